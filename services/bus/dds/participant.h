@@ -1,0 +1,45 @@
+// DDS backend of the ports: one participant per process, with the transports and QoS of services/bus/topics. No DDS
+// type is visible here.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "services/bus/port.h"
+
+namespace fulcrum::bus {
+
+struct DdsSettings {
+  int domain = 7;                       ///< 1 … 100: one per cart, one per test.
+  std::string node_name = "fulcrum";    ///< Seen by peers in USER_DATA.
+  std::filesystem::path shared_memory;  ///< Private 0700 directory on /dev/shm for data-sharing; empty: one per domain.
+};
+
+/// Hash of all IDL files, compiled in. Peers with another one are refused on discovery.
+[[nodiscard]] std::uint64_t SchemaHash();
+
+class DdsParticipant {
+ public:
+  /// Throws InputError when the domain is out of range, shared memory is short or the participant cannot be made.
+  explicit DdsParticipant(const DdsSettings& settings);
+  ~DdsParticipant();
+  DdsParticipant(const DdsParticipant&) = delete;
+  DdsParticipant& operator=(const DdsParticipant&) = delete;
+
+  /// Ports live at most as long as the participant. T is a message of services/core/messages.h.
+  template <class T>
+  [[nodiscard]] std::unique_ptr<Input<T>> MakeInput();
+  template <class T>
+  [[nodiscard]] std::unique_ptr<typename OutputOf<T>::type> MakeOutput();
+
+  /// Empty, or one line naming a peer whose schema hash differs (both hashes, both names).
+  [[nodiscard]] std::string schema_mismatch() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace fulcrum::bus

@@ -1,0 +1,41 @@
+// Checkpoint file: what a node cannot recompute after a kill. Two slots in a memory-mapped file; each commit fills the
+// older one and then seals it with sequence and checksum, so that a kill at any moment leaves one whole slot.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+
+namespace fulcrum::runtime {
+
+class CheckpointFile {
+ public:
+  /// Opens or creates. A file of another scene, layout version or capacity is replaced, not an error.
+  /// Throws InputError when the file cannot be created.
+  CheckpointFile(const std::filesystem::path& file, std::uint64_t scene_hash, std::uint32_t layout_version,
+                 std::size_t capacity_bytes);
+  ~CheckpointFile();
+  CheckpointFile(const CheckpointFile&) = delete;
+  CheckpointFile& operator=(const CheckpointFile&) = delete;
+
+  struct Loaded {
+    std::uint64_t sequence;
+    std::span<const std::byte> payload;  ///< Valid until the next Begin().
+  };
+  /// Newest whole slot, or nothing.
+  [[nodiscard]] std::optional<Loaded> Latest() const;
+
+  /// The slot to fill, `capacity_bytes` long.
+  [[nodiscard]] std::span<std::byte> Begin();
+  /// Seals the first `bytes` of it.
+  void Commit(std::size_t bytes);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace fulcrum::runtime

@@ -1,0 +1,57 @@
+#include "tests/benchmark/report.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+
+namespace fulcrum::benchmark {
+
+Report::Report(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view arg = argv[i];
+    if (arg == "--quick") {
+      quick_ = true;
+    } else if (arg.starts_with("-")) {
+      std::fprintf(stderr, "usage: %s [--quick] [PREFIX]\n", argv[0]);
+      std::exit(arg == "--help" || arg == "-h" ? 0 : 2);
+    } else {
+      prefix_ = arg;
+    }
+  }
+}
+
+bool Report::Wants(std::string_view stem) const {
+  return stem.starts_with(prefix_) || std::string_view(prefix_).starts_with(stem);
+}
+
+void Report::Add(std::string_view key, double value, std::string_view unit) {
+  if (!key.starts_with(prefix_)) return;
+  std::printf("%.*s %.6g %.*s\n", static_cast<int>(key.size()), key.data(), value, static_cast<int>(unit.size()),
+              unit.data());
+  std::fflush(stdout);
+}
+
+double Quantile(std::vector<double> values, double q) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  std::sort(values.begin(), values.end());
+  const double position = q * static_cast<double>(values.size() - 1);
+  const auto low = static_cast<std::size_t>(position);
+  const std::size_t high = std::min(low + 1, values.size() - 1);
+  return std::lerp(values[low], values[high], position - static_cast<double>(low));
+}
+
+std::vector<double> TimeMs(int warmup, int repeats, const std::function<void()>& body) {
+  std::vector<double> times;
+  for (int i = 0; i < warmup + repeats; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    body();
+    const std::chrono::duration<double, std::milli> elapsed = std::chrono::steady_clock::now() - start;
+    if (i >= warmup) times.push_back(elapsed.count());
+  }
+  return times;
+}
+
+}  // namespace fulcrum::benchmark
