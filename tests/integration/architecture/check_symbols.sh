@@ -1,0 +1,31 @@
+#!/usr/bin/env bash
+# A solver archive must know nothing of the middleware, the scene graph, the configuration or the network.
+#   check_symbols.sh BUILD_DIR
+# Every static library below a node's folder is a solver, except the node's own library lib<project>_<node>.a.
+set -euo pipefail
+build=$1
+forbidden='eprosima|fastrtps|fastdds|fastcdr|osg::|YAML::|fulcrum::msg::|fulcrum::app::|boost::'
+nodes=(physics_node thermal_node haptics_node handle_bridge render_node)
+checked=0
+failed=0
+for node in "${nodes[@]}"; do
+  while IFS= read -r archive; do
+    name=$(basename "$archive" .a)
+    case "$name" in
+      libfulcrum_"$node" | libfulcrum_handle_bridge_serial | libfulcrum_render_node_*) continue ;;
+    esac
+    checked=$((checked + 1))
+    if hits=$(nm -C "$archive" 2>/dev/null | grep -E "$forbidden" | head -n 5) && [ -n "$hits" ]; then
+      printf 'FAILED %s reaches beyond core:\n%s\n' "$name" "$hits"
+      failed=1
+    else
+      printf 'ok     %s\n' "$name"
+    fi
+  done < <(find "$build/$node" -name 'lib*.a' | sort)
+done
+# Guards the guard: the solvers of physics, thermal, haptics and handle must have been there to be read.
+if [ "$checked" -lt 6 ]; then
+  printf 'FAILED only %d solver archives found below %s: build everything first\n' "$checked" "$build"
+  exit 1
+fi
+exit "$failed"

@@ -1,0 +1,59 @@
+#include "services/core/hash.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <set>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace fulcrum {
+namespace {
+
+std::uint64_t HashOf(const std::vector<std::uint8_t>& bytes) {
+  Hash64 hash;
+  hash.Add(std::span<const std::uint8_t>(bytes));
+  return hash.value();
+}
+
+TEST(Hash64, EveryBitOfTheInputChangesIt) {
+  std::vector<std::uint8_t> bytes(37, 0x5a);
+  std::set<std::uint64_t> seen{HashOf(bytes)};
+  for (auto& byte : bytes) {
+    for (int bit = 0; bit < 8; ++bit) {
+      byte = static_cast<std::uint8_t>(byte ^ (1 << bit));
+      EXPECT_TRUE(seen.insert(HashOf(bytes)).second);
+      byte = static_cast<std::uint8_t>(byte ^ (1 << bit));
+    }
+  }
+}
+
+TEST(Hash64, LengthCounts) {
+  std::set<std::uint64_t> seen;
+  for (std::size_t n = 0; n < 40; ++n) {
+    EXPECT_TRUE(seen.insert(HashOf(std::vector<std::uint8_t>(n, 0))).second) << n << " zero bytes";
+  }
+}
+
+TEST(Hash64, OrderCounts) {
+  Hash64 ab;
+  ab.AddValue(1.0f);
+  ab.AddValue(2.0f);
+  Hash64 ba;
+  ba.AddValue(2.0f);
+  ba.AddValue(1.0f);
+  EXPECT_NE(ab.value(), ba.value());
+}
+
+TEST(Hash64, NegativeZeroIsAnotherState) {
+  // A state hash compares bits, so that a replay that differs in the sign of zero is found.
+  Hash64 positive;
+  positive.AddValue(0.0f);
+  Hash64 negative;
+  negative.AddValue(-0.0f);
+  EXPECT_NE(positive.value(), negative.value());
+}
+
+}  // namespace
+}  // namespace fulcrum
