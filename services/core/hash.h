@@ -7,11 +7,12 @@
 #include <cstring>
 #include <span>
 #include <string_view>
+#include <type_traits>
 
 namespace fulcrum {
 
-/// FNV-1a over 8-byte words with a finaliser (Fowler, Noll, Vo; finaliser of SplitMix64). The word-wise form reads
-/// 300 KB in about 40 us; the bytes left over at the end are folded in with the length, so that {1} and {1,0} differ.
+/// Multiply-rotate over 8-byte words with SplitMix64's finaliser (Steele, Lea, Flood 2014). The bytes left over at the
+/// end are folded in with the length, so that {1} and {1, 0} differ.
 class Hash64 {
  public:
   void Add(std::span<const std::byte> bytes) noexcept {
@@ -51,7 +52,11 @@ class Hash64 {
   }
 
  private:
-  void Mix(std::uint64_t word) noexcept { state_ = std::rotl((state_ ^ word) * 0x100000001b3ull, 23) + word; }
+  /// Invertible in the state for a given word and in the word for a given state: two inputs that differ in one word
+  /// never meet.
+  void Mix(std::uint64_t word) noexcept {
+    state_ = std::rotl(state_ ^ (word * 0x9e3779b97f4a7c15ull), 27) * 0xbf58476d1ce4e5b9ull + 0x94d049bb133111ebull;
+  }
 
   std::uint64_t state_ = 0xcbf29ce484222325ull;
 };
