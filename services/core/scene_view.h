@@ -91,7 +91,9 @@ struct StretchConstraint {
 /// Dihedral over the edge (v[0], v[1]) with the wings v[2], v[3].
 struct BendingConstraint {
   std::array<Index, 4> v;
-  float rest_angle;  ///< [rad], 0 when flat.
+  /// Signed angle from n1 = (x1-x0)x(x2-x0) to n2 = (x3-x0)x(x1-x0) about x1-x0 [rad], 0 when flat; at rest n1 and n2
+  /// point outward (away from the organ).
+  float rest_angle;
 };
 
 /// Eq. 9 of the paper: a spring from a membrane node to a point of a tube surface triangle.
