@@ -1,0 +1,28 @@
+// Counts what a real-time loop must not do. A program linked with fulcrum_allocation_guard has the malloc family and
+// pthread_mutex_lock replaced by versions that count, on the threads that ask for it, and then do their job.
+//
+//   AllocationGuard guard;
+//   servo.Step(tick);
+//   EXPECT_EQ(guard.violations(), 0);
+#pragma once
+
+#include <cstdint>
+
+namespace fulcrum::testing {
+
+/// While alive, the calling thread is watched. Guards do not nest.
+class AllocationGuard {
+ public:
+  AllocationGuard();
+  ~AllocationGuard();
+  AllocationGuard(const AllocationGuard&) = delete;
+  AllocationGuard& operator=(const AllocationGuard&) = delete;
+
+  /// Allocations, releases and mutex locks of this thread since the guard was made.
+  [[nodiscard]] std::int64_t violations() const;
+
+  /// False where a sanitizer owns malloc: nothing is counted there.
+  [[nodiscard]] static bool active();
+};
+
+}  // namespace fulcrum::testing
