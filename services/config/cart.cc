@@ -1,0 +1,187 @@
+#include "services/config/cart.h"
+
+#include <algorithm>
+
+#include "services/config/strict_yaml.h"
+
+namespace fulcrum::config {
+namespace {
+
+const StrictMap::Choices<LinkKind> kLinkKinds = {
+    {"none", LinkKind::kNone}, {"simulated", LinkKind::kSimulated}, {"serial", LinkKind::kSerial}};
+const StrictMap::Choices<DeviceKind> kDeviceKinds = {{"none", DeviceKind::kNone},
+                                                     {"simulated", DeviceKind::kSimulated}};
+constexpr std::array kBauds = {9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600};
+constexpr std::size_t kMaxCalibrationPoints = 9;
+constexpr int kMaxUsbId = 0xffff;
+
+std::string ToolKey(std::size_t tool) { return std::string("tool") + std::to_string(tool); }
+
+void ReadLink(StrictMap map, SerialLink* link) {
+  link->port = map.TextOr("port", link->port);
+  link->usb_vendor_id = static_cast<int>(map.Integer("usb_vendor_id", link->usb_vendor_id, 0, kMaxUsbId));
+  link->usb_product_id = static_cast<int>(map.Integer("usb_product_id", link->usb_product_id, 0, kMaxUsbId));
+  link->usb_serial = map.TextOr("usb_serial", link->usb_serial);
+  link->baud = static_cast<int>(map.Integer("baud", link->baud, kBauds.front(), kBauds.back()));
+}
+
+void ReadCalibration(StrictMap map, JawCalibration* calibration) {
+  calibration->adc_step_V = map.NumberSi("adc_step_V", calibration->adc_step_V, Range::Between(0.0005, 0.05));
+  calibration->volts = map.NumbersSi("points_V", calibration->volts, 2, kMaxCalibrationPoints, Range::Between(0, 5.5));
+  calibration->angles_rad =
+      map.NumbersSi("angles_deg", calibration->angles_rad, 2, kMaxCalibrationPoints, Range::Between(-10, 120));
+}
+
+void ReadTiming(StrictMap map, NodeTiming* timing) {
+  timing->rate_Hz = map.NumberSi("rate_Hz", timing->rate_Hz, Range::Between(1, 4000));
+  timing->fifo_priority = static_cast<int>(map.Integer("fifo_priority", timing->fifo_priority, 0, 99));
+  timing->cpu = static_cast<int>(map.Integer("cpu", timing->cpu, -1, 1023));
+  timing->spin_s = map.NumberSi("spin_us", timing->spin_s, Range::Between(0, 500));
+}
+
+/// Reads `file` over `cart`: what the file does not say stays.
+CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
+  StrictMap root = file->root();
+  cart.name = root.TextOr("name", cart.name, 31);
+  cart.domain = static_cast<int>(root.Integer("domain", cart.domain, 1, 100));
+  StrictMap handles = root.MapOrDefaults("handles");
+  for (std::size_t tool = 0; tool < cart.handles.size(); ++tool) {
+    StrictMap map = handles.MapOrDefaults(ToolKey(tool));
+    HandleConfig& handle = cart.handles[tool];
+    handle.kind = map.Choice("kind", handle.kind, kLinkKinds);
+    ReadLink(map, &handle.link);
+    ReadCalibration(map.MapOrDefaults("calibration"), &handle.calibration);
+  }
+  StrictMap pedal = root.MapOrDefaults("pedal");
+  cart.pedal.kind = pedal.Choice("kind", cart.pedal.kind, kLinkKinds);
+  ReadLink(pedal, &cart.pedal.link);
+  StrictMap devices = root.MapOrDefaults("devices");
+  for (std::size_t tool = 0; tool < cart.devices.size(); ++tool) {
+    cart.devices[tool] = devices.MapOrDefaults(ToolKey(tool)).Choice("kind", cart.devices[tool], kDeviceKinds);
+  }
+  StrictMap nodes = root.MapOrDefaults("nodes");
+  for (std::size_t node = 0; node < cart.nodes.size(); ++node) {
+    ReadTiming(nodes.MapOrDefaults(NodeName(static_cast<NodeId>(node))), &cart.nodes[node]);
+  }
+  file->Finish();
+  return cart;
+}
+
+[[noreturn]] void Refuse(const std::string& field, const std::string& reason) {
+  std::string message = field;
+  throw InputError(message.append(": ").append(reason));
+}
+
+void ValidateLink(const std::string& field, LinkKind kind, const SerialLink& link) {
+  if (kind != LinkKind::kSerial) {
+    return;
+  }
+  if (link.port.empty() && (link.usb_vendor_id == 0 || link.usb_product_id == 0)) {
+    Refuse(field, "kind is serial, but neither `port` nor `usb_vendor_id` and `usb_product_id` say which; give one");
+  }
+  if (std::find(kBauds.begin(), kBauds.end(), link.baud) == kBauds.end()) {
+    std::string valid;
+    for (const int baud : kBauds) {
+      valid += ' ';
+      valid += std::to_string(baud);
+    }
+    Refuse(field + ".baud", std::to_string(link.baud) + " is not a usual speed; valid:" + valid);
+  }
+}
+
+void ValidateCalibration(const std::string& field, const JawCalibration& calibration) {
+  const auto& v = calibration.volts;
+  const auto& a = calibration.angles_rad;
+  if (v.size() != a.size() || v.size() < 2 || v.size() > kMaxCalibrationPoints) {
+    Refuse(field, "points_V has " + std::to_string(v.size()) + " entries and angles_deg " + std::to_string(a.size()) +
+                      "; valid: the same number, 2 to 9");
+  }
+  // Fewer than four counts between two points and the converter's own error would dominate the slope.
+  const double min_gap_V = 4 * calibration.adc_step_V;
+  for (std::size_t i = 1; i < v.size(); ++i) {
+    if (!(v[i] - v[i - 1] >= min_gap_V)) {
+      Refuse(field + ".points_V", "entry " + std::to_string(i + 1) + " (" + std::to_string(v[i]) +
+                                      " V) must exceed the one before by at least 4 counts (" +
+                                      std::to_string(min_gap_V) + " V)");
+    }
+    if ((a[i] - a[i - 1]) * (a[1] - a[0]) <= 0) {
+      Refuse(field + ".angles_deg",
+             "entry " + std::to_string(i + 1) + " breaks the order; valid: all rising or all falling");
+    }
+  }
+}
+
+void ValidatePorts(const CartConfig& cart) {
+  std::vector<std::string> ports;
+  const auto add = [&ports](LinkKind kind, const SerialLink& link, const std::string& field) {
+    if (kind != LinkKind::kSerial || link.port.empty()) {
+      return;
+    }
+    if (std::find(ports.begin(), ports.end(), link.port) != ports.end()) {
+      Refuse(field + ".port", "'" + link.port + "' is given to two links; each needs its own");
+    }
+    ports.push_back(link.port);
+  };
+  for (std::size_t tool = 0; tool < cart.handles.size(); ++tool) {
+    add(cart.handles[tool].kind, cart.handles[tool].link, "handles." + ToolKey(tool));
+  }
+  add(cart.pedal.kind, cart.pedal.link, "pedal");
+}
+
+CartConfig ReadAndValidate(StrictYaml* yaml, const std::string& name) {
+  CartConfig cart = ReadCart(yaml, CartConfig());
+  try {
+    Validate(cart);
+  } catch (const InputError& e) {
+    throw InputError(name + ": " + e.what());
+  }
+  return cart;
+}
+
+}  // namespace
+
+CartConfig::CartConfig() {
+  for (HandleConfig& handle : handles) {
+    handle.kind = LinkKind::kSimulated;
+  }
+  pedal.kind = LinkKind::kSimulated;
+  devices.fill(DeviceKind::kSimulated);
+  const auto timing_of = [this](NodeId node) -> NodeTiming& { return nodes[static_cast<std::size_t>(node)]; };
+  timing_of(NodeId::kSupervisor) = {.rate_Hz = 10};
+  timing_of(NodeId::kHandleBridge) = {.rate_Hz = 400, .fifo_priority = 60};
+  timing_of(NodeId::kHaptics) = {.rate_Hz = 1000, .fifo_priority = 80, .spin_s = 50e-6};
+  timing_of(NodeId::kPhysics) = {.rate_Hz = 100, .fifo_priority = 40};
+  timing_of(NodeId::kThermal) = {.rate_Hz = 100, .fifo_priority = 30};
+  timing_of(NodeId::kRender) = {.rate_Hz = 30};
+}
+
+void Validate(const CartConfig& cart) {
+  if (cart.domain < 1 || cart.domain > 100) {
+    Refuse("domain", std::to_string(cart.domain) + " is out of range; valid: 1 to 100");
+  }
+  for (std::size_t tool = 0; tool < cart.handles.size(); ++tool) {
+    const std::string field = "handles." + ToolKey(tool);
+    ValidateLink(field, cart.handles[tool].kind, cart.handles[tool].link);
+    ValidateCalibration(field + ".calibration", cart.handles[tool].calibration);
+  }
+  ValidateLink("pedal", cart.pedal.kind, cart.pedal.link);
+  ValidatePorts(cart);
+}
+
+CartConfig LoadCart(const std::filesystem::path& file) {
+  StrictYaml yaml = StrictYaml::FromFile(file);
+  return ReadAndValidate(&yaml, file.string());
+}
+
+CartConfig LoadCartText(const std::string& text, const std::string& name) {
+  StrictYaml yaml = StrictYaml::FromText(text, name);
+  return ReadAndValidate(&yaml, name);
+}
+
+std::string CartToYaml(const CartConfig& cart) {
+  StrictYaml empty = StrictYaml::FromText("{}", "cart");
+  ReadCart(&empty, cart);
+  return empty.Effective();
+}
+
+}  // namespace fulcrum::config

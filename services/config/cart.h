@@ -1,0 +1,79 @@
+// The cart: what hardware (or simulation of it) is attached, and at which rate and priority each node runs.
+// Files: deploy/carts/*.yaml, documented there.
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "services/core/messages.h"
+
+namespace fulcrum::config {
+
+enum class LinkKind { kNone, kSimulated, kSerial };
+
+/// Where a serial line is found, and how it is spoken: 8N1, no flow control.
+struct SerialLink {
+  std::string port;       ///< "/dev/ttyUSB0", better "/dev/serial/by-path/…"; empty: found by USB identity.
+  int usb_vendor_id = 0;  ///< 0: not given. With vendor, product and serial number a replug on another socket is found.
+  int usb_product_id = 0;
+  std::string usb_serial;  ///< Empty: any.
+  int baud = 115200;
+};
+
+/// Jaw angle as a function of the voltage that the handle's converter reports: through 2 … 9 points, monotone.
+/// Default: the paper's linear 2.37 … 2.54 V for 0 … 60 degrees.
+struct JawCalibration {
+  double adc_step_V = 0.00488;  ///< Volt per count of the 10-bit converter.
+  std::vector<double> volts = {2.37, 2.54};
+  std::vector<double> angles_rad = {0.0, 1.0471975511965976};
+};
+
+/// One handle; the index in CartConfig::handles is the tool it works.
+struct HandleConfig {
+  LinkKind kind = LinkKind::kNone;
+  SerialLink link;  ///< For kSerial.
+  JawCalibration calibration;
+};
+
+struct PedalConfig {
+  LinkKind kind = LinkKind::kNone;
+  SerialLink link;  ///< For kSerial.
+};
+
+enum class DeviceKind { kNone, kSimulated };
+
+/// How a node's cyclic thread runs.
+struct NodeTiming {
+  double rate_Hz = 100;
+  int fifo_priority = 0;  ///< 1 … 99: SCHED_FIFO when permitted; 0: normal scheduling.
+  int cpu = -1;           ///< Pin to this CPU; -1: any.
+  double spin_s = 0;      ///< Sleep until this long before each period, then spin.
+};
+
+struct CartConfig {
+  std::string name = "simulated";
+  int domain = 7;  ///< DDS domain, 1 … 100.
+  std::array<HandleConfig, kMaxTools> handles;
+  PedalConfig pedal;
+  std::array<DeviceKind, kMaxTools> devices{};  ///< Haptic device per tool.
+  std::array<NodeTiming, kNodeCount> nodes;     ///< By NodeId.
+
+  /// Everything simulated, at the rates of the architecture page.
+  CartConfig();
+  [[nodiscard]] const NodeTiming& timing(NodeId node) const { return nodes[static_cast<std::size_t>(node)]; }
+};
+
+/// The rules that span several fields. Throws InputError naming field, value and valid range.
+void Validate(const CartConfig& cart);
+
+/// Reads and validates. Throws InputError.
+[[nodiscard]] CartConfig LoadCart(const std::filesystem::path& file);
+/// The same for text in memory; `name` stands for the file in messages.
+[[nodiscard]] CartConfig LoadCartText(const std::string& text, const std::string& name);
+
+/// The whole configuration, defaults included, as a cart file that loads to the same.
+[[nodiscard]] std::string CartToYaml(const CartConfig& cart);
+
+}  // namespace fulcrum::config

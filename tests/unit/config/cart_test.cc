@@ -1,0 +1,104 @@
+#include "services/config/cart.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "services/core/error.h"
+
+namespace fulcrum::config {
+namespace {
+
+std::string Refusal(const std::string& text) {
+  try {
+    static_cast<void>(LoadCartText(text, "cart.yaml"));
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "accepted";
+}
+
+TEST(Cart, EveryShippedFileLoads) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(FULCRUM_SOURCE_DIR "/deploy/carts")) {
+    const CartConfig cart = LoadCart(entry.path());
+    EXPECT_EQ(cart.name, entry.path().stem().string());
+    ++files;
+  }
+  EXPECT_GE(files, 2);
+}
+
+TEST(Cart, SimulatedFileIsTheDefault) {
+  const CartConfig cart = LoadCart(FULCRUM_SOURCE_DIR "/deploy/carts/simulated.yaml");
+  EXPECT_EQ(CartToYaml(cart), CartToYaml(CartConfig()));
+  EXPECT_EQ(cart.timing(NodeId::kHandleBridge).rate_Hz, 400);
+  EXPECT_EQ(cart.timing(NodeId::kHaptics).rate_Hz, 1000);
+}
+
+TEST(Cart, LabFileNamesThreeSerialLinks) {
+  const CartConfig cart = LoadCart(FULCRUM_SOURCE_DIR "/deploy/carts/lab.yaml");
+  EXPECT_EQ(cart.handles[0].kind, LinkKind::kSerial);
+  EXPECT_EQ(cart.handles[1].kind, LinkKind::kSerial);
+  EXPECT_EQ(cart.pedal.kind, LinkKind::kSerial);
+  EXPECT_NE(cart.handles[0].link.port, cart.handles[1].link.port);
+  EXPECT_NEAR(cart.timing(NodeId::kHaptics).spin_s, 100e-6, 1e-12);
+}
+
+TEST(Cart, EffectiveConfigurationLoadsToItself) {
+  CartConfig cart = LoadCart(FULCRUM_SOURCE_DIR "/deploy/carts/lab.yaml");
+  cart.handles[0].calibration.volts = {2.3, 2.4, 2.55};
+  cart.handles[0].calibration.angles_rad = {1.0, 0.5, 0.0};
+  const std::string yaml = CartToYaml(cart);
+  EXPECT_EQ(CartToYaml(LoadCartText(yaml, "again")), yaml) << yaml;
+}
+
+struct BadCart {
+  const char* rule;
+  const char* text;
+  const char* said;
+};
+
+class RefusedCart : public ::testing::TestWithParam<BadCart> {};
+
+TEST_P(RefusedCart, SaysFileFieldAndValidRange) {
+  const std::string said = Refusal(GetParam().text);
+  EXPECT_EQ(said.rfind("cart.yaml", 0), 0u) << said;
+  EXPECT_NE(said.find(GetParam().said), std::string::npos) << said;
+}
+
+const BadCart kBadCarts[] = {
+    {"DomainZero", "domain: 0", "domain: '0' is not valid; valid: an integer from 1 to 100"},
+    {"DomainAbove", "domain: 101", "1 to 100"},
+    {"UnknownTool", "handles: {tool2: {kind: simulated}}", "handles.tool2: unknown key"},
+    {"UnknownLinkKind", "handles: {tool0: {kind: usb}}", "valid: none, simulated, serial"},
+    {"UnknownDevice", "devices: {tool0: {kind: touch}}", "valid: none, simulated"},
+    {"SerialWithoutPort", "handles: {tool0: {kind: serial}}", "handles.tool0: kind is serial, but neither"},
+    {"PedalWithoutPort", "pedal: {kind: serial}", "pedal: kind is serial, but neither"},
+    {"OddBaud", "handles: {tool0: {kind: serial, port: /dev/ttyUSB0, baud: 100000}}", "100000 is not a usual speed"},
+    {"SharedPort", "handles: {tool0: {kind: serial, port: /dev/a}, tool1: {kind: serial, port: /dev/a}}",
+     "handles.tool1.port: '/dev/a' is given to two links"},
+    {"CalibrationLengths", "handles: {tool0: {calibration: {points_V: [2.3, 2.4, 2.5]}}}", "the same number, 2 to 9"},
+    {"CalibrationOrder", "handles: {tool0: {calibration: {points_V: [2.5, 2.3]}}}", "must exceed the one before"},
+    {"CalibrationNotMonotone", "handles: {tool0: {calibration: {points_V: [2.3, 2.4, 2.5], angles_deg: [0, 30, 20]}}}",
+     "breaks the order"},
+    {"CalibrationUnit", "handles: {tool0: {calibration: {adc_step_V: 4.88 mm}}}", "has the wrong unit"},
+    {"RateZero", "nodes: {physics_node: {rate_Hz: 0}}",
+     "nodes.physics_node.rate_Hz: '0' is out of range; valid: 1 to 4000 Hz"},
+    {"UnknownNode", "nodes: {physic_node: {rate_Hz: 100}}", "did you mean 'physics_node'?"},
+    {"Priority", "nodes: {physics_node: {fifo_priority: 100}}", "an integer from 0 to 99"},
+    {"Cpu", "nodes: {physics_node: {cpu: -2}}", "an integer from -1 to 1023"},
+    {"Spin", "nodes: {physics_node: {spin_us: 1000}}", "valid: 0 to 500 us"},
+};
+
+INSTANTIATE_TEST_SUITE_P(Rules, RefusedCart, ::testing::ValuesIn(kBadCarts),
+                         [](const auto& test) { return test.param.rule; });
+
+TEST(Cart, ValidateChecksAStructThatNoFileProduced) {
+  CartConfig cart;
+  EXPECT_NO_THROW(Validate(cart));
+  cart.domain = 200;
+  EXPECT_THROW(Validate(cart), InputError);
+}
+
+}  // namespace
+}  // namespace fulcrum::config
