@@ -1,0 +1,130 @@
+// The shipped procedural scenes as settings. deploy/scenes/*.yaml say the same; a test compares the two.
+#include "services/scene/scene_settings.h"
+
+namespace fulcrum::scene {
+namespace {
+
+constexpr float kMillimetre = 0.001f;
+
+ToolDescription Grasper(const Vec3f& p_WP) { return {ToolKind::kGrasper, p_WP, 0.0025f, 0.33f, 0.0015f, 0.018f}; }
+
+ToolDescription Hook(const Vec3f& p_WP) { return {ToolKind::kHook, p_WP, 0.0025f, 0.33f, 0.0006f, 0.005f}; }
+
+/// Writes keys one after the other.
+class ScriptWriter {
+ public:
+  explicit ScriptWriter(std::vector<ScriptKeySettings>* keys) : keys_(keys) {}
+
+  void Grasper(double time_s, float s, float t, double height_mm, double jaw_rad,
+               const Vec3f& offset_mm = Vec3f::Zero()) {
+    keys_->push_back(
+        {time_s, 0, std::nullopt, Vec2f(s, t), height_mm / 1000, kMillimetre * offset_mm, jaw_rad, kPedalNone, 0});
+  }
+  void Hook(double time_s, float s, float t, double height_mm, double cut_W = 0) {
+    keys_->push_back({time_s, 1, std::nullopt, Vec2f(s, t), height_mm / 1000, Vec3f::Zero(), 0,
+                      cut_W > 0 ? kPedalCut : kPedalNone, cut_W});
+  }
+
+ private:
+  std::vector<ScriptKeySettings>* keys_;
+};
+
+}  // namespace
+
+SceneSettings BuiltIn() {
+  SceneSettings scene;
+  scene.name = "built-in";
+  scene.description = "Procedural rectum and membrane at the size of the paper's Table 3";
+  scene.structures = {
+      {ProtectedKind::kUreter, 0.0025, 0.003, {{0.10f, 0.f}, {0.13f, 0.3f}, {0.11f, 0.6f}, {0.15f, 1.f}}},
+      {ProtectedKind::kUreter, 0.0025, 0.003, {{0.90f, 0.f}, {0.88f, 0.35f}, {0.90f, 0.65f}, {0.86f, 1.f}}},
+      {ProtectedKind::kNerve, 0.0010, 0.003, {{0.22f, 0.f}, {0.20f, 0.4f}, {0.24f, 0.7f}, {0.30f, 1.f}}},
+      {ProtectedKind::kNerve, 0.0010, 0.003, {{0.80f, 0.f}, {0.82f, 0.4f}, {0.77f, 0.7f}, {0.70f, 1.f}}},
+      {ProtectedKind::kNerve, 0.0006, 0.003, {{0.82f, 0.40f}, {0.86f, 0.52f}, {0.84f, 0.7f}}},
+      {ProtectedKind::kNerve, 0.0006, 0.003, {{0.20f, 0.40f}, {0.15f, 0.55f}, {0.17f, 0.7f}}},
+  };
+  scene.tools = {Grasper(Vec3f(-0.085f, -0.045f, 0.115f)), Hook(Vec3f(0.085f, -0.045f, 0.115f))};
+  scene.render.scope_tip_W = Vec3f(0.006f, -0.085f, 0.095f);
+  scene.render.scope_target_W = Vec3f(0.0f, 0.004f, 0.020f);
+  ScriptWriter key(&scene.script);
+  // Left hand: comes down with the jaws open, presses a fold into them, closes, lifts the sheet up and to the left,
+  // holds it while the hook works, gives it back.
+  key.Grasper(0.0, 0.36f, 0.50f, 55, 0.9);
+  key.Grasper(1.2, 0.36f, 0.50f, 12, 0.9);
+  key.Grasper(2.0, 0.36f, 0.50f, -2.5, 0.9);
+  key.Grasper(2.3, 0.36f, 0.50f, -2.5, 0.9);
+  key.Grasper(2.9, 0.36f, 0.50f, -2.5, 0.0);
+  key.Grasper(3.2, 0.36f, 0.50f, -2.0, 0.0);
+  key.Grasper(5.8, 0.36f, 0.50f, 20, 0.0, Vec3f(-10, 4, 4));
+  key.Grasper(15.0, 0.36f, 0.50f, 20, 0.0, Vec3f(-10, 4, 4));
+  key.Grasper(16.2, 0.36f, 0.50f, 4, 0.0, Vec3f(-2, 0, 0));
+  key.Grasper(16.6, 0.36f, 0.50f, 4, 0.0, Vec3f(-2, 0, 0));
+  key.Grasper(17.2, 0.36f, 0.50f, 5, 0.9, Vec3f(-2, 0, 0));
+  key.Grasper(19.0, 0.36f, 0.50f, 50, 0.9);
+  key.Grasper(20.0, 0.36f, 0.50f, 55, 0.9);
+  // Right hand: waits, touches down beside the tent, cuts 30 mm along the organ at 4 mm/s, lifts off.
+  key.Hook(0.0, 0.68f, 0.40f, 45);
+  key.Hook(4.5, 0.68f, 0.40f, 45);
+  key.Hook(6.3, 0.62f, 0.42f, 6);
+  key.Hook(7.0, 0.62f, 0.42f, -2.5);
+  key.Hook(7.3, 0.62f, 0.42f, -2.5, 35);
+  key.Hook(14.8, 0.62f, 0.57f, -2.5, 35);
+  key.Hook(14.9, 0.62f, 0.57f, -2.5);
+  key.Hook(15.8, 0.64f, 0.57f, 10);
+  key.Hook(18.0, 0.70f, 0.50f, 45);
+  key.Hook(20.0, 0.70f, 0.50f, 45);
+  scene.script_duration_s = 20;
+  return scene;
+}
+
+SceneSettings Small() {
+  SceneSettings scene = BuiltIn();
+  scene.name = "small";
+  scene.description = "A tenth of the built-in scene, for tests";
+  scene.tube = {.rings = 11,
+                .segments = 10,
+                .length_m = 0.080,
+                .outer_radius_m = 0.010,
+                .wall_m = 0.003,
+                .sagittal_bend_m = 0.003,
+                .lateral_bend_m = 0.001,
+                .fold_count = 2,
+                .fold_depth_m = 0.0006};
+  scene.membrane = {.rows = 73,
+                    .cols = 25,
+                    .width_m = 0.043,
+                    .gap_m = 0.0045,
+                    .density_kg_m2 = 0.5,
+                    .bending_row_stride = 4,
+                    .bending_col_stride = 4,
+                    .binding_row_stride = 3,
+                    .binding_col_stride = 3,
+                    .binding_reach_m = 0.0058};
+  scene.structures.resize(4);
+  scene.tools = {Grasper(Vec3f(-0.075f, -0.045f, 0.110f)), Hook(Vec3f(0.075f, -0.045f, 0.110f))};
+  scene.render.scope_tip_W = Vec3f(0.004f, -0.055f, 0.070f);
+  scene.render.scope_target_W = Vec3f(0.0f, 0.002f, 0.012f);
+  scene.script.clear();
+  ScriptWriter key(&scene.script);
+  key.Grasper(0.0, 0.33f, 0.50f, 20, 0.9);
+  key.Grasper(0.6, 0.33f, 0.50f, -2.0, 0.9);
+  key.Grasper(0.8, 0.33f, 0.50f, -2.0, 0.9);
+  key.Grasper(1.1, 0.33f, 0.50f, -2.0, 0.0);
+  key.Grasper(2.0, 0.33f, 0.50f, 9, 0.0, Vec3f(-4, 0, 2));
+  key.Grasper(4.9, 0.33f, 0.50f, 9, 0.0, Vec3f(-4, 0, 2));
+  key.Grasper(5.2, 0.33f, 0.50f, 3, 0.0);
+  key.Grasper(5.4, 0.33f, 0.50f, 4, 0.9);
+  key.Grasper(6.0, 0.33f, 0.50f, 20, 0.9);
+  key.Hook(0.0, 0.66f, 0.42f, 20);
+  key.Hook(1.4, 0.66f, 0.42f, 15);
+  key.Hook(2.1, 0.66f, 0.42f, -2.0);
+  key.Hook(2.3, 0.66f, 0.42f, -2.0, 35);
+  key.Hook(4.8, 0.66f, 0.545f, -2.0, 35);
+  key.Hook(4.9, 0.66f, 0.545f, -2.0);
+  key.Hook(5.4, 0.66f, 0.545f, 10);
+  key.Hook(6.0, 0.66f, 0.50f, 20);
+  scene.script_duration_s = 6;
+  return scene;
+}
+
+}  // namespace fulcrum::scene

@@ -1,0 +1,107 @@
+// What a scene description says: plain settings with defaults. Filled by services/scene/scene_yaml.h from a YAML file
+// or by the presets below, turned into a SceneData by services/scene/build.h.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/core/scene_view.h"
+
+namespace fulcrum::scene {
+
+/// The procedural rectum: a walled tube along +y (cranial), z anterior, as `rings` x `segments` x 2 vertices; each of
+/// the (rings - 1) * segments bricks is split into six tetrahedra.
+struct TubeSettings {
+  int rings = 43;
+  int segments = 24;
+  double length_m = 0.200;
+  double outer_radius_m = 0.018;
+  double wall_m = 0.003;
+  double sagittal_bend_m = 0.012;  ///< The ends lie this much higher than the middle.
+  double lateral_bend_m = 0.004;   ///< Amplitude of the S in the frontal plane.
+  int fold_count = 5;              ///< Haustra along the length.
+  double fold_depth_m = 0.0012;    ///< Amplitude of the folds on the radius.
+};
+
+/// The organ read from a closed surface mesh instead.
+struct ImportSettings {
+  std::filesystem::path organ_file;
+  double scale_m = 0.001;  ///< Metres per unit of all the files here.
+  int target_tets = 8000;
+  double min_edge_m = 0.0004;     ///< Shorter edges of the surface are collapsed.
+  double sector_deg = 170;        ///< How far round the organ the membrane reaches.
+  double apron_m = 0.012;         ///< The membrane goes on this far to the side of the organ.
+  double end_margin_m = 0.012;    ///< Length left free at either end of the organ …
+  double fixed_end_m = 0.006;     ///< … and fixed there.
+  int organ_surface_max = 20000;  ///< The embedded surface is decimated to this many triangles.
+  int surroundings_max = 3000;    ///< Each surrounding surface likewise.
+  struct Surrounding {
+    std::string name;
+    SurfaceRole role = SurfaceRole::kOther;
+    std::filesystem::path file;
+    bool collides = false;
+  };
+  std::vector<Surrounding> surroundings;
+};
+
+/// The membrane's dynamic layer. Columns run across the organ (coordinate s, +x), rows along it (coordinate t, +y).
+struct MembraneSettings {
+  int rows = 289;
+  int cols = 64;
+  double width_m = 0.069;  ///< Arc length across, procedural only.
+  double gap_m = 0.0055;   ///< From the organ's surface: the fat lies between.
+  double density_kg_m2 = 0.5;
+  int bending_row_stride = 4;  ///< Bending acts on the sub-grid of every so many rows …
+  int bending_col_stride = 7;  ///< … and columns; both divide the number of cells.
+  int binding_row_stride = 4;  ///< Every so many rows and columns a node is bound to the organ …
+  int binding_col_stride = 4;
+  double binding_reach_m = 0.0068;  ///< … where the organ's surface is this near.
+};
+
+/// A ureter or nerve beneath the membrane, through points given as fractions of the sheet.
+struct StructureSettings {
+  ProtectedKind kind = ProtectedKind::kUreter;
+  double radius_m = 0.0025;
+  double depth_m = 0.003;
+  std::vector<Vec2f> path;  ///< (s, t) fractions in [0, 1].
+};
+
+/// One key of the operator's script: a place over the membrane or in the world.
+struct ScriptKeySettings {
+  double time_s = 0;
+  int tool = 0;
+  std::optional<Vec3f> world_m;     ///< Set: this place. Not set: the three below.
+  Vec2f sheet = Vec2f(0.5f, 0.5f);  ///< (s, t) fractions of the sheet in [0, 1].
+  double height_m = 0;              ///< Above the sheet at rest; negative: pressed in.
+  Vec3f offset_m = Vec3f::Zero();   ///< Added to it, frame W.
+  double jaw_rad = 0;
+  std::uint32_t pedals = kPedalNone;
+  double power_W = 0;
+};
+
+struct SceneSettings {
+  std::string name;
+  std::string description;
+  PhysicsParams physics;
+  ThermalParams thermal;
+  RenderParams render;
+  HapticsParams haptics;
+  double organ_density_kg_m3 = 1050;
+  TubeSettings tube;  ///< Used without `import`.
+  std::optional<ImportSettings> import;
+  MembraneSettings membrane;
+  std::vector<StructureSettings> structures;
+  std::array<ToolDescription, kMaxTools> tools{};
+  std::vector<ScriptKeySettings> script;
+  double script_duration_s = 20;
+  std::uint32_t node_mask = 0x3e;  ///< Bit per NodeId.
+};
+
+/// The paper's size (Table 3 within 2 %); the same as deploy/scenes/built-in.yaml.
+SceneSettings BuiltIn();
+/// About a tenth of it; the same as deploy/scenes/small.yaml.
+SceneSettings Small();
+
+}  // namespace fulcrum::scene
