@@ -1,0 +1,229 @@
+#include "services/app/node_app.h"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdio>
+#include <limits>
+#include <mutex>
+#include <thread>
+
+#include "services/app/health_report.h"
+#include "services/bus/input_account.h"
+#include "services/core/error.h"
+#include "services/runtime/realtime.h"
+
+namespace fulcrum::app {
+namespace {
+
+using runtime::Log;
+using runtime::LogLevel;
+using runtime::MonotonicNs;
+
+constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max();
+constexpr auto kPollPeriod = std::chrono::milliseconds(10);
+constexpr auto kHealthPeriod = std::chrono::milliseconds(100);
+// A node that cannot end within this time has hung; its checkpoint is safe against a kill.
+constexpr unsigned kLongestEndS = 3;
+
+}  // namespace
+
+struct NodeApp::Impl {
+  Impl(NodeId node_id, const NodeOptions& node_options)
+      : node(node_id),
+        options(node_options),
+        cart(node_options.cart.empty() ? config::CartConfig() : config::LoadCart(node_options.cart)),
+        scene(node_options.scene),
+        participant({.domain = node_options.domain, .node_name = NodeName(node_id), .shared_memory = {}}),
+        manifests(participant.MakeInput<SceneManifest>()),
+        commands(participant.MakeInput<Command>()),
+        replies(participant.MakeOutput<CommandReply>()),
+        healths(participant.MakeOutput<Health>()),
+        reply_stamper(MonotonicNs()),
+        health_stamper(MonotonicNs()) {}
+
+  /// What the bus says to every node, looked at by the main thread.
+  void PollBus() {
+    SceneManifest manifest;
+    while (manifests->TakeNext(&manifest)) {
+      if (manifest.scene_hash != scene.view().hash) {
+        End(ExitCode::kMismatch, "the session runs another scene (\"" + manifest.scene_name +
+                                     "\"): stop it, or start this node with the scene of the session");
+        return;
+      }
+      if (session_start_ns.exchange(manifest.session_start_ns, std::memory_order_relaxed) == kSessionUnknown) {
+        Log(LogLevel::kInfo, "joined session " + manifest.session_id);
+      }
+    }
+    Command command;
+    while (commands->TakeNext(&command)) {
+      if (command.target != node) continue;
+      const bool known = command.verb == "stop";
+      CommandReply reply;
+      reply.stamp = reply_stamper.Next(MonotonicNs());
+      reply.request_id = command.request_id;
+      reply.from = node;
+      reply.ok = known;
+      reply.text = known ? "stopping" : "unknown verb \"" + command.verb + "\"; a node knows: stop";
+      replies->Write(reply);
+      if (known) End(ExitCode::kDone, "stopped by command");
+    }
+    if (const std::string mismatch = participant.schema_mismatch(); !mismatch.empty()) {
+      End(ExitCode::kMismatch, mismatch);
+    }
+  }
+
+  void End(ExitCode code, std::string_view reason) {
+    const std::lock_guard lock(end_mutex);
+    if (ended.load(std::memory_order_relaxed)) return;
+    Log(code == ExitCode::kDone ? LogLevel::kInfo : LogLevel::kError, reason);
+    exit_code = code;
+    ended.store(true, std::memory_order_release);  // Publishes exit_code.
+  }
+
+  [[nodiscard]] bool ShouldEnd() const noexcept {
+    return ended.load(std::memory_order_acquire) || runtime::ShouldStop();
+  }
+
+  void PublishHealth(HealthReport* report, const runtime::CyclicThread& thread, const HealthFill& fill) {
+    const std::int64_t now = MonotonicNs();
+    Health health = report->Make(now, state.load(std::memory_order_relaxed), thread.stats(), inputs, outputs);
+    health.stamp = health_stamper.Next(now);
+    if (fill) fill(&health);
+    FitToMessage(&health);
+    healths->Write(health);
+  }
+
+  const NodeId node;
+  NodeOptions options;
+  config::CartConfig cart;
+  scene::SceneFile scene;
+  bus::DdsParticipant participant;
+  std::unique_ptr<bus::Input<SceneManifest>> manifests;
+  std::unique_ptr<bus::Input<Command>> commands;
+  std::unique_ptr<bus::OutputOf<CommandReply>::type> replies;
+  std::unique_ptr<bus::OutputOf<Health>::type> healths;
+  bus::Stamper reply_stamper, health_stamper;
+  std::vector<HealthReport::InputWatch> inputs;
+  std::vector<HealthReport::OutputWatch> outputs;
+  std::vector<std::shared_ptr<void>> ports;
+
+  // Relaxed: one number, nothing else is published through it.
+  std::atomic<std::int64_t> session_start_ns{kSessionUnknown};
+  std::atomic<HealthState> state{HealthState::kStarting};
+  std::mutex end_mutex;
+  std::atomic<bool> ended{false};
+  ExitCode exit_code = ExitCode::kDone;
+};
+
+NodeApp::NodeApp(NodeId node, const NodeOptions& options) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(options.session, error)) {
+    throw InputError("--session " + options.session.string() + ": no such folder");
+  }
+  impl_ = std::make_unique<Impl>(node, options);
+}
+NodeApp::~NodeApp() = default;
+
+const SceneView& NodeApp::scene() const { return impl_->scene.view(); }
+NodeOptions& NodeApp::options() { return impl_->options; }
+const config::CartConfig& NodeApp::cart() const { return impl_->cart; }
+bus::DdsParticipant& NodeApp::bus() { return impl_->participant; }
+
+runtime::CyclicThreadSettings NodeApp::timing() const {
+  const config::NodeTiming& timing = impl_->cart.timing(impl_->node);
+  runtime::CyclicThreadSettings settings;
+  settings.name = NodeName(impl_->node);
+  settings.period_ns = static_cast<std::int64_t>(1e9 / timing.rate_Hz + 0.5);
+  settings.fifo_priority = timing.fifo_priority;
+  settings.spin_ns = static_cast<std::int64_t>(1e9 * timing.spin_s);
+  settings.cpu = timing.cpu;
+  return settings;
+}
+
+void NodeApp::Watch(TopicId topic, std::function<bus::InputStats()> stats) {
+  impl_->inputs.emplace_back(topic, std::move(stats));
+}
+void NodeApp::Watch(std::function<bus::OutputStats()> stats) { impl_->outputs.push_back(std::move(stats)); }
+void NodeApp::Keep(std::shared_ptr<void> port) { impl_->ports.push_back(std::move(port)); }
+
+double NodeApp::SessionTime(std::int64_t stamp_ns) const noexcept {
+  const std::int64_t start = impl_->session_start_ns.load(std::memory_order_relaxed);
+  return start == kSessionUnknown ? -1.0 : 1e-9 * static_cast<double>(stamp_ns - start);
+}
+
+void NodeApp::Finish(ExitCode code, std::string_view reason) { impl_->End(code, reason); }
+
+ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::function<void(const Tick&)>& step,
+                      const HealthFill& fill_health) {
+  Impl& app = *impl_;
+  if (!app.options.extra.empty()) {
+    throw InputError("unknown option \"" + app.options.extra.front() + "\"; see --help");
+  }
+  runtime::CyclicThread thread(settings, [&](const Tick& clock_tick) {
+    if (app.ShouldEnd()) return;
+    Tick tick = clock_tick;
+    tick.session_time_s = SessionTime(tick.stamp_ns);
+    try {
+      step(tick);
+    } catch (const std::exception& error) {
+      app.End(ExitCode::kFailure, std::string("step failed: ") + error.what());
+    }
+  });
+  HealthReport report(app.node, settings.period_ns, bus::SchemaHash(), app.scene.view().hash, ::getpid());
+  app.state = HealthState::kWaiting;
+  std::jthread health([&](const std::stop_token& stop) {
+    auto next = std::chrono::steady_clock::now();
+    while (!stop.stop_requested()) {
+      app.PublishHealth(&report, thread, fill_health);
+      next += kHealthPeriod;
+      std::this_thread::sleep_until(next);
+    }
+  });
+
+  bool stepping = false;
+  while (!app.ShouldEnd()) {
+    app.PollBus();
+    if (!stepping && SessionTime(MonotonicNs()) >= 0) {
+      stepping = true;
+      app.state = HealthState::kRunning;
+      thread.Start();
+    }
+    std::this_thread::sleep_for(kPollPeriod);
+  }
+  // SIGALRM's default action ends the process.
+  ::alarm(kLongestEndS);
+  app.state = HealthState::kStopping;
+  thread.Stop();
+  health.request_stop();
+  health.join();
+  app.PublishHealth(&report, thread, fill_health);
+  return app.exit_code;
+}
+
+int NodeMain(int argc, char** argv, NodeId node, const char* description,
+             const std::function<ExitCode(NodeApp&)>& run) {
+  runtime::SetLogName(NodeName(node));
+  runtime::InstallStopSignals();
+  const auto fail = [](ExitCode code, const std::exception& error) {
+    Log(LogLevel::kError, error.what());
+    return static_cast<int>(code);
+  };
+  try {
+    const ParsedOptions parsed = ParseNodeOptions(argc, argv, node, description);
+    if (!parsed.answer.empty()) {
+      std::fputs(parsed.answer.c_str(), stdout);
+      return static_cast<int>(ExitCode::kDone);
+    }
+    NodeApp app(node, parsed.options);
+    return static_cast<int>(run(app));
+  } catch (const InputError& error) {
+    return fail(ExitCode::kBadUsage, error);
+  } catch (const MismatchError& error) {
+    return fail(ExitCode::kMismatch, error);
+  } catch (const std::exception& error) {
+    return fail(ExitCode::kFailure, error);
+  }
+}
+
+}  // namespace fulcrum::app

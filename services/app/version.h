@@ -1,0 +1,7 @@
+#pragma once
+
+namespace fulcrum::app {
+
+inline constexpr const char* kVersion = FULCRUM_VERSION;
+
+}  // namespace fulcrum::app
