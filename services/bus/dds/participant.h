@@ -8,6 +8,7 @@
 #include <string>
 
 #include "services/bus/port.h"
+#include "services/bus/schema.h"
 
 namespace fulcrum::bus {
 
@@ -15,10 +16,8 @@ struct DdsSettings {
   int domain = 7;                       ///< 1 … 100: one per cart, one per test.
   std::string node_name = "fulcrum";    ///< Seen by peers in USER_DATA.
   std::filesystem::path shared_memory;  ///< Private 0700 directory on /dev/shm for data-sharing; empty: one per domain.
+  std::uint64_t schema_hash = SchemaHash();  ///< What peers must speak too; a test gives another one.
 };
-
-/// Hash of all IDL files, compiled in. Peers with another one are refused on discovery.
-[[nodiscard]] std::uint64_t SchemaHash();
 
 class DdsParticipant {
  public:

@@ -1,0 +1,248 @@
+#include "services/bus/dds/participant.h"
+
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastrtps/xmlparser/XMLProfileManager.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <map>
+#include <mutex>
+
+#include "services/bus/dds/ports.h"
+#include "services/bus/dds/shared_memory.h"
+#include "services/core/error.h"
+
+namespace fulcrum::bus {
+namespace {
+
+namespace fast = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastrtps::rtps;
+using eprosima::fastrtps::Duration_t;
+
+constexpr std::uint32_t kMilli_ns = 1'000'000;
+const Duration_t kLease{1, 0};
+const Duration_t kAnnouncement{0, 100 * kMilli_ns};
+/// A node's period is 10 ms or more wherever a reliable write may have to wait.
+const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
+constexpr std::uint32_t kSocketBuffer_B = 4u << 20;
+/// Samples above this do not fit one UDP datagram and are sent in fragments.
+constexpr std::uint32_t kDatagram_B = 64'000;
+
+std::string Hex(std::uint64_t value) {
+  std::array<char, 17> text{};
+  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(value));
+  return text.data();
+}
+
+/// USER_DATA of our participants: "fulcrum <hash> <node> <pid>".
+constexpr std::string_view kUserDataTag = "fulcrum ";
+
+/// Compares the schema of each peer that appears.
+class PeerWatch final : public fast::DomainParticipantListener {
+ public:
+  PeerWatch(std::string own_name, std::uint64_t own_hash) : own_name_(std::move(own_name)), own_hash_(Hex(own_hash)) {}
+
+  void on_participant_discovery(fast::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& info) override {
+    using Status = rtps::ParticipantDiscoveryInfo::DISCOVERY_STATUS;
+    const rtps::GUID_t guid = info.info.m_guid;
+    const std::lock_guard lock(mutex_);
+    if (info.status == Status::REMOVED_PARTICIPANT || info.status == Status::DROPPED_PARTICIPANT) {
+      mismatches_.erase(guid);
+      return;
+    }
+    const auto& bytes = info.info.m_userData;
+    const std::string text(bytes.begin(), bytes.end());
+    if (text.size() < kUserDataTag.size() + own_hash_.size() || text.compare(0, kUserDataTag.size(), kUserDataTag)) {
+      return;  // not one of ours: another program on this domain is none of our business
+    }
+    const std::string hash = text.substr(kUserDataTag.size(), own_hash_.size());
+    if (hash == own_hash_) return;
+    const std::size_t name_at = kUserDataTag.size() + hash.size();
+    mismatches_[guid] = "schema mismatch: peer" + text.substr(name_at) + " speaks schema " + hash + ", this " +
+                        own_name_ + " speaks " + own_hash_ + "; rebuild and restart both from the same sources";
+  }
+
+  [[nodiscard]] std::string mismatch() const {
+    const std::lock_guard lock(mutex_);
+    return mismatches_.empty() ? std::string() : mismatches_.begin()->second;
+  }
+
+ private:
+  const std::string own_name_, own_hash_;
+  mutable std::mutex mutex_;
+  std::map<rtps::GUID_t, std::string> mismatches_;
+};
+
+/// Settings from outside would silently replace the ones that were measured.
+void ForgetOutsideSettings() {
+  for (const char* name :
+       {"FASTDDS_STATISTICS", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_ENVIRONMENT_FILE", "ROS_DISCOVERY_SERVER"}) {
+    unsetenv(name);
+  }
+  setenv("SKIP_DEFAULT_XML", "1", 1);  // no DEFAULT_FASTRTPS_PROFILES.xml from the current directory
+}
+
+fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash) {
+  fast::DomainParticipantQos qos;
+  qos.name(settings.node_name);
+  const std::string user_data = std::string(kUserDataTag) + Hex(schema_hash) + " " + settings.node_name + " (pid " +
+                                std::to_string(getpid()) + ")";
+  qos.user_data().data_vec({user_data.begin(), user_data.end()});
+  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  udp->interfaceWhiteList = {"127.0.0.1"};
+  udp->sendBufferSize = kSocketBuffer_B;
+  udp->receiveBufferSize = kSocketBuffer_B;
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports.push_back(udp);
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  discovery.leaseDuration = kLease;
+  discovery.leaseDuration_announcementperiod = kAnnouncement;
+  return qos;
+}
+
+/// What a DataReaderQos and a DataWriterQos have in common.
+template <class Qos>
+void ApplyRole(const TopicRole& role, int depth, const std::string& shared_memory, Qos* qos) {
+  qos->reliability().kind = role.reliable ? fast::RELIABLE_RELIABILITY_QOS : fast::BEST_EFFORT_RELIABILITY_QOS;
+  qos->reliability().max_blocking_time = kMaxBlocking;
+  qos->durability().kind =
+      role.late_joiners_served ? fast::TRANSIENT_LOCAL_DURABILITY_QOS : fast::VOLATILE_DURABILITY_QOS;
+  qos->history().kind = role.keep_all ? fast::KEEP_ALL_HISTORY_QOS : fast::KEEP_LAST_HISTORY_QOS;
+  qos->history().depth = depth;
+  // The pool holds this many samples of the type's full size: one more than the history, for the sample being written.
+  // The library's default of 5000 would ask for 1.5 GB per large topic.
+  const int samples = role.keep_all ? depth : depth + 1;
+  qos->resource_limits().max_instances = 1;
+  qos->resource_limits().max_samples = samples;
+  qos->resource_limits().max_samples_per_instance = samples;
+  qos->resource_limits().allocated_samples = 0;
+  qos->endpoint().history_memory_policy = rtps::PREALLOCATED_MEMORY_MODE;
+  if (role.path == Path::kSharedMemory) {
+    qos->data_sharing().on(shared_memory);
+  } else {
+    qos->data_sharing().off();
+  }
+}
+
+}  // namespace
+
+struct DdsParticipant::Impl {
+  Impl(const DdsSettings& settings, std::uint64_t hash)
+      : schema_hash(hash), shared_memory(settings.shared_memory), watch(settings.node_name, hash) {
+    if (settings.domain < 1 || settings.domain > 100) {
+      throw InputError("domain " + std::to_string(settings.domain) + " is out of range: 1 to 100");
+    }
+    if (shared_memory.empty()) shared_memory = SharedMemoryDirectory(settings.domain);
+    PrepareSharedMemory(shared_memory);
+    ForgetOutsideSettings();
+    eprosima::fastrtps::LibrarySettingsAttributes library;
+    library.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
+    eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(library);
+
+    participant = fast::DomainParticipantFactory::get_instance()->create_participant(
+        static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash), &watch, fast::StatusMask::none());
+    if (participant == nullptr) {
+      throw InputError("domain " + std::to_string(settings.domain) +
+                       ": cannot open the bus; are its UDP ports on 127.0.0.1 free?");
+    }
+    publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
+    subscriber = participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
+  }
+
+  ~Impl() {
+    if (participant == nullptr) return;
+    participant->set_listener(nullptr);
+    participant->delete_contained_entities();
+    fast::DomainParticipantFactory::get_instance()->delete_participant(participant);
+  }
+
+  /// The topic of T, its type registered under a name that carries the schema hash: endpoints of two schemas never
+  /// match.
+  template <class T>
+  fast::Topic* TopicFor() {
+    const TopicRole& role = RoleOf<T>();
+    const std::lock_guard lock(mutex);
+    fast::Topic*& topic = topics[static_cast<std::size_t>(role.id)];
+    if (topic != nullptr) return topic;
+    fast::TypeSupport type(new typename dds::TypeSupportOf<T>::type());
+    if constexpr (dds::Loanable<T>) {
+      // Both together say that memory and wire look the same, which is what a loan relies on.
+      if (!type->is_plain() || type->m_typeSize != sizeof(dds::WireOf<T>) + 4) {
+        throw std::logic_error(std::string(role.name) + ": the generated type is not plain");
+      }
+    }
+    type->setName((std::string(role.name) + "#" + Hex(schema_hash)).c_str());
+    if (type.register_type(participant) == dds::ReturnCode::RETCODE_OK) {
+      topic = participant->create_topic(role.name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
+    }
+    if (topic == nullptr) throw InputError(std::string(role.name) + ": cannot make the topic");
+    return topic;
+  }
+
+  const std::uint64_t schema_hash;
+  std::filesystem::path shared_memory;
+  PeerWatch watch;
+  fast::DomainParticipant* participant = nullptr;
+  fast::Publisher* publisher = nullptr;
+  fast::Subscriber* subscriber = nullptr;
+  std::mutex mutex;  ///< Guards topics.
+  std::array<fast::Topic*, kTopicCount> topics{};
+};
+
+DdsParticipant::DdsParticipant(const DdsSettings& settings)
+    : impl_(std::make_unique<Impl>(settings, settings.schema_hash)) {}
+DdsParticipant::~DdsParticipant() = default;
+
+std::string DdsParticipant::schema_mismatch() const { return impl_->watch.mismatch(); }
+
+template <class T>
+std::unique_ptr<Input<T>> DdsParticipant::MakeInput() {
+  const TopicRole& role = RoleOf<T>();
+  fast::DataReaderQos qos;
+  ApplyRole(role, role.reader_depth, impl_->shared_memory, &qos);
+  auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos);
+  if (!port->ok()) throw InputError(std::string(role.name) + ": cannot make a reader");
+  return port;
+}
+
+template <class T>
+std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
+  const TopicRole& role = RoleOf<T>();
+  fast::Topic* topic = impl_->TopicFor<T>();
+  fast::DataWriterQos qos;
+  ApplyRole(role, role.writer_depth, impl_->shared_memory, &qos);
+  const bool fragmented =
+      role.path == Path::kLoopback && typename dds::TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
+  qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
+  auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos);
+  if (!port->ok()) throw InputError(std::string(role.name) + ": cannot make a writer");
+  return port;
+}
+
+#define FULCRUM_INSTANTIATE_PORTS(T)                              \
+  template std::unique_ptr<Input<T>> DdsParticipant::MakeInput(); \
+  template std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput<T>();
+
+FULCRUM_INSTANTIATE_PORTS(HandleState)
+FULCRUM_INSTANTIATE_PORTS(ToolState)
+FULCRUM_INSTANTIATE_PORTS(TissueFrame)
+FULCRUM_INSTANTIATE_PORTS(ContactModel)
+FULCRUM_INSTANTIATE_PORTS(CauteryContact)
+FULCRUM_INSTANTIATE_PORTS(TopologyState)
+FULCRUM_INSTANTIATE_PORTS(TemperaturePatch)
+FULCRUM_INSTANTIATE_PORTS(ThermalEvent)
+FULCRUM_INSTANTIATE_PORTS(SceneManifest)
+FULCRUM_INSTANTIATE_PORTS(Command)
+FULCRUM_INSTANTIATE_PORTS(CommandReply)
+FULCRUM_INSTANTIATE_PORTS(TickManifest)
+FULCRUM_INSTANTIATE_PORTS(Health)
+
+#undef FULCRUM_INSTANTIATE_PORTS
+
+}  // namespace fulcrum::bus
