@@ -365,6 +365,7 @@ SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
   scene.tube_edge_colours = SortByColour(&scene.tube_edges, n, particles);
   scene.bending_colours = SortByColour(&scene.bending, n, particles);
   scene.binding_colours = SortByColour(&scene.bindings, n, particles);
+  fixed.hash = ContentHash(scene.View());
   return scene;
 }
 

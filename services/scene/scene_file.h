@@ -41,7 +41,11 @@ struct SceneData {
   [[nodiscard]] SceneView View() const;
 };
 
-/// Writes atomically (temporary file, then rename). Returns the content hash.
+/// Hash of everything but the source text: two scenes with the same hash are the same to every node.
+[[nodiscard]] std::uint64_t ContentHash(const SceneView& view);
+
+/// Checks the scene and writes it atomically (temporary file, then rename). Returns the content hash.
+/// Throws InputError.
 std::uint64_t WriteSceneFile(const SceneData& scene, const std::string& source_yaml, const std::filesystem::path& file);
 
 class SceneFile {
