@@ -1,0 +1,156 @@
+#include "render_node/geometry/atlas.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include "render_node/geometry/membrane_mesh.h"
+
+namespace fulcrum::render {
+namespace {
+
+constexpr int kBlock = 32;
+// A cut drawn from the topology alone: half width of the slit, then of the charred, the browned and the blanched rim.
+// Typical of an L-hook at 30 W on peritoneum (0.2-0.5 mm lateral damage).
+constexpr float kSlit = 0.00030f;     // [m]
+constexpr float kChar = 0.00045f;     // [m]
+constexpr float kBrown = 0.00090f;    // [m]
+constexpr float kBlanched = 0.0018f;  // [m]
+
+float DistanceToSegment(const Vec2f& p, const Vec2f& a, const Vec2f& b) {
+  const Vec2f ab = b - a;
+  const float length2 = ab.squaredNorm();
+  const float t = length2 > 0 ? std::clamp((p - a).dot(ab) / length2, 0.0f, 1.0f) : 0.0f;
+  return (p - a - t * ab).norm();
+}
+
+/// 1 at `from`, 0 at `to`, linear between.
+float Ramp(float value, float from, float to) { return std::clamp((to - value) / (to - from), 0.0f, 1.0f); }
+
+}  // namespace
+
+AtlasRect AtlasRect::United(const AtlasRect& other) const {
+  if (empty()) {
+    return other;
+  }
+  if (other.empty()) {
+    return *this;
+  }
+  const int left = std::min(x, other.x), bottom = std::min(y, other.y);
+  return {left, bottom, std::max(x + width, other.x + other.width) - left,
+          std::max(y + height, other.y + other.height) - bottom};
+}
+
+Atlas::Atlas(const SceneView& scene) : texel_m_(scene.membrane.texel_m) {
+  Vec2f extent = Vec2f::Zero();
+  for (const Vec2f& m : scene.membrane_material) {
+    extent = extent.cwiseMax(m);
+  }
+  const auto texels_of = [this](float metres) {
+    return std::clamp(static_cast<int>(std::ceil(metres / texel_m_)) + 1, 1, kAtlasTexels);
+  };
+  width_ = texels_of(extent.x());
+  height_ = texels_of(extent.y());
+  blocks_x_ = (width_ + kBlock - 1) / kBlock;
+  covered_.assign(static_cast<std::size_t>(blocks_x_) * ((height_ + kBlock - 1) / kBlock), 0);
+  painted_.assign(scene.membrane.triangle_count(), 0);
+  const auto body = static_cast<std::uint8_t>(std::lround((scene.thermal.body_temperature_C - 20.0f) * 2));
+  texels_.resize(4u * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  for (std::size_t i = 0; i < texels_.size(); i += 4) {
+    texels_[i] = body;
+    texels_[i + 1] = 0;
+    texels_[i + 2] = 0;
+    texels_[i + 3] = 255;
+  }
+}
+
+AtlasRect Atlas::Apply(const TemperaturePatch& patch) {
+  if (patch.texels.size() != 4u * kPatchTexels * kPatchTexels || patch.header.origin_x >= kAtlasTexels ||
+      patch.header.origin_y >= kAtlasTexels) {
+    return {};
+  }
+  const int x = static_cast<int>(patch.header.origin_x), y = static_cast<int>(patch.header.origin_y);
+  const AtlasRect rect{x, y, std::min(kPatchTexels, width_ - x), std::min(kPatchTexels, height_ - y)};
+  if (rect.empty()) {
+    return {};
+  }
+  for (int row = 0; row < rect.height; ++row) {
+    std::memcpy(texels_.data() + 4 * (static_cast<std::size_t>(y + row) * static_cast<std::size_t>(width_) +
+                                      static_cast<std::size_t>(x)),
+                patch.texels.data() + 4 * static_cast<std::size_t>(row) * kPatchTexels,
+                4 * static_cast<std::size_t>(rect.width));
+  }
+  for (int by = y / kBlock; by <= (y + rect.height - 1) / kBlock; ++by) {
+    for (int bx = x / kBlock; bx <= (x + rect.width - 1) / kBlock; ++bx) {
+      covered_[static_cast<std::size_t>(by * blocks_x_ + bx)] = 1;
+    }
+  }
+  return rect;
+}
+
+bool Atlas::Covered(int x, int y) const {
+  return covered_[static_cast<std::size_t>((y / kBlock) * blocks_x_ + x / kBlock)] != 0;
+}
+
+AtlasRect Atlas::PaintCuts(const SceneView& scene, const TopologyState& topology) {
+  const std::uint32_t cols = scene.membrane.cols;
+  AtlasRect changed;
+  std::size_t index = 0;
+  for (std::uint32_t row = 0; row + 1 < scene.membrane.rows; ++row) {
+    for (std::uint32_t col = 0; col + 1 < cols; ++col) {
+      for (int half = 0; half < 2; ++half, ++index) {
+        const MembraneTriangle t = MembraneTriangleAt(cols, row, col, half);
+        std::uint8_t dead = 0;
+        for (int k = 0; k < 3; ++k) {
+          dead = static_cast<std::uint8_t>(dead | (TestBit(topology.dead_edges, t.edges[k]) ? 1u << k : 0u));
+        }
+        if (dead == painted_[index]) {
+          continue;
+        }
+        painted_[index] = dead;
+        std::array<Vec2f, 3> middles;
+        int count = 0;
+        for (int k = 0; k < 3; ++k) {
+          if ((dead >> k) & 1) {
+            middles[count++] =
+                0.5f * (scene.membrane_material[t.nodes[k]] + scene.membrane_material[t.nodes[(k + 1) % 3]]);
+          }
+        }
+        for (int k = 0; k + 1 < count; ++k) {
+          changed = changed.United(PaintCapsule(middles[k], middles[k + 1]));
+        }
+      }
+    }
+  }
+  return changed;
+}
+
+AtlasRect Atlas::PaintCapsule(Vec2f a, Vec2f b) {
+  const Vec2f low = (a.cwiseMin(b).array() - kBlanched).matrix() / texel_m_;
+  const Vec2f high = (a.cwiseMax(b).array() + kBlanched).matrix() / texel_m_;
+  const int x0 = std::max(0, static_cast<int>(low.x())), x1 = std::min(width_ - 1, static_cast<int>(high.x()));
+  const int y0 = std::max(0, static_cast<int>(low.y())), y1 = std::min(height_ - 1, static_cast<int>(high.y()));
+  for (int y = y0; y <= y1; ++y) {
+    for (int x = x0; x <= x1; ++x) {
+      if (Covered(x, y)) {
+        continue;
+      }
+      const Vec2f p((static_cast<float>(x) + 0.5f) * texel_m_, (static_cast<float>(y) + 0.5f) * texel_m_);
+      const float d = DistanceToSegment(p, a, b);
+      std::uint8_t* texel = texels_.data() + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+                                                  static_cast<std::size_t>(x));
+      const auto raise = [](std::uint8_t* byte, float value) {
+        *byte = std::max(*byte, static_cast<std::uint8_t>(std::lround(value)));
+      };
+      raise(texel + 1, 255 * Ramp(d, kBrown, kBlanched));
+      raise(texel + 2, 128 * Ramp(d, kChar, kBrown) + 127 * Ramp(d, kSlit, kChar));
+      if (d < kSlit) {
+        texel[3] = 0;
+      }
+    }
+  }
+  return {x0, y0, x1 - x0 + 1, y1 - y0 + 1};
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,54 @@
+// The atlas of the sheet's thermal state: one texel per 0.1 mm of material, four bytes as in a TemperaturePatch. Only
+// the part that the sheet uses is kept, of the 4096 x 4096 that a patch's origin can address. Pure.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "services/core/scene_view.h"
+
+namespace fulcrum::render {
+
+/// Texels, half open: [x, x + width) x [y, y + height).
+struct AtlasRect {
+  int x = 0, y = 0, width = 0, height = 0;
+  [[nodiscard]] bool empty() const { return width <= 0 || height <= 0; }
+  /// Smallest rectangle around both.
+  [[nodiscard]] AtlasRect United(const AtlasRect& other) const;
+};
+
+class Atlas {
+ public:
+  /// Covers the material coordinates of `scene`; intact tissue at body temperature everywhere.
+  explicit Atlas(const SceneView& scene);
+
+  /// Copies what lies within the atlas. Returns the texels that changed hands; empty when the patch has the wrong size
+  /// or lies outside.
+  AtlasRect Apply(const TemperaturePatch& patch);
+
+  /// Draws slits from the topology alone where no patch has ever been: what a restarted renderer can still know. Each
+  /// cut triangle gets a capsule between the middles of its dead edges, with a browned rim. Triangles that were
+  /// painted before are skipped. Returns the texels touched.
+  AtlasRect PaintCuts(const SceneView& scene, const TopologyState& topology);
+
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] float texel_m() const { return texel_m_; }
+  /// 4 * width * height bytes, row by row, t slow and s fast.
+  [[nodiscard]] std::span<const std::uint8_t> texels() const { return texels_; }
+
+ private:
+  [[nodiscard]] bool Covered(int x, int y) const;
+  AtlasRect PaintCapsule(Vec2f a, Vec2f b);
+
+  float texel_m_;
+  int width_;
+  int height_;
+  int blocks_x_;
+  std::vector<std::uint8_t> texels_;
+  std::vector<std::uint8_t> covered_;  // Per block of kBlock x kBlock texels.
+  std::vector<std::uint8_t> painted_;  // Per membrane triangle: bits of its dead edges that are drawn.
+};
+
+}  // namespace fulcrum::render

@@ -1,0 +1,77 @@
+#include "render_node/geometry/fat_layer.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fulcrum::render {
+namespace {
+
+// Fat lies this deep under the membrane where the tube is far away, and no nearer to the membrane than kLeastDepth, so
+// that the two surfaces do not fight for the same pixel.
+constexpr float kMostDepth = 0.0025f;   // [m]
+constexpr float kLeastDepth = 0.0006f;  // [m]
+// Share of the membrane's lift beyond rest that the loose fat follows; the rest is torn open areolar tissue.
+constexpr float kFollow = 0.45f;
+
+}  // namespace
+
+FatLayer::FatLayer(const SceneView& scene, std::uint32_t stride) {
+  const MembraneGrid& grid = scene.membrane;
+  if (grid.rows < 2 || grid.cols < 2 || scene.tube_surface.empty()) {
+    return;
+  }
+  std::vector<std::uint32_t> rows, cols;
+  const auto pick = [stride](std::uint32_t count, std::vector<std::uint32_t>* out) {
+    for (std::uint32_t i = 0; i < count - 1; i += stride) {
+      out->push_back(i);
+    }
+    out->push_back(count - 1);
+  };
+  pick(grid.rows, &rows);
+  pick(grid.cols, &cols);
+  const NearestOnSurface nearest(scene.rest_position, scene.tube_surface);
+  const std::span<const float> rest(scene.rest_position.front().data(), 3 * scene.rest_position.size());
+  for (const std::uint32_t row : rows) {
+    for (const std::uint32_t col : cols) {
+      const Index node = row * grid.cols + col;
+      const Vec3f& membrane = scene.rest_position[grid.first + node];
+      Anchor anchor{node, nearest.Find(membrane), 0, 0};
+      anchor.rest_gap = (membrane - anchor.foot.At(rest)).norm();
+      // Lobules: the depth below the membrane waves gently from place to place.
+      const Vec2f m = scene.membrane_material[node];
+      const float wave =
+          0.5f + 0.25f * std::sin(900 * m.x() + 300 * m.y()) + 0.25f * std::sin(700 * m.y() - 500 * m.x());
+      const float depth = std::min(std::max(kLeastDepth, (0.3f + 0.3f * wave) * anchor.rest_gap), kMostDepth);
+      anchor.weight = anchor.rest_gap > 0 ? std::max(0.0f, 1 - depth / anchor.rest_gap) : 0;
+      anchors_.push_back(anchor);
+      materials_.push_back(m);
+    }
+  }
+  const auto width = static_cast<Index>(cols.size());
+  for (Index r = 0; r + 1 < rows.size(); ++r) {
+    for (Index c = 0; c + 1 < width; ++c) {
+      const Index n00 = r * width + c;
+      triangles_.push_back({n00, n00 + 1, n00 + width + 1});
+      triangles_.push_back({n00, n00 + width + 1, n00 + width});
+    }
+  }
+  positions_.resize(anchors_.size());
+  normals_.resize(anchors_.size());
+}
+
+void FatLayer::Update(std::span<const float> xyz, const MembraneMesh& membrane) {
+  for (std::size_t k = 0; k < anchors_.size(); ++k) {
+    const Anchor& anchor = anchors_[k];
+    const Vec3f foot = anchor.foot.At(xyz);
+    const Vec3f up = membrane.positions()[anchor.node] - foot;
+    const float gap = up.norm();
+    const float lift = std::max(0.0f, gap - anchor.rest_gap);
+    // Equals `weight` at rest and stays on the line from foot to membrane.
+    const float weight =
+        gap > 0 ? anchor.weight * (anchor.rest_gap + kFollow * lift) / std::max(gap, anchor.rest_gap) : 0;
+    positions_[k] = foot + weight * up;
+  }
+  ComputeNormals(positions_, triangles_, normals_);
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,40 @@
+// An interpolative layer (fat): not simulated, it lies between a membrane node and the tube's surface beneath it, and
+// follows both (the binding of the paper's eq. 9, used here for a position instead of a force). Pure.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "render_node/geometry/membrane_mesh.h"
+#include "render_node/geometry/surface.h"
+
+namespace fulcrum::render {
+
+class FatLayer {
+ public:
+  /// Every `stride`-th node of the membrane's grid carries a fat vertex. Keeps a reference to the scene's arrays.
+  FatLayer(const SceneView& scene, std::uint32_t stride);
+
+  /// Positions and normals from the particles and the membrane as drawn (its dead nodes are in a quiet place there).
+  void Update(std::span<const float> xyz, const MembraneMesh& membrane);
+
+  [[nodiscard]] std::span<const Vec3f> positions() const { return positions_; }
+  [[nodiscard]] std::span<const Vec3f> normals() const { return normals_; }
+  [[nodiscard]] std::span<const Vec2f> materials() const { return materials_; }  ///< (s, t) [m].
+  [[nodiscard]] std::span<const Triangle> triangles() const { return triangles_; }
+
+ private:
+  struct Anchor {
+    Index node;         // Of the membrane's grid.
+    SurfacePoint foot;  // On the tube.
+    float rest_gap;     // Membrane to foot at rest [m].
+    float weight;       // 0 on the tube, 1 on the membrane, at rest.
+  };
+  std::vector<Anchor> anchors_;
+  std::vector<Vec3f> positions_;
+  std::vector<Vec3f> normals_;
+  std::vector<Vec2f> materials_;
+  std::vector<Triangle> triangles_;
+};
+
+}  // namespace fulcrum::render

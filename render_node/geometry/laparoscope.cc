@@ -1,0 +1,54 @@
+#include "render_node/geometry/laparoscope.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace fulcrum::render {
+namespace {
+
+constexpr float kNear = 0.004f;  // [m]
+constexpr float kFar = 0.8f;     // [m]
+// A 10 mm scope: fibres in a crescent, 4 mm from the lens.
+constexpr float kFibreOffset = 0.004f;  // [m]
+// The slanted glass bends the beam back towards the sight: what is left of the optics' angle.
+constexpr float kBeamTilt = 0.25f;
+// Of the picture's height: the circle cuts the corners, as with a camera head zoomed for the monitor.
+constexpr float kCircle = 0.70f;
+
+constexpr float Radians(float degrees) { return degrees * std::numbers::pi_v<float> / 180; }
+
+}  // namespace
+
+Laparoscope MakeLaparoscope(const RenderParams& params) {
+  Laparoscope scope;
+  const Vec3f sight = params.scope_target_W - params.scope_tip_W;
+  const Vec3f back = -sight.normalized();
+  // Looking nearly straight down, "up" in the picture is cranial (+y).
+  const Vec3f up_hint = std::abs(back.z()) > 0.9f ? Vec3f::UnitY() : Vec3f::UnitZ();
+  const Vec3f right = up_hint.cross(back).normalized();
+  const Vec3f up = back.cross(right);
+  scope.view.setIdentity();
+  scope.view.block<1, 3>(0, 0) = right.transpose();
+  scope.view.block<1, 3>(1, 0) = up.transpose();
+  scope.view.block<1, 3>(2, 0) = back.transpose();
+  scope.view.block<3, 1>(0, 3) = -scope.view.block<3, 3>(0, 0) * params.scope_tip_W;
+
+  const auto width = static_cast<float>(params.width), height = static_cast<float>(params.height);
+  const float focal = 1 / std::tan(Radians(params.fov_deg) / 2);
+  scope.projection.setZero();
+  scope.projection(0, 0) = focal * height / width;
+  scope.projection(1, 1) = focal;
+  scope.projection(2, 2) = (kFar + kNear) / (kNear - kFar);
+  scope.projection(2, 3) = 2 * kFar * kNear / (kNear - kFar);
+  scope.projection(3, 2) = -1;
+
+  const float tilt = kBeamTilt * Radians(params.scope_angle_deg);
+  scope.light_position = Vec3f(0.6f * kFibreOffset, kFibreOffset, 0);
+  scope.light_axis = Vec3f(0, -std::sin(tilt), -std::cos(tilt));
+  scope.light_power = sight.squaredNorm();
+  scope.picture_centre = Vec2f(width / 2, height / 2);
+  scope.circle_radius = kCircle * height;
+  return scope;
+}
+
+}  // namespace fulcrum::render

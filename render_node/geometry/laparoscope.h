@@ -1,0 +1,22 @@
+// The laparoscope as a camera: where it looks, what its light does, how large its round picture is. Pure.
+#pragma once
+
+#include "services/core/scene_view.h"
+
+namespace fulcrum::render {
+
+struct Laparoscope {
+  Eigen::Matrix4f view;        ///< Frame W to camera (x right, y up, looking along -z).
+  Eigen::Matrix4f projection;  ///< OpenGL clip coordinates.
+  Vec3f light_position;        ///< Camera frame [m]: the fibres lie beside the lens.
+  Vec3f light_axis;            ///< Camera frame, unit.
+  float light_power;           ///< Irradiance 1 at the target.
+  Vec2f picture_centre;        ///< [pixels]
+  float circle_radius;         ///< Of the round picture [pixels].
+};
+
+/// The line of sight goes from scope_tip_W to scope_target_W. With 30 degree optics the shaft lies 30 degrees above it
+/// and the light leaves between the two; with 0 degrees shaft, light and sight are one line. fov_deg spans the height.
+[[nodiscard]] Laparoscope MakeLaparoscope(const RenderParams& params);
+
+}  // namespace fulcrum::render

@@ -1,0 +1,222 @@
+#include "render_node/geometry/membrane_mesh.h"
+
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "render_node/geometry/surface.h"
+
+namespace fulcrum::render {
+namespace {
+
+struct Neighbour {
+  int row, col;
+};
+// Direction d of a TopologyState edge, seen from its first node.
+constexpr std::array<Neighbour, 3> kDirections{{{0, 1}, {1, 0}, {1, 1}}};
+
+}  // namespace
+
+MembraneTriangle MembraneTriangleAt(std::uint32_t cols, std::uint32_t row, std::uint32_t col, int half) {
+  const Index n00 = row * cols + col;
+  const Index n01 = n00 + 1, n10 = n00 + cols, n11 = n10 + 1;
+  const auto edge = [](Index node, std::size_t direction) { return 3 * std::size_t{node} + direction; };
+  if (half == 0) {
+    return {{n00, n01, n11}, {edge(n00, 0), edge(n01, 1), edge(n00, 2)}};
+  }
+  return {{n00, n11, n10}, {edge(n00, 2), edge(n10, 0), edge(n00, 1)}};
+}
+
+MembraneMesh::MembraneMesh(const SceneView& scene)
+    : scene_(scene), rows_(scene.membrane.rows), cols_(scene.membrane.cols) {
+  const std::size_t nodes = scene.membrane.node_count();
+  dead_nodes_.assign((nodes + 7) / 8, 0);
+  dead_edges_.assign((3 * nodes + 7) / 8, 0);
+  BuildTriangles();
+}
+
+bool MembraneMesh::SetTopology(const TopologyState& topology) {
+  if (topology.rows != rows_ || topology.cols != cols_ || topology.dead_nodes.size() < dead_nodes_.size() ||
+      topology.dead_edges.size() < dead_edges_.size()) {
+    return false;
+  }
+  std::copy_n(topology.dead_nodes.begin(), dead_nodes_.size(), dead_nodes_.begin());
+  std::copy_n(topology.dead_edges.begin(), dead_edges_.size(), dead_edges_.begin());
+  BuildTriangles();
+  return true;
+}
+
+void MembraneMesh::BuildTriangles() {
+  triangles_.clear();
+  parts_.clear();
+  dead_list_.clear();
+  for (Index node = 0; node < scene_.membrane.node_count(); ++node) {
+    if (node_dead(node)) {
+      dead_list_.push_back(node);
+    }
+  }
+  for (std::uint32_t row = 0; row + 1 < rows_; ++row) {
+    for (std::uint32_t col = 0; col + 1 < cols_; ++col) {
+      for (int half = 0; half < 2; ++half) {
+        const MembraneTriangle t = MembraneTriangleAt(cols_, row, col, half);
+        std::array<bool, 3> alive;
+        int dead = 0;
+        for (int k = 0; k < 3; ++k) {
+          const Index a = t.nodes[k], b = t.nodes[(k + 1) % 3];
+          alive[k] = !edge_dead(t.edges[k]) && !node_dead(a) && !node_dead(b);
+          dead += alive[k] ? 0 : 1;
+        }
+        // One dead edge leaves the corners joined: the slit ends inside, and the atlas shows how far it goes.
+        if (dead < 2) {
+          triangles_.push_back(t.nodes);
+        } else {
+          AddParts(t.nodes, alive);
+        }
+      }
+    }
+  }
+  whole_triangles_ = triangles_.size();
+  const std::size_t nodes = scene_.membrane.node_count();
+  const std::size_t vertices = nodes + 3 * parts_.size();
+  positions_.resize(vertices, Vec3f::Zero());
+  normals_.resize(vertices, Vec3f::Zero());
+  materials_.resize(vertices);
+  sides_.resize(vertices);
+  std::copy_n(scene_.membrane_material.begin(), nodes, materials_.begin());
+  std::fill_n(sides_.begin(), nodes, 1.0f);
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    const Index first = static_cast<Index>(nodes + 3 * p);
+    for (Index k = 0; k < 3; ++k) {
+      materials_[first + k] = scene_.membrane_material[parts_[p].nodes[k]];
+      sides_[first + k] = (parts_[p].owned >> k) & 1 ? 1.0f : -1.0f;
+    }
+    triangles_.push_back({first, first + 1, first + 2});
+  }
+}
+
+// With two or three dead edges a corner is joined to another one only through the edge that lives, if any.
+void MembraneMesh::AddParts(const Triangle& nodes, const std::array<bool, 3>& edge_alive) {
+  std::uint8_t taken = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (edge_alive[k]) {
+      const auto owned = static_cast<std::uint8_t>((1u << k) | (1u << ((k + 1) % 3)));
+      parts_.push_back({nodes, owned});
+      taken = owned;
+    }
+  }
+  for (int k = 0; k < 3; ++k) {
+    if (!((taken >> k) & 1) && !node_dead(nodes[k])) {
+      parts_.push_back({nodes, static_cast<std::uint8_t>(1u << k)});
+    }
+  }
+}
+
+void MembraneMesh::Update(std::span<const float> xyz) {
+  const std::size_t nodes = scene_.membrane.node_count();
+  for (std::size_t node = 0; node < nodes; ++node) {
+    positions_[node] = PositionOf(xyz, scene_.membrane.first + static_cast<Index>(node));
+  }
+  PlaceDeadNodes();
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    const Part& part = parts_[p];
+    const int owners = std::popcount(part.owned);
+    for (int k = 0; k < 3; ++k) {
+      Vec3f& position = positions_[nodes + 3 * p + static_cast<std::size_t>(k)];
+      if ((part.owned >> k) & 1) {
+        position = positions_[part.nodes[k]];
+        continue;
+      }
+      position = Vec3f::Zero();
+      for (int j = 0; j < 3; ++j) {
+        if ((part.owned >> j) & 1) {
+          position += GhostFrom(part.nodes[j], part.nodes[k]) / static_cast<float>(owners);
+        }
+      }
+    }
+  }
+  ComputeNormals(positions_, std::span(triangles_).first(whole_triangles_), normals_);
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    const Part& part = parts_[p];
+    Vec3f mean = Vec3f::Zero();
+    for (int k = 0; k < 3; ++k) {
+      if ((part.owned >> k) & 1) {
+        mean += normals_[part.nodes[k]];
+      }
+    }
+    // A corner cut off on every side has no whole triangle to take a normal from.
+    const Vec3f* corner = &positions_[nodes + 3 * p];
+    const Vec3f normal =
+        mean.squaredNorm() > 0 ? mean.normalized() : (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
+    for (std::size_t k = 0; k < 3; ++k) {
+      normals_[nodes + 3 * p + k] = (part.owned >> k) & 1 && mean.squaredNorm() > 0 ? normals_[part.nodes[k]] : normal;
+    }
+  }
+}
+
+// Least squares over the live edges at the node: dx = ds * Ds + dt * Dt.
+MembraneMesh::Frame MembraneMesh::FrameAt(Index node) const {
+  const int row = static_cast<int>(node / cols_), col = static_cast<int>(node % cols_);
+  Eigen::Matrix2f normal_matrix = Eigen::Matrix2f::Zero();
+  Eigen::Matrix<float, 3, 2> moment = Eigen::Matrix<float, 3, 2>::Zero();
+  const auto add = [&](int r, int c, std::size_t edge) {
+    if (r < 0 || c < 0 || r >= static_cast<int>(rows_) || c >= static_cast<int>(cols_) || edge_dead(edge)) {
+      return;
+    }
+    const Index other = static_cast<Index>(r) * cols_ + static_cast<Index>(c);
+    if (node_dead(other)) {
+      return;
+    }
+    const Vec2f dm = scene_.membrane_material[other] - scene_.membrane_material[node];
+    normal_matrix += dm * dm.transpose();
+    moment += (positions_[other] - positions_[node]) * dm.transpose();
+  };
+  for (std::size_t d = 0; d < 3; ++d) {
+    const auto [dr, dc] = kDirections[d];
+    add(row + dr, col + dc, 3 * std::size_t{node} + d);
+    const int r = row - dr, c = col - dc;
+    if (r >= 0 && c >= 0) {
+      add(r, c, 3 * (static_cast<std::size_t>(r) * cols_ + static_cast<std::size_t>(c)) + d);
+    }
+  }
+  // Two edges in nearly one line say nothing about the other direction: below 1 % of a right angle's determinant.
+  const float trace = normal_matrix.trace();
+  if (normal_matrix.determinant() <= 0.01f * trace * trace / 4) {
+    return {Vec3f::Zero(), Vec3f::Zero(), false};
+  }
+  const Eigen::Matrix<float, 3, 2> frame = moment * normal_matrix.inverse();
+  return {frame.col(0), frame.col(1), true};
+}
+
+Vec3f MembraneMesh::GhostFrom(Index owner, Index ghost) const {
+  const Frame frame = FrameAt(owner);
+  if (!frame.valid) {
+    const Index first = scene_.membrane.first;
+    return positions_[owner] + scene_.rest_position[first + ghost] - scene_.rest_position[first + owner];
+  }
+  const Vec2f dm = scene_.membrane_material[ghost] - scene_.membrane_material[owner];
+  // Unstretched: the free edge of a slit has let go of its tension.
+  const float ds = std::max(1.0f, frame.ds.norm()), dt = std::max(1.0f, frame.dt.norm());
+  return positions_[owner] + frame.ds * (dm.x() / ds) + frame.dt * (dm.y() / dt);
+}
+
+// A vaporised node has no constraints left and may be anywhere: the fat beneath and the picture need a quiet place.
+void MembraneMesh::PlaceDeadNodes() {
+  const Index first = scene_.membrane.first;
+  for (const Index node : dead_list_) {
+    const int row = static_cast<int>(node / cols_), col = static_cast<int>(node % cols_);
+    Vec3f sum = Vec3f::Zero();
+    int count = 0;
+    for (int r = std::max(0, row - 2); r <= std::min(static_cast<int>(rows_) - 1, row + 2); ++r) {
+      for (int c = std::max(0, col - 2); c <= std::min(static_cast<int>(cols_) - 1, col + 2); ++c) {
+        const Index other = static_cast<Index>(r) * cols_ + static_cast<Index>(c);
+        if (!node_dead(other)) {
+          sum += positions_[other] + scene_.rest_position[first + node] - scene_.rest_position[first + other];
+          ++count;
+        }
+      }
+    }
+    positions_[node] = count > 0 ? Vec3f(sum / static_cast<float>(count)) : scene_.rest_position[first + node];
+  }
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,88 @@
+// The membrane as triangles to draw, with its cuts. Pure.
+//
+// The simulation keeps one grid of particles, also across a cut: only the edges over the slit are dead. Drawn as it
+// stands, a triangle over the slit would stretch like chewing gum while the slit opens. Therefore such a triangle is
+// drawn once for each of the parts that its dead edges leave behind. A part keeps its own corners and gets ghosts for
+// the others, put where the sheet would be if it went on unstretched:
+//
+//         a───────b        dead edges a-c, b-c:                 a───────b
+//          \     /         part {a, b} with ghost c'    and      \ {ab}/       c
+//     ══════\═══/══ cut    part {c} with ghosts a', b'            ·---·   a'·-/{c}\-·b'
+//            \ /
+//             c
+//
+// `side` is +1 at a part's own corners and -1 at its ghosts: the shader drops fragments where it is negative, and the
+// atlas decides texel by texel where the slit runs.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "services/core/scene_view.h"
+
+namespace fulcrum::render {
+
+class MembraneMesh {
+ public:
+  /// Keeps a reference to the arrays of `scene`.
+  explicit MembraneMesh(const SceneView& scene);
+
+  /// Takes over dead nodes and edges and rebuilds the triangles. False, and nothing changes, when the size of the grid
+  /// differs or the bit fields are short.
+  bool SetTopology(const TopologyState& topology);
+
+  /// Positions and normals for these particles (3 * particle count floats, m).
+  void Update(std::span<const float> xyz);
+
+  /// Grid nodes first (node = row * cols + col), then three vertices for each part of a cut triangle.
+  [[nodiscard]] std::span<const Vec3f> positions() const { return positions_; }
+  [[nodiscard]] std::span<const Vec3f> normals() const { return normals_; }
+  [[nodiscard]] std::span<const Vec2f> materials() const { return materials_; }  ///< (s, t) [m].
+  [[nodiscard]] std::span<const float> sides() const { return sides_; }
+  [[nodiscard]] std::span<const Triangle> triangles() const { return triangles_; }
+  /// Triangles that are whole; parts of cut ones follow them in triangles().
+  [[nodiscard]] std::size_t whole_triangles() const { return whole_triangles_; }
+
+  [[nodiscard]] bool node_dead(Index node) const { return TestBit(dead_nodes_, node); }
+  [[nodiscard]] bool edge_dead(std::size_t edge) const { return TestBit(dead_edges_, edge); }
+
+ private:
+  struct Part {
+    Triangle nodes;      // Of the cut triangle.
+    std::uint8_t owned;  // Bit per corner.
+  };
+  struct Frame {
+    Vec3f ds, dt;  // d(position)/ds and /dt at a node.
+    bool valid;
+  };
+
+  void BuildTriangles();
+  void AddParts(const Triangle& nodes, const std::array<bool, 3>& edge_alive);
+  [[nodiscard]] Frame FrameAt(Index node) const;
+  [[nodiscard]] Vec3f GhostFrom(Index owner, Index ghost) const;
+  void PlaceDeadNodes();
+
+  SceneView scene_;
+  std::uint32_t rows_;
+  std::uint32_t cols_;
+  std::vector<std::uint8_t> dead_nodes_;
+  std::vector<std::uint8_t> dead_edges_;
+  std::vector<Index> dead_list_;
+  std::vector<Part> parts_;
+  std::vector<Vec3f> positions_;
+  std::vector<Vec3f> normals_;
+  std::vector<Vec2f> materials_;
+  std::vector<float> sides_;
+  std::vector<Triangle> triangles_;
+  std::size_t whole_triangles_ = 0;
+};
+
+/// Corners and edges of membrane triangle `index` = 2 * cell + half (numbering of CauteryContact and TopologyState).
+struct MembraneTriangle {
+  Triangle nodes;
+  std::array<std::size_t, 3> edges;  ///< Between corners (0, 1), (1, 2), (2, 0).
+};
+[[nodiscard]] MembraneTriangle MembraneTriangleAt(std::uint32_t cols, std::uint32_t row, std::uint32_t col, int half);
+
+}  // namespace fulcrum::render

@@ -1,0 +1,174 @@
+#include "render_node/geometry/solid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace fulcrum::render {
+namespace {
+
+constexpr Colour kSteel{0.42f, 0.44f, 0.46f, 1.0f};
+constexpr Colour kPolishedSteel{0.60f, 0.61f, 0.63f, 1.0f};
+constexpr Colour kInsulation{0.012f, 0.012f, 0.014f, 0.25f};
+constexpr Colour kCeramic{0.70f, 0.67f, 0.60f, 0.10f};
+constexpr float kHookNeck = 0.012f;  // [m], as the collision shape of the physics node.
+
+void AppendQuadFace(const std::array<Vec3f, 4>& corners, const Colour& colour, Solid* solid) {
+  const Vec3f area = (corners[2] - corners[0]).cross(corners[3] - corners[1]);
+  if (area.squaredNorm() == 0) {
+    return;
+  }
+  const Vec3f normal = area.normalized();
+  const auto first = static_cast<Index>(solid->positions.size());
+  for (const Vec3f& corner : corners) {
+    solid->positions.push_back(corner);
+    solid->normals.push_back(normal);
+    solid->colours.push_back(colour);
+  }
+  solid->triangles.push_back({first, first + 1, first + 2});
+  solid->triangles.push_back({first, first + 2, first + 3});
+}
+
+void AppendCap(std::span<const Vec3f> outline, const Vec3f& normal, const Colour& colour, Solid* solid) {
+  const auto first = static_cast<Index>(solid->positions.size());
+  for (const Vec3f& corner : outline) {
+    solid->positions.push_back(corner);
+    solid->normals.push_back(normal);
+    solid->colours.push_back(colour);
+  }
+  for (Index k = 1; k + 1 < outline.size(); ++k) {
+    const Triangle forward{first, first + k, first + k + 1};
+    const Vec3f area = (outline[k] - outline[0]).cross(outline[k + 1] - outline[0]);
+    solid->triangles.push_back(area.dot(normal) >= 0 ? forward : Triangle{forward[0], forward[2], forward[1]});
+  }
+}
+
+void AppendStraightTube(float z0, float z1, float r0, float r1, int segments, const Colour& colour, Solid* solid) {
+  const std::array<Vec3f, 2> path{Vec3f(0, 0, z0), Vec3f(0, 0, z1)};
+  const std::array<float, 2> radii{r0, r1};
+  AppendTube(path, radii, segments, colour, solid);
+}
+
+}  // namespace
+
+void AppendTube(std::span<const Vec3f> path, std::span<const float> radii, int segments, const Colour& colour,
+                Solid* solid) {
+  const auto sides = static_cast<Index>(segments);
+  const auto first = static_cast<Index>(solid->positions.size());
+  Vec3f across = (path[1] - path[0]).normalized().unitOrthogonal();
+  std::vector<Vec3f> ring(sides);
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    const Vec3f ahead = path[std::min(k + 1, path.size() - 1)] - path[k];
+    const Vec3f behind = path[k] - path[k > 0 ? k - 1 : 0];
+    const Vec3f along = (ahead.normalized() + behind.normalized()).normalized();
+    // Carried along the path instead of chosen anew, so that the rings do not twist against each other.
+    across = (across - across.dot(along) * along).normalized();
+    const Vec3f other = along.cross(across);
+    for (Index s = 0; s < sides; ++s) {
+      const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(s) / static_cast<float>(sides);
+      const Vec3f normal = std::cos(angle) * across + std::sin(angle) * other;
+      ring[s] = path[k] + radii[k] * normal;
+      solid->positions.push_back(ring[s]);
+      solid->normals.push_back(normal);
+      solid->colours.push_back(colour);
+    }
+    if (k > 0) {
+      const Index base = first + static_cast<Index>(k - 1) * sides;
+      for (Index s = 0; s < sides; ++s) {
+        const Index a = base + s, b = base + (s + 1) % sides;
+        solid->triangles.push_back({a, b, b + sides});
+        solid->triangles.push_back({a, b + sides, a + sides});
+      }
+    }
+  }
+  const std::vector<Vec3f> start(solid->positions.begin() + first, solid->positions.begin() + first + sides);
+  AppendCap(start, (path[0] - path[1]).normalized(), colour, solid);
+  AppendCap(ring, (path.back() - path[path.size() - 2]).normalized(), colour, solid);
+}
+
+void AppendLoft(std::span<const std::vector<Vec3f>> outlines, const Colour& colour, Solid* solid) {
+  for (std::size_t k = 0; k + 1 < outlines.size(); ++k) {
+    const auto &a = outlines[k], &b = outlines[k + 1];
+    for (std::size_t s = 0; s < a.size(); ++s) {
+      const std::size_t next = (s + 1) % a.size();
+      AppendQuadFace({a[s], a[next], b[next], b[s]}, colour, solid);
+    }
+  }
+  const Vec3f along = (outlines.back()[0] - outlines.front()[0]).normalized();
+  AppendCap(outlines.front(), -along, colour, solid);
+  AppendCap(outlines.back(), along, colour, solid);
+}
+
+Solid GrasperShaft(const ToolShape& shape) {
+  Solid solid;
+  const float hinge = -shape.tip_length_m;
+  AppendStraightTube(-shape.shaft_length_m, hinge - 0.008f, shape.shaft_radius_m, shape.shaft_radius_m, 24, kInsulation,
+                     &solid);
+  AppendStraightTube(hinge - 0.008f, hinge - 0.005f, 0.98f * shape.shaft_radius_m, 0.9f * shape.shaft_radius_m, 24,
+                     kSteel, &solid);
+  // The fork that carries the hinge, and its pin.
+  for (const float side : {-1.0f, 1.0f}) {
+    const float y0 = side * 0.85f * shape.shaft_radius_m, y1 = side * 0.5f * shape.shaft_radius_m;
+    std::vector<std::vector<Vec3f>> outlines;
+    for (const float z : {hinge - 0.0055f, hinge + 0.0018f}) {
+      const float x = 0.55f * shape.shaft_radius_m;
+      const float low = std::min(y0, y1), high = std::max(y0, y1);
+      outlines.push_back({{-x, low, z}, {x, low, z}, {x, high, z}, {-x, high, z}});
+    }
+    AppendLoft(outlines, kSteel, &solid);
+  }
+  const std::array<Vec3f, 2> pin{Vec3f(0, -0.95f * shape.shaft_radius_m, hinge),
+                                 Vec3f(0, 0.95f * shape.shaft_radius_m, hinge)};
+  const std::array<float, 2> pin_radius{0.0008f, 0.0008f};
+  AppendTube(pin, pin_radius, 12, kPolishedSteel, &solid);
+  return solid;
+}
+
+Solid GrasperJaw(const ToolShape& shape) {
+  Solid solid;
+  const float length = shape.tip_length_m;
+  const float width = 0.8f * std::min(shape.shaft_radius_m, 2 * shape.tip_radius_m);
+  const float height = 0.75f * shape.tip_radius_m;
+  // A half round bar that tapers towards the tip; its flat inner face carries teeth of a millimetre.
+  constexpr int kTeeth = 14;
+  std::vector<std::vector<Vec3f>> outlines;
+  for (int k = 0; k <= 2 * kTeeth; ++k) {
+    const float u = static_cast<float>(k) / (2 * kTeeth);
+    const float z = -0.002f + u * (length + 0.002f);
+    const float taper = 1.0f - 0.45f * u * u;
+    const float rounding = u > 0.93f ? std::sqrt(std::max(0.15f, 1 - std::pow((u - 0.93f) / 0.075f, 2.0f))) : 1.0f;
+    const float tooth = (k % 2 == 0 || u < 0.2f) ? 0.00005f : 0.00045f;
+    const float w = width * taper * rounding, h = height * taper * rounding + 0.0004f;
+    std::vector<Vec3f> outline;
+    outline.emplace_back(tooth, -w, z);
+    for (int s = 0; s <= 6; ++s) {
+      const float angle = std::numbers::pi_v<float> * (static_cast<float>(s) / 6 - 0.5f);
+      outline.emplace_back(tooth + 0.0004f + h * std::cos(angle), w * std::sin(angle), z);
+    }
+    outline.emplace_back(tooth, w, z);
+    outlines.push_back(std::move(outline));
+  }
+  AppendLoft(outlines, kPolishedSteel, &solid);
+  return solid;
+}
+
+Solid Hook(const ToolShape& shape) {
+  Solid solid;
+  const float r = shape.tip_radius_m;
+  AppendStraightTube(-shape.shaft_length_m, -kHookNeck - 0.004f, shape.shaft_radius_m, shape.shaft_radius_m, 24,
+                     kInsulation, &solid);
+  AppendStraightTube(-kHookNeck - 0.004f, -kHookNeck, 0.92f * shape.shaft_radius_m, 0.55f * shape.shaft_radius_m, 24,
+                     kCeramic, &solid);
+  const std::array<Vec3f, 7> path{Vec3f(0, 0, -kHookNeck),
+                                  Vec3f(0, 0, -3 * r),
+                                  Vec3f(0.1f * r, 0, -1.4f * r),
+                                  Vec3f(0.5f * r, 0, -0.5f * r),
+                                  Vec3f(1.4f * r, 0, -0.1f * r),
+                                  Vec3f(3 * r, 0, 0),
+                                  Vec3f(std::max(shape.tip_length_m, 4 * r), 0, 0)};
+  const std::array<float, 7> radii{r, r, r, r, r, r, 0.8f * r};
+  AppendTube(path, radii, 12, kSteel, &solid);
+  return solid;
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,42 @@
+// Small solids built from rings: instruments, ureter and nerve. Pure.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "services/core/types.h"
+
+namespace fulcrum::render {
+
+struct Solid {
+  std::vector<Vec3f> positions;
+  std::vector<Vec3f> normals;
+  std::vector<std::array<float, 4>> colours;  ///< Linear red, green, blue; alpha is how metallic, 0 … 1.
+  std::vector<Triangle> triangles;
+};
+
+using Colour = std::array<float, 4>;
+
+/// A round tube along a polyline, with `segments` sides and capped ends. @pre two points or more; radii as many.
+void AppendTube(std::span<const Vec3f> path, std::span<const float> radii, int segments, const Colour& colour,
+                Solid* solid);
+
+/// Joins outlines of equal size, each counter-clockwise seen from the last one, with flat faces and caps.
+void AppendLoft(std::span<const std::vector<Vec3f>> outlines, const Colour& colour, Solid* solid);
+
+/// Shaft from z = -shaft_length to the hinge (grasper) or to the neck (hook), in frame T.
+struct ToolShape {
+  float shaft_radius_m;
+  float shaft_length_m;
+  float tip_radius_m;
+  float tip_length_m;
+};
+[[nodiscard]] Solid GrasperShaft(const ToolShape& shape);
+/// The jaw on the +x side, closed, with the hinge at the origin and the tip at z = tip_length.
+[[nodiscard]] Solid GrasperJaw(const ToolShape& shape);
+/// L-hook: heel at the origin, foot along +x, neck along -z (frame T).
+[[nodiscard]] Solid Hook(const ToolShape& shape);
+
+}  // namespace fulcrum::render

@@ -1,0 +1,172 @@
+#include "render_node/geometry/tissue_pattern.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+
+namespace fulcrum::render {
+namespace {
+
+// std::mt19937's sequence is fixed by the standard, the distributions' are not.
+class Uniform {
+ public:
+  explicit Uniform(std::uint32_t seed) : engine_(seed) {}
+  float operator()() { return static_cast<float>(engine_() >> 8) * 0x1p-24f; }
+
+ private:
+  std::mt19937 engine_;
+};
+
+float SmoothStep(float t) { return t * t * (3 - 2 * t); }
+
+/// Adds value noise with `cells` cells a side to a square field.
+void AddValueNoise(int size, int cells, float amplitude, Uniform* uniform, std::vector<float>* field) {
+  std::vector<float> lattice(static_cast<std::size_t>(cells) * cells);
+  for (float& value : lattice) {
+    value = (*uniform)() - 0.5f;
+  }
+  const auto at = [&](int x, int y) { return lattice[static_cast<std::size_t>((y % cells) * cells + x % cells)]; };
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      const float fx = static_cast<float>(x) * cells / size, fy = static_cast<float>(y) * cells / size;
+      const int ix = static_cast<int>(fx), iy = static_cast<int>(fy);
+      const float tx = SmoothStep(fx - ix), ty = SmoothStep(fy - iy);
+      const float low = at(ix, iy) + tx * (at(ix + 1, iy) - at(ix, iy));
+      const float high = at(ix, iy + 1) + tx * (at(ix + 1, iy + 1) - at(ix, iy + 1));
+      (*field)[static_cast<std::size_t>(y * size + x)] += amplitude * (low + ty * (high - low));
+    }
+  }
+}
+
+/// Distance on the unit torus between two coordinates.
+float Wrapped(float a, float b) {
+  const float d = std::abs(a - b);
+  return std::min(d, 1 - d);
+}
+
+std::uint8_t ToByte(float value) { return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0f, 255.0f))); }
+
+}  // namespace
+
+std::vector<std::uint8_t> MakeNoisePattern(int size) {
+  std::vector<std::uint8_t> image(4u * static_cast<std::size_t>(size) * size);
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    Uniform uniform(static_cast<std::uint32_t>(17 + channel));
+    std::vector<float> field(static_cast<std::size_t>(size) * size, 0.0f);
+    for (const int cells : {5, 11, 23, 47}) {
+      AddValueNoise(size, cells, 5.0f / static_cast<float>(cells), &uniform, &field);
+    }
+    for (std::size_t i = 0; i < field.size(); ++i) {
+      image[4 * i + channel] = ToByte(128 + 127 * field[i]);
+    }
+  }
+  // Lobules: distance to the second nearest minus distance to the nearest of jittered centres.
+  constexpr int kCells = 9;
+  Uniform uniform(5);
+  std::array<std::array<float, 2>, kCells * kCells> centres;
+  for (int c = 0; c < kCells * kCells; ++c) {
+    centres[c] = {(static_cast<float>(c % kCells) + uniform()) / kCells,
+                  (static_cast<float>(c / kCells) + uniform()) / kCells};
+  }
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      const float u = (static_cast<float>(x) + 0.5f) / size, v = (static_cast<float>(y) + 0.5f) / size;
+      float nearest = 9, second = 9;
+      for (int dy = -2; dy <= 2; ++dy) {
+        for (int dx = -2; dx <= 2; ++dx) {
+          const int cx = (static_cast<int>(u * kCells) + dx + kCells) % kCells;
+          const int cy = (static_cast<int>(v * kCells) + dy + kCells) % kCells;
+          const auto& centre = centres[cy * kCells + cx];
+          const float d = std::hypot(Wrapped(u, centre[0]), Wrapped(v, centre[1]));
+          second = std::min(second, std::max(d, nearest));
+          nearest = std::min(nearest, d);
+        }
+      }
+      image[4 * static_cast<std::size_t>(y * size + x) + 3] =
+          ToByte(255 * SmoothStep(std::min(1.0f, 1.6f * kCells * (second - nearest))));
+    }
+  }
+  return image;
+}
+
+std::vector<std::uint8_t> MakeVesselPattern(int size) {
+  std::vector<float> image(static_cast<std::size_t>(size) * size, 0.0f);
+  struct Walker {
+    float x, y, angle, radius, left;
+  };
+  Uniform uniform(29);
+  std::vector<Walker> walkers;
+  for (int k = 0; k < 7; ++k) {
+    walkers.push_back(
+        {uniform() * size, uniform() * size, 2 * std::numbers::pi_v<float> * uniform(), 0.0042f * size, 0.9f * size});
+  }
+  for (std::size_t w = 0; w < walkers.size(); ++w) {
+    Walker walker = walkers[w];
+    while (walker.left > 0 && walker.radius > 0.35f) {
+      const int reach = static_cast<int>(walker.radius) + 2;
+      for (int dy = -reach; dy <= reach; ++dy) {
+        for (int dx = -reach; dx <= reach; ++dx) {
+          const int x = static_cast<int>(std::floor(walker.x)) + dx, y = static_cast<int>(std::floor(walker.y)) + dy;
+          const float d = std::hypot(static_cast<float>(x) + 0.5f - walker.x, static_cast<float>(y) + 0.5f - walker.y);
+          const float strength = std::min(1.0f, 0.35f + walker.radius / (0.004f * size)) *
+                                 SmoothStep(std::clamp(walker.radius + 1 - d, 0.0f, 1.0f));
+          float& texel = image[static_cast<std::size_t>(((y % size + size) % size) * size + (x % size + size) % size)];
+          texel = std::max(texel, strength);
+        }
+      }
+      walker.angle += 0.35f * (uniform() - 0.5f);
+      walker.x += std::cos(walker.angle);
+      walker.y += std::sin(walker.angle);
+      walker.left -= 1;
+      walker.radius *= 0.9985f;
+      // A branch leaves every thirtieth of the image or so, thinner (Murray: r0^3 = r1^3 + r2^3).
+      if (uniform() < 30.0f / static_cast<float>(size) && walkers.size() < 400) {
+        const float turn = (uniform() < 0.5f ? -1.0f : 1.0f) * (0.5f + 0.6f * uniform());
+        walkers.push_back({walker.x, walker.y, walker.angle + turn, 0.68f * walker.radius, 0.5f * walker.left});
+        walker.radius *= 0.88f;
+      }
+    }
+  }
+  std::vector<std::uint8_t> bytes(image.size());
+  std::transform(image.begin(), image.end(), bytes.begin(), [](float v) { return ToByte(255 * v); });
+  return bytes;
+}
+
+StructureMap MakeStructureMap(const SceneView& scene, float width_m, float height_m) {
+  constexpr float kTexel = 4.0e-4f;  // [m]: a fifth of a ureter.
+  StructureMap map;
+  if (scene.protected_structures.empty()) {
+    map.texels.assign(2, 0);
+    return map;
+  }
+  map.width = std::max(1, static_cast<int>(std::ceil(width_m / kTexel)));
+  map.height = std::max(1, static_cast<int>(std::ceil(height_m / kTexel)));
+  map.texels.assign(2u * static_cast<std::size_t>(map.width) * map.height, 0);
+  for (const ProtectedStructure& structure : scene.protected_structures) {
+    const std::size_t channel = structure.kind == ProtectedKind::kUreter ? 0 : 1;
+    const float reach = 2 * structure.radius_m;
+    for (Index k = 0; k + 1 < structure.point_count; ++k) {
+      const Vec2f a = scene.protected_points[structure.first_point + k].material;
+      const Vec2f ab = scene.protected_points[structure.first_point + k + 1].material - a;
+      const Vec2f low = a.cwiseMin(a + ab).array() - reach, high = a.cwiseMax(a + ab).array() + reach;
+      for (int y = std::max(0, static_cast<int>(low.y() / kTexel));
+           y <= std::min(map.height - 1, static_cast<int>(high.y() / kTexel)); ++y) {
+        for (int x = std::max(0, static_cast<int>(low.x() / kTexel));
+             x <= std::min(map.width - 1, static_cast<int>(high.x() / kTexel)); ++x) {
+          const Vec2f p((static_cast<float>(x) + 0.5f) * kTexel, (static_cast<float>(y) + 0.5f) * kTexel);
+          const float length2 = std::max(ab.squaredNorm(), std::numeric_limits<float>::min());
+          const float t = std::clamp((p - a).dot(ab) / length2, 0.0f, 1.0f);
+          const float shade = std::clamp(1 - (p - a - t * ab).norm() / reach, 0.0f, 1.0f);
+          std::uint8_t& texel = map.texels[2 * static_cast<std::size_t>(y * map.width + x) + channel];
+          texel = std::max(texel, ToByte(255 * shade));
+        }
+      }
+    }
+  }
+  return map;
+}
+
+}  // namespace fulcrum::render

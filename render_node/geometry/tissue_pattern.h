@@ -1,0 +1,27 @@
+// Patterns of tissue, made once at start-up: sampling them costs a software rasteriser far less than computing noise
+// for each pixel of each picture. All tile without a seam and are the same in every run. Pure.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "services/core/scene_view.h"
+
+namespace fulcrum::render {
+
+/// Square RGBA8 image of `size` texels: three independent smooth noises (red, green, blue; mean 128) that bend normals
+/// and mottle colours, and lobules (alpha: 0 in the clefts, 255 in the middle of a lobule) for fat.
+[[nodiscard]] std::vector<std::uint8_t> MakeNoisePattern(int size);
+
+/// Square one-byte image of `size` texels: small blood vessels that branch, 255 in the middle of a vessel.
+[[nodiscard]] std::vector<std::uint8_t> MakeVesselPattern(int size);
+
+/// Where ureter (red) and nerve (green) run under the sheet, as they shine through it: two bytes per texel, s fast,
+/// over the atlas' area. 255 on the centre line, 0 from twice the structure's radius outwards.
+struct StructureMap {
+  int width = 1, height = 1;
+  std::vector<std::uint8_t> texels;
+};
+[[nodiscard]] StructureMap MakeStructureMap(const SceneView& scene, float width_m, float height_m);
+
+}  // namespace fulcrum::render

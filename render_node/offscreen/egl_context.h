@@ -1,0 +1,33 @@
+// An OpenGL context without a window system: EGL on Mesa's surfaceless platform. Works on software GL, in a container,
+// with no X server and no GPU.
+#pragma once
+
+#include <string>
+
+namespace fulcrum::render {
+
+class EglContext {
+ public:
+  /// Makes a compatibility-profile OpenGL context. Throws std::runtime_error with one line that says which step failed
+  /// and what to install.
+  EglContext();
+  ~EglContext();
+  EglContext(const EglContext&) = delete;
+  EglContext& operator=(const EglContext&) = delete;
+
+  /// Makes the context current on the calling thread, without a surface. Throws std::runtime_error when another thread
+  /// still holds it.
+  void MakeCurrent();
+  /// Lets go of it, so that another thread can have it.
+  void Release() noexcept;
+
+  /// GL_RENDERER and GL_VERSION, for the log.
+  [[nodiscard]] const std::string& description() const { return description_; }
+
+ private:
+  void* display_ = nullptr;
+  void* context_ = nullptr;
+  std::string description_;
+};
+
+}  // namespace fulcrum::render

@@ -1,0 +1,57 @@
+// PNG files: one function, and a writer with a thread of its own so that drawing never waits for the disk.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "render_node/offscreen/framebuffer.h"
+
+namespace fulcrum::render {
+
+/// Writes to a temporary name and renames, so that a kill leaves no half picture. Throws std::runtime_error naming the
+/// file.
+void WritePng(const Picture& picture, const std::filesystem::path& file);
+
+/// Reads an 8-bit RGB picture back (bottom row first, as in Picture). Throws std::runtime_error.
+[[nodiscard]] Picture ReadPng(const std::filesystem::path& file);
+
+/// Writes the pictures of a session: <folder>/frame_<session time in ms, 7 digits>.png. The names sort by time, also
+/// across a restart.
+class FrameWriter {
+ public:
+  /// Throws std::runtime_error when the folder cannot be made.
+  explicit FrameWriter(const std::filesystem::path& folder);
+  ~FrameWriter();  ///< Writes what is queued, then ends.
+  FrameWriter(const FrameWriter&) = delete;
+  FrameWriter& operator=(const FrameWriter&) = delete;
+
+  /// Queues a picture; false when the disk is more than kQueue pictures behind and this one was dropped.
+  bool Add(Picture picture, double session_time_s);
+  [[nodiscard]] std::uint64_t written() const;
+  /// Empty, or why the last write failed.
+  [[nodiscard]] std::string last_error() const;
+
+ private:
+  static constexpr std::size_t kQueue = 4;
+  struct Job {
+    Picture picture;
+    double session_time_s;
+  };
+  void Work();
+
+  std::filesystem::path folder_;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<Job> jobs_;
+  bool stop_ = false;
+  std::uint64_t written_ = 0;
+  std::string last_error_;
+  std::thread thread_;
+};
+
+}  // namespace fulcrum::render

@@ -1,0 +1,80 @@
+#include "render_node/scene_graph/atlas_texture.h"
+
+#include <cstring>
+#include <osg/Image>
+
+namespace fulcrum::render {
+
+class AtlasTexture::Upload : public osg::Texture2D::SubloadCallback {
+ public:
+  explicit Upload(const Atlas& atlas) : atlas_(atlas) {}
+
+  void Add(const AtlasRect& rect) { pending_.push_back(rect); }
+
+  void load(const osg::Texture2D&, osg::State&) const override {
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA8, atlas_.width(), atlas_.height(), 0, GL_RGBA, GL_UNSIGNED_BYTE,
+                 atlas_.texels().data());
+    pending_.clear();
+  }
+
+  void subload(const osg::Texture2D&, osg::State&) const override {
+    if (pending_.empty()) {
+      return;
+    }
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+    glPixelStorei(GL_UNPACK_ROW_LENGTH, atlas_.width());
+    for (const AtlasRect& r : pending_) {
+      const std::size_t first = 4 * (static_cast<std::size_t>(r.y) * atlas_.width() + static_cast<std::size_t>(r.x));
+      glTexSubImage2D(GL_TEXTURE_2D, 0, r.x, r.y, r.width, r.height, GL_RGBA, GL_UNSIGNED_BYTE,
+                      atlas_.texels().data() + first);
+    }
+    glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
+    pending_.clear();
+  }
+
+ private:
+  const Atlas& atlas_;
+  // OSG calls load and subload as const; drawing and updating share one thread.
+  mutable std::vector<AtlasRect> pending_;
+};
+
+AtlasTexture::AtlasTexture(const Atlas& atlas) : texture_(new osg::Texture2D), upload_(new Upload(atlas)) {
+  texture_->setTextureSize(atlas.width(), atlas.height());
+  texture_->setInternalFormat(GL_RGBA8);
+  texture_->setFilter(osg::Texture::MIN_FILTER, osg::Texture::LINEAR);
+  texture_->setFilter(osg::Texture::MAG_FILTER, osg::Texture::LINEAR);
+  texture_->setWrap(osg::Texture::WRAP_S, osg::Texture::CLAMP_TO_EDGE);
+  texture_->setWrap(osg::Texture::WRAP_T, osg::Texture::CLAMP_TO_EDGE);
+  texture_->setResizeNonPowerOfTwoHint(false);
+  texture_->setDataVariance(osg::Object::DYNAMIC);
+  texture_->setSubloadCallback(upload_);
+}
+
+AtlasTexture::~AtlasTexture() = default;
+
+void AtlasTexture::Update(const AtlasRect& rect) {
+  if (!rect.empty()) {
+    upload_->Add(rect);
+  }
+}
+
+osg::ref_ptr<osg::Texture2D> MakeTexture(int width, int height, int channels, const std::vector<std::uint8_t>& bytes,
+                                         bool tile) {
+  const GLenum format = channels == 1 ? GL_RED : channels == 2 ? GL_RG : GL_RGBA;
+  const GLint internal = channels == 1 ? GL_R8 : channels == 2 ? GL_RG8 : GL_RGBA8;
+  osg::ref_ptr<osg::Image> image = new osg::Image;
+  image->allocateImage(width, height, 1, format, GL_UNSIGNED_BYTE);
+  std::memcpy(image->data(), bytes.data(), bytes.size());
+  image->setInternalTextureFormat(internal);
+  osg::ref_ptr<osg::Texture2D> texture = new osg::Texture2D(image);
+  const auto wrap = tile ? osg::Texture::REPEAT : osg::Texture::CLAMP_TO_EDGE;
+  texture->setWrap(osg::Texture::WRAP_S, wrap);
+  texture->setWrap(osg::Texture::WRAP_T, wrap);
+  texture->setFilter(osg::Texture::MIN_FILTER, tile ? osg::Texture::LINEAR_MIPMAP_NEAREST : osg::Texture::LINEAR);
+  texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::LINEAR);
+  texture->setResizeNonPowerOfTwoHint(false);
+  return texture;
+}
+
+}  // namespace fulcrum::render

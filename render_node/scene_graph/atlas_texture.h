@@ -1,0 +1,33 @@
+// The atlas on the GPU: uploaded whole once, then only the texels that changed (glTexSubImage2D).
+#pragma once
+
+#include <osg/Texture2D>
+#include <vector>
+
+#include "render_node/geometry/atlas.h"
+
+namespace fulcrum::render {
+
+class AtlasTexture {
+ public:
+  /// Keeps a reference to `atlas`.
+  explicit AtlasTexture(const Atlas& atlas);
+  ~AtlasTexture();
+  AtlasTexture(const AtlasTexture&) = delete;
+  AtlasTexture& operator=(const AtlasTexture&) = delete;
+
+  /// Uploads these texels with the next picture.
+  void Update(const AtlasRect& rect);
+  [[nodiscard]] osg::Texture2D* texture() const { return texture_; }
+
+ private:
+  class Upload;
+  osg::ref_ptr<osg::Texture2D> texture_;
+  osg::ref_ptr<Upload> upload_;
+};
+
+/// A tiling or clamped texture from bytes: 1, 2 or 4 channels.
+[[nodiscard]] osg::ref_ptr<osg::Texture2D> MakeTexture(int width, int height, int channels,
+                                                       const std::vector<std::uint8_t>& bytes, bool tile);
+
+}  // namespace fulcrum::render

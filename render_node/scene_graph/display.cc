@@ -1,0 +1,165 @@
+#include "render_node/scene_graph/display.h"
+
+#include <osg/GLExtensions>
+#include <osgViewer/Viewer>
+
+#include "render_node/offscreen/egl_context.h"
+#include "services/core/error.h"
+
+namespace fulcrum::render {
+namespace {
+
+osg::Matrix ToOsg(const Eigen::Matrix4f& m) {
+  osg::Matrix out;
+  for (int row = 0; row < 4; ++row) {
+    for (int col = 0; col < 4; ++col) {
+      out(row, col) = m(col, row);  // OSG multiplies row vectors.
+    }
+  }
+  return out;
+}
+
+void SetUpViewer(const LaparoscopeView& view, osgViewer::Viewer* viewer) {
+  viewer->setThreadingModel(osgViewer::ViewerBase::SingleThreaded);
+  viewer->setSceneData(view.root());
+  viewer->setLightingMode(osg::View::NO_LIGHT);
+  viewer->setKeyEventSetsDone(0);
+  osg::Camera* camera = viewer->getCamera();
+  camera->setComputeNearFarMode(osg::Camera::DO_NOT_COMPUTE_NEAR_FAR);
+  camera->setCullingMode(osg::CullSettings::NO_CULLING);
+  camera->setClearColor(osg::Vec4(0.02f, 0.006f, 0.005f, 1));
+  camera->setProjectionResizePolicy(osg::Camera::FIXED);
+  camera->setViewMatrix(ToOsg(view.laparoscope().view));
+  camera->setProjectionMatrix(ToOsg(view.laparoscope().projection));
+}
+
+void SetUpState(osg::State* state) {
+  state->setUseModelViewAndProjectionUniforms(true);
+  state->setUseVertexAttributeAliasing(true);
+}
+
+class OffscreenDisplay : public Display {
+ public:
+  OffscreenDisplay(const LaparoscopeView& view, const RenderParams& params, int samples) {
+    context_.MakeCurrent();
+    const int width = static_cast<int>(params.width), height = static_cast<int>(params.height);
+    framebuffer_ = std::make_unique<Framebuffer>(width, height, samples);
+    window_ = viewer_.setUpViewerAsEmbeddedInWindow(0, 0, width, height);
+    window_->setDefaultFboId(framebuffer_->draw_id());
+    SetUpState(window_->getState());
+    SetUpViewer(view, &viewer_);
+    viewer_.realize();
+    context_.Release();
+  }
+
+  ~OffscreenDisplay() override {
+    context_.MakeCurrent();
+    viewer_.setSceneData(nullptr);
+    framebuffer_.reset();
+    context_.Release();
+  }
+
+  void Draw() override {
+    context_.MakeCurrent();
+    viewer_.frame();
+    glFinish();
+    context_.Release();
+  }
+
+  void DrawAndRead(Picture* picture) override {
+    context_.MakeCurrent();
+    viewer_.frame();
+    framebuffer_->Read(picture);
+    context_.Release();
+  }
+
+  [[nodiscard]] bool closed() const override { return false; }
+  [[nodiscard]] std::string description() const override { return context_.description(); }
+
+ private:
+  EglContext context_;
+  std::unique_ptr<Framebuffer> framebuffer_;
+  osgViewer::Viewer viewer_;
+  osg::ref_ptr<osgViewer::GraphicsWindowEmbedded> window_;
+};
+
+class ReadAfterDraw : public osg::Camera::DrawCallback {
+ public:
+  ReadAfterDraw(int width, int height) : width_(width), height_(height) {}
+  void operator()(osg::RenderInfo&) const override {
+    if (picture != nullptr) {
+      ReadBoundFramebuffer(width_, height_, picture);
+    }
+  }
+  Picture* picture = nullptr;
+
+ private:
+  int width_;
+  int height_;
+};
+
+class WindowDisplay : public Display {
+ public:
+  WindowDisplay(const LaparoscopeView& view, const RenderParams& params)
+      : read_(new ReadAfterDraw(static_cast<int>(params.width), static_cast<int>(params.height))) {
+    osg::GraphicsContext::WindowingSystemInterface* system = osg::GraphicsContext::getWindowingSystemInterface();
+    if (system == nullptr || system->getNumScreens() == 0) {
+      throw InputError("--window: no display can be opened (DISPLAY); start an X server or leave --window out");
+    }
+    osg::ref_ptr<osg::GraphicsContext::Traits> traits = new osg::GraphicsContext::Traits;
+    traits->readDISPLAY();
+    traits->setUndefinedScreenDetailsToDefaultScreen();
+    traits->x = 40;
+    traits->y = 40;
+    traits->width = static_cast<int>(params.width);
+    traits->height = static_cast<int>(params.height);
+    traits->samples = kSamples;
+    traits->doubleBuffer = true;
+    traits->windowDecoration = true;
+    traits->supportsResize = false;
+    traits->windowName = "Fulcrum";
+    context_ = osg::GraphicsContext::createGraphicsContext(traits);
+    if (!context_) {
+      throw InputError("--window: the display refuses an OpenGL window of this size");
+    }
+    SetUpState(context_->getState());
+    viewer_.getCamera()->setGraphicsContext(context_);
+    viewer_.getCamera()->setViewport(0, 0, traits->width, traits->height);
+    viewer_.getCamera()->setFinalDrawCallback(read_);
+    SetUpViewer(view, &viewer_);
+    viewer_.realize();
+    if (!viewer_.isRealized()) {
+      throw InputError("--window: the display refuses an OpenGL window");
+    }
+    // The context goes from the thread that opens the window to the thread that draws.
+    viewer_.setReleaseContextAtEndOfFrameHint(true);
+  }
+
+  void Draw() override { viewer_.frame(); }
+
+  void DrawAndRead(Picture* picture) override {
+    read_->picture = picture;
+    viewer_.frame();
+    read_->picture = nullptr;
+  }
+
+  [[nodiscard]] bool closed() const override { return viewer_.done(); }
+  [[nodiscard]] std::string description() const override { return "window"; }
+
+ private:
+  osg::ref_ptr<ReadAfterDraw> read_;
+  osg::ref_ptr<osg::GraphicsContext> context_;
+  osgViewer::Viewer viewer_;
+};
+
+}  // namespace
+
+std::unique_ptr<Display> MakeOffscreenDisplay(const LaparoscopeView& view, const RenderParams& params, int samples) {
+  return std::make_unique<OffscreenDisplay>(view, params, samples);
+}
+
+std::unique_ptr<Display> MakeWindowDisplay(const LaparoscopeView& view, const RenderParams& params) {
+  return std::make_unique<WindowDisplay>(view, params);
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,359 @@
+#include "render_node/scene_graph/laparoscope_view.h"
+
+#include <cmath>
+#include <numbers>
+#include <osg/BlendFunc>
+#include <osg/ColorMask>
+#include <osg/CullFace>
+#include <osg/Depth>
+#include <osg/Geode>
+
+#include <Eigen/Eigenvalues>
+
+#include "render_node/geometry/atlas.h"
+#include "render_node/geometry/fat_layer.h"
+#include "render_node/geometry/membrane_mesh.h"
+#include "render_node/geometry/solid.h"
+#include "render_node/geometry/surface.h"
+#include "render_node/geometry/tissue_pattern.h"
+#include "render_node/scene_graph/atlas_texture.h"
+#include "render_node/scene_graph/instruments.h"
+#include "render_node/scene_graph/mesh.h"
+#include "render_node/scene_graph/program.h"
+
+namespace fulcrum::render {
+namespace {
+
+using Float4 = std::array<float, 4>;
+
+// Near to far among the opaque ones, so that hidden fragments are not shaded; then the layers that let light through,
+// from the inside out.
+enum Order { kMask, kInstruments, kRectum, kCords, kSurroundings, kFat, kMembraneDepth, kMembrane };
+
+// Texture units; the samplers of all programs are bound once at the root.
+enum Unit { kAtlasUnit, kNoiseUnit, kVesselUnit, kStructureUnit };
+
+constexpr int kNoiseTexels = 256;
+constexpr int kVesselTexels = 512;
+constexpr std::uint32_t kFatStride = 2;
+
+void DrawIn(Order order, osg::StateSet* state) { state->setRenderBinDetails(order, "RenderBin"); }
+
+void Blend(osg::StateSet* state) {
+  state->setMode(GL_BLEND, osg::StateAttribute::ON);
+  state->setAttributeAndModes(new osg::BlendFunc(osg::BlendFunc::SRC_ALPHA, osg::BlendFunc::ONE_MINUS_SRC_ALPHA));
+}
+
+Float4 SurroundingColour(SurfaceRole role) {
+  switch (role) {  // Linear colour; the last is how much fat shows.
+    case SurfaceRole::kAbdominalWall:
+      return {0.62f, 0.25f, 0.20f, 0.3f};
+    case SurfaceRole::kRetroperitoneum:
+      return {0.55f, 0.20f, 0.14f, 0.8f};
+    case SurfaceRole::kPelvis:
+      return {0.46f, 0.12f, 0.10f, 0.4f};
+    case SurfaceRole::kBladder:
+      return {0.66f, 0.36f, 0.27f, 0.1f};
+    case SurfaceRole::kOther:
+      break;
+  }
+  return {0.5f, 0.2f, 0.16f, 0.3f};
+}
+
+Float4 CordColour(ProtectedKind kind) {
+  return kind == ProtectedKind::kUreter ? Float4{0.80f, 0.45f, 0.38f, 0} : Float4{0.86f, 0.74f, 0.50f, 0};
+}
+
+}  // namespace
+
+struct LaparoscopeView::Impl {
+  explicit Impl(const SceneView& view);
+  void AddMask();
+  void AddSurroundings();
+  void AddCords();
+  void AddRectum();
+  void AddSheets();
+  void BindTextures();
+  void UpdateRectum();
+  void UpdateMembrane();
+  Mesh* Add(std::unique_ptr<Mesh>* mesh, const char* name, bool dynamic, Order order, const char* fragment);
+
+  SceneView scene;
+  Laparoscope scope;
+  Atlas atlas;
+  MembraneMesh membrane;
+  FatLayer fat;
+  std::vector<float> xyz;
+  std::vector<Vec3f> rectum_positions, rectum_normals;
+  std::vector<Float4> membrane_coordinates;
+  bool tissue_changed = true;
+  bool topology_changed = true;
+
+  osg::ref_ptr<osg::Group> root = new osg::Group;
+  osg::ref_ptr<osg::Geode> geode = new osg::Geode;
+  AtlasTexture atlas_texture;
+  Instruments instruments;
+  std::unique_ptr<Mesh> rectum_mesh, fat_mesh, membrane_mesh;
+};
+
+LaparoscopeView::Impl::Impl(const SceneView& view)
+    : scene(view),
+      scope(MakeLaparoscope(view.render)),
+      atlas(view),
+      membrane(view),
+      fat(view, kFatStride),
+      atlas_texture(atlas),
+      instruments(view) {
+  xyz.resize(3 * view.rest_position.size());
+  for (std::size_t i = 0; i < view.rest_position.size(); ++i) {
+    Eigen::Map<Vec3f>(xyz.data() + 3 * i) = view.rest_position[i];
+  }
+  root->addChild(geode);
+  root->addChild(instruments.node());
+  DrawIn(kInstruments, instruments.node()->getOrCreateStateSet());
+  AddMask();
+  AddRectum();
+  AddCords();
+  AddSurroundings();
+  AddSheets();
+  BindTextures();
+}
+
+Mesh* LaparoscopeView::Impl::Add(std::unique_ptr<Mesh>* mesh, const char* name, bool dynamic, Order order,
+                                 const char* fragment) {
+  *mesh = std::make_unique<Mesh>(name, dynamic);
+  (*mesh)->state()->setAttributeAndModes(MakeProgram("surface.vert", fragment));
+  DrawIn(order, (*mesh)->state());
+  geode->addDrawable((*mesh)->geometry());
+  return mesh->get();
+}
+
+void LaparoscopeView::Impl::AddMask() {
+  Mesh mask("mask", false);
+  mask.state()->setAttributeAndModes(MakeProgram("mask.vert", "mask.frag"));
+  DrawIn(kMask, mask.state());
+  constexpr Index kSides = 128;
+  std::vector<Vec3f> positions;
+  std::vector<Triangle> triangles;
+  for (Index k = 0; k < kSides; ++k) {
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kSides;
+    for (const float radius : {scope.circle_radius, 4 * scope.picture_centre.maxCoeff()}) {
+      positions.emplace_back(radius * std::cos(angle) / scope.picture_centre.x(),
+                             radius * std::sin(angle) / scope.picture_centre.y(), 0.0f);
+    }
+    const Index a = 2 * k, b = 2 * ((k + 1) % kSides);
+    triangles.push_back({a, a + 1, b + 1});
+    triangles.push_back({a, b + 1, b});
+  }
+  mask.SetPositions(positions);
+  mask.SetTriangles(triangles);
+  geode->addDrawable(mask.geometry());
+}
+
+void LaparoscopeView::Impl::AddSurroundings() {
+  std::vector<Vec3f> positions, normals;
+  std::vector<Float4> colours, coordinates;
+  std::vector<Triangle> triangles;
+  for (const StaticSurface& surface : scene.static_surfaces) {
+    const auto first = static_cast<Index>(positions.size());
+    for (Index k = 0; k < surface.vertex_count; ++k) {
+      const Vec3f& p = scene.static_vertices[surface.first_vertex + k];
+      positions.push_back(p);
+      coordinates.push_back({p.x(), p.y(), p.z(), 0});
+      colours.push_back(SurroundingColour(surface.role));
+    }
+    for (Index k = 0; k < surface.triangle_count; ++k) {
+      Triangle t = scene.static_triangles[surface.first_triangle + k];
+      for (Index& corner : t) {
+        corner = corner - surface.first_vertex + first;
+      }
+      triangles.push_back(t);
+    }
+  }
+  normals.resize(positions.size());
+  ComputeNormals(positions, triangles, normals);
+  std::unique_ptr<Mesh> mesh;
+  Add(&mesh, "surroundings", false, kSurroundings, "surroundings.frag");
+  // Seen from behind a wall is not there: the scope may look in through it.
+  mesh->state()->setAttributeAndModes(new osg::CullFace(osg::CullFace::BACK));
+  mesh->SetPositions(positions);
+  mesh->SetNormals(normals);
+  mesh->SetColours(colours);
+  mesh->SetCoordinates(coordinates);
+  mesh->SetTriangles(triangles);
+}
+
+void LaparoscopeView::Impl::AddCords() {
+  Solid solid;
+  for (const ProtectedStructure& structure : scene.protected_structures) {
+    std::vector<Vec3f> path;
+    for (Index k = 0; k < structure.point_count; ++k) {
+      path.push_back(scene.protected_points[structure.first_point + k].p_W);
+    }
+    if (path.size() >= 2) {
+      const std::vector<float> radii(path.size(), structure.radius_m);
+      AppendTube(path, radii, 12, CordColour(structure.kind), &solid);
+    }
+  }
+  std::unique_ptr<Mesh> mesh;
+  Add(&mesh, "cords", false, kCords, "cord.frag");
+  mesh->SetPositions(solid.positions);
+  mesh->SetNormals(solid.normals);
+  mesh->SetColours(solid.colours);
+  mesh->SetTriangles(solid.triangles);
+}
+
+void LaparoscopeView::Impl::AddRectum() {
+  const std::size_t count = scene.surface_vertices.size();
+  rectum_positions.resize(count);
+  rectum_normals.resize(count);
+  UpdateRectum();
+  // The pattern sticks to the tissue: coordinates at rest along the organ's three principal directions.
+  Vec3f mean = Vec3f::Zero();
+  for (const Vec3f& p : rectum_positions) {
+    mean += p / static_cast<float>(count);
+  }
+  Mat3f spread = Mat3f::Zero();
+  for (const Vec3f& p : rectum_positions) {
+    spread += (p - mean) * (p - mean).transpose();
+  }
+  const Mat3f axes = Eigen::SelfAdjointEigenSolver<Mat3f>(spread).eigenvectors();  // Ascending: the long axis is last.
+  std::vector<Float4> coordinates(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Vec3f place = axes.transpose() * (rectum_positions[k] - mean);
+    const Vec3f facing = axes.transpose() * rectum_normals[k];
+    const float front = facing[0] * facing[0], side = facing[1] * facing[1];
+    coordinates[k] = {place[2], place[1], place[0], front + side > 0 ? front / (front + side) : 0.5f};
+  }
+  Add(&rectum_mesh, "rectum", true, kRectum, "rectum.frag");
+  rectum_mesh->state()->setAttributeAndModes(new osg::CullFace(osg::CullFace::BACK));
+  rectum_mesh->SetCoordinates(coordinates);
+  rectum_mesh->SetTriangles(scene.surface_triangles);
+}
+
+void LaparoscopeView::Impl::AddSheets() {
+  Add(&fat_mesh, "fat", true, kFat, "fat.frag");
+  Blend(fat_mesh->state());
+  std::vector<Float4> coordinates;
+  for (const Vec2f& m : fat.materials()) {
+    coordinates.push_back({m.x(), m.y(), 0, 0});
+  }
+  fat_mesh->SetCoordinates(coordinates);
+  fat_mesh->SetTriangles(fat.triangles());
+
+  Add(&membrane_mesh, "membrane", true, kMembrane, "membrane.frag");
+  Blend(membrane_mesh->state());
+  membrane_mesh->state()->setAttributeAndModes(new osg::Depth(osg::Depth::EQUAL, 0, 1, false));
+  // The same mesh once more, before: depth only.
+  osg::ref_ptr<osg::Geode> depth_pass = new osg::Geode;
+  depth_pass->addDrawable(membrane_mesh->geometry());
+  osg::StateSet* state = depth_pass->getOrCreateStateSet();
+  const auto override_on = osg::StateAttribute::ON | osg::StateAttribute::OVERRIDE;
+  state->setAttributeAndModes(MakeProgram("surface.vert", "membrane_depth.frag"), override_on);
+  state->setAttributeAndModes(new osg::ColorMask(false, false, false, false), override_on);
+  state->setAttributeAndModes(new osg::Depth(osg::Depth::LESS, 0, 1, true), override_on);
+  state->setMode(GL_BLEND, osg::StateAttribute::OFF | osg::StateAttribute::OVERRIDE);
+  state->setRenderBinDetails(kMembraneDepth, "RenderBin", osg::StateSet::OVERRIDE_RENDERBIN_DETAILS);
+  root->addChild(depth_pass);
+}
+
+void LaparoscopeView::Impl::BindTextures() {
+  osg::StateSet* state = root->getOrCreateStateSet();
+  const Vec2f size(static_cast<float>(atlas.width()) * atlas.texel_m(),
+                   static_cast<float>(atlas.height()) * atlas.texel_m());
+  const StructureMap map = MakeStructureMap(scene, size.x(), size.y());
+  const auto bind = [state](Unit unit, const char* name, osg::Texture2D* texture) {
+    state->setTextureAttribute(static_cast<unsigned>(unit), texture);
+    state->addUniform(new osg::Uniform(name, static_cast<int>(unit)));
+  };
+  bind(kAtlasUnit, "atlas", atlas_texture.texture());
+  bind(kNoiseUnit, "noise_pattern", MakeTexture(kNoiseTexels, kNoiseTexels, 4, MakeNoisePattern(kNoiseTexels), true));
+  bind(kVesselUnit, "vessel_pattern",
+       MakeTexture(kVesselTexels, kVesselTexels, 1, MakeVesselPattern(kVesselTexels), true));
+  bind(kStructureUnit, "structures", MakeTexture(map.width, map.height, 2, map.texels, false));
+  const auto vec3 = [](const Vec3f& v) { return osg::Vec3(v.x(), v.y(), v.z()); };
+  state->addUniform(new osg::Uniform("atlas_per_metre", osg::Vec2(1 / size.x(), 1 / size.y())));
+  state->addUniform(new osg::Uniform("light_position", vec3(scope.light_position)));
+  state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
+  state->addUniform(new osg::Uniform("light_power", scope.light_power));
+  state->addUniform(new osg::Uniform("circle_radius", scope.circle_radius));
+  state->addUniform(new osg::Uniform("picture_centre", osg::Vec2(scope.picture_centre.x(), scope.picture_centre.y())));
+  state->setMode(GL_LIGHTING, osg::StateAttribute::OFF);
+}
+
+void LaparoscopeView::Impl::UpdateRectum() {
+  MapEmbedded(scene.tets, scene.surface_vertices, xyz, rectum_positions);
+  ComputeNormals(rectum_positions, scene.surface_triangles, rectum_normals);
+}
+
+void LaparoscopeView::Impl::UpdateMembrane() {
+  membrane.Update(xyz);
+  membrane_mesh->SetPositions(membrane.positions());
+  membrane_mesh->SetNormals(membrane.normals());
+  if (topology_changed) {
+    membrane_coordinates.resize(membrane.positions().size());
+    for (std::size_t k = 0; k < membrane_coordinates.size(); ++k) {
+      membrane_coordinates[k] = {membrane.materials()[k].x(), membrane.materials()[k].y(), membrane.sides()[k], 0};
+    }
+    membrane_mesh->SetCoordinates(membrane_coordinates);
+    membrane_mesh->SetTriangles(membrane.triangles());
+  }
+}
+
+LaparoscopeView::LaparoscopeView(const SceneView& scene) : impl_(std::make_unique<Impl>(scene)) { Update(); }
+LaparoscopeView::~LaparoscopeView() = default;
+
+void LaparoscopeView::SetTissue(std::span<const float> xyz) {
+  std::copy(xyz.begin(), xyz.end(), impl_->xyz.begin());
+  impl_->tissue_changed = true;
+}
+
+bool LaparoscopeView::SetTopology(const TopologyState& topology) {
+  if (!impl_->membrane.SetTopology(topology)) {
+    return false;
+  }
+  impl_->atlas_texture.Update(impl_->atlas.PaintCuts(impl_->scene, topology));
+  impl_->topology_changed = true;
+  return true;
+}
+
+bool LaparoscopeView::ApplyPatch(const TemperaturePatch& patch) {
+  const AtlasRect rect = impl_->atlas.Apply(patch);
+  impl_->atlas_texture.Update(rect);
+  return !rect.empty();
+}
+
+void LaparoscopeView::SetTool(int tool, const ToolSample& sample) { impl_->instruments.SetPose(tool, sample); }
+void LaparoscopeView::SetJaw(int tool, float angle_rad) { impl_->instruments.SetJaw(tool, angle_rad); }
+
+void LaparoscopeView::Update() {
+  Impl& impl = *impl_;
+  if (impl.tissue_changed || impl.topology_changed) {
+    impl.UpdateMembrane();
+    impl.fat.Update(impl.xyz, impl.membrane);
+    impl.fat_mesh->SetPositions(impl.fat.positions());
+    impl.fat_mesh->SetNormals(impl.fat.normals());
+  }
+  if (impl.tissue_changed) {
+    impl.UpdateRectum();
+    impl.rectum_mesh->SetPositions(impl.rectum_positions);
+    impl.rectum_mesh->SetNormals(impl.rectum_normals);
+  }
+  impl.tissue_changed = impl.topology_changed = false;
+}
+
+osg::Group* LaparoscopeView::root() const { return impl_->root; }
+const Laparoscope& LaparoscopeView::laparoscope() const { return impl_->scope; }
+
+Vec3f LaparoscopeView::OnMembrane(const Vec2f& material) const {
+  const auto materials = impl_->scene.membrane_material;
+  std::size_t best = 0;
+  for (std::size_t k = 1; k < materials.size(); ++k) {
+    if ((materials[k] - material).squaredNorm() < (materials[best] - material).squaredNorm()) {
+      best = k;
+    }
+  }
+  return materials.empty() ? Vec3f::Zero() : impl_->membrane.positions()[best];
+}
+
+}  // namespace fulcrum::render

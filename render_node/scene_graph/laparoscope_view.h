@@ -1,0 +1,43 @@
+// The whole picture as an OpenSceneGraph graph: what the surgeon sees. Knows no bus and no window.
+#pragma once
+
+#include <memory>
+#include <osg/Group>
+#include <span>
+
+#include "render_node/geometry/laparoscope.h"
+#include "services/core/scene_view.h"
+
+namespace fulcrum::render {
+
+class LaparoscopeView {
+ public:
+  /// Builds everything for `scene`, whose arrays must outlive it. Needs no OpenGL context.
+  explicit LaparoscopeView(const SceneView& scene);
+  ~LaparoscopeView();
+  LaparoscopeView(const LaparoscopeView&) = delete;
+  LaparoscopeView& operator=(const LaparoscopeView&) = delete;
+
+  /// Particles in scene order, 3 * n floats [m]. @pre n is the scene's count.
+  void SetTissue(std::span<const float> xyz);
+  /// False, and nothing changes, when it belongs to another grid.
+  bool SetTopology(const TopologyState& topology);
+  /// False when the patch lies outside the sheet or has the wrong size.
+  bool ApplyPatch(const TemperaturePatch& patch);
+  void SetTool(int tool, const ToolSample& sample);
+  void SetJaw(int tool, float angle_rad);
+
+  /// Carries the last SetTissue and SetTopology over to the meshes. Split off so that several changes cost one update.
+  void Update();
+
+  [[nodiscard]] osg::Group* root() const;
+  [[nodiscard]] const Laparoscope& laparoscope() const;
+  /// Where (s, t) [m] of the sheet is drawn now, frame W; for puffs of steam.
+  [[nodiscard]] Vec3f OnMembrane(const Vec2f& material) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace fulcrum::render

@@ -1,0 +1,36 @@
+// One indexed triangle mesh in vertex buffers, fed from our own arrays.
+#pragma once
+
+#include <osg/Geometry>
+#include <span>
+#include <string_view>
+
+#include "services/core/types.h"
+
+namespace fulcrum::render {
+
+class Mesh {
+ public:
+  /// `name` for messages; `dynamic`: positions change from picture to picture.
+  Mesh(std::string_view name, bool dynamic);
+
+  void SetPositions(std::span<const Vec3f> positions);
+  void SetNormals(std::span<const Vec3f> normals);
+  /// Four floats a vertex; what they mean is up to the shader.
+  void SetCoordinates(std::span<const std::array<float, 4>> coordinates);
+  void SetColours(std::span<const std::array<float, 4>> colours);
+  void SetTriangles(std::span<const Triangle> triangles);
+
+  [[nodiscard]] osg::Geometry* geometry() const { return geometry_; }
+  [[nodiscard]] osg::StateSet* state() const { return geometry_->getOrCreateStateSet(); }
+
+ private:
+  osg::ref_ptr<osg::Geometry> geometry_;
+  osg::ref_ptr<osg::Vec3Array> positions_;
+  osg::ref_ptr<osg::Vec3Array> normals_;
+  osg::ref_ptr<osg::Vec4Array> coordinates_;
+  osg::ref_ptr<osg::Vec4Array> colours_;
+  osg::ref_ptr<osg::DrawElementsUInt> triangles_;
+};
+
+}  // namespace fulcrum::render

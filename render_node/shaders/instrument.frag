@@ -1,0 +1,12 @@
+// Instruments. colour: linear; alpha is how metallic.
+in vec3 position;
+in vec3 normal;
+in vec4 colour;
+out vec4 fragment;
+
+void main() {
+  vec3 n = normalize(normal);
+  vec3 metal = ShadeMetal(colour.rgb, n, position);
+  vec3 dull = ShadeTissue(colour.rgb, vec3(0.0), n, position, 0.25);
+  fragment = vec4(ToneMap(mix(dull, metal, colour.a)), 1.0);
+}
