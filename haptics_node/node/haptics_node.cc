@@ -1,0 +1,90 @@
+#include "haptics_node/node/haptics_node.h"
+
+#include <algorithm>
+#include <string>
+
+#include "haptics_node/device/simulated_device.h"
+
+namespace fulcrum::haptics {
+namespace {
+
+using DeviceArray = std::array<std::unique_ptr<HapticDevice>, kMaxTools>;
+
+DeviceArray MakeDevices(const SceneView& scene, const std::array<bool, kMaxTools>& simulated) {
+  DeviceArray devices;
+  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+    const ToolDescription& tool = scene.tools[i];
+    if (tool.kind == ToolKind::kNone || !simulated[i]) continue;
+    const Trocar trocar{tool.p_WP.cast<double>(), tool.shaft_length_m};
+    devices[i] = std::make_unique<SimulatedDevice>(scene.haptics, trocar, scene.script, i);
+  }
+  return devices;
+}
+
+Servo::Devices Pointers(const DeviceArray& devices) {
+  Servo::Devices pointers{};
+  std::transform(devices.begin(), devices.end(), pointers.begin(), [](const auto& device) { return device.get(); });
+  return pointers;
+}
+
+}  // namespace
+
+HapticsNode::HapticsNode(const SceneView& scene, const std::array<bool, kMaxTools>& simulated, const Ports& ports,
+                         std::int64_t epoch_ns)
+    : ports_(ports),
+      devices_(MakeDevices(scene, simulated)),
+      servo_(scene, Pointers(devices_)),
+      epoch_(static_cast<std::uint64_t>(epoch_ns)) {
+  manifest_.node = NodeId::kHaptics;
+  manifest_.consumed.resize(1);
+}
+
+void HapticsNode::ServoStep(const Tick& tick) noexcept {
+  while (to_servo_.TryPop(&arrived_)) servo_.OfferModel(arrived_, tick.stamp_ns);
+  servo_.Step(tick);
+  figures_.Store(servo_.figures());
+  if (!from_servo_.TryPush(servo_.record())) records_lost_.fetch_add(1, std::memory_order_relaxed);
+}
+
+void HapticsNode::BusStep() {
+  if (ports_.contact_model.TakeLatest(&received_) && !to_servo_.TryPush(received_)) {
+    models_not_taken_.fetch_add(1, std::memory_order_relaxed);
+  }
+  while (from_servo_.TryPop(&record_)) Publish(record_);
+}
+
+void HapticsNode::Publish(const ServoRecord& record) {
+  ToolState tool = record.tool;
+  tool.stamp = {++tool_sequence_, epoch_, record.tool.stamp.stamp_ns};
+  ports_.tool_state.Write(tool);
+
+  if (!record.model_taken && record.tick < next_manifest_tick_) return;
+  next_manifest_tick_ = record.tick + kTicksPerManifest;
+  if (!ports_.tick_manifest.has_readers()) return;
+  manifest_.stamp = {++manifest_sequence_, epoch_, record.tool.stamp.stamp_ns};
+  manifest_.tick = record.tick;
+  manifest_.session_time_s = record.session_time_s;
+  manifest_.state_hash = record.state_hash;
+  manifest_.consumed[0] = {TopicId::kContactModel, record.model_epoch, record.model_sequence};
+  ports_.tick_manifest.Write(manifest_);
+}
+
+void HapticsNode::FillHealth(Health* health) const {
+  const ServoFigures figures = figures_.Load();
+  const auto metric = [&](const char* name, double value) { health->metrics.push_back({name, value}); };
+  metric("peak_force_N", figures.peak_force_N);
+  metric("force0_N", figures.force_N[0]);
+  metric("force1_N", figures.force_N[1]);
+  metric("model_age_ms", 1e3 * figures.model_age_s);
+  metric("models_dropped", static_cast<double>(figures.models_dropped));
+  metric("models_not_taken", static_cast<double>(models_not_taken_.load(std::memory_order_relaxed)));
+  metric("records_lost", static_cast<double>(records_lost_.load(std::memory_order_relaxed)));
+  metric("forces_not_finite", static_cast<double>(figures.not_finite));
+  if (figures.state == ServoState::kFade || (figures.state == ServoState::kOff && figures.model_age_s >= 0)) {
+    health->state = HealthState::kDegraded;
+    health->last_error = "no contact model for " + std::to_string(static_cast<int>(1e3 * figures.model_age_s)) +
+                         " ms: forces are off until physics is back";
+  }
+}
+
+}  // namespace fulcrum::haptics

@@ -1,0 +1,72 @@
+// The haptics node on ports. Two threads: the servo's, which touches no port, and the bus thread, which carries
+// messages between the ports and two lock-free rings.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+
+#include "haptics_node/device/haptic_device.h"
+#include "haptics_node/servo/servo.h"
+#include "services/bus/port.h"
+#include "services/core/messages.h"
+#include "services/core/scene_view.h"
+#include "services/core/tick.h"
+#include "services/runtime/seqlock.h"
+#include "services/runtime/spsc_ring.h"
+
+namespace fulcrum::haptics {
+
+/// A manifest goes out at each tick that admits a contact model, and at least this often [ticks].
+inline constexpr std::uint64_t kTicksPerManifest = 10;
+
+class HapticsNode {
+ public:
+  struct Ports {
+    bus::Input<ContactModel>& contact_model;
+    bus::Output<ToolState>& tool_state;
+    bus::Output<TickManifest>& tick_manifest;
+  };
+
+  /// Scene and ports must outlive the node.
+  /// @param simulated per tool: a simulated device; a tool without a device is not published.
+  /// @param epoch_ns CLOCK_MONOTONIC at the start of the process [ns].
+  HapticsNode(const SceneView& scene, const std::array<bool, kMaxTools>& simulated, const Ports& ports,
+              std::int64_t epoch_ns);
+
+  /// Servo thread, each millisecond. Does not wait, lock, allocate, log or throw.
+  void ServoStep(const Tick& tick) noexcept;
+
+  /// Bus thread, each millisecond: newest contact model in, records of the servo out. In a replay or a test, call it
+  /// before and after ServoStep() on one thread.
+  void BusStep();
+
+  /// Any thread.
+  void FillHealth(Health* health) const;
+
+ private:
+  void Publish(const ServoRecord& record);
+
+  Ports ports_;
+  std::array<std::unique_ptr<HapticDevice>, kMaxTools> devices_;
+  Servo servo_;
+  const std::uint64_t epoch_;
+
+  // A servo that is held up for long drops the newest models and records, and says so in Health.
+  runtime::SpscRing<ContactModel, 8> to_servo_;
+  runtime::SpscRing<ServoRecord, 256> from_servo_;
+  runtime::SeqLock<ServoFigures> figures_;
+  std::atomic<std::uint64_t> models_not_taken_{0}, records_lost_{0};
+
+  // Servo thread only.
+  ContactModel arrived_;
+  // Bus thread only.
+  ContactModel received_;
+  ServoRecord record_;
+  TickManifest manifest_;
+  std::uint64_t tool_sequence_ = 0, manifest_sequence_ = 0;
+  std::uint64_t next_manifest_tick_ = 0;
+};
+
+}  // namespace fulcrum::haptics

@@ -1,0 +1,106 @@
+#include "haptics_node/servo/local_model.h"
+
+#include <algorithm>
+
+namespace fulcrum::haptics {
+namespace {
+
+// Steps of a replay follow the stamps of the ring; a gap (the servo was held up) is bridged in one step of at most:
+constexpr double kMaxReplayStep_s = 0.02;
+constexpr double kMinReplayStep_s = 1e-5;
+
+double Smootherstep(double u) noexcept {
+  const double c = std::clamp(u, 0.0, 1.0);
+  return c * c * c * (c * (6.0 * c - 15.0) + 10.0);
+}
+
+double Seconds(std::int64_t ns) noexcept { return 1e-9 * static_cast<double>(ns); }
+
+}  // namespace
+
+double LocalModel::CouplingFor(const Contact& contact, std::uint32_t count, const HandMapping& hand) const noexcept {
+  // Stiffness of the skin where it was measured, as the hand feels it along the normal; of a grasp in the worst
+  // direction. The contacts of a device act in parallel and share the cap.
+  const double stretch = SkinStretch(contact.k1, contact.k3, contact.f_ref.cast<double>().norm());
+  const double stiffness = contact.k1 + 3.0 * contact.k3 * stretch * stretch;
+  const double lever = contact.kind == ContactKind::kGrasp
+                           ? hand.J.squaredNorm()
+                           : (hand.J.transpose() * contact.n.cast<double>()).squaredNorm();
+  const double cap = kMaxHandStiffness_N_m / (hand.force_scale * std::max(lever, 1e-3) * count);
+  double coupling = std::max(0.0, 1.0 / cap - 1.0 / stiffness);
+  // A coupling that gets stiffer in mid-contact would put energy in: it only ever gives more.
+  const ContactSet& set = sets_[current_];
+  for (std::uint32_t i = 0; i < set.count; ++i) {
+    if (set.laws[i].id == contact.id && set.laws[i].kind == contact.kind) {
+      coupling = std::max(coupling, set.laws[i].coupling);
+    }
+  }
+  return coupling;
+}
+
+void LocalModel::Accept(const DeviceContacts& contacts, std::int64_t t_s_ns, std::int64_t now_ns,
+                        const HandMapping& hand, const PoseRing& ring) noexcept {
+  ContactSet& set = sets_[1 - current_];
+  set.t_s_ns = t_s_ns;
+  set.count = contacts.count;
+  set.force_cap_N = contacts.force_cap_N;
+  for (std::uint32_t i = 0; i < set.count; ++i) {
+    const double coupling = CouplingFor(contacts.contacts[i], set.count, hand);
+    set.laws[i] = MakeContactLaw(contacts.contacts[i], coupling, &set.states[i]);
+  }
+  // The newest entry of the ring is this tick's: Step() is about to take it.
+  std::int64_t previous_ns = t_s_ns;
+  for (std::size_t age = set.count > 0 ? ring.CountAfter(t_s_ns) : 0; age > 1; --age) {
+    const TimedTip& tip = ring.Newest(age - 1);
+    const double dt = std::clamp(Seconds(tip.stamp_ns - previous_ns), kMinReplayStep_s, kMaxReplayStep_s);
+    (void)StepSet(&set, tip.x, tip.stamp_ns, dt);
+    previous_ns = tip.stamp_ns;
+  }
+  current_ = 1 - current_;
+  fade_start_ns_ = now_ns;
+}
+
+ModelForce LocalModel::StepSet(ContactSet* set, const Vec3d& x, std::int64_t now_ns, double dt) noexcept {
+  ModelForce total;
+  total.touching = set->count > 0;
+  double weight = 0;
+  const double t = Seconds(now_ns - set->t_s_ns);
+  for (std::uint32_t i = 0; i < set->count; ++i) {
+    const ContactForce force = StepContact(set->laws[i], x, t, dt, &set->states[i]);
+    total.f_W += force.f_W;
+    total.stored_J += force.stored_J;
+    // Each contact has a proxy of its own; the tool's is their mean by force.
+    const double size = force.f_W.norm();
+    total.offset += size * set->laws[i].coupling * force.f_W;
+    weight += size;
+  }
+  if (weight > 0.0) total.offset /= weight;
+  const double size = total.f_W.norm();
+  if (set->force_cap_N > 0.0 && size > set->force_cap_N) total.f_W *= set->force_cap_N / size;
+  return total;
+}
+
+ModelForce LocalModel::Step(const Vec3d& x, std::int64_t now_ns, double dt) noexcept {
+  ModelForce force = StepSet(&sets_[current_], x, now_ns, dt);
+  if (ready(now_ns)) return force;
+  const ModelForce old = StepSet(&sets_[1 - current_], x, now_ns, dt);
+  const double w = Smootherstep(Seconds(now_ns - fade_start_ns_) / Seconds(kCrossFade_ns));
+  force.f_W = old.f_W + w * (force.f_W - old.f_W);
+  force.offset = old.offset + w * (force.offset - old.offset);
+  force.stored_J = old.stored_J + w * (force.stored_J - old.stored_J);
+  return force;
+}
+
+void LocalModel::AddTo(Hash64* hash) const noexcept {
+  const ContactSet& set = sets_[current_];
+  hash->AddValue(set.t_s_ns);
+  for (std::uint32_t i = 0; i < set.count; ++i) {
+    const ContactState& state = set.states[i];
+    hash->AddValue(set.laws[i].id);
+    hash->AddValue(state.q);
+    hash->Add(std::as_bytes(std::span(state.q_t.data(), 3)));
+    hash->Add(std::as_bytes(std::span(state.anchor.data(), 3)));
+  }
+}
+
+}  // namespace fulcrum::haptics

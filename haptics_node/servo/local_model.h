@@ -1,0 +1,66 @@
+// The contact models of one device between messages: replays a new model from its own time to now, then cross-fades
+// from the old one to the new one, both evaluated at the current tip.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "haptics_node/servo/contact_law.h"
+#include "haptics_node/servo/pose_ring.h"
+#include "services/core/hash.h"
+#include "services/core/messages.h"
+
+namespace fulcrum::haptics {
+
+/// Stiffness beyond which a rendered contact would be unstable in a light grip, as felt by the hand [N/m].
+inline constexpr double kMaxHandStiffness_N_m = 1200.0;
+/// A new model takes over during this time [ns].
+inline constexpr std::int64_t kCrossFade_ns = 10'000'000;
+
+/// How tip stiffness becomes hand stiffness: k_hand = scale |J^T n|^2 k_tip.
+struct HandMapping {
+  double force_scale = 1;
+  Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
+};
+
+struct ModelForce {
+  Vec3d f_W = Vec3d::Zero();     ///< Of the tissue on the tool, before force_scale [N].
+  Vec3d offset = Vec3d::Zero();  ///< Proxy minus tip: what the virtual coupling gives way [m].
+  double stored_J = 0;
+  bool touching = false;  ///< The newest model has at least one contact, be it only near.
+};
+
+class LocalModel {
+ public:
+  /// False while a cross-fade runs: the caller keeps the message and asks again. A cross-fade cut short would step.
+  [[nodiscard]] bool ready(std::int64_t now_ns) const noexcept { return now_ns - fade_start_ns_ >= kCrossFade_ns; }
+
+  /// Takes over the contacts of a message for time `t_s_ns` and replays them over the ring.
+  /// @pre ready(); the contacts have passed the gate.
+  void Accept(const DeviceContacts& contacts, std::int64_t t_s_ns, std::int64_t now_ns, const HandMapping& hand,
+              const PoseRing& ring) noexcept;
+
+  /// Force now, `dt` after the last call. Once per tick.
+  [[nodiscard]] ModelForce Step(const Vec3d& x, std::int64_t now_ns, double dt) noexcept;
+
+  /// Folds the state into a hash.
+  void AddTo(Hash64* hash) const noexcept;
+
+ private:
+  struct ContactSet {
+    std::int64_t t_s_ns = 0;
+    std::uint32_t count = 0;
+    double force_cap_N = 0;
+    std::array<ContactLaw, kMaxContacts> laws;
+    std::array<ContactState, kMaxContacts> states;
+  };
+
+  [[nodiscard]] double CouplingFor(const Contact& contact, std::uint32_t count, const HandMapping& hand) const noexcept;
+  [[nodiscard]] static ModelForce StepSet(ContactSet* set, const Vec3d& x, std::int64_t now_ns, double dt) noexcept;
+
+  std::array<ContactSet, 2> sets_;
+  std::size_t current_ = 0;
+  std::int64_t fade_start_ns_ = -kCrossFade_ns;
+};
+
+}  // namespace fulcrum::haptics

@@ -1,0 +1,157 @@
+#include "haptics_node/servo/servo.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/core/hash.h"
+
+namespace fulcrum::haptics {
+namespace {
+
+// Velocities are differences of positions, smoothed with this time constant: a few ticks, well under a hand's motion.
+constexpr double kVelocityFilter_s = 0.003;
+// Bounds of the time between two ticks: below, a difference is all noise; above, the servo was held up.
+constexpr double kMinDt_s = 1e-4;
+constexpr double kMaxDt_s = 0.02;
+
+/// World X, or Y for a shaft that points along X: the roll of a tool is free, but must not jump in mid-motion.
+Vec3d RollReference(const ToolDescription& tool, std::span<const ScriptKey> script, std::size_t index) {
+  Vec3f towards = -tool.p_WP;
+  for (const ScriptKey& key : script) {
+    if (key.tool == index) {
+      towards = key.p_W - tool.p_WP;
+      break;
+    }
+  }
+  constexpr float kNearlyAlong = 0.9f;
+  return std::abs(towards.normalized().x()) > kNearlyAlong ? Vec3d::UnitY() : Vec3d::UnitX();
+}
+
+}  // namespace
+
+Servo::Servo(const SceneView& scene, const Devices& devices) : force_scale_(scene.haptics.force_scale) {
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    Channel& channel = channels_[i];
+    const ToolDescription& tool = scene.tools[i];
+    if (tool.kind == ToolKind::kNone) continue;
+    channel.device = devices[i];
+    channel.kind = tool.kind;
+    channel.trocar = {tool.p_WP.cast<double>(), tool.shaft_length_m};
+    channel.x_reference = RollReference(tool, scene.script, i);
+    channel.output.limit_N = scene.haptics.force_limit_N;
+    channel.output.slew_N_per_ms = scene.haptics.slew_N_per_ms;
+  }
+}
+
+void Servo::OfferModel(const ContactModel& model, std::int64_t now_ns) noexcept {
+  if (!gate_.Admit(model, now_ns)) return;
+  age_.OnModel(model.tool_stamp_ns, now_ns);
+  pending_ = model;  // A newer one replaces one that still waits.
+  has_pending_ = true;
+  record_.model_epoch = model.stamp.epoch;
+  record_.model_sequence = model.stamp.sequence;
+  model_offered_ = true;
+}
+
+void Servo::Step(const Tick& tick) noexcept {
+  if (last_stamp_ns_ != 0) {
+    dt_ = std::clamp(1e-9 * static_cast<double>(tick.stamp_ns - last_stamp_ns_), kMinDt_s, kMaxDt_s);
+  }
+  last_stamp_ns_ = tick.stamp_ns;
+  for (Channel& channel : channels_) ReadDevice(&channel, tick);
+  TakePendingModel(tick.stamp_ns);
+  age_.Step(model_time_ns_, tick.stamp_ns, dt_);
+  for (Channel& channel : channels_) Render(&channel, tick);
+  FillRecord(tick);
+}
+
+void Servo::ReadDevice(Channel* channel, const Tick& tick) const noexcept {
+  if (channel->device == nullptr) return;
+  const Vec3d read = channel->device->ReadPosition(tick);
+  // A reading that is no number would stay in every filter for good: the last one stands in.
+  const Vec3d p_WA = read.allFinite() ? read : channel->p_WA;
+  channel->moved = channel->started ? Vec3d(p_WA - channel->p_WA) : Vec3d(Vec3d::Zero());
+  channel->p_WA = p_WA;
+  channel->v_WA += dt_ / (dt_ + kVelocityFilter_s) * (channel->moved / dt_ - channel->v_WA);
+  channel->pose = PoseFromAttachPoint(channel->trocar, p_WA);
+  channel->ring.Push(tick.stamp_ns, channel->pose.p_WT);
+}
+
+void Servo::TakePendingModel(std::int64_t now_ns) noexcept {
+  // The channels fade in step, so the first one speaks for all.
+  if (!has_pending_ || !channels_.front().model.ready(now_ns)) return;
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    Channel& channel = channels_[i];
+    channel.model.Accept(pending_.devices[i], pending_.tool_stamp_ns, now_ns, {force_scale_, channel.pose.J},
+                         channel.ring);
+    channel.external_W = pending_.devices[i].p_ext_W;
+  }
+  model_time_ns_ = pending_.tool_stamp_ns;
+  has_pending_ = false;
+}
+
+void Servo::Render(Channel* channel, const Tick& tick) const noexcept {
+  if (channel->device == nullptr) return;
+  const ModelForce model = channel->model.Step(channel->pose.p_WT, tick.stamp_ns, dt_);
+  const double gain = force_scale_ * age_.gain();
+  Vec3d f_A = ForceAtAttachPoint(channel->pose, gain * model.f_W);
+  if (model.touching) f_A -= age_.damping() * channel->v_WA;
+  f_A = channel->passivity.Step(f_A, channel->output.sent, channel->moved, gain * model.stored_J, channel->external_W,
+                                dt_);
+  channel->device->WriteForce(channel->output.Step(f_A, age_.creeping(), tick.dt_s));
+  TrackProxy(channel, model.offset, !channel->started);
+  channel->started = true;
+}
+
+void Servo::TrackProxy(Channel* channel, const Vec3d& offset, bool first) const noexcept {
+  const Vec3d p_WT = channel->pose.p_WT + offset;
+  const Eigen::Quaterniond q_WT = ToolOrientation(channel->pose.d_W, channel->x_reference);
+  if (!first) {
+    const double blend = dt_ / (dt_ + kVelocityFilter_s);
+    const Eigen::Quaterniond turn = q_WT * channel->q_WT.conjugate();
+    // Twice the vector part is the rotation vector of a small turn; the sign picks the short way round.
+    const Vec3d w = std::copysign(2.0, turn.w()) / dt_ * turn.vec();
+    channel->v_WT += blend * ((p_WT - channel->p_WT) / dt_ - channel->v_WT);
+    channel->w_WT += blend * (w - channel->w_WT);
+  }
+  channel->p_WT = p_WT;
+  channel->q_WT = q_WT;
+}
+
+void Servo::FillRecord(const Tick& tick) noexcept {
+  const double age = model_time_ns_ == 0 ? -1.0 : 1e-9 * static_cast<double>(tick.stamp_ns - model_time_ns_);
+  Hash64 hash;
+  figures_.not_finite = 0;
+  for (std::size_t i = 0; i < channels_.size(); ++i) {
+    const Channel& channel = channels_[i];
+    ToolSample& sample = record_.tool.tools[i];
+    if (channel.device == nullptr) continue;
+    const Vec3d& sent = channel.output.sent;
+    sample.kind = channel.kind;
+    sample.state = age_.state();
+    sample.p_WT = channel.p_WT.cast<float>();
+    sample.q_WT = channel.q_WT.cast<float>();
+    sample.v_WT = channel.v_WT.cast<float>();
+    sample.w_WT = channel.w_WT.cast<float>();
+    sample.f_W = ForceAtTip(channel.pose, sent).cast<float>();
+    sample.model_age_s = static_cast<float>(age);
+    figures_.force_N[i] = sent.norm();
+    figures_.peak_force_N = std::max(figures_.peak_force_N, figures_.force_N[i]);
+    figures_.not_finite += channel.output.not_finite;
+    hash.Add(std::as_bytes(std::span(channel.p_WA.data(), 3)));
+    hash.Add(std::as_bytes(std::span(sent.data(), 3)));
+    channel.model.AddTo(&hash);
+  }
+  hash.AddValue(age_.gain());
+  figures_.state = age_.state();
+  figures_.model_age_s = age;
+  figures_.models_dropped = gate_.dropped();
+  record_.tool.stamp.stamp_ns = tick.stamp_ns;
+  record_.tick = tick.index;
+  record_.session_time_s = tick.session_time_s;
+  record_.state_hash = hash.value();
+  record_.model_taken = model_offered_;
+  model_offered_ = false;
+}
+
+}  // namespace fulcrum::haptics

@@ -1,0 +1,96 @@
+// The 1 kHz servo as a pure object: devices and contact models in, forces to the devices and a record of the tick out.
+// Nothing here waits, locks, logs, allocates or throws.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "haptics_node/device/haptic_device.h"
+#include "haptics_node/servo/age_machine.h"
+#include "haptics_node/servo/local_model.h"
+#include "haptics_node/servo/model_gate.h"
+#include "haptics_node/servo/output_chain.h"
+#include "haptics_node/servo/passivity.h"
+#include "haptics_node/servo/pose_ring.h"
+#include "haptics_node/servo/trocar.h"
+#include "services/core/messages.h"
+#include "services/core/scene_view.h"
+#include "services/core/tick.h"
+
+namespace fulcrum::haptics {
+
+/// What one tick leaves behind for the bus. `tool.stamp` carries the time of the tick; its sequence is the writer's.
+struct ServoRecord {
+  ToolState tool;
+  std::uint64_t tick = 0;
+  double session_time_s = 0;
+  std::uint64_t state_hash = 0;
+  std::uint64_t model_epoch = 0, model_sequence = 0;  ///< Newest contact model offered; sequence 0: none yet.
+  bool model_taken = false;                           ///< A model was offered and admitted since the last tick.
+};
+
+/// Figures for Health; plain, so that another thread can be given a copy.
+struct ServoFigures {
+  ServoState state = ServoState::kOff;
+  double model_age_s = 0;   ///< Of the model in use; negative when there is none.
+  double peak_force_N = 0;  ///< Largest force on a hand since the start.
+  std::array<double, kMaxTools> force_N{};
+  std::uint64_t models_dropped = 0;
+  std::uint64_t not_finite = 0;
+};
+
+class Servo {
+ public:
+  using Devices = std::array<HapticDevice*, kMaxTools>;
+
+  /// Devices may be null where the scene has no tool; the others must outlive the servo.
+  Servo(const SceneView& scene, const Devices& devices);
+
+  /// A contact model that has come in; before Step() of the tick that shall know of it.
+  void OfferModel(const ContactModel& model, std::int64_t now_ns) noexcept;
+  /// One tick of 1 ms nominal.
+  void Step(const Tick& tick) noexcept;
+
+  [[nodiscard]] const ServoRecord& record() const noexcept { return record_; }
+  [[nodiscard]] const ServoFigures& figures() const noexcept { return figures_; }
+
+ private:
+  struct Channel {
+    HapticDevice* device = nullptr;
+    ToolKind kind = ToolKind::kNone;
+    Trocar trocar;
+    Vec3d x_reference = Vec3d::UnitX();
+    // State.
+    bool started = false;
+    Vec3d p_WA = Vec3d::Zero(), moved = Vec3d::Zero(), v_WA = Vec3d::Zero();
+    TrocarPose pose;
+    PoseRing ring;
+    LocalModel model;
+    PassivityController passivity;
+    OutputChain output;
+    Vec3d p_WT = Vec3d::Zero(), v_WT = Vec3d::Zero(), w_WT = Vec3d::Zero();  ///< Of the proxy.
+    Eigen::Quaterniond q_WT = Eigen::Quaterniond::Identity();
+    double external_W = 0;
+  };
+
+  void ReadDevice(Channel* channel, const Tick& tick) const noexcept;
+  void TakePendingModel(std::int64_t now_ns) noexcept;
+  void Render(Channel* channel, const Tick& tick) const noexcept;
+  void TrackProxy(Channel* channel, const Vec3d& offset, bool first) const noexcept;
+  void FillRecord(const Tick& tick) noexcept;
+
+  double force_scale_;
+  std::array<Channel, kMaxTools> channels_;
+  ModelGate gate_;
+  AgeMachine age_;
+  ContactModel pending_;
+  bool has_pending_ = false;
+  bool model_offered_ = false;
+  std::int64_t model_time_ns_ = 0;  ///< t_s of the model in use; 0: none.
+  std::int64_t last_stamp_ns_ = 0;
+  double dt_ = 1e-3;  ///< Since the last tick [s].
+  ServoRecord record_;
+  ServoFigures figures_;
+};
+
+}  // namespace fulcrum::haptics
