@@ -1,0 +1,57 @@
+// The electrosurgical generator and its modes.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/core/messages.h"
+#include "services/core/scene_view.h"
+
+namespace fulcrum::thermal {
+
+/// What a mode does to the voltage and when it removes tissue.
+///
+/// All modes regulate the mean power that was asked. Their waveforms differ: cut is continuous, blend and coag are
+/// interrupted, so the same peak voltage gives a lower rms. A cell is removed when its water is spent *and* it is
+/// hotter than `remove_C`: in cut at once (the steam bursts it), in blend after some superheating of dry tissue (a
+/// wider coagulated border), in coag only when it burns; coag therefore dries and browns. Fractions and temperatures
+/// assumed.
+struct ModeRule {
+  float rms_fraction;  ///< Of v_max_V.
+  float remove_C;
+};
+
+inline ModeRule RuleOf(CauteryMode mode) {
+  switch (mode) {
+    case CauteryMode::kCut:
+      return {1.0f, 100.0f};
+    case CauteryMode::kBlend:
+      return {0.8f, 130.0f};
+    case CauteryMode::kCoag:
+      return {0.5f, 400.0f};
+    case CauteryMode::kOff:
+      break;
+  }
+  return {0.0f, 1e9f};
+}
+
+/// Setting of the generator for one step.
+struct Drive {
+  float power_W = 0;
+  float v_max_V = 0;
+  float i_max_A = 0;
+  float remove_theta = 0;  ///< [K]
+};
+
+inline Drive MakeDrive(const ThermalParams& params, CauteryMode mode, float power_W) {
+  const ModeRule rule = RuleOf(mode);
+  return {power_W, rule.rms_fraction * params.v_max_V, params.i_max_A, rule.remove_C - params.body_temperature_C};
+}
+
+/// Electrode voltage into a conductance: the asked power, within the limits of voltage and current [V rms].
+inline float RegulatedVoltage(const Drive& drive, float conductance_S) {
+  if (!(conductance_S > 0.0f)) return 0.0f;
+  return std::min({drive.v_max_V, std::sqrt(drive.power_W / conductance_S), drive.i_max_A / conductance_S});
+}
+
+}  // namespace fulcrum::thermal

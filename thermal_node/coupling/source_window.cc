@@ -1,0 +1,267 @@
+#include "thermal_node/coupling/source_window.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fulcrum::thermal {
+namespace {
+
+constexpr float kFarFieldSpacing = 0.1f;  ///< Of the table, in windows.
+
+}  // namespace
+
+SourceWindow::SourceWindow(const Material& material, const Sheet& sheet) : material_(material), sheet_(sheet) {
+  // Beyond the window the sheet goes on: V ~ K0(r / lambda) with lambda = sqrt(sigma d / leak).
+  const double lambda = std::sqrt(material.sigma * material.thickness_m / std::max(material.leak_S_m2, 1e-3f));
+  for (std::size_t n = 0; n < far_field_.size(); ++n) {
+    const double r = std::max<double>(n, 1) * kFarFieldSpacing * kWindow * material.cell_m;
+    const double x = std::min(r / lambda, 300.0);  // K0 underflows beyond
+    far_field_[n] = static_cast<float>(std::cyl_bessel_k(1.0, x) / std::cyl_bessel_k(0.0, x) / lambda);
+  }
+}
+
+void SourceWindow::Export(State* state) const {
+  state->corner = corner_;
+  potential_.ExportStart(&state->start);
+}
+
+void SourceWindow::Import(const State& state) {
+  corner_ = state.corner;
+  potential_.ImportStart(state.start);
+}
+
+void SourceWindow::MoveTo(CellIndex corner) {
+  if (corner == corner_) return;
+  const int di = corner.ix - corner_.ix, dj = corner.iy - corner_.iy;
+  // A touch-down elsewhere shares nothing with the last potential.
+  const bool near = corner_.ix != INT32_MIN && std::abs(di) < kWindow / 4 && std::abs(dj) < kWindow / 4;
+  near ? potential_.Shift(di, dj) : potential_.ImportStart({});
+  corner_ = corner;
+}
+
+/// Visits every run of cells of one window row within one tile: visit(tile, cell in tile, cell in window, count). Cells
+/// beyond the sheet are visited with tile == nullptr.
+template <class Visit>
+void SourceWindow::ForTileRows(HeatField* field, const Visit& visit) {
+  for (int j = 0; j < kWindow; ++j) {
+    const int iy = corner_.iy + j;
+    const int ty = iy >= 0 ? iy / kTile : -1;
+    for (int i = 0; i < kWindow;) {
+      const int ix = corner_.ix + i;
+      const int in_tile = ((ix % kTile) + kTile) % kTile;
+      const int run = std::min(kTile - in_tile, kWindow - i);
+      Tile* tile = ix >= 0 && ty >= 0 ? field->Wake(ix / kTile, ty) : nullptr;
+      visit(tile, tile != nullptr ? (iy % kTile) * kTile + in_tile : 0, j * kWindow + i, run);
+      i += run;
+    }
+  }
+}
+
+void SourceWindow::RefreshTiles(HeatField* field, Ledger* ledger) {
+  for (int n = 0; n < 9; ++n) {
+    const int ix = corner_.ix + std::min((n % 3) * kTile, kWindow - 1);
+    const int iy = corner_.iy + std::min((n / 3) * kTile, kWindow - 1);
+    Tile* tile = ix >= 0 && iy >= 0 ? field->Wake(ix / kTile, iy / kTile) : nullptr;
+    if (tile != nullptr) field->RefreshTheta(tile, ledger);
+  }
+}
+
+void SourceWindow::Load(HeatField* field, Ledger* ledger) {
+  // Bad cells must not reach the potential: there they would spoil the whole window.
+  RefreshTiles(field, ledger);
+  ForTileRows(field, [&](const Tile* tile, int from, int to, int count) {
+    if (tile == nullptr) {
+      std::fill_n(&enthalpy_[to], count, 0.0f);
+      std::fill_n(&water_[to], count, 0.0f);
+      std::fill_n(&flags_[to], count, kOutside);
+      std::fill_n(&inverse_volume_[to], count, 0.0f);
+      return;
+    }
+    std::copy_n(&tile->state.enthalpy[from], count, &enthalpy_[to]);
+    std::copy_n(&tile->state.water[from], count, &water_[to]);
+    std::copy_n(&tile->state.flags[from], count, &flags_[to]);
+    std::fill_n(&inverse_volume_[to], count, 1.0f / tile->volume);
+  });
+}
+
+void SourceWindow::Store(HeatField* field, bool tented) {
+  ForTileRows(field, [&](Tile* tile, int to, int from, int count) {
+    if (tile == nullptr) return;
+    tile->state.tented = tented ? 1 : 0;
+    std::copy_n(&enthalpy_[from], count, &tile->state.enthalpy[to]);
+    if (std::equal(&water_[from], &water_[from] + count, &tile->state.water[to]) &&
+        std::equal(&flags_[from], &flags_[from] + count, &tile->state.flags[to])) {
+      return;
+    }
+    std::copy_n(&water_[from], count, &tile->state.water[to]);
+    std::copy_n(&flags_[from], count, &tile->state.flags[to]);
+    tile->faces_stale = true;
+  });
+}
+
+void SourceWindow::SetGround(const Vec2f& tip, bool tented) {
+  const float cell = material_.cell_m;
+  const float leak = tented ? 0.0f : material_.leak_S_m2 * cell * cell * metric_.s * metric_.t;
+  for (int k = 0; k < kWindowCells; ++k) problem_.ground[k] = (flags_[k] & kNoTissue) != 0 ? 0.0f : leak;
+  // What flows on beyond the window, as the sheet's far field through each face of the border.
+  const auto add = [&](int i, int j, float face, const Vec2f& normal) {
+    const Vec2f r_cells = Vec2f(static_cast<float>(corner_.ix + i + sheet_.origin_x) + 0.5f,
+                                static_cast<float>(corner_.iy + j + sheet_.origin_y) + 0.5f) -
+                          tip / cell;
+    const float r = std::max(r_cells.norm(), 1.0f);
+    const float x = std::min(r / (kFarFieldSpacing * kWindow), static_cast<float>(far_field_.size()) - 1.001f);
+    const int n = static_cast<int>(x);
+    const float f = x - static_cast<float>(n);
+    const float kappa = tented ? 1.0f / (r * cell * std::log(std::max(kTentRadius_m / (r * cell), 1.2f)))
+                               : far_field_[n] + f * (far_field_[n + 1] - far_field_[n]);
+    const float cosine = std::max(0.0f, r_cells.dot(normal) / r);
+    problem_.ground[j * kWindow + i] += face * problem_.sigma[j * kWindow + i] * cell * kappa * cosine;
+  };
+  for (int n = 0; n < kWindow; ++n) {
+    add(0, n, problem_.face_s * metric_.s, -Vec2f::UnitX());
+    add(kWindow - 1, n, problem_.face_s * metric_.s, Vec2f::UnitX());
+    add(n, 0, problem_.face_t * metric_.t, -Vec2f::UnitY());
+    add(n, kWindow - 1, problem_.face_t * metric_.t, Vec2f::UnitY());
+  }
+}
+
+void SourceWindow::SetSigma() {
+  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
+  const float boil = material_.theta_boil, slope = material_.sigma_per_K;
+  for (int k = 0; k < kWindowCells; ++k) {
+    const float theta = enthalpy_[k] / (rc_dry + water_[k] * rc_water);
+    const float capped = std::min(std::max(theta, 0.0f), boil);
+    const float wet = std::max(water_[k], kDrySigmaFraction);
+    problem_.sigma[k] = (flags_[k] & kNoTissue) != 0 ? 0.0f : material_.sigma * (1.0f + slope * capped) * wet;
+  }
+}
+
+void SourceWindow::SetContact(const Vec2f& tip, float radius_m) {
+  problem_.contact.fill(0);
+  const float cell = material_.cell_m;
+  const float area = cell * cell * metric_.s * metric_.t;
+  const Vec2f centre = tip / cell - Vec2f(static_cast<float>(corner_.ix + sheet_.origin_x),
+                                          static_cast<float>(corner_.iy + sheet_.origin_y));
+  const float reach = radius_m / cell + 1.0f;
+  const int i0 = std::max(0, static_cast<int>((centre.x() - reach / metric_.s)));
+  const int i1 = std::min(kWindow - 1, static_cast<int>(centre.x() + reach / metric_.s));
+  const int j0 = std::max(0, static_cast<int>(centre.y() - reach / metric_.t));
+  const int j1 = std::min(kWindow - 1, static_cast<int>(centre.y() + reach / metric_.t));
+  for (int j = j0; j <= j1; ++j) {
+    for (int i = i0; i <= i1; ++i) {
+      const float dx = (static_cast<float>(i) + 0.5f - centre.x()) * metric_.s;
+      const float dy = (static_cast<float>(j) + 0.5f - centre.y()) * metric_.t;
+      const float covered = std::clamp(radius_m / cell - std::sqrt(dx * dx + dy * dy) + 0.5f, 0.0f, 1.0f);
+      // From the face that the metal touches to the middle of the sheet: sigma / (d / 2) per area.
+      const int k = j * kWindow + i;
+      problem_.contact[k] = covered * area * 2.0f * problem_.sigma[k] / material_.thickness_m;
+    }
+  }
+}
+
+float SourceWindow::TimeToEvent(float v2) const {
+  const auto& q = potential_.heat();
+  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
+  const float boil = material_.theta_boil, latent = material_.latent;
+  alignas(64) std::array<float, kWindow> fastest{};
+  // The largest rate of progress towards an event, as 1 / time, so that cells without heat need no special case.
+  for (int j = 0; j < kWindow; ++j) {
+    for (int i = 0; i < kWindow; ++i) {
+      const int k = j * kWindow + i;
+      const float power = q[k] * inverse_volume_[k];
+      const float rc = rc_dry + water_[k] * rc_water;
+      const float to_dry = std::max(rc * boil - enthalpy_[k], 0.0f) + water_[k] * latent;
+      const float warm = kMaxWarming * rc;
+      const float heat = enthalpy_[k] < 0.98f * rc * boil ? std::min(warm, to_dry) : to_dry;
+      const float rate = water_[k] > 0.0f ? power / (heat + 1.0f) : 0.0f;
+      fastest[i] = fastest[i] > rate ? fastest[i] : rate;
+    }
+  }
+  const float rate = *std::max_element(fastest.begin(), fastest.end()) * v2;
+  return rate > 0.0f ? 1.0f / rate : 1.0f;
+}
+
+void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
+  const float latent = material_.latent;
+  for (int i = 0; i < kWindow; ++i) {
+    const int k = j * kWindow + i;
+    if ((flags_[k] & kNoTissue) != 0) continue;
+    const double volume = 1.0 / inverse_volume_[k];
+    const float excess = enthalpy_[k] - material_.BoilingEnthalpy(water_[k]);
+    if (excess > 0.0f && water_[k] > 0.0f) {
+      const float before = enthalpy_[k];
+      const float boiled = std::min(water_[k], excess / latent);
+      water_[k] -= boiled;
+      enthalpy_[k] = material_.BoilingEnthalpy(water_[k]) + (excess - boiled * latent);
+      ledger->vapour += (static_cast<double>(before) - static_cast<double>(enthalpy_[k])) * volume;
+    }
+    if (water_[k] > 0.0f || enthalpy_[k] < material_.rc_dry * remove_theta) continue;
+    ledger->removed += static_cast<double>(enthalpy_[k]) * volume;
+    enthalpy_[k] = 0;
+    water_[k] = 0;
+    flags_[k] = static_cast<std::uint8_t>(flags_[k] | kRemoved);
+    ++stats_.removed_cells;
+    const CellIndex cell{corner_.ix + i, corner_.iy + j};
+    stats_.low = {std::min(stats_.low.ix, cell.ix), std::min(stats_.low.iy, cell.iy)};
+    stats_.high = {std::max(stats_.high.ix, cell.ix), std::max(stats_.high.iy, cell.iy)};
+  }
+}
+
+void SourceWindow::Deposit(float v2, float dt_s, float remove_theta, Ledger* ledger) {
+  const auto& q = potential_.heat();
+  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
+  const float scale = v2 * dt_s;
+  for (int j = 0; j < kWindow; ++j) {
+    float above = -1.0f;
+    for (int i = 0; i < kWindow; ++i) {
+      const int k = j * kWindow + i;
+      enthalpy_[k] += scale * q[k] * inverse_volume_[k];
+      const float excess = enthalpy_[k] - (rc_dry + water_[k] * rc_water) * material_.theta_boil;
+      above = above > excess ? above : excess;
+    }
+    if (above >= 0.0f) BoilRow(j, remove_theta, ledger);
+  }
+}
+
+void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger) {
+  const CellIndex middle = sheet_.CellOf(0.5f * (path.from + path.to));
+  MoveTo({middle.ix - kWindow / 2, middle.iy - kWindow / 2});
+  Load(field, ledger);
+  const int tile_x = std::clamp(middle.ix / kTile, 0, sheet_.tiles_x - 1);
+  const int tile_y = std::clamp(middle.iy / kTile, 0, sheet_.tiles_y - 1);
+  metric_ = sheet_.metric[tile_y * sheet_.tiles_x + tile_x];
+  problem_.face_s = material_.thickness_m * metric_.t / metric_.s;
+  problem_.face_t = material_.thickness_m * metric_.s / metric_.t;
+  SetSigma();
+  SetGround(0.5f * (path.from + path.to), path.tented);
+  // The tip passes over at most one cell per step.
+  const float cells = (path.to - path.from).norm() / material_.cell_m;
+  const float longest = std::max(duration_s / std::max(cells, 1.0f), 0.1f * min_step_s);
+  const float shortest = std::min(min_step_s, longest);
+  float t = 0, guess = shortest;
+  while (t < duration_s) {
+    const float at = std::min(t + 0.5f * guess, duration_s) / duration_s;
+    SetContact(path.from + at * (path.to - path.from), path.radius_m);
+    const PotentialResult solved = potential_.Solve(problem_, tolerance);
+    const float voltage = RegulatedVoltage(drive, solved.conductance_S);
+    const float v2 = voltage * voltage;
+    const float rest = duration_s - t;
+    float dt = std::min(std::clamp(TimeToEvent(v2), shortest, longest), rest);
+    if (rest - dt < 0.5f * shortest) dt = rest;  // no sliver at the end
+    Deposit(v2, dt, drive.remove_theta, ledger);
+    SetSigma();
+    ledger->joule += static_cast<double>(v2) * dt * solved.heat_S;
+    ledger->generator += static_cast<double>(v2) * dt * solved.conductance_S;
+    stats_.voltage_V = voltage;
+    stats_.current_A = voltage * solved.conductance_S;
+    stats_.imbalance = std::max(stats_.imbalance, solved.imbalance);
+    stats_.iterations += solved.iterations;
+    ++stats_.solves;
+    t = dt == rest ? duration_s : t + dt;
+    guess = dt;
+  }
+  Store(field, path.tented);
+  RefreshTiles(field, ledger);
+}
+
+}  // namespace fulcrum::thermal

@@ -1,0 +1,85 @@
+// Current and Joule heat around the tip: a 64 x 64 copy of the cells, advanced from event to event.
+//
+// A potential is valid until the tissue changes. So after each solve the step goes to the earliest moment at which a
+// cell has spent its water (or has warmed by more than kMaxWarming), within [min_step, rest]; the tip is taken at
+// mid-step. A fixed step of a frame would be wrong by about the whole energy (lab notes).
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "thermal_node/coupling/generator.h"
+#include "thermal_node/heat/heat_field.h"
+#include "thermal_node/potential/potential_solver.h"
+
+namespace fulcrum::thermal {
+
+inline constexpr float kMaxWarming = 20.0f;     ///< Per coupling step [K]: sigma then changes by less than 30 %.
+inline constexpr float kTentRadius_m = 0.015f;  ///< A tented sheet returns its current to the tissue from here on.
+
+/// Tip path over a span of time, in material space.
+struct TipPath {
+  Vec2f from = Vec2f::Zero(), to = Vec2f::Zero();  ///< [m]
+  float radius_m = 0;
+  bool tented = false;
+};
+
+/// Accumulated over Run() calls until ClearStats().
+struct SourceStats {
+  int solves = 0, iterations = 0;
+  int removed_cells = 0;
+  CellIndex low{INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN};  ///< Box of the removed cells.
+  float voltage_V = 0, current_A = 0;                               ///< Of the last solve.
+  float imbalance = 0;                                              ///< Largest.
+};
+
+class SourceWindow {
+ public:
+  SourceWindow(const Material& material, const Sheet& sheet);
+
+  /// Heats the sheet for `duration_s` while the tip moves along the path.
+  void Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger);
+
+  [[nodiscard]] const SourceStats& stats() const { return stats_; }
+  void ClearStats() { stats_ = {}; }
+
+  float min_step_s = 1.0e-3f;  ///< Shortest coupling step.
+  float tolerance = 3e-3f;     ///< Relative residual of the potential.
+
+  /// For checkpoints: where the window stood and the start value of the next solve.
+  struct State {
+    CellIndex corner{INT32_MIN, INT32_MIN};
+    std::array<float, kWindowCells> start{};
+  };
+  void Export(State* state) const;
+  void Import(const State& state);
+
+ private:
+  void MoveTo(CellIndex corner);
+  void RefreshTiles(HeatField* field, Ledger* ledger);
+  void Load(HeatField* field, Ledger* ledger);
+  /// The tissue in the window lies as it does under the tip: tented or not.
+  void Store(HeatField* field, bool tented);
+  void SetGround(const Vec2f& tip, bool tented);
+  void SetContact(const Vec2f& tip, float radius_m);
+  void SetSigma();
+  [[nodiscard]] float TimeToEvent(float v2) const;
+  void Deposit(float v2, float dt_s, float remove_theta, Ledger* ledger);
+  void BoilRow(int j, float remove_theta, Ledger* ledger);
+  template <class Visit>
+  void ForTileRows(HeatField* field, const Visit& visit);
+
+  const Material& material_;
+  const Sheet& sheet_;
+  PotentialSolver potential_;
+  PotentialProblem problem_;
+  CellIndex corner_{INT32_MIN, INT32_MIN};
+  Metric metric_;
+  std::array<float, 64> far_field_{};  ///< K1/(lambda K0) over distance [1/m].
+  SourceStats stats_;
+
+  alignas(64) std::array<float, kWindowCells> enthalpy_{}, water_{}, inverse_volume_{};
+  alignas(64) std::array<std::uint8_t, kWindowCells> flags_{};
+};
+
+}  // namespace fulcrum::thermal

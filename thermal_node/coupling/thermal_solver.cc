@@ -1,0 +1,191 @@
+#include "thermal_node/coupling/thermal_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "services/core/hash.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+/// Half width of the square around the tip that is searched for blanched and charred tissue [cells].
+constexpr int kSearchCells = 12;
+constexpr float kSteamQuiet_s = 0.2f, kCutQuiet_s = 0.1f, kQuarantineQuiet_s = 1.0f;
+constexpr float kCutReport_m = 5e-4f;  ///< A cut event per half millimetre.
+
+}  // namespace
+
+ThermalSolver::ThermalSolver(const SceneView& scene)
+    : params_(scene.thermal),
+      material_(MakeMaterial(scene.thermal)),
+      field_(MakeSheet(scene), material_),
+      topology_(scene, field_.sheet()),
+      damage_(material_.body_C),
+      protected_(scene, field_),
+      source_(material_, field_.sheet()) {
+  events_.reserve(64);
+  alarms_.reserve(16);
+  figures_.highest_C = figures_.present_C = material_.body_C;
+}
+
+bool ThermalSolver::Idle(const TipInput& tip) const {
+  return !tip.active && field_.idle() && !topology_.staged() && !protected_.warm() && !cut_meter_.pending();
+}
+
+void ThermalSolver::Step(const TipInput& tip, float dt_s) {
+  events_.clear();
+  committed_ = false;
+  stepped_ = !Idle(tip);
+  if (!stepped_) {
+    memory_.energised = 0;
+    figures_.power_W = 0;
+    return;
+  }
+  ++frame_;
+  clock_s_ += dt_s;
+  source_.ClearStats();
+  const double before_J = ledger_.generator;
+  ApplySource(tip, dt_s, 0.0f, 0.5f);
+  figures_.substeps = field_.Diffuse(dt_s, &ledger_);
+  ApplySource(tip, dt_s, 0.5f, 1.0f);
+  UpdateDamage(dt_s);
+  UpdateTopology(tip, dt_s);
+  UpdateProtected(dt_s);
+  figures_.power_W = static_cast<float>((ledger_.generator - before_J) / dt_s);
+  figures_.voltage_V = tip.active ? source_.stats().voltage_V : 0.0f;
+  figures_.solves = source_.stats().solves;
+  figures_.iterations = source_.stats().iterations;
+  figures_.present_C = material_.body_C + field_.MaxTheta();
+  figures_.highest_C = std::max(figures_.highest_C, figures_.present_C);
+  ReportEvents(tip);
+}
+
+void ThermalSolver::ApplySource(const TipInput& tip, float dt_s, float from, float to) {
+  if (!tip.active) return;
+  TipPath part = tip.path;
+  part.from = tip.path.from + from * (tip.path.to - tip.path.from);
+  part.to = tip.path.from + to * (tip.path.to - tip.path.from);
+  source_.Run(&field_, part, MakeDrive(params_, tip.mode, tip.power_W), (to - from) * dt_s, &ledger_);
+}
+
+void ThermalSolver::UpdateDamage(float dt_s) {
+  for (Tile* tile : field_.awake()) damage_.Update(tile, dt_s);
+}
+
+void ThermalSolver::UpdateTopology(const TipInput& tip, float dt_s) {
+  const SourceStats& stats = source_.stats();
+  if (stats.removed_cells > 0) topology_.StageCut(field_, stats.low, stats.high);
+  if (tip.active) cut_meter_.Walk(field_, tip.path);
+  cut_meter_.Update(&field_, dt_s);
+  if (!at_commit_frame()) return;
+  for (const Tile* tile : field_.awake()) {
+    // Collagen does not change below this; see DamageModel.
+    if (tile->theta_max > kDamageStart) topology_.StageShrink(field_, *tile);
+  }
+  committed_ = topology_.Commit();
+}
+
+void ThermalSolver::UpdateProtected(float dt_s) {
+  protected_dt_s_ += dt_s;
+  if (frame_ % kProtectedFrames != 0) return;
+  alarms_.clear();
+  protected_.Update(field_, damage_.cell_death(), std::exchange(protected_dt_s_, 0.0f), &alarms_);
+  for (const ProtectedAlarm& alarm : alarms_) {
+    const bool ureter = alarm.kind == ProtectedKind::kUreter;
+    const auto kind = alarm.injury ? (ureter ? ThermalEventKind::kUreterInjury : ThermalEventKind::kNerveInjury)
+                                   : (ureter ? ThermalEventKind::kUreterWarning : ThermalEventKind::kNerveWarning);
+    ++(alarm.injury ? figures_.injuries : figures_.warnings);
+    Report(kind, alarm.material, alarm.theta, alarm.omega, 0.0f);
+  }
+}
+
+void ThermalSolver::Report(ThermalEventKind kind, const Vec2f& at, float theta, float value, float quiet_s) {
+  float& quiet_until = memory_.quiet_until_s[static_cast<std::size_t>(kind)];
+  if (clock_s_ < quiet_until) return;
+  quiet_until = clock_s_ + quiet_s;
+  events_.push_back({kind, at, material_.body_C + theta, value});
+}
+
+void ThermalSolver::ReportEvents(const TipInput& tip) {
+  const Vec2f at = tip.path.to;
+  if (tip.active && memory_.energised == 0) {
+    memory_.blanched = memory_.charred = 0;
+    Report(ThermalEventKind::kContact, at, field_.MaxTheta(), tip.power_W, 0.0f);
+  }
+  memory_.energised = tip.active ? 1 : 0;
+  if (ledger_.vapour > memory_.vapour && tip.active) {
+    Report(ThermalEventKind::kSteam, at, material_.theta_boil, figures_.power_W, kSteamQuiet_s);
+  }
+  memory_.vapour = ledger_.vapour;
+  if (cut_length_m() >= memory_.reported_cut_m + kCutReport_m) {
+    memory_.reported_cut_m = cut_length_m();
+    Report(ThermalEventKind::kCut, at, field_.MaxTheta(), cut_length_m(), kCutQuiet_s);
+  }
+  if (field_.quarantined() != memory_.quarantined) {
+    memory_.quarantined = field_.quarantined();
+    const Vec2f where = field_.sheet().CentreOf(field_.last_quarantined());
+    Report(ThermalEventKind::kQuarantine, where, 0.0f, static_cast<float>(memory_.quarantined), kQuarantineQuiet_s);
+  }
+  if (!tip.active || !at_commit_frame() || (memory_.blanched != 0 && memory_.charred != 0)) return;
+  const CellIndex centre = field_.sheet().CellOf(at);
+  for (int dj = -kSearchCells; dj <= kSearchCells; ++dj) {
+    for (int di = -kSearchCells; di <= kSearchCells; ++di) {
+      const CellIndex cell{centre.ix + di, centre.iy + dj};
+      if (!field_.sheet().Contains(cell)) continue;
+      const Tile* tile = field_.Find(cell.ix / kTile, cell.iy / kTile);
+      if (tile == nullptr) continue;
+      const int k = (cell.iy % kTile) * kTile + cell.ix % kTile;
+      const float theta = tile->theta[ThetaIndex(cell.ix % kTile, cell.iy % kTile)];
+      if (memory_.blanched == 0 && tile->state.omega_collagen[k] >= 1.0f) {
+        memory_.blanched = 1;
+        Report(ThermalEventKind::kBlanch, field_.sheet().CentreOf(cell), theta, tile->state.omega_collagen[k], 0.0f);
+      }
+      if (memory_.charred == 0 && tile->state.charred[k] >= 0.5f) {
+        memory_.charred = 1;
+        Report(ThermalEventKind::kChar, field_.sheet().CentreOf(cell), theta, tile->state.charred[k], 0.0f);
+      }
+    }
+  }
+}
+
+std::uint64_t ThermalSolver::TickHash() const {
+  Hash64 hash;
+  for (const Tile* tile : field_.awake()) {
+    hash.AddValue(tile->index);
+    hash.Add(std::span<const float>(tile->theta_sum));
+  }
+  hash.AddValue(topology_.revision());
+  hash.AddValue(ledger_.joule);
+  hash.AddValue(ledger_.Out());
+  hash.AddValue(cut_length_m());
+  hash.AddValue(frame_);
+  return hash.value();
+}
+
+std::uint64_t ThermalSolver::FullHash() const {
+  Hash64 hash;
+  hash.AddValue(TickHash());
+  for (const Tile* tile : field_.Existing()) {
+    const TileState& s = tile->state;
+    if (IsBlank(s)) continue;
+    hash.AddValue(tile->index);
+    for (const auto* field : {&s.enthalpy, &s.water, &s.omega_cell, &s.omega_collagen, &s.charred}) {
+      hash.Add(std::span<const float>(*field));
+    }
+    hash.Add(std::span<const std::uint8_t>(s.flags));
+    hash.AddValue(s.awake);
+    hash.AddValue(s.tented);
+  }
+  const TopologyBits& bits = topology_.committed();
+  for (const auto* field : {&bits.dead_nodes, &bits.dead_edges, &bits.shrink}) {
+    hash.Add(std::span<const std::uint8_t>(*field));
+  }
+  for (const ProtectedSample& sample : protected_.samples()) {
+    hash.AddValue(sample.theta);
+    hash.AddValue(sample.omega);
+  }
+  return hash.value();
+}
+
+}  // namespace fulcrum::thermal

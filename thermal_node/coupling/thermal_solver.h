@@ -1,0 +1,121 @@
+// Electrocautery of one membrane, frame by frame: half the source, conduction, half the source, damage, topology.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "services/core/scene_view.h"
+#include "thermal_node/coupling/cut_meter.h"
+#include "thermal_node/coupling/source_window.h"
+#include "thermal_node/coupling/tip_tracker.h"
+#include "thermal_node/damage/arrhenius.h"
+#include "thermal_node/damage/protected_structures.h"
+#include "thermal_node/heat/heat_field.h"
+#include "thermal_node/topology/mesh_topology.h"
+
+namespace fulcrum::thermal {
+
+/// Topology is committed every this many frames: 20 Hz at 100 Hz.
+inline constexpr int kCommitFrames = 5;
+/// Protected structures are looked at as often: their time constants are seconds.
+inline constexpr int kProtectedFrames = 5;
+
+struct SolverEvent {
+  ThermalEventKind kind;
+  Vec2f material;
+  float temperature_C;
+  float value;
+};
+
+/// Figures of the last frame and since the start.
+struct SolverFigures {
+  float highest_C = 0;  ///< Since the start.
+  float present_C = 0;
+  float power_W = 0;  ///< Of the generator, mean over the last frame.
+  float voltage_V = 0;
+  std::uint32_t warnings = 0, injuries = 0;
+  int substeps = 0, solves = 0, iterations = 0;
+};
+
+class ThermalSolver {
+ public:
+  /// Throws InputError when the scene has no usable membrane or parameters.
+  explicit ThermalSolver(const SceneView& scene);
+
+  /// Advances one frame. Does nothing, in some ns, when there is no current, all is cold and nothing is staged.
+  void Step(const TipInput& tip, float dt_s);
+
+  /// Events of the last Step.
+  [[nodiscard]] std::span<const SolverEvent> events() const { return events_; }
+  /// True when the last Step made a new topology revision.
+  [[nodiscard]] bool committed() const { return committed_; }
+  [[nodiscard]] bool stepped() const { return stepped_; }
+
+  [[nodiscard]] const HeatField& field() const { return field_; }
+  [[nodiscard]] HeatField* mutable_field() { return &field_; }
+  [[nodiscard]] const MeshTopology& topology() const { return topology_; }
+  [[nodiscard]] const Ledger& ledger() const { return ledger_; }
+  [[nodiscard]] const SolverFigures& figures() const { return figures_; }
+  [[nodiscard]] const ProtectedStructures& protected_structures() const { return protected_; }
+  [[nodiscard]] const SourceStats& source_stats() const { return source_.stats(); }
+  [[nodiscard]] float cut_length_m() const { return cut_meter_.length_m(); }
+  /// Study knob of the benchmarks.
+  [[nodiscard]] SourceWindow* source() { return &source_; }
+
+  /// Hash of the warm state by its sums: cheap enough for each tick. Equal states give equal hashes; a difference in
+  /// any cell changes a sum.
+  [[nodiscard]] std::uint64_t TickHash() const;
+  /// Hash of every stored value.
+  [[nodiscard]] std::uint64_t FullHash() const;
+
+  // Checkpoints (coupling/checkpoint_state.cc). Save right after a Step that ended on a commit frame, so that nothing
+  // is staged.
+  [[nodiscard]] bool at_commit_frame() const { return frame_ % kCommitFrames == 0; }
+  [[nodiscard]] static std::size_t CheckpointCapacity(const SceneView& scene);
+  /// Returns the bytes used; 0 when `out` is too small.
+  [[nodiscard]] std::size_t Save(std::span<std::byte> out) const;
+  /// False, and an untouched fresh state, when the bytes are not a checkpoint of this layout.
+  [[nodiscard]] bool Restore(std::span<const std::byte> bytes);
+
+ private:
+  struct Header;
+  void ApplySource(const TipInput& tip, float dt_s, float from, float to);
+  void UpdateDamage(float dt_s);
+  void UpdateTopology(const TipInput& tip, float dt_s);
+  void UpdateProtected(float dt_s);
+  void ReportEvents(const TipInput& tip);
+  void Report(ThermalEventKind kind, const Vec2f& at, float theta, float value, float quiet_s);
+  [[nodiscard]] bool Idle(const TipInput& tip) const;
+
+  /// What an event needs to be said once, or not too often.
+  struct EventMemory {
+    std::array<float, 10> quiet_until_s{};  ///< Per kind, on the solver's clock.
+    float reported_cut_m = 0;
+    std::uint64_t quarantined = 0;
+    double vapour = 0;
+    std::uint8_t energised = 0, blanched = 0, charred = 0;
+  };
+
+  ThermalParams params_;
+  Material material_;
+  HeatField field_;
+  MeshTopology topology_;
+  DamageModel damage_;
+  ProtectedStructures protected_;
+  SourceWindow source_;
+  CutMeter cut_meter_;
+  Ledger ledger_;
+  SolverFigures figures_;
+  EventMemory memory_;
+  std::vector<SolverEvent> events_;
+  std::vector<ProtectedAlarm> alarms_;
+  std::uint64_t frame_ = 0;
+  float clock_s_ = 0;
+  float protected_dt_s_ = 0;
+  bool committed_ = false, stepped_ = false;
+};
+
+}  // namespace fulcrum::thermal

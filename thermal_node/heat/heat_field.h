@@ -1,0 +1,88 @@
+// Heat in the sheet: explicit finite volumes on sparse tiles in material space.
+//
+//   dH/dt = div(d k grad theta)/d - (loss) theta,   theta = H / rc(water),   water boils at theta_boil
+//
+// H is the sensible enthalpy. Boiling spends the latent heat of the water for good: steam leaves, and tissue that cools
+// does not get it back (the usual enthalpy form would let it condense again).
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "thermal_node/heat/ledger.h"
+#include "thermal_node/heat/material.h"
+#include "thermal_node/heat/sheet.h"
+#include "thermal_node/heat/tile.h"
+
+namespace fulcrum::thermal {
+
+inline constexpr float kWakeTheta = 0.03f;     ///< A neighbour wakes when this warm at its border [K].
+inline constexpr float kSleepTheta = 0.02f;    ///< A tile sleeps when nowhere warmer [K].
+inline constexpr float kExplicitLimit = 0.9f;  ///< dt * rate of the explicit step; the maximum principle holds to 1.
+inline constexpr float kThetaPlausible = 5000.0f;  ///< Beyond this a cell is bad, not hot [K].
+
+class HeatField {
+ public:
+  HeatField(Sheet sheet, const Material& material);
+
+  [[nodiscard]] const Sheet& sheet() const { return sheet_; }
+  [[nodiscard]] const Material& material() const { return material_; }
+  /// Awake tiles by ascending index: sums over them do not depend on the order of waking.
+  [[nodiscard]] std::span<Tile* const> awake() const { return awake_; }
+  [[nodiscard]] bool idle() const { return awake_.empty(); }
+
+  /// The tile, or nullptr when it never was awake or lies beyond the sheet.
+  [[nodiscard]] Tile* Find(int tx, int ty) const;
+  /// Wakes (and on first use creates) the tile. nullptr beyond the sheet.
+  Tile* Wake(int tx, int ty);
+
+  /// One step of conduction and losses in as many substeps as the fastest awake tile needs, with boiling, then waking
+  /// of neighbours and sleeping of cold tiles. Cells that hold no plausible number are quarantined first. Returns the
+  /// number of substeps.
+  int Diffuse(float dt_s, Ledger* ledger);
+
+  /// Recomputes theta, its sums and extremes from the enthalpy. Quarantines bad cells.
+  void RefreshTheta(Tile* tile, Ledger* ledger);
+  /// Spends heat above boiling on water [call after RefreshTheta].
+  void Boil(Tile* tile, Ledger* ledger);
+  /// Takes a cell out; its heat goes to `account`.
+  void TakeOut(Tile* tile, int cell, CellFlag why, double* account);
+
+  /// Heat held by all awake tiles [J].
+  [[nodiscard]] double Stored() const;
+  /// Highest theta of awake tissue [K]; 0 when all sleep.
+  [[nodiscard]] float MaxTheta() const;
+  [[nodiscard]] std::uint64_t quarantined() const { return quarantined_; }
+  /// Where the last quarantined cell was.
+  [[nodiscard]] CellIndex last_quarantined() const { return last_quarantined_; }
+
+  /// All tiles that exist, by ascending index.
+  [[nodiscard]] std::vector<const Tile*> Existing() const;
+  void Clear();
+  /// Puts back a tile from a checkpoint.
+  void Restore(int index, const TileState& state);
+  void RestoreQuarantined(std::uint64_t count) { quarantined_ = count; }
+
+ private:
+  void BuildFaces(Tile* tile);
+  void RebuildStaleFaces();
+  void ExchangeHalos(Tile* tile);
+  void Substep(Tile* tile, float dt_s, Ledger* ledger);
+  void WakeNeighbours();
+  void SleepCold(Ledger* ledger);
+  void MarkNeighboursStale(const Tile& tile);
+  void Quarantine(Tile* tile, Ledger* ledger);
+  Tile* Create(int index);
+  [[nodiscard]] float CellConductivity(const Tile& tile, int cell) const;
+
+  Sheet sheet_;
+  Material material_;
+  std::vector<std::unique_ptr<Tile>> tiles_;  ///< By index; null until first use.
+  std::vector<Tile*> awake_;
+  std::vector<Tile*> scratch_;
+  std::uint64_t quarantined_ = 0;
+  CellIndex last_quarantined_;
+};
+
+}  // namespace fulcrum::thermal

@@ -1,0 +1,111 @@
+#include "thermal_node/potential/multigrid.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+/// Sweeps on the 2 x 2 level: enough that its error does not show.
+constexpr int kCoarsestSweeps = 8;
+
+}  // namespace
+
+Level::Level(int size) : n(size), stride(size + 8), count((size + 2) * (size + 8)) {
+  for (auto* field : {&face_x, &face_y, &mass, &diag, &smooth, &x, &b, &r}) field->assign(count, 0.0f);
+}
+
+void Level::Finish() {
+  for (int j = 0; j < n; ++j) {
+    const int o = At(0, j);
+    const float* __restrict fx = &face_x[o];
+    const float* __restrict fy = &face_y[o];
+    const float* __restrict m = &mass[o];
+    float* __restrict d = &diag[o];
+    float* __restrict s = &smooth[o];
+    for (int i = 0; i < n; ++i) {
+      d[i] = fx[i] + fx[i + 1] + fy[i] + fy[i + stride] + m[i];
+      s[i] = d[i] > 0.0f ? kJacobiWeight / d[i] : 0.0f;
+    }
+  }
+}
+
+void Level::Apply(const float* v, float* out) const {
+  for (int j = 0; j < n; ++j) {
+    const int o = At(0, j);
+    const float* __restrict c = v + o;
+    const float* __restrict fx = &face_x[o];
+    const float* __restrict fy = &face_y[o];
+    const float* __restrict d = &diag[o];
+    float* __restrict y = out + o;
+    for (int i = 0; i < n; ++i) {
+      y[i] = d[i] * c[i] - fx[i] * c[i - 1] - fx[i + 1] * c[i + 1] - fy[i] * c[i - stride] -
+             fy[i + stride] * c[i + stride];
+    }
+  }
+}
+
+void Level::Residual() {
+  for (int j = 0; j < n; ++j) {
+    const int o = At(0, j);
+    const float* __restrict c = &x[o];
+    const float* __restrict fx = &face_x[o];
+    const float* __restrict fy = &face_y[o];
+    const float* __restrict d = &diag[o];
+    const float* __restrict rhs = &b[o];
+    float* __restrict y = &r[o];
+    for (int i = 0; i < n; ++i) {
+      y[i] = rhs[i] - (d[i] * c[i] - fx[i] * c[i - 1] - fx[i + 1] * c[i + 1] - fy[i] * c[i - stride] -
+                       fy[i + stride] * c[i + stride]);
+    }
+  }
+}
+
+void Level::Smooth() {
+  Residual();
+  for (int k = 0; k < count; ++k) x[k] += smooth[k] * r[k];
+}
+
+void Coarsen(const Level& fine, Level* coarse) {
+  const int fs = fine.stride;
+  for (int j = 0; j < coarse->n; ++j) {
+    for (int i = 0; i < coarse->n; ++i) {
+      const int f = fine.At(2 * i, 2 * j);
+      const int c = coarse->At(i, j);
+      coarse->face_x[c] = 0.5f * (fine.face_x[f] + fine.face_x[f + fs]);
+      coarse->face_y[c] = 0.5f * (fine.face_y[f] + fine.face_y[f + 1]);
+      coarse->mass[c] = fine.mass[f] + fine.mass[f + 1] + fine.mass[f + fs] + fine.mass[f + fs + 1];
+    }
+  }
+  coarse->Finish();
+}
+
+void VCycle(std::vector<Level>* levels, std::size_t l) {
+  Level& level = (*levels)[l];
+  for (int k = 0; k < level.count; ++k) level.x[k] = level.smooth[k] * level.b[k];
+  if (l + 1 == levels->size()) {
+    for (int sweep = 0; sweep < kCoarsestSweeps; ++sweep) level.Smooth();
+    return;
+  }
+  level.Residual();
+  Level& coarse = (*levels)[l + 1];
+  const int s = level.stride;
+  for (int j = 0; j < coarse.n; ++j) {
+    const float* __restrict r0 = &level.r[level.At(0, 2 * j)];
+    const float* __restrict r1 = r0 + s;
+    float* __restrict b = &coarse.b[coarse.At(0, j)];
+    for (int i = 0; i < coarse.n; ++i) b[i] = r0[2 * i] + r0[2 * i + 1] + r1[2 * i] + r1[2 * i + 1];
+  }
+  VCycle(levels, l + 1);
+  for (int j = 0; j < coarse.n; ++j) {
+    const float* __restrict e = &coarse.x[coarse.At(0, j)];
+    float* __restrict x0 = &level.x[level.At(0, 2 * j)];
+    float* __restrict x1 = x0 + s;
+    for (int i = 0; i < coarse.n; ++i) {
+      x0[2 * i] += e[i];
+      x0[2 * i + 1] += e[i];
+      x1[2 * i] += e[i];
+      x1[2 * i + 1] += e[i];
+    }
+  }
+  level.Smooth();
+}
+
+}  // namespace fulcrum::thermal

@@ -1,0 +1,76 @@
+// What has been cut and shrunk of the membrane's mesh, derived from the cells.
+//
+// An edge of the mesh stands for a strand of tissue: the band of cells around its segment in material space. It is dead
+// when no connected path of tissue inside that band joins the cells of its two nodes. So a slit far narrower than the
+// mesh cuts an edge, and a pin hole in a strand does not. A node is dead when its own cell is gone or no edge is left
+// at it. Changes are staged and become visible, with a new revision, at Commit().
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "services/core/scene_view.h"
+#include "thermal_node/heat/heat_field.h"
+
+namespace fulcrum::thermal {
+
+inline constexpr float kBandHalfWidth = 0.25f;  ///< Of an edge's band, relative to its length.
+inline constexpr int kShrinkStep = 4;           ///< Shrink moves in steps of 4 kShrinkUnit: 0.8 % of the rest length.
+
+/// The published arrays, packed as in the TopologyState message.
+struct TopologyBits {
+  std::vector<std::uint8_t> dead_nodes, dead_edges, shrink;
+};
+
+class MeshTopology {
+ public:
+  MeshTopology(const SceneView& scene, const Sheet& sheet);
+
+  /// Looks again at every edge whose band touches the box of cells, after cells in it were removed.
+  void StageCut(const HeatField& field, CellIndex low, CellIndex high);
+  /// Shrink from collagen damage of the edges near the tile: L = L0 (1 - shrink_max (1 - exp(-Omega))), mean over the
+  /// cells of the segment, once from the rest length and never back.
+  void StageShrink(const HeatField& field, const Tile& tile);
+  /// Makes what was staged visible. True when something changed: the revision is then one higher.
+  bool Commit();
+
+  [[nodiscard]] std::uint64_t revision() const { return revision_; }
+  [[nodiscard]] bool staged() const { return changed_; }
+  [[nodiscard]] const TopologyBits& committed() const { return committed_; }
+  [[nodiscard]] std::uint32_t rows() const { return rows_; }
+  [[nodiscard]] std::uint32_t cols() const { return cols_; }
+  [[nodiscard]] std::uint32_t dead_edge_count() const { return dead_edge_count_; }
+  [[nodiscard]] std::uint32_t dead_node_count() const { return dead_node_count_; }
+
+  /// From a checkpoint.
+  void Restore(std::uint64_t revision, const TopologyBits& bits);
+
+ private:
+  [[nodiscard]] std::span<const Index> EdgesAt(int tile_index) const;
+  [[nodiscard]] Index OtherEnd(Index edge) const;
+  [[nodiscard]] bool EdgeExists(Index edge) const;
+  [[nodiscard]] bool Severed(const HeatField& field, Index edge);
+  void KillEdge(Index edge);
+  void KillNode(Index node);
+  void KillIfIsolated(Index node);
+  void BuildBins(const Sheet& sheet);
+  template <class Visit>
+  void ForEdgesOfNode(Index node, const Visit& visit) const;
+
+  std::uint32_t rows_, cols_;
+  float shrink_max_, cell_m_;
+  std::vector<Vec2f> node_;                   ///< Material position in cells from the sheet's origin.
+  std::vector<std::uint8_t> exists_;          ///< Bit field over edges.
+  std::vector<Index> bin_offset_, bin_edge_;  ///< Edges whose band may touch a tile.
+  TopologyBits staged_, committed_;
+  bool changed_ = false;
+  std::uint64_t revision_ = 0;
+  std::uint32_t dead_edge_count_ = 0, dead_node_count_ = 0;
+
+  /// Scratch of the path search.
+  std::vector<std::uint8_t> open_;
+  std::vector<int> queue_;
+};
+
+}  // namespace fulcrum::thermal
