@@ -1,0 +1,26 @@
+// handle_bridge: jaw angles and foot pedal from serial lines, real or simulated, onto the bus.
+#include <memory>
+
+#include "handle_bridge/node/cart_links.h"
+#include "handle_bridge/node/handle_bridge_node.h"
+#include "services/app/node_app.h"
+
+namespace {
+
+fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
+  using namespace fulcrum::handle_bridge;
+  const auto follow_script = [&app](std::int64_t now_ns) { return FollowScript(app.scene(), app.SessionTime(now_ns)); };
+  const auto firmware = HasSimulatedLinks(app.cart()) ? std::make_unique<SimulatedFirmware>(follow_script) : nullptr;
+  HandleBridgeNode node(app.cart(), MakeCartLinks(app.cart(), firmware.get()), &app.MakeOutput<fulcrum::HandleState>(),
+                        fulcrum::runtime::MonotonicNs());
+  return app.Run(
+      app.timing(), [&node](const fulcrum::Tick& tick) { node.Step(tick); },
+      [&node](fulcrum::Health* health) { node.FillHealth(health); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kHandleBridge,
+                                "Jaw angles and foot pedal from serial lines.", RunBridge);
+}

@@ -1,0 +1,21 @@
+// From a cart's description to open links, and from a scene's script to the simulated operator.
+#pragma once
+
+#include "handle_bridge/node/handle_bridge_node.h"
+#include "handle_bridge/serial/simulated_firmware.h"
+#include "services/config/cart.h"
+#include "services/core/scene_view.h"
+
+namespace fulcrum::handle_bridge {
+
+/// True when something on the cart is simulated.
+[[nodiscard]] bool HasSimulatedLinks(const config::CartConfig& cart);
+
+/// `firmware` serves the simulated links and must outlive them; null when there are none.
+[[nodiscard]] HandleBridgeNode::Links MakeCartLinks(const config::CartConfig& cart, SimulatedFirmware* firmware);
+
+/// Jaws and pedals of the scripted operator; a pedal is down when any tool's key says so. Before the session is known
+/// (negative time) the jaws are at their first key and the pedals up.
+[[nodiscard]] OperatorInput FollowScript(const SceneView& scene, double session_time_s);
+
+}  // namespace fulcrum::handle_bridge

@@ -1,0 +1,157 @@
+#include "handle_bridge/node/handle_bridge_node.h"
+
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+namespace fulcrum::handle_bridge {
+namespace {
+
+constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+/// One tick's bytes: 20 at 2.5 ms and 115200 baud carry 29; the rest is for the backlog of a late tick.
+constexpr std::size_t kReadBytes = 512;
+
+LinkState StateOf(LinkPhase phase, LinkState open_state) {
+  switch (phase) {
+    case LinkPhase::kOpen:
+      return open_state;
+    case LinkPhase::kLost:
+      return LinkState::kLost;
+    case LinkPhase::kReconnecting:
+      return LinkState::kReconnecting;
+  }
+  return open_state;
+}
+
+}  // namespace
+
+JawChannelSettings MakeJawChannelSettings(const config::HandleConfig& handle) {
+  const config::JawCalibration& c = handle.calibration;
+  std::vector<double> codes;
+  std::vector<double> angles_deg;
+  for (std::size_t i = 0; i < c.volts.size(); ++i) {
+    codes.push_back(c.volts[i] / c.adc_step_V);
+    angles_deg.push_back(c.angles_rad[i] / kRadPerDeg);
+  }
+  JawLineSettings line;
+  line.adc_step_V = c.adc_step_V;
+  line.min_code = static_cast<int>(std::lround(codes.front()));
+  line.max_code = static_cast<int>(std::lround(codes.back()));
+  JawEstimatorSettings estimator;
+  estimator.adc_step_V = c.adc_step_V;
+  return {line, estimator, JawCalibration(codes, angles_deg)};
+}
+
+HandleBridgeNode::HandleBridgeNode(const config::CartConfig& cart, Links links, bus::Output<HandleState>* output,
+                                   std::int64_t epoch_ns)
+    : links_(std::move(links)), output_(output), stamper_(epoch_ns) {
+  for (std::size_t tool = 0; tool < jaws_.size(); ++tool) {
+    if (links_.handles[tool]) {
+      jaws_[tool].emplace(MakeJawChannelSettings(cart.handles[tool]));
+      snapshot_.links[tool].configured = true;
+    }
+  }
+  snapshot_.links[kMaxTools].configured = links_.pedal != nullptr;
+  published_.Store(snapshot_);
+}
+
+void HandleBridgeNode::Step(const Tick& tick) {
+  // A late thread skips whole periods: they have passed for the handles too.
+  const double periods = first_step_ ? 1.0 : static_cast<double>(tick.index - next_index_ + 1);
+  next_index_ = tick.index + 1;
+  first_step_ = false;
+  const double dt_s = periods * tick.dt_s;
+  for (std::size_t tool = 0; tool < jaws_.size(); ++tool) {
+    state_.handles[tool] = ReadHandle(tool, dt_s);
+  }
+  state_.pedals = ReadPedals(dt_s);
+  state_.stamp = stamper_.Next(tick.stamp_ns);
+  if (output_->has_readers()) {
+    output_->Write(state_);
+  }
+  published_.Store(snapshot_);
+}
+
+HandleSample HandleBridgeNode::ReadHandle(std::size_t tool, double dt_s) {
+  if (!jaws_[tool]) {
+    return {};
+  }
+  JawChannel& jaw = *jaws_[tool];
+  LinkHealth& health = snapshot_.links[tool];
+  std::array<char, kReadBytes> buffer;
+  const ByteLink::Result read = links_.handles[tool]->Read(buffer);
+  if (read.fresh) {
+    jaw.Reconnected();
+    ++health.connections;
+  }
+  if (read.phase == LinkPhase::kOpen) {
+    jaw.Tick({buffer.data(), read.bytes}, dt_s);
+  } else {
+    jaw.Disconnected();
+  }
+  const JawEstimate estimate = jaw.estimate();
+  health.state = StateOf(read.phase, jaw.state());
+  health.quality = jaw.quality();
+  health.jaw_deg = static_cast<float>(estimate.angle_deg);
+  health.totals = jaw.totals();
+  HandleSample sample;
+  sample.present = jaw.present();
+  sample.jaw_angle_rad = static_cast<float>(kRadPerDeg * estimate.angle_deg);
+  sample.jaw_rate_rad_s = static_cast<float>(kRadPerDeg * estimate.rate_deg_s);
+  sample.quality = health.quality;
+  sample.raw_counts = static_cast<std::uint16_t>(jaw.code());
+  return sample;
+}
+
+std::uint8_t HandleBridgeNode::ReadPedals(double dt_s) {
+  if (!links_.pedal) {
+    return kPedalNone;
+  }
+  LinkHealth& health = snapshot_.links[kMaxTools];
+  std::array<char, kReadBytes> buffer;
+  const ByteLink::Result read = links_.pedal->Read(buffer);
+  if (read.fresh) {
+    pedal_.Reconnected();
+    ++health.connections;
+  }
+  if (read.phase == LinkPhase::kOpen) {
+    pedal_.Tick({buffer.data(), read.bytes}, dt_s);
+  } else {
+    pedal_.Disconnected();
+  }
+  health.state = StateOf(read.phase, pedal_.state());
+  health.totals = pedal_.totals();
+  snapshot_.pedals = pedal_.pedals();
+  return snapshot_.pedals;
+}
+
+void HandleBridgeNode::FillHealth(Health* health) const {
+  const Snapshot s = published_.Load();
+  LinkCounts sum;
+  std::uint32_t reconnects = 0;
+  for (std::size_t i = 0; i < s.links.size(); ++i) {
+    const LinkHealth& link = s.links[i];
+    if (!link.configured) {
+      continue;
+    }
+    sum += link.totals;
+    reconnects += link.connections > 1 ? link.connections - 1 : 0;
+    if (link.state != LinkState::kOk && health->last_error.empty()) {
+      health->last_error = i < kMaxTools ? std::string("handle ") + std::to_string(i) : "pedal";
+      health->last_error += std::string(": ") + Explain(link.state);
+      health->state = HealthState::kDegraded;
+    }
+    if (i < kMaxTools) {
+      const std::string index = std::to_string(i);
+      health->metrics.push_back({std::string("jaw") + index + "_deg", link.jaw_deg});
+      health->metrics.push_back({std::string("quality") + index, link.quality});
+    }
+  }
+  health->metrics.push_back({"lines", static_cast<double>(sum.lines())});
+  health->metrics.push_back({"bad_lines", static_cast<double>(sum.malformed + sum.off_grid + sum.implausible)});
+  health->metrics.push_back({"reconnects", static_cast<double>(reconnects)});
+  health->metrics.push_back({"pedals", static_cast<double>(s.pedals)});
+}
+
+}  // namespace fulcrum::handle_bridge

@@ -1,0 +1,71 @@
+// handle_bridge: bytes of the handles and the foot pedal in, HandleState out, at 400 Hz.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "handle_bridge/node/jaw_channel.h"
+#include "handle_bridge/node/pedal_channel.h"
+#include "handle_bridge/serial/byte_link.h"
+#include "services/bus/input_account.h"
+#include "services/bus/port.h"
+#include "services/config/cart.h"
+#include "services/core/messages.h"
+#include "services/core/tick.h"
+#include "services/runtime/seqlock.h"
+
+namespace fulcrum::handle_bridge {
+
+/// Settings of a handle's channel from the cart: calibration in codes, and the range of codes that it covers.
+[[nodiscard]] JawChannelSettings MakeJawChannelSettings(const config::HandleConfig& handle);
+
+class HandleBridgeNode {
+ public:
+  /// A link is null where the cart has none.
+  struct Links {
+    std::array<std::unique_ptr<ByteLink>, kMaxTools> handles;
+    std::unique_ptr<ByteLink> pedal;
+  };
+
+  /// @param epoch_ns CLOCK_MONOTONIC now [ns].
+  HandleBridgeNode(const config::CartConfig& cart, Links links, bus::Output<HandleState>* output,
+                   std::int64_t epoch_ns);
+
+  /// Reads, estimates, publishes.
+  void Step(const Tick& tick);
+  /// Any thread.
+  void FillHealth(Health* health) const;
+
+ private:
+  struct LinkHealth {
+    bool configured = false;
+    LinkState state = LinkState::kReconnecting;
+    float quality = 0;
+    float jaw_deg = 0;
+    std::uint32_t connections = 0;
+    LinkCounts totals;
+  };
+  struct Snapshot {
+    std::array<LinkHealth, kMaxTools + 1> links;  // The last is the pedal.
+    std::uint8_t pedals = 0;
+  };
+
+  [[nodiscard]] HandleSample ReadHandle(std::size_t tool, double dt_s);
+  [[nodiscard]] std::uint8_t ReadPedals(double dt_s);
+
+  Links links_;
+  std::array<std::optional<JawChannel>, kMaxTools> jaws_;
+  PedalChannel pedal_;
+  bus::Output<HandleState>* output_;
+  bus::Stamper stamper_;
+  std::uint64_t next_index_ = 0;
+  bool first_step_ = true;
+  HandleState state_;
+  Snapshot snapshot_;
+  runtime::SeqLock<Snapshot> published_;
+};
+
+}  // namespace fulcrum::handle_bridge

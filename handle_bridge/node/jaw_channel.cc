@@ -1,0 +1,101 @@
+#include "handle_bridge/node/jaw_channel.h"
+
+#include <algorithm>
+
+namespace fulcrum::handle_bridge {
+namespace {
+
+/// Lines come in bunches of the adapter's latency; only a deficit beyond this is a lost line.
+constexpr double kLateLines = 8;
+
+}  // namespace
+
+JawChannel::JawChannel(const JawChannelSettings& settings)
+    : gate_(settings.line), estimator_(settings.estimator, settings.calibration) {}
+
+void JawChannel::Tick(std::span<const char> bytes, double dt_s) noexcept {
+  connected_ = true;
+  tick_counts_ = {};
+  tick_counts_.bytes = static_cast<std::uint32_t>(bytes.size());
+  owed_lines_ += dt_s * kLineRate_Hz;
+  for (const char byte : bytes) {
+    const LineFramer::Event event = framer_.Add(byte);
+    if (event != LineFramer::Event::kNone) {
+      TakeLine(event);
+    }
+  }
+  monitor_.Add(tick_counts_, dt_s);
+  totals_ += tick_counts_;
+  if (monitor_.state() == LinkState::kNoData) {
+    HoldAngle();
+  } else {
+    for (; owed_lines_ > kLateLines; --owed_lines_) {
+      estimator_.Predict();
+      gate_.Miss();
+    }
+  }
+  owed_lines_ = std::clamp(owed_lines_, -kLateLines, kLateLines);
+}
+
+void JawChannel::TakeLine(LineFramer::Event event) noexcept {
+  --owed_lines_;
+  const JawReading reading = event == LineFramer::Event::kLine ? gate_.Check(framer_.line()) : JawReading{};
+  switch (reading.verdict) {
+    case LineVerdict::kGood:
+      ++tick_counts_.good;
+      break;
+    case LineVerdict::kMalformed:
+      ++tick_counts_.malformed;
+      break;
+    case LineVerdict::kOffGrid:
+      ++tick_counts_.off_grid;
+      break;
+    case LineVerdict::kOutside:
+    case LineVerdict::kJump:
+      ++tick_counts_.implausible;
+      break;
+  }
+  if (reading.verdict == LineVerdict::kGood) {
+    code_ = reading.code;
+    holding_ = false;
+    wiring_.Add(reading.verdict);
+    estimator_.Update(reading.code);
+    return;
+  }
+  if (reading.verdict == LineVerdict::kOutside || reading.verdict == LineVerdict::kJump) {
+    wiring_.Add(reading.verdict);
+  }
+  // A bad line stands for one sample period, but noise with many line ends must not run ahead of the clock.
+  if (owed_lines_ > -1) {
+    estimator_.Predict();
+  }
+}
+
+void JawChannel::HoldAngle() noexcept {
+  if (!holding_) {
+    estimator_.Hold();
+    gate_.Reset();
+    wiring_.Reset();
+    holding_ = true;
+  }
+  owed_lines_ = 0;
+}
+
+void JawChannel::Reconnected() noexcept {
+  framer_.Reset();
+  monitor_.Reset();
+  HoldAngle();
+  connected_ = true;
+}
+
+void JawChannel::Disconnected() noexcept {
+  HoldAngle();
+  connected_ = false;
+}
+
+LinkState JawChannel::state() const noexcept {
+  const LinkState state = monitor_.state();
+  return state == LinkState::kOk && wiring_.faulty() ? LinkState::kWiring : state;
+}
+
+}  // namespace fulcrum::handle_bridge

@@ -1,0 +1,58 @@
+// What a serial link is doing, judged by what arrives over half a second.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace fulcrum::handle_bridge {
+
+enum class LinkState : std::uint8_t {
+  kOk,
+  kNoData,        ///< Open, but silent.
+  kGarbage,       ///< Bytes arrive, but less than half of the lines are valid: usually another baud rate.
+  kWrongStep,     ///< Lines are well formed but off the converter's grid: another adc_step_V.
+  kWiring,        ///< True codes outside calibration or jumping.
+  kLost,          ///< Hung up: unplugged or powered off.
+  kReconnecting,  ///< Looking for the port.
+};
+
+/// One line for people: what is wrong and what to do. Empty for kOk.
+const char* Explain(LinkState state);
+
+/// Counts of one tick.
+struct LinkCounts {
+  std::uint32_t bytes = 0;
+  std::uint32_t good = 0;       ///< Lines used.
+  std::uint32_t malformed = 0;  ///< Lines that are none.
+  std::uint32_t off_grid = 0;
+  std::uint32_t implausible = 0;  ///< Outside or jumping.
+  [[nodiscard]] std::uint32_t lines() const { return good + malformed + off_grid + implausible; }
+  LinkCounts& operator+=(const LinkCounts& other);
+};
+
+/// Sliding window of 0.5 s in ten slots.
+class LinkMonitor {
+ public:
+  static constexpr double kWindow_s = 0.5;
+  static constexpr double kSilence_s = 0.1;
+
+  /// Adds one tick's counts; `dt_s` is the time since the last call.
+  void Add(const LinkCounts& counts, double dt_s);
+  void Reset() { *this = LinkMonitor(); }
+
+  /// Share of the window's lines that were used, 0 … 1; 0 while silent.
+  [[nodiscard]] float quality() const;
+  /// kOk, kNoData, kGarbage or kWrongStep. kOk until half a second has been seen, unless silent.
+  [[nodiscard]] LinkState state() const;
+
+ private:
+  static constexpr int kSlots = 10;
+  std::array<LinkCounts, kSlots> slots_{};
+  int slot_ = 0;
+  double slot_age_s_ = 0;
+  double seen_s_ = 0;
+  double silent_s_ = 0;
+  [[nodiscard]] LinkCounts Sum() const;
+};
+
+}  // namespace fulcrum::handle_bridge

@@ -1,0 +1,26 @@
+// The foot pedal's line protocol, on a link of its own: the paper's handle line has no room for it.
+//
+//   P h c CR LF      h: pedal bits as one hexadecimal digit, c: its complement (15 - h), for example `P1E` = cut.
+//
+// Sent at once when a pedal moves and every 20 ms otherwise. The complement refuses every damaged digit; silence for
+// 100 ms counts as all pedals up, because the generator must not stay on behind a broken wire.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+namespace fulcrum::handle_bridge {
+
+inline constexpr double kPedalPeriod_s = 0.02;
+inline constexpr double kPedalTimeout_s = 0.1;
+inline constexpr std::uint8_t kAllPedals = 7;  ///< kPedalCut | kPedalCoag | kPedalBlend
+
+/// Pedal bits of a line without its CR LF, or nothing.
+[[nodiscard]] std::optional<std::uint8_t> ParsePedals(std::string_view line) noexcept;
+
+/// The line with CR LF.
+[[nodiscard]] std::array<char, 5> FormatPedals(std::uint8_t pedals) noexcept;
+
+}  // namespace fulcrum::handle_bridge

@@ -1,0 +1,64 @@
+#include "handle_bridge/serial/byte_link.h"
+
+#include <chrono>
+#include <utility>
+
+namespace fulcrum::handle_bridge {
+
+ReconnectingLink::ReconnectingLink(std::unique_ptr<ByteSourceOpener> opener)
+    : opener_(std::move(opener)), thread_([this](const std::stop_token& stop) { Connect(stop); }) {}
+
+ReconnectingLink::~ReconnectingLink() = default;
+
+ByteLink::Result ReconnectingLink::Read(std::span<char> buffer) noexcept {
+  Result result;
+  if (!current_) {
+    // The connecting thread holds the lock only to swap pointers; if it does so right now, the next tick will do.
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (lock.owns_lock()) {
+      current_ = std::move(fresh_);
+      result.fresh = current_ != nullptr;
+      phase_ = current_ ? LinkPhase::kOpen : searched_ ? LinkPhase::kReconnecting : phase_;
+    }
+  }
+  if (current_) {
+    const ReadResult read = current_->Read(buffer);
+    result.bytes = read.bytes;
+    if (read.hung_up) {
+      const std::unique_lock lock(mutex_, std::try_to_lock);
+      if (lock.owns_lock()) {
+        dead_ = std::move(current_);  // Closing may take time: the thread does it.
+        wanted_ = true;
+        searched_ = false;
+        phase_ = LinkPhase::kLost;
+        wake_.notify_one();
+      }
+    }
+  }
+  result.phase = phase_;
+  return result;
+}
+
+void ReconnectingLink::Connect(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  while (!stop.stop_requested()) {
+    wake_.wait(lock, stop, [this] { return wanted_; });
+    if (stop.stop_requested()) {
+      return;
+    }
+    std::unique_ptr<ByteSource> dead = std::move(dead_);
+    lock.unlock();
+    dead.reset();  // Before opening: some drivers give one name to one holder only.
+    std::unique_ptr<ByteSource> opened = opener_->Open();
+    lock.lock();
+    if (opened) {
+      fresh_ = std::move(opened);
+      wanted_ = false;
+    } else {
+      searched_ = true;
+      wake_.wait_for(lock, stop, std::chrono::milliseconds(kRetry_ms), [] { return false; });
+    }
+  }
+}
+
+}  // namespace fulcrum::handle_bridge

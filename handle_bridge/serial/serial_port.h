@@ -1,0 +1,23 @@
+// Real serial ports through libserialport.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "handle_bridge/serial/byte_source.h"
+#include "services/config/cart.h"
+
+namespace fulcrum::handle_bridge {
+
+/// Opens 8N1 without flow control, for reading. The port is the one with the USB identity given, else the one given by
+/// name or by-path link.
+class SerialPortOpener final : public ByteSourceOpener {
+ public:
+  explicit SerialPortOpener(config::SerialLink link) : link_(std::move(link)) {}
+  std::unique_ptr<ByteSource> Open() override;
+
+ private:
+  config::SerialLink link_;
+};
+
+}  // namespace fulcrum::handle_bridge

@@ -1,0 +1,52 @@
+// What the handle's microcontroller does, as numbers in and bytes out: potentiometer, 10-bit converter, line format.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <string_view>
+
+namespace fulcrum::handle_bridge {
+
+struct JawFirmwareSettings {
+  double closed_V = 2.37;  ///< At 0 degrees (paper).
+  double open_V = 2.54;    ///< At open_deg.
+  double open_deg = 60.0;
+  double adc_step_V = 0.00488;  ///< The paper's rounding of 5 V / 1024.
+  double noise_V = 0.001;       ///< Standard deviation: the paper's +-0.002 V taken as two of it.
+};
+
+class JawFirmware {
+ public:
+  JawFirmware(const JawFirmwareSettings& settings, std::uint64_t seed) : settings_(settings), random_(seed) {}
+
+  /// Converts: nearest code of the noisy voltage at this jaw angle.
+  int Convert(double jaw_deg);
+  /// `d.dddd` CR LF of a code.
+  [[nodiscard]] std::array<char, 8> Format(int code) const;
+  std::array<char, 8> Line(double jaw_deg) { return Format(Convert(jaw_deg)); }
+
+ private:
+  JawFirmwareSettings settings_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> noise_;
+};
+
+/// A bad cable: loses bytes and flips single bits.
+struct ByteDamage {
+  double drop_probability = 0;
+  double flip_probability = 0;
+};
+
+class DamagedLine {
+ public:
+  explicit DamagedLine(std::uint64_t seed) : random_(seed) {}
+  /// Appends what arrives of `sent` to `received`.
+  void Pass(std::string_view sent, const ByteDamage& damage, std::string* received);
+
+ private:
+  std::mt19937_64 random_;
+};
+
+}  // namespace fulcrum::handle_bridge
