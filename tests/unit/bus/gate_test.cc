@@ -1,0 +1,238 @@
+#include "services/bus/gate.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "tests/unit/bus/samples.h"
+
+namespace fulcrum::bus {
+namespace {
+
+/// Calls back for every floating-point number of a message: one that is left out here would escape the NaN test.
+template <class Visit>
+struct Floats {
+  Visit visit;
+  void operator()(float& x) const { visit(x); }
+  void operator()(double& x) const { visit(x); }
+  void operator()(Vec2f& v) const { Each(v.x(), v.y()); }
+  void operator()(Vec3f& v) const { Each(v.x(), v.y(), v.z()); }
+  void operator()(Quatf& q) const { Each(q.w(), q.x(), q.y(), q.z()); }
+  template <class... Fields>
+  void Each(Fields&... fields) const {
+    ((*this)(fields), ...);
+  }
+
+  void operator()(HandleState& m) const {
+    for (HandleSample& h : m.handles) Each(h.jaw_angle_rad, h.jaw_rate_rad_s, h.quality);
+  }
+  void operator()(ToolState& m) const {
+    for (ToolSample& t : m.tools) Each(t.p_WT, t.q_WT, t.v_WT, t.w_WT, t.f_W, t.model_age_s);
+  }
+  void operator()(TissueFrame& m) const { Each(m.header.session_time_s, m.xyz.front(), m.xyz[1234], m.xyz.back()); }
+  void operator()(ContactModel& m) const {
+    (*this)(m.physics_dt_s);
+    for (DeviceContacts& d : m.devices) {
+      Each(d.p_ext_W, d.force_cap_N);
+      for (Contact& c : d.contacts) {
+        Each(c.x_ref, c.f_ref, c.n, c.e1, c.p_s, c.v_s, c.u_c, c.du_c, c.gap, c.k1, c.k3, c.kt, c.k_body, c.b_body,
+             c.friction, c.kappa1, c.kappa2, c.slip_force, c.radius);
+      }
+    }
+  }
+  void operator()(CauteryContact& m) const {
+    Each(m.session_time_s, m.barycentric[0], m.barycentric[1], m.barycentric[2], m.material, m.material_rate,
+         m.contact_radius_m, m.power_W);
+  }
+  void operator()(TopologyState& m) const { (*this)(m.cut_length_m); }
+  void operator()(TemperaturePatch& m) const { (*this)(m.header.max_temperature_C); }
+  void operator()(ThermalEvent& m) const { Each(m.session_time_s, m.material, m.temperature_C, m.value); }
+  void operator()(SceneManifest&) const {}
+  void operator()(Command&) const {}
+  void operator()(CommandReply&) const {}
+  void operator()(TickManifest& m) const { (*this)(m.session_time_s); }
+  void operator()(Health& m) const {
+    Each(m.rate_asked_Hz, m.rate_achieved_Hz, m.step.p50_us, m.step.p99_us, m.step.max_us, m.wake.p50_us, m.wake.p99_us,
+         m.wake.max_us);
+    for (InputHealth& i : m.inputs) (*this)(i.age_ms);
+    for (Metric& metric : m.metrics) (*this)(metric.value);
+  }
+};
+
+template <class T>
+class Gate : public testing::Test {};
+using Types =
+    testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState, TemperaturePatch,
+                   ThermalEvent, SceneManifest, Command, CommandReply, TickManifest, Health>;
+TYPED_TEST_SUITE(Gate, Types);
+
+TYPED_TEST(Gate, PassesAGoodMessage) { EXPECT_TRUE(PassesGate(test::Sample<TypeParam>())); }
+
+TYPED_TEST(Gate, RefusesEveryNumberThatIsNotFinite) {
+  TypeParam m = test::Sample<TypeParam>();
+  int visited = 0;
+  const auto corrupt = [&](auto& x) {
+    using Scalar = std::remove_reference_t<decltype(x)>;
+    const Scalar good = x;
+    for (const Scalar bad : {std::numeric_limits<Scalar>::quiet_NaN(), std::numeric_limits<Scalar>::infinity(),
+                             -std::numeric_limits<Scalar>::infinity()}) {
+      x = bad;
+      EXPECT_FALSE(PassesGate(m)) << "number " << visited << " = " << bad;
+    }
+    x = good;
+    ++visited;
+  };
+  Floats<decltype(corrupt)>{corrupt}(m);
+  EXPECT_TRUE(PassesGate(m));
+}
+
+TYPED_TEST(Gate, RefusesANegativeStamp) {
+  TypeParam m = test::Sample<TypeParam>();
+  if constexpr (requires { m.header; }) {
+    m.header.stamp.stamp_ns = -1;
+  } else {
+    m.stamp.stamp_ns = -1;
+  }
+  EXPECT_FALSE(PassesGate(m));
+}
+
+/// One way to spoil a message that has only finite numbers.
+template <class T>
+struct Fault {
+  const char* what;
+  std::function<void(T&)> spoil;
+};
+
+template <class T>
+void ExpectRefused(const std::vector<Fault<T>>& faults) {
+  for (const Fault<T>& fault : faults) {
+    T m = test::Sample<T>();
+    fault.spoil(m);
+    EXPECT_FALSE(PassesGate(m)) << fault.what;
+  }
+}
+
+template <class Enum>
+Enum BeyondLast() {
+  return static_cast<Enum>(200);
+}
+
+TEST(GateRanges, HandleState) {
+  ExpectRefused<HandleState>({{"unknown pedal", [](auto& m) { m.pedals = 8; }},
+                              {"jaw beyond its stop", [](auto& m) { m.handles[1].jaw_angle_rad = 4; }},
+                              {"quality above 1", [](auto& m) { m.handles[0].quality = 1.01f; }},
+                              {"negative quality", [](auto& m) { m.handles[0].quality = -0.01f; }}});
+}
+
+TEST(GateRanges, ToolState) {
+  ExpectRefused<ToolState>({{"unknown kind", [](auto& m) { m.tools[0].kind = BeyondLast<ToolKind>(); }},
+                            {"unknown state", [](auto& m) { m.tools[1].state = BeyondLast<ServoState>(); }},
+                            {"quaternion not unit", [](auto& m) { m.tools[0].q_WT.coeffs() *= 1.1f; }},
+                            {"zero quaternion", [](auto& m) { m.tools[0].q_WT.coeffs().setZero(); }},
+                            {"outside the room", [](auto& m) { m.tools[0].p_WT.x() = 11; }},
+                            {"faster than any hand", [](auto& m) { m.tools[1].v_WT.z() = -101; }},
+                            {"force beyond any device", [](auto& m) { m.tools[1].f_W.y() = 1001; }},
+                            {"model from the future", [](auto& m) { m.tools[0].model_age_s = -0.1f; }}});
+}
+
+TEST(GateRanges, TissueFrame) {
+  ExpectRefused<TissueFrame>({{"more vertices than fit", [](auto& m) { m.header.vertex_count = 25601; }},
+                              {"payload shorter than its count", [](auto& m) { m.xyz.pop_back(); }},
+                              {"payload longer than its count", [](auto& m) { --m.header.vertex_count; }},
+                              {"a third tool grasps", [](auto& m) { m.header.grasping_tools = 4; }},
+                              {"vertex outside the room", [](auto& m) { m.xyz[60000] = -10.5f; }}});
+}
+
+TEST(GateRanges, ContactModel) {
+  ExpectRefused<ContactModel>(
+      {{"more contacts than fit", [](auto& m) { m.devices[0].count = 5; }},
+       {"unknown kind", [](auto& m) { m.devices[1].contacts[3].kind = BeyondLast<ContactKind>(); }},
+       {"normal not unit", [](auto& m) { m.devices[0].contacts[0].n *= 0.9f; }},
+       {"tangent not unit", [](auto& m) { m.devices[0].contacts[1].e1.setZero(); }},
+       {"negative stiffness", [](auto& m) { m.devices[0].contacts[0].k1 = -1; }},
+       {"negative viscosity", [](auto& m) { m.devices[0].contacts[0].b_body = -1; }},
+       {"negative cap", [](auto& m) { m.devices[1].force_cap_N = -1; }},
+       {"period of a minute", [](auto& m) { m.physics_dt_s = 60; }},
+       {"negative stamp of the tool", [](auto& m) { m.tool_stamp_ns = -5; }}});
+}
+
+TEST(GateRanges, CauteryContact) {
+  ExpectRefused<CauteryContact>({{"unknown mode", [](auto& m) { m.mode = BeyondLast<CauteryMode>(); }},
+                                 {"third tool", [](auto& m) { m.tool = 2; }},
+                                 {"weights beyond 1",
+                                  [](auto& m) {
+                                    m.barycentric = {2, -1, 0};
+                                  }},
+                                 {"weights do not sum to 1",
+                                  [](auto& m) {
+                                    m.barycentric = {0.1f, 0.1f, 0.1f};
+                                  }},
+                                 {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }},
+                                 {"negative power", [](auto& m) { m.power_W = -1; }},
+                                 {"power beyond any generator", [](auto& m) { m.power_W = 1001; }}});
+}
+
+TEST(GateRanges, TopologyState) {
+  ExpectRefused<TopologyState>({{"grid beyond capacity", [](auto& m) { m.rows = 97; }},
+                                {"product overflows 32 bits", [](auto& m) { m.rows = m.cols = 0x10000; }},
+                                {"node bits too short", [](auto& m) { m.dead_nodes.pop_back(); }},
+                                {"edge bits too long", [](auto& m) { m.dead_edges.push_back(0); }},
+                                {"shrink missing", [](auto& m) { m.shrink.clear(); }},
+                                {"negative length", [](auto& m) { m.cut_length_m = -1; }}});
+}
+
+TEST(GateRanges, TemperaturePatch) {
+  ExpectRefused<TemperaturePatch>({{"reaches beyond the atlas", [](auto& m) { m.header.origin_x = 3841; }},
+                                   {"reaches beyond the atlas", [](auto& m) { m.header.origin_y = 3841; }},
+                                   {"hotter than an arc", [](auto& m) { m.header.max_temperature_C = 3001; }},
+                                   {"texels missing", [](auto& m) { m.texels.pop_back(); }}});
+}
+
+TEST(GateRanges, ThermalEvent) {
+  ExpectRefused<ThermalEvent>({{"unknown kind", [](auto& m) { m.kind = BeyondLast<ThermalEventKind>(); }},
+                               {"colder than ice", [](auto& m) { m.temperature_C = -51; }},
+                               {"off the sheet", [](auto& m) { m.material.y() = 11; }}});
+}
+
+TEST(GateRanges, SessionMessages) {
+  ExpectRefused<SceneManifest>({{"unknown mode", [](auto& m) { m.mode = BeyondLast<SessionMode>(); }},
+                                {"name too long", [](auto& m) { m.scene_name = std::string(64, 'x'); }},
+                                {"session too long", [](auto& m) { m.session_id = std::string(64, 'x'); }},
+                                {"negative start", [](auto& m) { m.session_start_ns = -1; }}});
+  ExpectRefused<Command>({{"unknown node", [](auto& m) { m.target = BeyondLast<NodeId>(); }},
+                          {"verb too long", [](auto& m) { m.verb = std::string(32, 'x'); }},
+                          {"argument too long", [](auto& m) { m.argument = std::string(1024, 'x'); }}});
+  ExpectRefused<CommandReply>({{"unknown node", [](auto& m) { m.from = BeyondLast<NodeId>(); }}});
+  ExpectRefused<TickManifest>({{"unknown node", [](auto& m) { m.node = BeyondLast<NodeId>(); }},
+                               {"unknown topic", [](auto& m) { m.consumed[1].topic = BeyondLast<TopicId>(); }},
+                               {"too many inputs", [](auto& m) { m.consumed.resize(9); }}});
+}
+
+TEST(GateRanges, Health) {
+  ExpectRefused<Health>({{"unknown node", [](auto& m) { m.node = BeyondLast<NodeId>(); }},
+                         {"unknown state", [](auto& m) { m.state = BeyondLast<HealthState>(); }},
+                         {"negative pid", [](auto& m) { m.pid = -1; }},
+                         {"negative rate", [](auto& m) { m.rate_achieved_Hz = -1; }},
+                         {"negative time", [](auto& m) { m.step.p99_us = -1; }},
+                         {"unknown topic", [](auto& m) { m.inputs[0].topic = BeyondLast<TopicId>(); }},
+                         {"too many inputs", [](auto& m) { m.inputs.resize(9); }},
+                         {"too many metrics", [](auto& m) { m.metrics.resize(17); }},
+                         {"metric's name too long", [](auto& m) { m.metrics[0].name = std::string(32, 'x'); }}});
+}
+
+TEST(GateRanges, WhatAnIdleNodeSendsPasses) {
+  EXPECT_TRUE(PassesGate(HandleState{}));
+  EXPECT_TRUE(PassesGate(ToolState{}));
+  EXPECT_TRUE(PassesGate(TissueFrame{}));
+  EXPECT_TRUE(PassesGate(ContactModel{}));
+  EXPECT_TRUE(PassesGate(CauteryContact{}));
+  EXPECT_TRUE(PassesGate(TopologyState{}));
+  EXPECT_TRUE(PassesGate(Health{}));
+}
+
+}  // namespace
+}  // namespace fulcrum::bus
