@@ -1,0 +1,185 @@
+#include "physics_node/contact_model/contact_probe.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fulcrum::physics {
+namespace {
+
+constexpr float kReach = 0.010f;       ///< Contacts are announced this far before touch [m].
+constexpr float kSmoothing = 0.03f;    ///< Time constant of everything measured [s].
+constexpr float kRelaxation = 0.02f;   ///< b_body / k_body [s].
+constexpr float kMinBody = 30.0f, kMaxBody = 5000.0f;  ///< [N/m]
+constexpr float kSkinOverEt = 2.0f;    ///< k1 / (E t).
+constexpr float kBodyOverSecant = 2.0f;
+constexpr float kForceCap = 15.0f;     ///< Rectal tissue is damaged above this [N].
+constexpr float kSurfaceRadius = 0.012f, kGraspRadius = 0.03f;  ///< Where the model holds [m].
+constexpr float kLeastDent = 0.0005f;  ///< Below this a secant is noise [m].
+
+Vec3f Limited(const Vec3f& v, float limit) {
+  const float norm = v.norm();
+  return norm > limit ? Vec3f(v * (limit / norm)) : v;
+}
+
+}  // namespace
+
+ContactProbe::ContactProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
+    : scene_(scene), model_(model), particles_(particles), elastic_(scene, model, particles) {}
+
+ContactProbe::Motion ContactProbe::MeanMotion(std::span<const Index> particles) const {
+  Motion mean;
+  for (const Index p : particles) {
+    const ParticleRef at = particles_->Ref(p);
+    mean.displacement += particles_->At(at) - scene_.rest_position[p];
+    mean.velocity += particles_->At(at) - particles_->Previous(at);
+  }
+  const float scale = particles.empty() ? 0.0f : 1.0f / static_cast<float>(particles.size());
+  mean.displacement *= scale;
+  mean.velocity *= scale / scene_.physics.dt_s;
+  return mean;
+}
+
+ContactProbe::Motion ContactProbe::RingMotion(Index node) const {
+  constexpr float kRingRadius = 0.007f;
+  const auto cols = static_cast<int>(model_->cols()), rows = static_cast<int>(model_->rows());
+  const int row = static_cast<int>(node) / cols, col = static_cast<int>(node) % cols;
+  const auto steps = [&](int direction) {
+    const float length = scene_.membrane_rest_length[3 * node + static_cast<Index>(direction)];
+    return length > 0.0f ? std::max(1, static_cast<int>(std::lround(kRingRadius / length))) : 1;
+  };
+  const int dc = steps(0), dr = steps(1);
+  std::array<Index, 8> ring{};
+  std::size_t count = 0;
+  for (const auto& [r, c] : {std::pair{-dr, 0}, {dr, 0}, {0, -dc}, {0, dc}, {-dr * 7 / 10, -dc * 7 / 10},
+                             {-dr * 7 / 10, dc * 7 / 10}, {dr * 7 / 10, -dc * 7 / 10}, {dr * 7 / 10, dc * 7 / 10}}) {
+    if (row + r >= 0 && row + r < rows && col + c >= 0 && col + c < cols) {
+      const auto at = static_cast<Index>((row + r) * cols + col + c);
+      if (model_->NodeAlive(at)) {
+        ring[count++] = scene_.membrane.first + at;
+      }
+    }
+  }
+  return MeanMotion({ring.data(), count});
+}
+
+void ContactProbe::Enter(ToolMemory* memory, ContactKind kind) const {
+  if (memory->kind == kind) {
+    return;
+  }
+  std::vector<Index> buffer = std::move(memory->touched);
+  const Vec3f force = memory->kind == ContactKind::kNone || kind == ContactKind::kNone ? Vec3f::Zero().eval()
+                                                                                       : memory->force;
+  *memory = {};
+  memory->touched = std::move(buffer);
+  memory->kind = kind;
+  memory->force = force;  // Closing the jaws on what they press does not make the force start anew.
+  memory->stiffness = std::clamp(0.3f * scene_.physics.membrane_Et_N_per_m, kMinBody, kMaxBody);
+}
+
+void ContactProbe::Follow(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const {
+  const float dt = scene_.physics.dt_s, share = dt / (dt + kSmoothing);
+  memory->force += share * (Limited(force, kForceCap) - memory->force);
+  const Vec3f before = memory->u;
+  memory->u += share * (Limited(u, 0.2f) - memory->u);
+  memory->du += share * (Limited((memory->u - before) / dt, 2.0f) - memory->du);
+  const float dent = memory->u.norm();
+  if (dent > kLeastDent && memory->force.norm() > 0.0f) {
+    const float secant = std::clamp(kBodyOverSecant * memory->force.norm() / dent, kMinBody, kMaxBody);
+    memory->stiffness += share * (secant - memory->stiffness);
+  }
+}
+
+Contact ContactProbe::MakeContact(const ToolMemory& memory, const ToolPose& pose) const {
+  const PhysicsParams& params = scene_.physics;
+  Contact contact;
+  contact.kind = memory.kind;
+  contact.id = memory.id;
+  contact.x_ref = pose.p_WT;
+  contact.f_ref = memory.force;
+  contact.n = memory.normal;
+  contact.e1 = memory.normal.unitOrthogonal();
+  contact.u_c = memory.u;
+  contact.du_c = memory.du;
+  contact.v_s = memory.v_s;
+  contact.k1 = std::clamp(kSkinOverEt * params.membrane_Et_N_per_m, 50.0f, 1e4f);
+  contact.kt = 0.5f * contact.k1;
+  contact.k_body = memory.stiffness;
+  contact.b_body = kRelaxation * memory.stiffness;
+  contact.friction = std::min(params.friction, 2.0f);
+  return contact;
+}
+
+DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision,
+                                    const Grasp& grasp) {
+  ToolMemory& memory = tools_[tool];
+  DeviceContacts device;
+  device.force_cap_N = kForceCap;
+  const auto enter = [&](ContactKind kind) {
+    if (memory.kind != kind) {
+      const std::uint32_t id = memory.id;
+      Enter(&memory, kind);
+      memory.id = kind == ContactKind::kNone ? id : id + 1;
+    }
+  };
+  if (grasp.holding()) {
+    enter(ContactKind::kGrasp);
+    memory.touched.clear();
+    for (const HeldParticle& held : grasp.held()) {
+      memory.touched.push_back(held.particle);
+    }
+    std::sort(memory.touched.begin(), memory.touched.end());
+    Follow(&memory, elastic_.OnSet(memory.touched), MeanMotion(memory.touched).displacement);
+    memory.normal = pose.q_WT * -Vec3f::UnitZ();
+    Contact contact = MakeContact(memory, pose);
+    contact.p_s = pose.p_WT - memory.u;
+    contact.slip_force = scene_.physics.grip_force_N;
+    contact.radius = kGraspRadius;
+    device.contacts[device.count++] = contact;
+    return device;
+  }
+  const Capsule working = WorkingLine(scene_.tools[tool], pose);
+  const SurfacePoint nearest = collision.Nearest(working, kReach);
+  collision.TouchedParticles(tool, &memory.touched);
+  const bool touching = !memory.touched.empty();
+  if (!nearest.found && !touching) {
+    enter(ContactKind::kNone);
+    return device;
+  }
+  enter(ContactKind::kSurface);
+  Vec3f normal = Vec3f::Zero();
+  for (const ContactPair& pair : collision.pairs()) {
+    if (pair.touching && pair.capsule / kMaxCapsules == tool) {
+      normal -= pair.push;
+    }
+  }
+  if (!touching) {
+    normal = nearest.closest.on_segment - nearest.closest.on_triangle;
+  }
+  if (normal.norm() > 0.0f) {
+    const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kSmoothing);
+    memory.normal = memory.normal.isZero() ? normal.normalized()
+                                           : Vec3f(memory.normal + share * (normal.normalized() - memory.normal));
+  }
+  // Opposite normals may cancel on their way; any unit vector will do for one step then.
+  memory.normal = memory.normal.norm() > 0.1f ? memory.normal.normalized() : Vec3f::UnitZ();
+
+  Motion around;
+  if (nearest.found && nearest.on_membrane) {
+    around = RingMotion(model_->TriangleNodes(nearest.triangle)[0]);
+  }
+  const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kSmoothing);
+  memory.v_s += share * (Limited(around.velocity, 1.0f) - memory.v_s);
+  Follow(&memory, elastic_.OnSet(memory.touched),
+         touching ? Vec3f(MeanMotion(memory.touched).displacement - around.displacement) : Vec3f(Vec3f::Zero()));
+
+  Contact contact = MakeContact(memory, pose);
+  const float push = std::max(0.0f, memory.normal.dot(memory.force));
+  const float dent = -memory.normal.dot(memory.u);
+  contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - scene_.physics.collision_margin_m);
+  contact.p_s = pose.p_WT + (touching ? push / contact.k1 + dent : -contact.gap) * memory.normal;
+  contact.radius = kSurfaceRadius;
+  device.contacts[device.count++] = contact;
+  return device;
+}
+
+}  // namespace fulcrum::physics

@@ -1,0 +1,60 @@
+// The local contact model that the servo evaluates between two steps of physics: where the surface is, how hard it
+// pushes now, and how that changes with the tool's place.
+//
+//   f_ref   elastic force of the edges around what the tool touches or holds, with SI stiffness (elastic_force.h),
+//           low-passed over kSmoothing
+//   u_c     how far the tissue at the contact has been moved against its surroundings (a ring some 7 mm away), so that
+//           a tent raised by the other tool is not taken for a dent made by this one
+//   k1, kt  of the skin: E t of the membrane is what a small disc of it resists with, whatever its size
+//   k_body  twice the secant f / u (a sheet in tension stiffens with depth: its tangent lies above the secant; too
+//           soft a model would be active, too stiff only dissipates), within [kMinBody, kMaxBody]
+//   b_body  k_body * kRelaxation
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "physics_node/collision/tool_collision.h"
+#include "physics_node/contact_model/elastic_force.h"
+#include "physics_node/grasp/grasp.h"
+
+namespace fulcrum::physics {
+
+class ContactProbe {
+ public:
+  ContactProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
+
+  /// Contacts of one tool after a step: a grasp, or the nearest surface within reach, or none.
+  DeviceContacts Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision, const Grasp& grasp);
+  /// Force on the tool as last computed, low-passed [N].
+  [[nodiscard]] Vec3f force(std::uint32_t tool) const { return tools_[tool].force; }
+
+ private:
+  struct ToolMemory {
+    ContactKind kind = ContactKind::kNone;
+    std::uint32_t id = 0;
+    Vec3f force = Vec3f::Zero();
+    Vec3f normal = Vec3f::Zero();
+    Vec3f u = Vec3f::Zero(), du = Vec3f::Zero(), v_s = Vec3f::Zero();
+    float stiffness = 0;
+    std::vector<Index> touched;
+  };
+  /// Displacement from rest and velocity, averaged.
+  struct Motion {
+    Vec3f displacement = Vec3f::Zero(), velocity = Vec3f::Zero();
+  };
+
+  void Enter(ToolMemory* memory, ContactKind kind) const;
+  void Follow(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const;
+  [[nodiscard]] Motion MeanMotion(std::span<const Index> particles) const;
+  [[nodiscard]] Motion RingMotion(Index node) const;
+  [[nodiscard]] Contact MakeContact(const ToolMemory& memory, const ToolPose& pose) const;
+
+  SceneView scene_;
+  const TissueModel* model_;
+  const ParticleStore* particles_;
+  ElasticForce elastic_;
+  std::array<ToolMemory, kMaxTools> tools_;
+};
+
+}  // namespace fulcrum::physics

@@ -1,0 +1,96 @@
+// The hot loops of the PBD solver as plain functions on plain arrays, compiled once for the baseline CPU and once for
+// AVX2. Both give the same bits: every operation is an IEEE add, multiply, divide or square root on eight lanes.
+//
+// Nothing here includes a header with inline functions of its own: such a function, compiled for AVX2, could be the
+// copy that the linker keeps for the whole program.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace fulcrum::physics {
+
+/// Constraints of one batch; also the lanes of a membrane row.
+inline constexpr int kLanes = 8;
+
+/// Eight springs of one colour. Vertices are indices of xyzw particles. rest 0 switches a lane off.
+struct alignas(32) SpringBatch {
+  std::uint32_t a[kLanes];
+  std::uint32_t b[kLanes];
+  float rest[kLanes];  ///< [m]
+};
+
+/// Eight tetrahedra of one colour.
+struct alignas(32) TetBatch {
+  std::uint32_t v[4][kLanes];
+  float rest_volume[kLanes];  ///< [m^3]
+  float floor[kLanes];        ///< Least sum of w |gradient|^2 to divide by, a small part of its value at rest.
+};
+
+/// Eight dihedral angles of one colour. A particle's coordinates are pool[base + step * {0, 1, 2}], w at 3 * step.
+struct alignas(32) BendingBatch {
+  std::uint32_t base[4][kLanes];
+  std::uint32_t step[4][kLanes];
+  float rest_angle[kLanes];  ///< [rad]
+  float floor[kLanes];       ///< As in TetBatch [rad^2 per (m^2 kg)].
+  float active[kLanes];      ///< 1, or 0 where the hinge has been cut.
+};
+
+/// The membrane: coordinate planes, lane-blocked rows. Column c of a row lies in lane c / slots, slot c % slots, at
+/// offset row * stride + slot * 8 + lane with stride = 8 * slots. The neighbour c + 1 is the next slot of the same
+/// lane, or the first slot of the next lane: no gather, one rotation per row.
+struct GridArrays {
+  float* x;
+  float* y;
+  float* z;
+  const float* w;        ///< Inverse mass, 0 = fixed [1/kg].
+  const float* rest[3];  ///< Rest length of the edges to (r, c+1), (r+1, c), (r+1, c+1); 0: no such edge [m].
+  int rows;
+  int slots;
+};
+
+struct IntegrateSettings {
+  float keep;        ///< Part of the velocity that damping leaves in one step.
+  float gravity[3];  ///< g * dt^2 [m].
+  float limit;       ///< A coordinate that differs more from the previous one has been damaged from outside [m].
+};
+
+struct FinishResult {
+  float max_step_sq;     ///< Largest squared movement of a free particle [m^2].
+  std::uint32_t resets;  ///< Particles put back because they were not finite or left their bounds.
+};
+
+/// Bounds of blocks of 8 x 8 cells; array index (row_block * slot_blocks + slot_block) * 8 + lane.
+struct BlockBounds {
+  float* lo[3];
+  float* hi[3];
+};
+
+struct Kernels {
+  const char* name;
+
+  /// One Gauss-Seidel sweep over the three edges of each node: even row pairs, then odd ones.
+  void (*grid_stretch)(const GridArrays& grid, float k);
+  /// `particles` xyzw.
+  void (*springs)(float* particles, const SpringBatch* batches, std::size_t count, float k);
+  void (*volumes)(float* particles, const TetBatch* batches, std::size_t count, float k);
+  void (*bending)(float* pool, const BendingBatch* batches, std::size_t count, float k);
+
+  /// Verlet prediction of `count` entries (multiple of 8) of the planes: previous <- now, now <- now + velocity step.
+  /// A damaged coordinate is taken from `previous`; returns how many.
+  std::uint32_t (*integrate)(float* const now[3], float* const previous[3], const float* w,
+                             std::size_t count, const IntegrateSettings& settings);
+  /// Puts back what is not finite or has moved further than sqrt(limit_sq).
+  FinishResult (*finish)(float* const now[3], const float* const previous[3], const float* w, std::size_t count,
+                         float limit_sq);
+  void (*block_bounds)(const GridArrays& grid, const BlockBounds& bounds);
+};
+
+const Kernels& BaselineKernels();
+const Kernels& Avx2Kernels();
+/// The widest kernels of this CPU.
+const Kernels& BestKernels();
+/// False: Avx2Kernels() must not be called here.
+bool HasAvx2();
+
+}  // namespace fulcrum::physics

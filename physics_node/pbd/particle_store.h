@@ -1,0 +1,182 @@
+// Where particles live. One pool of floats, so that a constraint may join any two particles:
+//
+//   [ tube: x y z w of each vertex, one more as padding | membrane: plane x | plane y | plane z | plane w ]
+//
+// The tube is visited in the order of its constraints (gather), so each vertex is one 16-byte load. The membrane is a
+// grid and visited row by row, so its coordinates are planes with lane-blocked rows (kernels.h, GridArrays). A
+// ParticleRef reaches both in the same way. w is the inverse mass in effect: 0 for fixed, grasped and dead particles.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "physics_node/pbd/kernels.h"
+#include "services/core/scene_view.h"
+
+namespace fulcrum::physics {
+
+/// Coordinates of a particle are pool[base], pool[base + step], pool[base + 2 * step], its w at 3 * step.
+struct ParticleRef {
+  std::uint32_t base = 0;
+  std::uint32_t step = 1;
+};
+
+/// Lane-blocked rows of the membrane.
+struct GridLayout {
+  std::uint32_t rows = 0, cols = 0;
+  std::uint32_t slots = 0;   ///< Columns per lane.
+  std::uint32_t stride = 0;  ///< Floats per row.
+
+  GridLayout() = default;
+  GridLayout(std::uint32_t row_count, std::uint32_t col_count)
+      : rows(row_count), cols(col_count), slots((col_count + kLanes - 1) / kLanes), stride(slots * kLanes) {}
+  [[nodiscard]] std::uint32_t Offset(std::uint32_t row, std::uint32_t col) const {
+    return row * stride + (col % slots) * kLanes + col / slots;
+  }
+  [[nodiscard]] std::uint32_t plane() const { return rows * stride; }
+};
+
+/// Zeroed floats on a cache line.
+class FloatArray {
+ public:
+  explicit FloatArray(std::size_t count = 0)
+      : size_(count), data_(static_cast<float*>(std::aligned_alloc(64, ((count * sizeof(float) + 64) / 64) * 64))) {
+    std::fill_n(data_.get(), count, 0.0f);
+  }
+  [[nodiscard]] float* data() { return data_.get(); }
+  [[nodiscard]] const float* data() const { return data_.get(); }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] float& operator[](std::size_t i) { return data_.get()[i]; }
+  [[nodiscard]] float operator[](std::size_t i) const { return data_.get()[i]; }
+
+ private:
+  struct Free {
+    void operator()(float* p) const { std::free(p); }
+  };
+  std::size_t size_;
+  std::unique_ptr<float, Free> data_;
+};
+
+class ParticleStore {
+ public:
+  explicit ParticleStore(const SceneView& scene)
+      : tube_count_(scene.tube_vertex_count),
+        particle_count_(static_cast<Index>(scene.rest_position.size())),
+        first_node_(scene.membrane.first),
+        layout_(scene.membrane.rows, scene.membrane.cols),
+        tube_floats_((4 * (tube_count_ + 1) + 15) / 16 * 16),
+        now_(tube_floats_ + 4 * layout_.plane()),
+        previous_(tube_floats_ + 4 * layout_.plane()) {
+    for (Index p = 0; p < particle_count_; ++p) {
+      const ParticleRef at = Ref(p);
+      Set(at, scene.rest_position[p]);
+      SetPrevious(at, scene.rest_position[p]);
+      SetInverseMass(at, scene.inverse_mass[p]);
+    }
+    PadGrid();
+  }
+
+  [[nodiscard]] Index tube_count() const { return tube_count_; }
+  [[nodiscard]] Index particle_count() const { return particle_count_; }
+  [[nodiscard]] const GridLayout& layout() const { return layout_; }
+  /// Tube vertex that no constraint moves: fills the unused lanes of a batch.
+  [[nodiscard]] Index padding_vertex() const { return tube_count_; }
+
+  [[nodiscard]] ParticleRef Ref(Index particle) const {
+    if (particle < tube_count_) {
+      return {4 * particle, 1};
+    }
+    const Index node = particle - first_node_;
+    return NodeRef(node / layout_.cols, node % layout_.cols);
+  }
+  [[nodiscard]] ParticleRef NodeRef(std::uint32_t row, std::uint32_t col) const {
+    return {tube_floats_ + layout_.Offset(row, col), layout_.plane()};
+  }
+
+  [[nodiscard]] Vec3f At(ParticleRef r) const { return Read(now_.data(), r); }
+  [[nodiscard]] Vec3f Previous(ParticleRef r) const { return Read(previous_.data(), r); }
+  [[nodiscard]] float InverseMass(ParticleRef r) const { return now_[r.base + 3 * std::size_t{r.step}]; }
+  void Set(ParticleRef r, const Vec3f& p) { Write(now_.data(), r, p); }
+  void SetPrevious(ParticleRef r, const Vec3f& p) { Write(previous_.data(), r, p); }
+  void SetInverseMass(ParticleRef r, float w) { now_[r.base + 3 * std::size_t{r.step}] = w; }
+
+  [[nodiscard]] float* pool() { return now_.data(); }
+  [[nodiscard]] float* tube() { return now_.data(); }
+  [[nodiscard]] float* tube_previous() { return previous_.data(); }
+  /// Plane 0..2: x, y, z; 3: inverse mass.
+  [[nodiscard]] float* plane(int axis) { return now_.data() + tube_floats_ + std::size_t(axis) * layout_.plane(); }
+  [[nodiscard]] const float* plane(int axis) const {
+    return now_.data() + tube_floats_ + std::size_t(axis) * layout_.plane();
+  }
+  [[nodiscard]] float* previous_plane(int axis) {
+    return previous_.data() + tube_floats_ + std::size_t(axis) * layout_.plane();
+  }
+
+  /// Positions of all particles in scene order, x y z interleaved; 3 * particle_count() floats.
+  void CopyPositions(std::span<float> xyz) const { Copy(now_.data(), xyz); }
+  void CopyPrevious(std::span<float> xyz) const { Copy(previous_.data(), xyz); }
+  void SetAll(std::span<const float> xyz, std::span<const float> previous_xyz) {
+    for (Index p = 0; p < particle_count_; ++p) {
+      const ParticleRef at = Ref(p);
+      Set(at, Vec3f(xyz[3 * p], xyz[3 * p + 1], xyz[3 * p + 2]));
+      SetPrevious(at, Vec3f(previous_xyz[3 * p], previous_xyz[3 * p + 1], previous_xyz[3 * p + 2]));
+    }
+    PadGrid();
+  }
+  /// Bytes of the positions as they lie in memory, for a state hash. The padding is constant.
+  [[nodiscard]] std::span<const float> raw() const { return {now_.data(), now_.size()}; }
+
+ private:
+  static Vec3f Read(const float* pool, ParticleRef r) {
+    const std::size_t s = r.step;
+    return {pool[r.base], pool[r.base + s], pool[r.base + 2 * s]};
+  }
+  static void Write(float* pool, ParticleRef r, const Vec3f& p) {
+    const std::size_t s = r.step;
+    pool[r.base] = p.x();
+    pool[r.base + s] = p.y();
+    pool[r.base + 2 * s] = p.z();
+  }
+  void Copy(const float* pool, std::span<float> xyz) const {
+    float* out = xyz.data();
+    for (Index v = 0; v < tube_count_; ++v, out += 3) {
+      out[0] = pool[4 * v];
+      out[1] = pool[4 * v + 1];
+      out[2] = pool[4 * v + 2];
+    }
+    const std::size_t plane = layout_.plane();
+    for (std::uint32_t row = 0; row < layout_.rows; ++row) {
+      const float* at = pool + tube_floats_ + std::size_t{row} * layout_.stride;
+      std::uint32_t col = 0;
+      for (std::uint32_t lane = 0; lane < kLanes; ++lane) {
+        for (std::uint32_t slot = 0; slot < layout_.slots && col < layout_.cols; ++slot, ++col, out += 3) {
+          const float* node = at + slot * kLanes + lane;
+          out[0] = node[0];
+          out[1] = node[plane];
+          out[2] = node[2 * plane];
+        }
+      }
+    }
+  }
+  /// Columns beyond the last one repeat it, so that bounds of blocks stay tight.
+  void PadGrid() {
+    for (std::uint32_t row = 0; row < layout_.rows; ++row) {
+      const ParticleRef last = NodeRef(row, layout_.cols - 1);
+      for (std::uint32_t col = layout_.cols; col < layout_.stride; ++col) {
+        Set(NodeRef(row, col), At(last));
+        SetPrevious(NodeRef(row, col), At(last));
+      }
+    }
+  }
+
+  Index tube_count_, particle_count_, first_node_;
+  GridLayout layout_;
+  std::uint32_t tube_floats_;
+  FloatArray now_, previous_;
+};
+
+}  // namespace fulcrum::physics

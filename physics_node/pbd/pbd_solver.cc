@@ -1,0 +1,120 @@
+#include "physics_node/pbd/pbd_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace fulcrum::physics {
+
+PbdSolver::PbdSolver(const PhysicsParams& params, TissueModel* model, ParticleStore* particles, const Kernels& kernels)
+    : params_(params), model_(model), particles_(particles), kernels_(kernels) {}
+
+GridArrays PbdSolver::Grid() const {
+  const GridLayout& layout = particles_->layout();
+  return {particles_->plane(0),
+          particles_->plane(1),
+          particles_->plane(2),
+          particles_->plane(3),
+          {model_->rest(0), model_->rest(1), model_->rest(2)},
+          static_cast<int>(layout.rows),
+          static_cast<int>(layout.slots)};
+}
+
+std::uint32_t PbdSolver::Predict() {
+  IntegrateSettings settings{std::max(0.0f, 1.0f - params_.damping_per_s * params_.dt_s), {}, 2.0f * kMaxStep};
+  std::uint32_t resets = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    settings.gravity[axis] = params_.gravity[axis] * params_.dt_s * params_.dt_s;
+  }
+  float* x = particles_->tube();
+  float* p = particles_->tube_previous();
+  for (Index v = 0; v < particles_->tube_count(); ++v, x += 4, p += 4) {
+    for (int axis = 0; axis < 3; ++axis) {
+      float here = x[axis];
+      if (!(std::abs(here - p[axis]) < settings.limit)) {
+        here = p[axis];
+        ++resets;
+      }
+      const float step = (here - p[axis]) * settings.keep + settings.gravity[axis];
+      p[axis] = here;
+      x[axis] = x[3] > 0.0f ? here + step : here;
+    }
+  }
+  float* const now[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
+  float* const previous[3] = {particles_->previous_plane(0), particles_->previous_plane(1),
+                              particles_->previous_plane(2)};
+  return resets + kernels_.integrate(now, previous, particles_->plane(3), particles_->layout().plane(), settings);
+}
+
+void PbdSolver::Iterate() {
+  kernels_.springs(particles_->tube(), model_->springs().data(), model_->springs().size(), params_.k_stretch_tube);
+  kernels_.volumes(particles_->tube(), model_->tets().data(), model_->tets().size(), params_.k_volume);
+  kernels_.grid_stretch(Grid(), params_.k_stretch_membrane);
+  kernels_.bending(particles_->pool(), model_->bending().data(), model_->bending().size(), params_.k_bending);
+  ProjectBindings();
+}
+
+void PbdSolver::ProjectBindings() {
+  const float k = params_.k_binding;
+  for (const PackedBinding& binding : model_->bindings()) {
+    if (binding.rest_length < 0.0f) {
+      continue;
+    }
+    const Vec3f m = particles_->At(binding.membrane);
+    std::array<Vec3f, 3> s;
+    Vec3f foot = Vec3f::Zero();
+    float sum = particles_->InverseMass(binding.membrane);
+    std::array<float, 3> share;
+    for (int j = 0; j < 3; ++j) {
+      s[j] = particles_->At(binding.surface[j]);
+      foot += binding.barycentric[j] * s[j];
+      share[j] = particles_->InverseMass(binding.surface[j]) * binding.barycentric[j];
+      sum += share[j] * binding.barycentric[j];
+    }
+    const Vec3f d = m - foot;
+    const float length = d.norm();
+    if (!(length * sum > 0.0f)) {
+      continue;  // Nothing can move, or there is no direction to move in.
+    }
+    const Vec3f correction = (k * (length - binding.rest_length) / (length * sum)) * d;
+    particles_->Set(binding.membrane, m - particles_->InverseMass(binding.membrane) * correction);
+    for (int j = 0; j < 3; ++j) {
+      particles_->Set(binding.surface[j], s[j] + share[j] * correction);
+    }
+  }
+}
+
+FinishResult PbdSolver::Finish() {
+  constexpr float kLimitSq = kMaxStep * kMaxStep;
+  float* const now[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
+  const float* const previous[3] = {particles_->previous_plane(0), particles_->previous_plane(1),
+                                    particles_->previous_plane(2)};
+  FinishResult result =
+      kernels_.finish(now, previous, particles_->plane(3), particles_->layout().plane(), kLimitSq);
+  float* x = particles_->tube();
+  const float* p = particles_->tube_previous();
+  for (Index v = 0; v < particles_->tube_count(); ++v, x += 4, p += 4) {
+    const float dx = x[0] - p[0], dy = x[1] - p[1], dz = x[2] - p[2];
+    const float moved = dx * dx + dy * dy + dz * dz;
+    if (!(moved < kLimitSq)) {
+      std::memcpy(x, p, 3 * sizeof(float));
+      result.resets += x[3] > 0.0f;
+    } else {
+      result.max_step_sq = std::max(result.max_step_sq, moved);
+    }
+  }
+  return result;
+}
+
+void PbdSolver::Stop() {
+  for (Index v = 0; v < particles_->tube_count(); ++v) {
+    std::memcpy(particles_->tube_previous() + 4 * v, particles_->tube() + 4 * v, 3 * sizeof(float));
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    std::copy_n(particles_->plane(axis), particles_->layout().plane(), particles_->previous_plane(axis));
+  }
+}
+
+void PbdSolver::ComputeBlockBounds(const BlockBounds& bounds) const { kernels_.block_bounds(Grid(), bounds); }
+
+}  // namespace fulcrum::physics

@@ -1,0 +1,47 @@
+// One step of position-based dynamics in the paper's way: predict, a few Gauss-Seidel iterations over all layers,
+// velocities from positions (Verlet). Contacts and grasps are projected by the caller between the iterations.
+#pragma once
+
+#include <cstdint>
+
+#include "physics_node/pbd/kernels.h"
+#include "physics_node/pbd/particle_store.h"
+#include "physics_node/pbd/tissue_model.h"
+#include "services/core/scene_view.h"
+
+namespace fulcrum::physics {
+
+class PbdSolver {
+ public:
+  /// No particle moves further in one step [m]: 3 m/s at 100 Hz, ten times a quick hand. What would is not tissue but
+  /// an explosion, and is put back.
+  static constexpr float kMaxStep = 0.03f;
+
+  PbdSolver(const PhysicsParams& params, TissueModel* model, ParticleStore* particles,
+            const Kernels& kernels = BestKernels());
+
+  /// previous <- now; now <- now + damped velocity + gravity, for free particles.
+  /// A coordinate damaged since the last step (not finite, far off) comes from the last step; returns how many.
+  std::uint32_t Predict();
+  /// One Gauss-Seidel iteration: tube springs, volumes, membrane stretch, bending, bindings.
+  void Iterate();
+  /// Quarantine: what is not finite, or has gone further than kMaxStep, goes back to where it was.
+  FinishResult Finish();
+  /// Takes all velocities away.
+  void Stop();
+
+  /// Bounds of the membrane's blocks of 8 x 8 cells in the present positions.
+  void ComputeBlockBounds(const BlockBounds& bounds) const;
+  [[nodiscard]] const Kernels& kernels() const { return kernels_; }
+
+ private:
+  void ProjectBindings();
+  [[nodiscard]] GridArrays Grid() const;
+
+  PhysicsParams params_;
+  TissueModel* model_;
+  ParticleStore* particles_;
+  const Kernels& kernels_;
+};
+
+}  // namespace fulcrum::physics

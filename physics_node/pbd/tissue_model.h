@@ -1,0 +1,92 @@
+// The constraints of a scene in the order and layout of the kernels, and what cutting and shrinking have done to them.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "physics_node/pbd/kernels.h"
+#include "physics_node/pbd/particle_store.h"
+#include "services/core/scene_view.h"
+
+namespace fulcrum::physics {
+
+struct PackedBinding {
+  ParticleRef membrane;
+  std::array<ParticleRef, 3> surface;
+  std::array<float, 3> barycentric;
+  float rest_length;  ///< [m]; -1 where the node is dead.
+};
+
+struct ConstraintCounts {
+  std::size_t vertices = 0, stretch = 0, volume = 0, bending = 0, bindings = 0;
+};
+
+class TissueModel {
+ public:
+  /// Throws InputError when the scene breaks the rules that the layout rests on (membrane directly after the tube,
+  /// no two constraints of a colour on one particle).
+  TissueModel(const SceneView& scene, ParticleStore* particles);
+
+  /// Applies the difference between `topology` and what is in force, in place: O(edits) beyond one comparison of the
+  /// bit fields. Returns the number of edges and nodes changed, or -1 when the sizes do not fit this scene.
+  int Apply(const TopologyState& topology, ParticleStore* particles);
+
+  [[nodiscard]] const std::vector<SpringBatch>& springs() const { return springs_; }
+  [[nodiscard]] const std::vector<TetBatch>& tets() const { return tets_; }
+  [[nodiscard]] const std::vector<BendingBatch>& bending() const { return bending_; }
+  [[nodiscard]] const std::vector<PackedBinding>& bindings() const { return bindings_; }
+  /// Plane of rest lengths, laid out as the membrane is.
+  [[nodiscard]] const float* rest(int direction) const { return rest_[direction].data(); }
+
+  [[nodiscard]] std::uint64_t revision() const { return revision_; }
+  [[nodiscard]] std::uint32_t rows() const { return scene_.membrane.rows; }
+  [[nodiscard]] std::uint32_t cols() const { return scene_.membrane.cols; }
+  [[nodiscard]] bool NodeAlive(Index node) const { return !TestBit(dead_nodes_, node); }
+  /// Exists in the grid, is not cut, and neither is an end of it.
+  [[nodiscard]] bool EdgeAlive(Index node, int direction) const;
+  /// Triangle 2 * cell + half: all its nodes and edges are alive.
+  [[nodiscard]] bool TriangleAlive(Index triangle) const { return triangle_alive_[triangle] != 0; }
+  /// Nodes of a membrane triangle (indices within the grid).
+  [[nodiscard]] std::array<Index, 3> TriangleNodes(Index triangle) const;
+  /// Inverse mass without grasps; 0 for a dead node.
+  [[nodiscard]] float BaseInverseMass(Index particle) const;
+  /// The first binding of a grid node, or null.
+  [[nodiscard]] const PackedBinding* BindingOf(Index node) const;
+  [[nodiscard]] ConstraintCounts counts() const { return counts_; }
+
+ private:
+  void PackTube(const SceneView& scene, const ParticleStore& particles);
+  void PackBending(const SceneView& scene, const ParticleStore& particles);
+  void PackBindings(const SceneView& scene, const ParticleStore& particles);
+  void RefreshEdge(Index node, int direction);
+  void RefreshNode(Index node, ParticleStore* particles);
+  void RefreshTriangles(Index node);
+  void RefreshHinges(Index node, bool died);
+  void RefreshTriangle(Index triangle);
+  [[nodiscard]] bool HingeAlive(Index slot) const;
+
+  SceneView scene_;
+  GridLayout layout_;
+  std::vector<SpringBatch> springs_;
+  std::vector<TetBatch> tets_;
+  std::vector<BendingBatch> bending_;
+  std::vector<PackedBinding> bindings_;
+  std::array<FloatArray, 3> rest_;
+
+  // Who uses a node: compressed rows, entry = batch * 8 + lane for bending, index for bindings. A hinge may span many
+  // cells; it uses all nodes of the patch it spans, so that a cut through the patch switches it off.
+  std::vector<Index> bending_start_, bending_of_;
+  std::vector<Index> binding_start_, binding_of_;
+  struct Patch {
+    Index row0 = 0, row1 = 0, col0 = 0, col1 = 0;  ///< Inclusive.
+  };
+  std::vector<Patch> bending_patch_;  ///< By batch * 8 + lane.
+
+  std::vector<std::uint8_t> dead_nodes_, dead_edges_, shrink_, triangle_alive_;
+  std::uint64_t revision_ = 0;
+  ConstraintCounts counts_;
+};
+
+}  // namespace fulcrum::physics

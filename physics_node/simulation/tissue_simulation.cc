@@ -1,0 +1,217 @@
+#include "physics_node/simulation/tissue_simulation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/core/hash.h"
+
+namespace fulcrum::physics {
+namespace {
+
+/// Tissue that moves less than this per step (0.1 mm/s at 100 Hz), for so many steps, is at rest.
+constexpr float kStill = 1e-6f;
+constexpr int kStillSteps = 50;
+/// A tool that moves less is standing still: the resolution of a haptic device is 9 um.
+constexpr float kToolStill = 1e-7f;
+
+float AngleBetween(const Quatf& a, const Quatf& b) {
+  return 2.0f * std::acos(std::min(1.0f, std::abs(a.dot(b))));
+}
+
+/// From `from` towards `to`, at most `step` metres and `turn` radians.
+ToolPose Approach(const ToolPose& from, const ToolPose& to, float step, float turn) {
+  const float far = (to.p_WT - from.p_WT).norm() / step;
+  const float round = AngleBetween(from.q_WT, to.q_WT) / turn;
+  const float part = 1.0f / std::max({1.0f, far, round});
+  if (part == 1.0f) {
+    return to;
+  }
+  ToolPose pose = Interpolate(from, to, part);
+  pose.jaw_rad = to.jaw_rad;
+  return pose;
+}
+
+}  // namespace
+
+bool TissueSimulation::ToolTrack::moved() const {
+  return (now.p_WT - last.p_WT).norm() > kToolStill || now.q_WT.coeffs() != last.q_WT.coeffs() ||
+         now.jaw_rad != last.jaw_rad;
+}
+
+TissueSimulation::TissueSimulation(const SceneView& scene, const Kernels& kernels)
+    : scene_(scene),
+      particles_(scene),
+      model_(scene, &particles_),
+      solver_(scene.physics, &model_, &particles_, kernels),
+      collision_(scene, &model_, &particles_, &solver_),
+      grasps_{Grasp(scene), Grasp(scene)},
+      contacts_(scene, &model_, &particles_),
+      cautery_(scene, &model_, &particles_) {}
+
+void TissueSimulation::FollowTools(const std::array<ToolInput, kMaxTools>& tools) {
+  const float dt = scene_.physics.dt_s;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    ToolTrack& track = tracks_[i];
+    const bool appears = tools[i].present && !track.present;
+    track.present = tools[i].present;
+    if (!track.present) {
+      continue;
+    }
+    track.last = appears ? tools[i].pose : track.now;
+    track.now = Approach(track.last, tools[i].pose, kMaxToolSpeed * dt, kMaxToolTurn * dt);
+  }
+}
+
+void TissueSimulation::UpdateGrasps() {
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    const ToolTrack& track = tracks_[i];
+    if (track.present) {
+      grasps_[i].Update(scene_.tools[i], track.now, model_, &particles_);
+    } else if (grasps_[i].holding()) {
+      grasps_[i].Release(model_, &particles_);
+    }
+  }
+}
+
+void TissueSimulation::FindContacts(bool tissue_moved) {
+  std::array<ToolCollision::ToolMotion, kMaxTools> motions;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    if (tracks_[i].present) {
+      motions[i] = {ShapeOf(scene_.tools[i], tracks_[i].last), ShapeOf(scene_.tools[i], tracks_[i].now),
+                    grasps_[i].holding()};
+    }
+  }
+  collision_.FindPairs(motions, tissue_moved);
+}
+
+/// True while the tissue sleeps and no tool stirs it.
+bool TissueSimulation::MayRest() {
+  if (!asleep_) {
+    return false;
+  }
+  const bool stirred = std::any_of(tracks_.begin(), tracks_.end(),
+                                   [](const ToolTrack& track) { return track.present && track.moved(); });
+  if (stirred) {
+    const bool touched = collision_.any_touching();
+    FindContacts(false);
+    asleep_ = !touched && collision_.pairs().empty();
+  }
+  return asleep_;
+}
+
+StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools) {
+  FollowTools(tools);
+  const bool held = grasps_[0].holding() || grasps_[1].holding();
+  UpdateGrasps();
+  const bool holds = grasps_[0].holding() || grasps_[1].holding();
+  asleep_ = asleep_ && !held && !holds;
+  if (MayRest()) {
+    return {true, 0.0f, 0};
+  }
+  ++state_version_;
+  StepReport report;
+  report.resets = solver_.Predict();
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    grasps_[i].Move(tracks_[i].now, &particles_);
+  }
+  FindContacts(true);
+  collision_.Sweep();
+  for (std::uint32_t iteration = 0; iteration < scene_.physics.iterations; ++iteration) {
+    solver_.Iterate();
+    collision_.Project();
+  }
+  const FinishResult finish = solver_.Finish();
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    grasps_[i].Slip(contacts_.force(static_cast<std::uint32_t>(i)), scene_.tools[i], tracks_[i].now, model_,
+                    &particles_);
+  }
+  report.resets += finish.resets;
+  report.max_step_m = std::sqrt(finish.max_step_sq);
+  quarantined_ += report.resets;
+  const bool stirred = std::any_of(tracks_.begin(), tracks_.end(), [](const ToolTrack& track) {
+    return track.present && track.moved();
+  });
+  still_steps_ = report.max_step_m < kStill && !holds && !(stirred && !collision_.pairs().empty()) ? still_steps_ + 1 : 0;
+  if (still_steps_ >= kStillSteps) {
+    solver_.Stop();
+    asleep_ = true;
+    still_steps_ = 0;
+  }
+  return report;
+}
+
+int TissueSimulation::ApplyTopology(const TopologyState& topology) {
+  const int edits = model_.Apply(topology, &particles_);
+  if (edits > 0) {
+    for (Grasp& grasp : grasps_) {
+      grasp.DropDead(model_, &particles_);
+    }
+    asleep_ = false;
+    still_steps_ = 0;
+  }
+  return edits;
+}
+
+DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
+  if (!tracks_[tool].present) {
+    return {};
+  }
+  return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool]);
+}
+
+CauteryContact TissueSimulation::Cautery(std::uint32_t tool) { return cautery_.Update(tool, collision_); }
+
+float TissueSimulation::MaxDisplacement() const {
+  float largest = 0;
+  for (Index p = 0; p < particles_.particle_count(); ++p) {
+    largest = std::max(largest, (particles_.At(particles_.Ref(p)) - scene_.rest_position[p]).squaredNorm());
+  }
+  return std::sqrt(largest);
+}
+
+std::uint64_t TissueSimulation::StateHash() const {
+  Hash64 hash;
+  hash.Add(particles_.raw());
+  hash.AddValue(model_.revision());
+  return hash.value();
+}
+
+SimulationMemory TissueSimulation::Save() const {
+  SimulationMemory memory;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    memory.pose[i] = tracks_[i].now;
+    memory.known[i] = tracks_[i].present;
+    memory.grasp_state[i] = grasps_[i].state();
+    memory.held[i] = grasps_[i].held();
+  }
+  return memory;
+}
+
+bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float> previous_xyz,
+                               const SimulationMemory& memory) {
+  const std::size_t floats = 3 * std::size_t{particles_.particle_count()};
+  const auto finite = [](std::span<const float> values) {
+    return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
+  };
+  if (xyz.size() != floats || previous_xyz.size() != floats || !finite(xyz) || !finite(previous_xyz)) {
+    return false;
+  }
+  for (const auto& held : memory.held) {
+    if (!std::all_of(held.begin(), held.end(), [&](const HeldParticle& h) {
+          return h.particle < particles_.particle_count() && h.p_T.allFinite();
+        })) {
+      return false;
+    }
+  }
+  particles_.SetAll(xyz, previous_xyz);
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    tracks_[i] = {memory.known[i], memory.pose[i], memory.pose[i]};
+    grasps_[i].Restore(memory.grasp_state[i], memory.held[i], &particles_);
+  }
+  asleep_ = false;
+  still_steps_ = 0;
+  ++state_version_;
+  return true;
+}
+
+}  // namespace fulcrum::physics

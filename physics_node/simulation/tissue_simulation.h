@@ -1,0 +1,101 @@
+// The whole tissue: PBD, tool collision, grasps, cutting, rest. Numbers in, numbers out; no clock, no bus.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "physics_node/collision/tool_collision.h"
+#include "physics_node/contact_model/cautery_probe.h"
+#include "physics_node/contact_model/contact_probe.h"
+#include "physics_node/grasp/grasp.h"
+#include "physics_node/pbd/pbd_solver.h"
+
+namespace fulcrum::physics {
+
+struct ToolInput {
+  bool present = false;
+  ToolPose pose;
+};
+
+struct StepReport {
+  bool asleep = false;          ///< Nothing moved and nothing was computed.
+  float max_step_m = 0;         ///< Largest movement of a particle in this step.
+  std::uint32_t resets = 0;     ///< Particles put back in this step.
+};
+
+/// What a restarted node needs to go on; positions apart.
+struct SimulationMemory {
+  std::array<ToolPose, kMaxTools> pose;
+  std::array<bool, kMaxTools> known{};
+  std::array<Grasp::State, kMaxTools> grasp_state{};
+  std::array<std::vector<HeldParticle>, kMaxTools> held;
+};
+
+class TissueSimulation {
+ public:
+  /// Tools follow their input at most this fast: after a gap in the input they come after it instead of jumping
+  /// through the tissue [m/s], [rad/s].
+  static constexpr float kMaxToolSpeed = 1.0f;
+  static constexpr float kMaxToolTurn = 6.0f;
+
+  explicit TissueSimulation(const SceneView& scene, const Kernels& kernels = BestKernels());
+
+  /// Advances by PhysicsParams.dt_s. A tool that is not present leaves the tissue where it is and lets go.
+  StepReport Step(const std::array<ToolInput, kMaxTools>& tools);
+  /// Cut and shrunk edges; see TissueModel::Apply. Wakes the tissue when something changed.
+  int ApplyTopology(const TopologyState& topology);
+
+  /// After a Step: what a tool feels, and where a hook touches.
+  [[nodiscard]] DeviceContacts Contacts(std::uint32_t tool);
+  [[nodiscard]] CauteryContact Cautery(std::uint32_t tool);
+
+  [[nodiscard]] ParticleStore& particles() { return particles_; }
+  [[nodiscard]] const ParticleStore& particles() const { return particles_; }
+  [[nodiscard]] const TissueModel& model() const { return model_; }
+  [[nodiscard]] const ToolCollision& collision() const { return collision_; }
+  [[nodiscard]] const Grasp& grasp(std::uint32_t tool) const { return grasps_[tool]; }
+  [[nodiscard]] Vec3f force(std::uint32_t tool) const { return contacts_.force(tool); }
+  [[nodiscard]] bool asleep() const { return asleep_; }
+  [[nodiscard]] std::uint64_t quarantined() const { return quarantined_; }
+  /// Changes whenever positions may have changed.
+  [[nodiscard]] std::uint64_t state_version() const { return state_version_; }
+
+  /// Largest distance of a particle from rest [m].
+  [[nodiscard]] float MaxDisplacement() const;
+  /// Of positions and held particles: equal for equal runs.
+  [[nodiscard]] std::uint64_t StateHash() const;
+
+  [[nodiscard]] SimulationMemory Save() const;
+  /// Continues from a checkpoint: positions in scene order, x y z interleaved. False, and nothing changed, when it does
+  /// not fit the scene or is not finite.
+  bool Restore(std::span<const float> xyz, std::span<const float> previous_xyz, const SimulationMemory& memory);
+
+ private:
+  struct ToolTrack {
+    bool present = false;
+    ToolPose last, now;
+    [[nodiscard]] bool moved() const;
+  };
+
+  void FollowTools(const std::array<ToolInput, kMaxTools>& tools);
+  [[nodiscard]] bool MayRest();
+  void UpdateGrasps();
+  void FindContacts(bool tissue_moved);
+
+  SceneView scene_;
+  ParticleStore particles_;
+  TissueModel model_;
+  PbdSolver solver_;
+  ToolCollision collision_;
+  std::array<Grasp, kMaxTools> grasps_;
+  ContactProbe contacts_;
+  CauteryProbe cautery_;
+  std::array<ToolTrack, kMaxTools> tracks_;
+  bool asleep_ = false;
+  int still_steps_ = 0;
+  std::uint64_t quarantined_ = 0, state_version_ = 1;
+};
+
+}  // namespace fulcrum::physics
