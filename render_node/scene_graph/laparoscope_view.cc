@@ -1,5 +1,6 @@
 #include "render_node/scene_graph/laparoscope_view.h"
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <numbers>
 #include <osg/BlendFunc>
@@ -7,8 +8,6 @@
 #include <osg/CullFace>
 #include <osg/Depth>
 #include <osg/Geode>
-
-#include <Eigen/Eigenvalues>
 
 #include "render_node/geometry/atlas.h"
 #include "render_node/geometry/fat_layer.h"

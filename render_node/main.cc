@@ -1,0 +1,50 @@
+// render_node: draws what the laparoscope sees, into a window (--window) or off screen into PNG files.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render_node/node/render_node.h"
+#include "services/app/node_app.h"
+#include "services/runtime/realtime.h"
+
+namespace {
+
+// A software rasteriser takes every core it can get: below the servo and the solvers where they share cores.
+constexpr int kNice = 5;
+
+fulcrum::ExitCode RunRender(fulcrum::app::NodeApp& app) {
+  if (nice(kNice) == -1) {
+    fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kWarning, "cannot lower the priority of drawing");
+  }
+  fulcrum::render::RenderSettings settings;
+  settings.window = app.options().TakeFlag("--window");
+  settings.frames = app.options().session / "frames";
+  fulcrum::render::RenderNode node(app.scene(), settings,
+                                   {app.MakeInput<fulcrum::TissueFrame>(), app.MakeInput<fulcrum::TopologyState>(),
+                                    app.MakeInput<fulcrum::TemperaturePatch>(), app.MakeInput<fulcrum::ToolState>(),
+                                    app.MakeInput<fulcrum::HandleState>(), app.MakeInput<fulcrum::ThermalEvent>()});
+  fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, node.display_description());
+
+  // The scene says how many pictures it wants, the cart how many the machine can give: the slower of the two.
+  fulcrum::runtime::CyclicThreadSettings timing = app.timing();
+  timing.period_ns = std::max(timing.period_ns, std::int64_t{std::llround(1e9 / app.scene().render.rate_Hz)});
+  const fulcrum::ExitCode code = app.Run(
+      timing,
+      [&](const fulcrum::Tick& tick) {
+        node.Step(tick);
+        if (node.closed()) {
+          app.Finish(fulcrum::ExitCode::kDone, "the window was closed");
+        }
+      },
+      [&](fulcrum::Health* health) { node.FillHealth(health); });
+  node.Finish();
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kRender,
+                                "Draws what the laparoscope sees: off screen into PNG files, or --window.", RunRender);
+}

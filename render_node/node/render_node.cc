@@ -1,0 +1,150 @@
+#include "render_node/node/render_node.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+namespace fulcrum::render {
+namespace {
+
+// Below these a pose looks the same: a fifth of a pixel at 10 cm.
+constexpr float kSamePlace = 2e-5f;   // [m]
+constexpr float kSameAngle = 0.002f;  // [rad]
+
+bool LooksTheSame(const ToolSample& a, const ToolSample& b) {
+  return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle;
+}
+
+std::unique_ptr<Display> OpenDisplay(const LaparoscopeView& view, const RenderParams& params, bool window) {
+  return window ? MakeWindowDisplay(view, params) : MakeOffscreenDisplay(view, params);
+}
+
+}  // namespace
+
+RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, const RenderPorts& ports)
+    : scene_(scene),
+      window_(settings.window),
+      ports_(ports),
+      view_(scene),
+      display_(OpenDisplay(view_, scene.render, settings.window)),
+      writer_(settings.frames) {}
+
+RenderNode::~RenderNode() = default;
+
+void RenderNode::Step(const Tick& tick) {
+  session_time_s_ = tick.session_time_s;
+  TakeTissue();
+  TakeThermal();
+  TakeTools();
+  if (!ready()) {
+    return;
+  }
+  const bool write = changed_in_file_ && session_time_s_ >= next_png_s_;
+  if (write || (window_ && changed_on_screen_)) {
+    Draw(session_time_s_, write);
+  }
+}
+
+void RenderNode::Finish() {
+  if (ready() && changed_in_file_) {
+    Draw(session_time_s_, true);
+  }
+}
+
+void RenderNode::TakeTissue() {
+  if (!ports_.tissue.TakeLatest(&new_tissue_)) {
+    return;
+  }
+  if (new_tissue_.header.scene_hash != scene_.hash || new_tissue_.xyz.size() < 3 * scene_.rest_position.size()) {
+    Report("TissueFrame of another scene dropped");
+    return;
+  }
+  const bool moved = new_tissue_.xyz != tissue_.xyz;
+  std::swap(tissue_, new_tissue_);
+  if (moved) {
+    view_.SetTissue(std::span<const float>(tissue_.xyz).first(3 * scene_.rest_position.size()));
+    changed_on_screen_ = changed_in_file_ = true;
+  }
+}
+
+void RenderNode::TakeThermal() {
+  const std::uint64_t known = topology_.revision;
+  if (ports_.topology.TakeLatest(&topology_) && topology_.revision != known) {
+    if (topology_.scene_hash != scene_.hash || !view_.SetTopology(topology_)) {
+      Report("TopologyState of another scene dropped");
+    } else {
+      changed_on_screen_ = changed_in_file_ = true;
+    }
+  }
+  while (ports_.patches.TakeNext(&patch_)) {
+    if (view_.ApplyPatch(patch_)) {
+      patches_applied_.fetch_add(1, std::memory_order_relaxed);
+      changed_on_screen_ = changed_in_file_ = true;
+    }
+  }
+  while (ports_.events.TakeNext(&event_)) {
+  }
+}
+
+void RenderNode::TakeTools() {
+  if (ports_.tools.TakeLatest(&new_tools_)) {
+    for (int k = 0; k < kMaxTools; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      if (!LooksTheSame(tools_.tools[i], new_tools_.tools[i])) {
+        tools_.tools[i] = new_tools_.tools[i];
+        view_.SetTool(k, tools_.tools[i]);
+        changed_on_screen_ = changed_in_file_ = true;
+      }
+    }
+  }
+  if (ports_.handles.TakeLatest(&new_handles_)) {
+    for (int k = 0; k < kMaxTools; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      HandleSample& shown = handles_.handles[i];
+      const HandleSample& now = new_handles_.handles[i];
+      if (now.present && std::abs(now.jaw_angle_rad - shown.jaw_angle_rad) > kSameAngle) {
+        shown = now;
+        view_.SetJaw(k, now.jaw_angle_rad);
+        changed_on_screen_ = changed_in_file_ = true;
+      }
+    }
+  }
+}
+
+void RenderNode::Draw(double session_time_s, bool write_png) {
+  const auto start = std::chrono::steady_clock::now();
+  view_.Update();
+  if (write_png) {
+    display_->DrawAndRead(&picture_);
+    if (!writer_.Add(picture_, session_time_s)) {
+      pictures_dropped_.fetch_add(1, std::memory_order_relaxed);
+    }
+    const double period = 1.0 / std::max(0.001f, scene_.render.png_rate_Hz);
+    next_png_s_ = period * (std::floor(session_time_s / period) + 1);
+    changed_in_file_ = false;
+  } else {
+    display_->Draw();
+  }
+  changed_on_screen_ = false;
+  frames_drawn_.fetch_add(1, std::memory_order_relaxed);
+  const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
+  draw_ms_.store(spent.count(), std::memory_order_relaxed);
+}
+
+void RenderNode::Report(const std::string& error) {
+  const std::lock_guard lock(error_mutex_);
+  error_ = error;
+}
+
+void RenderNode::FillHealth(Health* health) const {
+  health->metrics.push_back({"frames_drawn", static_cast<double>(frames_drawn_.load(std::memory_order_relaxed))});
+  health->metrics.push_back({"png_written", static_cast<double>(writer_.written())});
+  health->metrics.push_back({"png_dropped", static_cast<double>(pictures_dropped_.load(std::memory_order_relaxed))});
+  health->metrics.push_back({"draw_ms", draw_ms_.load(std::memory_order_relaxed)});
+  health->metrics.push_back({"patches", static_cast<double>(patches_applied_.load(std::memory_order_relaxed))});
+  const std::lock_guard lock(error_mutex_);
+  health->last_error = error_.empty() ? writer_.last_error() : error_;
+}
+
+}  // namespace fulcrum::render

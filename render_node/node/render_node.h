@@ -1,0 +1,90 @@
+// The render node: what the bus says becomes a picture, in a window or in PNG files.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "render_node/offscreen/png_writer.h"
+#include "render_node/scene_graph/display.h"
+#include "render_node/scene_graph/laparoscope_view.h"
+#include "services/bus/port.h"
+#include "services/core/tick.h"
+
+namespace fulcrum::render {
+
+struct RenderPorts {
+  bus::Input<TissueFrame>& tissue;
+  bus::Input<TopologyState>& topology;
+  bus::Input<TemperaturePatch>& patches;
+  bus::Input<ToolState>& tools;
+  bus::Input<HandleState>& handles;
+  bus::Input<ThermalEvent>& events;
+};
+
+struct RenderSettings {
+  bool window = false;           ///< A real window instead of drawing into memory.
+  std::filesystem::path frames;  ///< Folder for the pictures.
+};
+
+class RenderNode {
+ public:
+  /// Builds the graph and opens OpenGL. Throws InputError when a window is asked for and no display can be opened,
+  /// std::runtime_error when OpenGL is missing. The arrays of `scene` and the ports must outlive the node.
+  RenderNode(const SceneView& scene, const RenderSettings& settings, const RenderPorts& ports);
+  ~RenderNode();
+
+  /// Takes what has come and draws when somebody will see it: in a window whenever something changed, off screen when
+  /// a PNG is due and something changed since the last one. Otherwise nothing is computed.
+  void Step(const Tick& tick);
+
+  /// The last picture of the session, when it differs from the last one written. After the last Step, any thread.
+  void Finish();
+
+  /// Metrics and last error. Any thread.
+  void FillHealth(Health* health) const;
+
+  /// The user closed the window.
+  [[nodiscard]] bool closed() const { return display_->closed(); }
+  [[nodiscard]] std::string display_description() const { return display_->description(); }
+
+ private:
+  void TakeTissue();
+  void TakeThermal();
+  void TakeTools();
+  [[nodiscard]] bool ready() const { return tissue_.header.stamp.sequence != 0; }
+  void Draw(double session_time_s, bool write_png);
+  void Report(const std::string& error);
+
+  SceneView scene_;
+  bool window_;
+  RenderPorts ports_;
+  LaparoscopeView view_;
+  std::unique_ptr<Display> display_;
+  FrameWriter writer_;
+
+  TissueFrame tissue_, new_tissue_;
+  TopologyState topology_;
+  TemperaturePatch patch_;
+  ToolState tools_, new_tools_;
+  HandleState handles_, new_handles_;
+  ThermalEvent event_;
+  Picture picture_;
+  double session_time_s_ = 0;
+  double next_png_s_ = 0;
+  bool changed_on_screen_ = false;  // Since the last picture that was drawn.
+  bool changed_in_file_ = false;    // Since the last picture that was written.
+
+  // Read by the health thread; each stands for itself, so relaxed order is enough.
+  std::atomic<std::uint64_t> frames_drawn_{0};
+  std::atomic<std::uint64_t> pictures_dropped_{0};
+  std::atomic<std::uint64_t> patches_applied_{0};
+  std::atomic<double> draw_ms_{0};
+  mutable std::mutex error_mutex_;
+  std::string error_;
+};
+
+}  // namespace fulcrum::render
