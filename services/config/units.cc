@@ -52,6 +52,7 @@ constexpr std::array kUnits = {
     Unit{"N_per_s", "N/s", "force rate", 1.0},
     Unit{"Ns_m", "Ns/m", "damping", 1.0},
     Unit{"kg_m3", "kg/m3", "density", 1.0},
+    Unit{"kg_m2", "kg/m2", "areal density", 1.0},
     Unit{"J_m3", "J/m3", "energy density", 1.0},
     Unit{"J_kgK", "J/kgK", "specific heat capacity", 1.0},
     Unit{"W_mK", "W/mK", "thermal conductivity", 1.0},

@@ -16,6 +16,8 @@ constexpr double kAtlasMargin_m = 0.001;  ///< Sheet coordinates begin here, so 
 constexpr int kStructurePoints = 33;      ///< Along each ureter or nerve: 6 mm apart on a 200 mm sheet.
 /// A tip may lie this far from the pivot at most: a laparoscopic shaft is about 330 mm long.
 constexpr double kLongestReach_m = 0.30;
+/// … and at least this far, also from the end of its shaft: the devices do not turn a shorter lever.
+constexpr double kLeastLever_m = 0.015;
 
 [[noreturn]] void Refuse(const SceneSettings& settings, const std::string& text) {
   throw InputError("scene '" + settings.name + "': " + text);
@@ -317,11 +319,11 @@ void AddScript(const SceneSettings& settings, const Sheet& sheet, SceneData* sce
       p = (at.p + key.height_m * at.normal).cast<float>() + key.offset_m;
     }
     const double reach = (p - settings.tools[key.tool].p_WP).norm();
-    if (!(reach < std::min<double>(kLongestReach_m, settings.tools[key.tool].shaft_length_m))) {
+    const double longest = std::min(kLongestReach_m, settings.tools[key.tool].shaft_length_m - kLeastLever_m);
+    if (!(reach >= kLeastLever_m && reach <= longest)) {
       Refuse(settings, "script key at " + std::to_string(key.time_s) + " s: tip " + std::to_string(1e3 * reach) +
-                           " mm from the trocar of tool " + std::to_string(key.tool) +
-                           "; valid: less than its shaft and less than " +
-                           std::to_string(static_cast<int>(1e3 * kLongestReach_m)) + " mm");
+                           " mm from the trocar of tool " + std::to_string(key.tool) + "; valid: " +
+                           std::to_string(1e3 * kLeastLever_m) + " to " + std::to_string(1e3 * longest) + " mm");
     }
     scene->script.push_back({static_cast<float>(key.time_s), static_cast<std::uint32_t>(key.tool), p,
                              static_cast<float>(key.jaw_rad), key.pedals, static_cast<float>(key.power_W)});

@@ -1,27 +1,27 @@
 // The shipped procedural scenes as settings. deploy/scenes/*.yaml say the same; a test compares the two.
+#include <numbers>
+
 #include "services/scene/scene_settings.h"
 
 namespace fulcrum::scene {
 namespace {
 
-constexpr float kMillimetre = 0.001f;
-
-ToolDescription Grasper(const Vec3f& p_WP) { return {ToolKind::kGrasper, p_WP, 0.0025f, 0.33f, 0.0015f, 0.018f}; }
-
-ToolDescription Hook(const Vec3f& p_WP) { return {ToolKind::kHook, p_WP, 0.0025f, 0.33f, 0.0006f, 0.005f}; }
+// As the YAML reader converts, so that both give the same bits.
+double Millimetres(double mm) { return mm * 1e-3; }
+double Degrees(double deg) { return deg * (std::numbers::pi / 180.0); }
 
 /// Writes keys one after the other.
 class ScriptWriter {
  public:
   explicit ScriptWriter(std::vector<ScriptKeySettings>* keys) : keys_(keys) {}
 
-  void Grasper(double time_s, float s, float t, double height_mm, double jaw_rad,
-               const Vec3f& offset_mm = Vec3f::Zero()) {
-    keys_->push_back(
-        {time_s, 0, std::nullopt, Vec2f(s, t), height_mm / 1000, kMillimetre * offset_mm, jaw_rad, kPedalNone, 0});
+  void Grasper(double time_s, float s, float t, double height_mm, double jaw_deg,
+               const Vec3d& offset_mm = Vec3d::Zero()) {
+    keys_->push_back({time_s, 0, std::nullopt, Vec2f(s, t), Millimetres(height_mm), (offset_mm * 1e-3).cast<float>(),
+                      Degrees(jaw_deg), kPedalNone, 0});
   }
   void Hook(double time_s, float s, float t, double height_mm, double cut_W = 0) {
-    keys_->push_back({time_s, 1, std::nullopt, Vec2f(s, t), height_mm / 1000, Vec3f::Zero(), 0,
+    keys_->push_back({time_s, 1, std::nullopt, Vec2f(s, t), Millimetres(height_mm), Vec3f::Zero(), 0,
                       cut_W > 0 ? kPedalCut : kPedalNone, cut_W});
   }
 
@@ -30,6 +30,20 @@ class ScriptWriter {
 };
 
 }  // namespace
+
+ToolDescription DefaultTool(ToolKind kind, const Vec3f& p_WP) {
+  switch (kind) {
+    case ToolKind::kGrasper:
+      return {kind, p_WP, 0.0025f, 0.330f, 0.0015f, 0.018f};
+    case ToolKind::kHook:
+      return {kind, p_WP, 0.0025f, 0.330f, 0.0006f, 0.005f};
+    case ToolKind::kScissors:
+      return {kind, p_WP, 0.0025f, 0.330f, 0.0010f, 0.016f};
+    case ToolKind::kNone:
+      break;
+  }
+  return {ToolKind::kNone, p_WP, 0, 0, 0, 0};
+}
 
 SceneSettings BuiltIn() {
   SceneSettings scene;
@@ -43,25 +57,26 @@ SceneSettings BuiltIn() {
       {ProtectedKind::kNerve, 0.0006, 0.003, {{0.82f, 0.40f}, {0.86f, 0.52f}, {0.84f, 0.7f}}},
       {ProtectedKind::kNerve, 0.0006, 0.003, {{0.20f, 0.40f}, {0.15f, 0.55f}, {0.17f, 0.7f}}},
   };
-  scene.tools = {Grasper(Vec3f(-0.085f, -0.045f, 0.115f)), Hook(Vec3f(0.085f, -0.045f, 0.115f))};
+  scene.tools = {DefaultTool(ToolKind::kGrasper, Vec3f(-0.085f, -0.045f, 0.115f)),
+                 DefaultTool(ToolKind::kHook, Vec3f(0.085f, -0.045f, 0.115f))};
   scene.render.scope_tip_W = Vec3f(0.006f, -0.085f, 0.095f);
   scene.render.scope_target_W = Vec3f(0.0f, 0.004f, 0.020f);
   ScriptWriter key(&scene.script);
   // Left hand: comes down with the jaws open, presses a fold into them, closes, lifts the sheet up and to the left,
   // holds it while the hook works, gives it back.
-  key.Grasper(0.0, 0.36f, 0.50f, 55, 0.9);
-  key.Grasper(1.2, 0.36f, 0.50f, 12, 0.9);
-  key.Grasper(2.0, 0.36f, 0.50f, -2.5, 0.9);
-  key.Grasper(2.3, 0.36f, 0.50f, -2.5, 0.9);
+  key.Grasper(0.0, 0.36f, 0.50f, 55, 50);
+  key.Grasper(1.2, 0.36f, 0.50f, 12, 50);
+  key.Grasper(2.0, 0.36f, 0.50f, -2.5, 50);
+  key.Grasper(2.3, 0.36f, 0.50f, -2.5, 50);
   key.Grasper(2.9, 0.36f, 0.50f, -2.5, 0.0);
   key.Grasper(3.2, 0.36f, 0.50f, -2.0, 0.0);
-  key.Grasper(5.8, 0.36f, 0.50f, 20, 0.0, Vec3f(-10, 4, 4));
-  key.Grasper(15.0, 0.36f, 0.50f, 20, 0.0, Vec3f(-10, 4, 4));
-  key.Grasper(16.2, 0.36f, 0.50f, 4, 0.0, Vec3f(-2, 0, 0));
-  key.Grasper(16.6, 0.36f, 0.50f, 4, 0.0, Vec3f(-2, 0, 0));
-  key.Grasper(17.2, 0.36f, 0.50f, 5, 0.9, Vec3f(-2, 0, 0));
-  key.Grasper(19.0, 0.36f, 0.50f, 50, 0.9);
-  key.Grasper(20.0, 0.36f, 0.50f, 55, 0.9);
+  key.Grasper(5.8, 0.36f, 0.50f, 20, 0.0, Vec3d(-10, 4, 4));
+  key.Grasper(15.0, 0.36f, 0.50f, 20, 0.0, Vec3d(-10, 4, 4));
+  key.Grasper(16.2, 0.36f, 0.50f, 4, 0.0, Vec3d(-2, 0, 0));
+  key.Grasper(16.6, 0.36f, 0.50f, 4, 0.0, Vec3d(-2, 0, 0));
+  key.Grasper(17.2, 0.36f, 0.50f, 5, 50, Vec3d(-2, 0, 0));
+  key.Grasper(19.0, 0.36f, 0.50f, 50, 50);
+  key.Grasper(20.0, 0.36f, 0.50f, 55, 50);
   // Right hand: waits, touches down beside the tent, cuts 30 mm along the organ at 4 mm/s, lifts off.
   key.Hook(0.0, 0.68f, 0.40f, 45);
   key.Hook(4.5, 0.68f, 0.40f, 45);
@@ -101,20 +116,21 @@ SceneSettings Small() {
                     .binding_col_stride = 3,
                     .binding_reach_m = 0.0058};
   scene.structures.resize(4);
-  scene.tools = {Grasper(Vec3f(-0.075f, -0.045f, 0.110f)), Hook(Vec3f(0.075f, -0.045f, 0.110f))};
+  scene.tools = {DefaultTool(ToolKind::kGrasper, Vec3f(-0.075f, -0.045f, 0.110f)),
+                 DefaultTool(ToolKind::kHook, Vec3f(0.075f, -0.045f, 0.110f))};
   scene.render.scope_tip_W = Vec3f(0.004f, -0.055f, 0.070f);
   scene.render.scope_target_W = Vec3f(0.0f, 0.002f, 0.012f);
   scene.script.clear();
   ScriptWriter key(&scene.script);
-  key.Grasper(0.0, 0.33f, 0.50f, 20, 0.9);
-  key.Grasper(0.6, 0.33f, 0.50f, -2.0, 0.9);
-  key.Grasper(0.8, 0.33f, 0.50f, -2.0, 0.9);
+  key.Grasper(0.0, 0.33f, 0.50f, 20, 50);
+  key.Grasper(0.6, 0.33f, 0.50f, -2.0, 50);
+  key.Grasper(0.8, 0.33f, 0.50f, -2.0, 50);
   key.Grasper(1.1, 0.33f, 0.50f, -2.0, 0.0);
-  key.Grasper(2.0, 0.33f, 0.50f, 9, 0.0, Vec3f(-4, 0, 2));
-  key.Grasper(4.9, 0.33f, 0.50f, 9, 0.0, Vec3f(-4, 0, 2));
+  key.Grasper(2.0, 0.33f, 0.50f, 9, 0.0, Vec3d(-4, 0, 2));
+  key.Grasper(4.9, 0.33f, 0.50f, 9, 0.0, Vec3d(-4, 0, 2));
   key.Grasper(5.2, 0.33f, 0.50f, 3, 0.0);
-  key.Grasper(5.4, 0.33f, 0.50f, 4, 0.9);
-  key.Grasper(6.0, 0.33f, 0.50f, 20, 0.9);
+  key.Grasper(5.4, 0.33f, 0.50f, 4, 50);
+  key.Grasper(6.0, 0.33f, 0.50f, 20, 50);
   key.Hook(0.0, 0.66f, 0.42f, 20);
   key.Hook(1.4, 0.66f, 0.42f, 15);
   key.Hook(2.1, 0.66f, 0.42f, -2.0);

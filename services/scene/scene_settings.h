@@ -25,22 +25,26 @@ struct TubeSettings {
   double fold_depth_m = 0.0012;    ///< Amplitude of the folds on the radius.
 };
 
-/// The organ read from a closed surface mesh instead.
+/// The organ read from a closed surface mesh instead. It is filled with tetrahedra (the wall is not told apart from
+/// what it holds); the membrane covers a stretch of its centre line, on the side it is dissected from.
 struct ImportSettings {
+  double scale_m = 0.001;          ///< Metres per unit of the files.
+  Vec3f origin_m = Vec3f::Zero();  ///< This place of the files becomes the origin of frame W.
   std::filesystem::path organ_file;
-  double scale_m = 0.001;  ///< Metres per unit of all the files here.
   int target_tets = 8000;
-  double min_edge_m = 0.0004;     ///< Shorter edges of the surface are collapsed.
-  double sector_deg = 170;        ///< How far round the organ the membrane reaches.
-  double apron_m = 0.012;         ///< The membrane goes on this far to the side of the organ.
-  double end_margin_m = 0.012;    ///< Length left free at either end of the organ …
-  double fixed_end_m = 0.006;     ///< … and fixed there.
-  int organ_surface_max = 20000;  ///< The embedded surface is decimated to this many triangles.
-  int surroundings_max = 3000;    ///< Each surrounding surface likewise.
+  double min_edge_m = 0.0003;       ///< Shorter edges of the surface are slivers and are collapsed.
+  int organ_triangles_max = 14000;  ///< The embedded surface is decimated to this many triangles.
+  double from = 0.1, to = 0.9;  ///< The stretch, as fractions of the centre line counted from its caudal end; beyond it
+                                ///< the organ is fixed.
+  Vec3f facing = Vec3f::UnitZ();  ///< The sector's middle lies this way from the centre line.
+  double sector_rad = 2.6;        ///< How far round the organ the membrane follows it.
+  double flare_m = 0.012;         ///< Then it leaves the organ and goes on this far to either side.
+  double bed_m = 0.040;           ///< A fixed surface continues it by so much.
   struct Surrounding {
     std::string name;
     SurfaceRole role = SurfaceRole::kOther;
     std::filesystem::path file;
+    int triangles_max = 4000;  ///< Decimated to this many.
     bool collides = false;
   };
   std::vector<Surrounding> surroundings;
@@ -98,6 +102,9 @@ struct SceneSettings {
   double script_duration_s = 20;
   std::uint32_t node_mask = 0x3e;  ///< Bit per NodeId.
 };
+
+/// A tool with the usual dimensions and its trocar at `p_WP`.
+ToolDescription DefaultTool(ToolKind kind, const Vec3f& p_WP);
 
 /// The paper's size (Table 3 within 2 %); the same as deploy/scenes/built-in.yaml.
 SceneSettings BuiltIn();

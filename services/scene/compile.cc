@@ -1,0 +1,28 @@
+#include "services/scene/compile.h"
+
+#include "services/scene/build.h"
+#include "services/scene/import.h"
+#include "services/scene/scene_yaml.h"
+
+namespace fulcrum::scene {
+
+SceneData BuildScene(const SceneSettings& settings, const Progress& progress) {
+  if (settings.import) {
+    return AssembleScene(settings, ImportAnatomy(settings, progress));
+  }
+  return BuildProcedural(settings);
+}
+
+CompiledScene CompileScene(const std::filesystem::path& yaml, const std::filesystem::path& data,
+                           const Progress& progress) {
+  if (progress) {
+    progress("reading " + yaml.string());
+  }
+  SceneDescription description = ReadSceneYaml(yaml, data);
+  if (progress) {
+    progress("building '" + description.settings.name + "'");
+  }
+  return {BuildScene(description.settings, progress), std::move(description.effective_yaml)};
+}
+
+}  // namespace fulcrum::scene

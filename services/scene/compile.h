@@ -1,0 +1,28 @@
+// From a description file to a compiled scene: what the scene_compiler program does.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "services/scene/scene_file.h"
+#include "services/scene/scene_settings.h"
+
+namespace fulcrum::scene {
+
+/// Called with what begins now; may be empty.
+using Progress = std::function<void(const std::string&)>;
+
+/// Procedural or imported, as the settings say. Throws InputError.
+SceneData BuildScene(const SceneSettings& settings, const Progress& progress);
+
+struct CompiledScene {
+  SceneData data;
+  std::string effective_yaml;
+};
+/// Reads the YAML and builds the scene. Throws InputError.
+CompiledScene CompileScene(const std::filesystem::path& yaml, const std::filesystem::path& data,
+                           const Progress& progress);
+
+}  // namespace fulcrum::scene

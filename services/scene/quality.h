@@ -1,0 +1,33 @@
+// Figures about a compiled scene, for the compiler's report and for tests.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+
+#include "services/core/scene_view.h"
+
+namespace fulcrum::scene {
+
+struct SceneQuality {
+  std::size_t vertices, organ_vertices, tets, organ_springs, membrane_springs, bending, bindings;
+  std::array<std::size_t, 4> colours;  ///< Of tets, organ springs, bending and bindings.
+  double organ_volume_m3;
+  double least_tet_volume_m3;
+  double least_dihedral_deg;            ///< Over all tetrahedra; 70.5 in a regular one.
+  double least_edge_m, largest_edge_m;  ///< Of the organ.
+  double least_binding_m, largest_binding_m;
+  /// Material length over rest length of the membrane's springs: 1 where the flattening is isometric.
+  double least_flat_ratio, largest_flat_ratio;
+  double rms_flat_error;          ///< Root mean square of that ratio minus 1.
+  std::array<double, 2> sheet_m;  ///< Extent of the flattened sheet.
+  double least_weight;            ///< Of the embedded surface: below 0 outside the tetrahedra.
+  double largest_reach_m;         ///< Of the script, from tip to trocar.
+};
+
+SceneQuality Measure(const SceneView& scene);
+
+/// The same for people, one line per figure, each with its unit.
+std::string Describe(const SceneView& scene, const SceneQuality& quality);
+
+}  // namespace fulcrum::scene

@@ -1,0 +1,371 @@
+#include "services/scene/scene_yaml.h"
+
+#include <algorithm>
+#include <charconv>
+
+#include "services/config/strict_yaml.h"
+
+namespace fulcrum::scene {
+namespace {
+
+using config::Range;
+using config::StrictMap;
+using config::StrictYaml;
+
+constexpr std::size_t kMaxKeys = 2000;
+constexpr std::size_t kMaxStructures = 64;
+constexpr std::size_t kMaxPathPoints = 64;
+
+const StrictMap::Choices<ToolKind> kToolKinds = {{"none", ToolKind::kNone},
+                                                 {"grasper", ToolKind::kGrasper},
+                                                 {"hook", ToolKind::kHook},
+                                                 {"scissors", ToolKind::kScissors}};
+const StrictMap::Choices<ProtectedKind> kProtectedKinds = {{"ureter", ProtectedKind::kUreter},
+                                                           {"nerve", ProtectedKind::kNerve}};
+const StrictMap::Choices<SurfaceRole> kRoles = {{"abdominal_wall", SurfaceRole::kAbdominalWall},
+                                                {"retroperitoneum", SurfaceRole::kRetroperitoneum},
+                                                {"pelvis", SurfaceRole::kPelvis},
+                                                {"bladder", SurfaceRole::kBladder},
+                                                {"other", SurfaceRole::kOther}};
+const StrictMap::Choices<std::uint32_t> kPedals = {
+    {"up", kPedalNone}, {"cut", kPedalCut}, {"coag", kPedalCoag}, {"blend", kPedalBlend}};
+const StrictMap::Choices<double> kLengthUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
+
+/// The double with the float's shortest decimal form: 0.8f becomes 0.8, not 0.800000011920929.
+double Decimal(float value) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof(text), value).ptr;
+  double result = 0;
+  std::from_chars(text, end, result);
+  return result;
+}
+
+/// One key per field, default = the field's own.
+void ReadSi(StrictMap* map, const char* key, const Range& range, float* field) {
+  *field = static_cast<float>(map->NumberSi(key, Decimal(*field), range));
+}
+void ReadSi(StrictMap* map, const char* key, const Range& range, double* field) {
+  *field = map->NumberSi(key, *field, range);
+}
+void ReadInteger(StrictMap* map, const char* key, int min, int max, int* field) {
+  *field = static_cast<int>(map->Integer(key, *field, min, max));
+}
+void ReadInteger(StrictMap* map, const char* key, int min, int max, std::uint32_t* field) {
+  *field = static_cast<std::uint32_t>(map->Integer(key, *field, min, max));
+}
+
+void ReadPhysics(StrictMap map, PhysicsParams* p) {
+  p->mode = map.Choice("mode", p->mode, {{"paper", PhysicsMode::kPaper}});
+  ReadInteger(&map, "iterations", 1, 1000, &p->iterations);
+  ReadSi(&map, "dt_ms", Range::Between(0.1, 100), &p->dt_s);
+  ReadSi(&map, "damping_per_s", Range::Between(0, 1000), &p->damping_per_s);
+  p->gravity = map.Vector3Si("gravity_m_s2", p->gravity, Range::Between(-50, 50));
+  ReadSi(&map, "k_stretch_tube", Range::Above(0, 1), &p->k_stretch_tube);
+  ReadSi(&map, "k_stretch_membrane", Range::Above(0, 1), &p->k_stretch_membrane);
+  ReadSi(&map, "k_volume", Range::Between(0, 1), &p->k_volume);
+  ReadSi(&map, "k_bending", Range::Between(0, 1), &p->k_bending);
+  ReadSi(&map, "k_binding", Range::Between(0, 1), &p->k_binding);
+  ReadSi(&map, "tube_youngs_modulus_kPa", Range::Between(0.001, 1e6), &p->tube_youngs_modulus_Pa);
+  ReadSi(&map, "membrane_Et_N_per_m", Range::Between(0.001, 1e7), &p->membrane_Et_N_per_m);
+  ReadSi(&map, "friction", Range::Between(0, 2), &p->friction);
+  ReadSi(&map, "collision_margin_mm", Range::Between(0, 10), &p->collision_margin_m);
+  ReadSi(&map, "grasp_radius_mm", Range::Between(0.1, 50), &p->grasp_radius_m);
+  ReadSi(&map, "grasp_close_deg", Range::Between(0, 85), &p->grasp_close_rad);
+  ReadSi(&map, "grasp_open_deg", Range::Between(0, 90), &p->grasp_open_rad);
+  ReadSi(&map, "grip_force_N", Range::Between(0, 1000), &p->grip_force_N);
+  if (!(p->grasp_open_rad > p->grasp_close_rad)) {
+    map.Fail("grasp_open_deg", "must be above grasp_close_deg");
+  }
+}
+
+void ReadThermal(StrictMap map, ThermalParams* t) {
+  ReadSi(&map, "cell_um", Range::Between(10, 10000), &t->cell_m);
+  ReadSi(&map, "thickness_mm", Range::Between(0.01, 10), &t->thickness_m);
+  ReadSi(&map, "density_kg_m3", Range::Between(1, 1e5), &t->density_kg_m3);
+  ReadSi(&map, "heat_capacity_J_kgK", Range::Between(1, 1e5), &t->heat_capacity_J_kgK);
+  ReadSi(&map, "conductivity_W_mK", Range::Between(0, 1e4), &t->conductivity_W_mK);
+  ReadSi(&map, "latent_heat_J_m3", Range::Between(0, 1e11), &t->latent_heat_J_m3);
+  ReadSi(&map, "body_temperature_C", Range::Between(0, 60), &t->body_temperature_C);
+  ReadSi(&map, "h_top_W_m2K", Range::Between(0, 1e5), &t->h_top_W_m2K);
+  ReadSi(&map, "h_below_W_m2K", Range::Between(0, 1e5), &t->h_below_W_m2K);
+  ReadSi(&map, "h_tented_W_m2K", Range::Between(0, 1e5), &t->h_tented_W_m2K);
+  ReadSi(&map, "perfusion_per_s", Range::Between(0, 10), &t->perfusion_per_s);
+  ReadSi(&map, "sigma_S_m", Range::Between(1e-4, 100), &t->sigma_S_m);
+  ReadSi(&map, "sigma_per_K", Range::Between(0, 1), &t->sigma_per_K);
+  ReadSi(&map, "sigma_fat_S_m", Range::Between(0, 100), &t->sigma_fat_S_m);
+  ReadSi(&map, "fat_depth_mm", Range::Between(0.1, 1000), &t->fat_depth_m);
+  ReadSi(&map, "v_max_V", Range::Between(1, 1e4), &t->v_max_V);
+  ReadSi(&map, "i_max_A", Range::Between(0.001, 100), &t->i_max_A);
+  ReadSi(&map, "hook_radius_mm", Range::Between(0.01, 10), &t->hook_radius_m);
+  ReadSi(&map, "shrink_max", Range::Between(0, 0.5), &t->shrink_max);
+}
+
+void ReadRender(StrictMap map, RenderParams* r) {
+  ReadInteger(&map, "width", 16, 7680, &r->width);
+  ReadInteger(&map, "height", 16, 4320, &r->height);
+  ReadSi(&map, "rate_Hz", Range::Between(0.1, 240), &r->rate_Hz);
+  ReadSi(&map, "png_rate_Hz", Range::Between(0, 240), &r->png_rate_Hz);
+  r->scope_tip_W = map.Vector3Si("scope_tip_mm", r->scope_tip_W, Range::Between(-1000, 1000));
+  r->scope_target_W = map.Vector3Si("scope_target_mm", r->scope_target_W, Range::Between(-1000, 1000));
+  r->fov_deg = static_cast<float>(map.Number("fov_deg", Decimal(r->fov_deg), Range::Between(10, 150)));
+  r->scope_angle_deg =
+      static_cast<float>(map.Number("scope_angle_deg", Decimal(r->scope_angle_deg), Range::Between(0, 90)));
+}
+
+void ReadHaptics(StrictMap map, HapticsParams* h) {
+  ReadSi(&map, "force_limit_N", Range::Between(0.01, 100), &h->force_limit_N);
+  h->slew_N_per_ms =
+      static_cast<float>(map.Number("slew_N_per_ms", Decimal(h->slew_N_per_ms), Range::Between(1e-4, 100)));
+  ReadSi(&map, "hand_mass_kg", Range::Between(0.001, 100), &h->hand_mass_kg);
+  ReadSi(&map, "hand_stiffness_N_m", Range::Between(0, 1e5), &h->hand_stiffness_N_m);
+  ReadSi(&map, "hand_damping_Ns_m", Range::Between(0, 1e4), &h->hand_damping_Ns_m);
+  ReadSi(&map, "force_scale", Range::Between(0, 100), &h->force_scale);
+}
+
+void ReadTube(StrictMap map, TubeSettings* t) {
+  ReadInteger(&map, "rings", 3, 1000, &t->rings);
+  ReadInteger(&map, "segments", 6, 200, &t->segments);
+  ReadSi(&map, "length_mm", Range::Between(10, 500), &t->length_m);
+  ReadSi(&map, "outer_radius_mm", Range::Between(2, 60), &t->outer_radius_m);
+  ReadSi(&map, "wall_mm", Range::Between(0.5, 20), &t->wall_m);
+  ReadSi(&map, "sagittal_bend_mm", Range::Between(-60, 60), &t->sagittal_bend_m);
+  ReadSi(&map, "lateral_bend_mm", Range::Between(-40, 40), &t->lateral_bend_m);
+  ReadInteger(&map, "fold_count", 0, 40, &t->fold_count);
+  ReadSi(&map, "fold_depth_mm", Range::Between(0, 5), &t->fold_depth_m);
+  if (t->wall_m + t->fold_depth_m >= t->outer_radius_m) {
+    map.Fail("outer_radius_mm", "must be more than wall_mm + fold_depth_mm");
+  }
+}
+
+/// Finds a mesh file, or refuses in one line with every place that was looked at.
+std::filesystem::path FindFile(const StrictMap& map, const std::string& key, const std::string& name,
+                               const std::vector<std::filesystem::path>& folders) {
+  std::string tried;
+  for (const auto& folder : folders) {
+    const std::filesystem::path candidate = (folder / name).lexically_normal();
+    if (std::filesystem::is_regular_file(candidate)) {
+      return candidate;
+    }
+    tried += tried.empty() ? "" : ", ";
+    tried += candidate.string();
+  }
+  std::string reason = "'";
+  reason += name;
+  reason += "' is not at ";
+  reason += tried;
+  reason += "; give its folder with --data DIR";
+  map.Fail(key, reason);
+}
+
+void ReadImport(StrictMap map, const std::filesystem::path& base, const std::filesystem::path& data,
+                ImportSettings* import) {
+  std::vector<std::filesystem::path> folders;
+  if (!data.empty()) {
+    folders.push_back(data);
+  }
+  for (const std::string& folder : map.Texts("folders", 0, 16)) {
+    folders.push_back(base / folder);
+  }
+  folders.push_back(base);
+  import->scale_m = map.Choice("unit", import->scale_m, kLengthUnits);
+  import->origin_m = map.Vector3Si("origin_mm", import->origin_m, Range::Between(-2000, 2000));
+  import->organ_file = FindFile(map, "organ", map.Text("organ"), folders);
+  ReadInteger(&map, "target_tets", 500, 60000, &import->target_tets);
+  ReadSi(&map, "min_edge_mm", Range::Between(0, 5), &import->min_edge_m);
+  ReadInteger(&map, "organ_triangles_max", 500, 200000, &import->organ_triangles_max);
+  ReadSi(&map, "from", Range::Between(0, 1), &import->from);
+  ReadSi(&map, "to", Range::Between(0, 1), &import->to);
+  if (!(import->to - import->from >= 0.1)) {
+    map.Fail("to", "must exceed `from` by at least 0.1");
+  }
+  import->facing = map.Vector3Si("facing", import->facing, Range::Between(-1, 1));
+  if (!(import->facing.norm() > 0.1)) {
+    map.Fail("facing", "must be a direction, not (nearly) zero");
+  }
+  ReadSi(&map, "sector_deg", Range::Between(30, 240), &import->sector_rad);
+  ReadSi(&map, "flare_mm", Range::Between(0, 60), &import->flare_m);
+  ReadSi(&map, "bed_mm", Range::Between(0, 150), &import->bed_m);
+  for (StrictMap& entry : map.Maps("surroundings", 0, 16)) {
+    ImportSettings::Surrounding s;
+    s.name = entry.Text("name", 31);
+    s.role = entry.Choice("role", s.role, kRoles);
+    s.file = FindFile(entry, "file", entry.Text("file"), folders);
+    ReadInteger(&entry, "triangles_max", 100, 100000, &s.triangles_max);
+    s.collides = entry.Flag("collides", s.collides);
+    import->surroundings.push_back(s);
+  }
+}
+
+void ReadMembrane(StrictMap map, MembraneSettings* m) {
+  ReadInteger(&map, "rows", 3, 5000, &m->rows);
+  ReadInteger(&map, "cols", 3, 5000, &m->cols);
+  ReadSi(&map, "width_mm", Range::Between(5, 1000), &m->width_m);
+  ReadSi(&map, "gap_mm", Range::Between(0.5, 30), &m->gap_m);
+  ReadSi(&map, "density_kg_m2", Range::Between(0.01, 50), &m->density_kg_m2);
+  ReadInteger(&map, "bending_row_stride", 1, 1000, &m->bending_row_stride);
+  ReadInteger(&map, "bending_col_stride", 1, 1000, &m->bending_col_stride);
+  ReadInteger(&map, "binding_row_stride", 1, 1000, &m->binding_row_stride);
+  ReadInteger(&map, "binding_col_stride", 1, 1000, &m->binding_col_stride);
+  ReadSi(&map, "binding_reach_mm", Range::Between(0.5, 60), &m->binding_reach_m);
+  if ((m->rows - 1) % m->bending_row_stride != 0) {
+    map.Fail("bending_row_stride", "must divide rows - 1 = " + std::to_string(m->rows - 1));
+  }
+  if ((m->cols - 1) % m->bending_col_stride != 0) {
+    map.Fail("bending_col_stride", "must divide cols - 1 = " + std::to_string(m->cols - 1));
+  }
+}
+
+Vec2f ToVec2(const std::vector<double>& v) { return {static_cast<float>(v[0]), static_cast<float>(v[1])}; }
+
+StructureSettings ReadStructure(StrictMap map) {
+  StructureSettings s;
+  s.kind = map.Choice("kind", kProtectedKinds);
+  ReadSi(&map, "radius_mm", Range::Between(0.05, 20), &s.radius_m);
+  ReadSi(&map, "depth_mm", Range::Between(0, 30), &s.depth_m);
+  const auto across = map.Numbers("s", 2, kMaxPathPoints, Range::Between(0, 1));
+  const auto along = map.Numbers("t", 2, kMaxPathPoints, Range::Between(0, 1));
+  if (across.size() != along.size()) {
+    map.Fail("t", "must have as many entries as s");
+  }
+  for (std::size_t i = 0; i < across.size(); ++i) {
+    s.path.push_back(ToVec2({across[i], along[i]}));
+  }
+  return s;
+}
+
+void ReadTool(StrictMap map, ToolDescription* tool) {
+  tool->kind = map.Choice("kind", tool->kind, kToolKinds);
+  if (tool->kind == ToolKind::kNone) {
+    return;
+  }
+  *tool = DefaultTool(tool->kind, map.Vector3Si("trocar_mm", Range::Between(-1000, 1000)));
+  ReadSi(&map, "shaft_radius_mm", Range::Between(0.1, 20), &tool->shaft_radius_m);
+  ReadSi(&map, "shaft_length_mm", Range::Between(50, 1000), &tool->shaft_length_m);
+  ReadSi(&map, "tip_radius_mm", Range::Between(0.05, 20), &tool->tip_radius_m);
+  ReadSi(&map, "tip_length_mm", Range::Between(0.1, 100), &tool->tip_length_m);
+}
+
+ScriptKeySettings ReadKey(StrictMap map, double duration_s) {
+  ScriptKeySettings key;
+  key.time_s = map.NumberSi("time_s", Range::Between(0, duration_s));
+  if (map.Has("world_mm")) {
+    key.world_m = map.Vector3Si("world_mm", Range::Between(-1000, 1000));
+  } else {
+    key.sheet = ToVec2(map.Numbers("sheet", 2, 2, Range::Between(0, 1)));
+    key.height_m = map.NumberSi("height_mm", Range::Between(-30, 500));
+    key.offset_m = map.Vector3Si("offset_mm", key.offset_m, Range::Between(-200, 200));
+  }
+  ReadSi(&map, "jaw_deg", Range::Between(0, 90), &key.jaw_rad);
+  key.pedals = map.Choice("pedal", key.pedals, kPedals);
+  ReadSi(&map, "power_W", Range::Between(0, 300), &key.power_W);
+  if (key.pedals != kPedalNone && !(key.power_W > 0)) {
+    map.Fail("pedal", "is down, but power_W is 0");
+  }
+  return key;
+}
+
+void ReadScript(StrictMap map, SceneSettings* scene) {
+  scene->script_duration_s = map.NumberSi("duration_s", scene->script_duration_s, Range::Between(0.1, 86400));
+  for (int tool = 0; tool < kMaxTools; ++tool) {
+    const std::string name = "tool" + std::to_string(tool);
+    double last_s = -1;
+    for (StrictMap& entry : map.Maps(name, 0, kMaxKeys)) {
+      ScriptKeySettings key = ReadKey(entry, scene->script_duration_s);
+      key.tool = tool;
+      if (scene->tools[tool].kind == ToolKind::kNone) {
+        entry.Fail("time_s", "the scene has no " + name);
+      }
+      if (!(key.time_s > last_s)) {
+        entry.Fail("time_s", "keys must follow one another in time");
+      }
+      last_s = key.time_s;
+      scene->script.push_back(key);
+    }
+  }
+}
+
+std::uint32_t ReadNodes(StrictMap* root, std::uint32_t all) {
+  const std::vector<std::string> names = root->Texts("nodes", 0, kNodeCount);
+  if (names.empty()) {
+    return all;
+  }
+  std::uint32_t mask = 0;
+  for (const std::string& name : names) {
+    int node = 1;
+    while (node < kNodeCount && name != NodeName(static_cast<NodeId>(node))) {
+      ++node;
+    }
+    if (node == kNodeCount) {
+      root->Fail("nodes",
+                 "no node '" + name + "'; valid: handle_bridge, haptics_node, physics_node, thermal_node, render_node");
+    }
+    mask |= 1u << static_cast<unsigned>(node);
+  }
+  return mask;
+}
+
+SceneDescription Read(StrictYaml* yaml, const std::filesystem::path& base, const std::filesystem::path& data) {
+  SceneSettings scene;
+  StrictMap root = yaml->root();
+  scene.name = root.Text("name", 63);
+  scene.description = root.TextOr("description", "");
+  StrictMap organ = root.Map("organ");
+  ReadSi(&organ, "density_kg_m3", Range::Between(1, 1e5), &scene.organ_density_kg_m3);
+  if (organ.Has("import") == organ.Has("procedural")) {
+    root.Fail("organ", "needs either `procedural` or `import`");
+  }
+  if (organ.Has("import")) {
+    ReadImport(organ.Map("import"), base, data, &scene.import.emplace());
+  } else {
+    ReadTube(organ.Map("procedural"), &scene.tube);
+  }
+  ReadMembrane(root.MapOrDefaults("membrane"), &scene.membrane);
+  for (StrictMap& entry : root.Maps("structures", 0, kMaxStructures)) {
+    scene.structures.push_back(ReadStructure(entry));
+  }
+  StrictMap tools = root.MapOrDefaults("tools");
+  for (int i = 0; i < kMaxTools; ++i) {
+    const std::string key = "tool" + std::to_string(i);
+    ReadTool(tools.MapOrDefaults(key), &scene.tools[i]);
+  }
+  ReadPhysics(root.MapOrDefaults("physics"), &scene.physics);
+  ReadThermal(root.MapOrDefaults("thermal"), &scene.thermal);
+  ReadRender(root.MapOrDefaults("render"), &scene.render);
+  ReadHaptics(root.MapOrDefaults("haptics"), &scene.haptics);
+  ReadScript(root.MapOrDefaults("script"), &scene);
+  scene.node_mask = ReadNodes(&root, scene.node_mask);
+  yaml->Finish();
+  return {scene, yaml->Effective()};
+}
+
+}  // namespace
+
+SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data) {
+  StrictYaml yaml = StrictYaml::FromFile(file);
+  return Read(&yaml, file.parent_path(), data);
+}
+
+SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data) {
+  StrictYaml yaml = StrictYaml::FromText(text, name);
+  return Read(&yaml, {}, data);
+}
+
+std::vector<SceneSummary> ListScenes(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::directory_iterator entries(folder, error);
+  if (error) {
+    throw InputError(folder.string() + ": cannot be listed (" + error.message() + ")");
+  }
+  std::vector<SceneSummary> scenes;
+  for (const auto& entry : entries) {
+    if (entry.path().extension() == ".yaml") {
+      StrictYaml yaml = StrictYaml::FromFile(entry.path());
+      StrictMap root = yaml.root();
+      scenes.push_back({root.Text("name", 63), root.TextOr("description", ""), entry.path()});
+    }
+  }
+  std::sort(scenes.begin(), scenes.end(), [](const auto& a, const auto& b) { return a.file < b.file; });
+  return scenes;
+}
+
+}  // namespace fulcrum::scene
