@@ -1,30 +1,35 @@
-// Every topic through the real bus between two participants.
+// Every topic through the real bus between two participants of one process.
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <cstdlib>
+#include <fstream>
 #include <limits>
-#include <thread>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/dds/shared_memory.h"
+#include "services/core/error.h"
+#include "tests/integration/bus/count_new.h"
+#include "tests/integration/bus/support.h"
 #include "tests/unit/bus/same.h"
 #include "tests/unit/bus/samples.h"
 
 namespace fulcrum::bus {
 namespace {
 
-constexpr int kDomain = 11;
+using test::Eventually;
 
-/// Waits for a condition that must come true; how long it takes is not what these tests judge.
-template <class Condition>
-bool Eventually(const Condition& condition) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-  while (std::chrono::steady_clock::now() < end) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+constexpr int kDomain = 11;
+const auto* const kClean = testing::AddGlobalTestEnvironment(new test::CleanDomain(kDomain));
+
+/// An output and a matched input of the same topic on two participants.
+template <class T>
+struct Pair {
+  DdsParticipant writer_side{{.domain = kDomain, .node_name = "writer", .shared_memory = {}}};
+  DdsParticipant reader_side{{.domain = kDomain, .node_name = "reader", .shared_memory = {}}};
+  std::unique_ptr<typename OutputOf<T>::type> out = writer_side.MakeOutput<T>();
+  std::unique_ptr<Input<T>> in = reader_side.MakeInput<T>();
+  Pair() {
+    EXPECT_TRUE(Eventually([&] { return out->has_readers() && in->stats().matched; }));
   }
-  return false;
-}
+};
 
 template <class T>
 class EveryTopic : public testing::Test {};
@@ -34,21 +39,178 @@ using Types =
 TYPED_TEST_SUITE(EveryTopic, Types);
 
 TYPED_TEST(EveryTopic, ArrivesUnchanged) {
-  DdsParticipant writer_side({.domain = kDomain, .node_name = "writer", .shared_memory = {}});
-  DdsParticipant reader_side({.domain = kDomain, .node_name = "reader", .shared_memory = {}});
-  auto out = writer_side.MakeOutput<TypeParam>();
-  auto in = reader_side.MakeInput<TypeParam>();
-  ASSERT_TRUE(Eventually([&] { return out->has_readers() && in->stats().matched; }));
+  Pair<TypeParam> bus;
   const auto sent = test::Sample<TypeParam>();
-  ASSERT_TRUE(out->Write(sent));
+  ASSERT_TRUE(bus.out->Write(sent));
   TypeParam got;
-  ASSERT_TRUE(Eventually([&] { return in->TakeLatest(&got); }));
+  ASSERT_TRUE(Eventually([&] { return bus.in->TakeLatest(&got); }));
   EXPECT_TRUE(Same(sent, got));
-  EXPECT_FALSE(in->TakeLatest(&got));
-  EXPECT_EQ(in->stats().received, 1u);
-  EXPECT_EQ(in->stats().rejected, 0u);
-  EXPECT_EQ(out->stats().written, 1u);
-  EXPECT_EQ(out->stats().failed, 0u);
+  EXPECT_FALSE(bus.in->TakeLatest(&got));
+  EXPECT_EQ(bus.in->stats().received, 1u);
+  EXPECT_EQ(bus.in->stats().rejected, 0u);
+  EXPECT_EQ(bus.out->stats().written, 1u);
+  EXPECT_EQ(bus.out->stats().failed, 0u);
+}
+
+TYPED_TEST(EveryTopic, BadStampIsStoppedAtTheGate) {
+  Pair<TypeParam> bus;
+  auto bad = test::Sample<TypeParam>();
+  if constexpr (requires { bad.header; }) {
+    bad.header.stamp.stamp_ns = -1;
+  } else {
+    bad.stamp.stamp_ns = -1;
+  }
+  ASSERT_TRUE(bus.out->Write(bad));
+  TypeParam got;
+  EXPECT_TRUE(Eventually([&] {
+    EXPECT_FALSE(bus.in->TakeLatest(&got));
+    return bus.in->stats().rejected == 1;
+  }));
+  EXPECT_EQ(bus.in->stats().received, 0u);
+}
+
+TEST(DdsInput, NaNIsStoppedAndTheNextGoodOnePasses) {
+  Pair<TissueFrame> bus;
+  TissueFrame frame = test::Sample<TissueFrame>(1);
+  frame.xyz[100] = std::numeric_limits<float>::quiet_NaN();
+  ASSERT_TRUE(bus.out->Write(frame));
+  TissueFrame got;
+  EXPECT_TRUE(Eventually([&] { return !bus.in->TakeNext(&got) && bus.in->stats().rejected == 1; }));
+  ASSERT_TRUE(bus.out->Write(test::Sample<TissueFrame>(2)));
+  ASSERT_TRUE(Eventually([&] { return bus.in->TakeNext(&got); }));
+  EXPECT_EQ(got.header.stamp.sequence, 2u);
+}
+
+TEST(DdsInput, TakeLatestPassesOverOlderFramesAndKeepsTheBooks) {
+  Pair<TissueFrame> bus;
+  for (std::uint64_t i = 1; i <= 3; ++i) ASSERT_TRUE(bus.out->Write(test::Sample<TissueFrame>(i)));
+  TissueFrame got;
+  ASSERT_TRUE(Eventually([&] { return bus.in->TakeLatest(&got) && got.header.stamp.sequence == 3; }));
+  EXPECT_EQ(bus.in->stats().received, 3u);
+  EXPECT_FALSE(bus.in->TakeLatest(&got));
+}
+
+TEST(DdsInput, TakeNextGivesEveryPatchInOrder) {
+  Pair<TemperaturePatch> bus;
+  for (std::uint64_t i = 1; i <= 10; ++i) ASSERT_TRUE(bus.out->Write(test::Sample<TemperaturePatch>(i)));
+  TemperaturePatch got;
+  for (std::uint64_t i = 1; i <= 10; ++i) {
+    ASSERT_TRUE(Eventually([&] { return bus.in->TakeNext(&got); }));
+    EXPECT_EQ(got.header.stamp.sequence, i);
+  }
+  EXPECT_EQ(bus.in->stats().lost, 0u);
+}
+
+TEST(DdsInput, BurstOfReliableEventsArrivesWhole) {
+  Pair<ThermalEvent> bus;
+  for (std::uint64_t i = 1; i <= 200; ++i) ASSERT_TRUE(bus.out->Write(test::Sample<ThermalEvent>(i)));
+  ThermalEvent got;
+  for (std::uint64_t i = 1; i <= 200; ++i) {
+    ASSERT_TRUE(Eventually([&] { return bus.in->TakeNext(&got); }));
+    ASSERT_EQ(got.stamp.sequence, i);
+  }
+}
+
+TEST(DdsInput, GapsAreLosses) {
+  Pair<ToolState> bus;
+  ToolState got;
+  for (const std::uint64_t sequence : {1u, 2u, 5u}) {
+    ASSERT_TRUE(bus.out->Write(test::Sample<ToolState>(sequence)));
+    ASSERT_TRUE(Eventually([&] { return bus.in->TakeLatest(&got); }));
+  }
+  EXPECT_EQ(bus.in->stats().lost, 2u);
+}
+
+TEST(DdsOutput, SteadyStreamDoesNotAllocateInTheCallersThread) {
+  Pair<ToolState> bus;
+  const ToolState sent = test::Sample<ToolState>();
+  ToolState got;
+  const auto pass_one = [&] {
+    ASSERT_TRUE(bus.out->Write(sent));
+    ASSERT_TRUE(Eventually([&] { return bus.in->TakeLatest(&got); }));
+  };
+  for (int i = 0; i < 200; ++i) pass_one();
+  long taking = 0, writing = 0;
+  for (int i = 0; i < 200; ++i) {
+    const long before_write = test::NewCalls();
+    ASSERT_TRUE(bus.out->Write(sent));
+    const long before_take = test::NewCalls();
+    ASSERT_TRUE(Eventually([&] { return bus.in->TakeLatest(&got); }));
+    writing += before_take - before_write;
+    taking += test::NewCalls() - before_take;
+  }
+  RecordProperty("allocations_writing", static_cast<int>(writing));
+  EXPECT_EQ(taking, 0);
+  EXPECT_EQ(writing, 0);
+}
+
+TEST(DdsOutput, PayloadIsWrittenInTheSharedMemoryOfTheCart) {
+  Pair<TissueFrame> bus;
+  const std::string directory = SharedMemoryDirectory(kDomain).string();
+  bool in_shared_memory = false;
+  ASSERT_TRUE(bus.out->WriteInPlace([&](TissueFrame::View view) {
+    view.header.stamp.sequence = 1;
+    view.header.vertex_count = 1;
+    const auto address = reinterpret_cast<std::uintptr_t>(view.xyz.data());
+    std::ifstream maps("/proc/self/maps");
+    for (std::string line; std::getline(maps, line);) {
+      unsigned long first = 0, last = 0;
+      if (std::sscanf(line.c_str(), "%lx-%lx", &first, &last) == 2 && address >= first && address < last) {
+        in_shared_memory = line.find(directory) != std::string::npos;
+      }
+    }
+  }));
+  EXPECT_TRUE(in_shared_memory);
+  TissueFrame got;
+  ASSERT_TRUE(Eventually([&] { return bus.in->TakeLatest(&got); }));
+  EXPECT_EQ(got.xyz.size(), 3u);
+}
+
+TEST(DdsOutput, FillThatThrowsIsCountedAndItsLoanComesBack) {
+  Pair<TissueFrame> bus;
+  for (int i = 0; i < 20; ++i) {  // more often than there are places in the pool
+    EXPECT_FALSE(bus.out->WriteInPlace([](TissueFrame::View) { throw 1; }));
+    EXPECT_FALSE(bus.out->WriteInPlace([](TissueFrame::View v) { v.header.vertex_count = kMaxTissueVertices + 1; }));
+  }
+  EXPECT_EQ(bus.out->stats().failed, 40u);
+  ASSERT_TRUE(bus.out->Write(test::Sample<TissueFrame>()));
+  TissueFrame got;
+  ASSERT_TRUE(Eventually([&] { return bus.in->TakeLatest(&got); }));
+}
+
+TEST(DdsOutput, WriteWithoutRoomFailsAndRecovers) {
+  Pair<Command> bus;
+  // Nobody takes: reader and writer fill up, and then each write is refused.
+  ASSERT_TRUE(Eventually([&] { return !bus.out->Write(test::Sample<Command>()); }));
+  EXPECT_GE(bus.out->stats().failed, 1u);
+  Command got;
+  ASSERT_TRUE(Eventually([&] {
+    while (bus.in->TakeNext(&got)) {
+    }
+    return bus.out->Write(test::Sample<Command>());
+  }));
+}
+
+TEST(DdsOutput, WhatDoesNotFitIsCounted) {
+  Pair<Command> bus;
+  Command command = test::Sample<Command>();
+  command.argument.assign(5000, 'x');
+  EXPECT_FALSE(bus.out->Write(command));
+  EXPECT_EQ(bus.out->stats().failed, 1u);
+}
+
+TEST(DdsParticipant, DomainOutOfRangeIsRefused) {
+  for (const int domain : {-1, 0, 101}) {
+    EXPECT_THROW(DdsParticipant({.domain = domain, .node_name = "x", .shared_memory = {}}), InputError);
+  }
+}
+
+TEST(DdsParticipant, OutsideSettingsAreForgotten) {
+  setenv("FASTDDS_STATISTICS", "HISTORY_LATENCY_TOPIC", 1);
+  setenv("FASTRTPS_DEFAULT_PROFILES_FILE", "profiles.xml", 1);
+  DdsParticipant bus({.domain = kDomain, .node_name = "x", .shared_memory = {}});
+  EXPECT_EQ(std::getenv("FASTDDS_STATISTICS"), nullptr);
+  EXPECT_EQ(std::getenv("FASTRTPS_DEFAULT_PROFILES_FILE"), nullptr);
 }
 
 }  // namespace

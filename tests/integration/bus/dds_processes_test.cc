@@ -1,0 +1,173 @@
+// The bus between real processes: late joiners, kills, restarts, another schema.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <set>
+
+#include "tests/integration/bus/support.h"
+#include "tests/unit/bus/same.h"
+#include "tests/unit/bus/samples.h"
+
+namespace fulcrum::bus {
+namespace {
+
+using test::Eventually;
+using test::Peer;
+
+constexpr int kDomain = 12;
+const std::string kDomainText = std::to_string(kDomain);
+const auto* const kClean = testing::AddGlobalTestEnvironment(new test::CleanDomain(kDomain));
+
+DdsParticipant MakeBus() { return DdsParticipant({.domain = kDomain, .node_name = "test", .shared_memory = {}}); }
+
+int FilesOf(const std::filesystem::path& directory) {
+  return static_cast<int>(std::distance(std::filesystem::directory_iterator(directory), {}));
+}
+
+TEST(DdsProcesses, LateJoinerGetsSceneTopologyAndHealthOfEveryWriter) {
+  std::vector<std::unique_ptr<Peer>> peers;
+  for (const char* node : {"0", "1", "2", "3"}) {
+    peers.push_back(std::make_unique<Peer>(std::vector<std::string>{kDomainText, "state", node}));
+  }
+  for (auto& peer : peers) ASSERT_EQ(peer->ReadLine(), "ready");
+
+  DdsParticipant bus = MakeBus();
+  auto scenes = bus.MakeInput<SceneManifest>();
+  auto topologies = bus.MakeInput<TopologyState>();
+  auto healths = bus.MakeInput<Health>();
+  SceneManifest scene;
+  TopologyState topology;
+  ASSERT_TRUE(Eventually([&] { return scenes->TakeLatest(&scene); }));
+  EXPECT_TRUE(Same(scene, test::Sample<SceneManifest>()));
+  ASSERT_TRUE(Eventually([&] { return topologies->TakeLatest(&topology); }));
+  EXPECT_TRUE(Same(topology, test::Sample<TopologyState>())) << "86 KB, so sent in fragments";
+  std::set<NodeId> heard;
+  Health health;
+  EXPECT_TRUE(Eventually([&] {
+    while (healths->TakeNext(&health)) heard.insert(health.node);
+    return heard.size() == 4;
+  }));
+  EXPECT_EQ(healths->stats().lost, 0u);
+}
+
+TEST(DdsProcesses, KilledPublisherIsForgottenAndItsSuccessorHeard) {
+  DdsParticipant bus = MakeBus();
+  auto frames = bus.MakeInput<TissueFrame>();
+  auto tools = bus.MakeInput<ToolState>();
+  TissueFrame frame;
+  ToolState tool;
+  std::set<std::uint64_t> epochs;
+  for (int life = 0; life < 3; ++life) {
+    Peer frame_peer({kDomainText, "frames"});
+    Peer tool_peer({kDomainText, "tools"});
+    for (int i = 0; i < 5; ++i) {
+      ASSERT_TRUE(Eventually([&] { return frames->TakeLatest(&frame); })) << "life " << life;
+      EXPECT_EQ(frame.xyz.front(), static_cast<float>(frame.header.stamp.sequence % 8));
+      EXPECT_EQ(frame.xyz.back(), frame.xyz.front());
+      ASSERT_TRUE(Eventually([&] { return tools->TakeLatest(&tool); })) << "life " << life;
+    }
+    epochs.insert(frame.header.stamp.epoch);
+    frame_peer.Kill();
+    tool_peer.Kill();
+    ASSERT_TRUE(Eventually([&] { return !frames->stats().matched && !tools->stats().matched; }));
+    while (frames->TakeLatest(&frame) || tools->TakeLatest(&tool)) {
+    }
+  }
+  EXPECT_EQ(epochs.size(), 3u);
+  EXPECT_EQ(frames->stats().rejected, 0u);
+  EXPECT_EQ(tools->stats().rejected, 0u);
+}
+
+TEST(DdsProcesses, KilledSubscriberDoesNotStopTheWriter) {
+  DdsParticipant bus = MakeBus();
+  auto frames = bus.MakeOutput<TissueFrame>();
+  auto tools = bus.MakeOutput<ToolState>();
+  std::uint64_t sequence = 0;
+  const auto publish = [&] {
+    ++sequence;
+    tools->Write(test::Sample<ToolState>(sequence));
+    if (sequence % 10 == 0) {
+      frames->WriteInPlace([&](TissueFrame::View view) {
+        view.header.stamp = {sequence / 10, 1, 1};
+        view.header.vertex_count = kMaxTissueVertices;
+        std::fill(view.xyz.begin(), view.xyz.end(), 0.5f);
+      });
+    }
+    return false;
+  };
+  for (int life = 0; life < 3; ++life) {
+    Peer peer({kDomainText, "subscribe"});
+    bool frame_seen = false, tool_seen = false;
+    std::thread listener([&] {
+      while (!frame_seen || !tool_seen) {
+        const std::string line = peer.ReadLine();
+        if (line.empty()) return;
+        frame_seen |= line.starts_with("frame ");
+        tool_seen |= line.starts_with("tool ");
+      }
+    });
+    std::atomic<bool> heard{false};
+    std::thread waiter([&] {
+      listener.join();
+      heard = true;
+    });
+    EXPECT_TRUE(Eventually([&] { return publish() || heard; })) << "life " << life;
+    peer.Kill();
+    waiter.join();
+    EXPECT_TRUE(frame_seen && tool_seen) << "life " << life;
+    ASSERT_TRUE(Eventually([&] { return publish() || !(frames->has_readers() || tools->has_readers()); }));
+  }
+  EXPECT_EQ(frames->stats().failed, 0u);
+  EXPECT_EQ(tools->stats().failed, 0u);
+}
+
+TEST(DdsProcesses, FilesOfTheDeadAreSweptAndThoseOfTheLivingStay) {
+  const auto directory = SharedMemoryDirectory(kDomain);
+  DdsParticipant bus = MakeBus();
+  auto frames = bus.MakeInput<TissueFrame>();
+  Peer survivor({kDomainText, "frames"});
+  TissueFrame frame;
+  ASSERT_TRUE(Eventually([&] { return frames->TakeLatest(&frame); }));
+  RecordProperty("swept_before", SweepSharedMemory(directory).files);  // left by kills of earlier tests
+  const int files_before = FilesOf(directory);
+  {
+    Peer victim({kDomainText, "frames"});
+    ASSERT_TRUE(Eventually([&] { return FilesOf(directory) > files_before; }));
+    EXPECT_EQ(SweepSharedMemory(directory).files, 0) << "all live";
+  }
+  EXPECT_GT(FilesOf(directory), files_before) << "a killed process leaves its files";
+  const SweepResult swept = SweepSharedMemory(directory);
+  EXPECT_GE(swept.files, 1);
+  EXPECT_EQ(FilesOf(directory), files_before);
+  ASSERT_TRUE(Eventually([&] { return frames->TakeLatest(&frame); }));  // the survivor goes on
+}
+
+TEST(DdsProcesses, AnotherSchemaIsNamedAndExchangesNothing) {
+  DdsParticipant bus = MakeBus();
+  auto tools = bus.MakeInput<ToolState>();
+  EXPECT_EQ(bus.schema_mismatch(), "");
+  const auto start = std::chrono::steady_clock::now();
+  {
+    Peer alien({kDomainText, "alien"});
+    ASSERT_TRUE(Eventually([&] { return !bus.schema_mismatch().empty(); }));
+    const auto elapsed = std::chrono::steady_clock::now() - start;
+    RecordProperty("ms", static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(elapsed).count()));
+    const std::string text = bus.schema_mismatch();
+    EXPECT_NE(text.find("peer_alien"), std::string::npos) << text;
+    EXPECT_NE(text.find(std::to_string(alien.pid())), std::string::npos) << text;
+    EXPECT_NE(text.find("00000000000a11e5"), std::string::npos) << text;
+    EXPECT_EQ(text.find('\n'), std::string::npos) << text;
+
+    // One that speaks our schema is heard meanwhile, so silence from the other is not for want of time.
+    Peer friendly({kDomainText, "tools"});
+    ToolState got;
+    ASSERT_TRUE(Eventually([&] { return tools->TakeLatest(&got); }));
+    friendly.Kill();
+    ASSERT_TRUE(Eventually([&] { return !tools->stats().matched; }));
+  }
+  EXPECT_TRUE(Eventually([&] { return bus.schema_mismatch().empty(); })) << "gone with the peer";
+}
+
+}  // namespace
+}  // namespace fulcrum::bus

@@ -1,0 +1,78 @@
+#include "services/bus/dds/shared_memory.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+
+#include "services/core/error.h"
+
+namespace fulcrum::bus {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SharedMemory : public testing::Test {
+ protected:
+  void SetUp() override { fs::remove_all(directory_); }
+  void TearDown() override { fs::remove_all(directory_); }
+  /// A file named as the library names those of process `pid`.
+  fs::path Touch(int pid) {
+    char name[120];
+    std::snprintf(name, sizeof name, "fast_datasharing_01.0f.12.34.%02x.%02x.56.78.0.0.0.0|0.0.1.3", pid & 0xff,
+                  (pid >> 8) & 0xff);
+    std::ofstream(directory_ / name) << "payload";
+    return directory_ / name;
+  }
+  const fs::path directory_ = "/dev/shm/fulcrum-test-" + std::to_string(getpid());
+};
+
+TEST_F(SharedMemory, DirectoryIsPrivate) {
+  PrepareSharedMemory(directory_);
+  struct stat status {};
+  ASSERT_EQ(stat(directory_.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777u, 0700u);
+  PrepareSharedMemory(directory_);  // a second process of the cart finds it
+}
+
+TEST_F(SharedMemory, DirectoryOpenToOthersIsRefused) {
+  fs::create_directory(directory_);
+  chmod(directory_.c_str(), 0755);
+  EXPECT_THROW(PrepareSharedMemory(directory_), InputError);
+}
+
+TEST_F(SharedMemory, LinkIsRefused) {
+  fs::create_symlink("/dev/shm", directory_);
+  EXPECT_THROW(PrepareSharedMemory(directory_), InputError);
+}
+
+TEST_F(SharedMemory, UnreachablePlaceIsRefused) { EXPECT_THROW(PrepareSharedMemory("/nowhere/fulcrum"), InputError); }
+
+TEST_F(SharedMemory, SweepRemovesOnlyWhatTheDeadLeft) {
+  PrepareSharedMemory(directory_);
+  const pid_t child = fork();
+  if (child == 0) _exit(0);
+  waitpid(child, nullptr, 0);  // so `child` is the id of a dead process
+  const fs::path dead = Touch(child), own = Touch(getpid());
+  std::ofstream(directory_ / "something_else") << "x";
+  const SweepResult swept = SweepSharedMemory(directory_);
+  EXPECT_EQ(swept.files, 1);
+  EXPECT_FALSE(fs::exists(dead));
+  EXPECT_TRUE(fs::exists(own));
+  EXPECT_TRUE(fs::exists(directory_ / "something_else"));
+}
+
+TEST_F(SharedMemory, RemoveTakesAllAndTheDirectory) {
+  PrepareSharedMemory(directory_);
+  Touch(getpid());
+  EXPECT_EQ(RemoveSharedMemory(directory_).files, 1);
+  EXPECT_FALSE(fs::exists(directory_));
+  EXPECT_EQ(RemoveSharedMemory(directory_).files, 0);
+  EXPECT_EQ(SweepSharedMemory(directory_).files, 0);
+}
+
+}  // namespace
+}  // namespace fulcrum::bus
