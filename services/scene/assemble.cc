@@ -7,6 +7,7 @@
 #include "services/core/error.h"
 #include "services/scene/build.h"
 #include "services/scene/colouring.h"
+#include "services/scene/flatten.h"
 #include "services/scene/geometry.h"
 
 namespace fulcrum::scene {
@@ -76,50 +77,28 @@ void CheckCounts(const SceneSettings& settings, const Anatomy& anatomy) {
   }
 }
 
-/// Arc length across from the middle column and along from the middle row. Lengths along both grid directions are kept
-/// exactly up to second order in the shear; what the sheet's own curvature distorts is in the quality report.
-std::vector<Vec2f> Flatten(const SceneSettings& settings, const std::vector<Vec3d>& sheet) {
-  const int rows = settings.membrane.rows, cols = settings.membrane.cols;
-  const auto at = [&](int r, int c) -> const Vec3d& { return sheet[static_cast<std::size_t>(r) * cols + c]; };
-  std::vector<Eigen::Vector2d> material(sheet.size());
-  const auto flat = [&](int r, int c) -> Eigen::Vector2d& { return material[static_cast<std::size_t>(r) * cols + c]; };
-  for (int r = 0; r < rows; ++r) {
-    double length = 0;
-    flat(r, 0).x() = 0;
-    for (int c = 1; c < cols; ++c) {
-      flat(r, c).x() = length += (at(r, c) - at(r, c - 1)).norm();
+/// Material coordinates, moved in from the edge of the atlas.
+std::vector<Vec2f> MaterialOf(const SceneSettings& settings, const std::vector<Vec3d>& sheet) {
+  const std::vector<Eigen::Vector2d> flat = FlattenSheet(settings.membrane.rows, settings.membrane.cols, sheet);
+  Eigen::Vector2d extent = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& m : flat) {
+    if (!m.allFinite()) {
+      Refuse(settings, "the membrane cannot be flattened: it has degenerate triangles");
     }
-    for (int c = 0; c < cols; ++c) {
-      flat(r, c).x() -= length / 2;
-    }
+    extent = extent.cwiseMax(m);
   }
-  for (int c = 0; c < cols; ++c) {
-    double length = 0;
-    flat(0, c).y() = 0;
-    for (int r = 1; r < rows; ++r) {
-      flat(r, c).y() = length += (at(r, c) - at(r - 1, c)).norm();
-    }
-    for (int r = 0; r < rows; ++r) {
-      flat(r, c).y() -= length / 2;
-    }
-  }
-  Eigen::Vector2d low = material[0], high = material[0];
-  for (const auto& m : material) {
-    low = low.cwiseMin(m);
-    high = high.cwiseMax(m);
-  }
-  const double limit = kAtlasTexels * 1.0e-4 - 2 * kAtlasMargin_m;
-  if ((high - low).maxCoeff() > limit) {
+  const double limit = kAtlasTexels * static_cast<double>(MembraneGrid().texel_m) - 2 * kAtlasMargin_m;
+  if (extent.maxCoeff() > limit) {
     std::ostringstream text;
-    text << "the membrane is " << 1e3 * (high - low).x() << " x " << 1e3 * (high - low).y()
-         << " mm when flattened; valid: at most " << 1e3 * limit << " mm either way (the atlas)";
+    text << "the membrane is " << 1e3 * extent.x() << " x " << 1e3 * extent.y() << " mm when flattened; valid: at most "
+         << 1e3 * limit << " mm either way (the atlas)";
     Refuse(settings, text.str());
   }
-  std::vector<Vec2f> result(material.size());
-  for (std::size_t i = 0; i < material.size(); ++i) {
-    result[i] = (material[i] - low + Eigen::Vector2d::Constant(kAtlasMargin_m)).cast<float>();
+  std::vector<Vec2f> material;
+  for (const Eigen::Vector2d& m : flat) {
+    material.push_back((m + Eigen::Vector2d::Constant(kAtlasMargin_m)).cast<float>());
   }
-  return result;
+  return material;
 }
 
 void AddParticles(const SceneSettings& settings, const Anatomy& anatomy, SceneData* scene) {
@@ -356,7 +335,7 @@ SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
   AddOrgan(anatomy, &scene);
   AddMembrane(settings, &scene);
   AddBindings(settings, anatomy, &scene);
-  scene.membrane_material = Flatten(settings, anatomy.sheet);
+  scene.membrane_material = MaterialOf(settings, anatomy.sheet);
   AddSurroundings(anatomy, &scene);
   const Sheet sheet(settings.membrane, anatomy.sheet, scene.membrane_material);
   AddStructures(settings, sheet, &scene);

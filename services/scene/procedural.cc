@@ -35,12 +35,11 @@ class Shape {
     // Parabola inside, its tangent outside.
     const double bend = std::abs(v) <= 1 ? v * v : 2 * std::abs(v) - 1;
     const double slope = std::abs(v) <= 1 ? 2 * v : std::copysign(2.0, v);
-    const double phase = kPi * std::clamp(v, -1.0, 1.0);
-    const double side = tube_.lateral_bend_m * std::sin(phase);
-    const double side_slope = std::abs(v) < 1 ? kPi * tube_.lateral_bend_m * std::cos(phase) : 0;
+    const double inside = std::clamp(v, -1.0, 1.0), slope_at = kPi * tube_.lateral_bend_m * std::cos(kPi * inside);
+    const double side = tube_.lateral_bend_m * std::sin(kPi * inside) + (v - inside) * slope_at;
     Frame frame;
     frame.centre = Vec3d(side, v * half, tube_.sagittal_bend_m * (bend - 0.5));
-    const Vec3d tangent = Vec3d(side_slope, half, tube_.sagittal_bend_m * slope).normalized();
+    const Vec3d tangent = Vec3d(slope_at, half, tube_.sagittal_bend_m * slope).normalized();
     frame.right = tangent.cross(Vec3d::UnitZ()).normalized();
     frame.up = frame.right.cross(tangent);
     return frame;
