@@ -7,6 +7,8 @@ namespace {
 
 /// Lines come in bunches of the adapter's latency; only a deficit beyond this is a lost line.
 constexpr double kLateLines = 8;
+/// The filter bridges lost lines this long; then its guess of the motion is worth less than standing still.
+constexpr double kMaxBlind_s = 0.05;
 
 }  // namespace
 
@@ -18,6 +20,7 @@ void JawChannel::Tick(std::span<const char> bytes, double dt_s) noexcept {
   tick_counts_ = {};
   tick_counts_.bytes = static_cast<std::uint32_t>(bytes.size());
   owed_lines_ += dt_s * kLineRate_Hz;
+  blind_s_ += dt_s;
   for (const char byte : bytes) {
     const LineFramer::Event event = framer_.Add(byte);
     if (event != LineFramer::Event::kNone) {
@@ -26,7 +29,7 @@ void JawChannel::Tick(std::span<const char> bytes, double dt_s) noexcept {
   }
   monitor_.Add(tick_counts_, dt_s);
   totals_ += tick_counts_;
-  if (monitor_.state() == LinkState::kNoData) {
+  if (blind_s_ > kMaxBlind_s) {
     HoldAngle();
   } else {
     for (; owed_lines_ > kLateLines; --owed_lines_) {
@@ -58,6 +61,7 @@ void JawChannel::TakeLine(LineFramer::Event event) noexcept {
   if (reading.verdict == LineVerdict::kGood) {
     code_ = reading.code;
     holding_ = false;
+    blind_s_ = 0;
     wiring_.Add(reading.verdict);
     estimator_.Update(reading.code);
     return;
@@ -66,7 +70,7 @@ void JawChannel::TakeLine(LineFramer::Event event) noexcept {
     wiring_.Add(reading.verdict);
   }
   // A bad line stands for one sample period, but noise with many line ends must not run ahead of the clock.
-  if (owed_lines_ > -1) {
+  if (owed_lines_ > -1 && !holding_) {
     estimator_.Predict();
   }
 }
@@ -75,7 +79,6 @@ void JawChannel::HoldAngle() noexcept {
   if (!holding_) {
     estimator_.Hold();
     gate_.Reset();
-    wiring_.Reset();
     holding_ = true;
   }
   owed_lines_ = 0;
@@ -84,6 +87,7 @@ void JawChannel::HoldAngle() noexcept {
 void JawChannel::Reconnected() noexcept {
   framer_.Reset();
   monitor_.Reset();
+  wiring_.Reset();
   HoldAngle();
   connected_ = true;
 }

@@ -48,6 +48,7 @@ class JawChannel {
   LinkCounts totals_;
   int code_ = 0;
   double owed_lines_ = 0;  ///< Sample periods that have passed without a line being seen for them.
+  double blind_s_ = 0;     ///< Since the last good line.
   bool holding_ = false;
   bool connected_ = false;
 };

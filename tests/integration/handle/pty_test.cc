@@ -1,0 +1,239 @@
+// The whole chain over real pseudo-terminals: simulated firmware → tty → parser → estimator → HandleState.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <mutex>
+#include <numbers>
+#include <string>
+#include <thread>
+
+#include "handle_bridge/node/cart_links.h"
+#include "handle_bridge/node/handle_bridge_node.h"
+#include "handle_bridge/serial/serial_port.h"
+#include "handle_bridge/serial/simulated_firmware.h"
+#include "services/bus/in_process.h"
+#include "services/runtime/cyclic_thread.h"
+
+namespace fulcrum::handle_bridge {
+namespace {
+
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+/// A triangle of 6 deg/s: slow enough that a late thread of a busy machine is no error.
+double SlowJaw(std::int64_t now_ns) {
+  const double t = std::fmod(static_cast<double>(now_ns) * 1e-9, 10.0);
+  return 15 + 6 * (t < 5 ? t : 10 - t);
+}
+
+/// Node and firmware, running.
+class Chain {
+ public:
+  explicit Chain(const config::CartConfig& cart = {})
+      : firmware_([this](std::int64_t now_ns) {
+          return OperatorInput{{SlowJaw(now_ns), 30}, pedals_.load()};
+        }),
+        input_(topic_.MakeInput()),
+        output_(topic_.MakeOutput()),
+        node_(cart, MakeCartLinks(cart, &firmware_), output_.get(), runtime::MonotonicNs()),
+        thread_({.name = "handle", .period_ns = 2500000}, [this](const Tick& tick) { node_.Step(tick); }) {
+    thread_.Start();
+  }
+
+  /// Waits until `condition` holds for a published state; false after a generous time.
+  bool WaitFor(const std::function<bool(const HandleState&)>& condition) {
+    for (int i = 0; i < 10000; ++i) {
+      if (input_->TakeLatest(&state) && condition(state)) {
+        return true;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return false;
+  }
+  bool WaitForError(const std::string& part) {
+    return WaitFor([&](const HandleState&) { return health().last_error.find(part) != std::string::npos; });
+  }
+  bool WaitForHealthy() {
+    return WaitFor([this](const HandleState& s) { return s.handles[0].quality > 0.9f && health().last_error.empty(); });
+  }
+
+  Health health() const {
+    Health h;
+    node_.FillHealth(&h);
+    return h;
+  }
+  double metric(const std::string& name) const {
+    for (const Metric& m : health().metrics) {
+      if (m.name == name) {
+        return m.value;
+      }
+    }
+    return -1;
+  }
+  SimulatedFirmware& firmware() { return firmware_; }
+  void SetPedals(std::uint8_t pedals) { pedals_ = pedals; }
+
+  HandleState state;
+
+ private:
+  std::atomic<std::uint8_t> pedals_{0};
+  SimulatedFirmware firmware_;
+  bus::InProcessTopic<HandleState> topic_;
+  std::unique_ptr<bus::Input<HandleState>> input_;
+  std::unique_ptr<bus::Output<HandleState>> output_;
+  HandleBridgeNode node_;
+  runtime::CyclicThread thread_;
+};
+
+/// Largest error against the truth at the stamps over `n` samples [deg].
+double WorstError(Chain* chain, int n) {
+  double worst = 0;
+  for (int seen = 0; seen < n; ++seen) {
+    EXPECT_TRUE(chain->WaitFor([](const HandleState&) { return true; }));
+    const HandleSample& sample = chain->state.handles[0];
+    worst = std::max(worst, std::abs(sample.jaw_angle_rad * kDegPerRad - SlowJaw(chain->state.stamp.stamp_ns)));
+  }
+  return worst;
+}
+
+TEST(HandlePty, FollowsTheFirmwareThroughNoise) {
+  Chain chain;
+  ASSERT_TRUE(chain.WaitForHealthy());
+  EXPECT_LT(WorstError(&chain, 600), 2.5);
+  EXPECT_TRUE(chain.state.handles[1].present);
+  EXPECT_NEAR(chain.state.handles[1].jaw_angle_rad * kDegPerRad, 30, 1.5);
+  EXPECT_EQ(chain.metric("bad_lines"), 0);
+  EXPECT_GT(chain.metric("lines"), 1000);
+}
+
+TEST(HandlePty, PedalsArriveAndAreReleased) {
+  Chain chain;
+  ASSERT_TRUE(chain.WaitForHealthy());
+  chain.SetPedals(kPedalCut);
+  EXPECT_TRUE(chain.WaitFor([](const HandleState& s) { return s.pedals == kPedalCut; }));
+  chain.SetPedals(kPedalCoag);
+  EXPECT_TRUE(chain.WaitFor([](const HandleState& s) { return s.pedals == kPedalCoag; }));
+  chain.firmware().Unplug(SimulatedFirmware::kPedalLink);
+  EXPECT_TRUE(chain.WaitFor([](const HandleState& s) { return s.pedals == kPedalNone; }));
+  EXPECT_TRUE(chain.WaitForError("pedal: "));
+}
+
+TEST(HandlePty, DamagedBytesAreCountedAndNeverSeen) {
+  Chain chain;
+  ASSERT_TRUE(chain.WaitForHealthy());
+  chain.firmware().SetDamage(0, {0.02, 0.02});
+  EXPECT_LT(WorstError(&chain, 600), 4.0);
+  EXPECT_GT(chain.metric("bad_lines"), 20);
+  EXPECT_LT(chain.state.handles[0].quality, 0.95f);
+  EXPECT_GT(chain.state.handles[0].quality, 0.4f);
+}
+
+TEST(HandlePty, WrongBaudIsNamed) {
+  config::CartConfig cart;
+  cart.handles[0].link.baud = 57600;
+  Chain chain(cart);
+  EXPECT_TRUE(chain.WaitForError("handle 0: less than half of the lines are valid: check the baud rate"));
+  EXPECT_FALSE(chain.state.handles[0].present);
+}
+
+TEST(HandlePty, SilentFirmwareIsNamedAndComesBack) {
+  Chain chain;
+  ASSERT_TRUE(chain.WaitForHealthy());
+  chain.firmware().SetSilent(0, true);
+  EXPECT_TRUE(chain.WaitForError("handle 0: no data"));
+  chain.firmware().SetSilent(0, false);
+  EXPECT_TRUE(chain.WaitForHealthy());
+}
+
+TEST(HandlePty, UnpluggedHandleHoldsAndIsFoundAgainUnderAnotherName) {
+  Chain chain;
+  ASSERT_TRUE(chain.WaitForHealthy());
+  for (int round = 1; round <= 3; ++round) {
+    chain.firmware().Unplug(0);
+    EXPECT_TRUE(chain.WaitForError("handle 0: port not found"));
+    const float held = chain.state.handles[0].jaw_angle_rad;
+    EXPECT_TRUE(chain.WaitFor([](const HandleState&) { return true; }));
+    EXPECT_EQ(chain.state.handles[0].jaw_angle_rad, held);
+    EXPECT_EQ(chain.state.handles[0].quality, 0.0f);
+    EXPECT_NEAR(chain.state.handles[1].jaw_angle_rad * kDegPerRad, 30, 1.5);  // The other handle goes on.
+    chain.firmware().Plug(0);
+    EXPECT_TRUE(chain.WaitForHealthy());
+    EXPECT_EQ(chain.metric("reconnects"), round);
+  }
+  EXPECT_LT(WorstError(&chain, 50), 2.5);
+}
+
+TEST(HandlePty, RestartRejoins) {
+  auto chain = std::make_unique<Chain>();
+  ASSERT_TRUE(chain->WaitForHealthy());
+  const std::uint64_t epoch = chain->state.stamp.epoch;
+  chain = std::make_unique<Chain>();
+  ASSERT_TRUE(chain->WaitForHealthy());
+  EXPECT_GT(chain->state.stamp.epoch, epoch);
+  EXPECT_LT(WorstError(chain.get(), 50), 2.5);
+}
+
+TEST(HandlePty, MissingRealPortIsReportedAndDisturbsNothing) {
+  config::CartConfig cart;
+  cart.handles[1].kind = config::LinkKind::kSerial;
+  cart.handles[1].link.port = "/dev/serial/by-path/no-such-adapter";
+  Chain chain(cart);
+  EXPECT_TRUE(chain.WaitForError("handle 1: port not found"));
+  EXPECT_TRUE(chain.WaitFor([](const HandleState& s) { return s.handles[0].present && !s.handles[1].present; }));
+}
+
+TEST(SerialPort, RefusesWhatIsNoSerialPort) {
+  for (const char* name : {"", "/dev/null", "/nonexistent", "/"}) {
+    config::SerialLink link;
+    link.port = name;
+    EXPECT_EQ(SerialPortOpener(link).Open(), nullptr) << name;
+  }
+  config::SerialLink by_identity;
+  by_identity.usb_vendor_id = 0xfffe;
+  by_identity.usb_product_id = 0xfffd;
+  EXPECT_EQ(SerialPortOpener(by_identity).Open(), nullptr);
+}
+
+TEST(PseudoTerminal, CarriesBytesUnchangedAndReportsItsReadersSpeed) {
+  PseudoTerminal terminal;
+  std::unique_ptr<ByteSource> source = TerminalOpener([&] { return terminal.device(); }, 57600).Open();
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(terminal.ReaderBaud(), 57600);
+  std::string sent;
+  for (int i = 0; i < 256; ++i) {
+    sent.push_back(static_cast<char>(i));
+  }
+  EXPECT_EQ(terminal.Send(sent), 256u);
+  std::string received;
+  std::array<char, 512> buffer;
+  for (int i = 0; i < 1000 && received.size() < sent.size(); ++i) {
+    received.append(buffer.data(), source->Read(buffer).bytes);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(received, sent);
+}
+
+TEST(PseudoTerminal, HangUpIsSeenWithinFiniteReads) {
+  auto terminal = std::make_unique<PseudoTerminal>();
+  std::unique_ptr<ByteSource> source = TerminalOpener([&] { return terminal->device(); }, 115200).Open();
+  ASSERT_NE(source, nullptr);
+  std::array<char, 64> buffer;
+  EXPECT_FALSE(source->Read(buffer).hung_up);
+  terminal->Send("2.4498\r\n");
+  terminal.reset();
+  std::string received;
+  bool hung_up = false;
+  for (int i = 0; i < 1000 && !hung_up; ++i) {
+    const ReadResult read = source->Read(buffer);
+    received.append(buffer.data(), read.bytes);
+    hung_up = read.hung_up;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_TRUE(hung_up);
+  // The kernel may drop what was not read yet, but it adds nothing.
+  EXPECT_TRUE(received.empty() || received == "2.4498\r\n") << received;
+}
+
+}  // namespace
+}  // namespace fulcrum::handle_bridge

@@ -1,0 +1,274 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "handle_bridge/node/cart_links.h"
+#include "handle_bridge/node/handle_bridge_node.h"
+#include "handle_bridge/protocol/pedal_line.h"
+#include "services/bus/in_process.h"
+
+namespace fulcrum::handle_bridge {
+namespace {
+
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+/// A link in memory: what the test puts in is read at the next tick.
+class MemoryLink final : public ByteLink {
+ public:
+  Result Read(std::span<char> buffer) noexcept override {
+    const std::size_t n = std::min(buffer.size(), bytes.size());
+    std::copy_n(bytes.begin(), n, buffer.begin());
+    bytes.erase(0, n);
+    const bool was_fresh = std::exchange(fresh, false);
+    return {n, phase, was_fresh};
+  }
+  std::string bytes;
+  LinkPhase phase = LinkPhase::kOpen;
+  bool fresh = true;
+};
+
+/// A node with two handles and a pedal in memory, ticked by hand.
+class NodeTest : public ::testing::Test {
+ protected:
+  NodeTest() : input_(topic_.MakeInput()), output_(topic_.MakeOutput()) { Restart(1000); }
+
+  void Restart(std::int64_t epoch_ns) {
+    HandleBridgeNode::Links links;
+    for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
+      auto link = std::make_unique<MemoryLink>();
+      handle_[tool] = link.get();
+      links.handles[tool] = std::move(link);
+    }
+    auto link = std::make_unique<MemoryLink>();
+    pedal_ = link.get();
+    links.pedal = std::move(link);
+    node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), epoch_ns);
+  }
+
+  /// One tick; handle 0 sends its angle, the pedal its bits.
+  const HandleState& Tick(double jaw0_deg, std::uint8_t pedals = 0) {
+    const auto line = firmware_.Line(jaw0_deg);
+    handle_[0]->bytes.append(line.data(), line.size());
+    const auto second = firmware_.Line(30);
+    handle_[1]->bytes.append(second.data(), second.size());
+    const auto pedal = FormatPedals(pedals);
+    pedal_->bytes.append(pedal.data(), pedal.size());
+    return TickSilently();
+  }
+
+  const HandleState& TickSilently(std::uint64_t skipped = 0) {
+    index_ += skipped;
+    node_->Step({index_, 0.0025 * static_cast<double>(index_), 0.0025, static_cast<std::int64_t>(2500000 * index_)});
+    ++index_;
+    EXPECT_TRUE(input_->TakeLatest(&state_));
+    return state_;
+  }
+
+  std::string Error() {
+    Health health;
+    node_->FillHealth(&health);
+    return health.last_error;
+  }
+
+  double MetricOf(const std::string& name) {
+    Health health;
+    node_->FillHealth(&health);
+    for (const Metric& metric : health.metrics) {
+      if (metric.name == name) {
+        return metric.value;
+      }
+    }
+    ADD_FAILURE() << "no metric " << name;
+    return -1;
+  }
+
+  double jaw0_deg() const { return state_.handles[0].jaw_angle_rad * kDegPerRad; }
+
+  bus::InProcessTopic<HandleState> topic_;
+  std::unique_ptr<bus::Input<HandleState>> input_;
+  std::unique_ptr<bus::Output<HandleState>> output_;
+  std::unique_ptr<HandleBridgeNode> node_;
+  std::array<MemoryLink*, kMaxTools> handle_{};
+  MemoryLink* pedal_ = nullptr;
+  JawFirmware firmware_{{}, 5};
+  std::uint64_t index_ = 0;
+  HandleState state_;
+};
+
+TEST_F(NodeTest, PublishesAngleRateQualityAndPedals) {
+  for (int i = 0; i < 800; ++i) {
+    Tick(10 + 40.0 * i / 800, kPedalCut);
+  }
+  EXPECT_TRUE(state_.handles[0].present);
+  EXPECT_NEAR(jaw0_deg(), 50, 1.5);
+  EXPECT_NEAR(state_.handles[0].jaw_rate_rad_s * kDegPerRad, 20, 10);
+  EXPECT_NEAR(state_.handles[1].jaw_angle_rad * kDegPerRad, 30, 1);
+  EXPECT_EQ(state_.handles[0].quality, 1.0f);
+  EXPECT_EQ(state_.pedals, kPedalCut);
+  EXPECT_EQ(state_.stamp.sequence, 800u);
+  EXPECT_NEAR(state_.handles[0].raw_counts, 514, 2);
+  EXPECT_EQ(Error(), "");
+  EXPECT_EQ(MetricOf("bad_lines"), 0);
+  EXPECT_EQ(MetricOf("reconnects"), 0);
+}
+
+TEST_F(NodeTest, IsNotPresentBeforeTheFirstLine) {
+  TickSilently();
+  EXPECT_FALSE(state_.handles[0].present);
+  EXPECT_EQ(state_.handles[0].quality, 0.0f);
+}
+
+TEST_F(NodeTest, SilenceHoldsTheAngleAndReleasesThePedal) {
+  for (int i = 0; i < 400; ++i) {
+    Tick(25, kPedalCoag);
+  }
+  const double held = jaw0_deg();
+  for (int i = 0; i < 38; ++i) {
+    TickSilently();
+  }
+  EXPECT_EQ(state_.pedals, kPedalCoag);
+  for (int i = 0; i < 10; ++i) {
+    TickSilently();
+  }
+  EXPECT_EQ(state_.pedals, kPedalNone);
+  EXPECT_EQ(state_.handles[0].quality, 0.0f);
+  EXPECT_EQ(state_.handles[0].jaw_rate_rad_s, 0.0f);
+  EXPECT_NEAR(jaw0_deg(), held, 1.0);
+  EXPECT_NE(Error().find("handle 0: no data"), std::string::npos) << Error();
+  Tick(25);
+  EXPECT_NEAR(jaw0_deg(), held, 1.5);
+}
+
+TEST_F(NodeTest, GarbageRaisesTheBaudAlarmAndMovesNothing) {
+  for (int i = 0; i < 400; ++i) {
+    Tick(25);
+  }
+  const double before = jaw0_deg();
+  std::mt19937_64 random(4);
+  for (int i = 0; i < 400; ++i) {
+    for (int k = 0; k < 8; ++k) {
+      handle_[0]->bytes.push_back(static_cast<char>(random()));
+    }
+    TickSilently();
+    ASSERT_NEAR(jaw0_deg(), before, 1.5);
+  }
+  EXPECT_NE(Error().find("check the baud rate"), std::string::npos) << Error();
+  EXPECT_GT(MetricOf("bad_lines"), 100);
+  EXPECT_LT(state_.handles[0].quality, 0.5f);
+}
+
+TEST_F(NodeTest, BrokenWireIsNamed) {
+  for (int i = 0; i < 400; ++i) {
+    Tick(25);
+  }
+  const double before = jaw0_deg();
+  for (int i = 0; i < 300; ++i) {
+    const auto line = firmware_.Format(i % 2 == 0 ? 0 : 1023);
+    handle_[0]->bytes.append(line.data(), line.size());
+    TickSilently();
+  }
+  EXPECT_NE(Error().find("check the potentiometer's wires"), std::string::npos) << Error();
+  EXPECT_NEAR(jaw0_deg(), before, 1.5);
+}
+
+TEST_F(NodeTest, StillJawForManySecondsIsHealthy) {
+  for (int i = 0; i < 400 * 10; ++i) {
+    const auto line = firmware_.Format(500);
+    handle_[0]->bytes.append(line.data(), line.size());
+    handle_[1]->bytes.append(line.data(), line.size());
+    const auto pedal = FormatPedals(0);
+    pedal_->bytes.append(pedal.data(), pedal.size());
+    TickSilently();
+  }
+  EXPECT_EQ(Error(), "");
+}
+
+TEST_F(NodeTest, HangUpHoldsAndTheReturnGoesOn) {
+  for (int i = 0; i < 400; ++i) {
+    Tick(25, kPedalCut);
+  }
+  const double held = jaw0_deg();
+  handle_[0]->phase = pedal_->phase = LinkPhase::kLost;
+  TickSilently();
+  EXPECT_NE(Error().find("handle 0: hung up"), std::string::npos) << Error();
+  EXPECT_EQ(state_.pedals, kPedalNone);
+  handle_[0]->phase = LinkPhase::kReconnecting;
+  TickSilently();
+  EXPECT_NE(Error().find("handle 0: port not found"), std::string::npos) << Error();
+  EXPECT_NEAR(jaw0_deg(), held, 1e-6);
+  EXPECT_EQ(state_.handles[0].quality, 0.0f);
+  handle_[0]->phase = pedal_->phase = LinkPhase::kOpen;
+  handle_[0]->fresh = pedal_->fresh = true;
+  handle_[0]->bytes = "12\r\n";  // The end of a line whose beginning went to nobody.
+  for (int i = 0; i < 40; ++i) {
+    Tick(45, kPedalCut);
+  }
+  EXPECT_NEAR(jaw0_deg(), 45, 2);
+  EXPECT_EQ(state_.pedals, kPedalCut);
+  EXPECT_EQ(Error(), "");
+  EXPECT_EQ(MetricOf("reconnects"), 2);
+}
+
+TEST_F(NodeTest, SkippedPeriodsAndTheirBacklogAreTaken) {
+  for (int i = 0; i < 400; ++i) {
+    Tick(20);
+  }
+  for (int i = 0; i < 10; ++i) {
+    const auto line = firmware_.Line(22);
+    handle_[0]->bytes.append(line.data(), line.size());
+  }
+  TickSilently(9);
+  EXPECT_EQ(state_.handles[0].quality, 1.0f);
+  EXPECT_NEAR(jaw0_deg(), 22, 1.5);
+}
+
+TEST_F(NodeTest, RestartTakesTheAngleFromTheFirstLineUnderANewEpoch) {
+  for (int i = 0; i < 400; ++i) {
+    Tick(40);
+  }
+  const std::uint64_t epoch = state_.stamp.epoch;
+  Restart(2000);
+  index_ = 0;
+  Tick(40);
+  EXPECT_TRUE(state_.handles[0].present);
+  EXPECT_NEAR(jaw0_deg(), 40, 2);
+  EXPECT_GT(state_.stamp.epoch, epoch);
+  EXPECT_EQ(state_.stamp.sequence, 1u);
+}
+
+TEST_F(NodeTest, AbsentHandleIsNeitherPublishedNorMissed) {
+  HandleBridgeNode::Links links;
+  auto link = std::make_unique<MemoryLink>();
+  handle_[0] = link.get();
+  links.handles[0] = std::move(link);
+  node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), 3000);
+  for (int i = 0; i < 100; ++i) {
+    const auto line = firmware_.Line(20);
+    handle_[0]->bytes.append(line.data(), line.size());
+    TickSilently();
+  }
+  EXPECT_TRUE(state_.handles[0].present);
+  EXPECT_FALSE(state_.handles[1].present);
+  EXPECT_EQ(state_.pedals, kPedalNone);
+  EXPECT_EQ(Error(), "");
+}
+
+TEST(FollowScript, GivesTheFirstKeyBeforeTheSessionAndThePedalsOfAllTools) {
+  const std::array keys = {ScriptKey{1, 0, Vec3f::Zero(), 0.8f, 0, 0}, ScriptKey{3, 0, Vec3f::Zero(), 0.2f, 0, 0},
+                           ScriptKey{0, 1, Vec3f::Zero(), 0.0f, 0, 0},
+                           ScriptKey{2, 1, Vec3f::Zero(), 0.0f, kPedalCut, 35},
+                           ScriptKey{4, 1, Vec3f::Zero(), 0.0f, 0, 0}};
+  SceneView scene;
+  scene.script = keys;
+  EXPECT_NEAR(FollowScript(scene, -1).jaw_deg[0], 0.8 * kDegPerRad, 1e-3);
+  EXPECT_EQ(FollowScript(scene, -1).pedals, 0);
+  EXPECT_NEAR(FollowScript(scene, 2).jaw_deg[0], 0.5 * kDegPerRad, 1e-3);
+  EXPECT_EQ(FollowScript(scene, 3.9).pedals, kPedalCut);
+  EXPECT_EQ(FollowScript(scene, 4).pedals, 0);
+  EXPECT_NEAR(FollowScript(scene, 99).jaw_deg[0], 0.2 * kDegPerRad, 1e-3);
+}
+
+}  // namespace
+}  // namespace fulcrum::handle_bridge
