@@ -26,9 +26,9 @@ struct PhysicsParams {
   float k_stretch_membrane = 0.9f;
   float k_volume = 0.8f;
   float k_bending = 0.1f;
-  float k_binding = 0.3f;
+  float k_binding = 0.01f;  ///< In tension; ten times as much in compression (capped at 1).
   float tube_youngs_modulus_Pa = 1.0e5f;
-  float membrane_Et_N_per_m = 300.0f;  ///< Young's modulus times thickness.
+  float membrane_Et_N_per_m = 150.0f;  ///< Young's modulus times thickness.
   float friction = 0.2f;
   float collision_margin_m = 0.0005f;
   float grasp_radius_m = 0.004f;  ///< Particles within this distance of the jaw's centre line are held.
