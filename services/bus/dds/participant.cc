@@ -202,11 +202,11 @@ DdsParticipant::~DdsParticipant() = default;
 std::string DdsParticipant::schema_mismatch() const { return impl_->watch.mismatch(); }
 
 template <class T>
-std::unique_ptr<Input<T>> DdsParticipant::MakeInput() {
+std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()> notify) {
   const TopicRole& role = RoleOf<T>();
   fast::DataReaderQos qos;
   ApplyRole(role, role.reader_depth, impl_->shared_memory, &qos);
-  auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos);
+  auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos, std::move(notify));
   if (!port->ok()) throw InputError(std::string(role.name) + ": cannot make a reader");
   return port;
 }
@@ -225,8 +225,8 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   return port;
 }
 
-#define FULCRUM_INSTANTIATE_PORTS(T)                              \
-  template std::unique_ptr<Input<T>> DdsParticipant::MakeInput(); \
+#define FULCRUM_INSTANTIATE_PORTS(T)                                                   \
+  template std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()>); \
   template std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput<T>();
 
 FULCRUM_INSTANTIATE_PORTS(HandleState)

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -28,8 +29,10 @@ class DdsParticipant {
   DdsParticipant& operator=(const DdsParticipant&) = delete;
 
   /// Ports live at most as long as the participant. T is a message of services/core/messages.h.
+  /// `notify`, if given, is called on a thread of the bus whenever a sample has come: it may wake somebody or take from
+  /// this input (then nobody else may), must be short and must not throw.
   template <class T>
-  [[nodiscard]] std::unique_ptr<Input<T>> MakeInput();
+  [[nodiscard]] std::unique_ptr<Input<T>> MakeInput(std::function<void()> notify = {});
   template <class T>
   [[nodiscard]] std::unique_ptr<typename OutputOf<T>::type> MakeOutput();
 

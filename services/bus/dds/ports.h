@@ -12,6 +12,8 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <functional>
+#include <utility>
 
 #include "services/bus/convert/convert.h"
 #include "services/bus/dds/type_support.h"
@@ -26,18 +28,27 @@ namespace fast = eprosima::fastdds::dds;
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
 /// Counts the live endpoints on the other side; asking the reader or writer itself would take its lock every tick.
-class ReaderMatches final : public fast::DataReaderListener {
+class ReaderEvents final : public fast::DataReaderListener {
  public:
+  explicit ReaderEvents(std::function<void()> notify) : notify_(std::move(notify)) {}
   void on_subscription_matched(fast::DataReader*, const fast::SubscriptionMatchedStatus& status) override {
     count_.store(status.current_count, std::memory_order_relaxed);  // stands for itself, orders nothing
   }
+  void on_data_available(fast::DataReader*) override { notify_(); }
   [[nodiscard]] bool any() const noexcept { return count_.load(std::memory_order_relaxed) > 0; }
+  /// What to listen for: without anybody to notify, a sample costs no call.
+  [[nodiscard]] fast::StatusMask mask() const {
+    fast::StatusMask mask = fast::StatusMask::subscription_matched();
+    if (notify_) mask << fast::StatusMask::data_available();
+    return mask;
+  }
 
  private:
+  const std::function<void()> notify_;
   std::atomic<int> count_{0};
 };
 
-class WriterMatches final : public fast::DataWriterListener {
+class WriterEvents final : public fast::DataWriterListener {
  public:
   void on_publication_matched(fast::DataWriter*, const fast::PublicationMatchedStatus& status) override {
     count_.store(status.current_count, std::memory_order_relaxed);  // as above
@@ -52,9 +63,11 @@ class WriterMatches final : public fast::DataWriterListener {
 template <class T>
 class InputBase : public Input<T> {
  public:
-  InputBase(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos)
-      : subscriber_(subscriber),
-        reader_(subscriber->create_datareader(topic, qos, &matches_, fast::StatusMask::subscription_matched())),
+  InputBase(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos,
+            std::function<void()> notify)
+      : events_(std::move(notify)),
+        subscriber_(subscriber),
+        reader_(subscriber->create_datareader(topic, qos, &events_, events_.mask())),
         account_(RoleOf<T>().gap_is_loss) {}
   ~InputBase() override {
     if (reader_ == nullptr) return;
@@ -65,10 +78,10 @@ class InputBase : public Input<T> {
   InputBase& operator=(const InputBase&) = delete;
 
   [[nodiscard]] bool ok() const { return reader_ != nullptr; }
-  InputStats stats() const override { return account_.stats(matches_.any()); }
+  InputStats stats() const override { return account_.stats(events_.any()); }
 
  protected:
-  ReaderMatches matches_;
+  ReaderEvents events_;
   fast::Subscriber* subscriber_;
   fast::DataReader* reader_;
   InputAccount account_;
@@ -176,7 +189,7 @@ class OutputBase : public OutputOf<T>::type {
  public:
   OutputBase(fast::Publisher* publisher, fast::Topic* topic, const fast::DataWriterQos& qos)
       : publisher_(publisher),
-        writer_(publisher->create_datawriter(topic, qos, &matches_, fast::StatusMask::publication_matched())) {}
+        writer_(publisher->create_datawriter(topic, qos, &events_, fast::StatusMask::publication_matched())) {}
   ~OutputBase() override {
     if (writer_ == nullptr) return;
     writer_->set_listener(nullptr);
@@ -186,7 +199,7 @@ class OutputBase : public OutputOf<T>::type {
   OutputBase& operator=(const OutputBase&) = delete;
 
   [[nodiscard]] bool ok() const { return writer_ != nullptr; }
-  bool has_readers() const noexcept override { return matches_.any(); }
+  bool has_readers() const noexcept override { return events_.any(); }
   OutputStats stats() const override {
     return {written_.load(std::memory_order_relaxed), failed_.load(std::memory_order_relaxed)};
   }
@@ -197,7 +210,7 @@ class OutputBase : public OutputOf<T>::type {
     return sent;
   }
 
-  WriterMatches matches_;
+  WriterEvents events_;
   fast::Publisher* publisher_;
   fast::DataWriter* writer_;
 

@@ -1,0 +1,255 @@
+// The bus between two processes, on real topics. All times are CLOCK_MONOTONIC, which both processes share.
+//
+//   small_rtt              HandleState (66 B on the wire) there, CauteryContact back, at 1 kHz over UDP loopback; both
+//                          sides take and write in the callback.
+//   frame_300k             TissueFrame filled to its capacity at 100 Hz, from the call of WriteInPlace to the callback
+//                          in the other process; frame_300k_take goes on until the checked copy is in the node's hands.
+//   start_to_first_sample  from fork to the first ToolState of a running publisher in the new process.
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "services/bus/dds/participant.h"
+#include "services/bus/dds/shared_memory.h"
+#include "services/bus/input_account.h"
+#include "tests/benchmark/report.h"
+
+namespace fulcrum::bus {
+namespace {
+
+constexpr int kDomain = 13;
+using Clock = std::chrono::steady_clock;
+std::int64_t NowNs() { return Clock::now().time_since_epoch().count(); }
+double Us(std::int64_t ns) { return 1e-3 * static_cast<double>(ns); }
+
+DdsParticipant MakeBus(const char* name) {
+  return DdsParticipant({.domain = kDomain, .node_name = name, .shared_memory = {}});
+}
+
+/// Waits up to ten seconds.
+template <class Condition>
+bool Eventually(const Condition& condition) {
+  const auto end = Clock::now() + std::chrono::seconds(10);
+  while (!condition()) {
+    if (Clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+// ------------------------------------------------------------------------------------------- the other process
+
+[[noreturn]] void Echo() {
+  DdsParticipant bus = MakeBus("bench_echo");
+  auto out = bus.MakeOutput<CauteryContact>();
+  std::unique_ptr<Input<HandleState>> in;
+  std::atomic<bool> made{false};
+  HandleState got;
+  CauteryContact reply;
+  in = bus.MakeInput<HandleState>([&] {
+    if (!made) return;
+    while (in->TakeNext(&got)) {
+      reply.stamp = got.stamp;
+      out->Write(reply);
+    }
+  });
+  made = true;
+  for (;;) pause();
+}
+
+/// Prints, for each frame, when its callback came and when its checked copy was there [ns since WriteInPlace].
+[[noreturn]] void Watch() {
+  DdsParticipant bus = MakeBus("bench_watch");
+  std::unique_ptr<Input<TissueFrame>> in;
+  std::atomic<bool> made{false};
+  TissueFrame got;
+  in = bus.MakeInput<TissueFrame>([&] {
+    const std::int64_t called_ns = NowNs();
+    if (!made || !in->TakeLatest(&got)) return;
+    const std::int64_t sent_ns = got.header.stamp.stamp_ns;
+    std::printf("%lld %lld\n", static_cast<long long>(called_ns - sent_ns), static_cast<long long>(NowNs() - sent_ns));
+  });
+  made = true;
+  for (;;) pause();
+}
+
+/// Prints when its first sample was there.
+[[noreturn]] void First() {
+  DdsParticipant bus = MakeBus("bench_first");
+  auto in = bus.MakeInput<ToolState>();
+  ToolState got;
+  while (!in->TakeLatest(&got)) std::this_thread::sleep_for(std::chrono::microseconds(200));
+  std::printf("%lld\n", static_cast<long long>(NowNs()));
+  for (;;) pause();
+}
+
+class Peer {
+ public:
+  explicit Peer(const char* role) {
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) std::abort();
+    pid_ = fork();
+    if (pid_ == 0) {
+      prctl(PR_SET_PDEATHSIG, SIGKILL);
+      dup2(ends[1], STDOUT_FILENO);
+      execl("/proc/self/exe", "bench_bus", "--peer", role, nullptr);
+      _exit(127);
+    }
+    close(ends[1]);
+    output_ = fdopen(ends[0], "r");
+  }
+  ~Peer() {
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+    std::fclose(output_);
+  }
+  Peer(const Peer&) = delete;
+  Peer& operator=(const Peer&) = delete;
+  [[nodiscard]] std::FILE* output() const { return output_; }
+
+ private:
+  pid_t pid_ = -1;
+  std::FILE* output_ = nullptr;
+};
+
+// ------------------------------------------------------------------------------------------------ the cases
+
+void AddQuantiles(benchmark::Report* report, const std::string& stem, const std::vector<double>& us) {
+  report->Add(stem + "_us_p50", benchmark::Quantile(us, 0.50), "us");
+  report->Add(stem + "_us_p99", benchmark::Quantile(us, 0.99), "us");
+}
+
+void SmallRoundTrip(benchmark::Report* report) {
+  const std::uint64_t count = report->quick() ? 1000 : 5000;
+  DdsParticipant bus = MakeBus("bench_rtt");
+  auto out = bus.MakeOutput<HandleState>();
+  std::vector<std::atomic<std::int64_t>> back_ns(count + 1);
+  std::vector<std::int64_t> sent_ns(count + 1);
+  std::unique_ptr<Input<CauteryContact>> in;
+  std::atomic<bool> made{false};
+  CauteryContact got;
+  in = bus.MakeInput<CauteryContact>([&] {
+    if (!made) return;
+    while (in->TakeNext(&got)) {
+      if (got.stamp.sequence <= count) back_ns[got.stamp.sequence] = NowNs();
+    }
+  });
+  made = true;
+  Peer peer("echo");
+  HandleState m;
+  // Each side learns of the other in its own time: only an echo says that both have. Sequence 0 is this warm-up.
+  if (!Eventually([&] { return out->Write(m) && back_ns[0] != 0; })) return;
+  Stamper stamper(NowNs());
+  auto next = Clock::now();
+  for (std::uint64_t i = 1; i <= count; ++i) {
+    next += std::chrono::milliseconds(1);
+    std::this_thread::sleep_until(next);
+    sent_ns[i] = NowNs();
+    m.stamp = stamper.Next(sent_ns[i]);
+    out->Write(m);
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  std::vector<double> us;
+  for (std::uint64_t i = 1; i <= count; ++i) {
+    if (back_ns[i] != 0) us.push_back(Us(back_ns[i] - sent_ns[i]));
+  }
+  AddQuantiles(report, "bus.small_rtt", us);
+  report->Add("bus.small_rtt_lost", static_cast<double>(count - us.size()), "samples");
+}
+
+void Frames(benchmark::Report* report) {
+  const std::size_t count = report->quick() ? 100 : 500;
+  DdsParticipant bus = MakeBus("bench_frames");
+  auto out = bus.MakeOutput<TissueFrame>();
+  Peer peer("watch");
+  // Each side learns of the other in its own time, at the latest with its next announcement.
+  if (!Eventually([&] { return out->has_readers(); })) return;
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  std::vector<float> xyz(std::size_t{3} * kMaxTissueVertices, 0.25f);
+  Stamper stamper(NowNs());
+  std::vector<double> write_us;
+  auto next = Clock::now();
+  for (std::size_t i = 0; i < count; ++i) {
+    next += std::chrono::milliseconds(10);
+    std::this_thread::sleep_until(next);
+    xyz[0] = 1e-4f * static_cast<float>(i % 100);
+    const std::int64_t start_ns = NowNs();
+    out->WriteInPlace([&](TissueFrame::View view) {
+      view.header.stamp = stamper.Next(start_ns);
+      view.header.vertex_count = kMaxTissueVertices;
+      std::copy(xyz.begin(), xyz.end(), view.xyz.begin());
+    });
+    write_us.push_back(Us(NowNs() - start_ns));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  // The pipe holds all lines: 500 of at most 20 characters.
+  fcntl(fileno(peer.output()), F_SETFL, O_NONBLOCK);
+  std::vector<double> called_us, taken_us;
+  long long called = 0, taken = 0;
+  while (std::fscanf(peer.output(), "%lld %lld", &called, &taken) == 2) {
+    called_us.push_back(Us(called));
+    taken_us.push_back(Us(taken));
+  }
+  AddQuantiles(report, "bus.frame_300k", called_us);
+  AddQuantiles(report, "bus.frame_300k_take", taken_us);
+  AddQuantiles(report, "bus.frame_300k_write", write_us);
+  report->Add("bus.frame_300k_lost", static_cast<double>(count) - static_cast<double>(called_us.size()), "samples");
+}
+
+void Start(benchmark::Report* report) {
+  DdsParticipant bus = MakeBus("bench_start");
+  auto out = bus.MakeOutput<ToolState>();
+  std::atomic<bool> stop{false};
+  std::thread publisher([&] {
+    Stamper stamper(NowNs());
+    ToolState m;
+    while (!stop) {
+      m.stamp = stamper.Next(NowNs());
+      out->Write(m);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  std::vector<double> ms;
+  for (int i = 0; i < (report->quick() ? 7 : 25); ++i) {
+    const std::int64_t start_ns = NowNs();
+    Peer peer("first");
+    long long first_ns = 0;
+    if (std::fscanf(peer.output(), "%lld", &first_ns) == 1) ms.push_back(1e-3 * Us(first_ns - start_ns));
+  }
+  stop = true;
+  publisher.join();
+  report->Add("bus.start_to_first_sample_ms_p50", benchmark::Quantile(ms, 0.5), "ms");
+  report->Add("bus.start_to_first_sample_ms_max", benchmark::Quantile(ms, 1.0), "ms");
+}
+
+int Main(int argc, char** argv) {
+  if (argc == 3 && std::string(argv[1]) == "--peer") {
+    std::setvbuf(stdout, nullptr, _IOLBF, 0);
+    const std::string role = argv[2];
+    if (role == "echo") Echo();
+    if (role == "watch") Watch();
+    First();
+  }
+  benchmark::Report report(argc, argv);
+  if (report.Wants("bus.small_rtt")) SmallRoundTrip(&report);
+  if (report.Wants("bus.frame_300k")) Frames(&report);
+  if (report.Wants("bus.start_to_first_sample")) Start(&report);
+  RemoveSharedMemory(SharedMemoryDirectory(kDomain));
+  return 0;
+}
+
+}  // namespace
+}  // namespace fulcrum::bus
+
+int main(int argc, char** argv) { return fulcrum::bus::Main(argc, argv); }
