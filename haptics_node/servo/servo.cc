@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "services/core/error.h"
 #include "services/core/hash.h"
 
 namespace fulcrum::haptics {
@@ -34,6 +36,10 @@ Servo::Servo(const SceneView& scene, const Devices& devices) : force_scale_(scen
     Channel& channel = channels_[i];
     const ToolDescription& tool = scene.tools[i];
     if (tool.kind == ToolKind::kNone) continue;
+    if (!(tool.shaft_length_m > 2 * kMinShaftPart_m)) {
+      throw InputError("scene: tool " + std::to_string(i) + ": shaft length " + std::to_string(tool.shaft_length_m) +
+                       " m; valid: more than " + std::to_string(2 * kMinShaftPart_m) + " m");
+    }
     channel.device = devices[i];
     channel.kind = tool.kind;
     channel.trocar = {tool.p_WP.cast<double>(), tool.shaft_length_m};
@@ -134,7 +140,7 @@ void Servo::FillRecord(const Tick& tick) noexcept {
     sample.v_WT = channel.v_WT.cast<float>();
     sample.w_WT = channel.w_WT.cast<float>();
     sample.f_W = ForceAtTip(channel.pose, sent).cast<float>();
-    sample.model_age_s = static_cast<float>(age);
+    sample.model_age_s = static_cast<float>(std::max(0.0, age));
     figures_.force_N[i] = sent.norm();
     figures_.peak_force_N = std::max(figures_.peak_force_N, figures_.force_N[i]);
     figures_.not_finite += channel.output.not_finite;

@@ -43,7 +43,7 @@ class Servo {
  public:
   using Devices = std::array<HapticDevice*, kMaxTools>;
 
-  /// Devices may be null where the scene has no tool; the others must outlive the servo.
+  /// Devices may be null; the others must outlive the servo. Throws InputError for a shaft too short to turn about.
   Servo(const SceneView& scene, const Devices& devices);
 
   /// A contact model that has come in; before Step() of the tick that shall know of it.

@@ -1,0 +1,186 @@
+// The node on in-process ports, and the promise of its servo: no allocation, no lock.
+#include "haptics_node/node/haptics_node.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "services/bus/in_process.h"
+#include "tests/unit/haptics/rig.h"
+#include "tests/unit/haptics/test_tissue.h"
+#include "tests/unit/runtime/allocation_guard.h"
+
+namespace fulcrum::haptics {
+namespace {
+
+using fulcrum::testing::AllocationGuard;
+using testing::BenchScene;
+using testing::LatePhysics;
+using testing::TestTissue;
+using testing::TickAt;
+
+const std::array<ScriptKey, 3> kScript{{{0.0f, 0, Vec3f(0, 0, 0.01f), 0, 0, 0},
+                                        {1.0f, 0, Vec3f(0, 0, -0.005f), 0, 0, 0},
+                                        {2.0f, 0, Vec3f(0.02f, 0, -0.005f), 0, 0, 0}}};
+
+class HapticsNodeTest : public ::testing::Test {
+ protected:
+  HapticsNodeTest() : scene(BenchScene(0.3)) {
+    scene.script = kScript;
+    model_out = models.MakeOutput();
+    model_in = models.MakeInput();
+    tool_out = tools.MakeOutput();
+    tool_in = tools.MakeInput(4);
+    manifest_out = manifests.MakeOutput();
+    manifest_in = manifests.MakeInput(64);
+    node = Make(1000);
+  }
+  std::unique_ptr<HapticsNode> Make(std::int64_t epoch) {
+    return std::make_unique<HapticsNode>(scene, std::array<bool, kMaxTools>{true, true},
+                                         HapticsNode::Ports{*model_in, *tool_out, *manifest_out}, epoch);
+  }
+  /// One millisecond of everything; the servo's part alone is watched.
+  void Step() {
+    const Tick tick = TickAt(millisecond++);
+    ContactModel model;
+    if (physics.Step(tissue, tick.stamp_ns - 1'000'000, &model)) model_out->Write(model);
+    node->BusStep();
+    {
+      const AllocationGuard guard;
+      node->ServoStep(tick);
+      violations += guard.violations();
+    }
+    node->BusStep();
+    if (tool_in->TakeLatest(&tool)) tissue.Step(tool.tools[0].p_WT.cast<double>(), tick.dt_s);
+  }
+
+  SceneView scene;
+  bus::InProcessTopic<ContactModel> models;
+  bus::InProcessTopic<ToolState> tools;
+  bus::InProcessTopic<TickManifest> manifests;
+  std::unique_ptr<bus::Output<ContactModel>> model_out;
+  std::unique_ptr<bus::Input<ContactModel>> model_in;
+  std::unique_ptr<bus::Output<ToolState>> tool_out;
+  std::unique_ptr<bus::Input<ToolState>> tool_in;
+  std::unique_ptr<bus::Output<TickManifest>> manifest_out;
+  std::unique_ptr<bus::Input<TickManifest>> manifest_in;
+  std::unique_ptr<HapticsNode> node;
+  TestTissue tissue{{}};
+  LatePhysics physics;
+  ToolState tool;
+  std::uint64_t millisecond = 0;
+  std::int64_t violations = 0;
+};
+
+TEST_F(HapticsNodeTest, ServoNeitherAllocatesNorLocks) {
+  if (!AllocationGuard::active()) GTEST_SKIP() << "a sanitizer owns malloc in this build";
+  for (int i = 0; i < 4000; ++i) Step();
+  EXPECT_EQ(violations, 0);
+  EXPECT_GT(tool.tools[0].f_W.z(), 0.1f);  // Models did arrive and forces did flow.
+}
+
+TEST_F(HapticsNodeTest, EachTickIsPublishedInOrderAndPassesTheBusGate) {
+  for (int i = 1; i <= 100; ++i) {
+    Step();
+    EXPECT_EQ(tool.stamp.sequence, static_cast<std::uint64_t>(i));
+    EXPECT_EQ(tool.stamp.epoch, 1000u);
+    EXPECT_EQ(tool.stamp.stamp_ns, TickAt(millisecond - 1).stamp_ns);
+  }
+  EXPECT_EQ(tool_in->stats().rejected, 0u);
+}
+
+TEST_F(HapticsNodeTest, ManifestsTellTickHashAndModelAtAHundredHertz) {
+  TickManifest manifest;
+  std::vector<TickManifest> seen;
+  for (int i = 0; i < 1000; ++i) {
+    Step();
+    while (manifest_in->TakeNext(&manifest)) seen.push_back(manifest);
+  }
+  EXPECT_GE(seen.size(), 99u);
+  EXPECT_LE(seen.size(), 105u);
+  for (std::size_t i = 1; i < seen.size(); ++i) {
+    EXPECT_EQ(seen[i].stamp.sequence, seen[i - 1].stamp.sequence + 1);
+    EXPECT_GT(seen[i].tick, seen[i - 1].tick);
+    EXPECT_LE(seen[i].tick, seen[i - 1].tick + kTicksPerManifest);
+  }
+  EXPECT_EQ(seen.back().node, NodeId::kHaptics);
+  ASSERT_EQ(seen.back().consumed.size(), 1u);
+  EXPECT_EQ(seen.back().consumed[0].topic, TopicId::kContactModel);
+  EXPECT_GT(seen.back().consumed[0].sequence, 90u);
+}
+
+TEST_F(HapticsNodeTest, AfterARestartTheHandIsWhereTheScriptIsAndForceRisesSoftly) {
+  for (int i = 0; i < 1500; ++i) Step();
+  const ToolState before = tool;
+  ASSERT_GT(before.tools[0].f_W.norm(), 0.1f);
+  node = Make(2000);  // As after kill -9: nothing but session time is left.
+  millisecond += 300;
+  Step();
+  EXPECT_EQ(tool.stamp.epoch, 2000u);
+  EXPECT_EQ(tool.stamp.sequence, 1u);
+  EXPECT_LT((tool.tools[0].p_WT - before.tools[0].p_WT).norm(), 0.01f);
+  float last = tool.tools[0].f_W.norm();
+  EXPECT_EQ(last, 0.0f);
+  for (int i = 0; i < 1000; ++i) {
+    Step();
+    const float force = tool.tools[0].f_W.norm();
+    EXPECT_LE(force - last, 0.03f);
+    last = force;
+  }
+  EXPECT_GT(last, 0.1f);
+}
+
+TEST_F(HapticsNodeTest, HealthTellsForcesAndThatPhysicsIsGone) {
+  const auto metric = [&](const Health& health, const std::string& name) {
+    const auto it =
+        std::find_if(health.metrics.begin(), health.metrics.end(), [&](const Metric& m) { return m.name == name; });
+    return it == health.metrics.end() ? -1.0 : it->value;
+  };
+  for (int i = 0; i < 1500; ++i) Step();
+  Health health;
+  health.state = HealthState::kRunning;
+  node->FillHealth(&health);
+  EXPECT_EQ(health.state, HealthState::kRunning);
+  EXPECT_GT(metric(health, "peak_force_N"), 0.1);
+  EXPECT_GT(metric(health, "force0_N"), 0.1);
+  EXPECT_EQ(metric(health, "force1_N"), 0.0);
+  EXPECT_NEAR(metric(health, "model_age_ms"), 15, 10);
+  EXPECT_LE(health.metrics.size(), 16u);
+
+  physics.stalled = true;
+  for (int i = 0; i < 1000; ++i) Step();
+  Health later;
+  later.state = HealthState::kRunning;
+  node->FillHealth(&later);
+  EXPECT_EQ(later.state, HealthState::kDegraded);
+  EXPECT_NE(later.last_error.find("contact model"), std::string::npos);
+  EXPECT_EQ(metric(later, "force0_N"), 0.0);
+  EXPECT_GE(metric(later, "peak_force_N"), metric(health, "peak_force_N"));
+}
+
+TEST_F(HapticsNodeTest, WhatDoesNotPassTheGateIsCounted) {
+  for (int i = 0; i < 50; ++i) Step();
+  physics.stalled = true;
+  ContactModel model;
+  model.stamp = {100000, 1, TickAt(millisecond).stamp_ns};
+  model.tool_stamp_ns = TickAt(millisecond).stamp_ns - 1'000'000;
+  model.devices[0].count = 1;
+  model.devices[0].contacts[0] = tissue.Report();
+  model.devices[0].contacts[0].k1 = 5e4f;  // Finite, so the bus lets it through; too stiff for the servo.
+  model_out->Write(model);
+  Step();
+  Step();
+  Health health;
+  node->FillHealth(&health);
+  const auto dropped = std::find_if(health.metrics.begin(), health.metrics.end(),
+                                    [](const Metric& m) { return m.name == "models_dropped"; });
+  ASSERT_NE(dropped, health.metrics.end());
+  EXPECT_EQ(dropped->value, 1.0);
+}
+
+}  // namespace
+}  // namespace fulcrum::haptics

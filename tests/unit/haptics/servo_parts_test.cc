@@ -1,0 +1,251 @@
+// Gate, age machine, output chain and passivity controller, each on its own.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "haptics_node/servo/age_machine.h"
+#include "haptics_node/servo/model_gate.h"
+#include "haptics_node/servo/output_chain.h"
+#include "haptics_node/servo/passivity.h"
+#include "tests/unit/haptics/test_tissue.h"
+
+namespace fulcrum::haptics {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr double kDt = 1e-3;
+constexpr double kRounding = 1e-12;
+
+ContactModel GoodModel() {
+  ContactModel model;
+  model.stamp = {5, 100, 1000 * kMs};
+  model.tool_stamp_ns = 990 * kMs;
+  model.devices[0].count = 1;
+  model.devices[0].contacts[0] = testing::TestTissue({}).Report();
+  return model;
+}
+
+TEST(ModelGate, AdmitsAGoodModelAndRefusesEachBrokenField) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float inf = std::numeric_limits<float>::infinity();
+  const std::vector<std::function<void(ContactModel&, Contact&)>> breaks = {
+      [](ContactModel& m, Contact&) { m.devices[0].count = kMaxContacts + 1; },
+      [](ContactModel& m, Contact&) { m.devices[1].count = 1; },  // Its contact is empty.
+      [](ContactModel& m, Contact&) { m.devices[0].p_ext_W = 1; },
+      [=](ContactModel& m, Contact&) { m.devices[0].force_cap_N = nan; },
+      [](ContactModel& m, Contact&) { m.tool_stamp_ns = 0; },
+      [](ContactModel& m, Contact&) { m.tool_stamp_ns = 2000 * kMs; },
+      [](ContactModel&, Contact& c) { c.kind = ContactKind::kNone; },
+      [](ContactModel&, Contact& c) { c.n *= 1.02f; },
+      [=](ContactModel&, Contact& c) { c.n.x() = nan; },
+      [=](ContactModel&, Contact& c) { c.e1.x() = nan; },
+      [=](ContactModel&, Contact& c) { c.x_ref.y() = inf; },
+      [=](ContactModel&, Contact& c) { c.p_s.y() = nan; },
+      [](ContactModel&, Contact& c) { c.v_s.z() = 11; },
+      [](ContactModel&, Contact& c) { c.f_ref.z() = 20.1f; },
+      [=](ContactModel&, Contact& c) { c.u_c.z() = nan; },
+      [=](ContactModel&, Contact& c) { c.du_c.z() = -inf; },
+      [=](ContactModel&, Contact& c) { c.gap = nan; },
+      [](ContactModel&, Contact& c) { c.k1 = 0; },
+      [](ContactModel&, Contact& c) { c.k1 = 2.1e4f; },
+      [](ContactModel&, Contact& c) { c.k3 = -1; },
+      [](ContactModel&, Contact& c) { c.kt = 2.1e4f; },
+      [](ContactModel&, Contact& c) { c.k_body = 9; },
+      [](ContactModel&, Contact& c) { c.k_body = 2.1e5f; },
+      [](ContactModel&, Contact& c) { c.b_body = 2.1e3f; },
+      [](ContactModel&, Contact& c) { c.friction = 2.1f; },
+      [](ContactModel&, Contact& c) { c.kappa2 = -3e3f; },
+      [=](ContactModel&, Contact& c) { c.slip_force = nan; },
+      [=](ContactModel&, Contact& c) { c.radius = nan; },
+  };
+  ModelGate gate;
+  EXPECT_TRUE(gate.Admit(GoodModel(), 1001 * kMs));
+  for (std::size_t i = 0; i < breaks.size(); ++i) {
+    ContactModel model = GoodModel();
+    model.stamp.sequence = 6;
+    model.stamp.stamp_ns = 1001 * kMs;
+    breaks[i](model, model.devices[0].contacts[0]);
+    EXPECT_FALSE(gate.Admit(model, 1001 * kMs)) << "break " << i;
+  }
+  EXPECT_EQ(gate.dropped(), breaks.size());
+}
+
+TEST(ModelGate, SequenceAndTimeMustGrowWithinAnEpochAndOldEpochsStayOut) {
+  ModelGate gate;
+  const auto admit = [&](std::uint64_t epoch, std::uint64_t sequence, std::int64_t stamp, std::int64_t tool_stamp) {
+    ContactModel model = GoodModel();
+    model.stamp = {sequence, epoch, stamp};
+    model.tool_stamp_ns = tool_stamp;
+    return gate.Admit(model, 5000 * kMs);
+  };
+  EXPECT_TRUE(admit(100, 5, 1000, 900));
+  EXPECT_FALSE(admit(100, 5, 1010, 910));   // The same again.
+  EXPECT_FALSE(admit(100, 6, 1000, 910));   // Time stands still.
+  EXPECT_FALSE(admit(100, 6, 1010, 890));   // An older tool.
+  EXPECT_TRUE(admit(100, 9, 1010, 900));    // Lost ones are no reason to refuse; nor is the same tool sample.
+  EXPECT_TRUE(admit(200, 1, 1020, 910));    // Physics was restarted.
+  EXPECT_FALSE(admit(100, 10, 1030, 920));  // A last word from the old one.
+  EXPECT_TRUE(admit(200, 2, 1030, 920));
+}
+
+/// Feeds a model every 10 ms, 15 ms old, while `fed`; returns the state after each tick.
+class AgeRun {
+ public:
+  void Run(int ticks, bool fed) {
+    for (int i = 0; i < ticks; ++i) {
+      now += kMs;
+      if (fed && now % (10 * kMs) == 0) {
+        model = now - 15 * kMs;
+        machine.OnModel(model, now);
+      }
+      machine.Step(model, now, kDt);
+      largest_gain_step = std::max(largest_gain_step, std::abs(machine.gain() - last_gain));
+      last_gain = machine.gain();
+    }
+  }
+  AgeMachine machine;
+  std::int64_t now = 1000 * kMs, model = 0;
+  double last_gain = 0, largest_gain_step = 0;
+};
+
+TEST(AgeMachine, StartsOffAndRisesAfterThreeModelsIn250Ms) {
+  AgeRun run;
+  run.Run(100, false);
+  EXPECT_EQ(run.machine.state(), ServoState::kOff);
+  EXPECT_EQ(run.machine.gain(), 0.0);
+  run.Run(25, true);  // Two models.
+  EXPECT_EQ(run.machine.state(), ServoState::kOff);
+  run.Run(5, true);  // The third.
+  EXPECT_EQ(run.machine.state(), ServoState::kRise);
+  run.Run(240, true);
+  EXPECT_EQ(run.machine.state(), ServoState::kRise);
+  run.Run(12, true);
+  EXPECT_EQ(run.machine.state(), ServoState::kNormal);
+  EXPECT_EQ(run.machine.gain(), 1.0);
+  EXPECT_LT(run.largest_gain_step, 0.007);  // 1.5 / 250: no corner anywhere.
+}
+
+TEST(AgeMachine, HoldsAfter40MsFadesAfter100MsIn300Ms) {
+  AgeRun run;
+  run.Run(400, true);
+  const std::int64_t newest = run.model;
+  bool seen_hold = false;
+  while (run.machine.state() != ServoState::kFade) {
+    run.Run(1, false);
+    const std::int64_t age = run.now - newest;
+    if (run.machine.state() == ServoState::kHold) {
+      seen_hold = true;
+      EXPECT_GT(age, kNormalAge_ns);
+      EXPECT_EQ(run.machine.damping(), kHoldDamping_Ns_m);
+      EXPECT_EQ(run.machine.gain(), 1.0);
+    }
+  }
+  EXPECT_TRUE(seen_hold);
+  EXPECT_EQ(run.now - newest, 101 * kMs);
+  run.Run(300, false);
+  EXPECT_EQ(run.machine.gain(), 0.0);
+  EXPECT_EQ(run.machine.state(), ServoState::kOff);
+  EXPECT_LE(run.now - newest, 402 * kMs);
+}
+
+TEST(AgeMachine, ReturnNeedsThreeInARowAndContinuesFromWhereItFaded) {
+  AgeRun run;
+  run.Run(400, true);
+  run.Run(200, false);  // Half faded.
+  ASSERT_EQ(run.machine.state(), ServoState::kFade);
+  const double before = run.machine.gain();
+  EXPECT_GT(before, 0.1);
+  run.Run(20, true);  // Two.
+  EXPECT_EQ(run.machine.state(), ServoState::kFade);
+  run.Run(10, true);  // Three.
+  EXPECT_EQ(run.machine.state(), ServoState::kRise);
+  EXPECT_LT(run.largest_gain_step, 0.007);
+}
+
+TEST(AgeMachine, ModelsThatComeOldAreNoReasonToReturn) {
+  AgeRun run;
+  run.Run(400, true);
+  run.Run(600, false);
+  for (int i = 0; i < 50; ++i) {
+    run.now += 10 * kMs;
+    run.model = run.now - 150 * kMs;
+    run.machine.OnModel(run.model, run.now);
+    run.machine.Step(run.model, run.now, 0.01);
+  }
+  EXPECT_EQ(run.machine.gain(), 0.0);
+}
+
+TEST(OutputChain, SmallForcesPassUnchangedAndLargeOnesMeetTheLimitSmoothly) {
+  OutputChain chain;
+  chain.slew_N_per_ms = 1e9;
+  EXPECT_EQ(chain.Step(Vec3d(2.7, 0, 0), false, kDt), Vec3d(2.7, 0, 0));
+  double last = 0;
+  for (double f = 0; f < 20; f += 0.01) {
+    const double sent = chain.Step(Vec3d(0, f, 0), false, kDt).norm();
+    EXPECT_GE(sent, last - kRounding);
+    EXPECT_LE(sent - last, 0.01 + 1e-12);  // Slope at most one, also at the knee.
+    EXPECT_LE(sent, 3.3 + kRounding);
+    last = sent;
+  }
+  EXPECT_GT(last, 3.29);
+}
+
+TEST(OutputChain, NeverExceedsLimitOrSlewWhateverComes) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> exponent(-6, 320);
+  std::uniform_int_distribution<int> kind(0, 9);
+  std::normal_distribution<double> normal;
+  OutputChain chain;
+  Vec3d last = Vec3d::Zero();
+  for (int i = 0; i < 100000; ++i) {
+    Vec3d wanted(normal(random), normal(random), normal(random));
+    wanted *= std::pow(10.0, exponent(random));
+    if (kind(random) == 0) wanted.x() = std::numeric_limits<double>::quiet_NaN();
+    if (kind(random) == 1) wanted.y() = -std::numeric_limits<double>::infinity();
+    const bool creep = kind(random) < 3;
+    const Vec3d sent = chain.Step(wanted, creep, kDt);
+    ASSERT_TRUE(sent.allFinite());
+    ASSERT_LE(sent.norm(), 3.3 + 1e-12);
+    ASSERT_LE((sent - last).norm(), (creep ? 0.02 : 0.4) + 1e-12);
+    last = sent;
+  }
+  EXPECT_GT(chain.not_finite, 0u);
+}
+
+// An active source (a force that helps the motion) may give no more than the tank.
+TEST(Passivity, AnActiveSourceIsDampedOnceTheTankIsEmpty) {
+  PassivityController controller;
+  Vec3d sent = Vec3d::Zero();
+  double given = 0;
+  Vec3d x = Vec3d::Zero();
+  for (int i = 1; i <= 5000; ++i) {
+    const Vec3d next(0.002 * std::sin(2 * M_PI * 3 * i * kDt), 0, 0);
+    const Vec3d moved = next - x;
+    x = next;
+    given += sent.dot(moved);
+    const Vec3d active = 0.8 * moved / kDt;  // Negative viscosity of 0.8 N s/m.
+    sent = controller.Step(active, sent, moved, 0.0, 0.0, kDt);
+  }
+  EXPECT_LE(given, kTank_J + 1e-3);
+}
+
+TEST(Passivity, ASpringIsLeftAlone) {
+  PassivityController controller;
+  Vec3d sent = Vec3d::Zero();
+  double x = 0;
+  for (int i = 1; i <= 5000; ++i) {
+    const double next = 0.003 * std::sin(2 * M_PI * 2 * i * kDt);
+    const Vec3d moved(next - x, 0, 0);
+    x = next;
+    const Vec3d spring(-500 * x, 0, 0);
+    sent = controller.Step(spring, sent, moved, 0.5 * 500 * x * x, 0.0, kDt);
+    ASSERT_EQ(sent, spring) << i;
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum::haptics

@@ -1,0 +1,319 @@
+// The whole servo in simulated time: forces on a wall, stalls, absurd messages, determinism.
+#include "haptics_node/servo/servo.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "haptics_node/device/simulated_device.h"
+#include "services/core/error.h"
+#include "tests/unit/haptics/rig.h"
+#include "tests/unit/haptics/test_tissue.h"
+
+namespace fulcrum::haptics {
+namespace {
+
+using testing::BenchScene;
+using testing::BenchTrocar;
+using testing::GuidedDevice;
+using testing::LatePhysics;
+using testing::SentForce;
+using testing::TestTissue;
+using testing::TickAt;
+using testing::TissueParameters;
+
+/// Servo, tissue and late physics together; `Run` gives each tick to `each`.
+struct Loop {
+  Loop(const SceneView& scene, HapticDevice* device, const TissueParameters& parameters)
+      : servo(scene, {device, nullptr}), tissue(parameters) {}
+
+  template <class Each>
+  void Run(int ticks, const Each& each) {
+    for (int i = 0; i < ticks; ++i) {
+      const Tick tick = TickAt(millisecond++);
+      ContactModel model;
+      if (physics.Step(tissue, tick.stamp_ns - 1'000'000, &model)) servo.OfferModel(model, tick.stamp_ns);
+      servo.Step(tick);
+      tissue.Step(servo.record().tool.tools[0].p_WT.cast<double>(), tick.dt_s);
+      each(tick);
+    }
+  }
+  Servo servo;
+  TestTissue tissue;
+  LatePhysics physics;
+  std::uint64_t millisecond = 0;
+};
+
+constexpr auto kNothing = [](const Tick&) {};
+
+TEST(Servo, RefusesAShaftTooShortToTurnAbout) {
+  SceneView scene = BenchScene(1);
+  scene.tools[0].shaft_length_m = 0.02f;
+  GuidedDevice device(BenchTrocar(), [](double) { return Vec3d(0, 0, 0.01); });
+  EXPECT_THROW(Servo(scene, {&device, nullptr}), InputError);
+}
+
+TEST(Servo, WithoutModelsThereIsNoForceAndTheToolIsPublished) {
+  GuidedDevice device(BenchTrocar(), [](double t) { return Vec3d(0, 0, 0.05 - 0.01 * t); });
+  Loop loop(BenchScene(1), &device, {});
+  loop.physics.stalled = true;
+  loop.Run(200, [&](const Tick&) { EXPECT_EQ(device.force, Vec3d::Zero()); });
+  const ToolSample& tool = loop.servo.record().tool.tools[0];
+  EXPECT_EQ(tool.kind, ToolKind::kGrasper);
+  EXPECT_EQ(tool.state, ServoState::kOff);
+  EXPECT_NEAR(tool.p_WT.z(), 0.05 - 0.01 * 0.199, 1e-6);
+  EXPECT_NEAR(tool.v_WT.z(), -0.01, 1e-4);
+  EXPECT_LT((tool.q_WT * Vec3f::UnitZ() + Vec3f::UnitZ()).norm(), 1e-6);  // z of the tool points down its shaft.
+  EXPECT_EQ(tool.model_age_s, 0.0f);                                      // The bus refuses negative ages.
+  EXPECT_LT(loop.servo.figures().model_age_s, 0.0);
+  EXPECT_EQ(loop.servo.record().tool.tools[1].kind, ToolKind::kNone);
+}
+
+TEST(Servo, PressingAPlaneGivesItsSeriesStiffnessStraightOut) {
+  TissueParameters parameters;
+  parameters.k3 = 0;
+  GuidedDevice device(BenchTrocar(), [](double) { return Vec3d(0, 0, -0.004); });
+  Loop loop(BenchScene(0.5), &device, parameters);
+  loop.Run(1500, kNothing);
+  const double expected = 0.5 * 0.004 / (1 / parameters.k1 + 1 / parameters.k_body);
+  EXPECT_NEAR(SentForce(loop.servo).z(), expected, 0.002 * expected);
+  EXPECT_LT(SentForce(loop.servo).head<2>().norm(), 1e-4);
+  EXPECT_NEAR(device.force.z(), expected, 0.002 * expected);  // The lever is 1 here and the shaft is the normal.
+}
+
+TEST(Servo, PressTheShaftSidewaysAndTheHandFeelsTheFulcrum) {
+  // A wall x > 0.05 … seen by a shaft that hangs straight down: the tip presses towards -x, so the wall pushes +x and
+  // the hand, on the other side of the pivot, is pushed towards -x by the inside part over the outside part.
+  GuidedDevice device(BenchTrocar(), [](double) { return Vec3d(0, 0, -0.05); });
+  Servo servo(BenchScene(0.3), {&device, nullptr});  // Softly enough for no coupling: tip and proxy are one.
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    const Tick tick = TickAt(i);
+    if (i % 10 == 0) {
+      ContactModel model;
+      model.stamp = {i + 1, 1, tick.stamp_ns};
+      model.tool_stamp_ns = tick.stamp_ns;
+      model.devices[0].count = 1;
+      Contact& contact = model.devices[0].contacts[0];
+      contact = TestTissue({}).Report();
+      contact.n = Vec3f::UnitX();
+      contact.e1 = Vec3f::UnitY();
+      contact.x_ref = Vec3f(0, 0, -0.05f);
+      contact.f_ref = Vec3f(1, 0, 0);
+      contact.u_c = Vec3f(-1.0f / contact.k_body, 0, 0);
+      servo.OfferModel(model, tick.stamp_ns);
+    }
+    servo.Step(tick);
+  }
+  EXPECT_NEAR(SentForce(servo).x(), 0.3, 1e-3);
+  EXPECT_NEAR(device.force.x(), -0.3 * 0.25 / 0.15, 1e-3);
+}
+
+// The hand's spring against the tissue: where it comes to rest is known.
+TEST(Servo, HandSettlesInBalanceWithTheTissue) {
+  const std::array<ScriptKey, 2> script{
+      {{0.0f, 0, Vec3f(0, 0, 0.01f), 0, 0, 0}, {1.0f, 0, Vec3f(0, 0, -0.005f), 0, 0, 0}}};
+  SceneView scene = BenchScene(0.3);
+  scene.script = script;
+  TissueParameters parameters;
+  parameters.k3 = 0;
+  SimulatedDevice device(scene.haptics, BenchTrocar(), script, 0);
+  Loop loop(scene, &device, parameters);
+  loop.Run(4000, kNothing);
+  const double tissue = 0.3 / (1 / parameters.k1 + 1 / parameters.k_body);
+  const double hand = scene.haptics.hand_stiffness_N_m;
+  const double depth = 0.005 * hand / (hand + tissue);
+  EXPECT_NEAR(loop.servo.record().tool.tools[0].p_WT.z(), -depth, 0.01 * depth);
+  EXPECT_NEAR(SentForce(loop.servo).z(), tissue * depth, 0.01 * tissue * depth);
+  EXPECT_LT(loop.servo.record().tool.tools[0].v_WT.norm(), 1e-4);
+}
+
+// A wall far stiffer than may be rendered, hit by a light grip: it rings down instead of up.
+TEST(Servo, AStiffWallStaysStable) {
+  const std::array<ScriptKey, 2> script{
+      {{0.0f, 0, Vec3f(0, 0, 0.01f), 0, 0, 0}, {0.8f, 0, Vec3f(0, 0, -0.004f), 0, 0, 0}}};
+  SceneView scene = BenchScene(1.0);
+  scene.script = script;
+  SimulatedDevice device(scene.haptics, BenchTrocar(), script, 0);
+  Loop loop(scene, &device, {.k1 = 8000, .k3 = 0, .kt = 500, .k_body = 6000, .b_body = 3});
+  double lowest = 1;
+  double highest = -1;
+  loop.Run(3000, [&](const Tick& tick) {
+    if (tick.session_time_s < 2.5) return;
+    const double z = loop.servo.record().tool.tools[0].p_WT.z();
+    lowest = std::min(lowest, z);
+    highest = std::max(highest, z);
+  });
+  EXPECT_LT(highest - lowest, 5e-5);
+  EXPECT_GT(SentForce(loop.servo).z(), 0.5);
+}
+
+TEST(Servo, ProxyStandsOutOfAWallStifferThanTheCap) {
+  GuidedDevice device(BenchTrocar(), [](double) { return Vec3d(0, 0, -0.002); });
+  Loop loop(BenchScene(1.0), &device, {.k1 = 8000, .k3 = 0, .kt = 500, .k_body = 20000, .b_body = 3});
+  loop.Run(1500, kNothing);
+  const double z = loop.servo.record().tool.tools[0].p_WT.z();
+  EXPECT_GT(z, -0.002 + 0.001);
+  EXPECT_LT(z, 0);
+  EXPECT_LT(SentForce(loop.servo).z(), 0.002 * kMaxHandStiffness_N_m);
+}
+
+TEST(Servo, StallOfPhysicsFadesForcesAndBringsThemBackSoftly) {
+  GuidedDevice device(BenchTrocar(), [](double) { return Vec3d(0, 0, -0.008); });
+  Loop loop(BenchScene(1), &device, {});
+  loop.Run(1500, kNothing);
+  const double pressed = device.force.norm();
+  ASSERT_GT(pressed, 1.5);
+  EXPECT_EQ(loop.servo.figures().state, ServoState::kNormal);
+
+  loop.physics.stalled = true;
+  std::vector<double> forces;
+  loop.Run(1000, [&](const Tick&) { forces.push_back(device.force.norm()); });
+  EXPECT_LE(forces[400], 0.1);  // 400 ms after the last model.
+  EXPECT_EQ(forces.back(), 0.0);
+  EXPECT_EQ(loop.servo.figures().state, ServoState::kOff);
+
+  loop.physics.stalled = false;
+  forces.clear();
+  loop.Run(1000, [&](const Tick&) { forces.push_back(device.force.norm()); });
+  for (std::size_t i = 5; i < forces.size(); ++i) EXPECT_LE(forces[i] - forces[i - 5], 0.1 + 1e-9) << i;
+  EXPECT_NEAR(forces.back(), pressed, 0.02 * pressed);
+  EXPECT_EQ(loop.servo.figures().state, ServoState::kNormal);
+}
+
+TEST(Servo, RestartOfPhysicsIsTakenUp) {
+  GuidedDevice device(BenchTrocar(), [](double) { return Vec3d(0, 0, -0.004); });
+  Loop loop(BenchScene(1), &device, {});
+  loop.Run(1000, kNothing);
+  const double pressed = device.force.norm();
+  loop.physics.stalled = true;
+  loop.Run(600, kNothing);
+  loop.physics = LatePhysics();
+  loop.physics.epoch = 2;
+  loop.Run(800, kNothing);
+  EXPECT_NEAR(device.force.norm(), pressed, 0.02 * pressed);
+  EXPECT_EQ(loop.servo.figures().models_dropped, 0u);
+}
+
+// A tenth of all fields at random: whatever of it passes the gate, the hand is never hurt.
+TEST(Servo, AbsurdModelsNeverBreakLimitOrSlew) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<float> normal;
+  std::uniform_int_distribution<int> die(0, 99);
+  const auto wild = [&](float good) -> float {
+    switch (die(random)) {
+      case 0:
+        return std::numeric_limits<float>::quiet_NaN();
+      case 1:
+        return -std::numeric_limits<float>::infinity();
+      case 2:
+        return 1e30f * normal(random);
+      case 3:
+      case 4:
+      case 5:
+        return good * std::pow(10.0f, 3 * normal(random));
+      case 6:
+        return -good;
+      default:
+        return good;
+    }
+  };
+  Vec3d tip(0, 0, 0.01);
+  GuidedDevice device(BenchTrocar(), [&](double) { return tip; });
+  Servo servo(BenchScene(1), {&device, nullptr});
+  Vec3d last = Vec3d::Zero();
+  double most = 0;
+  for (std::uint64_t i = 0; i < 60000; ++i) {
+    const Tick tick = TickAt(i);
+    tip = Vec3d(0.02 * std::sin(0.003 * static_cast<double>(i)), 0.01 * normal(random) * (i % 50 == 0),
+                0.01 * std::cos(0.007 * static_cast<double>(i)));
+    if (i % 7 == 0) {
+      ContactModel model;
+      model.stamp = {i + 1, 1, tick.stamp_ns};
+      model.tool_stamp_ns = tick.stamp_ns - 12'000'000;
+      model.devices[0].count = static_cast<std::uint32_t>(1 + i % 4);
+      for (Contact& c : model.devices[0].contacts) {
+        c = TestTissue({}).Report();
+        c.id = static_cast<std::uint32_t>(die(random));
+        c.kind = die(random) < 50 ? ContactKind::kSurface : ContactKind::kGrasp;
+        c.n = Vec3f(normal(random), normal(random), normal(random)).normalized();
+        c.e1 = c.n.unitOrthogonal();
+        c.x_ref = tip.cast<float>() * wild(1);
+        c.f_ref = Vec3f(wild(1), wild(-2), wild(10));
+        c.p_s.z() = wild(0.01f);
+        c.v_s.x() = wild(0.01f);
+        c.u_c = Vec3f(wild(0.001f), wild(0.002f), 0);
+        c.du_c = Vec3f(wild(0.01f), 0, wild(0.02f));
+        c.k1 = wild(2000);
+        c.k3 = wild(1e6f);
+        c.k_body = wild(500);
+        c.b_body = wild(10);
+        c.kappa1 = wild(20);
+        c.radius = wild(0.02f);
+        c.slip_force = wild(2);
+      }
+      servo.OfferModel(model, tick.stamp_ns);
+    }
+    servo.Step(tick);
+    ASSERT_TRUE(device.force.allFinite()) << i;
+    ASSERT_LE(device.force.norm(), 3.3f + 1e-12) << i;
+    ASSERT_LE((device.force - last).norm(), 0.4f + 1e-12) << i;
+    last = device.force;
+    most = std::max(most, last.norm());
+  }
+  EXPECT_GT(servo.figures().models_dropped, 1000u);
+  EXPECT_LT(servo.figures().models_dropped, 8500u);  // Some did pass: the test tests something.
+  EXPECT_GT(most, 1.0);
+}
+
+TEST(Servo, ADeviceThatReadsNonsenseIsRiddenOver) {
+  bool broken = false;
+  GuidedDevice device(BenchTrocar(), [&](double) -> Vec3d {
+    return broken ? Vec3d(Vec3d::Constant(std::numeric_limits<double>::quiet_NaN())) : Vec3d(0, 0, -0.003);
+  });
+  Loop loop(BenchScene(1), &device, {});
+  loop.Run(1000, kNothing);
+  const Vec3d before = device.force;
+  broken = true;
+  loop.Run(1, kNothing);
+  broken = false;
+  loop.Run(50, kNothing);
+  EXPECT_LT((device.force - before).norm(), 0.02);
+  EXPECT_TRUE(loop.servo.record().tool.tools[0].p_WT.allFinite());
+}
+
+// The force is continuous at each message: what the arrival of a model adds stays below 0.03 N per tick.
+TEST(Servo, MessagesDoNotKick) {
+  GuidedDevice device(BenchTrocar(), [](double t) { return Vec3d(0, 0, -0.003 + 0.002 * std::cos(2 * M_PI * 2 * t)); });
+  Loop loop(BenchScene(1), &device, {});
+  loop.Run(600, kNothing);
+  Vec3d last = device.force;
+  Vec3d before = last;
+  double worst = 0;
+  loop.Run(2000, [&](const Tick&) {
+    // Second difference: what is left when the motion's own rate is taken out.
+    worst = std::max(worst, (device.force - 2 * last + before).norm());
+    before = last;
+    last = device.force;
+  });
+  EXPECT_LT(worst, 0.03);
+}
+
+std::vector<std::uint64_t> HashesOfARun(double depth) {
+  GuidedDevice device(BenchTrocar(), [=](double t) { return Vec3d(0.01 * t, 0, -depth * std::sin(3 * t)); });
+  Loop loop(BenchScene(0.3), &device, {});
+  std::vector<std::uint64_t> hashes;
+  loop.Run(1500, [&](const Tick&) { hashes.push_back(loop.servo.record().state_hash); });
+  return hashes;
+}
+
+TEST(Servo, SameInputsGiveTheSameHashesAndOtherInputsOthers) {
+  const std::vector<std::uint64_t> first = HashesOfARun(0.004);
+  EXPECT_EQ(first, HashesOfARun(0.004));
+  EXPECT_NE(first.back(), HashesOfARun(0.004001).back());
+}
+
+}  // namespace
+}  // namespace fulcrum::haptics

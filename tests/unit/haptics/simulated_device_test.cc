@@ -1,0 +1,97 @@
+#include "haptics_node/device/simulated_device.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "services/core/operator_script.h"
+#include "tests/unit/haptics/rig.h"
+
+namespace fulcrum::haptics {
+namespace {
+
+using testing::BenchTrocar;
+using testing::TickAt;
+
+const std::array<ScriptKey, 4> kScript{{{1.0f, 0, Vec3f(0, 0, 0.05f), 0, 0, 0},
+                                        {2.0f, 0, Vec3f(0.03f, 0, 0.02f), 0, 0, 0},
+                                        {3.0f, 0, Vec3f(0.03f, 0.02f, 0.02f), 0, 0, 0},
+                                        {0.0f, 1, Vec3f(-0.03f, 0, 0.06f), 0, 0, 0}}};
+
+Vec3d Tip(const Vec3d& p_WA) { return PoseFromAttachPoint(BenchTrocar(), p_WA).p_WT; }
+
+TEST(SimulatedDevice, BeginsAtRestWhereTheScriptIs) {
+  for (const std::uint64_t begin : {0u, 1500u, 2500u, 9000u}) {
+    SimulatedDevice device({}, BenchTrocar(), kScript, 0);
+    const Tick tick = TickAt(begin);
+    const Vec3f wanted = EvaluateScript(kScript, 0, tick.session_time_s).p_W;
+    EXPECT_LT((Tip(device.ReadPosition(tick)) - wanted.cast<double>()).norm(), 1e-7);
+  }
+}
+
+TEST(SimulatedDevice, RestsAtTheFirstKeyWhileNoSessionIsKnown) {
+  SimulatedDevice device({}, BenchTrocar(), kScript, 0);
+  Vec3d tip;
+  for (std::uint64_t i = 0; i < 500; ++i) {
+    Tick tick = TickAt(i);
+    tick.session_time_s = -1;
+    tip = Tip(device.ReadPosition(tick));
+  }
+  EXPECT_LT((tip - Vec3d(0, 0, 0.05)).norm(), 1e-7);
+}
+
+TEST(SimulatedDevice, FollowsTheScriptWithinAMillimetreAndSettlesOnIt) {
+  SimulatedDevice device({}, BenchTrocar(), kScript, 0);
+  for (std::uint64_t i = 0; i < 4000; ++i) {
+    const Tick tick = TickAt(i);
+    const Vec3d wanted = EvaluateScript(kScript, 0, tick.session_time_s).p_W.cast<double>();
+    const Vec3d tip = Tip(device.ReadPosition(tick));
+    EXPECT_LT((tip - wanted).norm(), 0.001) << i;
+    if (i == 3999) {
+      EXPECT_LT((tip - wanted).norm(), 1e-6);
+    }
+  }
+}
+
+TEST(SimulatedDevice, AConstantForceMovesItByForceOverStiffness) {
+  HapticsParams hand;
+  SimulatedDevice device(hand, BenchTrocar(), kScript, 1);
+  Vec3d before;
+  Vec3d after;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    after = device.ReadPosition(TickAt(i));
+    if (i == 0) before = after;
+    device.WriteForce(Vec3d(1, -2, 0.5));
+  }
+  EXPECT_LT((after - before - Vec3d(1, -2, 0.5) / hand.hand_stiffness_N_m).norm(), 1e-7);
+}
+
+// The same motion at ticks that were skipped: the hand goes on in time, not in ticks.
+TEST(SimulatedDevice, SkippedTicksDoNotSlowTheHand) {
+  SimulatedDevice steady({}, BenchTrocar(), kScript, 0);
+  SimulatedDevice halting({}, BenchTrocar(), kScript, 0);
+  for (std::uint64_t i = 0; i < 1700; ++i) {
+    const Vec3d p = steady.ReadPosition(TickAt(i));
+    if (i % 7 != 0) continue;
+    EXPECT_LT((halting.ReadPosition(TickAt(i)) - p).norm(), 2e-4) << i;
+  }
+}
+
+TEST(SimulatedDevice, AnotherSessionIsTakenUpAtRest) {
+  SimulatedDevice device({}, BenchTrocar(), kScript, 0);
+  for (std::uint64_t i = 0; i < 1500; ++i) (void)device.ReadPosition(TickAt(i));
+  Tick tick = TickAt(1500);
+  tick.session_time_s = 2.9;
+  const Vec3d there = device.ReadPosition(tick);
+  EXPECT_LT((Tip(there) - EvaluateScript(kScript, 0, 2.9).p_W.cast<double>()).norm(), 1e-7);
+}
+
+TEST(SimulatedDevice, AToolWithoutKeysRests) {
+  SimulatedDevice device({}, BenchTrocar(), std::span(kScript).first(3), 1);
+  const Vec3d first = device.ReadPosition(TickAt(0));
+  for (std::uint64_t i = 1; i < 100; ++i) EXPECT_EQ(device.ReadPosition(TickAt(i)), first);
+  EXPECT_TRUE(first.allFinite());
+}
+
+}  // namespace
+}  // namespace fulcrum::haptics
