@@ -4,7 +4,7 @@
 # Every static library below a node's folder is a solver, except the node's own library lib<project>_<node>.a.
 set -euo pipefail
 build=$1
-forbidden='eprosima|fastrtps|fastdds|fastcdr|osg::|YAML::|fulcrum::msg::|fulcrum::app::|boost::'
+forbidden='eprosima|fastrtps|fastdds|fastcdr|osg::|YAML::|fulcrum::idl::|fulcrum::app::|boost::'
 nodes=(physics_node thermal_node haptics_node handle_bridge render_node)
 checked=0
 failed=0
