@@ -9,8 +9,8 @@ namespace fulcrum::physics {
 
 struct ClosestPoints {
   float distance_sq = 0;
-  float t = 0;                              ///< On the segment, 0 at its first end.
-  std::array<float, 3> barycentric{};       ///< On the triangle.
+  float t = 0;                         ///< On the segment, 0 at its first end.
+  std::array<float, 3> barycentric{};  ///< On the triangle.
   Vec3f on_segment = Vec3f::Zero();
   Vec3f on_triangle = Vec3f::Zero();
   bool crosses = false;  ///< The segment passes through the triangle: distance 0.

@@ -10,6 +10,10 @@ namespace {
 constexpr float kSlack = 0.0015f;
 /// One projection moves tissue at most this far: a deep overlap is undone over several steps, not thrown out [m].
 constexpr float kMaxPush = 0.003f;
+/// A tool deeper behind a triangle than this has gone through it for good: pushing would only tear [m].
+constexpr float kMaxBehind = 0.004f;
+/// After letting go, jaws collide again when nothing has been near them for so many steps.
+constexpr int kClearSteps = 5;
 /// A sweep is cut into pieces of this part of the capsule's radius …
 constexpr float kSweepPiece = 0.8f;
 /// … but at most into this many.
@@ -130,9 +134,8 @@ void ToolCollision::ForEachCellNear(const Vec3f& a, const Vec3f& b, float range,
             const Vec3f x01 = particles_->At(particles_->NodeRef(row, col + 1));
             const Vec3f x10 = particles_->At(particles_->NodeRef(row + 1, col));
             const Vec3f centre = 0.25f * (x00 + x01 + x10 + x11);
-            const float radius_sq =
-                std::max(std::max((x00 - centre).squaredNorm(), (x11 - centre).squaredNorm()),
-                         std::max((x01 - centre).squaredNorm(), (x10 - centre).squaredNorm()));
+            const float radius_sq = std::max(std::max((x00 - centre).squaredNorm(), (x11 - centre).squaredNorm()),
+                                             std::max((x01 - centre).squaredNorm(), (x10 - centre).squaredNorm()));
             const float distance = DistanceToSegment(centre, a, b);
             if (distance <= range + std::sqrt(radius_sq)) {
               visit(row, col, distance);
@@ -171,10 +174,10 @@ void ToolCollision::AddPair(std::uint32_t capsule, Index triangle, const std::ar
   if (triangle >= membrane_triangles_) {
     pair.side = 1;  // The organ is closed: tools are outside.
   } else {
-    const auto last = std::lower_bound(last_pairs_.begin(), last_pairs_.end(), pair,
-                                       [](const ContactPair& p, const ContactPair& q) {
-                                         return std::pair(p.capsule, p.triangle) < std::pair(q.capsule, q.triangle);
-                                       });
+    const auto last =
+        std::lower_bound(last_pairs_.begin(), last_pairs_.end(), pair, [](const ContactPair& p, const ContactPair& q) {
+          return std::pair(p.capsule, p.triangle) < std::pair(q.capsule, q.triangle);
+        });
     const bool known = last != last_pairs_.end() && last->capsule == capsule && last->triangle == triangle;
     if (known && last->touching) {
       pair.side = last->side;
@@ -247,18 +250,15 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
       const std::size_t first = pairs_.size();
       FindMembranePairs(c, range);
       FindTubePairs(c, range);
-      if (to.part == ToolPart::kJaw) {
-        clear = clear && std::all_of(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end(),
-                                     [touch](const ContactPair& p) { return p.closest.distance_sq > touch * touch; });
-      }
+      clear = clear && (to.part != ToolPart::kJaw || pairs_.size() == first);
     }
-    holding_[tool] = moved.hold || (holding_[tool] && !clear);
+    yielding_[tool] = moved.hold ? kClearSteps : clear ? std::max(yielding_[tool] - 1, 0) : yielding_[tool];
   }
   std::sort(pairs_.begin(), pairs_.end(), [](const ContactPair& p, const ContactPair& q) {
     return std::pair(p.capsule, p.triangle) < std::pair(q.capsule, q.triangle);
   });
   for (std::uint32_t c = 0; c < motion_.size(); ++c) {
-    if (motion_[c].to.part == ToolPart::kJaw && holding_[c / kMaxCapsules]) {
+    if (motion_[c].to.part == ToolPart::kJaw && yielding_[c / kMaxCapsules] > 0) {
       motion_[c].enabled = false;
     }
   }
@@ -274,12 +274,10 @@ void ToolCollision::Sweep() {
     if (!m.enabled) {
       continue;
     }
-    const int pieces =
-        std::clamp(static_cast<int>(std::ceil(m.travel / (kSweepPiece * m.to.radius))), 1, kMaxPieces);
+    const int pieces = std::clamp(static_cast<int>(std::ceil(m.travel / (kSweepPiece * m.to.radius))), 1, kMaxPieces);
     for (int piece = 1; piece <= pieces; ++piece) {
       const float u = static_cast<float>(piece) / static_cast<float>(pieces);
-      const Capsule now{m.from.a + u * (m.to.a - m.from.a), m.from.b + u * (m.to.b - m.from.b), m.to.radius,
-                        m.to.part};
+      const Capsule now{m.from.a + u * (m.to.a - m.from.a), m.from.b + u * (m.to.b - m.from.b), m.to.radius, m.to.part};
       for (std::size_t p = first; p < last; ++p) {
         ProjectPair(&pairs_[p], now);
       }
@@ -311,10 +309,10 @@ void ToolCollision::ProjectPair(ContactPair* pair, const Capsule& capsule) {
       return;  // It was through the membrane before we looked: there is no telling which side is right.
     }
     pair->push = -side * normal;
-    depth = reach - behind;
+    depth = behind > -kMaxBehind ? reach - behind : 0.0f;
   } else if (height < -kBehindCosine * distance) {
     pair->push = -side * normal;
-    depth = reach + distance;
+    depth = distance < kMaxBehind ? reach + distance : 0.0f;
   } else if (distance < reach && distance > 0.0f) {
     pair->push = -offset / distance;
     depth = reach - distance;
@@ -337,16 +335,21 @@ void ToolCollision::ProjectPair(ContactPair* pair, const Capsule& capsule) {
   // Coulomb: the point of contact is carried along by at most friction times the push.
   const Motion& m = motion_[pair->capsule];
   const Vec3f tool_step = closest.on_segment - (m.from.a + closest.t * (m.from.b - m.from.a));
-  const Vec3f tissue_step = closest.on_triangle - (b[0] * particles_->Previous(pair->at[0]) +
-                                                   b[1] * particles_->Previous(pair->at[1]) +
-                                                   b[2] * particles_->Previous(pair->at[2]));
+  const Vec3f tissue_step =
+      closest.on_triangle - (b[0] * particles_->Previous(pair->at[0]) + b[1] * particles_->Previous(pair->at[1]) +
+                             b[2] * particles_->Previous(pair->at[2]));
   Vec3f slide = tissue_step - tool_step;
-  slide -= slide.dot(pair->push) * pair->push;
+  const float approach = -slide.dot(pair->push);
+  slide += approach * pair->push;
   const float sliding = slide.norm(), grip = scene_.physics.friction * depth;
   const Vec3f move = depth * pair->push - (sliding > grip ? Vec3f(slide * (grip / sliding)) : slide);
+  // An overlap that this step's motion does not explain is taken away without giving the tissue speed.
+  const Vec3f correction = std::max(0.0f, depth - std::max(0.0f, approach)) * pair->push;
   for (std::size_t i = 0; i < 3; ++i) {
     if (w[i] > 0.0f) {
-      particles_->Set(pair->at[i], x[i] + (w[i] / sum) * move);
+      const float share = w[i] / sum;
+      particles_->Set(pair->at[i], x[i] + share * move);
+      particles_->SetPrevious(pair->at[i], particles_->Previous(pair->at[i]) + share * correction);
     }
   }
 }
@@ -379,9 +382,9 @@ SurfacePoint ToolCollision::Nearest(const Capsule& capsule, float range) const {
   const float reach = range + capsule.radius;
   float best_sq = reach * reach;
   const auto offer = [&](Index triangle, const std::array<Index, 3>& particle) {
-    const ClosestPoints closest =
-        ClosestSegmentTriangle(capsule.a, capsule.b, particles_->At(particles_->Ref(particle[0])),
-                               particles_->At(particles_->Ref(particle[1])), particles_->At(particles_->Ref(particle[2])));
+    const ClosestPoints closest = ClosestSegmentTriangle(
+        capsule.a, capsule.b, particles_->At(particles_->Ref(particle[0])),
+        particles_->At(particles_->Ref(particle[1])), particles_->At(particles_->Ref(particle[2])));
     if (closest.distance_sq < best_sq) {
       best_sq = closest.distance_sq;
       best = {true, triangle < membrane_triangles_, triangle, closest, std::sqrt(best_sq) - capsule.radius};

@@ -17,10 +17,10 @@ namespace fulcrum::physics {
 
 /// A capsule near a triangle in this step.
 struct ContactPair {
-  std::uint32_t capsule = 0;   ///< tool * kMaxCapsules + capsule of the tool.
-  Index triangle = 0;          ///< Membrane triangle, or membrane triangle count + index in SceneView.tube_surface.
-  std::int8_t side = 0;        ///< Sign of the tool's height over the triangle's normal; 0 unknown.
-  bool touching = false;       ///< The last projection moved the triangle.
+  std::uint32_t capsule = 0;  ///< tool * kMaxCapsules + capsule of the tool.
+  Index triangle = 0;         ///< Membrane triangle, or membrane triangle count + index in SceneView.tube_surface.
+  std::int8_t side = 0;       ///< Sign of the tool's height over the triangle's normal; 0 unknown.
+  bool touching = false;      ///< The last projection moved the triangle.
   std::array<ParticleRef, 3> at;
   std::array<Index, 3> particle{};
   ClosestPoints closest;       ///< At the last projection, before its correction.
@@ -31,9 +31,9 @@ struct ContactPair {
 struct SurfacePoint {
   bool found = false;
   bool on_membrane = true;
-  Index triangle = 0;       ///< As in ContactPair.
+  Index triangle = 0;  ///< As in ContactPair.
   ClosestPoints closest;
-  float gap = 0;            ///< Surface to surface; negative: overlapping [m].
+  float gap = 0;  ///< Surface to surface; negative: overlapping [m].
 };
 
 class ToolCollision {
@@ -42,7 +42,7 @@ class ToolCollision {
 
   struct ToolMotion {
     ToolShape from, to;
-    bool hold = false;  ///< The jaws hold tissue: they do not collide, and after letting go only once they are clear.
+    bool hold = false;  ///< The jaws hold tissue: they do not collide, nor after letting go until they are clear.
   };
 
   /// Finds the pairs of this step; cheap when no tool is near. `tissue_moved` false: since the last call it has not, so
@@ -96,7 +96,7 @@ class ToolCollision {
   std::vector<Index> tube_order_;
   std::vector<Chunk> chunks_;
   std::array<Motion, kMaxTools * kMaxCapsules> motion_;
-  std::array<bool, kMaxTools> holding_{};
+  std::array<int, kMaxTools> yielding_{};  ///< Steps for which the jaws still do not collide.
   std::vector<ContactPair> pairs_, last_pairs_;
 };
 

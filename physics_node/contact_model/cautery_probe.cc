@@ -98,8 +98,7 @@ CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolCollision& col
     const auto nodes = model_->TriangleNodes(pair.triangle);
     const auto& m = scene_.membrane_material;
     const auto barycentric = BarycentricInPlane(mean, m[nodes[0]], m[nodes[1]], m[nodes[2]]);
-    const Vec2f place =
-        barycentric[0] * m[nodes[0]] + barycentric[1] * m[nodes[1]] + barycentric[2] * m[nodes[2]];
+    const Vec2f place = barycentric[0] * m[nodes[0]] + barycentric[1] * m[nodes[1]] + barycentric[2] * m[nodes[2]];
     const float distance = (place - mean).squaredNorm();
     if (distance < nearest) {
       nearest = distance;

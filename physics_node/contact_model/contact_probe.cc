@@ -6,15 +6,15 @@
 namespace fulcrum::physics {
 namespace {
 
-constexpr float kReach = 0.010f;       ///< Contacts are announced this far before touch [m].
-constexpr float kSmoothing = 0.03f;    ///< Time constant of everything measured [s].
-constexpr float kRelaxation = 0.02f;   ///< b_body / k_body [s].
+constexpr float kReach = 0.010f;                       ///< Contacts are announced this far before touch [m].
+constexpr float kSmoothing = 0.03f;                    ///< Time constant of everything measured [s].
+constexpr float kRelaxation = 0.02f;                   ///< b_body / k_body [s].
 constexpr float kMinBody = 30.0f, kMaxBody = 5000.0f;  ///< [N/m]
-constexpr float kSkinOverEt = 2.0f;    ///< k1 / (E t).
+constexpr float kSkinOverEt = 2.0f;                    ///< k1 / (E t).
 constexpr float kBodyOverSecant = 2.0f;
-constexpr float kForceCap = 15.0f;     ///< Rectal tissue is damaged above this [N].
+constexpr float kForceCap = 15.0f;                              ///< Rectal tissue is damaged above this [N].
 constexpr float kSurfaceRadius = 0.012f, kGraspRadius = 0.03f;  ///< Where the model holds [m].
-constexpr float kLeastDent = 0.0005f;  ///< Below this a secant is noise [m].
+constexpr float kLeastDent = 0.0005f;                           ///< Below this a secant is noise [m].
 
 Vec3f Limited(const Vec3f& v, float limit) {
   const float norm = v.norm();
@@ -50,8 +50,14 @@ ContactProbe::Motion ContactProbe::RingMotion(Index node) const {
   const int dc = steps(0), dr = steps(1);
   std::array<Index, 8> ring{};
   std::size_t count = 0;
-  for (const auto& [r, c] : {std::pair{-dr, 0}, {dr, 0}, {0, -dc}, {0, dc}, {-dr * 7 / 10, -dc * 7 / 10},
-                             {-dr * 7 / 10, dc * 7 / 10}, {dr * 7 / 10, -dc * 7 / 10}, {dr * 7 / 10, dc * 7 / 10}}) {
+  for (const auto& [r, c] : {std::pair{-dr, 0},
+                             {dr, 0},
+                             {0, -dc},
+                             {0, dc},
+                             {-dr * 7 / 10, -dc * 7 / 10},
+                             {-dr * 7 / 10, dc * 7 / 10},
+                             {dr * 7 / 10, -dc * 7 / 10},
+                             {dr * 7 / 10, dc * 7 / 10}}) {
     if (row + r >= 0 && row + r < rows && col + c >= 0 && col + c < cols) {
       const auto at = static_cast<Index>((row + r) * cols + col + c);
       if (model_->NodeAlive(at)) {
@@ -67,8 +73,8 @@ void ContactProbe::Enter(ToolMemory* memory, ContactKind kind) const {
     return;
   }
   std::vector<Index> buffer = std::move(memory->touched);
-  const Vec3f force = memory->kind == ContactKind::kNone || kind == ContactKind::kNone ? Vec3f::Zero().eval()
-                                                                                       : memory->force;
+  const Vec3f force =
+      memory->kind == ContactKind::kNone || kind == ContactKind::kNone ? Vec3f::Zero().eval() : memory->force;
   *memory = {};
   memory->touched = std::move(buffer);
   memory->kind = kind;

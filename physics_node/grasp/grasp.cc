@@ -90,8 +90,7 @@ void Grasp::Slip(const Vec3f& traction_W, const ToolDescription& tool, const Too
 }
 
 void Grasp::DropDead(const TissueModel& model, ParticleStore* particles) {
-  DropIf(model, particles,
-         [&](const HeldParticle& held) { return model.BaseInverseMass(held.particle) == 0.0f; });
+  DropIf(model, particles, [&](const HeldParticle& held) { return model.BaseInverseMass(held.particle) == 0.0f; });
   for (const HeldParticle& held : held_) {
     particles->SetInverseMass(particles->Ref(held.particle), 0.0f);  // A revived node takes its mass back.
   }

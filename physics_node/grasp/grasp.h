@@ -25,7 +25,8 @@ class Grasp {
   void Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model, ParticleStore* particles);
   /// Puts what is held where the tool has taken it.
   void Move(const ToolPose& pose, ParticleStore* particles) const;
-  /// Above grip_force_N the tissue creeps out of the jaws along the traction [N, frame W]; what leaves the jaws is lost.
+  /// Above grip_force_N the tissue creeps out of the jaws along the traction [N, frame W]; what leaves the jaws is
+  /// lost.
   void Slip(const Vec3f& traction_W, const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
             ParticleStore* particles);
   /// Drops what has been cut away meanwhile.

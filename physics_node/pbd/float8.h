@@ -67,8 +67,9 @@ inline std::uint32_t Bits(F8 mask) {
 
 #endif
 
-inline F8 Abs(F8 a) { return a & F8::Halves(_mm_castsi128_ps(_mm_set1_epi32(0x7fffffff)),
-                                            _mm_castsi128_ps(_mm_set1_epi32(0x7fffffff))); }
+inline F8 Abs(F8 a) {
+  return a & F8::Halves(_mm_castsi128_ps(_mm_set1_epi32(0x7fffffff)), _mm_castsi128_ps(_mm_set1_epi32(0x7fffffff)));
+}
 inline F8 SignOf(F8 a) { return a & F8::All(-0.0f); }
 
 /// Lane i of the result is lane i + 1; the last lane is lane 0.
@@ -90,9 +91,7 @@ inline V8 operator+(V8 a, V8 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 inline V8 operator-(V8 a, V8 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline V8 operator*(V8 a, F8 s) { return {a.x * s, a.y * s, a.z * s}; }
 inline F8 Dot(V8 a, V8 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline V8 Cross(V8 a, V8 b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+inline V8 Cross(V8 a, V8 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 
 /// Eight xyzw particles, transposed into lanes.
 struct Particles8 {
@@ -150,8 +149,8 @@ inline F8 AtanUnit(F8 t) {
   const F8 big = t > F8::All(0.41421356f);
   const F8 u = Select(big, (t - one) / (t + one), t);
   const F8 s = u * u;
-  const F8 poly = ((F8::All(0.0805374449f) * s - F8::All(0.138776856f)) * s + F8::All(0.199777106f)) * s -
-                  F8::All(0.333329491f);
+  const F8 poly =
+      ((F8::All(0.0805374449f) * s - F8::All(0.138776856f)) * s + F8::All(0.199777106f)) * s - F8::All(0.333329491f);
   return Select(big, F8::All(0.78539816f), F8::All(0.0f)) + (u + u * s * poly);
 }
 /// Angle of (cosine, sine) scaled by any positive factor, in (-pi, pi].

@@ -57,7 +57,7 @@ struct IntegrateSettings {
 
 struct FinishResult {
   float max_step_sq;     ///< Largest squared movement of a free particle [m^2].
-  std::uint32_t resets;  ///< Particles put back because they were not finite or left their bounds.
+  std::uint32_t resets;  ///< Free particles put back or cut short.
 };
 
 /// Bounds of blocks of 8 x 8 cells; array index (row_block * slot_blocks + slot_block) * 8 + lane.
@@ -78,9 +78,9 @@ struct Kernels {
 
   /// Verlet prediction of `count` entries (multiple of 8) of the planes: previous <- now, now <- now + velocity step.
   /// A damaged coordinate is taken from `previous`; returns how many.
-  std::uint32_t (*integrate)(float* const now[3], float* const previous[3], const float* w,
-                             std::size_t count, const IntegrateSettings& settings);
-  /// Puts back what is not finite or has moved further than sqrt(limit_sq).
+  std::uint32_t (*integrate)(float* const now[3], float* const previous[3], const float* w, std::size_t count,
+                             const IntegrateSettings& settings);
+  /// Puts back what is not finite, and cuts short what has moved further than sqrt(limit_sq).
   FinishResult (*finish)(float* const now[3], const float* const previous[3], const float* w, std::size_t count,
                          float limit_sq);
   void (*block_bounds)(const GridArrays& grid, const BlockBounds& bounds);

@@ -234,11 +234,15 @@ FinishResult Finish(float* const now[3], const float* const previous[3], const f
     const F8 moved = Dot(d, d);
     const F8 good = moved < limit;  // False for a NaN.
     if (Bits(good) != 0xffu) {
-      const F8 held = F8::Load(w + i) > F8::All(0.0f);
-      Select(good, x.x, p.x).Store(now[0] + i);
-      Select(good, x.y, p.y).Store(now[1] + i);
-      Select(good, x.z, p.z).Store(now[2] + i);
-      result.resets += static_cast<std::uint32_t>(__builtin_popcount(~Bits(good) & Bits(held) & 0xffu));
+      // Too far: only as far as allowed. Not finite: back to where it was.
+      const F8 finite = moved < F8::All(3e38f);
+      const F8 part = Sqrt(limit / Max(moved, limit)) & finite;
+      const V8 kept = p + V8{d.x & finite, d.y & finite, d.z & finite} * part;
+      Select(good, x.x, kept.x).Store(now[0] + i);
+      Select(good, x.y, kept.y).Store(now[1] + i);
+      Select(good, x.z, kept.z).Store(now[2] + i);
+      const F8 free = F8::Load(w + i) > F8::All(0.0f);
+      result.resets += static_cast<std::uint32_t>(__builtin_popcount(~Bits(good) & Bits(free) & 0xffu));
     }
     largest = Max(moved & good, largest);
   }

@@ -5,6 +5,12 @@
 #include <cstring>
 
 namespace fulcrum::physics {
+namespace {
+
+/// The fat that a binding stands for gives way when the membrane is lifted off and carries it when it is pressed down.
+constexpr float kCompressionOverTension = 10.0f;
+
+}  // namespace
 
 PbdSolver::PbdSolver(const PhysicsParams& params, TissueModel* model, ParticleStore* particles, const Kernels& kernels)
     : params_(params), model_(model), particles_(particles), kernels_(kernels) {}
@@ -55,7 +61,8 @@ void PbdSolver::Iterate() {
 }
 
 void PbdSolver::ProjectBindings() {
-  const float k = params_.k_binding;
+  const float k_tension = params_.k_binding;
+  const float k_compression = std::min(1.0f, kCompressionOverTension * params_.k_binding);
   for (const PackedBinding& binding : model_->bindings()) {
     if (binding.rest_length < 0.0f) {
       continue;
@@ -76,6 +83,7 @@ void PbdSolver::ProjectBindings() {
     if (!(length * sum > 0.0f)) {
       continue;  // Nothing can move, or there is no direction to move in.
     }
+    const float k = length < binding.rest_length ? k_compression : k_tension;
     const Vec3f correction = (k * (length - binding.rest_length) / (length * sum)) * d;
     particles_->Set(binding.membrane, m - particles_->InverseMass(binding.membrane) * correction);
     for (int j = 0; j < 3; ++j) {
@@ -89,15 +97,18 @@ FinishResult PbdSolver::Finish() {
   float* const now[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
   const float* const previous[3] = {particles_->previous_plane(0), particles_->previous_plane(1),
                                     particles_->previous_plane(2)};
-  FinishResult result =
-      kernels_.finish(now, previous, particles_->plane(3), particles_->layout().plane(), kLimitSq);
+  FinishResult result = kernels_.finish(now, previous, particles_->plane(3), particles_->layout().plane(), kLimitSq);
   float* x = particles_->tube();
   const float* p = particles_->tube_previous();
   for (Index v = 0; v < particles_->tube_count(); ++v, x += 4, p += 4) {
     const float dx = x[0] - p[0], dy = x[1] - p[1], dz = x[2] - p[2];
     const float moved = dx * dx + dy * dy + dz * dz;
     if (!(moved < kLimitSq)) {
-      std::memcpy(x, p, 3 * sizeof(float));
+      const bool finite = moved < 3e38f;
+      const float part = finite ? std::sqrt(kLimitSq / moved) : 0.0f;
+      x[0] = p[0] + (finite ? dx : 0.0f) * part;
+      x[1] = p[1] + (finite ? dy : 0.0f) * part;
+      x[2] = p[2] + (finite ? dz : 0.0f) * part;
       result.resets += x[3] > 0.0f;
     } else {
       result.max_step_sq = std::max(result.max_step_sq, moved);

@@ -14,7 +14,7 @@ namespace fulcrum::physics {
 class PbdSolver {
  public:
   /// No particle moves further in one step [m]: 3 m/s at 100 Hz, ten times a quick hand. What would is not tissue but
-  /// an explosion, and is put back.
+  /// an explosion, and is cut short.
   static constexpr float kMaxStep = 0.03f;
 
   PbdSolver(const PhysicsParams& params, TissueModel* model, ParticleStore* particles,
@@ -25,7 +25,7 @@ class PbdSolver {
   std::uint32_t Predict();
   /// One Gauss-Seidel iteration: tube springs, volumes, membrane stretch, bending, bindings.
   void Iterate();
-  /// Quarantine: what is not finite, or has gone further than kMaxStep, goes back to where it was.
+  /// Quarantine: what is not finite goes back to where it was; nothing goes further than kMaxStep.
   FinishResult Finish();
   /// Takes all velocities away.
   void Stop();

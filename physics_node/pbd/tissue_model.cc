@@ -272,8 +272,9 @@ void TissueModel::RefreshEdge(Index node, int direction) {
   const Index edge = 3 * node + direction;
   const float rest = scene_.membrane_rest_length[edge];
   const std::uint32_t at = layout_.Offset(node / scene_.membrane.cols, node % scene_.membrane.cols);
-  rest_[direction][at] =
-      rest > 0.0f && EdgeAlive(node, direction) ? rest * (1.0f - kShrinkUnit * static_cast<float>(shrink_[edge])) : 0.0f;
+  rest_[direction][at] = rest > 0.0f && EdgeAlive(node, direction)
+                             ? rest * (1.0f - kShrinkUnit * static_cast<float>(shrink_[edge]))
+                             : 0.0f;
 }
 
 void TissueModel::RefreshTriangle(Index triangle) {
@@ -380,7 +381,8 @@ int TissueModel::Apply(const TopologyState& topology, ParticleStore* particles) 
   constexpr std::size_t kChunk = 256;  // Most chunks are equal: compare them whole.
   for (std::size_t at = 0; at < shrink_.size(); at += kChunk) {
     const std::size_t end = std::min(at + kChunk, shrink_.size());
-    if (std::equal(shrink_.begin() + static_cast<std::ptrdiff_t>(at), shrink_.begin() + static_cast<std::ptrdiff_t>(end),
+    if (std::equal(shrink_.begin() + static_cast<std::ptrdiff_t>(at),
+                   shrink_.begin() + static_cast<std::ptrdiff_t>(end),
                    topology.shrink.begin() + static_cast<std::ptrdiff_t>(at))) {
       continue;
     }

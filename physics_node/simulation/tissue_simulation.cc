@@ -14,9 +14,7 @@ constexpr int kStillSteps = 50;
 /// A tool that moves less is standing still: the resolution of a haptic device is 9 um.
 constexpr float kToolStill = 1e-7f;
 
-float AngleBetween(const Quatf& a, const Quatf& b) {
-  return 2.0f * std::acos(std::min(1.0f, std::abs(a.dot(b))));
-}
+float AngleBetween(const Quatf& a, const Quatf& b) { return 2.0f * std::acos(std::min(1.0f, std::abs(a.dot(b)))); }
 
 /// From `from` towards `to`, at most `step` metres and `turn` radians.
 ToolPose Approach(const ToolPose& from, const ToolPose& to, float step, float turn) {
@@ -128,10 +126,10 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
   report.resets += finish.resets;
   report.max_step_m = std::sqrt(finish.max_step_sq);
   quarantined_ += report.resets;
-  const bool stirred = std::any_of(tracks_.begin(), tracks_.end(), [](const ToolTrack& track) {
-    return track.present && track.moved();
-  });
-  still_steps_ = report.max_step_m < kStill && !holds && !(stirred && !collision_.pairs().empty()) ? still_steps_ + 1 : 0;
+  const bool stirred = std::any_of(tracks_.begin(), tracks_.end(),
+                                   [](const ToolTrack& track) { return track.present && track.moved(); });
+  still_steps_ =
+      report.max_step_m < kStill && !holds && !(stirred && !collision_.pairs().empty()) ? still_steps_ + 1 : 0;
   if (still_steps_ >= kStillSteps) {
     solver_.Stop();
     asleep_ = true;

@@ -20,9 +20,9 @@ struct ToolInput {
 };
 
 struct StepReport {
-  bool asleep = false;          ///< Nothing moved and nothing was computed.
-  float max_step_m = 0;         ///< Largest movement of a particle in this step.
-  std::uint32_t resets = 0;     ///< Particles put back in this step.
+  bool asleep = false;       ///< Nothing moved and nothing was computed.
+  float max_step_m = 0;      ///< Largest movement of a particle in this step.
+  std::uint32_t resets = 0;  ///< Particles put back in this step.
 };
 
 /// What a restarted node needs to go on; positions apart.

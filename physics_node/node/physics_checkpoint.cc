@@ -1,0 +1,111 @@
+#include "physics_node/node/physics_checkpoint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace fulcrum::physics {
+namespace {
+
+struct ToolRecord {
+  float p_WT[3];
+  float q_WT[4];  ///< w x y z.
+  float jaw_rad;
+  std::uint32_t known;
+  std::uint32_t grasp_state;
+  std::uint32_t held_count;
+};
+struct HeldRecord {
+  std::uint32_t particle;
+  float p_T[3];
+};
+struct Header {
+  std::uint32_t particle_count;
+  float max_displacement_m;
+  ToolRecord tools[kMaxTools];
+};
+// Followed by positions, previous positions (3 floats a particle each), then the held particles tool by tool.
+
+std::size_t PositionsBytes(Index particles) { return 3 * sizeof(float) * std::size_t{particles}; }
+
+}  // namespace
+
+std::size_t CheckpointCapacity(Index particle_count) {
+  return sizeof(Header) + 2 * PositionsBytes(particle_count) +
+         kMaxTools * sizeof(HeldRecord) * std::size_t{particle_count};
+}
+
+std::size_t WriteCheckpoint(const TissueSimulation& simulation, float max_displacement_m, std::span<std::byte> slot) {
+  const ParticleStore& particles = simulation.particles();
+  const Index count = particles.particle_count();
+  const SimulationMemory memory = simulation.Save();
+  Header header{};
+  header.particle_count = count;
+  header.max_displacement_m = max_displacement_m;
+  std::byte* at = slot.data() + sizeof(Header) + 2 * PositionsBytes(count);
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    ToolRecord& tool = header.tools[i];
+    const ToolPose& pose = memory.pose[i];
+    std::copy_n(pose.p_WT.data(), 3, tool.p_WT);
+    tool.q_WT[0] = pose.q_WT.w();
+    std::copy_n(pose.q_WT.vec().data(), 3, tool.q_WT + 1);
+    tool.jaw_rad = pose.jaw_rad;
+    tool.known = memory.known[i] ? 1 : 0;
+    tool.grasp_state = static_cast<std::uint32_t>(memory.grasp_state[i]);
+    tool.held_count = static_cast<std::uint32_t>(memory.held[i].size());
+    for (const HeldParticle& held : memory.held[i]) {
+      const HeldRecord record{held.particle, {held.p_T.x(), held.p_T.y(), held.p_T.z()}};
+      std::memcpy(at, &record, sizeof(record));
+      at += sizeof(record);
+    }
+  }
+  std::memcpy(slot.data(), &header, sizeof(header));
+  auto* floats = reinterpret_cast<float*>(slot.data() + sizeof(Header));
+  particles.CopyPositions({floats, 3 * std::size_t{count}});
+  particles.CopyPrevious({floats + 3 * std::size_t{count}, 3 * std::size_t{count}});
+  return static_cast<std::size_t>(at - slot.data());
+}
+
+std::optional<RestoredCheckpoint> ReadCheckpoint(std::span<const std::byte> payload, TissueSimulation* simulation) {
+  Header header;
+  if (payload.size() < sizeof(header)) {
+    return std::nullopt;
+  }
+  std::memcpy(&header, payload.data(), sizeof(header));
+  const std::size_t floats = 3 * std::size_t{header.particle_count};
+  std::size_t size = sizeof(Header) + 2 * PositionsBytes(header.particle_count);
+  for (const ToolRecord& tool : header.tools) {
+    size += sizeof(HeldRecord) * std::size_t{tool.held_count};
+  }
+  if (payload.size() != size) {
+    return std::nullopt;
+  }
+  std::vector<float> xyz(floats), previous(floats);
+  std::memcpy(xyz.data(), payload.data() + sizeof(Header), floats * sizeof(float));
+  std::memcpy(previous.data(), payload.data() + sizeof(Header) + floats * sizeof(float), floats * sizeof(float));
+  const std::byte* at = payload.data() + sizeof(Header) + 2 * floats * sizeof(float);
+  SimulationMemory memory;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    const ToolRecord& tool = header.tools[i];
+    const Quatf q(tool.q_WT[0], tool.q_WT[1], tool.q_WT[2], tool.q_WT[3]);
+    memory.pose[i] = {Vec3f(tool.p_WT[0], tool.p_WT[1], tool.p_WT[2]), q.normalized(), tool.jaw_rad};
+    memory.known[i] = tool.known != 0;
+    memory.grasp_state[i] = static_cast<Grasp::State>(tool.grasp_state);
+    if (tool.grasp_state > static_cast<std::uint32_t>(Grasp::State::kClosedEmpty) ||
+        (memory.known[i] && !(memory.pose[i].p_WT.allFinite() && memory.pose[i].q_WT.coeffs().allFinite() &&
+                              std::isfinite(tool.jaw_rad)))) {
+      return std::nullopt;
+    }
+    for (std::uint32_t h = 0; h < tool.held_count; ++h, at += sizeof(HeldRecord)) {
+      HeldRecord record;
+      std::memcpy(&record, at, sizeof(record));
+      memory.held[i].push_back({record.particle, Vec3f(record.p_T[0], record.p_T[1], record.p_T[2])});
+    }
+  }
+  if (!simulation->Restore(xyz, previous, memory)) {
+    return std::nullopt;
+  }
+  return RestoredCheckpoint{header.max_displacement_m};
+}
+
+}  // namespace fulcrum::physics

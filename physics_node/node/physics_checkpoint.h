@@ -1,0 +1,29 @@
+// What a restarted physics node continues from, as bytes: positions now and one step before, tools and grasps.
+// Topology is not in it: TopologyState brings it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "physics_node/simulation/tissue_simulation.h"
+
+namespace fulcrum::physics {
+
+/// Grows with any change of the layout below.
+inline constexpr std::uint32_t kCheckpointLayout = 1;
+
+[[nodiscard]] std::size_t CheckpointCapacity(Index particle_count);
+
+/// Fills `slot`, at least CheckpointCapacity() long; returns the bytes used.
+std::size_t WriteCheckpoint(const TissueSimulation& simulation, float max_displacement_m, std::span<std::byte> slot);
+
+struct RestoredCheckpoint {
+  float max_displacement_m = 0;
+};
+/// Puts the simulation where the checkpoint was. Nothing, and the simulation as it was, when the bytes do not fit.
+std::optional<RestoredCheckpoint> ReadCheckpoint(std::span<const std::byte> payload, TissueSimulation* simulation);
+
+}  // namespace fulcrum::physics

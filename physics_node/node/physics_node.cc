@@ -1,0 +1,237 @@
+#include "physics_node/node/physics_node.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "physics_node/node/physics_checkpoint.h"
+
+namespace fulcrum::physics {
+namespace {
+
+/// Between two checkpoints, between two measurements of the displacement, and between two frames while nothing moves
+/// (a renderer that has just come must still get one) [ticks].
+constexpr std::uint64_t kSlowTicks = 10;
+/// A tool that a live haptics node no longer knows is taken away after so long [ticks of ToolState].
+constexpr int kAbsentTicks = 100;
+/// Of a generator that the script says nothing about [W].
+constexpr float kDefaultPower = 35.0f;
+
+std::uint32_t FindHook(const SceneView& scene) {
+  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+    if (scene.tools[i].kind == ToolKind::kHook) {
+      return i;
+    }
+  }
+  return kMaxTools;
+}
+
+/// The generator is set once for a session: to the most that the script asks for with this tool.
+float GeneratorPower(const SceneView& scene, std::uint32_t tool) {
+  float power = 0;
+  for (const ScriptKey& key : scene.script) {
+    power = key.tool == tool ? std::max(power, key.power_W) : power;
+  }
+  return power > 0.0f ? power : kDefaultPower;
+}
+
+CauteryMode ModeOf(std::uint8_t pedals) {
+  return (pedals & kPedalCut) != 0     ? CauteryMode::kCut
+         : (pedals & kPedalBlend) != 0 ? CauteryMode::kBlend
+         : (pedals & kPedalCoag) != 0  ? CauteryMode::kCoag
+                                       : CauteryMode::kOff;
+}
+
+}  // namespace
+
+PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint,
+                         std::int64_t epoch_ns)
+    : scene_(scene),
+      ports_(ports),
+      checkpoint_(checkpoint),
+      simulation_(scene),
+      frame_stamper_(epoch_ns),
+      contact_stamper_(epoch_ns),
+      cautery_stamper_(epoch_ns),
+      manifest_stamper_(epoch_ns),
+      hook_(FindHook(scene)),
+      power_W_(GeneratorPower(scene, hook_)) {
+  for (ToolInput& input : inputs_) {
+    // Until a handle speaks, jaws neither grasp nor let go.
+    input.pose.jaw_rad = 0.5f * (scene.physics.grasp_close_rad + scene.physics.grasp_open_rad);
+  }
+  if (checkpoint_ == nullptr) {
+    return;
+  }
+  if (const auto latest = checkpoint_->Latest()) {
+    if (const auto state = ReadCheckpoint(latest->payload, &simulation_)) {
+      restored_ = true;
+      max_displacement_m_ = state->max_displacement_m;
+      const SimulationMemory memory = simulation_.Save();
+      for (std::size_t i = 0; i < kMaxTools; ++i) {
+        if (memory.known[i]) {
+          inputs_[i] = {true, memory.pose[i]};
+        }
+      }
+    }
+  }
+}
+
+void PhysicsNode::TakeInputs() {
+  if (ports_.tools.TakeLatest(&tool_state_)) {
+    for (std::size_t i = 0; i < kMaxTools; ++i) {
+      const ToolSample& sample = tool_state_.tools[i];
+      if (sample.kind != ToolKind::kNone && scene_.tools[i].kind != ToolKind::kNone) {
+        inputs_[i].present = true;
+        inputs_[i].pose.p_WT = sample.p_WT;
+        inputs_[i].pose.q_WT = sample.q_WT.normalized();
+        absent_ticks_[i] = 0;
+      } else if (inputs_[i].present && ++absent_ticks_[i] > kAbsentTicks) {
+        inputs_[i].present = false;
+      }
+    }
+  }
+  if (ports_.handles.TakeLatest(&handle_state_)) {
+    for (std::size_t i = 0; i < kMaxTools; ++i) {
+      const HandleSample& handle = handle_state_.handles[i];
+      if (handle.present && handle.quality > 0.0f) {
+        inputs_[i].pose.jaw_rad = std::clamp(handle.jaw_angle_rad, 0.0f, 1.6f);
+      }
+    }
+  }
+  if (ports_.topology.TakeLatest(&topology_state_)) {
+    const int edits = topology_state_.scene_hash == scene_.hash ? simulation_.ApplyTopology(topology_state_) : -1;
+    if (edits < 0) {
+      topology_refused_.fetch_add(1, std::memory_order_relaxed);
+    } else {
+      topology_edits_.fetch_add(static_cast<std::uint64_t>(edits), std::memory_order_relaxed);
+    }
+  }
+}
+
+void PhysicsNode::Step(const Tick& tick) {
+  TakeInputs();
+  const StepReport report = simulation_.Step(inputs_);
+  asleep_ticks_.fetch_add(report.asleep ? 1 : 0, std::memory_order_relaxed);
+  PublishContacts(tick);
+  PublishCautery(tick);
+  PublishFrame(tick);
+  PublishManifest(tick);
+  Measure();
+  SaveCheckpoint();
+  ++ticks_;
+}
+
+void PhysicsNode::PublishContacts(const Tick& tick) {
+  // The servo dates the model by the tool sample: without one there is nothing to say. Slip, too, needs the forces.
+  ContactModel model;
+  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+    model.devices[i] = simulation_.Contacts(i);
+    force_N_[i].store(simulation_.force(i).norm(), std::memory_order_relaxed);
+  }
+  if (tool_state_.stamp.sequence == 0 || !ports_.contacts.has_readers()) {
+    return;
+  }
+  model.stamp = contact_stamper_.Next(tick.stamp_ns);
+  model.tool_sequence = tool_state_.stamp.sequence;
+  model.tool_stamp_ns = tool_state_.stamp.stamp_ns;
+  model.physics_dt_s = scene_.physics.dt_s;
+  ports_.contacts.Write(model);
+}
+
+void PhysicsNode::PublishCautery(const Tick& tick) {
+  if (hook_ == kMaxTools || !ports_.cautery.has_readers()) {
+    return;
+  }
+  CauteryContact contact = simulation_.Cautery(hook_);
+  contact.stamp = cautery_stamper_.Next(tick.stamp_ns);
+  contact.session_time_s = tick.session_time_s;
+  contact.topology_revision = simulation_.model().revision();
+  contact.mode = ModeOf(handle_state_.pedals);
+  contact.power_W = contact.mode == CauteryMode::kOff ? 0.0f : power_W_;
+  ports_.cautery.Write(contact);
+}
+
+void PhysicsNode::PublishFrame(const Tick& tick) {
+  const bool moved = frame_version_ != simulation_.state_version();
+  if (!ports_.frames.has_readers() || (!moved && ticks_ % kSlowTicks != 0)) {
+    return;
+  }
+  frame_version_ = simulation_.state_version();
+  ports_.frames.WriteInPlace([&](TissueFrame::View view) {
+    TissueFrameHeader& header = view.header;
+    header.stamp = frame_stamper_.Next(tick.stamp_ns);
+    header.scene_hash = scene_.hash;
+    header.topology_revision = simulation_.model().revision();
+    header.tool_sequence = tool_state_.stamp.sequence;
+    header.handle_sequence = handle_state_.stamp.sequence;
+    header.session_time_s = tick.session_time_s;
+    header.vertex_count = simulation_.particles().particle_count();
+    header.grasping_tools = 0;
+    for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+      header.grasping_tools |= simulation_.grasp(i).holding() ? 1u << i : 0u;
+    }
+    simulation_.particles().CopyPositions(view.xyz.first(3 * std::size_t{header.vertex_count}));
+  });
+}
+
+void PhysicsNode::PublishManifest(const Tick& tick) {
+  if (!ports_.manifests.has_readers()) {
+    return;
+  }
+  if (hash_version_ != simulation_.state_version()) {
+    hash_version_ = simulation_.state_version();
+    state_hash_ = simulation_.StateHash();
+  }
+  manifest_.stamp = manifest_stamper_.Next(tick.stamp_ns);
+  manifest_.node = NodeId::kPhysics;
+  manifest_.tick = tick.index;
+  manifest_.session_time_s = tick.session_time_s;
+  manifest_.state_hash = state_hash_;
+  const auto consumed = [](TopicId topic, const Stamp& stamp) {
+    return ConsumedInput{topic, stamp.epoch, stamp.sequence};
+  };
+  manifest_.consumed = {consumed(TopicId::kToolState, tool_state_.stamp),
+                        consumed(TopicId::kHandleState, handle_state_.stamp),
+                        consumed(TopicId::kTopologyState, topology_state_.stamp)};
+  ports_.manifests.Write(manifest_);
+}
+
+void PhysicsNode::Measure() {
+  quarantined_.store(simulation_.quarantined(), std::memory_order_relaxed);
+  grasped_.store(static_cast<std::uint32_t>(simulation_.grasp(0).held().size() + simulation_.grasp(1).held().size()),
+                 std::memory_order_relaxed);
+  if (ticks_ % kSlowTicks != kSlowTicks / 2 || measured_version_ == simulation_.state_version()) {
+    return;
+  }
+  measured_version_ = simulation_.state_version();
+  const float displacement = simulation_.MaxDisplacement();
+  max_displacement_m_ = std::max(max_displacement_m_, displacement);
+  displacement_mm_.store(1e3f * displacement, std::memory_order_relaxed);
+  max_displacement_mm_.store(1e3f * max_displacement_m_, std::memory_order_relaxed);
+}
+
+void PhysicsNode::SaveCheckpoint() {
+  if (checkpoint_ == nullptr || ticks_ % kSlowTicks != 0 || saved_version_ == simulation_.state_version()) {
+    return;
+  }
+  saved_version_ = simulation_.state_version();
+  checkpoint_->Commit(WriteCheckpoint(simulation_, max_displacement_m_, checkpoint_->Begin()));
+}
+
+void PhysicsNode::FillHealth(Health* health) const {
+  const auto add = [health](const char* name, double value) { health->metrics.push_back({name, value}); };
+  add("displacement_mm", displacement_mm_.load(std::memory_order_relaxed));
+  add("max_displacement_mm", max_displacement_mm_.load(std::memory_order_relaxed));
+  add("grasped_particles", grasped_.load(std::memory_order_relaxed));
+  add("quarantined", static_cast<double>(quarantined_.load(std::memory_order_relaxed)));
+  add("tissue_force0_N", force_N_[0].load(std::memory_order_relaxed));
+  add("tissue_force1_N", force_N_[1].load(std::memory_order_relaxed));
+  add("asleep_ticks", static_cast<double>(asleep_ticks_.load(std::memory_order_relaxed)));
+  add("topology_edits", static_cast<double>(topology_edits_.load(std::memory_order_relaxed)));
+  if (const std::uint64_t refused = topology_refused_.load(std::memory_order_relaxed); refused > 0) {
+    add("topology_refused", static_cast<double>(refused));
+    health->last_error = "TopologyState of another scene refused";
+  }
+}
+
+}  // namespace fulcrum::physics

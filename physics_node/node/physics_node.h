@@ -1,0 +1,81 @@
+// The physics node on ports: inputs in, one step of the tissue, outputs out. The same class runs live, in a test and
+// in a replay.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "physics_node/simulation/tissue_simulation.h"
+#include "services/bus/input_account.h"
+#include "services/bus/port.h"
+#include "services/core/messages.h"
+#include "services/core/scene_view.h"
+#include "services/core/tick.h"
+#include "services/runtime/checkpoint.h"
+
+namespace fulcrum::physics {
+
+class PhysicsNode {
+ public:
+  struct Ports {
+    bus::Input<ToolState>& tools;
+    bus::Input<HandleState>& handles;
+    bus::Input<TopologyState>& topology;
+    bus::LoanOutput<TissueFrame>& frames;
+    bus::Output<ContactModel>& contacts;
+    bus::Output<CauteryContact>& cautery;
+    bus::Output<TickManifest>& manifests;
+  };
+
+  /// Scene, ports and checkpoint must outlive the node. Goes on from the checkpoint when it holds something.
+  /// @param checkpoint null: nothing is kept.
+  /// @param epoch_ns CLOCK_MONOTONIC at the start of the process [ns].
+  PhysicsNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint, std::int64_t epoch_ns);
+
+  /// One period. @pre called by one thread.
+  void Step(const Tick& tick);
+
+  /// Metrics and last error. Any thread.
+  void FillHealth(Health* health) const;
+
+  [[nodiscard]] const TissueSimulation& simulation() const { return simulation_; }
+  /// It went on from a checkpoint.
+  [[nodiscard]] bool restored() const { return restored_; }
+
+ private:
+  void TakeInputs();
+  void PublishFrame(const Tick& tick);
+  void PublishContacts(const Tick& tick);
+  void PublishCautery(const Tick& tick);
+  void PublishManifest(const Tick& tick);
+  void SaveCheckpoint();
+  void Measure();
+
+  SceneView scene_;
+  Ports ports_;
+  runtime::CheckpointFile* checkpoint_;
+  TissueSimulation simulation_;
+  bus::Stamper frame_stamper_, contact_stamper_, cautery_stamper_, manifest_stamper_;
+  std::uint32_t hook_ = kMaxTools;  ///< The tool that cuts; kMaxTools: none.
+  float power_W_;
+
+  ToolState tool_state_;
+  HandleState handle_state_;
+  TopologyState topology_state_;
+  std::array<ToolInput, kMaxTools> inputs_;
+  std::array<int, kMaxTools> absent_ticks_{};
+  std::uint64_t ticks_ = 0;
+  std::uint64_t frame_version_ = 0, hash_version_ = 0, saved_version_ = 0, measured_version_ = 0;
+  std::uint64_t state_hash_ = 0;
+  bool restored_ = false;
+  float max_displacement_m_ = 0;
+  TickManifest manifest_;
+
+  // For the health thread. Relaxed: each figure stands for itself.
+  std::atomic<float> displacement_mm_{0}, max_displacement_mm_{0}, force_N_[kMaxTools]{};
+  std::atomic<std::uint32_t> grasped_{0};
+  std::atomic<std::uint64_t> quarantined_{0}, asleep_ticks_{0}, topology_refused_{0}, topology_edits_{0};
+};
+
+}  // namespace fulcrum::physics
