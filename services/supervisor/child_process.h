@@ -1,0 +1,43 @@
+// A child process whose output goes to a file and that dies with its parent.
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace fulcrum::supervisor {
+
+/// How a child ended.
+struct ProcessEnd {
+  int exit_code = 0;  ///< When signal is 0.
+  int signal = 0;
+  /// "killed by signal 9 (Killed)" or "ended with exit code 3 (scene or schema mismatch)".
+  [[nodiscard]] std::string Describe() const;
+};
+
+class ChildProcess {
+ public:
+  ChildProcess() = default;
+  ~ChildProcess();  ///< Kills and reaps a child that still runs.
+  ChildProcess(ChildProcess&& other) noexcept;
+  ChildProcess& operator=(ChildProcess&& other) noexcept;
+
+  /// Starts `program` with `arguments`; standard output and error are appended to `log`. The child is killed when the
+  /// calling thread ends, so start children from the main thread. Throws InputError when the program cannot be started.
+  [[nodiscard]] static ChildProcess Start(const std::filesystem::path& program,
+                                          const std::vector<std::string>& arguments, const std::filesystem::path& log);
+
+  [[nodiscard]] bool running() const { return pid_ > 0; }
+  [[nodiscard]] pid_t pid() const { return pid_; }
+  /// How the child ended, once; nothing while it runs.
+  [[nodiscard]] std::optional<ProcessEnd> Poll();
+  void Signal(int signal) const;
+
+ private:
+  pid_t pid_ = -1;
+};
+
+}  // namespace fulcrum::supervisor

@@ -1,0 +1,57 @@
+#include <unistd.h>
+
+#include <climits>
+#include <iostream>
+
+#include "services/core/error.h"
+#include "services/supervisor/cli/commands.h"
+
+namespace fulcrum::supervisor::cli {
+namespace po = boost::program_options;
+
+Arguments Parse(const char* command, const Words& words, const po::options_description& options,
+                const std::vector<const char*>& positional) {
+  po::options_description visible("Options");
+  visible.add(options);
+  visible.add_options()("help", "print this");
+  po::options_description all;
+  all.add(visible);
+  po::positional_options_description places;
+  for (const char* name : positional) {
+    all.add_options()(name, po::value<std::string>());
+    places.add(name, 1);
+  }
+  Arguments arguments;
+  try {
+    const auto style = po::command_line_style::default_style & ~po::command_line_style::allow_guessing;
+    po::store(po::command_line_parser(words).options(all).positional(places).style(style).run(), arguments.values);
+  } catch (const po::error& error) {
+    throw InputError(std::string(error.what()) + "; see fulcrum help " + command);
+  }
+  if (arguments.values.count("help") != 0) {
+    arguments.help = true;
+    for (const CommandEntry& entry : Commands()) {
+      if (std::string_view(entry.name) == command) {
+        std::cout << "usage: fulcrum " << entry.usage << "\n\n" << entry.purpose << "\n";
+      }
+    }
+    std::cout << "\n" << visible;
+  }
+  return arguments;
+}
+
+void AddDomain(po::options_description* options) {
+  options->add_options()("domain", po::value<int>()->value_name("N"), "DDS domain of the cart, 1 to 100 (default 7)");
+}
+
+int DomainOf(const Arguments& arguments, int fallback) {
+  const int domain = arguments.values.count("domain") != 0 ? arguments.values["domain"].as<int>() : fallback;
+  if (domain < 1 || domain > 100) {
+    throw InputError("--domain " + std::to_string(domain) + ": must be 1 to 100");
+  }
+  return domain;
+}
+
+std::filesystem::path ProgramFolder() { return std::filesystem::read_symlink("/proc/self/exe").parent_path(); }
+
+}  // namespace fulcrum::supervisor::cli

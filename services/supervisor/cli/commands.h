@@ -1,0 +1,54 @@
+// The subcommands of `fulcrum`, one file each. Each takes the words after its name and throws InputError or
+// MismatchError for what the user can put right.
+#pragma once
+
+#include <boost/program_options.hpp>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "services/core/exit_code.h"
+
+namespace fulcrum::supervisor::cli {
+
+using Words = std::vector<std::string>;
+
+ExitCode Up(const Words& words);
+ExitCode Status(const Words& words);
+ExitCode Top(const Words& words);
+ExitCode Restart(const Words& words);
+ExitCode Down(const Words& words);
+ExitCode Doctor(const Words& words);
+
+struct CommandEntry {
+  const char* name;
+  const char* usage;    ///< After "fulcrum ".
+  const char* purpose;  ///< One line.
+  ExitCode (*run)(const Words&);
+};
+[[nodiscard]] std::span<const CommandEntry> Commands();
+
+/// Options of one subcommand; "--help" is added. Named positional words come last, for example {"scene"}.
+struct Arguments {
+  boost::program_options::variables_map values;
+  bool help = false;  ///< Help was asked for and printed.
+};
+[[nodiscard]] Arguments Parse(const char* command, const Words& words,
+                              const boost::program_options::options_description& options,
+                              const std::vector<const char*>& positional = {});
+
+/// Adds --domain.
+void AddDomain(boost::program_options::options_description* options);
+/// Its value. Throws InputError when it is out of range.
+[[nodiscard]] int DomainOf(const Arguments& arguments, int fallback);
+
+inline constexpr int kDefaultDomain = 7;
+
+/// Folder of this program: the nodes and the compiler lie beside it.
+[[nodiscard]] std::filesystem::path ProgramFolder();
+
+/// Sends a command to the supervisor of the domain and prints its answer. Throws InputError when none runs there.
+ExitCode Ask(int domain, const std::string& verb, const std::string& argument);
+
+}  // namespace fulcrum::supervisor::cli

@@ -1,0 +1,221 @@
+// Each check prints ✓ or ✗ with what was found, and for ✗ the fix.
+#include <EGL/egl.h>
+#include <EGL/eglext.h>
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "services/bus/dds/shared_memory.h"
+#include "services/runtime/realtime.h"
+#include "services/supervisor/cli/commands.h"
+#include "services/supervisor/domain_guard.h"
+
+namespace fulcrum::supervisor::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Finding {
+  bool good;
+  std::string found;
+  std::string fix;
+};
+
+/// Free bytes of the file system of `path`, or of its nearest parent that exists.
+std::uint64_t FreeBytes(fs::path path) {
+  path = fs::absolute(path);
+  struct statvfs space {};
+  while (::statvfs(path.c_str(), &space) != 0) {
+    if (path == path.root_path()) {
+      return 0;
+    }
+    path = path.parent_path();
+  }
+  return std::uint64_t{space.f_bavail} * space.f_frsize;
+}
+
+Finding SharedMemory(int domain) {
+  const std::uint64_t free = FreeBytes("/dev/shm");
+  const std::uint64_t needed = bus::kNeededSharedMemory_B;
+  std::string found = std::to_string(free >> 20) + " MiB free of " + std::to_string(needed >> 20) + " MiB needed";
+  if (free < needed) {
+    return {false, found, "mount -o remount,size=1G /dev/shm (in a container: --shm-size=1g)"};
+  }
+  const fs::path folder = bus::SharedMemoryDirectory(domain);
+  std::error_code error;
+  if (fs::exists(folder, error) && !DomainGuard::IsHeld(domain)) {
+    const bus::SweepResult swept = bus::SweepSharedMemory(folder);
+    found += "; swept " + std::to_string(swept.files) + " files of dead processes in " + folder.string();
+  }
+  return {true, found, ""};
+}
+
+Finding RealTime() {
+  std::string problem;
+  std::thread([&] { problem = runtime::SetFifoPriority(80); }).join();
+  return {problem.empty(), problem.empty() ? "SCHED_FIFO is permitted" : "SCHED_FIFO is not permitted",
+          "add \"@fulcrum - rtprio 90\" to /etc/security/limits.conf and join that group, or run in a container with "
+          "--cap-add=SYS_NICE; without it cycles start late under load"};
+}
+
+Finding LockedMemory() {
+  const std::string problem = runtime::LockMemory();
+  return {
+      problem.empty(), problem.empty() ? "memory may be locked" : "memory may not be locked",
+      "add \"@fulcrum - memlock unlimited\" to /etc/security/limits.conf and join that group, or --cap-add=IPC_LOCK"};
+}
+
+// Loaded at run time: a machine without EGL must get a diagnosis, not a loader error.
+Finding OffScreenGl() {
+  const std::string fix = "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri";
+  void* library = ::dlopen("libEGL.so.1", RTLD_NOW);
+  if (library == nullptr) {
+    return {false, "libEGL.so.1 is missing", fix};
+  }
+  const auto get_proc = reinterpret_cast<decltype(&eglGetProcAddress)>(::dlsym(library, "eglGetProcAddress"));
+  const auto initialize = reinterpret_cast<decltype(&eglInitialize)>(::dlsym(library, "eglInitialize"));
+  const auto query = reinterpret_cast<decltype(&eglQueryString)>(::dlsym(library, "eglQueryString"));
+  const auto get_display = reinterpret_cast<PFNEGLGETPLATFORMDISPLAYEXTPROC>(
+      get_proc != nullptr ? get_proc("eglGetPlatformDisplayEXT") : nullptr);
+  if (get_display == nullptr || initialize == nullptr || query == nullptr) {
+    return {false, "this EGL has no surfaceless platform", fix};
+  }
+  const EGLDisplay display = get_display(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, nullptr);
+  EGLint major = 0, minor = 0;
+  if (display == EGL_NO_DISPLAY || initialize(display, &major, &minor) == EGL_FALSE) {
+    return {false, "EGL cannot open a surfaceless display", fix};
+  }
+  const char* vendor = query(display, EGL_VENDOR);
+  return {true,
+          "EGL " + std::to_string(major) + "." + std::to_string(minor) + ", " + (vendor != nullptr ? vendor : "?"), ""};
+}
+
+Finding Display() {
+  for (const char* name : {"DISPLAY", "WAYLAND_DISPLAY"}) {
+    const char* value = std::getenv(name);
+    if (value != nullptr && *value != '\0') {
+      return {true, std::string(name) + "=" + value, ""};
+    }
+  }
+  return {true, "none: pictures are drawn off screen, --window needs one (xvfb-run gives one without a monitor)", ""};
+}
+
+Finding SerialPorts() {
+  std::string found, closed;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator("/dev", error)) {
+    const std::string name = entry.path().filename();
+    if (!name.starts_with("ttyUSB") && !name.starts_with("ttyACM")) {
+      continue;
+    }
+    found += ' ';
+    found += entry.path().native();
+    if (::access(entry.path().c_str(), R_OK | W_OK) != 0) {
+      closed += ' ';
+      closed += entry.path().native();
+    }
+  }
+  if (!closed.empty()) {
+    return {false, "no permission for" + closed, "sudo usermod -aG dialout $USER, then log in again"};
+  }
+  return {true, found.empty() ? "none: handles and pedal are simulated" : "usable:" + found, ""};
+}
+
+/// True when a UDP socket of this machine is bound to one of the ports that DDS derives from the domain.
+bool PortsInUse(int domain) {
+  // RTPS well-known ports: 7400 + 250 * domain, then 0, 1 and 10 + 2 * participant for the rest.
+  const unsigned first = 7400u + 250u * static_cast<unsigned>(domain);
+  std::ifstream table("/proc/net/udp");
+  std::string line;
+  while (std::getline(table, line)) {
+    std::istringstream words(line);
+    std::string slot, address;
+    words >> slot >> address;
+    const std::size_t colon = address.find(':');
+    if (colon == std::string::npos) {
+      continue;
+    }
+    const unsigned long port = std::strtoul(address.c_str() + colon + 1, nullptr, 16);
+    if (port >= first && port < first + 250u) {
+      return true;
+    }
+  }
+  return false;
+}
+
+Finding DomainInUse(int domain) {
+  const std::string name = "domain " + std::to_string(domain);
+  if (DomainGuard::IsHeld(domain)) {
+    return {true, name + ": a session is running (fulcrum status)", ""};
+  }
+  if (PortsInUse(domain)) {
+    return {false, name + ": no session, but some program is bound to its ports",
+            "end that program (ss -lunp shows it) or take another domain (--domain N)"};
+  }
+  return {true, name + " is free", ""};
+}
+
+Finding Disk(const fs::path& out) {
+  constexpr std::uint64_t kNeeded = std::uint64_t{1} << 30;
+  const std::uint64_t free = FreeBytes(out);
+  return {free >= kNeeded, std::to_string(free >> 20) + " MiB free for " + fs::absolute(out).string(),
+          "free at least 1 GiB, or give --out DIR on another disk"};
+}
+
+Finding Programs() {
+  std::string missing;
+  for (const char* name :
+       {"handle_bridge", "haptics_node", "physics_node", "thermal_node", "render_node", "scene_compiler"}) {
+    if (::access((ProgramFolder() / name).c_str(), X_OK) != 0) {
+      missing += std::string(" ") + name;
+    }
+  }
+  return {missing.empty(), missing.empty() ? "all in " + ProgramFolder().string() : "missing:" + missing,
+          "build them: cmake --build build/release"};
+}
+
+}  // namespace
+
+ExitCode Doctor(const Words& words) {
+  namespace po = boost::program_options;
+  po::options_description options;
+  options.add_options()("out", po::value<std::string>()->value_name("DIR")->default_value("out"),
+                        "folder of the sessions");
+  AddDomain(&options);
+  const Arguments arguments = Parse("doctor", words, options);
+  if (arguments.help) {
+    return ExitCode::kDone;
+  }
+  const int domain = DomainOf(arguments, kDefaultDomain);
+  const std::vector<std::pair<const char*, Finding>> findings{
+      {"programs", Programs()},
+      {"shared memory", SharedMemory(domain)},
+      {"domain", DomainInUse(domain)},
+      {"real-time priority", RealTime()},
+      {"locked memory", LockedMemory()},
+      {"off-screen GL", OffScreenGl()},
+      {"display", Display()},
+      {"serial ports", SerialPorts()},
+      {"disk", Disk(arguments.values["out"].as<std::string>())},
+  };
+  for (const auto& [what, finding] : findings) {
+    std::printf("%s %-19s %s\n", finding.good ? "✓" : "✗", what, finding.found.c_str());
+    if (!finding.good) {
+      std::printf("  %-19s fix: %s\n", "", finding.fix.c_str());
+    }
+  }
+  const bool all_good = std::all_of(findings.begin(), findings.end(), [](const auto& f) { return f.second.good; });
+  return all_good ? ExitCode::kDone : ExitCode::kFailure;
+}
+
+}  // namespace fulcrum::supervisor::cli

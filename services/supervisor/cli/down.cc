@@ -1,0 +1,31 @@
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+
+#include "services/supervisor/cli/commands.h"
+#include "services/supervisor/domain_guard.h"
+
+namespace fulcrum::supervisor::cli {
+
+ExitCode Down(const Words& words) {
+  boost::program_options::options_description options;
+  AddDomain(&options);
+  const Arguments arguments = Parse("down", words, options);
+  if (arguments.help) {
+    return ExitCode::kDone;
+  }
+  const int domain = DomainOf(arguments, kDefaultDomain);
+  const ExitCode answer = Ask(domain, "down", "");
+  // Returns when the session has really ended, so that the next one can start at once.
+  constexpr auto kPatience = std::chrono::seconds(30);
+  const auto begin = std::chrono::steady_clock::now();
+  while (DomainGuard::IsHeld(domain)) {
+    if (std::chrono::steady_clock::now() - begin > kPatience) {
+      throw std::runtime_error("the session has not ended after 30 s");
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return answer;
+}
+
+}  // namespace fulcrum::supervisor::cli

@@ -1,0 +1,79 @@
+// fulcrum: the operator's command.
+#include <array>
+#include <cstdio>
+#include <cstring>
+
+#include "services/app/version.h"
+#include "services/core/error.h"
+#include "services/runtime/realtime.h"
+#include "services/supervisor/cli/commands.h"
+
+namespace fulcrum::supervisor::cli {
+
+std::span<const CommandEntry> Commands() {
+  static constexpr std::array<CommandEntry, 6> kCommands{{
+      {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
+      {"status", "status [--domain N]", "Print the nodes of the running session once.", Status},
+      {"top", "top [--domain N]", "Show the nodes of the running session, refreshed until Ctrl-C.", Top},
+      {"restart", "restart NODE [--domain N]", "Restart one node of the running session.", Restart},
+      {"down", "down [--domain N]", "End the running session.", Down},
+      {"doctor", "doctor [--domain N] [--out DIR]", "Check what this machine permits, and say how to permit more.",
+       Doctor},
+  }};
+  return kCommands;
+}
+
+namespace {
+
+void PrintHelp() {
+  std::puts("usage: fulcrum COMMAND [options]\n\nRuns and watches a Fulcrum cart.\n");
+  for (const CommandEntry& entry : Commands()) {
+    std::printf("  %-9s %s\n", entry.name, entry.purpose);
+  }
+  std::puts(
+      "  help      help COMMAND: options of one command.\n"
+      "  version   Print the version.\n\n"
+      "Exit codes: 0 done, 1 failure, 2 bad use or configuration, 3 scene or schema mismatch, 4 device lost.");
+}
+
+ExitCode Dispatch(Words words) {
+  if (words.empty() || words[0] == "--help" || words == Words{"help"}) {
+    PrintHelp();
+    return words.empty() ? ExitCode::kBadUsage : ExitCode::kDone;
+  }
+  if (words[0] == "version" || words[0] == "--version") {
+    std::printf("fulcrum %s\n", app::kVersion);
+    return ExitCode::kDone;
+  }
+  if (words[0] == "help") {
+    words = {words[1], "--help"};
+  }
+  for (const CommandEntry& entry : Commands()) {
+    if (words[0] == entry.name) {
+      return entry.run({words.begin() + 1, words.end()});
+    }
+  }
+  throw InputError("unknown command \"" + words[0] + "\"; see fulcrum --help");
+}
+
+}  // namespace
+}  // namespace fulcrum::supervisor::cli
+
+int main(int argc, char** argv) {
+  using fulcrum::ExitCode;
+  fulcrum::runtime::SetLogName("fulcrum");
+  fulcrum::runtime::InstallStopSignals();
+  const auto fail = [](ExitCode code, const std::exception& error) {
+    std::fprintf(stderr, "fulcrum: %s\n", error.what());
+    return static_cast<int>(code);
+  };
+  try {
+    return static_cast<int>(fulcrum::supervisor::cli::Dispatch({argv + 1, argv + argc}));
+  } catch (const fulcrum::InputError& error) {
+    return fail(ExitCode::kBadUsage, error);
+  } catch (const fulcrum::MismatchError& error) {
+    return fail(ExitCode::kMismatch, error);
+  } catch (const std::exception& error) {
+    return fail(ExitCode::kFailure, error);
+  }
+}

@@ -1,0 +1,19 @@
+#include "services/core/error.h"
+#include "services/supervisor/cli/commands.h"
+
+namespace fulcrum::supervisor::cli {
+
+ExitCode Restart(const Words& words) {
+  boost::program_options::options_description options;
+  AddDomain(&options);
+  const Arguments arguments = Parse("restart", words, options, {"node"});
+  if (arguments.help) {
+    return ExitCode::kDone;
+  }
+  if (arguments.values.count("node") == 0) {
+    throw InputError("which node? see fulcrum status");
+  }
+  return Ask(DomainOf(arguments, kDefaultDomain), "restart", arguments.values["node"].as<std::string>());
+}
+
+}  // namespace fulcrum::supervisor::cli

@@ -1,0 +1,36 @@
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "services/core/error.h"
+#include "services/supervisor/cli/commands.h"
+#include "services/supervisor/cli/session_view.h"
+#include "services/supervisor/domain_guard.h"
+
+namespace fulcrum::supervisor::cli {
+
+ExitCode Status(const Words& words) {
+  boost::program_options::options_description options;
+  AddDomain(&options);
+  const Arguments arguments = Parse("status", words, options);
+  if (arguments.help) {
+    return ExitCode::kDone;
+  }
+  const int domain = DomainOf(arguments, kDefaultDomain);
+  if (!DomainGuard::IsHeld(domain)) {
+    std::printf("no session runs in domain %d\n", domain);
+    return ExitCode::kFailure;
+  }
+  SessionView view(domain);
+  // Health is late-joiner topic at 10 Hz: after this each live node has been heard several times.
+  constexpr auto kListen = std::chrono::milliseconds(700);
+  const auto end = std::chrono::steady_clock::now() + kListen;
+  while (std::chrono::steady_clock::now() < end) {
+    view.Update();
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  std::fputs(view.Text().c_str(), stdout);
+  return ExitCode::kDone;
+}
+
+}  // namespace fulcrum::supervisor::cli

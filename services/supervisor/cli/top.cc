@@ -1,0 +1,44 @@
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <thread>
+
+#include "services/core/error.h"
+#include "services/runtime/realtime.h"
+#include "services/supervisor/cli/commands.h"
+#include "services/supervisor/cli/session_view.h"
+#include "services/supervisor/domain_guard.h"
+
+namespace fulcrum::supervisor::cli {
+
+ExitCode Top(const Words& words) {
+  boost::program_options::options_description options;
+  AddDomain(&options);
+  const Arguments arguments = Parse("top", words, options);
+  if (arguments.help) {
+    return ExitCode::kDone;
+  }
+  const int domain = DomainOf(arguments, kDefaultDomain);
+  if (!DomainGuard::IsHeld(domain)) {
+    throw InputError("no session runs in domain " + std::to_string(domain) + "; start one with fulcrum up SCENE");
+  }
+  SessionView view(domain);
+  const bool terminal = ::isatty(STDOUT_FILENO) == 1;
+  constexpr auto kRefresh = std::chrono::milliseconds(500);
+  auto next = std::chrono::steady_clock::now() + kRefresh;
+  while (!runtime::ShouldStop() && DomainGuard::IsHeld(domain)) {
+    view.Update();
+    if (std::chrono::steady_clock::now() >= next) {
+      next += kRefresh;
+      // Home, text, then clear what an earlier longer text left below: no flicker.
+      std::printf("%s%s%s\n", terminal ? "\x1b[H\x1b[2J" : "", view.Text().c_str(),
+                  terminal ? "Ctrl-C ends this view" : "");
+      std::fflush(stdout);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  return ExitCode::kDone;
+}
+
+}  // namespace fulcrum::supervisor::cli

@@ -1,0 +1,76 @@
+#include <cstdlib>
+
+#include "services/core/error.h"
+#include "services/supervisor/cli/commands.h"
+#include "services/supervisor/scene_cache.h"
+#include "services/supervisor/supervisor.h"
+
+namespace fulcrum::supervisor::cli {
+namespace {
+
+namespace fs = std::filesystem;
+namespace po = boost::program_options;
+
+/// Beside the programs in a build tree, else in the user's cache.
+fs::path SceneCache(const fs::path& programs) {
+  if (fs::exists(programs.parent_path() / "CMakeCache.txt")) {
+    return programs.parent_path() / "scenes";
+  }
+  const char* cache = std::getenv("XDG_CACHE_HOME");
+  const char* home = std::getenv("HOME");
+  if (cache != nullptr && *cache != '\0') {
+    return fs::path(cache) / "fulcrum" / "scenes";
+  }
+  return (home != nullptr ? fs::path(home) / ".cache" : fs::temp_directory_path()) / "fulcrum" / "scenes";
+}
+
+}  // namespace
+
+ExitCode Up(const Words& words) {
+  po::options_description options;
+  options.add_options()                                                                                               //
+      ("seconds", po::value<double>()->value_name("N"),                                                               //
+       "session time (default: the script's duration; without a script until Ctrl-C)")                                //
+      ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "session folders are made in here")  //
+      ("window", "show the picture in a window as well")                                                              //
+      ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration (default: everything simulated)")    //
+      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")            //
+      ("keep-going", "go on without a node that failed for good");
+  AddDomain(&options);
+  const Arguments arguments = Parse("up", words, options, {"scene"});
+  if (arguments.help) {
+    return ExitCode::kDone;
+  }
+  const auto& values = arguments.values;
+  if (values.count("scene") == 0) {
+    throw InputError("which scene? see fulcrum help up");
+  }
+  UpSettings settings;
+  settings.programs = ProgramFolder();
+  if (values.count("cart") != 0) {
+    settings.cart = config::LoadCart(values["cart"].as<std::string>());
+  }
+  settings.cart.domain = DomainOf(arguments, settings.cart.domain);
+  settings.out = values["out"].as<std::string>();
+  settings.window = values.count("window") != 0;
+  settings.keep_going = values.count("keep-going") != 0;
+  if (values.count("seconds") != 0) {
+    settings.seconds = values["seconds"].as<double>();
+    constexpr double kLongest = 7 * 24 * 3600.0;
+    if (!(settings.seconds > 0 && settings.seconds <= kLongest)) {
+      throw InputError("--seconds: must be above 0 and at most " + std::to_string(static_cast<int>(kLongest)));
+    }
+  }
+  SceneRequest request;
+  request.name = values["scene"].as<std::string>();
+  if (values.count("data") != 0) {
+    request.data = fs::absolute(values["data"].as<std::string>());
+  }
+  request.library = FULCRUM_SCENE_DIR;
+  request.compiler = settings.programs / "scene_compiler";
+  request.cache = SceneCache(settings.programs);
+  settings.scene = ResolveScene(request);
+  return Supervisor(settings).Run();
+}
+
+}  // namespace fulcrum::supervisor::cli

@@ -1,0 +1,112 @@
+#include "services/supervisor/node_process.h"
+
+#include <signal.h>
+
+#include <fstream>
+
+#include "services/core/error.h"
+#include "services/core/exit_code.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+// Health comes ten times a second from a thread of its own: a node that is silent this long hangs.
+constexpr std::int64_t kLongestSilence = 5 * kSecond;
+// Until the first Health a node maps the scene and builds its solver.
+constexpr std::int64_t kLongestStart = 60 * kSecond;
+constexpr std::int64_t kPatienceWithRestart = 3 * kSecond;
+
+/// Starting again with the same arguments would end the same way.
+bool IsFinal(const ProcessEnd& end) {
+  const auto code = static_cast<ExitCode>(end.exit_code);
+  return end.signal == 0 &&
+         (code == ExitCode::kBadUsage || code == ExitCode::kMismatch || code == ExitCode::kDeviceLost);
+}
+
+}  // namespace
+
+void NodeProcess::Start(std::int64_t now_ns) {
+  process_ = ChildProcess::Start(command_.program, command_.arguments, command_.log);
+  started_ns_ = now_ns;
+  last_health_ns_ = 0;
+  due_ns_ = 0;
+  kill_ns_ = 0;
+  silent_ = false;
+}
+
+void NodeProcess::WatchForSilence(std::int64_t now_ns) {
+  const bool too_long =
+      last_health_ns_ != 0 ? now_ns - last_health_ns_ > kLongestSilence : now_ns - started_ns_ > kLongestStart;
+  if (too_long && !silent_) {
+    silent_ = true;
+    Signal(SIGKILL);
+  }
+  if (kill_ns_ != 0 && now_ns >= kill_ns_) {
+    Signal(SIGKILL);
+  }
+}
+
+std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
+  if (failed_) {
+    return std::nullopt;
+  }
+  if (due_ns_ != 0) {
+    if (now_ns >= due_ns_) {
+      try {
+        Start(now_ns);
+      } catch (const InputError& error) {
+        failed_ = true;
+        return Death{error.what(), true, {}, false};
+      }
+    }
+    return std::nullopt;
+  }
+  const std::optional<ProcessEnd> end = process_.Poll();
+  if (!end) {
+    WatchForSilence(now_ns);
+    return std::nullopt;
+  }
+  Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false};
+  if (kill_ns_ != 0) {
+    death.cause = "was restarted by command";
+    death.asked = true;
+    due_ns_ = now_ns;
+    return death;
+  }
+  const std::optional<std::int64_t> delay = IsFinal(*end) ? std::nullopt : policy_.OnDeath(now_ns - started_ns_);
+  death.for_good = failed_ = !delay.has_value();
+  due_ns_ = now_ns + delay.value_or(0);
+  return death;
+}
+
+void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
+  if (last_health_ns_ != 0) {
+    last_health_ns_ = now_ns;
+  } else {
+    started_ns_ = now_ns;
+  }
+}
+
+void NodeProcess::AskRestart(std::int64_t now_ns) {
+  Signal(SIGTERM);
+  kill_ns_ = now_ns + kPatienceWithRestart;
+}
+
+bool NodeProcess::HasEnded() {
+  (void)process_.Poll();
+  return !process_.running();
+}
+
+std::string LastLine(const std::filesystem::path& log) {
+  std::ifstream stream(log);
+  std::string line, last;
+  while (std::getline(stream, line)) {
+    if (!line.empty()) {
+      last = line;
+    }
+  }
+  return last;
+}
+
+}  // namespace fulcrum::supervisor

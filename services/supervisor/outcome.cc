@@ -1,0 +1,175 @@
+#include "services/supervisor/outcome.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace fulcrum::supervisor {
+namespace {
+
+std::string Quote(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      quoted += '\\';
+      quoted += c;
+    } else if (byte < 0x20) {
+      std::array<char, 8> escaped{};
+      std::snprintf(escaped.data(), escaped.size(), "\\u%04x", byte);
+      quoted += escaped.data();
+    } else {
+      quoted += c;
+    }
+  }
+  quoted += '"';
+  return quoted;
+}
+
+class FlatJson {
+ public:
+  void Add(const std::string& key, const std::string& value) { AddRaw(key, Quote(value)); }
+  void Add(const std::string& key, const char* value) { AddRaw(key, Quote(value)); }
+  void Add(const std::string& key, bool value) { AddRaw(key, value ? "true" : "false"); }
+  void Add(const std::string& key, double value) {
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), "%.9g", value);
+    AddRaw(key, std::isfinite(value) ? text.data() : "null");
+  }
+  [[nodiscard]] std::string text() const { return "{" + body_ + "\n}\n"; }
+
+ private:
+  void AddRaw(const std::string& key, const std::string& value) {
+    body_ += body_.empty() ? "\n  " : ",\n  ";
+    body_ += Quote(key);
+    body_ += ": ";
+    body_ += value;
+  }
+  std::string body_;
+};
+
+double Ms(float us) { return 1e-3 * static_cast<double>(us); }
+
+}  // namespace
+
+std::string Fixed(double value, int decimals) {
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
+  std::string result = text.data();
+  if (result.find_first_not_of("-0.") == std::string::npos && result.front() == '-') {
+    result.erase(0, 1);
+  }
+  return result;
+}
+
+const char* StateName(HealthState state) {
+  switch (state) {
+    case HealthState::kStarting:
+      return "starting";
+    case HealthState::kWaiting:
+      return "waiting";
+    case HealthState::kRunning:
+      return "running";
+    case HealthState::kDegraded:
+      return "degraded";
+    case HealthState::kStopping:
+      return "ended";
+  }
+  return "unknown";
+}
+
+std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
+  return {{"peak_force_N", "peak force", "N", 2, record.peak("peak_force_N")},
+          {"highest_temperature_C", "highest temperature", "°C", 0, record.peak("highest_temperature_C")},
+          {"cut_length_mm", "cut length", "mm", 1, record.peak("cut_length_mm")},
+          {"max_displacement_mm", "largest displacement", "mm", 1, record.peak("max_displacement_mm")},
+          {"grasped_particles", "particles grasped at most", "", 0, record.peak("grasped_particles")},
+          {"dead_edges", "membrane edges severed", "", 0, record.peak("dead_edges")},
+          {"warnings", "warnings", "", 0, record.peak("warnings")},
+          {"injuries", "injuries", "", 0, record.peak("injuries")},
+          {"quarantined", "particles quarantined", "", 0, record.peak("quarantined")},
+          {"png_written", "pictures", "", 0, record.peak("png_written")}};
+}
+
+std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& record) {
+  FlatJson json;
+  json.Add("scene", outcome.scene_name);
+  json.Add("session", outcome.session_id);
+  json.Add("started", outcome.started_utc);
+  json.Add("machine", outcome.machine);
+  json.Add("ok", outcome.exit_code == ExitCode::kDone);
+  json.Add("exit_code", static_cast<double>(outcome.exit_code));
+  json.Add("verdict", outcome.verdict);
+  json.Add("session_seconds", outcome.duration_s);
+  json.Add("wanted_seconds", outcome.wanted_s);
+  for (const KeyFigure& figure : KeyFigures(record)) {
+    json.Add(figure.key, figure.value);
+  }
+  json.Add("restarts", static_cast<double>(record.restarts().size()));
+  for (const auto& [kind, count] : record.event_counts()) {
+    std::string name = EventName(kind);
+    for (char& c : name) {
+      c = c == ' ' ? '_' : c;
+    }
+    json.Add("events." + name, static_cast<double>(count));
+  }
+  for (const NodeId id : outcome.nodes) {
+    const NodeFigures& node = record.node(id);
+    const std::string prefix = std::string(NodeName(id)) + ".";
+    json.Add(prefix + "failed", node.failed);
+    json.Add(prefix + "rate_asked_Hz", node.rate_asked_Hz);
+    json.Add(prefix + "rate_achieved_Hz", node.rate_achieved_Hz);
+    json.Add(prefix + "ticks", static_cast<double>(node.ticks));
+    json.Add(prefix + "step_p50_ms", Ms(node.step.p50_us));
+    json.Add(prefix + "step_p99_ms", Ms(node.step.p99_us));
+    json.Add(prefix + "step_max_ms", Ms(node.step.max_us));
+    json.Add(prefix + "wake_p99_ms", Ms(node.wake.p99_us));
+    json.Add(prefix + "overruns", static_cast<double>(node.overruns));
+    json.Add(prefix + "drops", static_cast<double>(node.drops));
+    json.Add(prefix + "restarts", static_cast<double>(node.restarts));
+    json.Add(prefix + "longest_rejoin_s", node.longest_rejoin_s);
+  }
+  return json.text();
+}
+
+std::string NodeTable(const std::vector<NodeId>& nodes, const SessionRecord& record) {
+  std::array<char, 256> line{};
+  std::snprintf(line.data(), line.size(), "%-14s %7s  %-9s %15s %27s %9s %6s %8s\n", "node", "pid", "state",
+                "rate / asked Hz", "step p50 / p99 / max ms", "overruns", "drops", "restarts");
+  std::string table = line.data();
+  for (const NodeId id : nodes) {
+    const NodeFigures& node = record.node(id);
+    const char* state = node.failed ? "failed" : node.seen ? StateName(node.state) : "silent";
+    const std::string rate = Fixed(node.rate_achieved_Hz, 1) + " / " + Fixed(node.rate_asked_Hz, 0);
+    const std::string step = Fixed(Ms(node.step.p50_us), 2) + " / " + Fixed(Ms(node.step.p99_us), 2) + " / " +
+                             Fixed(Ms(node.step.max_us), 2);
+    std::snprintf(line.data(), line.size(), "%-14s %7d  %-9s %15s %27s %9llu %6llu %8d\n", NodeName(id), node.pid,
+                  state, rate.c_str(), step.c_str(), static_cast<unsigned long long>(node.overruns),
+                  static_cast<unsigned long long>(node.drops), node.restarts);
+    table += line.data();
+    if (!node.last_error.empty()) {
+      table += "               └ " + node.last_error + "\n";
+    }
+  }
+  return table;
+}
+
+std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& record) {
+  std::string text = NodeTable(outcome.nodes, record) + "\n";
+  for (const KeyFigure& figure : KeyFigures(record)) {
+    std::array<char, 128> line{};
+    std::snprintf(line.data(), line.size(), "%-28s %10s %s\n", figure.label,
+                  Fixed(figure.value, figure.decimals).c_str(), figure.unit);
+    text += line.data();
+  }
+  for (const RestartRecord& restart : record.restarts()) {
+    text += std::string("restart at ") + Fixed(restart.time_s, 1) + " s: " + NodeName(restart.node) + " " + restart.cause +
+            (restart.rejoin_s >= 0 ? std::string(", back after ") + Fixed(restart.rejoin_s, 2) + " s" : ", did not come back") +
+            "\n";
+  }
+  text += std::string("\n") + Fixed(outcome.duration_s, 1) + " s of \"" + outcome.scene_name + "\": ";
+  text += outcome.verdict.empty() ? "all well\n" : "NOT WELL: " + outcome.verdict + "\n";
+  return text;
+}
+
+}  // namespace fulcrum::supervisor

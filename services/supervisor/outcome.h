@@ -1,0 +1,51 @@
+// How a session ended, and its figures as flat JSON and as a table for the terminal.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "services/core/exit_code.h"
+#include "services/supervisor/session_record.h"
+
+namespace fulcrum::supervisor {
+
+struct SessionOutcome {
+  std::string scene_name;
+  std::string session_id;
+  std::string started_utc;    ///< "2024-05-01 12:34:56 UTC".
+  std::string machine;        ///< CPU model and count.
+  std::string configuration;  ///< Effective configuration, YAML.
+  std::vector<NodeId> nodes;  ///< Those that were started, in order.
+  double duration_s = 0;      ///< Session time reached.
+  double wanted_s = 0;        ///< Session time asked for; 0: until stopped.
+  ExitCode exit_code = ExitCode::kDone;
+  std::string verdict;  ///< Empty when all is well; else one line that says what is not.
+};
+
+/// The figures of a session by name: the one list that table, JSON and report take theirs from.
+struct KeyFigure {
+  const char* key;    ///< In summary.json.
+  const char* label;  ///< For people.
+  const char* unit;
+  int decimals;
+  double value;
+};
+[[nodiscard]] std::vector<KeyFigure> KeyFigures(const SessionRecord& record);
+
+/// Flat JSON object; the keys are documented in services/supervisor/DESIGN.md.
+[[nodiscard]] std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& record);
+
+/// One row per node: state, pid, rates, step times, overruns, drops, restarts.
+[[nodiscard]] std::string NodeTable(const std::vector<NodeId>& nodes, const SessionRecord& record);
+
+/// Node table, key figures, restarts and verdict.
+[[nodiscard]] std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& record);
+
+/// "starting", "running", …
+[[nodiscard]] const char* StateName(HealthState state);
+
+/// printf for one number: fixed, without "-0".
+[[nodiscard]] std::string Fixed(double value, int decimals);
+
+}  // namespace fulcrum::supervisor

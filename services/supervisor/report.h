@@ -1,0 +1,15 @@
+// report.html of a session: one file with everything in it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "services/supervisor/outcome.h"
+
+namespace fulcrum::supervisor {
+
+/// `frames`: folder of the pictures. Long: reads and encodes PNG files.
+[[nodiscard]] std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& record,
+                                     const std::filesystem::path& frames);
+
+}  // namespace fulcrum::supervisor

@@ -1,0 +1,427 @@
+#include "services/supervisor/supervisor.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <thread>
+
+#include "services/app/health_report.h"
+#include "services/bus/dds/participant.h"
+#include "services/bus/dds/shared_memory.h"
+#include "services/bus/input_account.h"
+#include "services/core/error.h"
+#include "services/runtime/realtime.h"
+#include "services/scene/scene_file.h"
+#include "services/supervisor/domain_guard.h"
+#include "services/supervisor/node_process.h"
+#include "services/supervisor/outcome.h"
+#include "services/supervisor/progress.h"
+#include "services/supervisor/report.h"
+#include "services/supervisor/script_outlook.h"
+#include "services/supervisor/session_folder.h"
+#include "services/supervisor/session_record.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+using runtime::MonotonicNs;
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+constexpr auto kLoopPeriod = std::chrono::milliseconds(5);
+constexpr std::int64_t kHealthPeriod = kSecond / 10;
+// A node that cannot start holds the session up no longer than this; it is then missing from the beginning.
+constexpr std::int64_t kLongestStart = 30 * kSecond;
+// The manifest reaches all nodes before session time 0.
+constexpr std::int64_t kLeadTime = kSecond / 5;
+constexpr std::int64_t kLongestEnd = 4 * kSecond;
+// Peers let go of a dead process's files when its lease of 1 s is over.
+constexpr std::int64_t kSweepAfter = 2 * kSecond;
+// A gap in our own loop: a suspended machine, a stopped supervisor. Then silence proves nothing.
+constexpr std::int64_t kHeldUp = kSecond;
+
+std::vector<NodeId> NodesOf(const SceneView& scene) {
+  std::vector<NodeId> nodes;
+  for (int i = 0; i < kNodeCount; ++i) {
+    const auto id = static_cast<NodeId>(i);
+    if (id != NodeId::kSupervisor && (scene.node_mask >> i & 1u) != 0) {
+      nodes.push_back(id);
+    }
+  }
+  return nodes;
+}
+
+double EndOfSession(const UpSettings& settings, const SceneView& scene) {
+  return settings.seconds >= 0 ? settings.seconds : static_cast<double>(scene.script_duration_s);
+}
+
+std::string RunYaml(const UpSettings& settings, double end_s) {
+  const auto yes_no = [](bool value) { return value ? "true" : "false"; };
+  return "  seconds: " + (end_s > 0 ? Fixed(end_s, 3) : std::string("until stopped")) +
+         "\n  domain: " + std::to_string(settings.cart.domain) + "\n  window: " + yes_no(settings.window) +
+         "\n  keep_going: " + yes_no(settings.keep_going) + "\n";
+}
+
+}  // namespace
+
+struct Supervisor::Impl {
+  explicit Impl(const UpSettings& up)
+      : settings(up),
+        scene(up.scene),
+        end_s(EndOfSession(up, scene.view())),
+        guard(up.cart.domain),
+        folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
+        memory(bus::SharedMemoryDirectory(up.cart.domain)),
+        node_ids(NodesOf(scene.view())) {
+    if (node_ids.empty()) {
+      throw InputError(up.scene.string() + ": the scene names no node to start");
+    }
+    // Left by a supervisor that was killed: its nodes died with it.
+    bus::SweepSharedMemory(memory);
+    participant.emplace(bus::DdsSettings{.domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory});
+    manifests = participant->MakeOutput<SceneManifest>();
+    healths_in = participant->MakeInput<Health>();
+    healths_out = participant->MakeOutput<Health>();
+    events = participant->MakeInput<ThermalEvent>();
+    commands = participant->MakeInput<Command>();
+    replies = participant->MakeOutput<CommandReply>();
+    for (const NodeId id : node_ids) {
+      nodes.emplace_back(CommandFor(id));
+    }
+  }
+
+  [[nodiscard]] NodeCommand CommandFor(NodeId id) const {
+    NodeCommand command;
+    command.id = id;
+    command.program = settings.programs / NodeName(id);
+    command.arguments = {"--scene",   folder.scene.string(),
+                         "--session", folder.path.string(),
+                         "--domain",  std::to_string(settings.cart.domain),
+                         "--cart",    folder.cart.string()};
+    if (settings.window && id == NodeId::kRender) {
+      command.arguments.emplace_back("--window");
+    }
+    command.log = folder.logs / (std::string(NodeName(id)) + ".log");
+    return command;
+  }
+
+  [[nodiscard]] double SessionTime(std::int64_t now) const {
+    return start_ns == 0 ? -1.0 : 1e-9 * static_cast<double>(now - start_ns);
+  }
+  [[nodiscard]] double ReachedTime() const { return std::max(0.0, SessionTime(MonotonicNs())); }
+
+  NodeProcess* Find(std::string_view name) {
+    const auto found =
+        std::find_if(nodes.begin(), nodes.end(), [&](const NodeProcess& node) { return name == NodeName(node.id()); });
+    return found == nodes.end() ? nullptr : &*found;
+  }
+
+  /// Ends the session; the first cause counts.
+  void Fail(ExitCode code, const std::string& why) {
+    if (exit_code == ExitCode::kDone) {
+      exit_code = code;
+      verdict = why;
+    }
+  }
+
+  // ------------------------------------------------------------------------------------------ stages of the loop
+
+  void WatchNodes(std::int64_t now) {
+    if (now - last_loop_ns > kHeldUp) {
+      for (NodeProcess& node : nodes) {
+        node.ForgiveSilence(now);
+      }
+    }
+    last_loop_ns = now;
+    for (NodeProcess& node : nodes) {
+      const std::optional<NodeProcess::Death> death = node.Update(now);
+      if (!death) {
+        continue;
+      }
+      sweep_ns = now + kSweepAfter;
+      record.AddDeath(SessionTime(now), node.id(), death->cause, death->for_good);
+      const std::string what = std::string(NodeName(node.id())) + " " + death->cause;
+      if (!death->for_good) {
+        progress.Say("! " + what + ": starting it again");
+        continue;
+      }
+      const std::string last = LastLine(node.log());
+      progress.Say("! " + what + ", for good; see " + node.log().string() + (last.empty() ? "" : "\n  " + last));
+      const bool own_code = death->end.signal == 0 && death->end.exit_code >= 2 && death->end.exit_code <= 4;
+      failed_code = own_code ? static_cast<ExitCode>(death->end.exit_code) : ExitCode::kFailure;
+      failed_why = what + ", for good";
+      if (!settings.keep_going) {
+        ending = true;
+      }
+    }
+    if (sweep_ns != 0 && now >= sweep_ns) {
+      sweep_ns = 0;
+      bus::SweepSharedMemory(memory);
+    }
+  }
+
+  void TakeReports(std::int64_t now) {
+    while (healths_in->TakeNext(&health)) {
+      for (NodeProcess& node : nodes) {
+        if (node.id() == health.node && node.pid() == health.pid) {
+          node.OnHealth(now);
+          record.AddHealth(SessionTime(now), health);
+        }
+      }
+    }
+    ThermalEvent event;
+    while (events->TakeNext(&event)) {
+      record.AddEvent(event);
+    }
+    if (const std::string mismatch = participant->schema_mismatch(); !mismatch.empty()) {
+      Fail(ExitCode::kMismatch, mismatch);
+      ending = true;
+    }
+  }
+
+  void TakeCommands(std::int64_t now) {
+    Command command;
+    while (commands->TakeNext(&command)) {
+      if (command.target != NodeId::kSupervisor) {
+        continue;
+      }
+      CommandReply reply;
+      reply.stamp = reply_stamper.Next(now);
+      reply.request_id = command.request_id;
+      reply.from = NodeId::kSupervisor;
+      reply.ok = true;
+      if (command.verb == "down") {
+        reply.text = "ending the session";
+        ending = true;
+      } else if (command.verb == "restart") {
+        NodeProcess* node = Find(command.argument);
+        if (node != nullptr && node->running()) {
+          reply.text = "restarting " + command.argument + " (pid " + std::to_string(node->pid()) + ")";
+          node->AskRestart(now);
+        } else {
+          reply.ok = false;
+          reply.text = "no running node \"" + command.argument + "\" in this session";
+        }
+      } else {
+        reply.ok = false;
+        reply.text = "unknown verb \"" + command.verb + "\"; the supervisor knows: restart, down";
+      }
+      replies->Write(reply);
+    }
+  }
+
+  void PublishOwnHealth(std::int64_t now) {
+    if (now < next_health_ns) {
+      return;
+    }
+    next_health_ns = now + kHealthPeriod;
+    Health own;
+    own.stamp = health_stamper.Next(now);
+    own.node = NodeId::kSupervisor;
+    own.state = ending ? HealthState::kStopping : start_ns == 0 ? HealthState::kWaiting : HealthState::kRunning;
+    own.pid = ::getpid();
+    own.schema_hash = bus::SchemaHash();
+    own.scene_hash = scene.view().hash;
+    own.rate_asked_Hz = 1e9f / static_cast<float>(kHealthPeriod);
+    own.rate_achieved_Hz = static_cast<float>(own_rate.Observe(now, ++own_ticks));
+    own.ticks = own_ticks;
+    own.metrics.push_back({"session_time_s", SessionTime(now)});
+    own.metrics.push_back({"session_end_s", end_s});
+    for (const NodeId id : node_ids) {
+      own.metrics.push_back({std::string("restarts_") + NodeName(id), static_cast<double>(record.node(id).restarts)});
+    }
+    own.last_error = failed_why;
+    app::FitToMessage(&own);
+    healths_out->Write(own);
+  }
+
+  void ShowProgress(std::int64_t now) {
+    if (!progress.IsDue(now)) {
+      return;
+    }
+    const auto alive = std::count_if(nodes.begin(), nodes.end(), [](const NodeProcess& n) { return n.running(); });
+    std::string line = start_ns == 0 ? "starting" : "t " + Fixed(std::max(0.0, SessionTime(now)), 1);
+    if (start_ns != 0) {
+      const std::string phase = PhaseAt(scene.view(), SessionTime(now));
+      const auto last = [&](const char* metric) {
+        const auto& points = record.curve(metric).points();
+        return points.empty() ? 0.0 : points.back().value;
+      };
+      line += (end_s > 0 ? " / " + Fixed(end_s, 1) : std::string()) + " s";
+      line += phase.empty() ? "" : " · " + phase;
+      line += " · force " + Fixed(std::max(last("force0_N"), last("force1_N")), 2) + " N · displaced " +
+              Fixed(last("displacement_mm"), 1) + " mm · " + Fixed(last("temperature_C"), 0) + " °C · cut " +
+              Fixed(last("cut_length_mm"), 1) + " mm";
+    }
+    progress.Show(now, line + " · " + std::to_string(alive) + "/" + std::to_string(nodes.size()) + " nodes");
+  }
+
+  void Turn() {
+    const std::int64_t now = MonotonicNs();
+    TakeReports(now);
+    WatchNodes(now);
+    TakeCommands(now);
+    PublishOwnHealth(now);
+    ShowProgress(now);
+    ending |= runtime::ShouldStop();
+    std::this_thread::sleep_for(kLoopPeriod);
+  }
+
+  // ---------------------------------------------------------------------------------------- phases of the session
+
+  /// Until every node has reported, so that session time 0 finds all of them ready.
+  void WaitForNodes() {
+    const std::int64_t begin = MonotonicNs();
+    last_loop_ns = begin;
+    for (NodeProcess& node : nodes) {
+      node.Start(begin);
+    }
+    const auto ready = [](const NodeProcess& node) { return node.has_reported() || node.failed(); };
+    while (!ending && !std::all_of(nodes.begin(), nodes.end(), ready) && MonotonicNs() - begin < kLongestStart) {
+      Turn();
+    }
+  }
+
+  void BeginSession() {
+    const std::int64_t now = MonotonicNs();
+    start_ns = now + kLeadTime;
+    SceneManifest manifest;
+    manifest.stamp = {1, static_cast<std::uint64_t>(now), now};
+    manifest.scene_name = scene.view().name;
+    manifest.session_id = folder.session_id;
+    manifest.scene_hash = scene.view().hash;
+    manifest.session_start_ns = start_ns;
+    if (!manifests->Write(manifest)) {
+      Fail(ExitCode::kFailure, "the session could not be announced on the bus");
+      ending = true;
+    }
+  }
+
+  void EndNodes() {
+    reached_s = ReachedTime();
+    for (const NodeProcess& node : nodes) {
+      node.Signal(SIGTERM);
+    }
+    const std::int64_t begin = MonotonicNs();
+    const auto ended = [](NodeProcess& node) { return node.HasEnded(); };
+    while (!std::all_of(nodes.begin(), nodes.end(), ended)) {
+      const std::int64_t now = MonotonicNs();
+      if (now - begin > kLongestEnd) {
+        for (const NodeProcess& node : nodes) {
+          if (node.running()) {
+            progress.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and was killed");
+          }
+          node.Signal(SIGKILL);
+        }
+      }
+      TakeReports(now);
+      PublishOwnHealth(now);
+      std::this_thread::sleep_for(kLoopPeriod);
+    }
+    TakeReports(MonotonicNs());
+  }
+
+  void Judge() {
+    if (failed_code != ExitCode::kDone) {
+      Fail(failed_code, failed_why);
+    }
+    for (const NodeProcess& node : nodes) {
+      const NodeFigures& figures = record.node(node.id());
+      if (!figures.seen) {
+        Fail(ExitCode::kFailure, std::string(NodeName(node.id())) + " never reported; see " + node.log().string());
+      }
+    }
+    if (const std::string missing = MissingFrom(record, DemandsUntil(scene.view(), reached_s)); !missing.empty()) {
+      Fail(ExitCode::kFailure, missing);
+    }
+  }
+
+  void LeaveBus() {
+    commands.reset();
+    replies.reset();
+    events.reset();
+    healths_in.reset();
+    healths_out.reset();
+    manifests.reset();
+    participant.reset();
+    bus::RemoveSharedMemory(memory);
+  }
+
+  void Report() {
+    SessionOutcome outcome;
+    outcome.scene_name = scene.view().name;
+    outcome.session_id = folder.session_id;
+    outcome.started_utc = folder.started_utc;
+    outcome.machine = DescribeMachine();
+    outcome.configuration = folder.configuration;
+    outcome.nodes = node_ids;
+    outcome.duration_s = reached_s;
+    outcome.wanted_s = end_s;
+    outcome.exit_code = exit_code;
+    outcome.verdict = verdict;
+    WriteFile(folder.path / "summary.json", SummaryJson(outcome, record));
+    WriteFile(folder.path / "report.html", ReportHtml(outcome, record, folder.frames));
+    progress.Say("\n" + FinalTable(outcome, record) + "report: " + (folder.path / "report.html").string());
+  }
+
+  const UpSettings settings;
+  scene::SceneFile scene;
+  const double end_s;  ///< 0: until stopped.
+  DomainGuard guard;
+  SessionFolder folder;
+  const std::filesystem::path memory;
+  const std::vector<NodeId> node_ids;
+
+  std::optional<bus::DdsParticipant> participant;
+  std::unique_ptr<bus::Output<SceneManifest>> manifests;
+  std::unique_ptr<bus::Input<Health>> healths_in;
+  std::unique_ptr<bus::Output<Health>> healths_out;
+  std::unique_ptr<bus::Input<ThermalEvent>> events;
+  std::unique_ptr<bus::Input<Command>> commands;
+  std::unique_ptr<bus::Output<CommandReply>> replies;
+  bus::Stamper health_stamper{MonotonicNs()}, reply_stamper{MonotonicNs()};
+
+  std::vector<NodeProcess> nodes;
+  SessionRecord record;
+  Progress progress;
+  Health health;  ///< Reused by TakeReports.
+  app::RateMeter own_rate;
+  std::uint64_t own_ticks = 0;
+  std::int64_t start_ns = 0;  ///< CLOCK_MONOTONIC at session time 0; 0: not begun.
+  std::int64_t last_loop_ns = 0, next_health_ns = 0;
+  std::int64_t sweep_ns = 0;  ///< When to sweep; 0: nothing to sweep.
+  double reached_s = 0;
+  bool ending = false;
+  ExitCode failed_code = ExitCode::kDone;  ///< Of a node that failed for good.
+  std::string failed_why;
+  ExitCode exit_code = ExitCode::kDone;
+  std::string verdict;
+};
+
+Supervisor::Supervisor(const UpSettings& settings) : impl_(std::make_unique<Impl>(settings)) {}
+Supervisor::~Supervisor() = default;
+
+const std::filesystem::path& Supervisor::session_folder() const { return impl_->folder.path; }
+
+ExitCode Supervisor::Run() {
+  Impl& session = *impl_;
+  session.progress.Say("session " + session.folder.session_id + " in domain " +
+                       std::to_string(session.settings.cart.domain));
+  session.WaitForNodes();
+  if (!session.ending) {
+    session.BeginSession();
+  }
+  while (!session.ending && (session.end_s <= 0 || session.SessionTime(MonotonicNs()) < session.end_s)) {
+    session.Turn();
+  }
+  session.ending = true;
+  session.EndNodes();
+  session.Judge();
+  session.LeaveBus();
+  session.Report();
+  return session.exit_code;
+}
+
+}  // namespace fulcrum::supervisor

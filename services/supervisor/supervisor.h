@@ -1,0 +1,41 @@
+// Runs one session: starts the nodes of a scene, watches and restarts them, records what they report, ends them.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "services/config/cart.h"
+#include "services/core/exit_code.h"
+
+namespace fulcrum::supervisor {
+
+struct UpSettings {
+  std::filesystem::path scene;     ///< Compiled scene file.
+  std::filesystem::path out;       ///< The session folder is made in here.
+  std::filesystem::path programs;  ///< Folder of the node programs.
+  config::CartConfig cart;         ///< Its domain is the session's.
+  double seconds = -1;             ///< Session time; negative: the script's duration, or until stopped without one.
+  bool window = false;
+  bool keep_going = false;  ///< A node that failed for good does not end the session.
+};
+
+class Supervisor {
+ public:
+  /// Makes the session folder with the effective configuration and joins the bus. Throws InputError or MismatchError.
+  explicit Supervisor(const UpSettings& settings);
+  ~Supervisor();
+  Supervisor(const Supervisor&) = delete;
+  Supervisor& operator=(const Supervisor&) = delete;
+
+  /// Returns when the session has ended and its report is written. Call from the main thread: children die with it.
+  ExitCode Run();
+
+  [[nodiscard]] const std::filesystem::path& session_folder() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace fulcrum::supervisor

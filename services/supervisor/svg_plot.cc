@@ -1,0 +1,128 @@
+#include "services/supervisor/svg_plot.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/supervisor/outcome.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+// Size of a plot in SVG units, with room for the labels of the axes.
+constexpr double kWidth = 640, kHeight = 300;
+constexpr double kLeft = 62, kRight = 16, kTop = 44, kBottom = 46;
+constexpr std::size_t kMostDrawn = 1200;  // More points than pixels only make the file large.
+
+struct Axis {
+  double step, end;
+  int decimals;
+};
+
+Axis MakeAxis(double largest, int most) {
+  const double span = largest > 0 ? largest : 1.0;
+  const double step = NiceStep(span, most);
+  const int decimals = std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9)));
+  return {step, step * std::ceil(span / step - 1e-9), decimals};
+}
+
+std::string Text(double x, double y, const char* anchor, const std::string& text, const char* style = "") {
+  return "<text x='" + Fixed(x, 1) + "' y='" + Fixed(y, 1) + "' text-anchor='" + anchor + "' " + style + ">" +
+         EscapeHtml(text) + "</text>\n";
+}
+
+}  // namespace
+
+double NiceStep(double span, int most) {
+  const double raw = span / most;
+  const double power = std::pow(10.0, std::floor(std::log10(raw)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (raw <= factor * power * (1 + 1e-9)) {
+      return factor * power;
+    }
+  }
+  return 10 * power;
+}
+
+std::string EscapeHtml(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& lines) {
+  double largest = 0;
+  bool any = false;
+  for (const PlotLine& line : lines) {
+    any |= !line.curve->points().empty();
+    largest = std::max(largest, line.curve->max());
+  }
+  if (!any) {
+    return {};
+  }
+  const Axis value = MakeAxis(largest, 5);
+  const double end_s = settings.end_s > 0 ? settings.end_s : 1.0;
+  const double time_step = NiceStep(end_s, 8);
+  const auto x_of = [&](double t) { return kLeft + (kWidth - kLeft - kRight) * std::clamp(t / end_s, 0.0, 1.0); };
+  const auto y_of = [&](double v) {
+    return kHeight - kBottom - (kHeight - kTop - kBottom) * std::clamp(v / value.end, 0.0, 1.0);
+  };
+
+  std::string svg = "<svg viewBox='0 0 " + Fixed(kWidth, 0) + " " + Fixed(kHeight, 0) + "' role='img' aria-label='" +
+                    EscapeHtml(settings.title) + "'>\n";
+  svg += Text(kLeft - 46, 22, "start", settings.title + " [" + settings.unit + "]", "class='title'");
+  for (double v = 0; v <= value.end * (1 + 1e-9); v += value.step) {
+    svg += "<line class='grid' x1='" + Fixed(kLeft, 1) + "' x2='" + Fixed(kWidth - kRight, 1) + "' y1='" +
+           Fixed(y_of(v), 1) + "' y2='" + Fixed(y_of(v), 1) + "'/>\n";
+    svg += Text(kLeft - 8, y_of(v) + 5, "end", Fixed(v, value.decimals));
+  }
+  const int time_decimals = time_step < 1 ? 1 : 0;
+  for (double t = 0; t <= end_s * (1 + 1e-9); t += time_step) {
+    svg += Text(x_of(t), kHeight - kBottom + 20, "middle", Fixed(t, time_decimals));
+  }
+  svg += Text(kWidth - kRight, kHeight - 6, "end", "session time [s]");
+  for (const double mark : settings.marks_s) {
+    svg += "<line class='mark' x1='" + Fixed(x_of(mark), 1) + "' x2='" + Fixed(x_of(mark), 1) + "' y1='" +
+           Fixed(kTop - 6, 1) + "' y2='" + Fixed(kHeight - kBottom, 1) + "'><title>restart</title></line>\n";
+  }
+  double legend_x = kWidth - kRight;
+  for (auto line = lines.rbegin(); line != lines.rend(); ++line) {
+    const auto& points = line->curve->points();
+    if (points.empty()) {
+      continue;
+    }
+    svg += "<polyline fill='none' stroke='" + line->colour + "' stroke-width='2' points='";
+    const std::size_t stride = points.size() / kMostDrawn + 1;
+    for (std::size_t i = 0; i < points.size(); i += stride) {
+      svg += Fixed(x_of(points[i].time_s), 1) + "," + Fixed(y_of(points[i].value), 1) + " ";
+    }
+    svg += "'/>\n";
+    if (lines.size() > 1) {
+      svg += Text(legend_x, 22, "end", line->label,
+                  ("fill='" + line->colour + "' style='fill:" + line->colour + "'").c_str());
+      legend_x -= 12 + 9.0 * static_cast<double>(line->label.size());
+    }
+  }
+  return svg + "</svg>\n";
+}
+
+}  // namespace fulcrum::supervisor

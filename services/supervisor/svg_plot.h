@@ -1,0 +1,33 @@
+// Line plots over session time as inline SVG.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "services/supervisor/session_record.h"
+
+namespace fulcrum::supervisor {
+
+struct PlotLine {
+  std::string label;
+  std::string colour;  ///< CSS colour.
+  const Curve* curve;
+};
+
+struct PlotSettings {
+  std::string title;
+  std::string unit;
+  double end_s = 0;             ///< Right end of the time axis.
+  std::vector<double> marks_s;  ///< Restarts: dashed vertical lines.
+};
+
+/// Empty when no line has a point.
+[[nodiscard]] std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& lines);
+
+/// A step of 1, 2 or 5 times a power of ten that divides `span` into at most `most` parts. span > 0.
+[[nodiscard]] double NiceStep(double span, int most);
+
+/// Replaces the characters that HTML and SVG reserve.
+[[nodiscard]] std::string EscapeHtml(const std::string& text);
+
+}  // namespace fulcrum::supervisor
