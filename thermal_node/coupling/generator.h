@@ -19,20 +19,21 @@ namespace fulcrum::thermal {
 struct ModeRule {
   float rms_fraction;  ///< Of v_max_V.
   float remove_C;
+  float arc_m;  ///< Sparks reach tissue this far from the metal, ever more rarely.
 };
 
 inline ModeRule RuleOf(CauteryMode mode) {
   switch (mode) {
     case CauteryMode::kCut:
-      return {1.0f, 100.0f};
+      return {1.0f, 100.0f, 4.0e-4f};
     case CauteryMode::kBlend:
-      return {0.8f, 130.0f};
+      return {0.8f, 130.0f, 4.0e-4f};
     case CauteryMode::kCoag:
-      return {0.5f, 400.0f};
+      return {0.5f, 400.0f, 4.0e-4f};
     case CauteryMode::kOff:
       break;
   }
-  return {0.0f, 1e9f};
+  return {0.0f, 1e9f, 0.0f};
 }
 
 /// Setting of the generator for one step.
@@ -41,11 +42,13 @@ struct Drive {
   float v_max_V = 0;
   float i_max_A = 0;
   float remove_theta = 0;  ///< [K]
+  float arc_m = 0;
 };
 
 inline Drive MakeDrive(const ThermalParams& params, CauteryMode mode, float power_W) {
   const ModeRule rule = RuleOf(mode);
-  return {power_W, rule.rms_fraction * params.v_max_V, params.i_max_A, rule.remove_C - params.body_temperature_C};
+  return {power_W, rule.rms_fraction * params.v_max_V, params.i_max_A, rule.remove_C - params.body_temperature_C,
+          rule.arc_m};
 }
 
 /// Electrode voltage into a conductance: the asked power, within the limits of voltage and current [V rms].

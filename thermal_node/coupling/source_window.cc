@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thermal_node/heat/wide.h"
+
 namespace fulcrum::thermal {
 namespace {
 
@@ -75,12 +77,16 @@ void SourceWindow::Load(HeatField* field, Ledger* ledger) {
       std::fill_n(&water_[to], count, 0.0f);
       std::fill_n(&flags_[to], count, kOutside);
       std::fill_n(&inverse_volume_[to], count, 0.0f);
+      std::fill_n(&tissue_[to], count, 0.0f);
       return;
     }
     std::copy_n(&tile->state.enthalpy[from], count, &enthalpy_[to]);
     std::copy_n(&tile->state.water[from], count, &water_[to]);
     std::copy_n(&tile->state.flags[from], count, &flags_[to]);
     std::fill_n(&inverse_volume_[to], count, 1.0f / tile->volume);
+    for (int n = 0; n < count; ++n) {
+      tissue_[to + n] = (tile->state.flags[from + n] & kNoTissue) != 0 ? 0.0f : material_.sigma;
+    }
   });
 }
 
@@ -125,6 +131,7 @@ void SourceWindow::SetGround(const Vec2f& tip, bool tented) {
   }
 }
 
+FULCRUM_WIDE
 void SourceWindow::SetSigma() {
   const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
   const float boil = material_.theta_boil, slope = material_.sigma_per_K;
@@ -132,17 +139,17 @@ void SourceWindow::SetSigma() {
     const float theta = enthalpy_[k] / (rc_dry + water_[k] * rc_water);
     const float capped = std::min(std::max(theta, 0.0f), boil);
     const float wet = std::max(water_[k], kDrySigmaFraction);
-    problem_.sigma[k] = (flags_[k] & kNoTissue) != 0 ? 0.0f : material_.sigma * (1.0f + slope * capped) * wet;
+    problem_.sigma[k] = tissue_[k] * (1.0f + slope * capped) * wet;
   }
 }
 
-void SourceWindow::SetContact(const Vec2f& tip, float radius_m) {
+void SourceWindow::SetContact(const Vec2f& tip, float radius_m, float arc_m) {
   problem_.contact.fill(0);
   const float cell = material_.cell_m;
   const float area = cell * cell * metric_.s * metric_.t;
   const Vec2f centre = tip / cell - Vec2f(static_cast<float>(corner_.ix + sheet_.origin_x),
                                           static_cast<float>(corner_.iy + sheet_.origin_y));
-  const float reach = radius_m / cell + 1.0f;
+  const float reach = (radius_m + arc_m) / cell + 1.0f;
   const int i0 = std::max(0, static_cast<int>((centre.x() - reach / metric_.s)));
   const int i1 = std::min(kWindow - 1, static_cast<int>(centre.x() + reach / metric_.s));
   const int j0 = std::max(0, static_cast<int>(centre.y() - reach / metric_.t));
@@ -151,7 +158,12 @@ void SourceWindow::SetContact(const Vec2f& tip, float radius_m) {
     for (int i = i0; i <= i1; ++i) {
       const float dx = (static_cast<float>(i) + 0.5f - centre.x()) * metric_.s;
       const float dy = (static_cast<float>(j) + 0.5f - centre.y()) * metric_.t;
-      const float covered = std::clamp(radius_m / cell - std::sqrt(dx * dx + dy * dy) + 0.5f, 0.0f, 1.0f);
+      const float r = std::sqrt(dx * dx + dy * dy);
+      const float metal = std::clamp(radius_m / cell - r + 0.5f, 0.0f, 1.0f);
+      const float gap = std::max(r * cell - radius_m, 0.0f);
+      // Falls from 1 at the metal to 0 at arc_m as the sparks get rarer.
+      const float rarer = std::max(1.0f - gap / arc_m, 0.0f);
+      const float covered = std::max(metal, kArcConductance * rarer * rarer);
       // From the face that the metal touches to the middle of the sheet: sigma / (d / 2) per area.
       const int k = j * kWindow + i;
       problem_.contact[k] = covered * area * 2.0f * problem_.sigma[k] / material_.thickness_m;
@@ -159,25 +171,32 @@ void SourceWindow::SetContact(const Vec2f& tip, float radius_m) {
   }
 }
 
+FULCRUM_WIDE
 float SourceWindow::TimeToEvent(float v2) const {
-  const auto& q = potential_.heat();
+  const float* __restrict q = potential_.heat().data();
+  const float* __restrict h = enthalpy_.data();
+  const float* __restrict w = water_.data();
+  const float* __restrict iv = inverse_volume_.data();
   const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
   const float boil = material_.theta_boil, latent = material_.latent;
-  alignas(64) std::array<float, kWindow> fastest{};
+  alignas(64) float fastest[kWindow] = {};
   // The largest rate of progress towards an event, as 1 / time, so that cells without heat need no special case.
   for (int j = 0; j < kWindow; ++j) {
     for (int i = 0; i < kWindow; ++i) {
       const int k = j * kWindow + i;
-      const float power = q[k] * inverse_volume_[k];
-      const float rc = rc_dry + water_[k] * rc_water;
-      const float to_dry = std::max(rc * boil - enthalpy_[k], 0.0f) + water_[k] * latent;
-      const float warm = kMaxWarming * rc;
-      const float heat = enthalpy_[k] < 0.98f * rc * boil ? std::min(warm, to_dry) : to_dry;
-      const float rate = water_[k] > 0.0f ? power / (heat + 1.0f) : 0.0f;
+      const float power = q[k] * iv[k];
+      const float rc = rc_dry + w[k] * rc_water;
+      const float below = rc * boil - h[k];
+      const float to_dry = (below > 0.0f ? below : 0.0f) + w[k] * latent;
+      const float to_warm = kMaxWarming * rc < to_dry ? kMaxWarming * rc : to_dry;
+      // Close to boiling, warming ends by itself.
+      const float heat = below > kMaxWarming * 0.1f * rc ? to_warm : to_dry;
+      const float possible = power / (heat + 1.0f);
+      const float rate = w[k] > 0.0f ? possible : 0.0f;
       fastest[i] = fastest[i] > rate ? fastest[i] : rate;
     }
   }
-  const float rate = *std::max_element(fastest.begin(), fastest.end()) * v2;
+  const float rate = *std::max_element(fastest, fastest + kWindow) * v2;
   return rate > 0.0f ? 1.0f / rate : 1.0f;
 }
 
@@ -200,6 +219,7 @@ void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
     enthalpy_[k] = 0;
     water_[k] = 0;
     flags_[k] = static_cast<std::uint8_t>(flags_[k] | kRemoved);
+    tissue_[k] = 0;
     ++stats_.removed_cells;
     const CellIndex cell{corner_.ix + i, corner_.iy + j};
     stats_.low = {std::min(stats_.low.ix, cell.ix), std::min(stats_.low.iy, cell.iy)};
@@ -207,19 +227,21 @@ void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
   }
 }
 
+FULCRUM_WIDE
 void SourceWindow::Deposit(float v2, float dt_s, float remove_theta, Ledger* ledger) {
-  const auto& q = potential_.heat();
   const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
-  const float scale = v2 * dt_s;
+  const float boil = material_.theta_boil, scale = v2 * dt_s;
   for (int j = 0; j < kWindow; ++j) {
-    float above = -1.0f;
+    const float* __restrict q = &potential_.heat()[j * kWindow];
+    float* __restrict h = &enthalpy_[j * kWindow];
+    const float* __restrict w = &water_[j * kWindow];
+    const float* __restrict iv = &inverse_volume_[j * kWindow];
+    alignas(64) float excess[kWindow];
     for (int i = 0; i < kWindow; ++i) {
-      const int k = j * kWindow + i;
-      enthalpy_[k] += scale * q[k] * inverse_volume_[k];
-      const float excess = enthalpy_[k] - (rc_dry + water_[k] * rc_water) * material_.theta_boil;
-      above = above > excess ? above : excess;
+      h[i] += scale * q[i] * iv[i];
+      excess[i] = h[i] - (rc_dry + w[i] * rc_water) * boil;
     }
-    if (above >= 0.0f) BoilRow(j, remove_theta, ledger);
+    if (*std::max_element(excess, excess + kWindow) >= 0.0f) BoilRow(j, remove_theta, ledger);
   }
 }
 
@@ -241,7 +263,7 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   float t = 0, guess = shortest;
   while (t < duration_s) {
     const float at = std::min(t + 0.5f * guess, duration_s) / duration_s;
-    SetContact(path.from + at * (path.to - path.from), path.radius_m);
+    SetContact(path.from + at * (path.to - path.from), path.radius_m, drive.arc_m);
     const PotentialResult solved = potential_.Solve(problem_, tolerance);
     const float voltage = RegulatedVoltage(drive, solved.conductance_S);
     const float v2 = voltage * voltage;

@@ -5,11 +5,49 @@
 #include <limits>
 #include <utility>
 
+#include "thermal_node/heat/wide.h"
+
 namespace fulcrum::thermal {
 namespace {
 
 /// Harmonic mean; 0 when either side does not conduct. The guard only turns 0/0 into 0.
-float Harmonic(float a, float b) { return 2.0f * a * b / (a + b + std::numeric_limits<float>::min()); }
+inline float Harmonic(float a, float b) { return 2.0f * a * b / (a + b + std::numeric_limits<float>::min()); }
+
+/// One explicit step of conduction, with `loss` = dt times the sink per kelvin.
+FULCRUM_WIDE
+void Conduct(Tile* tile, float dt_s, float loss) {
+  for (int j = 0; j < kTile; ++j) {
+    const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
+    const float* __restrict fx = &tile->face_x[j * kFaceStride];
+    const float* __restrict fy = &tile->face_y[j * kTile];
+    float* __restrict h = &tile->state.enthalpy[j * kTile];
+    for (int i = 0; i < kTile; ++i) {
+      const float flux = fx[i] * (t[i - 1] - t[i]) + fx[i + 1] * (t[i + 1] - t[i]) +
+                         fy[i] * (t[i - kThetaStride] - t[i]) + fy[i + kTile] * (t[i + kThetaStride] - t[i]);
+      h[i] += dt_s * flux - loss * t[i];
+    }
+  }
+}
+
+/// theta with its column sums and extremes; rc = rc_dry + water * rc_water.
+FULCRUM_WIDE
+void ComputeTheta(Tile* tile, float rc_dry, float rc_water) {
+  alignas(64) float sum[kTile] = {}, high[kTile] = {}, low[kTile] = {};
+  for (int j = 0; j < kTile; ++j) {
+    float* __restrict t = &tile->theta[ThetaIndex(0, j)];
+    const float* __restrict h = &tile->state.enthalpy[j * kTile];
+    const float* __restrict w = &tile->state.water[j * kTile];
+    for (int i = 0; i < kTile; ++i) {
+      t[i] = h[i] / (rc_dry + w[i] * rc_water);
+      sum[i] += t[i];
+      high[i] = high[i] > t[i] ? high[i] : t[i];
+      low[i] = low[i] < t[i] ? low[i] : t[i];
+    }
+  }
+  std::copy_n(sum, kTile, tile->theta_sum.begin());
+  tile->theta_max = *std::max_element(high, high + kTile);
+  tile->theta_min = *std::min_element(low, low + kTile);
+}
 
 }  // namespace
 
@@ -153,41 +191,16 @@ void HeatField::ExchangeHalos(Tile* tile) {
 
 void HeatField::Substep(Tile* tile, float dt_s, Ledger* ledger) {
   const float loss = dt_s * (tile->state.tented ? material_.loss_tented : material_.loss_resting);
-  for (int j = 0; j < kTile; ++j) {
-    const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
-    const float* __restrict fx = &tile->face_x[j * kFaceStride];
-    const float* __restrict fy = &tile->face_y[j * kTile];
-    float* __restrict h = &tile->state.enthalpy[j * kTile];
-    for (int i = 0; i < kTile; ++i) {
-      const float flux = fx[i] * (t[i - 1] - t[i]) + fx[i + 1] * (t[i + 1] - t[i]) +
-                         fy[i] * (t[i - kThetaStride] - t[i]) + fy[i + kTile] * (t[i + kThetaStride] - t[i]);
-      h[i] += dt_s * flux - loss * t[i];
-    }
-  }
+  Conduct(tile, dt_s, loss);
   double sum = 0;
   for (const float s : tile->theta_sum) sum += s;
   ledger->lost += sum * loss * tile->volume;
 }
 
 void HeatField::RefreshTheta(Tile* tile, Ledger* ledger) {
-  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
-  alignas(64) std::array<float, kTile> sum{}, high{}, low{};
-  for (int j = 0; j < kTile; ++j) {
-    float* __restrict t = &tile->theta[ThetaIndex(0, j)];
-    const float* __restrict h = &tile->state.enthalpy[j * kTile];
-    const float* __restrict w = &tile->state.water[j * kTile];
-    for (int i = 0; i < kTile; ++i) {
-      t[i] = h[i] / (rc_dry + w[i] * rc_water);
-      sum[i] += t[i];
-      high[i] = high[i] > t[i] ? high[i] : t[i];
-      low[i] = low[i] < t[i] ? low[i] : t[i];
-    }
-  }
-  tile->theta_sum = sum;
-  tile->theta_max = *std::max_element(high.begin(), high.end());
-  tile->theta_min = *std::min_element(low.begin(), low.end());
+  ComputeTheta(tile, material_.rc_dry, material_.rc_wet - material_.rc_dry);
   float total = 0;
-  for (const float s : sum) total += s;
+  for (const float s : tile->theta_sum) total += s;
   if (!std::isfinite(total) || tile->theta_max > kThetaPlausible || tile->theta_min < -kThetaPlausible) {
     Quarantine(tile, ledger);
   }
@@ -239,7 +252,6 @@ void HeatField::Boil(Tile* tile, Ledger* ledger) {
 
 int HeatField::Diffuse(float dt_s, Ledger* ledger) {
   if (awake_.empty()) return 0;
-  for (Tile* tile : awake_) RefreshTheta(tile, ledger);
   WakeNeighbours();
   RebuildStaleFaces();
   float rate = 0;

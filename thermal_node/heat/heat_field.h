@@ -37,9 +37,9 @@ class HeatField {
   /// Wakes (and on first use creates) the tile. nullptr beyond the sheet.
   Tile* Wake(int tx, int ty);
 
-  /// One step of conduction and losses in as many substeps as the fastest awake tile needs, with boiling, then waking
-  /// of neighbours and sleeping of cold tiles. Cells that hold no plausible number are quarantined first. Returns the
-  /// number of substeps.
+  /// One step of conduction and losses in as many substeps as the fastest awake tile needs, with boiling, waking of
+  /// neighbours and sleeping of cold tiles. Whoever changed enthalpy or water must have called RefreshTheta. Returns
+  /// the number of substeps.
   int Diffuse(float dt_s, Ledger* ledger);
 
   /// Recomputes theta, its sums and extremes from the enthalpy. Quarantines bad cells.

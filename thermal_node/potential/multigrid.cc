@@ -1,10 +1,15 @@
 #include "thermal_node/potential/multigrid.h"
 
+#include <limits>
+
+#include "thermal_node/heat/wide.h"
+
 namespace fulcrum::thermal {
 namespace {
 
 /// Sweeps on the 2 x 2 level: enough that its error does not show.
 constexpr int kCoarsestSweeps = 8;
+constexpr float kTiny = std::numeric_limits<float>::min();
 
 }  // namespace
 
@@ -12,6 +17,7 @@ Level::Level(int size) : n(size), stride(size + 8), count((size + 2) * (size + 8
   for (auto* field : {&face_x, &face_y, &mass, &diag, &smooth, &x, &b, &r}) field->assign(count, 0.0f);
 }
 
+FULCRUM_WIDE
 void Level::Finish() {
   for (int j = 0; j < n; ++j) {
     const int o = At(0, j);
@@ -22,11 +28,13 @@ void Level::Finish() {
     float* __restrict s = &smooth[o];
     for (int i = 0; i < n; ++i) {
       d[i] = fx[i] + fx[i + 1] + fy[i] + fy[i + stride] + m[i];
-      s[i] = d[i] > 0.0f ? kJacobiWeight / d[i] : 0.0f;
+      // Without tissue diag is 0, and so is every residual that this multiplies.
+      s[i] = kJacobiWeight / (d[i] + kTiny);
     }
   }
 }
 
+FULCRUM_WIDE
 void Level::Apply(const float* v, float* out) const {
   for (int j = 0; j < n; ++j) {
     const int o = At(0, j);
@@ -42,6 +50,7 @@ void Level::Apply(const float* v, float* out) const {
   }
 }
 
+FULCRUM_WIDE
 void Level::Residual() {
   for (int j = 0; j < n; ++j) {
     const int o = At(0, j);
@@ -58,11 +67,16 @@ void Level::Residual() {
   }
 }
 
+FULCRUM_WIDE
 void Level::Smooth() {
   Residual();
-  for (int k = 0; k < count; ++k) x[k] += smooth[k] * r[k];
+  const float* __restrict s = smooth.data();
+  const float* __restrict res = r.data();
+  float* __restrict out = x.data();
+  for (int k = 0; k < count; ++k) out[k] += s[k] * res[k];
 }
 
+FULCRUM_WIDE
 void Coarsen(const Level& fine, Level* coarse) {
   const int fs = fine.stride;
   for (int j = 0; j < coarse->n; ++j) {
@@ -77,27 +91,33 @@ void Coarsen(const Level& fine, Level* coarse) {
   coarse->Finish();
 }
 
-void VCycle(std::vector<Level>* levels, std::size_t l) {
-  Level& level = (*levels)[l];
-  for (int k = 0; k < level.count; ++k) level.x[k] = level.smooth[k] * level.b[k];
-  if (l + 1 == levels->size()) {
-    for (int sweep = 0; sweep < kCoarsestSweeps; ++sweep) level.Smooth();
-    return;
-  }
-  level.Residual();
-  Level& coarse = (*levels)[l + 1];
-  const int s = level.stride;
-  for (int j = 0; j < coarse.n; ++j) {
-    const float* __restrict r0 = &level.r[level.At(0, 2 * j)];
+FULCRUM_WIDE
+void Level::SmoothFromZero() {
+  const float* __restrict s = smooth.data();
+  const float* __restrict rhs = b.data();
+  float* __restrict out = x.data();
+  for (int k = 0; k < count; ++k) out[k] = s[k] * rhs[k];
+}
+
+/// b of the coarse level: the sum of the fine residuals.
+FULCRUM_WIDE
+void Restrict(const Level& fine, Level* coarse) {
+  const int s = fine.stride;
+  for (int j = 0; j < coarse->n; ++j) {
+    const float* __restrict r0 = &fine.r[fine.At(0, 2 * j)];
     const float* __restrict r1 = r0 + s;
-    float* __restrict b = &coarse.b[coarse.At(0, j)];
-    for (int i = 0; i < coarse.n; ++i) b[i] = r0[2 * i] + r0[2 * i + 1] + r1[2 * i] + r1[2 * i + 1];
+    float* __restrict b = &coarse->b[coarse->At(0, j)];
+    for (int i = 0; i < coarse->n; ++i) b[i] = (r0[2 * i] + r0[2 * i + 1]) + (r1[2 * i] + r1[2 * i + 1]);
   }
-  VCycle(levels, l + 1);
+}
+
+/// Adds the coarse correction to the four cells below each coarse one.
+FULCRUM_WIDE
+void Prolong(const Level& coarse, Level* fine) {
   for (int j = 0; j < coarse.n; ++j) {
     const float* __restrict e = &coarse.x[coarse.At(0, j)];
-    float* __restrict x0 = &level.x[level.At(0, 2 * j)];
-    float* __restrict x1 = x0 + s;
+    float* __restrict x0 = &fine->x[fine->At(0, 2 * j)];
+    float* __restrict x1 = x0 + fine->stride;
     for (int i = 0; i < coarse.n; ++i) {
       x0[2 * i] += e[i];
       x0[2 * i + 1] += e[i];
@@ -105,6 +125,20 @@ void VCycle(std::vector<Level>* levels, std::size_t l) {
       x1[2 * i + 1] += e[i];
     }
   }
+}
+
+void VCycle(std::vector<Level>* levels, std::size_t l) {
+  Level& level = (*levels)[l];
+  level.SmoothFromZero();
+  if (l + 1 == levels->size()) {
+    for (int sweep = 0; sweep < kCoarsestSweeps; ++sweep) level.Smooth();
+    return;
+  }
+  level.Residual();
+  Level& coarse = (*levels)[l + 1];
+  Restrict(level, &coarse);
+  VCycle(levels, l + 1);
+  Prolong(coarse, &level);
   level.Smooth();
 }
 

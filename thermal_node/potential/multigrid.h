@@ -19,7 +19,7 @@ struct Level {
   std::vector<float> face_y;   ///< Between (i, j-1) and (i, j).
   std::vector<float> mass;     ///< Contact plus ground [S].
   std::vector<float> diag;     ///< 0 where there is no tissue.
-  std::vector<float> smooth;   ///< kJacobiWeight / diag, or 0.
+  std::vector<float> smooth;   ///< kJacobiWeight / diag.
   std::vector<float> x, b, r;  ///< Of the V-cycle.
 
   /// diag and smooth from faces and mass.
@@ -28,6 +28,8 @@ struct Level {
   void Apply(const float* v, float* out) const;
   /// r = b - A x.
   void Residual();
+  /// x = smooth * b: one Jacobi sweep from x = 0.
+  void SmoothFromZero();
   /// x += smooth * (b - A x).
   void Smooth();
 };

@@ -1,9 +1,10 @@
 #include "thermal_node/potential/potential_solver.h"
 
-#include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "thermal_node/heat/wide.h"
 #include "thermal_node/potential/multigrid.h"
 
 namespace fulcrum::thermal {
@@ -11,12 +12,78 @@ namespace {
 
 constexpr int kMaxIterations = 60;
 
-using Field = Eigen::Map<Eigen::ArrayXf>;
-using ConstField = Eigen::Map<const Eigen::ArrayXf>;
+using Vector = std::vector<float>;
 
-float Dot(const std::vector<float>& a, const std::vector<float>& b) {
-  const auto size = static_cast<Eigen::Index>(a.size());
-  return (ConstField(a.data(), size) * ConstField(b.data(), size)).sum();
+/// Sixteen running sums in a fixed order: the same bits on every CPU.
+FULCRUM_WIDE
+float Dot(const Vector& a, const Vector& b) {
+  constexpr int kLanes = 16;
+  alignas(64) float lane[kLanes] = {};
+  const float* __restrict pa = a.data();
+  const float* __restrict pb = b.data();
+  const int count = static_cast<int>(a.size()) / kLanes * kLanes;
+  for (int k = 0; k < count; k += kLanes) {
+    for (int l = 0; l < kLanes; ++l) lane[l] += pa[k + l] * pb[k + l];
+  }
+  float sum = 0;
+  for (const float part : lane) sum += part;
+  for (int k = count; k < static_cast<int>(a.size()); ++k) sum += pa[k] * pb[k];
+  return sum;
+}
+
+/// y = x + f * y
+FULCRUM_WIDE
+void ScaleAdd(const Vector& x, float f, Vector* y) {
+  const float* __restrict px = x.data();
+  float* __restrict py = y->data();
+  for (int k = 0; k < static_cast<int>(x.size()); ++k) py[k] = px[k] + f * py[k];
+}
+
+/// y += f * x
+FULCRUM_WIDE
+void Add(float f, const Vector& x, Vector* y) {
+  const float* __restrict px = x.data();
+  float* __restrict py = y->data();
+  for (int k = 0; k < static_cast<int>(x.size()); ++k) py[k] += f * px[k];
+}
+
+constexpr float kTiny = std::numeric_limits<float>::min();
+
+/// Face conductances of the finest level. The halo of sigma is 0, which closes the window's border; what flows on
+/// beyond it is in `ground`.
+FULCRUM_WIDE
+void SetFaces(const Vector& sigma, float face_s, float face_t, Level* fine) {
+  const int up = fine->stride;
+  for (int j = 0; j <= kWindow; ++j) {
+    const int o = fine->At(0, j);
+    const float* __restrict s = &sigma[o];
+    float* __restrict fx = &fine->face_x[o];
+    float* __restrict fy = &fine->face_y[o];
+    for (int i = 0; i <= kWindow; ++i) {
+      fx[i] = face_s * 2.0f * s[i - 1] * s[i] / (s[i - 1] + s[i] + kTiny);
+      fy[i] = face_t * 2.0f * s[i - up] * s[i] / (s[i - up] + s[i] + kTiny);
+    }
+  }
+}
+
+/// Heat of one row of cells. Each cell is crossed by four half faces of resistance 1 / (2 sigma face), so a current I
+/// leaves I^2 / (2 sigma face) in it.
+FULCRUM_WIDE
+void RowHeat(const Level& fine, const Vector& voltage, const Vector& sigma, float face_s, float face_t, int j,
+             const float* __restrict contact, float* __restrict q) {
+  const int o = fine.At(0, j), up = fine.stride;
+  const float* __restrict v = &voltage[o];
+  const float* __restrict s = &sigma[o];
+  const float* __restrict fx = &fine.face_x[o];
+  const float* __restrict fy = &fine.face_y[o];
+  const float half_s = 0.5f / face_s, half_t = 0.5f / face_t;
+  for (int i = 0; i < kWindow; ++i) {
+    const float left = fx[i] * (v[i] - v[i - 1]), right = fx[i + 1] * (v[i] - v[i + 1]);
+    const float above = fy[i] * (v[i] - v[i - up]), below = fy[i + up] * (v[i] - v[i + up]);
+    const float drop = 1.0f - v[i];
+    q[i] = (half_s * (left * left + right * right) + half_t * (above * above + below * below)) / (s[i] + kTiny) +
+           contact[i] * drop * drop;
+  }
 }
 
 }  // namespace
@@ -25,11 +92,11 @@ struct PotentialSolver::Multigrid {
   Multigrid() {
     for (int n = kWindow; n >= 2; n /= 2) levels.emplace_back(n);
     const std::size_t count = levels[0].count;
-    for (auto* field : {&v, &p, &ap, &residual, &contact, &sigma}) field->assign(count, 0.0f);
+    for (auto* field : {&v, &p, &ap, &contact, &sigma}) field->assign(count, 0.0f);
   }
   std::vector<Level> levels;
   std::vector<float> v;  ///< Solution, and start of the next solve.
-  std::vector<float> p, ap, residual, contact, sigma;
+  std::vector<float> p, ap, contact, sigma;
 };
 
 PotentialSolver::PotentialSolver() : grid_(std::make_unique<Multigrid>()) {}
@@ -47,19 +114,7 @@ PotentialResult PotentialSolver::Solve(const PotentialProblem& problem, float to
       fine.mass[o + i] = problem.contact[j * kWindow + i] + problem.ground[j * kWindow + i];
     }
   }
-  // The halo of sigma is 0, which closes the window's border; what flows on beyond it is in `ground`.
-  constexpr float kTiny = std::numeric_limits<float>::min();
-  for (int j = 0; j <= kWindow; ++j) {
-    const int o = fine.At(0, j);
-    const float* __restrict s = &grid_->sigma[o];
-    float* __restrict fx = &fine.face_x[o];
-    float* __restrict fy = &fine.face_y[o];
-    const int up = fine.stride;
-    for (int i = 0; i <= kWindow; ++i) {
-      fx[i] = problem.face_s * 2.0f * s[i - 1] * s[i] / (s[i - 1] + s[i] + kTiny);
-      fy[i] = problem.face_t * 2.0f * s[i - up] * s[i] / (s[i - up] + s[i] + kTiny);
-    }
-  }
+  SetFaces(grid_->sigma, problem.face_s, problem.face_t, &fine);
   fine.Finish();
   for (std::size_t l = 1; l < grid_->levels.size(); ++l) Coarsen(grid_->levels[l - 1], &grid_->levels[l]);
 
@@ -77,32 +132,26 @@ PotentialResult PotentialSolver::Solve(const PotentialProblem& problem, float to
 int PotentialSolver::Iterate(float tolerance) {
   Multigrid& g = *grid_;
   Level& fine = g.levels[0];
-  const auto size = static_cast<Eigen::Index>(fine.count);
-  Field v(g.v.data(), size), p(g.p.data(), size), ap(g.ap.data(), size), r(g.residual.data(), size);
-  Field z(fine.x.data(), size), b(fine.b.data(), size);
   const float norm_b = std::sqrt(Dot(g.contact, g.contact));
   if (!(norm_b > 0.0f)) {
-    v.setZero();
+    std::fill(g.v.begin(), g.v.end(), 0.0f);
     return 0;
   }
+  // The residual lives in fine.b, where the V-cycle wants it; its answer z is fine.x.
   fine.Apply(g.v.data(), g.ap.data());
-  r = ConstField(g.contact.data(), size) - ap;
+  fine.b = g.contact;
+  Add(-1.0f, g.ap, &fine.b);
   float rz = 0;
   for (int k = 0; k < kMaxIterations; ++k) {
-    if (!(std::sqrt(Dot(g.residual, g.residual)) > tolerance * norm_b)) return k;
-    b = r;
+    if (!(std::sqrt(Dot(fine.b, fine.b)) > tolerance * norm_b)) return k;
     VCycle(&g.levels, 0);
-    const float rz_new = Dot(g.residual, fine.x);
-    if (k == 0) {
-      p = z;
-    } else {
-      p = z + (rz_new / rz) * p;
-    }
+    const float rz_new = Dot(fine.b, fine.x);
+    ScaleAdd(fine.x, k == 0 ? 0.0f : rz_new / rz, &g.p);
     rz = rz_new;
     fine.Apply(g.p.data(), g.ap.data());
     const float alpha = rz / Dot(g.p, g.ap);
-    v += alpha * p;
-    r -= alpha * ap;
+    Add(alpha, g.p, &g.v);
+    Add(-alpha, g.ap, &fine.b);
   }
   return kMaxIterations;
 }
@@ -110,37 +159,22 @@ int PotentialSolver::Iterate(float tolerance) {
 PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
   Multigrid& g = *grid_;
   const Level& fine = g.levels[0];
-  constexpr float kTiny = std::numeric_limits<float>::min();
-  const int up = fine.stride;
   double in = 0, heat = 0, grounded = 0;
   for (int j = 0; j < kWindow; ++j) {
-    const int o = fine.At(0, j);
-    const float* __restrict v = &g.v[o];
-    const float* __restrict s = &g.sigma[o];
-    const float* __restrict fx = &fine.face_x[o];
-    const float* __restrict fy = &fine.face_y[o];
-    const float* __restrict contact = &problem.contact[j * kWindow];
-    const float* __restrict ground = &problem.ground[j * kWindow];
-    float* __restrict q = &heat_[j * kWindow];
-    alignas(64) float row_in[kWindow], row_ground[kWindow];
-    // Two half faces in series share the heat as their resistances: of a face, cell a gets sigma_b / (sigma_a +
-    // sigma_b).
-    const auto half = [&](float face, float dv, float mine, float other) {
-      return face * dv * dv * other / (mine + other + kTiny);
-    };
+    const float* contact = &problem.contact[j * kWindow];
+    const float* ground = &problem.ground[j * kWindow];
+    const float* v = &g.v[fine.At(0, j)];
+    float* q = &heat_[j * kWindow];
+    RowHeat(fine, g.v, g.sigma, problem.face_s, problem.face_t, j, contact, q);
+    float row_in = 0, row_heat = 0, row_ground = 0;
     for (int i = 0; i < kWindow; ++i) {
-      const float drop = 1.0f - v[i];
-      q[i] = half(fx[i], v[i] - v[i - 1], s[i], s[i - 1]) + half(fx[i + 1], v[i] - v[i + 1], s[i], s[i + 1]) +
-             half(fy[i], v[i] - v[i - up], s[i], s[i - up]) + half(fy[i + up], v[i] - v[i + up], s[i], s[i + up]) +
-             contact[i] * drop * drop;
-      row_in[i] = contact[i] * drop;
-      row_ground[i] = ground[i] * v[i] * v[i];
+      row_in += contact[i] * (1.0f - v[i]);
+      row_heat += q[i];
+      row_ground += ground[i] * v[i] * v[i];
     }
-    for (int i = 0; i < kWindow; ++i) {
-      in += row_in[i];
-      heat += q[i];
-      grounded += row_ground[i];
-    }
+    in += row_in;
+    heat += row_heat;
+    grounded += row_ground;
   }
   PotentialResult result;
   if (!(in > 0.0) || !std::isfinite(in + heat + grounded)) {
