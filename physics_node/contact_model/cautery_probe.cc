@@ -41,8 +41,8 @@ bool CauteryProbe::Tented(Index triangle, const std::array<float, 3>& barycentri
   for (int r = std::max(row - kBindingWindow, 0); r <= std::min(row + kBindingWindow, rows - 1); ++r) {
     for (int c = std::max(col - kBindingWindow, 0); c <= std::min(col + kBindingWindow, cols - 1); ++c) {
       const int apart = std::abs(r - row) + std::abs(c - col);
-      const PackedBinding* binding = model_->BindingOf(static_cast<Index>(r * cols + c));
-      if (binding == nullptr || apart >= nearest) {
+      const auto binding = apart < nearest ? model_->BindingOf(static_cast<Index>(r * cols + c)) : std::nullopt;
+      if (!binding) {
         continue;
       }
       nearest = apart;

@@ -112,8 +112,7 @@ Vec3f ElasticForce::OnParticle(Index particle) const {
     }
   });
   if (membrane) {
-    if (const PackedBinding* binding = model_->BindingOf(particle - scene_.membrane.first);
-        binding != nullptr && binding->rest_length >= 0.0f) {
+    if (const auto binding = model_->BindingOf(particle - scene_.membrane.first)) {
       Vec3f foot = Vec3f::Zero();
       for (std::size_t i = 0; i < 3; ++i) {
         foot += binding->barycentric[i] * particles_->At(binding->surface[i]);

@@ -36,6 +36,23 @@ struct alignas(32) BendingBatch {
   float active[kLanes];      ///< 1, or 0 where the hinge has been cut.
 };
 
+/// Eight bindings (eq. 9) of one colour: v[0] is the membrane's node, v[1..3] the surface triangle.
+struct alignas(32) BindingBatch {
+  std::uint32_t base[4][kLanes];
+  std::uint32_t step[4][kLanes];
+  float barycentric[3][kLanes];
+  float rest_length[kLanes];  ///< [m]
+  float rest_height[kLanes];  ///< Over the plane of the triangle [m].
+  float active[kLanes];       ///< 1, or 0 where the node is dead.
+};
+
+/// How a binding gives way, per iteration: drawn out, pressed in, and pressed in to less than `floor` of its height.
+struct BindingStiffness {
+  float tension;
+  float compression;
+  float floor;
+};
+
 /// The membrane: coordinate planes, lane-blocked rows. Column c of a row lies in lane c / slots, slot c % slots, at
 /// offset row * stride + slot * 8 + lane with stride = 8 * slots. The neighbour c + 1 is the next slot of the same
 /// lane, or the first slot of the next lane: no gather, one rotation per row.
@@ -75,6 +92,8 @@ struct Kernels {
   void (*springs)(float* particles, const SpringBatch* batches, std::size_t count, float k);
   void (*volumes)(float* particles, const TetBatch* batches, std::size_t count, float k);
   void (*bending)(float* pool, const BendingBatch* batches, std::size_t count, float k);
+
+  void (*bindings)(float* pool, const BindingBatch* batches, std::size_t count, const BindingStiffness& stiffness);
 
   /// Verlet prediction of `count` entries (multiple of 8) of the planes: previous <- now, now <- now + velocity step.
   /// A damaged coordinate is taken from `previous`; returns how many.

@@ -4,9 +4,9 @@
 namespace fulcrum::physics {
 
 const Kernels& BaselineKernels() {
-  static constexpr Kernels kernels{"baseline",        baseline::GridStretch,       baseline::Springs,
-                                   baseline::Volumes, baseline::Bending,           baseline::Integrate,
-                                   baseline::Finish,  baseline::ComputeBlockBounds};
+  static constexpr Kernels kernels{"baseline",          baseline::GridStretch, baseline::Springs,
+                                   baseline::Volumes,   baseline::Bending,     baseline::Bindings,
+                                   baseline::Integrate, baseline::Finish,      baseline::ComputeBlockBounds};
   return kernels;
 }
 

@@ -197,6 +197,33 @@ void Bending(float* pool, const BendingBatch* batches, std::size_t count, float 
   }
 }
 
+void Bindings(float* pool, const BindingBatch* batches, std::size_t count, const BindingStiffness& stiffness) {
+  const F8 zero = F8::All(0.0f);
+  for (std::size_t i = 0; i < count; ++i) {
+    const BindingBatch& batch = batches[i];
+    Particles8 q[4];
+    for (int j = 0; j < 4; ++j) {
+      q[j] = GatherPool(pool, batch.base[j], batch.step[j]);
+    }
+    const F8 b[3] = {F8::Load(batch.barycentric[0]), F8::Load(batch.barycentric[1]), F8::Load(batch.barycentric[2])};
+    const V8 d = q[0].p - (q[1].p * b[0] + q[2].p * b[1] + q[3].p * b[2]);
+    const F8 length = Sqrt(Dot(d, d));
+    const V8 area = Cross(q[2].p - q[1].p, q[3].p - q[1].p);
+    const V8 n = area * (F8::All(1.0f) / Max(Sqrt(Dot(area, area)), Tiny()));
+    const F8 height = Dot(n, d), rest_height = F8::Load(batch.rest_height);
+    const F8 drawn = Max(length - F8::Load(batch.rest_length), zero) * F8::All(-stiffness.tension);
+    const F8 pressed =
+        Max(F8::All(stiffness.compression) * (rest_height - height), F8::All(stiffness.floor) * rest_height - height);
+    const F8 sum = q[0].w + q[1].w * b[0] * b[0] + q[2].w * b[1] * b[1] + q[3].w * b[2] * b[2];
+    const F8 scale = F8::Load(batch.active) / Max(sum, Tiny());
+    const V8 move = d * (scale * drawn / Max(length, Tiny())) + n * (scale * Max(pressed, zero));
+    ScatterPool(q[0].p + move * q[0].w, pool, batch.base[0], batch.step[0]);
+    for (int j = 0; j < 3; ++j) {
+      ScatterPool(q[j + 1].p - move * (q[j + 1].w * b[j]), pool, batch.base[j + 1], batch.step[j + 1]);
+    }
+  }
+}
+
 std::uint32_t Integrate(float* const now[3], float* const previous[3], const float* w, std::size_t count,
                         const IntegrateSettings& settings) {
   std::uint32_t resets = 0;

@@ -7,8 +7,10 @@
 namespace fulcrum::physics {
 namespace {
 
-/// The fat that a binding stands for gives way when the membrane is lifted off and carries it when it is pressed down.
+/// The fat that a binding stands for gives way when the membrane is lifted off and carries it when it is pressed down;
+/// to less than this part of its height it cannot be pressed, so the organ does not come through the membrane.
 constexpr float kCompressionOverTension = 10.0f;
+constexpr float kLeastHeight = 0.3f;
 
 }  // namespace
 
@@ -57,39 +59,9 @@ void PbdSolver::Iterate() {
   kernels_.volumes(particles_->tube(), model_->tets().data(), model_->tets().size(), params_.k_volume);
   kernels_.grid_stretch(Grid(), params_.k_stretch_membrane);
   kernels_.bending(particles_->pool(), model_->bending().data(), model_->bending().size(), params_.k_bending);
-  ProjectBindings();
-}
-
-void PbdSolver::ProjectBindings() {
-  const float k_tension = params_.k_binding;
-  const float k_compression = std::min(1.0f, kCompressionOverTension * params_.k_binding);
-  for (const PackedBinding& binding : model_->bindings()) {
-    if (binding.rest_length < 0.0f) {
-      continue;
-    }
-    const Vec3f m = particles_->At(binding.membrane);
-    std::array<Vec3f, 3> s;
-    Vec3f foot = Vec3f::Zero();
-    float sum = particles_->InverseMass(binding.membrane);
-    std::array<float, 3> share;
-    for (int j = 0; j < 3; ++j) {
-      s[j] = particles_->At(binding.surface[j]);
-      foot += binding.barycentric[j] * s[j];
-      share[j] = particles_->InverseMass(binding.surface[j]) * binding.barycentric[j];
-      sum += share[j] * binding.barycentric[j];
-    }
-    const Vec3f d = m - foot;
-    const float length = d.norm();
-    if (!(length * sum > 0.0f)) {
-      continue;  // Nothing can move, or there is no direction to move in.
-    }
-    const float k = length < binding.rest_length ? k_compression : k_tension;
-    const Vec3f correction = (k * (length - binding.rest_length) / (length * sum)) * d;
-    particles_->Set(binding.membrane, m - particles_->InverseMass(binding.membrane) * correction);
-    for (int j = 0; j < 3; ++j) {
-      particles_->Set(binding.surface[j], s[j] + share[j] * correction);
-    }
-  }
+  const BindingStiffness binding{params_.k_binding, std::min(1.0f, kCompressionOverTension * params_.k_binding),
+                                 kLeastHeight};
+  kernels_.bindings(particles_->pool(), model_->bindings().data(), model_->bindings().size(), binding);
 }
 
 FinishResult PbdSolver::Finish() {

@@ -35,7 +35,6 @@ class PbdSolver {
   [[nodiscard]] const Kernels& kernels() const { return kernels_; }
 
  private:
-  void ProjectBindings();
   [[nodiscard]] GridArrays Grid() const;
 
   PhysicsParams params_;

@@ -224,22 +224,51 @@ void TissueModel::PackBending(const SceneView& scene, const ParticleStore& parti
 }
 
 void TissueModel::PackBindings(const SceneView& scene, const ParticleStore& particles) {
+  ColourCheck check(scene.rest_position.size());
   std::vector<std::pair<Index, Index>> users;
-  for (const Binding& binding : scene.bindings) {
-    if (binding.membrane < scene.membrane.first || binding.membrane >= scene.rest_position.size()) {
-      Refuse(scene, "bindings: the bound particle is not a membrane node");
-    }
-    PackedBinding packed{particles.Ref(binding.membrane), {}, binding.barycentric, binding.rest_length};
-    for (int j = 0; j < 3; ++j) {
-      if (binding.surface[j] >= scene.tube_vertex_count) {
-        Refuse(scene, "bindings: a surface vertex is not the tube's");
+  ForEachColour(scene, scene.binding_colours, scene.bindings.size(), "bindings", [&](Index first, Index last) {
+    check.Begin();
+    for (Index i = first; i < last; ++i) {
+      const Index lane = (i - first) % kLanes;
+      if (lane == 0) {
+        BindingBatch fresh{};
+        for (auto& base : fresh.base) {
+          std::fill_n(base, kLanes, 4 * particles.padding_vertex());
+        }
+        for (auto& step : fresh.step) {
+          std::fill_n(step, kLanes, 1u);
+        }
+        bindings_.push_back(fresh);
       }
-      packed.surface[j] = particles.Ref(binding.surface[j]);
+      const Binding& binding = scene.bindings[i];
+      if (binding.membrane < scene.membrane.first || !check.Add(binding.membrane)) {
+        Refuse(scene, "bindings: the bound particle is not a membrane node, or two of one colour share it");
+      }
+      const std::array<Index, 4> v{binding.membrane, binding.surface[0], binding.surface[1], binding.surface[2]};
+      BindingBatch& batch = bindings_.back();
+      for (int j = 0; j < 4; ++j) {
+        if (j > 0 && (v[j] >= scene.tube_vertex_count || !check.Add(v[j]))) {
+          Refuse(scene, "bindings: a surface vertex is not the tube's, or two of one colour share it");
+        }
+        const ParticleRef at = particles.Ref(v[j]);
+        batch.base[j][lane] = at.base;
+        batch.step[j][lane] = at.step;
+      }
+      const auto& x = scene.rest_position;
+      Vec3f foot = Vec3f::Zero();
+      for (int j = 0; j < 3; ++j) {
+        batch.barycentric[j][lane] = binding.barycentric[j];
+        foot += binding.barycentric[j] * x[v[j + 1]];
+      }
+      const Vec3f normal = (x[v[2]] - x[v[1]]).cross(x[v[3]] - x[v[1]]).normalized();
+      batch.rest_length[lane] = binding.rest_length;
+      batch.rest_height[lane] = std::max(0.0f, normal.dot(x[v[0]] - foot));
+      batch.active[lane] = 1.0f;
+      users.emplace_back(binding.membrane - scene.membrane.first,
+                         static_cast<Index>((bindings_.size() - 1) * kLanes + lane));
+      ++counts_.bindings;
     }
-    users.emplace_back(binding.membrane - scene.membrane.first, static_cast<Index>(bindings_.size()));
-    bindings_.push_back(packed);
-  }
-  counts_.bindings = bindings_.size();
+  });
   Compress(std::move(users), scene.membrane.node_count(), &binding_start_, &binding_of_);
 }
 
@@ -264,8 +293,18 @@ float TissueModel::BaseInverseMass(Index particle) const {
   return scene_.inverse_mass[particle];
 }
 
-const PackedBinding* TissueModel::BindingOf(Index node) const {
-  return binding_start_[node] < binding_start_[node + 1] ? &bindings_[binding_of_[binding_start_[node]]] : nullptr;
+std::optional<BindingView> TissueModel::BindingOf(Index node) const {
+  if (binding_start_[node] == binding_start_[node + 1] || !NodeAlive(node)) {
+    return std::nullopt;
+  }
+  const Index slot = binding_of_[binding_start_[node]], lane = slot % kLanes;
+  const BindingBatch& batch = bindings_[slot / kLanes];
+  BindingView view{{}, {}, batch.rest_length[lane]};
+  for (std::size_t j = 0; j < 3; ++j) {
+    view.surface[j] = {batch.base[j + 1][lane], batch.step[j + 1][lane]};
+    view.barycentric[j] = batch.barycentric[j][lane];
+  }
+  return view;
 }
 
 void TissueModel::RefreshEdge(Index node, int direction) {
@@ -335,8 +374,8 @@ void TissueModel::RefreshNode(Index node, ParticleStore* particles) {
   RefreshTriangles(node);
   RefreshHinges(node, !NodeAlive(node));
   for (Index i = binding_start_[node]; i < binding_start_[node + 1]; ++i) {
-    const Index b = binding_of_[i];
-    bindings_[b].rest_length = NodeAlive(node) ? scene_.bindings[b].rest_length : -1.0f;
+    const Index slot = binding_of_[i];
+    bindings_[slot / kLanes].active[slot % kLanes] = NodeAlive(node) ? 1.0f : 0.0f;
   }
   const Index particle = scene_.membrane.first + node;
   particles->SetInverseMass(particles->Ref(particle), BaseInverseMass(particle));

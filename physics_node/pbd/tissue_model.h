@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,11 +13,11 @@
 
 namespace fulcrum::physics {
 
-struct PackedBinding {
-  ParticleRef membrane;
+/// A binding as others than the solver see it.
+struct BindingView {
   std::array<ParticleRef, 3> surface;
   std::array<float, 3> barycentric;
-  float rest_length;  ///< [m]; -1 where the node is dead.
+  float rest_length;  ///< [m]
 };
 
 struct ConstraintCounts {
@@ -36,7 +37,7 @@ class TissueModel {
   [[nodiscard]] const std::vector<SpringBatch>& springs() const { return springs_; }
   [[nodiscard]] const std::vector<TetBatch>& tets() const { return tets_; }
   [[nodiscard]] const std::vector<BendingBatch>& bending() const { return bending_; }
-  [[nodiscard]] const std::vector<PackedBinding>& bindings() const { return bindings_; }
+  [[nodiscard]] const std::vector<BindingBatch>& bindings() const { return bindings_; }
   /// Plane of rest lengths, laid out as the membrane is.
   [[nodiscard]] const float* rest(int direction) const { return rest_[direction].data(); }
 
@@ -52,8 +53,8 @@ class TissueModel {
   [[nodiscard]] std::array<Index, 3> TriangleNodes(Index triangle) const;
   /// Inverse mass without grasps; 0 for a dead node.
   [[nodiscard]] float BaseInverseMass(Index particle) const;
-  /// The first binding of a grid node, or null.
-  [[nodiscard]] const PackedBinding* BindingOf(Index node) const;
+  /// The first binding of a grid node, if it has one and is alive.
+  [[nodiscard]] std::optional<BindingView> BindingOf(Index node) const;
   [[nodiscard]] ConstraintCounts counts() const { return counts_; }
 
  private:
@@ -72,10 +73,10 @@ class TissueModel {
   std::vector<SpringBatch> springs_;
   std::vector<TetBatch> tets_;
   std::vector<BendingBatch> bending_;
-  std::vector<PackedBinding> bindings_;
+  std::vector<BindingBatch> bindings_;
   std::array<FloatArray, 3> rest_;
 
-  // Who uses a node: compressed rows, entry = batch * 8 + lane for bending, index for bindings. A hinge may span many
+  // Who uses a node: compressed rows, entry = batch * 8 + lane. A hinge may span many
   // cells; it uses all nodes of the patch it spans, so that a cut through the patch switches it off.
   std::vector<Index> bending_start_, bending_of_;
   std::vector<Index> binding_start_, binding_of_;
