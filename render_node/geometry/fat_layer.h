@@ -21,6 +21,8 @@ class FatLayer {
   [[nodiscard]] std::span<const Vec3f> positions() const { return positions_; }
   [[nodiscard]] std::span<const Vec3f> normals() const { return normals_; }
   [[nodiscard]] std::span<const Vec2f> materials() const { return materials_; }  ///< (s, t) [m].
+  /// 0 where membrane and tube lie as close as anywhere, 1 where there is room for 4 mm more fat. At rest.
+  [[nodiscard]] std::span<const float> thickness() const { return thickness_; }
   [[nodiscard]] std::span<const Triangle> triangles() const { return triangles_; }
 
  private:
@@ -34,6 +36,7 @@ class FatLayer {
   std::vector<Vec3f> positions_;
   std::vector<Vec3f> normals_;
   std::vector<Vec2f> materials_;
+  std::vector<float> thickness_;
   std::vector<Triangle> triangles_;
 };
 

@@ -45,6 +45,7 @@ Laparoscope MakeLaparoscope(const RenderParams& params) {
   const float tilt = kBeamTilt * Radians(params.scope_angle_deg);
   scope.light_position = Vec3f(0.6f * kFibreOffset, kFibreOffset, 0);
   scope.light_axis = Vec3f(0, -std::sin(tilt), -std::cos(tilt));
+  scope.wall_direction = (scope.view.block<3, 3>(0, 0) * Vec3f(0.15f, 0.25f, 1.0f)).normalized();
   scope.light_power = sight.squaredNorm();
   scope.picture_centre = Vec2f(width / 2, height / 2);
   scope.circle_radius = kCircle * height;

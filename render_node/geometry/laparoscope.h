@@ -10,6 +10,7 @@ struct Laparoscope {
   Eigen::Matrix4f projection;  ///< OpenGL clip coordinates.
   Vec3f light_position;        ///< Camera frame [m]: the fibres lie beside the lens.
   Vec3f light_axis;            ///< Camera frame, unit.
+  Vec3f wall_direction;        ///< Camera frame, unit: towards the lit wall above the field.
   float light_power;           ///< Irradiance 1 at the target.
   Vec2f picture_centre;        ///< [pixels]
   float circle_radius;         ///< Of the round picture [pixels].

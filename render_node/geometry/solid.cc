@@ -143,7 +143,7 @@ Solid GrasperJaw(const ToolShape& shape) {
     outline.emplace_back(tooth, -w, z);
     for (int s = 0; s <= 6; ++s) {
       const float angle = std::numbers::pi_v<float> * (static_cast<float>(s) / 6 - 0.5f);
-      outline.emplace_back(tooth + 0.0004f + h * std::cos(angle), w * std::sin(angle), z);
+      outline.emplace_back(0.0005f + h * std::cos(angle), w * std::sin(angle), z);
     }
     outline.emplace_back(tooth, w, z);
     outlines.push_back(std::move(outline));

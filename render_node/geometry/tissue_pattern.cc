@@ -57,10 +57,10 @@ std::vector<std::uint8_t> MakeNoisePattern(int size) {
     Uniform uniform(static_cast<std::uint32_t>(17 + channel));
     std::vector<float> field(static_cast<std::size_t>(size) * size, 0.0f);
     for (const int cells : {5, 11, 23, 47}) {
-      AddValueNoise(size, cells, 5.0f / static_cast<float>(cells), &uniform, &field);
+      AddValueNoise(size, cells, std::pow(5.0f / static_cast<float>(cells), 0.75f), &uniform, &field);
     }
     for (std::size_t i = 0; i < field.size(); ++i) {
-      image[4 * i + channel] = ToByte(128 + 127 * field[i]);
+      image[4 * i + channel] = ToByte(128 + 115 * field[i]);
     }
   }
   // Lobules: distance to the second nearest minus distance to the nearest of jittered centres.

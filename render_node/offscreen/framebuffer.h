@@ -1,4 +1,5 @@
-// The picture that an off-screen view draws into: a multisampled framebuffer object and a plain one to read from.
+// The picture that an off-screen view draws into: a framebuffer object with colour and depth. One sample a
+// pixel: four cost a software rasteriser two and a half times as much (DESIGN.md).
 #pragma once
 
 #include <cstdint>
@@ -16,25 +17,23 @@ struct Picture {
 /// All calls need the OpenGL context current.
 class Framebuffer {
  public:
-  /// `samples` per pixel; 1: no multisampling. Throws std::runtime_error when GL refuses the size.
-  Framebuffer(int width, int height, int samples);
+  /// Throws std::runtime_error when GL refuses the size.
+  Framebuffer(int width, int height);
   ~Framebuffer();
   Framebuffer(const Framebuffer&) = delete;
   Framebuffer& operator=(const Framebuffer&) = delete;
 
-  /// GL name of the framebuffer to draw into.
-  [[nodiscard]] unsigned draw_id() const { return draw_; }
-  /// Resolves the samples and waits for the picture.
+  /// GL name, to draw into.
+  [[nodiscard]] unsigned id() const { return id_; }
+  /// Waits for the picture.
   void Read(Picture* picture);
 
  private:
   int width_;
   int height_;
-  unsigned draw_ = 0;
-  unsigned resolve_ = 0;
+  unsigned id_ = 0;
   unsigned colour_ = 0;
   unsigned depth_ = 0;
-  unsigned resolved_colour_ = 0;
 };
 
 /// Reads the window or framebuffer bound for reading.

@@ -71,7 +71,8 @@ osg::ref_ptr<osg::Texture2D> MakeTexture(int width, int height, int channels, co
   const auto wrap = tile ? osg::Texture::REPEAT : osg::Texture::CLAMP_TO_EDGE;
   texture->setWrap(osg::Texture::WRAP_S, wrap);
   texture->setWrap(osg::Texture::WRAP_T, wrap);
-  texture->setFilter(osg::Texture::MIN_FILTER, tile ? osg::Texture::LINEAR_MIPMAP_NEAREST : osg::Texture::LINEAR);
+  // No mipmaps: finding their level costs more than they give at a few texels a pixel.
+  texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::LINEAR);
   texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::LINEAR);
   texture->setResizeNonPowerOfTwoHint(false);
   return texture;

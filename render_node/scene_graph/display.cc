@@ -27,7 +27,7 @@ void SetUpViewer(const LaparoscopeView& view, osgViewer::Viewer* viewer) {
   osg::Camera* camera = viewer->getCamera();
   camera->setComputeNearFarMode(osg::Camera::DO_NOT_COMPUTE_NEAR_FAR);
   camera->setCullingMode(osg::CullSettings::NO_CULLING);
-  camera->setClearColor(osg::Vec4(0.02f, 0.006f, 0.005f, 1));
+  camera->setClearColor(osg::Vec4(0.12f, 0.035f, 0.03f, 1));
   camera->setProjectionResizePolicy(osg::Camera::FIXED);
   camera->setViewMatrix(ToOsg(view.laparoscope().view));
   camera->setProjectionMatrix(ToOsg(view.laparoscope().projection));
@@ -40,12 +40,12 @@ void SetUpState(osg::State* state) {
 
 class OffscreenDisplay : public Display {
  public:
-  OffscreenDisplay(const LaparoscopeView& view, const RenderParams& params, int samples) {
+  OffscreenDisplay(const LaparoscopeView& view, const RenderParams& params) {
     context_.MakeCurrent();
     const int width = static_cast<int>(params.width), height = static_cast<int>(params.height);
-    framebuffer_ = std::make_unique<Framebuffer>(width, height, samples);
+    framebuffer_ = std::make_unique<Framebuffer>(width, height);
     window_ = viewer_.setUpViewerAsEmbeddedInWindow(0, 0, width, height);
-    window_->setDefaultFboId(framebuffer_->draw_id());
+    window_->setDefaultFboId(framebuffer_->id());
     SetUpState(window_->getState());
     SetUpViewer(view, &viewer_);
     viewer_.realize();
@@ -113,7 +113,6 @@ class WindowDisplay : public Display {
     traits->y = 40;
     traits->width = static_cast<int>(params.width);
     traits->height = static_cast<int>(params.height);
-    traits->samples = kSamples;
     traits->doubleBuffer = true;
     traits->windowDecoration = true;
     traits->supportsResize = false;
@@ -154,8 +153,8 @@ class WindowDisplay : public Display {
 
 }  // namespace
 
-std::unique_ptr<Display> MakeOffscreenDisplay(const LaparoscopeView& view, const RenderParams& params, int samples) {
-  return std::make_unique<OffscreenDisplay>(view, params, samples);
+std::unique_ptr<Display> MakeOffscreenDisplay(const LaparoscopeView& view, const RenderParams& params) {
+  return std::make_unique<OffscreenDisplay>(view, params);
 }
 
 std::unique_ptr<Display> MakeWindowDisplay(const LaparoscopeView& view, const RenderParams& params) {

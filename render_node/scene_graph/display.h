@@ -22,12 +22,8 @@ class Display {
   [[nodiscard]] virtual std::string description() const = 0;
 };
 
-/// Multisampling of the pictures off screen.
-inline constexpr int kSamples = 4;
-
 /// Throws std::runtime_error with one clear line when OpenGL is missing. Keeps a reference to `view`.
-[[nodiscard]] std::unique_ptr<Display> MakeOffscreenDisplay(const LaparoscopeView& view, const RenderParams& params,
-                                                            int samples = kSamples);
+[[nodiscard]] std::unique_ptr<Display> MakeOffscreenDisplay(const LaparoscopeView& view, const RenderParams& params);
 
 /// Throws InputError when no display can be opened.
 [[nodiscard]] std::unique_ptr<Display> MakeWindowDisplay(const LaparoscopeView& view, const RenderParams& params);

@@ -12,7 +12,6 @@
 #include "render_node/geometry/atlas.h"
 #include "render_node/geometry/fat_layer.h"
 #include "render_node/geometry/membrane_mesh.h"
-#include "render_node/geometry/solid.h"
 #include "render_node/geometry/surface.h"
 #include "render_node/geometry/tissue_pattern.h"
 #include "render_node/scene_graph/atlas_texture.h"
@@ -27,7 +26,7 @@ using Float4 = std::array<float, 4>;
 
 // Near to far among the opaque ones, so that hidden fragments are not shaded; then the layers that let light through,
 // from the inside out.
-enum Order { kMask, kInstruments, kRectum, kCords, kSurroundings, kFat, kMembraneDepth, kMembrane };
+enum Order { kMask, kInstruments, kRectum, kSurroundings, kFat, kMembraneDepth, kMembrane };
 
 // Texture units; the samplers of all programs are bound once at the root.
 enum Unit { kAtlasUnit, kNoiseUnit, kVesselUnit, kStructureUnit };
@@ -46,21 +45,17 @@ void Blend(osg::StateSet* state) {
 Float4 SurroundingColour(SurfaceRole role) {
   switch (role) {  // Linear colour; the last is how much fat shows.
     case SurfaceRole::kAbdominalWall:
-      return {0.62f, 0.25f, 0.20f, 0.3f};
+      return {0.66f, 0.20f, 0.15f, 0.25f};
     case SurfaceRole::kRetroperitoneum:
-      return {0.55f, 0.20f, 0.14f, 0.8f};
+      return {0.62f, 0.15f, 0.11f, 0.55f};
     case SurfaceRole::kPelvis:
-      return {0.46f, 0.12f, 0.10f, 0.4f};
+      return {0.50f, 0.09f, 0.07f, 0.3f};
     case SurfaceRole::kBladder:
-      return {0.66f, 0.36f, 0.27f, 0.1f};
+      return {0.70f, 0.33f, 0.25f, 0.1f};
     case SurfaceRole::kOther:
       break;
   }
   return {0.5f, 0.2f, 0.16f, 0.3f};
-}
-
-Float4 CordColour(ProtectedKind kind) {
-  return kind == ProtectedKind::kUreter ? Float4{0.80f, 0.45f, 0.38f, 0} : Float4{0.86f, 0.74f, 0.50f, 0};
 }
 
 }  // namespace
@@ -69,7 +64,6 @@ struct LaparoscopeView::Impl {
   explicit Impl(const SceneView& view);
   void AddMask();
   void AddSurroundings();
-  void AddCords();
   void AddRectum();
   void AddSheets();
   void BindTextures();
@@ -112,7 +106,6 @@ LaparoscopeView::Impl::Impl(const SceneView& view)
   DrawIn(kInstruments, instruments.node()->getOrCreateStateSet());
   AddMask();
   AddRectum();
-  AddCords();
   AddSurroundings();
   AddSheets();
   BindTextures();
@@ -182,26 +175,6 @@ void LaparoscopeView::Impl::AddSurroundings() {
   mesh->SetTriangles(triangles);
 }
 
-void LaparoscopeView::Impl::AddCords() {
-  Solid solid;
-  for (const ProtectedStructure& structure : scene.protected_structures) {
-    std::vector<Vec3f> path;
-    for (Index k = 0; k < structure.point_count; ++k) {
-      path.push_back(scene.protected_points[structure.first_point + k].p_W);
-    }
-    if (path.size() >= 2) {
-      const std::vector<float> radii(path.size(), structure.radius_m);
-      AppendTube(path, radii, 12, CordColour(structure.kind), &solid);
-    }
-  }
-  std::unique_ptr<Mesh> mesh;
-  Add(&mesh, "cords", false, kCords, "cord.frag");
-  mesh->SetPositions(solid.positions);
-  mesh->SetNormals(solid.normals);
-  mesh->SetColours(solid.colours);
-  mesh->SetTriangles(solid.triangles);
-}
-
 void LaparoscopeView::Impl::AddRectum() {
   const std::size_t count = scene.surface_vertices.size();
   rectum_positions.resize(count);
@@ -234,8 +207,9 @@ void LaparoscopeView::Impl::AddSheets() {
   Add(&fat_mesh, "fat", true, kFat, "fat.frag");
   Blend(fat_mesh->state());
   std::vector<Float4> coordinates;
-  for (const Vec2f& m : fat.materials()) {
-    coordinates.push_back({m.x(), m.y(), 0, 0});
+  for (std::size_t k = 0; k < fat.materials().size(); ++k) {
+    const Vec2f& m = fat.materials()[k];
+    coordinates.push_back({m.x(), m.y(), fat.thickness()[k], 0});
   }
   fat_mesh->SetCoordinates(coordinates);
   fat_mesh->SetTriangles(fat.triangles());
@@ -274,6 +248,7 @@ void LaparoscopeView::Impl::BindTextures() {
   state->addUniform(new osg::Uniform("atlas_per_metre", osg::Vec2(1 / size.x(), 1 / size.y())));
   state->addUniform(new osg::Uniform("light_position", vec3(scope.light_position)));
   state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
+  state->addUniform(new osg::Uniform("wall_direction", vec3(scope.wall_direction)));
   state->addUniform(new osg::Uniform("light_power", scope.light_power));
   state->addUniform(new osg::Uniform("circle_radius", scope.circle_radius));
   state->addUniform(new osg::Uniform("picture_centre", osg::Vec2(scope.picture_centre.x(), scope.picture_centre.y())));

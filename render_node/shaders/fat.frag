@@ -1,5 +1,5 @@
-// Loose fat between membrane and organ: yellow lobules, thin in the clefts, with ureter and nerve shining through.
-// coordinate: material (s, t) [m].
+// Loose fat between membrane and organ: yellow lobules, a thin veil over the organ's front and thick beside it, with
+// ureter and nerve shining through. coordinate: material (s, t) [m], thickness 0 … 1.
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
@@ -11,21 +11,29 @@ out vec4 fragment;
 
 void main() {
   vec2 m = coordinate.xy;
-  vec4 noise = texture(noise_pattern, m * 34.0);
+  vec4 broad = texture(noise_pattern, m * 9.0);
+  // The coarse noise bends the fine one's coordinates, so that no two lobules are alike.
+  vec4 noise = texture(noise_pattern, m * 36.0 + 0.35 * broad.rg);
   vec4 heat = texture(atlas, m * atlas_per_metre);
   vec2 structure = texture(structures, m * atlas_per_metre).rg;
   vec3 bend = noise.rgb - 0.5;
   float lobule = noise.a;
-  vec3 n = normalize(normal + 0.55 * bend);
-  vec3 albedo = mix(vec3(0.60, 0.27, 0.085), vec3(0.86, 0.56, 0.155), lobule);
+  vec3 n = normalize(normal + 0.45 * bend);
+  vec3 albedo = mix(vec3(0.60, 0.25, 0.08), vec3(0.86, 0.52, 0.13), lobule * (0.55 + 0.75 * broad.b));
   // A ureter is a pale pink cord, a nerve a thin white one.
   float cord = smoothstep(0.35, 0.65, structure.r);
   float nerve = smoothstep(0.40, 0.70, structure.g);
-  albedo = mix(albedo, vec3(0.86, 0.52, 0.45) * (0.72 + 0.5 * structure.r), 0.85 * cord);
-  albedo = mix(albedo, vec3(0.92, 0.82, 0.62), 0.80 * nerve);
+  albedo = mix(albedo, vec3(0.86, 0.46, 0.40) * (0.62 + 0.6 * structure.r), 0.85 * cord);
+  albedo = mix(albedo, vec3(0.92, 0.82, 0.58), 0.80 * nerve);
+  // Islands where the layer is thin, closed where it is thick; in an opened slit it wells up.
+  float cover = smoothstep(0.42, 0.72, broad.r * 0.75 + 0.25 * lobule + 0.35 * coordinate.z);
+  float opened = max(heat.a < 0.5 ? 1.0 : 0.0, smoothstep(0.1, 0.5, heat.g));
+  float alpha = mix(0.06 + 0.10 * lobule, 0.55 + 0.30 * lobule, cover);
+  alpha = max(alpha, (0.62 + 0.30 * lobule) * opened);
+  alpha = clamp(max(alpha, 0.9 * max(cord, nerve)), 0.0, 0.97);
   // Under a burn the fat is seared too, least in the open middle of the slit.
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
-  albedo *= mix(vec3(1.0), vec3(0.46, 0.27, 0.16), (heat.a < 0.5 ? 0.35 : 0.8) * dry);
-  float alpha = clamp(0.42 + 0.42 * lobule + cord + nerve + (heat.a < 0.5 ? 0.25 : 0.0), 0.0, 0.96);
-  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.35, 0.25, 0.12), n, position, 0.55)), alpha);
+  albedo *= mix(vec3(1.0), vec3(0.46, 0.27, 0.16), (heat.a < 0.5 ? 0.25 : 0.7) * dry);
+  float gloss;
+  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.35, 0.25, 0.12), n, n, position, 0.6, gloss)), alpha);
 }

@@ -4,12 +4,10 @@
 
 uniform vec3 light_position;
 uniform vec3 light_axis;
+uniform vec3 wall_direction; // Towards the lit wall above, which wet tissue mirrors.
 uniform float light_power;   // Irradiance at 1 m; falls off with the square of the distance.
 uniform float circle_radius; // Of the round picture [pixels].
 uniform vec2 picture_centre; // [pixels]
-
-// Cosine-like lobe of the given sharpness around 1; exp2 costs a software rasteriser less than pow.
-float Lobe(float cosine, float sharpness) { return exp2(sharpness * (cosine - 1.0)); }
 
 // The scope's light: cone with a soft rim, inverse square.
 float Irradiance(vec3 position, out vec3 to_light) {
@@ -20,17 +18,26 @@ float Irradiance(vec3 position, out vec3 to_light) {
   return light_power * inverse * inverse * (0.15 + 0.85 * cone);
 }
 
-// Tissue: light wraps round the terminator, red furthest (it scatters deepest); `wet` is the film of fluid on top.
-vec3 ShadeTissue(vec3 albedo, vec3 scatter, vec3 normal, vec3 position, float wet) {
+// A highlight: broad lobe and, as its eighth power, a sharp one. exp2 costs a software rasteriser less than pow.
+float Highlight(float cosine, float broad, float sharp) {
+  float lobe = exp2(42.0 * (cosine - 1.0));
+  float lobe2 = lobe * lobe, lobe4 = lobe2 * lobe2;
+  return broad * lobe + sharp * lobe4 * lobe4;
+}
+
+// Tissue: light wraps round the terminator, red furthest (it scatters deepest). A film of fluid lies on top: `film` is
+// its normal, rougher than the tissue's, `wet` how much of it there is. `gloss` is the light that the film mirrors.
+vec3 ShadeTissue(vec3 albedo, vec3 scatter, vec3 normal, vec3 film, vec3 position, float wet, out float gloss) {
   vec3 l;
   float e = Irradiance(position, l);
   vec3 v = normalize(-position);
-  vec3 n = dot(normal, v) < 0.0 ? -normal : normal;
-  vec3 diffuse = clamp((dot(n, l) + scatter) / (1.0 + scatter), 0.0, 1.0);
-  float nh = dot(n, normalize(l + v));
-  float rim = 1.0 - max(dot(n, v), 0.0);
-  float gloss = wet * (1.1 * Lobe(nh, 420.0) + 0.16 * Lobe(nh, 45.0) + 0.05 * rim * rim * rim);
-  return e * (albedo * diffuse + gloss * vec3(1.0, 0.97, 0.94)) + 0.012 * albedo;
+  float side = sign(dot(normal, v));
+  vec3 diffuse = clamp((side * dot(normal, l) + scatter) / (1.0 + scatter), 0.0, 1.0);
+  // Light and eye are 4 mm apart: the direction of the one stands for half way between them.
+  gloss = e * wet * (Highlight(side * dot(film, l), 0.20, 1.6) +
+                     Highlight(side * dot(film, normalize(wall_direction + v)), 0.07, 0.45));
+  // Light that comes back from the rest of the cavity is red.
+  return e * (albedo * diffuse) + gloss * vec3(1.0, 0.96, 0.92) + albedo * vec3(0.030, 0.014, 0.012);
 }
 
 // Metal: what it mirrors is the lit cavity, red below and dark towards the scope.
@@ -41,13 +48,14 @@ vec3 ShadeMetal(vec3 tint, vec3 normal, vec3 position) {
   vec3 n = dot(normal, v) < 0.0 ? -normal : normal;
   vec3 r = reflect(-v, n);
   vec3 cavity = mix(vec3(0.30, 0.10, 0.08), vec3(0.05, 0.04, 0.04), smoothstep(-0.4, 0.5, r.z));
-  float nh = dot(n, normalize(l + v));
-  return e * tint * (0.35 * max(dot(n, l), 0.0) + 1.5 * Lobe(nh, 160.0) + 0.35 * Lobe(nh, 14.0)) + tint * cavity;
+  float nl = max(dot(n, l), 0.0);
+  return e * tint * (0.35 * nl + Highlight(nl, 0.4, 1.5)) + tint * cavity;
 }
 
-// Filmic shoulder, gamma of two, and the darkening towards the rim of the optics.
+// Shoulder 1 - 1 / (1 + x)^2, gamma of two, and the darkening towards the rim of the optics.
 vec3 ToneMap(vec3 colour) {
-  float r = length(gl_FragCoord.xy - picture_centre) / circle_radius;
-  float vignette = 1.0 - 0.45 * r * r * r;
-  return sqrt(1.0 - exp2(-1.7 * vignette * colour));
+  vec2 r = (gl_FragCoord.xy - picture_centre) / circle_radius;
+  float r2 = dot(r, r);
+  vec3 y = 1.0 / (1.0 + (0.95 - 0.55 * r2 * r2) * colour);
+  return sqrt(1.0 - y * y);
 }

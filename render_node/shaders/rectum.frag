@@ -10,11 +10,13 @@ out vec4 fragment;
 void main() {
   vec2 front = coordinate.xy, side = coordinate.xz;
   float facing = coordinate.w;
-  vec4 noise = mix(texture(noise_pattern, side * 28.0), texture(noise_pattern, front * 28.0), facing);
-  float vessel = texture(vessel_pattern, mix(side, front, step(0.5, facing)) * 20.0).r;
+  vec4 noise = mix(texture(noise_pattern, side * 24.0), texture(noise_pattern, front * 24.0), facing);
+  float vessel = texture(vessel_pattern, mix(side, front, step(0.5, facing)) * 19.0).r;
   vec3 bend = noise.rgb - 0.5;
-  vec3 n = normalize(normal + 0.30 * bend);
-  vec3 albedo = mix(vec3(0.62, 0.145, 0.115), vec3(0.74, 0.27, 0.21), clamp(0.5 + 1.6 * bend.x, 0.0, 1.0));
-  albedo = mix(albedo, vec3(0.33, 0.02, 0.025), 0.55 * vessel);
-  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.30, 0.10, 0.08), n, position, 0.75)), 1.0);
+  vec3 n = normalize(normal + 0.25 * bend);
+  vec3 film = normalize(normal + 0.70 * bend);
+  vec3 albedo = mix(vec3(0.52, 0.070, 0.060), vec3(0.72, 0.20, 0.15), clamp(0.5 + 1.8 * bend.x, 0.0, 1.0));
+  albedo = mix(albedo, vec3(0.26, 0.008, 0.014), 0.5 * vessel);
+  float gloss;
+  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.32, 0.08, 0.07), n, film, position, 0.8, gloss)), 1.0);
 }

@@ -1,5 +1,5 @@
-// Surfaces that do not move: abdominal wall, retroperitoneum, pelvis, bladder. colour: of the material.
-// coordinate: place in frame W [m].
+// Surfaces that do not move: abdominal wall, retroperitoneum, pelvis, bladder. colour: of the material; alpha is how
+// much fat lies beneath. coordinate: place in frame W [m].
 in vec3 position;
 in vec3 normal;
 in vec4 colour;
@@ -11,12 +11,14 @@ out vec4 fragment;
 void main() {
   // A slanted projection: no plane of the body is seen edge on by it for long.
   vec2 place = vec2(coordinate.x + 0.41 * coordinate.z, coordinate.y - 0.57 * coordinate.z);
-  vec4 noise = texture(noise_pattern, place * 13.0);
-  float vessel = texture(vessel_pattern, place * 11.0).r;
+  vec4 noise = texture(noise_pattern, place * 16.0);
+  float vessel = texture(vessel_pattern, place * 13.0).r;
   vec3 bend = noise.rgb - 0.5;
-  vec3 n = normalize(normal + 0.35 * bend);
-  vec3 albedo = colour.rgb * (1.0 + 0.9 * bend.x);
-  albedo = mix(albedo, vec3(0.70, 0.42, 0.16), 0.35 * colour.a * smoothstep(0.4, 0.9, noise.a));
-  albedo = mix(albedo, vec3(0.36, 0.03, 0.03), 0.5 * vessel);
-  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.25, 0.12, 0.10), n, position, 0.6)), 1.0);
+  vec3 n = normalize(normal + 0.15 * bend);
+  vec3 film = normalize(normal + 0.5 * bend);
+  vec3 albedo = colour.rgb * (1.0 + 0.8 * bend.x);
+  albedo = mix(albedo, vec3(0.80, 0.46, 0.16), colour.a * smoothstep(0.46, 0.72, noise.g));
+  albedo = mix(albedo, vec3(0.34, 0.015, 0.02), 0.45 * vessel);
+  float gloss;
+  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.28, 0.10, 0.08), n, film, position, 0.7, gloss)), 1.0);
 }
