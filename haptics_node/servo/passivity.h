@@ -26,6 +26,9 @@ class PassivityController {
     const double damping = std::min(kMaxPassivityDamping_Ns_m, -energy_J_ / (dt * speed2));
     return wanted - damping / dt * moved;
   }
+  /// While forces fade in or out the model's share changes without the hand's doing, at a rate that cannot build up an
+  /// oscillation: such a change is not the hand's debt.
+  void Refill(double stored) noexcept { energy_J_ = stored + kTank_J; }
   [[nodiscard]] double energy_J() const noexcept { return energy_J_; }
 
  private:

@@ -102,6 +102,7 @@ void Servo::Render(Channel* channel, const Tick& tick) const noexcept {
   const double gain = force_scale_ * age_.gain();
   Vec3d f_A = ForceAtAttachPoint(channel->pose, gain * model.f_W);
   if (model.touching) f_A -= age_.damping() * channel->v_WA;
+  if (age_.creeping()) channel->passivity.Refill(gain * model.stored_J);
   f_A = channel->passivity.Step(f_A, channel->output.sent, channel->moved, gain * model.stored_J, channel->external_W,
                                 dt_);
   channel->device->WriteForce(channel->output.Step(f_A, age_.creeping(), tick.dt_s));
