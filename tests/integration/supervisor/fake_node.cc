@@ -1,0 +1,76 @@
+// A node that computes nothing: the supervisor's tests start it under the names of the real ones. What it does besides
+// is told by a file <session>/../<node name>.do: "crash" (abort at once), "exit N", "hang" (in the step), "mismatch".
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+
+#include "services/app/node_app.h"
+#include "services/core/error.h"
+#include "services/runtime/realtime.h"
+
+namespace {
+
+using fulcrum::ExitCode;
+using fulcrum::NodeId;
+
+NodeId IdOf(const std::string& program) {
+  for (int i = 0; i < fulcrum::kNodeCount; ++i) {
+    if (program == fulcrum::NodeName(static_cast<NodeId>(i))) {
+      return static_cast<NodeId>(i);
+    }
+  }
+  return NodeId::kSupervisor;
+}
+
+std::string OrderFor(const fulcrum::app::NodeOptions& options, NodeId node) {
+  std::ifstream stream(options.session.parent_path() / (std::string(fulcrum::NodeName(node)) + ".do"));
+  std::string order;
+  std::getline(stream, order);
+  return order;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const NodeId node = IdOf(std::filesystem::path(argv[0]).filename());
+  return fulcrum::app::NodeMain(argc, argv, node, "Computes nothing.", [&](fulcrum::app::NodeApp& app) {
+    const std::string order = OrderFor(app.options(), node);
+    if (order == "crash") {
+      std::abort();
+    }
+    if (order.starts_with("exit ")) {
+      std::_Exit(std::stoi(order.substr(5)));
+    }
+    if (order == "mismatch") {
+      throw fulcrum::MismatchError("the scene is another one");
+    }
+    (void)app.options().TakeFlag("--window");
+    auto& frames = app.MakeOutput<fulcrum::TissueFrame>();
+    (void)app.MakeInput<fulcrum::TissueFrame>();
+    std::uint64_t sequence = 0;
+    return app.Run(
+        {.name = "fake", .period_ns = 10'000'000},
+        [&](const fulcrum::Tick& tick) {
+          if (order == "hang") {
+            fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, "hanging");
+            std::this_thread::sleep_for(std::chrono::hours(1));
+          }
+          if (node == NodeId::kPhysics) {
+            frames.WriteInPlace([&](fulcrum::TissueFrame::View view) {
+              view.header.stamp = {++sequence, 1, tick.stamp_ns};
+              view.header.vertex_count = 0;
+            });
+          }
+        },
+        [&](fulcrum::Health* health) {
+          if (node == NodeId::kPhysics) {
+            health->metrics.push_back({"max_displacement_mm", 12.5});
+          }
+        });
+  });
+}

@@ -1,0 +1,282 @@
+// The program `fulcrum` with fake nodes: real processes, real bus, a tiny scene.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "services/core/messages.h"
+#include "services/scene/build.h"
+#include "services/scene/scene_file.h"
+#include "services/supervisor/child_process.h"
+#include "services/supervisor/node_process.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+constexpr int kDomain = 21;
+
+std::string ReadAll(const fs::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// The small scene without its script, for other nodes.
+scene::SceneData TinyScene(std::uint32_t node_mask) {
+  scene::SceneData data = scene::BuildProcedural(scene::Small());
+  std::snprintf(data.fixed.name, sizeof(data.fixed.name), "tiny");
+  data.fixed.node_mask = node_mask;
+  data.fixed.script_duration_s = 0;
+  data.script.clear();
+  return data;
+}
+
+/// Session programs in a folder of their own: `fulcrum` finds its nodes beside itself.
+class SupervisorTest : public ::testing::Test {
+ protected:
+  static constexpr NodeId kNodes[] = {NodeId::kPhysics, NodeId::kThermal};
+
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "fulcrum_supervisor_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    fs::create_directory(folder_ / "bin");
+    fs::create_directory(folder_ / "out");
+    fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "fulcrum", folder_ / "bin" / "fulcrum");
+    std::uint32_t mask = 0;
+    for (const NodeId node : kNodes) {
+      fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "supervisor_fake_node", folder_ / "bin" / NodeName(node));
+      mask |= 1u << static_cast<unsigned>(node);
+    }
+    scene_ = folder_ / "tiny.fulcrum";
+    scene::WriteSceneFile(TinyScene(mask), "name: tiny\n", scene_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  void Order(NodeId node, const std::string& what) const {
+    std::ofstream(folder_ / "out" / (std::string(NodeName(node)) + ".do")) << what << "\n";
+  }
+  ChildProcess Fulcrum(std::vector<std::string> words) const {
+    words.insert(words.end(), {"--domain", std::to_string(kDomain)});
+    return ChildProcess::Start(folder_ / "bin" / "fulcrum", words, folder_ / "fulcrum.log");
+  }
+  ChildProcess Up(std::vector<std::string> more = {}) const {
+    std::vector<std::string> words{"up", scene_.string(), "--out", (folder_ / "out").string()};
+    words.insert(words.end(), more.begin(), more.end());
+    return Fulcrum(words);
+  }
+  static ProcessEnd Wait(ChildProcess* process) {
+    for (;;) {
+      if (const auto end = process->Poll()) {
+        return *end;
+      }
+      std::this_thread::sleep_for(5ms);
+    }
+  }
+  /// False after a time that only a fault can take.
+  static bool WaitUntil(const std::function<bool()>& condition) {
+    for (int i = 0; i < 6000; ++i) {
+      if (condition()) {
+        return true;
+      }
+      std::this_thread::sleep_for(5ms);
+    }
+    return false;
+  }
+  std::string Log() const { return ReadAll(folder_ / "fulcrum.log"); }
+  fs::path Session() const { return folder_ / "out" / "latest"; }
+  std::string NodeLog(NodeId node) const {
+    return ReadAll(Session() / "logs" / (std::string(NodeName(node)) + ".log"));
+  }
+  static std::size_t Count(const std::string& text, const std::string& what) {
+    std::size_t count = 0;
+    for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) {
+      ++count;
+    }
+    return count;
+  }
+  bool Joined(NodeId node, std::size_t times = 1) const { return Count(NodeLog(node), "joined session") >= times; }
+  bool AllJoined() const { return Joined(NodeId::kPhysics) && Joined(NodeId::kThermal); }
+
+  /// Process ids of the fake node of this test.
+  std::vector<pid_t> PidsOf(NodeId node) const {
+    std::vector<pid_t> pids;
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator("/proc", error)) {
+      std::error_code no_link;
+      const fs::path program = fs::read_symlink(entry.path() / "exe", no_link);
+      if (!no_link && program == folder_ / "bin" / NodeName(node)) {
+        pids.push_back(std::stoi(entry.path().filename()));
+      }
+    }
+    return pids;
+  }
+  static std::vector<std::string> SharedMemory() {
+    std::vector<std::string> names;
+    std::error_code error;
+    const fs::path folder = "/dev/shm/fulcrum-" + std::to_string(::getuid()) + "-" + std::to_string(kDomain);
+    if (fs::exists(folder)) {
+      names.push_back(folder.string());
+    }
+    for (const auto& entry : fs::directory_iterator(folder, error)) {
+      names.push_back(entry.path().filename());
+    }
+    return names;
+  }
+
+  fs::path folder_, scene_;
+};
+
+TEST_F(SupervisorTest, RunsForTheTimeAskedAndLeavesReportAndNothingElse) {
+  ChildProcess up = Up({"--seconds", "1"});
+  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
+  EXPECT_EQ(SharedMemory(), std::vector<std::string>{});
+  for (const char* file : {"summary.json", "report.html", "configuration.yaml", "cart.yaml", "scene.fulcrum"}) {
+    EXPECT_TRUE(fs::exists(Session() / file)) << file;
+  }
+  const std::string summary = ReadAll(Session() / "summary.json");
+  EXPECT_NE(summary.find("\"ok\": true"), std::string::npos) << summary;
+  EXPECT_NE(summary.find("\"max_displacement_mm\": 12.5"), std::string::npos) << summary;
+  EXPECT_NE(summary.find("\"physics_node.restarts\": 0"), std::string::npos) << summary;
+  for (const NodeId node : kNodes) {
+    EXPECT_TRUE(PidsOf(node).empty());
+  }
+}
+
+TEST_F(SupervisorTest, KilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
+  ChildProcess up = Up();
+  ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
+  const auto pids = PidsOf(NodeId::kPhysics);
+  ASSERT_EQ(pids.size(), 1u);
+  ::kill(pids[0], SIGKILL);
+  ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kPhysics, 2); })) << Log();
+  std::this_thread::sleep_for(300ms);  // A Health "running" on its way to the supervisor.
+  up.Signal(SIGINT);
+  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
+  EXPECT_NE(Log().find("physics_node killed by signal 9"), std::string::npos) << Log();
+  const std::string summary = ReadAll(Session() / "summary.json");
+  EXPECT_NE(summary.find("\"physics_node.restarts\": 1"), std::string::npos) << summary;
+  EXPECT_EQ(summary.find("\"physics_node.longest_rejoin_s\": 0,"), std::string::npos) << summary;
+  EXPECT_EQ(SharedMemory(), std::vector<std::string>{});
+}
+
+TEST_F(SupervisorTest, CrashLoopEndsTheSessionWithTheCause) {
+  Order(NodeId::kThermal, "crash");
+  ChildProcess up = Up();
+  EXPECT_EQ(Wait(&up).exit_code, 1) << Log();
+  EXPECT_NE(Log().find("thermal_node killed by signal 6"), std::string::npos) << Log();
+  EXPECT_NE(Log().find("for good"), std::string::npos) << Log();
+  EXPECT_TRUE(PidsOf(NodeId::kPhysics).empty());
+  EXPECT_EQ(SharedMemory(), std::vector<std::string>{});
+}
+
+TEST_F(SupervisorTest, KeepGoingRunsOnWithoutTheNodeThatFailed) {
+  Order(NodeId::kThermal, "exit 4");
+  ChildProcess up = Up({"--seconds", "1", "--keep-going"});
+  EXPECT_EQ(Wait(&up).exit_code, 4) << Log();
+  EXPECT_TRUE(Joined(NodeId::kPhysics)) << Log();
+  EXPECT_NE(ReadAll(Session() / "summary.json").find("\"thermal_node.failed\": true"), std::string::npos);
+}
+
+TEST_F(SupervisorTest, MismatchIsNotTriedAgain) {
+  Order(NodeId::kPhysics, "mismatch");
+  ChildProcess up = Up();
+  EXPECT_EQ(Wait(&up).exit_code, 3) << Log();
+  EXPECT_NE(Log().find("the scene is another one"), std::string::npos) << Log();
+  EXPECT_EQ(Count(Log(), "starting it again"), 0u) << Log();
+}
+
+TEST_F(SupervisorTest, NodeThatHangsInItsStepStillEndsWithTheSession) {
+  Order(NodeId::kPhysics, "hang");
+  ChildProcess up = Up();
+  ASSERT_TRUE(WaitUntil([&] { return Count(NodeLog(NodeId::kPhysics), "hanging") == 1; })) << Log();
+  up.Signal(SIGTERM);
+  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
+  EXPECT_TRUE(PidsOf(NodeId::kPhysics).empty());
+  EXPECT_EQ(SharedMemory(), std::vector<std::string>{});
+}
+
+TEST_F(SupervisorTest, ChildrenDieWithAKilledSupervisorAndTheNextRunSweeps) {
+  ChildProcess up = Up();
+  ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
+  up.Signal(SIGKILL);
+  Wait(&up);
+  EXPECT_TRUE(WaitUntil([&] { return PidsOf(NodeId::kPhysics).empty() && PidsOf(NodeId::kThermal).empty(); }));
+  EXPECT_NE(SharedMemory(), std::vector<std::string>{});
+  ChildProcess again = Up({"--seconds", "0.5"});
+  EXPECT_EQ(Wait(&again).exit_code, 0) << Log();
+  EXPECT_EQ(SharedMemory(), std::vector<std::string>{});
+}
+
+TEST_F(SupervisorTest, SecondSessionInTheSameDomainIsRefused) {
+  ChildProcess up = Up();
+  ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
+  ChildProcess second = Up();
+  EXPECT_EQ(Wait(&second).exit_code, 2) << Log();
+  EXPECT_NE(Log().find("a session runs in domain 21"), std::string::npos) << Log();
+  up.Signal(SIGTERM);
+  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
+}
+
+TEST_F(SupervisorTest, StatusRestartAndDownReachTheSupervisor) {
+  ChildProcess up = Up();
+  ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
+  ChildProcess status = Fulcrum({"status"});
+  EXPECT_EQ(Wait(&status).exit_code, 0) << Log();
+  EXPECT_NE(Log().find("scene \"tiny\""), std::string::npos) << Log();
+  EXPECT_NE(Log().find("thermal_node"), std::string::npos) << Log();
+
+  ChildProcess restart = Fulcrum({"restart", "thermal_node"});
+  EXPECT_EQ(Wait(&restart).exit_code, 0) << Log();
+  EXPECT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 2); })) << Log();
+  ChildProcess unknown = Fulcrum({"restart", "kitchen_node"});
+  EXPECT_EQ(Wait(&unknown).exit_code, 1) << Log();
+
+  ChildProcess down = Fulcrum({"down"});
+  EXPECT_EQ(Wait(&down).exit_code, 0) << Log();
+  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
+  ChildProcess nothing = Fulcrum({"down"});
+  EXPECT_EQ(Wait(&nothing).exit_code, 2) << Log();
+}
+
+TEST_F(SupervisorTest, ScriptThatAsksForACutWithoutOneIsAFailure) {
+  scene::SceneData data = TinyScene(1u << static_cast<unsigned>(NodeId::kPhysics));
+  data.fixed.script_duration_s = 4;
+  const Vec3f here = data.fixed.tools[1].p_WP - Vec3f(0, 0, 0.05f);
+  data.script = {{0, 1, here, 0, kPedalCut, 35}, {4, 1, here, 0, kPedalNone, 0}};
+  scene::WriteSceneFile(data, "name: tiny\n", scene_);
+  ChildProcess up = Up();
+  EXPECT_EQ(Wait(&up).exit_code, 1) << Log();
+  EXPECT_NE(Log().find("nothing was cut"), std::string::npos) << Log();
+}
+
+TEST_F(SupervisorTest, BadUseSaysWhatIsWrong) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases{
+      {{"up"}, "which scene"},
+      {{"up", "no-such-scene"}, "no scene \"no-such-scene\""},
+      {{"up", scene_.string(), "--seconds", "-1"}, "--seconds"},
+      {{"up", scene_.string(), "--sekonds", "1"}, "sekonds"},
+      {{"restart"}, "which node"},
+      {{"jump"}, "unknown command"},
+  };
+  for (const auto& [words, expected] : cases) {
+    ChildProcess fulcrum = Fulcrum(words);
+    EXPECT_EQ(Wait(&fulcrum).exit_code, 2) << expected;
+    EXPECT_NE(Log().find(expected), std::string::npos) << Log();
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum::supervisor

@@ -1,0 +1,119 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "services/app/health_report.h"
+#include "services/app/node_app.h"
+#include "services/core/error.h"
+
+namespace fulcrum::app {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+
+ParsedOptions Parse(const std::vector<const char*>& words) {
+  std::vector<const char*> argv{"physics_node"};
+  argv.insert(argv.end(), words.begin(), words.end());
+  return ParseNodeOptions(static_cast<int>(argv.size()), argv.data(), NodeId::kPhysics, "Tissue.");
+}
+
+void ExpectRefused(const std::vector<const char*>& words, const std::string& expected) {
+  try {
+    (void)Parse(words);
+    FAIL() << "taken, though " << expected;
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
+  }
+}
+
+TEST(NodeOptionsTest, ReadsTheCommonOptionsAndLeavesTheRest) {
+  ParsedOptions parsed =
+      Parse({"--scene", "a.fulcrum", "--session", "out/x", "--domain", "12", "--cart", "c.yaml", "--window"});
+  EXPECT_TRUE(parsed.answer.empty());
+  EXPECT_EQ(parsed.options.scene, "a.fulcrum");
+  EXPECT_EQ(parsed.options.session, "out/x");
+  EXPECT_EQ(parsed.options.domain, 12);
+  EXPECT_EQ(parsed.options.cart, "c.yaml");
+  EXPECT_EQ(parsed.options.extra, std::vector<std::string>{"--window"});
+  EXPECT_TRUE(parsed.options.TakeFlag("--window"));
+  EXPECT_FALSE(parsed.options.TakeFlag("--window"));
+  EXPECT_TRUE(parsed.options.extra.empty());
+}
+
+TEST(NodeOptionsTest, RefusesWhatCannotWork) {
+  ExpectRefused({"--session", "x"}, "--scene is missing");
+  ExpectRefused({"--scene", "x"}, "--session is missing");
+  ExpectRefused({"--scene", "x", "--session", "y", "--domain", "0"}, "1 to 100");
+  ExpectRefused({"--scene", "x", "--session", "y", "--domain", "101"}, "1 to 100");
+  ExpectRefused({"--scene", "x", "--session", "y", "--domain", "seven"}, "domain");
+}
+
+TEST(NodeOptionsTest, HelpAndVersionNeedNothingElse) {
+  EXPECT_NE(Parse({"--help"}).answer.find("--session"), std::string::npos);
+  EXPECT_EQ(Parse({"--version"}).answer.find("physics_node "), 0u);
+}
+
+TEST(RateMeterTest, ShowsTheLastSecondOnly) {
+  RateMeter meter;
+  EXPECT_EQ(meter.Observe(0, 0), 0);
+  std::uint64_t count = 0;
+  double rate = 0;
+  for (int i = 1; i <= 20; ++i) {
+    count += 10;
+    rate = meter.Observe(i * 100 * kMs, count);
+  }
+  EXPECT_NEAR(rate, 100, 1e-9);
+  for (int i = 21; i <= 31; ++i) {
+    rate = meter.Observe(i * 100 * kMs, count);
+  }
+  EXPECT_EQ(rate, 0);
+}
+
+TEST(HealthReportTest, GathersThreadInputsAndOutputs) {
+  HealthReport report(NodeId::kThermal, 10 * kMs, 11, 22, 33);
+  runtime::Histogram step;
+  for (int i = 0; i < 100; ++i) {
+    step.Add(2 * kMs);
+  }
+  runtime::CyclicStats thread;
+  thread.ticks = 100;
+  thread.overruns = 4;
+  thread.step = step.snapshot();
+  bus::InputStats fresh{.matched = true, .received = 50, .lost = 2, .rejected = 1, .newest_stamp_ns = 990 * kMs};
+  bus::InputStats none;
+  bus::OutputStats out{.written = 10, .failed = 3};
+  const Health health =
+      report.Make(1000 * kMs, HealthState::kRunning, thread,
+                  {{TopicId::kCauteryContact, [&] { return fresh; }}, {TopicId::kTissueFrame, [&] { return none; }}},
+                  {[&] { return out; }, [&] { return out; }});
+  EXPECT_EQ(health.node, NodeId::kThermal);
+  EXPECT_EQ(health.pid, 33);
+  EXPECT_EQ(health.schema_hash, 11u);
+  EXPECT_EQ(health.scene_hash, 22u);
+  EXPECT_EQ(health.overruns, 4u);
+  EXPECT_FLOAT_EQ(health.rate_asked_Hz, 100);
+  EXPECT_NEAR(health.step.p50_us, 2000, 2000 / 16.0);
+  EXPECT_EQ(health.write_failures, 6u);
+  ASSERT_EQ(health.inputs.size(), 2u);
+  EXPECT_FLOAT_EQ(health.inputs[0].age_ms, 10);
+  EXPECT_EQ(health.inputs[0].lost, 2u);
+  EXPECT_LT(health.inputs[1].age_ms, 0) << "no sample yet";
+}
+
+TEST(HealthReportTest, FitsToTheMessage) {
+  Health health;
+  health.inputs.resize(20);
+  for (int i = 0; i < 30; ++i) {
+    health.metrics.push_back({std::string(100, 'm'), std::numeric_limits<double>::quiet_NaN()});
+  }
+  health.last_error = std::string(1000, 'e');
+  FitToMessage(&health);
+  EXPECT_EQ(health.inputs.size(), 8u);
+  EXPECT_EQ(health.metrics.size(), 16u);
+  EXPECT_EQ(health.metrics[0].name.size(), 31u);
+  EXPECT_EQ(health.metrics[0].value, 0);
+  EXPECT_EQ(health.last_error.size(), 255u);
+}
+
+}  // namespace
+}  // namespace fulcrum::app
