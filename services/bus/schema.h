@@ -5,7 +5,7 @@
 
 namespace fulcrum::bus {
 
-/// Hash of all IDL files without comments and white space, compiled in. Peers with another one are refused on discovery.
+/// Hash of all IDL files without comments and white space, compiled in. Peers of another are refused.
 [[nodiscard]] std::uint64_t SchemaHash();
 
 }  // namespace fulcrum::bus

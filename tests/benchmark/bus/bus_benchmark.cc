@@ -1,9 +1,11 @@
 // The bus between two processes, on real topics. All times are CLOCK_MONOTONIC, which both processes share.
 //
-//   small_rtt              HandleState (66 B on the wire) there, CauteryContact back, at 1 kHz over UDP loopback; both
+//   small_rtt              HandleState (56 B) there, CauteryContact (84 B) back, at 1 kHz over UDP loopback; both
 //                          sides take and write in the callback.
 //   frame_300k             TissueFrame filled to its capacity at 100 Hz, from the call of WriteInPlace to the callback
 //                          in the other process; frame_300k_take goes on until the checked copy is in the node's hands.
+//   take                   what a node's tick pays in its own thread: TakeLatest with nothing new, and with the ten
+//                          ToolStates that a 100 Hz node finds.
 //   start_to_first_sample  from fork to the first ToolState of a running publisher in the new process.
 #include <fcntl.h>
 #include <signal.h>
@@ -207,6 +209,35 @@ void Frames(benchmark::Report* report) {
   report->Add("bus.frame_300k_lost", static_cast<double>(count) - static_cast<double>(called_us.size()), "samples");
 }
 
+void Take(benchmark::Report* report) {
+  DdsParticipant writer_side = MakeBus("bench_take_writer");
+  DdsParticipant reader_side = MakeBus("bench_take_reader");
+  auto out = writer_side.MakeOutput<ToolState>();
+  auto in = reader_side.MakeInput<ToolState>();
+  Stamper stamper(NowNs());
+  ToolState m;
+  if (!Eventually([&] { return out->Write(m) && in->TakeLatest(&m); })) return;
+  std::vector<double> empty_us, ten_us;
+  for (int i = 0; i < (report->quick() ? 50 : 300); ++i) {
+    const std::uint64_t before = in->stats().received;
+    for (int k = 0; k < 10; ++k) {
+      m.stamp = stamper.Next(NowNs());
+      out->Write(m);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    ToolState got;
+    std::int64_t start_ns = NowNs();
+    in->TakeLatest(&got);
+    const double us = Us(NowNs() - start_ns);
+    if (in->stats().received == before + 10) ten_us.push_back(us);
+    start_ns = NowNs();
+    in->TakeLatest(&got);
+    empty_us.push_back(Us(NowNs() - start_ns));
+  }
+  report->Add("bus.take.nothing_us_p50", benchmark::Quantile(empty_us, 0.5), "us");
+  report->Add("bus.take.ten_tool_states_us_p50", benchmark::Quantile(ten_us, 0.5), "us");
+}
+
 void Start(benchmark::Report* report) {
   DdsParticipant bus = MakeBus("bench_start");
   auto out = bus.MakeOutput<ToolState>();
@@ -244,6 +275,7 @@ int Main(int argc, char** argv) {
   benchmark::Report report(argc, argv);
   if (report.Wants("bus.small_rtt")) SmallRoundTrip(&report);
   if (report.Wants("bus.frame_300k")) Frames(&report);
+  if (report.Wants("bus.take")) Take(&report);
   if (report.Wants("bus.start_to_first_sample")) Start(&report);
   RemoveSharedMemory(SharedMemoryDirectory(kDomain));
   return 0;
