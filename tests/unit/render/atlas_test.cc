@@ -1,0 +1,108 @@
+#include "render_node/geometry/atlas.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "services/scene/build.h"
+
+namespace fulcrum::render {
+namespace {
+
+TemperaturePatch PatchAt(std::uint32_t x, std::uint32_t y, std::uint8_t value) {
+  TemperaturePatch patch;
+  patch.header.origin_x = x;
+  patch.header.origin_y = y;
+  patch.texels.assign(4u * kPatchTexels * kPatchTexels, value);
+  return patch;
+}
+
+class AtlasTest : public testing::Test {
+ protected:
+  AtlasTest() : data_(scene::BuildProcedural(scene::Small())), view_(data_.View()), atlas_(view_) {
+    topology_.rows = view_.membrane.rows;
+    topology_.cols = view_.membrane.cols;
+    topology_.dead_nodes.assign((view_.membrane.node_count() + 7) / 8, 0);
+    topology_.dead_edges.assign((3 * view_.membrane.node_count() + 7) / 8, 0);
+    for (std::uint32_t row = 30; row <= 40; ++row) {
+      const std::size_t node = row * view_.membrane.cols + 8;
+      SetBit(topology_.dead_edges, 3 * node);
+      if (row < 40) {
+        SetBit(topology_.dead_edges, 3 * node + 2);
+      }
+    }
+    const std::size_t node = 35 * view_.membrane.cols + 8;
+    slit_ = 0.5f * (view_.membrane_material[node] + view_.membrane_material[node + 1]);
+  }
+
+  std::uint8_t Texel(const Vec2f& material, int channel) const {
+    const auto x = static_cast<std::size_t>(material.x() / atlas_.texel_m());
+    const auto y = static_cast<std::size_t>(material.y() / atlas_.texel_m());
+    return atlas_.texels()[4 * (y * static_cast<std::size_t>(atlas_.width()) + x) + static_cast<std::size_t>(channel)];
+  }
+
+  const scene::SceneData data_;
+  const SceneView view_;
+  Atlas atlas_;
+  TopologyState topology_;
+  Vec2f slit_;  // Middle of the cut.
+};
+
+TEST_F(AtlasTest, CoversTheSheetAndNoMore) {
+  for (const Vec2f& m : view_.membrane_material) {
+    EXPECT_LE(m.x() / atlas_.texel_m(), static_cast<float>(atlas_.width()));
+    EXPECT_LE(m.y() / atlas_.texel_m(), static_cast<float>(atlas_.height()));
+  }
+  EXPECT_LT(atlas_.width() * atlas_.height(), kAtlasTexels * kAtlasTexels / 8);
+}
+
+TEST_F(AtlasTest, StartsIntactAtBodyTemperature) {
+  EXPECT_EQ(Texel(slit_, 0), 34);
+  EXPECT_EQ(Texel(slit_, 1), 0);
+  EXPECT_EQ(Texel(slit_, 2), 0);
+  EXPECT_EQ(Texel(slit_, 3), 255);
+}
+
+TEST_F(AtlasTest, APatchReplacesItsTexelsOnly) {
+  const AtlasRect rect = atlas_.Apply(PatchAt(32, 64, 99));
+  EXPECT_EQ(rect.x, 32);
+  EXPECT_EQ(rect.y, 64);
+  EXPECT_EQ(rect.width, kPatchTexels);
+  EXPECT_EQ(rect.height, kPatchTexels);
+  const auto texels = atlas_.texels();
+  const auto changed = std::count_if(texels.begin(), texels.end(), [](std::uint8_t byte) { return byte == 99; });
+  EXPECT_EQ(changed, 4 * kPatchTexels * kPatchTexels);
+}
+
+TEST_F(AtlasTest, APatchOverTheRimIsClippedAndOneBeyondIgnored) {
+  const AtlasRect rect = atlas_.Apply(PatchAt(static_cast<std::uint32_t>(atlas_.width() - 10), 0, 7));
+  EXPECT_EQ(rect.width, 10);
+  EXPECT_TRUE(atlas_.Apply(PatchAt(4000, 4000, 7)).empty());
+  EXPECT_TRUE(atlas_.Apply(PatchAt(4294967295u, 0, 7)).empty());
+  TemperaturePatch cut_short = PatchAt(0, 0, 7);
+  cut_short.texels.pop_back();
+  EXPECT_TRUE(atlas_.Apply(cut_short).empty());
+}
+
+TEST_F(AtlasTest, ACutKnownFromTheTopologyAloneIsASlitWithABrownedRim) {
+  const AtlasRect rect = atlas_.PaintCuts(view_, topology_);
+  EXPECT_FALSE(rect.empty());
+  EXPECT_EQ(Texel(slit_, 3), 0);
+  const Vec2f rim = slit_ + Vec2f(0.0005f, 0);
+  EXPECT_EQ(Texel(rim, 3), 255);
+  EXPECT_GT(Texel(rim, 2), 90);
+  const Vec2f beside = slit_ + Vec2f(0.004f, 0);
+  EXPECT_EQ(Texel(beside, 1), 0);
+  EXPECT_TRUE(atlas_.PaintCuts(view_, topology_).empty()) << "painted twice";
+}
+
+TEST_F(AtlasTest, WhatAPatchSaidIsNotPaintedOver) {
+  const auto x = static_cast<std::uint32_t>(slit_.x() / atlas_.texel_m()),
+             y = static_cast<std::uint32_t>(slit_.y() / atlas_.texel_m());
+  (void)atlas_.Apply(PatchAt(x > 128 ? x - 128 : 0, y > 128 ? y - 128 : 0, 200));
+  (void)atlas_.PaintCuts(view_, topology_);
+  EXPECT_EQ(Texel(slit_, 3), 200);
+}
+
+}  // namespace
+}  // namespace fulcrum::render

@@ -1,0 +1,102 @@
+#include "render_node/geometry/laparoscope.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "render_node/geometry/solid.h"
+#include "render_node/geometry/tissue_pattern.h"
+
+namespace fulcrum::render {
+namespace {
+
+Vec3f ToClip(const Laparoscope& scope, const Vec3f& p_W) {
+  const Eigen::Vector4f clip = scope.projection * scope.view * p_W.homogeneous();
+  return clip.hnormalized();
+}
+
+TEST(LaparoscopeTest, TheTargetIsInTheMiddleAndCranialIsUp) {
+  RenderParams params;
+  params.scope_tip_W = Vec3f(0.01f, -0.08f, 0.09f);
+  params.scope_target_W = Vec3f(0, 0.01f, 0.02f);
+  const Laparoscope scope = MakeLaparoscope(params);
+  const Vec3f target = ToClip(scope, params.scope_target_W);
+  EXPECT_NEAR(target.x(), 0, 1e-5f);
+  EXPECT_NEAR(target.y(), 0, 1e-5f);
+  EXPECT_GT(target.z(), -1);
+  EXPECT_LT(target.z(), 1);
+  EXPECT_GT(ToClip(scope, params.scope_target_W + Vec3f(0, 0.01f, 0)).y(), 0);
+  EXPECT_GT(ToClip(scope, params.scope_target_W + Vec3f(0.01f, 0, 0)).x(), 0);
+}
+
+TEST(LaparoscopeTest, TheFieldOfViewSpansTheHeight) {
+  RenderParams params;
+  params.scope_tip_W = Vec3f(0, 0, 0.1f);
+  params.scope_target_W = Vec3f::Zero();
+  params.fov_deg = 60;
+  const Laparoscope scope = MakeLaparoscope(params);
+  const float half = 0.1f * std::tan(0.5235988f);
+  EXPECT_NEAR(ToClip(scope, Vec3f(0, half, 0)).y(), 1, 1e-4f);
+  EXPECT_NEAR(ToClip(scope, Vec3f(half * 960 / 540, 0, 0)).x(), 1, 1e-4f);
+}
+
+TEST(LaparoscopeTest, LightIsOneAtTheTargetAndLeavesBetweenSightAndShaft) {
+  RenderParams params;
+  params.scope_tip_W = Vec3f(0, 0, 0.1f);
+  EXPECT_NEAR(MakeLaparoscope(params).light_power / 0.01f, 1, 1e-5f);
+  params.scope_angle_deg = 0;
+  EXPECT_NEAR(MakeLaparoscope(params).light_axis.dot(-Vec3f::UnitZ()), 1, 1e-6f);
+  params.scope_angle_deg = 30;
+  EXPECT_LT(MakeLaparoscope(params).light_axis.dot(-Vec3f::UnitZ()), 0.999f);
+}
+
+/// Six times the volume that the triangles enclose.
+float SignedVolume(const Solid& solid) {
+  float volume = 0;
+  for (const Triangle& t : solid.triangles) {
+    volume += solid.positions[t[0]].dot(solid.positions[t[1]].cross(solid.positions[t[2]]));
+  }
+  return volume;
+}
+
+TEST(SolidTest, FacesLookOutwardAndNormalsAgree) {
+  const ToolShape shape{0.0025f, 0.33f, 0.0015f, 0.018f};
+  for (const Solid& solid : {GrasperShaft(shape), GrasperJaw(shape), Hook({0.0025f, 0.33f, 0.0006f, 0.005f})}) {
+    EXPECT_GT(SignedVolume(solid), 0);
+    for (const Triangle& t : solid.triangles) {
+      const Vec3f area =
+          (solid.positions[t[1]] - solid.positions[t[0]]).cross(solid.positions[t[2]] - solid.positions[t[0]]);
+      const Vec3f normal = solid.normals[t[0]] + solid.normals[t[1]] + solid.normals[t[2]];
+      EXPECT_GE(area.dot(normal), -1e-12f);
+    }
+  }
+}
+
+TEST(SolidTest, TipsAreWhereTheFrameSays) {
+  const ToolShape shape{0.0025f, 0.33f, 0.0015f, 0.018f};
+  float jaw_tip = 0;
+  for (const Vec3f& p : GrasperJaw(shape).positions) {
+    jaw_tip = std::max(jaw_tip, p.z());
+  }
+  EXPECT_NEAR(jaw_tip, shape.tip_length_m, 1e-5f);
+  float foot = 0;
+  for (const Vec3f& p : Hook({0.0025f, 0.33f, 0.0006f, 0.005f}).positions) {
+    foot = std::max(foot, p.x());
+  }
+  EXPECT_NEAR(foot, 0.005f, 1e-5f);
+}
+
+TEST(TissuePatternTest, IsTheSameInEveryRunAndNotFlat) {
+  const auto noise = MakeNoisePattern(64);
+  EXPECT_EQ(noise, MakeNoisePattern(64));
+  const auto vessels = MakeVesselPattern(128);
+  EXPECT_EQ(vessels, MakeVesselPattern(128));
+  const auto share = static_cast<double>(std::count_if(vessels.begin(), vessels.end(), [](auto v) { return v > 40; })) /
+                     static_cast<double>(vessels.size());
+  EXPECT_GT(share, 0.01);
+  EXPECT_LT(share, 0.6);
+}
+
+}  // namespace
+}  // namespace fulcrum::render

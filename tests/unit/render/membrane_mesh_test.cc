@@ -1,0 +1,155 @@
+#include "render_node/geometry/membrane_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "render_node/geometry/fat_layer.h"
+#include "services/scene/build.h"
+
+namespace fulcrum::render {
+namespace {
+
+std::vector<float> Interleaved(std::span<const Vec3f> positions) {
+  std::vector<float> xyz;
+  for (const Vec3f& p : positions) {
+    xyz.insert(xyz.end(), {p.x(), p.y(), p.z()});
+  }
+  return xyz;
+}
+
+class MembraneMeshTest : public testing::Test {
+ protected:
+  MembraneMeshTest() : data_(scene::BuildProcedural(scene::Small())), view_(data_.View()), mesh_(view_) {
+    topology_.rows = view_.membrane.rows;
+    topology_.cols = view_.membrane.cols;
+    topology_.dead_nodes.assign((view_.membrane.node_count() + 7) / 8, 0);
+    topology_.dead_edges.assign((3 * view_.membrane.node_count() + 7) / 8, 0);
+  }
+
+  Index Node(std::uint32_t row, std::uint32_t col) const { return row * view_.membrane.cols + col; }
+
+  /// Kills all edges between column `col` and `col + 1` from row `first` to row `last`: a straight slit along t.
+  void CutBetweenColumns(std::uint32_t col, std::uint32_t first, std::uint32_t last) {
+    for (std::uint32_t row = first; row <= last; ++row) {
+      SetBit(topology_.dead_edges, 3 * std::size_t{Node(row, col)} + 0);
+      if (row < last) {
+        SetBit(topology_.dead_edges, 3 * std::size_t{Node(row, col)} + 2);
+      }
+    }
+  }
+
+  const scene::SceneData data_;
+  const SceneView view_;
+  MembraneMesh mesh_;
+  TopologyState topology_;
+};
+
+TEST_F(MembraneMeshTest, WithoutCutsEveryTriangleIsWhole) {
+  EXPECT_EQ(mesh_.whole_triangles(), view_.membrane.triangle_count());
+  EXPECT_EQ(mesh_.triangles().size(), mesh_.whole_triangles());
+}
+
+TEST_F(MembraneMeshTest, EachTriangleOverTheSlitIsDrawnOncePerSide) {
+  CutBetweenColumns(8, 20, 30);
+  ASSERT_TRUE(mesh_.SetTopology(topology_));
+  // Ten cells of two triangles; each has two dead edges.
+  EXPECT_EQ(mesh_.whole_triangles(), view_.membrane.triangle_count() - 20);
+  EXPECT_EQ(mesh_.triangles().size(), mesh_.whole_triangles() + 40);
+  for (const Triangle& t : mesh_.triangles().subspan(mesh_.whole_triangles())) {
+    const int owned =
+        static_cast<int>(std::count_if(t.begin(), t.end(), [&](Index k) { return mesh_.sides()[k] > 0; }));
+    EXPECT_TRUE(owned == 1 || owned == 2);
+  }
+}
+
+TEST_F(MembraneMeshTest, AClosedSlitLeavesTheSheetWhereItWas) {
+  CutBetweenColumns(8, 20, 30);
+  ASSERT_TRUE(mesh_.SetTopology(topology_));
+  mesh_.Update(Interleaved(view_.rest_position));
+  for (const Triangle& t : mesh_.triangles().subspan(mesh_.whole_triangles())) {
+    for (const Index k : t) {
+      const auto same = std::find(view_.membrane_material.begin(), view_.membrane_material.end(), mesh_.materials()[k]);
+      const auto node = static_cast<std::size_t>(same - view_.membrane_material.begin());
+      // A ghost continues the sheet along its tangent: what is left is its curvature over one cell of 2 mm.
+      EXPECT_LT((mesh_.positions()[k] - view_.rest_position[view_.membrane.first + node]).norm(), 5e-4f);
+    }
+  }
+}
+
+TEST_F(MembraneMeshTest, AnOpenSlitDoesNotStretchItsEdges) {
+  CutBetweenColumns(8, 20, 30);
+  ASSERT_TRUE(mesh_.SetTopology(topology_));
+  std::vector<Vec3f> particles(view_.rest_position.begin(), view_.rest_position.end());
+  constexpr float kOpening_m = 0.010f;
+  for (std::uint32_t row = 0; row < view_.membrane.rows; ++row) {
+    for (std::uint32_t col = 9; col < view_.membrane.cols; ++col) {
+      particles[view_.membrane.first + Node(row, col)].x() += kOpening_m;
+    }
+  }
+  mesh_.Update(Interleaved(particles));
+  for (const Triangle& t : mesh_.triangles().subspan(mesh_.whole_triangles())) {
+    for (int k = 0; k < 3; ++k) {
+      const Index a = t[k], b = t[(k + 1) % 3];
+      const float drawn = (mesh_.positions()[a] - mesh_.positions()[b]).norm();
+      const float material = (mesh_.materials()[a] - mesh_.materials()[b]).norm();
+      EXPECT_LT(drawn, 1.5f * material) << "an edge of " << material << " m bridges the slit";
+    }
+  }
+}
+
+TEST_F(MembraneMeshTest, ADeadNodeIsNeverDrawnAndAWildOneDoesNoHarm) {
+  const Index dead = Node(25, 8);
+  SetBit(topology_.dead_nodes, dead);
+  ASSERT_TRUE(mesh_.SetTopology(topology_));
+  std::vector<Vec3f> particles(view_.rest_position.begin(), view_.rest_position.end());
+  particles[view_.membrane.first + dead] = Vec3f(5, 5, 5);
+  mesh_.Update(Interleaved(particles));
+  for (const Triangle& t : mesh_.triangles().first(mesh_.whole_triangles())) {
+    EXPECT_EQ(std::count(t.begin(), t.end(), dead), 0);
+  }
+  for (const Vec3f& p : mesh_.positions()) {
+    EXPECT_LT(p.norm(), 0.2f);
+  }
+}
+
+TEST_F(MembraneMeshTest, RefusesTheTopologyOfAnotherGrid) {
+  topology_.rows += 1;
+  EXPECT_FALSE(mesh_.SetTopology(topology_));
+  topology_.rows -= 1;
+  topology_.dead_edges.pop_back();
+  EXPECT_FALSE(mesh_.SetTopology(topology_));
+  EXPECT_EQ(mesh_.whole_triangles(), view_.membrane.triangle_count());
+}
+
+TEST_F(MembraneMeshTest, FatLiesBetweenMembraneAndTubeAndFollowsHalfwayIntoATent) {
+  FatLayer fat(view_, 2);
+  const std::vector<float> rest = Interleaved(view_.rest_position);
+  mesh_.Update(rest);
+  fat.Update(rest, mesh_);
+  const std::vector<Vec3f> at_rest(fat.positions().begin(), fat.positions().end());
+  for (const Vec3f& p : at_rest) {
+    float to_membrane = 1;
+    for (const Vec3f& m : mesh_.positions()) {
+      to_membrane = std::min(to_membrane, (m - p).norm());
+    }
+    EXPECT_GT(to_membrane, 2e-4f);
+    EXPECT_LT(to_membrane, 3e-3f);
+  }
+  constexpr float kLift_m = 0.010f;
+  std::vector<Vec3f> particles(view_.rest_position.begin(), view_.rest_position.end());
+  for (Index node = 0; node < view_.membrane.node_count(); ++node) {
+    particles[view_.membrane.first + node].z() += kLift_m;
+  }
+  const std::vector<float> lifted = Interleaved(particles);
+  mesh_.Update(lifted);
+  fat.Update(lifted, mesh_);
+  for (std::size_t k = 0; k < at_rest.size(); ++k) {
+    const float rise = fat.positions()[k].z() - at_rest[k].z();
+    EXPECT_GT(rise, 0);
+    EXPECT_LT(rise, 0.8f * kLift_m);
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum::render
