@@ -80,7 +80,8 @@ void HapticsNode::FillHealth(Health* health) const {
   metric("models_not_taken", static_cast<double>(models_not_taken_.load(std::memory_order_relaxed)));
   metric("records_lost", static_cast<double>(records_lost_.load(std::memory_order_relaxed)));
   metric("forces_not_finite", static_cast<double>(figures.not_finite));
-  if (figures.state == ServoState::kFade || (figures.state == ServoState::kOff && figures.model_age_s >= 0)) {
+  // Before the first model there is nothing to miss.
+  if (figures.model_age_s > 1e-9 * static_cast<double>(kHoldAge_ns)) {
     health->state = HealthState::kDegraded;
     health->last_error = "no contact model for " + std::to_string(static_cast<int>(1e3 * figures.model_age_s)) +
                          " ms: forces are off until physics is back";

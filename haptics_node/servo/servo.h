@@ -32,7 +32,7 @@ struct ServoRecord {
 /// Figures for Health; plain, so that another thread can be given a copy.
 struct ServoFigures {
   ServoState state = ServoState::kOff;
-  double model_age_s = 0;   ///< Of the model in use; negative when there is none.
+  double model_age_s = -1;  ///< Of the model in use; negative when there is none.
   double peak_force_N = 0;  ///< Largest force on a hand since the start.
   std::array<double, kMaxTools> force_N{};
   std::uint64_t models_dropped = 0;
