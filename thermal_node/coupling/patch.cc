@@ -78,25 +78,24 @@ PatchPlanner::PatchPlanner(const HeatField& field, float texel_m) {
 
 template <class Visit>
 void PatchPlanner::ForPlaces(const Tile& tile, const Visit& visit) const {
-  const auto place = [&](int tile_coordinate, int offset, int limit) {
-    const float texel = static_cast<float>(tile_coordinate * kTile) * texels_per_cell_ + static_cast<float>(offset);
+  const auto first = [&](int tile_coordinate, int offset) {
+    return static_cast<float>(tile_coordinate * kTile) * texels_per_cell_ + static_cast<float>(offset);
+  };
+  const auto place = [](float texel, int limit) {
     return std::clamp(static_cast<int>(std::floor(texel / kPatchTexels)), 0, limit - 1);
   };
-  // The right and lower borders belong to the next tile; a place touched only there is drawn once too often, no harm.
-  for (int y = place(tile.ty, offset_y_, grid_y_); y <= place(tile.ty + 1, offset_y_, grid_y_); ++y) {
-    for (int x = place(tile.tx, offset_x_, grid_x_); x <= place(tile.tx + 1, offset_x_, grid_x_); ++x) {
-      visit(y * grid_x_ + x);
-    }
+  const int y1 = place(first(tile.ty + 1, offset_y_) - 1.0f, grid_y_);
+  const int x1 = place(first(tile.tx + 1, offset_x_) - 1.0f, grid_x_);
+  for (int y = place(first(tile.ty, offset_y_), grid_y_); y <= y1; ++y) {
+    for (int x = place(first(tile.tx, offset_x_), grid_x_); x <= x1; ++x) visit(y * grid_x_ + x);
   }
 }
 
 void PatchPlanner::Note(HeatField* field, bool everything) {
   const auto note = [&](const Tile& tile) { ForPlaces(tile, [&](int place) { due_[place] = history_[place] = 1; }); };
-  if (everything) {
-    for (const Tile* tile : field->Existing()) note(*tile);
-  }
-  for (Tile* tile : field->awake()) {
-    if (tile->patch_stale) note(*tile);
+  for (const auto& tile : field->tiles()) {
+    if (!tile || !(tile->patch_stale || everything)) continue;
+    note(*tile);
     tile->patch_stale = false;
   }
 }

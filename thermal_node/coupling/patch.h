@@ -28,7 +28,7 @@ class PatchPlanner {
  public:
   PatchPlanner(const HeatField& field, float texel_m);
 
-  /// Notes what has changed since the last call, of the awake tiles or, when asked, of every tile that was ever warm.
+  /// Notes what has changed since the last call; or, when asked, every tile that was ever warm.
   void Note(HeatField* field, bool everything);
   /// The next place that is due, which then no longer is. Nothing when nothing changed.
   std::optional<PatchPlace> Next(const HeatField& field);

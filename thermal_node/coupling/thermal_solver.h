@@ -44,6 +44,8 @@ class ThermalSolver {
  public:
   /// Throws InputError when the scene has no usable membrane or parameters.
   explicit ThermalSolver(const SceneView& scene);
+  ThermalSolver(const ThermalSolver&) = delete;  // parts refer to each other
+  ThermalSolver& operator=(const ThermalSolver&) = delete;
 
   /// Advances one frame. Does nothing, in some ns, when there is no current, all is cold and nothing is staged.
   void Step(const TipInput& tip, float dt_s);

@@ -91,7 +91,6 @@ Tile* HeatField::Wake(int tx, int ty) {
   Tile* tile = tiles_[index] ? tiles_[index].get() : Create(index);
   if (tile->state.awake) return tile;
   tile->state.awake = 1;
-  tile->touched = true;
   tile->faces_stale = true;
   const auto before = std::lower_bound(awake_.begin(), awake_.end(), index,
                                        [](const Tile* t, int wanted) { return t->index < wanted; });
@@ -305,6 +304,7 @@ void HeatField::SleepCold(Ledger* ledger) {
     tile->theta_sum.fill(0);
     tile->theta_max = tile->theta_min = 0;
     tile->state.awake = 0;
+    tile->patch_stale = true;
     MarkNeighboursStale(*tile);
     return true;
   };
@@ -345,7 +345,6 @@ void HeatField::Restore(int index, const TileState& state) {
   Tile* tile = Create(index);
   tile->state = state;
   tile->state.awake = 0;
-  tile->touched = true;
   if (state.awake != 0) Wake(tile->tx, tile->ty);
   MarkNeighboursStale(*tile);
   Ledger none;  // a checkpoint holds no bad cells

@@ -57,6 +57,8 @@ class HeatField {
   /// Where the last quarantined cell was.
   [[nodiscard]] CellIndex last_quarantined() const { return last_quarantined_; }
 
+  /// All tiles that exist, by index; null where none does.
+  [[nodiscard]] std::span<const std::unique_ptr<Tile>> tiles() const { return tiles_; }
   /// All tiles that exist, by ascending index.
   [[nodiscard]] std::vector<const Tile*> Existing() const;
   void Clear();

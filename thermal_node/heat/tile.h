@@ -53,7 +53,6 @@ struct Tile {
   bool faces_stale = true;  ///< Material of this tile changed since its faces were built.
   bool patch_stale = true;  ///< Changed since it was last drawn into a patch.
   bool held = false;        ///< A warm neighbour touches it: no sleep in this step.
-  bool touched = false;     ///< Ever warmed: has something to draw.
 };
 
 /// True when the tile sleeps and nothing lasting ever happened in it, so that it need not be stored.

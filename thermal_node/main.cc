@@ -1,0 +1,29 @@
+// thermal_node: electrocautery of the membrane.
+#include "services/app/node_app.h"
+#include "services/runtime/checkpoint.h"
+#include "services/runtime/cyclic_thread.h"
+#include "thermal_node/node/thermal_node.h"
+
+namespace {
+
+using namespace fulcrum;  // NOLINT: a main is nothing but names of other modules
+
+ExitCode RunThermal(app::NodeApp& app) {
+  runtime::CheckpointFile checkpoint(app.options().session / "thermal_node.checkpoint", app.scene().hash,
+                                     thermal::kCheckpointLayout,
+                                     thermal::ThermalSolver::CheckpointCapacity(app.scene()));
+  thermal::ThermalNode node(
+      app.scene(),
+      {app.MakeInput<CauteryContact>(), app.MakeOutput<TopologyState>(), app.MakeOutput<TemperaturePatch>(),
+       app.MakeOutput<ThermalEvent>(), app.MakeOutput<TickManifest>()},
+      &checkpoint, runtime::MonotonicNs());
+  return app.Run(
+      app.timing(), [&](const Tick& tick) { node.Step(tick); }, [&](Health* health) { node.FillHealth(health); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return app::NodeMain(argc, argv, NodeId::kThermal, "Heats and cuts the membrane; publishes topology and temperature.",
+                       RunThermal);
+}

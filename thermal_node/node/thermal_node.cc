@@ -1,0 +1,163 @@
+#include "thermal_node/node/thermal_node.h"
+
+#include <optional>
+
+#include "services/runtime/realtime.h"
+
+namespace fulcrum::thermal {
+
+ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint,
+                         std::int64_t epoch_ns)
+    : scene_(scene),
+      ports_(ports),
+      checkpoint_(checkpoint),
+      solver_(scene_),
+      tracker_(solver_.field().sheet(), scene_.thermal.hook_radius_m),
+      planner_(solver_.field(), scene_.membrane.texel_m),
+      topology_stamper_(epoch_ns),
+      patch_stamper_(epoch_ns),
+      event_stamper_(epoch_ns),
+      manifest_stamper_(epoch_ns) {
+  topology_.scene_hash = scene_.hash;
+  topology_.rows = scene_.membrane.rows;
+  topology_.cols = scene_.membrane.cols;
+  manifest_.node = NodeId::kThermal;
+  manifest_.consumed = {{TopicId::kCauteryContact, 0, 0}};
+  if (checkpoint_ != nullptr) {
+    if (const auto latest = checkpoint_->Latest()) restored_ = solver_.Restore(latest->payload);
+  }
+  NoteHealth();
+}
+
+void ThermalNode::Step(const Tick& tick) {
+  if (ticks_++ == 0) runtime::FlushDenormals();
+  solver_.Step(TakeContact(tick.dt_s), static_cast<float>(tick.dt_s));
+  SaveCheckpoint();
+  PublishTopology(tick);
+  PublishEvents(tick);
+  PublishPatch(tick);
+  PublishManifest(tick);
+  if (solver_.stepped()) NoteHealth();
+}
+
+TipInput ThermalNode::TakeContact(double dt_s) {
+  CauteryContact newest;
+  bool fresh = ports_.contact.TakeLatest(&newest);
+  if (fresh && !tracker_.Accepts(newest)) {
+    ++refused_;
+    fresh = false;
+  }
+  if (fresh) contact_ = newest;
+  return tracker_.Advance(fresh ? &contact_ : nullptr, dt_s);
+}
+
+/// Before anything of a new revision is published: whoever saw a revision can rely on it to survive this process.
+void ThermalNode::SaveCheckpoint() {
+  if (checkpoint_ == nullptr || !solver_.stepped()) return;
+  ++frames_since_checkpoint_;
+  const bool due = solver_.committed() || frames_since_checkpoint_ >= kFramesPerCheckpoint;
+  if (!due || !solver_.at_commit_frame()) return;
+  const std::size_t bytes = solver_.Save(checkpoint_->Begin());
+  checkpoint_full_ = bytes == 0;
+  if (bytes > 0) checkpoint_->Commit(bytes);
+  frames_since_checkpoint_ = 0;
+}
+
+void ThermalNode::PublishTopology(const Tick& tick) {
+  topology_due_ = topology_due_ || solver_.committed();
+  if (!topology_due_) return;
+  const MeshTopology& mesh = solver_.topology();
+  topology_.stamp = topology_stamper_.Next(tick.stamp_ns);
+  topology_.revision = mesh.revision();
+  topology_.cut_length_m = solver_.cut_length_m();
+  topology_.dead_nodes = mesh.committed().dead_nodes;
+  topology_.dead_edges = mesh.committed().dead_edges;
+  topology_.shrink = mesh.committed().shrink;
+  // Tried again next tick when it could not be sent.
+  topology_due_ = !ports_.topology.Write(topology_);
+}
+
+void ThermalNode::PublishEvents(const Tick& tick) {
+  for (const SolverEvent& event : solver_.events()) {
+    ThermalEvent message;
+    message.stamp = event_stamper_.Next(tick.stamp_ns);
+    message.session_time_s = tick.session_time_s;
+    message.kind = event.kind;
+    message.material = event.material;
+    message.temperature_C = event.temperature_C;
+    message.value = event.value;
+    message.topology_revision = solver_.topology().revision();
+    ports_.event.Write(message);
+  }
+}
+
+void ThermalNode::PublishPatch(const Tick& tick) {
+  patch_note_due_ = patch_note_due_ || solver_.stepped();
+  if (ticks_ % kTicksPerPatch != 0) return;
+  const bool readers = ports_.patch.has_readers();
+  const bool came = readers && !patch_readers_;
+  patch_readers_ = readers;
+  if (!readers) return;
+  if (patch_note_due_ || came) planner_.Note(solver_.mutable_field(), came);
+  patch_note_due_ = false;
+  std::optional<PatchPlace> place = planner_.Next(solver_.field());
+  if (!place && ticks_ % kTicksPerHistoryPatch == 0) place = planner_.NextOfHistory();
+  if (!place) return;
+  ports_.patch.WriteInPlace([&](TemperaturePatch::View view) {
+    view.header.stamp = patch_stamper_.Next(tick.stamp_ns);
+    view.header.topology_revision = solver_.topology().revision();
+    view.header.slot = place->slot;
+    view.header.origin_x = place->origin_x;
+    view.header.origin_y = place->origin_y;
+    view.header.max_temperature_C = DrawPatch(solver_.field(), scene_.membrane.texel_m, *place, view.texels);
+  });
+}
+
+void ThermalNode::PublishManifest(const Tick& tick) {
+  if (!ports_.manifest.has_readers()) return;
+  manifest_.stamp = manifest_stamper_.Next(tick.stamp_ns);
+  manifest_.tick = tick.index;
+  manifest_.session_time_s = tick.session_time_s;
+  manifest_.state_hash = solver_.TickHash();
+  manifest_.consumed[0].epoch = contact_.stamp.epoch;
+  manifest_.consumed[0].sequence = contact_.stamp.sequence;
+  ports_.manifest.Write(manifest_);
+}
+
+void ThermalNode::NoteHealth() {
+  Figures f{};
+  f.solver = solver_.figures();
+  f.delivered_J = solver_.ledger().generator;
+  f.closure = solver_.ledger().ClosureError(solver_.field().Stored());
+  f.revision = solver_.topology().revision();
+  f.quarantined = solver_.field().quarantined();
+  f.refused = refused_;
+  f.dead_edges = solver_.topology().dead_edge_count();
+  f.dead_nodes = solver_.topology().dead_node_count();
+  f.awake_tiles = static_cast<std::uint32_t>(solver_.field().awake().size());
+  f.checkpoint_full = checkpoint_full_ ? 1 : 0;
+  f.cut_length_m = solver_.cut_length_m();
+  figures_.Store(f);
+}
+
+void ThermalNode::FillHealth(Health* health) const {
+  const Figures f = figures_.Load();
+  health->metrics = {{"highest_temperature_C", f.solver.highest_C},
+                     {"temperature_C", f.solver.present_C},
+                     {"cut_length_mm", 1e3 * f.cut_length_m},
+                     {"dead_edges", static_cast<double>(f.dead_edges)},
+                     {"dead_nodes", static_cast<double>(f.dead_nodes)},
+                     {"warnings", static_cast<double>(f.solver.warnings)},
+                     {"injuries", static_cast<double>(f.solver.injuries)},
+                     {"power_W", f.solver.power_W},
+                     {"voltage_V", f.solver.voltage_V},
+                     {"delivered_J", f.delivered_J},
+                     {"energy_closure", f.closure},
+                     {"topology_revision", static_cast<double>(f.revision)},
+                     {"awake_tiles", static_cast<double>(f.awake_tiles)},
+                     {"quarantined_cells", static_cast<double>(f.quarantined)},
+                     {"contacts_refused", static_cast<double>(f.refused)}};
+  if (f.checkpoint_full != 0) health->last_error = "checkpoint has no room for the tissue that was heated";
+}
+
+}  // namespace fulcrum::thermal

@@ -1,0 +1,88 @@
+// The thermal node on ports: contact in, topology, temperature patches and events out. The same class runs live, in a
+// test and in a replay.
+#pragma once
+
+#include <cstdint>
+
+#include "services/bus/input_account.h"
+#include "services/bus/port.h"
+#include "services/core/messages.h"
+#include "services/core/scene_view.h"
+#include "services/core/tick.h"
+#include "services/runtime/checkpoint.h"
+#include "services/runtime/seqlock.h"
+#include "thermal_node/coupling/patch.h"
+#include "thermal_node/coupling/thermal_solver.h"
+#include "thermal_node/coupling/tip_tracker.h"
+
+namespace fulcrum::thermal {
+
+/// A patch is due every this many ticks: 25 Hz at 100 Hz, above what a monitor's eye follows in colour.
+inline constexpr std::uint64_t kTicksPerPatch = 4;
+/// When nothing changes, one old patch goes out this often, for readers that came late.
+inline constexpr std::uint64_t kTicksPerHistoryPatch = 100;
+/// A checkpoint at each new revision, and this often while the tissue is warm [frames of the solver].
+inline constexpr std::uint64_t kFramesPerCheckpoint = 20;
+/// Changes with the layout of the checkpoint.
+inline constexpr std::uint32_t kCheckpointLayout = 1;
+
+class ThermalNode {
+ public:
+  struct Ports {
+    bus::Input<CauteryContact>& contact;
+    bus::Output<TopologyState>& topology;
+    bus::LoanOutput<TemperaturePatch>& patch;
+    bus::Output<ThermalEvent>& event;
+    bus::Output<TickManifest>& manifest;
+  };
+
+  /// Scene, ports and checkpoint must outlive the node. Goes on from the checkpoint when it holds something.
+  /// @param checkpoint null: nothing is kept.
+  /// @param epoch_ns CLOCK_MONOTONIC at the start of the process [ns].
+  ThermalNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint, std::int64_t epoch_ns);
+
+  /// One period. Always called by the same thread.
+  void Step(const Tick& tick);
+
+  /// Metrics and last error. Any thread.
+  void FillHealth(Health* health) const;
+
+  [[nodiscard]] const ThermalSolver& solver() const { return solver_; }
+  /// It went on from a checkpoint.
+  [[nodiscard]] bool restored() const { return restored_; }
+
+ private:
+  [[nodiscard]] TipInput TakeContact(double dt_s);
+  void SaveCheckpoint();
+  void PublishTopology(const Tick& tick);
+  void PublishEvents(const Tick& tick);
+  void PublishPatch(const Tick& tick);
+  void PublishManifest(const Tick& tick);
+  void NoteHealth();
+
+  struct Figures {
+    SolverFigures solver;
+    double delivered_J, closure;
+    std::uint64_t revision, quarantined, refused;
+    std::uint32_t dead_edges, dead_nodes, awake_tiles, checkpoint_full;
+    float cut_length_m;
+  };
+
+  SceneView scene_;
+  Ports ports_;
+  runtime::CheckpointFile* checkpoint_;
+  ThermalSolver solver_;
+  TipTracker tracker_;
+  PatchPlanner planner_;
+  bus::Stamper topology_stamper_, patch_stamper_, event_stamper_, manifest_stamper_;
+
+  CauteryContact contact_;
+  TopologyState topology_;
+  TickManifest manifest_;
+  std::uint64_t ticks_ = 0, refused_ = 0, frames_since_checkpoint_ = 0;
+  bool restored_ = false, topology_due_ = true, patch_readers_ = false, patch_note_due_ = false;
+  bool checkpoint_full_ = false;
+  runtime::SeqLock<Figures> figures_;
+};
+
+}  // namespace fulcrum::thermal
