@@ -168,9 +168,9 @@ std::vector<Triangle> GridTriangles(int rows, int cols) {
 /// The sheet's fixed continuation to the sides and beyond the ends. It begins a little inside the membrane's rim and a
 /// little below it, so that no gap shows between the fine rim and the coarse surface.
 Anatomy::Surrounding Retroperitoneum(const TubeSettings& tube, const MembraneSettings& membrane, const Shape& shape) {
-  constexpr double kOverlap_m = 0.0015, kBelow_m = 0.0004, kReach_m = 0.110;
+  constexpr double kOverlap_m = 0.0015, kBelow_m = 0.0004, kReach_m = 0.150;
   constexpr int kInner = 32, kOuter = 12;
-  const double rim_u = kOverlap_m / tube.length_m, reach_u = 0.6 * kReach_m / tube.length_m;
+  const double rim_u = kOverlap_m / tube.length_m, reach_u = 0.45 * kReach_m / tube.length_m;
   const double rim_w = membrane.width_m / 2 - kOverlap_m;
   std::vector<double> u_lines, w_lines;
   for (int i = 0; i < kOuter; ++i) {

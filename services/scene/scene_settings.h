@@ -34,17 +34,20 @@ struct ImportSettings {
   int target_tets = 8000;
   double min_edge_m = 0.0003;       ///< Shorter edges of the surface are slivers and are collapsed.
   int organ_triangles_max = 14000;  ///< The embedded surface is decimated to this many triangles.
-  double from = 0.1, to = 0.9;  ///< The stretch, as fractions of the centre line counted from its caudal end; beyond it
-                                ///< the organ is fixed.
-  Vec3f facing = Vec3f::UnitZ();  ///< The sector's middle lies this way from the centre line.
-  double sector_rad = 2.6;        ///< How far round the organ the membrane follows it.
-  double flare_m = 0.012;         ///< Then it leaves the organ and goes on this far to either side.
-  double bed_m = 0.040;           ///< A fixed surface continues it by so much.
+  /// The organ's centre line, caudal end first, in the frame of the files [m].
+  std::vector<Vec3f> centreline_m;
+  /// The stretch under the membrane, as fractions of the centre line's length; beyond it the organ is fixed.
+  double from = 0.1, to = 0.9;
+  Vec3f facing = Vec3f::UnitZ();  ///< The membrane's middle lies this way from the centre line.
+  double sector_rad = 2.2;        ///< How far round the organ the membrane follows it.
+  double flare_m = 0.010;         ///< Then it leaves the organ and goes on this far to either side.
+  double bed_m = 0.025;           ///< A fixed surface continues it to the sides by so much.
   struct Surrounding {
     std::string name;
     SurfaceRole role = SurfaceRole::kOther;
     std::filesystem::path file;
-    int triangles_max = 4000;  ///< Decimated to this many.
+    Vec3f offset_m = Vec3f::Zero();  ///< Moved by this, as the assistant retracts it.
+    int triangles_max = 4000;        ///< Decimated to this many.
     bool collides = false;
   };
   std::vector<Surrounding> surroundings;

@@ -157,6 +157,20 @@ std::filesystem::path FindFile(const StrictMap& map, const std::string& key, con
   map.Fail(key, reason);
 }
 
+void ReadCentreline(StrictMap map, std::vector<Vec3f>* points) {
+  std::array<std::vector<double>, 3> axes;
+  const std::array keys = {"x_mm", "y_mm", "z_mm"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    axes[k] = map.NumbersSi(keys[k], 2, kMaxPathPoints, Range::Between(-5000, 5000));
+    if (axes[k].size() != axes[0].size()) {
+      map.Fail(keys[k], "must have as many entries as x_mm");
+    }
+  }
+  for (std::size_t i = 0; i < axes[0].size(); ++i) {
+    points->push_back(Eigen::Vector3d(axes[0][i], axes[1][i], axes[2][i]).cast<float>());
+  }
+}
+
 void ReadImport(StrictMap map, const std::filesystem::path& base, const std::filesystem::path& data,
                 ImportSettings* import) {
   std::vector<std::filesystem::path> folders;
@@ -173,6 +187,7 @@ void ReadImport(StrictMap map, const std::filesystem::path& base, const std::fil
   ReadInteger(&map, "target_tets", 500, 60000, &import->target_tets);
   ReadSi(&map, "min_edge_mm", Range::Between(0, 5), &import->min_edge_m);
   ReadInteger(&map, "organ_triangles_max", 500, 200000, &import->organ_triangles_max);
+  ReadCentreline(map.Map("centreline"), &import->centreline_m);
   ReadSi(&map, "from", Range::Between(0, 1), &import->from);
   ReadSi(&map, "to", Range::Between(0, 1), &import->to);
   if (!(import->to - import->from >= 0.1)) {
@@ -190,6 +205,7 @@ void ReadImport(StrictMap map, const std::filesystem::path& base, const std::fil
     s.name = entry.Text("name", 31);
     s.role = entry.Choice("role", s.role, kRoles);
     s.file = FindFile(entry, "file", entry.Text("file"), folders);
+    s.offset_m = entry.Vector3Si("offset_mm", s.offset_m, Range::Between(-500, 500));
     ReadInteger(&entry, "triangles_max", 100, 100000, &s.triangles_max);
     s.collides = entry.Flag("collides", s.collides);
     import->surroundings.push_back(s);

@@ -1,0 +1,208 @@
+#include "services/scene/mesh_repair.h"
+
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/connected_components.h>
+#include <CGAL/Polygon_mesh_processing/measure.h>
+#include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/orientation.h>
+#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
+#include <CGAL/Polygon_mesh_processing/repair_polygon_soup.h>
+#include <CGAL/Polygon_mesh_processing/self_intersections.h>
+#include <CGAL/Polygon_mesh_processing/shape_predicates.h>
+#include <CGAL/Polygon_mesh_processing/stitch_borders.h>
+#include <CGAL/Surface_mesh.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
+#include <CGAL/Surface_mesh_simplification/edge_collapse.h>
+#include <CGAL/boost/graph/Euler_operations.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "services/core/error.h"
+
+namespace fulcrum::scene {
+namespace {
+
+namespace pmp = CGAL::Polygon_mesh_processing;
+namespace sms = CGAL::Surface_mesh_simplification;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Surface = CGAL::Surface_mesh<Kernel::Point_3>;
+
+/// A triangle with a larger angle than this is a cap: nearly flat, its height far below its edges.
+const double kCapCosine = std::cos(165 * std::numbers::pi / 180);
+
+Surface ToSurface(const TriangleMesh& mesh) {
+  std::vector<Kernel::Point_3> points;
+  for (const Vec3d& p : mesh.vertices) {
+    points.emplace_back(p.x(), p.y(), p.z());
+  }
+  std::vector<std::vector<std::size_t>> polygons;
+  for (const Triangle& t : mesh.triangles) {
+    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) {
+      polygons.push_back({t[0], t[1], t[2]});
+    }
+  }
+  // Merges duplicate points and triangles, drops what has no area, makes neighbours agree on the side that is outside
+  // and splits the vertices where that is impossible.
+  pmp::repair_polygon_soup(points, polygons);
+  pmp::orient_polygon_soup(points, polygons);
+  Surface surface;
+  pmp::polygon_soup_to_polygon_mesh(points, polygons, surface);
+  pmp::stitch_borders(surface);
+  return surface;
+}
+
+TriangleMesh ToMesh(Surface* surface) {
+  surface->collect_garbage();
+  TriangleMesh mesh;
+  for (const auto v : surface->vertices()) {
+    const auto& p = surface->point(v);
+    mesh.vertices.emplace_back(p.x(), p.y(), p.z());
+  }
+  for (const auto f : surface->faces()) {
+    Triangle triangle;
+    int k = 0;
+    for (const auto v : surface->vertices_around_face(surface->halfedge(f))) {
+      triangle[k++] = static_cast<Index>(v.idx());
+    }
+    mesh.triangles.push_back(triangle);
+  }
+  return mesh;
+}
+
+void MeasureShape(const TriangleMesh& mesh, RepairReport* report) {
+  report->least_edge = 1e300;
+  report->least_angle_deg = 180;
+  for (const Triangle& t : mesh.triangles) {
+    for (int k = 0; k < 3; ++k) {
+      const Vec3d a = mesh.vertices[t[(k + 1) % 3]] - mesh.vertices[t[k]];
+      const Vec3d b = mesh.vertices[t[(k + 2) % 3]] - mesh.vertices[t[k]];
+      report->least_edge = std::min(report->least_edge, a.norm());
+      report->least_angle_deg =
+          std::min(report->least_angle_deg, std::atan2(a.cross(b).norm(), a.dot(b)) * 180 / std::numbers::pi);
+    }
+  }
+}
+
+double SquaredLength(const Surface& surface, Surface::Edge_index e) {
+  return CGAL::squared_distance(surface.point(surface.vertex(e, 0)), surface.point(surface.vertex(e, 1)));
+}
+
+/// Collapses an edge to its middle, unless that would change the topology or turn a neighbouring triangle over.
+bool Collapse(Surface::Edge_index e, Surface* surface) {
+  if (!CGAL::Euler::does_satisfy_link_condition(e, *surface)) {
+    return false;
+  }
+  const auto h = surface->halfedge(e);
+  const auto a = surface->source(h), b = surface->target(h);
+  const Kernel::Point_3 middle = CGAL::midpoint(surface->point(a), surface->point(b));
+  for (const auto v : {a, b}) {
+    for (const auto f : surface->faces_around_target(surface->halfedge(v))) {
+      std::array<Kernel::Point_3, 3> before, after;
+      int k = 0;
+      int ends = 0;
+      for (const auto w : surface->vertices_around_face(surface->halfedge(f))) {
+        const bool moves = w == a || w == b;
+        ends += moves ? 1 : 0;
+        before[k] = surface->point(w);
+        after[k++] = moves ? middle : surface->point(w);
+      }
+      const auto n0 = CGAL::normal(before[0], before[1], before[2]), n1 = CGAL::normal(after[0], after[1], after[2]);
+      const bool had_area = CGAL::to_double(n0.squared_length()) > 0;
+      if (ends == 1 && had_area && CGAL::to_double(n0 * n1) <= 0) {
+        return false;
+      }
+    }
+  }
+  surface->point(CGAL::Euler::collapse_edge(e, *surface)) = middle;
+  return true;
+}
+
+/// Flips the longest edge of a cap (a triangle with an angle near 180 degrees) when the flip is possible.
+bool FlipCap(Surface::Face_index f, Surface* surface) {
+  const auto h = pmp::is_cap_triangle_face(f, *surface, kCapCosine);
+  if (h == Surface::null_halfedge() || surface->is_border(surface->edge(h))) {
+    return false;
+  }
+  const auto opposite = surface->target(surface->next(surface->opposite(h)));
+  const auto own = surface->target(surface->next(h));
+  if (own == opposite || surface->halfedge(own, opposite) != Surface::null_halfedge()) {
+    return false;
+  }
+  CGAL::Euler::flip_edge(h, *surface);
+  return true;
+}
+
+/// Short edges are collapsed, shortest first; then caps are flipped; again until nothing changes.
+void RemoveSlivers(double min_edge, Surface* surface, RepairReport* report) {
+  constexpr int kRounds = 10;
+  for (int round = 0; round < kRounds; ++round) {
+    bool changed = false;
+    std::vector<std::pair<double, Surface::Edge_index>> edges;
+    for (const auto e : surface->edges()) {
+      if (SquaredLength(*surface, e) < min_edge * min_edge) {
+        edges.emplace_back(SquaredLength(*surface, e), e);
+      }
+    }
+    std::sort(edges.begin(), edges.end());
+    for (const auto& [length, e] : edges) {
+      if (!surface->is_removed(e) && SquaredLength(*surface, e) < min_edge * min_edge && Collapse(e, surface)) {
+        ++report->edges_collapsed;
+        changed = true;
+      }
+    }
+    surface->collect_garbage();
+    for (const auto f : surface->faces()) {
+      if (FlipCap(f, surface)) {
+        ++report->caps_flipped;
+        changed = true;
+      }
+    }
+    if (!changed) {
+      return;
+    }
+  }
+}
+
+}  // namespace
+
+TriangleMesh RepairClosedSurface(const TriangleMesh& mesh, double min_edge, const std::string& name,
+                                 RepairReport* report) {
+  Surface surface = ToSurface(mesh);
+  if (surface.number_of_faces() == 0) {
+    throw InputError(name + ": no triangle with an area");
+  }
+  report->pieces_dropped = pmp::keep_largest_connected_components(surface, 1);
+  surface.collect_garbage();
+  if (!CGAL::is_closed(surface)) {
+    std::size_t open = 0;
+    for (const auto e : surface.edges()) {
+      open += surface.is_border(e) ? 1 : 0;
+    }
+    throw InputError(name + ": the surface is not closed (" + std::to_string(open) +
+                     " open edges); close its holes, or cut it where the organ ends and cap it");
+  }
+  RemoveSlivers(min_edge, &surface, report);
+  pmp::orient_to_bound_a_volume(surface);
+  std::vector<std::pair<Surface::Face_index, Surface::Face_index>> crossing;
+  pmp::self_intersections(surface, std::back_inserter(crossing));
+  report->self_intersections = crossing.size();
+  if (!CGAL::is_closed(surface) || !CGAL::is_valid_polygon_mesh(surface)) {
+    throw InputError(name + ": cannot be repaired to a closed surface");
+  }
+  TriangleMesh repaired = ToMesh(&surface);
+  MeasureShape(repaired, report);
+  return repaired;
+}
+
+TriangleMesh Decimate(const TriangleMesh& mesh, int triangles_max) {
+  Surface surface = ToSurface(mesh);
+  const auto wanted_edges = static_cast<std::size_t>(triangles_max) * 3 / 2;
+  if (surface.number_of_faces() > static_cast<std::size_t>(triangles_max)) {
+    sms::edge_collapse(surface, sms::Count_stop_predicate<Surface>(wanted_edges));
+  }
+  return ToMesh(&surface);
+}
+
+}  // namespace fulcrum::scene

@@ -1,0 +1,26 @@
+// Makes usable surfaces of real ones. CGAL lives behind these functions and those of tetrahedralise.h only.
+#pragma once
+
+#include <string>
+
+#include "services/scene/mesh_io.h"
+
+namespace fulcrum::scene {
+
+struct RepairReport {
+  std::size_t pieces_dropped = 0;  ///< Separate pieces other than the largest.
+  std::size_t edges_collapsed = 0;
+  std::size_t caps_flipped = 0;        ///< Flat triangles removed by flipping their longest edge.
+  std::size_t self_intersections = 0;  ///< Pairs of triangles left that cross: tolerated by the mesher, reported.
+  double least_edge = 0, least_angle_deg = 0;  ///< After the repair.
+};
+
+/// The largest piece of `mesh` as a closed, oriented (outward) two-manifold without edges below `min_edge` and without
+/// needle or cap triangles where its topology allows. Throws InputError "name: reason" when it cannot be closed.
+TriangleMesh RepairClosedSurface(const TriangleMesh& mesh, double min_edge, const std::string& name,
+                                 RepairReport* report);
+
+/// Edge collapse (Lindstrom, Turk 1998) down to `triangles_max`; pieces and holes stay. Orientation is made consistent.
+TriangleMesh Decimate(const TriangleMesh& mesh, int triangles_max);
+
+}  // namespace fulcrum::scene
