@@ -12,6 +12,8 @@ constexpr float kSlack = 0.0015f;
 constexpr float kMaxPush = 0.003f;
 /// A tool deeper behind a triangle than this has gone through it for good: pushing would only tear [m].
 constexpr float kMaxBehind = 0.004f;
+/// Below this height there is no telling on which side of a triangle the tool was [m].
+constexpr float kUnclearHeight = 1e-6f;
 /// After letting go, jaws collide again when nothing has been near them for so many steps.
 constexpr int kClearSteps = 5;
 /// A sweep is cut into pieces of this part of the capsule's radius …
@@ -110,7 +112,7 @@ void ToolCollision::UpdateBounds() {
 }
 
 template <class Visit>
-void ToolCollision::ForEachCellNear(const Vec3f& a, const Vec3f& b, float range, const Visit& visit) const {
+void ToolCollision::ForEachCellNear(const Vec3f& a, const Vec3f& b, const float& range, const Visit& visit) const {
   const GridLayout& layout = particles_->layout();
   const Vec3f lo = a.cwiseMin(b) - Vec3f::Constant(range), hi = a.cwiseMax(b) + Vec3f::Constant(range);
   std::size_t index = 0;
@@ -179,17 +181,18 @@ void ToolCollision::AddPair(std::uint32_t capsule, Index triangle, const std::ar
           return std::pair(p.capsule, p.triangle) < std::pair(q.capsule, q.triangle);
         });
     const bool known = last != last_pairs_.end() && last->capsule == capsule && last->triangle == triangle;
-    if (known && last->touching) {
+    // Where the two points that are closest now were before this step, when nothing overlapped.
+    const auto& b = pair.closest.barycentric;
+    const Vec3f x0 = particles_->Previous(at[0]), x1 = particles_->Previous(at[1]), x2 = particles_->Previous(at[2]);
+    const Vec3f normal = (x1 - x0).cross(x2 - x0);
+    const Vec3f offset = motion.from.a + pair.closest.t * (motion.from.b - motion.from.a) -
+                         (b[0] * x0 + b[1] * x1 + b[2] * x2);
+    const float height = normal.dot(offset);
+    const bool unclear = std::abs(height) <= kUnclearHeight * normal.norm();
+    if (known && (last->touching || unclear)) {
       pair.side = last->side;
     } else {
-      // Where the tool was before this step, when nothing overlapped.
-      const Vec3f x0 = particles_->Previous(at[0]), x1 = particles_->Previous(at[1]), x2 = particles_->Previous(at[2]);
-      const ClosestPoints before = ClosestSegmentTriangle(motion.from.a, motion.from.b, x0, x1, x2);
-      const float height = (x1 - x0).cross(x2 - x0).dot(before.on_segment - before.on_triangle);
-      pair.side = before.crosses ? std::int8_t{0} : height >= 0.0f ? std::int8_t{1} : std::int8_t{-1};
-      if (known && before.crosses) {
-        pair.side = last->side;
-      }
+      pair.side = unclear ? std::int8_t{0} : height > 0.0f ? std::int8_t{1} : std::int8_t{-1};
     }
   }
   pairs_.push_back(pair);
@@ -236,6 +239,10 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
       const std::uint32_t c = tool * kMaxCapsules + static_cast<std::uint32_t>(i);
       motion_[c].enabled = false;
       if (i >= moved.to.count) {
+        continue;
+      }
+      if (moved.hold && moved.to.capsules[static_cast<std::size_t>(i)].part == ToolPart::kJaw) {
+        clear = false;
         continue;
       }
       const Capsule from = moved.from.capsules[static_cast<std::size_t>(i)];
@@ -395,12 +402,13 @@ SurfacePoint ToolCollision::Nearest(const Capsule& capsule, float range) const {
     return best;
   }
   // The nearest cell by its centre, then exactly around it.
-  float nearest = 3e38f;
+  float nearest = 3e38f, search = reach;
   Index row = 0, col = 0;
-  ForEachCellNear(capsule.a, capsule.b, reach, [&](std::uint32_t r, std::uint32_t c, float distance) {
+  ForEachCellNear(capsule.a, capsule.b, search, [&](std::uint32_t r, std::uint32_t c, float distance) {
     const Index cell = r * (model_->cols() - 1) + c;
     if (distance < nearest && (model_->TriangleAlive(2 * cell) || model_->TriangleAlive(2 * cell + 1))) {
       nearest = distance;
+      search = std::min(search, distance);
       row = r;
       col = c;
     }

@@ -79,8 +79,9 @@ class ToolCollision {
   void AddPair(std::uint32_t capsule, Index triangle, const std::array<Index, 3>& particle,
                const std::array<ParticleRef, 3>& at, float range);
   void ProjectPair(ContactPair* pair, const Capsule& capsule);
+  /// visit(row, column, distance of the centre); may lower `range` as it goes.
   template <class Visit>
-  void ForEachCellNear(const Vec3f& a, const Vec3f& b, float range, const Visit& visit) const;
+  void ForEachCellNear(const Vec3f& a, const Vec3f& b, const float& range, const Visit& visit) const;
   template <class Visit>
   void ForEachTubeTriangleNear(const Vec3f& a, const Vec3f& b, float range, const Visit& visit) const;
 
