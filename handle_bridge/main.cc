@@ -1,5 +1,6 @@
 // handle_bridge: jaw angles and foot pedal from serial lines, real or simulated, onto the bus.
 #include <memory>
+#include <optional>
 
 #include "handle_bridge/node/cart_links.h"
 #include "handle_bridge/node/handle_bridge_node.h"
@@ -9,7 +10,11 @@ namespace {
 
 fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
   using namespace fulcrum::handle_bridge;
-  const auto follow_script = [&app](std::int64_t now_ns) { return FollowScript(app.scene(), app.SessionTime(now_ns)); };
+  // Silent until the session is known: after a restart in mid-session the script's first key would be a false angle.
+  const auto follow_script = [&app](std::int64_t now_ns) -> std::optional<OperatorInput> {
+    const double time_s = app.SessionTime(now_ns);
+    return time_s < 0 ? std::nullopt : std::optional(FollowScript(app.scene(), time_s));
+  };
   const auto firmware = HasSimulatedLinks(app.cart()) ? std::make_unique<SimulatedFirmware>(follow_script) : nullptr;
   HandleBridgeNode node(app.cart(), MakeCartLinks(app.cart(), firmware.get()), &app.MakeOutput<fulcrum::HandleState>(),
                         fulcrum::runtime::MonotonicNs());

@@ -6,7 +6,7 @@
 namespace fulcrum::handle_bridge {
 
 JawCalibration::JawCalibration(std::span<const double> codes, std::span<const double> angles_deg)
-    : count_(static_cast<int>(codes.size())) {
+    : count_(codes.size()) {
   const std::size_t n = codes.size();
   if (n < 2 || n > kMaxPoints || n != angles_deg.size()) {
     throw std::invalid_argument("a jaw calibration has 2 to 9 points");
@@ -40,23 +40,23 @@ JawCalibration::JawCalibration(std::span<const double> codes, std::span<const do
   }
 }
 
-int JawCalibration::Segment(double code) const noexcept {
-  int i = 0;
-  while (i < count_ - 2 && code > codes_[static_cast<std::size_t>(i + 1)]) {
+std::size_t JawCalibration::Segment(double code) const noexcept {
+  std::size_t i = 0;
+  while (i + 2 < count_ && code > codes_[i + 1]) {
     ++i;
   }
   return i;
 }
 
 double JawCalibration::Angle(double code) const noexcept {
-  const auto last = static_cast<std::size_t>(count_ - 1);
+  const auto last = count_ - 1;
   if (code <= codes_[0]) {
     return angles_[0] + slopes_[0] * (code - codes_[0]);
   }
   if (code >= codes_[last]) {
     return angles_[last] + slopes_[last] * (code - codes_[last]);
   }
-  const auto i = static_cast<std::size_t>(Segment(code));
+  const auto i = Segment(code);
   const double h = codes_[i + 1] - codes_[i];
   const double t = (code - codes_[i]) / h;
   const double s = 1 - t;
@@ -65,26 +65,22 @@ double JawCalibration::Angle(double code) const noexcept {
 }
 
 double JawCalibration::Slope(double code) const noexcept {
-  const auto last = static_cast<std::size_t>(count_ - 1);
+  const auto last = count_ - 1;
   if (code <= codes_[0]) {
     return slopes_[0];
   }
   if (code >= codes_[last]) {
     return slopes_[last];
   }
-  const auto i = static_cast<std::size_t>(Segment(code));
+  const auto i = Segment(code);
   const double h = codes_[i + 1] - codes_[i];
   const double t = (code - codes_[i]) / h;
   return 6 * t * (1 - t) * (angles_[i + 1] - angles_[i]) / h + slopes_[i] * (1 - t) * (1 - 3 * t) +
          slopes_[i + 1] * t * (3 * t - 2);
 }
 
-double JawCalibration::min_angle() const noexcept {
-  return std::min(angles_[0], angles_[static_cast<std::size_t>(count_ - 1)]);
-}
+double JawCalibration::min_angle() const noexcept { return std::min(angles_[0], angles_[count_ - 1]); }
 
-double JawCalibration::max_angle() const noexcept {
-  return std::max(angles_[0], angles_[static_cast<std::size_t>(count_ - 1)]);
-}
+double JawCalibration::max_angle() const noexcept { return std::max(angles_[0], angles_[count_ - 1]); }
 
 }  // namespace fulcrum::handle_bridge

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
 
 namespace fulcrum::handle_bridge {
@@ -11,7 +12,7 @@ namespace fulcrum::handle_bridge {
 /// points becomes 0.08 deg with five.
 class JawCalibration {
  public:
-  static constexpr int kMaxPoints = 9;
+  static constexpr std::size_t kMaxPoints = 9;
 
   /// @param codes strictly rising, in counts (fractions allowed).
   /// @param angles_deg strictly monotone, as many.
@@ -24,15 +25,15 @@ class JawCalibration {
 
   /// Codes of the first and the last point.
   [[nodiscard]] double min_code() const noexcept { return codes_[0]; }
-  [[nodiscard]] double max_code() const noexcept { return codes_[static_cast<std::size_t>(count_ - 1)]; }
+  [[nodiscard]] double max_code() const noexcept { return codes_[count_ - 1]; }
   /// Smallest and largest calibrated angle [deg].
   [[nodiscard]] double min_angle() const noexcept;
   [[nodiscard]] double max_angle() const noexcept;
 
  private:
-  [[nodiscard]] int Segment(double code) const noexcept;
+  [[nodiscard]] std::size_t Segment(double code) const noexcept;
 
-  int count_ = 0;
+  std::size_t count_ = 0;
   std::array<double, kMaxPoints> codes_{};
   std::array<double, kMaxPoints> angles_{};
   std::array<double, kMaxPoints> slopes_{};

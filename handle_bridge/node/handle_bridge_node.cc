@@ -58,9 +58,12 @@ HandleBridgeNode::HandleBridgeNode(const config::CartConfig& cart, Links links, 
 
 void HandleBridgeNode::Step(const Tick& tick) {
   // A late thread skips whole periods: they have passed for the handles too.
-  const double periods = first_step_ ? 1.0 : static_cast<double>(tick.index - next_index_ + 1);
+  const double periods = snapshot_.stepping ? static_cast<double>(tick.index - next_index_ + 1) : 1.0;
   next_index_ = tick.index + 1;
-  first_step_ = false;
+  if (!snapshot_.stepping) {
+    DropBacklog();
+    snapshot_.stepping = true;
+  }
   const double dt_s = periods * tick.dt_s;
   for (std::size_t tool = 0; tool < jaws_.size(); ++tool) {
     state_.handles[tool] = ReadHandle(tool, dt_s);
@@ -71,6 +74,25 @@ void HandleBridgeNode::Step(const Tick& tick) {
     output_->Write(state_);
   }
   published_.Store(snapshot_);
+}
+
+void HandleBridgeNode::DropBacklog() {
+  // While the node waited for its session, a second of old lines has piled up in the kernel.
+  constexpr int kMostReads = 64;  // 32 KiB: several times what a terminal holds.
+  std::array<char, kReadBytes> buffer;
+  const auto drain = [&buffer](ByteLink* link, LinkHealth* health) {
+    for (int i = 0; link && i < kMostReads; ++i) {
+      const ByteLink::Result read = link->Read(buffer);
+      health->connections += read.fresh ? 1 : 0;
+      if (read.bytes < buffer.size()) {
+        return;
+      }
+    }
+  };
+  for (std::size_t tool = 0; tool < jaws_.size(); ++tool) {
+    drain(links_.handles[tool].get(), &snapshot_.links[tool]);
+  }
+  drain(links_.pedal.get(), &snapshot_.links[kMaxTools]);
 }
 
 HandleSample HandleBridgeNode::ReadHandle(std::size_t tool, double dt_s) {
@@ -137,7 +159,7 @@ void HandleBridgeNode::FillHealth(Health* health) const {
     }
     sum += link.totals;
     reconnects += link.connections > 1 ? link.connections - 1 : 0;
-    if (link.state != LinkState::kOk && health->last_error.empty()) {
+    if (s.stepping && link.state != LinkState::kOk && health->last_error.empty()) {
       health->last_error = i < kMaxTools ? std::string("handle ") + std::to_string(i) : "pedal";
       health->last_error += std::string(": ") + Explain(link.state);
       health->state = HealthState::kDegraded;

@@ -51,8 +51,10 @@ class HandleBridgeNode {
   struct Snapshot {
     std::array<LinkHealth, kMaxTools + 1> links;  // The last is the pedal.
     std::uint8_t pedals = 0;
+    bool stepping = false;  // Before the first step nothing is read, so nothing is known to be wrong.
   };
 
+  void DropBacklog();
   [[nodiscard]] HandleSample ReadHandle(std::size_t tool, double dt_s);
   [[nodiscard]] std::uint8_t ReadPedals(double dt_s);
 
@@ -62,7 +64,6 @@ class HandleBridgeNode {
   bus::Output<HandleState>* output_;
   bus::Stamper stamper_;
   std::uint64_t next_index_ = 0;
-  bool first_step_ = true;
   HandleState state_;
   Snapshot snapshot_;
   runtime::SeqLock<Snapshot> published_;

@@ -16,8 +16,7 @@ constexpr std::uint64_t kMaxCatchUp = 100;
 
 }  // namespace
 
-SimulatedFirmware::SimulatedFirmware(std::function<OperatorInput(std::int64_t)> input,
-                                     const JawFirmwareSettings& settings)
+SimulatedFirmware::SimulatedFirmware(InputAt input, const JawFirmwareSettings& settings)
     : input_(std::move(input)),
       jaws_{JawFirmware(settings, 1), JawFirmware(settings, 2)},
       links_{Link{PseudoTerminal(), DamagedLine(11), {}, false}, Link{PseudoTerminal(), DamagedLine(12), {}, false},
@@ -60,14 +59,17 @@ void SimulatedFirmware::Step(const Tick& tick) {
   const std::uint64_t owed = std::min(tick.index - next_index_ + 1, kMaxCatchUp);
   next_index_ = tick.index + 1;
   for (std::uint64_t i = owed; i-- > 0;) {
-    const OperatorInput input = input_(tick.stamp_ns - static_cast<std::int64_t>(i) * kPeriod_ns);
+    const std::optional<OperatorInput> input = input_(tick.stamp_ns - static_cast<std::int64_t>(i) * kPeriod_ns);
+    if (!input) {
+      continue;
+    }
     for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
-      const std::array<char, 8> line = jaws_[tool].Line(input.jaw_deg[tool]);
+      const std::array<char, 8> line = jaws_[tool].Line(input->jaw_deg[tool]);
       Transmit(&links_[tool], {line.data(), line.size()});
     }
-    if (input.pedals != sent_pedals_ || pedal_index_++ % kPedalPeriods == 0) {
-      sent_pedals_ = input.pedals;
-      const std::array<char, 5> line = FormatPedals(input.pedals);
+    if (input->pedals != sent_pedals_ || pedal_index_++ % kPedalPeriods == 0) {
+      sent_pedals_ = input->pedals;
+      const std::array<char, 5> line = FormatPedals(input->pedals);
       Transmit(&links_[kPedalLink], {line.data(), line.size()});
     }
   }

@@ -30,9 +30,11 @@ class SimulatedFirmware {
   static constexpr int kLinks = kMaxTools + 1;
   static constexpr int kBaud = 115200;
 
-  /// @param input called 400 times a second on the firmware's thread with the CLOCK_MONOTONIC time [ns].
-  explicit SimulatedFirmware(std::function<OperatorInput(std::int64_t)> input,
-                             const JawFirmwareSettings& settings = {});
+  /// At a CLOCK_MONOTONIC time [ns]; nothing: not known yet, so nothing is sent.
+  using InputAt = std::function<std::optional<OperatorInput>(std::int64_t)>;
+
+  /// @param input called 400 times a second on the firmware's thread.
+  explicit SimulatedFirmware(InputAt input, const JawFirmwareSettings& settings = {});
 
   /// Opens the near end of a link, now and after each Plug(). `baud` other than 115200 reads garbage, as on a wire.
   [[nodiscard]] std::unique_ptr<ByteSourceOpener> MakeOpener(int link, int baud = kBaud);
@@ -53,7 +55,7 @@ class SimulatedFirmware {
   void Step(const Tick& tick);
   void Transmit(Link* link, std::string_view bytes);
 
-  std::function<OperatorInput(std::int64_t)> input_;
+  InputAt input_;
   std::array<JawFirmware, kMaxTools> jaws_;
   std::mutex mutex_;
   std::array<Link, kLinks> links_;  // Guarded by mutex_.

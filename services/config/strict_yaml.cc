@@ -128,7 +128,9 @@ double SiFactor(std::string_view key) {
 }
 
 void CheckAllUsed(const Document& document, const Node& map) {
-  for (const auto& [key, node] : map.entries) {
+  for (const auto& entry : map.entries) {
+    const std::string& key = entry.first;
+    const Node* node = entry.second;
     const auto asked = std::find_if(map.asked.begin(), map.asked.end(), [&](const auto& a) { return a.key == key; });
     if (asked == map.asked.end()) {
       const auto nearest = std::min_element(map.asked.begin(), map.asked.end(), [&](const auto& a, const auto& b) {

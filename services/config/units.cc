@@ -93,11 +93,9 @@ const Unit* UnitOfSpelling(std::string_view text) {
       plain += text[i];
     }
   }
-  if (plain == "degC") {
-    plain = "C";
-  }
+  const std::string_view wanted = plain == "degC" ? std::string_view("C") : std::string_view(plain);
   for (const Unit& unit : kUnits) {
-    if (plain == unit.spelling || plain == unit.key_suffix) {
+    if (wanted == unit.spelling || wanted == unit.key_suffix) {
       return &unit;
     }
   }

@@ -1,6 +1,7 @@
 // The whole chain over real pseudo-terminals: simulated firmware → tty → parser → estimator → HandleState.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <functional>

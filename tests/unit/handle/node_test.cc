@@ -45,6 +45,8 @@ class NodeTest : public ::testing::Test {
     pedal_ = link.get();
     links.pedal = std::move(link);
     node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), epoch_ns);
+    EXPECT_EQ(Error(), "");  // Nothing has been read yet.
+    TickSilently();          // The first step drops what has piled up.
   }
 
   /// One tick; handle 0 sends its angle, the pedal its bits.
@@ -107,7 +109,7 @@ TEST_F(NodeTest, PublishesAngleRateQualityAndPedals) {
   EXPECT_NEAR(state_.handles[1].jaw_angle_rad * kDegPerRad, 30, 1);
   EXPECT_EQ(state_.handles[0].quality, 1.0f);
   EXPECT_EQ(state_.pedals, kPedalCut);
-  EXPECT_EQ(state_.stamp.sequence, 800u);
+  EXPECT_EQ(state_.stamp.sequence, 801u);
   EXPECT_NEAR(state_.handles[0].raw_counts, 514, 2);
   EXPECT_EQ(Error(), "");
   EXPECT_EQ(MetricOf("bad_lines"), 0);
@@ -118,6 +120,24 @@ TEST_F(NodeTest, IsNotPresentBeforeTheFirstLine) {
   TickSilently();
   EXPECT_FALSE(state_.handles[0].present);
   EXPECT_EQ(state_.handles[0].quality, 0.0f);
+}
+
+TEST_F(NodeTest, LinesFromBeforeTheFirstStepAreDropped) {
+  HandleBridgeNode::Links links;
+  auto link = std::make_unique<MemoryLink>();
+  handle_[0] = link.get();
+  links.handles[0] = std::move(link);
+  node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), 3000);
+  for (int i = 0; i < 400; ++i) {
+    const auto line = firmware_.Line(50);
+    handle_[0]->bytes.append(line.data(), line.size());
+  }
+  TickSilently();
+  EXPECT_FALSE(state_.handles[0].present);
+  const auto line = firmware_.Line(10);
+  handle_[0]->bytes.append(line.data(), line.size());
+  TickSilently();
+  EXPECT_NEAR(jaw0_deg(), 10, 2);
 }
 
 TEST_F(NodeTest, SilenceHoldsTheAngleAndReleasesThePedal) {
@@ -229,13 +249,13 @@ TEST_F(NodeTest, RestartTakesTheAngleFromTheFirstLineUnderANewEpoch) {
     Tick(40);
   }
   const std::uint64_t epoch = state_.stamp.epoch;
-  Restart(2000);
   index_ = 0;
+  Restart(2000);
   Tick(40);
   EXPECT_TRUE(state_.handles[0].present);
   EXPECT_NEAR(jaw0_deg(), 40, 2);
   EXPECT_GT(state_.stamp.epoch, epoch);
-  EXPECT_EQ(state_.stamp.sequence, 1u);
+  EXPECT_EQ(state_.stamp.sequence, 2u);
 }
 
 TEST_F(NodeTest, AbsentHandleIsNeitherPublishedNorMissed) {
@@ -244,6 +264,7 @@ TEST_F(NodeTest, AbsentHandleIsNeitherPublishedNorMissed) {
   handle_[0] = link.get();
   links.handles[0] = std::move(link);
   node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), 3000);
+  TickSilently();
   for (int i = 0; i < 100; ++i) {
     const auto line = firmware_.Line(20);
     handle_[0]->bytes.append(line.data(), line.size());
