@@ -15,8 +15,8 @@ constexpr int kBlock = 32;
 // Typical of an L-hook at 30 W on peritoneum (0.2-0.5 mm lateral damage).
 constexpr float kSlit = 0.00030f;     // [m]
 constexpr float kChar = 0.00045f;     // [m]
-constexpr float kBrown = 0.00090f;    // [m]
-constexpr float kBlanched = 0.0018f;  // [m]
+constexpr float kBrown = 0.00070f;    // [m]
+constexpr float kBlanched = 0.0012f;  // [m]
 
 float DistanceToSegment(const Vec2f& p, const Vec2f& a, const Vec2f& b) {
   const Vec2f ab = b - a;

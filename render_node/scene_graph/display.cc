@@ -42,33 +42,36 @@ class OffscreenDisplay : public Display {
  public:
   OffscreenDisplay(const LaparoscopeView& view, const RenderParams& params) {
     context_.MakeCurrent();
+    viewer_ = new osgViewer::Viewer;
     const int width = static_cast<int>(params.width), height = static_cast<int>(params.height);
     framebuffer_ = std::make_unique<Framebuffer>(width, height);
-    window_ = viewer_.setUpViewerAsEmbeddedInWindow(0, 0, width, height);
+    window_ = viewer_->setUpViewerAsEmbeddedInWindow(0, 0, width, height);
     window_->setDefaultFboId(framebuffer_->id());
     SetUpState(window_->getState());
-    SetUpViewer(view, &viewer_);
-    viewer_.realize();
+    SetUpViewer(view, viewer_.get());
+    viewer_->realize();
     context_.Release();
   }
 
   ~OffscreenDisplay() override {
+    // OSG gives back its OpenGL objects as it goes, which needs the context.
     context_.MakeCurrent();
-    viewer_.setSceneData(nullptr);
+    viewer_ = nullptr;
+    window_ = nullptr;
     framebuffer_.reset();
     context_.Release();
   }
 
   void Draw() override {
     context_.MakeCurrent();
-    viewer_.frame();
+    viewer_->frame();
     glFinish();
     context_.Release();
   }
 
   void DrawAndRead(Picture* picture) override {
     context_.MakeCurrent();
-    viewer_.frame();
+    viewer_->frame();
     framebuffer_->Read(picture);
     context_.Release();
   }
@@ -79,7 +82,7 @@ class OffscreenDisplay : public Display {
  private:
   EglContext context_;
   std::unique_ptr<Framebuffer> framebuffer_;
-  osgViewer::Viewer viewer_;
+  osg::ref_ptr<osgViewer::Viewer> viewer_;
   osg::ref_ptr<osgViewer::GraphicsWindowEmbedded> window_;
 };
 
@@ -103,7 +106,9 @@ class WindowDisplay : public Display {
   WindowDisplay(const LaparoscopeView& view, const RenderParams& params)
       : read_(new ReadAfterDraw(static_cast<int>(params.width), static_cast<int>(params.height))) {
     osg::GraphicsContext::WindowingSystemInterface* system = osg::GraphicsContext::getWindowingSystemInterface();
-    if (system == nullptr || system->getNumScreens() == 0) {
+    osg::GraphicsContext::ScreenIdentifier screen;
+    screen.readDISPLAY();
+    if (system == nullptr || system->getNumScreens(screen) == 0) {
       throw InputError("--window: no display can be opened (DISPLAY); start an X server or leave --window out");
     }
     osg::ref_ptr<osg::GraphicsContext::Traits> traits = new osg::GraphicsContext::Traits;

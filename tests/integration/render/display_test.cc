@@ -1,0 +1,144 @@
+// What happens without OpenGL or without a display, and that a window shows what is drawn off screen.
+#include "render_node/scene_graph/display.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "services/core/exit_code.h"
+#include "services/scene/build.h"
+#include "tests/integration/render/synthetic_scene.h"
+
+namespace fulcrum::render {
+namespace {
+
+struct Outcome {
+  int exit_code;
+  std::string text;
+};
+
+Outcome RunCommand(const std::string& command) {
+  std::FILE* pipe = popen((command + " 2>&1").c_str(), "r");
+  Outcome outcome{-1, {}};
+  std::array<char, 256> line;
+  while (std::fgets(line.data(), line.size(), pipe) != nullptr) {
+    outcome.text += line.data();
+  }
+  outcome.exit_code = WEXITSTATUS(pclose(pipe));
+  return outcome;
+}
+
+class NodeCommand : public testing::Test {
+ protected:
+  NodeCommand() {
+    std::filesystem::create_directories(folder_);
+    scene::WriteSceneFile(scene::BuildProcedural(scene::Small()), "", folder_ / "small.scene");
+  }
+  ~NodeCommand() override { std::filesystem::remove_all(folder_); }
+
+  std::string Command(const std::string& environment, const std::string& options) const {
+    return "timeout 20 env " + environment + " " FULCRUM_BIN_DIR "/render_node --domain 31 --scene " +
+           (folder_ / "small.scene").string() + " --session " + folder_.string() + " " + options;
+  }
+
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) / ("render_" + std::to_string(getpid()));
+};
+
+TEST_F(NodeCommand, WithoutOpenGlItSaysWhatToInstall) {
+  const Outcome outcome = RunCommand(Command("__EGL_VENDOR_LIBRARY_FILENAMES=/nonexistent", ""));
+  EXPECT_EQ(outcome.exit_code, static_cast<int>(ExitCode::kFailure)) << outcome.text;
+  EXPECT_NE(outcome.text.find("no OpenGL off screen"), std::string::npos) << outcome.text;
+  EXPECT_NE(outcome.text.find("libegl-mesa0"), std::string::npos) << outcome.text;
+}
+
+TEST_F(NodeCommand, AWindowWithoutADisplayIsRefused) {
+  const Outcome outcome = RunCommand(Command("-u DISPLAY", "--window"));
+  EXPECT_EQ(outcome.exit_code, static_cast<int>(ExitCode::kBadUsage)) << outcome.text;
+  EXPECT_NE(outcome.text.find("--window: no display"), std::string::npos) << outcome.text;
+}
+
+/// An X server of our own on a free display number.
+class VirtualScreen {
+ public:
+  VirtualScreen() {
+    std::array<int, 2> ends;
+    if (pipe(ends.data()) != 0) {
+      return;
+    }
+    child_ = fork();
+    if (child_ == 0) {
+      close(ends[0]);
+      const std::string fd = std::to_string(ends[1]);
+      if (std::freopen("/dev/null", "w", stderr) == nullptr) {
+        _exit(127);
+      }
+      execlp("Xvfb", "Xvfb", "-displayfd", fd.c_str(), "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset",
+             nullptr);
+      _exit(127);
+    }
+    close(ends[1]);
+    std::array<char, 16> number{};
+    if (read(ends[0], number.data(), number.size() - 1) > 0) {
+      display_ = ":" + std::to_string(std::atoi(number.data()));
+    }
+    close(ends[0]);
+  }
+  ~VirtualScreen() {
+    if (child_ > 0) {
+      kill(child_, SIGTERM);
+      waitpid(child_, nullptr, 0);
+    }
+  }
+  [[nodiscard]] const std::string& display() const { return display_; }
+
+ private:
+  pid_t child_ = -1;
+  std::string display_;
+};
+
+TEST(WindowTest, ShowsWhatIsDrawnOffScreen) {
+  const VirtualScreen screen;
+  if (screen.display().empty()) {
+    GTEST_SKIP() << "Xvfb is not installed: the window is not tested";
+  }
+  setenv("DISPLAY", screen.display().c_str(), 1);
+  const scene::SceneData data = scene::BuildProcedural(scene::Small());
+  SceneView view = data.View();
+  view.render.width = 480;
+  view.render.height = 270;
+  const SyntheticMoment moment = MakeSyntheticMoment(view, 4.5);
+  const auto draw = [&](bool window) {
+    LaparoscopeView laparoscope(view);
+    const auto display =
+        window ? MakeWindowDisplay(laparoscope, view.render) : MakeOffscreenDisplay(laparoscope, view.render);
+    laparoscope.SetTissue(moment.tissue.xyz);
+    laparoscope.SetTopology(moment.topology);
+    laparoscope.SetTool(0, moment.tools.tools[0]);
+    laparoscope.Update();
+    display->Draw();
+    Picture picture;
+    display->DrawAndRead(&picture);
+    EXPECT_FALSE(display->closed());
+    return picture;
+  };
+  const Picture in_window = draw(true), off_screen = draw(false);
+  ASSERT_EQ(in_window.rgb.size(), off_screen.rgb.size());
+  double sum = 0;
+  for (std::size_t i = 0; i < in_window.rgb.size(); ++i) {
+    sum += std::abs(int{in_window.rgb[i]} - int{off_screen.rgb[i]});
+  }
+  // Both are drawn by software, perhaps by different builds of it: edges may move by a pixel.
+  EXPECT_LT(sum / static_cast<double>(in_window.rgb.size()), 2.0);
+}
+
+}  // namespace
+}  // namespace fulcrum::render

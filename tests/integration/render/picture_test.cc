@@ -1,0 +1,213 @@
+// Looks at pictures of the small scene as a person would, by colour at places that are known.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+
+#include "render_node/offscreen/png_writer.h"
+#include "render_node/scene_graph/display.h"
+#include "services/scene/build.h"
+#include "tests/integration/render/synthetic_scene.h"
+
+namespace fulcrum::render {
+namespace {
+
+struct Rgb {
+  double r = 0, g = 0, b = 0;
+};
+
+class PictureTest : public testing::Test {
+ protected:
+  PictureTest() : data_(scene::BuildProcedural(scene::Small())), view_(data_.View()) {}
+
+  void Apply(const SyntheticMoment& moment, bool with_patches, LaparoscopeView* laparoscope) const {
+    laparoscope->SetTissue(moment.tissue.xyz);
+    laparoscope->SetTopology(moment.topology);
+    if (with_patches) {
+      for (const TemperaturePatch& patch : moment.patches) {
+        laparoscope->ApplyPatch(patch);
+      }
+    }
+    laparoscope->Update();
+  }
+
+  /// Draws the tissue alone, without instruments in front of it.
+  Picture Draw(const std::function<void(LaparoscopeView*)>& change) const {
+    LaparoscopeView laparoscope(view_);
+    const auto display = MakeOffscreenDisplay(laparoscope, view_.render);
+    change(&laparoscope);
+    laparoscope.Update();
+    Picture picture;
+    display->DrawAndRead(&picture);
+    return picture;
+  }
+
+  /// Mean colour of the square of 5 x 5 pixels where p_W is seen.
+  Rgb At(const Picture& picture, const Vec3f& p_W) const {
+    const Laparoscope scope = MakeLaparoscope(view_.render);
+    const Vec3f clip = (scope.projection * scope.view * p_W.homogeneous()).hnormalized();
+    const int x = static_cast<int>((0.5f + 0.5f * clip.x()) * static_cast<float>(picture.width));
+    const int y = static_cast<int>((0.5f + 0.5f * clip.y()) * static_cast<float>(picture.height));
+    EXPECT_TRUE(x > 2 && y > 2 && x < picture.width - 3 && y < picture.height - 3) << "not in the picture";
+    Rgb mean;
+    for (int dy = -2; dy <= 2; ++dy) {
+      for (int dx = -2; dx <= 2; ++dx) {
+        const std::uint8_t* pixel =
+            picture.rgb.data() + 3 * (static_cast<std::size_t>(y + dy) * static_cast<std::size_t>(picture.width) +
+                                      static_cast<std::size_t>(x + dx));
+        mean.r += pixel[0] / 25.0;
+        mean.g += pixel[1] / 25.0;
+        mean.b += pixel[2] / 25.0;
+      }
+    }
+    return mean;
+  }
+
+  static double MeanDifference(const Picture& a, const Picture& b) {
+    double sum = 0;
+    for (std::size_t i = 0; i < a.rgb.size(); ++i) {
+      sum += std::abs(int{a.rgb[i]} - int{b.rgb[i]});
+    }
+    return sum / static_cast<double>(a.rgb.size());
+  }
+
+  /// Where the middle of the cut is drawn.
+  static Vec3f MiddleOfCut(const LaparoscopeView& laparoscope, const SyntheticMoment& moment) {
+    return laparoscope.OnMembrane(moment.cut_path[moment.cut_path.size() / 2]);
+  }
+
+  const scene::SceneData data_;
+  const SceneView view_;
+};
+
+TEST_F(PictureTest, ShowsPinkTissueInARoundField) {
+  const Picture picture = Draw([](LaparoscopeView*) {});
+  const auto pixel = [&](int x, int y) {
+    return picture.rgb.data() + 3 * static_cast<std::size_t>(y * picture.width + x);
+  };
+  for (const int x : {0, picture.width - 1}) {
+    for (const int y : {0, picture.height - 1}) {
+      EXPECT_EQ(pixel(x, y)[0], 0) << "the corner at " << x << ", " << y << " lies outside the optics";
+    }
+  }
+  const Rgb middle = At(picture, view_.render.scope_target_W);
+  EXPECT_GT(middle.r, 90);
+  EXPECT_GT(middle.r, 1.15 * middle.g);
+  EXPECT_GT(middle.r, 1.15 * middle.b);
+}
+
+TEST_F(PictureTest, IsTheSameEveryTime) {
+  const SyntheticMoment moment = MakeSyntheticMoment(view_, 4.5);
+  const auto draw = [&] { return Draw([&](LaparoscopeView* l) { Apply(moment, true, l); }); };
+  const Picture first = draw(), second = draw();
+  // One rasteriser, one machine: not a single pixel differs. Between machines rounding may move an edge by a pixel.
+  EXPECT_EQ(first.rgb, second.rgb);
+}
+
+TEST_F(PictureTest, TheMembraneIsHalfTransparent) {
+  const Picture with = Draw([](LaparoscopeView*) {});
+  // The same without the membrane: every texel of the atlas is gone.
+  const Picture without = Draw([&](LaparoscopeView* l) {
+    TemperaturePatch gone;
+    gone.texels.assign(4u * kPatchTexels * kPatchTexels, 0);
+    for (std::uint32_t y = 0; y < 8; ++y) {
+      for (std::uint32_t x = 0; x < 8; ++x) {
+        gone.header.origin_x = x * kPatchTexels;
+        gone.header.origin_y = y * kPatchTexels;
+        l->ApplyPatch(gone);
+      }
+    }
+  });
+  const double difference = MeanDifference(with, without);
+  EXPECT_GT(difference, 1.0) << "the membrane cannot be seen";
+  EXPECT_LT(difference, 40.0) << "the membrane hides what lies beneath";
+  EXPECT_GT(At(without, view_.render.scope_target_W).r, 60) << "nothing lies beneath the membrane";
+}
+
+TEST_F(PictureTest, ASlitShowsFatBetweenBrownedEdges) {
+  const SyntheticMoment moment = MakeSyntheticMoment(view_, 4.8);
+  ASSERT_GE(moment.cut_path.size(), 3u);
+  SyntheticMoment uncut = moment;
+  std::fill(uncut.topology.dead_edges.begin(), uncut.topology.dead_edges.end(), std::uint8_t{0});
+  LaparoscopeView geometry(view_);
+  Apply(moment, true, &geometry);
+  const Vec3f middle = MiddleOfCut(geometry, moment);
+  const Picture cut = Draw([&](LaparoscopeView* l) { Apply(moment, true, l); });
+  const Picture intact = Draw([&](LaparoscopeView* l) { Apply(uncut, false, l); });
+  // Fat is yellow: less blue against red than the membrane over it.
+  const Rgb slit = At(cut, middle), sheet = At(intact, middle);
+  EXPECT_LT(slit.b / slit.r, 0.85 * sheet.b / sheet.r);
+  // Somewhere between the slit and 3 mm beside it the picture is much darker than the uncut sheet.
+  double darkest = 1;
+  for (float beside = 0; beside < 0.003f; beside += 0.0001f) {
+    const Vec3f p = middle + Vec3f(beside, 0, 0);
+    darkest = std::min(darkest, At(cut, p).r / At(intact, p).r);
+  }
+  EXPECT_LT(darkest, 0.75);
+}
+
+TEST_F(PictureTest, ARestartedRendererShowsTheCutFromTheTopologyAlone) {
+  const SyntheticMoment moment = MakeSyntheticMoment(view_, 4.8);
+  const Picture known = Draw([&](LaparoscopeView* l) { Apply(moment, true, l); });
+  const Picture rebuilt = Draw([&](LaparoscopeView* l) { Apply(moment, false, l); });
+  SyntheticMoment uncut = moment;
+  std::fill(uncut.topology.dead_edges.begin(), uncut.topology.dead_edges.end(), std::uint8_t{0});
+  const Picture intact = Draw([&](LaparoscopeView* l) { Apply(uncut, false, l); });
+  LaparoscopeView geometry(view_);
+  Apply(moment, true, &geometry);
+  const Vec3f middle = MiddleOfCut(geometry, moment);
+  // The strongest change within 3 mm of the cut's middle: the topology knows the place to half a cell of the grid only.
+  const auto change = [&](const Picture& picture) {
+    double most = 0;
+    for (float beside = -0.003f; beside < 0.003f; beside += 0.0002f) {
+      const Rgb a = At(picture, middle + Vec3f(beside, 0, 0)), b = At(intact, middle + Vec3f(beside, 0, 0));
+      most = std::max(most, std::hypot(a.r - b.r, a.g - b.g, a.b - b.b));
+    }
+    return most;
+  };
+  EXPECT_GT(change(known), 40);
+  EXPECT_GT(change(rebuilt), 0.6 * change(known));
+}
+
+TEST_F(PictureTest, InstrumentsAreDrawnWhereTheirTipsAreAndJawsOpen) {
+  const SyntheticMoment moment = MakeSyntheticMoment(view_, 0.0);
+  const Picture none = Draw([&](LaparoscopeView* l) { Apply(moment, false, l); });
+  const auto with_jaw = [&](float angle) {
+    return Draw([&](LaparoscopeView* l) {
+      Apply(moment, false, l);
+      ToolSample sample = moment.tools.tools[0];
+      sample.p_WT = view_.render.scope_target_W + Vec3f(0, 0, 0.012f);
+      l->SetTool(0, sample);
+      l->SetJaw(0, angle);
+    });
+  };
+  const Picture closed = with_jaw(0), open = with_jaw(0.9f);
+  EXPECT_GT(MeanDifference(none, closed), 0.2);
+  EXPECT_GT(MeanDifference(closed, open), 0.05);
+}
+
+TEST_F(PictureTest, TheTentMovesThePicture) {
+  const SyntheticMoment rest = MakeSyntheticMoment(view_, 0.0), lifted = MakeSyntheticMoment(view_, 2.2);
+  const Picture before = Draw([&](LaparoscopeView* l) { Apply(rest, false, l); });
+  const Picture after = Draw([&](LaparoscopeView* l) { Apply(lifted, false, l); });
+  EXPECT_GT(MeanDifference(before, after), 0.5);
+}
+
+TEST(PngTest, RoundTripsAndNamesTheFileThatCannotBeWritten) {
+  Picture picture{3, 2, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18}};
+  const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "round_trip.png";
+  WritePng(picture, file);
+  EXPECT_EQ(ReadPng(file).rgb, picture.rgb);
+  std::filesystem::remove(file);
+  try {
+    WritePng(picture, "/nonexistent/picture.png");
+    FAIL() << "wrote into a folder that is not there";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("/nonexistent/picture.png"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum::render

@@ -1,0 +1,171 @@
+// The node on in-process ports: what it draws and when, what it refuses, how it comes back.
+#include "render_node/node/render_node.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "services/bus/in_process.h"
+#include "services/scene/build.h"
+#include "tests/integration/render/synthetic_scene.h"
+
+namespace fulcrum::render {
+namespace {
+
+class RenderNodeTest : public testing::Test {
+ protected:
+  RenderNodeTest() : data_(scene::BuildProcedural(scene::Small())), view_(data_.View()) {
+    view_.hash = 77;
+    view_.render.width = 320;
+    view_.render.height = 180;
+    view_.render.png_rate_Hz = 2;
+    folder_ = std::filesystem::path(testing::TempDir()) /
+              (std::string("render_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::remove_all(folder_);
+  }
+  ~RenderNodeTest() override { std::filesystem::remove_all(folder_); }
+
+  std::unique_ptr<RenderNode> MakeNode() {
+    return std::make_unique<RenderNode>(
+        view_, RenderSettings{false, folder_},
+        RenderPorts{*tissue_in_, *topology_in_, *patches_in_, *tools_in_, *handles_in_, *events_in_});
+  }
+
+  static double Metric(const RenderNode& node, const std::string& name) {
+    Health health;
+    node.FillHealth(&health);
+    for (const auto& metric : health.metrics) {
+      if (metric.name == name) {
+        return metric.value;
+      }
+    }
+    ADD_FAILURE() << "no metric " << name;
+    return -1;
+  }
+
+  static void Stamped(Stamp* stamp) {
+    static std::uint64_t sequence = 0;
+    *stamp = {++sequence, 1, static_cast<std::int64_t>(sequence)};
+  }
+
+  void Publish(SyntheticMoment moment) {
+    Stamped(&moment.tissue.header.stamp);
+    Stamped(&moment.topology.stamp);
+    Stamped(&moment.tools.stamp);
+    Stamped(&moment.handles.stamp);
+    tissue_out_->Write(moment.tissue);
+    topology_out_->Write(moment.topology);
+    tools_out_->Write(moment.tools);
+    handles_out_->Write(moment.handles);
+    for (TemperaturePatch& patch : moment.patches) {
+      Stamped(&patch.header.stamp);
+      patches_out_->Write(patch);
+    }
+  }
+
+  static Tick At(double time_s) { return {static_cast<std::uint64_t>(time_s * 15), time_s, 1.0 / 15, 0}; }
+
+  const scene::SceneData data_;
+  SceneView view_;
+  std::filesystem::path folder_;
+  bus::InProcessTopic<TissueFrame> tissue_;
+  bus::InProcessTopic<TopologyState> topology_;
+  bus::InProcessTopic<TemperaturePatch> patches_;
+  bus::InProcessTopic<ToolState> tools_;
+  bus::InProcessTopic<HandleState> handles_;
+  bus::InProcessTopic<ThermalEvent> events_;
+  std::unique_ptr<bus::Input<TissueFrame>> tissue_in_ = tissue_.MakeInput();
+  std::unique_ptr<bus::Input<TopologyState>> topology_in_ = topology_.MakeInput();
+  std::unique_ptr<bus::Input<TemperaturePatch>> patches_in_ = patches_.MakeInput();
+  std::unique_ptr<bus::Input<ToolState>> tools_in_ = tools_.MakeInput();
+  std::unique_ptr<bus::Input<HandleState>> handles_in_ = handles_.MakeInput();
+  std::unique_ptr<bus::Input<ThermalEvent>> events_in_ = events_.MakeInput();
+  std::unique_ptr<bus::LoanOutput<TissueFrame>> tissue_out_ = tissue_.MakeOutput();
+  std::unique_ptr<bus::Output<TopologyState>> topology_out_ = topology_.MakeOutput();
+  std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patches_out_ = patches_.MakeOutput();
+  std::unique_ptr<bus::Output<ToolState>> tools_out_ = tools_.MakeOutput();
+  std::unique_ptr<bus::Output<HandleState>> handles_out_ = handles_.MakeOutput();
+};
+
+TEST_F(RenderNodeTest, DrawsNothingBeforeTheFirstTissueFrame) {
+  const auto node = MakeNode();
+  node->Step(At(1));
+  node->Finish();
+  EXPECT_EQ(Metric(*node, "frames_drawn"), 0);
+}
+
+TEST_F(RenderNodeTest, WritesAPictureWhenOneIsDueAndNoneWhileNothingChanges) {
+  {
+    const auto node = MakeNode();
+    Publish(MakeSyntheticMoment(view_, 1.0));
+    node->Step(At(1.0));
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 1);
+    Publish(MakeSyntheticMoment(view_, 1.2));
+    node->Step(At(1.2));
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 1) << "the next picture is due at 1.5 s";
+    node->Step(At(1.51));
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 2);
+    node->Step(At(2.1));
+    node->Step(At(2.6));
+    node->Finish();
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 2) << "nothing has changed since";
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "frame_0001000.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "frame_0001510.png"));
+}
+
+TEST_F(RenderNodeTest, FinishWritesTheLastStateOfTheSession) {
+  {
+    const auto node = MakeNode();
+    Publish(MakeSyntheticMoment(view_, 1.0));
+    node->Step(At(1.0));
+    Publish(MakeSyntheticMoment(view_, 1.2));
+    node->Step(At(1.2));
+    node->Finish();
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "frame_0001200.png"));
+}
+
+TEST_F(RenderNodeTest, DropsTheTissueOfAnotherSceneAndSaysSo) {
+  const auto node = MakeNode();
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 1.0);
+  moment.tissue.header.scene_hash = 78;
+  Publish(moment);
+  node->Step(At(1.0));
+  EXPECT_EQ(Metric(*node, "frames_drawn"), 0);
+  Health health;
+  node->FillHealth(&health);
+  EXPECT_NE(health.last_error.find("another scene"), std::string::npos);
+}
+
+TEST_F(RenderNodeTest, ANewNodeShowsTheCutAfterOneTissueFrameAndOneTopology) {
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 4.8);
+  moment.patches.clear();  // Lost with the node before.
+  Publish(moment);
+  {
+    const auto node = MakeNode();
+    node->Step(At(4.8));
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 1);
+  }
+  const Picture with_cut = ReadPng(folder_ / "frame_0004800.png");
+  std::fill(moment.topology.dead_edges.begin(), moment.topology.dead_edges.end(), std::uint8_t{0});
+  moment.topology.revision += 1;
+  Publish(moment);
+  {
+    const auto node = MakeNode();
+    node->Step(At(4.9));
+  }
+  EXPECT_NE(with_cut.rgb, ReadPng(folder_ / "frame_0004900.png").rgb);
+}
+
+TEST_F(RenderNodeTest, PatchesReachThePicture) {
+  const auto node = MakeNode();
+  const SyntheticMoment moment = MakeSyntheticMoment(view_, 4.8);
+  ASSERT_FALSE(moment.patches.empty());
+  Publish(moment);
+  node->Step(At(4.8));
+  EXPECT_GE(Metric(*node, "patches"), 1);
+}
+
+}  // namespace
+}  // namespace fulcrum::render
