@@ -132,19 +132,22 @@ std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& reco
   return json.text();
 }
 
+namespace {
+
+/// One row per node.
 std::string NodeTable(const std::vector<NodeId>& nodes, const SessionRecord& record) {
   std::array<char, 256> line{};
-  std::snprintf(line.data(), line.size(), "%-14s %7s  %-9s %15s %27s %9s %6s %8s\n", "node", "pid", "state",
-                "rate / asked Hz", "step p50 / p99 / max ms", "overruns", "drops", "restarts");
+  std::snprintf(line.data(), line.size(), "%-14s %-6s %15s %27s %9s %6s %8s\n", "node", "state", "rate / asked Hz",
+                "step p50 / p99 / max ms", "overruns", "drops", "restarts");
   std::string table = line.data();
   for (const NodeId id : nodes) {
     const NodeFigures& node = record.node(id);
-    const char* state = node.failed ? "failed" : node.seen ? StateName(node.state) : "silent";
+    const char* state = node.failed ? "failed" : node.seen ? "ok" : "silent";
     const std::string rate = Fixed(node.rate_achieved_Hz, 1) + " / " + Fixed(node.rate_asked_Hz, 0);
     const std::string step = Fixed(Ms(node.step.p50_us), 2) + " / " + Fixed(Ms(node.step.p99_us), 2) + " / " +
                              Fixed(Ms(node.step.max_us), 2);
-    std::snprintf(line.data(), line.size(), "%-14s %7d  %-9s %15s %27s %9llu %6llu %8d\n", NodeName(id), node.pid,
-                  state, rate.c_str(), step.c_str(), static_cast<unsigned long long>(node.overruns),
+    std::snprintf(line.data(), line.size(), "%-14s %-6s %15s %27s %9llu %6llu %8d\n", NodeName(id), state, rate.c_str(),
+                  step.c_str(), static_cast<unsigned long long>(node.overruns),
                   static_cast<unsigned long long>(node.drops), node.restarts);
     table += line.data();
     if (!node.last_error.empty()) {
@@ -153,6 +156,8 @@ std::string NodeTable(const std::vector<NodeId>& nodes, const SessionRecord& rec
   }
   return table;
 }
+
+}  // namespace
 
 std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& record) {
   std::string text = NodeTable(outcome.nodes, record) + "\n";
@@ -163,8 +168,10 @@ std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& recor
     text += line.data();
   }
   for (const RestartRecord& restart : record.restarts()) {
-    text += std::string("restart at ") + Fixed(restart.time_s, 1) + " s: " + NodeName(restart.node) + " " + restart.cause +
-            (restart.rejoin_s >= 0 ? std::string(", back after ") + Fixed(restart.rejoin_s, 2) + " s" : ", did not come back") +
+    text += std::string("restart at ") + Fixed(restart.time_s, 1) + " s: " + NodeName(restart.node) + " " +
+            restart.cause +
+            (restart.rejoin_s >= 0 ? std::string(", back after ") + Fixed(restart.rejoin_s, 2) + " s"
+                                   : ", did not come back") +
             "\n";
   }
   text += std::string("\n") + Fixed(outcome.duration_s, 1) + " s of \"" + outcome.scene_name + "\": ";

@@ -36,9 +36,6 @@ struct KeyFigure {
 /// Flat JSON object; the keys are documented in services/supervisor/DESIGN.md.
 [[nodiscard]] std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& record);
 
-/// One row per node: state, pid, rates, step times, overruns, drops, restarts.
-[[nodiscard]] std::string NodeTable(const std::vector<NodeId>& nodes, const SessionRecord& record);
-
 /// Node table, key figures, restarts and verdict.
 [[nodiscard]] std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& record);
 

@@ -29,8 +29,8 @@ img { display: block; width: 100%; border-radius: 10px; background: #000; }
 figure { margin: 0; } figcaption { color: var(--soft); font-size: 16px; padding: 6px 2px 0; }
 .sheet { display: grid; grid-template-columns: repeat(3, 1fr); gap: 16px; margin-top: 20px; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(520px, 1fr)); gap: 16px; }
-svg { width: 100%; height: auto; display: block; } svg text { font-size: 14px; fill: var(--soft); }
-svg text.title { font-size: 17px; font-weight: 600; fill: var(--ink); } svg .grid { stroke: #e6eaf0; }
+svg { width: 100%; height: auto; display: block; } svg text { font-size: 17px; fill: var(--soft); }
+svg text.title { font-size: 20px; font-weight: 600; fill: var(--ink); } svg .grid { stroke: #e6eaf0; }
 svg .mark { stroke: #d1242f; stroke-width: 1.5; stroke-dasharray: 5 4; }
 table { width: 100%; border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 17px; }
 th { text-align: right; font-weight: 600; color: var(--soft); font-size: 15px; border-bottom: 2px solid var(--line); }

@@ -167,7 +167,8 @@ struct Supervisor::Impl {
       for (NodeProcess& node : nodes) {
         if (node.id() == health.node && node.pid() == health.pid) {
           node.OnHealth(now);
-          record.AddHealth(SessionTime(now), health);
+          // The record closes with the session: what a node says of peers that have just ended is no finding.
+          if (!ended) record.AddHealth(SessionTime(now), health);
         }
       }
     }
@@ -300,13 +301,15 @@ struct Supervisor::Impl {
   }
 
   void EndNodes() {
+    TakeReports(MonotonicNs());
     reached_s = ReachedTime();
+    ended = true;
     for (const NodeProcess& node : nodes) {
       node.Signal(SIGTERM);
     }
     const std::int64_t begin = MonotonicNs();
-    const auto ended = [](NodeProcess& node) { return node.HasEnded(); };
-    while (!std::all_of(nodes.begin(), nodes.end(), ended)) {
+    const auto is_gone = [](NodeProcess& node) { return node.HasEnded(); };
+    while (!std::all_of(nodes.begin(), nodes.end(), is_gone)) {
       const std::int64_t now = MonotonicNs();
       if (now - begin > kLongestEnd) {
         for (const NodeProcess& node : nodes) {
@@ -320,7 +323,6 @@ struct Supervisor::Impl {
       PublishOwnHealth(now);
       std::this_thread::sleep_for(kLoopPeriod);
     }
-    TakeReports(MonotonicNs());
   }
 
   void Judge() {
@@ -338,7 +340,7 @@ struct Supervisor::Impl {
     }
   }
 
-  void LeaveBus() {
+  void CleanUp() {
     commands.reset();
     replies.reset();
     events.reset();
@@ -347,6 +349,11 @@ struct Supervisor::Impl {
     manifests.reset();
     participant.reset();
     bus::RemoveSharedMemory(memory);
+    // Checkpoints are for restarts within the session, and large.
+    for (const NodeId id : node_ids) {
+      std::error_code ignored;
+      std::filesystem::remove(folder.path / (std::string(NodeName(id)) + ".checkpoint"), ignored);
+    }
   }
 
   void Report() {
@@ -393,7 +400,8 @@ struct Supervisor::Impl {
   std::int64_t last_loop_ns = 0, next_health_ns = 0;
   std::int64_t sweep_ns = 0;  ///< When to sweep; 0: nothing to sweep.
   double reached_s = 0;
-  bool ending = false;
+  bool ending = false;                     ///< No further turn.
+  bool ended = false;                      ///< Session time has stopped.
   ExitCode failed_code = ExitCode::kDone;  ///< Of a node that failed for good.
   std::string failed_why;
   ExitCode exit_code = ExitCode::kDone;
@@ -419,7 +427,7 @@ ExitCode Supervisor::Run() {
   session.ending = true;
   session.EndNodes();
   session.Judge();
-  session.LeaveBus();
+  session.CleanUp();
   session.Report();
   return session.exit_code;
 }

@@ -9,8 +9,8 @@ namespace fulcrum::supervisor {
 namespace {
 
 // Size of a plot in SVG units, with room for the labels of the axes.
-constexpr double kWidth = 640, kHeight = 300;
-constexpr double kLeft = 62, kRight = 16, kTop = 44, kBottom = 46;
+constexpr double kWidth = 640, kHeight = 330;
+constexpr double kLeft = 66, kRight = 18, kTop = 48, kBottom = 56;
 constexpr std::size_t kMostDrawn = 1200;  // More points than pixels only make the file large.
 
 struct Axis {
@@ -89,15 +89,15 @@ std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& l
 
   std::string svg = "<svg viewBox='0 0 " + Fixed(kWidth, 0) + " " + Fixed(kHeight, 0) + "' role='img' aria-label='" +
                     EscapeHtml(settings.title) + "'>\n";
-  svg += Text(kLeft - 46, 22, "start", settings.title + " [" + settings.unit + "]", "class='title'");
+  svg += Text(kLeft - 50, 24, "start", settings.title + " [" + settings.unit + "]", "class='title'");
   for (double v = 0; v <= value.end * (1 + 1e-9); v += value.step) {
     svg += "<line class='grid' x1='" + Fixed(kLeft, 1) + "' x2='" + Fixed(kWidth - kRight, 1) + "' y1='" +
            Fixed(y_of(v), 1) + "' y2='" + Fixed(y_of(v), 1) + "'/>\n";
-    svg += Text(kLeft - 8, y_of(v) + 5, "end", Fixed(v, value.decimals));
+    svg += Text(kLeft - 8, y_of(v) + 6, "end", Fixed(v, value.decimals));
   }
   const int time_decimals = time_step < 1 ? 1 : 0;
   for (double t = 0; t <= end_s * (1 + 1e-9); t += time_step) {
-    svg += Text(x_of(t), kHeight - kBottom + 20, "middle", Fixed(t, time_decimals));
+    svg += Text(x_of(t), kHeight - kBottom + 23, "middle", Fixed(t, time_decimals));
   }
   svg += Text(kWidth - kRight, kHeight - 6, "end", "session time [s]");
   for (const double mark : settings.marks_s) {
@@ -117,9 +117,9 @@ std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& l
     }
     svg += "'/>\n";
     if (lines.size() > 1) {
-      svg += Text(legend_x, 22, "end", line->label,
+      svg += Text(legend_x, 24, "end", line->label,
                   ("fill='" + line->colour + "' style='fill:" + line->colour + "'").c_str());
-      legend_x -= 12 + 9.0 * static_cast<double>(line->label.size());
+      legend_x -= 14 + 10.5 * static_cast<double>(line->label.size());
     }
   }
   return svg + "</svg>\n";
