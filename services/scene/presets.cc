@@ -52,15 +52,15 @@ SceneSettings BuiltIn() {
   scene.structures = {
       {ProtectedKind::kUreter, 0.0025, 0.003, {{0.10f, 0.f}, {0.13f, 0.3f}, {0.11f, 0.6f}, {0.15f, 1.f}}},
       {ProtectedKind::kUreter, 0.0025, 0.003, {{0.90f, 0.f}, {0.88f, 0.35f}, {0.90f, 0.65f}, {0.86f, 1.f}}},
-      {ProtectedKind::kNerve, 0.0010, 0.003, {{0.22f, 0.f}, {0.20f, 0.4f}, {0.24f, 0.7f}, {0.30f, 1.f}}},
-      {ProtectedKind::kNerve, 0.0010, 0.003, {{0.80f, 0.f}, {0.82f, 0.4f}, {0.77f, 0.7f}, {0.70f, 1.f}}},
-      {ProtectedKind::kNerve, 0.0006, 0.003, {{0.82f, 0.40f}, {0.86f, 0.52f}, {0.84f, 0.7f}}},
-      {ProtectedKind::kNerve, 0.0006, 0.003, {{0.20f, 0.40f}, {0.15f, 0.55f}, {0.17f, 0.7f}}},
+      {ProtectedKind::kNerve, 0.0010, 0.003, {{0.22f, 0.f}, {0.16f, 0.4f}, {0.17f, 0.7f}, {0.26f, 1.f}}},
+      {ProtectedKind::kNerve, 0.0010, 0.003, {{0.80f, 0.f}, {0.84f, 0.4f}, {0.83f, 0.7f}, {0.74f, 1.f}}},
+      {ProtectedKind::kNerve, 0.0006, 0.003, {{0.84f, 0.40f}, {0.87f, 0.52f}, {0.85f, 0.7f}}},
+      {ProtectedKind::kNerve, 0.0006, 0.003, {{0.16f, 0.40f}, {0.13f, 0.55f}, {0.15f, 0.7f}}},
   };
   scene.tools = {DefaultTool(ToolKind::kGrasper, Vec3f(-0.085f, -0.045f, 0.115f)),
                  DefaultTool(ToolKind::kHook, Vec3f(0.085f, -0.045f, 0.115f))};
-  scene.render.scope_tip_W = Vec3f(0.006f, -0.085f, 0.095f);
-  scene.render.scope_target_W = Vec3f(0.0f, 0.004f, 0.020f);
+  scene.render.scope_tip_W = Vec3f(0.004f, -0.060f, 0.082f);
+  scene.render.scope_target_W = Vec3f(0.0f, 0.002f, 0.022f);
   ScriptWriter key(&scene.script);
   // Left hand: comes down with the jaws open, presses a fold into them, closes, lifts the sheet up and to the left,
   // holds it while the hook works, gives it back.
@@ -70,22 +70,22 @@ SceneSettings BuiltIn() {
   key.Grasper(2.3, 0.36f, 0.50f, -2.5, 50);
   key.Grasper(2.9, 0.36f, 0.50f, -2.5, 0.0);
   key.Grasper(3.2, 0.36f, 0.50f, -2.0, 0.0);
-  key.Grasper(5.8, 0.36f, 0.50f, 20, 0.0, Vec3d(-10, 4, 4));
-  key.Grasper(15.0, 0.36f, 0.50f, 20, 0.0, Vec3d(-10, 4, 4));
-  key.Grasper(16.2, 0.36f, 0.50f, 4, 0.0, Vec3d(-2, 0, 0));
-  key.Grasper(16.6, 0.36f, 0.50f, 4, 0.0, Vec3d(-2, 0, 0));
-  key.Grasper(17.2, 0.36f, 0.50f, 5, 50, Vec3d(-2, 0, 0));
+  key.Grasper(5.8, 0.36f, 0.50f, 20, 0.0, Vec3d(-4, 2, 6));
+  key.Grasper(15.0, 0.36f, 0.50f, 20, 0.0, Vec3d(-4, 2, 6));
+  key.Grasper(16.2, 0.36f, 0.50f, 4, 0.0, Vec3d(-1, 0, 0));
+  key.Grasper(16.6, 0.36f, 0.50f, 4, 0.0, Vec3d(-1, 0, 0));
+  key.Grasper(17.2, 0.36f, 0.50f, 5, 50, Vec3d(-1, 0, 0));
   key.Grasper(19.0, 0.36f, 0.50f, 50, 50);
   key.Grasper(20.0, 0.36f, 0.50f, 55, 50);
   // Right hand: waits, touches down beside the tent, cuts 30 mm along the organ at 4 mm/s, lifts off.
   key.Hook(0.0, 0.68f, 0.40f, 45);
   key.Hook(4.5, 0.68f, 0.40f, 45);
-  key.Hook(6.3, 0.62f, 0.42f, 6);
-  key.Hook(7.0, 0.62f, 0.42f, -2.5);
-  key.Hook(7.3, 0.62f, 0.42f, -2.5, 35);
-  key.Hook(14.8, 0.62f, 0.57f, -2.5, 35);
-  key.Hook(14.9, 0.62f, 0.57f, -2.5);
-  key.Hook(15.8, 0.64f, 0.57f, 10);
+  key.Hook(6.3, 0.56f, 0.42f, 7);
+  key.Hook(7.0, 0.56f, 0.42f, 1.5);
+  key.Hook(7.3, 0.56f, 0.42f, 1.5, 35);
+  key.Hook(14.8, 0.56f, 0.57f, 1.5, 35);
+  key.Hook(14.9, 0.56f, 0.57f, 1.5);
+  key.Hook(15.8, 0.60f, 0.57f, 12);
   key.Hook(18.0, 0.70f, 0.50f, 45);
   key.Hook(20.0, 0.70f, 0.50f, 45);
   scene.script_duration_s = 20;
@@ -131,14 +131,14 @@ SceneSettings Small() {
   key.Grasper(5.2, 0.33f, 0.50f, 3, 0.0);
   key.Grasper(5.4, 0.33f, 0.50f, 4, 50);
   key.Grasper(6.0, 0.33f, 0.50f, 20, 50);
-  key.Hook(0.0, 0.66f, 0.42f, 20);
-  key.Hook(1.4, 0.66f, 0.42f, 15);
-  key.Hook(2.1, 0.66f, 0.42f, -2.0);
-  key.Hook(2.3, 0.66f, 0.42f, -2.0, 35);
-  key.Hook(4.8, 0.66f, 0.545f, -2.0, 35);
-  key.Hook(4.9, 0.66f, 0.545f, -2.0);
-  key.Hook(5.4, 0.66f, 0.545f, 10);
-  key.Hook(6.0, 0.66f, 0.50f, 20);
+  key.Hook(0.0, 0.58f, 0.42f, 20);
+  key.Hook(1.4, 0.58f, 0.42f, 15);
+  key.Hook(2.1, 0.58f, 0.42f, 0.5);
+  key.Hook(2.3, 0.58f, 0.42f, 0.5, 35);
+  key.Hook(4.8, 0.58f, 0.545f, 0.5, 35);
+  key.Hook(4.9, 0.58f, 0.545f, 0.5);
+  key.Hook(5.4, 0.58f, 0.545f, 10);
+  key.Hook(6.0, 0.58f, 0.50f, 20);
   scene.script_duration_s = 6;
   return scene;
 }
