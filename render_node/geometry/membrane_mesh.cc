@@ -15,6 +15,9 @@ struct Neighbour {
 // Direction d of a TopologyState edge, seen from its first node.
 constexpr std::array<Neighbour, 3> kDirections{{{0, 1}, {1, 0}, {1, 1}}};
 
+// Pieces below this size are crumbs: some 30 mm^2 of the built-in sheet.
+constexpr std::size_t kCrumbNodes = 40;
+
 }  // namespace
 
 MembraneTriangle MembraneTriangleAt(std::uint32_t cols, std::uint32_t row, std::uint32_t col, int half) {
@@ -25,6 +28,24 @@ MembraneTriangle MembraneTriangleAt(std::uint32_t cols, std::uint32_t row, std::
     return {{n00, n01, n11}, {edge(n00, 0), edge(n01, 1), edge(n00, 2)}};
   }
   return {{n00, n11, n10}, {edge(n00, 2), edge(n10, 0), edge(n00, 1)}};
+}
+
+template <class Visit>
+void MembraneMesh::ForEachNeighbour(Index node, const Visit& visit) const {
+  const auto row = static_cast<int>(node / cols_), col = static_cast<int>(node % cols_);
+  const auto inside = [this](int r, int c) {
+    return r >= 0 && c >= 0 && r < static_cast<int>(rows_) && c < static_cast<int>(cols_);
+  };
+  for (std::size_t d = 0; d < 3; ++d) {
+    const auto [dr, dc] = kDirections[d];
+    if (inside(row + dr, col + dc)) {
+      visit(static_cast<Index>(row + dr) * cols_ + static_cast<Index>(col + dc), 3 * std::size_t{node} + d);
+    }
+    if (inside(row - dr, col - dc)) {
+      const Index other = static_cast<Index>(row - dr) * cols_ + static_cast<Index>(col - dc);
+      visit(other, 3 * std::size_t{other} + d);
+    }
+  }
 }
 
 MembraneMesh::MembraneMesh(const SceneView& scene)
@@ -46,15 +67,48 @@ bool MembraneMesh::SetTopology(const TopologyState& topology) {
   return true;
 }
 
+// Flood fill over live edges; a piece is a crumb when it is small and none of its nodes is fixed.
+void MembraneMesh::FindGone() {
+  const Index nodes = scene_.membrane.node_count();
+  gone_list_.clear();
+  gone_.assign(nodes, 0);
+  std::vector<std::uint8_t> seen(nodes, 0);
+  std::vector<Index> piece;
+  for (Index start = 0; start < nodes; ++start) {
+    if (TestBit(dead_nodes_, start)) {
+      gone_[start] = 1;
+      gone_list_.push_back(start);
+      continue;
+    }
+    if (seen[start]) {
+      continue;
+    }
+    piece.assign(1, start);
+    seen[start] = 1;
+    bool fixed = false;
+    for (std::size_t k = 0; k < piece.size(); ++k) {
+      const Index node = piece[k];
+      fixed = fixed || scene_.inverse_mass[scene_.membrane.first + node] == 0;
+      ForEachNeighbour(node, [&](Index other, std::size_t edge) {
+        if (!seen[other] && !edge_dead(edge) && !TestBit(dead_nodes_, other)) {
+          seen[other] = 1;
+          piece.push_back(other);
+        }
+      });
+    }
+    if (!fixed && piece.size() < kCrumbNodes) {
+      for (const Index node : piece) {
+        gone_[node] = 1;
+        gone_list_.push_back(node);
+      }
+    }
+  }
+}
+
 void MembraneMesh::BuildTriangles() {
   triangles_.clear();
   parts_.clear();
-  dead_list_.clear();
-  for (Index node = 0; node < scene_.membrane.node_count(); ++node) {
-    if (node_dead(node)) {
-      dead_list_.push_back(node);
-    }
-  }
+  FindGone();
   for (std::uint32_t row = 0; row + 1 < rows_; ++row) {
     for (std::uint32_t col = 0; col + 1 < cols_; ++col) {
       for (int half = 0; half < 2; ++half) {
@@ -63,7 +117,7 @@ void MembraneMesh::BuildTriangles() {
         int dead = 0;
         for (int k = 0; k < 3; ++k) {
           const Index a = t.nodes[k], b = t.nodes[(k + 1) % 3];
-          alive[k] = !edge_dead(t.edges[k]) && !node_dead(a) && !node_dead(b);
+          alive[k] = !edge_dead(t.edges[k]) && !node_gone(a) && !node_gone(b);
           dead += alive[k] ? 0 : 1;
         }
         // One dead edge leaves the corners joined: the slit ends inside, and the atlas shows how far it goes.
@@ -105,7 +159,7 @@ void MembraneMesh::AddParts(const Triangle& nodes, const std::array<bool, 3>& ed
     }
   }
   for (int k = 0; k < 3; ++k) {
-    if (!((taken >> k) & 1) && !node_dead(nodes[k])) {
+    if (!((taken >> k) & 1) && !node_gone(nodes[k])) {
       parts_.push_back({nodes, static_cast<std::uint8_t>(1u << k)});
     }
   }
@@ -116,7 +170,7 @@ void MembraneMesh::Update(std::span<const float> xyz) {
   for (std::size_t node = 0; node < nodes; ++node) {
     positions_[node] = PositionOf(xyz, scene_.membrane.first + static_cast<Index>(node));
   }
-  PlaceDeadNodes();
+  PlaceGoneNodes();
   for (std::size_t p = 0; p < parts_.size(); ++p) {
     const Part& part = parts_[p];
     const int owners = std::popcount(part.owned);
@@ -155,29 +209,15 @@ void MembraneMesh::Update(std::span<const float> xyz) {
 
 // Least squares over the live edges at the node: dx = ds * Ds + dt * Dt.
 MembraneMesh::Frame MembraneMesh::FrameAt(Index node) const {
-  const int row = static_cast<int>(node / cols_), col = static_cast<int>(node % cols_);
   Eigen::Matrix2f normal_matrix = Eigen::Matrix2f::Zero();
   Eigen::Matrix<float, 3, 2> moment = Eigen::Matrix<float, 3, 2>::Zero();
-  const auto add = [&](int r, int c, std::size_t edge) {
-    if (r < 0 || c < 0 || r >= static_cast<int>(rows_) || c >= static_cast<int>(cols_) || edge_dead(edge)) {
-      return;
+  ForEachNeighbour(node, [&](Index other, std::size_t edge) {
+    if (!edge_dead(edge) && !node_gone(other)) {
+      const Vec2f dm = scene_.membrane_material[other] - scene_.membrane_material[node];
+      normal_matrix += dm * dm.transpose();
+      moment += (positions_[other] - positions_[node]) * dm.transpose();
     }
-    const Index other = static_cast<Index>(r) * cols_ + static_cast<Index>(c);
-    if (node_dead(other)) {
-      return;
-    }
-    const Vec2f dm = scene_.membrane_material[other] - scene_.membrane_material[node];
-    normal_matrix += dm * dm.transpose();
-    moment += (positions_[other] - positions_[node]) * dm.transpose();
-  };
-  for (std::size_t d = 0; d < 3; ++d) {
-    const auto [dr, dc] = kDirections[d];
-    add(row + dr, col + dc, 3 * std::size_t{node} + d);
-    const int r = row - dr, c = col - dc;
-    if (r >= 0 && c >= 0) {
-      add(r, c, 3 * (static_cast<std::size_t>(r) * cols_ + static_cast<std::size_t>(c)) + d);
-    }
-  }
+  });
   // Two edges in nearly one line say nothing about the other direction: below 1 % of a right angle's determinant.
   const float trace = normal_matrix.trace();
   if (normal_matrix.determinant() <= 0.01f * trace * trace / 4) {
@@ -200,16 +240,16 @@ Vec3f MembraneMesh::GhostFrom(Index owner, Index ghost) const {
 }
 
 // A vaporised node has no constraints left and may be anywhere: the fat beneath and the picture need a quiet place.
-void MembraneMesh::PlaceDeadNodes() {
+void MembraneMesh::PlaceGoneNodes() {
   const Index first = scene_.membrane.first;
-  for (const Index node : dead_list_) {
+  for (const Index node : gone_list_) {
     const int row = static_cast<int>(node / cols_), col = static_cast<int>(node % cols_);
     Vec3f sum = Vec3f::Zero();
     int count = 0;
     for (int r = std::max(0, row - 2); r <= std::min(static_cast<int>(rows_) - 1, row + 2); ++r) {
       for (int c = std::max(0, col - 2); c <= std::min(static_cast<int>(cols_) - 1, col + 2); ++c) {
         const Index other = static_cast<Index>(r) * cols_ + static_cast<Index>(c);
-        if (!node_dead(other)) {
+        if (!node_gone(other)) {
           sum += positions_[other] + scene_.rest_position[first + node] - scene_.rest_position[first + other];
           ++count;
         }

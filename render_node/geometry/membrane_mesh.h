@@ -13,6 +13,9 @@
 //
 // `side` is +1 at a part's own corners and -1 at its ghosts: the shader drops fragments where it is negative, and the
 // atlas decides texel by texel where the slit runs.
+//
+// Crumbs (pieces cut off on every side, a few nodes large, held by nothing) are not drawn: they have shrivelled to less
+// than a texel of tissue, and the simulation leaves them wherever they were.
 #pragma once
 
 #include <cstdint>
@@ -44,8 +47,8 @@ class MembraneMesh {
   /// Triangles that are whole; parts of cut ones follow them in triangles().
   [[nodiscard]] std::size_t whole_triangles() const { return whole_triangles_; }
 
-  [[nodiscard]] bool node_dead(Index node) const { return TestBit(dead_nodes_, node); }
-  [[nodiscard]] bool edge_dead(std::size_t edge) const { return TestBit(dead_edges_, edge); }
+  /// Vaporised, or part of a crumb.
+  [[nodiscard]] bool node_gone(Index node) const { return gone_[node] != 0; }
 
  private:
   struct Part {
@@ -57,18 +60,24 @@ class MembraneMesh {
     bool valid;
   };
 
+  [[nodiscard]] bool edge_dead(std::size_t edge) const { return TestBit(dead_edges_, edge); }
+  void FindGone();
   void BuildTriangles();
   void AddParts(const Triangle& nodes, const std::array<bool, 3>& edge_alive);
+  /// visit(other node, edge between the two) for the up to six neighbours in the grid.
+  template <class Visit>
+  void ForEachNeighbour(Index node, const Visit& visit) const;
   [[nodiscard]] Frame FrameAt(Index node) const;
   [[nodiscard]] Vec3f GhostFrom(Index owner, Index ghost) const;
-  void PlaceDeadNodes();
+  void PlaceGoneNodes();
 
   SceneView scene_;
   std::uint32_t rows_;
   std::uint32_t cols_;
   std::vector<std::uint8_t> dead_nodes_;
   std::vector<std::uint8_t> dead_edges_;
-  std::vector<Index> dead_list_;
+  std::vector<std::uint8_t> gone_;  // Per node.
+  std::vector<Index> gone_list_;
   std::vector<Part> parts_;
   std::vector<Vec3f> positions_;
   std::vector<Vec3f> normals_;

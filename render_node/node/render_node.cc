@@ -28,7 +28,23 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       ports_(ports),
       view_(scene),
       display_(OpenDisplay(view_, scene.render, settings.window)),
-      writer_(settings.frames) {}
+      writer_(settings.frames) {
+  WarmUp();
+}
+
+// The first picture costs seconds on a busy machine, since the rasteriser translates each shader when it first meets
+// it: better now than in the session.
+void RenderNode::WarmUp() {
+  for (int k = 0; k < kMaxTools; ++k) {
+    ToolSample shown;
+    shown.kind = scene_.tools[static_cast<std::size_t>(k)].kind;
+    view_.SetTool(k, shown);
+  }
+  display_->DrawAndRead(&picture_);
+  for (int k = 0; k < kMaxTools; ++k) {
+    view_.SetTool(k, ToolSample());
+  }
+}
 
 RenderNode::~RenderNode() = default;
 

@@ -52,6 +52,7 @@ class RenderNode {
   [[nodiscard]] std::string display_description() const { return display_->description(); }
 
  private:
+  void WarmUp();
   void TakeTissue();
   void TakeThermal();
   void TakeTools();

@@ -26,8 +26,8 @@ void main() {
   vec3 film = normalize(normal + 0.42 * bend);
   float facing = abs(dot(n, normalize(position)));
   float grazing = (1.0 - facing) * (1.0 - facing);
-  vec3 albedo = mix(vec3(0.80, 0.36, 0.27), vec3(0.88, 0.56, 0.42), noise.g);
-  float alpha = 0.20 + 0.16 * noise.r + 0.50 * grazing;
+  vec3 albedo = mix(vec3(0.84, 0.40, 0.30), vec3(0.92, 0.66, 0.50), noise.g);
+  float alpha = 0.30 + 0.24 * noise.r + 0.45 * grazing;
 
   float living = 1.0 - smoothstep(0.05, 0.5, damage);
   // Warm tissue reddens, then pales as its protein coagulates (from about 60 degrees).
@@ -44,7 +44,7 @@ void main() {
   alpha = mix(alpha, 0.97, brown);
   albedo = mix(albedo, vec3(0.015, 0.010, 0.008), smoothstep(0.05, 0.6, burnt));
 
-  float wet = 1.25 * (1.0 - 0.92 * max(brown, 0.3 * pale));
+  float wet = 1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale));
   // What glitters is not see-through.
   float gloss;
   vec3 shaded = ShadeTissue(albedo, vec3(0.30, 0.16, 0.10), n, film, position, wet, gloss);

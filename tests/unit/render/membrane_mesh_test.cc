@@ -113,6 +113,31 @@ TEST_F(MembraneMeshTest, ADeadNodeIsNeverDrawnAndAWildOneDoesNoHarm) {
   }
 }
 
+TEST_F(MembraneMeshTest, ACrumbIsNotDrawnButAFlapIs) {
+  // A square of nine nodes cut off all round, by killing every edge that leaves it.
+  const auto inside = [](std::uint32_t row, std::uint32_t col) {
+    return row >= 20 && row < 23 && col >= 8 && col < 11;
+  };
+  constexpr std::uint32_t kSteps[3][2] = {{0, 1}, {1, 0}, {1, 1}};
+  for (std::uint32_t row = 0; row + 1 < view_.membrane.rows; ++row) {
+    for (std::uint32_t col = 0; col + 1 < view_.membrane.cols; ++col) {
+      for (std::size_t d = 0; d < 3; ++d) {
+        if (inside(row, col) != inside(row + kSteps[d][0], col + kSteps[d][1])) {
+          SetBit(topology_.dead_edges, 3 * std::size_t{Node(row, col)} + d);
+        }
+      }
+    }
+  }
+  ASSERT_TRUE(mesh_.SetTopology(topology_));
+  for (std::uint32_t row = 20; row < 23; ++row) {
+    for (std::uint32_t col = 8; col < 11; ++col) {
+      EXPECT_TRUE(mesh_.node_gone(Node(row, col)));
+    }
+  }
+  EXPECT_FALSE(mesh_.node_gone(Node(19, 8)));
+  EXPECT_FALSE(mesh_.node_gone(Node(40, 12)));
+}
+
 TEST_F(MembraneMeshTest, RefusesTheTopologyOfAnotherGrid) {
   topology_.rows += 1;
   EXPECT_FALSE(mesh_.SetTopology(topology_));
