@@ -72,7 +72,7 @@ Tile* HeatField::Create(int index) {
   tile->index = index;
   tile->tx = index % sheet_.tiles_x;
   tile->ty = index / sheet_.tiles_x;
-  const Metric metric = sheet_.metric[index];
+  const CellMetric metric = sheet_.metric[index];
   tile->volume = material_.cell_m * material_.cell_m * metric.s * metric.t * material_.thickness_m;
   for (int j = 0; j < kTile; ++j) {
     for (int i = 0; i < kTile; ++i) {

@@ -22,7 +22,7 @@ Sheet MakeEmpty(const Vec2f& low, const Vec2f& high, float cell) {
   sheet.ny = static_cast<int>(std::ceil(high.y() / cell - 1e-3f)) - sheet.origin_y;
   sheet.tiles_x = (sheet.nx + kTile - 1) / kTile;
   sheet.tiles_y = (sheet.ny + kTile - 1) / kTile;
-  sheet.metric.assign(sheet.tile_count(), Metric{});
+  sheet.metric.assign(sheet.tile_count(), CellMetric{});
   sheet.outside.assign(static_cast<std::size_t>(sheet.tile_count()) * kTileCells / 8, 0xff);
   return sheet;
 }

@@ -20,7 +20,7 @@ struct CellIndex {
 
 /// Rest length of a cell along s and t, relative to its length in material space. The map from the rest shape to the
 /// sheet is taken as orthogonal: cross terms are below 1 % for the regular grids that the scene compiler makes.
-struct Metric {
+struct CellMetric {
   float s = 1, t = 1;
 };
 inline constexpr float kMetricMin = 0.5f, kMetricMax = 2.0f;  ///< Keeps the explicit step bounded on bad maps.
@@ -30,7 +30,7 @@ struct Sheet {
   std::int32_t origin_x = 0, origin_y = 0;  ///< Global index floor(s / cell_m) of cell (0, 0).
   int nx = 0, ny = 0;                       ///< Cells.
   int tiles_x = 0, tiles_y = 0;
-  std::vector<Metric> metric;         ///< Per tile.
+  std::vector<CellMetric> metric;     ///< Per tile.
   std::vector<std::uint8_t> outside;  ///< Bit field over tiles_x*kTile by tiles_y*kTile: no tissue there.
 
   [[nodiscard]] int tile_count() const { return tiles_x * tiles_y; }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "thermal_node/heat/wide.h"
 #include "thermal_node/potential/multigrid.h"
@@ -132,8 +133,8 @@ PotentialResult PotentialSolver::Solve(const PotentialProblem& problem, float to
 int PotentialSolver::Iterate(float tolerance) {
   Multigrid& g = *grid_;
   Level& fine = g.levels[0];
-  const float norm_b = std::sqrt(Dot(g.contact, g.contact));
-  if (!(norm_b > 0.0f)) {
+  const float contact_sum = std::accumulate(g.contact.begin(), g.contact.end(), 0.0f);
+  if (!(contact_sum > 0.0f)) {
     std::fill(g.v.begin(), g.v.end(), 0.0f);
     return 0;
   }
@@ -143,14 +144,18 @@ int PotentialSolver::Iterate(float tolerance) {
   Add(-1.0f, g.ap, &fine.b);
   float rz = 0;
   for (int k = 0; k < kMaxIterations; ++k) {
-    if (!(std::sqrt(Dot(fine.b, fine.b)) > tolerance * norm_b)) return k;
     VCycle(&g.levels, 0);
     const float rz_new = Dot(fine.b, fine.x);
+    // r.z estimates the energy of the error, the conductance is the energy of the solution.
+    const float conductance = contact_sum - Dot(g.contact, g.v);
+    const bool last = !(rz_new > tolerance * tolerance * conductance);
+    if (!(rz_new > 0.0f)) return k;
     ScaleAdd(fine.x, k == 0 ? 0.0f : rz_new / rz, &g.p);
     rz = rz_new;
     fine.Apply(g.p.data(), g.ap.data());
     const float alpha = rz / Dot(g.p, g.ap);
     Add(alpha, g.p, &g.v);
+    if (last) return k + 1;  // the V-cycle was paid for, so its step is taken
     Add(-alpha, g.ap, &fine.b);
   }
   return kMaxIterations;

@@ -37,8 +37,9 @@ class PotentialSolver {
   PotentialSolver();
   ~PotentialSolver();
 
-  /// Relative residual `tolerance`; then, while the energy guard is not met, ten times less, at most twice. The heat is
-  /// rescaled so that power in equals heat plus power into ground.
+  /// Iterates until the error is `tolerance` in the energy norm, relative to the solution; then, while the energy guard
+  /// is not met, ten times less, at most twice. The heat is rescaled so that power in equals heat plus power into
+  /// ground.
   PotentialResult Solve(const PotentialProblem& problem, float tolerance);
 
   /// Joule heat per cell at 1 V [W/V^2] of the last solve; shared between two cells as their resistances.

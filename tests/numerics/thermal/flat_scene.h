@@ -66,7 +66,7 @@ struct SlitFigures {
   float width_min_m = 0, width_mean_m = 0, width_max_m = 0;  ///< Removed cells across.
   float brown_m = 0;                                         ///< Collagen damage >= 1, to one side of the slit, mean.
   float dead_m = 0;                                          ///< Cell death >= 1, likewise.
-  float warm_m = 0;     ///< At or above 45 C at the end of the drag near its end, to one side.
+  float warm_m = 0;             ///< At or above 45 C at the end of the drag near its end, to one side.
   int surviving_crossings = 0;  ///< Live mesh edges that cross the path.
 };
 

@@ -1,0 +1,218 @@
+// Conduction against exact solutions, and what it must never do.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include "tests/numerics/thermal/moving_gaussian.h"
+#include "thermal_node/heat/heat_field.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+ThermalParams Lossless() {
+  ThermalParams params;
+  params.h_top_W_m2K = params.h_below_W_m2K = params.h_tented_W_m2K = params.perfusion_per_s = 0;
+  return params;
+}
+
+/// Sets theta of every tissue cell from f(x, y), at cell centres [m].
+template <class F>
+void Fill(HeatField* field, const F& f) {
+  const Sheet& sheet = field->sheet();
+  Ledger ledger;
+  for (int ty = 0; ty < sheet.tiles_y; ++ty) {
+    for (int tx = 0; tx < sheet.tiles_x; ++tx) {
+      Tile* tile = field->Wake(tx, ty);
+      for (int k = 0; k < kTileCells; ++k) {
+        if ((tile->state.flags[k] & kNoTissue) != 0) continue;
+        const Vec2f p = sheet.CentreOf({tx * kTile + k % kTile, ty * kTile + k / kTile});
+        tile->state.enthalpy[k] =
+            static_cast<float>(f(p.x(), p.y())) * field->material().HeatCapacity(tile->state.water[k]);
+      }
+      field->RefreshTheta(tile, &ledger);
+    }
+  }
+}
+
+/// Visits the theta of every tissue cell: visit(theta, x, y).
+template <class F>
+void ForCells(const HeatField& field, const F& visit) {
+  for (const Tile* tile : field.awake()) {
+    for (int k = 0; k < kTileCells; ++k) {
+      if ((tile->state.flags[k] & kNoTissue) != 0) continue;
+      const Vec2f p = field.sheet().CentreOf({tile->tx * kTile + k % kTile, tile->ty * kTile + k / kTile});
+      visit(tile->theta[ThetaIndex(k % kTile, k / kTile)], p.x(), p.y());
+    }
+  }
+}
+
+/// Largest error of the mode cos(pi x / L) cos(2 pi y / L) on a square with insulated borders and losses after 2 s,
+/// relative to its amplitude, for a cell size; the time step goes with its square.
+double ModeError(float cell_m, float dt_s) {
+  ThermalParams params;
+  params.cell_m = cell_m;
+  const Material material = MakeMaterial(params);
+  const float length = 6.4e-3f;
+  HeatField field(MakeFlatSheet(length, length, cell_m), material);
+  const double kx = kPi / length, ky = 2 * kPi / length;
+  Fill(&field, [&](double x, double y) { return 30 + 20 * std::cos(kx * x) * std::cos(ky * y); });
+  const double alpha = material.k_wet / material.rc_wet, loss = material.loss_resting / material.rc_wet;
+  const double time = 2.0;
+  Ledger ledger;
+  const int steps = static_cast<int>(std::lround(time / dt_s));
+  for (int n = 0; n < steps; ++n) EXPECT_EQ(field.Diffuse(dt_s, &ledger), 1);
+  double worst = 0;
+  ForCells(field, [&](double theta, double x, double y) {
+    const double mode =
+        20 * std::exp(-(alpha * (kx * kx + ky * ky) + loss) * time) * std::cos(kx * x) * std::cos(ky * y);
+    worst = std::max(worst, std::abs(theta - 30 * std::exp(-loss * time) - mode) / 20);
+  });
+  return worst;
+}
+
+TEST(HeatTest, EigenfunctionDecaysWithSecondOrder) {
+  const double coarse = ModeError(2e-4f, 4e-2f), fine = ModeError(1e-4f, 1e-2f);
+  EXPECT_LT(fine, 2e-3);
+  EXPECT_GE(std::log2(coarse / fine), 1.9);
+}
+
+TEST(HeatTest, MovingGaussianMatchesTheExactIntegral) {
+  EXPECT_LT(RunMovingGaussian(1e-4f).max_error, 2.5e-3);  // measured 0.12 % of the peak
+}
+
+TEST(HeatTest, ResultDoesNotDependOnWhereTheTilesLie) {
+  // The same blob on the same sheet, moved by a number of cells that is no multiple of the tile.
+  const auto run = [](int shift) {
+    HeatField field(MakeFlatSheet(12.8e-3f, 12.8e-3f, 1e-4f), MakeMaterial(Lossless()));
+    const float centre = 6.4e-3f + 1e-4f * static_cast<float>(shift);
+    Ledger ledger;
+    Fill(&field, [&](double x, double y) {
+      return 50 * std::exp(-((x - centre) * (x - centre) + (y - centre) * (y - centre)) / 2e-7);
+    });
+    for (int n = 0; n < 100; ++n) field.Diffuse(0.01f, &ledger);
+    std::vector<float> around;
+    for (int j = -30; j < 30; ++j) {
+      for (int i = -30; i < 30; ++i) {
+        const int ix = 64 + shift + i, iy = 64 + shift + j;
+        const Tile* tile = field.Find(ix / kTile, iy / kTile);
+        around.push_back(tile->theta[ThetaIndex(ix % kTile, iy % kTile)]);
+      }
+    }
+    return around;
+  };
+  // Which tiles sleep differs, and with it what is cut off below the waking threshold.
+  constexpr float kTolerance = 0.3f * kWakeTheta;
+  const std::vector<float> a = run(0), b = run(13);
+  for (std::size_t k = 0; k < a.size(); ++k) EXPECT_NEAR(a[k], b[k], kTolerance);
+}
+
+TEST(HeatTest, RestMetricStretchesLengths) {
+  // Cells 1.5 times as long along s on the rest shape: the mode decays as on a sheet 1.5 times as long.
+  Sheet sheet = MakeFlatSheet(6.4e-3f, 6.4e-3f, 1e-4f);
+  for (CellMetric& metric : sheet.metric) metric.s = 1.5f;
+  const Material material = MakeMaterial(Lossless());
+  HeatField field(sheet, material);
+  const double length = 6.4e-3, k = kPi / length;
+  Fill(&field, [&](double x, double) { return 30 + 20 * std::cos(k * x); });
+  Ledger ledger;
+  for (int n = 0; n < 200; ++n) field.Diffuse(0.01f, &ledger);
+  const double alpha = material.k_wet / material.rc_wet;
+  ForCells(field, [&](double theta, double x, double) {
+    EXPECT_NEAR(theta, 30 + 20 * std::exp(-alpha * k * k / 2.25 * 2.0) * std::cos(k * x), 0.02);
+  });
+}
+
+TEST(HeatTest, MaximumPrincipleHoldsWithRandomHolesAndLongSteps) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  HeatField field(MakeFlatSheet(9.6e-3f, 9.6e-3f, 1e-4f), MakeMaterial(ThermalParams{}));
+  Fill(&field, [&](double, double) { return uniform(random) < 0.5f ? 60.0 : 0.0; });
+  Ledger ledger;
+  double removed = 0;
+  for (Tile* tile : field.awake()) {
+    for (int k = 0; k < kTileCells; ++k) {
+      tile->state.water[k] = uniform(random);  // k and rc jump from cell to cell
+      if (uniform(random) < 0.45f) field.TakeOut(tile, k, kRemoved, &removed);
+    }
+    for (int k = 0; k < kTileCells; ++k) {
+      const float cap = field.material().HeatCapacity(tile->state.water[k]) * 60;
+      tile->state.enthalpy[k] = std::min(tile->state.enthalpy[k], cap);
+    }
+    field.RefreshTheta(tile, &ledger);
+  }
+  for (const float dt : {0.001f, 0.01f, 0.1f, 1.0f, 10.0f}) {
+    field.Diffuse(dt, &ledger);
+    for (const Tile* tile : field.awake()) {
+      EXPECT_GE(tile->theta_min, 0.0f);
+      EXPECT_LE(tile->theta_max, 60.001f);
+      for (int k = 0; k < kTileCells; ++k) {
+        if ((tile->state.flags[k] & kRemoved) != 0) {
+          ASSERT_EQ(tile->state.enthalpy[k], 0.0f);
+        }
+      }
+    }
+  }
+}
+
+TEST(HeatTest, HeatIsConservedAcrossTilesSleepAndLosses) {
+  HeatField field(MakeFlatSheet(32e-3f, 32e-3f, 1e-4f), MakeMaterial(ThermalParams{}));
+  Ledger ledger;
+  Tile* tile = field.Wake(5, 5);
+  for (int k = 0; k < 40; ++k) tile->state.enthalpy[k] = 1e8f;
+  field.RefreshTheta(tile, &ledger);
+  const double start = field.Stored();
+  std::size_t most = 0;
+  for (int n = 0; n < 6000 && !field.idle(); ++n) {
+    field.Diffuse(0.01f, &ledger);
+    most = std::max(most, field.awake().size());
+    ASSERT_NEAR(field.Stored() + ledger.Out(), start, 1e-5 * start);
+  }
+  EXPECT_TRUE(field.idle());  // all went back to sleep
+  EXPECT_GT(most, 4u);        // and others had woken
+  EXPECT_LT(ledger.dropped, 0.1 * start);
+}
+
+TEST(HeatTest, BadCellIsQuarantinedAndItsNeighboursAreNot) {
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e30f}) {
+    HeatField field(MakeFlatSheet(9.6e-3f, 9.6e-3f, 1e-4f), MakeMaterial(ThermalParams{}));
+    Ledger ledger;
+    Fill(&field, [](double, double) { return 40.0; });
+    Tile* tile = field.Find(1, 1);
+    tile->state.enthalpy[500] = bad;
+    field.RefreshTheta(tile, &ledger);
+    for (int n = 0; n < 50; ++n) field.Diffuse(0.01f, &ledger);
+    EXPECT_EQ(field.quarantined(), 1u);
+    EXPECT_EQ(tile->state.flags[500], kQuarantined);
+    ForCells(field, [&](double theta, double, double) {
+      ASSERT_GT(theta, 0.0);
+      ASSERT_LE(theta, 40.0);
+    });
+  }
+}
+
+TEST(HeatTest, BoilingHoldsAtHundredDegreesUntilTheWaterIsSpent) {
+  const Material material = MakeMaterial(Lossless());
+  HeatField field(MakeFlatSheet(3.2e-3f, 3.2e-3f, 1e-4f), material);
+  Ledger ledger;
+  Fill(&field, [](double, double) { return 0.0; });
+  Tile* tile = field.Find(0, 0);
+  const float to_boil = material.BoilingEnthalpy(1.0f);
+  EXPECT_NEAR(to_boil * 1e-9f, 0.225f, 0.01f);  // 0.23 J/mm^3 from 37 to 100 C
+  // Uniform heating by 1.2 times what warming and half the water cost.
+  for (int n = 0; n < 100; ++n) {
+    for (float& h : tile->state.enthalpy) h += (to_boil + 0.5f * material.latent) / 100;
+    field.RefreshTheta(tile, &ledger);
+    field.Diffuse(0.01f, &ledger);
+    EXPECT_LE(tile->theta_max, material.theta_boil * 1.0001f);
+  }
+  EXPECT_NEAR(tile->state.water[0], 0.5f, 0.005f);
+  EXPECT_NEAR(tile->theta_max, material.theta_boil, 0.01f);
+}
+
+}  // namespace
+}  // namespace fulcrum::thermal

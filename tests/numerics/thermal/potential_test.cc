@@ -1,0 +1,96 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "tests/numerics/thermal/potential_rings.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+TEST(PotentialTest, CurrentBetweenCirclesIsTheLogarithms) {
+  const RingsResult result = SolveRings(6.3, 29.2, 1e-6f);
+  EXPECT_LT(result.current_error, 2e-3);
+  EXPECT_LT(result.heat_error, 0.02);
+}
+
+TEST(PotentialTest, WorkingToleranceKeepsCurrentAndHeat) {
+  const RingsResult result = SolveRings(6.3, 29.2, 1e-2f);
+  EXPECT_LT(result.current_error, 0.01);
+  EXPECT_LT(result.heat_error, 0.02);
+}
+
+std::unique_ptr<PotentialProblem> Random(unsigned seed, float holes) {
+  auto problem = std::make_unique<PotentialProblem>();
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  problem->face_s = problem->face_t = 3e-4f;
+  for (int k = 0; k < kWindowCells; ++k) {
+    const bool hole = uniform(random) < holes;
+    problem->sigma[k] = hole ? 0.0f : 0.35f * (uniform(random) < 0.3f ? 0.01f : 1.0f + uniform(random));
+    problem->ground[k] = hole ? 0.0f : 7e-8f;
+    const int i = k % kWindow - 32, j = k / kWindow - 32;
+    if (i * i + j * j < 30) problem->contact[k] = 2 * problem->sigma[k] * 1e-8f / 3e-4f;
+  }
+  return problem;
+}
+
+TEST(PotentialTest, StaysBetweenGroundAndElectrodeWithHolesAndJumps) {
+  // Islands of tissue that nothing ties to either electrode converge last: their energy is nil.
+  constexpr float kSlack = 0.01f;
+  for (const float holes : {0.0f, 0.2f, 0.45f}) {
+    const auto problem = Random(3, holes);
+    PotentialSolver solver;
+    const PotentialResult result = solver.Solve(*problem, 1e-5f);
+    EXPECT_LE(result.imbalance, kImbalanceLimit);
+    EXPECT_GT(result.conductance_S, 0.0f);
+    for (int k = 0; k < kWindowCells; ++k) {
+      EXPECT_GE(solver.heat()[k], 0.0f);
+      if (problem->sigma[k] == 0.0f) {
+        EXPECT_EQ(solver.heat()[k], 0.0f);
+        continue;
+      }
+      EXPECT_GE(solver.Voltage(k % kWindow, k / kWindow), -kSlack);
+      EXPECT_LE(solver.Voltage(k % kWindow, k / kWindow), 1.0f + kSlack);
+    }
+  }
+}
+
+TEST(PotentialTest, PowerInIsHeatPlusGround) {
+  for (const float tolerance : {1e-1f, 1e-2f, 1e-4f}) {
+    const auto problem = Random(5, 0.3f);
+    PotentialSolver solver;
+    const PotentialResult result = solver.Solve(*problem, tolerance);
+    EXPECT_LE(result.imbalance, kImbalanceLimit);
+    double heat = 0;
+    for (const float q : solver.heat()) heat += q;
+    EXPECT_NEAR(heat, result.heat_S, 1e-4 * heat);
+    EXPECT_LE(result.heat_S, result.conductance_S);
+  }
+}
+
+TEST(PotentialTest, WarmStartIsCheaperAndSameAsCold) {
+  const auto problem = Random(9, 0.1f);
+  PotentialSolver solver;
+  const PotentialResult cold = solver.Solve(*problem, 1e-4f);
+  for (float& c : problem->contact) c *= 1.02f;
+  const PotentialResult warm = solver.Solve(*problem, 1e-4f);
+  EXPECT_LT(warm.iterations, cold.iterations);
+  PotentialSolver fresh;
+  EXPECT_NEAR(warm.conductance_S, fresh.Solve(*problem, 1e-4f).conductance_S, 1e-3f * warm.conductance_S);
+}
+
+TEST(PotentialTest, NoContactOrBadNumbersDeliverNothing) {
+  auto problem = Random(1, 0.0f);
+  PotentialSolver solver;
+  problem->sigma[100] = NAN;
+  EXPECT_EQ(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);
+  problem = Random(1, 0.0f);
+  EXPECT_GT(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);  // and the next solve is good again
+  problem->contact.fill(0);
+  EXPECT_EQ(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);
+}
+
+}  // namespace
+}  // namespace fulcrum::thermal

@@ -1,0 +1,227 @@
+// The thermal node on in-process ports.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "services/bus/in_process.h"
+#include "tests/numerics/thermal/flat_scene.h"
+#include "thermal_node/node/thermal_node.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+class ThermalNodeTest : public ::testing::Test {
+ protected:
+  ThermalNodeTest() : data_(FlatScene(31, 41, 1e-3f)), scene_(data_.View()) {
+    folder_ =
+        std::filesystem::temp_directory_path() / ("fulcrum_thermal_node_" + std::to_string(::getpid()) + "_" +
+                                                  ::testing::UnitTest::GetInstance()->current_test_info()->name());
+    std::filesystem::create_directories(folder_);
+    physics_ = contact_topic_.MakeOutput();
+    contact_in_ = contact_topic_.MakeInput();
+    topology_out_ = topology_topic_.MakeOutput();
+    patch_out_ = patch_topic_.MakeOutput();
+    event_out_ = event_topic_.MakeOutput();
+    manifest_out_ = manifest_topic_.MakeOutput();
+    topology_in_ = topology_topic_.MakeInput(64);
+    event_in_ = event_topic_.MakeInput(1024);
+    manifest_in_ = manifest_topic_.MakeInput(4);
+  }
+  ~ThermalNodeTest() override { std::filesystem::remove_all(folder_); }
+
+  void OpenCheckpoint() {
+    checkpoint_.reset();  // the file is locked by its owner
+    checkpoint_ = std::make_unique<runtime::CheckpointFile>(
+        folder_ / "thermal_node.checkpoint", scene_.hash, kCheckpointLayout, ThermalSolver::CheckpointCapacity(scene_));
+  }
+  std::unique_ptr<ThermalNode> MakeNode() {
+    return std::make_unique<ThermalNode>(
+        scene_, ThermalNode::Ports{*contact_in_, *topology_out_, *patch_out_, *event_out_, *manifest_out_},
+        checkpoint_.get(), ++epoch_);
+  }
+
+  /// One tick with the tip at (s, 10.2 mm), energised.
+  void Touch(ThermalNode* node, float s) {
+    CauteryContact contact;
+    contact.stamp = {++sequence_, 1, tick_.stamp_ns};
+    contact.touching = true;
+    contact.mode = CauteryMode::kCut;
+    contact.power_W = 35;
+    contact.contact_radius_m = 5e-4f;
+    contact.material = {s, 0.0102f};
+    contact.triangle = 0;
+    contact.barycentric = {1, 0, 0};
+    ASSERT_TRUE(physics_->Write(contact));
+    Advance(node);
+  }
+  void Advance(ThermalNode* node) {
+    ++tick_.index;
+    tick_.dt_s = 0.01;
+    tick_.session_time_s += 0.01;
+    tick_.stamp_ns += 10'000'000;
+    node->Step(tick_);
+  }
+  /// Cuts from s0 to s1 at 8 mm/s.
+  void Cut(ThermalNode* node, float s0, float s1) {
+    for (float s = s0; s < s1; s += 8e-5f) Touch(node, s);
+  }
+  std::optional<TopologyState> NewestTopology() {
+    TopologyState state;
+    return topology_in_->TakeLatest(&state) ? std::optional(state) : std::nullopt;
+  }
+
+  scene::SceneData data_;
+  SceneView scene_;
+  std::filesystem::path folder_;
+  bus::InProcessTopic<CauteryContact> contact_topic_;
+  bus::InProcessTopic<TopologyState> topology_topic_;
+  bus::InProcessTopic<TemperaturePatch> patch_topic_;
+  bus::InProcessTopic<ThermalEvent> event_topic_;
+  bus::InProcessTopic<TickManifest> manifest_topic_;
+  std::unique_ptr<bus::Output<CauteryContact>> physics_;
+  std::unique_ptr<bus::Input<CauteryContact>> contact_in_;
+  std::unique_ptr<bus::Output<TopologyState>> topology_out_;
+  std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patch_out_;
+  std::unique_ptr<bus::Output<ThermalEvent>> event_out_;
+  std::unique_ptr<bus::Output<TickManifest>> manifest_out_;
+  std::unique_ptr<bus::Input<TopologyState>> topology_in_;
+  std::unique_ptr<bus::Input<ThermalEvent>> event_in_;
+  std::unique_ptr<bus::Input<TickManifest>> manifest_in_;
+  std::unique_ptr<runtime::CheckpointFile> checkpoint_;
+  Tick tick_;
+  std::uint64_t sequence_ = 0;
+  std::int64_t epoch_ = 100;
+};
+
+TEST_F(ThermalNodeTest, CutGivesTopologyEventsPatchesAndMetrics) {
+  auto node = MakeNode();
+  auto patches = patch_topic_.MakeInput(64);
+  Advance(node.get());
+  const auto first = NewestTopology();
+  ASSERT_TRUE(first);  // late joiners always find one
+  EXPECT_EQ(first->revision, 0u);
+  EXPECT_EQ(first->scene_hash, scene_.hash);
+  Cut(node.get(), 0.010f, 0.020f);
+  for (int n = 0; n < 10; ++n) Advance(node.get());
+
+  const auto cut = NewestTopology();
+  ASSERT_TRUE(cut);
+  EXPECT_GT(cut->revision, 5u);
+  EXPECT_NEAR(cut->cut_length_m, 0.010f, 0.001f);
+  // Row 10 at t = 10 mm is in the slit: its nodes are dead, edges down from row 9 are.
+  EXPECT_TRUE(TestBit(cut->dead_nodes, 10 * 41 + 15));
+  EXPECT_TRUE(TestBit(cut->dead_edges, 3 * (9 * 41 + 15) + 1));
+  EXPECT_FALSE(TestBit(cut->dead_edges, 3 * (5 * 41 + 15) + 1));
+
+  std::vector<int> seen(16, 0);
+  ThermalEvent event;
+  std::uint64_t last = 0;
+  while (event_in_->TakeNext(&event)) {
+    ++seen[static_cast<int>(event.kind)];
+    EXPECT_EQ(event.stamp.sequence, ++last);
+  }
+  EXPECT_EQ(seen[static_cast<int>(ThermalEventKind::kContact)], 1);
+  EXPECT_GE(seen[static_cast<int>(ThermalEventKind::kSteam)], 1);
+  EXPECT_GE(seen[static_cast<int>(ThermalEventKind::kCut)], 5);
+  EXPECT_EQ(seen[static_cast<int>(ThermalEventKind::kBlanch)], 1);
+
+  TemperaturePatch patch;
+  ASSERT_TRUE(patches->TakeLatest(&patch));
+  EXPECT_EQ(patch.header.topology_revision, cut->revision);
+  EXPECT_EQ(patch.texels[4 * (102 * kPatchTexels + 150) + 3], 0);
+
+  Health health;
+  node->FillHealth(&health);
+  EXPECT_LE(health.metrics.size(), 16u);
+  const auto metric = [&](const std::string& name) {
+    for (const Metric& m : health.metrics) {
+      if (m.name == name) return m.value;
+    }
+    return std::nan("");
+  };
+  EXPECT_NEAR(metric("highest_temperature_C"), 100, 10);
+  EXPECT_NEAR(metric("cut_length_mm"), 10, 1);
+  EXPECT_GT(metric("dead_edges"), 20);
+  EXPECT_EQ(metric("warnings"), 0);
+  EXPECT_EQ(metric("injuries"), 0);
+  EXPECT_LT(metric("energy_closure"), 1e-4);
+}
+
+TEST_F(ThermalNodeTest, RestartGoesOnWithTheSameTopologyAndHeat) {
+  OpenCheckpoint();
+  auto node = MakeNode();
+  EXPECT_FALSE(node->restored());
+  Cut(node.get(), 0.010f, 0.016f);
+  const auto before = NewestTopology();
+  ASSERT_TRUE(before);
+  const double stored = node->solver().field().Stored();
+  node.reset();  // as kill -9 would leave it: nothing is written on the way out
+  OpenCheckpoint();
+  node = MakeNode();
+  EXPECT_TRUE(node->restored());
+  EXPECT_NEAR(node->solver().field().Stored(), stored, 0.3 * stored);  // at most 0.2 s older
+  Advance(node.get());
+  const auto after = NewestTopology();
+  ASSERT_TRUE(after);
+  EXPECT_EQ(after->revision, before->revision);
+  EXPECT_EQ(after->dead_edges, before->dead_edges);
+  EXPECT_EQ(after->dead_nodes, before->dead_nodes);
+  EXPECT_EQ(after->shrink, before->shrink);
+  EXPECT_GT(after->stamp.epoch, before->stamp.epoch);
+  Cut(node.get(), 0.016f, 0.020f);
+  const auto later = NewestTopology();
+  ASSERT_TRUE(later);
+  EXPECT_GT(later->revision, before->revision);
+}
+
+TEST_F(ThermalNodeTest, IdleNodeSendsNothingButItsManifest) {
+  auto patches = patch_topic_.MakeInput(4);
+  auto node = MakeNode();
+  for (int n = 0; n < 300; ++n) Advance(node.get());
+  EXPECT_EQ(topology_out_->stats().written, 1u);
+  EXPECT_EQ(patch_out_->stats().written, 0u);
+  EXPECT_EQ(event_out_->stats().written, 0u);
+  EXPECT_EQ(manifest_out_->stats().written, 300u);
+}
+
+TEST_F(ThermalNodeTest, WithoutReadersNoPatchIsBuiltAndALateReaderGetsAll) {
+  auto node = MakeNode();
+  Cut(node.get(), 0.010f, 0.012f);
+  EXPECT_EQ(patch_out_->stats().written, 0u);
+  auto patches = patch_topic_.MakeInput(4);
+  for (int n = 0; n < 8; ++n) Advance(node.get());
+  TemperaturePatch patch;
+  EXPECT_TRUE(patches->TakeLatest(&patch));
+}
+
+TEST_F(ThermalNodeTest, SameInputsGiveTheSameHashes) {
+  const auto run = [&] {
+    sequence_ = 0;
+    tick_ = {};
+    auto node = MakeNode();
+    Cut(node.get(), 0.010f, 0.014f);
+    TickManifest manifest;
+    EXPECT_TRUE(manifest_in_->TakeLatest(&manifest));
+    EXPECT_EQ(manifest.node, NodeId::kThermal);
+    EXPECT_EQ(manifest.consumed.at(0).sequence, sequence_);
+    return manifest.state_hash;
+  };
+  EXPECT_EQ(run(), run());
+}
+
+TEST_F(ThermalNodeTest, ContactOffTheSheetIsRefusedAndCounted) {
+  auto node = MakeNode();
+  Touch(node.get(), 0.5f);
+  Touch(node.get(), 0.01f);
+  Health health;
+  node->FillHealth(&health);
+  EXPECT_EQ(health.metrics.back().name, "contacts_refused");
+  EXPECT_EQ(health.metrics.back().value, 1);
+}
+
+}  // namespace
+}  // namespace fulcrum::thermal

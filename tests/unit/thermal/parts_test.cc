@@ -1,0 +1,237 @@
+// Smaller parts of the thermal solver: material, tip, damage, protected structures, patches.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "services/core/error.h"
+#include "tests/numerics/thermal/flat_scene.h"
+#include "thermal_node/coupling/patch.h"
+#include "thermal_node/coupling/tip_tracker.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+TEST(MaterialTest, RefusesBadParametersWithNameValueAndRange) {
+  ThermalParams params;
+  params.thickness_m = 0.3f;  // millimetres given as metres
+  try {
+    (void)MakeMaterial(params);
+    FAIL();
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("thermal.thickness_m"), std::string::npos);
+    EXPECT_NE(text.find("0.3"), std::string::npos);
+    EXPECT_NE(text.find("range"), std::string::npos);
+  }
+  params = {};
+  params.sigma_S_m = NAN;
+  EXPECT_THROW((void)MakeMaterial(params), InputError);
+  EXPECT_NO_THROW((void)MakeMaterial(ThermalParams{}));
+}
+
+TEST(MaterialTest, HeatCapacityAndConductivitiesFallAsTheTissueDries) {
+  const Material m = MakeMaterial(ThermalParams{});
+  EXPECT_GT(m.HeatCapacity(0), 0.0f);
+  EXPECT_LT(m.HeatCapacity(0), 0.3f * m.HeatCapacity(1));
+  EXPECT_LT(m.ThermalConductivity(0), m.ThermalConductivity(1));
+  EXPECT_FLOAT_EQ(m.ElectricalConductivity(0, 1), m.sigma);
+  EXPECT_NEAR(m.ElectricalConductivity(60, 1) / m.sigma, 1.9f, 0.01f);
+  EXPECT_NEAR(m.ElectricalConductivity(300, 0) / m.ElectricalConductivity(300, 1), 0.01f, 1e-4f);
+}
+
+TEST(SheetTest, CellsOutsideTheMembraneAreNoTissue) {
+  scene::SceneData data = FlatScene(11, 11, 1e-3f);
+  for (Vec2f& p : data.membrane_material) p.x() += 0.5f * p.y();  // a sheared sheet
+  const Sheet sheet = MakeSheet(data.View());
+  EXPECT_TRUE(sheet.OnSheet({0.005f, 0.005f}));
+  EXPECT_FALSE(sheet.OnSheet({0.001f, 0.009f}));
+  EXPECT_FALSE(sheet.OnSheet({0.014f, 0.001f}));
+  EXPECT_FALSE(sheet.OnSheet({NAN, 0.001f}));
+  EXPECT_FALSE(sheet.OnSheet({1e9f, 0.001f}));
+}
+
+TEST(SheetTest, SceneWithoutMembraneIsRefused) {
+  scene::SceneData data;
+  EXPECT_THROW((void)MakeSheet(data.View()), InputError);
+  data = FlatScene(5, 5, 1e-3f);
+  data.membrane_material[3].x() = NAN;
+  EXPECT_THROW((void)MakeSheet(data.View()), InputError);
+  data = FlatScene(5, 5, 1.0f);  // a sheet of four metres
+  EXPECT_THROW((void)MakeSheet(data.View()), InputError);
+}
+
+class TipTest : public ::testing::Test {
+ protected:
+  [[nodiscard]] static CauteryContact At(float s, float t) {
+    CauteryContact contact;
+    contact.touching = true;
+    contact.mode = CauteryMode::kCut;
+    contact.power_W = 35;
+    contact.contact_radius_m = 5e-4f;
+    contact.material = {s, t};
+    return contact;
+  }
+  Sheet sheet_ = MakeFlatSheet(0.02f, 0.02f, 1e-4f);
+  TipTracker tip_{sheet_, 5e-4f};
+};
+
+TEST_F(TipTest, PathsOfSuccessiveFramesJoin) {
+  CauteryContact a = At(0.005f, 0.01f), b = At(0.0051f, 0.01f), c = At(0.0055f, 0.0102f);
+  EXPECT_EQ(tip_.Advance(&a, 0.01).path.from, a.material);
+  const TipInput second = tip_.Advance(&b, 0.01);
+  EXPECT_EQ(second.path.from, a.material);
+  EXPECT_EQ(second.path.to, b.material);
+  // No sample in one frame, two samples' way in the next.
+  const TipInput third = tip_.Advance(nullptr, 0.01);
+  EXPECT_EQ(third.path.from, third.path.to);
+  const TipInput fourth = tip_.Advance(&c, 0.01);
+  EXPECT_EQ(fourth.path.from, b.material);
+  EXPECT_EQ(fourth.path.to, c.material);
+}
+
+TEST_F(TipTest, JumpStartsANewPath) {
+  const CauteryContact a = At(0.005f, 0.01f), b = At(0.012f, 0.01f);
+  (void)tip_.Advance(&a, 0.01);
+  const TipInput jumped = tip_.Advance(&b, 0.01);
+  EXPECT_EQ(jumped.path.from, b.material);
+  EXPECT_TRUE(jumped.active);
+}
+
+TEST_F(TipTest, SilenceTurnsTheCurrentOff) {
+  const CauteryContact a = At(0.005f, 0.01f);
+  EXPECT_TRUE(tip_.Advance(&a, 0.01).active);
+  for (int n = 0; n < 9; ++n) EXPECT_TRUE(tip_.Advance(nullptr, 0.01).active);
+  for (int n = 0; n < 5; ++n) (void)tip_.Advance(nullptr, 0.01);
+  EXPECT_FALSE(tip_.Advance(nullptr, 0.01).active);
+}
+
+TEST_F(TipTest, SamplesOutOfRangeAreNotAccepted) {
+  EXPECT_TRUE(tip_.Accepts(At(0.005f, 0.01f)));
+  EXPECT_FALSE(tip_.Accepts(At(0.03f, 0.01f)));
+  EXPECT_FALSE(tip_.Accepts(At(NAN, 0.01f)));
+  CauteryContact strong = At(0.005f, 0.01f);
+  strong.power_W = 1e4f;
+  EXPECT_FALSE(tip_.Accepts(strong));
+  CauteryContact lifted = At(NAN, NAN);
+  lifted.touching = false;
+  EXPECT_TRUE(tip_.Accepts(lifted));
+}
+
+TEST(GeneratorTest, PowerThenVoltageThenCurrentLimits) {
+  const Drive drive = MakeDrive(ThermalParams{}, CauteryMode::kCut, 35);
+  EXPECT_NEAR(RegulatedVoltage(drive, 1e-3f), std::sqrt(35 / 1e-3f), 0.1f);
+  EXPECT_FLOAT_EQ(RegulatedVoltage(drive, 1e-6f), 350.0f);
+  EXPECT_FLOAT_EQ(RegulatedVoltage(drive, 10.0f), 0.2f);
+  EXPECT_EQ(RegulatedVoltage(drive, 0.0f), 0.0f);
+  EXPECT_LT(MakeDrive(ThermalParams{}, CauteryMode::kCoag, 35).v_max_V, drive.v_max_V);
+  EXPECT_GT(MakeDrive(ThermalParams{}, CauteryMode::kBlend, 35).remove_theta, drive.remove_theta);
+}
+
+TEST(DamageTest, KnownTimesToCellDeath) {
+  const DamageRate rate(kCellDeath, 37);
+  // Omega = 1 after 510 s at 43 C, 61 s at 50 C, 3.5 s at 60 C, 0.23 s at 70 C (lab values).
+  EXPECT_NEAR(1 / rate.At(6), 510, 15);
+  EXPECT_NEAR(1 / rate.At(13), 61, 2);
+  EXPECT_NEAR(1 / rate.At(23), 3.5, 0.2);
+  EXPECT_NEAR(1 / rate.At(33), 0.23, 0.02);
+  EXPECT_TRUE(std::isfinite(rate.At(1e9f)));
+  EXPECT_EQ(rate.At(-5), rate.At(0));
+}
+
+TEST(DamageTest, TableFollowsTheFormula) {
+  const DamageRate rate(kCollagen, 37);
+  for (double theta = 10; theta < 100; theta += 0.37) {
+    const double exact = kCollagen.a_per_s * std::exp(-kCollagen.ea_J_mol / (8.314462618 * (273.15 + 37 + theta)));
+    EXPECT_NEAR(rate.At(static_cast<float>(theta)) / exact, 1, 2e-3);
+  }
+}
+
+scene::SceneData SceneWithUreter(float depth_m) {
+  scene::SceneData data = FlatScene(21, 21, 1e-3f);
+  data.protected_structures = {{ProtectedKind::kUreter, 0.002f, depth_m, 0, 2}};
+  data.protected_points = {{Vec3f::Zero(), Vec2f(0.002f, 0.01f)}, {Vec3f::Zero(), Vec2f(0.018f, 0.01f)}};
+  return data;
+}
+
+std::set<ThermalEventKind> EventsOfDwell(float depth_m, int frames) {
+  const scene::SceneData data = SceneWithUreter(depth_m);
+  ThermalSolver solver(data.View());
+  std::set<ThermalEventKind> kinds;
+  TipInput tip;
+  tip.active = true;
+  tip.path.from = tip.path.to = {0.0103f, 0.0101f};
+  tip.path.radius_m = 5e-4f;
+  tip.mode = CauteryMode::kCoag;
+  tip.power_W = 15;
+  for (int n = 0; n < frames; ++n) {
+    solver.Step(tip, 0.01f);
+    for (const SolverEvent& event : solver.events()) kinds.insert(event.kind);
+  }
+  return kinds;
+}
+
+TEST(ProtectedTest, ShallowUreterIsWarnedAndInjuredByALongStay) {
+  const auto kinds = EventsOfDwell(5e-4f, 2000);
+  EXPECT_TRUE(kinds.contains(ThermalEventKind::kUreterWarning));
+  EXPECT_TRUE(kinds.contains(ThermalEventKind::kUreterInjury));
+  EXPECT_FALSE(kinds.contains(ThermalEventKind::kNerveWarning));
+  EXPECT_TRUE(kinds.contains(ThermalEventKind::kContact));
+  EXPECT_TRUE(kinds.contains(ThermalEventKind::kSteam));
+  EXPECT_TRUE(kinds.contains(ThermalEventKind::kBlanch));
+}
+
+TEST(ProtectedTest, DeepUreterIsSafeFromAShortOne) {
+  const auto kinds = EventsOfDwell(4e-3f, 200);
+  EXPECT_FALSE(kinds.contains(ThermalEventKind::kUreterWarning));
+}
+
+TEST(PatchTest, ShowsTemperatureDamageAndHolesInPlace) {
+  const scene::SceneData data = FlatScene(41, 41, 1e-3f);
+  const SceneView scene = data.View();
+  ThermalSolver solver(scene);
+  Drag drag;
+  drag.from = {0.030f, 0.0102f};
+  drag.to = {0.036f, 0.0102f};
+  RunDrag(drag, 0.01f, &solver);
+  std::vector<std::uint8_t> texels(4 * kPatchTexels * kPatchTexels);
+  const PatchPlace place{0, 256, 0};
+  const float highest = DrawPatch(solver.field(), scene.membrane.texel_m, place, texels);
+  EXPECT_NEAR(highest, 100, 10);
+  const auto at = [&](int x, int y) { return &texels[4 * (static_cast<std::size_t>(y) * kPatchTexels + x - 256)]; };
+  EXPECT_EQ(at(330, 102)[3], 0);        // in the slit
+  EXPECT_EQ(at(330, 160)[3], 255);      // beside it
+  EXPECT_EQ(at(330, 160)[1], 0);        // undamaged
+  EXPECT_NEAR(at(256, 250)[0], 34, 1);  // 37 C
+  int brown = 0;
+  for (int y = 80; y < 125; ++y) brown += at(330, y)[3] != 0 && at(330, y)[1] > 128 ? 1 : 0;
+  EXPECT_GT(brown, 1);
+}
+
+TEST(PatchTest, PlannerSendsWhatChangedOnceAndOnlyThat) {
+  const scene::SceneData data = FlatScene(61, 61, 1e-3f);
+  const SceneView scene = data.View();
+  ThermalSolver solver(scene);
+  PatchPlanner planner(solver.field(), scene.membrane.texel_m);
+  EXPECT_FALSE(planner.Next(solver.field()));
+  EXPECT_FALSE(planner.NextOfHistory());
+  Drag drag;
+  drag.from = {0.045f, 0.0402f};
+  drag.to = {0.046f, 0.0402f};
+  RunDrag(drag, 0.01f, &solver);
+  planner.Note(solver.mutable_field(), false);
+  const auto place = planner.Next(solver.field());
+  ASSERT_TRUE(place);
+  EXPECT_EQ(place->origin_x, 256u);
+  EXPECT_EQ(place->origin_y, 256u);
+  EXPECT_FALSE(planner.Next(solver.field()));
+  planner.Note(solver.mutable_field(), false);
+  EXPECT_FALSE(planner.Next(solver.field()));
+  EXPECT_TRUE(planner.NextOfHistory());
+  planner.Note(solver.mutable_field(), true);
+  EXPECT_TRUE(planner.Next(solver.field()));
+}
+
+}  // namespace
+}  // namespace fulcrum::thermal

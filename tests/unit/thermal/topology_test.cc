@@ -1,0 +1,148 @@
+// Edges and nodes of the mesh against holes in the cells.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/numerics/thermal/flat_scene.h"
+#include "thermal_node/topology/mesh_topology.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+constexpr float kCell = 1e-4f;
+constexpr std::uint32_t kRows = 21, kCols = 31;
+
+class TopologyTest : public ::testing::Test {
+ protected:
+  TopologyTest()
+      : data_(FlatScene(kRows, kCols, 1e-3f)),
+        scene_(data_.View()),
+        field_(MakeSheet(scene_), MakeMaterial(scene_.thermal)),
+        topology_(scene_, field_.sheet()) {}
+
+  /// Removes the cells [x0, x1] x [y0, y1] and lets the topology look.
+  void Remove(int x0, int y0, int x1, int y1) {
+    double heat = 0;
+    for (int y = y0; y <= y1; ++y) {
+      for (int x = x0; x <= x1; ++x) {
+        field_.TakeOut(field_.Wake(x / kTile, y / kTile), (y % kTile) * kTile + x % kTile, kRemoved, &heat);
+      }
+    }
+    topology_.StageCut(field_, {x0, y0}, {x1, y1});
+  }
+  [[nodiscard]] bool EdgeDead(std::uint32_t row, std::uint32_t col, std::uint32_t direction) const {
+    return TestBit(topology_.committed().dead_edges, 3 * (row * kCols + col) + direction);
+  }
+  [[nodiscard]] bool NodeDead(std::uint32_t row, std::uint32_t col) const {
+    return TestBit(topology_.committed().dead_nodes, row * kCols + col);
+  }
+
+  scene::SceneData data_;
+  SceneView scene_;
+  HeatField field_;
+  MeshTopology topology_;
+};
+
+TEST_F(TopologyTest, SlitOfOneCellBetweenTheRowsCutsWhatCrossesIt) {
+  // Rows lie at cells 50 and 60; the slit at 55 touches no node.
+  Remove(42, 55, 258, 55);
+  EXPECT_TRUE(topology_.Commit());
+  for (std::uint32_t col = 5; col < 25; ++col) {
+    EXPECT_TRUE(EdgeDead(5, col, 1)) << col;   // to the next row
+    EXPECT_TRUE(EdgeDead(5, col, 2)) << col;   // diagonal
+    EXPECT_FALSE(EdgeDead(5, col, 0)) << col;  // along the slit
+    EXPECT_FALSE(EdgeDead(6, col, 0)) << col;
+    EXPECT_FALSE(NodeDead(5, col));
+  }
+  EXPECT_FALSE(EdgeDead(4, 15, 1));
+  EXPECT_FALSE(EdgeDead(6, 15, 1));
+  EXPECT_EQ(topology_.dead_node_count(), 0u);
+}
+
+TEST_F(TopologyTest, DiagonalSlitOfTouchingCornersCutsToo) {
+  double heat = 0;
+  for (int n = 40; n < 160; ++n) {
+    field_.TakeOut(field_.Wake(n / kTile, n / kTile), (n % kTile) * kTile + n % kTile, kRemoved, &heat);
+  }
+  topology_.StageCut(field_, {40, 40}, {159, 159});
+  topology_.Commit();
+  // Direction 1 from (r, c) with c = r goes away from the diagonal; from (r, r+1) it crosses it at (r+1, r+1): both
+  // ends of those lie on the slit. The edge from (r, c+1) down to (r+1, c+1) ends on it.
+  for (std::uint32_t r = 5; r < 15; ++r) {
+    EXPECT_TRUE(NodeDead(r, r));
+    EXPECT_TRUE(EdgeDead(r, r, 0));
+    EXPECT_TRUE(EdgeDead(r, r, 2));
+  }
+  EXPECT_FALSE(EdgeDead(5, 8, 1));
+}
+
+TEST_F(TopologyTest, PinHoleInAStrandDoesNotCutIt) {
+  Remove(55, 50, 55, 50);  // on the segment from (5,5) to (5,6)
+  EXPECT_FALSE(topology_.Commit());
+  EXPECT_EQ(topology_.revision(), 0u);
+  EXPECT_FALSE(EdgeDead(5, 5, 0));
+}
+
+TEST_F(TopologyTest, NodeDiesWithItsCellOrWithItsLastEdge) {
+  Remove(50, 50, 50, 50);
+  topology_.Commit();
+  EXPECT_TRUE(NodeDead(5, 5));
+  EXPECT_TRUE(EdgeDead(5, 5, 0) && EdgeDead(5, 5, 1) && EdgeDead(5, 5, 2));
+  EXPECT_TRUE(EdgeDead(5, 4, 0) && EdgeDead(4, 5, 1) && EdgeDead(4, 4, 2));
+  EXPECT_FALSE(NodeDead(5, 6));
+  // A moat around node (10, 10), whose own cell stays.
+  Remove(96, 96, 104, 97);
+  Remove(96, 103, 104, 104);
+  Remove(96, 98, 97, 102);
+  Remove(103, 98, 104, 102);
+  topology_.Commit();
+  EXPECT_TRUE(NodeDead(10, 10));
+}
+
+TEST_F(TopologyTest, NothingShowsBeforeCommitAndRevisionsCountCommits) {
+  Remove(42, 55, 258, 55);
+  EXPECT_TRUE(topology_.staged());
+  EXPECT_FALSE(EdgeDead(5, 10, 1));
+  EXPECT_TRUE(topology_.Commit());
+  EXPECT_EQ(topology_.revision(), 1u);
+  EXPECT_TRUE(EdgeDead(5, 10, 1));
+  EXPECT_FALSE(topology_.Commit());
+  EXPECT_EQ(topology_.revision(), 1u);
+}
+
+TEST_F(TopologyTest, ShrinkIsTakenOnceFromTheRestLength) {
+  Tile* tile = field_.Wake(3, 3);
+  for (int ty = 2; ty <= 4; ++ty) {
+    for (int tx = 2; tx <= 4; ++tx) field_.Wake(tx, ty)->state.omega_collagen.fill(1.0f);
+  }
+  // Node (11, 11) is inside tile (3, 3); both ends of its edge are damaged, which must not count twice.
+  const std::size_t edge = 3 * (11 * kCols + 11);
+  const float expected = scene_.thermal.shrink_max * (1 - std::exp(-1.0f));
+  for (int n = 0; n < 3; ++n) {
+    topology_.StageShrink(field_, *tile);
+    topology_.Commit();
+    const float lost = static_cast<float>(topology_.committed().shrink[edge]) * kShrinkUnit;
+    EXPECT_NEAR(lost, expected, kShrinkStep * kShrinkUnit);
+    EXPECT_LE(lost, expected);
+  }
+  EXPECT_EQ(topology_.revision(), 1u);
+}
+
+TEST_F(TopologyTest, RestoredTopologyGoesOn) {
+  Remove(42, 55, 150, 55);
+  topology_.Commit();
+  MeshTopology other(scene_, field_.sheet());
+  other.Restore(topology_.revision(), topology_.committed());
+  EXPECT_EQ(other.dead_edge_count(), topology_.dead_edge_count());
+  double heat = 0;
+  for (int x = 151; x < 258; ++x) {
+    field_.TakeOut(field_.Wake(x / kTile, 55 / kTile), (55 % kTile) * kTile + x % kTile, kRemoved, &heat);
+  }
+  other.StageCut(field_, {151, 55}, {257, 55});
+  EXPECT_TRUE(other.Commit());
+  EXPECT_EQ(other.revision(), topology_.revision() + 1);
+  EXPECT_GT(other.dead_edge_count(), topology_.dead_edge_count());
+}
+
+}  // namespace
+}  // namespace fulcrum::thermal
