@@ -39,7 +39,7 @@ bool HasCapability(int capability) {
 }  // namespace
 
 std::string LockMemory() {
-  const std::string how =
+  std::string how =
       "memory is not locked, so a page fault may delay a cycle; to permit it, raise \"memlock\" to unlimited for this "
       "user in /etc/security/limits.conf, or give the program CAP_IPC_LOCK";
   rlimit limit{};
