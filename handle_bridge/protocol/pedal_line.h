@@ -3,7 +3,7 @@
 //   P h c CR LF      h: pedal bits as one hexadecimal digit, c: its complement (15 - h), for example `P1E` = cut.
 //
 // Sent at once when a pedal moves and every 20 ms otherwise. The complement refuses every damaged digit; silence for
-// 100 ms counts as all pedals up, because the generator must not stay on behind a broken wire.
+// 200 ms counts as all pedals up, because the generator must not stay on behind a broken wire.
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 namespace fulcrum::handle_bridge {
 
 inline constexpr double kPedalPeriod_s = 0.02;
-inline constexpr double kPedalTimeout_s = 0.1;
+inline constexpr double kPedalTimeout_s = 0.2;
 inline constexpr std::uint8_t kAllPedals = 7;  ///< kPedalCut | kPedalCoag | kPedalBlend
 
 /// Pedal bits of a line without its CR LF, or nothing.

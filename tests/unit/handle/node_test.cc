@@ -145,7 +145,7 @@ TEST_F(NodeTest, SilenceHoldsTheAngleAndReleasesThePedal) {
     Tick(25, kPedalCoag);
   }
   const double held = jaw0_deg();
-  for (int i = 0; i < 38; ++i) {
+  for (int i = 0; i < 78; ++i) {
     TickSilently();
   }
   EXPECT_EQ(state_.pedals, kPedalCoag);

@@ -199,7 +199,7 @@ TEST(LinkMonitor, TellsGoodSilentGarbledAndWrongStep) {
   Feed(&monitor, 400, good);
   EXPECT_EQ(monitor.state(), LinkState::kOk);
   EXPECT_EQ(monitor.quality(), 1.0f);
-  Feed(&monitor, 39, silent);
+  Feed(&monitor, 79, silent);
   EXPECT_EQ(monitor.state(), LinkState::kOk);
   Feed(&monitor, 2, silent);
   EXPECT_EQ(monitor.state(), LinkState::kNoData);
