@@ -33,31 +33,30 @@ fulcrum_packages() {
     >/dev/null || fulcrum_fail 'apt-get install failed'
 }
 
-# Runs a long step quietly: one line before, its output only when it fails.
+# fulcrum_step WHAT LOG COMMAND...: runs a long step quietly. What it is shows when it takes longer than a second, its
+# output only when it fails. On a terminal the last "[done/all]" of its output is shown while it runs.
 fulcrum_step() {
-  local what=$1 log=$2
+  local what=$1 log=$2 job tenths=0 said=
   shift 2
-  printf '%s ...\n' "$what"
   mkdir -p "$(dirname "$log")"
-  if ! "$@" >"$log" 2>&1; then
+  "$@" >"$log" 2>&1 9>&- &
+  job=$!
+  # A shell without job control lets its background jobs ignore Ctrl-C: they are ended here.
+  trap 'kill "$job" 2>/dev/null; exit 130' INT TERM
+  while kill -0 "$job" 2>/dev/null; do
+    if ((tenths++ >= 10)); then
+      [[ -n $said ]] || printf '%s ...\n' "$what"
+      said=1
+      [[ ! -t 1 ]] || printf '\r%s ' "$(tail -n 1 "$log" | grep -o '^\[[0-9]*/[0-9]*\]')"
+    fi
+    sleep 0.1
+  done
+  [[ -z $said || ! -t 1 ]] || printf '\r\033[K'
+  if ! wait "$job"; then
     tail -n 60 "$log" >&2
     fulcrum_fail "$what failed; all of its output: $log"
   fi
-}
-
-# fulcrum_compile [TARGET ...]: builds these, or everything.
-fulcrum_compile() {
-  local log=$fulcrum_root/build/release.build.log plan
-  # The list of test folders is looked through again each time; that is no work.
-  plan=$(ninja -C "$fulcrum_build" -n "$@" 2>&1 | grep -v 'Re-checking globbed') || true
-  [[ $plan == *'Building '* || $plan == *'Linking '* || $plan != *'no work to do'* ]] || return 0
-  # On a terminal ninja shows one live line; into a pipe it would print thousands.
-  if [[ -t 1 ]]; then
-    printf 'building ...\n'
-    ninja -C "$fulcrum_build" "$@" || fulcrum_fail 'the build failed'
-  else
-    fulcrum_step 'building (the first time this takes some minutes)' "$log" ninja -C "$fulcrum_build" "$@"
-  fi
+  trap - INT TERM
 }
 
 # fulcrum_set_up [TARGET ...]
@@ -65,8 +64,14 @@ fulcrum_set_up() {
   cd "$fulcrum_root" || exit 1
   [[ -r /etc/debian_version ]] || fulcrum_fail 'this needs Debian 12 (other systems: see services/README.md)' 2
   fulcrum_packages
+  # Two builds at once would spoil each other's records of what is up to date.
+  mkdir -p "$fulcrum_root/build"
+  exec 9>"$fulcrum_root/build/release.lock"
+  flock 9
   if [[ ! -e $fulcrum_build/build.ninja ]]; then
     fulcrum_step 'configuring' "$fulcrum_root/build/release.configure.log" cmake --preset release
   fi
-  fulcrum_compile "$@"
+  fulcrum_step 'building (the first time this takes some minutes)' "$fulcrum_root/build/release.build.log" \
+    ninja -C "$fulcrum_build" "$@"
+  exec 9>&-
 }

@@ -93,15 +93,14 @@ std::string SessionView::Text() const {
     if (!health.last_error.empty()) {
       text += "               └ " + health.last_error + "\n";
     }
+    std::string own;
     for (const Metric& metric : health.metrics) {
-      figures += figures.empty() ? "\n" : " · ";
-      figures += metric.name + " " + Fixed(metric.value, 2);
+      own += own.empty() ? std::string("\n") + NodeName(health.node) + ": " : " · ";
+      own += metric.name + " " + Fixed(metric.value, 2);
     }
-    if (!health.metrics.empty()) {
-      figures += "\n";
-    }
+    figures += own;
   }
-  return text + figures;
+  return text + figures + "\n";
 }
 
 }  // namespace fulcrum::supervisor::cli
