@@ -9,20 +9,27 @@ namespace {
 /// How far tissue may move in one step's iterations and still be among the pairs [m].
 constexpr float kSlack = 0.0015f;
 /// One projection moves tissue at most this far: a deep overlap is undone over several steps, not thrown out [m].
-constexpr float kMaxPush = 0.003f;
+constexpr float kMaxPush = 0.001f;
 /// A tool deeper behind a triangle than this has gone through it for good: pushing would only tear [m].
 constexpr float kMaxBehind = 0.004f;
-/// Below this height there is no telling on which side of a triangle the tool was [m].
-constexpr float kUnclearHeight = 1e-6f;
-/// After letting go, jaws collide again when nothing has been near them for so many steps.
+/// After closing or letting go, jaws collide again when nothing has been in their way for so many steps.
 constexpr int kClearSteps = 5;
+/// Jaws that have closed on nothing are clear of what is further than this part of their radius from their axis.
+constexpr float kClearPart = 0.5f;
 /// A sweep is cut into pieces of this part of the capsule's radius …
 constexpr float kSweepPiece = 0.8f;
 /// … but at most into this many.
 constexpr int kMaxPieces = 16;
+/// Sides are told by the normal of a patch this many nodes each way, not by that of a triangle: a crumpled triangle
+/// turns over without the membrane doing so.
+constexpr int kPatch = 3;
 /// Tube triangles per bounding sphere.
 constexpr std::size_t kChunkSize = 24;
-/// The tool counts as behind a triangle only where its offset is this much along the normal, and not beside an edge.
+/// With a corner that cannot move, the others must not make up for all of it: they move at most as if this part of the
+/// lightest corner's inverse mass stood against them. Three free corners of equal mass have at least 1/3.
+constexpr float kLeastShare = 0.25f;
+/// On which side of a triangle the tool is, can be told only where its offset is this much along the normal, and not
+/// beside an edge.
 constexpr float kBehindCosine = 0.7f;
 
 float DistanceToSegment(const Vec3f& p, const Vec3f& a, const Vec3f& b) {
@@ -160,6 +167,23 @@ void ToolCollision::ForEachTubeTriangleNear(const Vec3f& a, const Vec3f& b, floa
   }
 }
 
+Vec3f ToolCollision::PatchNormal(Index triangle, bool previous) const {
+  const GridLayout& layout = particles_->layout();
+  const Index cell = triangle / 2, cells = layout.cols - 1;
+  const auto row = static_cast<int>(cell / cells), col = static_cast<int>(cell % cells);
+  const auto at = [&](int r, int c) {
+    const ParticleRef ref =
+        particles_->NodeRef(static_cast<Index>(std::clamp(r, 0, static_cast<int>(layout.rows) - 1)),
+                            static_cast<Index>(std::clamp(c, 0, static_cast<int>(layout.cols) - 1)));
+    return previous ? particles_->Previous(ref) : particles_->At(ref);
+  };
+  const Vec3f along = at(row, col + kPatch + 1) - at(row, col - kPatch);
+  const Vec3f down = at(row + kPatch + 1, col) - at(row - kPatch, col);
+  const Vec3f normal = along.cross(down);
+  const float area = normal.norm();
+  return area > 0.0f ? Vec3f(normal / area) : Vec3f(Vec3f::Zero());
+}
+
 void ToolCollision::AddPair(std::uint32_t capsule, Index triangle, const std::array<Index, 3>& particle,
                             const std::array<ParticleRef, 3>& at, float range) {
   const Motion& motion = motion_[capsule];
@@ -175,7 +199,10 @@ void ToolCollision::AddPair(std::uint32_t capsule, Index triangle, const std::ar
   pair.at = at;
   if (triangle >= membrane_triangles_) {
     pair.side = 1;  // The organ is closed: tools are outside.
+    const Vec3f x0 = particles_->At(at[0]);
+    pair.normal = (particles_->At(at[1]) - x0).cross(particles_->At(at[2]) - x0).normalized();
   } else {
+    pair.normal = PatchNormal(triangle, false);
     const auto last =
         std::lower_bound(last_pairs_.begin(), last_pairs_.end(), pair, [](const ContactPair& p, const ContactPair& q) {
           return std::pair(p.capsule, p.triangle) < std::pair(q.capsule, q.triangle);
@@ -184,15 +211,14 @@ void ToolCollision::AddPair(std::uint32_t capsule, Index triangle, const std::ar
     // Where the two points that are closest now were before this step, when nothing overlapped.
     const auto& b = pair.closest.barycentric;
     const Vec3f x0 = particles_->Previous(at[0]), x1 = particles_->Previous(at[1]), x2 = particles_->Previous(at[2]);
-    const Vec3f normal = (x1 - x0).cross(x2 - x0);
-    const Vec3f offset = motion.from.a + pair.closest.t * (motion.from.b - motion.from.a) -
-                         (b[0] * x0 + b[1] * x1 + b[2] * x2);
-    const float height = normal.dot(offset);
-    const bool unclear = std::abs(height) <= kUnclearHeight * normal.norm();
-    if (known && (last->touching || unclear)) {
+    const Vec3f offset =
+        motion.from.a + pair.closest.t * (motion.from.b - motion.from.a) - (b[0] * x0 + b[1] * x1 + b[2] * x2);
+    const float height = PatchNormal(triangle, true).dot(offset), steep = kBehindCosine * offset.norm();
+    const bool clear = std::abs(height) > steep && steep > 0.0f;
+    if (known && (last->touching || !clear)) {
       pair.side = last->side;
-    } else {
-      pair.side = unclear ? std::int8_t{0} : height > 0.0f ? std::int8_t{1} : std::int8_t{-1};
+    } else if (clear) {
+      pair.side = height > 0.0f ? std::int8_t{1} : std::int8_t{-1};
     }
   }
   pairs_.push_back(pair);
@@ -215,6 +241,20 @@ void ToolCollision::FindMembranePairs(std::uint32_t capsule, float range) {
       AddPair(capsule, triangle, particle, at, range);
     }
   });
+}
+
+/// Where a pair's own geometry does not tell the side, its neighbours' does when they agree.
+void ToolCollision::SettleSides(std::size_t first) {
+  bool above = false, below = false;
+  for (std::size_t i = first; i < pairs_.size(); ++i) {
+    above |= pairs_[i].side > 0;
+    below |= pairs_[i].side < 0;
+  }
+  if (above != below) {
+    for (std::size_t i = first; i < pairs_.size(); ++i) {
+      pairs_[i].side = above ? 1 : -1;
+    }
+  }
 }
 
 void ToolCollision::FindTubePairs(std::uint32_t capsule, float range) {
@@ -256,16 +296,27 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
       }
       const std::size_t first = pairs_.size();
       FindMembranePairs(c, range);
+      SettleSides(first);
       FindTubePairs(c, range);
-      clear = clear && (to.part != ToolPart::kJaw || pairs_.size() == first);
+      if (to.part == ToolPart::kJaw) {
+        const float least = yielding_[tool].held ? 3e38f : kClearPart * to.radius;
+        clear = clear && std::none_of(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end(),
+                                      [least](const ContactPair& p) { return p.closest.distance_sq < least * least; });
+      }
     }
-    yielding_[tool] = moved.hold ? kClearSteps : clear ? std::max(yielding_[tool] - 1, 0) : yielding_[tool];
+    Yielding& yielding = yielding_[tool];
+    yielding.held = moved.hold || (yielding.held && yielding.steps > 0);
+    if (moved.hold || moved.closing) {
+      yielding.steps = kClearSteps;
+    } else if (clear && yielding.steps > 0) {
+      --yielding.steps;
+    }
   }
   std::sort(pairs_.begin(), pairs_.end(), [](const ContactPair& p, const ContactPair& q) {
     return std::pair(p.capsule, p.triangle) < std::pair(q.capsule, q.triangle);
   });
   for (std::uint32_t c = 0; c < motion_.size(); ++c) {
-    if (motion_[c].to.part == ToolPart::kJaw && yielding_[c / kMaxCapsules] > 0) {
+    if (motion_[c].to.part == ToolPart::kJaw && yielding_[c / kMaxCapsules].steps > 0) {
       motion_[c].enabled = false;
     }
   }
@@ -298,12 +349,7 @@ void ToolCollision::ProjectPair(ContactPair* pair, const Capsule& capsule) {
   pair->closest = ClosestSegmentTriangle(capsule.a, capsule.b, x[0], x[1], x[2]);
   const ClosestPoints& closest = pair->closest;
   const float reach = capsule.radius + scene_.physics.collision_margin_m;
-  const Vec3f area = (x[1] - x[0]).cross(x[2] - x[0]);
-  const float area_norm = area.norm();
-  if (!(area_norm > 0.0f)) {
-    return;  // A triangle without area has no side; its neighbours hold the tool off.
-  }
-  const Vec3f normal = area / area_norm;
+  const Vec3f& normal = pair->normal;
   const auto side = static_cast<float>(pair->side);
   const Vec3f offset = closest.on_segment - closest.on_triangle;
   const float distance = std::sqrt(closest.distance_sq);
@@ -330,14 +376,17 @@ void ToolCollision::ProjectPair(ContactPair* pair, const Capsule& capsule) {
   depth = std::min(depth, kMaxPush);
   const auto& b = closest.barycentric;
   std::array<float, 3> w;
-  float sum = 0;
+  float sum = 0, lightest = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    w[i] = particles_->InverseMass(pair->at[i]) * b[i];
+    const float inverse_mass = particles_->InverseMass(pair->at[i]);
+    w[i] = inverse_mass * b[i];
     sum += w[i] * b[i];
+    lightest = std::max(lightest, inverse_mass);
   }
   if (!(sum > 0.0f)) {
     return;
   }
+  sum = std::max(sum, kLeastShare * lightest);
   pair->touching = true;
   // Coulomb: the point of contact is carried along by at most friction times the push.
   const Motion& m = motion_[pair->capsule];
@@ -346,17 +395,12 @@ void ToolCollision::ProjectPair(ContactPair* pair, const Capsule& capsule) {
       closest.on_triangle - (b[0] * particles_->Previous(pair->at[0]) + b[1] * particles_->Previous(pair->at[1]) +
                              b[2] * particles_->Previous(pair->at[2]));
   Vec3f slide = tissue_step - tool_step;
-  const float approach = -slide.dot(pair->push);
-  slide += approach * pair->push;
+  slide -= slide.dot(pair->push) * pair->push;
   const float sliding = slide.norm(), grip = scene_.physics.friction * depth;
   const Vec3f move = depth * pair->push - (sliding > grip ? Vec3f(slide * (grip / sliding)) : slide);
-  // An overlap that this step's motion does not explain is taken away without giving the tissue speed.
-  const Vec3f correction = std::max(0.0f, depth - std::max(0.0f, approach)) * pair->push;
   for (std::size_t i = 0; i < 3; ++i) {
     if (w[i] > 0.0f) {
-      const float share = w[i] / sum;
-      particles_->Set(pair->at[i], x[i] + share * move);
-      particles_->SetPrevious(pair->at[i], particles_->Previous(pair->at[i]) + share * correction);
+      particles_->Set(pair->at[i], x[i] + (w[i] / sum) * move);
     }
   }
 }
@@ -365,6 +409,24 @@ void ToolCollision::Project() {
   for (ContactPair& pair : pairs_) {
     if (motion_[pair.capsule].enabled) {
       ProjectPair(&pair, motion_[pair.capsule].to);
+    }
+  }
+}
+
+void ToolCollision::Settle() {
+  for (const ContactPair& pair : pairs_) {
+    if (!pair.touching) {
+      continue;
+    }
+    const Motion& m = motion_[pair.capsule];
+    const Vec3f tool_step = pair.closest.on_segment - (m.from.a + pair.closest.t * (m.from.b - m.from.a));
+    const float driven = std::max(0.0f, tool_step.dot(pair.push));
+    for (const ParticleRef at : pair.at) {
+      const Vec3f previous = particles_->Previous(at);
+      const float excess = (particles_->At(at) - previous).dot(pair.push) - driven;
+      if (excess > 0.0f && particles_->InverseMass(at) > 0.0f) {
+        particles_->SetPrevious(at, previous + excess * pair.push);
+      }
     }
   }
 }

@@ -19,7 +19,8 @@ namespace fulcrum::physics {
 struct ContactPair {
   std::uint32_t capsule = 0;  ///< tool * kMaxCapsules + capsule of the tool.
   Index triangle = 0;         ///< Membrane triangle, or membrane triangle count + index in SceneView.tube_surface.
-  std::int8_t side = 0;       ///< Sign of the tool's height over the triangle's normal; 0 unknown.
+  Vec3f normal = Vec3f::Zero();  ///< Of the membrane around it, or of the organ's triangle.
+  std::int8_t side = 0;       ///< Sign of the tool's height along the normal; 0 unknown.
   bool touching = false;      ///< The last projection moved the triangle.
   std::array<ParticleRef, 3> at;
   std::array<Index, 3> particle{};
@@ -42,7 +43,8 @@ class ToolCollision {
 
   struct ToolMotion {
     ToolShape from, to;
-    bool hold = false;  ///< The jaws hold tissue: they do not collide, nor after letting go until they are clear.
+    bool hold = false;     ///< The jaws hold tissue: they do not collide, nor after letting go until they are clear.
+    bool closing = false;  ///< The jaws close: nor then, for two of them pressing from both sides have no answer.
   };
 
   /// Finds the pairs of this step; cheap when no tool is near. `tissue_moved` false: since the last call it has not, so
@@ -52,6 +54,9 @@ class ToolCollision {
   void Sweep();
   /// Moves the tissue out of the tools in their places at the end of the step.
   void Project();
+  /// After the step: tissue does not leave a tool faster than the tool pushed it. Overlaps that took more than that to
+  /// undo would otherwise come back as speed.
+  void Settle();
 
   [[nodiscard]] std::span<const ContactPair> pairs() const { return pairs_; }
   [[nodiscard]] bool any_touching() const;
@@ -73,11 +78,20 @@ class ToolCollision {
     float radius = 0;
   };
 
+  /// Jaws that do not collide for the time being.
+  struct Yielding {
+    int steps = 0;
+    bool held = false;  ///< They held something: nothing at all must be near.
+  };
+
   void UpdateBounds();
   void FindMembranePairs(std::uint32_t capsule, float range);
+  void SettleSides(std::size_t first);
   void FindTubePairs(std::uint32_t capsule, float range);
   void AddPair(std::uint32_t capsule, Index triangle, const std::array<Index, 3>& particle,
                const std::array<ParticleRef, 3>& at, float range);
+  /// Unit normal of the membrane around a triangle, now or before this step; zero where it has none.
+  [[nodiscard]] Vec3f PatchNormal(Index triangle, bool previous) const;
   void ProjectPair(ContactPair* pair, const Capsule& capsule);
   /// visit(row, column, distance of the centre); may lower `range` as it goes.
   template <class Visit>
@@ -97,7 +111,7 @@ class ToolCollision {
   std::vector<Index> tube_order_;
   std::vector<Chunk> chunks_;
   std::array<Motion, kMaxTools * kMaxCapsules> motion_;
-  std::array<int, kMaxTools> yielding_{};  ///< Steps for which the jaws still do not collide.
+  std::array<Yielding, kMaxTools> yielding_;
   std::vector<ContactPair> pairs_, last_pairs_;
 };
 

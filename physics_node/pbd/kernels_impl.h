@@ -10,6 +10,11 @@ namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 /// Only keeps 0/0 away: numerators carry the masses, so a sum of zero masses gives a correction of zero.
 inline F8 Tiny() { return F8::All(1e-30f); }
 
+/// With vertices that cannot move, the others must not make up for all of it however small their part in the constraint
+/// is: this part of the largest possible sum of w |gradient|^2 is divided by at least. A constraint between free
+/// vertices of like mass is above it.
+inline F8 LeastSum(F8 largest_w, F8 largest_gradient_sq) { return F8::All(0.2f) * (largest_w * largest_gradient_sq); }
+
 struct Pair8 {
   V8 p, q;
   F8 w_p, w_q;
@@ -186,10 +191,13 @@ void Bending(float* pool, const BendingBatch* batches, std::size_t count, float 
     const V8 g0 = m1 * Dot(q[1].p - q[2].p, hinge) + m2 * Dot(q[1].p - q[3].p, hinge);
     const V8 g1 = m1 * Dot(q[2].p - q[0].p, hinge) + m2 * Dot(q[3].p - q[0].p, hinge);
     const F8 sum = q[0].w * Dot(g0, g0) + q[1].w * Dot(g1, g1) + q[2].w * Dot(g2, g2) + q[3].w * Dot(g3, g3);
+    const F8 w_max = Max(Max(q[0].w, q[1].w), Max(q[2].w, q[3].w));
+    const F8 g_max = Max(Max(Dot(g0, g0), Dot(g1, g1)), Max(Dot(g2, g2), Dot(g3, g3)));
     F8 c = angle - F8::Load(batch.rest_angle);
     c = Select(c > pi, c - two_pi, c);
     c = Select(c < zero - pi, c + two_pi, c);
-    const F8 lambda = (F8::All(-stiffness) * F8::Load(batch.active)) * c / Max(sum, Tiny());
+    const F8 lambda =
+        (F8::All(-stiffness) * F8::Load(batch.active)) * c / Max(Max(sum, LeastSum(w_max, g_max)), Tiny());
     const V8 g[4] = {g0, g1, g2, g3};
     for (int j = 0; j < 4; ++j) {
       ScatterPool(q[j].p + g[j] * (lambda * q[j].w), pool, batch.base[j], batch.step[j]);
@@ -215,7 +223,8 @@ void Bindings(float* pool, const BindingBatch* batches, std::size_t count, const
     const F8 pressed =
         Max(F8::All(stiffness.compression) * (rest_height - height), F8::All(stiffness.floor) * rest_height - height);
     const F8 sum = q[0].w + q[1].w * b[0] * b[0] + q[2].w * b[1] * b[1] + q[3].w * b[2] * b[2];
-    const F8 scale = F8::Load(batch.active) / Max(sum, Tiny());
+    const F8 w_max = Max(Max(q[0].w, q[1].w), Max(q[2].w, q[3].w));
+    const F8 scale = F8::Load(batch.active) / Max(Max(sum, LeastSum(w_max, F8::All(1.0f))), Tiny());
     const V8 move = d * (scale * drawn / Max(length, Tiny())) + n * (scale * Max(pressed, zero));
     ScatterPool(q[0].p + move * q[0].w, pool, batch.base[0], batch.step[0]);
     for (int j = 0; j < 3; ++j) {

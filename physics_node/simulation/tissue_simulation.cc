@@ -76,7 +76,7 @@ void TissueSimulation::FindContacts(bool tissue_moved) {
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     if (tracks_[i].present) {
       motions[i] = {ShapeOf(scene_.tools[i], tracks_[i].last), ShapeOf(scene_.tools[i], tracks_[i].now),
-                    grasps_[i].holding()};
+                    grasps_[i].holding(), tracks_[i].now.jaw_rad < tracks_[i].last.jaw_rad};
     }
   }
   collision_.FindPairs(motions, tissue_moved);
@@ -119,6 +119,7 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
     collision_.Project();
   }
   const FinishResult finish = solver_.Finish();
+  collision_.Settle();
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     grasps_[i].Slip(contacts_.force(static_cast<std::uint32_t>(i)), scene_.tools[i], tracks_[i].now, model_,
                     &particles_);

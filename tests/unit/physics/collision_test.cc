@@ -1,0 +1,284 @@
+// Tools against tissue, and what a grasper holds.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "physics_node/simulation/tissue_simulation.h"
+#include "services/scene/build.h"
+#include "tests/unit/physics/sheet_scene.h"
+
+namespace fulcrum::physics {
+namespace {
+
+constexpr std::uint32_t kRows = 25, kCols = 25;
+constexpr float kH = 0.002f;
+const Vec3f kMiddle(0.024f, 0.024f, 0.0f);
+
+/// A tool that points straight down.
+ToolPose Down(const Vec3f& tip, float jaw_rad = 0.9f) {
+  return {tip, Quatf(Eigen::AngleAxisf(static_cast<float>(M_PI), Vec3f::UnitX())), jaw_rad};
+}
+
+std::array<ToolInput, kMaxTools> Only(int tool, const ToolPose& pose) {
+  std::array<ToolInput, kMaxTools> tools;
+  tools[static_cast<std::size_t>(tool)] = {true, pose};
+  return tools;
+}
+
+class OnSheet : public testing::Test {
+ protected:
+  explicit OnSheet(float grip_force_N = PhysicsParams().grip_force_N) : data_(Sheet(grip_force_N)) {}
+  static scene::SceneData Sheet(float grip_force_N) {
+    scene::SceneData data = SheetScene(kRows, kCols, kH);
+    data.fixed.physics.grip_force_N = grip_force_N;
+    return data;
+  }
+
+  scene::SceneData data_;
+  SceneView scene_ = data_.View();
+  TissueSimulation simulation_{scene_};
+
+  void Run(int tool, const ToolPose& pose, int steps) {
+    for (int i = 0; i < steps; ++i) {
+      simulation_.Step(Only(tool, pose));
+    }
+  }
+  /// Moves straight from `from` to `to`.
+  void Drive(int tool, const ToolPose& from, const ToolPose& to, int steps) {
+    for (int i = 1; i <= steps; ++i) {
+      simulation_.Step(Only(tool, Interpolate(from, to, static_cast<float>(i) / static_cast<float>(steps))));
+    }
+  }
+  [[nodiscard]] Vec3f Node(Index row, Index col) const {
+    return simulation_.particles().At(simulation_.particles().Ref(row * kCols + col));
+  }
+  [[nodiscard]] float Lowest() const {
+    float z = 1;
+    for (Index p = 0; p < kRows * kCols; ++p) {
+      z = std::min(z, simulation_.particles().At(simulation_.particles().Ref(p)).z());
+    }
+    return z;
+  }
+  [[nodiscard]] float Highest() const {
+    float z = -1;
+    for (Index p = 0; p < kRows * kCols; ++p) {
+      z = std::max(z, simulation_.particles().At(simulation_.particles().Ref(p)).z());
+    }
+    return z;
+  }
+};
+
+TEST(Closest, SegmentAndTriangleAgreeWithASearch) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> coordinate(-1, 1);
+  const auto point = [&] { return Vec3f(coordinate(random), coordinate(random), coordinate(random)); };
+  constexpr int kGrid = 60;
+  for (int trial = 0; trial < 150; ++trial) {
+    const Vec3f p0 = point(), p1 = point(), a = point(), b = point(), c = point();
+    const ClosestPoints found = ClosestSegmentTriangle(p0, p1, a, b, c);
+    float best = 1e9f;
+    for (int i = 0; i <= kGrid; ++i) {
+      const Vec3f on_segment = p0 + static_cast<float>(i) / kGrid * (p1 - p0);
+      const auto w = ClosestOnTriangle(on_segment, a, b, c);
+      best = std::min(best, (w[0] * a + w[1] * b + w[2] * c - on_segment).norm());
+    }
+    const float distance = std::sqrt(found.distance_sq);
+    EXPECT_LE(distance, best + 1e-5f);
+    EXPECT_GE(distance, best - (p1 - p0).norm() / kGrid);
+    const auto& w = found.barycentric;
+    EXPECT_NEAR(w[0] + w[1] + w[2], 1.0f, 1e-5f);
+    EXPECT_LT((w[0] * a + w[1] * b + w[2] * c - found.on_triangle).norm(), 1e-5f);
+    EXPECT_LT((p0 + found.t * (p1 - p0) - found.on_segment).norm(), 1e-5f);
+  }
+}
+
+TEST(Closest, DegenerateShapesAreFinite) {
+  const Vec3f p(1, 2, 3), q(0, 0, 0);
+  for (const ClosestPoints& c : {ClosestSegmentTriangle(p, p, q, q, q), ClosestSegmentTriangle(p, q, q, q, p),
+                                 ClosestSegmentTriangle(q, q, q, Vec3f(1, 0, 0), Vec3f(2, 0, 0))}) {
+    EXPECT_TRUE(std::isfinite(c.distance_sq));
+    EXPECT_NEAR(c.barycentric[0] + c.barycentric[1] + c.barycentric[2], 1.0f, 1e-5f);
+  }
+}
+
+TEST_F(OnSheet, HookDentsTheMembraneAndStaysInFront) {
+  const ToolPose above = Down(kMiddle + Vec3f(0, 0, 0.01f)), pressed = Down(kMiddle - Vec3f(0, 0, 0.003f));
+  Run(1, above, 5);
+  EXPECT_FALSE(simulation_.collision().any_touching());
+  Drive(1, above, pressed, 60);
+  Run(1, pressed, 60);
+  EXPECT_TRUE(simulation_.collision().any_touching());
+  // The foot runs from the heel along +x of the tool, which is +x of the world here.
+  const SurfacePoint nearest = simulation_.collision().Nearest(WorkingLine(scene_.tools[1], pressed), 0.01f);
+  ASSERT_TRUE(nearest.found);
+  EXPECT_LT(nearest.closest.on_triangle.z(), -0.003f);
+  EXPECT_NEAR(nearest.gap, scene_.physics.collision_margin_m, 4e-4f);
+  EXPECT_LT(Lowest(), -0.003f);
+  EXPECT_GT(Lowest(), -0.006f);
+  EXPECT_EQ(simulation_.quarantined(), 0u);
+  // Tool away: flat again.
+  Drive(1, pressed, above, 30);
+  Run(1, above, 400);
+  EXPECT_GT(Lowest(), -3e-4f);
+}
+
+TEST_F(OnSheet, AThinToolAtFullSpeedDoesNotTunnel) {
+  // 1 m/s: 10 mm a step with a foot of 0.6 mm radius and triangles of 2 mm.
+  const ToolPose above = Down(kMiddle + Vec3f(0.0007f, 0.0004f, 0.015f));
+  const ToolPose below = Down(kMiddle + Vec3f(0.0007f, 0.0004f, -0.010f));
+  Run(1, above, 3);
+  Drive(1, above, below, 3);
+  Run(1, below, 20);
+  EXPECT_LT(Lowest(), -0.0095f);  // The membrane hangs in front of the foot.
+}
+
+TEST_F(OnSheet, HookFromBelowLifts) {
+  ToolPose under = Down(kMiddle - Vec3f(0, 0, 0.01f));
+  under.q_WT = Quatf::Identity();  // The shaft comes from below.
+  TissueSimulation fresh(scene_);
+  for (int i = 0; i < 60; ++i) {
+    ToolPose pose = under;
+    pose.p_WT.z() += 0.0003f * static_cast<float>(i);
+    fresh.Step(Only(1, pose));
+  }
+  float highest = -1;
+  for (Index p = 0; p < kRows * kCols; ++p) {
+    highest = std::max(highest, fresh.particles().At(fresh.particles().Ref(p)).z());
+  }
+  EXPECT_GT(highest, 0.006f);
+}
+
+TEST_F(OnSheet, HolesDoNotCollide) {
+  TopologyState hole;
+  hole.scene_hash = scene_.hash;
+  hole.rows = kRows;
+  hole.cols = kCols;
+  hole.dead_nodes.assign((kRows * kCols + 7) / 8, 0);
+  hole.dead_edges.assign((3 * kRows * kCols + 7) / 8, 0);
+  hole.shrink.assign(3 * kRows * kCols, 0);
+  for (Index r = 6; r < 19; ++r) {
+    for (Index c = 6; c < 19; ++c) {
+      SetBit(hole.dead_nodes, r * kCols + c);
+    }
+  }
+  EXPECT_GT(simulation_.ApplyTopology(hole), 0);
+  const ToolPose above = Down(kMiddle + Vec3f(0, 0, 0.01f)), below = Down(kMiddle - Vec3f(0, 0, 0.008f));
+  Run(1, above, 2);
+  Drive(1, above, below, 40);
+  EXPECT_FALSE(simulation_.collision().any_touching());
+}
+
+TEST_F(OnSheet, FrictionCarriesTheMembraneAlong) {
+  const ToolPose above = Down(kMiddle + Vec3f(-0.006f, 0, 0.006f)),
+                 pressed = Down(kMiddle + Vec3f(-0.006f, 0, -0.003f));
+  ToolPose dragged = pressed;
+  dragged.p_WT.x() += 0.01f;
+  Run(1, above, 2);
+  Drive(1, above, pressed, 30);
+  const float before = Node(12, 10).x();
+  Drive(1, pressed, dragged, 40);
+  EXPECT_GT(Node(12, 10).x(), before + 2e-5f);
+  EXPECT_EQ(simulation_.quarantined(), 0u);
+}
+
+class Grasping : public OnSheet {
+ protected:
+  using OnSheet::OnSheet;
+  const ToolPose open_ = Down(kMiddle - Vec3f(0, 0, 0.001f), 0.9f);
+  const ToolPose closed_ = Down(kMiddle - Vec3f(0, 0, 0.001f), 0.0f);
+
+  void TakeHold() {
+    Run(0, Down(kMiddle + Vec3f(0, 0, 0.01f), 0.9f), 2);
+    Drive(0, Down(kMiddle + Vec3f(0, 0, 0.01f), 0.9f), open_, 30);
+    for (int i = 1; i <= 20; ++i) {
+      ToolPose pose = open_;
+      pose.jaw_rad = 0.9f - 0.045f * static_cast<float>(i);
+      simulation_.Step(Only(0, pose));
+    }
+    ASSERT_TRUE(simulation_.grasp(0).holding());
+  }
+};
+
+TEST_F(Grasping, HoldsRigidlyAndLetsGo) {
+  TakeHold();
+  const auto held = simulation_.grasp(0).held();
+  ASSERT_GT(held.size(), 3u);
+  const ToolPose up = Down(kMiddle + Vec3f(0.002f, 0, 0.008f), 0.0f);
+  Drive(0, closed_, up, 60);
+  ASSERT_EQ(simulation_.grasp(0).held().size(), held.size());
+  for (const HeldParticle& h : simulation_.grasp(0).held()) {
+    const Vec3f at = simulation_.particles().At(simulation_.particles().Ref(h.particle));
+    EXPECT_LT((at - up.ToWorld(h.p_T)).norm(), 1e-6f);
+  }
+  EXPECT_GT(Highest(), 0.004f);
+  ToolPose opened = up;
+  opened.jaw_rad = 0.9f;
+  Drive(0, up, opened, 10);
+  EXPECT_FALSE(simulation_.grasp(0).holding());
+  Run(0, Down(kMiddle + Vec3f(0, 0, 0.05f), 0.9f), 500);
+  EXPECT_LT(Highest(), 5e-4f);
+  for (Index p = 0; p < kRows * kCols; ++p) {
+    EXPECT_EQ(simulation_.particles().InverseMass(simulation_.particles().Ref(p)), scene_.inverse_mass[p]);
+  }
+}
+
+TEST_F(Grasping, ClosedJawsDoNotPickUpWhatTheyMeetLater) {
+  Run(0, Down(kMiddle + Vec3f(0, 0, 0.03f), 0.9f), 2);
+  Run(0, Down(kMiddle + Vec3f(0, 0, 0.03f), 0.0f), 2);
+  Drive(0, Down(kMiddle + Vec3f(0, 0, 0.03f), 0.0f), closed_, 40);
+  EXPECT_FALSE(simulation_.grasp(0).holding());
+  EXPECT_EQ(simulation_.grasp(0).state(), Grasp::State::kClosedEmpty);
+}
+
+class WeakGrasping : public Grasping {
+ protected:
+  WeakGrasping() : Grasping(1.5f) {}
+};
+
+TEST_F(WeakGrasping, SlipsWhenPulledTooHard) {
+  TakeHold();
+  const std::size_t before = simulation_.grasp(0).held().size();
+  const ToolPose far = Down(kMiddle + Vec3f(0, 0, 0.04f), 0.0f);
+  for (int i = 1; i <= 400; ++i) {
+    simulation_.Step(Only(0, Interpolate(closed_, far, std::min(1.0f, static_cast<float>(i) / 100))));
+    (void)simulation_.Contacts(0);
+  }
+  EXPECT_LT(simulation_.grasp(0).held().size(), before);
+  EXPECT_LT(simulation_.force(0).norm(), 1.6f * scene_.physics.grip_force_N);
+}
+
+TEST_F(Grasping, WhatIsCutAwayIsNotHeld) {
+  TakeHold();
+  TopologyState cut;
+  cut.scene_hash = scene_.hash;
+  cut.rows = kRows;
+  cut.cols = kCols;
+  cut.dead_nodes.assign((kRows * kCols + 7) / 8, 0);
+  cut.dead_edges.assign((3 * kRows * kCols + 7) / 8, 0);
+  cut.shrink.assign(3 * kRows * kCols, 0);
+  for (const HeldParticle& held : simulation_.grasp(0).held()) {
+    SetBit(cut.dead_nodes, held.particle);
+  }
+  EXPECT_GT(simulation_.ApplyTopology(cut), 0);
+  EXPECT_FALSE(simulation_.grasp(0).holding());
+}
+
+TEST(GraspLayers, TheMembraneIsTakenBeforeTheOrgan) {
+  const scene::SceneData data = scene::BuildProcedural(scene::Small());
+  const SceneView scene = data.View();
+  ParticleStore particles(scene);
+  const TissueModel model(scene, &particles);
+  Grasp grasp(scene);
+  // Straight down through membrane and organ in the middle of the sheet.
+  const Index middle = scene.membrane.first + 36 * 25 + 12;
+  const Vec3f tip = scene.rest_position[middle] - Vec3f(0, 0, 0.006f);
+  grasp.Update(scene.tools[0], Down(tip, 0.9f), model, &particles);
+  grasp.Update(scene.tools[0], Down(tip, 0.0f), model, &particles);
+  ASSERT_TRUE(grasp.holding());
+  for (const HeldParticle& held : grasp.held()) {
+    EXPECT_GE(held.particle, scene.membrane.first);
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum::physics

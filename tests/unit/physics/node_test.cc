@@ -1,0 +1,263 @@
+// The node on in-process ports.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "physics_node/node/physics_checkpoint.h"
+#include "physics_node/node/physics_node.h"
+#include "services/bus/in_process.h"
+#include "services/scene/build.h"
+#include "tests/numerics/physics/script_player.h"
+
+namespace fulcrum::physics {
+namespace {
+
+constexpr std::int64_t kPeriod = 10'000'000;
+
+struct Bus {
+  bus::InProcessTopic<ToolState> tools;
+  bus::InProcessTopic<HandleState> handles;
+  bus::InProcessTopic<TopologyState> topology;
+  bus::InProcessTopic<TissueFrame> frames;
+  bus::InProcessTopic<ContactModel> contacts;
+  bus::InProcessTopic<CauteryContact> cautery;
+  bus::InProcessTopic<TickManifest> manifests;
+};
+
+/// A node with its ports, and the senders of its inputs.
+class Bench {
+ public:
+  Bench(const SceneView& scene, runtime::CheckpointFile* checkpoint, std::int64_t epoch = 1)
+      : scene_(scene),
+        tool_in_(bus_.tools.MakeInput()),
+        handle_in_(bus_.handles.MakeInput()),
+        topology_in_(bus_.topology.MakeInput()),
+        frame_out_(bus_.frames.MakeOutput()),
+        contact_out_(bus_.contacts.MakeOutput()),
+        cautery_out_(bus_.cautery.MakeOutput()),
+        manifest_out_(bus_.manifests.MakeOutput()),
+        tool_out_(bus_.tools.MakeOutput()),
+        handle_out_(bus_.handles.MakeOutput()),
+        topology_out_(bus_.topology.MakeOutput()),
+        node_(scene, {*tool_in_, *handle_in_, *topology_in_, *frame_out_, *contact_out_, *cautery_out_, *manifest_out_},
+              checkpoint, epoch) {}
+
+  void Send(double time_s) {
+    ToolState tools;
+    HandleState handles;
+    tools.stamp = handles.stamp = {++sequence_, 1, 1 + static_cast<std::int64_t>(time_s * 1e9)};
+    const auto scripted = ScriptedTools(scene_, time_s);
+    for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+      tools.tools[i].kind = scene_.tools[i].kind;
+      tools.tools[i].p_WT = scripted[i].pose.p_WT;
+      tools.tools[i].q_WT = scripted[i].pose.q_WT;
+      handles.handles[i] = {true, scripted[i].pose.jaw_rad, 0, 1, 500};
+      handles.pedals = static_cast<std::uint8_t>(handles.pedals | EvaluateScript(scene_.script, i, time_s).pedals);
+    }
+    tool_out_->Write(tools);
+    handle_out_->Write(handles);
+  }
+  void Step() {
+    const auto index = static_cast<std::int64_t>(tick_.index);
+    tick_.stamp_ns = 1 + index * kPeriod;
+    tick_.session_time_s = 0.01 * static_cast<double>(index);
+    node_.Step(tick_);
+    ++tick_.index;
+  }
+  void Play(double from_s, double to_s) {
+    for (int i = static_cast<int>(from_s * 100 + 0.5); i < static_cast<int>(to_s * 100 + 0.5); ++i) {
+      Send(0.01 * i);
+      Step();
+    }
+  }
+  [[nodiscard]] double Figure(const std::string& name) const {
+    Health health;
+    node_.FillHealth(&health);
+    for (const Metric& metric : health.metrics) {
+      if (metric.name == name) {
+        return metric.value;
+      }
+    }
+    return -1;
+  }
+
+  Bus bus_;
+  SceneView scene_;
+  std::unique_ptr<bus::Input<ToolState>> tool_in_;
+  std::unique_ptr<bus::Input<HandleState>> handle_in_;
+  std::unique_ptr<bus::Input<TopologyState>> topology_in_;
+  std::unique_ptr<bus::LoanOutput<TissueFrame>> frame_out_;
+  std::unique_ptr<bus::Output<ContactModel>> contact_out_;
+  std::unique_ptr<bus::Output<CauteryContact>> cautery_out_;
+  std::unique_ptr<bus::Output<TickManifest>> manifest_out_;
+  std::unique_ptr<bus::Output<ToolState>> tool_out_;
+  std::unique_ptr<bus::Output<HandleState>> handle_out_;
+  std::unique_ptr<bus::Output<TopologyState>> topology_out_;
+  PhysicsNode node_;
+  Tick tick_{0, 0.0, 0.01, 1};
+  std::uint64_t sequence_ = 0;
+};
+
+class PhysicsNodeTest : public testing::Test {
+ protected:
+  scene::SceneData data_ = scene::BuildProcedural(scene::Small());
+  SceneView scene_ = [this] {
+    SceneView view = data_.View();
+    view.hash = 77;
+    return view;
+  }();
+};
+
+TEST_F(PhysicsNodeTest, WithoutReadersNothingIsSent) {
+  Bench bench(scene_, nullptr);
+  bench.Play(0, 0.3);
+  EXPECT_EQ(bench.frame_out_->stats().written, 0u);
+  EXPECT_EQ(bench.contact_out_->stats().written, 0u);
+  EXPECT_EQ(bench.cautery_out_->stats().written, 0u);
+  EXPECT_EQ(bench.manifest_out_->stats().written, 0u);
+}
+
+TEST_F(PhysicsNodeTest, TellsEachReaderWhatItNeeds) {
+  Bench bench(scene_, nullptr);
+  auto frames = bench.bus_.frames.MakeInput();
+  auto contacts = bench.bus_.contacts.MakeInput();
+  auto cautery = bench.bus_.cautery.MakeInput();
+  auto manifests = bench.bus_.manifests.MakeInput();
+  bench.Play(0, 3.0);
+  TissueFrame frame;
+  ASSERT_TRUE(frames->TakeLatest(&frame));
+  EXPECT_EQ(frame.header.vertex_count, scene_.rest_position.size());
+  EXPECT_EQ(frame.header.scene_hash, 77u);
+  EXPECT_EQ(frame.header.tool_sequence, 300u);
+  EXPECT_EQ(frame.header.handle_sequence, 300u);
+  EXPECT_EQ(frame.header.grasping_tools, 1u);
+  ContactModel model;
+  ASSERT_TRUE(contacts->TakeLatest(&model));
+  EXPECT_EQ(model.tool_sequence, 300u);
+  EXPECT_EQ(model.tool_stamp_ns, 1 + 2'990'000'000);
+  EXPECT_EQ(model.devices[0].contacts[0].kind, ContactKind::kGrasp);
+  CauteryContact contact;
+  ASSERT_TRUE(cautery->TakeLatest(&contact));
+  EXPECT_TRUE(contact.touching);
+  EXPECT_EQ(contact.mode, CauteryMode::kCut);
+  EXPECT_FLOAT_EQ(contact.power_W, 35.0f);
+  TickManifest manifest;
+  ASSERT_TRUE(manifests->TakeLatest(&manifest));
+  EXPECT_EQ(manifest.tick, 299u);
+  EXPECT_EQ(manifest.state_hash, bench.node_.simulation().StateHash());
+  ASSERT_EQ(manifest.consumed.size(), 3u);
+  EXPECT_EQ(manifest.consumed[0].sequence, 300u);
+  EXPECT_GT(bench.Figure("max_displacement_mm"), 5.0);
+  EXPECT_GT(bench.Figure("grasped_particles"), 0.0);
+  EXPECT_EQ(bench.Figure("quarantined"), 0.0);
+}
+
+TEST_F(PhysicsNodeTest, AtRestAFrameComesTenTimesASecond) {
+  Bench bench(scene_, nullptr);
+  auto frames = bench.bus_.frames.MakeInput();
+  for (int i = 0; i < 200; ++i) {
+    bench.Step();
+  }
+  ASSERT_TRUE(bench.node_.simulation().asleep());
+  const std::uint64_t before = bench.frame_out_->stats().written;
+  for (int i = 0; i < 100; ++i) {
+    bench.Step();
+  }
+  EXPECT_EQ(bench.frame_out_->stats().written - before, 10u);
+}
+
+TEST_F(PhysicsNodeTest, HoldsItsToolsWhenTheInputGoesStale) {
+  Bench bench(scene_, nullptr);
+  bench.Play(0, 2.5);
+  ASSERT_TRUE(bench.node_.simulation().grasp(0).holding());
+  const Vec3f tip = bench.node_.simulation().Save().pose[0].p_WT;
+  for (int i = 0; i < 200; ++i) {
+    bench.Step();
+  }
+  EXPECT_TRUE(bench.node_.simulation().grasp(0).holding());
+  EXPECT_EQ(bench.node_.simulation().Save().pose[0].p_WT, tip);
+  bench.Play(4.0, 4.5);  // And goes on when it comes back elsewhere.
+  EXPECT_TRUE(bench.node_.simulation().grasp(0).holding());
+}
+
+TEST_F(PhysicsNodeTest, AppliesTopologyOfItsSceneOnly) {
+  Bench bench(scene_, nullptr);
+  TopologyState state;
+  const std::size_t nodes = scene_.membrane.node_count();
+  state.stamp = {1, 1, 1};
+  state.scene_hash = 78;
+  state.revision = 5;
+  state.rows = scene_.membrane.rows;
+  state.cols = scene_.membrane.cols;
+  state.dead_nodes.assign((nodes + 7) / 8, 0);
+  state.dead_edges.assign((3 * nodes + 7) / 8, 0);
+  state.shrink.assign(3 * nodes, 0);
+  SetBit(state.dead_nodes, 40 * 25 + 12);
+  bench.topology_out_->Write(state);
+  bench.Step();
+  EXPECT_EQ(bench.node_.simulation().model().revision(), 0u);
+  EXPECT_EQ(bench.Figure("topology_refused"), 1.0);
+  state.scene_hash = 77;
+  state.stamp.sequence = 2;
+  bench.topology_out_->Write(state);
+  bench.Step();
+  EXPECT_EQ(bench.node_.simulation().model().revision(), 5u);
+  EXPECT_FALSE(bench.node_.simulation().model().NodeAlive(40 * 25 + 12));
+}
+
+class PhysicsRestart : public PhysicsNodeTest {
+ protected:
+  std::filesystem::path file_ =
+      std::filesystem::temp_directory_path() / ("physics_restart_" + std::to_string(getpid()) + ".checkpoint");
+  void TearDown() override { std::filesystem::remove(file_); }
+  [[nodiscard]] std::unique_ptr<runtime::CheckpointFile> Open() const {
+    return std::make_unique<runtime::CheckpointFile>(
+        file_, scene_.hash, kCheckpointLayout, CheckpointCapacity(static_cast<Index>(scene_.rest_position.size())));
+  }
+};
+
+TEST_F(PhysicsRestart, GoesOnWhereItWasKilled) {
+  std::vector<float> before(3 * scene_.rest_position.size()), after(before.size());
+  std::size_t held = 0;
+  {
+    auto checkpoint = Open();
+    Bench bench(scene_, checkpoint.get());
+    EXPECT_FALSE(bench.node_.restored());
+    bench.Play(0, 2.8);
+    bench.node_.simulation().particles().CopyPositions(before);
+    held = bench.node_.simulation().grasp(0).held().size();
+    ASSERT_GT(held, 0u);
+  }
+  auto checkpoint = Open();
+  Bench bench(scene_, checkpoint.get(), 2);
+  EXPECT_TRUE(bench.node_.restored());
+  EXPECT_EQ(bench.node_.simulation().grasp(0).held().size(), held);
+  for (int i = 0; i < 5; ++i) {
+    bench.Step();  // Inputs have not come back yet.
+  }
+  bench.Play(2.8, 3.0);
+  bench.node_.simulation().particles().CopyPositions(after);
+  float jump = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    jump = std::max(jump, std::abs(after[i] - before[i]));
+  }
+  EXPECT_LT(jump, 0.0015f);
+  EXPECT_TRUE(bench.node_.simulation().grasp(0).holding());
+}
+
+TEST_F(PhysicsRestart, ABrokenCheckpointIsAFreshStart) {
+  {
+    auto checkpoint = Open();
+    auto slot = checkpoint->Begin();
+    std::fill_n(slot.begin(), 4000, std::byte{0x7f});
+    checkpoint->Commit(4000);
+  }
+  auto checkpoint = Open();
+  Bench bench(scene_, checkpoint.get());
+  EXPECT_FALSE(bench.node_.restored());
+  bench.Play(0, 0.1);
+}
+
+}  // namespace
+}  // namespace fulcrum::physics

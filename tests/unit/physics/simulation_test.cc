@@ -1,0 +1,253 @@
+// The whole tissue: rest, sleep, determinism, restart; and what it tells the servo and the heat.
+#include <gtest/gtest.h>
+
+#include "haptics_node/servo/model_gate.h"
+#include "physics_node/contact_model/elastic_force.h"
+#include "physics_node/simulation/tissue_simulation.h"
+#include "services/bus/gate.h"
+#include "services/scene/build.h"
+#include "tests/numerics/physics/script_player.h"
+#include "tests/unit/physics/sheet_scene.h"
+
+namespace fulcrum::physics {
+namespace {
+
+class OnSmallScene : public testing::Test {
+ protected:
+  scene::SceneData data_ = scene::BuildProcedural(scene::Small());
+  SceneView scene_ = data_.View();
+};
+
+TEST_F(OnSmallScene, FallsAsleepAndIsWokenByATouchOnly) {
+  TissueSimulation simulation(scene_);
+  const auto far = ScriptedTools(scene_, 0.0);
+  int steps = 0;
+  while (!simulation.Step(far).asleep && steps < 200) {
+    ++steps;
+  }
+  EXPECT_LT(steps, 100);
+  const std::uint64_t version = simulation.state_version(), hash = simulation.StateHash();
+  auto moved = far;
+  for (int i = 0; i < 50; ++i) {
+    moved[0].pose.p_WT.z() += 0.0002f;
+    EXPECT_TRUE(simulation.Step(moved).asleep);
+  }
+  EXPECT_EQ(simulation.state_version(), version);
+  EXPECT_EQ(simulation.StateHash(), hash);
+  // The scripted touch wakes it.
+  bool awake = false;
+  for (int i = 0; i < 250 && !awake; ++i) {
+    awake = !simulation.Step(ScriptedTools(scene_, 0.01 * i)).asleep;
+  }
+  EXPECT_TRUE(awake);
+}
+
+TEST_F(OnSmallScene, ATopologyChangeWakes) {
+  TissueSimulation simulation(scene_);
+  for (int i = 0; i < 100; ++i) {
+    simulation.Step({});
+  }
+  ASSERT_TRUE(simulation.asleep());
+  TopologyState state;
+  const std::size_t nodes = scene_.membrane.node_count();
+  state.rows = scene_.membrane.rows;
+  state.cols = scene_.membrane.cols;
+  state.dead_nodes.assign((nodes + 7) / 8, 0);
+  state.dead_edges.assign((3 * nodes + 7) / 8, 0);
+  state.shrink.assign(3 * nodes, 0);
+  EXPECT_EQ(simulation.ApplyTopology(state), 0);
+  EXPECT_TRUE(simulation.asleep());
+  state.shrink[3 * (30 * 25 + 12)] = 200;
+  EXPECT_EQ(simulation.ApplyTopology(state), 1);
+  EXPECT_FALSE(simulation.Step({}).asleep);
+}
+
+TEST_F(OnSmallScene, TheSameRunGivesTheSameHash) {
+  std::vector<std::uint64_t> first, second;
+  for (auto* hashes : {&first, &second}) {
+    TissueSimulation simulation(scene_);
+    for (int i = 0; i < 350; ++i) {
+      simulation.Step(ScriptedTools(scene_, 0.01 * i));
+      hashes->push_back(simulation.StateHash());
+    }
+  }
+  EXPECT_EQ(first, second);
+  EXPECT_NE(first.front(), first.back());
+}
+
+TEST_F(OnSmallScene, EveryInstructionSetGivesTheSameHash) {
+  if (!HasAvx2()) {
+    GTEST_SKIP() << "this CPU has no AVX2";
+  }
+  TissueSimulation narrow(scene_, BaselineKernels()), wide(scene_, Avx2Kernels());
+  for (int i = 0; i < 300; ++i) {
+    narrow.Step(ScriptedTools(scene_, 0.01 * i));
+    wide.Step(ScriptedTools(scene_, 0.01 * i));
+  }
+  EXPECT_EQ(narrow.StateHash(), wide.StateHash());
+}
+
+TEST_F(OnSmallScene, ContinuesFromASavedStateWithoutAJump) {
+  TissueSimulation one(scene_);
+  int i = 0;
+  for (; i < 300; ++i) {
+    one.Step(ScriptedTools(scene_, 0.01 * i));
+  }
+  ASSERT_TRUE(one.grasp(0).holding());
+  const std::size_t floats = 3 * std::size_t{one.particles().particle_count()};
+  std::vector<float> now(floats), previous(floats);
+  one.particles().CopyPositions(now);
+  one.particles().CopyPrevious(previous);
+  TissueSimulation other(scene_);
+  ASSERT_TRUE(other.Restore(now, previous, one.Save()));
+  EXPECT_EQ(other.grasp(0).held().size(), one.grasp(0).held().size());
+  for (; i < 330; ++i) {
+    one.Step(ScriptedTools(scene_, 0.01 * i));
+    const StepReport report = other.Step(ScriptedTools(scene_, 0.01 * i));
+    EXPECT_LT(report.max_step_m, 0.001f);
+  }
+  float apart = 0;
+  for (Index p = 0; p < one.particles().particle_count(); ++p) {
+    apart = std::max(
+        apart, (one.particles().At(one.particles().Ref(p)) - other.particles().At(other.particles().Ref(p))).norm());
+  }
+  EXPECT_LT(apart, 2e-4f);
+}
+
+TEST_F(OnSmallScene, ASavedStateThatDoesNotFitIsRefused) {
+  TissueSimulation simulation(scene_);
+  const std::uint64_t hash = simulation.StateHash();
+  std::vector<float> xyz(3 * std::size_t{simulation.particles().particle_count()});
+  simulation.particles().CopyPositions(xyz);
+  std::vector<float> bad = xyz;
+  bad[100] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_FALSE(simulation.Restore(bad, xyz, simulation.Save()));
+  bad.pop_back();
+  EXPECT_FALSE(simulation.Restore(bad, bad, simulation.Save()));
+  SimulationMemory memory = simulation.Save();
+  memory.held[0].push_back({simulation.particles().particle_count(), Vec3f::Zero()});
+  EXPECT_FALSE(simulation.Restore(xyz, xyz, memory));
+  EXPECT_EQ(simulation.StateHash(), hash);
+}
+
+TEST_F(OnSmallScene, AToolThatJumpsIsFollowedAtALimitedSpeed) {
+  TissueSimulation simulation(scene_);
+  auto tools = ScriptedTools(scene_, 2.5);
+  for (int i = 0; i < 250; ++i) {
+    simulation.Step(ScriptedTools(scene_, 0.01 * i));
+  }
+  ASSERT_TRUE(simulation.grasp(0).holding());
+  tools[0].pose.p_WT.x() += 0.03f;
+  for (int i = 0; i < 10; ++i) {
+    const StepReport report = simulation.Step(tools);
+    EXPECT_LE(report.max_step_m, PbdSolver::kMaxStep);
+  }
+  EXPECT_LT((simulation.Save().pose[0].p_WT - tools[0].pose.p_WT).norm(), 1e-6f);
+}
+
+TEST_F(OnSmallScene, ContactModelsPassTheGatesAndPushBack) {
+  TissueSimulation simulation(scene_);
+  bool announced = false, pressed = false, grasped = false;
+  std::array<Vec3f, kMaxTools> last{Vec3f::Zero(), Vec3f::Zero()};
+  for (int i = 0; i < 600; ++i) {
+    simulation.Step(ScriptedTools(scene_, 0.01 * i));
+    ContactModel model;
+    model.stamp = {static_cast<std::uint64_t>(i + 1), 1, i};
+    model.tool_stamp_ns = 1;
+    for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
+      model.devices[tool] = simulation.Contacts(tool);
+      for (std::uint32_t c = 0; c < model.devices[tool].count; ++c) {
+        const Contact& contact = model.devices[tool].contacts[c];
+        EXPECT_TRUE(haptics::IsRenderable(contact)) << "step " << i << " tool " << tool;
+        if (contact.kind == ContactKind::kSurface) {
+          announced |= contact.gap > 0.002f;
+          if (contact.gap == 0.0f && tool == 1 && contact.f_ref.norm() > 0.02f) {
+            pressed = true;
+            EXPECT_GT(contact.f_ref.dot(contact.n), 0.0f) << "step " << i;
+          }
+        } else {
+          grasped = true;
+        }
+        // The reference force of a step must not jump: the servo would pass the jump on.
+        EXPECT_LT((contact.f_ref - last[tool]).norm(), 1.0f) << "step " << i;
+        last[tool] = contact.f_ref;
+      }
+    }
+    EXPECT_TRUE(bus::PassesGate(model)) << "step " << i;
+  }
+  EXPECT_TRUE(announced);
+  EXPECT_TRUE(pressed);
+  EXPECT_TRUE(grasped);
+}
+
+TEST_F(OnSmallScene, AGraspPullsBackTowardsRest) {
+  TissueSimulation simulation(scene_);
+  for (int i = 0; i < 300; ++i) {
+    simulation.Step(ScriptedTools(scene_, 0.01 * i));
+    (void)simulation.Contacts(0);
+  }
+  const DeviceContacts device = simulation.Contacts(0);
+  ASSERT_EQ(device.count, 1u);
+  const Contact& grasp = device.contacts[0];
+  EXPECT_EQ(grasp.kind, ContactKind::kGrasp);
+  EXPECT_GT(grasp.u_c.norm(), 0.005f);
+  EXPECT_LT(grasp.f_ref.normalized().dot(grasp.u_c.normalized()), -0.7f);
+  EXPECT_GT(grasp.f_ref.norm(), 0.3f);
+  EXPECT_LT(grasp.f_ref.norm(), scene_.physics.grip_force_N);
+}
+
+TEST_F(OnSmallScene, CauteryContactFollowsTheHook) {
+  TissueSimulation simulation(scene_);
+  int touching = 0;
+  float first = 0, last = 0;
+  for (int i = 0; i < 480; ++i) {
+    simulation.Step(ScriptedTools(scene_, 0.01 * i));
+    CauteryContact contact = simulation.Cautery(1);
+    contact.stamp.stamp_ns = 1;
+    ASSERT_TRUE(bus::PassesGate(contact));
+    if (i < 230 || !contact.touching) {
+      continue;
+    }
+    first = touching++ == 0 ? contact.material.y() : first;
+    last = contact.material.y();
+    // The place in the triangle and the place on the sheet are one.
+    const auto nodes = simulation.model().TriangleNodes(contact.triangle);
+    Vec2f place = Vec2f::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+      place += contact.barycentric[k] * scene_.membrane_material[nodes[k]];
+    }
+    EXPECT_LT((place - contact.material).norm(), 1e-6f);
+    EXPECT_LT(contact.material_rate.norm(), 0.1f);
+  }
+  EXPECT_GT(touching, 200);
+  EXPECT_GT(last - first, 0.006f);  // The script goes 10 mm along the sheet.
+}
+
+TEST(ElasticForce, IsZeroAtRestAndThatOfTheContinuumWhenStretched) {
+  const scene::SceneData data = SheetScene(21, 21, 0.002f);
+  const SceneView scene = data.View();
+  ParticleStore particles(scene);
+  const TissueModel model(scene, &particles);
+  const ElasticForce elastic(scene, &model, &particles);
+  std::vector<Index> half;
+  for (Index p = 0; p < particles.particle_count(); ++p) {
+    EXPECT_LT(elastic.OnParticle(p).norm(), 1e-4f);
+    if (p % 21 >= 10) {
+      half.push_back(p);
+    }
+  }
+  // One per cent along x: a strip carries E t * strain per width, here across 40 mm, with the springs' Poisson ratio
+  // of 1/3 held back at the sides: E t / (1 - 1/9).
+  constexpr float kStrain = 0.01f;
+  for (Index p = 0; p < particles.particle_count(); ++p) {
+    const Vec3f x = scene.rest_position[p];
+    particles.Set(particles.Ref(p), Vec3f(x.x() * (1 + kStrain), x.y(), x.z()));
+  }
+  const Vec3f force = elastic.OnSet(half);
+  const float expected = scene.physics.membrane_Et_N_per_m * kStrain * 0.040f / (1.0f - 1.0f / 9.0f);
+  EXPECT_NEAR(force.x(), -expected, 0.25f * expected);  // A square grid with one diagonal is not isotropic.
+  EXPECT_GT(elastic.StiffnessAround(half), 0.0f);
+}
+
+}  // namespace
+}  // namespace fulcrum::physics
