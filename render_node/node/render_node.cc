@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace fulcrum::render {
 namespace {
@@ -11,6 +14,7 @@ namespace {
 // Below these a pose looks the same: a fifth of a pixel at 10 cm.
 constexpr float kSamePlace = 2e-5f;   // [m]
 constexpr float kSameAngle = 0.002f;  // [rad]
+constexpr double kTextLife_s = 2.0;   // A temperature or a warning is shown for so long.
 
 bool LooksTheSame(const ToolSample& a, const ToolSample& b) {
   return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle;
@@ -40,6 +44,9 @@ void RenderNode::WarmUp() {
     shown.kind = scene_.tools[static_cast<std::size_t>(k)].kind;
     view_.SetTool(k, shown);
   }
+  UpdateTexts();
+  view_.AddSmoke(Vec2f::Zero(), -10);
+  view_.UpdateSmoke(-9.9);
   display_->DrawAndRead(&picture_);
   for (int k = 0; k < kMaxTools; ++k) {
     view_.SetTool(k, ToolSample());
@@ -52,6 +59,7 @@ void RenderNode::Step(const Tick& tick) {
   session_time_s_ = tick.session_time_s;
   TakeTissue();
   TakeThermal();
+  TakeEvents();
   TakeTools();
   if (!ready()) {
     return;
@@ -95,12 +103,68 @@ void RenderNode::TakeThermal() {
   }
   while (ports_.patches.TakeNext(&patch_)) {
     if (view_.ApplyPatch(patch_)) {
+      temperature_C_ = patch_.header.max_temperature_C;
+      temperature_time_s_ = session_time_s_;
       patches_applied_.fetch_add(1, std::memory_order_relaxed);
       changed_on_screen_ = changed_in_file_ = true;
     }
   }
+}
+
+void RenderNode::TakeEvents() {
   while (ports_.events.TakeNext(&event_)) {
+    switch (event_.kind) {
+      case ThermalEventKind::kSteam:
+      case ThermalEventKind::kCut:
+      case ThermalEventKind::kChar:
+        view_.AddSmoke(event_.material, event_.session_time_s);
+        break;
+      case ThermalEventKind::kUreterWarning:
+      case ThermalEventKind::kUreterInjury:
+        warned_s_[0] = event_.session_time_s;
+        injured_[0] = injured_[0] || event_.kind == ThermalEventKind::kUreterInjury;
+        break;
+      case ThermalEventKind::kNerveWarning:
+      case ThermalEventKind::kNerveInjury:
+        warned_s_[1] = event_.session_time_s;
+        injured_[1] = injured_[1] || event_.kind == ThermalEventKind::kNerveInjury;
+        break;
+      default:
+        break;
+    }
+    changed_on_screen_ = changed_in_file_ = true;
   }
+}
+
+void RenderNode::UpdateTexts() {
+  const auto number = [](const char* format, double value) {
+    std::array<char, 32> text;
+    std::snprintf(text.data(), text.size(), format, value);
+    return std::string(text.data());
+  };
+  std::vector<OverlayText> texts{{Corner::kTopLeft, 0, number("%.1f s", session_time_s_)}};
+  const auto pedals = handles_.pedals;
+  const char* mode = (pedals & kPedalBlend)  ? "BLEND"
+                     : (pedals & kPedalCut)  ? "CUT"
+                     : (pedals & kPedalCoag) ? "COAG"
+                                             : "";
+  texts.push_back({Corner::kBottomLeft, 0, mode});
+  if (topology_.cut_length_m > 0) {
+    texts.push_back({Corner::kBottomRight, 0, number("SLIT %.0f mm", 1000.0 * topology_.cut_length_m)});
+  }
+  if (session_time_s_ - temperature_time_s_ < kTextLife_s) {
+    texts.push_back({Corner::kBottomRight, 1, number("%.0f C", temperature_C_)});
+  }
+  constexpr std::array<const char*, 2> kNames{"URETER", "NERVE"};
+  for (int k = 0; k < 2; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    if (injured_[i]) {
+      texts.push_back({Corner::kTopRight, k, std::string(kNames[i]) + " INJURED", true});
+    } else if (session_time_s_ - warned_s_[i] < kTextLife_s) {
+      texts.push_back({Corner::kTopRight, k, std::string(kNames[i]) + " HOT!", true});
+    }
+  }
+  view_.SetTexts(texts);
 }
 
 void RenderNode::TakeTools() {
@@ -115,6 +179,10 @@ void RenderNode::TakeTools() {
     }
   }
   if (ports_.handles.TakeLatest(&new_handles_)) {
+    if (handles_.pedals != new_handles_.pedals) {
+      handles_.pedals = new_handles_.pedals;
+      changed_on_screen_ = changed_in_file_ = true;
+    }
     for (int k = 0; k < kMaxTools; ++k) {
       const auto i = static_cast<std::size_t>(k);
       HandleSample& shown = handles_.handles[i];
@@ -131,6 +199,8 @@ void RenderNode::TakeTools() {
 void RenderNode::Draw(double session_time_s, bool write_png) {
   const auto start = std::chrono::steady_clock::now();
   view_.Update();
+  UpdateTexts();
+  const bool smoking = view_.UpdateSmoke(session_time_s);
   if (write_png) {
     display_->DrawAndRead(&picture_);
     if (!writer_.Add(picture_, session_time_s)) {
@@ -138,11 +208,11 @@ void RenderNode::Draw(double session_time_s, bool write_png) {
     }
     const double period = 1.0 / std::max(0.001f, scene_.render.png_rate_Hz);
     next_png_s_ = period * (std::floor(session_time_s / period) + 1);
-    changed_in_file_ = false;
+    changed_in_file_ = smoking;
   } else {
     display_->Draw();
   }
-  changed_on_screen_ = false;
+  changed_on_screen_ = smoking;
   frames_drawn_.fetch_add(1, std::memory_order_relaxed);
   const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
   draw_ms_.store(spent.count(), std::memory_order_relaxed);

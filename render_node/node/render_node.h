@@ -1,6 +1,7 @@
 // The render node: what the bus says becomes a picture, in a window or in PNG files.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -57,6 +58,8 @@ class RenderNode {
   void TakeThermal();
   void TakeTools();
   [[nodiscard]] bool ready() const { return tissue_.header.stamp.sequence != 0; }
+  void TakeEvents();
+  void UpdateTexts();
   void Draw(double session_time_s, bool write_png);
   void Report(const std::string& error);
 
@@ -76,8 +79,12 @@ class RenderNode {
   Picture picture_;
   double session_time_s_ = 0;
   double next_png_s_ = 0;
-  bool changed_on_screen_ = false;  // Since the last picture that was drawn.
-  bool changed_in_file_ = false;    // Since the last picture that was written.
+  double temperature_time_s_ = -1e9;            // When the newest patch came.
+  float temperature_C_ = 0;                     // Its hottest texel.
+  std::array<double, 2> warned_s_{-1e9, -1e9};  // Ureter and nerve: session time of the last warning …
+  std::array<bool, 2> injured_{};               // … and whether one was an injury.
+  bool changed_on_screen_ = false;              // Since the last picture that was drawn.
+  bool changed_in_file_ = false;                // Since the last picture that was written.
 
   // Read by the health thread; each stands for itself, so relaxed order is enough.
   std::atomic<std::uint64_t> frames_drawn_{0};

@@ -18,6 +18,7 @@
 #include "render_node/scene_graph/instruments.h"
 #include "render_node/scene_graph/mesh.h"
 #include "render_node/scene_graph/program.h"
+#include "render_node/scene_graph/smoke.h"
 
 namespace fulcrum::render {
 namespace {
@@ -26,7 +27,7 @@ using Float4 = std::array<float, 4>;
 
 // Near to far among the opaque ones, so that hidden fragments are not shaded; then the layers that let light through,
 // from the inside out.
-enum Order { kMask, kInstruments, kRectum, kSurroundings, kFat, kMembraneDepth, kMembrane };
+enum Order { kMask, kInstruments, kRectum, kSurroundings, kFat, kMembraneDepth, kMembrane, kSmoke, kOverlay };
 
 // Texture units; the samplers of all programs are bound once at the root.
 enum Unit { kAtlasUnit, kNoiseUnit, kVesselUnit, kStructureUnit };
@@ -34,6 +35,9 @@ enum Unit { kAtlasUnit, kNoiseUnit, kVesselUnit, kStructureUnit };
 constexpr int kNoiseTexels = 256;
 constexpr int kVesselTexels = 512;
 constexpr std::uint32_t kFatStride = 2;
+// Layers of tissue that press on each other overlap by a millimetre in the simulation: the inner one gives way.
+constexpr float kFatBehind = 0.0015f;     // [m]
+constexpr float kRectumBehind = 0.0025f;  // [m]
 
 void DrawIn(Order order, osg::StateSet* state) { state->setRenderBinDetails(order, "RenderBin"); }
 
@@ -86,6 +90,8 @@ struct LaparoscopeView::Impl {
   osg::ref_ptr<osg::Geode> geode = new osg::Geode;
   AtlasTexture atlas_texture;
   Instruments instruments;
+  Smoke smoke;
+  Overlay overlay;
   std::unique_ptr<Mesh> rectum_mesh, fat_mesh, membrane_mesh;
 };
 
@@ -96,7 +102,8 @@ LaparoscopeView::Impl::Impl(const SceneView& view)
       membrane(view),
       fat(view, kFatStride),
       atlas_texture(atlas),
-      instruments(view) {
+      instruments(view),
+      overlay(static_cast<int>(view.render.width), static_cast<int>(view.render.height)) {
   xyz.resize(3 * view.rest_position.size());
   for (std::size_t i = 0; i < view.rest_position.size(); ++i) {
     Eigen::Map<Vec3f>(xyz.data() + 3 * i) = view.rest_position[i];
@@ -108,6 +115,13 @@ LaparoscopeView::Impl::Impl(const SceneView& view)
   AddRectum();
   AddSurroundings();
   AddSheets();
+  Blend(smoke.state());
+  smoke.state()->setAttributeAndModes(new osg::Depth(osg::Depth::LESS, 0, 1, false));
+  DrawIn(kSmoke, smoke.state());
+  geode->addDrawable(smoke.geometry());
+  Blend(overlay.state());
+  DrawIn(kOverlay, overlay.state());
+  geode->addDrawable(overlay.geometry());
   BindTextures();
 }
 
@@ -199,6 +213,7 @@ void LaparoscopeView::Impl::AddRectum() {
   }
   Add(&rectum_mesh, "rectum", true, kRectum, "rectum.frag");
   rectum_mesh->state()->setAttributeAndModes(new osg::CullFace(osg::CullFace::BACK));
+  rectum_mesh->state()->addUniform(new osg::Uniform("behind", kRectumBehind));
   rectum_mesh->SetCoordinates(coordinates);
   rectum_mesh->SetTriangles(scene.surface_triangles);
 }
@@ -206,6 +221,7 @@ void LaparoscopeView::Impl::AddRectum() {
 void LaparoscopeView::Impl::AddSheets() {
   Add(&fat_mesh, "fat", true, kFat, "fat.frag");
   Blend(fat_mesh->state());
+  fat_mesh->state()->addUniform(new osg::Uniform("behind", kFatBehind));
   std::vector<Float4> coordinates;
   for (std::size_t k = 0; k < fat.materials().size(); ++k) {
     const Vec2f& m = fat.materials()[k];
@@ -245,6 +261,7 @@ void LaparoscopeView::Impl::BindTextures() {
        MakeTexture(kVesselTexels, kVesselTexels, 1, MakeVesselPattern(kVesselTexels), true));
   bind(kStructureUnit, "structures", MakeTexture(map.width, map.height, 2, map.texels, false));
   const auto vec3 = [](const Vec3f& v) { return osg::Vec3(v.x(), v.y(), v.z()); };
+  state->addUniform(new osg::Uniform("behind", 0.0f));
   state->addUniform(new osg::Uniform("atlas_per_metre", osg::Vec2(1 / size.x(), 1 / size.y())));
   state->addUniform(new osg::Uniform("light_position", vec3(scope.light_position)));
   state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
@@ -315,6 +332,14 @@ void LaparoscopeView::Update() {
   }
   impl.tissue_changed = impl.topology_changed = false;
 }
+
+void LaparoscopeView::SetTexts(std::span<const OverlayText> texts) { impl_->overlay.Set(texts); }
+
+void LaparoscopeView::AddSmoke(const Vec2f& material, double session_time_s) {
+  impl_->smoke.Add(OnMembrane(material), session_time_s);
+}
+
+bool LaparoscopeView::UpdateSmoke(double session_time_s) { return impl_->smoke.Update(session_time_s); }
 
 osg::Group* LaparoscopeView::root() const { return impl_->root; }
 const Laparoscope& LaparoscopeView::laparoscope() const { return impl_->scope; }

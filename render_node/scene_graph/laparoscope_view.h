@@ -6,6 +6,7 @@
 #include <span>
 
 #include "render_node/geometry/laparoscope.h"
+#include "render_node/scene_graph/overlay.h"
 #include "services/core/scene_view.h"
 
 namespace fulcrum::render {
@@ -27,12 +28,19 @@ class LaparoscopeView {
   void SetTool(int tool, const ToolSample& sample);
   void SetJaw(int tool, float angle_rad);
 
+  /// Text in the corners.
+  void SetTexts(std::span<const OverlayText> texts);
+  /// A puff of steam where (s, t) [m] of the sheet is drawn now.
+  void AddSmoke(const Vec2f& material, double session_time_s);
+  /// Moves the smoke on. True while there is some to see.
+  bool UpdateSmoke(double session_time_s);
+
   /// Carries the last SetTissue and SetTopology over to the meshes. Split off so that several changes cost one update.
   void Update();
 
   [[nodiscard]] osg::Group* root() const;
   [[nodiscard]] const Laparoscope& laparoscope() const;
-  /// Where (s, t) [m] of the sheet is drawn now, frame W; for puffs of steam.
+  /// Where the sheet's node nearest to (s, t) [m] is drawn now, frame W.
   [[nodiscard]] Vec3f OnMembrane(const Vec2f& material) const;
 
  private:

@@ -26,8 +26,8 @@ void main() {
   vec3 film = normalize(normal + 0.42 * bend);
   float facing = abs(dot(n, normalize(position)));
   float grazing = (1.0 - facing) * (1.0 - facing);
-  vec3 albedo = mix(vec3(0.84, 0.40, 0.30), vec3(0.92, 0.66, 0.50), noise.g);
-  float alpha = 0.30 + 0.24 * noise.r + 0.45 * grazing;
+  vec3 albedo = mix(vec3(0.84, 0.40, 0.30), vec3(0.90, 0.60, 0.45), noise.g);
+  float alpha = 0.27 + 0.22 * noise.r + 0.45 * grazing;
 
   float living = 1.0 - smoothstep(0.05, 0.5, damage);
   // Warm tissue reddens, then pales as its protein coagulates (from about 60 degrees).
@@ -42,7 +42,7 @@ void main() {
   float brown = smoothstep(0.08, 0.65, dry);
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022) * (0.5 + noise.b), brown);
   alpha = mix(alpha, 0.97, brown);
-  albedo = mix(albedo, vec3(0.015, 0.010, 0.008), smoothstep(0.05, 0.6, burnt));
+  albedo = mix(albedo, vec3(0.035, 0.022, 0.015), smoothstep(0.05, 0.6, burnt));
 
   float wet = 1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale));
   // What glitters is not see-through.

@@ -5,17 +5,19 @@ in vec4 osg_Vertex;
 in vec3 osg_Normal;
 in vec4 osg_Color;
 in vec4 osg_MultiTexCoord0;
-uniform mat4 osg_ModelViewProjectionMatrix;
 uniform mat4 osg_ModelViewMatrix;
+uniform mat4 osg_ProjectionMatrix;
 uniform mat3 osg_NormalMatrix;
+uniform float behind;  // Counts as this much farther from the eye where surfaces lie on each other [m].
 out vec3 position;
 out vec3 normal;
 out vec4 colour;
 out vec4 coordinate;
 
 void main() {
-  gl_Position = osg_ModelViewProjectionMatrix * osg_Vertex;
   position = (osg_ModelViewMatrix * osg_Vertex).xyz;
+  // Along the line of sight: the place in the picture stays the same.
+  gl_Position = osg_ProjectionMatrix * vec4(position * (1.0 + behind / length(position)), 1.0);
   normal = osg_NormalMatrix * osg_Normal;
   colour = osg_Color;
   coordinate = osg_MultiTexCoord0;

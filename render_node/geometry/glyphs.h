@@ -1,0 +1,24 @@
+// A bitmap font of five by seven dots for the line of figures in the picture: no font file, no font library. Pure.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+namespace fulcrum::render {
+
+inline constexpr int kGlyphWidth = 6;   ///< With one dot of space.
+inline constexpr int kGlyphHeight = 8;  ///< With one dot of space.
+
+/// All glyphs side by side, one byte per dot (0 or 255), bottom row first.
+struct GlyphSheet {
+  int width;
+  int height;
+  std::vector<std::uint8_t> dots;
+};
+[[nodiscard]] GlyphSheet MakeGlyphSheet();
+
+/// Place of the character's glyph on the sheet; small letters are drawn as capitals, unknown ones as a space.
+[[nodiscard]] int GlyphIndex(char character);
+
+}  // namespace fulcrum::render

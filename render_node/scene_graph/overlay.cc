@@ -1,0 +1,67 @@
+#include "render_node/scene_graph/overlay.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "render_node/geometry/glyphs.h"
+#include "render_node/scene_graph/atlas_texture.h"
+#include "render_node/scene_graph/program.h"
+
+namespace fulcrum::render {
+namespace {
+
+constexpr std::array<float, 4> kText{0.62f, 0.70f, 0.72f, 1};
+constexpr std::array<float, 4> kWarning{1.0f, 0.25f, 0.15f, 1};
+constexpr int kGlyphUnit = 7;  // A texture unit that no other shader uses.
+
+}  // namespace
+
+Overlay::Overlay(int width, int height)
+    : width_(width), height_(height), dot_(std::max(1, height / 270)), mesh_("overlay", true) {
+  const GlyphSheet sheet = MakeGlyphSheet();
+  sheet_width_ = sheet.width;
+  osg::ref_ptr<osg::Texture2D> texture = MakeTexture(sheet.width, sheet.height, 1, sheet.dots, false);
+  texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::NEAREST);
+  texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::NEAREST);
+  mesh_.state()->setAttributeAndModes(MakeProgram("overlay.vert", "overlay.frag"));
+  mesh_.state()->setTextureAttribute(kGlyphUnit, texture);
+  mesh_.state()->addUniform(new osg::Uniform("glyphs", kGlyphUnit));
+  mesh_.state()->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
+}
+
+void Overlay::Set(std::span<const OverlayText> texts) {
+  std::vector<Vec3f> positions;
+  std::vector<std::array<float, 4>> coordinates, colours;
+  std::vector<Triangle> triangles;
+  const int margin = 4 * dot_;
+  for (const OverlayText& text : texts) {
+    const bool top = text.corner == Corner::kTopLeft || text.corner == Corner::kTopRight;
+    const bool left = text.corner == Corner::kTopLeft || text.corner == Corner::kBottomLeft;
+    const int length = kGlyphWidth * dot_ * static_cast<int>(text.text.size());
+    const int pitch = (kGlyphHeight + 2) * dot_;
+    int x = left ? margin : width_ - margin - length;
+    const int y = top ? height_ - margin - pitch * (text.line + 1) : margin + pitch * text.line;
+    for (const char character : text.text) {
+      const auto first = static_cast<Index>(positions.size());
+      const int glyph = GlyphIndex(character);
+      for (int corner = 0; corner < 4; ++corner) {
+        const int dx = corner == 1 || corner == 2 ? 1 : 0, dy = corner >= 2 ? 1 : 0;
+        positions.emplace_back(
+            2.0f * static_cast<float>(x + dx * kGlyphWidth * dot_) / static_cast<float>(width_) - 1,
+            2.0f * static_cast<float>(y + dy * kGlyphHeight * dot_) / static_cast<float>(height_) - 1, 0.0f);
+        coordinates.push_back({static_cast<float>((glyph + dx) * kGlyphWidth) / static_cast<float>(sheet_width_),
+                               static_cast<float>(dy), 0, 0});
+        colours.push_back(text.warning ? kWarning : kText);
+      }
+      triangles.push_back({first, first + 1, first + 2});
+      triangles.push_back({first, first + 2, first + 3});
+      x += kGlyphWidth * dot_;
+    }
+  }
+  mesh_.SetPositions(positions);
+  mesh_.SetCoordinates(coordinates);
+  mesh_.SetColours(colours);
+  mesh_.SetTriangles(triangles);
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,64 @@
+#include "render_node/scene_graph/smoke.h"
+
+#include <cmath>
+#include <vector>
+
+#include "render_node/scene_graph/program.h"
+
+namespace fulcrum::render {
+namespace {
+
+constexpr double kLeastInterval_s = 0.08;
+constexpr double kLife_s = 1.6;
+constexpr float kRise_m_s = 0.016f;
+constexpr float kDrift_m_s = 0.005f;
+constexpr float kFirstRadius_m = 0.0015f;
+constexpr float kGrowth_m_s = 0.0055f;
+constexpr float kOpacity = 0.30f;
+
+}  // namespace
+
+Smoke::Smoke() : mesh_("smoke", true) {
+  mesh_.state()->setAttributeAndModes(MakeProgram("smoke.vert", "smoke.frag"));
+  Update(0);
+}
+
+void Smoke::Add(const Vec3f& p_W, double session_time_s) {
+  if (session_time_s - last_birth_s_ < kLeastInterval_s) {
+    return;
+  }
+  last_birth_s_ = session_time_s;
+  // The golden angle spreads the puffs without a random number.
+  puffs_[next_] = {p_W, session_time_s, 2.39996f * static_cast<float>(next_)};
+  next_ = (next_ + 1) % puffs_.size();
+}
+
+bool Smoke::Update(double session_time_s) {
+  std::vector<Vec3f> positions;
+  std::vector<std::array<float, 4>> coordinates;
+  std::vector<Triangle> triangles;
+  for (const Puff& puff : puffs_) {
+    const double age = session_time_s - puff.born_s;
+    if (age < 0 || age >= kLife_s) {
+      continue;
+    }
+    const auto t = static_cast<float>(age);
+    const auto left = static_cast<float>(1 - age / kLife_s);
+    const Vec3f centre =
+        puff.p_W + t * Vec3f(kDrift_m_s * std::cos(puff.drift), kDrift_m_s * std::sin(puff.drift), kRise_m_s);
+    const float opacity = kOpacity * left * std::min(1.0f, 8 * t + 0.2f);
+    const auto first = static_cast<Index>(positions.size());
+    for (const auto& [u, v] : {std::array{-1.0f, -1.0f}, {1.0f, -1.0f}, {1.0f, 1.0f}, {-1.0f, 1.0f}}) {
+      positions.push_back(centre);
+      coordinates.push_back({u, v, kFirstRadius_m + kGrowth_m_s * t, opacity});
+    }
+    triangles.push_back({first, first + 1, first + 2});
+    triangles.push_back({first, first + 2, first + 3});
+  }
+  mesh_.SetPositions(positions);
+  mesh_.SetCoordinates(coordinates);
+  mesh_.SetTriangles(triangles);
+  return !triangles.empty();
+}
+
+}  // namespace fulcrum::render
