@@ -205,6 +205,27 @@ void PushOut(const TriangleMesh& organ, const TriangleLocator& locator, double r
   }
 }
 
+/// Spreads the nodes evenly along each row, then along each column.
+void Spread(Grid<Vec3d>* sheet) {
+  std::vector<Vec3d> line;
+  for (int r = 0; r < sheet->rows; ++r) {
+    line.assign(sheet->values.begin() + static_cast<std::ptrdiff_t>(r) * sheet->cols,
+                sheet->values.begin() + static_cast<std::ptrdiff_t>(r + 1) * sheet->cols);
+    line = Resample(line, sheet->cols);
+    std::copy(line.begin(), line.end(), sheet->values.begin() + static_cast<std::ptrdiff_t>(r) * sheet->cols);
+  }
+  for (int c = 0; c < sheet->cols; ++c) {
+    line.clear();
+    for (int r = 0; r < sheet->rows; ++r) {
+      line.push_back(sheet->at(r, c));
+    }
+    line = Resample(line, sheet->rows);
+    for (int r = 0; r < sheet->rows; ++r) {
+      sheet->at(r, c) = line[r];
+    }
+  }
+}
+
 /// A fold shows as a crease of more than 90 degrees between neighbouring nodes.
 void CheckFolds(const Grid<Vec3d>& sheet, const std::vector<CrossFrame>& frames, const std::string& name) {
   for (int r = 0; r < sheet.rows; ++r) {
@@ -295,19 +316,8 @@ std::vector<Vec3d> DrapeMembrane(const ImportSettings& import, const MembraneSet
   for (int round = 0; round < kRounds; ++round) {
     sheet.Smooth(kSheetSmoothing, false);
     PushOut(organ, locator, 2 * membrane.gap_m, gap, &sheet);
-    // Rows stay on their planes' order, columns are spread evenly again.
-    for (int r = 0; r < membrane.rows; ++r) {
-      std::vector<Vec3d> row;
-      for (int c = 0; c < membrane.cols; ++c) {
-        row.push_back(sheet.at(r, c));
-      }
-      row = Resample(row, membrane.cols);
-      for (int c = 0; c < membrane.cols; ++c) {
-        sheet.at(r, c) = row[c];
-      }
-    }
+    Spread(&sheet);
   }
-  sheet.Smooth(6, false);
   CheckFolds(sheet, frames, name);
   return sheet.values;
 }

@@ -49,13 +49,44 @@ SceneSettings BuiltIn() {
   SceneSettings scene;
   scene.name = "built-in";
   scene.description = "Procedural rectum and membrane at the size of the paper's Table 3";
+  scene.tube = {.rings = 43,
+                .segments = 24,
+                .length_m = Millimetres(200),
+                .outer_radius_m = Millimetres(18),
+                .wall_m = Millimetres(3),
+                .sagittal_bend_m = Millimetres(12),
+                .lateral_bend_m = Millimetres(4),
+                .fold_count = 5,
+                .fold_depth_m = Millimetres(1.2)};
+  scene.membrane = {.rows = 289,
+                    .cols = 64,
+                    .width_m = Millimetres(69),
+                    .gap_m = Millimetres(5.5),
+                    .density_kg_m2 = 0.5,
+                    .bending_row_stride = 4,
+                    .bending_col_stride = 7,
+                    .binding_row_stride = 4,
+                    .binding_col_stride = 4,
+                    .binding_reach_m = Millimetres(6.8)};
   scene.structures = {
-      {ProtectedKind::kUreter, 0.0025, 0.003, {{0.10f, 0.f}, {0.13f, 0.3f}, {0.11f, 0.6f}, {0.15f, 1.f}}},
-      {ProtectedKind::kUreter, 0.0025, 0.003, {{0.90f, 0.f}, {0.88f, 0.35f}, {0.90f, 0.65f}, {0.86f, 1.f}}},
-      {ProtectedKind::kNerve, 0.0010, 0.003, {{0.22f, 0.f}, {0.16f, 0.4f}, {0.17f, 0.7f}, {0.26f, 1.f}}},
-      {ProtectedKind::kNerve, 0.0010, 0.003, {{0.80f, 0.f}, {0.84f, 0.4f}, {0.83f, 0.7f}, {0.74f, 1.f}}},
-      {ProtectedKind::kNerve, 0.0006, 0.003, {{0.84f, 0.40f}, {0.87f, 0.52f}, {0.85f, 0.7f}}},
-      {ProtectedKind::kNerve, 0.0006, 0.003, {{0.16f, 0.40f}, {0.13f, 0.55f}, {0.15f, 0.7f}}},
+      {ProtectedKind::kUreter,
+       Millimetres(2.5),
+       Millimetres(3),
+       {{0.10f, 0.f}, {0.13f, 0.3f}, {0.11f, 0.6f}, {0.15f, 1.f}}},
+      {ProtectedKind::kUreter,
+       Millimetres(2.5),
+       Millimetres(3),
+       {{0.90f, 0.f}, {0.88f, 0.35f}, {0.90f, 0.65f}, {0.86f, 1.f}}},
+      {ProtectedKind::kNerve,
+       Millimetres(1),
+       Millimetres(3),
+       {{0.22f, 0.f}, {0.16f, 0.4f}, {0.17f, 0.7f}, {0.26f, 1.f}}},
+      {ProtectedKind::kNerve,
+       Millimetres(1),
+       Millimetres(3),
+       {{0.80f, 0.f}, {0.84f, 0.4f}, {0.83f, 0.7f}, {0.74f, 1.f}}},
+      {ProtectedKind::kNerve, Millimetres(0.6), Millimetres(3), {{0.84f, 0.40f}, {0.87f, 0.52f}, {0.85f, 0.7f}}},
+      {ProtectedKind::kNerve, Millimetres(0.6), Millimetres(3), {{0.16f, 0.40f}, {0.13f, 0.55f}, {0.15f, 0.7f}}},
   };
   scene.tools = {DefaultTool(ToolKind::kGrasper, Vec3f(-0.085f, -0.045f, 0.115f)),
                  DefaultTool(ToolKind::kHook, Vec3f(0.085f, -0.045f, 0.115f))};
@@ -98,23 +129,23 @@ SceneSettings Small() {
   scene.description = "A tenth of the built-in scene, for tests";
   scene.tube = {.rings = 11,
                 .segments = 10,
-                .length_m = 0.080,
-                .outer_radius_m = 0.010,
-                .wall_m = 0.003,
-                .sagittal_bend_m = 0.003,
-                .lateral_bend_m = 0.001,
+                .length_m = Millimetres(80),
+                .outer_radius_m = Millimetres(10),
+                .wall_m = Millimetres(3),
+                .sagittal_bend_m = Millimetres(3),
+                .lateral_bend_m = Millimetres(1),
                 .fold_count = 2,
-                .fold_depth_m = 0.0006};
+                .fold_depth_m = Millimetres(0.6)};
   scene.membrane = {.rows = 73,
                     .cols = 25,
-                    .width_m = 0.043,
-                    .gap_m = 0.0045,
+                    .width_m = Millimetres(43),
+                    .gap_m = Millimetres(4.5),
                     .density_kg_m2 = 0.5,
                     .bending_row_stride = 4,
                     .bending_col_stride = 4,
                     .binding_row_stride = 3,
                     .binding_col_stride = 3,
-                    .binding_reach_m = 0.0058};
+                    .binding_reach_m = Millimetres(5.8)};
   scene.structures.resize(4);
   scene.tools = {DefaultTool(ToolKind::kGrasper, Vec3f(-0.075f, -0.045f, 0.110f)),
                  DefaultTool(ToolKind::kHook, Vec3f(0.075f, -0.045f, 0.110f))};

@@ -31,7 +31,7 @@ constexpr double kCountTolerance = 0.1;
 constexpr double kSliverBound_deg = 10;
 /// Distance of the mesh from the surface, as a part of the cell size. The fine surface is embedded, so that what is
 /// seen does not suffer from this.
-constexpr double kFacetDistance = 0.12;
+constexpr double kFacetDistance = 0.25;
 constexpr unsigned kSeed = 0;
 
 double VolumeOf(const TriangleMesh& surface) {

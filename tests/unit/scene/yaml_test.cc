@@ -1,0 +1,200 @@
+// The YAML description: shipped scenes compile, presets and files agree, one refusal per rule.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "services/core/error.h"
+#include "services/scene/build.h"
+#include "services/scene/compile.h"
+#include "services/scene/quality.h"
+#include "services/scene/scene_file.h"
+#include "services/scene/scene_yaml.h"
+#include "services/scene/validate.h"
+
+namespace fulcrum::scene {
+namespace {
+
+const std::filesystem::path kScenes = std::filesystem::path(FULCRUM_SOURCE_DIR) / "deploy/scenes";
+
+std::string TextOf(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// `text` with the first `from` replaced, which must be there.
+std::string With(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+}
+
+std::string Refusal(const std::string& text) {
+  try {
+    (void)ParseSceneYaml(text, "x.yaml", {});
+    return "";
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
+TEST(ShippedScenes, AreListedWithNameAndDescription) {
+  std::set<std::string> names;
+  for (const SceneSummary& scene : ListScenes(kScenes)) {
+    EXPECT_EQ(scene.name, scene.file.stem().string());
+    EXPECT_FALSE(scene.description.empty());
+    names.insert(scene.name);
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"built-in", "openhelp", "small"}));
+}
+
+TEST(ShippedScenes, SayTheSameAsThePresets) {
+  EXPECT_EQ(CompileScene(kScenes / "built-in.yaml", {}, {}).data.fixed.hash, BuildProcedural(BuiltIn()).fixed.hash);
+  EXPECT_EQ(CompileScene(kScenes / "small.yaml", {}, {}).data.fixed.hash, BuildProcedural(Small()).fixed.hash);
+}
+
+TEST(ShippedScenes, EffectiveYamlReadsBackToTheSameScene) {
+  const CompiledScene scene = CompileScene(kScenes / "small.yaml", {}, {});
+  const SceneDescription again = ParseSceneYaml(scene.effective_yaml, "effective.yaml", {});
+  EXPECT_EQ(BuildProcedural(again.settings).fixed.hash, scene.data.fixed.hash);
+  EXPECT_NE(scene.effective_yaml.find("shrink_max: 0.3"), std::string::npos) << "defaults are written out, plainly";
+}
+
+TEST(ShippedScenes, OpenHelpGivesASoundSceneOrSaysWhatIsMissing) {
+  CompiledScene scene;
+  try {
+    scene = CompileScene(kScenes / "openhelp.yaml", {}, {});
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    ASSERT_NE(text.find("give its folder with --data DIR"), std::string::npos) << text;
+    ASSERT_NE(text.find("Rectum_Lumen.stl"), std::string::npos) << text;
+    GTEST_SKIP() << "the OpenHELP meshes are not beside the project: " << text;
+  }
+  const SceneView view = scene.data.View();
+  const auto fault = FindFault(view);
+  EXPECT_FALSE(fault) << fault->section << ": " << fault->reason;
+  const SceneQuality q = Measure(view);
+  EXPECT_GE(q.tets, 6000u);
+  EXPECT_LE(q.tets, 10000u);
+  EXPECT_LE(q.vertices, static_cast<std::size_t>(kMaxTissueVertices));
+  EXPECT_NEAR(1e6 * q.organ_volume_m3, 205, 10) << "the volume the surface encloses";
+  EXPECT_GT(q.least_dihedral_deg, 5);
+  EXPECT_GT(q.least_binding_m, 0.0005);
+  EXPECT_LT(q.rms_flat_error, 0.05);
+  EXPECT_GT(q.bindings, 500u);
+  EXPECT_GE(view.static_surfaces.size(), 3u);
+  EXPECT_EQ(CompileScene(kScenes / "openhelp.yaml", {}, {}).data.fixed.hash, view.hash) << "meshing must repeat itself";
+}
+
+// ---------------------------------------------------------------------------------------------------- refusals
+
+struct Rule {
+  const char* name;
+  const char* from;  ///< In small.yaml …
+  const char* to;    ///< … replaced by this …
+  std::vector<const char*> says;
+};
+
+class SceneYamlRule : public testing::TestWithParam<Rule> {};
+
+TEST_P(SceneYamlRule, IsRefusedWithFileKeyAndRange) {
+  const std::string message = Refusal(With(TextOf(kScenes / "small.yaml"), GetParam().from, GetParam().to));
+  EXPECT_EQ(message.substr(0, 7), "x.yaml:") << message;
+  for (const char* part : GetParam().says) {
+    EXPECT_NE(message.find(part), std::string::npos) << "'" << part << "' not in: " << message;
+  }
+}
+
+const Rule kRules[] = {
+    {"UnknownKey", "  rows: 73", "  rowz: 73", {"membrane", "rowz"}},
+    {"UnknownSection", "haptics:", "haptix:", {"haptix"}},
+    {"WrongUnit", "wall_mm: 3", "wall_mm: 3 s", {"organ.procedural.wall_mm", "wrong unit", "0.5 to 20"}},
+    {"UnitOnACount", "rings: 11", "rings: 11 mm", {"organ.procedural.rings"}},
+    {"TooManyRings", "rings: 11", "rings: 100000", {"organ.procedural.rings", "3 to 1000"}},
+    {"NegativeLength", "length_mm: 80", "length_mm: -80", {"organ.procedural.length_mm", "10 to 500"}},
+    {"NotANumber", "gap_mm: 4.5", "gap_mm: .nan", {"membrane.gap_mm"}},
+    {"WallThickerThanTube", "wall_mm: 3", "wall_mm: 12", {"outer_radius_mm", "wall_mm + fold_depth_mm"}},
+    {"NoOrgan", "  procedural:\n", "  procedure:\n", {"organ", "procedural"}},
+    {"BendingStride", "bending_row_stride: 4", "bending_row_stride: 5", {"bending_row_stride", "divide rows - 1 = 72"}},
+    {"BendingColStride", "bending_col_stride: 4", "bending_col_stride: 5", {"bending_col_stride", "cols - 1 = 24"}},
+    {"MassAreal", "density_kg_m2: 0.5", "density_kg_m2: 0.5 kg/m3", {"density_kg_m2", "wrong unit"}},
+    {"Mode", "mode: paper", "mode: fast", {"physics.mode", "paper"}},
+    {"Stiffness", "k_volume: 0.8", "k_volume: 1.5", {"physics.k_volume", "0 to 1"}},
+    {"Power", "power_W: 35", "power_W: 3500", {"power_W", "0 to 300"}},
+    {"PedalWithoutPower", "power_W: 35", "power_W: 0", {"pedal", "power_W is 0"}},
+    {"PedalName", "pedal: cut", "pedal: slice", {"pedal", "coag"}},
+    {"SheetFraction", "sheet: [0.33, 0.5]", "sheet: [1.33, 0.5]", {"script.tool0", "sheet", "0 to 1"}},
+    {"SheetCount", "sheet: [0.33, 0.5]", "sheet: [0.33]", {"script.tool0", "sheet"}},
+    {"TimeBeyondTheEnd", "time_s: 5.4", "time_s: 7", {"time_s", "0 to 6"}},
+    {"TimeBackwards", "time_s: 0.6", "time_s: 0.0", {"time_s", "follow one another"}},
+    {"ToolKind", "kind: grasper", "kind: spoon", {"tools.tool0.kind", "scissors"}},
+    {"NoTrocar", "kind: grasper, trocar_mm: [-75, -45, 110]", "kind: grasper", {"trocar_mm"}},
+    {"ScriptWithoutTool", "tool1: {kind: hook, trocar_mm: [75, -45, 110]}", "tool1: {kind: none}", {"no tool1"}},
+    {"StructureLists", "t: [0, 0.3, 0.6, 1]", "t: [0, 1]", {"structures", "as many entries as s"}},
+    {"StructureKind", "kind: ureter", "kind: artery", {"structures", "nerve"}},
+    {"Camera", "fov_deg: 60", "fov_deg: 400", {"render.fov_deg", "10 to 150"}},
+    {"Temperature", "cell_um: 100", "body_temperature_C: 370", {"thermal.body_temperature_C", "0 to 60"}},
+    {"NodeName", "name: small", "name: small\nnodes: [physics_nod]", {"nodes", "physics_nod", "valid: handle_bridge"}},
+    {"NoName", "name: small", "label: small", {"name"}},
+    {"Grasp", "grasp_radius_mm: 4", "grasp_close_deg: 50", {"grasp_open_deg", "above grasp_close_deg"}},
+};
+INSTANTIATE_TEST_SUITE_P(Rules, SceneYamlRule, testing::ValuesIn(kRules),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+const char* const kImported = R"(
+name: x
+organ:
+  import:
+    unit: mm
+    organ: nowhere.stl
+    centreline: {x_mm: [0, 0], y_mm: [0, 50], z_mm: [0, 0]}
+)";
+
+TEST(SceneYamlImport, MissingMeshIsRefusedInOneLineWithThePlacesLookedAt) {
+  const std::string message = Refusal(kImported);
+  EXPECT_NE(message.find("x.yaml:6: organ.import.organ: 'nowhere.stl' is not at"), std::string::npos) << message;
+  EXPECT_NE(message.find("--data DIR"), std::string::npos);
+  EXPECT_EQ(message.find('\n'), std::string::npos);
+}
+
+TEST(SceneYamlImport, RulesOfTheImport) {
+  const auto folder = std::filesystem::temp_directory_path() / ("fulcrum_scene_yaml_test_" + std::to_string(getpid()));
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "nowhere.stl") << "solid x\nendsolid x\n";
+  const auto refusal = [&](const std::string& text) -> std::string {
+    try {
+      (void)ParseSceneYaml(text, "x.yaml", folder);
+      return "";
+    } catch (const InputError& error) {
+      return error.what();
+    }
+  };
+  EXPECT_EQ(refusal(kImported), "");
+  EXPECT_NE(refusal(With(kImported, "unit: mm", "unit: inch")).find("unit"), std::string::npos);
+  EXPECT_NE(refusal(With(kImported, "z_mm: [0, 0]", "z_mm: [0, 0, 0]")).find("as many entries"), std::string::npos);
+  EXPECT_NE(refusal(With(kImported, "unit: mm", "unit: mm\n    from: 0.5\n    to: 0.55")).find("at least 0.1"),
+            std::string::npos);
+  EXPECT_NE(refusal(With(kImported, "unit: mm", "unit: mm\n    facing: [0, 0, 0]")).find("direction"),
+            std::string::npos);
+  EXPECT_NE(refusal(With(kImported, "  import:", "  procedural: {}\n  import:")).find("either"), std::string::npos);
+  std::filesystem::remove_all(folder);
+}
+
+TEST(SceneYaml, NodesCanBeChosen) {
+  const std::string text =
+      With(TextOf(kScenes / "small.yaml"), "name: small", "name: small\nnodes: [haptics_node, physics_node]");
+  EXPECT_EQ(ParseSceneYaml(text, "x.yaml", {}).settings.node_mask, (1u << 2) | (1u << 3));
+  EXPECT_EQ(ParseSceneYaml(TextOf(kScenes / "small.yaml"), "x.yaml", {}).settings.node_mask, 0x3eu);
+}
+
+TEST(SceneYaml, WorldPlacesAreTakenAsTheyAre) {
+  const std::string text = With(TextOf(kScenes / "small.yaml"), "sheet: [0.33, 0.5], height_mm: 20, jaw_deg: 50",
+                                "world_mm: [-20, 1, 30], jaw_deg: 50");
+  const SceneData scene = BuildProcedural(ParseSceneYaml(text, "x.yaml", {}).settings);
+  EXPECT_NEAR((scene.script[0].p_W - Vec3f(-0.020f, 0.001f, 0.030f)).norm(), 0, 1e-7);
+}
+
+}  // namespace
+}  // namespace fulcrum::scene
