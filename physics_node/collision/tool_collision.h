@@ -17,11 +17,11 @@ namespace fulcrum::physics {
 
 /// A capsule near a triangle in this step.
 struct ContactPair {
-  std::uint32_t capsule = 0;  ///< tool * kMaxCapsules + capsule of the tool.
-  Index triangle = 0;         ///< Membrane triangle, or membrane triangle count + index in SceneView.tube_surface.
+  std::uint32_t capsule = 0;     ///< tool * kMaxCapsules + capsule of the tool.
+  Index triangle = 0;            ///< Membrane triangle, or membrane triangle count + index in SceneView.tube_surface.
   Vec3f normal = Vec3f::Zero();  ///< Of the membrane around it, or of the organ's triangle.
-  std::int8_t side = 0;       ///< Sign of the tool's height along the normal; 0 unknown.
-  bool touching = false;      ///< The last projection moved the triangle.
+  std::int8_t side = 0;          ///< Sign of the tool's height along the normal; 0 unknown.
+  bool touching = false;         ///< The last projection moved the triangle.
   std::array<ParticleRef, 3> at;
   std::array<Index, 3> particle{};
   ClosestPoints closest;       ///< At the last projection, before its correction.

@@ -13,6 +13,8 @@ namespace {
 constexpr std::uint64_t kSlowTicks = 10;
 /// A tool that a live haptics node no longer knows is taken away after so long [ticks of ToolState].
 constexpr int kAbsentTicks = 100;
+/// A pedal that has not been heard of for so long is up: a dead handle bridge must not burn on [ns].
+constexpr std::int64_t kPedalTimeoutNs = 100'000'000;
 /// Of a generator that the script says nothing about [W].
 constexpr float kDefaultPower = 35.0f;
 
@@ -146,7 +148,8 @@ void PhysicsNode::PublishCautery(const Tick& tick) {
   contact.stamp = cautery_stamper_.Next(tick.stamp_ns);
   contact.session_time_s = tick.session_time_s;
   contact.topology_revision = simulation_.model().revision();
-  contact.mode = ModeOf(handle_state_.pedals);
+  const bool heard = tick.stamp_ns - handle_state_.stamp.stamp_ns <= kPedalTimeoutNs;
+  contact.mode = heard ? ModeOf(handle_state_.pedals) : CauteryMode::kOff;
   contact.power_W = contact.mode == CauteryMode::kOff ? 0.0f : power_W_;
   ports_.cautery.Write(contact);
 }

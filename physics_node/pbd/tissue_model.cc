@@ -15,6 +15,10 @@ constexpr float kFloorPart = 1e-3f;
 /// Part of a hinge triangle's rest |normal|^2 below which its angle has no usable gradient.
 constexpr float kNormalFloorPart = 1e-4f;
 
+/// A piece of at most so many nodes (about 2 cm^2 of the built-in sheet) that nothing holds is debris. The search for
+/// an anchor looks no further, which keeps an edit cheap; larger pieces go on moving.
+constexpr std::size_t kLargestDebris = 250;
+
 [[noreturn]] void Refuse(const SceneView& scene, const std::string& what) {
   throw InputError(std::string("scene '") + scene.name + "': " + what);
 }
@@ -83,6 +87,8 @@ TissueModel::TissueModel(const SceneView& scene, ParticleStore* particles)
   dead_nodes_.assign((nodes + 7) / 8, 0);
   dead_edges_.assign((3 * nodes + 7) / 8, 0);
   shrink_.assign(3 * nodes, 0);
+  debris_.assign(nodes, 0);
+  visited_.assign(nodes, 0);
   triangle_alive_.assign(scene.membrane.triangle_count(), 1);
   for (int d = 0; d < 3; ++d) {
     rest_[d] = FloatArray(layout_.plane());
@@ -287,8 +293,11 @@ bool TissueModel::EdgeAlive(Index node, int direction) const {
 }
 
 float TissueModel::BaseInverseMass(Index particle) const {
-  if (particle >= scene_.membrane.first && !NodeAlive(particle - scene_.membrane.first)) {
-    return 0.0f;
+  if (particle >= scene_.membrane.first) {
+    const Index node = particle - scene_.membrane.first;
+    if (!NodeAlive(node) || IsDebris(node)) {
+      return 0.0f;
+    }
   }
   return scene_.inverse_mass[particle];
 }
@@ -321,7 +330,7 @@ void TissueModel::RefreshTriangle(Index triangle) {
   // Half 0 is (n00, n01, n11): edges along the row, down the next column, diagonal. Half 1 is (n00, n11, n10).
   const bool alive = triangle % 2 == 0 ? EdgeAlive(a, 0) && EdgeAlive(b, 1) && EdgeAlive(a, 2)
                                        : EdgeAlive(a, 2) && EdgeAlive(c, 0) && EdgeAlive(a, 1);
-  triangle_alive_[triangle] = alive ? 1 : 0;
+  triangle_alive_[triangle] = alive && !IsDebris(a) ? 1 : 0;
 }
 
 bool TissueModel::HingeAlive(Index slot) const {
@@ -381,30 +390,115 @@ void TissueModel::RefreshNode(Index node, ParticleStore* particles) {
   particles->SetInverseMass(particles->Ref(particle), BaseInverseMass(particle));
 }
 
+/// Ends of the live edges of a node; kNoIndex where there is none.
+std::array<Index, 6> TissueModel::Neighbours(Index node) const {
+  const std::array<Index, 3> apart{1, cols(), cols() + 1};
+  std::array<Index, 6> ends;
+  ends.fill(kNoIndex);
+  const Index row = node / cols(), col = node % cols();
+  for (int d = 0; d < 3; ++d) {
+    const auto i = static_cast<std::size_t>(d);
+    if (EdgeAlive(node, d)) {
+      ends[i] = node + apart[i];
+    }
+    const bool inside = (d == 1 || col > 0) && (d == 0 || row > 0);
+    if (inside && EdgeAlive(node - apart[i], d)) {
+      ends[i + 3] = node - apart[i];
+    }
+  }
+  return ends;
+}
+
+/// Holds a piece of membrane in its place: the rim, or a binding to the organ.
+bool TissueModel::IsAnchor(Index node) const {
+  return scene_.inverse_mass[scene_.membrane.first + node] == 0.0f || binding_start_[node] < binding_start_[node + 1];
+}
+
+/// From each changed node, looks for an anchor among what it still hangs together with.
+void TissueModel::FindDebris(const std::vector<Index>& changed, ParticleStore* particles) {
+  for (const Index start : changed) {
+    if (!NodeAlive(start) || IsDebris(start)) {
+      continue;
+    }
+    ++search_;
+    piece_.assign(1, start);
+    visited_[start] = search_;
+    bool held = IsAnchor(start);
+    for (std::size_t i = 0; i < piece_.size() && !held; ++i) {
+      for (const Index next : Neighbours(piece_[i])) {
+        if (next != kNoIndex && visited_[next] != search_) {
+          visited_[next] = search_;
+          piece_.push_back(next);
+          held = held || IsAnchor(next) || piece_.size() > kLargestDebris;
+        }
+      }
+    }
+    if (held) {
+      continue;
+    }
+    for (const Index node : piece_) {
+      debris_[node] = 1;
+      particles->SetInverseMass(particles->Ref(scene_.membrane.first + node), 0.0f);
+    }
+    for (const Index node : piece_) {
+      RefreshTriangles(node);
+    }
+  }
+}
+
+void TissueModel::ForgetDebris(ParticleStore* particles) {
+  for (Index node = 0; node < debris_.size(); ++node) {
+    if (debris_[node] != 0) {
+      debris_[node] = 0;
+      particles->SetInverseMass(particles->Ref(scene_.membrane.first + node),
+                                BaseInverseMass(scene_.membrane.first + node));
+      RefreshTriangles(node);
+    }
+  }
+}
+
 int TissueModel::Apply(const TopologyState& topology, ParticleStore* particles) {
   if (topology.rows != rows() || topology.cols != cols() || topology.dead_nodes.size() != dead_nodes_.size() ||
       topology.dead_edges.size() != dead_edges_.size() || topology.shrink.size() != shrink_.size()) {
     return -1;
   }
   int edits = 0;
+  bool revived = false;
+  changed_nodes_.clear();
   const Index nodes = scene_.membrane.node_count();
+  const auto mark = [&](Index node) {
+    for (const Index neighbour : Neighbours(node)) {
+      if (neighbour != kNoIndex) {
+        changed_nodes_.push_back(neighbour);
+      }
+    }
+    changed_nodes_.push_back(node);
+  };
   for (std::size_t byte = 0; byte < dead_nodes_.size(); ++byte) {
     for (std::uint8_t changed = dead_nodes_[byte] ^ topology.dead_nodes[byte]; changed != 0;
          changed = static_cast<std::uint8_t>(changed & (changed - 1))) {
       const auto node = static_cast<Index>(8 * byte + static_cast<unsigned>(__builtin_ctz(changed)));
+      if (node < nodes && NodeAlive(node)) {
+        mark(node);  // Its neighbours lose a hold.
+      }
       dead_nodes_[byte] = static_cast<std::uint8_t>(dead_nodes_[byte] ^ (1u << (node % 8)));
       if (node < nodes) {
         RefreshNode(node, particles);
+        revived |= NodeAlive(node);
         ++edits;
       }
     }
   }
   const auto refresh_edge = [&](Index edge, bool cut) {
     if (edge < 3 * nodes && scene_.membrane_rest_length[edge] > 0.0f) {
-      RefreshEdge(edge / 3, static_cast<int>(edge % 3));
+      const Index node = edge / 3, other = node + std::array<Index, 3>{1, cols(), cols() + 1}[edge % 3];
+      RefreshEdge(node, static_cast<int>(edge % 3));
       if (cut) {
-        RefreshTriangles(edge / 3);
-        RefreshHinges(edge / 3, TestBit(dead_edges_, edge));
+        RefreshTriangles(node);
+        RefreshHinges(node, TestBit(dead_edges_, edge));
+        revived |= !TestBit(dead_edges_, edge);
+        changed_nodes_.push_back(node);
+        changed_nodes_.push_back(other);
       }
       ++edits;
     }
@@ -432,6 +526,15 @@ int TissueModel::Apply(const TopologyState& topology, ParticleStore* particles) 
       }
     }
   }
+  if (revived) {
+    // What was debris may hang on something again. Rare: only when the heat has lost its state.
+    ForgetDebris(particles);
+    changed_nodes_.clear();
+    for (Index node = 0; node < nodes; ++node) {
+      changed_nodes_.push_back(node);
+    }
+  }
+  FindDebris(changed_nodes_, particles);
   revision_ = topology.revision;
   return edits;
 }

@@ -45,13 +45,15 @@ class TissueModel {
   [[nodiscard]] std::uint32_t rows() const { return scene_.membrane.rows; }
   [[nodiscard]] std::uint32_t cols() const { return scene_.membrane.cols; }
   [[nodiscard]] bool NodeAlive(Index node) const { return !TestBit(dead_nodes_, node); }
+  /// Belongs to a small piece that hangs on nothing any more: it stays where it is and takes part in nothing.
+  [[nodiscard]] bool IsDebris(Index node) const { return debris_[node] != 0; }
   /// Exists in the grid, is not cut, and neither is an end of it.
   [[nodiscard]] bool EdgeAlive(Index node, int direction) const;
-  /// Triangle 2 * cell + half: all its nodes and edges are alive.
+  /// Triangle 2 * cell + half: all its nodes and edges are alive, and it is not debris.
   [[nodiscard]] bool TriangleAlive(Index triangle) const { return triangle_alive_[triangle] != 0; }
   /// Nodes of a membrane triangle (indices within the grid).
   [[nodiscard]] std::array<Index, 3> TriangleNodes(Index triangle) const;
-  /// Inverse mass without grasps; 0 for a dead node.
+  /// Inverse mass without grasps; 0 for a dead node and for debris.
   [[nodiscard]] float BaseInverseMass(Index particle) const;
   /// The first binding of a grid node, if it has one and is alive.
   [[nodiscard]] std::optional<BindingView> BindingOf(Index node) const;
@@ -67,6 +69,10 @@ class TissueModel {
   void RefreshHinges(Index node, bool died);
   void RefreshTriangle(Index triangle);
   [[nodiscard]] bool HingeAlive(Index slot) const;
+  [[nodiscard]] std::array<Index, 6> Neighbours(Index node) const;
+  [[nodiscard]] bool IsAnchor(Index node) const;
+  void FindDebris(const std::vector<Index>& changed, ParticleStore* particles);
+  void ForgetDebris(ParticleStore* particles);
 
   SceneView scene_;
   GridLayout layout_;
@@ -85,7 +91,10 @@ class TissueModel {
   };
   std::vector<Patch> bending_patch_;  ///< By batch * 8 + lane.
 
-  std::vector<std::uint8_t> dead_nodes_, dead_edges_, shrink_, triangle_alive_;
+  std::vector<std::uint8_t> dead_nodes_, dead_edges_, shrink_, triangle_alive_, debris_;
+  std::vector<Index> changed_nodes_, piece_;  ///< Scratch of Apply.
+  std::vector<std::uint32_t> visited_;        ///< Scratch: by node, the search that saw it last.
+  std::uint32_t search_ = 0;
   std::uint64_t revision_ = 0;
   ConstraintCounts counts_;
 };

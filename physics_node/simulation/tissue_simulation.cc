@@ -163,6 +163,10 @@ CauteryContact TissueSimulation::Cautery(std::uint32_t tool) { return cautery_.U
 float TissueSimulation::MaxDisplacement() const {
   float largest = 0;
   for (Index p = 0; p < particles_.particle_count(); ++p) {
+    const Index first = scene_.membrane.first;
+    if (p >= first && (!model_.NodeAlive(p - first) || model_.IsDebris(p - first))) {
+      continue;
+    }
     largest = std::max(largest, (particles_.At(particles_.Ref(p)) - scene_.rest_position[p]).squaredNorm());
   }
   return std::sqrt(largest);

@@ -62,7 +62,7 @@ class TissueSimulation {
   /// Changes whenever positions may have changed.
   [[nodiscard]] std::uint64_t state_version() const { return state_version_; }
 
-  /// Largest distance of a particle from rest [m].
+  /// Largest distance of a particle of live, connected tissue from rest [m].
   [[nodiscard]] float MaxDisplacement() const;
   /// Of positions and held particles: equal for equal runs.
   [[nodiscard]] std::uint64_t StateHash() const;

@@ -108,6 +108,7 @@ TEST_F(Topology, EverythingCanBeUndone) {
   }
   for (Index p = 0; p < particles_.particle_count(); ++p) {
     EXPECT_EQ(particles_.InverseMass(particles_.Ref(p)), scene_.inverse_mass[p]);
+    EXPECT_FALSE(model_.IsDebris(p));
   }
 }
 
@@ -135,6 +136,43 @@ TEST_F(Topology, PiecewiseOrAtOnceIsTheSame) {
       EXPECT_EQ(model_.rest(d)[i], at_once.rest(d)[i]);
     }
   }
+}
+
+/// All edges across the outline of rows [r0, r1] x columns [c0, c1].
+void CutOut(Index r0, Index r1, Index c0, Index c1, const SceneView& scene, TopologyState* state) {
+  const Index cols = scene.membrane.cols;
+  const auto inside = [&](Index node) {
+    return node / cols >= r0 && node / cols <= r1 && node % cols >= c0 && node % cols <= c1;
+  };
+  for (Index node = 0; node + cols + 1 < scene.membrane.node_count(); ++node) {
+    for (Index d = 0; d < 3; ++d) {
+      if (inside(node) != inside(node + std::array<Index, 3>{1, cols, cols + 1}[d])) {
+        SetBit(state->dead_edges, 3 * node + d);
+      }
+    }
+  }
+}
+
+TEST_F(Topology, APieceThatHangsOnNothingIsDebris) {
+  CutOut(4, 7, 5, 9, scene_, &state_);
+  EXPECT_GT(model_.Apply(state_, &particles_), 0);
+  for (Index node = 0; node < 12 * 17; ++node) {
+    const bool piece = node / 17 >= 4 && node / 17 <= 7 && node % 17 >= 5 && node % 17 <= 9;
+    EXPECT_EQ(model_.IsDebris(node), piece) << node;
+    EXPECT_EQ(particles_.InverseMass(particles_.Ref(node)), piece ? 0.0f : scene_.inverse_mass[node]);
+  }
+  EXPECT_FALSE(model_.TriangleAlive(2 * (5 * 16 + 6)));
+}
+
+TEST_F(Topology, OneEdgeLeftHoldsAPiece) {
+  CutOut(4, 7, 5, 9, scene_, &state_);
+  const Index bridge = 3 * (3 * 17 + 7) + 1;
+  state_.dead_edges[bridge / 8] = static_cast<std::uint8_t>(state_.dead_edges[bridge / 8] & ~(1u << (bridge % 8)));
+  (void)model_.Apply(state_, &particles_);
+  EXPECT_FALSE(model_.IsDebris(5 * 17 + 6));
+  SetBit(state_.dead_nodes, 3 * 17 + 7);  // The bridge burns through.
+  (void)model_.Apply(state_, &particles_);
+  EXPECT_TRUE(model_.IsDebris(5 * 17 + 6));
 }
 
 TEST_F(Topology, OfAnotherSizeIsRefusedWhole) {
