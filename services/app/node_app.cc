@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 #include <mutex>
@@ -134,9 +135,9 @@ runtime::CyclicThreadSettings NodeApp::timing() const {
   const config::NodeTiming& timing = impl_->cart.timing(impl_->node);
   runtime::CyclicThreadSettings settings;
   settings.name = NodeName(impl_->node);
-  settings.period_ns = static_cast<std::int64_t>(1e9 / timing.rate_Hz + 0.5);
+  settings.period_ns = std::llround(1e9 / timing.rate_Hz);
   settings.fifo_priority = timing.fifo_priority;
-  settings.spin_ns = static_cast<std::int64_t>(1e9 * timing.spin_s);
+  settings.spin_ns = std::llround(1e9 * timing.spin_s);
   settings.cpu = timing.cpu;
   return settings;
 }

@@ -56,7 +56,7 @@ fs::path FindYaml(const SceneRequest& request) {
   if (fs::is_regular_file(request.name)) {
     return request.name;
   }
-  const fs::path shipped = request.library / (request.name + ".yaml");
+  fs::path shipped = request.library / (request.name + ".yaml");
   if (request.name.find('/') == std::string::npos && fs::is_regular_file(shipped)) {
     return shipped;
   }
@@ -109,7 +109,7 @@ std::vector<std::string> ShippedScenes(const fs::path& library) {
 }
 
 fs::path ResolveScene(const SceneRequest& request) {
-  const fs::path source = FindYaml(request);
+  fs::path source = FindYaml(request);
   if (source.extension() != ".yaml") {
     return source;
   }
@@ -121,7 +121,7 @@ fs::path ResolveScene(const SceneRequest& request) {
   AddFilesNamedIn(yaml, source.parent_path(), request.data, &hash);
   std::array<char, 24> key{};
   std::snprintf(key.data(), key.size(), "-%016llx", static_cast<unsigned long long>(hash.value()));
-  const fs::path target = request.cache / (source.stem().string() + key.data() + ".fulcrum");
+  fs::path target = request.cache / (source.stem().string() + key.data() + ".fulcrum");
   if (!fs::is_regular_file(target)) {
     std::error_code error;
     fs::create_directories(request.cache, error);

@@ -31,7 +31,7 @@ std::string Indent(const std::string& text) {
 /// A name that does not exist yet, since two sessions may start within one second.
 fs::path FreshFolder(const fs::path& out, const std::string& name) {
   for (int attempt = 1;; ++attempt) {
-    const fs::path folder = out / (attempt == 1 ? name : name + "-" + std::to_string(attempt));
+    fs::path folder = out / (attempt == 1 ? name : name + "-" + std::to_string(attempt));
     if (fs::create_directory(folder)) {
       return folder;
     }
