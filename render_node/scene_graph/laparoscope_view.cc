@@ -62,6 +62,37 @@ Float4 SurroundingColour(SurfaceRole role) {
   return {0.5f, 0.2f, 0.16f, 0.3f};
 }
 
+/// A sphere of tissue round everything, seen from inside: where the scene's surfaces end the picture does not.
+void AppendCavity(const SceneView& scene, std::vector<Vec3f>* positions, std::vector<Vec3f>* normals,
+                  std::vector<Triangle>* triangles) {
+  constexpr Index kMeridians = 48, kParallels = 24;
+  const Vec3f centre = scene.render.scope_target_W;
+  float radius = (scene.render.scope_tip_W - centre).norm();
+  for (const auto& points : {scene.rest_position, scene.static_vertices}) {
+    for (const Vec3f& p : points) {
+      radius = std::max(radius, (p - centre).norm());
+    }
+  }
+  radius *= 1.02f;  // Just outside, also between the corners of its facets.
+  const auto first = static_cast<Index>(positions->size());
+  for (Index i = 0; i <= kParallels; ++i) {
+    const float polar = std::numbers::pi_v<float> * static_cast<float>(i) / kParallels;
+    for (Index k = 0; k <= kMeridians; ++k) {
+      const float turn = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kMeridians;
+      const Vec3f outward(std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar));
+      positions->push_back(centre + radius * outward);
+      normals->push_back(-outward);
+    }
+  }
+  for (Index i = 0; i < kParallels; ++i) {
+    for (Index k = 0; k < kMeridians; ++k) {
+      const Index a = first + i * (kMeridians + 1) + k, b = a + kMeridians + 1;
+      triangles->push_back({a, b + 1, b});
+      triangles->push_back({a, a + 1, b + 1});
+    }
+  }
+}
+
 }  // namespace
 
 struct LaparoscopeView::Impl {
@@ -178,6 +209,11 @@ void LaparoscopeView::Impl::AddSurroundings() {
   }
   normals.resize(positions.size());
   ComputeNormals(positions, triangles, normals);
+  AppendCavity(scene, &positions, &normals, &triangles);
+  for (std::size_t k = coordinates.size(); k < positions.size(); ++k) {
+    coordinates.push_back({positions[k].x(), positions[k].y(), positions[k].z(), 1});
+    colours.push_back({0.60f, 0.11f, 0.085f, 0.4f});
+  }
   std::unique_ptr<Mesh> mesh;
   Add(&mesh, "surroundings", false, kSurroundings, "surroundings.frag");
   // Seen from behind a wall is not there: the scope may look in through it.

@@ -1,5 +1,5 @@
 // Surfaces that do not move: abdominal wall, retroperitoneum, pelvis, bladder. colour: of the material; alpha is how
-// much fat lies beneath. coordinate: place in frame W [m].
+// much fat lies beneath. coordinate: place in frame W [m], 1 for the far and matt background.
 in vec3 position;
 in vec3 normal;
 in vec4 colour;
@@ -10,7 +10,7 @@ out vec4 fragment;
 
 void main() {
   // A slanted projection: no plane of the body is seen edge on by it for long.
-  vec2 place = vec2(coordinate.x + 0.41 * coordinate.z, coordinate.y - 0.57 * coordinate.z);
+  vec2 place = vec2(coordinate.x + 0.41 * coordinate.z, coordinate.y - 0.57 * coordinate.z) * (1.0 - 0.65 * coordinate.w);
   vec4 noise = texture(noise_pattern, place * 16.0);
   float vessel = texture(vessel_pattern, place * 13.0).r;
   vec3 bend = noise.rgb - 0.5;
@@ -20,5 +20,5 @@ void main() {
   albedo = mix(albedo, vec3(0.80, 0.46, 0.16), colour.a * smoothstep(0.35, 0.95, noise.g));
   albedo = mix(albedo, vec3(0.34, 0.015, 0.02), 0.45 * vessel);
   float gloss;
-  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.28, 0.10, 0.08), n, film, position, 0.7, gloss)), 1.0);
+  fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.28, 0.10, 0.08), n, film, position, 0.7 - 0.68 * coordinate.w, gloss)), 1.0);
 }
