@@ -18,7 +18,7 @@ body { margin: 0; background: #f4f6f9; color: var(--ink); font: 18px/1.5 system-
 main { max-width: 1240px; margin: 0 auto; padding: 36px 28px 80px; }
 h1 { font-size: 38px; line-height: 1.15; margin: 0 0 4px; letter-spacing: -0.01em; }
 h2 { font-size: 25px; margin: 52px 0 16px; }
-p.sub { color: var(--soft); margin: 0 0 22px; }
+p.sub { color: var(--soft); margin: 8px 0 22px; }
 .verdict { display: inline-block; padding: 9px 20px; border-radius: 8px; font-weight: 600; }
 .verdict.good { background: #d9f2e2; color: #0b5a2b; } .verdict.bad { background: #fbdcdb; color: #8d1512; }
 .tiles { display: grid; grid-template-columns: repeat(auto-fill, minmax(208px, 1fr)); gap: 14px; margin-top: 26px; }
