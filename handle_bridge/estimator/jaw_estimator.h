@@ -14,7 +14,7 @@ inline constexpr int kJawModes = 3;
 struct JawEstimatorSettings {
   double dt_s = 1.0 / 400.0;
   double noise_V = 1.46e-3;  ///< Analogue noise and tremor before the converter, standard deviation.
-  double adc_step_V = 0.00488;
+  double adc_step_V = 5.0 / 1024;
   double switch_probability = 0.018;  ///< A period, to each of the other modes together.
   double hold_leak_per_s = 2.0;       ///< Decay of velocity in the hold mode.
   /// Velocity noise of each mode per period [deg/s]: hold, move, snap.

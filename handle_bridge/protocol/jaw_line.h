@@ -22,7 +22,7 @@ enum class LineVerdict {
 };
 
 struct JawLineSettings {
-  double adc_step_V = 0.00488;
+  double adc_step_V = 5.0 / 1024;
   int min_code = 485;  ///< Calibrated codes, closed interval.
   int max_code = 521;
 };
@@ -34,7 +34,7 @@ struct JawReading {
 
 /// Strict gate from lines to codes. A reading is used only if its verdict is kGood.
 ///
-/// The grid test is what makes an unframed protocol safe: the codes are 0.00488 V apart and the line has a resolution
+/// The grid test is what makes an unframed protocol safe: the codes are 4.88 mV apart and the line has a resolution
 /// of 0.0001 V, so 48 of 49 damaged values are not multiples of the step. No change of a single bit or digit that moves
 /// the value by a count or more lands on the grid.
 class JawLineGate {

@@ -13,8 +13,8 @@ struct JawFirmwareSettings {
   double closed_V = 2.37;  ///< At 0 degrees (paper).
   double open_V = 2.54;    ///< At open_deg.
   double open_deg = 60.0;
-  double adc_step_V = 0.00488;  ///< The paper's rounding of 5 V / 1024.
-  double noise_V = 0.001;       ///< Standard deviation: the paper's +-0.002 V taken as two of it.
+  double adc_step_V = 5.0 / 1024;  ///< The paper rounds it to 0.00488.
+  double noise_V = 0.001;          ///< Standard deviation: the paper's +-0.002 V taken as two of it.
 };
 
 class JawFirmware {

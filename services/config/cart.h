@@ -25,7 +25,9 @@ struct SerialLink {
 /// Jaw angle as a function of the voltage that the handle's converter reports: through 2 … 9 points, monotone.
 /// Default: the paper's linear 2.37 … 2.54 V for 0 … 60 degrees.
 struct JawCalibration {
-  double adc_step_V = 0.00488;  ///< Volt per count of the 10-bit converter.
+  /// Volt per count of the 10-bit converter: 5 V / 1024. The paper rounds it to 0.00488; its lines (2.4512 is count
+  /// 502) show the exact step.
+  double adc_step_V = 5.0 / 1024;
   std::vector<double> volts = {2.37, 2.54};
   std::vector<double> angles_rad = {0.0, 1.0471975511965976};
 };

@@ -13,16 +13,16 @@ namespace fulcrum::handle_bridge {
 namespace {
 
 JawCalibration PaperCalibration() {
-  const std::array codes = {2.37 / 0.00488, 2.54 / 0.00488};
+  const std::array codes = {2.37 / (5.0 / 1024), 2.54 / (5.0 / 1024)};
   const std::array angles = {0.0, 60.0};
   return {codes, angles};
 }
 
 TEST(JawCalibration, TwoPointsAreAStraightLine) {
   const JawCalibration calibration = PaperCalibration();
-  EXPECT_NEAR(calibration.Angle(2.37 / 0.00488), 0, 1e-9);
-  EXPECT_NEAR(calibration.Angle(2.54 / 0.00488), 60, 1e-9);
-  EXPECT_NEAR(calibration.Slope(500), 60 / (0.17 / 0.00488), 1e-9);
+  EXPECT_NEAR(calibration.Angle(2.37 / (5.0 / 1024)), 0, 1e-9);
+  EXPECT_NEAR(calibration.Angle(2.54 / (5.0 / 1024)), 60, 1e-9);
+  EXPECT_NEAR(calibration.Slope(500), 60 / (0.17 / (5.0 / 1024)), 1e-9);
   EXPECT_NEAR(calibration.Angle(600) - calibration.Angle(599), calibration.Slope(500), 1e-9);
 }
 
@@ -55,7 +55,8 @@ TEST(JawCalibration, FivePointsRemoveBowSpreadAndOffset) {
   double sum2 = 0, sum5 = 0;
   int n = 0;
   for (int part = 0; part < 200; ++part) {
-    const double offset = 0.010 / 0.00488 * unit(random), gain = 1 + 0.08 * unit(random), bow = 0.03 * unit(random);
+    const double offset = 0.010 / (5.0 / 1024) * unit(random), gain = 1 + 0.08 * unit(random),
+                 bow = 0.03 * unit(random);
     const auto code_of = [&](double angle) {
       const double x = angle / 60;
       return 485.66 + offset + 34.84 * gain * (x + 4 * bow * x * (1 - x));
@@ -123,7 +124,7 @@ TEST(JawEstimator, RateIsTheDerivativeInASteadyMotion) {
 }
 
 TEST(JawEstimator, FallingCalibrationIsAMirrorImage) {
-  const std::array codes = {2.37 / 0.00488, 2.54 / 0.00488};
+  const std::array codes = {2.37 / (5.0 / 1024), 2.54 / (5.0 / 1024)};
   const std::array falling = {60.0, 0.0};
   JawEstimator up({}, PaperCalibration());
   JawEstimator down({}, JawCalibration(codes, falling));

@@ -14,6 +14,8 @@
 namespace fulcrum::handle_bridge {
 namespace {
 
+constexpr double kStep_V = 5.0 / 1024;
+
 struct Framed {
   std::vector<std::string> lines;
   int bad = 0;
@@ -75,9 +77,9 @@ TEST(JawFirmware, SendsThePapersVoltages) {
   JawFirmwareSettings quiet;
   quiet.noise_V = 0;
   JawFirmware firmware(quiet, 1);
-  EXPECT_EQ(firmware.Convert(0), 486);   // 2.37 V
+  EXPECT_EQ(firmware.Convert(0), 485);   // 2.37 V
   EXPECT_EQ(firmware.Convert(60), 520);  // 2.54 V
-  EXPECT_EQ(LineOf(502), "2.4498");
+  EXPECT_EQ(LineOf(502), "2.4512");
   const auto line = firmware.Line(30);
   EXPECT_EQ(line[6], '\r');
   EXPECT_EQ(line[7], '\n');
@@ -114,14 +116,16 @@ TEST(JawLineGate, NoSingleDamagedBitOrDigitGivesAWrongCode) {
 
 TEST(JawLineGate, AnotherConvertersStepIsToldFromGarbage) {
   JawLineGate gate{JawLineSettings{}};
-  // 502 * 5 V / 1024: the paper's own example line, computed with the exact step.
-  EXPECT_EQ(gate.Check("2.4512").verdict, LineVerdict::kOffGrid);
-  JawLineSettings exact;
-  exact.adc_step_V = 5.0 / 1024;
-  JawLineGate exact_gate(exact);
-  const JawReading reading = exact_gate.Check("2.4512");
+  // The paper's example line is count 502 of 5 V / 1024.
+  const JawReading reading = gate.Check("2.4512");
   EXPECT_EQ(reading.verdict, LineVerdict::kGood);
   EXPECT_EQ(reading.code, 502);
+  // The same count of a handle that computes with the rounded 0.00488 V.
+  EXPECT_EQ(gate.Check("2.4498").verdict, LineVerdict::kOffGrid);
+  JawLineSettings rounded;
+  rounded.adc_step_V = 0.00488;
+  JawLineGate rounded_gate(rounded);
+  EXPECT_EQ(rounded_gate.Check("2.4498").code, 502);
 }
 
 TEST(JawLineGate, CodeBeyondCalibrationIsOutside) {
@@ -283,7 +287,7 @@ TEST(Protocol, HoldsItsPromisesOnAHundredThousandMutatedInputs) {
       ASSERT_LE(reading.code, kMaxCode);
       if (reading.verdict == LineVerdict::kGood) {
         ASSERT_EQ(framer.line().size(), 6u);
-        ASSERT_LE(std::abs(std::stod(std::string(framer.line())) - reading.code * 0.00488), 0.00488 * 0.0125 + 1e-9);
+        ASSERT_LE(std::abs(std::stod(std::string(framer.line())) - reading.code * kStep_V), kStep_V * 0.0125 + 1e-9);
         ++good;
       }
     }
