@@ -36,7 +36,7 @@ void SourceWindow::MoveTo(CellIndex corner) {
   if (corner == corner_) return;
   const int di = corner.ix - corner_.ix, dj = corner.iy - corner_.iy;
   // A touch-down elsewhere shares nothing with the last potential.
-  const bool near = corner_.ix != INT32_MIN && std::abs(di) < kWindow / 4 && std::abs(dj) < kWindow / 4;
+  const bool near = std::abs(di) < kWindow / 4 && std::abs(dj) < kWindow / 4;
   near ? potential_.Shift(di, dj) : potential_.ImportStart({});
   corner_ = corner;
 }

@@ -17,6 +17,8 @@ namespace fulcrum::thermal {
 inline constexpr float kMaxWarming = 20.0f;  ///< Per coupling step [K]: sigma then changes by less than 30 %.
 /// Conductance of sparks across the steam, relative to metal on tissue; assumed.
 inline constexpr float kArcConductance = 0.15f;
+/// Corner of a window that has not been used yet: far from any sheet, yet no overflow in differences.
+inline constexpr CellIndex kNowhere{-(1 << 24), -(1 << 24)};
 inline constexpr float kTentRadius_m = 0.015f;  ///< A tented sheet returns its current to the tissue from here on.
 
 /// Tip path over a span of time, in material space.
@@ -50,7 +52,7 @@ class SourceWindow {
 
   /// For checkpoints: where the window stood and the start value of the next solve.
   struct State {
-    CellIndex corner{INT32_MIN, INT32_MIN};
+    CellIndex corner = kNowhere;
     std::array<float, kWindowCells> start{};
   };
   void Export(State* state) const;
@@ -75,7 +77,7 @@ class SourceWindow {
   const Sheet& sheet_;
   PotentialSolver potential_;
   PotentialProblem problem_;
-  CellIndex corner_{INT32_MIN, INT32_MIN};
+  CellIndex corner_ = kNowhere;
   CellMetric metric_;
   std::array<float, 64> far_field_{};  ///< K1/(lambda K0) over distance [1/m].
   SourceStats stats_;

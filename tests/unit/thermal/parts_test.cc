@@ -173,7 +173,7 @@ std::set<ThermalEventKind> EventsOfDwell(float depth_m, int frames) {
 }
 
 TEST(ProtectedTest, ShallowUreterIsWarnedAndInjuredByALongStay) {
-  const auto kinds = EventsOfDwell(5e-4f, 2000);
+  const auto kinds = EventsOfDwell(3e-4f, 500);
   EXPECT_TRUE(kinds.contains(ThermalEventKind::kUreterWarning));
   EXPECT_TRUE(kinds.contains(ThermalEventKind::kUreterInjury));
   EXPECT_FALSE(kinds.contains(ThermalEventKind::kNerveWarning));
