@@ -56,6 +56,19 @@ double DihedralAngle(const Vec3d& x0, const Vec3d& x1, const Vec3d& x2, const Ve
   return std::atan2(n1.cross(n2).dot(e.normalized()), n1.dot(n2));
 }
 
+std::vector<Triangle> GridTriangles(int rows, int cols) {
+  std::vector<Triangle> triangles;
+  for (int r = 0; r + 1 < rows; ++r) {
+    for (int c = 0; c + 1 < cols; ++c) {
+      const auto n00 = static_cast<Index>(r * cols + c);
+      const Index n10 = n00 + static_cast<Index>(cols);
+      triangles.push_back({n00, n00 + 1, n10 + 1});
+      triangles.push_back({n00, n10 + 1, n10});
+    }
+  }
+  return triangles;
+}
+
 std::vector<Triangle> BoundaryOf(const std::vector<Tetrahedron>& tets) {
   // Faces of a positive tetrahedron, counter-clockwise seen from outside.
   constexpr int kFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};

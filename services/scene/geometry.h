@@ -22,6 +22,9 @@ ClosestPoint ClosestOnTriangle(const Vec3d& p, const Vec3d& a, const Vec3d& b, c
 /// Signed dihedral angle of a BendingConstraint [rad]: see its definition in scene_view.h.
 double DihedralAngle(const Vec3d& x0, const Vec3d& x1, const Vec3d& x2, const Vec3d& x3);
 
+/// `rows` x `cols` points, row by row, as a triangulated grid; the normal is (column direction) x (row direction).
+std::vector<Triangle> GridTriangles(int rows, int cols);
+
 /// Triangles that belong to one tetrahedron only, seen counter-clockwise from outside.
 std::vector<Triangle> BoundaryOf(const std::vector<Tetrahedron>& tets);
 

@@ -1,6 +1,8 @@
 #include "services/scene/import.h"
 
+#include <cmath>
 #include <cstdio>
+#include <numbers>
 
 #include "services/core/error.h"
 #include "services/scene/drape.h"
@@ -17,6 +19,23 @@ TriangleMesh ToWorld(TriangleMesh mesh, const ImportSettings& import, const Vec3
     p = import.scale_m * p - import.origin_m.cast<double>() + offset_m.cast<double>();
   }
   return mesh;
+}
+
+/// A sphere round the stretch under the membrane, its triangles facing inwards.
+Anatomy::Surrounding Cavity(const Vec3d& centre, double radius) {
+  constexpr int kRows = 25, kCols = 49;
+  Anatomy::Surrounding result{"cavity", SurfaceRole::kRetroperitoneum, false, {}, {}};
+  for (int r = 0; r < kRows; ++r) {
+    // Not quite to the poles, where triangles would have no area.
+    const double latitude = 0.998 * std::numbers::pi * (static_cast<double>(r) / (kRows - 1) - 0.5);
+    for (int c = 0; c < kCols; ++c) {
+      const double longitude = -2 * std::numbers::pi * c / (kCols - 1);
+      result.vertices.push_back(centre + radius * Vec3d(std::cos(latitude) * std::cos(longitude),
+                                                        std::cos(latitude) * std::sin(longitude), std::sin(latitude)));
+    }
+  }
+  result.triangles = GridTriangles(kRows, kCols);
+  return result;
 }
 
 template <class... Values>
@@ -71,6 +90,9 @@ Anatomy ImportAnatomy(const SceneSettings& settings, const Progress& progress) {
     TriangleMesh bed = ContinueSideways(settings.membrane.rows, settings.membrane.cols, anatomy.sheet, import.bed_m);
     anatomy.surroundings.push_back(
         {"retroperitoneum", SurfaceRole::kRetroperitoneum, true, std::move(bed.vertices), std::move(bed.triangles)});
+  }
+  if (import.cavity_m > 0) {
+    anatomy.surroundings.push_back(Cavity(centre_line.At(0.5 * (import.from + import.to)), import.cavity_m));
   }
   for (const ImportSettings::Surrounding& s : import.surroundings) {
     TriangleMesh mesh = Decimate(ToWorld(ReadMesh(s.file), import, s.offset_m), s.triangles_max);

@@ -151,20 +151,6 @@ void AddSheet(const MembraneSettings& membrane, const Shape& shape, Anatomy* out
   }
 }
 
-/// `rows` x `cols` points as a triangulated grid; the normal is (col direction) x (row direction).
-std::vector<Triangle> GridTriangles(int rows, int cols) {
-  std::vector<Triangle> triangles;
-  for (int r = 0; r + 1 < rows; ++r) {
-    for (int c = 0; c + 1 < cols; ++c) {
-      const auto n00 = static_cast<Index>(r * cols + c);
-      const Index n10 = n00 + static_cast<Index>(cols);
-      triangles.push_back({n00, n00 + 1, n10 + 1});
-      triangles.push_back({n00, n10 + 1, n10});
-    }
-  }
-  return triangles;
-}
-
 /// The sheet's fixed continuation to the sides and beyond the ends. It begins a little inside the membrane's rim and a
 /// little below it, so that no gap shows between the fine rim and the coarse surface.
 Anatomy::Surrounding Retroperitoneum(const TubeSettings& tube, const MembraneSettings& membrane, const Shape& shape) {

@@ -42,6 +42,7 @@ struct ImportSettings {
   double sector_rad = 2.2;        ///< How far round the organ the membrane follows it.
   double flare_m = 0.010;         ///< Then it leaves the organ and goes on this far to either side.
   double bed_m = 0.025;           ///< A fixed surface continues it to the sides by so much.
+  double cavity_m = 0;            ///< Radius of a wall round the stretch, seen from inside; 0: none.
   struct Surrounding {
     std::string name;
     SurfaceRole role = SurfaceRole::kOther;

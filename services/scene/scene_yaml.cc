@@ -200,6 +200,7 @@ void ReadImport(StrictMap map, const std::filesystem::path& base, const std::fil
   ReadSi(&map, "sector_deg", Range::Between(30, 240), &import->sector_rad);
   ReadSi(&map, "flare_mm", Range::Between(0, 60), &import->flare_m);
   ReadSi(&map, "bed_mm", Range::Between(0, 150), &import->bed_m);
+  ReadSi(&map, "cavity_mm", Range::Between(0, 1000), &import->cavity_m);
   for (StrictMap& entry : map.Maps("surroundings", 0, 16)) {
     ImportSettings::Surrounding s;
     s.name = entry.Text("name", 31);
