@@ -32,20 +32,39 @@ void AddFile(Hash64* hash, const fs::path& file) {
   hash->AddValue(static_cast<std::int64_t>(fs::last_write_time(file, error).time_since_epoch().count()));
 }
 
-/// Any word of the YAML that names an existing file is taken for an input: too many cost a compilation, too few would
-/// run yesterday's anatomy.
-void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::path& data, Hash64* hash) {
+/// Words of the YAML that could name a file or folder.
+std::vector<std::string> PathWords(const std::string& yaml) {
   constexpr std::string_view kSeparators = " \t\r\n\"',[]{}";
+  constexpr std::size_t kLongestName = 255;
+  std::vector<std::string> words;
   for (std::size_t begin = 0; (begin = yaml.find_first_not_of(kSeparators, begin)) != std::string::npos;) {
     const std::size_t end = std::min(yaml.find_first_of(kSeparators, begin), yaml.size());
     const std::string word = yaml.substr(begin, end - begin);
     begin = end;
-    if (word.find('.') == std::string::npos || word.size() > 255) {
-      continue;
+    if (word.find_first_of("./") != std::string::npos && word.size() <= kLongestName) {
+      words.push_back(word);
     }
-    for (const fs::path& base : {folder, data}) {
-      std::error_code error;
-      if (!base.empty() && fs::is_regular_file(base / word, error)) {
+  }
+  return words;
+}
+
+/// Any word that names an existing file, in the scene's folder, the data folder or a folder that the YAML names, is
+/// taken for an input: too many cost a compilation, too few would run yesterday's anatomy.
+void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::path& data, Hash64* hash) {
+  const std::vector<std::string> words = PathWords(yaml);
+  std::vector<fs::path> bases{folder};
+  if (!data.empty()) {
+    bases.push_back(data);
+  }
+  std::error_code error;
+  for (const std::string& word : words) {
+    if (fs::is_directory(folder / word, error)) {
+      bases.push_back(folder / word);
+    }
+  }
+  for (const std::string& word : words) {
+    for (const fs::path& base : bases) {
+      if (fs::is_regular_file(base / word, error)) {
         AddFile(hash, base / word);
       }
     }

@@ -374,8 +374,9 @@ class SceneCacheTest : public ::testing::Test {
     request_.compiler = folder_.path() / "compiler";
     request_.cache = folder_.path() / "cache";
     fs::create_directory(request_.library);
-    std::ofstream(request_.library / "one.yaml") << "name: one\nmesh: organ.stl\n";
-    std::ofstream(request_.library / "organ.stl") << "solid";
+    std::ofstream(request_.library / "one.yaml") << "name: one\nfolders: [../meshes]\nmesh: organ.stl\n";
+    fs::create_directory(folder_.path() / "meshes");
+    std::ofstream(folder_.path() / "meshes" / "organ.stl") << "solid";
     Program("echo run >> \"$0.runs\"; cp \"$1\" \"$3\"");
   }
   void Program(const std::string& body) const {
@@ -398,7 +399,7 @@ TEST_F(SceneCacheTest, CompilesOnceUntilAnInputChanges) {
   EXPECT_TRUE(fs::exists(first));
   EXPECT_EQ(ResolveScene(request_), first);
   EXPECT_EQ(Runs(), 1);
-  std::ofstream(request_.library / "organ.stl") << "solid changed";
+  std::ofstream(folder_.path() / "meshes" / "organ.stl") << "solid changed";
   EXPECT_NE(ResolveScene(request_), first);
   EXPECT_EQ(Runs(), 2);
   std::ofstream(request_.library / "one.yaml") << "name: two\n";
