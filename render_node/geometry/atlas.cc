@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "render_node/geometry/membrane_mesh.h"
+#include "render_node/geometry/texel.h"
 
 namespace fulcrum::render {
 namespace {
@@ -76,22 +77,19 @@ AtlasRect Atlas::Apply(const TemperaturePatch& patch) {
     return {};
   }
   for (int row = 0; row < rect.height; ++row) {
-    std::memcpy(texels_.data() + 4 * (static_cast<std::size_t>(y + row) * static_cast<std::size_t>(width_) +
-                                      static_cast<std::size_t>(x)),
+    std::memcpy(texels_.data() + 4 * TexelIndex(x, y + row, width_),
                 patch.texels.data() + 4 * static_cast<std::size_t>(row) * kPatchTexels,
                 4 * static_cast<std::size_t>(rect.width));
   }
   for (int by = y / kBlock; by <= (y + rect.height - 1) / kBlock; ++by) {
     for (int bx = x / kBlock; bx <= (x + rect.width - 1) / kBlock; ++bx) {
-      covered_[static_cast<std::size_t>(by * blocks_x_ + bx)] = 1;
+      covered_[TexelIndex(bx, by, blocks_x_)] = 1;
     }
   }
   return rect;
 }
 
-bool Atlas::Covered(int x, int y) const {
-  return covered_[static_cast<std::size_t>((y / kBlock) * blocks_x_ + x / kBlock)] != 0;
-}
+bool Atlas::Covered(int x, int y) const { return covered_[TexelIndex(x / kBlock, y / kBlock, blocks_x_)] != 0; }
 
 AtlasRect Atlas::PaintCuts(const SceneView& scene, const TopologyState& topology) {
   const std::uint32_t cols = scene.membrane.cols;
@@ -126,7 +124,7 @@ AtlasRect Atlas::PaintCuts(const SceneView& scene, const TopologyState& topology
   return changed;
 }
 
-AtlasRect Atlas::PaintCapsule(Vec2f a, Vec2f b) {
+AtlasRect Atlas::PaintCapsule(const Vec2f& a, const Vec2f& b) {
   const Vec2f low = (a.cwiseMin(b).array() - kBlanched).matrix() / texel_m_;
   const Vec2f high = (a.cwiseMax(b).array() + kBlanched).matrix() / texel_m_;
   const int x0 = std::max(0, static_cast<int>(low.x())), x1 = std::min(width_ - 1, static_cast<int>(high.x()));
@@ -138,8 +136,7 @@ AtlasRect Atlas::PaintCapsule(Vec2f a, Vec2f b) {
       }
       const Vec2f p((static_cast<float>(x) + 0.5f) * texel_m_, (static_cast<float>(y) + 0.5f) * texel_m_);
       const float d = DistanceToSegment(p, a, b);
-      std::uint8_t* texel = texels_.data() + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                                                  static_cast<std::size_t>(x));
+      std::uint8_t* texel = texels_.data() + 4 * TexelIndex(x, y, width_);
       const auto raise = [](std::uint8_t* byte, float value) {
         *byte = std::max(*byte, static_cast<std::uint8_t>(std::lround(value)));
       };

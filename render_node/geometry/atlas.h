@@ -40,7 +40,7 @@ class Atlas {
 
  private:
   [[nodiscard]] bool Covered(int x, int y) const;
-  AtlasRect PaintCapsule(Vec2f a, Vec2f b);
+  AtlasRect PaintCapsule(const Vec2f& a, const Vec2f& b);
 
   float texel_m_;
   int width_;

@@ -3,6 +3,8 @@
 #include <array>
 #include <cctype>
 
+#include "render_node/geometry/texel.h"
+
 namespace fulcrum::render {
 namespace {
 
@@ -63,13 +65,13 @@ int GlyphIndex(char character) {
 
 GlyphSheet MakeGlyphSheet() {
   GlyphSheet sheet{kGlyphWidth * static_cast<int>(kCharacters.size()), kGlyphHeight, {}};
-  sheet.dots.assign(static_cast<std::size_t>(sheet.width * sheet.height), 0);
+  sheet.dots.assign(TexelIndex(0, sheet.height, sheet.width), 0);
   for (std::size_t glyph = 0; glyph < kCharacters.size(); ++glyph) {
     for (int row = 0; row < 7; ++row) {
       for (int dot = 0; dot < 5; ++dot) {
         if ((kRows[glyph][static_cast<std::size_t>(row)] >> (4 - dot)) & 1) {
           const int x = kGlyphWidth * static_cast<int>(glyph) + dot, y = kGlyphHeight - 1 - row;
-          sheet.dots[static_cast<std::size_t>(y * sheet.width + x)] = 255;
+          sheet.dots[TexelIndex(x, y, sheet.width)] = 255;
         }
       }
     }

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <random>
 
+#include "render_node/geometry/texel.h"
+
 namespace fulcrum::render {
 namespace {
 
@@ -28,7 +30,7 @@ void AddValueNoise(int size, int cells, float amplitude, Uniform* uniform, std::
   for (float& value : lattice) {
     value = (*uniform)() - 0.5f;
   }
-  const auto at = [&](int x, int y) { return lattice[static_cast<std::size_t>((y % cells) * cells + x % cells)]; };
+  const auto at = [&](int x, int y) { return lattice[TexelIndex(x % cells, y % cells, cells)]; };
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
       const float fx = static_cast<float>(x) * cells / size, fy = static_cast<float>(y) * cells / size;
@@ -36,7 +38,7 @@ void AddValueNoise(int size, int cells, float amplitude, Uniform* uniform, std::
       const float tx = SmoothStep(fx - ix), ty = SmoothStep(fy - iy);
       const float low = at(ix, iy) + tx * (at(ix + 1, iy) - at(ix, iy));
       const float high = at(ix, iy + 1) + tx * (at(ix + 1, iy + 1) - at(ix, iy + 1));
-      (*field)[static_cast<std::size_t>(y * size + x)] += amplitude * (low + ty * (high - low));
+      (*field)[TexelIndex(x, y, size)] += amplitude * (low + ty * (high - low));
     }
   }
 }
@@ -67,9 +69,11 @@ std::vector<std::uint8_t> MakeNoisePattern(int size) {
   constexpr int kCells = 9;
   Uniform uniform(5);
   std::array<std::array<float, 2>, kCells * kCells> centres;
-  for (int c = 0; c < kCells * kCells; ++c) {
-    centres[c] = {(static_cast<float>(c % kCells) + uniform()) / kCells,
-                  (static_cast<float>(c / kCells) + uniform()) / kCells};
+  for (int y = 0; y < kCells; ++y) {
+    for (int x = 0; x < kCells; ++x) {
+      const float u = static_cast<float>(x) + uniform(), v = static_cast<float>(y) + uniform();
+      centres[TexelIndex(x, y, kCells)] = {u / kCells, v / kCells};
+    }
   }
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
@@ -79,13 +83,13 @@ std::vector<std::uint8_t> MakeNoisePattern(int size) {
         for (int dx = -2; dx <= 2; ++dx) {
           const int cx = (static_cast<int>(u * kCells) + dx + kCells) % kCells;
           const int cy = (static_cast<int>(v * kCells) + dy + kCells) % kCells;
-          const auto& centre = centres[cy * kCells + cx];
+          const auto& centre = centres[TexelIndex(cx, cy, kCells)];
           const float d = std::hypot(Wrapped(u, centre[0]), Wrapped(v, centre[1]));
           second = std::min(second, std::max(d, nearest));
           nearest = std::min(nearest, d);
         }
       }
-      image[4 * static_cast<std::size_t>(y * size + x) + 3] =
+      image[4 * TexelIndex(x, y, size) + 3] =
           ToByte(255 * SmoothStep(std::min(1.0f, 1.6f * kCells * (second - nearest))));
     }
   }
@@ -97,8 +101,10 @@ std::vector<std::uint8_t> MakeVesselPattern(int size) {
   struct Walker {
     float x, y, angle, radius, left;
   };
+  constexpr std::size_t kMostWalkers = 400;
   Uniform uniform(29);
   std::vector<Walker> walkers;
+  walkers.reserve(kMostWalkers);
   for (int k = 0; k < 7; ++k) {
     walkers.push_back(
         {uniform() * size, uniform() * size, 2 * std::numbers::pi_v<float> * uniform(), 0.0042f * size, 0.9f * size});
@@ -113,7 +119,7 @@ std::vector<std::uint8_t> MakeVesselPattern(int size) {
           const float d = std::hypot(static_cast<float>(x) + 0.5f - walker.x, static_cast<float>(y) + 0.5f - walker.y);
           const float strength = std::min(1.0f, 0.35f + walker.radius / (0.004f * size)) *
                                  SmoothStep(std::clamp(walker.radius + 1 - d, 0.0f, 1.0f));
-          float& texel = image[static_cast<std::size_t>(((y % size + size) % size) * size + (x % size + size) % size)];
+          float& texel = image[TexelIndex((x % size + size) % size, (y % size + size) % size, size)];
           texel = std::max(texel, strength);
         }
       }
@@ -123,7 +129,7 @@ std::vector<std::uint8_t> MakeVesselPattern(int size) {
       walker.left -= 1;
       walker.radius *= 0.9985f;
       // A branch leaves every thirtieth of the image or so, thinner (Murray: r0^3 = r1^3 + r2^3).
-      if (uniform() < 30.0f / static_cast<float>(size) && walkers.size() < 400) {
+      if (uniform() < 30.0f / static_cast<float>(size) && walkers.size() < kMostWalkers) {
         const float turn = (uniform() < 0.5f ? -1.0f : 1.0f) * (0.5f + 0.6f * uniform());
         walkers.push_back({walker.x, walker.y, walker.angle + turn, 0.68f * walker.radius, 0.5f * walker.left});
         walker.radius *= 0.88f;
@@ -160,7 +166,7 @@ StructureMap MakeStructureMap(const SceneView& scene, float width_m, float heigh
           const float length2 = std::max(ab.squaredNorm(), std::numeric_limits<float>::min());
           const float t = std::clamp((p - a).dot(ab) / length2, 0.0f, 1.0f);
           const float shade = std::clamp(1 - (p - a - t * ab).norm() / reach, 0.0f, 1.0f);
-          std::uint8_t& texel = map.texels[2 * static_cast<std::size_t>(y * map.width + x) + channel];
+          std::uint8_t& texel = map.texels[2 * TexelIndex(x, y, map.width) + channel];
           texel = std::max(texel, ToByte(255 * shade));
         }
       }

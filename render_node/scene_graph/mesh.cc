@@ -17,7 +17,9 @@ void Fill(std::span<const T> values, Array* array) {
   static_assert(sizeof(T) == sizeof((*array)[0]));
   array->resize(values.size());
   if (!values.empty()) {
-    std::memcpy(static_cast<void*>(&array->front()), values.data(), values.size_bytes());
+    // As bytes: both are packed floats, but Eigen's vectors are not trivially copyable.
+    const auto bytes = std::as_bytes(values);
+    std::memcpy(&array->front(), bytes.data(), bytes.size());
   }
   array->dirty();
 }
