@@ -8,10 +8,22 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Current crosses a gap of this size between foot and membrane [m].
-constexpr float kContactGap = 0.0004f;
-/// Weight of a touching point falls by 4 at this distance from the foot's free end [m].
-constexpr float kEndLength = 0.0015f;
+/// The arc strikes across a gap of this size between metal and membrane. Once struck it holds over kHoldSpacings of the
+/// mesh more: where the membrane has burnt away it ends a triangle further on, not where the heat really ended [m].
+constexpr float kStrikeGap = 0.0004f;
+constexpr float kHoldSpacings = 0.5f;
+/// Bare metal up the neck [m].
+constexpr float kBareNeck = 0.005f;
+/// The weight of a touching point falls to a quarter this far from the aim; at the reach it is out of the circuit [m].
+constexpr float kSpotSize = 0.001f;
+constexpr float kSpotReach = 0.003f;
+/// The aim lies so far ahead of the spot when the tool moves faster than kSlow [m], [m/s].
+constexpr float kLead = 0.0008f;
+constexpr float kSlow = 0.001f;
+/// The spot follows the touch along the metal at most this fast [m/s]. After this time without a touch it is chosen
+/// anew and the arc is out [s].
+constexpr float kSpotSpeed = 0.010f;
+constexpr float kSpotMemory = 0.3f;
 /// The membrane counts as lifted off what lies beneath from here on [m].
 constexpr float kTentHeight = 0.002f;
 /// A binding this many rows and columns away still tells how the organ beneath has moved.
@@ -57,30 +69,91 @@ bool CauteryProbe::Tented(Index triangle, const std::array<float, 3>& barycentri
   return normal.dot(displacement - beneath) > kTentHeight;
 }
 
-CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolCollision& collision) {
+CauteryProbe::CauteryProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
+    : scene_(scene), model_(model), particles_(particles) {
+  double sum = 0, count = 0;
+  for (Index edge = 0; edge < scene.membrane_rest_length.size(); ++edge) {
+    if (edge % 3 != 2 && scene.membrane_rest_length[edge] > 0.0f) {
+      sum += scene.membrane_rest_length[edge];
+      count += 1;
+    }
+  }
+  spacing_ = static_cast<float>(sum / std::max(count, 1.0));
+}
+
+bool CauteryProbe::IsFresh() const { return static_cast<float>(steps_away_) * scene_.physics.dt_s > kSpotMemory; }
+
+void CauteryProbe::FindTouches(std::uint32_t tool, const ToolCollision& collision) {
+  const ToolDescription& description = scene_.tools[tool];
+  const float hold = IsFresh() ? 0.0f : kHoldSpacings * spacing_;
+  const float limit = description.tip_radius_m + scene_.physics.collision_margin_m + kStrikeGap + hold;
+  touches_.clear();
+  for (const ContactPair& pair : collision.pairs()) {
+    // ShapeOf: the hook's first capsule is the foot, its second the neck; both begin at the heel.
+    const std::uint32_t part = pair.capsule - tool * kMaxCapsules;
+    if (pair.capsule / kMaxCapsules != tool || part > 1 || pair.triangle >= collision.membrane_triangle_count() ||
+        pair.closest.distance_sq > limit * limit) {
+      continue;
+    }
+    const float along = part == 0 ? pair.closest.t * description.tip_length_m : -pair.closest.t * kHookNeck;
+    if (along >= -kBareNeck) {
+      touches_.push_back({&pair, along, limit - std::sqrt(pair.closest.distance_sq), pair.closest.on_triangle});
+    }
+  }
+}
+
+float CauteryProbe::Weight(const Touch& touch) const {
+  const float away = (touch.place - aim_).norm();
+  if (away > kSpotReach) {
+    return 0.0f;
+  }
+  const float fall = 1.0f / (1.0f + away * away / (kSpotSize * kSpotSize));
+  return touch.closeness * fall * fall;
+}
+
+void CauteryProbe::FollowSpot(const ToolPose& pose, const ToolPose& last_pose, const ToolDescription& tool) {
+  const float dt = scene_.physics.dt_s;
+  motion_ += dt / (dt + kRateSmoothing) * ((pose.p_WT - last_pose.p_WT) / dt - motion_);
+  float sum = 0, along = 0;
+  const bool fresh = IsFresh();
+  const float speed = motion_.norm();
+  const Vec3f lead = speed > kSlow ? Vec3f(motion_ * (kLead / speed)) : Vec3f(Vec3f::Zero());
+  const auto aim_at = [&](float spot) {
+    return Vec3f(pose.ToWorld(spot >= 0.0f ? Vec3f(spot, 0, 0) : Vec3f(0, 0, spot)) + lead);
+  };
+  aim_ = aim_at(spot_);
+  for (const Touch& touch : touches_) {
+    // Nothing near the spot: wherever it touches draws the spot to itself.
+    const float weight = fresh ? touch.closeness * touch.closeness : Weight(touch) + 1e-3f * touch.closeness;
+    sum += weight;
+    along += weight * touch.along;
+  }
+  if (!(sum > 0.0f)) {
+    ++steps_away_;
+    return;
+  }
+  steps_away_ = 0;
+  const float step = kSpotSpeed * dt;
+  spot_ = fresh ? along / sum : spot_ + std::clamp(along / sum - spot_, -step, step);
+  spot_ = std::clamp(spot_, -kBareNeck, tool.tip_length_m);
+  aim_ = aim_at(spot_);
+}
+
+CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& last_pose, const ToolPose& pose,
+                                    const ToolCollision& collision) {
   CauteryContact contact;
   contact.tool = static_cast<std::uint8_t>(tool);
   const ToolDescription& description = scene_.tools[tool];
-  const std::uint32_t foot = tool * kMaxCapsules;  // ShapeOf: the foot is the hook's first capsule.
-  const float limit = description.tip_radius_m + scene_.physics.collision_margin_m + kContactGap;
-  const auto place_of = [&](const ContactPair& pair) {
-    Vec2f place = Vec2f::Zero();
-    for (std::size_t i = 0; i < 3; ++i) {
-      place += pair.closest.barycentric[i] * scene_.membrane_material[pair.particle[i] - scene_.membrane.first];
-    }
-    return place;
-  };
+  const auto& material = scene_.membrane_material;
+  FindTouches(tool, collision);
+  FollowSpot(pose, last_pose, description);
   Vec2f mean = Vec2f::Zero();
   float sum = 0;
-  for (const ContactPair& pair : collision.pairs()) {
-    const float distance = std::sqrt(pair.closest.distance_sq);
-    if (pair.capsule != foot || pair.triangle >= collision.membrane_triangle_count() || distance > limit) {
-      continue;
+  for (const Touch& touch : touches_) {
+    const float weight = Weight(touch);
+    for (std::size_t i = 0; i < 3; ++i) {
+      mean += weight * touch.pair->closest.barycentric[i] * material[touch.pair->particle[i] - scene_.membrane.first];
     }
-    const float from_end = (1.0f - pair.closest.t) * description.tip_length_m / kEndLength;
-    const float fall = 1.0f / (1.0f + from_end * from_end);
-    const float weight = (limit - distance) * fall * fall;
-    mean += weight * place_of(pair);
     sum += weight;
   }
   if (!(sum > 0.0f)) {
@@ -90,19 +163,18 @@ CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolCollision& col
   }
   mean /= sum;
   float nearest = 3e38f;
-  for (const ContactPair& pair : collision.pairs()) {
-    if (pair.capsule != foot || pair.triangle >= collision.membrane_triangle_count() ||
-        pair.closest.distance_sq > limit * limit) {
+  for (const Touch& touch : touches_) {
+    if (!(Weight(touch) > 0.0f)) {
       continue;
     }
-    const auto nodes = model_->TriangleNodes(pair.triangle);
-    const auto& m = scene_.membrane_material;
-    const auto barycentric = BarycentricInPlane(mean, m[nodes[0]], m[nodes[1]], m[nodes[2]]);
-    const Vec2f place = barycentric[0] * m[nodes[0]] + barycentric[1] * m[nodes[1]] + barycentric[2] * m[nodes[2]];
+    const auto nodes = model_->TriangleNodes(touch.pair->triangle);
+    const auto barycentric = BarycentricInPlane(mean, material[nodes[0]], material[nodes[1]], material[nodes[2]]);
+    const Vec2f place =
+        barycentric[0] * material[nodes[0]] + barycentric[1] * material[nodes[1]] + barycentric[2] * material[nodes[2]];
     const float distance = (place - mean).squaredNorm();
     if (distance < nearest) {
       nearest = distance;
-      contact.triangle = pair.triangle;
+      contact.triangle = touch.pair->triangle;
       contact.barycentric = barycentric;
       contact.material = place;
     }

@@ -158,7 +158,9 @@ DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
   return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool]);
 }
 
-CauteryContact TissueSimulation::Cautery(std::uint32_t tool) { return cautery_.Update(tool, collision_); }
+CauteryContact TissueSimulation::Cautery(std::uint32_t tool) {
+  return cautery_.Update(tool, tracks_[tool].last, tracks_[tool].now, collision_);
+}
 
 float TissueSimulation::MaxDisplacement() const {
   float largest = 0;
