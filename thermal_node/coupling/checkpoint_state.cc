@@ -1,4 +1,4 @@
-// Checkpoint layout of the thermal solver: a header, the potential's start value, unfinished stretches of the cut,
+// Checkpoint layout of the thermal solver: a header, the potential's start value, the marks of the cut length,
 // protected structures, topology, then every tile that is not blank, each with only those arrays that hold anything.
 #include <algorithm>
 #include <cstring>
@@ -11,7 +11,7 @@ namespace fulcrum::thermal {
 namespace {
 
 /// Change it with the layout.
-constexpr std::uint64_t kLayout = 0x7468726d'00000001ull;
+constexpr std::uint64_t kLayout = 0x7468726d'00000002ull;
 /// Some hundred tiles with all their arrays; a session that cuts more than half a metre would need more.
 constexpr std::size_t kTileCapacity = std::size_t{24} << 20;
 
@@ -71,12 +71,12 @@ float DefaultOf(std::size_t array) { return array == 1 ? 1.0f : 0.0f; }
 struct ThermalSolver::Header {
   std::uint64_t layout;
   std::uint64_t frame, revision, quarantined;
-  CutMeter::State cut;
+  double cut_length_m;
   Ledger ledger;
   SolverFigures figures;
   EventMemory memory;
   float clock_s, protected_dt_s;
-  std::uint32_t tile_count, stretch_count, sample_count, structure_count;
+  std::uint32_t tile_count, mark_count, sample_count, structure_count;
   std::uint32_t node_bytes, edge_bytes, shrink_bytes, protected_warm;
 };
 
@@ -95,7 +95,7 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   header.frame = frame_;
   header.revision = topology_.revision();
   header.quarantined = field_.quarantined();
-  header.cut = cut_meter_.state();
+  header.cut_length_m = cut_meter_.state();
   header.ledger = ledger_;
   header.figures = figures_;
   header.memory = memory_;
@@ -103,7 +103,7 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   header.protected_dt_s = protected_dt_s_;
   const auto blank = [](const Tile* tile) { return IsBlank(tile->state); };
   header.tile_count = static_cast<std::uint32_t>(tiles.size() - std::count_if(tiles.begin(), tiles.end(), blank));
-  header.stretch_count = static_cast<std::uint32_t>(cut_meter_.stretches().size());
+  header.mark_count = static_cast<std::uint32_t>(cut_meter_.marks().size());
   header.sample_count = static_cast<std::uint32_t>(protected_.samples().size());
   header.structure_count = static_cast<std::uint32_t>(protected_.alarm_state().size());
   const TopologyBits& bits = topology_.committed();
@@ -115,7 +115,7 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   SourceWindow::State window;
   source_.Export(&window);
   writer.PutValue(window);
-  for (const CutMeter::Stretch& stretch : cut_meter_.stretches()) writer.PutValue(stretch);
+  writer.Put(std::span<const CutMeter::Mark>(cut_meter_.marks()));
   writer.Put(protected_.samples());
   writer.Put(protected_.alarm_state());
   for (const auto* field : {&bits.dead_nodes, &bits.dead_edges, &bits.shrink}) {
@@ -148,14 +148,12 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   TopologyBits bits = topology_.committed();
   if (header.node_bytes != bits.dead_nodes.size() || header.edge_bytes != bits.dead_edges.size() ||
       header.shrink_bytes != bits.shrink.size() || header.sample_count != protected_.samples().size() ||
-      header.structure_count != protected_.alarm_state().size() || header.stretch_count > (1u << 20) ||
+      header.structure_count != protected_.alarm_state().size() || header.mark_count > (1u << 20) ||
       header.tile_count > static_cast<std::uint32_t>(field_.sheet().tile_count())) {
     return false;
   }
-  std::deque<CutMeter::Stretch> stretches(header.stretch_count);
-  for (CutMeter::Stretch& stretch : stretches) {
-    if (!reader.GetValue(&stretch)) return false;
-  }
+  std::vector<CutMeter::Mark> marks(header.mark_count);
+  if (!reader.Get(std::span(marks))) return false;
   std::vector<ProtectedSample> samples(header.sample_count);
   std::vector<std::uint8_t> alarm_state(header.structure_count);
   if (!reader.Get(std::span(samples)) || !reader.Get(std::span(alarm_state)) ||
@@ -184,7 +182,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   frame_ = header.frame;
   topology_.Restore(header.revision, bits);
   field_.RestoreQuarantined(header.quarantined);
-  cut_meter_.Restore(header.cut, std::move(stretches));
+  cut_meter_.Restore(header.cut_length_m, std::move(marks));
   ledger_ = header.ledger;
   figures_ = header.figures;
   memory_ = header.memory;

@@ -30,7 +30,7 @@ ThermalSolver::ThermalSolver(const SceneView& scene)
 }
 
 bool ThermalSolver::Idle(const TipInput& tip) const {
-  return !tip.active && field_.idle() && !topology_.staged() && !protected_.warm() && !cut_meter_.pending();
+  return !tip.active && field_.idle() && !topology_.staged() && !protected_.warm();
 }
 
 void ThermalSolver::Step(const TipInput& tip, float dt_s) {
@@ -50,7 +50,7 @@ void ThermalSolver::Step(const TipInput& tip, float dt_s) {
   figures_.substeps = field_.Diffuse(dt_s, &ledger_);
   ApplySource(tip, dt_s, 0.5f, 1.0f);
   UpdateDamage(dt_s);
-  UpdateTopology(tip, dt_s);
+  UpdateTopology();
   UpdateProtected(dt_s);
   figures_.power_W = static_cast<float>((ledger_.generator - before_J) / dt_s);
   figures_.voltage_V = tip.active ? source_.stats().voltage_V : 0.0f;
@@ -73,11 +73,12 @@ void ThermalSolver::UpdateDamage(float dt_s) {
   for (Tile* tile : field_.awake()) damage_.Update(tile, dt_s);
 }
 
-void ThermalSolver::UpdateTopology(const TipInput& tip, float dt_s) {
+void ThermalSolver::UpdateTopology() {
   const SourceStats& stats = source_.stats();
-  if (stats.removed_cells > 0) topology_.StageCut(field_, stats.low, stats.high);
-  if (tip.active) cut_meter_.Walk(field_, tip.path);
-  cut_meter_.Update(&field_, dt_s);
+  if (stats.removed_cells > 0) {
+    topology_.StageCut(field_, stats.low, stats.high);
+    cut_meter_.Update(&field_, stats.low, stats.high);
+  }
   if (!at_commit_frame()) return;
   for (const Tile* tile : field_.awake()) {
     // Collagen does not change below this; see DamageModel.

@@ -86,7 +86,7 @@ class ThermalSolver {
   struct Header;
   void ApplySource(const TipInput& tip, float dt_s, float from, float to);
   void UpdateDamage(float dt_s);
-  void UpdateTopology(const TipInput& tip, float dt_s);
+  void UpdateTopology();
   void UpdateProtected(float dt_s);
   void ReportEvents(const TipInput& tip);
   void Report(ThermalEventKind kind, const Vec2f& at, float theta, float value, float quiet_s);
