@@ -71,7 +71,6 @@ float DefaultOf(std::size_t array) { return array == 1 ? 1.0f : 0.0f; }
 struct ThermalSolver::Header {
   std::uint64_t layout;
   std::uint64_t frame, revision, quarantined;
-  double cut_length_m;
   Ledger ledger;
   SolverFigures figures;
   EventMemory memory;
@@ -95,7 +94,6 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   header.frame = frame_;
   header.revision = topology_.revision();
   header.quarantined = field_.quarantined();
-  header.cut_length_m = cut_meter_.state();
   header.ledger = ledger_;
   header.figures = figures_;
   header.memory = memory_;
@@ -182,7 +180,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   frame_ = header.frame;
   topology_.Restore(header.revision, bits);
   field_.RestoreQuarantined(header.quarantined);
-  cut_meter_.Restore(header.cut_length_m, std::move(marks));
+  cut_meter_.Restore(marks);
   ledger_ = header.ledger;
   figures_ = header.figures;
   memory_ = header.memory;

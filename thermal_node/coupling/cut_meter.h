@@ -1,17 +1,18 @@
-// Length of the slit, measured on the hole itself: a removed cell that lies farther than kMarkSpacing from every mark
-// becomes a mark and adds its distance to the nearest one. The marks walk along a slit as it grows at its ends,
-// whatever path the tip took, so neither a spark that jumps ahead nor a second pass over the same place falsifies the
-// length. Holds for slits narrower than twice the spacing; a straight slit is short by half a spacing on average.
+// Length of the slit, measured on the hole itself. A removed cell that lies farther than kMarkSpacing from every mark
+// becomes a mark, so the marks cover the hole as a net. The length is that of the net's longest way, plus that of each
+// branch that leads farther away from it than a slit is wide. It does not depend on the tip's path: a spark that jumps
+// ahead or a second pass over the same place does not falsify it.
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "thermal_node/heat/heat_field.h"
 
 namespace fulcrum::thermal {
 
-/// [m]
+/// Resolution of the length [m].
 inline constexpr float kMarkSpacing = 0.0015f;
 
 class CutMeter {
@@ -22,17 +23,24 @@ class CutMeter {
   /// Looks at the cells of a box (inclusive) in which some have been removed.
   void Update(HeatField* field, CellIndex low, CellIndex high);
 
-  [[nodiscard]] float length_m() const { return static_cast<float>(length_m_); }
-
-  [[nodiscard]] double state() const { return length_m_; }
+  [[nodiscard]] float length_m() const { return length_m_; }
   [[nodiscard]] const std::vector<Mark>& marks() const { return marks_; }
-  void Restore(double length_m, std::vector<Mark> marks);
+  void Restore(const std::vector<Mark>& marks);
 
  private:
-  void Add(const Vec2f& place);
+  void Add(const Mark& mark);
+  void Measure();
+  /// Distance within the net from the sources (distance 0) to each mark; negative where no way leads.
+  [[nodiscard]] std::vector<float> DistanceFrom(const std::vector<std::uint32_t>& sources,
+                                                std::vector<std::uint32_t>* previous) const;
 
+  struct Link {
+    std::uint32_t to;
+    float length_m;
+  };
   std::vector<Mark> marks_;
-  double length_m_ = 0;
+  std::vector<std::vector<Link>> links_;  ///< Per mark: its neighbours within two spacings.
+  float length_m_ = 0;
 };
 
 }  // namespace fulcrum::thermal
