@@ -38,8 +38,8 @@ void main() {
   albedo = mix(albedo, vec3(0.92, 0.82, 0.66), pale);
   alpha = mix(alpha, 0.80, pale);
   // Coagulated through and through it turns tan, dry it turns brown, charred it turns black.
-  albedo = mix(albedo, vec3(0.52, 0.27, 0.11), 0.75 * smoothstep(0.75, 1.0, damage));
-  float brown = smoothstep(0.08, 0.65, dry);
+  albedo = mix(albedo, vec3(0.46, 0.22, 0.08), 0.9 * smoothstep(0.3, 0.8, damage));
+  float brown = smoothstep(0.02, 0.4, dry);
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022) * (0.5 + noise.b), brown);
   alpha = mix(alpha, 0.97, brown);
   albedo = mix(albedo, vec3(0.035, 0.022, 0.015), smoothstep(0.05, 0.6, burnt));
