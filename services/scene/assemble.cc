@@ -39,7 +39,9 @@ class Sheet {
     const double x = std::clamp(s, 0.0, 1.0) * (cols_ - 1), y = std::clamp(t, 0.0, 1.0) * (rows_ - 1);
     const int c = std::min(static_cast<int>(x), cols_ - 2), r = std::min(static_cast<int>(y), rows_ - 2);
     const double u = x - c, v = y - r;
-    const auto node = [&](int dr, int dc) { return static_cast<std::size_t>((r + dr) * cols_ + c + dc); };
+    const auto node = [&](int dr, int dc) {
+      return static_cast<std::size_t>(r + dr) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(c + dc);
+    };
     const Vec3d &p00 = nodes_[node(0, 0)], &p01 = nodes_[node(0, 1)], &p10 = nodes_[node(1, 0)],
                 &p11 = nodes_[node(1, 1)];
     SheetPoint result;
@@ -95,6 +97,7 @@ std::vector<Vec2f> MaterialOf(const SceneSettings& settings, const std::vector<V
     Refuse(settings, text.str());
   }
   std::vector<Vec2f> material;
+  material.reserve(flat.size());
   for (const Eigen::Vector2d& m : flat) {
     material.push_back((m + Eigen::Vector2d::Constant(kAtlasMargin_m)).cast<float>());
   }

@@ -333,7 +333,8 @@ TriangleMesh ContinueSideways(int rows, int cols, const std::vector<Vec3d>& shee
       const auto node = [&](int from_rim) -> const Vec3d& {
         return sheet[static_cast<std::size_t>(r) * cols + (side == 0 ? from_rim : cols - 1 - from_rim)];
       };
-      const Vec3d rim = node(0), out = (rim - node(std::min(4, cols - 1))).normalized();
+      const Vec3d& rim = node(0);
+      const Vec3d out = (rim - node(std::min(4, cols - 1))).normalized();
       const int r0 = std::max(r - 1, 0), r1 = std::min(r + 1, rows - 1), c = side == 0 ? 1 : cols - 2;
       const auto at = [&](int row, int col) { return sheet[static_cast<std::size_t>(row) * cols + col]; };
       const Vec3d normal = (at(r, c + 1) - at(r, c - 1)).cross(at(r1, c) - at(r0, c)).normalized();

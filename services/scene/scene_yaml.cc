@@ -142,7 +142,7 @@ std::filesystem::path FindFile(const StrictMap& map, const std::string& key, con
                                const std::vector<std::filesystem::path>& folders) {
   std::string tried;
   for (const auto& folder : folders) {
-    const std::filesystem::path candidate = (folder / name).lexically_normal();
+    std::filesystem::path candidate = (folder / name).lexically_normal();
     if (std::filesystem::is_regular_file(candidate)) {
       return candidate;
     }

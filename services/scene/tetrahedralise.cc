@@ -53,6 +53,7 @@ TetrahedralMesh ToMesh(const Complex& complex) {
     }
   }
   std::vector<std::array<double, 3>> places;
+  places.reserve(ids.size());
   for (const auto& entry : ids) {
     places.push_back(entry.first);
   }
