@@ -108,9 +108,11 @@ bool Collapse(Surface::Edge_index e, Surface* surface) {
         before[k] = surface->point(w);
         after[k++] = moves ? middle : surface->point(w);
       }
-      const auto n0 = CGAL::normal(before[0], before[1], before[2]), n1 = CGAL::normal(after[0], after[1], after[2]);
-      const bool had_area = CGAL::to_double(n0.squared_length()) > 0;
-      if (ends == 1 && had_area && CGAL::to_double(n0 * n1) <= 0) {
+      // Not CGAL::normal, which asks for triangles with an area.
+      const auto n0 = CGAL::cross_product(before[1] - before[0], before[2] - before[0]);
+      const auto n1 = CGAL::cross_product(after[1] - after[0], after[2] - after[0]);
+      const bool had_area = n0.squared_length() > 0;
+      if (ends == 1 && had_area && n0 * n1 <= 0) {
         return false;
       }
     }
