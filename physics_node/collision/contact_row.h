@@ -1,0 +1,28 @@
+// A contact as a solver sees it, whichever the bodies: a one-sided linear row over at most four particles,
+//
+//   g(x) = normal . (sum_k weight_k x_k) - offset >= 0,
+//
+// tissue against a tool (weights are the barycentric coordinates, offset carries the tool's surface) or tissue against
+// tissue (+1 for a node, minus the barycentric coordinates of the triangle that it must stay above).
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "physics_node/pbd/particle_store.h"
+
+namespace fulcrum::physics {
+
+struct ContactRow {
+  int count = 0;  ///< Particles in use, at most 4.
+  std::array<ParticleRef, 4> at;
+  std::array<float, 4> weight{0, 0, 0, 0};
+  Vec3f normal = Vec3f::UnitZ();  ///< Unit; towards where the tissue may be.
+  float offset = 0;               ///< [m]
+  float friction = 0;             ///< Coulomb coefficient.
+  Vec3f drift = Vec3f::Zero();    ///< How far the other body's surface moves in this (sub)step, fixed tissue: 0 [m].
+  std::uint32_t source = 0;       ///< The producer's index: the solver writes the normal force back to it.
+  float force_N = 0;              ///< Out: normal force after the step.
+};
+
+}  // namespace fulcrum::physics
