@@ -46,6 +46,8 @@ constexpr std::array kUnits = {
     Unit{"per_m", "1/m", "curvature", 1.0},
     Unit{"N_m", "N/m", "stiffness", 1.0},
     Unit{"N_mm", "N/mm", "stiffness", 1e3},
+    Unit{"Nm", "Nm", "moment", 1.0},
+    Unit{"uNm", "uNm", "moment", 1e-6},
     Unit{"N_per_m", "N/m", "stiffness", 1.0},
     Unit{"N_per_mm", "N/mm", "stiffness", 1e3},
     Unit{"N_per_ms", "N/ms", "force rate", 1e3},

@@ -13,11 +13,17 @@ namespace fulcrum {
 
 // ------------------------------------------------------------------------------------------- parameters (POD)
 
-enum class PhysicsMode : std::uint32_t { kPaper = 0 };
+enum class PhysicsMode : std::uint32_t { kPaper = 0, kXpbd = 1, kAccurate = 2 };
 
-/// Section `physics` of a scene. Stiffnesses k are PBD's, in (0, 1] per iteration; moduli are SI and give forces.
+/// How much the accurate solver does in a step: substeps x iterations of the global solve.
+enum class PhysicsPreset : std::uint32_t { kFast = 0, kDefault = 1, kAccurate = 2, kReference = 3 };
+
+/// Section `physics` of a scene. Stiffnesses k are PBD's, in (0, 1] per iteration, and belong to the paper's mode; the
+/// moduli are SI, are what the other modes solve for, and give the forces of all.
 struct PhysicsParams {
   PhysicsMode mode = PhysicsMode::kPaper;
+  PhysicsPreset preset = PhysicsPreset::kDefault;
+  std::uint32_t substeps = 20;  ///< Of mode xpbd.
   std::uint32_t iterations = 3;
   float dt_s = 0.01f;
   float damping_per_s = 3.0f;
@@ -28,7 +34,12 @@ struct PhysicsParams {
   float k_bending = 0.1f;
   float k_binding = 0.01f;  ///< In tension; ten times as much in compression (capped at 1).
   float tube_youngs_modulus_Pa = 1.0e5f;
-  float membrane_Et_N_per_m = 150.0f;  ///< Young's modulus times thickness.
+  float tube_poisson = 0.45f;
+  float membrane_Et_N_per_m = 150.0f;    ///< Young's modulus times thickness.
+  float membrane_stiffening = 0.0f;      ///< J-shape: tension is E t (e + c e^3) at engineering strain e.
+  float membrane_prestrain = 0.0f;       ///< Strain of the membrane in the rest shape.
+  float membrane_bending_Nm = 2.0e-6f;   ///< Flexural rigidity.
+  float fat_youngs_modulus_Pa = 3.0e3f;  ///< Of the fat between membrane and organ, which the bindings stand for.
   float friction = 0.2f;
   float collision_margin_m = 0.0005f;
   float grasp_radius_m = 0.004f;  ///< Particles within this distance of the jaw's centre line are held.

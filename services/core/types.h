@@ -12,6 +12,7 @@ using Vec2f = Eigen::Vector2f;
 using Vec3f = Eigen::Vector3f;
 using Vec3d = Eigen::Vector3d;
 using Mat3f = Eigen::Matrix3f;
+using Mat3d = Eigen::Matrix3d;
 using Quatf = Eigen::Quaternionf;
 
 using Index = std::uint32_t;

@@ -55,7 +55,15 @@ void ReadInteger(StrictMap* map, const char* key, int min, int max, std::uint32_
 }
 
 void ReadPhysics(StrictMap map, PhysicsParams* p) {
-  p->mode = map.Choice("mode", p->mode, {{"paper", PhysicsMode::kPaper}});
+  p->mode =
+      map.Choice("mode", p->mode,
+                 {{"paper", PhysicsMode::kPaper}, {"xpbd", PhysicsMode::kXpbd}, {"accurate", PhysicsMode::kAccurate}});
+  p->preset = map.Choice("preset", p->preset,
+                         {{"fast", PhysicsPreset::kFast},
+                          {"default", PhysicsPreset::kDefault},
+                          {"accurate", PhysicsPreset::kAccurate},
+                          {"reference", PhysicsPreset::kReference}});
+  ReadInteger(&map, "substeps", 1, 1000, &p->substeps);
   ReadInteger(&map, "iterations", 1, 1000, &p->iterations);
   ReadSi(&map, "dt_ms", Range::Between(0.1, 100), &p->dt_s);
   ReadSi(&map, "damping_per_s", Range::Between(0, 1000), &p->damping_per_s);
@@ -66,7 +74,12 @@ void ReadPhysics(StrictMap map, PhysicsParams* p) {
   ReadSi(&map, "k_bending", Range::Between(0, 1), &p->k_bending);
   ReadSi(&map, "k_binding", Range::Between(0, 1), &p->k_binding);
   ReadSi(&map, "tube_youngs_modulus_kPa", Range::Between(0.001, 1e6), &p->tube_youngs_modulus_Pa);
+  ReadSi(&map, "tube_poisson", Range::Between(0, 0.495), &p->tube_poisson);
   ReadSi(&map, "membrane_Et_N_per_m", Range::Between(0.001, 1e7), &p->membrane_Et_N_per_m);
+  ReadSi(&map, "membrane_stiffening", Range::Between(0, 1000), &p->membrane_stiffening);
+  ReadSi(&map, "membrane_prestrain", Range::Between(0, 0.5), &p->membrane_prestrain);
+  ReadSi(&map, "membrane_bending_uNm", Range::Between(0, 1e6), &p->membrane_bending_Nm);
+  ReadSi(&map, "fat_youngs_modulus_kPa", Range::Between(0.001, 1e6), &p->fat_youngs_modulus_Pa);
   ReadSi(&map, "friction", Range::Between(0, 2), &p->friction);
   ReadSi(&map, "collision_margin_mm", Range::Between(0, 10), &p->collision_margin_m);
   ReadSi(&map, "grasp_radius_mm", Range::Between(0.1, 50), &p->grasp_radius_m);

@@ -116,8 +116,11 @@ void CheckParameters(const SceneView& s) {
   const ThermalParams& t = s.thermal;
   const RenderParams& r = s.render;
   const HapticsParams& h = s.haptics;
-  if (p.mode != PhysicsMode::kPaper) {
-    Fail("scene", "physics.mode = ", static_cast<std::uint32_t>(p.mode), "; valid: 0 (paper)");
+  if (p.mode > PhysicsMode::kAccurate) {
+    Fail("scene", "physics.mode = ", static_cast<std::uint32_t>(p.mode), "; valid: 0 (paper), 1 (xpbd), 2 (accurate)");
+  }
+  if (p.preset > PhysicsPreset::kReference) {
+    Fail("scene", "physics.preset = ", static_cast<std::uint32_t>(p.preset), "; valid: 0 (fast) to 3 (reference)");
   }
   CheckBounds({{"physics.iterations", static_cast<float>(p.iterations), 1, 1000},
                {"physics.dt_s", p.dt_s, 1e-4f, 0.1f},
@@ -129,7 +132,13 @@ void CheckParameters(const SceneView& s) {
                {"physics.k_bending", p.k_bending, 0, 1},
                {"physics.k_binding", p.k_binding, 0, 1},
                {"physics.tube_youngs_modulus", p.tube_youngs_modulus_Pa, 1, 1e9f},
+               {"physics.substeps", static_cast<float>(p.substeps), 1, 1000},
+               {"physics.tube_poisson", p.tube_poisson, 0, 0.495f},
                {"physics.membrane_Et", p.membrane_Et_N_per_m, 1e-3f, 1e7f},
+               {"physics.membrane_stiffening", p.membrane_stiffening, 0, 1000},
+               {"physics.membrane_prestrain", p.membrane_prestrain, 0, 0.5f},
+               {"physics.membrane_bending", p.membrane_bending_Nm, 0, 1},
+               {"physics.fat_youngs_modulus", p.fat_youngs_modulus_Pa, 1, 1e9f},
                {"physics.friction", p.friction, 0, 2},
                {"physics.collision_margin", p.collision_margin_m, 0, 0.01f},
                {"physics.grasp_radius", p.grasp_radius_m, 1e-4f, 0.05f},

@@ -1,0 +1,145 @@
+#include "physics_node/energy/elastic_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fulcrum::physics {
+namespace {
+
+/// Shear modulus of the sheet over Young's: between that of an incompressible sheet (1/3) and of a woven one.
+constexpr double kShearPart = 0.25;
+
+Vec3d Rest(const SceneView& scene, Index particle) { return scene.rest_position[particle].cast<double>(); }
+
+double Cotangent(const Vec3d& at, const Vec3d& p, const Vec3d& q) {
+  const Vec3d u = p - at, v = q - at;
+  return u.dot(v) / u.cross(v).norm();
+}
+
+void AddSprings(const SceneView& scene, ElasticModel* model) {
+  const Index first = scene.membrane.first, rows = scene.membrane.rows, cols = scene.membrane.cols;
+  const double Et = scene.physics.membrane_Et_N_per_m, shrink = 1.0 / (1.0 + scene.physics.membrane_prestrain);
+  model->springs.assign(scene.membrane_rest_length.size(), {});
+  // Mean length of the edges that leave a node in a direction, and the share of sheet that belongs to an edge.
+  const auto length = [&](Index row, Index col, int direction) {
+    return static_cast<double>(scene.membrane_rest_length[3 * (row * cols + col) + static_cast<Index>(direction)]);
+  };
+  const auto share = [&](Index row, Index col, int direction) {
+    const int across = 1 - direction;
+    double width = 0;
+    for (int end = 0; end < 2; ++end) {
+      const Index r = row + (direction == 1 && end ? 1 : 0), c = col + (direction == 0 && end ? 1 : 0);
+      if (across == 0 ? c + 1 < cols : r + 1 < rows) {
+        width += 0.25 * length(r, c, across);
+      }
+      if (across == 0 ? c > 0 : r > 0) {
+        width += 0.25 * (across == 0 ? length(r, c - 1, 0) : length(r - 1, c, 1));
+      }
+    }
+    return width;
+  };
+  for (Index row = 0; row < rows; ++row) {
+    for (Index col = 0; col < cols; ++col) {
+      const Index node = row * cols + col;
+      for (int d = 0; d < 3; ++d) {
+        const double rest = length(row, col, d);
+        if (!(rest > 0)) {
+          continue;
+        }
+        ElasticSpring& spring = model->springs[3 * node + static_cast<Index>(d)];
+        spring.a = first + node;
+        spring.b = first + node + (d == 0 ? 1 : d == 1 ? cols : cols + 1);
+        spring.rest_length = rest * shrink;
+        spring.axial = d < 2 ? Et * share(row, col, d)
+                             : kShearPart * Et * rest * rest * rest / (length(row, col, 0) * length(row, col, 1));
+      }
+    }
+  }
+}
+
+void AddHinges(const SceneView& scene, ElasticModel* model) {
+  for (const BendingConstraint& bend : scene.bending) {
+    std::array<Vec3d, 4> x;
+    for (std::size_t i = 0; i < 4; ++i) {
+      x[i] = Rest(scene, bend.v[i]);
+    }
+    ElasticHinge hinge;
+    hinge.v = bend.v;
+    const double a0 = 0.5 * (x[1] - x[0]).cross(x[2] - x[0]).norm(), a1 = 0.5 * (x[1] - x[0]).cross(x[3] - x[0]).norm();
+    const double c02 = Cotangent(x[0], x[1], x[2]), c12 = Cotangent(x[1], x[0], x[2]);
+    const double c03 = Cotangent(x[0], x[1], x[3]), c13 = Cotangent(x[1], x[0], x[3]);
+    hinge.c = {c12 + c13, c02 + c03, -c02 - c12, -c03 - c13};
+    hinge.stiffness = 3.0 * scene.physics.membrane_bending_Nm / (a0 + a1);
+    if (std::isfinite(hinge.stiffness) &&
+        std::all_of(hinge.c.begin(), hinge.c.end(), [](double c) { return std::isfinite(c); })) {
+      model->hinges.push_back(hinge);
+    }
+  }
+}
+
+void AddTets(const SceneView& scene, ElasticModel* model) {
+  const double E = scene.physics.tube_youngs_modulus_Pa, nu = scene.physics.tube_poisson;
+  model->mu_Pa = E / (2 * (1 + nu));
+  model->lambda_Pa = E * nu / ((1 + nu) * (1 - 2 * nu));
+  model->tets.reserve(scene.tets.size());
+  for (const Tetrahedron& v : scene.tets) {
+    Mat3d edges;
+    for (int i = 0; i < 3; ++i) {
+      edges.col(i) = Rest(scene, v[static_cast<std::size_t>(i) + 1]) - Rest(scene, v[0]);
+    }
+    model->tets.push_back({v, edges.determinant() / 6.0, edges.inverse()});
+  }
+}
+
+void AddBindings(const SceneView& scene, ElasticModel* model) {
+  if (scene.bindings.empty()) {
+    return;
+  }
+  // Each binding is a column of fat: its share of the sheet, as long as the mean binding.
+  double area = 0, length = 0;
+  const Index first = scene.membrane.first, cols = scene.membrane.cols;
+  for (Index row = 0; row + 1 < scene.membrane.rows; ++row) {
+    for (Index col = 0; col + 1 < cols; ++col) {
+      const Index n = first + row * cols + col;
+      const Vec3d diagonal = Rest(scene, n + cols + 1) - Rest(scene, n);
+      area += 0.5 * diagonal.cross(Rest(scene, n + 1) - Rest(scene, n)).norm() +
+              0.5 * diagonal.cross(Rest(scene, n + cols) - Rest(scene, n)).norm();
+    }
+  }
+  for (const Binding& binding : scene.bindings) {
+    length += binding.rest_length;
+  }
+  const auto count = static_cast<double>(scene.bindings.size());
+  const double stiffness = scene.physics.fat_youngs_modulus_Pa * (area / count) / std::max(length / count, 1e-3);
+  for (const Binding& binding : scene.bindings) {
+    ElasticBinding b;
+    b.membrane = binding.membrane;
+    b.surface = binding.surface;
+    for (std::size_t i = 0; i < 3; ++i) {
+      b.barycentric[i] = binding.barycentric[i];
+    }
+    b.rest_length = binding.rest_length;
+    b.stiffness = stiffness;
+    model->bindings.push_back(b);
+  }
+}
+
+}  // namespace
+
+ElasticModel BuildElasticModel(const SceneView& scene) {
+  ElasticModel model;
+  for (Index p = 0; p < scene.rest_position.size(); ++p) {
+    model.rest_position.push_back(Rest(scene, p));
+    model.mass.push_back(scene.inverse_mass[p] > 0 ? 1.0 / static_cast<double>(scene.inverse_mass[p]) : 0.0);
+  }
+  model.stiffening = scene.physics.membrane_stiffening;
+  model.damping_per_s = scene.physics.damping_per_s;
+  model.gravity = scene.physics.gravity.cast<double>();
+  AddSprings(scene, &model);
+  AddHinges(scene, &model);
+  AddTets(scene, &model);
+  AddBindings(scene, &model);
+  return model;
+}
+
+}  // namespace fulcrum::physics
