@@ -29,11 +29,6 @@ std::array<float, 2> ClosestSegments(const Vec3f& p0, const Vec3f& u, const Vec3
 
 }  // namespace
 
-float ClosestOnSegment(const Vec3f& p, const Vec3f& a, const Vec3f& b) {
-  const Vec3f ab = b - a;
-  return std::clamp(Ratio((p - a).dot(ab), ab.squaredNorm()), 0.0f, 1.0f);
-}
-
 std::array<float, 3> ClosestOnTriangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
   const Vec3f ab = b - a, ac = c - a, ap = p - a;
   const float d1 = ab.dot(ap), d2 = ac.dot(ap);

@@ -1,6 +1,7 @@
 // Closest points between the axis of a capsule and a triangle.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "services/core/types.h"
@@ -20,7 +21,16 @@ struct ClosestPoints {
 [[nodiscard]] std::array<float, 3> ClosestOnTriangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c);
 
 /// Parameter in [0, 1] of the point of segment ab closest to p.
-[[nodiscard]] float ClosestOnSegment(const Vec3f& p, const Vec3f& a, const Vec3f& b);
+[[nodiscard]] inline float ClosestOnSegment(const Vec3f& p, const Vec3f& a, const Vec3f& b) {
+  const Vec3f ab = b - a;
+  const float length_sq = ab.squaredNorm();
+  return length_sq > 0.0f ? std::clamp((p - a).dot(ab) / length_sq, 0.0f, 1.0f) : 0.0f;
+}
+
+/// Squared distance of p from segment ab.
+[[nodiscard]] inline float DistanceSqToSegment(const Vec3f& p, const Vec3f& a, const Vec3f& b) {
+  return (a + ClosestOnSegment(p, a, b) * (b - a) - p).squaredNorm();
+}
 
 /// Closest points of segment p0-p1 and triangle abc. Degenerate segments and triangles are allowed.
 [[nodiscard]] ClosestPoints ClosestSegmentTriangle(const Vec3f& p0, const Vec3f& p1, const Vec3f& a, const Vec3f& b,

@@ -17,12 +17,13 @@ struct ContactRow {
   int count = 0;  ///< Particles in use, at most 4.
   std::array<ParticleRef, 4> at;
   std::array<float, 4> weight{0, 0, 0, 0};
-  Vec3f normal = Vec3f::UnitZ();  ///< Unit; towards where the tissue may be.
-  float offset = 0;               ///< [m]
-  float friction = 0;             ///< Coulomb coefficient.
-  Vec3f drift = Vec3f::Zero();    ///< How far the other body's surface moves in this (sub)step, fixed tissue: 0 [m].
-  std::uint32_t source = 0;       ///< The producer's index: the solver writes the normal force back to it.
-  float force_N = 0;              ///< Out: normal force after the step.
+  Vec3f normal = Vec3f::UnitZ();     ///< Unit; towards where the tissue may be.
+  float offset = 0;                  ///< [m]
+  float friction = 0;                ///< Coulomb coefficient.
+  Vec3f drift = Vec3f::Zero();       ///< How far the other body's surface moves in this (sub)step, fixed tissue: 0 [m].
+  std::uint32_t source = 0;          ///< The producer's index: the solver writes the normal force back to it.
+  float force_N = 0;                 ///< Out: normal force after the step.
+  Vec3f friction_N = Vec3f::Zero();  ///< Out: friction force on the tissue.
 };
 
 }  // namespace fulcrum::physics

@@ -1,7 +1,10 @@
-// Tools against tissue. Tools are capsules moved from outside; the tissue gives way. Continuous in time: before the
-// iterations each capsule is swept along its path of the step in pieces shorter than its radius, and every pair of
-// capsule and triangle remembers on which side of the triangle the tool was, so that a fast or thin tool presses the
+// Tools against tissue. Tools are capsules moved from outside; the tissue gives way. Continuous in time, and every pair
+// of capsule and triangle remembers on which side of the triangle the tool was, so that a fast or thin tool presses the
 // membrane in front of itself instead of appearing behind it.
+//
+// Once a step FindPairs; then, by the kind of solver,
+//   positions:  Sweep, Project after each iteration, Settle (tool_projection.cc)
+//   implicit:   Rows for each substep, TakeForces after it (tool_rows.cc)
 #pragma once
 
 #include <array>
@@ -10,6 +13,8 @@
 #include <vector>
 
 #include "physics_node/collision/closest.h"
+#include "physics_node/collision/contact_row.h"
+#include "physics_node/collision/surface_bounds.h"
 #include "physics_node/collision/tool_shape.h"
 #include "physics_node/pbd/pbd_solver.h"
 
@@ -21,10 +26,10 @@ struct ContactPair {
   Index triangle = 0;            ///< Membrane triangle, or membrane triangle count + index in SceneView.tube_surface.
   Vec3f normal = Vec3f::Zero();  ///< Of the membrane around it, or of the organ's triangle.
   std::int8_t side = 0;          ///< Sign of the tool's height along the normal; 0 unknown.
-  bool touching = false;         ///< The last projection moved the triangle.
+  bool touching = false;         ///< The last projection moved the triangle, or its row carried a force.
   std::array<ParticleRef, 3> at;
   std::array<Index, 3> particle{};
-  ClosestPoints closest;       ///< At the last projection, before its correction.
+  ClosestPoints closest;       ///< At the last projection, before its correction, or when its row was made.
   Vec3f push = Vec3f::Zero();  ///< Unit direction in which the tool pushes the tissue.
 };
 
@@ -39,7 +44,15 @@ struct SurfacePoint {
 
 class ToolCollision {
  public:
-  ToolCollision(const SceneView& scene, const TissueModel* model, ParticleStore* particles, const PbdSolver* solver);
+  /// Overlap is undone by at most this much in a projection or substep, not thrown out [m].
+  static constexpr float kMaxPush = 0.001f;
+  /// Most rows of one tool in a substep; the deepest are kept.
+  static constexpr std::size_t kMaxRows = 256;
+
+  ToolCollision(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
+                const Kernels& kernels = BestKernels());
+  ToolCollision(const SceneView& scene, const TissueModel* model, ParticleStore* particles, const PbdSolver* solver)
+      : ToolCollision(scene, model, particles, solver->kernels()) {}
 
   struct ToolMotion {
     ToolShape from, to;
@@ -48,8 +61,9 @@ class ToolCollision {
   };
 
   /// Finds the pairs of this step; cheap when no tool is near. `tissue_moved` false: since the last call it has not, so
-  /// its bounds still hold.
-  void FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bool tissue_moved);
+  /// its bounds still hold. `tissue_step`: about how far tissue will move in one substep (largest speed times its
+  /// length; what is beyond kMaxReach is not looked for) [m].
+  void FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bool tissue_moved, float tissue_step = 0);
   /// Carries the tissue along with the tools from their last places to the present ones.
   void Sweep();
   /// Moves the tissue out of the tools in their places at the end of the step.
@@ -57,6 +71,17 @@ class ToolCollision {
   /// After the step: tissue does not leave a tool faster than the tool pushed it. Overlaps that took more than that to
   /// undo would otherwise come back as speed.
   void Settle();
+
+  /// Replaces `rows` by the contacts of the substep from part u0 to part u1 of the step, for tissue in its present
+  /// places (those at the beginning of the substep). Each row keeps a point of a triangle clear of a capsule in its
+  /// place at u1; it is made before they touch. Continuous: the direction is that of their first touch on the way. A
+  /// row asks tissue to move at most kMaxPush more than the tool moves. Allocates nothing when `rows` has room for
+  /// kMaxTools * kMaxRows.
+  void Rows(float u0, float u1, std::vector<ContactRow>* rows);
+  /// Forces of the last Rows as the solver has written them: those on the tools, and which pairs touch.
+  void TakeForces(std::span<const ContactRow> rows);
+  /// Sum of normal and friction force of the tissue on a tool after TakeForces [N].
+  [[nodiscard]] Vec3f force(std::uint32_t tool) const { return force_[tool]; }
 
   [[nodiscard]] std::span<const ContactPair> pairs() const { return pairs_; }
   [[nodiscard]] bool any_touching() const;
@@ -71,48 +96,58 @@ class ToolCollision {
     Capsule from, to;
     float travel = 0;  ///< Of its faster end [m].
     bool enabled = false;
+    [[nodiscard]] Capsule At(float u) const {
+      return {from.a + u * (to.a - from.a), from.b + u * (to.b - from.b), to.radius, to.part};
+    }
+    /// Where the point at part t of the axis is at part u of the step.
+    [[nodiscard]] Vec3f PointAt(float t, float u) const {
+      const Vec3f p = from.a + t * (from.b - from.a);
+      return p + u * (to.a + t * (to.b - to.a) - p);
+    }
   };
-  struct Chunk {
-    Index first = 0, last = 0;  ///< Of tube_order_.
-    Vec3f centre = Vec3f::Zero();
-    float radius = 0;
-  };
-
   /// Jaws that do not collide for the time being.
   struct Yielding {
     int steps = 0;
     bool held = false;  ///< They held something: nothing at all must be near.
   };
+  /// How the tool pushes a pair's tissue.
+  struct Push {
+    float depth =
+        -3e38f;  ///< Tissue is to move at least so far along the direction; negative: that far from touch [m].
+    Vec3f direction = Vec3f::Zero();
+  };
 
-  void UpdateBounds();
   void FindMembranePairs(std::uint32_t capsule, float range);
   void SettleSides(std::size_t first);
   void FindTubePairs(std::uint32_t capsule, float range);
-  void AddPair(std::uint32_t capsule, Index triangle, const std::array<Index, 3>& particle,
-               const std::array<ParticleRef, 3>& at, float range);
-  /// Unit normal of the membrane around a triangle, now or before this step; zero where it has none.
-  [[nodiscard]] Vec3f PatchNormal(Index triangle, bool previous) const;
+  void AddPair(const ContactPair& draft, const Vec3f& previous_normal, float range);
+  void FollowYielding(std::uint32_t tool, const ToolMotion& moved, bool clear);
+  /// Unit normal of the membrane around a cell, now or before this step; zero where it has none.
+  [[nodiscard]] Vec3f PatchNormal(std::uint32_t row, std::uint32_t col, bool previous) const;
+  /// How far apart a pair is at least: bounding sphere against capsule axis.
+  [[nodiscard]] static bool IsFar(const std::array<Vec3f, 3>& x, const Capsule& capsule, float range);
+  /// From pair->closest; `capsule` is where that was taken.
+  [[nodiscard]] Push PushOf(const ContactPair& pair, const Capsule& capsule) const;
   void ProjectPair(ContactPair* pair, const Capsule& capsule);
-  /// visit(row, column, distance of the centre); may lower `range` as it goes.
-  template <class Visit>
-  void ForEachCellNear(const Vec3f& a, const Vec3f& b, const float& range, const Visit& visit) const;
-  template <class Visit>
-  void ForEachTubeTriangleNear(const Vec3f& a, const Vec3f& b, float range, const Visit& visit) const;
+  /// Part of the step in [u0, u1] at which the pair first touches, else that of their closest approach; fills
+  /// pair->closest for it.
+  [[nodiscard]] float FirstTouch(ContactPair* pair, const std::array<Vec3f, 3>& x, float u0, float u1) const;
+  void AddRow(Index index, const Push& push, const Vec3f& tool_step, std::vector<ContactRow>* rows) const;
+  void DropRepeated(std::size_t first, std::vector<ContactRow>* rows);
+  void DropShallow(std::size_t first, std::vector<ContactRow>* rows);
+  void DropMarked(std::size_t first, std::vector<ContactRow>* rows);
 
   SceneView scene_;
   const TissueModel* model_;
   ParticleStore* particles_;
-  const PbdSolver* solver_;
   Index membrane_triangles_;
-  std::uint32_t slot_blocks_, row_blocks_;
-  std::array<std::vector<float>, 6> bound_storage_;
-  BlockBounds bounds_{};
-  Vec3f low_ = Vec3f::Zero(), high_ = Vec3f::Zero();  ///< Of everything.
-  std::vector<Index> tube_order_;
-  std::vector<Chunk> chunks_;
+  SurfaceBounds bounds_;
   std::array<Motion, kMaxTools * kMaxCapsules> motion_;
   std::array<Yielding, kMaxTools> yielding_;
   std::vector<ContactPair> pairs_, last_pairs_;
+  float band_ = 0;  ///< Rows are made for what is so near to touch [m].
+  std::array<Vec3f, kMaxTools> force_{Vec3f::Zero(), Vec3f::Zero()};
+  std::vector<std::pair<std::uint64_t, Index>> row_order_;  ///< Scratch.
 };
 
 }  // namespace fulcrum::physics

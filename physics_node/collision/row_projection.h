@@ -1,0 +1,15 @@
+// Contact rows for solvers that project positions.
+#pragma once
+
+#include <span>
+
+#include "physics_node/collision/contact_row.h"
+#include "physics_node/pbd/particle_store.h"
+
+namespace fulcrum::physics {
+
+/// Moves particles until each violated row in turn holds, by at most `max_push` [m] a row, with Coulomb friction
+/// against the movement since ParticleStore::Previous. Inverse masses share the work. Returns how many rows pushed.
+std::size_t ProjectRows(std::span<const ContactRow> rows, float max_push, ParticleStore* particles);
+
+}  // namespace fulcrum::physics

@@ -1,0 +1,123 @@
+// What the tools' collision costs in each step of the built-in scene's script.
+#include <chrono>
+#include <cstdio>
+
+#include "services/scene/build.h"
+#include "tests/benchmark/report.h"
+#include "tests/numerics/physics/script_player.h"
+
+namespace fulcrum::physics {
+namespace {
+
+using benchmark::Quantile;
+
+double NowUs() {
+  return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// Microseconds per tool of one step.
+struct Cost {
+  double find = 3e38, project = 3e38, rows = 3e38;
+  void TakeLess(const Cost& other) {
+    find = std::min(find, other.find);
+    project = std::min(project, other.project);
+    rows = std::min(rows, other.rows);
+  }
+};
+
+struct Counts {
+  std::size_t pairs = 0, rows = 0;
+};
+
+/// One pass over the script: the simulation moves tissue and tools, a collision of our own is timed beside it.
+std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
+  TissueSimulation simulation(scene);
+  ParticleStore& particles = simulation.particles();
+  TissueModel model(scene, &particles);
+  ToolCollision collision(scene, &model, &particles);
+  std::vector<Cost> costs;
+  std::vector<float> xyz(3 * std::size_t{particles.particle_count()}), previous(xyz.size());
+  std::vector<ContactRow> rows;
+  rows.reserve(kMaxTools * ToolCollision::kMaxRows);
+  std::array<ToolInput, kMaxTools> last;
+  const int end = static_cast<int>(scene.script_duration_s * 100);
+  for (int index = 0; index < end; ++index) {
+    const auto tools = ScriptedTools(scene, 0.01 * index);
+    simulation.Step(tools);
+    std::array<ToolCollision::ToolMotion, kMaxTools> motions;
+    int count = 0;
+    for (std::size_t i = 0; i < kMaxTools; ++i) {
+      if (tools[i].present) {
+        const ToolPose& from = last[i].present ? last[i].pose : tools[i].pose;
+        motions[i] = {ShapeOf(scene.tools[i], from), ShapeOf(scene.tools[i], tools[i].pose),
+                      simulation.grasp(static_cast<std::uint32_t>(i)).holding(), tools[i].pose.jaw_rad < from.jaw_rad};
+        ++count;
+      }
+    }
+    last = tools;
+    if (count == 0) {
+      continue;
+    }
+    particles.CopyPositions(xyz);
+    particles.CopyPrevious(previous);
+    const double t0 = NowUs();
+    collision.FindPairs(motions, true);
+    const double t1 = NowUs();
+    for (const float u : {0.0f, 0.5f}) {
+      collision.Rows(u, u + 0.5f, &rows);
+      collision.TakeForces(rows);
+      most->rows = std::max(most->rows, rows.size());
+    }
+    const double t2 = NowUs();
+    collision.Sweep();
+    for (std::uint32_t iteration = 0; iteration < scene.physics.iterations; ++iteration) {
+      collision.Project();
+    }
+    collision.Settle();
+    const double t3 = NowUs();
+    particles.SetAll(xyz, previous);
+    costs.push_back({(t1 - t0) / count, (t3 - t2) / count, (t2 - t1) / count});
+    most->pairs = std::max(most->pairs, collision.pairs().size());
+  }
+  return costs;
+}
+
+void Collide(const SceneView& scene, benchmark::Report* report) {
+  // The least of some passes for each step: other programs' time is not the collision's.
+  Counts most;
+  std::vector<Cost> costs = Pass(scene, &most);
+  for (int pass = 1; pass < (report->quick() ? 2 : 5); ++pass) {
+    const std::vector<Cost> again = Pass(scene, &most);
+    for (std::size_t i = 0; i < costs.size(); ++i) {
+      costs[i].TakeLess(again[i]);
+    }
+  }
+  std::vector<double> find, with_rows, with_projection;
+  for (const Cost& cost : costs) {
+    find.push_back(cost.find);
+    with_rows.push_back(cost.find + cost.rows);
+    with_projection.push_back(cost.find + cost.project);
+  }
+  report->Add("physics.collide.us_per_tool_p50", Quantile(with_rows, 0.5), "us");
+  report->Add("physics.collide.us_per_tool_p99", Quantile(with_rows, 0.99), "us");
+  report->Add("physics.collide.paper_us_per_tool_p50", Quantile(with_projection, 0.5), "us");
+  report->Add("physics.collide.paper_us_per_tool_p99", Quantile(with_projection, 0.99), "us");
+  report->Add("physics.collide.find_us_per_tool_p50", Quantile(find, 0.5), "us");
+  report->Add("physics.collide.find_us_per_tool_p99", Quantile(find, 0.99), "us");
+  report->Add("physics.collide.pairs_max", static_cast<double>(most.pairs), "1");
+  report->Add("physics.collide.rows_max", static_cast<double>(most.rows), "1");
+}
+
+}  // namespace
+}  // namespace fulcrum::physics
+
+int main(int argc, char** argv) {
+  using namespace fulcrum;
+  benchmark::Report report(argc, argv);
+  if (!report.Wants("physics.collide.")) {
+    return 0;
+  }
+  const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
+  physics::Collide(data.View(), &report);
+  return 0;
+}
