@@ -70,10 +70,14 @@ void AddHinges(const SceneView& scene, ElasticModel* model) {
     const double c03 = Cotangent(x[0], x[1], x[3]), c13 = Cotangent(x[1], x[0], x[3]);
     hinge.c = {c12 + c13, c02 + c03, -c02 - c12, -c03 - c13};
     hinge.stiffness = 3.0 * scene.physics.membrane_bending_Nm / (a0 + a1);
-    if (std::isfinite(hinge.stiffness) &&
-        std::all_of(hinge.c.begin(), hinge.c.end(), [](double c) { return std::isfinite(c); })) {
-      model->hinges.push_back(hinge);
+    // One hinge per constraint of the scene, even where its patch has no area.
+    const bool sound = std::isfinite(hinge.stiffness) &&
+                       std::all_of(hinge.c.begin(), hinge.c.end(), [](double c) { return std::isfinite(c); });
+    if (!sound) {
+      hinge.c = {0, 0, 0, 0};
+      hinge.stiffness = 0;
     }
+    model->hinges.push_back(hinge);
   }
 }
 
@@ -89,6 +93,7 @@ void AddTets(const SceneView& scene, ElasticModel* model) {
     }
     model->tets.push_back({v, edges.determinant() / 6.0, edges.inverse()});
   }
+  AddOrganPatches(model);
 }
 
 void AddBindings(const SceneView& scene, ElasticModel* model) {

@@ -3,10 +3,24 @@
 //
 //   E(x) = sum springs  A L (e^2 / 2 + c e^4 / 4),      e = |x_j - x_i| / L - 1        (membrane)
 //        + sum hinges   k / 2 |sum_i c_i (x_i - X_i)|^2                                  (membrane bending)
-//        + sum tets     V Psi(F)                                                        (organ, tet_energy.h)
+//        + organ: nodal patches, see below                                              (tet_energy.h)
 //        + sum bindings k / 2 (|x_m - sum_i b_i x_i| - d)^2                              (eq. 9 of the paper)
 //
 // with inertia M and viscous drag -damping M v.
+//
+// The organ. Linear tetrahedra lock: a cantilever four elements thick bends 41 % too little at Poisson's ratio 0.45 and
+// 71 % at 0.49. So the constitutive law sits at the nodes, on the mean deformation gradient of the tets around each
+// (Dohrmann et al. 2000). That alone is a little soft and blind to some zigzags, so the scatter of the tets' gradients
+// about the nodes' mean is penalised, after Puso and Solberg (2006), here by a constant quadratic form:
+//
+//   F_n = sum_e (V_e / 4 V_n) F_e = sum_j x_j (x) g_nj,     V_n = sum_e V_e / 4     (e: tets at n, j: their vertices)
+//   E   = sum_n V_n Psi(F_n) + a mu/2 (sum_e V_e |F_e|^2 - sum_n V_n |F_n|^2)
+//       = sum_n V_n (Psi(F_n) - a mu/2 |F_n|^2) + sum_ij a mu/2 w_ij |x_i - x_j|^2   (ij: edges)
+//   w_ij = -sum_e V_e g_ei . g_ej
+//
+// The bracket is the variance of F over each patch: never negative, and 0 for any affine map, so rest and rotations are
+// free of stress and the Hessian is as positive as Psi's. With a = 0.25 the same cantilever errs by less than 4 % at
+// Poisson's ratios 0, 0.3, 0.45 and 0.49, and the law is evaluated at a third as many places.
 #pragma once
 
 #include <array>
@@ -37,6 +51,25 @@ struct ElasticTet {
   Mat3d inverse_edges;  ///< Inverse of the matrix with columns X1 - X0, X2 - X0, X3 - X0 [1/m].
 };
 
+/// The tets around an organ vertex as one element.
+struct ElasticPatch {
+  Index vertex = 0;
+  double volume = 0;                     ///< V_n, at rest [m^3].
+  Index first_link = 0, link_count = 0;  ///< Its range of ElasticModel::patch_links.
+};
+
+/// Term x_v (x) gradient of a patch's F. The gradients of a patch sum to 0.
+struct ElasticPatchLink {
+  Index v = 0;
+  Vec3d gradient;  ///< g_nj [1/m].
+};
+
+/// Edge of the organ in the variance term: energy stiffness/2 |x_a - x_b|^2.
+struct ElasticShearLink {
+  Index a = 0, b = 0;
+  double stiffness = 0;  ///< a mu w_ij [N/m]; negative at obtuse angles, where others outweigh it.
+};
+
 struct ElasticBinding {
   Index membrane = 0;
   Triangle surface{};
@@ -45,12 +78,18 @@ struct ElasticBinding {
   double stiffness = 0;    ///< [N/m]
 };
 
+/// a of the variance term: between 0.2 and 0.3 the errors over Poisson's ratio, split and shape of elements are least.
+inline constexpr double kPatchVariance = 0.25;
+
 struct ElasticModel {
   std::vector<Vec3d> rest_position;  ///< [n] frame W, m.
   std::vector<double> mass;          ///< [n] kg; 0 = fixed.
   std::vector<ElasticSpring> springs;
   std::vector<ElasticHinge> hinges;
-  std::vector<ElasticTet> tets;
+  std::vector<ElasticTet> tets;               ///< Volumes and inversions; the energy is in the patches.
+  std::vector<ElasticPatch> patches;          ///< [vertices of tets], sorted by vertex.
+  std::vector<ElasticPatchLink> patch_links;  ///< Sorted by vertex within a patch; always contains the patch's own.
+  std::vector<ElasticShearLink> shear_links;  ///< Sorted by (a, b), a < b.
   std::vector<ElasticBinding> bindings;
   double stiffening = 0;            ///< c of the springs.
   double mu_Pa = 0, lambda_Pa = 0;  ///< Lamé parameters of the organ.
@@ -63,5 +102,8 @@ struct ElasticModel {
 /// Moduli into elements. Springs: a row or column of the grid carries E t times its share of the width, so a strip in
 /// uniaxial tension along rows or columns is exact; diagonals give the sheet its shear stiffness.
 [[nodiscard]] ElasticModel BuildElasticModel(const SceneView& scene);
+
+/// Fills patches, patch_links and shear_links from rest_position, tets and mu_Pa; BuildElasticModel does so too.
+void AddOrganPatches(ElasticModel* model);
 
 }  // namespace fulcrum::physics
