@@ -52,7 +52,7 @@ void Say(const Progress& progress, const char* format, Values... values) {
 Anatomy ImportAnatomy(const SceneSettings& settings, const Progress& progress) {
   const ImportSettings& import = *settings.import;
   const std::string name = import.organ_file.string();
-  const TriangleMesh read = ToWorld(ReadMesh(import.organ_file), import, Vec3f::Zero());
+  const TriangleMesh read = ToWorld(SurfaceOf(ReadMesh(import.organ_file)), import, Vec3f::Zero());
   Say(progress, "%s: %zu vertices, %zu triangles", name.c_str(), read.vertices.size(), read.triangles.size());
   RepairReport report;
   const TriangleMesh organ = RepairClosedSurface(read, import.min_edge_m, name, &report);
@@ -95,7 +95,7 @@ Anatomy ImportAnatomy(const SceneSettings& settings, const Progress& progress) {
     anatomy.surroundings.push_back(Cavity(centre_line.At(0.5 * (import.from + import.to)), import.cavity_m));
   }
   for (const ImportSettings::Surrounding& s : import.surroundings) {
-    TriangleMesh mesh = Decimate(ToWorld(ReadMesh(s.file), import, s.offset_m), s.triangles_max);
+    TriangleMesh mesh = Decimate(ToWorld(SurfaceOf(ReadMesh(s.file)), import, s.offset_m), s.triangles_max);
     Say(progress, "%s: %zu triangles", s.name.c_str(), mesh.triangles.size());
     anatomy.surroundings.push_back({s.name, s.role, s.collides, std::move(mesh.vertices), std::move(mesh.triangles)});
   }

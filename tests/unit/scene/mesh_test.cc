@@ -1,10 +1,7 @@
-// Mesh files: both STL forms and OBJ, refusal of broken ones, repair, decimation, tetrahedra, draping.
+// From a surface to an organ: repair, decimation, tetrahedra, draping.
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
-#include <random>
-#include <sstream>
 
 #include "services/core/error.h"
 #include "services/scene/drape.h"
@@ -49,132 +46,6 @@ double VolumeOf(const TriangleMesh& mesh) {
     volume += mesh.vertices[t[0]].dot(mesh.vertices[t[1]].cross(mesh.vertices[t[2]])) / 6;
   }
   return volume;
-}
-
-std::string BinaryStl(const TriangleMesh& mesh) {
-  std::string bytes(80, ' ');
-  const auto put = [&](const auto& value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof(value)); };
-  put(static_cast<std::uint32_t>(mesh.triangles.size()));
-  for (const Triangle& t : mesh.triangles) {
-    bytes.append(12, '\0');
-    for (const Index v : t) {
-      for (int k = 0; k < 3; ++k) {
-        put(static_cast<float>(mesh.vertices[v][k]));
-      }
-    }
-    bytes.append(2, '\0');
-  }
-  return bytes;
-}
-
-std::string AsciiStl(const TriangleMesh& mesh) {
-  std::ostringstream text;
-  text << "solid thing\n";
-  for (const Triangle& t : mesh.triangles) {
-    text << "facet normal 0 0 0\n outer loop\n";
-    for (const Index v : t) {
-      text << "  vertex " << mesh.vertices[v].transpose() << "\n";
-    }
-    text << " endloop\nendfacet\n";
-  }
-  text << "endsolid thing\n";
-  return text.str();
-}
-
-std::string Refusal(const std::string& bytes, const char* name) {
-  try {
-    (void)ParseMesh(bytes, name);
-    return "";
-  } catch (const InputError& error) {
-    return error.what();
-  }
-}
-
-TEST(MeshFiles, BinaryAndAsciiStlGiveTheSameWeldedMesh) {
-  const TriangleMesh mesh = Capsule(5, 8, 10, 20);
-  for (const std::string& bytes : {BinaryStl(mesh), AsciiStl(mesh)}) {
-    const TriangleMesh read = ParseMesh(bytes, "a.stl");
-    EXPECT_EQ(read.vertices.size(), mesh.vertices.size());
-    ASSERT_EQ(read.triangles.size(), mesh.triangles.size());
-    EXPECT_NEAR(VolumeOf(read), VolumeOf(mesh), 1e-3 * VolumeOf(mesh));
-  }
-  EXPECT_EQ(ParseMesh("solid" + BinaryStl(mesh).substr(5), "a.STL").triangles.size(), mesh.triangles.size());
-}
-
-TEST(MeshFiles, ObjWithPolygonsAndEveryIndexForm) {
-  const TriangleMesh mesh = ParseMesh(
-      "# cube side\nmtllib x\nv 0 0 0\nv 1 0 0 1.0\nv 1 1 0\nv 0 1 0\nvn 0 0 1\nf 1 2//1 3/1 4/1/1\nf -4 -3 -2\n",
-      "a.obj");
-  EXPECT_EQ(mesh.vertices.size(), 4u);
-  ASSERT_EQ(mesh.triangles.size(), 3u);
-  EXPECT_EQ(mesh.triangles[1], (Triangle{0, 2, 3}));
-  EXPECT_EQ(mesh.triangles[2], (Triangle{0, 1, 2}));
-}
-
-TEST(MeshFiles, BrokenOnesAreRefusedWithTheReason) {
-  const std::string stl = BinaryStl(Capsule(3, 6, 1, 1));
-  const auto expect = [](const std::string& bytes, const char* name, const char* says) {
-    const std::string message = Refusal(bytes, name);
-    EXPECT_EQ(message.find(name), 0u) << message;
-    EXPECT_NE(message.find(says), std::string::npos) << message;
-  };
-  expect(stl.substr(0, stl.size() - 1), "a.stl", "cut short");
-  expect(stl.substr(0, 60), "a.stl", "neither a binary nor an ASCII");
-  std::string absurd = stl;
-  std::memset(absurd.data() + 80, 0xff, 4);
-  expect(absurd, "a.stl", "4294967295 triangles");
-  std::string nan = stl;
-  std::memset(nan.data() + 84 + 12, 0xff, 4);
-  expect(nan, "a.stl", "facet 0: coordinate");
-  expect("solid x\n facet normal 0 0 1\n outer loop\n vertex 0 0", "a.stl", "where a number should be");
-  expect("solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nendloop\nendfacet\nendsolid", "a.stl",
-         "corners in a facet");
-  expect("solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n", "a.stl", "cut short");
-  expect("solid x\nbanana\n", "a.stl", "unknown word 'banana'");
-  expect("solid x\nendsolid x\n", "a.stl", "no triangle");
-  expect("", "a.stl", "neither");
-  expect("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "a.obj", "line 4: vertex 4; valid: 1 to 3");
-  expect("v 0 0 0\nf 1 1\n", "a.obj", "fewer than three");
-  expect("v 0 x 0\n", "a.obj", "line 1");
-  expect("v 1e9 0 0\n", "a.obj", "beyond 1e6");
-  expect("ply\n", "a.ply", "valid: .stl, .obj");
-  EXPECT_THROW((void)ReadMesh("/no/such/file.stl"), InputError);
-}
-
-TEST(MeshFiles, RandomMutationsNeverDoHarm) {
-  const TriangleMesh mesh = Capsule(4, 6, 10, 20);
-  std::mt19937 random(7);
-  int accepted = 0;
-  for (const auto& [original, name] : {std::pair{BinaryStl(mesh), "a.stl"}, std::pair{AsciiStl(mesh), "a.stl"},
-                                       std::pair{std::string("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), "a.obj"}}) {
-    for (int round = 0; round < 1500; ++round) {
-      std::string bytes = original;
-      for (unsigned k = 0; k < 1 + random() % 3; ++k) {
-        switch (random() % 3) {
-          case 0:
-            bytes[random() % bytes.size()] = static_cast<char>(random());
-            break;
-          case 1:
-            bytes.resize(1 + random() % bytes.size());
-            break;
-          default:
-            bytes.insert(random() % bytes.size(), 1 + random() % 60, static_cast<char>(random()));
-        }
-      }
-      try {
-        const TriangleMesh read = ParseMesh(bytes, name);
-        ++accepted;
-        for (const Triangle& t : read.triangles) {
-          for (const Index v : t) {
-            ASSERT_LT(v, read.vertices.size());
-            ASSERT_TRUE(read.vertices[v].allFinite());
-          }
-        }
-      } catch (const InputError&) {
-      }
-    }
-  }
-  EXPECT_GT(accepted, 0);
 }
 
 // ------------------------------------------------------------------------------------------------------- repair

@@ -1,0 +1,141 @@
+// Reads a mesh file's bytes, as words of text or as binary values. Nothing in a file is believed: every value is
+// checked where it is read, and a count against the bytes that are left before any memory is asked for. Every fault is
+// an InputError "file: line 12: ..." in text, "file: byte 345: ..." once there was binary data.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "services/core/types.h"
+
+namespace fulcrum::scene {
+
+inline constexpr double kLargestCoordinate = 1.0e6;  ///< Beyond: a broken file, in any unit.
+
+[[noreturn]] void RefuseMesh(const std::string& name, const std::string& reason);
+
+/// At most 40 characters of a file's text, fit to be shown in one line.
+std::string Quote(std::string_view text);
+
+class Cursor {
+ public:
+  /// Reads `bytes` from `begin` up to `end`; places are told from the beginning of `bytes`. Both must outlive it.
+  Cursor(std::string_view bytes, const std::string& name, std::size_t begin = 0,
+         std::size_t end = std::string_view::npos)
+      : bytes_(bytes.substr(0, std::min(end, bytes.size()))), name_(&name), at_(std::min(begin, bytes_.size())) {}
+
+  [[nodiscard]] const std::string& name() const { return *name_; }
+  [[nodiscard]] std::size_t at() const { return at_; }
+  [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
+  [[nodiscard]] bool binary() const { return binary_; }
+
+  /// From here on Take() reads binary values, with their bytes in the other order when `swap`.
+  void SetBinary(bool swap) {
+    binary_ = true;
+    has_binary_ = true;
+    swap_ = swap;
+  }
+  void SetText() { binary_ = false; }
+
+  // ------------------------------------------------------------------------------------------------------- text
+
+  /// The rest of a line from this character on is a comment.
+  void set_comment(char c) { comment_ = c; }
+  /// The next word; empty at the end.
+  std::string_view Word();
+  /// The next word of this line; empty at its end.
+  std::string_view WordOfLine();
+  /// The next word, which must be this one.
+  void Expect(std::string_view word);
+  /// What is left of the line, without its end; the cursor goes behind that.
+  std::string_view Line();
+  /// Goes behind the next place where `mark` stands; fails when there is none.
+  void SkipPast(std::string_view mark);
+
+  // -------------------------------------------------------------------------------------------- text or binary
+
+  /// The next value: a word of text, or sizeof(T) bytes. `what` names it in a refusal.
+  template <class T>
+  T Take(const char* what) {
+    return binary_ ? TakeBinary<T>(what) : TakeText<T>(what);
+  }
+  /// The next value as a coordinate: finite and not absurd.
+  template <class T>
+  double TakeCoordinate() {
+    return CheckCoordinate(static_cast<double>(Take<T>("a coordinate")));
+  }
+  /// The next value as a number of things of which each takes `values_each` (at least one) values of T.
+  template <class T>
+  std::size_t TakeCount(const char* what, std::size_t values_each, std::size_t bytes_each);
+  /// Refuses a count of things for which the bytes that are left cannot suffice, or above the limit of any mesh.
+  /// A thing has `values_each` values in text, `bytes_each` bytes in binary data.
+  void CheckCount(const char* what, std::uint64_t count, std::size_t values_each, std::size_t bytes_each) const;
+  double CheckCoordinate(double value) const;
+  /// `number` counted from `first` as an index below `count`.
+  Index CheckVertex(std::int64_t number, std::int64_t first, std::size_t count) const;
+  /// Refuses with the place of what was read last.
+  [[noreturn]] void Fail(const std::string& reason) const;
+  /// Goes `count` bytes on.
+  void Skip(std::size_t count, const char* what);
+
+ private:
+  [[nodiscard]] static bool IsBlank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+  [[noreturn]] void FailWord(std::string_view word, const char* what) const;
+
+  template <class T>
+  T TakeText(const char* what) {
+    const std::string_view full = Word();
+    std::string_view word = full;
+    if (word.starts_with('+')) {
+      word.remove_prefix(1);
+    }
+    T value{};
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (word.empty() || error != std::errc() || end != word.data() + word.size()) {
+      FailWord(full, what);
+    }
+    return value;
+  }
+
+  template <class T>
+  T TakeBinary(const char* what) {
+    std::array<char, sizeof(T)> raw;
+    const std::size_t from = at_;
+    Skip(raw.size(), what);
+    std::memcpy(raw.data(), bytes_.data() + from, raw.size());
+    if (swap_) {
+      std::reverse(raw.begin(), raw.end());
+    }
+    T value;
+    std::memcpy(&value, raw.data(), raw.size());
+    return value;
+  }
+
+  std::string_view bytes_;
+  const std::string* name_;
+  std::size_t at_;
+  std::size_t token_ = 0;  ///< Where what was read last begins.
+  char comment_ = '\0';
+  bool binary_ = false, swap_ = false;
+  bool has_binary_ = false;  ///< From the first binary data on, lines mean nothing.
+};
+
+template <class T>
+std::size_t Cursor::TakeCount(const char* what, std::size_t values_each, std::size_t bytes_each) {
+  const T count = Take<T>(what);
+  if (std::is_signed_v<T> && count < 0) {
+    Fail(std::to_string(count) + " " + what + "; valid: 0 and above");
+  }
+  CheckCount(what, static_cast<std::uint64_t>(count), values_each, bytes_each);
+  return static_cast<std::size_t>(count);
+}
+
+}  // namespace fulcrum::scene

@@ -1,0 +1,26 @@
+// Cells as both of VTK's families of files hold them.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "services/scene/mesh_io.h"
+
+namespace fulcrum::scene {
+
+struct VtkCells {
+  std::vector<std::int64_t> offsets;       ///< Of each cell's first entry in `connectivity`; one more at the end.
+  std::vector<std::int64_t> connectivity;  ///< Vertices.
+  std::vector<std::int64_t> types;         ///< VTK's numbers, one a cell.
+};
+
+/// Called with what is wrong with the cells; throws.
+using VtkFault = std::function<void(const std::string&)>;
+
+/// Appends to `mesh` cells over `vertex_count` of its vertices from `first_vertex` on. Checks everything.
+void AddVtkCells(const VtkCells& cells, Index first_vertex, std::size_t vertex_count, const VtkFault& fail,
+                 MeshFile* mesh);
+
+}  // namespace fulcrum::scene

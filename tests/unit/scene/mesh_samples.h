@@ -1,0 +1,31 @@
+// One small valid file for every variant of every mesh format, written here and nowhere else: for tests of the readers.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "services/scene/mesh_io.h"
+
+namespace fulcrum::scene {
+
+struct MeshSample {
+  std::string label;                          ///< "gmsh22_binary" …
+  std::string name;                           ///< "a.msh" …
+  std::string bytes;                          ///< Of the file `name`.
+  std::map<std::string, std::string> beside;  ///< Its companions.
+  bool has_tets = false;                      ///< Else: the triangles of SampleSurface().
+};
+
+/// Two tetrahedra of opposite orientation that share a face; coordinates that text and float hold exactly.
+MeshFile SampleTets();
+/// A closed surface of triangles: the boundary of a cube's half, say.
+TriangleMesh SampleSurface();
+
+/// Every variant. Those with tetrahedra also hold what readers must leave out: points, lines, values.
+std::vector<MeshSample> MeshSamples();
+
+/// Parses `bytes` as the sample's file, with its companions.
+MeshFile ParseSample(const MeshSample& sample, const std::string& bytes);
+
+}  // namespace fulcrum::scene
