@@ -86,6 +86,43 @@ class Shape {
   const MembraneSettings& membrane_;
 };
 
+/// Kuhn's split of a brick: the six monotone paths from corner 000 to corner 111. It is the same in every brick, so the
+/// diagonals of neighbours agree, also round the closed direction.
+template <class Add>
+void SplitInSix(const Add& add) {
+  constexpr int kPaths[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
+  for (const auto& path : kPaths) {
+    std::array<std::array<int, 3>, 4> corners{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      corners[k + 1] = corners[k];
+      corners[k + 1][static_cast<std::size_t>(path[k])] = 1;
+    }
+    add(corners);
+  }
+}
+
+/// Four of the brick's corners, no two of them neighbours, make a tetrahedron in the middle; each other corner makes
+/// one with its three neighbours. Every face's diagonal joins two of the four. They are those whose coordinates add up
+/// to an even number over the whole tube, so that neighbours agree; `parity` is the sum at corner 000.
+template <class Add>
+void SplitInFive(int parity, const Add& add) {
+  std::array<std::array<int, 3>, 4> middle{};
+  std::size_t count = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const std::array<int, 3> at{corner & 1, corner >> 1 & 1, corner >> 2};
+    if ((parity + at[0] + at[1] + at[2]) % 2 == 0) {
+      middle[count++] = at;
+      continue;
+    }
+    std::array<std::array<int, 3>, 4> corners{at, at, at, at};
+    for (std::size_t k = 0; k < 3; ++k) {
+      corners[k + 1][k] = 1 - at[k];
+    }
+    add(corners);
+  }
+  add(middle);
+}
+
 void AddTube(const TubeSettings& tube, const Shape& shape, Anatomy* out) {
   const int n = tube.segments;
   const auto id = [&](int ring, int segment, int layer) {
@@ -100,25 +137,20 @@ void AddTube(const TubeSettings& tube, const Shape& shape, Anatomy* out) {
       }
     }
   }
-  // Kuhn's split: the six monotone paths from corner 000 to corner 111. It is the same in every brick, so the diagonals
-  // of neighbours agree, also round the closed direction.
-  constexpr int kPaths[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
   for (int ring = 0; ring + 1 < tube.rings; ++ring) {
     for (int segment = 0; segment < n; ++segment) {
-      for (const auto& path : kPaths) {
-        int step[3] = {0, 0, 0};
+      const auto add = [&](const std::array<std::array<int, 3>, 4>& corners) {
         Tetrahedron tet;
-        tet[0] = id(ring, segment, 0);
-        for (int k = 0; k < 3; ++k) {
-          step[path[k]] = 1;
-          tet[k + 1] = id(ring + step[0], segment + step[1], step[2]);
+        for (std::size_t k = 0; k < 4; ++k) {
+          tet[k] = id(ring + corners[k][0], segment + corners[k][1], corners[k][2]);
         }
         const auto& x = out->organ_vertices;
         if (SignedVolume(x[tet[0]], x[tet[1]], x[tet[2]], x[tet[3]]) < 0) {
           std::swap(tet[2], tet[3]);
         }
         out->tets.push_back(tet);
-      }
+      };
+      tube.split == BrickSplit::kSix ? SplitInSix(add) : SplitInFive((ring + segment) % 2, add);
     }
   }
 }
@@ -236,6 +268,10 @@ Anatomy::Surrounding AbdominalWall() {
 SceneData BuildProcedural(const SceneSettings& settings) {
   if (settings.import) {
     throw InputError("scene '" + settings.name + "': an imported organ is not procedural");
+  }
+  if (settings.tube.split == BrickSplit::kFive && settings.tube.segments % 2 != 0) {
+    throw InputError("scene '" + settings.name + "': " + std::to_string(settings.tube.segments) +
+                     " segments; valid with a split in five: an even number");
   }
   const Shape shape(settings.tube, settings.membrane);
   Anatomy anatomy;

@@ -11,8 +11,12 @@
 
 namespace fulcrum::scene {
 
+/// How a brick becomes tetrahedra: six by Kuhn's split, the same in every brick, or five whose diagonals alternate from
+/// brick to brick, which lock less (plain linear tetrahedra bent with nu = 0.45: 19 % off instead of 42 %).
+enum class BrickSplit { kSix, kFive };
+
 /// The procedural rectum: a walled tube along +y (cranial), z anterior, as `rings` x `segments` x 2 vertices; each of
-/// the (rings - 1) * segments bricks is split into six tetrahedra.
+/// the (rings - 1) * segments bricks is split into tetrahedra.
 struct TubeSettings {
   int rings = 43;
   int segments = 24;
@@ -23,6 +27,8 @@ struct TubeSettings {
   double lateral_bend_m = 0.004;   ///< Amplitude of the S in the frontal plane.
   int fold_count = 5;              ///< Haustra along the length.
   double fold_depth_m = 0.0012;    ///< Amplitude of the folds on the radius.
+  BrickSplit split =
+      BrickSplit::kSix;  ///< kFive needs an even number of segments: diagonals must agree round the ring.
 };
 
 /// The organ read from a closed surface mesh instead. It is filled with tetrahedra (the wall is not told apart from

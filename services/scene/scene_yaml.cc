@@ -29,6 +29,7 @@ const StrictMap::Choices<SurfaceRole> kRoles = {{"abdominal_wall", SurfaceRole::
                                                 {"other", SurfaceRole::kOther}};
 const StrictMap::Choices<std::uint32_t> kPedals = {
     {"up", kPedalNone}, {"cut", kPedalCut}, {"coag", kPedalCoag}, {"blend", kPedalBlend}};
+const StrictMap::Choices<BrickSplit> kSplits = {{"six", BrickSplit::kSix}, {"five", BrickSplit::kFive}};
 const StrictMap::Choices<double> kLengthUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
 
 /// The double with the float's shortest decimal form: 0.8f becomes 0.8, not 0.800000011920929.
@@ -145,6 +146,10 @@ void ReadTube(StrictMap map, TubeSettings* t) {
   ReadSi(&map, "lateral_bend_mm", Range::Between(-40, 40), &t->lateral_bend_m);
   ReadInteger(&map, "fold_count", 0, 40, &t->fold_count);
   ReadSi(&map, "fold_depth_mm", Range::Between(0, 5), &t->fold_depth_m);
+  t->split = map.Choice("split", t->split, kSplits);
+  if (t->split == BrickSplit::kFive && t->segments % 2 != 0) {
+    map.Fail("split", "five needs an even number of segments, not " + std::to_string(t->segments));
+  }
   if (t->wall_m + t->fold_depth_m >= t->outer_radius_m) {
     map.Fail("outer_radius_mm", "must be more than wall_mm + fold_depth_mm");
   }

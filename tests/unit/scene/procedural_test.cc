@@ -83,6 +83,36 @@ TEST_P(ProceduralScene, SurfaceIsClosedAndPointsOutward) {
   EXPECT_NEAR(volume, tet_volume, 1e-6 * tet_volume);
 }
 
+TEST(SplitInFive, FillsTheWallWithFacesThatMatchAlsoRoundTheRing) {
+  SceneSettings settings = BuiltIn();
+  settings.tube.split = BrickSplit::kFive;
+  const SceneData five = BuildProcedural(settings);
+  const SceneQuality q = Measure(five.View()), six = Measure(Scene("built-in").View());
+  EXPECT_EQ(q.tets, 42u * 24u * 5u);
+  EXPECT_EQ(q.organ_vertices, six.organ_vertices);
+  EXPECT_GT(q.least_tet_volume_m3, 0);
+  EXPECT_NEAR(q.organ_volume_m3 / six.organ_volume_m3, 1, 0.005) << "bricks are not quite flat-sided";
+  // Two triangles for every outer face of a brick: faces that did not match would show as more.
+  EXPECT_EQ(five.View().tube_surface.size(), 2u * (2 * 42 * 24 + 2 * 24));
+  std::multiset<std::pair<Index, Index>> edges;
+  for (const Triangle& t : five.View().tube_surface) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      edges.insert({t[k], t[(k + 1) % 3]});
+    }
+  }
+  for (const auto& [a, b] : edges) {
+    EXPECT_EQ(edges.count({a, b}), 1u);
+    EXPECT_EQ(edges.count({b, a}), 1u);
+  }
+}
+
+TEST(SplitInFive, NeedsAnEvenNumberOfSegments) {
+  SceneSettings settings = Small();
+  settings.tube.split = BrickSplit::kFive;
+  settings.tube.segments = 15;
+  EXPECT_THROW((void)BuildProcedural(settings), InputError);
+}
+
 template <class Constraint>
 void ExpectValidColours(std::span<const Constraint> constraints, std::span<const Index> offsets) {
   ASSERT_EQ(offsets.front(), 0u);
