@@ -1,5 +1,5 @@
-// Eight floats, on AVX in one register and on the baseline in two. Included only by kernels_impl.h, inside the
-// namespace of one instruction set, so that no copy of it leaks into another.
+// Eight floats, on AVX in one register and on the baseline in two. Included only by lanes.h, inside the namespace of
+// one instruction set, so that no copy of it leaks into another.
 #pragma once
 
 #include <immintrin.h>
@@ -11,6 +11,7 @@ namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 #if defined(__AVX__)
 
 struct F8 {
+  static constexpr int kBatches = 1;
   __m256 v;
   static F8 Load(const float* p) { return {_mm256_load_ps(p)}; }
   static F8 All(float s) { return {_mm256_set1_ps(s)}; }
@@ -32,10 +33,15 @@ inline F8 Max(F8 a, F8 b) { return {_mm256_max_ps(a.v, b.v)}; }
 inline F8 Min(F8 a, F8 b) { return {_mm256_min_ps(a.v, b.v)}; }
 inline F8 Select(F8 mask, F8 yes, F8 no) { return {_mm256_blendv_ps(no.v, yes.v, mask.v)}; }
 inline std::uint32_t Bits(F8 mask) { return static_cast<std::uint32_t>(_mm256_movemask_ps(mask.v)); }
+template <int lane>
+inline F8 Spread(F8 a) {
+  return {_mm256_permute_ps(a.v, lane * 0x55)};
+}
 
 #else
 
 struct F8 {
+  static constexpr int kBatches = 1;
   __m128 l, h;
   static F8 Load(const float* p) { return {_mm_load_ps(p), _mm_load_ps(p + 4)}; }
   static F8 All(float s) { return {_mm_set1_ps(s), _mm_set1_ps(s)}; }
@@ -64,6 +70,11 @@ inline F8 Select(F8 mask, F8 yes, F8 no) {
 inline std::uint32_t Bits(F8 mask) {
   return static_cast<std::uint32_t>(_mm_movemask_ps(mask.l) | (_mm_movemask_ps(mask.h) << 4));
 }
+/// Lane `lane` of each half in all lanes of that half.
+template <int lane>
+inline F8 Spread(F8 a) {
+  return {_mm_shuffle_ps(a.l, a.l, lane * 0x55), _mm_shuffle_ps(a.h, a.h, lane * 0x55)};
+}
 
 #endif
 
@@ -84,84 +95,45 @@ inline F8 RotateUp(F8 a) {
   return F8::Halves(_mm_castsi128_ps(_mm_alignr_epi8(l, h, 12)), _mm_castsi128_ps(_mm_alignr_epi8(h, l, 12)));
 }
 
-struct V8 {
-  F8 x, y, z;
-};
-inline V8 operator+(V8 a, V8 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline V8 operator-(V8 a, V8 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline V8 operator*(V8 a, F8 s) { return {a.x * s, a.y * s, a.z * s}; }
-inline F8 Dot(V8 a, V8 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline V8 Cross(V8 a, V8 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-
-/// Eight xyzw particles, transposed into lanes.
-struct Particles8 {
-  V8 p;
-  F8 w;
-};
-inline Particles8 GatherXyzw(const float* particles, const std::uint32_t* index) {
-  __m128 r[8];
-  for (int i = 0; i < 8; ++i) {
-    r[i] = _mm_load_ps(particles + 4 * static_cast<std::size_t>(index[i]));
-  }
-  _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
-  _MM_TRANSPOSE4_PS(r[4], r[5], r[6], r[7]);
-  return {{F8::Halves(r[0], r[4]), F8::Halves(r[1], r[5]), F8::Halves(r[2], r[6])}, F8::Halves(r[3], r[7])};
-}
-inline void ScatterXyzw(const Particles8& q, float* particles, const std::uint32_t* index) {
-  __m128 r[8] = {q.p.x.lo(), q.p.y.lo(), q.p.z.lo(), q.w.lo(), q.p.x.hi(), q.p.y.hi(), q.p.z.hi(), q.w.hi()};
-  _MM_TRANSPOSE4_PS(r[0], r[1], r[2], r[3]);
-  _MM_TRANSPOSE4_PS(r[4], r[5], r[6], r[7]);
-  for (int i = 0; i < 8; ++i) {
-    _mm_store_ps(particles + 4 * static_cast<std::size_t>(index[i]), r[i]);
-  }
+/// Rows of four floats in each half to columns, and back: the transpose is its own inverse.
+inline void Transpose(F8* r0, F8* r1, F8* r2, F8* r3) {
+#if defined(__AVX__)
+  const __m256 a = _mm256_unpacklo_ps(r0->v, r1->v), b = _mm256_unpackhi_ps(r0->v, r1->v);
+  const __m256 c = _mm256_unpacklo_ps(r2->v, r3->v), d = _mm256_unpackhi_ps(r2->v, r3->v);
+  r0->v = _mm256_shuffle_ps(a, c, 0x44);
+  r1->v = _mm256_shuffle_ps(a, c, 0xee);
+  r2->v = _mm256_shuffle_ps(b, d, 0x44);
+  r3->v = _mm256_shuffle_ps(b, d, 0xee);
+#else
+  _MM_TRANSPOSE4_PS(r0->l, r1->l, r2->l, r3->l);
+  _MM_TRANSPOSE4_PS(r0->h, r1->h, r2->h, r3->h);
+#endif
 }
 
-/// Eight particles anywhere in the pool.
-inline Particles8 GatherPool(const float* pool, const std::uint32_t* base, const std::uint32_t* step) {
-  alignas(32) float x[8], y[8], z[8], w[8];
-  for (int i = 0; i < 8; ++i) {
-    const float* at = pool + base[i];
-    const std::size_t s = step[i];
-    x[i] = at[0];
-    y[i] = at[s];
-    z[i] = at[2 * s];
-    w[i] = at[3 * s];
+/// pool[index[i] + plane * step[i]] in lane i.
+inline F8 Gather(const float* pool, const std::uint32_t* index, const std::uint32_t* step, std::uint32_t plane) {
+#if defined(__AVX2__)
+  __m256i at = _mm256_load_si256(reinterpret_cast<const __m256i*>(index));
+  for (std::uint32_t i = 0; i < plane; ++i) {
+    at = _mm256_add_epi32(at, _mm256_load_si256(reinterpret_cast<const __m256i*>(step)));
   }
-  return {{F8::Load(x), F8::Load(y), F8::Load(z)}, F8::Load(w)};
-}
-inline void ScatterPool(const V8& p, float* pool, const std::uint32_t* base, const std::uint32_t* step) {
-  alignas(32) float x[8], y[8], z[8];
-  p.x.Store(x);
-  p.y.Store(y);
-  p.z.Store(z);
-  for (int i = 0; i < 8; ++i) {
-    float* at = pool + base[i];
-    const std::size_t s = step[i];
-    at[0] = x[i];
-    at[s] = y[i];
-    at[2 * s] = z[i];
-  }
+  return {_mm256_i32gather_ps(pool, at, 4)};
+#else
+  const auto value = [&](int i) { return pool[index[i] + plane * step[i]]; };
+  return F8::Halves(_mm_set_ps(value(3), value(2), value(1), value(0)),
+                    _mm_set_ps(value(7), value(6), value(5), value(4)));
+#endif
 }
 
-/// atan of t in [0, 1], |error| < 3e-7 rad: reduced to |u| <= tan(pi/8) by (t - 1)/(t + 1), then an odd polynomial.
-inline F8 AtanUnit(F8 t) {
-  const F8 one = F8::All(1.0f);
-  const F8 big = t > F8::All(0.41421356f);
-  const F8 u = Select(big, (t - one) / (t + one), t);
-  const F8 s = u * u;
-  const F8 poly =
-      ((F8::All(0.0805374449f) * s - F8::All(0.138776856f)) * s + F8::All(0.199777106f)) * s - F8::All(0.333329491f);
-  return Select(big, F8::All(0.78539816f), F8::All(0.0f)) + (u + u * s * poly);
+/// Row i of the result holds the four floats at rows + scale * index[i] and at rows + scale * index[i + 4].
+template <std::size_t scale>
+inline F8 LoadRow(const float* rows, const std::uint32_t* index, int i) {
+  return F8::Halves(_mm_load_ps(rows + scale * index[i]), _mm_load_ps(rows + scale * index[i + 4]));
 }
-/// Angle of (cosine, sine) scaled by any positive factor, in (-pi, pi].
-inline F8 Atan2(F8 sine, F8 cosine) {
-  const F8 as = Abs(sine), ac = Abs(cosine);
-  const F8 steep = as > ac;
-  const F8 ratio = Min(as, ac) / Max(Max(as, ac), F8::All(1e-37f));
-  F8 a = AtanUnit(ratio);
-  a = Select(steep, F8::All(1.57079633f) - a, a);
-  a = Select(cosine < F8::All(0.0f), F8::All(3.14159265f) - a, a);
-  return a ^ SignOf(sine);
+template <std::size_t scale>
+inline void StoreRow(F8 row, float* rows, const std::uint32_t* index, int i) {
+  _mm_store_ps(rows + scale * index[i], row.lo());
+  _mm_store_ps(rows + scale * index[i + 4], row.hi());
 }
 
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

@@ -1,5 +1,6 @@
-// The hot loops of the PBD solver as plain functions on plain arrays, compiled once for the baseline CPU and once for
-// AVX2. Both give the same bits: every operation is an IEEE add, multiply, divide or square root on eight lanes.
+// The hot loops of the PBD solver as plain functions on plain arrays, compiled from one source for the baseline CPU,
+// for AVX2 and for AVX-512. All give the same bits: every operation on a lane is an IEEE add, multiply, divide or
+// square root, in one order. AVX-512 takes two batches of a colour at a time, which changes no lane.
 //
 // Nothing here includes a header with inline functions of its own: such a function, compiled for AVX2, could be the
 // copy that the linker keeps for the whole program.
@@ -12,6 +13,8 @@ namespace fulcrum::physics {
 
 /// Constraints of one batch; also the lanes of a membrane row.
 inline constexpr int kLanes = 8;
+/// Batches 2 i and 2 i + 1 are of one colour: each colour is filled up to a multiple of so many batches.
+inline constexpr std::size_t kBatchesAtOnce = 2;
 
 /// Eight springs of one colour. Vertices are indices of xyzw particles. rest 0 switches a lane off.
 struct alignas(32) SpringBatch {
@@ -27,16 +30,17 @@ struct alignas(32) TetBatch {
   float floor[kLanes];        ///< Least sum of w |gradient|^2 to divide by, a small part of its value at rest.
 };
 
-/// Eight dihedral angles of one colour. A particle's coordinates are pool[base + step * {0, 1, 2}], w at 3 * step.
+/// Eight dihedral angles of one colour. Vertices are indices into the hinge particles, a copy in xyzw of the few
+/// particles that hinges use: gathered from the membrane's planes, each would cost four cache lines in each hinge.
 struct alignas(32) BendingBatch {
-  std::uint32_t base[4][kLanes];
-  std::uint32_t step[4][kLanes];
+  std::uint32_t v[4][kLanes];
   float rest_angle[kLanes];  ///< [rad]
   float floor[kLanes];       ///< As in TetBatch [rad^2 per (m^2 kg)].
   float active[kLanes];      ///< 1, or 0 where the hinge has been cut.
 };
 
-/// Eight bindings (eq. 9) of one colour: v[0] is the membrane's node, v[1..3] the surface triangle.
+/// Eight bindings (eq. 9) of one colour: index 0 is the membrane's node, 1..3 the surface triangle. A particle's
+/// coordinates are pool[base + step * {0, 1, 2}], w at 3 * step; the triangle's are the tube's, with step 1.
 struct alignas(32) BindingBatch {
   std::uint32_t base[4][kLanes];
   std::uint32_t step[4][kLanes];
@@ -91,8 +95,7 @@ struct Kernels {
   /// `particles` xyzw.
   void (*springs)(float* particles, const SpringBatch* batches, std::size_t count, float k);
   void (*volumes)(float* particles, const TetBatch* batches, std::size_t count, float k);
-  void (*bending)(float* pool, const BendingBatch* batches, std::size_t count, float k);
-
+  void (*bending)(float* hinge_particles, const BendingBatch* batches, std::size_t count, float k);
   void (*bindings)(float* pool, const BindingBatch* batches, std::size_t count, const BindingStiffness& stiffness);
 
   /// Verlet prediction of `count` entries (multiple of 8) of the planes: previous <- now, now <- now + velocity step.
@@ -102,14 +105,19 @@ struct Kernels {
   /// Puts back what is not finite, and cuts short what has moved further than sqrt(limit_sq).
   FinishResult (*finish)(float* const now[3], const float* const previous[3], const float* w, std::size_t count,
                          float limit_sq);
+  /// The same for xyzw particles; `count` floats, a multiple of 8.
+  std::uint32_t (*integrate_xyzw)(float* now, float* previous, std::size_t count, const IntegrateSettings& settings);
+  FinishResult (*finish_xyzw)(float* now, const float* previous, std::size_t count, float limit_sq);
   void (*block_bounds)(const GridArrays& grid, const BlockBounds& bounds);
 };
 
 const Kernels& BaselineKernels();
 const Kernels& Avx2Kernels();
+const Kernels& Avx512Kernels();
 /// The widest kernels of this CPU.
 const Kernels& BestKernels();
-/// False: Avx2Kernels() must not be called here.
+/// False: the kernels of that name must not be called here.
 bool HasAvx2();
+bool HasAvx512();
 
 }  // namespace fulcrum::physics

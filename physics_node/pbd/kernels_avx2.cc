@@ -3,11 +3,6 @@
 
 namespace fulcrum::physics {
 
-const Kernels& Avx2Kernels() {
-  static constexpr Kernels kernels{"AVX2",          avx2::GridStretch, avx2::Springs,
-                                   avx2::Volumes,   avx2::Bending,     avx2::Bindings,
-                                   avx2::Integrate, avx2::Finish,      avx2::ComputeBlockBounds};
-  return kernels;
-}
+const Kernels& Avx2Kernels() { return avx2::Table("AVX2"); }
 
 }  // namespace fulcrum::physics

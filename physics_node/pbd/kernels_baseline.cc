@@ -3,11 +3,6 @@
 
 namespace fulcrum::physics {
 
-const Kernels& BaselineKernels() {
-  static constexpr Kernels kernels{"baseline",          baseline::GridStretch, baseline::Springs,
-                                   baseline::Volumes,   baseline::Bending,     baseline::Bindings,
-                                   baseline::Integrate, baseline::Finish,      baseline::ComputeBlockBounds};
-  return kernels;
-}
+const Kernels& BaselineKernels() { return baseline::Table("baseline"); }
 
 }  // namespace fulcrum::physics

@@ -2,78 +2,103 @@
 // go: load, constraint value, gradient, masses, lambda, apply.
 #pragma once
 
-#include "physics_node/pbd/float8.h"
 #include "physics_node/pbd/kernels.h"
+#include "physics_node/pbd/lanes.h"
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
 /// Only keeps 0/0 away: numerators carry the masses, so a sum of zero masses gives a correction of zero.
-inline F8 Tiny() { return F8::All(1e-30f); }
+template <class F>
+inline F Tiny() {
+  return F::All(1e-30f);
+}
 
 /// With vertices that cannot move, the others must not make up for all of it however small their part in the constraint
 /// is: this part of the largest possible sum of w |gradient|^2 is divided by at least. A constraint between free
 /// vertices of like mass is above it.
-inline F8 LeastSum(F8 largest_w, F8 largest_gradient_sq) { return F8::All(0.2f) * (largest_w * largest_gradient_sq); }
+template <class F>
+inline F LeastSum(F largest_w, F largest_gradient_sq) {
+  return F::All(0.2f) * (largest_w * largest_gradient_sq);
+}
 
-struct Pair8 {
-  V8 p, q;
-  F8 w_p, w_q;
+template <class F>
+struct Pair {
+  V<F> p, q;
+  F w_p, w_q;
 };
 
-/// Distance constraint |q - p| = rest of eight pairs: dp = w_p * lambda * d, dq = -w_q * lambda * d.
-inline F8 StretchFactor(const Pair8& s, V8 d, F8 rest, F8 k) {
-  const F8 length = Sqrt(Dot(d, d));
-  const F8 factor = k * (length - rest) / Max(length * (s.w_p + s.w_q), Tiny());
-  return factor & (rest > F8::All(0.0f));
+/// Distance constraint |q - p| = rest of pairs: dp = w_p * lambda * d, dq = -w_q * lambda * d.
+template <class F>
+inline F StretchFactor(const Pair<F>& s, V<F> d, F rest, F k) {
+  const F length = Sqrt(Dot(d, d));
+  const F factor = k * (length - rest) / Max(length * (s.w_p + s.w_q), Tiny<F>());
+  return factor & (rest > F::All(0.0f));
 }
-inline void ProjectStretch(Pair8* s, F8 rest, F8 k) {
-  const V8 d = s->q - s->p;
-  const F8 factor = StretchFactor(*s, d, rest, k);
+template <class F>
+inline void ProjectStretch(Pair<F>* s, F rest, F k) {
+  const V<F> d = s->q - s->p;
+  const F factor = StretchFactor(*s, d, rest, k);
   s->p = s->p + d * (factor * s->w_p);
   s->q = s->q - d * (factor * s->w_q);
 }
 
-struct GridRow {
+/// One row of the membrane, or with F16 two of them, `next` floats apart.
+template <class F>
+struct GridRows {
   float* x;
   float* y;
   float* z;
   const float* w;
-  [[nodiscard]] V8 Load(int slot) const {
-    return {F8::Load(x + 8 * slot), F8::Load(y + 8 * slot), F8::Load(z + 8 * slot)};
+  std::size_t next;
+  [[nodiscard]] V<F> Load(int slot) const {
+    return {Batches<F>::Load(x + 8 * slot, next), Batches<F>::Load(y + 8 * slot, next),
+            Batches<F>::Load(z + 8 * slot, next)};
   }
-  [[nodiscard]] F8 LoadMass(int slot) const { return F8::Load(w + 8 * slot); }
-  void Store(int slot, V8 p) const {
-    p.x.Store(x + 8 * slot);
-    p.y.Store(y + 8 * slot);
-    p.z.Store(z + 8 * slot);
+  [[nodiscard]] F LoadMass(int slot) const { return Batches<F>::Load(w + 8 * slot, next); }
+  void Store(int slot, const V<F>& p) const {
+    Batches<F>::Store(p.x, x + 8 * slot, next);
+    Batches<F>::Store(p.y, y + 8 * slot, next);
+    Batches<F>::Store(p.z, z + 8 * slot, next);
   }
 };
-inline GridRow RowOf(const GridArrays& g, int row) {
-  const std::size_t at = static_cast<std::size_t>(row) * 8 * static_cast<std::size_t>(g.slots);
-  return {g.x + at, g.y + at, g.z + at, g.w + at};
+
+/// Row `row`, and with F16 also row + apart.
+template <class F>
+inline GridRows<F> RowsOf(const GridArrays& g, int row, int apart) {
+  const std::size_t stride = 8 * static_cast<std::size_t>(g.slots);
+  const std::size_t at = static_cast<std::size_t>(row) * stride;
+  return {g.x + at, g.y + at, g.z + at, g.w + at, static_cast<std::size_t>(apart) * stride};
 }
 inline const float* RestOf(const GridArrays& g, int direction, int row) {
   return g.rest[direction] + static_cast<std::size_t>(row) * 8 * static_cast<std::size_t>(g.slots);
 }
-inline V8 RotateDown(V8 a) { return {RotateDown(a.x), RotateDown(a.y), RotateDown(a.z)}; }
-inline V8 RotateUp(V8 a) { return {RotateUp(a.x), RotateUp(a.y), RotateUp(a.z)}; }
+template <class F>
+inline V<F> RotateDown(const V<F>& a) {
+  return {RotateDown(a.x), RotateDown(a.y), RotateDown(a.z)};
+}
+template <class F>
+inline V<F> RotateUp(const V<F>& a) {
+  return {RotateUp(a.x), RotateUp(a.y), RotateUp(a.z)};
+}
 
-/// Edge between `slot` of row a and `slot + 1` of row b; the last slot's neighbour is the first one, a lane further.
-inline void StretchToNext(const GridRow& a, const GridRow& b, const float* rest, int slot, int slots, F8 k) {
+/// Edges between `slot` of row a and `slot + 1` of row b; the last slot's neighbour is the first one, a lane further.
+template <class F>
+inline void StretchToNext(const GridRows<F>& a, const GridRows<F>& b, const float* rest, int slot, int slots, F k) {
   const bool wraps = slot + 1 == slots;
   const int next = wraps ? 0 : slot + 1;
-  Pair8 s{a.Load(slot), b.Load(next), a.LoadMass(slot), b.LoadMass(next)};
+  Pair<F> s{a.Load(slot), b.Load(next), a.LoadMass(slot), b.LoadMass(next)};
   if (wraps) {
     s.q = RotateDown(s.q);
     s.w_q = RotateDown(s.w_q);
   }
-  ProjectStretch(&s, F8::Load(rest + 8 * slot), k);
+  ProjectStretch(&s, Batches<F>::Load(rest + 8 * slot, a.next), k);
   a.Store(slot, s.p);
   b.Store(next, wraps ? RotateUp(s.q) : s.q);
 }
 
-/// Edges along one row: even slots, odd slots, then the wrap, each a set of disjoint pairs.
-inline void StretchAlongRow(const GridRow& row, const float* rest, int slots, F8 k) {
+/// Edges along a row: even slots, odd slots, then the wrap, each a set of disjoint pairs.
+template <class F>
+inline void StretchAlongRow(const GridRows<F>& row, const float* rest, int slots, F k) {
   for (int first = 0; first < 2; ++first) {
     for (int s = first; s + 1 < slots; s += 2) {
       StretchToNext(row, row, rest, s, slots, k);
@@ -85,12 +110,13 @@ inline void StretchAlongRow(const GridRow& row, const float* rest, int slots, F8
     // One slot: neighbours are lanes of the same vector, so the pairs overlap. Even lanes, then odd lanes.
     for (int first = 0; first < 2; ++first) {
       for (int lane = first; lane + 1 < kLanes; lane += 2) {
-        const float l0 = rest[lane];
-        alignas(32) float only[kLanes] = {};
-        only[lane] = l0;
-        Pair8 s{row.Load(0), RotateDown(row.Load(0)), row.LoadMass(0), RotateDown(row.LoadMass(0))};
-        const V8 d = s.q - s.p;
-        const F8 factor = StretchFactor(s, d, F8::Load(only), k);
+        alignas(32) float lanes[kLanes] = {};
+        lanes[lane] = 1.0f;
+        const F only =
+            Select(Batches<F>::Load(lanes, 0) > F::All(0.0f), Batches<F>::Load(rest, row.next), F::All(0.0f));
+        const Pair<F> s{row.Load(0), RotateDown(row.Load(0)), row.LoadMass(0), RotateDown(row.LoadMass(0))};
+        const V<F> d = s.q - s.p;
+        const F factor = StretchFactor(s, d, only, k);
         row.Store(0, s.p + d * (factor * s.w_p) - RotateUp(d * (factor * s.w_q)));
       }
     }
@@ -98,11 +124,12 @@ inline void StretchAlongRow(const GridRow& row, const float* rest, int slots, F8
 }
 
 /// Edges from row a to row b straight and diagonal.
-inline void StretchBetweenRows(const GridRow& a, const GridRow& b, const float* straight, const float* diagonal,
-                               int slots, F8 k) {
+template <class F>
+inline void StretchBetweenRows(const GridRows<F>& a, const GridRows<F>& b, const float* straight, const float* diagonal,
+                               int slots, F k) {
   for (int s = 0; s < slots; ++s) {
-    Pair8 pair{a.Load(s), b.Load(s), a.LoadMass(s), b.LoadMass(s)};
-    ProjectStretch(&pair, F8::Load(straight + 8 * s), k);
+    Pair<F> pair{a.Load(s), b.Load(s), a.LoadMass(s), b.LoadMass(s)};
+    ProjectStretch(&pair, Batches<F>::Load(straight + 8 * s, a.next), k);
     a.Store(s, pair.p);
     b.Store(s, pair.q);
   }
@@ -111,127 +138,164 @@ inline void StretchBetweenRows(const GridRow& a, const GridRow& b, const float* 
   }
 }
 
+/// Rows `row` and row + 1, and with F16 also the next two: along each while it is in the first-level cache, when
+/// `along`, then between the two of a pair.
+template <class F>
+inline void StretchRowPairs(const GridArrays& g, int row, bool along, F k) {
+  if (along) {
+    for (int r = row; r < row + 2 * F::kBatches; r += F::kBatches) {
+      StretchAlongRow(RowsOf<F>(g, r, 1), RestOf(g, 0, r), g.slots, k);
+    }
+  }
+  StretchBetweenRows(RowsOf<F>(g, row, 2), RowsOf<F>(g, row + 1, 2), RestOf(g, 1, row), RestOf(g, 2, row), g.slots, k);
+}
+
 void GridStretch(const GridArrays& g, float stiffness) {
   const F8 k = F8::All(stiffness);
-  // Even row pairs while their rows are in the first-level cache: along both rows, then between them.
-  for (int r = 0; r < g.rows; r += 2) {
-    const GridRow a = RowOf(g, r);
-    StretchAlongRow(a, RestOf(g, 0, r), g.slots, k);
-    if (r + 1 < g.rows) {
-      const GridRow b = RowOf(g, r + 1);
-      StretchAlongRow(b, RestOf(g, 0, r + 1), g.slots, k);
-      StretchBetweenRows(a, b, RestOf(g, 1, r), RestOf(g, 2, r), g.slots, k);
+  // Even row pairs, then odd ones: the pairs of a set are disjoint.
+  for (int first = 0; first < 2; ++first) {
+    int r = first;
+    for (; r + 2 * Widest::kBatches <= g.rows; r += 2 * Widest::kBatches) {
+      StretchRowPairs<Widest>(g, r, first == 0, Widest::All(stiffness));
+    }
+    for (; r + 2 <= g.rows; r += 2) {
+      StretchRowPairs<F8>(g, r, first == 0, k);
+    }
+    if (first == 0 && r < g.rows) {
+      StretchAlongRow(RowsOf<F8>(g, r, 1), RestOf(g, 0, r), g.slots, k);
     }
   }
-  for (int r = 1; r + 1 < g.rows; r += 2) {
-    StretchBetweenRows(RowOf(g, r), RowOf(g, r + 1), RestOf(g, 1, r), RestOf(g, 2, r), g.slots, k);
+}
+
+/// Floats from an array of one batch to that of the next.
+template <class Batch>
+inline constexpr std::size_t kNext = sizeof(Batch) / sizeof(float);
+
+template <class F>
+inline void ProjectSprings(float* particles, const SpringBatch& batch, float stiffness) {
+  constexpr std::size_t kStep = kNext<SpringBatch>;
+  const Particles<F> a = GatherXyzw<F, 4>(particles, batch.a, kStep);
+  const Particles<F> b = GatherXyzw<F, 4>(particles, batch.b, kStep);
+  Pair<F> s{a.p, b.p, a.w, b.w};
+  ProjectStretch(&s, Batches<F>::Load(batch.rest, kStep), F::All(stiffness));
+  ScatterXyzw<F, 4>({s.p, s.w_p}, particles, batch.a, kStep);
+  ScatterXyzw<F, 4>({s.q, s.w_q}, particles, batch.b, kStep);
+}
+
+template <class F>
+inline void ProjectVolumes(float* particles, const TetBatch& batch, float stiffness) {
+  constexpr std::size_t kStep = kNext<TetBatch>;
+  const F sixth = F::All(1.0f / 6.0f);
+  Particles<F> q[4];
+  for (int j = 0; j < 4; ++j) {
+    q[j] = GatherXyzw<F, 4>(particles, batch.v[j], kStep);
+  }
+  const V<F> b = q[1].p - q[0].p, c = q[2].p - q[0].p, d = q[3].p - q[0].p;
+  const V<F> gd = Cross(b, c) * sixth;
+  const F volume = Dot(gd, d);
+  const V<F> gb = Cross(c, d) * sixth;
+  const V<F> gc = Cross(d, b) * sixth;
+  const V<F> ga = (gb + gc + gd) * F::All(-1.0f);
+  const F sum = q[0].w * Dot(ga, ga) + q[1].w * Dot(gb, gb) + q[2].w * Dot(gc, gc) + q[3].w * Dot(gd, gd);
+  const F lambda = F::All(stiffness) * (Batches<F>::Load(batch.rest_volume, kStep) - volume) /
+                   Max(sum, Batches<F>::Load(batch.floor, kStep));
+  q[0].p = q[0].p + ga * (lambda * q[0].w);
+  q[1].p = q[1].p + gb * (lambda * q[1].w);
+  q[2].p = q[2].p + gc * (lambda * q[2].w);
+  q[3].p = q[3].p + gd * (lambda * q[3].w);
+  for (int j = 0; j < 4; ++j) {
+    ScatterXyzw<F, 4>(q[j], particles, batch.v[j], kStep);
   }
 }
+
+template <class F>
+inline void ProjectBending(float* particles, const BendingBatch& batch, float stiffness) {
+  constexpr std::size_t kStep = kNext<BendingBatch>;
+  const F pi = F::All(3.14159265f), two_pi = F::All(6.28318531f), zero = F::All(0.0f);
+  Particles<F> q[4];
+  for (int j = 0; j < 4; ++j) {
+    q[j] = GatherXyzw<F, 4>(particles, batch.v[j], kStep);
+  }
+  const F floor = Batches<F>::Load(batch.floor, kStep);
+  const V<F> e = q[1].p - q[0].p;
+  const F length = Max(Sqrt(Dot(e, e)), Tiny<F>());
+  const V<F> n1 = Cross(q[0].p - q[2].p, q[1].p - q[2].p);
+  const V<F> n2 = Cross(q[1].p - q[3].p, q[0].p - q[3].p);
+  const F angle = Atan2(Dot(Cross(n1, n2), e) / length, Dot(n1, n2));
+  const V<F> m1 = n1 * (F::All(1.0f) / Max(Dot(n1, n1), floor));
+  const V<F> m2 = n2 * (F::All(1.0f) / Max(Dot(n2, n2), floor));
+  const V<F> hinge = e * (F::All(1.0f) / length);
+  const V<F> g2 = m1 * (zero - length);
+  const V<F> g3 = m2 * (zero - length);
+  const V<F> g0 = m1 * Dot(q[1].p - q[2].p, hinge) + m2 * Dot(q[1].p - q[3].p, hinge);
+  const V<F> g1 = m1 * Dot(q[2].p - q[0].p, hinge) + m2 * Dot(q[3].p - q[0].p, hinge);
+  const F sum = q[0].w * Dot(g0, g0) + q[1].w * Dot(g1, g1) + q[2].w * Dot(g2, g2) + q[3].w * Dot(g3, g3);
+  const F w_max = Max(Max(q[0].w, q[1].w), Max(q[2].w, q[3].w));
+  const F g_max = Max(Max(Dot(g0, g0), Dot(g1, g1)), Max(Dot(g2, g2), Dot(g3, g3)));
+  F c = angle - Batches<F>::Load(batch.rest_angle, kStep);
+  c = Select(c > pi, c - two_pi, c);
+  c = Select(c < zero - pi, c + two_pi, c);
+  const F lambda = (F::All(-stiffness) * Batches<F>::Load(batch.active, kStep)) * c /
+                   Max(Max(sum, LeastSum(w_max, g_max)), Tiny<F>());
+  const V<F> g[4] = {g0, g1, g2, g3};
+  for (int j = 0; j < 4; ++j) {
+    q[j].p = q[j].p + g[j] * (lambda * q[j].w);
+    ScatterXyzw<F, 4>(q[j], particles, batch.v[j], kStep);
+  }
+}
+
+template <class F>
+inline void ProjectBindings(float* pool, const BindingBatch& batch, const BindingStiffness& stiffness) {
+  constexpr std::size_t kStep = kNext<BindingBatch>;
+  const F zero = F::All(0.0f);
+  const Particles<F> node = GatherPool<F>(pool, batch.base[0], batch.step[0], kStep);
+  Particles<F> q[3];
+  F b[3];
+  for (int j = 0; j < 3; ++j) {
+    q[j] = GatherXyzw<F, 1>(pool, batch.base[j + 1], kStep);
+    b[j] = Batches<F>::Load(batch.barycentric[j], kStep);
+  }
+  const V<F> d = node.p - (q[0].p * b[0] + q[1].p * b[1] + q[2].p * b[2]);
+  const F length = Sqrt(Dot(d, d));
+  const V<F> area = Cross(q[1].p - q[0].p, q[2].p - q[0].p);
+  const V<F> n = area * (F::All(1.0f) / Max(Sqrt(Dot(area, area)), Tiny<F>()));
+  const F height = Dot(n, d), rest_height = Batches<F>::Load(batch.rest_height, kStep);
+  const F drawn = Max(length - Batches<F>::Load(batch.rest_length, kStep), zero) * F::All(-stiffness.tension);
+  const F pressed =
+      Max(F::All(stiffness.compression) * (rest_height - height), F::All(stiffness.floor) * rest_height - height);
+  const F sum = node.w + q[0].w * b[0] * b[0] + q[1].w * b[1] * b[1] + q[2].w * b[2] * b[2];
+  const F w_max = Max(Max(node.w, q[0].w), Max(q[1].w, q[2].w));
+  const F scale = Batches<F>::Load(batch.active, kStep) / Max(Max(sum, LeastSum(w_max, F::All(1.0f))), Tiny<F>());
+  const V<F> move = d * (scale * drawn / Max(length, Tiny<F>())) + n * (scale * Max(pressed, zero));
+  ScatterPool<F>(node.p + move * node.w, pool, batch.base[0], batch.step[0], kStep);
+  for (int j = 0; j < 3; ++j) {
+    q[j].p = q[j].p - move * (q[j].w * b[j]);
+    ScatterXyzw<F, 1>(q[j], pool, batch.base[j + 1], kStep);
+  }
+}
+
+/// As many batches at a time as fit the registers, then one at a time. Batches 2 i and 2 i + 1 are of one colour.
+#define FULCRUM_FOR_BATCHES(project, place, batches, count, stiffness) \
+  std::size_t i = 0;                                                   \
+  for (; i + Widest::kBatches <= (count); i += Widest::kBatches) {     \
+    project<Widest>(place, (batches)[i], stiffness);                   \
+  }                                                                    \
+  for (; i < (count); ++i) {                                           \
+    project<F8>(place, (batches)[i], stiffness);                       \
+  }
 
 void Springs(float* particles, const SpringBatch* batches, std::size_t count, float stiffness) {
-  const F8 k = F8::All(stiffness);
-  for (std::size_t i = 0; i < count; ++i) {
-    const SpringBatch& batch = batches[i];
-    const Particles8 a = GatherXyzw(particles, batch.a);
-    const Particles8 b = GatherXyzw(particles, batch.b);
-    Pair8 s{a.p, b.p, a.w, b.w};
-    ProjectStretch(&s, F8::Load(batch.rest), k);
-    ScatterXyzw({s.p, s.w_p}, particles, batch.a);
-    ScatterXyzw({s.q, s.w_q}, particles, batch.b);
-  }
+  FULCRUM_FOR_BATCHES(ProjectSprings, particles, batches, count, stiffness)
 }
-
 void Volumes(float* particles, const TetBatch* batches, std::size_t count, float stiffness) {
-  const F8 k = F8::All(stiffness);
-  const F8 sixth = F8::All(1.0f / 6.0f);
-  for (std::size_t i = 0; i < count; ++i) {
-    const TetBatch& batch = batches[i];
-    Particles8 q[4];
-    for (int j = 0; j < 4; ++j) {
-      q[j] = GatherXyzw(particles, batch.v[j]);
-    }
-    const V8 b = q[1].p - q[0].p, c = q[2].p - q[0].p, d = q[3].p - q[0].p;
-    const V8 gd = Cross(b, c) * sixth;
-    const F8 volume = Dot(gd, d);
-    const V8 gb = Cross(c, d) * sixth;
-    const V8 gc = Cross(d, b) * sixth;
-    const V8 ga = (gb + gc + gd) * F8::All(-1.0f);
-    const F8 sum = q[0].w * Dot(ga, ga) + q[1].w * Dot(gb, gb) + q[2].w * Dot(gc, gc) + q[3].w * Dot(gd, gd);
-    const F8 lambda = k * (F8::Load(batch.rest_volume) - volume) / Max(sum, F8::Load(batch.floor));
-    q[0].p = q[0].p + ga * (lambda * q[0].w);
-    q[1].p = q[1].p + gb * (lambda * q[1].w);
-    q[2].p = q[2].p + gc * (lambda * q[2].w);
-    q[3].p = q[3].p + gd * (lambda * q[3].w);
-    for (int j = 0; j < 4; ++j) {
-      ScatterXyzw(q[j], particles, batch.v[j]);
-    }
-  }
+  FULCRUM_FOR_BATCHES(ProjectVolumes, particles, batches, count, stiffness)
 }
-
-void Bending(float* pool, const BendingBatch* batches, std::size_t count, float stiffness) {
-  const F8 pi = F8::All(3.14159265f), two_pi = F8::All(6.28318531f);
-  for (std::size_t i = 0; i < count; ++i) {
-    const BendingBatch& batch = batches[i];
-    Particles8 q[4];
-    for (int j = 0; j < 4; ++j) {
-      q[j] = GatherPool(pool, batch.base[j], batch.step[j]);
-    }
-    const F8 floor = F8::Load(batch.floor);
-    const V8 e = q[1].p - q[0].p;
-    const F8 length = Max(Sqrt(Dot(e, e)), Tiny());
-    const V8 n1 = Cross(q[0].p - q[2].p, q[1].p - q[2].p);
-    const V8 n2 = Cross(q[1].p - q[3].p, q[0].p - q[3].p);
-    const F8 angle = Atan2(Dot(Cross(n1, n2), e) / length, Dot(n1, n2));
-    const V8 m1 = n1 * (F8::All(1.0f) / Max(Dot(n1, n1), floor));
-    const V8 m2 = n2 * (F8::All(1.0f) / Max(Dot(n2, n2), floor));
-    const V8 hinge = e * (F8::All(1.0f) / length);
-    const F8 zero = F8::All(0.0f);
-    const V8 g2 = m1 * (zero - length);
-    const V8 g3 = m2 * (zero - length);
-    const V8 g0 = m1 * Dot(q[1].p - q[2].p, hinge) + m2 * Dot(q[1].p - q[3].p, hinge);
-    const V8 g1 = m1 * Dot(q[2].p - q[0].p, hinge) + m2 * Dot(q[3].p - q[0].p, hinge);
-    const F8 sum = q[0].w * Dot(g0, g0) + q[1].w * Dot(g1, g1) + q[2].w * Dot(g2, g2) + q[3].w * Dot(g3, g3);
-    const F8 w_max = Max(Max(q[0].w, q[1].w), Max(q[2].w, q[3].w));
-    const F8 g_max = Max(Max(Dot(g0, g0), Dot(g1, g1)), Max(Dot(g2, g2), Dot(g3, g3)));
-    F8 c = angle - F8::Load(batch.rest_angle);
-    c = Select(c > pi, c - two_pi, c);
-    c = Select(c < zero - pi, c + two_pi, c);
-    const F8 lambda =
-        (F8::All(-stiffness) * F8::Load(batch.active)) * c / Max(Max(sum, LeastSum(w_max, g_max)), Tiny());
-    const V8 g[4] = {g0, g1, g2, g3};
-    for (int j = 0; j < 4; ++j) {
-      ScatterPool(q[j].p + g[j] * (lambda * q[j].w), pool, batch.base[j], batch.step[j]);
-    }
-  }
+void Bending(float* particles, const BendingBatch* batches, std::size_t count, float stiffness) {
+  FULCRUM_FOR_BATCHES(ProjectBending, particles, batches, count, stiffness)
 }
-
-void Bindings(float* pool, const BindingBatch* batches, std::size_t count, const BindingStiffness& stiffness) {
-  const F8 zero = F8::All(0.0f);
-  for (std::size_t i = 0; i < count; ++i) {
-    const BindingBatch& batch = batches[i];
-    Particles8 q[4];
-    for (int j = 0; j < 4; ++j) {
-      q[j] = GatherPool(pool, batch.base[j], batch.step[j]);
-    }
-    const F8 b[3] = {F8::Load(batch.barycentric[0]), F8::Load(batch.barycentric[1]), F8::Load(batch.barycentric[2])};
-    const V8 d = q[0].p - (q[1].p * b[0] + q[2].p * b[1] + q[3].p * b[2]);
-    const F8 length = Sqrt(Dot(d, d));
-    const V8 area = Cross(q[2].p - q[1].p, q[3].p - q[1].p);
-    const V8 n = area * (F8::All(1.0f) / Max(Sqrt(Dot(area, area)), Tiny()));
-    const F8 height = Dot(n, d), rest_height = F8::Load(batch.rest_height);
-    const F8 drawn = Max(length - F8::Load(batch.rest_length), zero) * F8::All(-stiffness.tension);
-    const F8 pressed =
-        Max(F8::All(stiffness.compression) * (rest_height - height), F8::All(stiffness.floor) * rest_height - height);
-    const F8 sum = q[0].w + q[1].w * b[0] * b[0] + q[2].w * b[1] * b[1] + q[3].w * b[2] * b[2];
-    const F8 w_max = Max(Max(q[0].w, q[1].w), Max(q[2].w, q[3].w));
-    const F8 scale = F8::Load(batch.active) / Max(Max(sum, LeastSum(w_max, F8::All(1.0f))), Tiny());
-    const V8 move = d * (scale * drawn / Max(length, Tiny())) + n * (scale * Max(pressed, zero));
-    ScatterPool(q[0].p + move * q[0].w, pool, batch.base[0], batch.step[0]);
-    for (int j = 0; j < 3; ++j) {
-      ScatterPool(q[j + 1].p - move * (q[j + 1].w * b[j]), pool, batch.base[j + 1], batch.step[j + 1]);
-    }
-  }
-}
+void Bindings(float* pool, const BindingBatch* batches, std::size_t count,
+              const BindingStiffness& stiffness){FULCRUM_FOR_BATCHES(ProjectBindings, pool, batches, count, stiffness)}
+#undef FULCRUM_FOR_BATCHES
 
 std::uint32_t Integrate(float* const now[3], float* const previous[3], const float* w, std::size_t count,
                         const IntegrateSettings& settings) {
@@ -258,6 +322,16 @@ std::uint32_t Integrate(float* const now[3], float* const previous[3], const flo
   return resets;
 }
 
+inline float LargestLane(F8 v) {
+  alignas(32) float lanes[8];
+  v.Store(lanes);
+  float largest = lanes[0];
+  for (const float lane : lanes) {
+    largest = lane > largest ? lane : largest;
+  }
+  return largest;
+}
+
 FinishResult Finish(float* const now[3], const float* const previous[3], const float* w, std::size_t count,
                     float limit_sq) {
   FinishResult result{0, 0};
@@ -282,11 +356,56 @@ FinishResult Finish(float* const now[3], const float* const previous[3], const f
     }
     largest = Max(moved & good, largest);
   }
-  alignas(32) float lanes[8];
-  largest.Store(lanes);
-  for (const float lane : lanes) {
-    result.max_step_sq = lane > result.max_step_sq ? lane : result.max_step_sq;
+  result.max_step_sq = LargestLane(largest);
+  return result;
+}
+
+/// Lanes x, y, z of two xyzw particles.
+inline F8 XyzLanes() {
+  alignas(32) static constexpr float kXyz[8] = {1, 1, 1, 0, 1, 1, 1, 0};
+  return F8::Load(kXyz) > F8::All(0.0f);
+}
+
+std::uint32_t IntegrateXyzw(float* now, float* previous, std::size_t count, const IntegrateSettings& settings) {
+  std::uint32_t resets = 0;
+  const float* g = settings.gravity;
+  alignas(32) const float falls[8] = {g[0], g[1], g[2], 0, g[0], g[1], g[2], 0};
+  const F8 keep = F8::All(settings.keep), limit = F8::All(settings.limit), fall = F8::Load(falls), xyz = XyzLanes();
+  for (std::size_t i = 0; i < count; i += 8) {
+    const F8 last = F8::Load(previous + i), x = F8::Load(now + i);
+    F8 here = x;
+    const F8 good = Abs(here - last) < limit;  // False for a NaN.
+    if ((~Bits(good) & 0x77u) != 0) {
+      here = Select(good, here, last);
+      resets += static_cast<std::uint32_t>(__builtin_popcount(~Bits(good) & 0x77u));
+    }
+    const F8 step = (here - last) * keep + fall;
+    Select(xyz, here, last).Store(previous + i);
+    Select(xyz, here + (step & (Spread<3>(x) > F8::All(0.0f))), x).Store(now + i);
   }
+  return resets;
+}
+
+FinishResult FinishXyzw(float* now, const float* previous, std::size_t count, float limit_sq) {
+  FinishResult result{0, 0};
+  const F8 limit = F8::All(limit_sq), xyz = XyzLanes();
+  F8 largest = F8::All(0.0f);
+  for (std::size_t i = 0; i < count; i += 8) {
+    const F8 x = F8::Load(now + i), p = F8::Load(previous + i);
+    const F8 d = x - p, squares = d * d;
+    const F8 moved = Spread<0>(squares) + Spread<1>(squares) + Spread<2>(squares);
+    const F8 good = moved < limit;  // False for a NaN.
+    if (Bits(good) != 0xffu) {
+      const F8 finite = moved < F8::All(3e38f);
+      const F8 part = Sqrt(limit / Max(moved, limit)) & finite;
+      const F8 kept = p + (d & finite) * part;
+      Select(xyz, Select(good, x, kept), x).Store(now + i);
+      const F8 free = Spread<3>(x) > F8::All(0.0f);
+      result.resets += static_cast<std::uint32_t>(__builtin_popcount(~Bits(good) & Bits(free) & 0x11u));
+    }
+    largest = Max(moved & good, largest);
+  }
+  result.max_step_sq = LargestLane(largest);
   return result;
 }
 
@@ -316,6 +435,12 @@ void ComputeBlockBounds(const GridArrays& g, const BlockBounds& bounds) {
       }
     }
   }
+}
+
+const Kernels& Table(const char* name) {
+  static const Kernels kernels{name,      GridStretch, Springs,       Volumes,    Bending,           Bindings,
+                               Integrate, Finish,      IntegrateXyzw, FinishXyzw, ComputeBlockBounds};
+  return kernels;
 }
 
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

@@ -7,6 +7,7 @@
 // ParticleRef reaches both in the same way. w is the inverse mass in effect: 0 for fixed, grasped and dead particles.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
@@ -106,6 +107,8 @@ class ParticleStore {
 
   [[nodiscard]] float* pool() { return now_.data(); }
   [[nodiscard]] float* tube() { return now_.data(); }
+  /// Floats of the tube with its padding, a multiple of 16.
+  [[nodiscard]] std::size_t tube_floats() const { return tube_floats_; }
   [[nodiscard]] float* tube_previous() { return previous_.data(); }
   /// Plane 0..2: x, y, z; 3: inverse mass.
   [[nodiscard]] float* plane(int axis) { return now_.data() + tube_floats_ + std::size_t(axis) * layout_.plane(); }
@@ -119,6 +122,8 @@ class ParticleStore {
   /// Positions of all particles in scene order, x y z interleaved; 3 * particle_count() floats.
   void CopyPositions(std::span<float> xyz) const { Copy(now_.data(), xyz); }
   void CopyPrevious(std::span<float> xyz) const { Copy(previous_.data(), xyz); }
+  /// previous <- now.
+  void RememberPlaces() { std::copy_n(now_.data(), now_.size(), previous_.data()); }
   void SetAll(std::span<const float> xyz, std::span<const float> previous_xyz) {
     for (Index p = 0; p < particle_count_; ++p) {
       const ParticleRef at = Ref(p);

@@ -15,7 +15,11 @@ constexpr float kLeastHeight = 0.3f;
 }  // namespace
 
 PbdSolver::PbdSolver(const PhysicsParams& params, TissueModel* model, ParticleStore* particles, const Kernels& kernels)
-    : params_(params), model_(model), particles_(particles), kernels_(kernels) {}
+    : params_(params),
+      model_(model),
+      particles_(particles),
+      kernels_(kernels),
+      hinge_particles_(4 * model->hinge_particles().size()) {}
 
 GridArrays PbdSolver::Grid() const {
   const GridLayout& layout = particles_->layout();
@@ -28,26 +32,32 @@ GridArrays PbdSolver::Grid() const {
           static_cast<int>(layout.slots)};
 }
 
+void PbdSolver::Bend() {
+  const std::vector<ParticleRef>& refs = model_->hinge_particles();
+  float* pool = particles_->pool();
+  float* copy = hinge_particles_.data();
+  for (const ParticleRef at : refs) {
+    for (std::size_t axis = 0; axis < 4; ++axis) {
+      *copy++ = pool[at.base + axis * at.step];
+    }
+  }
+  kernels_.bending(hinge_particles_.data(), model_->bending().data(), model_->bending().size(), params_.k_bending);
+  copy = hinge_particles_.data();
+  for (const ParticleRef at : refs) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      pool[at.base + axis * at.step] = copy[axis];
+    }
+    copy += 4;
+  }
+}
+
 std::uint32_t PbdSolver::Predict() {
   IntegrateSettings settings{std::max(0.0f, 1.0f - params_.damping_per_s * params_.dt_s), {}, 2.0f * kMaxStep};
-  std::uint32_t resets = 0;
   for (int axis = 0; axis < 3; ++axis) {
     settings.gravity[axis] = params_.gravity[axis] * params_.dt_s * params_.dt_s;
   }
-  float* x = particles_->tube();
-  float* p = particles_->tube_previous();
-  for (Index v = 0; v < particles_->tube_count(); ++v, x += 4, p += 4) {
-    for (int axis = 0; axis < 3; ++axis) {
-      float here = x[axis];
-      if (!(std::abs(here - p[axis]) < settings.limit)) {
-        here = p[axis];
-        ++resets;
-      }
-      const float step = (here - p[axis]) * settings.keep + settings.gravity[axis];
-      p[axis] = here;
-      x[axis] = x[3] > 0.0f ? here + step : here;
-    }
-  }
+  const std::uint32_t resets =
+      kernels_.integrate_xyzw(particles_->tube(), particles_->tube_previous(), particles_->tube_floats(), settings);
   float* const now[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
   float* const previous[3] = {particles_->previous_plane(0), particles_->previous_plane(1),
                               particles_->previous_plane(2)};
@@ -58,7 +68,9 @@ void PbdSolver::Iterate() {
   kernels_.springs(particles_->tube(), model_->springs().data(), model_->springs().size(), params_.k_stretch_tube);
   kernels_.volumes(particles_->tube(), model_->tets().data(), model_->tets().size(), params_.k_volume);
   kernels_.grid_stretch(Grid(), params_.k_stretch_membrane);
-  kernels_.bending(particles_->pool(), model_->bending().data(), model_->bending().size(), params_.k_bending);
+  if (!model_->bending().empty()) {
+    Bend();
+  }
   const BindingStiffness binding{params_.k_binding, std::min(1.0f, kCompressionOverTension * params_.k_binding),
                                  kLeastHeight};
   kernels_.bindings(particles_->pool(), model_->bindings().data(), model_->bindings().size(), binding);
@@ -69,24 +81,11 @@ FinishResult PbdSolver::Finish() {
   float* const now[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
   const float* const previous[3] = {particles_->previous_plane(0), particles_->previous_plane(1),
                                     particles_->previous_plane(2)};
-  FinishResult result = kernels_.finish(now, previous, particles_->plane(3), particles_->layout().plane(), kLimitSq);
-  float* x = particles_->tube();
-  const float* p = particles_->tube_previous();
-  for (Index v = 0; v < particles_->tube_count(); ++v, x += 4, p += 4) {
-    const float dx = x[0] - p[0], dy = x[1] - p[1], dz = x[2] - p[2];
-    const float moved = dx * dx + dy * dy + dz * dz;
-    if (!(moved < kLimitSq)) {
-      const bool finite = moved < 3e38f;
-      const float part = finite ? std::sqrt(kLimitSq / moved) : 0.0f;
-      x[0] = p[0] + (finite ? dx : 0.0f) * part;
-      x[1] = p[1] + (finite ? dy : 0.0f) * part;
-      x[2] = p[2] + (finite ? dz : 0.0f) * part;
-      result.resets += x[3] > 0.0f;
-    } else {
-      result.max_step_sq = std::max(result.max_step_sq, moved);
-    }
-  }
-  return result;
+  const FinishResult grid =
+      kernels_.finish(now, previous, particles_->plane(3), particles_->layout().plane(), kLimitSq);
+  const FinishResult tube =
+      kernels_.finish_xyzw(particles_->tube(), particles_->tube_previous(), particles_->tube_floats(), kLimitSq);
+  return {std::max(grid.max_step_sq, tube.max_step_sq), grid.resets + tube.resets};
 }
 
 void PbdSolver::Stop() {

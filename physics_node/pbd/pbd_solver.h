@@ -25,6 +25,8 @@ class PbdSolver {
   std::uint32_t Predict();
   /// One Gauss-Seidel iteration: tube springs, volumes, membrane stretch, bending, bindings.
   void Iterate();
+  /// The bending of Iterate, on a compact copy of the particles that hinges use.
+  void Bend();
   /// Quarantine: what is not finite goes back to where it was; nothing goes further than kMaxStep.
   FinishResult Finish();
   /// Takes all velocities away.
@@ -41,6 +43,7 @@ class PbdSolver {
   TissueModel* model_;
   ParticleStore* particles_;
   const Kernels& kernels_;
+  FloatArray hinge_particles_;  ///< xyzw copies of TissueModel::hinge_particles.
 };
 
 }  // namespace fulcrum::physics

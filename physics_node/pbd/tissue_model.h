@@ -37,6 +37,8 @@ class TissueModel {
   [[nodiscard]] const std::vector<SpringBatch>& springs() const { return springs_; }
   [[nodiscard]] const std::vector<TetBatch>& tets() const { return tets_; }
   [[nodiscard]] const std::vector<BendingBatch>& bending() const { return bending_; }
+  /// The particles that BendingBatch::v indexes; the last one pads.
+  [[nodiscard]] const std::vector<ParticleRef>& hinge_particles() const { return hinge_particles_; }
   [[nodiscard]] const std::vector<BindingBatch>& bindings() const { return bindings_; }
   /// Plane of rest lengths, laid out as the membrane is.
   [[nodiscard]] const float* rest(int direction) const { return rest_[direction].data(); }
@@ -79,6 +81,7 @@ class TissueModel {
   std::vector<SpringBatch> springs_;
   std::vector<TetBatch> tets_;
   std::vector<BendingBatch> bending_;
+  std::vector<ParticleRef> hinge_particles_;
   std::vector<BindingBatch> bindings_;
   std::array<FloatArray, 3> rest_;
 

@@ -1,4 +1,4 @@
-// The vector kernels do what the plain constraints do, on both instruction sets with the same bits.
+// The vector kernels do what the plain constraints do, on all instruction sets with the same bits.
 #include "physics_node/pbd/kernels.h"
 
 #include <gtest/gtest.h>
@@ -11,6 +11,7 @@
 #include "physics_node/pbd/pbd_solver.h"
 #include "physics_node/pbd/tissue_model.h"
 #include "services/scene/build.h"
+#include "tests/unit/physics/kernels_scalar.h"
 #include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics {
@@ -212,7 +213,9 @@ TEST(Kernels, SpringsVolumesBendingBindingsMatchThePlainConstraints) {
       ProjectPlain<4>(&plain.particles, hinge.v, k,
                       [&](const auto& x) { return Bending<double>(x, hinge.rest_angle); });
     }
-    kernels.bending(vector.particles.pool(), vector.model.bending().data(), vector.model.bending().size(), k);
+    PhysicsParams params = view.physics;
+    params.k_bending = k;
+    PbdSolver(params, &vector.model, &vector.particles).Bend();
     EXPECT_LT(LargestDifference(Positions(plain.particles), Positions(vector.particles)), 10 * kTolerance);
   }
   {
@@ -277,31 +280,65 @@ TEST(Kernels, AtRestNothingMoves) {
   EXPECT_LT(LargestDifference(Positions(rest.particles), Positions(body.particles)), 2e-6f);
 }
 
-TEST(Kernels, BaselineAndAvx2GiveTheSameBits) {
-  if (!HasAvx2()) {
-    GTEST_SKIP() << "this CPU has no AVX2";
-  }
-  const scene::SceneData data = scene::BuildProcedural(scene::Small());
-  Body a(data.View()), b(data.View());
-  Shake(&a.particles, 0.002f, 9);
-  Shake(&b.particles, 0.002f, 9);
-  PhysicsParams params = data.View().physics;
-  params.gravity = Vec3f(0.3f, -0.2f, -9.81f);
-  PbdSolver narrow(params, &a.model, &a.particles, BaselineKernels());
-  PbdSolver wide(params, &b.model, &b.particles, Avx2Kernels());
-  for (int i = 0; i < 50; ++i) {
-    for (PbdSolver* solver : {&narrow, &wide}) {
-      solver->Predict();
-      solver->Iterate();
-      solver->Iterate();
+/// The kernels of each instruction set against the plain loops, on a step of everything.
+class SameBits : public testing::TestWithParam<const char*> {
+ protected:
+  [[nodiscard]] static const Kernels* Find(const std::string& name) {
+    if (name == "avx2") {
+      return HasAvx2() ? &Avx2Kernels() : nullptr;
     }
-    const FinishResult x = narrow.Finish(), y = wide.Finish();
-    EXPECT_EQ(x.max_step_sq, y.max_step_sq);
-    EXPECT_EQ(x.resets, y.resets);
-    ASSERT_EQ(std::memcmp(a.particles.raw().data(), b.particles.raw().data(), a.particles.raw().size_bytes()), 0)
-        << "step " << i;
+    if (name == "avx512") {
+      return HasAvx512() ? &Avx512Kernels() : nullptr;
+    }
+    return &BaselineKernels();
+  }
+  static void Compare(const SceneView& view, const Kernels& kernels) {
+    Body a(view), b(view);
+    Shake(&a.particles, 0.002f, 9);
+    Shake(&b.particles, 0.002f, 9);
+    // A thrown and a damaged particle, so that the rare branches run too.
+    for (Body* body : {&a, &b}) {
+      const ParticleRef thrown = body->particles.Ref(view.membrane.first + view.membrane.cols * 2 + 2);
+      body->particles.Set(thrown, Vec3f(0.5f, 0, 0));
+      body->particles.SetPrevious(thrown, Vec3f(0.48f, 0, 0));
+      if (view.tube_vertex_count > 0) {
+        body->particles.Set({4 * 61, 1}, Vec3f(0, std::numeric_limits<float>::quiet_NaN(), 0));
+      }
+    }
+    PhysicsParams params = view.physics;
+    params.gravity = Vec3f(0.3f, -0.2f, -9.81f);
+    PbdSolver oracle(params, &a.model, &a.particles, ScalarKernels());
+    PbdSolver vector(params, &b.model, &b.particles, kernels);
+    for (int i = 0; i < 30; ++i) {
+      EXPECT_EQ(oracle.Predict(), vector.Predict());
+      for (int k = 0; k < 2; ++k) {
+        oracle.Iterate();
+        vector.Iterate();
+      }
+      const FinishResult x = oracle.Finish(), y = vector.Finish();
+      EXPECT_EQ(x.max_step_sq, y.max_step_sq);
+      EXPECT_EQ(x.resets, y.resets);
+      ASSERT_EQ(std::memcmp(a.particles.raw().data(), b.particles.raw().data(), a.particles.raw().size_bytes()), 0)
+          << kernels.name << ", step " << i;
+    }
+  }
+};
+
+TEST_P(SameBits, AsThePlainLoops) {
+  const Kernels* kernels = Find(GetParam());
+  if (kernels == nullptr) {
+    GTEST_SKIP() << "this CPU has no " << GetParam();
+  }
+  const scene::SceneData organ = scene::BuildProcedural(scene::Small());
+  Compare(organ.View(), *kernels);
+  // One slot a row; an odd and an even number of them.
+  for (const std::uint32_t cols : {7u, 23u, 30u, 64u}) {
+    const scene::SceneData sheet = SheetScene(9, cols);
+    Compare(sheet.View(), *kernels);
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(InstructionSets, SameBits, testing::Values("baseline", "avx2", "avx512"));
 
 TEST(Quarantine, WhatIsNotFiniteGoesBackAndNothingSpreads) {
   const scene::SceneData data = scene::BuildProcedural(scene::Small());

@@ -1,0 +1,167 @@
+// What the kernels are written in: F lanes of floats, F = F8 for one batch of eight or F16 for two batches at a time.
+// Included only by kernels_impl.h.
+#pragma once
+
+#if defined(FULCRUM_KERNEL_SCALAR)
+#include "physics_node/pbd/float8_scalar.h"
+#elif defined(__AVX512F__)
+#include "physics_node/pbd/float16.h"
+#else
+#include "physics_node/pbd/float8.h"
+#endif
+
+namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
+
+/// Loads and stores lane arrays: those of a second batch stand `next` floats further.
+template <class F>
+struct Batches;
+
+template <>
+struct Batches<F8> {
+  static F8 Load(const float* lanes, std::size_t) { return F8::Load(lanes); }
+  static void Store(F8 v, float* lanes, std::size_t) { v.Store(lanes); }
+  static F8 Gather(const float* pool, const std::uint32_t* index, const std::uint32_t* step, std::uint32_t plane,
+                   std::size_t) {
+    return FULCRUM_KERNEL_NAMESPACE::Gather(pool, index, step, plane);
+  }
+  template <std::size_t scale>
+  static F8 LoadRow(const float* rows, const std::uint32_t* index, int i, std::size_t) {
+    return FULCRUM_KERNEL_NAMESPACE::LoadRow<scale>(rows, index, i);
+  }
+  template <std::size_t scale>
+  static void StoreRow(F8 row, float* rows, const std::uint32_t* index, int i, std::size_t) {
+    FULCRUM_KERNEL_NAMESPACE::StoreRow<scale>(row, rows, index, i);
+  }
+};
+
+#if defined(__AVX512F__) && !defined(FULCRUM_KERNEL_SCALAR)
+template <>
+struct Batches<F16> {
+  static F16 Load(const float* lanes, std::size_t next) { return F16::Halves(F8::Load(lanes), F8::Load(lanes + next)); }
+  static void Store(F16 v, float* lanes, std::size_t next) {
+    v.lo().Store(lanes);
+    v.hi().Store(lanes + next);
+  }
+  static F16 Gather(const float* pool, const std::uint32_t* index, const std::uint32_t* step, std::uint32_t plane,
+                    std::size_t next) {
+    return F16::Halves(FULCRUM_KERNEL_NAMESPACE::Gather(pool, index, step, plane),
+                       FULCRUM_KERNEL_NAMESPACE::Gather(pool, index + next, step + next, plane));
+  }
+  template <std::size_t scale>
+  static F16 LoadRow(const float* rows, const std::uint32_t* index, int i, std::size_t next) {
+    return F16::Halves(FULCRUM_KERNEL_NAMESPACE::LoadRow<scale>(rows, index, i),
+                       FULCRUM_KERNEL_NAMESPACE::LoadRow<scale>(rows, index + next, i));
+  }
+  template <std::size_t scale>
+  static void StoreRow(F16 row, float* rows, const std::uint32_t* index, int i, std::size_t next) {
+    FULCRUM_KERNEL_NAMESPACE::StoreRow<scale>(row.lo(), rows, index, i);
+    FULCRUM_KERNEL_NAMESPACE::StoreRow<scale>(row.hi(), rows, index + next, i);
+  }
+};
+using Widest = F16;
+#else
+using Widest = F8;
+#endif
+
+template <class F>
+struct V {
+  F x, y, z;
+};
+using V8 = V<F8>;
+template <class F>
+inline V<F> operator+(V<F> a, V<F> b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <class F>
+inline V<F> operator-(V<F> a, V<F> b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <class F>
+inline V<F> operator*(V<F> a, F s) {
+  return {a.x * s, a.y * s, a.z * s};
+}
+template <class F>
+inline F Dot(V<F> a, V<F> b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <class F>
+inline V<F> Cross(V<F> a, V<F> b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+/// Particles in lanes.
+template <class F>
+struct Particles {
+  V<F> p;
+  F w;
+};
+/// Of xyzw particles; the one of lane i stands at rows + scale * index[i].
+template <class F, std::size_t scale>
+inline Particles<F> GatherXyzw(const float* rows, const std::uint32_t* index, std::size_t next) {
+  F x = Batches<F>::template LoadRow<scale>(rows, index, 0, next);
+  F y = Batches<F>::template LoadRow<scale>(rows, index, 1, next);
+  F z = Batches<F>::template LoadRow<scale>(rows, index, 2, next);
+  F w = Batches<F>::template LoadRow<scale>(rows, index, 3, next);
+  Transpose(&x, &y, &z, &w);
+  return {{x, y, z}, w};
+}
+template <class F, std::size_t scale>
+inline void ScatterXyzw(const Particles<F>& q, float* rows, const std::uint32_t* index, std::size_t next) {
+  F r[4] = {q.p.x, q.p.y, q.p.z, q.w};
+  Transpose(&r[0], &r[1], &r[2], &r[3]);
+  for (int i = 0; i < 4; ++i) {
+    Batches<F>::template StoreRow<scale>(r[i], rows, index, i, next);
+  }
+}
+
+/// Of particles anywhere in the pool.
+template <class F>
+inline Particles<F> GatherPool(const float* pool, const std::uint32_t* base, const std::uint32_t* step,
+                               std::size_t next) {
+  return {{Batches<F>::Gather(pool, base, step, 0, next), Batches<F>::Gather(pool, base, step, 1, next),
+           Batches<F>::Gather(pool, base, step, 2, next)},
+          Batches<F>::Gather(pool, base, step, 3, next)};
+}
+template <class F>
+inline void ScatterPool(const V<F>& p, float* pool, const std::uint32_t* base, const std::uint32_t* step,
+                        std::size_t next) {
+  constexpr int kCount = 8 * F::kBatches;
+  alignas(64) float x[kCount], y[kCount], z[kCount];
+  Batches<F>::Store(p.x, x, 8);
+  Batches<F>::Store(p.y, y, 8);
+  Batches<F>::Store(p.z, z, 8);
+  for (int batch = 0; batch < F::kBatches; ++batch, base += next, step += next) {
+    for (int i = 0; i < 8; ++i) {
+      float* at = pool + base[i];
+      const std::size_t s = step[i];
+      at[0] = x[8 * batch + i];
+      at[s] = y[8 * batch + i];
+      at[2 * s] = z[8 * batch + i];
+    }
+  }
+}
+
+/// atan of t in [0, 1], |error| < 3e-7 rad: reduced to |u| <= tan(pi/8) by (t - 1)/(t + 1), then an odd polynomial.
+template <class F>
+inline F AtanUnit(F t) {
+  const F one = F::All(1.0f);
+  const auto big = t > F::All(0.41421356f);
+  const F u = Select(big, (t - one) / (t + one), t);
+  const F s = u * u;
+  const F poly =
+      ((F::All(0.0805374449f) * s - F::All(0.138776856f)) * s + F::All(0.199777106f)) * s - F::All(0.333329491f);
+  return Select(big, F::All(0.78539816f), F::All(0.0f)) + (u + u * s * poly);
+}
+/// Angle of (cosine, sine) scaled by any positive factor, in (-pi, pi].
+template <class F>
+inline F Atan2(F sine, F cosine) {
+  const F as = Abs(sine), ac = Abs(cosine);
+  const auto steep = as > ac;
+  const F ratio = Min(as, ac) / Max(Max(as, ac), F::All(1e-37f));
+  F a = AtanUnit(ratio);
+  a = Select(steep, F::All(1.57079633f) - a, a);
+  a = Select(cosine < F::All(0.0f), F::All(3.14159265f) - a, a);
+  return a ^ SignOf(sine);
+}
+
+}  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE
