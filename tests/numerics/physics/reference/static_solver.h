@@ -1,0 +1,23 @@
+// Static equilibrium by Newton's method: conjugate gradients on the true Hessian, preconditioned by a sparse Cholesky
+// factor that is kept while it serves.
+#pragma once
+
+#include <vector>
+
+#include "tests/numerics/physics/reference/elastic_energy.h"
+
+namespace fulcrum::physics::reference {
+
+struct StaticResult {
+  Points x;
+  double residual_N = 0;  ///< Largest component of the force that is left on a free particle.
+  int iterations = 0;
+};
+
+/// Minimises the energy plus -sum load . x over the particles with mass that are not `held`, from `start`. Line
+/// search on the energy. Ends at `tolerance_N`, or where rounding allows no better. `load` may be empty.
+/// Throws std::runtime_error when it stands still above `tolerance_N` x 1e4.
+[[nodiscard]] StaticResult SolveStatic(const ElasticEnergy& energy, const Points& start, const std::vector<bool>& held,
+                                       const Points& load, double tolerance_N = 1e-8);
+
+}  // namespace fulcrum::physics::reference
