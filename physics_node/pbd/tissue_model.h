@@ -39,6 +39,10 @@ class TissueModel {
   [[nodiscard]] const std::vector<BendingBatch>& bending() const { return bending_; }
   /// The particles that BendingBatch::v indexes; the last one pads.
   [[nodiscard]] const std::vector<ParticleRef>& hinge_particles() const { return hinge_particles_; }
+  /// Of constraint `i` of the scene's bending: the sheet it spans is whole.
+  [[nodiscard]] bool HingeWhole(Index i) const {
+    return bending_[hinge_slot_[i] / kLanes].active[hinge_slot_[i] % kLanes] > 0.0f;
+  }
   [[nodiscard]] const std::vector<BindingBatch>& bindings() const { return bindings_; }
   /// Plane of rest lengths, laid out as the membrane is.
   [[nodiscard]] const float* rest(int direction) const { return rest_[direction].data(); }
@@ -82,6 +86,7 @@ class TissueModel {
   std::vector<TetBatch> tets_;
   std::vector<BendingBatch> bending_;
   std::vector<ParticleRef> hinge_particles_;
+  std::vector<Index> hinge_slot_;  ///< By constraint of the scene: batch * 8 + lane.
   std::vector<BindingBatch> bindings_;
   std::array<FloatArray, 3> rest_;
 

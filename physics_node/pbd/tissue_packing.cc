@@ -158,6 +158,7 @@ void TissueModel::PackBending(const SceneView& scene, const ParticleStore& parti
       }
     }
   }
+  hinge_slot_.assign(scene.bending.size(), 0);
   BendingBatch no_hinges{};
   for (auto& v : no_hinges.v) {
     std::fill_n(v, kLanes, static_cast<Index>(hinge_particles_.size()));
@@ -173,6 +174,7 @@ void TissueModel::PackBending(const SceneView& scene, const ParticleStore& parti
       const BendingConstraint& constraint = scene.bending[i];
       BendingBatch& batch = bending_[at];
       const auto slot = static_cast<Index>(at * kLanes + lane);
+      hinge_slot_[i] = slot;
       Patch patch{kNoIndex, 0, kNoIndex, 0};
       bool on_membrane = true;
       for (int j = 0; j < 4; ++j) {

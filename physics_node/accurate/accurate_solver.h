@@ -1,0 +1,114 @@
+// Two-level linearised implicit small steps (TLI). Each substep is one backward Euler step of ElasticModel, linearised
+// once and solved by a few iterations of conjugate gradients. The preconditioner has two levels: 3 x 3 blocks of the
+// diagonal, and a few dozen coarse nodes (coarse_space.h) that carry what a sweep over neighbours cannot. See
+// DESIGN.md.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "physics_node/accurate/coarse_space.h"
+#include "physics_node/accurate/elements.h"
+#include "physics_node/accurate/kernels.h"
+#include "physics_node/energy/elastic_model.h"
+#include "physics_node/pbd/particle_store.h"
+#include "physics_node/pbd/tissue_model.h"
+
+namespace fulcrum::physics::accurate {
+
+/// A particle that a tool or a test holds; its inverse mass in the store is 0.
+struct HeldPlace {
+  ParticleRef at;
+  Vec3f place = Vec3f::Zero();  ///< At the end of the substep [m].
+};
+
+struct SubstepReport {
+  float largest_correction_m = 0;  ///< What the solve added to the inertial guess.
+  float largest_speed_m_s = 0;
+  std::uint32_t resets = 0;  ///< Particles put back because they were not finite.
+  bool searched = false;     ///< The energy was looked at.
+};
+
+/// Substeps and iterations of a preset.
+struct Effort {
+  int substeps = 2;
+  int iterations = 2;
+};
+[[nodiscard]] Effort EffortOf(PhysicsPreset preset);
+
+class AccurateSolver {
+ public:
+  AccurateSolver(const SceneView& scene, const ElasticModel& model, const TissueModel& tissue, ParticleStore* particles,
+                 const Kernels& kernels = BestKernels());
+
+  /// Takes over what cutting and shrinking have done to `tissue`. In place; nothing is factored again.
+  void Follow(const TissueModel& tissue);
+
+  /// Once a step, before its substeps of `h` seconds: the blocks of the organ, a part of the coarse matrix.
+  void BeginStep();
+  SubstepReport Substep(float h, int iterations, std::span<const HeldPlace> held, std::span<ContactRow> contacts);
+
+  /// Elastic force on a particle at the end of the last substep [N]; of a held one, what the tissue pulls at it with.
+  [[nodiscard]] Vec3f ForceOn(ParticleRef at) const;
+  [[nodiscard]] Vec3f Velocity(ParticleRef at) const;
+  void Stop();
+  /// Velocities from two states a step apart, for a restart.
+  void SetVelocity(ParticleRef at, const Vec3f& v);
+
+ private:
+  static constexpr int kChunkRows = 16;
+
+  [[nodiscard]] Sheet MakeSheet() const;
+  [[nodiscard]] SheetMatrix MakeMatrix();
+  [[nodiscard]] Organ MakeOrgan() const;
+  [[nodiscard]] SheetLinearise At(const FloatArray& place, FloatArray* residual);
+  [[nodiscard]] Inertia MakeInertia(float h) const;
+  void PackSheet(const ElasticModel& model);
+  void PackOrgan(const ElasticModel& model, std::uint32_t tube_count);
+  float Guess(float h);
+  void PutHeld(std::span<const HeldPlace> held);
+  [[nodiscard]] double EnergyAt(const FloatArray& place, const Inertia& inertia, std::span<const ContactRow> contacts);
+  void Linearise(const Inertia& inertia, std::span<const ContactRow> contacts);
+  double Precondition();
+  double Apply(float inertia);
+  void Solve(float inertia, int iterations);
+  void LimitCorrection(float largest);
+  SubstepReport Finish(float h);
+  [[nodiscard]] float LargestCorrection() const;
+  template <class Body>
+  void ForChunks(const Body& body) const;
+
+  const Kernels& kernels_;
+  ParticleStore* particles_;
+  std::uint32_t tube_count_;
+  int rows_, slots_;
+  std::size_t plane_, tube_floats_;
+  float damping_, stiffening_, rest_scale_;
+  Vec3f gravity_;
+
+  // The model, packed.
+  std::array<FloatArray, 3> inverse_rest_, axial_, axial_uncut_;
+  FloatArray sheet_mass_;
+  std::vector<std::uint32_t> start_, vertex_, patch_start_, patch_;
+  FloatArray gradient_, patch_gradient_, volume_, organ_mass_, spread_;
+  float mu_ = 0, lambda_ = 0;
+  Elements elements_;
+  CoarseSpace coarse_;
+  FloatArray base_extra_, extra_;  ///< Membrane plane, then tube: stiffness of elements on the diagonal.
+  std::vector<std::uint32_t> extra_changed_;
+
+  // The linearisation.
+  std::array<std::array<FloatArray, 3>, 3> m_;
+  std::array<FloatArray, 3> kt_;
+  std::array<FloatArray, 6> block_;
+  FloatArray organ_c_, organ_f_, organ_stress_, organ_block_;
+
+  // Fields: velocity, place of the linearisation, residual, z = M^-1 r, direction p, q = A p, correction d.
+  FloatArray velocity_, place_, residual_, z_, p_, q_, d_;
+  FloatArray carry_, row_sums_;
+  std::vector<double> partial_;
+  bool organ_blocks_due_ = true, refresh_due_ = false;
+};
+
+}  // namespace fulcrum::physics::accurate

@@ -1,0 +1,333 @@
+#include "physics_node/accurate/coarse_space.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace fulcrum::physics::accurate {
+namespace {
+
+constexpr int kSheetRows = 9, kSheetColumns = 4;
+constexpr double kLattice = 0.030;  ///< [m]
+
+/// Part of the mean diagonal that is added to it: nodes of little support must not make the matrix singular.
+constexpr float kRegularisation = 1e-5f;
+
+/// Coarse node positions 0 .. count-1 spread evenly over 0 .. fine-1.
+template <class Place>
+std::vector<Place> Spread(int fine, int count) {
+  std::vector<Place> place;
+  for (int i = 0; i < fine; ++i) {
+    const double at = fine > 1 ? static_cast<double>(i) * (count - 1) / (fine - 1) : 0.0;
+    const int cell = std::clamp(static_cast<int>(at), 0, std::max(count - 2, 0));
+    place.push_back({cell, static_cast<float>(at - cell)});
+  }
+  return place;
+}
+
+}  // namespace
+
+CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
+    : rows_(static_cast<int>(scene.membrane.rows)),
+      stride_(static_cast<int>(particles.layout().stride)),
+      cols_(scene.membrane.cols),
+      layout_(particles.layout()) {
+  columns_ = std::min(kSheetColumns, static_cast<int>(cols_));
+  coarse_rows_ = std::min(kSheetRows, rows_);
+  row_place_ = Spread<RowPlace>(rows_, coarse_rows_);
+  column_place_ = Spread<RowPlace>(static_cast<int>(cols_), columns_);
+  column_weights_ = FloatArray(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(stride_));
+  for (std::uint32_t c = 0; c < cols_; ++c) {
+    const RowPlace& at = column_place_[c];
+    column_weights_[static_cast<std::size_t>(at.cell * stride_) + layout_.Offset(0, c)] += 1.0f - at.fraction;
+    if (at.cell + 1 < columns_) {
+      column_weights_[static_cast<std::size_t>((at.cell + 1) * stride_) + layout_.Offset(0, c)] += at.fraction;
+    }
+  }
+  nodes_ = columns_ * coarse_rows_;
+  // The lattice over the organ; only nodes that carry something get a number.
+  std::map<std::array<int, 3>, std::uint16_t> lattice;
+  for (Index v = 0; v < scene.tube_vertex_count; ++v) {
+    const Vec3d at = model.rest_position[v] / kLattice;
+    Weights8 weights{};
+    const Vec3d low = at.array().floor();
+    for (int corner = 0; corner < 8; ++corner) {
+      std::array<int, 3> key;
+      double weight = 1;
+      for (int axis = 0; axis < 3; ++axis) {
+        const int up = (corner >> axis) & 1;
+        const double fraction = at[axis] - low[axis];
+        key[static_cast<std::size_t>(axis)] = static_cast<int>(low[axis]) + up;
+        weight *= up ? fraction : 1 - fraction;
+      }
+      const auto [it, fresh] = lattice.try_emplace(key, static_cast<std::uint16_t>(nodes_));
+      nodes_ += fresh ? 1 : 0;
+      weights.node[static_cast<std::size_t>(corner)] = it->second;
+      weights.weight[static_cast<std::size_t>(corner)] = model.fixed(v) ? 0.0f : static_cast<float>(weight);
+    }
+    tube_weights_.push_back(weights);
+  }
+  const Eigen::Index n = 3 * nodes_;
+  constant_ = Eigen::MatrixXf::Zero(n, n);
+  tube_mass_ = Eigen::MatrixXf::Zero(n, n);
+  building_ = Eigen::MatrixXf::Zero(n, n);
+  factor_ = Eigen::LLT<Eigen::MatrixXf>(n);
+  right_ = solution_ = Eigen::VectorXf::Zero(n);
+  row_values_.assign(static_cast<std::size_t>(rows_ * columns_ * 3), 0.0f);
+  AddTube(model);
+  AddBindings(model, particles);
+}
+
+void CoarseSpace::AddTube(const ElasticModel& model) {
+  for (Index v = 0; v < tube_weights_.size(); ++v) {
+    const Weights8& w = tube_weights_[v];
+    for (std::size_t i = 0; i < 8; ++i) {
+      for (std::size_t j = 0; j < 8; ++j) {
+        const float m = static_cast<float>(model.mass[v]) * w.weight[i] * w.weight[j];
+        for (int axis = 0; axis < 3; ++axis) {
+          tube_mass_(3 * w.node[i] + axis, 3 * w.node[j] + axis) += m;
+        }
+      }
+    }
+  }
+  // At rest V dP = V (mu ((1 - a) dF + dF^T) + lambda_Lame tr(dF) I), and the edges.
+  const double mu = model.mu_Pa, lambda = model.lambda_Pa;
+  std::vector<std::pair<int, Vec3d>> gradients;
+  for (const ElasticPatch& patch : model.patches) {
+    gradients.clear();
+    for (Index i = patch.first_link; i < patch.first_link + patch.link_count; ++i) {
+      const ElasticPatchLink& link = model.patch_links[i];
+      const Weights8& w = tube_weights_[link.v];
+      for (std::size_t k = 0; k < 8; ++k) {
+        const auto at = std::find_if(gradients.begin(), gradients.end(),
+                                     [&](const auto& entry) { return entry.first == w.node[k]; });
+        if (at == gradients.end()) {
+          gradients.emplace_back(w.node[k], link.gradient * static_cast<double>(w.weight[k]));
+        } else {
+          at->second += link.gradient * static_cast<double>(w.weight[k]);
+        }
+      }
+    }
+    for (const auto& [a, ga] : gradients) {
+      for (const auto& [b, gb] : gradients) {
+        const Mat3d block = patch.volume * ((1 - kPatchVariance) * mu * ga.dot(gb) * Mat3d::Identity() +
+                                            mu * gb * ga.transpose() + lambda * ga * gb.transpose());
+        constant_.block<3, 3>(3 * a, 3 * b) += block.cast<float>();
+      }
+    }
+  }
+  for (const ElasticShearLink& link : model.shear_links) {
+    const Weights8 &wa = tube_weights_[link.a], &wb = tube_weights_[link.b];
+    std::vector<std::pair<int, double>> weights;
+    for (std::size_t k = 0; k < 8; ++k) {
+      weights.emplace_back(wa.node[k], static_cast<double>(wa.weight[k]));
+      weights.emplace_back(wb.node[k], -static_cast<double>(wb.weight[k]));
+    }
+    for (const auto& [a, va] : weights) {
+      for (const auto& [b, vb] : weights) {
+        const auto k = static_cast<float>(link.stiffness * va * vb);
+        for (int axis = 0; axis < 3; ++axis) {
+          constant_(3 * a + axis, 3 * b + axis) += k;
+        }
+      }
+    }
+  }
+}
+
+void CoarseSpace::AddBindings(const ElasticModel& model, const ParticleStore& particles) {
+  for (const ElasticBinding& binding : model.bindings) {
+    std::vector<std::pair<int, double>> weights;
+    const Index node = binding.membrane - particles.tube_count();
+    const RowPlace& row = row_place_[node / cols_];
+    const RowPlace& column = column_place_[node % cols_];
+    if (!model.fixed(binding.membrane)) {
+      for (int i = 0; i < 2; ++i) {
+        for (int j = 0; j < 2; ++j) {
+          const double w =
+              static_cast<double>((i ? row.fraction : 1 - row.fraction) * (j ? column.fraction : 1 - column.fraction));
+          if (w != 0) {
+            weights.emplace_back((row.cell + i) * columns_ + column.cell + j, w);
+          }
+        }
+      }
+    }
+    Vec3d direction = model.rest_position[binding.membrane];
+    for (std::size_t i = 0; i < 3; ++i) {
+      direction -= binding.barycentric[i] * model.rest_position[binding.surface[i]];
+      const Weights8& w = tube_weights_[binding.surface[i]];
+      for (std::size_t k = 0; k < 8; ++k) {
+        weights.emplace_back(w.node[k], -binding.barycentric[i] * static_cast<double>(w.weight[k]));
+      }
+    }
+    direction.normalize();
+    const Mat3d stiffness = binding.stiffness * direction * direction.transpose();
+    for (const auto& [a, wa] : weights) {
+      for (const auto& [b, wb] : weights) {
+        constant_.block<3, 3>(3 * a, 3 * b) += (wa * wb * stiffness).cast<float>();
+      }
+    }
+  }
+}
+
+void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int row) {
+  const std::size_t stride = static_cast<std::size_t>(stride_);
+  const auto value = [&](const float* plane, std::uint32_t col) {
+    return plane[static_cast<std::size_t>(row) * stride + layout_.Offset(0, col)];
+  };
+  // An edge leads to the next row at most, and coarse rows stand on rows, so both its ends lie in one coarse cell.
+  const RowPlace here = row_place_[static_cast<std::size_t>(row)];
+  const float next_row = row + 1 < rows_ && coarse_rows_ > 1
+                             ? here.fraction + static_cast<float>(coarse_rows_ - 1) / static_cast<float>(rows_ - 1)
+                             : here.fraction;
+  const float next_column = columns_ > 1 ? static_cast<float>(columns_ - 1) / static_cast<float>(cols_ - 1) : 0.0f;
+  std::array<Eigen::Index, 4> node;
+  std::array<std::array<std::array<float, 6>, 4>, 4> sum{};
+  int cell = 0;
+  const auto flush = [&] {
+    for (std::size_t a = 0; a < 4; ++a) {
+      for (std::size_t b = 0; b < 4; ++b) {
+        const std::array<float, 6>& k = a <= b ? sum[a][b] : sum[b][a];
+        Eigen::Matrix3f block;
+        block << k[0], k[3], k[4], k[3], k[1], k[5], k[4], k[5], k[2];
+        if (node[a] < 0 || node[b] < 0) {
+          continue;
+        }
+        building_.block<3, 3>(3 * node[a], 3 * node[b]) += block;
+      }
+    }
+    sum = {};
+  };
+  const auto enter = [&](int new_cell) {
+    cell = new_cell;
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < 2; ++j) {
+        const bool exists = here.cell + i < coarse_rows_ && cell + j < columns_;
+        node[static_cast<std::size_t>(2 * i + j)] = exists ? (here.cell + i) * columns_ + cell + j : -1;
+      }
+    }
+  };
+  const auto shape = [](float row_fraction, float column_fraction) {
+    return std::array<float, 4>{(1 - row_fraction) * (1 - column_fraction), (1 - row_fraction) * column_fraction,
+                                row_fraction * (1 - column_fraction), row_fraction * column_fraction};
+  };
+  const auto add = [&](const std::array<float, 4>& w, float k, const float* m) {
+    std::array<float, 6> element{k, k, k, 0, 0, 0};
+    if (m) {
+      element = {k + m[0] * m[0], k + m[1] * m[1], k + m[2] * m[2], m[0] * m[1], m[0] * m[2], m[1] * m[2]};
+    }
+    for (std::size_t a = 0; a < 4; ++a) {
+      for (std::size_t b = a; b < 4; ++b) {
+        const float ww = w[a] * w[b];
+        for (std::size_t i = 0; i < 6; ++i) {
+          sum[a][b][i] += ww * element[i];
+        }
+      }
+    }
+  };
+  enter(0);
+  for (std::uint32_t col = 0; col < cols_; ++col) {
+    const RowPlace at = column_place_[col];
+    if (at.cell != cell) {
+      flush();
+      enter(at.cell);
+    }
+    const bool moves = value(sheet.w, col) > 0.0f;
+    std::array<float, 4> own{};
+    if (moves) {
+      own = shape(here.fraction, at.fraction);
+      add(own, value(sheet.mass, col) * inertia, nullptr);
+    }
+    for (int d = 0; d < 3; ++d) {
+      const std::size_t down = d != 0 ? stride : 0;
+      const std::uint32_t to = d != 1 ? col + 1 : col;
+      if (to >= cols_ || (down && row + 1 >= rows_) || !(value(sheet.axial[d], col) > 0.0f)) {
+        continue;
+      }
+      std::array<float, 4> w{};
+      if (sheet.w[static_cast<std::size_t>(row) * stride + down + layout_.Offset(0, to)] > 0.0f) {
+        w = shape(down ? next_row : here.fraction, at.fraction + (d != 1 ? next_column : 0.0f));
+      }
+      for (std::size_t i = 0; i < 4; ++i) {
+        w[i] -= own[i];
+      }
+      const float m[3] = {value(matrix.m[d][0], col), value(matrix.m[d][1], col), value(matrix.m[d][2], col)};
+      add(w, value(matrix.kt[d], col), m);
+    }
+  }
+  flush();
+}
+
+void CoarseSpace::Factorise() {
+  const float mean = building_.diagonal().mean();
+  building_.diagonal().array() += kRegularisation * mean;
+  factor_.compute(building_);
+}
+
+void CoarseSpace::Refresh(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows) {
+  if (next_row_ == 0) {
+    building_ = constant_ + inertia * tube_mass_;
+  }
+  const int end = std::min(next_row_ + rows, rows_);
+  for (; next_row_ < end; ++next_row_) {
+    AddSheetRow(sheet, matrix, inertia, next_row_);
+  }
+  if (next_row_ == rows_) {
+    Factorise();
+    next_row_ = 0;
+  }
+}
+
+void CoarseSpace::Solve(const float* row_sums, const float* tube_residual, const float* tube) {
+  right_.setZero();
+  const auto width = static_cast<std::size_t>(3 * columns_);
+  for (int row = 0; row < rows_; ++row) {
+    const RowPlace& at = row_place_[static_cast<std::size_t>(row)];
+    const float* sums = row_sums + static_cast<std::size_t>(row) * width;
+    float* low = right_.data() + static_cast<std::size_t>(at.cell) * width;
+    float* high = at.cell + 1 < coarse_rows_ ? low + width : low;
+    for (std::size_t i = 0; i < width; ++i) {
+      low[i] += (1.0f - at.fraction) * sums[i];
+      high[i] += at.fraction * sums[i];
+    }
+  }
+  for (std::size_t v = 0; v < tube_weights_.size(); ++v) {
+    if (!(tube[4 * v + 3] > 0.0f)) {
+      continue;
+    }
+    const Weights8& w = tube_weights_[v];
+    for (std::size_t i = 0; i < 8; ++i) {
+      float* out = right_.data() + 3 * static_cast<std::size_t>(w.node[i]);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        out[axis] += w.weight[i] * tube_residual[4 * v + axis];
+      }
+    }
+  }
+  solution_ = right_;
+  factor_.solveInPlace(solution_);
+  for (int row = 0; row < rows_; ++row) {
+    const RowPlace& at = row_place_[static_cast<std::size_t>(row)];
+    const float* low = solution_.data() + static_cast<std::size_t>(at.cell) * width;
+    const float* high = at.cell + 1 < coarse_rows_ ? low + width : low;
+    float* out = row_values_.data() + static_cast<std::size_t>(row) * width;
+    for (std::size_t i = 0; i < width; ++i) {
+      out[i] = (1.0f - at.fraction) * low[i] + at.fraction * high[i];
+    }
+  }
+}
+
+void CoarseSpace::Prolong(const float* tube, float* tube_z) const {
+  for (std::size_t v = 0; v < tube_weights_.size(); ++v) {
+    if (!(tube[4 * v + 3] > 0.0f)) {
+      continue;
+    }
+    const Weights8& w = tube_weights_[v];
+    for (std::size_t i = 0; i < 8; ++i) {
+      const float* in = solution_.data() + 3 * static_cast<std::size_t>(w.node[i]);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        tube_z[4 * v + axis] += w.weight[i] * in[axis];
+      }
+    }
+  }
+}
+
+}  // namespace fulcrum::physics::accurate

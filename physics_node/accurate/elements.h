@@ -1,0 +1,54 @@
+// What joins particles across the two layers or far apart in one: bindings, hinges, contacts. A few thousand against
+// tens of thousands of edges, so plain loops over ParticleRefs.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "physics_node/collision/contact_row.h"
+#include "physics_node/energy/elastic_model.h"
+#include "physics_node/pbd/tissue_model.h"
+
+namespace fulcrum::physics::accurate {
+
+/// A sum over up to four particles, weight_k x_k, and what resists its change: kt I + m m^T.
+struct Element {
+  int count = 4;
+  std::array<ParticleRef, 4> at;
+  std::array<float, 4> weight{0, 0, 0, 0};
+  float kt = 0;
+  Vec3f m = Vec3f::Zero();
+  bool active = true;
+};
+
+class Elements {
+ public:
+  Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles);
+
+  /// Switches off what a cut has severed.
+  void Follow(const TissueModel& tissue);
+
+  /// Stiffness that bindings and hinges add to the diagonal, by pool offset of x.
+  [[nodiscard]] std::vector<std::pair<std::uint32_t, float>> Diagonal() const;
+  /// Linearises at `place` and adds the forces to `residual`. Contacts: at `place`, sliding measured from `start`.
+  void Linearise(const float* place, const float* start, std::span<const ContactRow> contacts, float* residual);
+  /// out += K p; returns p . K p.
+  double Apply(const float* p, float* out) const;
+  [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts) const;
+  /// Normal forces of contacts at `place`.
+  static void WriteForces(const float* place, std::span<ContactRow> contacts);
+
+  /// A contact's stiffness in its normal direction [N/m], against about 200 N/m of an edge of the membrane.
+  static constexpr float kContactStiffness = 4000.0f;
+
+ private:
+  struct BindingRest {
+    float length, stiffness;
+    Index node;
+  };
+  std::vector<Element> bindings_, hinges_, contacts_;
+  std::vector<BindingRest> binding_rest_;
+  std::vector<Vec3f> hinge_rest_;
+};
+
+}  // namespace fulcrum::physics::accurate

@@ -1,0 +1,128 @@
+// The hot loops of the accurate solver as plain functions on plain arrays, compiled once per instruction set from
+// kernels_impl.h. All give the same bits. As in pbd/kernels.h nothing here includes inline functions of its own.
+//
+// A "field" is an array of the particle pool's size and layout (pbd/particle_store.h): tube xyz_ per vertex, then the
+// membrane's planes with lane-blocked rows. Sheet kernels work on a range of rows and write nothing outside it, so that
+// any number of threads gives the same bits.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace fulcrum::physics::accurate {
+
+inline constexpr int kLanes = 8;
+
+/// The membrane. Edges of a node lead to (r, c+1), (r+1, c), (r+1, c+1), as in TopologyState.
+struct Sheet {
+  int rows;
+  int slots;                     ///< Vectors of a row.
+  const float* inverse_rest[3];  ///< [1/m]
+  const float* axial[3];         ///< Tension per strain [N]; 0: no such edge.
+  float stiffening;              ///< c of tension = axial (e + c e^3).
+  const float* w;                ///< 0: the node does not move.
+  const float* mass;             ///< [kg]
+};
+
+/// One substep's constants. Backward Euler with drag: a particle resists d with mass * inertia * d.
+struct Inertia {
+  float h;           ///< [s]
+  float inertia;     ///< (1 + damping h) / h^2 [1/s^2]
+  float gravity[3];  ///< [m/s^2]
+};
+
+/// What a linearisation of the sheet leaves behind for the products with its matrix. An edge's stiffness is
+/// kt I + m m^T, positive semi-definite by construction.
+struct SheetMatrix {
+  float* m[3][3];   ///< [direction][axis]
+  float* kt[3];     ///< [N/m]
+  float* block[6];  ///< Inverse of the diagonal blocks: xx, yy, zz, xy, xz, yz; 0 where a node does not move [m/N].
+};
+
+/// Rows of partial sums that a kernel hands to the next row; kCarry * stride floats, owned by the caller's thread.
+inline constexpr int kCarry = 18;
+
+struct SheetLinearise {
+  const float* place[3];     ///< Where to linearise.
+  const float* start[3];     ///< At the beginning of the substep.
+  const float* velocity[3];  ///< At the beginning of the substep.
+  const float* extra;        ///< Stiffness of other elements on a node's diagonal [N/m].
+  float* residual[3];        ///< Out: elastic force + gravity - inertia.
+};
+
+/// The organ: one patch per vertex (energy/elastic_model.h), links in compressed rows.
+struct Organ {
+  std::uint32_t vertices;
+  /// Vertices of a patch: start[vertices + 1], the vertex, and g xyz_ with F = sum x_j (x) g.
+  const std::uint32_t* start;
+  const std::uint32_t* vertex;
+  const float* gradient;
+  /// The patches of a vertex: the same links by vertex; in w the stiffness of the edge to that patch's vertex [N/m].
+  const std::uint32_t* patch_start;
+  const std::uint32_t* patch;
+  const float* patch_gradient;
+  const float* volume;  ///< Of a patch [m^3].
+  float mu, lambda;     ///< lambda of the stable neo-Hookean energy: Lamé's + mu [Pa].
+  float variance;       ///< Part of mu that is taken off |F|^2, kPatchVariance.
+  const float* mass;    ///< [kg]
+  const float* spread;  ///< Constant part of a vertex's diagonal block [N/m].
+};
+/// V dP = (1 - variance) mu V dF + c (c : dF) + d(cof F)[dF] q, c = sqrt(lambda V) cof F, q folded into `f`. Three
+/// columns xyz_ of each per patch.
+struct OrganMatrix {
+  float* c;
+  float* f;
+  float* stress;  ///< V P or V dP of the patches, between the two halves of a product.
+  float* block;   ///< Inverse of the diagonal blocks, three columns xyz_; 0 where a vertex does not move.
+};
+
+struct Kernels {
+  const char* name;
+
+  /// place <- start + h * velocity for nodes that move, start for the others; returns the largest |h velocity|^2.
+  float (*sheet_guess)(const Sheet& sheet, float h, const float* const start[3], const float* const velocity[3],
+                       float* const place[3], int row0, int row1);
+  void (*sheet_linearise)(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at,
+                          const SheetMatrix& matrix, float* carry, int row0, int row1);
+  /// out <- K p + mass * inertia * p. Returns p . out.
+  double (*sheet_apply)(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
+                        float* const out[3], float* carry, int row0, int row1);
+  /// Elastic and inertial energy at `place` of the edges and nodes that rows [row0, row1) own [J].
+  double (*sheet_energy)(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at, int row0, int row1);
+
+  /// z <- D^-1 r + (coarse) where a node moves; coarse is [columns][3] per row, weights [columns][stride] by column.
+  /// Returns r . z.
+  double (*sheet_precondition)(const Sheet& sheet, const SheetMatrix& matrix, const float* const r[3],
+                               const float* coarse, const float* weights, int columns, float* const z[3], int row0,
+                               int row1);
+  /// sums[row][column][3] <- sum over a row of weight * r, of nodes that move.
+  void (*sheet_restrict)(const Sheet& sheet, const float* const r[3], const float* weights, int columns, float* sums,
+                         int row0, int row1);
+
+  /// p <- z + beta p on `count` floats.
+  void (*combine)(const float* z, float beta, float* p, std::size_t count);
+  /// d += alpha p; r -= alpha q.
+  void (*advance)(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count);
+
+  /// Stress and its derivative of patches [first, last).
+  void (*organ_linearise)(const Organ& organ, const OrganMatrix& matrix, const float* place, std::uint32_t first,
+                          std::uint32_t last);
+  /// Inverse diagonal blocks of vertices; w of `pool` tells which move. After organ_linearise of all.
+  void (*organ_blocks)(const Organ& organ, const OrganMatrix& matrix, const float* pool, const float* extra,
+                       float inertia, std::uint32_t first, std::uint32_t last);
+  /// stress <- V dP of patches.
+  void (*organ_stress)(const Organ& organ, const OrganMatrix& matrix, const float* p, std::uint32_t first,
+                       std::uint32_t last);
+  /// out <- sum of stress * gradient + edges, on vertices.
+  void (*organ_gather)(const Organ& organ, const OrganMatrix& matrix, const float* p, float* out, std::uint32_t first,
+                       std::uint32_t last);
+  double (*organ_energy)(const Organ& organ, const float* place, std::uint32_t first, std::uint32_t last);
+};
+
+const Kernels& BaselineKernels();
+const Kernels& Avx2Kernels();
+const Kernels& Avx512Kernels();
+/// The widest kernels of this CPU.
+const Kernels& BestKernels();
+
+}  // namespace fulcrum::physics::accurate
