@@ -69,37 +69,47 @@ ClosestPoints ClosestSegmentTriangle(const Vec3f& p0, const Vec3f& p1, const Vec
   const std::array<const Vec3f*, 3> corner{&a, &b, &c};
   const Vec3f u = p1 - p0;
   const Vec3f n = (b - a).cross(c - a);
-  ClosestPoints best;
-  best.distance_sq = 3e38f;
-  const auto offer = [&](float t, const std::array<float, 3>& bary) {
-    const Vec3f on_segment = p0 + t * u;
-    const Vec3f on_triangle = bary[0] * a + bary[1] * b + bary[2] * c;
-    const float distance_sq = (on_segment - on_triangle).squaredNorm();
-    if (distance_sq < best.distance_sq) {
-      best = {distance_sq, t, bary, on_segment, on_triangle, false};
-    }
+  const float n2 = n.squaredNorm(), h0 = n.dot(p0 - a), h1 = n.dot(p1 - a);
+  // Inside when the three sub-areas have the sign of the whole.
+  const auto inside = [&](const Vec3f& p, std::array<float, 3>* bary) {
+    const float wa = n.dot((b - p).cross(c - p)), wb = n.dot((c - p).cross(a - p)), wc = n2 - wa - wb;
+    *bary = {wa / n2, wb / n2, wc / n2};
+    return wa >= 0.0f && wb >= 0.0f && wc >= 0.0f;
   };
-  const float h0 = n.dot(p0 - a), h1 = n.dot(p1 - a);
-  if ((h0 > 0.0f) != (h1 > 0.0f) && h0 != h1) {
+  std::array<float, 3> bary;
+  if ((h0 > 0.0f) != (h1 > 0.0f) && h0 != h1 && n2 > 0.0f) {
     const float t = h0 / (h0 - h1);
     const Vec3f at = p0 + t * u;
-    // Inside when the three sub-areas have the sign of the whole.
-    const float n2 = n.squaredNorm();
-    const float wa = n.dot((b - at).cross(c - at)), wb = n.dot((c - at).cross(a - at)), wc = n2 - wa - wb;
-    if (n2 > 0.0f && wa >= 0.0f && wb >= 0.0f && wc >= 0.0f) {
-      return {0.0f, t, {wa / n2, wb / n2, wc / n2}, at, at, true};
+    if (inside(at, &bary)) {
+      return {0.0f, t, bary, at, at, true};
     }
   }
-  offer(0.0f, ClosestOnTriangle(p0, a, b, c));
-  offer(1.0f, ClosestOnTriangle(p1, a, b, c));
+  // The segment against the edges, which covers corners and ends; then an end over the inside.
+  ClosestPoints best;
+  best.distance_sq = 3e38f;
   for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t j = (i + 1) % 3;
-    const auto [s, t] = ClosestSegments(p0, u, *corner[i], *corner[j] - *corner[i]);
-    std::array<float, 3> bary{0, 0, 0};
-    bary[i] = 1.0f - t;
-    bary[j] = t;
-    offer(s, bary);
+    const std::size_t j = i < 2 ? i + 1 : 0;
+    const Vec3f v = *corner[j] - *corner[i];
+    const auto [s, t] = ClosestSegments(p0, u, *corner[i], v);
+    const float distance_sq = (p0 + s * u - *corner[i] - t * v).squaredNorm();
+    if (distance_sq < best.distance_sq) {
+      best.distance_sq = distance_sq;
+      best.t = s;
+      best.barycentric = {0, 0, 0};
+      best.barycentric[i] = 1.0f - t;
+      best.barycentric[j] = t;
+    }
   }
+  for (const float t : {0.0f, 1.0f}) {
+    const float h = t > 0.0f ? h1 : h0;
+    if (h * h < best.distance_sq * n2 && inside(t > 0.0f ? p1 : p0, &bary)) {
+      best.distance_sq = h * h / n2;
+      best.t = t;
+      best.barycentric = bary;
+    }
+  }
+  best.on_segment = p0 + best.t * u;
+  best.on_triangle = best.barycentric[0] * a + best.barycentric[1] * b + best.barycentric[2] * c;
   return best;
 }
 

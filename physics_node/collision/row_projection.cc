@@ -10,9 +10,9 @@ constexpr float kLeastShare = 0.25f;
 
 }  // namespace
 
-std::size_t ProjectRows(std::span<const ContactRow> rows, float max_push, ParticleStore* particles) {
+std::size_t ProjectRows(std::span<ContactRow> rows, float max_push, float dt_s, ParticleStore* particles) {
   std::size_t pushed = 0;
-  for (const ContactRow& row : rows) {
+  for (ContactRow& row : rows) {
     const auto count = static_cast<std::size_t>(row.count);
     Vec3f place = Vec3f::Zero(), moved = Vec3f::Zero();
     float sum = 0, lightest = 0;
@@ -39,6 +39,7 @@ std::size_t ProjectRows(std::span<const ContactRow> rows, float max_push, Partic
         particles->Set(row.at[i], particles->At(row.at[i]) + share * move);
       }
     }
+    row.force_N += depth / (sum * dt_s * dt_s);
     ++pushed;
   }
   return pushed;

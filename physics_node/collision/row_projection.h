@@ -9,7 +9,8 @@
 namespace fulcrum::physics {
 
 /// Moves particles until each violated row in turn holds, by at most `max_push` [m] a row, with Coulomb friction
-/// against the movement since ParticleStore::Previous. Inverse masses share the work. Returns how many rows pushed.
-std::size_t ProjectRows(std::span<const ContactRow> rows, float max_push, ParticleStore* particles);
+/// against the movement since ParticleStore::Previous. Inverse masses share the work. Adds to each row's force_N the
+/// force that would have moved the particles as far within dt_s. Returns how many rows pushed.
+std::size_t ProjectRows(std::span<ContactRow> rows, float max_push, float dt_s, ParticleStore* particles);
 
 }  // namespace fulcrum::physics

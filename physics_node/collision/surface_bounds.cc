@@ -3,8 +3,8 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Tube triangles per bounding sphere.
-constexpr std::size_t kChunkSize = 8;
+/// Triangles in a leaf, leaves in a cluster.
+constexpr std::size_t kLeafSize = 8, kClusterSize = 8;
 
 /// Interleaves ten bits of each coordinate: neighbours in space become neighbours in order.
 std::uint32_t Morton(const Vec3f& unit) {
@@ -16,6 +16,9 @@ std::uint32_t Morton(const Vec3f& unit) {
   }
   return code;
 }
+
+/// Further than any tissue goes in a step [m].
+constexpr float kForgotten = 1e3f;
 
 }  // namespace
 
@@ -51,11 +54,16 @@ SurfaceBounds::SurfaceBounds(const SceneView& scene, const TissueModel* model, P
   for (const auto& [code, t] : order) {
     tube_order_.push_back(t);
   }
-  for (std::size_t first = 0; first < tube_order_.size(); first += kChunkSize) {
-    Chunk chunk;
-    chunk.first = static_cast<Index>(first);
-    chunk.last = static_cast<Index>(std::min(first + kChunkSize, tube_order_.size()));
-    chunks_.push_back(chunk);
+  for (std::size_t first = 0; first < tube_order_.size(); first += kLeafSize) {
+    leaves_.push_back({static_cast<Index>(first), static_cast<Index>(std::min(first + kLeafSize, tube_order_.size()))});
+  }
+  for (std::size_t first = 0; first < leaves_.size(); first += kClusterSize) {
+    clusters_.push_back(
+        {static_cast<Index>(first), static_cast<Index>(std::min(first + kClusterSize, leaves_.size()))});
+  }
+  age_.assign(clusters_.size(), 0.0f);
+  for (Sphere& cluster : clusters_) {
+    FitCluster(&cluster);
   }
   Update({});
 }
@@ -72,45 +80,52 @@ void SurfaceBounds::FitMembrane() {
   kernels_.block_bounds(grid, bounds_);
 }
 
-void SurfaceBounds::FitChunk(Chunk* chunk) {
+void SurfaceBounds::FitLeaf(Sphere* leaf) {
   Vec3f lo = Vec3f::Constant(3e38f), hi = Vec3f::Constant(-3e38f);
-  for (Index i = chunk->first; i < chunk->last; ++i) {
+  for (Index i = leaf->first; i < leaf->last; ++i) {
     for (const Index v : scene_.tube_surface[tube_order_[i]]) {
       const Vec3f p = particles_->At({4 * v, 1});
       lo = lo.cwiseMin(p);
       hi = hi.cwiseMax(p);
     }
   }
-  chunk->centre = 0.5f * (lo + hi);
-  chunk->radius = 0.5f * (hi - lo).norm();
+  leaf->centre = 0.5f * (lo + hi);
+  leaf->radius = 0.5f * (hi - lo).norm();
+}
+
+void SurfaceBounds::FitCluster(Sphere* cluster) {
+  cluster->centre.setZero();
+  for (Index leaf = cluster->first; leaf < cluster->last; ++leaf) {
+    FitLeaf(&leaves_[leaf]);
+    cluster->centre += leaves_[leaf].centre;
+  }
+  cluster->centre /= static_cast<float>(cluster->last - cluster->first);
+  cluster->radius = 0;
+  for (Index leaf = cluster->first; leaf < cluster->last; ++leaf) {
+    cluster->radius = std::max(cluster->radius, (leaves_[leaf].centre - cluster->centre).norm() + leaves_[leaf].radius);
+  }
 }
 
 void SurfaceBounds::Update(std::span<const Capsule> tools) {
-  if (tools.empty() && fitted_) {
-    fitted_ = false;  // Nobody looks: everything anew for the next tool.
-    return;
-  }
   FitMembrane();
-  turn_ = (turn_ + 1) % kTurns;
-  low_ = Vec3f::Constant(3e38f);
-  high_ = Vec3f::Constant(-3e38f);
   const std::size_t blocks = std::size_t{row_blocks_} * slot_blocks_ * kLanes;
   for (int axis = 0; axis < 3; ++axis) {
     low_[axis] = *std::min_element(bounds_.lo[axis], bounds_.lo[axis] + blocks);
     high_[axis] = *std::max_element(bounds_.hi[axis], bounds_.hi[axis] + blocks);
   }
-  for (std::size_t i = 0; i < chunks_.size(); ++i) {
-    Chunk& chunk = chunks_[i];
-    const auto near = [&](const Capsule& tool) {
-      return !Beyond(chunk.centre, tool.a, tool.b, kFar + chunk.radius + tool.radius);
-    };
-    if (!fitted_ || i % kTurns == turn_ || std::any_of(tools.begin(), tools.end(), near)) {
-      FitChunk(&chunk);
+  for (std::size_t i = 0; i < clusters_.size(); ++i) {
+    Sphere& cluster = clusters_[i];
+    age_[i] += kOrganStep;
+    const float reach = kReach + age_[i] + cluster.radius;
+    if (age_[i] > kForgotten || std::any_of(tools.begin(), tools.end(), [&](const Capsule& tool) {
+          return !Beyond(cluster.centre, tool.a, tool.b, reach + tool.radius);
+        })) {
+      FitCluster(&cluster);
+      age_[i] = 0;
     }
-    low_ = low_.cwiseMin(chunk.centre - Vec3f::Constant(chunk.radius));
-    high_ = high_.cwiseMax(chunk.centre + Vec3f::Constant(chunk.radius));
+    low_ = low_.cwiseMin(cluster.centre - Vec3f::Constant(cluster.radius));
+    high_ = high_.cwiseMax(cluster.centre + Vec3f::Constant(cluster.radius));
   }
-  fitted_ = true;
 }
 
 bool SurfaceBounds::MayTouch(const Vec3f& a, const Vec3f& b, float range) const {

@@ -1,5 +1,6 @@
-// Broad phase over the tissue's surface: boxes around blocks of the membrane, spheres around clusters of the organ's
-// surface. Local to the tools: what is near one is looked at in each update, the rest in turns.
+// Broad phase over the tissue's surface: boxes around blocks of the membrane (one vector kernel), two levels of spheres
+// around pieces of the organ's surface. The latter are fitted locally to the tools: a sphere counts as grown by what
+// tissue may have moved since it was fitted, and is fitted anew when it then comes near a tool.
 #pragma once
 
 #include <algorithm>
@@ -20,9 +21,11 @@ class SurfaceBounds {
  public:
   SurfaceBounds(const SceneView& scene, const TissueModel* model, ParticleStore* particles, const Kernels& kernels);
 
-  /// Fits the bounds to the tissue around `tools`. What is further than kFar from all of them was fitted at most
-  /// kTurns updates ago: tissue slower than 1 m/s cannot have come near unseen.
+  /// Fits the bounds to the tissue within kReach of `tools`, once a step: organ faster than kOrganStep a step may come
+  /// near unseen.
   void Update(std::span<const Capsule> tools);
+  /// Tissue moves while nobody looks: the next Update fits everything.
+  void Forget() { std::fill(age_.begin(), age_.end(), 3e38f); }
   /// False: no tissue within `range` of the segment's box.
   [[nodiscard]] bool MayTouch(const Vec3f& a, const Vec3f& b, float range) const;
 
@@ -35,13 +38,11 @@ class SurfaceBounds {
   void ForEachTubeTriangleNear(const Vec3f& a, const Vec3f& b, float range, const Visit& visit) const;
 
  private:
-  /// Updates until everything has been fitted again, and the distance that tissue at 1 m/s covers in that time at
-  /// 100 Hz [m].
-  static constexpr std::uint32_t kTurns = 4;
-  static constexpr float kFar = 0.045f;
+  static constexpr float kReach = 0.020f;      ///< [m]
+  static constexpr float kOrganStep = 0.010f;  ///< 1 m/s at 100 Hz [m].
 
-  struct Chunk {
-    Index first = 0, last = 0;  ///< Of tube_order_.
+  struct Sphere {
+    Index first = 0, last = 0;  ///< Leaves: of tube_order_; clusters: of leaves_.
     Vec3f centre = Vec3f::Zero();
     float radius = 0;
   };
@@ -49,7 +50,8 @@ class SurfaceBounds {
     return DistanceSqToSegment(p, a, b) > range * range;
   }
   void FitMembrane();
-  void FitChunk(Chunk* chunk);
+  void FitLeaf(Sphere* leaf);
+  void FitCluster(Sphere* cluster);
 
   SceneView scene_;
   ParticleStore* particles_;
@@ -59,23 +61,33 @@ class SurfaceBounds {
   std::array<std::vector<float>, 6> bound_storage_;
   BlockBounds bounds_{};
   std::vector<Index> tube_order_;
-  std::vector<Chunk> chunks_;
-  std::uint32_t turn_ = 0;
-  bool fitted_ = false;
+  std::vector<Sphere> leaves_, clusters_;
+  std::vector<float> age_;  ///< Of each cluster: how far tissue may have moved since it was fitted [m].
   Vec3f low_ = Vec3f::Zero(), high_ = Vec3f::Zero();  ///< Of everything.
 };
 
 template <class Visit>
 void SurfaceBounds::ForEachCellNear(const Vec3f& a, const Vec3f& b, const float& range, const Visit& visit) const {
   const GridLayout& layout = particles_->layout();
+  const Vec3f low = a.cwiseMin(b), high = a.cwiseMax(b);
+  const auto apart = [&](std::size_t i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (bounds_.lo[axis][i] > high[axis] + range || bounds_.hi[axis][i] < low[axis] - range) {
+        return true;
+      }
+    }
+    return false;
+  };
   std::size_t index = 0;
   for (std::uint32_t rb = 0; rb < row_blocks_; ++rb) {
     for (std::uint32_t sb = 0; sb < slot_blocks_; ++sb) {
       for (std::uint32_t lane = 0; lane < kLanes; ++lane, ++index) {
+        if (apart(index)) {
+          continue;
+        }
         const Vec3f lo(bounds_.lo[0][index], bounds_.lo[1][index], bounds_.lo[2][index]);
         const Vec3f hi(bounds_.hi[0][index], bounds_.hi[1][index], bounds_.hi[2][index]);
-        if ((lo.array() > a.cwiseMax(b).array() + range).any() || (hi.array() < a.cwiseMin(b).array() - range).any() ||
-            Beyond(0.5f * (lo + hi), a, b, range + 0.5f * (hi - lo).norm())) {
+        if (Beyond(0.5f * (lo + hi), a, b, range + 0.5f * (hi - lo).norm())) {
           continue;
         }
         for (std::uint32_t row = 8 * rb; row < std::min(8 * rb + 8, layout.rows - 1); ++row) {
@@ -106,10 +118,15 @@ void SurfaceBounds::ForEachCellNear(const Vec3f& a, const Vec3f& b, const float&
 
 template <class Visit>
 void SurfaceBounds::ForEachTubeTriangleNear(const Vec3f& a, const Vec3f& b, float range, const Visit& visit) const {
-  for (const Chunk& chunk : chunks_) {
-    if (!Beyond(chunk.centre, a, b, range + chunk.radius)) {
-      for (Index i = chunk.first; i < chunk.last; ++i) {
-        visit(tube_order_[i]);
+  for (const Sphere& cluster : clusters_) {
+    if (Beyond(cluster.centre, a, b, range + cluster.radius)) {
+      continue;
+    }
+    for (Index leaf = cluster.first; leaf < cluster.last; ++leaf) {
+      if (!Beyond(leaves_[leaf].centre, a, b, range + leaves_[leaf].radius)) {
+        for (Index i = leaves_[leaf].first; i < leaves_[leaf].last; ++i) {
+          visit(tube_order_[i]);
+        }
       }
     }
   }

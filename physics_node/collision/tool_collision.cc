@@ -11,6 +11,8 @@ constexpr float kSlack = 0.0015f;
 /// Rows are made for tissue this near to touch, and as much more as it moves in a substep up to kMaxReach [m].
 constexpr float kRowBand = 0.001f;
 constexpr float kMaxReach = 0.005f;
+/// Closest points are exact for pairs that come this near to touch [m].
+constexpr float kNear = 0.001f;
 /// A tool deeper behind a triangle than this has gone through it for good: pushing would only tear [m].
 constexpr float kMaxBehind = 0.004f;
 /// After closing or letting go, jaws collide again when nothing has been in their way for so many steps.
@@ -39,18 +41,23 @@ ToolCollision::ToolCollision(const SceneView& scene, const TissueModel* model, P
       particles_(particles),
       membrane_triangles_(scene.membrane.triangle_count()),
       bounds_(scene, model, particles, kernels) {
+  for (std::uint32_t col = 0; col < scene.membrane.cols; ++col) {
+    column_.push_back(particles->NodeRef(0, col));
+  }
   pairs_.reserve(kPairs);
   last_pairs_.reserve(kPairs);
   row_order_.reserve(kPairs);
 }
 
-Vec3f ToolCollision::PatchNormal(std::uint32_t row, std::uint32_t col, bool previous) const {
+Vec3f ToolCollision::PatchNormal(Index triangle, bool previous) const {
   const GridLayout& layout = particles_->layout();
-  const auto at = [&](std::uint32_t r, std::uint32_t c) {
-    const ParticleRef ref = particles_->NodeRef(std::min(r, layout.rows - 1), std::min(c, layout.cols - 1));
+  const Index cell = triangle / 2, row = cell / (layout.cols - 1), col = cell % (layout.cols - 1);
+  const auto at = [&](Index r, Index c) {
+    const ParticleRef first = column_[std::min(c, layout.cols - 1)];
+    const ParticleRef ref{first.base + std::min(r, layout.rows - 1) * layout.stride, first.step};
     return previous ? particles_->Previous(ref) : particles_->At(ref);
   };
-  const auto before = [](std::uint32_t i) { return i > kPatch ? i - kPatch : 0; };
+  const auto before = [](Index i) { return i > kPatch ? i - kPatch : 0; };
   const Vec3f along = at(row, col + kPatch + 1) - at(row, before(col));
   const Vec3f down = at(row + kPatch + 1, col) - at(before(row), col);
   const Vec3f normal = along.cross(down);
@@ -65,38 +72,61 @@ bool ToolCollision::IsFar(const std::array<Vec3f, 3>& x, const Capsule& capsule,
   return DistanceSqToSegment(centre, capsule.a, capsule.b) > (range + radius) * (range + radius);
 }
 
-/// `draft` has everything but closest points and side.
-void ToolCollision::AddPair(const ContactPair& draft, const Vec3f& previous_normal, float range) {
+/// `draft` has everything but closest points, normal and side.
+void ToolCollision::AddPair(const ContactPair& draft, float range) {
   const Motion& motion = motion_[draft.capsule];
   const std::array<Vec3f, 3> x{particles_->At(draft.at[0]), particles_->At(draft.at[1]), particles_->At(draft.at[2])};
   if (IsFar(x, motion.to, range)) {
     return;
   }
-  const ClosestPoints closest = ClosestSegmentTriangle(motion.to.a, motion.to.b, x[0], x[1], x[2]);
-  if (closest.distance_sq > range * range) {
-    return;
-  }
   pairs_.push_back(draft);
   ContactPair& pair = pairs_.back();
-  pair.closest = closest;
-  if (pair.triangle >= membrane_triangles_) {
-    pair.side = 1;  // The organ is closed: tools are outside.
-    pair.normal = (x[1] - x[0]).cross(x[2] - x[0]).normalized();
+  if (IsFar(x, motion.to, motion.to.radius + kNear)) {
+    // Only the side has to be told: the middle of the triangle will do.
+    pair.closest.barycentric = {1.0f / 3, 1.0f / 3, 1.0f / 3};
+    pair.closest.on_triangle = (x[0] + x[1] + x[2]) / 3.0f;
+    pair.closest.t = ClosestOnSegment(pair.closest.on_triangle, motion.to.a, motion.to.b);
+    pair.closest.on_segment = motion.PointAt(pair.closest.t, 1.0f);
+    pair.closest.distance_sq = (pair.closest.on_segment - pair.closest.on_triangle).squaredNorm();
+  } else {
+    pair.closest = ClosestSegmentTriangle(motion.to.a, motion.to.b, x[0], x[1], x[2]);
+  }
+  pair.normal = NormalOf(pair, false);
+  FindSide(&pair);
+  // The organ is closed. What is seen from within without having been seen from outside is its other wall.
+  if (pair.triangle >= membrane_triangles_ && pair.side < 0) {
+    pairs_.pop_back();
+  }
+}
+
+Vec3f ToolCollision::NormalOf(const ContactPair& pair, bool previous) const {
+  if (pair.triangle < membrane_triangles_) {
+    return PatchNormal(pair.triangle, previous);
+  }
+  const auto at = [&](std::size_t i) {
+    return previous ? particles_->Previous(pair.at[i]) : particles_->At(pair.at[i]);
+  };
+  return (at(1) - at(0)).cross(at(2) - at(0)).normalized();
+}
+
+/// By where the two points that are closest now were before this step, when nothing overlapped.
+void ToolCollision::FindSide(ContactPair* pair) const {
+  const auto last = std::lower_bound(last_pairs_.begin(), last_pairs_.end(), *pair, InOrder);
+  const bool known = last != last_pairs_.end() && last->capsule == pair->capsule && last->triangle == pair->triangle;
+  if (known && (last->touching || pair->triangle >= membrane_triangles_)) {
+    pair->side = last->side;
+    pair->remembers = last->touching;
     return;
   }
-  const auto last = std::lower_bound(last_pairs_.begin(), last_pairs_.end(), pair, InOrder);
-  const bool known = last != last_pairs_.end() && last->capsule == pair.capsule && last->triangle == pair.triangle;
-  // Where the two points that are closest now were before this step, when nothing overlapped.
-  const auto& b = closest.barycentric;
-  const Vec3f offset = motion.PointAt(closest.t, 0.0f) -
-                       (b[0] * particles_->Previous(pair.at[0]) + b[1] * particles_->Previous(pair.at[1]) +
-                        b[2] * particles_->Previous(pair.at[2]));
-  const float height = previous_normal.dot(offset), steep = kBesideCosine * offset.norm();
-  const bool clear = std::abs(height) > steep && steep > 0.0f;
-  if (known && (last->touching || !clear)) {
-    pair.side = last->side;
-  } else if (clear) {
-    pair.side = height > 0.0f ? std::int8_t{1} : std::int8_t{-1};
+  const auto& b = pair->closest.barycentric;
+  const Vec3f offset = motion_[pair->capsule].PointAt(pair->closest.t, 0.0f) -
+                       (b[0] * particles_->Previous(pair->at[0]) + b[1] * particles_->Previous(pair->at[1]) +
+                        b[2] * particles_->Previous(pair->at[2]));
+  const float height = NormalOf(*pair, true).dot(offset), steep = kBesideCosine * offset.norm();
+  if (std::abs(height) > steep && steep > 0.0f) {
+    pair->side = height > 0.0f ? std::int8_t{1} : std::int8_t{-1};
+  } else if (known) {
+    pair->side = last->side;
   }
 }
 
@@ -114,33 +144,38 @@ void ToolCollision::FindMembranePairs(std::uint32_t capsule, float range) {
                                         n10 = n00 + model_->cols();
                             ContactPair draft;
                             draft.capsule = capsule;
-                            draft.normal = PatchNormal(row, col, false);
-                            const Vec3f previous_normal = PatchNormal(row, col, true);
                             if (model_->TriangleAlive(2 * cell)) {
                               draft.triangle = 2 * cell;
                               draft.particle = {n00, n00 + 1, n10 + 1};
                               draft.at = {corner[0], corner[1], corner[3]};
-                              AddPair(draft, previous_normal, range);
+                              AddPair(draft, range);
                             }
                             if (model_->TriangleAlive(2 * cell + 1)) {
                               draft.triangle = 2 * cell + 1;
                               draft.particle = {n00, n10 + 1, n10};
                               draft.at = {corner[0], corner[3], corner[2]};
-                              AddPair(draft, previous_normal, range);
+                              AddPair(draft, range);
                             }
                           });
 }
 
-/// Where a pair's own geometry does not tell the side, its neighbours' does when they agree.
+/// A capsule is on one side of all the membrane around it, except at a hole or a rim: what touched in the last step
+/// decides when it agrees, else all pairs when they agree. A pair alone may be wrong: of a pit that the tool presses,
+/// the flat surroundings look as if the tool were beneath them.
 void ToolCollision::SettleSides(std::size_t first) {
-  bool above = false, below = false;
-  for (std::size_t i = first; i < pairs_.size(); ++i) {
-    above |= pairs_[i].side > 0;
-    below |= pairs_[i].side < 0;
-  }
-  if (above != below) {
+  for (const bool remembered : {true, false}) {
+    bool above = false, below = false;
     for (std::size_t i = first; i < pairs_.size(); ++i) {
-      pairs_[i].side = above ? 1 : -1;
+      above |= pairs_[i].side > 0 && (pairs_[i].remembers || !remembered);
+      below |= pairs_[i].side < 0 && (pairs_[i].remembers || !remembered);
+    }
+    if (above != below) {
+      for (std::size_t i = first; i < pairs_.size(); ++i) {
+        pairs_[i].side = above ? 1 : -1;
+      }
+    }
+    if (above || below) {
+      return;
     }
   }
 }
@@ -156,7 +191,7 @@ void ToolCollision::FindTubePairs(std::uint32_t capsule, float range) {
     for (std::size_t i = 0; i < 3; ++i) {
       draft.at[i] = {4 * draft.particle[i], 1};
     }
-    AddPair(draft, Vec3f::Zero(), range);
+    AddPair(draft, range);
   });
 }
 
@@ -181,7 +216,11 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
       std::copy_n(moved.to.capsules.begin(), moved.to.count, near.begin() + static_cast<std::ptrdiff_t>(count));
       count += static_cast<std::size_t>(moved.to.count);
     }
-    bounds_.Update({near.data(), count});
+    if (count > 0) {
+      bounds_.Update({near.data(), count});
+    } else {
+      bounds_.Forget();
+    }
   }
   for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
     const ToolMotion& moved = tools[tool];
@@ -208,7 +247,7 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
       SettleSides(first);
       FindTubePairs(c, range);
       if (to.part == ToolPart::kJaw) {
-        const float least = yielding_[tool].held ? 3e38f : kClearPart * to.radius;
+        const float least = yielding_[tool].held ? range : kClearPart * to.radius;
         clear = clear && std::none_of(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end(),
                                       [least](const ContactPair& p) { return p.closest.distance_sq < least * least; });
       }

@@ -26,6 +26,7 @@ struct ContactPair {
   Index triangle = 0;            ///< Membrane triangle, or membrane triangle count + index in SceneView.tube_surface.
   Vec3f normal = Vec3f::Zero();  ///< Of the membrane around it, or of the organ's triangle.
   std::int8_t side = 0;          ///< Sign of the tool's height along the normal; 0 unknown.
+  bool remembers = false;        ///< The side is that of the last step, in which they touched.
   bool touching = false;         ///< The last projection moved the triangle, or its row carried a force.
   std::array<ParticleRef, 3> at;
   std::array<Index, 3> particle{};
@@ -120,10 +121,15 @@ class ToolCollision {
   void FindMembranePairs(std::uint32_t capsule, float range);
   void SettleSides(std::size_t first);
   void FindTubePairs(std::uint32_t capsule, float range);
-  void AddPair(const ContactPair& draft, const Vec3f& previous_normal, float range);
+  void AddPair(const ContactPair& draft, float range);
+  void FindSide(ContactPair* pair) const;
   void FollowYielding(std::uint32_t tool, const ToolMotion& moved, bool clear);
-  /// Unit normal of the membrane around a cell, now or before this step; zero where it has none.
-  [[nodiscard]] Vec3f PatchNormal(std::uint32_t row, std::uint32_t col, bool previous) const;
+  /// Unit normal of the membrane around a triangle, now or before this step; zero where it has none.
+  [[nodiscard]] Vec3f PatchNormal(Index triangle, bool previous) const;
+  /// Of the membrane around it, or of the organ's triangle.
+  [[nodiscard]] Vec3f NormalOf(const ContactPair& pair, bool previous) const;
+  /// Closest points are told for tissue up to this far from touch: the arc of an electrode reaches so far [m].
+  [[nodiscard]] static float Probed(const Capsule& capsule) { return capsule.part == ToolPart::kTip ? 0.0015f : 0.0f; }
   /// How far apart a pair is at least: bounding sphere against capsule axis.
   [[nodiscard]] static bool IsFar(const std::array<Vec3f, 3>& x, const Capsule& capsule, float range);
   /// From pair->closest; `capsule` is where that was taken.
@@ -142,6 +148,7 @@ class ToolCollision {
   ParticleStore* particles_;
   Index membrane_triangles_;
   SurfaceBounds bounds_;
+  std::vector<ParticleRef> column_;  ///< Of the first row.
   std::array<Motion, kMaxTools * kMaxCapsules> motion_;
   std::array<Yielding, kMaxTools> yielding_;
   std::vector<ContactPair> pairs_, last_pairs_;

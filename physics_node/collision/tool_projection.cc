@@ -14,8 +14,6 @@ constexpr int kMaxPieces = 16;
 /// With a corner that cannot move, the others must not make up for all of it: they move at most as if this part of the
 /// lightest corner's inverse mass stood against them. Three free corners of equal mass have at least 1/3.
 constexpr float kLeastShare = 0.25f;
-/// Closest points are told for tissue up to this far from touch: the electrode's arc reaches so far [m].
-constexpr float kProbed = 0.0015f;
 constexpr float kFarSq = 1.0f;
 
 }  // namespace
@@ -44,7 +42,7 @@ void ToolCollision::Sweep() {
 void ToolCollision::ProjectPair(ContactPair* pair, const Capsule& capsule) {
   const std::array<Vec3f, 3> x{particles_->At(pair->at[0]), particles_->At(pair->at[1]), particles_->At(pair->at[2])};
   pair->touching = false;
-  if (IsFar(x, capsule, capsule.radius + scene_.physics.collision_margin_m + kProbed)) {
+  if (IsFar(x, capsule, capsule.radius + scene_.physics.collision_margin_m + Probed(capsule))) {
     pair->closest.distance_sq = kFarSq;
     pair->closest.crosses = false;
     return;

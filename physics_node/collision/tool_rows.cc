@@ -12,8 +12,6 @@ constexpr float kSmallMove = 0.25f;
 /// On the way to the first touch a look is at least this part of the radius further, or kMaxLooks would not do.
 constexpr float kLeastAdvance = 0.5f;
 constexpr float kMaxLooks = 24.0f;
-/// Closest points are told for tissue up to this far from touch: the electrode's arc reaches so far [m].
-constexpr float kProbed = 0.0015f;
 constexpr float kFarSq = 1.0f;
 
 /// The corners that a row rests on when they are one or two: equal for all triangles that share them.
@@ -149,7 +147,7 @@ void ToolCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) {
     }
     const std::array<Vec3f, 3> x{particles_->At(pair.at[0]), particles_->At(pair.at[1]), particles_->At(pair.at[2])};
     const float reach = m.to.radius + scene_.physics.collision_margin_m;
-    if (IsFar(x, m.At(0.5f * (u0 + u1)), reach + std::max(band_, kProbed) + 0.5f * m.travel * (u1 - u0))) {
+    if (IsFar(x, m.At(0.5f * (u0 + u1)), reach + std::max(band_, Probed(m.to)) + 0.5f * m.travel * (u1 - u0))) {
       pair.closest.distance_sq = kFarSq;
       pair.closest.crosses = false;
       continue;
