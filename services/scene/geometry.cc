@@ -4,11 +4,34 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 
 namespace fulcrum::scene {
 
 double SignedVolume(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d) {
   return (b - a).cross(c - a).dot(d - a) / 6.0;
+}
+
+DihedralRange DihedralAngles(const std::array<Vec3d, 4>& x) {
+  DihedralRange range{180, 0};
+  for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t j = i + 1; j < 4; ++j) {
+      std::array<std::size_t, 2> rest{};
+      std::size_t count = 0;
+      for (std::size_t k = 0; k < 4; ++k) {
+        if (k != i && k != j) {
+          rest[count++] = k;
+        }
+      }
+      const Vec3d e = (x[j] - x[i]).normalized();
+      const Vec3d a = x[rest[0]] - x[i], b = x[rest[1]] - x[i];
+      const Vec3d p = a - a.dot(e) * e, q = b - b.dot(e) * e;
+      const double angle = std::atan2(p.cross(q).norm(), p.dot(q)) * 180 / std::numbers::pi;
+      range.least_deg = std::min(range.least_deg, angle);
+      range.largest_deg = std::max(range.largest_deg, angle);
+    }
+  }
+  return range;
 }
 
 ClosestPoint ClosestOnTriangle(const Vec3d& p, const Vec3d& a, const Vec3d& b, const Vec3d& c) {

@@ -11,6 +11,12 @@ namespace fulcrum::scene {
 /// Positive when (b-a)x(c-a).(d-a) > 0 [m^3].
 double SignedVolume(const Vec3d& a, const Vec3d& b, const Vec3d& c, const Vec3d& d);
 
+/// The six angles between a tetrahedron's faces; 70.5 degrees each in a regular one.
+struct DihedralRange {
+  double least_deg, largest_deg;
+};
+DihedralRange DihedralAngles(const std::array<Vec3d, 4>& corners);
+
 struct ClosestPoint {
   std::array<double, 3> barycentric;
   Vec3d point;

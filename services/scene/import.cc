@@ -8,13 +8,17 @@
 #include "services/scene/drape.h"
 #include "services/scene/geometry.h"
 #include "services/scene/mesh_repair.h"
+#include "services/scene/tet_repair.h"
 #include "services/scene/tetrahedralise.h"
 
 namespace fulcrum::scene {
 namespace {
 
+constexpr int kLeastTets = 100, kMostTets = 60000;  ///< Fewer are no organ, more are beyond the vertices of a scene.
+
 /// From the files' unit and origin to frame W.
-TriangleMesh ToWorld(TriangleMesh mesh, const ImportSettings& import, const Vec3f& offset_m) {
+template <class Mesh>
+Mesh ToWorld(Mesh mesh, const ImportSettings& import, const Vec3f& offset_m) {
   for (Vec3d& p : mesh.vertices) {
     p = import.scale_m * p - import.origin_m.cast<double>() + offset_m.cast<double>();
   }
@@ -47,42 +51,85 @@ void Say(const Progress& progress, const char* format, Values... values) {
   }
 }
 
+/// The organ as a body and the surface that is seen of it.
+struct Organ {
+  TetrahedralMesh tets;
+  TriangleMesh surface;
+};
+
+Organ TakeTetrahedra(const MeshFile& file, const ImportSettings& import, const std::string& name,
+                     const Progress& progress) {
+  if (import.wall_m > 0 || import.cap_openings) {
+    throw InputError(name +
+                     ": wall_mm and cap_openings are for surfaces, but this file holds tetrahedra; with "
+                     "`remesh: true` its surface is taken");
+  }
+  TetRepairReport report;
+  Organ organ{RepairTetrahedra(file, name, &report), {}};
+  Say(progress,
+      "taken: %zu tetrahedra, %zu vertices; %zu vertices merged, %zu turned, %zu doubles and %zu loose pieces dropped; "
+      "dihedral angles %.1f to %.1f deg",
+      organ.tets.tets.size(), organ.tets.vertices.size(), report.vertices_merged, report.turned, report.doubles_dropped,
+      report.pieces_dropped, report.least_dihedral_deg, report.largest_dihedral_deg);
+  organ.surface = {organ.tets.vertices, BoundaryOf(organ.tets.tets)};
+  return organ;
+}
+
+Organ FillSurface(const TriangleMesh& read, const ImportSettings& import, const std::string& name,
+                  const Progress& progress) {
+  RepairReport report;
+  Organ organ;
+  organ.surface = RepairSurface(read, {import.min_edge_m, import.cap_openings, import.wall_m}, name, &report);
+  Say(progress,
+      "repaired: %zu openings capped, %zu edges collapsed, %zu caps flipped, %zu loose pieces dropped, %zu pairs "
+      "cross; "
+      "least edge %.2f mm, least angle %.1f deg",
+      report.openings_capped, report.edges_collapsed, report.caps_flipped, report.pieces_dropped,
+      report.self_intersections, 1e3 * report.least_edge, report.least_angle_deg);
+  const int target = import.tet_edge_m > 0 ? TetsOfEdge(organ.surface, import.tet_edge_m) : import.target_tets;
+  if (target < kLeastTets || target > kMostTets) {
+    throw InputError(name + ": tet_edge_mm = " + std::to_string(1e3 * import.tet_edge_m) + " gives about " +
+                     std::to_string(target) + " tetrahedra; valid: " + std::to_string(kLeastTets) + " to " +
+                     std::to_string(kMostTets));
+  }
+  organ.tets = Tetrahedralise(organ.surface, target, name);
+  Say(progress, "filled with %zu tetrahedra, %zu vertices", organ.tets.tets.size(), organ.tets.vertices.size());
+  return organ;
+}
+
+Organ ReadOrgan(const ImportSettings& import, const std::string& name, const Progress& progress) {
+  MeshFile file = ToWorld(ReadMesh(import.organ_file), import, Vec3f::Zero());
+  Say(progress, "%s: %zu vertices, %zu triangles, %zu tetrahedra, %zu points and lines left out", name.c_str(),
+      file.vertices.size(), file.triangles.size(), file.tets.size(), file.skipped);
+  return file.tets.empty() || import.remesh ? FillSurface(SurfaceOf(std::move(file)), import, name, progress)
+                                            : TakeTetrahedra(file, import, name, progress);
+}
+
 }  // namespace
 
 Anatomy ImportAnatomy(const SceneSettings& settings, const Progress& progress) {
   const ImportSettings& import = *settings.import;
   const std::string name = import.organ_file.string();
-  const TriangleMesh read = ToWorld(SurfaceOf(ReadMesh(import.organ_file)), import, Vec3f::Zero());
-  Say(progress, "%s: %zu vertices, %zu triangles", name.c_str(), read.vertices.size(), read.triangles.size());
-  RepairReport report;
-  const TriangleMesh organ = RepairClosedSurface(read, import.min_edge_m, name, &report);
-  Say(progress,
-      "repaired: %zu edges collapsed, %zu caps flipped, %zu loose pieces dropped, %zu pairs cross; least edge %.2f mm, "
-      "least angle %.1f deg",
-      report.edges_collapsed, report.caps_flipped, report.pieces_dropped, report.self_intersections,
-      1e3 * report.least_edge, report.least_angle_deg);
-
+  const Organ body = ReadOrgan(import, name, progress);
   Anatomy anatomy;
-  TetrahedralMesh tets = Tetrahedralise(organ, import.target_tets, name);
-  Say(progress, "filled with %zu tetrahedra, %zu vertices", tets.tets.size(), tets.vertices.size());
 
   std::vector<Vec3d> line;
   for (const Vec3f& p : import.centreline_m) {
     line.push_back((p - import.origin_m).cast<double>());
   }
   const CentreLine centre_line(line);
-  for (const Vec3d& p : tets.vertices) {
+  for (const Vec3d& p : body.tets.vertices) {
     const double fraction = centre_line.Project(p);
     anatomy.organ_fixed.push_back(fraction < import.from || fraction > import.to);
   }
   // Draped over the tetrahedra's own surface: that is what the bindings hold on to.
-  const TriangleMesh coarse{tets.vertices, BoundaryOf(tets.tets)};
+  const TriangleMesh coarse{body.tets.vertices, BoundaryOf(body.tets.tets)};
   anatomy.sheet = DrapeMembrane(import, settings.membrane, centre_line, coarse, name);
   Say(progress, "membrane draped over %.0f mm of the organ", 1e3 * (import.to - import.from) * centre_line.length());
-  anatomy.organ_vertices = std::move(tets.vertices);
-  anatomy.tets = std::move(tets.tets);
+  anatomy.organ_vertices = body.tets.vertices;
+  anatomy.tets = body.tets.tets;
 
-  TriangleMesh fine = Decimate(organ, import.organ_triangles_max);
+  TriangleMesh fine = Decimate(body.surface, import.organ_triangles_max);
   anatomy.surface_vertices = std::move(fine.vertices);
   anatomy.surface_triangles = std::move(fine.triangles);
 

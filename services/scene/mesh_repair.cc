@@ -1,6 +1,7 @@
 #include "services/scene/mesh_repair.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/border.h>
 #include <CGAL/Polygon_mesh_processing/connected_components.h>
 #include <CGAL/Polygon_mesh_processing/measure.h>
 #include <CGAL/Polygon_mesh_processing/orient_polygon_soup.h>
@@ -10,6 +11,7 @@
 #include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/Polygon_mesh_processing/shape_predicates.h>
 #include <CGAL/Polygon_mesh_processing/stitch_borders.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
@@ -18,6 +20,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 #include "services/core/error.h"
 
@@ -167,29 +170,113 @@ void RemoveSlivers(double min_edge, Surface* surface, RepairReport* report) {
   }
 }
 
+/// Closes every hole with triangles between its own vertices. Returns how many.
+std::size_t CapOpenings(Surface* surface) {
+  std::vector<Surface::Halfedge_index> holes;
+  pmp::extract_boundary_cycles(*surface, std::back_inserter(holes));
+  std::size_t capped = 0;
+  for (const auto h : holes) {
+    std::vector<Surface::Face_index> faces;
+    pmp::triangulate_hole(*surface, h, std::back_inserter(faces));
+    capped += faces.empty() ? 0 : 1;
+  }
+  return capped;
+}
+
+/// Outward also where the surface is open: as the body that caps would close.
+void OrientOutward(const std::string& name, Surface* surface) {
+  Surface closed = *surface;
+  CapOpenings(&closed);
+  if (!CGAL::is_closed(closed)) {
+    throw InputError(name + ": its openings cannot be closed, so that its inner side is not known");
+  }
+  if (pmp::volume(closed) < 0) {
+    pmp::reverse_face_orientations(*surface);
+  }
+}
+
+/// The outer surface, an inner one below it by `thickness`, and rims between the two where it is open.
+TriangleMesh WithWall(const TriangleMesh& outer, double thickness) {
+  constexpr int kSmoothing = 3;  // Of the normals: a surface's noise would make the inner side cross itself.
+  const std::size_t count = outer.vertices.size();
+  // Weighted by the angle at the vertex: how a surface is cut into triangles must not matter.
+  const auto angle = [&](const Triangle& t, std::size_t k) {
+    const Vec3d &p = outer.vertices[t[k]], a = outer.vertices[t[(k + 1) % 3]] - p,
+                b = outer.vertices[t[(k + 2) % 3]] - p;
+    return std::atan2(a.cross(b).norm(), a.dot(b));
+  };
+  std::vector<Vec3d> normals(count, Vec3d::Zero());
+  for (const Triangle& t : outer.triangles) {
+    const Vec3d& p = outer.vertices[t[0]];
+    const Vec3d normal = (outer.vertices[t[1]] - p).cross(outer.vertices[t[2]] - p).normalized();
+    for (std::size_t k = 0; k < 3; ++k) {
+      normals[t[k]] += angle(t, k) * normal;
+    }
+  }
+  for (int round = 0; round < kSmoothing; ++round) {
+    std::vector<Vec3d> sums(count, Vec3d::Zero());
+    for (const Triangle& t : outer.triangles) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        sums[t[k]] += angle(t, k) * (2 * normals[t[k]].normalized() + normals[t[(k + 1) % 3]].normalized() +
+                                     normals[t[(k + 2) % 3]].normalized());
+      }
+    }
+    normals = sums;
+  }
+  TriangleMesh wall = outer;
+  for (std::size_t v = 0; v < count; ++v) {
+    wall.vertices.push_back(outer.vertices[v] - thickness * normals[v].normalized());
+  }
+  const auto shift = static_cast<Index>(count);
+  std::set<std::array<Index, 2>> edges;
+  for (const Triangle& t : outer.triangles) {
+    wall.triangles.push_back({t[0] + shift, t[2] + shift, t[1] + shift});
+    for (std::size_t k = 0; k < 3; ++k) {
+      edges.insert({t[k], t[(k + 1) % 3]});
+    }
+  }
+  for (const auto& [a, b] : edges) {
+    if (!edges.contains({b, a})) {
+      wall.triangles.push_back({b, a, a + shift});
+      wall.triangles.push_back({b, a + shift, b + shift});
+    }
+  }
+  return wall;
+}
+
 }  // namespace
 
-TriangleMesh RepairClosedSurface(const TriangleMesh& mesh, double min_edge, const std::string& name,
-                                 RepairReport* report) {
+TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settings, const std::string& name,
+                           RepairReport* report) {
   Surface surface = ToSurface(mesh);
   if (surface.number_of_faces() == 0) {
     throw InputError(name + ": no triangle with an area");
   }
   report->pieces_dropped = pmp::keep_largest_connected_components(surface, 1);
   surface.collect_garbage();
-  if (!CGAL::is_closed(surface)) {
+  if (settings.cap_openings) {
+    report->openings_capped = CapOpenings(&surface);
+  }
+  if (!CGAL::is_closed(surface) && !(settings.wall > 0)) {
     std::size_t open = 0;
     for (const auto e : surface.edges()) {
       open += surface.is_border(e) ? 1 : 0;
     }
     throw InputError(name + ": the surface is not closed (" + std::to_string(open) +
-                     " open edges); close its holes, or cut it where the organ ends and cap it");
+                     " open edges); `cap_openings: true` closes its holes, `wall_mm` makes it a wall");
   }
-  RemoveSlivers(min_edge, &surface, report);
-  pmp::orient_to_bound_a_volume(surface);
+  RemoveSlivers(settings.min_edge, &surface, report);
+  OrientOutward(name, &surface);
+  if (settings.wall > 0) {
+    surface = ToSurface(WithWall(ToMesh(&surface), settings.wall));
+  }
   std::vector<std::pair<Surface::Face_index, Surface::Face_index>> crossing;
   pmp::self_intersections(surface, std::back_inserter(crossing));
   report->self_intersections = crossing.size();
+  if (settings.wall > 0 && !crossing.empty()) {
+    throw InputError(name + ": the wall's inner side crosses itself (" + std::to_string(crossing.size()) +
+                     " pairs of triangles); choose a thinner wall, or a smoother or coarser surface");
+  }
   if (!CGAL::is_closed(surface) || !CGAL::is_valid_polygon_mesh(surface)) {
     throw InputError(name + ": cannot be repaired to a closed surface");
   }

@@ -7,7 +7,14 @@
 
 namespace fulcrum::scene {
 
+struct SurfaceRepair {
+  double min_edge = 0;        ///< Shorter edges are collapsed.
+  bool cap_openings = false;  ///< Close an open surface.
+  double wall = 0;            ///< > 0: the result bounds a wall this thick below the surface; openings become its rims.
+};
+
 struct RepairReport {
+  std::size_t openings_capped = 0;
   std::size_t pieces_dropped = 0;  ///< Separate pieces other than the largest.
   std::size_t edges_collapsed = 0;
   std::size_t caps_flipped = 0;        ///< Flat triangles removed by flipping their longest edge.
@@ -15,10 +22,11 @@ struct RepairReport {
   double least_edge = 0, least_angle_deg = 0;  ///< After the repair.
 };
 
-/// The largest piece of `mesh` as a closed, oriented (outward) two-manifold without edges below `min_edge` and without
-/// needle or cap triangles where its topology allows. Throws InputError "name: reason" when it cannot be closed.
-TriangleMesh RepairClosedSurface(const TriangleMesh& mesh, double min_edge, const std::string& name,
-                                 RepairReport* report);
+/// The largest piece of `mesh` as a closed, oriented (outward) two-manifold without short edges and without needle or
+/// cap triangles where its topology allows. Throws InputError "name: reason" when it cannot be closed, or when the
+/// wall's inner side crosses itself.
+TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settings, const std::string& name,
+                           RepairReport* report);
 
 /// Edge collapse (Lindstrom, Turk 1998) down to `triangles_max`; pieces and holes stay. Orientation is made consistent.
 TriangleMesh Decimate(const TriangleMesh& mesh, int triangles_max);

@@ -27,26 +27,6 @@ struct Extent {
   }
 };
 
-double LeastDihedral(const std::array<Vec3d, 4>& x) {
-  double least = kInfinity;
-  for (int i = 0; i < 4; ++i) {
-    for (int j = i + 1; j < 4; ++j) {
-      std::array<int, 2> rest;
-      int count = 0;
-      for (int k = 0; k < 4; ++k) {
-        if (k != i && k != j) {
-          rest[count++] = k;
-        }
-      }
-      const Vec3d e = (x[j] - x[i]).normalized();
-      const Vec3d a = x[rest[0]] - x[i], b = x[rest[1]] - x[i];
-      const Vec3d p = a - a.dot(e) * e, q = b - b.dot(e) * e;
-      least = std::min(least, std::atan2(p.cross(q).norm(), p.dot(q)));
-    }
-  }
-  return least * 180 / std::numbers::pi;
-}
-
 void MeasureOrgan(const SceneView& s, SceneQuality* q) {
   Extent volume, angle, edge;
   for (const Tetrahedron& t : s.tets) {
@@ -57,16 +37,22 @@ void MeasureOrgan(const SceneView& s, SceneQuality* q) {
     const double v = SignedVolume(x[0], x[1], x[2], x[3]);
     q->organ_volume_m3 += v;
     volume.Add(v);
-    angle.Add(LeastDihedral(x));
+    const DihedralRange dihedral = DihedralAngles(x);
+    angle.Add(dihedral.least_deg);
+    angle.Add(dihedral.largest_deg);
+    q->mean_least_dihedral_deg += dihedral.least_deg / static_cast<double>(s.tets.size());
+    q->inverted_tets += v > 0 ? 0 : 1;
   }
   for (const StretchConstraint& e : s.tube_edges) {
     edge.Add(e.rest_length);
+    q->mean_edge_m += e.rest_length / static_cast<double>(s.tube_edges.size());
   }
   for (Extent* extent : {&volume, &angle, &edge}) {
     extent->Settle();
   }
   q->least_tet_volume_m3 = volume.least;
   q->least_dihedral_deg = angle.least;
+  q->largest_dihedral_deg = angle.largest;
   q->least_edge_m = edge.least;
   q->largest_edge_m = edge.largest;
 }
@@ -144,8 +130,12 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
   add("  bending    %zu", q.bending);
   add("  colours    tets %zu, organ springs %zu, bending %zu, bindings %zu", q.colours[0], q.colours[1], q.colours[2],
       q.colours[3]);
-  add("  tets       least volume %.4f mm3, least dihedral angle %.1f deg, edges %.2f to %.2f mm",
-      1e9 * q.least_tet_volume_m3, q.least_dihedral_deg, 1e3 * q.least_edge_m, 1e3 * q.largest_edge_m);
+  add("  tets       %zu inverted, least volume %.4f mm3, dihedral angles %.1f to %.1f deg (least of each: %.1f on "
+      "average)",
+      q.inverted_tets, 1e9 * q.least_tet_volume_m3, q.least_dihedral_deg, q.largest_dihedral_deg,
+      q.mean_least_dihedral_deg);
+  add("  edges      %.2f to %.2f mm, %.2f on average", 1e3 * q.least_edge_m, 1e3 * q.largest_edge_m,
+      1e3 * q.mean_edge_m);
   add("  bindings   %.2f to %.2f mm long", 1e3 * q.least_binding_m, 1e3 * q.largest_binding_m);
   add("  sheet      %.1f x %.1f mm flattened, lengths kept to %.2f %% rms, %.1f to %.1f %%", 1e3 * q.sheet_m[0],
       1e3 * q.sheet_m[1], 100 * q.rms_flat_error, 100 * (q.least_flat_ratio - 1), 100 * (q.largest_flat_ratio - 1));

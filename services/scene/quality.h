@@ -14,8 +14,10 @@ struct SceneQuality {
   std::array<std::size_t, 4> colours;  ///< Of tets, organ springs, bending and bindings.
   double organ_volume_m3;
   double least_tet_volume_m3;
-  double least_dihedral_deg;            ///< Over all tetrahedra; 70.5 in a regular one.
-  double least_edge_m, largest_edge_m;  ///< Of the organ.
+  std::size_t inverted_tets;                         ///< Without positive volume.
+  double least_dihedral_deg, largest_dihedral_deg;   ///< Over all tetrahedra; 70.5 in a regular one.
+  double mean_least_dihedral_deg;                    ///< Of each tetrahedron's least angle.
+  double least_edge_m, largest_edge_m, mean_edge_m;  ///< Of the organ.
   double least_binding_m, largest_binding_m;
   /// Material length over rest length of the membrane's springs: 1 where the flattening is isometric.
   double least_flat_ratio, largest_flat_ratio;

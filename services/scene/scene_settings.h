@@ -31,13 +31,18 @@ struct TubeSettings {
       BrickSplit::kSix;  ///< kFive needs an even number of segments: diagonals must agree round the ring.
 };
 
-/// The organ read from a closed surface mesh instead. It is filled with tetrahedra (the wall is not told apart from
-/// what it holds); the membrane covers a stretch of its centre line, on the side it is dissected from.
+/// The organ read from a mesh instead: its tetrahedra as they are, or a surface that is filled with tetrahedra (without
+/// `wall_m` the wall is not told apart from what it holds). The membrane covers a stretch of its centre line, on the
+/// side it is dissected from.
 struct ImportSettings {
   double scale_m = 0.001;          ///< Metres per unit of the files.
   Vec3f origin_m = Vec3f::Zero();  ///< This place of the files becomes the origin of frame W.
   std::filesystem::path organ_file;
+  bool remesh = false;        ///< Fill the surface of a file's tetrahedra anew.
+  bool cap_openings = false;  ///< Close an open surface with caps.
+  double wall_m = 0;          ///< > 0: hollow, a wall this thick below the surface; openings stay open.
   int target_tets = 8000;
+  double tet_edge_m = 0;            ///< > 0: tetrahedra of about this mean edge instead of `target_tets`.
   double min_edge_m = 0.0003;       ///< Shorter edges of the surface are slivers and are collapsed.
   int organ_triangles_max = 14000;  ///< The embedded surface is decimated to this many triangles.
   /// The organ's centre line, caudal end first, in the frame of the files [m].

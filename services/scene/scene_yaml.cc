@@ -202,7 +202,14 @@ void ReadImport(StrictMap map, const std::filesystem::path& base, const std::fil
   import->scale_m = map.Choice("unit", import->scale_m, kLengthUnits);
   import->origin_m = map.Vector3Si("origin_mm", import->origin_m, Range::Between(-2000, 2000));
   import->organ_file = FindFile(map, "organ", map.Text("organ"), folders);
+  import->remesh = map.Flag("remesh", import->remesh);
+  import->cap_openings = map.Flag("cap_openings", import->cap_openings);
+  ReadSi(&map, "wall_mm", Range::Between(0, 30), &import->wall_m);
+  if (map.Has("tet_edge_mm") && map.Has("target_tets")) {
+    map.Fail("tet_edge_mm", "and target_tets say the same: give one of them");
+  }
   ReadInteger(&map, "target_tets", 500, 60000, &import->target_tets);
+  ReadSi(&map, "tet_edge_mm", Range::Between(0, 50), &import->tet_edge_m);
   ReadSi(&map, "min_edge_mm", Range::Between(0, 5), &import->min_edge_m);
   ReadInteger(&map, "organ_triangles_max", 500, 200000, &import->organ_triangles_max);
   ReadCentreline(map.Map("centreline"), &import->centreline_m);

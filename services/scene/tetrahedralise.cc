@@ -26,7 +26,8 @@ using Triangulation = CGAL::Mesh_triangulation_3<Domain, CGAL::Default, CGAL::Se
 using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 
-constexpr int kAttempts = 5;
+constexpr int kAttempts = 6;
+constexpr double kLeastOrder = 1, kLargestOrder = 5;  ///< Bounds of a step where two attempts tell nothing of use.
 constexpr double kCountTolerance = 0.1;
 constexpr double kSliverBound_deg = 10;
 /// Distance of the mesh from the surface, as a part of the cell size. The fine surface is embedded, so that what is
@@ -80,7 +81,14 @@ TetrahedralMesh ToMesh(const Complex& complex) {
   return mesh;
 }
 
+/// Of a regular tetrahedron of edge 1.
+const double kRegularVolume = 1 / (6 * std::numbers::sqrt2);
+
 }  // namespace
+
+int TetsOfEdge(const TriangleMesh& surface, double edge) {
+  return static_cast<int>(std::min(VolumeOf(surface) / (kRegularVolume * edge * edge * edge), 1e9));
+}
 
 TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const std::string& name) {
   namespace params = CGAL::parameters;
@@ -92,8 +100,10 @@ TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const 
   for (const Triangle& t : mesh.triangles) {
     surface.add_face(vertices[t[0]], vertices[t[1]], vertices[t[2]]);
   }
-  // Volume of a regular tetrahedron of edge h: h^3 / (6 sqrt 2). The criterion bounds circumradii, so begin above it.
-  double size = 1.1 * std::cbrt(6 * std::numbers::sqrt2 * VolumeOf(mesh) / target_tets);
+  // The criterion bounds circumradii, so begin above the regular tetrahedron's edge.
+  double size = 1.1 * std::cbrt(VolumeOf(mesh) / (kRegularVolume * target_tets));
+  // count ~ size^-order: 3 in a thick body; in a wall of one layer it is told by the last two attempts.
+  double order = 3, last_size = 0;
   std::size_t last_count = 0;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     CGAL::Random random(kSeed);
@@ -107,15 +117,22 @@ TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const 
         CGAL::make_mesh_3<Complex>(domain, criteria, params::no_odt(), params::no_lloyd(),
                                    params::perturb(params::time_limit = 0, params::sliver_bound = kSliverBound_deg),
                                    params::exude(params::time_limit = 0, params::sliver_bound = kSliverBound_deg));
-    last_count = complex.number_of_cells_in_complex();
-    if (last_count == 0) {
+    const std::size_t count = complex.number_of_cells_in_complex();
+    if (count == 0) {
       break;
     }
-    const double ratio = static_cast<double>(last_count) / target_tets;
+    if (last_count > 0) {
+      order = std::clamp(
+          std::log(static_cast<double>(count) / static_cast<double>(last_count)) / std::log(last_size / size),
+          kLeastOrder, kLargestOrder);
+    }
+    last_count = count;
+    last_size = size;
+    const double ratio = static_cast<double>(count) / target_tets;
     if (std::abs(ratio - 1) <= kCountTolerance) {
       return ToMesh(complex);
     }
-    size *= std::cbrt(ratio);
+    size *= std::pow(ratio, 1 / order);
   }
   throw InputError(name + ": gives " + std::to_string(last_count) + " tetrahedra after " + std::to_string(kAttempts) +
                    " attempts; asked: " + std::to_string(target_tets) + ". Try another target_tets");

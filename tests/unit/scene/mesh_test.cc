@@ -71,7 +71,7 @@ TEST(Repair, TurnsFlippedFacesAndDropsSlivers) {
     }
   }
   RepairReport report;
-  const TriangleMesh repaired = RepairClosedSurface(mesh, 0.0003, "x", &report);
+  const TriangleMesh repaired = RepairSurface(mesh, {0.0003, false, 0}, "x", &report);
   EXPECT_NEAR(VolumeOf(repaired), volume, 0.01 * volume);
   EXPECT_GE(report.edges_collapsed, 1u);
   EXPECT_GE(report.least_edge, 0.0003);
@@ -90,18 +90,18 @@ TEST(Repair, KeepsTheLargestPieceAndRefusesHoles) {
     mesh.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
   }
   RepairReport report;
-  EXPECT_EQ(RepairClosedSurface(mesh, 1e-5, "x", &report).triangles.size(), count);
+  EXPECT_EQ(RepairSurface(mesh, {1e-5, false, 0}, "x", &report).triangles.size(), count);
   EXPECT_EQ(report.pieces_dropped, 1u);
   mesh = Capsule(9, 14, 0.010, 0.020);
   mesh.triangles.pop_back();
   try {
-    (void)RepairClosedSurface(mesh, 1e-5, "open.stl", &report);
+    (void)RepairSurface(mesh, {1e-5, false, 0}, "open.stl", &report);
     FAIL();
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("open.stl: the surface is not closed (3 open edges)"), std::string::npos)
         << error.what();
   }
-  EXPECT_THROW((void)RepairClosedSurface({{Vec3d::Zero()}, {{0, 0, 0}}}, 1e-5, "x", &report), InputError);
+  EXPECT_THROW((void)RepairSurface({{Vec3d::Zero()}, {{0, 0, 0}}}, {1e-5, false, 0}, "x", &report), InputError);
 }
 
 TEST(Decimation, ReachesItsCountAndKeepsTheShape) {
