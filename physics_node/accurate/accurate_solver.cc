@@ -92,7 +92,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
     *a = FloatArray(pool);
   }
   carry_ = FloatArray(kCarry * std::size_t{particles->layout().stride} + 16);
-  row_sums_ = FloatArray(static_cast<std::size_t>(rows_ * coarse_.columns() * 3));
+  row_sums_ = FloatArray(static_cast<std::size_t>(rows_) * coarse_.row_width());
   partial_.assign(static_cast<std::size_t>(rows_ / kChunkRows + 1), 0.0);
   Follow(tissue);
   // The first coarse matrix: all of it, at rest.
@@ -342,6 +342,7 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   ForChunks([&](int, int row0, int row1) {
     kernels_.sheet_linearise(sheet, inertia, at, matrix, carry_.data(), row0, row1);
   });
+  kernels_.middle_blocks(sheet, coarse_.middle(), matrix, inertia.inertia);
   const Organ organ = MakeOrgan();
   const OrganMatrix organ_matrix{organ_c_.data(), organ_f_.data(), organ_stress_.data(), organ_block_.data()};
   kernels_.organ_linearise(organ, organ_matrix, place_.data(), 0, tube_count_);
@@ -372,13 +373,11 @@ double AccurateSolver::Precondition() {
         {field.data() + tube_floats_, field.data() + tube_floats_ + plane_, field.data() + tube_floats_ + 2 * plane_}};
   };
   Planes r = planes(residual_), z = planes(z_);
-  ForChunks([&](int, int row0, int row1) {
-    kernels_.sheet_restrict(sheet, r, coarse_.weights(), coarse_.columns(), row_sums_.data(), row0, row1);
-  });
+  const Middle middle = coarse_.middle();
+  ForChunks([&](int, int row0, int row1) { kernels_.sheet_restrict(sheet, middle, r, row_sums_.data(), row0, row1); });
   coarse_.Solve(row_sums_.data(), residual_.data(), particles_->tube());
   ForChunks([&](int chunk, int row0, int row1) {
-    partial_[static_cast<std::size_t>(chunk)] = kernels_.sheet_precondition(
-        sheet, matrix, r, coarse_.row_values(), coarse_.weights(), coarse_.columns(), z, row0, row1);
+    partial_[static_cast<std::size_t>(chunk)] = kernels_.sheet_precondition(sheet, middle, matrix, r, z, row0, row1);
   });
   double sum = 0;
   for (const double part : partial_) {

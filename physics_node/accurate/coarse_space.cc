@@ -1,5 +1,7 @@
 #include "physics_node/accurate/coarse_space.h"
 
+#include <xmmintrin.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -36,14 +38,7 @@ CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, cons
   coarse_rows_ = std::min(kSheetRows, rows_);
   row_place_ = Spread<RowPlace>(rows_, coarse_rows_);
   column_place_ = Spread<RowPlace>(static_cast<int>(cols_), columns_);
-  column_weights_ = FloatArray(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(stride_));
-  for (std::uint32_t c = 0; c < cols_; ++c) {
-    const RowPlace& at = column_place_[c];
-    column_weights_[static_cast<std::size_t>(at.cell * stride_) + layout_.Offset(0, c)] += 1.0f - at.fraction;
-    if (at.cell + 1 < columns_) {
-      column_weights_[static_cast<std::size_t>((at.cell + 1) * stride_) + layout_.Offset(0, c)] += at.fraction;
-    }
-  }
+  BuildMiddle();
   nodes_ = columns_ * coarse_rows_;
   // The lattice over the organ; only nodes that carry something get a number.
   std::map<std::array<int, 3>, std::uint16_t> lattice;
@@ -72,10 +67,62 @@ CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, cons
   tube_mass_ = Eigen::MatrixXf::Zero(n, n);
   building_ = Eigen::MatrixXf::Zero(n, n);
   factor_ = Eigen::LLT<Eigen::MatrixXf>(n);
-  right_ = solution_ = Eigen::VectorXf::Zero(n);
-  row_values_.assign(static_cast<std::size_t>(rows_ * columns_ * 3), 0.0f);
+  solution_ = Eigen::VectorXf::Zero(n);
+  nodes4_ = FloatArray(4 * static_cast<std::size_t>(nodes_));
   AddTube(model);
   AddBindings(model, particles);
+}
+
+void CoarseSpace::BuildMiddle() {
+  const int slots = static_cast<int>(layout_.slots);
+  middle_slots_ = (slots + 3) / 4;
+  width_ = static_cast<std::size_t>(middle_slots_) * kLanes;
+  for (int row = 0; row < rows_; row += 4) {
+    centre_.push_back(row);
+  }
+  if (rows_ > 0 && centre_.back() != rows_ - 1) {
+    centre_.push_back(rows_ - 1);
+  }
+  middle_rows_ = static_cast<int>(centre_.size());
+  for (int row = 0; row < rows_; ++row) {
+    const int cell = row / 4;
+    cell_.push_back(cell);
+    const int span = cell + 1 < middle_rows_ ? centre_[static_cast<std::size_t>(cell) + 1] - 4 * cell : 1;
+    fraction_.push_back(static_cast<float>(row - 4 * cell) / static_cast<float>(span));
+  }
+  own_ = FloatArray(static_cast<std::size_t>(slots) * kLanes);
+  next_ = FloatArray(static_cast<std::size_t>(slots) * kLanes);
+  for (int s = 0; s < slots; ++s) {
+    const int group = s / 4, length = std::min(4, slots - 4 * group);
+    const float on = static_cast<float>(s - 4 * group) / static_cast<float>(length);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      // Nothing follows the last lane's last group.
+      const bool last = lane + 1 == kLanes && group + 1 == middle_slots_;
+      own_[static_cast<std::size_t>(s * kLanes + lane)] = last ? 1.0f : 1.0f - on;
+      next_[static_cast<std::size_t>(s * kLanes + lane)] = last ? 0.0f : on;
+    }
+  }
+  for (FloatArray& block : block_) {
+    block = FloatArray(static_cast<std::size_t>(middle_rows_) * width_);
+  }
+  residual_ = FloatArray(3 * static_cast<std::size_t>(middle_rows_) * width_);
+  value_ = FloatArray(3 * static_cast<std::size_t>(middle_rows_) * width_);
+  for (std::size_t i = 0; i < width_; ++i) {
+    const auto slot = static_cast<std::uint32_t>(4 * (i / kLanes)), lane = static_cast<std::uint32_t>(i % kLanes);
+    column_of_.push_back(std::min(lane * layout_.slots + slot, cols_ > 0 ? cols_ - 1 : 0));
+  }
+}
+
+Middle CoarseSpace::middle() {
+  return {middle_rows_,
+          middle_slots_,
+          centre_.data(),
+          own_.data(),
+          next_.data(),
+          cell_.data(),
+          fraction_.data(),
+          {block_[0].data(), block_[1].data(), block_[2].data(), block_[3].data(), block_[4].data(), block_[5].data()},
+          value_.data()};
 }
 
 void CoarseSpace::AddTube(const ElasticModel& model) {
@@ -278,54 +325,101 @@ void CoarseSpace::Refresh(const Sheet& sheet, const SheetMatrix& matrix, float i
 }
 
 void CoarseSpace::Solve(const float* row_sums, const float* tube_residual, const float* tube) {
-  right_.setZero();
-  const auto width = static_cast<std::size_t>(3 * columns_);
-  for (int row = 0; row < rows_; ++row) {
-    const RowPlace& at = row_place_[static_cast<std::size_t>(row)];
-    const float* sums = row_sums + static_cast<std::size_t>(row) * width;
-    float* low = right_.data() + static_cast<std::size_t>(at.cell) * width;
-    float* high = at.cell + 1 < coarse_rows_ ? low + width : low;
-    for (std::size_t i = 0; i < width; ++i) {
-      low[i] += (1.0f - at.fraction) * sums[i];
-      high[i] += at.fraction * sums[i];
+  std::fill_n(residual_.data(), residual_.size(), 0.0f);
+  const std::size_t row_floats = row_width();
+  for (std::size_t row = 0; row < static_cast<std::size_t>(rows_); ++row) {
+    const float* sums = row_sums + row * row_floats;
+    float* low = residual_.data() + static_cast<std::size_t>(cell_[row]) * row_floats;
+    const float up = fraction_[row], down = 1.0f - up;
+    for (std::size_t i = 0; i < row_floats; ++i) {
+      low[i] += down * sums[i];
     }
-  }
-  for (std::size_t v = 0; v < tube_weights_.size(); ++v) {
-    if (!(tube[4 * v + 3] > 0.0f)) {
-      continue;
-    }
-    const Weights8& w = tube_weights_[v];
-    for (std::size_t i = 0; i < 8; ++i) {
-      float* out = right_.data() + 3 * static_cast<std::size_t>(w.node[i]);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        out[axis] += w.weight[i] * tube_residual[4 * v + axis];
+    if (up > 0.0f) {
+      for (std::size_t i = 0; i < row_floats; ++i) {
+        low[row_floats + i] += up * sums[i];
       }
     }
   }
-  solution_ = right_;
+  std::fill_n(nodes4_.data(), nodes4_.size(), 0.0f);
+  ForEachMiddle([&](std::size_t at, std::size_t node, float weight) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      nodes4_[4 * node + axis] += weight * residual_[at + axis * width_];
+    }
+  });
+  for (std::size_t v = 0; v < tube_weights_.size(); ++v) {
+    if (tube[4 * v + 3] > 0.0f) {
+      const Weights8& w = tube_weights_[v];
+      const __m128 r = _mm_load_ps(tube_residual + 4 * v);
+      for (std::size_t i = 0; i < 8; ++i) {
+        float* out = nodes4_.data() + 4 * std::size_t{w.node[i]};
+        _mm_store_ps(out, _mm_add_ps(_mm_load_ps(out), _mm_mul_ps(_mm_set1_ps(w.weight[i]), r)));
+      }
+    }
+  }
+  for (int i = 0; i < nodes_; ++i) {
+    solution_.segment<3>(3 * i) = Eigen::Map<const Vec3f>(nodes4_.data() + 4 * i);
+  }
   factor_.solveInPlace(solution_);
-  for (int row = 0; row < rows_; ++row) {
-    const RowPlace& at = row_place_[static_cast<std::size_t>(row)];
-    const float* low = solution_.data() + static_cast<std::size_t>(at.cell) * width;
-    const float* high = at.cell + 1 < coarse_rows_ ? low + width : low;
-    float* out = row_values_.data() + static_cast<std::size_t>(row) * width;
-    for (std::size_t i = 0; i < width; ++i) {
-      out[i] = (1.0f - at.fraction) * low[i] + at.fraction * high[i];
+  for (int i = 0; i < nodes_; ++i) {
+    Eigen::Map<Vec3f>(nodes4_.data() + 4 * i) = solution_.segment<3>(3 * i);
+  }
+  SmoothMiddle();
+  ForEachMiddle([&](std::size_t at, std::size_t node, float weight) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      value_[at + axis * width_] += weight * nodes4_[4 * node + axis];
+    }
+  });
+}
+
+/// visit(float of the middle level, coarse node, weight) for all that overlap.
+template <class Visit>
+void CoarseSpace::ForEachMiddle(const Visit& visit) const {
+  for (std::size_t r = 0; r < static_cast<std::size_t>(middle_rows_); ++r) {
+    const RowPlace row = row_place_[static_cast<std::size_t>(centre_[r])];
+    for (std::size_t i = 0; i < width_; ++i) {
+      const RowPlace column = column_place_[column_of_[i]];
+      const std::size_t at = 3 * r * width_ + i;
+      const auto first = static_cast<std::size_t>(row.cell * columns_ + column.cell);
+      const bool next_row = row.cell + 1 < coarse_rows_, next_column = column.cell + 1 < columns_;
+      visit(at, first, (1 - row.fraction) * (1 - column.fraction));
+      if (next_column) {
+        visit(at, first + 1, (1 - row.fraction) * column.fraction);
+      }
+      if (next_row) {
+        visit(at, first + static_cast<std::size_t>(columns_), row.fraction * (1 - column.fraction));
+        if (next_column) {
+          visit(at, first + static_cast<std::size_t>(columns_) + 1, row.fraction * column.fraction);
+        }
+      }
+    }
+  }
+}
+
+/// value <- B^-1 residual.
+void CoarseSpace::SmoothMiddle() {
+  for (std::size_t r = 0; r < static_cast<std::size_t>(middle_rows_); ++r) {
+    const std::size_t at = 3 * r * width_, plane = r * width_;
+    const float *x = residual_.data() + at, *y = x + width_, *z = y + width_;
+    float *vx = value_.data() + at, *vy = vx + width_, *vz = vy + width_;
+    for (std::size_t i = 0; i < width_; ++i) {
+      const std::size_t b = plane + i;
+      vx[i] = block_[0][b] * x[i] + block_[3][b] * y[i] + block_[4][b] * z[i];
+      vy[i] = block_[3][b] * x[i] + block_[1][b] * y[i] + block_[5][b] * z[i];
+      vz[i] = block_[4][b] * x[i] + block_[5][b] * y[i] + block_[2][b] * z[i];
     }
   }
 }
 
 void CoarseSpace::Prolong(const float* tube, float* tube_z) const {
   for (std::size_t v = 0; v < tube_weights_.size(); ++v) {
-    if (!(tube[4 * v + 3] > 0.0f)) {
-      continue;
-    }
-    const Weights8& w = tube_weights_[v];
-    for (std::size_t i = 0; i < 8; ++i) {
-      const float* in = solution_.data() + 3 * static_cast<std::size_t>(w.node[i]);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        tube_z[4 * v + axis] += w.weight[i] * in[axis];
+    if (tube[4 * v + 3] > 0.0f) {
+      const Weights8& w = tube_weights_[v];
+      __m128 sum = _mm_load_ps(tube_z + 4 * v);
+      for (std::size_t i = 0; i < 8; ++i) {
+        sum = _mm_add_ps(
+            sum, _mm_mul_ps(_mm_set1_ps(w.weight[i]), _mm_load_ps(nodes4_.data() + 4 * std::size_t{w.node[i]})));
       }
+      _mm_store_ps(tube_z + 4 * v, sum);
     }
   }
 }

@@ -1,6 +1,7 @@
-// The coarse level of the two-level solver: a few dozen nodes that carry what neighbours alone would take hundreds of
-// sweeps to tell one another. Bilinear in the membrane's rows and columns, trilinear on a lattice of 30 mm over the
-// organ; Galerkin matrix A_c = P^T A P, factored dense.
+// The levels above the particles: what carries in one product what neighbours would take hundreds of sweeps to tell one
+// another. Over the membrane a middle level of every fourth row and column, with blocks of its diagonal; over both
+// layers a coarse level of a few dozen nodes, bilinear in the membrane's rows and columns and trilinear on a lattice of
+// 30 mm over the organ, with its Galerkin matrix factored dense.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -22,19 +23,19 @@ class CoarseSpace {
   /// force when it is complete: so no step pays for all of it. A hundred steps old it serves as well as new.
   void Refresh(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows);
 
-  /// Weights of the membrane's columns, [columns()][stride].
-  [[nodiscard]] const float* weights() const { return column_weights_.data(); }
-  [[nodiscard]] int columns() const { return columns_; }
+  /// The middle level as the kernels see it.
+  [[nodiscard]] Middle middle();
+  /// Floats of one row in Kernels::sheet_restrict's sums.
+  [[nodiscard]] std::size_t row_width() const { return 3 * width_; }
 
-  /// Of the residual r: `row_sums` [rows][columns][3] by Kernels::sheet_restrict, tube xyz_ of moving vertices.
+  /// From the residual - `row_sums` [rows][row_width()] by Kernels::sheet_restrict, tube xyz_ - to Middle::value and
+  /// the coarse solution.
   void Solve(const float* row_sums, const float* tube_residual, const float* tube);
-  /// The solution on the membrane's rows, [rows][columns][3], for Kernels::sheet_precondition.
-  [[nodiscard]] const float* row_values() const { return row_values_.data(); }
   /// tube_z += P y for vertices that move (w of `tube` > 0).
   void Prolong(const float* tube, float* tube_z) const;
 
  private:
-  struct Weights8 {
+  struct alignas(16) Weights8 {
     std::array<std::uint16_t, 8> node;
     std::array<float, 8> weight;
   };
@@ -46,20 +47,34 @@ class CoarseSpace {
   void AddTube(const ElasticModel& model);
   void AddBindings(const ElasticModel& model, const ParticleStore& particles);
   void Factorise();
+  void BuildMiddle();
+  void SmoothMiddle();
+  template <class Visit>
+  void ForEachMiddle(const Visit& visit) const;
 
   int columns_ = 0, coarse_rows_ = 0, rows_ = 0, stride_ = 0;
   std::uint32_t cols_ = 0;
   GridLayout layout_;
   std::vector<RowPlace> row_place_;
   std::vector<RowPlace> column_place_;
-  FloatArray column_weights_;
+
+  // The middle level.
+  int middle_rows_ = 0, middle_slots_ = 0;
+  std::size_t width_ = 0;  ///< Floats of a plane of its row.
+  std::vector<int> centre_, cell_;
+  std::vector<float> fraction_;
+  FloatArray own_, next_;
+  std::array<FloatArray, 6> block_;
+  FloatArray residual_, value_;
+  std::vector<std::uint32_t> column_of_;  ///< Column of the sheet that a float of its row stands on, at most cols - 1.
+
   std::vector<Weights8> tube_weights_;
   int nodes_ = 0;
   Eigen::MatrixXf constant_, tube_mass_;  ///< Parts that do not change: organ and bindings at rest; mass of the organ.
   Eigen::MatrixXf building_;
   Eigen::LLT<Eigen::MatrixXf> factor_;
-  Eigen::VectorXf right_, solution_;
-  std::vector<float> row_values_;
+  Eigen::VectorXf solution_;
+  FloatArray nodes4_;  ///< Right side, then solution, xyz_ per coarse node.
   int next_row_ = 0;
 };
 

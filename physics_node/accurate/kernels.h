@@ -39,8 +39,22 @@ struct SheetMatrix {
   float* block[6];  ///< Inverse of the diagonal blocks: xx, yy, zz, xy, xz, yz; 0 where a node does not move [m/N].
 };
 
-/// Rows of partial sums that a kernel hands to the next row; kCarry * stride floats, owned by the caller's thread.
-inline constexpr int kCarry = 18;
+/// Memory of a thread for the rows in work: kCarry * stride floats.
+inline constexpr int kCarry = 45;
+
+/// The middle level: hats of +-4 rows and 4 columns, lane-blocked as the sheet is, every fourth slot of it.
+struct Middle {
+  int rows, slots;
+  const int* centre;      ///< [rows] row of the sheet.
+  const float* own;       ///< [sheet slots][8] weight of a column in its own function ...
+  const float* next;      ///< ... and in the next one; at the end of a lane the next lane's first.
+  const int* cell;        ///< [sheet rows] the middle row at or before a row ...
+  const float* fraction;  ///< ... and how far on towards the one after it.
+  float* block[6];        ///< Inverse of the diagonal blocks, [rows][slots * 8].
+  const float* value;     ///< The solution, [rows][3][slots * 8].
+};
+/// Sum of hat^2 over the nodes of a hat: (11/4)^2.
+inline constexpr float kHatMass = 7.5625f;
 
 struct SheetLinearise {
   const float* place[3];     ///< Where to linearise.
@@ -90,14 +104,13 @@ struct Kernels {
   /// Elastic and inertial energy at `place` of the edges and nodes that rows [row0, row1) own [J].
   double (*sheet_energy)(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at, int row0, int row1);
 
-  /// z <- D^-1 r + (coarse) where a node moves; coarse is [columns][3] per row, weights [columns][stride] by column.
-  /// Returns r . z.
-  double (*sheet_precondition)(const Sheet& sheet, const SheetMatrix& matrix, const float* const r[3],
-                               const float* coarse, const float* weights, int columns, float* const z[3], int row0,
-                               int row1);
-  /// sums[row][column][3] <- sum over a row of weight * r, of nodes that move.
-  void (*sheet_restrict)(const Sheet& sheet, const float* const r[3], const float* weights, int columns, float* sums,
-                         int row0, int row1);
+  void (*middle_blocks)(const Sheet& sheet, const Middle& middle, const SheetMatrix& matrix, float inertia);
+  /// sums [row][3][middle slots * 8] <- what a row's residual of nodes that move gives to the middle level's slots.
+  void (*sheet_restrict)(const Sheet& sheet, const Middle& middle, const float* const r[3], float* sums, int row0,
+                         int row1);
+  /// z <- D^-1 r + the middle level's value where a node moves. Returns r . z.
+  double (*sheet_precondition)(const Sheet& sheet, const Middle& middle, const SheetMatrix& matrix,
+                               const float* const r[3], float* const z[3], int row0, int row1);
 
   /// p <- z + beta p on `count` floats.
   void (*combine)(const float* z, float beta, float* p, std::size_t count);

@@ -6,11 +6,10 @@ namespace fulcrum::physics::accurate {
 
 const Kernels& Avx512Kernels() {
   namespace isa = accurate_avx512;
-  static constexpr Kernels kernels{"AVX-512",           isa::SheetGuess,  isa::SheetLineariseRows,
-                                   isa::SheetApply,     isa::SheetEnergy, isa::SheetPrecondition,
-                                   isa::SheetRestrict,  isa::Combine,     isa::AdvanceFields,
-                                   isa::OrganLinearise, isa::OrganBlocks, isa::OrganStress,
-                                   isa::OrganGather,    isa::OrganEnergy};
+  static constexpr Kernels kernels{
+      "AVX-512",           isa::SheetGuess,    isa::SheetLineariseRows, isa::SheetApply,  isa::SheetEnergy,
+      isa::MiddleBlocks,   isa::SheetRestrict, isa::SheetPrecondition,  isa::Combine,     isa::AdvanceFields,
+      isa::OrganLinearise, isa::OrganBlocks,   isa::OrganStress,        isa::OrganGather, isa::OrganEnergy};
   return kernels;
 }
 
