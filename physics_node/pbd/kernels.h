@@ -26,8 +26,8 @@ struct alignas(32) SpringBatch {
 /// Eight tetrahedra of one colour.
 struct alignas(32) TetBatch {
   std::uint32_t v[4][kLanes];
-  float rest_volume[kLanes];  ///< [m^3]
-  float floor[kLanes];        ///< Least sum of w |gradient|^2 to divide by, a small part of its value at rest.
+  float rest_volume[kLanes];  ///< Six times it [m^3].
+  float floor[kLanes];        ///< Least sum of w |6 gradient|^2 to divide by, a small part of its value at rest.
 };
 
 /// Eight dihedral angles of one colour. Vertices are indices into the hinge particles, a copy in xyzw of the few
@@ -35,7 +35,7 @@ struct alignas(32) TetBatch {
 struct alignas(32) BendingBatch {
   std::uint32_t v[4][kLanes];
   float rest_angle[kLanes];  ///< [rad]
-  float floor[kLanes];       ///< As in TetBatch [rad^2 per (m^2 kg)].
+  float floor[kLanes];       ///< Least |normal|^2 to divide by, a small part of its value at rest [m^4].
   float active[kLanes];      ///< 1, or 0 where the hinge has been cut.
 };
 

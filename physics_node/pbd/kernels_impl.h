@@ -151,19 +151,27 @@ inline void StretchRowPairs(const GridArrays& g, int row, bool along, F k) {
 }
 
 void GridStretch(const GridArrays& g, float stiffness) {
+  // Even row pairs, then odd ones: the pairs of a set are disjoint. An odd pair needs only its two even neighbours
+  // done, so it follows them at once, while their rows are in the cache.
+  constexpr int kAtOnce = 2 * Widest::kBatches;
   const F8 k = F8::All(stiffness);
-  // Even row pairs, then odd ones: the pairs of a set are disjoint.
-  for (int first = 0; first < 2; ++first) {
-    int r = first;
-    for (; r + 2 * Widest::kBatches <= g.rows; r += 2 * Widest::kBatches) {
-      StretchRowPairs<Widest>(g, r, first == 0, Widest::All(stiffness));
+  const Widest wide_k = Widest::All(stiffness);
+  int even = 0, odd = 1;
+  for (; even + kAtOnce <= g.rows; even += kAtOnce) {
+    StretchRowPairs(g, even, true, wide_k);
+    if (odd <= even) {
+      StretchRowPairs(g, odd, false, wide_k);
+      odd += kAtOnce;
     }
-    for (; r + 2 <= g.rows; r += 2) {
-      StretchRowPairs<F8>(g, r, first == 0, k);
-    }
-    if (first == 0 && r < g.rows) {
-      StretchAlongRow(RowsOf<F8>(g, r, 1), RestOf(g, 0, r), g.slots, k);
-    }
+  }
+  for (; even + 2 <= g.rows; even += 2) {
+    StretchRowPairs(g, even, true, k);
+  }
+  if (even < g.rows) {
+    StretchAlongRow(RowsOf<F8>(g, even, 1), RestOf(g, 0, even), g.slots, k);
+  }
+  for (; odd + 2 <= g.rows; odd += 2) {
+    StretchRowPairs(g, odd, false, k);
   }
 }
 
@@ -185,21 +193,18 @@ inline void ProjectSprings(float* particles, const SpringBatch& batch, float sti
 template <class F>
 inline void ProjectVolumes(float* particles, const TetBatch& batch, float stiffness) {
   constexpr std::size_t kStep = kNext<TetBatch>;
-  const F sixth = F::All(1.0f / 6.0f);
   Particles<F> q[4];
   for (int j = 0; j < 4; ++j) {
     q[j] = GatherXyzw<F, 4>(particles, batch.v[j], kStep);
   }
+  // Six times the volume and its gradients; the first vertex's is minus the sum of the others'.
   const V<F> b = q[1].p - q[0].p, c = q[2].p - q[0].p, d = q[3].p - q[0].p;
-  const V<F> gd = Cross(b, c) * sixth;
-  const F volume = Dot(gd, d);
-  const V<F> gb = Cross(c, d) * sixth;
-  const V<F> gc = Cross(d, b) * sixth;
-  const V<F> ga = (gb + gc + gd) * F::All(-1.0f);
+  const V<F> gd = Cross(b, c), gb = Cross(c, d), gc = Cross(d, b);
+  const V<F> ga = gb + gc + gd;
   const F sum = q[0].w * Dot(ga, ga) + q[1].w * Dot(gb, gb) + q[2].w * Dot(gc, gc) + q[3].w * Dot(gd, gd);
-  const F lambda = F::All(stiffness) * (Batches<F>::Load(batch.rest_volume, kStep) - volume) /
+  const F lambda = F::All(stiffness) * (Batches<F>::Load(batch.rest_volume, kStep) - Dot(gd, d)) /
                    Max(sum, Batches<F>::Load(batch.floor, kStep));
-  q[0].p = q[0].p + ga * (lambda * q[0].w);
+  q[0].p = q[0].p - ga * (lambda * q[0].w);
   q[1].p = q[1].p + gb * (lambda * q[1].w);
   q[2].p = q[2].p + gc * (lambda * q[2].w);
   q[3].p = q[3].p + gd * (lambda * q[3].w);

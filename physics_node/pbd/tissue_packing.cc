@@ -137,9 +137,9 @@ void TissueModel::PackTube(const SceneView& scene, const ParticleStore& particle
         sum += w * rest.gradient[j].squaredNorm();
         heaviest = std::max(heaviest, rest.gradient[j].squaredNorm());
       }
-      batch.rest_volume[lane] = static_cast<float>(rest.value);
+      batch.rest_volume[lane] = static_cast<float>(6 * rest.value);
       // With all four vertices fixed there is nothing to move; any positive floor does.
-      batch.floor[lane] = static_cast<float>(kFloorPart * (sum > 0 ? sum : heaviest));
+      batch.floor[lane] = static_cast<float>(36 * kFloorPart * (sum > 0 ? sum : heaviest));
       ++counts_.volume;
     }
   });
@@ -148,14 +148,20 @@ void TissueModel::PackTube(const SceneView& scene, const ParticleStore& particle
 void TissueModel::PackBending(const SceneView& scene, const ParticleStore& particles) {
   ColourCheck check(scene.rest_position.size());
   std::vector<std::pair<Index, Index>> users;
-  // Each particle that a hinge uses gets a place in the compact copy; the last one is the padding.
+  // Each particle that a hinge uses gets a place in the compact copy, in the order of memory; the last one is the
+  // padding.
   std::vector<Index> place(scene.rest_position.size(), kNoIndex);
   for (const BendingConstraint& constraint : scene.bending) {
     for (const Index p : constraint.v) {
-      if (p < place.size() && place[p] == kNoIndex) {
-        place[p] = static_cast<Index>(hinge_particles_.size());
-        hinge_particles_.push_back(particles.Ref(p));
+      if (p < place.size()) {
+        place[p] = 0;
       }
+    }
+  }
+  for (Index p = 0; p < place.size(); ++p) {
+    if (place[p] != kNoIndex) {
+      place[p] = static_cast<Index>(hinge_particles_.size());
+      hinge_particles_.push_back(particles.Ref(p));
     }
   }
   hinge_slot_.assign(scene.bending.size(), 0);
