@@ -1,0 +1,310 @@
+#include "physics_node/collision/tissue_collision.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "physics_node/collision/closest.h"
+
+namespace fulcrum::physics {
+namespace {
+
+/// Rows are made this far from contact, and as much more as the block moves in two steps [m].
+constexpr float kBand = 0.0002f;
+/// What is further than this behind a surface has gone through for good [m].
+constexpr float kMaxBehind = 0.005f;
+/// Fixed surfaces are seen from this far [m].
+constexpr float kSight = 0.012f;
+/// Beside a rim: the offset from the nearest point lies less than this much along the normal.
+constexpr float kBesideCosine = 0.5f;
+/// Nearer than this the triangle's own normal is the better direction [m].
+constexpr float kTouching = 0.0003f;
+/// Steps of a walk over the organ's surface in one look.
+constexpr int kMaxWalk = 8;
+
+}  // namespace
+
+Vec3f BreathingOffset(const Breathing& breathing, double time_s) {
+  if (!(breathing.amplitude_m > 0.0f) || !(breathing.period_s > 0.0f)) {
+    return Vec3f::Zero();
+  }
+  const double phase = 2.0 * std::numbers::pi * time_s / breathing.period_s;
+  return static_cast<float>(0.5 * breathing.amplitude_m * (1.0 - std::cos(phase))) * breathing.direction;
+}
+
+bool Breathes(SurfaceRole role) { return role != SurfaceRole::kPelvis; }
+
+TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
+                                 const Breathing& breathing)
+    : scene_(scene), model_(model), particles_(particles), breathing_(breathing) {
+  travel_.assign((particles->particle_count() + kBlock - 1) / kBlock, 0.0f);
+  WatchOrgan();
+  WatchFixed(false);
+  WatchFixed(true);
+  near_organ_.reserve(organ_.size());
+  near_fixed_.reserve(fixed_[0].size() + fixed_[1].size());
+}
+
+TissueCollision::Signed TissueCollision::SignedDistance(const Vec3f& p, const std::array<Vec3f, 3>& corners) {
+  Signed result;
+  result.barycentric = ClosestOnTriangle(p, corners[0], corners[1], corners[2]);
+  const auto& b = result.barycentric;
+  const Vec3f offset = p - b[0] * corners[0] - b[1] * corners[1] - b[2] * corners[2];
+  Vec3f normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  const float area = normal.norm();
+  if (!(area > 0.0f)) {
+    return result;
+  }
+  normal /= area;
+  const float distance = offset.norm();
+  const bool front = normal.dot(offset) >= 0.0f;
+  result.distance = front ? distance : -distance;
+  // Behind an edge the way out is still that of the triangle.
+  result.normal = front && distance > kTouching ? Vec3f(offset / distance) : normal;
+  return result;
+}
+
+void TissueCollision::MakeGroups(std::span<Watch> watches, std::vector<Group>* groups) {
+  for (Index i = 0; i < watches.size(); ++i) {
+    const Index block = watches[i].particle / kBlock;
+    if (groups->empty() || groups->back().block != block) {
+      groups->push_back({block, i, i, 0.0f});
+    }
+    groups->back().last = i + 1;
+  }
+}
+
+std::array<Vec3f, 3> TissueCollision::OrganCorners(Index triangle) const {
+  const Triangle& v = scene_.tube_surface[triangle];
+  return {particles_->At({4 * v[0], 1}), particles_->At({4 * v[1], 1}), particles_->At({4 * v[2], 1})};
+}
+
+void TissueCollision::WatchOrgan() {
+  std::vector<std::array<Vec3f, 3>> corners;
+  std::vector<std::vector<Index>> around(scene_.tube_vertex_count);
+  for (Index t = 0; t < scene_.tube_surface.size(); ++t) {
+    const Triangle& v = scene_.tube_surface[t];
+    corners.push_back({scene_.rest_position[v[0]], scene_.rest_position[v[1]], scene_.rest_position[v[2]]});
+    for (const Index vertex : v) {
+      around[vertex].push_back(t);
+    }
+  }
+  ring_start_.push_back(0);
+  for (Index t = 0; t < scene_.tube_surface.size(); ++t) {
+    std::vector<Index> ring;
+    for (const Index vertex : scene_.tube_surface[t]) {
+      ring.insert(ring.end(), around[vertex].begin(), around[vertex].end());
+    }
+    std::sort(ring.begin(), ring.end());
+    ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
+    std::erase(ring, t);
+    ring_.insert(ring_.end(), ring.begin(), ring.end());
+    ring_start_.push_back(static_cast<Index>(ring_.size()));
+  }
+  const TriangleTree tree(corners);
+  for (Index node = 0; node < scene_.membrane.node_count() && !tree.empty(); ++node) {
+    const Index particle = scene_.membrane.first + node;
+    const Vec3f& p = scene_.rest_position[particle];
+    const TriangleTree::Hit hit = tree.Nearest(p, 1.0f);
+    if (scene_.inverse_mass[particle] > 0.0f && hit.triangle != kNoIndex) {
+      const float rest = SignedDistance(p, corners[hit.triangle]).distance;
+      if (rest > 0.0f) {
+        const float clearance = std::min(scene_.physics.collision_margin_m, 0.5f * rest);
+        organ_.push_back({particle, particles_->Ref(particle), hit.triangle, clearance, 0.0f, true});
+      }
+    }
+  }
+  MakeGroups(organ_, &organ_groups_);
+}
+
+void TissueCollision::WatchFixed(bool breathing) {
+  const bool breathes_at_all = breathing_.amplitude_m > 0.0f;
+  std::vector<std::array<Vec3f, 3>> corners;
+  for (const StaticSurface& surface : scene_.static_surfaces) {
+    if (!surface.collides || (breathes_at_all && Breathes(surface.role)) != breathing) {
+      continue;
+    }
+    for (Index t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
+      const Triangle& v = scene_.static_triangles[t];
+      corners.push_back({scene_.static_vertices[v[0]], scene_.static_vertices[v[1]], scene_.static_vertices[v[2]]});
+    }
+  }
+  const std::size_t which = breathing ? 1 : 0;
+  trees_[which] = TriangleTree(std::move(corners));
+  if (trees_[which].empty()) {
+    return;
+  }
+  std::vector<bool> on_surface(particles_->particle_count(), false);
+  for (const Triangle& t : scene_.tube_surface) {
+    on_surface[t[0]] = on_surface[t[1]] = on_surface[t[2]] = true;
+  }
+  for (Index particle = 0; particle < particles_->particle_count(); ++particle) {
+    if (!(scene_.inverse_mass[particle] > 0.0f) || (particle < scene_.tube_vertex_count && !on_surface[particle])) {
+      continue;
+    }
+    Watch watch{particle, particles_->Ref(particle), kNoIndex, scene_.physics.collision_margin_m, 0.0f, false};
+    const Vec3f& p = scene_.rest_position[particle];
+    const TriangleTree::Hit hit = trees_[which].Nearest(p, kSight);
+    if (hit.triangle != kNoIndex) {
+      const float height = trees_[which].normal(hit.triangle).dot(p - hit.point);
+      watch.clearance = std::clamp(0.5f * height, 0.0f, watch.clearance);
+    }
+    fixed_[which].push_back(watch);
+  }
+  MakeGroups(fixed_[which], &fixed_groups_[which]);
+}
+
+void TissueCollision::MeasureMoves(std::vector<float>* moved) const {
+  moved->assign(block_count(), 0.0f);
+  for (Index p = 0; p < particles_->particle_count(); ++p) {
+    const ParticleRef at = particles_->Ref(p);
+    float& largest = (*moved)[p / kBlock];
+    largest = std::max(largest, (particles_->At(at) - particles_->Previous(at)).squaredNorm());
+  }
+  for (float& m : *moved) {
+    m = std::sqrt(m);
+  }
+}
+
+void TissueCollision::Walk(Watch* watch, const Vec3f& p) const {
+  const auto distance_sq = [&](Index t) {
+    const auto x = OrganCorners(t);
+    const auto b = ClosestOnTriangle(p, x[0], x[1], x[2]);
+    return (p - b[0] * x[0] - b[1] * x[1] - b[2] * x[2]).squaredNorm();
+  };
+  float best = distance_sq(watch->triangle);
+  for (int step = 0; step < kMaxWalk; ++step) {
+    const Index from = watch->triangle;
+    for (Index i = ring_start_[from]; i < ring_start_[from + 1]; ++i) {
+      const float d = distance_sq(ring_[i]);
+      if (d < best) {
+        best = d;
+        watch->triangle = ring_[i];
+      }
+    }
+    if (watch->triangle == from) {
+      return;
+    }
+  }
+}
+
+/// look(watch, index, band) returns how far the particle and what it may touch may move together before the next look.
+template <class Look>
+void TissueCollision::LookAtDue(std::vector<Group>* groups, std::vector<Watch>* watches, std::span<const float> moved,
+                                float others_travel, const Look& look) {
+  for (Group& group : *groups) {
+    const float travel = travel_[group.block] + others_travel;
+    if (travel < group.due) {
+      continue;
+    }
+    const float band = kBand + 2.0f * moved[group.block];
+    group.due = 3e38f;
+    for (Index i = group.first; i < group.last; ++i) {
+      Watch& watch = (*watches)[i];
+      if (travel >= watch.due) {
+        ++looked_at_;
+        watch.due = travel + std::max(0.0f, look(&watch, i, band) - band);
+      }
+      group.due = std::min(group.due, watch.due);
+    }
+  }
+}
+
+void TissueCollision::LookAtFixed(std::size_t which, std::span<const float> moved) {
+  const Vec3f shift = which == 1 ? breath0_ : Vec3f(Vec3f::Zero());
+  const TriangleTree& tree = trees_[which];
+  LookAtDue(&fixed_groups_[which], &fixed_[which], moved, which == 1 ? breath_travel_ : 0.0f,
+            [&](Watch* watch, Index index, float band) {
+              const Vec3f p = particles_->At(watch->at) - shift;
+              const TriangleTree::Hit hit = tree.Nearest(p, kSight);
+              if (hit.triangle == kNoIndex) {
+                watch->front = false;
+                return kSight;
+              }
+              const Vec3f& normal = tree.normal(hit.triangle);
+              const float distance = std::sqrt(hit.distance_sq), height = normal.dot(p - hit.point);
+              const bool beside = std::abs(height) < kBesideCosine * distance;
+              watch->front = watch->front || (height > 0.0f && !beside);
+              if (watch->front && !beside && height > -kMaxBehind && height < watch->clearance + band) {
+                near_fixed_.push_back({static_cast<std::uint32_t>(which), {index, band, hit.point, normal}});
+              }
+              return watch->front ? distance - watch->clearance : distance;
+            });
+}
+
+void TissueCollision::FindPairs(std::span<const float> moved, double time0_s, double time1_s) {
+  near_organ_.clear();
+  near_fixed_.clear();
+  looked_at_ = 0;
+  const Index organ_blocks = (scene_.tube_vertex_count + kBlock - 1) / kBlock;
+  float organ_moved = 0;
+  for (Index b = 0; b < travel_.size(); ++b) {
+    travel_[b] += moved[b];
+    organ_moved = b < organ_blocks ? std::max(organ_moved, moved[b]) : organ_moved;
+  }
+  organ_travel_ += organ_moved;
+  breath0_ = BreathingOffset(breathing_, time0_s);
+  breath1_ = BreathingOffset(breathing_, time1_s);
+  breath_travel_ += (breath1_ - breath0_).norm();
+  LookAtDue(&organ_groups_, &organ_, moved, organ_travel_, [&](Watch* watch, Index index, float band) {
+    if (!model_->NodeAlive(watch->particle - scene_.membrane.first) ||
+        model_->IsDebris(watch->particle - scene_.membrane.first)) {
+      return kSight;
+    }
+    const Vec3f p = particles_->At(watch->at);
+    Walk(watch, p);
+    const float distance = SignedDistance(p, OrganCorners(watch->triangle)).distance - watch->clearance;
+    if (distance < band + 2.0f * organ_moved) {
+      near_organ_.push_back({index, band + 2.0f * organ_moved, Vec3f::Zero(), Vec3f::Zero()});
+    }
+    return distance;
+  });
+  LookAtFixed(0, moved);
+  LookAtFixed(1, moved);
+}
+
+void TissueCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) const {
+  const std::size_t end = rows->size() + kMaxRows;
+  ContactRow row;
+  row.friction = scene_.physics.friction;
+  for (const Near& near : near_organ_) {
+    const Watch& watch = organ_[near.watch];
+    const auto corners = OrganCorners(watch.triangle);
+    const Signed now = SignedDistance(particles_->At(watch.at), corners);
+    if (now.distance > watch.clearance + near.band || now.distance < -kMaxBehind || rows->size() == end) {
+      continue;
+    }
+    row.count = 1;
+    row.at[0] = watch.at;
+    row.weight[0] = 1.0f;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (now.barycentric[i] > 0.0f) {
+        row.at[static_cast<std::size_t>(row.count)] = {4 * scene_.tube_surface[watch.triangle][i], 1};
+        row.weight[static_cast<std::size_t>(row.count)] = -now.barycentric[i];
+        ++row.count;
+      }
+    }
+    row.normal = now.normal;
+    row.offset = watch.clearance;
+    row.source = kSource | near.watch;
+    rows->push_back(row);
+  }
+  row.count = 1;
+  row.weight = {1, 0, 0, 0};
+  for (const auto& [which, near] : near_fixed_) {
+    if (rows->size() == end) {
+      break;
+    }
+    const Watch& watch = fixed_[which][near.watch];
+    const bool breathes = which == 1;
+    const Vec3f end_shift = breathes ? Vec3f(breath0_ + u1 * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
+    row.at[0] = watch.at;
+    row.normal = near.normal;
+    row.offset = near.normal.dot(near.point + end_shift) + watch.clearance;
+    row.drift = breathes ? Vec3f((u1 - u0) * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
+    row.source = kSource | near.watch;
+    rows->push_back(row);
+  }
+}
+
+}  // namespace fulcrum::physics

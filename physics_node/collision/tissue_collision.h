@@ -1,0 +1,118 @@
+// Tissue against tissue and against what surrounds it: membrane nodes stay outside the organ, membrane and organ stay
+// in front of the fixed surfaces of the scene that collide.
+//
+// Amortised by distance: a particle that was d from contact is not looked at again before it and what it may touch have
+// together moved that far. Movements come from the solver by blocks of particles, so tissue at rest costs one
+// comparison a block.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "physics_node/collision/contact_row.h"
+#include "physics_node/collision/triangle_tree.h"
+#include "physics_node/pbd/particle_store.h"
+#include "physics_node/pbd/tissue_model.h"
+#include "services/core/scene_view.h"
+
+namespace fulcrum::physics {
+
+/// Smooth to-and-fro of the surroundings: amplitude * (1 - cos(2 pi t / period)) / 2 along `direction`.
+struct Breathing {
+  Vec3f direction = Vec3f::UnitZ();  ///< Unit, frame W.
+  float amplitude_m = 0;             ///< Peak to peak; 0: none.
+  float period_s = 4;
+};
+/// Where the surroundings that breathe are at session time `time_s`, against their place in the scene [m].
+[[nodiscard]] Vec3f BreathingOffset(const Breathing& breathing, double time_s);
+/// The pelvis does not breathe; wall, retroperitoneum and the rest do.
+[[nodiscard]] bool Breathes(SurfaceRole role);
+
+class TissueCollision {
+ public:
+  /// Particles of a block, in scene order.
+  static constexpr Index kBlock = 64;
+  /// Set in ContactRow.source of our rows.
+  static constexpr std::uint32_t kSource = 0x80000000u;
+  static constexpr std::size_t kMaxRows = 4096;
+
+  TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
+                  const Breathing& breathing = {});
+
+  [[nodiscard]] std::size_t block_count() const { return travel_.size(); }
+  /// Largest movement since ParticleStore::Previous in each block [m]: a `moved` for FindPairs where the solver has
+  /// none. [block_count()]
+  void MeasureMoves(std::vector<float>* moved) const;
+
+  /// Once a step, before it. `moved`: at least how far any particle of each block has moved since the last call [m],
+  /// [block_count()]; 0 for blocks at rest. Session time at the begin and the end of the step [s].
+  void FindPairs(std::span<const float> moved, double time0_s, double time1_s);
+  /// Appends the contacts of the substep from part u0 to u1 of the step; at most kMaxRows.
+  void Rows(float u0, float u1, std::vector<ContactRow>* rows) const;
+
+  /// Particles near something in this step.
+  [[nodiscard]] std::size_t near_count() const { return near_organ_.size() + near_fixed_.size(); }
+  /// Particles looked at by the last FindPairs.
+  [[nodiscard]] std::size_t looked_at() const { return looked_at_; }
+
+ private:
+  /// What a particle must stay in front of.
+  struct Watch {
+    Index particle = 0;
+    ParticleRef at;
+    Index triangle = kNoIndex;  ///< Of tube_surface, or of the tree.
+    float clearance = 0;        ///< Kept from the surface: less where it rests nearer [m].
+    float due = 0;              ///< Looked at again when the travel that concerns it has come to this [m].
+    bool front = false;         ///< Seen in front of the surface and not lost from sight since.
+  };
+  /// Watches of one block: [first, last), and the least `due` of them.
+  struct Group {
+    Index block = 0, first = 0, last = 0;
+    float due = 0;
+  };
+  struct Near {
+    Index watch = 0;
+    float band = 0;               ///< Rows are made this far from contact [m].
+    Vec3f point = Vec3f::Zero();  ///< Fixed surfaces: nearest, at rest.
+    Vec3f normal = Vec3f::Zero();
+  };
+  struct Signed {
+    std::array<float, 3> barycentric{};
+    Vec3f normal = Vec3f::Zero();  ///< Unit, from the surface to the particle's proper side.
+    float distance = 0;            ///< Negative: behind [m].
+  };
+
+  void WatchOrgan();
+  void WatchFixed(bool breathing);
+  static void MakeGroups(std::span<Watch> watches, std::vector<Group>* groups);
+  [[nodiscard]] std::array<Vec3f, 3> OrganCorners(Index triangle) const;
+  /// Walks to the nearest triangle of the organ from the one known.
+  void Walk(Watch* watch, const Vec3f& p) const;
+  [[nodiscard]] static Signed SignedDistance(const Vec3f& p, const std::array<Vec3f, 3>& corners);
+  template <class Look>
+  void LookAtDue(std::vector<Group>* groups, std::vector<Watch>* watches, std::span<const float> moved,
+                 float others_travel, const Look& look);
+  void LookAtFixed(std::size_t which, std::span<const float> moved);
+
+  SceneView scene_;
+  const TissueModel* model_;
+  const ParticleStore* particles_;
+  Breathing breathing_;
+
+  std::vector<Index> ring_start_, ring_;  ///< Organ triangles that share a corner with each.
+  std::vector<Watch> organ_;
+  std::vector<Group> organ_groups_;
+  std::array<TriangleTree, 2> trees_;  ///< Still and breathing.
+  std::array<std::vector<Watch>, 2> fixed_;
+  std::array<std::vector<Group>, 2> fixed_groups_;
+
+  std::vector<float> travel_;  ///< Of each block since the beginning [m].
+  float organ_travel_ = 0, breath_travel_ = 0;
+  Vec3f breath0_ = Vec3f::Zero(), breath1_ = Vec3f::Zero();
+  std::vector<Near> near_organ_;
+  std::vector<std::pair<std::uint32_t, Near>> near_fixed_;  ///< With the tree.
+  std::size_t looked_at_ = 0;
+};
+
+}  // namespace fulcrum::physics

@@ -1,0 +1,43 @@
+// Nearest triangle of a surface that does not deform: a tree of boxes, built once.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "services/core/types.h"
+
+namespace fulcrum::physics {
+
+class TriangleTree {
+ public:
+  struct Hit {
+    Index triangle = kNoIndex;  ///< Of those given; kNoIndex: none within range.
+    Vec3f point = Vec3f::Zero();
+    float distance_sq = 0;  ///< [m^2]
+  };
+
+  TriangleTree() = default;
+  /// Corners of each triangle [m]. Degenerate ones are allowed and have a zero normal.
+  explicit TriangleTree(std::vector<std::array<Vec3f, 3>> triangles);
+
+  [[nodiscard]] bool empty() const { return nodes_.empty(); }
+  /// The nearest triangle to `p` within `range` [m]; of equally near ones that with the least index.
+  [[nodiscard]] Hit Nearest(const Vec3f& p, float range) const;
+  /// Unit normal, counter-clockwise.
+  [[nodiscard]] const Vec3f& normal(Index triangle) const { return normals_[triangle]; }
+
+ private:
+  struct Node {
+    Vec3f low, high;
+    Index first = 0;  ///< Leaf: of order_; else left child, the right one follows it.
+    Index count = 0;  ///< 0: inner node.
+  };
+  void Build(Index node, Index first, Index last);
+
+  std::vector<std::array<Vec3f, 3>> triangles_;
+  std::vector<Vec3f> normals_;
+  std::vector<Index> order_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace fulcrum::physics

@@ -1,0 +1,221 @@
+// Membrane against organ, both against fixed surroundings, and surroundings that breathe.
+#include "physics_node/collision/tissue_collision.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "physics_node/collision/closest.h"
+#include "physics_node/collision/row_projection.h"
+#include "physics_node/pbd/pbd_solver.h"
+#include "services/scene/build.h"
+#include "tests/unit/physics/sheet_scene.h"
+
+namespace fulcrum::physics {
+namespace {
+
+/// A sheet 2 mm over a fixed floor that reaches beyond it and faces up.
+scene::SceneData SheetOverFloor(float below = 0.002f) {
+  scene::SceneData data = SheetScene(17, 17);
+  StaticSurface floor{};
+  std::strncpy(floor.name, "floor", sizeof(floor.name) - 1);
+  floor.role = SurfaceRole::kRetroperitoneum;
+  floor.vertex_count = 4;
+  floor.triangle_count = 2;
+  floor.collides = 1;
+  data.static_surfaces = {floor};
+  data.static_vertices = {Vec3f(-0.01f, -0.01f, -below), Vec3f(0.05f, -0.01f, -below), Vec3f(0.05f, 0.05f, -below),
+                          Vec3f(-0.01f, 0.05f, -below)};
+  data.static_triangles = {{0, 1, 2}, {0, 2, 3}};
+  return data;
+}
+
+struct World {
+  explicit World(const SceneView& view, const Breathing& breathing = {})
+      : scene(view),
+        particles(scene),
+        model(scene, &particles),
+        solver(scene.physics, &model, &particles),
+        collision(scene, &model, &particles, breathing) {}
+  void Step() {
+    collision.MeasureMoves(&moved);
+    const double next = time + scene.physics.dt_s;
+    collision.FindPairs(moved, time, next);
+    time = next;
+    rows.clear();
+    collision.Rows(0, 1, &rows);
+    solver.Predict();
+    for (int i = 0; i < 4; ++i) {
+      solver.Iterate();
+      ProjectRows(rows, 0.001f, scene.physics.dt_s, &particles);
+    }
+    solver.Finish();
+  }
+  [[nodiscard]] Vec3f Node(Index node) const { return particles.At(particles.Ref(scene.membrane.first + node)); }
+
+  SceneView scene;
+  ParticleStore particles;
+  TissueModel model;
+  PbdSolver solver;
+  TissueCollision collision;
+  std::vector<float> moved;
+  std::vector<ContactRow> rows;
+  double time = 0;
+};
+
+TEST(TriangleTree, FindsTheNearestLikeASearch) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> at(-1, 1);
+  const auto point = [&] { return Vec3f(at(random), at(random), at(random)); };
+  std::vector<std::array<Vec3f, 3>> triangles;
+  for (int i = 0; i < 300; ++i) {
+    const Vec3f p = point();
+    triangles.push_back({p, p + 0.1f * point(), p + 0.1f * point()});
+  }
+  const TriangleTree tree(triangles);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3f p = point();
+    float best = 1e9f;
+    for (const auto& t : triangles) {
+      const auto b = ClosestOnTriangle(p, t[0], t[1], t[2]);
+      best = std::min(best, (p - b[0] * t[0] - b[1] * t[1] - b[2] * t[2]).squaredNorm());
+    }
+    EXPECT_NEAR(tree.Nearest(p, 10).distance_sq, best, 1e-6f);
+    EXPECT_EQ(tree.Nearest(p, 0.5f * std::sqrt(best)).triangle, kNoIndex);
+  }
+  EXPECT_EQ(TriangleTree().Nearest(point(), 1).triangle, kNoIndex);
+}
+
+TEST(TissueCollision, AFallingSheetComesToRestOnTheFloor) {
+  const scene::SceneData data = SheetOverFloor();
+  SceneView scene = data.View();
+  scene.physics.gravity = Vec3f(0, 0, -9.81f);
+  scene.physics.k_stretch_membrane = 0.05f;  // A cloth that would hang far below the floor.
+  World world(scene);
+  for (int i = 0; i < 200; ++i) {
+    world.Step();
+    ASSERT_LE(world.rows.size(), TissueCollision::kMaxRows);
+  }
+  float lowest = 1;
+  for (Index n = 0; n < scene.membrane.node_count(); ++n) {
+    lowest = std::min(lowest, world.Node(n).z());
+  }
+  EXPECT_NEAR(lowest, -0.002f + scene.physics.collision_margin_m, 2e-4f);
+  EXPECT_GT(world.collision.near_count(), 20u);
+}
+
+TEST(TissueCollision, SeenFromBehindAFixedSurfaceIsNoContact) {
+  const scene::SceneData data = SheetOverFloor(-0.002f);  // The floor lies over the sheet and faces away from it.
+  World world(data.View());
+  for (int i = 0; i < 20; ++i) {
+    world.Step();
+    EXPECT_TRUE(world.rows.empty());
+  }
+}
+
+TEST(TissueCollision, RestCostsNothing) {
+  const scene::SceneData data = scene::BuildProcedural(scene::Small());
+  World world(data.View());
+  const std::vector<float> still(world.collision.block_count(), 0.0f);
+  world.collision.FindPairs(still, 0, 0.01);
+  EXPECT_GT(world.collision.looked_at(), 1000u);  // The first time, everything.
+  world.collision.FindPairs(still, 0.01, 0.02);
+  EXPECT_LE(world.collision.looked_at(), world.collision.near_count() + 20u);
+  // One block moves a little: only its own particles that are near something are looked at.
+  std::vector<float> moved = still;
+  moved.back() = 0.0001f;
+  world.collision.FindPairs(moved, 0.02, 0.03);
+  EXPECT_LE(world.collision.looked_at(), world.collision.near_count() + TissueCollision::kBlock + 20u);
+}
+
+TEST(TissueCollision, TheRestShapeHasNoForce) {
+  for (const auto& settings : {scene::Small(), scene::BuiltIn()}) {
+    const scene::SceneData data = scene::BuildProcedural(settings);
+    World world(data.View());
+    world.collision.MeasureMoves(&world.moved);
+    world.collision.FindPairs(world.moved, 0, 0.01);
+    world.collision.Rows(0, 1, &world.rows);
+    for (const ContactRow& row : world.rows) {
+      float gap = -row.offset;
+      for (int k = 0; k < row.count; ++k) {
+        const auto j = static_cast<std::size_t>(k);
+        gap += row.weight[j] * row.normal.dot(world.particles.At(row.at[j]));
+      }
+      ASSERT_GE(gap, -1e-6f);
+    }
+  }
+}
+
+/// Free membrane nodes inside the organ.
+int CountInside(const World& world) {
+  int inside = 0;
+  for (Index n = 0; n < world.scene.membrane.node_count(); ++n) {
+    const ParticleRef at = world.particles.Ref(world.scene.membrane.first + n);
+    const Vec3f p = world.particles.At(at);
+    float best = 1e9f;
+    bool behind = false;
+    for (const Triangle& t : world.scene.tube_surface) {
+      const Vec3f a = world.particles.At({4 * t[0], 1}), b = world.particles.At({4 * t[1], 1}),
+                  c = world.particles.At({4 * t[2], 1});
+      const auto w = ClosestOnTriangle(p, a, b, c);
+      const Vec3f offset = p - w[0] * a - w[1] * b - w[2] * c;
+      if (offset.squaredNorm() < best) {
+        best = offset.squaredNorm();
+        behind = (b - a).cross(c - a).dot(offset) < 0.0f;
+      }
+    }
+    inside += behind && best > 1e-8f && world.particles.InverseMass(at) > 0.0f;
+  }
+  return inside;
+}
+
+TEST(TissueCollision, TheMembraneStaysOutsideTheOrgan) {
+  scene::SceneData data = scene::BuildProcedural(scene::Small());
+  data.bindings.clear();  // They would keep it away as well.
+  data.binding_colours = {0};
+  World world(data.View());
+  // The middle of the membrane is thrown down onto the organ.
+  const Index cols = world.scene.membrane.cols;
+  int near = 0;
+  for (int i = 0; i < 40; ++i) {
+    if (i < 6) {
+      for (Index r = 30; r < 43; ++r) {
+        for (Index c = 8; c < 17; ++c) {
+          const ParticleRef at = world.particles.Ref(world.scene.membrane.first + r * cols + c);
+          world.particles.SetPrevious(at, world.particles.At(at) + Vec3f(0, 0, 0.003f));
+        }
+      }
+    }
+    world.Step();
+    near = std::max(near, static_cast<int>(world.rows.size()));
+    if (i % 3 == 0) {
+      ASSERT_EQ(CountInside(world), 0) << "step " << i;
+    }
+  }
+  EXPECT_GT(near, 20);
+}
+
+TEST(TissueCollision, BreathingIsSmoothAndCarriesTheTissue) {
+  const Breathing breathing{Vec3f::UnitZ(), 0.004f, 4.0f};
+  EXPECT_EQ(BreathingOffset({}, 1.0), Vec3f(Vec3f::Zero()));
+  EXPECT_NEAR(BreathingOffset(breathing, 0.0).z(), 0.0f, 1e-9f);
+  EXPECT_NEAR(BreathingOffset(breathing, 2.0).z(), 0.004f, 1e-7f);
+  EXPECT_NEAR(BreathingOffset(breathing, 8.0).z(), 0.0f, 1e-7f);
+  EXPECT_FALSE(Breathes(SurfaceRole::kPelvis));
+  EXPECT_TRUE(Breathes(SurfaceRole::kAbdominalWall));
+  const scene::SceneData data = SheetOverFloor();
+  World world(data.View(), breathing);
+  const Index middle = 8 * 17 + 8;
+  float highest = -1;
+  for (int i = 0; i < 400; ++i) {
+    world.Step();
+    highest = std::max(highest, world.Node(middle).z());
+  }
+  // The floor comes up to 2 mm over the sheet's rest and goes down again.
+  EXPECT_GT(highest, 0.0018f);
+  EXPECT_LT(highest, 0.0035f);
+  EXPECT_LT(world.Node(middle).z(), 0.001f);
+}
+
+}  // namespace
+}  // namespace fulcrum::physics
