@@ -5,7 +5,11 @@
 namespace fulcrum::physics::reference {
 
 ExplicitDynamics::ExplicitDynamics(const ElasticEnergy* energy, const Points& start, double step_s)
-    : energy_(energy), step_s_(step_s), x_(start), v_(Points::Zero(3, start.cols())) {}
+    : energy_(energy),
+      step_s_(step_s),
+      x_(start),
+      v_(Points::Zero(3, start.cols())),
+      starts_(static_cast<std::size_t>(start.cols()), true) {}
 
 void ExplicitDynamics::Hold(const std::vector<Index>& particles, Motion motion) {
   held_ = particles;
@@ -21,14 +25,17 @@ void ExplicitDynamics::Run(int count) {
     for (Eigen::Index p = 0; p < x_.cols(); ++p) {
       const double mass = model.mass[static_cast<std::size_t>(p)];
       if (mass > 0) {
-        v_.col(p) = keep * v_.col(p) - gain / mass * gradient_.col(p);
+        v_.col(p) =
+            keep * v_.col(p) - (starts_[static_cast<std::size_t>(p)] ? 0.5 : 1.0) * gain / mass * gradient_.col(p);
         x_.col(p) += step_s_ * v_.col(p);
       }
     }
     ++steps_;
+    starts_.assign(starts_.size(), false);
     for (const Index p : held_) {
       const Vec3d next = motion_(p, time_s());
       v_.col(p).setZero();
+      starts_[p] = true;
       x_.col(p) = next;
     }
   }

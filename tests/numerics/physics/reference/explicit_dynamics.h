@@ -17,6 +17,9 @@ class ExplicitDynamics {
   using Motion = std::function<Vec3d(Index particle, double time_s)>;
   void Hold(const std::vector<Index>& particles, Motion motion);
 
+  /// Goes on with another energy of as many particles.
+  void ChangeEnergy(const ElasticEnergy* energy) { energy_ = energy; }
+
   /// Goes on for `count` steps.
   void Run(int count);
 
@@ -30,6 +33,7 @@ class ExplicitDynamics {
   double step_s_;
   long steps_ = 0;
   Points x_, v_, gradient_;
+  std::vector<bool> starts_;  ///< [particles] At rest now: the next kick is half, as velocities are half a step behind.
   std::vector<Index> held_;
   Motion motion_;
 };

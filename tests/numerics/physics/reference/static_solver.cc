@@ -16,7 +16,8 @@ constexpr double kMaxStep = 0.01;
 /// The factor of an earlier iterate's Hessian preconditions the next ones as long as it does in so many iterations.
 constexpr int kRefactorAfter = 40;
 constexpr int kMaxCgIterations = 200;
-constexpr double kCgTolerance = 1e-4;
+/// Far from the end a rough step is as good as an exact one.
+constexpr double kCgTolerance = 0.03;
 
 /// Solves H step = b by conjugate gradients. Where H bends down along a direction, the step so far is the answer: it
 /// goes downhill.

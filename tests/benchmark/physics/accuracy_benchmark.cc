@@ -1,0 +1,128 @@
+// Run time and error of every tissue solver on one case, in one table; the work-precision plot.
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "services/scene/build.h"
+#include "tests/benchmark/physics/work_precision_plot.h"
+#include "tests/benchmark/report.h"
+#include "tests/numerics/physics/accurate_under_test.h"
+#include "tests/numerics/physics/paper_solver.h"
+#include "tests/numerics/physics/standard_case.h"
+
+namespace fulcrum::physics {
+namespace {
+
+struct Entry {
+  std::string key;  ///< physics.KEY.*; empty: in the plot only.
+  std::string label;
+  std::string family;
+  SolverFactory make;
+  PhysicsParams params;  ///< The solver's own settings within the case.
+};
+
+std::vector<Entry> Entries(const SceneView& scene) {
+  std::vector<Entry> entries;
+  const auto add = [&](const char* key, const char* label, const char* family, auto change, SolverFactory make) {
+    PhysicsParams params = scene.physics;
+    change(&params);
+    entries.push_back({key, label, family, std::move(make), params});
+  };
+  const auto accurate = [&](const char* key, const char* label, PhysicsPreset preset) {
+    add(
+        key, label, "TLI", [preset](PhysicsParams* p) { p->preset = preset; },
+        [](const SceneView& s) { return std::make_unique<AccurateUnderTest>(s); });
+  };
+  accurate("fast", "TLI fast 1x3", PhysicsPreset::kFast);
+  accurate("default", "TLI default 2x2", PhysicsPreset::kDefault);
+  accurate("accurate", "TLI accurate 4x2", PhysicsPreset::kAccurate);
+  accurate("reference_preset", "TLI reference 8x2", PhysicsPreset::kReference);
+  const auto paper = [&](const char* key, const char* label, std::uint32_t iterations) {
+    add(
+        key, label, "PBD", [iterations](PhysicsParams* p) { p->iterations = iterations; },
+        [](const SceneView& s) { return std::make_unique<PaperSolver>(s); });
+  };
+  paper("paper_mode", "PBD 3 (paper)", 3);
+  paper("", "PBD 20", 20);
+  return entries;
+}
+
+/// Measures one solver, prints its keys, returns its place in the plot.
+WorkPrecisionPoint Measure(const StandardCase& standard, const StandardCase::Reference& truth, const Entry& entry,
+                           benchmark::Report* report) {
+  const std::string stem = "physics." + entry.key + ".";
+  const bool with_cut = entry.key == "accurate";
+  SceneView scene = standard.scene();
+  scene.physics = entry.params;
+  std::vector<double> frame_ms, p99, cut_max;
+  StandardRun run;
+  for (int repeat = 0; repeat < (report->quick() || entry.key.empty() ? 1 : 3); ++repeat) {
+    run = RunStandardCase(standard, truth, entry.make, scene, with_cut);
+    frame_ms.insert(frame_ms.end(), run.frame_ms.begin(), run.frame_ms.end());
+    p99.push_back(benchmark::Quantile(run.frame_ms, 0.99));
+    cut_max.push_back(run.cut_frame_ms.empty() ? 0 : run.cut_frame_ms.front());
+  }
+  const StandardErrors& e = run.errors;
+  const double p50 = benchmark::Quantile(frame_ms, 0.5);
+  if (!entry.key.empty()) {
+    report->Add(stem + "frame_ms_p50", p50, "ms");
+    report->Add(stem + "frame_ms_p99", benchmark::Quantile(p99, 0.5), "ms");
+    report->Add(stem + "hold_error_pct", 100 * e.hold, "%");
+    report->Add(stem + "hold_error_max_mm", 1e3 * e.hold_max_m, "mm");
+    report->Add(stem + "force_error_pct", 100 * e.force, "%");
+    report->Add(stem + "pull_error_pct", 100 * e.pull, "%");
+    report->Add(stem + "release_error_pct", 100 * e.release, "%");
+    report->Add(stem + "volume_error_pct", 100 * e.volume, "%");
+    report->Add(stem + "tet_volume_error_pct", 100 * e.tet_volume, "%");
+    report->Add(stem + "strain_error", e.strain, "1");
+  }
+  if (with_cut) {
+    report->Add(stem + "cut_error_pct", 100 * e.cut, "%");
+    report->Add(stem + "cut_frame_ms_max", benchmark::Quantile(cut_max, 0.5), "ms");
+  }
+  std::fprintf(stderr, "%-20s %8.2f ms  hold %8.3g %%  force %8.3g %%  pull %8.3g %%  release %8.3g %%\n",
+               entry.label.c_str(), p50, 100 * e.hold, 100 * e.force, 100 * e.pull, 100 * e.release);
+  return {entry.label, entry.family, p50, {100 * e.hold, 100 * e.pull}};
+}
+
+void RunAll(benchmark::Report* report) {
+  const StandardCase standard(scene::BuildProcedural(scene::BuiltIn()), kBuiltInCase);
+  const std::vector<Entry> entries = Entries(standard.scene());
+  const bool wanted = std::any_of(entries.begin(), entries.end(), [&](const Entry& entry) {
+    return !entry.key.empty() && report->Wants("physics." + entry.key + ".");
+  });
+  if (!wanted) {
+    return;
+  }
+  const StandardCase::Reference truth =
+      standard.LoadReference(std::filesystem::path(FULCRUM_BIN_DIR).parent_path() / "out");
+  std::vector<WorkPrecisionPoint> points;
+  bool all = true;
+  for (const Entry& entry : entries) {
+    if (report->Wants("physics." + (entry.key.empty() ? "plot" : entry.key) + ".")) {
+      points.push_back(Measure(standard, truth, entry, report));
+    } else {
+      all = false;
+    }
+  }
+  if (!all) {
+    return;  // A plot of some would pass for a plot of all.
+  }
+  const char* folder = std::getenv("FULCRUM_BENCH_OUT");
+  const std::filesystem::path file =
+      std::filesystem::path(folder != nullptr ? folder : FULCRUM_SOURCE_DIR "/out") / "physics_work_precision.svg";
+  std::filesystem::create_directories(file.parent_path());
+  std::ofstream(file) << WorkPrecisionSvg(
+      "Error against run time, built-in scene, one core",
+      {"static: 30 mm hold, RMS over RMS displacement", "dynamic: the pull, RMS over RMS displacement"}, points);
+  std::fprintf(stderr, "wrote %s\n", file.c_str());
+}
+
+}  // namespace
+}  // namespace fulcrum::physics
+
+int main(int argc, char** argv) {
+  fulcrum::benchmark::Report report(argc, argv);
+  fulcrum::physics::RunAll(&report);
+}

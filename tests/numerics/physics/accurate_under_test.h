@@ -1,0 +1,45 @@
+// The accurate mode as a thing to be measured: the preset of the scene, without tools.
+#pragma once
+
+#include "physics_node/accurate/accurate_solver.h"
+#include "tests/numerics/physics/store_solver.h"
+
+namespace fulcrum::physics {
+
+class AccurateUnderTest final : public StoreSolver {
+ public:
+  explicit AccurateUnderTest(const SceneView& scene)
+      : StoreSolver(scene),
+        effort_(accurate::EffortOf(scene.physics.preset)),
+        solver_(scene, BuildElasticModel(scene), tissue_, &particles_) {}
+
+  void Step() override {
+    solver_.BeginStep();
+    for (int s = 1; s <= effort_.substeps; ++s) {
+      const float part = static_cast<float>(s) / static_cast<float>(effort_.substeps);
+      for (std::size_t i = 0; i < held_.size(); ++i) {
+        targets_[i].place = begin_[i] + part * (places_[i] - begin_[i]);
+      }
+      solver_.Substep(scene_.physics.dt_s / static_cast<float>(effort_.substeps), effort_.iterations, targets_, {});
+    }
+    begin_ = places_;
+  }
+
+ private:
+  void Stop() override { solver_.Stop(); }
+  void HeldChanged() override {
+    targets_.clear();
+    for (const ParticleRef at : held_) {
+      targets_.push_back({at, particles_.At(at)});
+    }
+    begin_ = places_;
+  }
+  void TopologyChanged() override { solver_.Follow(tissue_); }
+
+  accurate::Effort effort_;
+  accurate::AccurateSolver solver_;
+  std::vector<accurate::HeldPlace> targets_;
+  std::vector<Vec3f> begin_;  ///< Of the held particles at the start of the step.
+};
+
+}  // namespace fulcrum::physics

@@ -1,0 +1,68 @@
+// Solvers over a ParticleStore and a TissueModel, as things to be measured: all but the step itself.
+#pragma once
+
+#include <vector>
+
+#include "physics_node/pbd/particle_store.h"
+#include "physics_node/pbd/tissue_model.h"
+#include "tests/numerics/physics/solver_under_test.h"
+
+namespace fulcrum::physics {
+
+class StoreSolver : public SolverUnderTest {
+ public:
+  explicit StoreSolver(const SceneView& scene) : scene_(scene), particles_(scene), tissue_(scene, &particles_) {
+    topology_.rows = scene.membrane.rows;
+    topology_.cols = scene.membrane.cols;
+    topology_.dead_nodes.assign((scene.membrane.node_count() + 7) / 8, 0);
+    topology_.dead_edges.assign((3 * scene.membrane.node_count() + 7) / 8, 0);
+    topology_.shrink.assign(3 * std::size_t{scene.membrane.node_count()}, 0);
+  }
+
+  void SetPositions(std::span<const float> xyz) override {
+    particles_.SetAll(xyz, xyz);
+    Stop();
+  }
+  void ReadPositions(std::span<float> xyz) const override { particles_.CopyPositions(xyz); }
+  void Hold(std::span<const Index> particles) override {
+    for (std::size_t i = 0; i < held_.size(); ++i) {
+      particles_.SetInverseMass(held_[i], tissue_.BaseInverseMass(held_particles_[i]));
+    }
+    held_particles_.assign(particles.begin(), particles.end());
+    held_.clear();
+    places_.clear();
+    for (const Index p : particles) {
+      held_.push_back(particles_.Ref(p));
+      places_.push_back(particles_.At(held_.back()));
+      particles_.SetInverseMass(held_.back(), 0);
+    }
+    HeldChanged();
+  }
+  void MoveHeld(std::span<const Vec3f> places) override { places_.assign(places.begin(), places.end()); }
+  void CutEdges(std::span<const std::size_t> edges) override {
+    for (const std::size_t edge : edges) {
+      SetBit(topology_.dead_edges, edge);
+    }
+    ++topology_.revision;
+    tissue_.Apply(topology_, &particles_);
+    TopologyChanged();
+  }
+
+ protected:
+  /// Positions have been set: forget velocities and what else belongs to the past.
+  virtual void Stop() {}
+  /// Inverse masses have changed.
+  virtual void HeldChanged() {}
+  /// tissue_ has changed.
+  virtual void TopologyChanged() {}
+
+  SceneView scene_;
+  ParticleStore particles_;
+  TissueModel tissue_;
+  TopologyState topology_;
+  std::vector<Index> held_particles_;
+  std::vector<ParticleRef> held_;
+  std::vector<Vec3f> places_;  ///< Of the held particles at the end of the step.
+};
+
+}  // namespace fulcrum::physics
