@@ -563,10 +563,14 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
       }
     }
   }
+  // Before the particles move on: their start is still in the store.
+  for (std::size_t i = 0; !contacts.empty() && i < tube_floats_ + 3 * plane_; ++i) {
+    q_[i] = place_[i] + d_[i];
+  }
+  Elements::WriteForces(q_.data(), particles_->pool(), contacts);
   SubstepReport report = Finish(h);
   report.largest_correction_m = largest;
   report.searched = searched;
-  Elements::WriteForces(particles_->pool(), contacts);
   return report;
 }
 

@@ -180,9 +180,18 @@ double Elements::Energy(const float* place, std::span<const ContactRow> contacts
   return sum;
 }
 
-void Elements::WriteForces(const float* place, std::span<ContactRow> contacts) {
+void Elements::WriteForces(const float* place, const float* start, std::span<ContactRow> contacts) {
   for (ContactRow& row : contacts) {
-    row.force_N = kContactStiffness * std::max(row.offset - row.normal.dot(Combine(row, place)), 0.0f);
+    const Vec3f here = Combine(row, place);
+    row.force_N = kContactStiffness * std::max(row.offset - row.normal.dot(here), 0.0f);
+    row.friction_N.setZero();
+    if (row.force_N > 0.0f && row.friction > 0.0f) {
+      Vec3f slide = here - Combine(row, start) - row.drift;
+      slide -= row.normal.dot(slide) * row.normal;
+      const float k =
+          std::min(kTangentialPart * kContactStiffness, row.friction * row.force_N / std::max(slide.norm(), kStick));
+      row.friction_N = -k * slide;
+    }
   }
 }
 

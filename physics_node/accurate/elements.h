@@ -35,8 +35,8 @@ class Elements {
   /// out += K p; returns p . K p.
   double Apply(const float* p, float* out) const;
   [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts) const;
-  /// Normal forces of contacts at `place`.
-  static void WriteForces(const float* place, std::span<ContactRow> contacts);
+  /// Normal and friction forces of contacts at `place`, sliding measured from `start`.
+  static void WriteForces(const float* place, const float* start, std::span<ContactRow> contacts);
 
   /// A contact's stiffness in its normal direction [N/m], against about 200 N/m of an edge of the membrane.
   static constexpr float kContactStiffness = 4000.0f;

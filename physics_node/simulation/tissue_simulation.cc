@@ -44,7 +44,14 @@ TissueSimulation::TissueSimulation(const SceneView& scene, const Kernels& kernel
       collision_(scene, &model_, &particles_, &solver_),
       grasps_{Grasp(scene), Grasp(scene)},
       contacts_(scene, &model_, &particles_),
-      cautery_(scene, &model_, &particles_) {}
+      cautery_(scene, &model_, &particles_) {
+  if (scene.physics.mode == PhysicsMode::kAccurate) {
+    accurate_.emplace(scene, BuildElasticModel(scene), model_, &particles_);
+    effort_ = accurate::EffortOf(scene.physics.preset);
+    held_places_.reserve(particles_.particle_count());
+    rows_.reserve(kMaxTools * ToolCollision::kMaxRows);
+  }
+}
 
 void TissueSimulation::FollowTools(const std::array<ToolInput, kMaxTools>& tools) {
   const float dt = scene_.physics.dt_s;
@@ -71,7 +78,7 @@ void TissueSimulation::UpdateGrasps() {
   }
 }
 
-void TissueSimulation::FindContacts(bool tissue_moved) {
+void TissueSimulation::FindContacts(bool tissue_moved, float tissue_step) {
   std::array<ToolCollision::ToolMotion, kMaxTools> motions;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     if (tracks_[i].present) {
@@ -79,7 +86,7 @@ void TissueSimulation::FindContacts(bool tissue_moved) {
                     grasps_[i].holding(), tracks_[i].now.jaw_rad < tracks_[i].last.jaw_rad};
     }
   }
-  collision_.FindPairs(motions, tissue_moved);
+  collision_.FindPairs(motions, tissue_moved, tissue_step);
 }
 
 /// True while the tissue sleeps and no tool stirs it.
@@ -97,16 +104,7 @@ bool TissueSimulation::MayRest() {
   return asleep_;
 }
 
-StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools) {
-  FollowTools(tools);
-  const bool held = grasps_[0].holding() || grasps_[1].holding();
-  UpdateGrasps();
-  const bool holds = grasps_[0].holding() || grasps_[1].holding();
-  asleep_ = asleep_ && !held && !holds;
-  if (MayRest()) {
-    return {true, 0.0f, 0};
-  }
-  ++state_version_;
+StepReport TissueSimulation::StepPaper() {
   StepReport report;
   report.resets = solver_.Predict();
   for (std::size_t i = 0; i < kMaxTools; ++i) {
@@ -126,6 +124,59 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
   }
   report.resets += finish.resets;
   report.max_step_m = std::sqrt(finish.max_step_sq);
+  return report;
+}
+
+/// Places of all that is held, at part u of the step.
+void TissueSimulation::PlaceHeld(float u) {
+  held_places_.clear();
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    if (grasps_[i].holding()) {
+      const ToolPose pose = Interpolate(tracks_[i].last, tracks_[i].now, u);
+      for (const HeldParticle& held : grasps_[i].held()) {
+        held_places_.push_back({particles_.Ref(held.particle), pose.ToWorld(held.p_T)});
+      }
+    }
+  }
+}
+
+StepReport TissueSimulation::StepAccurate() {
+  StepReport report;
+  const auto substeps = static_cast<float>(effort_.substeps);
+  const float h = scene_.physics.dt_s / substeps;
+  accurate_->BeginStep();
+  FindContacts(true, largest_speed_ * h);
+  for (int i = 0; i < effort_.substeps; ++i) {
+    const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
+    PlaceHeld(u1);
+    collision_.Rows(u0, u1, &rows_);
+    const accurate::SubstepReport substep = accurate_->Substep(h, effort_.iterations, held_places_, rows_);
+    collision_.TakeForces(rows_);
+    report.resets += substep.resets;
+    largest_speed_ = substep.largest_speed_m_s;
+    report.max_step_m = std::max(report.max_step_m, largest_speed_ * scene_.physics.dt_s);
+  }
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    Vec3f traction = Vec3f::Zero();
+    for (const HeldParticle& held : grasps_[i].held()) {
+      traction += accurate_->ForceOn(particles_.Ref(held.particle));
+    }
+    grasps_[i].Slip(traction, scene_.tools[i], tracks_[i].now, model_, &particles_);
+  }
+  return report;
+}
+
+StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools) {
+  FollowTools(tools);
+  const bool held = grasps_[0].holding() || grasps_[1].holding();
+  UpdateGrasps();
+  const bool holds = grasps_[0].holding() || grasps_[1].holding();
+  asleep_ = asleep_ && !held && !holds;
+  if (MayRest()) {
+    return {true, 0.0f, 0};
+  }
+  ++state_version_;
+  const StepReport report = accurate_ ? StepAccurate() : StepPaper();
   quarantined_ += report.resets;
   const bool stirred = std::any_of(tracks_.begin(), tracks_.end(),
                                    [](const ToolTrack& track) { return track.present && track.moved(); });
@@ -133,6 +184,9 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
       report.max_step_m < kStill && !holds && !(stirred && !collision_.pairs().empty()) ? still_steps_ + 1 : 0;
   if (still_steps_ >= kStillSteps) {
     solver_.Stop();
+    if (accurate_) {
+      accurate_->Stop();
+    }
     asleep_ = true;
     still_steps_ = 0;
   }
@@ -142,6 +196,9 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
 int TissueSimulation::ApplyTopology(const TopologyState& topology) {
   const int edits = model_.Apply(topology, &particles_);
   if (edits > 0) {
+    if (accurate_) {
+      accurate_->Follow(model_);
+    }
     for (Grasp& grasp : grasps_) {
       grasp.DropDead(model_, &particles_);
     }
@@ -209,6 +266,12 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
     }
   }
   particles_.SetAll(xyz, previous_xyz);
+  if (accurate_) {
+    for (Index p = 0; p < particles_.particle_count(); ++p) {
+      const ParticleRef at = particles_.Ref(p);
+      accurate_->SetVelocity(at, (particles_.At(at) - particles_.Previous(at)) / scene_.physics.dt_s);
+    }
+  }
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     tracks_[i] = {memory.known[i], memory.pose[i], memory.pose[i]};
     grasps_[i].Restore(memory.grasp_state[i], memory.held[i], &particles_);

@@ -1,11 +1,13 @@
-// The whole tissue: PBD, tool collision, grasps, cutting, rest. Numbers in, numbers out; no clock, no bus.
+// The whole tissue: solver, tool collision, grasps, cutting, rest. Numbers in, numbers out; no clock, no bus.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "physics_node/accurate/accurate_solver.h"
 #include "physics_node/collision/tool_collision.h"
 #include "physics_node/contact_model/cautery_probe.h"
 #include "physics_node/contact_model/contact_probe.h"
@@ -81,13 +83,21 @@ class TissueSimulation {
 
   void FollowTools(const std::array<ToolInput, kMaxTools>& tools);
   [[nodiscard]] bool MayRest();
+  [[nodiscard]] StepReport StepPaper();
+  [[nodiscard]] StepReport StepAccurate();
+  void PlaceHeld(float u);
   void UpdateGrasps();
-  void FindContacts(bool tissue_moved);
+  void FindContacts(bool tissue_moved, float tissue_step = 0);
 
   SceneView scene_;
   ParticleStore particles_;
   TissueModel model_;
   PbdSolver solver_;
+  std::optional<accurate::AccurateSolver> accurate_;  ///< In mode accurate.
+  accurate::Effort effort_;
+  std::vector<accurate::HeldPlace> held_places_;
+  std::vector<ContactRow> rows_;
+  float largest_speed_ = 0;  ///< Of the tissue after the last accurate step [m/s].
   ToolCollision collision_;
   std::array<Grasp, kMaxTools> grasps_;
   ContactProbe contacts_;
