@@ -2,16 +2,9 @@
 // go: load, constraint value, gradient, masses, lambda, apply.
 #pragma once
 
-#include "physics_node/pbd/kernels.h"
-#include "physics_node/pbd/lanes.h"
+#include "physics_node/pbd/grid_sweep.h"
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
-
-/// Only keeps 0/0 away: numerators carry the masses, so a sum of zero masses gives a correction of zero.
-template <class F>
-inline F Tiny() {
-  return F::All(1e-30f);
-}
 
 /// With vertices that cannot move, the others must not make up for all of it however small their part in the constraint
 /// is: this part of the largest possible sum of w |gradient|^2 is divided by at least. A constraint between free
@@ -21,177 +14,41 @@ inline F LeastSum(F largest_w, F largest_gradient_sq) {
   return F::All(0.2f) * (largest_w * largest_gradient_sq);
 }
 
+/// Distance constraint |q - p| = rest.
 template <class F>
-struct Pair {
-  V<F> p, q;
-  F w_p, w_q;
-};
-
-/// Distance constraint |q - p| = rest of pairs: dp = w_p * lambda * d, dq = -w_q * lambda * d.
-template <class F>
-inline F StretchFactor(const Pair<F>& s, V<F> d, F rest, F k) {
+inline F StretchFactor(const Pair<F>& s, const V<F>& d, F rest, F k) {
   const F length = Sqrt(Dot(d, d));
   const F factor = k * (length - rest) / Max(length * (s.w_p + s.w_q), Tiny<F>());
   return factor & (rest > F::All(0.0f));
 }
-template <class F>
-inline void ProjectStretch(Pair<F>* s, F rest, F k) {
-  const V<F> d = s->q - s->p;
-  const F factor = StretchFactor(*s, d, rest, k);
-  s->p = s->p + d * (factor * s->w_p);
-  s->q = s->q - d * (factor * s->w_q);
-}
 
-/// One row of the membrane, or with F16 two of them, `next` floats apart.
-template <class F>
-struct GridRows {
-  float* x;
-  float* y;
-  float* z;
-  const float* w;
-  std::size_t next;
-  [[nodiscard]] V<F> Load(int slot) const {
-    return {Batches<F>::Load(x + 8 * slot, next), Batches<F>::Load(y + 8 * slot, next),
-            Batches<F>::Load(z + 8 * slot, next)};
-  }
-  [[nodiscard]] F LoadMass(int slot) const { return Batches<F>::Load(w + 8 * slot, next); }
-  void Store(int slot, const V<F>& p) const {
-    Batches<F>::Store(p.x, x + 8 * slot, next);
-    Batches<F>::Store(p.y, y + 8 * slot, next);
-    Batches<F>::Store(p.z, z + 8 * slot, next);
+struct PbdStretch {
+  const float* rest[3];
+  float k;
+  template <class F>
+  [[nodiscard]] F Factor(const Pair<F>& s, const V<F>& d, int direction, std::size_t at, std::size_t next) const {
+    return StretchFactor(s, d, Batches<F>::Load(rest[direction] + at, next), F::All(k));
   }
 };
 
-/// Row `row`, and with F16 also row + apart.
-template <class F>
-inline GridRows<F> RowsOf(const GridArrays& g, int row, int apart) {
-  const std::size_t stride = 8 * static_cast<std::size_t>(g.slots);
-  const std::size_t at = static_cast<std::size_t>(row) * stride;
-  return {g.x + at, g.y + at, g.z + at, g.w + at, static_cast<std::size_t>(apart) * stride};
-}
-inline const float* RestOf(const GridArrays& g, int direction, int row) {
-  return g.rest[direction] + static_cast<std::size_t>(row) * 8 * static_cast<std::size_t>(g.slots);
-}
-template <class F>
-inline V<F> RotateDown(const V<F>& a) {
-  return {RotateDown(a.x), RotateDown(a.y), RotateDown(a.z)};
-}
-template <class F>
-inline V<F> RotateUp(const V<F>& a) {
-  return {RotateUp(a.x), RotateUp(a.y), RotateUp(a.z)};
-}
-
-/// Edges between `slot` of row a and `slot + 1` of row b; the last slot's neighbour is the first one, a lane further.
-template <class F>
-inline void StretchToNext(const GridRows<F>& a, const GridRows<F>& b, const float* rest, int slot, int slots, F k) {
-  const bool wraps = slot + 1 == slots;
-  const int next = wraps ? 0 : slot + 1;
-  Pair<F> s{a.Load(slot), b.Load(next), a.LoadMass(slot), b.LoadMass(next)};
-  if (wraps) {
-    s.q = RotateDown(s.q);
-    s.w_q = RotateDown(s.w_q);
-  }
-  ProjectStretch(&s, Batches<F>::Load(rest + 8 * slot, a.next), k);
-  a.Store(slot, s.p);
-  b.Store(next, wraps ? RotateUp(s.q) : s.q);
-}
-
-/// Edges along a row: even slots, odd slots, then the wrap, each a set of disjoint pairs.
-template <class F>
-inline void StretchAlongRow(const GridRows<F>& row, const float* rest, int slots, F k) {
-  for (int first = 0; first < 2; ++first) {
-    for (int s = first; s + 1 < slots; s += 2) {
-      StretchToNext(row, row, rest, s, slots, k);
-    }
-  }
-  if (slots > 1) {
-    StretchToNext(row, row, rest, slots - 1, slots, k);
-  } else {
-    // One slot: neighbours are lanes of the same vector, so the pairs overlap. Even lanes, then odd lanes.
-    for (int first = 0; first < 2; ++first) {
-      for (int lane = first; lane + 1 < kLanes; lane += 2) {
-        alignas(32) float lanes[kLanes] = {};
-        lanes[lane] = 1.0f;
-        const F only =
-            Select(Batches<F>::Load(lanes, 0) > F::All(0.0f), Batches<F>::Load(rest, row.next), F::All(0.0f));
-        const Pair<F> s{row.Load(0), RotateDown(row.Load(0)), row.LoadMass(0), RotateDown(row.LoadMass(0))};
-        const V<F> d = s.q - s.p;
-        const F factor = StretchFactor(s, d, only, k);
-        row.Store(0, s.p + d * (factor * s.w_p) - RotateUp(d * (factor * s.w_q)));
-      }
-    }
-  }
-}
-
-/// Edges from row a to row b straight and diagonal.
-template <class F>
-inline void StretchBetweenRows(const GridRows<F>& a, const GridRows<F>& b, const float* straight, const float* diagonal,
-                               int slots, F k) {
-  for (int s = 0; s < slots; ++s) {
-    Pair<F> pair{a.Load(s), b.Load(s), a.LoadMass(s), b.LoadMass(s)};
-    ProjectStretch(&pair, Batches<F>::Load(straight + 8 * s, a.next), k);
-    a.Store(s, pair.p);
-    b.Store(s, pair.q);
-  }
-  for (int s = 0; s < slots; ++s) {
-    StretchToNext(a, b, diagonal, s, slots, k);
-  }
-}
-
-/// Rows `row` and row + 1, and with F16 also the next two: along each while it is in the first-level cache, when
-/// `along`, then between the two of a pair.
-template <class F>
-inline void StretchRowPairs(const GridArrays& g, int row, bool along, F k) {
-  if (along) {
-    for (int r = row; r < row + 2 * F::kBatches; r += F::kBatches) {
-      StretchAlongRow(RowsOf<F>(g, r, 1), RestOf(g, 0, r), g.slots, k);
-    }
-  }
-  StretchBetweenRows(RowsOf<F>(g, row, 2), RowsOf<F>(g, row + 1, 2), RestOf(g, 1, row), RestOf(g, 2, row), g.slots, k);
-}
-
 void GridStretch(const GridArrays& g, float stiffness) {
-  // Even row pairs, then odd ones: the pairs of a set are disjoint. An odd pair needs only its two even neighbours
-  // done, so it follows them at once, while their rows are in the cache.
-  constexpr int kAtOnce = 2 * Widest::kBatches;
-  const F8 k = F8::All(stiffness);
-  const Widest wide_k = Widest::All(stiffness);
-  int even = 0, odd = 1;
-  for (; even + kAtOnce <= g.rows; even += kAtOnce) {
-    StretchRowPairs(g, even, true, wide_k);
-    if (odd <= even) {
-      StretchRowPairs(g, odd, false, wide_k);
-      odd += kAtOnce;
-    }
-  }
-  for (; even + 2 <= g.rows; even += 2) {
-    StretchRowPairs(g, even, true, k);
-  }
-  if (even < g.rows) {
-    StretchAlongRow(RowsOf<F8>(g, even, 1), RestOf(g, 0, even), g.slots, k);
-  }
-  for (; odd + 2 <= g.rows; odd += 2) {
-    StretchRowPairs(g, odd, false, k);
-  }
+  SweepGrid(g, PbdStretch{{g.rest[0], g.rest[1], g.rest[2]}, stiffness});
 }
 
-/// Floats from an array of one batch to that of the next.
-template <class Batch>
-inline constexpr std::size_t kNext = sizeof(Batch) / sizeof(float);
-
 template <class F>
-inline void ProjectSprings(float* particles, const SpringBatch& batch, float stiffness) {
+FULCRUM_INLINE void ProjectSprings(float* particles, const SpringBatch& batch, float stiffness) {
   constexpr std::size_t kStep = kNext<SpringBatch>;
   const Particles<F> a = GatherXyzw<F, 4>(particles, batch.a, kStep);
   const Particles<F> b = GatherXyzw<F, 4>(particles, batch.b, kStep);
   Pair<F> s{a.p, b.p, a.w, b.w};
-  ProjectStretch(&s, Batches<F>::Load(batch.rest, kStep), F::All(stiffness));
+  const V<F> d = s.q - s.p;
+  s.Pull(d, StretchFactor(s, d, Batches<F>::Load(batch.rest, kStep), F::All(stiffness)));
   ScatterXyzw<F, 4>({s.p, s.w_p}, particles, batch.a, kStep);
   ScatterXyzw<F, 4>({s.q, s.w_q}, particles, batch.b, kStep);
 }
 
 template <class F>
-inline void ProjectVolumes(float* particles, const TetBatch& batch, float stiffness) {
+FULCRUM_INLINE void ProjectVolumes(float* particles, const TetBatch& batch, float stiffness) {
   constexpr std::size_t kStep = kNext<TetBatch>;
   Particles<F> q[4];
   for (int j = 0; j < 4; ++j) {
@@ -214,7 +71,7 @@ inline void ProjectVolumes(float* particles, const TetBatch& batch, float stiffn
 }
 
 template <class F>
-inline void ProjectBending(float* particles, const BendingBatch& batch, float stiffness) {
+FULCRUM_INLINE void ProjectBending(float* particles, const BendingBatch& batch, float stiffness) {
   constexpr std::size_t kStep = kNext<BendingBatch>;
   const F pi = F::All(3.14159265f), two_pi = F::All(6.28318531f), zero = F::All(0.0f);
   Particles<F> q[4];
@@ -250,7 +107,7 @@ inline void ProjectBending(float* particles, const BendingBatch& batch, float st
 }
 
 template <class F>
-inline void ProjectBindings(float* pool, const BindingBatch& batch, const BindingStiffness& stiffness) {
+FULCRUM_INLINE void ProjectBindings(float* pool, const BindingBatch& batch, const BindingStiffness& stiffness) {
   constexpr std::size_t kStep = kNext<BindingBatch>;
   const F zero = F::All(0.0f);
   const Particles<F> node = GatherPool<F>(pool, batch.base[0], batch.step[0], kStep);
@@ -279,28 +136,26 @@ inline void ProjectBindings(float* pool, const BindingBatch& batch, const Bindin
   }
 }
 
-/// As many batches at a time as fit the registers, then one at a time. Batches 2 i and 2 i + 1 are of one colour.
-#define FULCRUM_FOR_BATCHES(project, place, batches, count, stiffness) \
-  std::size_t i = 0;                                                   \
-  for (; i + Widest::kBatches <= (count); i += Widest::kBatches) {     \
-    project<Widest>(place, (batches)[i], stiffness);                   \
-  }                                                                    \
-  for (; i < (count); ++i) {                                           \
-    project<F8>(place, (batches)[i], stiffness);                       \
-  }
-
 void Springs(float* particles, const SpringBatch* batches, std::size_t count, float stiffness) {
-  FULCRUM_FOR_BATCHES(ProjectSprings, particles, batches, count, stiffness)
+  ForBatches(
+      count, [&](auto lanes, std::size_t i)
+                 __attribute__((always_inline)) { ProjectSprings<decltype(lanes)>(particles, batches[i], stiffness); });
 }
 void Volumes(float* particles, const TetBatch* batches, std::size_t count, float stiffness) {
-  FULCRUM_FOR_BATCHES(ProjectVolumes, particles, batches, count, stiffness)
+  ForBatches(
+      count, [&](auto lanes, std::size_t i)
+                 __attribute__((always_inline)) { ProjectVolumes<decltype(lanes)>(particles, batches[i], stiffness); });
 }
 void Bending(float* particles, const BendingBatch* batches, std::size_t count, float stiffness) {
-  FULCRUM_FOR_BATCHES(ProjectBending, particles, batches, count, stiffness)
+  ForBatches(
+      count, [&](auto lanes, std::size_t i)
+                 __attribute__((always_inline)) { ProjectBending<decltype(lanes)>(particles, batches[i], stiffness); });
 }
-void Bindings(float* pool, const BindingBatch* batches, std::size_t count,
-              const BindingStiffness& stiffness){FULCRUM_FOR_BATCHES(ProjectBindings, pool, batches, count, stiffness)}
-#undef FULCRUM_FOR_BATCHES
+void Bindings(float* pool, const BindingBatch* batches, std::size_t count, const BindingStiffness& stiffness) {
+  ForBatches(
+      count, [&](auto lanes, std::size_t i)
+                 __attribute__((always_inline)) { ProjectBindings<decltype(lanes)>(pool, batches[i], stiffness); });
+}
 
 std::uint32_t Integrate(float* const now[3], float* const previous[3], const float* w, std::size_t count,
                         const IntegrateSettings& settings) {

@@ -1,5 +1,5 @@
 // What the kernels are written in: F lanes of floats, F = F8 for one batch of eight or F16 for two batches at a time.
-// Included only by kernels_impl.h.
+// Included only by bodies of kernels.
 #pragma once
 
 #if defined(FULCRUM_KERNEL_SCALAR)
@@ -9,6 +9,9 @@
 #else
 #include "physics_node/pbd/float8.h"
 #endif
+
+/// For what runs in the innermost loops: called instead, it would load its constants again each time.
+#define FULCRUM_INLINE inline __attribute__((always_inline))
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
