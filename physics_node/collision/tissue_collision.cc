@@ -11,6 +11,8 @@ namespace {
 
 /// Rows are made this far from contact, and as much more as the block moves in two steps [m].
 constexpr float kBand = 0.0002f;
+/// A particle that is near goes so far before its nearest triangle is looked for anew [m].
+constexpr float kKeep = 0.0003f;
 /// What is further than this behind a surface has gone through for good [m].
 constexpr float kMaxBehind = 0.005f;
 /// Fixed surfaces are seen from this far [m].
@@ -42,7 +44,8 @@ TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* mode
   WatchFixed(false);
   WatchFixed(true);
   near_organ_.reserve(organ_.size());
-  near_fixed_.reserve(fixed_[0].size() + fixed_[1].size());
+  near_fixed_[0].reserve(fixed_[0].size());
+  near_fixed_[1].reserve(fixed_[1].size());
 }
 
 TissueCollision::Signed TissueCollision::SignedDistance(const Vec3f& p, const std::array<Vec3f, 3>& corners) {
@@ -68,7 +71,7 @@ void TissueCollision::MakeGroups(std::span<Watch> watches, std::vector<Group>* g
   for (Index i = 0; i < watches.size(); ++i) {
     const Index block = watches[i].particle / kBlock;
     if (groups->empty() || groups->back().block != block) {
-      groups->push_back({block, i, i, 0.0f});
+      groups->push_back({block, i, i, 0.0f, 0});
     }
     groups->back().last = i + 1;
   }
@@ -110,7 +113,12 @@ void TissueCollision::WatchOrgan() {
       const float rest = SignedDistance(p, corners[hit.triangle]).distance;
       if (rest > 0.0f) {
         const float clearance = std::min(scene_.physics.collision_margin_m, 0.5f * rest);
-        organ_.push_back({particle, particles_->Ref(particle), hit.triangle, clearance, 0.0f, true});
+        Watch watch;
+        watch.particle = particle;
+        watch.at = particles_->Ref(particle);
+        watch.triangle = hit.triangle;
+        watch.clearance = clearance;
+        organ_.push_back(watch);
       }
     }
   }
@@ -142,7 +150,10 @@ void TissueCollision::WatchFixed(bool breathing) {
     if (!(scene_.inverse_mass[particle] > 0.0f) || (particle < scene_.tube_vertex_count && !on_surface[particle])) {
       continue;
     }
-    Watch watch{particle, particles_->Ref(particle), kNoIndex, scene_.physics.collision_margin_m, 0.0f, false};
+    Watch watch;
+    watch.particle = particle;
+    watch.at = particles_->Ref(particle);
+    watch.clearance = scene_.physics.collision_margin_m;
     const Vec3f& p = scene_.rest_position[particle];
     const TriangleTree::Hit hit = trees_[which].Nearest(p, kSight);
     if (hit.triangle != kNoIndex) {
@@ -188,24 +199,34 @@ void TissueCollision::Walk(Watch* watch, const Vec3f& p) const {
   }
 }
 
-/// look(watch, index, band) returns how far the particle and what it may touch may move together before the next look.
+/// look(watch, reach) tells how far the particle is from contact, 3e38 where there can be none; `reach` is from where
+/// on it is near.
 template <class Look>
 void TissueCollision::LookAtDue(std::vector<Group>* groups, std::vector<Watch>* watches, std::span<const float> moved,
-                                float others_travel, const Look& look) {
+                                float others_travel, float others_moved, std::vector<Near>* near, const Look& look) {
+  near->clear();
   for (Group& group : *groups) {
     const float travel = travel_[group.block] + others_travel;
-    if (travel < group.due) {
-      continue;
-    }
-    const float band = kBand + 2.0f * moved[group.block];
-    group.due = 3e38f;
-    for (Index i = group.first; i < group.last; ++i) {
-      Watch& watch = (*watches)[i];
-      if (travel >= watch.due) {
-        ++looked_at_;
-        watch.due = travel + std::max(0.0f, look(&watch, i, band) - band);
+    const float band = kBand + 2.0f * (moved[group.block] + others_moved), reach = band + kKeep;
+    if (travel >= group.due) {
+      group.due = 3e38f;
+      group.near = 0;
+      for (Index i = group.first; i < group.last; ++i) {
+        Watch& watch = (*watches)[i];
+        if (travel >= watch.due) {
+          ++looked_at_;
+          const float distance = look(&watch);
+          watch.near = distance < reach;
+          watch.due = travel + (watch.near ? kKeep : std::min(distance, kSight) - band);
+        }
+        group.near += watch.near;
+        group.due = std::min(group.due, watch.due);
       }
-      group.due = std::min(group.due, watch.due);
+    }
+    for (Index i = group.near > 0 ? group.first : group.last; i < group.last; ++i) {
+      if ((*watches)[i].near) {
+        near->push_back({i, band});
+      }
     }
   }
 }
@@ -213,28 +234,27 @@ void TissueCollision::LookAtDue(std::vector<Group>* groups, std::vector<Watch>* 
 void TissueCollision::LookAtFixed(std::size_t which, std::span<const float> moved) {
   const Vec3f shift = which == 1 ? breath0_ : Vec3f(Vec3f::Zero());
   const TriangleTree& tree = trees_[which];
-  LookAtDue(&fixed_groups_[which], &fixed_[which], moved, which == 1 ? breath_travel_ : 0.0f,
-            [&](Watch* watch, Index index, float band) {
+  const float breathed = which == 1 ? (breath1_ - breath0_).norm() : 0.0f;
+  LookAtDue(&fixed_groups_[which], &fixed_[which], moved, which == 1 ? breath_travel_ : 0.0f, breathed,
+            &near_fixed_[which], [&](Watch* watch) {
               const Vec3f p = particles_->At(watch->at) - shift;
               const TriangleTree::Hit hit = tree.Nearest(p, kSight);
               if (hit.triangle == kNoIndex) {
                 watch->front = false;
                 return kSight;
               }
-              const Vec3f& normal = tree.normal(hit.triangle);
-              const float distance = std::sqrt(hit.distance_sq), height = normal.dot(p - hit.point);
+              watch->point = hit.point;
+              watch->normal = tree.normal(hit.triangle);
+              const float distance = std::sqrt(hit.distance_sq), height = watch->normal.dot(p - hit.point);
               const bool beside = std::abs(height) < kBesideCosine * distance;
               watch->front = watch->front || (height > 0.0f && !beside);
-              if (watch->front && !beside && height > -kMaxBehind && height < watch->clearance + band) {
-                near_fixed_.push_back({static_cast<std::uint32_t>(which), {index, band, hit.point, normal}});
-              }
-              return watch->front ? distance - watch->clearance : distance;
+              const bool blocks = watch->front && !beside && height > -kMaxBehind;
+              // Past a rim or behind, it comes to contact only round the rim.
+              return blocks ? height - watch->clearance : std::max(distance, 2.0f * kKeep);
             });
 }
 
 void TissueCollision::FindPairs(std::span<const float> moved, double time0_s, double time1_s) {
-  near_organ_.clear();
-  near_fixed_.clear();
   looked_at_ = 0;
   const Index organ_blocks = (scene_.tube_vertex_count + kBlock - 1) / kBlock;
   float organ_moved = 0;
@@ -246,33 +266,58 @@ void TissueCollision::FindPairs(std::span<const float> moved, double time0_s, do
   breath0_ = BreathingOffset(breathing_, time0_s);
   breath1_ = BreathingOffset(breathing_, time1_s);
   breath_travel_ += (breath1_ - breath0_).norm();
-  LookAtDue(&organ_groups_, &organ_, moved, organ_travel_, [&](Watch* watch, Index index, float band) {
-    if (!model_->NodeAlive(watch->particle - scene_.membrane.first) ||
-        model_->IsDebris(watch->particle - scene_.membrane.first)) {
-      return kSight;
-    }
+  LookAtDue(&organ_groups_, &organ_, moved, organ_travel_, organ_moved, &near_organ_, [&](Watch* watch) {
     const Vec3f p = particles_->At(watch->at);
     Walk(watch, p);
-    const float distance = SignedDistance(p, OrganCorners(watch->triangle)).distance - watch->clearance;
-    if (distance < band + 2.0f * organ_moved) {
-      near_organ_.push_back({index, band + 2.0f * organ_moved, Vec3f::Zero(), Vec3f::Zero()});
-    }
-    return distance;
+    return SignedDistance(p, OrganCorners(watch->triangle)).distance - watch->clearance;
   });
   LookAtFixed(0, moved);
   LookAtFixed(1, moved);
 }
 
+/// Dead and loose membrane touches nothing.
+bool TissueCollision::Touches(Index particle) const {
+  const Index first = scene_.membrane.first;
+  return particle < first || (model_->NodeAlive(particle - first) && !model_->IsDebris(particle - first));
+}
+
+void TissueCollision::AddFixedRows(std::size_t which, float u0, float u1, std::size_t limit,
+                                   std::vector<ContactRow>* rows) const {
+  ContactRow row;
+  row.friction = scene_.physics.friction;
+  row.count = 1;
+  row.weight[0] = 1.0f;
+  const bool breathes = which == 1;
+  const Vec3f shift = breathes ? Vec3f(breath0_ + u1 * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
+  row.drift = breathes ? Vec3f((u1 - u0) * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
+  for (const Near& near : near_fixed_[which]) {
+    const Watch& watch = fixed_[which][near.watch];
+    row.offset = watch.normal.dot(watch.point + shift) + watch.clearance;
+    if (watch.normal.dot(particles_->At(watch.at)) > row.offset + near.band || !Touches(watch.particle)) {
+      continue;
+    }
+    if (rows->size() == limit) {
+      return;
+    }
+    row.at[0] = watch.at;
+    row.normal = watch.normal;
+    row.source = kSource | near.watch;
+    rows->push_back(row);
+  }
+}
+
 void TissueCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) const {
-  const std::size_t end = rows->size() + kMaxRows;
+  const std::size_t limit = rows->size() + kMaxRows;
   ContactRow row;
   row.friction = scene_.physics.friction;
   for (const Near& near : near_organ_) {
     const Watch& watch = organ_[near.watch];
-    const auto corners = OrganCorners(watch.triangle);
-    const Signed now = SignedDistance(particles_->At(watch.at), corners);
-    if (now.distance > watch.clearance + near.band || now.distance < -kMaxBehind || rows->size() == end) {
+    const Signed now = SignedDistance(particles_->At(watch.at), OrganCorners(watch.triangle));
+    if (now.distance > watch.clearance + near.band || now.distance < -kMaxBehind || !Touches(watch.particle)) {
       continue;
+    }
+    if (rows->size() == limit) {
+      return;
     }
     row.count = 1;
     row.at[0] = watch.at;
@@ -289,22 +334,8 @@ void TissueCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) co
     row.source = kSource | near.watch;
     rows->push_back(row);
   }
-  row.count = 1;
-  row.weight = {1, 0, 0, 0};
-  for (const auto& [which, near] : near_fixed_) {
-    if (rows->size() == end) {
-      break;
-    }
-    const Watch& watch = fixed_[which][near.watch];
-    const bool breathes = which == 1;
-    const Vec3f end_shift = breathes ? Vec3f(breath0_ + u1 * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
-    row.at[0] = watch.at;
-    row.normal = near.normal;
-    row.offset = near.normal.dot(near.point + end_shift) + watch.clearance;
-    row.drift = breathes ? Vec3f((u1 - u0) * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
-    row.source = kSource | near.watch;
-    rows->push_back(row);
-  }
+  AddFixedRows(0, u0, u1, limit, rows);
+  AddFixedRows(1, u0, u1, limit, rows);
 }
 
 }  // namespace fulcrum::physics

@@ -2,8 +2,8 @@
 // in front of the fixed surfaces of the scene that collide.
 //
 // Amortised by distance: a particle that was d from contact is not looked at again before it and what it may touch have
-// together moved that far. Movements come from the solver by blocks of particles, so tissue at rest costs one
-// comparison a block.
+// together moved that far; one that is near keeps its triangle for kKeep. Movements come from the solver by blocks of
+// particles, so tissue at rest costs one comparison a block.
 #pragma once
 
 #include <array>
@@ -52,7 +52,9 @@ class TissueCollision {
   void Rows(float u0, float u1, std::vector<ContactRow>* rows) const;
 
   /// Particles near something in this step.
-  [[nodiscard]] std::size_t near_count() const { return near_organ_.size() + near_fixed_.size(); }
+  [[nodiscard]] std::size_t near_count() const {
+    return near_organ_.size() + near_fixed_[0].size() + near_fixed_[1].size();
+  }
   /// Particles looked at by the last FindPairs.
   [[nodiscard]] std::size_t looked_at() const { return looked_at_; }
 
@@ -61,21 +63,24 @@ class TissueCollision {
   struct Watch {
     Index particle = 0;
     ParticleRef at;
-    Index triangle = kNoIndex;  ///< Of tube_surface, or of the tree.
-    float clearance = 0;        ///< Kept from the surface: less where it rests nearer [m].
-    float due = 0;              ///< Looked at again when the travel that concerns it has come to this [m].
-    bool front = false;         ///< Seen in front of the surface and not lost from sight since.
+    Index triangle = kNoIndex;     ///< Of tube_surface, or of the tree.
+    float clearance = 0;           ///< Kept from the surface: less where it rests nearer [m].
+    float due = 0;                 ///< Looked at again when the travel that concerns it has come to this [m].
+    bool front = false;            ///< Seen in front of the surface and not lost from sight since.
+    bool near = false;             ///< Rows may come of it before it is looked at again.
+    Vec3f point = Vec3f::Zero();   ///< Of a fixed surface: the nearest one …
+    Vec3f normal = Vec3f::Zero();  ///< … and its normal.
   };
   /// Watches of one block: [first, last), and the least `due` of them.
   struct Group {
     Index block = 0, first = 0, last = 0;
     float due = 0;
+    Index near = 0;  ///< How many are near.
   };
+  /// One that is near in this step.
   struct Near {
     Index watch = 0;
-    float band = 0;               ///< Rows are made this far from contact [m].
-    Vec3f point = Vec3f::Zero();  ///< Fixed surfaces: nearest, at rest.
-    Vec3f normal = Vec3f::Zero();
+    float band = 0;  ///< Rows are made this far from contact [m].
   };
   struct Signed {
     std::array<float, 3> barycentric{};
@@ -92,8 +97,10 @@ class TissueCollision {
   [[nodiscard]] static Signed SignedDistance(const Vec3f& p, const std::array<Vec3f, 3>& corners);
   template <class Look>
   void LookAtDue(std::vector<Group>* groups, std::vector<Watch>* watches, std::span<const float> moved,
-                 float others_travel, const Look& look);
+                 float others_travel, float others_moved, std::vector<Near>* near, const Look& look);
   void LookAtFixed(std::size_t which, std::span<const float> moved);
+  [[nodiscard]] bool Touches(Index particle) const;
+  void AddFixedRows(std::size_t which, float u0, float u1, std::size_t limit, std::vector<ContactRow>* rows) const;
 
   SceneView scene_;
   const TissueModel* model_;
@@ -111,7 +118,7 @@ class TissueCollision {
   float organ_travel_ = 0, breath_travel_ = 0;
   Vec3f breath0_ = Vec3f::Zero(), breath1_ = Vec3f::Zero();
   std::vector<Near> near_organ_;
-  std::vector<std::pair<std::uint32_t, Near>> near_fixed_;  ///< With the tree.
+  std::array<std::vector<Near>, 2> near_fixed_;
   std::size_t looked_at_ = 0;
 };
 

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cstdio>
 
+#include "physics_node/collision/tissue_collision.h"
 #include "services/scene/build.h"
 #include "tests/benchmark/report.h"
 #include "tests/numerics/physics/script_player.h"
@@ -18,15 +19,17 @@ double NowUs() {
 /// Microseconds per tool of one step.
 struct Cost {
   double find = 3e38, project = 3e38, rows = 3e38;
+  double tissue = 3e38;  ///< Not per tool.
   void TakeLess(const Cost& other) {
     find = std::min(find, other.find);
     project = std::min(project, other.project);
     rows = std::min(rows, other.rows);
+    tissue = std::min(tissue, other.tissue);
   }
 };
 
 struct Counts {
-  std::size_t pairs = 0, rows = 0;
+  std::size_t pairs = 0, rows = 0, tissue_rows = 0;
 };
 
 /// One pass over the script: the simulation moves tissue and tools, a collision of our own is timed beside it.
@@ -35,10 +38,11 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
   ParticleStore& particles = simulation.particles();
   TissueModel model(scene, &particles);
   ToolCollision collision(scene, &model, &particles);
+  TissueCollision tissue(scene, &model, &particles);
   std::vector<Cost> costs;
-  std::vector<float> xyz(3 * std::size_t{particles.particle_count()}), previous(xyz.size());
+  std::vector<float> moved, xyz(3 * std::size_t{particles.particle_count()}), previous(xyz.size());
   std::vector<ContactRow> rows;
-  rows.reserve(kMaxTools * ToolCollision::kMaxRows);
+  rows.reserve(TissueCollision::kMaxRows);
   std::array<ToolInput, kMaxTools> last;
   const int end = static_cast<int>(scene.script_duration_s * 100);
   for (int index = 0; index < end; ++index) {
@@ -76,7 +80,17 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
     collision.Settle();
     const double t3 = NowUs();
     particles.SetAll(xyz, previous);
-    costs.push_back({(t1 - t0) / count, (t3 - t2) / count, (t2 - t1) / count});
+    tissue.MeasureMoves(&moved);
+    rows.clear();
+    const double t4 = NowUs();
+    tissue.FindPairs(moved, 0, 0);
+    for (const float u : {0.0f, 0.5f}) {
+      rows.clear();
+      tissue.Rows(u, u + 0.5f, &rows);
+    }
+    const double t5 = NowUs();
+    most->tissue_rows = std::max(most->tissue_rows, rows.size());
+    costs.push_back({(t1 - t0) / count, (t3 - t2) / count, (t2 - t1) / count, t5 - t4});
     most->pairs = std::max(most->pairs, collision.pairs().size());
   }
   return costs;
@@ -92,9 +106,10 @@ void Collide(const SceneView& scene, benchmark::Report* report) {
       costs[i].TakeLess(again[i]);
     }
   }
-  std::vector<double> find, with_rows, with_projection;
+  std::vector<double> find, with_rows, with_projection, tissue;
   for (const Cost& cost : costs) {
     find.push_back(cost.find);
+    tissue.push_back(cost.tissue);
     with_rows.push_back(cost.find + cost.rows);
     with_projection.push_back(cost.find + cost.project);
   }
@@ -104,6 +119,9 @@ void Collide(const SceneView& scene, benchmark::Report* report) {
   report->Add("physics.collide.paper_us_per_tool_p99", Quantile(with_projection, 0.99), "us");
   report->Add("physics.collide.find_us_per_tool_p50", Quantile(find, 0.5), "us");
   report->Add("physics.collide.find_us_per_tool_p99", Quantile(find, 0.99), "us");
+  report->Add("physics.collide.tissue_us_p50", Quantile(tissue, 0.5), "us");
+  report->Add("physics.collide.tissue_us_p99", Quantile(tissue, 0.99), "us");
+  report->Add("physics.collide.tissue_rows_max", static_cast<double>(most.tissue_rows), "1");
   report->Add("physics.collide.pairs_max", static_cast<double>(most.pairs), "1");
   report->Add("physics.collide.rows_max", static_cast<double>(most.rows), "1");
 }
