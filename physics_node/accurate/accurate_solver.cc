@@ -88,8 +88,11 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
     *a = FloatArray(12 * (tube_count_ + std::size_t{1}));
   }
   const std::size_t pool = particles->raw().size();
-  for (FloatArray* a : {&velocity_, &place_, &residual_, &z_, &p_, &q_, &d_}) {
+  for (FloatArray* a : {&velocity_, &place_, &residual_, &z_, &p_, &q_, &d_, &load_}) {
     *a = FloatArray(pool);
+  }
+  for (Index p = 0; p < model.load.size(); ++p) {
+    Write(load_.data(), particles->Ref(p), model.load[p].cast<float>());
   }
   carry_ = FloatArray(kCarry * std::size_t{particles->layout().stride} + 16);
   row_sums_ = FloatArray(static_cast<std::size_t>(rows_) * coarse_.row_width());
@@ -133,7 +136,6 @@ void AccurateSolver::PackOrgan(const ElasticModel& model, std::uint32_t tube_cou
   lambda_ = static_cast<float>(model.lambda_Pa + model.mu_Pa);
   volume_ = FloatArray(tube_count + 1);
   organ_mass_ = FloatArray(tube_count + 1);
-  spread_ = FloatArray(tube_count + 1);
   start_.assign(tube_count + 1, 0);
   patch_start_.assign(tube_count + 1, 0);
   for (const ElasticPatch& patch : model.patches) {
@@ -165,8 +167,6 @@ void AccurateSolver::PackOrgan(const ElasticModel& model, std::uint32_t tube_cou
         gradient_[4 * std::size_t{to} + static_cast<std::size_t>(axis)] = g;
         patch_gradient_[4 * std::size_t{back} + static_cast<std::size_t>(axis)] = g;
       }
-      spread_[link.v] +=
-          static_cast<float>((1 - kPatchVariance) * model.mu_Pa * patch.volume * link.gradient.squaredNorm());
     }
   }
   const auto edge = [&](Index from, Index to) -> float& {
@@ -180,8 +180,6 @@ void AccurateSolver::PackOrgan(const ElasticModel& model, std::uint32_t tube_cou
     const auto k = static_cast<float>(link.stiffness);
     edge(link.a, link.b) = k;
     edge(link.b, link.a) = k;
-    spread_[link.a] += k;
-    spread_[link.b] += k;
   }
 }
 
@@ -234,8 +232,7 @@ Organ AccurateSolver::MakeOrgan() const {
           mu_,
           lambda_,
           static_cast<float>(kPatchVariance),
-          organ_mass_.data(),
-          spread_.data()};
+          organ_mass_.data()};
 }
 
 Inertia AccurateSolver::MakeInertia(float h) const {
@@ -249,6 +246,7 @@ SheetLinearise AccurateSolver::At(const FloatArray& place, FloatArray* residual)
     at.place[axis] = place.data() + plane;
     at.start[axis] = particles_->plane(static_cast<int>(axis));
     at.velocity[axis] = velocity_.data() + plane;
+    at.load[axis] = load_.data() + plane;
     at.residual[axis] = residual ? residual->data() + plane : nullptr;
   }
   at.extra = extra_.data();
@@ -310,13 +308,14 @@ double AccurateSolver::EnergyAt(const FloatArray& place, const Inertia& inertia,
     if (!(x[4 * v + 3] > 0.0f)) {
       continue;
     }
-    float energy = 0;
+    float energy = 0, load = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const float moved = place[4 * v + axis] - x[4 * v + axis];
+      load += moved * load_[4 * v + axis];
       energy += 0.5f * inertia.inertia * moved * moved - moved * velocity_[4 * v + axis] / inertia.h -
                 moved * inertia.gravity[axis];
     }
-    sum += static_cast<double>(organ_mass_[v] * energy);
+    sum += static_cast<double>(organ_mass_[v] * energy - load);
   }
   return sum + elements_.Energy(place.data(), contacts);
 }
@@ -358,7 +357,7 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::size_t i = 4 * v + axis;
       const float momentum = (place_[i] - x[i]) * inertia.inertia - velocity_[i] / inertia.h;
-      residual_[i] = mass * (inertia.gravity[axis] - momentum) - residual_[i];
+      residual_[i] = load_[i] + mass * (inertia.gravity[axis] - momentum) - residual_[i];
     }
   }
   elements_.Linearise(place_.data(), particles_->pool(), contacts, residual_.data());
@@ -398,11 +397,11 @@ double AccurateSolver::Precondition() {
 }
 
 /// q <- A p; returns p . q.
-double AccurateSolver::Apply(float inertia) {
+double AccurateSolver::Apply(const FloatArray& direction, float inertia) {
   const Sheet sheet = MakeSheet();
   const SheetMatrix matrix = MakeMatrix();
-  float* const p[3] = {p_.data() + tube_floats_, p_.data() + tube_floats_ + plane_,
-                       p_.data() + tube_floats_ + 2 * plane_};
+  const float* const p[3] = {direction.data() + tube_floats_, direction.data() + tube_floats_ + plane_,
+                             direction.data() + tube_floats_ + 2 * plane_};
   float* const q[3] = {q_.data() + tube_floats_, q_.data() + tube_floats_ + plane_,
                        q_.data() + tube_floats_ + 2 * plane_};
   ForChunks([&](int chunk, int row0, int row1) {
@@ -415,31 +414,39 @@ double AccurateSolver::Apply(float inertia) {
   }
   const Organ organ = MakeOrgan();
   const OrganMatrix organ_matrix{organ_c_.data(), organ_f_.data(), organ_stress_.data(), organ_block_.data()};
-  kernels_.organ_stress(organ, organ_matrix, p_.data(), 0, tube_count_);
-  kernels_.organ_gather(organ, organ_matrix, p_.data(), q_.data(), 0, tube_count_);
+  kernels_.organ_stress(organ, organ_matrix, direction.data(), 0, tube_count_);
+  kernels_.organ_gather(organ, organ_matrix, direction.data(), q_.data(), 0, tube_count_);
   for (std::size_t v = 0; v < tube_count_; ++v) {
     for (std::size_t i = 4 * v; i < 4 * v + 3; ++i) {
-      q_[i] += organ_mass_[v] * inertia * p_[i];
-      sum += static_cast<double>(q_[i] * p_[i]);
+      q_[i] += organ_mass_[v] * inertia * direction[i];
+      sum += static_cast<double>(q_[i] * direction[i]);
     }
   }
-  return sum + elements_.Apply(p_.data(), q_.data());
+  return sum + elements_.Apply(direction.data(), q_.data());
 }
 
+/// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d.
 void AccurateSolver::Solve(float inertia, int iterations) {
   const std::size_t count = tube_floats_ + 3 * plane_;
-  std::fill_n(d_.data(), count, 0.0f);
   double rz = Precondition();
-  std::copy_n(z_.data(), count, p_.data());
+  const FloatArray* direction = &z_;
   for (int i = 0; i < iterations; ++i) {
-    const double curvature = Apply(inertia);
-    if (!(rz > 0.0) || !(curvature > 0.0)) {
-      return;  // Solved, or not finite: Finish counts what is not.
+    const double curvature = Apply(*direction, inertia);
+    // Nothing left to solve, or not finite: Finish counts what is not.
+    const bool stop = !(rz > 0.0) || !(curvature > 0.0);
+    const auto alpha = stop ? 0.0f : static_cast<float>(rz / curvature);
+    (i == 0 ? kernels_.start : kernels_.advance)(alpha, direction->data(), q_.data(), d_.data(), residual_.data(),
+                                                 count);
+    if (stop) {
+      return;
     }
-    kernels_.advance(static_cast<float>(rz / curvature), p_.data(), q_.data(), d_.data(), residual_.data(), count);
     if (i + 1 < iterations) {
+      if (i == 0) {
+        std::swap(z_, p_);
+      }
       const double next = Precondition();
       kernels_.combine(z_.data(), static_cast<float>(next / rz), p_.data(), count);
+      direction = &p_;
       rz = next;
     }
   }
@@ -450,11 +457,7 @@ float AccurateSolver::LargestCorrection() const {
   for (std::size_t i = 0; i < 4 * std::size_t{tube_count_}; i += 4) {
     largest = std::max(largest, d_[i] * d_[i] + d_[i + 1] * d_[i + 1] + d_[i + 2] * d_[i + 2]);
   }
-  const float *x = d_.data() + tube_floats_, *y = x + plane_, *z = y + plane_;
-  for (std::size_t i = 0; i < plane_; ++i) {
-    largest = std::max(largest, x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
-  }
-  return std::sqrt(largest);
+  return std::sqrt(std::max(largest, kernels_.largest(d_.data() + tube_floats_, plane_, plane_)));
 }
 
 void AccurateSolver::LimitCorrection(float largest) {
@@ -484,18 +487,17 @@ SubstepReport AccurateSolver::Finish(float h) {
   SubstepReport report;
   float largest = 0;
   const float inverse_h = 1.0f / h;
-  const auto finish = [&](std::size_t i, std::size_t step, float w) {
+  const auto finish = [&](std::size_t i, float w) {
     float* x = particles_->pool() + i;
     float v[3], square = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::size_t at = axis * step;
-      v[axis] = (place_[i + at] + d_[i + at] - x[at]) * inverse_h;
+      v[axis] = (place_[i + axis] + d_[i + axis] - x[axis]) * inverse_h;
       square += v[axis] * v[axis];
     }
     if (!(square < 1e30f)) {
       report.resets += w > 0.0f ? 1 : 0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        velocity_[i + axis * step] = 0;
+        velocity_[i + axis] = 0;
       }
       return;
     }
@@ -508,17 +510,22 @@ SubstepReport AccurateSolver::Finish(float h) {
     }
     largest = w > 0.0f ? std::max(largest, square) : largest;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      x[axis * step] += h * v[axis];
-      velocity_[i + axis * step] = v[axis];
+      x[axis] += h * v[axis];
+      velocity_[i + axis] = v[axis];
     }
   };
   for (std::size_t i = 0; i < 4 * std::size_t{tube_count_}; i += 4) {
-    finish(i, 1, particles_->tube()[i + 3]);
+    finish(i, particles_->tube()[i + 3]);
   }
-  const float* w = particles_->plane(3);
-  for (std::size_t i = 0; i < plane_; ++i) {
-    finish(tube_floats_ + i, plane_, w[i]);
-  }
+  const auto planes = [&](FloatArray& field) {
+    float* at = field.data() + tube_floats_;
+    return Planes{{at, at + plane_, at + 2 * plane_}};
+  };
+  Planes place = planes(place_), d = planes(d_), velocity = planes(velocity_);
+  float* const x[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
+  const FinishCount sheet = kernels_.finish(place, d, particles_->plane(3), h, kLargestSpeed, x, velocity, plane_);
+  report.resets += sheet.resets;
+  largest = std::max(largest, sheet.largest_speed_sq);
   report.largest_speed_m_s = std::sqrt(largest);
   return report;
 }

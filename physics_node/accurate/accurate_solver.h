@@ -71,7 +71,7 @@ class AccurateSolver {
   [[nodiscard]] double EnergyAt(const FloatArray& place, const Inertia& inertia, std::span<const ContactRow> contacts);
   void Linearise(const Inertia& inertia, std::span<const ContactRow> contacts);
   double Precondition();
-  double Apply(float inertia);
+  double Apply(const FloatArray& p, float inertia);
   void Solve(float inertia, int iterations);
   void LimitCorrection(float largest);
   SubstepReport Finish(float h);
@@ -91,7 +91,8 @@ class AccurateSolver {
   std::array<FloatArray, 3> inverse_rest_, axial_, axial_uncut_;
   FloatArray sheet_mass_;
   std::vector<std::uint32_t> start_, vertex_, patch_start_, patch_;
-  FloatArray gradient_, patch_gradient_, volume_, organ_mass_, spread_;
+  FloatArray gradient_, patch_gradient_, volume_, organ_mass_;
+  FloatArray load_;  ///< A field.
   float mu_ = 0, lambda_ = 0;
   Elements elements_;
   CoarseSpace coarse_;

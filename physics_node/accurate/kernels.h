@@ -60,8 +60,9 @@ struct SheetLinearise {
   const float* place[3];     ///< Where to linearise.
   const float* start[3];     ///< At the beginning of the substep.
   const float* velocity[3];  ///< At the beginning of the substep.
+  const float* load[3];      ///< Dead load [N].
   const float* extra;        ///< Stiffness of other elements on a node's diagonal [N/m].
-  float* residual[3];        ///< Out: elastic force + gravity - inertia.
+  float* residual[3];        ///< Out: elastic force + load + gravity - inertia.
 };
 
 /// The organ: one patch per vertex (energy/elastic_model.h), links in compressed rows.
@@ -79,15 +80,19 @@ struct Organ {
   float mu, lambda;     ///< lambda of the stable neo-Hookean energy: Lamé's + mu [Pa].
   float variance;       ///< Part of mu that is taken off |F|^2, kPatchVariance.
   const float* mass;    ///< [kg]
-  const float* spread;  ///< Constant part of a vertex's diagonal block [N/m].
 };
-/// V dP = (1 - variance) mu V dF + c (c : dF) + d(cof F)[dF] q, c = sqrt(lambda V) cof F, q folded into `f`. Three
-/// columns xyz_ of each per patch.
+/// V dP = k dF + c (c : dF) + d(cof F)[dF] q, c = sqrt(lambda V) cof F with k in its fourth lanes, q folded into `f`.
+/// Three columns xyz_ of each per patch.
 struct OrganMatrix {
   float* c;
   float* f;
   float* stress;  ///< V P or V dP of the patches, between the two halves of a product.
   float* block;   ///< Inverse of the diagonal blocks, three columns xyz_; 0 where a vertex does not move.
+};
+
+struct FinishCount {
+  float largest_speed_sq;  ///< Of nodes that move [m^2/s^2].
+  std::uint32_t resets;
 };
 
 struct Kernels {
@@ -114,8 +119,14 @@ struct Kernels {
 
   /// p <- z + beta p on `count` floats.
   void (*combine)(const float* z, float beta, float* p, std::size_t count);
-  /// d += alpha p; r -= alpha q.
+  /// d <- alpha p, or d += alpha p; r -= alpha q.
+  void (*start)(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count);
   void (*advance)(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count);
+  /// Largest |d|^2 of `count` particles in planes x y z, `plane` floats apart.
+  float (*largest)(const float* d, std::size_t plane, std::size_t count);
+  /// Positions and velocities of nodes: place + d, at most `speed` fast; what is not finite stays, at rest.
+  FinishCount (*finish)(const float* const place[3], const float* const d[3], const float* w, float h, float speed,
+                        float* const x[3], float* const velocity[3], std::size_t count);
 
   /// Stress and its derivative of patches [first, last).
   void (*organ_linearise)(const Organ& organ, const OrganMatrix& matrix, const float* place, std::uint32_t first,

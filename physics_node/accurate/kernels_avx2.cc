@@ -7,10 +7,11 @@ namespace fulcrum::physics::accurate {
 const Kernels& Avx2Kernels() {
   namespace isa = accurate_avx2;
   static constexpr Kernels kernels{
-      "AVX2",           isa::SheetGuess,    isa::SheetLineariseRows, isa::SheetApply,
-      isa::SheetEnergy, isa::MiddleBlocks,  isa::SheetRestrict,      isa::SheetPrecondition,
-      isa::Combine,     isa::AdvanceFields, isa::OrganLinearise,     isa::OrganBlocks,
-      isa::OrganStress, isa::OrganGather,   isa::OrganEnergy};
+      "AVX2",           isa::SheetGuess,     isa::SheetLineariseRows, isa::SheetApply,
+      isa::SheetEnergy, isa::MiddleBlocks,   isa::SheetRestrict,      isa::SheetPrecondition,
+      isa::Combine,     isa::StartFields,    isa::AdvanceFields,      isa::Largest,
+      isa::FinishSheet, isa::OrganLinearise, isa::OrganBlocks,        isa::OrganStress,
+      isa::OrganGather, isa::OrganEnergy};
   return kernels;
 }
 

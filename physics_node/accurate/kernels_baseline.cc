@@ -7,9 +7,10 @@ namespace fulcrum::physics::accurate {
 const Kernels& BaselineKernels() {
   namespace isa = accurate_baseline;
   static constexpr Kernels kernels{
-      "baseline",          isa::SheetGuess,    isa::SheetLineariseRows, isa::SheetApply,  isa::SheetEnergy,
-      isa::MiddleBlocks,   isa::SheetRestrict, isa::SheetPrecondition,  isa::Combine,     isa::AdvanceFields,
-      isa::OrganLinearise, isa::OrganBlocks,   isa::OrganStress,        isa::OrganGather, isa::OrganEnergy};
+      "baseline",         isa::SheetGuess,    isa::SheetLineariseRows, isa::SheetApply,     isa::SheetEnergy,
+      isa::MiddleBlocks,  isa::SheetRestrict, isa::SheetPrecondition,  isa::Combine,        isa::StartFields,
+      isa::AdvanceFields, isa::Largest,       isa::FinishSheet,        isa::OrganLinearise, isa::OrganBlocks,
+      isa::OrganStress,   isa::OrganGather,   isa::OrganEnergy};
   return kernels;
 }
 

@@ -96,12 +96,13 @@ inline void OrganLinearise(const Organ& organ, const OrganMatrix& matrix, const 
                             f.c2 * shear + cofactor.c2 * p};
     const std::size_t at = 12 * static_cast<std::size_t>(n);
     StoreColumns(stress, F4::All(volume), matrix.stress + at);
-    const float bound = organ.mu / Root(Larger(LargestStretchSq(f), 1e-12f));
+    const float sigma = Root(Larger(LargestStretchSq(f), 1e-12f)), bound = organ.mu / sigma;
     // Flattened and inverted patches leave the indefinite part out altogether.
     const float fade = Smaller(Larger((j - 0.1f) * 2.5f, 0.0f), 1.0f);
     const float q = Larger(Smaller(pressure, bound), -bound) * fade;
     StoreColumns(cofactor, F4::All(Root(organ.lambda * volume)), matrix.c + at);
     StoreColumns(f, F4::All(q * volume), matrix.f + at);
+    matrix.c[at + 3] = ((1.0f - organ.variance) * organ.mu + __builtin_fabsf(pressure - q) * sigma) * volume;
   }
 }
 
@@ -110,7 +111,7 @@ inline void OrganStress(const Organ& organ, const OrganMatrix& matrix, const flo
   for (std::uint32_t n = first; n < last; ++n) {
     const std::size_t at = 12 * static_cast<std::size_t>(n);
     const Columns d = PatchGradient(organ, p, n), c = LoadColumns(matrix.c + at), f = LoadColumns(matrix.f + at);
-    const F4 shear = F4::All((1.0f - organ.variance) * organ.mu * organ.volume[n]), along = F4::All(DotColumns(c, d));
+    const F4 shear = SpreadLane<3>(c.c0), along = F4::All(DotColumns(c, d));
     // d(cof F)[dF], columns: dF1 x F2 + F1 x dF2 and so on.
     const Columns stress = {d.c0 * shear + c.c0 * along + (CrossProduct(d.c1, f.c2) + CrossProduct(f.c1, d.c2)),
                             d.c1 * shear + c.c1 * along + (CrossProduct(d.c2, f.c0) + CrossProduct(f.c2, d.c0)),
@@ -144,8 +145,8 @@ inline void OrganBlocks(const Organ& organ, const OrganMatrix& matrix, const flo
       StoreColumns({F4::All(0), F4::All(0), F4::All(0)}, F4::All(0), matrix.block + at);
       continue;
     }
-    const float own = organ.spread[v] + extra[v] + organ.mass[v] * inertia;
-    Columns k = {{_mm_set_ps(0, 0, 0, own)}, {_mm_set_ps(0, 0, own, 0)}, {_mm_set_ps(0, own, 0, 0)}};
+    float own = extra[v] + organ.mass[v] * inertia;
+    Columns k = {F4::All(0), F4::All(0), F4::All(0)};
     for (std::uint32_t i = organ.patch_start[v]; i < organ.patch_start[v + 1]; ++i) {
       const Columns c = LoadColumns(matrix.c + 12 * static_cast<std::size_t>(organ.patch[i]));
       const F4 g = F4::Load(organ.patch_gradient + 4 * static_cast<std::size_t>(i));
@@ -153,7 +154,11 @@ inline void OrganBlocks(const Organ& organ, const OrganMatrix& matrix, const flo
       k.c0 = k.c0 + u * SpreadLane<0>(u);
       k.c1 = k.c1 + u * SpreadLane<1>(u);
       k.c2 = k.c2 + u * SpreadLane<2>(u);
+      own += SpreadLane<3>(c.c0).First() * DotProduct(g, g) + SpreadLane<3>(g).First();
     }
+    k.c0 = k.c0 + F4{_mm_set_ps(0, 0, 0, own)};
+    k.c1 = k.c1 + F4{_mm_set_ps(0, 0, own, 0)};
+    k.c2 = k.c2 + F4{_mm_set_ps(0, own, 0, 0)};
     // The inverse of a symmetric matrix is its cofactor over its determinant.
     const Columns cofactor = CofactorColumns(k);
     StoreColumns(cofactor, F4::All(1.0f / DotProduct(k.c0, cofactor.c0)), matrix.block + at);

@@ -89,6 +89,16 @@ struct Below {
   }
 };
 
+inline float LargestOf(F8 v) {
+  alignas(32) float f[8];
+  v.Store(f);
+  float largest = 0;
+  for (const float lane : f) {
+    largest = lane > largest ? lane : largest;
+  }
+  return largest;
+}
+
 inline float SheetGuess(const Sheet& sheet, float h, const float* const start[3], const float* const velocity[3],
                         float* const place[3], int row0, int row1) {
   F8 largest = F8::All(0);
@@ -100,13 +110,7 @@ inline float SheetGuess(const Sheet& sheet, float h, const float* const start[3]
     largest = Max(largest, Dot(d, d));
     StoreV(LoadV(start, at) + d, place, at);
   }
-  alignas(32) float f[8];
-  largest.Store(f);
-  float result = 0;
-  for (const float v : f) {
-    result = v > result ? v : result;
-  }
-  return result;
+  return LargestOf(largest);
 }
 
 /// Stiffness of an edge: transverse part kt >= 0 and m m^T along it.
@@ -210,7 +214,7 @@ inline void SheetLineariseRows(const Sheet& sheet, const Inertia& inertia, const
       const V8 moved = LoadV(at.place, node) - LoadV(at.start, node);
       const V8 momentum = moved * k - LoadV(at.velocity, node) * inverse_h;
       const V8 elastic = {sum(0, slot), sum(1, slot), sum(2, slot)};
-      StoreV(elastic + (gravity - momentum) * mass, at.residual, node);
+      StoreV(elastic + LoadV(at.load, node) + (gravity - momentum) * mass, at.residual, node);
       const F8 own = F8::Load(at.extra + node) + mass * k;
       const F8 block[6] = {sum(3, slot) + own, sum(4, slot) + own, sum(5, slot) + own,
                            sum(6, slot),       sum(7, slot),       sum(8, slot)};
@@ -307,6 +311,8 @@ inline double SheetEnergy(const Sheet& sheet, const Inertia& inertia, const Shee
       }
       const F8 mass = F8::Load(sheet.mass + node) & (F8::Load(sheet.w + node) > zero);
       const V8 moved = x - LoadV(at.start, node);
+      const V8 load = LoadV(at.load, node);
+      energy = energy - Dot(moved, load);
       energy = energy + mass * (half * k * Dot(moved, moved) - inverse_h * Dot(moved, LoadV(at.velocity, node)) -
                                 Dot(moved, gravity));
     }
@@ -427,12 +433,50 @@ inline void Combine(const float* z, float beta, float* p, std::size_t count) {
   }
 }
 
+inline void StartFields(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count) {
+  const F8 a = F8::All(alpha);
+  for (std::size_t i = 0; i < count; i += 8) {
+    (F8::Load(p + i) * a).Store(d + i);
+    (F8::Load(r + i) - F8::Load(q + i) * a).Store(r + i);
+  }
+}
+
 inline void AdvanceFields(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count) {
   const F8 a = F8::All(alpha);
   for (std::size_t i = 0; i < count; i += 8) {
     (F8::Load(d + i) + F8::Load(p + i) * a).Store(d + i);
     (F8::Load(r + i) - F8::Load(q + i) * a).Store(r + i);
   }
+}
+
+inline float Largest(const float* d, std::size_t plane, std::size_t count) {
+  F8 largest = F8::All(0);
+  for (std::size_t i = 0; i < count; i += 8) {
+    const V8 v = {F8::Load(d + i), F8::Load(d + plane + i), F8::Load(d + 2 * plane + i)};
+    largest = Max(Dot(v, v), largest);
+  }
+  return LargestOf(largest);
+}
+
+inline accurate::FinishCount FinishSheet(const float* const place[3], const float* const d[3], const float* w, float h,
+                                         float speed, float* const x[3], float* const velocity[3], std::size_t count) {
+  const F8 zero = F8::All(0), step = F8::All(h), inverse_h = F8::All(1.0f / h);
+  const F8 limit = F8::All(speed), limit_sq = F8::All(speed * speed);
+  F8 largest = zero;
+  std::uint32_t resets = 0;
+  for (std::size_t i = 0; i < count; i += 8) {
+    const V8 from = LoadV(x, i);
+    V8 v = ((LoadV(place, i) + LoadV(d, i)) - from) * inverse_h;
+    const F8 square = Dot(v, v), moves = F8::Load(w + i) > zero;
+    const F8 finite = square < F8::All(1e30f);
+    resets += static_cast<std::uint32_t>(__builtin_popcount(Bits(moves) & ~Bits(finite) & 0xffu));
+    const F8 part = Select(square > limit_sq, limit / Sqrt(square), F8::All(1.0f));
+    v = {(v.x * part) & finite, (v.y * part) & finite, (v.z * part) & finite};
+    largest = Max(Min(square & finite, limit_sq) & moves, largest);
+    StoreV(v, velocity, i);
+    StoreV(from + v * step, x, i);
+  }
+  return {LargestOf(largest), resets};
 }
 
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

@@ -129,6 +129,20 @@ void AddBindings(const SceneView& scene, ElasticModel* model) {
   }
 }
 
+/// At rest only the springs pull: organ, hinges and bindings are free of force there.
+void AddLoad(ElasticModel* model) {
+  model->load.assign(model->rest_position.size(), Vec3d::Zero());
+  for (const ElasticSpring& spring : model->springs) {
+    if (spring.axial > 0) {
+      const Vec3d d = model->rest_position[spring.b] - model->rest_position[spring.a];
+      const double strain = d.norm() / spring.rest_length - 1;
+      const Vec3d force = spring.axial * (strain + model->stiffening * strain * strain * strain) * d.normalized();
+      model->load[spring.a] -= force;
+      model->load[spring.b] += force;
+    }
+  }
+}
+
 }  // namespace
 
 ElasticModel BuildElasticModel(const SceneView& scene) {
@@ -144,6 +158,7 @@ ElasticModel BuildElasticModel(const SceneView& scene) {
   AddHinges(scene, &model);
   AddTets(scene, &model);
   AddBindings(scene, &model);
+  AddLoad(&model);
   return model;
 }
 

@@ -6,7 +6,9 @@
 //        + organ: nodal patches, see below                                              (tet_energy.h)
 //        + sum bindings k / 2 (|x_m - sum_i b_i x_i| - d)^2                              (eq. 9 of the paper)
 //
-// with inertia M and viscous drag -damping M v.
+// with inertia M, viscous drag -damping M v and a dead load. A prestrained membrane would leave its rest shape; what
+// holds it there (pressure, fat, neighbours) is not modelled, so the load is that which makes the rest shape an
+// equilibrium.
 //
 // The organ. Linear tetrahedra lock: a cantilever four elements thick bends 41 % too little at Poisson's ratio 0.45 and
 // 71 % at 0.49. So the constitutive law sits at the nodes, on the mean deformation gradient of the tets around each
@@ -84,6 +86,7 @@ inline constexpr double kPatchVariance = 0.25;
 struct ElasticModel {
   std::vector<Vec3d> rest_position;  ///< [n] frame W, m.
   std::vector<double> mass;          ///< [n] kg; 0 = fixed.
+  std::vector<Vec3d> load;           ///< [n] N: what keeps a prestrained membrane in its rest shape; energy -load . x.
   std::vector<ElasticSpring> springs;
   std::vector<ElasticHinge> hinges;
   std::vector<ElasticTet> tets;               ///< Volumes and inversions; the energy is in the patches.
