@@ -82,6 +82,18 @@ void MeasureMembrane(const SceneView& s, SceneQuality* q) {
   q->rms_flat_error = q->membrane_springs ? std::sqrt(squares / static_cast<double>(q->membrane_springs)) : 0;
   q->least_binding_m = binding.least;
   q->largest_binding_m = binding.largest;
+  Extent stretch, area;
+  for (const AtlasMetric& m : MeasureAtlas(s)) {
+    stretch.Add(m.stretches()[0]);
+    stretch.Add(m.stretches()[1]);
+    area.Add(m.area());
+  }
+  stretch.Settle();
+  area.Settle();
+  q->least_atlas_stretch = stretch.least;
+  q->largest_atlas_stretch = stretch.largest;
+  q->least_atlas_area = area.least;
+  q->largest_atlas_area = area.largest;
   Vec2f extent = Vec2f::Zero();
   for (const Vec2f& m : s.membrane_material) {
     extent = extent.cwiseMax(m);
@@ -90,6 +102,35 @@ void MeasureMembrane(const SceneView& s, SceneQuality* q) {
 }
 
 }  // namespace
+
+double AtlasMetric::area() const { return std::sqrt(std::max(ss * tt - st * st, 0.0)); }
+
+std::array<double, 2> AtlasMetric::stretches() const {
+  const double mean = (ss + tt) / 2, radius = std::hypot((ss - tt) / 2, st);
+  return {std::sqrt(std::max(mean - radius, 0.0)), std::sqrt(mean + radius)};
+}
+
+std::vector<AtlasMetric> MeasureAtlas(const SceneView& s) {
+  std::vector<AtlasMetric> metrics;
+  const std::size_t rows = s.membrane.rows, cols = s.membrane.cols;
+  for (std::size_t r = 0; r + 1 < rows; ++r) {
+    for (std::size_t c = 0; c + 1 < cols; ++c) {
+      const std::size_t n = r * cols + c;
+      const auto x = [&](std::size_t k) { return Vec3d(s.rest_position[s.membrane.first + k].cast<double>()); };
+      const auto m = [&](std::size_t k) { return Eigen::Vector2d(s.membrane_material[k].cast<double>()); };
+      Eigen::Matrix<double, 3, 2> place;
+      Eigen::Matrix2d material;
+      // Sums of the cell's opposite edges: twice the derivative of the bilinear map in its middle.
+      const std::size_t across = n + 1, along = n + cols, both = n + cols + 1;
+      place << x(across) - x(n) + x(both) - x(along), x(along) - x(n) + x(both) - x(across);
+      material << m(across) - m(n) + m(both) - m(along), m(along) - m(n) + m(both) - m(across);
+      const Eigen::Matrix<double, 3, 2> map = place * material.inverse();
+      const Eigen::Matrix2d metric = map.transpose() * map;
+      metrics.push_back({metric(0, 0), metric(0, 1), metric(1, 1)});
+    }
+  }
+  return metrics;
+}
 
 SceneQuality Measure(const SceneView& s) {
   SceneQuality q{};
@@ -139,6 +180,8 @@ std::string Describe(const SceneView& s, const SceneQuality& q) {
   add("  bindings   %.2f to %.2f mm long", 1e3 * q.least_binding_m, 1e3 * q.largest_binding_m);
   add("  sheet      %.1f x %.1f mm flattened, lengths kept to %.2f %% rms, %.1f to %.1f %%", 1e3 * q.sheet_m[0],
       1e3 * q.sheet_m[1], 100 * q.rms_flat_error, 100 * (q.least_flat_ratio - 1), 100 * (q.largest_flat_ratio - 1));
+  add("  atlas      true length over length in the atlas %.3f to %.3f a cell, area %.3f to %.3f", q.least_atlas_stretch,
+      q.largest_atlas_stretch, q.least_atlas_area, q.largest_atlas_area);
   add("  surface    %zu vertices, %zu triangles, least embedding weight %.2f", s.surface_vertices.size(),
       s.surface_triangles.size(), q.least_weight);
   add("  around     %zu surfaces, %zu triangles; %zu ureters and nerves", s.static_surfaces.size(),

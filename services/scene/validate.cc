@@ -201,6 +201,23 @@ void CheckParameters(const SceneView& s) {
 
 // -------------------------------------------------------------------------------------------------------- arrays
 
+/// No triangle of the membrane is turned over in the atlas: two places of the sheet would share a texel.
+void CheckAtlas(const SceneView& s) {
+  const std::size_t rows = s.membrane.rows, cols = s.membrane.cols;
+  for (std::size_t r = 0; r + 1 < rows; ++r) {
+    for (std::size_t c = 0; c + 1 < cols; ++c) {
+      const std::size_t n = r * cols + c;
+      for (const auto& [b, d] : {std::pair{n + 1, n + cols + 1}, std::pair{n + cols + 1, n + cols}}) {
+        const Vec2f u = s.membrane_material[b] - s.membrane_material[n];
+        const Vec2f v = s.membrane_material[d] - s.membrane_material[n];
+        if (!(u.x() * v.y() - u.y() * v.x() > 0)) {
+          Fail("membrane_material", "row ", r, ", column ", c, ": the sheet is folded over in the atlas");
+        }
+      }
+    }
+  }
+}
+
 void CheckParticles(const SceneView& s) {
   const std::uint64_t nodes = static_cast<std::uint64_t>(s.membrane.rows) * s.membrane.cols;
   const std::uint64_t total = s.tube_vertex_count + nodes;
@@ -224,6 +241,7 @@ void CheckParticles(const SceneView& s) {
     CheckRange("membrane_material", "s", i, s.membrane_material[i].x(), 0, atlas);
     CheckRange("membrane_material", "t", i, s.membrane_material[i].y(), 0, atlas);
   }
+  CheckAtlas(s);
 }
 
 void CheckConstraints(const SceneView& s) {

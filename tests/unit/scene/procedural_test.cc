@@ -83,6 +83,37 @@ TEST_P(ProceduralScene, SurfaceIsClosedAndPointsOutward) {
   EXPECT_NEAR(volume, tet_volume, 1e-6 * tet_volume);
 }
 
+TEST_P(ProceduralScene, AtlasMetricGivesTheLengthsOfTheSheet) {
+  const std::vector<AtlasMetric> metrics = MeasureAtlas(view_);
+  const std::size_t cols = view_.membrane.cols;
+  ASSERT_EQ(metrics.size(), (view_.membrane.rows - 1) * (cols - 1));
+  double worst = 0;
+  for (std::size_t i = 0; i < metrics.size(); ++i) {
+    const std::size_t r = i / (cols - 1), c = i % (cols - 1), n = r * cols + c;
+    // Between the middles of the cell's sides, where the bilinear map's derivative holds exactly.
+    for (const auto& [a, b, d, e] :
+         {std::array{n, n + cols, n + 1, n + cols + 1}, {n, n + 1, n + cols, n + cols + 1}}) {
+      const Vec2f m = view_.membrane_material[d] + view_.membrane_material[e] - view_.membrane_material[a] -
+                      view_.membrane_material[b];
+      const auto p = [&](std::size_t k) { return X(view_.membrane.first + static_cast<Index>(k)); };
+      const double length = (p(d) + p(e) - p(a) - p(b)).norm();
+      const AtlasMetric& g = metrics[i];
+      const double told = std::sqrt(g.ss * m.x() * m.x() + 2 * g.st * m.x() * m.y() + g.tt * m.y() * m.y());
+      worst = std::max(worst, std::abs(told / length - 1));
+    }
+  }
+  EXPECT_LT(worst, 1e-4) << "positions are floats";
+}
+
+TEST(AtlasMetric, TellsStretchesAndArea) {
+  const AtlasMetric shear{1, 0.5, 1.25};  // Of the map (s + t/2, t).
+  EXPECT_NEAR(shear.area(), 1, 1e-12);
+  EXPECT_NEAR(shear.stretches()[0] * shear.stretches()[1], 1, 1e-12);
+  const AtlasMetric stretched{4, 0, 0.25};
+  EXPECT_NEAR(stretched.stretches()[0], 0.5, 1e-12);
+  EXPECT_NEAR(stretched.stretches()[1], 2, 1e-12);
+}
+
 TEST(SplitInFive, FillsTheWallWithFacesThatMatchAlsoRoundTheRing) {
   SceneSettings settings = BuiltIn();
   settings.tube.split = BrickSplit::kFive;

@@ -137,7 +137,9 @@ TEST_F(SceneFileTest, AnotherVersionIsAMismatch) {
   other[8] = static_cast<char>(kSceneFileVersion + 1);
   Write(other);
   EXPECT_EQ(Refusal().substr(0, 9), "mismatch:");
-  EXPECT_NE(Refusal().find("version 2, this build reads version 1"), std::string::npos) << Refusal();
+  const std::string says = "version " + std::to_string(kSceneFileVersion + 1) + ", this build reads version " +
+                           std::to_string(kSceneFileVersion);
+  EXPECT_NE(Refusal().find(says), std::string::npos) << Refusal();
 }
 
 TEST_F(SceneFileTest, AnAlteredByteInAnySectionIsNamed) {
@@ -204,6 +206,11 @@ TEST(SceneValidation, EveryRuleRefusesAndNamesItsSection) {
       {"rest_position", "coordinate", [](SceneData& s) { s.rest_position[3].y() = kNan; }},
       {"inverse_mass", "element 5", [](SceneData& s) { s.inverse_mass[5] = -1; }},
       {"membrane_material", "element 9", [](SceneData& s) { s.membrane_material[9].x() = 0.5f; }},
+      {"membrane_material", "row 2, column 2: the sheet is folded over",
+       [](SceneData& s) {
+         const std::size_t n = 3 * s.fixed.membrane.cols + 3;
+         s.membrane_material[n] = 2 * s.membrane_material[n - s.fixed.membrane.cols - 1] - s.membrane_material[n];
+       }},
       {"tets", "index 4000000", [](SceneData& s) { s.tets[2][1] = 4000000; }},
       {"tets", "no positive volume", [](SceneData& s) { std::swap(s.tets[2][1], s.tets[2][2]); }},
       {"tet_colours", "offsets", [](SceneData& s) { s.tet_colours.back() += 1; }},
