@@ -138,7 +138,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     memory.normal = pose.q_WT * -Vec3f::UnitZ();
     Contact contact = MakeContact(memory, pose);
     contact.p_s = pose.p_WT - memory.u;
-    contact.slip_force = scene_.physics.grip_force_N;
+    contact.slip_force = Grasp::GripForce(scene_.physics, pose.jaw_rad);
     contact.radius = kGraspRadius;
     device.contacts[device.count++] = contact;
     return device;

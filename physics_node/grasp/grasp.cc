@@ -9,14 +9,32 @@ namespace {
 
 /// Tissue that creeps this many grasp radii from the jaws' line is out of them.
 constexpr float kLostRadii = 1.5f;
-/// Creep per step at twice the grip force: 50 mm/s at 100 Hz [m].
-constexpr float kCreep = 0.0005f;
-
-float DistanceToJaws(const Vec3f& p, const Capsule& jaws) {
-  return (jaws.a + ClosestOnSegment(p, jaws.a, jaws.b) * (jaws.b - jaws.a) - p).norm();
-}
+/// Creep at twice the grip force [m/s].
+constexpr float kCreepSpeed = 0.05f;
+/// The hold falls to this at grasp_radius, from 1 at kFirmPart of it.
+constexpr float kLeastHold = 0.3f;
+constexpr float kFirmPart = 0.5f;
 
 }  // namespace
+
+float Grasp::GripForce(const PhysicsParams& params, float jaw_rad) {
+  return params.grip_force_N * std::clamp(1.0f - jaw_rad / params.grasp_open_rad, 0.0f, 1.0f);
+}
+
+/// Distance from the surface between the jaws' axes.
+float Grasp::DistanceToJaws(const Vec3f& p_T, const ToolDescription& tool, float jaw_rad) const {
+  const float length = tool.tip_length_m, half = 0.5f * std::max(jaw_rad, 0.0f);
+  const Vec3f hinge(0, 0, -length);
+  const Vec3f up = hinge + length * Vec3f(std::sin(half), 0, std::cos(half)), down(-up.x(), 0, up.z());
+  const auto b = ClosestOnTriangle(p_T, hinge, up, down);
+  return (b[0] * hinge + b[1] * up + b[2] * down - p_T).norm();
+}
+
+float Grasp::HoldOf(const HeldParticle& held, const ToolDescription& tool) const {
+  const float radius = scene_.physics.grasp_radius_m;
+  const float out = DistanceToJaws(held.p_T, tool, 0.0f) / radius;
+  return std::clamp(1.0f - (1.0f - kLeastHold) * (out - kFirmPart) / (1.0f - kFirmPart), kLeastHold, 1.0f);
+}
 
 void Grasp::Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
                    ParticleStore* particles) {
@@ -32,21 +50,23 @@ void Grasp::Update(const ToolDescription& tool, const ToolPose& pose, const Tiss
 }
 
 void Grasp::TakeHold(const ToolDescription& tool, const ToolPose& pose, ParticleStore* particles) {
-  const Capsule jaws = WorkingLine(tool, pose);
-  const auto take = [&](Index first, Index last) {
+  const auto take = [&](Index first, Index last, float radius) {
     for (Index p = first; p < last; ++p) {
       const ParticleRef at = particles->Ref(p);
-      const Vec3f x = particles->At(at);
-      if (particles->InverseMass(at) > 0.0f && DistanceToJaws(x, jaws) < scene_.physics.grasp_radius_m) {
-        held_.push_back({p, pose.ToTool(x)});
+      const Vec3f p_T = pose.ToTool(particles->At(at));
+      // Dead, loose and fixed tissue has no inverse mass, nor has what the other tool holds.
+      if (particles->InverseMass(at) > 0.0f && DistanceToJaws(p_T, tool, pose.jaw_rad) < radius) {
+        held_.push_back({p, p_T});
         particles->SetInverseMass(at, 0.0f);
       }
     }
   };
+  const float radius = scene_.physics.grasp_radius_m;
   held_.clear();
-  take(scene_.membrane.first, particles->particle_count());
+  take(0, scene_.tube_vertex_count, std::min(tool.tip_radius_m, radius));
+  take(scene_.membrane.first, particles->particle_count(), radius);
   if (held_.empty()) {
-    take(0, scene_.tube_vertex_count);
+    take(0, scene_.tube_vertex_count, radius);
   }
   state_ = held_.empty() ? State::kClosedEmpty : State::kHolding;
 }
@@ -74,19 +94,17 @@ void Grasp::DropIf(const TissueModel& model, ParticleStore* particles, const Pre
 
 void Grasp::Slip(const Vec3f& traction_W, const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
                  ParticleStore* particles) {
-  const float traction = traction_W.norm(), grip = scene_.physics.grip_force_N;
+  const float traction = traction_W.norm(), grip = GripForce(scene_.physics, pose.jaw_rad);
   if (!holding() || !(traction > grip)) {
     return;
   }
-  const Vec3f creep_T =
-      (kCreep * std::min(traction / grip - 1.0f, 2.0f) / traction) * (pose.q_WT.conjugate() * traction_W);
+  const float excess = grip > 0.0f ? std::min(traction / grip - 1.0f, 2.0f) : 2.0f;
+  const Vec3f creep_T = (kCreepSpeed * scene_.physics.dt_s * excess / traction) * (pose.q_WT.conjugate() * traction_W);
   for (HeldParticle& held : held_) {
-    held.p_T += creep_T;
+    held.p_T += creep_T / HoldOf(held, tool);
   }
-  const Capsule jaws = WorkingLine(tool, pose);
   const float lost = kLostRadii * scene_.physics.grasp_radius_m;
-  DropIf(model, particles,
-         [&](const HeldParticle& held) { return DistanceToJaws(pose.ToWorld(held.p_T), jaws) > lost; });
+  DropIf(model, particles, [&](const HeldParticle& held) { return DistanceToJaws(held.p_T, tool, 0.0f) > lost; });
 }
 
 void Grasp::DropDead(const TissueModel& model, ParticleStore* particles) {

@@ -20,13 +20,19 @@ class Grasp {
 
   explicit Grasp(const SceneView& scene) : scene_(scene) {}
 
-  /// Follows the jaw: takes hold when it closes past grasp_close_rad, lets go past grasp_open_rad. What lies between
-  /// the jaws is the membrane where there is some, else the organ.
+  /// Follows the jaw: takes hold when it closes past grasp_close_rad, lets go past grasp_open_rad. Held is what lies
+  /// between the jaws: membrane within grasp_radius of the surface that they span, all sheets of a fold, and the organ
+  /// within a jaw's thickness of it; with nothing there, organ within grasp_radius.
   void Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model, ParticleStore* particles);
   /// Puts what is held where the tool has taken it.
   void Move(const ToolPose& pose, ParticleStore* particles) const;
-  /// Above grip_force_N the tissue creeps out of the jaws along the traction [N, frame W]; what leaves the jaws is
-  /// lost.
+  /// Largest traction that jaws so far open hold [N]: grip_force_N when closed, none from grasp_open_rad on, linear.
+  [[nodiscard]] static float GripForce(const PhysicsParams& params, float jaw_rad);
+  /// Part of the grip that a held particle has: 1 between the jaws, less towards grasp_radius.
+  [[nodiscard]] float HoldOf(const HeldParticle& held, const ToolDescription& tool) const;
+  /// Above GripForce the tissue creeps out of the jaws along the traction [N, frame W], which is what the tissue pulls
+  /// at the tool with: measured by the solver as the sum of forces on what is held, or estimated from edges. The less
+  /// hold the faster; what leaves the jaws is lost. Once a step.
   void Slip(const Vec3f& traction_W, const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
             ParticleStore* particles);
   /// Drops what has been cut away meanwhile.
@@ -41,6 +47,7 @@ class Grasp {
 
  private:
   void TakeHold(const ToolDescription& tool, const ToolPose& pose, ParticleStore* particles);
+  [[nodiscard]] float DistanceToJaws(const Vec3f& p_T, const ToolDescription& tool, float jaw_rad) const;
   template <class Predicate>
   void DropIf(const TissueModel& model, ParticleStore* particles, const Predicate& gone);
 
