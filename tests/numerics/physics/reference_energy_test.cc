@@ -79,6 +79,7 @@ TEST_F(ReferenceEnergy, TheClampedHessianIsPositiveAndTheSameWhereNothingIsClamp
 TEST_F(ReferenceEnergy, RotationsCostNothingAndRestIsFreeOfForce) {
   ElasticModel model = Model();
   model.gravity.setZero();
+  model.load.clear();
   model.hinges.clear();  // They hold the rest shape's orientation, as their comment says.
   for (ElasticSpring& spring : model.springs) {
     spring.rest_length *= 1.04f;  // Without prestrain.
@@ -98,6 +99,7 @@ TEST_F(ReferenceEnergy, AnAffineStretchOfTheOrganCostsTheLaw) {
   model.springs.clear();
   model.hinges.clear();
   model.bindings.clear();
+  model.load.clear();
   model.gravity.setZero();
   const ElasticEnergy energy(model);
   Mat3d F;
@@ -112,8 +114,8 @@ TEST_F(ReferenceEnergy, EquilibriumIsWhereDynamicsComeToRest) {
   ElasticModel model = Model();
   model.stiffening = 0;
   model.damping_per_s = 300;
-  const ElasticEnergy energy(model);
   const Points rest = RestPoints(model);
+  const ElasticEnergy energy(model);
   const StaticResult still = SolveStatic(energy, rest, {}, {});
   EXPECT_LT(still.residual_N, 1e-8);
   EXPECT_EQ(InvertedTets(model, still.x), 0);

@@ -24,9 +24,9 @@ constexpr double kPartOfStableStep = 0.75;
 constexpr std::uint64_t kGenerator = 1;
 
 std::vector<bool> Mask(const std::vector<Index>& particles, std::size_t count) {
-  std::vector<bool> mask(count, false);
+  std::vector<bool> mask(3 * count, false);
   for (const Index p : particles) {
-    mask[p] = true;
+    std::fill_n(mask.begin() + 3 * static_cast<std::ptrdiff_t>(p), 3, true);
   }
   return mask;
 }
@@ -241,6 +241,7 @@ std::uint64_t StandardCase::Hash() const {
   const auto add = [&hash](const auto& values) { hash.Add(std::as_bytes(std::span(values))); };
   add(model_.rest_position);
   add(model_.mass);
+  add(model_.load);
   for (const ElasticSpring& s : model_.springs) {
     hash.AddValue(s.a);
     hash.AddValue(s.b);

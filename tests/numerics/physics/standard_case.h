@@ -6,9 +6,9 @@
 //      0  __________/                |_ _ _ _ (free)
 //         0       0.5 s          0.8 s    1 s
 //
-// The membrane has 4 % prestrain, so the scene's rest shape is not at rest; the case begins in equilibrium, and
-// displacements are from there. The reference moves by central differences (explicit_dynamics.h) and stands still by
-// Newton's method (static_solver.h); both are computed once per scene and kept in a file.
+// The case begins in equilibrium (with the model's dead load that is the scene's rest shape, to the rounding of the
+// scene's floats); displacements are from there. The reference moves by central differences (explicit_dynamics.h) and
+// stands still by Newton's method (static_solver.h); both are computed once per scene and kept in a file.
 #pragma once
 
 #include <filesystem>

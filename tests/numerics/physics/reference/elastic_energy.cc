@@ -163,7 +163,11 @@ double ElasticEnergy::Energy(const Points& x) const {
     energy += b.stiffness / 2 * stretch * stretch;
   }
   for (Eigen::Index p = 0; p < particle_count(); ++p) {
-    energy -= model_.mass[static_cast<std::size_t>(p)] * model_.gravity.dot(x.col(p));
+    const auto i = static_cast<std::size_t>(p);
+    energy -= model_.mass[i] * model_.gravity.dot(x.col(p));
+    if (!model_.load.empty()) {
+      energy -= model_.load[i].dot(x.col(p) - model_.rest_position[i]);
+    }
   }
   return energy;
 }
@@ -245,6 +249,9 @@ void ElasticEnergy::Gradient(const Points& x, Points* gradient) const {
     for (Eigen::Index p = 0; p < particle_count(); ++p) {
       gradient->col(p) -= model_.mass[static_cast<std::size_t>(p)] * model_.gravity;
     }
+  }
+  for (std::size_t p = 0; p < model_.load.size(); ++p) {
+    gradient->col(static_cast<Eigen::Index>(p)) -= model_.load[p];
   }
 }
 

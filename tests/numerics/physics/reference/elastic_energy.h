@@ -23,7 +23,7 @@ class ElasticEnergy {
   /// Takes the spring of membrane edge 3 * node + direction away.
   void CutEdge(std::size_t edge);
 
-  /// Elastic energy and potential in the gravity field [J].
+  /// Elastic energy, and potential of gravity and of the dead load [J].
   [[nodiscard]] double Energy(const Points& x) const;
   /// dE/dx [N], also on particles that are fixed.
   void Gradient(const Points& x, Points* gradient) const;

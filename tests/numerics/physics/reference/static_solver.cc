@@ -69,7 +69,7 @@ StaticResult SolveStatic(const ElasticEnergy& energy, const Points& start, const
   for (Eigen::Index p = 0; p < n; ++p) {
     const auto i = static_cast<std::size_t>(p);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (!energy.model().fixed(static_cast<Index>(p)) && !(i < held.size() && held[i])) {
+      if (!energy.model().fixed(static_cast<Index>(p)) && !(!held.empty() && held[3 * i + axis])) {
         free_of[3 * i + axis] = free_count++;
       }
     }

@@ -14,7 +14,8 @@ struct StaticResult {
   int iterations = 0;
 };
 
-/// Minimises the energy plus -sum load . x over the particles with mass that are not `held`, from `start`. Line
+/// Minimises the energy plus -sum load . x from `start`, over the coordinates of particles with mass that
+/// are not `held` ([3 * particles], x y z of each; empty: none). Line
 /// search on the energy. Ends at `tolerance_N`, or where rounding allows no better. `load` may be empty.
 /// Throws std::runtime_error when it stands still above `tolerance_N` x 1e4.
 [[nodiscard]] StaticResult SolveStatic(const ElasticEnergy& energy, const Points& start, const std::vector<bool>& held,
