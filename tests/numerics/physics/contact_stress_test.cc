@@ -1,0 +1,140 @@
+// Tools where no tool should go: deep in the organ, through it at full speed, across each other.
+#include <gtest/gtest.h>
+
+#include "physics_node/collision/closest.h"
+#include "services/scene/build.h"
+#include "tests/numerics/physics/script_player.h"
+
+namespace fulcrum::physics {
+namespace {
+
+class DeepTools : public testing::Test {
+ protected:
+  scene::SceneData data_ = scene::BuildProcedural(scene::Small());
+  SceneView scene_ = data_.View();
+  TissueSimulation simulation_{scene_};
+  std::array<ToolInput, kMaxTools> tools_;
+  /// The membrane's middle, over the organ's top.
+  const Vec3f middle_ = scene_.rest_position[scene_.membrane.first + 36 * 25 + 12];
+
+  /// Shaft straight up, turned about it.
+  static ToolPose Upright(const Vec3f& tip, float jaw_rad, float about_z = 0) {
+    return {tip,
+            Quatf(Eigen::AngleAxisf(about_z, Vec3f::UnitZ())) *
+                Quatf(Eigen::AngleAxisf(static_cast<float>(M_PI), Vec3f::UnitX())),
+            jaw_rad};
+  }
+
+  void Step() {
+    simulation_.Step(tools_);
+    for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
+      const DeviceContacts device = simulation_.Contacts(tool);
+      for (std::uint32_t c = 0; c < device.count; ++c) {
+        ASSERT_TRUE(device.contacts[c].f_ref.allFinite());
+        ASSERT_LE(device.contacts[c].f_ref.norm(), 16.0f);
+      }
+    }
+    ASSERT_TRUE(std::isfinite(simulation_.MaxDisplacement()));
+  }
+  /// Moves tool `i` to `pose` in so many steps.
+  void Drive(std::size_t i, const ToolPose& pose, int steps) {
+    const ToolPose from = tools_[i].present ? tools_[i].pose : pose;
+    for (int s = 1; s <= steps; ++s) {
+      tools_[i] = {true, Interpolate(from, pose, static_cast<float>(s) / static_cast<float>(steps))};
+      Step();
+    }
+  }
+  [[nodiscard]] Vec3f At(Index particle) const {
+    return simulation_.particles().At(simulation_.particles().Ref(particle));
+  }
+
+  /// Free membrane nodes more than 1 mm inside the organ.
+  [[nodiscard]] int MembraneInOrgan() const {
+    int inside = 0;
+    for (Index p = scene_.membrane.first; p < simulation_.particles().particle_count(); ++p) {
+      float best = 1e9f;
+      bool behind = false;
+      for (const Triangle& t : scene_.tube_surface) {
+        const Vec3f a = At(t[0]), b = At(t[1]), c = At(t[2]);
+        const auto w = ClosestOnTriangle(At(p), a, b, c);
+        const Vec3f offset = At(p) - w[0] * a - w[1] * b - w[2] * c;
+        if (offset.squaredNorm() < best) {
+          best = offset.squaredNorm();
+          behind = (b - a).cross(c - a).dot(offset) < 0.0f;
+        }
+      }
+      inside += behind && best > 1e-6f && scene_.inverse_mass[p] > 0.0f;
+    }
+    return inside;
+  }
+  [[nodiscard]] int Inverted() const {
+    int inverted = 0;
+    for (const Tetrahedron& t : scene_.tets) {
+      inverted += (At(t[1]) - At(t[0])).cross(At(t[2]) - At(t[0])).dot(At(t[3]) - At(t[0])) <= 0.0f;
+    }
+    return inverted;
+  }
+  /// Tools gone: back near rest, nothing turned inside out, the membrane over the organ.
+  void ExpectRecovery() {
+    tools_ = {};
+    for (int i = 0; i < 600; ++i) {
+      Step();
+    }
+    EXPECT_LT(simulation_.MaxDisplacement(), 0.005f);
+    EXPECT_EQ(Inverted(), 0);
+    EXPECT_EQ(MembraneInOrgan(), 0);
+  }
+};
+
+TEST_F(DeepTools, SteepJawsPushedIntoTheOrgan) {
+  for (const float jaw : {0.9f, 0.3f, 0.0f}) {
+    for (const float about_z : {0.0f, 1.1f}) {
+      Drive(0, Upright(middle_ + Vec3f(0, 0, 0.015f), jaw, about_z), 1);
+      Drive(0, Upright(middle_ - Vec3f(0, 0, 0.015f), jaw, about_z), 60);
+      for (int i = 0; i < 100; ++i) {
+        Step();
+        ASSERT_LT(simulation_.MaxDisplacement(), 0.04f) << "jaw " << jaw << " turned " << about_z << " step " << i;
+      }
+      Drive(0, Upright(middle_ + Vec3f(0, 0, 0.03f), jaw, about_z), 60);
+      ExpectRecovery();
+    }
+  }
+}
+
+TEST_F(DeepTools, ThroughTheOrganAtOneMetrePerSecond) {
+  for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
+    Drive(tool, Upright(middle_ + Vec3f(0.001f, 0.002f, 0.025f), 0.0f), 1);
+    Drive(tool, Upright(middle_ + Vec3f(0.001f, 0.002f, -0.025f), 0.0f), 5);
+    for (int i = 0; i < 20; ++i) {
+      Step();
+      ASSERT_LT(simulation_.MaxDisplacement(), 0.06f);
+    }
+    Drive(tool, Upright(middle_ + Vec3f(0.001f, 0.002f, 0.035f), 0.0f), 6);
+    ExpectRecovery();
+  }
+}
+
+TEST_F(DeepTools, AcrossEachOther) {
+  const auto left = [&](float x) { return Upright(middle_ + Vec3f(x, 0, -0.003f), 0.3f); };
+  const auto right = [&](float x) { return Upright(middle_ + Vec3f(x, 0.001f, -0.004f), 0.0f, 0.5f); };
+  tools_[0] = {true, left(-0.012f)};
+  tools_[1] = {true, right(0.012f)};
+  tools_[0].pose.p_WT.z() += 0.02f;
+  tools_[1].pose.p_WT.z() += 0.02f;
+  Step();
+  Drive(0, left(-0.012f), 20);
+  Drive(1, right(0.012f), 20);
+  for (int i = 0; i <= 120; ++i) {
+    const float x = 0.012f * std::cos(0.1f * static_cast<float>(i));
+    tools_[0].pose = left(-x);
+    tools_[1].pose = right(x);
+    Step();
+    ASSERT_LT(simulation_.MaxDisplacement(), 0.04f);
+  }
+  Drive(0, Upright(middle_ + Vec3f(-0.012f, 0, 0.03f), 0.3f), 30);
+  Drive(1, Upright(middle_ + Vec3f(0.012f, 0, 0.03f), 0.0f), 30);
+  ExpectRecovery();
+}
+
+}  // namespace
+}  // namespace fulcrum::physics
