@@ -24,7 +24,11 @@ Vec3f Limited(const Vec3f& v, float limit) {
 }  // namespace
 
 ContactProbe::ContactProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
-    : scene_(scene), model_(model), particles_(particles), elastic_(scene, model, particles) {}
+    : scene_(scene),
+      model_(model),
+      particles_(particles),
+      elastic_(scene, model, particles),
+      compliance_(scene.physics.dt_s) {}
 
 ContactProbe::Motion ContactProbe::MeanMotion(std::span<const Index> particles) const {
   Motion mean;
@@ -95,7 +99,8 @@ void ContactProbe::Follow(ToolMemory* memory, const Vec3f& force, const Vec3f& u
   }
 }
 
-Contact ContactProbe::MakeContact(const ToolMemory& memory, const ToolPose& pose) const {
+Contact ContactProbe::MakeContact(std::uint32_t tool, const ToolPose& pose) {
+  const ToolMemory& memory = tools_[tool];
   const PhysicsParams& params = scene_.physics;
   Contact contact;
   contact.kind = memory.kind;
@@ -111,6 +116,11 @@ Contact ContactProbe::MakeContact(const ToolMemory& memory, const ToolPose& pose
   contact.kt = 0.5f * contact.k1;
   contact.k_body = memory.stiffness;
   contact.b_body = kRelaxation * memory.stiffness;
+  const Compliance& asked = compliance_.Update(tool, memory.touched, memory.normal, solver_);
+  if (asked.known) {
+    contact.k_body = asked.stiffness;
+    contact.b_body = asked.viscosity;
+  }
   contact.friction = std::min(params.friction, 2.0f);
   return contact;
 }
@@ -124,6 +134,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     if (memory.kind != kind) {
       const std::uint32_t id = memory.id;
       Enter(&memory, kind);
+      compliance_.Forget(tool);
       memory.id = kind == ContactKind::kNone ? id : id + 1;
     }
   };
@@ -136,7 +147,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     std::sort(memory.touched.begin(), memory.touched.end());
     Follow(&memory, elastic_.OnSet(memory.touched), MeanMotion(memory.touched).displacement);
     memory.normal = pose.q_WT * -Vec3f::UnitZ();
-    Contact contact = MakeContact(memory, pose);
+    Contact contact = MakeContact(tool, pose);
     contact.p_s = pose.p_WT - memory.u;
     contact.slip_force = Grasp::GripForce(scene_.physics, pose.jaw_rad);
     contact.radius = kGraspRadius;
@@ -178,7 +189,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   Follow(&memory, elastic_.OnSet(memory.touched),
          touching ? Vec3f(MeanMotion(memory.touched).displacement - around.displacement) : Vec3f(Vec3f::Zero()));
 
-  Contact contact = MakeContact(memory, pose);
+  Contact contact = MakeContact(tool, pose);
   const float push = std::max(0.0f, memory.normal.dot(memory.force));
   const float dent = -memory.normal.dot(memory.u);
   contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - scene_.physics.collision_margin_m);

@@ -9,12 +9,14 @@
 //   k_body  twice the secant f / u (a sheet in tension stiffens with depth: its tangent lies above the secant; too
 //           soft a model would be active, too stiff only dissipates), within [kMinBody, kMaxBody]
 //   b_body  k_body * kRelaxation
+// Both are asked of the solver instead where it offers a ComplianceSolver.
 #pragma once
 
 #include <array>
 #include <vector>
 
 #include "physics_node/collision/tool_collision.h"
+#include "physics_node/contact_model/compliance_probe.h"
 #include "physics_node/contact_model/elastic_force.h"
 #include "physics_node/grasp/grasp.h"
 
@@ -26,6 +28,9 @@ class ContactProbe {
 
   /// Contacts of one tool after a step: a grasp, or the nearest surface within reach, or none.
   DeviceContacts Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision, const Grasp& grasp);
+  /// Stiffness and viscosity come from `solver` from now on; nullptr: estimated from force and dent again.
+  void AskSolver(ComplianceSolver* solver) { solver_ = solver; }
+  [[nodiscard]] const Compliance& compliance(std::uint32_t tool) const { return compliance_.compliance(tool); }
   /// Force on the tool as last computed, low-passed [N].
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return tools_[tool].force; }
 
@@ -48,13 +53,15 @@ class ContactProbe {
   void Follow(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const;
   [[nodiscard]] Motion MeanMotion(std::span<const Index> particles) const;
   [[nodiscard]] Motion RingMotion(Index node) const;
-  [[nodiscard]] Contact MakeContact(const ToolMemory& memory, const ToolPose& pose) const;
+  [[nodiscard]] Contact MakeContact(std::uint32_t tool, const ToolPose& pose);
 
   SceneView scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
   ElasticForce elastic_;
   std::array<ToolMemory, kMaxTools> tools_;
+  ComplianceProbe compliance_;
+  ComplianceSolver* solver_ = nullptr;
 };
 
 }  // namespace fulcrum::physics

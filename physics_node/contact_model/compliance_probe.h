@@ -1,0 +1,68 @@
+// How the tissue at a contact gives way, asked of the solver itself: the displacement under a unit force after one
+// frame and at rest. From the two follow the stiffness and viscosity of a Kelvin-Voigt element,
+//
+//   u(t) = F / k (1 - exp(-k t / b)):   k = F / u(rest),   b = k h / -ln(1 - u(h) / u(rest)).
+//
+// Costs at most one question to the solver a tool and step: the two horizons take turns.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "physics_node/pbd/particle_store.h"
+#include "services/core/messages.h"
+
+namespace fulcrum::physics {
+
+/// A force on some particles together.
+struct ProbeLoad {
+  std::span<const Index> particles;
+  std::span<const float> weights;  ///< Of each particle, sum 1.
+  Vec3f force = Vec3f::Zero();     ///< Of all together, frame W [N].
+};
+
+/// What a solver offers to the probe.
+class ComplianceSolver {
+ public:
+  static constexpr float kAtRest = 0;
+
+  virtual ~ComplianceSolver() = default;
+  /// How far the load alone, acting from now on, moves its particles (weighted mean) within `horizon_s`, or until rest
+  /// for kAtRest [m]. The state stays as it is. False: no answer this time. The solver bounds its own cost and may
+  /// answer approximately.
+  virtual bool Respond(const ProbeLoad& load, float horizon_s, Vec3f* displacement) = 0;
+};
+
+struct Compliance {
+  bool known = false;
+  float fast = 0;       ///< Force over displacement after one frame [N/m].
+  float stiffness = 0;  ///< At rest [N/m].
+  float viscosity = 0;  ///< [N s/m]
+};
+
+class ComplianceProbe {
+ public:
+  static constexpr std::size_t kMaxParticles = 256;
+
+  explicit ComplianceProbe(float frame_s) : frame_s_(frame_s) {}
+
+  /// Once a step for a tool in contact: `particles` (at most kMaxParticles are used) are what it touches or holds,
+  /// `direction` the unit direction in which the hand would push. Low-passed; known once both horizons have answered.
+  const Compliance& Update(std::uint32_t tool, std::span<const Index> particles, const Vec3f& direction,
+                           ComplianceSolver* solver);
+  /// The contact is over.
+  void Forget(std::uint32_t tool) { tools_[tool] = {}; }
+  [[nodiscard]] const Compliance& compliance(std::uint32_t tool) const { return tools_[tool].compliance; }
+
+ private:
+  struct Memory {
+    float after_frame = 0, at_rest = 0;  ///< Displacement over force, low-passed [m/N].
+    bool ask_rest = true;
+    Compliance compliance;
+  };
+  float frame_s_;
+  std::array<Memory, kMaxTools> tools_;
+  std::array<float, kMaxParticles> weights_{};
+};
+
+}  // namespace fulcrum::physics
