@@ -29,7 +29,7 @@ using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 constexpr int kAttempts = 6;
 constexpr double kLeastOrder = 1, kLargestOrder = 5;  ///< Bounds of a step where two attempts tell nothing of use.
 constexpr double kCountTolerance = 0.1;
-constexpr double kSliverBound_deg = 10;
+constexpr double kSliverBound_deg = 15;
 /// Distance of the mesh from the surface, as a part of the cell size. The fine surface is embedded, so that what is
 /// seen does not suffer from this.
 constexpr double kFacetDistance = 0.25;

@@ -126,9 +126,10 @@ std::string TakeCompressed(ByteStream* in, const VtuEncoding& encoding, const ch
   if (blocks > kMaxMeshBytes || !in->MayHold(blocks * (encoding.long_header ? 8 : 4))) {
     in->Fail(std::to_string(blocks) + " compressed blocks of " + what + ", more than the data can hold");
   }
-  // No product here overflows: blocks is below 2^31 by now, and block as soon as it is compared.
+  // A last block of another size says so; a single one may be announced far larger than it is. No product here
+  // overflows: blocks is below 2^31 by now, and block below 2^32 where it counts.
   const std::uint64_t full = last > 0 && blocks > 0 ? blocks - 1 : blocks;
-  if (block > wanted || last > wanted || full * block + last != wanted) {
+  if ((full > 0 && block > wanted) || last > wanted || full * block + last != wanted) {
     in->Fail(std::to_string(blocks) + " compressed blocks of " + std::to_string(block) + " bytes, the last of " +
              std::to_string(last) + ", for " + what + "; valid: " + std::to_string(wanted) + " bytes in all");
   }
@@ -239,6 +240,9 @@ std::vector<T> ReadArray(std::string_view bytes, const std::string& name, const 
   if (count > kMaxMeshElements * 4) {
     text.Fail(std::to_string(count) + " values of " + what + "; valid: at most " +
               std::to_string(kMaxMeshElements * 4));
+  }
+  if (count == 0) {
+    return values;
   }
   ByteStream stream(bytes, name, array);
   const std::uint64_t wanted = count * SizeOf(array.type);

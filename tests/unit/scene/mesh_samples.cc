@@ -256,11 +256,14 @@ std::string VtuSize(std::uint64_t size, const VtuVariant& v) {
   return out.bytes();
 }
 
-/// Two blocks, the second one shorter; header and data are padded apart as VTK's own writer does.
+/// Appended: two blocks, the second one shorter. Inline: one, announced as large as writers usually make them, which
+/// is more than there is. Header and data are padded apart as VTK's own writer does.
 std::string VtuCompressed(const std::string& data, const VtuVariant& v) {
-  const std::size_t block = data.size() / 2 + 1;
-  std::string header = VtuSize(2, v) + VtuSize(block, v) + VtuSize(data.size() - block, v), packed;
-  for (const std::string& part : {data.substr(0, block), data.substr(block)}) {
+  const std::size_t block = v.appended ? data.size() / 2 + 1 : 32768;
+  const std::vector<std::string> parts =
+      v.appended ? std::vector{data.substr(0, block), data.substr(block)} : std::vector{data};
+  std::string header = VtuSize(parts.size(), v) + VtuSize(block, v) + VtuSize(parts.back().size(), v), packed;
+  for (const std::string& part : parts) {
     std::string out(compressBound(part.size()), '\0');
     uLongf size = out.size();
     compress(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(part.data()), part.size());
