@@ -3,9 +3,9 @@
 //
 // A law has
 //   template <class F>
-//   F Factor(const Pair<F>& s, const V<F>& d, int direction, std::size_t at, std::size_t next) const;
+//   V<F> Impulse(const Pair<F>& s, const V<F>& d, int direction, std::size_t at, std::size_t next) const;
 // for the edges of a direction at offset `at` of its planes and, with F16, `next` floats further; 0 where there is no
-// edge. The edge's ends then move by w_p * factor * d and -w_q * factor * d.
+// edge. With d = q - p, the ends then move by w_p and -w_q times it.
 #pragma once
 
 #include "physics_node/pbd/kernels.h"
@@ -24,9 +24,9 @@ struct Pair {
   V<F> p, q;
   F w_p, w_q;
 
-  void Pull(const V<F>& d, F factor) {
-    p = p + d * (factor * w_p);
-    q = q - d * (factor * w_q);
+  void Move(const V<F>& impulse) {
+    p = p + impulse * w_p;
+    q = q - impulse * w_q;
   }
 };
 
@@ -79,8 +79,7 @@ FULCRUM_INLINE void StretchToNext(const GridRows<F>& a, const GridRows<F>& b, in
     s.q = RotateDown(s.q);
     s.w_q = RotateDown(s.w_q);
   }
-  const V<F> d = s.q - s.p;
-  s.Pull(d, law.Factor(s, d, direction, a.Place(slot), a.next));
+  s.Move(law.Impulse(s, s.q - s.p, direction, a.Place(slot), a.next));
   a.Store(slot, s.p);
   b.Store(next, wraps ? RotateUp(s.q) : s.q);
 }
@@ -103,9 +102,10 @@ FULCRUM_INLINE void StretchAlongRow(const GridRows<F>& row, int slots, Law law) 
       alignas(32) float lanes[kLanes] = {};
       lanes[lane] = 1.0f;
       const Pair<F> s{row.Load(0), RotateDown(row.Load(0)), row.LoadMass(0), RotateDown(row.LoadMass(0))};
-      const V<F> d = s.q - s.p;
-      const F factor = law.Factor(s, d, 0, row.Place(0), row.next) & (Batches<F>::Load(lanes, 0) > F::All(0.0f));
-      row.Store(0, s.p + d * (factor * s.w_p) - RotateUp(d * (factor * s.w_q)));
+      const V<F> all = law.Impulse(s, s.q - s.p, 0, row.Place(0), row.next);
+      const auto only = Batches<F>::Load(lanes, 0) > F::All(0.0f);
+      const V<F> impulse{all.x & only, all.y & only, all.z & only};
+      row.Store(0, s.p + impulse * s.w_p - RotateUp(impulse * s.w_q));
     }
   }
 }
@@ -115,8 +115,7 @@ template <class F, class Law>
 FULCRUM_INLINE void StretchBetweenRows(const GridRows<F>& a, const GridRows<F>& b, int slots, Law law) {
   for (int slot = 0; slot < slots; ++slot) {
     Pair<F> s{a.Load(slot), b.Load(slot), a.LoadMass(slot), b.LoadMass(slot)};
-    const V<F> d = s.q - s.p;
-    s.Pull(d, law.Factor(s, d, 1, a.Place(slot), a.next));
+    s.Move(law.Impulse(s, s.q - s.p, 1, a.Place(slot), a.next));
     a.Store(slot, s.p);
     b.Store(slot, s.q);
   }

@@ -16,18 +16,18 @@ inline F LeastSum(F largest_w, F largest_gradient_sq) {
 
 /// Distance constraint |q - p| = rest.
 template <class F>
-inline F StretchFactor(const Pair<F>& s, const V<F>& d, F rest, F k) {
+inline V<F> StretchImpulse(const Pair<F>& s, const V<F>& d, F rest, F k) {
   const F length = Sqrt(Dot(d, d));
   const F factor = k * (length - rest) / Max(length * (s.w_p + s.w_q), Tiny<F>());
-  return factor & (rest > F::All(0.0f));
+  return d * (factor & (rest > F::All(0.0f)));
 }
 
 struct PbdStretch {
   const float* rest[3];
   float k;
   template <class F>
-  [[nodiscard]] F Factor(const Pair<F>& s, const V<F>& d, int direction, std::size_t at, std::size_t next) const {
-    return StretchFactor(s, d, Batches<F>::Load(rest[direction] + at, next), F::All(k));
+  [[nodiscard]] V<F> Impulse(const Pair<F>& s, const V<F>& d, int direction, std::size_t at, std::size_t next) const {
+    return StretchImpulse(s, d, Batches<F>::Load(rest[direction] + at, next), F::All(k));
   }
 };
 
@@ -41,8 +41,7 @@ FULCRUM_INLINE void ProjectSprings(float* particles, const SpringBatch& batch, f
   const Particles<F> a = GatherXyzw<F, 4>(particles, batch.a, kStep);
   const Particles<F> b = GatherXyzw<F, 4>(particles, batch.b, kStep);
   Pair<F> s{a.p, b.p, a.w, b.w};
-  const V<F> d = s.q - s.p;
-  s.Pull(d, StretchFactor(s, d, Batches<F>::Load(batch.rest, kStep), F::All(stiffness)));
+  s.Move(StretchImpulse(s, s.q - s.p, Batches<F>::Load(batch.rest, kStep), F::All(stiffness)));
   ScatterXyzw<F, 4>({s.p, s.w_p}, particles, batch.a, kStep);
   ScatterXyzw<F, 4>({s.q, s.w_q}, particles, batch.b, kStep);
 }

@@ -132,6 +132,14 @@ class ParticleStore {
     }
     PadGrid();
   }
+  /// Previous positions become the present ones: no velocity is left.
+  void StopAll() {
+    for (Index p = 0; p < particle_count_; ++p) {
+      const ParticleRef at = Ref(p);
+      SetPrevious(at, At(at));
+    }
+    PadGrid();
+  }
   /// Bytes of the positions as they lie in memory, for a state hash. The padding is constant.
   [[nodiscard]] std::span<const float> raw() const { return {now_.data(), now_.size()}; }
 

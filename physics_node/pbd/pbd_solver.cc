@@ -34,21 +34,9 @@ GridArrays PbdSolver::Grid() const {
 
 void PbdSolver::Bend() {
   const std::vector<ParticleRef>& refs = model_->hinge_particles();
-  float* pool = particles_->pool();
-  float* copy = hinge_particles_.data();
-  for (const ParticleRef at : refs) {
-    for (std::size_t axis = 0; axis < 4; ++axis) {
-      *copy++ = pool[at.base + axis * at.step];
-    }
-  }
+  CopyHingeParticles(refs, particles_->pool(), hinge_particles_.data());
   kernels_.bending(hinge_particles_.data(), model_->bending().data(), model_->bending().size(), params_.k_bending);
-  copy = hinge_particles_.data();
-  for (const ParticleRef at : refs) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      pool[at.base + axis * at.step] = copy[axis];
-    }
-    copy += 4;
-  }
+  PutHingeParticles(refs, hinge_particles_.data(), particles_->pool());
 }
 
 std::uint32_t PbdSolver::Predict() {
@@ -88,14 +76,7 @@ FinishResult PbdSolver::Finish() {
   return {std::max(grid.max_step_sq, tube.max_step_sq), grid.resets + tube.resets};
 }
 
-void PbdSolver::Stop() {
-  for (Index v = 0; v < particles_->tube_count(); ++v) {
-    std::memcpy(particles_->tube_previous() + 4 * v, particles_->tube() + 4 * v, 3 * sizeof(float));
-  }
-  for (int axis = 0; axis < 3; ++axis) {
-    std::copy_n(particles_->plane(axis), particles_->layout().plane(), particles_->previous_plane(axis));
-  }
-}
+void PbdSolver::Stop() { particles_->StopAll(); }
 
 void PbdSolver::ComputeBlockBounds(const BlockBounds& bounds) const { kernels_.block_bounds(Grid(), bounds); }
 

@@ -44,6 +44,10 @@ class TissueModel {
     return bending_[hinge_slot_[i] / kLanes].active[hinge_slot_[i] % kLanes] > 0.0f;
   }
   [[nodiscard]] const std::vector<BindingBatch>& bindings() const { return bindings_; }
+  /// Where a constraint of the scene stands in its batches: batch * 8 + lane.
+  [[nodiscard]] const std::vector<Index>& tet_slots() const { return tet_slot_; }
+  [[nodiscard]] const std::vector<Index>& hinge_slots() const { return hinge_slot_; }
+  [[nodiscard]] const std::vector<Index>& binding_slots() const { return binding_slot_; }
   /// Plane of rest lengths, laid out as the membrane is.
   [[nodiscard]] const float* rest(int direction) const { return rest_[direction].data(); }
 
@@ -86,7 +90,7 @@ class TissueModel {
   std::vector<TetBatch> tets_;
   std::vector<BendingBatch> bending_;
   std::vector<ParticleRef> hinge_particles_;
-  std::vector<Index> hinge_slot_;  ///< By constraint of the scene: batch * 8 + lane.
+  std::vector<Index> tet_slot_, hinge_slot_, binding_slot_;  ///< By constraint of the scene: batch * 8 + lane.
   std::vector<BindingBatch> bindings_;
   std::array<FloatArray, 3> rest_;
 
@@ -106,5 +110,22 @@ class TissueModel {
   std::uint64_t revision_ = 0;
   ConstraintCounts counts_;
 };
+
+/// The hinge particles' xyzw from the pool into a compact copy, and their xyz back.
+inline void CopyHingeParticles(const std::vector<ParticleRef>& refs, const float* pool, float* copy) {
+  for (const ParticleRef at : refs) {
+    for (std::size_t axis = 0; axis < 4; ++axis) {
+      *copy++ = pool[at.base + axis * at.step];
+    }
+  }
+}
+inline void PutHingeParticles(const std::vector<ParticleRef>& refs, const float* copy, float* pool) {
+  for (const ParticleRef at : refs) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      pool[at.base + axis * at.step] = copy[axis];
+    }
+    copy += 4;
+  }
+}
 
 }  // namespace fulcrum::physics

@@ -121,6 +121,7 @@ void TissueModel::PackTube(const SceneView& scene, const ParticleStore& particle
     for (Index i = first; i < last; ++i) {
       const auto [at, lane] = SlotOf(i, first, last, tets_);
       TetBatch& batch = tets_[at];
+      tet_slot_.push_back(static_cast<Index>(at * kLanes + lane));
       std::array<V3<double>, 4> x;
       for (int j = 0; j < 4; ++j) {
         const Index v = scene.tets[i][j];
@@ -254,7 +255,8 @@ void TissueModel::PackBindings(const SceneView& scene, const ParticleStore& part
       batch.rest_length[lane] = binding.rest_length;
       batch.rest_height[lane] = std::max(0.0f, normal.dot(x[v[0]] - foot));
       batch.active[lane] = 1.0f;
-      users.emplace_back(binding.membrane - scene.membrane.first, static_cast<Index>(at * kLanes + lane));
+      binding_slot_.push_back(static_cast<Index>(at * kLanes + lane));
+      users.emplace_back(binding.membrane - scene.membrane.first, binding_slot_.back());
       ++counts_.bindings;
     }
   });

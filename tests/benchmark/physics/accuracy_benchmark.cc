@@ -10,6 +10,7 @@
 #include "tests/numerics/physics/accurate_under_test.h"
 #include "tests/numerics/physics/paper_solver.h"
 #include "tests/numerics/physics/standard_case.h"
+#include "tests/numerics/physics/xpbd_under_test.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -45,6 +46,13 @@ std::vector<Entry> Entries(const SceneView& scene) {
   };
   paper("paper_mode", "PBD 3 (paper)", 3);
   paper("", "PBD 20", 20);
+  const auto xpbd = [&](const char* key, const char* label, std::uint32_t substeps) {
+    add(
+        key, label, "XPBD", [substeps](PhysicsParams* p) { p->substeps = substeps; },
+        [](const SceneView& s) { return std::make_unique<XpbdUnderTest>(s); });
+  };
+  xpbd("xpbd20", "XPBD 20x1", 20);
+  xpbd("", "XPBD 80x1", 80);
   return entries;
 }
 
