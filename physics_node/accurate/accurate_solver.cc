@@ -328,11 +328,13 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
     extra_[i] = base_extra_[i];
   }
   extra_changed_.clear();
-  for (const ContactRow& row : contacts) {
-    for (int k = 0; k < row.count; ++k) {
+  elements_.Touch(place_.data(), particles_->pool(), contacts);
+  for (const Element& contact : elements_.touching()) {
+    const float stiffness = contact.kt + contact.m.squaredNorm();
+    for (int k = 0; k < contact.count; ++k) {
       const auto i = static_cast<std::size_t>(k);
-      extra_[slot(row.at[i])] += Elements::kContactStiffness * row.weight[i] * row.weight[i];
-      extra_changed_.push_back(slot(row.at[i]));
+      extra_[slot(contact.at[i])] += stiffness * contact.weight[i] * contact.weight[i];
+      extra_changed_.push_back(slot(contact.at[i]));
     }
   }
   const Sheet sheet = MakeSheet();
@@ -346,10 +348,11 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   const OrganMatrix organ_matrix{organ_c_.data(), organ_f_.data(), organ_stress_.data(), organ_block_.data()};
   kernels_.organ_linearise(organ, organ_matrix, place_.data(), 0, tube_count_);
   kernels_.organ_gather(organ, organ_matrix, place_.data(), residual_.data(), 0, tube_count_);
-  if (organ_blocks_due_) {
+  // What touches the organ changes its blocks; left alone it does not turn enough in a step to matter.
+  if (organ_blocks_due_ || !elements_.touching().empty()) {
     kernels_.organ_blocks(organ, organ_matrix, particles_->tube(), extra_.data() + plane_, inertia.inertia, 0,
                           tube_count_);
-    organ_blocks_due_ = false;
+    organ_blocks_due_ = !elements_.touching().empty();
   }
   const float* x = particles_->tube();
   for (std::size_t v = 0; v < tube_count_; ++v) {
@@ -360,7 +363,7 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
       residual_[i] = load_[i] + mass * (inertia.gravity[axis] - momentum) - residual_[i];
     }
   }
-  elements_.Linearise(place_.data(), particles_->pool(), contacts, residual_.data());
+  elements_.Linearise(place_.data(), residual_.data());
 }
 
 /// z <- M^-1 residual; returns residual . z.

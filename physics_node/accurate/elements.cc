@@ -3,11 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics_node/collision/tissue_collision.h"
+
 namespace fulcrum::physics::accurate {
 namespace {
 
 /// Sliding slower than this within a step counts as sticking [m].
 constexpr float kStick = 1e-6f;
+/// Tools and tissue against tissue together; more make the list grow.
+constexpr std::size_t kMostContacts = 4608;
+/// A contact's resistance to movement along its normal within a substep, over its stiffness: what comes fast does not
+/// bounce.
+constexpr float kContactDamping = 1.0f;
 /// Part of a contact's normal stiffness that resists sliding at most.
 constexpr float kTangentialPart = 0.3f;
 
@@ -38,7 +45,37 @@ void Spread(const Sum& e, const Vec3f& v, float* field) {
   }
 }
 
+/// What a contact does to its particles at `place`.
+struct ContactState {
+  float stiffness, damping;  ///< [N/m]; damping against the movement in this substep.
+  float force;               ///< Normal, never negative [N].
+  float tangential;          ///< Stiffness against sliding [N/m].
+  Vec3f slide;
+};
+ContactState StateOf(const ContactRow& row, const float* place, const float* start) {
+  ContactState state{};
+  const Vec3f here = Combine(row, place), moved = here - Combine(row, start) - row.drift;
+  const float gap = row.normal.dot(here) - row.offset;
+  if (!(gap < 0.0f)) {
+    return state;
+  }
+  state.stiffness = Elements::ContactStiffness(row);
+  state.damping = kContactDamping * state.stiffness;
+  const float approach = row.normal.dot(moved);
+  state.force = std::max(-state.stiffness * gap - state.damping * approach, 0.0f);
+  // Coulomb with the normal force at hand, within one step linear.
+  state.slide = moved - approach * row.normal;
+  state.tangential =
+      std::min(kTangentialPart * state.stiffness, row.friction * state.force / std::max(state.slide.norm(), kStick));
+  return state;
+}
+
 }  // namespace
+
+float Elements::ContactStiffness(const ContactRow& row) {
+  constexpr float kTool = 2000.0f, kTissue = 300.0f;
+  return (row.source & TissueCollision::kSource) != 0 ? kTissue : kTool;
+}
 
 Elements::Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles) {
   for (const ElasticBinding& binding : model.bindings) {
@@ -65,7 +102,8 @@ Elements::Elements(const SceneView& scene, const ElasticModel& model, const Part
     hinges_.push_back(e);
     hinge_rest_.push_back(rest.cast<float>());
   }
-  contacts_.reserve(4096);
+  contacts_.reserve(kMostContacts);
+  contact_force_.reserve(kMostContacts);
 }
 
 void Elements::Follow(const TissueModel& tissue) {
@@ -93,8 +131,25 @@ std::vector<std::pair<std::uint32_t, float>> Elements::Diagonal() const {
   return diagonal;
 }
 
-void Elements::Linearise(const float* place, const float* start, std::span<const ContactRow> contacts,
-                         float* residual) {
+void Elements::Touch(const float* place, const float* start, std::span<const ContactRow> contacts) {
+  contacts_.clear();
+  contact_force_.clear();
+  for (const ContactRow& row : contacts) {
+    const ContactState state = StateOf(row, place, start);
+    if (state.force > 0.0f) {
+      Element e;
+      e.count = row.count;
+      e.at = row.at;
+      e.weight = row.weight;
+      e.kt = state.tangential;
+      e.m = row.normal * std::sqrt(std::max(state.stiffness + state.damping - e.kt, 0.0f));
+      contacts_.push_back(e);
+      contact_force_.push_back(row.normal * state.force - state.slide * state.tangential);
+    }
+  }
+}
+
+void Elements::Linearise(const float* place, float* residual) {
   for (std::size_t i = 0; i < bindings_.size(); ++i) {
     Element& e = bindings_[i];
     if (!e.active) {
@@ -112,25 +167,8 @@ void Elements::Linearise(const float* place, const float* start, std::span<const
       Spread(hinges_[i], (hinge_rest_[i] - Combine(hinges_[i], place)) * hinges_[i].kt, residual);
     }
   }
-  contacts_.clear();
-  for (const ContactRow& row : contacts) {
-    const Vec3f here = Combine(row, place);
-    const float gap = row.normal.dot(here) - row.offset;
-    if (!(gap < 0.0f)) {
-      continue;
-    }
-    Element e;
-    e.count = row.count;
-    e.at = row.at;
-    e.weight = row.weight;
-    // Coulomb with the normal force at hand: sliding resisted by at most friction * N, within one step linear.
-    Vec3f slide = here - Combine(row, start) - row.drift;
-    slide -= row.normal.dot(slide) * row.normal;
-    const float limit = row.friction * kContactStiffness * -gap;
-    e.kt = std::min(kTangentialPart * kContactStiffness, limit / std::max(slide.norm(), kStick));
-    e.m = row.normal * std::sqrt(std::max(kContactStiffness - e.kt, 0.0f));
-    Spread(e, row.normal * (-kContactStiffness * gap) - slide * e.kt, residual);
-    contacts_.push_back(e);
+  for (std::size_t i = 0; i < contacts_.size(); ++i) {
+    Spread(contacts_[i], contact_force_[i], residual);
   }
 }
 
@@ -175,23 +213,16 @@ double Elements::Energy(const float* place, std::span<const ContactRow> contacts
   }
   for (const ContactRow& row : contacts) {
     const float gap = std::min(row.normal.dot(Combine(row, place)) - row.offset, 0.0f);
-    sum += 0.5 * static_cast<double>(kContactStiffness * gap * gap);
+    sum += 0.5 * static_cast<double>(ContactStiffness(row) * gap * gap);
   }
   return sum;
 }
 
 void Elements::WriteForces(const float* place, const float* start, std::span<ContactRow> contacts) {
   for (ContactRow& row : contacts) {
-    const Vec3f here = Combine(row, place);
-    row.force_N = kContactStiffness * std::max(row.offset - row.normal.dot(here), 0.0f);
-    row.friction_N.setZero();
-    if (row.force_N > 0.0f && row.friction > 0.0f) {
-      Vec3f slide = here - Combine(row, start) - row.drift;
-      slide -= row.normal.dot(slide) * row.normal;
-      const float k =
-          std::min(kTangentialPart * kContactStiffness, row.friction * row.force_N / std::max(slide.norm(), kStick));
-      row.friction_N = -k * slide;
-    }
+    const ContactState state = StateOf(row, place, start);
+    row.force_N = state.force;
+    row.friction_N = state.force > 0.0f ? Vec3f(-state.tangential * state.slide) : Vec3f(Vec3f::Zero());
   }
 }
 

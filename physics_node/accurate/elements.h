@@ -30,16 +30,20 @@ class Elements {
 
   /// Stiffness that bindings and hinges add to the diagonal, by pool offset of x.
   [[nodiscard]] std::vector<std::pair<std::uint32_t, float>> Diagonal() const;
-  /// Linearises at `place` and adds the forces to `residual`. Contacts: at `place`, sliding measured from `start`.
-  void Linearise(const float* place, const float* start, std::span<const ContactRow> contacts, float* residual);
+  /// Finds which contacts push at `place`, sliding measured from `start`; they act until the next call.
+  void Touch(const float* place, const float* start, std::span<const ContactRow> contacts);
+  [[nodiscard]] std::span<const Element> touching() const { return contacts_; }
+  /// Linearises at `place` and adds the forces to `residual`, those of the touching contacts included.
+  void Linearise(const float* place, float* residual);
   /// out += K p; returns p . K p.
   double Apply(const float* p, float* out) const;
   [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts) const;
   /// Normal and friction forces of contacts at `place`, sliding measured from `start`.
   static void WriteForces(const float* place, const float* start, std::span<ContactRow> contacts);
 
-  /// A contact's stiffness in its normal direction [N/m], against about 200 N/m of an edge of the membrane.
-  static constexpr float kContactStiffness = 4000.0f;
+  /// Stiffness of a contact in its normal direction: of tissue against a tool, and of soft tissue against tissue; an
+  /// edge of the membrane has some 200 N/m [N/m].
+  [[nodiscard]] static float ContactStiffness(const ContactRow& row);
 
  private:
   struct BindingRest {
@@ -47,6 +51,7 @@ class Elements {
     Index node;
   };
   std::vector<Element> bindings_, hinges_, contacts_;
+  std::vector<Vec3f> contact_force_;
   std::vector<BindingRest> binding_rest_;
   std::vector<Vec3f> hinge_rest_;
 };

@@ -42,6 +42,7 @@ TissueSimulation::TissueSimulation(const SceneView& scene, const Kernels& kernel
       model_(scene, &particles_),
       solver_(scene.physics, &model_, &particles_, kernels),
       collision_(scene, &model_, &particles_, &solver_),
+      tissue_collision_(scene, &model_, &particles_),
       grasps_{Grasp(scene), Grasp(scene)},
       contacts_(scene, &model_, &particles_),
       cautery_(scene, &model_, &particles_) {
@@ -49,7 +50,7 @@ TissueSimulation::TissueSimulation(const SceneView& scene, const Kernels& kernel
     accurate_.emplace(scene, BuildElasticModel(scene), model_, &particles_);
     effort_ = accurate::EffortOf(scene.physics.preset);
     held_places_.reserve(particles_.particle_count());
-    rows_.reserve(kMaxTools * ToolCollision::kMaxRows);
+    rows_.reserve(kMaxTools * ToolCollision::kMaxRows + TissueCollision::kMaxRows);
   }
 }
 
@@ -144,12 +145,15 @@ StepReport TissueSimulation::StepAccurate() {
   StepReport report;
   const auto substeps = static_cast<float>(effort_.substeps);
   const float h = scene_.physics.dt_s / substeps;
+  tissue_collision_.MeasureMoves(&moved_);
   accurate_->BeginStep();
   FindContacts(true, largest_speed_ * h);
+  tissue_collision_.FindPairs(moved_, 0.0, 0.0);
   for (int i = 0; i < effort_.substeps; ++i) {
     const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
     PlaceHeld(u1);
     collision_.Rows(u0, u1, &rows_);
+    tissue_collision_.Rows(u0, u1, &rows_);
     const accurate::SubstepReport substep = accurate_->Substep(h, effort_.iterations, held_places_, rows_);
     collision_.TakeForces(rows_);
     report.resets += substep.resets;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "physics_node/accurate/accurate_solver.h"
+#include "physics_node/collision/tissue_collision.h"
 #include "physics_node/collision/tool_collision.h"
 #include "physics_node/contact_model/cautery_probe.h"
 #include "physics_node/contact_model/contact_probe.h"
@@ -97,8 +98,10 @@ class TissueSimulation {
   accurate::Effort effort_;
   std::vector<accurate::HeldPlace> held_places_;
   std::vector<ContactRow> rows_;
+  std::vector<float> moved_;  ///< Of each block of particles in the last step [m].
   float largest_speed_ = 0;  ///< Of the tissue after the last accurate step [m/s].
   ToolCollision collision_;
+  TissueCollision tissue_collision_;
   std::array<Grasp, kMaxTools> grasps_;
   ContactProbe contacts_;
   CauteryProbe cautery_;
