@@ -23,11 +23,12 @@ struct XpbdStretch {
     const F scene_rest = Batches<F>::Load(rest[direction] + at, next);
     const F unstrained = scene_rest * F::All(membrane.rest_scale);
     const F length = Sqrt(Dot(d, d)), drawn = length - unstrained;
-    F k = (Batches<F>::Load(membrane.stiffness[direction] + at, next) * squared) & (scene_rest > F::All(0.0f));
+    F k = Batches<F>::Load(membrane.stiffness[direction] + at, next) * squared;
     if (membrane.stiffening > 0.0f) {
       const F strain = drawn / Max(unstrained, Tiny<F>());
       k = k * (one + F::All(membrane.stiffening) * (strain * strain));
     }
+    k = k & (scene_rest > F::All(0.0f));
     const F share = one + k * (s.w_p + s.w_q);
     if (!prestrained) {
       return d * (k * drawn / Max(length * share, Tiny<F>()));
