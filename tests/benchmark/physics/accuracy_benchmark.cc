@@ -5,6 +5,8 @@
 #include <fstream>
 
 #include "services/scene/build.h"
+#include "tests/benchmark/physics/baselines/mass_spring.h"
+#include "tests/benchmark/physics/baselines/projective_dynamics.h"
 #include "tests/benchmark/physics/work_precision_plot.h"
 #include "tests/benchmark/report.h"
 #include "tests/numerics/physics/accurate_under_test.h"
@@ -53,6 +55,18 @@ std::vector<Entry> Entries(const SceneView& scene) {
   };
   xpbd("xpbd20", "XPBD 20x1", 20);
   xpbd("", "XPBD 80x1", 80);
+  // The paper's Tables 3 and 4 on one machine: its method by number of iterations, and the two that came before.
+  for (const std::uint32_t iterations : {1u, 2u, 5u, 10u}) {
+    const std::string n = std::to_string(iterations);
+    paper(("table3.pbd" + n).c_str(), ("PBD " + n).c_str(), iterations);
+  }
+  paper("table4.pbd", "PBD 3", 3);
+  add(
+      "table4.mass_spring", "mass-spring", "mass-spring", [](PhysicsParams*) {},
+      [](const SceneView& s) { return std::make_unique<baselines::MassSpring>(s); });
+  add(
+      "table4.projective_dynamics", "projective dynamics", "projective dynamics", [](PhysicsParams*) {},
+      [](const SceneView& s) { return std::make_unique<baselines::ProjectiveDynamics>(s); });
   return entries;
 }
 
@@ -65,7 +79,8 @@ WorkPrecisionPoint Measure(const StandardCase& standard, const StandardCase::Ref
   scene.physics = entry.params;
   std::vector<double> frame_ms, p99, cut_max;
   StandardRun run;
-  for (int repeat = 0; repeat < (report->quick() || entry.key.empty() ? 1 : 3); ++repeat) {
+  for (int repeat = 0; repeat < (report->quick() || entry.key.empty() || entry.key.starts_with("table") ? 1 : 3);
+       ++repeat) {
     run = RunStandardCase(standard, truth, entry.make, scene, with_cut);
     frame_ms.insert(frame_ms.end(), run.frame_ms.begin(), run.frame_ms.end());
     p99.push_back(benchmark::Quantile(run.frame_ms, 0.99));
