@@ -135,7 +135,8 @@ TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const 
     size *= std::pow(ratio, 1 / order);
   }
   throw InputError(name + ": gives " + std::to_string(last_count) + " tetrahedra after " + std::to_string(kAttempts) +
-                   " attempts; asked: " + std::to_string(target_tets) + ". Try another target_tets");
+                   " attempts; asked: " + std::to_string(target_tets) +
+                   ". A thin body needs more of them; try another number");
 }
 
 }  // namespace fulcrum::scene

@@ -197,7 +197,7 @@ template <class T>
 void TakeTyped(Cursor* in, const std::string& type, const char* what, std::uint64_t count, std::vector<T>* values) {
   if constexpr (std::is_floating_point_v<T>) {
     type == "Float32" ? TakeAll<float>(in, what, count, values) : TakeAll<double>(in, what, count, values);
-  } else if (!in->binary()) {
+  } else if (!in->binary() || type == "Int64") {
     TakeAll<std::int64_t>(in, what, count, values);
   } else if (type == "Int8") {
     TakeAll<std::int8_t>(in, what, count, values);
@@ -211,8 +211,6 @@ void TakeTyped(Cursor* in, const std::string& type, const char* what, std::uint6
     TakeAll<std::int32_t>(in, what, count, values);
   } else if (type == "UInt32") {
     TakeAll<std::uint32_t>(in, what, count, values);
-  } else if (type == "Int64") {
-    TakeAll<std::int64_t>(in, what, count, values);
   } else {
     TakeAll<std::uint64_t>(in, what, count, values);
   }

@@ -62,7 +62,7 @@ const TriangleMesh& CappedTube() {
 /// The capped tube as tetrahedra, as a file would hold them.
 const MeshFile& TubeFile() {
   static const MeshFile file = [] {
-    const TetrahedralMesh tets = Tetrahedralise(CappedTube(), 2500, "x");
+    const TetrahedralMesh tets = Tetrahedralise(CappedTube(), 1200, "x");
     return MeshFile{tets.vertices, {}, tets.tets, 0};
   }();
   return file;
@@ -136,7 +136,7 @@ TEST(Wall, ThickerThanTheOrganIsRefused) {
 }
 
 TEST(TetrahedraOfAnEdge, HaveItOnAverage) {
-  for (const double edge : {0.004, 0.006}) {
+  for (const double edge : {0.005, 0.007}) {
     const TetrahedralMesh mesh = Tetrahedralise(CappedTube(), TetsOfEdge(CappedTube(), edge), "x");
     double sum = 0;
     const auto edges = EdgesOf(mesh.tets);
@@ -293,9 +293,9 @@ TEST_F(OrganScene, TetrahedraOfAFileAreTakenAsTheyAre) {
 }
 
 TEST_F(OrganScene, TetrahedraOfAFileCanBeFilledAnew) {
-  const SceneData data = Build("    organ: tube.vtk\n    remesh: true\n    target_tets: 1200\n");
+  const SceneData data = Build("    organ: tube.vtk\n    remesh: true\n    target_tets: 800\n");
   ExpectSound(data);
-  EXPECT_NEAR(static_cast<double>(data.View().tets.size()), 1200, 120);
+  EXPECT_NEAR(static_cast<double>(data.View().tets.size()), 800, 80);
 }
 
 TEST_F(OrganScene, OpenTubeBecomesAWall) {
