@@ -9,22 +9,45 @@ namespace {
 /// Quotient of a projection onto an edge, 0 for an edge of no length.
 float Ratio(float numerator, float denominator) { return denominator > 0.0f ? numerator / denominator : 0.0f; }
 
-/// Closest parameters (s, t) of the segments p0 + s u and q0 + t v (Ericson 5.1.9).
-std::array<float, 2> ClosestSegments(const Vec3f& p0, const Vec3f& u, const Vec3f& q0, const Vec3f& v) {
-  const Vec3f r = p0 - q0;
-  const float a = u.squaredNorm(), e = v.squaredNorm(), f = v.dot(r), c = u.dot(r), b = u.dot(v);
-  const float denominator = a * e - b * b;
-  float s = 0.0f;
+/// Four lanes: the three edges of a triangle at once; the fourth repeats the first.
+using F4 = float __attribute__((vector_size(16)));
+
+F4 Clamp01(F4 v) {
+  const F4 zero{}, one = zero + 1.0f;
+  v = v < zero ? zero : v;
+  return v > one ? one : v;
+}
+/// Lanes where the denominator is not positive give 0.
+F4 Ratio(F4 numerator, F4 denominator) {
+  const F4 zero{}, one = zero + 1.0f;
+  return denominator > zero ? numerator / (denominator > zero ? denominator : one) : zero;
+}
+
+struct EdgesClosest {
+  F4 s, t;  ///< Along the segment, along the edge.
+  F4 distance_sq;
+};
+
+/// Closest parameters of the segment p0 + s u and each edge corner[i] + t (corner[i+1] - corner[i]) (Ericson 5.1.9).
+EdgesClosest ClosestEdges(const Vec3f& p0, const Vec3f& u, const Vec3f& x0, const Vec3f& x1, const Vec3f& x2) {
+  const auto lanes = [&](int axis) { return F4{x0[axis], x1[axis], x2[axis], x0[axis]}; };
+  const auto next = [&](int axis) { return F4{x1[axis], x2[axis], x0[axis], x1[axis]}; };
+  const F4 px = lanes(0), py = lanes(1), pz = lanes(2);
+  const F4 vx = next(0) - px, vy = next(1) - py, vz = next(2) - pz;
+  const F4 rx = p0.x() - px, ry = p0.y() - py, rz = p0.z() - pz;
+  const F4 zero{};
+  const F4 a = zero + u.squaredNorm();
+  const F4 e = vx * vx + vy * vy + vz * vz, f = vx * rx + vy * ry + vz * rz;
+  const F4 c = u.x() * rx + u.y() * ry + u.z() * rz, b = u.x() * vx + u.y() * vy + u.z() * vz;
+  const F4 denominator = a * e - b * b;
   // Parallel within rounding: any s will do.
-  if (denominator > 1e-6f * a * e) {
-    s = std::clamp((b * f - c * e) / denominator, 0.0f, 1.0f);
-  }
-  float t = Ratio(b * s + f, e);
-  if (t < 0.0f || t > 1.0f) {
-    t = std::clamp(t, 0.0f, 1.0f);
-    s = std::clamp(Ratio(t * b - c, a), 0.0f, 1.0f);
-  }
-  return {s, t};
+  F4 s = denominator > 1e-6f * a * e ? Clamp01(Ratio(b * f - c * e, denominator)) : zero;
+  F4 t = Ratio(b * s + f, e);
+  const F4 inside = Clamp01(t);
+  s = inside != t ? Clamp01(Ratio(inside * b - c, a)) : s;
+  t = inside;
+  const F4 dx = rx + s * u.x() - t * vx, dy = ry + s * u.y() - t * vy, dz = rz + s * u.z() - t * vz;
+  return {s, t, dx * dx + dy * dy + dz * dz};
 }
 
 }  // namespace
@@ -66,7 +89,6 @@ std::array<float, 3> ClosestOnTriangle(const Vec3f& p, const Vec3f& a, const Vec
 }
 
 ClosestPoints ClosestSegmentTriangle(const Vec3f& p0, const Vec3f& p1, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
-  const std::array<const Vec3f*, 3> corner{&a, &b, &c};
   const Vec3f u = p1 - p0;
   const Vec3f n = (b - a).cross(c - a);
   const float n2 = n.squaredNorm(), h0 = n.dot(p0 - a), h1 = n.dot(p1 - a);
@@ -85,21 +107,14 @@ ClosestPoints ClosestSegmentTriangle(const Vec3f& p0, const Vec3f& p1, const Vec
     }
   }
   // The segment against the edges, which covers corners and ends; then an end over the inside.
+  const EdgesClosest edges = ClosestEdges(p0, u, a, b, c);
+  std::size_t edge = edges.distance_sq[1] < edges.distance_sq[0] ? 1 : 0;
+  edge = edges.distance_sq[2] < edges.distance_sq[edge] ? 2 : edge;
   ClosestPoints best;
-  best.distance_sq = 3e38f;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t j = i < 2 ? i + 1 : 0;
-    const Vec3f v = *corner[j] - *corner[i];
-    const auto [s, t] = ClosestSegments(p0, u, *corner[i], v);
-    const float distance_sq = (p0 + s * u - *corner[i] - t * v).squaredNorm();
-    if (distance_sq < best.distance_sq) {
-      best.distance_sq = distance_sq;
-      best.t = s;
-      best.barycentric = {0, 0, 0};
-      best.barycentric[i] = 1.0f - t;
-      best.barycentric[j] = t;
-    }
-  }
+  best.distance_sq = edges.distance_sq[edge];
+  best.t = edges.s[edge];
+  best.barycentric[edge] = 1.0f - edges.t[edge];
+  best.barycentric[edge < 2 ? edge + 1 : 0] = edges.t[edge];
   for (const float t : {0.0f, 1.0f}) {
     const float h = t > 0.0f ? h1 : h0;
     if (h * h < best.distance_sq * n2 && inside(t > 0.0f ? p1 : p0, &bary)) {

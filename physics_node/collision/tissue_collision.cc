@@ -17,6 +17,7 @@ constexpr float kKeep = 0.0003f;
 constexpr float kMaxBehind = 0.005f;
 /// Fixed surfaces are seen from this far [m].
 constexpr float kSight = 0.012f;
+constexpr float kAnywhere = 10.0f;
 /// Beside a rim: the offset from the nearest point lies less than this much along the normal.
 constexpr float kBesideCosine = 0.5f;
 /// Nearer than this the triangle's own normal is the better direction [m].
@@ -41,11 +42,12 @@ TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* mode
     : scene_(scene), model_(model), particles_(particles), breathing_(breathing) {
   travel_.assign((particles->particle_count() + kBlock - 1) / kBlock, 0.0f);
   WatchOrgan();
-  WatchFixed(false);
-  WatchFixed(true);
+  for (const StaticSurface& surface : scene.static_surfaces) {
+    if (surface.collides) {
+      WatchFixed(surface);
+    }
+  }
   near_organ_.reserve(organ_.size());
-  near_fixed_[0].reserve(fixed_[0].size());
-  near_fixed_[1].reserve(fixed_[1].size());
 }
 
 TissueCollision::Signed TissueCollision::SignedDistance(const Vec3f& p, const std::array<Vec3f, 3>& corners) {
@@ -125,23 +127,15 @@ void TissueCollision::WatchOrgan() {
   MakeGroups(organ_, &organ_groups_);
 }
 
-void TissueCollision::WatchFixed(bool breathing) {
-  const bool breathes_at_all = breathing_.amplitude_m > 0.0f;
+void TissueCollision::WatchFixed(const StaticSurface& surface) {
   std::vector<std::array<Vec3f, 3>> corners;
-  for (const StaticSurface& surface : scene_.static_surfaces) {
-    if (!surface.collides || (breathes_at_all && Breathes(surface.role)) != breathing) {
-      continue;
-    }
-    for (Index t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
-      const Triangle& v = scene_.static_triangles[t];
-      corners.push_back({scene_.static_vertices[v[0]], scene_.static_vertices[v[1]], scene_.static_vertices[v[2]]});
-    }
+  for (Index t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
+    const Triangle& v = scene_.static_triangles[t];
+    corners.push_back({scene_.static_vertices[v[0]], scene_.static_vertices[v[1]], scene_.static_vertices[v[2]]});
   }
-  const std::size_t which = breathing ? 1 : 0;
-  trees_[which] = TriangleTree(std::move(corners));
-  if (trees_[which].empty()) {
-    return;
-  }
+  Fixed fixed;
+  fixed.tree = TriangleTree(std::move(corners));
+  fixed.breathes = Breathes(surface.role);
   std::vector<bool> on_surface(particles_->particle_count(), false);
   for (const Triangle& t : scene_.tube_surface) {
     on_surface[t[0]] = on_surface[t[1]] = on_surface[t[2]] = true;
@@ -150,19 +144,32 @@ void TissueCollision::WatchFixed(bool breathing) {
     if (!(scene_.inverse_mass[particle] > 0.0f) || (particle < scene_.tube_vertex_count && !on_surface[particle])) {
       continue;
     }
+    const Vec3f& p = scene_.rest_position[particle];
+    const TriangleTree::Hit hit = fixed.tree.Nearest(p, kAnywhere);
+    if (hit.triangle == kNoIndex) {
+      continue;
+    }
+    const float height = fixed.tree.normal(hit.triangle).dot(p - hit.point);
+    if (height < 0.0f) {
+      continue;
+    }
     Watch watch;
     watch.particle = particle;
     watch.at = particles_->Ref(particle);
-    watch.clearance = scene_.physics.collision_margin_m;
-    const Vec3f& p = scene_.rest_position[particle];
-    const TriangleTree::Hit hit = trees_[which].Nearest(p, kSight);
-    if (hit.triangle != kNoIndex) {
-      const float height = trees_[which].normal(hit.triangle).dot(p - hit.point);
-      watch.clearance = std::clamp(0.5f * height, 0.0f, watch.clearance);
-    }
-    fixed_[which].push_back(watch);
+    watch.clearance = std::min(scene_.physics.collision_margin_m, 0.5f * height);
+    fixed.watches.push_back(watch);
   }
-  MakeGroups(fixed_[which], &fixed_groups_[which]);
+  MakeGroups(fixed.watches, &fixed.groups);
+  fixed.near.reserve(fixed.watches.size());
+  fixed_.push_back(std::move(fixed));
+}
+
+std::size_t TissueCollision::near_count() const {
+  std::size_t count = near_organ_.size();
+  for (const Fixed& fixed : fixed_) {
+    count += fixed.near.size();
+  }
+  return count;
 }
 
 void TissueCollision::MeasureMoves(std::vector<float>* moved) const {
@@ -231,12 +238,12 @@ void TissueCollision::LookAtDue(std::vector<Group>* groups, std::vector<Watch>* 
   }
 }
 
-void TissueCollision::LookAtFixed(std::size_t which, std::span<const float> moved) {
-  const Vec3f shift = which == 1 ? breath0_ : Vec3f(Vec3f::Zero());
-  const TriangleTree& tree = trees_[which];
-  const float breathed = which == 1 ? (breath1_ - breath0_).norm() : 0.0f;
-  LookAtDue(&fixed_groups_[which], &fixed_[which], moved, which == 1 ? breath_travel_ : 0.0f, breathed,
-            &near_fixed_[which], [&](Watch* watch) {
+void TissueCollision::LookAtFixed(Fixed* fixed, std::span<const float> moved) {
+  const Vec3f shift = fixed->breathes ? breath0_ : Vec3f(Vec3f::Zero());
+  const TriangleTree& tree = fixed->tree;
+  const float breathed = fixed->breathes ? (breath1_ - breath0_).norm() : 0.0f;
+  LookAtDue(&fixed->groups, &fixed->watches, moved, fixed->breathes ? breath_travel_ : 0.0f, breathed, &fixed->near,
+            [&](Watch* watch) {
               const Vec3f p = particles_->At(watch->at) - shift;
               const TriangleTree::Hit hit = tree.Nearest(p, kSight);
               if (hit.triangle == kNoIndex) {
@@ -271,8 +278,9 @@ void TissueCollision::FindPairs(std::span<const float> moved, double time0_s, do
     Walk(watch, p);
     return SignedDistance(p, OrganCorners(watch->triangle)).distance - watch->clearance;
   });
-  LookAtFixed(0, moved);
-  LookAtFixed(1, moved);
+  for (Fixed& fixed : fixed_) {
+    LookAtFixed(&fixed, moved);
+  }
 }
 
 /// Dead and loose membrane touches nothing.
@@ -281,17 +289,16 @@ bool TissueCollision::Touches(Index particle) const {
   return particle < first || (model_->NodeAlive(particle - first) && !model_->IsDebris(particle - first));
 }
 
-void TissueCollision::AddFixedRows(std::size_t which, float u0, float u1, std::size_t limit,
+void TissueCollision::AddFixedRows(const Fixed& fixed, float u0, float u1, std::size_t limit,
                                    std::vector<ContactRow>* rows) const {
   ContactRow row;
   row.friction = scene_.physics.friction;
   row.count = 1;
   row.weight[0] = 1.0f;
-  const bool breathes = which == 1;
-  const Vec3f shift = breathes ? Vec3f(breath0_ + u1 * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
-  row.drift = breathes ? Vec3f((u1 - u0) * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
-  for (const Near& near : near_fixed_[which]) {
-    const Watch& watch = fixed_[which][near.watch];
+  const Vec3f shift = fixed.breathes ? Vec3f(breath0_ + u1 * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
+  row.drift = fixed.breathes ? Vec3f((u1 - u0) * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
+  for (const Near& near : fixed.near) {
+    const Watch& watch = fixed.watches[near.watch];
     row.offset = watch.normal.dot(watch.point + shift) + watch.clearance;
     if (watch.normal.dot(particles_->At(watch.at)) > row.offset + near.band || !Touches(watch.particle)) {
       continue;
@@ -334,8 +341,9 @@ void TissueCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) co
     row.source = kSource | near.watch;
     rows->push_back(row);
   }
-  AddFixedRows(0, u0, u1, limit, rows);
-  AddFixedRows(1, u0, u1, limit, rows);
+  for (const Fixed& fixed : fixed_) {
+    AddFixedRows(fixed, u0, u1, limit, rows);
+  }
 }
 
 }  // namespace fulcrum::physics

@@ -52,9 +52,7 @@ class TissueCollision {
   void Rows(float u0, float u1, std::vector<ContactRow>* rows) const;
 
   /// Particles near something in this step.
-  [[nodiscard]] std::size_t near_count() const {
-    return near_organ_.size() + near_fixed_[0].size() + near_fixed_[1].size();
-  }
+  [[nodiscard]] std::size_t near_count() const;
   /// Particles looked at by the last FindPairs.
   [[nodiscard]] std::size_t looked_at() const { return looked_at_; }
 
@@ -88,8 +86,18 @@ class TissueCollision {
     float distance = 0;            ///< Negative: behind [m].
   };
 
+  /// A fixed surface of the scene that collides. What lies behind it at rest, such as the organ under the peritoneum,
+  /// is not its business.
+  struct Fixed {
+    TriangleTree tree;
+    bool breathes = false;
+    std::vector<Watch> watches;
+    std::vector<Group> groups;
+    std::vector<Near> near;
+  };
+
   void WatchOrgan();
-  void WatchFixed(bool breathing);
+  void WatchFixed(const StaticSurface& surface);
   static void MakeGroups(std::span<Watch> watches, std::vector<Group>* groups);
   [[nodiscard]] std::array<Vec3f, 3> OrganCorners(Index triangle) const;
   /// Walks to the nearest triangle of the organ from the one known.
@@ -98,9 +106,9 @@ class TissueCollision {
   template <class Look>
   void LookAtDue(std::vector<Group>* groups, std::vector<Watch>* watches, std::span<const float> moved,
                  float others_travel, float others_moved, std::vector<Near>* near, const Look& look);
-  void LookAtFixed(std::size_t which, std::span<const float> moved);
+  void LookAtFixed(Fixed* fixed, std::span<const float> moved);
   [[nodiscard]] bool Touches(Index particle) const;
-  void AddFixedRows(std::size_t which, float u0, float u1, std::size_t limit, std::vector<ContactRow>* rows) const;
+  void AddFixedRows(const Fixed& fixed, float u0, float u1, std::size_t limit, std::vector<ContactRow>* rows) const;
 
   SceneView scene_;
   const TissueModel* model_;
@@ -110,15 +118,12 @@ class TissueCollision {
   std::vector<Index> ring_start_, ring_;  ///< Organ triangles that share a corner with each.
   std::vector<Watch> organ_;
   std::vector<Group> organ_groups_;
-  std::array<TriangleTree, 2> trees_;  ///< Still and breathing.
-  std::array<std::vector<Watch>, 2> fixed_;
-  std::array<std::vector<Group>, 2> fixed_groups_;
+  std::vector<Fixed> fixed_;
 
   std::vector<float> travel_;  ///< Of each block since the beginning [m].
   float organ_travel_ = 0, breath_travel_ = 0;
   Vec3f breath0_ = Vec3f::Zero(), breath1_ = Vec3f::Zero();
   std::vector<Near> near_organ_;
-  std::array<std::vector<Near>, 2> near_fixed_;
   std::size_t looked_at_ = 0;
 };
 

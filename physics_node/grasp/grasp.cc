@@ -15,19 +15,19 @@ constexpr float kCreepSpeed = 0.05f;
 constexpr float kLeastHold = 0.3f;
 constexpr float kFirmPart = 0.5f;
 
-}  // namespace
-
-float Grasp::GripForce(const PhysicsParams& params, float jaw_rad) {
-  return params.grip_force_N * std::clamp(1.0f - jaw_rad / params.grasp_open_rad, 0.0f, 1.0f);
-}
-
-/// Distance from the surface between the jaws' axes.
-float Grasp::DistanceToJaws(const Vec3f& p_T, const ToolDescription& tool, float jaw_rad) const {
+/// Distance from the surface between the axes of jaws so far open; 0: from their middle line.
+float DistanceToJaws(const Vec3f& p_T, const ToolDescription& tool, float jaw_rad) {
   const float length = tool.tip_length_m, half = 0.5f * std::max(jaw_rad, 0.0f);
   const Vec3f hinge(0, 0, -length);
   const Vec3f up = hinge + length * Vec3f(std::sin(half), 0, std::cos(half)), down(-up.x(), 0, up.z());
   const auto b = ClosestOnTriangle(p_T, hinge, up, down);
   return (b[0] * hinge + b[1] * up + b[2] * down - p_T).norm();
+}
+
+}  // namespace
+
+float Grasp::GripForce(const PhysicsParams& params, float jaw_rad) {
+  return params.grip_force_N * std::clamp(1.0f - jaw_rad / params.grasp_open_rad, 0.0f, 1.0f);
 }
 
 float Grasp::HoldOf(const HeldParticle& held, const ToolDescription& tool) const {
@@ -50,23 +50,24 @@ void Grasp::Update(const ToolDescription& tool, const ToolPose& pose, const Tiss
 }
 
 void Grasp::TakeHold(const ToolDescription& tool, const ToolPose& pose, ParticleStore* particles) {
-  const auto take = [&](Index first, Index last, float radius) {
+  const auto take = [&](Index first, Index last, float between, float around) {
     for (Index p = first; p < last; ++p) {
       const ParticleRef at = particles->Ref(p);
       const Vec3f p_T = pose.ToTool(particles->At(at));
       // Dead, loose and fixed tissue has no inverse mass, nor has what the other tool holds.
-      if (particles->InverseMass(at) > 0.0f && DistanceToJaws(p_T, tool, pose.jaw_rad) < radius) {
+      if (particles->InverseMass(at) > 0.0f &&
+          (DistanceToJaws(p_T, tool, pose.jaw_rad) < between || DistanceToJaws(p_T, tool, 0.0f) < around)) {
         held_.push_back({p, p_T});
         particles->SetInverseMass(at, 0.0f);
       }
     }
   };
-  const float radius = scene_.physics.grasp_radius_m;
+  const float radius = scene_.physics.grasp_radius_m, jaw = std::min(tool.tip_radius_m, radius);
   held_.clear();
-  take(0, scene_.tube_vertex_count, std::min(tool.tip_radius_m, radius));
-  take(scene_.membrane.first, particles->particle_count(), radius);
+  take(0, scene_.tube_vertex_count, jaw, 0.0f);
+  take(scene_.membrane.first, particles->particle_count(), jaw, radius);
   if (held_.empty()) {
-    take(0, scene_.tube_vertex_count, radius);
+    take(0, scene_.tube_vertex_count, jaw, radius);
   }
   state_ = held_.empty() ? State::kClosedEmpty : State::kHolding;
 }

@@ -21,8 +21,9 @@ class Grasp {
   explicit Grasp(const SceneView& scene) : scene_(scene) {}
 
   /// Follows the jaw: takes hold when it closes past grasp_close_rad, lets go past grasp_open_rad. Held is what lies
-  /// between the jaws: membrane within grasp_radius of the surface that they span, all sheets of a fold, and the organ
-  /// within a jaw's thickness of it; with nothing there, organ within grasp_radius.
+  /// between the jaws: whatever is within a jaw's thickness of the surface that they span, all sheets of a fold and
+  /// both layers, and the membrane within grasp_radius of their middle line; with nothing there, organ within
+  /// grasp_radius.
   void Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model, ParticleStore* particles);
   /// Puts what is held where the tool has taken it.
   void Move(const ToolPose& pose, ParticleStore* particles) const;
@@ -47,7 +48,6 @@ class Grasp {
 
  private:
   void TakeHold(const ToolDescription& tool, const ToolPose& pose, ParticleStore* particles);
-  [[nodiscard]] float DistanceToJaws(const Vec3f& p_T, const ToolDescription& tool, float jaw_rad) const;
   template <class Predicate>
   void DropIf(const TissueModel& model, ParticleStore* particles, const Predicate& gone);
 
