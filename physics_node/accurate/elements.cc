@@ -73,7 +73,7 @@ ContactState StateOf(const ContactRow& row, const float* place, const float* sta
 }  // namespace
 
 float Elements::ContactStiffness(const ContactRow& row) {
-  constexpr float kTool = 2000.0f, kTissue = 300.0f;
+  constexpr float kTool = 2000.0f, kTissue = 30.0f;
   return (row.source & TissueCollision::kSource) != 0 ? kTissue : kTool;
 }
 
