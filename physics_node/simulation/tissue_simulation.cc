@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics_node/collision/row_projection.h"
 #include "services/core/hash.h"
 
 namespace fulcrum::physics {
@@ -46,9 +47,14 @@ TissueSimulation::TissueSimulation(const SceneView& scene, const Kernels& kernel
       grasps_{Grasp(scene), Grasp(scene)},
       contacts_(scene, &model_, &particles_),
       cautery_(scene, &model_, &particles_) {
-  if (scene.physics.mode == PhysicsMode::kAccurate) {
-    accurate_.emplace(scene, BuildElasticModel(scene), model_, &particles_);
-    effort_ = accurate::EffortOf(scene.physics.preset);
+  if (scene.physics.mode != PhysicsMode::kPaper) {
+    const ElasticModel elastic = BuildElasticModel(scene);
+    if (scene.physics.mode == PhysicsMode::kXpbd) {
+      xpbd_.emplace(elastic, &model_, &particles_);
+    } else {
+      accurate_.emplace(scene, elastic, model_, &particles_);
+      effort_ = accurate::EffortOf(scene.physics.preset);
+    }
     held_places_.reserve(particles_.particle_count());
     rows_.reserve(kMaxTools * ToolCollision::kMaxRows + TissueCollision::kMaxRows);
   }
@@ -141,14 +147,52 @@ void TissueSimulation::PlaceHeld(float u) {
   }
 }
 
+/// Pairs of tools and tissue and of tissue with itself, for substeps of h.
+void TissueSimulation::FindAllContacts(float h) {
+  FindContacts(true, largest_speed_ * h);
+  tissue_collision_.FindPairs(moved_, 0.0, 0.0);
+}
+
+StepReport TissueSimulation::StepXpbd() {
+  StepReport report;
+  const auto substeps = static_cast<float>(scene_.physics.substeps);
+  const float h = scene_.physics.dt_s / substeps;
+  // Previous places are those a substep ago; movement is at most that of the fastest.
+  moved_.assign(tissue_collision_.block_count(), largest_speed_ * scene_.physics.dt_s);
+  FindAllContacts(h);
+  float largest_sq = 0;
+  for (std::uint32_t i = 0; i < scene_.physics.substeps; ++i) {
+    const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
+    collision_.Rows(u0, u1, &rows_);
+    tissue_collision_.Rows(u0, u1, &rows_);
+    report.resets += xpbd_->Predict(h);
+    PlaceHeld(u1);
+    for (const accurate::HeldPlace& held : held_places_) {
+      particles_.Set(held.at, held.place);
+    }
+    xpbd_->Iterate(h);
+    ProjectRows(rows_, ToolCollision::kMaxPush, h, &particles_);
+    const FinishResult finish = xpbd_->Finish(h);
+    collision_.TakeForces(rows_);
+    report.resets += finish.resets;
+    largest_sq = std::max(largest_sq, finish.max_step_sq);
+  }
+  largest_speed_ = std::sqrt(largest_sq) / h;
+  report.max_step_m = largest_speed_ * scene_.physics.dt_s;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    grasps_[i].Slip(contacts_.force(static_cast<std::uint32_t>(i)), scene_.tools[i], tracks_[i].now, model_,
+                    &particles_);
+  }
+  return report;
+}
+
 StepReport TissueSimulation::StepAccurate() {
   StepReport report;
   const auto substeps = static_cast<float>(effort_.substeps);
   const float h = scene_.physics.dt_s / substeps;
   tissue_collision_.MeasureMoves(&moved_);
   accurate_->BeginStep();
-  FindContacts(true, largest_speed_ * h);
-  tissue_collision_.FindPairs(moved_, 0.0, 0.0);
+  FindAllContacts(h);
   for (int i = 0; i < effort_.substeps; ++i) {
     const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
     PlaceHeld(u1);
@@ -180,7 +224,7 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
     return {true, 0.0f, 0};
   }
   ++state_version_;
-  const StepReport report = accurate_ ? StepAccurate() : StepPaper();
+  const StepReport report = accurate_ ? StepAccurate() : xpbd_ ? StepXpbd() : StepPaper();
   quarantined_ += report.resets;
   const bool stirred = std::any_of(tracks_.begin(), tracks_.end(),
                                    [](const ToolTrack& track) { return track.present && track.moved(); });
@@ -190,6 +234,9 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
     solver_.Stop();
     if (accurate_) {
       accurate_->Stop();
+    }
+    if (xpbd_) {
+      xpbd_->Stop();
     }
     asleep_ = true;
     still_steps_ = 0;

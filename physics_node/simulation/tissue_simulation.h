@@ -14,6 +14,7 @@
 #include "physics_node/contact_model/contact_probe.h"
 #include "physics_node/grasp/grasp.h"
 #include "physics_node/pbd/pbd_solver.h"
+#include "physics_node/xpbd/xpbd_solver.h"
 
 namespace fulcrum::physics {
 
@@ -85,8 +86,10 @@ class TissueSimulation {
   void FollowTools(const std::array<ToolInput, kMaxTools>& tools);
   [[nodiscard]] bool MayRest();
   [[nodiscard]] StepReport StepPaper();
+  [[nodiscard]] StepReport StepXpbd();
   [[nodiscard]] StepReport StepAccurate();
   void PlaceHeld(float u);
+  void FindAllContacts(float h);
   void UpdateGrasps();
   void FindContacts(bool tissue_moved, float tissue_step = 0);
 
@@ -95,11 +98,12 @@ class TissueSimulation {
   TissueModel model_;
   PbdSolver solver_;
   std::optional<accurate::AccurateSolver> accurate_;  ///< In mode accurate.
+  std::optional<xpbd::XpbdSolver> xpbd_;              ///< In mode xpbd.
   accurate::Effort effort_;
   std::vector<accurate::HeldPlace> held_places_;
   std::vector<ContactRow> rows_;
   std::vector<float> moved_;  ///< Of each block of particles in the last step [m].
-  float largest_speed_ = 0;  ///< Of the tissue after the last accurate step [m/s].
+  float largest_speed_ = 0;   ///< Of the tissue after the last step, paper's mode apart [m/s].
   ToolCollision collision_;
   TissueCollision tissue_collision_;
   std::array<Grasp, kMaxTools> grasps_;
