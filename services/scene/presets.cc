@@ -29,6 +29,14 @@ class ScriptWriter {
   std::vector<ScriptKeySettings>* keys_;
 };
 
+PhysicsParams AccuratePhysics() {
+  PhysicsParams physics;
+  physics.mode = PhysicsMode::kAccurate;
+  physics.damping_per_s = 20.0f;
+  physics.membrane_prestrain = 0.04f;
+  return physics;
+}
+
 }  // namespace
 
 ToolDescription DefaultTool(ToolKind kind, const Vec3f& p_WP) {
@@ -47,6 +55,7 @@ ToolDescription DefaultTool(ToolKind kind, const Vec3f& p_WP) {
 
 SceneSettings BuiltIn() {
   SceneSettings scene;
+  scene.physics = AccuratePhysics();
   scene.name = "built-in";
   scene.description = "Procedural rectum and membrane at the size of the paper's Table 3";
   scene.tube = {.rings = 43,

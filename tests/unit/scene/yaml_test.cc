@@ -125,7 +125,7 @@ const Rule kRules[] = {
     {"BendingStride", "bending_row_stride: 4", "bending_row_stride: 5", {"bending_row_stride", "divide rows - 1 = 72"}},
     {"BendingColStride", "bending_col_stride: 4", "bending_col_stride: 5", {"bending_col_stride", "cols - 1 = 24"}},
     {"MassAreal", "density_kg_m2: 0.5", "density_kg_m2: 0.5 kg/m3", {"density_kg_m2", "wrong unit"}},
-    {"Mode", "mode: paper", "mode: fast", {"physics.mode", "paper"}},
+    {"Mode", "mode: accurate", "mode: fast", {"physics.mode", "paper"}},
     {"Stiffness", "k_volume: 0.8", "k_volume: 1.5", {"physics.k_volume", "0 to 1"}},
     {"Power", "power_W: 35", "power_W: 3500", {"power_W", "0 to 300"}},
     {"PedalWithoutPower", "power_W: 35", "power_W: 0", {"pedal", "power_W is 0"}},
