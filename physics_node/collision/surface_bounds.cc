@@ -57,6 +57,18 @@ SurfaceBounds::SurfaceBounds(const SceneView& scene, const TissueModel* model, P
   for (std::size_t first = 0; first < tube_order_.size(); first += kLeafSize) {
     leaves_.push_back({static_cast<Index>(first), static_cast<Index>(std::min(first + kLeafSize, tube_order_.size()))});
   }
+  leaf_start_.push_back(0);
+  for (const Sphere& leaf : leaves_) {
+    std::vector<Index> vertices;
+    for (Index i = leaf.first; i < leaf.last; ++i) {
+      const Triangle& v = scene.tube_surface[tube_order_[i]];
+      vertices.insert(vertices.end(), v.begin(), v.end());
+    }
+    std::sort(vertices.begin(), vertices.end());
+    vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+    leaf_vertices_.insert(leaf_vertices_.end(), vertices.begin(), vertices.end());
+    leaf_start_.push_back(static_cast<Index>(leaf_vertices_.size()));
+  }
   for (std::size_t first = 0; first < leaves_.size(); first += kClusterSize) {
     clusters_.push_back(
         {static_cast<Index>(first), static_cast<Index>(std::min(first + kClusterSize, leaves_.size()))});
@@ -80,23 +92,21 @@ void SurfaceBounds::FitMembrane() {
   kernels_.block_bounds(grid, bounds_);
 }
 
-void SurfaceBounds::FitLeaf(Sphere* leaf) {
+void SurfaceBounds::FitLeaf(Index leaf) {
   Vec3f lo = Vec3f::Constant(3e38f), hi = Vec3f::Constant(-3e38f);
-  for (Index i = leaf->first; i < leaf->last; ++i) {
-    for (const Index v : scene_.tube_surface[tube_order_[i]]) {
-      const Vec3f p = particles_->At({4 * v, 1});
-      lo = lo.cwiseMin(p);
-      hi = hi.cwiseMax(p);
-    }
+  for (Index i = leaf_start_[leaf]; i < leaf_start_[leaf + 1]; ++i) {
+    const Vec3f p = particles_->At({4 * leaf_vertices_[i], 1});
+    lo = lo.cwiseMin(p);
+    hi = hi.cwiseMax(p);
   }
-  leaf->centre = 0.5f * (lo + hi);
-  leaf->radius = 0.5f * (hi - lo).norm();
+  leaves_[leaf].centre = 0.5f * (lo + hi);
+  leaves_[leaf].radius = 0.5f * (hi - lo).norm();
 }
 
 void SurfaceBounds::FitCluster(Sphere* cluster) {
   cluster->centre.setZero();
   for (Index leaf = cluster->first; leaf < cluster->last; ++leaf) {
-    FitLeaf(&leaves_[leaf]);
+    FitLeaf(leaf);
     cluster->centre += leaves_[leaf].centre;
   }
   cluster->centre /= static_cast<float>(cluster->last - cluster->first);

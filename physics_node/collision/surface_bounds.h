@@ -38,7 +38,7 @@ class SurfaceBounds {
   void ForEachTubeTriangleNear(const Vec3f& a, const Vec3f& b, float range, const Visit& visit) const;
 
  private:
-  static constexpr float kReach = 0.020f;      ///< [m]
+  static constexpr float kReach = 0.015f;      ///< Probes look 10 mm around a tool [m].
   static constexpr float kOrganStep = 0.010f;  ///< 1 m/s at 100 Hz [m].
 
   struct Sphere {
@@ -50,7 +50,7 @@ class SurfaceBounds {
     return DistanceSqToSegment(p, a, b) > range * range;
   }
   void FitMembrane();
-  void FitLeaf(Sphere* leaf);
+  void FitLeaf(Index leaf);
   void FitCluster(Sphere* cluster);
 
   SceneView scene_;
@@ -61,6 +61,7 @@ class SurfaceBounds {
   std::array<std::vector<float>, 6> bound_storage_;
   BlockBounds bounds_{};
   std::vector<Index> tube_order_;
+  std::vector<Index> leaf_start_, leaf_vertices_;  ///< Each vertex of a leaf once.
   std::vector<Sphere> leaves_, clusters_;
   std::vector<float> age_;  ///< Of each cluster: how far tissue may have moved since it was fitted [m].
   Vec3f low_ = Vec3f::Zero(), high_ = Vec3f::Zero();  ///< Of everything.

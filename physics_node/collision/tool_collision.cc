@@ -205,6 +205,20 @@ void ToolCollision::FollowYielding(std::uint32_t tool, const ToolMotion& moved, 
   }
 }
 
+/// By capsule and triangle. Sorts keys, for pairs are large; the last step's are needed no more.
+void ToolCollision::SortPairs() {
+  row_order_.clear();
+  for (Index i = 0; i < pairs_.size(); ++i) {
+    row_order_.emplace_back(std::uint64_t{pairs_[i].capsule} << 32 | pairs_[i].triangle, i);
+  }
+  std::sort(row_order_.begin(), row_order_.end());
+  last_pairs_.clear();
+  for (const auto& [key, index] : row_order_) {
+    last_pairs_.push_back(pairs_[index]);
+  }
+  std::swap(pairs_, last_pairs_);
+}
+
 void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bool tissue_moved, float tissue_step) {
   std::swap(pairs_, last_pairs_);
   pairs_.clear();
@@ -254,7 +268,7 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
     }
     FollowYielding(tool, moved, clear);
   }
-  std::sort(pairs_.begin(), pairs_.end(), InOrder);
+  SortPairs();
   for (std::uint32_t c = 0; c < motion_.size(); ++c) {
     if (motion_[c].to.part == ToolPart::kJaw && yielding_[c / kMaxCapsules].steps > 0) {
       motion_[c].enabled = false;

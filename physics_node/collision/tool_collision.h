@@ -120,6 +120,7 @@ class ToolCollision {
 
   void FindMembranePairs(std::uint32_t capsule, float range);
   void SettleSides(std::size_t first);
+  void SortPairs();
   void FindTubePairs(std::uint32_t capsule, float range);
   void AddPair(const ContactPair& draft, float range);
   void FindSide(ContactPair* pair) const;
@@ -154,7 +155,7 @@ class ToolCollision {
   std::vector<ContactPair> pairs_, last_pairs_;
   float band_ = 0;  ///< Rows are made for what is so near to touch [m].
   std::array<Vec3f, kMaxTools> force_{Vec3f::Zero(), Vec3f::Zero()};
-  std::vector<std::pair<std::uint64_t, Index>> row_order_;  ///< Scratch.
+  std::vector<std::pair<std::uint64_t, Index>> row_order_;  ///< Scratch, of pairs too.
 };
 
 }  // namespace fulcrum::physics

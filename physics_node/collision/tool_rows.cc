@@ -147,7 +147,8 @@ void ToolCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) {
     }
     const std::array<Vec3f, 3> x{particles_->At(pair.at[0]), particles_->At(pair.at[1]), particles_->At(pair.at[2])};
     const float reach = m.to.radius + scene_.physics.collision_margin_m;
-    if (IsFar(x, m.At(0.5f * (u0 + u1)), reach + std::max(band_, Probed(m.to)) + 0.5f * m.travel * (u1 - u0))) {
+    if (IsFar(x, m.At(0.5f * (u0 + u1)),
+              reach + (u1 < 1.0f ? band_ : std::max(band_, Probed(m.to))) + 0.5f * m.travel * (u1 - u0))) {
       pair.closest.distance_sq = kFarSq;
       pair.closest.crosses = false;
       continue;
