@@ -8,9 +8,15 @@
 namespace fulcrum::physics {
 namespace {
 
-class DeepTools : public testing::Test {
+class DeepTools : public testing::TestWithParam<PhysicsMode> {
  protected:
-  scene::SceneData data_ = scene::BuildProcedural(scene::Small());
+  static scene::SceneData Scene() {
+    scene::SceneData data = scene::BuildProcedural(scene::Small());
+    data.fixed.physics.mode = GetParam();
+    return data;
+  }
+
+  scene::SceneData data_ = Scene();
   SceneView scene_ = data_.View();
   TissueSimulation simulation_{scene_};
   std::array<ToolInput, kMaxTools> tools_;
@@ -86,7 +92,7 @@ class DeepTools : public testing::Test {
   }
 };
 
-TEST_F(DeepTools, SteepJawsPushedIntoTheOrgan) {
+TEST_P(DeepTools, SteepJawsPushedIntoTheOrgan) {
   for (const float jaw : {0.9f, 0.3f, 0.0f}) {
     for (const float about_z : {0.0f, 1.1f}) {
       Drive(0, Upright(middle_ + Vec3f(0, 0, 0.015f), jaw, about_z), 1);
@@ -101,7 +107,7 @@ TEST_F(DeepTools, SteepJawsPushedIntoTheOrgan) {
   }
 }
 
-TEST_F(DeepTools, ThroughTheOrganAtOneMetrePerSecond) {
+TEST_P(DeepTools, ThroughTheOrganAtOneMetrePerSecond) {
   for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
     Drive(tool, Upright(middle_ + Vec3f(0.001f, 0.002f, 0.025f), 0.0f), 1);
     Drive(tool, Upright(middle_ + Vec3f(0.001f, 0.002f, -0.025f), 0.0f), 5);
@@ -114,7 +120,7 @@ TEST_F(DeepTools, ThroughTheOrganAtOneMetrePerSecond) {
   }
 }
 
-TEST_F(DeepTools, AcrossEachOther) {
+TEST_P(DeepTools, AcrossEachOther) {
   const auto left = [&](float x) { return Upright(middle_ + Vec3f(x, 0, -0.003f), 0.3f); };
   const auto right = [&](float x) { return Upright(middle_ + Vec3f(x, 0.001f, -0.004f), 0.0f, 0.5f); };
   tools_[0] = {true, left(-0.012f)};
@@ -135,6 +141,11 @@ TEST_F(DeepTools, AcrossEachOther) {
   Drive(1, Upright(middle_ + Vec3f(0.012f, 0, 0.03f), 0.0f), 30);
   ExpectRecovery();
 }
+
+INSTANTIATE_TEST_SUITE_P(Modes, DeepTools, testing::Values(PhysicsMode::kPaper, PhysicsMode::kAccurate),
+                         [](const auto& mode) {
+                           return mode.param == PhysicsMode::kPaper ? std::string("paper") : std::string("accurate");
+                         });
 
 }  // namespace
 }  // namespace fulcrum::physics
