@@ -355,6 +355,12 @@ inline void MiddleBlocks(const Sheet& sheet, const Middle& middle, const SheetMa
         block[i] = block[i] + own;
       }
       StoreInverseBlock(block, middle.block, to);
+      // A hat on a node that does not move has only part of its edges, and the samples are not of that part.
+      const int last = 4 * s < sheet.slots ? 4 * s : sheet.slots - 1;
+      const F8 moves = F8::Load(sheet.w + RowStart(sheet, centre) + 8 * static_cast<std::size_t>(last)) > zero;
+      for (float* plane : middle.block) {
+        (F8::Load(plane + to) & moves).Store(plane + to);
+      }
     }
   }
 }
