@@ -15,6 +15,8 @@ constexpr float kLargestCorrection = 0.003f;
 constexpr int kHalvings = 4;
 /// Nothing moves faster: ten times a quick hand [m/s].
 constexpr float kLargestSpeed = 5.0f;
+/// No place is so far from the origin [m].
+constexpr float kFarthest = 10.0f;
 /// Rows of the membrane that the coarse matrix takes over per step: complete about once in 60 steps.
 constexpr int kRefreshRows = 5;
 
@@ -261,33 +263,43 @@ void AccurateSolver::ForChunks(const Body& body) const {
   }
 }
 
-void AccurateSolver::BeginStep() {
+std::uint32_t AccurateSolver::BeginStep() {
+  const std::uint32_t resets = particles_->RepairPlaces(kFarthest);
   particles_->RememberPlaces();
   organ_blocks_due_ = true;
   refresh_due_ = true;
+  return resets;
 }
 
-/// Free particles go on with their velocity. Returns the largest step [m].
-float AccurateSolver::Guess(float h) {
+/// Free particles go on with their velocity; what has no sound velocity stays.
+GuessCount AccurateSolver::Guess(float h) {
   const Sheet sheet = MakeSheet();
   const SheetLinearise at = At(place_, nullptr);
   float* const place[3] = {place_.data() + tube_floats_, place_.data() + tube_floats_ + plane_,
                            place_.data() + tube_floats_ + 2 * plane_};
-  float largest = 0;
+  GuessCount count{};
   ForChunks([&](int, int row0, int row1) {
-    largest = std::max(largest, kernels_.sheet_guess(sheet, h, at.start, at.velocity, place, row0, row1));
+    const GuessCount rows = kernels_.sheet_guess(sheet, h, at.start, at.velocity, place, row0, row1);
+    count.largest_sq = std::max(count.largest_sq, rows.largest_sq);
+    count.resets += rows.resets;
   });
   const float* x = particles_->tube();
   for (std::size_t i = 0; i < 4 * std::size_t{tube_count_}; i += 4) {
-    float moved = 0;
+    const Vec3f step = h * Vec3f(velocity_[i], velocity_[i + 1], velocity_[i + 2]);
+    const bool moves = x[i + 3] > 0.0f, sound = step.squaredNorm() < 1e30f;
+    count.resets += moves && !sound ? 1 : 0;
+    count.largest_sq = moves && sound ? std::max(count.largest_sq, step.squaredNorm()) : count.largest_sq;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float step = x[i + 3] > 0.0f ? h * velocity_[i + axis] : 0.0f;
-      place_[i + axis] = x[i + axis] + step;
-      moved += step * step;
+      place_[i + axis] = x[i + axis] + (moves && sound ? step[static_cast<Eigen::Index>(axis)] : 0.0f);
     }
-    largest = std::max(largest, moved);
   }
-  return std::sqrt(largest);
+  return count;
+}
+
+void AccurateSolver::ForgetDamagedVelocities() {
+  for (std::size_t i = 0; i < velocity_.size(); ++i) {
+    velocity_[i] = std::isfinite(velocity_[i]) ? velocity_[i] : 0.0f;
+  }
 }
 
 void AccurateSolver::PutHeld(std::span<const HeldPlace> held) {
@@ -536,10 +548,13 @@ SubstepReport AccurateSolver::Finish(float h) {
 SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const HeldPlace> held,
                                       std::span<ContactRow> contacts) {
   const Inertia inertia = MakeInertia(h);
-  const float guessed = Guess(h);
+  const GuessCount guess = Guess(h);
+  if (guess.resets > 0) {
+    ForgetDamagedVelocities();
+  }
   PutHeld(held);
   bool searched = false;
-  if (guessed > kDoubtfulGuess) {
+  if (guess.largest_sq > kDoubtfulGuess * kDoubtfulGuess) {
     const double moving = EnergyAt(place_, inertia, contacts);
     (void)Guess(0.0f);
     PutHeld(held);
@@ -581,6 +596,7 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
   SubstepReport report = Finish(h);
   report.largest_correction_m = largest;
   report.searched = searched;
+  report.resets += guess.resets;
   return report;
 }
 

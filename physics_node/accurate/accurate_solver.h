@@ -45,8 +45,9 @@ class AccurateSolver {
   /// Takes over what cutting and shrinking have done to `tissue`. In place; nothing is factored again.
   void Follow(const TissueModel& tissue);
 
-  /// Once a step, before its substeps of `h` seconds: the blocks of the organ, a part of the coarse matrix.
-  void BeginStep();
+  /// Once a step, before its substeps: remembers the places. A place damaged since the last step (not finite, far off)
+  /// comes from the last step; returns how many coordinates.
+  std::uint32_t BeginStep();
   SubstepReport Substep(float h, int iterations, std::span<const HeldPlace> held, std::span<ContactRow> contacts);
 
   /// Elastic force on a particle at the end of the last substep [N]; of a held one, what the tissue pulls at it with.
@@ -66,7 +67,8 @@ class AccurateSolver {
   [[nodiscard]] Inertia MakeInertia(float h) const;
   void PackSheet(const ElasticModel& model);
   void PackOrgan(const ElasticModel& model, std::uint32_t tube_count);
-  float Guess(float h);
+  GuessCount Guess(float h);
+  void ForgetDamagedVelocities();
   void PutHeld(std::span<const HeldPlace> held);
   [[nodiscard]] double EnergyAt(const FloatArray& place, const Inertia& inertia, std::span<const ContactRow> contacts);
   void Linearise(const Inertia& inertia, std::span<const ContactRow> contacts);

@@ -90,6 +90,10 @@ struct OrganMatrix {
   float* block;   ///< Inverse of the diagonal blocks, three columns xyz_; 0 where a vertex does not move.
 };
 
+struct GuessCount {
+  float largest_sq;      ///< |h velocity|^2 [m^2].
+  std::uint32_t resets;  ///< Velocities that were not finite.
+};
 struct FinishCount {
   float largest_speed_sq;  ///< Of nodes that move [m^2/s^2].
   std::uint32_t resets;
@@ -98,9 +102,9 @@ struct FinishCount {
 struct Kernels {
   const char* name;
 
-  /// place <- start + h * velocity for nodes that move, start for the others; returns the largest |h velocity|^2.
-  float (*sheet_guess)(const Sheet& sheet, float h, const float* const start[3], const float* const velocity[3],
-                       float* const place[3], int row0, int row1);
+  /// place <- start + h * velocity for nodes that move and have a sound velocity, start for the others.
+  GuessCount (*sheet_guess)(const Sheet& sheet, float h, const float* const start[3], const float* const velocity[3],
+                            float* const place[3], int row0, int row1);
   void (*sheet_linearise)(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at,
                           const SheetMatrix& matrix, float* carry, int row0, int row1);
   /// out <- K p + mass * inertia * p. Returns p . out.

@@ -99,18 +99,21 @@ inline float LargestOf(F8 v) {
   return largest;
 }
 
-inline float SheetGuess(const Sheet& sheet, float h, const float* const start[3], const float* const velocity[3],
-                        float* const place[3], int row0, int row1) {
+inline accurate::GuessCount SheetGuess(const Sheet& sheet, float h, const float* const start[3],
+                                       const float* const velocity[3], float* const place[3], int row0, int row1) {
   F8 largest = F8::All(0);
-  const F8 zero = F8::All(0), step = F8::All(h);
+  const F8 zero = F8::All(0), step = F8::All(h), sound = F8::All(1e30f);
+  std::uint32_t resets = 0;
   for (std::size_t at = RowStart(sheet, row0), end = RowStart(sheet, row1); at < end; at += 8) {
     const F8 moves = F8::Load(sheet.w + at) > zero;
     V8 d = LoadV(velocity, at) * step;
-    d = {d.x & moves, d.y & moves, d.z & moves};
+    const F8 finite = Dot(d, d) < sound, keep = moves & finite;
+    resets += static_cast<std::uint32_t>(__builtin_popcount(Bits(moves) & ~Bits(finite) & 0xffu));
+    d = {d.x & keep, d.y & keep, d.z & keep};
     largest = Max(largest, Dot(d, d));
     StoreV(LoadV(start, at) + d, place, at);
   }
-  return LargestOf(largest);
+  return {LargestOf(largest), resets};
 }
 
 /// Stiffness of an edge: transverse part kt >= 0 and m m^T along it.

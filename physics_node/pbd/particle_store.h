@@ -124,6 +124,19 @@ class ParticleStore {
   void CopyPrevious(std::span<float> xyz) const { Copy(previous_.data(), xyz); }
   /// previous <- now.
   void RememberPlaces() { std::copy_n(now_.data(), now_.size(), previous_.data()); }
+  /// Coordinates that are not finite or farther than `limit` from 0 come from the previous ones; returns how many.
+  std::uint32_t RepairPlaces(float limit) {
+    std::uint32_t repaired = 0;
+    const std::size_t count = tube_floats_ + 3 * std::size_t{layout_.plane()};  // All but the masses of the membrane.
+    for (std::size_t i = 0; i < count; ++i) {
+      const bool mass = i < tube_floats_ && i % 4 == 3;
+      if (!mass && !(std::abs(now_[i]) < limit)) {
+        now_[i] = previous_[i];
+        ++repaired;
+      }
+    }
+    return repaired;
+  }
   void SetAll(std::span<const float> xyz, std::span<const float> previous_xyz) {
     for (Index p = 0; p < particle_count_; ++p) {
       const ParticleRef at = Ref(p);

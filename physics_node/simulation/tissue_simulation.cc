@@ -191,7 +191,7 @@ StepReport TissueSimulation::StepAccurate() {
   const auto substeps = static_cast<float>(effort_.substeps);
   const float h = scene_.physics.dt_s / substeps;
   tissue_collision_.MeasureMoves(&moved_);
-  accurate_->BeginStep();
+  report.resets = accurate_->BeginStep();
   FindAllContacts(h);
   for (int i = 0; i < effort_.substeps; ++i) {
     const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
