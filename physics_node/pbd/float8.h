@@ -125,15 +125,13 @@ inline F8 Gather(const float* pool, const std::uint32_t* index, const std::uint3
 #endif
 }
 
-/// Row i of the result holds the four floats at rows + scale * index[i] and at rows + scale * index[i + 4].
-template <std::size_t scale>
+/// Row i of the result holds the four floats at rows + index[i] and at rows + index[i + 4].
 inline F8 LoadRow(const float* rows, const std::uint32_t* index, int i) {
-  return F8::Halves(_mm_load_ps(rows + scale * index[i]), _mm_load_ps(rows + scale * index[i + 4]));
+  return F8::Halves(_mm_load_ps(rows + index[i]), _mm_load_ps(rows + index[i + 4]));
 }
-template <std::size_t scale>
 inline void StoreRow(F8 row, float* rows, const std::uint32_t* index, int i) {
-  _mm_store_ps(rows + scale * index[i], row.lo());
-  _mm_store_ps(rows + scale * index[i + 4], row.hi());
+  _mm_store_ps(rows + index[i], row.lo());
+  _mm_store_ps(rows + index[i + 4], row.hi());
 }
 
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

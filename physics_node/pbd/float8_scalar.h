@@ -132,20 +132,18 @@ inline F8 Gather(const float* pool, const std::uint32_t* index, const std::uint3
   }
   return r;
 }
-template <std::size_t scale>
 inline F8 LoadRow(const float* rows, const std::uint32_t* index, int i) {
   F8 r;
   for (int j = 0; j < 4; ++j) {
-    r.lane[j] = rows[scale * index[i] + static_cast<std::size_t>(j)];
-    r.lane[4 + j] = rows[scale * index[i + 4] + static_cast<std::size_t>(j)];
+    r.lane[j] = rows[index[i] + static_cast<std::size_t>(j)];
+    r.lane[4 + j] = rows[index[i + 4] + static_cast<std::size_t>(j)];
   }
   return r;
 }
-template <std::size_t scale>
 inline void StoreRow(F8 row, float* rows, const std::uint32_t* index, int i) {
   for (int j = 0; j < 4; ++j) {
-    rows[scale * index[i] + static_cast<std::size_t>(j)] = row.lane[j];
-    rows[scale * index[i + 4] + static_cast<std::size_t>(j)] = row.lane[4 + j];
+    rows[index[i] + static_cast<std::size_t>(j)] = row.lane[j];
+    rows[index[i + 4] + static_cast<std::size_t>(j)] = row.lane[4 + j];
   }
 }
 

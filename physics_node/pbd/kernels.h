@@ -16,22 +16,24 @@ inline constexpr int kLanes = 8;
 /// Batches 2 i and 2 i + 1 are of one colour: each colour is filled up to a multiple of so many batches.
 inline constexpr std::size_t kBatchesAtOnce = 2;
 
-/// Eight springs of one colour. Vertices are indices of xyzw particles. rest 0 switches a lane off.
+/// Eight springs of one colour. Vertices are offsets of xyzw particles in floats: 4 * index. rest 0 switches a lane
+/// off.
 struct alignas(32) SpringBatch {
   std::uint32_t a[kLanes];
   std::uint32_t b[kLanes];
   float rest[kLanes];  ///< [m]
 };
 
-/// Eight tetrahedra of one colour.
+/// Eight tetrahedra of one colour. Vertices as in SpringBatch.
 struct alignas(32) TetBatch {
   std::uint32_t v[4][kLanes];
   float rest_volume[kLanes];  ///< Six times it [m^3].
   float floor[kLanes];        ///< Least sum of w |6 gradient|^2 to divide by, a small part of its value at rest.
 };
 
-/// Eight dihedral angles of one colour. Vertices are indices into the hinge particles, a copy in xyzw of the few
-/// particles that hinges use: gathered from the membrane's planes, each would cost four cache lines in each hinge.
+/// Eight dihedral angles of one colour. Vertices are offsets, 4 * index, into the hinge particles, a copy in xyzw of
+/// the few particles that hinges use: gathered from the membrane's planes, each would cost four cache lines in each
+/// hinge.
 struct alignas(32) BendingBatch {
   std::uint32_t v[4][kLanes];
   float rest_angle[kLanes];  ///< [rad]

@@ -38,12 +38,12 @@ void GridStretch(const GridArrays& g, float stiffness) {
 template <class F>
 FULCRUM_INLINE void ProjectSprings(float* particles, const SpringBatch& batch, float stiffness) {
   constexpr std::size_t kStep = kNext<SpringBatch>;
-  const Particles<F> a = GatherXyzw<F, 4>(particles, batch.a, kStep);
-  const Particles<F> b = GatherXyzw<F, 4>(particles, batch.b, kStep);
+  const Particles<F> a = GatherXyzw<F>(particles, batch.a, kStep);
+  const Particles<F> b = GatherXyzw<F>(particles, batch.b, kStep);
   Pair<F> s{a.p, b.p, a.w, b.w};
   s.Move(StretchImpulse(s, s.q - s.p, Batches<F>::Load(batch.rest, kStep), F::All(stiffness)));
-  ScatterXyzw<F, 4>({s.p, s.w_p}, particles, batch.a, kStep);
-  ScatterXyzw<F, 4>({s.q, s.w_q}, particles, batch.b, kStep);
+  ScatterXyzw<F>({s.p, s.w_p}, particles, batch.a, kStep);
+  ScatterXyzw<F>({s.q, s.w_q}, particles, batch.b, kStep);
 }
 
 template <class F>
@@ -51,7 +51,7 @@ FULCRUM_INLINE void ProjectVolumes(float* particles, const TetBatch& batch, floa
   constexpr std::size_t kStep = kNext<TetBatch>;
   Particles<F> q[4];
   for (int j = 0; j < 4; ++j) {
-    q[j] = GatherXyzw<F, 4>(particles, batch.v[j], kStep);
+    q[j] = GatherXyzw<F>(particles, batch.v[j], kStep);
   }
   // Six times the volume and its gradients; the first vertex's is minus the sum of the others'.
   const V<F> b = q[1].p - q[0].p, c = q[2].p - q[0].p, d = q[3].p - q[0].p;
@@ -65,7 +65,7 @@ FULCRUM_INLINE void ProjectVolumes(float* particles, const TetBatch& batch, floa
   q[2].p = q[2].p + gc * (lambda * q[2].w);
   q[3].p = q[3].p + gd * (lambda * q[3].w);
   for (int j = 0; j < 4; ++j) {
-    ScatterXyzw<F, 4>(q[j], particles, batch.v[j], kStep);
+    ScatterXyzw<F>(q[j], particles, batch.v[j], kStep);
   }
 }
 
@@ -75,17 +75,17 @@ FULCRUM_INLINE void ProjectBending(float* particles, const BendingBatch& batch, 
   const F pi = F::All(3.14159265f), two_pi = F::All(6.28318531f), zero = F::All(0.0f);
   Particles<F> q[4];
   for (int j = 0; j < 4; ++j) {
-    q[j] = GatherXyzw<F, 4>(particles, batch.v[j], kStep);
+    q[j] = GatherXyzw<F>(particles, batch.v[j], kStep);
   }
   const F floor = Batches<F>::Load(batch.floor, kStep);
   const V<F> e = q[1].p - q[0].p;
   const F length = Max(Sqrt(Dot(e, e)), Tiny<F>());
   const V<F> n1 = Cross(q[0].p - q[2].p, q[1].p - q[2].p);
   const V<F> n2 = Cross(q[1].p - q[3].p, q[0].p - q[3].p);
-  const F angle = Atan2(Dot(Cross(n1, n2), e) / length, Dot(n1, n2));
+  const V<F> hinge = e * (F::All(1.0f) / length);
+  const F angle = Atan2(Dot(Cross(n1, n2), hinge), Dot(n1, n2));
   const V<F> m1 = n1 * (F::All(1.0f) / Max(Dot(n1, n1), floor));
   const V<F> m2 = n2 * (F::All(1.0f) / Max(Dot(n2, n2), floor));
-  const V<F> hinge = e * (F::All(1.0f) / length);
   const V<F> g2 = m1 * (zero - length);
   const V<F> g3 = m2 * (zero - length);
   const V<F> g0 = m1 * Dot(q[1].p - q[2].p, hinge) + m2 * Dot(q[1].p - q[3].p, hinge);
@@ -101,7 +101,7 @@ FULCRUM_INLINE void ProjectBending(float* particles, const BendingBatch& batch, 
   const V<F> g[4] = {g0, g1, g2, g3};
   for (int j = 0; j < 4; ++j) {
     q[j].p = q[j].p + g[j] * (lambda * q[j].w);
-    ScatterXyzw<F, 4>(q[j], particles, batch.v[j], kStep);
+    ScatterXyzw<F>(q[j], particles, batch.v[j], kStep);
   }
 }
 
@@ -113,7 +113,7 @@ FULCRUM_INLINE void ProjectBindings(float* pool, const BindingBatch& batch, cons
   Particles<F> q[3];
   F b[3];
   for (int j = 0; j < 3; ++j) {
-    q[j] = GatherXyzw<F, 1>(pool, batch.base[j + 1], kStep);
+    q[j] = GatherXyzw<F>(pool, batch.base[j + 1], kStep);
     b[j] = Batches<F>::Load(batch.barycentric[j], kStep);
   }
   const V<F> d = node.p - (q[0].p * b[0] + q[1].p * b[1] + q[2].p * b[2]);
@@ -126,12 +126,15 @@ FULCRUM_INLINE void ProjectBindings(float* pool, const BindingBatch& batch, cons
       Max(F::All(stiffness.compression) * (rest_height - height), F::All(stiffness.floor) * rest_height - height);
   const F sum = node.w + q[0].w * b[0] * b[0] + q[1].w * b[1] * b[1] + q[2].w * b[2] * b[2];
   const F w_max = Max(Max(node.w, q[0].w), Max(q[1].w, q[2].w));
-  const F scale = Batches<F>::Load(batch.active, kStep) / Max(Max(sum, LeastSum(w_max, F::All(1.0f))), Tiny<F>());
-  const V<F> move = d * (scale * drawn / Max(length, Tiny<F>())) + n * (scale * Max(pressed, zero));
+  // 1 over the length and over the sum in one division.
+  const F some_length = Max(length, Tiny<F>());
+  const F inverse = Batches<F>::Load(batch.active, kStep) /
+                    (some_length * Max(Max(sum, LeastSum(w_max, F::All(1.0f))), F::All(1e-6f)));
+  const V<F> move = d * (inverse * drawn) + n * (inverse * some_length * Max(pressed, zero));
   ScatterPool<F>(node.p + move * node.w, pool, batch.base[0], batch.step[0], kStep);
   for (int j = 0; j < 3; ++j) {
     q[j].p = q[j].p - move * (q[j].w * b[j]);
-    ScatterXyzw<F, 1>(q[j], pool, batch.base[j + 1], kStep);
+    ScatterXyzw<F>(q[j], pool, batch.base[j + 1], kStep);
   }
 }
 

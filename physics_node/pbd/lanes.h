@@ -27,13 +27,11 @@ struct Batches<F8> {
                    std::size_t) {
     return FULCRUM_KERNEL_NAMESPACE::Gather(pool, index, step, plane);
   }
-  template <std::size_t scale>
   static F8 LoadRow(const float* rows, const std::uint32_t* index, int i, std::size_t) {
-    return FULCRUM_KERNEL_NAMESPACE::LoadRow<scale>(rows, index, i);
+    return FULCRUM_KERNEL_NAMESPACE::LoadRow(rows, index, i);
   }
-  template <std::size_t scale>
   static void StoreRow(F8 row, float* rows, const std::uint32_t* index, int i, std::size_t) {
-    FULCRUM_KERNEL_NAMESPACE::StoreRow<scale>(row, rows, index, i);
+    FULCRUM_KERNEL_NAMESPACE::StoreRow(row, rows, index, i);
   }
 };
 
@@ -51,18 +49,16 @@ struct Batches<F16> {
                        FULCRUM_KERNEL_NAMESPACE::Gather(pool, index + next, step + next, plane));
   }
   /// Straight between memory and quarters: no shuffle is spent.
-  template <std::size_t scale>
   static F16 LoadRow(const float* rows, const std::uint32_t* index, int i, std::size_t next) {
-    const auto quarter = [&](std::size_t at) { return _mm_load_ps(rows + scale * index[at]); };
+    const auto quarter = [&](std::size_t at) { return _mm_load_ps(rows + index[at]); };
     const auto first = static_cast<std::size_t>(i);
     __m512 row = _mm512_castps128_ps512(quarter(first));
     row = _mm512_mask_broadcast_f32x4(row, 0x00f0, quarter(first + 4));
     row = _mm512_mask_broadcast_f32x4(row, 0x0f00, quarter(first + next));
     return {_mm512_mask_broadcast_f32x4(row, 0xf000, quarter(first + next + 4))};
   }
-  template <std::size_t scale>
   static void StoreRow(F16 row, float* rows, const std::uint32_t* index, int i, std::size_t next) {
-    const auto place = [&](std::size_t at) { return rows + scale * index[at]; };
+    const auto place = [&](std::size_t at) { return rows + index[at]; };
     const auto first = static_cast<std::size_t>(i);
     _mm_store_ps(place(first), _mm512_castps512_ps128(row.v));
     _mm_store_ps(place(first + 4), _mm512_extractf32x4_ps(row.v, 1));
@@ -107,22 +103,22 @@ struct Particles {
   V<F> p;
   F w;
 };
-/// Of xyzw particles; the one of lane i stands at rows + scale * index[i].
-template <class F, std::size_t scale>
+/// Of xyzw particles; the one of lane i stands at rows + index[i].
+template <class F>
 inline Particles<F> GatherXyzw(const float* rows, const std::uint32_t* index, std::size_t next) {
-  F x = Batches<F>::template LoadRow<scale>(rows, index, 0, next);
-  F y = Batches<F>::template LoadRow<scale>(rows, index, 1, next);
-  F z = Batches<F>::template LoadRow<scale>(rows, index, 2, next);
-  F w = Batches<F>::template LoadRow<scale>(rows, index, 3, next);
+  F x = Batches<F>::LoadRow(rows, index, 0, next);
+  F y = Batches<F>::LoadRow(rows, index, 1, next);
+  F z = Batches<F>::LoadRow(rows, index, 2, next);
+  F w = Batches<F>::LoadRow(rows, index, 3, next);
   Transpose(&x, &y, &z, &w);
   return {{x, y, z}, w};
 }
-template <class F, std::size_t scale>
+template <class F>
 inline void ScatterXyzw(const Particles<F>& q, float* rows, const std::uint32_t* index, std::size_t next) {
   F r[4] = {q.p.x, q.p.y, q.p.z, q.w};
   Transpose(&r[0], &r[1], &r[2], &r[3]);
   for (int i = 0; i < 4; ++i) {
-    Batches<F>::template StoreRow<scale>(r[i], rows, index, i, next);
+    Batches<F>::StoreRow(r[i], rows, index, i, next);
   }
 }
 
@@ -153,24 +149,19 @@ inline void ScatterPool(const V<F>& p, float* pool, const std::uint32_t* base, c
   }
 }
 
-/// atan of t in [0, 1], |error| < 3e-7 rad: reduced to |u| <= tan(pi/8) by (t - 1)/(t + 1), then an odd polynomial.
-template <class F>
-inline F AtanUnit(F t) {
-  const F one = F::All(1.0f);
-  const auto big = t > F::All(0.41421356f);
-  const F u = Select(big, (t - one) / (t + one), t);
-  const F s = u * u;
-  const F poly =
-      ((F::All(0.0805374449f) * s - F::All(0.138776856f)) * s + F::All(0.199777106f)) * s - F::All(0.333329491f);
-  return Select(big, F::All(0.78539816f), F::All(0.0f)) + (u + u * s * poly);
-}
-/// Angle of (cosine, sine) scaled by any positive factor, in (-pi, pi].
+/// Angle of (cosine, sine) scaled by any positive factor, in (-pi, pi]; |error| < 3e-7 rad. The smaller over the larger
+/// is t in [0, 1]; above tan(pi/8) it is reduced by (t - 1)/(t + 1); then an odd polynomial. One division in all.
 template <class F>
 inline F Atan2(F sine, F cosine) {
   const F as = Abs(sine), ac = Abs(cosine);
   const auto steep = as > ac;
-  const F ratio = Min(as, ac) / Max(Max(as, ac), F::All(1e-37f));
-  F a = AtanUnit(ratio);
+  const F small = Min(as, ac), large = Max(Max(as, ac), F::All(1e-37f));
+  const auto big = small > F::All(0.41421356f) * large;
+  const F u = Select(big, small - large, small) / Select(big, small + large, large);
+  const F s = u * u;
+  const F poly =
+      ((F::All(0.0805374449f) * s - F::All(0.138776856f)) * s + F::All(0.199777106f)) * s - F::All(0.333329491f);
+  F a = Select(big, F::All(0.78539816f), F::All(0.0f)) + (u + u * s * poly);
   a = Select(steep, F::All(1.57079633f) - a, a);
   a = Select(cosine < F::All(0.0f), F::All(3.14159265f) - a, a);
   return a ^ SignOf(sine);

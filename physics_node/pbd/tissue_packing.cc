@@ -89,7 +89,7 @@ void Compress(std::vector<std::pair<Index, Index>> pairs, std::size_t nodes, std
 }  // namespace
 
 void TissueModel::PackTube(const SceneView& scene, const ParticleStore& particles) {
-  const Index padding = particles.padding_vertex();
+  const Index padding = 4 * particles.padding_vertex();
   ColourCheck check(scene.tube_vertex_count);
   SpringBatch no_springs{};
   std::fill_n(no_springs.a, kLanes, padding);
@@ -104,8 +104,8 @@ void TissueModel::PackTube(const SceneView& scene, const ParticleStore& particle
         Refuse(scene, "tube edges: two of one colour share a vertex, or a vertex is not the tube's");
       }
       SpringBatch& batch = springs_[at];
-      batch.a[lane] = edge.a;
-      batch.b[lane] = edge.b;
+      batch.a[lane] = 4 * edge.a;
+      batch.b[lane] = 4 * edge.b;
       batch.rest[lane] = edge.rest_length;
       ++counts_.stretch;
     }
@@ -128,7 +128,7 @@ void TissueModel::PackTube(const SceneView& scene, const ParticleStore& particle
         if (!check.Add(v)) {
           Refuse(scene, "tetrahedra: two of one colour share a vertex, or a vertex is not the tube's");
         }
-        batch.v[j][lane] = v;
+        batch.v[j][lane] = 4 * v;
         x[j] = scene.rest_position[v].cast<double>();
       }
       const auto rest = Volume<double>(x, 0.0);
@@ -168,7 +168,7 @@ void TissueModel::PackBending(const SceneView& scene, const ParticleStore& parti
   hinge_slot_.assign(scene.bending.size(), 0);
   BendingBatch no_hinges{};
   for (auto& v : no_hinges.v) {
-    std::fill_n(v, kLanes, static_cast<Index>(hinge_particles_.size()));
+    std::fill_n(v, kLanes, static_cast<Index>(4 * hinge_particles_.size()));
   }
   std::fill_n(no_hinges.floor, kLanes, 1.0f);
   hinge_particles_.push_back({4 * particles.padding_vertex(), 1});
@@ -189,7 +189,7 @@ void TissueModel::PackBending(const SceneView& scene, const ParticleStore& parti
         if (!check.Add(p)) {
           Refuse(scene, "bending: two of one colour share a particle, or a particle does not exist");
         }
-        batch.v[j][lane] = place[p];
+        batch.v[j][lane] = 4 * place[p];
         on_membrane = on_membrane && p >= scene.membrane.first;
         if (on_membrane) {
           const Index row = (p - scene.membrane.first) / cols(), col = (p - scene.membrane.first) % cols();

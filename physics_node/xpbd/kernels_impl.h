@@ -65,7 +65,7 @@ FULCRUM_INLINE void ProjectTets(float* particles, const TetBatch& batch, const x
   const F one = F::All(1.0f);
   Particles<F> q[4];
   for (int j = 0; j < 4; ++j) {
-    q[j] = GatherXyzw<F, 4>(particles, batch.v[j], kStep);
+    q[j] = GatherXyzw<F>(particles, batch.v[j], kStep);
   }
   F m[9];
   for (int j = 0; j < 9; ++j) {
@@ -105,7 +105,7 @@ FULCRUM_INLINE void ProjectTets(float* particles, const TetBatch& batch, const x
   const F l = (s_h * s_d * dh - p * (one + a)) / det;
   for (int i = 0; i < 4; ++i) {
     q[i].p = q[i].p + (d[i] * u + h[i] * l) * q[i].w;
-    ScatterXyzw<F, 4>(q[i], particles, batch.v[i], kStep);
+    ScatterXyzw<F>(q[i], particles, batch.v[i], kStep);
   }
 }
 
@@ -119,7 +119,7 @@ FULCRUM_INLINE void ProjectHinges(float* particles, const BendingBatch& batch, c
             F::All(0.0f) - Batches<F>::Load(material.offset[1], kMaterial),
             F::All(0.0f) - Batches<F>::Load(material.offset[2], kMaterial)};
   for (int j = 0; j < 4; ++j) {
-    q[j] = GatherXyzw<F, 4>(particles, batch.v[j], kStep);
+    q[j] = GatherXyzw<F>(particles, batch.v[j], kStep);
     c[j] = Batches<F>::Load(material.c[j], kMaterial);
     bent = bent + q[j].p * c[j];
     sum = sum + q[j].w * (c[j] * c[j]);
@@ -128,7 +128,7 @@ FULCRUM_INLINE void ProjectHinges(float* particles, const BendingBatch& batch, c
   const V<F> move = bent * (s / (F::All(1.0f) + s * sum));
   for (int j = 0; j < 4; ++j) {
     q[j].p = q[j].p - move * (q[j].w * c[j]);
-    ScatterXyzw<F, 4>(q[j], particles, batch.v[j], kStep);
+    ScatterXyzw<F>(q[j], particles, batch.v[j], kStep);
   }
 }
 
@@ -140,7 +140,7 @@ FULCRUM_INLINE void ProjectFat(float* pool, const BindingBatch& batch, const xpb
   F b[3], sum = node.w;
   V<F> d = node.p;
   for (int j = 0; j < 3; ++j) {
-    q[j] = GatherXyzw<F, 1>(pool, batch.base[j + 1], kStep);
+    q[j] = GatherXyzw<F>(pool, batch.base[j + 1], kStep);
     b[j] = Batches<F>::Load(batch.barycentric[j], kStep);
     d = d - q[j].p * b[j];
     sum = sum + q[j].w * (b[j] * b[j]);
@@ -152,7 +152,7 @@ FULCRUM_INLINE void ProjectFat(float* pool, const BindingBatch& batch, const xpb
   ScatterPool<F>(node.p - move * node.w, pool, batch.base[0], batch.step[0], kStep);
   for (int j = 0; j < 3; ++j) {
     q[j].p = q[j].p + move * (q[j].w * b[j]);
-    ScatterXyzw<F, 1>(q[j], pool, batch.base[j + 1], kStep);
+    ScatterXyzw<F>(q[j], pool, batch.base[j + 1], kStep);
   }
 }
 

