@@ -98,7 +98,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   }
   carry_ = FloatArray(kCarry * std::size_t{particles->layout().stride} + 16);
   row_sums_ = FloatArray(static_cast<std::size_t>(rows_) * coarse_.row_width());
-  partial_.assign(static_cast<std::size_t>(rows_ / kChunkRows + 1), 0.0);
+  partial_.assign(static_cast<std::size_t>(rows_) / kChunkRows + 1, 0.0);
   Follow(tissue);
   // The first coarse matrix: all of it, at rest.
   const Effort effort = EffortOf(scene.physics.preset);

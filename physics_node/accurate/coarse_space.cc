@@ -98,8 +98,9 @@ void CoarseSpace::BuildMiddle() {
     for (int lane = 0; lane < kLanes; ++lane) {
       // Nothing follows the last lane's last group.
       const bool last = lane + 1 == kLanes && group + 1 == middle_slots_;
-      own_[static_cast<std::size_t>(s * kLanes + lane)] = last ? 1.0f : 1.0f - on;
-      next_[static_cast<std::size_t>(s * kLanes + lane)] = last ? 0.0f : on;
+      const auto at = static_cast<std::size_t>(s) * kLanes + static_cast<std::size_t>(lane);
+      own_[at] = last ? 1.0f : 1.0f - on;
+      next_[at] = last ? 0.0f : on;
     }
   }
   for (FloatArray& block : block_) {
@@ -227,7 +228,7 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
                              ? here.fraction + static_cast<float>(coarse_rows_ - 1) / static_cast<float>(rows_ - 1)
                              : here.fraction;
   const float next_column = columns_ > 1 ? static_cast<float>(columns_ - 1) / static_cast<float>(cols_ - 1) : 0.0f;
-  std::array<Eigen::Index, 4> node;
+  std::array<int, 4> node;
   std::array<std::array<std::array<float, 6>, 4>, 4> sum{};
   int cell = 0;
   const auto flush = [&] {
@@ -246,11 +247,10 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
   };
   const auto enter = [&](int new_cell) {
     cell = new_cell;
-    for (int i = 0; i < 2; ++i) {
-      for (int j = 0; j < 2; ++j) {
-        const bool exists = here.cell + i < coarse_rows_ && cell + j < columns_;
-        node[static_cast<std::size_t>(2 * i + j)] = exists ? (here.cell + i) * columns_ + cell + j : -1;
-      }
+    for (std::size_t corner = 0; corner < 4; ++corner) {
+      const int i = corner < 2 ? 0 : 1, j = static_cast<int>(corner % 2);
+      const bool exists = here.cell + i < coarse_rows_ && cell + j < columns_;
+      node[corner] = exists ? (here.cell + i) * columns_ + cell + j : -1;
     }
   };
   const auto shape = [](float row_fraction, float column_fraction) {
@@ -379,7 +379,8 @@ void CoarseSpace::ForEachMiddle(const Visit& visit) const {
     for (std::size_t i = 0; i < width_; ++i) {
       const RowPlace column = column_place_[column_of_[i]];
       const std::size_t at = 3 * r * width_ + i;
-      const auto first = static_cast<std::size_t>(row.cell * columns_ + column.cell);
+      const auto first = static_cast<std::size_t>(row.cell) * static_cast<std::size_t>(columns_) +
+                         static_cast<std::size_t>(column.cell);
       const bool next_row = row.cell + 1 < coarse_rows_, next_column = column.cell + 1 < columns_;
       visit(at, first, (1 - row.fraction) * (1 - column.fraction));
       if (next_column) {
