@@ -15,6 +15,8 @@ constexpr std::uint64_t kSlowTicks = 10;
 constexpr int kAbsentTicks = 100;
 /// A pedal that has not been heard of for so long is up: a dead handle bridge must not burn on [ns].
 constexpr std::int64_t kPedalTimeoutNs = 100'000'000;
+/// After so long in time a cheaper preset gives way to the next dearer one [ticks].
+constexpr int kRecoveryTicks = 200;
 /// Of a generator that the script says nothing about [W].
 constexpr float kDefaultPower = 35.0f;
 
@@ -110,7 +112,22 @@ void PhysicsNode::TakeInputs() {
   }
 }
 
+/// A skipped period means that the step before ran late: go on with a cheaper preset, for a while. In lock step no
+/// period is ever skipped, so replays do not depend on the machine.
+void PhysicsNode::MindTheTime(const Tick& tick) {
+  const bool late = ticks_ > 0 && tick.index > last_index_ + 1;
+  last_index_ = tick.index;
+  ticks_in_time_ = late ? 0 : ticks_in_time_ + 1;
+  const std::uint32_t cheaper = cheaper_.load(std::memory_order_relaxed);
+  if (late) {
+    cheaper_.store(simulation_.SetCheaper(cheaper + 1), std::memory_order_relaxed);
+  } else if (cheaper > 0 && ticks_in_time_ % kRecoveryTicks == 0) {
+    cheaper_.store(simulation_.SetCheaper(cheaper - 1), std::memory_order_relaxed);
+  }
+}
+
 void PhysicsNode::Step(const Tick& tick) {
+  MindTheTime(tick);
   TakeInputs();
   const StepReport report = simulation_.Step(inputs_);
   asleep_ticks_.fetch_add(report.asleep ? 1 : 0, std::memory_order_relaxed);
@@ -231,6 +248,10 @@ void PhysicsNode::FillHealth(Health* health) const {
   add("tissue_force1_N", force_N_[1].load(std::memory_order_relaxed));
   add("asleep_ticks", static_cast<double>(asleep_ticks_.load(std::memory_order_relaxed)));
   add("topology_edits", static_cast<double>(topology_edits_.load(std::memory_order_relaxed)));
+  if (const std::uint32_t cheaper = cheaper_.load(std::memory_order_relaxed); cheaper > 0) {
+    add("cheaper_presets", cheaper);
+    health->last_error = "steps ran late: a cheaper preset for the next seconds";
+  }
   if (const std::uint64_t refused = topology_refused_.load(std::memory_order_relaxed); refused > 0) {
     add("topology_refused", static_cast<double>(refused));
     health->last_error = "TopologyState of another scene refused";

@@ -45,6 +45,7 @@ class PhysicsNode {
 
  private:
   void TakeInputs();
+  void MindTheTime(const Tick& tick);
   void PublishFrame(const Tick& tick);
   void PublishContacts(const Tick& tick);
   void PublishCautery(const Tick& tick);
@@ -66,6 +67,8 @@ class PhysicsNode {
   std::array<ToolInput, kMaxTools> inputs_;
   std::array<int, kMaxTools> absent_ticks_{};
   std::uint64_t ticks_ = 0;
+  std::uint64_t last_index_ = 0;
+  int ticks_in_time_ = 0;  ///< Since the last skipped period.
   std::uint64_t frame_version_ = 0, hash_version_ = 0, saved_version_ = 0, measured_version_ = 0;
   std::uint64_t state_hash_ = 0;
   bool restored_ = false;
@@ -73,6 +76,7 @@ class PhysicsNode {
   TickManifest manifest_;
 
   // For the health thread. Relaxed: each figure stands for itself.
+  std::atomic<std::uint32_t> cheaper_{0};  ///< Presets below the scene's.
   std::atomic<float> displacement_mm_{0}, max_displacement_mm_{0}, force_N_[kMaxTools]{};
   std::atomic<std::uint32_t> grasped_{0};
   std::atomic<std::uint64_t> quarantined_{0}, asleep_ticks_{0}, topology_refused_{0}, topology_edits_{0};

@@ -244,6 +244,13 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
   return report;
 }
 
+std::uint32_t TissueSimulation::SetCheaper(std::uint32_t presets) {
+  const auto own = accurate_ ? static_cast<std::uint32_t>(scene_.physics.preset) : 0u;
+  const std::uint32_t cheaper = std::min(presets, own);
+  effort_ = accurate::EffortOf(static_cast<PhysicsPreset>(own - cheaper));
+  return cheaper;
+}
+
 int TissueSimulation::ApplyTopology(const TopologyState& topology) {
   const int edits = model_.Apply(topology, &particles_);
   if (edits > 0) {

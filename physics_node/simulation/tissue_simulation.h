@@ -51,6 +51,9 @@ class TissueSimulation {
   /// Cut and shrunk edges; see TissueModel::Apply. Wakes the tissue when something changed.
   int ApplyTopology(const TopologyState& topology);
 
+  /// Goes on with the preset that many below the scene's (mode accurate; at most down to fast); returns how many it is.
+  std::uint32_t SetCheaper(std::uint32_t presets);
+
   /// After a Step: what a tool feels, and where a hook touches.
   [[nodiscard]] DeviceContacts Contacts(std::uint32_t tool);
   [[nodiscard]] CauteryContact Cautery(std::uint32_t tool);

@@ -118,6 +118,22 @@ TEST_F(PhysicsNodeTest, WithoutReadersNothingIsSent) {
   EXPECT_EQ(bench.manifest_out_->stats().written, 0u);
 }
 
+TEST_F(PhysicsNodeTest, LateStepsMakeItCheaperForAWhile) {
+  Bench bench(scene_, nullptr);
+  bench.Play(0, 0.1);
+  EXPECT_EQ(bench.Figure("cheaper_presets"), -1);
+  bench.tick_.index += 3;
+  bench.Step();
+  EXPECT_EQ(bench.Figure("cheaper_presets"), 1) << "default -> fast";
+  bench.tick_.index += 3;
+  bench.Step();
+  EXPECT_EQ(bench.Figure("cheaper_presets"), 1) << "There is nothing below fast.";
+  for (int i = 0; i < 201; ++i) {
+    bench.Step();
+  }
+  EXPECT_EQ(bench.Figure("cheaper_presets"), -1);
+}
+
 TEST_F(PhysicsNodeTest, TellsEachReaderWhatItNeeds) {
   Bench bench(scene_, nullptr);
   auto frames = bench.bus_.frames.MakeInput();
