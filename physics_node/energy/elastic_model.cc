@@ -8,6 +8,12 @@ namespace {
 
 /// Shear modulus of the sheet over Young's: between that of an incompressible sheet (1/3) and of a woven one.
 constexpr double kShearPart = 0.25;
+/// A cell's area over its diagonal squared is 1/2 for a square. Cells that are thinner than this would get a diagonal
+/// that is stiff beyond measure along itself for the little shear that it carries.
+constexpr double kLeastCell = 0.1;
+/// Edges shorter than this part of their direction's mean carry less tension in proportion: a node on its neighbour
+/// would be tied to it by a spring that no step resolves.
+constexpr double kLeastEdge = 0.05;
 
 Vec3d Rest(const SceneView& scene, Index particle) { return scene.rest_position[particle].cast<double>(); }
 
@@ -38,6 +44,14 @@ void AddSprings(const SceneView& scene, ElasticModel* model) {
     }
     return width;
   };
+  std::array<double, 3> mean{}, count{};
+  for (std::size_t i = 0; i < scene.membrane_rest_length.size(); ++i) {
+    mean[i % 3] += static_cast<double>(scene.membrane_rest_length[i]);
+    count[i % 3] += scene.membrane_rest_length[i] > 0.0f ? 1 : 0;
+  }
+  for (std::size_t d = 0; d < 3; ++d) {
+    mean[d] /= std::max(count[d], 1.0);
+  }
   for (Index row = 0; row < rows; ++row) {
     for (Index col = 0; col < cols; ++col) {
       const Index node = row * cols + col;
@@ -46,12 +60,15 @@ void AddSprings(const SceneView& scene, ElasticModel* model) {
         if (!(rest > 0)) {
           continue;
         }
+        const double whole = kLeastEdge * mean[static_cast<std::size_t>(d)];
         ElasticSpring& spring = model->springs[3 * node + static_cast<Index>(d)];
         spring.a = first + node;
         spring.b = first + node + (d == 0 ? 1 : d == 1 ? cols : cols + 1);
         spring.rest_length = rest * shrink;
         spring.axial = d < 2 ? Et * share(row, col, d)
-                             : kShearPart * Et * rest * rest * rest / (length(row, col, 0) * length(row, col, 1));
+                             : kShearPart * Et * rest * rest * rest /
+                                   std::max(length(row, col, 0) * length(row, col, 1), kLeastCell * rest * rest);
+        spring.axial *= std::min(1.0, rest / whole);
       }
     }
   }

@@ -197,7 +197,8 @@ double HangingSheet(int n) {
     }
   }
   ElasticModel model = BuildElasticModel(data.View());
-  // Strains are so small that the scene's floats would show.
+  // Strains are so small that the scene's floats would show, in lengths and in the load that keeps them.
+  model.load.clear();
   for (int p = 0; p < rows * cols; ++p) {
     model.rest_position[static_cast<std::size_t>(p)] = Vec3d((p % cols) * w, 0, -(p / cols) * h);
   }
