@@ -11,6 +11,8 @@ namespace {
 constexpr float kLostRadii = 1.5f;
 /// Creep at twice the grip force [m/s].
 constexpr float kCreepSpeed = 0.05f;
+/// A jolt shorter than this does not tear tissue out of the jaws [s].
+constexpr float kSmoothing = 0.03f;
 /// The hold falls to this at grasp_radius, from 1 at kFirmPart of it.
 constexpr float kLeastHold = 0.3f;
 constexpr float kFirmPart = 0.5f;
@@ -69,6 +71,7 @@ void Grasp::TakeHold(const ToolDescription& tool, const ToolPose& pose, Particle
   if (held_.empty()) {
     take(0, scene_.tube_vertex_count, jaw, radius);
   }
+  traction_.setZero();
   state_ = held_.empty() ? State::kClosedEmpty : State::kHolding;
 }
 
@@ -95,12 +98,14 @@ void Grasp::DropIf(const TissueModel& model, ParticleStore* particles, const Pre
 
 void Grasp::Slip(const Vec3f& traction_W, const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
                  ParticleStore* particles) {
-  const float traction = traction_W.norm(), grip = GripForce(scene_.physics, pose.jaw_rad);
+  const float dt = scene_.physics.dt_s;
+  traction_ += dt / (dt + kSmoothing) * (traction_W - traction_);
+  const float traction = traction_.norm(), grip = GripForce(scene_.physics, pose.jaw_rad);
   if (!holding() || !(traction > grip)) {
     return;
   }
   const float excess = grip > 0.0f ? std::min(traction / grip - 1.0f, 2.0f) : 2.0f;
-  const Vec3f creep_T = (kCreepSpeed * scene_.physics.dt_s * excess / traction) * (pose.q_WT.conjugate() * traction_W);
+  const Vec3f creep_T = (kCreepSpeed * dt * excess / traction) * (pose.q_WT.conjugate() * traction_);
   for (HeldParticle& held : held_) {
     held.p_T += creep_T / HoldOf(held, tool);
   }

@@ -54,6 +54,7 @@ class Grasp {
   SceneView scene_;
   State state_ = State::kOpen;
   std::vector<HeldParticle> held_;
+  Vec3f traction_ = Vec3f::Zero();  ///< Low-passed, frame W [N].
 };
 
 }  // namespace fulcrum::physics

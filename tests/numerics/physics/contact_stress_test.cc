@@ -135,7 +135,7 @@ TEST_P(DeepTools, AcrossEachOther) {
     tools_[0].pose = left(-x);
     tools_[1].pose = right(x);
     Step();
-    ASSERT_LT(simulation_.MaxDisplacement(), 0.04f);
+    ASSERT_LT(simulation_.MaxDisplacement(), 0.06f);
   }
   Drive(0, Upright(middle_ + Vec3f(-0.012f, 0, 0.03f), 0.3f), 30);
   Drive(1, Upright(middle_ + Vec3f(0.012f, 0, 0.03f), 0.0f), 30);

@@ -119,10 +119,12 @@ TEST_F(Grasps, SlipsAboveTheGripOfItsJawAngleOnly) {
       grasp_.Slip(Vec3f(0.99f * grip, 0, 0), scene_.tools[0], pose, model_, &particles_);
     }
     EXPECT_EQ(grasp_.held().front().p_T, before);
-    grasp_.Slip(Vec3f(1.2f * grip, 0, 0), scene_.tools[0], pose, model_, &particles_);
+    for (int i = 0; i < 10; ++i) {  // Longer than a jolt.
+      grasp_.Slip(Vec3f(1.2f * grip, 0, 0), scene_.tools[0], pose, model_, &particles_);
+    }
     const Vec3f crept = grasp_.held().front().p_T - before;
     EXPECT_GT(crept.x(), 0.0f);  // Along the traction, which is x of the tool as well.
-    EXPECT_LT(crept.norm(), 0.001f);
+    EXPECT_LT(crept.norm(), 0.003f);
     for (int i = 0; i < 400; ++i) {
       grasp_.Slip(Vec3f(2.0f * grip, 0, 0), scene_.tools[0], pose, model_, &particles_);
     }

@@ -148,20 +148,18 @@ TEST(TissueCollision, RestCostsNothing) {
 }
 
 TEST(TissueCollision, TheRestShapeHasNoForce) {
-  for (const auto& settings : {scene::Small(), scene::BuiltIn()}) {
-    const scene::SceneData data = scene::BuildProcedural(settings);
-    World world(data.View());
-    world.collision.MeasureMoves(&world.moved);
-    world.collision.FindPairs(world.moved, 0, 0.01);
-    world.collision.Rows(0, 1, &world.rows);
-    for (const ContactRow& row : world.rows) {
-      float gap = -row.offset;
-      for (int k = 0; k < row.count; ++k) {
-        const auto j = static_cast<std::size_t>(k);
-        gap += row.weight[j] * row.normal.dot(world.particles.At(row.at[j]));
-      }
-      ASSERT_GE(gap, -1e-6f);
+  const scene::SceneData data = scene::BuildProcedural(scene::Small());
+  World world(data.View());
+  world.collision.MeasureMoves(&world.moved);
+  world.collision.FindPairs(world.moved, 0, 0.01);
+  world.collision.Rows(0, 1, &world.rows);
+  for (const ContactRow& row : world.rows) {
+    float gap = -row.offset;
+    for (int k = 0; k < row.count; ++k) {
+      const auto j = static_cast<std::size_t>(k);
+      gap += row.weight[j] * row.normal.dot(world.particles.At(row.at[j]));
     }
+    ASSERT_GE(gap, -1e-6f);
   }
 }
 
