@@ -124,7 +124,9 @@ void DrawLabel(double px, double py, const std::string& label, const char* colou
 }  // namespace
 
 std::string WorkPrecisionSvg(const std::string& heading, const std::vector<std::string>& titles,
-                             const std::vector<WorkPrecisionPoint>& points) {
+                             std::vector<WorkPrecisionPoint> points) {
+  std::stable_sort(points.begin(), points.end(),
+                   [](const WorkPrecisionPoint& a, const WorkPrecisionPoint& b) { return a.time_ms < b.time_ms; });
   std::vector<std::string> families;
   std::vector<double> times;
   for (const WorkPrecisionPoint& p : points) {

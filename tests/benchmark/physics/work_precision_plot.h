@@ -9,13 +9,13 @@ namespace fulcrum::physics {
 
 struct WorkPrecisionPoint {
   std::string label;
-  std::string family;             ///< Points of a family share a colour and are joined in their order.
+  std::string family;             ///< Points of a family share a colour and are joined in the order of time.
   double time_ms = 0;             ///< Per frame.
   std::vector<double> error_pct;  ///< One per panel; not positive or not finite: not drawn.
 };
 
 /// Panels stand side by side under `titles`.
 [[nodiscard]] std::string WorkPrecisionSvg(const std::string& heading, const std::vector<std::string>& titles,
-                                           const std::vector<WorkPrecisionPoint>& points);
+                                           std::vector<WorkPrecisionPoint> points);
 
 }  // namespace fulcrum::physics
