@@ -1,0 +1,93 @@
+// How the solver's arrays come out of ElasticModel, and how they follow what cutting and shrinking do.
+#include "physics_node/accurate/accurate_solver.h"
+
+namespace fulcrum::physics::accurate {
+
+void AccurateSolver::PackSheet(const ElasticModel& model) {
+  const GridLayout& layout = particles_->layout();
+  sheet_mass_ = FloatArray(plane_);
+  for (int d = 0; d < 3; ++d) {
+    const auto i = static_cast<std::size_t>(d);
+    inverse_rest_[i] = FloatArray(plane_);
+    axial_[i] = FloatArray(plane_);
+    axial_uncut_[i] = FloatArray(plane_);
+  }
+  for (std::uint32_t row = 0; row < layout.rows; ++row) {
+    for (std::uint32_t col = 0; col < layout.cols; ++col) {
+      const std::uint32_t node = row * layout.cols + col, at = layout.Offset(row, col);
+      sheet_mass_[at] = static_cast<float>(model.mass[tube_count_ + node]);
+      for (std::size_t d = 0; d < 3; ++d) {
+        const ElasticSpring& spring = model.springs[3 * node + d];
+        axial_uncut_[d][at] = static_cast<float>(spring.axial);
+        inverse_rest_[d][at] = spring.axial > 0 ? static_cast<float>(1.0 / spring.rest_length) : 1.0f;
+      }
+    }
+  }
+}
+
+void AccurateSolver::PackOrgan(const ElasticModel& model, std::uint32_t tube_count) {
+  mu_ = static_cast<float>(model.mu_Pa);
+  lambda_ = static_cast<float>(model.lambda_Pa + model.mu_Pa);
+  volume_ = FloatArray(tube_count + 1);
+  organ_mass_ = FloatArray(tube_count + 1);
+  start_.assign(tube_count + 1, 0);
+  patch_start_.assign(tube_count + 1, 0);
+  for (const ElasticPatch& patch : model.patches) {
+    volume_[patch.vertex] = static_cast<float>(patch.volume);
+    start_[patch.vertex + 1] = patch.link_count;
+  }
+  for (const ElasticPatchLink& link : model.patch_links) {
+    ++patch_start_[link.v + 1];
+  }
+  for (std::uint32_t v = 0; v < tube_count; ++v) {
+    organ_mass_[v] = static_cast<float>(model.mass[v]);
+    start_[v + 1] += start_[v];
+    patch_start_[v + 1] += patch_start_[v];
+  }
+  const std::size_t links = model.patch_links.size();
+  vertex_.resize(links);
+  patch_.resize(links);
+  gradient_ = FloatArray(4 * links);
+  patch_gradient_ = FloatArray(4 * links);
+  std::vector<std::uint32_t> next(patch_start_.begin(), patch_start_.end());
+  for (const ElasticPatch& patch : model.patches) {
+    for (Index i = 0; i < patch.link_count; ++i) {
+      const ElasticPatchLink& link = model.patch_links[patch.first_link + i];
+      const std::uint32_t to = start_[patch.vertex] + i, back = next[link.v]++;
+      vertex_[to] = link.v;
+      patch_[back] = patch.vertex;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto g = static_cast<float>(link.gradient[axis]);
+        gradient_[4 * std::size_t{to} + static_cast<std::size_t>(axis)] = g;
+        patch_gradient_[4 * std::size_t{back} + static_cast<std::size_t>(axis)] = g;
+      }
+    }
+  }
+  const auto edge = [&](Index from, Index to) -> float& {
+    for (std::uint32_t i = patch_start_[from];; ++i) {
+      if (patch_[i] == to) {
+        return patch_gradient_[4 * std::size_t{i} + 3];
+      }
+    }
+  };
+  for (const ElasticShearLink& link : model.shear_links) {
+    const auto k = static_cast<float>(link.stiffness);
+    edge(link.a, link.b) = k;
+    edge(link.b, link.a) = k;
+  }
+}
+
+void AccurateSolver::Follow(const TissueModel& tissue) {
+  for (int d = 0; d < 3; ++d) {
+    const auto i = static_cast<std::size_t>(d);
+    const float* rest = tissue.rest(d);
+    for (std::size_t at = 0; at < plane_; ++at) {
+      const bool whole = rest[at] > 0.0f;
+      axial_[i][at] = whole ? axial_uncut_[i][at] : 0.0f;
+      inverse_rest_[i][at] = whole ? 1.0f / (rest[at] * rest_scale_) : inverse_rest_[i][at];
+    }
+  }
+  elements_.Follow(tissue);
+}
+
+}  // namespace fulcrum::physics::accurate
