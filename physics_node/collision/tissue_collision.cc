@@ -223,7 +223,7 @@ void TissueCollision::LookAtDue(std::vector<Group>* groups, std::vector<Watch>* 
         if (travel >= watch.due) {
           ++looked_at_;
           const float distance = look(&watch);
-          watch.near = distance < reach;
+          watch.near = watch.blocks && distance < reach;
           watch.due = travel + (watch.near ? kKeep : std::min(distance, kSight) - band);
         }
         group.near += watch.near;
@@ -247,7 +247,7 @@ void TissueCollision::LookAtFixed(Fixed* fixed, std::span<const float> moved) {
               const Vec3f p = particles_->At(watch->at) - shift;
               const TriangleTree::Hit hit = tree.Nearest(p, kSight);
               if (hit.triangle == kNoIndex) {
-                watch->front = false;
+                watch->front = watch->blocks = false;
                 return kSight;
               }
               watch->point = hit.point;
@@ -255,9 +255,9 @@ void TissueCollision::LookAtFixed(Fixed* fixed, std::span<const float> moved) {
               const float distance = std::sqrt(hit.distance_sq), height = watch->normal.dot(p - hit.point);
               const bool beside = std::abs(height) < kBesideCosine * distance;
               watch->front = watch->front || (height > 0.0f && !beside);
-              const bool blocks = watch->front && !beside && height > -kMaxBehind;
+              watch->blocks = watch->front && !beside && height > -kMaxBehind;
               // Past a rim or behind, it comes to contact only round the rim.
-              return blocks ? height - watch->clearance : std::max(distance, 2.0f * kKeep);
+              return watch->blocks ? height - watch->clearance : std::max(distance, 2.0f * kKeep);
             });
 }
 

@@ -65,6 +65,7 @@ class TissueCollision {
     float clearance = 0;           ///< Kept from the surface: less where it rests nearer [m].
     float due = 0;                 ///< Looked at again when the travel that concerns it has come to this [m].
     bool front = false;            ///< Seen in front of the surface and not lost from sight since.
+    bool blocks = true;            ///< What it was seen nearest to can hold it back: not out of sight, nor past a rim.
     bool near = false;             ///< Rows may come of it before it is looked at again.
     Vec3f point = Vec3f::Zero();   ///< Of a fixed surface: the nearest one …
     Vec3f normal = Vec3f::Zero();  ///< … and its normal.
