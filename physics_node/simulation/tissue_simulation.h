@@ -62,6 +62,8 @@ class TissueSimulation {
   [[nodiscard]] const ParticleStore& particles() const { return particles_; }
   [[nodiscard]] const TissueModel& model() const { return model_; }
   [[nodiscard]] const ToolCollision& collision() const { return collision_; }
+  /// Contacts of the last substep, forces in them; none in mode paper.
+  [[nodiscard]] std::span<const ContactRow> rows() const { return rows_; }
   [[nodiscard]] const Grasp& grasp(std::uint32_t tool) const { return grasps_[tool]; }
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return contacts_.force(tool); }
   [[nodiscard]] bool asleep() const { return asleep_; }
