@@ -17,7 +17,7 @@ std::uint32_t Morton(const Vec3f& unit) {
   return code;
 }
 
-/// Further than any tissue goes in a step [m].
+/// Older bounds are fitted wherever the tools are [m].
 constexpr float kForgotten = 1e3f;
 
 }  // namespace
@@ -77,19 +77,33 @@ SurfaceBounds::SurfaceBounds(const SceneView& scene, const TissueModel* model, P
   for (Sphere& cluster : clusters_) {
     FitCluster(&cluster);
   }
+  strips_.resize(row_blocks_);
+  Forget();
   Update({});
 }
 
-void SurfaceBounds::FitMembrane() {
+void SurfaceBounds::FitStrip(Strip* strip, std::uint32_t row_block) {
   const GridLayout& layout = particles_->layout();
-  const GridArrays grid{particles_->plane(0),
-                        particles_->plane(1),
-                        particles_->plane(2),
-                        particles_->plane(3),
-                        {model_->rest(0), model_->rest(1), model_->rest(2)},
-                        static_cast<int>(layout.rows),
+  const std::uint32_t row = 8 * row_block, rows = std::min(layout.rows - row, 9u);
+  const std::size_t at = std::size_t{row} * layout.stride, first = std::size_t{row_block} * slot_blocks_ * kLanes;
+  const GridArrays grid{particles_->plane(0) + at,
+                        particles_->plane(1) + at,
+                        particles_->plane(2) + at,
+                        particles_->plane(3) + at,
+                        {model_->rest(0) + at, model_->rest(1) + at, model_->rest(2) + at},
+                        static_cast<int>(rows),
                         static_cast<int>(layout.slots)};
-  kernels_.block_bounds(grid, bounds_);
+  BlockBounds blocks = bounds_;
+  for (int axis = 0; axis < 3; ++axis) {
+    blocks.lo[axis] += first;
+    blocks.hi[axis] += first;
+  }
+  kernels_.block_bounds(grid, blocks);
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::size_t count = slot_blocks_ * kLanes;
+    strip->low[axis] = *std::min_element(blocks.lo[axis], blocks.lo[axis] + count);
+    strip->high[axis] = *std::max_element(blocks.hi[axis], blocks.hi[axis] + count);
+  }
 }
 
 void SurfaceBounds::FitLeaf(Index leaf) {
@@ -117,15 +131,22 @@ void SurfaceBounds::FitCluster(Sphere* cluster) {
 }
 
 void SurfaceBounds::Update(std::span<const Capsule> tools) {
-  FitMembrane();
-  const std::size_t blocks = std::size_t{row_blocks_} * slot_blocks_ * kLanes;
-  for (int axis = 0; axis < 3; ++axis) {
-    low_[axis] = *std::min_element(bounds_.lo[axis], bounds_.lo[axis] + blocks);
-    high_[axis] = *std::max_element(bounds_.hi[axis], bounds_.hi[axis] + blocks);
+  all_ = {};
+  for (std::uint32_t rb = 0; rb < row_blocks_; ++rb) {
+    Strip& strip = strips_[rb];
+    strip.age += kTissueStep;
+    if (strip.age > kForgotten || std::any_of(tools.begin(), tools.end(), [&](const Capsule& tool) {
+          return strip.MayTouch(tool.a, tool.b, kReach + strip.age + tool.radius);
+        })) {
+      FitStrip(&strip, rb);
+      strip.age = 0;
+    }
+    all_.low = all_.low.cwiseMin(strip.low);
+    all_.high = all_.high.cwiseMax(strip.high);
   }
   for (std::size_t i = 0; i < clusters_.size(); ++i) {
     Sphere& cluster = clusters_[i];
-    age_[i] += kOrganStep;
+    age_[i] += kTissueStep;
     const float reach = kReach + age_[i] + cluster.radius;
     if (age_[i] > kForgotten || std::any_of(tools.begin(), tools.end(), [&](const Capsule& tool) {
           return !Beyond(cluster.centre, tool.a, tool.b, reach + tool.radius);
@@ -133,14 +154,14 @@ void SurfaceBounds::Update(std::span<const Capsule> tools) {
       FitCluster(&cluster);
       age_[i] = 0;
     }
-    low_ = low_.cwiseMin(cluster.centre - Vec3f::Constant(cluster.radius));
-    high_ = high_.cwiseMax(cluster.centre + Vec3f::Constant(cluster.radius));
+    all_.low = all_.low.cwiseMin(cluster.centre - Vec3f::Constant(cluster.radius));
+    all_.high = all_.high.cwiseMax(cluster.centre + Vec3f::Constant(cluster.radius));
   }
 }
 
-bool SurfaceBounds::MayTouch(const Vec3f& a, const Vec3f& b, float range) const {
+bool SurfaceBounds::Strip::MayTouch(const Vec3f& a, const Vec3f& b, float range) const {
   const Vec3f lo = a.cwiseMin(b), hi = a.cwiseMax(b);
-  return !(lo.array() > high_.array() + range).any() && !(hi.array() < low_.array() - range).any();
+  return !(lo.array() > high.array() + range).any() && !(hi.array() < low.array() - range).any();
 }
 
 }  // namespace fulcrum::physics

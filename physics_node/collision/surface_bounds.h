@@ -1,6 +1,7 @@
-// Broad phase over the tissue's surface: boxes around blocks of the membrane (one vector kernel), two levels of spheres
-// around pieces of the organ's surface. The latter are fitted locally to the tools: a sphere counts as grown by what
-// tissue may have moved since it was fitted, and is fitted anew when it then comes near a tool.
+// Broad phase over the tissue's surface: boxes around blocks of the membrane (one vector kernel for a strip of eight
+// rows of cells), two levels of spheres around pieces of the organ's surface. Both are fitted locally to the tools: a
+// strip or sphere counts as grown by what tissue may have moved since it was fitted, and is fitted anew when it then
+// comes near a tool.
 #pragma once
 
 #include <algorithm>
@@ -21,13 +22,16 @@ class SurfaceBounds {
  public:
   SurfaceBounds(const SceneView& scene, const TissueModel* model, ParticleStore* particles, const Kernels& kernels);
 
-  /// Fits the bounds to the tissue within kReach of `tools`, once a step: organ faster than kOrganStep a step may come
-  /// near unseen.
+  /// Fits the bounds to the tissue within kReach of `tools`, once a step: tissue faster than kTissueStep a step may
+  /// come near unseen.
   void Update(std::span<const Capsule> tools);
   /// Tissue moves while nobody looks: the next Update fits everything.
-  void Forget() { std::fill(age_.begin(), age_.end(), 3e38f); }
+  void Forget() {
+    std::fill(age_.begin(), age_.end(), 3e38f);
+    std::for_each(strips_.begin(), strips_.end(), [](Strip& strip) { strip.age = 3e38f; });
+  }
   /// False: no tissue within `range` of the segment's box.
-  [[nodiscard]] bool MayTouch(const Vec3f& a, const Vec3f& b, float range) const;
+  [[nodiscard]] bool MayTouch(const Vec3f& a, const Vec3f& b, float range) const { return all_.MayTouch(a, b, range); }
 
   /// visit(row, column, corners, squared distance of the centre): cells of the membrane within `range` of segment ab,
   /// perhaps some more. Corners (r, c), (r, c+1), (r+1, c), (r+1, c+1). The visitor may lower `range` as it goes.
@@ -38,18 +42,24 @@ class SurfaceBounds {
   void ForEachTubeTriangleNear(const Vec3f& a, const Vec3f& b, float range, const Visit& visit) const;
 
  private:
-  static constexpr float kReach = 0.015f;      ///< Probes look 10 mm around a tool [m].
-  static constexpr float kOrganStep = 0.010f;  ///< 1 m/s at 100 Hz [m].
+  static constexpr float kReach = 0.015f;       ///< Probes look 10 mm around a tool [m].
+  static constexpr float kTissueStep = 0.010f;  ///< 1 m/s at 100 Hz [m].
 
   struct Sphere {
     Index first = 0, last = 0;  ///< Leaves: of tube_order_; clusters: of leaves_.
     Vec3f centre = Vec3f::Zero();
     float radius = 0;
   };
+  /// Bounds of eight rows of cells.
+  struct Strip {
+    Vec3f low = Vec3f::Constant(3e38f), high = Vec3f::Constant(-3e38f);
+    float age = 0;  ///< How far tissue may have moved since it was fitted [m].
+    [[nodiscard]] bool MayTouch(const Vec3f& a, const Vec3f& b, float range) const;
+  };
   static bool Beyond(const Vec3f& p, const Vec3f& a, const Vec3f& b, float range) {
     return DistanceSqToSegment(p, a, b) > range * range;
   }
-  void FitMembrane();
+  void FitStrip(Strip* strip, std::uint32_t row_block);
   void FitLeaf(Index leaf);
   void FitCluster(Sphere* cluster);
 
@@ -64,7 +74,8 @@ class SurfaceBounds {
   std::vector<Index> leaf_start_, leaf_vertices_;  ///< Each vertex of a leaf once.
   std::vector<Sphere> leaves_, clusters_;
   std::vector<float> age_;  ///< Of each cluster: how far tissue may have moved since it was fitted [m].
-  Vec3f low_ = Vec3f::Zero(), high_ = Vec3f::Zero();  ///< Of everything.
+  std::vector<Strip> strips_;
+  Strip all_;  ///< Bounds of everything.
 };
 
 template <class Visit>
@@ -81,6 +92,10 @@ void SurfaceBounds::ForEachCellNear(const Vec3f& a, const Vec3f& b, const float&
   };
   std::size_t index = 0;
   for (std::uint32_t rb = 0; rb < row_blocks_; ++rb) {
+    if (!strips_[rb].MayTouch(a, b, range)) {
+      index += std::size_t{slot_blocks_} * kLanes;
+      continue;
+    }
     for (std::uint32_t sb = 0; sb < slot_blocks_; ++sb) {
       for (std::uint32_t lane = 0; lane < kLanes; ++lane, ++index) {
         if (apart(index)) {

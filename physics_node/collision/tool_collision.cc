@@ -25,8 +25,15 @@ constexpr int kPatch = 3;
 /// On which side of a triangle the tool is, can be told only where its offset is this much along the normal, and not
 /// beside an edge.
 constexpr float kBesideCosine = 0.7f;
+/// Squared distances at least so large are of triangles that were left alone [m^2].
+constexpr float kLeftAlone = 1e38f;
 /// Room for the pairs of a step: a tool among crumpled membrane.
 constexpr std::size_t kPairs = 2048;
+
+SegmentMotion SegmentOf(const Capsule& from, const Capsule& to) {
+  return {{{from.a.x(), from.a.y(), from.a.z()}, {from.b.x(), from.b.y(), from.b.z()}},
+          {{to.a.x(), to.a.y(), to.a.z()}, {to.b.x(), to.b.y(), to.b.z()}}};
+}
 
 bool InOrder(const ContactPair& p, const ContactPair& q) {
   return std::pair(p.capsule, p.triangle) < std::pair(q.capsule, q.triangle);
@@ -39,6 +46,7 @@ ToolCollision::ToolCollision(const SceneView& scene, const TissueModel* model, P
     : scene_(scene),
       model_(model),
       particles_(particles),
+      kernels_(kernels),
       membrane_triangles_(scene.membrane.triangle_count()),
       bounds_(scene, model, particles, kernels) {
   for (std::uint32_t col = 0; col < scene.membrane.cols; ++col) {
@@ -49,9 +57,9 @@ ToolCollision::ToolCollision(const SceneView& scene, const TissueModel* model, P
   row_order_.reserve(kPairs);
 }
 
-Vec3f ToolCollision::PatchNormal(Index triangle, bool previous) const {
+Vec3f ToolCollision::PatchNormal(Index cell, bool previous) const {
   const GridLayout& layout = particles_->layout();
-  const Index cell = triangle / 2, row = cell / (layout.cols - 1), col = cell % (layout.cols - 1);
+  const Index row = cell / (layout.cols - 1), col = cell % (layout.cols - 1);
   const auto at = [&](Index r, Index c) {
     const ParticleRef first = column_[std::min(c, layout.cols - 1)];
     const ParticleRef ref{first.base + std::min(r, layout.rows - 1) * layout.stride, first.step};
@@ -72,36 +80,70 @@ bool ToolCollision::IsFar(const std::array<Vec3f, 3>& x, const Capsule& capsule,
   return DistanceSqToSegment(centre, capsule.a, capsule.b) > (range + radius) * (range + radius);
 }
 
-/// `draft` has everything but closest points, normal and side.
-void ToolCollision::AddPair(const ContactPair& draft, float range) {
-  const Motion& motion = motion_[draft.capsule];
-  const std::array<Vec3f, 3> x{particles_->At(draft.at[0]), particles_->At(draft.at[1]), particles_->At(draft.at[2])};
-  if (IsFar(x, motion.to, range)) {
-    return;
-  }
-  pairs_.push_back(draft);
-  ContactPair& pair = pairs_.back();
-  if (IsFar(x, motion.to, motion.to.radius + kNear)) {
-    // Only the side has to be told: the middle of the triangle will do.
-    pair.closest.barycentric = {1.0f / 3, 1.0f / 3, 1.0f / 3};
-    pair.closest.on_triangle = (x[0] + x[1] + x[2]) / 3.0f;
-    pair.closest.t = ClosestOnSegment(pair.closest.on_triangle, motion.to.a, motion.to.b);
-    pair.closest.on_segment = motion.PointAt(pair.closest.t, 1.0f);
-    pair.closest.distance_sq = (pair.closest.on_segment - pair.closest.on_triangle).squaredNorm();
-  } else {
-    pair.closest = ClosestSegmentTriangle(motion.to.a, motion.to.b, x[0], x[1], x[2]);
-  }
-  pair.normal = NormalOf(pair, false);
-  FindSide(&pair);
-  // The organ is closed. What is seen from within without having been seen from outside is its other wall.
-  if (pair.triangle >= membrane_triangles_ && pair.side < 0) {
-    pairs_.pop_back();
+void ToolCollision::LoadTriangle(const std::array<ParticleRef, 3>& at, std::size_t lane) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Vec3f x = particles_->At(at[i]);
+    for (int axis = 0; axis < 3; ++axis) {
+      triangles_.corner[i][axis][lane] = x[axis];
+    }
   }
 }
 
-Vec3f ToolCollision::NormalOf(const ContactPair& pair, bool previous) const {
+void ToolCollision::TakeTouch(const Capsule& now, std::size_t lane, ClosestPoints* closest) const {
+  closest->distance_sq = touch_.distance_sq[lane];
+  closest->t = touch_.t[lane];
+  closest->crosses = touch_.crosses[lane] > 0.0f;
+  closest->on_segment = now.a + touch_.t[lane] * (now.b - now.a);
+  Vec3f on_triangle = Vec3f::Zero();
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto& x = triangles_.corner[i];
+    closest->barycentric[i] = touch_.weight[i][lane];
+    on_triangle += touch_.weight[i][lane] * Vec3f(x[0][lane], x[1][lane], x[2][lane]);
+  }
+  closest->on_triangle = on_triangle;
+}
+
+void ToolCollision::AddCandidate(const Candidate& candidate, std::uint32_t capsule, float range) {
+  LoadTriangle(candidate.at, waiting_count_);
+  waiting_[waiting_count_++] = candidate;
+  if (waiting_count_ == kLanes) {
+    Flush(capsule, range);
+  }
+}
+
+void ToolCollision::Flush(std::uint32_t capsule, float range) {
+  const Motion& motion = motion_[capsule];
+  // Beyond `exact` only the side has to be told: the middle of the triangle will do.
+  const TouchSearch search{1.0f, 1.0f, 0.0f, 0.0f, 1.0f, range, motion.to.radius + kNear};
+  kernels_.first_touch(motion.segment, search, triangles_, &touch_);
+  for (std::size_t lane = 0; lane < waiting_count_; ++lane) {
+    if (!(touch_.distance_sq[lane] < kLeftAlone)) {
+      continue;
+    }
+    ContactPair& pair = pairs_.emplace_back();
+    pair.capsule = capsule;
+    pair.triangle = waiting_[lane].triangle;
+    pair.particle = waiting_[lane].particle;
+    pair.at = waiting_[lane].at;
+    TakeTouch(motion.to, lane, &pair.closest);
+    pair.normal = NormalOf(pair, false);
+    FindSide(&pair);
+    // The organ is closed. What is seen from within without having been seen from outside is its other wall.
+    if (pair.triangle >= membrane_triangles_ && pair.side < 0) {
+      pairs_.pop_back();
+    }
+  }
+  waiting_count_ = 0;
+}
+
+Vec3f ToolCollision::NormalOf(const ContactPair& pair, bool previous) {
   if (pair.triangle < membrane_triangles_) {
-    return PatchNormal(pair.triangle, previous);
+    Patch& patch = patch_[previous ? 1 : 0];
+    if (patch.cell != pair.triangle / 2) {
+      patch.cell = pair.triangle / 2;
+      patch.normal = PatchNormal(patch.cell, previous);
+    }
+    return patch.normal;
   }
   const auto at = [&](std::size_t i) {
     return previous ? particles_->Previous(pair.at[i]) : particles_->At(pair.at[i]);
@@ -110,7 +152,7 @@ Vec3f ToolCollision::NormalOf(const ContactPair& pair, bool previous) const {
 }
 
 /// By where the two points that are closest now were before this step, when nothing overlapped.
-void ToolCollision::FindSide(ContactPair* pair) const {
+void ToolCollision::FindSide(ContactPair* pair) {
   const auto last = std::lower_bound(last_pairs_.begin(), last_pairs_.end(), *pair, InOrder);
   const bool known = last != last_pairs_.end() && last->capsule == pair->capsule && last->triangle == pair->triangle;
   if (known && (last->touching || pair->triangle >= membrane_triangles_)) {
@@ -134,29 +176,22 @@ void ToolCollision::FindMembranePairs(std::uint32_t capsule, float range) {
   const Motion& motion = motion_[capsule];
   const Capsule middle = motion.At(0.5f);
   const float half_range = range - 0.5f * motion.travel;
-  bounds_.ForEachCellNear(middle.a, middle.b, half_range,
-                          [&](std::uint32_t row, std::uint32_t col, const std::array<ParticleRef, 4>& corner, float) {
-                            const Index cell = row * (model_->cols() - 1) + col;
-                            if (!model_->TriangleAlive(2 * cell) && !model_->TriangleAlive(2 * cell + 1)) {
-                              return;
-                            }
-                            const Index n00 = scene_.membrane.first + row * model_->cols() + col,
-                                        n10 = n00 + model_->cols();
-                            ContactPair draft;
-                            draft.capsule = capsule;
-                            if (model_->TriangleAlive(2 * cell)) {
-                              draft.triangle = 2 * cell;
-                              draft.particle = {n00, n00 + 1, n10 + 1};
-                              draft.at = {corner[0], corner[1], corner[3]};
-                              AddPair(draft, range);
-                            }
-                            if (model_->TriangleAlive(2 * cell + 1)) {
-                              draft.triangle = 2 * cell + 1;
-                              draft.particle = {n00, n10 + 1, n10};
-                              draft.at = {corner[0], corner[3], corner[2]};
-                              AddPair(draft, range);
-                            }
-                          });
+  bounds_.ForEachCellNear(
+      middle.a, middle.b, half_range,
+      [&](std::uint32_t row, std::uint32_t col, const std::array<ParticleRef, 4>& corner, float) {
+        const Index cell = row * (model_->cols() - 1) + col;
+        if (!model_->TriangleAlive(2 * cell) && !model_->TriangleAlive(2 * cell + 1)) {
+          return;
+        }
+        const Index n00 = scene_.membrane.first + row * model_->cols() + col, n10 = n00 + model_->cols();
+        if (model_->TriangleAlive(2 * cell)) {
+          AddCandidate({2 * cell, {n00, n00 + 1, n10 + 1}, {corner[0], corner[1], corner[3]}}, capsule, range);
+        }
+        if (model_->TriangleAlive(2 * cell + 1)) {
+          AddCandidate({2 * cell + 1, {n00, n10 + 1, n10}, {corner[0], corner[3], corner[2]}}, capsule, range);
+        }
+      });
+  Flush(capsule, range);
 }
 
 /// A capsule is on one side of all the membrane around it, except at a hole or a rim: what touched in the last step
@@ -183,16 +218,11 @@ void ToolCollision::SettleSides(std::size_t first) {
 void ToolCollision::FindTubePairs(std::uint32_t capsule, float range) {
   const Motion& motion = motion_[capsule];
   const Capsule middle = motion.At(0.5f);
-  ContactPair draft;
-  draft.capsule = capsule;
   bounds_.ForEachTubeTriangleNear(middle.a, middle.b, range - 0.5f * motion.travel, [&](Index triangle) {
-    draft.triangle = membrane_triangles_ + triangle;
-    draft.particle = scene_.tube_surface[triangle];
-    for (std::size_t i = 0; i < 3; ++i) {
-      draft.at[i] = {4 * draft.particle[i], 1};
-    }
-    AddPair(draft, range);
+    const Triangle& v = scene_.tube_surface[triangle];
+    AddCandidate({membrane_triangles_ + triangle, v, {{{4 * v[0], 1}, {4 * v[1], 1}, {4 * v[2], 1}}}}, capsule, range);
   });
+  Flush(capsule, range);
 }
 
 void ToolCollision::FollowYielding(std::uint32_t tool, const ToolMotion& moved, bool clear) {
@@ -222,6 +252,7 @@ void ToolCollision::SortPairs() {
 void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bool tissue_moved, float tissue_step) {
   std::swap(pairs_, last_pairs_);
   pairs_.clear();
+  patch_ = {};
   band_ = kRowBand + std::clamp(tissue_step, 0.0f, kMaxReach);
   if (tissue_moved) {
     std::array<Capsule, kMaxTools * kMaxCapsules> near;
@@ -251,7 +282,7 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
       }
       const Capsule from = moved.from.capsules[static_cast<std::size_t>(i)];
       const Capsule to = moved.to.capsules[static_cast<std::size_t>(i)];
-      motion_[c] = {from, to, std::max((to.a - from.a).norm(), (to.b - from.b).norm()), true};
+      motion_[c] = {from, to, std::max((to.a - from.a).norm(), (to.b - from.b).norm()), true, SegmentOf(from, to)};
       const float range = to.radius + scene_.physics.collision_margin_m + kSlack + band_ - kRowBand + motion_[c].travel;
       if (!bounds_.MayTouch(to.a, to.b, range)) {
         continue;

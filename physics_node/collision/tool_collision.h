@@ -97,6 +97,7 @@ class ToolCollision {
     Capsule from, to;
     float travel = 0;  ///< Of its faster end [m].
     bool enabled = false;
+    SegmentMotion segment{};  ///< Of its axis.
     [[nodiscard]] Capsule At(float u) const {
       return {from.a + u * (to.a - from.a), from.b + u * (to.b - from.b), to.radius, to.part};
     }
@@ -118,17 +119,30 @@ class ToolCollision {
     Vec3f direction = Vec3f::Zero();
   };
 
+  struct Patch {
+    Index cell = kNoIndex;
+    Vec3f normal = Vec3f::Zero();
+  };
+  /// A triangle that may become a pair.
+  struct Candidate {
+    Index triangle = 0;
+    std::array<Index, 3> particle{};
+    std::array<ParticleRef, 3> at;
+  };
+
   void FindMembranePairs(std::uint32_t capsule, float range);
   void SettleSides(std::size_t first);
   void SortPairs();
   void FindTubePairs(std::uint32_t capsule, float range);
-  void AddPair(const ContactPair& draft, float range);
-  void FindSide(ContactPair* pair) const;
+  /// Candidates are looked at eight at a time: Flush looks at those that are left.
+  void AddCandidate(const Candidate& candidate, std::uint32_t capsule, float range);
+  void Flush(std::uint32_t capsule, float range);
+  void FindSide(ContactPair* pair);
   void FollowYielding(std::uint32_t tool, const ToolMotion& moved, bool clear);
-  /// Unit normal of the membrane around a triangle, now or before this step; zero where it has none.
-  [[nodiscard]] Vec3f PatchNormal(Index triangle, bool previous) const;
+  /// Unit normal of the membrane around a cell, now or before this step; zero where it has none.
+  [[nodiscard]] Vec3f PatchNormal(Index cell, bool previous) const;
   /// Of the membrane around it, or of the organ's triangle.
-  [[nodiscard]] Vec3f NormalOf(const ContactPair& pair, bool previous) const;
+  [[nodiscard]] Vec3f NormalOf(const ContactPair& pair, bool previous);
   /// Closest points are told for tissue up to this far from touch: the arc of an electrode reaches so far [m].
   [[nodiscard]] static float Probed(const Capsule& capsule) { return capsule.part == ToolPart::kTip ? 0.0015f : 0.0f; }
   /// How far apart a pair is at least: bounding sphere against capsule axis.
@@ -136,9 +150,12 @@ class ToolCollision {
   /// From pair->closest; `capsule` is where that was taken.
   [[nodiscard]] Push PushOf(const ContactPair& pair, const Capsule& capsule) const;
   void ProjectPair(ContactPair* pair, const Capsule& capsule);
-  /// Part of the step in [u0, u1] at which the pair first touches, else that of their closest approach; fills
-  /// pair->closest for it.
-  [[nodiscard]] float FirstTouch(ContactPair* pair, const std::array<Vec3f, 3>& x, float u0, float u1) const;
+  /// Fills lane `lane` with a triangle's corners.
+  void LoadTriangle(const std::array<ParticleRef, 3>& at, std::size_t lane);
+  /// What the last look has found in a lane; `now` is the capsule where that was.
+  void TakeTouch(const Capsule& now, std::size_t lane, ClosestPoints* closest) const;
+  /// Rows of at most eight pairs of one capsule.
+  void AddRows(Index first, Index last, float u0, float u1, std::vector<ContactRow>* rows);
   void AddRow(Index index, const Push& push, const Vec3f& tool_step, std::vector<ContactRow>* rows) const;
   void DropRepeated(std::size_t first, std::vector<ContactRow>* rows);
   void DropShallow(std::size_t first, std::vector<ContactRow>* rows);
@@ -147,13 +164,19 @@ class ToolCollision {
   SceneView scene_;
   const TissueModel* model_;
   ParticleStore* particles_;
+  const Kernels& kernels_;
   Index membrane_triangles_;
   SurfaceBounds bounds_;
   std::vector<ParticleRef> column_;  ///< Of the first row.
   std::array<Motion, kMaxTools * kMaxCapsules> motion_;
   std::array<Yielding, kMaxTools> yielding_;
   std::vector<ContactPair> pairs_, last_pairs_;
-  float band_ = 0;  ///< Rows are made for what is so near to touch [m].
+  std::array<Candidate, kLanes> waiting_;
+  std::size_t waiting_count_ = 0;
+  TriangleBatch triangles_{};
+  TouchBatch touch_{};
+  std::array<Patch, 2> patch_;  ///< The last one asked for, now and before this step.
+  float band_ = 0;              ///< Rows are made for what is so near to touch [m].
   std::array<Vec3f, kMaxTools> force_{Vec3f::Zero(), Vec3f::Zero()};
   std::vector<std::pair<std::uint64_t, Index>> row_order_;  ///< Scratch, of pairs too.
 };

@@ -22,34 +22,6 @@ std::uint64_t SharedFeature(const ContactRow& row) {
 
 }  // namespace
 
-float ToolCollision::FirstTouch(ContactPair* pair, const std::array<Vec3f, 3>& x, float u0, float u1) const {
-  const Motion& m = motion_[pair->capsule];
-  const float reach = m.to.radius + scene_.physics.collision_margin_m;
-  const auto look = [&](float u) {
-    const Capsule now = m.At(u);
-    return ClosestSegmentTriangle(now.a, now.b, x[0], x[1], x[2]);
-  };
-  if (!((u1 - u0) * m.travel > kSmallMove * m.to.radius)) {
-    pair->closest = look(u1);
-    return u1;
-  }
-  // Conservative advancement: no point of the capsule moves further than travel * du.
-  const float least = std::max(kLeastAdvance * m.to.radius / m.travel, (u1 - u0) / kMaxLooks);
-  float nearest = 3e38f, at = u1;
-  for (float u = u0;;) {
-    const ClosestPoints closest = look(u);
-    if (closest.distance_sq < nearest) {
-      nearest = closest.distance_sq;
-      at = u;
-      pair->closest = closest;
-    }
-    if (u >= u1 || closest.distance_sq <= reach * reach) {
-      return at;
-    }
-    u = std::min(u1, u + std::max((std::sqrt(closest.distance_sq) - reach) / m.travel, least));
-  }
-}
-
 void ToolCollision::AddRow(Index index, const Push& push, const Vec3f& tool_step, std::vector<ContactRow>* rows) const {
   const ContactPair& pair = pairs_[index];
   ContactRow row;
@@ -128,33 +100,29 @@ void ToolCollision::DropShallow(std::size_t first, std::vector<ContactRow>* rows
   DropMarked(first, rows);
 }
 
-void ToolCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) {
-  rows->clear();
-  std::size_t tool_first = 0, capsule_first = 0;
-  for (Index index = 0; index < pairs_.size(); ++index) {
+void ToolCollision::AddRows(Index first, Index last, float u0, float u1, std::vector<ContactRow>* rows) {
+  const Motion& m = motion_[pairs_[first].capsule];
+  const float reach = m.to.radius + scene_.physics.collision_margin_m;
+  const float range = reach + (u1 < 1.0f ? band_ : std::max(band_, Probed(m.to))) + 0.5f * m.travel * (u1 - u0);
+  const bool moves = (u1 - u0) * m.travel > kSmallMove * m.to.radius;
+  const float least = moves ? std::max(kLeastAdvance * m.to.radius / m.travel, (u1 - u0) / kMaxLooks) : 1.0f;
+  const TouchSearch search{u0, u1, reach, moves ? m.travel : 0.0f, least, range, range};
+  for (Index i = first; i < last; ++i) {
+    LoadTriangle(pairs_[i].at, i - first);
+  }
+  kernels_.first_touch(m.segment, search, triangles_, &touch_);
+  for (Index index = first; index < last; ++index) {
     ContactPair& pair = pairs_[index];
-    if (index > 0 && pair.capsule != pairs_[index - 1].capsule) {
-      DropRepeated(capsule_first, rows);
-      if (pair.capsule / kMaxCapsules != pairs_[index - 1].capsule / kMaxCapsules) {
-        DropShallow(tool_first, rows);
-        tool_first = rows->size();
-      }
-      capsule_first = rows->size();
-    }
-    const Motion& m = motion_[pair.capsule];
-    if (!m.enabled) {
-      continue;
-    }
-    const std::array<Vec3f, 3> x{particles_->At(pair.at[0]), particles_->At(pair.at[1]), particles_->At(pair.at[2])};
-    const float reach = m.to.radius + scene_.physics.collision_margin_m;
-    if (IsFar(x, m.At(0.5f * (u0 + u1)),
-              reach + (u1 < 1.0f ? band_ : std::max(band_, Probed(m.to))) + 0.5f * m.travel * (u1 - u0))) {
+    const std::size_t lane = index - first;
+    if (!(touch_.distance_sq[lane] < kFarSq)) {
       pair.closest.distance_sq = kFarSq;
       pair.closest.crosses = false;
       continue;
     }
-    const float u = FirstTouch(&pair, x, u0, u1);
-    Push push = PushOf(pair, m.At(u));
+    const float u = touch_.u[lane];
+    const Capsule now = m.At(u);
+    TakeTouch(now, lane, &pair.closest);
+    Push push = PushOf(pair, now);
     const Vec3f end = m.PointAt(pair.closest.t, u1), tool_step = end - m.PointAt(pair.closest.t, u0);
     push.depth += push.direction.dot(end - m.PointAt(pair.closest.t, u));
     push.depth = std::min(push.depth, kMaxPush + std::max(0.0f, push.direction.dot(tool_step)));
@@ -163,8 +131,27 @@ void ToolCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) {
       AddRow(index, push, tool_step, rows);
     }
   }
-  DropRepeated(capsule_first, rows);
-  DropShallow(tool_first, rows);
+}
+
+void ToolCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) {
+  rows->clear();
+  const auto count = static_cast<Index>(pairs_.size());
+  std::size_t tool_first = 0;
+  for (Index first = 0, last = 0; first < count; first = last) {
+    const std::uint32_t capsule = pairs_[first].capsule;
+    while (last < count && pairs_[last].capsule == capsule) {
+      ++last;
+    }
+    const std::size_t capsule_first = rows->size();
+    for (Index i = first; i < last && motion_[capsule].enabled; i += kLanes) {
+      AddRows(i, std::min(i + kLanes, last), u0, u1, rows);
+    }
+    DropRepeated(capsule_first, rows);
+    if (last == count || pairs_[last].capsule / kMaxCapsules != capsule / kMaxCapsules) {
+      DropShallow(tool_first, rows);
+      tool_first = rows->size();
+    }
+  }
   for (ContactRow& row : *rows) {
     row.force_N = 0.0f;
   }

@@ -89,6 +89,37 @@ struct BlockBounds {
   float* hi[3];
 };
 
+/// Eight triangles, corner by corner and axis by axis [m].
+struct alignas(32) TriangleBatch {
+  float corner[3][3][kLanes];
+};
+
+/// A segment on its way: the ends at the part u are from + u (to - from). By end and axis [m].
+struct SegmentMotion {
+  float from[2][3];
+  float to[2][3];
+};
+
+/// How a moving segment is held against triangles that stand still.
+struct TouchSearch {
+  float u0, u1;  ///< Part of the motion.
+  float reach;   ///< They touch at this distance [m].
+  float travel;  ///< How far any point of the segment goes from u = 0 to 1 [m]. 0: only u1 is looked at.
+  float least;   ///< A look is at least this part further than the one before.
+  float range;   ///< Triangles further from the segment in the middle of the motion are left alone [m].
+  float exact;   ///< Of those beyond this only the middle is looked at, at u1 [m].
+};
+
+/// Closest points of the segment and the triangle in each lane, at the part `u` of the motion where they first touch,
+/// else at the look where they were nearest.
+struct alignas(32) TouchBatch {
+  float u[kLanes];
+  float distance_sq[kLanes];  ///< 3e38 where the triangle was left alone [m^2].
+  float t[kLanes];            ///< Along the segment.
+  float weight[3][kLanes];    ///< Barycentric, on the triangle.
+  float crosses[kLanes];      ///< 1 where the segment passes through the triangle, else 0.
+};
+
 struct Kernels {
   const char* name;
 
@@ -111,6 +142,8 @@ struct Kernels {
   std::uint32_t (*integrate_xyzw)(float* now, float* previous, std::size_t count, const IntegrateSettings& settings);
   FinishResult (*finish_xyzw)(float* now, const float* previous, std::size_t count, float limit_sq);
   void (*block_bounds)(const GridArrays& grid, const BlockBounds& bounds);
+  void (*first_touch)(const SegmentMotion& segment, const TouchSearch& search, const TriangleBatch& triangles,
+                      TouchBatch* touch);
 };
 
 const Kernels& BaselineKernels();

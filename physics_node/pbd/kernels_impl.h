@@ -3,6 +3,7 @@
 #pragma once
 
 #include "physics_node/pbd/grid_sweep.h"
+#include "physics_node/pbd/touch_impl.h"
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
@@ -301,7 +302,7 @@ void ComputeBlockBounds(const GridArrays& g, const BlockBounds& bounds) {
 
 const Kernels& Table(const char* name) {
   static const Kernels kernels{name,      GridStretch, Springs,       Volumes,    Bending,           Bindings,
-                               Integrate, Finish,      IntegrateXyzw, FinishXyzw, ComputeBlockBounds};
+                               Integrate, Finish,      IntegrateXyzw, FinishXyzw, ComputeBlockBounds, FirstTouch};
   return kernels;
 }
 

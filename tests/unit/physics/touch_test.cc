@@ -1,0 +1,176 @@
+// The narrow phase, eight triangles at a time: against the closest points of one, against a fine search in time, and
+// the same bits on every instruction set.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "physics_node/collision/closest.h"
+#include "physics_node/pbd/kernels.h"
+#include "tests/unit/physics/kernels_scalar.h"
+
+namespace fulcrum::physics {
+namespace {
+
+constexpr float kMm = 0.001f;
+
+std::vector<const Kernels*> VectorKernels() {
+  std::vector<const Kernels*> kernels{&BaselineKernels()};
+  if (HasAvx2()) {
+    kernels.push_back(&Avx2Kernels());
+  }
+  if (HasAvx512()) {
+    kernels.push_back(&Avx512Kernels());
+  }
+  return kernels;
+}
+
+class Touch : public testing::Test {
+ protected:
+  /// Somewhere in a cube of 10 mm.
+  Vec3f Point() { return Vec3f(coordinate_(random_), coordinate_(random_), coordinate_(random_)); }
+  void MakeTriangles(float size) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Vec3f middle = Point();
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        SetCorner(corner, lane, middle + size * Point());
+      }
+    }
+  }
+  void SetCorner(std::size_t corner, std::size_t lane, const Vec3f& x) {
+    for (int axis = 0; axis < 3; ++axis) {
+      triangles_.corner[corner][axis][lane] = x[axis];
+    }
+  }
+  [[nodiscard]] Vec3f Corner(std::size_t corner, std::size_t lane) const {
+    const auto& x = triangles_.corner[corner];
+    return {x[0][lane], x[1][lane], x[2][lane]};
+  }
+  static void Put(const Vec3f& p, float* out) { std::copy_n(p.data(), 3, out); }
+  /// From p0-p1 to q0-q1.
+  static SegmentMotion Moving(const Vec3f& p0, const Vec3f& p1, const Vec3f& q0, const Vec3f& q1) {
+    SegmentMotion motion;
+    Put(p0, motion.from[0]);
+    Put(p1, motion.from[1]);
+    Put(q0, motion.to[0]);
+    Put(q1, motion.to[1]);
+    return motion;
+  }
+  /// The same on every instruction set.
+  [[nodiscard]] TouchBatch Look(const SegmentMotion& motion, const TouchSearch& search) const {
+    using Bits = std::array<std::uint32_t, sizeof(TouchBatch) / sizeof(std::uint32_t)>;
+    TouchBatch oracle{};
+    ScalarKernels().first_touch(motion, search, triangles_, &oracle);
+    for (const Kernels* kernels : VectorKernels()) {
+      TouchBatch other{};
+      kernels->first_touch(motion, search, triangles_, &other);
+      EXPECT_EQ(std::bit_cast<Bits>(oracle), std::bit_cast<Bits>(other)) << kernels->name;
+    }
+    return oracle;
+  }
+
+  std::mt19937 random_{11};
+  std::uniform_real_distribution<float> coordinate_{-5 * kMm, 5 * kMm};
+  TriangleBatch triangles_{};
+};
+
+TEST_F(Touch, AtRestTheyAreTheClosestPointsOfEachTriangle) {
+  int crossings = 0;
+  for (int trial = 0; trial < 500; ++trial) {
+    MakeTriangles(trial % 2 == 0 ? 2.0f : 0.2f);
+    const Vec3f p0 = Point(), p1 = trial % 10 == 0 ? p0 : Point();
+    const TouchBatch touch = Look(Moving(p0, p1, p0, p1), {1, 1, 0, 0, 1, 1, 1});
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Vec3f a = Corner(0, lane), b = Corner(1, lane), c = Corner(2, lane);
+      const ClosestPoints one = ClosestSegmentTriangle(p0, p1, a, b, c);
+      ASSERT_NEAR(std::sqrt(touch.distance_sq[lane]), std::sqrt(one.distance_sq), 1e-6f);
+      ASSERT_EQ(touch.crosses[lane] > 0, one.crosses);
+      crossings += one.crosses;
+      // Where two places are equally near either will do: told by their distance.
+      const Vec3f on_triangle = touch.weight[0][lane] * a + touch.weight[1][lane] * b + touch.weight[2][lane] * c;
+      const Vec3f on_segment = p0 + touch.t[lane] * (p1 - p0);
+      ASSERT_NEAR((on_triangle - on_segment).norm(), std::sqrt(one.distance_sq), 2e-6f);
+      ASSERT_NEAR(touch.weight[0][lane] + touch.weight[1][lane] + touch.weight[2][lane], 1.0f, 1e-4f);
+      ASSERT_GE(std::min({touch.weight[0][lane], touch.weight[1][lane], touch.weight[2][lane]}), -1e-5f);
+    }
+  }
+  EXPECT_GT(crossings, 100);
+}
+
+TEST_F(Touch, OnTheWayTheFirstOneCounts) {
+  constexpr float kReach = 1 * kMm;
+  int touched = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    MakeTriangles(0.2f);
+    const Vec3f p0 = Point(), p1 = Point(), way = 2.0f * Point();
+    const TouchSearch search{0.25f, 1, kReach, way.norm(), 1e-3f, 1, 1};
+    const TouchBatch touch = Look(Moving(p0, p1, p0 + way, p1 + way), search);
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      float first = 2, nearest = 1;
+      for (float u = search.u0; u <= 1.0f; u += 1.0f / 512) {
+        const ClosestPoints at =
+            ClosestSegmentTriangle(p0 + u * way, p1 + u * way, Corner(0, lane), Corner(1, lane), Corner(2, lane));
+        const float distance = std::sqrt(at.distance_sq);
+        nearest = std::min(nearest, distance);
+        if (distance <= kReach) {
+          first = u;
+          break;
+        }
+      }
+      const float found = std::sqrt(touch.distance_sq[lane]);
+      if (first < 2) {
+        ASSERT_LE(found, kReach);
+        ASSERT_NEAR(touch.u[lane], first, 4e-3f);
+        ++touched;
+      } else {
+        ASSERT_GE(found, nearest - way.norm() * 2e-3f);  // The nearest of those looks that it took.
+      }
+    }
+  }
+  EXPECT_GT(touched, 100);
+}
+
+TEST_F(Touch, WhatIsFarIsLeftAloneAndWhatIsHalfwayIsSeenByItsMiddle) {
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    const Vec3f middle(0, 0, static_cast<float>(lane) * kMm);
+    SetCorner(0, lane, middle + Vec3f(0.1f * kMm, 0, 0));
+    SetCorner(1, lane, middle + Vec3f(-0.1f * kMm, 0.1f * kMm, 0));
+    SetCorner(2, lane, middle + Vec3f(0, -0.1f * kMm, 0));
+  }
+  const Vec3f p0(-kMm, 0, 0), p1(kMm, 0, 0);
+  const TouchBatch touch = Look(Moving(p0, p1, p0, p1), {1, 1, 0, 0, 1, 5.5f * kMm, 2.5f * kMm});
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    if (lane > 5) {
+      EXPECT_GT(touch.distance_sq[lane], 1e38f);
+    } else {
+      EXPECT_NEAR(std::sqrt(touch.distance_sq[lane]), static_cast<float>(lane) * kMm, 1e-5f);
+      EXPECT_EQ(touch.weight[0][lane] == touch.weight[1][lane], lane > 2);
+    }
+  }
+}
+
+TEST_F(Touch, DegenerateAndDamagedTrianglesEnd) {
+  MakeTriangles(0.2f);
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    SetCorner(corner, 1, Vec3f::Zero());
+    SetCorner(corner, 2, static_cast<float>(corner) * Vec3f(kMm, 0, 0));
+    SetCorner(corner, 3, 1e-12f * Point());
+  }
+  SetCorner(1, 4, Vec3f::Constant(std::nanf("")));
+  SetCorner(2, 5, Vec3f::Constant(3e38f));
+  const Vec3f p0(-kMm, 0, kMm), p1(kMm, 0, kMm), way(0, 0, -10 * kMm);
+  for (const Vec3f& end : {p1, p0}) {
+    const TouchBatch touch = Look(Moving(p0, end, p0 + way, end + way), {0, 1, kMm, way.norm(), 0.04f, 1, 1});
+    for (const std::size_t lane : {1u, 2u, 3u}) {
+      EXPECT_LE(touch.distance_sq[lane], 1.1f * kMm * kMm);
+      EXPECT_NEAR(touch.weight[0][lane] + touch.weight[1][lane] + touch.weight[2][lane], 1.0f, 1e-4f);
+    }
+    EXPECT_GT(touch.distance_sq[4], 1e38f);
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum::physics
