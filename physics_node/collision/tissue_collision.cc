@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "physics_node/collision/closest.h"
+#include "services/core/breathing.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -27,19 +27,8 @@ constexpr int kMaxWalk = 8;
 
 }  // namespace
 
-Vec3f BreathingOffset(const Breathing& breathing, double time_s) {
-  if (!(breathing.amplitude_m > 0.0f) || !(breathing.period_s > 0.0f)) {
-    return Vec3f::Zero();
-  }
-  const double phase = 2.0 * std::numbers::pi * time_s / breathing.period_s;
-  return static_cast<float>(0.5 * breathing.amplitude_m * (1.0 - std::cos(phase))) * breathing.direction;
-}
-
-bool Breathes(SurfaceRole role) { return role != SurfaceRole::kPelvis; }
-
-TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
-                                 const Breathing& breathing)
-    : scene_(scene), model_(model), particles_(particles), breathing_(breathing) {
+TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
+    : scene_(scene), model_(model), particles_(particles) {
   travel_.assign((particles->particle_count() + kBlock - 1) / kBlock, 0.0f);
   WatchOrgan();
   for (const StaticSurface& surface : scene.static_surfaces) {
@@ -135,7 +124,7 @@ void TissueCollision::WatchFixed(const StaticSurface& surface) {
   }
   Fixed fixed;
   fixed.tree = TriangleTree(std::move(corners));
-  fixed.breathes = Breathes(surface.role);
+  fixed.breathes = scene_.breathing.amplitude_m > 0.0f && Breathes(surface.role);
   std::vector<bool> on_surface(particles_->particle_count(), false);
   for (const Triangle& t : scene_.tube_surface) {
     on_surface[t[0]] = on_surface[t[1]] = on_surface[t[2]] = true;
@@ -162,6 +151,13 @@ void TissueCollision::WatchFixed(const StaticSurface& surface) {
   MakeGroups(fixed.watches, &fixed.groups);
   fixed.near.reserve(fixed.watches.size());
   fixed_.push_back(std::move(fixed));
+}
+
+bool TissueCollision::breath_near() const {
+  return std::any_of(fixed_.begin(), fixed_.end(), [this](const Fixed& fixed) {
+    return fixed.breathes && std::any_of(fixed.near.begin(), fixed.near.end(),
+                                         [&](const Near& near) { return Touches(fixed.watches[near.watch].particle); });
+  });
 }
 
 std::size_t TissueCollision::near_count() const {
@@ -270,8 +266,8 @@ void TissueCollision::FindPairs(std::span<const float> moved, double time0_s, do
     organ_moved = b < organ_blocks ? std::max(organ_moved, moved[b]) : organ_moved;
   }
   organ_travel_ += organ_moved;
-  breath0_ = BreathingOffset(breathing_, time0_s);
-  breath1_ = BreathingOffset(breathing_, time1_s);
+  breath0_ = BreathingOffset(scene_.breathing, time0_s);
+  breath1_ = BreathingOffset(scene_.breathing, time1_s);
   breath_travel_ += (breath1_ - breath0_).norm();
   LookAtDue(&organ_groups_, &organ_, moved, organ_travel_, organ_moved, &near_organ_, [&](Watch* watch) {
     const Vec3f p = particles_->At(watch->at);

@@ -18,17 +18,6 @@
 
 namespace fulcrum::physics {
 
-/// Smooth to-and-fro of the surroundings: amplitude * (1 - cos(2 pi t / period)) / 2 along `direction`.
-struct Breathing {
-  Vec3f direction = Vec3f::UnitZ();  ///< Unit, frame W.
-  float amplitude_m = 0;             ///< Peak to peak; 0: none.
-  float period_s = 4;
-};
-/// Where the surroundings that breathe are at session time `time_s`, against their place in the scene [m].
-[[nodiscard]] Vec3f BreathingOffset(const Breathing& breathing, double time_s);
-/// The pelvis does not breathe; wall, retroperitoneum and the rest do.
-[[nodiscard]] bool Breathes(SurfaceRole role);
-
 class TissueCollision {
  public:
   /// Particles of a block, in scene order.
@@ -37,8 +26,7 @@ class TissueCollision {
   static constexpr std::uint32_t kSource = 0x80000000u;
   static constexpr std::size_t kMaxRows = 4096;
 
-  TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
-                  const Breathing& breathing = {});
+  TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
 
   [[nodiscard]] std::size_t block_count() const { return travel_.size(); }
   /// Largest movement since ParticleStore::Previous in each block [m]: a `moved` for FindPairs where the solver has
@@ -46,11 +34,14 @@ class TissueCollision {
   void MeasureMoves(std::vector<float>* moved) const;
 
   /// Once a step, before it. `moved`: at least how far any particle of each block has moved since the last call [m],
-  /// [block_count()]; 0 for blocks at rest. Session time at the begin and the end of the step [s].
+  /// [block_count()]; 0 for blocks at rest. Simulated time at the begin and the end of the step [s]: what
+  /// breathes moves from one to the other.
   void FindPairs(std::span<const float> moved, double time0_s, double time1_s);
   /// Appends the contacts of the substep from part u0 to u1 of the step; at most kMaxRows.
   void Rows(float u0, float u1, std::vector<ContactRow>* rows) const;
 
+  /// Something that breathes is near live tissue in this step: it will push.
+  [[nodiscard]] bool breath_near() const;
   /// Particles near something in this step.
   [[nodiscard]] std::size_t near_count() const;
   /// Particles looked at by the last FindPairs.
@@ -114,7 +105,6 @@ class TissueCollision {
   SceneView scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
-  Breathing breathing_;
 
   std::vector<Index> ring_start_, ring_;  ///< Organ triangles that share a corner with each.
   std::vector<Watch> organ_;

@@ -20,6 +20,7 @@ struct HeldRecord {
   float p_T[3];
 };
 struct Header {
+  std::uint64_t steps;
   std::uint32_t particle_count;
   float max_displacement_m;
   ToolRecord tools[kMaxTools];
@@ -40,6 +41,7 @@ std::size_t WriteCheckpoint(const TissueSimulation& simulation, float max_displa
   const Index count = particles.particle_count();
   const SimulationMemory memory = simulation.Save();
   Header header{};
+  header.steps = memory.steps;
   header.particle_count = count;
   header.max_displacement_m = max_displacement_m;
   std::byte* at = slot.data() + sizeof(Header) + 2 * PositionsBytes(count);
@@ -85,6 +87,7 @@ std::optional<RestoredCheckpoint> ReadCheckpoint(std::span<const std::byte> payl
   std::memcpy(previous.data(), payload.data() + sizeof(Header) + floats * sizeof(float), floats * sizeof(float));
   const std::byte* at = payload.data() + sizeof(Header) + 2 * floats * sizeof(float);
   SimulationMemory memory;
+  memory.steps = header.steps;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolRecord& tool = header.tools[i];
     const Quatf q(tool.q_WT[0], tool.q_WT[1], tool.q_WT[2], tool.q_WT[3]);

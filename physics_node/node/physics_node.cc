@@ -185,6 +185,7 @@ void PhysicsNode::PublishFrame(const Tick& tick) {
     header.tool_sequence = tool_state_.stamp.sequence;
     header.handle_sequence = handle_state_.stamp.sequence;
     header.session_time_s = tick.session_time_s;
+    header.simulated_time_s = simulation_.simulated_time_s();
     header.vertex_count = simulation_.particles().particle_count();
     header.grasping_tools = 0;
     for (std::uint32_t i = 0; i < kMaxTools; ++i) {

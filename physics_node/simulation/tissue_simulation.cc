@@ -96,7 +96,23 @@ void TissueSimulation::FindContacts(bool tissue_moved, float tissue_step) {
   collision_.FindPairs(motions, tissue_moved, tissue_step);
 }
 
-/// True while the tissue sleeps and no tool stirs it.
+/// Of tissue with itself and its surroundings, for the step that leads to the present time.
+void TissueSimulation::FindTissueContacts() {
+  const double now = simulated_time_s();
+  tissue_collision_.FindPairs(moved_, now - static_cast<double>(scene_.physics.dt_s), now);
+}
+
+/// Asleep: what breathes has come near the tissue.
+bool TissueSimulation::BreathStirs() {
+  if (!(scene_.breathing.amplitude_m > 0.0f) || scene_.physics.mode == PhysicsMode::kPaper) {
+    return false;
+  }
+  moved_.assign(tissue_collision_.block_count(), 0.0f);
+  FindTissueContacts();
+  return tissue_collision_.breath_near();
+}
+
+/// True while the tissue sleeps and nothing stirs it.
 bool TissueSimulation::MayRest() {
   if (!asleep_) {
     return false;
@@ -108,6 +124,7 @@ bool TissueSimulation::MayRest() {
     FindContacts(false);
     asleep_ = !touched && collision_.pairs().empty();
   }
+  asleep_ = asleep_ && !BreathStirs();
   return asleep_;
 }
 
@@ -150,7 +167,7 @@ void TissueSimulation::PlaceHeld(float u) {
 /// Pairs of tools and tissue and of tissue with itself, for substeps of h.
 void TissueSimulation::FindAllContacts(float h) {
   FindContacts(true, largest_speed_ * h);
-  tissue_collision_.FindPairs(moved_, 0.0, 0.0);
+  FindTissueContacts();
 }
 
 StepReport TissueSimulation::StepXpbd() {
@@ -215,6 +232,7 @@ StepReport TissueSimulation::StepAccurate() {
 }
 
 StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools) {
+  ++steps_;
   FollowTools(tools);
   const bool held = grasps_[0].holding() || grasps_[1].holding();
   UpdateGrasps();
@@ -228,8 +246,10 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
   quarantined_ += report.resets;
   const bool stirred = std::any_of(tracks_.begin(), tracks_.end(),
                                    [](const ToolTrack& track) { return track.present && track.moved(); });
-  still_steps_ =
-      report.max_step_m < kStill && !holds && !(stirred && !collision_.pairs().empty()) ? still_steps_ + 1 : 0;
+  still_steps_ = report.max_step_m < kStill && !holds && !(stirred && !collision_.pairs().empty()) &&
+                         !tissue_collision_.breath_near()
+                     ? still_steps_ + 1
+                     : 0;
   if (still_steps_ >= kStillSteps) {
     solver_.Stop();
     if (accurate_) {
@@ -298,6 +318,7 @@ std::uint64_t TissueSimulation::StateHash() const {
 
 SimulationMemory TissueSimulation::Save() const {
   SimulationMemory memory;
+  memory.steps = steps_;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     memory.pose[i] = tracks_[i].now;
     memory.known[i] = tracks_[i].present;
@@ -334,6 +355,7 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
     tracks_[i] = {memory.known[i], memory.pose[i], memory.pose[i]};
     grasps_[i].Restore(memory.grasp_state[i], memory.held[i], &particles_);
   }
+  steps_ = memory.steps;
   asleep_ = false;
   still_steps_ = 0;
   ++state_version_;

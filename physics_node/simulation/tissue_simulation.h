@@ -31,6 +31,7 @@ struct StepReport {
 
 /// What a restarted node needs to go on; positions apart.
 struct SimulationMemory {
+  std::uint64_t steps = 0;  ///< Made so far.
   std::array<ToolPose, kMaxTools> pose;
   std::array<bool, kMaxTools> known{};
   std::array<Grasp::State, kMaxTools> grasp_state{};
@@ -68,6 +69,10 @@ class TissueSimulation {
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return contacts_.force(tool); }
   [[nodiscard]] bool asleep() const { return asleep_; }
   [[nodiscard]] std::uint64_t quarantined() const { return quarantined_; }
+  /// Steps made times their length [s]: what breathes follows it.
+  [[nodiscard]] double simulated_time_s() const {
+    return static_cast<double>(steps_) * static_cast<double>(scene_.physics.dt_s);
+  }
   /// Changes whenever positions may have changed.
   [[nodiscard]] std::uint64_t state_version() const { return state_version_; }
 
@@ -90,12 +95,14 @@ class TissueSimulation {
 
   void FollowTools(const std::array<ToolInput, kMaxTools>& tools);
   [[nodiscard]] bool MayRest();
+  [[nodiscard]] bool BreathStirs();
   [[nodiscard]] StepReport StepPaper();
   [[nodiscard]] StepReport StepXpbd();
   [[nodiscard]] StepReport StepAccurate();
   void PlaceHeld(float u);
   void FindAllContacts(float h);
   void UpdateGrasps();
+  void FindTissueContacts();
   void FindContacts(bool tissue_moved, float tissue_step = 0);
 
   SceneView scene_;
@@ -117,6 +124,7 @@ class TissueSimulation {
   std::array<ToolTrack, kMaxTools> tracks_;
   bool asleep_ = false;
   int still_steps_ = 0;
+  std::uint64_t steps_ = 0;
   std::uint64_t quarantined_ = 0, state_version_ = 1;
 };
 

@@ -88,6 +88,8 @@ void RenderNode::TakeTissue() {
   std::swap(tissue_, new_tissue_);
   if (moved) {
     view_.SetTissue(std::span<const float>(tissue_.xyz).first(3 * scene_.rest_position.size()));
+  }
+  if (view_.SetBreath(tissue_.header.simulated_time_s) || moved) {
     changed_on_screen_ = changed_in_file_ = true;
   }
 }

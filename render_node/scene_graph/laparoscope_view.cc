@@ -19,6 +19,7 @@
 #include "render_node/scene_graph/mesh.h"
 #include "render_node/scene_graph/program.h"
 #include "render_node/scene_graph/smoke.h"
+#include "services/core/breathing.h"
 
 namespace fulcrum::render {
 namespace {
@@ -73,6 +74,7 @@ void AppendCavity(const SceneView& scene, std::vector<Vec3f>* positions, std::ve
       radius = std::max(radius, (p - centre).norm());
     }
   }
+  radius += scene.breathing.amplitude_m;
   radius *= 1.02f;  // Just outside, also between the corners of its facets.
   const auto first = static_cast<Index>(positions->size());
   for (Index i = 0; i <= kParallels; ++i) {
@@ -99,6 +101,7 @@ struct LaparoscopeView::Impl {
   explicit Impl(const SceneView& view);
   void AddMask();
   void AddSurroundings();
+  void AddSurfaces(const char* name, bool breathing);
   void AddRectum();
   void AddSheets();
   void BindTextures();
@@ -114,6 +117,8 @@ struct LaparoscopeView::Impl {
   std::vector<float> xyz;
   std::vector<Vec3f> rectum_positions, rectum_normals;
   std::vector<Float4> membrane_coordinates;
+  Vec3f breath = Vec3f::Zero();
+  osg::ref_ptr<osg::Uniform> breath_shift = new osg::Uniform("shift", osg::Vec3(0, 0, 0));
   bool tissue_changed = true;
   bool topology_changed = true;
 
@@ -188,10 +193,21 @@ void LaparoscopeView::Impl::AddMask() {
 }
 
 void LaparoscopeView::Impl::AddSurroundings() {
+  AddSurfaces("surroundings", false);
+  if (scene.breathing.amplitude_m > 0) {
+    AddSurfaces("breathing", true);
+  }
+}
+
+/// Those of the fixed surfaces that breathe, or the others and the cavity around everything.
+void LaparoscopeView::Impl::AddSurfaces(const char* name, bool breathing) {
   std::vector<Vec3f> positions, normals;
   std::vector<Float4> colours, coordinates;
   std::vector<Triangle> triangles;
   for (const StaticSurface& surface : scene.static_surfaces) {
+    if ((scene.breathing.amplitude_m > 0 && Breathes(surface.role)) != breathing) {
+      continue;
+    }
     const auto first = static_cast<Index>(positions.size());
     for (Index k = 0; k < surface.vertex_count; ++k) {
       const Vec3f& p = scene.static_vertices[surface.first_vertex + k];
@@ -209,13 +225,18 @@ void LaparoscopeView::Impl::AddSurroundings() {
   }
   normals.resize(positions.size());
   ComputeNormals(positions, triangles, normals);
-  AppendCavity(scene, &positions, &normals, &triangles);
+  if (!breathing) {
+    AppendCavity(scene, &positions, &normals, &triangles);
+  }
   for (std::size_t k = coordinates.size(); k < positions.size(); ++k) {
     coordinates.push_back({positions[k].x(), positions[k].y(), positions[k].z(), 1});
     colours.push_back({0.60f, 0.11f, 0.085f, 0.4f});
   }
   std::unique_ptr<Mesh> mesh;
-  Add(&mesh, "surroundings", false, kSurroundings, "surroundings.frag");
+  Add(&mesh, name, false, kSurroundings, "surroundings.frag");
+  if (breathing) {
+    mesh->state()->addUniform(breath_shift);
+  }
   // Seen from behind a wall is not there: the scope may look in through it.
   mesh->state()->setAttributeAndModes(new osg::CullFace(osg::CullFace::BACK));
   mesh->SetPositions(positions);
@@ -298,6 +319,7 @@ void LaparoscopeView::Impl::BindTextures() {
   bind(kStructureUnit, "structures", MakeTexture(map.width, map.height, 2, map.texels, false));
   const auto vec3 = [](const Vec3f& v) { return osg::Vec3(v.x(), v.y(), v.z()); };
   state->addUniform(new osg::Uniform("behind", 0.0f));
+  state->addUniform(new osg::Uniform("shift", osg::Vec3(0, 0, 0)));
   state->addUniform(new osg::Uniform("atlas_per_metre", osg::Vec2(1 / size.x(), 1 / size.y())));
   state->addUniform(new osg::Uniform("light_position", vec3(scope.light_position)));
   state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
@@ -333,6 +355,16 @@ LaparoscopeView::~LaparoscopeView() = default;
 void LaparoscopeView::SetTissue(std::span<const float> xyz) {
   std::copy(xyz.begin(), xyz.end(), impl_->xyz.begin());
   impl_->tissue_changed = true;
+}
+
+bool LaparoscopeView::SetBreath(double simulated_time_s) {
+  const Vec3f breath = BreathingOffset(impl_->scene.breathing, simulated_time_s);
+  if (breath == impl_->breath) {
+    return false;
+  }
+  impl_->breath = breath;
+  impl_->breath_shift->set(osg::Vec3(breath.x(), breath.y(), breath.z()));
+  return true;
 }
 
 bool LaparoscopeView::SetTopology(const TopologyState& topology) {

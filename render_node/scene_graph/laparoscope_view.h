@@ -21,6 +21,8 @@ class LaparoscopeView {
 
   /// Particles in scene order, 3 * n floats [m]. @pre n is the scene's count.
   void SetTissue(std::span<const float> xyz);
+  /// Where what breathes is drawn: at this time of the simulation [s]. True when that is another place than before.
+  bool SetBreath(double simulated_time_s);
   /// False, and nothing changes, when it belongs to another grid.
   bool SetTopology(const TopologyState& topology);
   /// False when the patch lies outside the sheet or has the wrong size.

@@ -8,6 +8,7 @@ in vec4 osg_MultiTexCoord0;
 uniform mat4 osg_ModelViewMatrix;
 uniform mat4 osg_ProjectionMatrix;
 uniform mat3 osg_NormalMatrix;
+uniform vec3 shift;    // Of the whole mesh, from where its vertices are [m].
 uniform float behind;  // Counts as this much farther from the eye where surfaces lie on each other [m].
 out vec3 position;
 out vec3 normal;
@@ -15,7 +16,7 @@ out vec4 colour;
 out vec4 coordinate;
 
 void main() {
-  position = (osg_ModelViewMatrix * osg_Vertex).xyz;
+  position = (osg_ModelViewMatrix * (osg_Vertex + vec4(shift, 0.0))).xyz;
   // Along the line of sight: the place in the picture stays the same.
   gl_Position = osg_ProjectionMatrix * vec4(position * (1.0 + behind / length(position)), 1.0);
   normal = osg_NormalMatrix * osg_Normal;

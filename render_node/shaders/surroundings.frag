@@ -1,4 +1,4 @@
-// Surfaces that do not move: abdominal wall, retroperitoneum, pelvis, bladder. colour: of the material; alpha is how
+// Surfaces that do not deform: abdominal wall, retroperitoneum, pelvis, bladder. colour: of the material; alpha is how
 // much fat lies beneath. coordinate: place in frame W [m], 1 for the far and matt background.
 in vec3 position;
 in vec3 normal;

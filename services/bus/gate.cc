@@ -80,9 +80,9 @@ bool PassesGate(const ToolState& m) noexcept {
 
 bool PassesGate(const TissueFrame& m) noexcept {
   const TissueFrameHeader& h = m.header;
-  return IsStamp(h.stamp) && IsSessionTime(h.session_time_s) && h.vertex_count <= kMaxTissueVertices &&
-         (h.grasping_tools >> kMaxTools) == 0 && m.xyz.size() == 3 * std::size_t{h.vertex_count} &&
-         AllWithin(m.xyz, kMaxCoordinate_m);
+  return IsStamp(h.stamp) && IsSessionTime(h.session_time_s) && IsSessionTime(h.simulated_time_s) &&
+         h.vertex_count <= kMaxTissueVertices && (h.grasping_tools >> kMaxTools) == 0 &&
+         m.xyz.size() == 3 * std::size_t{h.vertex_count} && AllWithin(m.xyz, kMaxCoordinate_m);
 }
 
 bool PassesGate(const ContactModel& m) noexcept {

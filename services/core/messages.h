@@ -82,6 +82,7 @@ struct TissueFrameHeader {
   std::uint64_t tool_sequence = 0;      ///< ToolState consumed.
   std::uint64_t handle_sequence = 0;    ///< HandleState consumed.
   double session_time_s = 0;
+  double simulated_time_s = 0;  ///< Of these positions: what breathes is where it is then.
   std::uint32_t vertex_count = 0;
   /// Bit per tool: the grasper holds tissue.
   std::uint32_t grasping_tools = 0;

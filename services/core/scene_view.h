@@ -71,6 +71,13 @@ struct ThermalParams {
   float shrink_max = 0.3f;  ///< Rest length lost at full collagen damage.
 };
 
+/// Section `breathing`: to-and-fro of the fixed surroundings but the pelvis; services/core/breathing.h.
+struct Breathing {
+  Vec3f direction = Vec3f::UnitZ();  ///< Unit, frame W: where they go from their place in the scene.
+  float amplitude_m = 0;             ///< Peak to peak; 0: none.
+  float period_s = 4;
+};
+
 /// Section `render`.
 struct RenderParams {
   std::uint32_t width = 960, height = 540;
@@ -187,6 +194,7 @@ struct SceneView {
   ThermalParams thermal;
   RenderParams render;
   HapticsParams haptics;
+  Breathing breathing;
 
   /// Particles: tube vertices [0, tube_vertex_count), then the membrane grid.
   Index tube_vertex_count = 0;

@@ -327,6 +327,7 @@ SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
   fixed.thermal = settings.thermal;
   fixed.render = settings.render;
   fixed.haptics = settings.haptics;
+  fixed.breathing = settings.breathing;
   fixed.tools = settings.tools;
   fixed.node_mask = settings.node_mask;
   fixed.tube_vertex_count = static_cast<Index>(anatomy.organ_vertices.size());

@@ -57,6 +57,7 @@ struct FixedPart {
   ThermalParams thermal;
   RenderParams render;
   HapticsParams haptics;
+  Breathing breathing;
   MembraneGrid membrane;
   Index tube_vertex_count;
   FixedTool tools[kMaxTools];
@@ -64,7 +65,8 @@ struct FixedPart {
   std::uint32_t node_mask;
 };
 static_assert(sizeof(FixedPart) == 64 + sizeof(PhysicsParams) + sizeof(ThermalParams) + sizeof(RenderParams) +
-                                       sizeof(HapticsParams) + sizeof(MembraneGrid) + 4 + kMaxTools * 32 + 8);
+                                       sizeof(HapticsParams) + sizeof(Breathing) + sizeof(MembraneGrid) + 4 +
+                                       kMaxTools * 32 + 8);
 
 FixedPart ToFixed(const SceneView& view) {
   FixedPart fixed{};
@@ -73,6 +75,7 @@ FixedPart ToFixed(const SceneView& view) {
   fixed.thermal = view.thermal;
   fixed.render = view.render;
   fixed.haptics = view.haptics;
+  fixed.breathing = view.breathing;
   fixed.membrane = view.membrane;
   fixed.tube_vertex_count = view.tube_vertex_count;
   for (int i = 0; i < kMaxTools; ++i) {
@@ -91,6 +94,7 @@ void FromFixed(const FixedPart& fixed, SceneView* view) {
   view->thermal = fixed.thermal;
   view->render = fixed.render;
   view->haptics = fixed.haptics;
+  view->breathing = fixed.breathing;
   view->membrane = fixed.membrane;
   view->tube_vertex_count = fixed.tube_vertex_count;
   for (int i = 0; i < kMaxTools; ++i) {

@@ -107,6 +107,7 @@ struct SceneSettings {
   ThermalParams thermal;
   RenderParams render;
   HapticsParams haptics;
+  Breathing breathing;
   double organ_density_kg_m3 = 1050;
   TubeSettings tube;  ///< Used without `import`.
   std::optional<ImportSettings> import;

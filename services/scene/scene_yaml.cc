@@ -136,6 +136,19 @@ void ReadHaptics(StrictMap map, HapticsParams* h) {
   ReadSi(&map, "force_scale", Range::Between(0, 100), &h->force_scale);
 }
 
+void ReadBreathing(StrictMap map, PhysicsMode mode, Breathing* b) {
+  b->direction = map.Vector3Si("direction", b->direction, Range::Between(-1, 1));
+  if (!(b->direction.norm() > 0.1f)) {
+    map.Fail("direction", "must be a direction, not (nearly) zero");
+  }
+  b->direction.normalize();
+  ReadSi(&map, "amplitude_mm", Range::Between(0, 50), &b->amplitude_m);
+  ReadSi(&map, "period_s", Range::Between(0.5, 60), &b->period_s);
+  if (b->amplitude_m > 0 && mode == PhysicsMode::kPaper) {
+    map.Fail("amplitude_mm", "needs physics.mode accurate or xpbd: in mode paper nothing touches the surroundings");
+  }
+}
+
 void ReadTube(StrictMap map, TubeSettings* t) {
   ReadInteger(&map, "rings", 3, 1000, &t->rings);
   ReadInteger(&map, "segments", 6, 200, &t->segments);
@@ -371,6 +384,7 @@ SceneDescription Read(StrictYaml* yaml, const std::filesystem::path& base, const
     ReadTool(tools.MapOrDefaults(key), &scene.tools[i]);
   }
   ReadPhysics(root.MapOrDefaults("physics"), &scene.physics);
+  ReadBreathing(root.MapOrDefaults("breathing"), scene.physics.mode, &scene.breathing);
   ReadThermal(root.MapOrDefaults("thermal"), &scene.thermal);
   ReadRender(root.MapOrDefaults("render"), &scene.render);
   ReadHaptics(root.MapOrDefaults("haptics"), &scene.haptics);

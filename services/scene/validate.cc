@@ -176,6 +176,9 @@ void CheckParameters(const SceneView& s) {
                {"haptics.hand_stiffness", h.hand_stiffness_N_m, 0, 1e5f},
                {"haptics.hand_damping", h.hand_damping_Ns_m, 0, 1e4f},
                {"haptics.force_scale", h.force_scale, 0, 100},
+               {"breathing.direction", s.breathing.direction.norm(), 0.999f, 1.001f},
+               {"breathing.amplitude", s.breathing.amplitude_m, 0, 0.05f},
+               {"breathing.period", s.breathing.period_s, 0.5f, 60},
                {"script duration", s.script_duration_s, 0, 86400},
                {"membrane texel", s.membrane.texel_m, 1e-6f, 0.01f}});
   CheckPoint("scene", 0, r.scope_tip_W);

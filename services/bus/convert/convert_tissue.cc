@@ -44,6 +44,7 @@ TissueFrameHeader FromWire(const idl::TissueFrameHeader& w) {
           .tool_sequence = w.tool_sequence(),
           .handle_sequence = w.handle_sequence(),
           .session_time_s = w.session_time_s(),
+          .simulated_time_s = w.simulated_time_s(),
           .vertex_count = w.vertex_count(),
           .grasping_tools = w.grasping_tools()};
 }
@@ -73,6 +74,7 @@ bool CloseLoan(const TissueFrameHeader& header, std::byte* loan) {
   w.tool_sequence(header.tool_sequence);
   w.handle_sequence(header.handle_sequence);
   w.session_time_s(header.session_time_s);
+  w.simulated_time_s(header.simulated_time_s);
   w.vertex_count(header.vertex_count);
   w.grasping_tools(header.grasping_tools);
   PutHeader(w, loan);

@@ -32,8 +32,8 @@ inline bool Same(const ToolState& a, const ToolState& b) { return Same(a.stamp, 
 inline bool Same(const TissueFrameHeader& a, const TissueFrameHeader& b) {
   return Same(a.stamp, b.stamp) && a.scene_hash == b.scene_hash && a.topology_revision == b.topology_revision &&
          a.tool_sequence == b.tool_sequence && a.handle_sequence == b.handle_sequence &&
-         a.session_time_s == b.session_time_s && a.vertex_count == b.vertex_count &&
-         a.grasping_tools == b.grasping_tools;
+         a.session_time_s == b.session_time_s && a.simulated_time_s == b.simulated_time_s &&
+         a.vertex_count == b.vertex_count && a.grasping_tools == b.grasping_tools;
 }
 inline bool Same(const TissueFrame& a, const TissueFrame& b) { return Same(a.header, b.header) && a.xyz == b.xyz; }
 

@@ -87,6 +87,16 @@ TEST_F(SceneFileTest, RoundTripKeepsEveryByte) {
   });
 }
 
+TEST_F(SceneFileTest, BreathingIsKept) {
+  SceneSettings settings = Small();
+  settings.breathing = {Vec3f::UnitX(), 0.007f, 3.5f};
+  EXPECT_NE(WriteSceneFile(BuildProcedural(settings), kSource, file_), hash_);
+  const SceneFile file(file_);
+  EXPECT_EQ(file.view().breathing.direction, Vec3f(Vec3f::UnitX()));
+  EXPECT_EQ(file.view().breathing.amplitude_m, 0.007f);
+  EXPECT_EQ(file.view().breathing.period_s, 3.5f);
+}
+
 TEST_F(SceneFileTest, SameSceneGivesTheSameFile) {
   const auto again = dir_ / "again.scene";
   EXPECT_EQ(WriteSceneFile(BuildProcedural(Small()), kSource, again), hash_);
@@ -238,6 +248,9 @@ TEST(SceneValidation, EveryRuleRefusesAndNamesItsSection) {
       {"surface_vertices", "weight", [](SceneData& s) { s.surface_vertices[4].barycentric[0] = kNan; }},
       {"surface_triangles", "index", [](SceneData& s) { s.surface_triangles[0][0] = kNoIndex; }},
       {"static_vertices", "coordinate", [](SceneData& s) { s.static_vertices[0].z() = 1e20f; }},
+      {"scene", "breathing.amplitude", [](SceneData& s) { s.fixed.breathing.amplitude_m = kNan; }},
+      {"scene", "breathing.period", [](SceneData& s) { s.fixed.breathing.period_s = 0; }},
+      {"scene", "breathing.direction", [](SceneData& s) { s.fixed.breathing.direction.setZero(); }},
       {"static_surfaces", "beyond", [](SceneData& s) { s.static_surfaces[0].vertex_count = 0xffffffffu; }},
       {"static_surfaces", "role", [](SceneData& s) { s.static_surfaces[0].role = static_cast<SurfaceRole>(9); }},
       {"static_triangles", "index", [](SceneData& s) { s.static_triangles[0][0] = kNoIndex; }},

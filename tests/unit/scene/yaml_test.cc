@@ -142,6 +142,10 @@ const Rule kRules[] = {
     {"Camera", "fov_deg: 60", "fov_deg: 400", {"render.fov_deg", "10 to 150"}},
     {"Temperature", "cell_um: 100", "body_temperature_C: 370", {"thermal.body_temperature_C", "0 to 60"}},
     {"NodeName", "name: small", "name: small\nnodes: [physics_nod]", {"nodes", "physics_nod", "valid: handle_bridge"}},
+    {"BreathingTooDeep", "thermal:", "breathing: {amplitude_mm: 80}\nthermal:", {"breathing.amplitude_mm", "0 to 50"}},
+    {"BreathingPeriod", "thermal:", "breathing: {period_s: 0}\nthermal:", {"breathing.period_s", "0.5 to 60"}},
+    {"BreathingNowhere", "thermal:", "breathing: {direction: [0, 0, 0]}\nthermal:", {"breathing.direction"}},
+    {"BreathingUnit", "thermal:", "breathing: {amplitude_mm: 2 s}\nthermal:", {"amplitude_mm", "wrong unit"}},
     {"NoName", "name: small", "label: small", {"name"}},
     {"Grasp", "grasp_radius_mm: 4", "grasp_close_deg: 50", {"grasp_open_deg", "above grasp_close_deg"}},
 };
@@ -185,6 +189,24 @@ TEST(SceneYamlImport, RulesOfTheImport) {
             std::string::npos);
   EXPECT_NE(refusal(With(kImported, "  import:", "  procedural: {}\n  import:")).find("either"), std::string::npos);
   std::filesystem::remove_all(folder);
+}
+
+TEST(SceneYaml, BreathingIsOptionalAndCompiled) {
+  const std::string small = TextOf(kScenes / "small.yaml");
+  EXPECT_EQ(ParseSceneYaml(small, "x.yaml", {}).settings.breathing.amplitude_m, 0.0f);
+  const std::string breathing =
+      With(small, "thermal:", "breathing: {direction: [0, -0.3, 0.4], amplitude_mm: 6, period_s: 5}\nthermal:");
+  const SceneDescription read = ParseSceneYaml(breathing, "x.yaml", {});
+  const Breathing& b = read.settings.breathing;
+  EXPECT_NEAR((b.direction - Vec3f(0, -0.6f, 0.8f)).norm(), 0, 1e-6);
+  EXPECT_EQ(b.amplitude_m, 0.006f);
+  EXPECT_EQ(b.period_s, 5.0f);
+  const SceneData scene = BuildProcedural(read.settings);
+  EXPECT_EQ(FindFault(scene.View()), std::nullopt);
+  EXPECT_NE(scene.fixed.hash, BuildProcedural(Small()).fixed.hash);
+  EXPECT_EQ(BuildProcedural(ParseSceneYaml(read.effective_yaml, "x.yaml", {}).settings).fixed.hash, scene.fixed.hash);
+  const std::string in_paper = Refusal(With(breathing, "mode: accurate", "mode: paper"));
+  EXPECT_NE(in_paper.find("breathing.amplitude_mm: needs physics.mode"), std::string::npos) << in_paper;
 }
 
 TEST(SceneYaml, NodesCanBeChosen) {
