@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+
+#include "physics_node/accurate/for_tasks.h"
 
 namespace fulcrum::physics::accurate {
 namespace {
@@ -19,12 +20,6 @@ constexpr float kLargestSpeed = 5.0f;
 constexpr float kFarthest = 10.0f;
 /// Rows of the membrane that the coarse matrix takes over per step: complete about once in 60 steps.
 constexpr int kRefreshRows = 5;
-
-/// Planes of a field's membrane part.
-struct Planes {
-  float* p[3];
-  operator float* const*() { return p; }
-};
 
 Vec3f Read(const float* field, ParticleRef r) {
   const std::size_t s = r.step;
@@ -54,7 +49,7 @@ Effort EffortOf(PhysicsPreset preset) {
 }
 
 AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model, const TissueModel& tissue,
-                               ParticleStore* particles, const Kernels& kernels)
+                               ParticleStore* particles, int threads, const Kernels& kernels)
     : kernels_(kernels),
       particles_(particles),
       tube_count_(particles->tube_count()),
@@ -67,7 +62,9 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
       rest_scale_(1.0f / (1.0f + scene.physics.membrane_prestrain)),
       gravity_(model.gravity.cast<float>()),
       elements_(scene, model, *particles),
-      coarse_(scene, model, *particles) {
+      coarse_(scene, model, *particles),
+      workers_(threads),
+      regions_(MakeRegions(model)) {
   PackSheet(model);
   PackOrgan(model, tube_count_);
   base_extra_ = FloatArray(plane_ + tube_count_ + 1);
@@ -76,19 +73,17 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
     base_extra_[base < tube_floats_ ? plane_ + base / 4 : base - tube_floats_] += stiffness;
   }
   std::copy_n(base_extra_.data(), base_extra_.size(), extra_.data());
-  for (int d = 0; d < 3; ++d) {
-    const auto i = static_cast<std::size_t>(d);
-    kt_[i] = FloatArray(plane_);
-    for (FloatArray& axis : m_[i]) {
-      axis = FloatArray(plane_);
-    }
+  for (std::size_t d = 0; d < 3; ++d) {
+    kt_[d] = FloatArray(plane_);
+    along_[d] = FloatArray(plane_);
   }
   for (FloatArray& block : block_) {
     block = FloatArray(plane_);
   }
-  for (FloatArray* a : {&organ_c_, &organ_f_, &organ_stress_, &organ_block_}) {
+  for (FloatArray* a : {&organ_c_, &organ_f_, &organ_block_}) {
     *a = FloatArray(12 * (tube_count_ + std::size_t{1}));
   }
+  organ_stress_ = FloatArray(16 * (tube_count_ + std::size_t{1}));
   const std::size_t pool = particles->raw().size();
   for (FloatArray* a : {&velocity_, &place_, &residual_, &z_, &p_, &q_, &d_, &load_}) {
     *a = FloatArray(pool);
@@ -96,19 +91,34 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   for (Index p = 0; p < model.load.size(); ++p) {
     Write(load_.data(), particles->Ref(p), model.load[p].cast<float>());
   }
-  carry_ = FloatArray(kCarry * std::size_t{particles->layout().stride} + 16);
+  for (int worker = 0; worker < workers_.count(); ++worker) {
+    carry_.emplace_back(kCarry * std::size_t{particles->layout().stride} + 16);
+  }
   row_sums_ = FloatArray(static_cast<std::size_t>(rows_) * coarse_.row_width());
-  partial_.assign(static_cast<std::size_t>(rows_) / kChunkRows + 1, 0.0);
-  Follow(tissue);
+  const auto regions = static_cast<std::size_t>(regions_.count());
+  for (auto* flags : {&held_before_, &touched_before_, &held_now_, &touched_now_}) {
+    flags->assign(regions, 0);
+  }
+  speed_.assign(regions, 0.0f);
+  partial_.assign(regions, 0.0);
+  guess_.assign(regions, {});
+  finish_.assign(regions, {});
+  const GridLayout& layout = particles->layout();
+  for (std::uint32_t row = 0; row < layout.rows; ++row) {
+    for (std::uint32_t col = 0; col < layout.cols; ++col) {
+      for (std::size_t d = 0; d < 3; ++d) {
+        FollowEdge(tissue, layout.Offset(row, col), d);
+      }
+    }
+  }
+  elements_.Follow(tissue);
+  FollowRegions();
   // The first coarse matrix: all of it, at rest.
   const Effort effort = EffortOf(scene.physics.preset);
   const Inertia inertia = MakeInertia(scene.physics.dt_s / static_cast<float>(effort.substeps));
   (void)Guess(inertia.h);
-  organ_blocks_due_ = true;
   Linearise(inertia, {});
-  const Sheet sheet = MakeSheet();
-  const SheetMatrix matrix = MakeMatrix();
-  coarse_.Refresh(sheet, matrix, inertia.inertia, rows_);
+  coarse_.Refresh(MakeSheet(), MakeMatrix(), inertia.inertia, rows_);
 }
 
 Sheet AccurateSolver::MakeSheet() const {
@@ -124,10 +134,9 @@ Sheet AccurateSolver::MakeSheet() const {
 SheetMatrix AccurateSolver::MakeMatrix() {
   SheetMatrix matrix;
   for (std::size_t d = 0; d < 3; ++d) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      matrix.m[d][axis] = m_[d][axis].data();
-    }
     matrix.kt[d] = kt_[d].data();
+    matrix.along[d] = along_[d].data();
+    matrix.place[d] = place_.data() + tube_floats_ + d * plane_;
   }
   for (std::size_t i = 0; i < 6; ++i) {
     matrix.block[i] = block_[i].data();
@@ -150,6 +159,10 @@ Organ AccurateSolver::MakeOrgan() const {
           organ_mass_.data()};
 }
 
+OrganMatrix AccurateSolver::MakeOrganMatrix() {
+  return {organ_c_.data(), organ_f_.data(), organ_stress_.data(), organ_block_.data()};
+}
+
 Inertia AccurateSolver::MakeInertia(float h) const {
   return {h, (1.0f + damping_ * h) / (h * h), {gravity_.x(), gravity_.y(), gravity_.z()}};
 }
@@ -168,20 +181,71 @@ SheetLinearise AccurateSolver::At(const FloatArray& place, FloatArray* residual)
   return at;
 }
 
-/// body(chunk, first row, end row): the unit of work; sums over chunks are taken in their order.
-template <class Body>
-void AccurateSolver::ForChunks(const Body& body) const {
-  for (int row = 0, chunk = 0; row < rows_; row += kChunkRows, ++chunk) {
-    body(chunk, row, std::min(row + kChunkRows, rows_));
-  }
+OrganLinearisation AccurateSolver::OrganAt(const FloatArray& place) {
+  return {place.data(), particles_->tube(), velocity_.data(), load_.data(), residual_.data()};
 }
 
 std::uint32_t AccurateSolver::BeginStep() {
-  const std::uint32_t resets = particles_->RepairPlaces(kFarthest);
-  particles_->RememberPlaces();
+  std::uint32_t resets = 0;
+  if (!kernels_.within(particles_->tube(), kFarthest, 4 * std::size_t{tube_count_}, true) ||
+      !kernels_.within(particles_->plane(0), kFarthest, 3 * plane_, false)) {
+    resets = particles_->RepairPlaces(kFarthest);
+    regions_.WakeAll();
+  }
+  ForTasks([&](const Task& task, int, int) {
+    ForParts(task, [&](std::size_t first, std::size_t count) { particles_->RememberPlaces(first, count); });
+  });
   organ_blocks_due_ = true;
   refresh_due_ = true;
   return resets;
+}
+
+/// What held particles and contacts begin, move or end wakes the tissue there.
+void AccurateSolver::WakeTouched(std::span<const HeldPlace> held, std::span<const ContactRow> contacts) {
+  std::fill(held_now_.begin(), held_now_.end(), std::uint8_t{0});
+  std::fill(touched_now_.begin(), touched_now_.end(), std::uint8_t{0});
+  for (const HeldPlace& h : held) {
+    held_now_[static_cast<std::size_t>(regions_.Of(h.at))] = 1;
+  }
+  for (const ContactRow& row : contacts) {
+    Vec3f here = Vec3f::Zero();
+    for (std::size_t k = 0; k < static_cast<std::size_t>(row.count); ++k) {
+      here += row.weight[k] * particles_->At(row.at[k]);
+    }
+    if (row.normal.dot(here) - row.offset < 0.0f) {
+      const std::uint8_t how = row.drift.squaredNorm() > 0.0f ? 2 : 1;
+      for (std::size_t k = 0; k < static_cast<std::size_t>(row.count); ++k) {
+        std::uint8_t& touched = touched_now_[static_cast<std::size_t>(regions_.Of(row.at[k]))];
+        touched = std::max(touched, how);
+      }
+    }
+  }
+  for (std::size_t i = 0; i < held_now_.size(); ++i) {
+    const bool touch_changes = (touched_now_[i] != 0) != (touched_before_[i] != 0);
+    if (held_now_[i] != 0 || held_before_[i] != 0 || touch_changes || touched_now_[i] == 2) {
+      regions_.Wake(static_cast<int>(i));
+    }
+  }
+  held_before_.swap(held_now_);
+  touched_before_.swap(touched_now_);
+}
+
+/// What is no longer computed does not move, and is no direction of the solve.
+void AccurateSolver::FollowRegions() {
+  elements_.FollowRegions(regions_);
+  coarse_.FollowRegions(regions_);
+  for (const int region : regions_.taken_out()) {
+    ForParts(regions_.Extent(region), [&](std::size_t first, std::size_t count) {
+      for (FloatArray* field : {&velocity_, &z_, &p_, &q_, &d_}) {
+        std::fill_n(field->data() + first, count, 0.0f);
+      }
+      std::copy_n(particles_->pool() + first, count, place_.data() + first);
+    });
+    const Task extent = regions_.Extent(region);
+    for (int v = extent.first; !extent.sheet && v < extent.end; ++v) {
+      place_[4 * static_cast<std::size_t>(v) + 3] = 0;  // A copy of the inverse mass.
+    }
+  }
 }
 
 /// Free particles go on with their velocity; what has no sound velocity stays.
@@ -190,21 +254,16 @@ GuessCount AccurateSolver::Guess(float h) {
   const SheetLinearise at = At(place_, nullptr);
   float* const place[3] = {place_.data() + tube_floats_, place_.data() + tube_floats_ + plane_,
                            place_.data() + tube_floats_ + 2 * plane_};
-  GuessCount count{};
-  ForChunks([&](int, int row0, int row1) {
-    const GuessCount rows = kernels_.sheet_guess(sheet, h, at.start, at.velocity, place, row0, row1);
-    count.largest_sq = std::max(count.largest_sq, rows.largest_sq);
-    count.resets += rows.resets;
+  ForTasks([&](const Task& task, int index, int) {
+    guess_[static_cast<std::size_t>(index)] =
+        task.sheet ? kernels_.sheet_guess(sheet, h, at.start, at.velocity, place, task.first, task.end)
+                   : kernels_.organ_guess(h, particles_->tube(), velocity_.data(), place_.data(), Vertex(task.first),
+                                          Vertex(task.end));
   });
-  const float* x = particles_->tube();
-  for (std::size_t i = 0; i < 4 * std::size_t{tube_count_}; i += 4) {
-    const Vec3f step = h * Vec3f(velocity_[i], velocity_[i + 1], velocity_[i + 2]);
-    const bool moves = x[i + 3] > 0.0f, sound = step.squaredNorm() < 1e30f;
-    count.resets += moves && !sound ? 1 : 0;
-    count.largest_sq = moves && sound ? std::max(count.largest_sq, step.squaredNorm()) : count.largest_sq;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      place_[i + axis] = x[i + axis] + (moves && sound ? step[static_cast<Eigen::Index>(axis)] : 0.0f);
-    }
+  GuessCount count{};
+  for (std::size_t i = 0; i < regions_.tasks().size(); ++i) {
+    count.largest_sq = std::max(count.largest_sq, guess_[i].largest_sq);
+    count.resets += guess_[i].resets;
   }
   return count;
 }
@@ -225,27 +284,17 @@ double AccurateSolver::EnergyAt(const FloatArray& place, const Inertia& inertia,
   const Sheet sheet = MakeSheet();
   const Organ organ = MakeOrgan();
   const SheetLinearise at = At(place, nullptr);
-  double sum = 0;
-  ForChunks([&](int, int row0, int row1) { sum += kernels_.sheet_energy(sheet, inertia, at, row0, row1); });
-  sum += kernels_.organ_energy(organ, place.data(), 0, tube_count_);
-  const float* x = particles_->tube();
-  for (std::size_t v = 0; v < tube_count_; ++v) {
-    if (!(x[4 * v + 3] > 0.0f)) {
-      continue;
-    }
-    float energy = 0, load = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const float moved = place[4 * v + axis] - x[4 * v + axis];
-      load += moved * load_[4 * v + axis];
-      energy += 0.5f * inertia.inertia * moved * moved - moved * velocity_[4 * v + axis] / inertia.h -
-                moved * inertia.gravity[axis];
-    }
-    sum += static_cast<double>(organ_mass_[v] * energy - load);
-  }
-  return sum + elements_.Energy(place.data(), contacts);
+  const OrganLinearisation organ_at = OrganAt(place);
+  ForTasks([&](const Task& task, int index, int) {
+    partial_[static_cast<std::size_t>(index)] =
+        task.sheet ? kernels_.sheet_energy(sheet, inertia, at, task.first, task.end)
+                   : kernels_.organ_energy(organ, inertia, organ_at, Vertex(task.first), Vertex(task.end));
+  });
+  return SumOfPartials() + elements_.Energy(place.data(), contacts);
 }
 
-void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRow> contacts) {
+/// Contacts stiffen the diagonal of what they touch.
+void AccurateSolver::RefreshContactStiffness() {
   const auto slot = [&](ParticleRef at) {
     return static_cast<std::uint32_t>(at.base < tube_floats_ ? plane_ + at.base / 4 : at.base - tube_floats_);
   };
@@ -253,7 +302,6 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
     extra_[i] = base_extra_[i];
   }
   extra_changed_.clear();
-  elements_.Touch(place_.data(), particles_->pool(), contacts);
   for (const Element& contact : elements_.touching()) {
     const float stiffness = contact.kt + contact.m.squaredNorm();
     for (int k = 0; k < contact.count; ++k) {
@@ -262,130 +310,63 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
       extra_changed_.push_back(slot(contact.at[i]));
     }
   }
+}
+
+void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRow> contacts) {
+  elements_.Touch(place_.data(), particles_->pool(), regions_, contacts);
+  RefreshContactStiffness();
   const Sheet sheet = MakeSheet();
   const SheetMatrix matrix = MakeMatrix();
   const SheetLinearise at = At(place_, &residual_);
-  ForChunks([&](int, int row0, int row1) {
-    kernels_.sheet_linearise(sheet, inertia, at, matrix, carry_.data(), row0, row1);
-  });
-  kernels_.middle_blocks(sheet, coarse_.middle(), matrix, inertia.inertia);
   const Organ organ = MakeOrgan();
-  const OrganMatrix organ_matrix{organ_c_.data(), organ_f_.data(), organ_stress_.data(), organ_block_.data()};
-  kernels_.organ_linearise(organ, organ_matrix, place_.data(), 0, tube_count_);
-  kernels_.organ_gather(organ, organ_matrix, place_.data(), residual_.data(), 0, tube_count_);
-  // What touches the organ changes its blocks; left alone it does not turn enough in a step to matter.
-  if (organ_blocks_due_ || !elements_.touching().empty()) {
-    kernels_.organ_blocks(organ, organ_matrix, particles_->tube(), extra_.data() + plane_, inertia.inertia, 0,
-                          tube_count_);
-    organ_blocks_due_ = !elements_.touching().empty();
-  }
-  const float* x = particles_->tube();
-  for (std::size_t v = 0; v < tube_count_; ++v) {
-    const float mass = x[4 * v + 3] > 0.0f ? organ_mass_[v] : 0.0f;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::size_t i = 4 * v + axis;
-      const float momentum = (place_[i] - x[i]) * inertia.inertia - velocity_[i] / inertia.h;
-      residual_[i] = load_[i] + mass * (inertia.gravity[axis] - momentum) - residual_[i];
+  const OrganMatrix organ_matrix = MakeOrganMatrix();
+  const Middle middle = coarse_.middle();
+  // Stresses reach the vertices around, edges the row below: two phases.
+  const std::span<const Task> tasks = regions_.tasks(), patches = regions_.patches();
+  const auto sheet_tasks =
+      static_cast<std::size_t>(std::count_if(tasks.begin(), tasks.end(), [](const Task& task) { return task.sheet; }));
+  workers_.Run(static_cast<int>(sheet_tasks + patches.size()), [&](int index, int worker) {
+    const auto i = static_cast<std::size_t>(index);
+    const Task& task = i < sheet_tasks ? tasks[i] : patches[i - sheet_tasks];
+    if (task.sheet) {
+      kernels_.sheet_linearise(sheet, inertia, at, matrix, carry_[static_cast<std::size_t>(worker)].data(), task.first,
+                               task.end);
+    } else {
+      kernels_.organ_linearise(organ, organ_matrix, place_.data(), Vertex(task.first), Vertex(task.end));
     }
-  }
+  });
+  // What touches the organ changes its blocks; left alone it does not turn enough in a step to matter.
+  const bool organ_blocks = organ_blocks_due_ || !elements_.touching().empty();
+  organ_blocks_due_ = !elements_.touching().empty();
+  ForTasks([&](const Task& task, int, int) {
+    if (task.sheet) {
+      const auto [first, end] = coarse_.MiddleRows(task.first, task.end);
+      kernels_.middle_blocks(sheet, middle, matrix, inertia.inertia, first, end);
+      return;
+    }
+    kernels_.organ_residual(organ, organ_matrix, inertia, OrganAt(place_), Vertex(task.first), Vertex(task.end));
+    if (organ_blocks) {
+      kernels_.organ_blocks(organ, organ_matrix, particles_->tube(), extra_.data() + plane_, inertia.inertia,
+                            Vertex(task.first), Vertex(task.end));
+    }
+  });
   elements_.Linearise(place_.data(), residual_.data());
 }
 
-/// z <- M^-1 residual; returns residual . z.
-double AccurateSolver::Precondition() {
+float AccurateSolver::LargestCorrection() {
   const Sheet sheet = MakeSheet();
-  const SheetMatrix matrix = MakeMatrix();
-  const auto planes = [&](FloatArray& field) {
-    return Planes{
-        {field.data() + tube_floats_, field.data() + tube_floats_ + plane_, field.data() + tube_floats_ + 2 * plane_}};
-  };
-  Planes r = planes(residual_), z = planes(z_);
-  const Middle middle = coarse_.middle();
-  ForChunks([&](int, int row0, int row1) { kernels_.sheet_restrict(sheet, middle, r, row_sums_.data(), row0, row1); });
-  coarse_.Solve(row_sums_.data(), residual_.data(), particles_->tube());
-  ForChunks([&](int chunk, int row0, int row1) {
-    partial_[static_cast<std::size_t>(chunk)] = kernels_.sheet_precondition(sheet, middle, matrix, r, z, row0, row1);
+  const float* const d[3] = {d_.data() + tube_floats_, d_.data() + tube_floats_ + plane_,
+                             d_.data() + tube_floats_ + 2 * plane_};
+  ForTasks([&](const Task& task, int index, int) {
+    partial_[static_cast<std::size_t>(index)] =
+        task.sheet ? static_cast<double>(kernels_.sheet_largest(sheet, d, task.first, task.end))
+                   : static_cast<double>(kernels_.organ_largest(d_.data(), Vertex(task.first), Vertex(task.end)));
   });
-  double sum = 0;
-  for (const double part : partial_) {
-    sum += part;
+  double largest = 0;
+  for (std::size_t i = 0; i < regions_.tasks().size(); ++i) {
+    largest = std::max(largest, partial_[i]);
   }
-  for (std::size_t v = 0; v < tube_count_; ++v) {
-    const float* block = organ_block_.data() + 12 * v;
-    const float* b = residual_.data() + 4 * v;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      z_[4 * v + axis] = block[axis] * b[0] + block[4 + axis] * b[1] + block[8 + axis] * b[2];
-    }
-  }
-  coarse_.Prolong(particles_->tube(), z_.data());
-  for (std::size_t i = 0; i < 4 * std::size_t{tube_count_}; i += 4) {
-    sum += static_cast<double>(z_[i] * residual_[i] + z_[i + 1] * residual_[i + 1] + z_[i + 2] * residual_[i + 2]);
-  }
-  return sum;
-}
-
-/// q <- A p; returns p . q.
-double AccurateSolver::Apply(const FloatArray& direction, float inertia) {
-  const Sheet sheet = MakeSheet();
-  const SheetMatrix matrix = MakeMatrix();
-  const float* const p[3] = {direction.data() + tube_floats_, direction.data() + tube_floats_ + plane_,
-                             direction.data() + tube_floats_ + 2 * plane_};
-  float* const q[3] = {q_.data() + tube_floats_, q_.data() + tube_floats_ + plane_,
-                       q_.data() + tube_floats_ + 2 * plane_};
-  ForChunks([&](int chunk, int row0, int row1) {
-    partial_[static_cast<std::size_t>(chunk)] =
-        kernels_.sheet_apply(sheet, inertia, matrix, p, q, carry_.data(), row0, row1);
-  });
-  double sum = 0;
-  for (const double part : partial_) {
-    sum += part;
-  }
-  const Organ organ = MakeOrgan();
-  const OrganMatrix organ_matrix{organ_c_.data(), organ_f_.data(), organ_stress_.data(), organ_block_.data()};
-  kernels_.organ_stress(organ, organ_matrix, direction.data(), 0, tube_count_);
-  kernels_.organ_gather(organ, organ_matrix, direction.data(), q_.data(), 0, tube_count_);
-  for (std::size_t v = 0; v < tube_count_; ++v) {
-    for (std::size_t i = 4 * v; i < 4 * v + 3; ++i) {
-      q_[i] += organ_mass_[v] * inertia * direction[i];
-      sum += static_cast<double>(q_[i] * direction[i]);
-    }
-  }
-  return sum + elements_.Apply(direction.data(), q_.data());
-}
-
-/// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d.
-void AccurateSolver::Solve(float inertia, int iterations) {
-  const std::size_t count = tube_floats_ + 3 * plane_;
-  double rz = Precondition();
-  const FloatArray* direction = &z_;
-  for (int i = 0; i < iterations; ++i) {
-    const double curvature = Apply(*direction, inertia);
-    // Nothing left to solve, or not finite: Finish counts what is not.
-    const bool stop = !(rz > 0.0) || !(curvature > 0.0);
-    const auto alpha = stop ? 0.0f : static_cast<float>(rz / curvature);
-    (i == 0 ? kernels_.start : kernels_.advance)(alpha, direction->data(), q_.data(), d_.data(), residual_.data(),
-                                                 count);
-    if (stop) {
-      return;
-    }
-    if (i + 1 < iterations) {
-      if (i == 0) {
-        std::swap(z_, p_);
-      }
-      const double next = Precondition();
-      kernels_.combine(z_.data(), static_cast<float>(next / rz), p_.data(), count);
-      direction = &p_;
-      rz = next;
-    }
-  }
-}
-
-float AccurateSolver::LargestCorrection() const {
-  float largest = 0;
-  for (std::size_t i = 0; i < 4 * std::size_t{tube_count_}; i += 4) {
-    largest = std::max(largest, d_[i] * d_[i] + d_[i + 1] * d_[i + 1] + d_[i + 2] * d_[i + 2]);
-  }
-  return std::sqrt(std::max(largest, kernels_.largest(d_.data() + tube_floats_, plane_, plane_)));
+  return std::sqrt(static_cast<float>(largest));
 }
 
 void AccurateSolver::LimitCorrection(float largest) {
@@ -410,50 +391,54 @@ void AccurateSolver::LimitCorrection(float largest) {
   }
 }
 
+/// Halves the correction until the energy is no larger than without it.
+void AccurateSolver::SearchAlongCorrection(const Inertia& inertia, std::span<const ContactRow> contacts) {
+  const double before = EnergyAt(place_, inertia, contacts);
+  const std::size_t count = tube_floats_ + 3 * plane_;
+  for (int halving = 0; halving <= kHalvings; ++halving) {
+    for (std::size_t i = 0; i < count; ++i) {
+      q_[i] = place_[i] + d_[i];
+    }
+    if (EnergyAt(q_, inertia, contacts) <= before || halving == kHalvings) {
+      break;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      d_[i] *= 0.5f;
+    }
+  }
+}
+
 /// Positions and velocities from place + d. What is not finite stays where it was, at rest.
 SubstepReport AccurateSolver::Finish(float h) {
-  SubstepReport report;
-  float largest = 0;
-  const float inverse_h = 1.0f / h;
-  const auto finish = [&](std::size_t i, float w) {
-    float* x = particles_->pool() + i;
-    float v[3], square = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      v[axis] = (place_[i + axis] + d_[i + axis] - x[axis]) * inverse_h;
-      square += v[axis] * v[axis];
-    }
-    if (!(square < 1e30f)) {
-      report.resets += w > 0.0f ? 1 : 0;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        velocity_[i + axis] = 0;
-      }
-      return;
-    }
-    if (square > kLargestSpeed * kLargestSpeed) {
-      const float part = kLargestSpeed / std::sqrt(square);
-      for (float& component : v) {
-        component *= part;
-      }
-      square = kLargestSpeed * kLargestSpeed;
-    }
-    largest = w > 0.0f ? std::max(largest, square) : largest;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      x[axis] += h * v[axis];
-      velocity_[i + axis] = v[axis];
-    }
-  };
-  for (std::size_t i = 0; i < 4 * std::size_t{tube_count_}; i += 4) {
-    finish(i, particles_->tube()[i + 3]);
-  }
   const auto planes = [&](FloatArray& field) {
     float* at = field.data() + tube_floats_;
-    return Planes{{at, at + plane_, at + 2 * plane_}};
+    return std::array<float*, 3>{at, at + plane_, at + 2 * plane_};
   };
-  Planes place = planes(place_), d = planes(d_), velocity = planes(velocity_);
+  const Sheet sheet = MakeSheet();
+  const std::array<float*, 3> place = planes(place_), d = planes(d_), velocity = planes(velocity_);
   float* const x[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
-  const FinishCount sheet = kernels_.finish(place, d, particles_->plane(3), h, kLargestSpeed, x, velocity, plane_);
-  report.resets += sheet.resets;
-  largest = std::max(largest, sheet.largest_speed_sq);
+  std::fill(speed_.begin(), speed_.end(), 0.0f);
+  ForTasks([&](const Task& task, int index, int) {
+    FinishCount& total = finish_[static_cast<std::size_t>(index)] = {};
+    const int size = task.sheet ? Regions::kRows : Regions::kVertices;
+    for (int first = task.first; first < task.end; first += size) {
+      const int end = std::min(first + size, task.end);
+      const FinishCount part =
+          task.sheet
+              ? kernels_.sheet_finish(sheet, place.data(), d.data(), h, kLargestSpeed, x, velocity.data(), first, end)
+              : kernels_.organ_finish(place_.data(), d_.data(), h, kLargestSpeed, particles_->pool(), velocity_.data(),
+                                      Vertex(first), Vertex(end));
+      speed_[static_cast<std::size_t>(regions_.At(task.sheet, first))] = std::sqrt(part.largest_speed_sq);
+      total.largest_speed_sq = std::max(total.largest_speed_sq, part.largest_speed_sq);
+      total.resets += part.resets;
+    }
+  });
+  SubstepReport report;
+  float largest = 0;
+  for (std::size_t i = 0; i < regions_.tasks().size(); ++i) {
+    largest = std::max(largest, finish_[i].largest_speed_sq);
+    report.resets += finish_[i].resets;
+  }
   report.largest_speed_m_s = std::sqrt(largest);
   return report;
 }
@@ -461,6 +446,10 @@ SubstepReport AccurateSolver::Finish(float h) {
 SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const HeldPlace> held,
                                       std::span<ContactRow> contacts) {
   const Inertia inertia = MakeInertia(h);
+  WakeTouched(held, contacts);
+  if (regions_.Rebuild()) {
+    FollowRegions();
+  }
   const GuessCount guess = Guess(h);
   if (guess.resets > 0) {
     ForgetDamagedVelocities();
@@ -478,7 +467,7 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
     searched = true;
   }
   Linearise(inertia, contacts);
-  if (refresh_due_) {
+  if (refresh_due_ && regions_.everything()) {
     coarse_.Refresh(MakeSheet(), MakeMatrix(), inertia.inertia, kRefreshRows);
     refresh_due_ = false;
   }
@@ -487,26 +476,12 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
   LimitCorrection(largest);
   if (largest > kDoubtfulCorrection) {
     searched = true;
-    const double before = EnergyAt(place_, inertia, contacts);
-    const std::size_t count = tube_floats_ + 3 * plane_;
-    for (int halving = 0; halving <= kHalvings; ++halving) {
-      for (std::size_t i = 0; i < count; ++i) {
-        q_[i] = place_[i] + d_[i];
-      }
-      if (EnergyAt(q_, inertia, contacts) <= before || halving == kHalvings) {
-        break;
-      }
-      for (std::size_t i = 0; i < count; ++i) {
-        d_[i] *= 0.5f;
-      }
-    }
+    SearchAlongCorrection(inertia, contacts);
   }
   // Before the particles move on: their start is still in the store.
-  for (std::size_t i = 0; !contacts.empty() && i < tube_floats_ + 3 * plane_; ++i) {
-    q_[i] = place_[i] + d_[i];
-  }
-  Elements::WriteForces(q_.data(), particles_->pool(), contacts);
+  Elements::WriteForces(place_.data(), d_.data(), particles_->pool(), contacts);
   SubstepReport report = Finish(h);
+  regions_.Settle(speed_, h);
   report.largest_correction_m = largest;
   report.searched = searched;
   report.resets += guess.resets;
@@ -515,7 +490,10 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
 
 Vec3f AccurateSolver::ForceOn(ParticleRef at) const { return Read(residual_.data(), at); }
 Vec3f AccurateSolver::Velocity(ParticleRef at) const { return Read(velocity_.data(), at); }
-void AccurateSolver::SetVelocity(ParticleRef at, const Vec3f& v) { Write(velocity_.data(), at, v); }
+void AccurateSolver::SetVelocity(ParticleRef at, const Vec3f& v) {
+  Write(velocity_.data(), at, v);
+  regions_.Wake(regions_.Of(at));
+}
 void AccurateSolver::Stop() { std::fill_n(velocity_.data(), velocity_.size(), 0.0f); }
 
 }  // namespace fulcrum::physics::accurate

@@ -11,6 +11,8 @@
 #include "physics_node/accurate/coarse_space.h"
 #include "physics_node/accurate/elements.h"
 #include "physics_node/accurate/kernels.h"
+#include "physics_node/accurate/regions.h"
+#include "physics_node/accurate/workers.h"
 #include "physics_node/energy/elastic_model.h"
 #include "physics_node/pbd/particle_store.h"
 #include "physics_node/pbd/tissue_model.h"
@@ -39,10 +41,12 @@ struct Effort {
 
 class AccurateSolver {
  public:
+  /// `threads` with the caller's; results do not depend on it.
   AccurateSolver(const SceneView& scene, const ElasticModel& model, const TissueModel& tissue, ParticleStore* particles,
-                 const Kernels& kernels = BestKernels());
+                 int threads = 1, const Kernels& kernels = BestKernels());
 
-  /// Takes over what cutting and shrinking have done to `tissue`. In place; nothing is factored again.
+  /// After each TissueModel::Apply that changed something: takes over what cutting and shrinking have done, and wakes
+  /// it. Costs what the edit costs; nothing is factored again.
   void Follow(const TissueModel& tissue);
 
   /// Once a step, before its substeps: remembers the places. A place damaged since the last step (not finite, far off)
@@ -54,32 +58,49 @@ class AccurateSolver {
   [[nodiscard]] Vec3f ForceOn(ParticleRef at) const;
   [[nodiscard]] Vec3f Velocity(ParticleRef at) const;
   void Stop();
-  /// Velocities from two states a step apart, for a restart.
+  /// Velocities from two states a step apart, for a restart. Wakes.
   void SetVelocity(ParticleRef at, const Vec3f& v);
 
- private:
-  static constexpr int kChunkRows = 16;
+  /// What is computed at present.
+  [[nodiscard]] const Regions& regions() const { return regions_; }
 
+ private:
   [[nodiscard]] Sheet MakeSheet() const;
   [[nodiscard]] SheetMatrix MakeMatrix();
   [[nodiscard]] Organ MakeOrgan() const;
+  [[nodiscard]] OrganMatrix MakeOrganMatrix();
   [[nodiscard]] SheetLinearise At(const FloatArray& place, FloatArray* residual);
+  [[nodiscard]] OrganLinearisation OrganAt(const FloatArray& place);
   [[nodiscard]] Inertia MakeInertia(float h) const;
   void PackSheet(const ElasticModel& model);
   void PackOrgan(const ElasticModel& model, std::uint32_t tube_count);
+  [[nodiscard]] Regions MakeRegions(const ElasticModel& model) const;
+  void FollowEdge(const TissueModel& tissue, std::uint32_t at, std::size_t direction);
+
+  void WakeTouched(std::span<const HeldPlace> held, std::span<const ContactRow> contacts);
+  void FollowRegions();
   GuessCount Guess(float h);
   void ForgetDamagedVelocities();
   void PutHeld(std::span<const HeldPlace> held);
+  /// Of what is computed, for comparisons.
   [[nodiscard]] double EnergyAt(const FloatArray& place, const Inertia& inertia, std::span<const ContactRow> contacts);
   void Linearise(const Inertia& inertia, std::span<const ContactRow> contacts);
+  void RefreshContactStiffness();
   double Precondition();
   double Apply(const FloatArray& p, float inertia);
   void Solve(float inertia, int iterations);
+  [[nodiscard]] float LargestCorrection();
   void LimitCorrection(float largest);
+  void SearchAlongCorrection(const Inertia& inertia, std::span<const ContactRow> contacts);
   SubstepReport Finish(float h);
-  [[nodiscard]] float LargestCorrection() const;
+
+  /// body(task, index, worker) for all that is computed, shared by the threads.
   template <class Body>
-  void ForChunks(const Body& body) const;
+  void ForTasks(const Body& body);
+  /// body(first float, count) for the parts of a field that belong to a task.
+  template <class Body>
+  void ForParts(const Task& task, const Body& body) const;
+  [[nodiscard]] double SumOfPartials() const;
 
   const Kernels& kernels_;
   ParticleStore* particles_;
@@ -101,16 +122,25 @@ class AccurateSolver {
   FloatArray base_extra_, extra_;  ///< Membrane plane, then tube: stiffness of elements on the diagonal.
   std::vector<std::uint32_t> extra_changed_;
 
+  // Who works on what.
+  Workers workers_;
+  Regions regions_;
+  std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_;  ///< By region.
+  std::vector<float> speed_;                                                         ///< By region [m/s].
+
   // The linearisation.
-  std::array<std::array<FloatArray, 3>, 3> m_;
-  std::array<FloatArray, 3> kt_;
+  std::array<FloatArray, 3> kt_, along_;
   std::array<FloatArray, 6> block_;
   FloatArray organ_c_, organ_f_, organ_stress_, organ_block_;
 
-  // Fields: velocity, place of the linearisation, residual, z = M^-1 r, direction p, q = A p, correction d.
+  // Fields: velocity, place of the linearisation, residual, z = M^-1 r, direction p, q = A p, correction d. Where
+  // nothing is computed, velocity, z, p, q and d are 0 and the place is that of the particle.
   FloatArray velocity_, place_, residual_, z_, p_, q_, d_;
-  FloatArray carry_, row_sums_;
-  std::vector<double> partial_;
+  std::vector<FloatArray> carry_;  ///< By thread.
+  FloatArray row_sums_;
+  std::vector<double> partial_;      ///< By task.
+  std::vector<GuessCount> guess_;    ///< By task.
+  std::vector<FinishCount> finish_;  ///< By task.
   bool organ_blocks_due_ = true, refresh_due_ = false;
 };
 

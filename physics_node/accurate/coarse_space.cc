@@ -297,7 +297,12 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
       for (std::size_t i = 0; i < 4; ++i) {
         w[i] -= own[i];
       }
-      const float m[3] = {value(matrix.m[d][0], col), value(matrix.m[d][1], col), value(matrix.m[d][2], col)};
+      const float root = std::sqrt(value(matrix.along[d], col));
+      float m[3];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const float* x = matrix.place[axis] + static_cast<std::size_t>(row) * stride;
+        m[axis] = root * (x[down + layout_.Offset(0, to)] - x[layout_.Offset(0, col)]);
+      }
       add(w, value(matrix.kt[d], col), m);
     }
   }
@@ -324,29 +329,72 @@ void CoarseSpace::Refresh(const Sheet& sheet, const SheetMatrix& matrix, float i
   }
 }
 
-void CoarseSpace::Solve(const float* row_sums, const float* tube_residual, const float* tube) {
-  std::fill_n(residual_.data(), residual_.size(), 0.0f);
-  const std::size_t row_floats = row_width();
-  for (std::size_t row = 0; row < static_cast<std::size_t>(rows_); ++row) {
-    const float* sums = row_sums + row * row_floats;
-    float* low = residual_.data() + static_cast<std::size_t>(cell_[row]) * row_floats;
-    const float up = fraction_[row], down = 1.0f - up;
-    for (std::size_t i = 0; i < row_floats; ++i) {
-      low[i] += down * sums[i];
-    }
-    if (up > 0.0f) {
-      for (std::size_t i = 0; i < row_floats; ++i) {
-        low[row_floats + i] += up * sums[i];
-      }
+std::pair<int, int> CoarseSpace::MiddleRows(int first, int end) const {
+  const auto before = [&](int row) {
+    return static_cast<int>(std::lower_bound(centre_.begin(), centre_.end(), row) - centre_.begin());
+  };
+  return {before(first), before(end)};
+}
+
+void CoarseSpace::FollowRegions(const Regions& regions) {
+  coarse_rests_ = !regions.everything();
+  middle_rests_.assign(static_cast<std::size_t>(middle_rows_), 0);
+  for (int r = 0; r < middle_rows_; ++r) {
+    const auto i = static_cast<std::size_t>(r);
+    const int first = r > 0 ? centre_[i - 1] + 1 : 0, end = r + 1 < middle_rows_ ? centre_[i + 1] : rows_;
+    for (int row = first; row < end; ++row) {
+      middle_rests_[i] |= regions.computed(regions.At(true, row)) ? 0 : 1;
     }
   }
   std::fill_n(nodes4_.data(), nodes4_.size(), 0.0f);
-  ForEachMiddle([&](std::size_t at, std::size_t node, float weight) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      nodes4_[4 * node + axis] += weight * residual_[at + axis * width_];
+  std::fill_n(value_.data(), value_.size(), 0.0f);
+}
+
+void CoarseSpace::Solve(std::span<const Task> tasks, const float* row_sums, const float* tube_residual,
+                        const float* tube) {
+  std::fill_n(residual_.data(), residual_.size(), 0.0f);
+  const std::size_t width = row_width();
+  for (const Task& task : tasks) {
+    if (!task.sheet) {
+      continue;
     }
-  });
-  for (std::size_t v = 0; v < tube_weights_.size(); ++v) {
+    for (auto row = static_cast<std::size_t>(task.first); row < static_cast<std::size_t>(task.end); ++row) {
+      const float* sums = row_sums + row * width;
+      float* low = residual_.data() + static_cast<std::size_t>(cell_[row]) * width;
+      const __m128 up = _mm_set1_ps(fraction_[row]), down = _mm_set1_ps(1.0f - fraction_[row]);
+      const std::size_t next = fraction_[row] > 0.0f ? width : 0;
+      for (std::size_t i = 0; i < width; i += 4) {
+        const __m128 sum = _mm_load_ps(sums + i);
+        _mm_store_ps(low + i, _mm_add_ps(_mm_load_ps(low + i), _mm_mul_ps(down, sum)));
+        _mm_store_ps(low + next + i, _mm_add_ps(_mm_load_ps(low + next + i), _mm_mul_ps(up, sum)));
+      }
+    }
+  }
+  if (!coarse_rests_) {
+    std::fill_n(nodes4_.data(), nodes4_.size(), 0.0f);
+    RestrictMiddle();
+    for (const Task& task : tasks) {
+      if (!task.sheet) {
+        RestrictTube(task.first, task.end, tube_residual, tube);
+      }
+    }
+    SolveCoarse();
+  }
+  ProlongMiddle();
+}
+
+void CoarseSpace::SolveCoarse() {
+  for (int i = 0; i < nodes_; ++i) {
+    solution_.segment<3>(3 * i) = Eigen::Map<const Vec3f>(nodes4_.data() + 4 * i);
+  }
+  factor_.solveInPlace(solution_);
+  for (int i = 0; i < nodes_; ++i) {
+    Eigen::Map<Vec3f>(nodes4_.data() + 4 * i) = solution_.segment<3>(3 * i);
+  }
+}
+
+void CoarseSpace::RestrictTube(int first, int end, const float* tube_residual, const float* tube) {
+  for (auto v = static_cast<std::size_t>(first); v < static_cast<std::size_t>(end); ++v) {
     if (tube[4 * v + 3] > 0.0f) {
       const Weights8& w = tube_weights_[v];
       const __m128 r = _mm_load_ps(tube_residual + 4 * v);
@@ -356,73 +404,80 @@ void CoarseSpace::Solve(const float* row_sums, const float* tube_residual, const
       }
     }
   }
-  for (int i = 0; i < nodes_; ++i) {
-    solution_.segment<3>(3 * i) = Eigen::Map<const Vec3f>(nodes4_.data() + 4 * i);
-  }
-  factor_.solveInPlace(solution_);
-  for (int i = 0; i < nodes_; ++i) {
-    Eigen::Map<Vec3f>(nodes4_.data() + 4 * i) = solution_.segment<3>(3 * i);
-  }
-  SmoothMiddle();
-  ForEachMiddle([&](std::size_t at, std::size_t node, float weight) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      value_[at + axis * width_] += weight * nodes4_[4 * node + axis];
-    }
-  });
 }
 
-/// visit(float of the middle level, coarse node, weight) for all that overlap.
-template <class Visit>
-void CoarseSpace::ForEachMiddle(const Visit& visit) const {
+/// Right side of the coarse nodes from the middle level's residual: first along a row, then to the two coarse rows.
+void CoarseSpace::RestrictMiddle() {
+  __m128 sum[kSheetColumns + 1];
   for (std::size_t r = 0; r < static_cast<std::size_t>(middle_rows_); ++r) {
-    const RowPlace row = row_place_[static_cast<std::size_t>(centre_[r])];
+    const float *x = residual_.data() + 3 * r * width_, *y = x + width_, *z = y + width_;
+    std::fill(std::begin(sum), std::end(sum), _mm_setzero_ps());
     for (std::size_t i = 0; i < width_; ++i) {
       const RowPlace column = column_place_[column_of_[i]];
-      const std::size_t at = 3 * r * width_ + i;
-      const auto first = static_cast<std::size_t>(row.cell) * static_cast<std::size_t>(columns_) +
-                         static_cast<std::size_t>(column.cell);
-      const bool next_row = row.cell + 1 < coarse_rows_, next_column = column.cell + 1 < columns_;
-      visit(at, first, (1 - row.fraction) * (1 - column.fraction));
-      if (next_column) {
-        visit(at, first + 1, (1 - row.fraction) * column.fraction);
-      }
-      if (next_row) {
-        visit(at, first + static_cast<std::size_t>(columns_), row.fraction * (1 - column.fraction));
-        if (next_column) {
-          visit(at, first + static_cast<std::size_t>(columns_) + 1, row.fraction * column.fraction);
-        }
+      const auto c = static_cast<std::size_t>(column.cell);
+      const __m128 value = _mm_set_ps(0, z[i], y[i], x[i]), part = _mm_mul_ps(_mm_set1_ps(column.fraction), value);
+      sum[c] = _mm_add_ps(sum[c], _mm_sub_ps(value, part));
+      sum[c + 1] = _mm_add_ps(sum[c + 1], part);
+    }
+    const RowPlace row = row_place_[static_cast<std::size_t>(centre_[r])];
+    for (int i = 0; i < 2 && row.cell + i < coarse_rows_; ++i) {
+      const __m128 weight = _mm_set1_ps(i == 0 ? 1 - row.fraction : row.fraction);
+      float* to = nodes4_.data() + 4 * static_cast<std::size_t>((row.cell + i) * columns_);
+      for (std::size_t c = 0; c < static_cast<std::size_t>(columns_); ++c, to += 4) {
+        _mm_store_ps(to, _mm_add_ps(_mm_load_ps(to), _mm_mul_ps(weight, sum[c])));
       }
     }
   }
 }
 
-/// value <- B^-1 residual.
-void CoarseSpace::SmoothMiddle() {
+/// value <- B^-1 residual + what the coarse nodes say.
+void CoarseSpace::ProlongMiddle() {
+  std::array<std::array<float, 4>, kSheetColumns + 1> at_column{};
   for (std::size_t r = 0; r < static_cast<std::size_t>(middle_rows_); ++r) {
+    if (middle_rests_[r] != 0) {
+      continue;
+    }
+    const RowPlace row = row_place_[static_cast<std::size_t>(centre_[r])];
+    const float* low = nodes4_.data() + 4 * static_cast<std::size_t>(row.cell * columns_);
+    const float* high = row.cell + 1 < coarse_rows_ ? low + 4 * static_cast<std::size_t>(columns_) : low;
+    for (std::size_t c = 0; c < static_cast<std::size_t>(columns_); ++c) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        at_column[c][axis] = (1 - row.fraction) * low[4 * c + axis] + row.fraction * high[4 * c + axis];
+      }
+    }
     const std::size_t at = 3 * r * width_, plane = r * width_;
     const float *x = residual_.data() + at, *y = x + width_, *z = y + width_;
-    float *vx = value_.data() + at, *vy = vx + width_, *vz = vy + width_;
+    float* v = value_.data() + at;
     for (std::size_t i = 0; i < width_; ++i) {
-      const std::size_t b = plane + i;
-      vx[i] = block_[0][b] * x[i] + block_[3][b] * y[i] + block_[4][b] * z[i];
-      vy[i] = block_[3][b] * x[i] + block_[1][b] * y[i] + block_[5][b] * z[i];
-      vz[i] = block_[4][b] * x[i] + block_[5][b] * y[i] + block_[2][b] * z[i];
+      const RowPlace column = column_place_[column_of_[i]];
+      const auto &a = at_column[static_cast<std::size_t>(column.cell)],
+                 &b = at_column[static_cast<std::size_t>(column.cell) + 1];
+      const float up = column.fraction, down = 1 - up;
+      const std::size_t k = plane + i;
+      v[i] = block_[0][k] * x[i] + block_[3][k] * y[i] + block_[4][k] * z[i] + (down * a[0] + up * b[0]);
+      v[width_ + i] = block_[3][k] * x[i] + block_[1][k] * y[i] + block_[5][k] * z[i] + (down * a[1] + up * b[1]);
+      v[2 * width_ + i] = block_[4][k] * x[i] + block_[5][k] * y[i] + block_[2][k] * z[i] + (down * a[2] + up * b[2]);
     }
   }
 }
 
-void CoarseSpace::Prolong(const float* tube, float* tube_z) const {
-  for (std::size_t v = 0; v < tube_weights_.size(); ++v) {
-    if (tube[4 * v + 3] > 0.0f) {
+double CoarseSpace::Prolong(const float* tube, const float* tube_residual, float* tube_z, int first, int end) const {
+  double dot = 0;
+  for (auto v = static_cast<std::size_t>(first); v < static_cast<std::size_t>(end); ++v) {
+    float* z = tube_z + 4 * v;
+    if (tube[4 * v + 3] > 0.0f && !coarse_rests_) {
       const Weights8& w = tube_weights_[v];
-      __m128 sum = _mm_load_ps(tube_z + 4 * v);
+      __m128 sum = _mm_load_ps(z);
       for (std::size_t i = 0; i < 8; ++i) {
         sum = _mm_add_ps(
             sum, _mm_mul_ps(_mm_set1_ps(w.weight[i]), _mm_load_ps(nodes4_.data() + 4 * std::size_t{w.node[i]})));
       }
-      _mm_store_ps(tube_z + 4 * v, sum);
+      _mm_store_ps(z, sum);
     }
+    const float* r = tube_residual + 4 * v;
+    dot += static_cast<double>(r[0] * z[0] + r[1] * z[1] + r[2] * z[2]);
   }
+  return dot;
 }
 
 }  // namespace fulcrum::physics::accurate

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "physics_node/accurate/kernels.h"
+#include "physics_node/accurate/regions.h"
 #include "physics_node/energy/elastic_model.h"
 #include "physics_node/pbd/particle_store.h"
 
@@ -28,11 +29,18 @@ class CoarseSpace {
   /// Floats of one row in Kernels::sheet_restrict's sums.
   [[nodiscard]] std::size_t row_width() const { return 3 * width_; }
 
-  /// From the residual - `row_sums` [rows][row_width()] by Kernels::sheet_restrict, tube xyz_ - to Middle::value and
-  /// the coarse solution.
-  void Solve(const float* row_sums, const float* tube_residual, const float* tube);
-  /// tube_z += P y for vertices that move (w of `tube` > 0).
-  void Prolong(const float* tube, float* tube_z) const;
+  /// While not all is computed the coarse nodes rest, and so do middle functions that reach into what is not: cut off
+  /// there they would cost far more energy than their blocks say.
+  void FollowRegions(const Regions& regions);
+
+  /// Middle rows whose centre is one of the sheet's rows [first, end): first and end of them.
+  [[nodiscard]] std::pair<int, int> MiddleRows(int first, int end) const;
+
+  /// From the residual of what is computed - `row_sums` [rows][row_width()] by Kernels::sheet_restrict, tube xyz_ - to
+  /// Middle::value and the coarse solution.
+  void Solve(std::span<const Task> tasks, const float* row_sums, const float* tube_residual, const float* tube);
+  /// tube_z += P y for vertices [first, end) that move (w of `tube` > 0). Returns tube_residual . tube_z.
+  double Prolong(const float* tube, const float* tube_residual, float* tube_z, int first, int end) const;
 
  private:
   struct alignas(16) Weights8 {
@@ -48,9 +56,10 @@ class CoarseSpace {
   void AddBindings(const ElasticModel& model, const ParticleStore& particles);
   void Factorise();
   void BuildMiddle();
-  void SmoothMiddle();
-  template <class Visit>
-  void ForEachMiddle(const Visit& visit) const;
+  void RestrictTube(int first, int end, const float* tube_residual, const float* tube);
+  void SolveCoarse();
+  void RestrictMiddle();
+  void ProlongMiddle();
 
   int columns_ = 0, coarse_rows_ = 0, rows_ = 0, stride_ = 0;
   std::uint32_t cols_ = 0;
@@ -62,6 +71,8 @@ class CoarseSpace {
   int middle_rows_ = 0, middle_slots_ = 0;
   std::size_t width_ = 0;  ///< Floats of a plane of its row.
   std::vector<int> centre_, cell_;
+  std::vector<std::uint8_t> middle_rests_;  ///< By middle row.
+  bool coarse_rests_ = false;
   std::vector<float> fraction_;
   FloatArray own_, next_;
   std::array<FloatArray, 6> block_;

@@ -45,6 +45,27 @@ void Spread(const Sum& e, const Vec3f& v, float* field) {
   }
 }
 
+/// Of all four particles: no loop that ends at a count.
+Vec3f Combine4(const Element& e, const float* field) {
+  return (e.weight[0] * Read(field, e.at[0]) + e.weight[1] * Read(field, e.at[1])) +
+         (e.weight[2] * Read(field, e.at[2]) + e.weight[3] * Read(field, e.at[3]));
+}
+void Spread4(const Element& e, const Vec3f& v, float* field) {
+  Add(field, e.at[0], e.weight[0] * v);
+  Add(field, e.at[1], e.weight[1] * v);
+  Add(field, e.at[2], e.weight[2] * v);
+  Add(field, e.at[3], e.weight[3] * v);
+}
+template <class Sum>
+bool AnyComputed(const Sum& e, const Regions& regions) {
+  for (int k = 0; k < e.count; ++k) {
+    if (regions.computed(regions.Of(e.at[static_cast<std::size_t>(k)]))) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /// What a contact does to its particles at `place`.
 struct ContactState {
   float stiffness, damping;  ///< [N/m]; damping against the movement in this substep.
@@ -52,9 +73,9 @@ struct ContactState {
   float tangential;          ///< Stiffness against sliding [N/m].
   Vec3f slide;
 };
-ContactState StateOf(const ContactRow& row, const float* place, const float* start) {
+ContactState StateOf(const ContactRow& row, const Vec3f& here, const float* start) {
   ContactState state{};
-  const Vec3f here = Combine(row, place), moved = here - Combine(row, start) - row.drift;
+  const Vec3f moved = here - Combine(row, start) - row.drift;
   const float gap = row.normal.dot(here) - row.offset;
   if (!(gap < 0.0f)) {
     return state;
@@ -77,7 +98,8 @@ float Elements::ContactStiffness(const ContactRow& row) {
   return (row.source & TissueCollision::kSource) != 0 ? kTissue : kTool;
 }
 
-Elements::Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles) {
+Elements::Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
+    : hinges_(model, particles) {
   for (const ElasticBinding& binding : model.bindings) {
     Element e;
     e.at[0] = particles.Ref(binding.membrane);
@@ -90,18 +112,6 @@ Elements::Elements(const SceneView& scene, const ElasticModel& model, const Part
     binding_rest_.push_back({static_cast<float>(binding.rest_length), static_cast<float>(binding.stiffness),
                              binding.membrane - scene.membrane.first});
   }
-  for (const ElasticHinge& hinge : model.hinges) {
-    Element e;
-    Vec3d rest = Vec3d::Zero();
-    for (std::size_t k = 0; k < 4; ++k) {
-      e.at[k] = particles.Ref(hinge.v[k]);
-      e.weight[k] = static_cast<float>(hinge.c[k]);
-      rest += hinge.c[k] * model.rest_position[hinge.v[k]];
-    }
-    e.kt = static_cast<float>(hinge.stiffness);
-    hinges_.push_back(e);
-    hinge_rest_.push_back(rest.cast<float>());
-  }
   contacts_.reserve(kMostContacts);
   contact_force_.reserve(kMostContacts);
 }
@@ -110,32 +120,39 @@ void Elements::Follow(const TissueModel& tissue) {
   for (std::size_t i = 0; i < bindings_.size(); ++i) {
     bindings_[i].active = tissue.NodeAlive(binding_rest_[i].node);
   }
-  for (std::size_t i = 0; i < hinges_.size(); ++i) {
-    hinges_[i].active = tissue.HingeWhole(static_cast<Index>(i));
-  }
+  hinges_.Follow(tissue);
 }
 
 std::vector<std::pair<std::uint32_t, float>> Elements::Diagonal() const {
-  std::vector<std::pair<std::uint32_t, float>> diagonal;
-  const auto add = [&](const Element& e, float stiffness) {
-    for (std::size_t k = 0; k < 4; ++k) {
-      diagonal.emplace_back(e.at[k].base, stiffness * e.weight[k] * e.weight[k]);
-    }
-  };
+  std::vector<std::pair<std::uint32_t, float>> diagonal = hinges_.Diagonal();
   for (std::size_t i = 0; i < bindings_.size(); ++i) {
-    add(bindings_[i], binding_rest_[i].stiffness);
-  }
-  for (const Element& hinge : hinges_) {
-    add(hinge, hinge.kt);
+    const Element& e = bindings_[i];
+    for (std::size_t k = 0; k < 4; ++k) {
+      diagonal.emplace_back(e.at[k].base, binding_rest_[i].stiffness * e.weight[k] * e.weight[k]);
+    }
   }
   return diagonal;
 }
 
-void Elements::Touch(const float* place, const float* start, std::span<const ContactRow> contacts) {
+void Elements::FollowRegions(const Regions& regions) {
+  active_.clear();
+  for (std::uint32_t i = 0; i < bindings_.size(); ++i) {
+    if (bindings_[i].active && AnyComputed(bindings_[i], regions)) {
+      active_.push_back(i);
+    }
+  }
+  hinges_.FollowRegions(regions);
+}
+
+void Elements::Touch(const float* place, const float* start, const Regions& regions,
+                     std::span<const ContactRow> contacts) {
   contacts_.clear();
   contact_force_.clear();
   for (const ContactRow& row : contacts) {
-    const ContactState state = StateOf(row, place, start);
+    if (!AnyComputed(row, regions)) {
+      continue;
+    }
+    const ContactState state = StateOf(row, Combine(row, place), start);
     if (state.force > 0.0f) {
       Element e;
       e.count = row.count;
@@ -150,66 +167,42 @@ void Elements::Touch(const float* place, const float* start, std::span<const Con
 }
 
 void Elements::Linearise(const float* place, float* residual) {
-  for (std::size_t i = 0; i < bindings_.size(); ++i) {
+  for (const std::uint32_t i : active_) {
     Element& e = bindings_[i];
-    if (!e.active) {
-      continue;
-    }
-    const Vec3f d = Combine(e, place);
+    const Vec3f d = Combine4(e, place);
     const float length = std::max(d.norm(), 1e-9f), k = binding_rest_[i].stiffness;
     const float tension = k * (length - binding_rest_[i].length);
     e.kt = std::max(tension / length, 0.0f);
     e.m = d * (std::sqrt(std::max(k - e.kt, 0.0f)) / length);
-    Spread(e, d * (-tension / length), residual);
+    Spread4(e, d * (-tension / length), residual);
   }
-  for (std::size_t i = 0; i < hinges_.size(); ++i) {
-    if (hinges_[i].active) {
-      Spread(hinges_[i], (hinge_rest_[i] - Combine(hinges_[i], place)) * hinges_[i].kt, residual);
-    }
-  }
+  hinges_.AddForce(place, residual);
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     Spread(contacts_[i], contact_force_[i], residual);
   }
 }
 
-double Elements::Apply(const float* p, float* out) const {
-  double sum = 0;
-  const auto apply = [&](const Element& e) {
-    const Vec3f d = Combine(e, p);
-    const Vec3f force = e.kt * d + e.m * e.m.dot(d);
+double Elements::Apply(const float* p, float* out) {
+  double sum = hinges_.Apply(p, out);
+  for (const std::uint32_t i : active_) {
+    const Element& e = bindings_[i];
+    const Vec3f d = Combine4(e, p), force = e.kt * d + e.m * e.m.dot(d);
     sum += static_cast<double>(d.dot(force));
-    Spread(e, force, out);
-  };
-  for (const Element& e : bindings_) {
-    if (e.active) {
-      apply(e);
-    }
-  }
-  for (const Element& e : hinges_) {
-    if (e.active) {
-      const Vec3f d = Combine(e, p), force = e.kt * d;
-      sum += static_cast<double>(d.dot(force));
-      Spread(e, force, out);
-    }
+    Spread4(e, force, out);
   }
   for (const Element& e : contacts_) {
-    apply(e);
+    const Vec3f d = Combine(e, p), force = e.kt * d + e.m * e.m.dot(d);
+    sum += static_cast<double>(d.dot(force));
+    Spread(e, force, out);
   }
   return sum;
 }
 
-double Elements::Energy(const float* place, std::span<const ContactRow> contacts) const {
-  double sum = 0;
-  for (std::size_t i = 0; i < bindings_.size(); ++i) {
-    if (bindings_[i].active) {
-      const float stretch = Combine(bindings_[i], place).norm() - binding_rest_[i].length;
-      sum += 0.5 * static_cast<double>(binding_rest_[i].stiffness * stretch * stretch);
-    }
-  }
-  for (std::size_t i = 0; i < hinges_.size(); ++i) {
-    if (hinges_[i].active) {
-      sum += 0.5 * static_cast<double>(hinges_[i].kt * (Combine(hinges_[i], place) - hinge_rest_[i]).squaredNorm());
-    }
+double Elements::Energy(const float* place, std::span<const ContactRow> contacts) {
+  double sum = hinges_.Energy(place);
+  for (const std::uint32_t i : active_) {
+    const float stretch = Combine4(bindings_[i], place).norm() - binding_rest_[i].length;
+    sum += 0.5 * static_cast<double>(binding_rest_[i].stiffness * stretch * stretch);
   }
   for (const ContactRow& row : contacts) {
     const float gap = std::min(row.normal.dot(Combine(row, place)) - row.offset, 0.0f);
@@ -218,9 +211,9 @@ double Elements::Energy(const float* place, std::span<const ContactRow> contacts
   return sum;
 }
 
-void Elements::WriteForces(const float* place, const float* start, std::span<ContactRow> contacts) {
+void Elements::WriteForces(const float* place, const float* d, const float* start, std::span<ContactRow> contacts) {
   for (ContactRow& row : contacts) {
-    const ContactState state = StateOf(row, place, start);
+    const ContactState state = StateOf(row, Combine(row, place) + Combine(row, d), start);
     row.force_N = state.force;
     row.friction_N = state.force > 0.0f ? Vec3f(-state.tangential * state.slide) : Vec3f(Vec3f::Zero());
   }

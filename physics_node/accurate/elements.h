@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "physics_node/accurate/hinge_matrix.h"
+#include "physics_node/accurate/regions.h"
 #include "physics_node/collision/contact_row.h"
 #include "physics_node/energy/elastic_model.h"
 #include "physics_node/pbd/tissue_model.h"
@@ -27,19 +29,21 @@ class Elements {
 
   /// Switches off what a cut has severed.
   void Follow(const TissueModel& tissue);
+  /// From now on only elements with a particle in a region that is computed.
+  void FollowRegions(const Regions& regions);
 
   /// Stiffness that bindings and hinges add to the diagonal, by pool offset of x.
   [[nodiscard]] std::vector<std::pair<std::uint32_t, float>> Diagonal() const;
   /// Finds which contacts push at `place`, sliding measured from `start`; they act until the next call.
-  void Touch(const float* place, const float* start, std::span<const ContactRow> contacts);
+  void Touch(const float* place, const float* start, const Regions& regions, std::span<const ContactRow> contacts);
   [[nodiscard]] std::span<const Element> touching() const { return contacts_; }
   /// Linearises at `place` and adds the forces to `residual`, those of the touching contacts included.
   void Linearise(const float* place, float* residual);
   /// out += K p; returns p . K p.
-  double Apply(const float* p, float* out) const;
-  [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts) const;
-  /// Normal and friction forces of contacts at `place`, sliding measured from `start`.
-  static void WriteForces(const float* place, const float* start, std::span<ContactRow> contacts);
+  double Apply(const float* p, float* out);
+  [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts);
+  /// Normal and friction forces of contacts at `place` + `d`, sliding measured from `start`.
+  static void WriteForces(const float* place, const float* d, const float* start, std::span<ContactRow> contacts);
 
   /// Stiffness of a contact in its normal direction: of tissue against a tool, and of soft tissue against tissue; an
   /// edge of the membrane has some 200 N/m [N/m].
@@ -50,10 +54,11 @@ class Elements {
     float length, stiffness;
     Index node;
   };
-  std::vector<Element> bindings_, hinges_, contacts_;
-  std::vector<Vec3f> contact_force_;
+  std::vector<Element> bindings_, contacts_;
   std::vector<BindingRest> binding_rest_;
-  std::vector<Vec3f> hinge_rest_;
+  std::vector<std::uint32_t> active_;  ///< Bindings in force and computed.
+  std::vector<Vec3f> contact_force_;
+  HingeMatrix hinges_;
 };
 
 }  // namespace fulcrum::physics::accurate

@@ -32,15 +32,16 @@ struct Inertia {
 };
 
 /// What a linearisation of the sheet leaves behind for the products with its matrix. An edge's stiffness is
-/// kt I + m m^T, positive semi-definite by construction.
+/// kt I + along d d^T with d from its first node to its second at `place`; positive semi-definite by construction.
 struct SheetMatrix {
-  float* m[3][3];   ///< [direction][axis]
-  float* kt[3];     ///< [N/m]
-  float* block[6];  ///< Inverse of the diagonal blocks: xx, yy, zz, xy, xz, yz; 0 where a node does not move [m/N].
+  float* kt[3];           ///< [N/m]
+  float* along[3];        ///< [N/m^3]
+  float* block[6];        ///< Inverse of the diagonal blocks: xx, yy, zz, xy, xz, yz; 0 where a node stays [m/N].
+  const float* place[3];  ///< Where it was linearised.
 };
 
 /// Memory of a thread for the rows in work: kCarry * stride floats.
-inline constexpr int kCarry = 45;
+inline constexpr int kCarry = 18;
 
 /// The middle level: hats of +-4 rows and 4 columns, lane-blocked as the sheet is, every fourth slot of it.
 struct Middle {
@@ -86,8 +87,16 @@ struct Organ {
 struct OrganMatrix {
   float* c;
   float* f;
-  float* stress;  ///< V P or V dP of the patches, between the two halves of a product.
+  float* stress;  ///< Between the two halves of a product, per patch: three columns of V P or V dP, and x or dx.
   float* block;   ///< Inverse of the diagonal blocks, three columns xyz_; 0 where a vertex does not move.
+};
+/// Tube parts of fields, xyz_ per vertex; `start` with w.
+struct OrganLinearisation {
+  const float* place;     ///< Where to linearise.
+  const float* start;     ///< At the beginning of the substep.
+  const float* velocity;  ///< At the beginning of the substep.
+  const float* load;      ///< Dead load [N].
+  float* residual;        ///< Out: elastic force + load + gravity - inertia.
 };
 
 struct GuessCount {
@@ -113,38 +122,56 @@ struct Kernels {
   /// Elastic and inertial energy at `place` of the edges and nodes that rows [row0, row1) own [J].
   double (*sheet_energy)(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at, int row0, int row1);
 
-  void (*middle_blocks)(const Sheet& sheet, const Middle& middle, const SheetMatrix& matrix, float inertia);
+  /// Blocks of middle rows [first, end).
+  void (*middle_blocks)(const Sheet& sheet, const Middle& middle, const SheetMatrix& matrix, float inertia, int first,
+                        int end);
   /// sums [row][3][middle slots * 8] <- what a row's residual of nodes that move gives to the middle level's slots.
   void (*sheet_restrict)(const Sheet& sheet, const Middle& middle, const float* const r[3], float* sums, int row0,
                          int row1);
   /// z <- D^-1 r + the middle level's value where a node moves. Returns r . z.
   double (*sheet_precondition)(const Sheet& sheet, const Middle& middle, const SheetMatrix& matrix,
                                const float* const r[3], float* const z[3], int row0, int row1);
+  /// Positions and velocities of nodes: place + d, at most `speed` fast; what is not finite stays, at rest.
+  FinishCount (*sheet_finish)(const Sheet& sheet, const float* const place[3], const float* const d[3], float h,
+                              float speed, float* const x[3], float* const velocity[3], int row0, int row1);
+  /// Largest |d|^2 of nodes.
+  float (*sheet_largest)(const Sheet& sheet, const float* const d[3], int row0, int row1);
 
   /// p <- z + beta p on `count` floats.
   void (*combine)(const float* z, float beta, float* p, std::size_t count);
   /// d <- alpha p, or d += alpha p; r -= alpha q.
   void (*start)(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count);
   void (*advance)(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count);
-  /// Largest |d|^2 of `count` particles in planes x y z, `plane` floats apart.
-  float (*largest)(const float* d, std::size_t plane, std::size_t count);
-  /// Positions and velocities of nodes: place + d, at most `speed` fast; what is not finite stays, at rest.
-  FinishCount (*finish)(const float* const place[3], const float* const d[3], const float* w, float h, float speed,
-                        float* const x[3], float* const velocity[3], std::size_t count);
+  /// True while all of `count` floats, of xyzw ones all but w, are between -limit and limit.
+  bool (*within)(const float* p, float limit, std::size_t count, bool xyzw);
 
+  /// As sheet_guess, for vertices [first, last) of xyz_ arrays; w of `start` tells which move.
+  GuessCount (*organ_guess)(float h, const float* start, const float* velocity, float* place, std::uint32_t first,
+                            std::uint32_t last);
   /// Stress and its derivative of patches [first, last).
   void (*organ_linearise)(const Organ& organ, const OrganMatrix& matrix, const float* place, std::uint32_t first,
                           std::uint32_t last);
-  /// Inverse diagonal blocks of vertices; w of `pool` tells which move. After organ_linearise of all.
+  /// Residual of vertices. After organ_linearise of their patches.
+  void (*organ_residual)(const Organ& organ, const OrganMatrix& matrix, const Inertia& inertia,
+                         const OrganLinearisation& at, std::uint32_t first, std::uint32_t last);
+  /// Inverse diagonal blocks of vertices; w of `pool` tells which move. After organ_linearise of their patches.
   void (*organ_blocks)(const Organ& organ, const OrganMatrix& matrix, const float* pool, const float* extra,
                        float inertia, std::uint32_t first, std::uint32_t last);
-  /// stress <- V dP of patches.
+  /// V dP of patches.
   void (*organ_stress)(const Organ& organ, const OrganMatrix& matrix, const float* p, std::uint32_t first,
                        std::uint32_t last);
-  /// out <- sum of stress * gradient + edges, on vertices.
-  void (*organ_gather)(const Organ& organ, const OrganMatrix& matrix, const float* p, float* out, std::uint32_t first,
-                       std::uint32_t last);
-  double (*organ_energy)(const Organ& organ, const float* place, std::uint32_t first, std::uint32_t last);
+  /// out <- K p + mass * inertia * p on vertices, after organ_stress of their patches. Returns p . out.
+  double (*organ_apply)(const Organ& organ, const OrganMatrix& matrix, float inertia, const float* p, float* out,
+                        std::uint32_t first, std::uint32_t last);
+  /// z <- D^-1 r.
+  void (*organ_precondition)(const OrganMatrix& matrix, const float* r, float* z, std::uint32_t first,
+                             std::uint32_t last);
+  double (*organ_energy)(const Organ& organ, const Inertia& inertia, const OrganLinearisation& at, std::uint32_t first,
+                         std::uint32_t last);
+  /// As sheet_finish; `pool` xyzw.
+  FinishCount (*organ_finish)(const float* place, const float* d, float h, float speed, float* pool, float* velocity,
+                              std::uint32_t first, std::uint32_t last);
+  float (*organ_largest)(const float* d, std::uint32_t first, std::uint32_t last);
 };
 
 const Kernels& BaselineKernels();

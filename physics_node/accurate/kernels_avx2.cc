@@ -1,17 +1,10 @@
 #define FULCRUM_KERNEL_NAMESPACE accurate_avx2
-#include "physics_node/accurate/organ_kernels_impl.h"
-#include "physics_node/accurate/sheet_kernels_impl.h"
+#include "physics_node/accurate/kernels_impl.h"
 
 namespace fulcrum::physics::accurate {
 
 const Kernels& Avx2Kernels() {
-  namespace isa = accurate_avx2;
-  static constexpr Kernels kernels{
-      "AVX2",           isa::SheetGuess,     isa::SheetLineariseRows, isa::SheetApply,
-      isa::SheetEnergy, isa::MiddleBlocks,   isa::SheetRestrict,      isa::SheetPrecondition,
-      isa::Combine,     isa::StartFields,    isa::AdvanceFields,      isa::Largest,
-      isa::FinishSheet, isa::OrganLinearise, isa::OrganBlocks,        isa::OrganStress,
-      isa::OrganGather, isa::OrganEnergy};
+  static constexpr Kernels kernels = accurate_avx2::MakeKernels("AVX2");
   return kernels;
 }
 

@@ -1,16 +1,10 @@
 #define FULCRUM_KERNEL_NAMESPACE accurate_avx512
-#include "physics_node/accurate/organ_kernels_impl.h"
-#include "physics_node/accurate/sheet_kernels_impl.h"
+#include "physics_node/accurate/kernels_impl.h"
 
 namespace fulcrum::physics::accurate {
 
 const Kernels& Avx512Kernels() {
-  namespace isa = accurate_avx512;
-  static constexpr Kernels kernels{
-      "AVX-512",          isa::SheetGuess,    isa::SheetLineariseRows, isa::SheetApply,     isa::SheetEnergy,
-      isa::MiddleBlocks,  isa::SheetRestrict, isa::SheetPrecondition,  isa::Combine,        isa::StartFields,
-      isa::AdvanceFields, isa::Largest,       isa::FinishSheet,        isa::OrganLinearise, isa::OrganBlocks,
-      isa::OrganStress,   isa::OrganGather,   isa::OrganEnergy};
+  static constexpr Kernels kernels = accurate_avx512::MakeKernels("AVX-512");
   return kernels;
 }
 

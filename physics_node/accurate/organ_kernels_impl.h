@@ -14,7 +14,9 @@
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
+using accurate::Inertia;
 using accurate::Organ;
+using accurate::OrganLinearisation;
 using accurate::OrganMatrix;
 
 struct F4 {
@@ -60,17 +62,65 @@ inline float DotColumns(const Columns& a, const Columns& b) {
   return (p.First() + SpreadLane<1>(p).First()) + SpreadLane<2>(p).First();
 }
 
+/// Four columns xyz_ next to one another. In two registers even where one would do: sums of four cycles each follow one
+/// another, and two of them hide more of that than one.
+struct Quad {
+#if defined(__AVX__)
+  __m256 a, b;
+  static Quad Load(const float* p) { return {_mm256_load_ps(p), _mm256_load_ps(p + 8)}; }
+  static Quad Zero() { return {_mm256_setzero_ps(), _mm256_setzero_ps()}; }
+  static Quad Repeat(F4 c) {
+    const __m256 both = _mm256_set_m128(c.v, c.v);
+    return {both, both};
+  }
+  static Quad Spread(F4 c) {
+    const __m256 both = _mm256_set_m128(c.v, c.v);
+    return {_mm256_permutevar_ps(both, _mm256_set_epi32(1, 1, 1, 1, 0, 0, 0, 0)),
+            _mm256_permutevar_ps(both, _mm256_set_epi32(3, 3, 3, 3, 2, 2, 2, 2))};
+  }
+  static Quad Fourth(F4 c) { return {_mm256_setzero_ps(), _mm256_set_m128(c.v, _mm_setzero_ps())}; }
+  template <int i>
+  [[nodiscard]] F4 Column() const {
+    const __m256 half = i < 2 ? a : b;
+    return {i % 2 == 0 ? _mm256_castps256_ps128(half) : _mm256_extractf128_ps(half, 1)};
+  }
+#else
+  F4 c[4];
+  static Quad Load(const float* p) { return {{F4::Load(p), F4::Load(p + 4), F4::Load(p + 8), F4::Load(p + 12)}}; }
+  static Quad Zero() { return {{F4::All(0), F4::All(0), F4::All(0), F4::All(0)}}; }
+  static Quad Repeat(F4 a) { return {{a, a, a, a}}; }
+  static Quad Spread(F4 a) { return {{SpreadLane<0>(a), SpreadLane<1>(a), SpreadLane<2>(a), SpreadLane<3>(a)}}; }
+  static Quad Fourth(F4 a) { return {{F4::All(0), F4::All(0), F4::All(0), a}}; }
+  template <int i>
+  [[nodiscard]] F4 Column() const {
+    return c[i];
+  }
+#endif
+};
+#if defined(__AVX__)
+inline Quad operator+(Quad a, Quad b) { return {_mm256_add_ps(a.a, b.a), _mm256_add_ps(a.b, b.b)}; }
+inline Quad operator-(Quad a, Quad b) { return {_mm256_sub_ps(a.a, b.a), _mm256_sub_ps(a.b, b.b)}; }
+inline Quad operator*(Quad a, Quad b) { return {_mm256_mul_ps(a.a, b.a), _mm256_mul_ps(a.b, b.b)}; }
+#else
+inline Quad operator+(const Quad& a, const Quad& b) {
+  return {{a.c[0] + b.c[0], a.c[1] + b.c[1], a.c[2] + b.c[2], a.c[3] + b.c[3]}};
+}
+inline Quad operator-(const Quad& a, const Quad& b) {
+  return {{a.c[0] - b.c[0], a.c[1] - b.c[1], a.c[2] - b.c[2], a.c[3] - b.c[3]}};
+}
+inline Quad operator*(const Quad& a, const Quad& b) {
+  return {{a.c[0] * b.c[0], a.c[1] * b.c[1], a.c[2] * b.c[2], a.c[3] * b.c[3]}};
+}
+#endif
+
 /// sum x_j (x) g_j over the patch of vertex n.
 inline Columns PatchGradient(const Organ& organ, const float* tube, std::uint32_t n) {
-  Columns f = {F4::All(0), F4::All(0), F4::All(0)};
+  Quad f = Quad::Zero();
   for (std::uint32_t i = organ.start[n]; i < organ.start[n + 1]; ++i) {
     const F4 x = F4::Load(tube + 4 * static_cast<std::size_t>(organ.vertex[i]));
-    const F4 g = F4::Load(organ.gradient + 4 * static_cast<std::size_t>(i));
-    f.c0 = f.c0 + x * SpreadLane<0>(g);
-    f.c1 = f.c1 + x * SpreadLane<1>(g);
-    f.c2 = f.c2 + x * SpreadLane<2>(g);
+    f = f + Quad::Repeat(x) * Quad::Spread(F4::Load(organ.gradient + 4 * static_cast<std::size_t>(i)));
   }
-  return f;
+  return {f.Column<0>(), f.Column<1>(), f.Column<2>()};
 }
 
 inline float Larger(float a, float b) { return a > b ? a : b; }
@@ -85,6 +135,13 @@ inline float LargestStretchSq(const Columns& f) {
 }
 inline float Root(float v) { return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(v))); }
 
+/// What the vertices of patch n gather: its stress, and in the fourth column where its own vertex is.
+inline void StoreLine(const Columns& stress, F4 scale, const float* p, std::uint32_t n, float* lines) {
+  float* line = lines + 16 * static_cast<std::size_t>(n);
+  StoreColumns(stress, scale, line);
+  F4::Load(p + 4 * static_cast<std::size_t>(n)).Store(line + 12);
+}
+
 inline void OrganLinearise(const Organ& organ, const OrganMatrix& matrix, const float* place, std::uint32_t first,
                            std::uint32_t last) {
   for (std::uint32_t n = first; n < last; ++n) {
@@ -95,7 +152,7 @@ inline void OrganLinearise(const Organ& organ, const OrganMatrix& matrix, const 
     const Columns stress = {f.c0 * shear + cofactor.c0 * p, f.c1 * shear + cofactor.c1 * p,
                             f.c2 * shear + cofactor.c2 * p};
     const std::size_t at = 12 * static_cast<std::size_t>(n);
-    StoreColumns(stress, F4::All(volume), matrix.stress + at);
+    StoreLine(stress, F4::All(volume), place, n, matrix.stress);
     const float sigma = Root(Larger(LargestStretchSq(f), 1e-12f)), bound = organ.mu / sigma;
     // Flattened and inverted patches leave the indefinite part out altogether.
     const float fade = Smaller(Larger((j - 0.1f) * 2.5f, 0.0f), 1.0f);
@@ -116,25 +173,48 @@ inline void OrganStress(const Organ& organ, const OrganMatrix& matrix, const flo
     const Columns stress = {d.c0 * shear + c.c0 * along + (CrossProduct(d.c1, f.c2) + CrossProduct(f.c1, d.c2)),
                             d.c1 * shear + c.c1 * along + (CrossProduct(d.c2, f.c0) + CrossProduct(f.c2, d.c0)),
                             d.c2 * shear + c.c2 * along + (CrossProduct(d.c0, f.c1) + CrossProduct(f.c0, d.c1))};
-    StoreColumns(stress, F4::All(1.0f), matrix.stress + at);
+    StoreLine(stress, F4::All(1.0f), p, n, matrix.stress);
   }
 }
 
-inline void OrganGather(const Organ& organ, const OrganMatrix& matrix, const float* p, float* out, std::uint32_t first,
-                        std::uint32_t last) {
+/// sum over the patches of vertex v of stress * gradient + stiffness * (x_v - x_n).
+inline F4 GatherVertex(const Organ& organ, const OrganMatrix& matrix, F4 here, std::uint32_t v) {
+  const Quad centre = Quad::Fourth(here);
+  Quad sum = Quad::Zero();
+  for (std::uint32_t i = organ.patch_start[v]; i < organ.patch_start[v + 1]; ++i) {
+    const Quad line = Quad::Load(matrix.stress + 16 * static_cast<std::size_t>(organ.patch[i]));
+    sum = sum + (line - centre) * Quad::Spread(F4::Load(organ.patch_gradient + 4 * static_cast<std::size_t>(i)));
+  }
+  const F4 keep = {_mm_castsi128_ps(_mm_set_epi32(0, -1, -1, -1))};
+  const F4 all = ((sum.Column<0>() + sum.Column<1>()) + sum.Column<2>()) - sum.Column<3>();
+  return {_mm_and_ps(all.v, keep.v)};
+}
+
+inline void OrganResidual(const Organ& organ, const OrganMatrix& matrix, const Inertia& inertia,
+                          const OrganLinearisation& at, std::uint32_t first, std::uint32_t last) {
+  const F4 k = F4::All(inertia.inertia), inverse_h = F4::All(1.0f / inertia.h);
+  const F4 gravity = {_mm_set_ps(0, inertia.gravity[2], inertia.gravity[1], inertia.gravity[0])};
   const F4 keep = {_mm_castsi128_ps(_mm_set_epi32(0, -1, -1, -1))};
   for (std::uint32_t v = first; v < last; ++v) {
-    const F4 here = F4::Load(p + 4 * static_cast<std::size_t>(v));
-    F4 sum = F4::All(0);
-    for (std::uint32_t i = organ.patch_start[v]; i < organ.patch_start[v + 1]; ++i) {
-      const std::size_t n = organ.patch[i];
-      const Columns stress = LoadColumns(matrix.stress + 12 * n);
-      const F4 g = F4::Load(organ.patch_gradient + 4 * static_cast<std::size_t>(i));
-      sum = sum + (stress.c0 * SpreadLane<0>(g) + stress.c1 * SpreadLane<1>(g) + stress.c2 * SpreadLane<2>(g) +
-                   (here - F4::Load(p + 4 * n)) * SpreadLane<3>(g));
-    }
-    F4{_mm_and_ps(sum.v, keep.v)}.Store(out + 4 * static_cast<std::size_t>(v));
+    const std::size_t i = 4 * static_cast<std::size_t>(v);
+    const F4 here = F4::Load(at.place + i);
+    const F4 mass = F4::All(at.start[i + 3] > 0.0f ? organ.mass[v] : 0.0f);
+    const F4 momentum = (here - F4::Load(at.start + i)) * k - F4::Load(at.velocity + i) * inverse_h;
+    const F4 force = F4::Load(at.load + i) + (gravity - momentum) * mass - GatherVertex(organ, matrix, here, v);
+    F4{_mm_and_ps(force.v, keep.v)}.Store(at.residual + i);
   }
+}
+
+inline double OrganApply(const Organ& organ, const OrganMatrix& matrix, float inertia, const float* p, float* out,
+                         std::uint32_t first, std::uint32_t last) {
+  double sum = 0;
+  for (std::uint32_t v = first; v < last; ++v) {
+    const F4 here = F4::Load(p + 4 * static_cast<std::size_t>(v));
+    const F4 result = GatherVertex(organ, matrix, here, v) + here * F4::All(organ.mass[v] * inertia);
+    result.Store(out + 4 * static_cast<std::size_t>(v));
+    sum += static_cast<double>(DotProduct(here, result));
+  }
+  return sum;
 }
 
 /// Patches overlap by a dozen vertices, so their diagonal blocks alone overshoot: the largest eigenvalue of the
@@ -170,23 +250,94 @@ inline void OrganBlocks(const Organ& organ, const OrganMatrix& matrix, const flo
   }
 }
 
-inline double OrganEnergy(const Organ& organ, const float* place, std::uint32_t first, std::uint32_t last) {
+inline void OrganPrecondition(const OrganMatrix& matrix, const float* r, float* z, std::uint32_t first,
+                              std::uint32_t last) {
+  for (std::uint32_t v = first; v < last; ++v) {
+    const Columns block = LoadColumns(matrix.block + 12 * static_cast<std::size_t>(v));
+    const F4 b = F4::Load(r + 4 * static_cast<std::size_t>(v));
+    (block.c0 * SpreadLane<0>(b) + block.c1 * SpreadLane<1>(b) + block.c2 * SpreadLane<2>(b))
+        .Store(z + 4 * static_cast<std::size_t>(v));
+  }
+}
+
+inline double OrganEnergy(const Organ& organ, const Inertia& inertia, const OrganLinearisation& at, std::uint32_t first,
+                          std::uint32_t last) {
+  const F4 gravity = {_mm_set_ps(0, inertia.gravity[2], inertia.gravity[1], inertia.gravity[0])};
+  const F4 half = F4::All(0.5f * inertia.inertia), inverse_h = F4::All(1.0f / inertia.h);
   double sum = 0;
   for (std::uint32_t n = first; n < last; ++n) {
-    const Columns f = PatchGradient(organ, place, n);
+    const Columns f = PatchGradient(organ, at.place, n);
     const float j = DotProduct(f.c0, CrossProduct(f.c1, f.c2)) - 1.0f;
     const float density = 0.5f * organ.mu * (1.0f - organ.variance) * (DotColumns(f, f) - 3.0f) - organ.mu * j +
                           0.5f * organ.lambda * (j * j);
     sum += static_cast<double>(density * organ.volume[n]);
-    const F4 here = F4::Load(place + 4 * static_cast<std::size_t>(n));
+    const std::size_t i = 4 * static_cast<std::size_t>(n);
+    const F4 here = F4::Load(at.place + i);
     float edges = 0;
-    for (std::uint32_t i = organ.patch_start[n]; i < organ.patch_start[n + 1]; ++i) {
-      const F4 d = here - F4::Load(place + 4 * static_cast<std::size_t>(organ.patch[i]));
-      edges += organ.patch_gradient[4 * static_cast<std::size_t>(i) + 3] * DotProduct(d, d);
+    for (std::uint32_t k = organ.patch_start[n]; k < organ.patch_start[n + 1]; ++k) {
+      const F4 d = here - F4::Load(at.place + 4 * static_cast<std::size_t>(organ.patch[k]));
+      edges += organ.patch_gradient[4 * static_cast<std::size_t>(k) + 3] * DotProduct(d, d);
     }
     sum += 0.25 * static_cast<double>(edges);  // Each edge is met from both ends.
+    if (at.start[i + 3] > 0.0f) {
+      const F4 moved = here - F4::Load(at.start + i);
+      const F4 momentum = moved * half - F4::Load(at.velocity + i) * inverse_h - gravity;
+      sum +=
+          static_cast<double>(organ.mass[n] * DotProduct(moved, momentum) - DotProduct(moved, F4::Load(at.load + i)));
+    }
   }
   return sum;
+}
+
+inline accurate::GuessCount OrganGuess(float h, const float* start, const float* velocity, float* place,
+                                       std::uint32_t first, std::uint32_t last) {
+  const F4 step = F4::All(h), keep = {_mm_castsi128_ps(_mm_set_epi32(0, -1, -1, -1))};
+  accurate::GuessCount count{0, 0};
+  for (std::size_t i = 4 * static_cast<std::size_t>(first); i < 4 * static_cast<std::size_t>(last); i += 4) {
+    const F4 x = F4::Load(start + i), d = F4::Load(velocity + i) * step;
+    const float square = DotProduct(d, d);
+    const bool moves = start[i + 3] > 0.0f, sound = square < 1e30f;
+    count.resets += moves && !sound ? 1 : 0;
+    count.largest_sq = moves && sound ? Larger(square, count.largest_sq) : count.largest_sq;
+    F4{_mm_and_ps((moves && sound ? x + d : x).v, keep.v)}.Store(place + i);
+  }
+  return count;
+}
+
+inline accurate::FinishCount OrganFinish(const float* place, const float* d, float h, float speed, float* pool,
+                                         float* velocity, std::uint32_t first, std::uint32_t last) {
+  const F4 step = F4::All(h), inverse_h = F4::All(1.0f / h);
+  const F4 keep = {_mm_castsi128_ps(_mm_set_epi32(0, -1, -1, -1))};
+  accurate::FinishCount count{0, 0};
+  for (std::size_t i = 4 * static_cast<std::size_t>(first); i < 4 * static_cast<std::size_t>(last); i += 4) {
+    const F4 from = F4::Load(pool + i);
+    F4 v = ((F4::Load(place + i) + F4::Load(d + i)) - from) * inverse_h;
+    v = {_mm_and_ps(v.v, keep.v)};
+    float square = DotProduct(v, v);
+    const bool moves = pool[i + 3] > 0.0f;
+    if (!(square < 1e30f)) {
+      count.resets += moves ? 1 : 0;
+      F4::All(0).Store(velocity + i);
+      continue;
+    }
+    if (square > speed * speed) {
+      v = v * F4::All(speed / Root(square));
+      square = speed * speed;
+    }
+    count.largest_speed_sq = moves ? Larger(square, count.largest_speed_sq) : count.largest_speed_sq;
+    v.Store(velocity + i);
+    (from + v * step).Store(pool + i);
+  }
+  return count;
+}
+
+inline float OrganLargest(const float* d, std::uint32_t first, std::uint32_t last) {
+  float largest = 0;
+  for (std::size_t i = 4 * static_cast<std::size_t>(first); i < 4 * static_cast<std::size_t>(last); i += 4) {
+    const F4 v = F4::Load(d + i);
+    largest = Larger(DotProduct(v, v), largest);
+  }
+  return largest;
 }
 
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

@@ -77,17 +77,41 @@ void AccurateSolver::PackOrgan(const ElasticModel& model, std::uint32_t tube_cou
   }
 }
 
-void AccurateSolver::Follow(const TissueModel& tissue) {
-  for (int d = 0; d < 3; ++d) {
-    const auto i = static_cast<std::size_t>(d);
-    const float* rest = tissue.rest(d);
-    for (std::size_t at = 0; at < plane_; ++at) {
-      const bool whole = rest[at] > 0.0f;
-      axial_[i][at] = whole ? axial_uncut_[i][at] : 0.0f;
-      inverse_rest_[i][at] = whole ? 1.0f / (rest[at] * rest_scale_) : inverse_rest_[i][at];
+/// Regions, and which of them the organ's patches and the bindings join.
+Regions AccurateSolver::MakeRegions(const ElasticModel& model) const {
+  std::vector<std::pair<ParticleRef, ParticleRef>> joined;
+  for (const ElasticPatch& patch : model.patches) {
+    for (Index i = patch.first_link; i < patch.first_link + patch.link_count; ++i) {
+      joined.emplace_back(particles_->Ref(patch.vertex), particles_->Ref(model.patch_links[i].v));
     }
   }
+  for (const ElasticBinding& binding : model.bindings) {
+    for (const Index v : binding.surface) {
+      joined.emplace_back(particles_->Ref(binding.membrane), particles_->Ref(v));
+    }
+  }
+  return Regions(*particles_, joined);
+}
+
+/// `at` within a plane.
+void AccurateSolver::FollowEdge(const TissueModel& tissue, std::uint32_t at, std::size_t direction) {
+  const float rest = tissue.rest(static_cast<int>(direction))[at];
+  axial_[direction][at] = rest > 0.0f ? axial_uncut_[direction][at] : 0.0f;
+  if (rest > 0.0f) {
+    inverse_rest_[direction][at] = 1.0f / (rest * rest_scale_);
+  }
+}
+
+void AccurateSolver::Follow(const TissueModel& tissue) {
+  const GridLayout& layout = particles_->layout();
+  for (const Index edge : tissue.edited_edges()) {
+    const Index row = edge / 3 / layout.cols, col = edge / 3 % layout.cols;
+    FollowEdge(tissue, layout.Offset(row, col), edge % 3);
+    regions_.Wake(regions_.Of(particles_->NodeRef(row, col)));
+    regions_.Wake(regions_.Of(particles_->NodeRef(std::min(row + 1, layout.rows - 1), col)));
+  }
   elements_.Follow(tissue);
+  elements_.FollowRegions(regions_);
 }
 
 }  // namespace fulcrum::physics::accurate

@@ -123,7 +123,11 @@ class ParticleStore {
   void CopyPositions(std::span<float> xyz) const { Copy(now_.data(), xyz); }
   void CopyPrevious(std::span<float> xyz) const { Copy(previous_.data(), xyz); }
   /// previous <- now.
-  void RememberPlaces() { std::copy_n(now_.data(), now_.size(), previous_.data()); }
+  void RememberPlaces() { RememberPlaces(0, now_.size()); }
+  /// The same for `count` floats of the pool.
+  void RememberPlaces(std::size_t first, std::size_t count) {
+    std::copy_n(now_.data() + first, count, previous_.data() + first);
+  }
   /// Coordinates that are not finite or farther than `limit` from 0 come from the previous ones; returns how many.
   std::uint32_t RepairPlaces(float limit) {
     std::uint32_t repaired = 0;

@@ -34,6 +34,9 @@ class TissueModel {
   /// bit fields. Returns the number of edges and nodes changed, or -1 when the sizes do not fit this scene.
   int Apply(const TopologyState& topology, ParticleStore* particles);
 
+  /// Edges (3 * node + direction) that the last Apply has changed, some more than once.
+  [[nodiscard]] const std::vector<Index>& edited_edges() const { return edited_edges_; }
+
   [[nodiscard]] const std::vector<SpringBatch>& springs() const { return springs_; }
   [[nodiscard]] const std::vector<TetBatch>& tets() const { return tets_; }
   [[nodiscard]] const std::vector<BendingBatch>& bending() const { return bending_; }
@@ -105,7 +108,8 @@ class TissueModel {
 
   std::vector<std::uint8_t> dead_nodes_, dead_edges_, shrink_, triangle_alive_, debris_;
   std::vector<Index> changed_nodes_, piece_;  ///< Scratch of Apply.
-  std::vector<std::uint32_t> visited_;        ///< Scratch: by node, the search that saw it last.
+  std::vector<Index> edited_edges_;
+  std::vector<std::uint32_t> visited_;  ///< Scratch: by node, the search that saw it last.
   std::uint32_t search_ = 0;
   std::uint64_t revision_ = 0;
   ConstraintCounts counts_;

@@ -12,6 +12,7 @@ void TissueModel::RefreshEdge(Index node, int direction) {
   rest_[direction][at] = rest > 0.0f && EdgeAlive(node, direction)
                              ? rest * (1.0f - kShrinkUnit * static_cast<float>(shrink_[edge]))
                              : 0.0f;
+  edited_edges_.push_back(edge);
 }
 
 void TissueModel::RefreshTriangle(Index triangle) {
@@ -87,6 +88,7 @@ int TissueModel::Apply(const TopologyState& topology, ParticleStore* particles) 
   int edits = 0;
   bool revived = false;
   changed_nodes_.clear();
+  edited_edges_.clear();
   const Index nodes = scene_.membrane.node_count();
   const auto mark = [&](Index node) {
     for (const Index neighbour : Neighbours(node)) {

@@ -23,10 +23,10 @@ class Accurate : public testing::Test {
   Accurate() : data_(scene::BuildProcedural(scene::Small())), scene_(data_.View()) {}
 
   struct Run {
-    explicit Run(const SceneView& scene, const accurate::Kernels& kernels = accurate::BestKernels())
+    explicit Run(const SceneView& scene, const accurate::Kernels& kernels = accurate::BestKernels(), int threads = 1)
         : particles(scene),
           tissue(scene, &particles),
-          solver(scene, BuildElasticModel(scene), tissue, &particles, kernels) {}
+          solver(scene, BuildElasticModel(scene), tissue, &particles, threads, kernels) {}
 
     SubstepReport Step(std::span<const HeldPlace> held = {}, std::span<ContactRow> contacts = {}) {
       solver.BeginStep();

@@ -1,0 +1,104 @@
+// The linear solve of a substep: conjugate gradients with the three-level preconditioner, a phase at a time over what
+// is awake.
+#include <cmath>
+
+#include "physics_node/accurate/accurate_solver.h"
+#include "physics_node/accurate/for_tasks.h"
+
+namespace fulcrum::physics::accurate {
+
+/// z <- M^-1 residual, whose part for the middle level is in row_sums_ already; returns residual . z.
+double AccurateSolver::Precondition() {
+  const Sheet sheet = MakeSheet();
+  const SheetMatrix matrix = MakeMatrix();
+  const OrganMatrix organ_matrix = MakeOrganMatrix();
+  const Middle middle = coarse_.middle();
+  const float* const r[3] = {residual_.data() + tube_floats_, residual_.data() + tube_floats_ + plane_,
+                             residual_.data() + tube_floats_ + 2 * plane_};
+  float* const z[3] = {z_.data() + tube_floats_, z_.data() + tube_floats_ + plane_,
+                       z_.data() + tube_floats_ + 2 * plane_};
+  coarse_.Solve(regions_.tasks(), row_sums_.data(), residual_.data(), particles_->tube());
+  ForTasks([&](const Task& task, int index, int) {
+    double& partial = partial_[static_cast<std::size_t>(index)];
+    if (task.sheet) {
+      partial = kernels_.sheet_precondition(sheet, middle, matrix, r, z, task.first, task.end);
+    } else {
+      kernels_.organ_precondition(organ_matrix, residual_.data(), z_.data(), Vertex(task.first), Vertex(task.end));
+      partial = coarse_.Prolong(particles_->tube(), residual_.data(), z_.data(), task.first, task.end);
+    }
+  });
+  return SumOfPartials();
+}
+
+/// q <- A p; returns p . q.
+double AccurateSolver::Apply(const FloatArray& direction, float inertia) {
+  const Sheet sheet = MakeSheet();
+  const SheetMatrix matrix = MakeMatrix();
+  const Organ organ = MakeOrgan();
+  const OrganMatrix organ_matrix = MakeOrganMatrix();
+  const float* const p[3] = {direction.data() + tube_floats_, direction.data() + tube_floats_ + plane_,
+                             direction.data() + tube_floats_ + 2 * plane_};
+  float* const q[3] = {q_.data() + tube_floats_, q_.data() + tube_floats_ + plane_,
+                       q_.data() + tube_floats_ + 2 * plane_};
+  const std::span<const Task> patches = regions_.patches();
+  workers_.Run(static_cast<int>(patches.size()), [&](int index, int) {
+    const Task& task = patches[static_cast<std::size_t>(index)];
+    kernels_.organ_stress(organ, organ_matrix, direction.data(), Vertex(task.first), Vertex(task.end));
+  });
+  ForTasks([&](const Task& task, int index, int worker) {
+    partial_[static_cast<std::size_t>(index)] =
+        task.sheet ? kernels_.sheet_apply(sheet, inertia, matrix, p, q, carry_[static_cast<std::size_t>(worker)].data(),
+                                          task.first, task.end)
+                   : kernels_.organ_apply(organ, organ_matrix, inertia, direction.data(), q_.data(), Vertex(task.first),
+                                          Vertex(task.end));
+  });
+  return SumOfPartials() + elements_.Apply(direction.data(), q_.data());
+}
+
+/// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d.
+void AccurateSolver::Solve(float inertia, int iterations) {
+  const Sheet sheet = MakeSheet();
+  const Middle middle = coarse_.middle();
+  const float* const r[3] = {residual_.data() + tube_floats_, residual_.data() + tube_floats_ + plane_,
+                             residual_.data() + tube_floats_ + 2 * plane_};
+  const auto restrict_rows = [&](const Task& task) {
+    if (task.sheet) {
+      kernels_.sheet_restrict(sheet, middle, r, row_sums_.data(), task.first, task.end);
+    }
+  };
+  ForTasks([&](const Task& task, int, int) { restrict_rows(task); });
+  double rz = Precondition();
+  FloatArray* direction = &z_;
+  for (int i = 0; i < iterations; ++i) {
+    const double curvature = Apply(*direction, inertia);
+    // Nothing left to solve, or not finite: Finish counts what is not.
+    const bool stop = !(rz > 0.0) || !(curvature > 0.0), last = stop || i + 1 == iterations;
+    const auto alpha = stop ? 0.0f : static_cast<float>(rz / curvature);
+    const auto step = i == 0 ? kernels_.start : kernels_.advance;
+    ForTasks([&](const Task& task, int, int) {
+      ForParts(task, [&](std::size_t first, std::size_t count) {
+        step(alpha, direction->data() + first, q_.data() + first, d_.data() + first, residual_.data() + first, count);
+      });
+      if (!last) {
+        restrict_rows(task);
+      }
+    });
+    if (last) {
+      return;
+    }
+    if (i == 0) {
+      std::swap(z_, p_);
+    }
+    const double next = Precondition();
+    const auto beta = static_cast<float>(next / rz);
+    ForTasks([&](const Task& task, int, int) {
+      ForParts(task, [&](std::size_t first, std::size_t count) {
+        kernels_.combine(z_.data() + first, beta, p_.data() + first, count);
+      });
+    });
+    direction = &p_;
+    rz = next;
+  }
+}
+
+}  // namespace fulcrum::physics::accurate

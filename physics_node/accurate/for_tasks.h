@@ -1,0 +1,40 @@
+// Bodies of AccurateSolver's loops over what is awake; for its own sources.
+#pragma once
+
+#include "physics_node/accurate/accurate_solver.h"
+
+namespace fulcrum::physics::accurate {
+
+inline std::uint32_t Vertex(int v) { return static_cast<std::uint32_t>(v); }
+
+template <class Body>
+void AccurateSolver::ForTasks(const Body& body) {
+  const std::span<const Task> tasks = regions_.tasks();
+  workers_.Run(static_cast<int>(tasks.size()),
+               [&](int index, int worker) { body(tasks[static_cast<std::size_t>(index)], index, worker); });
+}
+
+template <class Body>
+void AccurateSolver::ForParts(const Task& task, const Body& body) const {
+  if (!task.sheet) {
+    body(4 * static_cast<std::size_t>(task.first), 4 * static_cast<std::size_t>(task.end - task.first));
+    return;
+  }
+  const std::size_t stride = plane_ / static_cast<std::size_t>(rows_);
+  const std::size_t first = stride * static_cast<std::size_t>(task.first),
+                    count = stride * static_cast<std::size_t>(task.end - task.first);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    body(tube_floats_ + axis * plane_ + first, count);
+  }
+}
+
+/// In the order of the tasks, whoever did them.
+inline double AccurateSolver::SumOfPartials() const {
+  double sum = 0;
+  for (std::size_t i = 0; i < regions_.tasks().size(); ++i) {
+    sum += partial_[i];
+  }
+  return sum;
+}
+
+}  // namespace fulcrum::physics::accurate

@@ -1,0 +1,39 @@
+// All kernels of one instruction set as a table. FULCRUM_KERNEL_NAMESPACE names it.
+#pragma once
+
+#include "physics_node/accurate/level_kernels_impl.h"
+#include "physics_node/accurate/organ_kernels_impl.h"
+#include "physics_node/accurate/sheet_kernels_impl.h"
+
+namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
+
+constexpr accurate::Kernels MakeKernels(const char* name) {
+  accurate::Kernels k{};
+  k.name = name;
+  k.sheet_guess = SheetGuess;
+  k.sheet_linearise = SheetLineariseRows;
+  k.sheet_apply = SheetApply;
+  k.sheet_energy = SheetEnergy;
+  k.middle_blocks = MiddleBlocks;
+  k.sheet_restrict = SheetRestrict;
+  k.sheet_precondition = SheetPrecondition;
+  k.sheet_finish = SheetFinish;
+  k.sheet_largest = SheetLargest;
+  k.combine = Combine;
+  k.start = StartFields;
+  k.advance = AdvanceFields;
+  k.within = Within;
+  k.organ_guess = OrganGuess;
+  k.organ_linearise = OrganLinearise;
+  k.organ_residual = OrganResidual;
+  k.organ_blocks = OrganBlocks;
+  k.organ_stress = OrganStress;
+  k.organ_apply = OrganApply;
+  k.organ_precondition = OrganPrecondition;
+  k.organ_energy = OrganEnergy;
+  k.organ_finish = OrganFinish;
+  k.organ_largest = OrganLargest;
+  return k;
+}
+
+}  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

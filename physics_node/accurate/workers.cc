@@ -1,0 +1,80 @@
+#include "physics_node/accurate/workers.h"
+
+#include <immintrin.h>
+
+namespace fulcrum::physics::accurate {
+namespace {
+
+/// Pauses before a thread without work sleeps: some 50 us, longer than the stretch between two phases of a step.
+constexpr int kSpins = 1500;
+
+}  // namespace
+
+Workers::Workers(int threads) {
+  for (int worker = 1; worker < threads; ++worker) {
+    threads_.emplace_back([this, worker] { Loop(worker); });
+  }
+}
+
+Workers::~Workers() {
+  stop_ = true;
+  ++phase_;
+  phase_.notify_all();
+  for (std::thread& thread : threads_) {
+    thread.join();
+  }
+}
+
+void Workers::Help(int worker) {
+  std::uint64_t ticket = ticket_.load(std::memory_order_acquire);
+  for (;;) {
+    const auto next = static_cast<std::uint32_t>(ticket & 0xffffu),
+               tasks = static_cast<std::uint32_t>(ticket >> 16) & 0xffffu;
+    if (next >= tasks) {
+      return;
+    }
+    if (!ticket_.compare_exchange_weak(ticket, ticket + 1, std::memory_order_acq_rel, std::memory_order_acquire)) {
+      continue;
+    }
+    // The phase cannot end before this task has, so these are its own.
+    call_.load(std::memory_order_relaxed)(body_.load(std::memory_order_relaxed), static_cast<int>(next), worker);
+    done_.fetch_add(1, std::memory_order_release);
+    ticket = ticket_.load(std::memory_order_acquire);
+  }
+}
+
+void Workers::RunShared(int tasks, Call call, const void* body) {
+  call_.store(call, std::memory_order_relaxed);
+  body_.store(body, std::memory_order_relaxed);
+  done_.store(0, std::memory_order_relaxed);
+  const std::uint32_t phase = phase_.load(std::memory_order_relaxed) + 1;
+  ticket_.store(std::uint64_t{phase} << 32 | static_cast<std::uint64_t>(tasks) << 16, std::memory_order_release);
+  phase_.store(phase, std::memory_order_release);
+  phase_.notify_all();
+  Help(0);
+  for (int spins = 0; done_.load(std::memory_order_acquire) < tasks; ++spins) {
+    if (spins < kSpins) {
+      _mm_pause();
+    } else {
+      std::this_thread::yield();
+    }
+  }
+}
+
+void Workers::Loop(int worker) {
+  std::uint32_t seen = 0;
+  while (!stop_.load(std::memory_order_relaxed)) {
+    int spins = 0;
+    while (phase_.load(std::memory_order_acquire) == seen) {
+      if (++spins < kSpins) {
+        _mm_pause();
+      } else {
+        phase_.wait(seen, std::memory_order_acquire);
+      }
+    }
+    seen = phase_.load(std::memory_order_acquire);
+    Help(worker);
+  }
+}
+
+}  // namespace fulcrum::physics::accurate

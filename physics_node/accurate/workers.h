@@ -1,0 +1,55 @@
+// Threads that share the tasks of a phase. Tasks are claimed one by one, so that a thread whose core is taken away
+// costs the time of its task and no more; whoever finds nothing to do spins for a while and then sleeps. Which thread
+// does a task must not matter to its result.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <thread>
+#include <vector>
+
+namespace fulcrum::physics::accurate {
+
+class Workers {
+ public:
+  /// `threads` with the one that calls; at least 1.
+  explicit Workers(int threads);
+  ~Workers();
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  [[nodiscard]] int count() const { return static_cast<int>(threads_.size()) + 1; }
+
+  /// body(task, worker) once for each task in [0, tasks), worker in [0, count()); returns when all are done. At most
+  /// 65,535 tasks. Not from within a body.
+  template <class Body>
+  void Run(int tasks, const Body& body) {
+    if (threads_.empty() || tasks < 2) {
+      for (int task = 0; task < tasks; ++task) {
+        body(task, 0);
+      }
+      return;
+    }
+    RunShared(
+        tasks, [](const void* b, int task, int worker) { (*static_cast<const Body*>(b))(task, worker); }, &body);
+  }
+
+ private:
+  using Call = void (*)(const void* body, int task, int worker);
+
+  void RunShared(int tasks, Call call, const void* body);
+  /// Does tasks of the phase in `ticket_` until none is left.
+  void Help(int worker);
+  void Loop(int worker);
+
+  /// Phase number, tasks and next task in one word (32, 16, 16 bits): a claim cannot mistake one phase for another.
+  alignas(64) std::atomic<std::uint64_t> ticket_{0};
+  std::atomic<Call> call_{nullptr};
+  std::atomic<const void*> body_{nullptr};
+  alignas(64) std::atomic<int> done_{0};
+  alignas(64) std::atomic<std::uint32_t> phase_{0};
+  std::atomic<bool> stop_{false};
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace fulcrum::physics::accurate
