@@ -19,7 +19,10 @@ namespace fulcrum {
          breathing.direction;
 }
 
-/// The pelvis does not breathe; wall, retroperitoneum and the rest do.
-[[nodiscard]] inline bool Breathes(SurfaceRole role) { return role != SurfaceRole::kPelvis; }
+/// Wall, bladder and what else lies free; not the pelvis, nor the retroperitoneum, to which the membrane's rim is
+/// fixed.
+[[nodiscard]] inline bool Breathes(SurfaceRole role) {
+  return role != SurfaceRole::kPelvis && role != SurfaceRole::kRetroperitoneum;
+}
 
 }  // namespace fulcrum

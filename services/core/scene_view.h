@@ -71,7 +71,8 @@ struct ThermalParams {
   float shrink_max = 0.3f;  ///< Rest length lost at full collagen damage.
 };
 
-/// Section `breathing`: to-and-fro of the fixed surroundings but the pelvis; services/core/breathing.h.
+/// Section `breathing`: to-and-fro of the abdominal wall and what else of the surroundings breathes;
+/// services/core/breathing.h.
 struct Breathing {
   Vec3f direction = Vec3f::UnitZ();  ///< Unit, frame W: where they go from their place in the scene.
   float amplitude_m = 0;             ///< Peak to peak; 0: none.

@@ -231,8 +231,10 @@ TEST(TissueCollision, BreathingIsSmoothAndCarriesTheTissue) {
   EXPECT_NEAR(BreathingOffset(breathing, 2.0).z(), 0.004f, 1e-7f);
   EXPECT_NEAR(BreathingOffset(breathing, 8.0).z(), 0.0f, 1e-7f);
   EXPECT_FALSE(Breathes(SurfaceRole::kPelvis));
+  EXPECT_FALSE(Breathes(SurfaceRole::kRetroperitoneum));
   EXPECT_TRUE(Breathes(SurfaceRole::kAbdominalWall));
   scene::SceneData data = SheetOverFloor();
+  data.static_surfaces[0].role = SurfaceRole::kOther;
   data.fixed.breathing = breathing;
   World world(data.View());
   const Index middle = 8 * 17 + 8;
