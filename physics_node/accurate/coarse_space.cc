@@ -66,7 +66,7 @@ CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, cons
   constant_ = Eigen::MatrixXf::Zero(n, n);
   tube_mass_ = Eigen::MatrixXf::Zero(n, n);
   building_ = Eigen::MatrixXf::Zero(n, n);
-  factor_ = Eigen::LLT<Eigen::MatrixXf>(n);
+  factor_.compute(Eigen::MatrixXf::Identity(n, n));  // Not left without a state: it is replaced when complete.
   solution_ = Eigen::VectorXf::Zero(n);
   nodes4_ = FloatArray(4 * static_cast<std::size_t>(nodes_));
   AddTube(model);
