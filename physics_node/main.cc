@@ -17,7 +17,7 @@ fulcrum::ExitCode RunPhysics(fulcrum::app::NodeApp& app) {
                             {app.MakeInput<ToolState>(), app.MakeInput<HandleState>(), app.MakeInput<TopologyState>(),
                              app.MakeOutput<TissueFrame>(), app.MakeOutput<ContactModel>(),
                              app.MakeOutput<CauteryContact>(), app.MakeOutput<TickManifest>()},
-                            &checkpoint, runtime::MonotonicNs());
+                            &checkpoint, runtime::MonotonicNs(), app.cart().timing(NodeId::kPhysics).threads);
   if (node.restored()) {
     runtime::Log(runtime::LogLevel::kInfo, "goes on from its checkpoint");
   }

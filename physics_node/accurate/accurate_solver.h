@@ -61,7 +61,7 @@ class AccurateSolver {
   /// Velocities from two states a step apart, for a restart. Wakes.
   void SetVelocity(ParticleRef at, const Vec3f& v);
 
-  /// What is computed at present.
+  /// What is computed at present, and what is awake.
   [[nodiscard]] const Regions& regions() const { return regions_; }
 
  private:

@@ -2,6 +2,8 @@
 
 #include <immintrin.h>
 
+#include <chrono>
+
 namespace fulcrum::physics::accurate {
 namespace {
 
@@ -56,7 +58,8 @@ void Workers::RunShared(int tasks, Call call, const void* body) {
     if (spins < kSpins) {
       _mm_pause();
     } else {
-      std::this_thread::yield();
+      // A thread of lower priority may need this very core to finish its task.
+      std::this_thread::sleep_for(std::chrono::microseconds(20));
     }
   }
 }

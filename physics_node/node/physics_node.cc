@@ -48,11 +48,11 @@ CauteryMode ModeOf(std::uint8_t pedals) {
 }  // namespace
 
 PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint,
-                         std::int64_t epoch_ns)
+                         std::int64_t epoch_ns, int threads)
     : scene_(scene),
       ports_(ports),
       checkpoint_(checkpoint),
-      simulation_(scene),
+      simulation_(scene, threads),
       frame_stamper_(epoch_ns),
       contact_stamper_(epoch_ns),
       cautery_stamper_(epoch_ns),

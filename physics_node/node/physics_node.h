@@ -31,7 +31,9 @@ class PhysicsNode {
   /// Scene, ports and checkpoint must outlive the node. Goes on from the checkpoint when it holds something.
   /// @param checkpoint null: nothing is kept.
   /// @param epoch_ns CLOCK_MONOTONIC at the start of the process [ns].
-  PhysicsNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint, std::int64_t epoch_ns);
+  /// @param threads that share a step; the state does not depend on it.
+  PhysicsNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint, std::int64_t epoch_ns,
+              int threads = 1);
 
   /// One period. @pre called by one thread.
   void Step(const Tick& tick);

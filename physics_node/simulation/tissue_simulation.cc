@@ -37,7 +37,7 @@ bool TissueSimulation::ToolTrack::moved() const {
          now.jaw_rad != last.jaw_rad;
 }
 
-TissueSimulation::TissueSimulation(const SceneView& scene, const Kernels& kernels)
+TissueSimulation::TissueSimulation(const SceneView& scene, int threads, const Kernels& kernels)
     : scene_(scene),
       particles_(scene),
       model_(scene, &particles_),
@@ -52,7 +52,7 @@ TissueSimulation::TissueSimulation(const SceneView& scene, const Kernels& kernel
     if (scene.physics.mode == PhysicsMode::kXpbd) {
       xpbd_.emplace(elastic, &model_, &particles_);
     } else {
-      accurate_.emplace(scene, elastic, model_, &particles_);
+      accurate_.emplace(scene, elastic, model_, &particles_, threads);
       effort_ = accurate::EffortOf(scene.physics.preset);
     }
     held_places_.reserve(particles_.particle_count());
@@ -307,6 +307,10 @@ float TissueSimulation::MaxDisplacement() const {
     largest = std::max(largest, (particles_.At(particles_.Ref(p)) - scene_.rest_position[p]).squaredNorm());
   }
   return std::sqrt(largest);
+}
+
+float TissueSimulation::awake_part() const {
+  return asleep_ ? 0.0f : accurate_ ? accurate_->regions().awake_part() : 1.0f;
 }
 
 std::uint64_t TissueSimulation::StateHash() const {

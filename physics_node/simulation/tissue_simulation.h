@@ -45,7 +45,8 @@ class TissueSimulation {
   static constexpr float kMaxToolSpeed = 1.0f;
   static constexpr float kMaxToolTurn = 6.0f;
 
-  explicit TissueSimulation(const SceneView& scene, const Kernels& kernels = BestKernels());
+  /// `threads` share a step of mode accurate; the state does not depend on it.
+  explicit TissueSimulation(const SceneView& scene, int threads = 1, const Kernels& kernels = BestKernels());
 
   /// Advances by PhysicsParams.dt_s. A tool that is not present leaves the tissue where it is and lets go.
   StepReport Step(const std::array<ToolInput, kMaxTools>& tools);
@@ -68,6 +69,8 @@ class TissueSimulation {
   [[nodiscard]] const Grasp& grasp(std::uint32_t tool) const { return grasps_[tool]; }
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return contacts_.force(tool); }
   [[nodiscard]] bool asleep() const { return asleep_; }
+  /// Part of the tissue that is awake.
+  [[nodiscard]] float awake_part() const;
   [[nodiscard]] std::uint64_t quarantined() const { return quarantined_; }
   /// Steps made times their length [s]: what breathes follows it.
   [[nodiscard]] double simulated_time_s() const {

@@ -32,11 +32,14 @@ void ReadCalibration(StrictMap map, JawCalibration* calibration) {
       map.NumbersSi("angles_deg", calibration->angles_rad, 2, kMaxCalibrationPoints, Range::Between(-10, 120));
 }
 
-void ReadTiming(StrictMap map, NodeTiming* timing) {
+void ReadTiming(StrictMap map, NodeId node, NodeTiming* timing) {
   timing->rate_Hz = map.NumberSi("rate_Hz", timing->rate_Hz, Range::Between(1, 4000));
   timing->fifo_priority = static_cast<int>(map.Integer("fifo_priority", timing->fifo_priority, 0, 99));
   timing->cpu = static_cast<int>(map.Integer("cpu", timing->cpu, -1, 1023));
   timing->spin_s = map.NumberSi("spin_us", timing->spin_s, Range::Between(0, 500));
+  if (node == NodeId::kPhysics) {
+    timing->threads = static_cast<int>(map.Integer("threads", timing->threads, 1, 16));
+  }
 }
 
 /// Reads `file` over `cart`: what the file does not say stays.
@@ -61,7 +64,8 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   }
   StrictMap nodes = root.MapOrDefaults("nodes");
   for (std::size_t node = 0; node < cart.nodes.size(); ++node) {
-    ReadTiming(nodes.MapOrDefaults(NodeName(static_cast<NodeId>(node))), &cart.nodes[node]);
+    const auto id = static_cast<NodeId>(node);
+    ReadTiming(nodes.MapOrDefaults(NodeName(id)), id, &cart.nodes[node]);
   }
   file->Finish();
   return cart;

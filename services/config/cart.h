@@ -52,6 +52,7 @@ struct NodeTiming {
   int fifo_priority = 0;  ///< 1 … 99: SCHED_FIFO when permitted; 0: normal scheduling.
   int cpu = -1;           ///< Pin to this CPU; -1: any.
   double spin_s = 0;      ///< Sleep until this long before each period, then spin.
+  int threads = 1;        ///< That share a period's work; physics_node only.
 };
 
 struct CartConfig {

@@ -8,10 +8,10 @@ namespace fulcrum::physics {
 
 class AccurateUnderTest final : public StoreSolver {
  public:
-  explicit AccurateUnderTest(const SceneView& scene)
+  explicit AccurateUnderTest(const SceneView& scene, int threads = 1)
       : StoreSolver(scene),
         effort_(accurate::EffortOf(scene.physics.preset)),
-        solver_(scene, BuildElasticModel(scene), tissue_, &particles_) {}
+        solver_(scene, BuildElasticModel(scene), tissue_, &particles_, threads) {}
 
   void Step() override {
     solver_.BeginStep();

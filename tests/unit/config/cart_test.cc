@@ -87,6 +87,8 @@ const BadCart kBadCarts[] = {
     {"UnknownNode", "nodes: {physic_node: {rate_Hz: 100}}", "did you mean 'physics_node'?"},
     {"Priority", "nodes: {physics_node: {fifo_priority: 100}}", "an integer from 0 to 99"},
     {"Cpu", "nodes: {physics_node: {cpu: -2}}", "an integer from -1 to 1023"},
+    {"Threads", "nodes: {physics_node: {threads: 17}}", "an integer from 1 to 16"},
+    {"ThreadsElsewhere", "nodes: {thermal_node: {threads: 2}}", "threads"},
     {"Spin", "nodes: {physics_node: {spin_us: 1000}}", "valid: 0 to 500 us"},
 };
 

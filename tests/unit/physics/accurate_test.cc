@@ -1,11 +1,13 @@
 // The accurate solver: same bits on every instruction set, rest, pull and return, cuts, damaged input.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <vector>
 
 #include "physics_node/accurate/accurate_solver.h"
+#include "physics_node/accurate/workers.h"
 #include "services/scene/build.h"
 
 namespace fulcrum::physics {
@@ -58,6 +60,17 @@ class Accurate : public testing::Test {
     }
     return held;
   }
+  TopologyState WholeTopology() const {
+    TopologyState topology;
+    const std::size_t nodes = scene_.membrane.node_count();
+    topology.revision = 1;
+    topology.rows = scene_.membrane.rows;
+    topology.cols = scene_.membrane.cols;
+    topology.dead_nodes.assign((nodes + 7) / 8, 0);
+    topology.dead_edges.assign((3 * nodes + 7) / 8, 0);
+    topology.shrink.assign(3 * nodes, 0);
+    return topology;
+  }
   void Release(Run* run) const {
     for (Index p = 0; p < run->particles.particle_count(); ++p) {
       run->particles.SetInverseMass(run->particles.Ref(p), run->tissue.BaseInverseMass(p));
@@ -94,6 +107,95 @@ TEST_F(Accurate, SameBitsOnEveryInstructionSet) {
   }
 }
 
+TEST_F(Accurate, SameBitsOnAnyNumberOfThreads) {
+  std::vector<std::vector<float>> results;
+  for (const int threads : {1, 2, 3, 2}) {
+    Run run(scene_, accurate::BestKernels(), threads);
+    for (int i = 0; i < 30; ++i) {
+      run.Step(Patch(&run, 0.0005f * static_cast<float>(i)));
+    }
+    results.push_back(run.Positions());
+    EXPECT_EQ(results.back(), results.front()) << threads << " threads";
+  }
+}
+
+TEST(Workers, DoEachTaskOnce) {
+  accurate::Workers workers(3);
+  std::vector<std::atomic<int>> done(200);
+  for (int phase = 0; phase < 2000; ++phase) {
+    const int tasks = phase % 200;
+    workers.Run(tasks, [&](int task, int worker) {
+      EXPECT_LT(worker, 3);
+      ++done[static_cast<std::size_t>(task)];
+    });
+  }
+  for (int task = 0; task < 200; ++task) {
+    EXPECT_EQ(done[static_cast<std::size_t>(task)], 10 * (199 - task));
+  }
+}
+
+TEST_F(Accurate, SleepsWhereNothingMovesAndWakesWhereSomethingDoes) {
+  const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
+  const SceneView scene = data.View();
+  Run run(scene);
+  for (int i = 0; i < 60; ++i) {
+    run.Step();
+  }
+  EXPECT_TRUE(run.solver.regions().nothing()) << "Nothing has ever moved.";
+
+  // A node near one end, lifted and let go: what is near wakes, what is far does not.
+  const Index particle = scene.membrane.first + 3 * scene.membrane.cols + scene.membrane.cols / 2;
+  const ParticleRef at = run.particles.Ref(particle);
+  const float w = run.particles.InverseMass(at);
+  run.particles.SetInverseMass(at, 0);
+  for (int i = 1; i <= 10; ++i) {
+    const HeldPlace held{at, scene.rest_position[particle] + Vec3f(0, 0, 2e-6f * static_cast<float>(i))};
+    run.Step({&held, 1});
+  }
+  const int far = run.solver.regions().Of(run.particles.NodeRef(scene.membrane.rows - 1, 0));
+  EXPECT_TRUE(run.solver.regions().computed(run.solver.regions().Of(at)));
+  EXPECT_FALSE(run.solver.regions().everything());
+  EXPECT_FALSE(run.solver.regions().computed(far));
+  run.particles.SetInverseMass(at, w);
+  run.Step();
+  EXPECT_GT(run.solver.Velocity(at).norm(), 1e-4f) << "Released, it moves.";
+  for (int i = 0; i < 300 && !run.solver.regions().nothing(); ++i) {
+    run.Step();
+  }
+  EXPECT_TRUE(run.solver.regions().nothing());
+  EXPECT_LT((run.particles.At(at) - scene.rest_position[particle]).norm(), 1e-5f);
+}
+
+TEST_F(Accurate, ContactAndCutsWake) {
+  Run run(scene_);
+  for (int i = 0; i < 60; ++i) {
+    run.Step();
+  }
+  ASSERT_TRUE(run.solver.regions().nothing());
+  const Index row_index = scene_.membrane.rows / 2, col = scene_.membrane.cols / 2;
+  ContactRow row;
+  row.count = 1;
+  row.at[0] = run.particles.NodeRef(row_index, col);
+  row.weight[0] = 1;
+  row.offset = run.particles.At(row.at[0]).z() - 0.001f;
+  run.Step({}, {&row, 1});
+  EXPECT_TRUE(run.solver.regions().nothing()) << "Near is not touching.";
+  row.offset += 0.0015f;
+  run.Step({}, {&row, 1});
+  EXPECT_TRUE(run.solver.regions().computed(run.solver.regions().Of(row.at[0])));
+  for (int i = 0; i < 300; ++i) {
+    run.Step();
+  }
+  ASSERT_TRUE(run.solver.regions().nothing());
+
+  TopologyState topology = WholeTopology();
+  SetBit(topology.dead_edges, 3 * (row_index * scene_.membrane.cols + col));
+  ASSERT_GT(run.tissue.Apply(topology, &run.particles), 0);
+  run.solver.Follow(run.tissue);
+  run.Step();
+  EXPECT_TRUE(run.solver.regions().computed(run.solver.regions().Of(row.at[0])));
+}
+
 TEST_F(Accurate, RestShapeIsAtRestInSpiteOfThePrestrain) {
   ASSERT_GT(scene_.physics.membrane_prestrain, 0.0f);
   Run run(scene_);
@@ -123,14 +225,7 @@ TEST_F(Accurate, PulledAndReleasedItComesBack) {
 
 TEST_F(Accurate, CutEdgesCarryNothing) {
   Run whole(scene_), cut(scene_);
-  TopologyState topology;
-  const std::size_t nodes = scene_.membrane.node_count();
-  topology.revision = 1;
-  topology.rows = scene_.membrane.rows;
-  topology.cols = scene_.membrane.cols;
-  topology.dead_nodes.assign((nodes + 7) / 8, 0);
-  topology.dead_edges.assign((3 * nodes + 7) / 8, 0);
-  topology.shrink.assign(3 * nodes, 0);
+  TopologyState topology = WholeTopology();
   // All around the patch that is held.
   const Index rows = scene_.membrane.rows, cols = scene_.membrane.cols;
   for (Index r = rows / 2 - 3; r <= rows / 2 + 3; ++r) {

@@ -79,7 +79,7 @@ TEST_F(OnSmallScene, EveryInstructionSetGivesTheSameHash) {
   if (!HasAvx2()) {
     GTEST_SKIP() << "this CPU has no AVX2";
   }
-  TissueSimulation narrow(scene_, BaselineKernels()), wide(scene_, Avx2Kernels());
+  TissueSimulation narrow(scene_, 1, BaselineKernels()), wide(scene_, 1, Avx2Kernels());
   for (int i = 0; i < 300; ++i) {
     narrow.Step(ScriptedTools(scene_, 0.01 * i));
     wide.Step(ScriptedTools(scene_, 0.01 * i));
