@@ -9,12 +9,16 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Rows are made this far from contact, and as much more as the block moves in two steps [m].
+/// Rows are made this far from contact, and half as much again as the particle moves in a step [m].
 constexpr float kBand = 0.0002f;
+constexpr float Band(float way) { return kBand + 1.5f * way; }
 /// A particle that is near goes so far before its nearest triangle is looked for anew [m].
 constexpr float kKeep = 0.0003f;
 /// What is further than this behind a surface has gone through for good [m].
 constexpr float kMaxBehind = 0.005f;
+/// A particle is followed against the triangle it is nearest to. Other parts of the surface may come nearer by as much
+/// as they move otherwise than that triangle: of how far the surface moves anywhere, this part.
+constexpr float kElsewhere = 0.25f;
 /// Fixed surfaces are seen from this far [m].
 constexpr float kSight = 0.012f;
 constexpr float kAnywhere = 10.0f;
@@ -27,22 +31,29 @@ constexpr int kMaxWalk = 8;
 
 }  // namespace
 
-TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
-    : scene_(scene), model_(model), particles_(particles) {
+TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
+                                 const Kernels& kernels)
+    : scene_(scene), model_(model), particles_(particles), kernels_(kernels) {
   travel_.assign((particles->particle_count() + kBlock - 1) / kBlock, 0.0f);
+  for (Index col = 0; col < scene.membrane.cols; ++col) {
+    column_.push_back(particles->NodeRef(0, col));
+  }
   WatchOrgan();
   for (const StaticSurface& surface : scene.static_surfaces) {
     if (surface.collides) {
       WatchFixed(surface);
     }
   }
-  near_organ_.reserve(organ_.size());
 }
 
 TissueCollision::Signed TissueCollision::SignedDistance(const Vec3f& p, const std::array<Vec3f, 3>& corners) {
+  return SignedDistance(p, corners, ClosestOnTriangle(p, corners[0], corners[1], corners[2]));
+}
+
+TissueCollision::Signed TissueCollision::SignedDistance(const Vec3f& p, const std::array<Vec3f, 3>& corners,
+                                                        const std::array<float, 3>& b) {
   Signed result;
-  result.barycentric = ClosestOnTriangle(p, corners[0], corners[1], corners[2]);
-  const auto& b = result.barycentric;
+  result.barycentric = b;
   const Vec3f offset = p - b[0] * corners[0] - b[1] * corners[1] - b[2] * corners[2];
   Vec3f normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
   const float area = normal.norm();
@@ -58,14 +69,16 @@ TissueCollision::Signed TissueCollision::SignedDistance(const Vec3f& p, const st
   return result;
 }
 
-void TissueCollision::MakeGroups(std::span<Watch> watches, std::vector<Group>* groups) {
-  for (Index i = 0; i < watches.size(); ++i) {
-    const Index block = watches[i].particle / kBlock;
-    if (groups->empty() || groups->back().block != block) {
-      groups->push_back({block, i, i, 0.0f, 0});
+void TissueCollision::Watches::MakeGroups() {
+  for (Index i = 0; i < all.size(); ++i) {
+    const Index block = all[i].particle / kBlock;
+    if (groups.empty() || groups.back().block != block) {
+      groups.push_back({block, i, i, {}});
     }
-    groups->back().last = i + 1;
+    groups.back().last = i + 1;
   }
+  times.resize(all.size());
+  near.reserve(all.size());
 }
 
 std::array<Vec3f, 3> TissueCollision::OrganCorners(Index triangle) const {
@@ -92,6 +105,7 @@ void TissueCollision::WatchOrgan() {
     std::sort(ring.begin(), ring.end());
     ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
     std::erase(ring, t);
+    ring.insert(ring.begin(), t);
     ring_.insert(ring_.end(), ring.begin(), ring.end());
     ring_start_.push_back(static_cast<Index>(ring_.size()));
   }
@@ -109,11 +123,11 @@ void TissueCollision::WatchOrgan() {
         watch.at = particles_->Ref(particle);
         watch.triangle = hit.triangle;
         watch.clearance = clearance;
-        organ_.push_back(watch);
+        organ_.all.push_back(watch);
       }
     }
   }
-  MakeGroups(organ_, &organ_groups_);
+  organ_.MakeGroups();
 }
 
 void TissueCollision::WatchFixed(const StaticSurface& surface) {
@@ -146,34 +160,42 @@ void TissueCollision::WatchFixed(const StaticSurface& surface) {
     watch.particle = particle;
     watch.at = particles_->Ref(particle);
     watch.clearance = std::min(scene_.physics.collision_margin_m, 0.5f * height);
-    fixed.watches.push_back(watch);
+    fixed.watches.all.push_back(watch);
   }
-  MakeGroups(fixed.watches, &fixed.groups);
-  fixed.near.reserve(fixed.watches.size());
+  fixed.watches.MakeGroups();
   fixed_.push_back(std::move(fixed));
 }
 
 bool TissueCollision::breath_near() const {
   return std::any_of(fixed_.begin(), fixed_.end(), [this](const Fixed& fixed) {
-    return fixed.breathes && std::any_of(fixed.near.begin(), fixed.near.end(),
-                                         [&](const Near& near) { return Touches(fixed.watches[near.watch].particle); });
+    return fixed.breathes && std::any_of(fixed.watches.near.begin(), fixed.watches.near.end(), [&](const Near& near) {
+             return Touches(fixed.watches.all[near.watch].particle);
+           });
   });
 }
 
 std::size_t TissueCollision::near_count() const {
-  std::size_t count = near_organ_.size();
+  std::size_t count = organ_.near.size();
   for (const Fixed& fixed : fixed_) {
-    count += fixed.near.size();
+    count += fixed.watches.near.size();
   }
   return count;
 }
 
 void TissueCollision::MeasureMoves(std::vector<float>* moved) const {
   moved->assign(block_count(), 0.0f);
-  for (Index p = 0; p < particles_->particle_count(); ++p) {
-    const ParticleRef at = particles_->Ref(p);
+  const auto measure = [&](Index p, ParticleRef at) {
     float& largest = (*moved)[p / kBlock];
     largest = std::max(largest, (particles_->At(at) - particles_->Previous(at)).squaredNorm());
+  };
+  for (Index p = 0; p < scene_.tube_vertex_count; ++p) {
+    measure(p, {4 * p, 1});
+  }
+  const GridLayout& layout = particles_->layout();
+  for (Index p = scene_.membrane.first, row = 0; row < layout.rows; ++row) {
+    for (Index col = 0; col < layout.cols; ++p, ++col) {
+      measure(p, {column_[col].base + row * layout.stride, column_[col].step});
+    }
   }
   for (float& m : *moved) {
     m = std::sqrt(m);
@@ -181,19 +203,30 @@ void TissueCollision::MeasureMoves(std::vector<float>* moved) const {
 }
 
 void TissueCollision::Walk(Watch* watch, const Vec3f& p) const {
-  const auto distance_sq = [&](Index t) {
-    const auto x = OrganCorners(t);
-    const auto b = ClosestOnTriangle(p, x[0], x[1], x[2]);
-    return (p - b[0] * x[0] - b[1] * x[1] - b[2] * x[2]).squaredNorm();
-  };
-  float best = distance_sq(watch->triangle);
+  PointBatch points;
+  FootBatch feet;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::fill_n(points.point[axis], kLanes, p[static_cast<int>(axis)]);
+  }
+  const float* tube = particles_->raw().data();
+  float best = 3e38f;
   for (int step = 0; step < kMaxWalk; ++step) {
     const Index from = watch->triangle;
-    for (Index i = ring_start_[from]; i < ring_start_[from + 1]; ++i) {
-      const float d = distance_sq(ring_[i]);
-      if (d < best) {
-        best = d;
-        watch->triangle = ring_[i];
+    // The triangle itself first; a batch is filled up with its last one.
+    const Index first = step == 0 ? ring_start_[from] : ring_start_[from] + 1, last = ring_start_[from + 1];
+    for (Index i = first; i < last; i += kLanes) {
+      for (Index lane = 0; lane < kLanes; ++lane) {
+        const Triangle& v = scene_.tube_surface[ring_[std::min(i + lane, last - 1)]];
+        for (std::size_t corner = 0; corner < 3; ++corner) {
+          points.corner[corner][lane] = 4 * v[corner];
+        }
+      }
+      kernels_.feet(tube, points, &feet);
+      for (Index lane = 0; lane < std::min<Index>(kLanes, last - i); ++lane) {
+        if (feet.distance_sq[lane] < best) {
+          best = feet.distance_sq[lane];
+          watch->triangle = ring_[i + lane];
+        }
       }
     }
     if (watch->triangle == from) {
@@ -202,33 +235,66 @@ void TissueCollision::Walk(Watch* watch, const Vec3f& p) const {
   }
 }
 
-/// look(watch, reach) tells how far the particle is from contact, 3e38 where there can be none; `reach` is from where
-/// on it is near.
-template <class Look>
-void TissueCollision::LookAtDue(std::vector<Group>* groups, std::vector<Watch>* watches, std::span<const float> moved,
-                                float others_travel, float others_moved, std::vector<Near>* near, const Look& look) {
-  near->clear();
-  for (Group& group : *groups) {
-    const float travel = travel_[group.block] + others_travel;
-    const float band = kBand + 2.0f * (moved[group.block] + others_moved), reach = band + kKeep;
-    if (travel >= group.due) {
-      group.due = 3e38f;
-      group.near = 0;
+Vec3f TissueCollision::Standpoint(const Watch& watch) const {
+  const auto x = OrganCorners(watch.triangle);
+  return particles_->At(watch.at) - (x[0] + x[1] + x[2]) / 3.0f;
+}
+
+template <class Stand>
+void TissueCollision::AskWay(Watch* watch, float others_moved, float unknown, const Stand& stand) const {
+  if (watch->asked == step_) {
+    return;
+  }
+  const Vec3f at = stand(*watch);
+  const bool known = watch->asked + 1 == step_;
+  watch->way = known ? (at - watch->last).norm() + (watch->near ? 0.0f : kElsewhere * others_moved) : unknown;
+  watch->gone = (at - watch->seen).norm();
+  watch->last = at;
+  watch->asked = step_;
+}
+
+/// look(watch) tells how far the particle is from contact. stand(watch) is where it is, as far as that concerns what
+/// it watches; what others move there, is in others_travel.
+template <class Stand, class Look>
+void TissueCollision::LookAtDue(Watches* watches, std::span<const float> moved, float others_travel, float others_moved,
+                                const Stand& stand, const Look& look) {
+  watches->near.clear();
+  for (Group& group : watches->groups) {
+    const float travel = travel_[group.block] + others_travel, step = moved[group.block] + others_moved;
+    if (travel >= group.times.due) {
+      group.times = {kNever, kNever};
       for (Index i = group.first; i < group.last; ++i) {
-        Watch& watch = (*watches)[i];
-        if (travel >= watch.due) {
-          ++looked_at_;
-          const float distance = look(&watch);
-          watch.near = watch.blocks && distance < reach;
-          watch.due = travel + (watch.near ? kKeep : std::min(distance, kSight) - band);
+        Times& times = watches->times[i];
+        if (travel >= times.due) {
+          Watch& watch = watches->all[i];
+          AskWay(&watch, others_moved, step, stand);
+          float others = watch.near ? 0.0f : kElsewhere * (others_travel - watch.others);
+          const float left = watch.near ? kKeep - watch.gone : watch.gap - watch.gone - others - Band(watch.way);
+          if (!(left > 0.0f)) {
+            ++looked_at_;
+            watch.gap = look(&watch);
+            watch.near = watch.blocks && watch.gap < Band(watch.way) + kKeep;
+            watch.others = others_travel;
+            watch.gone = others = 0.0f;
+            watch.seen = watch.last = stand(watch);
+          }
+          // Asked again a step before the block's fastest could have come there: then its own way is known.
+          const float alone = watch.gap - watch.gone - others - Band(step) - step;
+          times.due = travel + (watch.near ? kKeep - watch.gone : std::max(0.0f, std::min(alone, kSight)));
+          times.start = watch.near ? travel - watch.gone + watch.gap : kNever;
         }
-        group.near += watch.near;
-        group.due = std::min(group.due, watch.due);
+        group.times = {std::min(group.times.due, times.due), std::min(group.times.start, times.start)};
       }
     }
-    for (Index i = group.near > 0 ? group.first : group.last; i < group.last; ++i) {
-      if ((*watches)[i].near) {
-        near->push_back({i, band});
+    // A row may come of what gets into its band in the first half of this step.
+    const float from = travel + step + Band(step);
+    for (Index i = group.times.start < from ? group.first : group.last; i < group.last; ++i) {
+      if (watches->times[i].start < from) {
+        Watch& watch = watches->all[i];
+        AskWay(&watch, others_moved, step, stand);
+        if (watch.gap - watch.gone - watch.way < Band(watch.way)) {
+          watches->near.push_back({i, Band(watch.way)});
+        }
       }
     }
   }
@@ -238,27 +304,30 @@ void TissueCollision::LookAtFixed(Fixed* fixed, std::span<const float> moved) {
   const Vec3f shift = fixed->breathes ? breath0_ : Vec3f(Vec3f::Zero());
   const TriangleTree& tree = fixed->tree;
   const float breathed = fixed->breathes ? (breath1_ - breath0_).norm() : 0.0f;
-  LookAtDue(&fixed->groups, &fixed->watches, moved, fixed->breathes ? breath_travel_ : 0.0f, breathed, &fixed->near,
-            [&](Watch* watch) {
-              const Vec3f p = particles_->At(watch->at) - shift;
-              const TriangleTree::Hit hit = tree.Nearest(p, kSight);
-              if (hit.triangle == kNoIndex) {
-                watch->front = watch->blocks = false;
-                return kSight;
-              }
-              watch->point = hit.point;
-              watch->normal = tree.normal(hit.triangle);
-              const float distance = std::sqrt(hit.distance_sq), height = watch->normal.dot(p - hit.point);
-              const bool beside = std::abs(height) < kBesideCosine * distance;
-              watch->front = watch->front || (height > 0.0f && !beside);
-              watch->blocks = watch->front && !beside && height > -kMaxBehind;
-              // Past a rim or behind, it comes to contact only round the rim.
-              return watch->blocks ? height - watch->clearance : std::max(distance, 2.0f * kKeep);
-            });
+  LookAtDue(
+      &fixed->watches, moved, fixed->breathes ? breath_travel_ : 0.0f, breathed,
+      [&](const Watch& watch) { return Vec3f(particles_->At(watch.at) - shift); },
+      [&](Watch* watch) {
+        const Vec3f p = particles_->At(watch->at) - shift;
+        const TriangleTree::Hit hit = tree.Nearest(p, kSight);
+        if (hit.triangle == kNoIndex) {
+          watch->front = watch->blocks = false;
+          return kSight;
+        }
+        watch->point = hit.point;
+        watch->normal = tree.normal(hit.triangle);
+        const float distance = std::sqrt(hit.distance_sq), height = watch->normal.dot(p - hit.point);
+        const bool beside = std::abs(height) < kBesideCosine * distance;
+        watch->front = watch->front || (height > 0.0f && !beside);
+        watch->blocks = watch->front && !beside && height > -kMaxBehind;
+        // Past a rim or behind, it comes to contact only round the rim.
+        return watch->blocks ? height - watch->clearance : std::max(distance, 2.0f * kKeep);
+      });
 }
 
 void TissueCollision::FindPairs(std::span<const float> moved, double time0_s, double time1_s) {
   looked_at_ = 0;
+  ++step_;
   const Index organ_blocks = (scene_.tube_vertex_count + kBlock - 1) / kBlock;
   float organ_moved = 0;
   for (Index b = 0; b < travel_.size(); ++b) {
@@ -269,11 +338,13 @@ void TissueCollision::FindPairs(std::span<const float> moved, double time0_s, do
   breath0_ = BreathingOffset(scene_.breathing, time0_s);
   breath1_ = BreathingOffset(scene_.breathing, time1_s);
   breath_travel_ += (breath1_ - breath0_).norm();
-  LookAtDue(&organ_groups_, &organ_, moved, organ_travel_, organ_moved, &near_organ_, [&](Watch* watch) {
-    const Vec3f p = particles_->At(watch->at);
-    Walk(watch, p);
-    return SignedDistance(p, OrganCorners(watch->triangle)).distance - watch->clearance;
-  });
+  LookAtDue(
+      &organ_, moved, organ_travel_, organ_moved, [&](const Watch& watch) { return Standpoint(watch); },
+      [&](Watch* watch) {
+        const Vec3f p = particles_->At(watch->at);
+        Walk(watch, p);
+        return SignedDistance(p, OrganCorners(watch->triangle)).distance - watch->clearance;
+      });
   for (Fixed& fixed : fixed_) {
     LookAtFixed(&fixed, moved);
   }
@@ -293,8 +364,8 @@ void TissueCollision::AddFixedRows(const Fixed& fixed, float u0, float u1, std::
   row.weight[0] = 1.0f;
   const Vec3f shift = fixed.breathes ? Vec3f(breath0_ + u1 * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
   row.drift = fixed.breathes ? Vec3f((u1 - u0) * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
-  for (const Near& near : fixed.near) {
-    const Watch& watch = fixed.watches[near.watch];
+  for (const Near& near : fixed.watches.near) {
+    const Watch& watch = fixed.watches.all[near.watch];
     row.offset = watch.normal.dot(watch.point + shift) + watch.clearance;
     if (watch.normal.dot(particles_->At(watch.at)) > row.offset + near.band || !Touches(watch.particle)) {
       continue;
@@ -309,33 +380,56 @@ void TissueCollision::AddFixedRows(const Fixed& fixed, float u0, float u1, std::
   }
 }
 
-void TissueCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) const {
-  const std::size_t limit = rows->size() + kMaxRows;
+void TissueCollision::AddOrganRow(const Near& near, const Signed& now, std::vector<ContactRow>* rows) const {
+  const Watch& watch = organ_.all[near.watch];
   ContactRow row;
   row.friction = scene_.physics.friction;
-  for (const Near& near : near_organ_) {
-    const Watch& watch = organ_[near.watch];
-    const Signed now = SignedDistance(particles_->At(watch.at), OrganCorners(watch.triangle));
-    if (now.distance > watch.clearance + near.band || now.distance < -kMaxBehind || !Touches(watch.particle)) {
-      continue;
+  row.count = 1;
+  row.at[0] = watch.at;
+  row.weight[0] = 1.0f;
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (now.barycentric[i] > 0.0f) {
+      row.at[static_cast<std::size_t>(row.count)] = {4 * scene_.tube_surface[watch.triangle][i], 1};
+      row.weight[static_cast<std::size_t>(row.count)] = -now.barycentric[i];
+      ++row.count;
     }
-    if (rows->size() == limit) {
-      return;
-    }
-    row.count = 1;
-    row.at[0] = watch.at;
-    row.weight[0] = 1.0f;
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (now.barycentric[i] > 0.0f) {
-        row.at[static_cast<std::size_t>(row.count)] = {4 * scene_.tube_surface[watch.triangle][i], 1};
-        row.weight[static_cast<std::size_t>(row.count)] = -now.barycentric[i];
-        ++row.count;
+  }
+  row.normal = now.normal;
+  row.offset = watch.clearance;
+  row.source = kSource | near.watch;
+  rows->push_back(row);
+}
+
+void TissueCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) const {
+  const std::size_t limit = rows->size() + kMaxRows;
+  const float* tube = particles_->raw().data();
+  PointBatch points{};
+  FootBatch feet;
+  for (std::size_t first = 0; first < organ_.near.size(); first += kLanes) {
+    const std::size_t count = std::min<std::size_t>(kLanes, organ_.near.size() - first);
+    for (std::size_t lane = 0; lane < count; ++lane) {
+      const Watch& watch = organ_.all[organ_.near[first + lane].watch];
+      const Vec3f p = particles_->At(watch.at);
+      for (std::size_t i = 0; i < 3; ++i) {
+        points.point[i][lane] = p[static_cast<int>(i)];
+        points.corner[i][lane] = 4 * scene_.tube_surface[watch.triangle][i];
       }
     }
-    row.normal = now.normal;
-    row.offset = watch.clearance;
-    row.source = kSource | near.watch;
-    rows->push_back(row);
+    kernels_.feet(tube, points, &feet);
+    for (std::size_t lane = 0; lane < count; ++lane) {
+      const Near& near = organ_.near[first + lane];
+      const Watch& watch = organ_.all[near.watch];
+      const float reach = feet.side[lane] < 0.0f ? kMaxBehind : watch.clearance + near.band;
+      if (feet.distance_sq[lane] > reach * reach || !Touches(watch.particle)) {
+        continue;
+      }
+      const Signed now = SignedDistance(particles_->At(watch.at), OrganCorners(watch.triangle),
+                                        {feet.weight[0][lane], feet.weight[1][lane], feet.weight[2][lane]});
+      if (rows->size() == limit) {
+        return;
+      }
+      AddOrganRow(near, now, rows);
+    }
   }
   for (const Fixed& fixed : fixed_) {
     AddFixedRows(fixed, u0, u1, limit, rows);

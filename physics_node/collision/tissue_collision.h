@@ -3,7 +3,8 @@
 //
 // Amortised by distance: a particle that was d from contact is not looked at again before it and what it may touch have
 // together moved that far; one that is near keeps its triangle for kKeep. Movements come from the solver by blocks of
-// particles, so tissue at rest costs one comparison a block.
+// particles, so tissue at rest costs one comparison a block. Where a block has moved far enough, each of its particles
+// is first asked for its own way, which is shorter than that of the fastest one added up over the steps.
 #pragma once
 
 #include <array>
@@ -26,7 +27,8 @@ class TissueCollision {
   static constexpr std::uint32_t kSource = 0x80000000u;
   static constexpr std::size_t kMaxRows = 4096;
 
-  TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
+  TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
+                  const Kernels& kernels = BestKernels());
 
   [[nodiscard]] std::size_t block_count() const { return travel_.size(); }
   /// Largest movement since ParticleStore::Previous in each block [m]: a `moved` for FindPairs where the solver has
@@ -52,20 +54,31 @@ class TissueCollision {
   struct Watch {
     Index particle = 0;
     ParticleRef at;
-    Index triangle = kNoIndex;     ///< Of tube_surface, or of the tree.
-    float clearance = 0;           ///< Kept from the surface: less where it rests nearer [m].
-    float due = 0;                 ///< Looked at again when the travel that concerns it has come to this [m].
-    bool front = false;            ///< Seen in front of the surface and not lost from sight since.
-    bool blocks = true;            ///< What it was seen nearest to can hold it back: not out of sight, nor past a rim.
-    bool near = false;             ///< Rows may come of it before it is looked at again.
+    Index triangle = kNoIndex;   ///< Of tube_surface, or of the tree.
+    float clearance = 0;         ///< Kept from the surface: less where it rests nearer [m].
+    float gap = 0;               ///< From contact when it was looked at [m].
+    float others = 0;            ///< Travel of what it may touch at that time [m].
+    Vec3f seen = Vec3f::Zero();  ///< Where it was then: see Standpoint.
+    Vec3f last = Vec3f::Zero();  ///< Where it was in step `asked`, in which it was asked for its way.
+    std::uint32_t asked = 0;
+    float gone = 0;      ///< From `seen` to `last` [m].
+    float way = 0;       ///< In the step before that one, with what it may touch: its next is about the same [m].
+    bool front = false;  ///< Seen in front of the surface and not lost from sight since.
+    bool blocks = true;  ///< What it was seen nearest to can hold it back: not out of sight, nor past a rim.
+    bool near = false;   ///< Rows may come of it before it is looked at again.
     Vec3f point = Vec3f::Zero();   ///< Of a fixed surface: the nearest one …
     Vec3f normal = Vec3f::Zero();  ///< … and its normal.
   };
-  /// Watches of one block: [first, last), and the least `due` of them.
+  /// Of a watch, or the least of a group's: the travel that concerns it at which something is to be done [m].
+  struct Times {
+    float due = 0;         ///< It is looked at again.
+    float start = kNever;  ///< Rows may come of it from here on, until it is looked at again; told without the band.
+  };
+  static constexpr float kNever = 3e38f;
+  /// Watches of one block: [first, last).
   struct Group {
     Index block = 0, first = 0, last = 0;
-    float due = 0;
-    Index near = 0;  ///< How many are near.
+    Times times;
   };
   /// One that is near in this step.
   struct Near {
@@ -78,26 +91,41 @@ class TissueCollision {
     float distance = 0;            ///< Negative: behind [m].
   };
 
+  /// All that watches one surface.
+  struct Watches {
+    std::vector<Watch> all;
+    std::vector<Times> times;  ///< Of each, apart from the rest: most steps read nothing else.
+    std::vector<Group> groups;
+    std::vector<Near> near;  ///< In this step.
+    void MakeGroups();
+  };
+
   /// A fixed surface of the scene that collides. What lies behind it at rest, such as the organ under the peritoneum,
   /// is not its business.
   struct Fixed {
     TriangleTree tree;
     bool breathes = false;
-    std::vector<Watch> watches;
-    std::vector<Group> groups;
-    std::vector<Near> near;
+    Watches watches;
   };
 
   void WatchOrgan();
   void WatchFixed(const StaticSurface& surface);
-  static void MakeGroups(std::span<Watch> watches, std::vector<Group>* groups);
   [[nodiscard]] std::array<Vec3f, 3> OrganCorners(Index triangle) const;
   /// Walks to the nearest triangle of the organ from the one known.
   void Walk(Watch* watch, const Vec3f& p) const;
   [[nodiscard]] static Signed SignedDistance(const Vec3f& p, const std::array<Vec3f, 3>& corners);
-  template <class Look>
-  void LookAtDue(std::vector<Group>* groups, std::vector<Watch>* watches, std::span<const float> moved,
-                 float others_travel, float others_moved, std::vector<Near>* near, const Look& look);
+  /// With the closest point known.
+  [[nodiscard]] static Signed SignedDistance(const Vec3f& p, const std::array<Vec3f, 3>& corners,
+                                             const std::array<float, 3>& barycentric);
+  /// Whose movement concerns a particle that watches the organ: its own against the middle of its triangle.
+  [[nodiscard]] Vec3f Standpoint(const Watch& watch) const;
+  /// Fills watch->gone and way; `unknown` is the way of one that was not asked in the last step.
+  template <class Stand>
+  void AskWay(Watch* watch, float others_moved, float unknown, const Stand& stand) const;
+  template <class Stand, class Look>
+  void LookAtDue(Watches* watches, std::span<const float> moved, float others_travel, float others_moved,
+                 const Stand& stand, const Look& look);
+  void AddOrganRow(const Near& near, const Signed& now, std::vector<ContactRow>* rows) const;
   void LookAtFixed(Fixed* fixed, std::span<const float> moved);
   [[nodiscard]] bool Touches(Index particle) const;
   void AddFixedRows(const Fixed& fixed, float u0, float u1, std::size_t limit, std::vector<ContactRow>* rows) const;
@@ -105,17 +133,18 @@ class TissueCollision {
   SceneView scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
+  const Kernels& kernels_;
 
   std::vector<Index> ring_start_, ring_;  ///< Organ triangles that share a corner with each.
-  std::vector<Watch> organ_;
-  std::vector<Group> organ_groups_;
+  std::vector<ParticleRef> column_;       ///< Of the membrane's first row.
+  Watches organ_;
   std::vector<Fixed> fixed_;
 
   std::vector<float> travel_;  ///< Of each block since the beginning [m].
   float organ_travel_ = 0, breath_travel_ = 0;
   Vec3f breath0_ = Vec3f::Zero(), breath1_ = Vec3f::Zero();
-  std::vector<Near> near_organ_;
   std::size_t looked_at_ = 0;
+  std::uint32_t step_ = 1;  ///< Calls of FindPairs.
 };
 
 }  // namespace fulcrum::physics

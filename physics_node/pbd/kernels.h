@@ -120,6 +120,19 @@ struct alignas(32) TouchBatch {
   float crosses[kLanes];      ///< 1 where the segment passes through the triangle, else 0.
 };
 
+/// Eight points and a triangle of the organ for each: offsets of its corners, 4 * index.
+struct alignas(32) PointBatch {
+  float point[3][kLanes];  ///< By axis [m].
+  std::uint32_t corner[3][kLanes];
+};
+
+/// The point of each triangle closest to the point in its lane.
+struct alignas(32) FootBatch {
+  float weight[3][kLanes];    ///< Barycentric.
+  float distance_sq[kLanes];  ///< [m^2]
+  float side[kLanes];         ///< Positive where the point is in front of the triangle, counter-clockwise; no length.
+};
+
 struct Kernels {
   const char* name;
 
@@ -144,6 +157,8 @@ struct Kernels {
   void (*block_bounds)(const GridArrays& grid, const BlockBounds& bounds);
   void (*first_touch)(const SegmentMotion& segment, const TouchSearch& search, const TriangleBatch& triangles,
                       TouchBatch* touch);
+  /// `particles` xyzw.
+  void (*feet)(const float* particles, const PointBatch& points, FootBatch* feet);
 };
 
 const Kernels& BaselineKernels();

@@ -301,8 +301,9 @@ void ComputeBlockBounds(const GridArrays& g, const BlockBounds& bounds) {
 }
 
 const Kernels& Table(const char* name) {
-  static const Kernels kernels{name,      GridStretch, Springs,       Volumes,    Bending,           Bindings,
-                               Integrate, Finish,      IntegrateXyzw, FinishXyzw, ComputeBlockBounds, FirstTouch};
+  static const Kernels kernels{
+      name,       GridStretch,        Springs,    Volumes, Bending, Bindings, Integrate, Finish, IntegrateXyzw,
+      FinishXyzw, ComputeBlockBounds, FirstTouch, Feet};
   return kernels;
 }
 

@@ -1,5 +1,5 @@
-// A moving segment against eight triangles at once; included only by bodies of kernels. The steps are those of
-// ClosestSegmentTriangle in physics_node/collision/closest.h, which is the oracle of the tests.
+// A moving segment against eight triangles at once, and eight points against one each; included only by bodies of
+// kernels. The steps are those of physics_node/collision/closest.h, which is the oracle of the tests.
 #pragma once
 
 #include "physics_node/pbd/kernels.h"
@@ -198,6 +198,49 @@ void FirstTouch(const SegmentMotion& segment, const TouchSearch& search, const T
     best.weight[i].Store(out->weight[i]);
   }
   best.crosses.Store(out->crosses);
+}
+
+/// Ericson, Real-Time Collision Detection, 5.1.5: the regions that come first there are chosen last here.
+void Feet(const float* particles, const PointBatch& points, FootBatch* out) {
+  const F8 zero = F8::All(0.0f), one = F8::All(1.0f);
+  const V8 p{F8::Load(points.point[0]), F8::Load(points.point[1]), F8::Load(points.point[2])};
+  const V8 a = GatherXyzw<F8>(particles, points.corner[0], 0).p;
+  const V8 b = GatherXyzw<F8>(particles, points.corner[1], 0).p;
+  const V8 c = GatherXyzw<F8>(particles, points.corner[2], 0).p;
+  const V8 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
+  const F8 d1 = Dot(ab, ap), d2 = Dot(ac, ap), d3 = Dot(ab, bp), d4 = Dot(ac, bp), d5 = Dot(ab, cp), d6 = Dot(ac, cp);
+  const F8 va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
+  const auto not_above = [&](F8 x, F8 limit) { return Unless(x > limit, Everywhere()); };
+
+  const F8 sum = va + vb + vc;
+  F8 v = Ratio(vb, sum), w = Ratio(vc, sum);
+  const F8 to_c = d4 - d3, to_b = d5 - d6;
+  const F8 on_bc = not_above(va, zero) & not_above(zero, to_c) & not_above(zero, to_b);
+  const F8 along_bc = Ratio(to_c, to_c + to_b);
+  v = Select(on_bc, one - along_bc, v);
+  w = Select(on_bc, along_bc, w);
+  const F8 on_ca = not_above(vb, zero) & not_above(zero, d2) & not_above(d6, zero);
+  v = Unless(on_ca, v);
+  w = Select(on_ca, Ratio(d2, d2 - d6), w);
+  const F8 at_c = not_above(zero, d6) & not_above(d5, d6);
+  v = Unless(at_c, v);
+  w = Select(at_c, one, w);
+  const F8 on_ab = not_above(vc, zero) & not_above(zero, d1) & not_above(d3, zero);
+  v = Select(on_ab, Ratio(d1, d1 - d3), v);
+  w = Unless(on_ab, w);
+  const F8 at_b = not_above(zero, d3) & not_above(d4, d3);
+  v = Select(at_b, one, v);
+  w = Unless(at_b, w);
+  const F8 at_a = not_above(d1, zero) & not_above(d2, zero);
+  v = Unless(at_a, v);
+  w = Unless(at_a, w);
+
+  const V8 offset = ap - ab * v - ac * w;
+  (one - v - w).Store(out->weight[0]);
+  v.Store(out->weight[1]);
+  w.Store(out->weight[2]);
+  Dot(offset, offset).Store(out->distance_sq);
+  Dot(Cross(ab, ac), offset).Store(out->side);
 }
 
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

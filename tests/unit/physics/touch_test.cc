@@ -172,5 +172,46 @@ TEST_F(Touch, DegenerateAndDamagedTrianglesEnd) {
   }
 }
 
+TEST_F(Touch, FeetAreTheClosestPointsOfTheTriangles) {
+  // Triangles of ten organ vertices, some of them degenerate.
+  alignas(32) std::array<float, 40> particles{};
+  PointBatch points;
+  using Bits = std::array<std::uint32_t, sizeof(FootBatch) / sizeof(std::uint32_t)>;
+  std::uniform_int_distribution<std::uint32_t> vertex(0, 9);
+  for (int trial = 0; trial < 500; ++trial) {
+    for (std::size_t v = 0; v < 10; ++v) {
+      Put(Point(), &particles[4 * v]);
+    }
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const Vec3f p = Point();
+      for (std::size_t i = 0; i < 3; ++i) {
+        points.point[i][lane] = p[static_cast<int>(i)];
+        points.corner[i][lane] = 4 * vertex(random_);
+      }
+    }
+    FootBatch oracle{};
+    ScalarKernels().feet(particles.data(), points, &oracle);
+    for (const Kernels* kernels : VectorKernels()) {
+      FootBatch other{};
+      kernels->feet(particles.data(), points, &other);
+      ASSERT_EQ(std::bit_cast<Bits>(oracle), std::bit_cast<Bits>(other)) << kernels->name;
+    }
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const auto corner = [&](std::size_t i) { return Vec3f(&particles[points.corner[i][lane]]); };
+      const Vec3f p(points.point[0][lane], points.point[1][lane], points.point[2][lane]);
+      const Vec3f a = corner(0), b = corner(1), c = corner(2);
+      const auto one = ClosestOnTriangle(p, a, b, c);
+      const Vec3f offset = p - one[0] * a - one[1] * b - one[2] * c;
+      const auto& w = oracle.weight;
+      ASSERT_NEAR(std::sqrt(oracle.distance_sq[lane]), offset.norm(), 1e-6f);
+      ASSERT_NEAR((p - w[0][lane] * a - w[1][lane] * b - w[2][lane] * c).norm(), offset.norm(), 1e-6f);
+      const float side = (b - a).cross(c - a).dot(offset);
+      if (std::abs(side) > 1e-12f) {
+        ASSERT_EQ(side > 0, oracle.side[lane] > 0);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace fulcrum::physics
