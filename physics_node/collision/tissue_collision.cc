@@ -317,8 +317,9 @@ void TissueCollision::LookAtFixed(Fixed* fixed, std::span<const float> moved) {
         watch->point = hit.point;
         watch->normal = tree.normal(hit.triangle);
         const float distance = std::sqrt(hit.distance_sq), height = watch->normal.dot(p - hit.point);
-        const bool beside = std::abs(height) < kBesideCosine * distance;
-        watch->front = watch->front || (height > 0.0f && !beside);
+        const bool beside = distance > kTouching && std::abs(height) < kBesideCosine * distance;
+        // What goes round a rim has not come through: from beneath, nothing throws it back up.
+        watch->front = !beside && (watch->front || height > 0.0f);
         watch->blocks = watch->front && !beside && height > -kMaxBehind;
         // Past a rim or behind, it comes to contact only round the rim.
         return watch->blocks ? height - watch->clearance : std::max(distance, 2.0f * kKeep);

@@ -124,6 +124,39 @@ TEST(TissueCollision, FastTissueOutOfSightOfTheFloorIsNoContact) {
   EXPECT_TRUE(world.rows.empty());
 }
 
+/// A floor under one half of the sheet; a node of the other half is taken down beside it and then beneath it.
+TEST(TissueCollision, WhatGoesRoundTheRimIsNotThrownUpFromBeneath) {
+  scene::SceneData data = SheetOverFloor();
+  for (Vec3f& p : data.static_vertices) {
+    p.x() = std::min(p.x(), 0.016f);
+  }
+  World world(data.View());
+  const Index node = 8 * 17 + 9;  // 2 mm past the rim.
+  const ParticleRef at = world.particles.Ref(world.scene.membrane.first + node);
+  const auto move_to = [&](const Vec3f& p) {
+    world.particles.SetPrevious(at, world.particles.At(at));
+    world.particles.Set(at, p);
+    world.collision.MeasureMoves(&world.moved);
+    world.collision.FindPairs(world.moved, 0, 0);
+    world.rows.clear();
+    world.collision.Rows(0, 1, &world.rows);
+    return std::any_of(world.rows.begin(), world.rows.end(),
+                       [&](const ContactRow& row) { return row.at[0].base == at.base; });
+  };
+  const float y = world.Node(node).y();
+  EXPECT_TRUE(move_to(Vec3f(0.0150f, y, -0.0014f))) << "on the floor";
+  for (const auto& [x, z] : {std::pair{0.0165f, -0.0016f},
+                             {0.0172f, -0.0022f},
+                             {0.0172f, -0.0030f},
+                             {0.0165f, -0.0034f},
+                             {0.0158f, -0.0034f},
+                             {0.0150f, -0.0032f}}) {
+    (void)move_to(Vec3f(x, y, z));
+  }
+  EXPECT_FALSE(move_to(Vec3f(0.0150f, y, -0.0030f))) << "beneath it";
+  EXPECT_FALSE(move_to(Vec3f(0.0150f, y, -0.0022f))) << "and close";
+}
+
 TEST(TissueCollision, TheOrganUnderThePeritoneumIsFreeToRise) {
   const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
   World world(data.View());
