@@ -15,7 +15,7 @@ constexpr float kOpen = 0.9f, kClosed = 0.0f;
 constexpr int kCutsPerSheet = 60;
 constexpr int kRestSteps = 1500;
 /// While tools act: as far as a grasper may take tissue, as fast as the solver lets anything go.
-constexpr TissueBounds kActing{0.080f, 5.0f, 20.0f, false};
+constexpr TissueBounds kActing{0.120f, 5.0f, 20.0f, false};
 /// Let alone: a cut sheet under tension draws back from the cut and its flaps lie where they have fallen. Some flaps go
 /// on moving: there the preconditioned matrix exceeds what two iterations bear.
 constexpr TissueBounds kResting{0.030f, 0.3f, 0.0f, true};
