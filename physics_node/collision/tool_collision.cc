@@ -155,7 +155,7 @@ Vec3f ToolCollision::NormalOf(const ContactPair& pair, bool previous) {
 void ToolCollision::FindSide(ContactPair* pair) {
   const auto last = std::lower_bound(last_pairs_.begin(), last_pairs_.end(), *pair, InOrder);
   const bool known = last != last_pairs_.end() && last->capsule == pair->capsule && last->triangle == pair->triangle;
-  if (known && (last->touching || pair->triangle >= membrane_triangles_)) {
+  if (known && (last->touching || pair->triangle >= membrane_triangles_) && !OnRim(*pair)) {
     pair->side = last->side;
     pair->remembers = last->touching;
     return;
@@ -307,6 +307,33 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
   }
 }
 
+bool ToolCollision::OnRim(const ContactPair& pair) const {
+  if (pair.triangle >= membrane_triangles_ || pair.closest.crosses) {
+    return false;
+  }
+  const auto cols = static_cast<int>(model_->cols()) - 1, rows = static_cast<int>(model_->rows()) - 1;
+  const int cell = static_cast<int>(pair.triangle / 2), row = cell / cols, col = cell % cols;
+  const auto dead = [&](int r, int c, int half) {
+    return r < 0 || c < 0 || r >= rows || c >= cols ||
+           !model_->TriangleAlive(static_cast<Index>(2 * (r * cols + c) + half));
+  };
+  const auto& b = pair.closest.barycentric;
+  const bool lower = pair.triangle % 2 != 0;
+  std::array<bool, 3> off;  // The closest point is not at that corner, nor between it and another.
+  std::transform(b.begin(), b.end(), off.begin(), [](float weight) { return weight <= 0.0f; });
+  if (off[0] + off[1] + off[2] == 2) {
+    // At a corner: one of the six triangles around it is missing. Corners of the halves: 00 01 11 and 00 11 10.
+    const std::size_t corner = !off[0] ? 0 : !off[1] ? 1 : 2;
+    const int r = row + (lower ? corner != 0 : corner == 2), c = col + (lower ? corner == 1 : corner != 0);
+    return dead(r - 1, c - 1, 0) || dead(r - 1, c - 1, 1) || dead(r - 1, c, 1) || dead(r, c - 1, 0) || dead(r, c, 0) ||
+           dead(r, c, 1);
+  }
+  if (lower) {
+    return (off[2] && dead(row, col, 0)) || (off[0] && dead(row + 1, col, 0)) || (off[1] && dead(row, col - 1, 0));
+  }
+  return (off[2] && dead(row - 1, col, 1)) || (off[0] && dead(row, col + 1, 1)) || (off[1] && dead(row, col, 1));
+}
+
 ToolCollision::Push ToolCollision::PushOf(const ContactPair& pair, const Capsule& capsule) const {
   const ClosestPoints& closest = pair.closest;
   const float reach = capsule.radius + scene_.physics.collision_margin_m;
@@ -321,8 +348,12 @@ ToolCollision::Push ToolCollision::PushOf(const ContactPair& pair, const Capsule
                                   side * pair.normal.dot(capsule.b - closest.on_triangle));
     return behind > -kMaxBehind ? Push{reach - behind, -side * pair.normal} : Push{};
   }
-  if (side * pair.normal.dot(offset) < -kBesideCosine * distance) {
-    return distance < kMaxBehind ? Push{reach + distance, -side * pair.normal} : Push{};
+  if (side * pair.normal.dot(offset) < -kBesideCosine * distance && !OnRim(pair)) {
+    // What did not touch it in the last step has come behind it in this one, or past a rim.
+    const float come = reach + motion_[pair.capsule].travel + band_;
+    return distance < (pair.remembers ? kMaxBehind : std::min(kMaxBehind, come))
+               ? Push{reach + distance, -side * pair.normal}
+               : Push{};
   }
   return distance > 0.0f ? Push{reach - distance, -offset / distance} : Push{};
 }

@@ -47,8 +47,9 @@ class ToolCollision {
  public:
   /// Overlap is undone by at most this much in a projection or substep, not thrown out [m].
   static constexpr float kMaxPush = 0.001f;
-  /// Most rows of one tool in a substep; the deepest are kept.
-  static constexpr std::size_t kMaxRows = 256;
+  /// Most rows of one tool in a substep; the deepest are kept. A shaft in a tent of fine mesh makes 600: what is left
+  /// out goes through the tool.
+  static constexpr std::size_t kMaxRows = 1024;
 
   ToolCollision(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
                 const Kernels& kernels = BestKernels());
@@ -147,6 +148,8 @@ class ToolCollision {
   [[nodiscard]] static float Probed(const Capsule& capsule) { return capsule.part == ToolPart::kTip ? 0.0015f : 0.0f; }
   /// How far apart a pair is at least: bounding sphere against capsule axis.
   [[nodiscard]] static bool IsFar(const std::array<Vec3f, 3>& x, const Capsule& capsule, float range);
+  /// The closest point is on the membrane's rim, at a hole or a slit: past it a tool gets to the other side.
+  [[nodiscard]] bool OnRim(const ContactPair& pair) const;
   /// From pair->closest; `capsule` is where that was taken.
   [[nodiscard]] Push PushOf(const ContactPair& pair, const Capsule& capsule) const;
   void ProjectPair(ContactPair* pair, const Capsule& capsule);

@@ -192,6 +192,56 @@ TEST(ContactRows, NoneOnDeadNodes) {
   EXPECT_GT(seen, 0u);
 }
 
+TEST(ContactRows, AHookGoesThroughASlitAndComesBack) {
+  const scene::SceneData data = SheetScene(kRows, kCols, kH);
+  const SceneView scene = data.View();
+  RowPlayer player(scene);
+  // Sixteen millimetres along y, one cell wide.
+  TopologyState slit;
+  slit.rows = kRows;
+  slit.cols = kCols;
+  slit.dead_nodes.assign((kRows * kCols + 7) / 8, 0);
+  slit.dead_edges.assign((3 * kRows * kCols + 7) / 8, 0);
+  slit.shrink.assign(3 * kRows * kCols, 0);
+  for (Index r = 8; r < 17; ++r) {
+    SetBit(slit.dead_edges, 3 * (r * kCols + 12));
+    SetBit(slit.dead_edges, 3 * (r * kCols + 12) + 2);
+  }
+  ASSERT_GT(player.model().Apply(slit, &player.particles()), 0);
+  const float along = static_cast<float>(M_PI) / 2;
+  const Vec3f heel = kMiddle + Vec3f(0.001f, -0.002f, 0);
+  const auto move = [&](float from, float to, float about_z0, float about_z1) {
+    for (int i = 1; i <= 40; ++i) {
+      const float u = static_cast<float>(i) / 40;
+      player.Step(1, Down(heel + Vec3f(0, 0, from + u * (to - from)), about_z0 + u * (about_z1 - about_z0)));
+    }
+  };
+  const auto lifted = [&] {
+    float most = 0;
+    for (Index p = 0; p < scene.membrane.node_count(); ++p) {
+      most = std::max(most, std::abs(player.particles().At(player.particles().Ref(p)).z()));
+    }
+    return most;
+  };
+  // The foot along the slit: in and out.
+  move(0.006f, -0.004f, along, along);
+  EXPECT_LT(lifted(), 0.001f);
+  move(-0.004f, 0.008f, along, along);
+  EXPECT_LT(lifted(), 0.001f);
+  // Turned across it beneath the sheet, it hooks; turned back, it lets go.
+  move(0.008f, -0.004f, along, along);
+  move(-0.004f, -0.004f, along, 0);
+  move(-0.004f, 0.004f, 0, 0);
+  EXPECT_GT(lifted(), 0.002f);
+  move(0.004f, -0.004f, 0, 0);
+  move(-0.004f, -0.004f, 0, along);
+  move(-0.004f, 0.008f, along, along);
+  for (int i = 0; i < 100; ++i) {
+    player.Step(1, Down(heel + Vec3f(0, 0, 0.008f), along));
+  }
+  EXPECT_LT(lifted(), 0.001f);
+}
+
 TEST(ContactRows, ForcesOfTheRowsAreThatOnTheTool) {
   const scene::SceneData data = SheetScene(kRows, kCols, kH);
   const SceneView scene = data.View();
