@@ -81,7 +81,7 @@ class AccurateSolver {
   void FollowRegions();
   GuessCount Guess(float h);
   void ForgetDamagedVelocities();
-  void PutHeld(std::span<const HeldPlace> held);
+  void PutHeld(std::span<const HeldPlace> held, std::span<const ContactRow> contacts);
   /// Of what is computed, for comparisons.
   [[nodiscard]] double EnergyAt(const FloatArray& place, const Inertia& inertia, std::span<const ContactRow> contacts);
   void Linearise(const Inertia& inertia, std::span<const ContactRow> contacts);
@@ -141,7 +141,7 @@ class AccurateSolver {
   std::vector<double> partial_;      ///< By task.
   std::vector<GuessCount> guess_;    ///< By task.
   std::vector<FinishCount> finish_;  ///< By task.
-  bool organ_blocks_due_ = true, refresh_due_ = false;
+  bool organ_blocks_due_ = true, refresh_due_ = false, stiff_contacts_ = false;
 };
 
 }  // namespace fulcrum::physics::accurate

@@ -32,6 +32,7 @@ std::vector<Place> Spread(int fine, int count) {
 CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
     : rows_(static_cast<int>(scene.membrane.rows)),
       stride_(static_cast<int>(particles.layout().stride)),
+      tube_floats_(particles.tube_floats()),
       cols_(scene.membrane.cols),
       layout_(particles.layout()) {
   columns_ = std::min(kSheetColumns, static_cast<int>(cols_));
@@ -103,6 +104,7 @@ void CoarseSpace::BuildMiddle() {
       next_[at] = last ? 0.0f : on;
     }
   }
+  yields_.assign(static_cast<std::size_t>(middle_rows_) * width_, 1.0f);
   for (FloatArray& block : block_) {
     block = FloatArray(static_cast<std::size_t>(middle_rows_) * width_);
   }
@@ -350,6 +352,89 @@ void CoarseSpace::FollowRegions(const Regions& regions) {
   std::fill_n(value_.data(), value_.size(), 0.0f);
 }
 
+void CoarseSpace::ForgetContacts() {
+  if (!held_.empty()) {
+    std::fill(yields_.begin(), yields_.end(), 1.0f);
+  }
+  held_.clear();
+}
+
+void CoarseSpace::Stiffen(const Element& contact) {
+  struct Share {
+    std::size_t function;
+    float weight;
+  };
+  std::array<Share, 16> shares;
+  std::size_t count = 0;
+  const auto add = [&](std::size_t function, float weight) {
+    if (!(weight != 0.0f)) {
+      return;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      if (shares[i].function == function) {
+        shares[i].weight += weight;
+        return;
+      }
+    }
+    shares[count++] = {function, weight};
+  };
+  for (std::size_t k = 0; k < static_cast<std::size_t>(contact.count); ++k) {
+    if (contact.at[k].base < tube_floats_) {
+      continue;
+    }
+    const std::size_t at = contact.at[k].base - tube_floats_, row = at / static_cast<std::size_t>(stride_),
+                      place = at % static_cast<std::size_t>(stride_), slot = place / kLanes, lane = place % kLanes;
+    const std::size_t group = slot / 4, own = kLanes * group + lane;
+    const std::size_t next = group + 1 < static_cast<std::size_t>(middle_slots_) ? own + kLanes : (lane + 1) % kLanes;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const float along = contact.weight[k] * (i == 0 ? 1 - fraction_[row] : fraction_[row]);
+      const std::size_t first = (static_cast<std::size_t>(cell_[row]) + i) * width_;
+      add(first + own, along * own_[place]);
+      add(first + next, along * next_[place]);
+    }
+  }
+  // (B + v v^T)^-1 by Sherman and Morrison.
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t at = shares[i].function;
+    const Vec3f v = shares[i].weight * contact.m;
+    Eigen::Matrix3f inverse;
+    inverse << block_[0][at], block_[3][at], block_[4][at], block_[3][at], block_[1][at], block_[5][at], block_[4][at],
+        block_[5][at], block_[2][at];
+    const Vec3f bv = inverse * v;
+    held_.push_back({at, 0.0f});
+    yields_[at] /= 1.0f + v.dot(bv);
+    inverse -= bv * bv.transpose() / (1.0f + v.dot(bv));
+    block_[0][at] = inverse(0, 0);
+    block_[1][at] = inverse(1, 1);
+    block_[2][at] = inverse(2, 2);
+    block_[3][at] = inverse(0, 1);
+    block_[4][at] = inverse(0, 2);
+    block_[5][at] = inverse(1, 2);
+  }
+}
+
+/// The coarse nodes' part fades out towards what contacts hold, over kFade functions: cut off sharply it would cost
+/// more energy than the coarse matrix says, and what it overestimates grows.
+void CoarseSpace::FadeAtContacts() {
+  constexpr int kFade = 4;
+  const int columns = middle_slots_ * kLanes;
+  for (auto& [function, part] : held_) {
+    part = 1.0f - yields_[function];
+  }
+  for (const auto& [function, part] : held_) {
+    const int row = static_cast<int>(function / width_), place = static_cast<int>(function % width_);
+    const int column = place % kLanes * middle_slots_ + place / kLanes;
+    for (int r = std::max(row - kFade + 1, 0); r < std::min(row + kFade, middle_rows_); ++r) {
+      for (int c = std::max(column - kFade + 1, 0); c < std::min(column + kFade, columns); ++c) {
+        const int away = std::max(std::abs(r - row), std::abs(c - column));
+        float& yields = yields_[static_cast<std::size_t>(r) * width_ +
+                                static_cast<std::size_t>(c % middle_slots_ * kLanes + c / middle_slots_)];
+        yields = std::min(yields, 1.0f - part * (1.0f - static_cast<float>(away) / kFade));
+      }
+    }
+  }
+}
+
 void CoarseSpace::Solve(std::span<const Task> tasks, const float* row_sums, const float* tube_residual,
                         const float* tube) {
   std::fill_n(residual_.data(), residual_.size(), 0.0f);
@@ -415,7 +500,8 @@ void CoarseSpace::RestrictMiddle() {
     for (std::size_t i = 0; i < width_; ++i) {
       const RowPlace column = column_place_[column_of_[i]];
       const auto c = static_cast<std::size_t>(column.cell);
-      const __m128 value = _mm_set_ps(0, z[i], y[i], x[i]), part = _mm_mul_ps(_mm_set1_ps(column.fraction), value);
+      const __m128 value = _mm_mul_ps(_mm_set1_ps(yields_[r * width_ + i]), _mm_set_ps(0, z[i], y[i], x[i])),
+                   part = _mm_mul_ps(_mm_set1_ps(column.fraction), value);
       sum[c] = _mm_add_ps(sum[c], _mm_sub_ps(value, part));
       sum[c + 1] = _mm_add_ps(sum[c + 1], part);
     }
@@ -452,8 +538,8 @@ void CoarseSpace::ProlongMiddle() {
       const RowPlace column = column_place_[column_of_[i]];
       const auto &a = at_column[static_cast<std::size_t>(column.cell)],
                  &b = at_column[static_cast<std::size_t>(column.cell) + 1];
-      const float up = column.fraction, down = 1 - up;
       const std::size_t k = plane + i;
+      const float up = column.fraction * yields_[k], down = yields_[k] - up;
       v[i] = block_[0][k] * x[i] + block_[3][k] * y[i] + block_[4][k] * z[i] + (down * a[0] + up * b[0]);
       v[width_ + i] = block_[3][k] * x[i] + block_[1][k] * y[i] + block_[5][k] * z[i] + (down * a[1] + up * b[1]);
       v[2 * width_ + i] = block_[4][k] * x[i] + block_[5][k] * y[i] + block_[2][k] * z[i] + (down * a[2] + up * b[2]);

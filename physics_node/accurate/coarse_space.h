@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "physics_node/accurate/elements.h"
 #include "physics_node/accurate/kernels.h"
 #include "physics_node/accurate/regions.h"
 #include "physics_node/energy/elastic_model.h"
@@ -32,6 +33,14 @@ class CoarseSpace {
   /// While not all is computed the coarse nodes rest, and so do middle functions that reach into what is not: cut off
   /// there they would cost far more energy than their blocks say.
   void FollowRegions(const Regions& regions);
+
+  /// Adds a contact's stiffness to the blocks of the middle functions that move it, for this substep: they would ask it
+  /// to yield as easily as the sheet.
+  void Stiffen(const Element& contact);
+  /// After the last of them.
+  void FadeAtContacts();
+  /// Before a substep's contacts: forgets those of the last one.
+  void ForgetContacts();
 
   /// Middle rows whose centre is one of the sheet's rows [first, end): first and end of them.
   [[nodiscard]] std::pair<int, int> MiddleRows(int first, int end) const;
@@ -62,6 +71,7 @@ class CoarseSpace {
   void ProlongMiddle();
 
   int columns_ = 0, coarse_rows_ = 0, rows_ = 0, stride_ = 0;
+  std::size_t tube_floats_;
   std::uint32_t cols_ = 0;
   GridLayout layout_;
   std::vector<RowPlace> row_place_;
@@ -73,6 +83,8 @@ class CoarseSpace {
   std::vector<int> centre_, cell_;
   std::vector<std::uint8_t> middle_rests_;  ///< By middle row.
   bool coarse_rests_ = false;
+  std::vector<float> yields_;                        ///< By middle function: 0 where a contact holds it, else 1.
+  std::vector<std::pair<std::size_t, float>> held_;  ///< Functions that do not yield.
   std::vector<float> fraction_;
   FloatArray own_, next_;
   std::array<FloatArray, 6> block_;

@@ -69,8 +69,10 @@ bool AnyComputed(const Sum& e, const Regions& regions) {
 /// What a contact does to its particles at `place`.
 struct ContactState {
   float stiffness, damping;  ///< [N/m]; damping against the movement in this substep.
-  float force;               ///< Normal, never negative [N].
-  float tangential;          ///< Stiffness against sliding [N/m].
+  /// Normal [N]. Negative while what has penetrated leaves faster than the contact alone would drive it: cut off there,
+  /// the contact would be missing from the solve that should hold it in place, and chatter.
+  float force;
+  float tangential;  ///< Stiffness against sliding [N/m].
   Vec3f slide;
 };
 ContactState StateOf(const ContactRow& row, const Vec3f& here, const float* start) {
@@ -83,11 +85,11 @@ ContactState StateOf(const ContactRow& row, const Vec3f& here, const float* star
   state.stiffness = Elements::ContactStiffness(row);
   state.damping = kContactDamping * state.stiffness;
   const float approach = row.normal.dot(moved);
-  state.force = std::max(-state.stiffness * gap - state.damping * approach, 0.0f);
+  state.force = -state.stiffness * gap - state.damping * approach;
   // Coulomb with the normal force at hand, within one step linear.
   state.slide = moved - approach * row.normal;
-  state.tangential =
-      std::min(kTangentialPart * state.stiffness, row.friction * state.force / std::max(state.slide.norm(), kStick));
+  state.tangential = std::min(kTangentialPart * state.stiffness,
+                              row.friction * std::max(state.force, 0.0f) / std::max(state.slide.norm(), kStick));
   return state;
 }
 
@@ -153,7 +155,7 @@ void Elements::Touch(const float* place, const float* start, const Regions& regi
       continue;
     }
     const ContactState state = StateOf(row, Combine(row, place), start);
-    if (state.force > 0.0f) {
+    if (state.stiffness > 0.0f) {
       Element e;
       e.count = row.count;
       e.at = row.at;
@@ -214,7 +216,7 @@ double Elements::Energy(const float* place, std::span<const ContactRow> contacts
 void Elements::WriteForces(const float* place, const float* d, const float* start, std::span<ContactRow> contacts) {
   for (ContactRow& row : contacts) {
     const ContactState state = StateOf(row, Combine(row, place) + Combine(row, d), start);
-    row.force_N = state.force;
+    row.force_N = std::max(state.force, 0.0f);
     row.friction_N = state.force > 0.0f ? Vec3f(-state.tangential * state.slide) : Vec3f(Vec3f::Zero());
   }
 }

@@ -24,6 +24,16 @@ struct ContactRow {
   std::uint32_t source = 0;          ///< The producer's index: the solver writes the normal force back to it.
   float force_N = 0;                 ///< Out: normal force after the step.
   Vec3f friction_N = Vec3f::Zero();  ///< Out: friction force on the tissue.
+
+  /// sum_k weight_k x_k with x of a field in the particle pool's layout.
+  [[nodiscard]] Vec3f At(const float* field) const {
+    Vec3f sum = Vec3f::Zero();
+    for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
+      const std::size_t base = at[k].base, step = at[k].step;
+      sum += weight[k] * Vec3f(field[base], field[base + step], field[base + 2 * step]);
+    }
+    return sum;
+  }
 };
 
 }  // namespace fulcrum::physics
