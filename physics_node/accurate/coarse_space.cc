@@ -104,6 +104,8 @@ void CoarseSpace::BuildMiddle() {
       next_[at] = last ? 0.0f : on;
     }
   }
+  scale_ = FloatArray(static_cast<std::size_t>(middle_rows_) * width_);
+  std::fill_n(scale_.data(), scale_.size(), 1.0f);
   yields_.assign(static_cast<std::size_t>(middle_rows_) * width_, 1.0f);
   for (FloatArray& block : block_) {
     block = FloatArray(static_cast<std::size_t>(middle_rows_) * width_);
@@ -124,6 +126,7 @@ Middle CoarseSpace::middle() {
           next_.data(),
           cell_.data(),
           fraction_.data(),
+          scale_.data(),
           {block_[0].data(), block_[1].data(), block_[2].data(), block_[3].data(), block_[4].data(), block_[5].data()},
           value_.data()};
 }
@@ -336,6 +339,76 @@ std::pair<int, int> CoarseSpace::MiddleRows(int first, int end) const {
     return static_cast<int>(std::lower_bound(centre_.begin(), centre_.end(), row) - centre_.begin());
   };
   return {before(first), before(end)};
+}
+
+/// Middle functions that a node of the sheet takes part in, by place in a row of them: its own, and the one after.
+std::array<std::uint32_t, 2> CoarseSpace::FunctionsOf(std::uint32_t col) const {
+  const std::uint32_t place = layout_.Offset(0, col), group = place / kLanes / 4, lane = place % kLanes;
+  const std::uint32_t own = kLanes * group + lane;
+  return {own, group + 1 < static_cast<std::uint32_t>(middle_slots_) ? own + kLanes : (lane + 1) % kLanes};
+}
+
+/// Value of a middle function at a node; 0 outside the sheet.
+float CoarseSpace::Hat(std::uint32_t function, int row, int col) const {
+  if (row < 0 || row >= rows_ || col < 0 || col >= static_cast<int>(cols_)) {
+    return 0.0f;
+  }
+  const auto r = static_cast<std::size_t>(row);
+  const int above = static_cast<int>(function / width_) - cell_[r];
+  const std::uint32_t place = layout_.Offset(0, static_cast<std::uint32_t>(col)),
+                      in_row = function % static_cast<std::uint32_t>(width_);
+  const auto [own, next] = FunctionsOf(static_cast<std::uint32_t>(col));
+  const float along = above == 0 ? 1.0f - fraction_[r] : above == 1 ? fraction_[r] : 0.0f;
+  return along * ((in_row == own ? own_[place] : 0.0f) + (in_row == next ? next_[place] : 0.0f));
+}
+
+void CoarseSpace::MarkEdit(std::uint32_t row, std::uint32_t col, std::size_t d) {
+  const auto mark = [&](std::uint32_t r, std::uint32_t c) {
+    for (std::uint32_t i = 0; i < (fraction_[r] > 0.0f ? 2u : 1u); ++i) {
+      for (const std::uint32_t in_row : FunctionsOf(c)) {
+        edited_.push_back((static_cast<std::uint32_t>(cell_[r]) + i) * static_cast<std::uint32_t>(width_) + in_row);
+      }
+    }
+  };
+  mark(row, col);
+  mark(std::min(row + (d != 0 ? 1 : 0), static_cast<std::uint32_t>(rows_) - 1),
+       std::min(col + (d != 1 ? 1 : 0), cols_ - 1));
+}
+
+void CoarseSpace::ScaleBlocks(const Sheet& sheet) {
+  std::sort(edited_.begin(), edited_.end());
+  edited_.erase(std::unique(edited_.begin(), edited_.end()), edited_.end());
+  const auto whole = [&](int row, int col, std::size_t d) {
+    const bool inside = row >= 0 && row < rows_ && col >= 0 && col < static_cast<int>(cols_);
+    return inside &&
+           sheet.axial[d][layout_.Offset(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(col))] > 0;
+  };
+  for (const std::uint32_t function : edited_) {
+    const auto r = static_cast<std::size_t>(function / width_);
+    const int centre_row = centre_[r], in_row = static_cast<int>(function % width_);
+    const int slot = 4 * (in_row / kLanes), first_col = in_row % kLanes * static_cast<int>(layout_.slots);
+    float exact = 0, sampled = 0;
+    for (int row = centre_row - 4; row < centre_row + 4; ++row) {
+      for (int col = first_col + slot - 4; col < first_col + slot + 4; ++col) {
+        for (std::size_t d = 0; d < 3; ++d) {
+          if (whole(row, col, d)) {
+            const float step = Hat(function, row + (d != 0 ? 1 : 0), col + (d != 1 ? 1 : 0)) - Hat(function, row, col);
+            exact += step * step;
+          }
+        }
+      }
+    }
+    for (int sample = 0; sample < 4; ++sample) {
+      const int row = std::clamp(centre_row + (sample < 2 ? -1 : 1), 0, rows_ - 1);
+      const int at = std::min(slot + (sample & 1), static_cast<int>(layout_.slots) - 1);
+      for (std::size_t d = 0; d < 3; ++d) {
+        sampled += whole(row, first_col + at, d) ? (d == 2 ? 2.75f : 1.375f) / 4.0f : 0.0f;
+      }
+    }
+    // Of 5.5. Where much is cut, what is left may hold in other directions than the samples do: no hat there.
+    scale_[function] = exact > 3.8f && sampled > 3.3f ? std::max(exact / sampled, 1.0f) : 0.0f;
+  }
+  edited_.clear();
 }
 
 void CoarseSpace::FollowRegions(const Regions& regions) {

@@ -30,6 +30,11 @@ class CoarseSpace {
   /// Floats of one row in Kernels::sheet_restrict's sums.
   [[nodiscard]] std::size_t row_width() const { return 3 * width_; }
 
+  /// The edge from a node of the sheet in direction `d` is cut or whole again; in force after ScaleBlocks.
+  void MarkEdit(std::uint32_t row, std::uint32_t col, std::size_t d);
+  /// Blocks are sampled at their centres. Where a cut goes through the samples they are scaled to the edges that are
+  /// left to the whole hat; too soft a block would overshoot.
+  void ScaleBlocks(const Sheet& sheet);
   /// While not all is computed the coarse nodes rest, and so do middle functions that reach into what is not: cut off
   /// there they would cost far more energy than their blocks say.
   void FollowRegions(const Regions& regions);
@@ -52,6 +57,8 @@ class CoarseSpace {
   double Prolong(const float* tube, const float* tube_residual, float* tube_z, int first, int end) const;
 
  private:
+  [[nodiscard]] std::array<std::uint32_t, 2> FunctionsOf(std::uint32_t col) const;
+  [[nodiscard]] float Hat(std::uint32_t function, int row, int col) const;
   struct alignas(16) Weights8 {
     std::array<std::uint16_t, 8> node;
     std::array<float, 8> weight;
@@ -86,7 +93,8 @@ class CoarseSpace {
   std::vector<float> yields_;                        ///< By middle function: 0 where a contact holds it, else 1.
   std::vector<std::pair<std::size_t, float>> held_;  ///< Functions that do not yield.
   std::vector<float> fraction_;
-  FloatArray own_, next_;
+  FloatArray own_, next_, scale_;
+  std::vector<std::uint32_t> edited_;  ///< Middle functions.
   std::array<FloatArray, 6> block_;
   FloatArray residual_, value_;
   std::vector<std::uint32_t> column_of_;  ///< Column of the sheet that a float of its row stands on, at most cols - 1.

@@ -51,8 +51,9 @@ struct Middle {
   const float* next;      ///< ... and in the next one; at the end of a lane the next lane's first.
   const int* cell;        ///< [sheet rows] the middle row at or before a row ...
   const float* fraction;  ///< ... and how far on towards the one after it.
-  float* block[6];        ///< Inverse of the diagonal blocks, [rows][slots * 8].
-  const float* value;     ///< The solution, [rows][3][slots * 8].
+  const float* scale;  ///< [rows][slots * 8] of the sampled blocks, where cuts make the samples no measure; 0: no hat.
+  float* block[6];     ///< Inverse of the diagonal blocks, [rows][slots * 8].
+  const float* value;  ///< The solution, [rows][3][slots * 8].
 };
 /// Sum of hat^2 over the nodes of a hat: (11/4)^2.
 inline constexpr float kHatMass = 7.5625f;

@@ -40,14 +40,16 @@ inline void MiddleBlocks(const Sheet& sheet, const Middle& middle, const SheetMa
         mass = mass + F8::Load(sheet.mass + at);
       }
       // A sheet that hangs on nothing still has its mass; without mass and edges there is no residual either.
+      const std::size_t to = 8 * static_cast<std::size_t>(r * middle.slots + s);
+      const F8 scale = F8::Load(middle.scale + to);
       const F8 own = Max(mass * F8::All(0.25f) * k, F8::All(1e-3f));
-      for (int i = 0; i < 3; ++i) {
-        block[i] = block[i] + own;
+      for (int i = 0; i < 6; ++i) {
+        block[i] = i < 3 ? block[i] * scale + own : block[i] * scale;
       }
       // A hat on a node that does not move has only part of its edges, and the samples are not of that part.
       const int last = 4 * s < sheet.slots ? 4 * s : sheet.slots - 1;
       const F8 moves = F8::Load(sheet.w + RowStart(sheet, centre) + 8 * static_cast<std::size_t>(last)) > zero;
-      StoreInverseBlock(block, moves, middle.block, 8 * static_cast<std::size_t>(r * middle.slots + s));
+      StoreInverseBlock(block, moves & (scale > zero), middle.block, to);
     }
   }
 }

@@ -107,9 +107,11 @@ void AccurateSolver::Follow(const TissueModel& tissue) {
   for (const Index edge : tissue.edited_edges()) {
     const Index row = edge / 3 / layout.cols, col = edge / 3 % layout.cols;
     FollowEdge(tissue, layout.Offset(row, col), edge % 3);
+    coarse_.MarkEdit(row, col, edge % 3);
     regions_.Wake(regions_.Of(particles_->NodeRef(row, col)));
     regions_.Wake(regions_.Of(particles_->NodeRef(std::min(row + 1, layout.rows - 1), col)));
   }
+  coarse_.ScaleBlocks(MakeSheet());
   elements_.Follow(tissue);
   elements_.FollowRegions(regions_);
 }
