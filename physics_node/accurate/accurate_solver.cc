@@ -92,6 +92,10 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   for (FloatArray* a : {&velocity_, &place_, &residual_, &z_, &p_, &q_, &d_, &load_}) {
     *a = FloatArray(pool);
   }
+  aside_ = FloatArray(pool);
+  for (FloatArray& answer : answer_) {
+    answer = FloatArray(pool);
+  }
   for (Index p = 0; p < model.load.size(); ++p) {
     Write(load_.data(), particles->Ref(p), model.load[p].cast<float>());
   }
@@ -238,6 +242,9 @@ void AccurateSolver::FollowRegions() {
     ForParts(regions_.Extent(region), [&](std::size_t first, std::size_t count) {
       for (FloatArray* field : {&velocity_, &z_, &p_, &q_, &d_}) {
         std::fill_n(field->data() + first, count, 0.0f);
+      }
+      for (FloatArray& answer : answer_) {
+        std::fill_n(answer.data() + first, count, 0.0f);
       }
       std::copy_n(particles_->pool() + first, count, place_.data() + first);
     });

@@ -32,6 +32,17 @@ struct SubstepReport {
   bool searched = false;     ///< The energy was looked at.
 };
 
+/// What happens if some particles together are pushed, beside what is going on. Where they are held, how the tissue
+/// pulls when they move together.
+struct Question {
+  std::span<const ParticleRef> at;
+  std::span<const float> weights;  ///< Sum 1.
+  Vec3f force = Vec3f::Zero();     ///< Of all together [N].
+  float horizon_s = 0;             ///< After so long; 0: when all is at rest again.
+  /// Below kMemories: the last answer of the same memory is where the search for this one begins.
+  std::size_t memory = 0;
+};
+
 /// Substeps and iterations of a preset.
 struct Effort {
   int substeps = 2;
@@ -60,6 +71,12 @@ class AccurateSolver {
   void Stop();
   /// Velocities from two states a step apart, for a restart. Wakes.
   void SetVelocity(ParticleRef at, const Vec3f& v);
+
+  static constexpr std::size_t kMemories = 4;
+  /// Weighted mean displacement that the force alone would bring about [m], from the last substep's linearisation
+  /// without contacts. Costs two iterations and a product, so the first answer to a new question at rest is too small;
+  /// it improves when the question is repeated. False: all is asleep, or no sound answer. The state stays as it is.
+  bool Respond(const Question& question, Vec3f* displacement);
 
   /// What is computed at present, and what is awake.
   [[nodiscard]] const Regions& regions() const { return regions_; }
@@ -136,7 +153,9 @@ class AccurateSolver {
   // Fields: velocity, place of the linearisation, residual, z = M^-1 r, direction p, q = A p, correction d. Where
   // nothing is computed, velocity, z, p, q and d are 0 and the place is that of the particle.
   FloatArray velocity_, place_, residual_, z_, p_, q_, d_;
-  std::vector<FloatArray> carry_;  ///< By thread.
+  std::array<FloatArray, kMemories> answer_;  ///< To questions: displacements.
+  FloatArray aside_;                          ///< The residual, while a question is answered.
+  std::vector<FloatArray> carry_;             ///< By thread.
   FloatArray row_sums_;
   std::vector<double> partial_;      ///< By task.
   std::vector<GuessCount> guess_;    ///< By task.

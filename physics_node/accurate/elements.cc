@@ -192,7 +192,7 @@ double Elements::Apply(const float* p, float* out) {
     sum += static_cast<double>(d.dot(force));
     Spread4(e, force, out);
   }
-  for (const Element& e : contacts_) {
+  for (const Element& e : contacts_out_ ? std::span<const Element>() : std::span<const Element>(contacts_)) {
     const Vec3f d = Combine(e, p), force = e.kt * d + e.m * e.m.dot(d);
     sum += static_cast<double>(d.dot(force));
     Spread(e, force, out);

@@ -39,6 +39,8 @@ class Elements {
   [[nodiscard]] std::span<const Element> touching() const { return contacts_; }
   /// Linearises at `place` and adds the forces to `residual`, those of the touching contacts included.
   void Linearise(const float* place, float* residual);
+  /// While set, contacts take no part in Apply.
+  void LeaveContactsOut(bool out) { contacts_out_ = out; }
   /// out += K p; returns p . K p.
   double Apply(const float* p, float* out);
   [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts);
@@ -58,6 +60,7 @@ class Elements {
   std::vector<BindingRest> binding_rest_;
   std::vector<std::uint32_t> active_;  ///< Bindings in force and computed.
   std::vector<Vec3f> contact_force_;
+  bool contacts_out_ = false;
   HingeMatrix hinges_;
 };
 

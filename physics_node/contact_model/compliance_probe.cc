@@ -25,7 +25,7 @@ const Compliance& ComplianceProbe::Update(std::uint32_t tool, std::span<const In
     return memory.compliance;
   }
   std::fill_n(weights_.begin(), count, 1.0f / static_cast<float>(count));
-  const ProbeLoad load{particles.first(count), {weights_.data(), count}, kForce * direction};
+  const ProbeLoad load{particles.first(count), {weights_.data(), count}, kForce * direction, tool};
   float* known = memory.ask_rest ? &memory.at_rest : &memory.after_frame;
   Vec3f displacement = Vec3f::Zero();
   if (!solver->Respond(load, memory.ask_rest ? ComplianceSolver::kAtRest : frame_s_, &displacement)) {

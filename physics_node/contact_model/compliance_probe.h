@@ -19,6 +19,7 @@ struct ProbeLoad {
   std::span<const Index> particles;
   std::span<const float> weights;  ///< Of each particle, sum 1.
   Vec3f force = Vec3f::Zero();     ///< Of all together, frame W [N].
+  std::uint32_t tool = 0;          ///< Who asks: its questions resemble one another.
 };
 
 /// What a solver offers to the probe.

@@ -54,10 +54,23 @@ TissueSimulation::TissueSimulation(const SceneView& scene, int threads, const Ke
     } else {
       accurate_.emplace(scene, elastic, model_, &particles_, threads);
       effort_ = accurate::EffortOf(scene.physics.preset);
+      contacts_.AskSolver(&answers_);
     }
     held_places_.reserve(particles_.particle_count());
     rows_.reserve(kMaxTools * ToolCollision::kMaxRows + TissueCollision::kMaxRows);
   }
+}
+
+bool TissueSimulation::Answers::Respond(const ProbeLoad& load, float horizon_s, Vec3f* displacement) {
+  if ((simulation_->steps_ + load.tool * kAskEvery / 2) % kAskEvery != 0) {
+    return false;
+  }
+  at_.clear();
+  for (const Index particle : load.particles) {
+    at_.push_back(simulation_->particles_.Ref(particle));
+  }
+  const std::size_t memory = 2 * load.tool + (horizon_s > 0.0f ? 1 : 0);
+  return simulation_->accurate_->Respond({at_, load.weights, load.force, horizon_s, memory}, displacement);
 }
 
 void TissueSimulation::FollowTools(const std::array<ToolInput, kMaxTools>& tools) {

@@ -48,6 +48,9 @@ class TissueSimulation {
   /// `threads` share a step of mode accurate; the state does not depend on it.
   explicit TissueSimulation(const SceneView& scene, int threads = 1, const Kernels& kernels = BestKernels());
 
+  TissueSimulation(const TissueSimulation&) = delete;
+  TissueSimulation& operator=(const TissueSimulation&) = delete;
+
   /// Advances by PhysicsParams.dt_s. A tool that is not present leaves the tissue where it is and lets go.
   StepReport Step(const std::array<ToolInput, kMaxTools>& tools);
   /// Cut and shrunk edges; see TissueModel::Apply. Wakes the tissue when something changed.
@@ -90,6 +93,19 @@ class TissueSimulation {
   bool Restore(std::span<const float> xyz, std::span<const float> previous_xyz, const SimulationMemory& memory);
 
  private:
+  /// The accurate solver's answers to ContactProbe's questions: one a tool every kAskEvery steps, so that asking costs
+  /// a tenth of a step at most.
+  class Answers final : public ComplianceSolver {
+   public:
+    static constexpr std::uint64_t kAskEvery = 8;
+    explicit Answers(TissueSimulation* simulation) : simulation_(simulation) {}
+    bool Respond(const ProbeLoad& load, float horizon_s, Vec3f* displacement) override;
+
+   private:
+    TissueSimulation* simulation_;
+    std::vector<ParticleRef> at_;
+  };
+
   struct ToolTrack {
     bool present = false;
     ToolPose last, now;
@@ -123,6 +139,7 @@ class TissueSimulation {
   TissueCollision tissue_collision_;
   std::array<Grasp, kMaxTools> grasps_;
   ContactProbe contacts_;
+  Answers answers_{this};
   CauteryProbe cautery_;
   std::array<ToolTrack, kMaxTools> tracks_;
   bool asleep_ = false;

@@ -211,6 +211,52 @@ TEST_F(Accurate, ContactAndCutsWake) {
   EXPECT_TRUE(run.solver.regions().computed(there));
 }
 
+TEST_F(Accurate, AnswersQuestionsAsItThenBehaves) {
+  Run run(scene_);
+  constexpr float kStep = 0.0002f;
+  const auto force = [&] {
+    Vec3f sum = Vec3f::Zero();
+    for (const HeldPlace& held : Patch(&run, 0)) {
+      sum += run.solver.ForceOn(held.at);
+    }
+    return sum;
+  };
+  for (int i = 0; i < 30; ++i) {
+    run.Step(Patch(&run, 0));
+  }
+  std::vector<ParticleRef> at;
+  std::vector<float> weights;
+  for (const HeldPlace& held : Patch(&run, 0)) {
+    at.push_back(held.at);
+    weights.push_back(1.0f / 9.0f);
+  }
+  const Vec3f before = force();
+  const std::vector<float> places = run.Positions();
+  const auto stiffness = [&](float horizon_s, std::size_t memory, int questions) {
+    Vec3f answer = Vec3f::Zero();
+    for (int i = 0; i < questions; ++i) {
+      EXPECT_TRUE(run.solver.Respond({at, weights, 0.1f * Vec3f::UnitZ(), horizon_s, memory}, &answer));
+    }
+    return 0.1f / answer.z();
+  };
+  const float at_rest = stiffness(0, 0, 10), in_a_frame = stiffness(0.01f, 1, 3);
+  EXPECT_EQ(run.Positions(), places);
+  EXPECT_EQ(force(), before) << "Asking changes nothing.";
+  EXPECT_GT(in_a_frame, at_rest);
+  for (int i = 0; i < 300; ++i) {
+    run.Step(Patch(&run, kStep));
+  }
+  const float measured = (before - force()).z() / kStep;
+  EXPECT_NEAR(at_rest, measured, 0.05f * measured);
+
+  // The same patch, free, pushed together.
+  Release(&run);
+  for (int i = 0; i < 20; ++i) {
+    run.Step();
+  }
+  EXPECT_NEAR(stiffness(0, 2, 20), measured, 0.2f * measured);
+}
+
 TEST_F(Accurate, RestShapeIsAtRestInSpiteOfThePrestrain) {
   ASSERT_GT(scene_.physics.membrane_prestrain, 0.0f);
   Run run(scene_);
