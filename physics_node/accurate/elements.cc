@@ -101,7 +101,7 @@ float Elements::ContactStiffness(const ContactRow& row) {
 }
 
 Elements::Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
-    : hinges_(model, particles) {
+    : hinges_(model, particles), guard_(model) {
   for (const ElasticBinding& binding : model.bindings) {
     Element e;
     e.at[0] = particles.Ref(binding.membrane);
@@ -179,13 +179,14 @@ void Elements::Linearise(const float* place, float* residual) {
     Spread4(e, d * (-tension / length), residual);
   }
   hinges_.AddForce(place, residual);
+  guard_.Linearise(place, residual);
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     Spread(contacts_[i], contact_force_[i], residual);
   }
 }
 
 double Elements::Apply(const float* p, float* out) {
-  double sum = hinges_.Apply(p, out);
+  double sum = hinges_.Apply(p, out) + guard_.Apply(p, out);
   for (const std::uint32_t i : active_) {
     const Element& e = bindings_[i];
     const Vec3f d = Combine4(e, p), force = e.kt * d + e.m * e.m.dot(d);
@@ -201,7 +202,7 @@ double Elements::Apply(const float* p, float* out) {
 }
 
 double Elements::Energy(const float* place, std::span<const ContactRow> contacts) {
-  double sum = hinges_.Energy(place);
+  double sum = hinges_.Energy(place) + guard_.Energy(place);
   for (const std::uint32_t i : active_) {
     const float stretch = Combine4(bindings_[i], place).norm() - binding_rest_[i].length;
     sum += 0.5 * static_cast<double>(binding_rest_[i].stiffness * stretch * stretch);

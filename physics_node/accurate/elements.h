@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "physics_node/accurate/hinge_matrix.h"
+#include "physics_node/accurate/inversion_guard.h"
 #include "physics_node/accurate/regions.h"
 #include "physics_node/collision/contact_row.h"
 #include "physics_node/energy/elastic_model.h"
@@ -62,6 +63,7 @@ class Elements {
   std::vector<Vec3f> contact_force_;
   bool contacts_out_ = false;
   HingeMatrix hinges_;
+  InversionGuard guard_;
 };
 
 }  // namespace fulcrum::physics::accurate
