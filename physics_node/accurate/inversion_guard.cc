@@ -6,10 +6,14 @@
 namespace fulcrum::physics::accurate {
 namespace {
 
-/// Turned over below 0; brought back to this.
-constexpr float kBack = 0.1f;
-/// Of the organ's bulk modulus: enough to open a fold, little enough for the preconditioner, which does not know it.
+/// Turned over below 0; kept from falling below this ...
+constexpr float kBack = 0.15f;
+/// ... until it has recovered to this.
+constexpr float kSound = 0.4f;
+/// Of the organ's bulk modulus to begin with: enough to open most folds, little enough for the preconditioner, which
+/// does not know it. It grows each substep that a fold resists, up to so many times.
 constexpr double kPart = 0.3;
+constexpr float kGrowth = 1.02f, kMost = 16.0f;
 
 Vec3f At(const float* field, Index v) {
   return {field[4 * std::size_t{v}], field[4 * std::size_t{v} + 1], field[4 * std::size_t{v} + 2]};
@@ -39,13 +43,14 @@ float InversionGuard::RelativeVolume(const Tet& tet, const float* place) const {
 }
 
 void InversionGuard::Look(const float* place) {
-  std::erase_if(found_, [&](const Found& f) { return !(RelativeVolume(tets_[f.tet], place) < kBack); });
+  std::erase_if(found_, [&](const Found& f) { return !(RelativeVolume(tets_[f.tet], place) < kSound); });
   const std::size_t end = std::min(next_ + tets_.size() / kParts + 1, tets_.size());
   for (; next_ < end; ++next_) {
     if (RelativeVolume(tets_[next_], place) < 0.0f &&
         std::none_of(found_.begin(), found_.end(), [&](const Found& f) { return f.tet == next_; })) {
       Found& found = found_.emplace_back();
       found.tet = next_;
+      found.stiffness = tets_[next_].stiffness;
     }
   }
   next_ = next_ == tets_.size() ? 0 : next_;
@@ -57,12 +62,14 @@ void InversionGuard::Linearise(const float* place, float* residual) {
     const Tet& tet = tets_[found.tet];
     const Vec3f x0 = At(place, tet.v[0]), a = At(place, tet.v[1]) - x0, b = At(place, tet.v[2]) - x0,
                 c = At(place, tet.v[3]) - x0;
-    const float root = std::sqrt(tet.stiffness), scale = root * tet.inverse_volume;
+    const float volume = RelativeVolume(tet, place);
+    found.stiffness = std::min(found.stiffness * kGrowth, kMost * tet.stiffness);
+    const float root = volume < kBack ? std::sqrt(found.stiffness) : 0.0f, scale = root * tet.inverse_volume;
     found.gradient[1] = scale * b.cross(c);
     found.gradient[2] = scale * c.cross(a);
     found.gradient[3] = scale * a.cross(b);
     found.gradient[0] = -(found.gradient[1] + found.gradient[2] + found.gradient[3]);
-    const float missing = root * (kBack - RelativeVolume(tet, place));
+    const float missing = root * (kBack - volume);
     for (std::size_t k = 0; k < 4; ++k) {
       Add(residual, tet.v[k], missing * found.gradient[k]);
     }
@@ -90,7 +97,7 @@ double InversionGuard::Energy(const float* place) const {
   for (const Found& found : found_) {
     const Tet& tet = tets_[found.tet];
     const float missing = std::max(kBack - RelativeVolume(tet, place), 0.0f);
-    sum += 0.5 * static_cast<double>(tet.stiffness * missing * missing);
+    sum += 0.5 * static_cast<double>(found.stiffness * missing * missing);
   }
   return sum;
 }

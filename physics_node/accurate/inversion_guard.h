@@ -1,7 +1,7 @@
 // The organ's law sits at patches of some twenty tetrahedra, so a single one may turn over within a sound patch and
 // stay so: a fold finer than the law can see. This adds what the law lacks there and nowhere else,
 //
-//   E = k V / 2 (J - J0)^2   for tetrahedra that are found turned over, until J has come back to J0,
+//   E = k V / 2 min(J - J0, 0)^2   for tetrahedra that have been found turned over, until they are sound again,
 //
 // with J their volume over that at rest. Nothing is added to tissue without folds.
 #pragma once
@@ -34,6 +34,7 @@ class InversionGuard {
   };
   struct Found {
     std::size_t tet = 0;
+    float stiffness = 0;  ///< Grows while the fold resists [J].
     std::array<Vec3f, 4> gradient{Vec3f::Zero(), Vec3f::Zero(), Vec3f::Zero(),
                                   Vec3f::Zero()};  ///< Of J, times the root of the stiffness.
   };
