@@ -107,6 +107,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   for (auto* flags : {&held_before_, &touched_before_, &held_now_, &touched_now_}) {
     flags->assign(regions, 0);
   }
+  stiffened_.assign(regions, 0);
   speed_.assign(regions, 0.0f);
   partial_.assign(regions, 0.0);
   guess_.assign(regions, {});
@@ -331,6 +332,8 @@ void AccurateSolver::RefreshContactStiffness() {
       const auto i = static_cast<std::size_t>(k);
       extra_[slot(contact.at[i])] += stiffness * contact.weight[i] * contact.weight[i];
       extra_changed_.push_back(slot(contact.at[i]));
+      // Once more after the last time, to be as without.
+      stiffened_[static_cast<std::size_t>(regions_.Of(contact.at[i]))] = 2;
     }
   }
 }
@@ -358,9 +361,9 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
       kernels_.organ_linearise(organ, organ_matrix, place_.data(), Vertex(task.first), Vertex(task.end));
     }
   });
-  // What touches the organ changes its blocks; left alone it does not turn enough in a step to matter.
-  const bool organ_blocks = organ_blocks_due_ || !elements_.touching().empty();
-  organ_blocks_due_ = !elements_.touching().empty();
+  // What touches the organ changes its blocks there; left alone it does not turn enough in a step to matter.
+  const bool all_blocks = organ_blocks_due_;
+  organ_blocks_due_ = false;
   ForTasks([&](const Task& task, int, int) {
     if (task.sheet) {
       const auto [first, end] = coarse_.MiddleRows(task.first, task.end);
@@ -368,9 +371,13 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
       return;
     }
     kernels_.organ_residual(organ, organ_matrix, inertia, OrganAt(place_), Vertex(task.first), Vertex(task.end));
-    if (organ_blocks) {
-      kernels_.organ_blocks(organ, organ_matrix, particles_->tube(), extra_.data() + plane_, inertia.inertia,
-                            Vertex(task.first), Vertex(task.end));
+    for (int first = task.first; first < task.end; first += Regions::kVertices) {
+      std::uint8_t& stiffened = stiffened_[static_cast<std::size_t>(regions_.At(false, first))];
+      if (all_blocks || stiffened != 0) {
+        kernels_.organ_blocks(organ, organ_matrix, particles_->tube(), extra_.data() + plane_, inertia.inertia,
+                              Vertex(first), Vertex(std::min(first + Regions::kVertices, task.end)));
+      }
+      stiffened = static_cast<std::uint8_t>(stiffened >> 1);
     }
   });
   coarse_.ForgetContacts();

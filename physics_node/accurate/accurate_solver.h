@@ -142,8 +142,8 @@ class AccurateSolver {
   // Who works on what.
   Workers workers_;
   Regions regions_;
-  std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_;  ///< By region.
-  std::vector<float> speed_;                                                         ///< By region [m/s].
+  std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_, stiffened_;  ///< By region.
+  std::vector<float> speed_;                                                                     ///< By region [m/s].
 
   // The linearisation.
   std::array<FloatArray, 3> kt_, along_;
