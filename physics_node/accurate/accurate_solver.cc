@@ -11,9 +11,6 @@ namespace {
 /// Above this the inertial guess is compared with the state before it, and the solve with the guess [m].
 constexpr float kDoubtfulGuess = 0.0005f;
 constexpr float kDoubtfulCorrection = 0.0002f;
-/// No particle is corrected by more in one solve [m].
-constexpr float kLargestCorrection = 0.003f;
-constexpr int kHalvings = 4;
 /// Contacts stiffer than this the middle level must know; softer ones are as the fat around [N/m].
 constexpr float kStiffContact = 500.0f;
 /// Iterations more while a tool touches: with two a pressed patch chatters, with three it rests.
@@ -390,61 +387,6 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   }
   coarse_.FadeAtContacts();
   elements_.Linearise(place_.data(), residual_.data());
-}
-
-float AccurateSolver::LargestCorrection() {
-  const Sheet sheet = MakeSheet();
-  const float* const d[3] = {d_.data() + tube_floats_, d_.data() + tube_floats_ + plane_,
-                             d_.data() + tube_floats_ + 2 * plane_};
-  ForTasks([&](const Task& task, int index, int) {
-    partial_[static_cast<std::size_t>(index)] =
-        task.sheet ? static_cast<double>(kernels_.sheet_largest(sheet, d, task.first, task.end))
-                   : static_cast<double>(kernels_.organ_largest(d_.data(), Vertex(task.first), Vertex(task.end)));
-  });
-  double largest = 0;
-  for (std::size_t i = 0; i < regions_.tasks().size(); ++i) {
-    largest = std::max(largest, partial_[i]);
-  }
-  return std::sqrt(static_cast<float>(largest));
-}
-
-void AccurateSolver::LimitCorrection(float largest) {
-  if (largest <= kLargestCorrection) {
-    return;
-  }
-  const auto limit = [](float* x, float* y, float* z) {
-    const float length = std::sqrt(*x * *x + *y * *y + *z * *z);
-    if (length > kLargestCorrection) {
-      const float part = kLargestCorrection / length;
-      *x *= part;
-      *y *= part;
-      *z *= part;
-    }
-  };
-  for (std::size_t i = 0; i < 4 * std::size_t{tube_count_}; i += 4) {
-    limit(&d_[i], &d_[i + 1], &d_[i + 2]);
-  }
-  float* x = d_.data() + tube_floats_;
-  for (std::size_t i = 0; i < plane_; ++i) {
-    limit(x + i, x + plane_ + i, x + 2 * plane_ + i);
-  }
-}
-
-/// Halves the correction until the energy is no larger than without it.
-void AccurateSolver::SearchAlongCorrection(const Inertia& inertia, std::span<const ContactRow> contacts) {
-  const double before = EnergyAt(place_, inertia, contacts);
-  const std::size_t count = tube_floats_ + 3 * plane_;
-  for (int halving = 0; halving <= kHalvings; ++halving) {
-    for (std::size_t i = 0; i < count; ++i) {
-      q_[i] = place_[i] + d_[i];
-    }
-    if (EnergyAt(q_, inertia, contacts) <= before || halving == kHalvings) {
-      break;
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      d_[i] *= 0.5f;
-    }
-  }
 }
 
 /// Positions and velocities from place + d. What is not finite stays where it was, at rest.

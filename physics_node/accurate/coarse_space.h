@@ -57,6 +57,7 @@ class CoarseSpace {
   double Prolong(const float* tube, const float* tube_residual, float* tube_z, int first, int end) const;
 
  private:
+  static constexpr int kSheetColumns = 4;
   [[nodiscard]] std::array<std::uint32_t, 2> FunctionsOf(std::uint32_t col) const;
   [[nodiscard]] float Hat(std::uint32_t function, int row, int col) const;
   struct alignas(16) Weights8 {

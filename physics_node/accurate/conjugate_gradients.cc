@@ -6,6 +6,13 @@
 #include "physics_node/accurate/for_tasks.h"
 
 namespace fulcrum::physics::accurate {
+namespace {
+
+/// No particle is corrected by more in one solve [m].
+constexpr float kLargestCorrection = 0.003f;
+constexpr int kHalvings = 4;
+
+}  // namespace
 
 /// z <- M^-1 residual, whose part for the middle level is in row_sums_ already; returns residual . z.
 double AccurateSolver::Precondition() {
@@ -98,6 +105,61 @@ void AccurateSolver::Solve(float inertia, int iterations) {
     });
     direction = &p_;
     rz = next;
+  }
+}
+
+float AccurateSolver::LargestCorrection() {
+  const Sheet sheet = MakeSheet();
+  const float* const d[3] = {d_.data() + tube_floats_, d_.data() + tube_floats_ + plane_,
+                             d_.data() + tube_floats_ + 2 * plane_};
+  ForTasks([&](const Task& task, int index, int) {
+    partial_[static_cast<std::size_t>(index)] =
+        task.sheet ? static_cast<double>(kernels_.sheet_largest(sheet, d, task.first, task.end))
+                   : static_cast<double>(kernels_.organ_largest(d_.data(), Vertex(task.first), Vertex(task.end)));
+  });
+  double largest = 0;
+  for (std::size_t i = 0; i < regions_.tasks().size(); ++i) {
+    largest = std::max(largest, partial_[i]);
+  }
+  return std::sqrt(static_cast<float>(largest));
+}
+
+void AccurateSolver::LimitCorrection(float largest) {
+  if (largest <= kLargestCorrection) {
+    return;
+  }
+  const auto limit = [](float* x, float* y, float* z) {
+    const float length = std::sqrt(*x * *x + *y * *y + *z * *z);
+    if (length > kLargestCorrection) {
+      const float part = kLargestCorrection / length;
+      *x *= part;
+      *y *= part;
+      *z *= part;
+    }
+  };
+  for (std::size_t i = 0; i < 4 * std::size_t{tube_count_}; i += 4) {
+    limit(&d_[i], &d_[i + 1], &d_[i + 2]);
+  }
+  float* x = d_.data() + tube_floats_;
+  for (std::size_t i = 0; i < plane_; ++i) {
+    limit(x + i, x + plane_ + i, x + 2 * plane_ + i);
+  }
+}
+
+/// Halves the correction until the energy is no larger than without it.
+void AccurateSolver::SearchAlongCorrection(const Inertia& inertia, std::span<const ContactRow> contacts) {
+  const double before = EnergyAt(place_, inertia, contacts);
+  const std::size_t count = tube_floats_ + 3 * plane_;
+  for (int halving = 0; halving <= kHalvings; ++halving) {
+    for (std::size_t i = 0; i < count; ++i) {
+      q_[i] = place_[i] + d_[i];
+    }
+    if (EnergyAt(q_, inertia, contacts) <= before || halving == kHalvings) {
+      break;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      d_[i] *= 0.5f;
+    }
   }
 }
 
