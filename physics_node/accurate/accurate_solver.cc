@@ -279,12 +279,12 @@ void AccurateSolver::ForgetDamagedVelocities() {
   }
 }
 
-/// Where inertia does not tell where the guess is: held particles, and along its normal what a contact presses. Guessed
+/// Where inertia does not tell where the guess is: held particles, and along its normal what a tool presses. Guessed
 /// from its velocity, that would bounce: the error of one solve, seen as velocity, doubles in the next guess.
 void AccurateSolver::PutHeld(std::span<const HeldPlace> held, std::span<const ContactRow> contacts) {
   for (const ContactRow& row : contacts) {
     const float inside = row.offset - row.normal.dot(row.At(particles_->pool()));
-    if (!(inside > 0.0f)) {
+    if (!(inside > 0.0f) || !(Elements::ContactStiffness(row) > kStiffContact)) {
       continue;
     }
     // With the tool, but no farther than to its surface.

@@ -83,7 +83,7 @@ TEST(Script, SmallSceneIsBelievable) {
 
 TEST(Script, BuiltInSceneIsBelievable) {
   const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
-  const Played played = Play(data.View(), 8.0);
+  const Played played = Play(data.View(), 5.0);
   ExpectBelievable(played, 0.025f);
   EXPECT_GT(played.max_displacement, 0.010f);
   EXPECT_LT(played.max_displacement, 0.060f);
