@@ -23,7 +23,6 @@ class InversionGuard {
   double Apply(const float* p, float* out) const;
   /// Of those found, at `place` [J].
   [[nodiscard]] double Energy(const float* place) const;
-  [[nodiscard]] std::size_t found() const { return found_.size(); }
 
  private:
   static constexpr std::size_t kParts = 16;
