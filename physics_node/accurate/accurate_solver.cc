@@ -22,17 +22,6 @@ constexpr float kFarthest = 10.0f;
 /// Rows of the membrane that the coarse matrix takes over per step: complete about once in 60 steps.
 constexpr int kRefreshRows = 5;
 
-Vec3f Read(const float* field, ParticleRef r) {
-  const std::size_t s = r.step;
-  return {field[r.base], field[r.base + s], field[r.base + 2 * s]};
-}
-void Write(float* field, ParticleRef r, const Vec3f& v) {
-  const std::size_t s = r.step;
-  field[r.base] = v.x();
-  field[r.base + s] = v.y();
-  field[r.base + 2 * s] = v.z();
-}
-
 }  // namespace
 
 Effort EffortOf(PhysicsPreset preset) {
@@ -94,7 +83,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
     answer = FloatArray(pool);
   }
   for (Index p = 0; p < model.load.size(); ++p) {
-    Write(load_.data(), particles->Ref(p), model.load[p].cast<float>());
+    PutField(load_.data(), particles->Ref(p), model.load[p].cast<float>());
   }
   for (int worker = 0; worker < workers_.count(); ++worker) {
     carry_.emplace_back(kCarry * std::size_t{particles->layout().stride} + 16);
@@ -290,14 +279,14 @@ void AccurateSolver::PutHeld(std::span<const HeldPlace> held, std::span<const Co
     // With the tool, but no farther than to its surface.
     const float along = std::min(row.normal.dot(row.drift), inside);
     for (std::size_t k = 0; k < static_cast<std::size_t>(row.count); ++k) {
-      const Vec3f place = Read(place_.data(), row.at[k]), moved = place - particles_->At(row.at[k]);
+      const Vec3f place = FieldAt(place_.data(), row.at[k]), moved = place - particles_->At(row.at[k]);
       if (particles_->InverseMass(row.at[k]) > 0.0f) {
-        Write(place_.data(), row.at[k], place + row.normal * (along - row.normal.dot(moved)));
+        PutField(place_.data(), row.at[k], place + row.normal * (along - row.normal.dot(moved)));
       }
     }
   }
   for (const HeldPlace& h : held) {
-    Write(place_.data(), h.at, h.place);
+    PutField(place_.data(), h.at, h.place);
   }
 }
 
@@ -469,10 +458,10 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
   return report;
 }
 
-Vec3f AccurateSolver::ForceOn(ParticleRef at) const { return Read(residual_.data(), at); }
-Vec3f AccurateSolver::Velocity(ParticleRef at) const { return Read(velocity_.data(), at); }
+Vec3f AccurateSolver::ForceOn(ParticleRef at) const { return FieldAt(residual_.data(), at); }
+Vec3f AccurateSolver::Velocity(ParticleRef at) const { return FieldAt(velocity_.data(), at); }
 void AccurateSolver::SetVelocity(ParticleRef at, const Vec3f& v) {
-  Write(velocity_.data(), at, v);
+  PutField(velocity_.data(), at, v);
   regions_.Wake(regions_.Of(at));
 }
 void AccurateSolver::Stop() { std::fill_n(velocity_.data(), velocity_.size(), 0.0f); }

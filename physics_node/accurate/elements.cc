@@ -18,22 +18,12 @@ constexpr float kContactDamping = 1.0f;
 /// Part of a contact's normal stiffness that resists sliding at most.
 constexpr float kTangentialPart = 0.3f;
 
-Vec3f Read(const float* field, ParticleRef r) {
-  const std::size_t s = r.step;
-  return {field[r.base], field[r.base + s], field[r.base + 2 * s]};
-}
-void Add(float* field, ParticleRef r, const Vec3f& v) {
-  const std::size_t s = r.step;
-  field[r.base] += v.x();
-  field[r.base + s] += v.y();
-  field[r.base + 2 * s] += v.z();
-}
 template <class Sum>
 Vec3f Combine(const Sum& e, const float* field) {
   Vec3f sum = Vec3f::Zero();
   for (int k = 0; k < e.count; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    sum += e.weight[i] * Read(field, e.at[i]);
+    sum += e.weight[i] * FieldAt(field, e.at[i]);
   }
   return sum;
 }
@@ -41,20 +31,20 @@ template <class Sum>
 void Spread(const Sum& e, const Vec3f& v, float* field) {
   for (int k = 0; k < e.count; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    Add(field, e.at[i], e.weight[i] * v);
+    AddField(field, e.at[i], e.weight[i] * v);
   }
 }
 
 /// Of all four particles: no loop that ends at a count.
 Vec3f Combine4(const Element& e, const float* field) {
-  return (e.weight[0] * Read(field, e.at[0]) + e.weight[1] * Read(field, e.at[1])) +
-         (e.weight[2] * Read(field, e.at[2]) + e.weight[3] * Read(field, e.at[3]));
+  return (e.weight[0] * FieldAt(field, e.at[0]) + e.weight[1] * FieldAt(field, e.at[1])) +
+         (e.weight[2] * FieldAt(field, e.at[2]) + e.weight[3] * FieldAt(field, e.at[3]));
 }
 void Spread4(const Element& e, const Vec3f& v, float* field) {
-  Add(field, e.at[0], e.weight[0] * v);
-  Add(field, e.at[1], e.weight[1] * v);
-  Add(field, e.at[2], e.weight[2] * v);
-  Add(field, e.at[3], e.weight[3] * v);
+  AddField(field, e.at[0], e.weight[0] * v);
+  AddField(field, e.at[1], e.weight[1] * v);
+  AddField(field, e.at[2], e.weight[2] * v);
+  AddField(field, e.at[3], e.weight[3] * v);
 }
 template <class Sum>
 bool AnyComputed(const Sum& e, const Regions& regions) {

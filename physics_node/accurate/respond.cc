@@ -11,17 +11,6 @@ constexpr int kIterations = 2;
 /// How far held particles are moved to see what pulls [m]; the answer is linear in it.
 constexpr float kProbeStep = 1e-3f;
 
-Vec3f Read(const float* field, ParticleRef r) {
-  const std::size_t s = r.step;
-  return {field[r.base], field[r.base + s], field[r.base + 2 * s]};
-}
-void Add(float* field, ParticleRef r, const Vec3f& v) {
-  const std::size_t s = r.step;
-  field[r.base] += v.x();
-  field[r.base + s] += v.y();
-  field[r.base + 2 * s] += v.z();
-}
-
 }  // namespace
 
 bool AccurateSolver::Respond(const Question& question, Vec3f* displacement) {
@@ -55,7 +44,7 @@ bool AccurateSolver::Respond(const Question& question, Vec3f* displacement) {
   });
   for (const ParticleRef at : question.at) {
     if (held && particles_->InverseMass(at) == 0.0f) {
-      Add(u.data(), at, kProbeStep * direction - Read(u.data(), at));
+      AddField(u.data(), at, kProbeStep * direction - FieldAt(u.data(), at));
     }
   }
   std::swap(residual_, aside_);
@@ -69,7 +58,7 @@ bool AccurateSolver::Respond(const Question& question, Vec3f* displacement) {
     });
   });
   for (std::size_t k = 0; k < question.at.size() && !held; ++k) {
-    Add(residual_.data(), question.at[k], question.weights[k] * question.force);
+    AddField(residual_.data(), question.at[k], question.weights[k] * question.force);
   }
   Solve(inertia, kIterations);
   ForTasks([&](const Task& task, int, int) {
@@ -83,8 +72,8 @@ bool AccurateSolver::Respond(const Question& question, Vec3f* displacement) {
   *displacement = Vec3f::Zero();
   float pull = 0;
   for (std::size_t k = 0; k < question.at.size(); ++k) {
-    *displacement += question.weights[k] * Read(u.data(), question.at[k]);
-    pull -= Read(residual_.data(), question.at[k]).dot(direction);
+    *displacement += question.weights[k] * FieldAt(u.data(), question.at[k]);
+    pull -= FieldAt(residual_.data(), question.at[k]).dot(direction);
   }
   std::swap(residual_, aside_);
   if (held) {

@@ -29,8 +29,7 @@ struct ContactRow {
   [[nodiscard]] Vec3f At(const float* field) const {
     Vec3f sum = Vec3f::Zero();
     for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
-      const std::size_t base = at[k].base, step = at[k].step;
-      sum += weight[k] * Vec3f(field[base], field[base + step], field[base + 2 * step]);
+      sum += weight[k] * FieldAt(field, at[k]);
     }
     return sum;
   }

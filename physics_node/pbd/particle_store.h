@@ -26,6 +26,24 @@ struct ParticleRef {
   std::uint32_t step = 1;
 };
 
+/// x y z of a particle in any array of the pool's layout.
+inline Vec3f FieldAt(const float* field, ParticleRef r) {
+  const std::size_t s = r.step;
+  return {field[r.base], field[r.base + s], field[r.base + 2 * s]};
+}
+inline void PutField(float* field, ParticleRef r, const Vec3f& v) {
+  const std::size_t s = r.step;
+  field[r.base] = v.x();
+  field[r.base + s] = v.y();
+  field[r.base + 2 * s] = v.z();
+}
+inline void AddField(float* field, ParticleRef r, const Vec3f& v) {
+  const std::size_t s = r.step;
+  field[r.base] += v.x();
+  field[r.base + s] += v.y();
+  field[r.base + 2 * s] += v.z();
+}
+
 /// Lane-blocked rows of the membrane.
 struct GridLayout {
   std::uint32_t rows = 0, cols = 0;
@@ -98,11 +116,11 @@ class ParticleStore {
     return {tube_floats_ + layout_.Offset(row, col), layout_.plane()};
   }
 
-  [[nodiscard]] Vec3f At(ParticleRef r) const { return Read(now_.data(), r); }
-  [[nodiscard]] Vec3f Previous(ParticleRef r) const { return Read(previous_.data(), r); }
+  [[nodiscard]] Vec3f At(ParticleRef r) const { return FieldAt(now_.data(), r); }
+  [[nodiscard]] Vec3f Previous(ParticleRef r) const { return FieldAt(previous_.data(), r); }
   [[nodiscard]] float InverseMass(ParticleRef r) const { return now_[r.base + 3 * std::size_t{r.step}]; }
-  void Set(ParticleRef r, const Vec3f& p) { Write(now_.data(), r, p); }
-  void SetPrevious(ParticleRef r, const Vec3f& p) { Write(previous_.data(), r, p); }
+  void Set(ParticleRef r, const Vec3f& p) { PutField(now_.data(), r, p); }
+  void SetPrevious(ParticleRef r, const Vec3f& p) { PutField(previous_.data(), r, p); }
   void SetInverseMass(ParticleRef r, float w) { now_[r.base + 3 * std::size_t{r.step}] = w; }
 
   [[nodiscard]] float* pool() { return now_.data(); }
@@ -161,16 +179,6 @@ class ParticleStore {
   [[nodiscard]] std::span<const float> raw() const { return {now_.data(), now_.size()}; }
 
  private:
-  static Vec3f Read(const float* pool, ParticleRef r) {
-    const std::size_t s = r.step;
-    return {pool[r.base], pool[r.base + s], pool[r.base + 2 * s]};
-  }
-  static void Write(float* pool, ParticleRef r, const Vec3f& p) {
-    const std::size_t s = r.step;
-    pool[r.base] = p.x();
-    pool[r.base + s] = p.y();
-    pool[r.base + 2 * s] = p.z();
-  }
   void Copy(const float* pool, std::span<float> xyz) const {
     float* out = xyz.data();
     for (Index v = 0; v < tube_count_; ++v, out += 3) {
