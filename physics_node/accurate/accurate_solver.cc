@@ -95,6 +95,8 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   }
   stiffened_.assign(regions, 0);
   speed_.assign(regions, 0.0f);
+  moved_.assign(particles->block_count(), 0.0f);
+  moved_asleep_.assign(particles->block_count(), 0.0f);
   partial_.assign(regions, 0.0);
   guess_.assign(regions, {});
   finish_.assign(regions, {});
@@ -187,12 +189,23 @@ std::uint32_t AccurateSolver::BeginStep() {
     resets = particles_->RepairPlaces(kFarthest);
     regions_.WakeAll();
   }
+  moved_.swap(moved_asleep_);
+  std::fill(moved_asleep_.begin(), moved_asleep_.end(), 0.0f);
   ForTasks([&](const Task& task, int, int) {
+    Measure(task, &moved_);
     ForParts(task, [&](std::size_t first, std::size_t count) { particles_->RememberPlaces(first, count); });
   });
   organ_blocks_due_ = true;
   refresh_due_ = true;
   return resets;
+}
+
+void AccurateSolver::Measure(const Task& task, std::vector<float>* moved) const {
+  if (task.sheet) {
+    particles_->MeasureRows(Vertex(task.first), Vertex(task.end), moved->data());
+  } else {
+    particles_->MeasureTube(Vertex(task.first), Vertex(task.end), moved->data());
+  }
 }
 
 /// What held particles and contacts begin, move or end wakes the tissue there.
@@ -226,7 +239,9 @@ void AccurateSolver::FollowRegions() {
   elements_.FollowRegions(regions_);
   coarse_.FollowRegions(regions_);
   for (const int region : regions_.taken_out()) {
+    Measure(regions_.Extent(region), &moved_asleep_);
     ForParts(regions_.Extent(region), [&](std::size_t first, std::size_t count) {
+      particles_->RememberPlaces(first, count);
       for (FloatArray* field : {&velocity_, &z_, &p_, &q_, &d_}) {
         std::fill_n(field->data() + first, count, 0.0f);
       }

@@ -63,6 +63,9 @@ class AccurateSolver {
   /// Once a step, before its substeps: remembers the places. A place damaged since the last step (not finite, far off)
   /// comes from the last step; returns how many coordinates.
   std::uint32_t BeginStep();
+  /// At least how far any particle of each block of the ParticleStore has moved in the step that the last BeginStep
+  /// ended [m]; 0 where all slept.
+  [[nodiscard]] std::span<const float> moved() const { return moved_; }
   SubstepReport Substep(float h, int iterations, std::span<const HeldPlace> held, std::span<ContactRow> contacts);
 
   /// Elastic force on a particle at the end of the last substep [N]; of a held one, what the tissue pulls at it with.
@@ -94,6 +97,7 @@ class AccurateSolver {
   [[nodiscard]] Regions MakeRegions(const ElasticModel& model) const;
   void FollowEdge(const TissueModel& tissue, std::uint32_t at, std::size_t direction);
 
+  void Measure(const Task& task, std::vector<float>* moved) const;
   void WakeTouched(std::span<const HeldPlace> held, std::span<const ContactRow> contacts);
   void FollowRegions();
   GuessCount Guess(float h);
@@ -144,6 +148,8 @@ class AccurateSolver {
   Regions regions_;
   std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_, stiffened_;  ///< By region.
   std::vector<float> speed_;                                                                     ///< By region [m/s].
+
+  std::vector<float> moved_, moved_asleep_;  ///< By block [m]; since BeginStep of what has fallen asleep since.
 
   // The linearisation.
   std::array<FloatArray, 3> kt_, along_;

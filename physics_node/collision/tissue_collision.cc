@@ -34,10 +34,7 @@ constexpr int kMaxWalk = 8;
 TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
                                  const Kernels& kernels)
     : scene_(scene), model_(model), particles_(particles), kernels_(kernels) {
-  travel_.assign((particles->particle_count() + kBlock - 1) / kBlock, 0.0f);
-  for (Index col = 0; col < scene.membrane.cols; ++col) {
-    column_.push_back(particles->NodeRef(0, col));
-  }
+  travel_.assign(particles->block_count(), 0.0f);
   WatchOrgan();
   for (const StaticSurface& surface : scene.static_surfaces) {
     if (surface.collides) {
@@ -69,9 +66,9 @@ TissueCollision::Signed TissueCollision::SignedDistance(const Vec3f& p, const st
   return result;
 }
 
-void TissueCollision::Watches::MakeGroups() {
+void TissueCollision::Watches::MakeGroups(const ParticleStore& particles) {
   for (Index i = 0; i < all.size(); ++i) {
-    const Index block = all[i].particle / kBlock;
+    const Index block = particles.BlockOf(all[i].particle);
     if (groups.empty() || groups.back().block != block) {
       groups.push_back({block, i, i, {}});
     }
@@ -127,7 +124,7 @@ void TissueCollision::WatchOrgan() {
       }
     }
   }
-  organ_.MakeGroups();
+  organ_.MakeGroups(*particles_);
 }
 
 void TissueCollision::WatchFixed(const StaticSurface& surface) {
@@ -162,7 +159,7 @@ void TissueCollision::WatchFixed(const StaticSurface& surface) {
     watch.clearance = std::min(scene_.physics.collision_margin_m, 0.5f * height);
     fixed.watches.all.push_back(watch);
   }
-  fixed.watches.MakeGroups();
+  fixed.watches.MakeGroups(*particles_);
   fixed_.push_back(std::move(fixed));
 }
 
@@ -180,26 +177,6 @@ std::size_t TissueCollision::near_count() const {
     count += fixed.watches.near.size();
   }
   return count;
-}
-
-void TissueCollision::MeasureMoves(std::vector<float>* moved) const {
-  moved->assign(block_count(), 0.0f);
-  const auto measure = [&](Index p, ParticleRef at) {
-    float& largest = (*moved)[p / kBlock];
-    largest = std::max(largest, (particles_->At(at) - particles_->Previous(at)).squaredNorm());
-  };
-  for (Index p = 0; p < scene_.tube_vertex_count; ++p) {
-    measure(p, {4 * p, 1});
-  }
-  const GridLayout& layout = particles_->layout();
-  for (Index p = scene_.membrane.first, row = 0; row < layout.rows; ++row) {
-    for (Index col = 0; col < layout.cols; ++p, ++col) {
-      measure(p, {column_[col].base + row * layout.stride, column_[col].step});
-    }
-  }
-  for (float& m : *moved) {
-    m = std::sqrt(m);
-  }
 }
 
 void TissueCollision::Walk(Watch* watch, const Vec3f& p) const {
@@ -329,7 +306,7 @@ void TissueCollision::LookAtFixed(Fixed* fixed, std::span<const float> moved) {
 void TissueCollision::FindPairs(std::span<const float> moved, double time0_s, double time1_s) {
   looked_at_ = 0;
   ++step_;
-  const Index organ_blocks = (scene_.tube_vertex_count + kBlock - 1) / kBlock;
+  const Index organ_blocks = particles_->tube_blocks();
   float organ_moved = 0;
   for (Index b = 0; b < travel_.size(); ++b) {
     travel_[b] += moved[b];

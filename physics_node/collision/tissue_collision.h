@@ -21,8 +21,6 @@ namespace fulcrum::physics {
 
 class TissueCollision {
  public:
-  /// Particles of a block, in scene order.
-  static constexpr Index kBlock = 64;
   /// Set in ContactRow.source of our rows.
   static constexpr std::uint32_t kSource = 0x80000000u;
   static constexpr std::size_t kMaxRows = 4096;
@@ -30,14 +28,9 @@ class TissueCollision {
   TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
                   const Kernels& kernels = BestKernels());
 
-  [[nodiscard]] std::size_t block_count() const { return travel_.size(); }
-  /// Largest movement since ParticleStore::Previous in each block [m]: a `moved` for FindPairs where the solver has
-  /// none. [block_count()]
-  void MeasureMoves(std::vector<float>* moved) const;
-
-  /// Once a step, before it. `moved`: at least how far any particle of each block has moved since the last call [m],
-  /// [block_count()]; 0 for blocks at rest. Simulated time at the begin and the end of the step [s]: what
-  /// breathes moves from one to the other.
+  /// Once a step, before it. `moved`: at least how far any particle of each block of the ParticleStore has moved since
+  /// the last call [m], [block_count()]; 0 for blocks at rest. Simulated time at the begin and the end of the step [s]:
+  /// what breathes moves from one to the other.
   void FindPairs(std::span<const float> moved, double time0_s, double time1_s);
   /// Appends the contacts of the substep from part u0 to u1 of the step; at most kMaxRows.
   void Rows(float u0, float u1, std::vector<ContactRow>* rows) const;
@@ -97,7 +90,7 @@ class TissueCollision {
     std::vector<Times> times;  ///< Of each, apart from the rest: most steps read nothing else.
     std::vector<Group> groups;
     std::vector<Near> near;  ///< In this step.
-    void MakeGroups();
+    void MakeGroups(const ParticleStore& particles);
   };
 
   /// A fixed surface of the scene that collides. What lies behind it at rest, such as the organ under the peritoneum,
@@ -136,7 +129,6 @@ class TissueCollision {
   const Kernels& kernels_;
 
   std::vector<Index> ring_start_, ring_;  ///< Organ triangles that share a corner with each.
-  std::vector<ParticleRef> column_;       ///< Of the membrane's first row.
   Watches organ_;
   std::vector<Fixed> fixed_;
 

@@ -146,6 +146,26 @@ class ParticleStore {
   void RememberPlaces(std::size_t first, std::size_t count) {
     std::copy_n(now_.data() + first, count, previous_.data() + first);
   }
+
+  /// Blocks of particles whose movement is told together: 64 vertices of the tube; then of each row of the membrane
+  /// the columns in lanes 0..3, and those in lanes 4..7.
+  static constexpr Index kBlockVertices = 64;
+  static constexpr std::uint32_t kBlocksPerRow = 2;
+  [[nodiscard]] Index tube_blocks() const { return (tube_count_ + kBlockVertices - 1) / kBlockVertices; }
+  [[nodiscard]] Index block_count() const { return tube_blocks() + kBlocksPerRow * layout_.rows; }
+  [[nodiscard]] Index BlockOf(Index particle) const {
+    if (particle < tube_count_) {
+      return particle / kBlockVertices;
+    }
+    const Index node = particle - first_node_, lane = node % layout_.cols / layout_.slots;
+    return tube_blocks() + node / layout_.cols * kBlocksPerRow + lane * kBlocksPerRow / kLanes;
+  }
+  /// Raises moved[b], for each block of vertices [first, end) of the tube or of such rows of the membrane, to at least
+  /// how far any of its particles is from its previous place [m]. The first vertex begins a block.
+  void MeasureTube(Index first, Index end, float* moved) const;
+  void MeasureRows(std::uint32_t first, std::uint32_t end, float* moved) const;
+  /// Of all blocks, from 0.
+  void MeasureMoves(std::vector<float>* moved) const;
   /// Coordinates that are not finite or farther than `limit` from 0 come from the previous ones; returns how many.
   std::uint32_t RepairPlaces(float limit) {
     std::uint32_t repaired = 0;

@@ -120,7 +120,7 @@ bool TissueSimulation::BreathStirs() {
   if (!(scene_.breathing.amplitude_m > 0.0f) || scene_.physics.mode == PhysicsMode::kPaper) {
     return false;
   }
-  moved_.assign(tissue_collision_.block_count(), 0.0f);
+  moved_.assign(particles_.block_count(), 0.0f);
   FindTissueContacts();
   return tissue_collision_.breath_near();
 }
@@ -188,7 +188,7 @@ StepReport TissueSimulation::StepXpbd() {
   const auto substeps = static_cast<float>(scene_.physics.substeps);
   const float h = scene_.physics.dt_s / substeps;
   // Previous places are those a substep ago; movement is at most that of the fastest.
-  moved_.assign(tissue_collision_.block_count(), largest_speed_ * scene_.physics.dt_s);
+  moved_.assign(particles_.block_count(), largest_speed_ * scene_.physics.dt_s);
   FindAllContacts(h);
   float largest_sq = 0;
   for (std::uint32_t i = 0; i < scene_.physics.substeps; ++i) {
@@ -220,8 +220,9 @@ StepReport TissueSimulation::StepAccurate() {
   StepReport report;
   const auto substeps = static_cast<float>(effort_.substeps);
   const float h = scene_.physics.dt_s / substeps;
-  tissue_collision_.MeasureMoves(&moved_);
   report.resets = accurate_->BeginStep();
+  const std::span<const float> moved = accurate_->moved();
+  moved_.assign(moved.begin(), moved.end());
   FindAllContacts(h);
   for (int i = 0; i < effort_.substeps; ++i) {
     const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;

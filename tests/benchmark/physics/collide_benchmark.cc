@@ -80,7 +80,7 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
     collision.Settle();
     const double t3 = NowUs();
     particles.SetAll(xyz, previous);
-    tissue.MeasureMoves(&moved);
+    particles.MeasureMoves(&moved);
     rows.clear();
     const double t4 = NowUs();
     tissue.FindPairs(moved, 0, 0);

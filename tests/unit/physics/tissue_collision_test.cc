@@ -39,7 +39,7 @@ struct World {
         solver(scene.physics, &model, &particles),
         collision(scene, &model, &particles) {}
   void Step() {
-    collision.MeasureMoves(&moved);
+    particles.MeasureMoves(&moved);
     const double next = time + scene.physics.dt_s;
     collision.FindPairs(moved, time, next);
     time = next;
@@ -118,7 +118,7 @@ TEST(TissueCollision, SeenFromBehindAFixedSurfaceIsNoContact) {
 TEST(TissueCollision, FastTissueOutOfSightOfTheFloorIsNoContact) {
   const scene::SceneData data = SheetOverFloor(0.05f);
   World world(data.View());
-  const std::vector<float> fast(world.collision.block_count(), 0.02f);
+  const std::vector<float> fast(world.particles.block_count(), 0.02f);
   world.collision.FindPairs(fast, 0, 0.01);
   world.collision.Rows(0, 1, &world.rows);
   EXPECT_TRUE(world.rows.empty());
@@ -136,7 +136,7 @@ TEST(TissueCollision, WhatGoesRoundTheRimIsNotThrownUpFromBeneath) {
   const auto move_to = [&](const Vec3f& p) {
     world.particles.SetPrevious(at, world.particles.At(at));
     world.particles.Set(at, p);
-    world.collision.MeasureMoves(&world.moved);
+    world.particles.MeasureMoves(&world.moved);
     world.collision.FindPairs(world.moved, 0, 0);
     world.rows.clear();
     world.collision.Rows(0, 1, &world.rows);
@@ -166,7 +166,7 @@ TEST(TissueCollision, TheOrganUnderThePeritoneumIsFreeToRise) {
       world.particles.SetPrevious(at, world.particles.At(at));
       world.particles.Set(at, world.particles.At(at) + Vec3f(0, 0, 0.001f));
     }
-    world.collision.MeasureMoves(&world.moved);
+    world.particles.MeasureMoves(&world.moved);
     world.collision.FindPairs(world.moved, 0, 0);
     world.rows.clear();
     world.collision.Rows(0, 1, &world.rows);
@@ -179,7 +179,7 @@ TEST(TissueCollision, TheOrganUnderThePeritoneumIsFreeToRise) {
 TEST(TissueCollision, RestCostsNothing) {
   const scene::SceneData data = scene::BuildProcedural(scene::Small());
   World world(data.View());
-  const std::vector<float> still(world.collision.block_count(), 0.0f);
+  const std::vector<float> still(world.particles.block_count(), 0.0f);
   world.collision.FindPairs(still, 0, 0.01);
   EXPECT_GT(world.collision.looked_at(), 1000u);  // The first time, everything.
   world.collision.FindPairs(still, 0.01, 0.02);
@@ -188,13 +188,13 @@ TEST(TissueCollision, RestCostsNothing) {
   std::vector<float> moved = still;
   moved.back() = 0.0001f;
   world.collision.FindPairs(moved, 0.02, 0.03);
-  EXPECT_LE(world.collision.looked_at(), world.collision.near_count() + TissueCollision::kBlock + 20u);
+  EXPECT_LE(world.collision.looked_at(), world.collision.near_count() + ParticleStore::kBlockVertices + 20u);
 }
 
 TEST(TissueCollision, TheRestShapeHasNoForce) {
   const scene::SceneData data = scene::BuildProcedural(scene::Small());
   World world(data.View());
-  world.collision.MeasureMoves(&world.moved);
+  world.particles.MeasureMoves(&world.moved);
   world.collision.FindPairs(world.moved, 0, 0.01);
   world.collision.Rows(0, 1, &world.rows);
   for (const ContactRow& row : world.rows) {
