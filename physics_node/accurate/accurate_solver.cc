@@ -13,14 +13,14 @@ constexpr float kDoubtfulGuess = 0.0005f;
 constexpr float kDoubtfulCorrection = 0.0002f;
 /// Contacts stiffer than this the middle level must know; softer ones are as the fat around [N/m].
 constexpr float kStiffContact = 500.0f;
-/// Iterations more while a tool touches: with two a pressed patch chatters, with three it rests.
-constexpr int kContactIterations = 1;
 /// Nothing moves faster: ten times a quick hand [m/s].
 constexpr float kLargestSpeed = 5.0f;
 /// No place is so far from the origin [m].
 constexpr float kFarthest = 10.0f;
 /// Rows of the membrane that the coarse matrix takes over per step: complete about once in 60 steps.
 constexpr int kRefreshRows = 5;
+
+bool IsStiff(const Element& contact) { return contact.m.squaredNorm() > kStiffContact; }
 
 }  // namespace
 
@@ -75,7 +75,8 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   }
   organ_stress_ = FloatArray(16 * (tube_count_ + std::size_t{1}));
   const std::size_t pool = particles->raw().size();
-  for (FloatArray* a : {&velocity_, &place_, &residual_, &z_, &p_, &q_, &d_, &load_}) {
+  pressed_ = around_ = regions_.MakePart();
+  for (FloatArray* a : {&velocity_, &place_, &residual_, &z_, &p_, &q_, &d_, &load_, &local_}) {
     *a = FloatArray(pool);
   }
   aside_ = FloatArray(pool);
@@ -90,7 +91,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   }
   row_sums_ = FloatArray(static_cast<std::size_t>(rows_) * coarse_.row_width());
   const auto regions = static_cast<std::size_t>(regions_.count());
-  for (auto* flags : {&held_before_, &touched_before_, &held_now_, &touched_now_}) {
+  for (auto* flags : {&held_before_, &touched_before_, &held_now_, &touched_now_, &pressed_now_}) {
     flags->assign(regions, 0);
   }
   stiffened_.assign(regions, 0);
@@ -234,10 +235,37 @@ void AccurateSolver::WakeTouched(std::span<const HeldPlace> held, std::span<cons
   touched_before_.swap(touched_now_);
 }
 
+/// Notes which regions stiff contacts press.
+void AccurateSolver::FollowContacts() {
+  stiff_contacts_ = false;
+  std::fill(pressed_now_.begin(), pressed_now_.end(), std::uint8_t{0});
+  for (const Element& contact : elements_.touching()) {
+    for (std::size_t k = 0; IsStiff(contact) && k < static_cast<std::size_t>(contact.count); ++k) {
+      const int region = regions_.Of(contact.at[k]);
+      pressed_now_[static_cast<std::size_t>(region)] = regions_.computed(region) ? 1 : 0;
+      stiff_contacts_ = true;
+    }
+  }
+  if (!stiff_contacts_ || (!around_due_ && pressed_now_ == pressed_.marked)) {
+    return;
+  }
+  around_due_ = false;
+  for (const Task& task : pressed_.tasks) {
+    ForParts(task, [&](std::size_t first, std::size_t count) { std::fill_n(local_.data() + first, count, 0.0f); });
+  }
+  pressed_.marked = pressed_now_;
+  regions_.FindTasks(&pressed_);
+  around_.marked = pressed_now_;
+  regions_.Widen(&around_);
+  regions_.FindTasks(&around_);
+  elements_.Select(regions_, pressed_.marked, around_.marked, &around_elements_);
+}
+
 /// What is no longer computed does not move, and is no direction of the solve.
 void AccurateSolver::FollowRegions() {
   elements_.FollowRegions(regions_);
   coarse_.FollowRegions(regions_);
+  around_due_ = true;
   for (const int region : regions_.taken_out()) {
     Measure(regions_.Extent(region), &moved_asleep_);
     ForParts(regions_.Extent(region), [&](std::size_t first, std::size_t count) {
@@ -270,7 +298,7 @@ GuessCount AccurateSolver::Guess(float h) {
                                           Vertex(task.end));
   });
   GuessCount count{};
-  for (std::size_t i = 0; i < regions_.tasks().size(); ++i) {
+  for (std::size_t i = 0; i < regions_.part().tasks.size(); ++i) {
     count.largest_sq = std::max(count.largest_sq, guess_[i].largest_sq);
     count.resets += guess_[i].resets;
   }
@@ -315,7 +343,7 @@ double AccurateSolver::EnergyAt(const FloatArray& place, const Inertia& inertia,
         task.sheet ? kernels_.sheet_energy(sheet, inertia, at, task.first, task.end)
                    : kernels_.organ_energy(organ, inertia, organ_at, Vertex(task.first), Vertex(task.end));
   });
-  return SumOfPartials() + elements_.Energy(place.data(), contacts);
+  return SumOfPartials(regions_.part().tasks.size()) + elements_.Energy(place.data(), contacts);
 }
 
 /// Contacts stiffen the diagonal of what they touch.
@@ -349,7 +377,7 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   const OrganMatrix organ_matrix = MakeOrganMatrix();
   const Middle middle = coarse_.middle();
   // Stresses reach the vertices around, edges the row below: two phases.
-  const std::span<const Task> tasks = regions_.tasks(), patches = regions_.patches();
+  const std::span<const Task> tasks = regions_.part().tasks, patches = regions_.part().patches;
   const auto sheet_tasks =
       static_cast<std::size_t>(std::count_if(tasks.begin(), tasks.end(), [](const Task& task) { return task.sheet; }));
   workers_.Run(static_cast<int>(sheet_tasks + patches.size()), [&](int index, int worker) {
@@ -382,14 +410,13 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
     }
   });
   coarse_.ForgetContacts();
-  stiff_contacts_ = false;
   for (const Element& contact : elements_.touching()) {
-    if (contact.m.squaredNorm() > kStiffContact) {
-      stiff_contacts_ = true;
+    if (IsStiff(contact)) {
       coarse_.Stiffen(contact);
     }
   }
   coarse_.FadeAtContacts();
+  FollowContacts();
   elements_.Linearise(place_.data(), residual_.data());
 }
 
@@ -420,7 +447,7 @@ SubstepReport AccurateSolver::Finish(float h) {
   });
   SubstepReport report;
   float largest = 0;
-  for (std::size_t i = 0; i < regions_.tasks().size(); ++i) {
+  for (std::size_t i = 0; i < regions_.part().tasks.size(); ++i) {
     largest = std::max(largest, finish_[i].largest_speed_sq);
     report.resets += finish_[i].resets;
   }
@@ -456,7 +483,10 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
     coarse_.Refresh(MakeSheet(), MakeMatrix(), inertia.inertia, kRefreshRows);
     refresh_due_ = false;
   }
-  Solve(inertia.inertia, iterations + (stiff_contacts_ ? kContactIterations : 0));
+  Solve(inertia.inertia, iterations);
+  if (stiff_contacts_) {
+    SolveAtContacts(inertia.inertia);
+  }
   const float largest = LargestCorrection();
   LimitCorrection(largest);
   if (largest > kDoubtfulCorrection) {

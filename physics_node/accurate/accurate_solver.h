@@ -108,8 +108,11 @@ class AccurateSolver {
   void Linearise(const Inertia& inertia, std::span<const ContactRow> contacts);
   void RefreshContactStiffness();
   double Precondition();
-  double Apply(const FloatArray& p, float inertia);
+  double Apply(const FloatArray& p, float inertia) { return Apply(p, inertia, regions_.part(), elements_.computed()); }
+  double Apply(const FloatArray& p, float inertia, const Part& part, const Selection& elements);
   void Solve(float inertia, int iterations);
+  void FollowContacts();
+  void SolveAtContacts(float inertia);
   [[nodiscard]] float LargestCorrection();
   void LimitCorrection(float largest);
   void SearchAlongCorrection(const Inertia& inertia, std::span<const ContactRow> contacts);
@@ -117,11 +120,15 @@ class AccurateSolver {
 
   /// body(task, index, worker) for all that is computed, shared by the threads.
   template <class Body>
-  void ForTasks(const Body& body);
+  void ForTasks(const Body& body) {
+    ForTasks(regions_.part().tasks, body);
+  }
+  template <class Body>
+  void ForTasks(std::span<const Task> tasks, const Body& body);
   /// body(first float, count) for the parts of a field that belong to a task.
   template <class Body>
   void ForParts(const Task& task, const Body& body) const;
-  [[nodiscard]] double SumOfPartials() const;
+  [[nodiscard]] double SumOfPartials(std::size_t tasks) const;
 
   const Kernels& kernels_;
   ParticleStore* particles_;
@@ -146,8 +153,9 @@ class AccurateSolver {
   // Who works on what.
   Workers workers_;
   Regions regions_;
-  std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_, stiffened_;  ///< By region.
-  std::vector<float> speed_;                                                                     ///< By region [m/s].
+  std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_, pressed_now_,
+      stiffened_;             ///< By region.
+  std::vector<float> speed_;  ///< By region [m/s].
 
   std::vector<float> moved_, moved_asleep_;  ///< By block [m]; since BeginStep of what has fallen asleep since.
 
@@ -167,6 +175,12 @@ class AccurateSolver {
   std::vector<GuessCount> guess_;    ///< By task.
   std::vector<FinishCount> finish_;  ///< By task.
   bool organ_blocks_due_ = true, refresh_due_ = false, stiff_contacts_ = false;
+
+  // Around the stiff contacts.
+  Part pressed_, around_;
+  Selection around_elements_;
+  bool around_due_ = true;  ///< What is computed, or what elements there are, has changed.
+  FloatArray local_;        ///< A direction of the solve, 0 where not pressed.
 };
 
 }  // namespace fulcrum::physics::accurate

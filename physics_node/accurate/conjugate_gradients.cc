@@ -24,21 +24,21 @@ double AccurateSolver::Precondition() {
                              residual_.data() + tube_floats_ + 2 * plane_};
   float* const z[3] = {z_.data() + tube_floats_, z_.data() + tube_floats_ + plane_,
                        z_.data() + tube_floats_ + 2 * plane_};
-  coarse_.Solve(regions_.tasks(), row_sums_.data(), residual_.data(), particles_->tube());
+  coarse_.Solve(regions_.part().tasks, row_sums_.data(), residual_.data(), particles_->tube());
   ForTasks([&](const Task& task, int index, int) {
     double& partial = partial_[static_cast<std::size_t>(index)];
     if (task.sheet) {
       partial = kernels_.sheet_precondition(sheet, middle, matrix, r, z, task.first, task.end);
     } else {
-      kernels_.organ_precondition(organ_matrix, residual_.data(), z_.data(), Vertex(task.first), Vertex(task.end));
+      (void)kernels_.organ_block_solve(organ_matrix, residual_.data(), z_.data(), Vertex(task.first), Vertex(task.end));
       partial = coarse_.Prolong(particles_->tube(), residual_.data(), z_.data(), task.first, task.end);
     }
   });
-  return SumOfPartials();
+  return SumOfPartials(regions_.part().tasks.size());
 }
 
-/// q <- A p; returns p . q.
-double AccurateSolver::Apply(const FloatArray& direction, float inertia) {
+/// q <- A p in `part`; returns p . q.
+double AccurateSolver::Apply(const FloatArray& direction, float inertia, const Part& part, const Selection& elements) {
   const Sheet sheet = MakeSheet();
   const SheetMatrix matrix = MakeMatrix();
   const Organ organ = MakeOrgan();
@@ -47,19 +47,17 @@ double AccurateSolver::Apply(const FloatArray& direction, float inertia) {
                              direction.data() + tube_floats_ + 2 * plane_};
   float* const q[3] = {q_.data() + tube_floats_, q_.data() + tube_floats_ + plane_,
                        q_.data() + tube_floats_ + 2 * plane_};
-  const std::span<const Task> patches = regions_.patches();
-  workers_.Run(static_cast<int>(patches.size()), [&](int index, int) {
-    const Task& task = patches[static_cast<std::size_t>(index)];
+  ForTasks(part.patches, [&](const Task& task, int, int) {
     kernels_.organ_stress(organ, organ_matrix, direction.data(), Vertex(task.first), Vertex(task.end));
   });
-  ForTasks([&](const Task& task, int index, int worker) {
+  ForTasks(part.tasks, [&](const Task& task, int index, int worker) {
     partial_[static_cast<std::size_t>(index)] =
         task.sheet ? kernels_.sheet_apply(sheet, inertia, matrix, p, q, carry_[static_cast<std::size_t>(worker)].data(),
                                           task.first, task.end)
                    : kernels_.organ_apply(organ, organ_matrix, inertia, direction.data(), q_.data(), Vertex(task.first),
                                           Vertex(task.end));
   });
-  return SumOfPartials() + elements_.Apply(direction.data(), q_.data());
+  return SumOfPartials(part.tasks.size()) + elements_.Apply(direction.data(), q_.data(), elements);
 }
 
 /// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d.
@@ -108,6 +106,36 @@ void AccurateSolver::Solve(float inertia, int iterations) {
   }
 }
 
+/// One step of steepest descent with the blocks of the diagonal, where stiff contacts press: with two iterations alone
+/// a pressed patch chatters. A third everywhere would do as well, at ten times the cost.
+void AccurateSolver::SolveAtContacts(float inertia) {
+  const Sheet sheet = MakeSheet();
+  const SheetMatrix matrix = MakeMatrix();
+  const OrganMatrix organ_matrix = MakeOrganMatrix();
+  const float* const r[3] = {residual_.data() + tube_floats_, residual_.data() + tube_floats_ + plane_,
+                             residual_.data() + tube_floats_ + 2 * plane_};
+  float* const z[3] = {local_.data() + tube_floats_, local_.data() + tube_floats_ + plane_,
+                       local_.data() + tube_floats_ + 2 * plane_};
+  ForTasks(pressed_.tasks, [&](const Task& task, int index, int) {
+    partial_[static_cast<std::size_t>(index)] =
+        task.sheet ? kernels_.sheet_block_solve(sheet, matrix, r, z, task.first, task.end)
+                   : kernels_.organ_block_solve(organ_matrix, residual_.data(), local_.data(), Vertex(task.first),
+                                                Vertex(task.end));
+  });
+  const double rz = SumOfPartials(pressed_.tasks.size());
+  const double curvature = Apply(local_, inertia, around_, around_elements_);
+  if (!(rz > 0.0) || !(curvature > 0.0)) {
+    return;
+  }
+  const auto alpha = static_cast<float>(rz / curvature);
+  ForTasks(around_.tasks, [&](const Task& task, int, int) {
+    ForParts(task, [&](std::size_t first, std::size_t count) {
+      kernels_.advance(alpha, local_.data() + first, q_.data() + first, d_.data() + first, residual_.data() + first,
+                       count);
+    });
+  });
+}
+
 float AccurateSolver::LargestCorrection() {
   const Sheet sheet = MakeSheet();
   const float* const d[3] = {d_.data() + tube_floats_, d_.data() + tube_floats_ + plane_,
@@ -118,7 +146,7 @@ float AccurateSolver::LargestCorrection() {
                    : static_cast<double>(kernels_.organ_largest(d_.data(), Vertex(task.first), Vertex(task.end)));
   });
   double largest = 0;
-  for (std::size_t i = 0; i < regions_.tasks().size(); ++i) {
+  for (std::size_t i = 0; i < regions_.part().tasks.size(); ++i) {
     largest = std::max(largest, partial_[i]);
   }
   return std::sqrt(static_cast<float>(largest));

@@ -47,9 +47,9 @@ void Spread4(const Element& e, const Vec3f& v, float* field) {
   AddField(field, e.at[3], e.weight[3] * v);
 }
 template <class Sum>
-bool AnyComputed(const Sum& e, const Regions& regions) {
+bool AnyMarked(const Sum& e, const Regions& regions, std::span<const std::uint8_t> marked) {
   for (int k = 0; k < e.count; ++k) {
-    if (regions.computed(regions.Of(e.at[static_cast<std::size_t>(k)]))) {
+    if (marked[static_cast<std::size_t>(regions.Of(e.at[static_cast<std::size_t>(k)]))] != 0) {
       return true;
     }
   }
@@ -104,6 +104,7 @@ Elements::Elements(const SceneView& scene, const ElasticModel& model, const Part
     binding_rest_.push_back({static_cast<float>(binding.rest_length), static_cast<float>(binding.stiffness),
                              binding.membrane - scene.membrane.first});
   }
+  computed_.bindings.reserve(bindings_.size());
   contacts_.reserve(kMostContacts);
   contact_force_.reserve(kMostContacts);
 }
@@ -127,13 +128,18 @@ std::vector<std::pair<std::uint32_t, float>> Elements::Diagonal() const {
 }
 
 void Elements::FollowRegions(const Regions& regions) {
-  active_.clear();
+  Select(regions, regions.part().marked, regions.part().marked, &computed_);
+}
+
+void Elements::Select(const Regions& regions, std::span<const std::uint8_t> moved, std::span<const std::uint8_t> felt,
+                      Selection* selection) const {
+  selection->bindings.clear();
   for (std::uint32_t i = 0; i < bindings_.size(); ++i) {
-    if (bindings_[i].active && AnyComputed(bindings_[i], regions)) {
-      active_.push_back(i);
+    if (bindings_[i].active && AnyMarked(bindings_[i], regions, moved)) {
+      selection->bindings.push_back(i);
     }
   }
-  hinges_.FollowRegions(regions);
+  hinges_.Select(regions, felt, &selection->hinge_rows);
 }
 
 void Elements::Touch(const float* place, const float* start, const Regions& regions,
@@ -141,7 +147,7 @@ void Elements::Touch(const float* place, const float* start, const Regions& regi
   contacts_.clear();
   contact_force_.clear();
   for (const ContactRow& row : contacts) {
-    if (!AnyComputed(row, regions)) {
+    if (!AnyMarked(row, regions, regions.part().marked)) {
       continue;
     }
     const ContactState state = StateOf(row, Combine(row, place), start);
@@ -159,7 +165,7 @@ void Elements::Touch(const float* place, const float* start, const Regions& regi
 }
 
 void Elements::Linearise(const float* place, float* residual) {
-  for (const std::uint32_t i : active_) {
+  for (const std::uint32_t i : computed_.bindings) {
     Element& e = bindings_[i];
     const Vec3f d = Combine4(e, place);
     const float length = std::max(d.norm(), 1e-9f), k = binding_rest_[i].stiffness;
@@ -168,16 +174,16 @@ void Elements::Linearise(const float* place, float* residual) {
     e.m = d * (std::sqrt(std::max(k - e.kt, 0.0f)) / length);
     Spread4(e, d * (-tension / length), residual);
   }
-  hinges_.AddForce(place, residual);
+  hinges_.AddForce(place, residual, computed_.hinge_rows);
   guard_.Linearise(place, residual);
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     Spread(contacts_[i], contact_force_[i], residual);
   }
 }
 
-double Elements::Apply(const float* p, float* out) {
-  double sum = hinges_.Apply(p, out) + guard_.Apply(p, out);
-  for (const std::uint32_t i : active_) {
+double Elements::Apply(const float* p, float* out, const Selection& selection) {
+  double sum = hinges_.Apply(p, out, selection.hinge_rows) + guard_.Apply(p, out);
+  for (const std::uint32_t i : selection.bindings) {
     const Element& e = bindings_[i];
     const Vec3f d = Combine4(e, p), force = e.kt * d + e.m * e.m.dot(d);
     sum += static_cast<double>(d.dot(force));
@@ -192,8 +198,8 @@ double Elements::Apply(const float* p, float* out) {
 }
 
 double Elements::Energy(const float* place, std::span<const ContactRow> contacts) {
-  double sum = hinges_.Energy(place) + guard_.Energy(place);
-  for (const std::uint32_t i : active_) {
+  double sum = hinges_.Energy(place, computed_.hinge_rows) + guard_.Energy(place);
+  for (const std::uint32_t i : computed_.bindings) {
     const float stretch = Combine4(bindings_[i], place).norm() - binding_rest_[i].length;
     sum += 0.5 * static_cast<double>(binding_rest_[i].stiffness * stretch * stretch);
   }

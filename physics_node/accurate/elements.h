@@ -24,6 +24,11 @@ struct Element {
   bool active = true;
 };
 
+/// Elements with a say in a part of the tissue.
+struct Selection {
+  std::vector<std::uint32_t> bindings, hinge_rows;
+};
+
 class Elements {
  public:
   Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles);
@@ -32,6 +37,10 @@ class Elements {
   void Follow(const TissueModel& tissue);
   /// From now on only elements with a particle in a region that is computed.
   void FollowRegions(const Regions& regions);
+  [[nodiscard]] const Selection& computed() const { return computed_; }
+  /// Those that resist when particles in regions `moved` move, which is felt in regions `felt`.
+  void Select(const Regions& regions, std::span<const std::uint8_t> moved, std::span<const std::uint8_t> felt,
+              Selection* selection) const;
 
   /// Stiffness that bindings and hinges add to the diagonal, by pool offset of x.
   [[nodiscard]] std::vector<std::pair<std::uint32_t, float>> Diagonal() const;
@@ -43,7 +52,8 @@ class Elements {
   /// While set, contacts take no part in Apply.
   void LeaveContactsOut(bool out) { contacts_out_ = out; }
   /// out += K p; returns p . K p.
-  double Apply(const float* p, float* out);
+  /// p is 0 wherever elements act that are not selected. All contacts are.
+  double Apply(const float* p, float* out, const Selection& selection);
   [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts);
   /// Normal and friction forces of contacts at `place` + `d`, sliding measured from `start`.
   static void WriteForces(const float* place, const float* d, const float* start, std::span<ContactRow> contacts);
@@ -59,7 +69,7 @@ class Elements {
   };
   std::vector<Element> bindings_, contacts_;
   std::vector<BindingRest> binding_rest_;
-  std::vector<std::uint32_t> active_;  ///< Bindings in force and computed.
+  Selection computed_;
   std::vector<Vec3f> contact_force_;
   bool contacts_out_ = false;
   HingeMatrix hinges_;

@@ -8,8 +8,7 @@ namespace fulcrum::physics::accurate {
 inline std::uint32_t Vertex(int v) { return static_cast<std::uint32_t>(v); }
 
 template <class Body>
-void AccurateSolver::ForTasks(const Body& body) {
-  const std::span<const Task> tasks = regions_.tasks();
+void AccurateSolver::ForTasks(std::span<const Task> tasks, const Body& body) {
   workers_.Run(static_cast<int>(tasks.size()),
                [&](int index, int worker) { body(tasks[static_cast<std::size_t>(index)], index, worker); });
 }
@@ -29,9 +28,9 @@ void AccurateSolver::ForParts(const Task& task, const Body& body) const {
 }
 
 /// In the order of the tasks, whoever did them.
-inline double AccurateSolver::SumOfPartials() const {
+inline double AccurateSolver::SumOfPartials(std::size_t tasks) const {
   double sum = 0;
-  for (std::size_t i = 0; i < regions_.tasks().size(); ++i) {
+  for (std::size_t i = 0; i < tasks; ++i) {
     sum += partial_[i];
   }
   return sum;

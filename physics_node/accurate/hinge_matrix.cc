@@ -44,7 +44,6 @@ HingeMatrix::HingeMatrix(const ElasticModel& model, const ParticleStore& particl
     start_.push_back(static_cast<std::uint32_t>(column_.size()));
   }
   value_.resize(column_.size());
-  active_.reserve(particles_.size());
   Assemble();
 }
 
@@ -76,11 +75,12 @@ void HingeMatrix::Follow(const TissueModel& tissue) {
   }
 }
 
-void HingeMatrix::FollowRegions(const Regions& regions) {
-  active_.clear();
+void HingeMatrix::Select(const Regions& regions, std::span<const std::uint8_t> marked,
+                         std::vector<std::uint32_t>* rows) const {
+  rows->clear();
   for (std::uint32_t i = 0; i < particles_.size(); ++i) {
-    if (regions.computed(regions.Of(particles_[i]))) {
-      active_.push_back(i);
+    if (marked[static_cast<std::size_t>(regions.Of(particles_[i]))] != 0) {
+      rows->push_back(i);
     }
   }
 }
@@ -107,27 +107,27 @@ void HingeMatrix::Take(const float* field, const float* minus) {
   }
 }
 
-template <class Use>
-double HingeMatrix::Multiply(const Use& use) const {
+template <class Load, class Use>
+double HingeMatrix::Multiply(std::span<const std::uint32_t> rows, const Load& load, const Use& use) const {
   double dot = 0;
-  alignas(16) float row[4];
-  for (const std::uint32_t i : active_) {
+  alignas(16) float row[4], here[4];
+  for (const std::uint32_t i : rows) {
     __m128 sum = _mm_setzero_ps();
     for (std::uint32_t k = start_[i]; k < start_[i + 1]; ++k) {
-      sum = _mm_add_ps(sum,
-                       _mm_mul_ps(_mm_set1_ps(value_[k]), _mm_load_ps(vector_.data() + 4 * std::size_t{column_[k]})));
+      sum = _mm_add_ps(sum, _mm_mul_ps(_mm_set1_ps(value_[k]), load(column_[k])));
     }
     _mm_store_ps(row, sum);
     use(i, row);
-    const float* here = vector_.data() + 4 * std::size_t{i};
+    _mm_store_ps(here, load(i));
     dot += static_cast<double>(here[0] * row[0] + here[1] * row[1] + here[2] * row[2]);
   }
   return dot;
 }
 
-void HingeMatrix::AddForce(const float* place, float* force) {
+void HingeMatrix::AddForce(const float* place, float* force, std::span<const std::uint32_t> rows) {
   Take(place, rest_.data());
-  (void)Multiply([&](std::uint32_t i, const float* row) {
+  const auto load = [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + 4 * std::size_t{k}); };
+  (void)Multiply(rows, load, [&](std::uint32_t i, const float* row) {
     const std::size_t step = particles_[i].step;
     float* at = force + particles_[i].base;
     at[0] -= row[0];
@@ -136,20 +136,32 @@ void HingeMatrix::AddForce(const float* place, float* force) {
   });
 }
 
-double HingeMatrix::Apply(const float* p, float* out) {
-  Take(p, nullptr);
-  return Multiply([&](std::uint32_t i, const float* row) {
+double HingeMatrix::Apply(const float* p, float* out, std::span<const std::uint32_t> rows) {
+  const auto add = [&](std::uint32_t i, const float* row) {
     const std::size_t step = particles_[i].step;
     float* at = out + particles_[i].base;
     at[0] += row[0];
     at[step] += row[1];
     at[2 * step] += row[2];
-  });
+  };
+  // A few rows are quicker without a copy of all particles.
+  if (4 * rows.size() < particles_.size()) {
+    const auto load = [&](std::uint32_t k) {
+      const float* from = p + particles_[k].base;
+      const std::size_t step = particles_[k].step;
+      return _mm_set_ps(0, from[2 * step], from[step], from[0]);
+    };
+    return Multiply(rows, load, add);
+  }
+  Take(p, nullptr);
+  return Multiply(
+      rows, [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + 4 * std::size_t{k}); }, add);
 }
 
-double HingeMatrix::Energy(const float* place) {
+double HingeMatrix::Energy(const float* place, std::span<const std::uint32_t> rows) {
   Take(place, rest_.data());
-  return 0.5 * Multiply([](std::uint32_t, const float*) {});
+  const auto load = [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + 4 * std::size_t{k}); };
+  return 0.5 * Multiply(rows, load, [](std::uint32_t, const float*) {});
 }
 
 }  // namespace fulcrum::physics::accurate

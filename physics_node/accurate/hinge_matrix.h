@@ -17,17 +17,17 @@ class HingeMatrix {
 
   /// Takes out hinges that a cut has severed, and puts back those that are whole again.
   void Follow(const TissueModel& tissue);
-  /// From now on only rows of particles in regions that are computed.
-  void FollowRegions(const Regions& regions);
+  /// Rows of particles in marked regions.
+  void Select(const Regions& regions, std::span<const std::uint8_t> marked, std::vector<std::uint32_t>* rows) const;
 
   /// Of each particle's diagonal: pool offset of x and what all hinges, severed or not, add to it [N/m].
   [[nodiscard]] std::vector<std::pair<std::uint32_t, float>> Diagonal() const;
-  /// force -= K (place - rest).
-  void AddForce(const float* place, float* force);
-  /// out += K p; returns p . K p.
-  double Apply(const float* p, float* out);
-  /// At `place` [J].
-  [[nodiscard]] double Energy(const float* place);
+  /// force -= K (place - rest), in these rows.
+  void AddForce(const float* place, float* force, std::span<const std::uint32_t> rows);
+  /// out += K p, in these rows; returns their share of p . K p.
+  double Apply(const float* p, float* out, std::span<const std::uint32_t> rows);
+  /// Of these rows at `place` [J].
+  [[nodiscard]] double Energy(const float* place, std::span<const std::uint32_t> rows);
 
  private:
   struct Hinge {
@@ -39,16 +39,15 @@ class HingeMatrix {
   void Assemble();
   /// vector_ <- the particles' xyz_ of a field, `minus` taken off.
   void Take(const float* field, const float* minus);
-  /// use(i, xyz_ of row i of K vector_) for rows that are computed; returns vector_ . K vector_ over them.
-  template <class Use>
-  double Multiply(const Use& use) const;
+  /// use(i, xyz_ of row i of K x) for these rows; returns their share of x . K x. load(k): xyz_ of particle k in x.
+  template <class Load, class Use>
+  double Multiply(std::span<const std::uint32_t> rows, const Load& load, const Use& use) const;
 
   std::vector<Hinge> hinges_;
   std::vector<ParticleRef> particles_;
   std::vector<std::uint32_t> start_, column_;
   std::vector<float> value_;
-  std::vector<std::uint32_t> active_;  ///< Rows that are computed.
-  FloatArray rest_, vector_;           ///< xyz_ per particle.
+  FloatArray rest_, vector_;  ///< xyz_ per particle.
 };
 
 }  // namespace fulcrum::physics::accurate

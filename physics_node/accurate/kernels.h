@@ -132,6 +132,9 @@ struct Kernels {
   /// z <- D^-1 r + the middle level's value where a node moves. Returns r . z.
   double (*sheet_precondition)(const Sheet& sheet, const Middle& middle, const SheetMatrix& matrix,
                                const float* const r[3], float* const z[3], int row0, int row1);
+  /// z <- D^-1 r. Returns r . z.
+  double (*sheet_block_solve)(const Sheet& sheet, const SheetMatrix& matrix, const float* const r[3], float* const z[3],
+                              int row0, int row1);
   /// Positions and velocities of nodes: place + d, at most `speed` fast; what is not finite stays, at rest.
   FinishCount (*sheet_finish)(const Sheet& sheet, const float* const place[3], const float* const d[3], float h,
                               float speed, float* const x[3], float* const velocity[3], int row0, int row1);
@@ -164,9 +167,9 @@ struct Kernels {
   /// out <- K p + mass * inertia * p on vertices, after organ_stress of their patches. Returns p . out.
   double (*organ_apply)(const Organ& organ, const OrganMatrix& matrix, float inertia, const float* p, float* out,
                         std::uint32_t first, std::uint32_t last);
-  /// z <- D^-1 r.
-  void (*organ_precondition)(const OrganMatrix& matrix, const float* r, float* z, std::uint32_t first,
-                             std::uint32_t last);
+  /// z <- D^-1 r. Returns r . z.
+  double (*organ_block_solve)(const OrganMatrix& matrix, const float* r, float* z, std::uint32_t first,
+                              std::uint32_t last);
   double (*organ_energy)(const Organ& organ, const Inertia& inertia, const OrganLinearisation& at, std::uint32_t first,
                          std::uint32_t last);
   /// As sheet_finish; `pool` xyzw.

@@ -17,6 +17,7 @@ constexpr accurate::Kernels MakeKernels(const char* name) {
   k.middle_blocks = MiddleBlocks;
   k.sheet_restrict = SheetRestrict;
   k.sheet_precondition = SheetPrecondition;
+  k.sheet_block_solve = SheetBlockSolve;
   k.sheet_finish = SheetFinish;
   k.sheet_largest = SheetLargest;
   k.combine = Combine;
@@ -29,7 +30,7 @@ constexpr accurate::Kernels MakeKernels(const char* name) {
   k.organ_blocks = OrganBlocks;
   k.organ_stress = OrganStress;
   k.organ_apply = OrganApply;
-  k.organ_precondition = OrganPrecondition;
+  k.organ_block_solve = OrganBlockSolve;
   k.organ_energy = OrganEnergy;
   k.organ_finish = OrganFinish;
   k.organ_largest = OrganLargest;

@@ -81,6 +81,28 @@ inline void SheetRestrict(const Sheet& sheet, const Middle& middle, const float*
   }
 }
 
+FULCRUM_INLINE V8 BlockProduct(const SheetMatrix& matrix, std::size_t node, V8 b) {
+  const F8 xx = F8::Load(matrix.block[0] + node), yy = F8::Load(matrix.block[1] + node),
+           zz = F8::Load(matrix.block[2] + node), xy = F8::Load(matrix.block[3] + node),
+           xz = F8::Load(matrix.block[4] + node), yz = F8::Load(matrix.block[5] + node);
+  return {xx * b.x + xy * b.y + xz * b.z, xy * b.x + yy * b.y + yz * b.z, xz * b.x + yz * b.y + zz * b.z};
+}
+
+inline double SheetBlockSolve(const Sheet& sheet, const SheetMatrix& matrix, const float* const r[3], float* const z[3],
+                              int row0, int row1) {
+  double sum = 0;
+  for (int row = row0; row < row1; ++row) {
+    F8 dot = F8::All(0);
+    for (std::size_t node = RowStart(sheet, row), end = RowStart(sheet, row + 1); node < end; node += 8) {
+      const V8 b = LoadV(r, node), result = BlockProduct(matrix, node, b);
+      StoreV(result, z, node);
+      dot = dot + Dot(b, result);
+    }
+    sum += SumOf(dot);
+  }
+  return sum;
+}
+
 inline double SheetPrecondition(const Sheet& sheet, const Middle& middle, const SheetMatrix& matrix,
                                 const float* const r[3], float* const z[3], int row0, int row1) {
   const std::size_t width = 8 * static_cast<std::size_t>(middle.slots);
@@ -104,12 +126,7 @@ inline double SheetPrecondition(const Sheet& sheet, const Middle& middle, const 
         const std::size_t node = RowStart(sheet, row) + 8 * static_cast<std::size_t>(s);
         const V8 far = here * F8::Load(middle.own + 8 * s) + following * F8::Load(middle.next + 8 * s);
         const F8 moves = F8::Load(sheet.w + node) > zero;
-        const V8 b = LoadV(r, node);
-        const F8 xx = F8::Load(matrix.block[0] + node), yy = F8::Load(matrix.block[1] + node),
-                 zz = F8::Load(matrix.block[2] + node), xy = F8::Load(matrix.block[3] + node),
-                 xz = F8::Load(matrix.block[4] + node), yz = F8::Load(matrix.block[5] + node);
-        const V8 near = {xx * b.x + xy * b.y + xz * b.z, xy * b.x + yy * b.y + yz * b.z,
-                         xz * b.x + yz * b.y + zz * b.z};
+        const V8 b = LoadV(r, node), near = BlockProduct(matrix, node, b);
         const V8 result = {near.x + (far.x & moves), near.y + (far.y & moves), near.z + (far.z & moves)};
         StoreV(result, z, node);
         dot = dot + Dot(b, result);

@@ -250,14 +250,17 @@ inline void OrganBlocks(const Organ& organ, const OrganMatrix& matrix, const flo
   }
 }
 
-inline void OrganPrecondition(const OrganMatrix& matrix, const float* r, float* z, std::uint32_t first,
+inline double OrganBlockSolve(const OrganMatrix& matrix, const float* r, float* z, std::uint32_t first,
                               std::uint32_t last) {
+  double sum = 0;
   for (std::uint32_t v = first; v < last; ++v) {
     const Columns block = LoadColumns(matrix.block + 12 * static_cast<std::size_t>(v));
     const F4 b = F4::Load(r + 4 * static_cast<std::size_t>(v));
-    (block.c0 * SpreadLane<0>(b) + block.c1 * SpreadLane<1>(b) + block.c2 * SpreadLane<2>(b))
-        .Store(z + 4 * static_cast<std::size_t>(v));
+    const F4 result = block.c0 * SpreadLane<0>(b) + block.c1 * SpreadLane<1>(b) + block.c2 * SpreadLane<2>(b);
+    result.Store(z + 4 * static_cast<std::size_t>(v));
+    sum += static_cast<double>(DotProduct(b, result));
   }
+  return sum;
 }
 
 inline double OrganEnergy(const Organ& organ, const Inertia& inertia, const OrganLinearisation& at, std::uint32_t first,

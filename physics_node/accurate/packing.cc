@@ -114,6 +114,7 @@ void AccurateSolver::Follow(const TissueModel& tissue) {
   coarse_.ScaleBlocks(MakeSheet());
   elements_.Follow(tissue);
   elements_.FollowRegions(regions_);
+  around_due_ = true;
 }
 
 }  // namespace fulcrum::physics::accurate

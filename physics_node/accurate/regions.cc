@@ -37,11 +37,9 @@ Regions::Regions(const ParticleStore& particles, std::span<const std::pair<Parti
   }
   const auto size = static_cast<std::size_t>(all);
   awake_.assign(size, 1);
-  computed_.assign(size, 0);
   near_.assign(size, 1);
   still_s_.assign(size, 0.0f);
-  tasks_.reserve(size);
-  patches_.reserve(size);
+  part_ = MakePart();
   taken_out_.reserve(size);
   (void)Rebuild();
 }
@@ -96,7 +94,7 @@ void Regions::Settle(std::span<const float> speed, float h) {
   }
 }
 
-void Regions::AddTasks(int first_region, int end_region, const std::vector<std::uint8_t>& wanted,
+void Regions::AddTasks(int first_region, int end_region, std::span<const std::uint8_t> wanted,
                        std::vector<Task>* tasks) const {
   int length = 0;
   for (int region = first_region; region < end_region; ++region) {
@@ -136,27 +134,53 @@ bool Regions::Rebuild() {
   }
   everything_ = everything;
   taken_out_.clear();
-  std::fill(near_.begin(), near_.end(), std::uint8_t{0});
   for (int region = 0; region < count(); ++region) {
     const auto i = static_cast<std::size_t>(region);
     const bool now = everything || awake_[i] != 0;
-    if (computed_[i] != 0 && !now) {
+    if (part_.marked[i] != 0 && !now) {
       taken_out_.push_back(region);
     }
-    computed_[i] = now ? 1 : 0;
-    if (now) {
+    part_.marked[i] = now ? 1 : 0;
+  }
+  FindTasks(&part_);
+  return true;
+}
+
+Part Regions::MakePart() const {
+  const auto size = static_cast<std::size_t>(count());
+  Part part;
+  part.marked.assign(size, 0);
+  part.tasks.reserve(size);
+  part.patches.reserve(size);
+  return part;
+}
+
+void Regions::MarkNear(std::span<const std::uint8_t> marked) {
+  std::fill(near_.begin(), near_.end(), std::uint8_t{0});
+  for (std::size_t i = 0; i < marked.size(); ++i) {
+    if (marked[i] != 0) {
       near_[i] = 1;
       for (const int neighbour : neighbours_[i]) {
         near_[static_cast<std::size_t>(neighbour)] = 1;
       }
     }
   }
-  tasks_.clear();
-  patches_.clear();
-  AddTasks(0, sheet_regions_, computed_, &tasks_);
-  AddTasks(sheet_regions_, count(), computed_, &tasks_);
-  AddTasks(sheet_regions_, count(), near_, &patches_);
-  return true;
+}
+
+void Regions::Widen(Part* part) {
+  MarkNear(part->marked);
+  for (std::size_t i = 0; i < near_.size(); ++i) {
+    part->marked[i] = near_[i] != 0 && part_.marked[i] != 0 ? 1 : 0;
+  }
+}
+
+void Regions::FindTasks(Part* part) {
+  part->tasks.clear();
+  part->patches.clear();
+  AddTasks(0, sheet_regions_, part->marked, &part->tasks);
+  AddTasks(sheet_regions_, count(), part->marked, &part->tasks);
+  MarkNear(part->marked);
+  AddTasks(sheet_regions_, count(), near_, &part->patches);
 }
 
 }  // namespace fulcrum::physics::accurate

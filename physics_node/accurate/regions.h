@@ -19,6 +19,13 @@ struct Task {
   int first = 0, end = 0;
 };
 
+/// Regions in which something is computed.
+struct Part {
+  std::vector<std::uint8_t> marked;  ///< By region.
+  std::vector<Task> tasks;           ///< In order: the membrane, then the organ.
+  std::vector<Task> patches;         ///< Vertices of the organ whose patches those need.
+};
+
 class Regions {
  public:
   static constexpr int kRows = 8;
@@ -40,8 +47,8 @@ class Regions {
   }
   /// Rows or vertices of a region.
   [[nodiscard]] Task Extent(int region) const;
-  [[nodiscard]] bool computed(int region) const { return computed_[static_cast<std::size_t>(region)] != 0; }
-  [[nodiscard]] bool nothing() const { return tasks_.empty(); }
+  [[nodiscard]] bool computed(int region) const { return part_.marked[static_cast<std::size_t>(region)] != 0; }
+  [[nodiscard]] bool nothing() const { return part_.tasks.empty(); }
   [[nodiscard]] bool everything() const { return everything_; }
   /// Part of all particles that is awake, whether or not the rest is computed too.
   [[nodiscard]] float awake_part() const;
@@ -54,23 +61,27 @@ class Regions {
   /// True when what is computed has changed since the last call; then the tasks are new.
   bool Rebuild();
 
-  /// What is computed, in order: the membrane, then the organ.
-  [[nodiscard]] std::span<const Task> tasks() const { return tasks_; }
-  /// Vertices of the organ whose patches those need.
-  [[nodiscard]] std::span<const Task> patches() const { return patches_; }
+  /// What is computed.
+  [[nodiscard]] const Part& part() const { return part_; }
+  [[nodiscard]] Part MakePart() const;
+  /// Adds to part->marked all neighbours that are computed.
+  void Widen(Part* part);
+  /// Tasks and patches of what is marked.
+  void FindTasks(Part* part);
   /// Regions that the last Rebuild has taken out.
   [[nodiscard]] std::span<const int> taken_out() const { return taken_out_; }
 
  private:
-  void AddTasks(int first_region, int end_region, const std::vector<std::uint8_t>& wanted,
-                std::vector<Task>* tasks) const;
+  void AddTasks(int first_region, int end_region, std::span<const std::uint8_t> wanted, std::vector<Task>* tasks) const;
+  /// near_ <- `marked` and the neighbours of those.
+  void MarkNear(std::span<const std::uint8_t> marked);
 
   std::uint32_t tube_floats_, stride_, tube_count_, rows_, cols_;
   int sheet_regions_ = 0;
   std::vector<std::vector<int>> neighbours_;
-  std::vector<std::uint8_t> awake_, computed_, near_;
+  std::vector<std::uint8_t> awake_, near_;
   std::vector<float> still_s_;
-  std::vector<Task> tasks_, patches_;
+  Part part_;
   std::vector<int> taken_out_;
   bool changed_ = true, everything_ = false;
 };
