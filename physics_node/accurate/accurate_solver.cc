@@ -11,8 +11,6 @@ namespace {
 /// Above this the inertial guess is compared with the state before it, and the solve with the guess [m].
 constexpr float kDoubtfulGuess = 0.0005f;
 constexpr float kDoubtfulCorrection = 0.0002f;
-/// Contacts stiffer than this the middle level must know; softer ones are as the fat around [N/m].
-constexpr float kStiffContact = 500.0f;
 /// Nothing moves faster: ten times a quick hand [m/s].
 constexpr float kLargestSpeed = 5.0f;
 /// No place is so far from the origin [m].
@@ -20,7 +18,7 @@ constexpr float kFarthest = 10.0f;
 /// Rows of the membrane that the coarse matrix takes over per step: complete about once in 60 steps.
 constexpr int kRefreshRows = 5;
 
-bool IsStiff(const Element& contact) { return contact.m.squaredNorm() > kStiffContact; }
+bool IsStiff(const Element& contact) { return contact.m.squaredNorm() > Elements::kStiffContact; }
 
 }  // namespace
 
@@ -315,8 +313,11 @@ void AccurateSolver::ForgetDamagedVelocities() {
 /// from its velocity, that would bounce: the error of one solve, seen as velocity, doubles in the next guess.
 void AccurateSolver::PutHeld(std::span<const HeldPlace> held, std::span<const ContactRow> contacts) {
   for (const ContactRow& row : contacts) {
+    if (!(Elements::ContactStiffness(row) > Elements::kStiffContact)) {
+      continue;
+    }
     const float inside = row.offset - row.normal.dot(row.At(particles_->pool()));
-    if (!(inside > 0.0f) || !(Elements::ContactStiffness(row) > kStiffContact)) {
+    if (!(inside > 0.0f)) {
       continue;
     }
     // With the tool, but no farther than to its surface.

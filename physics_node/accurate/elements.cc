@@ -212,6 +212,9 @@ double Elements::Energy(const float* place, std::span<const ContactRow> contacts
 
 void Elements::WriteForces(const float* place, const float* d, const float* start, std::span<ContactRow> contacts) {
   for (ContactRow& row : contacts) {
+    if (!(ContactStiffness(row) > kStiffContact)) {
+      continue;
+    }
     const ContactState state = StateOf(row, Combine(row, place) + Combine(row, d), start);
     row.force_N = std::max(state.force, 0.0f);
     row.friction_N = state.force > 0.0f ? Vec3f(-state.tangential * state.slide) : Vec3f(Vec3f::Zero());

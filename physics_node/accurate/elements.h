@@ -55,7 +55,9 @@ class Elements {
   /// p is 0 wherever elements act that are not selected. All contacts are.
   double Apply(const float* p, float* out, const Selection& selection);
   [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts);
-  /// Normal and friction forces of contacts at `place` + `d`, sliding measured from `start`.
+  /// Contacts stiffer than this are with a tool; softer ones are tissue on tissue, as the fat around [N/m].
+  static constexpr float kStiffContact = 500.0f;
+  /// Normal and friction forces of contacts with tools at `place` + `d`, sliding measured from `start`.
   static void WriteForces(const float* place, const float* d, const float* start, std::span<ContactRow> contacts);
 
   /// Stiffness of a contact in its normal direction: of tissue against a tool, and of soft tissue against tissue; an

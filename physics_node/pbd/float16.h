@@ -18,6 +18,9 @@ struct F16 {
   static constexpr int kBatches = 2;
   __m512 v;
   static F16 All(float s) { return {_mm512_set1_ps(s)}; }
+  /// Sixteen in a row, aligned as F8's.
+  static F16 Load(const float* p) { return {_mm512_loadu_ps(p)}; }
+  void Store(float* p) const { _mm512_storeu_ps(p, v); }
   static F16 Halves(F8 lo, F8 hi) {
     return {_mm512_castpd_ps(
         _mm512_insertf64x4(_mm512_castps_pd(_mm512_castps256_ps512(lo.v)), _mm256_castps_pd(hi.v), 1))};
