@@ -345,7 +345,7 @@ void TissueCollision::AddFixedRows(const Fixed& fixed, float u0, float u1, std::
   for (const Near& near : fixed.watches.near) {
     const Watch& watch = fixed.watches.all[near.watch];
     row.offset = watch.normal.dot(watch.point + shift) + watch.clearance;
-    if (watch.normal.dot(particles_->At(watch.at)) > row.offset + near.band || !Touches(watch.particle)) {
+    if (watch.normal.dot(particles_->At(watch.at)) > row.offset + (u1 - u0) * near.band || !Touches(watch.particle)) {
       continue;
     }
     if (rows->size() == limit) {
@@ -397,7 +397,7 @@ void TissueCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) co
     for (std::size_t lane = 0; lane < count; ++lane) {
       const Near& near = organ_.near[first + lane];
       const Watch& watch = organ_.all[near.watch];
-      const float reach = feet.side[lane] < 0.0f ? kMaxBehind : watch.clearance + near.band;
+      const float reach = feet.side[lane] < 0.0f ? kMaxBehind : watch.clearance + (u1 - u0) * near.band;
       if (feet.distance_sq[lane] > reach * reach || !Touches(watch.particle)) {
         continue;
       }

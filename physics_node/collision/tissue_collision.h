@@ -76,7 +76,7 @@ class TissueCollision {
   /// One that is near in this step.
   struct Near {
     Index watch = 0;
-    float band = 0;  ///< Rows are made this far from contact [m].
+    float band = 0;  ///< Rows are made this far from contact, or as much less as they are for less than a step [m].
   };
   struct Signed {
     std::array<float, 3> barycentric{};
