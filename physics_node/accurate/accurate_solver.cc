@@ -347,7 +347,7 @@ double AccurateSolver::EnergyAt(const FloatArray& place, const Inertia& inertia,
   return SumOfPartials(regions_.part().tasks.size()) + elements_.Energy(place.data(), contacts);
 }
 
-/// Contacts stiffen the diagonal of what they touch.
+/// Contacts and folds stiffen the diagonal of what they touch.
 void AccurateSolver::RefreshContactStiffness() {
   const auto slot = [&](ParticleRef at) {
     return static_cast<std::uint32_t>(at.base < tube_floats_ ? plane_ + at.base / 4 : at.base - tube_floats_);
@@ -356,16 +356,20 @@ void AccurateSolver::RefreshContactStiffness() {
     extra_[i] = base_extra_[i];
   }
   extra_changed_.clear();
+  const auto stiffen = [&](ParticleRef at, float stiffness) {
+    extra_[slot(at)] += stiffness;
+    extra_changed_.push_back(slot(at));
+    // Once more after the last time, to be as without.
+    stiffened_[static_cast<std::size_t>(regions_.Of(at))] = 2;
+  };
   for (const Element& contact : elements_.touching()) {
     const float stiffness = contact.kt + contact.m.squaredNorm();
     for (int k = 0; k < contact.count; ++k) {
       const auto i = static_cast<std::size_t>(k);
-      extra_[slot(contact.at[i])] += stiffness * contact.weight[i] * contact.weight[i];
-      extra_changed_.push_back(slot(contact.at[i]));
-      // Once more after the last time, to be as without.
-      stiffened_[static_cast<std::size_t>(regions_.Of(contact.at[i]))] = 2;
+      stiffen(contact.at[i], stiffness * contact.weight[i] * contact.weight[i]);
     }
   }
+  elements_.guard().ForDiagonal([&](Index vertex, float stiffness) { stiffen(ParticleRef{4 * vertex}, stiffness); });
 }
 
 void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRow> contacts) {
@@ -410,6 +414,7 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
       stiffened = static_cast<std::uint8_t>(stiffened >> 1);
     }
   });
+  coarse_.LetNodesRest(!regions_.everything() || elements_.guard().folded());
   coarse_.ForgetContacts();
   for (const Element& contact : elements_.touching()) {
     if (IsStiff(contact)) {

@@ -35,9 +35,12 @@ class CoarseSpace {
   /// Blocks are sampled at their centres. Where a cut goes through the samples they are scaled to the edges that are
   /// left to the whole hat; too soft a block would overshoot.
   void ScaleBlocks(const Sheet& sheet);
-  /// While not all is computed the coarse nodes rest, and so do middle functions that reach into what is not: cut off
-  /// there they would cost far more energy than their blocks say.
+  /// While not all is computed, middle functions that reach into what is not rest: cut off there they would cost far
+  /// more energy than their blocks say.
   void FollowRegions(const Regions& regions);
+  /// The coarse nodes, too, rest while not all is computed, and while the organ is folded: their matrix knows it as it
+  /// is at rest, and a folded one is up to a thousand times as stiff.
+  void LetNodesRest(bool rest);
 
   /// Adds a contact's stiffness to the blocks of the middle functions that move it, for this substep: they would ask it
   /// to yield as easily as the sheet.

@@ -144,6 +144,7 @@ void Elements::Select(const Regions& regions, std::span<const std::uint8_t> move
 
 void Elements::Touch(const float* place, const float* start, const Regions& regions,
                      std::span<const ContactRow> contacts) {
+  guard_.Linearise(place);
   contacts_.clear();
   contact_force_.clear();
   for (const ContactRow& row : contacts) {
@@ -175,7 +176,7 @@ void Elements::Linearise(const float* place, float* residual) {
     Spread4(e, d * (-tension / length), residual);
   }
   hinges_.AddForce(place, residual, computed_.hinge_rows);
-  guard_.Linearise(place, residual);
+  guard_.AddForce(residual);
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     Spread(contacts_[i], contact_force_[i], residual);
   }

@@ -44,9 +44,11 @@ class Elements {
 
   /// Stiffness that bindings and hinges add to the diagonal, by pool offset of x.
   [[nodiscard]] std::vector<std::pair<std::uint32_t, float>> Diagonal() const;
-  /// Finds which contacts push at `place`, sliding measured from `start`; they act until the next call.
+  /// Finds what folds the organ has (see InversionGuard), and which contacts push at `place`, sliding measured from
+  /// `start`; they act until the next call.
   void Touch(const float* place, const float* start, const Regions& regions, std::span<const ContactRow> contacts);
   [[nodiscard]] std::span<const Element> touching() const { return contacts_; }
+  [[nodiscard]] const InversionGuard& guard() const { return guard_; }
   /// Linearises at `place` and adds the forces to `residual`, those of the touching contacts included.
   void Linearise(const float* place, float* residual);
   /// While set, contacts take no part in Apply.

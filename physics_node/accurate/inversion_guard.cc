@@ -1,19 +1,16 @@
 #include "physics_node/accurate/inversion_guard.h"
 
+#include <Eigen/SVD>
 #include <algorithm>
-#include <cmath>
 
 namespace fulcrum::physics::accurate {
 namespace {
 
-/// Turned over below 0; kept from falling below this ...
-constexpr float kBack = 0.15f;
-/// ... until it has recovered to this.
-constexpr float kSound = 0.4f;
-/// Of the organ's bulk modulus to begin with: enough to open most folds, little enough for the preconditioner, which
-/// does not know it. It grows each substep that a fold resists, up to so many times.
-constexpr double kPart = 0.3;
-constexpr float kGrowth = 1.02f, kMost = 16.0f;
+/// k over the shear modulus: a fold in the wall of a mirrored organ gives way from 5 on; at 20 single tetrahedra snap.
+constexpr double kPart = 10;
+/// |F - R| of a tetrahedron that is left alone again. So near rest that little energy is taken out: let go as soon as
+/// it is the right way round, it falls back, is found again, and so shakes the wall for good.
+constexpr float kSound = 0.1f;
 
 Vec3f At(const float* field, Index v) {
   return {field[4 * std::size_t{v}], field[4 * std::size_t{v} + 1], field[4 * std::size_t{v} + 2]};
@@ -24,54 +21,69 @@ void Add(float* field, Index v, const Vec3f& value) {
   }
 }
 
+/// f less the rotation nearest to it.
+Eigen::Matrix3f Strain(const Eigen::Matrix3f& f) {
+  const Eigen::JacobiSVD<Eigen::Matrix3f> svd(f, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3f u = svd.matrixU();
+  if (u.determinant() * svd.matrixV().determinant() < 0.0f) {
+    u.col(2) *= -1.0f;  // A mirror image goes back along its least stretch.
+  }
+  return f - u * svd.matrixV().transpose();
+}
+
 }  // namespace
 
 InversionGuard::InversionGuard(const ElasticModel& model) {
   for (const ElasticTet& tet : model.tets) {
-    Tet t;
-    std::copy(tet.v.begin(), tet.v.end(), t.v.begin());
-    t.inverse_volume = static_cast<float>(1.0 / (6.0 * tet.volume));
-    t.stiffness = static_cast<float>(kPart * (model.lambda_Pa + model.mu_Pa) * tet.volume);
-    tets_.push_back(t);
+    Vertices& vertices = tets_.emplace_back();
+    std::copy(tet.v.begin(), tet.v.end(), vertices.begin());
+    Shape& shape = shapes_.emplace_back();
+    shape.stiffness = static_cast<float>(kPart * model.mu_Pa * tet.volume);
+    for (std::size_t k = 1; k < 4; ++k) {
+      shape.gradient[k] = tet.inverse_edges.row(static_cast<Eigen::Index>(k) - 1).transpose().cast<float>();
+      shape.gradient[0] -= shape.gradient[k];
+    }
   }
   found_.reserve(tets_.size());
 }
 
-float InversionGuard::RelativeVolume(const Tet& tet, const float* place) const {
-  const Vec3f x0 = At(place, tet.v[0]);
-  return (At(place, tet.v[1]) - x0).cross(At(place, tet.v[2]) - x0).dot(At(place, tet.v[3]) - x0) * tet.inverse_volume;
+Eigen::Matrix3f InversionGuard::Gradient(std::size_t tet, const float* place) const {
+  Eigen::Matrix3f f = Eigen::Matrix3f::Zero();
+  for (std::size_t k = 0; k < 4; ++k) {
+    f += At(place, tets_[tet][k]) * shapes_[tet].gradient[k].transpose();
+  }
+  return f;
 }
 
 void InversionGuard::Look(const float* place) {
-  std::erase_if(found_, [&](const Found& f) { return !(RelativeVolume(tets_[f.tet], place) < kSound); });
   const std::size_t end = std::min(next_ + tets_.size() / kParts + 1, tets_.size());
   for (; next_ < end; ++next_) {
-    if (RelativeVolume(tets_[next_], place) < 0.0f &&
-        std::none_of(found_.begin(), found_.end(), [&](const Found& f) { return f.tet == next_; })) {
-      Found& found = found_.emplace_back();
-      found.tet = next_;
-      found.stiffness = tets_[next_].stiffness;
+    const Vertices& v = tets_[next_];
+    const Vec3f x0 = At(place, v[0]);
+    const float volume = (At(place, v[1]) - x0).cross(At(place, v[2]) - x0).dot(At(place, v[3]) - x0);
+    if (volume < 0.0f &&
+        std::none_of(found_.begin(), found_.end(), [&](const Found& found) { return found.tet == next_; })) {
+      found_.emplace_back().tet = next_;
     }
   }
   next_ = next_ == tets_.size() ? 0 : next_;
 }
 
-void InversionGuard::Linearise(const float* place, float* residual) {
+void InversionGuard::Linearise(const float* place) {
   Look(place);
   for (Found& found : found_) {
-    const Tet& tet = tets_[found.tet];
-    const Vec3f x0 = At(place, tet.v[0]), a = At(place, tet.v[1]) - x0, b = At(place, tet.v[2]) - x0,
-                c = At(place, tet.v[3]) - x0;
-    const float volume = RelativeVolume(tet, place);
-    found.stiffness = std::min(found.stiffness * kGrowth, kMost * tet.stiffness);
-    const float root = volume < kBack ? std::sqrt(found.stiffness) : 0.0f, scale = root * tet.inverse_volume;
-    found.gradient[1] = scale * b.cross(c);
-    found.gradient[2] = scale * c.cross(a);
-    found.gradient[3] = scale * a.cross(b);
-    found.gradient[0] = -(found.gradient[1] + found.gradient[2] + found.gradient[3]);
-    const float missing = root * (kBack - volume);
+    const Eigen::Matrix3f f = Gradient(found.tet, place);
+    // What is not finite is put back elsewhere, and found again if need be.
+    found.strain = f.allFinite() ? Strain(f) : Eigen::Matrix3f::Zero();
+  }
+  std::erase_if(found_, [](const Found& found) { return found.strain.squaredNorm() < kSound * kSound; });
+}
+
+void InversionGuard::AddForce(float* residual) const {
+  for (const Found& found : found_) {
+    const Shape& shape = shapes_[found.tet];
     for (std::size_t k = 0; k < 4; ++k) {
-      Add(residual, tet.v[k], missing * found.gradient[k]);
+      Add(residual, tets_[found.tet][k], -shape.stiffness * (found.strain * shape.gradient[k]));
     }
   }
 }
@@ -79,15 +91,12 @@ void InversionGuard::Linearise(const float* place, float* residual) {
 double InversionGuard::Apply(const float* p, float* out) const {
   double sum = 0;
   for (const Found& found : found_) {
-    const Tet& tet = tets_[found.tet];
-    float change = 0;
+    const Shape& shape = shapes_[found.tet];
+    const Eigen::Matrix3f f = Gradient(found.tet, p);
     for (std::size_t k = 0; k < 4; ++k) {
-      change += found.gradient[k].dot(At(p, tet.v[k]));
+      Add(out, tets_[found.tet][k], shape.stiffness * (f * shape.gradient[k]));
     }
-    for (std::size_t k = 0; k < 4; ++k) {
-      Add(out, tet.v[k], change * found.gradient[k]);
-    }
-    sum += static_cast<double>(change * change);
+    sum += static_cast<double>(shape.stiffness * f.squaredNorm());
   }
   return sum;
 }
@@ -95,9 +104,7 @@ double InversionGuard::Apply(const float* p, float* out) const {
 double InversionGuard::Energy(const float* place) const {
   double sum = 0;
   for (const Found& found : found_) {
-    const Tet& tet = tets_[found.tet];
-    const float missing = std::max(kBack - RelativeVolume(tet, place), 0.0f);
-    sum += 0.5 * static_cast<double>(found.stiffness * missing * missing);
+    sum += 0.5 * static_cast<double>(shapes_[found.tet].stiffness * Strain(Gradient(found.tet, place)).squaredNorm());
   }
   return sum;
 }
