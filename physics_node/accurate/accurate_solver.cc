@@ -414,7 +414,7 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
       stiffened = static_cast<std::uint8_t>(stiffened >> 1);
     }
   });
-  coarse_.LetNodesRest(!regions_.everything() || elements_.guard().folded());
+  coarse_.LeaveOrganAlone(elements_.guard().folded());
   coarse_.ForgetContacts();
   for (const Element& contact : elements_.touching()) {
     if (IsStiff(contact)) {

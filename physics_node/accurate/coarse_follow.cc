@@ -76,6 +76,7 @@ void CoarseSpace::ScaleBlocks(const Sheet& sheet) {
 }
 
 void CoarseSpace::FollowRegions(const Regions& regions) {
+  coarse_rests_ = !regions.everything();
   middle_rests_.assign(static_cast<std::size_t>(middle_rows_), 0);
   for (int r = 0; r < middle_rows_; ++r) {
     const auto i = static_cast<std::size_t>(r);
@@ -86,13 +87,6 @@ void CoarseSpace::FollowRegions(const Regions& regions) {
   }
   std::fill_n(nodes4_.data(), nodes4_.size(), 0.0f);
   std::fill_n(value_.data(), value_.size(), 0.0f);
-}
-
-void CoarseSpace::LetNodesRest(bool rest) {
-  if (rest && !coarse_rests_) {
-    std::fill_n(nodes4_.data(), nodes4_.size(), 0.0f);
-  }
-  coarse_rests_ = rest;
 }
 
 void CoarseSpace::ForgetContacts() {

@@ -31,7 +31,7 @@ void CoarseSpace::Solve(std::span<const Task> tasks, const float* row_sums, cons
     std::fill_n(nodes4_.data(), nodes4_.size(), 0.0f);
     RestrictMiddle();
     for (const Task& task : tasks) {
-      if (!task.sheet) {
+      if (!task.sheet && !organ_alone_) {
         RestrictTube(task.first, task.end, tube_residual, tube);
       }
     }
@@ -123,7 +123,7 @@ double CoarseSpace::Prolong(const float* tube, const float* tube_residual, float
   double dot = 0;
   for (auto v = static_cast<std::size_t>(first); v < static_cast<std::size_t>(end); ++v) {
     float* z = tube_z + 4 * v;
-    if (tube[4 * v + 3] > 0.0f && !coarse_rests_) {
+    if (tube[4 * v + 3] > 0.0f && !coarse_rests_ && !organ_alone_) {
       const Weights8& w = tube_weights_[v];
       __m128 sum = _mm_load_ps(z);
       for (std::size_t i = 0; i < 8; ++i) {

@@ -35,12 +35,12 @@ class CoarseSpace {
   /// Blocks are sampled at their centres. Where a cut goes through the samples they are scaled to the edges that are
   /// left to the whole hat; too soft a block would overshoot.
   void ScaleBlocks(const Sheet& sheet);
-  /// While not all is computed, middle functions that reach into what is not rest: cut off there they would cost far
-  /// more energy than their blocks say.
+  /// While not all is computed the coarse nodes rest, and so do middle functions that reach into what is not: cut off
+  /// there they would cost far more energy than their blocks say.
   void FollowRegions(const Regions& regions);
-  /// The coarse nodes, too, rest while not all is computed, and while the organ is folded: their matrix knows it as it
-  /// is at rest, and a folded one is up to a thousand times as stiff.
-  void LetNodesRest(bool rest);
+  /// While the organ is folded the coarse nodes leave it alone: their matrix knows it as it is at rest, and in folds it
+  /// is a hundred times as stiff.
+  void LeaveOrganAlone(bool alone) { organ_alone_ = alone; }
 
   /// Adds a contact's stiffness to the blocks of the middle functions that move it, for this substep: they would ask it
   /// to yield as easily as the sheet.
@@ -93,7 +93,7 @@ class CoarseSpace {
   std::size_t width_ = 0;  ///< Floats of a plane of its row.
   std::vector<int> centre_, cell_;
   std::vector<std::uint8_t> middle_rests_;  ///< By middle row.
-  bool coarse_rests_ = false;
+  bool coarse_rests_ = false, organ_alone_ = false;
   std::vector<float> yields_;                        ///< By middle function: 0 where a contact holds it, else 1.
   std::vector<std::pair<std::size_t, float>> held_;  ///< Functions that do not yield.
   std::vector<float> fraction_;
