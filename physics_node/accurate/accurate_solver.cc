@@ -103,7 +103,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   for (std::uint32_t row = 0; row < layout.rows; ++row) {
     for (std::uint32_t col = 0; col < layout.cols; ++col) {
       for (std::size_t d = 0; d < 3; ++d) {
-        FollowEdge(tissue, layout.Offset(row, col), d);
+        FollowEdge(tissue, row, col, d);
       }
     }
   }
@@ -309,9 +309,13 @@ void AccurateSolver::ForgetDamagedVelocities() {
   }
 }
 
-/// Where inertia does not tell where the guess is: held particles, and along its normal what a tool presses. Guessed
-/// from its velocity, that would bounce: the error of one solve, seen as velocity, doubles in the next guess.
-void AccurateSolver::PutHeld(std::span<const HeldPlace> held, std::span<const ContactRow> contacts) {
+/// Where inertia does not tell where the guess is: held particles, along its normal what a tool presses, and what a cut
+/// has frayed. Guessed from its velocity, that would bounce: the error of one solve, seen as velocity, doubles in the
+/// next guess. Shreds that hang on little are light and turn far in a substep, and no few iterations solve them all.
+void AccurateSolver::PutUnguessed(std::span<const HeldPlace> held, std::span<const ContactRow> contacts) {
+  for (const ParticleRef at : frayed_) {
+    PutField(place_.data(), at, particles_->At(at));
+  }
   for (const ContactRow& row : contacts) {
     if (!(Elements::ContactStiffness(row) > Elements::kStiffContact)) {
       continue;
@@ -472,15 +476,15 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
   if (guess.resets > 0) {
     ForgetDamagedVelocities();
   }
-  PutHeld(held, contacts);
+  PutUnguessed(held, contacts);
   bool searched = false;
   if (guess.largest_sq > kDoubtfulGuess * kDoubtfulGuess) {
     const double moving = EnergyAt(place_, inertia, contacts);
     (void)Guess(0.0f);
-    PutHeld(held, contacts);
+    PutUnguessed(held, contacts);
     if (moving < EnergyAt(place_, inertia, contacts)) {
       (void)Guess(h);
-      PutHeld(held, contacts);
+      PutUnguessed(held, contacts);
     }
     searched = true;
   }

@@ -95,14 +95,14 @@ class AccurateSolver {
   void PackSheet(const ElasticModel& model);
   void PackOrgan(const ElasticModel& model, std::uint32_t tube_count);
   [[nodiscard]] Regions MakeRegions(const ElasticModel& model) const;
-  void FollowEdge(const TissueModel& tissue, std::uint32_t at, std::size_t direction);
+  void FollowEdge(const TissueModel& tissue, Index row, Index col, std::size_t direction);
 
   void Measure(const Task& task, std::vector<float>* moved) const;
   void WakeTouched(std::span<const HeldPlace> held, std::span<const ContactRow> contacts);
   void FollowRegions();
   GuessCount Guess(float h);
   void ForgetDamagedVelocities();
-  void PutHeld(std::span<const HeldPlace> held, std::span<const ContactRow> contacts);
+  void PutUnguessed(std::span<const HeldPlace> held, std::span<const ContactRow> contacts);
   /// Of what is computed, for comparisons.
   [[nodiscard]] double EnergyAt(const FloatArray& place, const Inertia& inertia, std::span<const ContactRow> contacts);
   void Linearise(const Inertia& inertia, std::span<const ContactRow> contacts);
@@ -140,6 +140,8 @@ class AccurateSolver {
 
   // The model, packed.
   std::array<FloatArray, 3> inverse_rest_, axial_, axial_uncut_;
+  std::vector<int> missing_edges_;   ///< By place in a plane: how many edges a node has lost to cuts.
+  std::vector<ParticleRef> frayed_;  ///< Nodes that have lost half of them or more.
   FloatArray sheet_mass_;
   std::vector<std::uint32_t> start_, vertex_, patch_start_, patch_;
   FloatArray gradient_, patch_gradient_, volume_, organ_mass_;

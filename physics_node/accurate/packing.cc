@@ -2,6 +2,12 @@
 #include "physics_node/accurate/accurate_solver.h"
 
 namespace fulcrum::physics::accurate {
+namespace {
+
+/// A node is frayed when cuts have left it at most half of its six edges: the border of a clean cut keeps four.
+constexpr int kFrayed = 3;
+
+}  // namespace
 
 void AccurateSolver::PackSheet(const ElasticModel& model) {
   const GridLayout& layout = particles_->layout();
@@ -12,6 +18,7 @@ void AccurateSolver::PackSheet(const ElasticModel& model) {
     axial_[i] = FloatArray(plane_);
     axial_uncut_[i] = FloatArray(plane_);
   }
+  missing_edges_.assign(plane_, 0);
   for (std::uint32_t row = 0; row < layout.rows; ++row) {
     for (std::uint32_t col = 0; col < layout.cols; ++col) {
       const std::uint32_t node = row * layout.cols + col, at = layout.Offset(row, col);
@@ -19,6 +26,7 @@ void AccurateSolver::PackSheet(const ElasticModel& model) {
       for (std::size_t d = 0; d < 3; ++d) {
         const ElasticSpring& spring = model.springs[3 * node + d];
         axial_uncut_[d][at] = static_cast<float>(spring.axial);
+        axial_[d][at] = axial_uncut_[d][at];
         inverse_rest_[d][at] = spring.axial > 0 ? static_cast<float>(1.0 / spring.rest_length) : 1.0f;
       }
     }
@@ -93,12 +101,18 @@ Regions AccurateSolver::MakeRegions(const ElasticModel& model) const {
   return Regions(*particles_, joined);
 }
 
-/// `at` within a plane.
-void AccurateSolver::FollowEdge(const TissueModel& tissue, std::uint32_t at, std::size_t direction) {
-  const float rest = tissue.rest(static_cast<int>(direction))[at];
+void AccurateSolver::FollowEdge(const TissueModel& tissue, Index row, Index col, std::size_t direction) {
+  const GridLayout& layout = particles_->layout();
+  const std::uint32_t at = layout.Offset(row, col);
+  const float rest = tissue.rest(static_cast<int>(direction))[at], before = axial_[direction][at];
   axial_[direction][at] = rest > 0.0f ? axial_uncut_[direction][at] : 0.0f;
   if (rest > 0.0f) {
     inverse_rest_[direction][at] = 1.0f / (rest * rest_scale_);
+  }
+  if ((before > 0.0f) != (axial_[direction][at] > 0.0f)) {
+    const int missing = before > 0.0f ? 1 : -1;
+    missing_edges_[at] += missing;
+    missing_edges_[layout.Offset(row + (direction != 0 ? 1 : 0), col + (direction != 1 ? 1 : 0))] += missing;
   }
 }
 
@@ -106,10 +120,16 @@ void AccurateSolver::Follow(const TissueModel& tissue) {
   const GridLayout& layout = particles_->layout();
   for (const Index edge : tissue.edited_edges()) {
     const Index row = edge / 3 / layout.cols, col = edge / 3 % layout.cols;
-    FollowEdge(tissue, layout.Offset(row, col), edge % 3);
+    FollowEdge(tissue, row, col, edge % 3);
     coarse_.MarkEdit(row, col, edge % 3);
     regions_.Wake(regions_.Of(particles_->NodeRef(row, col)));
     regions_.Wake(regions_.Of(particles_->NodeRef(std::min(row + 1, layout.rows - 1), col)));
+  }
+  frayed_.clear();
+  for (std::uint32_t at = 0; at < missing_edges_.size(); ++at) {
+    if (missing_edges_[at] >= kFrayed) {
+      frayed_.push_back({static_cast<std::uint32_t>(tube_floats_) + at, static_cast<std::uint32_t>(plane_)});
+    }
   }
   coarse_.ScaleBlocks(MakeSheet());
   elements_.Follow(tissue);

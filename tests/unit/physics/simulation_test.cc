@@ -1,6 +1,8 @@
 // The whole tissue: rest, sleep, determinism, restart; and what it tells the servo and the heat.
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "haptics_node/servo/model_gate.h"
 #include "physics_node/contact_model/elastic_force.h"
 #include "physics_node/simulation/tissue_simulation.h"
@@ -60,6 +62,36 @@ TEST_F(OnSmallScene, ATopologyChangeWakes) {
   state.shrink[3 * (30 * 25 + 12)] = 200;
   EXPECT_EQ(simulation.ApplyTopology(state), 1);
   EXPECT_FALSE(simulation.Step({}).asleep);
+}
+
+TEST_F(OnSmallScene, ASheetCutInManyPlacesComesToRest) {
+  const std::size_t nodes = scene_.membrane.node_count();
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    TopologyState state;
+    state.rows = scene_.membrane.rows;
+    state.cols = scene_.membrane.cols;
+    state.dead_nodes.assign((nodes + 7) / 8, 0);
+    state.dead_edges.assign((3 * nodes + 7) / 8, 0);
+    state.shrink.assign(3 * nodes, 0);
+    std::mt19937 random(seed);
+    for (Index row = 20; row < 45; ++row) {
+      for (Index edge = 3 * (row * state.cols + 6); edge < 3 * (row * state.cols + 18); ++edge) {
+        if (random() % 100 < 30) {
+          SetBit(state.dead_edges, edge);
+        }
+      }
+    }
+    TissueSimulation simulation(scene_);
+    EXPECT_GT(simulation.ApplyTopology(state), 100);
+    float early = 0, late = 0;
+    for (int i = 0; i < 400; ++i) {
+      const float step = simulation.Step({}).max_step_m;
+      early = i < 50 ? std::max(early, step) : early;
+      late = i >= 350 ? std::max(late, step) : late;
+    }
+    EXPECT_GT(early, 0.001f) << seed;  // The slits gape …
+    EXPECT_LT(late, 1e-5f) << seed;    // … and that is that: shreds do not go on swinging.
+  }
 }
 
 TEST_F(OnSmallScene, TheSameRunGivesTheSameHash) {
