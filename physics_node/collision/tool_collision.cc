@@ -21,7 +21,7 @@ constexpr int kClearSteps = 5;
 constexpr float kClearPart = 0.5f;
 /// Sides are told by the normal of a patch this many nodes each way, not by that of a triangle: a crumpled triangle
 /// turns over without the membrane doing so.
-constexpr int kPatch = 3;
+constexpr Index kPatch = 3;
 /// On which side of a triangle the tool is, can be told only where its offset is this much along the normal, and not
 /// beside an edge.
 constexpr float kBesideCosine = 0.7f;
@@ -60,14 +60,27 @@ ToolCollision::ToolCollision(const SceneView& scene, const TissueModel* model, P
 Vec3f ToolCollision::PatchNormal(Index cell, bool previous) const {
   const GridLayout& layout = particles_->layout();
   const Index row = cell / (layout.cols - 1), col = cell % (layout.cols - 1);
+  const Index left = col > kPatch ? col - kPatch : 0, right = std::min(col + kPatch + 1, layout.cols - 1);
+  const Index top = row > kPatch ? row - kPatch : 0, bottom = std::min(row + kPatch + 1, layout.rows - 1);
+  // Beside a cut there is none: what lies beyond may be anywhere, and flaps turn over as they like.
+  const auto whole = [&](int direction, Index r, Index c) {
+    return model_->rest(direction)[column_[c].base - column_[0].base + r * layout.stride] > 0.0f;
+  };
+  for (Index c = left; c < right; ++c) {
+    if (!whole(0, row, c)) {
+      return Vec3f::Zero();
+    }
+  }
+  for (Index r = top; r < bottom; ++r) {
+    if (!whole(1, r, col)) {
+      return Vec3f::Zero();
+    }
+  }
   const auto at = [&](Index r, Index c) {
-    const ParticleRef first = column_[std::min(c, layout.cols - 1)];
-    const ParticleRef ref{first.base + std::min(r, layout.rows - 1) * layout.stride, first.step};
+    const ParticleRef ref{column_[c].base + r * layout.stride, column_[c].step};
     return previous ? particles_->Previous(ref) : particles_->At(ref);
   };
-  const auto before = [](Index i) { return i > kPatch ? i - kPatch : 0; };
-  const Vec3f along = at(row, col + kPatch + 1) - at(row, before(col));
-  const Vec3f down = at(row + kPatch + 1, col) - at(before(row), col);
+  const Vec3f along = at(row, right) - at(row, left), down = at(bottom, col) - at(top, col);
   const Vec3f normal = along.cross(down);
   const float area = normal.norm();
   return area > 0.0f ? Vec3f(normal / area) : Vec3f(Vec3f::Zero());
@@ -341,7 +354,7 @@ ToolCollision::Push ToolCollision::PushOf(const ContactPair& pair, const Capsule
   const Vec3f offset = closest.on_segment - closest.on_triangle;
   const float distance = std::sqrt(closest.distance_sq);
   if (closest.crosses) {
-    if (pair.side == 0) {
+    if (pair.side == 0 || pair.normal.isZero(0.0f)) {
       return {};  // It was through the membrane before we looked: there is no telling which side is right.
     }
     const float behind = std::min(side * pair.normal.dot(capsule.a - closest.on_triangle),

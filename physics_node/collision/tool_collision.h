@@ -140,7 +140,7 @@ class ToolCollision {
   void Flush(std::uint32_t capsule, float range);
   void FindSide(ContactPair* pair);
   void FollowYielding(std::uint32_t tool, const ToolMotion& moved, bool clear);
-  /// Unit normal of the membrane around a cell, now or before this step; zero where it has none.
+  /// Unit normal of the membrane around a cell, now or before this step; zero beside a cut or where it has none.
   [[nodiscard]] Vec3f PatchNormal(Index cell, bool previous) const;
   /// Of the membrane around it, or of the organ's triangle.
   [[nodiscard]] Vec3f NormalOf(const ContactPair& pair, bool previous);

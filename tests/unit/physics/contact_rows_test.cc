@@ -1,6 +1,8 @@
 // Contact rows of the tools: what they keep apart, how strongly, and how many there are.
 #include <gtest/gtest.h>
 
+#include <tuple>
+
 #include "services/scene/build.h"
 #include "tests/unit/physics/row_player.h"
 #include "tests/unit/physics/sheet_scene.h"
@@ -192,11 +194,8 @@ TEST(ContactRows, NoneOnDeadNodes) {
   EXPECT_GT(seen, 0u);
 }
 
-TEST(ContactRows, AHookGoesThroughASlitAndComesBack) {
-  const scene::SceneData data = SheetScene(kRows, kCols, kH);
-  const SceneView scene = data.View();
-  RowPlayer player(scene);
-  // Sixteen millimetres along y, one cell wide.
+/// Sixteen millimetres along y, one cell wide: right of the nodes of column 12.
+TopologyState Slit() {
   TopologyState slit;
   slit.rows = kRows;
   slit.cols = kCols;
@@ -207,7 +206,45 @@ TEST(ContactRows, AHookGoesThroughASlitAndComesBack) {
     SetBit(slit.dead_edges, 3 * (r * kCols + 12));
     SetBit(slit.dead_edges, 3 * (r * kCols + 12) + 2);
   }
-  ASSERT_GT(player.model().Apply(slit, &player.particles()), 0);
+  return slit;
+}
+
+TEST(ContactRows, AFlapThatLiesOverAToolIsNotPulledThroughIt) {
+  const scene::SceneData data = SheetScene(kRows, kCols, kH);
+  RowPlayer player(data.View());
+  ASSERT_GT(player.model().Apply(Slit(), &player.particles()), 0);
+  // The foot lies along the slit on its left border, which folds back over it.
+  const auto foot = [](float height) { return Down(Vec3f(0.0205f, 0.022f, height), static_cast<float>(M_PI) / 2); };
+  for (const float height : {0.0012f, 0.0008f, 0.0004f}) {
+    player.Step(1, foot(height));
+  }
+  for (std::uint32_t r = 10; r < 15; ++r) {
+    for (const auto& [col, x, z] : {std::tuple{11u, 0.0221f, 0.0006f}, {12u, 0.0202f, 0.0014f}}) {
+      const Vec3f place(x, kH * static_cast<float>(r), z);
+      player.particles().Set(player.particles().NodeRef(r, col), place);
+      player.particles().SetPrevious(player.particles().NodeRef(r, col), place);
+    }
+  }
+  int over = 0;
+  bool first = true;
+  player.Step(1, foot(0.0004f), [&](const std::vector<ContactRow>& rows) {
+    for (const ContactRow& row : rows) {
+      const ContactPair& pair = player.tools().pairs()[row.source];
+      if (first && pair.closest.on_triangle.z() > pair.closest.on_segment.z()) {
+        EXPECT_GT(row.normal.dot(pair.closest.on_triangle - pair.closest.on_segment), 0.0f);
+        ++over;
+      }
+    }
+    first = false;
+  });
+  EXPECT_GT(over, 3);
+}
+
+TEST(ContactRows, AHookGoesThroughASlitAndComesBack) {
+  const scene::SceneData data = SheetScene(kRows, kCols, kH);
+  const SceneView scene = data.View();
+  RowPlayer player(scene);
+  ASSERT_GT(player.model().Apply(Slit(), &player.particles()), 0);
   const float along = static_cast<float>(M_PI) / 2;
   const Vec3f heel = kMiddle + Vec3f(0.001f, -0.002f, 0);
   const auto move = [&](float from, float to, float about_z0, float about_z1) {
