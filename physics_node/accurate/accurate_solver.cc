@@ -360,20 +360,24 @@ void AccurateSolver::RefreshContactStiffness() {
     extra_[i] = base_extra_[i];
   }
   extra_changed_.clear();
-  const auto stiffen = [&](ParticleRef at, float stiffness) {
+  // Blocks of the organ that only soft contacts touch wait for the next step. Once more after the last time, to be as
+  // without.
+  const auto stiffen = [&](ParticleRef at, float stiffness, bool at_once) {
     extra_[slot(at)] += stiffness;
     extra_changed_.push_back(slot(at));
-    // Once more after the last time, to be as without.
-    stiffened_[static_cast<std::size_t>(regions_.Of(at))] = 2;
+    if (at_once) {
+      stiffened_[static_cast<std::size_t>(regions_.Of(at))] = 2;
+    }
   };
   for (const Element& contact : elements_.touching()) {
     const float stiffness = contact.kt + contact.m.squaredNorm();
     for (int k = 0; k < contact.count; ++k) {
       const auto i = static_cast<std::size_t>(k);
-      stiffen(contact.at[i], stiffness * contact.weight[i] * contact.weight[i]);
+      stiffen(contact.at[i], stiffness * contact.weight[i] * contact.weight[i], IsStiff(contact));
     }
   }
-  elements_.guard().ForDiagonal([&](Index vertex, float stiffness) { stiffen(ParticleRef{4 * vertex}, stiffness); });
+  elements_.guard().ForDiagonal(
+      [&](Index vertex, float stiffness) { stiffen(ParticleRef{4 * vertex}, stiffness, true); });
 }
 
 void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRow> contacts) {

@@ -1,5 +1,7 @@
 #include "physics_node/accurate/elements.h"
 
+#include <xmmintrin.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -35,16 +37,35 @@ void Spread(const Sum& e, const Vec3f& v, float* field) {
   }
 }
 
-/// Of all four particles: no loop that ends at a count.
-Vec3f Combine4(const Element& e, const float* field) {
-  return (e.weight[0] * FieldAt(field, e.at[0]) + e.weight[1] * FieldAt(field, e.at[1])) +
-         (e.weight[2] * FieldAt(field, e.at[2]) + e.weight[3] * FieldAt(field, e.at[3]));
+// A binding joins a node of the membrane, coordinate by coordinate, to three vertices of the organ, a register each.
+
+__m128 Xyz(const Vec3f& v) { return _mm_set_ps(0, v.z(), v.y(), v.x()); }
+/// In all lanes, of the first three.
+__m128 Dot3(__m128 a, __m128 b) {
+  const __m128 p = _mm_mul_ps(a, b);
+  return _mm_add_ps(_mm_add_ps(_mm_shuffle_ps(p, p, 0x00), _mm_shuffle_ps(p, p, 0x55)), _mm_shuffle_ps(p, p, 0xaa));
 }
-void Spread4(const Element& e, const Vec3f& v, float* field) {
-  AddField(field, e.at[0], e.weight[0] * v);
-  AddField(field, e.at[1], e.weight[1] * v);
-  AddField(field, e.at[2], e.weight[2] * v);
-  AddField(field, e.at[3], e.weight[3] * v);
+__m128 CombineBinding(const Element& e, const float* field) {
+  const auto vertex = [&](std::size_t k) {
+    return _mm_mul_ps(_mm_set1_ps(e.weight[k]), _mm_load_ps(field + e.at[k].base));
+  };
+  const float* node = field + e.at[0].base;
+  const std::size_t step = e.at[0].step;
+  const __m128 at = _mm_mul_ps(_mm_set1_ps(e.weight[0]), _mm_set_ps(0, node[2 * step], node[step], node[0]));
+  return _mm_add_ps(_mm_add_ps(at, vertex(1)), _mm_add_ps(vertex(2), vertex(3)));
+}
+void SpreadBinding(const Element& e, __m128 v, float* field) {
+  alignas(16) float at[4];
+  _mm_store_ps(at, _mm_mul_ps(_mm_set1_ps(e.weight[0]), v));
+  float* node = field + e.at[0].base;
+  const std::size_t step = e.at[0].step;
+  node[0] += at[0];
+  node[step] += at[1];
+  node[2 * step] += at[2];
+  for (std::size_t k = 1; k < 4; ++k) {
+    float* vertex = field + e.at[k].base;
+    _mm_store_ps(vertex, _mm_add_ps(_mm_load_ps(vertex), _mm_mul_ps(_mm_set1_ps(e.weight[k]), v)));
+  }
 }
 template <class Sum>
 bool AnyMarked(const Sum& e, const Regions& regions, std::span<const std::uint8_t> marked) {
@@ -168,12 +189,14 @@ void Elements::Touch(const float* place, const float* start, const Regions& regi
 void Elements::Linearise(const float* place, float* residual) {
   for (const std::uint32_t i : computed_.bindings) {
     Element& e = bindings_[i];
-    const Vec3f d = Combine4(e, place);
-    const float length = std::max(d.norm(), 1e-9f), k = binding_rest_[i].stiffness;
+    const __m128 d = CombineBinding(e, place);
+    const float length = std::max(std::sqrt(_mm_cvtss_f32(Dot3(d, d))), 1e-9f), k = binding_rest_[i].stiffness;
     const float tension = k * (length - binding_rest_[i].length);
     e.kt = std::max(tension / length, 0.0f);
-    e.m = d * (std::sqrt(std::max(k - e.kt, 0.0f)) / length);
-    Spread4(e, d * (-tension / length), residual);
+    alignas(16) float m[4];
+    _mm_store_ps(m, _mm_mul_ps(d, _mm_set1_ps(std::sqrt(std::max(k - e.kt, 0.0f)) / length)));
+    e.m = Vec3f(m[0], m[1], m[2]);
+    SpreadBinding(e, _mm_mul_ps(d, _mm_set1_ps(-tension / length)), residual);
   }
   hinges_.AddForce(place, residual, computed_.hinge_rows);
   guard_.AddForce(residual);
@@ -186,9 +209,10 @@ double Elements::Apply(const float* p, float* out, const Selection& selection) {
   double sum = hinges_.Apply(p, out, selection.hinge_rows) + guard_.Apply(p, out);
   for (const std::uint32_t i : selection.bindings) {
     const Element& e = bindings_[i];
-    const Vec3f d = Combine4(e, p), force = e.kt * d + e.m * e.m.dot(d);
-    sum += static_cast<double>(d.dot(force));
-    Spread4(e, force, out);
+    const __m128 d = CombineBinding(e, p), m = Xyz(e.m);
+    const __m128 force = _mm_add_ps(_mm_mul_ps(_mm_set1_ps(e.kt), d), _mm_mul_ps(m, Dot3(m, d)));
+    sum += static_cast<double>(_mm_cvtss_f32(Dot3(d, force)));
+    SpreadBinding(e, force, out);
   }
   for (const Element& e : contacts_out_ ? std::span<const Element>() : std::span<const Element>(contacts_)) {
     const Vec3f d = Combine(e, p), force = e.kt * d + e.m * e.m.dot(d);
@@ -201,7 +225,8 @@ double Elements::Apply(const float* p, float* out, const Selection& selection) {
 double Elements::Energy(const float* place, std::span<const ContactRow> contacts) {
   double sum = hinges_.Energy(place, computed_.hinge_rows) + guard_.Energy(place);
   for (const std::uint32_t i : computed_.bindings) {
-    const float stretch = Combine4(bindings_[i], place).norm() - binding_rest_[i].length;
+    const __m128 d = CombineBinding(bindings_[i], place);
+    const float stretch = std::sqrt(_mm_cvtss_f32(Dot3(d, d))) - binding_rest_[i].length;
     sum += 0.5 * static_cast<double>(binding_rest_[i].stiffness * stretch * stretch);
   }
   for (const ContactRow& row : contacts) {
