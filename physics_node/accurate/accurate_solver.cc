@@ -391,9 +391,8 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   const Middle middle = coarse_.middle();
   // Stresses reach the vertices around, edges the row below: two phases.
   const std::span<const Task> tasks = regions_.part().tasks, patches = regions_.part().patches;
-  const auto sheet_tasks =
-      static_cast<std::size_t>(std::count_if(tasks.begin(), tasks.end(), [](const Task& task) { return task.sheet; }));
-  workers_.Run(static_cast<int>(sheet_tasks + patches.size()), [&](int index, int worker) {
+  const auto sheet_tasks = static_cast<std::size_t>(regions_.part().sheet_tasks);
+  workers_.Run(static_cast<int>(sheet_tasks + patches.size()), regions_.part().sheet_tasks, [&](int index, int worker) {
     const auto i = static_cast<std::size_t>(index);
     const Task& task = i < sheet_tasks ? tasks[i] : patches[i - sheet_tasks];
     if (task.sheet) {

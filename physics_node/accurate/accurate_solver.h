@@ -121,10 +121,10 @@ class AccurateSolver {
   /// body(task, index, worker) for all that is computed, shared by the threads.
   template <class Body>
   void ForTasks(const Body& body) {
-    ForTasks(regions_.part().tasks, body);
+    ForTasks(regions_.part(), body);
   }
   template <class Body>
-  void ForTasks(std::span<const Task> tasks, const Body& body);
+  void ForTasks(const Part& part, const Body& body);
   /// body(first float, count) for the parts of a field that belong to a task.
   template <class Body>
   void ForParts(const Task& task, const Body& body) const;

@@ -47,10 +47,11 @@ double AccurateSolver::Apply(const FloatArray& direction, float inertia, const P
                              direction.data() + tube_floats_ + 2 * plane_};
   float* const q[3] = {q_.data() + tube_floats_, q_.data() + tube_floats_ + plane_,
                        q_.data() + tube_floats_ + 2 * plane_};
-  ForTasks(part.patches, [&](const Task& task, int, int) {
+  workers_.Run(static_cast<int>(part.patches.size()), 0, [&](int index, int) {
+    const Task& task = part.patches[static_cast<std::size_t>(index)];
     kernels_.organ_stress(organ, organ_matrix, direction.data(), Vertex(task.first), Vertex(task.end));
   });
-  ForTasks(part.tasks, [&](const Task& task, int index, int worker) {
+  ForTasks(part, [&](const Task& task, int index, int worker) {
     partial_[static_cast<std::size_t>(index)] =
         task.sheet ? kernels_.sheet_apply(sheet, inertia, matrix, p, q, carry_[static_cast<std::size_t>(worker)].data(),
                                           task.first, task.end)
@@ -116,7 +117,7 @@ void AccurateSolver::SolveAtContacts(float inertia) {
                              residual_.data() + tube_floats_ + 2 * plane_};
   float* const z[3] = {local_.data() + tube_floats_, local_.data() + tube_floats_ + plane_,
                        local_.data() + tube_floats_ + 2 * plane_};
-  ForTasks(pressed_.tasks, [&](const Task& task, int index, int) {
+  ForTasks(pressed_, [&](const Task& task, int index, int) {
     partial_[static_cast<std::size_t>(index)] =
         task.sheet ? kernels_.sheet_block_solve(sheet, matrix, r, z, task.first, task.end)
                    : kernels_.organ_block_solve(organ_matrix, residual_.data(), local_.data(), Vertex(task.first),
@@ -128,7 +129,7 @@ void AccurateSolver::SolveAtContacts(float inertia) {
     return;
   }
   const auto alpha = static_cast<float>(rz / curvature);
-  ForTasks(around_.tasks, [&](const Task& task, int, int) {
+  ForTasks(around_, [&](const Task& task, int, int) {
     ForParts(task, [&](std::size_t first, std::size_t count) {
       kernels_.advance(alpha, local_.data() + first, q_.data() + first, d_.data() + first, residual_.data() + first,
                        count);

@@ -8,9 +8,9 @@ namespace fulcrum::physics::accurate {
 inline std::uint32_t Vertex(int v) { return static_cast<std::uint32_t>(v); }
 
 template <class Body>
-void AccurateSolver::ForTasks(std::span<const Task> tasks, const Body& body) {
-  workers_.Run(static_cast<int>(tasks.size()),
-               [&](int index, int worker) { body(tasks[static_cast<std::size_t>(index)], index, worker); });
+void AccurateSolver::ForTasks(const Part& part, const Body& body) {
+  workers_.Run(static_cast<int>(part.tasks.size()), part.sheet_tasks,
+               [&](int index, int worker) { body(part.tasks[static_cast<std::size_t>(index)], index, worker); });
 }
 
 template <class Body>

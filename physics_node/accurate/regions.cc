@@ -178,6 +178,7 @@ void Regions::FindTasks(Part* part) {
   part->tasks.clear();
   part->patches.clear();
   AddTasks(0, sheet_regions_, part->marked, &part->tasks);
+  part->sheet_tasks = static_cast<int>(part->tasks.size());
   AddTasks(sheet_regions_, count(), part->marked, &part->tasks);
   MarkNear(part->marked);
   AddTasks(sheet_regions_, count(), near_, &part->patches);

@@ -23,6 +23,7 @@ struct Task {
 struct Part {
   std::vector<std::uint8_t> marked;  ///< By region.
   std::vector<Task> tasks;           ///< In order: the membrane, then the organ.
+  int sheet_tasks = 0;               ///< How many are of the membrane.
   std::vector<Task> patches;         ///< Vertices of the organ whose patches those need.
 };
 

@@ -2,6 +2,7 @@
 
 #include <immintrin.h>
 
+#include <algorithm>
 #include <chrono>
 
 namespace fulcrum::physics::accurate {
@@ -12,7 +13,7 @@ constexpr int kSpins = 1500;
 
 }  // namespace
 
-Workers::Workers(int threads) {
+Workers::Workers(int threads) : tickets_(static_cast<std::size_t>(std::max(threads, 1))) {
   for (int worker = 1; worker < threads; ++worker) {
     threads_.emplace_back([this, worker] { Loop(worker); });
   }
@@ -28,29 +29,45 @@ Workers::~Workers() {
 }
 
 void Workers::Help(int worker) {
-  std::uint64_t ticket = ticket_.load(std::memory_order_acquire);
-  for (;;) {
-    const auto next = static_cast<std::uint32_t>(ticket & 0xffffu),
-               tasks = static_cast<std::uint32_t>(ticket >> 16) & 0xffffu;
-    if (next >= tasks) {
-      return;
-    }
-    if (!ticket_.compare_exchange_weak(ticket, ticket + 1, std::memory_order_acq_rel, std::memory_order_acquire)) {
-      continue;
-    }
-    // The phase cannot end before this task has, so these are its own.
-    call_.load(std::memory_order_relaxed)(body_.load(std::memory_order_relaxed), static_cast<int>(next), worker);
-    done_.fetch_add(1, std::memory_order_release);
-    ticket = ticket_.load(std::memory_order_acquire);
+  for (int i = 0; i < count(); ++i) {
+    HelpPart((worker + i) % count(), worker);
   }
 }
 
-void Workers::RunShared(int tasks, Call call, const void* body) {
+void Workers::HelpPart(int part, int worker) {
+  std::atomic<std::uint64_t>& word = tickets_[static_cast<std::size_t>(part)].word;
+  std::uint64_t ticket = word.load(std::memory_order_acquire);
+  for (;;) {
+    const auto next = static_cast<int>(ticket & 0xffffu), end = static_cast<int>(ticket >> 16 & 0xffffu);
+    if (next >= end) {
+      return;
+    }
+    if (!word.compare_exchange_weak(ticket, ticket + 1, std::memory_order_acq_rel, std::memory_order_acquire)) {
+      continue;
+    }
+    // The phase cannot end before this task has, so all of this is its own.
+    const int tasks = tasks_.load(std::memory_order_relaxed), split = split_.load(std::memory_order_relaxed);
+    const int first = First(split, part), of_first = First(split, part + 1) - first;
+    const int task = next < of_first ? first + next : split + First(tasks - split, part) + next - of_first;
+    call_.load(std::memory_order_relaxed)(body_.load(std::memory_order_relaxed), task, worker);
+    done_.fetch_add(1, std::memory_order_release);
+    ticket = word.load(std::memory_order_acquire);
+  }
+}
+
+void Workers::RunShared(int tasks, int split, Call call, const void* body) {
   call_.store(call, std::memory_order_relaxed);
   body_.store(body, std::memory_order_relaxed);
+  tasks_.store(tasks, std::memory_order_relaxed);
+  split_.store(split, std::memory_order_relaxed);
   done_.store(0, std::memory_order_relaxed);
   const std::uint32_t phase = phase_.load(std::memory_order_relaxed) + 1;
-  ticket_.store(std::uint64_t{phase} << 32 | static_cast<std::uint64_t>(tasks) << 16, std::memory_order_release);
+  for (int part = 0; part < count(); ++part) {
+    const int own =
+        First(split, part + 1) - First(split, part) + First(tasks - split, part + 1) - First(tasks - split, part);
+    tickets_[static_cast<std::size_t>(part)].word.store(
+        std::uint64_t{phase} << 32 | static_cast<std::uint64_t>(own) << 16, std::memory_order_release);
+  }
   phase_.store(phase, std::memory_order_release);
   phase_.notify_all();
   Help(0);

@@ -1,6 +1,7 @@
-// Threads that share the tasks of a phase. Tasks are claimed one by one, so that a thread whose core is taken away
-// costs the time of its task and no more; whoever finds nothing to do spins for a while and then sleeps. Which thread
-// does a task must not matter to its result.
+// Threads that share the tasks of a phase. Each begins with its own part of them, the same in each phase, so that data
+// stay in the cache of its core; then it takes what others have left. Tasks are claimed one by one, so that a thread
+// whose core is taken away costs the time of its task and no more; whoever finds nothing to do spins for a while and
+// then sleeps. Which thread does a task must not matter to its result.
 #pragma once
 
 #include <atomic>
@@ -18,12 +19,13 @@ class Workers {
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
-  [[nodiscard]] int count() const { return static_cast<int>(threads_.size()) + 1; }
+  [[nodiscard]] int count() const { return static_cast<int>(tickets_.size()); }
 
-  /// body(task, worker) once for each task in [0, tasks), worker in [0, count()); returns when all are done. At most
-  /// 65,535 tasks. Not from within a body.
+  /// body(task, worker) once for each task in [0, tasks), worker in [0, count()); returns when all are done. The first
+  /// `split` tasks are of one kind, the others of another: each worker's part has its share of both. At most 65,535
+  /// tasks. Not from within a body.
   template <class Body>
-  void Run(int tasks, const Body& body) {
+  void Run(int tasks, int split, const Body& body) {
     if (threads_.empty() || tasks < 2) {
       for (int task = 0; task < tasks; ++task) {
         body(task, 0);
@@ -31,19 +33,28 @@ class Workers {
       return;
     }
     RunShared(
-        tasks, [](const void* b, int task, int worker) { (*static_cast<const Body*>(b))(task, worker); }, &body);
+        tasks, split, [](const void* b, int task, int worker) { (*static_cast<const Body*>(b))(task, worker); }, &body);
   }
 
  private:
   using Call = void (*)(const void* body, int task, int worker);
 
-  void RunShared(int tasks, Call call, const void* body);
-  /// Does tasks of the phase in `ticket_` until none is left.
+  /// First of `tasks` in a worker's part.
+  [[nodiscard]] int First(int tasks, int worker) const { return tasks * worker / count(); }
+  void RunShared(int tasks, int split, Call call, const void* body);
+  /// Does tasks of the phase until none is left.
   void Help(int worker);
+  /// Does tasks of one part.
+  void HelpPart(int part, int worker);
   void Loop(int worker);
 
-  /// Phase number, tasks and next task in one word (32, 16, 16 bits): a claim cannot mistake one phase for another.
-  alignas(64) std::atomic<std::uint64_t> ticket_{0};
+  /// Phase number, tasks and next task of a part in one word (32, 16, 16 bits): a claim cannot mistake one phase for
+  /// another.
+  struct alignas(64) Ticket {
+    std::atomic<std::uint64_t> word{0};
+  };
+  std::vector<Ticket> tickets_;  ///< By worker.
+  std::atomic<int> tasks_{0}, split_{0};
   std::atomic<Call> call_{nullptr};
   std::atomic<const void*> body_{nullptr};
   alignas(64) std::atomic<int> done_{0};

@@ -124,7 +124,7 @@ TEST(Workers, DoEachTaskOnce) {
   std::vector<std::atomic<int>> done(200);
   for (int phase = 0; phase < 2000; ++phase) {
     const int tasks = phase % 200;
-    workers.Run(tasks, [&](int task, int worker) {
+    workers.Run(tasks, tasks / 3, [&](int task, int worker) {
       EXPECT_LT(worker, 3);
       ++done[static_cast<std::size_t>(task)];
     });
