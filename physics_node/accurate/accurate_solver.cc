@@ -8,15 +8,19 @@
 namespace fulcrum::physics::accurate {
 namespace {
 
-/// Above this the inertial guess is compared with the state before it, and the solve with the guess [m].
-constexpr float kDoubtfulGuess = 0.0005f;
+/// The inertial guess goes no faster than this [m/s], or than the fastest tool by this factor: what a tool pulls comes
+/// along, what snaps back or flaps beside a cut does not go on from one truncated solve's error to the next. Where
+/// something would, the guess is also compared in energy with staying.
+constexpr float kGuessedSpeed = 0.08f, kFasterThanTools = 1.5f;
+/// Above this the solve is compared in energy with the guess [m].
 constexpr float kDoubtfulCorrection = 0.0002f;
 /// Nothing moves faster: ten times a quick hand [m/s].
 constexpr float kLargestSpeed = 5.0f;
 /// No place is so far from the origin [m].
 constexpr float kFarthest = 10.0f;
-/// Rows of the membrane that the coarse matrix takes over per step: complete about once in 60 steps.
-constexpr int kRefreshRows = 5;
+/// Rows of the membrane that the coarse matrix takes over per step: complete about once in 30 steps. Twice as old, its
+/// errors in the pull are two thirds larger.
+constexpr int kRefreshRows = 10;
 
 bool IsStiff(const Element& contact) { return contact.m.squaredNorm() > Elements::kStiffContact; }
 
@@ -112,7 +116,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   // The first coarse matrix: all of it, at rest.
   const Effort effort = EffortOf(scene.physics.preset);
   const Inertia inertia = MakeInertia(scene.physics.dt_s / static_cast<float>(effort.substeps));
-  (void)Guess(inertia.h);
+  (void)Guess(inertia.h, 0.0f);
   Linearise(inertia, {});
   coarse_.Refresh(MakeSheet(), MakeMatrix(), inertia.inertia, rows_);
 }
@@ -284,16 +288,16 @@ void AccurateSolver::FollowRegions() {
 }
 
 /// Free particles go on with their velocity; what has no sound velocity stays.
-GuessCount AccurateSolver::Guess(float h) {
+GuessCount AccurateSolver::Guess(float h, float limit) {
   const Sheet sheet = MakeSheet();
   const SheetLinearise at = At(place_, nullptr);
   float* const place[3] = {place_.data() + tube_floats_, place_.data() + tube_floats_ + plane_,
                            place_.data() + tube_floats_ + 2 * plane_};
   ForTasks([&](const Task& task, int index, int) {
     guess_[static_cast<std::size_t>(index)] =
-        task.sheet ? kernels_.sheet_guess(sheet, h, at.start, at.velocity, place, task.first, task.end)
-                   : kernels_.organ_guess(h, particles_->tube(), velocity_.data(), place_.data(), Vertex(task.first),
-                                          Vertex(task.end));
+        task.sheet ? kernels_.sheet_guess(sheet, h, limit, at.start, at.velocity, place, task.first, task.end)
+                   : kernels_.organ_guess(h, limit, particles_->tube(), velocity_.data(), place_.data(),
+                                          Vertex(task.first), Vertex(task.end));
   });
   GuessCount count{};
   for (std::size_t i = 0; i < regions_.part().tasks.size(); ++i) {
@@ -301,6 +305,17 @@ GuessCount AccurateSolver::Guess(float h) {
     count.resets += guess_[i].resets;
   }
   return count;
+}
+
+float AccurateSolver::GuessLimit(float h, std::span<const HeldPlace> held, std::span<const ContactRow> contacts) const {
+  float farthest_sq = 0;
+  for (const HeldPlace& place : held) {
+    farthest_sq = std::max(farthest_sq, (place.place - particles_->At(place.at)).squaredNorm());
+  }
+  for (const ContactRow& row : contacts) {
+    farthest_sq = std::max(farthest_sq, row.drift.squaredNorm());
+  }
+  return std::max(kGuessedSpeed * h, kFasterThanTools * std::sqrt(farthest_sq));
 }
 
 void AccurateSolver::ForgetDamagedVelocities() {
@@ -475,21 +490,20 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
   if (regions_.Rebuild()) {
     FollowRegions();
   }
-  const GuessCount guess = Guess(h);
+  const float limit = GuessLimit(h, held, contacts);
+  const GuessCount guess = Guess(h, limit);
   if (guess.resets > 0) {
     ForgetDamagedVelocities();
   }
   PutUnguessed(held, contacts);
-  bool searched = false;
-  if (guess.largest_sq > kDoubtfulGuess * kDoubtfulGuess) {
+  if (guess.largest_sq > limit * limit) {
     const double moving = EnergyAt(place_, inertia, contacts);
-    (void)Guess(0.0f);
+    (void)Guess(0.0f, 0.0f);
     PutUnguessed(held, contacts);
     if (moving < EnergyAt(place_, inertia, contacts)) {
-      (void)Guess(h);
+      (void)Guess(h, limit);
       PutUnguessed(held, contacts);
     }
-    searched = true;
   }
   Linearise(inertia, contacts);
   if (refresh_due_ && regions_.everything()) {
@@ -503,7 +517,6 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
   const float largest = LargestCorrection();
   LimitCorrection(largest);
   if (largest > kDoubtfulCorrection) {
-    searched = true;
     SearchAlongCorrection(inertia, contacts);
   }
   // Before the particles move on: their start is still in the store.
@@ -511,7 +524,7 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
   SubstepReport report = Finish(h);
   regions_.Settle(speed_, h);
   report.largest_correction_m = largest;
-  report.searched = searched;
+  report.searched = largest > kDoubtfulCorrection;
   report.resets += guess.resets;
   return report;
 }

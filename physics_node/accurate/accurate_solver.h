@@ -100,7 +100,9 @@ class AccurateSolver {
   void Measure(const Task& task, std::vector<float>* moved) const;
   void WakeTouched(std::span<const HeldPlace> held, std::span<const ContactRow> contacts);
   void FollowRegions();
-  GuessCount Guess(float h);
+  /// place <- start + h velocity, at most `limit` away [m].
+  GuessCount Guess(float h, float limit);
+  [[nodiscard]] float GuessLimit(float h, std::span<const HeldPlace> held, std::span<const ContactRow> contacts) const;
   void ForgetDamagedVelocities();
   void PutUnguessed(std::span<const HeldPlace> held, std::span<const ContactRow> contacts);
   /// Of what is computed, for comparisons.

@@ -25,6 +25,18 @@ std::vector<Place> Spread(int fine, int count) {
   return place;
 }
 
+/// Sums of symmetric matrices xx yy zz xy xz yz, times 1, t and t^2.
+struct Moments {
+  std::array<std::array<float, 6>, 3> sum{};
+  void Add(const std::array<float, 6>& element, float t) {
+    for (std::size_t i = 0; i < 6; ++i) {
+      sum[0][i] += element[i];
+      sum[1][i] += t * element[i];
+      sum[2][i] += t * t * element[i];
+    }
+  }
+};
+
 }  // namespace
 
 CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
@@ -234,7 +246,42 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
   std::array<int, 4> node;
   std::array<std::array<std::array<float, 6>, 4>, 4> sum{};
   int cell = 0;
+  const auto shape = [](float row_fraction, float column_fraction) {
+    return std::array<float, 4>{(1 - row_fraction) * (1 - column_fraction), (1 - row_fraction) * column_fraction,
+                                row_fraction * (1 - column_fraction), row_fraction * column_fraction};
+  };
+  // In a coarse cell the weights of a kind of edge (0..2, and 3: a node's mass) are linear along the row, so three
+  // moments of their matrices are all that is needed of them.
+  std::array<Moments, 4> moments{};
+  const auto add_moments = [&](std::size_t kind) {
+    const auto weights = [&](float t) {
+      std::array<float, 4> w = shape(here.fraction, t);
+      if (kind < 3) {
+        const auto far = shape(kind == 0 ? here.fraction : next_row, kind == 1 ? t : t + next_column);
+        for (std::size_t i = 0; i < 4; ++i) {
+          w[i] -= far[i];
+        }
+      }
+      return w;
+    };
+    const std::array<float, 4> constant = weights(0), at_end = weights(1);
+    for (std::size_t a = 0; a < 4; ++a) {
+      const float slope_a = at_end[a] - constant[a];
+      for (std::size_t b = a; b < 4; ++b) {
+        const float slope_b = at_end[b] - constant[b];
+        for (std::size_t i = 0; i < 6; ++i) {
+          sum[a][b][i] += constant[a] * constant[b] * moments[kind].sum[0][i] +
+                          (constant[a] * slope_b + slope_a * constant[b]) * moments[kind].sum[1][i] +
+                          slope_a * slope_b * moments[kind].sum[2][i];
+        }
+      }
+    }
+  };
   const auto flush = [&] {
+    for (std::size_t kind = 0; kind < 4; ++kind) {
+      add_moments(kind);
+    }
+    moments = {};
     for (std::size_t a = 0; a < 4; ++a) {
       for (std::size_t b = 0; b < 4; ++b) {
         const std::array<float, 6>& k = a <= b ? sum[a][b] : sum[b][a];
@@ -256,20 +303,11 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
       node[corner] = exists ? (here.cell + i) * columns_ + cell + j : -1;
     }
   };
-  const auto shape = [](float row_fraction, float column_fraction) {
-    return std::array<float, 4>{(1 - row_fraction) * (1 - column_fraction), (1 - row_fraction) * column_fraction,
-                                row_fraction * (1 - column_fraction), row_fraction * column_fraction};
-  };
-  const auto add = [&](const std::array<float, 4>& w, float k, const float* m) {
-    std::array<float, 6> element{k, k, k, 0, 0, 0};
-    if (m) {
-      element = {k + m[0] * m[0], k + m[1] * m[1], k + m[2] * m[2], m[0] * m[1], m[0] * m[2], m[1] * m[2]};
-    }
+  const auto add = [&](const std::array<float, 4>& w, const std::array<float, 6>& element) {
     for (std::size_t a = 0; a < 4; ++a) {
       for (std::size_t b = a; b < 4; ++b) {
-        const float ww = w[a] * w[b];
         for (std::size_t i = 0; i < 6; ++i) {
-          sum[a][b][i] += ww * element[i];
+          sum[a][b][i] += w[a] * w[b] * element[i];
         }
       }
     }
@@ -282,31 +320,32 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
       enter(at.cell);
     }
     const bool moves = value(sheet.w, col) > 0.0f;
-    std::array<float, 4> own{};
     if (moves) {
-      own = shape(here.fraction, at.fraction);
-      add(own, value(sheet.mass, col) * inertia, nullptr);
+      const float mass = value(sheet.mass, col) * inertia;
+      moments[3].Add({mass, mass, mass, 0, 0, 0}, at.fraction);
     }
-    for (int d = 0; d < 3; ++d) {
+    for (std::size_t d = 0; d < 3; ++d) {
       const std::size_t down = d != 0 ? stride : 0;
       const std::uint32_t to = d != 1 ? col + 1 : col;
       if (to >= cols_ || (down && row + 1 >= rows_) || !(value(sheet.axial[d], col) > 0.0f)) {
         continue;
       }
-      std::array<float, 4> w{};
-      if (sheet.w[static_cast<std::size_t>(row) * stride + down + layout_.Offset(0, to)] > 0.0f) {
-        w = shape(down ? next_row : here.fraction, at.fraction + (d != 1 ? next_column : 0.0f));
-      }
-      for (std::size_t i = 0; i < 4; ++i) {
-        w[i] -= own[i];
-      }
-      const float root = std::sqrt(value(matrix.along[d], col));
-      float m[3];
+      float e[3];
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const float* x = matrix.place[axis] + static_cast<std::size_t>(row) * stride;
-        m[axis] = root * (x[down + layout_.Offset(0, to)] - x[layout_.Offset(0, col)]);
+        e[axis] = x[down + layout_.Offset(0, to)] - x[layout_.Offset(0, col)];
       }
-      add(w, value(matrix.kt[d], col), m);
+      const float k = value(matrix.kt[d], col), along = value(matrix.along[d], col);
+      const std::array<float, 6> element{k + along * e[0] * e[0], k + along * e[1] * e[1], k + along * e[2] * e[2],
+                                         along * e[0] * e[1],     along * e[0] * e[2],     along * e[1] * e[2]};
+      const bool far_moves = sheet.w[static_cast<std::size_t>(row) * stride + down + layout_.Offset(0, to)] > 0.0f;
+      if (moves && far_moves) {
+        moments[d].Add(element, at.fraction);
+      } else if (moves) {
+        add(shape(here.fraction, at.fraction), element);
+      } else if (far_moves) {
+        add(shape(down ? next_row : here.fraction, at.fraction + (d != 1 ? next_column : 0.0f)), element);
+      }
     }
   }
   flush();

@@ -112,9 +112,10 @@ struct FinishCount {
 struct Kernels {
   const char* name;
 
-  /// place <- start + h * velocity for nodes that move and have a sound velocity, start for the others.
-  GuessCount (*sheet_guess)(const Sheet& sheet, float h, const float* const start[3], const float* const velocity[3],
-                            float* const place[3], int row0, int row1);
+  /// place <- start + h * velocity, at most `limit` from start, for nodes that move and have a sound velocity, start
+  /// for the others.
+  GuessCount (*sheet_guess)(const Sheet& sheet, float h, float limit, const float* const start[3],
+                            const float* const velocity[3], float* const place[3], int row0, int row1);
   void (*sheet_linearise)(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at,
                           const SheetMatrix& matrix, float* carry, int row0, int row1);
   /// out <- K p + mass * inertia * p. Returns p . out.
@@ -150,8 +151,8 @@ struct Kernels {
   bool (*within)(const float* p, float limit, std::size_t count, bool xyzw);
 
   /// As sheet_guess, for vertices [first, last) of xyz_ arrays; w of `start` tells which move.
-  GuessCount (*organ_guess)(float h, const float* start, const float* velocity, float* place, std::uint32_t first,
-                            std::uint32_t last);
+  GuessCount (*organ_guess)(float h, float limit, const float* start, const float* velocity, float* place,
+                            std::uint32_t first, std::uint32_t last);
   /// Stress and its derivative of patches [first, last).
   void (*organ_linearise)(const Organ& organ, const OrganMatrix& matrix, const float* place, std::uint32_t first,
                           std::uint32_t last);

@@ -292,7 +292,7 @@ inline double OrganEnergy(const Organ& organ, const Inertia& inertia, const Orga
   return sum;
 }
 
-inline accurate::GuessCount OrganGuess(float h, const float* start, const float* velocity, float* place,
+inline accurate::GuessCount OrganGuess(float h, float limit, const float* start, const float* velocity, float* place,
                                        std::uint32_t first, std::uint32_t last) {
   const F4 step = F4::All(h), keep = {_mm_castsi128_ps(_mm_set_epi32(0, -1, -1, -1))};
   accurate::GuessCount count{0, 0};
@@ -302,7 +302,8 @@ inline accurate::GuessCount OrganGuess(float h, const float* start, const float*
     const bool moves = start[i + 3] > 0.0f, sound = square < 1e30f;
     count.resets += moves && !sound ? 1 : 0;
     count.largest_sq = moves && sound ? Larger(square, count.largest_sq) : count.largest_sq;
-    F4{_mm_and_ps((moves && sound ? x + d : x).v, keep.v)}.Store(place + i);
+    const F4 way = square > limit * limit ? d * F4::All(limit / Root(square)) : d;
+    F4{_mm_and_ps((moves && sound ? x + way : x).v, keep.v)}.Store(place + i);
   }
   return count;
 }

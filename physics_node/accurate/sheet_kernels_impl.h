@@ -66,19 +66,20 @@ inline float LargestOf(F8 v) {
   return largest;
 }
 
-inline accurate::GuessCount SheetGuess(const Sheet& sheet, float h, const float* const start[3],
+inline accurate::GuessCount SheetGuess(const Sheet& sheet, float h, float limit, const float* const start[3],
                                        const float* const velocity[3], float* const place[3], int row0, int row1) {
-  F8 largest = F8::All(0);
-  const F8 zero = F8::All(0), step = F8::All(h), sound = F8::All(1e30f);
+  const F8 zero = F8::All(0), step = F8::All(h), sound = F8::All(1e30f), one = F8::All(1.0f), most = F8::All(limit);
+  F8 largest = zero;
   std::uint32_t resets = 0;
   for (std::size_t at = RowStart(sheet, row0), end = RowStart(sheet, row1); at < end; at += 8) {
     const F8 moves = F8::Load(sheet.w + at) > zero;
-    V8 d = LoadV(velocity, at) * step;
-    const F8 finite = Dot(d, d) < sound, keep = moves & finite;
+    const V8 d = LoadV(velocity, at) * step;
+    const F8 square = Dot(d, d), finite = square < sound, keep = moves & finite;
     resets += static_cast<std::uint32_t>(__builtin_popcount(Bits(moves) & ~Bits(finite) & 0xffu));
-    d = {d.x & keep, d.y & keep, d.z & keep};
-    largest = Max(largest, Dot(d, d));
-    StoreV(LoadV(start, at) + d, place, at);
+    largest = Max(largest, square & keep);
+    const F8 part = Min(one, most / Sqrt(Max(square, F8::All(1e-24f))));
+    const V8 way = d * part;
+    StoreV(LoadV(start, at) + V8{way.x & keep, way.y & keep, way.z & keep}, place, at);
   }
   return {LargestOf(largest), resets};
 }

@@ -83,23 +83,42 @@ void MeasureTwoThreads(const StandardCase& standard, const StandardCase::Referen
   report->Add("physics.accurate.frame_ms_p50_2threads", benchmark::Quantile(frame_ms, 0.5), "ms");
 }
 
-/// Measures one solver, prints its keys, returns its place in the plot.
+StandardErrors Median(const std::vector<StandardErrors>& all) {
+  StandardErrors median;
+  for (double StandardErrors::*part : {&StandardErrors::pull, &StandardErrors::release, &StandardErrors::hold,
+                                       &StandardErrors::hold_max_m, &StandardErrors::force, &StandardErrors::volume,
+                                       &StandardErrors::tet_volume, &StandardErrors::strain, &StandardErrors::cut}) {
+    std::vector<double> values;
+    for (const StandardErrors& errors : all) {
+      values.push_back(errors.*part);
+    }
+    median.*part = benchmark::Quantile(values, 0.5);
+  }
+  return median;
+}
+
+/// Measures one solver, prints its keys, returns its place in the plot. How the sheet folds hangs on the last bit, and
+/// the errors on the folds: told is the median of runs whose stiffness differs by some millionths.
 WorkPrecisionPoint Measure(const StandardCase& standard, const StandardCase::Reference& truth, const Entry& entry,
                            benchmark::Report* report) {
+  constexpr int kRuns = 5;
+  constexpr float kOther = 1e-6f;
   const std::string stem = "physics." + entry.key + ".";
   const bool with_cut = entry.key == "accurate";
   SceneView scene = standard.scene();
   scene.physics = entry.params;
   std::vector<double> frame_ms, p99, cut_max;
-  StandardRun run;
-  for (int repeat = 0; repeat < (report->quick() || entry.key.empty() || entry.key.starts_with("table") ? 1 : 3);
-       ++repeat) {
-    run = RunStandardCase(standard, truth, entry.make, scene, with_cut);
+  std::vector<StandardErrors> errors;
+  const int runs = report->quick() || entry.key.empty() || entry.key.starts_with("table") ? 1 : kRuns;
+  for (int i = 0; i < runs; ++i) {
+    scene.physics.membrane_Et_N_per_m = entry.params.membrane_Et_N_per_m * (1 + kOther * static_cast<float>(i));
+    const StandardRun run = RunStandardCase(standard, truth, entry.make, scene, with_cut);
     frame_ms.insert(frame_ms.end(), run.frame_ms.begin(), run.frame_ms.end());
     p99.push_back(benchmark::Quantile(run.frame_ms, 0.99));
     cut_max.push_back(run.cut_frame_ms.empty() ? 0 : run.cut_frame_ms.front());
+    errors.push_back(run.errors);
   }
-  const StandardErrors& e = run.errors;
+  const StandardErrors e = Median(errors);
   const double p50 = benchmark::Quantile(frame_ms, 0.5);
   if (!entry.key.empty()) {
     report->Add(stem + "frame_ms_p50", p50, "ms");
