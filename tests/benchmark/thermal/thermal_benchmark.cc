@@ -13,6 +13,7 @@
 #include "tests/benchmark/report.h"
 #include "tests/benchmark/thermal/picture.h"
 #include "tests/numerics/thermal/flat_scene.h"
+#include "tests/numerics/thermal/heat_cases.h"
 #include "tests/numerics/thermal/moving_gaussian.h"
 #include "tests/numerics/thermal/potential_rings.h"
 #include "thermal_node/coupling/patch.h"
@@ -124,6 +125,24 @@ void HeatOneSpot(Report* report) {
   report->Add("thermal.heat_one_spot.max_error_pct", 100 * result.max_error, "%");
 }
 
+void HeatFastTip(Report* report) {
+  if (!report->Wants("thermal.heat_fast_tip")) return;
+  const MovingGaussianResult result = RunMovingGaussian(1e-4f, 0.05);
+  report->Add("thermal.heat_fast_tip.step_ms", result.step_ms, "ms");
+  report->Add("thermal.heat_fast_tip.max_error_pct", 100 * result.max_error, "%");
+}
+
+/// Cells half as large with steps a quarter as long, and steps halved on one grid.
+void Orders(Report* report) {
+  if (!report->Wants("thermal.order")) return;
+  const double mode = std::log2(ModeError(2e-4f, 4e-2f) / ModeError(1e-4f, 1e-2f));
+  const double variable = std::log2(VariableError(2e-4f, 4e-2f) / VariableError(1e-4f, 1e-2f));
+  report->Add("thermal.order.eigenfunction", mode, "1");
+  report->Add("thermal.order.variable", variable, "1");
+  report->Add("thermal.order.space", std::min(mode, variable), "1");
+  report->Add("thermal.order.time", TimeOrder(), "1");
+}
+
 void PotentialWindow(Report* report) {
   if (!report->Wants("thermal.potential_window")) return;
   const RingsResult result = SolveRings(6.3, 29.2, 1e-2f);
@@ -152,6 +171,8 @@ int main(int argc, char** argv) {
   Frame(&report);
   Cuts(&report);
   HeatOneSpot(&report);
+  HeatFastTip(&report);
+  Orders(&report);
   PotentialWindow(&report);
   Idle(&report);
   return 0;

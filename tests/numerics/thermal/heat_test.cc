@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "tests/numerics/thermal/heat_cases.h"
 #include "tests/numerics/thermal/moving_gaussian.h"
 #include "thermal_node/heat/heat_field.h"
 
@@ -20,64 +21,15 @@ ThermalParams Lossless() {
   return params;
 }
 
-/// Sets theta of every tissue cell from f(x, y), at cell centres [m].
-template <class F>
-void Fill(HeatField* field, const F& f) {
-  const Sheet& sheet = field->sheet();
-  Ledger ledger;
-  for (int ty = 0; ty < sheet.tiles_y; ++ty) {
-    for (int tx = 0; tx < sheet.tiles_x; ++tx) {
-      Tile* tile = field->Wake(tx, ty);
-      for (int k = 0; k < kTileCells; ++k) {
-        if ((tile->state.flags[k] & kNoTissue) != 0) continue;
-        const Vec2f p = sheet.CentreOf({tx * kTile + k % kTile, ty * kTile + k / kTile});
-        tile->state.enthalpy[k] =
-            static_cast<float>(f(p.x(), p.y())) * field->material().HeatCapacity(tile->state.water[k]);
-      }
-      field->RefreshTheta(tile, &ledger);
-    }
-  }
-}
-
-/// Visits the theta of every tissue cell: visit(theta, x, y).
-template <class F>
-void ForCells(const HeatField& field, const F& visit) {
-  for (const Tile* tile : field.awake()) {
-    for (int k = 0; k < kTileCells; ++k) {
-      if ((tile->state.flags[k] & kNoTissue) != 0) continue;
-      const Vec2f p = field.sheet().CentreOf({tile->tx * kTile + k % kTile, tile->ty * kTile + k / kTile});
-      visit(tile->theta[ThetaIndex(k % kTile, k / kTile)], p.x(), p.y());
-    }
-  }
-}
-
-/// Largest error of the mode cos(pi x / L) cos(2 pi y / L) on a square with insulated borders and losses after 2 s,
-/// relative to its amplitude, for a cell size; the time step goes with its square.
-double ModeError(float cell_m, float dt_s) {
-  ThermalParams params;
-  params.cell_m = cell_m;
-  const Material material = MakeMaterial(params);
-  const float length = 6.4e-3f;
-  HeatField field(MakeFlatSheet(length, length, cell_m), material);
-  const double kx = kPi / length, ky = 2 * kPi / length;
-  Fill(&field, [&](double x, double y) { return 30 + 20 * std::cos(kx * x) * std::cos(ky * y); });
-  const double alpha = material.k_wet / material.rc_wet, loss = material.loss_resting / material.rc_wet;
-  const double time = 2.0;
-  Ledger ledger;
-  const int steps = static_cast<int>(std::lround(time / dt_s));
-  for (int n = 0; n < steps; ++n) EXPECT_EQ(field.Diffuse(dt_s, &ledger), 1);
-  double worst = 0;
-  ForCells(field, [&](double theta, double x, double y) {
-    const double mode =
-        20 * std::exp(-(alpha * (kx * kx + ky * ky) + loss) * time) * std::cos(kx * x) * std::cos(ky * y);
-    worst = std::max(worst, std::abs(theta - 30 * std::exp(-loss * time) - mode) / 20);
-  });
-  return worst;
-}
-
 TEST(HeatTest, EigenfunctionDecaysWithSecondOrder) {
   const double coarse = ModeError(2e-4f, 4e-2f), fine = ModeError(1e-4f, 1e-2f);
   EXPECT_LT(fine, 2e-3);
+  EXPECT_GE(std::log2(coarse / fine), 1.9);
+}
+
+TEST(HeatTest, VariableTissueIsSolvedWithSecondOrder) {
+  const double coarse = VariableError(2e-4f, 4e-2f), fine = VariableError(1e-4f, 1e-2f);
+  EXPECT_LT(fine, 2e-2);
   EXPECT_GE(std::log2(coarse / fine), 1.9);
 }
 

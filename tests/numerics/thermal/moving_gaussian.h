@@ -9,8 +9,8 @@ struct MovingGaussianResult {
   int tiles = 0;
 };
 
-/// s = 0.25 mm, 10 mm/s, window of 9.6 mm, frames of 10 ms for 0.4 s, without losses; half of each frame's swept source
+/// s = 0.25 mm, 4 mm of way in a window of 9.6 mm, frames of 10 ms, without losses; half of each frame's swept source
 /// before the conduction and half after.
-MovingGaussianResult RunMovingGaussian(float cell_m);
+MovingGaussianResult RunMovingGaussian(float cell_m, double speed_m_s = 0.01);
 
 }  // namespace fulcrum::thermal

@@ -1,0 +1,143 @@
+#include "tests/numerics/thermal/heat_cases.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+namespace fulcrum::thermal {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr float kLength = 6.4e-3f;
+
+/// theta = e^(-t / tau) (30 + 10 cos(a x) cos(2 a y)) where water is 0.6 + 0.3 cos(a x) cos(a y), a = pi / L.
+class Variable {
+ public:
+  Variable(float cell_m, float dt_s) : dt_s_(dt_s), field_(MakeFlatSheet(kLength, kLength, cell_m), Wet(cell_m)) {
+    Fill(&field_, [](double, double) { return 0.0; });
+    for (Tile* tile : field_.awake()) {
+      for (int k = 0; k < kTileCells; ++k) {
+        if ((tile->state.flags[k] & kNoTissue) != 0) continue;
+        const Vec2f p = Centre(*tile, k);
+        tile->state.water[k] = static_cast<float>(Water(p.x(), p.y()));
+      }
+      tile->faces_stale = true;
+    }
+    Fill(&field_, [](double x, double y) { return Exact(x, y, 0); });
+  }
+  void Run(double seconds) {
+    const int steps = static_cast<int>(std::lround(seconds / dt_s_));
+    Ledger ledger;
+    for (int n = 0; n < steps; ++n) {
+      AddSource((n + 0.25) * dt_s_);
+      field_.Diffuse(dt_s_, &ledger);
+      AddSource((n + 0.75) * dt_s_);
+    }
+  }
+  [[nodiscard]] double Error(double seconds) const {
+    double worst = 0, highest = 0;
+    ForCells(field_, [&](double theta, double x, double y) {
+      worst = std::max(worst, std::abs(theta - Exact(x, y, seconds)));
+      highest = std::max(highest, Exact(x, y, seconds));
+    });
+    return worst / highest;
+  }
+  [[nodiscard]] std::vector<double> Theta() const {
+    std::vector<double> all;
+    ForCells(field_, [&](double theta, double, double) { all.push_back(theta); });
+    return all;
+  }
+
+ private:
+  static constexpr double kTau = 0.3, kA = kPi / kLength;
+  static Material Wet(float cell_m) {
+    ThermalParams params;
+    params.cell_m = cell_m;
+    return MakeMaterial(params);
+  }
+  static double Water(double x, double y) { return 0.6 + 0.3 * std::cos(kA * x) * std::cos(kA * y); }
+  static double Exact(double x, double y, double t) {
+    return std::exp(-t / kTau) * (30 + 10 * std::cos(kA * x) * std::cos(2 * kA * y));
+  }
+  [[nodiscard]] Vec2f Centre(const Tile& tile, int k) const {
+    return field_.sheet().CentreOf({tile.tx * kTile + k % kTile, tile.ty * kTile + k / kTile});
+  }
+  /// rc d theta/dt - div(k grad theta) + loss theta.
+  [[nodiscard]] double Source(double x, double y, double t) const {
+    const Material& m = field_.material();
+    const double w = Water(x, y), fade = std::exp(-t / kTau);
+    const double rc = m.rc_dry + w * (m.rc_wet - m.rc_dry), k = m.k_dry + w * (m.k_wet - m.k_dry);
+    const double cx = std::cos(kA * x), sx = std::sin(kA * x), cy = std::cos(kA * y), sy = std::sin(kA * y),
+                 c2y = std::cos(2 * kA * y), s2y = std::sin(2 * kA * y);
+    const double slope = m.k_wet - m.k_dry;
+    const double kx = -slope * 0.3 * kA * sx * cy, ky = -slope * 0.3 * kA * cx * sy;
+    const double ux = -10 * fade * kA * sx * c2y, uy = -20 * fade * kA * cx * s2y;
+    const double laplacian = -50 * fade * kA * kA * cx * c2y;
+    const double u = Exact(x, y, t);
+    return -rc * u / kTau - (kx * ux + ky * uy + k * laplacian) + m.loss_resting * u;
+  }
+  /// Half a step's, by its middle.
+  void AddSource(double t) {
+    Ledger ledger;
+    for (Tile* tile : field_.awake()) {
+      for (int k = 0; k < kTileCells; ++k) {
+        if ((tile->state.flags[k] & kNoTissue) != 0) continue;
+        const Vec2f p = Centre(*tile, k);
+        tile->state.enthalpy[k] += static_cast<float>(0.5 * dt_s_ * Source(p.x(), p.y(), t));
+      }
+      field_.RefreshTheta(tile, &ledger);
+    }
+  }
+
+  float dt_s_;
+  HeatField field_;
+};
+
+}  // namespace
+
+double ModeError(float cell_m, float dt_s) {
+  ThermalParams params;
+  params.cell_m = cell_m;
+  const Material material = MakeMaterial(params);
+  HeatField field(MakeFlatSheet(kLength, kLength, cell_m), material);
+  const double kx = kPi / kLength, ky = 2 * kPi / kLength;
+  Fill(&field, [&](double x, double y) { return 30 + 20 * std::cos(kx * x) * std::cos(ky * y); });
+  const double alpha = material.k_wet / material.rc_wet, loss = material.loss_resting / material.rc_wet;
+  const double time = 2.0;
+  Ledger ledger;
+  const int steps = static_cast<int>(std::lround(time / dt_s));
+  for (int n = 0; n < steps; ++n) field.Diffuse(dt_s, &ledger);
+  double worst = 0;
+  ForCells(field, [&](double theta, double x, double y) {
+    const double mode =
+        20 * std::exp(-(alpha * (kx * kx + ky * ky) + loss) * time) * std::cos(kx * x) * std::cos(ky * y);
+    worst = std::max(worst, std::abs(theta - 30 * std::exp(-loss * time) - mode) / 20);
+  });
+  return worst;
+}
+
+double VariableError(float cell_m, float dt_s) {
+  Variable problem(cell_m, dt_s);
+  problem.Run(0.24);
+  return problem.Error(0.24);
+}
+
+double TimeOrder() {
+  std::vector<std::vector<double>> results;
+  for (const float dt : {0.048f, 0.024f, 0.012f}) {
+    Variable problem(2e-4f, dt);
+    problem.Run(0.48);
+    results.push_back(problem.Theta());
+  }
+  const auto difference = [&](std::size_t a, std::size_t b) {
+    double worst = 0;
+    for (std::size_t i = 0; i < results[a].size(); ++i) {
+      worst = std::max(worst, std::abs(results[a][i] - results[b][i]));
+    }
+    return worst;
+  };
+  return std::log2(difference(0, 1) / difference(1, 2));
+}
+
+}  // namespace fulcrum::thermal
