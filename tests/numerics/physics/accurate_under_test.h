@@ -25,6 +25,9 @@ class AccurateUnderTest final : public StoreSolver {
     begin_ = places_;
   }
 
+  /// Part of the tissue that is awake after the last step.
+  [[nodiscard]] float awake_part() const { return solver_.regions().awake_part(); }
+
  private:
   void Stop() override { solver_.Stop(); }
   void HeldChanged() override {
