@@ -58,8 +58,8 @@ TEST(Soak, AMillionSubstepsLeaveTheTissueWhereItWas) {
     if (phase < kSwing) {
       const float height = 0.005f * std::min(1.0f, static_cast<float>(phase) / kRise);
       const float turn = 0.05f * static_cast<float>(std::max(0, phase - kRise));
-      const Vec3f place = scene.rest_position[particle] +
-                          Vec3f(0.0015f * std::sin(turn), 0.0015f * (std::cos(turn) - 1), height);
+      const Vec3f place =
+          scene.rest_position[particle] + Vec3f(0.0015f * std::sin(turn), 0.0015f * (std::cos(turn) - 1), height);
       solver.MoveHeld({&place, 1});
     } else if (phase == kSwing) {
       solver.Hold({});
