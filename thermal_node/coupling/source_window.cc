@@ -83,8 +83,8 @@ void SourceWindow::Load(HeatField* field, Ledger* ledger) {
     std::copy_n(&tile->state.enthalpy[from], count, &enthalpy_[to]);
     std::copy_n(&tile->state.water[from], count, &water_[to]);
     std::copy_n(&tile->state.flags[from], count, &flags_[to]);
-    std::fill_n(&inverse_volume_[to], count, 1.0f / tile->volume);
     for (int n = 0; n < count; ++n) {
+      inverse_volume_[to + n] = tile->geometry.inverse_area[from + n] / tile->flat_volume;
       tissue_[to + n] = (tile->state.flags[from + n] & kNoTissue) != 0 ? 0.0f : material_.sigma;
     }
   });
@@ -107,7 +107,7 @@ void SourceWindow::Store(HeatField* field, bool tented) {
 
 void SourceWindow::SetGround(const Vec2f& tip, bool tented) {
   const float cell = material_.cell_m;
-  const float leak = tented ? 0.0f : material_.leak_S_m2 * cell * cell * metric_.s * metric_.t;
+  const float leak = tented ? 0.0f : material_.leak_S_m2 * cell * cell * metric_.area();
   for (int k = 0; k < kWindowCells; ++k) problem_.ground[k] = (flags_[k] & kNoTissue) != 0 ? 0.0f : leak;
   // What flows on beyond the window, as the sheet's far field through each face of the border.
   const auto add = [&](int i, int j, float face, const Vec2f& normal) {
@@ -123,11 +123,12 @@ void SourceWindow::SetGround(const Vec2f& tip, bool tented) {
     const float cosine = std::max(0.0f, r_cells.dot(normal) / r);
     problem_.ground[j * kWindow + i] += face * problem_.sigma[j * kWindow + i] * cell * kappa * cosine;
   };
+  const float stretch_s = std::sqrt(metric_.ss), stretch_t = std::sqrt(metric_.tt);
   for (int n = 0; n < kWindow; ++n) {
-    add(0, n, problem_.face_s * metric_.s, -Vec2f::UnitX());
-    add(kWindow - 1, n, problem_.face_s * metric_.s, Vec2f::UnitX());
-    add(n, 0, problem_.face_t * metric_.t, -Vec2f::UnitY());
-    add(n, kWindow - 1, problem_.face_t * metric_.t, Vec2f::UnitY());
+    add(0, n, problem_.face_s * stretch_s, -Vec2f::UnitX());
+    add(kWindow - 1, n, problem_.face_s * stretch_s, Vec2f::UnitX());
+    add(n, 0, problem_.face_t * stretch_t, -Vec2f::UnitY());
+    add(n, kWindow - 1, problem_.face_t * stretch_t, Vec2f::UnitY());
   }
 }
 
@@ -146,19 +147,21 @@ void SourceWindow::SetSigma() {
 void SourceWindow::SetContact(const Vec2f& tip, float radius_m, float arc_m) {
   problem_.contact.fill(0);
   const float cell = material_.cell_m;
-  const float area = cell * cell * metric_.s * metric_.t;
+  const float area = cell * cell * metric_.area();
   const Vec2f centre = tip / cell - Vec2f(static_cast<float>(corner_.ix + sheet_.origin_x),
                                           static_cast<float>(corner_.iy + sheet_.origin_y));
   const float reach = (radius_m + arc_m) / cell + 1.0f;
-  const int i0 = std::max(0, static_cast<int>((centre.x() - reach / metric_.s)));
-  const int i1 = std::min(kWindow - 1, static_cast<int>(centre.x() + reach / metric_.s));
-  const int j0 = std::max(0, static_cast<int>(centre.y() - reach / metric_.t));
-  const int j1 = std::min(kWindow - 1, static_cast<int>(centre.y() + reach / metric_.t));
+  // The box of the ellipse g(dx, dx) = reach^2.
+  const float reach_s = reach * std::sqrt(metric_.tt) / metric_.area();
+  const float reach_t = reach * std::sqrt(metric_.ss) / metric_.area();
+  const int i0 = std::max(0, static_cast<int>(centre.x() - reach_s));
+  const int i1 = std::min(kWindow - 1, static_cast<int>(centre.x() + reach_s));
+  const int j0 = std::max(0, static_cast<int>(centre.y() - reach_t));
+  const int j1 = std::min(kWindow - 1, static_cast<int>(centre.y() + reach_t));
   for (int j = j0; j <= j1; ++j) {
     for (int i = i0; i <= i1; ++i) {
-      const float dx = (static_cast<float>(i) + 0.5f - centre.x()) * metric_.s;
-      const float dy = (static_cast<float>(j) + 0.5f - centre.y()) * metric_.t;
-      const float r = std::sqrt(dx * dx + dy * dy);
+      const float dx = static_cast<float>(i) + 0.5f - centre.x(), dy = static_cast<float>(j) + 0.5f - centre.y();
+      const float r = std::sqrt(metric_.ss * dx * dx + 2.0f * metric_.st * dx * dy + metric_.tt * dy * dy);
       const float metal = std::clamp(radius_m / cell - r + 0.5f, 0.0f, 1.0f);
       const float gap = std::max(r * cell - radius_m, 0.0f);
       // Falls from 1 at the metal to 0 at arc_m as the sparks get rarer.
@@ -249,11 +252,9 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   const CellIndex middle = sheet_.CellOf(0.5f * (path.from + path.to));
   MoveTo({middle.ix - kWindow / 2, middle.iy - kWindow / 2});
   Load(field, ledger);
-  const int tile_x = std::clamp(middle.ix / kTile, 0, sheet_.tiles_x - 1);
-  const int tile_y = std::clamp(middle.iy / kTile, 0, sheet_.tiles_y - 1);
-  metric_ = sheet_.metric[tile_y * sheet_.tiles_x + tile_x];
-  problem_.face_s = material_.thickness_m * metric_.t / metric_.s;
-  problem_.face_t = material_.thickness_m * metric_.s / metric_.t;
+  metric_ = sheet_.MetricAt(static_cast<float>(middle.ix), static_cast<float>(middle.iy));
+  problem_.face_s = material_.thickness_m * metric_.tt / metric_.area();
+  problem_.face_t = material_.thickness_m * metric_.ss / metric_.area();
   SetSigma();
   SetGround(0.5f * (path.from + path.to), path.tented);
   // The tip passes over at most one cell per step.

@@ -6,6 +6,7 @@
 // does not get it back (the usual enthalpy form would let it condense again).
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -20,7 +21,15 @@ namespace fulcrum::thermal {
 inline constexpr float kWakeTheta = 0.03f;     ///< A neighbour wakes when this warm at its border [K].
 inline constexpr float kSleepTheta = 0.02f;    ///< A tile sleeps when nowhere warmer [K].
 inline constexpr float kExplicitLimit = 0.9f;  ///< dt * rate of the explicit step; the maximum principle holds to 1.
+/// Largest ratio of a fourth-order flux to the two-point one: that of the shortest wave.
+inline constexpr float kFluxGain = 4.0f / 3.0f;
+inline constexpr float kShearIgnored = 1e-4f;  ///< Of a face's conductance: no diagonal links.
+/// Substeps of a step at most. Where these would not do, faces conduct no faster than they allow.
+inline constexpr int kMaxSubsteps = 64;
 inline constexpr float kThetaPlausible = 5000.0f;  ///< Beyond this a cell is bad, not hot [K].
+
+/// Fills the tile's geometry from the sheet's metric.
+void SetGeometry(const Sheet& sheet, Tile* tile);
 
 class HeatField {
  public:
@@ -37,9 +46,11 @@ class HeatField {
   /// Wakes (and on first use creates) the tile. nullptr beyond the sheet.
   Tile* Wake(int tx, int ty);
 
-  /// One step of conduction and losses in as many substeps as the fastest awake tile needs, with boiling, waking of
-  /// neighbours and sleeping of cold tiles. Whoever changed enthalpy or water must have called RefreshTheta. Returns
-  /// the number of substeps.
+  /// One step of conduction and losses, of second order in time, in as many substeps as the fastest awake cell needs,
+  /// with boiling, waking of neighbours and sleeping of cold tiles. Whoever changed enthalpy or water must have called
+  /// RefreshTheta. A step that would need more than kMaxSubsteps is stiff: cells that are too fast for it conduct as
+  /// fast as it allows, so it stays bounded by what was there and conserves heat, whatever its length. Returns the
+  /// number of substeps.
   int Diffuse(float dt_s, Ledger* ledger);
 
   /// Recomputes theta, its sums and extremes from the enthalpy. Quarantines bad cells.
@@ -53,6 +64,7 @@ class HeatField {
   [[nodiscard]] double Stored() const;
   /// Highest theta of awake tissue [K]; 0 when all sleep.
   [[nodiscard]] float MaxTheta() const;
+  [[nodiscard]] std::uint64_t stiff_steps() const { return stiff_steps_; }
   [[nodiscard]] std::uint64_t quarantined() const { return quarantined_; }
   /// Where the last quarantined cell was.
   [[nodiscard]] CellIndex last_quarantined() const { return last_quarantined_; }
@@ -70,20 +82,23 @@ class HeatField {
   void BuildFaces(Tile* tile);
   void RebuildStaleFaces();
   void ExchangeHalos(Tile* tile);
-  void Substep(Tile* tile, float dt_s, Ledger* ledger);
+  void LimitFaces(Tile* tile, float rate);
+  void RunStage(bool second, float dt_s, Ledger* ledger);
+  void ComputeTheta(Tile* tile) const;
   void WakeNeighbours();
   void SleepCold(Ledger* ledger);
   void MarkNeighboursStale(const Tile& tile);
   void Quarantine(Tile* tile, Ledger* ledger);
   Tile* Create(int index);
-  [[nodiscard]] float CellConductivity(const Tile& tile, int cell) const;
+  /// The tile and its neighbours, row by row; null where none is awake.
+  [[nodiscard]] std::array<const Tile*, 9> Around(const Tile& tile) const;
 
   Sheet sheet_;
   Material material_;
   std::vector<std::unique_ptr<Tile>> tiles_;  ///< By index; null until first use.
   std::vector<Tile*> awake_;
   std::vector<Tile*> scratch_;
-  std::uint64_t quarantined_ = 0;
+  std::uint64_t quarantined_ = 0, stiff_steps_ = 0;
   CellIndex last_quarantined_;
 };
 

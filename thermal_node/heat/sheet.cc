@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "services/core/error.h"
 
@@ -22,7 +23,6 @@ Sheet MakeEmpty(const Vec2f& low, const Vec2f& high, float cell) {
   sheet.ny = static_cast<int>(std::ceil(high.y() / cell - 1e-3f)) - sheet.origin_y;
   sheet.tiles_x = (sheet.nx + kTile - 1) / kTile;
   sheet.tiles_y = (sheet.ny + kTile - 1) / kTile;
-  sheet.metric.assign(sheet.tile_count(), CellMetric{});
   sheet.outside.assign(static_cast<std::size_t>(sheet.tile_count()) * kTileCells / 8, 0xff);
   return sheet;
 }
@@ -53,38 +53,119 @@ void FillTriangle(Sheet* sheet, const Vec2f& a, const Vec2f& b, const Vec2f& c) 
   }
 }
 
-/// Mean of rest length over material length of the grid edges whose middle lies in each tile.
-void AverageMetric(const SceneView& scene, Sheet* sheet) {
+/// Stretches within their bounds, by the eigenvalues of g.
+Metric Bounded(const Metric& g) {
+  const float mean = 0.5f * (g.ss + g.tt), half = 0.5f * (g.ss - g.tt);
+  const float radius = std::sqrt(half * half + g.st * g.st);
+  if (!std::isfinite(mean + radius)) return {};
+  constexpr float kLow = kStretchMin * kStretchMin, kHigh = kStretchMax * kStretchMax;
+  const float large = std::clamp(mean + radius, kLow, kHigh), small = std::clamp(mean - radius, kLow, kHigh);
+  const float shrink = radius > 0 ? 0.5f * (large - small) / radius : 0.0f;
+  return {0.5f * (large + small) + shrink * half, shrink * g.st, 0.5f * (large + small) - shrink * half};
+}
+
+/// g of each node of the grid: the mean of the quads around it.
+std::vector<Metric> NodeMetric(const SceneView& scene) {
   const MembraneGrid& grid = scene.membrane;
-  struct Sum {
-    double s = 0, t = 0;
-    int ns = 0, nt = 0;
-  };
-  std::vector<Sum> sums(sheet->tile_count());
-  const auto add = [&](Index a, Index b, bool along_s) {
-    const Vec2f d = scene.membrane_material[b] - scene.membrane_material[a];
-    const float rest = (scene.rest_position[grid.first + b] - scene.rest_position[grid.first + a]).norm();
-    const CellIndex cell = sheet->CellOf(0.5f * (scene.membrane_material[a] + scene.membrane_material[b]));
-    if (!sheet->Contains(cell) || d.norm() <= 0.0f) return;
-    Sum& sum = sums[(cell.iy / kTile) * sheet->tiles_x + cell.ix / kTile];
-    const double ratio = rest / d.norm();
-    along_s ? (sum.s += ratio, ++sum.ns) : (sum.t += ratio, ++sum.nt);
-  };
-  for (Index r = 0; r < grid.rows; ++r) {
-    for (Index c = 0; c < grid.cols; ++c) {
-      const Index node = r * grid.cols + c;
-      for (const Index next : {c + 1 < grid.cols ? node + 1 : node, r + 1 < grid.rows ? node + grid.cols : node}) {
-        if (next == node) continue;
-        const Vec2f d = scene.membrane_material[next] - scene.membrane_material[node];
-        add(node, next, std::abs(d.x()) >= std::abs(d.y()));
+  std::vector<Metric> sum(grid.node_count(), Metric{0, 0, 0});
+  std::vector<int> count(grid.node_count(), 0);
+  for (Index r = 0; r + 1 < grid.rows; ++r) {
+    for (Index c = 0; c + 1 < grid.cols; ++c) {
+      const Index n00 = r * grid.cols + c, n01 = n00 + 1, n10 = n00 + grid.cols, n11 = n10 + 1;
+      // Means of opposite sides, in material space and on the rest shape: J maps the former to the latter.
+      const auto sides = [&]<class V>(const V* at) {
+        return std::pair<V, V>{0.5f * ((at[n01] - at[n00]) + (at[n11] - at[n10])),
+                               0.5f * ((at[n10] - at[n00]) + (at[n11] - at[n01]))};
+      };
+      const auto [u, v] = sides(scene.membrane_material.data());
+      const auto [ru, rv] = sides(scene.rest_position.data() + grid.first);
+      const float det = Cross(u, v);
+      if (!(std::abs(det) > 0.0f)) continue;
+      const Vec3f js = (ru * v.y() - rv * u.y()) / det, jt = (rv * u.x() - ru * v.x()) / det;
+      const Metric g = Bounded({js.squaredNorm(), js.dot(jt), jt.squaredNorm()});
+      for (const Index n : {n00, n01, n10, n11}) {
+        sum[n] = {sum[n].ss + g.ss, sum[n].st + g.st, sum[n].tt + g.tt};
+        ++count[n];
       }
     }
   }
-  for (int i = 0; i < sheet->tile_count(); ++i) {
-    const Sum& sum = sums[i];
-    if (sum.ns > 0) sheet->metric[i].s = std::clamp(static_cast<float>(sum.s / sum.ns), kMetricMin, kMetricMax);
-    if (sum.nt > 0) sheet->metric[i].t = std::clamp(static_cast<float>(sum.t / sum.nt), kMetricMin, kMetricMax);
+  for (std::size_t n = 0; n < sum.size(); ++n) {
+    const float f = 1.0f / static_cast<float>(std::max(count[n], 1));
+    sum[n] = count[n] > 0 ? Metric{f * sum[n].ss, f * sum[n].st, f * sum[n].tt} : Metric{};
   }
+  return sum;
+}
+
+void MakeLattice(Sheet* sheet) {
+  sheet->metric_x = sheet->tiles_x * kTile / kMetricStep + 1;
+  sheet->metric_y = sheet->tiles_y * kTile / kMetricStep + 1;
+  sheet->metric.assign(static_cast<std::size_t>(sheet->metric_x) * sheet->metric_y, Metric{});
+}
+
+/// Gives places of the lattice without tissue what their nearest neighbours have.
+void Spread(const Sheet& sheet, std::vector<std::uint8_t>* known, std::vector<Metric>* metric) {
+  const int nx = sheet.metric_x, ny = sheet.metric_y;
+  for (bool more = true; more;) {
+    more = false;
+    const std::vector<std::uint8_t> before = *known;
+    for (int k = 0; k < nx * ny; ++k) {
+      if (before[k] != 0) continue;
+      Metric sum{0, 0, 0};
+      float count = 0;
+      const auto add = [&](bool inside, int n) {
+        if (!inside || before[n] == 0) return;
+        const Metric& g = (*metric)[n];
+        sum = {sum.ss + g.ss, sum.st + g.st, sum.tt + g.tt};
+        ++count;
+      };
+      add(k % nx > 0, k - 1);
+      add(k % nx + 1 < nx, k + 1);
+      add(k >= nx, k - nx);
+      add(k + nx < nx * ny, k + nx);
+      if (count == 0) continue;
+      (*metric)[k] = {sum.ss / count, sum.st / count, sum.tt / count};
+      (*known)[k] = 1;
+      more = true;
+    }
+  }
+}
+
+/// The metric of the grid at the places of the lattice, linear within each of its triangles.
+void MeasureMetric(const SceneView& scene, Sheet* sheet) {
+  const MembraneGrid& grid = scene.membrane;
+  const std::vector<Metric> at_node = NodeMetric(scene);
+  MakeLattice(sheet);
+  std::vector<std::uint8_t> known(sheet->metric.size(), 0);
+  const Vec2f origin(static_cast<float>(sheet->origin_x), static_cast<float>(sheet->origin_y));
+  const auto place = [&](Index n) -> Vec2f {
+    return (scene.membrane_material[n] / sheet->cell_m - origin) / static_cast<float>(kMetricStep);
+  };
+  const auto triangle = [&](Index na, Index nb, Index nc) {
+    const Vec2f a = place(na), b = place(nb), c = place(nc);
+    const float area = Cross(b - a, c - a);
+    if (area == 0.0f) return;
+    const Vec2f low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
+    for (int y = std::max(0, static_cast<int>(std::ceil(low.y()))); y <= high.y() && y < sheet->metric_y; ++y) {
+      for (int x = std::max(0, static_cast<int>(std::ceil(low.x()))); x <= high.x() && x < sheet->metric_x; ++x) {
+        const Vec2f p(static_cast<float>(x), static_cast<float>(y));
+        const float wb = Cross(p - a, c - a) / area, wc = Cross(b - a, p - a) / area, wa = 1 - wb - wc;
+        if (std::min({wa, wb, wc}) < -1e-4f) continue;
+        const Metric &ga = at_node[na], &gb = at_node[nb], &gc = at_node[nc];
+        const std::size_t k = static_cast<std::size_t>(y) * sheet->metric_x + x;
+        sheet->metric[k] = Bounded({wa * ga.ss + wb * gb.ss + wc * gc.ss, wa * ga.st + wb * gb.st + wc * gc.st,
+                                    wa * ga.tt + wb * gb.tt + wc * gc.tt});
+        known[k] = 1;
+      }
+    }
+  };
+  for (Index r = 0; r + 1 < grid.rows; ++r) {
+    for (Index c = 0; c + 1 < grid.cols; ++c) {
+      const Index n00 = r * grid.cols + c, n01 = n00 + 1, n10 = n00 + grid.cols, n11 = n10 + 1;
+      triangle(n00, n01, n11);
+      triangle(n00, n11, n10);
+    }
+  }
+  Spread(*sheet, &known, &sheet->metric);
 }
 
 }  // namespace
@@ -96,6 +177,31 @@ CellIndex Sheet::CellOf(const Vec2f& material) const {
 
 Vec2f Sheet::CentreOf(CellIndex cell) const {
   return Vec2f(static_cast<float>(cell.ix + origin_x) + 0.5f, static_cast<float>(cell.iy + origin_y) + 0.5f) * cell_m;
+}
+
+Metric Sheet::MetricAt(float x, float y) const {
+  if (metric.empty()) return {};
+  const float u = std::clamp(x / kMetricStep, 0.0f, static_cast<float>(metric_x - 1));
+  const float v = std::clamp(y / kMetricStep, 0.0f, static_cast<float>(metric_y - 1));
+  const int i = std::min(static_cast<int>(u), metric_x - 2), j = std::min(static_cast<int>(v), metric_y - 2);
+  const float f = u - static_cast<float>(i), h = v - static_cast<float>(j);
+  const Metric* row = &metric[static_cast<std::size_t>(j) * metric_x + i];
+  const Metric &a = row[0], &b = row[1], &c = row[metric_x], &d = row[metric_x + 1];
+  const auto mix = [&](float pa, float pb, float pc, float pd) {
+    return (1 - h) * (pa + f * (pb - pa)) + h * (pc + f * (pd - pc));
+  };
+  return {mix(a.ss, b.ss, c.ss, d.ss), mix(a.st, b.st, c.st, d.st), mix(a.tt, b.tt, c.tt, d.tt)};
+}
+
+void SetMetric(Sheet* sheet, const std::function<Metric(const Vec2f&)>& metric_at) {
+  MakeLattice(sheet);
+  for (int y = 0; y < sheet->metric_y; ++y) {
+    for (int x = 0; x < sheet->metric_x; ++x) {
+      const Vec2f p(static_cast<float>(x * kMetricStep + sheet->origin_x),
+                    static_cast<float>(y * kMetricStep + sheet->origin_y));
+      sheet->metric[static_cast<std::size_t>(y) * sheet->metric_x + x] = Bounded(metric_at(p * sheet->cell_m));
+    }
+  }
 }
 
 bool Sheet::OnSheet(const Vec2f& material) const {
@@ -129,7 +235,7 @@ Sheet MakeSheet(const SceneView& scene) {
       FillTriangle(&sheet, p[n00], p[n11], p[n10]);
     }
   }
-  AverageMetric(scene, &sheet);
+  MeasureMetric(scene, &sheet);
   return sheet;
 }
 

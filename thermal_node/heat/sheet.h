@@ -2,7 +2,9 @@
 // the rest shape.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "services/core/scene_view.h"
@@ -18,19 +20,24 @@ struct CellIndex {
   bool operator==(const CellIndex&) const = default;
 };
 
-/// Rest length of a cell along s and t, relative to its length in material space. The map from the rest shape to the
-/// sheet is taken as orthogonal: cross terms are below 1 % for the regular grids that the scene compiler makes.
-struct CellMetric {
-  float s = 1, t = 1;
+/// First fundamental form of the rest shape over material space, g = J^T J with J = d rest / d (s, t): squared stretch
+/// along s and t, and their scalar product (shear).
+struct Metric {
+  float ss = 1, st = 0, tt = 1;
+
+  [[nodiscard]] float area() const { return std::sqrt(ss * tt - st * st); }  ///< Rest area over material area.
 };
-inline constexpr float kMetricMin = 0.5f, kMetricMax = 2.0f;  ///< Keeps the explicit step bounded on bad maps.
+inline constexpr float kStretchMin = 0.5f, kStretchMax = 2.0f;  ///< Keeps the explicit step bounded on bad maps.
+inline constexpr int kMetricStep = 8;                           ///< Cells between the places where it is stored.
 
 struct Sheet {
   float cell_m = 1e-4f;
   std::int32_t origin_x = 0, origin_y = 0;  ///< Global index floor(s / cell_m) of cell (0, 0).
   int nx = 0, ny = 0;                       ///< Cells.
   int tiles_x = 0, tiles_y = 0;
-  std::vector<CellMetric> metric;     ///< Per tile.
+  /// At the corners of blocks of kMetricStep cells, metric_x to a row; bilinear between. Empty: isometric.
+  std::vector<Metric> metric;
+  int metric_x = 0, metric_y = 0;
   std::vector<std::uint8_t> outside;  ///< Bit field over tiles_x*kTile by tiles_y*kTile: no tissue there.
 
   [[nodiscard]] int tile_count() const { return tiles_x * tiles_y; }
@@ -40,6 +47,8 @@ struct Sheet {
   }
   [[nodiscard]] CellIndex CellOf(const Vec2f& material) const;
   [[nodiscard]] Vec2f CentreOf(CellIndex cell) const;
+  /// At a place in cells from the sheet's origin; beyond the border as at the border.
+  [[nodiscard]] Metric MetricAt(float x, float y) const;
   /// True when the point lies on tissue.
   [[nodiscard]] bool OnSheet(const Vec2f& material) const;
 };
@@ -49,5 +58,8 @@ struct Sheet {
 [[nodiscard]] Sheet MakeSheet(const SceneView& scene);
 /// A flat rectangle with its corner at (0, 0) [m].
 [[nodiscard]] Sheet MakeFlatSheet(float width_m, float height_m, float cell_m);
+/// Sets the metric from a function of material coordinates [m]. What is not finite becomes isometric; stretches are
+/// held within [kStretchMin, kStretchMax].
+void SetMetric(Sheet* sheet, const std::function<Metric(const Vec2f&)>& metric_at);
 
 }  // namespace fulcrum::thermal

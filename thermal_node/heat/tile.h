@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <vector>
 
 #include "thermal_node/heat/sheet.h"
 
@@ -16,10 +18,19 @@ enum CellFlag : std::uint8_t {
 };
 inline constexpr std::uint8_t kNoTissue = kRemoved | kOutside | kQuarantined;
 
-/// Padded layout of theta: one halo row above and below, eight floats left and right so that rows stay aligned.
+/// Cells of a neighbouring tile that a face's flux looks at.
+inline constexpr int kHalo = 2;
+/// Padded layout of theta: two halo rows above and below, eight floats left and right so that rows stay aligned.
 inline constexpr int kThetaStride = kTile + 16;
-inline constexpr int ThetaIndex(int i, int j) { return (j + 1) * kThetaStride + 8 + i; }
-inline constexpr int kFaceStride = kTile + 8;
+inline constexpr int kThetaCount = (kTile + 2 * kHalo) * kThetaStride;
+inline constexpr int ThetaIndex(int i, int j) { return (j + kHalo) * kThetaStride + 8 + i; }
+/// Faces across s, i = -1 ... kTile + 1 of row j, and across t, row j = -1 ... kTile + 1: one beyond each border.
+inline constexpr int kFaceStride = kTile + 16;
+inline constexpr int FaceS(int i, int j) { return j * kFaceStride + 8 + i; }
+inline constexpr int FaceT(int i, int j) { return (j + 1) * kTile + i; }
+/// Corners (i, j) between cells (i-1, j-1) and (i, j), 0 ... kTile.
+inline constexpr int kCornerStride = kTile + 8;
+inline constexpr int Corner(int i, int j) { return j * kCornerStride + i; }
 
 template <class T>
 using CellArray = std::array<T, kTileCells>;
@@ -36,23 +47,47 @@ struct TileState {
   std::uint8_t tented = 0;
 };
 
+/// Conductances of links between cells that touch at a corner, as of faces; only where the map shears.
+struct DiagonalLinks {
+  alignas(64) std::array<float, (kTile + 1) * kCornerStride> main{};  ///< Between (i-1, j-1) and (i, j).
+  alignas(64) std::array<float, (kTile + 1) * kCornerStride> anti{};  ///< Between (i, j-1) and (i-1, j).
+};
+
+/// The map from material space to the rest shape, at the cells, faces and corners of a tile.
+struct TileGeometry {
+  alignas(64) CellArray<float> area{};                            ///< sqrt(g).
+  alignas(64) CellArray<float> inverse_area{};                    ///< 1 / sqrt(g).
+  alignas(64) std::array<float, kTile * kFaceStride> across_s{};  ///< sqrt(g) g^ss at FaceS, less what corners carry.
+  alignas(64) std::array<float, (kTile + 3) * kTile> across_t{};  ///< sqrt(g) g^tt at FaceT, likewise.
+  std::vector<float> shear;                                       ///< sqrt(g) g^st at Corner; empty: none.
+};
+
 struct Tile {
   TileState state;
   int tx = 0, ty = 0, index = 0;
-  float volume = 0;  ///< Of a cell on the rest shape [m^3].
+  float flat_volume = 0;  ///< Of a cell in material space [m^3].
+  TileGeometry geometry;
 
   /// theta [K] with a halo; equals enthalpy / heat capacity at all times between calls.
-  alignas(64) std::array<float, (kTile + 2) * kThetaStride> theta{};
-  /// Conductance over volume of the face between cells (i-1, j) and (i, j) [W/(K m^3)].
-  alignas(64) std::array<float, kTile * kFaceStride> face_x{};
-  /// The same between (i, j-1) and (i, j).
-  alignas(64) std::array<float, (kTile + 1) * kTile> face_y{};
-  alignas(64) std::array<float, kTile> theta_sum{};  ///< Column sums of theta.
+  alignas(64) std::array<float, kThetaCount> theta{};
+  /// Conductance over flat_volume of the face between cells (i-1, j) and (i, j), at FaceS [W/(K m^3)].
+  alignas(64) std::array<float, kTile * kFaceStride> face_s{};
+  /// The same between (i, j-1) and (i, j), at FaceT.
+  alignas(64) std::array<float, (kTile + 3) * kTile> face_t{};
+  std::unique_ptr<DiagonalLinks> links;              ///< Null without shear.
+  alignas(64) CellArray<float> before{};             ///< Enthalpy at the beginning of a substep [J/m^3].
+  alignas(64) CellArray<float> cell_rate{};          ///< Rate of the explicit step in each cell [1/s].
+  alignas(64) std::array<float, kTile> theta_sum{};  ///< Column sums of theta times area.
   float theta_max = 0, theta_min = 0;
-  float rate = 0;           ///< Largest rate of the explicit step [1/s].
+  float rate = 0;           ///< The largest of cell_rate.
   bool faces_stale = true;  ///< Material of this tile changed since its faces were built.
   bool patch_stale = true;  ///< Changed since it was last drawn into a patch.
   bool held = false;        ///< A warm neighbour touches it: no sleep in this step.
+
+  /// Of a cell on the rest shape [m^3].
+  [[nodiscard]] float Volume(int cell) const { return flat_volume * geometry.area[cell]; }
+  /// Heat of all cells [J].
+  [[nodiscard]] double Heat() const;
 };
 
 /// True when the tile sleeps and nothing lasting ever happened in it, so that it need not be stored.

@@ -52,7 +52,7 @@ TEST_P(CutTest, SlitIsContinuousAndEnergyCloses) {
   const Material& m = solver.field().material();
   double removed_m3 = 0;
   for (const Tile* tile : solver.field().Existing()) {
-    for (const std::uint8_t flags : tile->state.flags) removed_m3 += (flags & kRemoved) != 0 ? tile->volume : 0.0;
+    for (int k = 0; k < kTileCells; ++k) removed_m3 += (tile->state.flags[k] & kRemoved) != 0 ? tile->Volume(k) : 0.0;
   }
   EXPECT_LE(removed_m3 * (m.BoilingEnthalpy(1.0f) + m.latent), solver.ledger().joule);
 }

@@ -1,0 +1,324 @@
+// The explicit step of HeatField: conductances, fluxes, temperatures.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "thermal_node/heat/heat_field.h"
+#include "thermal_node/heat/wide.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+/// Harmonic mean; 0 when either side does not conduct. The guard only turns 0/0 into 0.
+inline float Harmonic(float a, float b) { return 2.0f * a * b / (a + b + std::numeric_limits<float>::min()); }
+
+/// Flux through a face from the two-point fluxes of it and of those before and behind it on its line. The divergence of
+/// f - f'' / 12 is of fourth order where f is smooth. Kept between 0 and kFluxGain times the two-point flux, as which
+/// it is never more than a conductance times the difference of its two cells: so the maximum principle holds, closed
+/// faces stay closed, and both sides of the face see the same.
+inline float FourthOrder(float before, float flux, float after) {
+  const float f = (14.0f / 12.0f) * flux - (1.0f / 12.0f) * (before + after);
+  const float most = kFluxGain * flux;
+  const float low = most < 0.0f ? most : 0.0f, high = most > 0.0f ? most : 0.0f;
+  const float above = f > low ? f : low;
+  return above < high ? above : high;
+}
+
+/// Rows of the tile: enthalpy <- enthalpy + dt dH/dt, with `loss` = dt times the sink per kelvin. In the second stage
+/// of a substep the result is the mean of that and of the enthalpy before it: Heun's method, which keeps the maximum
+/// principle of its stages (Shu and Osher 1988).
+template <bool kSecond, bool kSheared>
+inline void Stage(Tile* tile, float dt_s, float loss) {
+  alignas(64) float across_t[(kTile + 3) * kTile];
+  for (int j = -1; j <= kTile + 1; ++j) {
+    const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
+    const float* __restrict g = &tile->face_t[FaceT(0, j)];
+    float* __restrict f = &across_t[FaceT(0, j)];
+    for (int i = 0; i < kTile; ++i) f[i] = g[i] * (t[i - kThetaStride] - t[i]);
+  }
+  alignas(64) float above[kTile], below[kTile], across_s[kTile + 16], face_s[kTile + 16];
+  for (int i = 0; i < kTile; ++i) {
+    const float* f = &across_t[FaceT(i, 0)];
+    below[i] = FourthOrder(f[-kTile], f[0], f[kTile]);
+  }
+  for (int j = 0; j < kTile; ++j) {
+    const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
+    const float* __restrict g = &tile->face_s[FaceS(0, j)];
+    const float* __restrict ft = &across_t[FaceT(0, j + 1)];
+    const float* __restrict inverse_area = &tile->geometry.inverse_area[j * kTile];
+    float* __restrict h = &tile->state.enthalpy[j * kTile];
+    float* __restrict before = &tile->before[j * kTile];
+    for (int i = 0; i < kTile; ++i) above[i] = below[i];
+    for (int i = 0; i < kTile; ++i) below[i] = FourthOrder(ft[i - kTile], ft[i], ft[i + kTile]);
+    for (int i = -1; i <= kTile + 1; ++i) across_s[i + 8] = g[i] * (t[i - 1] - t[i]);
+    for (int i = 0; i <= kTile; ++i) face_s[i] = FourthOrder(across_s[i + 7], across_s[i + 8], across_s[i + 9]);
+    for (int i = 0; i < kTile; ++i) {
+      float flux = (face_s[i] - face_s[i + 1]) + (above[i] - below[i]);
+      if constexpr (kSheared) {
+        const float* main = &tile->links->main[Corner(i, j)];
+        const float* anti = &tile->links->anti[Corner(i, j)];
+        flux += main[0] * (t[i - 1 - kThetaStride] - t[i]) +
+                main[kCornerStride + 1] * (t[i + 1 + kThetaStride] - t[i]) +
+                anti[1] * (t[i + 1 - kThetaStride] - t[i]) + anti[kCornerStride] * (t[i - 1 + kThetaStride] - t[i]);
+      }
+      const float after = h[i] + (dt_s * inverse_area[i] * flux - loss * t[i]);
+      if constexpr (kSecond) {
+        h[i] = 0.5f * (before[i] + after);
+      } else {
+        before[i] = h[i];
+        h[i] = after;
+      }
+    }
+  }
+}
+
+FULCRUM_WIDE
+void FirstStage(Tile* tile, float dt_s, float loss) { Stage<false, false>(tile, dt_s, loss); }
+FULCRUM_WIDE
+void SecondStage(Tile* tile, float dt_s, float loss) { Stage<true, false>(tile, dt_s, loss); }
+FULCRUM_WIDE
+void FirstStageSheared(Tile* tile, float dt_s, float loss) { Stage<false, true>(tile, dt_s, loss); }
+FULCRUM_WIDE
+void SecondStageSheared(Tile* tile, float dt_s, float loss) { Stage<true, true>(tile, dt_s, loss); }
+
+/// theta with its column sums and extremes; rc = rc_dry + water * rc_water.
+FULCRUM_WIDE
+void ThetaOf(Tile* tile, float rc_dry, float rc_water) {
+  alignas(64) float sum[kTile] = {}, high[kTile] = {}, low[kTile] = {};
+  for (int j = 0; j < kTile; ++j) {
+    float* __restrict t = &tile->theta[ThetaIndex(0, j)];
+    const float* __restrict h = &tile->state.enthalpy[j * kTile];
+    const float* __restrict w = &tile->state.water[j * kTile];
+    const float* __restrict area = &tile->geometry.area[j * kTile];
+    for (int i = 0; i < kTile; ++i) {
+      t[i] = h[i] / (rc_dry + w[i] * rc_water);
+      sum[i] += t[i] * area[i];
+      high[i] = high[i] > t[i] ? high[i] : t[i];
+      low[i] = low[i] < t[i] ? low[i] : t[i];
+    }
+  }
+  std::copy_n(sum, kTile, tile->theta_sum.begin());
+  tile->theta_max = *std::max_element(high, high + kTile);
+  tile->theta_min = *std::min_element(low, low + kTile);
+}
+
+/// A field of cells with the halo of theta.
+using Padded = std::array<float, kThetaCount>;
+
+/// Copies what the eight neighbours have next to the tile into the halo of a padded field; value(tile, cell).
+template <class Value>
+void FillHalo(const std::array<const Tile*, 9>& around, const Value& value, float* field) {
+  for (int n = 0; n < 9; ++n) {
+    const Tile* other = around[n];
+    if (other == nullptr || n == 4) continue;
+    const int dx = n % 3 - 1, dy = n / 3 - 1;
+    const int i0 = dx < 0 ? -kHalo : (dx > 0 ? kTile : 0), i1 = dx < 0 ? 0 : (dx > 0 ? kTile + kHalo : kTile);
+    const int j0 = dy < 0 ? -kHalo : (dy > 0 ? kTile : 0), j1 = dy < 0 ? 0 : (dy > 0 ? kTile + kHalo : kTile);
+    for (int j = j0; j < j1; ++j) {
+      for (int i = i0; i < i1; ++i) {
+        field[ThetaIndex(i, j)] = value(*other, i - dx * kTile, j - dy * kTile);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+void SetGeometry(const Sheet& sheet, Tile* tile) {
+  TileGeometry& geometry = tile->geometry;
+  if (sheet.metric.empty()) {
+    geometry.area.fill(1);
+    geometry.inverse_area.fill(1);
+    geometry.across_s.fill(1);
+    geometry.across_t.fill(1);
+    return;
+  }
+  const auto at = [&](float x, float y) {
+    return sheet.MetricAt(static_cast<float>(tile->tx * kTile) + x, static_cast<float>(tile->ty * kTile) + y);
+  };
+  // What diagonal links carry they take from the faces around them: both must not fall below 0.
+  const auto shear_at = [&](int i, int j) {
+    const Metric g = at(static_cast<float>(i), static_cast<float>(j));
+    const float most = std::min(g.ss, g.tt) / g.area(), b = -g.st / g.area();
+    return std::abs(b) < kShearIgnored * most ? 0.0f : std::clamp(b, -most, most);
+  };
+  constexpr int kSide = kTile + 3;
+  std::array<float, kSide * kSide> shear;  // corners -1 ... kTile + 1
+  bool sheared = false;
+  for (int j = -1; j <= kTile + 1; ++j) {
+    for (int i = -1; i <= kTile + 1; ++i) {
+      const float b = shear_at(i, j);
+      shear[(j + 1) * kSide + i + 1] = b;
+      sheared = sheared || b != 0.0f;
+    }
+  }
+  const auto carried = [&](int i, int j) { return std::abs(shear[(j + 1) * kSide + i + 1]); };
+  for (int j = 0; j < kTile; ++j) {
+    for (int i = -1; i <= kTile + 1; ++i) {
+      const Metric g = at(static_cast<float>(i), static_cast<float>(j) + 0.5f);
+      geometry.across_s[FaceS(i, j)] = std::max(0.0f, g.tt / g.area() - 0.5f * (carried(i, j) + carried(i, j + 1)));
+    }
+  }
+  for (int j = -1; j <= kTile + 1; ++j) {
+    for (int i = 0; i < kTile; ++i) {
+      const Metric g = at(static_cast<float>(i) + 0.5f, static_cast<float>(j));
+      geometry.across_t[FaceT(i, j)] = std::max(0.0f, g.ss / g.area() - 0.5f * (carried(i, j) + carried(i + 1, j)));
+    }
+  }
+  for (int k = 0; k < kTileCells; ++k) {
+    geometry.area[k] = at(static_cast<float>(k % kTile) + 0.5f, static_cast<float>(k / kTile) + 0.5f).area();
+    geometry.inverse_area[k] = 1.0f / geometry.area[k];
+  }
+  if (!sheared) return;
+  geometry.shear.assign((kTile + 1) * kCornerStride, 0.0f);
+  for (int j = 0; j <= kTile; ++j) {
+    for (int i = 0; i <= kTile; ++i) geometry.shear[Corner(i, j)] = shear[(j + 1) * kSide + i + 1];
+  }
+}
+
+std::array<const Tile*, 9> HeatField::Around(const Tile& tile) const {
+  std::array<const Tile*, 9> around{};
+  for (int n = 0; n < 9; ++n) {
+    const Tile* other = n == 4 ? &tile : Find(tile.tx + n % 3 - 1, tile.ty + n / 3 - 1);
+    // A face or link to a tile that sleeps is closed.
+    around[n] = other != nullptr && other->state.awake != 0 ? other : nullptr;
+  }
+  return around;
+}
+
+void HeatField::BuildFaces(Tile* tile) {
+  const auto conductivity = [&](const Tile& of, int i, int j) {
+    const int cell = j * kTile + i;
+    return (of.state.flags[cell] & kNoTissue) != 0 ? 0.0f : material_.ThermalConductivity(of.state.water[cell]);
+  };
+  alignas(64) Padded k{};
+  for (int j = 0; j < kTile; ++j) {
+    for (int i = 0; i < kTile; ++i) k[ThetaIndex(i, j)] = conductivity(*tile, i, j);
+  }
+  FillHalo(Around(*tile), conductivity, k.data());
+  const TileGeometry& geometry = tile->geometry;
+  const float scale = 1.0f / (material_.cell_m * material_.cell_m);  // d / flat_volume
+  for (int j = 0; j < kTile; ++j) {
+    const float* row = &k[ThetaIndex(0, j)];
+    for (int i = -1; i <= kTile + 1; ++i) {
+      const int f = FaceS(i, j);
+      tile->face_s[f] = scale * geometry.across_s[f] * Harmonic(row[i - 1], row[i]);
+    }
+  }
+  for (int j = -1; j <= kTile + 1; ++j) {
+    const float* row = &k[ThetaIndex(0, j)];
+    for (int i = 0; i < kTile; ++i) {
+      const int f = FaceT(i, j);
+      tile->face_t[f] = scale * geometry.across_t[f] * Harmonic(row[i - kThetaStride], row[i]);
+    }
+  }
+  if (!geometry.shear.empty()) {
+    if (tile->links == nullptr) tile->links = std::make_unique<DiagonalLinks>();
+    for (int j = 0; j <= kTile; ++j) {
+      const float* row = &k[ThetaIndex(0, j)];
+      for (int i = 0; i <= kTile; ++i) {
+        const float b = scale * geometry.shear[Corner(i, j)];
+        // Heat goes around a corner only through tissue.
+        const float a00 = row[i - 1 - kThetaStride], a01 = row[i - kThetaStride], a10 = row[i - 1], a11 = row[i];
+        tile->links->main[Corner(i, j)] = a01 + a10 > 0.0f ? std::max(b, 0.0f) * Harmonic(a00, a11) : 0.0f;
+        tile->links->anti[Corner(i, j)] = a00 + a11 > 0.0f ? std::max(-b, 0.0f) * Harmonic(a01, a10) : 0.0f;
+      }
+    }
+  }
+  const float sink = std::max(material_.loss_resting, material_.loss_tented);
+  tile->rate = 0;
+  for (int j = 0; j < kTile; ++j) {
+    for (int i = 0; i < kTile; ++i) {
+      const int cell = j * kTile + i;
+      float sum = kFluxGain * ((tile->face_s[FaceS(i, j)] + tile->face_s[FaceS(i + 1, j)]) +
+                               (tile->face_t[FaceT(i, j)] + tile->face_t[FaceT(i, j + 1)]));
+      if (tile->links != nullptr) {
+        sum += (tile->links->main[Corner(i, j)] + tile->links->main[Corner(i + 1, j + 1)]) +
+               (tile->links->anti[Corner(i + 1, j)] + tile->links->anti[Corner(i, j + 1)]);
+      }
+      const float capacity = material_.HeatCapacity(tile->state.water[cell]);
+      tile->cell_rate[cell] = (sum * geometry.inverse_area[cell] + sink) / capacity;
+      tile->rate = std::max(tile->rate, tile->cell_rate[cell]);
+    }
+  }
+}
+
+void HeatField::LimitFaces(Tile* tile, float rate) {
+  const auto part_of = [&](const Tile& of, int i, int j) { return std::min(1.0f, rate / of.cell_rate[j * kTile + i]); };
+  alignas(64) Padded part{};
+  for (int j = 0; j < kTile; ++j) {
+    for (int i = 0; i < kTile; ++i) part[ThetaIndex(i, j)] = part_of(*tile, i, j);
+  }
+  FillHalo(Around(*tile), part_of, part.data());
+  for (int j = 0; j < kTile; ++j) {
+    const float* p = &part[ThetaIndex(0, j)];
+    for (int i = -1; i <= kTile + 1; ++i) tile->face_s[FaceS(i, j)] *= std::min(p[i - 1], p[i]);
+  }
+  for (int j = -1; j <= kTile + 1; ++j) {
+    const float* p = &part[ThetaIndex(0, j)];
+    for (int i = 0; i < kTile; ++i) tile->face_t[FaceT(i, j)] *= std::min(p[i - kThetaStride], p[i]);
+  }
+  if (tile->links == nullptr) return;
+  for (int j = 0; j <= kTile; ++j) {
+    const float* p = &part[ThetaIndex(0, j)];
+    for (int i = 0; i <= kTile; ++i) {
+      tile->links->main[Corner(i, j)] *= std::min(p[i - 1 - kThetaStride], p[i]);
+      tile->links->anti[Corner(i, j)] *= std::min(p[i - kThetaStride], p[i - 1]);
+    }
+  }
+}
+
+void HeatField::ExchangeHalos(Tile* tile) {
+  // To an absent or sleeping neighbour every face is closed, so the old value there does no harm, as long as it is
+  // finite: it is.
+  const std::array<const Tile*, 9> around = Around(*tile);
+  float* theta = tile->theta.data();
+  for (const auto& [other, to, from] : {std::tuple{around[3], -kHalo, kTile - kHalo}, {around[5], kTile, 0}}) {
+    if (other == nullptr) continue;
+    for (int j = 0; j < kTile; ++j) {
+      std::copy_n(&other->theta[ThetaIndex(from, j)], kHalo, &theta[ThetaIndex(to, j)]);
+    }
+  }
+  for (const auto& [other, to, from] : {std::tuple{around[1], -kHalo, kTile - kHalo}, {around[7], kTile, 0}}) {
+    if (other == nullptr) continue;
+    for (int j = 0; j < kHalo; ++j) {
+      std::copy_n(&other->theta[ThetaIndex(0, from + j)], kTile, &theta[ThetaIndex(0, to + j)]);
+    }
+  }
+  if (tile->links == nullptr) return;
+  for (const auto& [other, i, j] :
+       {std::tuple{around[0], -1, -1}, {around[2], kTile, -1}, {around[6], -1, kTile}, {around[8], kTile, kTile}}) {
+    if (other == nullptr) continue;
+    theta[ThetaIndex(i, j)] = other->theta[ThetaIndex((i + kTile) % kTile, (j + kTile) % kTile)];
+  }
+}
+
+void HeatField::RunStage(bool second, float dt_s, Ledger* ledger) {
+  for (Tile* tile : awake_) ExchangeHalos(tile);
+  for (Tile* tile : awake_) {
+    // Where the sink alone is stiff, no more goes at once than leaves half of the heat.
+    const float loss = std::min(dt_s * (tile->state.tented != 0 ? material_.loss_tented : material_.loss_resting),
+                                0.5f * material_.rc_dry);
+    if (tile->links != nullptr) {
+      (second ? SecondStageSheared : FirstStageSheared)(tile, dt_s, loss);
+    } else {
+      (second ? SecondStage : FirstStage)(tile, dt_s, loss);
+    }
+    double sum = 0;
+    for (const float s : tile->theta_sum) sum += s;
+    ledger->lost += 0.5 * sum * loss * tile->flat_volume;
+  }
+}
+
+void HeatField::ComputeTheta(Tile* tile) const { ThetaOf(tile, material_.rc_dry, material_.rc_wet - material_.rc_dry); }
+
+void HeatField::RefreshTheta(Tile* tile, Ledger* ledger) {
+  ComputeTheta(tile);
+  float total = 0;
+  for (const float s : tile->theta_sum) total += s;
+  if (!std::isfinite(total) || tile->theta_max > kThetaPlausible || tile->theta_min < -kThetaPlausible) {
+    Quarantine(tile, ledger);
+  }
+}
+
+}  // namespace fulcrum::thermal
