@@ -101,7 +101,7 @@ void SourceWindow::Store(HeatField* field, bool tented) {
     }
     std::copy_n(&water_[from], count, &tile->state.water[to]);
     std::copy_n(&flags_[from], count, &tile->state.flags[to]);
-    tile->faces_stale = true;
+    tile->material_stale = true;
   });
 }
 

@@ -78,7 +78,7 @@ class SourceWindow {
   PotentialSolver potential_;
   PotentialProblem problem_;
   CellIndex corner_ = kNowhere;
-  Metric metric_;                      ///< Under the tip; one for the whole window.
+  SurfaceMetric metric_;               ///< Under the tip; one for the whole window.
   std::array<float, 64> far_field_{};  ///< K1/(lambda K0) over distance [1/m].
   SourceStats stats_;
 

@@ -13,22 +13,26 @@ namespace {
 inline float Harmonic(float a, float b) { return 2.0f * a * b / (a + b + std::numeric_limits<float>::min()); }
 
 /// Flux through a face from the two-point fluxes of it and of those before and behind it on its line. The divergence of
-/// f - f'' / 12 is of fourth order where f is smooth. Kept between 0 and kFluxGain times the two-point flux, as which
+/// f - f'' / 12 is of fourth order where f is smooth. Kept between 0 and `gain` times the two-point flux, as which
 /// it is never more than a conductance times the difference of its two cells: so the maximum principle holds, closed
 /// faces stay closed, and both sides of the face see the same.
-inline float FourthOrder(float before, float flux, float after) {
+[[gnu::always_inline]] inline float FourthOrder(float before, float flux, float after, float gain) {
   const float f = (14.0f / 12.0f) * flux - (1.0f / 12.0f) * (before + after);
-  const float most = kFluxGain * flux;
+  const float most = gain * flux;
   const float low = most < 0.0f ? most : 0.0f, high = most > 0.0f ? most : 0.0f;
   const float above = f > low ? f : low;
   return above < high ? above : high;
 }
 
+/// The two directions of a diagonal link.
+[[gnu::always_inline]] inline float Main(float link) { return link > 0.0f ? link : 0.0f; }
+[[gnu::always_inline]] inline float Anti(float link) { return link < 0.0f ? -link : 0.0f; }
+
 /// Rows of the tile: enthalpy <- enthalpy + dt dH/dt, with `loss` = dt times the sink per kelvin. In the second stage
 /// of a substep the result is the mean of that and of the enthalpy before it: Heun's method, which keeps the maximum
 /// principle of its stages (Shu and Osher 1988).
 template <bool kSecond, bool kSheared>
-inline void Stage(Tile* tile, float dt_s, float loss) {
+[[gnu::always_inline]] inline void Stage(Tile* tile, float dt_s, float gain, float loss) {
   alignas(64) float across_t[(kTile + 3) * kTile];
   for (int j = -1; j <= kTile + 1; ++j) {
     const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
@@ -39,7 +43,7 @@ inline void Stage(Tile* tile, float dt_s, float loss) {
   alignas(64) float above[kTile], below[kTile], across_s[kTile + 16], face_s[kTile + 16];
   for (int i = 0; i < kTile; ++i) {
     const float* f = &across_t[FaceT(i, 0)];
-    below[i] = FourthOrder(f[-kTile], f[0], f[kTile]);
+    below[i] = FourthOrder(f[-kTile], f[0], f[kTile], gain);
   }
   for (int j = 0; j < kTile; ++j) {
     const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
@@ -49,17 +53,17 @@ inline void Stage(Tile* tile, float dt_s, float loss) {
     float* __restrict h = &tile->state.enthalpy[j * kTile];
     float* __restrict before = &tile->before[j * kTile];
     for (int i = 0; i < kTile; ++i) above[i] = below[i];
-    for (int i = 0; i < kTile; ++i) below[i] = FourthOrder(ft[i - kTile], ft[i], ft[i + kTile]);
+    for (int i = 0; i < kTile; ++i) below[i] = FourthOrder(ft[i - kTile], ft[i], ft[i + kTile], gain);
     for (int i = -1; i <= kTile + 1; ++i) across_s[i + 8] = g[i] * (t[i - 1] - t[i]);
-    for (int i = 0; i <= kTile; ++i) face_s[i] = FourthOrder(across_s[i + 7], across_s[i + 8], across_s[i + 9]);
+    for (int i = 0; i <= kTile; ++i) face_s[i] = FourthOrder(across_s[i + 7], across_s[i + 8], across_s[i + 9], gain);
     for (int i = 0; i < kTile; ++i) {
       float flux = (face_s[i] - face_s[i + 1]) + (above[i] - below[i]);
       if constexpr (kSheared) {
-        const float* main = &tile->links->main[Corner(i, j)];
-        const float* anti = &tile->links->anti[Corner(i, j)];
-        flux += main[0] * (t[i - 1 - kThetaStride] - t[i]) +
-                main[kCornerStride + 1] * (t[i + 1 + kThetaStride] - t[i]) +
-                anti[1] * (t[i + 1 - kThetaStride] - t[i]) + anti[kCornerStride] * (t[i - 1 + kThetaStride] - t[i]);
+        const float* l = &tile->links[Corner(i, j)];
+        const float* up = &t[i - kThetaStride];
+        const float* down = &t[i + kThetaStride];
+        flux += Main(l[0]) * (up[-1] - t[i]) + Main(l[kCornerStride + 1]) * (down[1] - t[i]) +
+                Anti(l[1]) * (up[1] - t[i]) + Anti(l[kCornerStride]) * (down[-1] - t[i]);
       }
       const float after = h[i] + (dt_s * inverse_area[i] * flux - loss * t[i]);
       if constexpr (kSecond) {
@@ -73,13 +77,13 @@ inline void Stage(Tile* tile, float dt_s, float loss) {
 }
 
 FULCRUM_WIDE
-void FirstStage(Tile* tile, float dt_s, float loss) { Stage<false, false>(tile, dt_s, loss); }
+void FirstStage(Tile* tile, float dt_s, float gain, float loss) { Stage<false, false>(tile, dt_s, gain, loss); }
 FULCRUM_WIDE
-void SecondStage(Tile* tile, float dt_s, float loss) { Stage<true, false>(tile, dt_s, loss); }
+void SecondStage(Tile* tile, float dt_s, float gain, float loss) { Stage<true, false>(tile, dt_s, gain, loss); }
 FULCRUM_WIDE
-void FirstStageSheared(Tile* tile, float dt_s, float loss) { Stage<false, true>(tile, dt_s, loss); }
+void FirstStageSheared(Tile* tile, float dt_s, float gain, float loss) { Stage<false, true>(tile, dt_s, gain, loss); }
 FULCRUM_WIDE
-void SecondStageSheared(Tile* tile, float dt_s, float loss) { Stage<true, true>(tile, dt_s, loss); }
+void SecondStageSheared(Tile* tile, float dt_s, float gain, float loss) { Stage<true, true>(tile, dt_s, gain, loss); }
 
 /// theta with its column sums and extremes; rc = rc_dry + water * rc_water.
 FULCRUM_WIDE
@@ -105,20 +109,89 @@ void ThetaOf(Tile* tile, float rc_dry, float rc_water) {
 /// A field of cells with the halo of theta.
 using Padded = std::array<float, kThetaCount>;
 
-/// Copies what the eight neighbours have next to the tile into the halo of a padded field; value(tile, cell).
+/// Copies what the eight neighbours have next to the tile into the halo of a padded field; value(tile, i, j). Where
+/// there is none the halo becomes 0, or stays as it was.
 template <class Value>
-void FillHalo(const std::array<const Tile*, 9>& around, const Value& value, float* field) {
+void FillHalo(const std::array<const Tile*, 9>& around, const Value& value, bool clear, float* field) {
   for (int n = 0; n < 9; ++n) {
     const Tile* other = around[n];
-    if (other == nullptr || n == 4) continue;
+    if (n == 4 || (other == nullptr && !clear)) continue;
     const int dx = n % 3 - 1, dy = n / 3 - 1;
     const int i0 = dx < 0 ? -kHalo : (dx > 0 ? kTile : 0), i1 = dx < 0 ? 0 : (dx > 0 ? kTile + kHalo : kTile);
     const int j0 = dy < 0 ? -kHalo : (dy > 0 ? kTile : 0), j1 = dy < 0 ? 0 : (dy > 0 ? kTile + kHalo : kTile);
     for (int j = j0; j < j1; ++j) {
       for (int i = i0; i < i1; ++i) {
-        field[ThetaIndex(i, j)] = value(*other, i - dx * kTile, j - dy * kTile);
+        field[ThetaIndex(i, j)] = other != nullptr ? value(*other, i - dx * kTile, j - dy * kTile) : 0.0f;
       }
     }
+  }
+}
+
+/// Conductivity of each cell into `out`, 0 where there is no tissue; k = k_dry + water * k_water.
+FULCRUM_WIDE
+void ConductivityOf(const TileState& state, float k_dry, float k_water, float* out) {
+  for (int j = 0; j < kTile; ++j) {
+    float* __restrict k = &out[ThetaIndex(0, j)];
+    const float* __restrict water = &state.water[j * kTile];
+    const std::uint8_t* __restrict flags = &state.flags[j * kTile];
+    for (int i = 0; i < kTile; ++i) {
+      const float tissue = (flags[i] & kNoTissue) != 0 ? 0.0f : 1.0f;
+      k[i] = tissue * (k_dry + water[i] * k_water);
+    }
+  }
+}
+
+FULCRUM_WIDE
+void FacesOf(Tile* tile, float scale) {
+  const TileGeometry& geometry = tile->geometry;
+  for (int j = 0; j < kTile; ++j) {
+    const float* __restrict k = &tile->conductivity[ThetaIndex(0, j)];
+    const float* __restrict ratio = &geometry.across_s[FaceS(0, j)];
+    float* __restrict face = &tile->face_s[FaceS(0, j)];
+    for (int i = -1; i <= kTile + 1; ++i) face[i] = scale * ratio[i] * Harmonic(k[i - 1], k[i]);
+  }
+  for (int j = -1; j <= kTile + 1; ++j) {
+    const float* __restrict k = &tile->conductivity[ThetaIndex(0, j)];
+    const float* __restrict ratio = &geometry.across_t[FaceT(0, j)];
+    float* __restrict face = &tile->face_t[FaceT(0, j)];
+    for (int i = 0; i < kTile; ++i) face[i] = scale * ratio[i] * Harmonic(k[i - kThetaStride], k[i]);
+  }
+}
+
+/// Heat goes around a corner only through tissue: 0 where both other cells of the corner are gone.
+FULCRUM_WIDE
+void LinksOf(Tile* tile, float scale) {
+  for (int j = 0; j <= kTile; ++j) {
+    const float* __restrict below = &tile->conductivity[ThetaIndex(0, j)];
+    const float* __restrict above = below - kThetaStride;
+    const float* __restrict shear = &tile->geometry.shear[Corner(0, j)];
+    float* __restrict link = &tile->links[Corner(0, j)];
+    for (int i = 0; i <= kTile; ++i) {
+      const float main = above[i] + below[i - 1] > 0.0f ? Harmonic(above[i - 1], below[i]) : 0.0f;
+      const float anti = above[i - 1] + below[i] > 0.0f ? Harmonic(above[i], below[i - 1]) : 0.0f;
+      link[i] = scale * shear[i] * (shear[i] > 0.0f ? main : anti);
+    }
+  }
+}
+
+/// Rate of the explicit step with two-point fluxes.
+FULCRUM_WIDE
+void RatesOf(Tile* tile, float rc_dry, float rc_water, float sink) {
+  for (int j = 0; j < kTile; ++j) {
+    const float* __restrict s = &tile->face_s[FaceS(0, j)];
+    const float* __restrict t = &tile->face_t[FaceT(0, j)];
+    const float* __restrict water = &tile->state.water[j * kTile];
+    const float* __restrict inverse_area = &tile->geometry.inverse_area[j * kTile];
+    float* __restrict rate = &tile->cell_rate[j * kTile];
+    alignas(64) float sum[kTile];
+    for (int i = 0; i < kTile; ++i) sum[i] = (s[i] + s[i + 1]) + (t[i] + t[i + kTile]);
+    if (!tile->links.empty()) {
+      const float* __restrict l = &tile->links[Corner(0, j)];
+      for (int i = 0; i < kTile; ++i) {
+        sum[i] += (Main(l[i]) + Main(l[i + kCornerStride + 1])) + (Anti(l[i + 1]) + Anti(l[i + kCornerStride]));
+      }
+    }
+    for (int i = 0; i < kTile; ++i) rate[i] = (sum[i] * inverse_area[i] + sink) / (rc_dry + water[i] * rc_water);
   }
 }
 
@@ -138,7 +211,7 @@ void SetGeometry(const Sheet& sheet, Tile* tile) {
   };
   // What diagonal links carry they take from the faces around them: both must not fall below 0.
   const auto shear_at = [&](int i, int j) {
-    const Metric g = at(static_cast<float>(i), static_cast<float>(j));
+    const SurfaceMetric g = at(static_cast<float>(i), static_cast<float>(j));
     const float most = std::min(g.ss, g.tt) / g.area(), b = -g.st / g.area();
     return std::abs(b) < kShearIgnored * most ? 0.0f : std::clamp(b, -most, most);
   };
@@ -155,13 +228,13 @@ void SetGeometry(const Sheet& sheet, Tile* tile) {
   const auto carried = [&](int i, int j) { return std::abs(shear[(j + 1) * kSide + i + 1]); };
   for (int j = 0; j < kTile; ++j) {
     for (int i = -1; i <= kTile + 1; ++i) {
-      const Metric g = at(static_cast<float>(i), static_cast<float>(j) + 0.5f);
+      const SurfaceMetric g = at(static_cast<float>(i), static_cast<float>(j) + 0.5f);
       geometry.across_s[FaceS(i, j)] = std::max(0.0f, g.tt / g.area() - 0.5f * (carried(i, j) + carried(i, j + 1)));
     }
   }
   for (int j = -1; j <= kTile + 1; ++j) {
     for (int i = 0; i < kTile; ++i) {
-      const Metric g = at(static_cast<float>(i) + 0.5f, static_cast<float>(j));
+      const SurfaceMetric g = at(static_cast<float>(i) + 0.5f, static_cast<float>(j));
       geometry.across_t[FaceT(i, j)] = std::max(0.0f, g.ss / g.area() - 0.5f * (carried(i, j) + carried(i + 1, j)));
     }
   }
@@ -186,61 +259,42 @@ std::array<const Tile*, 9> HeatField::Around(const Tile& tile) const {
   return around;
 }
 
+void HeatField::ComputeConductivity(Tile* tile) {
+  alignas(64) Padded now;
+  ConductivityOf(tile->state, material_.k_dry, material_.k_wet - material_.k_dry, now.data());
+  // Neighbours look at two cells from the border.
+  std::array<bool, 9> changed{};
+  for (int j = 0; j < kTile; ++j) {
+    const float* before = &tile->conductivity[ThetaIndex(0, j)];
+    const float* after = &now[ThetaIndex(0, j)];
+    const int row = j < kHalo ? 0 : (j >= kTile - kHalo ? 6 : 3);
+    if (row != 3 && !std::equal(before, before + kTile, after)) changed[row + 1] = true;
+    if (!std::equal(before, before + kHalo, after)) changed[row] = changed[3] = true;
+    if (!std::equal(before + kTile - kHalo, before + kTile, after + kTile - kHalo))
+      changed[row + 2] = changed[5] = true;
+    std::copy_n(after, kTile, &tile->conductivity[ThetaIndex(0, j)]);
+  }
+  for (int n = 0; n < 9; ++n) {
+    if (Tile* other = changed[n] ? Find(tile->tx + n % 3 - 1, tile->ty + n / 3 - 1) : nullptr) {
+      other->faces_stale = true;
+    }
+  }
+}
+
 void HeatField::BuildFaces(Tile* tile) {
-  const auto conductivity = [&](const Tile& of, int i, int j) {
-    const int cell = j * kTile + i;
-    return (of.state.flags[cell] & kNoTissue) != 0 ? 0.0f : material_.ThermalConductivity(of.state.water[cell]);
-  };
-  alignas(64) Padded k{};
-  for (int j = 0; j < kTile; ++j) {
-    for (int i = 0; i < kTile; ++i) k[ThetaIndex(i, j)] = conductivity(*tile, i, j);
-  }
-  FillHalo(Around(*tile), conductivity, k.data());
   const TileGeometry& geometry = tile->geometry;
+  FillHalo(
+      Around(*tile), [](const Tile& of, int i, int j) { return of.conductivity[ThetaIndex(i, j)]; }, true,
+      tile->conductivity.data());
   const float scale = 1.0f / (material_.cell_m * material_.cell_m);  // d / flat_volume
-  for (int j = 0; j < kTile; ++j) {
-    const float* row = &k[ThetaIndex(0, j)];
-    for (int i = -1; i <= kTile + 1; ++i) {
-      const int f = FaceS(i, j);
-      tile->face_s[f] = scale * geometry.across_s[f] * Harmonic(row[i - 1], row[i]);
-    }
-  }
-  for (int j = -1; j <= kTile + 1; ++j) {
-    const float* row = &k[ThetaIndex(0, j)];
-    for (int i = 0; i < kTile; ++i) {
-      const int f = FaceT(i, j);
-      tile->face_t[f] = scale * geometry.across_t[f] * Harmonic(row[i - kThetaStride], row[i]);
-    }
-  }
+  FacesOf(tile, scale);
   if (!geometry.shear.empty()) {
-    if (tile->links == nullptr) tile->links = std::make_unique<DiagonalLinks>();
-    for (int j = 0; j <= kTile; ++j) {
-      const float* row = &k[ThetaIndex(0, j)];
-      for (int i = 0; i <= kTile; ++i) {
-        const float b = scale * geometry.shear[Corner(i, j)];
-        // Heat goes around a corner only through tissue.
-        const float a00 = row[i - 1 - kThetaStride], a01 = row[i - kThetaStride], a10 = row[i - 1], a11 = row[i];
-        tile->links->main[Corner(i, j)] = a01 + a10 > 0.0f ? std::max(b, 0.0f) * Harmonic(a00, a11) : 0.0f;
-        tile->links->anti[Corner(i, j)] = a00 + a11 > 0.0f ? std::max(-b, 0.0f) * Harmonic(a01, a10) : 0.0f;
-      }
-    }
+    tile->links.resize(geometry.shear.size());
+    LinksOf(tile, scale);
   }
-  const float sink = std::max(material_.loss_resting, material_.loss_tented);
-  tile->rate = 0;
-  for (int j = 0; j < kTile; ++j) {
-    for (int i = 0; i < kTile; ++i) {
-      const int cell = j * kTile + i;
-      float sum = kFluxGain * ((tile->face_s[FaceS(i, j)] + tile->face_s[FaceS(i + 1, j)]) +
-                               (tile->face_t[FaceT(i, j)] + tile->face_t[FaceT(i, j + 1)]));
-      if (tile->links != nullptr) {
-        sum += (tile->links->main[Corner(i, j)] + tile->links->main[Corner(i + 1, j + 1)]) +
-               (tile->links->anti[Corner(i + 1, j)] + tile->links->anti[Corner(i, j + 1)]);
-      }
-      const float capacity = material_.HeatCapacity(tile->state.water[cell]);
-      tile->cell_rate[cell] = (sum * geometry.inverse_area[cell] + sink) / capacity;
-      tile->rate = std::max(tile->rate, tile->cell_rate[cell]);
-    }
-  }
+  RatesOf(tile, material_.rc_dry, material_.rc_wet - material_.rc_dry,
+          std::max(material_.loss_resting, material_.loss_tented));
+  tile->rate = *std::max_element(tile->cell_rate.begin(), tile->cell_rate.end());
 }
 
 void HeatField::LimitFaces(Tile* tile, float rate) {
@@ -249,7 +303,7 @@ void HeatField::LimitFaces(Tile* tile, float rate) {
   for (int j = 0; j < kTile; ++j) {
     for (int i = 0; i < kTile; ++i) part[ThetaIndex(i, j)] = part_of(*tile, i, j);
   }
-  FillHalo(Around(*tile), part_of, part.data());
+  FillHalo(Around(*tile), part_of, false, part.data());
   for (int j = 0; j < kTile; ++j) {
     const float* p = &part[ThetaIndex(0, j)];
     for (int i = -1; i <= kTile + 1; ++i) tile->face_s[FaceS(i, j)] *= std::min(p[i - 1], p[i]);
@@ -258,12 +312,12 @@ void HeatField::LimitFaces(Tile* tile, float rate) {
     const float* p = &part[ThetaIndex(0, j)];
     for (int i = 0; i < kTile; ++i) tile->face_t[FaceT(i, j)] *= std::min(p[i - kThetaStride], p[i]);
   }
-  if (tile->links == nullptr) return;
+  if (tile->links.empty()) return;
   for (int j = 0; j <= kTile; ++j) {
     const float* p = &part[ThetaIndex(0, j)];
     for (int i = 0; i <= kTile; ++i) {
-      tile->links->main[Corner(i, j)] *= std::min(p[i - 1 - kThetaStride], p[i]);
-      tile->links->anti[Corner(i, j)] *= std::min(p[i - kThetaStride], p[i - 1]);
+      float& link = tile->links[Corner(i, j)];
+      link *= link > 0.0f ? std::min(p[i - 1 - kThetaStride], p[i]) : std::min(p[i - kThetaStride], p[i - 1]);
     }
   }
 }
@@ -285,7 +339,7 @@ void HeatField::ExchangeHalos(Tile* tile) {
       std::copy_n(&other->theta[ThetaIndex(0, from + j)], kTile, &theta[ThetaIndex(0, to + j)]);
     }
   }
-  if (tile->links == nullptr) return;
+  if (tile->links.empty()) return;
   for (const auto& [other, i, j] :
        {std::tuple{around[0], -1, -1}, {around[2], kTile, -1}, {around[6], -1, kTile}, {around[8], kTile, kTile}}) {
     if (other == nullptr) continue;
@@ -293,21 +347,28 @@ void HeatField::ExchangeHalos(Tile* tile) {
   }
 }
 
-void HeatField::RunStage(bool second, float dt_s, Ledger* ledger) {
+void HeatField::RunStage(bool second, float dt_s, float gain, bool sink, Ledger* ledger) {
   for (Tile* tile : awake_) ExchangeHalos(tile);
   for (Tile* tile : awake_) {
-    // Where the sink alone is stiff, no more goes at once than leaves half of the heat.
-    const float loss = std::min(dt_s * (tile->state.tented != 0 ? material_.loss_tented : material_.loss_resting),
-                                0.5f * material_.rc_dry);
-    if (tile->links != nullptr) {
-      (second ? SecondStageSheared : FirstStageSheared)(tile, dt_s, loss);
+    const float loss = sink ? dt_s * SinkOf(*tile) : 0.0f;
+    if (!tile->links.empty()) {
+      (second ? SecondStageSheared : FirstStageSheared)(tile, dt_s, gain, loss);
     } else {
-      (second ? SecondStage : FirstStage)(tile, dt_s, loss);
+      (second ? SecondStage : FirstStage)(tile, dt_s, gain, loss);
     }
     double sum = 0;
     for (const float s : tile->theta_sum) sum += s;
     ledger->lost += 0.5 * sum * loss * tile->flat_volume;
   }
+}
+
+void HeatField::Cool(Tile* tile, float dt_s, Ledger* ledger) const {
+  const float loss = dt_s * SinkOf(*tile);
+  const double before = tile->Heat();
+  for (int cell = 0; cell < kTileCells; ++cell) {
+    tile->state.enthalpy[cell] *= std::exp(-loss / material_.HeatCapacity(tile->state.water[cell]));
+  }
+  ledger->lost += before - tile->Heat();
 }
 
 void HeatField::ComputeTheta(Tile* tile) const { ThetaOf(tile, material_.rc_dry, material_.rc_wet - material_.rc_dry); }

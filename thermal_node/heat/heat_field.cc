@@ -55,6 +55,7 @@ Tile* HeatField::Wake(int tx, int ty) {
   if (tile->state.awake) return tile;
   tile->state.awake = 1;
   tile->faces_stale = true;
+  MarkNeighboursStale(*tile);
   const auto before = std::lower_bound(awake_.begin(), awake_.end(), index,
                                        [](const Tile* t, int wanted) { return t->index < wanted; });
   awake_.insert(before, tile);
@@ -69,15 +70,13 @@ void HeatField::MarkNeighboursStale(const Tile& tile) {
 }
 
 void HeatField::RebuildStaleFaces() {
-  // Two passes: marking while building would spread over the whole sheet.
-  scratch_.clear();
   for (Tile* tile : awake_) {
-    if (tile->faces_stale) scratch_.push_back(tile);
+    if (!std::exchange(tile->material_stale, false)) continue;
+    tile->faces_stale = true;
+    ComputeConductivity(tile);
   }
-  for (const Tile* tile : scratch_) MarkNeighboursStale(*tile);
   for (Tile* tile : awake_) {
-    if (tile->faces_stale) BuildFaces(tile);
-    tile->faces_stale = false;
+    if (std::exchange(tile->faces_stale, false)) BuildFaces(tile);
   }
 }
 
@@ -101,7 +100,7 @@ void HeatField::TakeOut(Tile* tile, int cell, CellFlag why, double* account) {
   s.water[cell] = 0;
   s.flags[cell] = static_cast<std::uint8_t>(s.flags[cell] | why);
   tile->theta[ThetaIndex(cell % kTile, cell / kTile)] = 0;
-  tile->faces_stale = true;
+  tile->material_stale = true;
   tile->patch_stale = true;
 }
 
@@ -120,7 +119,7 @@ void HeatField::Boil(Tile* tile, Ledger* ledger) {
   }
   if (steam > 0) {
     ledger->vapour += steam * tile->flat_volume;
-    tile->faces_stale = true;
+    tile->material_stale = true;
     RefreshTheta(tile, ledger);
   }
 }
@@ -137,13 +136,15 @@ int HeatField::Diffuse(float dt_s, Ledger* ledger) {
   const float h = dt_s / static_cast<float>(substeps);
   if (stiff) {
     ++stiff_steps_;
-    for (Tile* tile : awake_) LimitFaces(tile, 0.5f * kExplicitLimit / h);
+    for (Tile* tile : awake_) LimitFaces(tile, kExplicitLimit / h);
   }
+  const float gain = stiff ? 1.0f : std::min(kFluxGain, kExplicitLimit / (h * rate));
   for (int n = 0; n < substeps; ++n) {
-    RunStage(false, h, ledger);
+    RunStage(false, h, gain, !stiff, ledger);
     for (Tile* tile : awake_) ComputeTheta(tile);
-    RunStage(true, h, ledger);
+    RunStage(true, h, gain, !stiff, ledger);
     for (Tile* tile : awake_) {
+      if (stiff) Cool(tile, h, ledger);
       RefreshTheta(tile, ledger);
       Boil(tile, ledger);
       tile->patch_stale = true;
@@ -226,7 +227,6 @@ void HeatField::Restore(int index, const TileState& state) {
   tile->state = state;
   tile->state.awake = 0;
   if (state.awake != 0) Wake(tile->tx, tile->ty);
-  MarkNeighboursStale(*tile);
   Ledger none;  // a checkpoint holds no bad cells
   RefreshTheta(tile, &none);
 }

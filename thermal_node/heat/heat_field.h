@@ -21,7 +21,8 @@ namespace fulcrum::thermal {
 inline constexpr float kWakeTheta = 0.03f;     ///< A neighbour wakes when this warm at its border [K].
 inline constexpr float kSleepTheta = 0.02f;    ///< A tile sleeps when nowhere warmer [K].
 inline constexpr float kExplicitLimit = 0.9f;  ///< dt * rate of the explicit step; the maximum principle holds to 1.
-/// Largest ratio of a fourth-order flux to the two-point one: that of the shortest wave.
+/// Largest ratio of a fourth-order flux to the two-point one: that of the shortest wave. Where the step is too long for
+/// it, what the step allows.
 inline constexpr float kFluxGain = 4.0f / 3.0f;
 inline constexpr float kShearIgnored = 1e-4f;  ///< Of a face's conductance: no diagonal links.
 /// Substeps of a step at most. Where these would not do, faces conduct no faster than they allow.
@@ -49,7 +50,8 @@ class HeatField {
   /// One step of conduction and losses, of second order in time, in as many substeps as the fastest awake cell needs,
   /// with boiling, waking of neighbours and sleeping of cold tiles. Whoever changed enthalpy or water must have called
   /// RefreshTheta. A step that would need more than kMaxSubsteps is stiff: cells that are too fast for it conduct as
-  /// fast as it allows, so it stays bounded by what was there and conserves heat, whatever its length. Returns the
+  /// fast as it allows and the sink is taken exactly, after each substep. So it stays bounded by what was there and
+  /// conserves heat, whatever its length. Returns the
   /// number of substeps.
   int Diffuse(float dt_s, Ledger* ledger);
 
@@ -83,13 +85,19 @@ class HeatField {
   void RebuildStaleFaces();
   void ExchangeHalos(Tile* tile);
   void LimitFaces(Tile* tile, float rate);
-  void RunStage(bool second, float dt_s, Ledger* ledger);
+  void RunStage(bool second, float dt_s, float gain, bool sink, Ledger* ledger);
+  void Cool(Tile* tile, float dt_s, Ledger* ledger) const;
+  void ComputeConductivity(Tile* tile);
   void ComputeTheta(Tile* tile) const;
   void WakeNeighbours();
   void SleepCold(Ledger* ledger);
   void MarkNeighboursStale(const Tile& tile);
   void Quarantine(Tile* tile, Ledger* ledger);
   Tile* Create(int index);
+  /// [W/m^3K]
+  [[nodiscard]] float SinkOf(const Tile& tile) const {
+    return tile.state.tented != 0 ? material_.loss_tented : material_.loss_resting;
+  }
   /// The tile and its neighbours, row by row; null where none is awake.
   [[nodiscard]] std::array<const Tile*, 9> Around(const Tile& tile) const;
 

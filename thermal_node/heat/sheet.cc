@@ -54,7 +54,7 @@ void FillTriangle(Sheet* sheet, const Vec2f& a, const Vec2f& b, const Vec2f& c) 
 }
 
 /// Stretches within their bounds, by the eigenvalues of g.
-Metric Bounded(const Metric& g) {
+SurfaceMetric Bounded(const SurfaceMetric& g) {
   const float mean = 0.5f * (g.ss + g.tt), half = 0.5f * (g.ss - g.tt);
   const float radius = std::sqrt(half * half + g.st * g.st);
   if (!std::isfinite(mean + radius)) return {};
@@ -65,9 +65,9 @@ Metric Bounded(const Metric& g) {
 }
 
 /// g of each node of the grid: the mean of the quads around it.
-std::vector<Metric> NodeMetric(const SceneView& scene) {
+std::vector<SurfaceMetric> NodeMetric(const SceneView& scene) {
   const MembraneGrid& grid = scene.membrane;
-  std::vector<Metric> sum(grid.node_count(), Metric{0, 0, 0});
+  std::vector<SurfaceMetric> sum(grid.node_count(), SurfaceMetric{0, 0, 0});
   std::vector<int> count(grid.node_count(), 0);
   for (Index r = 0; r + 1 < grid.rows; ++r) {
     for (Index c = 0; c + 1 < grid.cols; ++c) {
@@ -82,7 +82,7 @@ std::vector<Metric> NodeMetric(const SceneView& scene) {
       const float det = Cross(u, v);
       if (!(std::abs(det) > 0.0f)) continue;
       const Vec3f js = (ru * v.y() - rv * u.y()) / det, jt = (rv * u.x() - ru * v.x()) / det;
-      const Metric g = Bounded({js.squaredNorm(), js.dot(jt), jt.squaredNorm()});
+      const SurfaceMetric g = Bounded({js.squaredNorm(), js.dot(jt), jt.squaredNorm()});
       for (const Index n : {n00, n01, n10, n11}) {
         sum[n] = {sum[n].ss + g.ss, sum[n].st + g.st, sum[n].tt + g.tt};
         ++count[n];
@@ -91,7 +91,7 @@ std::vector<Metric> NodeMetric(const SceneView& scene) {
   }
   for (std::size_t n = 0; n < sum.size(); ++n) {
     const float f = 1.0f / static_cast<float>(std::max(count[n], 1));
-    sum[n] = count[n] > 0 ? Metric{f * sum[n].ss, f * sum[n].st, f * sum[n].tt} : Metric{};
+    sum[n] = count[n] > 0 ? SurfaceMetric{f * sum[n].ss, f * sum[n].st, f * sum[n].tt} : SurfaceMetric{};
   }
   return sum;
 }
@@ -99,22 +99,22 @@ std::vector<Metric> NodeMetric(const SceneView& scene) {
 void MakeLattice(Sheet* sheet) {
   sheet->metric_x = sheet->tiles_x * kTile / kMetricStep + 1;
   sheet->metric_y = sheet->tiles_y * kTile / kMetricStep + 1;
-  sheet->metric.assign(static_cast<std::size_t>(sheet->metric_x) * sheet->metric_y, Metric{});
+  sheet->metric.assign(static_cast<std::size_t>(sheet->metric_x) * sheet->metric_y, SurfaceMetric{});
 }
 
 /// Gives places of the lattice without tissue what their nearest neighbours have.
-void Spread(const Sheet& sheet, std::vector<std::uint8_t>* known, std::vector<Metric>* metric) {
+void Spread(const Sheet& sheet, std::vector<std::uint8_t>* known, std::vector<SurfaceMetric>* metric) {
   const int nx = sheet.metric_x, ny = sheet.metric_y;
   for (bool more = true; more;) {
     more = false;
     const std::vector<std::uint8_t> before = *known;
     for (int k = 0; k < nx * ny; ++k) {
       if (before[k] != 0) continue;
-      Metric sum{0, 0, 0};
+      SurfaceMetric sum{0, 0, 0};
       float count = 0;
       const auto add = [&](bool inside, int n) {
         if (!inside || before[n] == 0) return;
-        const Metric& g = (*metric)[n];
+        const SurfaceMetric& g = (*metric)[n];
         sum = {sum.ss + g.ss, sum.st + g.st, sum.tt + g.tt};
         ++count;
       };
@@ -133,7 +133,7 @@ void Spread(const Sheet& sheet, std::vector<std::uint8_t>* known, std::vector<Me
 /// The metric of the grid at the places of the lattice, linear within each of its triangles.
 void MeasureMetric(const SceneView& scene, Sheet* sheet) {
   const MembraneGrid& grid = scene.membrane;
-  const std::vector<Metric> at_node = NodeMetric(scene);
+  const std::vector<SurfaceMetric> at_node = NodeMetric(scene);
   MakeLattice(sheet);
   std::vector<std::uint8_t> known(sheet->metric.size(), 0);
   const Vec2f origin(static_cast<float>(sheet->origin_x), static_cast<float>(sheet->origin_y));
@@ -150,7 +150,7 @@ void MeasureMetric(const SceneView& scene, Sheet* sheet) {
         const Vec2f p(static_cast<float>(x), static_cast<float>(y));
         const float wb = Cross(p - a, c - a) / area, wc = Cross(b - a, p - a) / area, wa = 1 - wb - wc;
         if (std::min({wa, wb, wc}) < -1e-4f) continue;
-        const Metric &ga = at_node[na], &gb = at_node[nb], &gc = at_node[nc];
+        const SurfaceMetric &ga = at_node[na], &gb = at_node[nb], &gc = at_node[nc];
         const std::size_t k = static_cast<std::size_t>(y) * sheet->metric_x + x;
         sheet->metric[k] = Bounded({wa * ga.ss + wb * gb.ss + wc * gc.ss, wa * ga.st + wb * gb.st + wc * gc.st,
                                     wa * ga.tt + wb * gb.tt + wc * gc.tt});
@@ -179,21 +179,21 @@ Vec2f Sheet::CentreOf(CellIndex cell) const {
   return Vec2f(static_cast<float>(cell.ix + origin_x) + 0.5f, static_cast<float>(cell.iy + origin_y) + 0.5f) * cell_m;
 }
 
-Metric Sheet::MetricAt(float x, float y) const {
+SurfaceMetric Sheet::MetricAt(float x, float y) const {
   if (metric.empty()) return {};
   const float u = std::clamp(x / kMetricStep, 0.0f, static_cast<float>(metric_x - 1));
   const float v = std::clamp(y / kMetricStep, 0.0f, static_cast<float>(metric_y - 1));
   const int i = std::min(static_cast<int>(u), metric_x - 2), j = std::min(static_cast<int>(v), metric_y - 2);
   const float f = u - static_cast<float>(i), h = v - static_cast<float>(j);
-  const Metric* row = &metric[static_cast<std::size_t>(j) * metric_x + i];
-  const Metric &a = row[0], &b = row[1], &c = row[metric_x], &d = row[metric_x + 1];
+  const SurfaceMetric* row = &metric[static_cast<std::size_t>(j) * metric_x + i];
+  const SurfaceMetric &a = row[0], &b = row[1], &c = row[metric_x], &d = row[metric_x + 1];
   const auto mix = [&](float pa, float pb, float pc, float pd) {
     return (1 - h) * (pa + f * (pb - pa)) + h * (pc + f * (pd - pc));
   };
   return {mix(a.ss, b.ss, c.ss, d.ss), mix(a.st, b.st, c.st, d.st), mix(a.tt, b.tt, c.tt, d.tt)};
 }
 
-void SetMetric(Sheet* sheet, const std::function<Metric(const Vec2f&)>& metric_at) {
+void SetMetric(Sheet* sheet, const std::function<SurfaceMetric(const Vec2f&)>& metric_at) {
   MakeLattice(sheet);
   for (int y = 0; y < sheet->metric_y; ++y) {
     for (int x = 0; x < sheet->metric_x; ++x) {

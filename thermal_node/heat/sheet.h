@@ -22,7 +22,7 @@ struct CellIndex {
 
 /// First fundamental form of the rest shape over material space, g = J^T J with J = d rest / d (s, t): squared stretch
 /// along s and t, and their scalar product (shear).
-struct Metric {
+struct SurfaceMetric {
   float ss = 1, st = 0, tt = 1;
 
   [[nodiscard]] float area() const { return std::sqrt(ss * tt - st * st); }  ///< Rest area over material area.
@@ -36,7 +36,7 @@ struct Sheet {
   int nx = 0, ny = 0;                       ///< Cells.
   int tiles_x = 0, tiles_y = 0;
   /// At the corners of blocks of kMetricStep cells, metric_x to a row; bilinear between. Empty: isometric.
-  std::vector<Metric> metric;
+  std::vector<SurfaceMetric> metric;
   int metric_x = 0, metric_y = 0;
   std::vector<std::uint8_t> outside;  ///< Bit field over tiles_x*kTile by tiles_y*kTile: no tissue there.
 
@@ -48,7 +48,7 @@ struct Sheet {
   [[nodiscard]] CellIndex CellOf(const Vec2f& material) const;
   [[nodiscard]] Vec2f CentreOf(CellIndex cell) const;
   /// At a place in cells from the sheet's origin; beyond the border as at the border.
-  [[nodiscard]] Metric MetricAt(float x, float y) const;
+  [[nodiscard]] SurfaceMetric MetricAt(float x, float y) const;
   /// True when the point lies on tissue.
   [[nodiscard]] bool OnSheet(const Vec2f& material) const;
 };
@@ -60,6 +60,6 @@ struct Sheet {
 [[nodiscard]] Sheet MakeFlatSheet(float width_m, float height_m, float cell_m);
 /// Sets the metric from a function of material coordinates [m]. What is not finite becomes isometric; stretches are
 /// held within [kStretchMin, kStretchMax].
-void SetMetric(Sheet* sheet, const std::function<Metric(const Vec2f&)>& metric_at);
+void SetMetric(Sheet* sheet, const std::function<SurfaceMetric(const Vec2f&)>& metric_at);
 
 }  // namespace fulcrum::thermal

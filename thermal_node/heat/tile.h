@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "thermal_node/heat/sheet.h"
@@ -47,12 +46,6 @@ struct TileState {
   std::uint8_t tented = 0;
 };
 
-/// Conductances of links between cells that touch at a corner, as of faces; only where the map shears.
-struct DiagonalLinks {
-  alignas(64) std::array<float, (kTile + 1) * kCornerStride> main{};  ///< Between (i-1, j-1) and (i, j).
-  alignas(64) std::array<float, (kTile + 1) * kCornerStride> anti{};  ///< Between (i, j-1) and (i-1, j).
-};
-
 /// The map from material space to the rest shape, at the cells, faces and corners of a tile.
 struct TileGeometry {
   alignas(64) CellArray<float> area{};                            ///< sqrt(g).
@@ -70,19 +63,24 @@ struct Tile {
 
   /// theta [K] with a halo; equals enthalpy / heat capacity at all times between calls.
   alignas(64) std::array<float, kThetaCount> theta{};
+  /// [W/mK], likewise; 0 where there is no tissue.
+  alignas(64) std::array<float, kThetaCount> conductivity{};
   /// Conductance over flat_volume of the face between cells (i-1, j) and (i, j), at FaceS [W/(K m^3)].
   alignas(64) std::array<float, kTile * kFaceStride> face_s{};
   /// The same between (i, j-1) and (i, j), at FaceT.
   alignas(64) std::array<float, (kTile + 3) * kTile> face_t{};
-  std::unique_ptr<DiagonalLinks> links;              ///< Null without shear.
-  alignas(64) CellArray<float> before{};             ///< Enthalpy at the beginning of a substep [J/m^3].
-  alignas(64) CellArray<float> cell_rate{};          ///< Rate of the explicit step in each cell [1/s].
+  /// The same between cells that touch at a corner, at Corner; above 0 between (i-1, j-1) and (i, j), below 0, minus
+  /// that between (i, j-1) and (i-1, j). Empty without shear.
+  std::vector<float> links;
+  alignas(64) CellArray<float> before{};     ///< Enthalpy at the beginning of a substep [J/m^3].
+  alignas(64) CellArray<float> cell_rate{};  ///< Rate of the explicit step with two-point fluxes in each cell [1/s].
   alignas(64) std::array<float, kTile> theta_sum{};  ///< Column sums of theta times area.
   float theta_max = 0, theta_min = 0;
-  float rate = 0;           ///< The largest of cell_rate.
-  bool faces_stale = true;  ///< Material of this tile changed since its faces were built.
-  bool patch_stale = true;  ///< Changed since it was last drawn into a patch.
-  bool held = false;        ///< A warm neighbour touches it: no sleep in this step.
+  float rate = 0;              ///< The largest of cell_rate.
+  bool material_stale = true;  ///< Its conductivity has changed.
+  bool faces_stale = true;     ///< Its faces have to be built again.
+  bool patch_stale = true;     ///< Changed since it was last drawn into a patch.
+  bool held = false;           ///< A warm neighbour touches it: no sleep in this step.
 
   /// Of a cell on the rest shape [m^3].
   [[nodiscard]] float Volume(int cell) const { return flat_volume * geometry.area[cell]; }

@@ -137,9 +137,13 @@ void Orders(Report* report) {
   if (!report->Wants("thermal.order")) return;
   const double mode = std::log2(ModeError(2e-4f, 4e-2f) / ModeError(1e-4f, 1e-2f));
   const double variable = std::log2(VariableError(2e-4f, 4e-2f) / VariableError(1e-4f, 1e-2f));
+  const double on_sphere = SphereError(1e-4f, 1e-2f);
+  const double sphere = std::log2(on_sphere / SphereError(5e-5f, 2.5e-3f));
+  report->Add("thermal.order.sphere_error_pct", 100 * on_sphere, "%");
+  report->Add("thermal.order.sphere", sphere, "1");
   report->Add("thermal.order.eigenfunction", mode, "1");
   report->Add("thermal.order.variable", variable, "1");
-  report->Add("thermal.order.space", std::min(mode, variable), "1");
+  report->Add("thermal.order.space", std::min({mode, variable, sphere}), "1");
   report->Add("thermal.order.time", TimeOrder(), "1");
 }
 

@@ -44,6 +44,10 @@ void ForCells(const HeatField& field, const F& visit) {
 /// that vary by half over the sheet; its source is added half before and half after each step.
 [[nodiscard]] double VariableError(float cell_m, float dt_s);
 
+/// Largest error over the largest value of a bump that fades on a patch of a sphere of 8 mm radius, in coordinates that
+/// shear by 27 degrees.
+[[nodiscard]] double SphereError(float cell_m, float dt_s);
+
 /// Order of the step in time on the same problem, from the differences of steps of 48, 24 and 12 ms on one grid.
 [[nodiscard]] double TimeOrder();
 
