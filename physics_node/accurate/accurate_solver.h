@@ -32,13 +32,11 @@ struct SubstepReport {
   bool searched = false;     ///< The energy was looked at.
 };
 
-/// What happens if some particles together are pushed, beside what is going on. Where they are held, how the tissue
-/// pulls when they move together.
+/// With what force the tissue resists when some particles are moved together by a little, beside what is going on.
 struct Question {
   std::span<const ParticleRef> at;
-  std::span<const float> weights;  ///< Sum 1.
-  Vec3f force = Vec3f::Zero();     ///< Of all together [N].
-  float horizon_s = 0;             ///< After so long; 0: when all is at rest again.
+  Vec3f direction = Vec3f::UnitZ();  ///< Unit.
+  float horizon_s = 0;               ///< After so long; 0: when all is at rest again.
   /// Below kMemories: the last answer of the same memory is where the search for this one begins.
   std::size_t memory = 0;
 };
@@ -76,10 +74,10 @@ class AccurateSolver {
   void SetVelocity(ParticleRef at, const Vec3f& v);
 
   static constexpr std::size_t kMemories = 4;
-  /// Weighted mean displacement that the force alone would bring about [m], from the last substep's linearisation
-  /// without contacts. Costs two iterations and a product, so the first answer to a new question at rest is too small;
-  /// it improves when the question is repeated. False: all is asleep, or no sound answer. The state stays as it is.
-  bool Respond(const Question& question, Vec3f* displacement);
+  /// Force over displacement [N/m], from the last substep's linearisation, without contacts. Costs two iterations and a
+  /// product, so the first answer to a new question at rest is too large; it improves when the question is repeated.
+  /// False: all is asleep, or no sound answer. The state stays as it is.
+  bool Stiffness(const Question& question, float* newton_per_m);
 
   /// What is computed at present, and what is awake.
   [[nodiscard]] const Regions& regions() const { return regions_; }
@@ -115,6 +113,7 @@ class AccurateSolver {
   void Solve(float inertia, int iterations);
   void FollowContacts();
   void SolveAtContacts(float inertia);
+  void SwapBlock(ParticleRef at, std::array<float, 12>* block);
   [[nodiscard]] float LargestCorrection();
   void LimitCorrection(float largest);
   void SearchAlongCorrection(const Inertia& inertia, std::span<const ContactRow> contacts);
@@ -173,7 +172,12 @@ class AccurateSolver {
   FloatArray velocity_, place_, residual_, z_, p_, q_, d_;
   std::array<FloatArray, kMemories> answer_;  ///< To questions: displacements.
   FloatArray aside_;                          ///< The residual, while a question is answered.
-  std::vector<FloatArray> carry_;             ///< By thread.
+  struct Fixed {
+    float inverse_mass = 0;
+    std::array<float, 12> block{};
+  };
+  std::vector<Fixed> fixed_;       ///< Of the particles that a question is about, meanwhile.
+  std::vector<FloatArray> carry_;  ///< By thread.
   FloatArray row_sums_;
   std::vector<double> partial_;      ///< By task.
   std::vector<GuessCount> guess_;    ///< By task.

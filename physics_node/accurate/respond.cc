@@ -1,5 +1,6 @@
-// Questions to the tissue: static and one-step responses on the matrix of the last linearisation.
+// Questions to the tissue: static and one-step stiffness on the matrix of the last linearisation.
 #include <algorithm>
+#include <cmath>
 
 #include "physics_node/accurate/accurate_solver.h"
 #include "physics_node/accurate/for_tasks.h"
@@ -8,20 +9,36 @@ namespace fulcrum::physics::accurate {
 namespace {
 
 constexpr int kIterations = 2;
-/// How far held particles are moved to see what pulls [m]; the answer is linear in it.
+/// How far the particles are moved to see what pulls [m]; the answer is linear in it.
 constexpr float kProbeStep = 1e-3f;
 
 }  // namespace
 
-bool AccurateSolver::Respond(const Question& question, Vec3f* displacement) {
-  const float size = question.force.norm();
-  if (regions_.nothing() || question.at.empty() || !(size > 0.0f)) {
+/// Exchanges a particle's block of the preconditioner; one of zeros keeps the particle where it is.
+void AccurateSolver::SwapBlock(ParticleRef at, std::array<float, 12>* block) {
+  if (at.base < tube_floats_) {
+    std::swap_ranges(block->begin(), block->end(), organ_block_.data() + 3 * std::size_t{at.base});
+    return;
+  }
+  for (std::size_t i = 0; i < block_.size(); ++i) {
+    std::swap((*block)[i], block_[i][at.base - tube_floats_]);
+  }
+}
+
+bool AccurateSolver::Stiffness(const Question& question, float* newton_per_m) {
+  if (regions_.nothing() || question.at.empty()) {
     return false;
   }
-  const Vec3f direction = question.force / size;
   const float inertia = question.horizon_s > 0.0f ? MakeInertia(question.horizon_s).inertia : 0.0f;
-  const bool held = particles_->InverseMass(question.at[0]) == 0.0f;
   FloatArray& u = answer_[question.memory];
+  // The particles move together as asked, as held ones do, whatever touches them: so the answer is soon a good one.
+  fixed_.clear();
+  for (const ParticleRef at : question.at) {
+    Fixed& fixed = fixed_.emplace_back();
+    fixed.inverse_mass = particles_->InverseMass(at);
+    particles_->SetInverseMass(at, 0.0f);
+    SwapBlock(at, &fixed.block);
+  }
   // What cannot move does not; what is held moves as asked.
   ForTasks([&](const Task& task, int, int) {
     const auto first = static_cast<std::size_t>(task.first), end = static_cast<std::size_t>(task.end);
@@ -43,9 +60,7 @@ bool AccurateSolver::Respond(const Question& question, Vec3f* displacement) {
     }
   });
   for (const ParticleRef at : question.at) {
-    if (held && particles_->InverseMass(at) == 0.0f) {
-      AddField(u.data(), at, kProbeStep * direction - FieldAt(u.data(), at));
-    }
+    AddField(u.data(), at, kProbeStep * question.direction - FieldAt(u.data(), at));
   }
   std::swap(residual_, aside_);
   elements_.LeaveContactsOut(true);
@@ -57,9 +72,6 @@ bool AccurateSolver::Respond(const Question& question, Vec3f* displacement) {
       }
     });
   });
-  for (std::size_t k = 0; k < question.at.size() && !held; ++k) {
-    AddField(residual_.data(), question.at[k], question.weights[k] * question.force);
-  }
   Solve(inertia, kIterations);
   ForTasks([&](const Task& task, int, int) {
     ForParts(task, [&](std::size_t first, std::size_t count) {
@@ -69,17 +81,18 @@ bool AccurateSolver::Respond(const Question& question, Vec3f* displacement) {
     });
   });
   elements_.LeaveContactsOut(false);
-  *displacement = Vec3f::Zero();
   float pull = 0;
   for (std::size_t k = 0; k < question.at.size(); ++k) {
-    *displacement += question.weights[k] * FieldAt(u.data(), question.at[k]);
-    pull -= FieldAt(residual_.data(), question.at[k]).dot(direction);
+    pull -= FieldAt(residual_.data(), question.at[k]).dot(question.direction);
+  }
+  // Backwards: a particle may be asked about twice.
+  for (std::size_t k = question.at.size(); k-- > 0;) {
+    particles_->SetInverseMass(question.at[k], fixed_[k].inverse_mass);
+    SwapBlock(question.at[k], &fixed_[k].block);
   }
   std::swap(residual_, aside_);
-  if (held) {
-    *displacement *= size / pull;
-  }
-  if (!displacement->allFinite() || (held && !(pull > 0.0f))) {
+  *newton_per_m = pull / kProbeStep;
+  if (!std::isfinite(pull) || !(pull > 0.0f)) {
     std::fill_n(u.data(), u.size(), 0.0f);
     return false;
   }

@@ -12,8 +12,6 @@ constexpr float kShare = 0.3f;
 constexpr float kLeast = 1.0f / 5000.0f, kMost = 1.0f / 30.0f;
 /// Of the displacement at rest, at most this is reached in one frame: the viscosity stays above zero.
 constexpr float kMostInFrame = 0.98f;
-/// A small force: the answer is that of the linearised tissue [N].
-constexpr float kForce = 0.1f;
 
 }  // namespace
 
@@ -24,18 +22,17 @@ const Compliance& ComplianceProbe::Update(std::uint32_t tool, std::span<const In
   if (solver == nullptr || count == 0) {
     return memory.compliance;
   }
-  std::fill_n(weights_.begin(), count, 1.0f / static_cast<float>(count));
-  const ProbeLoad load{particles.first(count), {weights_.data(), count}, kForce * direction, tool};
   float* known = memory.ask_rest ? &memory.at_rest : &memory.after_frame;
-  Vec3f displacement = Vec3f::Zero();
-  if (!solver->Respond(load, memory.ask_rest ? ComplianceSolver::kAtRest : frame_s_, &displacement)) {
+  float stiffness = 0;
+  if (!solver->Stiffness({particles.first(count), direction, tool},
+                         memory.ask_rest ? ComplianceSolver::kAtRest : frame_s_, &stiffness)) {
     return memory.compliance;
   }
   memory.ask_rest = !memory.ask_rest;
-  const float answer = displacement.dot(direction) / kForce;
-  if (!(answer > 0.0f) || !std::isfinite(answer)) {
+  if (!(stiffness > 0.0f) || !std::isfinite(stiffness)) {
     return memory.compliance;
   }
+  const float answer = 1.0f / stiffness;
   *known += (*known > 0.0f ? kShare : 1.0f) * (answer - *known);
   if (memory.after_frame > 0.0f && memory.at_rest > 0.0f) {
     const float rest = std::clamp(memory.at_rest, kLeast, kMost);

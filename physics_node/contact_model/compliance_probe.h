@@ -1,7 +1,8 @@
-// How the tissue at a contact gives way, asked of the solver itself: the displacement under a unit force after one
-// frame and at rest. From the two follow the stiffness and viscosity of a Kelvin-Voigt element,
+// How the tissue at a contact gives way, asked of the solver itself: with what force it resists when what is touched
+// moves with the tool by a little, after one frame and at rest. From the two follow the stiffness and viscosity of a
+// Kelvin-Voigt element under a constant force,
 //
-//   u(t) = F / k (1 - exp(-k t / b)):   k = F / u(rest),   b = k h / -ln(1 - u(h) / u(rest)).
+//   u(t) = F / k (1 - exp(-k t / b)):   k = k(rest),   b = k h / -ln(1 - k(rest) / k(h)).
 //
 // Costs at most one question to the solver a tool and step: the two horizons take turns.
 #pragma once
@@ -14,12 +15,11 @@
 
 namespace fulcrum::physics {
 
-/// A force on some particles together.
-struct ProbeLoad {
+/// Particles that move together.
+struct Probe {
   std::span<const Index> particles;
-  std::span<const float> weights;  ///< Of each particle, sum 1.
-  Vec3f force = Vec3f::Zero();     ///< Of all together, frame W [N].
-  std::uint32_t tool = 0;          ///< Who asks: its questions resemble one another.
+  Vec3f direction = Vec3f::UnitZ();  ///< Unit, frame W.
+  std::uint32_t tool = 0;            ///< Who asks: its questions resemble one another.
 };
 
 /// What a solver offers to the probe.
@@ -28,10 +28,10 @@ class ComplianceSolver {
   static constexpr float kAtRest = 0;
 
   virtual ~ComplianceSolver() = default;
-  /// How far the load alone, acting from now on, moves its particles (weighted mean) within `horizon_s`, or until rest
-  /// for kAtRest [m]. The state stays as it is. False: no answer this time. The solver bounds its own cost and may
-  /// answer approximately.
-  virtual bool Respond(const ProbeLoad& load, float horizon_s, Vec3f* displacement) = 0;
+  /// Force over displacement when the particles are moved, from now on, and after `horizon_s` or, for kAtRest, at rest
+  /// [N/m]. The state stays as it is. False: no answer this time. The solver bounds its own cost and may answer
+  /// approximately.
+  virtual bool Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) = 0;
 };
 
 struct Compliance {
@@ -63,7 +63,6 @@ class ComplianceProbe {
   };
   float frame_s_;
   std::array<Memory, kMaxTools> tools_;
-  std::array<float, kMaxParticles> weights_{};
 };
 
 }  // namespace fulcrum::physics

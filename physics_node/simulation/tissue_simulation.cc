@@ -61,16 +61,16 @@ TissueSimulation::TissueSimulation(const SceneView& scene, int threads, const Ke
   }
 }
 
-bool TissueSimulation::Answers::Respond(const ProbeLoad& load, float horizon_s, Vec3f* displacement) {
-  if ((simulation_->steps_ + load.tool * kAskEvery / 2) % kAskEvery != 0) {
+bool TissueSimulation::Answers::Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) {
+  if ((simulation_->steps_ + probe.tool * kAskEvery / 2) % kAskEvery != 0) {
     return false;
   }
   at_.clear();
-  for (const Index particle : load.particles) {
+  for (const Index particle : probe.particles) {
     at_.push_back(simulation_->particles_.Ref(particle));
   }
-  const std::size_t memory = 2 * load.tool + (horizon_s > 0.0f ? 1 : 0);
-  return simulation_->accurate_->Respond({at_, load.weights, load.force, horizon_s, memory}, displacement);
+  const std::size_t memory = 2 * probe.tool + (horizon_s > 0.0f ? 1 : 0);
+  return simulation_->accurate_->Stiffness({at_, probe.direction, horizon_s, memory}, newton_per_m);
 }
 
 void TissueSimulation::FollowTools(const std::array<ToolInput, kMaxTools>& tools) {

@@ -99,7 +99,7 @@ class TissueSimulation {
    public:
     static constexpr std::uint64_t kAskEvery = 8;
     explicit Answers(TissueSimulation* simulation) : simulation_(simulation) {}
-    bool Respond(const ProbeLoad& load, float horizon_s, Vec3f* displacement) override;
+    bool Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) override;
 
    private:
     TissueSimulation* simulation_;
