@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace fulcrum::physics {
 namespace {
@@ -12,6 +13,7 @@ constexpr float kRelaxation = 0.02f;                   ///< b_body / k_body [s].
 constexpr float kMinBody = 30.0f, kMaxBody = 5000.0f;  ///< [N/m]
 constexpr float kSkinOverEt = 2.0f;                    ///< k1 / (E t).
 constexpr float kBodyOverSecant = 2.0f;
+constexpr float kJaws = 1e4f;                                   ///< What is held has no skin to give way [N/m].
 constexpr float kForceCap = 15.0f;                              ///< Rectal tissue is damaged above this [N].
 constexpr float kSurfaceRadius = 0.012f, kGraspRadius = 0.03f;  ///< Where the model holds [m].
 constexpr float kLeastDent = 0.0005f;                           ///< Below this a secant is noise [m].
@@ -77,11 +79,13 @@ void ContactProbe::Enter(ToolMemory* memory, ContactKind kind) const {
     return;
   }
   std::vector<Index> buffer = std::move(memory->touched);
+  const Vec3f tip = memory->tip;
   const Vec3f force =
       memory->kind == ContactKind::kNone || kind == ContactKind::kNone ? Vec3f::Zero().eval() : memory->force;
   *memory = {};
   memory->touched = std::move(buffer);
   memory->kind = kind;
+  memory->tip = memory->x_ref = tip;
   memory->force = force;  // Closing the jaws on what they press does not make the force start anew.
   memory->stiffness = std::clamp(0.3f * scene_.physics.membrane_Et_N_per_m, kMinBody, kMaxBody);
 }
@@ -99,13 +103,38 @@ void ContactProbe::Follow(ToolMemory* memory, const Vec3f& force, const Vec3f& u
   }
 }
 
-Contact ContactProbe::MakeContact(std::uint32_t tool, const ToolPose& pose) {
+void ContactProbe::FollowSolver(ToolMemory* memory, const Vec3f& force) const {
+  const Vec3f limited = Limited(force, kForceCap);
+  if (memory->kind == ContactKind::kGrasp) {
+    memory->force = limited;
+    memory->x_ref = memory->tip;
+    return;
+  }
+  if (std::exchange(memory->steps, 1) == 0) {
+    memory->forces.fill(limited);
+    memory->tips.fill(memory->tip);
+  }
+  std::rotate(memory->forces.begin(), memory->forces.begin() + 1, memory->forces.end());
+  std::rotate(memory->tips.begin(), memory->tips.begin() + 1, memory->tips.end());
+  memory->forces.back() = limited;
+  memory->tips.back() = memory->tip;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::array<float, kMedian> values;
+    std::transform(memory->forces.begin(), memory->forces.end(), values.begin(),
+                   [&](const Vec3f& f) { return f[axis]; });
+    std::nth_element(values.begin(), values.begin() + kMedian / 2, values.end());
+    memory->force[axis] = values[kMedian / 2];
+  }
+  memory->x_ref = memory->tips[kMedian / 2];
+}
+
+Contact ContactProbe::MakeContact(std::uint32_t tool) {
   const ToolMemory& memory = tools_[tool];
   const PhysicsParams& params = scene_.physics;
   Contact contact;
   contact.kind = memory.kind;
   contact.id = memory.id;
-  contact.x_ref = pose.p_WT;
+  contact.x_ref = memory.x_ref;
   contact.f_ref = memory.force;
   contact.n = memory.normal;
   contact.e1 = memory.normal.unitOrthogonal();
@@ -126,8 +155,10 @@ Contact ContactProbe::MakeContact(std::uint32_t tool, const ToolPose& pose) {
 }
 
 DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision,
-                                    const Grasp& grasp) {
+                                    const Grasp& grasp, const Vec3f* solver_force) {
   ToolMemory& memory = tools_[tool];
+  memory.x_ref = pose.p_WT;
+  const Vec3f tool_velocity = (pose.p_WT - std::exchange(memory.tip, pose.p_WT)) / scene_.physics.dt_s;
   DeviceContacts device;
   device.force_cap_N = kForceCap;
   const auto enter = [&](ContactKind kind) {
@@ -146,9 +177,15 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     }
     std::sort(memory.touched.begin(), memory.touched.end());
     Follow(&memory, elastic_.OnSet(memory.touched), MeanMotion(memory.touched).displacement);
+    if (solver_force != nullptr) {
+      FollowSolver(&memory, *solver_force);
+      memory.u = MeanMotion(memory.touched).displacement;
+      memory.du = Limited(tool_velocity, 2.0f);  // What is held moves with the tool.
+    }
     memory.normal = pose.q_WT * -Vec3f::UnitZ();
-    Contact contact = MakeContact(tool, pose);
+    Contact contact = MakeContact(tool);
     contact.p_s = pose.p_WT - memory.u;
+    contact.k1 = kJaws;
     contact.slip_force = Grasp::GripForce(scene_.physics, pose.jaw_rad);
     contact.radius = kGraspRadius;
     device.contacts[device.count++] = contact;
@@ -189,7 +226,12 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   Follow(&memory, elastic_.OnSet(memory.touched),
          touching ? Vec3f(MeanMotion(memory.touched).displacement - around.displacement) : Vec3f(Vec3f::Zero()));
 
-  Contact contact = MakeContact(tool, pose);
+  memory.steps = touching ? memory.steps : 0;
+  if (solver_force != nullptr && touching) {
+    FollowSolver(&memory, *solver_force);
+    memory.du = Limited(memory.normal.dot(tool_velocity) * memory.normal, 2.0f);
+  }
+  Contact contact = MakeContact(tool);
   const float push = std::max(0.0f, memory.normal.dot(memory.force));
   const float dent = -memory.normal.dot(memory.u);
   contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - scene_.physics.collision_margin_m);

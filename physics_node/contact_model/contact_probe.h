@@ -1,8 +1,9 @@
 // The local contact model that the servo evaluates between two steps of physics: where the surface is, how hard it
 // pushes now, and how that changes with the tool's place.
 //
-//   f_ref   elastic force of the edges around what the tool touches or holds, with SI stiffness (elastic_force.h),
-//           low-passed over kSmoothing
+//   f_ref   from a solver that knows it: of a grasp as it is, of a surface the median of the last kMedian steps, dated
+//           back to the middle one by x_ref; else the elastic force of the edges around what the tool touches or holds,
+//           with SI stiffness (elastic_force.h), low-passed over kSmoothing
 //   u_c     how far the tissue at the contact has been moved against its surroundings (a ring some 7 mm away), so that
 //           a tent raised by the other tool is not taken for a dent made by this one
 //   k1, kt  of the skin: E t of the membrane is what a small disc of it resists with, whatever its size
@@ -26,8 +27,10 @@ class ContactProbe {
  public:
   ContactProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
 
-  /// Contacts of one tool after a step: a grasp, or the nearest surface within reach, or none.
-  DeviceContacts Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision, const Grasp& grasp);
+  /// Contacts of one tool after a step: a grasp, or the nearest surface within reach, or none. `solver_force`: of the
+  /// tissue on the tool [N], from a solver that knows; null: estimated from the edges.
+  DeviceContacts Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision, const Grasp& grasp,
+                        const Vec3f* solver_force);
   /// Stiffness and viscosity come from `solver` from now on; nullptr: estimated from force and dent again.
   void AskSolver(ComplianceSolver* solver) { solver_ = solver; }
   [[nodiscard]] const Compliance& compliance(std::uint32_t tool) const { return compliance_.compliance(tool); }
@@ -35,6 +38,7 @@ class ContactProbe {
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return tools_[tool].force; }
 
  private:
+  static constexpr int kMedian = 5;
   struct ToolMemory {
     ContactKind kind = ContactKind::kNone;
     std::uint32_t id = 0;
@@ -43,6 +47,10 @@ class ContactProbe {
     Vec3f u = Vec3f::Zero(), du = Vec3f::Zero(), v_s = Vec3f::Zero();
     float stiffness = 0;
     std::vector<Index> touched;
+    Vec3f tip = Vec3f::Zero();                ///< Of the tool in the last step.
+    Vec3f x_ref = Vec3f::Zero();              ///< Where the tip was when `force` acted.
+    std::array<Vec3f, kMedian> forces, tips;  ///< Of the last steps, the newest last.
+    int steps = 0;                            ///< 0: nothing in these yet.
   };
   /// Displacement from rest and velocity, averaged.
   struct Motion {
@@ -51,9 +59,10 @@ class ContactProbe {
 
   void Enter(ToolMemory* memory, ContactKind kind) const;
   void Follow(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const;
+  void FollowSolver(ToolMemory* memory, const Vec3f& force) const;
   [[nodiscard]] Motion MeanMotion(std::span<const Index> particles) const;
   [[nodiscard]] Motion RingMotion(Index node) const;
-  [[nodiscard]] Contact MakeContact(std::uint32_t tool, const ToolPose& pose);
+  [[nodiscard]] Contact MakeContact(std::uint32_t tool);
 
   SceneView scene_;
   const TissueModel* model_;

@@ -14,6 +14,9 @@ constexpr float kStill = 1e-6f;
 constexpr int kStillSteps = 50;
 /// A tool that moves less is standing still: the resolution of a haptic device is 9 um.
 constexpr float kToolStill = 1e-7f;
+/// How far a tool that presses may move in a substep of mode accurate [m], at the price of at most so many substeps.
+constexpr float kWayPerSubstep = 6e-5f;
+constexpr int kMostSubsteps = 8;
 
 float AngleBetween(const Quatf& a, const Quatf& b) { return 2.0f * std::acos(std::min(1.0f, std::abs(a.dot(b)))); }
 
@@ -54,6 +57,7 @@ TissueSimulation::TissueSimulation(const SceneView& scene, int threads, const Ke
     } else {
       accurate_.emplace(scene, elastic, model_, &particles_, threads);
       effort_ = accurate::EffortOf(scene.physics.preset);
+      most_substeps_ = std::max(kMostSubsteps, effort_.substeps);
       contacts_.AskSolver(&answers_);
     }
     held_places_.reserve(particles_.particle_count());
@@ -216,21 +220,37 @@ StepReport TissueSimulation::StepXpbd() {
   return report;
 }
 
+/// The linearised solve of a substep is only good for a small part of a cell: a tool that presses and moves by more in
+/// one gets forces that jump about by more than the force itself.
+int TissueSimulation::SubstepsForTools() const {
+  float way = 0;
+  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+    if (tracks_[i].present && !grasps_[i].holding() && collision_.force(i) != Vec3f::Zero()) {
+      way = std::max(way, (tracks_[i].now.p_WT - tracks_[i].last.p_WT).norm());
+    }
+  }
+  return std::clamp(static_cast<int>(std::ceil(way / kWayPerSubstep)), effort_.substeps, most_substeps_);
+}
+
 StepReport TissueSimulation::StepAccurate() {
   StepReport report;
-  const auto substeps = static_cast<float>(effort_.substeps);
+  const int count = SubstepsForTools();
+  const auto substeps = static_cast<float>(count);
   const float h = scene_.physics.dt_s / substeps;
   report.resets = accurate_->BeginStep();
   const std::span<const float> moved = accurate_->moved();
   moved_.assign(moved.begin(), moved.end());
   FindAllContacts(h);
-  for (int i = 0; i < effort_.substeps; ++i) {
+  for (int i = 0; i < count; ++i) {
     const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
     PlaceHeld(u1);
     collision_.Rows(u0, u1, &rows_);
     tissue_collision_.Rows(u0, u1, &rows_);
     const accurate::SubstepReport substep = accurate_->Substep(h, effort_.iterations, held_places_, rows_);
     collision_.TakeForces(rows_);
+    for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
+      tool_force_[tool] += (collision_.force(tool) - tool_force_[tool]) / static_cast<float>(i + 1);
+    }
     report.resets += substep.resets;
     largest_speed_ = substep.largest_speed_m_s;
     report.max_step_m = std::max(report.max_step_m, largest_speed_ * scene_.physics.dt_s);
@@ -239,6 +259,9 @@ StepReport TissueSimulation::StepAccurate() {
     Vec3f traction = Vec3f::Zero();
     for (const HeldParticle& held : grasps_[i].held()) {
       traction += accurate_->ForceOn(particles_.Ref(held.particle));
+    }
+    if (grasps_[i].holding()) {
+      tool_force_[i] = traction;
     }
     grasps_[i].Slip(traction, scene_.tools[i], tracks_[i].now, model_, &particles_);
   }
@@ -282,6 +305,7 @@ std::uint32_t TissueSimulation::SetCheaper(std::uint32_t presets) {
   const auto own = accurate_ ? static_cast<std::uint32_t>(scene_.physics.preset) : 0u;
   const std::uint32_t cheaper = std::min(presets, own);
   effort_ = accurate::EffortOf(static_cast<PhysicsPreset>(own - cheaper));
+  most_substeps_ = cheaper > 0 ? effort_.substeps : std::max(kMostSubsteps, effort_.substeps);
   return cheaper;
 }
 
@@ -304,7 +328,7 @@ DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
   if (!tracks_[tool].present) {
     return {};
   }
-  return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool]);
+  return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool], accurate_ ? &tool_force_[tool] : nullptr);
 }
 
 CauteryContact TissueSimulation::Cautery(std::uint32_t tool) {

@@ -117,6 +117,7 @@ class TissueSimulation {
   [[nodiscard]] bool BreathStirs();
   [[nodiscard]] StepReport StepPaper();
   [[nodiscard]] StepReport StepXpbd();
+  [[nodiscard]] int SubstepsForTools() const;
   [[nodiscard]] StepReport StepAccurate();
   void PlaceHeld(float u);
   void FindAllContacts(float h);
@@ -131,10 +132,13 @@ class TissueSimulation {
   std::optional<accurate::AccurateSolver> accurate_;  ///< In mode accurate.
   std::optional<xpbd::XpbdSolver> xpbd_;              ///< In mode xpbd.
   accurate::Effort effort_;
+  int most_substeps_ = 1;  ///< While a tool that presses moves.
   std::vector<accurate::HeldPlace> held_places_;
   std::vector<ContactRow> rows_;
   std::vector<float> moved_;  ///< Of each block of particles in the last step [m].
-  float largest_speed_ = 0;   ///< Of the tissue after the last step, paper's mode apart [m/s].
+  std::array<Vec3f, kMaxTools> tool_force_{Vec3f::Zero(), Vec3f::Zero()};  ///< Of the tissue on a tool, mean over the
+                                                                           ///< last step; mode accurate [N].
+  float largest_speed_ = 0;  ///< Of the tissue after the last step, paper's mode apart [m/s].
   ToolCollision collision_;
   TissueCollision tissue_collision_;
   std::array<Grasp, kMaxTools> grasps_;
