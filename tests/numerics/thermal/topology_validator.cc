@@ -37,6 +37,27 @@ CellIndex TopologyValidator::CellOfNode(Index node, const Sheet& sheet) const {
           std::clamp(static_cast<int>(std::floor(node_[node].y())), 0, sheet.ny - 1)};
 }
 
+void TopologyValidator::FindHoles(const HeatField& field) {
+  const auto removed = [](std::uint8_t flags) { return (flags & kRemoved) != 0; };
+  hole_.assign(field.sheet().tile_count(), false);
+  for (const Tile* tile : field.Existing()) {
+    hole_[tile->index] = std::any_of(tile->state.flags.begin(), tile->state.flags.end(), removed);
+  }
+}
+
+bool TopologyValidator::NearHole(const Edge& edge, const Sheet& sheet) const {
+  const Vec2f a = node_[edge.a], b = node_[edge.b];
+  const float reach = 2.0f + kBandHalfWidth * (b - a).norm();
+  const Vec2f low = a.cwiseMin(b).array() - reach, high = a.cwiseMax(b).array() + reach;
+  const auto tile = [](float cell, int tiles) { return std::clamp(static_cast<int>(cell) / kTile, 0, tiles - 1); };
+  for (int ty = tile(low.y(), sheet.tiles_y); ty <= tile(high.y(), sheet.tiles_y); ++ty) {
+    for (int tx = tile(low.x(), sheet.tiles_x); tx <= tile(high.x(), sheet.tiles_x); ++tx) {
+      if (hole_[ty * sheet.tiles_x + tx]) return true;
+    }
+  }
+  return false;
+}
+
 bool TopologyValidator::Joined(const Edge& edge, const HeatField& field, bool holes, bool outside) const {
   const Sheet& sheet = field.sheet();
   const Vec2f a = node_[edge.a], along = node_[edge.b] - a;
@@ -79,7 +100,7 @@ std::string TopologyValidator::CheckEdge(const Edge& edge, const TopologyBits& b
     return name + " lives and ends at a dead node";
   }
   bool severed = false;
-  if (!Joined(edge, field, true, false)) {
+  if (NearHole(edge, field.sheet()) && !Joined(edge, field, true, false)) {
     severed = Joined(edge, field, false, false) || !Joined(edge, field, true, true);
   }
   if (severed != dead) return name + (dead ? " is dead, its strand is whole" : " lives, its strand is severed");
@@ -123,6 +144,7 @@ std::string TopologyValidator::Check(const MeshTopology& topology, const HeatFie
   for (std::size_t n = nodes_; n < 8 * bits.dead_nodes.size(); ++n) {
     if (TestBit(bits.dead_nodes, n)) return "a node beyond the mesh is dead";
   }
+  FindHoles(field);
   std::vector<bool> attached(nodes_, false);
   std::size_t next = 0;
   for (std::size_t e = 0; e < 8 * bits.dead_edges.size(); ++e) {

@@ -36,6 +36,9 @@ class TopologyValidator {
   [[nodiscard]] std::string CheckNode(Index node, bool attached, const TopologyBits& bits,
                                       const HeatField& field) const;
   [[nodiscard]] std::string CheckHistory(const MeshTopology& topology) const;
+  void FindHoles(const HeatField& field);
+  /// False when no tile under the strand has a hole: then there is nothing to recompute.
+  [[nodiscard]] bool NearHole(const Edge& edge, const Sheet& sheet) const;
   /// True when tissue cells within the strand join the cells of its nodes.
   [[nodiscard]] bool Joined(const Edge& edge, const HeatField& field, bool holes, bool outside) const;
   [[nodiscard]] CellIndex CellOfNode(Index node, const Sheet& sheet) const;
@@ -43,6 +46,7 @@ class TopologyValidator {
   std::size_t nodes_;
   std::vector<Edge> edges_;  ///< Those that exist.
   std::vector<Vec2f> node_;  ///< In cells from the sheet's origin.
+  std::vector<bool> hole_;   ///< Per tile, at the present Check().
   TopologyBits last_;
   std::uint64_t last_revision_ = 0;
 };
