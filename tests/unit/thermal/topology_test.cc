@@ -150,8 +150,8 @@ TEST_F(TopologyTest, CellsBeyondTheBorderAreNoBridge) {
 
 TEST_F(TopologyTest, StrandsThatTheCellsDoNotResolveAreNotSeveredByWhatHappensBesideThem) {
   // At an acute corner the border strands run over cells whose centres lie beyond the sheet.
-  scene::SceneData data = FlatScene(kRows, kCols, 1e-3f);
-  for (Vec2f& p : data.membrane_material) p.x() += 3.0f * p.y();
+  scene::SceneData data = FlatScene(6, 6, 1e-3f);
+  for (Vec2f& p : data.membrane_material) p.x() += 8.0f * p.y();
   const SceneView scene = data.View();
   HeatField field(MakeSheet(scene), MakeMaterial(scene.thermal));
   MeshTopology topology(scene, field.sheet());
