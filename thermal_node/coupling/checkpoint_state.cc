@@ -1,6 +1,7 @@
 // Checkpoint layout of the thermal solver: a header, the potential's start value, the marks of the cut length,
 // protected structures, topology, then every tile that is not blank, each with only those arrays that hold anything.
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <type_traits>
 
@@ -63,6 +64,28 @@ class Reader {
 
 auto FloatArrays(auto& s) { return std::array{&s.enthalpy, &s.water, &s.omega_cell, &s.omega_collagen, &s.charred}; }
 
+template <class Values>
+bool AllWithin(const Values& values, float low, float high) {
+  return std::all_of(values.begin(), values.end(), [&](float v) { return v >= low && v <= high; });  // false for NaN
+}
+
+/// Only what the solver itself could have left in a tile.
+bool Plausible(const TileState& s, int index, const HeatField& field) {
+  if (!AllWithin(s.water, 0.0f, 1.0f) || !AllWithin(s.omega_cell, 0.0f, kOmegaMax) ||
+      !AllWithin(s.omega_collagen, 0.0f, kOmegaMax) || !AllWithin(s.charred, 0.0f, 1.0f)) {
+    return false;
+  }
+  const Sheet& sheet = field.sheet();
+  const int x0 = index % sheet.tiles_x * kTile, y0 = index / sheet.tiles_x * kTile;
+  for (int k = 0; k < kTileCells; ++k) {
+    const bool outside = (s.flags[k] & kOutside) != 0;
+    if (outside != sheet.IsOutside(x0 + k % kTile, y0 + k / kTile)) return false;
+    const float limit = kThetaPlausible * field.material().HeatCapacity(s.water[k]);
+    if (!(std::abs(s.enthalpy[k]) <= limit)) return false;
+  }
+  return true;
+}
+
 /// Value of an array of FloatArrays that need not be stored.
 float DefaultOf(std::size_t array) { return array == 1 ? 1.0f : 0.0f; }
 
@@ -77,6 +100,13 @@ struct ThermalSolver::Header {
   float clock_s, protected_dt_s;
   std::uint32_t tile_count, mark_count, sample_count, structure_count;
   std::uint32_t node_bytes, edge_bytes, shrink_bytes, protected_warm;
+
+  [[nodiscard]] bool Finite() const {
+    float sum = clock_s + protected_dt_s + memory.reported_cut_m;
+    for (const float quiet : memory.quiet_until_s) sum += quiet;
+    for (const float figure : {figures.highest_C, figures.present_C, figures.power_W, figures.voltage_V}) sum += figure;
+    return std::isfinite(sum) && std::isfinite(ledger.joule + ledger.generator + ledger.Out() + memory.vapour);
+  }
 };
 
 std::size_t ThermalSolver::CheckpointCapacity(const SceneView& scene) {
@@ -87,6 +117,7 @@ std::size_t ThermalSolver::CheckpointCapacity(const SceneView& scene) {
 }
 
 std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
+  if (topology_.staged()) return 0;
   const std::vector<const Tile*> tiles = field_.Existing();
   Writer writer(out);
   Header header{};
@@ -142,7 +173,12 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   Reader reader(bytes);
   Header header;
   SourceWindow::State window;
-  if (!reader.GetValue(&header) || header.layout != kLayout || !reader.GetValue(&window)) return false;
+  if (!reader.GetValue(&header) || header.layout != kLayout || !header.Finite() || !reader.GetValue(&window))
+    return false;
+  if (!AllWithin(window.start, -2.0f, 2.0f) || std::abs(window.corner.ix) > -kNowhere.ix ||
+      std::abs(window.corner.iy) > -kNowhere.iy) {
+    return false;
+  }
   TopologyBits bits = topology_.committed();
   if (header.node_bytes != bits.dead_nodes.size() || header.edge_bytes != bits.dead_edges.size() ||
       header.shrink_bytes != bits.shrink.size() || header.sample_count != protected_.samples().size() ||
@@ -159,16 +195,26 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
       !reader.Get(std::span(bits.shrink))) {
     return false;
   }
+  const auto on_sheet = [&](const CutMeter::Mark& mark) { return field_.sheet().OnSheet({mark[0], mark[1]}); };
+  const auto finite = [](const ProtectedSample& sample) { return std::isfinite(sample.theta + sample.omega); };
+  if (!std::all_of(marks.begin(), marks.end(), on_sheet) || !std::all_of(samples.begin(), samples.end(), finite) ||
+      !topology_.Fits(bits)) {
+    return false;
+  }
   TileState state;
+  std::int64_t last = -1;
   for (std::uint32_t n = 0; n < header.tile_count; ++n) {
     std::array<std::uint32_t, 4> record;
-    bool good = reader.GetValue(&record) && record[0] < static_cast<std::uint32_t>(field_.sheet().tile_count());
+    bool good = reader.GetValue(&record) && record[0] > last && record[2] <= 1 && record[3] <= 1 &&
+                record[0] < static_cast<std::uint32_t>(field_.sheet().tile_count());
+    last = record[0];
     const auto arrays = FloatArrays(state);
     for (std::size_t a = 0; good && a < arrays.size(); ++a) {
       arrays[a]->fill(DefaultOf(a));
       if ((record[1] >> a & 1u) != 0) good = reader.Get(std::span<float>(*arrays[a]));
     }
-    good = good && reader.Get(std::span<std::uint8_t>(state.flags));
+    good = good && reader.Get(std::span<std::uint8_t>(state.flags)) &&
+           Plausible(state, static_cast<int>(record[0]), field_);
     if (!good) {
       field_.Clear();
       return false;

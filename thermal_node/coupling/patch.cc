@@ -8,7 +8,10 @@ namespace {
 
 constexpr float kTexelZero_C = 20.0f, kTexelPerKelvin = 2.0f;
 
-std::uint8_t ToByte(float value) { return static_cast<std::uint8_t>(std::clamp(value + 0.5f, 0.0f, 255.0f)); }
+/// Rounds into 0 … 255; a bad number gives 0.
+std::uint8_t ToByte(float value) {
+  return value > 0.0f ? static_cast<std::uint8_t>(std::min(value + 0.5f, 255.0f)) : std::uint8_t{0};
+}
 
 /// 0 wet, 128 dry, 255 char.
 std::uint8_t Dryness(float water, float charred) { return ToByte(128.0f * (1.0f - water) + 127.0f * charred); }

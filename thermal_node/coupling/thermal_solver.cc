@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "services/core/hash.h"
@@ -70,7 +71,20 @@ void ThermalSolver::ApplySource(const TipInput& tip, float dt_s, float from, flo
 }
 
 void ThermalSolver::UpdateDamage(float dt_s) {
-  for (Tile* tile : field_.awake()) damage_.Update(tile, dt_s);
+  for (Tile* tile : field_.awake()) {
+    if (!damage_.Update(tile, dt_s)) QuarantineBadDamage(tile);
+  }
+}
+
+void ThermalSolver::QuarantineBadDamage(Tile* tile) {
+  TileState& s = tile->state;
+  for (int k = 0; k < kTileCells; ++k) {
+    if (std::isfinite(s.omega_cell[k] + s.omega_collagen[k] + s.charred[k])) continue;
+    s.omega_cell[k] = s.omega_collagen[k] = s.charred[k] = 0;
+    field_.TakeOut(tile, k, kQuarantined, &ledger_.quarantined);
+    s.enthalpy[k] = std::numeric_limits<float>::quiet_NaN();  // its heat is booked; this has the cell counted below
+  }
+  field_.RefreshTheta(tile, &ledger_);
 }
 
 void ThermalSolver::UpdateTopology() {

@@ -73,19 +73,21 @@ class ThermalSolver {
   /// Hash of every stored value.
   [[nodiscard]] std::uint64_t FullHash() const;
 
-  // Checkpoints (coupling/checkpoint_state.cc). Save right after a Step that ended on a commit frame, so that nothing
-  // is staged.
+  // Checkpoints (coupling/checkpoint_state.cc). They hold the committed topology only: nothing may be staged, which is
+  // so after every Step that ended on a commit frame, and between commits while nothing was cut.
   [[nodiscard]] bool at_commit_frame() const { return frame_ % kCommitFrames == 0; }
   [[nodiscard]] static std::size_t CheckpointCapacity(const SceneView& scene);
-  /// Returns the bytes used; 0 when `out` is too small.
+  /// Returns the bytes used; 0 when `out` is too small or changes of the topology are staged.
   [[nodiscard]] std::size_t Save(std::span<std::byte> out) const;
-  /// False, and an untouched fresh state, when the bytes are not a checkpoint of this layout.
+  /// False, and an untouched fresh state, when the bytes are not a checkpoint of this layout or hold values that the
+  /// solver could not have written.
   [[nodiscard]] bool Restore(std::span<const std::byte> bytes);
 
  private:
   struct Header;
   void ApplySource(const TipInput& tip, float dt_s, float from, float to);
   void UpdateDamage(float dt_s);
+  void QuarantineBadDamage(Tile* tile);
   void UpdateTopology();
   void UpdateProtected(float dt_s);
   void ReportEvents(const TipInput& tip);

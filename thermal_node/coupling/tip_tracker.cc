@@ -9,7 +9,7 @@ bool TipTracker::Accepts(const CauteryContact& sample) const {
   if (!sample.touching) return true;
   const bool numbers = sample.material.allFinite() && std::isfinite(sample.power_W) && sample.power_W >= 0 &&
                        sample.power_W <= kPowerMax_W && std::isfinite(sample.contact_radius_m) &&
-                       sample.contact_radius_m >= 0;
+                       sample.contact_radius_m >= 0 && sample.mode <= CauteryMode::kBlend;
   return numbers && sheet_.OnSheet(sample.material);
 }
 

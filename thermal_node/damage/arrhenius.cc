@@ -21,9 +21,10 @@ DamageRate::DamageRate(const ArrheniusPair& pair, float body_C) {
 DamageModel::DamageModel(float body_C)
     : cell_death_(kCellDeath, body_C), collagen_(kCollagen, body_C), theta_char_(kCharStart_C - body_C) {}
 
-void DamageModel::Update(Tile* tile, float dt_s) const {
-  if (tile->theta_max < kDamageStart) return;
+bool DamageModel::Update(Tile* tile, float dt_s) const {
+  if (tile->theta_max < kDamageStart) return true;
   TileState& s = tile->state;
+  bool good = true;
   for (int j = 0; j < kTile; ++j) {
     const float* theta = &tile->theta[ThetaIndex(0, j)];
     float warmest = 0;
@@ -32,6 +33,10 @@ void DamageModel::Update(Tile* tile, float dt_s) const {
     for (int i = 0; i < kTile; ++i) {
       if (theta[i] < kDamageStart) continue;
       const int cell = j * kTile + i;
+      if (!std::isfinite(s.omega_cell[cell] + s.omega_collagen[cell] + s.charred[cell])) {
+        good = false;
+        continue;
+      }
       s.omega_cell[cell] = std::min(kOmegaMax, s.omega_cell[cell] + dt_s * cell_death_.At(theta[i]));
       s.omega_collagen[cell] = std::min(kOmegaMax, s.omega_collagen[cell] + dt_s * collagen_.At(theta[i]));
       if (theta[i] > theta_char_) {
@@ -40,6 +45,7 @@ void DamageModel::Update(Tile* tile, float dt_s) const {
       }
     }
   }
+  return good;
 }
 
 }  // namespace fulcrum::thermal

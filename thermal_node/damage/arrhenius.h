@@ -43,8 +43,9 @@ class DamageRate {
 class DamageModel {
  public:
   explicit DamageModel(float body_C);
-  /// Integrates both integrals and charring over dt at the tile's present temperature.
-  void Update(Tile* tile, float dt_s) const;
+  /// Integrates both integrals and charring over dt at the tile's present temperature. False when a cell's damage was
+  /// no number: it is left as it was.
+  bool Update(Tile* tile, float dt_s) const;
   [[nodiscard]] const DamageRate& cell_death() const { return cell_death_; }
   [[nodiscard]] const DamageRate& collagen() const { return collagen_; }
 

@@ -128,6 +128,12 @@ void MeshTopology::KillIfIsolated(Index node) {
 }
 
 bool MeshTopology::Severed(const HeatField& field, Index edge) {
+  if (HasPath(field, edge, {.holes = true, .outside = false})) return false;
+  const bool resolved = HasPath(field, edge, {.holes = false, .outside = false});
+  return resolved || !HasPath(field, edge, {.holes = true, .outside = true});
+}
+
+bool MeshTopology::HasPath(const HeatField& field, Index edge, const StrandRule& rule) {
   const Sheet& sheet = field.sheet();
   const Vec2f a = node_[edge / 3], b = node_[OtherEnd(edge)];
   Box box = BoxOf(a, b);
@@ -147,20 +153,21 @@ bool MeshTopology::Severed(const HeatField& field, Index edge) {
       const bool end = (x == start_x && y == start_y) || (x == goal_x && y == goal_y);
       if (!end && (p - a - u * along).squaredNorm() > band2) continue;
       const int ix = box.x0 + x, iy = box.y0 + y;
-      const Tile* tile = field.Find(ix / kTile, iy / kTile);
+      if (!end && !rule.outside && sheet.IsOutside(ix, iy)) continue;
+      const Tile* tile = rule.holes ? field.Find(ix / kTile, iy / kTile) : nullptr;
       const bool gone = tile != nullptr && (tile->state.flags[(iy % kTile) * kTile + ix % kTile] & kRemoved) != 0;
       open_[y * width + x] = gone ? 0 : 1;
     }
   }
   const int start = start_y * width + start_x, goal = goal_y * width + goal_x;
-  if (open_[start] == 0 || open_[goal] == 0) return true;
+  if (open_[start] == 0 || open_[goal] == 0) return false;
   // Breadth first over faces, as heat and current go.
   queue_.clear();
   queue_.push_back(start);
   open_[start] = 0;
   for (std::size_t head = 0; head < queue_.size(); ++head) {
     const int at = queue_[head];
-    if (at == goal) return false;
+    if (at == goal) return true;
     const int x = at % width, y = at / width;
     const auto enter = [&](bool inside, int next) {
       if (!inside || open_[next] == 0) return;
@@ -172,7 +179,7 @@ bool MeshTopology::Severed(const HeatField& field, Index edge) {
     enter(y > 0, at - width);
     enter(y + 1 < height, at + width);
   }
-  return true;
+  return false;
 }
 
 void MeshTopology::StageCut(const HeatField& field, CellIndex low, CellIndex high) {
@@ -210,7 +217,8 @@ void MeshTopology::StageShrink(const HeatField& field, const Tile& tile) {
       const Vec2f p = a + (b - a) * ((static_cast<float>(n) + 0.5f) / static_cast<float>(samples));
       const int ix = CellCoordinate(p.x(), sheet.nx), iy = CellCoordinate(p.y(), sheet.ny);
       const Tile* at = field.Find(ix / kTile, iy / kTile);
-      if (at != nullptr) sum += 1.0f - std::exp(-at->state.omega_collagen[(iy % kTile) * kTile + ix % kTile]);
+      const float omega = at != nullptr ? at->state.omega_collagen[(iy % kTile) * kTile + ix % kTile] : 0.0f;
+      if (omega > 0.0f) sum += 1.0f - std::exp(-omega);  // false for a bad number, which must not leave its cell
     }
     const float lost = shrink_max_ * sum / static_cast<float>(samples);
     const int value = std::min(255, static_cast<int>(lost / kShrinkUnit)) / kShrinkStep * kShrinkStep;
@@ -226,6 +234,27 @@ bool MeshTopology::Commit() {
   committed_ = staged_;
   changed_ = false;
   ++revision_;
+  return true;
+}
+
+bool MeshTopology::Fits(const TopologyBits& bits) const {
+  const std::size_t nodes = std::size_t{rows_} * cols_;
+  if (bits.dead_nodes.size() != staged_.dead_nodes.size() || bits.dead_edges.size() != staged_.dead_edges.size() ||
+      bits.shrink.size() != staged_.shrink.size()) {
+    return false;
+  }
+  for (std::size_t bit = nodes; bit < 8 * bits.dead_nodes.size(); ++bit) {
+    if (TestBit(bits.dead_nodes, bit)) return false;
+  }
+  for (std::size_t edge = 0; edge < 8 * bits.dead_edges.size(); ++edge) {
+    const bool dead = TestBit(bits.dead_edges, edge);
+    if (edge >= 3 * nodes || !TestBit(exists_, edge)) {
+      if (dead || (edge < 3 * nodes && bits.shrink[edge] != 0)) return false;
+      continue;
+    }
+    const auto index = static_cast<Index>(edge);
+    if (!dead && (TestBit(bits.dead_nodes, index / 3) || TestBit(bits.dead_nodes, OtherEnd(index)))) return false;
+  }
   return true;
 }
 

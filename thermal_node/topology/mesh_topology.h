@@ -4,6 +4,9 @@
 // when no connected path of tissue inside that band joins the cells of its two nodes. So a slit far narrower than the
 // mesh cuts an edge, and a pin hole in a strand does not. A node is dead when its own cell is gone or no edge is left
 // at it. Changes are staged and become visible, with a new revision, at Commit().
+//
+// Cells beyond the border of the sheet are no tissue and lead nowhere; except in a strand that has no path without them
+// at rest, because the cells do not resolve an acute corner.
 #pragma once
 
 #include <cstdint>
@@ -43,6 +46,9 @@ class MeshTopology {
   [[nodiscard]] std::uint32_t dead_edge_count() const { return dead_edge_count_; }
   [[nodiscard]] std::uint32_t dead_node_count() const { return dead_node_count_; }
 
+  /// True when arrays of another session fit this mesh: their sizes, nothing set beyond them or where no edge exists,
+  /// and no live edge at a dead node.
+  [[nodiscard]] bool Fits(const TopologyBits& bits) const;
   /// From a checkpoint.
   void Restore(std::uint64_t revision, const TopologyBits& bits);
 
@@ -51,6 +57,11 @@ class MeshTopology {
   [[nodiscard]] Index OtherEnd(Index edge) const;
   [[nodiscard]] bool EdgeExists(Index edge) const;
   [[nodiscard]] bool Severed(const HeatField& field, Index edge);
+  struct StrandRule {
+    bool holes;    ///< Removed cells are closed.
+    bool outside;  ///< Cells beyond the border are open.
+  };
+  [[nodiscard]] bool HasPath(const HeatField& field, Index edge, const StrandRule& rule);
   void KillEdge(Index edge);
   void KillNode(Index node);
   void KillIfIsolated(Index node);

@@ -7,7 +7,8 @@
 
 namespace fulcrum::thermal {
 
-/// Writes temperature, damage and mesh around `centre` as three pictures side by side, `width_m` wide each.
+/// Writes temperature, damage and mesh around `centre` as three pictures side by side, `width_m` wide each, with their
+/// scales. Holes are black in all.
 void WritePicture(const ThermalSolver& solver, const SceneView& scene, const Vec2f& centre, float width_m,
                   const std::filesystem::path& file);
 

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "tests/numerics/thermal/flat_scene.h"
+#include "tests/numerics/thermal/topology_validator.h"
 
 namespace fulcrum::thermal {
 namespace {
@@ -20,6 +21,16 @@ Drag Slanted(float speed_m_s, float length_m = 0.030f) {
   return drag;
 }
 
+/// Runs the whole drag; the topology is held to the cells after each commit.
+void RunChecked(const SceneView& scene, const Drag& drag, ThermalSolver* solver) {
+  TopologyValidator validator(scene, solver->field().sheet());
+  for (int frame = 0; frame < drag.frames(kDt); ++frame) {
+    solver->Step(drag.At(frame, kDt), kDt);
+    if (!solver->committed()) continue;
+    ASSERT_EQ(validator.Check(*solver), "") << "frame " << frame;
+  }
+}
+
 class CutTest : public ::testing::TestWithParam<float> {};
 
 TEST_P(CutTest, SlitIsContinuousAndEnergyCloses) {
@@ -27,11 +38,14 @@ TEST_P(CutTest, SlitIsContinuousAndEnergyCloses) {
   const SceneView scene = data.View();
   ThermalSolver solver(scene);
   const Drag drag = Slanted(GetParam());
+  TopologyValidator validator(scene, solver.field().sheet());
   for (int frame = 0; frame < drag.frames(kDt); ++frame) {
     solver.Step(drag.At(frame, kDt), kDt);
     ASSERT_LE(solver.source_stats().imbalance, kImbalanceLimit);
     ASSERT_LE(solver.figures().power_W, drag.power_W * 1.001f);
     ASSERT_LE(solver.figures().voltage_V, scene.thermal.v_max_V * 1.001f);
+    if (!solver.committed()) continue;
+    ASSERT_EQ(validator.Check(solver), "");
   }
   for (int n = 0; n < kCommitFrames; ++n) solver.Step({}, kDt);
   const SlitFigures slit = MeasureSlit(solver, scene, drag);
@@ -66,7 +80,7 @@ TEST(CutPropertiesTest, FasterCutsAreNarrower) {
   for (const float speed : {0.003f, 0.008f}) {
     ThermalSolver solver(scene);
     const Drag drag = Slanted(speed, 0.012f);
-    RunDrag(drag, kDt, &solver);
+    RunChecked(scene, drag, &solver);
     const float width = MeasureSlit(solver, scene, drag).width_mean_m;
     EXPECT_LT(width, last);
     last = width;
@@ -94,10 +108,10 @@ TEST(CutPropertiesTest, GoingOverAnOldSlitAddsNoLength) {
   const SceneView scene = data.View();
   ThermalSolver solver(scene);
   Drag drag = Slanted(0.004f);
-  RunDrag(drag, kDt, &solver);
+  RunChecked(scene, drag, &solver);
   const float once = solver.cut_length_m();
   std::swap(drag.from, drag.to);
-  RunDrag(drag, kDt, &solver);
+  RunChecked(scene, drag, &solver);
   EXPECT_NEAR(solver.cut_length_m(), once, kMarkSpacing);
 }
 
@@ -108,7 +122,7 @@ TEST(CutPropertiesTest, CoagulationDriesAndBrownsButDoesNotCut) {
   Drag drag = Slanted(0.004f);
   drag.mode = CauteryMode::kCoag;
   drag.power_W = 30;
-  RunDrag(drag, kDt, &solver);
+  RunChecked(scene, drag, &solver);
   for (int n = 0; n < kCommitFrames; ++n) solver.Step({}, kDt);
   const SlitFigures slit = MeasureSlit(solver, scene, drag);
   EXPECT_EQ(slit.width_max_m, 0.0f);
@@ -219,7 +233,7 @@ TEST(CutPropertiesTest, CooledTissueFallsAsleepAndKeepsItsHistory) {
   const SceneView scene = data.View();
   ThermalSolver solver(scene);
   const Drag drag = Slanted(0.008f);
-  RunDrag(drag, kDt, &solver);
+  RunChecked(scene, drag, &solver);
   int frames = 0;
   while (solver.Step({}, kDt), solver.stepped()) ASSERT_LT(++frames, 6000);
   EXPECT_TRUE(solver.field().idle());

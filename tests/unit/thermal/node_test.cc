@@ -213,6 +213,17 @@ TEST_F(ThermalNodeTest, SameInputsGiveTheSameHashes) {
   EXPECT_EQ(run(), run());
 }
 
+TEST_F(ThermalNodeTest, ContactOfNoNumbersIsCountedAndChangesNothing) {
+  auto node = MakeNode();
+  Advance(node.get());
+  const std::uint64_t before = node->solver().FullHash();
+  for (const float bad : {NAN, INFINITY, -INFINITY}) Touch(node.get(), bad);
+  EXPECT_EQ(contact_in_->stats().rejected, 3u);
+  EXPECT_EQ(node->solver().FullHash(), before);
+  Touch(node.get(), 0.01f);  // and the next good one is used
+  EXPECT_TRUE(node->solver().stepped());
+}
+
 TEST_F(ThermalNodeTest, ContactOffTheSheetIsRefusedAndCounted) {
   auto node = MakeNode();
   Touch(node.get(), 0.5f);

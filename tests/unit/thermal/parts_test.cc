@@ -115,6 +115,9 @@ TEST_F(TipTest, SamplesOutOfRangeAreNotAccepted) {
   CauteryContact strong = At(0.005f, 0.01f);
   strong.power_W = 1e4f;
   EXPECT_FALSE(tip_.Accepts(strong));
+  CauteryContact unknown = At(0.005f, 0.01f);
+  unknown.mode = static_cast<CauteryMode>(7);
+  EXPECT_FALSE(tip_.Accepts(unknown));
   CauteryContact lifted = At(NAN, NAN);
   lifted.touching = false;
   EXPECT_TRUE(tip_.Accepts(lifted));

@@ -128,6 +128,65 @@ TEST_F(TopologyTest, ShrinkIsTakenOnceFromTheRestLength) {
   EXPECT_EQ(topology_.revision(), 1u);
 }
 
+TEST_F(TopologyTest, CellsBeyondTheBorderAreNoBridge) {
+  // A sheared sheet, whose left border runs through the bands of its edges. All tissue of one row of cells goes.
+  scene::SceneData data = FlatScene(kRows, kCols, 1e-3f);
+  for (Vec2f& p : data.membrane_material) p.x() += 0.5f * p.y();
+  const SceneView scene = data.View();
+  HeatField field(MakeSheet(scene), MakeMaterial(scene.thermal));
+  MeshTopology topology(scene, field.sheet());
+  double heat = 0;
+  for (int x = 0; x < field.sheet().nx; ++x) {
+    if (field.sheet().IsOutside(x, 55)) continue;
+    field.TakeOut(field.Wake(x / kTile, 55 / kTile), (55 % kTile) * kTile + x % kTile, kRemoved, &heat);
+  }
+  topology.StageCut(field, {0, 55}, {field.sheet().nx - 1, 55});
+  topology.Commit();
+  for (std::uint32_t col = 0; col < kCols; ++col) {
+    EXPECT_TRUE(TestBit(topology.committed().dead_edges, 3 * (5 * kCols + col) + 1)) << col;
+    EXPECT_FALSE(TestBit(topology.committed().dead_edges, 3 * (4 * kCols + col) + 1)) << col;
+  }
+}
+
+TEST_F(TopologyTest, StrandsThatTheCellsDoNotResolveAreNotSeveredByWhatHappensBesideThem) {
+  // At an acute corner the border strands run over cells whose centres lie beyond the sheet.
+  scene::SceneData data = FlatScene(6, 6, 1e-3f);
+  for (Vec2f& p : data.membrane_material) p.x() += 8.0f * p.y();
+  const SceneView scene = data.View();
+  HeatField field(MakeSheet(scene), MakeMaterial(scene.thermal));
+  MeshTopology topology(scene, field.sheet());
+  topology.StageCut(field, {0, 0}, {field.sheet().nx - 1, field.sheet().ny - 1});
+  EXPECT_FALSE(topology.Commit());
+}
+
+TEST_F(TopologyTest, BadDamageInACellIsNotSeenInTheMesh) {
+  Tile* tile = field_.Wake(3, 3);
+  tile->state.omega_collagen.fill(0.2f);
+  tile->state.omega_collagen[14 * kTile + 16] = NAN;  // on the edge from (11, 11) to (11, 12)
+  topology_.StageShrink(field_, *tile);
+  topology_.Commit();
+  const float lost = static_cast<float>(topology_.committed().shrink[3 * (11 * kCols + 11)]) * kShrinkUnit;
+  EXPECT_NEAR(lost, 0.9f * scene_.thermal.shrink_max * (1 - std::exp(-0.2f)), kShrinkStep * kShrinkUnit);
+}
+
+TEST_F(TopologyTest, ArraysThatDoNotFitTheMeshAreToldApart) {
+  Remove(42, 55, 150, 55);
+  Remove(50, 70, 50, 70);  // a node
+  topology_.Commit();
+  const TopologyBits good = topology_.committed();
+  EXPECT_TRUE(topology_.Fits(good));
+  const auto fits = [&](const auto& spoil) {
+    TopologyBits bad = good;
+    spoil(&bad);
+    return topology_.Fits(bad);
+  };
+  EXPECT_FALSE(fits([](TopologyBits* b) { b->shrink.pop_back(); }));
+  EXPECT_FALSE(fits([](TopologyBits* b) { SetBit(b->dead_nodes, kRows * kCols); }));      // beyond the mesh
+  EXPECT_FALSE(fits([](TopologyBits* b) { SetBit(b->dead_edges, 3 * (kCols - 1)); }));    // does not exist
+  EXPECT_FALSE(fits([](TopologyBits* b) { b->shrink[3 * (kCols - 1)] = kShrinkStep; }));  // neither
+  EXPECT_FALSE(fits([](TopologyBits* b) { SetBit(b->dead_nodes, 10 * kCols + 20); }));    // has live edges
+}
+
 TEST_F(TopologyTest, RestoredTopologyGoesOn) {
   Remove(42, 55, 150, 55);
   topology_.Commit();

@@ -1,0 +1,175 @@
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <numeric>
+#include <vector>
+
+#include "services/bus/in_process.h"
+#include "services/scene/build.h"
+#include "tests/benchmark/thermal/thermal_cases.h"
+#include "thermal_node/coupling/patch.h"
+#include "thermal_node/node/thermal_node.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+using benchmark::Quantile;
+using benchmark::Report;
+using benchmark::TimeMs;
+
+/// A node on in-process ports with a reader on every topic and a checkpoint on disk, as in a session.
+class Session {
+ public:
+  explicit Session(const SceneView& scene) : scene_(scene) {
+    const std::string name = "fulcrum_bench_thermal_" + std::to_string(::getpid());
+    folder_ = std::filesystem::temp_directory_path() / name;
+    std::filesystem::create_directories(folder_);
+    checkpoint_ = std::make_unique<runtime::CheckpointFile>(folder_ / "checkpoint", scene.hash, kCheckpointLayout,
+                                                            ThermalSolver::CheckpointCapacity(scene));
+    node_ = std::make_unique<ThermalNode>(
+        scene_, ThermalNode::Ports{*contact_in_, *topology_out_, *patch_out_, *event_out_, *manifest_out_},
+        checkpoint_.get(), 1);
+  }
+  ~Session() { std::filesystem::remove_all(folder_); }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// Puts the tip where the input says; to be seen by the next Step.
+  void Touch(const TipInput& tip) {
+    CauteryContact contact;
+    contact.stamp = {++sequence_, 1, tick_.stamp_ns};
+    contact.touching = true;
+    contact.mode = tip.mode;
+    contact.power_W = tip.power_W;
+    contact.contact_radius_m = tip.path.radius_m;
+    contact.material = tip.path.to;
+    contact.triangle = 0;
+    contact.barycentric = {1, 0, 0};
+    contact_out_->Write(contact);
+  }
+  void Step() {
+    ++tick_.index;
+    tick_.dt_s = kFrame_s;
+    tick_.session_time_s += kFrame_s;
+    tick_.stamp_ns += 10'000'000;
+    node_->Step(tick_);
+  }
+  [[nodiscard]] const ThermalSolver& solver() const { return node_->solver(); }
+
+ private:
+  SceneView scene_;
+  std::filesystem::path folder_;
+  bus::InProcessTopic<CauteryContact> contact_topic_;
+  bus::InProcessTopic<TopologyState> topology_topic_;
+  bus::InProcessTopic<TemperaturePatch> patch_topic_;
+  bus::InProcessTopic<ThermalEvent> event_topic_;
+  bus::InProcessTopic<TickManifest> manifest_topic_;
+  std::unique_ptr<bus::Output<CauteryContact>> contact_out_ = contact_topic_.MakeOutput();
+  std::unique_ptr<bus::Input<CauteryContact>> contact_in_ = contact_topic_.MakeInput();
+  std::unique_ptr<bus::Output<TopologyState>> topology_out_ = topology_topic_.MakeOutput();
+  std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patch_out_ = patch_topic_.MakeOutput();
+  std::unique_ptr<bus::Output<ThermalEvent>> event_out_ = event_topic_.MakeOutput();
+  std::unique_ptr<bus::Output<TickManifest>> manifest_out_ = manifest_topic_.MakeOutput();
+  // Readers that keep the newest sample, as their queues on the bus do.
+  std::unique_ptr<bus::Input<TopologyState>> topology_in_ = topology_topic_.MakeInput(1);
+  std::unique_ptr<bus::Input<TemperaturePatch>> patch_in_ = patch_topic_.MakeInput(1);
+  std::unique_ptr<bus::Input<ThermalEvent>> event_in_ = event_topic_.MakeInput(4096);
+  std::unique_ptr<bus::Input<TickManifest>> manifest_in_ = manifest_topic_.MakeInput(4096);
+  std::unique_ptr<runtime::CheckpointFile> checkpoint_;
+  std::unique_ptr<ThermalNode> node_;
+  Tick tick_;
+  std::uint64_t sequence_ = 0;
+};
+
+/// Every stage of a frame while the built-in scene is cut: contact in, solver, checkpoint, topology, events, patch and
+/// manifest out.
+void NodeCutting(Report* report) {
+  if (!report->Wants("thermal.node_cutting_5mm_s")) return;
+  const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
+  const SceneView scene = data.View();
+  const Drag drag = BuiltInDrag(scene, 0.005f);
+  // The repeats are the same to the last bit, so the median over them is the time of that frame and not of whatever
+  // else the machine did meanwhile.
+  std::vector<std::vector<double>> repeats(drag.frames(kFrame_s));
+  for (int repeat = 0; repeat < (report->quick() ? 3 : 7); ++repeat) {
+    Session session(scene);
+    session.Step();  // the first one publishes the whole topology
+    for (int frame = 0; frame < drag.frames(kFrame_s); ++frame) {
+      session.Touch(drag.At(frame, kFrame_s));
+      repeats[frame].push_back(TimeMs(0, 1, [&] { session.Step(); }).front());
+    }
+    if (repeat == 0) Picture(session.solver(), scene, drag.to - Vec2f(0, 0.004f), "scene");
+  }
+  std::vector<double> times;
+  for (const std::vector<double>& frame : repeats) times.push_back(Quantile(frame, 0.5));
+  const double mean = std::accumulate(times.begin(), times.end(), 0.0) / static_cast<double>(times.size());
+  report->Add("thermal.node_cutting_5mm_s.frame_ms_mean", mean, "ms");
+  report->Add("thermal.node_cutting_5mm_s.frame_ms_p50", Quantile(times, 0.5), "ms");
+  report->Add("thermal.node_cutting_5mm_s.frame_ms_p99", Quantile(times, 0.99), "ms");
+}
+
+/// Where the energy of a cut of ten seconds went, at its worst moment.
+void EnergyClosure(Report* report) {
+  if (!report->Wants("thermal.energy_closure_rel")) return;
+  const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
+  const SceneView scene = data.View();
+  ThermalSolver solver(scene);
+  const Drag drag = BuiltInDrag(scene, 0.003f);
+  double worst = 0;
+  for (int frame = 0; frame < drag.frames(kFrame_s); ++frame) {
+    solver.Step(drag.At(frame, kFrame_s), kFrame_s);
+    worst = std::max(worst, solver.ledger().ClosureError(solver.field().Stored()));
+  }
+  report->Add("thermal.energy_closure_rel", worst, "1");
+}
+
+/// What the node does at 20 and 25 Hz beside the solver.
+void CheckpointAndPatch(Report* report) {
+  if (!report->Wants("thermal.checkpoint_") && !report->Wants("thermal.patch_ms")) return;
+  const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
+  const SceneView scene = data.View();
+  ThermalSolver solver(scene);
+  RunDrag(BuiltInDrag(scene, 0.005f), kFrame_s, &solver);
+  while (!solver.at_commit_frame()) solver.Step({}, kFrame_s);
+  std::vector<std::byte> slot(ThermalSolver::CheckpointCapacity(scene));
+  std::size_t bytes = 0;
+  report->Add("thermal.checkpoint_ms", Quantile(TimeMs(2, 15, [&] { bytes = solver.Save(slot); }), 0.5), "ms");
+  report->Add("thermal.checkpoint_kib", static_cast<double>(bytes) / 1024, "KiB");
+  std::vector<std::uint8_t> texels(4 * kPatchTexels * kPatchTexels);
+  const auto draw = [&] { DrawPatch(solver.field(), scene.membrane.texel_m, {0, 256, 768}, texels); };
+  report->Add("thermal.patch_ms", Quantile(TimeMs(2, 15, draw), 0.5), "ms");
+}
+
+void Idle(Report* report) {
+  if (!report->Wants("thermal.idle_frame_ns")) return;
+  const scene::SceneData data = FlatScene(41, 61, 1e-3f);
+  ThermalSolver solver(data.View());
+  constexpr int kFrames = 100000;
+  const auto body = [&] {
+    for (int n = 0; n < kFrames; ++n) solver.Step({}, kFrame_s);
+  };
+  report->Add("thermal.idle_frame_ns", Quantile(TimeMs(1, 5, body), 0.5) * 1e6 / kFrames, "ns");
+}
+
+}  // namespace
+
+Drag BuiltInDrag(const SceneView& scene, float speed_m_s) {
+  const MembraneGrid& grid = scene.membrane;
+  Drag drag;
+  drag.from = scene.membrane_material[(grid.rows * 42 / 100) * grid.cols + grid.cols * 62 / 100] + Vec2f(3e-4f, 2e-4f);
+  drag.to = drag.from + Vec2f(0, 0.030f);
+  drag.speed_m_s = speed_m_s;
+  drag.radius_m = scene.tools[1].tip_radius_m;
+  return drag;
+}
+
+void NodeCases(Report* report) {
+  NodeCutting(report);
+  EnergyClosure(report);
+  CheckpointAndPatch(report);
+  Idle(report);
+}
+
+}  // namespace fulcrum::thermal

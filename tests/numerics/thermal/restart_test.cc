@@ -1,0 +1,116 @@
+// A burn that is interrupted anywhere and goes on from its checkpoint ends in the same bits.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "tests/numerics/thermal/flat_scene.h"
+#include "tests/numerics/thermal/topology_validator.h"
+
+namespace fulcrum::thermal {
+namespace {
+
+constexpr float kDt = 0.01f;
+
+struct Burn {
+  CauteryMode mode;
+  bool tented;
+};
+
+class RestartTest : public ::testing::TestWithParam<Burn> {
+ protected:
+  [[nodiscard]] Drag MakeDrag() const {
+    Drag drag;
+    drag.from = {0.0053f, 0.0051f};
+    drag.to = drag.from + 0.006f * Vec2f(std::cos(0.7f), std::sin(0.7f));
+    drag.speed_m_s = 0.006f;
+    drag.mode = GetParam().mode;
+    drag.tented = GetParam().tented;
+    return drag;
+  }
+  /// Frame by frame: 100 of burning, then cooling.
+  void Step(int frame, ThermalSolver* solver) const {
+    const Drag drag = MakeDrag();
+    solver->Step(frame < drag.frames(kDt) ? drag.At(frame, kDt) : TipInput{}, kDt);
+  }
+
+  static constexpr int kFrames = 130;
+  const scene::SceneData data_ = FlatScene(16, 16, 1e-3f);
+  const SceneView scene_ = data_.View();
+};
+
+TEST_P(RestartTest, AnyFrameWithNothingStagedGivesTheSameBits) {
+  std::vector<std::uint64_t> hashes;
+  std::vector<std::vector<std::byte>> checkpoints;
+  std::vector<std::byte> slot(ThermalSolver::CheckpointCapacity(scene_));
+  ThermalSolver whole(scene_);
+  TopologyValidator validator(scene_, whole.field().sheet());
+  int refused = 0;
+  for (int frame = 0; frame < kFrames; ++frame) {
+    Step(frame, &whole);
+    hashes.push_back(whole.FullHash());
+    const std::size_t bytes = whole.Save(slot);
+    // Tissue was cut since the last commit and its edges are not in the committed topology: no checkpoint then.
+    EXPECT_EQ(bytes == 0, whole.topology().staged());
+    EXPECT_FALSE(whole.at_commit_frame() && bytes == 0);
+    refused += bytes == 0 ? 1 : 0;
+    checkpoints.emplace_back(slot.begin(), slot.begin() + static_cast<std::ptrdiff_t>(bytes));
+    ASSERT_EQ(validator.Check(whole), "");
+  }
+  if (GetParam().mode == CauteryMode::kCut) {
+    EXPECT_GT(refused, 10);
+  }
+  for (const int stop : {0, 7, 23, 39, 49, 64, 74, 89, 99, 101, 119}) {
+    if (checkpoints[stop].empty()) continue;
+    ThermalSolver restarted(scene_);
+    ASSERT_TRUE(restarted.Restore(checkpoints[stop]));
+    ASSERT_EQ(restarted.FullHash(), hashes[stop]);
+    for (int frame = stop + 1; frame < kFrames; ++frame) {
+      Step(frame, &restarted);
+      ASSERT_EQ(restarted.FullHash(), hashes[frame]) << "stopped after " << stop << ", frame " << frame;
+    }
+    EXPECT_EQ(restarted.topology().revision(), whole.topology().revision());
+    EXPECT_EQ(restarted.topology().committed().dead_edges, whole.topology().committed().dead_edges);
+    EXPECT_EQ(restarted.cut_length_m(), whole.cut_length_m());
+    EXPECT_EQ(restarted.ledger().generator, whole.ledger().generator);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Burns, RestartTest,
+                         ::testing::Values(Burn{CauteryMode::kCut, false}, Burn{CauteryMode::kCoag, true}));
+
+TEST(RestartRefusalTest, ValuesThatTheSolverCannotHaveWrittenAreRefused) {
+  const scene::SceneData data = FlatScene(16, 16, 1e-3f);
+  const SceneView scene = data.View();
+  ThermalSolver solver(scene);
+  Drag drag;
+  drag.from = {0.0053f, 0.0051f};
+  drag.to = {0.0083f, 0.0051f};
+  RunDrag(drag, kDt, &solver);
+  while (!solver.at_commit_frame()) solver.Step({}, kDt);
+  std::vector<std::byte> bytes(ThermalSolver::CheckpointCapacity(scene));
+  // Spoilt in memory and then saved: what a bit that flipped in a cell would leave.
+  const auto refuses = [&](auto* value, auto bad) {
+    const auto good = std::exchange(*value, bad);
+    const std::size_t used = solver.Save(bytes);
+    ThermalSolver other(scene);
+    const bool refused = used > 0 && !other.Restore(std::span(bytes).first(used));
+    *value = good;
+    return refused && other.FullHash() == ThermalSolver(scene).FullHash();
+  };
+  TileState& s = solver.mutable_field()->Wake(1, 1)->state;
+  EXPECT_FALSE(refuses(&s.water[7], s.water[7]));
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  for (float* value : {&s.enthalpy[7], &s.water[7], &s.omega_cell[7], &s.omega_collagen[7], &s.charred[7]}) {
+    EXPECT_TRUE(refuses(value, kNan));
+    EXPECT_TRUE(refuses(value, 1e30f));
+  }
+  EXPECT_TRUE(refuses(&s.water[7], -0.1f));
+  EXPECT_TRUE(refuses(&s.flags[7], static_cast<std::uint8_t>(kOutside)));
+  EXPECT_TRUE(refuses(&s.awake, std::uint8_t{2}));
+}
+
+}  // namespace
+}  // namespace fulcrum::thermal
