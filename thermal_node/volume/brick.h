@@ -1,0 +1,57 @@
+// A brick of 64 x 64 x 32 cells beneath 3 x 3 tiles of the sheet.
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "thermal_node/volume/volume_material.h"
+
+namespace fulcrum::thermal {
+
+inline constexpr int kBrick = 64;                  ///< Columns of cells along the edge of a brick.
+inline constexpr int kBrickTiles = 3;              ///< Tiles of the sheet along it.
+inline constexpr int kBrickSpan = kBrick * 3 / 2;  ///< Cells of the sheet along it.
+inline constexpr int kColumns = kBrick * kBrick;
+inline constexpr int kBrickCells = kColumns * kLayers;
+
+/// Padded layout of theta: one halo row before and after, eight floats left and right so that rows stay aligned.
+inline constexpr int kBrickStride = kBrick + 16;
+inline constexpr int kLayerStride = kBrickStride * (kBrick + 2);
+inline constexpr int BrickIndex(int i, int j, int k) { return (k * kBrick + j) * kBrick + i; }
+inline constexpr int BrickThetaIndex(int i, int j, int k) { return k * kLayerStride + (j + 1) * kBrickStride + 8 + i; }
+
+/// The warm part of a brick: rows [row0, row1), both even, layers [0, layers). Outside it theta is 0 and no heat
+/// crosses its border; it grows before the front gets there.
+struct WarmBox {
+  int row0 = kBrick, row1 = 0, layers = 0;
+  [[nodiscard]] bool empty() const { return row0 >= row1; }
+  [[nodiscard]] bool Holds(int j, int k) const { return j >= row0 && j < row1 && k < layers; }
+  bool operator==(const WarmBox&) const = default;
+};
+
+struct Brick {
+  int bx = 0, by = 0, index = 0;
+  bool awake = false;
+  bool held = false;  ///< Something warm touches it: no sleep in this step.
+  bool has_source = false;
+  float length_s = 1, length_t = 1;  ///< Rest length of a cell relative to pitch_m.
+  float volume = 0;                  ///< Of a cell on the rest shape [m^3].
+  float lid_area = 1;                ///< Largest area of the sheet above a column over the column's own.
+  WarmBox box;
+  float theta_max = 0;
+
+  alignas(64) std::array<float, kBrickCells> enthalpy{};          ///< Over rc [K]; boiling takes latent[k] of it.
+  alignas(64) std::array<float, kBrickCells> omega{};             ///< Arrhenius integral of cell death.
+  alignas(64) std::array<float, kLayerStride * kLayers> theta{};  ///< [K]
+  alignas(64) std::array<float, kLayers * kBrick> row_max{}, row_sum{};  ///< Of theta, row (j, k) at k * kBrick + j.
+
+  /// Above layer 0: d(enthalpy/rc)/dt = lid_flux - lid_rate * theta [K/s], [1/s], column (i, j) at j * kBrick + i.
+  alignas(64) std::array<float, kColumns> lid_flux{}, lid_rate{};
+  /// Heat to come in the next step, in each fat cell of a column [J/m^3].
+  alignas(64) std::array<float, kColumns> source{};
+};
+
+/// True when the brick sleeps and no cell was ever warm enough to be damaged.
+[[nodiscard]] bool IsBlank(const Brick& brick);
+
+}  // namespace fulcrum::thermal
