@@ -11,6 +11,7 @@ namespace fulcrum::thermal {
 inline constexpr int kBrick = 64;                  ///< Columns of cells along the edge of a brick.
 inline constexpr int kBrickTiles = 3;              ///< Tiles of the sheet along it.
 inline constexpr int kBrickSpan = kBrick * 3 / 2;  ///< Cells of the sheet along it.
+inline constexpr int kBrickPairs = kBrick / 2;
 inline constexpr int kColumns = kBrick * kBrick;
 inline constexpr int kBrickCells = kColumns * kLayers;
 
@@ -43,7 +44,9 @@ struct Brick {
   alignas(64) std::array<float, kBrickCells> enthalpy{};          ///< Over rc [K]; boiling takes latent[k] of it.
   alignas(64) std::array<float, kBrickCells> omega{};             ///< Arrhenius integral of cell death.
   alignas(64) std::array<float, kLayerStride * kLayers> theta{};  ///< [K]
-  alignas(64) std::array<float, kLayers * kBrick> row_max{}, row_sum{};  ///< Of theta, row (j, k) at k * kBrick + j.
+  /// Largest |theta| of rows 2n and 2n + 1 of layer k, at k * kBrickPairs + n.
+  alignas(64) std::array<float, kLayers * kBrickPairs> pair_max{};
+  std::array<float, kLayers> layer_sum{};  ///< Of theta.
 
   /// Above layer 0: d(enthalpy/rc)/dt = lid_flux - lid_rate * theta [K/s], [1/s], column (i, j) at j * kBrick + i.
   alignas(64) std::array<float, kColumns> lid_flux{}, lid_rate{};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 
 #include "thermal_node/damage/arrhenius.h"
@@ -69,19 +70,25 @@ double ApplyLid(Brick* brick, float dt_s) {
 FULCRUM_WIDE
 void RefreshLayer(Brick* brick, int k, float boil, float latent_K) {
   const float spent = boil + latent_K;
-  for (int j = brick->box.row0; j < brick->box.row1; ++j) {
-    float* __restrict t = &brick->theta[BrickThetaIndex(0, j, k)];
-    const float* __restrict h = &brick->enthalpy[BrickIndex(0, j, k)];
-    alignas(64) float sum[kBrick], high[kBrick];
-    for (int i = 0; i < kBrick; ++i) {
-      const float below = h[i] > boil ? boil : h[i];
-      const float dry = h[i] - spent;
-      t[i] = below + (dry > 0.0f ? dry : 0.0f);
-      sum[i] = high[i] = t[i];
+  alignas(64) float sum[kBrick] = {};
+  for (int j = brick->box.row0; j < brick->box.row1; j += 2) {
+    alignas(64) float high[kBrick] = {};
+    for (int row = j; row < j + 2; ++row) {
+      float* __restrict t = &brick->theta[BrickThetaIndex(0, row, k)];
+      const float* __restrict h = &brick->enthalpy[BrickIndex(0, row, k)];
+      for (int i = 0; i < kBrick; ++i) {
+        const float below = h[i] > boil ? boil : h[i];
+        const float dry = h[i] - spent;
+        const float value = below + (dry > 0.0f ? dry : 0.0f);
+        const float size = std::abs(value);
+        t[i] = value;
+        sum[i] += value;
+        high[i] = high[i] > size ? high[i] : size;
+      }
     }
-    brick->row_sum[k * kBrick + j] = SumRow(sum);
-    brick->row_max[k * kBrick + j] = MaxRow(high);
+    brick->pair_max[k * kBrickPairs + j / 2] = MaxRow(high);
   }
+  brick->layer_sum[k] = SumRow(sum);
 }
 
 FULCRUM_WIDE

@@ -15,7 +15,7 @@ struct LayerStep {
 void ConductLayer(Brick* brick, int k, const LayerStep& step);
 /// What comes into layer 0 through the lid in dt. Returns the sum over the columns [K].
 double ApplyLid(Brick* brick, float dt_s);
-/// theta of layer k with the sums and maxima of its rows; boiling takes `latent_K` at `boil` [K].
+/// theta of layer k with its sum and the maxima of its pairs of rows; boiling takes `latent_K` at `boil` [K].
 void RefreshLayer(Brick* brick, int k, float boil, float latent_K);
 
 /// dOmega/dt = exp2(a - b / (zero_K + theta)) [1/s].

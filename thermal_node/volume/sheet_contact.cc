@@ -103,7 +103,7 @@ void SheetContact::WakeSheetAbove(const Brick& brick, HeatField* sheet) const {
   // A column lies below a whole cell of the sheet and half of the next; these may be in two tiles.
   const auto tile_of = [](int column, int half) { return (3 * column + 2 * half) / 2 / kTile; };
   for (int j = brick.box.row0; j < brick.box.row1; ++j) {
-    if (brick.row_max[j] <= kVolumeWakeTheta) continue;
+    if (brick.pair_max[j / 2] <= kVolumeWakeTheta) continue;
     const float* theta = &brick.theta[BrickThetaIndex(0, j, 0)];
     for (int i = 0; i < kBrick; ++i) {
       if (theta[i] <= kVolumeWakeTheta) continue;

@@ -134,11 +134,11 @@ void VolumeField::Spread() {
     if (box.empty()) continue;
     bool first = false, last = false, left = false, right = false;
     for (int k = 0; k < box.layers; ++k) {
-      const float* high = &brick->row_max[k * kBrick];
-      first = first || high[box.row0] > kVolumeWakeTheta;
-      last = last || high[box.row1 - 1] > kVolumeWakeTheta;
+      const float* high = &brick->pair_max[k * kBrickPairs];
+      first = first || high[box.row0 / 2] > kVolumeWakeTheta;
+      last = last || high[box.row1 / 2 - 1] > kVolumeWakeTheta;
       for (int j = box.row0; j < box.row1 && !(left && right); ++j) {
-        if (high[j] <= kVolumeWakeTheta) continue;
+        if (high[j / 2] <= kVolumeWakeTheta) continue;
         left = left || brick->theta[BrickThetaIndex(0, j, k)] > kVolumeWakeTheta;
         right = right || brick->theta[BrickThetaIndex(kBrick - 1, j, k)] > kVolumeWakeTheta;
       }
@@ -153,8 +153,8 @@ void VolumeField::Spread() {
     if (first) box.row0 = std::max(0, box.row0 - kGrowRows);
     if (last) box.row1 = std::min(kBrick, box.row1 + kGrowRows);
     if (box.layers > 0 && box.layers < kLayers) {
-      const float* high = &brick->row_max[(box.layers - 1) * kBrick];
-      if (*std::max_element(high + box.row0, high + box.row1) > kVolumeWakeTheta) box.layers += kGrowLayers;
+      const float* high = &brick->pair_max[(box.layers - 1) * kBrickPairs];
+      if (*std::max_element(high + box.row0 / 2, high + box.row1 / 2) > kVolumeWakeTheta) box.layers += kGrowLayers;
     }
   }
 }
@@ -204,9 +204,7 @@ void VolumeField::StepBrick(Brick* brick, float dt_s) {
   const float p = material_.pitch_m;
   const WarmBox& box = brick->box;
   for (int k = 0; k < box.layers; ++k) {
-    double sum = 0;
-    for (int j = box.row0; j < box.row1; ++j) sum += brick->row_sum[k * kBrick + j];
-    ledger_.perfused += sum * dt_s * material_.perfusion * brick->volume;
+    ledger_.perfused += static_cast<double>(brick->layer_sum[k]) * dt_s * material_.perfusion * brick->volume;
     const float per_rc = dt_s / material_.rc[k];
     LayerStep step;
     step.along_s = per_rc * material_.k[k] / (p * p * brick->length_s * brick->length_s);
@@ -246,10 +244,8 @@ void VolumeField::Quarantine(Brick* brick) {
   float high = 0;
   bool bad = false;
   for (int k = 0; k < box.layers; ++k) {
-    for (int j = box.row0; j < box.row1; ++j) {
-      high = std::max(high, brick->row_max[k * kBrick + j]);
-      bad = bad || !(std::abs(brick->row_sum[k * kBrick + j]) <= kBrick * kThetaPlausible);
-    }
+    for (int j = box.row0; j < box.row1; j += 2) high = std::max(high, brick->pair_max[k * kBrickPairs + j / 2]);
+    bad = bad || !std::isfinite(brick->layer_sum[k]);  // a maximum does not see NaN
   }
   brick->theta_max = high;
   if (!bad && high <= kThetaPlausible) return;
@@ -276,7 +272,7 @@ void VolumeField::Damage(Brick* brick, float dt_s) {
   for (int k = box.layers - 1; k >= 0; --k) {
     bool dead = false;
     for (int j = box.row0; j < box.row1; ++j) {
-      if (brick->row_max[k * kBrick + j] < kDamageStart) continue;
+      if (brick->pair_max[k * kBrickPairs + j / 2] < kDamageStart) continue;
       float* omega = &brick->omega[BrickIndex(0, j, k)];
       const float high = DamageRow(&brick->theta[BrickThetaIndex(0, j, k)], omega, rate, dt_s, kDamageStart);
       if (high < 1.0f || !deepest) continue;
@@ -301,8 +297,8 @@ void VolumeField::SleepCold() {
     ledger_.dropped += StoredIn(*brick);
     brick->enthalpy.fill(0);
     brick->theta.fill(0);
-    brick->row_max.fill(0);
-    brick->row_sum.fill(0);
+    brick->pair_max.fill(0);
+    brick->layer_sum.fill(0);
     brick->theta_max = 0;
     brick->box = {};
     brick->awake = false;
@@ -371,11 +367,7 @@ double VolumeField::Stored() const {
 void VolumeField::AddSums(Hash64* hash) const {
   for (const Brick* brick : awake_) {
     hash->AddValue(brick->index);
-    for (int k = 0; k < brick->box.layers; ++k) {
-      float sum = 0;
-      for (int j = brick->box.row0; j < brick->box.row1; ++j) sum += brick->row_sum[k * kBrick + j];
-      hash->AddValue(sum);
-    }
+    hash->Add(std::span<const float>(brick->layer_sum));
   }
   hash->AddValue(ledger_.joule);
   hash->AddValue(ledger_.perfused);
