@@ -121,12 +121,14 @@ bool GetVolume(Reader* reader, VolumeField* volume) {
   VolumeField::Totals totals;
   if (!reader->GetValue(&totals)) return false;
   const auto get = [&](std::span<float> rows) { return reader->Get(rows); };
+  std::int32_t last = -1;
   for (std::uint32_t n = 0; n < totals.brick_count; ++n) {
     BrickRecord record;
-    if (!reader->GetValue(&record) || record.index < 0 || record.index >= volume->brick_count() ||
-        !IsValid(record.warm) || !IsValid(record.damaged)) {
+    if (!reader->GetValue(&record) || record.index <= last || record.index >= volume->brick_count() ||
+        !IsValid(record.warm) || record.warm.row0 % 2 != 0 || record.warm.row1 % 2 != 0 || !IsValid(record.damaged)) {
       return false;
     }
+    last = record.index;
     Brick* brick = volume->BeginRestore(record.index);
     brick->box = record.warm;
     brick->awake = record.awake != 0;

@@ -67,6 +67,37 @@ double HalfSpaceError(float pitch_m) {
   return error / kSurface;
 }
 
+double SheetOnFatError(float cell_m) {
+  constexpr float kStart = 40, kDt = 0.01f;
+  ThermalParams params = PlainFat(cell_m);
+  params.h_top_W_m2K = params.h_below_W_m2K = 0;
+  params.conductivity_W_mK = 2;  // the formula's layer has no resistance of its own
+  const Material material = MakeMaterial(params);
+  HeatField field(SheetOfBricks(1, 1, cell_m), material);
+  VolumeField volume(field.sheet(), params);
+  const SheetContact contact(material, volume.material());
+  Ledger ledger;
+  for (int ty = 0; ty < kBrickTiles; ++ty) {
+    for (int tx = 0; tx < kBrickTiles; ++tx) {
+      Tile* tile = field.Wake(tx, ty);
+      tile->state.enthalpy.fill(material.rc_wet * kStart);
+      field.RefreshTheta(tile, &ledger);
+    }
+  }
+  const Tissue fat = kFat;
+  const double b = std::sqrt(fat.conductivity_W_mK * fat.density_kg_m3 * fat.heat_capacity_J_kgK) /
+                   (material.rc_wet * material.thickness_m);
+  double error = 0;
+  for (int n = 1; n <= 400; ++n) {
+    contact.Step(kDt, &field, &volume, &ledger);
+    const double t = n * kDt;
+    if (n < 100) continue;
+    const double exact = std::exp(b * b * t) * std::erfc(b * std::sqrt(t));
+    error = std::max(error, std::abs(field.MaxTheta() / kStart - exact));
+  }
+  return error;
+}
+
 double CosineError(int half_waves) {
   constexpr double kAmplitude = 20;
   constexpr float kPitch_m = 1.5e-4f;

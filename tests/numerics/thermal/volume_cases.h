@@ -18,6 +18,11 @@ namespace fulcrum::thermal {
 /// start. Half waves in depth and across a brick; the step is in proportion to the square of the cells per wave.
 [[nodiscard]] double CosineError(int half_waves);
 
+/// Largest error of the temperature of a sheet that conducts well and lies on fat, from 40 K on, at 1 to 4 s against
+/// exp(b^2 t) erfc(b sqrt(t)), b = sqrt(k rc of fat) / (rc d of the sheet); relative to 40 K. A stirred layer in
+/// contact with a half-space (Carslaw and Jaeger, Conduction of Heat in Solids, 12.4).
+[[nodiscard]] double SheetOnFatError(float cell_m);
+
 /// A block of 64 x 64 x 32 cells at 150 um, all rows and layers awake, under a warm sheet, with current.
 struct VolumeTimes {
   double step_ms = 0;     ///< Heat and damage, a hot spot: damage in a part of the cells.

@@ -91,6 +91,12 @@ TEST(VolumeTest, WavesOverTwoBricksDecayInSecondOrder) {
   EXPECT_LE(coarse, 1e-3);
 }
 
+TEST(VolumeTest, SheetCoolsIntoFatAsALayerOnAHalfSpace) {
+  const double coarse = SheetOnFatError(2e-4f), fine = SheetOnFatError(1e-4f);
+  EXPECT_LE(fine, 0.01);
+  EXPECT_LT(fine, coarse);
+}
+
 TEST(VolumeTest, MaximumPrincipleHoldsWithTheSheetAndLongSteps) {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> uniform(0, 1);
