@@ -78,7 +78,7 @@ WarmBox DamagedBox(const Brick& brick) {
     for (int j = 0; j < kBrick; ++j) {
       const float* row = &brick.omega[BrickIndex(0, j, k)];
       if (std::none_of(row, row + kBrick, [](float omega) { return omega != 0.0f; })) continue;
-      box = {std::min(box.row0, j), std::max(box.row1, j + 1), k + 1};
+      box = {0, kBrick, std::min(box.row0, j), std::max(box.row1, j + 1), k + 1};
     }
   }
   return box;
@@ -95,9 +95,10 @@ bool ForRows(const WarmBox& box, Cells& cells, const Visit& visit) {
   return true;
 }
 
-bool IsValid(const WarmBox& box) {
-  return box.row0 >= 0 && box.row0 <= kBrick && box.row1 >= 0 && box.row1 <= kBrick && box.layers >= 0 &&
-         box.layers <= kLayers;
+bool IsValid(const WarmBox& box, int columns, int rows) {
+  const auto good = [](int value, int step) { return value >= 0 && value <= kBrick && value % step == 0; };
+  return good(box.col0, columns) && good(box.col1, columns) && good(box.row0, rows) && good(box.row1, rows) &&
+         (box.empty() || box.col0 < box.col1) && box.layers >= 0 && box.layers <= kLayers;
 }
 
 void PutVolume(const VolumeField& volume, Writer* writer) {
@@ -125,7 +126,7 @@ bool GetVolume(Reader* reader, VolumeField* volume) {
   for (std::uint32_t n = 0; n < totals.brick_count; ++n) {
     BrickRecord record;
     if (!reader->GetValue(&record) || record.index <= last || record.index >= volume->brick_count() ||
-        !IsValid(record.warm) || record.warm.row0 % 2 != 0 || record.warm.row1 % 2 != 0 || !IsValid(record.damaged)) {
+        !IsValid(record.warm, kBoxColumns, kBoxRows) || !IsValid(record.damaged, 1, 1)) {
       return false;
     }
     last = record.index;

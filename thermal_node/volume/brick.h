@@ -20,14 +20,20 @@ inline constexpr int kLayerStride = kBrickStride * (kBrick + 2);
 inline constexpr int BrickIndex(int i, int j, int k) { return (k * kBrick + j) * kBrick + i; }
 inline constexpr int BrickThetaIndex(int i, int j, int k) { return k * kLayerStride + (j + 1) * kBrickStride + 8 + i; }
 
-/// The warm part of a brick: rows [row0, row1), both even, layers [0, layers). Outside it theta is 0 and no heat
-/// crosses its border; it grows before the front gets there.
+inline constexpr int kBoxColumns = 16;  ///< A box begins and ends at multiples of this along s …
+inline constexpr int kBoxRows = 2;      ///< … and of this along t.
+
+/// The warm part of a brick: cells [col0, col1) of the rows [row0, row1) of layers [0, layers). Outside it there is no
+/// heat, and none crosses its border; it grows before the front gets there.
 struct WarmBox {
-  int row0 = kBrick, row1 = 0, layers = 0;
+  int col0 = kBrick, col1 = 0, row0 = kBrick, row1 = 0, layers = 0;
   [[nodiscard]] bool empty() const { return row0 >= row1; }
-  [[nodiscard]] bool Holds(int j, int k) const { return j >= row0 && j < row1 && k < layers; }
+  [[nodiscard]] bool Holds(int i, int j, int k) const {
+    return i >= col0 && i < col1 && j >= row0 && j < row1 && k < layers;
+  }
   bool operator==(const WarmBox&) const = default;
 };
+inline constexpr WarmBox kWholeBrick{0, kBrick, 0, kBrick, kLayers};
 
 struct Brick {
   int bx = 0, by = 0, index = 0;
@@ -40,9 +46,10 @@ struct Brick {
   WarmBox box;
   float theta_max = 0;
 
-  alignas(64) std::array<float, kBrickCells> enthalpy{};          ///< Over rc [K]; boiling takes latent[k] of it.
-  alignas(64) std::array<float, kBrickCells> omega{};             ///< Arrhenius integral of cell death.
-  alignas(64) std::array<float, kLayerStride * kLayers> theta{};  ///< [K]
+  alignas(64) std::array<float, kBrickCells> enthalpy{};  ///< Over rc [K]; boiling takes latent[k] of it.
+  alignas(64) std::array<float, kBrickCells> omega{};     ///< Arrhenius integral of cell death.
+  /// [K]; beside the box it is what the halos need there.
+  alignas(64) std::array<float, kLayerStride * kLayers> theta{};
   /// Largest |theta| of rows 2n and 2n + 1 of layer k, at k * kBrickPairs + n.
   alignas(64) std::array<float, kLayers * kBrickPairs> pair_max{};
   std::array<float, kLayers> layer_sum{};  ///< Of theta.

@@ -30,35 +30,38 @@ inline float MaxRow(float* values) {
 FULCRUM_WIDE
 void ConductLayer(Brick* brick, int k, const LayerStep& step) {
   const WarmBox box = brick->box;
+  const int count = box.col1 - box.col0;
   const float cs = step.along_s, ct = step.along_t, above = step.above, below = step.below, loss = step.loss;
   for (int j = box.row0; j < box.row1; ++j) {
-    const float* __restrict t = &brick->theta[BrickThetaIndex(0, j, k)];
+    const float* __restrict t = &brick->theta[BrickThetaIndex(box.col0, j, k)];
     // At the border of the box the row is its own neighbour: no heat crosses it. A halo row is there at the brick's.
     const float* __restrict before = j > box.row0 || j == 0 ? t - kBrickStride : t;
     const float* __restrict after = j + 1 < box.row1 || j + 1 == kBrick ? t + kBrickStride : t;
     const float* __restrict up = k > 0 ? t - kLayerStride : t;
     const float* __restrict down = k + 1 < box.layers ? t + kLayerStride : t;
-    float* __restrict h = &brick->enthalpy[BrickIndex(0, j, k)];
-    for (int i = 0; i < kBrick; ++i) {
+    float* __restrict h = &brick->enthalpy[BrickIndex(box.col0, j, k)];
+    for (int i = 0; i < count; ++i) {
       h[i] += cs * ((t[i - 1] - t[i]) + (t[i + 1] - t[i])) + ct * ((before[i] - t[i]) + (after[i] - t[i])) +
               above * (up[i] - t[i]) + below * (down[i] - t[i]) - loss * t[i];
     }
     if (step.source == 0.0f) continue;
-    const float* __restrict q = &brick->source[j * kBrick];
-    for (int i = 0; i < kBrick; ++i) h[i] += step.source * q[i];
+    const float* __restrict q = &brick->source[j * kBrick + box.col0];
+    for (int i = 0; i < count; ++i) h[i] += step.source * q[i];
   }
 }
 
 FULCRUM_WIDE
 double ApplyLid(Brick* brick, float dt_s) {
+  const WarmBox box = brick->box;
+  const int count = box.col1 - box.col0;
   double total = 0;
-  for (int j = brick->box.row0; j < brick->box.row1; ++j) {
-    const float* __restrict t = &brick->theta[BrickThetaIndex(0, j, 0)];
-    const float* __restrict flux = &brick->lid_flux[j * kBrick];
-    const float* __restrict rate = &brick->lid_rate[j * kBrick];
-    float* __restrict h = &brick->enthalpy[BrickIndex(0, j, 0)];
-    alignas(64) float in[kBrick];
-    for (int i = 0; i < kBrick; ++i) {
+  for (int j = box.row0; j < box.row1; ++j) {
+    const float* __restrict t = &brick->theta[BrickThetaIndex(box.col0, j, 0)];
+    const float* __restrict flux = &brick->lid_flux[j * kBrick + box.col0];
+    const float* __restrict rate = &brick->lid_rate[j * kBrick + box.col0];
+    float* __restrict h = &brick->enthalpy[BrickIndex(box.col0, j, 0)];
+    alignas(64) float in[kBrick] = {};
+    for (int i = 0; i < count; ++i) {
       in[i] = dt_s * (flux[i] - rate[i] * t[i]);
       h[i] += in[i];
     }
@@ -70,13 +73,15 @@ double ApplyLid(Brick* brick, float dt_s) {
 FULCRUM_WIDE
 void RefreshLayer(Brick* brick, int k, float boil, float latent_K) {
   const float spent = boil + latent_K;
+  const WarmBox box = brick->box;
+  const int count = box.col1 - box.col0;
   alignas(64) float sum[kBrick] = {};
-  for (int j = brick->box.row0; j < brick->box.row1; j += 2) {
+  for (int j = box.row0; j < box.row1; j += kBoxRows) {
     alignas(64) float high[kBrick] = {};
-    for (int row = j; row < j + 2; ++row) {
-      float* __restrict t = &brick->theta[BrickThetaIndex(0, row, k)];
-      const float* __restrict h = &brick->enthalpy[BrickIndex(0, row, k)];
-      for (int i = 0; i < kBrick; ++i) {
+    for (int row = j; row < j + kBoxRows; ++row) {
+      float* __restrict t = &brick->theta[BrickThetaIndex(box.col0, row, k)];
+      const float* __restrict h = &brick->enthalpy[BrickIndex(box.col0, row, k)];
+      for (int i = 0; i < count; ++i) {
         const float below = h[i] > boil ? boil : h[i];
         const float dry = h[i] - spent;
         const float value = below + (dry > 0.0f ? dry : 0.0f);
@@ -92,11 +97,11 @@ void RefreshLayer(Brick* brick, int k, float boil, float latent_K) {
 }
 
 FULCRUM_WIDE
-float DamageRow(const float* __restrict theta, float* __restrict omega, const ArrheniusExp2& rate, float dt_s,
-                float start) {
-  alignas(64) float high[kBrick];
+float DamageRow(const float* __restrict theta, float* __restrict omega, int count, const ArrheniusExp2& rate,
+                float dt_s, float start) {
+  alignas(64) float high[kBrick] = {};
   const float a = rate.a, b = rate.b, zero = rate.zero_K;
-  for (int i = 0; i < kBrick; ++i) {
+  for (int i = 0; i < count; ++i) {
     const float t = theta[i];
     const float dt = t < start ? 0.0f : dt_s;
     const float x = a - b / (zero + (t > start ? t : start));

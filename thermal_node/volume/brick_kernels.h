@@ -22,7 +22,7 @@ void RefreshLayer(Brick* brick, int k, float boil, float latent_K);
 struct ArrheniusExp2 {
   float a, b, zero_K;
 };
-/// Adds dt of damage to a row of cells where theta >= start and returns the row's largest omega.
-float DamageRow(const float* theta, float* omega, const ArrheniusExp2& rate, float dt_s, float start);
+/// Adds dt of damage to `count` <= kBrick cells of a row where theta >= start and returns their largest omega.
+float DamageRow(const float* theta, float* omega, int count, const ArrheniusExp2& rate, float dt_s, float start);
 
 }  // namespace fulcrum::thermal

@@ -91,8 +91,10 @@ void SheetContact::Wake(HeatField* sheet, VolumeField* volume) const {
     }
     if (last < 0) continue;
     const int top = tile->ty % kBrickTiles * kTile;
-    Brick* brick = volume->Wake(tile->tx / kBrickTiles, tile->ty / kBrickTiles, (top + first) * 2 / 3,
-                                ((top + last) * 2 + 1) / 3 + 1, 1);
+    const int left = tile->tx % kBrickTiles * kTile;
+    const WarmBox need{left * 2 / 3, ((left + kTile - 1) * 2 + 1) / 3 + 1, (top + first) * 2 / 3,
+                       ((top + last) * 2 + 1) / 3 + 1, 1};
+    Brick* brick = volume->Wake(tile->tx / kBrickTiles, tile->ty / kBrickTiles, need);
     if (brick != nullptr) brick->held = true;
   }
   for (const Brick* brick : volume->awake()) WakeSheetAbove(*brick, sheet);
@@ -103,9 +105,9 @@ void SheetContact::WakeSheetAbove(const Brick& brick, HeatField* sheet) const {
   // A column lies below a whole cell of the sheet and half of the next; these may be in two tiles.
   const auto tile_of = [](int column, int half) { return (3 * column + 2 * half) / 2 / kTile; };
   for (int j = brick.box.row0; j < brick.box.row1; ++j) {
-    if (brick.pair_max[j / 2] <= kVolumeWakeTheta) continue;
+    if (brick.pair_max[j / kBoxRows] <= kVolumeWakeTheta) continue;
     const float* theta = &brick.theta[BrickThetaIndex(0, j, 0)];
-    for (int i = 0; i < kBrick; ++i) {
+    for (int i = brick.box.col0; i < brick.box.col1; ++i) {
       if (theta[i] <= kVolumeWakeTheta) continue;
       for (int n = 0; n < 4; ++n) warm[tile_of(j, n / 2)][tile_of(i, n % 2)] = true;
     }
@@ -142,6 +144,14 @@ void SheetContact::Exchange(float dt_s, HeatField* sheet, const VolumeMaterial& 
           rows.flow[r][to + i] = g * area;
           rows.decay[r][to + i] = g / volume.sheet_thickness;
         }
+      }
+    }
+    // Beside the box there is no contact.
+    const int first = brick->box.col0 / 2 * 3, last = brick->box.col1 / 2 * 3;
+    for (int r = 0; r < 3; ++r) {
+      for (float* row : {rows.flow[r], rows.decay[r]}) {
+        std::fill(row, row + first, 0.0f);
+        std::fill(row + last, row + kBrickSpan, 0.0f);
       }
     }
     ToColumns(rows, scale, &brick->lid_flux[j * kBrick], &brick->lid_rate[j * kBrick]);

@@ -15,13 +15,15 @@ void VolumeField::Damage(Brick* brick, float dt_s) {
   for (int k = box.layers - 1; k >= 0; --k) {
     bool dead = false;
     for (int j = box.row0; j < box.row1; ++j) {
-      if (brick->pair_max[k * kBrickPairs + j / 2] < kDamageStart) continue;
-      float* omega = &brick->omega[BrickIndex(0, j, k)];
-      const float high = DamageRow(&brick->theta[BrickThetaIndex(0, j, k)], omega, rate, dt_s, kDamageStart);
+      if (brick->pair_max[k * kBrickPairs + j / kBoxRows] < kDamageStart) continue;
+      float* omega = &brick->omega[BrickIndex(box.col0, j, k)];
+      const int count = box.col1 - box.col0;
+      const float high =
+          DamageRow(&brick->theta[BrickThetaIndex(box.col0, j, k)], omega, count, rate, dt_s, kDamageStart);
       if (high < 1.0f || !deepest) continue;
       dead = true;
-      for (int i = 0; i < kBrick; ++i) {
-        if (omega[i] >= 1.0f) deepest_burn_m_ = std::max(deepest_burn_m_, BurnDepth(*brick, j * kBrick + i));
+      for (int i = 0; i < count; ++i) {
+        if (omega[i] >= 1.0f) deepest_burn_m_ = std::max(deepest_burn_m_, BurnDepth(*brick, j * kBrick + box.col0 + i));
       }
     }
     deepest = deepest && !dead;
@@ -37,6 +39,7 @@ float VolumeField::ThetaAt(const Vec2f& material, float depth_m) const {
   const float z = std::clamp(depth_m / material_.pitch_m - 0.5f, 0.0f, static_cast<float>(kLayers - 1));
   const int k = std::min(static_cast<int>(z), kLayers - 2);
   const float f = z - static_cast<float>(k);
+  if (!brick->box.Holds(i, j, 0)) return 0;
   const float upper = brick->theta[BrickThetaIndex(i, j, k)], lower = brick->theta[BrickThetaIndex(i, j, k + 1)];
   return upper + f * (lower - upper);
 }

@@ -10,8 +10,6 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// Rows and layers a box grows by at once, so that it does not grow at every step.
-constexpr int kGrowRows = 2, kGrowLayers = 1;
 /// Less heat than this does not wake tissue [K/s]: what a tip that moves on leaves there is less than a sleeping brick
 /// may hold.
 constexpr float kLeastSource_K_s = 1.0f;
@@ -79,16 +77,33 @@ void VolumeField::Rouse(Brick* brick) {
   awake_.insert(before, brick);
 }
 
-Brick* VolumeField::Wake(int bx, int by, int row0, int row1, int layers) {
+Brick* VolumeField::Wake(int bx, int by, const WarmBox& need) {
   if (bx < 0 || by < 0 || bx >= bricks_x_ || by >= bricks_y_) return nullptr;
   const int index = by * bricks_x_ + bx;
   Brick* brick = bricks_[index] ? bricks_[index].get() : Create(index);
   Rouse(brick);
-  WarmBox& box = brick->box;
-  box.row0 = std::max(0, std::min(box.row0, row0 & ~1));
-  box.row1 = std::min(kBrick, std::max(box.row1, (row1 + 1) & ~1));
-  box.layers = std::min(kLayers, std::max(box.layers, layers));
+  Grow(brick, need);
   return brick;
+}
+
+void VolumeField::Grow(Brick* brick, const WarmBox& need) {
+  const WarmBox before = brick->box;
+  const auto down = [](int value, int step) { return std::max(0, value) / step * step; };
+  const auto up = [](int value, int step) { return std::min(kBrick, (value + step - 1) / step * step); };
+  WarmBox& box = brick->box;
+  box.col0 = std::min(before.col0, down(need.col0, kBoxColumns));
+  box.col1 = std::max(before.col1, up(need.col1, kBoxColumns));
+  box.row0 = std::min(before.row0, down(need.row0, kBoxRows));
+  box.row1 = std::max(before.row1, up(need.row1, kBoxRows));
+  box.layers = std::min(kLayers, std::max(before.layers, need.layers));
+  if (before.empty() || (box.col0 == before.col0 && box.col1 == before.col1)) return;
+  // Beside the old box stood values for the halos.
+  for (int k = 0; k < before.layers; ++k) {
+    for (int j = before.row0; j < before.row1; ++j) {
+      if (box.col0 < before.col0) brick->theta[BrickThetaIndex(before.col0 - 1, j, k)] = 0;
+      if (box.col1 > before.col1) brick->theta[BrickThetaIndex(before.col1, j, k)] = 0;
+    }
+  }
 }
 
 void VolumeField::AddSource(CellIndex cell, float heat_J_m3, float duration_s) {
@@ -96,9 +111,9 @@ void VolumeField::AddSource(CellIndex cell, float heat_J_m3, float duration_s) {
   const int x = cell.ix % kBrickSpan, y = cell.iy % kBrickSpan;
   const int i = x / 3 * 2, j = y / 3 * 2, deepest = material_.fat_layers - 1;
   Brick* brick = Find(bx, by);
-  if (brick == nullptr || !brick->box.Holds(j, deepest) || !brick->box.Holds(j + 1, deepest)) {
+  if (brick == nullptr || !brick->box.Holds(i, j, deepest)) {  // boxes are even: it holds the next row and column, too
     if (heat_J_m3 < kLeastSource_K_s * duration_s * material_.rc[0]) return;
-    brick = Wake(bx, by, j, j + 2, material_.fat_layers);
+    brick = Wake(bx, by, {i, i + 2, j, j + 2, material_.fat_layers});
   }
   const float share = heat_J_m3 / (kPitch * kPitch);
   for (int dj = 0; dj < 2; ++dj) {
@@ -130,32 +145,35 @@ float VolumeField::Rate() const {
 void VolumeField::Spread() {
   scratch_.assign(awake_.begin(), awake_.end());
   for (Brick* brick : scratch_) {
-    WarmBox& box = brick->box;
+    const WarmBox box = brick->box;
     if (box.empty()) continue;
     bool first = false, last = false, left = false, right = false;
     for (int k = 0; k < box.layers; ++k) {
       const float* high = &brick->pair_max[k * kBrickPairs];
-      first = first || high[box.row0 / 2] > kVolumeWakeTheta;
-      last = last || high[box.row1 / 2 - 1] > kVolumeWakeTheta;
+      first = first || high[box.row0 / kBoxRows] > kVolumeWakeTheta;
+      last = last || high[box.row1 / kBoxRows - 1] > kVolumeWakeTheta;
       for (int j = box.row0; j < box.row1 && !(left && right); ++j) {
-        if (high[j / 2] <= kVolumeWakeTheta) continue;
-        left = left || brick->theta[BrickThetaIndex(0, j, k)] > kVolumeWakeTheta;
-        right = right || brick->theta[BrickThetaIndex(kBrick - 1, j, k)] > kVolumeWakeTheta;
+        if (high[j / kBoxRows] <= kVolumeWakeTheta) continue;
+        left = left || brick->theta[BrickThetaIndex(box.col0, j, k)] > kVolumeWakeTheta;
+        right = right || brick->theta[BrickThetaIndex(box.col1 - 1, j, k)] > kVolumeWakeTheta;
       }
     }
-    const auto hold = [&](int bx, int by, int row0, int row1) {
-      if (Brick* other = Wake(bx, by, row0, row1, box.layers)) other->held = true;
+    const float* lowest = &brick->pair_max[(box.layers - 1) * kBrickPairs];
+    const bool deep = *std::max_element(lowest + box.row0 / kBoxRows, lowest + box.row1 / kBoxRows) > kVolumeWakeTheta;
+    const auto hold = [&](int dx, int dy, WarmBox need) {
+      if (Brick* other = Wake(brick->bx + dx, brick->by + dy, need)) other->held = true;
     };
-    if (left) hold(brick->bx - 1, brick->by, box.row0, box.row1);
-    if (right) hold(brick->bx + 1, brick->by, box.row0, box.row1);
-    if (first && box.row0 == 0) hold(brick->bx, brick->by - 1, kBrick - kGrowRows, kBrick);
-    if (last && box.row1 == kBrick) hold(brick->bx, brick->by + 1, 0, kGrowRows);
-    if (first) box.row0 = std::max(0, box.row0 - kGrowRows);
-    if (last) box.row1 = std::min(kBrick, box.row1 + kGrowRows);
-    if (box.layers > 0 && box.layers < kLayers) {
-      const float* high = &brick->pair_max[(box.layers - 1) * kBrickPairs];
-      if (*std::max_element(high + box.row0 / 2, high + box.row1 / 2) > kVolumeWakeTheta) box.layers += kGrowLayers;
-    }
+    WarmBox need = box;
+    if (left && box.col0 == 0) hold(-1, 0, {kBrick - 1, kBrick, box.row0, box.row1, box.layers});
+    if (right && box.col1 == kBrick) hold(1, 0, {0, 1, box.row0, box.row1, box.layers});
+    if (first && box.row0 == 0) hold(0, -1, {box.col0, box.col1, kBrick - 1, kBrick, box.layers});
+    if (last && box.row1 == kBrick) hold(0, 1, {box.col0, box.col1, 0, 1, box.layers});
+    need.col0 -= left ? 1 : 0;
+    need.col1 += right ? 1 : 0;
+    need.row0 -= first ? 1 : 0;
+    need.row1 += last ? 1 : 0;
+    need.layers += deep ? 1 : 0;
+    Grow(brick, need);
   }
 }
 
@@ -174,28 +192,32 @@ void VolumeField::FillHalos(Brick* brick) const {
   float* theta = brick->theta.data();
   const WarmBox& box = brick->box;
   for (const int dx : {-1, 1}) {
+    const int inside = dx < 0 ? box.col0 : box.col1 - 1, beyond = dx < 0 ? kBrick - 1 : 0;
+    const bool at_border = inside + dx < 0 || inside + dx == kBrick;
     const Brick* other = Find(brick->bx + dx, brick->by);
-    const float weight = BorderWeight(*brick, dx, 0);
-    const int inside = dx < 0 ? 0 : kBrick - 1, beyond = kBrick - 1 - inside;
+    const float weight = at_border ? BorderWeight(*brick, dx, 0) : 0.0f;
     for (int k = 0; k < box.layers; ++k) {
       for (int j = box.row0; j < box.row1; ++j) {
         const int at = BrickThetaIndex(inside, j, k);
-        const bool joined = weight > 0.0f && other->box.Holds(j, k);
+        const bool joined = weight > 0.0f && other->box.Holds(beyond, j, k);
         const float theirs = joined ? other->theta[BrickThetaIndex(beyond, j, k)] : theta[at];
         theta[at + dx] = theta[at] + weight * (theirs - theta[at]);
       }
     }
   }
   for (const int dy : {-1, 1}) {
+    const int inside = dy < 0 ? 0 : kBrick - 1, beyond = kBrick - 1 - inside;
+    if (inside < box.row0 || inside >= box.row1) continue;
     const Brick* other = Find(brick->bx, brick->by + dy);
     const float weight = BorderWeight(*brick, 0, dy);
-    const int inside = dy < 0 ? 0 : kBrick - 1, beyond = kBrick - 1 - inside;
-    for (int k = 0; k < box.layers && box.Holds(inside, k); ++k) {
+    for (int k = 0; k < box.layers; ++k) {
       const float* own = &theta[BrickThetaIndex(0, inside, k)];
       float* halo = &theta[BrickThetaIndex(0, inside + dy, k)];
-      const bool joined = weight > 0.0f && other->box.Holds(beyond, k);
-      const float* theirs = joined ? &other->theta[BrickThetaIndex(0, beyond, k)] : own;
-      for (int i = 0; i < kBrick; ++i) halo[i] = own[i] + weight * (theirs[i] - own[i]);
+      for (int i = box.col0; i < box.col1; ++i) {
+        const bool joined = weight > 0.0f && other->box.Holds(i, beyond, k);
+        const float theirs = joined ? other->theta[BrickThetaIndex(i, beyond, k)] : own[i];
+        halo[i] = own[i] + weight * (theirs - own[i]);
+      }
     }
   }
 }
@@ -244,14 +266,16 @@ void VolumeField::Quarantine(Brick* brick) {
   float high = 0;
   bool bad = false;
   for (int k = 0; k < box.layers; ++k) {
-    for (int j = box.row0; j < box.row1; j += 2) high = std::max(high, brick->pair_max[k * kBrickPairs + j / 2]);
+    for (int j = box.row0; j < box.row1; j += kBoxRows) {
+      high = std::max(high, brick->pair_max[k * kBrickPairs + j / kBoxRows]);
+    }
     bad = bad || !std::isfinite(brick->layer_sum[k]);  // a maximum does not see NaN
   }
   brick->theta_max = high;
   if (!bad && high <= kThetaPlausible) return;
   for (int k = 0; k < box.layers; ++k) {
     for (int j = box.row0; j < box.row1; ++j) {
-      for (int i = 0; i < kBrick; ++i) {
+      for (int i = box.col0; i < box.col1; ++i) {
         float& h = brick->enthalpy[BrickIndex(i, j, k)];
         if (std::abs(brick->theta[BrickThetaIndex(i, j, k)]) <= kThetaPlausible) continue;
         if (std::isfinite(h)) ledger_.quarantined += static_cast<double>(h) * material_.rc[k] * brick->volume;

@@ -38,8 +38,8 @@ class VolumeField {
   [[nodiscard]] int brick_count() const { return static_cast<int>(bricks_.size()); }
   /// The brick, or nullptr when it never was awake or lies beyond the sheet.
   [[nodiscard]] Brick* Find(int bx, int by) const;
-  /// Wakes the brick with at least the rows [row0, row1) and that many layers. nullptr beyond the sheet.
-  Brick* Wake(int bx, int by, int row0, int row1, int layers);
+  /// Wakes the brick with at least the cells of `need` in its box. nullptr beyond the sheet.
+  Brick* Wake(int bx, int by, const WarmBox& need);
 
   /// Adds heat of the leak current beneath one cell of the sheet: q dt in the fat [J/m^3], come in duration_s. Too
   /// little to wake sleeping tissue is left out.
@@ -88,6 +88,7 @@ class VolumeField {
  private:
   Brick* Create(int index);
   void Rouse(Brick* brick);
+  static void Grow(Brick* brick, const WarmBox& need);
   [[nodiscard]] float BorderWeight(const Brick& brick, int dx, int dy) const;
   void FillHalos(Brick* brick) const;
   void StepBrick(Brick* brick, float dt_s);

@@ -52,7 +52,7 @@ double HalfSpaceError(float pitch_m) {
   constexpr double kSurface = 40, kDuration_s = 8;
   const Sheet sheet = SheetOfBricks(1, 1, pitch_m / kPitch);
   VolumeField volume(sheet, PlainFat(pitch_m / kPitch));
-  Brick* brick = volume.Wake(0, 0, 0, kBrick, kLayers);
+  Brick* brick = volume.Wake(0, 0, kWholeBrick);
   const float rate = volume.material().face[0] / (volume.material().rc[0] * volume.material().pitch_m);
   brick->lid_rate.fill(rate);
   brick->lid_flux.fill(rate * static_cast<float>(kSurface));
@@ -103,7 +103,7 @@ double CosineError(int half_waves) {
   constexpr float kPitch_m = 1.5e-4f;
   const Sheet sheet = SheetOfBricks(2, 1, kPitch_m / kPitch);
   VolumeField volume(sheet, PlainFat(kPitch_m / kPitch));
-  for (int bx = 0; bx < 2; ++bx) volume.Wake(bx, 0, 0, kBrick, kLayers);
+  for (int bx = 0; bx < 2; ++bx) volume.Wake(bx, 0, kWholeBrick);
   const double pi_w = std::numbers::pi * half_waves, p = kPitch_m;
   const double ws = 2 * pi_w / (2 * kBrick * p), wt = pi_w / (kBrick * p), wz = pi_w / (kLayers * p);
   const auto shape = [&](int x, int y, int k) {
@@ -138,7 +138,7 @@ VolumeTimes TimeVolume() {
     VolumeField volume(field.sheet(), params);
     const SheetContact between(material, volume.material());
     Ledger ledger;
-    Brick* brick = volume.Wake(0, 0, 0, kBrick, kLayers);
+    Brick* brick = volume.Wake(0, 0, kWholeBrick);
     ForCells(volume, [&](const Brick&, int, int, int k, int i, int j) {
       const float x = (static_cast<float>(i) - 31.5f) * 0.15f, y = (static_cast<float>(j) - 31.5f) * 0.15f;
       const float z = (static_cast<float>(k) + 0.5f) * 0.15f;

@@ -114,8 +114,8 @@ TEST(VolumeTest, MaximumPrincipleHoldsWithTheSheetAndLongSteps) {
     }
     stack.Warm(n % 3, n / 3, [&](int) { return uniform(random) < 0.5f ? 60.0f : 0.0f; });
   }
-  stack.volume.Wake(0, 0, 0, kBrick, kLayers);
-  stack.volume.Wake(1, 0, 0, kBrick, kLayers);
+  stack.volume.Wake(0, 0, kWholeBrick);
+  stack.volume.Wake(1, 0, kWholeBrick);
   ForCells(stack.volume, [&](Brick* brick, int i, int j, int k) {
     brick->enthalpy[BrickIndex(i, j, k)] = uniform(random) < 0.5f ? 60.0f : 0.0f;
   });
@@ -139,7 +139,9 @@ TEST(VolumeTest, BothLedgersCloseAcrossBricksAndSleep) {
   std::uniform_real_distribution<float> uniform(0.85f, 1.2f);
   Sheet sheet = SheetOfBricks(2, 2, 1e-4f);
   for (CellMetric& metric : sheet.metric) metric = {uniform(random), uniform(random)};
-  Stack stack(std::move(sheet));
+  ThermalParams params;
+  params.perfusion_per_s = 0.1f;  // cold again soon
+  Stack stack(std::move(sheet), params);
   // At the corner where the four bricks meet.
   for (const int tx : {2, 3}) {
     for (const int ty : {2, 3}) stack.Warm(tx, ty, [](int k) { return k % 7 == 0 ? 60.0f : 5.0f; });
@@ -167,7 +169,7 @@ TEST(VolumeTest, BadCellStartsAnewAndItsNeighboursNeverReadIt) {
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1e30f}) {
     const Sheet sheet = SheetOfBricks(1, 1, 1e-4f);
     VolumeField volume(sheet, PlainFat(1e-4f));
-    Brick* brick = volume.Wake(0, 0, 0, kBrick, kLayers);
+    Brick* brick = volume.Wake(0, 0, kWholeBrick);
     brick->enthalpy.fill(40.0f);
     volume.Advance(0);
     brick->enthalpy[BrickIndex(20, 21, 9)] = bad;
@@ -185,7 +187,7 @@ TEST(VolumeTest, BoilingHoldsAtHundredDegrees) {
   const Sheet sheet = SheetOfBricks(1, 1, 1e-4f);
   VolumeField volume(sheet, PlainFat(1e-4f));
   const float half_spent = 63.0f + 0.5f * volume.material().latent[0];
-  Brick* brick = volume.Wake(0, 0, 0, kBrick, kLayers);
+  Brick* brick = volume.Wake(0, 0, kWholeBrick);
   brick->enthalpy.fill(half_spent);
   volume.Advance(kDt);
   EXPECT_NEAR(volume.MaxTheta(), 63.0f, 1e-3f);
@@ -200,7 +202,7 @@ TEST(VolumeTest, DamageRateIsThatOfTheSheet) {
   for (int i = 0; i < kBrick; ++i) theta[i] = 5.0f + static_cast<float>(i);
   // So short that no cell reaches the cap.
   constexpr float kShort = 1e-3f;
-  const float high = DamageRow(theta.data(), omega.data(), rate, kShort, kDamageStart);
+  const float high = DamageRow(theta.data(), omega.data(), kBrick, rate, kShort, kDamageStart);
   EXPECT_EQ(omega[0], 0.0f);
   for (int i = 1; i < kBrick; ++i) EXPECT_NEAR(omega[i] / (kShort * table.At(theta[i])), 1.0f, 2e-3f) << theta[i];
   EXPECT_EQ(high, omega[kBrick - 1]);
@@ -287,9 +289,9 @@ TEST(VolumeTest, StructuresAreAsWarmAsTheVolumeAtTheirDepth) {
 TEST(VolumeTest, SleepingTissueKeepsItsBurn) {
   const Sheet sheet = SheetOfBricks(2, 2, 1e-4f);
   VolumeField volume(sheet, ThermalParams{});
-  Brick* brick = volume.Wake(1, 0, 10, 20, 8);
+  Brick* brick = volume.Wake(1, 0, {16, 32, 10, 20, 8});
   // 12 layers of 150 um at 60 C for 10 s: omega about 2.9; below them cold.
-  volume.Wake(1, 0, 0, kBrick, 12);
+  volume.Wake(1, 0, {0, kBrick, 0, kBrick, 12});
   for (int k = 0; k < 12; ++k) {
     for (int n = 0; n < kColumns; ++n) brick->enthalpy[k * kColumns + n] = 23.0f;
   }
