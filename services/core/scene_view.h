@@ -68,7 +68,8 @@ struct ThermalParams {
   float v_max_V = 350.0f;
   float i_max_A = 2.0f;
   float hook_radius_m = 0.0005f;
-  float shrink_max = 0.3f;  ///< Rest length lost at full collagen damage.
+  float shrink_max = 0.3f;   ///< Rest length lost at full collagen damage.
+  std::uint32_t volume = 0;  ///< 1: heat and damage are computed in depth, too; h_below_W_m2K is then not used.
 };
 
 /// Section `breathing`: to-and-fro of the abdominal wall and what else of the surroundings breathes;

@@ -112,6 +112,7 @@ void ReadThermal(StrictMap map, ThermalParams* t) {
   ReadSi(&map, "i_max_A", Range::Between(0.001, 100), &t->i_max_A);
   ReadSi(&map, "hook_radius_mm", Range::Between(0.01, 10), &t->hook_radius_m);
   ReadSi(&map, "shrink_max", Range::Between(0, 0.5), &t->shrink_max);
+  t->volume = map.Flag("volume", t->volume != 0) ? 1 : 0;
 }
 
 void ReadRender(StrictMap map, RenderParams* r) {

@@ -163,7 +163,8 @@ void CheckParameters(const SceneView& s) {
                {"thermal.v_max", t.v_max_V, 1, 1e4f},
                {"thermal.i_max", t.i_max_A, 1e-3f, 100},
                {"thermal.hook_radius", t.hook_radius_m, 1e-5f, 0.01f},
-               {"thermal.shrink_max", t.shrink_max, 0, 0.5f}});
+               {"thermal.shrink_max", t.shrink_max, 0, 0.5f},
+               {"thermal.volume", static_cast<float>(t.volume), 0, 1}});
   CheckBounds({{"render.width", static_cast<float>(r.width), 16, 7680},
                {"render.height", static_cast<float>(r.height), 16, 4320},
                {"render.rate", r.rate_Hz, 0.1f, 240},

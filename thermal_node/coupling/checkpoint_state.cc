@@ -1,5 +1,6 @@
 // Checkpoint layout of the thermal solver: a header, the potential's start value, the marks of the cut length,
-// protected structures, topology, then every tile that is not blank, each with only those arrays that hold anything.
+// protected structures, topology, then every tile that is not blank, each with only those arrays that hold anything,
+// then the bricks of the volume with the rows that hold anything.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -12,9 +13,11 @@ namespace fulcrum::thermal {
 namespace {
 
 /// Change it with the layout.
-constexpr std::uint64_t kLayout = 0x7468726d'00000002ull;
+constexpr std::uint64_t kLayout = 0x7468726d'00000003ull;
 /// Some hundred tiles with all their arrays; a session that cuts more than half a metre would need more.
 constexpr std::size_t kTileCapacity = std::size_t{24} << 20;
+/// Some thirty bricks burned to the bottom.
+constexpr std::size_t kVolumeCapacity = std::size_t{32} << 20;
 
 class Writer {
  public:
@@ -86,6 +89,80 @@ bool Plausible(const TileState& s, int index, const HeatField& field) {
   return true;
 }
 
+/// What is stored of a brick: its warm box, and the box of the rows that hold damage.
+struct BrickRecord {
+  std::int32_t index, awake;
+  WarmBox warm, damaged;
+};
+
+WarmBox DamagedBox(const Brick& brick) {
+  WarmBox box;
+  for (int k = 0; k < kLayers; ++k) {
+    for (int j = 0; j < kBrick; ++j) {
+      const float* row = &brick.omega[BrickIndex(0, j, k)];
+      if (std::none_of(row, row + kBrick, [](float omega) { return omega != 0.0f; })) continue;
+      box = {0, kBrick, std::min(box.row0, j), std::max(box.row1, j + 1), k + 1};
+    }
+  }
+  return box;
+}
+
+/// Calls visit(rows of a layer) for all layers of the box until it returns false.
+template <class Cells, class Visit>
+bool ForRows(const WarmBox& box, Cells& cells, const Visit& visit) {
+  if (box.empty()) return true;
+  for (int k = 0; k < box.layers; ++k) {
+    const auto count = static_cast<std::size_t>(box.row1 - box.row0) * kBrick;
+    if (!visit(std::span(&cells[BrickIndex(0, box.row0, k)], count))) return false;
+  }
+  return true;
+}
+
+bool IsValid(const WarmBox& box, int columns, int rows) {
+  const auto good = [](int value, int step) { return value >= 0 && value <= kBrick && value % step == 0; };
+  return good(box.col0, columns) && good(box.col1, columns) && good(box.row0, rows) && good(box.row1, rows) &&
+         (box.empty() || box.col0 < box.col1) && box.layers >= 0 && box.layers <= kLayers;
+}
+
+void PutVolume(const VolumeField& volume, Writer* writer) {
+  const std::vector<const Brick*> bricks = volume.Existing();
+  VolumeField::Totals totals = volume.totals();
+  totals.brick_count = static_cast<std::uint32_t>(bricks.size());
+  writer->PutValue(totals);
+  const auto put = [&](std::span<const float> rows) {
+    writer->Put(rows);
+    return true;
+  };
+  for (const Brick* brick : bricks) {
+    const BrickRecord record{brick->index, brick->awake ? 1 : 0, brick->box, DamagedBox(*brick)};
+    writer->PutValue(record);
+    ForRows(record.warm, brick->enthalpy, put);
+    ForRows(record.damaged, brick->omega, put);
+  }
+}
+
+bool GetVolume(Reader* reader, VolumeField* volume) {
+  VolumeField::Totals totals;
+  if (!reader->GetValue(&totals)) return false;
+  const auto get = [&](std::span<float> rows) { return reader->Get(rows); };
+  std::int32_t last = -1;
+  for (std::uint32_t n = 0; n < totals.brick_count; ++n) {
+    BrickRecord record;
+    if (!reader->GetValue(&record) || record.index <= last || record.index >= volume->brick_count() ||
+        !IsValid(record.warm, kBoxColumns, kBoxRows) || !IsValid(record.damaged, 1, 1)) {
+      return false;
+    }
+    last = record.index;
+    Brick* brick = volume->BeginRestore(record.index);
+    brick->box = record.warm;
+    brick->awake = record.awake != 0;
+    if (!ForRows(record.warm, brick->enthalpy, get) || !ForRows(record.damaged, brick->omega, get)) return false;
+    volume->FinishRestore(brick);
+  }
+  volume->RestoreTotals(totals);
+  return true;
+}
+
 /// Value of an array of FloatArrays that need not be stored.
 float DefaultOf(std::size_t array) { return array == 1 ? 1.0f : 0.0f; }
 
@@ -100,6 +177,7 @@ struct ThermalSolver::Header {
   float clock_s, protected_dt_s;
   std::uint32_t tile_count, mark_count, sample_count, structure_count;
   std::uint32_t node_bytes, edge_bytes, shrink_bytes, protected_warm;
+  std::uint64_t has_volume;
 
   [[nodiscard]] bool Finite() const {
     float sum = clock_s + protected_dt_s + memory.reported_cut_m;
@@ -113,7 +191,11 @@ std::size_t ThermalSolver::CheckpointCapacity(const SceneView& scene) {
   const std::size_t nodes = scene.membrane.node_count();
   const std::size_t fixed = (std::size_t{1} << 18) + 64 * scene.protected_points.size() + 4 * nodes;
   const Sheet sheet = MakeSheet(scene);
-  return fixed + std::min(kTileCapacity, sheet.tile_count() * (sizeof(TileState) + 64));
+  const std::size_t tiles = std::min(kTileCapacity, sheet.tile_count() * (sizeof(TileState) + 64));
+  if (scene.thermal.volume == 0) return fixed + tiles;
+  const std::size_t bricks = VolumeField(sheet, scene.thermal).brick_count();
+  constexpr std::size_t kBrickBytes = 2 * sizeof(float) * kBrickCells + 64;
+  return fixed + tiles + std::min(kVolumeCapacity, bricks * kBrickBytes + 128);
 }
 
 std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
@@ -140,6 +222,7 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   header.edge_bytes = static_cast<std::uint32_t>(bits.dead_edges.size());
   header.shrink_bytes = static_cast<std::uint32_t>(bits.shrink.size());
   header.protected_warm = protected_.warm() ? 1 : 0;
+  header.has_volume = volume_ != nullptr ? 1 : 0;
   writer.PutValue(header);
   SourceWindow::State window;
   source_.Export(&window);
@@ -166,6 +249,7 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
     }
     writer.Put(std::span<const std::uint8_t>(s.flags));
   }
+  if (volume_ != nullptr) PutVolume(*volume_, &writer);
   return writer.used();
 }
 
@@ -182,6 +266,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   TopologyBits bits = topology_.committed();
   if (header.node_bytes != bits.dead_nodes.size() || header.edge_bytes != bits.dead_edges.size() ||
       header.shrink_bytes != bits.shrink.size() || header.sample_count != protected_.samples().size() ||
+      header.has_volume != (volume_ != nullptr ? 1u : 0u) ||
       header.structure_count != protected_.alarm_state().size() || header.mark_count > (1u << 20) ||
       header.tile_count > static_cast<std::uint32_t>(field_.sheet().tile_count())) {
     return false;
@@ -222,6 +307,11 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
     state.awake = static_cast<std::uint8_t>(record[2]);
     state.tented = static_cast<std::uint8_t>(record[3]);
     field_.Restore(static_cast<int>(record[0]), state);
+  }
+  if (volume_ != nullptr && !GetVolume(&reader, volume_.get())) {
+    field_.Clear();
+    volume_->Clear();
+    return false;
   }
   frame_ = header.frame;
   topology_.Restore(header.revision, bits);

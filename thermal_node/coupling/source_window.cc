@@ -248,6 +248,17 @@ void SourceWindow::Deposit(float v2, float dt_s, float remove_theta, Ledger* led
   }
 }
 
+void SourceWindow::AddLeak(float v2, float dt_s) {
+  const float scale = v2 * dt_s;
+  for (int j = 0; j < kWindow; ++j) {
+    for (int i = 0; i < kWindow; ++i) {
+      const int k = j * kWindow + i;
+      const float volts = potential_.Voltage(i, j);
+      leak_V2s_[k] += tissue_[k] > 0.0f ? scale * volts * volts : 0.0f;
+    }
+  }
+}
+
 void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger) {
   const CellIndex middle = sheet_.CellOf(0.5f * (path.from + path.to));
   MoveTo({middle.ix - kWindow / 2, middle.iy - kWindow / 2});
@@ -261,6 +272,7 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   const float cells = (path.to - path.from).norm() / material_.cell_m;
   const float longest = std::max(duration_s / std::max(cells, 1.0f), 0.1f * min_step_s);
   const float shortest = std::min(min_step_s, longest);
+  leak_V2s_.fill(0);
   float t = 0, guess = shortest;
   while (t < duration_s) {
     const float at = std::min(t + 0.5f * guess, duration_s) / duration_s;
@@ -271,6 +283,7 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
     const float rest = duration_s - t;
     float dt = std::min(std::clamp(TimeToEvent(v2), shortest, longest), rest);
     if (rest - dt < 0.5f * shortest) dt = rest;  // no sliver at the end
+    if (keep_leak_ && !path.tented) AddLeak(v2, dt);
     Deposit(v2, dt, drive.remove_theta, ledger);
     SetSigma();
     ledger->joule += static_cast<double>(v2) * dt * solved.heat_S;

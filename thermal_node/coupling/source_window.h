@@ -44,6 +44,13 @@ class SourceWindow {
   /// Heats the sheet for `duration_s` while the tip moves along the path.
   void Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger);
 
+  /// Time integral of the squared potential against the tissue beneath, over the last Run [V^2 s]; cell (i, j) of the
+  /// window at j * kWindow + i, cell (0, 0) at corner(). 0 where nothing leaks: holes, a tented sheet. Only kept when
+  /// asked for.
+  [[nodiscard]] const std::array<float, kWindowCells>& leak_V2s() const { return leak_V2s_; }
+  [[nodiscard]] CellIndex corner() const { return corner_; }
+  void KeepLeak() { keep_leak_ = true; }
+
   [[nodiscard]] const SourceStats& stats() const { return stats_; }
   void ClearStats() { stats_ = {}; }
 
@@ -69,6 +76,7 @@ class SourceWindow {
   void SetSigma();
   [[nodiscard]] float TimeToEvent(float v2) const;
   void Deposit(float v2, float dt_s, float remove_theta, Ledger* ledger);
+  void AddLeak(float v2, float dt_s);
   void BoilRow(int j, float remove_theta, Ledger* ledger);
   template <class Visit>
   void ForTileRows(HeatField* field, const Visit& visit);
@@ -81,6 +89,8 @@ class SourceWindow {
   SurfaceMetric metric_;               ///< Under the tip; one for the whole window.
   std::array<float, 64> far_field_{};  ///< K1/(lambda K0) over distance [1/m].
   SourceStats stats_;
+  bool keep_leak_ = false;
+  alignas(64) std::array<float, kWindowCells> leak_V2s_{};
 
   alignas(64) std::array<float, kWindowCells> enthalpy_{}, water_{}, inverse_volume_{};
   alignas(64) std::array<float, kWindowCells> tissue_{};  ///< sigma wet at body temperature [S/m]; 0: no tissue.

@@ -15,11 +15,17 @@ constexpr int kSearchCells = 12;
 constexpr float kSteamQuiet_s = 0.2f, kCutQuiet_s = 0.1f, kQuarantineQuiet_s = 1.0f;
 constexpr float kCutReport_m = 5e-4f;  ///< A cut event per half millimetre.
 
+/// With the tissue beneath computed, the sheet's own sink to it goes.
+ThermalParams SheetParams(ThermalParams params) {
+  if (params.volume != 0) params.h_below_W_m2K = 0;
+  return params;
+}
+
 }  // namespace
 
 ThermalSolver::ThermalSolver(const SceneView& scene)
     : params_(scene.thermal),
-      material_(MakeMaterial(scene.thermal)),
+      material_(MakeMaterial(SheetParams(scene.thermal))),
       field_(MakeSheet(scene), material_),
       topology_(scene, field_.sheet()),
       damage_(material_.body_C),
@@ -27,11 +33,17 @@ ThermalSolver::ThermalSolver(const SceneView& scene)
       source_(material_, field_.sheet()) {
   events_.reserve(64);
   alarms_.reserve(16);
+  if (params_.volume != 0) {
+    volume_ = std::make_unique<VolumeField>(field_.sheet(), params_);
+    contact_ = std::make_unique<SheetContact>(material_, volume_->material());
+    source_.KeepLeak();
+  }
   figures_.highest_C = figures_.present_C = material_.body_C;
 }
 
 bool ThermalSolver::Idle(const TipInput& tip) const {
-  return !tip.active && field_.idle() && !topology_.staged() && !protected_.warm();
+  const bool below_idle = volume_ == nullptr || volume_->idle();
+  return !tip.active && field_.idle() && below_idle && !topology_.staged() && !protected_.warm();
 }
 
 void ThermalSolver::Step(const TipInput& tip, float dt_s) {
@@ -50,6 +62,7 @@ void ThermalSolver::Step(const TipInput& tip, float dt_s) {
   ApplySource(tip, dt_s, 0.0f, 0.5f);
   figures_.substeps = field_.Diffuse(dt_s, &ledger_);
   ApplySource(tip, dt_s, 0.5f, 1.0f);
+  UpdateVolume(dt_s);
   UpdateDamage(dt_s);
   UpdateTopology();
   UpdateProtected(dt_s);
@@ -68,6 +81,24 @@ void ThermalSolver::ApplySource(const TipInput& tip, float dt_s, float from, flo
   part.from = tip.path.from + from * (tip.path.to - tip.path.from);
   part.to = tip.path.from + to * (tip.path.to - tip.path.from);
   source_.Run(&field_, part, MakeDrive(params_, tip.mode, tip.power_W), (to - from) * dt_s, &ledger_);
+  if (volume_ != nullptr) AddLeakHeat((to - from) * dt_s);
+}
+
+void ThermalSolver::AddLeakHeat(float duration_s) {
+  const CellIndex corner = source_.corner();
+  const float per_V2s = volume_->material().source_per_V2;
+  for (int j = 0; j < kWindow; ++j) {
+    for (int i = 0; i < kWindow; ++i) {
+      const float v2s = source_.leak_V2s()[j * kWindow + i];
+      if (v2s > 0.0f) volume_->AddSource({corner.ix + i, corner.iy + j}, per_V2s * v2s, duration_s);
+    }
+  }
+}
+
+void ThermalSolver::UpdateVolume(float dt_s) {
+  if (volume_ == nullptr) return;
+  contact_->Step(dt_s, &field_, volume_.get(), &ledger_);
+  figures_.burn_depth_m = volume_->deepest_burn_m();
 }
 
 void ThermalSolver::UpdateDamage(float dt_s) {
@@ -105,7 +136,7 @@ void ThermalSolver::UpdateProtected(float dt_s) {
   protected_dt_s_ += dt_s;
   if (frame_ % kProtectedFrames != 0) return;
   alarms_.clear();
-  protected_.Update(field_, damage_.cell_death(), std::exchange(protected_dt_s_, 0.0f), &alarms_);
+  protected_.Update(field_, volume_.get(), damage_.cell_death(), std::exchange(protected_dt_s_, 0.0f), &alarms_);
   for (const ProtectedAlarm& alarm : alarms_) {
     const bool ureter = alarm.kind == ProtectedKind::kUreter;
     const auto kind = alarm.injury ? (ureter ? ThermalEventKind::kUreterInjury : ThermalEventKind::kNerveInjury)
@@ -170,6 +201,7 @@ std::uint64_t ThermalSolver::TickHash() const {
     hash.AddValue(tile->index);
     hash.Add(std::span<const float>(tile->theta_sum));
   }
+  if (volume_ != nullptr) volume_->AddSums(&hash);
   hash.AddValue(topology_.revision());
   hash.AddValue(ledger_.joule);
   hash.AddValue(ledger_.Out());
@@ -191,6 +223,14 @@ std::uint64_t ThermalSolver::FullHash() const {
     hash.Add(std::span<const std::uint8_t>(s.flags));
     hash.AddValue(s.awake);
     hash.AddValue(s.tented);
+  }
+  if (volume_ != nullptr) {
+    for (const Brick* brick : volume_->Existing()) {
+      hash.AddValue(brick->index);
+      hash.AddValue(brick->awake);
+      hash.Add(std::span<const float>(brick->enthalpy));
+      hash.Add(std::span<const float>(brick->omega));
+    }
   }
   const TopologyBits& bits = topology_.committed();
   for (const auto* field : {&bits.dead_nodes, &bits.dead_edges, &bits.shrink}) {

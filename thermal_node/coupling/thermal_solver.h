@@ -15,6 +15,7 @@
 #include "thermal_node/damage/protected_structures.h"
 #include "thermal_node/heat/heat_field.h"
 #include "thermal_node/topology/mesh_topology.h"
+#include "thermal_node/volume/sheet_contact.h"
 
 namespace fulcrum::thermal {
 
@@ -36,6 +37,7 @@ struct SolverFigures {
   float present_C = 0;
   float power_W = 0;  ///< Of the generator, mean over the last frame.
   float voltage_V = 0;
+  float burn_depth_m = 0;  ///< Deepest dead tissue below the sheet since the start; 0 without a volume.
   std::uint32_t warnings = 0, injuries = 0;
   int substeps = 0, solves = 0, iterations = 0;
 };
@@ -58,6 +60,8 @@ class ThermalSolver {
 
   [[nodiscard]] const HeatField& field() const { return field_; }
   [[nodiscard]] HeatField* mutable_field() { return &field_; }
+  /// The tissue beneath; nullptr when the scene leaves it out.
+  [[nodiscard]] const VolumeField* volume() const { return volume_.get(); }
   [[nodiscard]] const MeshTopology& topology() const { return topology_; }
   [[nodiscard]] const Ledger& ledger() const { return ledger_; }
   [[nodiscard]] const SolverFigures& figures() const { return figures_; }
@@ -86,6 +90,8 @@ class ThermalSolver {
  private:
   struct Header;
   void ApplySource(const TipInput& tip, float dt_s, float from, float to);
+  void AddLeakHeat(float duration_s);
+  void UpdateVolume(float dt_s);
   void UpdateDamage(float dt_s);
   void QuarantineBadDamage(Tile* tile);
   void UpdateTopology();
@@ -110,6 +116,8 @@ class ThermalSolver {
   DamageModel damage_;
   ProtectedStructures protected_;
   SourceWindow source_;
+  std::unique_ptr<VolumeField> volume_;  ///< Null: the tissue beneath is a boundary condition.
+  std::unique_ptr<SheetContact> contact_;
   CutMeter cut_meter_;
   Ledger ledger_;
   SolverFigures figures_;

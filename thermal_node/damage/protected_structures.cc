@@ -50,23 +50,29 @@ float ProtectedStructures::MeanTheta(const HeatField& field, const Vec2f& at, fl
   return sum / static_cast<float>(count);
 }
 
-void ProtectedStructures::Update(const HeatField& field, const DamageRate& cell_death, float dt_s,
-                                 std::vector<ProtectedAlarm>* alarms) {
+float ProtectedStructures::Lumped(const HeatField& field, const Vec2f& at, float depth_m, float before,
+                                  float dt_s) const {
+  const CellIndex cell = field.sheet().CellOf(at);
+  const Tile* tile = field.Find(cell.ix / kTile, cell.iy / kTile);
+  const bool above_warm = tile != nullptr && tile->state.awake != 0;
+  if (!above_warm && before <= 0.0f) return 0;
+  const float above = above_warm ? std::exp(-depth_m / kAttenuationDepth_m) * MeanTheta(field, at, depth_m) : 0.0f;
+  const float tau = depth_m * depth_m / (2.0f * kFatDiffusivity_m2_s);
+  const float theta = above + (before - above) * std::exp(-dt_s / tau);
+  return theta < 0.01f && !above_warm ? 0.0f : theta;
+}
+
+void ProtectedStructures::Update(const HeatField& field, const VolumeField* volume, const DamageRate& cell_death,
+                                 float dt_s, std::vector<ProtectedAlarm>* alarms) {
   warm_ = false;
   for (std::size_t n = 0; n < samples_.size(); ++n) {
     ProtectedSample& sample = samples_[n];
     const Place& place = places_[n];
-    const CellIndex cell = field.sheet().CellOf(place.material);
-    const Tile* tile = field.Find(cell.ix / kTile, cell.iy / kTile);
-    const bool above_warm = tile != nullptr && tile->state.awake != 0;
-    if (!above_warm && sample.theta <= 0.0f) continue;
     const Structure& structure = structures_[place.structure];
-    const float above = above_warm ? std::exp(-structure.depth_m / kAttenuationDepth_m) *
-                                         MeanTheta(field, place.material, structure.depth_m)
-                                   : 0.0f;
-    const float tau = structure.depth_m * structure.depth_m / (2.0f * kFatDiffusivity_m2_s);
-    sample.theta = above + (sample.theta - above) * std::exp(-dt_s / tau);
-    if (sample.theta < 0.01f && !above_warm) sample.theta = 0;
+    const bool inside = volume != nullptr && structure.depth_m <= volume->material().depth_m();
+    sample.theta = inside ? volume->ThetaAt(place.material, structure.depth_m)
+                          : Lumped(field, place.material, structure.depth_m, sample.theta, dt_s);
+    if (sample.theta <= 0.0f) continue;
     if (sample.theta > 0.01f) warm_ = true;
     if (sample.theta >= kDamageStart) sample.omega += dt_s * cell_death.At(sample.theta);
     std::uint8_t& state = alarm_state_[place.structure];

@@ -7,6 +7,8 @@
 // <theta> is the mean over the sheet within one depth of the point (heat spreads as it goes down), delta the depth over
 // which perfusion eats a steady temperature, tau the time heat takes through the fat. A short pass over a deep
 // structure thus does not warm it, a long stay over a shallow one does.
+//
+// Where the tissue beneath is computed and reaches down to a structure, its temperature is that of the volume there.
 #pragma once
 
 #include <span>
@@ -15,6 +17,7 @@
 #include "services/core/scene_view.h"
 #include "thermal_node/damage/arrhenius.h"
 #include "thermal_node/heat/heat_field.h"
+#include "thermal_node/volume/volume_field.h"
 
 namespace fulcrum::thermal {
 
@@ -42,7 +45,9 @@ class ProtectedStructures {
   ProtectedStructures(const SceneView& scene, const HeatField& field);
 
   /// Advances by dt (any length) and appends alarms: each structure warns once and is injured once.
-  void Update(const HeatField& field, const DamageRate& cell_death, float dt_s, std::vector<ProtectedAlarm>* alarms);
+  /// @param volume the tissue beneath, or nullptr.
+  void Update(const HeatField& field, const VolumeField* volume, const DamageRate& cell_death, float dt_s,
+              std::vector<ProtectedAlarm>* alarms);
   /// True while a point is warmer than the sheet can have made it by chance.
   [[nodiscard]] bool warm() const { return warm_; }
 
@@ -54,6 +59,8 @@ class ProtectedStructures {
   void set_warm(bool warm) { warm_ = warm; }
 
  private:
+  /// Temperature of the sheet's lumped model after dt, from `before` [K].
+  [[nodiscard]] float Lumped(const HeatField& field, const Vec2f& at, float depth_m, float before, float dt_s) const;
   [[nodiscard]] float MeanTheta(const HeatField& field, const Vec2f& at, float radius) const;
 
   struct Structure {

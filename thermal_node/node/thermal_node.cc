@@ -145,6 +145,7 @@ void ThermalNode::FillHealth(Health* health) const {
   health->metrics = {{"highest_temperature_C", f.solver.highest_C},
                      {"temperature_C", f.solver.present_C},
                      {"cut_length_mm", 1e3 * f.cut_length_m},
+                     {"burn_depth_mm", 1e3 * f.solver.burn_depth_m},
                      {"dead_edges", static_cast<double>(f.dead_edges)},
                      {"dead_nodes", static_cast<double>(f.dead_nodes)},
                      {"warnings", static_cast<double>(f.solver.warnings)},

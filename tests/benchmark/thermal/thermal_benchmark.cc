@@ -5,6 +5,7 @@
 #include "services/runtime/realtime.h"
 #include "tests/benchmark/thermal/picture.h"
 #include "tests/benchmark/thermal/thermal_cases.h"
+#include "tests/benchmark/thermal/volume_case.h"
 
 namespace fulcrum::thermal {
 
@@ -25,5 +26,6 @@ int main(int argc, char** argv) {
   fulcrum::thermal::HeatCases(&report);
   fulcrum::thermal::PotentialCases(&report);
   fulcrum::thermal::PublishedCases(&report);
+  fulcrum::thermal::BenchmarkVolume(&report);
   return 0;
 }

@@ -140,6 +140,7 @@ const Rule kRules[] = {
     {"StructureLists", "t: [0, 0.3, 0.6, 1]", "t: [0, 1]", {"structures", "as many entries as s"}},
     {"StructureKind", "kind: ureter", "kind: artery", {"structures", "nerve"}},
     {"Camera", "fov_deg: 60", "fov_deg: 400", {"render.fov_deg", "10 to 150"}},
+    {"VolumeIsNoNumber", "cell_um: 100", "volume: deep", {"thermal.volume"}},
     {"Temperature", "cell_um: 100", "body_temperature_C: 370", {"thermal.body_temperature_C", "0 to 60"}},
     {"NodeName", "name: small", "name: small\nnodes: [physics_nod]", {"nodes", "physics_nod", "valid: handle_bridge"}},
     {"BreathingTooDeep", "thermal:", "breathing: {amplitude_mm: 80}\nthermal:", {"breathing.amplitude_mm", "0 to 50"}},
@@ -207,6 +208,15 @@ TEST(SceneYaml, BreathingIsOptionalAndCompiled) {
   EXPECT_EQ(BuildProcedural(ParseSceneYaml(read.effective_yaml, "x.yaml", {}).settings).fixed.hash, scene.fixed.hash);
   const std::string in_paper = Refusal(With(breathing, "mode: accurate", "mode: paper"));
   EXPECT_NE(in_paper.find("breathing.amplitude_mm: needs physics.mode"), std::string::npos) << in_paper;
+}
+
+TEST(SceneYaml, VolumeIsASwitchAndCompiled) {
+  const std::string small = TextOf(kScenes / "small.yaml");
+  EXPECT_EQ(ParseSceneYaml(small, "x.yaml", {}).settings.thermal.volume, 0u);
+  const SceneDescription read = ParseSceneYaml(With(small, "thermal:", "thermal:\n  volume: true"), "x.yaml", {});
+  EXPECT_EQ(read.settings.thermal.volume, 1u);
+  EXPECT_NE(read.effective_yaml.find("volume: true"), std::string::npos);
+  EXPECT_EQ(ParseSceneYaml(read.effective_yaml, "x.yaml", {}).settings.thermal.volume, 1u);
 }
 
 TEST(SceneYaml, NodesCanBeChosen) {

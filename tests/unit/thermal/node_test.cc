@@ -145,6 +145,7 @@ TEST_F(ThermalNodeTest, CutGivesTopologyEventsPatchesAndMetrics) {
   };
   EXPECT_NEAR(metric("highest_temperature_C"), 100, 10);
   EXPECT_NEAR(metric("cut_length_mm"), 10, 1);
+  EXPECT_EQ(metric("burn_depth_mm"), 0);
   EXPECT_GT(metric("dead_edges"), 20);
   EXPECT_EQ(metric("warnings"), 0);
   EXPECT_EQ(metric("injuries"), 0);

@@ -1,0 +1,36 @@
+// The fat lies against the sheet: heat goes between the sheet's cells and the columns of the volume beneath them.
+//
+// Two columns lie under three cells of the sheet, along s and along t. Each pair of a cell and a column exchanges
+// g A (theta_cell - theta_column), A the area they share, g the series of half the sheet and half a layer; so both stay
+// within the temperatures they had and what leaves one enters the other. No contact at holes and where the sheet is
+// tented.
+#pragma once
+
+#include "thermal_node/heat/heat_field.h"
+#include "thermal_node/volume/volume_field.h"
+
+namespace fulcrum::thermal {
+
+class SheetContact {
+ public:
+  explicit SheetContact(const Material& sheet, const VolumeMaterial& volume);
+
+  /// One step of the volume with its contact to the sheet, substepped by the faster of both. What goes down is booked
+  /// as lost by the sheet. Returns the number of substeps; 0: all cold.
+  int Step(float dt_s, HeatField* sheet, VolumeField* volume, Ledger* ledger) const;
+
+ private:
+  /// Warm tissue on one side wakes the other.
+  void Wake(HeatField* sheet, VolumeField* volume) const;
+  void WakeSheetAbove(const Brick& brick, HeatField* sheet) const;
+  /// Takes dt of heat from or to the sheet above the brick and sets the brick's lid to match.
+  void Exchange(float dt_s, HeatField* sheet, const VolumeMaterial& volume, Brick* brick) const;
+  /// g of a cell of the sheet [W/m^2K].
+  [[nodiscard]] float Conductance(const Tile& tile, int cell) const;
+
+  const Material& sheet_material_;
+  float half_layer_ = 0;  ///< Resistance of half a layer of the volume [m^2K/W].
+  float rate_ = 0;        ///< Largest of the exchange, seen from the sheet [1/s].
+};
+
+}  // namespace fulcrum::thermal
