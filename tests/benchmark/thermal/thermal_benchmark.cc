@@ -12,6 +12,7 @@
 #include "services/scene/build.h"
 #include "tests/benchmark/report.h"
 #include "tests/benchmark/thermal/picture.h"
+#include "tests/benchmark/thermal/work_precision.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "tests/numerics/thermal/heat_cases.h"
 #include "tests/numerics/thermal/moving_gaussian.h"
@@ -175,5 +176,6 @@ int main(int argc, char** argv) {
   Orders(&report);
   PotentialWindow(&report);
   Idle(&report);
+  WorkPrecision(&report);
   return 0;
 }
