@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <type_traits>
+#include <utility>
 
 #include "thermal_node/coupling/thermal_solver.h"
 
@@ -12,6 +13,8 @@ namespace {
 
 /// Change it with the layout.
 constexpr std::uint64_t kLayout = 0x7468726d'00000002ull;
+/// A checkpoint of one model is none of another.
+constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
 /// Some hundred tiles with all their arrays; a session that cuts more than half a metre would need more.
 constexpr std::size_t kTileCapacity = std::size_t{24} << 20;
 
@@ -83,14 +86,15 @@ std::size_t ThermalSolver::CheckpointCapacity(const SceneView& scene) {
   const std::size_t nodes = scene.membrane.node_count();
   const std::size_t fixed = (std::size_t{1} << 18) + 64 * scene.protected_points.size() + 4 * nodes;
   const Sheet sheet = MakeSheet(scene);
-  return fixed + std::min(kTileCapacity, sheet.tile_count() * (sizeof(TileState) + 64));
+  const std::size_t paper = scene.thermal.model == ThermalModel::kPaper ? TexturePotential::StateBytes() : 0;
+  return fixed + paper + std::min(kTileCapacity, sheet.tile_count() * (sizeof(TileState) + 64));
 }
 
 std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   const std::vector<const Tile*> tiles = field_.Existing();
   Writer writer(out);
   Header header{};
-  header.layout = kLayout;
+  header.layout = LayoutOf(params_.model);
   header.frame = frame_;
   header.revision = topology_.revision();
   header.quarantined = field_.quarantined();
@@ -113,6 +117,10 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   SourceWindow::State window;
   source_.Export(&window);
   writer.PutValue(window);
+  if (paper_ != nullptr) {
+    writer.PutValue(paper_->corner());
+    writer.Put(std::as_const(*paper_).potential());
+  }
   writer.Put(std::span<const CutMeter::Mark>(cut_meter_.marks()));
   writer.Put(protected_.samples());
   writer.Put(protected_.alarm_state());
@@ -142,7 +150,10 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   Reader reader(bytes);
   Header header;
   SourceWindow::State window;
-  if (!reader.GetValue(&header) || header.layout != kLayout || !reader.GetValue(&window)) return false;
+  if (!reader.GetValue(&header) || header.layout != LayoutOf(params_.model) || !reader.GetValue(&window)) return false;
+  CellIndex paper_corner;
+  std::vector<float> paper_potential(paper_ != nullptr ? paper_->potential().size() : 0);
+  if (paper_ != nullptr && (!reader.GetValue(&paper_corner) || !reader.Get(std::span(paper_potential)))) return false;
   TopologyBits bits = topology_.committed();
   if (header.node_bytes != bits.dead_nodes.size() || header.edge_bytes != bits.dead_edges.size() ||
       header.shrink_bytes != bits.shrink.size() || header.sample_count != protected_.samples().size() ||
@@ -187,6 +198,10 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   clock_s_ = header.clock_s;
   protected_dt_s_ = header.protected_dt_s;
   source_.Import(window);
+  if (paper_ != nullptr) {
+    paper_->set_corner(paper_corner);
+    std::copy(paper_potential.begin(), paper_potential.end(), paper_->potential().begin());
+  }
   std::copy(samples.begin(), samples.end(), protected_.samples().begin());
   std::copy(alarm_state.begin(), alarm_state.end(), protected_.alarm_state().begin());
   protected_.set_warm(header.protected_warm != 0);

@@ -11,6 +11,7 @@
 #include "services/runtime/realtime.h"
 #include "services/scene/build.h"
 #include "tests/benchmark/report.h"
+#include "tests/benchmark/thermal/paper_cases.h"
 #include "tests/benchmark/thermal/picture.h"
 #include "tests/benchmark/thermal/work_precision.h"
 #include "tests/numerics/thermal/flat_scene.h"
@@ -177,5 +178,6 @@ int main(int argc, char** argv) {
   PotentialWindow(&report);
   Idle(&report);
   WorkPrecision(&report);
+  PaperCases(&report);
   return 0;
 }
