@@ -11,9 +11,17 @@ namespace {
 
 constexpr int kTextureTiles = kTexture / kTile;
 
+/// Adds scale * heat, as far as `limit` lets it, and what was added to `sum`.
 FULCRUM_WIDE
-void AddHeat(float scale, const float* __restrict heat, float* __restrict enthalpy) {
-  for (int i = 0; i < kTile; ++i) enthalpy[i] += scale * heat[i];
+void AddHeat(float scale, float limit, const float* __restrict heat, float* __restrict enthalpy,
+             float* __restrict sum) {
+  for (int i = 0; i < kTile; ++i) {
+    const float asked = scale * heat[i], room = limit - enthalpy[i];
+    const float most = room > 0.0f ? room : 0.0f;
+    const float added = asked < most ? asked : most;
+    enthalpy[i] += added;
+    sum[i] += added;
+  }
 }
 
 /// Node positions on the far border belong to the last cell, not to one beyond the sheet.
@@ -112,6 +120,7 @@ void PaperModel::Heat(HeatField* field, const Electrode& electrode, float dt_s, 
   PlaceElectrode(sheet, electrode);
   potential_.Relax(kPaperSweeps);
   const float sheet_S = material.sigma * material.thickness_m;
+  const float limit = kPaperThetaMax * material.rc_wet;
   const float watt = sheet_S * electrode.voltage_V * electrode.voltage_V;  // at a conductance of 1
   ledger->generator += static_cast<double>(watt) * dt_s * potential_.TakeConductance();
   for (int ty = 0; ty < kTextureTiles; ++ty) {
@@ -124,13 +133,14 @@ void PaperModel::Heat(HeatField* field, const Electrode& electrode, float dt_s, 
       Tile* tile = ix >= 0 && iy >= 0 ? field->Wake(ix / kTile, iy / kTile) : nullptr;
       if (tile == nullptr) continue;
       tile->state.tented = electrode.tented ? 1 : 0;
-      double sum = 0;
+      alignas(64) std::array<float, kTile> sum{};
+      const float scale = watt * dt_s / tile->volume;
       for (int j = 0; j < kTile; ++j) {
-        const float* row = &heat[j * kTexture + tx * kTile];
-        AddHeat(watt * dt_s / tile->volume, row, &tile->state.enthalpy[j * kTile]);
-        for (int i = 0; i < kTile; ++i) sum += row[i];
+        AddHeat(scale, limit, &heat[j * kTexture + tx * kTile], &tile->state.enthalpy[j * kTile], sum.data());
       }
-      ledger->joule += static_cast<double>(watt) * dt_s * sum;
+      double added = 0;
+      for (const float s : sum) added += s;
+      ledger->joule += added * tile->volume;
       field->RefreshTheta(tile, ledger);
     }
   }

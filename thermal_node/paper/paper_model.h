@@ -19,6 +19,8 @@ namespace fulcrum::thermal {
 
 /// Table 2's diffusivity read in mm^2/s. As printed, in SI, it is some 4.5 million times that of tissue.
 inline constexpr float kPaperDiffusivity_m2_s = 4.5f * 1.26e-7f;
+/// No texel is heated beyond this [K]: between nodes that live on nothing else would end it, and messages carry 3000 C.
+inline constexpr float kPaperThetaMax = 2500.0f;
 inline constexpr int kPaperSweeps = 32;  ///< Jacobi sweeps a frame; our choice, the paper's is not known.
 
 /// Constant material without water: nothing boils, the conductivities follow neither temperature nor dryness, no leak.

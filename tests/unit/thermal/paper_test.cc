@@ -131,8 +131,9 @@ TEST(PaperModelTest, StaysFiniteUnderAbsurdInput) {
     }
     solver.Step(tip, frame % 7 == 0 ? 0.1f : kDt);
     ExpectFinite(solver);
+    ASSERT_LE(solver.figures().present_C, 3000.0f);  // what the messages let through
   }
-  EXPECT_GE(solver.field().quarantined(), 2u);
+  EXPECT_EQ(solver.field().quarantined(), 2u);
   EXPECT_GT(solver.topology().dead_node_count(), 50u);
 }
 
