@@ -24,7 +24,8 @@ scene::SceneData PaperScene() {
 Drag Along(float t_m) {
   Drag drag;
   drag.from = {0.0103f, t_m};
-  drag.to = {0.0253f, t_m};
+  drag.to = {0.0203f, t_m};
+  drag.speed_m_s = 0.01f;
   return drag;
 }
 
@@ -50,9 +51,9 @@ TEST(PaperModelTest, CutKillsNodesAndShrinksEdgesOncePerInvalidEnd) {
   RunDrag(Along(0.0101f), kDt, &solver);
   for (int n = 0; n < kCommitFrames; ++n) solver.Step({}, kDt);
   const TopologyBits& bits = solver.topology().committed();
-  EXPECT_GT(solver.topology().dead_node_count(), 10u);
-  EXPECT_GT(solver.cut_length_m(), 0.012f);
-  EXPECT_NEAR(solver.figures().present_C, 60.0f, 45.0f);
+  EXPECT_GE(solver.topology().dead_node_count(), 9u);
+  EXPECT_GT(solver.cut_length_m(), 0.008f);
+  EXPECT_GT(solver.figures().highest_C, kBoiling_C);  // nothing boils, so nothing holds it there
   constexpr std::array kLeft{1.0f, 0.7f, 0.49f};
   int once = 0, twice = 0;
   for (std::size_t e = 0; e < scene.membrane_rest_length.size(); ++e) {
@@ -158,7 +159,7 @@ TEST(PaperModelTest, RestartContinuesBitForBitAndOnlyItsOwnModel) {
     }
     return solver->FullHash();
   };
-  EXPECT_EQ(run(-1), run(100));
+  EXPECT_EQ(run(-1), run(50));
 }
 
 }  // namespace
