@@ -176,7 +176,7 @@ struct TopologyState {
   std::vector<std::uint8_t> dead_edges;  ///< Bit field, 3 * rows * cols bits.
   std::vector<std::uint8_t> shrink;      ///< Per edge: rest length is scaled by 1 - kShrinkUnit * value.
 };
-inline constexpr float kShrinkUnit = 0.5f / 255.0f;
+inline constexpr float kShrinkUnit = 0.002f;
 
 inline bool TestBit(std::span<const std::uint8_t> bits, std::size_t i) { return (bits[i >> 3] >> (i & 7u)) & 1u; }
 inline void SetBit(std::span<std::uint8_t> bits, std::size_t i) {

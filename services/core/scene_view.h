@@ -48,8 +48,12 @@ struct PhysicsParams {
   float grip_force_N = 8.0f;      ///< Slips above this traction.
 };
 
+/// What thermal_node computes; thermal_node/DESIGN.md.
+enum class ThermalModel : std::uint32_t { kAccurate = 0, kPaper = 1 };
+
 /// Section `thermal`. Defaults: peritoneum on fat, lab values.
 struct ThermalParams {
+  ThermalModel model = ThermalModel::kAccurate;
   float cell_m = 1.0e-4f;
   float thickness_m = 3.0e-4f;
   float density_kg_m3 = 1050.0f;

@@ -93,6 +93,7 @@ void ReadPhysics(StrictMap map, PhysicsParams* p) {
 }
 
 void ReadThermal(StrictMap map, ThermalParams* t) {
+  t->model = map.Choice("model", t->model, {{"accurate", ThermalModel::kAccurate}, {"paper", ThermalModel::kPaper}});
   ReadSi(&map, "cell_um", Range::Between(10, 10000), &t->cell_m);
   ReadSi(&map, "thickness_mm", Range::Between(0.01, 10), &t->thickness_m);
   ReadSi(&map, "density_kg_m3", Range::Between(1, 1e5), &t->density_kg_m3);

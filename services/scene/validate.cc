@@ -145,6 +145,9 @@ void CheckParameters(const SceneView& s) {
                {"physics.grasp_close", p.grasp_close_rad, 0, 1.5f},
                {"physics.grasp_open", p.grasp_open_rad, p.grasp_close_rad, 1.6f},
                {"physics.grip_force", p.grip_force_N, 0, 1000}});
+  if (t.model > ThermalModel::kPaper) {
+    Fail("scene", "thermal.model = ", static_cast<std::uint32_t>(t.model), "; valid: 0 (accurate), 1 (paper)");
+  }
   CheckBounds({{"thermal.cell", t.cell_m, 1e-5f, 0.01f},
                {"thermal.thickness", t.thickness_m, 1e-5f, 0.01f},
                {"thermal.density", t.density_kg_m3, 1, 1e5f},

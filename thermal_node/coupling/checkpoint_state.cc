@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <type_traits>
+#include <utility>
 
 #include "thermal_node/coupling/thermal_solver.h"
 
@@ -14,6 +15,8 @@ namespace {
 
 /// Change it with the layout.
 constexpr std::uint64_t kLayout = 0x7468726d'00000003ull;
+/// A checkpoint of one model is none of another.
+constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
 /// Some hundred tiles with all their arrays; a session that cuts more than half a metre would need more.
 constexpr std::size_t kTileCapacity = std::size_t{24} << 20;
 /// Some thirty bricks burned to the bottom.
@@ -192,6 +195,7 @@ std::size_t ThermalSolver::CheckpointCapacity(const SceneView& scene) {
   const std::size_t fixed = (std::size_t{1} << 18) + 64 * scene.protected_points.size() + 4 * nodes;
   const Sheet sheet = MakeSheet(scene);
   const std::size_t tiles = std::min(kTileCapacity, sheet.tile_count() * (sizeof(TileState) + 64));
+  if (scene.thermal.model == ThermalModel::kPaper) return fixed + tiles + TexturePotential::StateBytes();
   if (scene.thermal.volume == 0) return fixed + tiles;
   const std::size_t bricks = VolumeField(sheet, scene.thermal).brick_count();
   constexpr std::size_t kBrickBytes = 2 * sizeof(float) * kBrickCells + 64;
@@ -203,7 +207,7 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   const std::vector<const Tile*> tiles = field_.Existing();
   Writer writer(out);
   Header header{};
-  header.layout = kLayout;
+  header.layout = LayoutOf(params_.model);
   header.frame = frame_;
   header.revision = topology_.revision();
   header.quarantined = field_.quarantined();
@@ -227,6 +231,10 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   SourceWindow::State window;
   source_.Export(&window);
   writer.PutValue(window);
+  if (paper_ != nullptr) {
+    writer.PutValue(paper_->corner());
+    writer.Put(std::as_const(*paper_).potential());
+  }
   writer.Put(std::span<const CutMeter::Mark>(cut_meter_.marks()));
   writer.Put(protected_.samples());
   writer.Put(protected_.alarm_state());
@@ -257,12 +265,17 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   Reader reader(bytes);
   Header header;
   SourceWindow::State window;
-  if (!reader.GetValue(&header) || header.layout != kLayout || !header.Finite() || !reader.GetValue(&window))
+  if (!reader.GetValue(&header) || header.layout != LayoutOf(params_.model) || !header.Finite() ||
+      !reader.GetValue(&window)) {
     return false;
+  }
   if (!AllWithin(window.start, -2.0f, 2.0f) || std::abs(window.corner.ix) > -kNowhere.ix ||
       std::abs(window.corner.iy) > -kNowhere.iy) {
     return false;
   }
+  CellIndex paper_corner;
+  std::vector<float> paper_potential(paper_ != nullptr ? paper_->potential().size() : 0);
+  if (paper_ != nullptr && (!reader.GetValue(&paper_corner) || !reader.Get(std::span(paper_potential)))) return false;
   TopologyBits bits = topology_.committed();
   if (header.node_bytes != bits.dead_nodes.size() || header.edge_bytes != bits.dead_edges.size() ||
       header.shrink_bytes != bits.shrink.size() || header.sample_count != protected_.samples().size() ||
@@ -323,6 +336,10 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   clock_s_ = header.clock_s;
   protected_dt_s_ = header.protected_dt_s;
   source_.Import(window);
+  if (paper_ != nullptr) {
+    paper_->set_corner(paper_corner);
+    std::copy(paper_potential.begin(), paper_potential.end(), paper_->potential().begin());
+  }
   std::copy(samples.begin(), samples.end(), protected_.samples().begin());
   std::copy(alarm_state.begin(), alarm_state.end(), protected_.alarm_state().begin());
   protected_.set_warm(header.protected_warm != 0);

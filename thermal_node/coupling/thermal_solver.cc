@@ -25,15 +25,17 @@ ThermalParams SheetParams(ThermalParams params) {
 
 ThermalSolver::ThermalSolver(const SceneView& scene)
     : params_(scene.thermal),
-      material_(MakeMaterial(SheetParams(scene.thermal))),
+      material_(scene.thermal.model == ThermalModel::kPaper ? MakePaperMaterial(scene.thermal)
+                                                            : MakeMaterial(SheetParams(scene.thermal))),
       field_(MakeSheet(scene), material_),
       topology_(scene, field_.sheet()),
       damage_(material_.body_C),
       protected_(scene, field_),
       source_(material_, field_.sheet()) {
+  if (scene.thermal.model == ThermalModel::kPaper) paper_ = std::make_unique<PaperModel>(scene, field_.sheet());
   events_.reserve(64);
   alarms_.reserve(16);
-  if (params_.volume != 0) {
+  if (params_.volume != 0 && paper_ == nullptr) {
     volume_ = std::make_unique<VolumeField>(field_.sheet(), params_);
     contact_ = std::make_unique<SheetContact>(material_, volume_->material());
     source_.KeepLeak();
@@ -57,22 +59,39 @@ void ThermalSolver::Step(const TipInput& tip, float dt_s) {
   }
   ++frame_;
   clock_s_ += dt_s;
-  source_.ClearStats();
   const double before_J = ledger_.generator;
+  paper_ == nullptr ? AccurateFrame(tip, dt_s) : PaperFrame(tip, dt_s);
+  UpdateProtected(dt_s);
+  figures_.power_W = static_cast<float>((ledger_.generator - before_J) / dt_s);
+  figures_.present_C = material_.body_C + field_.MaxTheta();
+  figures_.highest_C = std::max(figures_.highest_C, figures_.present_C);
+  ReportEvents(tip);
+}
+
+void ThermalSolver::AccurateFrame(const TipInput& tip, float dt_s) {
+  source_.ClearStats();
   ApplySource(tip, dt_s, 0.0f, 0.5f);
   figures_.substeps = field_.Diffuse(dt_s, &ledger_);
   ApplySource(tip, dt_s, 0.5f, 1.0f);
   UpdateVolume(dt_s);
   UpdateDamage(dt_s);
   UpdateTopology();
-  UpdateProtected(dt_s);
-  figures_.power_W = static_cast<float>((ledger_.generator - before_J) / dt_s);
   figures_.voltage_V = tip.active ? source_.stats().voltage_V : 0.0f;
   figures_.solves = source_.stats().solves;
   figures_.iterations = source_.stats().iterations;
-  figures_.present_C = material_.body_C + field_.MaxTheta();
-  figures_.highest_C = std::max(figures_.highest_C, figures_.present_C);
-  ReportEvents(tip);
+}
+
+void ThermalSolver::PaperFrame(const TipInput& tip, float dt_s) {
+  // The voltage is that of the mode, whatever power was asked.
+  const float voltage = tip.active ? MakeDrive(params_, tip.mode, tip.power_W).v_max_V : 0.0f;
+  if (tip.active) paper_->Heat(&field_, {tip.path.from, tip.path.radius_m, voltage, tip.path.tented}, dt_s, &ledger_);
+  figures_.substeps = field_.Diffuse(dt_s, &ledger_);
+  const RemovedBox removed = paper_->RemoveNodes(&field_, &topology_, &ledger_);
+  if (!removed.empty()) cut_meter_.Update(&field_, removed.low, removed.high);
+  committed_ = at_commit_frame() && topology_.Commit();
+  figures_.voltage_V = voltage;
+  figures_.solves = tip.active ? 1 : 0;
+  figures_.iterations = tip.active ? kPaperSweeps : 0;
 }
 
 void ThermalSolver::ApplySource(const TipInput& tip, float dt_s, float from, float to) {

@@ -1,4 +1,5 @@
-// Electrocautery of one membrane, frame by frame: half the source, conduction, half the source, damage, topology.
+// Electrocautery of one membrane, frame by frame: half the source, conduction, half the source, damage, topology. With
+// the scene's `thermal.model: paper`: the paper's source, conduction and node rule instead.
 #pragma once
 
 #include <array>
@@ -14,6 +15,7 @@
 #include "thermal_node/damage/arrhenius.h"
 #include "thermal_node/damage/protected_structures.h"
 #include "thermal_node/heat/heat_field.h"
+#include "thermal_node/paper/paper_model.h"
 #include "thermal_node/topology/mesh_topology.h"
 #include "thermal_node/volume/sheet_contact.h"
 
@@ -89,6 +91,8 @@ class ThermalSolver {
 
  private:
   struct Header;
+  void AccurateFrame(const TipInput& tip, float dt_s);
+  void PaperFrame(const TipInput& tip, float dt_s);
   void ApplySource(const TipInput& tip, float dt_s, float from, float to);
   void AddLeakHeat(float duration_s);
   void UpdateVolume(float dt_s);
@@ -118,6 +122,7 @@ class ThermalSolver {
   SourceWindow source_;
   std::unique_ptr<VolumeField> volume_;  ///< Null: the tissue beneath is a boundary condition.
   std::unique_ptr<SheetContact> contact_;
+  std::unique_ptr<PaperModel> paper_;  ///< Null in the accurate model.
   CutMeter cut_meter_;
   Ledger ledger_;
   SolverFigures figures_;

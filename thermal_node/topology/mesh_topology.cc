@@ -229,6 +229,16 @@ void MeshTopology::StageShrink(const HeatField& field, const Tile& tile) {
   }
 }
 
+void MeshTopology::StageInvalidNode(Index node) {
+  ForEdgesOfNode(node, [&](Index edge) {
+    if (!EdgeExists(edge)) return;
+    const float left = kInvalidShrink * (1.0f - kShrinkUnit * static_cast<float>(staged_.shrink[edge]));
+    staged_.shrink[edge] = static_cast<std::uint8_t>(std::min(255L, std::lround((1.0f - left) / kShrinkUnit)));
+    changed_ = true;
+  });
+  KillNode(node);
+}
+
 bool MeshTopology::Commit() {
   if (!changed_) return false;
   committed_ = staged_;

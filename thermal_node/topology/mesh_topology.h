@@ -19,6 +19,7 @@
 namespace fulcrum::thermal {
 
 inline constexpr float kBandHalfWidth = 0.25f;  ///< Of an edge's band, relative to its length.
+inline constexpr float kInvalidShrink = 0.7f;   ///< Of the paper: what is left of an edge's length per invalid end.
 inline constexpr int kShrinkStep = 4;           ///< Shrink moves in steps of 4 kShrinkUnit: 0.8 % of the rest length.
 
 /// The published arrays, packed as in the TopologyState message.
@@ -35,6 +36,9 @@ class MeshTopology {
   /// Shrink from collagen damage of the edges near the tile: L = L0 (1 - shrink_max (1 - exp(-Omega))), mean over the
   /// cells of the segment, once from the rest length and never back.
   void StageShrink(const HeatField& field, const Tile& tile);
+  /// The paper's rule: the node dies, and the rest length of every edge at it is cut to kInvalidShrink of what it was,
+  /// so once per end that has become invalid. Call once per node.
+  void StageInvalidNode(Index node);
   /// Makes what was staged visible. True when something changed: the revision is then one higher.
   bool Commit();
 

@@ -7,8 +7,8 @@
 #include "services/scene/build.h"
 #include "tests/benchmark/physics/baselines/mass_spring.h"
 #include "tests/benchmark/physics/baselines/projective_dynamics.h"
-#include "tests/benchmark/physics/work_precision_plot.h"
 #include "tests/benchmark/report.h"
+#include "tests/benchmark/work_precision_plot.h"
 #include "tests/numerics/physics/accurate_under_test.h"
 #include "tests/numerics/physics/paper_solver.h"
 #include "tests/numerics/physics/standard_case.h"
@@ -99,8 +99,8 @@ StandardErrors Median(const std::vector<StandardErrors>& all) {
 
 /// Measures one solver, prints its keys, returns its place in the plot. How the sheet folds hangs on the last bit, and
 /// the errors on the folds: told is the median of runs whose stiffness differs by some millionths.
-WorkPrecisionPoint Measure(const StandardCase& standard, const StandardCase::Reference& truth, const Entry& entry,
-                           benchmark::Report* report) {
+benchmark::WorkPrecisionPoint Measure(const StandardCase& standard, const StandardCase::Reference& truth,
+                                      const Entry& entry, benchmark::Report* report) {
   constexpr int kRuns = 5;
   constexpr float kOther = 1e-6f;
   const std::string stem = "physics." + entry.key + ".";
@@ -152,7 +152,7 @@ void RunAll(benchmark::Report* report) {
   }
   const StandardCase::Reference truth =
       standard.LoadReference(std::filesystem::path(FULCRUM_BIN_DIR).parent_path() / "out");
-  std::vector<WorkPrecisionPoint> points;
+  std::vector<benchmark::WorkPrecisionPoint> points;
   bool all = true;
   for (const Entry& entry : entries) {
     if (report->Wants("physics." + (entry.key.empty() ? "plot" : entry.key) + ".")) {
@@ -171,7 +171,7 @@ void RunAll(benchmark::Report* report) {
   const std::filesystem::path file =
       std::filesystem::path(folder != nullptr ? folder : FULCRUM_SOURCE_DIR "/out") / "physics_work_precision.svg";
   std::filesystem::create_directories(file.parent_path());
-  std::ofstream(file) << WorkPrecisionSvg(
+  std::ofstream(file) << benchmark::WorkPrecisionSvg(
       "Error against run time, built-in scene, one core",
       {"static: 30 mm hold, RMS over RMS displacement", "dynamic: the pull, RMS over RMS displacement"}, points);
   std::fprintf(stderr, "wrote %s\n", file.c_str());

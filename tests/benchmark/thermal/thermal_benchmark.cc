@@ -3,9 +3,11 @@
 #include <filesystem>
 
 #include "services/runtime/realtime.h"
+#include "tests/benchmark/thermal/paper_cases.h"
 #include "tests/benchmark/thermal/picture.h"
 #include "tests/benchmark/thermal/thermal_cases.h"
 #include "tests/benchmark/thermal/volume_case.h"
+#include "tests/benchmark/thermal/work_precision.h"
 
 namespace fulcrum::thermal {
 
@@ -27,5 +29,7 @@ int main(int argc, char** argv) {
   fulcrum::thermal::PotentialCases(&report);
   fulcrum::thermal::PublishedCases(&report);
   fulcrum::thermal::BenchmarkVolume(&report);
+  fulcrum::thermal::WorkPrecision(&report);
+  fulcrum::thermal::PaperCases(&report);
   return 0;
 }

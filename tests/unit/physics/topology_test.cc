@@ -77,7 +77,7 @@ TEST_F(Topology, ShrinkingShortensTheRestLength) {
   const Index edge = 3 * (4 * 17 + 4);
   state_.shrink[edge] = 255;
   EXPECT_EQ(model_.Apply(state_, &particles_), 1);
-  EXPECT_FLOAT_EQ(Rest(4 * 17 + 4, 0), 0.5f * scene_.membrane_rest_length[edge]);
+  EXPECT_FLOAT_EQ(Rest(4 * 17 + 4, 0), (1.0f - 255.0f * kShrinkUnit) * scene_.membrane_rest_length[edge]);
 }
 
 TEST_F(Topology, EverythingCanBeUndone) {

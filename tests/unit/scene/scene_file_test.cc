@@ -206,6 +206,7 @@ TEST(SceneValidation, EveryRuleRefusesAndNamesItsSection) {
       {"scene", "k_bending", [](SceneData& s) { s.fixed.physics.k_bending = kNan; }},
       {"scene", "thermal.cell", [](SceneData& s) { s.fixed.thermal.cell_m = -1; }},
       {"scene", "thermal.volume", [](SceneData& s) { s.fixed.thermal.volume = 2; }},
+      {"scene", "thermal.model", [](SceneData& s) { s.fixed.thermal.model = static_cast<ThermalModel>(2); }},
       {"scene", "render.width", [](SceneData& s) { s.fixed.render.width = 0; }},
       {"scene", "coordinate", [](SceneData& s) { s.fixed.render.scope_tip_W.x() = kNan; }},
       {"scene", "force_limit", [](SceneData& s) { s.fixed.haptics.force_limit_N = -3; }},

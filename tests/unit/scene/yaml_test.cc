@@ -142,6 +142,7 @@ const Rule kRules[] = {
     {"Camera", "fov_deg: 60", "fov_deg: 400", {"render.fov_deg", "10 to 150"}},
     {"VolumeIsNoNumber", "cell_um: 100", "volume: deep", {"thermal.volume"}},
     {"Temperature", "cell_um: 100", "body_temperature_C: 370", {"thermal.body_temperature_C", "0 to 60"}},
+    {"ThermalModel", "cell_um: 100", "model: textbook", {"thermal.model", "paper"}},
     {"NodeName", "name: small", "name: small\nnodes: [physics_nod]", {"nodes", "physics_nod", "valid: handle_bridge"}},
     {"BreathingTooDeep", "thermal:", "breathing: {amplitude_mm: 80}\nthermal:", {"breathing.amplitude_mm", "0 to 50"}},
     {"BreathingPeriod", "thermal:", "breathing: {period_s: 0}\nthermal:", {"breathing.period_s", "0.5 to 60"}},

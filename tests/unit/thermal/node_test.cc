@@ -179,6 +179,32 @@ TEST_F(ThermalNodeTest, RestartGoesOnWithTheSameTopologyAndHeat) {
   EXPECT_GT(later->revision, before->revision);
 }
 
+TEST_F(ThermalNodeTest, PaperModelRunsInTheSameNodeAndComesBack) {
+  scene_.thermal.model = ThermalModel::kPaper;
+  OpenCheckpoint();
+  auto node = MakeNode();
+  auto patches = patch_topic_.MakeInput(64);
+  Cut(node.get(), 0.010f, 0.016f);
+  const auto before = NewestTopology();
+  ASSERT_TRUE(before);
+  EXPECT_TRUE(TestBit(before->dead_nodes, 10 * 41 + 13));
+  TemperaturePatch patch;
+  ASSERT_TRUE(patches->TakeLatest(&patch));
+  const std::size_t texel = 4 * (102 * kPatchTexels + 130);
+  EXPECT_EQ(patch.texels[texel + 3], 0);
+  EXPECT_EQ(patch.texels[texel + 4 * kPatchTexels * 10 + 1], 0);  // no history of damage
+  node.reset();
+  OpenCheckpoint();
+  node = MakeNode();
+  EXPECT_TRUE(node->restored());
+  Advance(node.get());
+  const auto after = NewestTopology();
+  ASSERT_TRUE(after);
+  EXPECT_EQ(after->revision, before->revision);
+  EXPECT_EQ(after->dead_nodes, before->dead_nodes);
+  EXPECT_EQ(after->shrink, before->shrink);
+}
+
 TEST_F(ThermalNodeTest, IdleNodeSendsNothingButItsManifest) {
   auto patches = patch_topic_.MakeInput(4);
   auto node = MakeNode();

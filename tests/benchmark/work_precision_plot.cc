@@ -1,16 +1,16 @@
-#include "tests/benchmark/physics/work_precision_plot.h"
+#include "tests/benchmark/work_precision_plot.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 
-namespace fulcrum::physics {
+namespace fulcrum::benchmark {
 namespace {
 
 // Panel geometry [px].
 constexpr double kWidth = 600, kHeight = 520, kLeft = 64, kRight = 24, kTop = 72, kBottom = 52;
-constexpr double kLabelHeight = 13;
+constexpr double kLabelHeight = 13, kLegendLine = 17;
 constexpr double kCharacter = 6.1;  ///< Mean width of one at 11 px.
 constexpr std::array kColours{"#1b6ca8", "#c8501e", "#2e8540", "#7b4fa3", "#8a6d1a", "#555555", "#b3245b"};
 
@@ -66,6 +66,12 @@ class Svg {
   std::string out_;
 };
 
+/// Characters of a UTF-8 text.
+double Length(const std::string& text) {
+  const auto begins = [](char c) { return (static_cast<unsigned char>(c) & 0xc0u) != 0x80u; };
+  return static_cast<double>(std::count_if(text.begin(), text.end(), begins));
+}
+
 std::string Number(double value) {
   char text[32];
   std::snprintf(text, sizeof(text), "%.3g", value);
@@ -104,7 +110,7 @@ struct Box {
 /// Writes a label beside its point: right, left, above or below, further off until it is free.
 void DrawLabel(double px, double py, const std::string& label, const char* colour, const Axis& x,
                std::vector<Box>* taken, Svg* svg) {
-  const double width = kCharacter * static_cast<double>(label.size());
+  const double width = kCharacter * Length(label);
   for (double away = 0; away < 200; away += kLabelHeight / 2) {
     for (const auto& [dx, dy] : {std::pair{7.0, -away}, {7.0, away}, {-7.0 - width, -away}, {-7.0 - width, away}}) {
       const Box box{px + dx, py + dy - 9, px + dx + width, py + dy + 4};
@@ -121,10 +127,20 @@ void DrawLabel(double px, double py, const std::string& label, const char* colou
   }
 }
 
+/// Names of the families below the panels, one a line.
+void DrawLegend(const std::vector<std::string>& families, Svg* svg) {
+  for (std::size_t f = 0; f < families.size(); ++f) {
+    const char* colour = kColours[f % kColours.size()];
+    const double y = kHeight + kLegendLine * static_cast<double>(f) + 8;
+    svg->Circle(kLeft + 4, y - 4, colour);
+    svg->Text(kLeft + 14, y, "start", 12, colour, families[f]);
+  }
+}
+
 }  // namespace
 
 std::string WorkPrecisionSvg(const std::string& heading, const std::vector<std::string>& titles,
-                             std::vector<WorkPrecisionPoint> points) {
+                             std::vector<WorkPrecisionPoint> points, bool legend) {
   std::stable_sort(points.begin(), points.end(),
                    [](const WorkPrecisionPoint& a, const WorkPrecisionPoint& b) { return a.time_ms < b.time_ms; });
   std::vector<std::string> families;
@@ -138,8 +154,9 @@ std::string WorkPrecisionSvg(const std::string& heading, const std::vector<std::
     }
   }
   Svg svg;
+  const double height = kHeight + (legend ? kLegendLine * static_cast<double>(families.size()) + 4 : 0);
   const double width = kWidth * static_cast<double>(titles.size());
-  svg.Raw("<svg xmlns='http://www.w3.org/2000/svg' width='" + Number(width) + "' height='" + Number(kHeight) +
+  svg.Raw("<svg xmlns='http://www.w3.org/2000/svg' width='" + Number(width) + "' height='" + Number(height) +
           "' font-family='sans-serif'>\n<rect width='100%' height='100%' fill='white'/>\n");
   svg.Text(width / 2, 24, "middle", 16, "#111", heading);
   for (std::size_t panel = 0; panel < titles.size(); ++panel) {
@@ -189,8 +206,9 @@ std::string WorkPrecisionSvg(const std::string& heading, const std::vector<std::
       }
     }
   }
+  if (legend) DrawLegend(families, &svg);
   svg.Raw("</svg>\n");
   return svg.text();
 }
 
-}  // namespace fulcrum::physics
+}  // namespace fulcrum::benchmark

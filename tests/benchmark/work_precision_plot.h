@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace fulcrum::physics {
+namespace fulcrum::benchmark {
 
 struct WorkPrecisionPoint {
   std::string label;
@@ -14,8 +14,9 @@ struct WorkPrecisionPoint {
   std::vector<double> error_pct;  ///< One per panel; not positive or not finite: not drawn.
 };
 
-/// Panels stand side by side under `titles`.
+/// Panels stand side by side under `titles`. With a legend the families are named below; without, the labels must do
+/// that.
 [[nodiscard]] std::string WorkPrecisionSvg(const std::string& heading, const std::vector<std::string>& titles,
-                                           std::vector<WorkPrecisionPoint> points);
+                                           std::vector<WorkPrecisionPoint> points, bool legend = false);
 
-}  // namespace fulcrum::physics
+}  // namespace fulcrum::benchmark

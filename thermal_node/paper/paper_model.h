@@ -1,0 +1,75 @@
+// The paper's own model of cautery (its eq. 10 to 15), to run beside the accurate one: see "The paper's model" in
+// thermal_node/DESIGN.md for each equation, what is corrected knowingly and what is not known of it.
+//
+//   eq. 10, 14  conduction and sinks: HeatField with MakePaperMaterial
+//   eq. 12      q = sigma |grad V|^2: Joule heat of the sheet's current, over its thickness
+//   eq. 13      div grad V = 0 on a 256 x 256 texture around the tip, at a fixed voltage
+//   node rule   a node whose texel passes the vaporisation threshold goes, at once and without latent heat
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "services/core/scene_view.h"
+#include "thermal_node/heat/heat_field.h"
+#include "thermal_node/paper/texture_potential.h"
+#include "thermal_node/topology/mesh_topology.h"
+
+namespace fulcrum::thermal {
+
+/// Table 2's diffusivity read in mm^2/s. As printed, in SI, it is some 4.5 million times that of tissue.
+inline constexpr float kPaperDiffusivity_m2_s = 4.5f * 1.26e-7f;
+/// No texel is heated beyond this [K]: between nodes that live on nothing else would end it, and messages carry 3000 C.
+inline constexpr float kPaperThetaMax = 2500.0f;
+inline constexpr int kPaperSweeps = 32;  ///< Jacobi sweeps a frame; our choice, the paper's is not known.
+
+/// Constant material without water: nothing boils, the conductivities follow neither temperature nor dryness, no leak.
+/// Throws InputError as MakeMaterial does.
+[[nodiscard]] Material MakePaperMaterial(const ThermalParams& params);
+
+/// Cells that a call removed; `low` > `high` when none.
+struct RemovedBox {
+  CellIndex low{INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN};
+  [[nodiscard]] bool empty() const { return low.ix > high.ix; }
+};
+
+class PaperModel {
+ public:
+  PaperModel(const SceneView& scene, const Sheet& sheet);
+
+  struct Electrode {
+    Vec2f tip = Vec2f::Zero();  ///< Material coordinates [m].
+    float radius_m = 0;
+    float voltage_V = 0;
+    bool tented = false;
+  };
+  /// Heats the texture around a tip that stands for the whole step.
+  void Heat(HeatField* field, const Electrode& electrode, float dt_s, Ledger* ledger);
+  /// The node rule. A node takes the cells with it that lie nearer to it than to its neighbours in the grid.
+  [[nodiscard]] RemovedBox RemoveNodes(HeatField* field, MeshTopology* topology, Ledger* ledger);
+
+  /// For checkpoints: where the texture lies, and its potential.
+  [[nodiscard]] CellIndex corner() const { return corner_; }
+  [[nodiscard]] std::span<const float> potential() const { return potential_.state(); }
+  [[nodiscard]] std::span<float> potential() { return potential_.state(); }
+  void set_corner(CellIndex corner) { corner_ = corner; }
+
+ private:
+  void MoveTo(CellIndex corner);
+  void LoadTissue(const HeatField& field);
+  void PlaceElectrode(const Sheet& sheet, const Electrode& electrode);
+  [[nodiscard]] CellIndex CellOfNode(Index node) const;
+  void TakeOutCellsOf(Index node, HeatField* field, Ledger* ledger, RemovedBox* removed) const;
+  template <class Visit>
+  void ForNeighbours(Index node, const Visit& visit) const;
+
+  std::uint32_t rows_, cols_;
+  int nx_, ny_;
+  std::vector<Vec2f> node_;                   ///< Material position in cells from the sheet's origin.
+  std::vector<Index> bin_offset_, bin_node_;  ///< Nodes by the tile of their cell.
+  std::vector<Index> invalid_;                ///< Scratch.
+  TexturePotential potential_;
+  CellIndex corner_;
+};
+
+}  // namespace fulcrum::thermal
