@@ -88,7 +88,7 @@ void SecondStageSheared(Tile* tile, float dt_s, float gain, float loss) { Stage<
 /// theta with its column sums and extremes; rc = rc_dry + water * rc_water.
 FULCRUM_WIDE
 void ThetaOf(Tile* tile, float rc_dry, float rc_water) {
-  alignas(64) float sum[kTile] = {}, high[kTile] = {}, low[kTile] = {};
+  alignas(64) float sum[kTile] = {}, high[kTile] = {}, low[kTile] = {}, odd[kTile] = {};
   for (int j = 0; j < kTile; ++j) {
     float* __restrict t = &tile->theta[ThetaIndex(0, j)];
     const float* __restrict h = &tile->state.enthalpy[j * kTile];
@@ -99,11 +99,14 @@ void ThetaOf(Tile* tile, float rc_dry, float rc_water) {
       sum[i] += t[i] * area[i];
       high[i] = high[i] > t[i] ? high[i] : t[i];
       low[i] = low[i] < t[i] ? low[i] : t[i];
+      const float off = w[i] > 0.5f ? w[i] - 0.5f : 0.5f - w[i];
+      odd[i] = odd[i] > off ? odd[i] : off;
     }
   }
   std::copy_n(sum, kTile, tile->theta_sum.begin());
   tile->theta_max = *std::max_element(high, high + kTile);
   tile->theta_min = *std::min_element(low, low + kTile);
+  tile->water_off = *std::max_element(odd, odd + kTile);
 }
 
 /// A field of cells with the halo of theta.
@@ -377,7 +380,8 @@ void HeatField::RefreshTheta(Tile* tile, Ledger* ledger) {
   ComputeTheta(tile);
   float total = 0;
   for (const float s : tile->theta_sum) total += s;
-  if (!std::isfinite(total) || tile->theta_max > kThetaPlausible || tile->theta_min < -kThetaPlausible) {
+  if (!std::isfinite(total) || tile->theta_max > kThetaPlausible || tile->theta_min < -kThetaPlausible ||
+      tile->water_off > 0.5f) {
     Quarantine(tile, ledger);
   }
 }

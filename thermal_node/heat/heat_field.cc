@@ -83,7 +83,7 @@ void HeatField::RebuildStaleFaces() {
 void HeatField::Quarantine(Tile* tile, Ledger* ledger) {
   for (int cell = 0; cell < kTileCells; ++cell) {
     const float theta = tile->theta[ThetaIndex(cell % kTile, cell / kTile)];
-    const bool material_good = std::isfinite(tile->state.water[cell]);
+    const bool material_good = tile->state.water[cell] >= 0.0f && tile->state.water[cell] <= 1.0f;
     if (material_good && std::abs(theta) <= kThetaPlausible) continue;
     TakeOut(tile, cell, kQuarantined, &ledger->quarantined);
     ++quarantined_;

@@ -76,6 +76,7 @@ struct Tile {
   alignas(64) CellArray<float> cell_rate{};  ///< Rate of the explicit step with two-point fluxes in each cell [1/s].
   alignas(64) std::array<float, kTile> theta_sum{};  ///< Column sums of theta times area.
   float theta_max = 0, theta_min = 0;
+  float water_off = 0;         ///< Largest distance of the water from 0.5; above that it is no fraction.
   float rate = 0;              ///< The largest of cell_rate.
   bool material_stale = true;  ///< Its conductivity has changed.
   bool faces_stale = true;     ///< Its faces have to be built again.

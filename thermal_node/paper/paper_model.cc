@@ -11,16 +11,13 @@ namespace {
 
 constexpr int kTextureTiles = kTexture / kTile;
 
-/// Adds scale * heat, as far as `limit` lets it, and what was added to `sum`.
+/// Adds scale * heat, as far as `limit` lets it.
 FULCRUM_WIDE
-void AddHeat(float scale, float limit, const float* __restrict heat, float* __restrict enthalpy,
-             float* __restrict sum) {
+void AddHeat(float scale, float limit, const float* __restrict heat, float* __restrict enthalpy) {
   for (int i = 0; i < kTile; ++i) {
     const float asked = scale * heat[i], room = limit - enthalpy[i];
     const float most = room > 0.0f ? room : 0.0f;
-    const float added = asked < most ? asked : most;
-    enthalpy[i] += added;
-    sum[i] += added;
+    enthalpy[i] += asked < most ? asked : most;
   }
 }
 
@@ -133,14 +130,14 @@ void PaperModel::Heat(HeatField* field, const Electrode& electrode, float dt_s, 
       Tile* tile = ix >= 0 && iy >= 0 ? field->Wake(ix / kTile, iy / kTile) : nullptr;
       if (tile == nullptr) continue;
       tile->state.tented = electrode.tented ? 1 : 0;
-      alignas(64) std::array<float, kTile> sum{};
-      const float scale = watt * dt_s / tile->volume;
+      // The texture is flat, as in the paper; the ledger knows the sheet as it is.
+      const float scale = watt * dt_s / tile->flat_volume;
+      field->RefreshTheta(tile, ledger);  // Bad cells must not reach the ledger.
+      const double before = tile->Heat();
       for (int j = 0; j < kTile; ++j) {
-        AddHeat(scale, limit, &heat[j * kTexture + tx * kTile], &tile->state.enthalpy[j * kTile], sum.data());
+        AddHeat(scale, limit, &heat[j * kTexture + tx * kTile], &tile->state.enthalpy[j * kTile]);
       }
-      double added = 0;
-      for (const float s : sum) added += s;
-      ledger->joule += added * tile->volume;
+      ledger->joule += tile->Heat() - before;
       field->RefreshTheta(tile, ledger);
     }
   }

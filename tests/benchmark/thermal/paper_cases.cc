@@ -53,7 +53,7 @@ CutFigures Cut(ThermalModel model, const char* name) {
   for (int n = 0; n < kCommitFrames; ++n) solver.Step({}, kDt);
   double removed_m3 = 0;
   for (const Tile* tile : solver.field().Existing()) {
-    for (const std::uint8_t flags : tile->state.flags) removed_m3 += (flags & kRemoved) != 0 ? tile->volume : 0.0;
+    for (int k = 0; k < kTileCells; ++k) removed_m3 += (tile->state.flags[k] & kRemoved) != 0 ? tile->Volume(k) : 0.0;
   }
   return {.frame_ms_p50 = benchmark::Quantile(times, 0.5),
           .frame_ms_p99 = benchmark::Quantile(times, 0.99),

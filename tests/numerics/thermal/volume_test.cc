@@ -103,7 +103,10 @@ TEST(VolumeTest, MaximumPrincipleHoldsWithTheSheetAndLongSteps) {
   ThermalParams params;
   params.fat_depth_m = 2.1e-3f;  // fat above the wall of the rectum
   Sheet sheet = SheetOfBricks(2, 1, params.cell_m);
-  for (CellMetric& metric : sheet.metric) metric = {0.8f + 0.4f * uniform(random), 0.8f + 0.4f * uniform(random)};
+  SetMetric(&sheet, [&](const Vec2f&) {
+    const float s = 0.8f + 0.4f * uniform(random), t = 0.8f + 0.4f * uniform(random);
+    return SurfaceMetric{s * s, 0, t * t};
+  });
   Stack stack(std::move(sheet), params);
   double removed = 0;
   for (int n = 0; n < 9; ++n) {
@@ -138,7 +141,10 @@ TEST(VolumeTest, BothLedgersCloseAcrossBricksAndSleep) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> uniform(0.85f, 1.2f);
   Sheet sheet = SheetOfBricks(2, 2, 1e-4f);
-  for (CellMetric& metric : sheet.metric) metric = {uniform(random), uniform(random)};
+  SetMetric(&sheet, [&](const Vec2f&) {
+    const float s = uniform(random), t = uniform(random);
+    return SurfaceMetric{s * s, 0.1f * s * t, t * t};
+  });
   ThermalParams params;
   params.perfusion_per_s = 0.1f;  // cold again soon
   Stack stack(std::move(sheet), params);
