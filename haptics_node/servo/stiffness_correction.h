@@ -28,6 +28,8 @@ class StiffnessCorrection {
   /// @param predicted by it, for the time of the new message [N].
   /// @param reported reference force of the new message [N].
   void Learn(double start, double predicted, double reported) noexcept {
+    // No force where one was predicted is a surface that was taken to be nearer than it is.
+    if (!(std::abs(reported) > kReferenceNoise_N)) return;
     const double change = predicted - start;
     const double surprise = reported - predicted;
     const double noise = kReferenceNoise * std::abs(reported) + kReferenceNoise_N;

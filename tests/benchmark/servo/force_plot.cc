@@ -128,8 +128,9 @@ std::string ForceErrorSvg(const std::vector<ForcePanel>& panels) {
     at += 270;
   }
   for (std::size_t i = 0; i < panels.size(); ++i) {
-    const auto row = static_cast<double>(i / kColumns), column = static_cast<double>(i % kColumns);
-    DrawPanel(panels[i], column * kPanelWidth, kHead + row * kPanelHeight, &out);
+    const std::size_t row = i / kColumns, column = i % kColumns;
+    DrawPanel(panels[i], static_cast<double>(column) * kPanelWidth, kHead + static_cast<double>(row) * kPanelHeight,
+              &out);
   }
   out += "</svg>\n";
   return out;

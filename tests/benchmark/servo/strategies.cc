@@ -104,7 +104,7 @@ class GodObject final : public Baseline {
   }
   Vec3d Force(const Vec3d& tip, double age) override {
     const Vec3d seen = extrapolates_ ? Vec3d(tip - age * du_) : tip;
-    const Vec3d skin = FrozenSkin(seen);
+    Vec3d skin = FrozenSkin(seen);
     if (grasp_ || kt_ <= 0.0) return skin;
     const Vec3d stick = -kt_ * Tangent(seen - anchor_);
     const Vec3d drag = WithinCone(stick, skin.norm());

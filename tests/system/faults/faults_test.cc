@@ -68,7 +68,7 @@ scene::SceneSettings PullingScene() {
   scene::SceneSettings settings = scene::Small();
   constexpr double kOpen = 0.87;
   settings.script.clear();
-  const auto key = [&](int tool, double time_s, Vec2f sheet, double height_m, double jaw_rad) {
+  const auto key = [&](int tool, double time_s, const Vec2f& sheet, double height_m, double jaw_rad) {
     settings.script.push_back({.time_s = time_s,
                                .tool = tool,
                                .world_m = {},

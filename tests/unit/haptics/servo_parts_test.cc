@@ -237,6 +237,18 @@ TEST(Passivity, AnActiveSourceIsDampedOnceTheTankIsEmpty) {
   EXPECT_LE(given, kTank_J + 1e-3);
 }
 
+// Tissue that breathes against a hand that gives way does work on it, which physics declares.
+TEST(Passivity, PowerThatComesFromOutsideIsNotTheServosDebt) {
+  PassivityController declared, undeclared;
+  const Vec3d moved(1e-5, 0, 0), push(0.8, 0, 0);  // 8 mW.
+  for (int i = 0; i < 1000; ++i) {
+    EXPECT_EQ(declared.Step(push, push, moved, 0.0, 0.010, kDt), push);
+    (void)undeclared.Step(push, push, moved, 0.0, 0.0, kDt);
+  }
+  EXPECT_LT(undeclared.Step(push, push, moved, 0.0, 0.0, kDt).x(), 0.8 - 0.02);
+  EXPECT_GE(undeclared.Step(push, push, moved, 0.0, 0.0, kDt).x(), 0.8 - kMaxPassivityDamping_Ns_m * 0.01 - 1e-12);
+}
+
 TEST(Passivity, ASpringIsLeftAlone) {
   PassivityController controller;
   Vec3d sent = Vec3d::Zero();
@@ -282,6 +294,12 @@ TEST(StiffnessCorrection, NoiseOfTheReferenceForceMovesItLittle) {
 TEST(StiffnessCorrection, AHoldTeachesNothing) {
   StiffnessCorrection correction;
   for (int i = 0; i < 1000; ++i) correction.Learn(1.0, 1.0, i % 2 == 0 ? 1.02 : 0.98);
+  EXPECT_EQ(correction.scale(), 1.0);
+}
+
+TEST(StiffnessCorrection, ATouchThatWasPredictedTooEarlyTeachesNothing) {
+  StiffnessCorrection correction;
+  for (int i = 0; i < 10; ++i) correction.Learn(0.0, 0.05, 0.0);
   EXPECT_EQ(correction.scale(), 1.0);
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "haptics_node/device/simulated_device.h"
@@ -169,6 +170,37 @@ TEST(Servo, CouplingIsCappedWhereTheHandFeelsIt) {
           << "axis " << axis << ", pivot " << pivot.transpose();
     }
   }
+}
+
+TEST(Servo, TwoToolsPressTheirOwnTissue) {
+  SceneView scene = BenchScene(0.5);
+  scene.tools[1] = scene.tools[0];
+  GuidedDevice left(BenchTrocar(), [](double) { return Vec3d(0, 0, -0.004); });
+  GuidedDevice right(BenchTrocar(), [](double t) { return Vec3d(0, 0, 0.004 - 0.004 * t); });
+  Servo servo(scene, {&left, &right});
+  TestTissue soft({}), stiff({.k1 = 900, .k_body = 900, .b_body = 10});
+  std::uint64_t sequence = 0;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    const Tick tick = TickAt(i);
+    if (i % 10 == 0 && i > 0) {
+      ContactModel model;
+      model.stamp = {++sequence, 1, tick.stamp_ns};
+      model.tool_stamp_ns = TickAt(i - 1).stamp_ns;
+      model.devices[0].count = model.devices[1].count = 1;
+      model.devices[0].contacts[0] = soft.Report();
+      model.devices[1].contacts[0] = stiff.Report();
+      servo.OfferModel(model, tick.stamp_ns);
+    }
+    servo.Step(tick);
+    soft.Step(servo.record().tool.tools[0].p_WT.cast<double>(), tick.dt_s);
+    stiff.Step(servo.record().tool.tools[1].p_WT.cast<double>(), tick.dt_s);
+  }
+  for (const auto& [device, tissue] : {std::pair{&left, &soft}, std::pair{&right, &stiff}}) {
+    const double expected = 0.5 * tissue->force().z();
+    EXPECT_GT(expected, 0.3);
+    EXPECT_NEAR(device->force.z(), expected, 0.01 * expected);
+  }
+  EXPECT_GT((left.force - right.force).norm(), 0.1);
 }
 
 TEST(Servo, StallOfPhysicsFadesForcesAndBringsThemBackSoftly) {
