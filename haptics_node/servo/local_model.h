@@ -7,6 +7,8 @@
 
 #include "haptics_node/servo/contact_law.h"
 #include "haptics_node/servo/pose_ring.h"
+#include "haptics_node/servo/stiffness_correction.h"
+#include "haptics_node/servo/trocar.h"
 #include "services/core/hash.h"
 #include "services/core/messages.h"
 
@@ -20,7 +22,7 @@ inline constexpr std::int64_t kCrossFade_ns = 10'000'000;
 /// How tip stiffness becomes hand stiffness: k_hand = scale |J^T n|^2 k_tip.
 struct HandMapping {
   double force_scale = 1;
-  Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
+  TrocarPose pose;
 };
 
 struct ModelForce {
@@ -35,7 +37,8 @@ class LocalModel {
   /// False while a cross-fade runs: the caller keeps the message and asks again. A cross-fade cut short would step.
   [[nodiscard]] bool ready(std::int64_t now_ns) const noexcept { return now_ns - fade_start_ns_ >= kCrossFade_ns; }
 
-  /// Takes over the contacts of a message for time `t_s_ns` and replays them over the ring.
+  /// Takes over the contacts of a message for time `t_s_ns` and replays them over the ring. Learns first from what the
+  /// message before had predicted for that time.
   /// @pre ready(); the contacts have passed the gate.
   void Accept(const DeviceContacts& contacts, std::int64_t t_s_ns, std::int64_t now_ns, const HandMapping& hand,
               const PoseRing& ring) noexcept;
@@ -55,12 +58,23 @@ class LocalModel {
     std::array<ContactState, kMaxContacts> states;
   };
 
+  struct Prediction {
+    std::int64_t stamp_ns = 0;
+    Vec3d f_W = Vec3d::Zero();
+  };
+
+  void Learn(const DeviceContacts& contacts, std::int64_t t_s_ns) noexcept;
+  void Remember(std::int64_t stamp_ns, const Vec3d& f_W) noexcept;
   [[nodiscard]] double CouplingFor(const Contact& contact, std::uint32_t count, const HandMapping& hand) const noexcept;
   [[nodiscard]] static ModelForce StepSet(ContactSet* set, const Vec3d& x, std::int64_t now_ns, double dt) noexcept;
 
   std::array<ContactSet, 2> sets_;
   std::size_t current_ = 0;
   std::int64_t fade_start_ns_ = -kCrossFade_ns;
+  StiffnessCorrection correction_;
+  Vec3d reference_f_W_ = Vec3d::Zero();                      ///< Sum of the reference forces of the current set.
+  std::array<Prediction, PoseRing::kCapacity> predictions_;  ///< Of the current set, by tick.
+  std::size_t prediction_count_ = 0;
 };
 
 }  // namespace fulcrum::haptics

@@ -44,6 +44,10 @@ bool IsRenderable(const Contact& c) noexcept {
 bool ModelGate::IsInOrder(const ContactModel& model, std::int64_t now_ns) const noexcept {
   // Physics that has not seen a tool yet has nothing to say to the servo; a stamp ahead of now is not of this clock.
   if (model.tool_stamp_ns <= 0 || model.tool_stamp_ns > now_ns) return false;
+  // One such message would shut out all that come after it.
+  if (model.stamp.stamp_ns > now_ns + kClockSlack_ns || model.stamp.epoch > static_cast<std::uint64_t>(now_ns)) {
+    return false;
+  }
   if (model.stamp.epoch != epoch_) return model.stamp.epoch > epoch_;
   // Two models may stand on the same tool sample, when physics was faster than the bus.
   return model.stamp.sequence > sequence_ && model.stamp.stamp_ns > stamp_ns_ && model.tool_stamp_ns >= tool_stamp_ns_;

@@ -22,6 +22,8 @@ inline constexpr float kMaxLength_m = 1.0f;         ///< Of gaps, displacements,
 inline constexpr float kMaxRate_m_s = 10.0f;
 inline constexpr float kMaxPlace_m = 10.0f;
 inline constexpr float kMaxExternalPower_W = 0.05f;
+/// A message may be stamped so much later than the tick that looks at it began [ns].
+inline constexpr std::int64_t kClockSlack_ns = 10'000'000;
 
 /// Ranges of one contact, each number finite.
 [[nodiscard]] bool IsRenderable(const Contact& contact) noexcept;

@@ -88,7 +88,7 @@ void Servo::TakePendingModel(std::int64_t now_ns) noexcept {
   if (!has_pending_ || !channels_.front().model.ready(now_ns)) return;
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     Channel& channel = channels_[i];
-    channel.model.Accept(pending_.devices[i], pending_.tool_stamp_ns, now_ns, {force_scale_, channel.pose.J},
+    channel.model.Accept(pending_.devices[i], pending_.tool_stamp_ns, now_ns, {force_scale_, channel.pose},
                          channel.ring);
     channel.external_W = pending_.devices[i].p_ext_W;
   }

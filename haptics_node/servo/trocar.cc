@@ -1,6 +1,7 @@
 #include "haptics_node/servo/trocar.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace fulcrum::haptics {
 
@@ -26,10 +27,24 @@ Vec3d AttachPointForTip(const Trocar& trocar, const Vec3d& p_WT) noexcept {
   return trocar.p_WP - (trocar.length_m - inside) * d;
 }
 
+namespace {
+
+/// J is diagonal in the frame of the shaft: `across` in the two directions normal to d, `along` in d itself.
+struct Levers {
+  double along, across;
+  explicit Levers(const TrocarPose& pose) noexcept
+      : along(pose.d_W.dot(pose.J * pose.d_W)), across(0.5 * (pose.J.trace() - along)) {}
+};
+
+}  // namespace
+
+double LargestLever(const TrocarPose& pose) noexcept {
+  const Levers lever(pose);
+  return std::max(std::abs(lever.along), std::abs(lever.across));
+}
+
 Vec3d ForceAtTip(const TrocarPose& pose, const Vec3d& f_A) noexcept {
-  // J is diagonal in the frame of the shaft: `across` in the two directions normal to d, `along` in d itself.
-  const double along = pose.d_W.dot(pose.J * pose.d_W);
-  const double across = 0.5 * (pose.J.trace() - along);
+  const auto [along, across] = Levers(pose);
   const double f_along = pose.d_W.dot(f_A);
   Vec3d f_T = (f_A - f_along * pose.d_W) / across;
   if (along > 0.5) f_T += f_along * pose.d_W;  // It is 1 or, clamped, 0.

@@ -35,6 +35,9 @@ struct TrocarPose {
 /// The attach point that puts the tip at `p_WT`, clamped as above; a tip at the pivot itself points downwards.
 [[nodiscard]] Vec3d AttachPointForTip(const Trocar& trocar, const Vec3d& p_WT) noexcept;
 
+/// Largest |J^T n| of any direction n: how much of a tip force the hand may feel.
+[[nodiscard]] double LargestLever(const TrocarPose& pose) noexcept;
+
 /// Force at the attach point that does the work of `f_T` at the tip: J^T f_T, hence f_A . v_A = f_T . v_T.
 [[nodiscard]] inline Vec3d ForceAtAttachPoint(const TrocarPose& pose, const Vec3d& f_T) noexcept {
   return pose.J.transpose() * f_T;

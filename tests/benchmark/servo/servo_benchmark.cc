@@ -1,19 +1,32 @@
-// The servo's time and its error.
-//   servo.wake_late_us_*   lateness of a real 1 kHz thread that runs the node's servo step with models arriving
-//   servo.step_us_*        duration of that step
-//   servo.busy_step_us_*   the same with four contacts on each tool, a model every 10 ms replayed over 20 ms
-//   haptics.MOTION.*       force against tissue integrated at 20 us, with models 10 to 20 ms old: RMS error in per cent
-//                          of the RMS force, for this servo, for parameters 30 % too high, and for holding the last
-//                          reported force (the paper's way); and the largest step of a tick that the tissue did not
-//                          make
+// The servo's time, its error and its stability; writes force_error.svg.
+//   servo.wake_late_us_*       lateness of a real 1 kHz thread that runs the node's servo step with models arriving
+//   servo.wake_late_ratio_p99  the same over a bare thread that only sleeps and spins, in turns with it
+//   servo.step_us_*            duration of that step
+//   servo.busy_step_us_*       the same with four contacts on each tool, a model every 10 ms replayed over 20 ms
+//   haptics.force_error_pct.*  force against tissue integrated at 20 us, with models every 10 ms, 10 to 20 ms old: RMS
+//                              error in per cent of the RMS force. mismatch30: worst motion with physics' stiffnesses
+//                              and viscosities each 30 % high or low; mismatch30_first: the same in the first cycle
+//                              after the start; noise2: worst motion with 2 % noise on each reference force
+//   haptics.paper_force_error_pct.*  depth x normal held from one physics step to the next, on the same runs
+//   haptics.excess_step_N      largest step of a tick that the tissue did not make, worst motion
+//   haptics.z_width_N_per_mm.GRIP.*  stiffest wall on which the hand comes to rest; stiffness then rendered
+//   haptics.energy_per_cycle_mJ.*    what the hand loses in a cycle; leak: its negative over the energy stored
+//   haptics.stall_1s.*         physics stops for a second
+#include <sys/prctl.h>
+#include <time.h>
+
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <functional>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "haptics_node/node/haptics_node.h"
@@ -22,6 +35,10 @@
 #include "services/runtime/cyclic_thread.h"
 #include "services/runtime/realtime.h"
 #include "tests/benchmark/report.h"
+#include "tests/benchmark/servo/force_plot.h"
+#include "tests/benchmark/servo/motions.h"
+#include "tests/benchmark/servo/stability.h"
+#include "tests/benchmark/servo/strategies.h"
 #include "tests/unit/haptics/rig.h"
 #include "tests/unit/haptics/test_tissue.h"
 
@@ -32,12 +49,12 @@ using benchmark::Report;
 using testing::BenchScene;
 using testing::BenchTrocar;
 using testing::GuidedDevice;
-using testing::LatePhysics;
 using testing::TestTissue;
 using testing::TickAt;
-using testing::TissueParameters;
 
 constexpr int kServoPriority = 80;
+constexpr std::int64_t kPeriod_ns = 1'000'000;
+constexpr std::int64_t kSpin_ns = 50'000;
 
 // ---------------------------------------------------------------------------------------------------- timing
 
@@ -49,7 +66,37 @@ std::array<ScriptKey, 4> MovingScript() {
            {10.0f, 1, Vec3f(-0.05f, 0, -0.005f), 0, 0, 0}}};
 }
 
-void RunThread(Report* report, double seconds) {
+/// Lateness [ns] of a thread that does nothing but sleep and spin, at the servo's priority and rate.
+std::vector<double> BareLateness(double seconds) {
+  std::vector<double> late;
+  late.reserve(static_cast<std::size_t>(1e3 * seconds) + 1);
+  std::thread thread([&] {
+    prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0);
+    (void)runtime::SetFifoPriority(kServoPriority);
+    std::int64_t wake = runtime::MonotonicNs() + kPeriod_ns;
+    const std::int64_t end = wake + static_cast<std::int64_t>(1e9 * seconds);
+    while (wake < end) {
+      const std::int64_t sleep_end = wake - kSpin_ns;
+      const timespec until{sleep_end / 1'000'000'000, sleep_end % 1'000'000'000};
+      clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+      std::int64_t now = runtime::MonotonicNs();
+      while (now < wake) now = runtime::MonotonicNs();
+      late.push_back(static_cast<double>(now - wake));
+      wake = runtime::PlanNextPeriod(wake, kPeriod_ns, now).wake_ns;
+    }
+  });
+  thread.join();
+  return late;
+}
+
+void Merge(const runtime::HistogramSnapshot& from, runtime::HistogramSnapshot* into) {
+  for (std::size_t i = 0; i < from.bins.size(); ++i) into->bins[i] += from.bins[i];
+  into->count += from.count;
+  into->max_ns = std::max(into->max_ns, from.max_ns);
+}
+
+/// The node's servo and a bare loop take turns, so that both see the same machine.
+void RunThread(Report* report, int rounds, double seconds) {
   const std::array<ScriptKey, 4> script = MovingScript();
   SceneView scene = BenchScene(0.3);
   scene.tools[1] = scene.tools[0];
@@ -66,14 +113,6 @@ void RunThread(Report* report, double seconds) {
 
   const std::string memory = runtime::LockMemory();
   std::fprintf(stderr, "servo: %s\n", memory.empty() ? "memory is locked" : memory.c_str());
-  std::string fifo;
-  const std::int64_t start = runtime::MonotonicNs();
-  runtime::CyclicThread servo({.name = "servo", .period_ns = 1'000'000, .spin_ns = 50'000}, [&](const Tick& tick) {
-    if (tick.index == 0) fifo = runtime::SetFifoPriority(kServoPriority);
-    Tick timed = tick;
-    timed.session_time_s = 1e-9 * static_cast<double>(tick.stamp_ns - start);
-    node.ServoStep(timed);
-  });
   const TestTissue tissue({});
   std::uint64_t sequence = 0;
   ToolState tool;
@@ -91,21 +130,44 @@ void RunThread(Report* report, double seconds) {
     }
     model_out->Write(model);
   });
-  runtime::CyclicThread bus({.name = "bus", .period_ns = 1'000'000}, [&](const Tick&) { node.BusStep(); });
+  runtime::CyclicThread bus({.name = "bus", .period_ns = kPeriod_ns}, [&](const Tick&) { node.BusStep(); });
   bus.Start();
   physics.Start();
-  servo.Start();
-  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-  servo.Stop();
-  const runtime::CyclicStats stats = servo.stats();
+
+  std::string refused;
+  const std::int64_t start = runtime::MonotonicNs();
+  runtime::HistogramSnapshot wake, step;
+  std::uint64_t skipped = 0;
+  std::vector<double> node_p99, bare_p99;
+  for (int round = 0; round < rounds; ++round) {
+    runtime::CyclicThread servo({.name = "servo", .period_ns = kPeriod_ns, .spin_ns = kSpin_ns}, [&](const Tick& tick) {
+      if (tick.index == 0) refused = runtime::SetFifoPriority(kServoPriority);
+      Tick timed = tick;
+      timed.session_time_s = 1e-9 * static_cast<double>(tick.stamp_ns - start);
+      node.ServoStep(timed);
+    });
+    servo.Start();
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+    servo.Stop();
+    const runtime::CyclicStats stats = servo.stats();
+    Merge(stats.wake, &wake);
+    Merge(stats.step, &step);
+    skipped += stats.overruns;
+    node_p99.push_back(static_cast<double>(stats.wake.Quantile(0.99)));
+    bare_p99.push_back(benchmark::Quantile(BareLateness(seconds), 0.99));
+  }
   std::fprintf(stderr, "servo: %s; %llu ticks, %llu periods skipped, %llu models\n",
-               fifo.empty() ? "SCHED_FIFO 80, spin 50 us" : fifo.c_str(), static_cast<unsigned long long>(stats.ticks),
-               static_cast<unsigned long long>(stats.overruns), static_cast<unsigned long long>(sequence));
-  report->Add("servo.wake_late_us_p50", 1e-3 * static_cast<double>(stats.wake.Quantile(0.5)), "us");
-  report->Add("servo.wake_late_us_p99", 1e-3 * static_cast<double>(stats.wake.Quantile(0.99)), "us");
-  report->Add("servo.wake_late_us_p999", 1e-3 * static_cast<double>(stats.wake.Quantile(0.999)), "us");
-  report->Add("servo.step_us_p50", 1e-3 * static_cast<double>(stats.step.Quantile(0.5)), "us");
-  report->Add("servo.step_us_p99", 1e-3 * static_cast<double>(stats.step.Quantile(0.99)), "us");
+               refused.empty() ? "SCHED_FIFO 80, spin 50 us" : refused.c_str(),
+               static_cast<unsigned long long>(wake.count), static_cast<unsigned long long>(skipped),
+               static_cast<unsigned long long>(sequence));
+  const double node_late = benchmark::Quantile(node_p99, 0.5), bare_late = benchmark::Quantile(bare_p99, 0.5);
+  report->Add("servo.wake_late_us_p50", 1e-3 * static_cast<double>(wake.Quantile(0.5)), "us");
+  report->Add("servo.wake_late_us_p99", 1e-3 * node_late, "us");
+  report->Add("servo.wake_late_us_p999", 1e-3 * static_cast<double>(wake.Quantile(0.999)), "us");
+  report->Add("servo.bare_wake_late_us_p99", 1e-3 * bare_late, "us");
+  report->Add("servo.wake_late_ratio_p99", node_late / bare_late, "1");
+  report->Add("servo.step_us_p50", 1e-3 * static_cast<double>(step.Quantile(0.5)), "us");
+  report->Add("servo.step_us_p99", 1e-3 * static_cast<double>(step.Quantile(0.99)), "us");
 }
 
 void RunBusy(Report* report, int ticks) {
@@ -137,111 +199,127 @@ void RunBusy(Report* report, int ticks) {
   report->Add("servo.busy_step_us_p99", benchmark::Quantile(times, 0.99), "us");
 }
 
-// ----------------------------------------------------------------------------------------------------- error
+// -------------------------------------------------------------------------------------------------- accuracy
 
-struct ForceError {
-  double percent = 0, held_percent = 0, excess_step_N = 0;
-};
+using MakeStrategy = std::unique_ptr<ForceStrategy>();
 
-/// @param parameter_scale what physics believes of k1, kt, Kb, Bb over what is true.
-ForceError FollowMotion(const std::function<Vec3d(double)>& tip, const TissueParameters& parameters,
-                        double parameter_scale) {
-  constexpr int kSettle = 1000;  // Three models, the rise to full force, and a whole cycle.
-  constexpr int kMeasured = 4000;
-  GuidedDevice device(BenchTrocar(), tip);
-  Servo servo(BenchScene(1.0), {&device, nullptr});
-  TestTissue tissue(parameters);
-  tissue.Place(tip(0));
-  LatePhysics physics;
-  double error2 = 0;
-  double held2 = 0;
-  double force2 = 0;
-  double worst = 0;
-  Vec3d held = Vec3d::Zero();
-  Vec3d last_error = Vec3d::Zero();
-  for (int i = 0; i < kSettle + kMeasured; ++i) {
-    const Tick tick = TickAt(static_cast<std::uint64_t>(i));
-    ContactModel model;
-    if (physics.Step(tissue, tick.stamp_ns - 1'000'000, &model)) {
-      Contact& contact = model.devices[0].contacts[0];
-      held = contact.f_ref.cast<double>();
-      for (float* value : {&contact.k1, &contact.k3, &contact.kt, &contact.k_body, &contact.b_body}) {
-        *value *= static_cast<float>(parameter_scale);
-      }
-      servo.OfferModel(model, tick.stamp_ns);
-    }
-    servo.Step(tick);
-    const Vec3d truth = tissue.Step(servo.record().tool.tools[0].p_WT.cast<double>(), tick.dt_s);
-    const Vec3d error = testing::SentForce(servo) - truth;
-    if (i >= kSettle) {
-      error2 += error.squaredNorm();
-      held2 += (held - truth).squaredNorm();
-      force2 += truth.squaredNorm();
-      worst = std::max(worst, (error - last_error).norm());
-    }
-    last_error = error;
-  }
-  return {100 * std::sqrt(error2 / force2), 100 * std::sqrt(held2 / force2), worst};
-}
-
-struct Motion {
-  const char* name;
-  std::function<Vec3d(double)> tip;
-  TissueParameters parameters;
-};
-
-std::vector<Motion> Motions() {
-  constexpr double kPi = 3.14159265358979323846;
-  TissueParameters grasp;
-  grasp.grasp = true;
-  return {
-      {"press_hold",
-       [](double t) {
-         const double u = std::fmod(t, 1.0);  // Down in 150 ms, hold, up, hold.
-         const double ramp = std::clamp(std::min(u, 0.65 - u) / 0.15, 0.0, 1.0);
-         return Vec3d(0, 0, 0.001 - 0.007 * ramp * ramp * (3 - 2 * ramp));
-       },
-       {}},
-      {"palpate_2Hz", [=](double t) { return Vec3d(0, 0, -0.004 + 0.003 * std::cos(2 * kPi * 2 * t)); }, {}},
-      {"tap_5Hz", [=](double t) { return Vec3d(0, 0, 0.003 * std::cos(2 * kPi * 5 * t)); }, {}},
-      {"slide_60mm_s",
-       [](double t) {
-         const double u = std::fmod(t, 2.0);
-         return Vec3d(0.06 * (u < 1 ? u : 2 - u), 0, -0.004);
-       },
-       {}},
-      {"grasp_pull",
-       [=](double t) {
-         const double pull = 0.004 * (1 - std::cos(2 * kPi * 0.7 * t));
-         return Vec3d(0.3 * pull, 0.2 * pull, 0.6 * pull);
-       },
-       grasp},
-  };
+ForceError Measure(const Motion& motion, const Physics& physics, MakeStrategy* make) {
+  const std::unique_ptr<ForceStrategy> strategy = make();
+  return Follow(motion, physics, strategy.get());
 }
 
 void RunMotions(Report* report) {
+  double worst_step = 0;
   for (const Motion& motion : Motions()) {
-    const std::string stem = std::string("haptics.") + motion.name;
-    if (!report->Wants(stem)) continue;
-    const ForceError matched = FollowMotion(motion.tip, motion.parameters, 1.0);
-    const ForceError off = FollowMotion(motion.tip, motion.parameters, 1.3);
-    report->Add(stem + ".force_error_pct", matched.percent, "%");
-    report->Add(stem + ".mismatched_error_pct", off.percent, "%");
-    report->Add(stem + ".held_force_error_pct", matched.held_percent, "%");
-    report->Add(stem + ".excess_step_N", matched.excess_step_N, "N");
-    report->Add(stem + ".mismatched_excess_step_N", off.excess_step_N, "N");
+    const ForceError error = Measure(motion, {}, MakeServo);
+    worst_step = std::max(worst_step, error.excess_step_N);
+    report->Add(std::string("haptics.force_error_pct.") + motion.name, error.percent, "%");
+    report->Add(std::string("haptics.paper_force_error_pct.") + motion.name, Measure(motion, {}, MakeHeldForce).percent,
+                "%");
   }
+  report->Add("haptics.excess_step_N", worst_step, "N");
+}
+
+void RunMismatch(Report* report) {
+  ForceError worst;
+  for (const Motion& motion : Motions()) {
+    ForceError of_motion;
+    for (const double stiffness : {0.7, 1.3}) {
+      for (const double viscosity : {0.7, 1.3}) {
+        Physics physics;
+        physics.mismatch = {stiffness, viscosity};
+        const ForceError error = Measure(motion, physics, MakeServo);
+        of_motion.percent = std::max(of_motion.percent, error.percent);
+        of_motion.first_percent = std::max(of_motion.first_percent, error.first_percent);
+        of_motion.excess_step_N = std::max(of_motion.excess_step_N, error.excess_step_N);
+      }
+    }
+    std::fprintf(stderr, "haptics: %-8s 30 %% off: %.2f %%, first cycle %.2f %%, step %.4f N\n", motion.name,
+                 of_motion.percent, of_motion.first_percent, of_motion.excess_step_N);
+    worst.percent = std::max(worst.percent, of_motion.percent);
+    worst.first_percent = std::max(worst.first_percent, of_motion.first_percent);
+    worst.excess_step_N = std::max(worst.excess_step_N, of_motion.excess_step_N);
+  }
+  report->Add("haptics.force_error_pct.mismatch30", worst.percent, "%");
+  report->Add("haptics.force_error_pct.mismatch30_first", worst.first_percent, "%");
+  report->Add("haptics.excess_step_N.mismatch30", worst.excess_step_N, "N");
+
+  ForceError noisy;
+  for (const Motion& motion : Motions()) {
+    Physics physics;
+    physics.noise = 0.02;
+    const ForceError error = Measure(motion, physics, MakeServo);
+    noisy.percent = std::max(noisy.percent, error.percent);
+    noisy.excess_step_N = std::max(noisy.excess_step_N, error.excess_step_N);
+  }
+  report->Add("haptics.force_error_pct.noise2", noisy.percent, "%");
+  report->Add("haptics.excess_step_N.noise2", noisy.excess_step_N, "N");
+}
+
+// ------------------------------------------------------------------------------------------------- stability
+
+void RunZWidth(Report* report) {
+  const std::pair<const char*, HandModel> hands[] = {
+      {"fingertip", kFingertip}, {"light_grip", kLightGrip}, {"firm_grip", kFirmGrip}};
+  // Up to the stiffest skin that the gate admits.
+  const double walls[] = {0.3, 0.6, 0.9, 1.2, 1.6, 2, 3, 4, 6, 8, 10, 12, 14, 16, 18, 20};
+  for (const auto& [name, hand] : hands) {
+    double stable_up_to = 0;
+    double rendered = 0;
+    for (const double wall : walls) {
+      const WallResult result = HitWall(hand, wall);
+      if (!result.stable) break;
+      stable_up_to = wall;
+      rendered = result.rendered_N_per_mm;
+    }
+    const std::string stem = std::string("haptics.z_width_N_per_mm.") + name;
+    report->Add(stem + ".stable", stable_up_to, "N/mm");
+    report->Add(stem + ".rendered", rendered, "N/mm");
+  }
+}
+
+void RunEnergy(Report* report) {
+  const CycleEnergy tissue = CycleOnTissue(), wall = CycleOnElasticWall();
+  report->Add("haptics.energy_per_cycle_mJ.tissue", tissue.lost_mJ, "mJ");
+  report->Add("haptics.energy_per_cycle_mJ.elastic_wall", wall.lost_mJ, "mJ");
+  report->Add("haptics.energy_per_cycle_mJ.elastic_wall_leak_pct", -100 * wall.lost_mJ / wall.stored_mJ, "%");
+}
+
+void RunStall(Report* report) {
+  const StallResult stall = StallForASecond();
+  report->Add("haptics.stall_1s.pressed_N", stall.pressed_N, "N");
+  report->Add("haptics.stall_1s.force_at_400ms_N", stall.force_at_400ms_N, "N");
+  report->Add("haptics.stall_1s.return_step_N_per_5ms", stall.return_step_N_per_5ms, "N");
+  report->Add("haptics.stall_1s.returned_N", stall.returned_N, "N");
+}
+
+// ------------------------------------------------------------------------------------------------------ plot
+
+void WritePlot(bool quick) {
+  const char* folder = std::getenv("FULCRUM_BENCH_OUT");
+  const std::filesystem::path file = std::filesystem::path(folder != nullptr ? folder : "out") / "force_error.svg";
+  std::filesystem::create_directories(file.parent_path());
+  std::ofstream(file) << ForceErrorSvg(MeasureForcePlot(quick));
+  std::fprintf(stderr, "haptics: wrote %s\n", file.c_str());
 }
 
 }  // namespace
 }  // namespace fulcrum::haptics
 
 int main(int argc, char** argv) {
+  using namespace fulcrum::haptics;
   fulcrum::benchmark::Report report(argc, argv);
-  if (report.Wants("servo.wake") || report.Wants("servo.step")) {
-    fulcrum::haptics::RunThread(&report, report.quick() ? 1.5 : 5.0);
+  if (report.Wants("servo.wake") || report.Wants("servo.bare") || report.Wants("servo.step")) {
+    report.quick() ? RunThread(&report, 3, 0.5) : RunThread(&report, 7, 1.0);
   }
-  if (report.Wants("servo.busy")) fulcrum::haptics::RunBusy(&report, report.quick() ? 5000 : 20000);
-  if (report.Wants("haptics")) fulcrum::haptics::RunMotions(&report);
+  if (report.Wants("servo.busy")) RunBusy(&report, report.quick() ? 5000 : 20000);
+  if (report.Wants("haptics.force_error") || report.Wants("haptics.paper") || report.Wants("haptics.excess")) {
+    RunMotions(&report);
+    RunMismatch(&report);
+    WritePlot(report.quick());
+  }
+  if (report.Wants("haptics.z_width")) RunZWidth(&report);
+  if (report.Wants("haptics.energy")) RunEnergy(&report);
+  if (report.Wants("haptics.stall")) RunStall(&report);
   return 0;
 }

@@ -11,6 +11,7 @@
 #include "haptics_node/servo/model_gate.h"
 #include "haptics_node/servo/output_chain.h"
 #include "haptics_node/servo/passivity.h"
+#include "haptics_node/servo/stiffness_correction.h"
 #include "tests/unit/haptics/test_tissue.h"
 
 namespace fulcrum::haptics {
@@ -39,6 +40,9 @@ TEST(ModelGate, AdmitsAGoodModelAndRefusesEachBrokenField) {
       [=](ContactModel& m, Contact&) { m.devices[0].force_cap_N = nan; },
       [](ContactModel& m, Contact&) { m.tool_stamp_ns = 0; },
       [](ContactModel& m, Contact&) { m.tool_stamp_ns = 2000 * kMs; },
+      [](ContactModel& m, Contact&) { m.stamp.stamp_ns = 1100 * kMs; },
+      [](ContactModel& m, Contact&) { m.stamp.epoch = ~std::uint64_t{0}; },
+      [](ContactModel& m, Contact&) { m.stamp.epoch = 1002 * kMs; },
       [](ContactModel&, Contact& c) { c.kind = ContactKind::kNone; },
       [](ContactModel&, Contact& c) { c.n *= 1.02f; },
       [=](ContactModel&, Contact& c) { c.n.x() = nan; },
@@ -233,6 +237,18 @@ TEST(Passivity, AnActiveSourceIsDampedOnceTheTankIsEmpty) {
   EXPECT_LE(given, kTank_J + 1e-3);
 }
 
+// Tissue that breathes against a hand that gives way does work on it, which physics declares.
+TEST(Passivity, PowerThatComesFromOutsideIsNotTheServosDebt) {
+  PassivityController declared, undeclared;
+  const Vec3d moved(1e-5, 0, 0), push(0.8, 0, 0);  // 8 mW.
+  for (int i = 0; i < 1000; ++i) {
+    EXPECT_EQ(declared.Step(push, push, moved, 0.0, 0.010, kDt), push);
+    (void)undeclared.Step(push, push, moved, 0.0, 0.0, kDt);
+  }
+  EXPECT_LT(undeclared.Step(push, push, moved, 0.0, 0.0, kDt).x(), 0.8 - 0.02);
+  EXPECT_GE(undeclared.Step(push, push, moved, 0.0, 0.0, kDt).x(), 0.8 - kMaxPassivityDamping_Ns_m * 0.01 - 1e-12);
+}
+
 TEST(Passivity, ASpringIsLeftAlone) {
   PassivityController controller;
   Vec3d sent = Vec3d::Zero();
@@ -245,6 +261,69 @@ TEST(Passivity, ASpringIsLeftAlone) {
     sent = controller.Step(spring, sent, moved, 0.5 * 500 * x * x, 0.0, kDt);
     ASSERT_EQ(sent, spring) << i;
   }
+}
+
+/// Forces that rise and fall; the model's share of each change is 1 / too_stiff of what it predicts.
+void Teach(double too_stiff, double noise, int messages, StiffnessCorrection* correction) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  double force = 1.0;
+  for (int i = 0; i < messages; ++i) {
+    const double change = 0.3 * std::cos(0.4 * i);
+    const double predicted = force + change * too_stiff * correction->scale();
+    const double reported = (force + change) * (1.0 + noise * normal(random));
+    correction->Learn(force, predicted, reported);
+    force = reported;
+  }
+}
+
+TEST(StiffnessCorrection, FindsTheScaleWithinAFewMessages) {
+  for (const double too_stiff : {0.7, 1.0, 1.3}) {
+    StiffnessCorrection correction;
+    Teach(too_stiff, 0, 10, &correction);
+    EXPECT_NEAR(correction.scale() * too_stiff, 1.0, 0.01) << too_stiff;
+  }
+}
+
+TEST(StiffnessCorrection, NoiseOfTheReferenceForceMovesItLittle) {
+  StiffnessCorrection correction;
+  Teach(1.3, 0.02, 200, &correction);
+  EXPECT_NEAR(correction.scale() * 1.3, 1.0, 0.1);
+}
+
+TEST(StiffnessCorrection, AHoldTeachesNothing) {
+  StiffnessCorrection correction;
+  for (int i = 0; i < 1000; ++i) correction.Learn(1.0, 1.0, i % 2 == 0 ? 1.02 : 0.98);
+  EXPECT_EQ(correction.scale(), 1.0);
+}
+
+TEST(StiffnessCorrection, ATouchThatWasPredictedTooEarlyTeachesNothing) {
+  StiffnessCorrection correction;
+  for (int i = 0; i < 10; ++i) correction.Learn(0.0, 0.05, 0.0);
+  EXPECT_EQ(correction.scale(), 1.0);
+}
+
+TEST(StiffnessCorrection, AJumpThatNoStiffnessExplainsIsNotLearnt) {
+  StiffnessCorrection correction;
+  correction.Learn(2.0, 2.1, 0.3);  // It slipped, or was cut.
+  EXPECT_EQ(correction.scale(), 1.0);
+}
+
+TEST(StiffnessCorrection, StaysWithinItsBoundsWhateverComes) {
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> exponent(-9, 3);
+  std::normal_distribution<double> normal;
+  StiffnessCorrection correction;
+  const auto wild = [&] { return normal(random) * std::pow(10.0, exponent(random)); };
+  for (int i = 0; i < 100000; ++i) {
+    if (i % 97 == 0) correction.Doubt();
+    const double start = wild();
+    correction.Learn(start, start + wild(), start + wild());
+    ASSERT_LE(correction.scale(), kMaxStiffnessCorrection);
+    ASSERT_GE(correction.scale(), 1 / kMaxStiffnessCorrection);
+  }
+  correction.Learn(1.0, std::numeric_limits<double>::quiet_NaN(), 1.0);
+  EXPECT_TRUE(std::isfinite(correction.scale()));
 }
 
 }  // namespace

@@ -6,10 +6,12 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "haptics_node/device/simulated_device.h"
 #include "services/core/error.h"
+#include "tests/unit/haptics/loop.h"
 #include "tests/unit/haptics/rig.h"
 #include "tests/unit/haptics/test_tissue.h"
 
@@ -19,35 +21,13 @@ namespace {
 using testing::BenchScene;
 using testing::BenchTrocar;
 using testing::GuidedDevice;
+using testing::kNothing;
 using testing::LatePhysics;
+using testing::Loop;
 using testing::SentForce;
 using testing::TestTissue;
 using testing::TickAt;
 using testing::TissueParameters;
-
-/// Servo, tissue and late physics together; `Run` gives each tick to `each`.
-struct Loop {
-  Loop(const SceneView& scene, HapticDevice* device, const TissueParameters& parameters)
-      : servo(scene, {device, nullptr}), tissue(parameters) {}
-
-  template <class Each>
-  void Run(int ticks, const Each& each) {
-    for (int i = 0; i < ticks; ++i) {
-      const Tick tick = TickAt(millisecond++);
-      ContactModel model;
-      if (physics.Step(tissue, tick.stamp_ns - 1'000'000, &model)) servo.OfferModel(model, tick.stamp_ns);
-      servo.Step(tick);
-      tissue.Step(servo.record().tool.tools[0].p_WT.cast<double>(), tick.dt_s);
-      each(tick);
-    }
-  }
-  Servo servo;
-  TestTissue tissue;
-  LatePhysics physics;
-  std::uint64_t millisecond = 0;
-};
-
-constexpr auto kNothing = [](const Tick&) {};
 
 TEST(Servo, RefusesAShaftTooShortToTurnAbout) {
   SceneView scene = BenchScene(1);
@@ -158,6 +138,69 @@ TEST(Servo, ProxyStandsOutOfAWallStifferThanTheCap) {
   EXPECT_GT(z, -0.002 + 0.001);
   EXPECT_LT(z, 0);
   EXPECT_LT(SentForce(loop.servo).z(), 0.002 * kMaxHandStiffness_N_m);
+}
+
+/// A device that is where it is put.
+class PlacedDevice final : public HapticDevice {
+ public:
+  [[nodiscard]] Vec3d ReadPosition(const Tick& /*tick*/) noexcept override { return p_WA; }
+  void WriteForce(const Vec3d& f_W) noexcept override { force = f_W; }
+  Vec3d p_WA = Vec3d::Zero(), force = Vec3d::Zero();
+};
+
+// The stiffest wall there is, under levers of 0.5 to 3 and from all sides: the hand feels at most the cap.
+TEST(Servo, CouplingIsCappedWhereTheHandFeelsIt) {
+  const Vec3f pivots[] = {{0, 0, 0.2f}, {0, 0, 0.3f}, {0.13f, 0, 0.02f}, {0.27f, 0, 0.03f}, {0.1f, 0.1f, 0.15f}};
+  for (const Vec3f& pivot : pivots) {
+    SceneView scene = BenchScene(1.0);
+    scene.tools[0].p_WP = pivot;
+    const Trocar trocar{pivot.cast<double>(), scene.tools[0].shaft_length_m};
+    const Vec3d place = AttachPointForTip(trocar, Vec3d(0, 0, -0.001));
+    for (int axis = 0; axis < 3; ++axis) {
+      PlacedDevice device;
+      device.p_WA = place;
+      Loop loop(scene, &device, {.k1 = 2e4, .k3 = 0, .kt = 2e4, .k_body = 2e5, .b_body = 20, .friction = 2});
+      loop.Run(1200, kNothing);
+      const Vec3d before = device.force;
+      ASSERT_GT(before.norm(), 0.1);
+      constexpr double kStep_m = 1e-4;
+      device.p_WA += kStep_m * Vec3d::Unit(axis);
+      loop.Run(400, kNothing);
+      EXPECT_LE((device.force - before).norm(), 1.01 * kStep_m * kMaxHandStiffness_N_m)
+          << "axis " << axis << ", pivot " << pivot.transpose();
+    }
+  }
+}
+
+TEST(Servo, TwoToolsPressTheirOwnTissue) {
+  SceneView scene = BenchScene(0.5);
+  scene.tools[1] = scene.tools[0];
+  GuidedDevice left(BenchTrocar(), [](double) { return Vec3d(0, 0, -0.004); });
+  GuidedDevice right(BenchTrocar(), [](double t) { return Vec3d(0, 0, 0.004 - 0.004 * t); });
+  Servo servo(scene, {&left, &right});
+  TestTissue soft({}), stiff({.k1 = 900, .k_body = 900, .b_body = 10});
+  std::uint64_t sequence = 0;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    const Tick tick = TickAt(i);
+    if (i % 10 == 0 && i > 0) {
+      ContactModel model;
+      model.stamp = {++sequence, 1, tick.stamp_ns};
+      model.tool_stamp_ns = TickAt(i - 1).stamp_ns;
+      model.devices[0].count = model.devices[1].count = 1;
+      model.devices[0].contacts[0] = soft.Report();
+      model.devices[1].contacts[0] = stiff.Report();
+      servo.OfferModel(model, tick.stamp_ns);
+    }
+    servo.Step(tick);
+    soft.Step(servo.record().tool.tools[0].p_WT.cast<double>(), tick.dt_s);
+    stiff.Step(servo.record().tool.tools[1].p_WT.cast<double>(), tick.dt_s);
+  }
+  for (const auto& [device, tissue] : {std::pair{&left, &soft}, std::pair{&right, &stiff}}) {
+    const double expected = 0.5 * tissue->force().z();
+    EXPECT_GT(expected, 0.3);
+    EXPECT_NEAR(device->force.z(), expected, 0.01 * expected);
+  }
+  EXPECT_GT((left.force - right.force).norm(), 0.1);
 }
 
 TEST(Servo, StallOfPhysicsFadesForcesAndBringsThemBackSoftly) {

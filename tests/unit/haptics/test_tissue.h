@@ -92,20 +92,17 @@ class TestTissue {
 /// Reports every 10 ms, 10 ms after the tool sample that it used: models are 10 to 20 ms old in use.
 class LatePhysics {
  public:
-  static constexpr std::int64_t kPeriod_ns = 10'000'000;
-  static constexpr std::int64_t kLatency_ns = 10'000'000;
-
   /// Once per millisecond with the tissue as it is now. True when `model` has been filled with one that arrives now.
   [[nodiscard]] bool Step(const TestTissue& tissue, std::int64_t now_ns, ContactModel* model) {
     if (!stalled && now_ns >= next_ns_) {
-      next_ns_ = now_ns + kPeriod_ns;
+      next_ns_ = now_ns + period_ns;
       ContactModel fresh;
       fresh.tool_stamp_ns = now_ns;
       fresh.devices[0].count = 1;
       fresh.devices[0].contacts[0] = tissue.Report();
       under_way_.push_back(fresh);
     }
-    if (under_way_.empty() || now_ns < under_way_.front().tool_stamp_ns + kLatency_ns) return false;
+    if (under_way_.empty() || now_ns < under_way_.front().tool_stamp_ns + latency_ns) return false;
     *model = under_way_.front();
     under_way_.pop_front();
     if (stalled) return false;
@@ -113,6 +110,8 @@ class LatePhysics {
     return true;
   }
 
+  std::int64_t period_ns = 10'000'000;
+  std::int64_t latency_ns = 10'000'000;
   bool stalled = false;
   std::uint64_t epoch = 1;
 

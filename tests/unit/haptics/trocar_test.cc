@@ -52,6 +52,19 @@ TEST(Trocar, JacobianEqualsFiniteDifferences) {
   }
 }
 
+TEST(Trocar, LargestLeverBoundsEveryDirection) {
+  std::mt19937 random(8);
+  for (int i = 0; i < 100; ++i) {
+    const TrocarPose pose = PoseFromAttachPoint(kTrocar, RandomAttachPoint(&random));
+    double largest = 0;
+    for (int k = 0; k < 200; ++k) {
+      largest = std::max(largest, ForceAtAttachPoint(pose, Random(&random, 1).normalized()).norm());
+    }
+    EXPECT_LE(largest, LargestLever(pose) + 1e-12);
+    EXPECT_GE(largest, 0.9 * LargestLever(pose));
+  }
+}
+
 TEST(Trocar, ForceMappingConservesPower) {
   std::mt19937 random(3);
   for (int i = 0; i < 100; ++i) {

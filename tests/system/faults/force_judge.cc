@@ -1,0 +1,63 @@
+#include "tests/system/faults/force_judge.h"
+
+#include <algorithm>
+#include <sstream>
+
+namespace fulcrum::testing {
+namespace {
+
+constexpr double kLimit_N = 3.3;
+constexpr double kSlew_N_per_tick = 0.4;
+constexpr double kGone_s = 0.4;  // Without a model for so long …
+constexpr double kGone_N = 0.1;  // … no more than this.
+constexpr double kRise_N = 0.1;  // In five ticks of coming back.
+// ToolState tells the force at the proxy's tip; on its way back to the hand the lever is off by the proxy's distance
+// from the tip over the shaft, millimetres over a decimetre, and by float.
+constexpr double kLever = 1.02;
+// The age machine counts no tick as longer than this.
+constexpr std::int64_t kLongestTick_ns = 20'000'000;
+constexpr std::int64_t kFadeAndSome_ns = 500'000'000;
+
+}  // namespace
+
+void ForceJudge::Add(const ToolState& state) {
+  const ToolSample& tool = state.tools[0];
+  const haptics::TrocarPose pose =
+      haptics::PoseFromAttachPoint(trocar_, haptics::AttachPointForTip(trocar_, tool.p_WT.cast<double>()));
+  const Vec3d f_A = haptics::ForceAtAttachPoint(pose, tool.f_W.cast<double>());
+  const double force = f_A.norm();
+  if (!(force <= kLever * kLimit_N)) Object(state, "force [N]", force);
+  if (samples_ > 0 && state.stamp.epoch == last_.epoch) {
+    const auto ticks = static_cast<double>(state.stamp.sequence - last_.sequence);
+    const double step = (f_A - f_A_).norm();
+    if (step > kLever * kSlew_N_per_tick * ticks) Object(state, "step of the force [N]", step);
+    if (state.stamp.stamp_ns - last_.stamp_ns > kLongestTick_ns) held_up_ns_ = state.stamp.stamp_ns;
+  }
+  const bool in_time = state.stamp.stamp_ns - held_up_ns_ > kFadeAndSome_ns;
+  if (in_time && tool.model_age_s > kGone_s + 0.002 && force > kGone_N) Object(state, "force without a model", force);
+  const bool rising = tool.state == ServoState::kRise;
+  const Past& past = past_[state.stamp.sequence % kWindow];
+  if (rising && past.rising && past.sequence + kWindow == state.stamp.sequence &&
+      force - past.force > kLever * kRise_N) {
+    Object(state, "rise of the force in 5 ms [N]", force - past.force);
+  }
+  past_[state.stamp.sequence % kWindow] = {state.stamp.sequence, force, rising};
+
+  ++samples_;
+  last_ = state.stamp;
+  f_A_ = f_A;
+  force_ = force;
+  state_ = tool.state;
+  least_ = std::min(least_, force);
+  most_ = std::max(most_, force);
+}
+
+void ForceJudge::Object(const ToolState& state, const char* what, double value) {
+  if (!verdict_.empty()) return;
+  std::ostringstream text;
+  text << what << ' ' << value << " at tick " << state.stamp.sequence << ", state "
+       << static_cast<int>(state.tools[0].state) << ", model " << 1e3f * state.tools[0].model_age_s << " ms old";
+  verdict_ = text.str();
+}
+
+}  // namespace fulcrum::testing

@@ -1,0 +1,121 @@
+// What becomes of a message that is already old when it comes: replay over the ring and cross-fade.
+#include "haptics_node/servo/local_model.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "tests/unit/haptics/rig.h"
+#include "tests/unit/haptics/test_tissue.h"
+
+namespace fulcrum::haptics {
+namespace {
+
+using testing::TestTissue;
+using testing::TickAt;
+
+constexpr double kDt = 1e-3;
+
+/// A tip that presses and slides.
+Vec3d Tip(std::uint64_t millisecond) {
+  const double t = kDt * static_cast<double>(millisecond);
+  return {0.002 * std::sin(7 * t), 0, -0.003 - 0.002 * std::sin(11 * t)};
+}
+
+DeviceContacts One(const Contact& contact) {
+  DeviceContacts contacts;
+  contacts.count = 1;
+  contacts.contacts[0] = contact;
+  return contacts;
+}
+
+class LocalModelTest : public ::testing::Test {
+ protected:
+  LocalModelTest() {
+    tissue.Place(Tip(0));
+    for (std::uint64_t i = 0; i <= kMessage; ++i) tissue.Step(Tip(i), kDt);
+  }
+  void Take(LocalModel* model, const DeviceContacts& contacts, std::uint64_t t_s, std::uint64_t now) {
+    model->Accept(contacts, TickAt(t_s).stamp_ns, TickAt(now).stamp_ns, {}, ring);
+  }
+  ModelForce Step(LocalModel* model, std::uint64_t now) { return model->Step(Tip(now), TickAt(now).stamp_ns, kDt); }
+
+  static constexpr std::uint64_t kMessage = 40;  ///< The tick that the message is about.
+  TestTissue tissue{{}};
+  PoseRing ring;
+};
+
+// However late a message comes, after its replay and the cross-fade the force is what it would be had it come at once.
+TEST_F(LocalModelTest, ALateMessageEndsWhereAPunctualOneDoes) {
+  for (const std::uint64_t late : {1u, 5u, 20u, 60u, 120u}) {
+    LocalModel punctual, tardy;
+    ring = PoseRing();
+    ModelForce first, second;
+    for (std::uint64_t now = kMessage; now < kMessage + late + 15; ++now) {
+      ring.Push(TickAt(now).stamp_ns, Tip(now));
+      if (now == kMessage + 1) Take(&punctual, One(tissue.Report()), kMessage, now);
+      if (now == kMessage + late) Take(&tardy, One(tissue.Report()), kMessage, now);
+      if (now > kMessage) first = Step(&punctual, now);
+      if (now >= kMessage + late) second = Step(&tardy, now);
+    }
+    EXPECT_GT(first.f_W.z(), 0.3);
+    EXPECT_LT((first.f_W - second.f_W).norm(), 1e-12) << late << " ms late";
+  }
+}
+
+TEST_F(LocalModelTest, ANewModelTakesOverWithoutAStep) {
+  LocalModel model;
+  Vec3d last = Vec3d::Zero();
+  double largest = 0;
+  for (std::uint64_t now = kMessage; now < kMessage + 60; ++now) {
+    ring.Push(TickAt(now).stamp_ns, Tip(kMessage));  // It holds still: what changes is the model's doing.
+    if (now == kMessage + 1 || now == kMessage + 30) {
+      Contact contact = tissue.Report();
+      if (now == kMessage + 30) contact.f_ref *= 1.5f;  // The new one disagrees by half.
+      ASSERT_TRUE(model.ready(TickAt(now).stamp_ns));
+      Take(&model, One(contact), now - 1, now);
+    }
+    if (now == kMessage) continue;
+    const Vec3d f = model.Step(Tip(kMessage), TickAt(now).stamp_ns, kDt).f_W;
+    if (now >= kMessage + 30) largest = std::max(largest, (f - last).norm());
+    if (now == kMessage + 30) {
+      EXPECT_LT((f - last).norm(), 0.01);
+      EXPECT_FALSE(model.ready(TickAt(now).stamp_ns));
+    }
+    last = f;
+  }
+  // Smootherstep over 10 ms: its steepest tick is 0.19 of the way.
+  EXPECT_LT(largest, 0.22 * 0.5 * tissue.force().norm());
+  EXPECT_NEAR(last.z(), 1.5 * tissue.force().z(), 0.1 * tissue.force().z());
+}
+
+// Physics believes the tissue 30 % stiffer than it is; its own messages tell.
+TEST_F(LocalModelTest, LearnsTheStiffnessThatMessagesImply) {
+  const auto worst_after = [&](std::uint64_t begin) {
+    LocalModel model;
+    TestTissue truth{{}};
+    truth.Place(Tip(0));
+    ring = PoseRing();
+    double worst = 0;
+    std::vector<Contact> reports;
+    for (std::uint64_t now = 0; now < 1000; ++now) {
+      ring.Push(TickAt(now).stamp_ns, Tip(now));
+      if (now > 15 && now % 10 == 0) {
+        Contact contact = reports[now - 15];
+        for (float* value : {&contact.k1, &contact.k3, &contact.kt, &contact.k_body, &contact.b_body}) *value *= 1.3f;
+        Take(&model, One(contact), now - 15, now);
+      }
+      const Vec3d f = Step(&model, now).f_W;
+      const Vec3d true_f = truth.Step(Tip(now), kDt);
+      reports.push_back(truth.Report());
+      if (now >= begin && now < begin + 300) worst = std::max(worst, (f - true_f).norm());
+    }
+    return worst;
+  };
+  EXPECT_LT(worst_after(600), 0.25 * worst_after(40));
+}
+
+}  // namespace
+}  // namespace fulcrum::haptics
