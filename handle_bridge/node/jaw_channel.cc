@@ -43,6 +43,7 @@ void JawChannel::Tick(std::span<const char> bytes, double dt_s) noexcept {
 void JawChannel::TakeLine(LineFramer::Event event) noexcept {
   --owed_lines_;
   const JawReading reading = event == LineFramer::Event::kLine ? gate_.Check(framer_.line()) : JawReading{};
+  tick_counts_.lost += reading.lost;
   switch (reading.verdict) {
     case LineVerdict::kGood:
       ++tick_counts_.good;
@@ -56,6 +57,9 @@ void JawChannel::TakeLine(LineFramer::Event event) noexcept {
     case LineVerdict::kOutside:
     case LineVerdict::kJump:
       ++tick_counts_.implausible;
+      break;
+    case LineVerdict::kOther:
+      ++tick_counts_.other;
       break;
   }
   if (reading.verdict == LineVerdict::kGood) {
@@ -84,11 +88,17 @@ void JawChannel::HoldAngle() noexcept {
   owed_lines_ = 0;
 }
 
+void JawChannel::SetUnit(const JawChannelSettings& settings) noexcept {
+  gate_ = JawLineGate(settings.line);
+  estimator_ = JawEstimator(settings.estimator, settings.calibration);
+}
+
 void JawChannel::Reconnected() noexcept {
   framer_.Reset();
   monitor_.Reset();
   wiring_.Reset();
   HoldAngle();
+  gate_.Reconnected();
   connected_ = true;
 }
 

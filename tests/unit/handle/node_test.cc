@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <numbers>
 #include <string>
 
@@ -8,6 +11,7 @@
 #include "handle_bridge/node/handle_bridge_node.h"
 #include "handle_bridge/protocol/pedal_line.h"
 #include "services/bus/in_process.h"
+#include "services/core/error.h"
 
 namespace fulcrum::handle_bridge {
 namespace {
@@ -24,7 +28,16 @@ class MemoryLink final : public ByteLink {
     const bool was_fresh = std::exchange(fresh, false);
     return {n, phase, was_fresh};
   }
+  std::string_view unit() const noexcept override { return serial_number; }
+  bool SetBaud(int new_baud) noexcept override {
+    baud = new_baud;
+    fresh = true;
+    bytes.clear();
+    return true;
+  }
   std::string bytes;
+  std::string serial_number;
+  int baud = 115200;
   LinkPhase phase = LinkPhase::kOpen;
   bool fresh = true;
 };
@@ -34,17 +47,20 @@ class NodeTest : public ::testing::Test {
  protected:
   NodeTest() : input_(topic_.MakeInput()), output_(topic_.MakeOutput()) { Restart(1000); }
 
+  static std::unique_ptr<WatchedLink> MakeLink(MemoryLink** memory) {
+    auto link = std::make_unique<MemoryLink>();
+    *memory = link.get();
+    return std::make_unique<WatchedLink>(std::move(link), 115200);
+  }
+
   void Restart(std::int64_t epoch_ns) {
     HandleBridgeNode::Links links;
     for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
-      auto link = std::make_unique<MemoryLink>();
-      handle_[tool] = link.get();
-      links.handles[tool] = std::move(link);
+      links.handles[tool] = MakeLink(&handle_[tool]);
     }
-    auto link = std::make_unique<MemoryLink>();
-    pedal_ = link.get();
-    links.pedal = std::move(link);
-    node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), epoch_ns);
+    links.pedal = MakeLink(&pedal_);
+    node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), calibrations_, std::move(links), output_.get(),
+                                               epoch_ns);
     EXPECT_EQ(Error(), "");  // Nothing has been read yet.
     TickSilently();          // The first step drops what has piled up.
   }
@@ -91,6 +107,7 @@ class NodeTest : public ::testing::Test {
   bus::InProcessTopic<HandleState> topic_;
   std::unique_ptr<bus::Input<HandleState>> input_;
   std::unique_ptr<bus::Output<HandleState>> output_;
+  CalibrationStore calibrations_;
   std::unique_ptr<HandleBridgeNode> node_;
   std::array<MemoryLink*, kMaxTools> handle_{};
   MemoryLink* pedal_ = nullptr;
@@ -124,10 +141,9 @@ TEST_F(NodeTest, IsNotPresentBeforeTheFirstLine) {
 
 TEST_F(NodeTest, LinesFromBeforeTheFirstStepAreDropped) {
   HandleBridgeNode::Links links;
-  auto link = std::make_unique<MemoryLink>();
-  handle_[0] = link.get();
-  links.handles[0] = std::move(link);
-  node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), 3000);
+  links.handles[0] = MakeLink(&handle_[0]);
+  node_ =
+      std::make_unique<HandleBridgeNode>(config::CartConfig(), calibrations_, std::move(links), output_.get(), 3000);
   for (int i = 0; i < 400; ++i) {
     const auto line = firmware_.Line(50);
     handle_[0]->bytes.append(line.data(), line.size());
@@ -156,7 +172,7 @@ TEST_F(NodeTest, SilenceHoldsTheAngleAndReleasesThePedal) {
   EXPECT_EQ(state_.handles[0].quality, 0.0f);
   EXPECT_EQ(state_.handles[0].jaw_rate_rad_s, 0.0f);
   EXPECT_NEAR(jaw0_deg(), held, 1.0);
-  EXPECT_NE(Error().find("handle 0: no data"), std::string::npos) << Error();
+  EXPECT_NE(Error().find("handle 0: no-data"), std::string::npos) << Error();
   Tick(25);
   EXPECT_NEAR(jaw0_deg(), held, 1.5);
 }
@@ -174,7 +190,7 @@ TEST_F(NodeTest, GarbageRaisesTheBaudAlarmAndMovesNothing) {
     TickSilently();
     ASSERT_NEAR(jaw0_deg(), before, 1.5);
   }
-  EXPECT_NE(Error().find("check the baud rate"), std::string::npos) << Error();
+  EXPECT_NE(Error().find("handle 0: garbage"), std::string::npos) << Error();
   EXPECT_GT(MetricOf("bad_lines"), 100);
   EXPECT_LT(state_.handles[0].quality, 0.5f);
 }
@@ -212,11 +228,11 @@ TEST_F(NodeTest, HangUpHoldsAndTheReturnGoesOn) {
   const double held = jaw0_deg();
   handle_[0]->phase = pedal_->phase = LinkPhase::kLost;
   TickSilently();
-  EXPECT_NE(Error().find("handle 0: hung up"), std::string::npos) << Error();
+  EXPECT_NE(Error().find("handle 0: hung-up"), std::string::npos) << Error();
   EXPECT_EQ(state_.pedals, kPedalNone);
   handle_[0]->phase = LinkPhase::kReconnecting;
   TickSilently();
-  EXPECT_NE(Error().find("handle 0: port not found"), std::string::npos) << Error();
+  EXPECT_NE(Error().find("handle 0: no-port"), std::string::npos) << Error();
   EXPECT_NEAR(jaw0_deg(), held, 1e-6);
   EXPECT_EQ(state_.handles[0].quality, 0.0f);
   handle_[0]->phase = pedal_->phase = LinkPhase::kOpen;
@@ -260,10 +276,9 @@ TEST_F(NodeTest, RestartTakesTheAngleFromTheFirstLineUnderANewEpoch) {
 
 TEST_F(NodeTest, AbsentHandleIsNeitherPublishedNorMissed) {
   HandleBridgeNode::Links links;
-  auto link = std::make_unique<MemoryLink>();
-  handle_[0] = link.get();
-  links.handles[0] = std::move(link);
-  node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), 3000);
+  links.handles[0] = MakeLink(&handle_[0]);
+  node_ =
+      std::make_unique<HandleBridgeNode>(config::CartConfig(), calibrations_, std::move(links), output_.get(), 3000);
   TickSilently();
   for (int i = 0; i < 100; ++i) {
     const auto line = firmware_.Line(20);
@@ -276,6 +291,126 @@ TEST_F(NodeTest, AbsentHandleIsNeitherPublishedNorMissed) {
   EXPECT_EQ(Error(), "");
 }
 
+TEST_F(NodeTest, FramesAreTakenAndTheirLossCounted) {
+  std::uint8_t sequence = 250;
+  for (int i = 0; i < 400; ++i, ++sequence) {
+    if (i % 10 == 9) {
+      TickSilently();
+      continue;
+    }
+    const auto line = FormatFrame({kLeftHandle, sequence, firmware_.Convert(25)});
+    handle_[0]->bytes.append(line.data(), line.size());
+    const auto pedal = FormatFrame({kPedalSender, static_cast<std::uint8_t>(i), kPedalCoag});
+    pedal_->bytes.append(pedal.data(), pedal.size());
+    const auto second = firmware_.Line(30);
+    handle_[1]->bytes.append(second.data(), second.size());
+    TickSilently();
+  }
+  EXPECT_NEAR(jaw0_deg(), 25, 1.5);
+  EXPECT_EQ(state_.pedals, kPedalCoag);
+  EXPECT_EQ(MetricOf("lost_frames"), 39 + 39);  // The last one of each is not missed yet.
+  EXPECT_EQ(Error(), "");
+}
+
+TEST_F(NodeTest, AnotherUnitsFramesAreRefusedAndNamed) {
+  for (int i = 0; i < 400; ++i) {
+    const auto line = FormatFrame({kRightHandle, static_cast<std::uint8_t>(i), 500});
+    handle_[0]->bytes.append(line.data(), line.size());
+    pedal_->bytes.append(line.data(), line.size());
+    handle_[1]->bytes.append(line.data(), line.size());
+    TickSilently();
+  }
+  EXPECT_FALSE(state_.handles[0].present);
+  EXPECT_TRUE(state_.handles[1].present);
+  EXPECT_EQ(Error(),
+            "handle 0: swapped: another unit is plugged in here: swap the plugs, or correct `hand` in the cart; "
+            "pedal: swapped");
+}
+
+TEST_F(NodeTest, WrongBaudIsToldFromGarbageAndMended) {
+  std::mt19937_64 random(4);
+  // Handle 0 speaks at 38400: at any other speed its bytes are noise. The pedal's line is noise at every speed.
+  for (int i = 0; i < 1200; ++i) {
+    if (handle_[0]->baud == 38400) {
+      const auto line = firmware_.Line(25);
+      handle_[0]->bytes.append(line.data(), line.size());
+    } else {
+      handle_[0]->bytes.append({static_cast<char>(random()), static_cast<char>(random())});
+    }
+    pedal_->bytes.append({static_cast<char>(random()), static_cast<char>(random())});
+    const auto second = firmware_.Line(30);
+    handle_[1]->bytes.append(second.data(), second.size());
+    TickSilently();
+  }
+  EXPECT_NEAR(jaw0_deg(), 25, 1.5);
+  EXPECT_EQ(state_.handles[0].quality, 1.0f);
+  EXPECT_EQ(Error().rfind("handle 0: wrong-baud: it speaks at another speed", 0), 0u) << Error();
+  EXPECT_NE(Error().find("; pedal: garbage"), std::string::npos) << Error();
+  EXPECT_EQ(MetricOf("reconnects"), 0);
+}
+
+TEST_F(NodeTest, EachUnitHasItsOwnCalibration) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("handle_node_test." + std::to_string(::getpid()));
+  // The same codes mean half the angle on unit B.
+  const CalibrationPoints half{{485.376, 520.192}, {0, 30}};
+  EXPECT_EQ(CalibrationStore::Save(folder, "B", half), folder / "B.yaml");
+  calibrations_ = CalibrationStore::Load(folder);
+  std::filesystem::remove_all(folder);
+  Restart(2000);
+  for (int i = 0; i < 100; ++i) {
+    Tick(40);
+  }
+  EXPECT_NEAR(jaw0_deg(), 40, 1.5);
+  EXPECT_EQ(MetricOf("calibration0_points"), 0);
+  handle_[0]->phase = LinkPhase::kReconnecting;
+  TickSilently();
+  handle_[0]->phase = LinkPhase::kOpen;
+  handle_[0]->fresh = true;
+  handle_[0]->serial_number = "B";
+  for (int i = 0; i < 100; ++i) {
+    Tick(40);
+  }
+  EXPECT_NEAR(jaw0_deg(), 20, 1.5);
+  EXPECT_EQ(MetricOf("calibration0_points"), 2);
+  EXPECT_EQ(MetricOf("calibration1_points"), 0);
+}
+
+TEST(CalibrationStore, RefusesADamagedFileWithItsName) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("handle_store_test." + std::to_string(::getpid()));
+  EXPECT_EQ(CalibrationStore::Load(folder).Find("A"), nullptr);  // No folder, no calibrations.
+  CalibrationStore::Save(folder, "/dev/a b", {{480, 490, 500}, {60, 30, 0}});
+  const CalibrationStore store = CalibrationStore::Load(folder);
+  ASSERT_NE(store.Find("/dev/a b"), nullptr);
+  EXPECT_EQ(store.Find("/dev/a b")->angles_deg, (std::vector<double>{60, 30, 0}));
+  for (const char* bad : {"unit: A\ncodes: [480, 479]\nangles_deg: [0, 60]\n", "unit: A\ncodes: [480]\n",
+                          "unit: A\ncodes: [480, 500]\nangles_deg: [0, 600]\n", ""}) {
+    std::ofstream(folder / "bad.yaml") << bad;
+    try {
+      static_cast<void>(CalibrationStore::Load(folder));
+      ADD_FAILURE() << bad;
+    } catch (const InputError& refused) {
+      EXPECT_NE(std::string(refused.what()).find("bad.yaml"), std::string::npos) << refused.what();
+    }
+  }
+  std::filesystem::remove_all(folder);
+}
+
+TEST(FaultsAt, FollowTheCartsWindows) {
+  config::SimulatedUnit unit;
+  unit.drop = 0.25;
+  unit.unplugged_s = {2, 3, 5, 6};
+  unit.silent_s = {5.5, 7};
+  EXPECT_EQ(FaultsAt(unit, 1).cable.drop_probability, 0.25);
+  EXPECT_FALSE(FaultsAt(unit, 1).unplugged);
+  EXPECT_TRUE(FaultsAt(unit, 2).unplugged);
+  EXPECT_FALSE(FaultsAt(unit, 3).unplugged);
+  EXPECT_TRUE(FaultsAt(unit, 5.7).unplugged);
+  EXPECT_TRUE(FaultsAt(unit, 5.7).silent);
+  EXPECT_FALSE(FaultsAt(unit, 99).silent);
+}
+
 TEST(FollowScript, GivesTheFirstKeyBeforeTheSessionAndThePedalsOfAllTools) {
   const std::array keys = {ScriptKey{1, 0, Vec3f::Zero(), 0.8f, 0, 0}, ScriptKey{3, 0, Vec3f::Zero(), 0.2f, 0, 0},
                            ScriptKey{0, 1, Vec3f::Zero(), 0.0f, 0, 0},
@@ -283,12 +418,12 @@ TEST(FollowScript, GivesTheFirstKeyBeforeTheSessionAndThePedalsOfAllTools) {
                            ScriptKey{4, 1, Vec3f::Zero(), 0.0f, 0, 0}};
   SceneView scene;
   scene.script = keys;
-  EXPECT_NEAR(FollowScript(scene, -1).jaw_deg[0], 0.8 * kDegPerRad, 1e-3);
-  EXPECT_EQ(FollowScript(scene, -1).pedals, 0);
-  EXPECT_NEAR(FollowScript(scene, 2).jaw_deg[0], 0.5 * kDegPerRad, 1e-3);
-  EXPECT_EQ(FollowScript(scene, 3.9).pedals, kPedalCut);
-  EXPECT_EQ(FollowScript(scene, 4).pedals, 0);
-  EXPECT_NEAR(FollowScript(scene, 99).jaw_deg[0], 0.2 * kDegPerRad, 1e-3);
+  EXPECT_NEAR(FollowScript(scene, {}, -1).jaw_deg[0], 0.8 * kDegPerRad, 1e-3);
+  EXPECT_EQ(FollowScript(scene, {}, -1).pedals, 0);
+  EXPECT_NEAR(FollowScript(scene, {}, 2).jaw_deg[0], 0.5 * kDegPerRad, 1e-3);
+  EXPECT_EQ(FollowScript(scene, {}, 3.9).pedals, kPedalCut);
+  EXPECT_EQ(FollowScript(scene, {}, 4).pedals, 0);
+  EXPECT_NEAR(FollowScript(scene, {}, 99).jaw_deg[0], 0.2 * kDegPerRad, 1e-3);
 }
 
 }  // namespace
