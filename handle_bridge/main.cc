@@ -6,6 +6,7 @@
 #include "handle_bridge/node/cart_links.h"
 #include "handle_bridge/node/handle_bridge_node.h"
 #include "services/app/node_app.h"
+#include "services/runtime/realtime.h"
 
 namespace {
 
@@ -19,9 +20,10 @@ fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
   const auto firmware = HasSimulatedLinks(app.cart())
                             ? std::make_unique<SimulatedFirmware>(follow_script, MakeSimulatedUnits(app.cart()))
                             : nullptr;
-  HandleBridgeNode node(app.cart(), CalibrationStore::Load(CalibrationFolder()),
-                        MakeCartLinks(app.cart(), firmware.get()), &app.MakeOutput<fulcrum::HandleState>(),
-                        fulcrum::runtime::MonotonicNs());
+  const CalibrationStore calibrations = CalibrationStore::Load(CalibrationFolder());
+  fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, calibrations.Describe());
+  HandleBridgeNode node(app.cart(), calibrations, MakeCartLinks(app.cart(), firmware.get()),
+                        &app.MakeOutput<fulcrum::HandleState>(), fulcrum::runtime::MonotonicNs());
   return app.Run(
       app.timing(), [&node](const fulcrum::Tick& tick) { node.Step(tick); },
       [&node](fulcrum::Health* health) { node.FillHealth(health); });

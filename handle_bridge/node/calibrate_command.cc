@@ -28,8 +28,8 @@ namespace {
 namespace po = boost::program_options;
 
 constexpr double kSettle_s = 0.3;   ///< After Enter: the hand moves when the other one types.
-constexpr double kHold_s = 2.0;     ///< What a point is taken from.
-constexpr double kSilence_s = 3.0;  ///< Without enough readings: the link is at fault.
+constexpr double kHold_s = 1.0;     ///< What a point is taken from.
+constexpr double kSilence_s = 1.0;  ///< Without enough readings: the link is at fault.
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
 constexpr const char* kUsage =

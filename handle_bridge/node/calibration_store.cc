@@ -50,6 +50,7 @@ fs::path CalibrationFolder() {
 
 CalibrationStore CalibrationStore::Load(const fs::path& folder) {
   CalibrationStore store;
+  store.folder_ = folder;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
     if (entry.path().extension() != ".yaml") {
@@ -89,6 +90,15 @@ fs::path CalibrationStore::Save(const fs::path& folder, const std::string& unit,
   }
   fs::rename(draft, path);
   return path;
+}
+
+std::string CalibrationStore::Describe() const {
+  std::string units;
+  for (const auto& [unit, points] : units_) {
+    units += (units.empty() ? " " : ", ") + unit;
+  }
+  return units.empty() ? "no stored calibrations in " + folder_.string() + ": the cart's are used"
+                       : "stored calibrations in " + folder_.string() + ":" + units;
 }
 
 const CalibrationPoints* CalibrationStore::Find(std::string_view unit) const noexcept {

@@ -22,10 +22,13 @@ class CalibrationStore {
   static std::filesystem::path Save(const std::filesystem::path& folder, const std::string& unit,
                                     const CalibrationPoints& points);
 
+  /// Units and folder, in one line for the log.
+  [[nodiscard]] std::string Describe() const;
   /// Null when the unit has none. Without allocation.
   [[nodiscard]] const CalibrationPoints* Find(std::string_view unit) const noexcept;
 
  private:
+  std::filesystem::path folder_;
   std::map<std::string, CalibrationPoints, std::less<>> units_;
 };
 

@@ -62,16 +62,20 @@ void JawChannel::TakeLine(LineFramer::Event event) noexcept {
       ++tick_counts_.other;
       break;
   }
-  if (reading.verdict == LineVerdict::kGood) {
+  const bool good = reading.verdict == LineVerdict::kGood;
+  if (good || reading.verdict == LineVerdict::kOutside || reading.verdict == LineVerdict::kJump) {
+    wiring_.Add(reading.verdict);
+  }
+  if (wiring_.faulty()) {
+    HoldAngle();  // The codes of a floating wire lie within the calibration now and then; they are no angles.
+    return;
+  }
+  if (good) {
     code_ = reading.code;
     holding_ = false;
     blind_s_ = 0;
-    wiring_.Add(reading.verdict);
     estimator_.Update(reading.code);
     return;
-  }
-  if (reading.verdict == LineVerdict::kOutside || reading.verdict == LineVerdict::kJump) {
-    wiring_.Add(reading.verdict);
   }
   // A bad line stands for one sample period, but noise with many line ends must not run ahead of the clock.
   if (owed_lines_ > -1 && !holding_) {

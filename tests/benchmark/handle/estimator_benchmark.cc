@@ -138,7 +138,7 @@ void PlotEstimators(benchmark::Report* report) {
   add("three", "IMM 3 modes", Imm({}));
   add("particles", "particles", [&] { return std::make_unique<ParticleFilter>(calibration, 1000, 1); });
   const std::filesystem::path file = std::filesystem::path(folder) / "handle_estimators.svg";
-  std::ofstream(file) << LagSvg(points, 20, 1.4);
+  std::ofstream(file) << LagSvg(points);
   std::fprintf(stderr, "wrote %s\n", file.c_str());
 }
 

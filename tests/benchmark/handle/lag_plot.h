@@ -14,7 +14,7 @@ struct LagPoint {
   double static_rms_deg = 0;
 };
 
-/// @param max_lag_ms, max_rms_deg what lies beyond is not drawn.
-[[nodiscard]] std::string LagSvg(const std::vector<LagPoint>& points, double max_lag_ms, double max_rms_deg);
+/// The lag's axis is a square root, for most of what matters lies below 2 ms; the targets are shaded.
+[[nodiscard]] std::string LagSvg(const std::vector<LagPoint>& points);
 
 }  // namespace fulcrum::handle_bridge

@@ -38,7 +38,7 @@ double SquaredError(const JawCalibration& calibration, const JawFirmwareSettings
 }
 
 JawCalibration Calibrated(JawFirmware* firmware, const std::vector<double>& angles_deg) {
-  constexpr int kReadings = 800;  // As the command takes.
+  constexpr int kReadings = 400;  // As the command takes.
   JawCalibrator calibrator;
   for (const double angle : angles_deg) {
     std::vector<int> codes;

@@ -209,6 +209,25 @@ TEST_F(NodeTest, BrokenWireIsNamed) {
   EXPECT_NEAR(jaw0_deg(), before, 1.5);
 }
 
+TEST_F(NodeTest, FloatingWireMovesNothing) {
+  for (int i = 0; i < 400; ++i) {
+    Tick(25);
+  }
+  std::mt19937_64 random(9);
+  double worst = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const auto line = firmware_.Format(static_cast<int>(random() % 1024));
+    handle_[0]->bytes.append(line.data(), line.size());
+    TickSilently();
+    worst = std::max(worst, std::abs(jaw0_deg() - 25));
+  }
+  EXPECT_LT(worst, 3.0);
+  for (int i = 0; i < 40; ++i) {
+    Tick(45);
+  }
+  EXPECT_NEAR(jaw0_deg(), 45, 1.5);  // Mended: it follows again.
+}
+
 TEST_F(NodeTest, StillJawForManySecondsIsHealthy) {
   for (int i = 0; i < 400 * 10; ++i) {
     const auto line = firmware_.Format(500);
