@@ -75,7 +75,7 @@ CalibrationStore CalibrationStore::Load(const fs::path& folder) {
 
 fs::path CalibrationStore::Save(const fs::path& folder, const std::string& unit, const CalibrationPoints& points) {
   fs::create_directories(folder);
-  const fs::path path = folder / FileName(unit);
+  fs::path path = folder / FileName(unit);
   const fs::path draft = path.string() + ".new";
   {
     std::ofstream out(draft);
