@@ -27,6 +27,14 @@ std::string FileName(const std::string& unit) {
   return name + ".yaml";
 }
 
+std::string Quoted(const std::string& text) {
+  std::string quoted = "'";
+  for (const char c : text) {
+    quoted += c == '\'' ? "''" : std::string(1, c);
+  }
+  return quoted + "'";
+}
+
 std::string List(const std::vector<double>& values) {
   std::string text;
   for (const double value : values) {
@@ -80,7 +88,7 @@ fs::path CalibrationStore::Save(const fs::path& folder, const std::string& unit,
   {
     std::ofstream out(draft);
     out << "# Taken in the hand by `handle_bridge calibrate`: jaw angles at codes of the converter.\n"
-        << "unit: \"" << unit << "\"\n"
+        << "unit: " << Quoted(unit) << "\n"
         << "codes: " << List(points.codes) << "\n"
         << "angles_deg: " << List(points.angles_deg) << "\n";
     out.flush();

@@ -1,4 +1,5 @@
 // Error and lag of the jaw estimator and of its alternatives on simulated hands.
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -89,6 +90,11 @@ JawCalibration PaperCalibration() {
 }
 
 void MeasureEstimator(benchmark::Report* report) {
+  const std::array keys = {"handle.static_rms_deg", "handle.motion_rms_deg", "handle.mixed_rms_deg",
+                           "handle.lag_ms",         "handle.step_us_p50",    "handle.raw_"};
+  if (std::none_of(keys.begin(), keys.end(), [report](const char* key) { return report->Wants(key); })) {
+    return;
+  }
   const int runs = report->quick() ? 20 : 60;
   const Errors imm = Measure(Imm({}), runs);
   const Errors raw = Measure([] { return std::make_unique<RawCode>(PaperCalibration()); }, runs);
@@ -106,7 +112,7 @@ void PlotEstimators(benchmark::Report* report) {
   if (!folder || !report->Wants("handle.estimators.")) {
     return;
   }
-  const int runs = report->quick() ? 3 : 12;
+  const int runs = report->quick() ? 3 : 6;
   const JawCalibration calibration = PaperCalibration();
   std::vector<LagPoint> points;
   const auto add = [&](const std::string& family, const std::string& label, const MakeFilter& make) {

@@ -204,6 +204,9 @@ void MeasureRecovery(benchmark::Report* report) {
 }
 
 void MeasureTick(benchmark::Report* report) {
+  if (!report->Wants("handle.tick_")) {
+    return;
+  }
   constexpr int kTicks = 20000;
   for (const bool framed : {false, true}) {
     JawChannel channel({JawLineSettings{}, JawEstimatorSettings{}, PaperCalibration()});

@@ -399,10 +399,10 @@ TEST(CalibrationStore, RefusesADamagedFileWithItsName) {
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("handle_store_test." + std::to_string(::getpid()));
   EXPECT_EQ(CalibrationStore::Load(folder).Find("A"), nullptr);  // No folder, no calibrations.
-  CalibrationStore::Save(folder, "/dev/a b", {{480, 490, 500}, {60, 30, 0}});
+  CalibrationStore::Save(folder, "/dev/\"a\" b's", {{480, 490, 500}, {60, 30, 0}});
   const CalibrationStore store = CalibrationStore::Load(folder);
-  ASSERT_NE(store.Find("/dev/a b"), nullptr);
-  EXPECT_EQ(store.Find("/dev/a b")->angles_deg, (std::vector<double>{60, 30, 0}));
+  ASSERT_NE(store.Find("/dev/\"a\" b's"), nullptr);
+  EXPECT_EQ(store.Find("/dev/\"a\" b's")->angles_deg, (std::vector<double>{60, 30, 0}));
   for (const char* bad : {"unit: A\ncodes: [480, 479]\nangles_deg: [0, 60]\n", "unit: A\ncodes: [480]\n",
                           "unit: A\ncodes: [480, 500]\nangles_deg: [0, 600]\n", ""}) {
     std::ofstream(folder / "bad.yaml") << bad;
