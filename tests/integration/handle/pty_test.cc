@@ -188,8 +188,8 @@ TEST(HandlePty, GarbageIsNeitherWrongBaudNorMotion) {
   noise.cable.garbage = true;
   chain.SetFaults(1, noise);
   EXPECT_TRUE(chain.WaitForError("handle 1: garbage: under half of the lines are valid, at no usual speed"));
-  // Long enough for two other speeds.
-  for (int i = 0; i < 700; ++i) {
+  // Long enough for another speed.
+  for (int i = 0; i < 450; ++i) {
     ASSERT_TRUE(chain.WaitFor([](const HandleState&) { return true; }));
     ASSERT_NEAR(chain.state.handles[1].jaw_angle_rad * kDegPerRad, 30, 1.5);
     ASSERT_EQ(chain.health().last_error.find("wrong-baud"), std::string::npos);
