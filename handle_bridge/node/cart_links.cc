@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <memory>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "handle_bridge/serial/serial_port.h"
 #include "services/core/operator_script.h"
@@ -10,17 +12,27 @@
 namespace fulcrum::handle_bridge {
 namespace {
 
-std::unique_ptr<ByteLink> MakeLink(config::LinkKind kind, const config::SerialLink& link, SimulatedFirmware* firmware,
-                                   int firmware_link) {
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+std::unique_ptr<WatchedLink> MakeLink(config::LinkKind kind, const config::SerialLink& link,
+                                      SimulatedFirmware* firmware, std::size_t firmware_link) {
+  std::unique_ptr<ByteSourceOpener> opener;
   switch (kind) {
     case config::LinkKind::kNone:
       return nullptr;
     case config::LinkKind::kSimulated:
-      return std::make_unique<ReconnectingLink>(firmware->MakeOpener(firmware_link, link.baud));
+      opener = firmware->MakeOpener(firmware_link);
+      break;
     case config::LinkKind::kSerial:
-      return std::make_unique<ReconnectingLink>(std::make_unique<SerialPortOpener>(link));
+      opener = std::make_unique<SerialPortOpener>(link);
+      break;
   }
-  return nullptr;
+  return std::make_unique<WatchedLink>(std::make_unique<ReconnectingLink>(std::move(opener), link.baud), link.baud);
+}
+
+bool Within(const std::vector<double>& ends_s, double time_s) {
+  // An odd number of ends lies behind.
+  return (std::upper_bound(ends_s.begin(), ends_s.end(), time_s) - ends_s.begin()) % 2 != 0;
 }
 
 }  // namespace
@@ -34,20 +46,49 @@ bool HasSimulatedLinks(const config::CartConfig& cart) {
 HandleBridgeNode::Links MakeCartLinks(const config::CartConfig& cart, SimulatedFirmware* firmware) {
   HandleBridgeNode::Links links;
   for (std::size_t tool = 0; tool < links.handles.size(); ++tool) {
-    links.handles[tool] = MakeLink(cart.handles[tool].kind, cart.handles[tool].link, firmware, static_cast<int>(tool));
+    links.handles[tool] = MakeLink(cart.handles[tool].kind, cart.handles[tool].link, firmware, tool);
   }
-  links.pedal = MakeLink(cart.pedal.kind, cart.pedal.link, firmware, SimulatedFirmware::kPedalLink);
+  links.pedal = MakeLink(cart.pedal.kind, cart.pedal.link, firmware, kPedalLink);
   return links;
 }
 
-OperatorInput FollowScript(const SceneView& scene, double session_time_s) {
-  constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+std::array<SimulatedUnit, kLinks> MakeSimulatedUnits(const config::CartConfig& cart) {
+  std::array<SimulatedUnit, kLinks> units = SimulatedFirmware::DefaultUnits();
+  for (std::size_t tool = 0; tool < cart.handles.size(); ++tool) {
+    const config::HandleConfig& handle = cart.handles[tool];
+    units[tool].framed = handle.simulated.protocol == config::LineProtocol::kFramed;
+    units[tool].sender = SenderOf(handle.hand);
+    JawFirmwareSettings& jaw = units[tool].jaw;
+    jaw.closed_V = handle.simulated.closed_V;
+    jaw.open_V = handle.simulated.open_V;
+    jaw.bow = handle.simulated.bow;
+    jaw.adc_step_V = handle.calibration.adc_step_V;
+    jaw.noise_V = handle.simulated.noise_V;
+    jaw.tremor_deg = kDegPerRad * handle.simulated.tremor_rad;
+  }
+  units[kPedalLink].framed = cart.pedal.simulated.protocol == config::LineProtocol::kFramed;
+  return units;
+}
+
+LinkFaults FaultsAt(const config::SimulatedUnit& unit, double session_time_s) {
+  LinkFaults faults;
+  faults.cable = {unit.drop, unit.flip, Within(unit.garbage_s, session_time_s)};
+  faults.silent = Within(unit.silent_s, session_time_s);
+  faults.wrong_baud = Within(unit.wrong_baud_s, session_time_s);
+  faults.broken_wire = Within(unit.broken_wire_s, session_time_s);
+  faults.unplugged = Within(unit.unplugged_s, session_time_s);
+  return faults;
+}
+
+OperatorInput FollowScript(const SceneView& scene, const config::CartConfig& cart, double session_time_s) {
   OperatorInput input;
   for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
     const ScriptPoint point = EvaluateScript(scene.script, tool, session_time_s);
     input.jaw_deg[tool] = kDegPerRad * point.jaw_rad;
     input.pedals = static_cast<std::uint8_t>(input.pedals | point.pedals);
+    input.faults[tool] = FaultsAt(cart.handles[tool].simulated, session_time_s);
   }
+  input.faults[kPedalLink] = FaultsAt(cart.pedal.simulated, session_time_s);
   return input;
 }
 

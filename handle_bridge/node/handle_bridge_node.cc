@@ -12,43 +12,38 @@ constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 /// One tick's bytes: 20 at 2.5 ms and 115200 baud carry 29; the rest is for the backlog of a late tick.
 constexpr std::size_t kReadBytes = 512;
 
-LinkState StateOf(LinkPhase phase, LinkState open_state) {
-  switch (phase) {
-    case LinkPhase::kOpen:
-      return open_state;
-    case LinkPhase::kLost:
-      return LinkState::kLost;
-    case LinkPhase::kReconnecting:
-      return LinkState::kReconnecting;
-  }
-  return open_state;
-}
-
 }  // namespace
 
-JawChannelSettings MakeJawChannelSettings(const config::HandleConfig& handle) {
+char SenderOf(config::Hand hand) { return hand == config::Hand::kLeft ? kLeftHandle : kRightHandle; }
+
+JawChannelSettings MakeJawChannelSettings(const config::HandleConfig& handle, const CalibrationPoints* stored) {
   const config::JawCalibration& c = handle.calibration;
-  std::vector<double> codes;
-  std::vector<double> angles_deg;
-  for (std::size_t i = 0; i < c.volts.size(); ++i) {
-    codes.push_back(c.volts[i] / c.adc_step_V);
-    angles_deg.push_back(c.angles_rad[i] / kRadPerDeg);
+  std::array<double, JawCalibration::kMaxPoints> codes{}, angles_deg{};
+  const std::size_t n = stored ? stored->codes.size() : c.volts.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    codes[i] = stored ? stored->codes[i] : c.volts[i] / c.adc_step_V;
+    angles_deg[i] = stored ? stored->angles_deg[i] : c.angles_rad[i] / kRadPerDeg;
   }
   JawLineSettings line;
+  line.sender = SenderOf(handle.hand);
   line.adc_step_V = c.adc_step_V;
-  line.min_code = static_cast<int>(std::lround(codes.front()));
-  line.max_code = static_cast<int>(std::lround(codes.back()));
+  line.min_code = static_cast<int>(std::lround(codes[0]));
+  line.max_code = static_cast<int>(std::lround(codes[n - 1]));
   JawEstimatorSettings estimator;
   estimator.adc_step_V = c.adc_step_V;
-  return {line, estimator, JawCalibration(codes, angles_deg)};
+  return {line, estimator, JawCalibration({codes.data(), n}, {angles_deg.data(), n})};
 }
 
-HandleBridgeNode::HandleBridgeNode(const config::CartConfig& cart, Links links, bus::Output<HandleState>* output,
-                                   std::int64_t epoch_ns)
-    : links_(std::move(links)), output_(output), stamper_(epoch_ns) {
+HandleBridgeNode::HandleBridgeNode(const config::CartConfig& cart, CalibrationStore calibrations, Links links,
+                                   bus::Output<HandleState>* output, std::int64_t epoch_ns)
+    : handles_(cart.handles),
+      calibrations_(std::move(calibrations)),
+      links_(std::move(links)),
+      output_(output),
+      stamper_(epoch_ns) {
   for (std::size_t tool = 0; tool < jaws_.size(); ++tool) {
     if (links_.handles[tool]) {
-      jaws_[tool].emplace(MakeJawChannelSettings(cart.handles[tool]));
+      jaws_[tool].emplace(MakeJawChannelSettings(handles_[tool], nullptr));
       snapshot_.links[tool].configured = true;
     }
   }
@@ -80,19 +75,27 @@ void HandleBridgeNode::DropBacklog() {
   // While the node waited for its session, a second of old lines has piled up in the kernel.
   constexpr int kMostReads = 64;  // 32 KiB: several times what a terminal holds.
   std::array<char, kReadBytes> buffer;
-  const auto drain = [&buffer](ByteLink* link, LinkHealth* health) {
-    for (int i = 0; link && i < kMostReads; ++i) {
-      const ByteLink::Result read = link->Read(buffer);
-      health->connections += read.fresh ? 1 : 0;
-      if (read.bytes < buffer.size()) {
-        return;
-      }
+  const auto drain = [&buffer](WatchedLink* link) {
+    for (int i = 0; link && i < kMostReads && link->Read(buffer).bytes == buffer.size(); ++i) {
     }
   };
   for (std::size_t tool = 0; tool < jaws_.size(); ++tool) {
-    drain(links_.handles[tool].get(), &snapshot_.links[tool]);
+    drain(links_.handles[tool].get());
+    if (links_.handles[tool]) {
+      TakeCalibration(tool);
+    }
   }
-  drain(links_.pedal.get(), &snapshot_.links[kMaxTools]);
+  drain(links_.pedal.get());
+}
+
+void HandleBridgeNode::TakeCalibration(std::size_t tool) {
+  const CalibrationPoints* stored = calibrations_.Find(links_.handles[tool]->unit());
+  if (stored == in_use_[tool]) {
+    return;  // The same handle is back: its angle is held until it speaks.
+  }
+  in_use_[tool] = stored;
+  jaws_[tool]->SetUnit(MakeJawChannelSettings(handles_[tool], stored));
+  snapshot_.links[tool].calibration_points = stored ? static_cast<std::uint32_t>(stored->codes.size()) : 0;
 }
 
 HandleSample HandleBridgeNode::ReadHandle(std::size_t tool, double dt_s) {
@@ -100,20 +103,23 @@ HandleSample HandleBridgeNode::ReadHandle(std::size_t tool, double dt_s) {
     return {};
   }
   JawChannel& jaw = *jaws_[tool];
+  WatchedLink& link = *links_.handles[tool];
   LinkHealth& health = snapshot_.links[tool];
   std::array<char, kReadBytes> buffer;
-  const ByteLink::Result read = links_.handles[tool]->Read(buffer);
+  const ByteLink::Result read = link.Read(buffer);
   if (read.fresh) {
+    TakeCalibration(tool);
     jaw.Reconnected();
-    ++health.connections;
   }
   if (read.phase == LinkPhase::kOpen) {
     jaw.Tick({buffer.data(), read.bytes}, dt_s);
+    link.Judge(jaw.tick_counts(), dt_s);
   } else {
     jaw.Disconnected();
   }
   const JawEstimate estimate = jaw.estimate();
-  health.state = StateOf(read.phase, jaw.state());
+  health.state = link.state(jaw.state());
+  health.reconnects = link.reconnects();
   health.quality = jaw.quality();
   health.jaw_deg = static_cast<float>(estimate.angle_deg);
   health.totals = jaw.totals();
@@ -135,14 +141,15 @@ std::uint8_t HandleBridgeNode::ReadPedals(double dt_s) {
   const ByteLink::Result read = links_.pedal->Read(buffer);
   if (read.fresh) {
     pedal_.Reconnected();
-    ++health.connections;
   }
   if (read.phase == LinkPhase::kOpen) {
     pedal_.Tick({buffer.data(), read.bytes}, dt_s);
+    links_.pedal->Judge(pedal_.tick_counts(), dt_s);
   } else {
     pedal_.Disconnected();
   }
-  health.state = StateOf(read.phase, pedal_.state());
+  health.state = links_.pedal->state(pedal_.state());
+  health.reconnects = links_.pedal->reconnects();
   health.totals = pedal_.totals();
   snapshot_.pedals = pedal_.pedals();
   return snapshot_.pedals;
@@ -158,20 +165,27 @@ void HandleBridgeNode::FillHealth(Health* health) const {
       continue;
     }
     sum += link.totals;
-    reconnects += link.connections > 1 ? link.connections - 1 : 0;
-    if (s.stepping && link.state != LinkState::kOk && health->last_error.empty()) {
-      health->last_error = i < kMaxTools ? std::string("handle ") + std::to_string(i) : "pedal";
-      health->last_error += std::string(": ") + Explain(link.state);
+    reconnects += link.reconnects;
+    if (s.stepping && link.state != LinkState::kOk) {
+      // What to do is said for the first; for the others there is room for what it is.
+      const bool first = health->last_error.empty();
+      health->last_error += first ? "" : "; ";
+      health->last_error += i < kMaxTools ? std::string("handle ") + std::to_string(i) : "pedal";
+      health->last_error +=
+          std::string(": ") + Code(link.state) + (first ? std::string(": ") + Explain(link.state) : "");
       health->state = HealthState::kDegraded;
     }
     if (i < kMaxTools) {
       const std::string index = std::to_string(i);
       health->metrics.push_back({std::string("jaw") + index + "_deg", link.jaw_deg});
       health->metrics.push_back({std::string("quality") + index, link.quality});
+      health->metrics.push_back(
+          {std::string("calibration") + index + "_points", static_cast<double>(link.calibration_points)});
     }
   }
   health->metrics.push_back({"lines", static_cast<double>(sum.lines())});
-  health->metrics.push_back({"bad_lines", static_cast<double>(sum.malformed + sum.off_grid + sum.implausible)});
+  health->metrics.push_back({"bad_lines", static_cast<double>(sum.lines() - sum.good)});
+  health->metrics.push_back({"lost_frames", static_cast<double>(sum.lost)});
   health->metrics.push_back({"reconnects", static_cast<double>(reconnects)});
   health->metrics.push_back({"pedals", static_cast<double>(s.pedals)});
 }

@@ -7,9 +7,10 @@
 #include <optional>
 #include <vector>
 
+#include "handle_bridge/node/calibration_store.h"
 #include "handle_bridge/node/jaw_channel.h"
 #include "handle_bridge/node/pedal_channel.h"
-#include "handle_bridge/serial/byte_link.h"
+#include "handle_bridge/node/watched_link.h"
 #include "services/bus/input_account.h"
 #include "services/bus/port.h"
 #include "services/config/cart.h"
@@ -19,20 +20,26 @@
 
 namespace fulcrum::handle_bridge {
 
-/// Settings of a handle's channel from the cart: calibration in codes, and the range of codes that it covers.
-[[nodiscard]] JawChannelSettings MakeJawChannelSettings(const config::HandleConfig& handle);
+/// The letter of a hand's frames.
+[[nodiscard]] char SenderOf(config::Hand hand);
+
+/// Settings of a handle's channel: calibration in codes (`stored`, or the cart's when null), and the range of codes
+/// that it covers.
+[[nodiscard]] JawChannelSettings MakeJawChannelSettings(const config::HandleConfig& handle,
+                                                        const CalibrationPoints* stored);
 
 class HandleBridgeNode {
  public:
   /// A link is null where the cart has none.
   struct Links {
-    std::array<std::unique_ptr<ByteLink>, kMaxTools> handles;
-    std::unique_ptr<ByteLink> pedal;
+    std::array<std::unique_ptr<WatchedLink>, kMaxTools> handles;
+    std::unique_ptr<WatchedLink> pedal;
   };
 
+  /// @param calibrations of units that may be plugged in, now or later.
   /// @param epoch_ns CLOCK_MONOTONIC now [ns].
-  HandleBridgeNode(const config::CartConfig& cart, Links links, bus::Output<HandleState>* output,
-                   std::int64_t epoch_ns);
+  HandleBridgeNode(const config::CartConfig& cart, CalibrationStore calibrations, Links links,
+                   bus::Output<HandleState>* output, std::int64_t epoch_ns);
 
   /// Reads, estimates, publishes.
   void Step(const Tick& tick);
@@ -45,7 +52,8 @@ class HandleBridgeNode {
     LinkState state = LinkState::kReconnecting;
     float quality = 0;
     float jaw_deg = 0;
-    std::uint32_t connections = 0;
+    std::uint32_t reconnects = 0;
+    std::uint32_t calibration_points = 0;  // Of the stored calibration in use; 0: the cart's.
     LinkCounts totals;
   };
   struct Snapshot {
@@ -55,9 +63,13 @@ class HandleBridgeNode {
   };
 
   void DropBacklog();
+  void TakeCalibration(std::size_t tool);
   [[nodiscard]] HandleSample ReadHandle(std::size_t tool, double dt_s);
   [[nodiscard]] std::uint8_t ReadPedals(double dt_s);
 
+  std::array<config::HandleConfig, kMaxTools> handles_;
+  CalibrationStore calibrations_;
+  std::array<const CalibrationPoints*, kMaxTools> in_use_{};  // Of calibrations_; null: the cart's.
   Links links_;
   std::array<std::optional<JawChannel>, kMaxTools> jaws_;
   PedalChannel pedal_;

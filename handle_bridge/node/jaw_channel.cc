@@ -43,6 +43,7 @@ void JawChannel::Tick(std::span<const char> bytes, double dt_s) noexcept {
 void JawChannel::TakeLine(LineFramer::Event event) noexcept {
   --owed_lines_;
   const JawReading reading = event == LineFramer::Event::kLine ? gate_.Check(framer_.line()) : JawReading{};
+  tick_counts_.lost += reading.lost;
   switch (reading.verdict) {
     case LineVerdict::kGood:
       ++tick_counts_.good;
@@ -57,17 +58,24 @@ void JawChannel::TakeLine(LineFramer::Event event) noexcept {
     case LineVerdict::kJump:
       ++tick_counts_.implausible;
       break;
+    case LineVerdict::kOther:
+      ++tick_counts_.other;
+      break;
   }
-  if (reading.verdict == LineVerdict::kGood) {
+  const bool good = reading.verdict == LineVerdict::kGood;
+  if (good || reading.verdict == LineVerdict::kOutside || reading.verdict == LineVerdict::kJump) {
+    wiring_.Add(reading.verdict);
+  }
+  if (wiring_.faulty()) {
+    HoldAngle();  // The codes of a floating wire lie within the calibration now and then; they are no angles.
+    return;
+  }
+  if (good) {
     code_ = reading.code;
     holding_ = false;
     blind_s_ = 0;
-    wiring_.Add(reading.verdict);
     estimator_.Update(reading.code);
     return;
-  }
-  if (reading.verdict == LineVerdict::kOutside || reading.verdict == LineVerdict::kJump) {
-    wiring_.Add(reading.verdict);
   }
   // A bad line stands for one sample period, but noise with many line ends must not run ahead of the clock.
   if (owed_lines_ > -1 && !holding_) {
@@ -84,11 +92,17 @@ void JawChannel::HoldAngle() noexcept {
   owed_lines_ = 0;
 }
 
+void JawChannel::SetUnit(const JawChannelSettings& settings) noexcept {
+  gate_ = JawLineGate(settings.line);
+  estimator_ = JawEstimator(settings.estimator, settings.calibration);
+}
+
 void JawChannel::Reconnected() noexcept {
   framer_.Reset();
   monitor_.Reset();
   wiring_.Reset();
   HoldAngle();
+  gate_.Reconnected();
   connected_ = true;
 }
 

@@ -22,6 +22,8 @@ class JawChannel {
 
   /// One tick of the open link, `dt_s` after the last one.
   void Tick(std::span<const char> bytes, double dt_s) noexcept;
+  /// Another unit, or the first one that is known: from now on its calibration.
+  void SetUnit(const JawChannelSettings& settings) noexcept;
   /// A new connection: the half line and the suspicions of the old one are void, the angle stays.
   void Reconnected() noexcept;
   /// One tick without connection: the angle is held.
@@ -32,6 +34,8 @@ class JawChannel {
   [[nodiscard]] int code() const noexcept { return code_; }
   [[nodiscard]] float quality() const noexcept { return connected_ ? monitor_.quality() : 0.0f; }
   [[nodiscard]] LinkState state() const noexcept;
+  /// Of the last tick.
+  [[nodiscard]] const LinkCounts& tick_counts() const noexcept { return tick_counts_; }
   /// Since the start.
   [[nodiscard]] const LinkCounts& totals() const noexcept { return totals_; }
 

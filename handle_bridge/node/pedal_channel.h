@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "handle_bridge/protocol/frame.h"
 #include "handle_bridge/protocol/line_framer.h"
 #include "handle_bridge/protocol/link_monitor.h"
 
@@ -20,11 +21,18 @@ class PedalChannel {
   /// PedalBits; none when the last valid line is older than kPedalTimeout_s.
   [[nodiscard]] std::uint8_t pedals() const noexcept { return pedals_; }
   [[nodiscard]] LinkState state() const noexcept { return monitor_.state(); }
+  /// Of the last tick.
+  [[nodiscard]] const LinkCounts& tick_counts() const noexcept { return tick_counts_; }
+  /// Since the start.
   [[nodiscard]] const LinkCounts& totals() const noexcept { return totals_; }
 
  private:
+  void TakeLine(std::string_view line) noexcept;
+
   LineFramer framer_;
+  SequenceCounter sequence_;
   LinkMonitor monitor_;
+  LinkCounts tick_counts_;
   LinkCounts totals_;
   double age_s_ = 0;
   std::uint8_t pedals_ = 0;

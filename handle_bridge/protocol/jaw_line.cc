@@ -31,6 +31,17 @@ std::optional<int> ParseVoltage(std::string_view line) noexcept {
 }
 
 JawReading JawLineGate::Check(std::string_view line) noexcept {
+  if (IsFramed(line)) {
+    const std::optional<Frame> frame = ParseFrame(line);
+    if (!frame || frame->sender != settings_.sender) {
+      Miss();
+      return {frame ? LineVerdict::kOther : LineVerdict::kMalformed, 0};
+    }
+    const std::uint32_t lost = sequence_.Lost(frame->sequence);
+    JawReading reading = frame->value <= kMaxCode ? CheckCode(frame->value) : JawReading{};
+    reading.lost = lost;
+    return reading;
+  }
   const std::optional<int> units = ParseVoltage(line);
   if (!units) {
     Miss();
@@ -42,6 +53,10 @@ JawReading JawLineGate::Check(std::string_view line) noexcept {
     Miss();
     return {LineVerdict::kOffGrid, 0};
   }
+  return CheckCode(code);
+}
+
+JawReading JawLineGate::CheckCode(int code) noexcept {
   if (code < settings_.min_code - kOutsideMargin || code > settings_.max_code + kOutsideMargin) {
     Miss();
     return {LineVerdict::kOutside, code};
@@ -62,6 +77,12 @@ JawReading JawLineGate::Check(std::string_view line) noexcept {
 
 void JawLineGate::Miss() noexcept { allowed_jump_ = std::min(allowed_jump_ + 1, kMaxCode); }
 
-void JawLineGate::Reset() noexcept { *this = JawLineGate(settings_); }
+void JawLineGate::Reset() noexcept {
+  const SequenceCounter sequence = sequence_;
+  Reconnected();
+  sequence_ = sequence;
+}
+
+void JawLineGate::Reconnected() noexcept { *this = JawLineGate(settings_); }
 
 }  // namespace fulcrum::handle_bridge

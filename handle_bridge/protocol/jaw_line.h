@@ -1,9 +1,12 @@
-// The handle's line protocol: a 10-bit code of the jaw potentiometer as `d.dddd` volts, 400 lines a second.
+// The handle's lines: a 10-bit code of the jaw potentiometer, 400 lines a second, as `d.dddd` volts (the paper's line)
+// or in a frame (frame.h). Which of the two is told from each line by itself.
 #pragma once
 
 #include <cstdint>
 #include <optional>
 #include <string_view>
+
+#include "handle_bridge/protocol/frame.h"
 
 namespace fulcrum::handle_bridge {
 
@@ -15,13 +18,15 @@ inline constexpr int kMaxCode = 1023;  ///< 10-bit converter.
 
 enum class LineVerdict {
   kGood,
-  kMalformed,  ///< Not `d.dddd`.
+  kMalformed,  ///< Neither `d.dddd` nor a whole frame.
   kOffGrid,    ///< Well formed, but no multiple of the converter's step: a damaged digit, or another step.
   kOutside,    ///< A true code, but beyond the calibrated ones: wiring.
   kJump,       ///< Too far from the last good code to be a jaw.
+  kOther,      ///< A whole frame, but of the other handle or the pedal: plugs are swapped.
 };
 
 struct JawLineSettings {
+  char sender = kLeftHandle;  ///< Whose frames are taken.
   double adc_step_V = 5.0 / 1024;
   int min_code = 485;  ///< Calibrated codes, closed interval.
   int max_code = 521;
@@ -29,7 +34,8 @@ struct JawLineSettings {
 
 struct JawReading {
   LineVerdict verdict = LineVerdict::kMalformed;
-  int code = 0;  ///< Set unless malformed or off grid.
+  int code = 0;            ///< Set unless malformed, off grid or another's.
+  std::uint32_t lost = 0;  ///< Frames missing just before this one.
 };
 
 /// Strict gate from lines to codes. A reading is used only if its verdict is kGood.
@@ -41,12 +47,16 @@ class JawLineGate {
  public:
   explicit JawLineGate(const JawLineSettings& settings) : settings_(settings) {}
 
+  /// @param line without CR LF.
   JawReading Check(std::string_view line) noexcept;
 
   /// A sample period passed without a usable line: the jaw may have moved further.
   void Miss() noexcept;
 
+  /// After a silence: any code may be next.
   void Reset() noexcept;
+  /// After a new connection: also any sequence number.
+  void Reconnected() noexcept;
 
   /// Tolerances, public for the tests.
   static constexpr double kGridTolerance = 0.0125;  ///< Counts; rounding to 0.0001 V is 0.0103 counts.
@@ -55,7 +65,10 @@ class JawLineGate {
   static constexpr int kAgreeing = 3;       ///< Jumped codes that agree with each other are the truth.
 
  private:
+  [[nodiscard]] JawReading CheckCode(int code) noexcept;
+
   JawLineSettings settings_;
+  SequenceCounter sequence_;
   int last_code_ = -1;
   int allowed_jump_ = kMaxJump;
   int candidate_ = -1;

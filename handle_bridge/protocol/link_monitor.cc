@@ -4,32 +4,62 @@
 
 namespace fulcrum::handle_bridge {
 
+const char* Code(LinkState state) {
+  switch (state) {
+    case LinkState::kOk:
+      return "ok";
+    case LinkState::kNoData:
+      return "no-data";
+    case LinkState::kGarbage:
+      return "garbage";
+    case LinkState::kWrongBaud:
+      return "wrong-baud";
+    case LinkState::kWrongStep:
+      return "wrong-step";
+    case LinkState::kWiring:
+      return "wire";
+    case LinkState::kSwapped:
+      return "swapped";
+    case LinkState::kLost:
+      return "hung-up";
+    case LinkState::kReconnecting:
+      return "no-port";
+  }
+  return "";
+}
+
 const char* Explain(LinkState state) {
   switch (state) {
     case LinkState::kOk:
       return "";
     case LinkState::kNoData:
-      return "no data: check that the handle is powered and its transmit wire connected";
+      return "no bytes: check that it is powered and its transmit wire connected";
     case LinkState::kGarbage:
-      return "less than half of the lines are valid: check the baud rate (115200 8N1)";
+      return "under half of the lines are valid, at no usual speed: check cable, ground and what is plugged in";
+    case LinkState::kWrongBaud:
+      return "it speaks at another speed than the cart says; used as found: correct `baud` in the cart";
     case LinkState::kWrongStep:
       return "voltages are not multiples of adc_step_V: set the step of this handle's converter";
     case LinkState::kWiring:
-      return "codes outside the calibration or jumping: check the potentiometer's wires";
+      return "codes outside the calibration or jumping: check the potentiometer's wires, or calibrate";
+    case LinkState::kSwapped:
+      return "another unit is plugged in here: swap the plugs, or correct `hand` in the cart";
     case LinkState::kLost:
-      return "hung up: unplugged or powered off";
+      return "unplugged or powered off: plug it in, it is found by itself";
     case LinkState::kReconnecting:
       return "port not found: plug the adapter in; it is looked for four times a second";
   }
   return "";
 }
 
-LinkCounts& LinkCounts::operator+=(const LinkCounts& other) {
-  bytes += other.bytes;
-  good += other.good;
-  malformed += other.malformed;
-  off_grid += other.off_grid;
-  implausible += other.implausible;
+LinkCounts& LinkCounts::operator+=(const LinkCounts& more) {
+  bytes += more.bytes;
+  good += more.good;
+  malformed += more.malformed;
+  off_grid += more.off_grid;
+  implausible += more.implausible;
+  other += more.other;
+  lost += more.lost;
   return *this;
 }
 
@@ -73,11 +103,13 @@ LinkState LinkMonitor::state() const {
     return LinkState::kOk;
   }
   const LinkCounts sum = Sum();
-  const std::uint32_t formed = sum.good + sum.implausible;
-  if (2 * formed >= sum.lines() && sum.lines() > 0) {
+  if (2 * (sum.good + sum.implausible) >= sum.lines() && sum.lines() > 0) {
     return LinkState::kOk;
   }
-  return sum.off_grid > sum.malformed ? LinkState::kWrongStep : LinkState::kGarbage;
+  if (std::max(sum.other, sum.off_grid) <= sum.malformed) {
+    return LinkState::kGarbage;
+  }
+  return sum.other > sum.off_grid ? LinkState::kSwapped : LinkState::kWrongStep;
 }
 
 }  // namespace fulcrum::handle_bridge

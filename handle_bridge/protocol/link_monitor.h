@@ -9,14 +9,18 @@ namespace fulcrum::handle_bridge {
 enum class LinkState : std::uint8_t {
   kOk,
   kNoData,        ///< Open, but silent.
-  kGarbage,       ///< Bytes arrive, but less than half of the lines are valid: usually another baud rate.
+  kGarbage,       ///< Bytes arrive, but less than half of the lines are valid, and no usual speed makes them so.
+  kWrongBaud,     ///< Valid lines, at another speed than the cart's.
   kWrongStep,     ///< Lines are well formed but off the converter's grid: another adc_step_V.
   kWiring,        ///< True codes outside calibration or jumping.
+  kSwapped,       ///< Whole frames, but of the other handle or the pedal.
   kLost,          ///< Hung up: unplugged or powered off.
   kReconnecting,  ///< Looking for the port.
 };
 
-/// One line for people: what is wrong and what to do. Empty for kOk.
+/// A word for lists and searches, "wrong-baud"; "ok" for kOk.
+const char* Code(LinkState state);
+/// What is wrong and what to do, in one line for people. Empty for kOk.
 const char* Explain(LinkState state);
 
 /// Counts of one tick.
@@ -26,8 +30,12 @@ struct LinkCounts {
   std::uint32_t malformed = 0;  ///< Lines that are none.
   std::uint32_t off_grid = 0;
   std::uint32_t implausible = 0;  ///< Outside or jumping.
-  [[nodiscard]] std::uint32_t lines() const { return good + malformed + off_grid + implausible; }
-  LinkCounts& operator+=(const LinkCounts& other);
+  std::uint32_t other = 0;        ///< Of another sender.
+  std::uint32_t lost = 0;         ///< Frames that the sequence misses: lost whole, or malformed.
+  [[nodiscard]] std::uint32_t lines() const { return formed() + malformed; }
+  /// Lines that only a sender at our speed can have sent.
+  [[nodiscard]] std::uint32_t formed() const { return good + off_grid + implausible + other; }
+  LinkCounts& operator+=(const LinkCounts& more);
 };
 
 /// Sliding window of 0.5 s in ten slots.
@@ -43,7 +51,7 @@ class LinkMonitor {
 
   /// Share of the window's lines that were used, 0 … 1; 0 while silent.
   [[nodiscard]] float quality() const;
-  /// kOk, kNoData, kGarbage or kWrongStep. kOk until half a second has been seen, unless silent.
+  /// kOk, kNoData, kGarbage, kWrongStep or kSwapped. kOk until half a second has been seen, unless silent.
   [[nodiscard]] LinkState state() const;
 
  private:

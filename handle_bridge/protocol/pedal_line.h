@@ -2,8 +2,9 @@
 //
 //   P h c CR LF      h: pedal bits as one hexadecimal digit, c: its complement (15 - h), for example `P1E` = cut.
 //
-// Sent at once when a pedal moves and every 20 ms otherwise. The complement refuses every damaged digit; silence for
-// 200 ms counts as all pedals up, because the generator must not stay on behind a broken wire.
+// or, with sequence and checksum, the frame of frame.h with the bits as its value. Sent at once when a pedal moves and
+// every 20 ms otherwise. The complement refuses every damaged digit; silence for 200 ms counts as all pedals up,
+// because the generator must not stay on behind a broken wire.
 #pragma once
 
 #include <array>
@@ -17,10 +18,10 @@ inline constexpr double kPedalPeriod_s = 0.02;
 inline constexpr double kPedalTimeout_s = 0.2;
 inline constexpr std::uint8_t kAllPedals = 7;  ///< kPedalCut | kPedalCoag | kPedalBlend
 
-/// Pedal bits of a line without its CR LF, or nothing.
+/// Pedal bits of a plain line without its CR LF, or nothing.
 [[nodiscard]] std::optional<std::uint8_t> ParsePedals(std::string_view line) noexcept;
 
-/// The line with CR LF.
+/// The plain line with CR LF.
 [[nodiscard]] std::array<char, 5> FormatPedals(std::uint8_t pedals) noexcept;
 
 }  // namespace fulcrum::handle_bridge

@@ -5,8 +5,8 @@
 
 namespace fulcrum::handle_bridge {
 
-ReconnectingLink::ReconnectingLink(std::unique_ptr<ByteSourceOpener> opener)
-    : opener_(std::move(opener)), thread_([this](const std::stop_token& stop) { Connect(stop); }) {}
+ReconnectingLink::ReconnectingLink(std::unique_ptr<ByteSourceOpener> opener, int baud)
+    : opener_(std::move(opener)), baud_(baud), thread_([this](const std::stop_token& stop) { Connect(stop); }) {}
 
 ReconnectingLink::~ReconnectingLink() = default;
 
@@ -39,6 +39,21 @@ ByteLink::Result ReconnectingLink::Read(std::span<char> buffer) noexcept {
   return result;
 }
 
+bool ReconnectingLink::SetBaud(int baud) noexcept {
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock.owns_lock()) {
+    return false;
+  }
+  baud_ = baud;
+  if (std::unique_ptr<ByteSource>& open = current_ ? current_ : fresh_) {
+    dead_ = std::move(open);
+    wanted_ = true;
+    searched_ = false;
+    wake_.notify_one();
+  }
+  return true;
+}
+
 void ReconnectingLink::Connect(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
@@ -47,11 +62,14 @@ void ReconnectingLink::Connect(const std::stop_token& stop) {
       return;
     }
     std::unique_ptr<ByteSource> dead = std::move(dead_);
+    const int baud = baud_;
     lock.unlock();
     dead.reset();  // Before opening: some drivers give one name to one holder only.
-    std::unique_ptr<ByteSource> opened = opener_->Open();
+    std::unique_ptr<ByteSource> opened = opener_->Open(baud);
     lock.lock();
-    if (opened) {
+    if (opened && baud != baud_) {
+      dead_ = std::move(opened);  // Another speed was asked for meanwhile.
+    } else if (opened) {
       fresh_ = std::move(opened);
       wanted_ = false;
     } else {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <span>
+#include <string_view>
 #include <thread>
 
 #include "handle_bridge/serial/byte_source.h"
@@ -29,6 +30,10 @@ class ByteLink {
   };
   /// Cyclic thread; never waits.
   virtual Result Read(std::span<char> buffer) noexcept = 0;
+  /// Serial number of the unit that is connected; empty when none is. Cyclic thread.
+  [[nodiscard]] virtual std::string_view unit() const noexcept = 0;
+  /// Opens the link anew at another speed. Cyclic thread; false: not now, ask again.
+  virtual bool SetBaud(int baud) noexcept = 0;
 };
 
 class ReconnectingLink final : public ByteLink {
@@ -36,10 +41,14 @@ class ReconnectingLink final : public ByteLink {
   /// How often a missing port is looked for.
   static constexpr int kRetry_ms = 250;
 
-  explicit ReconnectingLink(std::unique_ptr<ByteSourceOpener> opener);
+  ReconnectingLink(std::unique_ptr<ByteSourceOpener> opener, int baud);
   ~ReconnectingLink() override;
 
   Result Read(std::span<char> buffer) noexcept override;
+  [[nodiscard]] std::string_view unit() const noexcept override {
+    return current_ ? current_->unit() : std::string_view();
+  }
+  bool SetBaud(int baud) noexcept override;
 
  private:
   void Connect(const std::stop_token& stop);
@@ -52,6 +61,7 @@ class ReconnectingLink final : public ByteLink {
   std::condition_variable_any wake_;
   std::unique_ptr<ByteSource> fresh_;  // Guarded by mutex_: opened, not yet taken by the reader.
   std::unique_ptr<ByteSource> dead_;   // Guarded: hung up, to be closed by the thread.
+  int baud_;                           // Guarded.
   bool wanted_ = true;                 // Guarded: the reader has no connection.
   bool searched_ = false;              // Guarded: at least one attempt has failed since the hang-up.
   std::jthread thread_;                // Last: stopped and joined before the rest goes.

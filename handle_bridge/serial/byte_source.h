@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
-#include <string>
+#include <string_view>
 
 namespace fulcrum::handle_bridge {
 
@@ -19,6 +19,8 @@ class ByteSource {
   virtual ~ByteSource() = default;
   /// Takes what has arrived, without waiting.
   virtual ReadResult Read(std::span<char> buffer) noexcept = 0;
+  /// Serial number of the unit at the other end, or what comes closest; the same as long as it is open.
+  [[nodiscard]] virtual std::string_view unit() const noexcept = 0;
 };
 
 /// Finds and opens it, again after each hang-up.
@@ -26,7 +28,7 @@ class ByteSourceOpener {
  public:
   virtual ~ByteSourceOpener() = default;
   /// Null when it is not there (yet); may take milliseconds, so not for a cyclic thread. Bytes from before are dropped.
-  virtual std::unique_ptr<ByteSource> Open() = 0;
+  virtual std::unique_ptr<ByteSource> Open(int baud) = 0;
 };
 
 }  // namespace fulcrum::handle_bridge

@@ -26,7 +26,7 @@ constexpr std::array<std::pair<int, speed_t>, 8> kSpeeds = {{{9600, B9600},
 
 class TerminalSource final : public ByteSource {
  public:
-  explicit TerminalSource(FileDescriptor fd) : fd_(std::move(fd)) {}
+  TerminalSource(FileDescriptor fd, std::string unit) : fd_(std::move(fd)), unit_(std::move(unit)) {}
 
   ReadResult Read(std::span<char> buffer) noexcept override {
     // poll(), and read() when nothing is there, wait for the kernel's worker that moves bytes into the terminal, and
@@ -44,8 +44,11 @@ class TerminalSource final : public ByteSource {
     return {static_cast<std::size_t>(std::max<ssize_t>(read, 0)), read < 0 && errno == EIO};
   }
 
+  [[nodiscard]] std::string_view unit() const noexcept override { return unit_; }
+
  private:
   FileDescriptor fd_;
+  std::string unit_;
 };
 
 bool SetRaw(int fd, int baud) {
@@ -95,16 +98,16 @@ int PseudoTerminal::ReaderBaud() const noexcept {
   return 0;
 }
 
-std::unique_ptr<ByteSource> TerminalOpener::Open() {
+std::unique_ptr<ByteSource> TerminalOpener::Open(int baud) {
   const std::string device = device_();
   if (device.empty()) {
     return nullptr;
   }
   FileDescriptor fd(::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
-  if (!fd.valid() || !SetRaw(fd.get(), baud_)) {
+  if (!fd.valid() || !SetRaw(fd.get(), baud)) {
     return nullptr;
   }
-  return std::make_unique<TerminalSource>(std::move(fd));
+  return std::make_unique<TerminalSource>(std::move(fd), unit_);
 }
 
 }  // namespace fulcrum::handle_bridge

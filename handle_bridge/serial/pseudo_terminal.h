@@ -29,15 +29,17 @@ class PseudoTerminal {
   std::string device_;
 };
 
-/// The bridge's end: opens raw 8N1 at `baud` the device that `device` names at that moment (empty: unplugged).
+/// The bridge's end: opens raw 8N1 the device that `device` names at that moment (empty: unplugged).
 class TerminalOpener final : public ByteSourceOpener {
  public:
-  TerminalOpener(std::function<std::string()> device, int baud) : device_(std::move(device)), baud_(baud) {}
-  std::unique_ptr<ByteSource> Open() override;
+  /// @param unit serial number of the unit behind it.
+  TerminalOpener(std::function<std::string()> device, std::string unit)
+      : device_(std::move(device)), unit_(std::move(unit)) {}
+  std::unique_ptr<ByteSource> Open(int baud) override;
 
  private:
   std::function<std::string()> device_;
-  int baud_;
+  std::string unit_;
 };
 
 }  // namespace fulcrum::handle_bridge

@@ -19,7 +19,7 @@ using Port = std::unique_ptr<sp_port, FreePort>;
 
 class SerialPortSource final : public ByteSource {
  public:
-  explicit SerialPortSource(Port port) : port_(std::move(port)) {}
+  SerialPortSource(Port port, std::string unit) : port_(std::move(port)), unit_(std::move(unit)) {}
 
   ReadResult Read(std::span<char> buffer) noexcept override {
     // After a hang-up sp_nonblocking_read() returns 0 as if nothing had come; sp_input_waiting() fails with EIO.
@@ -32,8 +32,11 @@ class SerialPortSource final : public ByteSource {
     return {static_cast<std::size_t>(std::max(read, 0)), read < 0};
   }
 
+  [[nodiscard]] std::string_view unit() const noexcept override { return unit_; }
+
  private:
   Port port_;
+  std::string unit_;
 };
 
 bool HasIdentity(const sp_port* port, const config::SerialLink& link) {
@@ -78,7 +81,7 @@ Port FindByName(const config::SerialLink& link) {
 
 }  // namespace
 
-std::unique_ptr<ByteSource> SerialPortOpener::Open() {
+std::unique_ptr<ByteSource> SerialPortOpener::Open(int baud) {
   Port port = FindByIdentity(link_);
   if (!port) {
     port = FindByName(link_);
@@ -86,11 +89,17 @@ std::unique_ptr<ByteSource> SerialPortOpener::Open() {
   if (!port || sp_open(port.get(), SP_MODE_READ) != SP_OK) {
     return nullptr;
   }
-  const bool set_up = sp_set_baudrate(port.get(), link_.baud) == SP_OK && sp_set_bits(port.get(), 8) == SP_OK &&
+  const bool set_up = sp_set_baudrate(port.get(), baud) == SP_OK && sp_set_bits(port.get(), 8) == SP_OK &&
                       sp_set_parity(port.get(), SP_PARITY_NONE) == SP_OK && sp_set_stopbits(port.get(), 1) == SP_OK &&
                       sp_set_flowcontrol(port.get(), SP_FLOWCONTROL_NONE) == SP_OK &&
                       sp_flush(port.get(), SP_BUF_INPUT) == SP_OK;
-  return set_up ? std::make_unique<SerialPortSource>(std::move(port)) : nullptr;
+  if (!set_up) {
+    return nullptr;
+  }
+  const char* serial = sp_get_port_usb_serial(port.get());
+  const char* name = sp_get_port_name(port.get());
+  std::string unit = serial ? serial : !link_.port.empty() ? link_.port : name ? name : "";
+  return std::make_unique<SerialPortSource>(std::move(port), std::move(unit));
 }
 
 }  // namespace fulcrum::handle_bridge

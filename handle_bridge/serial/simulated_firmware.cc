@@ -1,8 +1,10 @@
 #include "handle_bridge/serial/simulated_firmware.h"
 
 #include <algorithm>
+#include <system_error>
 #include <utility>
 
+#include "handle_bridge/protocol/frame.h"
 #include "handle_bridge/protocol/jaw_line.h"
 #include "handle_bridge/protocol/pedal_line.h"
 
@@ -16,42 +18,28 @@ constexpr std::uint64_t kMaxCatchUp = 100;
 
 }  // namespace
 
-SimulatedFirmware::SimulatedFirmware(InputAt input, const JawFirmwareSettings& settings)
+SimulatedFirmware::SimulatedFirmware(InputAt input, const std::array<SimulatedUnit, kLinks>& units)
     : input_(std::move(input)),
-      jaws_{JawFirmware(settings, 1), JawFirmware(settings, 2)},
-      links_{Link{PseudoTerminal(), DamagedLine(11), {}, false}, Link{PseudoTerminal(), DamagedLine(12), {}, false},
-             Link{PseudoTerminal(), DamagedLine(13), {}, false}},
+      units_(units),
+      jaws_{JawFirmware(units[0].jaw, 1), JawFirmware(units[1].jaw, 2)},
+      links_{Link(11), Link(12), Link(13)},
       thread_({.name = "firmware", .period_ns = kPeriod_ns}, [this](const Tick& tick) { Step(tick); }) {
   thread_.Start();
 }
 
-std::unique_ptr<ByteSourceOpener> SimulatedFirmware::MakeOpener(int link, int baud) {
+std::array<SimulatedUnit, kLinks> SimulatedFirmware::DefaultUnits() {
+  return {SimulatedUnit{"simulated-tool0", false, kLeftHandle, {}},
+          SimulatedUnit{"simulated-tool1", false, kRightHandle, {}},
+          SimulatedUnit{"simulated-pedal", false, kPedalSender, {}}};
+}
+
+std::unique_ptr<ByteSourceOpener> SimulatedFirmware::MakeOpener(std::size_t link) {
   const auto device = [this, link]() -> std::string {
     const std::lock_guard lock(mutex_);
-    const auto& terminal = links_[static_cast<std::size_t>(link)].terminal;
+    const auto& terminal = links_[link].terminal;
     return terminal ? terminal->device() : "";
   };
-  return std::make_unique<TerminalOpener>(device, baud);
-}
-
-void SimulatedFirmware::Unplug(int link) {
-  const std::lock_guard lock(mutex_);
-  links_[static_cast<std::size_t>(link)].terminal.reset();
-}
-
-void SimulatedFirmware::Plug(int link) {
-  const std::lock_guard lock(mutex_);
-  links_[static_cast<std::size_t>(link)].terminal.emplace();
-}
-
-void SimulatedFirmware::SetDamage(int link, const ByteDamage& damage) {
-  const std::lock_guard lock(mutex_);
-  links_[static_cast<std::size_t>(link)].damage = damage;
-}
-
-void SimulatedFirmware::SetSilent(int link, bool silent) {
-  const std::lock_guard lock(mutex_);
-  links_[static_cast<std::size_t>(link)].silent = silent;
+  return std::make_unique<TerminalOpener>(device, units_[link].serial_number);
 }
 
 void SimulatedFirmware::Step(const Tick& tick) {
@@ -63,33 +51,74 @@ void SimulatedFirmware::Step(const Tick& tick) {
     if (!input) {
       continue;
     }
-    for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
-      const std::array<char, 8> line = jaws_[tool].Line(input->jaw_deg[tool]);
-      Transmit(&links_[tool], {line.data(), line.size()});
+    for (std::size_t link = 0; link < kLinks; ++link) {
+      Plug(&links_[link], !input->faults[link].unplugged);
     }
-    if (input->pedals != sent_pedals_ || pedal_index_++ % kPedalPeriods == 0) {
-      sent_pedals_ = input->pedals;
-      const std::array<char, 5> line = FormatPedals(input->pedals);
-      Transmit(&links_[kPedalLink], {line.data(), line.size()});
+    for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
+      SendJaw(tool, input->jaw_deg[tool], input->faults[tool]);
+    }
+    SendPedals(input->pedals, input->faults[kPedalLink]);
+  }
+}
+
+void SimulatedFirmware::Plug(Link* link, bool plugged) {
+  if (!plugged) {
+    link->terminal.reset();
+  } else if (!link->terminal) {
+    try {
+      link->terminal.emplace();
+    } catch (const std::system_error&) {
+      // The system has none left: tried again at the next sample, as a user would.
     }
   }
 }
 
-void SimulatedFirmware::Transmit(Link* link, std::string_view bytes) {
-  if (!link->terminal || link->silent) {
+void SimulatedFirmware::SendJaw(std::size_t tool, double jaw_deg, const LinkFaults& faults) {
+  int code = jaws_[tool].Convert(jaw_deg);
+  if (faults.broken_wire) {
+    constexpr std::uint64_t kMultiplier = 6364136223846793005u;  // Knuth's linear congruential generator.
+    floating_ = floating_ * kMultiplier + 1442695040888963407u;
+    code = static_cast<int>(floating_ >> 54);  // 10 bits.
+  }
+  Link* link = &links_[tool];
+  if (units_[tool].framed) {
+    const auto line = FormatFrame({units_[tool].sender, link->sequence++, code});
+    Transmit(link, {line.data(), line.size()}, faults);
+  } else {
+    const auto line = jaws_[tool].Format(code);
+    Transmit(link, {line.data(), line.size()}, faults);
+  }
+}
+
+void SimulatedFirmware::SendPedals(std::uint8_t pedals, const LinkFaults& faults) {
+  if (pedals == sent_pedals_ && pedal_index_++ % kPedalPeriods != 0) {
+    return;
+  }
+  sent_pedals_ = pedals;
+  Link* link = &links_[kPedalLink];
+  if (units_[kPedalLink].framed) {
+    const auto line = FormatFrame({units_[kPedalLink].sender, link->sequence++, pedals});
+    Transmit(link, {line.data(), line.size()}, faults);
+  } else {
+    const auto line = FormatPedals(pedals);
+    Transmit(link, {line.data(), line.size()}, faults);
+  }
+}
+
+void SimulatedFirmware::Transmit(Link* link, std::string_view bytes, const LinkFaults& faults) {
+  if (!link->terminal || faults.silent) {
     return;
   }
   bytes_.clear();
-  link->cable.Pass(bytes, link->damage, &bytes_);
-  if (const int baud = link->terminal->ReaderBaud(); baud != kBaud) {
-    // A receiver at another speed samples the wrong moments: it sees about baud / kBaud as many bytes, all nonsense.
-    const ByteDamage nonsense{std::max(0.0, 1.0 - static_cast<double>(baud) / kBaud), 1.0};
+  link->cable.Pass(bytes, faults.cable, &bytes_);
+  const int unit_baud = faults.wrong_baud ? kOtherBaud : kBaud;
+  if (const int baud = link->terminal->ReaderBaud(); baud != unit_baud) {
+    // A receiver at another speed samples the wrong moments: it sees about baud / unit_baud as many bytes, all
+    // nonsense.
+    const ByteDamage nonsense{std::max(0.0, 1.0 - static_cast<double>(baud) / unit_baud), 0.0, true};
     std::string heard;
-    for (int pass = 0; pass < 3; ++pass) {  // Three flipped bits: not even digits stay digits.
-      heard.clear();
-      link->cable.Pass(bytes_, pass == 0 ? nonsense : ByteDamage{0.0, 1.0}, &heard);
-      bytes_.swap(heard);
-    }
+    link->cable.Pass(bytes_, nonsense, &heard);
+    bytes_.swap(heard);
   }
   link->terminal->Send(bytes_);
 }

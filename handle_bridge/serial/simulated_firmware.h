@@ -1,5 +1,5 @@
 // The simulated firmware of a cart: handles and foot pedal, each on a pseudo-terminal of its own, on one thread that
-// sends what the hardware sends, when it sends it.
+// sends what the hardware sends, when it sends it, and fails as hardware fails.
 #pragma once
 
 #include <array>
@@ -17,51 +17,74 @@
 
 namespace fulcrum::handle_bridge {
 
-/// What the operator's hands and foot do at a moment.
+/// Index of a link: the handle of that tool, or the pedal.
+inline constexpr std::size_t kPedalLink = kMaxTools;
+inline constexpr std::size_t kLinks = kMaxTools + 1;
+
+/// What is built into a unit.
+struct SimulatedUnit {
+  std::string serial_number;
+  bool framed = false;      ///< Speaks frames (frame.h) instead of the plain lines.
+  char sender = 'L';        ///< Of its frames.
+  JawFirmwareSettings jaw;  ///< Of a handle.
+};
+
+/// What befalls a link at a moment.
+struct LinkFaults {
+  ByteDamage cable{};
+  bool silent = false;       ///< No power, or the transmit wire is broken.
+  bool wrong_baud = false;   ///< The unit speaks at SimulatedFirmware::kOtherBaud.
+  bool broken_wire = false;  ///< Of the potentiometer: the converter floats between its stops.
+  bool unplugged = false;    ///< The adapter is pulled: a hang-up, and a new port once it is over.
+};
+
+/// What the operator's hands and foot do at a moment, and what befalls the links.
 struct OperatorInput {
   std::array<double, kMaxTools> jaw_deg{};
   std::uint8_t pedals = kPedalNone;  ///< PedalBits.
+  std::array<LinkFaults, kLinks> faults{};
 };
 
 class SimulatedFirmware {
  public:
-  /// Index of a link: the handle of that tool, or the pedal.
-  static constexpr int kPedalLink = kMaxTools;
-  static constexpr int kLinks = kMaxTools + 1;
   static constexpr int kBaud = 115200;
+  static constexpr int kOtherBaud = 57600;
 
   /// At a CLOCK_MONOTONIC time [ns]; nothing: not known yet, so nothing is sent.
   using InputAt = std::function<std::optional<OperatorInput>(std::int64_t)>;
 
   /// @param input called 400 times a second on the firmware's thread.
-  explicit SimulatedFirmware(InputAt input, const JawFirmwareSettings& settings = {});
+  explicit SimulatedFirmware(InputAt input, const std::array<SimulatedUnit, kLinks>& units = DefaultUnits());
 
-  /// Opens the near end of a link, now and after each Plug(). `baud` other than 115200 reads garbage, as on a wire.
-  [[nodiscard]] std::unique_ptr<ByteSourceOpener> MakeOpener(int link, int baud = kBaud);
+  /// Plain lines, the paper's potentiometers.
+  static std::array<SimulatedUnit, kLinks> DefaultUnits();
 
-  // For tests, from any thread: what can happen to a cable.
-  void Unplug(int link);
-  void Plug(int link);
-  void SetDamage(int link, const ByteDamage& damage);
-  void SetSilent(int link, bool silent);
+  /// Opens the near end of a link, again after each hang-up. A speed that is not the unit's reads garbage, as on a
+  /// wire.
+  [[nodiscard]] std::unique_ptr<ByteSourceOpener> MakeOpener(std::size_t link);
 
  private:
   struct Link {
-    std::optional<PseudoTerminal> terminal;
+    explicit Link(std::uint64_t seed) : cable(seed) {}
+    std::optional<PseudoTerminal> terminal = PseudoTerminal();
     DamagedLine cable;
-    ByteDamage damage;
-    bool silent = false;
+    std::uint8_t sequence = 0;
   };
   void Step(const Tick& tick);
-  void Transmit(Link* link, std::string_view bytes);
+  void Plug(Link* link, bool plugged);
+  void SendJaw(std::size_t tool, double jaw_deg, const LinkFaults& faults);
+  void SendPedals(std::uint8_t pedals, const LinkFaults& faults);
+  void Transmit(Link* link, std::string_view bytes, const LinkFaults& faults);
 
   InputAt input_;
+  std::array<SimulatedUnit, kLinks> units_;
   std::array<JawFirmware, kMaxTools> jaws_;
   std::mutex mutex_;
   std::array<Link, kLinks> links_;  // Guarded by mutex_.
   std::uint64_t next_index_ = 0;
   std::uint8_t sent_pedals_ = kPedalNone;
   std::uint64_t pedal_index_ = 0;
+  std::uint64_t floating_ = 1;    // State of the broken wire's noise.
   std::string bytes_;             // Scratch of Transmit.
   runtime::CyclicThread thread_;  // Last: stopped before the rest goes.
 };

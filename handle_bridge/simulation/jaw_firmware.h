@@ -1,4 +1,5 @@
-// What the handle's microcontroller does, as numbers in and bytes out: potentiometer, 10-bit converter, line format.
+// What the handle's microcontroller does, as numbers in and bytes out: potentiometer, 10-bit converter, line format;
+// and what a bad cable does to the bytes.
 #pragma once
 
 #include <array>
@@ -13,15 +14,17 @@ struct JawFirmwareSettings {
   double closed_V = 2.37;  ///< At 0 degrees (paper).
   double open_V = 2.54;    ///< At open_deg.
   double open_deg = 60.0;
+  double bow = 0;                  ///< Excess of the voltage in the middle, as a share of the whole span.
   double adc_step_V = 5.0 / 1024;  ///< The paper rounds it to 0.00488.
   double noise_V = 0.001;          ///< Standard deviation: the paper's +-0.002 V taken as two of it.
+  double tremor_deg = 0;           ///< Amplitude of the hand's tremor, two tones of 8 to 12 Hz.
 };
 
 class JawFirmware {
  public:
-  JawFirmware(const JawFirmwareSettings& settings, std::uint64_t seed) : settings_(settings), random_(seed) {}
+  JawFirmware(const JawFirmwareSettings& settings, std::uint64_t seed);
 
-  /// Converts: nearest code of the noisy voltage at this jaw angle.
+  /// One sample: nearest code of the noisy voltage at this jaw angle.
   int Convert(double jaw_deg);
   /// `d.dddd` CR LF of a code.
   [[nodiscard]] std::array<char, 8> Format(int code) const;
@@ -31,12 +34,15 @@ class JawFirmware {
   JawFirmwareSettings settings_;
   std::mt19937_64 random_;
   std::normal_distribution<double> noise_;
+  std::array<double, 2> tone_step_{};   ///< Tremor [rad/sample].
+  std::array<double, 2> tone_phase_{};  ///< [rad]
 };
 
-/// A bad cable: loses bytes and flips single bits.
+/// What a bad cable does.
 struct ByteDamage {
   double drop_probability = 0;
-  double flip_probability = 0;
+  double flip_probability = 0;  ///< Of one bit of a byte.
+  bool garbage = false;         ///< Every byte is any byte.
 };
 
 class DamagedLine {

@@ -11,9 +11,13 @@ const StrictMap::Choices<LinkKind> kLinkKinds = {
     {"none", LinkKind::kNone}, {"simulated", LinkKind::kSimulated}, {"serial", LinkKind::kSerial}};
 const StrictMap::Choices<DeviceKind> kDeviceKinds = {{"none", DeviceKind::kNone},
                                                      {"simulated", DeviceKind::kSimulated}};
+const StrictMap::Choices<LineProtocol> kProtocols = {{"plain", LineProtocol::kPlain},
+                                                     {"framed", LineProtocol::kFramed}};
+const StrictMap::Choices<Hand> kHands = {{"left", Hand::kLeft}, {"right", Hand::kRight}};
 constexpr std::array kBauds = {9600, 19200, 38400, 57600, 115200, 230400, 460800, 921600};
 constexpr std::size_t kMaxCalibrationPoints = 9;
 constexpr int kMaxUsbId = 0xffff;
+constexpr std::size_t kMaxWindowEnds = 32;
 
 std::string ToolKey(std::size_t tool) { return std::string("tool") + std::to_string(tool); }
 
@@ -30,6 +34,30 @@ void ReadCalibration(StrictMap map, JawCalibration* calibration) {
   calibration->volts = map.NumbersSi("points_V", calibration->volts, 2, kMaxCalibrationPoints, Range::Between(0, 5.5));
   calibration->angles_rad =
       map.NumbersSi("angles_deg", calibration->angles_rad, 2, kMaxCalibrationPoints, Range::Between(-10, 120));
+}
+
+void ReadSimulated(StrictMap map, bool handle, SimulatedUnit* unit) {
+  unit->protocol = map.Choice("protocol", unit->protocol, kProtocols);
+  const auto window = [&map](const char* key, std::vector<double>* ends) {
+    *ends = map.NumbersSi(key, *ends, 0, kMaxWindowEnds, Range::AtLeast(0));
+    if (ends->size() % 2 != 0 || !std::is_sorted(ends->begin(), ends->end())) {
+      map.Fail(key, "a list of pairs `from, to` in rising order, for example [5, 6]");
+    }
+  };
+  unit->drop = map.Number("drop", unit->drop, Range::Between(0, 0.5));
+  unit->flip = map.Number("flip", unit->flip, Range::Between(0, 0.5));
+  window("silent_s", &unit->silent_s);
+  window("garbage_s", &unit->garbage_s);
+  window("wrong_baud_s", &unit->wrong_baud_s);
+  window("unplugged_s", &unit->unplugged_s);
+  if (handle) {
+    unit->closed_V = map.NumberSi("closed_V", unit->closed_V, Range::Between(0, 5));
+    unit->open_V = map.NumberSi("open_V", unit->open_V, Range::Between(0, 5));
+    unit->bow = map.NumberSi("bow_percent", unit->bow, Range::Between(-20, 20));
+    unit->noise_V = map.NumberSi("noise_mV", unit->noise_V, Range::Between(0, 1000));
+    unit->tremor_rad = map.NumberSi("tremor_deg", unit->tremor_rad, Range::Between(0, 20));
+    window("broken_wire_s", &unit->broken_wire_s);
+  }
 }
 
 void ReadTiming(StrictMap map, NodeId node, NodeTiming* timing) {
@@ -53,11 +81,14 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
     HandleConfig& handle = cart.handles[tool];
     handle.kind = map.Choice("kind", handle.kind, kLinkKinds);
     ReadLink(map, &handle.link);
+    ReadSimulated(map.MapOrDefaults("simulated"), true, &handle.simulated);
+    handle.hand = map.Choice("hand", handle.hand, kHands);
     ReadCalibration(map.MapOrDefaults("calibration"), &handle.calibration);
   }
   StrictMap pedal = root.MapOrDefaults("pedal");
   cart.pedal.kind = pedal.Choice("kind", cart.pedal.kind, kLinkKinds);
   ReadLink(pedal, &cart.pedal.link);
+  ReadSimulated(pedal.MapOrDefaults("simulated"), false, &cart.pedal.simulated);
   StrictMap devices = root.MapOrDefaults("devices");
   for (std::size_t tool = 0; tool < cart.devices.size(); ++tool) {
     cart.devices[tool] = devices.MapOrDefaults(ToolKey(tool)).Choice("kind", cart.devices[tool], kDeviceKinds);
@@ -148,6 +179,7 @@ CartConfig::CartConfig() {
   for (HandleConfig& handle : handles) {
     handle.kind = LinkKind::kSimulated;
   }
+  handles[1].hand = Hand::kRight;
   pedal.kind = LinkKind::kSimulated;
   devices.fill(DeviceKind::kSimulated);
   const auto timing_of = [this](NodeId node) -> NodeTiming& { return nodes[static_cast<std::size_t>(node)]; };

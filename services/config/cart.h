@@ -32,16 +32,36 @@ struct JawCalibration {
   std::vector<double> angles_rad = {0.0, 1.0471975511965976};
 };
 
+/// Line format of a handle or pedal: the bridge tells them apart by itself, simulated firmware is told which to speak.
+enum class LineProtocol { kPlain, kFramed };
+
+/// A simulated handle or pedal: how it is built, and what goes wrong with it. Windows are pairs [from, to, from, to, …)
+/// of session time [s]; the jaw's keys are for handles only.
+struct SimulatedUnit {
+  LineProtocol protocol = LineProtocol::kPlain;
+  double closed_V = 2.37, open_V = 2.54;  ///< At 0 and 60 degrees.
+  double bow = 0;                         ///< Excess in the middle, as a share of the span.
+  double noise_V = 0.001;                 ///< Standard deviation.
+  double tremor_rad = 0;                  ///< Amplitude.
+  double drop = 0, flip = 0;              ///< Probability that a byte is lost, or has a flipped bit.
+  std::vector<double> silent_s, garbage_s, wrong_baud_s, broken_wire_s, unplugged_s;
+};
+
+enum class Hand { kLeft, kRight };
+
 /// One handle; the index in CartConfig::handles is the tool it works.
 struct HandleConfig {
   LinkKind kind = LinkKind::kNone;
-  SerialLink link;  ///< For kSerial.
-  JawCalibration calibration;
+  SerialLink link;             ///< For kSerial.
+  SimulatedUnit simulated;     ///< For kSimulated.
+  Hand hand = Hand::kLeft;     ///< Whose frames are taken; a plain line does not say. Tool 1: right.
+  JawCalibration calibration;  ///< Unless `handle_bridge calibrate` has stored one for the unit.
 };
 
 struct PedalConfig {
   LinkKind kind = LinkKind::kNone;
-  SerialLink link;  ///< For kSerial.
+  SerialLink link;          ///< For kSerial.
+  SimulatedUnit simulated;  ///< For kSimulated.
 };
 
 enum class DeviceKind { kNone, kSimulated };

@@ -35,7 +35,7 @@ void PutText(const std::string& from, FixedString* to) {
     length = FixedString::max_size;
     while (length > 0 && (static_cast<unsigned char>(from[length]) & 0xc0u) == 0x80u) --length;
   }
-  to->assign(from.data(), length);
+  *to = from.substr(0, length);  // assign() would leave the end of a longer text that stood there.
 }
 
 template <class FixedString>

@@ -4,13 +4,17 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "services/bus/dds/participant.h"
 #include "services/bus/input_account.h"
@@ -25,30 +29,64 @@ namespace {
 
 constexpr int kDomain = 47;
 
+/// The executable with its words; what it prints is kept, what is given stands in its stdin.
 class BridgeProcess {
  public:
-  BridgeProcess(const std::filesystem::path& scene, const std::filesystem::path& session) : pid_(::fork()) {
+  explicit BridgeProcess(std::vector<std::string> words, const std::string& input = "") {
+    std::array<int, 2> in{}, out{};
+    EXPECT_EQ(::pipe(in.data()) | ::pipe(out.data()), 0);
+    EXPECT_EQ(::write(in[1], input.data(), input.size()), static_cast<ssize_t>(input.size()));
+    words.insert(words.begin(), "handle_bridge");
+    std::vector<char*> argv;
+    for (std::string& word : words) {
+      argv.push_back(word.data());
+    }
+    argv.push_back(nullptr);
+    pid_ = ::fork();
     if (pid_ == 0) {
-      ::execl(FULCRUM_BIN_DIR "/handle_bridge", "handle_bridge", "--scene", scene.c_str(), "--session", session.c_str(),
-              "--domain", std::to_string(kDomain).c_str(), nullptr);
+      ::dup2(in[0], STDIN_FILENO);
+      ::dup2(out[1], STDOUT_FILENO);
+      ::dup2(out[1], STDERR_FILENO);
+      for (const int fd : {in[0], in[1], out[0], out[1]}) {
+        ::close(fd);
+      }
+      ::execv(FULCRUM_BIN_DIR "/handle_bridge", argv.data());
       ::_exit(127);
     }
+    ::close(in[0]);
+    ::close(in[1]);
+    ::close(out[1]);
+    output_ = out[0];
   }
-  ~BridgeProcess() { End(SIGKILL); }
+  ~BridgeProcess() {
+    End(SIGKILL);
+    ::close(output_);
+  }
   /// Exit status, or minus the signal.
   int End(int signal) {
     if (pid_ <= 0) {
       return 0;
     }
-    ::kill(pid_, signal);
+    if (signal != 0) {
+      ::kill(pid_, signal);
+    }
     int status = 0;
     ::waitpid(pid_, &status, 0);
     pid_ = -1;
     return WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
   }
+  /// Waits for its end; what it has printed is in `said`.
+  int Wait(std::string* said) {
+    std::array<char, 1024> buffer;
+    for (ssize_t n = 0; (n = ::read(output_, buffer.data(), buffer.size())) > 0;) {
+      said->append(buffer.data(), static_cast<std::size_t>(n));
+    }
+    return End(0);
+  }
 
  private:
-  pid_t pid_;
+  pid_t pid_ = -1;
+  int output_ = -1;
 };
 
 class HandleProcess : public ::testing::Test {
@@ -56,6 +94,7 @@ class HandleProcess : public ::testing::Test {
   void SetUp() override {
     folder_ = std::filesystem::temp_directory_path() / ("handle_process_test." + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
+    ::setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
     data_ = scene::BuildProcedural(scene::Small());
     scene::WriteSceneFile(data_, "name: small\n", folder_ / "scene");
     scene_ = std::make_unique<scene::SceneFile>(folder_ / "scene");
@@ -64,6 +103,42 @@ class HandleProcess : public ::testing::Test {
     manifest_.scene_hash = scene_->view().hash;
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::vector<std::string> NodeWords(const std::string& cart = "") const {
+    std::vector<std::string> words = {"--scene", folder_ / "scene", "--session",
+                                      folder_,   "--domain",        std::to_string(kDomain)};
+    if (!cart.empty()) {
+      words.insert(words.end(), {"--cart", cart});
+    }
+    return words;
+  }
+  std::string WriteCart(const std::string& text, const std::string& name = "cart.yaml") const {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+  /// Waits for a Health of the bridge.
+  bool WaitForHealth(const std::function<bool(const Health&)>& condition) {
+    for (int i = 0; i < 4000; ++i) {
+      while (healths_->TakeNext(&health_)) {
+        if (health_.node == NodeId::kHandleBridge && condition(health_)) {
+          return true;
+        }
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return false;
+  }
+  bool WaitForError(const std::string& error) {
+    return WaitForHealth([&](const Health& h) { return h.last_error.rfind(error, 0) == 0; });
+  }
+  static double MetricOf(const Health& health, const std::string& name) {
+    for (const Metric& metric : health.metrics) {
+      if (metric.name == name) {
+        return metric.value;
+      }
+    }
+    return -1;
+  }
 
   /// Session time 0 is `ago_s` in the past.
   void StartSession(double ago_s) {
@@ -97,17 +172,18 @@ class HandleProcess : public ::testing::Test {
   bus::Stamper stamper_{runtime::MonotonicNs()};
   SceneManifest manifest_;
   HandleState state_;
+  Health health_;
 };
 
 TEST_F(HandleProcess, JoinsASessionIsKilledAndGoesOnWithTheScript) {
-  BridgeProcess first(folder_ / "scene", folder_);
+  BridgeProcess first(NodeWords());
   StartSession(3.0);
   const auto present = [](const HandleState& s) { return s.handles[0].present && s.handles[1].present; };
   ASSERT_TRUE(WaitFor(present));
   const std::uint64_t epoch = state_.stamp.epoch;
   EXPECT_EQ(first.End(SIGKILL), -SIGKILL);
 
-  BridgeProcess second(folder_ / "scene", folder_);
+  BridgeProcess second(NodeWords());
   ASSERT_TRUE(WaitFor([&](const HandleState& s) { return s.stamp.epoch > epoch && present(s); }));
   // From its first sample on the angle is the script's: no trace of the script's beginning.
   for (int i = 0; i < 100; ++i) {
@@ -116,28 +192,85 @@ TEST_F(HandleProcess, JoinsASessionIsKilledAndGoesOnWithTheScript) {
     }
     ASSERT_TRUE(WaitFor([](const HandleState&) { return true; }));
   }
-  Health health;
-  bool running = false;
-  for (int i = 0; i < 2000 && !running; ++i) {
-    running = healths_->TakeLatest(&health) && health.node == NodeId::kHandleBridge &&
-              health.state == HealthState::kRunning && health.rate_achieved_Hz > 300;
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  EXPECT_TRUE(running) << health.last_error;
-  EXPECT_EQ(health.last_error, "");
+  EXPECT_TRUE(WaitForHealth([](const Health& h) {
+    return h.state == HealthState::kRunning && h.rate_achieved_Hz > 300;
+  })) << health_.last_error;
+  EXPECT_EQ(health_.last_error, "");
   EXPECT_EQ(second.End(SIGTERM), 0);
 }
 
 TEST_F(HandleProcess, BadCartEndsWithTheUsageCode) {
-  const pid_t pid = ::fork();
-  if (pid == 0) {
-    ::execl(FULCRUM_BIN_DIR "/handle_bridge", "handle_bridge", "--scene", (folder_ / "scene").c_str(), "--session",
-            folder_.c_str(), "--domain", "47", "--cart", "/nonexistent.yaml", nullptr);
-    ::_exit(127);
+  std::string said;
+  EXPECT_EQ(BridgeProcess(NodeWords("/nonexistent.yaml")).Wait(&said), 2);
+  EXPECT_NE(said.find("/nonexistent.yaml"), std::string::npos) << said;
+}
+
+TEST_F(HandleProcess, CalibrationInTheHandIsStoredAndUsedUnlessRefused) {
+  // The refused ones take their time beside the good one.
+  ::setenv("XDG_STATE_HOME", (folder_ / "refused").c_str(), 1);
+  const std::string silent = WriteCart("handles: {tool1: {simulated: {silent_s: [0, 99]}}}", "silent.yaml");
+  const std::string noisy = WriteCart("handles: {tool0: {simulated: {noise_mV: 10}}}", "noisy.yaml");
+  const std::string absent = WriteCart("handles: {tool0: {kind: none}}", "absent.yaml");
+  struct Case {
+    BridgeProcess process;
+    int exit_code;
+    const char* said;
+  };
+  // One line for each point, and one more for the second try of a refused one.
+  std::array<Case, 6> cases = {{
+      {BridgeProcess({"calibrate", "--cart", silent, "--tool", "1"}, "\n"), 1, "refused: no-data: no bytes"},
+      {BridgeProcess({"calibrate", "--cart", noisy}, "\n"), 1, "refused: too noisy"},
+      {BridgeProcess({"calibrate", "--angles", "10,12"}, "\n\n"), 1, "refused: too few counts apart"},
+      {BridgeProcess({"calibrate", "--cart", absent}), 2, "the cart has no handle there"},
+      {BridgeProcess({"calibrate", "--angles", "10"}), 2, "valid: 2 to 9"},
+      {BridgeProcess({"calibrate", "--help"}), 0, "For each angle, set the jaw to it"},
+  }};
+  ::setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
+  // A potentiometer 10 mV off, 9 % too long and bent by 3 %: 2 deg wrong at 50 deg with the cart's line.
+  const std::string cart = WriteCart(
+      "handles: {tool0: {simulated: {protocol: framed, closed_V: 2.36, open_V: 2.545, bow_percent: 3, "
+      "tremor_deg: 0.25}}}");
+  std::string said;
+  EXPECT_EQ(BridgeProcess({"calibrate", "--cart", cart}, "\n\n\n\n\n").Wait(&said), 0);
+  EXPECT_NE(said.find("stored for simulated-tool0"), std::string::npos) << said;
+  for (Case& c : cases) {
+    said.clear();
+    EXPECT_EQ(c.process.Wait(&said), c.exit_code) << said;
+    EXPECT_NE(said.find(c.said), std::string::npos) << said;
   }
-  int status = 0;
-  ::waitpid(pid, &status, 0);
-  EXPECT_EQ(WEXITSTATUS(status), 2);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "refused"));
+
+  BridgeProcess node(NodeWords(cart));
+  StartSession(5.5);  // The jaw is open: at 0 deg the calibrated range hides the error.
+  ASSERT_TRUE(WaitForHealth([](const Health& h) {
+    return MetricOf(h, "calibration0_points") == 5 && MetricOf(h, "quality0") > 0.9;
+  })) << health_.last_error;
+  EXPECT_EQ(MetricOf(health_, "calibration1_points"), 0);
+  double squares = 0;
+  constexpr int kSamples = 200;
+  for (int i = 0; i < kSamples; ++i) {
+    ASSERT_TRUE(WaitFor([](const HandleState&) { return true; }));
+    ASSERT_GT(TruthAt(state_.stamp.stamp_ns, 0), 0.6);
+    squares += std::pow(state_.handles[0].jaw_angle_rad - TruthAt(state_.stamp.stamp_ns, 0), 2);
+  }
+  EXPECT_LT(std::sqrt(squares / kSamples), 0.02);
+}
+
+TEST_F(HandleProcess, FaultsOfTheCartAreNamedAndMendedOnTheRunningNode) {
+  const std::string cart = WriteCart(
+      "handles:\n"
+      "  tool0: {simulated: {protocol: framed, unplugged_s: [0.5, 1.2]}}\n"
+      "  tool1: {simulated: {broken_wire_s: [1.6, 2.0]}}\n"
+      "pedal: {simulated: {protocol: framed, garbage_s: [2.4, 3.2]}}\n");
+  BridgeProcess node(NodeWords(cart));
+  StartSession(0.0);
+  EXPECT_TRUE(WaitForError("handle 0: no-port")) << health_.last_error;
+  EXPECT_TRUE(WaitForError("handle 1: wire")) << health_.last_error;
+  EXPECT_TRUE(WaitForError("pedal: garbage")) << health_.last_error;
+  EXPECT_TRUE(WaitForHealth([](const Health& h) {
+    return h.last_error.empty() && MetricOf(h, "quality0") > 0.9 && MetricOf(h, "quality1") > 0.9;
+  })) << health_.last_error;
+  EXPECT_EQ(MetricOf(health_, "reconnects"), 1);
 }
 
 }  // namespace

@@ -50,6 +50,22 @@ TYPED_TEST(Convert, RoundTripKeepsEveryField) {
   EXPECT_TRUE(Same(sent, got));
 }
 
+/// As a writer does, which keeps its wire object.
+TEST(ConvertHealth, ShorterErrorLeavesNothingOfTheLongerOneBefore) {
+  dds::TypeSupportOf<Health>::type type;
+  dds::WireOf<Health> wire, received;
+  Health sent = test::Sample<Health>();
+  for (const char* error : {"handle 0: unplugged", "handle", ""}) {
+    sent.last_error = error;
+    ASSERT_TRUE(ToWire(sent, &wire));
+    Payload payload(type.m_typeSize);
+    ASSERT_TRUE(type.serialize(&wire, &payload) && type.deserialize(&payload, &received));
+    Health got;
+    FromWire(received, &got);
+    EXPECT_EQ(got.last_error, error);
+  }
+}
+
 TYPED_TEST(Convert, ReusedTargetHoldsNothingOfThePreviousMessage) {
   TypeParam got = test::Sample<TypeParam>();
   TypeParam empty;

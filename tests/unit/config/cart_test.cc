@@ -46,10 +46,20 @@ TEST(Cart, LabFileNamesThreeSerialLinks) {
 
 TEST(Cart, EffectiveConfigurationLoadsToItself) {
   CartConfig cart = LoadCart(FULCRUM_SOURCE_DIR "/deploy/carts/lab.yaml");
+  cart.handles[0].simulated.protocol = LineProtocol::kFramed;
+  cart.handles[0].simulated.bow = 0.03;
+  cart.handles[0].simulated.unplugged_s = {5, 6.5, 8, 9};
+  cart.pedal.simulated.drop = 1e-3;
   cart.handles[0].calibration.volts = {2.3, 2.4, 2.55};
   cart.handles[0].calibration.angles_rad = {1.0, 0.5, 0.0};
   const std::string yaml = CartToYaml(cart);
   EXPECT_EQ(CartToYaml(LoadCartText(yaml, "again")), yaml) << yaml;
+  const CartConfig again = LoadCartText(yaml, "again");
+  EXPECT_EQ(again.handles[0].simulated.protocol, LineProtocol::kFramed);
+  EXPECT_NEAR(again.handles[0].simulated.bow, 0.03, 1e-12);
+  EXPECT_EQ(again.handles[0].simulated.unplugged_s, (std::vector<double>{5, 6.5, 8, 9}));
+  EXPECT_EQ(again.handles[1].hand, Hand::kRight);
+  EXPECT_EQ(again.pedal.simulated.drop, 1e-3);
 }
 
 struct BadCart {
@@ -82,6 +92,12 @@ const BadCart kBadCarts[] = {
     {"CalibrationNotMonotone", "handles: {tool0: {calibration: {points_V: [2.3, 2.4, 2.5], angles_deg: [0, 30, 20]}}}",
      "breaks the order"},
     {"CalibrationUnit", "handles: {tool0: {calibration: {adc_step_V: 4.88 mm}}}", "has the wrong unit"},
+    {"UnknownHand", "handles: {tool0: {hand: both}}", "valid: left, right"},
+    {"UnknownProtocol", "handles: {tool0: {simulated: {protocol: nmea}}}", "valid: plain, framed"},
+    {"DropAbove", "handles: {tool0: {simulated: {drop: 0.9}}}", "valid: 0 to 0.5"},
+    {"HalfWindow", "handles: {tool0: {simulated: {unplugged_s: [5]}}}", "a list of pairs"},
+    {"WindowBackwards", "pedal: {simulated: {silent_s: [5, 4]}}", "a list of pairs"},
+    {"PedalWithPotentiometer", "pedal: {simulated: {broken_wire_s: [1, 2]}}", "unknown key"},
     {"RateZero", "nodes: {physics_node: {rate_Hz: 0}}",
      "nodes.physics_node.rate_Hz: '0' is out of range; valid: 1 to 4000 Hz"},
     {"UnknownNode", "nodes: {physic_node: {rate_Hz: 100}}", "did you mean 'physics_node'?"},

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "handle_bridge/estimator/jaw_calibration.h"
+#include "handle_bridge/estimator/jaw_calibrator.h"
 #include "handle_bridge/estimator/jaw_estimator.h"
 #include "handle_bridge/simulation/jaw_firmware.h"
 #include "tests/unit/handle/jaw_truth.h"
@@ -76,6 +77,72 @@ TEST(JawCalibration, FivePointsRemoveBowSpreadAndOffset) {
   }
   EXPECT_LT(std::sqrt(sum2 / n), 2.0);
   EXPECT_LT(std::sqrt(sum5 / n), 0.08);
+}
+
+/// Codes of a hold, `seconds` of a handle.
+std::vector<int> Hold(JawFirmware* firmware, double angle_deg, int samples = 400) {
+  std::vector<int> codes;
+  for (int i = 0; i < samples; ++i) {
+    codes.push_back(firmware->Convert(angle_deg));
+  }
+  return codes;
+}
+
+TEST(JawCalibrator, FindsTheVoltageBetweenTheCodes) {
+  JawFirmwareSettings settings;
+  settings.tremor_deg = 0.25;
+  double squares = 0;
+  int n = 0;
+  for (std::uint64_t part = 0; part < 40; ++part) {
+    settings.closed_V = 2.37 + 0.0001 * static_cast<double>(part);  // Every place between two codes.
+    settings.open_V = settings.closed_V + 0.17;
+    JawFirmware firmware(settings, part);
+    JawCalibrator calibrator;
+    for (const double angle : {0.0, 15.0, 30.0, 45.0, 60.0}) {
+      EXPECT_EQ(calibrator.Add(angle, Hold(&firmware, angle)), "");
+    }
+    const CalibrationPoints points = calibrator.Solve();
+    for (std::size_t i = 0; i < points.codes.size(); ++i) {
+      const double truth = (settings.closed_V + 0.17 / 60 * points.angles_deg[i]) / settings.adc_step_V;
+      squares += (points.codes[i] - truth) * (points.codes[i] - truth);
+      ++n;
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / n), 0.04);  // Counts. The mean of the codes: 0.09.
+}
+
+TEST(JawCalibrator, TakesFallingHandlesInAnyOrder) {
+  JawFirmwareSettings settings;
+  std::swap(settings.closed_V, settings.open_V);
+  JawFirmware firmware(settings, 3);
+  JawCalibrator calibrator;
+  for (const double angle : {30.0, 0.0, 60.0}) {
+    EXPECT_EQ(calibrator.Add(angle, Hold(&firmware, angle)), "");
+  }
+  EXPECT_EQ(calibrator.Solve().angles_deg, (std::vector<double>{60, 30, 0}));
+}
+
+TEST(JawCalibrator, RefusesWithTheReason) {
+  JawFirmware firmware({}, 3);
+  JawCalibrator calibrator;
+  const auto says = [&calibrator](double angle, const std::vector<int>& codes, const char* what) {
+    const std::string said = calibrator.Add(angle, codes);
+    EXPECT_EQ(said.rfind(what, 0), 0u) << said;
+  };
+  says(0, {}, "only 0 readings came");
+  says(0, std::vector<int>(400, 0), "the converter is at its stop");
+  says(0, std::vector<int>(400, 1023), "the converter is at its stop");
+  JawFirmwareSettings shaky;
+  shaky.noise_V = 0.005;
+  JawFirmware unsteady(shaky, 4);
+  says(0, Hold(&unsteady, 10), "too noisy: the codes spread by 1.0");
+  says(20, Hold(&firmware, 20), "");
+  says(22, Hold(&firmware, 22), "too few counts apart: 1.");
+  says(40, Hold(&firmware, 40), "");
+  says(60, Hold(&firmware, 30), "not monotone: at 60.0 deg");
+  says(10, Hold(&firmware, 50), "not monotone");
+  says(60, Hold(&firmware, 60), "");
+  EXPECT_EQ(calibrator.size(), 3u);
 }
 
 struct Errors {

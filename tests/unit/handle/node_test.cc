@@ -1,12 +1,15 @@
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
 #include <numbers>
+#include <random>
 #include <string>
 
-#include "handle_bridge/node/cart_links.h"
 #include "handle_bridge/node/handle_bridge_node.h"
 #include "handle_bridge/protocol/pedal_line.h"
+#include "handle_bridge/simulation/jaw_firmware.h"
 #include "services/bus/in_process.h"
 
 namespace fulcrum::handle_bridge {
@@ -24,7 +27,16 @@ class MemoryLink final : public ByteLink {
     const bool was_fresh = std::exchange(fresh, false);
     return {n, phase, was_fresh};
   }
+  std::string_view unit() const noexcept override { return serial_number; }
+  bool SetBaud(int new_baud) noexcept override {
+    baud = new_baud;
+    fresh = true;
+    bytes.clear();
+    return true;
+  }
   std::string bytes;
+  std::string serial_number;
+  int baud = 115200;
   LinkPhase phase = LinkPhase::kOpen;
   bool fresh = true;
 };
@@ -34,17 +46,20 @@ class NodeTest : public ::testing::Test {
  protected:
   NodeTest() : input_(topic_.MakeInput()), output_(topic_.MakeOutput()) { Restart(1000); }
 
+  static std::unique_ptr<WatchedLink> MakeLink(MemoryLink** memory) {
+    auto link = std::make_unique<MemoryLink>();
+    *memory = link.get();
+    return std::make_unique<WatchedLink>(std::move(link), 115200);
+  }
+
   void Restart(std::int64_t epoch_ns) {
     HandleBridgeNode::Links links;
     for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
-      auto link = std::make_unique<MemoryLink>();
-      handle_[tool] = link.get();
-      links.handles[tool] = std::move(link);
+      links.handles[tool] = MakeLink(&handle_[tool]);
     }
-    auto link = std::make_unique<MemoryLink>();
-    pedal_ = link.get();
-    links.pedal = std::move(link);
-    node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), epoch_ns);
+    links.pedal = MakeLink(&pedal_);
+    node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), calibrations_, std::move(links), output_.get(),
+                                               epoch_ns);
     EXPECT_EQ(Error(), "");  // Nothing has been read yet.
     TickSilently();          // The first step drops what has piled up.
   }
@@ -91,6 +106,7 @@ class NodeTest : public ::testing::Test {
   bus::InProcessTopic<HandleState> topic_;
   std::unique_ptr<bus::Input<HandleState>> input_;
   std::unique_ptr<bus::Output<HandleState>> output_;
+  CalibrationStore calibrations_;
   std::unique_ptr<HandleBridgeNode> node_;
   std::array<MemoryLink*, kMaxTools> handle_{};
   MemoryLink* pedal_ = nullptr;
@@ -124,10 +140,9 @@ TEST_F(NodeTest, IsNotPresentBeforeTheFirstLine) {
 
 TEST_F(NodeTest, LinesFromBeforeTheFirstStepAreDropped) {
   HandleBridgeNode::Links links;
-  auto link = std::make_unique<MemoryLink>();
-  handle_[0] = link.get();
-  links.handles[0] = std::move(link);
-  node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), 3000);
+  links.handles[0] = MakeLink(&handle_[0]);
+  node_ =
+      std::make_unique<HandleBridgeNode>(config::CartConfig(), calibrations_, std::move(links), output_.get(), 3000);
   for (int i = 0; i < 400; ++i) {
     const auto line = firmware_.Line(50);
     handle_[0]->bytes.append(line.data(), line.size());
@@ -156,7 +171,7 @@ TEST_F(NodeTest, SilenceHoldsTheAngleAndReleasesThePedal) {
   EXPECT_EQ(state_.handles[0].quality, 0.0f);
   EXPECT_EQ(state_.handles[0].jaw_rate_rad_s, 0.0f);
   EXPECT_NEAR(jaw0_deg(), held, 1.0);
-  EXPECT_NE(Error().find("handle 0: no data"), std::string::npos) << Error();
+  EXPECT_NE(Error().find("handle 0: no-data"), std::string::npos) << Error();
   Tick(25);
   EXPECT_NEAR(jaw0_deg(), held, 1.5);
 }
@@ -174,7 +189,7 @@ TEST_F(NodeTest, GarbageRaisesTheBaudAlarmAndMovesNothing) {
     TickSilently();
     ASSERT_NEAR(jaw0_deg(), before, 1.5);
   }
-  EXPECT_NE(Error().find("check the baud rate"), std::string::npos) << Error();
+  EXPECT_NE(Error().find("handle 0: garbage"), std::string::npos) << Error();
   EXPECT_GT(MetricOf("bad_lines"), 100);
   EXPECT_LT(state_.handles[0].quality, 0.5f);
 }
@@ -191,6 +206,25 @@ TEST_F(NodeTest, BrokenWireIsNamed) {
   }
   EXPECT_NE(Error().find("check the potentiometer's wires"), std::string::npos) << Error();
   EXPECT_NEAR(jaw0_deg(), before, 1.5);
+}
+
+TEST_F(NodeTest, FloatingWireMovesNothing) {
+  for (int i = 0; i < 400; ++i) {
+    Tick(25);
+  }
+  std::mt19937_64 random(9);
+  double worst = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const auto line = firmware_.Format(static_cast<int>(random() % 1024));
+    handle_[0]->bytes.append(line.data(), line.size());
+    TickSilently();
+    worst = std::max(worst, std::abs(jaw0_deg() - 25));
+  }
+  EXPECT_LT(worst, 3.0);
+  for (int i = 0; i < 40; ++i) {
+    Tick(45);
+  }
+  EXPECT_NEAR(jaw0_deg(), 45, 1.5);  // Mended: it follows again.
 }
 
 TEST_F(NodeTest, StillJawForManySecondsIsHealthy) {
@@ -212,11 +246,11 @@ TEST_F(NodeTest, HangUpHoldsAndTheReturnGoesOn) {
   const double held = jaw0_deg();
   handle_[0]->phase = pedal_->phase = LinkPhase::kLost;
   TickSilently();
-  EXPECT_NE(Error().find("handle 0: hung up"), std::string::npos) << Error();
+  EXPECT_NE(Error().find("handle 0: hung-up"), std::string::npos) << Error();
   EXPECT_EQ(state_.pedals, kPedalNone);
   handle_[0]->phase = LinkPhase::kReconnecting;
   TickSilently();
-  EXPECT_NE(Error().find("handle 0: port not found"), std::string::npos) << Error();
+  EXPECT_NE(Error().find("handle 0: no-port"), std::string::npos) << Error();
   EXPECT_NEAR(jaw0_deg(), held, 1e-6);
   EXPECT_EQ(state_.handles[0].quality, 0.0f);
   handle_[0]->phase = pedal_->phase = LinkPhase::kOpen;
@@ -260,10 +294,9 @@ TEST_F(NodeTest, RestartTakesTheAngleFromTheFirstLineUnderANewEpoch) {
 
 TEST_F(NodeTest, AbsentHandleIsNeitherPublishedNorMissed) {
   HandleBridgeNode::Links links;
-  auto link = std::make_unique<MemoryLink>();
-  handle_[0] = link.get();
-  links.handles[0] = std::move(link);
-  node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), std::move(links), output_.get(), 3000);
+  links.handles[0] = MakeLink(&handle_[0]);
+  node_ =
+      std::make_unique<HandleBridgeNode>(config::CartConfig(), calibrations_, std::move(links), output_.get(), 3000);
   TickSilently();
   for (int i = 0; i < 100; ++i) {
     const auto line = firmware_.Line(20);
@@ -276,19 +309,89 @@ TEST_F(NodeTest, AbsentHandleIsNeitherPublishedNorMissed) {
   EXPECT_EQ(Error(), "");
 }
 
-TEST(FollowScript, GivesTheFirstKeyBeforeTheSessionAndThePedalsOfAllTools) {
-  const std::array keys = {ScriptKey{1, 0, Vec3f::Zero(), 0.8f, 0, 0}, ScriptKey{3, 0, Vec3f::Zero(), 0.2f, 0, 0},
-                           ScriptKey{0, 1, Vec3f::Zero(), 0.0f, 0, 0},
-                           ScriptKey{2, 1, Vec3f::Zero(), 0.0f, kPedalCut, 35},
-                           ScriptKey{4, 1, Vec3f::Zero(), 0.0f, 0, 0}};
-  SceneView scene;
-  scene.script = keys;
-  EXPECT_NEAR(FollowScript(scene, -1).jaw_deg[0], 0.8 * kDegPerRad, 1e-3);
-  EXPECT_EQ(FollowScript(scene, -1).pedals, 0);
-  EXPECT_NEAR(FollowScript(scene, 2).jaw_deg[0], 0.5 * kDegPerRad, 1e-3);
-  EXPECT_EQ(FollowScript(scene, 3.9).pedals, kPedalCut);
-  EXPECT_EQ(FollowScript(scene, 4).pedals, 0);
-  EXPECT_NEAR(FollowScript(scene, 99).jaw_deg[0], 0.2 * kDegPerRad, 1e-3);
+TEST_F(NodeTest, FramesAreTakenAndTheirLossCounted) {
+  std::uint8_t sequence = 250;
+  for (int i = 0; i < 400; ++i, ++sequence) {
+    if (i % 10 == 9) {
+      TickSilently();
+      continue;
+    }
+    const auto line = FormatFrame({kLeftHandle, sequence, firmware_.Convert(25)});
+    handle_[0]->bytes.append(line.data(), line.size());
+    const auto pedal = FormatFrame({kPedalSender, static_cast<std::uint8_t>(i), kPedalCoag});
+    pedal_->bytes.append(pedal.data(), pedal.size());
+    const auto second = firmware_.Line(30);
+    handle_[1]->bytes.append(second.data(), second.size());
+    TickSilently();
+  }
+  EXPECT_NEAR(jaw0_deg(), 25, 1.5);
+  EXPECT_EQ(state_.pedals, kPedalCoag);
+  EXPECT_EQ(MetricOf("lost_frames"), 39 + 39);  // The last one of each is not missed yet.
+  EXPECT_EQ(Error(), "");
+}
+
+TEST_F(NodeTest, AnotherUnitsFramesAreRefusedAndNamed) {
+  for (int i = 0; i < 400; ++i) {
+    const auto line = FormatFrame({kRightHandle, static_cast<std::uint8_t>(i), 500});
+    handle_[0]->bytes.append(line.data(), line.size());
+    pedal_->bytes.append(line.data(), line.size());
+    handle_[1]->bytes.append(line.data(), line.size());
+    TickSilently();
+  }
+  EXPECT_FALSE(state_.handles[0].present);
+  EXPECT_TRUE(state_.handles[1].present);
+  EXPECT_EQ(Error(),
+            "handle 0: swapped: another unit is plugged in here: swap the plugs, or correct `hand` in the cart; "
+            "pedal: swapped");
+}
+
+TEST_F(NodeTest, WrongBaudIsToldFromGarbageAndMended) {
+  std::mt19937_64 random(4);
+  // Handle 0 speaks at 38400: at any other speed its bytes are noise. The pedal's line is noise at every speed.
+  for (int i = 0; i < 1200; ++i) {
+    if (handle_[0]->baud == 38400) {
+      const auto line = firmware_.Line(25);
+      handle_[0]->bytes.append(line.data(), line.size());
+    } else {
+      handle_[0]->bytes.append({static_cast<char>(random()), static_cast<char>(random())});
+    }
+    pedal_->bytes.append({static_cast<char>(random()), static_cast<char>(random())});
+    const auto second = firmware_.Line(30);
+    handle_[1]->bytes.append(second.data(), second.size());
+    TickSilently();
+  }
+  EXPECT_NEAR(jaw0_deg(), 25, 1.5);
+  EXPECT_EQ(state_.handles[0].quality, 1.0f);
+  EXPECT_EQ(Error().rfind("handle 0: wrong-baud: it speaks at another speed", 0), 0u) << Error();
+  EXPECT_NE(Error().find("; pedal: garbage"), std::string::npos) << Error();
+  EXPECT_EQ(MetricOf("reconnects"), 0);
+}
+
+TEST_F(NodeTest, EachUnitHasItsOwnCalibration) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("handle_node_test." + std::to_string(::getpid()));
+  // The same codes mean half the angle on unit B.
+  const CalibrationPoints half{{485.376, 520.192}, {0, 30}};
+  EXPECT_EQ(CalibrationStore::Save(folder, "B", half), folder / "B.yaml");
+  calibrations_ = CalibrationStore::Load(folder);
+  std::filesystem::remove_all(folder);
+  Restart(2000);
+  for (int i = 0; i < 100; ++i) {
+    Tick(40);
+  }
+  EXPECT_NEAR(jaw0_deg(), 40, 1.5);
+  EXPECT_EQ(MetricOf("calibration0_points"), 0);
+  handle_[0]->phase = LinkPhase::kReconnecting;
+  TickSilently();
+  handle_[0]->phase = LinkPhase::kOpen;
+  handle_[0]->fresh = true;
+  handle_[0]->serial_number = "B";
+  for (int i = 0; i < 100; ++i) {
+    Tick(40);
+  }
+  EXPECT_NEAR(jaw0_deg(), 20, 1.5);
+  EXPECT_EQ(MetricOf("calibration0_points"), 2);
+  EXPECT_EQ(MetricOf("calibration1_points"), 0);
 }
 
 }  // namespace

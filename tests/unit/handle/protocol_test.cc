@@ -1,10 +1,11 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <random>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "handle_bridge/protocol/baud_search.h"
+#include "handle_bridge/protocol/frame.h"
 #include "handle_bridge/protocol/jaw_line.h"
 #include "handle_bridge/protocol/line_framer.h"
 #include "handle_bridge/protocol/link_monitor.h"
@@ -14,24 +15,22 @@
 namespace fulcrum::handle_bridge {
 namespace {
 
-constexpr double kStep_V = 5.0 / 1024;
-
-struct Framed {
+struct Lines {
   std::vector<std::string> lines;
   int bad = 0;
 };
 
-Framed Frame(std::string_view bytes) {
-  Framed framed;
+Lines Cut(std::string_view bytes) {
+  Lines cut;
   LineFramer framer;
   for (const char byte : bytes) {
     const LineFramer::Event event = framer.Add(byte);
     if (event == LineFramer::Event::kLine) {
-      framed.lines.emplace_back(framer.line());
+      cut.lines.emplace_back(framer.line());
     }
-    framed.bad += event == LineFramer::Event::kBad;
+    cut.bad += event == LineFramer::Event::kBad;
   }
-  return framed;
+  return cut;
 }
 
 std::string LineOf(int code) {
@@ -40,27 +39,27 @@ std::string LineOf(int code) {
 }
 
 TEST(LineFramer, CutsAtCarriageReturnLineFeed) {
-  const Framed framed = Frame("2.4512\r\n2.3700\r\n\r\n2.5");
-  EXPECT_EQ(framed.lines, (std::vector<std::string>{"2.4512", "2.3700", ""}));
-  EXPECT_EQ(framed.bad, 0);
+  const Lines cut = Cut("2.4512\r\n2.3700\r\n\r\n2.5");
+  EXPECT_EQ(cut.lines, (std::vector<std::string>{"2.4512", "2.3700", ""}));
+  EXPECT_EQ(cut.bad, 0);
 }
 
 TEST(LineFramer, LineWithoutCarriageReturnIsBad) {
-  const Framed framed = Frame("2.4512\n2.3700\r\n");
-  EXPECT_EQ(framed.lines, (std::vector<std::string>{"2.3700"}));
-  EXPECT_EQ(framed.bad, 1);
+  const Lines cut = Cut("2.4512\n2.3700\r\n");
+  EXPECT_EQ(cut.lines, (std::vector<std::string>{"2.3700"}));
+  EXPECT_EQ(cut.bad, 1);
 }
 
 TEST(LineFramer, OverlongLineIsBadOnceAndTheNextLineIsWhole) {
-  const Framed framed = Frame("2.45122.45122.4512\r\n2.3700\r\n");
-  EXPECT_EQ(framed.lines, (std::vector<std::string>{"2.3700"}));
-  EXPECT_EQ(framed.bad, 1);
+  const Lines cut = Cut("2.45122.45122.4512\r\n2.3700\r\n");
+  EXPECT_EQ(cut.lines, (std::vector<std::string>{"2.3700"}));
+  EXPECT_EQ(cut.bad, 1);
 }
 
 TEST(LineFramer, EndlessGarbageCountsAsManyBadLines) {
-  const Framed framed = Frame(std::string(1600, 'x'));
-  EXPECT_TRUE(framed.lines.empty());
-  EXPECT_NEAR(framed.bad, 100, 1);
+  const Lines cut = Cut(std::string(1600, 'x'));
+  EXPECT_TRUE(cut.lines.empty());
+  EXPECT_NEAR(cut.bad, 100, 1);
 }
 
 TEST(ParseVoltage, AcceptsExactlyOneDigitPointFourDigits) {
@@ -190,6 +189,9 @@ TEST(PedalLine, NoSingleDamagedByteChangesThePedals) {
   }
 }
 
+constexpr LinkCounts kGoodLine{.bytes = 8, .good = 1};
+constexpr LinkCounts kBadLine{.bytes = 8, .malformed = 1};
+
 /// Feeds `n` ticks of 2.5 ms.
 void Feed(LinkMonitor* monitor, int n, const LinkCounts& counts) {
   for (int i = 0; i < n; ++i) {
@@ -198,7 +200,8 @@ void Feed(LinkMonitor* monitor, int n, const LinkCounts& counts) {
 }
 
 TEST(LinkMonitor, TellsGoodSilentGarbledAndWrongStep) {
-  const LinkCounts good{8, 1, 0, 0, 0}, bad{8, 0, 1, 0, 0}, off{8, 0, 0, 1, 0}, silent{};
+  const LinkCounts good{.bytes = 8, .good = 1}, bad{.bytes = 8, .malformed = 1}, off{.bytes = 8, .off_grid = 1},
+      other{.bytes = 14, .other = 1}, silent{};
   LinkMonitor monitor;
   Feed(&monitor, 400, good);
   EXPECT_EQ(monitor.state(), LinkState::kOk);
@@ -214,20 +217,22 @@ TEST(LinkMonitor, TellsGoodSilentGarbledAndWrongStep) {
   EXPECT_EQ(monitor.state(), LinkState::kWrongStep);
   Feed(&monitor, 220, good);
   EXPECT_EQ(monitor.state(), LinkState::kOk);
+  Feed(&monitor, 400, other);
+  EXPECT_EQ(monitor.state(), LinkState::kSwapped);
 }
 
 TEST(LinkMonitor, AlarmComesBelowHalfOfTheLinesAndWithinHalfASecond) {
   LinkMonitor monitor;
-  Feed(&monitor, 400, {8, 1, 0, 0, 0});
+  Feed(&monitor, 400, kGoodLine);
   int ticks = 0;
   while (monitor.state() == LinkState::kOk && ticks < 1000) {
-    monitor.Add({8, 0, 1, 0, 0}, 0.0025);
+    monitor.Add(kBadLine, 0.0025);
     ++ticks;
   }
   EXPECT_LE(ticks * 0.0025, 0.3);
   LinkMonitor sixty;
   for (int i = 0; i < 1000; ++i) {
-    sixty.Add(i % 5 < 3 ? LinkCounts{8, 1, 0, 0, 0} : LinkCounts{8, 0, 1, 0, 0}, 0.0025);
+    sixty.Add(i % 5 < 3 ? kGoodLine : kBadLine, 0.0025);
   }
   EXPECT_EQ(sixty.state(), LinkState::kOk);
   EXPECT_NEAR(sixty.quality(), 0.6f, 0.02f);
@@ -235,64 +240,132 @@ TEST(LinkMonitor, AlarmComesBelowHalfOfTheLinesAndWithinHalfASecond) {
 
 TEST(LinkMonitor, StallOfTheProgramClearsTheWindow) {
   LinkMonitor monitor;
-  Feed(&monitor, 400, {8, 0, 1, 0, 0});
+  Feed(&monitor, 400, kBadLine);
   EXPECT_EQ(monitor.state(), LinkState::kGarbage);
-  monitor.Add({8, 1, 0, 0, 0}, 5.0);
-  Feed(&monitor, 10, {8, 1, 0, 0, 0});
+  monitor.Add(kGoodLine, 5.0);
+  Feed(&monitor, 10, kGoodLine);
   EXPECT_EQ(monitor.state(), LinkState::kOk);
 }
 
-/// Mutates valid lines and pure noise; the framer and the gates must keep their promises on every byte.
-TEST(Protocol, HoldsItsPromisesOnAHundredThousandMutatedInputs) {
-  std::mt19937_64 random(20);
-  LineFramer framer;
-  JawLineGate gate{JawLineSettings{}};
-  int good = 0;
-  for (int input = 0; input < 200000; ++input) {
-    std::string bytes;
-    const int code = 486 + static_cast<int>(random() % 35);
-    if (random() % 8 != 0) {
-      const auto line = JawFirmware({}, 1).Format(code);
-      bytes.assign(line.data(), line.size());
-    } else {
-      bytes.resize(random() % 40);
-      for (char& byte : bytes) {
-        byte = static_cast<char>(random());
-      }
-    }
-    for (std::uint64_t edits = random() % 4; edits > 0 && !bytes.empty(); --edits) {
-      const std::size_t at = random() % bytes.size();
-      switch (random() % 4) {
-        case 0:
-          bytes[at] = static_cast<char>(bytes[at] ^ (1 << random() % 8));
-          break;
-        case 1:
-          bytes.erase(at, 1);
-          break;
-        case 2:
-          bytes.insert(at, 1, static_cast<char>(random()));
-          break;
-        default:
-          bytes.insert(at, bytes);
-      }
-    }
-    for (const char byte : bytes) {
-      if (framer.Add(byte) != LineFramer::Event::kLine) {
-        continue;
-      }
-      ASSERT_LT(framer.line().size(), LineFramer::kMaxLineBytes);
-      static_cast<void>(ParsePedals(framer.line()));
-      const JawReading reading = gate.Check(framer.line());
-      ASSERT_GE(reading.code, 0);
-      ASSERT_LE(reading.code, kMaxCode);
-      if (reading.verdict == LineVerdict::kGood) {
-        ASSERT_EQ(framer.line().size(), 6u);
-        ASSERT_LE(std::abs(std::stod(std::string(framer.line())) - reading.code * kStep_V), kStep_V * 0.0125 + 1e-9);
-        ++good;
+std::string FrameLine(const Frame& frame) {
+  const auto line = FormatFrame(frame);
+  return {line.data(), line.size() - 2};
+}
+
+TEST(Frame, EveryCodeAndSequenceRoundTrips) {
+  for (int value = 0; value <= 9999; ++value) {
+    const Frame sent{value % 2 == 0 ? kLeftHandle : kRightHandle, static_cast<std::uint8_t>(value * 7), value};
+    const std::optional<Frame> frame = ParseFrame(FrameLine(sent));
+    ASSERT_TRUE(frame) << value;
+    EXPECT_EQ(frame->sender, sent.sender);
+    EXPECT_EQ(frame->sequence, sent.sequence);
+    EXPECT_EQ(frame->value, value);
+  }
+}
+
+TEST(Frame, IsWhatItsDescriptionSays) {
+  // CRC-8/AUTOSAR of "123456789" is 0xDF; here of the frame of the description.
+  EXPECT_EQ(FrameLine({kLeftHandle, 0x1A, 503}), "$L1A,0503*29");
+  EXPECT_TRUE(ParseFrame("$L1A,0503*29"));
+  for (const char* bad : {"", "$", "$L1A,0503*2A", "$l1A,0503*29", "$L1a,0503*29", "$L1A,503*91", "$L1A,0503*29 ",
+                          "$L1A,05O3*91", "L1A,0503*29", "2.4512"}) {
+    EXPECT_FALSE(ParseFrame(bad)) << bad;
+  }
+}
+
+TEST(Frame, NoDamageOfTwoBitsIsBelievedAndOfThreeHardlyAny) {
+  const std::string line = FrameLine({kRightHandle, 0xC7, 498});
+  const auto bits = static_cast<int>(8 * line.size());
+  const auto flipped = [](std::string text, int bit) {
+    text[static_cast<std::size_t>(bit / 8)] =
+        static_cast<char>(text[static_cast<std::size_t>(bit / 8)] ^ (1 << bit % 8));
+    return text;
+  };
+  int believed = 0;
+  for (int a = 0; a < bits; ++a) {
+    const std::string one = flipped(line, a);
+    EXPECT_FALSE(ParseFrame(one)) << one;
+    for (int b = a + 1; b < bits; ++b) {
+      const std::string two = flipped(one, b);
+      EXPECT_FALSE(ParseFrame(two)) << two;
+      for (int c = b + 1; c < bits; ++c) {
+        believed += ParseFrame(flipped(two, c)) ? 1 : 0;
       }
     }
   }
-  EXPECT_GT(good, 20000);
+  // 142,880 ways. The CRC itself would find them all; one flip can change three bits of a hexadecimal letter.
+  EXPECT_LE(believed, 3);
+}
+
+TEST(SequenceCounter, CountsWhatIsMissingAcrossTheWrap) {
+  SequenceCounter counter;
+  EXPECT_EQ(counter.Lost(0xFE), 0u);
+  EXPECT_EQ(counter.Lost(0xFF), 0u);
+  EXPECT_EQ(counter.Lost(0x00), 0u);
+  EXPECT_EQ(counter.Lost(0x04), 3u);
+}
+
+TEST(JawLineGate, TakesFramesOfItsHandAndPlainLines) {
+  JawLineSettings settings;
+  settings.sender = kRightHandle;
+  JawLineGate gate(settings);
+  EXPECT_EQ(gate.Check(FrameLine({kRightHandle, 5, 500})).verdict, LineVerdict::kGood);
+  const JawReading later = gate.Check(FrameLine({kRightHandle, 8, 501}));
+  EXPECT_EQ(later.code, 501);
+  EXPECT_EQ(later.lost, 2u);
+  EXPECT_EQ(gate.Check(FrameLine({kLeftHandle, 9, 501})).verdict, LineVerdict::kOther);
+  EXPECT_EQ(gate.Check(FrameLine({kPedalSender, 9, 1})).verdict, LineVerdict::kOther);
+  EXPECT_EQ(gate.Check(FrameLine({kRightHandle, 9, 700})).verdict, LineVerdict::kOutside);
+  EXPECT_EQ(gate.Check(FrameLine({kRightHandle, 10, 1024})).verdict, LineVerdict::kMalformed);
+  EXPECT_EQ(gate.Check(LineOf(501)).verdict, LineVerdict::kGood);
+}
+
+constexpr LinkCounts kNothing{};
+
+/// Ticks until the search wants another speed, or 0 after 10 s.
+int TicksUntilChange(BaudSearch* search, const LinkCounts& counts) {
+  for (int tick = 1; tick <= 4000; ++tick) {
+    if (search->Add(counts, 0.0025)) {
+      return tick;
+    }
+  }
+  return 0;
+}
+
+TEST(BaudSearch, TriesEveryUsualSpeedAndTheKnownOneInBetween) {
+  BaudSearch search(115200);
+  std::vector<int> tried;
+  for (int i = 0; i < 14; ++i) {
+    EXPECT_NEAR(TicksUntilChange(&search, kBadLine), 100, 2);
+    EXPECT_TRUE(search.searching());
+    tried.push_back(search.baud());
+  }
+  for (std::size_t i = 0; i < tried.size(); ++i) {
+    EXPECT_EQ(tried[i], i % 2 == 1 ? 115200 : kUsualBauds[1 + i / 2]);
+  }
+}
+
+TEST(BaudSearch, StaysWhereALineIsValidAndSaysSo) {
+  BaudSearch search(115200);
+  EXPECT_NE(TicksUntilChange(&search, kBadLine), 0);
+  EXPECT_EQ(search.baud(), 57600);
+  EXPECT_FALSE(search.Add(kGoodLine, 0.0025));
+  EXPECT_FALSE(search.searching());
+  EXPECT_TRUE(search.found_other());
+  // A disturbance of less than a second changes nothing.
+  for (int i = 0; i < 390; ++i) {
+    EXPECT_FALSE(search.Add(kBadLine, 0.0025));
+  }
+  EXPECT_FALSE(search.Add(kGoodLine, 0.0025));
+  EXPECT_EQ(search.baud(), 57600);
+}
+
+TEST(BaudSearch, SilenceAndHalfLinesChangeNothing) {
+  BaudSearch search(115200);
+  EXPECT_EQ(TicksUntilChange(&search, kNothing), 0);
+  EXPECT_FALSE(search.Add({.bytes = 7}, 0.0025));
+  EXPECT_EQ(TicksUntilChange(&search, kNothing), 0);
+  EXPECT_FALSE(search.searching());
 }
 
 }  // namespace
