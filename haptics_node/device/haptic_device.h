@@ -1,8 +1,11 @@
 // What the servo sees of a haptic device.
 #pragma once
 
+#include <array>
+#include <memory>
 #include <string>
 
+#include "services/core/messages.h"
 #include "services/core/tick.h"
 #include "services/core/types.h"
 
@@ -26,5 +29,8 @@ class HapticDevice {
   /// Any thread but the servo's.
   [[nodiscard]] virtual DeviceHealth Describe() const { return {}; }
 };
+
+/// By tool; null for a tool without device.
+using DeviceArray = std::array<std::unique_ptr<HapticDevice>, kMaxTools>;
 
 }  // namespace fulcrum::haptics
