@@ -22,6 +22,7 @@ fulcrum::ExitCode RunHaptics(fulcrum::app::NodeApp& app) {
   fulcrum::haptics::CartDevices cart =
       fulcrum::haptics::MakeCartDevices(app.cart(), app.scene(), fulcrum::haptics::TrocarFolder());
   for (const std::string& note : cart.notes) Log(fulcrum::runtime::LogLevel::kInfo, note);
+  if (cart.touch) cart.touch->Start();
   fulcrum::haptics::HapticsNode node(app.scene(), std::move(cart.devices),
                                      {app.MakeInput<fulcrum::ContactModel>(), app.MakeOutput<fulcrum::ToolState>(),
                                       app.MakeOutput<fulcrum::TickManifest>()},

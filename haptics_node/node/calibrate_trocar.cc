@@ -25,6 +25,7 @@ TrocarMotion RecordTouch(const config::CartConfig& cart, std::size_t tool, doubl
   std::array<bool, kMaxTools> used{};
   used[tool] = true;
   const auto driver = MakeTouchDriver(cart, used, touch_library);
+  driver->Start();
   const auto wanted = static_cast<std::size_t>(seconds / kSamplePeriod_s);
   TrocarMotion motion;
   const std::int64_t start_ns = runtime::MonotonicNs();

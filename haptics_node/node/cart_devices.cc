@@ -71,9 +71,7 @@ std::shared_ptr<TouchDriver> MakeTouchDriver(const config::CartConfig& cart, con
     if (used[tool] && device.kind == DeviceKind::kTouch) wanted[tool] = {device.name, device.serial};
   }
   if (std::none_of(wanted.begin(), wanted.end(), [](const auto& want) { return want.has_value(); })) return nullptr;
-  auto driver = std::make_shared<TouchDriver>(wanted, touch_library);
-  driver->Start();
-  return driver;
+  return std::make_shared<TouchDriver>(wanted, touch_library);
 }
 
 CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& scene,
@@ -83,6 +81,7 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
                  [](const ToolDescription& tool) { return tool.kind != ToolKind::kNone; });
   const std::shared_ptr<TouchDriver> driver = MakeTouchDriver(cart, used, touch_library);
   CartDevices made;
+  made.touch = driver;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     const DeviceConfig& device = cart.devices[i];
     if (!used[i] || device.kind == DeviceKind::kNone) continue;

@@ -20,7 +20,8 @@ inline constexpr const char* kTouchLibrary = "libHD.so";
 
 struct CartDevices {
   DeviceArray devices;
-  std::vector<std::string> notes;  ///< What was found and which trocars are in use, a line each, for the log.
+  std::shared_ptr<TouchDriver> touch;  ///< Behind the Touch devices; null without. Start() its maintenance.
+  std::vector<std::string> notes;      ///< What was found and which trocars are in use, a line each, for the log.
 };
 
 /// Opens what the cart names for the tools of the scene; a trocar in `trocars` stands above the cart's own, unless
