@@ -205,8 +205,8 @@ void TouchDriver::OpenDevices() {
 // The library may take seconds over a device that is not there: Health must not wait for it, so nothing of it is called
 // with the mutex held.
 void TouchDriver::Open(Device* device) {
-  while (api_.GetError().code != 0) {
-    // What an earlier device left behind is not this one's.
+  // What an earlier device left behind is not this one's; a library that never runs dry is not waited for.
+  for (int i = 0; i < kMaxErrorsPerFrame && api_.GetError().code != 0; ++i) {
   }
   hd::Handle handle = api_.InitDevice(device->name.c_str());
   const hd::ErrorInfo error = api_.GetError();

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstring>
+#include <cstdlib>
 #include <memory>
 #include <thread>
 
@@ -22,7 +22,17 @@ struct Error {
   unsigned device;
 };
 
-std::unique_ptr<StandIn> controls;
+std::unique_ptr<StandIn> NewControls() {
+  auto fresh = std::make_unique<StandIn>();
+  for (StandInDevice& device : fresh->devices) device.forces.reserve(kMaxForces);
+  fresh->devices[0].name = "Left Device";
+  fresh->devices[0].serial = "A100";
+  fresh->devices[1].name = "Right Device";
+  fresh->devices[1].serial = "B200";
+  return fresh;
+}
+
+std::unique_ptr<StandIn> controls = NewControls();
 std::array<Error, kMaxErrors> errors;
 std::size_t error_count = 0;
 unsigned current = kInvalid, frame = kInvalid;
@@ -45,6 +55,26 @@ StandInDevice* Current(const char* what, bool in_frame) {
   if (in_frame && frame != current) Misuse(what);
   return &controls->devices[current];
 }
+/// With HD_STAND_IN_SWING in the environment the devices move by themselves, as a tool that is swung about its trocar.
+const bool swings = std::getenv("HD_STAND_IN_SWING") != nullptr;
+
+void SwingTo(double time_s) {
+  const double a = 0.4 * std::sin(6 * time_s), b = 0.4 * std::sin(8 * time_s);
+  // The axis of the tool, towards its tip, and two directions normal to it; the trocar is at (0, -100, -100) mm.
+  const double x = std::tan(a), y = std::tan(b) - 1, z = -1, length = std::hypot(x, y, z);
+  const std::array<double, 3> d{x / length, y / length, z / length};
+  const double flat = std::hypot(d[1], d[2]);
+  const std::array<double, 3> u{0, d[2] / flat, -d[1] / flat};
+  for (StandInDevice& device : controls->devices) {
+    device.buttons = 1;
+    for (std::size_t i = 0; i < 3; ++i) {
+      device.position_mm[i] = (i == 0 ? 0.0 : -100.0) - 140 * d[i];
+      device.transform[4 + i] = u[i];
+      device.transform[8 + i] = -d[i];
+    }
+  }
+}
+
 void CallBack() {
   if (running && !controls->stalled && callback != nullptr) (void)callback(callback_data);
 }
@@ -54,12 +84,7 @@ void CallBack() {
 extern "C" {
 
 StandIn* hd_stand_in_reset() {
-  controls = std::make_unique<StandIn>();
-  for (StandInDevice& device : controls->devices) device.forces.reserve(kMaxForces);
-  controls->devices[0].name = "Left Device";
-  controls->devices[0].serial = "A100";
-  controls->devices[1].name = "Right Device";
-  controls->devices[1].serial = "B200";
+  controls = NewControls();
   error_count = 0;
   current = frame = kInvalid;
   callback = nullptr;
@@ -179,9 +204,10 @@ void hdUnschedule(unsigned long) { callback = nullptr; }
 void hdSetSchedulerRate(unsigned long rate) { controls->rate_Hz = rate; }
 void hdStartScheduler() {
   if (running.exchange(true)) return Misuse("hdStartScheduler twice");
-  if (!controls->threaded) return;
+  if (!controls->threaded && !swings) return;
   scheduler = std::thread([] {
-    while (running) {
+    for (double time_s = 0; running; time_s += 0.001) {
+      if (swings) SwingTo(time_s);
       CallBack();
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
