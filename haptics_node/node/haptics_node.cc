@@ -27,7 +27,7 @@ Servo::Devices Pointers(const DeviceArray& devices) {
 }
 
 void AddTrouble(Health* health, const std::string& trouble) {
-  health->state = HealthState::kDegraded;
+  if (health->state == HealthState::kRunning) health->state = HealthState::kDegraded;
   if (!health->last_error.empty()) health->last_error += "; ";
   health->last_error += trouble;
 }

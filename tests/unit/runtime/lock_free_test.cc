@@ -119,7 +119,10 @@ TEST(LatestValue, TwoThreadsSeeWholeValuesThatNeverGoBack) {
   Block block;
   std::uint64_t newest = 0, torn = 0, backward = 0;
   while (newest < kLast) {
-    if (!value.TryTake(&block)) continue;
+    if (!value.TryTake(&block)) {
+      std::this_thread::yield();
+      continue;
+    }
     if (!block.whole()) ++torn;
     if (block.word[0] <= newest) ++backward;
     newest = block.word[0];
