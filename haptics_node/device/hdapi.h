@@ -37,7 +37,7 @@ inline constexpr Enum kCalibrationOk = 0x5000, kCalibrationNeedsUpdate = 0x5001;
 inline constexpr Enum kEncoderReset = 1, kAutomatic = 2, kInkwell = 4;
 
 // Errors.
-inline constexpr unsigned kWarmMotors = 0x0200;
+inline constexpr unsigned kWarmMotors = 0x0200, kMaxForceExceeded = 0x0201, kForceError = 0x0204;
 inline constexpr unsigned kDeviceFault = 0x0300, kCommError = 0x0302, kTimerError = 0x0304;
 
 /// The functions of the library, under its names without "hd".

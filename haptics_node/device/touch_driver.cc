@@ -15,7 +15,8 @@ constexpr double kMetrePerMm = 1e-3;
 constexpr double kFarthest_m = 1.0;
 // Temperatures and calibration are asked for at a tenth of a second.
 constexpr std::uint64_t kSlowFrames = 100;
-constexpr int kWarmFrames = 1000;
+// How long an error about forces is shown, and the motors count as warm.
+constexpr int kErrorFrames = 1000;
 // A servo that sends no force for 20 ms has stopped: the last force then goes down to nothing within 100 ms.
 constexpr int kHoldFrames = 20, kReleaseFrames = 100;
 constexpr int kMaxErrorsPerFrame = 8;
@@ -28,6 +29,8 @@ constexpr std::int64_t kSchedulerDead_ns = 500'000'000;
 constexpr auto kMaintenancePeriod = std::chrono::milliseconds(100);
 
 bool IsDeviceError(unsigned code) { return code >= hd::kDeviceFault && code <= hd::kTimerError; }
+
+bool IsForceError(unsigned code) { return code >= hd::kMaxForceExceeded && code <= hd::kForceError; }
 
 std::string Quoted(const std::string& text) { return "'" + text + "'"; }
 
@@ -90,6 +93,7 @@ void TouchDriver::Frame(Device* device) noexcept {
   TakeErrors(device);
   if (device->warm_frames > 0) --device->warm_frames;
   device->link->warm.store(device->warm_frames > 0, std::memory_order_relaxed);
+  if (device->refusal_frames > 0 && --device->refusal_frames == 0) device->refusal.store(0, std::memory_order_relaxed);
 }
 
 void TouchDriver::CheckCalibration(Device* device) noexcept {
@@ -152,7 +156,11 @@ void TouchDriver::TakeErrors(Device* current) noexcept {
     for (Device& other : devices_) {
       if (other.handle == error.device && other.link != nullptr) device = &other;
     }
-    if (error.code == hd::kWarmMotors) device->warm_frames = kWarmFrames;
+    if (error.code == hd::kWarmMotors) device->warm_frames = kErrorFrames;
+    if (IsForceError(error.code)) {
+      device->refusal.store(error.code, std::memory_order_relaxed);
+      device->refusal_frames = kErrorFrames;
+    }
     if (IsDeviceError(error.code)) {
       device->error.store(error.code, std::memory_order_relaxed);
       device->state.store(State::kLost, std::memory_order_relaxed);
@@ -316,6 +324,9 @@ std::string TouchDriver::Trouble(std::size_t tool) const {
   }
   if (device->link->warm.load(std::memory_order_relaxed)) {
     return who + " has hot motors: its force is off until they have cooled";
+  }
+  if (const unsigned refusal = device->refusal.load(std::memory_order_relaxed); refusal != 0) {
+    return who + " has refused a force (" + Describe(refusal) + "): move it more slowly, or lower force_scale";
   }
   return {};
 }

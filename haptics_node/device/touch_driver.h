@@ -85,9 +85,10 @@ class TouchDriver {
     std::atomic<State> state{State::kAbsent};
     std::atomic<unsigned> error{0};         ///< That it was lost with.
     std::atomic<bool> bad_position{false};  ///< The last reading was no place that a device can be in.
+    std::atomic<unsigned> refusal{0};       ///< Of a force, within the last second; 0: none.
     // Callback only.
     std::uint64_t frames = 0;
-    int frames_without_force = 0, warm_frames = 0;
+    int frames_without_force = 0, warm_frames = 0, refusal_frames = 0;
     Vec3d force_D = Vec3d::Zero();
   };
 

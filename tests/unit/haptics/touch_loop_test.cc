@@ -71,7 +71,6 @@ TEST_P(StiffWall, RingsDownThroughTheDriver) {
     highest = std::max(highest, touch.ReadPosition(tick).z());
     force = Vec3d(rig.hd->devices[0].force_N.data()).norm();
   }
-
   EXPECT_LT(highest - lowest, 5e-5);
   EXPECT_GT(force, 0.5);
 }

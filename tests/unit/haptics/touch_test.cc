@@ -310,6 +310,20 @@ TEST_F(Touch, WarmMotorsErrorTurnsTheForceOffAndItReturnsSoftly) {
   EXPECT_EQ(driver->losses(), 0u);
 }
 
+TEST_F(Touch, ARefusedForceIsShownForASecondAndTheDeviceGoesOn) {
+  Open(kLeft);
+  Run(1500, Vec3d(1, 0, 0));
+  rig.hd->devices[0].error = 0x0203;
+  Run(2, Vec3d(1, 0, 0));
+  EXPECT_EQ(driver->Trouble(0),
+            "Touch A100 has refused a force (maximum velocity exceeded): move it more slowly, or "
+            "lower force_scale");
+  Run(1000, Vec3d(1, 0, 0));
+  EXPECT_EQ(driver->Trouble(0), "");
+  EXPECT_NEAR(Force(0).norm(), 1, 1e-9);
+  EXPECT_EQ(driver->losses(), 0u);
+}
+
 TEST_F(Touch, UncalibratedDeviceIsSilentUntilTheStylusWasInTheInkwell) {
   rig.hd->devices[0].calibration = 0x5002;
   Open(kLeft);

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <memory>
 #include <thread>
+#include <utility>
 
 namespace {
 
@@ -131,6 +132,7 @@ void hdEndFrame(unsigned handle) {
     Push(0x0302, handle);
     return;
   }
+  if (device.error != 0) Push(std::exchange(device.error, 0), handle);
   if (*std::max_element(device.heat.begin(), device.heat.end()) >= 1) {
     device.force_N.fill(0);
     Push(0x0200, handle);
@@ -148,6 +150,8 @@ const char* hdGetErrorString(unsigned code) {
   switch (code) {
     case 0x0200:
       return "warm motors";
+    case 0x0203:
+      return "maximum velocity exceeded";
     case 0x0300:
       return "device fault";
     case 0x0302:

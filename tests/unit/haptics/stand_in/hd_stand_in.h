@@ -20,6 +20,7 @@ struct StandInDevice {
   unsigned calibration = 0x5000;
   int calibration_updates = 0;
   double max_force_N = 3.3;
+  unsigned error = 0;  ///< Reported once, by the next frame.
 
   bool open = false;
   bool force_enabled = false;
