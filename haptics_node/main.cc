@@ -1,10 +1,15 @@
 // haptics_node: the 1 kHz servo between the operator's hands and the tissue.
 #include <algorithm>
-#include <array>
+#include <string>
+#include <utility>
 
+#include "haptics_node/calibrate_command.h"
+#include "haptics_node/node/cart_devices.h"
 #include "haptics_node/node/haptics_node.h"
+#include "haptics_node/node/trocar_store.h"
 #include "services/app/node_app.h"
 #include "services/runtime/cyclic_thread.h"
+#include "services/runtime/realtime.h"
 
 namespace {
 
@@ -14,11 +19,11 @@ using fulcrum::Tick;
 constexpr int kPriorityBelowServo = 20;
 
 fulcrum::ExitCode RunHaptics(fulcrum::app::NodeApp& app) {
-  std::array<bool, fulcrum::kMaxTools> simulated{};
-  for (std::size_t i = 0; i < simulated.size(); ++i) {
-    simulated[i] = app.cart().devices[i] == fulcrum::config::DeviceKind::kSimulated;
-  }
-  fulcrum::haptics::HapticsNode node(app.scene(), simulated,
+  fulcrum::haptics::CartDevices cart =
+      fulcrum::haptics::MakeCartDevices(app.cart(), app.scene(), fulcrum::haptics::TrocarFolder());
+  for (const std::string& note : cart.notes) Log(fulcrum::runtime::LogLevel::kInfo, note);
+  if (cart.touch) cart.touch->Start();
+  fulcrum::haptics::HapticsNode node(app.scene(), std::move(cart.devices),
                                      {app.MakeInput<fulcrum::ContactModel>(), app.MakeOutput<fulcrum::ToolState>(),
                                       app.MakeOutput<fulcrum::TickManifest>()},
                                      fulcrum::runtime::MonotonicNs());
@@ -39,7 +44,9 @@ fulcrum::ExitCode RunHaptics(fulcrum::app::NodeApp& app) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (fulcrum::haptics::IsCalibrateCommand(argc, argv)) return fulcrum::haptics::CalibrateMain(argc, argv);
   return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kHaptics,
-                                "Reads the devices, renders the forces of the tissue, publishes ToolState at 1 kHz.",
+                                "Reads the devices, renders the forces of the tissue, publishes ToolState at 1 kHz.\n"
+                                "`haptics_node calibrate-trocar --help`: measures where a trocar is.",
                                 RunHaptics);
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "services/core/operator_script.h"
 
@@ -16,19 +17,23 @@ constexpr double kSessionJump_s = 0.05;
 
 }  // namespace
 
-SimulatedDevice::SimulatedDevice(const HapticsParams& hand, const Trocar& trocar, std::span<const ScriptKey> script,
+Vec3d RestingAttachPoint(const Trocar& trocar) {
+  const Vec3d inward = trocar.p_WP.norm() > 0 ? Vec3d(-trocar.p_WP.normalized()) : Vec3d(-Vec3d::UnitZ());
+  return AttachPointForTip(trocar, trocar.p_WP + 0.5 * trocar.length_m * inward);
+}
+
+SimulatedDevice::SimulatedDevice(const HandModel& hand, const Trocar& trocar, std::span<const ScriptKey> script,
                                  std::uint32_t tool)
-    : mass_kg_(hand.hand_mass_kg + kDeviceMass_kg),
-      stiffness_N_m_(hand.hand_stiffness_N_m),
-      damping_Ns_m_(hand.hand_damping_Ns_m),
-      trocar_(trocar),
-      script_(script),
-      tool_(tool) {}
+    : hand_(hand), trocar_(trocar), script_(script), tool_(tool) {}
+
+SimulatedDevice::SimulatedDevice(const HandModel& hand, std::shared_ptr<const RecordedMotion> motion,
+                                 const WorkspaceMap& map)
+    : hand_(hand), motion_(std::move(motion)), map_(map) {}
 
 Vec3d SimulatedDevice::Target(double session_time_s) const noexcept {
+  if (motion_) return map_.ToWorld(motion_->PositionAt(session_time_s));
   const ScriptPoint point = EvaluateScript(script_, tool_, session_time_s);
-  if (point.present) return AttachPointForTip(trocar_, point.p_W.cast<double>());
-  return AttachPointForTip(trocar_, trocar_.p_WP - 0.5 * trocar_.length_m * trocar_.p_WP.normalized());
+  return point.present ? AttachPointForTip(trocar_, point.p_W.cast<double>()) : RestingAttachPoint(trocar_);
 }
 
 Vec3d SimulatedDevice::ReadPosition(const Tick& tick) noexcept {
@@ -46,11 +51,12 @@ Vec3d SimulatedDevice::ReadPosition(const Tick& tick) noexcept {
     const int steps = std::max(1, static_cast<int>(std::lround(span / kStep_s)));
     const double h = span / steps;
     const Vec3d target_velocity = (target - target_) / elapsed;
-    const double inertia = mass_kg_ + h * damping_Ns_m_ + h * h * stiffness_N_m_;
+    const double mass = hand_.mass_kg + kDeviceMass_kg;
+    const double inertia = mass + h * hand_.damping_Ns_m + h * h * hand_.stiffness_N_m;
     for (int i = 1; i <= steps; ++i) {
       const Vec3d wanted = target - (steps - i) * h * target_velocity;
-      velocity_ = (mass_kg_ * velocity_ +
-                   h * (stiffness_N_m_ * (wanted - position_) + damping_Ns_m_ * target_velocity + force_)) /
+      velocity_ = (mass * velocity_ +
+                   h * (hand_.stiffness_N_m * (wanted - position_) + hand_.damping_Ns_m * target_velocity + force_)) /
                   inertia;
       position_ += h * velocity_;
     }

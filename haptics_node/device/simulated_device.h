@@ -1,11 +1,15 @@
-// A device with an operator's hand on it: mass, spring and damper that follow the scripted tip in session time, pushed
-// by the force sent. Stateless apart from session time: it begins at rest where the script is.
+// A device with an operator's hand on it: mass, spring and damper that follow a wanted place in session time, pushed by
+// the force sent. Stateless apart from session time: it begins at rest where the wanted place is.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 
+#include "haptics_node/device/hand_model.h"
 #include "haptics_node/device/haptic_device.h"
+#include "haptics_node/device/recorded_motion.h"
+#include "haptics_node/device/workspace_map.h"
 #include "haptics_node/servo/trocar.h"
 #include "services/core/scene_view.h"
 
@@ -14,24 +18,34 @@ namespace fulcrum::haptics {
 /// Moving mass of a desktop device such as the Touch, at the attach point [kg].
 inline constexpr double kDeviceMass_kg = 0.045;
 
+/// Where a tool that nothing moves rests: half of its shaft inside, pointing at the origin of W [m].
+[[nodiscard]] Vec3d RestingAttachPoint(const Trocar& trocar);
+
 class SimulatedDevice final : public HapticDevice {
  public:
-  /// @param script keys of all tools, as in the scene; it must outlive the device. A tool without keys rests with half
-  /// its shaft inside, pointing at the origin of W.
-  SimulatedDevice(const HapticsParams& hand, const Trocar& trocar, std::span<const ScriptKey> script,
-                  std::uint32_t tool);
+  /// The hand leads the tip along the scene's script.
+  /// @param script keys of all tools; it must outlive the device. A tool without keys rests.
+  SimulatedDevice(const HandModel& hand, const Trocar& trocar, std::span<const ScriptKey> script, std::uint32_t tool);
+  /// The hand plays a recorded motion of the attach point, which `map` brings into the world.
+  SimulatedDevice(const HandModel& hand, std::shared_ptr<const RecordedMotion> motion, const WorkspaceMap& map);
+
+  /// Share of the force that reaches the hand, 0 … 1.
+  void set_force_scale(double scale) { force_scale_ = scale; }
 
   [[nodiscard]] Vec3d ReadPosition(const Tick& tick) noexcept override;
-  void WriteForce(const Vec3d& f_W) noexcept override { force_ = f_W; }
+  void WriteForce(const Vec3d& f_W) noexcept override { force_ = force_scale_ * f_W; }
 
  private:
   /// The attach point that the operator wants at this session time.
   [[nodiscard]] Vec3d Target(double session_time_s) const noexcept;
 
-  double mass_kg_, stiffness_N_m_, damping_Ns_m_;
+  HandModel hand_;
   Trocar trocar_;
   std::span<const ScriptKey> script_;
-  std::uint32_t tool_;
+  std::uint32_t tool_ = 0;
+  std::shared_ptr<const RecordedMotion> motion_;
+  WorkspaceMap map_;
+  double force_scale_ = 1;
 
   bool placed_ = false;
   double session_time_s_ = 0;

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "haptics_node/device/simulated_device.h"
 
 namespace fulcrum::haptics {
 namespace {
 
-using DeviceArray = std::array<std::unique_ptr<HapticDevice>, kMaxTools>;
-
-DeviceArray MakeDevices(const SceneView& scene, const std::array<bool, kMaxTools>& simulated) {
+DeviceArray MakeScriptedDevices(const SceneView& scene, const std::array<bool, kMaxTools>& simulated) {
   DeviceArray devices;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     const ToolDescription& tool = scene.tools[i];
@@ -27,12 +26,21 @@ Servo::Devices Pointers(const DeviceArray& devices) {
   return pointers;
 }
 
+void AddTrouble(Health* health, const std::string& trouble) {
+  if (health->state == HealthState::kRunning) health->state = HealthState::kDegraded;
+  if (!health->last_error.empty()) health->last_error += "; ";
+  health->last_error += trouble;
+}
+
 }  // namespace
 
 HapticsNode::HapticsNode(const SceneView& scene, const std::array<bool, kMaxTools>& simulated, const Ports& ports,
                          std::int64_t epoch_ns)
+    : HapticsNode(scene, MakeScriptedDevices(scene, simulated), ports, epoch_ns) {}
+
+HapticsNode::HapticsNode(const SceneView& scene, DeviceArray devices, const Ports& ports, std::int64_t epoch_ns)
     : ports_(ports),
-      devices_(MakeDevices(scene, simulated)),
+      devices_(std::move(devices)),
       servo_(scene, Pointers(devices_)),
       epoch_(static_cast<std::uint64_t>(epoch_ns)) {
   manifest_.node = NodeId::kHaptics;
@@ -80,11 +88,24 @@ void HapticsNode::FillHealth(Health* health) const {
   metric("models_not_taken", static_cast<double>(models_not_taken_.load(std::memory_order_relaxed)));
   metric("records_lost", static_cast<double>(records_lost_.load(std::memory_order_relaxed)));
   metric("forces_not_finite", static_cast<double>(figures.not_finite));
+  FillDeviceHealth(health);
   // Before the first model there is nothing to miss.
   if (figures.model_age_s > 1e-9 * static_cast<double>(kHoldAge_ns)) {
-    health->state = HealthState::kDegraded;
-    health->last_error = "no contact model for " + std::to_string(static_cast<int>(1e3 * figures.model_age_s)) +
-                         " ms: forces are off until physics is back";
+    AddTrouble(health, "no contact model for " + std::to_string(static_cast<int>(1e3 * figures.model_age_s)) +
+                           " ms: forces are off until physics is back");
+  }
+}
+
+void HapticsNode::FillDeviceHealth(Health* health) const {
+  for (std::size_t i = 0; i < devices_.size(); ++i) {
+    if (!devices_[i]) continue;
+    const DeviceHealth device = devices_[i]->Describe();
+    const std::string tool = std::to_string(i);
+    if (device.motor_heat >= 0) {
+      health->metrics.push_back({"motor" + tool + "_heat_pct", 100 * device.motor_heat});
+      health->metrics.push_back({"device" + tool + "_gain_pct", 100 * device.gain});
+    }
+    if (!device.trouble.empty()) AddTrouble(health, "tool " + tool + ": " + device.trouble);
   }
 }
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <memory>
 
 #include "haptics_node/device/haptic_device.h"
 #include "haptics_node/servo/servo.h"
@@ -29,9 +28,10 @@ class HapticsNode {
     bus::Output<TickManifest>& tick_manifest;
   };
 
-  /// Scene and ports must outlive the node.
-  /// @param simulated per tool: a simulated device; a tool without a device is not published.
+  /// Scene and ports must outlive the node. A tool without a device is not published.
   /// @param epoch_ns CLOCK_MONOTONIC at the start of the process [ns].
+  HapticsNode(const SceneView& scene, DeviceArray devices, const Ports& ports, std::int64_t epoch_ns);
+  /// The same with simulated devices that follow the scene's script, for the tools that `simulated` marks.
   HapticsNode(const SceneView& scene, const std::array<bool, kMaxTools>& simulated, const Ports& ports,
               std::int64_t epoch_ns);
 
@@ -47,9 +47,10 @@ class HapticsNode {
 
  private:
   void Publish(const ServoRecord& record);
+  void FillDeviceHealth(Health* health) const;
 
   Ports ports_;
-  std::array<std::unique_ptr<HapticDevice>, kMaxTools> devices_;
+  DeviceArray devices_;
   Servo servo_;
   const std::uint64_t epoch_;
 

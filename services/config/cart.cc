@@ -9,8 +9,12 @@ namespace {
 
 const StrictMap::Choices<LinkKind> kLinkKinds = {
     {"none", LinkKind::kNone}, {"simulated", LinkKind::kSimulated}, {"serial", LinkKind::kSerial}};
-const StrictMap::Choices<DeviceKind> kDeviceKinds = {{"none", DeviceKind::kNone},
-                                                     {"simulated", DeviceKind::kSimulated}};
+const StrictMap::Choices<DeviceKind> kDeviceKinds = {
+    {"none", DeviceKind::kNone}, {"simulated", DeviceKind::kSimulated}, {"touch", DeviceKind::kTouch}};
+const StrictMap::Choices<HandHold> kHandHolds = {{"scene", HandHold::kScene},
+                                                 {"fingertip", HandHold::kFingertip},
+                                                 {"light_grip", HandHold::kLightGrip},
+                                                 {"firm_grip", HandHold::kFirmGrip}};
 const StrictMap::Choices<LineProtocol> kProtocols = {{"plain", LineProtocol::kPlain},
                                                      {"framed", LineProtocol::kFramed}};
 const StrictMap::Choices<Hand> kHands = {{"left", Hand::kLeft}, {"right", Hand::kRight}};
@@ -60,6 +64,23 @@ void ReadSimulated(StrictMap map, bool handle, SimulatedUnit* unit) {
   }
 }
 
+void ReadDevice(StrictMap map, DeviceConfig* device) {
+  device->kind = map.Choice("kind", device->kind, kDeviceKinds);
+  device->name = map.TextOr("name", device->name, 63);
+  device->serial = map.TextOr("serial", device->serial, 63);
+  device->force_scale = map.Number("force_scale", device->force_scale, Range::Between(0, 1));
+  device->hand = map.Choice("hand", device->hand, kHandHolds);
+  device->motion = map.TextOr("motion", device->motion);
+  StrictMap workspace = map.MapOrDefaults("workspace");
+  WorkspaceConfig& w = device->workspace;
+  const auto vector = [&workspace](const char* key, const Range& range, Vec3d* v) {
+    *v = Vec3d(workspace.NumbersSi(key, {v->x(), v->y(), v->z()}, 3, 3, range).data());
+  };
+  vector("rotation_deg", Range::Between(-360, 360), &w.rotation_rad);
+  vector("trocar_mm", Range::Between(-1000, 1000), &w.trocar_D);
+  w.scale = workspace.Number("scale", w.scale, Range::Between(0.1, 10));
+}
+
 void ReadTiming(StrictMap map, NodeId node, NodeTiming* timing) {
   timing->rate_Hz = map.NumberSi("rate_Hz", timing->rate_Hz, Range::Between(1, 4000));
   timing->fifo_priority = static_cast<int>(map.Integer("fifo_priority", timing->fifo_priority, 0, 99));
@@ -91,7 +112,7 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   ReadSimulated(pedal.MapOrDefaults("simulated"), false, &cart.pedal.simulated);
   StrictMap devices = root.MapOrDefaults("devices");
   for (std::size_t tool = 0; tool < cart.devices.size(); ++tool) {
-    cart.devices[tool] = devices.MapOrDefaults(ToolKey(tool)).Choice("kind", cart.devices[tool], kDeviceKinds);
+    ReadDevice(devices.MapOrDefaults(ToolKey(tool)), &cart.devices[tool]);
   }
   StrictMap nodes = root.MapOrDefaults("nodes");
   for (std::size_t node = 0; node < cart.nodes.size(); ++node) {
@@ -163,6 +184,38 @@ void ValidatePorts(const CartConfig& cart) {
   add(cart.pedal.kind, cart.pedal.link, "pedal");
 }
 
+void ValidateDevices(const CartConfig& cart) {
+  const DeviceConfig* other = nullptr;
+  for (std::size_t tool = 0; tool < cart.devices.size(); ++tool) {
+    const DeviceConfig& device = cart.devices[tool];
+    const std::string field = "devices." + ToolKey(tool);
+    // The servo bounds the stiffness that the hand feels; what comes after it must not raise it.
+    constexpr double kRounding = 1e-9;
+    if (device.force_scale * device.workspace.scale > 1 + kRounding) {
+      Refuse(field, "force_scale " + std::to_string(device.force_scale) + " times workspace.scale " +
+                        std::to_string(device.workspace.scale) +
+                        " makes contacts stiffer than the servo holds stable; valid: a product of at most 1");
+    }
+    if (!device.motion.empty() && device.kind != DeviceKind::kSimulated) {
+      Refuse(field + ".motion", "only a simulated device plays recorded motion; valid: kind: simulated");
+    }
+    if (device.kind != DeviceKind::kTouch) continue;
+    if (device.name.empty()) Refuse(field + ".name", "is empty; valid: the name in the Touch's setup program");
+    if (other != nullptr) {
+      if (device.name == other->name) {
+        Refuse(field + ".name", "'" + device.name + "' is given to two tools; each needs its own");
+      }
+      if (device.serial.empty() != other->serial.empty()) {
+        Refuse(field + ".serial", "one Touch has a serial number, the other has none; give both, or neither");
+      }
+      if (!device.serial.empty() && device.serial == other->serial) {
+        Refuse(field + ".serial", "'" + device.serial + "' is given to two tools; each needs its own");
+      }
+    }
+    other = &device;
+  }
+}
+
 CartConfig ReadAndValidate(StrictYaml* yaml, const std::string& name) {
   CartConfig cart = ReadCart(yaml, CartConfig());
   try {
@@ -181,7 +234,9 @@ CartConfig::CartConfig() {
   }
   handles[1].hand = Hand::kRight;
   pedal.kind = LinkKind::kSimulated;
-  devices.fill(DeviceKind::kSimulated);
+  for (DeviceConfig& device : devices) {
+    device.kind = DeviceKind::kSimulated;
+  }
   const auto timing_of = [this](NodeId node) -> NodeTiming& { return nodes[static_cast<std::size_t>(node)]; };
   timing_of(NodeId::kSupervisor) = {.rate_Hz = 10};
   timing_of(NodeId::kHandleBridge) = {.rate_Hz = 400, .fifo_priority = 60};
@@ -202,11 +257,18 @@ void Validate(const CartConfig& cart) {
   }
   ValidateLink("pedal", cart.pedal.kind, cart.pedal.link);
   ValidatePorts(cart);
+  ValidateDevices(cart);
 }
 
 CartConfig LoadCart(const std::filesystem::path& file) {
   StrictYaml yaml = StrictYaml::FromFile(file);
-  return ReadAndValidate(&yaml, file.string());
+  CartConfig cart = ReadAndValidate(&yaml, file.string());
+  for (DeviceConfig& device : cart.devices) {
+    if (!device.motion.empty()) {
+      device.motion = (std::filesystem::absolute(file).parent_path() / device.motion).lexically_normal().string();
+    }
+  }
+  return cart;
 }
 
 CartConfig LoadCartText(const std::string& text, const std::string& name) {

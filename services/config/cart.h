@@ -4,6 +4,7 @@
 
 #include <array>
 #include <filesystem>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -64,7 +65,31 @@ struct PedalConfig {
   SimulatedUnit simulated;  ///< For kSimulated.
 };
 
-enum class DeviceKind { kNone, kSimulated };
+enum class DeviceKind { kNone, kSimulated, kTouch };
+
+/// Who holds a simulated device: the hand that the scene describes, or one of three standard ones.
+enum class HandHold { kScene, kFingertip, kLightGrip, kFirmGrip };
+
+/// How the frame D of a device lies in the world: p_W = trocar_W + scale R_WD (p_D - trocar_D). For the Touch D has x
+/// to the right, y up and z towards the operator.
+struct WorkspaceConfig {
+  /// Turns about the fixed axes x, y, z, in this order [rad]. Default: the device stands on a table, world z is up and
+  /// the operator looks along world y.
+  Vec3d rotation_rad{std::numbers::pi / 2, 0, 0};
+  Vec3d trocar_D{0, -0.1, -0.1};  ///< Unless `haptics_node calibrate-trocar` has stored a better one [m].
+  double scale = 1;               ///< Motion of the tool per motion of the hand.
+};
+
+/// One haptic device; the index in CartConfig::devices is the tool it works.
+struct DeviceConfig {
+  DeviceKind kind = DeviceKind::kNone;
+  std::string name = "Default Device";  ///< For kTouch: as in the Touch's setup program.
+  std::string serial;                   ///< For kTouch; empty: whatever device has that name.
+  double force_scale = 1;               ///< Share of the servo's force that goes to the hand, 0 … 1.
+  WorkspaceConfig workspace;            ///< For kTouch and for recorded motion.
+  HandHold hand = HandHold::kScene;     ///< For kSimulated.
+  std::string motion;                   ///< For kSimulated: file of recorded poses; empty: the scene's script.
+};
 
 /// How a node's cyclic thread runs.
 struct NodeTiming {
@@ -80,7 +105,7 @@ struct CartConfig {
   int domain = 7;  ///< DDS domain, 1 … 100.
   std::array<HandleConfig, kMaxTools> handles;
   PedalConfig pedal;
-  std::array<DeviceKind, kMaxTools> devices{};  ///< Haptic device per tool.
+  std::array<DeviceConfig, kMaxTools> devices;  ///< By tool.
   std::array<NodeTiming, kNodeCount> nodes;     ///< By NodeId.
 
   /// Everything simulated, at the rates of the architecture page.
@@ -91,7 +116,7 @@ struct CartConfig {
 /// The rules that span several fields. Throws InputError naming field, value and valid range.
 void Validate(const CartConfig& cart);
 
-/// Reads and validates. Throws InputError.
+/// Reads and validates. Relative paths in the file are taken from its folder. Throws InputError.
 [[nodiscard]] CartConfig LoadCart(const std::filesystem::path& file);
 /// The same for text in memory; `name` stands for the file in messages.
 [[nodiscard]] CartConfig LoadCartText(const std::string& text, const std::string& name);

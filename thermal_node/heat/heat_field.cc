@@ -126,6 +126,8 @@ void HeatField::Boil(Tile* tile, Ledger* ledger) {
 
 int HeatField::Diffuse(float dt_s, Ledger* ledger) {
   if (awake_.empty()) return 0;
+  // What is no number must be out before the first stage: the second would carry it on.
+  for (Tile* tile : awake_) RefreshTheta(tile, ledger);
   WakeNeighbours();
   RebuildStaleFaces();
   float rate = 0;

@@ -206,7 +206,7 @@ RemovedBox PaperModel::RemoveNodes(HeatField* field, MeshTopology* topology, Led
   }
   if (!removed.empty()) {
     for (Tile* tile : field->awake()) {
-      if (tile->faces_stale) field->RefreshTheta(tile, ledger);
+      if (tile->material_stale) field->RefreshTheta(tile, ledger);
     }
   }
   return removed;

@@ -131,6 +131,12 @@ Finding SerialPorts() {
   return {true, found.empty() ? "none: handles and pedal are simulated" : "usable:" + found, ""};
 }
 
+// The name that haptics_node loads; a cart with simulated devices does not need it.
+Finding TouchDriver() {
+  if (::dlopen("libHD.so", RTLD_LAZY | RTLD_LOCAL) != nullptr) return {true, "libHD.so is installed", ""};
+  return {true, "none: a cart with `kind: touch` needs libHD.so (3D Systems: Touch Device Driver, OpenHaptics)", ""};
+}
+
 /// True when a UDP socket of this machine is bound to one of the ports that DDS derives from the domain.
 bool PortsInUse(int domain) {
   // RTPS well-known ports: 7400 + 250 * domain, then 0, 1 and 10 + 2 * participant for the rest.
@@ -206,6 +212,7 @@ ExitCode Doctor(const Words& words) {
       {"off-screen GL", OffScreenGl()},
       {"display", Display()},
       {"serial ports", SerialPorts()},
+      {"haptic driver", TouchDriver()},
       {"disk", Disk(arguments.values["out"].as<std::string>())},
   };
   for (const auto& [what, finding] : findings) {

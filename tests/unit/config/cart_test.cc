@@ -1,8 +1,10 @@
 #include "services/config/cart.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
+#include <fstream>
 
 #include "services/core/error.h"
 
@@ -25,7 +27,7 @@ TEST(Cart, EveryShippedFileLoads) {
     EXPECT_EQ(cart.name, entry.path().stem().string());
     ++files;
   }
-  EXPECT_GE(files, 2);
+  EXPECT_GE(files, 3);
 }
 
 TEST(Cart, SimulatedFileIsTheDefault) {
@@ -44,6 +46,23 @@ TEST(Cart, LabFileNamesThreeSerialLinks) {
   EXPECT_NEAR(cart.timing(NodeId::kHaptics).spin_s, 100e-6, 1e-12);
 }
 
+TEST(Cart, TouchFileNamesTwoDevices) {
+  const CartConfig cart = LoadCart(FULCRUM_SOURCE_DIR "/deploy/carts/touch.yaml");
+  EXPECT_EQ(cart.devices[0].kind, DeviceKind::kTouch);
+  EXPECT_EQ(cart.devices[1].kind, DeviceKind::kTouch);
+  EXPECT_NE(cart.devices[0].serial, cart.devices[1].serial);
+}
+
+TEST(Cart, MotionFileIsFoundFromTheCartsFolder) {
+  const auto folder = std::filesystem::temp_directory_path();
+  const auto file = folder / ("cart_test." + std::to_string(::getpid()) + ".yaml");
+  std::ofstream(file) << "devices: {tool0: {motion: hands/left.csv}, tool1: {motion: /right.csv}}\n";
+  const CartConfig cart = LoadCart(file);
+  std::filesystem::remove(file);
+  EXPECT_EQ(cart.devices[0].motion, (folder / "hands/left.csv").string());
+  EXPECT_EQ(cart.devices[1].motion, "/right.csv");
+}
+
 TEST(Cart, EffectiveConfigurationLoadsToItself) {
   CartConfig cart = LoadCart(FULCRUM_SOURCE_DIR "/deploy/carts/lab.yaml");
   cart.handles[0].simulated.protocol = LineProtocol::kFramed;
@@ -52,7 +71,14 @@ TEST(Cart, EffectiveConfigurationLoadsToItself) {
   cart.pedal.simulated.drop = 1e-3;
   cart.handles[0].calibration.volts = {2.3, 2.4, 2.55};
   cart.handles[0].calibration.angles_rad = {1.0, 0.5, 0.0};
+  cart.devices[0].kind = DeviceKind::kTouch;
+  cart.devices[0].name = "Left";
+  cart.devices[0].serial = "0042";
+  cart.devices[0].force_scale = 0.5;
+  cart.devices[0].workspace = {Vec3d(0.1, -0.2, 0.3), Vec3d(0.01, 0.02, -0.03), 1.5};
+  cart.devices[1].hand = HandHold::kFirmGrip;
   const std::string yaml = CartToYaml(cart);
+  EXPECT_EQ(LoadCartText(yaml, "again").devices[0].serial, "0042");
   EXPECT_EQ(CartToYaml(LoadCartText(yaml, "again")), yaml) << yaml;
   const CartConfig again = LoadCartText(yaml, "again");
   EXPECT_EQ(again.handles[0].simulated.protocol, LineProtocol::kFramed);
@@ -81,7 +107,22 @@ const BadCart kBadCarts[] = {
     {"DomainAbove", "domain: 101", "1 to 100"},
     {"UnknownTool", "handles: {tool2: {kind: simulated}}", "handles.tool2: unknown key"},
     {"UnknownLinkKind", "handles: {tool0: {kind: usb}}", "valid: none, simulated, serial"},
-    {"UnknownDevice", "devices: {tool0: {kind: touch}}", "valid: none, simulated"},
+    {"UnknownDevice", "devices: {tool0: {kind: omega}}", "valid: none, simulated, touch"},
+    {"UnknownHand", "devices: {tool0: {hand: fist}}", "valid: scene, fingertip, light_grip, firm_grip"},
+    {"ForceScale", "devices: {tool0: {force_scale: 1.5}}", "valid: 0 to 1"},
+    {"WorkspaceScale", "devices: {tool0: {workspace: {scale: 0}}}", "valid: 0.1 to 10"},
+    {"WorkspaceUnit", "devices: {tool0: {workspace: {trocar_mm: [0, 10 deg, 0]}}}", "has the wrong unit"},
+    {"WorkspaceTrocar", "devices: {tool0: {workspace: {trocar_mm: [0, 2000, 0]}}}", "valid: -1000 to 1000 mm"},
+    {"TooStiff", "devices: {tool1: {force_scale: 0.8, workspace: {scale: 2}}}",
+     "devices.tool1: force_scale 0.800000 times workspace.scale 2.000000 makes contacts stiffer"},
+    {"MotionOfATouch", "devices: {tool0: {kind: touch, motion: a.csv}}", "devices.tool0.motion: only a simulated"},
+    {"SameTouchTwice", "devices: {tool0: {kind: touch}, tool1: {kind: touch}}",
+     "devices.tool1.name: 'Default Device' is given to two tools"},
+    {"SameSerialTwice",
+     "devices: {tool0: {kind: touch, name: a, serial: \"1\"}, tool1: {kind: touch, name: b, serial: \"1\"}}",
+     "devices.tool1.serial: '1' is given to two tools"},
+    {"OneSerialOnly", "devices: {tool0: {kind: touch, name: a, serial: \"1\"}, tool1: {kind: touch, name: b}}",
+     "devices.tool1.serial: one Touch has a serial number"},
     {"SerialWithoutPort", "handles: {tool0: {kind: serial}}", "handles.tool0: kind is serial, but neither"},
     {"PedalWithoutPort", "pedal: {kind: serial}", "pedal: kind is serial, but neither"},
     {"OddBaud", "handles: {tool0: {kind: serial, port: /dev/ttyUSB0, baud: 100000}}", "100000 is not a usual speed"},

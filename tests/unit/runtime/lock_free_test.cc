@@ -1,5 +1,5 @@
-// The ring and the sequence lock: single-threaded properties, and two threads against each other (also run under the
-// thread sanitizer by the tsan preset).
+// The ring, the sequence lock and the latest value: single-threaded properties, and two threads against each other
+// (also run under the thread sanitizer by the tsan preset).
 #include <gtest/gtest.h>
 
 #include <array>
@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <thread>
 
+#include "services/runtime/latest_value.h"
 #include "services/runtime/seqlock.h"
 #include "services/runtime/spsc_ring.h"
 
@@ -94,6 +95,41 @@ TEST(SeqLock, ReadersNeverSeeATornOrOlderValue) {
   first.join();
   second.join();
   EXPECT_TRUE(good);
+}
+
+TEST(LatestValue, GivesTheNewestOnceAndNothingBeforeTheFirst) {
+  LatestValue<int> value;
+  int got = -1;
+  EXPECT_FALSE(value.TryTake(&got));
+  EXPECT_EQ(got, -1);
+  for (int i = 0; i < 20; ++i) {
+    for (int j = 0; j <= i % 5; ++j) value.Store(10 * i + j);
+    EXPECT_TRUE(value.TryTake(&got));
+    EXPECT_EQ(got, 10 * i + i % 5);
+    EXPECT_FALSE(value.TryTake(&got));
+  }
+}
+
+TEST(LatestValue, TwoThreadsSeeWholeValuesThatNeverGoBack) {
+  constexpr std::uint64_t kLast = 100'000;
+  LatestValue<Block> value;
+  std::thread producer([&] {
+    for (std::uint64_t n = 1; n <= kLast; ++n) value.Store(Block::Of(n));
+  });
+  Block block;
+  std::uint64_t newest = 0, torn = 0, backward = 0;
+  while (newest < kLast) {
+    if (!value.TryTake(&block)) {
+      std::this_thread::yield();
+      continue;
+    }
+    if (!block.whole()) ++torn;
+    if (block.word[0] <= newest) ++backward;
+    newest = block.word[0];
+  }
+  producer.join();
+  EXPECT_EQ(torn, 0u);
+  EXPECT_EQ(backward, 0u);
 }
 
 }  // namespace

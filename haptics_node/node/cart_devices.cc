@@ -1,0 +1,104 @@
+#include "haptics_node/node/cart_devices.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "haptics_node/device/simulated_device.h"
+#include "haptics_node/device/touch_device.h"
+#include "haptics_node/node/trocar_store.h"
+
+namespace fulcrum::haptics {
+namespace {
+
+using config::DeviceConfig;
+using config::DeviceKind;
+using config::HandHold;
+
+HandModel HandOf(HandHold hold, const HapticsParams& scene) {
+  switch (hold) {
+    case HandHold::kFingertip:
+      return kFingertip;
+    case HandHold::kLightGrip:
+      return kLightGrip;
+    case HandHold::kFirmGrip:
+      return kFirmGrip;
+    case HandHold::kScene:
+      break;
+  }
+  return scene;
+}
+
+/// @param serial of the device at hand; empty: not known, or simulated.
+WorkspaceMap MapOf(const config::CartConfig& cart, std::size_t tool, const Vec3d& p_WP, const std::string& serial,
+                   const std::filesystem::path& trocars, std::vector<std::string>* notes) {
+  const config::WorkspaceConfig& workspace = cart.devices[tool].workspace;
+  WorkspaceMap map{RotationFromAngles(workspace.rotation_rad), workspace.scale, workspace.trocar_D, p_WP};
+  const std::filesystem::path file = TrocarFile(trocars, cart.name, tool);
+  const std::string who = "tool " + std::to_string(tool) + ": ";
+  if (const auto stored = LoadTrocar(file)) {
+    if (serial.empty() || stored->serial == serial) {
+      map.p_DP = stored->p_DP;
+      notes->push_back(who + "trocar as measured, " + file.string());
+    } else {
+      notes->push_back(who + "the trocar of the cart file is used: " + file.string() + " was measured with device " +
+                       stored->serial + ", this is " + serial + "; calibrate the trocar again");
+    }
+  }
+  return map;
+}
+
+std::unique_ptr<HapticDevice> MakeSimulated(const DeviceConfig& device, const SceneView& scene, const Trocar& trocar,
+                                            std::uint32_t tool, const WorkspaceMap& map) {
+  const HandModel hand = HandOf(device.hand, scene.haptics);
+  std::unique_ptr<SimulatedDevice> made;
+  if (device.motion.empty()) {
+    made = std::make_unique<SimulatedDevice>(hand, trocar, scene.script, tool);
+  } else {
+    made = std::make_unique<SimulatedDevice>(
+        hand, std::make_shared<const RecordedMotion>(RecordedMotion::Load(device.motion)), map);
+  }
+  made->set_force_scale(device.force_scale);
+  return made;
+}
+
+}  // namespace
+
+std::shared_ptr<TouchDriver> MakeTouchDriver(const config::CartConfig& cart, const std::array<bool, kMaxTools>& used,
+                                             const std::string& touch_library) {
+  TouchDriver::WantedByTool wanted;
+  for (std::size_t tool = 0; tool < wanted.size(); ++tool) {
+    const DeviceConfig& device = cart.devices[tool];
+    if (used[tool] && device.kind == DeviceKind::kTouch) wanted[tool] = {device.name, device.serial};
+  }
+  if (std::none_of(wanted.begin(), wanted.end(), [](const auto& want) { return want.has_value(); })) return nullptr;
+  return std::make_shared<TouchDriver>(wanted, touch_library);
+}
+
+CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& scene,
+                            const std::filesystem::path& trocars, const std::string& touch_library) {
+  std::array<bool, kMaxTools> used{};
+  std::transform(scene.tools.begin(), scene.tools.end(), used.begin(),
+                 [](const ToolDescription& tool) { return tool.kind != ToolKind::kNone; });
+  const std::shared_ptr<TouchDriver> driver = MakeTouchDriver(cart, used, touch_library);
+  CartDevices made;
+  made.touch = driver;
+  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+    const DeviceConfig& device = cart.devices[i];
+    if (!used[i] || device.kind == DeviceKind::kNone) continue;
+    const Trocar trocar{scene.tools[i].p_WP.cast<double>(), scene.tools[i].shaft_length_m};
+    if (device.kind == DeviceKind::kSimulated) {
+      const WorkspaceMap map =
+          device.motion.empty() ? WorkspaceMap() : MapOf(cart, i, trocar.p_WP, "", trocars, &made.notes);
+      made.devices[i] = MakeSimulated(device, scene, trocar, i, map);
+      continue;
+    }
+    const std::string found = driver->serial(i), trouble = driver->Trouble(i);
+    const std::string& serial = found.empty() ? device.serial : found;
+    const WorkspaceMap map = MapOf(cart, i, trocar.p_WP, serial, trocars, &made.notes);
+    made.notes.push_back("tool " + std::to_string(i) + ": " + (trouble.empty() ? "Touch " + serial : trouble));
+    made.devices[i] = std::make_unique<TouchDevice>(driver, i, map, device.force_scale, RestingAttachPoint(trocar));
+  }
+  return made;
+}
+
+}  // namespace fulcrum::haptics
