@@ -69,11 +69,8 @@ WallResult HitWall(const HandModel& hand, double wall_N_per_mm) {
   const std::array<ScriptKey, 2> script{
       {{0.0f, 0, Vec3f(0, 0, 0.01f), 0, 0, 0}, {0.8f, 0, Vec3f(0, 0, -0.004f), 0, 0, 0}}};
   SceneView scene = BenchScene(1.0);
-  scene.haptics.hand_mass_kg = static_cast<float>(hand.mass_kg);
-  scene.haptics.hand_stiffness_N_m = static_cast<float>(hand.stiffness_N_m);
-  scene.haptics.hand_damping_Ns_m = static_cast<float>(hand.damping_Ns_m);
   scene.script = script;
-  SimulatedDevice device(scene.haptics, BenchTrocar(), script, 0);
+  SimulatedDevice device(hand, BenchTrocar(), script, 0);
   Loop loop(scene, &device, Wall(1e3 * wall_N_per_mm));
   double lowest = 1, highest = -1;
   double depth = 0;

@@ -1,15 +1,9 @@
 // Measures of the closed loop of hand, servo and tissue: stiffness that stays stable, energy, a stall of physics.
 #pragma once
 
-namespace fulcrum::haptics {
+#include "haptics_node/device/hand_model.h"
 
-/// A hand on the device: mass without the device's own, spring and damper towards where it wants to be.
-struct HandModel {
-  double mass_kg, stiffness_N_m, damping_Ns_m;
-};
-inline constexpr HandModel kFingertip{0.03, 150, 1.5};
-inline constexpr HandModel kLightGrip{0.08, 250, 4};
-inline constexpr HandModel kFirmGrip{0.15, 400, 8};  ///< The default cart's.
+namespace fulcrum::haptics {
 
 struct WallResult {
   bool stable = false;
