@@ -31,37 +31,51 @@ inline float Harmonic(float a, float b) { return 2.0f * a * b / (a + b + std::nu
 /// Rows of the tile: enthalpy <- enthalpy + dt dH/dt, with `loss` = dt times the sink per kelvin. In the second stage
 /// of a substep the result is the mean of that and of the enthalpy before it: Heun's method, which keeps the maximum
 /// principle of its stages (Shu and Osher 1988).
-template <bool kSecond, bool kSheared>
+template <bool kSecond, int kShear>
 [[gnu::always_inline]] inline void Stage(Tile* tile, float dt_s, float gain, float loss) {
-  alignas(64) float across_t[(kTile + 3) * kTile];
+  // Each pass over the whole tile: what is read with a shift right after it was written waits for the store.
+  alignas(64) float across_s[kTile * kFaceStride], across_t[(kTile + 3) * kTile], face_s[kTile * kFaceStride];
   for (int j = -1; j <= kTile + 1; ++j) {
     const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
     const float* __restrict g = &tile->face_t[FaceT(0, j)];
     float* __restrict f = &across_t[FaceT(0, j)];
     for (int i = 0; i < kTile; ++i) f[i] = g[i] * (t[i - kThetaStride] - t[i]);
   }
-  alignas(64) float above[kTile], below[kTile], across_s[kTile + 16], face_s[kTile + 16];
+  for (int j = 0; j < kTile; ++j) {
+    const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
+    const float* __restrict g = &tile->face_s[FaceS(0, j)];
+    float* __restrict f = &across_s[FaceS(0, j)];
+    for (int i = -8; i < kTile + 8; ++i) f[i] = g[i] * (t[i - 1] - t[i]);  // whole vectors; beyond the halo g is 0
+  }
+  for (int j = 0; j < kTile; ++j) {
+    const float* __restrict f = &across_s[FaceS(0, j)];
+    float* __restrict face = &face_s[FaceS(0, j)];
+    for (int i = 0; i < kTile + 8; ++i) face[i] = FourthOrder(f[i - 1], f[i], f[i + 1], gain);
+  }
+  alignas(64) float above[kTile], below[kTile];
   for (int i = 0; i < kTile; ++i) {
     const float* f = &across_t[FaceT(i, 0)];
     below[i] = FourthOrder(f[-kTile], f[0], f[kTile], gain);
   }
   for (int j = 0; j < kTile; ++j) {
     const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
-    const float* __restrict g = &tile->face_s[FaceS(0, j)];
+    const float* __restrict fs = &face_s[FaceS(0, j)];
     const float* __restrict ft = &across_t[FaceT(0, j + 1)];
     const float* __restrict inverse_area = &tile->geometry.inverse_area[j * kTile];
     float* __restrict h = &tile->state.enthalpy[j * kTile];
     float* __restrict before = &tile->before[j * kTile];
     for (int i = 0; i < kTile; ++i) above[i] = below[i];
     for (int i = 0; i < kTile; ++i) below[i] = FourthOrder(ft[i - kTile], ft[i], ft[i + kTile], gain);
-    for (int i = -1; i <= kTile + 1; ++i) across_s[i + 8] = g[i] * (t[i - 1] - t[i]);
-    for (int i = 0; i <= kTile; ++i) face_s[i] = FourthOrder(across_s[i + 7], across_s[i + 8], across_s[i + 9], gain);
     for (int i = 0; i < kTile; ++i) {
-      float flux = (face_s[i] - face_s[i + 1]) + (above[i] - below[i]);
-      if constexpr (kSheared) {
-        const float* l = &tile->links[Corner(i, j)];
-        const float* up = &t[i - kThetaStride];
-        const float* down = &t[i + kThetaStride];
+      float flux = (fs[i] - fs[i + 1]) + (above[i] - below[i]);
+      const float* l = kShear != 0 ? &tile->links[Corner(i, j)] : nullptr;
+      const float* up = &t[i - kThetaStride];
+      const float* down = &t[i + kThetaStride];
+      if constexpr (kShear == kMainLinks) {
+        flux += l[0] * (up[-1] - t[i]) + l[kCornerStride + 1] * (down[1] - t[i]);
+      } else if constexpr (kShear == kAntiLinks) {
+        flux -= l[1] * (up[1] - t[i]) + l[kCornerStride] * (down[-1] - t[i]);
+      } else if constexpr (kShear != 0) {
         flux += Main(l[0]) * (up[-1] - t[i]) + Main(l[kCornerStride + 1]) * (down[1] - t[i]) +
                 Anti(l[1]) * (up[1] - t[i]) + Anti(l[kCornerStride]) * (down[-1] - t[i]);
       }
@@ -77,13 +91,37 @@ template <bool kSecond, bool kSheared>
 }
 
 FULCRUM_WIDE
-void FirstStage(Tile* tile, float dt_s, float gain, float loss) { Stage<false, false>(tile, dt_s, gain, loss); }
+void FirstStage(Tile* tile, float dt_s, float gain, float loss) { Stage<false, 0>(tile, dt_s, gain, loss); }
 FULCRUM_WIDE
-void SecondStage(Tile* tile, float dt_s, float gain, float loss) { Stage<true, false>(tile, dt_s, gain, loss); }
+void FirstStageMain(Tile* tile, float dt_s, float gain, float loss) {
+  Stage<false, kMainLinks>(tile, dt_s, gain, loss);
+}
 FULCRUM_WIDE
-void FirstStageSheared(Tile* tile, float dt_s, float gain, float loss) { Stage<false, true>(tile, dt_s, gain, loss); }
+void FirstStageAnti(Tile* tile, float dt_s, float gain, float loss) {
+  Stage<false, kAntiLinks>(tile, dt_s, gain, loss);
+}
 FULCRUM_WIDE
-void SecondStageSheared(Tile* tile, float dt_s, float gain, float loss) { Stage<true, true>(tile, dt_s, gain, loss); }
+void FirstStageSheared(Tile* tile, float dt_s, float gain, float loss) {
+  Stage<false, kMainLinks | kAntiLinks>(tile, dt_s, gain, loss);
+}
+FULCRUM_WIDE
+void SecondStage(Tile* tile, float dt_s, float gain, float loss) { Stage<true, 0>(tile, dt_s, gain, loss); }
+FULCRUM_WIDE
+void SecondStageMain(Tile* tile, float dt_s, float gain, float loss) {
+  Stage<true, kMainLinks>(tile, dt_s, gain, loss);
+}
+FULCRUM_WIDE
+void SecondStageAnti(Tile* tile, float dt_s, float gain, float loss) {
+  Stage<true, kAntiLinks>(tile, dt_s, gain, loss);
+}
+FULCRUM_WIDE
+void SecondStageSheared(Tile* tile, float dt_s, float gain, float loss) {
+  Stage<true, kMainLinks | kAntiLinks>(tile, dt_s, gain, loss);
+}
+using StageKernel = void (*)(Tile*, float, float, float);
+/// By the links of the tile.
+constexpr std::array<StageKernel, 4> kFirstStage{FirstStage, FirstStageMain, FirstStageAnti, FirstStageSheared};
+constexpr std::array<StageKernel, 4> kSecondStage{SecondStage, SecondStageMain, SecondStageAnti, SecondStageSheared};
 
 /// theta with its column sums and extremes; rc = rc_dry + water * rc_water.
 FULCRUM_WIDE
@@ -107,6 +145,26 @@ void ThetaOf(Tile* tile, float rc_dry, float rc_water) {
   tile->theta_max = *std::max_element(high, high + kTile);
   tile->theta_min = *std::min_element(low, low + kTile);
   tile->water_off = *std::max_element(odd, odd + kTile);
+}
+
+/// theta between the stages with its column sums. What is no number must not reach the neighbours in the second stage;
+/// it is taken out after it.
+FULCRUM_WIDE
+void MiddleThetaOf(Tile* tile, float rc_dry, float rc_water) {
+  alignas(64) float sum[kTile] = {};
+  for (int j = 0; j < kTile; ++j) {
+    float* __restrict t = &tile->theta[ThetaIndex(0, j)];
+    const float* __restrict h = &tile->state.enthalpy[j * kTile];
+    const float* __restrict w = &tile->state.water[j * kTile];
+    const float* __restrict area = &tile->geometry.area[j * kTile];
+    for (int i = 0; i < kTile; ++i) {
+      const float theta = h[i] / (rc_dry + w[i] * rc_water);
+      const float size = theta < 0.0f ? -theta : theta;
+      t[i] = size <= kThetaPlausible ? theta : 0.0f;
+      sum[i] += t[i] * area[i];
+    }
+  }
+  std::copy_n(sum, kTile, tile->theta_sum.begin());
 }
 
 /// A field of cells with the halo of theta.
@@ -220,12 +278,11 @@ void SetGeometry(const Sheet& sheet, Tile* tile) {
   };
   constexpr int kSide = kTile + 3;
   std::array<float, kSide * kSide> shear;  // corners -1 ... kTile + 1
-  bool sheared = false;
   for (int j = -1; j <= kTile + 1; ++j) {
     for (int i = -1; i <= kTile + 1; ++i) {
       const float b = shear_at(i, j);
       shear[(j + 1) * kSide + i + 1] = b;
-      sheared = sheared || b != 0.0f;
+      geometry.links |= b > 0.0f ? kMainLinks : (b < 0.0f ? kAntiLinks : 0);
     }
   }
   const auto carried = [&](int i, int j) { return std::abs(shear[(j + 1) * kSide + i + 1]); };
@@ -245,7 +302,7 @@ void SetGeometry(const Sheet& sheet, Tile* tile) {
     geometry.area[k] = at(static_cast<float>(k % kTile) + 0.5f, static_cast<float>(k / kTile) + 0.5f).area();
     geometry.inverse_area[k] = 1.0f / geometry.area[k];
   }
-  if (!sheared) return;
+  if (geometry.links == 0) return;
   geometry.shear.assign((kTile + 1) * kCornerStride, 0.0f);
   for (int j = 0; j <= kTile; ++j) {
     for (int i = 0; i <= kTile; ++i) geometry.shear[Corner(i, j)] = shear[(j + 1) * kSide + i + 1];
@@ -350,19 +407,12 @@ void HeatField::ExchangeHalos(Tile* tile) {
   }
 }
 
-void HeatField::RunStage(bool second, float dt_s, float gain, bool sink, Ledger* ledger) {
-  for (Tile* tile : awake_) ExchangeHalos(tile);
-  for (Tile* tile : awake_) {
-    const float loss = sink ? dt_s * SinkOf(*tile) : 0.0f;
-    if (!tile->links.empty()) {
-      (second ? SecondStageSheared : FirstStageSheared)(tile, dt_s, gain, loss);
-    } else {
-      (second ? SecondStage : FirstStage)(tile, dt_s, gain, loss);
-    }
-    double sum = 0;
-    for (const float s : tile->theta_sum) sum += s;
-    ledger->lost += 0.5 * sum * loss * tile->flat_volume;
-  }
+void HeatField::RunStage(Tile* tile, bool second, float dt_s, float gain, bool sink, Ledger* ledger) {
+  const float loss = sink ? dt_s * SinkOf(*tile) : 0.0f;
+  (second ? kSecondStage : kFirstStage)[tile->geometry.links](tile, dt_s, gain, loss);
+  double sum = 0;
+  for (const float s : tile->theta_sum) sum += s;
+  ledger->lost += 0.5 * sum * loss * tile->flat_volume;
 }
 
 void HeatField::Cool(Tile* tile, float dt_s, Ledger* ledger) const {
@@ -374,10 +424,12 @@ void HeatField::Cool(Tile* tile, float dt_s, Ledger* ledger) const {
   ledger->lost += before - tile->Heat();
 }
 
-void HeatField::ComputeTheta(Tile* tile) const { ThetaOf(tile, material_.rc_dry, material_.rc_wet - material_.rc_dry); }
+void HeatField::ComputeMiddleTheta(Tile* tile) const {
+  MiddleThetaOf(tile, material_.rc_dry, material_.rc_wet - material_.rc_dry);
+}
 
 void HeatField::RefreshTheta(Tile* tile, Ledger* ledger) {
-  ComputeTheta(tile);
+  ThetaOf(tile, material_.rc_dry, material_.rc_wet - material_.rc_dry);
   float total = 0;
   for (const float s : tile->theta_sum) total += s;
   if (!std::isfinite(total) || tile->theta_max > kThetaPlausible || tile->theta_min < -kThetaPlausible ||

@@ -126,8 +126,6 @@ void HeatField::Boil(Tile* tile, Ledger* ledger) {
 
 int HeatField::Diffuse(float dt_s, Ledger* ledger) {
   if (awake_.empty()) return 0;
-  // What is no number must be out before the first stage: the second would carry it on.
-  for (Tile* tile : awake_) RefreshTheta(tile, ledger);
   WakeNeighbours();
   RebuildStaleFaces();
   float rate = 0;
@@ -142,10 +140,15 @@ int HeatField::Diffuse(float dt_s, Ledger* ledger) {
   }
   const float gain = stiff ? 1.0f : std::min(kFluxGain, kExplicitLimit / (h * rate));
   for (int n = 0; n < substeps; ++n) {
-    RunStage(false, h, gain, !stiff, ledger);
-    for (Tile* tile : awake_) ComputeTheta(tile);
-    RunStage(true, h, gain, !stiff, ledger);
+    // Halos first: a tile may then go through all of a stage while it is in the cache.
+    for (Tile* tile : awake_) ExchangeHalos(tile);
     for (Tile* tile : awake_) {
+      RunStage(tile, false, h, gain, !stiff, ledger);
+      ComputeMiddleTheta(tile);
+    }
+    for (Tile* tile : awake_) ExchangeHalos(tile);
+    for (Tile* tile : awake_) {
+      RunStage(tile, true, h, gain, !stiff, ledger);
       if (stiff) Cool(tile, h, ledger);
       RefreshTheta(tile, ledger);
       Boil(tile, ledger);

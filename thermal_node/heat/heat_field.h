@@ -18,9 +18,9 @@
 
 namespace fulcrum::thermal {
 
-inline constexpr float kWakeTheta = 0.03f;     ///< A neighbour wakes when this warm at its border [K].
-inline constexpr float kSleepTheta = 0.02f;    ///< A tile sleeps when nowhere warmer [K].
-inline constexpr float kExplicitLimit = 0.9f;  ///< dt * rate of the explicit step; the maximum principle holds to 1.
+inline constexpr float kWakeTheta = 0.03f;      ///< A neighbour wakes when this warm at its border [K].
+inline constexpr float kSleepTheta = 0.02f;     ///< A tile sleeps when nowhere warmer [K].
+inline constexpr float kExplicitLimit = 0.98f;  ///< dt * rate of the explicit step; the maximum principle holds to 1.
 /// Largest ratio of a fourth-order flux to the two-point one: that of the shortest wave. Where the step is too long for
 /// it, what the step allows.
 inline constexpr float kFluxGain = 4.0f / 3.0f;
@@ -84,10 +84,10 @@ class HeatField {
   void RebuildStaleFaces();
   void ExchangeHalos(Tile* tile);
   void LimitFaces(Tile* tile, float rate);
-  void RunStage(bool second, float dt_s, float gain, bool sink, Ledger* ledger);
+  void RunStage(Tile* tile, bool second, float dt_s, float gain, bool sink, Ledger* ledger);
   void Cool(Tile* tile, float dt_s, Ledger* ledger) const;
   void ComputeConductivity(Tile* tile);
-  void ComputeTheta(Tile* tile) const;
+  void ComputeMiddleTheta(Tile* tile) const;
   void WakeNeighbours();
   void SleepCold(Ledger* ledger);
   void MarkNeighboursStale(const Tile& tile);

@@ -128,7 +128,9 @@ void ThermalNode::NoteHealth() {
   Figures f{};
   f.solver = solver_.figures();
   f.delivered_J = solver_.ledger().generator;
-  f.closure = solver_.ledger().ClosureError(solver_.field().Stored());
+  // Summing up the heat takes as long as a substep of it.
+  if (ticks_ % kTicksPerClosure == 0) closure_ = solver_.ledger().ClosureError(solver_.field().Stored());
+  f.closure = closure_;
   f.revision = solver_.topology().revision();
   f.quarantined = solver_.field().quarantined();
   f.refused = refused_;

@@ -19,6 +19,7 @@ namespace fulcrum::thermal {
 
 /// A patch is due every this many ticks: 25 Hz at 100 Hz, above what a monitor's eye follows in colour.
 inline constexpr std::uint64_t kTicksPerPatch = 4;
+inline constexpr std::uint64_t kTicksPerClosure = 10;  ///< Of the energy for Health.
 /// When nothing changes, one old patch goes out this often, for readers that came late.
 inline constexpr std::uint64_t kTicksPerHistoryPatch = 100;
 /// A checkpoint at each new revision, and this often while the tissue is warm [frames of the solver].
@@ -81,6 +82,7 @@ class ThermalNode {
   TickManifest manifest_;
   std::uint64_t ticks_ = 0, refused_ = 0, frames_since_checkpoint_ = 0;
   bool restored_ = false, topology_due_ = true, patch_readers_ = false, patch_note_due_ = false;
+  double closure_ = 0;
   bool checkpoint_full_ = false;
   runtime::SeqLock<Figures> figures_;
 };

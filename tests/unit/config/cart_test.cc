@@ -108,7 +108,7 @@ const BadCart kBadCarts[] = {
     {"UnknownTool", "handles: {tool2: {kind: simulated}}", "handles.tool2: unknown key"},
     {"UnknownLinkKind", "handles: {tool0: {kind: usb}}", "valid: none, simulated, serial"},
     {"UnknownDevice", "devices: {tool0: {kind: omega}}", "valid: none, simulated, touch"},
-    {"UnknownHand", "devices: {tool0: {hand: fist}}", "valid: scene, fingertip, light_grip, firm_grip"},
+    {"UnknownHandHold", "devices: {tool0: {hand: fist}}", "valid: scene, fingertip, light_grip, firm_grip"},
     {"ForceScale", "devices: {tool0: {force_scale: 1.5}}", "valid: 0 to 1"},
     {"WorkspaceScale", "devices: {tool0: {workspace: {scale: 0}}}", "valid: 0.1 to 10"},
     {"WorkspaceUnit", "devices: {tool0: {workspace: {trocar_mm: [0, 10 deg, 0]}}}", "has the wrong unit"},
