@@ -13,7 +13,9 @@ constexpr float kRelaxation = 0.02f;                   ///< b_body / k_body [s].
 constexpr float kMinBody = 30.0f, kMaxBody = 5000.0f;  ///< [N/m]
 constexpr float kSkinOverEt = 2.0f;                    ///< k1 / (E t).
 constexpr float kBodyOverSecant = 2.0f;
-constexpr float kJaws = 1e4f;                                   ///< What is held has no skin to give way [N/m].
+constexpr float kJaws = 1e4f;  ///< What is held has no skin to give way [N/m].
+/// Of what breathing or the other tool does to the surroundings of a contact [W].
+constexpr float kMostExternal = 0.05f;
 constexpr float kForceCap = 15.0f;                              ///< Rectal tissue is damaged above this [N].
 constexpr float kSurfaceRadius = 0.012f, kGraspRadius = 0.03f;  ///< Where the model holds [m].
 constexpr float kLeastDent = 0.0005f;                           ///< Below this a secant is noise [m].
@@ -237,6 +239,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - scene_.physics.collision_margin_m);
   contact.p_s = pose.p_WT + (touching ? push / contact.k1 + dent : -contact.gap) * memory.normal;
   contact.radius = kSurfaceRadius;
+  device.p_ext_W = std::clamp(memory.force.dot(memory.v_s), 0.0f, kMostExternal);
   device.contacts[device.count++] = contact;
   return device;
 }

@@ -1,0 +1,212 @@
+// What the hand feels of the real physics_node over DDS, against the same physics run at 1 kHz in this process with the
+// tool poses that were really taken.
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "physics_node/simulation/tissue_simulation.h"
+#include "services/bus/dds/participant.h"
+#include "services/bus/input_account.h"
+#include "services/core/operator_script.h"
+#include "services/runtime/cyclic_thread.h"
+#include "services/scene/build.h"
+#include "services/scene/scene_file.h"
+#include "tests/benchmark/report.h"
+
+namespace fulcrum {
+namespace {
+
+constexpr int kDomain = 96;
+constexpr double kPatience_s = 20;
+
+class Process {
+ public:
+  Process(const char* name, const std::filesystem::path& folder) : pid_(::fork()) {
+    if (pid_ != 0) return;
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    const std::string program = std::string(FULCRUM_BIN_DIR) + "/" + name;
+    ::execl(program.c_str(), name, "--scene", (folder / "scene").c_str(), "--session", folder.c_str(), "--domain",
+            std::to_string(kDomain).c_str(), nullptr);
+    ::_exit(127);
+  }
+  ~Process() {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+ private:
+  pid_t pid_;
+};
+
+struct Part {
+  const char* name;
+  double from_s, to_s;
+};
+constexpr double kGrasp_s = 6.2;
+constexpr Part kPress{"press", 0.8, 2.2}, kPalpate{"palpate", 2.2, 5.2}, kPull{"grasp", kGrasp_s + 0.9, 12.0};
+
+/// Tool 0 on the built-in scene: presses 6 mm, palpates once a second, takes the membrane, and pulls it up and down.
+scene::SceneSettings LiveScene() {
+  scene::SceneSettings settings = scene::BuiltIn();
+  constexpr double kOpen = 0.87, kNeither = 0.35;
+  settings.script.clear();
+  const auto key = [&](int tool, double time_s, const Vec2f& sheet, double height_m, double jaw_rad) {
+    settings.script.push_back({.time_s = time_s,
+                               .tool = tool,
+                               .world_m = {},
+                               .sheet = sheet,
+                               .height_m = height_m,
+                               .offset_m = Vec3f::Zero(),
+                               .jaw_rad = jaw_rad,
+                               .pedals = kPedalNone,
+                               .power_W = 0});
+  };
+  const Vec2f place(0.40f, 0.5f);
+  key(0, 0.0, place, 0.010, kNeither);
+  key(0, 0.4, place, 0.004, kNeither);
+  key(0, 1.2, place, -0.006, kNeither);
+  for (int i = 0; i < 7; ++i) key(0, 2.2 + 0.5 * i, place, i % 2 == 0 ? -0.006 : -0.003, kNeither);
+  key(0, 5.7, place, 0.010, kOpen);
+  key(0, kGrasp_s, place, -0.001, kOpen);
+  key(0, kGrasp_s + 0.3, place, -0.001, 0);
+  for (int i = 0; i < 10; ++i) key(0, kGrasp_s + 0.9 + 0.5 * i, place, i % 2 == 0 ? 0.012 : 0.008, 0);
+  key(1, 0.0, Vec2f(0.62f, 0.42f), 0.020, 0);
+  settings.script_duration_s = 12;
+  return settings;
+}
+
+struct Sample {
+  double time_s;
+  ToolSample tool;
+};
+
+/// Runs the session and returns what the servo published of tool 0.
+std::vector<Sample> Record(const SceneView& scene, const std::filesystem::path& folder) {
+  bus::DdsParticipant participant({.domain = kDomain, .node_name = "benchmark", .shared_memory = {}});
+  const auto manifests = participant.MakeOutput<SceneManifest>();
+  const auto handles = participant.MakeOutput<HandleState>();
+  const auto tools = participant.MakeInput<ToolState>();
+  const auto healths = participant.MakeInput<Health>();
+  const Process haptics("haptics_node", folder), physics("physics_node", folder);
+  const auto seconds_since = [](std::int64_t ns) { return 1e-9 * static_cast<double>(runtime::MonotonicNs() - ns); };
+  const std::int64_t begin = runtime::MonotonicNs();
+  std::set<NodeId> waiting;
+  Health health;
+  while (waiting.size() < 2 && seconds_since(begin) < kPatience_s) {
+    while (healths->TakeNext(&health)) {
+      if (health.state == HealthState::kWaiting) waiting.insert(health.node);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  if (waiting.size() < 2) return {};
+  SceneManifest manifest;
+  manifest.scene_name = scene.name;
+  manifest.session_id = "benchmark";
+  manifest.scene_hash = scene.hash;
+  const std::int64_t start = runtime::MonotonicNs();
+  manifest.stamp = bus::Stamper(start).Next(start);
+  manifest.session_start_ns = start;
+  manifests->Write(manifest);
+  bus::Stamper stamper(start);
+  std::vector<Sample> samples;
+  ToolState state;
+  while (seconds_since(start) < scene.script_duration_s) {
+    HandleState handle;
+    handle.stamp = stamper.Next(runtime::MonotonicNs());
+    for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+      handle.handles[i] = {true, EvaluateScript(scene.script, i, seconds_since(start)).jaw_rad, 0, 1, 0};
+    }
+    handles->Write(handle);
+    while (tools->TakeNext(&state)) {
+      samples.push_back({1e-9 * static_cast<double>(state.stamp.stamp_ns - start), state.tools[0]});
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return samples;
+}
+
+/// Force of the tissue on tool 0 at each millisecond, with the tool where it was.
+std::vector<Vec3f> Truth(SceneView scene, const std::vector<Sample>& samples) {
+  scene.physics.dt_s = 1e-3f;
+  scene.physics.preset = PhysicsPreset::kFast;  // one substep a millisecond
+  physics::TissueSimulation simulation(scene);
+  std::vector<Vec3f> forces;
+  std::array<physics::ToolInput, kMaxTools> inputs;
+  std::size_t at = 0;
+  for (int ms = 0; ms < static_cast<int>(1e3 * scene.script_duration_s); ++ms) {
+    const double time_s = 1e-3 * ms;
+    while (at + 1 < samples.size() && samples[at + 1].time_s <= time_s) ++at;
+    inputs[0].present = samples[at].tool.kind != ToolKind::kNone;
+    inputs[0].pose.p_WT = samples[at].tool.p_WT;
+    inputs[0].pose.q_WT = samples[at].tool.q_WT.normalized();
+    inputs[0].pose.jaw_rad = EvaluateScript(scene.script, 0, time_s).jaw_rad;
+    (void)simulation.Step(inputs);
+    const DeviceContacts contacts = simulation.Contacts(0);
+    Vec3f force = Vec3f::Zero();
+    for (std::uint32_t i = 0; i < contacts.count; ++i) force += contacts.contacts[i].f_ref;
+    forces.push_back(force);
+  }
+  return forces;
+}
+
+int Run(benchmark::Report* report) {
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path() / ("bench_live." + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  scene::WriteSceneFile(scene::BuildProcedural(LiveScene()), "name: built-in\n", folder / "scene");
+  const scene::SceneFile file(folder / "scene");
+  const SceneView scene = file.view();
+  const std::vector<Sample> samples = Record(scene, folder);
+  std::filesystem::remove_all(folder);
+  if (samples.empty()) {
+    std::fprintf(stderr, "bench_live: haptics_node and physics_node did not come up within %.0f s\n", kPatience_s);
+    return 1;
+  }
+  const std::vector<Vec3f> truth = Truth(scene, samples);
+  double all_error = 0, all_truth = 0;
+  for (const Part& part : {kPress, kPalpate, kPull}) {
+    double error = 0, size = 0, largest = 0;
+    int unusual = 0;
+    for (const Sample& sample : samples) {
+      const int ms = static_cast<int>(std::lround(1e3 * sample.time_s));
+      if (sample.time_s < part.from_s || sample.time_s >= part.to_s || ms >= static_cast<int>(truth.size())) continue;
+      unusual += sample.tool.state == ServoState::kNormal ? 0 : 1;
+      // What is sent is scaled for the hand.
+      const Vec3f felt = sample.tool.f_W / scene.haptics.force_scale;
+      error += (felt - truth[ms]).squaredNorm();
+      size += truth[ms].squaredNorm();
+      largest = std::max<double>(largest, truth[ms].norm());
+    }
+    const std::string stem = std::string("haptics.live_force_error_pct.") + part.name;
+    report->Add(stem, 100 * std::sqrt(error / size), "%");
+    report->Add(std::string("haptics.live.") + part.name + ".largest_N", largest, "N");
+    report->Add(std::string("haptics.live.") + part.name + ".ticks_not_normal", unusual, "1");
+    all_error += error;
+    all_truth += size;
+  }
+  report->Add("haptics.live_force_error_pct", 100 * std::sqrt(all_error / all_truth), "%");
+  return 0;
+}
+
+}  // namespace
+}  // namespace fulcrum
+
+int main(int argc, char** argv) {
+  fulcrum::benchmark::Report report(argc, argv);
+  return report.Wants("haptics.live") ? fulcrum::Run(&report) : 0;
+}
