@@ -268,9 +268,8 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   problem_.face_t = material_.thickness_m * metric_.ss / metric_.area();
   SetSigma();
   SetGround(0.5f * (path.from + path.to), path.tented);
-  // The tip passes over at most one cell per step.
   const float cells = (path.to - path.from).norm() / material_.cell_m;
-  const float longest = std::max(duration_s / std::max(cells, 1.0f), 0.1f * min_step_s);
+  const float longest = std::max(duration_s / std::max(cells / kMaxWay, 1.0f), 0.1f * min_step_s);
   const float shortest = std::min(min_step_s, longest);
   leak_V2s_.fill(0);
   float t = 0, guess = shortest;

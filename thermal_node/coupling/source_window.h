@@ -15,6 +15,7 @@
 namespace fulcrum::thermal {
 
 inline constexpr float kMaxWarming = 20.0f;  ///< Per coupling step [K]: sigma then changes by less than 30 %.
+inline constexpr float kMaxWay = 0.26f;      ///< Of the tip in a coupling step [cells]: 5 mm/s in half a frame.
 /// Conductance of sparks across the steam, relative to metal on tissue; assumed.
 inline constexpr float kArcConductance = 0.15f;
 /// Corner of a window that has not been used yet: far from any sheet, yet no overflow in differences.
@@ -54,8 +55,9 @@ class SourceWindow {
   [[nodiscard]] const SourceStats& stats() const { return stats_; }
   void ClearStats() { stats_ = {}; }
 
-  float min_step_s = 2.0e-3f;  ///< Shortest coupling step; 0.1 ms changes the energy of a cut by 0.4 %.
-  float tolerance = 1e-2f;     ///< Of the potential, energy norm; 1e-3 changes the energy of a cut by less than 0.1 %.
+  /// Shortest coupling step, unless the tip moves more than kMaxWay in it. See thermal.coupling_error_pct.
+  float min_step_s = 5.0e-3f;
+  float tolerance = 1e-2f;  ///< Of the potential, energy norm; 1e-3 changes the energy of a cut by less than 0.1 %.
 
   /// For checkpoints: where the window stood and the start value of the next solve.
   struct State {
