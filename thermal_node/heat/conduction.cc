@@ -299,7 +299,8 @@ void SetGeometry(const Sheet& sheet, Tile* tile) {
     }
   }
   for (int k = 0; k < kTileCells; ++k) {
-    geometry.area[k] = at(static_cast<float>(k % kTile) + 0.5f, static_cast<float>(k / kTile) + 0.5f).area();
+    const int i = k % kTile, j = k / kTile;
+    geometry.area[k] = at(static_cast<float>(i) + 0.5f, static_cast<float>(j) + 0.5f).area();
     geometry.inverse_area[k] = 1.0f / geometry.area[k];
   }
   if (geometry.links == 0) return;
