@@ -50,7 +50,7 @@ template <bool kSecond, int kShear>
   for (int j = 0; j < kTile; ++j) {
     const float* __restrict f = &across_s[FaceS(0, j)];
     float* __restrict face = &face_s[FaceS(0, j)];
-    for (int i = 0; i < kTile + 8; ++i) face[i] = FourthOrder(f[i - 1], f[i], f[i + 1], gain);
+    for (int i = 0; i <= kTile; ++i) face[i] = FourthOrder(f[i - 1], f[i], f[i + 1], gain);
   }
   alignas(64) float above[kTile], below[kTile];
   for (int i = 0; i < kTile; ++i) {
