@@ -182,6 +182,8 @@ class AccurateSolver {
   std::vector<double> partial_;      ///< By task.
   std::vector<GuessCount> guess_;    ///< By task.
   std::vector<FinishCount> finish_;  ///< By task.
+  float blocks_inertia_ = 0;         ///< Inertia for which the organ's blocks of the diagonal were made; 0: make all.
+  std::uint32_t steps_ = 0;
   bool organ_blocks_due_ = true, refresh_due_ = false, stiff_contacts_ = false;
 
   // Around the stiff contacts.

@@ -40,27 +40,38 @@ void CoarseSpace::Solve(std::span<const Task> tasks, const float* row_sums, cons
   ProlongMiddle();
 }
 
-void CoarseSpace::SolveCoarse() {
-  for (int i = 0; i < nodes_; ++i) {
-    solution_.segment<3>(3 * i) = Eigen::Map<const Vec3f>(nodes4_.data() + 4 * i);
-  }
-  factor_.solveInPlace(solution_);
-  for (int i = 0; i < nodes_; ++i) {
-    Eigen::Map<Vec3f>(nodes4_.data() + 4 * i) = solution_.segment<3>(3 * i);
-  }
-}
+void CoarseSpace::SolveCoarse() { factor_.Solve(kernels_, nodes4_.data()); }
 
+/// Vertices that follow one another mostly lie in the same cell: what its nodes get is summed in registers.
 void CoarseSpace::RestrictTube(int first, int end, const float* tube_residual, const float* tube) {
-  for (auto v = static_cast<std::size_t>(first); v < static_cast<std::size_t>(end); ++v) {
+  if (first >= end) {
+    return;
+  }
+  const auto at = static_cast<std::size_t>(first);
+  const Weights8* cell = tube_weights_.data() + at;
+  __m128 sum[8];
+  std::fill(std::begin(sum), std::end(sum), _mm_setzero_ps());
+  const auto flush = [&] {
+    for (std::size_t i = 0; i < 8; ++i) {
+      float* out = nodes4_.data() + 4 * std::size_t{cell->node[i]};
+      _mm_store_ps(out, _mm_add_ps(_mm_load_ps(out), sum[i]));
+    }
+  };
+  for (std::size_t v = at; v < static_cast<std::size_t>(end); ++v) {
+    const Weights8& w = tube_weights_[v];
+    if (w.node != cell->node) {
+      flush();
+      std::fill(std::begin(sum), std::end(sum), _mm_setzero_ps());
+      cell = &w;
+    }
     if (tube[4 * v + 3] > 0.0f) {
-      const Weights8& w = tube_weights_[v];
       const __m128 r = _mm_load_ps(tube_residual + 4 * v);
       for (std::size_t i = 0; i < 8; ++i) {
-        float* out = nodes4_.data() + 4 * std::size_t{w.node[i]};
-        _mm_store_ps(out, _mm_add_ps(_mm_load_ps(out), _mm_mul_ps(_mm_set1_ps(w.weight[i]), r)));
+        sum[i] = _mm_add_ps(sum[i], _mm_mul_ps(_mm_set1_ps(w.weight[i]), r));
       }
     }
   }
+  flush();
 }
 
 /// Right side of the coarse nodes from the middle level's residual: first along a row, then to the two coarse rows.

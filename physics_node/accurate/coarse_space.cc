@@ -1,8 +1,10 @@
 #include "physics_node/accurate/coarse_space.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 namespace fulcrum::physics::accurate {
 namespace {
@@ -25,6 +27,23 @@ std::vector<Place> Spread(int fine, int count) {
   return place;
 }
 
+/// The coarse nodes in order along the longest side of the box around them: each has neighbours only near by.
+std::vector<std::uint32_t> AlongLongestSide(const std::vector<Vec3d>& place) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3d& p : place) {
+    box.extend(p);
+  }
+  Eigen::Index axis = 0;
+  if (!place.empty()) {
+    box.sizes().maxCoeff(&axis);
+  }
+  std::vector<std::uint32_t> order(place.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return place[a][axis] < place[b][axis]; });
+  return order;
+}
+
 /// Sums of symmetric matrices xx yy zz xy xz yz, times 1, t and t^2.
 struct Moments {
   std::array<std::array<float, 6>, 3> sum{};
@@ -39,8 +58,10 @@ struct Moments {
 
 }  // namespace
 
-CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
-    : rows_(static_cast<int>(scene.membrane.rows)),
+CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles,
+                         const Kernels& kernels)
+    : kernels_(kernels),
+      rows_(static_cast<int>(scene.membrane.rows)),
       stride_(static_cast<int>(particles.layout().stride)),
       tube_floats_(particles.tube_floats()),
       cols_(scene.membrane.cols),
@@ -77,8 +98,20 @@ CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, cons
   constant_ = Eigen::MatrixXf::Zero(n, n);
   tube_mass_ = Eigen::MatrixXf::Zero(n, n);
   building_ = Eigen::MatrixXf::Zero(n, n);
-  factor_.compute(Eigen::MatrixXf::Identity(n, n));  // Not left without a state: it is replaced when complete.
-  solution_ = Eigen::VectorXf::Zero(n);
+  std::vector<Vec3d> place;
+  for (int i = 0; i < coarse_rows_; ++i) {
+    for (int j = 0; j < columns_; ++j) {
+      const int row = i * (rows_ - 1) / std::max(coarse_rows_ - 1, 1),
+                column = j * (static_cast<int>(cols_) - 1) / std::max(columns_ - 1, 1);
+      place.push_back(
+          model.rest_position[scene.membrane.first + static_cast<Index>(row) * cols_ + static_cast<Index>(column)]);
+    }
+  }
+  place.resize(static_cast<std::size_t>(nodes_));
+  for (const auto& [key, node] : lattice) {
+    place[node] = kLattice * Vec3d(key[0], key[1], key[2]);
+  }
+  factor_ = CoarseFactor(AlongLongestSide(place));
   nodes4_ = FloatArray(4 * static_cast<std::size_t>(nodes_));
   AddTube(model);
   AddBindings(model, particles);
@@ -354,7 +387,7 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
 void CoarseSpace::Factorise() {
   const float mean = building_.diagonal().mean();
   building_.diagonal().array() += kRegularisation * mean;
-  factor_.compute(building_);
+  (void)factor_.Take(building_);  // If it fails, the last one serves on.
 }
 
 void CoarseSpace::Refresh(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows) {

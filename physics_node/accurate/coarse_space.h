@@ -4,11 +4,11 @@
 // 30 mm over the organ, with its Galerkin matrix factored dense.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <span>
 #include <vector>
 
+#include "physics_node/accurate/coarse_factor.h"
 #include "physics_node/accurate/elements.h"
 #include "physics_node/accurate/kernels.h"
 #include "physics_node/accurate/regions.h"
@@ -19,7 +19,8 @@ namespace fulcrum::physics::accurate {
 
 class CoarseSpace {
  public:
-  CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles);
+  CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles,
+              const Kernels& kernels);
 
   /// Begins a new matrix when the last one is in force, adds the next `rows` rows of the membrane to it, and puts it in
   /// force when it is complete: so no step pays for all of it. A hundred steps old it serves as well as new.
@@ -81,6 +82,7 @@ class CoarseSpace {
   void RestrictMiddle();
   void ProlongMiddle();
 
+  const Kernels& kernels_;
   int columns_ = 0, coarse_rows_ = 0, rows_ = 0, stride_ = 0;
   std::size_t tube_floats_;
   std::uint32_t cols_ = 0;
@@ -107,8 +109,7 @@ class CoarseSpace {
   int nodes_ = 0;
   Eigen::MatrixXf constant_, tube_mass_;  ///< Parts that do not change: organ and bindings at rest; mass of the organ.
   Eigen::MatrixXf building_;
-  Eigen::LLT<Eigen::MatrixXf> factor_;
-  Eigen::VectorXf solution_;
+  CoarseFactor factor_;
   FloatArray nodes4_;  ///< Right side, then solution, xyz_ per coarse node.
   int next_row_ = 0;
 };

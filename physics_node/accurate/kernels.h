@@ -109,6 +109,17 @@ struct FinishCount {
   std::uint32_t resets;
 };
 
+/// Rows of a block of the coarse factor.
+inline constexpr int kFactorBlock = 16;
+/// A triangular matrix in blocks of kFactorBlock rows, by columns of blocks in the order in which a substitution takes
+/// them. `block[i]` for i from `start[step]` to `start[step + 1]` are the rows of blocks: first that on the diagonal,
+/// whose inverse is stored, then those not zero among the ones that come later. Each block is stored by columns.
+struct Substitution {
+  int steps;
+  const std::uint32_t* start;
+  const std::uint32_t* block;
+};
+
 struct Kernels {
   const char* name;
 
@@ -141,6 +152,9 @@ struct Kernels {
                               float speed, float* const x[3], float* const velocity[3], int row0, int row1);
   /// Largest |d|^2 of nodes.
   float (*sheet_largest)(const Sheet& sheet, const float* const d[3], int row0, int row1);
+
+  /// x <- T^-1 x for the triangular T that `order` and `blocks` describe.
+  void (*substitute)(const Substitution& order, const float* blocks, float* x);
 
   /// p <- z + beta p on `count` floats.
   void (*combine)(const float* z, float beta, float* p, std::size_t count);

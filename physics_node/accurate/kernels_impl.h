@@ -21,6 +21,7 @@ constexpr accurate::Kernels MakeKernels(const char* name) {
   k.sheet_block_solve = SheetBlockSolve;
   k.sheet_finish = SheetFinish;
   k.sheet_largest = SheetLargest;
+  k.substitute = Substitute;
   k.combine = Combine;
   k.start = StartFields;
   k.advance = AdvanceFields;

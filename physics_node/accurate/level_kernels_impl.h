@@ -6,8 +6,10 @@
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
+using accurate::kFactorBlock;
 using accurate::kHatMass;
 using accurate::Middle;
+using accurate::Substitution;
 
 /// Blocks of the middle level's functions, inverted. Each is a hat of +-4 rows and slots; sum (d hat)^2 over its edges
 /// is 11/8 along rows and columns and 11/4 along diagonals, and the edges are sampled at and around its centre.
@@ -136,6 +138,42 @@ inline double SheetPrecondition(const Sheet& sheet, const Middle& middle, const 
     sum += SumOf(dot);
   }
   return sum;
+}
+
+/// out <- out - block y, or block y when `set`; the products of a row one after the other.
+template <bool kSet>
+FULCRUM_INLINE void TakeBlock(const float* block, const float* y, float* out) {
+  constexpr int kWidth = 8 * Widest::kBatches, kParts = kFactorBlock / kWidth;
+  Widest sum[kParts];
+  for (int i = 0; i < kParts; ++i) {
+    sum[i] = kSet ? Widest::All(0) : Widest::Load(out + kWidth * i);
+  }
+  for (int j = 0; j < kFactorBlock; ++j) {
+    const Widest factor = Widest::All(y[j]);
+    for (int i = 0; i < kParts; ++i) {
+      const Widest product = Widest::Load(block + kFactorBlock * j + kWidth * i) * factor;
+      sum[i] = kSet ? sum[i] + product : sum[i] - product;
+    }
+  }
+  for (int i = 0; i < kParts; ++i) {
+    sum[i].Store(out + kWidth * i);
+  }
+}
+
+inline void Substitute(const Substitution& order, const float* blocks, float* x) {
+  constexpr std::size_t kFloats = std::size_t{kFactorBlock} * kFactorBlock;
+  alignas(64) float y[kFactorBlock];
+  for (int step = 0; step < order.steps; ++step) {
+    const std::uint32_t first = order.start[step], end = order.start[step + 1];
+    float* own = x + std::size_t{kFactorBlock} * order.block[first];
+    TakeBlock<true>(blocks + kFloats * first, own, y);
+    for (int i = 0; i < kFactorBlock; ++i) {
+      own[i] = y[i];
+    }
+    for (std::uint32_t later = first + 1; later < end; ++later) {
+      TakeBlock<false>(blocks + kFloats * later, y, x + std::size_t{kFactorBlock} * order.block[later]);
+    }
+  }
 }
 
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

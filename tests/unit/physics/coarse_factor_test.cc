@@ -1,0 +1,103 @@
+// The factor of the coarse matrix against a dense solve, on every instruction set, and what it leaves out.
+#include "physics_node/accurate/coarse_factor.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <numeric>
+#include <vector>
+
+namespace fulcrum::physics::accurate {
+namespace {
+
+constexpr int kNodes = 37;  // 111 rows: the last block of sixteen is not full.
+
+/// A chain in which each node holds its neighbours up to `reach` away, numbered 0, 2, 4, ..., 5, 3, 1.
+Eigen::MatrixXf Chain(int reach) {
+  Eigen::MatrixXf matrix = Eigen::MatrixXf::Zero(3 * kNodes, 3 * kNodes);
+  const auto number = [](int place) { return 2 * place < kNodes ? 2 * place : 2 * (kNodes - place) - 1; };
+  for (int a = 0; a < kNodes; ++a) {
+    matrix.block<3, 3>(3 * number(a), 3 * number(a)) += 0.1f * Eigen::Matrix3f::Identity();
+    for (int b = a + 1; b < std::min(a + reach + 1, kNodes); ++b) {
+      const Eigen::Vector3f d = Eigen::Vector3f(1.0f, 0.3f * static_cast<float>(b % 3), 0.2f).normalized();
+      const Eigen::Matrix3f k = 0.2f * Eigen::Matrix3f::Identity() + d * d.transpose();
+      const int i = 3 * number(a), j = 3 * number(b);
+      matrix.block<3, 3>(i, i) += k;
+      matrix.block<3, 3>(j, j) += k;
+      matrix.block<3, 3>(i, j) -= k;
+      matrix.block<3, 3>(j, i) -= k;
+    }
+  }
+  return matrix;
+}
+std::vector<std::uint32_t> AlongChain() {
+  std::vector<std::uint32_t> order;
+  order.reserve(kNodes);
+  for (int place = 0; place < kNodes; ++place) {
+    order.push_back(static_cast<std::uint32_t>(2 * place < kNodes ? 2 * place : 2 * (kNodes - place) - 1));
+  }
+  return order;
+}
+FloatArray RightSide() {
+  FloatArray x(4 * kNodes);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    x[i] = i % 4 == 3 ? 77.0f : static_cast<float>((7 * i) % 11) - 5.0f;
+  }
+  return x;
+}
+
+TEST(CoarseFactor, SolvesAsADenseOneInAnyOrder) {
+  const Eigen::MatrixXf matrix = Chain(4);
+  Eigen::VectorXf right(3 * kNodes);
+  const FloatArray b = RightSide();
+  for (Eigen::Index i = 0; i < right.size(); ++i) {
+    right[i] = b[static_cast<std::size_t>(4 * (i / 3) + i % 3)];
+  }
+  const Eigen::VectorXd exact = matrix.cast<double>().llt().solve(right.cast<double>());
+  std::vector<std::uint32_t> as_numbered(kNodes);
+  std::iota(as_numbered.begin(), as_numbered.end(), 0u);
+  for (const auto& order : {as_numbered, AlongChain()}) {
+    CoarseFactor factor(order);
+    ASSERT_TRUE(factor.Take(matrix));
+    FloatArray x = RightSide();
+    factor.Solve(BaselineKernels(), x.data());
+    for (Eigen::Index i = 0; i < right.size(); ++i) {
+      EXPECT_NEAR(x[static_cast<std::size_t>(4 * (i / 3) + i % 3)], exact[i], 1e-4 * exact.norm());
+    }
+    EXPECT_EQ(x[3], 77.0f) << "the fourth of a node is not its own";
+  }
+}
+
+TEST(CoarseFactor, IsTheSameOnEveryInstructionSet) {
+  CoarseFactor factor(AlongChain());
+  ASSERT_TRUE(factor.Take(Chain(4)));
+  FloatArray narrow = RightSide(), wide = RightSide();
+  factor.Solve(BaselineKernels(), narrow.data());
+  factor.Solve(BestKernels(), wide.data());
+  EXPECT_TRUE(std::equal(narrow.data(), narrow.data() + narrow.size(), wide.data()));
+}
+
+TEST(CoarseFactor, LeavesOutBlocksOfZeros) {
+  CoarseFactor banded(AlongChain()), whole(AlongChain());
+  ASSERT_TRUE(banded.Take(Chain(4)));
+  ASSERT_TRUE(whole.Take(Chain(kNodes)));
+  EXPECT_EQ(whole.block_count(), 7u * 8u / 2u);
+  EXPECT_EQ(banded.block_count(), 7u + 6u) << "a band within 15 rows reaches into the next block only";
+}
+
+TEST(CoarseFactor, KeepsTheLastFactorWhenTheMatrixIsNone) {
+  CoarseFactor factor(AlongChain());
+  ASSERT_TRUE(factor.Take(Chain(4)));
+  FloatArray before = RightSide(), after = RightSide();
+  factor.Solve(BaselineKernels(), before.data());
+  Eigen::MatrixXf bad = Chain(4);
+  bad(5, 5) = -1.0f;
+  EXPECT_FALSE(factor.Take(bad));
+  bad(5, 5) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_FALSE(factor.Take(bad));
+  factor.Solve(BaselineKernels(), after.data());
+  EXPECT_TRUE(std::equal(before.data(), before.data() + before.size(), after.data()));
+}
+
+}  // namespace
+}  // namespace fulcrum::physics::accurate
