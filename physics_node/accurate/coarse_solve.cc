@@ -59,7 +59,7 @@ void CoarseSpace::RestrictTube(int first, int end, const float* tube_residual, c
   };
   for (std::size_t v = at; v < static_cast<std::size_t>(end); ++v) {
     const Weights8& w = tube_weights_[v];
-    if (w.node != cell->node) {
+    if (w.new_cell) {
       flush();
       std::fill(std::begin(sum), std::end(sum), _mm_setzero_ps());
       cell = &w;
@@ -76,32 +76,32 @@ void CoarseSpace::RestrictTube(int first, int end, const float* tube_residual, c
 
 /// Right side of the coarse nodes from the middle level's residual: first along a row, then to the two coarse rows.
 void CoarseSpace::RestrictMiddle() {
-  __m128 sum[kSheetColumns + 1];
   for (std::size_t r = 0; r < static_cast<std::size_t>(middle_rows_); ++r) {
     const float *x = residual_.data() + 3 * r * width_, *y = x + width_, *z = y + width_;
-    std::fill(std::begin(sum), std::end(sum), _mm_setzero_ps());
-    for (std::size_t i = 0; i < width_; ++i) {
-      const RowPlace column = column_place_[column_of_[i]];
-      const auto c = static_cast<std::size_t>(column.cell);
-      const __m128 value = _mm_mul_ps(_mm_set1_ps(yields_[r * width_ + i]), _mm_set_ps(0, z[i], y[i], x[i])),
-                   part = _mm_mul_ps(_mm_set1_ps(column.fraction), value);
-      sum[c] = _mm_add_ps(sum[c], _mm_sub_ps(value, part));
-      sum[c + 1] = _mm_add_ps(sum[c + 1], part);
-    }
+    const float* yields = yields_.data() + r * width_;
     const RowPlace row = row_place_[static_cast<std::size_t>(centre_[r])];
-    for (int i = 0; i < 2 && row.cell + i < coarse_rows_; ++i) {
-      const __m128 weight = _mm_set1_ps(i == 0 ? 1 - row.fraction : row.fraction);
-      float* to = nodes4_.data() + 4 * static_cast<std::size_t>((row.cell + i) * columns_);
-      for (std::size_t c = 0; c < static_cast<std::size_t>(columns_); ++c, to += 4) {
-        _mm_store_ps(to, _mm_add_ps(_mm_load_ps(to), _mm_mul_ps(weight, sum[c])));
+    for (std::size_t c = 0; c < static_cast<std::size_t>(columns_); ++c) {
+      const float* share = column_share_.data() + c * width_;
+      __m128 sum_x = _mm_setzero_ps(), sum_y = sum_x, sum_z = sum_x, none = sum_x;
+      for (std::size_t i = 0; i < width_; i += 4) {
+        const __m128 w = _mm_mul_ps(_mm_load_ps(share + i), _mm_loadu_ps(yields + i));
+        sum_x = _mm_add_ps(sum_x, _mm_mul_ps(w, _mm_load_ps(x + i)));
+        sum_y = _mm_add_ps(sum_y, _mm_mul_ps(w, _mm_load_ps(y + i)));
+        sum_z = _mm_add_ps(sum_z, _mm_mul_ps(w, _mm_load_ps(z + i)));
+      }
+      _MM_TRANSPOSE4_PS(sum_x, sum_y, sum_z, none);
+      const __m128 sum = _mm_add_ps(_mm_add_ps(sum_x, sum_y), _mm_add_ps(sum_z, none));
+      for (int i = 0; i < 2 && row.cell + i < coarse_rows_; ++i) {
+        float* to = nodes4_.data() + 4 * (static_cast<std::size_t>((row.cell + i) * columns_) + c);
+        const __m128 weight = _mm_set1_ps(i == 0 ? 1 - row.fraction : row.fraction);
+        _mm_store_ps(to, _mm_add_ps(_mm_load_ps(to), _mm_mul_ps(weight, sum)));
       }
     }
   }
 }
 
-/// value <- B^-1 residual + what the coarse nodes say.
+/// The middle level's value: its blocks times the residual, and the coarse nodes' part where it yields.
 void CoarseSpace::ProlongMiddle() {
-  std::array<std::array<float, 4>, kSheetColumns + 1> at_column{};
   for (std::size_t r = 0; r < static_cast<std::size_t>(middle_rows_); ++r) {
     if (middle_rests_[r] != 0) {
       continue;
@@ -109,23 +109,30 @@ void CoarseSpace::ProlongMiddle() {
     const RowPlace row = row_place_[static_cast<std::size_t>(centre_[r])];
     const float* low = nodes4_.data() + 4 * static_cast<std::size_t>(row.cell * columns_);
     const float* high = row.cell + 1 < coarse_rows_ ? low + 4 * static_cast<std::size_t>(columns_) : low;
-    for (std::size_t c = 0; c < static_cast<std::size_t>(columns_); ++c) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        at_column[c][axis] = (1 - row.fraction) * low[4 * c + axis] + row.fraction * high[4 * c + axis];
-      }
-    }
     const std::size_t at = 3 * r * width_, plane = r * width_;
-    const float *x = residual_.data() + at, *y = x + width_, *z = y + width_;
-    float* v = value_.data() + at;
-    for (std::size_t i = 0; i < width_; ++i) {
-      const RowPlace column = column_place_[column_of_[i]];
-      const auto &a = at_column[static_cast<std::size_t>(column.cell)],
-                 &b = at_column[static_cast<std::size_t>(column.cell) + 1];
-      const std::size_t k = plane + i;
-      const float up = column.fraction * yields_[k], down = yields_[k] - up;
-      v[i] = block_[0][k] * x[i] + block_[3][k] * y[i] + block_[4][k] * z[i] + (down * a[0] + up * b[0]);
-      v[width_ + i] = block_[3][k] * x[i] + block_[1][k] * y[i] + block_[5][k] * z[i] + (down * a[1] + up * b[1]);
-      v[2 * width_ + i] = block_[4][k] * x[i] + block_[5][k] * y[i] + block_[2][k] * z[i] + (down * a[2] + up * b[2]);
+    for (std::size_t i = 0; i < width_; i += 4) {
+      __m128 far[3] = {_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()}, b[6], v[3];
+      for (std::size_t c = 0; c < static_cast<std::size_t>(columns_); ++c) {
+        const __m128 share = _mm_load_ps(column_share_.data() + c * width_ + i);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const float node = (1 - row.fraction) * low[4 * c + axis] + row.fraction * high[4 * c + axis];
+          far[axis] = _mm_add_ps(far[axis], _mm_mul_ps(share, _mm_set1_ps(node)));
+        }
+      }
+      for (std::size_t k = 0; k < 6; ++k) {
+        b[k] = _mm_load_ps(block_[k].data() + plane + i);
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        v[axis] = _mm_load_ps(residual_.data() + at + axis * width_ + i);
+      }
+      const __m128 yields = _mm_loadu_ps(yields_.data() + plane + i);
+      const auto put = [&](std::size_t axis, __m128 bx, __m128 by, __m128 bz) {
+        const __m128 near = _mm_add_ps(_mm_add_ps(_mm_mul_ps(bx, v[0]), _mm_mul_ps(by, v[1])), _mm_mul_ps(bz, v[2]));
+        _mm_store_ps(value_.data() + at + axis * width_ + i, _mm_add_ps(near, _mm_mul_ps(yields, far[axis])));
+      };
+      put(0, b[0], b[3], b[4]);
+      put(1, b[3], b[1], b[5]);
+      put(2, b[4], b[5], b[2]);
     }
   }
 }

@@ -92,6 +92,7 @@ CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, cons
       weights.node[static_cast<std::size_t>(corner)] = it->second;
       weights.weight[static_cast<std::size_t>(corner)] = model.fixed(v) ? 0.0f : static_cast<float>(weight);
     }
+    weights.new_cell = v == 0 || weights.node != tube_weights_.back().node;
     tube_weights_.push_back(weights);
   }
   const Eigen::Index n = 3 * nodes_;
@@ -155,9 +156,15 @@ void CoarseSpace::BuildMiddle() {
   }
   residual_ = FloatArray(3 * static_cast<std::size_t>(middle_rows_) * width_);
   value_ = FloatArray(3 * static_cast<std::size_t>(middle_rows_) * width_);
+  column_share_ = FloatArray(static_cast<std::size_t>(columns_) * width_);
   for (std::size_t i = 0; i < width_; ++i) {
     const auto slot = static_cast<std::uint32_t>(4 * (i / kLanes)), lane = static_cast<std::uint32_t>(i % kLanes);
-    column_of_.push_back(std::min(lane * layout_.slots + slot, cols_ > 0 ? cols_ - 1 : 0));
+    const RowPlace column = column_place_[std::min(lane * layout_.slots + slot, cols_ > 0 ? cols_ - 1 : 0)];
+    const auto cell = static_cast<std::size_t>(column.cell);
+    column_share_[cell * width_ + i] = 1.0f - column.fraction;
+    if (column.cell + 1 < columns_) {
+      column_share_[(cell + 1) * width_ + i] = column.fraction;
+    }
   }
 }
 

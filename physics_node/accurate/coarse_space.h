@@ -67,6 +67,7 @@ class CoarseSpace {
   struct alignas(16) Weights8 {
     std::array<std::uint16_t, 8> node;
     std::array<float, 8> weight;
+    bool new_cell = true;  ///< Not in the cell of the vertex before.
   };
   struct RowPlace {
     int cell;
@@ -103,7 +104,7 @@ class CoarseSpace {
   std::vector<std::uint32_t> edited_;  ///< Middle functions.
   std::array<FloatArray, 6> block_;
   FloatArray residual_, value_;
-  std::vector<std::uint32_t> column_of_;  ///< Column of the sheet that a float of its row stands on, at most cols - 1.
+  FloatArray column_share_;  ///< [columns_][width_], part of a coarse column in a float of the middle level's row.
 
   std::vector<Weights8> tube_weights_;
   int nodes_ = 0;
