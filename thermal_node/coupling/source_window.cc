@@ -207,9 +207,9 @@ void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
   const float latent = material_.latent;
   for (int i = 0; i < kWindow; ++i) {
     const int k = j * kWindow + i;
-    if ((flags_[k] & kNoTissue) != 0) continue;
-    const double volume = 1.0 / inverse_volume_[k];
     const float excess = enthalpy_[k] - material_.BoilingEnthalpy(water_[k]);
+    if (excess < 0.0f || (flags_[k] & kNoTissue) != 0) continue;
+    const double volume = 1.0 / inverse_volume_[k];
     if (excess > 0.0f && water_[k] > 0.0f) {
       const float before = enthalpy_[k];
       const float boiled = std::min(water_[k], excess / latent);
@@ -239,12 +239,12 @@ void SourceWindow::Deposit(float v2, float dt_s, float remove_theta, Ledger* led
     float* __restrict h = &enthalpy_[j * kWindow];
     const float* __restrict w = &water_[j * kWindow];
     const float* __restrict iv = &inverse_volume_[j * kWindow];
-    alignas(64) float excess[kWindow];
+    std::uint32_t boiling = 0;
     for (int i = 0; i < kWindow; ++i) {
       h[i] += scale * q[i] * iv[i];
-      excess[i] = h[i] - (rc_dry + w[i] * rc_water) * boil;
+      boiling |= h[i] >= (rc_dry + w[i] * rc_water) * boil ? 1u : 0u;
     }
-    if (*std::max_element(excess, excess + kWindow) >= 0.0f) BoilRow(j, remove_theta, ledger);
+    if (boiling != 0) BoilRow(j, remove_theta, ledger);
   }
 }
 

@@ -56,7 +56,7 @@ class SourceWindow {
   void ClearStats() { stats_ = {}; }
 
   /// Shortest coupling step, unless the tip moves more than kMaxWay in it. See thermal.coupling_error_pct.
-  float min_step_s = 5.0e-3f;
+  float min_step_s = 2.0e-3f;
   float tolerance = 1e-2f;  ///< Of the potential, energy norm; 1e-3 changes the energy of a cut by less than 0.1 %.
 
   /// For checkpoints: where the window stood and the start value of the next solve.

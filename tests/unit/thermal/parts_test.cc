@@ -140,15 +140,15 @@ TEST(DamageTest, KnownTimesToCellDeath) {
   EXPECT_NEAR(1 / rate.At(13), 61, 2);
   EXPECT_NEAR(1 / rate.At(23), 3.5, 0.2);
   EXPECT_NEAR(1 / rate.At(33), 0.23, 0.02);
-  EXPECT_TRUE(std::isfinite(rate.At(1e9f)));
+  for (const float theta : {1e3f, 1e9f, INFINITY}) EXPECT_TRUE(std::isfinite(rate.At(theta)));
   EXPECT_EQ(rate.At(-5), rate.At(0));
 }
 
-TEST(DamageTest, TableFollowsTheFormula) {
+TEST(DamageTest, RateFollowsTheFormula) {
   const DamageRate rate(kCollagen, 37);
   for (double theta = 10; theta < 100; theta += 0.37) {
     const double exact = kCollagen.a_per_s * std::exp(-kCollagen.ea_J_mol / (8.314462618 * (273.15 + 37 + theta)));
-    EXPECT_NEAR(rate.At(static_cast<float>(theta)) / exact, 1, 2e-3);
+    EXPECT_NEAR(rate.At(static_cast<float>(theta)) / exact, 1, 1e-4);  // x of some 130 in float
   }
 }
 
