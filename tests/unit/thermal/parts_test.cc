@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "services/core/error.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "thermal_node/coupling/cut_meter.h"
+#include "thermal_node/coupling/electrode.h"
 #include "thermal_node/coupling/patch.h"
 #include "thermal_node/coupling/tip_tracker.h"
 
@@ -121,6 +123,52 @@ TEST_F(TipTest, SamplesOutOfRangeAreNotAccepted) {
   CauteryContact lifted = At(NAN, NAN);
   lifted.touching = false;
   EXPECT_TRUE(tip_.Accepts(lifted));
+}
+
+TEST_F(TipTest, FootGoesWithTheTipAndAnAbsurdOneIsRefused) {
+  CauteryContact contact = At(0.010f, 0.010f);
+  contact.contact_foot = {2e-3f, -1e-3f};
+  ASSERT_TRUE(tip_.Accepts(contact));
+  EXPECT_EQ(tip_.Advance(&contact, 0.01).path.foot, contact.contact_foot);
+  for (const float bad : {1.01f * kFootMax_m, NAN, INFINITY}) {
+    contact.contact_foot = {bad, 0};
+    EXPECT_FALSE(tip_.Accepts(contact)) << bad;
+  }
+}
+
+/// Area under a capsule in units of radius squared, by cells of 1 / `fine` of its radius.
+double CoveredArea(float length, float heading, float fine) {
+  constexpr float kNoArc = 1e-6f;
+  const Vec2f tip(0.31f, 0.17f), foot = length * fine * Vec2f(std::cos(heading), std::sin(heading));
+  const Electrode electrode({1, 0, 1}, tip, foot, fine, kNoArc);
+  double sum = 0;
+  const Vec2f low = electrode.low().array().floor(), high = electrode.high();
+  for (float y = low.y() + 0.5f; y <= high.y(); y += 1) {
+    for (float x = low.x() + 0.5f; x <= high.x(); x += 1) sum += electrode.Covered({x, y});
+  }
+  return sum / (fine * fine);
+}
+
+TEST(ElectrodeTest, CoverageIsTheAreaOfTheCapsuleAnyWay) {
+  for (const float length : {0.0f, 0.5f, 3.0f}) {
+    const double exact = std::numbers::pi + 2.0 * length;
+    for (float heading = 0; heading < 3.1f; heading += 0.23f) {
+      EXPECT_NEAR(CoveredArea(length, heading, 5) / exact, 1, 0.02) << length << " " << heading;  // 0.5 mm in 0.1 mm
+      EXPECT_NEAR(CoveredArea(length, heading, 40) / exact, 1, 1e-3) << length << " " << heading;
+    }
+  }
+}
+
+TEST(ElectrodeTest, DistanceIsThatOnTheStretchedSheet) {
+  // The same capsule in material coordinates that are stretched 2 : 1 and sheared covers what the map leaves of it.
+  const SurfaceMetric metric{4.0f, 0.6f, 1.5f};
+  const Electrode electrode(metric, {0, 0}, {8, 3}, 12, 1e-6f);
+  const double length = std::sqrt(metric.ss * 64 + 2 * metric.st * 24 + metric.tt * 9);
+  double sum = 0;
+  for (float y = -60.5f; y < 60; y += 1) {
+    for (float x = -60.5f; x < 60; x += 1) sum += electrode.Covered({x, y});
+  }
+  EXPECT_NEAR(sum * metric.area() / (std::numbers::pi * 144 + 2 * 12 * length), 1, 0.02);
 }
 
 TEST(GeneratorTest, PowerThenVoltageThenCurrentLimits) {
