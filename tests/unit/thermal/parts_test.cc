@@ -177,7 +177,9 @@ TEST(GeneratorTest, PowerThenVoltageThenCurrentLimits) {
   EXPECT_FLOAT_EQ(RegulatedVoltage(drive, 1e-6f), 350.0f);
   EXPECT_FLOAT_EQ(RegulatedVoltage(drive, 10.0f), 0.2f);
   EXPECT_EQ(RegulatedVoltage(drive, 0.0f), 0.0f);
-  EXPECT_LT(MakeDrive(ThermalParams{}, CauteryMode::kCoag, 35).v_max_V, drive.v_max_V);
+  const Drive coag = MakeDrive(ThermalParams{}, CauteryMode::kCoag, 35);  // on for a quarter of the time
+  EXPECT_FLOAT_EQ(coag.v_max_V, 0.5f * drive.v_max_V);
+  EXPECT_FLOAT_EQ(coag.i_max_A, 0.5f * drive.i_max_A);
   EXPECT_GT(MakeDrive(ThermalParams{}, CauteryMode::kBlend, 35).remove_theta, drive.remove_theta);
 }
 
