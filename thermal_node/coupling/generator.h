@@ -12,12 +12,12 @@ namespace fulcrum::thermal {
 /// What a mode does to the voltage and when it removes tissue.
 ///
 /// All modes regulate the mean power that was asked. Their waveforms differ: cut is continuous, blend and coag are
-/// interrupted, so the same peak voltage gives a lower rms. A cell is removed when its water is spent *and* it is
-/// hotter than `remove_C`: in cut at once (the steam bursts it), in blend after some superheating of dry tissue (a
-/// wider coagulated border), in coag only when it burns; coag therefore dries and browns. Fractions and temperatures
-/// assumed.
+/// interrupted, and the generator's limits hold while the current is on; over all, rms = sqrt(duty) times that. A cell
+/// is removed when its water is spent *and* it is hotter than `remove_C`: in cut at once (the steam bursts it), in
+/// blend after some superheating of dry tissue (a wider coagulated border), in coag only when it burns; coag therefore
+/// dries and browns. Duty cycles and temperatures assumed.
 struct ModeRule {
-  float rms_fraction;  ///< Of v_max_V.
+  float duty;  ///< Part of the time in which the current is on.
   float remove_C;
   float arc_m;  ///< Sparks reach tissue this far from the metal, ever more rarely.
 };
@@ -27,9 +27,9 @@ inline ModeRule RuleOf(CauteryMode mode) {
     case CauteryMode::kCut:
       return {1.0f, 100.0f, 4.0e-4f};
     case CauteryMode::kBlend:
-      return {0.8f, 130.0f, 4.0e-4f};
+      return {0.64f, 130.0f, 4.0e-4f};
     case CauteryMode::kCoag:
-      return {0.5f, 400.0f, 4.0e-4f};
+      return {0.25f, 400.0f, 4.0e-4f};
     case CauteryMode::kOff:
       break;
   }
@@ -39,16 +39,16 @@ inline ModeRule RuleOf(CauteryMode mode) {
 /// Setting of the generator for one step.
 struct Drive {
   float power_W = 0;
-  float v_max_V = 0;
-  float i_max_A = 0;
+  float v_max_V = 0;       ///< [V rms]
+  float i_max_A = 0;       ///< [A rms]
   float remove_theta = 0;  ///< [K]
   float arc_m = 0;
 };
 
 inline Drive MakeDrive(const ThermalParams& params, CauteryMode mode, float power_W) {
   const ModeRule rule = RuleOf(mode);
-  return {power_W, rule.rms_fraction * params.v_max_V, params.i_max_A, rule.remove_C - params.body_temperature_C,
-          rule.arc_m};
+  const float rms = std::sqrt(rule.duty);
+  return {power_W, rms * params.v_max_V, rms * params.i_max_A, rule.remove_C - params.body_temperature_C, rule.arc_m};
 }
 
 /// Electrode voltage into a conductance: the asked power, within the limits of voltage and current [V rms].

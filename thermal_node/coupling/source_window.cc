@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thermal_node/coupling/electrode.h"
 #include "thermal_node/heat/wide.h"
 
 namespace fulcrum::thermal {
@@ -105,7 +106,7 @@ void SourceWindow::Store(HeatField* field, bool tented) {
   });
 }
 
-void SourceWindow::SetGround(const Vec2f& tip, bool tented) {
+void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
   const float cell = material_.cell_m;
   const float leak = tented ? 0.0f : material_.leak_S_m2 * cell * cell * metric_.area();
   for (int k = 0; k < kWindowCells; ++k) problem_.ground[k] = (flags_[k] & kNoTissue) != 0 ? 0.0f : leak;
@@ -113,7 +114,7 @@ void SourceWindow::SetGround(const Vec2f& tip, bool tented) {
   const auto add = [&](int i, int j, float face, const Vec2f& normal) {
     const Vec2f r_cells = Vec2f(static_cast<float>(corner_.ix + i + sheet_.origin_x) + 0.5f,
                                 static_cast<float>(corner_.iy + j + sheet_.origin_y) + 0.5f) -
-                          tip / cell;
+                          middle / cell;
     const float r = std::max(r_cells.norm(), 1.0f);
     const float x = std::min(r / (kFarFieldSpacing * kWindow), static_cast<float>(far_field_.size()) - 1.001f);
     const int n = static_cast<int>(x);
@@ -144,32 +145,21 @@ void SourceWindow::SetSigma() {
   }
 }
 
-void SourceWindow::SetContact(const Vec2f& tip, float radius_m, float arc_m) {
+void SourceWindow::SetContact(const Vec2f& tip, const Vec2f& foot, float radius_m, float arc_m) {
   problem_.contact.fill(0);
   const float cell = material_.cell_m;
-  const float area = cell * cell * metric_.area();
-  const Vec2f centre = tip / cell - Vec2f(static_cast<float>(corner_.ix + sheet_.origin_x),
-                                          static_cast<float>(corner_.iy + sheet_.origin_y));
-  const float reach = (radius_m + arc_m) / cell + 1.0f;
-  // The box of the ellipse g(dx, dx) = reach^2.
-  const float reach_s = reach * std::sqrt(metric_.tt) / metric_.area();
-  const float reach_t = reach * std::sqrt(metric_.ss) / metric_.area();
-  const int i0 = std::max(0, static_cast<int>(centre.x() - reach_s));
-  const int i1 = std::min(kWindow - 1, static_cast<int>(centre.x() + reach_s));
-  const int j0 = std::max(0, static_cast<int>(centre.y() - reach_t));
-  const int j1 = std::min(kWindow - 1, static_cast<int>(centre.y() + reach_t));
+  const Vec2f origin(static_cast<float>(corner_.ix + sheet_.origin_x),
+                     static_cast<float>(corner_.iy + sheet_.origin_y));
+  const Electrode electrode(metric_, tip / cell - origin, foot / cell, radius_m / cell, arc_m / cell);
+  const Vec2f low = electrode.low(), high = electrode.high();
+  const int i0 = std::max(0, static_cast<int>(low.x())), i1 = std::min(kWindow - 1, static_cast<int>(high.x()));
+  const int j0 = std::max(0, static_cast<int>(low.y())), j1 = std::min(kWindow - 1, static_cast<int>(high.y()));
+  // From the face that the metal touches to the middle of the sheet: sigma / (d / 2) per area.
+  const float per_sigma = 2.0f * cell * cell * metric_.area() / material_.thickness_m;
   for (int j = j0; j <= j1; ++j) {
     for (int i = i0; i <= i1; ++i) {
-      const float dx = static_cast<float>(i) + 0.5f - centre.x(), dy = static_cast<float>(j) + 0.5f - centre.y();
-      const float r = std::sqrt(metric_.ss * dx * dx + 2.0f * metric_.st * dx * dy + metric_.tt * dy * dy);
-      const float metal = std::clamp(radius_m / cell - r + 0.5f, 0.0f, 1.0f);
-      const float gap = std::max(r * cell - radius_m, 0.0f);
-      // Falls from 1 at the metal to 0 at arc_m as the sparks get rarer.
-      const float rarer = std::max(1.0f - gap / arc_m, 0.0f);
-      const float covered = std::max(metal, kArcConductance * rarer * rarer);
-      // From the face that the metal touches to the middle of the sheet: sigma / (d / 2) per area.
-      const int k = j * kWindow + i;
-      problem_.contact[k] = covered * area * 2.0f * problem_.sigma[k] / material_.thickness_m;
+      const Vec2f centre(static_cast<float>(i) + 0.5f, static_cast<float>(j) + 0.5f);
+      problem_.contact[j * kWindow + i] = electrode.Covered(centre) * per_sigma * problem_.sigma[j * kWindow + i];
     }
   }
 }
@@ -207,9 +197,9 @@ void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
   const float latent = material_.latent;
   for (int i = 0; i < kWindow; ++i) {
     const int k = j * kWindow + i;
-    if ((flags_[k] & kNoTissue) != 0) continue;
-    const double volume = 1.0 / inverse_volume_[k];
     const float excess = enthalpy_[k] - material_.BoilingEnthalpy(water_[k]);
+    if (excess < 0.0f || (flags_[k] & kNoTissue) != 0) continue;
+    const double volume = 1.0 / inverse_volume_[k];
     if (excess > 0.0f && water_[k] > 0.0f) {
       const float before = enthalpy_[k];
       const float boiled = std::min(water_[k], excess / latent);
@@ -239,12 +229,12 @@ void SourceWindow::Deposit(float v2, float dt_s, float remove_theta, Ledger* led
     float* __restrict h = &enthalpy_[j * kWindow];
     const float* __restrict w = &water_[j * kWindow];
     const float* __restrict iv = &inverse_volume_[j * kWindow];
-    alignas(64) float excess[kWindow];
+    std::uint32_t boiling = 0;
     for (int i = 0; i < kWindow; ++i) {
       h[i] += scale * q[i] * iv[i];
-      excess[i] = h[i] - (rc_dry + w[i] * rc_water) * boil;
+      boiling |= h[i] >= (rc_dry + w[i] * rc_water) * boil ? 1u : 0u;
     }
-    if (*std::max_element(excess, excess + kWindow) >= 0.0f) BoilRow(j, remove_theta, ledger);
+    if (boiling != 0) BoilRow(j, remove_theta, ledger);
   }
 }
 
@@ -260,14 +250,15 @@ void SourceWindow::AddLeak(float v2, float dt_s) {
 }
 
 void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger) {
-  const CellIndex middle = sheet_.CellOf(0.5f * (path.from + path.to));
+  const Vec2f centre = 0.5f * (path.from + path.to + path.foot);
+  const CellIndex middle = sheet_.CellOf(centre);
   MoveTo({middle.ix - kWindow / 2, middle.iy - kWindow / 2});
   Load(field, ledger);
   metric_ = sheet_.MetricAt(static_cast<float>(middle.ix), static_cast<float>(middle.iy));
   problem_.face_s = material_.thickness_m * metric_.tt / metric_.area();
   problem_.face_t = material_.thickness_m * metric_.ss / metric_.area();
   SetSigma();
-  SetGround(0.5f * (path.from + path.to), path.tented);
+  SetGround(centre, path.tented);
   const float cells = (path.to - path.from).norm() / material_.cell_m;
   const float longest = std::max(duration_s / std::max(cells / kMaxWay, 1.0f), 0.1f * min_step_s);
   const float shortest = std::min(min_step_s, longest);
@@ -275,7 +266,7 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   float t = 0, guess = shortest;
   while (t < duration_s) {
     const float at = std::min(t + 0.5f * guess, duration_s) / duration_s;
-    SetContact(path.from + at * (path.to - path.from), path.radius_m, drive.arc_m);
+    SetContact(path.from + at * (path.to - path.from), path.foot, path.radius_m, drive.arc_m);
     const PotentialResult solved = potential_.Solve(problem_, tolerance);
     const float voltage = RegulatedVoltage(drive, solved.conductance_S);
     const float v2 = voltage * voltage;

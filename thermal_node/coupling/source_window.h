@@ -16,8 +16,6 @@ namespace fulcrum::thermal {
 
 inline constexpr float kMaxWarming = 20.0f;  ///< Per coupling step [K]: sigma then changes by less than 30 %.
 inline constexpr float kMaxWay = 0.26f;      ///< Of the tip in a coupling step [cells]: 5 mm/s in half a frame.
-/// Conductance of sparks across the steam, relative to metal on tissue; assumed.
-inline constexpr float kArcConductance = 0.15f;
 /// Corner of a window that has not been used yet: far from any sheet, yet no overflow in differences.
 inline constexpr CellIndex kNowhere{-(1 << 24), -(1 << 24)};
 inline constexpr float kTentRadius_m = 0.015f;  ///< A tented sheet returns its current to the tissue from here on.
@@ -25,7 +23,8 @@ inline constexpr float kTentRadius_m = 0.015f;  ///< A tented sheet returns its 
 /// Tip path over a span of time, in material space.
 struct TipPath {
   Vec2f from = Vec2f::Zero(), to = Vec2f::Zero();  ///< [m]
-  float radius_m = 0;
+  Vec2f foot = Vec2f::Zero();  ///< From the tip to the other end of the metal's line of contact, which moves along [m].
+  float radius_m = 0;          ///< Around that line.
   bool tented = false;
 };
 
@@ -56,7 +55,7 @@ class SourceWindow {
   void ClearStats() { stats_ = {}; }
 
   /// Shortest coupling step, unless the tip moves more than kMaxWay in it. See thermal.coupling_error_pct.
-  float min_step_s = 5.0e-3f;
+  float min_step_s = 2.0e-3f;
   float tolerance = 1e-2f;  ///< Of the potential, energy norm; 1e-3 changes the energy of a cut by less than 0.1 %.
 
   /// For checkpoints: where the window stood and the start value of the next solve.
@@ -73,8 +72,8 @@ class SourceWindow {
   void Load(HeatField* field, Ledger* ledger);
   /// The tissue in the window lies as it does under the tip: tented or not.
   void Store(HeatField* field, bool tented);
-  void SetGround(const Vec2f& tip, bool tented);
-  void SetContact(const Vec2f& tip, float radius_m, float arc_m);
+  void SetGround(const Vec2f& middle, bool tented);
+  void SetContact(const Vec2f& tip, const Vec2f& foot, float radius_m, float arc_m);
   void SetSigma();
   [[nodiscard]] float TimeToEvent(float v2) const;
   void Deposit(float v2, float dt_s, float remove_theta, Ledger* ledger);

@@ -13,7 +13,7 @@ constexpr float kTiny = std::numeric_limits<float>::min();
 
 }  // namespace
 
-Level::Level(int size) : n(size), stride(size + 8), count((size + 2) * (size + 8)) {
+Level::Level(int size) : n(size), stride(size + kPad), count((size + 2) * stride + kPad) {
   for (auto* field : {&face_x, &face_y, &mass, &diag, &smooth, &x, &b, &r}) field->assign(count, 0.0f);
 }
 

@@ -1,26 +1,45 @@
 // One level of the cell-centred grid hierarchy and its kernels. Private to the potential solver.
 #pragma once
 
-#include <algorithm>
-#include <array>
+#include <cstddef>
+#include <new>
 #include <vector>
 
 namespace fulcrum::thermal {
 
 inline constexpr float kJacobiWeight = 0.8f;  ///< Best smoothing of the five-point operator (factor 0.6).
 
-/// n x n cells with a halo of zeros: four floats on the left and right, one row above and below.
+/// Widest vector of any CPU; a load that straddles two of its kind costs twice.
+inline constexpr std::size_t kVectorBytes = 64;
+inline constexpr int kPad = static_cast<int>(kVectorBytes / sizeof(float));
+
+template <class T>
+struct VectorAllocator {
+  using value_type = T;
+  VectorAllocator() = default;
+  template <class U>
+  explicit VectorAllocator(const VectorAllocator<U>& /*other*/) {}
+  T* allocate(std::size_t count) {
+    return static_cast<T*>(::operator new (count * sizeof(T), std::align_val_t{kVectorBytes}));
+  }
+  void deallocate(T* p, std::size_t /*count*/) { ::operator delete (p, std::align_val_t{kVectorBytes}); }
+  bool operator==(const VectorAllocator&) const { return true; }
+};
+using Field = std::vector<float, VectorAllocator<float>>;
+
+/// n x n cells with a halo of zeros: one vector left and right (the right one is the left one of the next row), one row
+/// above and below.
 struct Level {
   explicit Level(int size);
-  [[nodiscard]] int At(int i, int j) const { return (j + 1) * stride + 4 + i; }
+  [[nodiscard]] int At(int i, int j) const { return (j + 1) * stride + kPad + i; }
 
   int n, stride, count;
-  std::vector<float> face_x;   ///< Between (i-1, j) and (i, j), at At(i, j) [S].
-  std::vector<float> face_y;   ///< Between (i, j-1) and (i, j).
-  std::vector<float> mass;     ///< Contact plus ground [S].
-  std::vector<float> diag;     ///< 0 where there is no tissue.
-  std::vector<float> smooth;   ///< kJacobiWeight / diag.
-  std::vector<float> x, b, r;  ///< Of the V-cycle.
+  Field face_x;   ///< Between (i-1, j) and (i, j), at At(i, j) [S].
+  Field face_y;   ///< Between (i, j-1) and (i, j).
+  Field mass;     ///< Contact plus ground [S].
+  Field diag;     ///< 0 where there is no tissue.
+  Field smooth;   ///< kJacobiWeight / diag.
+  Field x, b, r;  ///< Of the V-cycle.
 
   /// diag and smooth from faces and mass.
   void Finish();

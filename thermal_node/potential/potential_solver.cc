@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
-#include <numeric>
 
 #include "thermal_node/heat/wide.h"
 #include "thermal_node/potential/multigrid.h"
@@ -13,12 +13,12 @@ namespace {
 
 constexpr int kMaxIterations = 60;
 
-using Vector = std::vector<float>;
+/// Running sums side by side, in a fixed order: the same bits on every CPU.
+constexpr int kLanes = 32;
+static_assert(kWindow % kLanes == 0);
 
-/// Sixteen running sums in a fixed order: the same bits on every CPU.
 FULCRUM_WIDE
-float Dot(const Vector& a, const Vector& b) {
-  constexpr int kLanes = 16;
+float Dot(const Field& a, const Field& b) {
   alignas(64) float lane[kLanes] = {};
   const float* __restrict pa = a.data();
   const float* __restrict pb = b.data();
@@ -32,9 +32,23 @@ float Dot(const Vector& a, const Vector& b) {
   return sum;
 }
 
+FULCRUM_WIDE
+float Sum(const Field& a) {
+  alignas(64) float lane[kLanes] = {};
+  const float* __restrict pa = a.data();
+  const int count = static_cast<int>(a.size()) / kLanes * kLanes;
+  for (int k = 0; k < count; k += kLanes) {
+    for (int l = 0; l < kLanes; ++l) lane[l] += pa[k + l];
+  }
+  float sum = 0;
+  for (const float part : lane) sum += part;
+  for (int k = count; k < static_cast<int>(a.size()); ++k) sum += pa[k];
+  return sum;
+}
+
 /// y = x + f * y
 FULCRUM_WIDE
-void ScaleAdd(const Vector& x, float f, Vector* y) {
+void ScaleAdd(const Field& x, float f, Field* y) {
   const float* __restrict px = x.data();
   float* __restrict py = y->data();
   for (int k = 0; k < static_cast<int>(x.size()); ++k) py[k] = px[k] + f * py[k];
@@ -42,7 +56,7 @@ void ScaleAdd(const Vector& x, float f, Vector* y) {
 
 /// y += f * x
 FULCRUM_WIDE
-void Add(float f, const Vector& x, Vector* y) {
+void Add(float f, const Field& x, Field* y) {
   const float* __restrict px = x.data();
   float* __restrict py = y->data();
   for (int k = 0; k < static_cast<int>(x.size()); ++k) py[k] += f * px[k];
@@ -53,7 +67,7 @@ constexpr float kTiny = std::numeric_limits<float>::min();
 /// Face conductances of the finest level. The halo of sigma is 0, which closes the window's border; what flows on
 /// beyond it is in `ground`.
 FULCRUM_WIDE
-void SetFaces(const Vector& sigma, float face_s, float face_t, Level* fine) {
+void SetFaces(const Field& sigma, float face_s, float face_t, Level* fine) {
   const int up = fine->stride;
   for (int j = 0; j <= kWindow; ++j) {
     const int o = fine->At(0, j);
@@ -70,7 +84,7 @@ void SetFaces(const Vector& sigma, float face_s, float face_t, Level* fine) {
 /// Heat of one row of cells. Each cell is crossed by four half faces of resistance 1 / (2 sigma face), so a current I
 /// leaves I^2 / (2 sigma face) in it.
 FULCRUM_WIDE
-void RowHeat(const Level& fine, const Vector& voltage, const Vector& sigma, float face_s, float face_t, int j,
+void RowHeat(const Level& fine, const Field& voltage, const Field& sigma, float face_s, float face_t, int j,
              const float* __restrict contact, float* __restrict q) {
   const int o = fine.At(0, j), up = fine.stride;
   const float* __restrict v = &voltage[o];
@@ -87,6 +101,34 @@ void RowHeat(const Level& fine, const Vector& voltage, const Vector& sigma, floa
   }
 }
 
+/// Power into the sheet, heat in it and power into ground, at 1 V [W/V^2].
+struct Balance {
+  double in = 0, heat = 0, grounded = 0;
+};
+
+FULCRUM_WIDE
+void AddRow(const float* __restrict contact, const float* __restrict ground, const float* __restrict v,
+            const float* __restrict q, Balance* balance) {
+  alignas(64) float in[kLanes] = {}, heat[kLanes] = {}, grounded[kLanes] = {};
+  for (int i = 0; i < kWindow; i += kLanes) {
+    for (int l = 0; l < kLanes; ++l) {
+      in[l] += contact[i + l] * (1.0f - v[i + l]);
+      heat[l] += q[i + l];
+      grounded[l] += ground[i + l] * v[i + l] * v[i + l];
+    }
+  }
+  for (int width = kLanes / 2; width > 0; width /= 2) {
+    for (int l = 0; l < width; ++l) {
+      in[l] += in[l + width];
+      heat[l] += heat[l + width];
+      grounded[l] += grounded[l + width];
+    }
+  }
+  balance->in += in[0];
+  balance->heat += heat[0];
+  balance->grounded += grounded[0];
+}
+
 }  // namespace
 
 struct PotentialSolver::Multigrid {
@@ -96,8 +138,8 @@ struct PotentialSolver::Multigrid {
     for (auto* field : {&v, &p, &ap, &contact, &sigma}) field->assign(count, 0.0f);
   }
   std::vector<Level> levels;
-  std::vector<float> v;  ///< Solution, and start of the next solve.
-  std::vector<float> p, ap, contact, sigma;
+  Field v;  ///< Solution, and start of the next solve.
+  Field p, ap, contact, sigma;
 };
 
 PotentialSolver::PotentialSolver() : grid_(std::make_unique<Multigrid>()) {}
@@ -108,12 +150,10 @@ float PotentialSolver::Voltage(int i, int j) const { return grid_->v[grid_->leve
 PotentialResult PotentialSolver::Solve(const PotentialProblem& problem, float tolerance) {
   Level& fine = grid_->levels[0];
   for (int j = 0; j < kWindow; ++j) {
-    const int o = fine.At(0, j);
-    for (int i = 0; i < kWindow; ++i) {
-      grid_->sigma[o + i] = problem.sigma[j * kWindow + i];
-      grid_->contact[o + i] = problem.contact[j * kWindow + i];
-      fine.mass[o + i] = problem.contact[j * kWindow + i] + problem.ground[j * kWindow + i];
-    }
+    const int o = fine.At(0, j), k = j * kWindow;
+    std::copy_n(&problem.sigma[k], kWindow, &grid_->sigma[o]);
+    std::copy_n(&problem.contact[k], kWindow, &grid_->contact[o]);
+    std::transform(&problem.contact[k], &problem.contact[k] + kWindow, &problem.ground[k], &fine.mass[o], std::plus{});
   }
   SetFaces(grid_->sigma, problem.face_s, problem.face_t, &fine);
   fine.Finish();
@@ -133,7 +173,7 @@ PotentialResult PotentialSolver::Solve(const PotentialProblem& problem, float to
 int PotentialSolver::Iterate(float tolerance) {
   Multigrid& g = *grid_;
   Level& fine = g.levels[0];
-  const float contact_sum = std::accumulate(g.contact.begin(), g.contact.end(), 0.0f);
+  const float contact_sum = Sum(g.contact);
   if (!(contact_sum > 0.0f)) {
     std::fill(g.v.begin(), g.v.end(), 0.0f);
     return 0;
@@ -164,23 +204,14 @@ int PotentialSolver::Iterate(float tolerance) {
 PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
   Multigrid& g = *grid_;
   const Level& fine = g.levels[0];
-  double in = 0, heat = 0, grounded = 0;
+  Balance balance;
   for (int j = 0; j < kWindow; ++j) {
     const float* contact = &problem.contact[j * kWindow];
-    const float* ground = &problem.ground[j * kWindow];
-    const float* v = &g.v[fine.At(0, j)];
     float* q = &heat_[j * kWindow];
     RowHeat(fine, g.v, g.sigma, problem.face_s, problem.face_t, j, contact, q);
-    float row_in = 0, row_heat = 0, row_ground = 0;
-    for (int i = 0; i < kWindow; ++i) {
-      row_in += contact[i] * (1.0f - v[i]);
-      row_heat += q[i];
-      row_ground += ground[i] * v[i] * v[i];
-    }
-    in += row_in;
-    heat += row_heat;
-    grounded += row_ground;
+    AddRow(contact, &problem.ground[j * kWindow], &g.v[fine.At(0, j)], q, &balance);
   }
+  const auto& [in, heat, grounded] = balance;
   PotentialResult result;
   if (!(in > 0.0) || !std::isfinite(in + heat + grounded)) {
     // No contact; or the matrix held a bad number: start afresh and deliver nothing this time.

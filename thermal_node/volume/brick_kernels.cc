@@ -1,7 +1,6 @@
 #include "thermal_node/volume/brick_kernels.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -97,26 +96,17 @@ void RefreshLayer(Brick* brick, int k, float boil, float latent_K) {
 }
 
 FULCRUM_WIDE
-float DamageRow(const float* __restrict theta, float* __restrict omega, int count, const ArrheniusExp2& rate,
-                float dt_s, float start) {
-  alignas(64) float high[kBrick] = {};
-  const float a = rate.a, b = rate.b, zero = rate.zero_K;
+bool DamageRow(const float* __restrict theta, float* __restrict omega, int count, DamageRate rate, float dt_s) {
+  std::uint32_t dead = 0;
   for (int i = 0; i < count; ++i) {
-    const float t = theta[i];
-    const float dt = t < start ? 0.0f : dt_s;
-    const float x = a - b / (zero + (t > start ? t : start));
-    // exp2 by its nearest integer and the series of the rest, within 3e-6. x lies within (-13, 130).
-    const std::int32_t n = static_cast<std::int32_t>(x + 64.5f) - 64;
-    const float f = x - static_cast<float>(n);
-    const float series =
-        1.0f + f * (0.69314718f + f * (0.24022651f + f * (0.05550411f + f * (0.00961813f + f * 0.00133336f))));
-    const float power = std::bit_cast<float>((std::min(n, 126) + 127) << 23);
-    const float sum = omega[i] + dt * (series * power);
+    const float dt = theta[i] < kDamageStart ? 0.0f : dt_s;
+    const float inverse_K = rate.InverseKelvin(theta[i] > kDamageStart ? theta[i] : kDamageStart);
+    const float sum = omega[i] + dt * rate.OfInverse(inverse_K);
     const float capped = sum < kOmegaMax ? sum : kOmegaMax;
     omega[i] = capped;
-    high[i] = capped;
+    dead |= sum >= 1.0f ? 1u : 0u;
   }
-  return MaxRow(high);
+  return dead != 0;
 }
 
 }  // namespace fulcrum::thermal

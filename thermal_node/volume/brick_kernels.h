@@ -1,6 +1,7 @@
 // The hot loops over a brick's layers.
 #pragma once
 
+#include "thermal_node/damage/arrhenius.h"
 #include "thermal_node/volume/brick.h"
 
 namespace fulcrum::thermal {
@@ -18,11 +19,7 @@ double ApplyLid(Brick* brick, float dt_s);
 /// theta of layer k with its sum and the maxima of its pairs of rows; boiling takes `latent_K` at `boil` [K].
 void RefreshLayer(Brick* brick, int k, float boil, float latent_K);
 
-/// dOmega/dt = exp2(a - b / (zero_K + theta)) [1/s].
-struct ArrheniusExp2 {
-  float a, b, zero_K;
-};
-/// Adds dt of damage to `count` <= kBrick cells of a row where theta >= start and returns their largest omega.
-float DamageRow(const float* theta, float* omega, int count, const ArrheniusExp2& rate, float dt_s, float start);
+/// Adds dt of damage to `count` cells of a row where theta >= kDamageStart; true when a cell of it is dead, Omega >= 1.
+bool DamageRow(const float* theta, float* omega, int count, DamageRate rate, float dt_s);
 
 }  // namespace fulcrum::thermal

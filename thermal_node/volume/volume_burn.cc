@@ -9,7 +9,6 @@ namespace fulcrum::thermal {
 
 void VolumeField::Damage(Brick* brick, float dt_s) {
   if (brick->theta_max < kDamageStart) return;
-  const ArrheniusExp2 rate{damage_a_, damage_b_, damage_zero_K_};
   const WarmBox& box = brick->box;
   bool deepest = true;  // layers above the deepest dead one need not be asked
   for (int k = box.layers - 1; k >= 0; --k) {
@@ -18,9 +17,8 @@ void VolumeField::Damage(Brick* brick, float dt_s) {
       if (brick->pair_max[k * kBrickPairs + j / kBoxRows] < kDamageStart) continue;
       float* omega = &brick->omega[BrickIndex(box.col0, j, k)];
       const int count = box.col1 - box.col0;
-      const float high =
-          DamageRow(&brick->theta[BrickThetaIndex(box.col0, j, k)], omega, count, rate, dt_s, kDamageStart);
-      if (high < 1.0f || !deepest) continue;
+      const float* theta = &brick->theta[BrickThetaIndex(box.col0, j, k)];
+      if (!DamageRow(theta, omega, count, cell_death_, dt_s) || !deepest) continue;
       dead = true;
       for (int i = 0; i < count; ++i) {
         if (omega[i] >= 1.0f) deepest_burn_m_ = std::max(deepest_burn_m_, BurnDepth(*brick, j * kBrick + box.col0 + i));

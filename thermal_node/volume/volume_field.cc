@@ -13,8 +13,6 @@ namespace {
 /// Less heat than this does not wake tissue [K/s]: what a tip that moves on leaves there is less than a sleeping brick
 /// may hold.
 constexpr float kLeastSource_K_s = 1.0f;
-constexpr double kGas_J_molK = 8.314462618;
-constexpr double kZero_C = 273.15;
 /// Fractions of one sheet cell over the columns 2n and 2n + 1 that lie below the cells 3n, 3n + 1, 3n + 2.
 constexpr float kOverlap[3][2] = {{1.0f, 0.0f}, {0.5f, 0.5f}, {0.0f, 1.0f}};
 
@@ -43,9 +41,7 @@ bool IsBlank(const Brick& brick) {
 VolumeField::VolumeField(const Sheet& sheet, const ThermalParams& params)
     : sheet_(sheet),
       material_(MakeVolumeMaterial(params)),
-      damage_a_(static_cast<float>(std::log2(kCellDeath.a_per_s))),
-      damage_b_(static_cast<float>(kCellDeath.ea_J_mol / (kGas_J_molK * std::log(2.0)))),
-      damage_zero_K_(static_cast<float>(kZero_C) + params.body_temperature_C),
+      cell_death_(kCellDeath, params.body_temperature_C),
       bricks_x_((sheet.tiles_x + kBrickTiles - 1) / kBrickTiles),
       bricks_y_((sheet.tiles_y + kBrickTiles - 1) / kBrickTiles),
       bricks_(static_cast<std::size_t>(bricks_x_) * bricks_y_) {}

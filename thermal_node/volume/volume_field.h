@@ -101,7 +101,7 @@ class VolumeField {
 
   const Sheet& sheet_;
   VolumeMaterial material_;
-  float damage_a_, damage_b_, damage_zero_K_;  ///< dOmega/dt = exp2(a - b / (zero + theta)).
+  DamageRate cell_death_;
   int bricks_x_ = 0, bricks_y_ = 0;
   std::vector<std::unique_ptr<Brick>> bricks_;  ///< By index; null until first use.
   std::vector<Brick*> awake_, scratch_;

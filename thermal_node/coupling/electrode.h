@@ -1,0 +1,55 @@
+// The metal on the grid of the source window, as the part of each cell that it covers.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/core/types.h"
+#include "thermal_node/heat/sheet.h"
+
+namespace fulcrum::thermal {
+
+/// Conductance of sparks across the steam, relative to metal on tissue; assumed.
+inline constexpr float kArcConductance = 0.15f;
+
+/// The points nearer than `radius` to a segment: a capsule, or a disc where the segment has no length. Material
+/// coordinates in cells; distances by the metric, in cells.
+class Electrode {
+ public:
+  /// @param tip one end of the segment. @param foot way to the other end.
+  Electrode(const SurfaceMetric& metric, const Vec2f& tip, const Vec2f& foot, float radius, float arc)
+      : metric_(metric), tip_(tip), foot_(foot), radius_(radius), arc_(arc) {
+    const Vec2f lowered(metric.ss * foot.x() + metric.st * foot.y(), metric.st * foot.x() + metric.tt * foot.y());
+    const float length2 = lowered.dot(foot);
+    if (length2 > 0.0f) share_ = lowered / length2;
+  }
+
+  /// Conductance of the cell at `centre` to the metal, over that of a covered cell: the part of it under the metal, by
+  /// its distance to the edge; beyond the edge sparks, which fall to 0 at `arc` as they get rarer.
+  [[nodiscard]] float Covered(const Vec2f& centre) const {
+    const Vec2f from_tip = centre - tip_;
+    const Vec2f d = from_tip - std::clamp(from_tip.dot(share_), 0.0f, 1.0f) * foot_;
+    const float r =
+        std::sqrt(metric_.ss * d.x() * d.x() + 2.0f * metric_.st * d.x() * d.y() + metric_.tt * d.y() * d.y());
+    const float metal = std::clamp(radius_ - r + 0.5f, 0.0f, 1.0f);
+    const float rarer = std::max(1.0f - std::max(r - radius_, 0.0f) / arc_, 0.0f);
+    return std::max(metal, kArcConductance * rarer * rarer);
+  }
+
+  /// The box that holds every centre with Covered() > 0.
+  [[nodiscard]] Vec2f low() const { return tip_ + foot_.cwiseMin(0.0f) - Reach(); }
+  [[nodiscard]] Vec2f high() const { return tip_ + foot_.cwiseMax(0.0f) + Reach(); }
+
+ private:
+  /// Of the ellipse g(d, d) = reach^2.
+  [[nodiscard]] Vec2f Reach() const {
+    return (radius_ + arc_ + 1.0f) / metric_.area() * Vec2f(std::sqrt(metric_.tt), std::sqrt(metric_.ss));
+  }
+
+  SurfaceMetric metric_;
+  Vec2f tip_, foot_;
+  Vec2f share_ = Vec2f::Zero();  ///< Its product with a way from the tip is how far along the segment that leads.
+  float radius_, arc_;
+};
+
+}  // namespace fulcrum::thermal
