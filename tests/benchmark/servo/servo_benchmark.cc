@@ -31,7 +31,6 @@
 
 #include "haptics_node/node/haptics_node.h"
 #include "haptics_node/servo/servo.h"
-#include "services/bus/in_process.h"
 #include "services/runtime/cyclic_thread.h"
 #include "services/runtime/realtime.h"
 #include "tests/benchmark/report.h"
@@ -39,6 +38,7 @@
 #include "tests/benchmark/servo/motions.h"
 #include "tests/benchmark/servo/stability.h"
 #include "tests/benchmark/servo/strategies.h"
+#include "tests/unit/haptics/node_bus.h"
 #include "tests/unit/haptics/rig.h"
 #include "tests/unit/haptics/test_tissue.h"
 
@@ -101,15 +101,8 @@ void RunThread(Report* report, int rounds, double seconds) {
   SceneView scene = BenchScene(0.3);
   scene.tools[1] = scene.tools[0];
   scene.script = script;
-  bus::InProcessTopic<ContactModel> models;
-  bus::InProcessTopic<ToolState> tools;
-  bus::InProcessTopic<TickManifest> manifests;
-  const auto model_out = models.MakeOutput();
-  const auto model_in = models.MakeInput();
-  const auto tool_out = tools.MakeOutput();
-  const auto manifest_out = manifests.MakeOutput();
-  const auto tool_in = tools.MakeInput();
-  HapticsNode node(scene, {true, true}, {*model_in, *tool_out, *manifest_out}, runtime::MonotonicNs());
+  const testing::NodeBus bus;
+  HapticsNode node(scene, {true, true}, bus.ports(), runtime::MonotonicNs());
 
   const std::string memory = runtime::LockMemory();
   std::fprintf(stderr, "servo: %s\n", memory.empty() ? "memory is locked" : memory.c_str());
@@ -117,7 +110,7 @@ void RunThread(Report* report, int rounds, double seconds) {
   std::uint64_t sequence = 0;
   ToolState tool;
   runtime::CyclicThread physics({.name = "physics", .period_ns = 10'000'000}, [&](const Tick& tick) {
-    if (!tool_in->TakeLatest(&tool)) return;
+    if (!bus.tool_in->TakeLatest(&tool)) return;
     ContactModel model;
     model.stamp = {++sequence, 1, tick.stamp_ns};
     model.tool_stamp_ns = tool.stamp.stamp_ns;
@@ -128,10 +121,10 @@ void RunThread(Report* report, int rounds, double seconds) {
       model.devices[i].contacts[0].gap = 0;
       model.devices[i].contacts[0].f_ref = Vec3f(0.1f, 0, 1.0f);
     }
-    model_out->Write(model);
+    bus.model_out->Write(model);
   });
-  runtime::CyclicThread bus({.name = "bus", .period_ns = kPeriod_ns}, [&](const Tick&) { node.BusStep(); });
-  bus.Start();
+  runtime::CyclicThread bus_thread({.name = "bus", .period_ns = kPeriod_ns}, [&](const Tick&) { node.BusStep(); });
+  bus_thread.Start();
   physics.Start();
 
   std::string refused;

@@ -1,7 +1,6 @@
 #include "tests/benchmark/servo/stability.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -66,25 +65,16 @@ CycleEnergy Cycle(const TissueParameters& parameters, double depth, double wall_
 }  // namespace
 
 WallResult HitWall(const HandModel& hand, double wall_N_per_mm) {
-  const std::array<ScriptKey, 2> script{
-      {{0.0f, 0, Vec3f(0, 0, 0.01f), 0, 0, 0}, {0.8f, 0, Vec3f(0, 0, -0.004f), 0, 0, 0}}};
   SceneView scene = BenchScene(1.0);
-  scene.script = script;
-  SimulatedDevice device(hand, BenchTrocar(), script, 0);
+  scene.script = testing::kIntoTheWall;
+  SimulatedDevice device(hand, BenchTrocar(), scene.script, 0);
   Loop loop(scene, &device, Wall(1e3 * wall_N_per_mm));
-  double lowest = 1, highest = -1;
-  double depth = 0;
-  loop.Run(3000, [&](const Tick& tick) {
-    if (tick.session_time_s < 2.5) return;
-    const Vec3d attach = device.ReadPosition(tick);
-    const double z = PoseFromAttachPoint(BenchTrocar(), attach).p_WT.z();
-    depth = -z;
-    lowest = std::min(lowest, z);
-    highest = std::max(highest, z);
-  });
+  double z = 0;
   WallResult result;
-  result.stable = highest - lowest < 1e-4;
-  result.rendered_N_per_mm = 1e-3 * testing::SentForce(loop.servo).z() / depth;
+  result.stable = testing::UnrestAtTheWall(&loop, [&](const Tick& tick) {
+                    return z = PoseFromAttachPoint(BenchTrocar(), device.ReadPosition(tick)).p_WT.z();
+                  }) < 1e-4;
+  result.rendered_N_per_mm = -1e-3 * testing::SentForce(loop.servo).z() / z;
   return result;
 }
 

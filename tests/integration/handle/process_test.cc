@@ -1,7 +1,6 @@
 // The handle_bridge executable on the real bus: joins a session, survives kill -9, goes on where the script is.
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
@@ -23,71 +22,18 @@
 #include "services/scene/build.h"
 #include "services/scene/scene_file.h"
 #include "services/scene/scene_settings.h"
+#include "tests/support/program.h"
 
 namespace fulcrum {
 namespace {
 
+using testing::Program;
+
 constexpr int kDomain = 47;
 
-/// The executable with its words; what it prints is kept, what is given stands in its stdin.
-class BridgeProcess {
- public:
-  explicit BridgeProcess(std::vector<std::string> words, const std::string& input = "") {
-    std::array<int, 2> in{}, out{};
-    EXPECT_EQ(::pipe(in.data()) | ::pipe(out.data()), 0);
-    EXPECT_EQ(::write(in[1], input.data(), input.size()), static_cast<ssize_t>(input.size()));
-    words.insert(words.begin(), "handle_bridge");
-    std::vector<char*> argv;
-    for (std::string& word : words) {
-      argv.push_back(word.data());
-    }
-    argv.push_back(nullptr);
-    pid_ = ::fork();
-    if (pid_ == 0) {
-      ::dup2(in[0], STDIN_FILENO);
-      ::dup2(out[1], STDOUT_FILENO);
-      ::dup2(out[1], STDERR_FILENO);
-      for (const int fd : {in[0], in[1], out[0], out[1]}) {
-        ::close(fd);
-      }
-      ::execv(FULCRUM_BIN_DIR "/handle_bridge", argv.data());
-      ::_exit(127);
-    }
-    ::close(in[0]);
-    ::close(in[1]);
-    ::close(out[1]);
-    output_ = out[0];
-  }
-  ~BridgeProcess() {
-    End(SIGKILL);
-    ::close(output_);
-  }
-  /// Exit status, or minus the signal.
-  int End(int signal) {
-    if (pid_ <= 0) {
-      return 0;
-    }
-    if (signal != 0) {
-      ::kill(pid_, signal);
-    }
-    int status = 0;
-    ::waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
-  }
-  /// Waits for its end; what it has printed is in `said`.
-  int Wait(std::string* said) {
-    std::array<char, 1024> buffer;
-    for (ssize_t n = 0; (n = ::read(output_, buffer.data(), buffer.size())) > 0;) {
-      said->append(buffer.data(), static_cast<std::size_t>(n));
-    }
-    return End(0);
-  }
-
- private:
-  pid_t pid_ = -1;
-  int output_ = -1;
-};
+Program Bridge(const std::vector<std::string>& words, const std::string& input = "") {
+  return Program("handle_bridge", words, input);
+}
 
 class HandleProcess : public ::testing::Test {
  protected:
@@ -176,14 +122,14 @@ class HandleProcess : public ::testing::Test {
 };
 
 TEST_F(HandleProcess, JoinsASessionIsKilledAndGoesOnWithTheScript) {
-  BridgeProcess first(NodeWords());
+  Program first = Bridge(NodeWords());
   StartSession(3.0);
   const auto present = [](const HandleState& s) { return s.handles[0].present && s.handles[1].present; };
   ASSERT_TRUE(WaitFor(present));
   const std::uint64_t epoch = state_.stamp.epoch;
   EXPECT_EQ(first.End(SIGKILL), -SIGKILL);
 
-  BridgeProcess second(NodeWords());
+  Program second = Bridge(NodeWords());
   ASSERT_TRUE(WaitFor([&](const HandleState& s) { return s.stamp.epoch > epoch && present(s); }));
   // From its first sample on the angle is the script's: no trace of the script's beginning.
   for (int i = 0; i < 100; ++i) {
@@ -200,9 +146,9 @@ TEST_F(HandleProcess, JoinsASessionIsKilledAndGoesOnWithTheScript) {
 }
 
 TEST_F(HandleProcess, BadCartEndsWithTheUsageCode) {
-  std::string said;
-  EXPECT_EQ(BridgeProcess(NodeWords("/nonexistent.yaml")).Wait(&said), 2);
-  EXPECT_NE(said.find("/nonexistent.yaml"), std::string::npos) << said;
+  Program bridge = Bridge(NodeWords("/nonexistent.yaml"));
+  EXPECT_EQ(bridge.End(0), 2);
+  EXPECT_NE(bridge.Said().find("/nonexistent.yaml"), std::string::npos) << bridge.Said();
 }
 
 TEST_F(HandleProcess, CalibrationInTheHandIsStoredAndUsedUnlessRefused) {
@@ -212,35 +158,34 @@ TEST_F(HandleProcess, CalibrationInTheHandIsStoredAndUsedUnlessRefused) {
   const std::string noisy = WriteCart("handles: {tool0: {simulated: {noise_mV: 10}}}", "noisy.yaml");
   const std::string absent = WriteCart("handles: {tool0: {kind: none}}", "absent.yaml");
   struct Case {
-    BridgeProcess process;
+    Program process;
     int exit_code;
     const char* said;
   };
   // One line for each point, and one more for the second try of a refused one.
   std::array<Case, 6> cases = {{
-      {BridgeProcess({"calibrate", "--cart", silent, "--tool", "1"}, "\n"), 1, "refused: no-data: no bytes"},
-      {BridgeProcess({"calibrate", "--cart", noisy}, "\n"), 1, "refused: too noisy"},
-      {BridgeProcess({"calibrate", "--angles", "10,12"}, "\n\n"), 1, "refused: too few counts apart"},
-      {BridgeProcess({"calibrate", "--cart", absent}), 2, "the cart has no handle there"},
-      {BridgeProcess({"calibrate", "--angles", "10"}), 2, "valid: 2 to 9"},
-      {BridgeProcess({"calibrate", "--help"}), 0, "For each angle, set the jaw to it"},
+      {Bridge({"calibrate", "--cart", silent, "--tool", "1"}, "\n"), 1, "refused: no-data: no bytes"},
+      {Bridge({"calibrate", "--cart", noisy}, "\n"), 1, "refused: too noisy"},
+      {Bridge({"calibrate", "--angles", "10,12"}, "\n\n"), 1, "refused: too few counts apart"},
+      {Bridge({"calibrate", "--cart", absent}), 2, "the cart has no handle there"},
+      {Bridge({"calibrate", "--angles", "10"}), 2, "valid: 2 to 9"},
+      {Bridge({"calibrate", "--help"}), 0, "For each angle, set the jaw to it"},
   }};
   ::setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
   // A potentiometer 10 mV off, 9 % too long and bent by 3 %: 2 deg wrong at 50 deg with the cart's line.
   const std::string cart = WriteCart(
       "handles: {tool0: {simulated: {protocol: framed, closed_V: 2.36, open_V: 2.545, bow_percent: 3, "
       "tremor_deg: 0.25}}}");
-  std::string said;
-  EXPECT_EQ(BridgeProcess({"calibrate", "--cart", cart}, "\n\n\n\n\n").Wait(&said), 0);
-  EXPECT_NE(said.find("stored for simulated-tool0"), std::string::npos) << said;
+  Program good = Bridge({"calibrate", "--cart", cart}, "\n\n\n\n\n");
+  EXPECT_EQ(good.End(0), 0);
+  EXPECT_NE(good.Said().find("stored for simulated-tool0"), std::string::npos) << good.Said();
   for (Case& c : cases) {
-    said.clear();
-    EXPECT_EQ(c.process.Wait(&said), c.exit_code) << said;
-    EXPECT_NE(said.find(c.said), std::string::npos) << said;
+    EXPECT_EQ(c.process.End(0), c.exit_code) << c.process.Said();
+    EXPECT_NE(c.process.Said().find(c.said), std::string::npos) << c.process.Said();
   }
   EXPECT_FALSE(std::filesystem::exists(folder_ / "refused"));
 
-  BridgeProcess node(NodeWords(cart));
+  Program node = Bridge(NodeWords(cart));
   StartSession(5.5);  // The jaw is open: at 0 deg the calibrated range hides the error.
   ASSERT_TRUE(WaitForHealth([](const Health& h) {
     return MetricOf(h, "calibration0_points") == 5 && MetricOf(h, "quality0") > 0.9;
@@ -262,7 +207,7 @@ TEST_F(HandleProcess, FaultsOfTheCartAreNamedAndMendedOnTheRunningNode) {
       "  tool0: {simulated: {protocol: framed, unplugged_s: [0.5, 1.2]}}\n"
       "  tool1: {simulated: {broken_wire_s: [1.6, 2.0]}}\n"
       "pedal: {simulated: {protocol: framed, garbage_s: [2.4, 3.2]}}\n");
-  BridgeProcess node(NodeWords(cart));
+  Program node = Bridge(NodeWords(cart));
   StartSession(0.0);
   EXPECT_TRUE(WaitForError("handle 0: no-port")) << health_.last_error;
   EXPECT_TRUE(WaitForError("handle 1: wire")) << health_.last_error;

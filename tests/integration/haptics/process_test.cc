@@ -2,7 +2,6 @@
 // command, what it says when something is missing, and a session with a device that moves.
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -12,7 +11,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -24,12 +22,14 @@
 #include "services/scene/build.h"
 #include "services/scene/scene_file.h"
 #include "services/scene/scene_settings.h"
+#include "tests/support/program.h"
 #include "tests/unit/haptics/swing.h"
 
 namespace fulcrum::haptics {
 namespace {
 
 namespace fs = std::filesystem;
+using fulcrum::testing::Program;
 
 constexpr int kDomain = 48;
 
@@ -40,44 +40,21 @@ class HapticsProcess : public ::testing::Test {
     fs::create_directories(folder);
   }
   void TearDown() override {
-    End(SIGKILL);
+    node = Program();
     fs::remove_all(folder);
   }
 
-  /// Starts haptics_node with an environment of its own; what it says goes into a file.
+  /// Starts haptics_node; with a driver, it is the stand-in.
   void Start(const std::vector<std::string>& arguments, bool with_driver) {
-    pid = ::fork();
-    if (pid != 0) return;
     ::setenv("XDG_STATE_HOME", folder.c_str(), 1);
     ::setenv("LD_LIBRARY_PATH", with_driver ? FULCRUM_HD_FOLDER : "/nonexistent", 1);
     ::setenv("HD_STAND_IN_SWING", "1", 1);
-    const std::string said = Said();
-    if (::freopen(said.c_str(), "w", stdout) == nullptr || ::dup2(STDOUT_FILENO, STDERR_FILENO) < 0) ::_exit(126);
-    std::vector<const char*> words{"haptics_node"};
-    for (const std::string& argument : arguments) words.push_back(argument.c_str());
-    words.push_back(nullptr);
-    ::execv(FULCRUM_BIN_DIR "/haptics_node", const_cast<char* const*>(words.data()));
-    ::_exit(127);
-  }
-  /// Exit status, or minus the signal.
-  int End(int signal) {
-    if (pid <= 0) return 0;
-    if (signal != 0) ::kill(pid, signal);
-    int status = 0;
-    ::waitpid(pid, &status, 0);
-    pid = -1;
-    return WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status);
+    node = Program("haptics_node", arguments);
   }
   int Calibrate(bool with_driver = true) {
     Start({"calibrate-trocar", "--cart", Cart(), "--tool", "0", "--seconds", "2", "--save", folder / "saved.csv"},
           with_driver);
-    return End(0);
-  }
-  [[nodiscard]] std::string Said() const { return folder / "said"; }
-  [[nodiscard]] std::string Answer() const {
-    std::ostringstream text;
-    text << std::ifstream(Said()).rdbuf();
-    return text.str();
+    return node.End(0);
   }
   [[nodiscard]] std::string Cart() const { return folder / "cart.yaml"; }
   void WriteCart(const std::string& device) const {
@@ -88,16 +65,16 @@ class HapticsProcess : public ::testing::Test {
   }
 
   fs::path folder;
-  pid_t pid = -1;
+  Program node;
 };
 
 TEST_F(HapticsProcess, CalibratesTheTrocarOfASimulatedDevice) {
   const Vec3d pivot(0.012, -0.095, -0.110);
   std::ofstream(folder / "motion.csv") << ToText(testing::Swing(pivot, 0.3, 0.001));
   WriteCart("{kind: simulated, motion: motion.csv}");
-  EXPECT_EQ(Calibrate(), 0) << Answer();
-  EXPECT_NE(Answer().find("residual 0.8"), std::string::npos) << Answer();
-  EXPECT_NE(Answer().find("condition"), std::string::npos) << Answer();
+  EXPECT_EQ(Calibrate(), 0) << node.Said();
+  EXPECT_NE(node.Said().find("residual 0.8"), std::string::npos) << node.Said();
+  EXPECT_NE(node.Said().find("condition"), std::string::npos) << node.Said();
   ASSERT_TRUE(Stored().has_value());
   EXPECT_LT((Stored()->p_DP - pivot).norm(), 0.0005);
 }
@@ -106,28 +83,28 @@ TEST_F(HapticsProcess, RefusesAMotionThatIsTooSmallAndStoresNothing) {
   std::ofstream(folder / "motion.csv") << ToText(testing::Swing(Vec3d(0, -0.1, -0.1), 0.05, 0.001));
   WriteCart("{kind: simulated, motion: motion.csv}");
   EXPECT_EQ(Calibrate(), 2);
-  EXPECT_NE(Answer().find("nothing stored: the motion was too small"), std::string::npos) << Answer();
+  EXPECT_NE(node.Said().find("nothing stored: the motion was too small"), std::string::npos) << node.Said();
   EXPECT_FALSE(Stored().has_value());
 }
 
 TEST_F(HapticsProcess, CalibratesTheTrocarOfATouchAndSavesTheMotionForASimulatedOne) {
   WriteCart("{kind: touch, name: Left Device, serial: A100}");
-  EXPECT_EQ(Calibrate(), 0) << Answer();
-  ASSERT_TRUE(Stored().has_value()) << Answer();
+  EXPECT_EQ(Calibrate(), 0) << node.Said();
+  ASSERT_TRUE(Stored().has_value()) << node.Said();
   EXPECT_EQ(Stored()->serial, "A100");
   EXPECT_LT((Stored()->p_DP - Vec3d(0, -0.1, -0.1)).norm(), 1e-5);
   fs::rename(folder / "saved.csv", folder / "motion.csv");
   fs::remove_all(folder / "fulcrum");
   WriteCart("{kind: simulated, motion: motion.csv}");
-  EXPECT_EQ(Calibrate(), 0) << Answer();
+  EXPECT_EQ(Calibrate(), 0) << node.Said();
   EXPECT_LT((Stored()->p_DP - Vec3d(0, -0.1, -0.1)).norm(), 1e-5);
 }
 
 TEST_F(HapticsProcess, MissingDriverEndsWithTheUsageCodeAndWhatToInstall) {
   WriteCart("{kind: touch}");
   EXPECT_EQ(Calibrate(false), 2);
-  EXPECT_NE(Answer().find("the Touch needs libHD.so, which cannot be loaded"), std::string::npos) << Answer();
-  EXPECT_NE(Answer().find("Touch Device Driver"), std::string::npos) << Answer();
+  EXPECT_NE(node.Said().find("the Touch needs libHD.so, which cannot be loaded"), std::string::npos) << node.Said();
+  EXPECT_NE(node.Said().find("Touch Device Driver"), std::string::npos) << node.Said();
 }
 
 TEST_F(HapticsProcess, ATouchMovesItsToolInASession) {
@@ -160,10 +137,10 @@ TEST_F(HapticsProcess, ATouchMovesItsToolInASession) {
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
-  EXPECT_GT((most - least).x(), 0.05f) << Answer();
+  EXPECT_GT((most - least).x(), 0.05f) << node.Said();
   EXPECT_EQ(tool.tools[1].kind, ToolKind::kNone);
-  EXPECT_NE(Answer().find("tool 0: Touch A100"), std::string::npos) << Answer();
-  EXPECT_EQ(End(SIGTERM), 0);
+  EXPECT_NE(node.Said().find("tool 0: Touch A100"), std::string::npos) << node.Said();
+  EXPECT_EQ(node.End(SIGTERM), 0);
 }
 
 }  // namespace

@@ -14,8 +14,8 @@
 #include "haptics_node/node/calibrate_trocar.h"
 #include "haptics_node/node/haptics_node.h"
 #include "haptics_node/node/trocar_store.h"
-#include "services/bus/in_process.h"
 #include "services/core/error.h"
+#include "tests/unit/haptics/node_bus.h"
 #include "tests/unit/haptics/rig.h"
 #include "tests/unit/haptics/swing.h"
 #include "tests/unit/haptics/test_tissue.h"
@@ -77,15 +77,8 @@ TEST_F(CartDevicesTest, ServoWithATouchNeitherAllocatesNorLocks) {
   UseTouch("Left Device");
   // Straight up from the trocar, so that the tip is 7 mm below the tissue's surface.
   cart.devices[0].workspace.trocar_D = Vec3d(0, -0.193, 0);
-  bus::InProcessTopic<ContactModel> models;
-  bus::InProcessTopic<ToolState> tools;
-  bus::InProcessTopic<TickManifest> manifests;
-  const auto model_out = models.MakeOutput();
-  const auto model_in = models.MakeInput();
-  const auto tool_out = tools.MakeOutput();
-  const auto tool_in = tools.MakeInput(4);
-  const auto manifest_out = manifests.MakeOutput();
-  HapticsNode node(scene, std::move(Make().devices), {*model_in, *tool_out, *manifest_out}, 1);
+  const testing::NodeBus bus;
+  HapticsNode node(scene, std::move(Make().devices), bus.ports(), 1);
   TestTissue tissue{{}};
   LatePhysics physics;
   ToolState tool;
@@ -93,7 +86,7 @@ TEST_F(CartDevicesTest, ServoWithATouchNeitherAllocatesNorLocks) {
   for (std::uint64_t i = 0; i < 3000; ++i) {
     const Tick tick = TickAt(i);
     ContactModel model;
-    if (physics.Step(tissue, tick.stamp_ns - 1'000'000, &model)) model_out->Write(model);
+    if (physics.Step(tissue, tick.stamp_ns - 1'000'000, &model)) bus.model_out->Write(model);
     node.BusStep();
     {
       const AllocationGuard guard;
@@ -106,7 +99,7 @@ TEST_F(CartDevicesTest, ServoWithATouchNeitherAllocatesNorLocks) {
       servo_violations += guard.violations();
     }
     node.BusStep();
-    if (tool_in->TakeLatest(&tool)) tissue.Step(tool.tools[0].p_WT.cast<double>(), tick.dt_s);
+    if (bus.tool_in->TakeLatest(&tool)) tissue.Step(tool.tools[0].p_WT.cast<double>(), tick.dt_s);
   }
   EXPECT_EQ(servo_violations, 0);
   EXPECT_EQ(driver_violations, 0);

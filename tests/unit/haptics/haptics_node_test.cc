@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "services/bus/in_process.h"
+#include "tests/unit/haptics/node_bus.h"
 #include "tests/unit/haptics/rig.h"
 #include "tests/unit/haptics/test_tissue.h"
 #include "tests/unit/runtime/allocation_guard.h"
@@ -31,23 +31,16 @@ class HapticsNodeTest : public ::testing::Test {
  protected:
   HapticsNodeTest() : scene(BenchScene(0.3)) {
     scene.script = kScript;
-    model_out = models.MakeOutput();
-    model_in = models.MakeInput();
-    tool_out = tools.MakeOutput();
-    tool_in = tools.MakeInput(4);
-    manifest_out = manifests.MakeOutput();
-    manifest_in = manifests.MakeInput(64);
     node = Make(1000);
   }
   std::unique_ptr<HapticsNode> Make(std::int64_t epoch) {
-    return std::make_unique<HapticsNode>(scene, std::array<bool, kMaxTools>{true, true},
-                                         HapticsNode::Ports{*model_in, *tool_out, *manifest_out}, epoch);
+    return std::make_unique<HapticsNode>(scene, std::array<bool, kMaxTools>{true, true}, bus.ports(), epoch);
   }
   /// One millisecond of everything; the servo's part alone is watched.
   void Step() {
     const Tick tick = TickAt(millisecond++);
     ContactModel model;
-    if (physics.Step(tissue, tick.stamp_ns - 1'000'000, &model)) model_out->Write(model);
+    if (physics.Step(tissue, tick.stamp_ns - 1'000'000, &model)) bus.model_out->Write(model);
     node->BusStep();
     {
       const AllocationGuard guard;
@@ -55,19 +48,11 @@ class HapticsNodeTest : public ::testing::Test {
       violations += guard.violations();
     }
     node->BusStep();
-    if (tool_in->TakeLatest(&tool)) tissue.Step(tool.tools[0].p_WT.cast<double>(), tick.dt_s);
+    if (bus.tool_in->TakeLatest(&tool)) tissue.Step(tool.tools[0].p_WT.cast<double>(), tick.dt_s);
   }
 
   SceneView scene;
-  bus::InProcessTopic<ContactModel> models;
-  bus::InProcessTopic<ToolState> tools;
-  bus::InProcessTopic<TickManifest> manifests;
-  std::unique_ptr<bus::Output<ContactModel>> model_out;
-  std::unique_ptr<bus::Input<ContactModel>> model_in;
-  std::unique_ptr<bus::Output<ToolState>> tool_out;
-  std::unique_ptr<bus::Input<ToolState>> tool_in;
-  std::unique_ptr<bus::Output<TickManifest>> manifest_out;
-  std::unique_ptr<bus::Input<TickManifest>> manifest_in;
+  testing::NodeBus bus;
   std::unique_ptr<HapticsNode> node;
   TestTissue tissue{{}};
   LatePhysics physics;
@@ -90,7 +75,7 @@ TEST_F(HapticsNodeTest, EachTickIsPublishedInOrderAndPassesTheBusGate) {
     EXPECT_EQ(tool.stamp.epoch, 1000u);
     EXPECT_EQ(tool.stamp.stamp_ns, TickAt(millisecond - 1).stamp_ns);
   }
-  EXPECT_EQ(tool_in->stats().rejected, 0u);
+  EXPECT_EQ(bus.tool_in->stats().rejected, 0u);
 }
 
 TEST_F(HapticsNodeTest, ManifestsTellTickHashAndModelAtAHundredHertz) {
@@ -98,7 +83,7 @@ TEST_F(HapticsNodeTest, ManifestsTellTickHashAndModelAtAHundredHertz) {
   std::vector<TickManifest> seen;
   for (int i = 0; i < 1000; ++i) {
     Step();
-    while (manifest_in->TakeNext(&manifest)) seen.push_back(manifest);
+    while (bus.manifest_in->TakeNext(&manifest)) seen.push_back(manifest);
   }
   EXPECT_GE(seen.size(), 99u);
   EXPECT_LE(seen.size(), 105u);
@@ -171,7 +156,7 @@ TEST_F(HapticsNodeTest, WhatDoesNotPassTheGateIsCounted) {
   model.devices[0].count = 1;
   model.devices[0].contacts[0] = tissue.Report();
   model.devices[0].contacts[0].k1 = 5e4f;  // Finite, so the bus lets it through; too stiff for the servo.
-  model_out->Write(model);
+  bus.model_out->Write(model);
   Step();
   Step();
   Health health;

@@ -1,6 +1,8 @@
 // Servo, tissue and a physics that reports late, together in simulated time.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstdint>
 
 #include "haptics_node/servo/servo.h"
@@ -31,6 +33,23 @@ struct Loop {
   LatePhysics physics;
   std::uint64_t millisecond = 0;
 };
+
+/// A hand that goes from 10 mm above the surface to 4 mm beneath it.
+inline const std::array<ScriptKey, 2> kIntoTheWall{
+    {{0.0f, 0, Vec3f(0, 0, 0.01f), 0, 0, 0}, {0.8f, 0, Vec3f(0, 0, -0.004f), 0, 0, 0}}};
+
+/// Runs three seconds of that; how far `height` of a tick still goes up and down in the last half.
+template <class Height>
+double UnrestAtTheWall(Loop* loop, const Height& height) {
+  double lowest = 1, highest = -1;
+  loop->Run(3000, [&](const Tick& tick) {
+    if (tick.session_time_s < 2.5) return;
+    const double z = height(tick);
+    lowest = std::min(lowest, z);
+    highest = std::max(highest, z);
+  });
+  return highest - lowest;
+}
 
 inline constexpr auto kNothing = [](const Tick&) {};
 

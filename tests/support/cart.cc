@@ -1,0 +1,73 @@
+#include "tests/support/cart.h"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+#include <thread>
+
+namespace fulcrum::testing {
+
+namespace fs = std::filesystem;
+
+bool WaitFor(double limit_s, const std::function<bool()>& done) {
+  using std::chrono::steady_clock;
+  const auto start = steady_clock::now();
+  while (std::chrono::duration<double>(steady_clock::now() - start).count() < limit_s) {
+    if (done()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return done();
+}
+
+std::string ReadFile(const fs::path& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+Cart::Cart(const std::string& scene, int domain, const std::vector<std::string>& more_arguments)
+    : folder_(fs::temp_directory_path() /
+              ("fulcrum-cart-" + std::to_string(::getpid()) + "-" + std::to_string(domain))) {
+  fs::remove_all(folder_);
+  fs::create_directories(folder_);
+  std::vector<std::string> arguments{"up", scene, "--domain", std::to_string(domain), "--out", folder_};
+  arguments.insert(arguments.end(), more_arguments.begin(), more_arguments.end());
+  up_ = Program("fulcrum", arguments);
+}
+
+Cart::~Cart() {
+  up_ = Program();
+  std::error_code ignored;
+  fs::remove_all(folder_, ignored);
+}
+
+std::map<std::string, pid_t> Cart::nodes() const {
+  std::map<std::string, pid_t> children;
+  for (const auto& entry : fs::directory_iterator("/proc")) {
+    const std::string name = entry.path().filename();
+    if (name.find_first_not_of("0123456789") != std::string::npos) continue;
+    std::ifstream stat(entry.path() / "stat");
+    std::string line;
+    if (!std::getline(stat, line)) continue;
+    const auto open = line.find('('), close = line.rfind(')');
+    if (open == std::string::npos || close == std::string::npos) continue;
+    std::istringstream rest(line.substr(close + 1));
+    char state = '?';
+    pid_t ppid = 0;
+    rest >> state >> ppid;
+    if (ppid == up_.pid() && state != 'Z') children[line.substr(open + 1, close - open - 1)] = std::stoi(name);
+  }
+  return children;
+}
+
+std::optional<int> Cart::WaitForEnd(double limit_s) {
+  std::optional<int> code;
+  WaitFor(limit_s, [&] { return (code = up_.Poll()).has_value(); });
+  return code;
+}
+
+}  // namespace fulcrum::testing
