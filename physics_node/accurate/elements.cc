@@ -17,8 +17,9 @@ constexpr std::size_t kMostContacts = 4608;
 /// A contact's resistance to movement along its normal within a substep, over its stiffness: what comes fast does not
 /// bounce.
 constexpr float kContactDamping = 1.0f;
-/// Part of a contact's normal stiffness that resists sliding at most.
-constexpr float kTangentialPart = 0.3f;
+/// A contact's viscosity against sliding over its normal stiffness, at most [s]. By time and not by substep: else what
+/// sticks creeps slowly in long substeps and at once in short ones.
+constexpr float kSlideTime = 3e-4f;
 
 template <class Sum>
 Vec3f Combine(const Sum& e, const float* field) {
@@ -86,7 +87,7 @@ struct ContactState {
   float tangential;  ///< Stiffness against sliding [N/m].
   Vec3f slide;
 };
-ContactState StateOf(const ContactRow& row, const Vec3f& here, const float* start) {
+ContactState StateOf(float h, const ContactRow& row, const Vec3f& here, const float* start) {
   ContactState state{};
   const Vec3f moved = here - Combine(row, start) - row.drift;
   const float gap = row.normal.dot(here) - row.offset;
@@ -97,9 +98,9 @@ ContactState StateOf(const ContactRow& row, const Vec3f& here, const float* star
   state.damping = kContactDamping * state.stiffness;
   const float approach = row.normal.dot(moved);
   state.force = -state.stiffness * gap - state.damping * approach;
-  // Coulomb with the normal force at hand, within one step linear.
+  // Coulomb with the normal force at hand, viscous below it.
   state.slide = moved - approach * row.normal;
-  state.tangential = std::min(kTangentialPart * state.stiffness,
+  state.tangential = std::min(kSlideTime / h * state.stiffness,
                               row.friction * std::max(state.force, 0.0f) / std::max(state.slide.norm(), kStick));
   return state;
 }
@@ -163,7 +164,7 @@ void Elements::Select(const Regions& regions, std::span<const std::uint8_t> move
   hinges_.Select(regions, felt, &selection->hinge_rows);
 }
 
-void Elements::Touch(const float* place, const float* start, const Regions& regions,
+void Elements::Touch(float h, const float* place, const float* start, const Regions& regions,
                      std::span<const ContactRow> contacts) {
   guard_.Linearise(place);
   contacts_.clear();
@@ -172,7 +173,7 @@ void Elements::Touch(const float* place, const float* start, const Regions& regi
     if (!AnyMarked(row, regions, regions.part().marked)) {
       continue;
     }
-    const ContactState state = StateOf(row, Combine(row, place), start);
+    const ContactState state = StateOf(h, row, Combine(row, place), start);
     if (state.stiffness > 0.0f) {
       Element e;
       e.count = row.count;
@@ -236,12 +237,13 @@ double Elements::Energy(const float* place, std::span<const ContactRow> contacts
   return sum;
 }
 
-void Elements::WriteForces(const float* place, const float* d, const float* start, std::span<ContactRow> contacts) {
+void Elements::WriteForces(float h, const float* place, const float* d, const float* start,
+                           std::span<ContactRow> contacts) {
   for (ContactRow& row : contacts) {
     if (!(ContactStiffness(row) > kStiffContact)) {
       continue;
     }
-    const ContactState state = StateOf(row, Combine(row, place) + Combine(row, d), start);
+    const ContactState state = StateOf(h, row, Combine(row, place) + Combine(row, d), start);
     row.force_N = std::max(state.force, 0.0f);
     row.friction_N = state.force > 0.0f ? Vec3f(-state.tangential * state.slide) : Vec3f(Vec3f::Zero());
   }

@@ -45,8 +45,9 @@ class Elements {
   /// Stiffness that bindings and hinges add to the diagonal, by pool offset of x.
   [[nodiscard]] std::vector<std::pair<std::uint32_t, float>> Diagonal() const;
   /// Finds what folds the organ has (see InversionGuard), and which contacts push at `place`, sliding measured from
-  /// `start`; they act until the next call.
-  void Touch(const float* place, const float* start, const Regions& regions, std::span<const ContactRow> contacts);
+  /// `start`, a substep of h ago; they act until the next call.
+  void Touch(float h, const float* place, const float* start, const Regions& regions,
+             std::span<const ContactRow> contacts);
   [[nodiscard]] std::span<const Element> touching() const { return contacts_; }
   [[nodiscard]] const InversionGuard& guard() const { return guard_; }
   /// Linearises at `place` and adds the forces to `residual`, those of the touching contacts included.
@@ -59,8 +60,9 @@ class Elements {
   [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts);
   /// Contacts stiffer than this are with a tool; softer ones are tissue on tissue, as the fat around [N/m].
   static constexpr float kStiffContact = 500.0f;
-  /// Normal and friction forces of contacts with tools at `place` + `d`, sliding measured from `start`.
-  static void WriteForces(const float* place, const float* d, const float* start, std::span<ContactRow> contacts);
+  /// Normal and friction forces of contacts with tools at `place` + `d`, sliding measured from `start`, h ago.
+  static void WriteForces(float h, const float* place, const float* d, const float* start,
+                          std::span<ContactRow> contacts);
 
   /// Stiffness of a contact in its normal direction: of tissue against a tool, and of soft tissue against tissue; an
   /// edge of the membrane has some 200 N/m [N/m].

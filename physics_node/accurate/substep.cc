@@ -159,7 +159,7 @@ void AccurateSolver::FollowContacts() {
 }
 
 void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRow> contacts) {
-  elements_.Touch(place_.data(), particles_->pool(), regions_, contacts);
+  elements_.Touch(inertia.h, place_.data(), particles_->pool(), regions_, contacts);
   RefreshContactStiffness();
   const Sheet sheet = MakeSheet();
   const SheetMatrix matrix = MakeMatrix();
@@ -286,7 +286,7 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
     SearchAlongCorrection(inertia, contacts);
   }
   // Before the particles move on: their start is still in the store.
-  Elements::WriteForces(place_.data(), d_.data(), particles_->pool(), contacts);
+  Elements::WriteForces(h, place_.data(), d_.data(), particles_->pool(), contacts);
   SubstepReport report = Finish(h);
   regions_.Settle(speed_, h);
   report.largest_correction_m = largest;

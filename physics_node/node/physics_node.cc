@@ -112,10 +112,11 @@ void PhysicsNode::TakeInputs() {
   }
 }
 
-/// A skipped period means that the step before ran late: go on with a cheaper preset, for a while. In lock step no
-/// period is ever skipped, so replays do not depend on the machine.
+/// A skipped period means that the step before ran late: go on with a cheaper preset, for a while. The first step looks
+/// at everything for the first time and says nothing about the next. In lock step no period is ever skipped, so replays
+/// do not depend on the machine.
 void PhysicsNode::MindTheTime(const Tick& tick) {
-  const bool late = ticks_ > 0 && tick.index > last_index_ + 1;
+  const bool late = ticks_ > 1 && tick.index > last_index_ + 1;
   last_index_ = tick.index;
   ticks_in_time_ = late ? 0 : ticks_in_time_ + 1;
   const std::uint32_t cheaper = cheaper_.load(std::memory_order_relaxed);

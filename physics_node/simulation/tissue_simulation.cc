@@ -14,9 +14,12 @@ constexpr float kStill = 1e-6f;
 constexpr int kStillSteps = 50;
 /// A tool that moves less is standing still: the resolution of a haptic device is 9 um.
 constexpr float kToolStill = 1e-7f;
-/// How far a tool that presses may move in a substep of mode accurate [m], at the price of at most so many substeps.
-constexpr float kWayPerSubstep = 6e-5f;
-constexpr int kMostSubsteps = 8;
+/// How far a tool that presses may move in a substep of mode accurate [m], at the price of at most so many substeps:
+/// for good forces, and for forces at all.
+constexpr float kGoodWayPerSubstep = 2e-5f, kWayPerSubstep = 6e-5f;
+constexpr int kGoodSubsteps = 3, kMostSubsteps = 8;
+/// With one substep a step forces are wrong by half of themselves, however slow the tool.
+constexpr int kLeastSubsteps = 2;
 
 float AngleBetween(const Quatf& a, const Quatf& b) { return 2.0f * std::acos(std::min(1.0f, std::abs(a.dot(b)))); }
 
@@ -229,7 +232,12 @@ int TissueSimulation::SubstepsForTools() const {
       way = std::max(way, (tracks_[i].now.p_WT - tracks_[i].last.p_WT).norm());
     }
   }
-  return std::clamp(static_cast<int>(std::ceil(way / kWayPerSubstep)), effort_.substeps, most_substeps_);
+  if (way == 0.0f) {
+    return effort_.substeps;
+  }
+  const int good = std::min(static_cast<int>(std::ceil(way / kGoodWayPerSubstep)), kGoodSubsteps);
+  const int needed = std::max(static_cast<int>(std::ceil(way / kWayPerSubstep)), good);
+  return std::clamp(needed, std::max(effort_.substeps, kLeastSubsteps), most_substeps_);
 }
 
 StepReport TissueSimulation::StepAccurate() {
@@ -305,7 +313,7 @@ std::uint32_t TissueSimulation::SetCheaper(std::uint32_t presets) {
   const auto own = accurate_ ? static_cast<std::uint32_t>(scene_.physics.preset) : 0u;
   const std::uint32_t cheaper = std::min(presets, own);
   effort_ = accurate::EffortOf(static_cast<PhysicsPreset>(own - cheaper));
-  most_substeps_ = cheaper > 0 ? effort_.substeps : std::max(kMostSubsteps, effort_.substeps);
+  most_substeps_ = std::max(cheaper > 0 ? kLeastSubsteps : kMostSubsteps, effort_.substeps);
   return cheaper;
 }
 
