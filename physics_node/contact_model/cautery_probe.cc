@@ -29,6 +29,8 @@ constexpr float kTentHeight = 0.002f;
 /// A binding this many rows and columns away still tells how the organ beneath has moved.
 constexpr int kBindingWindow = 6;
 constexpr float kRateSmoothing = 0.03f;  ///< [s]
+/// The line of contact is cut off here [m]: the spot reaches no farther, whatever the metal lies on.
+constexpr float kLongestHalf = 0.002f;
 
 }  // namespace
 
@@ -86,7 +88,7 @@ bool CauteryProbe::IsFresh() const { return static_cast<float>(steps_away_) * sc
 void CauteryProbe::FindTouches(std::uint32_t tool, const ToolCollision& collision) {
   const ToolDescription& description = scene_.tools[tool];
   const float hold = IsFresh() ? 0.0f : kHoldSpacings * spacing_;
-  const float limit = description.tip_radius_m + scene_.physics.collision_margin_m + kStrikeGap + hold;
+  const float metal = description.tip_radius_m + scene_.physics.collision_margin_m, limit = metal + kStrikeGap + hold;
   touches_.clear();
   for (const ContactPair& pair : collision.pairs()) {
     // ShapeOf: the hook's first capsule is the foot, its second the neck; both begin at the heel.
@@ -97,18 +99,54 @@ void CauteryProbe::FindTouches(std::uint32_t tool, const ToolCollision& collisio
     }
     const float along = part == 0 ? pair.closest.t * description.tip_length_m : -pair.closest.t * kHookNeck;
     if (along >= -kBareNeck) {
-      touches_.push_back({&pair, along, limit - std::sqrt(pair.closest.distance_sq), pair.closest.on_triangle});
+      const float distance = std::sqrt(pair.closest.distance_sq);
+      touches_.push_back({&pair, along, limit - distance, metal - distance, pair.closest.on_triangle});
     }
   }
 }
 
-float CauteryProbe::Weight(const Touch& touch) const {
+float CauteryProbe::Nearness(const Touch& touch) const {
   const float away = (touch.place - aim_).norm();
   if (away > kSpotReach) {
     return 0.0f;
   }
   const float fall = 1.0f / (1.0f + away * away / (kSpotSize * kSpotSize));
-  return touch.closeness * fall * fall;
+  return fall * fall;
+}
+
+float CauteryProbe::Weight(const Touch& touch) const { return touch.closeness * Nearness(touch); }
+
+Vec2f CauteryProbe::MaterialOf(const Touch& touch) const {
+  Vec2f place = Vec2f::Zero();
+  for (std::size_t i = 0; i < 3; ++i) {
+    place +=
+        touch.pair->closest.barycentric[i] * scene_.membrane_material[touch.pair->particle[i] - scene_.membrane.first];
+  }
+  return place;
+}
+
+Vec2f CauteryProbe::HalfLine() const {
+  float sum = 0, along = 0, square = 0;
+  Vec2f place = Vec2f::Zero(), product = Vec2f::Zero();
+  for (const Touch& touch : touches_) {
+    const float weight = touch.along >= 0.0f ? std::max(touch.metal, 0.0f) * Nearness(touch) : 0.0f;
+    if (weight > 0.0f) {
+      const Vec2f at = MaterialOf(touch);
+      sum += weight;
+      along += weight * touch.along;
+      square += weight * touch.along * touch.along;
+      place += weight * at;
+      product += weight * touch.along * at;
+    }
+  }
+  const float variance = sum > 0.0f ? square / sum - along * along / (sum * sum) : 0.0f;
+  if (!(variance > 1e-10f)) {
+    return Vec2f::Zero();
+  }
+  const Vec2f slope = (product / sum - along * place / (sum * sum)) / variance;
+  const Vec2f half = slope * std::sqrt(3.0f * variance);
+  const float length = half.norm();
+  return length > kLongestHalf ? Vec2f(half * (kLongestHalf / length)) : half;
 }
 
 void CauteryProbe::FollowSpot(const ToolPose& pose, const ToolPose& last_pose, const ToolDescription& tool) {
@@ -145,20 +183,20 @@ CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& last_pos
   contact.tool = static_cast<std::uint8_t>(tool);
   const ToolDescription& description = scene_.tools[tool];
   const auto& material = scene_.membrane_material;
+  const float dt = scene_.physics.dt_s;
   FindTouches(tool, collision);
   FollowSpot(pose, last_pose, description);
   Vec2f mean = Vec2f::Zero();
   float sum = 0;
   for (const Touch& touch : touches_) {
     const float weight = Weight(touch);
-    for (std::size_t i = 0; i < 3; ++i) {
-      mean += weight * touch.pair->closest.barycentric[i] * material[touch.pair->particle[i] - scene_.membrane.first];
-    }
+    mean += weight * MaterialOf(touch);
     sum += weight;
   }
   if (!(sum > 0.0f)) {
     was_touching_ = false;
     rate_.setZero();
+    half_.setZero();
     return contact;
   }
   mean /= sum;
@@ -182,8 +220,11 @@ CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& last_pos
   contact.touching = true;
   contact.tented = Tented(contact.triangle, contact.barycentric);
   contact.contact_radius_m = description.tip_radius_m;
+  // A line has no direction: towards the end that was told of last.
+  const Vec2f half = HalfLine();
+  half_ += dt / (dt + kRateSmoothing) * ((half.dot(half_) < 0.0f ? Vec2f(-half) : half) - half_);
+  contact.contact_half = half_;
   if (was_touching_) {
-    const float dt = scene_.physics.dt_s;
     rate_ += dt / (dt + kRateSmoothing) * ((contact.material - last_material_) / dt - rate_);
   }
   contact.material_rate = rate_;

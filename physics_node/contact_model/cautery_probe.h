@@ -26,13 +26,20 @@ class CauteryProbe {
     const ContactPair* pair;
     float along;      ///< On the metal from the heel: positive on the foot, negative up the neck [m].
     float closeness;  ///< How much nearer than the reach of the current [m].
+    float metal;      ///< How much nearer than where the metal itself touches; negative: an arc at most [m].
     Vec3f place;
   };
   /// Nothing has touched for a while.
   [[nodiscard]] bool IsFresh() const;
   void FindTouches(std::uint32_t tool, const ToolCollision& collision);
   void FollowSpot(const ToolPose& pose, const ToolPose& last_pose, const ToolDescription& tool);
+  /// 1 at the aim, 0 out of the spot's reach.
+  [[nodiscard]] float Nearness(const Touch& touch) const;
   [[nodiscard]] float Weight(const Touch& touch) const;
+  [[nodiscard]] Vec2f MaterialOf(const Touch& touch) const;
+  /// Half of the line along which the foot itself touches near the spot, in material coordinates: its direction by
+  /// least squares of the touching points over their places on the metal, as long as an even line of their spread.
+  [[nodiscard]] Vec2f HalfLine() const;
   [[nodiscard]] bool Tented(Index triangle, const std::array<float, 3>& barycentric) const;
 
   SceneView scene_;
@@ -46,6 +53,7 @@ class CauteryProbe {
   Vec3f motion_ = Vec3f::Zero();  ///< Of the tool, low-passed [m/s].
   int steps_away_ = 1000;         ///< Since anything touched.
   Vec2f last_material_ = Vec2f::Zero(), rate_ = Vec2f::Zero();
+  Vec2f half_ = Vec2f::Zero();  ///< HalfLine, low-passed.
 };
 
 /// Barycentric coordinates of `p` in triangle abc of the plane, clamped into it.

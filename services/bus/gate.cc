@@ -98,7 +98,7 @@ bool PassesGate(const CauteryContact& m) noexcept {
   return IsStamp(m.stamp) && IsSessionTime(m.session_time_s) && UpTo(m.mode, CauteryMode::kBlend) &&
          m.tool < kMaxTools && weights_in_range && (!m.touching || place_is_known) &&
          Magnitude(m.material, kMaxCoordinate_m) && Magnitude(m.material_rate, kMaxSpeed_m_s) &&
-         Magnitude(m.contact_foot, kMaxCoordinate_m) && Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) &&
+         Magnitude(m.contact_half, kMaxCoordinate_m) && Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) &&
          Within(m.power_W, 0.0, kMaxPower_W);
 }
 

@@ -158,7 +158,7 @@ struct CauteryContact {
   Vec2f material = Vec2f::Zero();       ///< (s, t) of the tip on the rest sheet [m].
   Vec2f material_rate = Vec2f::Zero();  ///< [m/s].
   /// (s, t) from the tip to the other end of the line along which the metal touches; 0 where only the tip does [m].
-  Vec2f contact_foot = Vec2f::Zero();
+  Vec2f contact_half = Vec2f::Zero();
   float contact_radius_m = 0;
   float power_W = 0;  ///< Asked of the generator; 0 with the pedal up.
 };

@@ -16,19 +16,19 @@ inline constexpr float kArcConductance = 0.15f;
 /// coordinates in cells; distances by the metric, in cells.
 class Electrode {
  public:
-  /// @param tip one end of the segment. @param foot way to the other end.
-  Electrode(const SurfaceMetric& metric, const Vec2f& tip, const Vec2f& foot, float radius, float arc)
-      : metric_(metric), tip_(tip), foot_(foot), radius_(radius), arc_(arc) {
-    const Vec2f lowered(metric.ss * foot.x() + metric.st * foot.y(), metric.st * foot.x() + metric.tt * foot.y());
-    const float length2 = lowered.dot(foot);
+  /// @param middle of the segment. @param half way from there to either end.
+  Electrode(const SurfaceMetric& metric, const Vec2f& middle, const Vec2f& half, float radius, float arc)
+      : metric_(metric), middle_(middle), half_(half), radius_(radius), arc_(arc) {
+    const Vec2f lowered(metric.ss * half.x() + metric.st * half.y(), metric.st * half.x() + metric.tt * half.y());
+    const float length2 = lowered.dot(half);
     if (length2 > 0.0f) share_ = lowered / length2;
   }
 
   /// Conductance of the cell at `centre` to the metal, over that of a covered cell: the part of it under the metal, by
   /// its distance to the edge; beyond the edge sparks, which fall to 0 at `arc` as they get rarer.
   [[nodiscard]] float Covered(const Vec2f& centre) const {
-    const Vec2f from_tip = centre - tip_;
-    const Vec2f d = from_tip - std::clamp(from_tip.dot(share_), 0.0f, 1.0f) * foot_;
+    const Vec2f from_middle = centre - middle_;
+    const Vec2f d = from_middle - std::clamp(from_middle.dot(share_), -1.0f, 1.0f) * half_;
     const float r =
         std::sqrt(metric_.ss * d.x() * d.x() + 2.0f * metric_.st * d.x() * d.y() + metric_.tt * d.y() * d.y());
     const float metal = std::clamp(radius_ - r + 0.5f, 0.0f, 1.0f);
@@ -37,8 +37,8 @@ class Electrode {
   }
 
   /// The box that holds every centre with Covered() > 0.
-  [[nodiscard]] Vec2f low() const { return tip_ + foot_.cwiseMin(0.0f) - Reach(); }
-  [[nodiscard]] Vec2f high() const { return tip_ + foot_.cwiseMax(0.0f) + Reach(); }
+  [[nodiscard]] Vec2f low() const { return middle_ - half_.cwiseAbs() - Reach(); }
+  [[nodiscard]] Vec2f high() const { return middle_ + half_.cwiseAbs() + Reach(); }
 
  private:
   /// Of the ellipse g(d, d) = reach^2.
@@ -47,8 +47,8 @@ class Electrode {
   }
 
   SurfaceMetric metric_;
-  Vec2f tip_, foot_;
-  Vec2f share_ = Vec2f::Zero();  ///< Its product with a way from the tip is how far along the segment that leads.
+  Vec2f middle_, half_;
+  Vec2f share_ = Vec2f::Zero();  ///< Its product with a way from the middle: how far along the half that leads.
   float radius_, arc_;
 };
 

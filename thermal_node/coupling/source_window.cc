@@ -145,12 +145,12 @@ void SourceWindow::SetSigma() {
   }
 }
 
-void SourceWindow::SetContact(const Vec2f& tip, const Vec2f& foot, float radius_m, float arc_m) {
+void SourceWindow::SetContact(const Vec2f& tip, const Vec2f& half, float radius_m, float arc_m) {
   problem_.contact.fill(0);
   const float cell = material_.cell_m;
   const Vec2f origin(static_cast<float>(corner_.ix + sheet_.origin_x),
                      static_cast<float>(corner_.iy + sheet_.origin_y));
-  const Electrode electrode(metric_, tip / cell - origin, foot / cell, radius_m / cell, arc_m / cell);
+  const Electrode electrode(metric_, tip / cell - origin, half / cell, radius_m / cell, arc_m / cell);
   const Vec2f low = electrode.low(), high = electrode.high();
   const int i0 = std::max(0, static_cast<int>(low.x())), i1 = std::min(kWindow - 1, static_cast<int>(high.x()));
   const int j0 = std::max(0, static_cast<int>(low.y())), j1 = std::min(kWindow - 1, static_cast<int>(high.y()));
@@ -250,7 +250,7 @@ void SourceWindow::AddLeak(float v2, float dt_s) {
 }
 
 void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive, float duration_s, Ledger* ledger) {
-  const Vec2f centre = 0.5f * (path.from + path.to + path.foot);
+  const Vec2f centre = 0.5f * (path.from + path.to);
   const CellIndex middle = sheet_.CellOf(centre);
   MoveTo({middle.ix - kWindow / 2, middle.iy - kWindow / 2});
   Load(field, ledger);
@@ -266,7 +266,7 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   float t = 0, guess = shortest;
   while (t < duration_s) {
     const float at = std::min(t + 0.5f * guess, duration_s) / duration_s;
-    SetContact(path.from + at * (path.to - path.from), path.foot, path.radius_m, drive.arc_m);
+    SetContact(path.from + at * (path.to - path.from), path.half, path.radius_m, drive.arc_m);
     const PotentialResult solved = potential_.Solve(problem_, tolerance);
     const float voltage = RegulatedVoltage(drive, solved.conductance_S);
     const float v2 = voltage * voltage;

@@ -23,7 +23,7 @@ inline constexpr float kTentRadius_m = 0.015f;  ///< A tented sheet returns its 
 /// Tip path over a span of time, in material space.
 struct TipPath {
   Vec2f from = Vec2f::Zero(), to = Vec2f::Zero();  ///< [m]
-  Vec2f foot = Vec2f::Zero();  ///< From the tip to the other end of the metal's line of contact, which moves along [m].
+  Vec2f half = Vec2f::Zero();  ///< From the tip to either end of the line of metal that touches [m].
   float radius_m = 0;          ///< Around that line.
   bool tented = false;
 };
@@ -73,7 +73,7 @@ class SourceWindow {
   /// The tissue in the window lies as it does under the tip: tented or not.
   void Store(HeatField* field, bool tented);
   void SetGround(const Vec2f& middle, bool tented);
-  void SetContact(const Vec2f& tip, const Vec2f& foot, float radius_m, float arc_m);
+  void SetContact(const Vec2f& tip, const Vec2f& half, float radius_m, float arc_m);
   void SetSigma();
   [[nodiscard]] float TimeToEvent(float v2) const;
   void Deposit(float v2, float dt_s, float remove_theta, Ledger* ledger);

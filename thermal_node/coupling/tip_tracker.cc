@@ -9,8 +9,8 @@ bool TipTracker::Accepts(const CauteryContact& sample) const {
   if (!sample.touching) return true;
   const bool numbers = sample.material.allFinite() && std::isfinite(sample.power_W) && sample.power_W >= 0 &&
                        sample.power_W <= kPowerMax_W && std::isfinite(sample.contact_radius_m) &&
-                       sample.contact_foot.norm() <= kFootMax_m &&
-                       sample.contact_radius_m >= 0 && sample.mode <= CauteryMode::kBlend;
+                       sample.contact_half.norm() <= kHalfContactMax_m && sample.contact_radius_m >= 0 &&
+                       sample.mode <= CauteryMode::kBlend;
   return numbers && sheet_.OnSheet(sample.material);
 }
 
@@ -31,7 +31,7 @@ TipInput TipTracker::Advance(const CauteryContact* sample, double dt_s) {
   input.path.to = last_.material;
   const float radius = last_.contact_radius_m > 0 ? last_.contact_radius_m : default_radius_m_;
   input.path.radius_m = std::clamp(radius, kContactRadiusMin_m, kContactRadiusMax_m);
-  input.path.foot = last_.contact_foot;
+  input.path.half = last_.contact_half;
   input.path.tented = last_.tented;
   input.mode = last_.mode;
   input.power_W = last_.power_W;

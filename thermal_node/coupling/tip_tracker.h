@@ -10,7 +10,7 @@ namespace fulcrum::thermal {
 inline constexpr double kContactTimeout_s = 0.1;
 inline constexpr float kTipSpeedMax_m_s = 0.3f;  ///< Farther between two samples is a jump, not a cut.
 inline constexpr float kContactRadiusMin_m = 1e-4f, kContactRadiusMax_m = 2e-3f;
-inline constexpr float kFootMax_m = 4e-3f;  ///< A longer line of contact does not fit into the source's window.
+inline constexpr float kHalfContactMax_m = 2e-3f;  ///< A longer line of contact does not fit into the source's window.
 inline constexpr float kPowerMax_W = 400.0f;
 
 /// What the solver needs of one frame.

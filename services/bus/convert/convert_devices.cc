@@ -169,7 +169,7 @@ bool ToWire(const CauteryContact& from, idl::CauteryContact* to) {
   to->barycentric(from.barycentric);
   to->material(cv::ToWire(from.material));
   to->material_rate(cv::ToWire(from.material_rate));
-  to->contact_foot(cv::ToWire(from.contact_foot));
+  to->contact_half(cv::ToWire(from.contact_half));
   to->contact_radius_m(from.contact_radius_m);
   to->power_W(from.power_W);
   return true;
@@ -187,7 +187,7 @@ void FromWire(const idl::CauteryContact& from, CauteryContact* to) {
   to->barycentric = from.barycentric();
   to->material = cv::FromWire(from.material());
   to->material_rate = cv::FromWire(from.material_rate());
-  to->contact_foot = cv::FromWire(from.contact_foot());
+  to->contact_half = cv::FromWire(from.contact_half());
   to->contact_radius_m = from.contact_radius_m();
   to->power_W = from.power_W();
 }

@@ -103,22 +103,22 @@ TEST(CutPropertiesTest, CouplingStepHasConverged) {
   EXPECT_NEAR(joule[0], joule[1], 0.02 * joule[1]);
 }
 
-TEST(CutPropertiesTest, FootWidensTheSlitAcrossTheCutAndNotAlongIt) {
+TEST(CutPropertiesTest, ALineOfMetalWidensTheSlitAcrossTheCutAndNotAlongIt) {
   const scene::SceneData data = FlatScene(31, 51, 1e-3f);
   const SceneView scene = data.View();
   Drag drag = Slanted(0.002f, 0.010f);
   drag.power_W = 60;
   const Vec2f along = (drag.to - drag.from).normalized(), across(-along.y(), along.x());
-  const auto width = [&](const Vec2f& foot) {
+  const auto width = [&](const Vec2f& half) {
     ThermalSolver solver(scene);
-    drag.foot = foot;
+    drag.half = half;
     RunChecked(scene, drag, &solver);
     EXPECT_LE(solver.ledger().ClosureError(solver.field().Stored()), 1e-4);
     return MeasureSlit(solver, scene, drag).width_mean_m;
   };
-  const float tip_only = width(Vec2f::Zero());
-  EXPECT_NEAR(width(0.001f * along), tip_only, 2.5e-4f);
-  EXPECT_NEAR(width(0.001f * across), tip_only + 0.001f, 3e-4f);
+  const float point = width(Vec2f::Zero());
+  EXPECT_NEAR(width(0.0005f * along), point, 2.5e-4f);
+  EXPECT_NEAR(width(0.0005f * across), point + 0.001f, 3e-4f);
 }
 
 TEST(CutPropertiesTest, GoingOverAnOldSlitAddsNoLength) {

@@ -36,7 +36,7 @@ struct Drag {
   CauteryMode mode = CauteryMode::kCut;
   float power_W = 35;
   float radius_m = 5e-4f;
-  Vec2f foot = Vec2f::Zero();
+  Vec2f half = Vec2f::Zero();
   bool tented = false;
 
   [[nodiscard]] int frames(float dt_s) const {
@@ -50,7 +50,7 @@ struct Drag {
     input.path.from = from + a * (to - from);
     input.path.to = from + b * (to - from);
     input.path.radius_m = radius_m;
-    input.path.foot = foot;
+    input.path.half = half;
     input.path.tented = tented;
     input.mode = mode;
     input.power_W = power_W;

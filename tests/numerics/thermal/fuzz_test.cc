@@ -59,7 +59,7 @@ class Fuzz {
     if (OneIn(60)) contact.material.y() = Absurd();
     if (OneIn(60)) contact.power_W = Absurd();
     if (OneIn(60)) contact.contact_radius_m = Absurd();
-    if (OneIn(60)) contact.contact_foot.x() = Absurd();
+    if (OneIn(60)) contact.contact_half.x() = Absurd();
     if (OneIn(60)) contact.mode = static_cast<CauteryMode>(Below(256));
     if (OneIn(60)) contact.material_rate = Vec2f::Constant(Absurd());
     return contact;
@@ -106,7 +106,7 @@ class Patient {
     burn.mode = static_cast<CauteryMode>(1 + fuzz->Below(3));
     burn.power_W = fuzz->OneIn(5) ? 400.0f : fuzz->Between(0, 80);
     burn.contact_radius_m = fuzz->OneIn(5) ? fuzz->Between(0, 5e-3f) : fuzz->Between(2e-4f, 1e-3f);
-    if (fuzz->OneIn(3)) burn.contact_foot = {fuzz->Between(-3e-3f, 3e-3f), fuzz->Between(-3e-3f, 3e-3f)};
+    if (fuzz->OneIn(3)) burn.contact_half = {fuzz->Between(-1.5e-3f, 1.5e-3f), fuzz->Between(-1.5e-3f, 1.5e-3f)};
     burn.tented = fuzz->OneIn(3);
     const float heading = fuzz->Between(-4, 4), speed = std::pow(10.0f, fuzz->Between(-3.5f, -0.5f));
     const Vec2f rate = speed * Vec2f(std::cos(heading), std::sin(heading));

@@ -46,7 +46,7 @@ struct Floats {
   }
   void operator()(CauteryContact& m) const {
     Each(m.session_time_s, m.barycentric[0], m.barycentric[1], m.barycentric[2], m.material, m.material_rate,
-         m.contact_foot, m.contact_radius_m, m.power_W);
+         m.contact_half, m.contact_radius_m, m.power_W);
   }
   void operator()(TopologyState& m) const { (*this)(m.cut_length_m); }
   void operator()(TemperaturePatch& m) const { (*this)(m.header.max_temperature_C); }

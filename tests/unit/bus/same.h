@@ -56,7 +56,7 @@ inline bool Same(const CauteryContact& a, const CauteryContact& b) {
   return Same(a.stamp, b.stamp) && a.session_time_s == b.session_time_s && a.topology_revision == b.topology_revision &&
          a.touching == b.touching && a.tented == b.tented && a.mode == b.mode && a.tool == b.tool &&
          a.triangle == b.triangle && a.barycentric == b.barycentric && a.material == b.material &&
-         a.material_rate == b.material_rate && a.contact_foot == b.contact_foot &&
+         a.material_rate == b.material_rate && a.contact_half == b.contact_half &&
          a.contact_radius_m == b.contact_radius_m && a.power_W == b.power_W;
 }
 

@@ -92,7 +92,7 @@ inline CauteryContact Sample(std::uint64_t sequence) {
   m.barycentric = {0.25f, 0.125f, 0.625f};
   m.material = {0.03f, 0.04f};
   m.material_rate = {-0.01f, 0.02f};
-  m.contact_foot = Vec2f(0.0012f, -0.0007f);
+  m.contact_half = Vec2f(0.0012f, -0.0007f);
   m.contact_radius_m = 0.0005f;
   m.power_W = 35;
   return m;

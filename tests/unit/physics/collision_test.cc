@@ -122,6 +122,36 @@ TEST_F(OnSheet, HookDentsTheMembraneAndStaysInFront) {
   EXPECT_GT(Lowest(), -3e-4f);
 }
 
+TEST_F(OnSheet, CauteryTellsTheLineAlongWhichTheFootTouches) {
+  const Vec3f place = kMiddle - Vec3f(0, 0, 0.002f);
+  const auto half_at = [&](const Quatf& turn) {
+    TissueSimulation simulation(scene_);
+    const ToolPose down = Down(place), pose{place, turn * down.q_WT, 0};
+    CauteryContact contact;
+    Vec2f before = Vec2f::Zero();
+    for (int i = 0; i <= 150; ++i) {
+      ToolPose now = pose;
+      now.p_WT.z() += std::max(0.0f, 0.008f - 1e-4f * static_cast<float>(i));
+      simulation.Step(Only(1, now));
+      contact = simulation.Cautery(1);
+      EXPECT_LE(contact.contact_half.norm(), 0.002f);
+      EXPECT_LE((contact.contact_half - before).norm(), 7e-4f) << "step " << i;
+      before = contact.contact_half;
+    }
+    EXPECT_TRUE(contact.touching);
+    return contact.contact_half;
+  };
+  const auto turned = [](float angle, const Vec3f& axis) { return Quatf(Eigen::AngleAxisf(angle, axis)); };
+  const Vec2f lying = half_at(Quatf::Identity());
+  EXPECT_GT(std::abs(lying.x()), 4e-4f);
+  EXPECT_LT(std::abs(lying.y()), 0.3f * std::abs(lying.x()));
+  const Vec2f across = half_at(turned(static_cast<float>(M_PI / 2), Vec3f::UnitZ()));
+  EXPECT_GT(std::abs(across.y()), 4e-4f);
+  EXPECT_LT(std::abs(across.x()), 0.3f * std::abs(across.y()));
+  // The foot points up: its heel alone touches.
+  EXPECT_LT(half_at(turned(static_cast<float>(-M_PI / 3), Vec3f::UnitY())).norm(), 0.5f * lying.norm());
+}
+
 TEST_F(OnSheet, AThinToolAtFullSpeedDoesNotTunnel) {
   // 1 m/s: 10 mm a step with a foot of 0.6 mm radius and triangles of 2 mm.
   const ToolPose above = Down(kMiddle + Vec3f(0.0007f, 0.0004f, 0.015f));

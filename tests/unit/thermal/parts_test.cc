@@ -125,13 +125,13 @@ TEST_F(TipTest, SamplesOutOfRangeAreNotAccepted) {
   EXPECT_TRUE(tip_.Accepts(lifted));
 }
 
-TEST_F(TipTest, FootGoesWithTheTipAndAnAbsurdOneIsRefused) {
+TEST_F(TipTest, ALineOfMetalGoesWithTheTipAndAnAbsurdOneIsRefused) {
   CauteryContact contact = At(0.010f, 0.010f);
-  contact.contact_foot = {2e-3f, -1e-3f};
+  contact.contact_half = {1.5e-3f, -1e-3f};
   ASSERT_TRUE(tip_.Accepts(contact));
-  EXPECT_EQ(tip_.Advance(&contact, 0.01).path.foot, contact.contact_foot);
-  for (const float bad : {1.01f * kFootMax_m, NAN, INFINITY}) {
-    contact.contact_foot = {bad, 0};
+  EXPECT_EQ(tip_.Advance(&contact, 0.01).path.half, contact.contact_half);
+  for (const float bad : {1.01f * kHalfContactMax_m, NAN, INFINITY}) {
+    contact.contact_half = {bad, 0};
     EXPECT_FALSE(tip_.Accepts(contact)) << bad;
   }
 }
@@ -139,8 +139,8 @@ TEST_F(TipTest, FootGoesWithTheTipAndAnAbsurdOneIsRefused) {
 /// Area under a capsule in units of radius squared, by cells of 1 / `fine` of its radius.
 double CoveredArea(float length, float heading, float fine) {
   constexpr float kNoArc = 1e-6f;
-  const Vec2f tip(0.31f, 0.17f), foot = length * fine * Vec2f(std::cos(heading), std::sin(heading));
-  const Electrode electrode({1, 0, 1}, tip, foot, fine, kNoArc);
+  const Vec2f middle(0.31f, 0.17f), half = 0.5f * length * fine * Vec2f(std::cos(heading), std::sin(heading));
+  const Electrode electrode({1, 0, 1}, middle, half, fine, kNoArc);
   double sum = 0;
   const Vec2f low = electrode.low().array().floor(), high = electrode.high();
   for (float y = low.y() + 0.5f; y <= high.y(); y += 1) {
@@ -162,7 +162,7 @@ TEST(ElectrodeTest, CoverageIsTheAreaOfTheCapsuleAnyWay) {
 TEST(ElectrodeTest, DistanceIsThatOnTheStretchedSheet) {
   // The same capsule in material coordinates that are stretched 2 : 1 and sheared covers what the map leaves of it.
   const SurfaceMetric metric{4.0f, 0.6f, 1.5f};
-  const Electrode electrode(metric, {0, 0}, {8, 3}, 12, 1e-6f);
+  const Electrode electrode(metric, {0, 0}, {4, 1.5f}, 12, 1e-6f);
   const double length = std::sqrt(metric.ss * 64 + 2 * metric.st * 24 + metric.tt * 9);
   double sum = 0;
   for (float y = -60.5f; y < 60; y += 1) {
