@@ -269,8 +269,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
       !reader.GetValue(&window)) {
     return false;
   }
-  // A start value, so any number will do; between 0 and 1 where the last solve converged.
-  if (!AllWithin(window.start, -1e3f, 1e3f) || std::abs(window.corner.ix) > -kNowhere.ix ||
+  if (!AllWithin(window.start, 0.0f, 1.0f) || std::abs(window.corner.ix) > -kNowhere.ix ||
       std::abs(window.corner.iy) > -kNowhere.iy) {
     return false;
   }
