@@ -19,6 +19,7 @@ fulcrum::ExitCode RunRender(fulcrum::app::NodeApp& app) {
   }
   fulcrum::render::RenderSettings settings;
   settings.window = app.options().TakeFlag("--window");
+  settings.quality = fulcrum::render::QualityFromName(app.options().TakeValue("--quality", "auto"));
   settings.frames = app.options().session / "frames";
   fulcrum::render::RenderNode node(app.scene(), settings,
                                    {app.MakeInput<fulcrum::TissueFrame>(), app.MakeInput<fulcrum::TopologyState>(),

@@ -12,6 +12,7 @@ namespace fulcrum::render {
 namespace {
 
 constexpr int kBlock = 32;
+constexpr std::uint8_t kDamaged = 20;  // Below this share of 255 damage cannot be seen.
 // A cut drawn from the topology alone: half width of the slit, then of the charred, the browned and the blanched rim.
 // Typical of an L-hook at 30 W on peritoneum (0.2-0.5 mm lateral damage).
 constexpr float kSlit = 0.00030f;     // [m]
@@ -55,6 +56,7 @@ Atlas::Atlas(const SceneView& scene) : texel_m_(scene.membrane.texel_m) {
   height_ = texels_of(extent.y());
   blocks_x_ = (width_ + kBlock - 1) / kBlock;
   covered_.assign(static_cast<std::size_t>(blocks_x_) * ((height_ + kBlock - 1) / kBlock), 0);
+  touched_ = covered_;
   painted_.assign(scene.membrane.triangle_count(), 0);
   const auto body = static_cast<std::uint8_t>(std::lround((scene.thermal.body_temperature_C - 20.0f) * 2));
   texels_.resize(4u * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
@@ -86,7 +88,35 @@ AtlasRect Atlas::Apply(const TemperaturePatch& patch) {
       covered_[TexelIndex(bx, by, blocks_x_)] = 1;
     }
   }
+  Touch(rect);
   return rect;
+}
+
+void Atlas::Touch(const AtlasRect& rect) {
+  for (int y = rect.y; y < rect.y + rect.height; ++y) {
+    for (int x = rect.x; x < rect.x + rect.width; ++x) {
+      const std::uint8_t* texel = texels_.data() + 4 * TexelIndex(x, y, width_);
+      std::uint8_t& touched = touched_[TexelIndex(x / kBlock, y / kBlock, blocks_x_)];
+      if (touched == 0 && (texel[1] >= kDamaged || texel[3] < 128)) {
+        touched = 1;
+        ++touches_;
+      }
+    }
+  }
+}
+
+bool Atlas::Touched(const Vec2f& material) const {
+  const int bx = static_cast<int>(material.x() / texel_m_) / kBlock,
+            by = static_cast<int>(material.y() / texel_m_) / kBlock;
+  const int blocks_y = (height_ + kBlock - 1) / kBlock;
+  for (int y = std::max(0, by - 1); y <= std::min(blocks_y - 1, by + 1); ++y) {
+    for (int x = std::max(0, bx - 1); x <= std::min(blocks_x_ - 1, bx + 1); ++x) {
+      if (touched_[TexelIndex(x, y, blocks_x_)] != 0) {
+        return true;
+      }
+    }
+  }
+  return false;
 }
 
 bool Atlas::Covered(int x, int y) const { return covered_[TexelIndex(x / kBlock, y / kBlock, blocks_x_)] != 0; }
@@ -147,7 +177,9 @@ AtlasRect Atlas::PaintCapsule(const Vec2f& a, const Vec2f& b) {
       }
     }
   }
-  return {x0, y0, x1 - x0 + 1, y1 - y0 + 1};
+  const AtlasRect rect{x0, y0, x1 - x0 + 1, y1 - y0 + 1};
+  Touch(rect);
+  return rect;
 }
 
 }  // namespace fulcrum::render

@@ -32,6 +32,11 @@ class Atlas {
   /// painted before are skipped. Returns the texels touched.
   AtlasRect PaintCuts(const SceneView& scene, const TopologyState& topology);
 
+  /// Tissue within 3 mm of (s, t) [m] has been damaged or cut.
+  [[nodiscard]] bool Touched(const Vec2f& material) const;
+  /// Counts the times that Touched() has become true somewhere.
+  [[nodiscard]] std::uint64_t touches() const { return touches_; }
+
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] float texel_m() const { return texel_m_; }
@@ -40,6 +45,7 @@ class Atlas {
 
  private:
   [[nodiscard]] bool Covered(int x, int y) const;
+  void Touch(const AtlasRect& rect);
   AtlasRect PaintCapsule(const Vec2f& a, const Vec2f& b);
 
   float texel_m_;
@@ -48,6 +54,8 @@ class Atlas {
   int blocks_x_;
   std::vector<std::uint8_t> texels_;
   std::vector<std::uint8_t> covered_;  // Per block of kBlock x kBlock texels.
+  std::vector<std::uint8_t> touched_;  // Per block.
+  std::uint64_t touches_ = 0;
   std::vector<std::uint8_t> painted_;  // Per membrane triangle: bits of its dead edges that are drawn.
 };
 

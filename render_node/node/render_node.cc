@@ -32,7 +32,8 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       ports_(ports),
       view_(scene),
       display_(OpenDisplay(view_, scene.render, settings.window)),
-      writer_(settings.frames) {
+      writer_(settings.frames),
+      quality_(settings.quality, static_cast<int>(scene.render.height)) {
   WarmUp();
 }
 
@@ -200,9 +201,10 @@ void RenderNode::TakeTools() {
 
 void RenderNode::Draw(double session_time_s, bool write_png) {
   const auto start = std::chrono::steady_clock::now();
+  const bool smoking = view_.UpdateSmoke(session_time_s);
+  view_.SetScale(quality_.scale());
   view_.Update();
   UpdateTexts();
-  const bool smoking = view_.UpdateSmoke(session_time_s);
   if (write_png) {
     display_->DrawAndRead(&picture_);
     if (!writer_.Add(picture_, session_time_s)) {
@@ -217,7 +219,9 @@ void RenderNode::Draw(double session_time_s, bool write_png) {
   changed_on_screen_ = smoking;
   frames_drawn_.fetch_add(1, std::memory_order_relaxed);
   const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
+  quality_.Add(spent.count());
   draw_ms_.store(spent.count(), std::memory_order_relaxed);
+  scale_.store(quality_.scale(), std::memory_order_relaxed);
 }
 
 void RenderNode::Report(const std::string& error) {
@@ -230,6 +234,7 @@ void RenderNode::FillHealth(Health* health) const {
   health->metrics.push_back({"png_written", static_cast<double>(writer_.written())});
   health->metrics.push_back({"png_dropped", static_cast<double>(pictures_dropped_.load(std::memory_order_relaxed))});
   health->metrics.push_back({"draw_ms", draw_ms_.load(std::memory_order_relaxed)});
+  health->metrics.push_back({"scale", scale_.load(std::memory_order_relaxed)});
   health->metrics.push_back({"patches", static_cast<double>(patches_applied_.load(std::memory_order_relaxed))});
   const std::lock_guard lock(error_mutex_);
   health->last_error = error_.empty() ? writer_.last_error() : error_;

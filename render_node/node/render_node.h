@@ -9,6 +9,7 @@
 #include <mutex>
 #include <string>
 
+#include "render_node/geometry/quality.h"
 #include "render_node/offscreen/png_writer.h"
 #include "render_node/scene_graph/display.h"
 #include "render_node/scene_graph/laparoscope_view.h"
@@ -27,8 +28,9 @@ struct RenderPorts {
 };
 
 struct RenderSettings {
-  bool window = false;           ///< A real window instead of drawing into memory.
-  std::filesystem::path frames;  ///< Folder for the pictures.
+  bool window = false;               ///< A real window instead of drawing into memory.
+  Quality quality = Quality::kAuto;  ///< How finely the scene is drawn.
+  std::filesystem::path frames;      ///< Folder for the pictures.
 };
 
 class RenderNode {
@@ -69,6 +71,7 @@ class RenderNode {
   LaparoscopeView view_;
   std::unique_ptr<Display> display_;
   FrameWriter writer_;
+  QualityControl quality_;
 
   TissueFrame tissue_, new_tissue_;
   TopologyState topology_;
@@ -91,6 +94,7 @@ class RenderNode {
   std::atomic<std::uint64_t> pictures_dropped_{0};
   std::atomic<std::uint64_t> patches_applied_{0};
   std::atomic<double> draw_ms_{0};
+  std::atomic<double> scale_{1};
   mutable std::mutex error_mutex_;
   std::string error_;
 };

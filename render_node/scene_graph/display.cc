@@ -9,16 +9,6 @@
 namespace fulcrum::render {
 namespace {
 
-osg::Matrix ToOsg(const Eigen::Matrix4f& m) {
-  osg::Matrix out;
-  for (int row = 0; row < 4; ++row) {
-    for (int col = 0; col < 4; ++col) {
-      out(row, col) = m(col, row);  // OSG multiplies row vectors.
-    }
-  }
-  return out;
-}
-
 void SetUpViewer(const LaparoscopeView& view, osgViewer::Viewer* viewer) {
   viewer->setThreadingModel(osgViewer::ViewerBase::SingleThreaded);
   viewer->setSceneData(view.root());
@@ -27,10 +17,8 @@ void SetUpViewer(const LaparoscopeView& view, osgViewer::Viewer* viewer) {
   osg::Camera* camera = viewer->getCamera();
   camera->setComputeNearFarMode(osg::Camera::DO_NOT_COMPUTE_NEAR_FAR);
   camera->setCullingMode(osg::CullSettings::NO_CULLING);
-  camera->setClearColor(osg::Vec4(0.12f, 0.035f, 0.03f, 1));
+  camera->setClearColor(osg::Vec4(0, 0, 0, 1));
   camera->setProjectionResizePolicy(osg::Camera::FIXED);
-  camera->setViewMatrix(ToOsg(view.laparoscope().view));
-  camera->setProjectionMatrix(ToOsg(view.laparoscope().projection));
 }
 
 void SetUpState(osg::State* state) {

@@ -34,10 +34,14 @@ class LaparoscopeView {
   void SetTexts(std::span<const OverlayText> texts);
   /// A puff of steam where (s, t) [m] of the sheet is drawn now.
   void AddSmoke(const Vec2f& material, double session_time_s);
-  /// Moves the smoke on. True while there is some to see.
+  /// Moves the smoke on. True when that changes the picture.
   bool UpdateSmoke(double session_time_s);
 
+  /// Share of the picture's width and height that the scene is drawn with, in (0, 1]; text always has all of it.
+  void SetScale(float scale);
+
   /// Carries the last SetTissue and SetTopology over to the meshes. Split off so that several changes cost one update.
+  /// Where nothing changed, the next picture shows the last one of the scene again.
   void Update();
 
   [[nodiscard]] osg::Group* root() const;

@@ -5,8 +5,7 @@ in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
 uniform sampler2D atlas;
-uniform sampler2D noise_pattern;
-uniform sampler2D vessel_pattern;
+uniform sampler2D serosa_pattern;
 uniform vec2 atlas_per_metre;
 out vec4 fragment;
 
@@ -14,8 +13,8 @@ void main() {
   vec2 m = coordinate.xy;
   vec4 heat = texture(atlas, m * atlas_per_metre);
   if (coordinate.z < 0.0 || heat.a < 0.5) discard;
-  vec4 noise = texture(noise_pattern, m * 20.0);
-  float vessel = texture(vessel_pattern, m * 15.0).r;
+  vec4 noise = texture(serosa_pattern, m * 16.0);
+  float vessel = noise.a;
   float celsius = 20.0 + 127.5 * heat.r;
   float damage = heat.g;
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);

@@ -27,7 +27,7 @@ class RenderNodeTest : public testing::Test {
 
   std::unique_ptr<RenderNode> MakeNode() {
     return std::make_unique<RenderNode>(
-        view_, RenderSettings{false, folder_},
+        view_, RenderSettings{.frames = folder_},
         RenderPorts{*tissue_in_, *topology_in_, *patches_in_, *tools_in_, *handles_in_, *events_in_});
   }
 
