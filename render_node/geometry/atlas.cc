@@ -88,8 +88,56 @@ AtlasRect Atlas::Apply(const TemperaturePatch& patch) {
       covered_[TexelIndex(bx, by, blocks_x_)] = 1;
     }
   }
+  Compose(rect);
   Touch(rect);
   return rect;
+}
+
+AtlasRect Atlas::Stain(const Vec2f& material, float radius_m, float thickness) {
+  blood_.resize(texels_.size() / 4, 0);
+  const Vec2f low = (material.array() - radius_m).matrix() / texel_m_;
+  const Vec2f high = (material.array() + radius_m).matrix() / texel_m_;
+  const int x0 = std::max(0, static_cast<int>(low.x())), x1 = std::min(width_ - 1, static_cast<int>(high.x()));
+  const int y0 = std::max(0, static_cast<int>(low.y())), y1 = std::min(height_ - 1, static_cast<int>(high.y()));
+  if (x1 < x0 || y1 < y0) {
+    return {};
+  }
+  for (int y = y0; y <= y1; ++y) {
+    for (int x = x0; x <= x1; ++x) {
+      const Vec2f p((static_cast<float>(x) + 0.5f) * texel_m_, (static_cast<float>(y) + 0.5f) * texel_m_);
+      const float r2 = (p - material).squaredNorm() / (radius_m * radius_m);
+      const auto blood = static_cast<std::uint8_t>(127 * thickness * std::max(0.0f, 1 - r2 * r2));
+      std::uint8_t& here = blood_[TexelIndex(x, y, width_)];
+      here = std::max(here, blood);
+    }
+  }
+  const AtlasRect rect{x0, y0, x1 - x0 + 1, y1 - y0 + 1};
+  Compose(rect);
+  return rect;
+}
+
+void Atlas::Compose(const AtlasRect& rect) {
+  if (blood_.empty()) {
+    return;
+  }
+  for (int y = rect.y; y < rect.y + rect.height; ++y) {
+    for (int x = rect.x; x < rect.x + rect.width; ++x) {
+      const std::size_t index = TexelIndex(x, y, width_);
+      std::uint8_t& alive = texels_[4 * index + 3];
+      alive = static_cast<std::uint8_t>(alive >= 128 ? 255 - blood_[index] : blood_[index]);
+    }
+  }
+}
+
+std::optional<std::array<std::uint8_t, 4>> Atlas::At(const Vec2f& material) const {
+  const int x = static_cast<int>(std::floor(material.x() / texel_m_));
+  const int y = static_cast<int>(std::floor(material.y() / texel_m_));
+  if (x < 0 || y < 0 || x >= width_ || y >= height_) {
+    return std::nullopt;
+  }
+  std::array<std::uint8_t, 4> texel;
+  std::copy_n(texels_.begin() + static_cast<std::ptrdiff_t>(4 * TexelIndex(x, y, width_)), 4, texel.begin());
+  return texel;
 }
 
 void Atlas::Touch(const AtlasRect& rect) {
@@ -173,11 +221,12 @@ AtlasRect Atlas::PaintCapsule(const Vec2f& a, const Vec2f& b) {
       raise(texel + 1, 255 * Ramp(d, kBrown, kBlanched));
       raise(texel + 2, 128 * Ramp(d, kChar, kBrown) + 127 * Ramp(d, kSlit, kChar));
       if (d < kSlit) {
-        texel[3] = 0;
+        texel[3] = 0;  // Compose adds the blood.
       }
     }
   }
   const AtlasRect rect{x0, y0, x1 - x0 + 1, y1 - y0 + 1};
+  Compose(rect);
   Touch(rect);
   return rect;
 }

@@ -1,7 +1,9 @@
 #include "render_node/scene_graph/display.h"
 
 #include <osg/GLExtensions>
+#include <osgGA/GUIEventHandler>
 #include <osgViewer/Viewer>
+#include <utility>
 
 #include "render_node/offscreen/egl_context.h"
 #include "services/core/error.h"
@@ -64,6 +66,7 @@ class OffscreenDisplay : public Display {
     context_.Release();
   }
 
+  [[nodiscard]] std::vector<int> TakeKeys() override { return {}; }
   [[nodiscard]] bool closed() const override { return false; }
   [[nodiscard]] std::string description() const override { return context_.description(); }
 
@@ -87,6 +90,17 @@ class ReadAfterDraw : public osg::Camera::DrawCallback {
  private:
   int width_;
   int height_;
+};
+
+class Keyboard : public osgGA::GUIEventHandler {
+ public:
+  bool handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAdapter&) override {
+    if (event.getEventType() == osgGA::GUIEventAdapter::KEYDOWN) {
+      pressed.push_back(event.getKey());
+    }
+    return false;
+  }
+  std::vector<int> pressed;
 };
 
 class WindowDisplay : public Display {
@@ -119,6 +133,7 @@ class WindowDisplay : public Display {
     viewer_.getCamera()->setViewport(0, 0, traits->width, traits->height);
     viewer_.getCamera()->setFinalDrawCallback(read_);
     SetUpViewer(view, &viewer_);
+    viewer_.addEventHandler(keys_);
     viewer_.realize();
     if (!viewer_.isRealized()) {
       throw InputError("--window: the display refuses an OpenGL window");
@@ -135,11 +150,18 @@ class WindowDisplay : public Display {
     read_->picture = nullptr;
   }
 
+  [[nodiscard]] std::vector<int> TakeKeys() override {
+    viewer_.advance();
+    viewer_.eventTraversal();
+    return std::exchange(keys_->pressed, {});
+  }
+
   [[nodiscard]] bool closed() const override { return viewer_.done(); }
   [[nodiscard]] std::string description() const override { return "window"; }
 
  private:
   osg::ref_ptr<ReadAfterDraw> read_;
+  osg::ref_ptr<Keyboard> keys_ = new Keyboard;
   osg::ref_ptr<osg::GraphicsContext> context_;
   osgViewer::Viewer viewer_;
 };

@@ -6,6 +6,7 @@
 #include <osg/Geode>
 
 #include "render_node/geometry/atlas.h"
+#include "render_node/geometry/bleeding.h"
 #include "render_node/geometry/texel.h"
 #include "render_node/geometry/tissue_pattern.h"
 #include "render_node/scene_graph/atlas_texture.h"
@@ -22,7 +23,8 @@ namespace {
 
 constexpr int kNoiseTexels = 256;
 constexpr int kSerosaTexels = 512;
-constexpr float kFatCover = 0.48f;  // fat.frag begins at 0.51.
+constexpr float kSerosaPerMetre = 16;  // As in membrane.frag.
+constexpr float kFatCover = 0.48f;     // fat.frag begins at 0.51.
 
 }  // namespace
 
@@ -35,6 +37,7 @@ struct LaparoscopeView::Impl {
   explicit Impl(const SceneView& view);
   void BindTextures();
   void ShowFat();
+  void ShineFrom(const Laparoscope& from);
 
   SceneView scene;
   Laparoscope scope;
@@ -44,6 +47,8 @@ struct LaparoscopeView::Impl {
   Surroundings surroundings;
   Instruments instruments;
   Smoke smoke;
+  std::vector<std::uint8_t> serosa = MakeSerosaPattern(kSerosaTexels);
+  Bleeding bleeding;
   Overlay overlay;
   osg::ref_ptr<osg::Group> scene_root = new osg::Group;
   Optics optics;
@@ -52,6 +57,8 @@ struct LaparoscopeView::Impl {
   StructureMap structures;
   Vec2f size = Vec2f::Ones();                     // Of the atlas [m].
   std::uint64_t fat_touches = ~std::uint64_t{0};  // Of the atlas when the fat was last chosen.
+  osg::ref_ptr<osg::Uniform> wall_direction = new osg::Uniform("wall_direction", osg::Vec3());
+  osg::ref_ptr<osg::Uniform> light_power = new osg::Uniform("light_power", 1.0f);
   Vec3f breath = Vec3f::Zero();
 };
 
@@ -63,6 +70,7 @@ LaparoscopeView::Impl::Impl(const SceneView& view)
       layers(view, scope),
       surroundings(view, scope),
       instruments(view),
+      bleeding(view, serosa, kSerosaTexels, kSerosaPerMetre),
       overlay(static_cast<int>(view.render.width), static_cast<int>(view.render.height)),
       optics(scope, static_cast<int>(view.render.width), static_cast<int>(view.render.height), surroundings.fixed(),
              scene_root) {
@@ -99,8 +107,7 @@ void LaparoscopeView::Impl::BindTextures() {
   noise = MakeNoisePattern(kNoiseTexels);
   structures = map;
   bind(kNoiseUnit, "noise_pattern", MakeTexture(kNoiseTexels, kNoiseTexels, 4, noise, true));
-  bind(kSerosaUnit, "serosa_pattern",
-       MakeTexture(kSerosaTexels, kSerosaTexels, 4, MakeSerosaPattern(kSerosaTexels), true));
+  bind(kSerosaUnit, "serosa_pattern", MakeTexture(kSerosaTexels, kSerosaTexels, 4, serosa, true));
   bind(kStructureUnit, "structures", MakeTexture(map.width, map.height, 2, map.texels, false));
   const auto vec3 = [](const Vec3f& v) { return osg::Vec3(v.x(), v.y(), v.z()); };
   state->addUniform(new osg::Uniform("behind", 0.0f));
@@ -108,9 +115,15 @@ void LaparoscopeView::Impl::BindTextures() {
   state->addUniform(new osg::Uniform("atlas_per_metre", osg::Vec2(1 / size.x(), 1 / size.y())));
   state->addUniform(new osg::Uniform("light_position", vec3(scope.light_position)));
   state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
-  state->addUniform(new osg::Uniform("wall_direction", vec3(scope.wall_direction)));
-  state->addUniform(new osg::Uniform("light_power", scope.light_power));
+  state->addUniform(wall_direction);
+  state->addUniform(light_power);
+  ShineFrom(scope);
   state->setMode(GL_LIGHTING, osg::StateAttribute::OFF);
+}
+
+void LaparoscopeView::Impl::ShineFrom(const Laparoscope& from) {
+  wall_direction->set(osg::Vec3(from.wall_direction.x(), from.wall_direction.y(), from.wall_direction.z()));
+  light_power->set(from.light_power);
 }
 
 // What of the fat can be seen: the condition of fat.frag, a little wider, or where it has been bared.
@@ -177,6 +190,17 @@ void LaparoscopeView::SetJaw(int tool, float angle_rad) {
   impl_->optics.SceneChanged();
 }
 
+void LaparoscopeView::SetCamera(const RenderParams& params) {
+  RenderParams wanted = impl_->scene.render;
+  wanted.scope_tip_W = params.scope_tip_W;
+  wanted.scope_target_W = params.scope_target_W;
+  wanted.roll_deg = params.roll_deg;
+  impl_->scope = MakeLaparoscope(wanted);
+  impl_->layers.SetScope(impl_->scope);
+  impl_->optics.SetScope(impl_->scope);
+  impl_->ShineFrom(impl_->scope);
+}
+
 void LaparoscopeView::SetScale(float scale) { impl_->optics.SetScale(scale); }
 
 void LaparoscopeView::Update() {
@@ -192,12 +216,19 @@ void LaparoscopeView::AddSmoke(const Vec2f& material, double session_time_s) {
   impl_->smoke.Add(OnMembrane(material), session_time_s);
 }
 
-bool LaparoscopeView::UpdateSmoke(double session_time_s) {
+void LaparoscopeView::OpenVessels(const Vec2f& material, double session_time_s) {
+  impl_->bleeding.Cut(material, impl_->atlas, session_time_s);
+}
+
+bool LaparoscopeView::UpdateEffects(double session_time_s) {
   const bool smoking = impl_->smoke.Update(session_time_s);
-  if (smoking) {
+  const AtlasRect stained = impl_->bleeding.Update(session_time_s, impl_->layers.membrane(), &impl_->atlas);
+  impl_->atlas_texture.Update(stained);
+  const bool changed = smoking || !stained.empty();
+  if (changed) {
     impl_->optics.SceneChanged();
   }
-  return smoking;
+  return changed || impl_->bleeding.sources() > 0 || impl_->bleeding.drops() > 0;
 }
 
 osg::Group* LaparoscopeView::root() const { return impl_->root; }

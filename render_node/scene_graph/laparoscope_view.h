@@ -34,9 +34,13 @@ class LaparoscopeView {
   void SetTexts(std::span<const OverlayText> texts);
   /// A puff of steam where (s, t) [m] of the sheet is drawn now.
   void AddSmoke(const Vec2f& material, double session_time_s);
-  /// Moves the smoke on. True when that changes the picture.
-  bool UpdateSmoke(double session_time_s);
+  /// A cut at (s, t) [m]: the vessels that it opens bleed until heat closes them.
+  void OpenVessels(const Vec2f& material, double session_time_s);
+  /// Moves smoke and blood on. True when the picture changes by that, or is going to.
+  bool UpdateEffects(double session_time_s);
 
+  /// Looks from and to where `params` says; size and field of view stay.
+  void SetCamera(const RenderParams& params);
   /// Share of the picture's width and height that the scene is drawn with, in (0, 1]; text always has all of it.
   void SetScale(float scale);
 

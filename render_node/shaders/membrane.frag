@@ -43,6 +43,11 @@ void main() {
   alpha = mix(alpha, 0.97, brown);
   albedo = mix(albedo, vec3(0.035, 0.022, 0.015), smoothstep(0.05, 0.6, burnt));
 
+  // Blood lies on top: the low bits of the fourth channel (geometry/atlas.h).
+  float blood = smoothstep(0.12, 0.7, 2.0 - 2.0 * heat.a);
+  albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);
+  alpha = mix(alpha, 0.96, blood);
+
   float wet = 1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale));
   // What glitters is not see-through.
   float gloss;

@@ -163,7 +163,7 @@ class NodeRun {
   explicit NodeRun(const SceneView& view)
       : folder_(std::filesystem::temp_directory_path() / ("fulcrum_bench_render_" + std::to_string(getpid()))),
         node_(view, RenderSettings{.frames = folder_},
-              {*tissue_in_, *topology_in_, *patches_in_, *tools_in_, *handles_in_, *events_in_}) {}
+              {*tissue_in_, *topology_in_, *patches_in_, *tools_in_, *handles_in_, *events_in_, *contacts_in_}) {}
   ~NodeRun() { std::filesystem::remove_all(folder_); }
 
   void Publish(SyntheticMoment* moment) {
@@ -184,12 +184,14 @@ class NodeRun {
   bus::InProcessTopic<ToolState> tools_;
   bus::InProcessTopic<HandleState> handles_;
   bus::InProcessTopic<ThermalEvent> events_;
+  bus::InProcessTopic<CauteryContact> contacts_;
   std::unique_ptr<bus::Input<TissueFrame>> tissue_in_ = tissue_.MakeInput();
   std::unique_ptr<bus::Input<TopologyState>> topology_in_ = topology_.MakeInput();
   std::unique_ptr<bus::Input<TemperaturePatch>> patches_in_ = patches_.MakeInput();
   std::unique_ptr<bus::Input<ToolState>> tools_in_ = tools_.MakeInput();
   std::unique_ptr<bus::Input<HandleState>> handles_in_ = handles_.MakeInput();
   std::unique_ptr<bus::Input<ThermalEvent>> events_in_ = events_.MakeInput();
+  std::unique_ptr<bus::Input<CauteryContact>> contacts_in_ = contacts_.MakeInput();
   std::unique_ptr<bus::LoanOutput<TissueFrame>> tissue_out_ = tissue_.MakeOutput();
   std::unique_ptr<bus::Output<TopologyState>> topology_out_ = topology_.MakeOutput();
   std::unique_ptr<bus::Output<ToolState>> tools_out_ = tools_.MakeOutput();
