@@ -117,6 +117,9 @@ void LaparoscopeView::Impl::BindTextures() {
   state->addUniform(new osg::Uniform("light_axis", vec3(scope.light_axis)));
   state->addUniform(wall_direction);
   state->addUniform(light_power);
+  // Patches of the paper's model carry no damage.
+  const bool by_temperature = scene.thermal.model == ThermalModel::kPaper;
+  state->addUniform(new osg::Uniform("colour_by_temperature", by_temperature ? 1.0f : 0.0f));
   ShineFrom(scope);
   state->setMode(GL_LIGHTING, osg::StateAttribute::OFF);
 }

@@ -7,6 +7,7 @@ in vec4 coordinate;
 uniform sampler2D atlas;
 uniform sampler2D serosa_pattern;
 uniform vec2 atlas_per_metre;
+uniform float colour_by_temperature; // 1: the paper's eq. 15, from the temperature of the moment.
 out vec4 fragment;
 
 void main() {
@@ -43,6 +44,9 @@ void main() {
   alpha = mix(alpha, 0.97, brown);
   albedo = mix(albedo, vec3(0.035, 0.022, 0.015), smoothstep(0.05, 0.6, burnt));
 
+  float hot = colour_by_temperature * clamp((celsius - 45.0) / 55.0, 0.0, 1.0);
+  albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
+  alpha = mix(alpha, 0.95, hot);
   // Blood lies on top: the low bits of the fourth channel (geometry/atlas.h).
   float blood = smoothstep(0.12, 0.7, 2.0 - 2.0 * heat.a);
   albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);
