@@ -16,6 +16,7 @@ namespace {
 constexpr float kSamePlace = 2e-5f;   // [m]
 constexpr float kSameAngle = 0.002f;  // [rad]
 constexpr float kSameForce = 0.05f;   // [N]: half of what the bar's figure shows.
+constexpr float kBoils_C = 90;        // Somewhere in the patch.
 constexpr double kTextLife_s = 4.0;   // A temperature or a warning is shown for so long.
 constexpr double kLate_s = 0.3;       // What comes a hundred times a second is missed by then.
 
@@ -189,8 +190,16 @@ void RenderNode::FindLate() {
 }
 
 void RenderNode::TakeContact() {
-  if (ports_.contacts.TakeLatest(&contact_) && contact_.power_W != hud_.power_W) {
+  if (!ports_.contacts.TakeLatest(&contact_)) {
+    return;
+  }
+  if (contact_.power_W != hud_.power_W) {
     hud_.power_W = contact_.power_W;
+    changed_on_screen_ = changed_in_file_ = true;
+  }
+  // Events tell of the first steam at a place; as long as power goes into tissue that boils, there is more.
+  if (contact_.touching && contact_.power_W > 0 && temperature_C_ > kBoils_C && Recent(temperature_time_s_)) {
+    view_.AddSmoke(contact_.material, session_time_s_);
     changed_on_screen_ = changed_in_file_ = true;
   }
 }

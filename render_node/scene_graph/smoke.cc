@@ -10,12 +10,12 @@ namespace fulcrum::render {
 namespace {
 
 constexpr double kLeastInterval_s = 0.08;
-constexpr double kLife_s = 1.6;
+constexpr double kLife_s = 2.2;
 constexpr float kRise_m_s = 0.016f;
 constexpr float kDrift_m_s = 0.005f;
 constexpr float kFirstRadius_m = 0.0015f;
-constexpr float kGrowth_m_s = 0.0055f;
-constexpr float kOpacity = 0.30f;
+constexpr float kGrowth_m_s = 0.0060f;
+constexpr float kOpacity = 0.50f;
 
 }  // namespace
 

@@ -24,7 +24,7 @@ class Smoke {
     double born_s = -1e9;
     float drift = 0;  // Direction of its sideways drift [rad].
   };
-  std::array<Puff, 24> puffs_;
+  std::array<Puff, 28> puffs_;
   std::size_t next_ = 0;
   bool shown_ = true;
   double last_birth_s_ = -1e9;
