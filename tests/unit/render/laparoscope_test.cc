@@ -97,7 +97,8 @@ float SignedVolume(const Solid& solid) {
 
 TEST(SolidTest, FacesLookOutwardAndNormalsAgree) {
   const ToolShape shape{0.0025f, 0.33f, 0.0015f, 0.018f};
-  for (const Solid& solid : {GrasperShaft(shape), GrasperJaw(shape), Hook({0.0025f, 0.33f, 0.0006f, 0.005f})}) {
+  for (const Solid& solid :
+       {GrasperShaft(shape), GrasperJaw(shape), ScissorBlade(shape), Hook({0.0025f, 0.33f, 0.0006f, 0.005f})}) {
     EXPECT_GT(SignedVolume(solid), 0);
     for (const Triangle& t : solid.triangles) {
       const Vec3f area =
