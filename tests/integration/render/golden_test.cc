@@ -9,6 +9,7 @@
 #include <osg/Geode>
 #include <osg/NodeVisitor>
 
+#include "render_node/geometry/texel.h"
 #include "render_node/node/hud.h"
 #include "render_node/offscreen/png_writer.h"
 #include "render_node/scene_graph/display.h"
@@ -29,10 +30,10 @@ Picture Reduced(const Picture& full) {
   Picture half{full.width / 2, full.height / 2, {}};
   for (int y = 0; y < half.height; ++y) {
     for (int x = 0; x < half.width; ++x) {
-      for (int channel = 0; channel < 3; ++channel) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
         int sum = 2;
         for (const auto& [dx, dy] : {std::pair{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {
-          sum += full.rgb[static_cast<std::size_t>(3 * ((2 * y + dy) * full.width + 2 * x + dx) + channel)];
+          sum += full.rgb[3 * TexelIndex(2 * x + dx, 2 * y + dy, full.width) + channel];
         }
         half.rgb.push_back(static_cast<std::uint8_t>(sum / 4));
       }
@@ -55,10 +56,10 @@ Difference Compare(const Picture& a, const Picture& b) {
   for (int y = 0; y + kBlock <= a.height; y += kBlock) {
     for (int x = 0; x + kBlock <= a.width; x += kBlock) {
       double worst = 0;
-      for (int channel = 0; channel < 3; ++channel) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
         int sum = 0;
         for (int k = 0; k < kBlock * kBlock; ++k) {
-          const auto i = static_cast<std::size_t>(3 * ((y + k / kBlock) * a.width + x + k % kBlock) + channel);
+          const std::size_t i = 3 * TexelIndex(x + k % kBlock, y + k / kBlock, a.width) + channel;
           sum += int{a.rgb[i]} - int{b.rgb[i]};
         }
         worst = std::max(worst, std::abs(sum) / static_cast<double>(kBlock * kBlock));
