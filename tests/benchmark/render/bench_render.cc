@@ -162,9 +162,15 @@ class NodeRun {
  public:
   explicit NodeRun(const SceneView& view)
       : folder_(std::filesystem::temp_directory_path() / ("fulcrum_bench_render_" + std::to_string(getpid()))),
-        node_(view, RenderSettings{.frames = folder_},
-              {*tissue_in_, *topology_in_, *patches_in_, *tools_in_, *handles_in_, *events_in_, *contacts_in_}) {}
-  ~NodeRun() { std::filesystem::remove_all(folder_); }
+        node_(std::make_unique<RenderNode>(view, RenderSettings{.frames = folder_},
+                                           RenderPorts{*tissue_in_, *topology_in_, *patches_in_, *tools_in_,
+                                                       *handles_in_, *events_in_, *contacts_in_})) {}
+  ~NodeRun() {
+    node_.reset();  // It writes until its end.
+    std::filesystem::remove_all(folder_);
+  }
+  NodeRun(const NodeRun&) = delete;
+  NodeRun& operator=(const NodeRun&) = delete;
 
   void Publish(SyntheticMoment* moment) {
     ++sequence_;
@@ -174,7 +180,7 @@ class NodeRun {
     tools_out_->Write(moment->tools);
     topology_out_->Write(moment->topology);
   }
-  void Step(double time_s) { node_.Step({static_cast<std::uint64_t>(1e3 * time_s), time_s, 1.0 / 30, 0}); }
+  void Step(double time_s) { node_->Step({static_cast<std::uint64_t>(1e3 * time_s), time_s, 1.0 / 30, 0}); }
 
  private:
   std::filesystem::path folder_;
@@ -196,7 +202,7 @@ class NodeRun {
   std::unique_ptr<bus::Output<TopologyState>> topology_out_ = topology_.MakeOutput();
   std::unique_ptr<bus::Output<ToolState>> tools_out_ = tools_.MakeOutput();
   std::uint64_t sequence_ = 0;
-  RenderNode node_;
+  std::unique_ptr<RenderNode> node_;
 };
 
 /// Every frame comes in and says what the last one said: 30 steps a second, tissue at 100 Hz.
