@@ -19,11 +19,13 @@ fulcrum::ExitCode RunRender(fulcrum::app::NodeApp& app) {
   }
   fulcrum::render::RenderSettings settings;
   settings.window = app.options().TakeFlag("--window");
+  settings.quality = fulcrum::render::QualityFromName(app.options().TakeValue("--quality", "auto"));
   settings.frames = app.options().session / "frames";
   fulcrum::render::RenderNode node(app.scene(), settings,
                                    {app.MakeInput<fulcrum::TissueFrame>(), app.MakeInput<fulcrum::TopologyState>(),
                                     app.MakeInput<fulcrum::TemperaturePatch>(), app.MakeInput<fulcrum::ToolState>(),
-                                    app.MakeInput<fulcrum::HandleState>(), app.MakeInput<fulcrum::ThermalEvent>()});
+                                    app.MakeInput<fulcrum::HandleState>(), app.MakeInput<fulcrum::ThermalEvent>(),
+                                    app.MakeInput<fulcrum::CauteryContact>()});
   fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, node.display_description());
 
   // The scene says how many pictures it wants, the cart how many the machine can give: the slower of the two.

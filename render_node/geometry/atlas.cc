@@ -12,6 +12,7 @@ namespace fulcrum::render {
 namespace {
 
 constexpr int kBlock = 32;
+constexpr std::uint8_t kDamaged = 20;  // Below this share of 255 damage cannot be seen.
 // A cut drawn from the topology alone: half width of the slit, then of the charred, the browned and the blanched rim.
 // Typical of an L-hook at 30 W on peritoneum (0.2-0.5 mm lateral damage).
 constexpr float kSlit = 0.00030f;     // [m]
@@ -55,6 +56,7 @@ Atlas::Atlas(const SceneView& scene) : texel_m_(scene.membrane.texel_m) {
   height_ = texels_of(extent.y());
   blocks_x_ = (width_ + kBlock - 1) / kBlock;
   covered_.assign(static_cast<std::size_t>(blocks_x_) * ((height_ + kBlock - 1) / kBlock), 0);
+  touched_ = covered_;
   painted_.assign(scene.membrane.triangle_count(), 0);
   const auto body = static_cast<std::uint8_t>(std::lround((scene.thermal.body_temperature_C - 20.0f) * 2));
   texels_.resize(4u * static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
@@ -86,7 +88,83 @@ AtlasRect Atlas::Apply(const TemperaturePatch& patch) {
       covered_[TexelIndex(bx, by, blocks_x_)] = 1;
     }
   }
+  Compose(rect);
+  Touch(rect);
   return rect;
+}
+
+AtlasRect Atlas::Stain(const Vec2f& material, float radius_m, float thickness) {
+  blood_.resize(texels_.size() / 4, 0);
+  const Vec2f low = (material.array() - radius_m).matrix() / texel_m_;
+  const Vec2f high = (material.array() + radius_m).matrix() / texel_m_;
+  const int x0 = std::max(0, static_cast<int>(low.x())), x1 = std::min(width_ - 1, static_cast<int>(high.x()));
+  const int y0 = std::max(0, static_cast<int>(low.y())), y1 = std::min(height_ - 1, static_cast<int>(high.y()));
+  if (x1 < x0 || y1 < y0) {
+    return {};
+  }
+  for (int y = y0; y <= y1; ++y) {
+    for (int x = x0; x <= x1; ++x) {
+      const Vec2f p((static_cast<float>(x) + 0.5f) * texel_m_, (static_cast<float>(y) + 0.5f) * texel_m_);
+      const float r2 = (p - material).squaredNorm() / (radius_m * radius_m);
+      const auto blood = static_cast<std::uint8_t>(127 * thickness * std::max(0.0f, 1 - r2 * r2));
+      std::uint8_t& here = blood_[TexelIndex(x, y, width_)];
+      here = std::max(here, blood);
+    }
+  }
+  const AtlasRect rect{x0, y0, x1 - x0 + 1, y1 - y0 + 1};
+  Compose(rect);
+  return rect;
+}
+
+void Atlas::Compose(const AtlasRect& rect) {
+  if (blood_.empty()) {
+    return;
+  }
+  for (int y = rect.y; y < rect.y + rect.height; ++y) {
+    for (int x = rect.x; x < rect.x + rect.width; ++x) {
+      const std::size_t index = TexelIndex(x, y, width_);
+      std::uint8_t& alive = texels_[4 * index + 3];
+      alive = static_cast<std::uint8_t>(alive >= 128 ? 255 - blood_[index] : blood_[index]);
+    }
+  }
+}
+
+std::optional<std::array<std::uint8_t, 4>> Atlas::At(const Vec2f& material) const {
+  const int x = static_cast<int>(std::floor(material.x() / texel_m_));
+  const int y = static_cast<int>(std::floor(material.y() / texel_m_));
+  if (x < 0 || y < 0 || x >= width_ || y >= height_) {
+    return std::nullopt;
+  }
+  std::array<std::uint8_t, 4> texel;
+  std::copy_n(texels_.begin() + static_cast<std::ptrdiff_t>(4 * TexelIndex(x, y, width_)), 4, texel.begin());
+  return texel;
+}
+
+void Atlas::Touch(const AtlasRect& rect) {
+  for (int y = rect.y; y < rect.y + rect.height; ++y) {
+    for (int x = rect.x; x < rect.x + rect.width; ++x) {
+      const std::uint8_t* texel = texels_.data() + 4 * TexelIndex(x, y, width_);
+      std::uint8_t& touched = touched_[TexelIndex(x / kBlock, y / kBlock, blocks_x_)];
+      if (touched == 0 && (texel[1] >= kDamaged || texel[3] < 128)) {
+        touched = 1;
+        ++touches_;
+      }
+    }
+  }
+}
+
+bool Atlas::Touched(const Vec2f& material) const {
+  const int bx = static_cast<int>(material.x() / texel_m_) / kBlock,
+            by = static_cast<int>(material.y() / texel_m_) / kBlock;
+  const int blocks_y = (height_ + kBlock - 1) / kBlock;
+  for (int y = std::max(0, by - 1); y <= std::min(blocks_y - 1, by + 1); ++y) {
+    for (int x = std::max(0, bx - 1); x <= std::min(blocks_x_ - 1, bx + 1); ++x) {
+      if (touched_[TexelIndex(x, y, blocks_x_)] != 0) {
+        return true;
+      }
+    }
+  }
+  return false;
 }
 
 bool Atlas::Covered(int x, int y) const { return covered_[TexelIndex(x / kBlock, y / kBlock, blocks_x_)] != 0; }
@@ -143,11 +221,14 @@ AtlasRect Atlas::PaintCapsule(const Vec2f& a, const Vec2f& b) {
       raise(texel + 1, 255 * Ramp(d, kBrown, kBlanched));
       raise(texel + 2, 128 * Ramp(d, kChar, kBrown) + 127 * Ramp(d, kSlit, kChar));
       if (d < kSlit) {
-        texel[3] = 0;
+        texel[3] = 0;  // Compose adds the blood.
       }
     }
   }
-  return {x0, y0, x1 - x0 + 1, y1 - y0 + 1};
+  const AtlasRect rect{x0, y0, x1 - x0 + 1, y1 - y0 + 1};
+  Compose(rect);
+  Touch(rect);
+  return rect;
 }
 
 }  // namespace fulcrum::render

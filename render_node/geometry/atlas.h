@@ -2,7 +2,9 @@
 // the part that the sheet uses is kept, of the 4096 x 4096 that a patch's origin can address. Pure.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -32,6 +34,19 @@ class Atlas {
   /// painted before are skipped. Returns the texels touched.
   AtlasRect PaintCuts(const SceneView& scene, const TopologyState& topology);
 
+  /// Blood over the disc of `radius_m` round (s, t) [m], `thickness` 0 … 1 in its middle; where there is more already
+  /// it stays. It is kept beneath the patches in the low seven bits of the fourth byte: 255 - blood of living texels,
+  /// blood of those that are gone. Returns the texels touched.
+  AtlasRect Stain(const Vec2f& material, float radius_m, float thickness);
+
+  /// The texel at (s, t) [m]; nothing outside the sheet.
+  [[nodiscard]] std::optional<std::array<std::uint8_t, 4>> At(const Vec2f& material) const;
+
+  /// Tissue within 3 mm of (s, t) [m] has been damaged or cut.
+  [[nodiscard]] bool Touched(const Vec2f& material) const;
+  /// Counts the times that Touched() has become true somewhere.
+  [[nodiscard]] std::uint64_t touches() const { return touches_; }
+
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] float texel_m() const { return texel_m_; }
@@ -40,6 +55,8 @@ class Atlas {
 
  private:
   [[nodiscard]] bool Covered(int x, int y) const;
+  void Compose(const AtlasRect& rect);
+  void Touch(const AtlasRect& rect);
   AtlasRect PaintCapsule(const Vec2f& a, const Vec2f& b);
 
   float texel_m_;
@@ -48,6 +65,9 @@ class Atlas {
   int blocks_x_;
   std::vector<std::uint8_t> texels_;
   std::vector<std::uint8_t> covered_;  // Per block of kBlock x kBlock texels.
+  std::vector<std::uint8_t> blood_;    // Per texel, 0 … 127; empty before the first drop.
+  std::vector<std::uint8_t> touched_;  // Per block.
+  std::uint64_t touches_ = 0;
   std::vector<std::uint8_t> painted_;  // Per membrane triangle: bits of its dead edges that are drawn.
 };
 

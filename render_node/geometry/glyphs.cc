@@ -8,7 +8,7 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr std::string_view kCharacters = " 0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ.:-/%!";
+constexpr std::string_view kCharacters = " 0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZ.:-/%!#+,";
 
 // Seven rows from the top, five dots each, the leftmost dot in bit 4.
 constexpr std::array<std::array<std::uint8_t, 7>, kCharacters.size()> kRows{{
@@ -54,6 +54,9 @@ constexpr std::array<std::array<std::uint8_t, 7>, kCharacters.size()> kRows{{
     {0, 1, 2, 4, 8, 16, 0},                                      // /
     {24, 25, 2, 4, 8, 19, 3},                                    // %
     {4, 4, 4, 4, 4, 0, 4},                                       // !
+    {31, 31, 31, 31, 31, 31, 31},                                // #
+    {0, 4, 4, 31, 4, 4, 0},                                      // +
+    {0, 0, 0, 0, 12, 4, 8},                                      // ,
 }};
 
 }  // namespace

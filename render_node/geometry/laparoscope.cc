@@ -25,7 +25,8 @@ Laparoscope MakeLaparoscope(const RenderParams& params) {
   const Vec3f back = -sight.normalized();
   // Looking nearly straight down, "up" in the picture is cranial (+y).
   const Vec3f up_hint = std::abs(back.z()) > 0.9f ? Vec3f::UnitY() : Vec3f::UnitZ();
-  const Vec3f right = up_hint.cross(back).normalized();
+  // The picture turns clockwise when the camera turns the other way.
+  const Vec3f right = Eigen::AngleAxisf(Radians(params.roll_deg), back) * up_hint.cross(back).normalized();
   const Vec3f up = back.cross(right);
   scope.view.setIdentity();
   scope.view.block<1, 3>(0, 0) = right.transpose();

@@ -1,5 +1,6 @@
 #include "render_node/geometry/membrane_mesh.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -109,26 +110,21 @@ void MembraneMesh::BuildTriangles() {
   triangles_.clear();
   parts_.clear();
   FindGone();
-  for (std::uint32_t row = 0; row + 1 < rows_; ++row) {
-    for (std::uint32_t col = 0; col + 1 < cols_; ++col) {
-      for (int half = 0; half < 2; ++half) {
-        const MembraneTriangle t = MembraneTriangleAt(cols_, row, col, half);
-        std::array<bool, 3> alive;
-        int dead = 0;
-        for (int k = 0; k < 3; ++k) {
-          const Index a = t.nodes[k], b = t.nodes[(k + 1) % 3];
-          alive[k] = !edge_dead(t.edges[k]) && !node_gone(a) && !node_gone(b);
-          dead += alive[k] ? 0 : 1;
-        }
-        // One dead edge leaves the corners joined: the slit ends inside, and the atlas shows how far it goes.
-        if (dead < 2) {
-          triangles_.push_back(t.nodes);
-        } else {
-          AddParts(t.nodes, alive);
+  block_start_.clear();
+  block_intact_.clear();
+  for (std::uint32_t block_row = 0; block_row < block_rows(); ++block_row) {
+    for (std::uint32_t block_col = 0; block_col < block_cols(); ++block_col) {
+      block_start_.push_back(triangles_.size());
+      bool intact = true;
+      for (std::uint32_t r = block_row * kBlockRows; r < std::min((block_row + 1) * kBlockRows, rows_ - 1); ++r) {
+        for (std::uint32_t c = block_col * kBlockCols; c < std::min((block_col + 1) * kBlockCols, cols_ - 1); ++c) {
+          intact = AddTriangles(r, c) && intact;
         }
       }
+      block_intact_.push_back(intact ? 1 : 0);
     }
   }
+  block_start_.push_back(triangles_.size());
   whole_triangles_ = triangles_.size();
   const std::size_t nodes = scene_.membrane.node_count();
   const std::size_t vertices = nodes + 3 * parts_.size();
@@ -146,6 +142,29 @@ void MembraneMesh::BuildTriangles() {
     }
     triangles_.push_back({first, first + 1, first + 2});
   }
+}
+
+// True when both triangles of the cell are as they were made.
+bool MembraneMesh::AddTriangles(std::uint32_t row, std::uint32_t col) {
+  bool intact = true;
+  for (int half = 0; half < 2; ++half) {
+    const MembraneTriangle t = MembraneTriangleAt(cols_, row, col, half);
+    std::array<bool, 3> alive;
+    int dead = 0;
+    for (int k = 0; k < 3; ++k) {
+      const Index a = t.nodes[k], b = t.nodes[(k + 1) % 3];
+      alive[k] = !edge_dead(t.edges[k]) && !node_gone(a) && !node_gone(b);
+      dead += alive[k] ? 0 : 1;
+    }
+    intact = intact && dead == 0;
+    // One dead edge leaves the corners joined: the slit ends inside, and the atlas shows how far it goes.
+    if (dead < 2) {
+      triangles_.push_back(t.nodes);
+    } else {
+      AddParts(t.nodes, alive);
+    }
+  }
+  return intact;
 }
 
 // With two or three dead edges a corner is joined to another one only through the edge that lives, if any.

@@ -47,6 +47,17 @@ class MembraneMesh {
   /// Triangles that are whole; parts of cut ones follow them in triangles().
   [[nodiscard]] std::size_t whole_triangles() const { return whole_triangles_; }
 
+  /// The grid in blocks of kBlockRows x kBlockCols cells, row by row; the last ones may be smaller.
+  static constexpr std::uint32_t kBlockRows = 8, kBlockCols = 4;
+  [[nodiscard]] std::uint32_t block_rows() const { return rows_ > 0 ? (rows_ - 1 + kBlockRows - 1) / kBlockRows : 0; }
+  [[nodiscard]] std::uint32_t block_cols() const { return cols_ > 0 ? (cols_ - 1 + kBlockCols - 1) / kBlockCols : 0; }
+  /// Whole triangles of a block.
+  [[nodiscard]] std::span<const Triangle> block_triangles(std::size_t block) const {
+    return triangles().subspan(block_start_[block], block_start_[block + 1] - block_start_[block]);
+  }
+  /// Nothing in the block is cut or gone.
+  [[nodiscard]] bool block_intact(std::size_t block) const { return block_intact_[block] != 0; }
+
   /// Vaporised, or part of a crumb.
   [[nodiscard]] bool node_gone(Index node) const { return gone_[node] != 0; }
 
@@ -63,6 +74,7 @@ class MembraneMesh {
   [[nodiscard]] bool edge_dead(std::size_t edge) const { return TestBit(dead_edges_, edge); }
   void FindGone();
   void BuildTriangles();
+  bool AddTriangles(std::uint32_t row, std::uint32_t col);
   void AddParts(const Triangle& nodes, const std::array<bool, 3>& edge_alive);
   /// visit(other node, edge between the two) for the up to six neighbours in the grid.
   template <class Visit>
@@ -84,6 +96,8 @@ class MembraneMesh {
   std::vector<Vec2f> materials_;
   std::vector<float> sides_;
   std::vector<Triangle> triangles_;
+  std::vector<std::size_t> block_start_;
+  std::vector<std::uint8_t> block_intact_;
   std::size_t whole_triangles_ = 0;
 };
 

@@ -152,6 +152,23 @@ Solid GrasperJaw(const ToolShape& shape) {
   return solid;
 }
 
+Solid ScissorBlade(const ToolShape& shape) {
+  Solid solid;
+  constexpr int kSections = 12;
+  const float width = 0.7f * std::min(shape.shaft_radius_m, 2 * shape.tip_radius_m);
+  const float height = 0.9f * shape.tip_radius_m;
+  std::vector<std::vector<Vec3f>> outlines;
+  for (int k = 0; k <= kSections; ++k) {
+    const float u = static_cast<float>(k) / kSections;
+    const float z = -0.002f + u * (shape.tip_length_m + 0.002f);
+    const float bow = 0.35f * width * u * u;  // To the side, as of dissecting scissors.
+    const float h = height * (1 - 0.85f * u) + 0.0002f, w = 0.35f * width * (1 - 0.6f * u) + 0.0001f;
+    outlines.push_back({{0, bow - w, z}, {h, bow - w, z}, {0.8f * h, bow + w, z}, {0, bow + w, z}});
+  }
+  AppendLoft(outlines, kPolishedSteel, &solid);
+  return solid;
+}
+
 Solid Hook(const ToolShape& shape) {
   Solid solid;
   const float r = shape.tip_radius_m;

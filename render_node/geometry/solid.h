@@ -36,6 +36,8 @@ struct ToolShape {
 [[nodiscard]] Solid GrasperShaft(const ToolShape& shape);
 /// The jaw on the +x side, closed, with the hinge at the origin and the tip at z = tip_length.
 [[nodiscard]] Solid GrasperJaw(const ToolShape& shape);
+/// Blade of scissors, curved and pointed; placed like GrasperJaw.
+[[nodiscard]] Solid ScissorBlade(const ToolShape& shape);
 /// L-hook: heel at the origin, foot along +x, neck along -z (frame T).
 [[nodiscard]] Solid Hook(const ToolShape& shape);
 

@@ -141,6 +141,15 @@ std::vector<std::uint8_t> MakeVesselPattern(int size) {
   return bytes;
 }
 
+std::vector<std::uint8_t> MakeSerosaPattern(int size) {
+  std::vector<std::uint8_t> image = MakeNoisePattern(size);
+  const std::vector<std::uint8_t> vessels = MakeVesselPattern(size);
+  for (std::size_t i = 0; i < vessels.size(); ++i) {
+    image[4 * i + 3] = vessels[i];
+  }
+  return image;
+}
+
 StructureMap MakeStructureMap(const SceneView& scene, float width_m, float height_m) {
   constexpr float kTexel = 4.0e-4f;  // [m]: a fifth of a ureter.
   StructureMap map;

@@ -16,6 +16,9 @@ namespace fulcrum::render {
 /// Square one-byte image of `size` texels: small blood vessels that branch, 255 in the middle of a vessel.
 [[nodiscard]] std::vector<std::uint8_t> MakeVesselPattern(int size);
 
+/// Square RGBA8 image of `size` texels: the three noises, and the vessels as alpha. One sample instead of two.
+[[nodiscard]] std::vector<std::uint8_t> MakeSerosaPattern(int size);
+
 /// Where ureter (red) and nerve (green) run under the sheet, as they shine through it: two bytes per texel, s fast,
 /// over the atlas' area. 255 on the centre line, 0 from twice the structure's radius outwards.
 struct StructureMap {

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
+#include <map>
+#include <osgGA/GUIEventAdapter>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,10 +15,14 @@ namespace {
 // Below these a pose looks the same: a fifth of a pixel at 10 cm.
 constexpr float kSamePlace = 2e-5f;   // [m]
 constexpr float kSameAngle = 0.002f;  // [rad]
-constexpr double kTextLife_s = 2.0;   // A temperature or a warning is shown for so long.
+constexpr float kSameForce = 0.05f;   // [N]: half of what the bar's figure shows.
+constexpr float kBoils_C = 90;        // Somewhere in the patch.
+constexpr double kTextLife_s = 4.0;   // A temperature or a warning is shown for so long.
+constexpr double kLate_s = 0.3;       // What comes a hundred times a second is missed by then.
 
 bool LooksTheSame(const ToolSample& a, const ToolSample& b) {
-  return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle;
+  return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle &&
+         std::abs(a.f_W.norm() - b.f_W.norm()) < kSameForce;
 }
 
 std::unique_ptr<Display> OpenDisplay(const LaparoscopeView& view, const RenderParams& params, bool window) {
@@ -32,7 +37,10 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       ports_(ports),
       view_(scene),
       display_(OpenDisplay(view_, scene.render, settings.window)),
-      writer_(settings.frames) {
+      writer_(settings.frames),
+      quality_(settings.quality, static_cast<int>(scene.render.height)),
+      camera_(scene.render),
+      figures_(scene.render.hud != 0) {
   WarmUp();
 }
 
@@ -46,7 +54,7 @@ void RenderNode::WarmUp() {
   }
   UpdateTexts();
   view_.AddSmoke(Vec2f::Zero(), -10);
-  view_.UpdateSmoke(-9.9);
+  static_cast<void>(view_.UpdateEffects(-9.9));
   display_->DrawAndRead(&picture_);
   for (int k = 0; k < kMaxTools; ++k) {
     view_.SetTool(k, ToolSample());
@@ -57,14 +65,20 @@ RenderNode::~RenderNode() = default;
 
 void RenderNode::Step(const Tick& tick) {
   session_time_s_ = tick.session_time_s;
-  TakeTissue();
-  TakeThermal();
-  TakeEvents();
-  TakeTools();
+  TakeKeys();
+  if (!hud_.paused) {
+    TakeTissue();
+    TakeThermal();
+    TakeEvents();
+    TakeTools();
+    TakeContact();
+    FindLate();
+  }
   if (!ready()) {
     return;
   }
-  const bool write = changed_in_file_ && session_time_s_ >= next_png_s_;
+  const bool write = screenshot_ || (changed_in_file_ && session_time_s_ >= next_png_s_);
+  screenshot_ = false;
   if (write || (window_ && changed_on_screen_)) {
     Draw(session_time_s_, write);
   }
@@ -80,6 +94,7 @@ void RenderNode::TakeTissue() {
   if (!ports_.tissue.TakeLatest(&new_tissue_)) {
     return;
   }
+  arrivals_[0].time_s = session_time_s_;
   if (new_tissue_.header.scene_hash != scene_.hash || new_tissue_.xyz.size() < 3 * scene_.rest_position.size()) {
     Report("TissueFrame of another scene dropped");
     return;
@@ -116,8 +131,10 @@ void RenderNode::TakeThermal() {
 void RenderNode::TakeEvents() {
   while (ports_.events.TakeNext(&event_)) {
     switch (event_.kind) {
-      case ThermalEventKind::kSteam:
       case ThermalEventKind::kCut:
+        view_.OpenVessels(event_.material, event_.session_time_s);
+        [[fallthrough]];
+      case ThermalEventKind::kSteam:
       case ThermalEventKind::kChar:
         view_.AddSmoke(event_.material, event_.session_time_s);
         break;
@@ -138,39 +155,108 @@ void RenderNode::TakeEvents() {
   }
 }
 
+bool RenderNode::Recent(double time_s) const { return session_time_s_ - time_s < kTextLife_s; }
+
 void RenderNode::UpdateTexts() {
-  const auto number = [](const char* format, double value) {
-    std::array<char, 32> text;
-    std::snprintf(text.data(), text.size(), format, value);
-    return std::string(text.data());
+  hud_.session_time_s = session_time_s_;
+  hud_.pedals = handles_.pedals;
+  hud_.force_limit_N = scene_.haptics.force_limit_N;
+  hud_.slit_m = topology_.cut_length_m;
+  hud_.tip_C = Recent(temperature_time_s_) ? std::optional(temperature_C_) : std::nullopt;
+  for (std::size_t k = 0; k < kMaxTools; ++k) {
+    const bool there = tools_.tools[k].kind != ToolKind::kNone;
+    hud_.force_N[k] = there ? std::optional(tools_.tools[k].f_W.norm()) : std::nullopt;
+  }
+  const auto alarm = [this](std::size_t k) {
+    return injured_[k] ? Alarm::kInjured : Recent(warned_s_[k]) ? Alarm::kHot : Alarm::kNone;
   };
-  std::vector<OverlayText> texts{{Corner::kTopLeft, 0, number("%.1f s", session_time_s_)}};
-  const auto pedals = handles_.pedals;
-  const char* mode = (pedals & kPedalBlend)  ? "BLEND"
-                     : (pedals & kPedalCut)  ? "CUT"
-                     : (pedals & kPedalCoag) ? "COAG"
-                                             : "";
-  texts.push_back({Corner::kBottomLeft, 0, mode});
-  if (topology_.cut_length_m > 0) {
-    texts.push_back({Corner::kBottomRight, 0, number("SLIT %.0f mm", 1000.0 * topology_.cut_length_m)});
-  }
-  if (session_time_s_ - temperature_time_s_ < kTextLife_s) {
-    texts.push_back({Corner::kBottomRight, 1, number("%.0f C", temperature_C_)});
-  }
-  constexpr std::array<const char*, 2> kNames{"URETER", "NERVE"};
-  for (int k = 0; k < 2; ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    if (injured_[i]) {
-      texts.push_back({Corner::kTopRight, k, std::string(kNames[i]) + " INJURED", true});
-    } else if (session_time_s_ - warned_s_[i] < kTextLife_s) {
-      texts.push_back({Corner::kTopRight, k, std::string(kNames[i]) + " HOT!", true});
+  hud_.ureter = alarm(0);
+  hud_.nerve = alarm(1);
+  view_.SetTexts(HudTexts(hud_, figures_));
+}
+
+// The picture goes on showing the last that came, and says so.
+void RenderNode::FindLate() {
+  std::vector<std::string> late;
+  for (const Arrival& arrival : arrivals_) {
+    if (arrival.time_s >= 0 && session_time_s_ - arrival.time_s > kLate_s) {
+      late.emplace_back(arrival.text);
     }
   }
-  view_.SetTexts(texts);
+  if (late != hud_.late) {
+    hud_.late = std::move(late);
+    changed_on_screen_ = changed_in_file_ = true;
+  }
+}
+
+void RenderNode::TakeContact() {
+  if (!ports_.contacts.TakeLatest(&contact_)) {
+    return;
+  }
+  if (contact_.power_W != hud_.power_W) {
+    hud_.power_W = contact_.power_W;
+    changed_on_screen_ = changed_in_file_ = true;
+  }
+  // Events tell of the first steam at a place; as long as power goes into tissue that boils, there is more.
+  if (contact_.touching && contact_.power_W > 0 && temperature_C_ > kBoils_C && Recent(temperature_time_s_)) {
+    view_.AddSmoke(contact_.material, session_time_s_);
+    changed_on_screen_ = changed_in_file_ = true;
+  }
+}
+
+void RenderNode::TakeKeys() {
+  for (const int key : display_->TakeKeys()) {
+    Press(key);
+    changed_on_screen_ = true;
+  }
+  if (followed_ >= 0) {
+    const ToolSample& tool = tools_.tools[static_cast<std::size_t>(followed_)];
+    if (tool.kind != ToolKind::kNone && (tool.p_WT - camera_.params().scope_target_W).norm() > kSamePlace) {
+      camera_.Follow(tool.p_WT);
+      view_.SetCamera(camera_.params());
+    }
+  }
+}
+
+void RenderNode::Press(int key) {
+  static const std::map<int, CameraKey> kCameraKeys{{osgGA::GUIEventAdapter::KEY_Left, CameraKey::kLeft},
+                                                    {osgGA::GUIEventAdapter::KEY_Right, CameraKey::kRight},
+                                                    {osgGA::GUIEventAdapter::KEY_Up, CameraKey::kUp},
+                                                    {osgGA::GUIEventAdapter::KEY_Down, CameraKey::kDown},
+                                                    {'+', CameraKey::kNearer},
+                                                    {'-', CameraKey::kFarther},
+                                                    {'r', CameraKey::kRollLeft},
+                                                    {'t', CameraKey::kRollRight},
+                                                    {'0', CameraKey::kReset}};
+  if (const auto camera_key = kCameraKeys.find(key); camera_key != kCameraKeys.end()) {
+    camera_.Press(camera_key->second);
+    view_.SetCamera(camera_.params());
+    return;
+  }
+  switch (key) {
+    case 'l':
+      followed_ = followed_ + 1 < kMaxTools ? followed_ + 1 : -1;
+      return;
+    case 's':
+      screenshot_ = true;
+      return;
+    case 'p':
+      hud_.paused = !hud_.paused;
+      return;
+    case 'u':
+      figures_ = !figures_;
+      return;
+    case 'h':
+      hud_.help = !hud_.help;
+      return;
+    default:
+      return;
+  }
 }
 
 void RenderNode::TakeTools() {
   if (ports_.tools.TakeLatest(&new_tools_)) {
+    arrivals_[1].time_s = session_time_s_;
     for (int k = 0; k < kMaxTools; ++k) {
       const auto i = static_cast<std::size_t>(k);
       if (!LooksTheSame(tools_.tools[i], new_tools_.tools[i])) {
@@ -181,6 +267,7 @@ void RenderNode::TakeTools() {
     }
   }
   if (ports_.handles.TakeLatest(&new_handles_)) {
+    arrivals_[2].time_s = session_time_s_;
     if (handles_.pedals != new_handles_.pedals) {
       handles_.pedals = new_handles_.pedals;
       changed_on_screen_ = changed_in_file_ = true;
@@ -200,9 +287,10 @@ void RenderNode::TakeTools() {
 
 void RenderNode::Draw(double session_time_s, bool write_png) {
   const auto start = std::chrono::steady_clock::now();
+  const bool moving = view_.UpdateEffects(session_time_s);
+  view_.SetScale(quality_.scale());
   view_.Update();
   UpdateTexts();
-  const bool smoking = view_.UpdateSmoke(session_time_s);
   if (write_png) {
     display_->DrawAndRead(&picture_);
     if (!writer_.Add(picture_, session_time_s)) {
@@ -210,14 +298,16 @@ void RenderNode::Draw(double session_time_s, bool write_png) {
     }
     const double period = 1.0 / std::max(0.001f, scene_.render.png_rate_Hz);
     next_png_s_ = period * (std::floor(session_time_s / period) + 1);
-    changed_in_file_ = smoking;
+    changed_in_file_ = moving;
   } else {
     display_->Draw();
   }
-  changed_on_screen_ = smoking;
+  changed_on_screen_ = moving;
   frames_drawn_.fetch_add(1, std::memory_order_relaxed);
   const std::chrono::duration<double, std::milli> spent = std::chrono::steady_clock::now() - start;
+  quality_.Add(spent.count());
   draw_ms_.store(spent.count(), std::memory_order_relaxed);
+  scale_.store(quality_.scale(), std::memory_order_relaxed);
 }
 
 void RenderNode::Report(const std::string& error) {
@@ -230,6 +320,7 @@ void RenderNode::FillHealth(Health* health) const {
   health->metrics.push_back({"png_written", static_cast<double>(writer_.written())});
   health->metrics.push_back({"png_dropped", static_cast<double>(pictures_dropped_.load(std::memory_order_relaxed))});
   health->metrics.push_back({"draw_ms", draw_ms_.load(std::memory_order_relaxed)});
+  health->metrics.push_back({"scale", scale_.load(std::memory_order_relaxed)});
   health->metrics.push_back({"patches", static_cast<double>(patches_applied_.load(std::memory_order_relaxed))});
   const std::lock_guard lock(error_mutex_);
   health->last_error = error_.empty() ? writer_.last_error() : error_;

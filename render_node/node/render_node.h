@@ -9,6 +9,9 @@
 #include <mutex>
 #include <string>
 
+#include "render_node/geometry/camera_control.h"
+#include "render_node/geometry/quality.h"
+#include "render_node/node/hud.h"
 #include "render_node/offscreen/png_writer.h"
 #include "render_node/scene_graph/display.h"
 #include "render_node/scene_graph/laparoscope_view.h"
@@ -24,11 +27,13 @@ struct RenderPorts {
   bus::Input<ToolState>& tools;
   bus::Input<HandleState>& handles;
   bus::Input<ThermalEvent>& events;
+  bus::Input<CauteryContact>& contacts;
 };
 
 struct RenderSettings {
-  bool window = false;           ///< A real window instead of drawing into memory.
-  std::filesystem::path frames;  ///< Folder for the pictures.
+  bool window = false;               ///< A real window instead of drawing into memory.
+  Quality quality = Quality::kAuto;  ///< How finely the scene is drawn.
+  std::filesystem::path frames;      ///< Folder for the pictures.
 };
 
 class RenderNode {
@@ -59,6 +64,11 @@ class RenderNode {
   void TakeTools();
   [[nodiscard]] bool ready() const { return tissue_.header.stamp.sequence != 0; }
   void TakeEvents();
+  void TakeContact();
+  void TakeKeys();
+  void Press(int key);
+  void FindLate();
+  [[nodiscard]] bool Recent(double time_s) const;
   void UpdateTexts();
   void Draw(double session_time_s, bool write_png);
   void Report(const std::string& error);
@@ -69,6 +79,7 @@ class RenderNode {
   LaparoscopeView view_;
   std::unique_ptr<Display> display_;
   FrameWriter writer_;
+  QualityControl quality_;
 
   TissueFrame tissue_, new_tissue_;
   TopologyState topology_;
@@ -76,7 +87,19 @@ class RenderNode {
   ToolState tools_, new_tools_;
   HandleState handles_, new_handles_;
   ThermalEvent event_;
+  CauteryContact contact_;
   Picture picture_;
+  HudState hud_;
+  CameraControl camera_;
+  bool figures_;             // The HUD is on.
+  int followed_ = -1;        // Tool that the camera is locked on.
+  bool screenshot_ = false;  // One is wanted.
+  // Session time at which each topic last came: what has come once and then not for a while is late.
+  struct Arrival {
+    const char* text;
+    double time_s;
+  };
+  std::array<Arrival, 3> arrivals_{{{"TISSUE HELD", -1}, {"TOOLS HELD", -1}, {"HANDLES LATE", -1}}};
   double session_time_s_ = 0;
   double next_png_s_ = 0;
   double temperature_time_s_ = -1e9;            // When the newest patch came.
@@ -91,6 +114,7 @@ class RenderNode {
   std::atomic<std::uint64_t> pictures_dropped_{0};
   std::atomic<std::uint64_t> patches_applied_{0};
   std::atomic<double> draw_ms_{0};
+  std::atomic<double> scale_{1};
   mutable std::mutex error_mutex_;
   std::string error_;
 };

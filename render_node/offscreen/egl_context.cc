@@ -3,6 +3,7 @@
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <GL/gl.h>
+#include <GL/glext.h>
 
 #include <array>
 #include <cstdio>
@@ -50,7 +51,14 @@ EglContext::EglContext() {
   MakeCurrent();
   description_ = std::string(reinterpret_cast<const char*>(glGetString(GL_RENDERER))) + ", OpenGL " +
                  reinterpret_cast<const char*>(glGetString(GL_VERSION));
+  // glCopyImageSubData; Mesa's software renderer has had it for years.
+  GLint major = 0, minor = 0;
+  glGetIntegerv(GL_MAJOR_VERSION, &major);
+  glGetIntegerv(GL_MINOR_VERSION, &minor);
   Release();
+  if (major < 4 || (major == 4 && minor < 3)) {
+    throw std::runtime_error("OpenGL 4.3 is needed off screen; this is " + description_);
+  }
 }
 
 // The display is shared by the whole process: it is not terminated here, so that two contexts can live side by side.

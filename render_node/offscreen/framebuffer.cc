@@ -36,6 +36,10 @@ void Framebuffer::Read(Picture* picture) {
   ReadBoundFramebuffer(width_, height_, picture);
 }
 
+void CopyTexture(unsigned from, unsigned to, int width, int height) {
+  glCopyImageSubData(from, GL_TEXTURE_2D, 0, 0, 0, 0, to, GL_TEXTURE_2D, 0, 0, 0, 0, width, height, 1);
+}
+
 void ReadBoundFramebuffer(int width, int height, Picture* picture) {
   picture->width = width;
   picture->height = height;

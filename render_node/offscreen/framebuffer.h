@@ -36,6 +36,9 @@ class Framebuffer {
   unsigned depth_ = 0;
 };
 
+/// The first texels of one two-dimensional texture, by GL name, into another of the same format (OpenGL 4.3).
+void CopyTexture(unsigned from, unsigned to, int width, int height);
+
 /// Reads the window or framebuffer bound for reading.
 void ReadBoundFramebuffer(int width, int height, Picture* picture);
 

@@ -1,23 +1,15 @@
 #include "render_node/scene_graph/display.h"
 
 #include <osg/GLExtensions>
+#include <osgGA/GUIEventHandler>
 #include <osgViewer/Viewer>
+#include <utility>
 
 #include "render_node/offscreen/egl_context.h"
 #include "services/core/error.h"
 
 namespace fulcrum::render {
 namespace {
-
-osg::Matrix ToOsg(const Eigen::Matrix4f& m) {
-  osg::Matrix out;
-  for (int row = 0; row < 4; ++row) {
-    for (int col = 0; col < 4; ++col) {
-      out(row, col) = m(col, row);  // OSG multiplies row vectors.
-    }
-  }
-  return out;
-}
 
 void SetUpViewer(const LaparoscopeView& view, osgViewer::Viewer* viewer) {
   viewer->setThreadingModel(osgViewer::ViewerBase::SingleThreaded);
@@ -27,10 +19,8 @@ void SetUpViewer(const LaparoscopeView& view, osgViewer::Viewer* viewer) {
   osg::Camera* camera = viewer->getCamera();
   camera->setComputeNearFarMode(osg::Camera::DO_NOT_COMPUTE_NEAR_FAR);
   camera->setCullingMode(osg::CullSettings::NO_CULLING);
-  camera->setClearColor(osg::Vec4(0.12f, 0.035f, 0.03f, 1));
+  camera->setClearColor(osg::Vec4(0, 0, 0, 1));
   camera->setProjectionResizePolicy(osg::Camera::FIXED);
-  camera->setViewMatrix(ToOsg(view.laparoscope().view));
-  camera->setProjectionMatrix(ToOsg(view.laparoscope().projection));
 }
 
 void SetUpState(osg::State* state) {
@@ -76,6 +66,7 @@ class OffscreenDisplay : public Display {
     context_.Release();
   }
 
+  [[nodiscard]] std::vector<int> TakeKeys() override { return {}; }
   [[nodiscard]] bool closed() const override { return false; }
   [[nodiscard]] std::string description() const override { return context_.description(); }
 
@@ -99,6 +90,17 @@ class ReadAfterDraw : public osg::Camera::DrawCallback {
  private:
   int width_;
   int height_;
+};
+
+class Keyboard : public osgGA::GUIEventHandler {
+ public:
+  bool handle(const osgGA::GUIEventAdapter& event, osgGA::GUIActionAdapter&) override {
+    if (event.getEventType() == osgGA::GUIEventAdapter::KEYDOWN) {
+      pressed.push_back(event.getKey());
+    }
+    return false;
+  }
+  std::vector<int> pressed;
 };
 
 class WindowDisplay : public Display {
@@ -131,6 +133,7 @@ class WindowDisplay : public Display {
     viewer_.getCamera()->setViewport(0, 0, traits->width, traits->height);
     viewer_.getCamera()->setFinalDrawCallback(read_);
     SetUpViewer(view, &viewer_);
+    viewer_.addEventHandler(keys_);
     viewer_.realize();
     if (!viewer_.isRealized()) {
       throw InputError("--window: the display refuses an OpenGL window");
@@ -147,11 +150,18 @@ class WindowDisplay : public Display {
     read_->picture = nullptr;
   }
 
+  [[nodiscard]] std::vector<int> TakeKeys() override {
+    viewer_.advance();
+    viewer_.eventTraversal();
+    return std::exchange(keys_->pressed, {});
+  }
+
   [[nodiscard]] bool closed() const override { return viewer_.done(); }
   [[nodiscard]] std::string description() const override { return "window"; }
 
  private:
   osg::ref_ptr<ReadAfterDraw> read_;
+  osg::ref_ptr<Keyboard> keys_ = new Keyboard;
   osg::ref_ptr<osg::GraphicsContext> context_;
   osgViewer::Viewer viewer_;
 };

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "render_node/offscreen/framebuffer.h"
 #include "render_node/scene_graph/laparoscope_view.h"
@@ -16,6 +17,8 @@ class Display {
   virtual void Draw() = 0;
   /// Draws, and reads the picture back.
   virtual void DrawAndRead(Picture* picture) = 0;
+  /// Keys pressed since the last call, as X key symbols; looks after the window also when nothing is drawn.
+  [[nodiscard]] virtual std::vector<int> TakeKeys() = 0;
   /// The user closed the window.
   [[nodiscard]] virtual bool closed() const = 0;
   /// Renderer and version, for the log.

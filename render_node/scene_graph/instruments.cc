@@ -34,7 +34,9 @@ Instruments::Instruments(const SceneView& scene) : root_(new osg::Group) {
       instrument.body->addChild(ToGeometry(Hook(shape), "hook"));
     } else if (tool.kind != ToolKind::kNone) {
       instrument.body->addChild(ToGeometry(GrasperShaft(shape), "grasper"));
-      const osg::ref_ptr<osg::Geometry> jaw = ToGeometry(GrasperJaw(shape), "jaw");
+      const osg::ref_ptr<osg::Geometry> jaw = tool.kind == ToolKind::kScissors
+                                                  ? ToGeometry(ScissorBlade(shape), "blade")
+                                                  : ToGeometry(GrasperJaw(shape), "jaw");
       for (auto& joint : instrument.jaws) {
         joint = new osg::MatrixTransform;
         joint->addChild(jaw);

@@ -34,10 +34,18 @@ class LaparoscopeView {
   void SetTexts(std::span<const OverlayText> texts);
   /// A puff of steam where (s, t) [m] of the sheet is drawn now.
   void AddSmoke(const Vec2f& material, double session_time_s);
-  /// Moves the smoke on. True while there is some to see.
-  bool UpdateSmoke(double session_time_s);
+  /// A cut at (s, t) [m]: the vessels that it opens bleed until heat closes them.
+  void OpenVessels(const Vec2f& material, double session_time_s);
+  /// Moves smoke and blood on. True when the picture changes by that, or is going to.
+  bool UpdateEffects(double session_time_s);
+
+  /// Looks from and to where `params` says; size and field of view stay.
+  void SetCamera(const RenderParams& params);
+  /// Share of the picture's width and height that the scene is drawn with, in (0, 1]; text always has all of it.
+  void SetScale(float scale);
 
   /// Carries the last SetTissue and SetTopology over to the meshes. Split off so that several changes cost one update.
+  /// Where nothing changed, the next picture shows the last one of the scene again.
   void Update();
 
   [[nodiscard]] osg::Group* root() const;

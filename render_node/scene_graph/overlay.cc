@@ -37,8 +37,9 @@ void Overlay::Set(std::span<const OverlayText> texts) {
   for (const OverlayText& text : texts) {
     const bool top = text.corner == Corner::kTopLeft || text.corner == Corner::kTopRight;
     const bool left = text.corner == Corner::kTopLeft || text.corner == Corner::kBottomLeft;
-    const int length = kGlyphWidth * dot_ * static_cast<int>(text.text.size());
-    const int pitch = (kGlyphHeight + 2) * dot_;
+    const int dot = text.size * dot_;
+    const int length = kGlyphWidth * dot * static_cast<int>(text.text.size());
+    const int pitch = (kGlyphHeight + 2) * dot;
     int x = left ? margin : width_ - margin - length;
     const int y = top ? height_ - margin - pitch * (text.line + 1) : margin + pitch * text.line;
     for (const char character : text.text) {
@@ -46,16 +47,16 @@ void Overlay::Set(std::span<const OverlayText> texts) {
       const int glyph = GlyphIndex(character);
       for (int corner = 0; corner < 4; ++corner) {
         const int dx = corner == 1 || corner == 2 ? 1 : 0, dy = corner >= 2 ? 1 : 0;
-        positions.emplace_back(
-            2.0f * static_cast<float>(x + dx * kGlyphWidth * dot_) / static_cast<float>(width_) - 1,
-            2.0f * static_cast<float>(y + dy * kGlyphHeight * dot_) / static_cast<float>(height_) - 1, 0.0f);
+        positions.emplace_back(2.0f * static_cast<float>(x + dx * kGlyphWidth * dot) / static_cast<float>(width_) - 1,
+                               2.0f * static_cast<float>(y + dy * kGlyphHeight * dot) / static_cast<float>(height_) - 1,
+                               0.0f);
         coordinates.push_back({static_cast<float>((glyph + dx) * kGlyphWidth) / static_cast<float>(sheet_width_),
                                static_cast<float>(dy), 0, 0});
         colours.push_back(text.warning ? kWarning : kText);
       }
       triangles.push_back({first, first + 1, first + 2});
       triangles.push_back({first, first + 2, first + 3});
-      x += kGlyphWidth * dot_;
+      x += kGlyphWidth * dot;
     }
   }
   mesh_.SetPositions(positions);

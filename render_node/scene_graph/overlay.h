@@ -15,6 +15,7 @@ struct OverlayText {
   int line;  ///< 0 is nearest to the upper or lower rim.
   std::string text;
   bool warning = false;  ///< Red instead of grey.
+  int size = 1;          ///< Height and pitch, in those of plain text.
 };
 
 class Overlay {

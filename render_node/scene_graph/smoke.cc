@@ -1,5 +1,6 @@
 #include "render_node/scene_graph/smoke.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -9,12 +10,12 @@ namespace fulcrum::render {
 namespace {
 
 constexpr double kLeastInterval_s = 0.08;
-constexpr double kLife_s = 1.6;
+constexpr double kLife_s = 2.2;
 constexpr float kRise_m_s = 0.016f;
 constexpr float kDrift_m_s = 0.005f;
 constexpr float kFirstRadius_m = 0.0015f;
-constexpr float kGrowth_m_s = 0.0055f;
-constexpr float kOpacity = 0.30f;
+constexpr float kGrowth_m_s = 0.0060f;
+constexpr float kOpacity = 0.50f;
 
 }  // namespace
 
@@ -34,6 +35,13 @@ void Smoke::Add(const Vec3f& p_W, double session_time_s) {
 }
 
 bool Smoke::Update(double session_time_s) {
+  const bool shown = shown_;
+  shown_ = std::any_of(puffs_.begin(), puffs_.end(), [&](const Puff& puff) {
+    return session_time_s >= puff.born_s && session_time_s - puff.born_s < kLife_s;
+  });
+  if (!shown && !shown_) {
+    return false;
+  }
   std::vector<Vec3f> positions;
   std::vector<std::array<float, 4>> coordinates;
   std::vector<Triangle> triangles;
@@ -58,7 +66,7 @@ bool Smoke::Update(double session_time_s) {
   mesh_.SetPositions(positions);
   mesh_.SetCoordinates(coordinates);
   mesh_.SetTriangles(triangles);
-  return !triangles.empty();
+  return true;
 }
 
 }  // namespace fulcrum::render

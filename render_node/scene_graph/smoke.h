@@ -13,7 +13,7 @@ class Smoke {
   Smoke();
   /// A puff is born at p_W [m]; the oldest makes room. Births within kLeastInterval of the last one are left out.
   void Add(const Vec3f& p_W, double session_time_s);
-  /// Builds the squares for this time. True while there is something to see.
+  /// Builds the squares for this time. True when there is something to see, or no longer is.
   bool Update(double session_time_s);
   [[nodiscard]] osg::Geometry* geometry() const { return mesh_.geometry(); }
   [[nodiscard]] osg::StateSet* state() const { return mesh_.state(); }
@@ -24,8 +24,9 @@ class Smoke {
     double born_s = -1e9;
     float drift = 0;  // Direction of its sideways drift [rad].
   };
-  std::array<Puff, 24> puffs_;
+  std::array<Puff, 28> puffs_;
   std::size_t next_ = 0;
+  bool shown_ = true;
   double last_birth_s_ = -1e9;
   Mesh mesh_;
 };

@@ -26,14 +26,17 @@ void main() {
   albedo = mix(albedo, vec3(0.86, 0.46, 0.40) * (0.62 + 0.6 * structure.r), 0.85 * cord);
   albedo = mix(albedo, vec3(0.92, 0.82, 0.58), 0.80 * nerve);
   // Islands where the layer is thin, closed where it is thick; in an opened slit it wells up.
-  float cover = smoothstep(0.52, 0.95, broad.r * 0.8 + 0.2 * lobule + 0.45 * coordinate.z);
+  float cover = smoothstep(0.51, 0.66, broad.r * 0.8 + 0.45 * coordinate.z);
   float opened = max(heat.a < 0.5 ? 1.0 : 0.0, smoothstep(0.1, 0.5, heat.g));
-  float alpha = mix(0.05 + 0.07 * lobule, 0.60 + 0.30 * lobule, cover);
+  float alpha = (0.45 + 0.45 * lobule) * cover;
   alpha = max(alpha, (0.62 + 0.30 * lobule) * opened);
   alpha = clamp(max(alpha, 0.9 * max(cord, nerve)), 0.0, 0.97);
   // Under a burn the fat is seared too, least in the open middle of the slit.
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
   albedo *= mix(vec3(1.0), vec3(0.46, 0.27, 0.16), (heat.a < 0.5 ? 0.25 : 0.7) * dry);
+  float blood = heat.a < 0.5 ? smoothstep(0.12, 0.7, 2.0 * heat.a) : 0.0;
+  albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);
+  alpha = mix(alpha, 0.97, blood);
   float gloss;
   fragment = vec4(ToneMap(ShadeTissue(albedo, vec3(0.35, 0.25, 0.12), n, n, position, 0.6, gloss)), alpha);
 }

@@ -5,17 +5,17 @@ in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
 uniform sampler2D atlas;
-uniform sampler2D noise_pattern;
-uniform sampler2D vessel_pattern;
+uniform sampler2D serosa_pattern;
 uniform vec2 atlas_per_metre;
+uniform float colour_by_temperature; // 1: the paper's eq. 15, from the temperature of the moment.
 out vec4 fragment;
 
 void main() {
   vec2 m = coordinate.xy;
   vec4 heat = texture(atlas, m * atlas_per_metre);
   if (coordinate.z < 0.0 || heat.a < 0.5) discard;
-  vec4 noise = texture(noise_pattern, m * 20.0);
-  float vessel = texture(vessel_pattern, m * 15.0).r;
+  vec4 noise = texture(serosa_pattern, m * 16.0);
+  float vessel = noise.a;
   float celsius = 20.0 + 127.5 * heat.r;
   float damage = heat.g;
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
@@ -43,6 +43,14 @@ void main() {
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022) * (0.5 + noise.b), brown);
   alpha = mix(alpha, 0.97, brown);
   albedo = mix(albedo, vec3(0.035, 0.022, 0.015), smoothstep(0.05, 0.6, burnt));
+
+  float hot = colour_by_temperature * clamp((celsius - 45.0) / 55.0, 0.0, 1.0);
+  albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
+  alpha = mix(alpha, 0.95, hot);
+  // Blood lies on top: the low bits of the fourth channel (geometry/atlas.h).
+  float blood = smoothstep(0.12, 0.7, 2.0 - 2.0 * heat.a);
+  albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);
+  alpha = mix(alpha, 0.96, blood);
 
   float wet = 1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale));
   // What glitters is not see-through.

@@ -3,15 +3,14 @@
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
-uniform sampler2D noise_pattern;
-uniform sampler2D vessel_pattern;
+uniform sampler2D serosa_pattern;
 out vec4 fragment;
 
 void main() {
   vec2 front = coordinate.xy, side = coordinate.xz;
   float facing = coordinate.w;
-  vec4 noise = mix(texture(noise_pattern, side * 24.0), texture(noise_pattern, front * 24.0), facing);
-  float vessel = texture(vessel_pattern, mix(side, front, step(0.5, facing)) * 19.0).r;
+  vec4 noise = texture(serosa_pattern, mix(side, front, step(0.5, facing)) * 20.0);
+  float vessel = noise.a;
   vec3 bend = noise.rgb - 0.5;
   vec3 n = normalize(normal + 0.25 * bend);
   vec3 film = normalize(normal + 0.70 * bend);

@@ -4,15 +4,14 @@ in vec3 position;
 in vec3 normal;
 in vec4 colour;
 in vec4 coordinate;
-uniform sampler2D noise_pattern;
-uniform sampler2D vessel_pattern;
+uniform sampler2D serosa_pattern;
 out vec4 fragment;
 
 void main() {
   // A slanted projection: no plane of the body is seen edge on by it for long.
   vec2 place = vec2(coordinate.x + 0.41 * coordinate.z, coordinate.y - 0.57 * coordinate.z) * (1.0 - 0.65 * coordinate.w);
-  vec4 noise = texture(noise_pattern, place * 16.0);
-  float vessel = texture(vessel_pattern, place * 13.0).r;
+  vec4 noise = texture(serosa_pattern, place * 14.0);
+  float vessel = noise.a;
   vec3 bend = noise.rgb - 0.5;
   vec3 n = normalize(normal + 0.15 * bend);
   vec3 film = normalize(normal + 0.5 * bend);

@@ -42,6 +42,9 @@ struct NodeOptions {
 
   /// Removes a flag such as "--window" from `extra`; true when it was there.
   [[nodiscard]] bool TakeFlag(std::string_view flag);
+  /// Removes "NAME VALUE" or "NAME=VALUE" from `extra`; `missing` when it was not there. Throws InputError without a
+  /// value.
+  [[nodiscard]] std::string TakeValue(std::string_view name, std::string_view missing);
 };
 
 /// What a command line asks for.

@@ -9,6 +9,26 @@ namespace fulcrum::app {
 
 bool NodeOptions::TakeFlag(std::string_view flag) { return std::erase(extra, flag) > 0; }
 
+std::string NodeOptions::TakeValue(std::string_view name, std::string_view missing) {
+  std::string value(missing);
+  for (std::size_t k = 0; k < extra.size();) {
+    const auto at = extra.begin() + static_cast<std::ptrdiff_t>(k);
+    if (extra[k] == name) {
+      if (k + 1 == extra.size()) {
+        throw InputError(std::string(name) + " needs a value");
+      }
+      value = extra[k + 1];
+      extra.erase(at, at + 2);
+    } else if (extra[k].starts_with(std::string(name) + "=")) {
+      value = extra[k].substr(name.size() + 1);
+      extra.erase(at);
+    } else {
+      ++k;
+    }
+  }
+  return value;
+}
+
 ParsedOptions ParseNodeOptions(int argc, const char* const* argv, NodeId node, const char* description) {
   namespace po = boost::program_options;
   po::options_description known("Options");

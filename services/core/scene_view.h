@@ -93,6 +93,8 @@ struct RenderParams {
   Vec3f scope_target_W = Vec3f::Zero();
   float fov_deg = 60.0f;
   float scope_angle_deg = 30.0f;  ///< 0 or 30 degree optics.
+  float roll_deg = 0.0f;          ///< Of the horizon, clockwise in the picture.
+  std::uint32_t hud = 1;          ///< 0: no figures in the picture; warnings stay.
 };
 
 /// Section `haptics`.

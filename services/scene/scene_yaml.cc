@@ -126,6 +126,8 @@ void ReadRender(StrictMap map, RenderParams* r) {
   r->fov_deg = static_cast<float>(map.Number("fov_deg", Decimal(r->fov_deg), Range::Between(10, 150)));
   r->scope_angle_deg =
       static_cast<float>(map.Number("scope_angle_deg", Decimal(r->scope_angle_deg), Range::Between(0, 90)));
+  r->roll_deg = static_cast<float>(map.Number("roll_deg", Decimal(r->roll_deg), Range::Between(-180, 180)));
+  ReadInteger(&map, "hud", 0, 1, &r->hud);
 }
 
 void ReadHaptics(StrictMap map, HapticsParams* h) {

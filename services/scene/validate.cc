@@ -174,6 +174,8 @@ void CheckParameters(const SceneView& s) {
                {"render.png_rate", r.png_rate_Hz, 0, 240},
                {"render.fov", r.fov_deg, 10, 150},
                {"render.scope_angle", r.scope_angle_deg, 0, 90},
+               {"render.roll", r.roll_deg, -180, 180},
+               {"render.hud", static_cast<float>(r.hud), 0, 1},
                {"haptics.force_limit", h.force_limit_N, 0.01f, 100},
                {"haptics.slew", h.slew_N_per_ms, 1e-4f, 100},
                {"haptics.hand_mass", h.hand_mass_kg, 1e-3f, 100},

@@ -100,8 +100,11 @@ struct Supervisor::Impl {
                          "--session", folder.path.string(),
                          "--domain",  std::to_string(settings.cart.domain),
                          "--cart",    folder.cart.string()};
-    if (settings.window && id == NodeId::kRender) {
-      command.arguments.emplace_back("--window");
+    if (id == NodeId::kRender) {
+      command.arguments.insert(command.arguments.end(), {"--quality", settings.quality});
+      if (settings.window) {
+        command.arguments.emplace_back("--window");
+      }
     }
     command.log = folder.logs / (std::string(NodeName(id)) + ".log");
     return command;

@@ -17,7 +17,8 @@ struct UpSettings {
   config::CartConfig cart;         ///< Its domain is the session's.
   double seconds = -1;             ///< Session time; negative: the script's duration, or until stopped without one.
   bool window = false;
-  bool keep_going = false;  ///< A node that failed for good does not end the session.
+  std::string quality = "auto";  ///< Of the picture: auto, low, high.
+  bool keep_going = false;       ///< A node that failed for good does not end the session.
 };
 
 class Supervisor {

@@ -33,6 +33,8 @@ ExitCode Up(const Words& words) {
        "session time (default: the script's duration; without a script until Ctrl-C)")                                //
       ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "session folders are made in here")  //
       ("window", "show the picture in a window as well")                                                              //
+      ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                                //
+       "of the picture: auto, low, high")                                                                             //
       ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration (default: everything simulated)")    //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")            //
       ("keep-going", "go on without a node that failed for good");
@@ -53,6 +55,10 @@ ExitCode Up(const Words& words) {
   settings.cart.domain = DomainOf(arguments, settings.cart.domain);
   settings.out = values["out"].as<std::string>();
   settings.window = values.count("window") != 0;
+  settings.quality = values["quality"].as<std::string>();
+  if (settings.quality != "auto" && settings.quality != "low" && settings.quality != "high") {
+    throw InputError("--quality: \"" + settings.quality + "\"; valid: auto, low, high");
+  }
   settings.keep_going = values.count("keep-going") != 0;
   if (values.count("seconds") != 0) {
     settings.seconds = values["seconds"].as<double>();

@@ -1,15 +1,267 @@
-// What a picture costs: the built-in scene in the middle of its cut, off screen.
+// What a picture costs, full and when nothing changes: the built-in scene in the middle of its cut, tissue moving, off
+// screen.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <ctime>
+#include <filesystem>
 #include <osg/GraphicsContext>
 #include <osg/State>
+#include <thread>
 
 #include "render_node/geometry/atlas.h"
+#include "render_node/geometry/quality.h"
+#include "render_node/geometry/surface.h"
+#include "render_node/node/render_node.h"
 #include "render_node/offscreen/egl_context.h"
 #include "render_node/scene_graph/atlas_texture.h"
 #include "render_node/scene_graph/display.h"
+#include "services/bus/in_process.h"
 #include "services/scene/build.h"
 #include "tests/benchmark/report.h"
 #include "tests/integration/render/synthetic_scene.h"
+
+namespace fulcrum::render {
+namespace {
+
+double CpuMs(clockid_t clock) {
+  timespec now;
+  clock_gettime(clock, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+std::int64_t MonotonicNs() {
+  timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
+}
+
+void Show(const SyntheticMoment& moment, LaparoscopeView* view) {
+  view->SetTissue(moment.tissue.xyz);
+  view->SetTopology(moment.topology);
+  for (const TemperaturePatch& patch : moment.patches) {
+    view->ApplyPatch(patch);
+  }
+  for (int tool = 0; tool < kMaxTools; ++tool) {
+    view->SetTool(tool, moment.tools.tools[static_cast<std::size_t>(tool)]);
+  }
+}
+
+/// The tissue as it swings gently, so that no two pictures are alike.
+void Sway(const std::vector<float>& rest, int step, std::vector<float>* xyz) {
+  const float lift = 0.001f * std::sin(0.4f * static_cast<float>(step));
+  *xyz = rest;
+  for (std::size_t k = 2; k < xyz->size(); k += 3) {
+    (*xyz)[k] += lift * std::sin(60 * (*xyz)[k - 1]);
+  }
+}
+
+void FullScene(const SceneView& scene, benchmark::Report* report) {
+  if (!report->Wants("render.full_scene_720p.")) {
+    return;
+  }
+  SceneView view = scene;
+  view.render.width = 1280;
+  view.render.height = 720;
+  LaparoscopeView laparoscope(view);
+  const auto display = MakeOffscreenDisplay(laparoscope, view.render);
+  const SyntheticMoment moment = MakeSyntheticMoment(view, 12.0);
+  Show(moment, &laparoscope);
+  QualityControl quality(Quality::kAuto, static_cast<int>(view.render.height));
+  std::vector<float> xyz;
+  std::vector<double> frame_ms, cpu_side_ms;
+  const int repeats = report->quick() ? 20 : 100, settling = 60;
+  for (int k = 0; k < settling + repeats; ++k) {
+    Sway(moment.tissue.xyz, k, &xyz);
+    const double start = CpuMs(CLOCK_MONOTONIC);
+    laparoscope.SetTissue(xyz);
+    laparoscope.SetScale(quality.scale());
+    laparoscope.Update();
+    const double updated = CpuMs(CLOCK_MONOTONIC);
+    display->Draw();
+    const double drawn = CpuMs(CLOCK_MONOTONIC);
+    quality.Add(drawn - start);
+    if (k >= settling) {
+      frame_ms.push_back(drawn - start);
+      cpu_side_ms.push_back(updated - start);
+    }
+  }
+  report->Add("render.full_scene_720p.frame_ms_p50", benchmark::Quantile(frame_ms, 0.5), "ms");
+  report->Add("render.full_scene_720p.frame_ms_p95", benchmark::Quantile(frame_ms, 0.95), "ms");
+  report->Add("render.full_scene_720p.cpu_side_ms_p50", benchmark::Quantile(cpu_side_ms, 0.5), "ms");
+  report->Add("render.full_scene_720p.scale", quality.scale(), "1");
+  for (const auto& [name, scale] : {std::pair{"high", 1.0f}, {"low", 0.52f}}) {
+    laparoscope.SetScale(scale);
+    int step = 0;
+    const auto times = benchmark::TimeMs(3, repeats / 2, [&] {
+      Sway(moment.tissue.xyz, ++step, &xyz);
+      laparoscope.SetTissue(xyz);
+      laparoscope.Update();
+      display->Draw();
+    });
+    report->Add(std::string("render.full_scene_720p.") + name + "_frame_ms_p50", benchmark::Quantile(times, 0.5), "ms");
+  }
+}
+
+void Uploads(const SceneView& view, benchmark::Report* report) {
+  if (!report->Wants("render.subtexture_update_ms") && !report->Wants("render.full_atlas_ms")) {
+    return;
+  }
+  const SyntheticMoment moment = MakeSyntheticMoment(view, 12.0);
+  EglContext context;
+  context.MakeCurrent();
+  Atlas atlas(view);
+  AtlasTexture texture(atlas);
+  const osg::ref_ptr<osg::State> state = new osg::State;
+  state->setContextID(osg::GraphicsContext::createNewContextID());
+  state->initializeExtensionProcs();
+  texture.texture()->apply(*state);
+  glFinish();
+  const int repeats = report->quick() ? 15 : 60;
+  const auto upload = [&](const AtlasRect& rect) {
+    texture.Update(rect);
+    texture.texture()->apply(*state);
+    glFinish();
+  };
+  const auto patch = benchmark::TimeMs(3, repeats, [&] { upload(atlas.Apply(moment.patches.front())); });
+  const auto all = benchmark::TimeMs(3, repeats, [&] { upload({0, 0, atlas.width(), atlas.height()}); });
+  report->Add("render.subtexture_update_ms_p50", benchmark::Quantile(patch, 0.5), "ms");
+  report->Add("render.full_atlas_ms", benchmark::Quantile(all, 0.5), "ms");
+}
+
+/// The surface in single precision against its definition in double, after a bend, a twist and a stretch by a half.
+void Embedding(const SceneView& view, benchmark::Report* report) {
+  if (!report->Wants("render.embedding_error_um_max")) {
+    return;
+  }
+  std::vector<float> xyz;
+  for (const Vec3f& p : view.rest_position) {
+    const float turn = 8 * p.y(), lift = 0.05f * std::sin(25 * p.y());
+    xyz.insert(xyz.end(), {std::cos(turn) * p.x() - std::sin(turn) * p.z(), 1.5f * p.y(),
+                           std::sin(turn) * p.x() + std::cos(turn) * p.z() + lift});
+  }
+  std::vector<Vec3f> surface(view.surface_vertices.size());
+  MapEmbedded(view.tets, view.surface_vertices, xyz, surface);
+  double worst_m = 0;
+  for (std::size_t k = 0; k < surface.size(); ++k) {
+    const EmbeddedVertex& vertex = view.surface_vertices[k];
+    Eigen::Vector3d exact = Eigen::Vector3d::Zero();
+    for (std::size_t j = 0; j < 4; ++j) {
+      exact +=
+          static_cast<double>(vertex.barycentric[j]) * PositionOf(xyz, view.tets[vertex.tetrahedron][j]).cast<double>();
+    }
+    worst_m = std::max(worst_m, (surface[k].cast<double>() - exact).norm());
+  }
+  report->Add("render.embedding_error_um_max", 1e6 * worst_m, "um");
+}
+
+/// The node on ports of its own, as in a session.
+class NodeRun {
+ public:
+  explicit NodeRun(const SceneView& view)
+      : folder_(std::filesystem::temp_directory_path() / ("fulcrum_bench_render_" + std::to_string(getpid()))),
+        node_(std::make_unique<RenderNode>(view, RenderSettings{.frames = folder_},
+                                           RenderPorts{*tissue_in_, *topology_in_, *patches_in_, *tools_in_,
+                                                       *handles_in_, *events_in_, *contacts_in_})) {}
+  ~NodeRun() {
+    node_.reset();  // It writes until its end.
+    std::filesystem::remove_all(folder_);
+  }
+  NodeRun(const NodeRun&) = delete;
+  NodeRun& operator=(const NodeRun&) = delete;
+
+  void Publish(SyntheticMoment* moment) {
+    ++sequence_;
+    const Stamp stamp{sequence_, 1, MonotonicNs()};
+    moment->tissue.header.stamp = moment->tools.stamp = moment->topology.stamp = stamp;
+    tissue_out_->Write(moment->tissue);
+    tools_out_->Write(moment->tools);
+    topology_out_->Write(moment->topology);
+  }
+  void Step(double time_s) { node_->Step({static_cast<std::uint64_t>(1e3 * time_s), time_s, 1.0 / 30, 0}); }
+
+ private:
+  std::filesystem::path folder_;
+  bus::InProcessTopic<TissueFrame> tissue_;
+  bus::InProcessTopic<TopologyState> topology_;
+  bus::InProcessTopic<TemperaturePatch> patches_;
+  bus::InProcessTopic<ToolState> tools_;
+  bus::InProcessTopic<HandleState> handles_;
+  bus::InProcessTopic<ThermalEvent> events_;
+  bus::InProcessTopic<CauteryContact> contacts_;
+  std::unique_ptr<bus::Input<TissueFrame>> tissue_in_ = tissue_.MakeInput();
+  std::unique_ptr<bus::Input<TopologyState>> topology_in_ = topology_.MakeInput();
+  std::unique_ptr<bus::Input<TemperaturePatch>> patches_in_ = patches_.MakeInput();
+  std::unique_ptr<bus::Input<ToolState>> tools_in_ = tools_.MakeInput();
+  std::unique_ptr<bus::Input<HandleState>> handles_in_ = handles_.MakeInput();
+  std::unique_ptr<bus::Input<ThermalEvent>> events_in_ = events_.MakeInput();
+  std::unique_ptr<bus::Input<CauteryContact>> contacts_in_ = contacts_.MakeInput();
+  std::unique_ptr<bus::LoanOutput<TissueFrame>> tissue_out_ = tissue_.MakeOutput();
+  std::unique_ptr<bus::Output<TopologyState>> topology_out_ = topology_.MakeOutput();
+  std::unique_ptr<bus::Output<ToolState>> tools_out_ = tools_.MakeOutput();
+  std::uint64_t sequence_ = 0;
+  std::unique_ptr<RenderNode> node_;
+};
+
+/// Every frame comes in and says what the last one said: 30 steps a second, tissue at 100 Hz.
+void StaticScene(const SceneView& view, benchmark::Report* report) {
+  if (!report->Wants("render.static_scene.")) {
+    return;
+  }
+  NodeRun run(view);
+  SyntheticMoment moment = MakeSyntheticMoment(view, 12.0);
+  const int steps = report->quick() ? 60 : 150;
+  double cpu_ms = 0;
+  double began_ms = 0;
+  for (int k = -10; k < steps; ++k) {
+    if (k == 0) {
+      began_ms = CpuMs(CLOCK_MONOTONIC);
+    }
+    for (int frame = 0; frame < 3; ++frame) {
+      run.Publish(&moment);
+    }
+    const double before = CpuMs(CLOCK_PROCESS_CPUTIME_ID);
+    run.Step(1 + k / 30.0);
+    if (k >= 0) {
+      cpu_ms += CpuMs(CLOCK_PROCESS_CPUTIME_ID) - before;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(32));
+  }
+  report->Add("render.static_scene.cpu_pct", 100 * cpu_ms / (CpuMs(CLOCK_MONOTONIC) - began_ms), "%");
+}
+
+/// From the stamp of the newest pose to the end of the drawing that shows it, every step drawn.
+void PoseToFrame(const SceneView& scene, benchmark::Report* report) {
+  if (!report->Wants("render.pose_to_frame_ms")) {
+    return;
+  }
+  SceneView view = scene;
+  view.render.width = 1280;
+  view.render.height = 720;
+  view.render.png_rate_Hz = 240;
+  NodeRun run(view);
+  SyntheticMoment moment = MakeSyntheticMoment(view, 12.0);
+  const std::vector<float> rest = moment.tissue.xyz;
+  std::vector<double> latency_ms;
+  const int settling = 60, steps = report->quick() ? 20 : 60;
+  for (int k = 0; k < settling + steps; ++k) {
+    Sway(rest, k, &moment.tissue.xyz);
+    moment.tools.tools[1].p_WT.z() += 1e-4f;
+    run.Publish(&moment);
+    // The servo's stamps are up to a millisecond old when a step takes them.
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    run.Step(1 + k / 30.0);
+    if (k >= settling) {
+      latency_ms.push_back(1e-6 * static_cast<double>(MonotonicNs() - moment.tools.stamp.stamp_ns));
+    }
+  }
+  report->Add("render.pose_to_frame_ms_p50", benchmark::Quantile(latency_ms, 0.5), "ms");
+}
+
+}  // namespace
+}  // namespace fulcrum::render
 
 int main(int argc, char** argv) {
   using namespace fulcrum;
@@ -20,48 +272,11 @@ int main(int argc, char** argv) {
   try {
     const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
     const SceneView view = data.View();
-    render::LaparoscopeView laparoscope(view);
-    const auto display = render::MakeOffscreenDisplay(laparoscope, view.render);
-    const render::SyntheticMoment moment = render::MakeSyntheticMoment(view, 12.0);
-    laparoscope.SetTissue(moment.tissue.xyz);
-    laparoscope.SetTopology(moment.topology);
-    for (const TemperaturePatch& patch : moment.patches) {
-      laparoscope.ApplyPatch(patch);
-    }
-    for (int tool = 0; tool < kMaxTools; ++tool) {
-      laparoscope.SetTool(tool, moment.tools.tools[static_cast<std::size_t>(tool)]);
-    }
-    const int repeats = report.quick() ? 15 : 60;
-    const auto cpu_side = benchmark::TimeMs(3, repeats, [&] {
-      laparoscope.SetTissue(moment.tissue.xyz);
-      laparoscope.Update();
-    });
-    render::Picture picture;
-    const auto frame = benchmark::TimeMs(3, repeats, [&] {
-      laparoscope.SetTissue(moment.tissue.xyz);
-      laparoscope.Update();
-      display->DrawAndRead(&picture);
-    });
-    // One patch into the atlas' texture, on a context of its own.
-    render::EglContext context;
-    context.MakeCurrent();
-    render::Atlas atlas(view);
-    render::AtlasTexture texture(atlas);
-    osg::ref_ptr<osg::State> state = new osg::State;
-    state->setContextID(osg::GraphicsContext::createNewContextID());
-    state->initializeExtensionProcs();
-    texture.texture()->apply(*state);
-    glFinish();
-    const auto upload = benchmark::TimeMs(3, repeats, [&] {
-      texture.Update(atlas.Apply(moment.patches.front()));
-      texture.texture()->apply(*state);
-      glFinish();
-    });
-    report.Add("render.width", view.render.width, "pixels");
-    report.Add("render.height", view.render.height, "pixels");
-    report.Add("render.frame_ms_p50", benchmark::Quantile(frame, 0.5), "ms");
-    report.Add("render.cpu_side_ms_p50", benchmark::Quantile(cpu_side, 0.5), "ms");
-    report.Add("render.subtexture_update_ms_p50", benchmark::Quantile(upload, 0.5), "ms");
+    render::FullScene(view, &report);
+    render::Uploads(view, &report);
+    render::Embedding(view, &report);
+    render::StaticScene(view, &report);
+    render::PoseToFrame(view, &report);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "bench_render: %s\n", error.what());
     return 1;

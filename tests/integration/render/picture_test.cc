@@ -149,6 +149,30 @@ TEST_F(PictureTest, ASlitShowsFatBetweenBrownedEdges) {
   EXPECT_LT(darkest, 0.75);
 }
 
+TEST_F(PictureTest, InThePapersModelColourFollowsTheTemperatureOfTheMoment) {
+  SceneView paper = view_;
+  paper.thermal.model = ThermalModel::kPaper;
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 4.8);
+  for (TemperaturePatch& patch : moment.patches) {
+    for (std::size_t k = 0; k < patch.texels.size(); k += 4) {
+      patch.texels[k] = 150;  // 95 degrees, and nothing else has happened.
+      patch.texels[k + 1] = patch.texels[k + 2] = 0;
+      patch.texels[k + 3] = 255;
+    }
+  }
+  std::fill(moment.topology.dead_edges.begin(), moment.topology.dead_edges.end(), std::uint8_t{0});
+  std::vector<Rgb> middles;
+  for (const SceneView& scene : {view_, paper}) {
+    LaparoscopeView laparoscope(scene);
+    const auto display = MakeOffscreenDisplay(laparoscope, scene.render);
+    Apply(moment, true, &laparoscope);
+    Picture picture;
+    display->DrawAndRead(&picture);
+    middles.push_back(At(picture, MiddleOfCut(laparoscope, moment)));
+  }
+  EXPECT_LT(middles[1].r, 0.8 * middles[0].r) << "brown by eq. 15";
+}
+
 TEST_F(PictureTest, ARestartedRendererShowsTheCutFromTheTopologyAlone) {
   const SyntheticMoment moment = MakeSyntheticMoment(view_, 4.8);
   const Picture known = Draw([&](LaparoscopeView* l) { Apply(moment, true, l); });

@@ -27,8 +27,8 @@ class RenderNodeTest : public testing::Test {
 
   std::unique_ptr<RenderNode> MakeNode() {
     return std::make_unique<RenderNode>(
-        view_, RenderSettings{false, folder_},
-        RenderPorts{*tissue_in_, *topology_in_, *patches_in_, *tools_in_, *handles_in_, *events_in_});
+        view_, RenderSettings{.frames = folder_},
+        RenderPorts{*tissue_in_, *topology_in_, *patches_in_, *tools_in_, *handles_in_, *events_in_, *contacts_in_});
   }
 
   static double Metric(const RenderNode& node, const std::string& name) {
@@ -74,12 +74,14 @@ class RenderNodeTest : public testing::Test {
   bus::InProcessTopic<ToolState> tools_;
   bus::InProcessTopic<HandleState> handles_;
   bus::InProcessTopic<ThermalEvent> events_;
+  bus::InProcessTopic<CauteryContact> contacts_;
   std::unique_ptr<bus::Input<TissueFrame>> tissue_in_ = tissue_.MakeInput();
   std::unique_ptr<bus::Input<TopologyState>> topology_in_ = topology_.MakeInput();
   std::unique_ptr<bus::Input<TemperaturePatch>> patches_in_ = patches_.MakeInput();
   std::unique_ptr<bus::Input<ToolState>> tools_in_ = tools_.MakeInput();
   std::unique_ptr<bus::Input<HandleState>> handles_in_ = handles_.MakeInput();
   std::unique_ptr<bus::Input<ThermalEvent>> events_in_ = events_.MakeInput();
+  std::unique_ptr<bus::Input<CauteryContact>> contacts_in_ = contacts_.MakeInput();
   std::unique_ptr<bus::LoanOutput<TissueFrame>> tissue_out_ = tissue_.MakeOutput();
   std::unique_ptr<bus::Output<TopologyState>> topology_out_ = topology_.MakeOutput();
   std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patches_out_ = patches_.MakeOutput();
@@ -156,6 +158,32 @@ TEST_F(RenderNodeTest, ANewNodeShowsTheCutAfterOneTissueFrameAndOneTopology) {
     node->Step(At(4.9));
   }
   EXPECT_NE(with_cut.rgb, ReadPng(folder_ / "frame_0004900.png").rgb);
+}
+
+TEST_F(RenderNodeTest, HoldsTissueThatIsLateAndSaysSo) {
+  {
+    const auto node = MakeNode();
+    SyntheticMoment moment = MakeSyntheticMoment(view_, 1.0);
+    Publish(moment);
+    node->Step(At(1.0));
+    node->Step(At(1.5));
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 2) << "the picture says that tissue is late";
+    node->Step(At(2.1));
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 2) << "it says so once";
+    Publish(moment);
+    node->Step(At(2.6));
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 3) << "and takes it back";
+  }
+  const Picture held = ReadPng(folder_ / "frame_0001500.png");
+  const auto red_text = [](const Picture& picture) {
+    int count = 0;
+    for (std::size_t k = 0; k < picture.rgb.size(); k += 3) {
+      count += picture.rgb[k] > 250 && picture.rgb[k + 2] < 60 ? 1 : 0;
+    }
+    return count;
+  };
+  EXPECT_GT(red_text(held), 50);
+  EXPECT_EQ(red_text(ReadPng(folder_ / "frame_0002600.png")), 0);
 }
 
 TEST_F(RenderNodeTest, PatchesReachThePicture) {

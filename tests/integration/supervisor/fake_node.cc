@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
       throw fulcrum::MismatchError("the scene is another one");
     }
     (void)app.options().TakeFlag("--window");
+    (void)app.options().TakeValue("--quality", "auto");
     auto& frames = app.MakeOutput<fulcrum::TissueFrame>();
     (void)app.MakeInput<fulcrum::TissueFrame>();
     std::uint64_t sequence = 0;

@@ -40,6 +40,17 @@ TEST(NodeOptionsTest, ReadsTheCommonOptionsAndLeavesTheRest) {
   EXPECT_TRUE(parsed.options.extra.empty());
 }
 
+TEST(NodeOptionsTest, TakesValuesOfOptionsOfTheNode) {
+  NodeOptions options;
+  options.extra = {"--quality", "low", "--window", "--other=1"};
+  EXPECT_EQ(options.TakeValue("--quality", "auto"), "low");
+  EXPECT_EQ(options.TakeValue("--quality", "auto"), "auto");
+  EXPECT_EQ(options.TakeValue("--other", ""), "1");
+  EXPECT_EQ(options.extra, std::vector<std::string>{"--window"});
+  options.extra = {"--quality"};
+  EXPECT_THROW(static_cast<void>(options.TakeValue("--quality", "auto")), InputError);
+}
+
 TEST(NodeOptionsTest, RefusesWhatCannotWork) {
   ExpectRefused({"--session", "x"}, "--scene is missing");
   ExpectRefused({"--scene", "x"}, "--session is missing");

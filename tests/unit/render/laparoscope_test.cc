@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render_node/geometry/camera_control.h"
 #include "render_node/geometry/solid.h"
 #include "render_node/geometry/tissue_pattern.h"
 
@@ -41,6 +42,40 @@ TEST(LaparoscopeTest, TheFieldOfViewSpansTheHeight) {
   EXPECT_NEAR(ToClip(scope, Vec3f(half * 960 / 540, 0, 0)).x(), 1, 1e-4f);
 }
 
+TEST(LaparoscopeTest, TheHorizonRollsClockwise) {
+  RenderParams params;
+  params.scope_tip_W = Vec3f(0, -0.08f, 0.09f);
+  params.roll_deg = 90;
+  const Laparoscope scope = MakeLaparoscope(params);
+  EXPECT_GT(ToClip(scope, Vec3f(0, 0, 0.01f)).x(), 0.01f) << "what was up is on the right";
+  EXPECT_NEAR(ToClip(scope, Vec3f(0, 0, 0.01f)).y(), 0, 1e-5f);
+}
+
+TEST(CameraControlTest, TurnsAboutTheTargetAndComesBack) {
+  RenderParams scene;
+  scene.scope_tip_W = Vec3f(0.004f, -0.06f, 0.08f);
+  scene.scope_target_W = Vec3f(0, 0.002f, 0.02f);
+  CameraControl camera(scene);
+  const float distance = (scene.scope_tip_W - scene.scope_target_W).norm();
+  for (const CameraKey key : {CameraKey::kLeft, CameraKey::kUp, CameraKey::kRight, CameraKey::kDown}) {
+    for (int k = 0; k < 60; ++k) {
+      camera.Press(key);
+      const Vec3f out = camera.params().scope_tip_W - camera.params().scope_target_W;
+      EXPECT_NEAR(out.norm(), distance, 1e-4f);
+      EXPECT_LT(std::abs(out.normalized().z()), 0.98f) << "never straight down, where up is lost";
+    }
+  }
+  for (int k = 0; k < 100; ++k) {
+    camera.Press(CameraKey::kNearer);
+  }
+  EXPECT_NEAR((camera.params().scope_tip_W - camera.params().scope_target_W).norm(), 0.02f, 1e-4f);
+  camera.Follow(Vec3f(0.01f, 0, 0.03f));
+  EXPECT_EQ(camera.params().scope_target_W, Vec3f(0.01f, 0, 0.03f));
+  camera.Press(CameraKey::kReset);
+  EXPECT_EQ(camera.params().scope_tip_W, scene.scope_tip_W);
+  EXPECT_EQ(camera.params().scope_target_W, scene.scope_target_W);
+}
+
 TEST(LaparoscopeTest, LightIsOneAtTheTargetAndLeavesBetweenSightAndShaft) {
   RenderParams params;
   params.scope_tip_W = Vec3f(0, 0, 0.1f);
@@ -62,7 +97,8 @@ float SignedVolume(const Solid& solid) {
 
 TEST(SolidTest, FacesLookOutwardAndNormalsAgree) {
   const ToolShape shape{0.0025f, 0.33f, 0.0015f, 0.018f};
-  for (const Solid& solid : {GrasperShaft(shape), GrasperJaw(shape), Hook({0.0025f, 0.33f, 0.0006f, 0.005f})}) {
+  for (const Solid& solid :
+       {GrasperShaft(shape), GrasperJaw(shape), ScissorBlade(shape), Hook({0.0025f, 0.33f, 0.0006f, 0.005f})}) {
     EXPECT_GT(SignedVolume(solid), 0);
     for (const Triangle& t : solid.triangles) {
       const Vec3f area =

@@ -1,0 +1,173 @@
+#include "render_node/geometry/bleeding.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "render_node/geometry/texel.h"
+
+namespace fulcrum::render {
+namespace {
+
+constexpr double kStep_s = 0.02;
+constexpr int kMostSteps = 50;                     // After a longer pause time is skipped, not caught up on.
+constexpr int kDropEvery = 14;                     // Steps.
+constexpr int kRim = 16;                           // Places looked at round a cut.
+constexpr float kRimRadii[] = {0.0005f, 0.0008f};  // [m]
+constexpr float kVessel = 0.5f;
+constexpr std::uint8_t kSealed = 128;
+constexpr float kWay_m = 0.032f;
+constexpr float kSpeed_m_s = 0.009f;  // Down a wall.
+constexpr float kLeastSlope = 0.15f;  // A film creeps on flat ground, too.
+constexpr float kSameVessel_m = 0.006f;
+constexpr float kPool_m = 0.0024f;  // Radius at the source.
+constexpr float kDrop_m = 0.0016f;  // Radius of a full drop.
+constexpr float kStray = 0.6f;      // [rad]
+constexpr float kThick = 1.0f, kThin = 0.6f;
+
+}  // namespace
+
+Bleeding::Bleeding(const SceneView& scene, std::span<const std::uint8_t> vessels, int texels, float per_m)
+    : scene_(scene), vessels_(vessels), texels_(texels), per_m_(per_m) {}
+
+float Bleeding::VesselAt(const Vec2f& material) const {
+  const auto wrapped = [this](float metres) {
+    const float place = metres * per_m_;
+    return std::min(texels_ - 1, static_cast<int>((place - std::floor(place)) * static_cast<float>(texels_)));
+  };
+  return static_cast<float>(vessels_[4 * TexelIndex(wrapped(material.x()), wrapped(material.y()), texels_) + 3]) / 255;
+}
+
+void Bleeding::Cut(const Vec2f& material, const Atlas& atlas, double session_time_s) {
+  Vec2f best = material;
+  float strongest = kVessel;
+  for (const float radius : kRimRadii) {
+    for (int k = 0; k < kRim; ++k) {
+      const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kRim;
+      const Vec2f place = material + radius * Vec2f(std::cos(angle), std::sin(angle));
+      const auto texel = atlas.At(place);
+      if (texel && (*texel)[3] >= 128 && (*texel)[1] < kSealed && VesselAt(place) > strongest) {
+        strongest = VesselAt(place);
+        best = place;
+      }
+    }
+  }
+  const bool known = std::any_of(sources_.begin(), sources_.end(), [&](const Source& source) {
+    return source.open && (source.material - best).norm() < kSameVessel_m;
+  });
+  if (strongest <= kVessel || known || scene_.membrane_material.empty()) {
+    return;
+  }
+  if (sources() == 0 && drops() == 0) {
+    time_s_ = session_time_s;
+  }
+  Index nearest = 0;
+  for (Index node = 1; node < scene_.membrane.node_count(); ++node) {
+    if ((scene_.membrane_material[node] - best).squaredNorm() <
+        (scene_.membrane_material[nearest] - best).squaredNorm()) {
+      nearest = node;
+    }
+  }
+  sources_[next_source_] = {true, best, nearest, 0};
+  next_source_ = (next_source_ + 1) % sources_.size();
+}
+
+int Bleeding::sources() const {
+  return static_cast<int>(std::count_if(sources_.begin(), sources_.end(), [](const Source& s) { return s.open; }));
+}
+
+int Bleeding::drops() const {
+  return static_cast<int>(std::count_if(drops_.begin(), drops_.end(), [](const Drop& d) { return d.left_m > 0; }));
+}
+
+AtlasRect Bleeding::Update(double session_time_s, const MembraneMesh& membrane, Atlas* atlas) {
+  AtlasRect changed;
+  if (sources() == 0 && drops() == 0) {
+    return changed;
+  }
+  time_s_ = std::max(time_s_, session_time_s - kMostSteps * kStep_s);
+  for (; time_s_ + kStep_s <= session_time_s; time_s_ += kStep_s) {
+    for (Source& source : sources_) {
+      if (source.open) {
+        changed = changed.United(Bleed(&source, atlas));
+      }
+    }
+    for (Drop& drop : drops_) {
+      if (drop.left_m > 0) {
+        changed = changed.United(Run(&drop, membrane.positions(), atlas));
+      }
+    }
+  }
+  return changed;
+}
+
+AtlasRect Bleeding::Bleed(Source* source, Atlas* atlas) {
+  const auto texel = atlas->At(source->material);
+  if (!texel || (*texel)[3] < 128 || (*texel)[1] >= kSealed) {
+    source->open = false;
+    return {};
+  }
+  if (source->steps++ % kDropEvery != 0) {
+    return {};
+  }
+  drops_[next_drop_] = {kWay_m, source->material, source->node, 2.39996f * static_cast<float>(next_drop_)};
+  next_drop_ = (next_drop_ + 1) % drops_.size();
+  const float grown = std::min(1.0f, 0.5f + 0.004f * static_cast<float>(source->steps));
+  return atlas->Stain(source->material, grown * kPool_m, kThick);
+}
+
+AtlasRect Bleeding::Run(Drop* drop, std::span<const Vec3f> positions, Atlas* atlas) {
+  const Vec2f downhill = Downhill(drop->node, positions);
+  const float slope = downhill.norm();
+  const float way = static_cast<float>(kStep_s) * kSpeed_m_s * std::max(slope, kLeastSlope);
+  if (slope > 0) {
+    // Tissue is never even: drops from one source take slightly different ways.
+    const float stray = kStray * std::sin(1400 * drop->material.x() + 900 * drop->material.y() + drop->phase);
+    drop->material += way / slope * (Eigen::Rotation2Df(stray) * downhill);
+  }
+  drop->left_m -= way;
+  drop->node = NearestNode(drop->material, drop->node);
+  const float full = std::max(0.0f, drop->left_m / kWay_m);
+  return atlas->Stain(drop->material, (0.5f + 0.5f * full) * kDrop_m, kThin + (kThick - kThin) * full);
+}
+
+// Steepest descent over the neighbours: the sheet's places grow with row and column.
+Index Bleeding::NearestNode(const Vec2f& material, Index start) const {
+  const std::uint32_t rows = scene_.membrane.rows, cols = scene_.membrane.cols;
+  Index best = start;
+  for (;;) {
+    const Index here = best;
+    const std::uint32_t row = here / cols, col = here % cols;
+    for (std::uint32_t r = row > 0 ? row - 1 : 0; r <= std::min(row + 1, rows - 1); ++r) {
+      for (std::uint32_t c = col > 0 ? col - 1 : 0; c <= std::min(col + 1, cols - 1); ++c) {
+        const Index other = r * cols + c;
+        if ((scene_.membrane_material[other] - material).squaredNorm() <
+            (scene_.membrane_material[best] - material).squaredNorm()) {
+          best = other;
+        }
+      }
+    }
+    if (best == here) {
+      return best;
+    }
+  }
+}
+
+/// In (s, t), its length the sine of the slope: the gradient of the height, from the differences to the neighbours.
+Vec2f Bleeding::Downhill(Index node, std::span<const Vec3f> positions) const {
+  const std::uint32_t rows = scene_.membrane.rows, cols = scene_.membrane.cols;
+  const std::uint32_t row = node / cols, col = node % cols;
+  const Index up = (row > 0 ? row - 1 : 0) * cols + col, down = std::min(row + 1, rows - 1) * cols + col;
+  const Index left = row * cols + (col > 0 ? col - 1 : 0), right = row * cols + std::min(col + 1, cols - 1);
+  Eigen::Matrix2f step;
+  step << (scene_.membrane_material[right] - scene_.membrane_material[left]).transpose(),
+      (scene_.membrane_material[down] - scene_.membrane_material[up]).transpose();
+  if (std::abs(step.determinant()) < 1e-12f) {  // [m^2]: a grid of less than a micrometre.
+    return Vec2f::Zero();
+  }
+  const Vec2f rise(positions[right].z() - positions[left].z(), positions[down].z() - positions[up].z());
+  const Vec2f gradient = step.inverse() * rise;
+  return -gradient / std::sqrt(1 + gradient.squaredNorm());
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,29 @@
+// The laparoscope in the hand of an assistant at the keyboard. Pure.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "services/core/scene_view.h"
+
+namespace fulcrum::render {
+
+enum class CameraKey { kLeft, kRight, kUp, kDown, kNearer, kFarther, kRollLeft, kRollRight, kReset };
+
+class CameraControl {
+ public:
+  explicit CameraControl(const RenderParams& scene) : scene_(scene), now_(scene) {}
+
+  /// Turns the tip about the target by 3 degrees, moves it by a twentieth of the way, or rolls the horizon by 5
+  /// degrees.
+  void Press(CameraKey key);
+  /// The picture's middle follows this point [m]; without one it stays.
+  void Follow(const Vec3f& p_W);
+  [[nodiscard]] const RenderParams& params() const { return now_; }
+
+ private:
+  RenderParams scene_;
+  RenderParams now_;
+};
+
+}  // namespace fulcrum::render

@@ -1,0 +1,60 @@
+#include "render_node/geometry/quality.h"
+
+#include <algorithm>
+#include <string>
+
+#include "services/core/error.h"
+
+namespace fulcrum::render {
+namespace {
+
+constexpr double kBudget_ms = 28;  // Of the 33 ms that 30 pictures a second leave, with room for a busy moment.
+constexpr double kStepCost = 1.5;  // A step finer costs up to this factor more.
+constexpr int kCalmWindows = 6;    // Some two seconds: no going to and fro.
+constexpr float kFewestLines = 270;
+
+}  // namespace
+
+Quality QualityFromName(std::string_view name) {
+  if (name == "auto") {
+    return Quality::kAuto;
+  }
+  if (name == "low") {
+    return Quality::kLow;
+  }
+  if (name == "high") {
+    return Quality::kHigh;
+  }
+  throw InputError("--quality: \"" + std::string(name) + "\"; valid: auto, low, high");
+}
+
+QualityControl::QualityControl(Quality quality, int height) : automatic_(quality == Quality::kAuto) {
+  while (last_step_ + 1 < kScales.size() && kScales[last_step_ + 1] * static_cast<float>(height) >= kFewestLines) {
+    ++last_step_;
+  }
+  if (quality == Quality::kLow) {
+    step_ = last_step_;
+  }
+}
+
+void QualityControl::Add(double draw_ms) {
+  if (!automatic_) {
+    return;
+  }
+  cost_ms_[count_++] = draw_ms;
+  if (count_ < kWindow) {
+    return;
+  }
+  count_ = 0;
+  std::nth_element(cost_ms_.begin(), cost_ms_.begin() + kWindow / 2, cost_ms_.end());
+  const double median_ms = cost_ms_[kWindow / 2];
+  calm_ = median_ms * kStepCost < kBudget_ms ? calm_ + 1 : 0;
+  if (median_ms > kBudget_ms && step_ < last_step_) {
+    ++step_;
+  } else if (calm_ >= kCalmWindows && step_ > 0) {
+    --step_;
+    calm_ = 0;
+  }
+}
+
+}  // namespace fulcrum::render

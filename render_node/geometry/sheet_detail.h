@@ -1,0 +1,40 @@
+// How finely each part of the membrane is drawn. A software rasteriser shades blocks of 4 x 4 pixels: where the sheet
+// is smooth and whole, triangles of a few pixels cost several times what large ones do and show the same. Pure.
+#pragma once
+
+#include <vector>
+
+#include "render_node/geometry/membrane_mesh.h"
+
+namespace fulcrum::render {
+
+class SheetDetail {
+ public:
+  explicit SheetDetail(const MembraneGrid& grid);
+
+  /// Replaces `out` by the triangles to draw: per block of the grid the coarsest division that lies within half a pixel
+  /// of the fine one and keeps its normals within 0.15; cut blocks and those beside them as they are. Without gaps
+  /// between blocks. Rows far from the eye come first, so that in a fold the near layer is blended over the far one;
+  /// then the parts of cut triangles.
+  ///
+  /// @param eye_W           Place of the eye [m].
+  /// @param pixels_per_rad  Of the picture, in its middle.
+  void Choose(const MembraneMesh& membrane, const Vec3f& eye_W, float pixels_per_rad, std::vector<Triangle>* out);
+
+  /// Nodes of a block: [row, row_end] x [col, col_end].
+  struct Block {
+    std::uint32_t row, row_end, col, col_end;
+  };
+
+ private:
+  [[nodiscard]] Block BlockAt(std::uint32_t row, std::uint32_t col) const;
+  [[nodiscard]] bool BesideCut(const MembraneMesh& membrane, std::uint32_t row, std::uint32_t col) const;
+  void ChooseLevels(const MembraneMesh& membrane, const Vec3f& eye_W, float pixels_per_rad);
+  void AppendBlock(const MembraneMesh& membrane, std::uint32_t row, std::uint32_t col,
+                   std::vector<Triangle>* out) const;
+
+  MembraneGrid grid_;
+  std::vector<std::uint8_t> levels_;  // Per block: how coarse.
+};
+
+}  // namespace fulcrum::render

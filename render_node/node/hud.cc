@@ -1,0 +1,78 @@
+#include "render_node/node/hud.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string_view>
+
+namespace fulcrum::render {
+namespace {
+
+constexpr int kBar = 10;  // Blocks.
+
+std::string Number(const char* format, double value) {
+  std::array<char, 32> text;
+  std::snprintf(text.data(), text.size(), format, value);
+  return text.data();
+}
+
+std::string ForceBar(int tool, float force_N, float limit_N) {
+  const int full = std::clamp(static_cast<int>(std::ceil(kBar * force_N / limit_N - 0.05f)), 0, kBar);
+  return (tool == 0 ? "L " : "R ") + std::string(static_cast<std::size_t>(full), '#') +
+         std::string(static_cast<std::size_t>(kBar - full), '-') + Number(" %.1f N", force_N);
+}
+
+}  // namespace
+
+std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
+  std::vector<OverlayText> texts;
+  int line = 0;
+  for (const auto& [alarm, name] : {std::pair{state.ureter, "URETER"}, {state.nerve, "NERVE"}}) {
+    if (alarm != Alarm::kNone) {
+      texts.push_back({Corner::kTopRight, line, name, true, 2});
+      texts.push_back({Corner::kTopRight, line + 1, alarm == Alarm::kInjured ? "INJURED" : "HOT!", true, 2});
+      line += 2;
+    }
+  }
+  line = 0;
+  for (const std::string& late : state.late) {
+    texts.push_back({Corner::kTopLeft, ++line, late, true});
+  }
+  if (state.paused) {
+    texts.push_back({Corner::kTopLeft, ++line, "PAUSED", true});
+  }
+  if (state.help) {
+    for (const std::string_view key : {"ARROWS TURN", "+ - NEARER, FARTHER", "R T ROLL", "0 RESET VIEW",
+                                       "L LOCK ON TOOL", "S SCREENSHOT", "P PAUSE", "U FIGURES", "H HELP"}) {
+      texts.push_back({Corner::kTopLeft, ++line, std::string(key)});
+    }
+  }
+  if (!figures) {
+    return texts;
+  }
+  texts.push_back({Corner::kTopLeft, 0, Number("%.1f s", state.session_time_s)});
+  line = 0;
+  for (int tool = kMaxTools - 1; tool >= 0; --tool) {
+    if (const auto& force_N = state.force_N[static_cast<std::size_t>(tool)]) {
+      texts.push_back({Corner::kBottomLeft, line++, ForceBar(tool, *force_N, state.force_limit_N)});
+    }
+  }
+  const char* mode = (state.pedals & kPedalBlend)  ? "BLEND"
+                     : (state.pedals & kPedalCut)  ? "CUT"
+                     : (state.pedals & kPedalCoag) ? "COAG"
+                                                   : "";
+  if (*mode != '\0') {
+    texts.push_back(
+        {Corner::kBottomLeft, line, state.power_W > 0 ? std::string(mode) + Number(" %.0f W", state.power_W) : mode});
+  }
+  line = 0;
+  if (state.slit_m > 0) {
+    texts.push_back({Corner::kBottomRight, line++, Number("SLIT %.0f mm", 1000.0 * state.slit_m)});
+  }
+  if (state.tip_C) {
+    texts.push_back({Corner::kBottomRight, line, Number("TIP %.0f C", *state.tip_C)});
+  }
+  return texts;
+}
+
+}  // namespace fulcrum::render

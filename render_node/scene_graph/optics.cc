@@ -1,0 +1,184 @@
+#include "render_node/scene_graph/optics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <osg/Geode>
+#include <vector>
+
+#include "render_node/offscreen/framebuffer.h"
+#include "render_node/scene_graph/mesh.h"
+#include "render_node/scene_graph/order.h"
+#include "render_node/scene_graph/program.h"
+
+namespace fulcrum::render {
+namespace {
+
+constexpr unsigned kPictureUnit = 6;  // A texture unit that no other shader uses.
+constexpr Index kSides = 128;
+
+osg::Matrix ToOsg(const Eigen::Matrix4f& m) {
+  osg::Matrix out;
+  for (int row = 0; row < 4; ++row) {
+    for (int col = 0; col < 4; ++col) {
+      out(row, col) = m(col, row);  // OSG multiplies row vectors.
+    }
+  }
+  return out;
+}
+
+/// After a picture its camera rests until something has changed.
+class DrawnOnce : public osg::Camera::DrawCallback {
+ public:
+  explicit DrawnOnce(osg::Camera* camera) : camera_(camera) {}
+  void operator()(osg::RenderInfo&) const override { camera_->setNodeMask(0); }
+
+ private:
+  osg::Camera* camera_;  // Owns this.
+};
+
+}  // namespace
+
+/// First in the scene's picture: the background, colour and depth.
+class Optics::CopyTarget : public osg::Drawable {
+ public:
+  CopyTarget(const Target& from, const Target& to) : from_(from), to_(to) {
+    setUseDisplayList(false);
+    setCullingActive(false);
+    DrawIn(Order::kBackground, getOrCreateStateSet());
+  }
+  CopyTarget() = default;
+  CopyTarget(const CopyTarget& other, const osg::CopyOp& copy_op)
+      : osg::Drawable(other, copy_op), from_(other.from_), to_(other.to_) {}
+  META_Object(fulcrum, CopyTarget);
+
+  void drawImplementation(osg::RenderInfo& info) const override {
+    const osg::Viewport* area = to_.camera->getViewport();
+    const unsigned context = info.getContextID();
+    const auto copy = [&](const osg::Texture2D& from, const osg::Texture2D& to) {
+      CopyTexture(from.getTextureObject(context)->id(), to.getTextureObject(context)->id(),
+                  static_cast<int>(area->width()), static_cast<int>(area->height()));
+    };
+    copy(*from_.colour, *to_.colour);
+    copy(*from_.depth, *to_.depth);
+  }
+
+ private:
+  Target from_, to_;
+};
+
+Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* background, osg::Node* scene)
+    : scope_(scope),
+      width_(width),
+      height_(height),
+      node_(new osg::Group),
+      circle_radius_(new osg::Uniform("circle_radius", 1.0f)),
+      picture_centre_(new osg::Uniform("picture_centre", osg::Vec2())),
+      texture_scale_(new osg::Uniform("texture_scale", osg::Vec2(1, 1))),
+      texture_most_(new osg::Uniform("texture_most", osg::Vec2(1, 1))) {
+  osg::StateSet* state = node_->getOrCreateStateSet();
+  state->addUniform(circle_radius_);
+  state->addUniform(picture_centre_);
+  background_ = MakeTarget(0, background);
+  background_.camera->setClearColor(osg::Vec4(0.12f, 0.035f, 0.03f, 1));
+  scene_ = MakeTarget(1, scene);
+  scene_.camera->setClearMask(0);
+  const osg::ref_ptr<osg::Geode> copy = new osg::Geode;
+  copy->addDrawable(new CopyTarget(background_, scene_));
+  scene_.camera->addChild(copy);
+  AddField();
+  SetScope(scope);
+  SetScale(1);
+}
+
+Optics::Target Optics::MakeTarget(int order, osg::Node* content) {
+  const auto make_texture = [this](GLint internal, GLenum format, GLenum type) {
+    osg::ref_ptr<osg::Texture2D> texture = new osg::Texture2D;
+    texture->setTextureSize(width_, height_);
+    texture->setInternalFormat(internal);
+    texture->setSourceFormat(format);
+    texture->setSourceType(type);
+    texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::LINEAR);
+    texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::LINEAR);
+    texture->setWrap(osg::Texture::WRAP_S, osg::Texture::CLAMP_TO_EDGE);
+    texture->setWrap(osg::Texture::WRAP_T, osg::Texture::CLAMP_TO_EDGE);
+    texture->setResizeNonPowerOfTwoHint(false);
+    return texture;
+  };
+  Target target;
+  target.colour = make_texture(GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE);
+  target.depth = make_texture(GL_DEPTH_COMPONENT24, GL_DEPTH_COMPONENT, GL_UNSIGNED_INT);
+  target.camera = new osg::Camera;
+  target.camera->setReferenceFrame(osg::Transform::ABSOLUTE_RF);
+  target.camera->setRenderOrder(osg::Camera::PRE_RENDER, order);
+  target.camera->setRenderTargetImplementation(osg::Camera::FRAME_BUFFER_OBJECT);
+  target.camera->attach(osg::Camera::COLOR_BUFFER, target.colour);
+  target.camera->attach(osg::Camera::DEPTH_BUFFER, target.depth);
+  target.camera->setComputeNearFarMode(osg::Camera::DO_NOT_COMPUTE_NEAR_FAR);
+  target.camera->setCullingMode(osg::CullSettings::NO_CULLING);
+  target.camera->setProjectionMatrix(ToOsg(scope_.projection));
+  target.camera->setFinalDrawCallback(new DrawnOnce(target.camera));
+  target.camera->addChild(content);
+  node_->addChild(target.camera);
+  return target;
+}
+
+void Optics::AddField() {
+  Mesh field("field", false);
+  field.state()->setAttributeAndModes(MakeProgram("field.vert", "field.frag"));
+  field.state()->addUniform(new osg::Uniform("scene_picture", static_cast<int>(kPictureUnit)));
+  field.state()->addUniform(texture_scale_);
+  field.state()->addUniform(texture_most_);
+  field.state()->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
+  field.state()->setRenderBinDetails(0, "RenderBin");
+  std::vector<Vec3f> positions{Vec3f::Zero()};
+  std::vector<Triangle> triangles;
+  for (Index k = 0; k < kSides; ++k) {
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kSides;
+    positions.emplace_back(scope_.circle_radius * std::cos(angle) / scope_.picture_centre.x(),
+                           scope_.circle_radius * std::sin(angle) / scope_.picture_centre.y(), 0.0f);
+    triangles.push_back({0, 1 + k, 1 + (k + 1) % kSides});
+  }
+  field.SetPositions(positions);
+  field.SetTriangles(triangles);
+  const osg::ref_ptr<osg::Geode> geode = new osg::Geode;
+  geode->addDrawable(field.geometry());
+  node_->addChild(geode);
+  node_->getOrCreateStateSet()->setTextureAttribute(kPictureUnit, scene_.colour);
+}
+
+void Optics::SetScale(float scale) {
+  const auto pixels = [scale](int full) {
+    return std::clamp(static_cast<int>(std::lround(scale * static_cast<float>(full))), 1, full);
+  };
+  const int width = pixels(width_), height = pixels(height_);
+  const osg::Viewport* now = scene_.camera->getViewport();
+  if (now != nullptr && static_cast<int>(now->width()) == width && static_cast<int>(now->height()) == height) {
+    return;
+  }
+  background_.camera->setViewport(0, 0, width, height);
+  scene_.camera->setViewport(0, 0, width, height);
+  const osg::Vec2 share(static_cast<float>(width) / static_cast<float>(width_),
+                        static_cast<float>(height) / static_cast<float>(height_));
+  circle_radius_->set(scope_.circle_radius * share.y());
+  picture_centre_->set(osg::Vec2(scope_.picture_centre.x() * share.x(), scope_.picture_centre.y() * share.y()));
+  texture_scale_->set(share);
+  // Beyond the last texel drawn lies an older picture.
+  texture_most_->set(share - osg::Vec2(0.5f / static_cast<float>(width_), 0.5f / static_cast<float>(height_)));
+  BackgroundChanged();
+}
+
+void Optics::SetScope(const Laparoscope& scope) {
+  background_.camera->setViewMatrix(ToOsg(scope.view));
+  scene_.camera->setViewMatrix(ToOsg(scope.view));
+  BackgroundChanged();
+}
+
+void Optics::SceneChanged() { scene_.camera->setNodeMask(~0u); }
+
+void Optics::BackgroundChanged() {
+  background_.camera->setNodeMask(~0u);
+  SceneChanged();
+}
+
+}  // namespace fulcrum::render

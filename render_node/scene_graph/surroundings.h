@@ -1,0 +1,28 @@
+// What does not deform: the fixed surfaces of the scene, a cavity round everything, and the black rim of the optics.
+#pragma once
+
+#include <osg/Geode>
+
+#include "render_node/geometry/laparoscope.h"
+
+namespace fulcrum::render {
+
+class Surroundings {
+ public:
+  Surroundings(const SceneView& scene, const Laparoscope& scope);
+
+  /// What breathes is drawn this far from its place [m].
+  void SetShift(const Vec3f& shift) { shift_->set(osg::Vec3(shift.x(), shift.y(), shift.z())); }
+  /// What never moves.
+  [[nodiscard]] osg::Geode* fixed() const { return fixed_; }
+  [[nodiscard]] osg::Geode* breathing() const { return breathing_; }
+
+ private:
+  void AddMask(const Laparoscope& scope);
+  void AddSurfaces(const SceneView& scene, const char* name, bool breathing);
+
+  osg::ref_ptr<osg::Geode> fixed_ = new osg::Geode, breathing_ = new osg::Geode;
+  osg::ref_ptr<osg::Uniform> shift_ = new osg::Uniform("shift", osg::Vec3(0, 0, 0));
+};
+
+}  // namespace fulcrum::render

@@ -1,0 +1,181 @@
+#include "render_node/scene_graph/tissue_layers.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <osg/CullFace>
+#include <osg/Depth>
+
+#include "render_node/geometry/sheet_detail.h"
+#include "render_node/geometry/surface.h"
+#include "render_node/scene_graph/program.h"
+
+namespace fulcrum::render {
+namespace {
+
+using Float4 = std::array<float, 4>;
+
+constexpr std::uint32_t kFatStride = 2;
+// Layers of tissue that press on each other overlap by a millimetre in the simulation: the inner one gives way.
+constexpr float kFatBehind = 0.0015f;     // [m]
+constexpr float kRectumBehind = 0.0025f;  // [m]
+
+Vec3f EyeOf(const Laparoscope& scope) {
+  return -scope.view.block<3, 3>(0, 0).transpose() * scope.view.block<3, 1>(0, 3);
+}
+
+float PixelsPerRad(const Laparoscope& scope) { return scope.projection(1, 1) * scope.picture_centre.y(); }
+
+}  // namespace
+
+TissueLayers::TissueLayers(const SceneView& scene, const Laparoscope& scope)
+    : scene_(scene),
+      field_(scope),
+      eye_W_(EyeOf(scope)),
+      pixels_per_rad_(PixelsPerRad(scope)),
+      membrane_(scene),
+      detail_(scene.membrane),
+      fat_(scene, kFatStride) {
+  xyz_.resize(3 * scene.rest_position.size());
+  for (std::size_t i = 0; i < scene.rest_position.size(); ++i) {
+    Eigen::Map<Vec3f>(xyz_.data() + 3 * i) = scene.rest_position[i];
+  }
+  AddRectum();
+  AddSheets();
+}
+
+void TissueLayers::Add(Layer* layer, const char* name, Order order, const char* fragment) {
+  layer->mesh = std::make_unique<Mesh>(name, true);
+  layer->mesh->state()->setAttributeAndModes(MakeProgram("surface.vert", fragment));
+  DrawIn(order, layer->mesh->state());
+  geode_->addDrawable(layer->mesh->geometry());
+}
+
+void TissueLayers::AddRectum() {
+  const std::size_t count = scene_.surface_vertices.size();
+  rectum_positions_.resize(count);
+  rectum_normals_.resize(count);
+  UpdateRectum();
+  // The pattern sticks to the tissue: coordinates at rest along the organ's three principal directions.
+  Vec3f mean = Vec3f::Zero();
+  for (const Vec3f& p : rectum_positions_) {
+    mean += p / static_cast<float>(count);
+  }
+  Mat3f spread = Mat3f::Zero();
+  for (const Vec3f& p : rectum_positions_) {
+    spread += (p - mean) * (p - mean).transpose();
+  }
+  const Mat3f axes = Eigen::SelfAdjointEigenSolver<Mat3f>(spread).eigenvectors();  // Ascending: the long axis is last.
+  std::vector<Float4> coordinates(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Vec3f place = axes.transpose() * (rectum_positions_[k] - mean);
+    const Vec3f facing = axes.transpose() * rectum_normals_[k];
+    const float front = facing[0] * facing[0], side = facing[1] * facing[1];
+    coordinates[k] = {place[2], place[1], place[0], front + side > 0 ? front / (front + side) : 0.5f};
+  }
+  Add(&rectum_, "rectum", Order::kRectum, "rectum.frag");
+  rectum_.mesh->state()->setAttributeAndModes(new osg::CullFace(osg::CullFace::BACK));
+  rectum_.mesh->state()->addUniform(new osg::Uniform("behind", kRectumBehind));
+  rectum_.mesh->SetCoordinates(coordinates);
+}
+
+void TissueLayers::AddSheets() {
+  Add(&fat_layer_, "fat", Order::kFat, "fat.frag");
+  Blend(fat_layer_.mesh->state());
+  fat_layer_.mesh->state()->addUniform(new osg::Uniform("behind", kFatBehind));
+  std::vector<Float4> coordinates;
+  for (std::size_t k = 0; k < fat_.materials().size(); ++k) {
+    const Vec2f& m = fat_.materials()[k];
+    coordinates.push_back({m.x(), m.y(), fat_.thickness()[k], 0});
+  }
+  fat_layer_.mesh->SetCoordinates(coordinates);
+
+  Add(&sheet_, "membrane", Order::kMembrane, "membrane.frag");
+  Blend(sheet_.mesh->state());
+}
+
+void TissueLayers::SetTissue(std::span<const float> xyz) {
+  std::copy(xyz.begin(), xyz.end(), xyz_.begin());
+  tissue_changed_ = true;
+}
+
+bool TissueLayers::SetTopology(const TopologyState& topology) {
+  if (!membrane_.SetTopology(topology)) {
+    return false;
+  }
+  topology_changed_ = true;
+  return true;
+}
+
+void TissueLayers::SetScope(const Laparoscope& scope) {
+  field_ = FieldOfView(scope);
+  eye_W_ = EyeOf(scope);
+  pixels_per_rad_ = PixelsPerRad(scope);
+  scope_changed_ = true;
+}
+
+void TissueLayers::ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible) {
+  std::vector<std::uint8_t> seen(fat_.materials().size());
+  for (std::size_t k = 0; k < seen.size(); ++k) {
+    seen[k] = visible(fat_.materials()[k], fat_.thickness()[k]) ? 1 : 0;
+  }
+  fat_shown_.clear();
+  for (const Triangle& t : fat_.triangles()) {
+    if (seen[t[0]] || seen[t[1]] || seen[t[2]]) {
+      fat_shown_.push_back(t);
+    }
+  }
+  topology_changed_ = true;
+}
+
+bool TissueLayers::Update() {
+  if (!tissue_changed_ && !topology_changed_ && !scope_changed_) {
+    return false;
+  }
+  UpdateMembrane();
+  UpdateFat();
+  if (tissue_changed_ || scope_changed_) {
+    UpdateRectum();
+    rectum_.mesh->SetPositions(rectum_positions_);
+    rectum_.mesh->SetNormals(rectum_normals_);
+    Show(&rectum_, rectum_positions_, scene_.surface_triangles, Sides::kFront);
+  }
+  tissue_changed_ = topology_changed_ = scope_changed_ = false;
+  return true;
+}
+
+void TissueLayers::UpdateRectum() {
+  MapEmbedded(scene_.tets, scene_.surface_vertices, xyz_, rectum_positions_);
+  ComputeNormals(rectum_positions_, scene_.surface_triangles, rectum_normals_);
+}
+
+void TissueLayers::UpdateMembrane() {
+  membrane_.Update(xyz_);
+  const std::span<const Vec3f> positions = membrane_.positions();
+  sheet_.mesh->SetPositions(positions);
+  sheet_.mesh->SetNormals(membrane_.normals());
+  if (topology_changed_) {
+    std::vector<Float4> coordinates(positions.size());
+    for (std::size_t k = 0; k < coordinates.size(); ++k) {
+      coordinates[k] = {membrane_.materials()[k].x(), membrane_.materials()[k].y(), membrane_.sides()[k], 0};
+    }
+    sheet_.mesh->SetCoordinates(coordinates);
+  }
+  detail_.Choose(membrane_, eye_W_, pixels_per_rad_, &chosen_);
+  Show(&sheet_, positions, chosen_, Sides::kBoth);
+}
+
+void TissueLayers::UpdateFat() {
+  fat_.Update(xyz_, membrane_);
+  fat_layer_.mesh->SetPositions(fat_.positions());
+  fat_layer_.mesh->SetNormals(fat_.normals());
+  Show(&fat_layer_, fat_.positions(), fat_shown_, Sides::kBoth);
+}
+
+void TissueLayers::Show(Layer* layer, std::span<const Vec3f> positions, std::span<const Triangle> triangles,
+                        Sides sides) {
+  if (field_.Find(positions, triangles, sides, &layer->seen)) {
+    layer->mesh->SetTriangles(layer->seen);
+  }
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,68 @@
+// The layers of tissue that deform: organ, fat, membrane. Their meshes follow the particles; of each only the triangles
+// that can be seen are given to OpenGL.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <osg/Geode>
+#include <span>
+#include <vector>
+
+#include "render_node/geometry/fat_layer.h"
+#include "render_node/geometry/field_of_view.h"
+#include "render_node/geometry/membrane_mesh.h"
+#include "render_node/geometry/sheet_detail.h"
+#include "render_node/scene_graph/mesh.h"
+#include "render_node/scene_graph/order.h"
+
+namespace fulcrum::render {
+
+class TissueLayers {
+ public:
+  /// Keeps a reference to the arrays of `scene`.
+  TissueLayers(const SceneView& scene, const Laparoscope& scope);
+
+  /// Particles in scene order, 3 * n floats [m]. @pre n is the scene's count.
+  void SetTissue(std::span<const float> xyz);
+  /// False, and nothing changes, when it belongs to another grid.
+  bool SetTopology(const TopologyState& topology);
+  void SetScope(const Laparoscope& scope);
+  /// Fat is drawn where some corner of a triangle is `visible`, from (s, t) [m] and thickness 0 … 1.
+  void ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible);
+  /// Carries what was set over to the meshes. False when there was nothing.
+  bool Update();
+
+  [[nodiscard]] const MembraneMesh& membrane() const { return membrane_; }
+  [[nodiscard]] osg::Geode* node() const { return geode_; }
+
+ private:
+  /// One mesh and the list of its triangles that OpenGL has.
+  struct Layer {
+    std::unique_ptr<Mesh> mesh;
+    std::vector<Triangle> seen;
+  };
+  void Add(Layer* layer, const char* name, Order order, const char* fragment);
+  void Show(Layer* layer, std::span<const Vec3f> positions, std::span<const Triangle> triangles, Sides sides);
+  void AddRectum();
+  void AddSheets();
+  void UpdateRectum();
+  void UpdateMembrane();
+  void UpdateFat();
+
+  SceneView scene_;
+  FieldOfView field_;
+  Vec3f eye_W_;
+  float pixels_per_rad_;
+  MembraneMesh membrane_;
+  SheetDetail detail_;
+  FatLayer fat_;
+  std::vector<float> xyz_;
+  std::vector<Vec3f> rectum_positions_, rectum_normals_;
+  std::vector<Triangle> fat_shown_;
+  std::vector<Triangle> chosen_;  // Scratch: the membrane's triangles, as finely as needed.
+  bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
+  osg::ref_ptr<osg::Geode> geode_ = new osg::Geode;
+  Layer rectum_, fat_layer_, sheet_;
+};
+
+}  // namespace fulcrum::render

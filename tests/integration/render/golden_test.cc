@@ -1,0 +1,248 @@
+// Pictures of the built-in scene against pictures that a person has looked at, and proof that the comparison sees what
+// must never go wrong: a slit that is gone, a membrane that hides everything, a cut drawn as missing triangles.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <osg/Geode>
+#include <osg/NodeVisitor>
+
+#include "render_node/geometry/texel.h"
+#include "render_node/node/hud.h"
+#include "render_node/offscreen/png_writer.h"
+#include "render_node/scene_graph/display.h"
+#include "services/scene/build.h"
+#include "tests/integration/render/synthetic_scene.h"
+
+namespace fulcrum::render {
+namespace {
+
+// Rasterisers round edges differently, by a pixel: in the mean over blocks of 6 x 6 pixels that is a few of 255. What
+// the eye sees at once (the mutations below) is more than three times the limit in some block.
+constexpr int kBlock = 3;           // Of the reduced picture.
+constexpr double kWorstBlock = 12;  // Of 255, per channel.
+constexpr double kMean = 1.5;
+
+/// Mean of each 2 x 2 pixels: what the files hold.
+Picture Reduced(const Picture& full) {
+  Picture half{full.width / 2, full.height / 2, {}};
+  for (int y = 0; y < half.height; ++y) {
+    for (int x = 0; x < half.width; ++x) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        int sum = 2;
+        for (const auto& [dx, dy] : {std::pair{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {
+          sum += full.rgb[3 * TexelIndex(2 * x + dx, 2 * y + dy, full.width) + channel];
+        }
+        half.rgb.push_back(static_cast<std::uint8_t>(sum / 4));
+      }
+    }
+  }
+  return half;
+}
+
+struct Difference {
+  double worst_block = 0, mean = 0;
+  [[nodiscard]] bool visible() const { return worst_block > kWorstBlock || mean > kMean; }
+};
+
+Difference Compare(const Picture& a, const Picture& b) {
+  Difference difference;
+  if (a.width != b.width || a.height != b.height) {
+    return {255, 255};
+  }
+  int blocks = 0;
+  for (int y = 0; y + kBlock <= a.height; y += kBlock) {
+    for (int x = 0; x + kBlock <= a.width; x += kBlock) {
+      double worst = 0;
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        int sum = 0;
+        for (int k = 0; k < kBlock * kBlock; ++k) {
+          const std::size_t i = 3 * TexelIndex(x + k % kBlock, y + k / kBlock, a.width) + channel;
+          sum += int{a.rgb[i]} - int{b.rgb[i]};
+        }
+        worst = std::max(worst, std::abs(sum) / static_cast<double>(kBlock * kBlock));
+      }
+      difference.worst_block = std::max(difference.worst_block, worst);
+      difference.mean += worst;
+      ++blocks;
+    }
+  }
+  difference.mean /= blocks;
+  return difference;
+}
+
+class Opaque : public osg::NodeVisitor {
+ public:
+  Opaque() : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN) {}
+  void apply(osg::Geode& geode) override {
+    for (unsigned k = 0; k < geode.getNumDrawables(); ++k) {
+      if (geode.getDrawable(k)->getName() == "membrane") {
+        geode.getDrawable(k)->getOrCreateStateSet()->setMode(GL_BLEND, osg::StateAttribute::OFF);
+        ++found;
+      }
+    }
+  }
+  int found = 0;
+};
+
+class GoldenTest : public testing::Test {
+ protected:
+  GoldenTest() : data_(scene::BuildProcedural(scene::BuiltIn())), view_(data_.View()) {
+    view_.render.width = 480;
+    view_.render.height = 270;
+  }
+
+  Picture Draw(const SyntheticMoment& moment, const std::function<void(LaparoscopeView*)>& change = {}) const {
+    LaparoscopeView laparoscope(view_);
+    const auto display = MakeOffscreenDisplay(laparoscope, view_.render);
+    laparoscope.SetTissue(moment.tissue.xyz);
+    laparoscope.SetTopology(moment.topology);
+    for (const TemperaturePatch& patch : moment.patches) {
+      laparoscope.ApplyPatch(patch);
+    }
+    HudState hud;
+    hud.session_time_s = moment.tissue.header.session_time_s;
+    for (int tool = 0; tool < kMaxTools; ++tool) {
+      const auto k = static_cast<std::size_t>(tool);
+      laparoscope.SetTool(tool, moment.tools.tools[k]);
+      laparoscope.SetJaw(tool, moment.handles.handles[k].jaw_angle_rad);
+      hud.force_N[k] = 0.4f;
+    }
+    laparoscope.SetTexts(HudTexts(hud, true));
+    laparoscope.Update();
+    if (change) {
+      change(&laparoscope);
+      laparoscope.Update();
+    }
+    Picture picture;
+    display->DrawAndRead(&picture);
+    return Reduced(picture);
+  }
+
+  static void ExpectAsBefore(const char* name, const Picture& picture) {
+    const std::filesystem::path file = std::filesystem::path(FULCRUM_GOLDEN_DIR) / (std::string(name) + ".png");
+    const std::filesystem::path now = std::filesystem::path(testing::TempDir()) / (std::string(name) + ".png");
+    WritePng(picture, now);
+    ASSERT_TRUE(std::filesystem::exists(file)) << "no " << file << "; look at " << now;
+    const Difference difference = Compare(picture, ReadPng(file));
+    EXPECT_FALSE(difference.visible()) << name << ": a block differs by " << difference.worst_block
+                                       << " of 255, the mean by " << difference.mean << "; look at " << now;
+  }
+
+  /// As through a scope with a narrow field, at the middle of the cut: the triangles of the mesh are 30 pixels large.
+  void LookClose() {
+    const SyntheticMoment moment = MakeSyntheticMoment(view_, 14.0);
+    LaparoscopeView laparoscope(view_);
+    laparoscope.SetTissue(moment.tissue.xyz);
+    laparoscope.Update();
+    view_.render.scope_target_W = laparoscope.OnMembrane(moment.cut_path[moment.cut_path.size() / 2]);
+    view_.render.fov_deg = 10;
+  }
+
+  static Picture Golden(const char* name) {
+    return ReadPng(std::filesystem::path(FULCRUM_GOLDEN_DIR) / (std::string(name) + ".png"));
+  }
+
+  const scene::SceneData data_;
+  SceneView view_;
+};
+
+TEST_F(GoldenTest, AtRest) { ExpectAsBefore("at_rest", Draw(MakeSyntheticMoment(view_, 0.5))); }
+
+TEST_F(GoldenTest, Pulled) { ExpectAsBefore("pulled", Draw(MakeSyntheticMoment(view_, 6.0))); }
+
+TEST_F(GoldenTest, CutOpen) { ExpectAsBefore("cut_open", Draw(MakeSyntheticMoment(view_, 14.0))); }
+
+TEST_F(GoldenTest, CutSeenClose) {
+  LookClose();
+  ExpectAsBefore("cut_close", Draw(MakeSyntheticMoment(view_, 14.0)));
+}
+
+TEST_F(GoldenTest, BurningWithSmoke) {
+  const SyntheticMoment moment = MakeSyntheticMoment(view_, 10.0);
+  ExpectAsBefore("burning", Draw(moment, [&](LaparoscopeView* view) {
+                   for (int k = 0; k < 12; ++k) {
+                     view->AddSmoke(moment.cut_path.back(), 9.0 + 0.1 * k);
+                   }
+                   EXPECT_TRUE(view->UpdateEffects(10.2));
+                 }));
+}
+
+TEST_F(GoldenTest, Bleeding) {
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 12.0);
+  for (TemperaturePatch& patch : moment.patches) {  // Cut without any coagulation.
+    for (std::size_t k = 0; k < patch.texels.size(); k += 4) {
+      patch.texels[k + 1] = patch.texels[k + 2] = 0;
+    }
+  }
+  ExpectAsBefore("bleeding", Draw(moment, [&](LaparoscopeView* view) {
+                   for (const Vec2f& place : moment.cut_path) {
+                     view->OpenVessels(place, 12.0);
+                   }
+                   for (int k = 0; k < 30; ++k) {
+                     view->UpdateEffects(12.0 + 0.1 * k);
+                   }
+                 }));
+}
+
+TEST_F(GoldenTest, WarningShown) {
+  HudState hud;
+  hud.session_time_s = 8.0;
+  hud.pedals = kPedalCut;
+  hud.power_W = 35;
+  hud.force_N = {0.8f, 2.1f};
+  hud.force_limit_N = 3.3f;
+  hud.tip_C = 100;
+  hud.slit_m = 0.012f;
+  hud.ureter = Alarm::kHot;
+  hud.nerve = Alarm::kInjured;
+  hud.late = {"TISSUE HELD"};
+  ExpectAsBefore("warning", Draw(MakeSyntheticMoment(view_, 8.0),
+                                 [&](LaparoscopeView* view) { view->SetTexts(HudTexts(hud, true)); }));
+}
+
+TEST_F(GoldenTest, ASlitThatDisappearsIsSeen) {
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 14.0);
+  std::fill(moment.topology.dead_edges.begin(), moment.topology.dead_edges.end(), std::uint8_t{0});
+  for (TemperaturePatch& patch : moment.patches) {
+    for (std::size_t k = 3; k < patch.texels.size(); k += 4) {
+      patch.texels[k] = 255;
+    }
+  }
+  const Difference difference = Compare(Draw(moment), Golden("cut_open"));
+  EXPECT_GT(difference.worst_block, 3 * kWorstBlock);
+}
+
+TEST_F(GoldenTest, AnOpaqueMembraneIsSeen) {
+  const Picture picture = Draw(MakeSyntheticMoment(view_, 0.5), [](LaparoscopeView* view) {
+    Opaque opaque;
+    view->root()->accept(opaque);
+    EXPECT_EQ(opaque.found, 1);
+  });
+  const Difference difference = Compare(picture, Golden("at_rest"));
+  EXPECT_GT(difference.worst_block, 3 * kWorstBlock);
+}
+
+TEST_F(GoldenTest, ACutOfMissingTrianglesIsSeen) {
+  LookClose();
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 14.0);
+  for (TemperaturePatch& patch : moment.patches) {
+    for (std::size_t k = 3; k < patch.texels.size(); k += 4) {
+      patch.texels[k] = 255;
+    }
+  }
+  for (Index node = 0; node < view_.membrane.node_count(); ++node) {
+    for (std::size_t direction = 0; direction < 3; ++direction) {
+      if (TestBit(moment.topology.dead_edges, 3 * std::size_t{node} + direction)) {
+        SetBit(moment.topology.dead_nodes, node);
+      }
+    }
+  }
+  const Difference difference = Compare(Draw(moment), Golden("cut_close"));
+  EXPECT_GT(difference.worst_block, 3 * kWorstBlock);
+}
+
+}  // namespace
+}  // namespace fulcrum::render

@@ -1,0 +1,134 @@
+// Blood: where it comes from, where it runs, when it stops, what it may cost.
+#include "render_node/geometry/bleeding.h"
+
+#include <gtest/gtest.h>
+
+#include "services/scene/build.h"
+
+namespace fulcrum::render {
+namespace {
+
+class BleedingTest : public testing::Test {
+ protected:
+  BleedingTest() : data_(scene::BuildProcedural(scene::Small())), view_(data_.View()), membrane_(view_), atlas_(view_) {
+    std::vector<float> xyz;
+    for (const Vec3f& p : view_.rest_position) {
+      xyz.insert(xyz.end(), {p.x(), p.y(), p.z()});
+    }
+    membrane_.Update(xyz);
+    place_ = view_.membrane_material[view_.membrane.rows / 2 * view_.membrane.cols + view_.membrane.cols / 4];
+  }
+
+  /// Heats the disc round `place_` until its damage is `damage` of 255.
+  void Heat(std::uint8_t damage) {
+    TemperaturePatch patch;
+    patch.header.origin_x = static_cast<std::uint32_t>(std::max(0.0f, place_.x() / atlas_.texel_m() - 128));
+    patch.header.origin_y = static_cast<std::uint32_t>(std::max(0.0f, place_.y() / atlas_.texel_m() - 128));
+    patch.texels.assign(4u * kPatchTexels * kPatchTexels, 255);
+    for (std::size_t k = 0; k < patch.texels.size(); k += 4) {
+      patch.texels[k] = 34;
+      patch.texels[k + 1] = damage;
+      patch.texels[k + 2] = 0;
+    }
+    ASSERT_FALSE(atlas_.Apply(patch).empty());
+  }
+
+  int Stained() const {
+    int count = 0;
+    for (std::size_t k = 3; k < atlas_.texels().size(); k += 4) {
+      count += atlas_.texels()[k] != 255 ? 1 : 0;
+    }
+    return count;
+  }
+
+  const scene::SceneData data_;
+  const SceneView view_;
+  MembraneMesh membrane_;
+  Atlas atlas_;
+  Vec2f place_;
+  const std::vector<std::uint8_t> vessels_ = std::vector<std::uint8_t>(4, 255);  // Everywhere.
+  const std::vector<std::uint8_t> bloodless_ = std::vector<std::uint8_t>(4, 0);
+};
+
+TEST_F(BleedingTest, AnOpenedVesselStainsTheSheetDownhill) {
+  Bleeding bleeding(view_, vessels_, 1, 16);
+  bleeding.Cut(place_, atlas_, 1.0);
+  ASSERT_EQ(bleeding.sources(), 1);
+  EXPECT_FALSE(bleeding.Update(1.1, membrane_, &atlas_).empty());
+  const int first = Stained();
+  EXPECT_GT(first, 0);
+  Vec2f centre = Vec2f::Zero();
+  for (double t = 1.2; t < 4; t += 0.1) {
+    bleeding.Update(t, membrane_, &atlas_);
+  }
+  EXPECT_GT(Stained(), 2 * first);
+  int count = 0;
+  for (int y = 0; y < atlas_.height(); ++y) {
+    for (int x = 0; x < atlas_.width(); ++x) {
+      if (atlas_.texels()[4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(atlas_.width()) +
+                               static_cast<std::size_t>(x)) +
+                          3] != 255) {
+        centre += atlas_.texel_m() * Vec2f(static_cast<float>(x), static_cast<float>(y));
+        ++count;
+      }
+    }
+  }
+  centre /= static_cast<float>(count);
+  const auto height = [&](const Vec2f& m) {
+    std::size_t best = 0;
+    for (std::size_t k = 1; k < view_.membrane_material.size(); ++k) {
+      if ((view_.membrane_material[k] - m).norm() < (view_.membrane_material[best] - m).norm()) {
+        best = k;
+      }
+    }
+    return membrane_.positions()[best].z();
+  };
+  EXPECT_LT(height(centre), height(place_));
+}
+
+TEST_F(BleedingTest, HeatSealsIt) {
+  Bleeding bleeding(view_, vessels_, 1, 16);
+  bleeding.Cut(place_, atlas_, 1.0);
+  bleeding.Update(1.5, membrane_, &atlas_);
+  EXPECT_EQ(bleeding.sources(), 1);
+  Heat(200);
+  bleeding.Update(1.6, membrane_, &atlas_);
+  EXPECT_EQ(bleeding.sources(), 0);
+  for (double t = 1.7; t < 30; t += 0.2) {
+    bleeding.Update(t, membrane_, &atlas_);
+  }
+  EXPECT_EQ(bleeding.drops(), 0) << "what has left runs out";
+  const int stained = Stained();
+  EXPECT_TRUE(bleeding.Update(31, membrane_, &atlas_).empty());
+  EXPECT_EQ(Stained(), stained) << "what lies there stays";
+}
+
+TEST_F(BleedingTest, ACoagulatedOrBloodlessPlaceDoesNotBleed) {
+  Bleeding without(view_, bloodless_, 1, 16);
+  without.Cut(place_, atlas_, 1.0);
+  EXPECT_EQ(without.sources(), 0);
+  Heat(200);
+  Bleeding bleeding(view_, vessels_, 1, 16);
+  bleeding.Cut(place_, atlas_, 1.0);
+  EXPECT_EQ(bleeding.sources(), 0);
+}
+
+TEST_F(BleedingTest, IsBoundedAndDoesNotDependOnHowOftenItIsDrawn) {
+  const auto run = [&](double step) {
+    Atlas atlas(view_);
+    Bleeding bleeding(view_, vessels_, 1, 16);
+    for (const Vec2f& m : view_.membrane_material) {
+      bleeding.Cut(m, atlas, 1.0);
+    }
+    for (int k = 1; k * step < 8.0001; ++k) {
+      bleeding.Update(1.0 + k * step, membrane_, &atlas);
+      EXPECT_LE(bleeding.sources(), 8);
+      EXPECT_LE(bleeding.drops(), 48);
+    }
+    return std::vector<std::uint8_t>(atlas.texels().begin(), atlas.texels().end());
+  };
+  EXPECT_EQ(run(0.1), run(0.4));
+}
+
+}  // namespace
+}  // namespace fulcrum::render

@@ -1,0 +1,175 @@
+// What is left out of a picture is not missed: field of view, coarse divisions of the sheet, quality.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "render_node/geometry/field_of_view.h"
+#include "render_node/geometry/quality.h"
+#include "render_node/geometry/sheet_detail.h"
+#include "services/core/error.h"
+#include "services/scene/build.h"
+
+namespace fulcrum::render {
+namespace {
+
+class DetailTest : public testing::Test {
+ protected:
+  DetailTest() : data_(scene::BuildProcedural(scene::Small())), view_(data_.View()) {
+    for (const Vec3f& p : view_.rest_position) {
+      xyz_.insert(xyz_.end(), {p.x(), p.y(), p.z()});
+    }
+  }
+
+  std::vector<Triangle> Choose(const MembraneMesh& mesh, float pixels_per_rad = 500) {
+    std::vector<Triangle> chosen;
+    SheetDetail(view_.membrane).Choose(mesh, view_.render.scope_tip_W, pixels_per_rad, &chosen);
+    return chosen;
+  }
+
+  const scene::SceneData data_;
+  const SceneView view_;
+  std::vector<float> xyz_;
+};
+
+TEST_F(DetailTest, NoTriangleInTheFieldIsLeftOut) {
+  RenderParams close = view_.render;
+  close.fov_deg = 25;
+  const Laparoscope scope = MakeLaparoscope(close);
+  FieldOfView field(scope);
+  MembraneMesh mesh(view_);
+  mesh.Update(xyz_);
+  std::vector<Triangle> seen;
+  EXPECT_TRUE(field.Find(mesh.positions(), mesh.triangles(), Sides::kBoth, &seen));
+  EXPECT_FALSE(field.Find(mesh.positions(), mesh.triangles(), Sides::kBoth, &seen)) << "nothing has moved";
+  EXPECT_LT(seen.size(), mesh.triangles().size());
+  std::sort(seen.begin(), seen.end());
+  for (const Triangle& t : mesh.triangles()) {
+    for (const Index corner : t) {
+      const Eigen::Vector4f clip = scope.projection * scope.view * mesh.positions()[corner].homogeneous();
+      const Vec2f pixel = (clip.head<2>() / clip.w()).cwiseProduct(scope.picture_centre);
+      if (clip.w() > 0 && pixel.norm() < scope.circle_radius && pixel.cwiseAbs().y() < scope.picture_centre.y()) {
+        EXPECT_TRUE(std::binary_search(seen.begin(), seen.end(), t));
+        break;
+      }
+    }
+  }
+}
+
+TEST_F(DetailTest, WhatTurnsItsBackIsLeftOutOfAClosedSurface) {
+  const Laparoscope scope = MakeLaparoscope(view_.render);
+  std::vector<Triangle> both, front;
+  FieldOfView field(scope);
+  field.Find(view_.rest_position, view_.tube_surface, Sides::kBoth, &both);
+  field.Find(view_.rest_position, view_.tube_surface, Sides::kFront, &front);
+  EXPECT_LT(front.size(), 0.7 * static_cast<double>(both.size()));
+  EXPECT_GT(front.size(), 0.2 * static_cast<double>(both.size()));
+}
+
+TEST_F(DetailTest, ASmoothSheetTakesFewTrianglesAndHasNoGaps) {
+  MembraneMesh mesh(view_);
+  mesh.Update(xyz_);
+  const std::vector<Triangle> chosen = Choose(mesh);
+  EXPECT_LT(chosen.size(), mesh.triangles().size() / 2);
+  // Watertight: in a sheet an edge inside has two triangles; with one it is on the rim of the grid.
+  std::map<std::pair<Index, Index>, int> edges;
+  for (const Triangle& t : chosen) {
+    for (int k = 0; k < 3; ++k) {
+      const Index a = t[k], b = t[(k + 1) % 3];
+      ++edges[{std::min(a, b), std::max(a, b)}];
+    }
+  }
+  const auto on_rim = [&](Index node) {
+    const Index row = node / view_.membrane.cols, col = node % view_.membrane.cols;
+    return row == 0 || col == 0 || row == view_.membrane.rows - 1 || col == view_.membrane.cols - 1;
+  };
+  for (const auto& [edge, count] : edges) {
+    EXPECT_TRUE(count == 2 || (on_rim(edge.first) && on_rim(edge.second)));
+  }
+}
+
+TEST_F(DetailTest, TheSheetStaysWatertightWhereItsDetailVaries) {
+  for (std::size_t i = view_.membrane.first; i < view_.rest_position.size(); ++i) {
+    const float r = (view_.rest_position[i] - view_.render.scope_target_W).norm();
+    xyz_[3 * i + 2] += 0.015f * std::exp(-r * r / 1e-4f);
+  }
+  MembraneMesh mesh(view_);
+  mesh.Update(xyz_);
+  double area = 0, fine_area = 0;
+  const auto material_area = [&](const Triangle& t) {
+    const auto m = view_.membrane_material;
+    const Vec2f a = m[t[1]] - m[t[0]], b = m[t[2]] - m[t[0]];
+    return 0.5 * static_cast<double>(a.x() * b.y() - a.y() * b.x());
+  };
+  for (const Triangle& t : Choose(mesh)) {
+    area += material_area(t);
+  }
+  for (const Triangle& t : mesh.triangles()) {
+    fine_area += material_area(t);
+  }
+  EXPECT_NEAR(area / fine_area, 1, 1e-3) << "the sheet is covered once";
+}
+
+TEST_F(DetailTest, ACutIsDrawnAsFinelyAsItIs) {
+  TopologyState topology;
+  topology.rows = view_.membrane.rows;
+  topology.cols = view_.membrane.cols;
+  topology.dead_nodes.assign((view_.membrane.node_count() + 7) / 8, 0);
+  topology.dead_edges.assign((3 * std::size_t{view_.membrane.node_count()} + 7) / 8, 0);
+  const Index node = view_.membrane.rows / 2 * view_.membrane.cols + view_.membrane.cols / 2;
+  SetBit(topology.dead_edges, 3 * std::size_t{node});
+  SetBit(topology.dead_edges, 3 * std::size_t{node} + 2);
+  MembraneMesh mesh(view_);
+  ASSERT_TRUE(mesh.SetTopology(topology));
+  mesh.Update(xyz_);
+  const std::vector<Triangle> chosen = Choose(mesh);
+  for (std::size_t block = 0; block < std::size_t{mesh.block_rows()} * mesh.block_cols(); ++block) {
+    if (!mesh.block_intact(block)) {
+      for (const Triangle& t : mesh.block_triangles(block)) {
+        EXPECT_NE(std::find(chosen.begin(), chosen.end(), t), chosen.end());
+      }
+    }
+  }
+  for (const Triangle& t : mesh.triangles().subspan(mesh.whole_triangles())) {
+    EXPECT_NE(std::find(chosen.begin(), chosen.end(), t), chosen.end()) << "a part of a cut triangle";
+  }
+}
+
+TEST(QualityTest, StepsDownWhenPicturesAreDearAndUpWhenTheyAreCheap) {
+  QualityControl quality(Quality::kAuto, 720);
+  EXPECT_EQ(quality.scale(), 1.0f);
+  for (int k = 0; k < 1000; ++k) {
+    quality.Add(60 * quality.scale() * quality.scale());
+  }
+  const float settled = quality.scale();
+  EXPECT_LT(60 * settled * settled, 33);
+  for (int k = 0; k < 1000; ++k) {
+    quality.Add(60 * quality.scale() * quality.scale());
+    EXPECT_EQ(quality.scale(), settled) << "no going to and fro";
+  }
+  for (int k = 0; k < 1000; ++k) {
+    quality.Add(5);
+  }
+  EXPECT_EQ(quality.scale(), 1.0f);
+}
+
+TEST(QualityTest, NeverGoesBelowLegible) {
+  for (const int height : {180, 360, 540, 720}) {
+    QualityControl quality(Quality::kAuto, height);
+    for (int k = 0; k < 1000; ++k) {
+      quality.Add(500);
+    }
+    EXPECT_GE(quality.scale() * static_cast<float>(height), std::min(height, 270));
+    EXPECT_EQ(QualityControl(Quality::kLow, height).scale(), quality.scale());
+    EXPECT_EQ(QualityControl(Quality::kHigh, height).scale(), 1.0f);
+  }
+}
+
+TEST(QualityTest, RefusesAnUnknownName) {
+  EXPECT_EQ(QualityFromName("low"), Quality::kLow);
+  EXPECT_THROW(static_cast<void>(QualityFromName("best")), InputError);
+}
+
+}  // namespace
+}  // namespace fulcrum::render
