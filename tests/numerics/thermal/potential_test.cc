@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <memory>
 #include <random>
@@ -54,6 +55,34 @@ TEST(PotentialTest, StaysBetweenGroundAndElectrodeWithHolesAndJumps) {
       EXPECT_GE(solver.Voltage(k % kWindow, k / kWindow), -kSlack);
       EXPECT_LE(solver.Voltage(k % kWindow, k / kWindow), 1.0f + kSlack);
     }
+  }
+}
+
+TEST(PotentialTest, IslandsThatFloatStayWhereTheyAre) {
+  // A tented sheet with a hole, and in it pieces of tissue that are tied to nothing: single cells, and squares and bars
+  // that are single cells of a coarser level. Their start value is whatever they had when they came loose.
+  auto problem = Random(7, 0.0f);
+  for (int k = 0; k < kWindowCells; ++k) {
+    const int i = k % kWindow, j = k / kWindow;
+    problem->ground[k] = i == 0 || j == 0 || i == kWindow - 1 || j == kWindow - 1 ? 1e-4f : 0.0f;
+    const bool in_hole = i >= 44 && i < 60 && j >= 20 && j < 44;
+    const bool island = i % 8 >= 4 && (j % 8 >= 4 || (j == 25 && i % 8 < 6));
+    if (in_hole && !island) problem->sigma[k] = 0;
+  }
+  std::array<float, kWindowCells> start;
+  for (int k = 0; k < kWindowCells; ++k) start[k] = 0.3f + 1e-3f * static_cast<float>(k % 37);
+  PotentialSolver solver;
+  solver.ImportStart(start);
+  for (int n = 0; n < 200; ++n) {
+    for (float& c : problem->contact) c *= n % 2 == 0 ? 1.03f : 1 / 1.03f;
+    const PotentialResult result = solver.Solve(*problem, 1e-2f);
+    ASSERT_GT(result.conductance_S, 0.0f) << n;
+    ASSERT_LE(result.imbalance, kImbalanceLimit) << n;
+  }
+  for (int k = 0; k < kWindowCells; ++k) {
+    if (problem->sigma[k] == 0.0f) continue;
+    EXPECT_GE(solver.Voltage(k % kWindow, k / kWindow), -0.1f) << k;
+    EXPECT_LE(solver.Voltage(k % kWindow, k / kWindow), 1.1f) << k;
   }
 }
 
