@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
 #include <random>
 
+#include "tests/numerics/thermal/electrode_current.h"
 #include "tests/numerics/thermal/potential_rings.h"
 
 namespace fulcrum::thermal {
@@ -119,6 +121,53 @@ TEST(PotentialTest, NoContactOrBadNumbersDeliverNothing) {
   EXPECT_GT(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);  // and the next solve is good again
   problem->contact.fill(0);
   EXPECT_EQ(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);
+}
+
+Material WithCells(float cell_m) {
+  ThermalParams params;
+  params.cell_m = cell_m;
+  return MakeMaterial(params);
+}
+
+/// Largest error of the window's current, over headings and over where between the cells' corners the capsule lies.
+double LargestError(float cell_m, const CapsuleOnSheet& capsule, double exact) {
+  const Material material = WithCells(cell_m);
+  double largest = 0;
+  for (const float heading : {0.0f, 0.4f, 0.785f, 1.2f}) {
+    for (const Vec2f& from_node : {Vec2f(0, 0), Vec2f(0.5f, 0.5f), Vec2f(0.5f, 0), Vec2f(0.2f, 0.3f)}) {
+      largest = std::max(largest, std::abs(WindowConductance(material, capsule, heading, from_node) / exact - 1));
+    }
+  }
+  return largest;
+}
+
+TEST(ElectrodeCurrentTest, ReferenceFindsTheDiscsBesselFunctions) {
+  const Material material = WithCells(1e-4f);
+  const CapsuleOnSheet disc{.arc_m = 1e-9};
+  EXPECT_NEAR(ReferenceConductance(material, disc, 2e-5) / DiscConductance(material, disc.radius_m), 1, 3e-4);
+}
+
+TEST(ElectrodeCurrentTest, DrawnFromTheWindowIsThatFromThePlane) {
+  const auto errors = [](const CapsuleOnSheet& capsule, double exact) {
+    const double coarse = LargestError(2e-4f, capsule, exact), fine = LargestError(5e-5f, capsule, exact);
+    const double working = LargestError(1e-4f, capsule, exact);
+    EXPECT_LT(coarse, 0.02);
+    EXPECT_LT(working, 0.006);
+    EXPECT_LT(fine, 0.002);
+    EXPECT_LT(working, 0.5 * coarse);
+    EXPECT_LT(fine, 0.6 * working);
+  };
+  const CapsuleOnSheet disc{.arc_m = 1e-9};
+  errors(disc, DiscConductance(WithCells(1e-4f), disc.radius_m));
+  for (const double length : {0.0, 1e-3}) {
+    const CapsuleOnSheet capsule{.length_m = length};
+    errors(capsule, ReferenceConductance(WithCells(1e-4f), capsule, 2e-5));
+  }
+}
+
+TEST(ElectrodeCurrentTest, LongCapsuleInTheWorkingWindow) {
+  const CapsuleOnSheet capsule{.length_m = 3e-3};
+  EXPECT_LT(LargestError(1e-4f, capsule, ReferenceConductance(WithCells(1e-4f), capsule, 2e-5)), 0.003);
 }
 
 }  // namespace
