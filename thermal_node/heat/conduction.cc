@@ -64,6 +64,8 @@ template <bool kSecond, int kShear>
     const float* __restrict inverse_area = &tile->geometry.inverse_area[j * kTile];
     float* __restrict h = &tile->state.enthalpy[j * kTile];
     float* __restrict before = &tile->before[j * kTile];
+    // In the loop below, a second array to write would keep some variants from vectors.
+    if constexpr (!kSecond) std::copy_n(h, kTile, before);
     for (int i = 0; i < kTile; ++i) above[i] = below[i];
     for (int i = 0; i < kTile; ++i) below[i] = FourthOrder(ft[i - kTile], ft[i], ft[i + kTile], gain);
     for (int i = 0; i < kTile; ++i) {
@@ -80,12 +82,7 @@ template <bool kSecond, int kShear>
                 Anti(l[1]) * (up[1] - t[i]) + Anti(l[kCornerStride]) * (down[-1] - t[i]);
       }
       const float after = h[i] + (dt_s * inverse_area[i] * flux - loss * t[i]);
-      if constexpr (kSecond) {
-        h[i] = 0.5f * (before[i] + after);
-      } else {
-        before[i] = h[i];
-        h[i] = after;
-      }
+      h[i] = kSecond ? 0.5f * (before[i] + after) : after;
     }
   }
 }
@@ -137,7 +134,7 @@ void ThetaOf(Tile* tile, float rc_dry, float rc_water) {
       sum[i] += t[i] * area[i];
       high[i] = high[i] > t[i] ? high[i] : t[i];
       low[i] = low[i] < t[i] ? low[i] : t[i];
-      const float off = w[i] > 0.5f ? w[i] - 0.5f : 0.5f - w[i];
+      const float off = std::abs(w[i] - 0.5f);
       odd[i] = odd[i] > off ? odd[i] : off;
     }
   }
