@@ -47,11 +47,11 @@ class HeatField {
   /// Wakes (and on first use creates) the tile. nullptr beyond the sheet.
   Tile* Wake(int tx, int ty);
 
-  /// One step of conduction and losses, of second order in time, in as many substeps as the fastest awake cell needs,
-  /// with boiling, waking of neighbours and sleeping of cold tiles. A step that would need more than kMaxSubsteps is
-  /// stiff: cells that are too fast for it conduct as fast as it allows and the sink is taken exactly, after each
-  /// substep. So it stays bounded by what was there and conserves heat, whatever its length. Returns the number of
-  /// substeps.
+  /// One step of conduction and losses, of second order in time, in as many substeps as the fastest awake cell needs
+  /// to be stable and wet tissue to be accurate, with boiling, waking of neighbours and sleeping of cold tiles. A step
+  /// that would need more than kMaxSubsteps is stiff: cells that are too fast for it conduct as fast as it allows and
+  /// the sink is taken exactly, after each substep. So it stays bounded by what was there and conserves heat, whatever
+  /// its length. Returns the number of substeps.
   int Diffuse(float dt_s, Ledger* ledger);
 
   /// Recomputes theta, its sums and extremes from the enthalpy. Quarantines bad cells.
