@@ -132,9 +132,9 @@ int HeatField::Diffuse(float dt_s, Ledger* ledger) {
   for (const Tile* tile : awake_) rate = std::max(rate, tile->rate);
   const float needed = std::ceil(dt_s * rate / kExplicitLimit);
   const bool stiff = !(needed <= kMaxSubsteps);
-  // For accuracy, wet tissue wants its fluxes of fourth order whole.
+  // In wet tissue waves of four cells and longer should keep their fourth-order fluxes whole.
   const float wet_rate = 4.0f * material_.k_wet / (material_.rc_wet * material_.cell_m * material_.cell_m);
-  const float wanted = std::max(needed, std::ceil(dt_s * kFluxGain * wet_rate / kExplicitLimit));
+  const float wanted = std::max(needed, std::ceil(dt_s * kResolvedGain * wet_rate / kExplicitLimit));
   const int substeps = stiff ? kMaxSubsteps : static_cast<int>(std::clamp<float>(wanted, 1, kMaxSubsteps));
   const float h = dt_s / static_cast<float>(substeps);
   if (stiff) {

@@ -24,7 +24,8 @@ inline constexpr float kExplicitLimit = 0.98f;  ///< dt * rate of the explicit s
 /// Largest ratio of a fourth-order flux to the two-point one: that of the shortest wave. Where the step is too long for
 /// it, what the step allows.
 inline constexpr float kFluxGain = 4.0f / 3.0f;
-inline constexpr float kShearIgnored = 1e-4f;  ///< Of a face's conductance: no diagonal links.
+inline constexpr float kResolvedGain = 7.0f / 6.0f;  ///< The same of a wave of four cells.
+inline constexpr float kShearIgnored = 1e-4f;        ///< Of a face's conductance: no diagonal links.
 /// Substeps of a step at most. Where these would not do, faces conduct no faster than they allow.
 inline constexpr int kMaxSubsteps = 64;
 inline constexpr float kThetaPlausible = 5000.0f;  ///< Beyond this a cell is bad, not hot [K].
