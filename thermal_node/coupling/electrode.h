@@ -32,8 +32,9 @@ class Electrode {
     const float r =
         std::sqrt(metric_.ss * d.x() * d.x() + 2.0f * metric_.st * d.x() * d.y() + metric_.tt * d.y() * d.y());
     const float metal = std::clamp(radius_ - r + 0.5f, 0.0f, 1.0f);
-    const float rarer = std::max(1.0f - std::max(r - radius_, 0.0f) / arc_, 0.0f);
-    return std::max(metal, kArcConductance * rarer * rarer);
+    const float beyond = std::max(r - radius_, 0.5f * (1.0f - metal));  // of the middle of what is not covered
+    const float rarer = std::max(1.0f - beyond / arc_, 0.0f);
+    return metal + (1.0f - metal) * kArcConductance * rarer * rarer;
   }
 
   /// The box that holds every centre with Covered() > 0.

@@ -110,11 +110,12 @@ void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
   const float cell = material_.cell_m;
   const float leak = tented ? 0.0f : material_.leak_S_m2 * cell * cell * metric_.area();
   for (int k = 0; k < kWindowCells; ++k) problem_.ground[k] = (flags_[k] & kNoTissue) != 0 ? 0.0f : leak;
-  // What flows on beyond the window, as the sheet's far field through each face of the border.
-  const auto add = [&](int i, int j, float face, const Vec2f& normal) {
+  // What flows on beyond the window, as the sheet's far field at each face of the border, in series with the half cell
+  // before it.
+  const auto add = [&](int i, int j, float face, float stretch, const Vec2f& normal) {
     const Vec2f r_cells = Vec2f(static_cast<float>(corner_.ix + i + sheet_.origin_x) + 0.5f,
-                                static_cast<float>(corner_.iy + j + sheet_.origin_y) + 0.5f) -
-                          middle / cell;
+                                static_cast<float>(corner_.iy + j + sheet_.origin_y) + 0.5f) +
+                          0.5f * normal - middle / cell;
     const float r = std::max(r_cells.norm(), 1.0f);
     const float x = std::min(r / (kFarFieldSpacing * kWindow), static_cast<float>(far_field_.size()) - 1.001f);
     const int n = static_cast<int>(x);
@@ -122,14 +123,15 @@ void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
     const float kappa = tented ? 1.0f / (r * cell * std::log(std::max(kTentRadius_m / (r * cell), 1.2f)))
                                : far_field_[n] + f * (far_field_[n + 1] - far_field_[n]);
     const float cosine = std::max(0.0f, r_cells.dot(normal) / r);
-    problem_.ground[j * kWindow + i] += face * problem_.sigma[j * kWindow + i] * cell * kappa * cosine;
+    const float slope = cell * stretch * kappa * cosine;  // of the potential, per cell
+    problem_.ground[j * kWindow + i] += face * problem_.sigma[j * kWindow + i] * slope / (1.0f + 0.5f * slope);
   };
   const float stretch_s = std::sqrt(metric_.ss), stretch_t = std::sqrt(metric_.tt);
   for (int n = 0; n < kWindow; ++n) {
-    add(0, n, problem_.face_s * stretch_s, -Vec2f::UnitX());
-    add(kWindow - 1, n, problem_.face_s * stretch_s, Vec2f::UnitX());
-    add(n, 0, problem_.face_t * stretch_t, -Vec2f::UnitY());
-    add(n, kWindow - 1, problem_.face_t * stretch_t, Vec2f::UnitY());
+    add(0, n, problem_.face_s, stretch_s, -Vec2f::UnitX());
+    add(kWindow - 1, n, problem_.face_s, stretch_s, Vec2f::UnitX());
+    add(n, 0, problem_.face_t, stretch_t, -Vec2f::UnitY());
+    add(n, kWindow - 1, problem_.face_t, stretch_t, Vec2f::UnitY());
   }
 }
 

@@ -31,7 +31,7 @@ inline float Harmonic(float a, float b) { return 2.0f * a * b / (a + b + std::nu
 /// Rows of the tile: enthalpy <- enthalpy + dt dH/dt, with `loss` = dt times the sink per kelvin. In the second stage
 /// of a substep the result is the mean of that and of the enthalpy before it: Heun's method, which keeps the maximum
 /// principle of its stages (Shu and Osher 1988).
-template <bool kSecond, int kShear>
+template <bool kSecond, bool kSheared>
 [[gnu::always_inline]] inline void Stage(Tile* tile, float dt_s, float gain, float loss) {
   // Each pass over the whole tile: what is read with a shift right after it was written waits for the store.
   alignas(64) float across_s[kTile * kFaceStride], across_t[(kTile + 3) * kTile], face_s[kTile * kFaceStride];
@@ -64,64 +64,33 @@ template <bool kSecond, int kShear>
     const float* __restrict inverse_area = &tile->geometry.inverse_area[j * kTile];
     float* __restrict h = &tile->state.enthalpy[j * kTile];
     float* __restrict before = &tile->before[j * kTile];
+    // In the loop below, a second array to write would keep some variants from vectors.
+    if constexpr (!kSecond) std::copy_n(h, kTile, before);
     for (int i = 0; i < kTile; ++i) above[i] = below[i];
     for (int i = 0; i < kTile; ++i) below[i] = FourthOrder(ft[i - kTile], ft[i], ft[i + kTile], gain);
+    const float* __restrict l = kSheared ? &tile->links[Corner(0, j)] : nullptr;
     for (int i = 0; i < kTile; ++i) {
       float flux = (fs[i] - fs[i + 1]) + (above[i] - below[i]);
-      const float* l = kShear != 0 ? &tile->links[Corner(i, j)] : nullptr;
-      const float* up = &t[i - kThetaStride];
-      const float* down = &t[i + kThetaStride];
-      if constexpr (kShear == kMainLinks) {
-        flux += l[0] * (up[-1] - t[i]) + l[kCornerStride + 1] * (down[1] - t[i]);
-      } else if constexpr (kShear == kAntiLinks) {
-        flux -= l[1] * (up[1] - t[i]) + l[kCornerStride] * (down[-1] - t[i]);
-      } else if constexpr (kShear != 0) {
-        flux += Main(l[0]) * (up[-1] - t[i]) + Main(l[kCornerStride + 1]) * (down[1] - t[i]) +
-                Anti(l[1]) * (up[1] - t[i]) + Anti(l[kCornerStride]) * (down[-1] - t[i]);
+      if constexpr (kSheared) {
+        const float* up = &t[i - kThetaStride];
+        const float* down = &t[i + kThetaStride];
+        flux += Main(l[i]) * (up[-1] - t[i]) + Main(l[i + kCornerStride + 1]) * (down[1] - t[i]) +
+                Anti(l[i + 1]) * (up[1] - t[i]) + Anti(l[i + kCornerStride]) * (down[-1] - t[i]);
       }
       const float after = h[i] + (dt_s * inverse_area[i] * flux - loss * t[i]);
-      if constexpr (kSecond) {
-        h[i] = 0.5f * (before[i] + after);
-      } else {
-        before[i] = h[i];
-        h[i] = after;
-      }
+      h[i] = kSecond ? 0.5f * (before[i] + after) : after;
     }
   }
 }
 
 FULCRUM_WIDE
-void FirstStage(Tile* tile, float dt_s, float gain, float loss) { Stage<false, 0>(tile, dt_s, gain, loss); }
+void FirstStage(Tile* tile, float dt_s, float gain, float loss) { Stage<false, false>(tile, dt_s, gain, loss); }
 FULCRUM_WIDE
-void FirstStageMain(Tile* tile, float dt_s, float gain, float loss) {
-  Stage<false, kMainLinks>(tile, dt_s, gain, loss);
-}
+void SecondStage(Tile* tile, float dt_s, float gain, float loss) { Stage<true, false>(tile, dt_s, gain, loss); }
 FULCRUM_WIDE
-void FirstStageAnti(Tile* tile, float dt_s, float gain, float loss) {
-  Stage<false, kAntiLinks>(tile, dt_s, gain, loss);
-}
+void FirstStageSheared(Tile* tile, float dt_s, float gain, float loss) { Stage<false, true>(tile, dt_s, gain, loss); }
 FULCRUM_WIDE
-void FirstStageSheared(Tile* tile, float dt_s, float gain, float loss) {
-  Stage<false, kMainLinks | kAntiLinks>(tile, dt_s, gain, loss);
-}
-FULCRUM_WIDE
-void SecondStage(Tile* tile, float dt_s, float gain, float loss) { Stage<true, 0>(tile, dt_s, gain, loss); }
-FULCRUM_WIDE
-void SecondStageMain(Tile* tile, float dt_s, float gain, float loss) {
-  Stage<true, kMainLinks>(tile, dt_s, gain, loss);
-}
-FULCRUM_WIDE
-void SecondStageAnti(Tile* tile, float dt_s, float gain, float loss) {
-  Stage<true, kAntiLinks>(tile, dt_s, gain, loss);
-}
-FULCRUM_WIDE
-void SecondStageSheared(Tile* tile, float dt_s, float gain, float loss) {
-  Stage<true, kMainLinks | kAntiLinks>(tile, dt_s, gain, loss);
-}
-using StageKernel = void (*)(Tile*, float, float, float);
-/// By the links of the tile.
-constexpr std::array<StageKernel, 4> kFirstStage{FirstStage, FirstStageMain, FirstStageAnti, FirstStageSheared};
-constexpr std::array<StageKernel, 4> kSecondStage{SecondStage, SecondStageMain, SecondStageAnti, SecondStageSheared};
+void SecondStageSheared(Tile* tile, float dt_s, float gain, float loss) { Stage<true, true>(tile, dt_s, gain, loss); }
 
 /// theta with its column sums and extremes; rc = rc_dry + water * rc_water.
 FULCRUM_WIDE
@@ -137,7 +106,7 @@ void ThetaOf(Tile* tile, float rc_dry, float rc_water) {
       sum[i] += t[i] * area[i];
       high[i] = high[i] > t[i] ? high[i] : t[i];
       low[i] = low[i] < t[i] ? low[i] : t[i];
-      const float off = w[i] > 0.5f ? w[i] - 0.5f : 0.5f - w[i];
+      const float off = std::abs(w[i] - 0.5f);
       odd[i] = odd[i] > off ? odd[i] : off;
     }
   }
@@ -280,9 +249,7 @@ void SetGeometry(const Sheet& sheet, Tile* tile) {
   std::array<float, kSide * kSide> shear;  // corners -1 ... kTile + 1
   for (int j = -1; j <= kTile + 1; ++j) {
     for (int i = -1; i <= kTile + 1; ++i) {
-      const float b = shear_at(i, j);
-      shear[(j + 1) * kSide + i + 1] = b;
-      geometry.links |= b > 0.0f ? kMainLinks : (b < 0.0f ? kAntiLinks : 0);
+      shear[(j + 1) * kSide + i + 1] = shear_at(i, j);
     }
   }
   const auto carried = [&](int i, int j) { return std::abs(shear[(j + 1) * kSide + i + 1]); };
@@ -303,7 +270,7 @@ void SetGeometry(const Sheet& sheet, Tile* tile) {
     geometry.area[k] = at(static_cast<float>(i) + 0.5f, static_cast<float>(j) + 0.5f).area();
     geometry.inverse_area[k] = 1.0f / geometry.area[k];
   }
-  if (geometry.links == 0) return;
+  if (std::all_of(shear.begin(), shear.end(), [](float b) { return b == 0.0f; })) return;
   geometry.shear.assign((kTile + 1) * kCornerStride, 0.0f);
   for (int j = 0; j <= kTile; ++j) {
     for (int i = 0; i <= kTile; ++i) geometry.shear[Corner(i, j)] = shear[(j + 1) * kSide + i + 1];
@@ -410,7 +377,12 @@ void HeatField::ExchangeHalos(Tile* tile) {
 
 void HeatField::RunStage(Tile* tile, bool second, float dt_s, float gain, bool sink, Ledger* ledger) {
   const float loss = sink ? dt_s * SinkOf(*tile) : 0.0f;
-  (second ? kSecondStage : kFirstStage)[tile->geometry.links](tile, dt_s, gain, loss);
+  const bool sheared = !tile->links.empty();
+  if (second) {
+    (sheared ? SecondStageSheared : SecondStage)(tile, dt_s, gain, loss);
+  } else {
+    (sheared ? FirstStageSheared : FirstStage)(tile, dt_s, gain, loss);
+  }
   double sum = 0;
   for (const float s : tile->theta_sum) sum += s;
   ledger->lost += 0.5 * sum * loss * tile->flat_volume;

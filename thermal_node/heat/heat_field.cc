@@ -132,7 +132,10 @@ int HeatField::Diffuse(float dt_s, Ledger* ledger) {
   for (const Tile* tile : awake_) rate = std::max(rate, tile->rate);
   const float needed = std::ceil(dt_s * rate / kExplicitLimit);
   const bool stiff = !(needed <= kMaxSubsteps);
-  const int substeps = stiff ? kMaxSubsteps : std::max(1, static_cast<int>(needed));
+  // In wet tissue waves of four cells and longer should keep their fourth-order fluxes whole.
+  const float wet_rate = 4.0f * material_.k_wet / (material_.rc_wet * material_.cell_m * material_.cell_m);
+  const float wanted = std::max(needed, std::ceil(dt_s * kResolvedGain * wet_rate / kExplicitLimit));
+  const int substeps = stiff ? kMaxSubsteps : static_cast<int>(std::clamp<float>(wanted, 1, kMaxSubsteps));
   const float h = dt_s / static_cast<float>(substeps);
   if (stiff) {
     ++stiff_steps_;

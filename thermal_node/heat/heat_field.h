@@ -24,7 +24,8 @@ inline constexpr float kExplicitLimit = 0.98f;  ///< dt * rate of the explicit s
 /// Largest ratio of a fourth-order flux to the two-point one: that of the shortest wave. Where the step is too long for
 /// it, what the step allows.
 inline constexpr float kFluxGain = 4.0f / 3.0f;
-inline constexpr float kShearIgnored = 1e-4f;  ///< Of a face's conductance: no diagonal links.
+inline constexpr float kResolvedGain = 7.0f / 6.0f;  ///< The same of a wave of four cells.
+inline constexpr float kShearIgnored = 1e-4f;        ///< Of a face's conductance: no diagonal links.
 /// Substeps of a step at most. Where these would not do, faces conduct no faster than they allow.
 inline constexpr int kMaxSubsteps = 64;
 inline constexpr float kThetaPlausible = 5000.0f;  ///< Beyond this a cell is bad, not hot [K].
@@ -47,11 +48,11 @@ class HeatField {
   /// Wakes (and on first use creates) the tile. nullptr beyond the sheet.
   Tile* Wake(int tx, int ty);
 
-  /// One step of conduction and losses, of second order in time, in as many substeps as the fastest awake cell needs,
-  /// with boiling, waking of neighbours and sleeping of cold tiles. A step that would need more than kMaxSubsteps is
-  /// stiff: cells that are too fast for it conduct as fast as it allows and the sink is taken exactly, after each
-  /// substep. So it stays bounded by what was there and conserves heat, whatever its length. Returns the number of
-  /// substeps.
+  /// One step of conduction and losses, of second order in time, in as many substeps as the fastest awake cell needs
+  /// to be stable and wet tissue to be accurate, with boiling, waking of neighbours and sleeping of cold tiles. A step
+  /// that would need more than kMaxSubsteps is stiff: cells that are too fast for it conduct as fast as it allows and
+  /// the sink is taken exactly, after each substep. So it stays bounded by what was there and conserves heat, whatever
+  /// its length. Returns the number of substeps.
   int Diffuse(float dt_s, Ledger* ledger);
 
   /// Recomputes theta, its sums and extremes from the enthalpy. Quarantines bad cells.

@@ -46,8 +46,6 @@ struct TileState {
   std::uint8_t tented = 0;
 };
 
-enum LinkDirection : int { kMainLinks = 1, kAntiLinks = 2 };
-
 /// The map from material space to the rest shape, at the cells, faces and corners of a tile.
 struct TileGeometry {
   alignas(64) CellArray<float> area{};                            ///< sqrt(g).
@@ -55,7 +53,6 @@ struct TileGeometry {
   alignas(64) std::array<float, kTile * kFaceStride> across_s{};  ///< sqrt(g) g^ss at FaceS, less what corners carry.
   alignas(64) std::array<float, (kTile + 3) * kTile> across_t{};  ///< sqrt(g) g^tt at FaceT, likewise.
   std::vector<float> shear;                                       ///< sqrt(g) g^st at Corner; empty: none.
-  int links = 0;                                                  ///< Of LinkDirection: what the shear asks for.
 };
 
 struct Tile {

@@ -28,8 +28,10 @@ void Level::Finish() {
     float* __restrict s = &smooth[o];
     for (int i = 0; i < n; ++i) {
       d[i] = fx[i] + fx[i + 1] + fy[i] + fy[i + stride] + m[i];
-      // Without tissue diag is 0, and so is every residual that this multiplies.
-      s[i] = kJacobiWeight / (d[i] + kTiny);
+      // Where nothing is tied to anything diag is 0: no tissue, or on a coarse level an island that floats. The sum of
+      // an island's residuals is its rounding error, which must not be divided by next to nothing.
+      const float weight = kJacobiWeight / (d[i] + kTiny);
+      s[i] = d[i] > 0.0f ? weight : 0.0f;
     }
   }
 }

@@ -37,8 +37,8 @@ struct Level {
   Field face_x;   ///< Between (i-1, j) and (i, j), at At(i, j) [S].
   Field face_y;   ///< Between (i, j-1) and (i, j).
   Field mass;     ///< Contact plus ground [S].
-  Field diag;     ///< 0 where there is no tissue.
-  Field smooth;   ///< kJacobiWeight / diag.
+  Field diag;     ///< 0 where there is no tissue, and where an island floats that is one cell of this level.
+  Field smooth;   ///< kJacobiWeight / diag, 0 where diag is 0.
   Field x, b, r;  ///< Of the V-cycle.
 
   /// diag and smooth from faces and mass.

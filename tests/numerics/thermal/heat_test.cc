@@ -42,7 +42,8 @@ TEST(HeatTest, CurvedAndShearedSurfaceIsSolvedWithSecondOrder) {
 TEST(HeatTest, StepIsOfSecondOrderInTime) { EXPECT_GE(TimeOrder(), 1.9); }
 
 TEST(HeatTest, MovingGaussianMatchesTheExactIntegral) {
-  EXPECT_LT(RunMovingGaussian(1e-4f).max_error, 1e-3);  // measured 0.04 % of the peak
+  EXPECT_LT(RunMovingGaussian(1e-4f).max_error, 1e-3);    // measured 0.04 % of the peak
+  EXPECT_LT(RunMovingGaussian(7.5e-5f).max_error, 1e-3);  // 0.03 %; stable in one substep, but not accurate
 }
 
 TEST(HeatTest, ResultDoesNotDependOnWhereTheTilesLie) {

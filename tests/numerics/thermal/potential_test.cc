@@ -1,9 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <random>
 
+#include "tests/numerics/thermal/electrode_current.h"
 #include "tests/numerics/thermal/potential_rings.h"
 
 namespace fulcrum::thermal {
@@ -57,6 +60,34 @@ TEST(PotentialTest, StaysBetweenGroundAndElectrodeWithHolesAndJumps) {
   }
 }
 
+TEST(PotentialTest, IslandsThatFloatStayWhereTheyAre) {
+  // A tented sheet with a hole, and in it pieces of tissue that are tied to nothing: single cells, and squares and bars
+  // that are single cells of a coarser level. Their start value is whatever they had when they came loose.
+  auto problem = Random(7, 0.0f);
+  for (int k = 0; k < kWindowCells; ++k) {
+    const int i = k % kWindow, j = k / kWindow;
+    problem->ground[k] = i == 0 || j == 0 || i == kWindow - 1 || j == kWindow - 1 ? 1e-4f : 0.0f;
+    const bool in_hole = i >= 44 && i < 60 && j >= 20 && j < 44;
+    const bool island = i % 8 >= 4 && (j % 8 >= 4 || (j == 25 && i % 8 < 6));
+    if (in_hole && !island) problem->sigma[k] = 0;
+  }
+  std::array<float, kWindowCells> start;
+  for (int k = 0; k < kWindowCells; ++k) start[k] = 0.3f + 1e-3f * static_cast<float>(k % 37);
+  PotentialSolver solver;
+  solver.ImportStart(start);
+  for (int n = 0; n < 200; ++n) {
+    for (float& c : problem->contact) c *= n % 2 == 0 ? 1.03f : 1 / 1.03f;
+    const PotentialResult result = solver.Solve(*problem, 1e-2f);
+    ASSERT_GT(result.conductance_S, 0.0f) << n;
+    ASSERT_LE(result.imbalance, kImbalanceLimit) << n;
+  }
+  for (int k = 0; k < kWindowCells; ++k) {
+    if (problem->sigma[k] == 0.0f) continue;
+    EXPECT_GE(solver.Voltage(k % kWindow, k / kWindow), -0.1f) << k;
+    EXPECT_LE(solver.Voltage(k % kWindow, k / kWindow), 1.1f) << k;
+  }
+}
+
 TEST(PotentialTest, PowerInIsHeatPlusGround) {
   for (const float tolerance : {1e-1f, 1e-2f, 1e-4f}) {
     const auto problem = Random(5, 0.3f);
@@ -90,6 +121,53 @@ TEST(PotentialTest, NoContactOrBadNumbersDeliverNothing) {
   EXPECT_GT(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);  // and the next solve is good again
   problem->contact.fill(0);
   EXPECT_EQ(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);
+}
+
+Material WithCells(float cell_m) {
+  ThermalParams params;
+  params.cell_m = cell_m;
+  return MakeMaterial(params);
+}
+
+/// Largest error of the window's current, over headings and over where between the cells' corners the capsule lies.
+double LargestError(float cell_m, const CapsuleOnSheet& capsule, double exact) {
+  const Material material = WithCells(cell_m);
+  double largest = 0;
+  for (const float heading : {0.0f, 0.4f, 0.785f, 1.2f}) {
+    for (const Vec2f& from_node : {Vec2f(0, 0), Vec2f(0.5f, 0.5f), Vec2f(0.5f, 0), Vec2f(0.2f, 0.3f)}) {
+      largest = std::max(largest, std::abs(WindowConductance(material, capsule, heading, from_node) / exact - 1));
+    }
+  }
+  return largest;
+}
+
+TEST(ElectrodeCurrentTest, ReferenceFindsTheDiscsBesselFunctions) {
+  const Material material = WithCells(1e-4f);
+  const CapsuleOnSheet disc{.arc_m = 1e-9};
+  EXPECT_NEAR(ReferenceConductance(material, disc, 2e-5) / DiscConductance(material, disc.radius_m), 1, 3e-4);
+}
+
+TEST(ElectrodeCurrentTest, DrawnFromTheWindowIsThatFromThePlane) {
+  const auto errors = [](const CapsuleOnSheet& capsule, double exact) {
+    const double coarse = LargestError(2e-4f, capsule, exact), fine = LargestError(5e-5f, capsule, exact);
+    const double working = LargestError(1e-4f, capsule, exact);
+    EXPECT_LT(coarse, 0.02);
+    EXPECT_LT(working, 0.006);
+    EXPECT_LT(fine, 0.002);
+    EXPECT_LT(working, 0.5 * coarse);
+    EXPECT_LT(fine, 0.6 * working);
+  };
+  const CapsuleOnSheet disc{.arc_m = 1e-9};
+  errors(disc, DiscConductance(WithCells(1e-4f), disc.radius_m));
+  for (const double length : {0.0, 1e-3}) {
+    const CapsuleOnSheet capsule{.length_m = length};
+    errors(capsule, ReferenceConductance(WithCells(1e-4f), capsule, 2e-5));
+  }
+}
+
+TEST(ElectrodeCurrentTest, LongCapsuleInTheWorkingWindow) {
+  const CapsuleOnSheet capsule{.length_m = 3e-3};
+  EXPECT_LT(LargestError(1e-4f, capsule, ReferenceConductance(WithCells(1e-4f), capsule, 2e-5)), 0.003);
 }
 
 }  // namespace

@@ -1,0 +1,28 @@
+// Current of an electrode into a leaky sheet without borders, by other means than the solver's.
+#pragma once
+
+#include "services/core/types.h"
+#include "thermal_node/heat/material.h"
+
+namespace fulcrum::thermal {
+
+/// A capsule that lies on the sheet and its sparks, as coupling/electrode.h describes them [m].
+struct CapsuleOnSheet {
+  double length_m = 0;  ///< Of its axis; 0: a disc.
+  double radius_m = 5e-4;
+  double arc_m = 4e-4;
+};
+
+/// Current at 1 V [S] on the whole plane: finite volumes in double on a quarter of it, with cells of `core_m` where
+/// metal and sparks are and ever wider ones out to eight decay lengths of the potential, solved directly.
+[[nodiscard]] double ReferenceConductance(const Material& material, const CapsuleOnSheet& capsule, double core_m);
+
+/// The same for a disc without sparks, exactly: I0 under the metal, K0 beside it.
+[[nodiscard]] double DiscConductance(const Material& material, double radius_m);
+
+/// What the source window draws from wet tissue at 1 V [S]. @param heading of the capsule's axis [rad]. @param
+/// from_node from a corner of cells in the middle of the sheet to the middle of the capsule [cells].
+[[nodiscard]] double WindowConductance(const Material& material, const CapsuleOnSheet& capsule, float heading,
+                                       const Vec2f& from_node);
+
+}  // namespace fulcrum::thermal
