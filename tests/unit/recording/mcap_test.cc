@@ -1,0 +1,242 @@
+// What is written is read again; what is cut off, damaged or foreign is read as far as it goes.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "services/core/error.h"
+#include "services/recording/byte_stream.h"
+#include "services/recording/mcap_reader.h"
+#include "services/recording/mcap_writer.h"
+
+namespace fulcrum::recording {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+struct Sample {
+  std::string topic;
+  std::uint32_t sequence;
+  std::uint64_t time_ns;
+  Bytes data;
+  bool operator==(const Sample&) const = default;
+};
+
+class McapTest : public testing::Test {
+ protected:
+  ~McapTest() override { std::filesystem::remove(file_); }
+
+  /// Two topics; message i is i % 50 bytes long.
+  void Fill(McapWriter* writer, int messages) {
+    const std::uint16_t schema = writer->AddSchema("fulcrum::ToolState", "omgidl", "struct ToolState {};");
+    const std::uint16_t tool = writer->AddChannel(schema, "tool_state", "cdr", {{"rate_Hz", "1000"}});
+    const std::uint16_t health = writer->AddChannel(0, "health", "cdr", {});
+    for (int i = 0; i < messages; ++i) {
+      const bool is_tool = i % 5 != 0;
+      const Bytes data(static_cast<std::size_t>(i % 50), static_cast<std::uint8_t>(7 * i));
+      const auto number = static_cast<std::uint32_t>(i);
+      const std::uint64_t time = 1'000'000'000 + std::uint64_t{number} * 1'000'000;
+      writer->Write(is_tool ? tool : health, number, time, time - 5, std::as_bytes(std::span(data)));
+      written_.push_back({is_tool ? "tool_state" : "health", number, time, data});
+    }
+  }
+  std::vector<Sample> Read(McapReader* reader) const {
+    std::vector<Sample> all;
+    McapMessage message;
+    while (reader->Next(&message)) {
+      all.push_back({reader->channels().at(message.channel).topic, message.sequence, message.log_time_ns,
+                     Bytes(message.data.begin(), message.data.end())});
+    }
+    return all;
+  }
+  Bytes FileBytes() const {
+    std::ifstream in(file_, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  void Put(std::span<const std::uint8_t> bytes) const {
+    std::ofstream out(file_, std::ios::binary | std::ios::trunc);
+    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  }
+  /// True when `read` is the first of what was written.
+  bool IsBeginning(const std::vector<Sample>& read) const {
+    return read.size() <= written_.size() && std::equal(read.begin(), read.end(), written_.begin());
+  }
+
+  const std::filesystem::path file_ =
+      std::filesystem::path(testing::TempDir()) / ("fulcrum_" + std::to_string(getpid()) + ".mcap");
+  std::vector<Sample> written_;
+};
+
+TEST_F(McapTest, WhatIsWrittenIsReadAgain) {
+  {
+    McapWriter writer(file_, "fulcrum", "fulcrum 0.1");
+    writer.AddMetadata("session", {{"scene", "built-in"}, {"hash", "77"}});
+    Fill(&writer, 3000);
+    writer.EndChunk();
+    EXPECT_EQ(writer.message_count(), 3000u);
+    EXPECT_EQ(writer.error(), "");
+  }
+  McapReader reader(file_);
+  EXPECT_EQ(Read(&reader), written_);
+  EXPECT_TRUE(reader.closed());
+  EXPECT_TRUE(reader.faults().empty());
+  EXPECT_EQ(reader.profile(), "fulcrum");
+  EXPECT_EQ(reader.metadata().at("session").at("hash"), "77");
+  EXPECT_EQ(reader.schemas().at(1).text, "struct ToolState {};");
+  EXPECT_EQ(reader.channels().at(0).metadata.at("rate_Hz"), "1000");
+  EXPECT_EQ(reader.channels().at(1).schema, 0);
+}
+
+TEST_F(McapTest, AMessageMayBeLargerThanAChunk) {
+  const Bytes large(3 * McapWriter::kChunkBytes + 17, 0x5a);
+  {
+    McapWriter writer(file_, "", "");
+    const std::uint16_t channel = writer.AddChannel(0, "tissue", "cdr", {});
+    writer.Write(channel, 0, 1, 1, std::as_bytes(std::span(large)));
+    writer.Write(channel, 1, 2, 2, {});
+  }
+  McapReader reader(file_);
+  const std::vector<Sample> read = Read(&reader);
+  ASSERT_EQ(read.size(), 2u);
+  EXPECT_EQ(read[0].data, large);
+  EXPECT_TRUE(read[1].data.empty());
+}
+
+TEST_F(McapTest, AfterAKillItReadsUpToTheLastChunk) {
+  const std::filesystem::path killed = file_.string() + ".killed";
+  {
+    McapWriter writer(file_, "", "");
+    Fill(&writer, 100);
+    writer.EndChunk();
+    // As the operating system would keep it: nothing closes the writer.
+    std::filesystem::copy_file(file_, killed, std::filesystem::copy_options::overwrite_existing);
+  }
+  McapReader reader(killed);
+  EXPECT_EQ(Read(&reader), written_);
+  EXPECT_FALSE(reader.closed());
+  EXPECT_TRUE(reader.faults().empty());
+  std::filesystem::remove(killed);
+}
+
+TEST_F(McapTest, CutOffAnywhereItIsReadAsFarAsItGoes) {
+  {
+    McapWriter writer(file_, "fulcrum", "");
+    Fill(&writer, 60);
+    writer.EndChunk();
+    Fill(&writer, 60);
+  }
+  const Bytes whole = FileBytes();
+  std::size_t most = 0;
+  for (std::size_t length = 0; length < whole.size(); ++length) {
+    Put(std::span(whole).first(length));
+    if (length < kMcapMagic.size()) {
+      EXPECT_THROW(McapReader{file_}, InputError);
+      continue;
+    }
+    McapReader reader(file_);
+    const std::vector<Sample> read = Read(&reader);
+    ASSERT_TRUE(IsBeginning(read)) << "cut at " << length;
+    ASSERT_GE(read.size(), most) << "cut at " << length;
+    ASSERT_FALSE(reader.closed());
+    most = read.size();
+  }
+  EXPECT_EQ(most, written_.size());
+}
+
+TEST_F(McapTest, DamageNeverCrashesAndIsTold) {
+  {
+    McapWriter writer(file_, "fulcrum", "test");
+    for (int chunk = 0; chunk < 4; ++chunk) {
+      Fill(&writer, 40);
+      writer.EndChunk();
+    }
+  }
+  const Bytes whole = FileBytes();
+  std::mt19937 random(5);
+  int told = 0;
+  for (int trial = 0; trial < 3000; ++trial) {
+    Bytes damaged = whole;
+    for (std::uint32_t n = 1 + random() % 3; n > 0; --n) {
+      std::uint8_t& byte = damaged[kMcapMagic.size() + random() % (whole.size() - kMcapMagic.size())];
+      byte = random() % 4 == 0 ? 0xff : static_cast<std::uint8_t>(byte ^ (1u << random() % 8));
+    }
+    Put(damaged);
+    McapReader reader(file_);
+    McapMessage message;
+    while (reader.Next(&message)) {
+      ASSERT_LE(message.data.size(), 50u);
+    }
+    ASSERT_LE(reader.faults().size(), McapReader::kMostFaults);
+    told += reader.faults().empty() ? 0 : 1;
+  }
+  EXPECT_GT(told, 1000);
+}
+
+TEST_F(McapTest, ADamagedChunkCostsItsOwnMessagesOnly) {
+  std::vector<std::uint64_t> ends;
+  {
+    McapWriter writer(file_, "", "");
+    for (int chunk = 0; chunk < 3; ++chunk) {
+      Fill(&writer, 40);
+      writer.EndChunk();
+      ends.push_back(writer.bytes_written());
+    }
+  }
+  // Within the packed body of the second chunk.
+  Bytes damaged = FileBytes();
+  damaged[(ends[0] + ends[1]) / 2] ^= 0x40;
+  Put(damaged);
+  McapReader reader(file_);
+  EXPECT_EQ(Read(&reader).size(), 80u);
+  ASSERT_EQ(reader.faults().size(), 1u);
+  EXPECT_GT(reader.faults()[0].offset, ends[0]);
+  EXPECT_LT(reader.faults()[0].offset, ends[1]);
+  EXPECT_TRUE(reader.closed());
+}
+
+TEST_F(McapTest, RecordsOfALaterVersionArePassedOver) {
+  Bytes bytes(kMcapMagic.begin(), kMcapMagic.end());
+  ByteWriter to(&bytes);
+  to.Record(static_cast<Opcode>(0x7e), [&] { to.Text("from the future"); });
+  to.Record(Opcode::kChannel, [&] {
+    to.Number(std::uint16_t{4});
+    to.Number(std::uint16_t{0});
+    to.Text("health");
+    to.Text("cdr");
+    to.Texts({});
+    to.Number(std::uint64_t{99});  // A field that this reader does not know.
+  });
+  to.Record(Opcode::kMessage, [&] {
+    to.Number(std::uint16_t{4});
+    to.Number(std::uint32_t{1});
+    to.Number(std::uint64_t{2});
+    to.Number(std::uint64_t{3});
+  });
+  Put(bytes);
+  McapReader reader(file_);
+  EXPECT_EQ(Read(&reader).size(), 1u);
+  EXPECT_TRUE(reader.faults().empty());
+}
+
+TEST_F(McapTest, AFullDiskIsKeptAsErrorAndNothingMoreIsWritten) {
+  McapWriter writer("/dev/full", "", "");
+  Fill(&writer, 10);
+  writer.EndChunk();
+  EXPECT_NE(writer.error().find("No space left"), std::string::npos) << writer.error();
+  EXPECT_EQ(writer.bytes_written(), 0u);
+  writer.Close();
+  EXPECT_EQ(writer.bytes_written(), 0u);
+}
+
+TEST_F(McapTest, WhatIsNoRecordingIsRefused) {
+  EXPECT_THROW(McapReader("/nonexistent.mcap"), InputError);
+  EXPECT_THROW(McapWriter("/nonexistent/x.mcap", "", ""), InputError);
+  Put(Bytes(100, 'x'));
+  EXPECT_THROW(McapReader{file_}, InputError);
+}
+
+}  // namespace
+}  // namespace fulcrum::recording
