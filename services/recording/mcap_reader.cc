@@ -150,8 +150,6 @@ bool McapReader::Take(const Record& record, McapMessage* message) {
       metadata_[std::move(name)] = from.Texts();
       break;
     }
-    case Opcode::kDataEnd:
-      break;
     default:
       break;
   }
