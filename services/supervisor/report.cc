@@ -1,5 +1,7 @@
 #include "services/supervisor/report.h"
 
+#include <fstream>
+#include <iterator>
 #include <vector>
 
 #include "services/supervisor/picture.h"
@@ -25,7 +27,7 @@ p.sub { color: var(--soft); margin: 8px 0 22px; }
 .tile, .card { background: #fff; border: 1px solid var(--line); border-radius: 12px; padding: 16px 20px; }
 .tile b { display: block; font-size: 32px; line-height: 1.2; font-variant-numeric: tabular-nums; }
 .tile b small { font-size: 18px; color: var(--soft); font-weight: 500; } .tile span { color: var(--soft); font-size: 16px; }
-img { display: block; width: 100%; border-radius: 10px; background: #000; }
+img, video { display: block; width: 100%; border-radius: 10px; background: #000; }
 figure { margin: 0; } figcaption { color: var(--soft); font-size: 16px; padding: 6px 2px 0; }
 .sheet { display: grid; grid-template-columns: repeat(3, 1fr); gap: 16px; margin-top: 20px; }
 .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(520px, 1fr)); gap: 16px; }
@@ -76,13 +78,23 @@ std::string Picture(const Frame& frame, unsigned shrink) {
          "</figcaption></figure>\n";
 }
 
-std::string Pictures(const std::filesystem::path& folder) {
+/// Embedded like all else, so that the report stays one file.
+std::string Clip(const std::filesystem::path& clip) {
+  std::ifstream in(clip, std::ios::binary);
+  const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in), {}};
+  return bytes.empty() ? std::string()
+                       : Tag("h2", "The session as a video") +
+                             "<div class='card'><video controls loop muted src='data:video/mp4;base64," +
+                             Base64(bytes) + "'></video></div>\n";
+}
+
+std::string Pictures(const std::filesystem::path& folder, const std::filesystem::path& clip) {
   const std::vector<Frame> frames = FindFrames(folder);
   if (frames.empty()) {
     return Tag("h2", "Pictures") + Tag("p", "No picture was written in this session.");
   }
   std::string html = Tag("h2", "The last picture") + "<div class='card'>" + Picture(frames.back(), 1) + "</div>\n";
-  html += Tag("h2", "Over time") + "<div class='sheet'>\n";
+  html += Clip(clip) + Tag("h2", "Over time") + "<div class='sheet'>\n";
   for (const Frame& frame : Spread(frames, kSheetFrames)) {
     html += Picture(frame, kSheetShrink);
   }
@@ -186,14 +198,14 @@ std::string Events(const SessionRecord& record) {
 
 }  // namespace
 
-std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& record,
-                       const std::filesystem::path& frames) {
+std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& record, const std::filesystem::path& frames,
+                       const std::filesystem::path& clip) {
   std::string html =
       "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'>"
       "<meta name='viewport' content='width=device-width, initial-scale=1'><title>Fulcrum · ";
   html += EscapeHtml(outcome.scene_name + " · " + outcome.session_id) + "</title><style>" + kStyle;
   html += "</style></head><body><main>\n";
-  html += Header(outcome) + Tiles(record) + Pictures(frames) + Plots(outcome, record) + Nodes(outcome, record) +
+  html += Header(outcome) + Tiles(record) + Pictures(frames, clip) + Plots(outcome, record) + Nodes(outcome, record) +
           Restarts(record) + Events(record);
   html += Tag("h2", "Configuration") + "<details><summary>Effective configuration of this session</summary><pre>" +
           EscapeHtml(outcome.configuration) + "</pre></details>\n</main></body></html>\n";

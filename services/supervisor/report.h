@@ -8,8 +8,8 @@
 
 namespace fulcrum::supervisor {
 
-/// `frames`: folder of the pictures. Long: reads and encodes PNG files.
+/// `frames`: folder of the pictures; `clip`: an MP4 of them, if it exists. Long: reads and encodes PNG files.
 [[nodiscard]] std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& record,
-                                     const std::filesystem::path& frames);
+                                     const std::filesystem::path& frames, const std::filesystem::path& clip);
 
 }  // namespace fulcrum::supervisor

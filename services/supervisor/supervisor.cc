@@ -15,6 +15,7 @@
 #include "services/core/error.h"
 #include "services/runtime/realtime.h"
 #include "services/scene/scene_file.h"
+#include "services/supervisor/clip.h"
 #include "services/supervisor/domain_guard.h"
 #include "services/supervisor/node_process.h"
 #include "services/supervisor/outcome.h"
@@ -372,7 +373,9 @@ struct Supervisor::Impl {
     outcome.exit_code = exit_code;
     outcome.verdict = verdict;
     WriteFile(folder.path / "summary.json", SummaryJson(outcome, record));
-    WriteFile(folder.path / "report.html", ReportHtml(outcome, record, folder.frames));
+    const std::filesystem::path clip = folder.path / "clip.mp4";
+    (void)MakeClip(folder.frames, clip, folder.logs / "clip.log");
+    WriteFile(folder.path / "report.html", ReportHtml(outcome, record, folder.frames, clip));
     progress.Say("\n" + FinalTable(outcome, record) + "report: " + (folder.path / "report.html").string());
   }
 

@@ -9,6 +9,7 @@
 
 #include "services/core/error.h"
 #include "services/supervisor/child_process.h"
+#include "services/supervisor/clip.h"
 #include "services/supervisor/outcome.h"
 #include "services/supervisor/picture.h"
 #include "services/supervisor/progress.h"
@@ -339,6 +340,49 @@ TEST(PictureTest, EmbedsAndShrinks) {
   EXPECT_TRUE(EmbedPng(folder.path() / "bad.png", 1).empty());
 }
 
+/// A program `ffmpeg` of the test's own, alone on the path.
+class ClipTest : public ::testing::Test {
+ protected:
+  ClipTest() : path_(std::getenv("PATH")) { setenv("PATH", folder_.path().c_str(), 1); }
+  ~ClipTest() override { setenv("PATH", path_.c_str(), 1); }
+  void Ffmpeg(const std::string& body) {
+    const fs::path program = folder_.path() / "ffmpeg";
+    std::ofstream(program) << "#!/bin/sh\nfor last; do :; done\n" << body << '\n';
+    fs::permissions(program, fs::perms::owner_all);
+  }
+  [[nodiscard]] bool Make() const { return MakeClip(folder_.path(), clip_, folder_.path() / "clip.log"); }
+
+  const Folder folder_;
+  const fs::path clip_ = folder_.path() / "clip.mp4";
+  const std::string path_;
+};
+
+TEST_F(ClipTest, ShowsEachPictureForItsTime) {
+  for (const char* name : {"frame_0000500.png", "frame_0000750.png", "frame_0002000.png"}) {
+    std::ofstream(folder_.path() / name) << "x";
+  }
+  Ffmpeg("while read -r line; do echo \"$line\"; done < \"$last.frames\" > \"$last\"");
+  ASSERT_TRUE(Make());
+  std::ifstream in(clip_);
+  const std::string list{std::istreambuf_iterator<char>(in), {}};
+  EXPECT_NE(list.find("frame_0000500.png'\nduration 0.25\n"), std::string::npos) << list;
+  EXPECT_NE(list.find("frame_0000750.png'\nduration 1.25\n"), std::string::npos) << list;
+  EXPECT_FALSE(fs::exists(clip_.string() + ".frames"));
+}
+
+TEST_F(ClipTest, WithoutPicturesOrProgramOrAfterAFailureThereIsNone) {
+  Ffmpeg("echo clip > \"$last\"");
+  EXPECT_FALSE(Make()) << "no pictures";
+  std::ofstream(folder_.path() / "frame_0000500.png") << "x";
+  std::ofstream(folder_.path() / "frame_0000750.png") << "x";
+  EXPECT_TRUE(Make());
+  Ffmpeg("echo half > \"$last\"; exit 1");
+  EXPECT_FALSE(Make());
+  EXPECT_FALSE(fs::exists(clip_));
+  fs::remove(folder_.path() / "ffmpeg");
+  EXPECT_FALSE(Make());
+}
+
 TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   const Folder folder;
   WritePng(folder.path() / "frame_0001000.png", 64, 32);
@@ -355,9 +399,10 @@ TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   ThermalEvent event;
   event.kind = ThermalEventKind::kCut;
   record.AddEvent(event);
-  const std::string html = ReportHtml(outcome, record, folder.path());
-  for (const char* part : {"&lt;tiny&gt;", "physics_node", "data:image/png;base64,", "<svg", "class='mark'",
-                           "killed by signal 9", "cut × 1", "a: &lt;b&gt;"}) {
+  std::ofstream(folder.path() / "clip.mp4") << "a clip";
+  const std::string html = ReportHtml(outcome, record, folder.path(), folder.path() / "clip.mp4");
+  for (const char* part : {"&lt;tiny&gt;", "physics_node", "data:image/png;base64,", "data:video/mp4;base64,YSBjbGlw",
+                           "<svg", "class='mark'", "killed by signal 9", "cut × 1", "a: &lt;b&gt;"}) {
     EXPECT_NE(html.find(part), std::string::npos) << part;
   }
   for (const char* outside : {"http://", "https://", "src='/", "<script", "<link"}) {
