@@ -34,7 +34,9 @@ void main() {
   // Under a burn the fat is seared too, least in the open middle of the slit.
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
   albedo *= mix(vec3(1.0), vec3(0.46, 0.27, 0.16), (heat.a < 0.5 ? 0.25 : 0.7) * dry);
-  float blood = heat.a < 0.5 ? smoothstep(0.12, 0.7, 2.0 * heat.a) : 0.0;
+  // Of the texel itself: half way from open to closed would look like blood.
+  float own = heat.a < 0.5 ? texelFetch(atlas, ivec2(m * atlas_per_metre * vec2(textureSize(atlas, 0))), 0).a : 1.0;
+  float blood = own < 0.5 ? smoothstep(0.12, 0.7, 2.0 * own) : 0.0;
   albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);
   alpha = mix(alpha, 0.97, blood);
   float gloss;

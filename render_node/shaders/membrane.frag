@@ -48,7 +48,9 @@ void main() {
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
   alpha = mix(alpha, 0.95, hot);
   // Blood lies on top: the low bits of the fourth channel (geometry/atlas.h).
-  float blood = smoothstep(0.12, 0.7, 2.0 - 2.0 * heat.a);
+  // Where the atlas is neither whole nor clean, of the texel itself: half way to an open one would look like blood.
+  float own = heat.a < 0.97 ? texelFetch(atlas, ivec2(m * atlas_per_metre * vec2(textureSize(atlas, 0))), 0).a : 1.0;
+  float blood = own < 0.5 ? 0.0 : smoothstep(0.12, 0.7, 2.0 - 2.0 * own);
   albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);
   alpha = mix(alpha, 0.96, blood);
 
