@@ -26,7 +26,7 @@ fs::path FindProgram(const std::string& name) {
   const char* folders = std::getenv("PATH");
   std::istringstream list(folders ? folders : "");
   for (std::string folder; std::getline(list, folder, ':');) {
-    const fs::path program = fs::path(folder) / name;
+    fs::path program = fs::path(folder) / name;
     if (!folder.empty() && access(program.c_str(), X_OK) == 0 && !fs::is_directory(program)) {
       return program;
     }
