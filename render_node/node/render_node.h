@@ -47,6 +47,9 @@ class RenderNode {
   /// a PNG is due and something changed since the last one. Otherwise nothing is computed.
   void Step(const Tick& tick);
 
+  /// As a key of the window (an X key symbol), before the next Step; a key that means nothing does nothing.
+  void Press(int key);
+
   /// The last picture of the session, when it differs from the last one written. After the last Step, any thread.
   void Finish();
 
@@ -66,7 +69,6 @@ class RenderNode {
   void TakeEvents();
   void TakeContact();
   void TakeKeys();
-  void Press(int key);
   void FindLate();
   [[nodiscard]] bool Recent(double time_s) const;
   void UpdateTexts();

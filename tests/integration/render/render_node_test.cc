@@ -3,7 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <osgGA/GUIEventAdapter>
+#include <string>
+#include <thread>
 
 #include "services/bus/in_process.h"
 #include "services/scene/build.h"
@@ -193,6 +199,50 @@ TEST_F(RenderNodeTest, PatchesReachThePicture) {
   Publish(moment);
   node->Step(At(4.8));
   EXPECT_GE(Metric(*node, "patches"), 1);
+}
+
+TEST_F(RenderNodeTest, KeysDoWhatTheHelpSays) {
+  const auto node = MakeNode();
+  Publish(MakeSyntheticMoment(view_, 4.0));
+  int ms = 4000;
+  const auto shot = [&](std::initializer_list<int> keys) {
+    for (const int key : keys) {
+      node->Press(key);
+    }
+    node->Press('s');
+    ms += 5;
+    node->Step(At(0.001 * ms));
+    const std::filesystem::path file = folder_ / ("frame_000" + std::to_string(ms) + ".png");
+    for (int wait = 0; wait < 1000 && !std::filesystem::exists(file); ++wait) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    std::ifstream in(file, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  const std::string with_figures = shot({});
+  const std::string plain = shot({'u'});
+  ASSERT_FALSE(plain.empty());
+  EXPECT_NE(with_figures, plain);
+  EXPECT_EQ(shot({}), plain) << "nothing pressed, nothing changed";
+  EXPECT_EQ(shot({'x'}), plain) << "a key that means nothing";
+  for (const int key : {osgGA::GUIEventAdapter::KEY_Left, osgGA::GUIEventAdapter::KEY_Right,
+                        osgGA::GUIEventAdapter::KEY_Up, osgGA::GUIEventAdapter::KEY_Down}) {
+    EXPECT_NE(shot({key}), plain) << key;
+    EXPECT_EQ(shot({'0'}), plain);
+  }
+  for (const int key : {'+', '-', 'r', 't'}) {
+    EXPECT_NE(shot({key}), plain) << static_cast<char>(key);
+    EXPECT_EQ(shot({'0'}), plain);
+  }
+  EXPECT_NE(shot({'h'}), plain);
+  EXPECT_EQ(shot({'h'}), plain);
+  EXPECT_NE(shot({'l'}), plain) << "looks at the first tool";
+  EXPECT_EQ(shot({'l', 'l', '0'}), plain);
+  // While it pauses, what comes is not shown; afterwards it is.
+  const std::string paused = shot({'p'});
+  Publish(MakeSyntheticMoment(view_, 4.6));
+  EXPECT_EQ(shot({}), paused);
+  EXPECT_NE(shot({'p'}), plain);
 }
 
 }  // namespace
