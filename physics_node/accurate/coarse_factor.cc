@@ -9,7 +9,8 @@ CoarseFactor::CoarseFactor(std::vector<std::uint32_t> order)
     : order_(std::move(order)), llt_(static_cast<Eigen::Index>(3 * order_.size())) {
   const auto size = static_cast<Eigen::Index>(3 * order_.size());
   const Eigen::Index blocks = (size + kFactorBlock - 1) / kFactorBlock;
-  permuted_.resize(size, size);
+  permuted_ = Eigen::MatrixXf::Identity(size, size);
+  llt_.compute(permuted_);  // Not left without a state.
   factor_ = Eigen::MatrixXf::Identity(kFactorBlock * blocks, kFactorBlock * blocks);
   solution_ = FloatArray(static_cast<std::size_t>(kFactorBlock * blocks));
   const auto most = static_cast<std::size_t>(blocks * (blocks + 1) / 2);
