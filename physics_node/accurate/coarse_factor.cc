@@ -17,7 +17,7 @@ CoarseFactor::CoarseFactor(std::vector<std::uint32_t> order)
   for (Triangle* triangle : {&down_, &up_}) {
     triangle->start.reserve(static_cast<std::size_t>(blocks) + 1);
     triangle->block.reserve(most);
-    triangle->value.reserve(most * kFactorBlock * kFactorBlock);
+    triangle->value = FloatArray(most * kFactorBlock * kFactorBlock);
   }
   Pack(false, &down_);
   Pack(true, &up_);
@@ -33,13 +33,13 @@ void CoarseFactor::Pack(bool up, Triangle* triangle) {
     };
     return up ? Block(block(column, row).transpose()) : Block(block(row, column));
   };
+  float* to = triangle->value.data();
   const auto put = [&](std::uint32_t row, const Block& block) {
     triangle->block.push_back(row);
-    triangle->value.insert(triangle->value.end(), block.data(), block.data() + block.size());
+    to = std::copy_n(block.data(), block.size(), to);
   };
   triangle->start.assign(1, 0);
   triangle->block.clear();
-  triangle->value.clear();
   for (std::uint32_t step = 0; step < blocks; ++step) {
     const std::uint32_t own = up ? blocks - 1 - step : step;
     const Block diagonal = at(own, own), identity = Block::Identity();

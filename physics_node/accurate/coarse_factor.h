@@ -27,7 +27,7 @@ class CoarseFactor {
  private:
   struct Triangle {
     std::vector<std::uint32_t> start, block;
-    std::vector<float, Eigen::aligned_allocator<float>> value;
+    FloatArray value;  ///< Room for all blocks, aligned as the kernels need it.
     [[nodiscard]] Substitution order() const {
       return {static_cast<int>(start.size()) - 1, start.data(), block.data()};
     }
