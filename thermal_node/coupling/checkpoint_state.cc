@@ -269,7 +269,8 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
       !reader.GetValue(&window)) {
     return false;
   }
-  if (!AllWithin(window.start, 0.0f, 1.0f) || std::abs(window.corner.ix) > -kNowhere.ix ||
+  // A start value, so any number will do; between 0 and 1 where the last solve converged.
+  if (!AllWithin(window.start, -1e3f, 1e3f) || std::abs(window.corner.ix) > -kNowhere.ix ||
       std::abs(window.corner.iy) > -kNowhere.iy) {
     return false;
   }

@@ -224,8 +224,6 @@ PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
   result.imbalance = static_cast<float>(std::abs(in - out) / in);
   const auto scale = static_cast<float>(in / out);
   for (float& q : heat_) q *= scale;
-  // The solution of 1 V lies within [0, 1]; so does the start of the next solve, whatever this one was left with.
-  for (float& v : g.v) v = v > 0.0f ? (v < 1.0f ? v : 1.0f) : 0.0f;
   result.heat_S = static_cast<float>(heat) * scale;
   return result;
 }
