@@ -18,9 +18,9 @@
 #include "render_node/offscreen/egl_context.h"
 #include "render_node/scene_graph/atlas_texture.h"
 #include "render_node/scene_graph/display.h"
-#include "services/bus/in_process.h"
 #include "services/scene/build.h"
 #include "tests/benchmark/report.h"
+#include "tests/integration/render/node_bus.h"
 #include "tests/integration/render/synthetic_scene.h"
 
 namespace fulcrum::render {
@@ -162,9 +162,7 @@ class NodeRun {
  public:
   explicit NodeRun(const SceneView& view)
       : folder_(std::filesystem::temp_directory_path() / ("fulcrum_bench_render_" + std::to_string(getpid()))),
-        node_(std::make_unique<RenderNode>(view, RenderSettings{.frames = folder_},
-                                           RenderPorts{*tissue_in_, *topology_in_, *patches_in_, *tools_in_,
-                                                       *handles_in_, *events_in_, *contacts_in_})) {}
+        node_(std::make_unique<RenderNode>(view, RenderSettings{.frames = folder_}, bus_.ports())) {}
   ~NodeRun() {
     node_.reset();  // It writes until its end.
     std::filesystem::remove_all(folder_);
@@ -176,31 +174,15 @@ class NodeRun {
     ++sequence_;
     const Stamp stamp{sequence_, 1, MonotonicNs()};
     moment->tissue.header.stamp = moment->tools.stamp = moment->topology.stamp = stamp;
-    tissue_out_->Write(moment->tissue);
-    tools_out_->Write(moment->tools);
-    topology_out_->Write(moment->topology);
+    bus_.tissue_out->Write(moment->tissue);
+    bus_.tools_out->Write(moment->tools);
+    bus_.topology_out->Write(moment->topology);
   }
   void Step(double time_s) { node_->Step({static_cast<std::uint64_t>(1e3 * time_s), time_s, 1.0 / 30, 0}); }
 
  private:
   std::filesystem::path folder_;
-  bus::InProcessTopic<TissueFrame> tissue_;
-  bus::InProcessTopic<TopologyState> topology_;
-  bus::InProcessTopic<TemperaturePatch> patches_;
-  bus::InProcessTopic<ToolState> tools_;
-  bus::InProcessTopic<HandleState> handles_;
-  bus::InProcessTopic<ThermalEvent> events_;
-  bus::InProcessTopic<CauteryContact> contacts_;
-  std::unique_ptr<bus::Input<TissueFrame>> tissue_in_ = tissue_.MakeInput();
-  std::unique_ptr<bus::Input<TopologyState>> topology_in_ = topology_.MakeInput();
-  std::unique_ptr<bus::Input<TemperaturePatch>> patches_in_ = patches_.MakeInput();
-  std::unique_ptr<bus::Input<ToolState>> tools_in_ = tools_.MakeInput();
-  std::unique_ptr<bus::Input<HandleState>> handles_in_ = handles_.MakeInput();
-  std::unique_ptr<bus::Input<ThermalEvent>> events_in_ = events_.MakeInput();
-  std::unique_ptr<bus::Input<CauteryContact>> contacts_in_ = contacts_.MakeInput();
-  std::unique_ptr<bus::LoanOutput<TissueFrame>> tissue_out_ = tissue_.MakeOutput();
-  std::unique_ptr<bus::Output<TopologyState>> topology_out_ = topology_.MakeOutput();
-  std::unique_ptr<bus::Output<ToolState>> tools_out_ = tools_.MakeOutput();
+  NodeBus bus_;
   std::uint64_t sequence_ = 0;
   std::unique_ptr<RenderNode> node_;
 };

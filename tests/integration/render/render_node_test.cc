@@ -11,8 +11,8 @@
 #include <string>
 #include <thread>
 
-#include "services/bus/in_process.h"
 #include "services/scene/build.h"
+#include "tests/integration/render/node_bus.h"
 #include "tests/integration/render/synthetic_scene.h"
 
 namespace fulcrum::render {
@@ -32,9 +32,7 @@ class RenderNodeTest : public testing::Test {
   ~RenderNodeTest() override { std::filesystem::remove_all(folder_); }
 
   std::unique_ptr<RenderNode> MakeNode() {
-    return std::make_unique<RenderNode>(
-        view_, RenderSettings{.frames = folder_},
-        RenderPorts{*tissue_in_, *topology_in_, *patches_in_, *tools_in_, *handles_in_, *events_in_, *contacts_in_});
+    return std::make_unique<RenderNode>(view_, RenderSettings{.frames = folder_}, bus_.ports());
   }
 
   static double Metric(const RenderNode& node, const std::string& name) {
@@ -59,13 +57,13 @@ class RenderNodeTest : public testing::Test {
     Stamped(&moment.topology.stamp);
     Stamped(&moment.tools.stamp);
     Stamped(&moment.handles.stamp);
-    tissue_out_->Write(moment.tissue);
-    topology_out_->Write(moment.topology);
-    tools_out_->Write(moment.tools);
-    handles_out_->Write(moment.handles);
+    bus_.tissue_out->Write(moment.tissue);
+    bus_.topology_out->Write(moment.topology);
+    bus_.tools_out->Write(moment.tools);
+    bus_.handles_out->Write(moment.handles);
     for (TemperaturePatch& patch : moment.patches) {
       Stamped(&patch.header.stamp);
-      patches_out_->Write(patch);
+      bus_.patches_out->Write(patch);
     }
   }
 
@@ -74,25 +72,7 @@ class RenderNodeTest : public testing::Test {
   const scene::SceneData data_;
   SceneView view_;
   std::filesystem::path folder_;
-  bus::InProcessTopic<TissueFrame> tissue_;
-  bus::InProcessTopic<TopologyState> topology_;
-  bus::InProcessTopic<TemperaturePatch> patches_;
-  bus::InProcessTopic<ToolState> tools_;
-  bus::InProcessTopic<HandleState> handles_;
-  bus::InProcessTopic<ThermalEvent> events_;
-  bus::InProcessTopic<CauteryContact> contacts_;
-  std::unique_ptr<bus::Input<TissueFrame>> tissue_in_ = tissue_.MakeInput();
-  std::unique_ptr<bus::Input<TopologyState>> topology_in_ = topology_.MakeInput();
-  std::unique_ptr<bus::Input<TemperaturePatch>> patches_in_ = patches_.MakeInput();
-  std::unique_ptr<bus::Input<ToolState>> tools_in_ = tools_.MakeInput();
-  std::unique_ptr<bus::Input<HandleState>> handles_in_ = handles_.MakeInput();
-  std::unique_ptr<bus::Input<ThermalEvent>> events_in_ = events_.MakeInput();
-  std::unique_ptr<bus::Input<CauteryContact>> contacts_in_ = contacts_.MakeInput();
-  std::unique_ptr<bus::LoanOutput<TissueFrame>> tissue_out_ = tissue_.MakeOutput();
-  std::unique_ptr<bus::Output<TopologyState>> topology_out_ = topology_.MakeOutput();
-  std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patches_out_ = patches_.MakeOutput();
-  std::unique_ptr<bus::Output<ToolState>> tools_out_ = tools_.MakeOutput();
-  std::unique_ptr<bus::Output<HandleState>> handles_out_ = handles_.MakeOutput();
+  NodeBus bus_;
 };
 
 TEST_F(RenderNodeTest, DrawsNothingBeforeTheFirstTissueFrame) {

@@ -1,0 +1,38 @@
+// In-process topics of a RenderNode with their other ends.
+#pragma once
+
+#include <memory>
+
+#include "render_node/node/render_node.h"
+#include "services/bus/in_process.h"
+
+namespace fulcrum::render {
+
+struct NodeBus {
+  bus::InProcessTopic<TissueFrame> tissue;
+  bus::InProcessTopic<TopologyState> topology;
+  bus::InProcessTopic<TemperaturePatch> patches;
+  bus::InProcessTopic<ToolState> tools;
+  bus::InProcessTopic<HandleState> handles;
+  bus::InProcessTopic<ThermalEvent> events;
+  bus::InProcessTopic<CauteryContact> contacts;
+  std::unique_ptr<bus::Input<TissueFrame>> tissue_in = tissue.MakeInput();
+  std::unique_ptr<bus::Input<TopologyState>> topology_in = topology.MakeInput();
+  std::unique_ptr<bus::Input<TemperaturePatch>> patches_in = patches.MakeInput();
+  std::unique_ptr<bus::Input<ToolState>> tools_in = tools.MakeInput();
+  std::unique_ptr<bus::Input<HandleState>> handles_in = handles.MakeInput();
+  std::unique_ptr<bus::Input<ThermalEvent>> events_in = events.MakeInput();
+  std::unique_ptr<bus::Input<CauteryContact>> contacts_in = contacts.MakeInput();
+  std::unique_ptr<bus::LoanOutput<TissueFrame>> tissue_out = tissue.MakeOutput();
+  std::unique_ptr<bus::Output<TopologyState>> topology_out = topology.MakeOutput();
+  std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patches_out = patches.MakeOutput();
+  std::unique_ptr<bus::Output<ToolState>> tools_out = tools.MakeOutput();
+  std::unique_ptr<bus::Output<HandleState>> handles_out = handles.MakeOutput();
+
+  /// The node's.
+  [[nodiscard]] RenderPorts ports() const {
+    return {*tissue_in, *topology_in, *patches_in, *tools_in, *handles_in, *events_in, *contacts_in};
+  }
+};
+
+}  // namespace fulcrum::render
