@@ -48,7 +48,10 @@ HapticsNode::HapticsNode(const SceneView& scene, DeviceArray devices, const Port
 }
 
 void HapticsNode::ServoStep(const Tick& tick) noexcept {
-  while (to_servo_.TryPop(&arrived_)) servo_.OfferModel(arrived_, tick.stamp_ns);
+  // The newest one alone: a replay knows which model a tick took, not which ones a late tick passed over.
+  bool arrived = false;
+  while (to_servo_.TryPop(&arrived_)) arrived = true;
+  if (arrived) servo_.OfferModel(arrived_, tick.stamp_ns);
   servo_.Step(tick);
   figures_.Store(servo_.figures());
   if (!from_servo_.TryPush(servo_.record())) records_lost_.fetch_add(1, std::memory_order_relaxed);

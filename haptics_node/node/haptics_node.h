@@ -42,6 +42,9 @@ class HapticsNode {
   /// before and after ServoStep() on one thread.
   void BusStep();
 
+  /// Of the servo after the newest tick that BusStep() has published. Bus thread.
+  [[nodiscard]] std::uint64_t state_hash() const { return record_.state_hash; }
+
   /// Any thread.
   void FillHealth(Health* health) const;
 

@@ -1,0 +1,197 @@
+#include "services/replayer/lock_step.h"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "services/core/error.h"
+#include "services/replayer/published_difference.h"
+#include "services/replayer/replayed_node.h"
+#include "services/replayer/tick_source.h"
+#include "services/runtime/cyclic_thread.h"
+
+namespace fulcrum::replay {
+namespace {
+
+constexpr double kNsToS = 1e-9;
+
+/// A node that makes the ticks it is given, on its own thread.
+class NodeRunner {
+ public:
+  NodeRunner(NodeId node, const NodeMaking& making) : node_(MakeReplayedNode(node, making)) {
+    result_.node = node;
+    thread_ = std::thread([this] { Run(); });
+  }
+  ~NodeRunner() { End(); }
+  NodeRunner(const NodeRunner&) = delete;
+  NodeRunner& operator=(const NodeRunner&) = delete;
+
+  /// Waits for room. False: the node has stopped and wants no more.
+  bool Give(RecordedTick tick) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return stopped_ || queue_.size() < kQueue; });
+    if (stopped_) return false;
+    queue_.push_back(std::move(tick));
+    changed_.notify_all();
+    return true;
+  }
+
+  /// After the last tick has been made. The result is then whole.
+  void End() {
+    {
+      const std::lock_guard lock(mutex_);
+      ended_ = true;
+      changed_.notify_all();
+    }
+    if (thread_.joinable()) thread_.join();
+  }
+
+  [[nodiscard]] NodeResult& result() { return result_; }
+  /// Of the tick of the departure.
+  [[nodiscard]] const std::vector<Published>& outputs() const { return outputs_; }
+
+ private:
+  static constexpr std::size_t kQueue = 64;
+
+  void Run() {
+    RecordedTick tick;
+    while (Take(&tick)) {
+      if (!Make(tick)) break;
+    }
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+    changed_.notify_all();
+  }
+
+  bool Take(RecordedTick* tick) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return ended_ || !queue_.empty(); });
+    if (queue_.empty()) return false;
+    *tick = std::move(queue_.front());
+    queue_.pop_front();
+    changed_.notify_all();
+    return true;
+  }
+
+  bool Make(const RecordedTick& tick) {
+    if (!tick.missing.empty()) {
+      result_.missing = tick.missing;
+      return false;
+    }
+    const std::int64_t begin = runtime::MonotonicNs();
+    std::uint64_t hash = 0;
+    try {
+      hash = node_->Step(tick);
+    } catch (const std::exception& error) {
+      result_.missing = error.what();
+      return false;
+    }
+    result_.busy_s += kNsToS * static_cast<double>(runtime::MonotonicNs() - begin);
+    ++result_.ticks;
+    result_.starts += tick.epoch != epoch_ ? 1 : 0;
+    epoch_ = tick.epoch;
+    result_.session_time_s = tick.tick.session_time_s;
+    if (!tick.state_hash) return true;
+    ++result_.compared;
+    if (*tick.state_hash == hash) return true;
+    result_.departure = Departure{
+        tick.tick.index, tick.tick.session_time_s, tick.tick.stamp_ns, tick.epoch, *tick.state_hash, hash, {}};
+    outputs_ = node_->TakeOutputs();
+    return false;
+  }
+
+  std::unique_ptr<ReplayedNode> node_;
+  NodeResult result_;
+  std::vector<Published> outputs_;
+  std::uint64_t epoch_ = 0;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<RecordedTick> queue_;
+  bool ended_ = false, stopped_ = false;
+  std::thread thread_;
+};
+
+}  // namespace
+
+bool LockStepResult::good() const {
+  return std::all_of(nodes.begin(), nodes.end(), [](const NodeResult& node) { return node.good(); });
+}
+
+LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneView& scene,
+                                const config::CartConfig& cart, const std::function<void(double)>& progress) {
+  std::array<double, kNodeCount> period_s{};
+  for (int i = 0; i < kNodeCount; ++i) {
+    const auto node = static_cast<NodeId>(i);
+    // As the cyclic thread counts: whole nanoseconds.
+    period_s[static_cast<std::size_t>(i)] =
+        node == NodeId::kSupervisor ? 0.0 : kNsToS * std::round(1e9 / cart.timing(node).rate_Hz);
+  }
+  TickSource source(settings.recording, settings.nodes, period_s);
+  std::vector<std::unique_ptr<NodeRunner>> runners;
+  for (const NodeId node : settings.nodes) {
+    runners.push_back(std::make_unique<NodeRunner>(node, NodeMaking{scene, cart, settings.folder}));
+  }
+
+  LockStepResult result;
+  const std::int64_t begin = runtime::MonotonicNs();
+  std::int64_t first_stamp = 0;
+  double first_time = 0, told_s = 0;
+  RecordedTick tick;
+  std::vector<bool> running(runners.size(), true);
+  while (std::find(running.begin(), running.end(), true) != running.end() && source.Next(&tick)) {
+    if (source.session() && source.session()->scene_hash != scene.hash) {
+      throw MismatchError(settings.recording.string() + " was recorded with another scene (\"" +
+                          source.session()->scene_name + "\"): give the compiled scene of that session with --scene");
+    }
+    const double time = tick.tick.session_time_s;
+    if (settings.until_s >= 0 && time > settings.until_s) break;
+    if (first_stamp == 0) {
+      first_stamp = tick.tick.stamp_ns;
+      first_time = time;
+    }
+    if (settings.rate > 0) {
+      const double due_s = kNsToS * static_cast<double>(tick.tick.stamp_ns - first_stamp) / settings.rate;
+      const double now_s = kNsToS * static_cast<double>(runtime::MonotonicNs() - begin);
+      if (due_s > now_s) std::this_thread::sleep_for(std::chrono::duration<double>(due_s - now_s));
+    }
+    for (std::size_t i = 0; i < runners.size(); ++i) {
+      if (running[i] && runners[i]->result().node == tick.node) running[i] = runners[i]->Give(std::move(tick));
+    }
+    result.session_s = std::max(result.session_s, time - first_time);
+    if (progress && time > told_s + 0.1) {
+      told_s = time;
+      progress(time);
+    }
+  }
+  for (const auto& runner : runners) runner->End();
+  result.wall_s = kNsToS * static_cast<double>(runtime::MonotonicNs() - begin);
+
+  for (const auto& runner : runners) {
+    NodeResult& node = runner->result();
+    if (node.departure) {
+      node.departure->field =
+          DescribeDifference(settings.recording, node.departure->epoch, node.departure->stamp_ns, runner->outputs());
+    }
+    if (node.ticks == 0 && node.missing.empty()) {
+      node.missing = std::string("the recording holds no tick of ") + NodeName(node.node);
+    }
+    result.nodes.push_back(node);
+  }
+  for (const recording::McapFault& fault : source.reader().faults()) {
+    result.faults.push_back("at byte " + std::to_string(fault.offset) + ": " + fault.what);
+  }
+  if (source.undecodable() > 0) {
+    result.faults.push_back(std::to_string(source.undecodable()) + " messages are not of their topic's type");
+  }
+  return result;
+}
+
+}  // namespace fulcrum::replay

@@ -1,0 +1,82 @@
+#include "services/replayer/lock_step_report.h"
+
+#include <cstdarg>
+#include <cstdio>
+#include <fstream>
+
+#include "services/core/error.h"
+
+namespace fulcrum::replay {
+namespace {
+
+__attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
+  char text[512];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text, sizeof(text), format, arguments);
+  va_end(arguments);
+  return text;
+}
+
+std::string Quoted(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return quoted + '"';
+}
+
+std::string Describe(const Departure& departure) {
+  return Format("tick %llu (session time %.3f s): state hash recorded %016llx, replayed %016llx; ",
+                static_cast<unsigned long long>(departure.tick), departure.session_time_s,
+                static_cast<unsigned long long>(departure.recorded_hash),
+                static_cast<unsigned long long>(departure.replayed_hash)) +
+         departure.field;
+}
+
+double Speed(const LockStepResult& result) { return result.wall_s > 0 ? result.session_s / result.wall_s : 0; }
+
+}  // namespace
+
+std::string ReportText(const LockStepResult& result) {
+  std::string text;
+  for (const NodeResult& node : result.nodes) {
+    const bool restarted = node.starts > 1;
+    text += Format("%-14s %8llu ticks to %8.2f s, %8llu states compared%s: %s\n", NodeName(node.node),
+                   static_cast<unsigned long long>(node.ticks), node.session_time_s,
+                   static_cast<unsigned long long>(node.compared),
+                   restarted ? Format(", %llu restarts", static_cast<unsigned long long>(node.starts - 1)).c_str() : "",
+                   node.good()      ? "all the same"
+                   : node.departure ? "DIFFERENT"
+                                    : "NOT COMPLETE");
+    if (node.departure) text += "  first difference: " + Describe(*node.departure) + '\n';
+    if (!node.missing.empty()) text += "  missing: " + node.missing + '\n';
+  }
+  for (const std::string& fault : result.faults) text += "  recording: " + fault + '\n';
+  text += Format("%.2f s of the session in %.2f s: %.1f x real time\n", result.session_s, result.wall_s, Speed(result));
+  return text;
+}
+
+void WriteReportJson(const LockStepResult& result, const std::filesystem::path& file) {
+  std::string json = Format("{\n  \"same\": %s,\n  \"session_s\": %.6f,\n  \"speed_x_realtime\": %.3f",
+                            result.good() ? "true" : "false", result.session_s, Speed(result));
+  for (const NodeResult& node : result.nodes) {
+    const auto add = [&](const char* key, const std::string& value) {
+      json += std::string(",\n  \"") + NodeName(node.node) + "." + key + "\": " + value;
+    };
+    add("ticks", std::to_string(node.ticks));
+    add("compared", std::to_string(node.compared));
+    add("mismatches", node.departure ? "1" : "0");
+    add("starts", std::to_string(node.starts));
+    add("busy_s", Format("%.6f", node.busy_s));
+    add("departure", Quoted(node.departure ? Describe(*node.departure) : std::string()));
+    add("missing", Quoted(node.missing));
+  }
+  json += "\n}\n";
+  std::ofstream out(file);
+  out << json;
+  if (!out.flush()) throw InputError(file.string() + ": cannot be written");
+}
+
+}  // namespace fulcrum::replay

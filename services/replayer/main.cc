@@ -1,0 +1,182 @@
+// replayer: a recorded session again.
+#include <unistd.h>
+
+#include <boost/program_options.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "services/app/version.h"
+#include "services/config/cart.h"
+#include "services/core/error.h"
+#include "services/core/exit_code.h"
+#include "services/replayer/lock_step.h"
+#include "services/replayer/lock_step_report.h"
+#include "services/scene/scene_file.h"
+
+namespace {
+
+using namespace fulcrum;  // NOLINT: a main is nothing but names of other modules
+namespace po = boost::program_options;
+
+constexpr const char* kUsage =
+    R"(usage: replayer RECORDING --into NODE... [options]
+
+Lets nodes make the ticks of a recorded session again, with exactly the inputs that they had then, and compares their
+state with the recorded one after each tick. Stops a node at its first difference and says which tick, topic, field and
+index. Needs no bus, no devices and no real time.
+
+  replayer out/latest/recording.mcap --into physics thermal haptics
+
+)";
+
+constexpr const char* kExitCodes =
+    "\nExit code: 0 every state was the same, 1 a state differed or the recording lacks something, 2 bad usage or "
+    "file,\n"
+    "3 the recording is of another scene.\n";
+
+struct Options {
+  replay::LockStepSettings lock_step;
+  std::filesystem::path scene, cart, json;
+  bool quiet = false;
+  std::string answer;
+};
+
+NodeId NodeNamed(const std::string& name) {
+  for (const NodeId node : {NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics}) {
+    const std::string full = NodeName(node);
+    if (name == full || name + "_node" == full) return node;
+  }
+  throw InputError("--into " + name + ": cannot be replayed; valid: physics, thermal, haptics");
+}
+
+/// What stands beside the recording in its session's folder, unless it was given.
+std::filesystem::path BesideRecording(const std::string& given, const std::filesystem::path& recording,
+                                      const char* name) {
+  if (!given.empty()) return given;
+  const std::filesystem::path beside = recording.parent_path() / name;
+  return std::filesystem::exists(beside) ? beside : std::filesystem::path();
+}
+
+Options Parse(int argc, char** argv) {
+  Options options;
+  po::options_description visible("Options"), all;
+  visible.add_options()  //
+      ("into", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
+       "physics, thermal, haptics: one or more")                                                                 //
+      ("rate", po::value<double>()->value_name("X")->default_value(0), "times real time; 0: as fast as it can")  //
+      ("until", po::value<double>()->value_name("S")->default_value(-1), "end at this session time [s]")         //
+      ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
+       "compiled scene; default: scene.fulcrum beside the recording")  //
+      ("cart", po::value<std::string>()->value_name("FILE")->default_value(""),
+       "cart configuration; default: cart.yaml beside the recording")                                           //
+      ("json", po::value<std::string>()->value_name("FILE")->default_value(""), "write the result there, too")  //
+      ("quiet", "no progress")                                                                                  //
+      ("version", "print the version")                                                                          //
+      ("help", "print this");
+  po::options_description hidden;
+  hidden.add_options()("recording", po::value<std::string>());
+  all.add(visible).add(hidden);
+  po::positional_options_description position;
+  position.add("recording", 1);
+  try {
+    po::variables_map values;
+    const auto style = po::command_line_style::default_style & ~po::command_line_style::allow_guessing;
+    po::store(po::command_line_parser(argc, argv).options(all).positional(position).style(style).run(), values);
+    if (values.count("help") != 0) {
+      std::ostringstream text;
+      text << kUsage << visible << kExitCodes;
+      options.answer = text.str();
+      return options;
+    }
+    if (values.count("version") != 0) {
+      options.answer = std::string("replayer ") + app::kVersion + "\n";
+      return options;
+    }
+    if (values.count("recording") == 0) throw InputError("which recording? See --help");
+    if (values.count("into") == 0) throw InputError("--into is missing: which nodes? See --help");
+    options.lock_step.recording = values["recording"].as<std::string>();
+    for (const std::string& name : values["into"].as<std::vector<std::string>>()) {
+      const NodeId node = NodeNamed(name);
+      for (const NodeId other : options.lock_step.nodes) {
+        if (other == node) throw InputError("--into " + name + ": named twice");
+      }
+      options.lock_step.nodes.push_back(node);
+    }
+    options.lock_step.rate = values["rate"].as<double>();
+    if (!(options.lock_step.rate >= 0)) throw InputError("--rate: must be 0 (as fast as it can) or more");
+    options.lock_step.until_s = values["until"].as<double>();
+    options.scene = BesideRecording(values["scene"].as<std::string>(), options.lock_step.recording, "scene.fulcrum");
+    options.cart = BesideRecording(values["cart"].as<std::string>(), options.lock_step.recording, "cart.yaml");
+    options.json = values["json"].as<std::string>();
+    options.quiet = values.count("quiet") != 0 || ::isatty(STDERR_FILENO) == 0;
+    if (options.scene.empty()) {
+      throw InputError("no scene.fulcrum beside " + options.lock_step.recording.string() +
+                       ": give the compiled scene of that session with --scene");
+    }
+  } catch (const po::error& error) {
+    throw InputError(std::string(error.what()) + "; see --help");
+  }
+  return options;
+}
+
+/// A folder of its own that goes with it.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "fulcrum-replay-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) throw InputError("cannot make a folder " + name);
+    path_ = name;
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+int Run(int argc, char** argv) {
+  Options options = Parse(argc, argv);
+  if (!options.answer.empty()) {
+    std::cout << options.answer;
+    return static_cast<int>(ExitCode::kDone);
+  }
+  const scene::SceneFile scene(options.scene);
+  const config::CartConfig cart = options.cart.empty() ? config::CartConfig() : config::LoadCart(options.cart);
+  const ScratchFolder scratch;
+  options.lock_step.folder = scratch.path();
+  const auto progress = [&](double time_s) { std::fprintf(stderr, "\rsession time %.1f s ", time_s); };
+  const replay::LockStepResult result = options.quiet
+                                            ? ReplayInLockStep(options.lock_step, scene.view(), cart, {})
+                                            : ReplayInLockStep(options.lock_step, scene.view(), cart, progress);
+  if (!options.quiet) std::fputs("\r\033[K", stderr);
+  std::cout << ReportText(result);
+  if (!options.json.empty()) replay::WriteReportJson(result, options.json);
+  return static_cast<int>(result.good() ? ExitCode::kDone : ExitCode::kFailure);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return Run(argc, argv);
+  } catch (const InputError& error) {
+    std::cerr << "replayer: " << error.what() << '\n';
+    return static_cast<int>(ExitCode::kBadUsage);
+  } catch (const MismatchError& error) {
+    std::cerr << "replayer: " << error.what() << '\n';
+    return static_cast<int>(ExitCode::kMismatch);
+  } catch (const std::exception& error) {
+    std::cerr << "replayer: " << error.what() << '\n';
+    return static_cast<int>(ExitCode::kFailure);
+  }
+}

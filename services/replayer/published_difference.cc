@@ -1,0 +1,64 @@
+#include "services/replayer/published_difference.h"
+
+#include <algorithm>
+#include <optional>
+#include <span>
+
+#include "services/bus/convert/cdr.h"
+#include "services/bus/topics.h"
+#include "services/core/message_difference.h"
+#include "services/recording/mcap_reader.h"
+
+namespace fulcrum::replay {
+namespace {
+
+/// Of one topic: `bytes` was recorded.
+template <class T>
+std::optional<std::string> Compare(std::span<const std::uint8_t> bytes, std::uint64_t epoch, std::int64_t stamp_ns,
+                                   const std::vector<Published>& now) {
+  T recorded;
+  if (!bus::DecodeCdr(bytes, &recorded)) return std::nullopt;
+  const Stamp& stamp = bus::StampOf(recorded);
+  if (stamp.epoch != epoch || stamp.stamp_ns != stamp_ns) return std::nullopt;
+  const auto found =
+      std::find_if(now.begin(), now.end(), [](const Published& p) { return p.topic == bus::kTopicOf<T>; });
+  const std::string label(bus::TopicLabel(bus::kTopicOf<T>));
+  if (found == now.end()) return label + " was published then and is not now";
+  T replayed;
+  if (!bus::DecodeCdr(found->bytes, &replayed)) return std::nullopt;
+  // Samples are numbered from the first reader on, which a replay has at once.
+  const auto difference = FirstDifference(recorded, replayed, "stamp");
+  if (!difference) return std::nullopt;
+  return label + "." + difference->field + ": recorded " + difference->first + ", replayed " + difference->second;
+}
+
+template <class T>
+bool Is(const std::string& topic) {
+  return topic == bus::RoleOf<T>().name;
+}
+
+}  // namespace
+
+std::string DescribeDifference(const std::filesystem::path& recording, std::uint64_t epoch, std::int64_t stamp_ns,
+                               const std::vector<Published>& now) {
+  recording::McapReader reader(recording);
+  recording::McapMessage message{};
+  while (reader.Next(&message)) {
+    const std::string& topic = reader.channels().at(message.channel).topic;
+    std::optional<std::string> found;
+    const auto look = [&]<class T>(const T*) {
+      if (!found && Is<T>(topic)) found = Compare<T>(message.data, epoch, stamp_ns, now);
+    };
+    look(static_cast<const TissueFrame*>(nullptr));
+    look(static_cast<const ContactModel*>(nullptr));
+    look(static_cast<const CauteryContact*>(nullptr));
+    look(static_cast<const TopologyState*>(nullptr));
+    look(static_cast<const TemperaturePatch*>(nullptr));
+    look(static_cast<const ThermalEvent*>(nullptr));
+    look(static_cast<const ToolState*>(nullptr));
+    if (found) return *found;
+  }
+  return "nothing that it published in this tick differs: the difference is inside";
+}
+
+}  // namespace fulcrum::replay

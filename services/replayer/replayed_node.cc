@@ -1,0 +1,231 @@
+#include "services/replayer/replayed_node.h"
+
+#include <xmmintrin.h>
+
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "haptics_node/node/cart_devices.h"
+#include "haptics_node/node/haptics_node.h"
+#include "haptics_node/node/trocar_store.h"
+#include "physics_node/node/physics_checkpoint.h"
+#include "physics_node/node/physics_node.h"
+#include "services/bus/convert/cdr.h"
+#include "services/bus/in_process.h"
+#include "services/core/error.h"
+#include "services/runtime/checkpoint.h"
+#include "thermal_node/node/thermal_node.h"
+
+namespace fulcrum::replay {
+namespace {
+
+/// A topic that the node reads.
+template <class T>
+struct Inlet {
+  bus::InProcessTopic<T> topic;
+  std::unique_ptr<bus::Input<T>> in = topic.MakeInput();
+  std::unique_ptr<typename bus::OutputOf<T>::type> out = topic.MakeOutput();
+  void Give(const std::optional<T>& sample) {
+    if (sample) out->Write(*sample);
+  }
+};
+
+/// A topic that the node writes.
+template <class T>
+struct Outlet {
+  bus::InProcessTopic<T> topic;
+  std::unique_ptr<typename bus::OutputOf<T>::type> out = topic.MakeOutput();
+  std::unique_ptr<bus::Input<T>> in = topic.MakeInput();
+  T sample;
+  /// Those of the last tick, oldest first.
+  void TakeInto(std::vector<Published>* published) {
+    while (in->TakeNext(&sample)) {
+      Published message{bus::kTopicOf<T>, {}};
+      if (bus::EncodeCdr(sample, &message.bytes)) published->push_back(std::move(message));
+    }
+  }
+  void Drop() { (void)in->TakeLatest(&sample); }
+};
+
+std::filesystem::path CheckpointPath(const NodeMaking& making, NodeId node) {
+  return making.folder / (std::string(NodeName(node)) + ".checkpoint");
+}
+
+class ReplayedPhysics final : public ReplayedNode {
+ public:
+  explicit ReplayedPhysics(const NodeMaking& making)
+      : ReplayedNode(NodeId::kPhysics),
+        scene_(making.scene),
+        checkpoint_(CheckpointPath(making, id()), scene_.hash, physics::kCheckpointLayout,
+                    physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size()))) {}
+
+  std::vector<Published> TakeOutputs() override {
+    std::vector<Published> published;
+    frames_.TakeInto(&published);
+    contacts_.TakeInto(&published);
+    cautery_.TakeInto(&published);
+    return published;
+  }
+
+ private:
+  void Start(std::int64_t epoch_ns) override {
+    node_.reset();
+    // Nothing of the process before is left, in its ports neither.
+    tools_ = {};
+    handles_ = {};
+    topology_ = {};
+    node_.emplace(scene_,
+                  physics::PhysicsNode::Ports{*tools_.in, *handles_.in, *topology_.in, *frames_.out, *contacts_.out,
+                                              *cautery_.out, *manifests_.out},
+                  &checkpoint_, epoch_ns);
+  }
+
+  std::uint64_t Advance(const RecordedTick& tick) override {
+    frames_.Drop();
+    contacts_.Drop();
+    cautery_.Drop();
+    tools_.Give(tick.tools);
+    handles_.Give(tick.handles);
+    topology_.Give(tick.topology);
+    node_->Step(tick.tick);
+    (void)manifests_.in->TakeLatest(&manifests_.sample);
+    return manifests_.sample.state_hash;
+  }
+
+  const SceneView& scene_;
+  runtime::CheckpointFile checkpoint_;
+  Inlet<ToolState> tools_;
+  Inlet<HandleState> handles_;
+  Inlet<TopologyState> topology_;
+  Outlet<TissueFrame> frames_;
+  Outlet<ContactModel> contacts_;
+  Outlet<CauteryContact> cautery_;
+  Outlet<TickManifest> manifests_;
+  std::optional<physics::PhysicsNode> node_;
+};
+
+class ReplayedThermal final : public ReplayedNode {
+ public:
+  explicit ReplayedThermal(const NodeMaking& making)
+      : ReplayedNode(NodeId::kThermal),
+        scene_(making.scene),
+        checkpoint_(CheckpointPath(making, id()), scene_.hash, thermal::kCheckpointLayout,
+                    thermal::ThermalSolver::CheckpointCapacity(scene_)) {}
+
+  std::vector<Published> TakeOutputs() override {
+    std::vector<Published> published;
+    topology_.TakeInto(&published);
+    patches_.TakeInto(&published);
+    events_.TakeInto(&published);
+    return published;
+  }
+
+ private:
+  void Start(std::int64_t epoch_ns) override {
+    node_.reset();
+    contacts_ = {};
+    node_.emplace(
+        scene_,
+        thermal::ThermalNode::Ports{*contacts_.in, *topology_.out, *patches_.out, *events_.out, *manifests_.out},
+        &checkpoint_, epoch_ns);
+  }
+
+  std::uint64_t Advance(const RecordedTick& tick) override {
+    topology_.Drop();
+    patches_.Drop();
+    events_.Drop();
+    contacts_.Give(tick.cautery);
+    node_->Step(tick.tick);
+    (void)manifests_.in->TakeLatest(&manifests_.sample);
+    return manifests_.sample.state_hash;
+  }
+
+  const SceneView& scene_;
+  runtime::CheckpointFile checkpoint_;
+  Inlet<CauteryContact> contacts_;
+  Outlet<TopologyState> topology_;
+  Outlet<TemperaturePatch> patches_;
+  Outlet<ThermalEvent> events_;
+  Outlet<TickManifest> manifests_;
+  std::optional<thermal::ThermalNode> node_;
+};
+
+class ReplayedHaptics final : public ReplayedNode {
+ public:
+  explicit ReplayedHaptics(const NodeMaking& making)
+      : ReplayedNode(NodeId::kHaptics), scene_(making.scene), cart_(making.cart) {
+    for (std::size_t i = 0; i < kMaxTools; ++i) {
+      if (cart_.devices[i].kind == config::DeviceKind::kTouch && scene_.tools[i].kind != ToolKind::kNone) {
+        throw InputError("haptics_node cannot be replayed: tool " + std::to_string(i) +
+                         " was moved by a Touch, and what its motors and encoders did is on no topic. Replay physics "
+                         "and thermal; for haptics record with simulated devices");
+      }
+    }
+  }
+
+  std::vector<Published> TakeOutputs() override {
+    std::vector<Published> published;
+    tools_.TakeInto(&published);
+    return published;
+  }
+
+ private:
+  void Start(std::int64_t epoch_ns) override {
+    node_.reset();
+    models_ = {};
+    haptics::CartDevices cart = haptics::MakeCartDevices(cart_, scene_, haptics::TrocarFolder());
+    node_.emplace(scene_, std::move(cart.devices),
+                  haptics::HapticsNode::Ports{*models_.in, *tools_.out, *manifests_.out}, epoch_ns);
+  }
+
+  std::uint64_t Advance(const RecordedTick& tick) override {
+    tools_.Drop();
+    models_.Give(tick.model);
+    node_->BusStep();
+    node_->ServoStep(tick.tick);
+    node_->BusStep();
+    while (manifests_.in->TakeNext(&manifests_.sample)) {
+    }
+    return node_->state_hash();
+  }
+
+  const SceneView& scene_;
+  const config::CartConfig& cart_;
+  Inlet<ContactModel> models_;
+  Outlet<ToolState> tools_;
+  Outlet<TickManifest> manifests_;
+  std::optional<haptics::HapticsNode> node_;
+};
+
+}  // namespace
+
+std::uint64_t ReplayedNode::Step(const RecordedTick& tick) {
+  const unsigned outside = _mm_getcsr();
+  if (!started_ || tick.epoch != epoch_) {
+    float_state_ = outside;
+    Start(static_cast<std::int64_t>(tick.epoch));
+    started_ = true;
+    epoch_ = tick.epoch;
+  }
+  _mm_setcsr(float_state_);
+  const std::uint64_t hash = Advance(tick);
+  float_state_ = _mm_getcsr();
+  _mm_setcsr(outside);
+  return hash;
+}
+
+std::unique_ptr<ReplayedNode> MakeReplayedNode(NodeId node, const NodeMaking& making) {
+  switch (node) {
+    case NodeId::kPhysics:
+      return std::make_unique<ReplayedPhysics>(making);
+    case NodeId::kThermal:
+      return std::make_unique<ReplayedThermal>(making);
+    case NodeId::kHaptics:
+      return std::make_unique<ReplayedHaptics>(making);
+    default:
+      throw InputError(std::string(NodeName(node)) + " has no state to replay; valid: physics, thermal, haptics");
+  }
+}
+
+}  // namespace fulcrum::replay

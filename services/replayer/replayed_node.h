@@ -1,0 +1,58 @@
+// A node in lock step: the class that runs live, with the inputs of a recorded tick, on ports within this process.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "services/config/cart.h"
+#include "services/core/scene_view.h"
+#include "services/replayer/recorded_tick.h"
+
+namespace fulcrum::replay {
+
+/// A message as it would have travelled.
+struct Published {
+  TopicId topic;
+  std::vector<std::uint8_t> bytes;  ///< CDR with its encapsulation.
+};
+
+class ReplayedNode {
+ public:
+  virtual ~ReplayedNode() = default;
+  ReplayedNode(const ReplayedNode&) = delete;
+  ReplayedNode& operator=(const ReplayedNode&) = delete;
+
+  [[nodiscard]] NodeId id() const { return id_; }
+
+  /// Makes the tick and returns the state hash after it. A tick of another epoch first starts the node anew, from the
+  /// checkpoint that it has written so far, as its process was. Any thread, one at a time.
+  std::uint64_t Step(const RecordedTick& tick);
+
+  /// What the node published in its last tick; once for each tick.
+  [[nodiscard]] virtual std::vector<Published> TakeOutputs() = 0;
+
+ protected:
+  explicit ReplayedNode(NodeId id) : id_(id) {}
+  virtual void Start(std::int64_t epoch_ns) = 0;
+  virtual std::uint64_t Advance(const RecordedTick& tick) = 0;
+
+ private:
+  NodeId id_;
+  bool started_ = false;
+  std::uint64_t epoch_ = 0;
+  unsigned float_state_;  ///< Thermal takes tiny numbers for zero on its own thread: kept for each node apart.
+};
+
+/// What a replayed node is made of. Scene and cart must outlive it.
+struct NodeMaking {
+  const SceneView& scene;
+  const config::CartConfig& cart;
+  std::filesystem::path folder;  ///< For its checkpoint.
+};
+
+/// For physics, thermal and haptics. Throws InputError when the node cannot be replayed.
+[[nodiscard]] std::unique_ptr<ReplayedNode> MakeReplayedNode(NodeId node, const NodeMaking& making);
+
+}  // namespace fulcrum::replay

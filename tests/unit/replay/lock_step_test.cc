@@ -1,0 +1,115 @@
+#include "services/replayer/lock_step.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+
+#include "services/core/error.h"
+#include "services/replayer/lock_step_report.h"
+#include "services/scene/build.h"
+#include "services/scene/scene_settings.h"
+#include "tests/unit/replay/recorded_cart.h"
+
+namespace fulcrum::replay {
+namespace {
+
+using testing::CartStory;
+
+/// The small scene, in a hurry: touched, grasped, pulled and cut within two seconds.
+scene::SceneData HurriedScene() {
+  scene::SceneData data = scene::BuildProcedural(scene::Small());
+  for (ScriptKey& key : data.script) key.time_s *= 0.4f;
+  data.fixed.hash = scene::ContentHash(data.View());
+  return data;
+}
+
+class LockStepTest : public ::testing::Test {
+ protected:
+  LockStepTest() : data_(HurriedScene()), view_(data_.View()) {
+    folder_ = std::filesystem::temp_directory_path() / ("fulcrum_replay_test_" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_ / "again");
+  }
+  ~LockStepTest() override { std::filesystem::remove_all(folder_); }
+
+  /// Length that was cut [m].
+  float Record(const CartStory& story) { return testing::RecordCart(view_, folder_, story); }
+
+  LockStepResult Replay(const std::vector<NodeId>& nodes) {
+    std::filesystem::remove_all(folder_ / "again");
+    std::filesystem::create_directories(folder_ / "again");
+    LockStepSettings settings;
+    settings.recording = folder_ / "recording.mcap";
+    settings.folder = folder_ / "again";
+    settings.nodes = nodes;
+    return ReplayInLockStep(settings, view_, SimulatedCart(), {});
+  }
+
+  static config::CartConfig SimulatedCart() { return {}; }
+
+  scene::SceneData data_;
+  SceneView view_;
+  std::filesystem::path folder_;
+};
+
+const std::vector<NodeId> kAll{NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics};
+
+TEST_F(LockStepTest, ComesToTheSameStates) {
+  EXPECT_GT(Record({.seconds = 2, .late_physics_s = 1.0, .threads = 2}), 1e-3f);
+  const LockStepResult result = Replay(kAll);
+  EXPECT_TRUE(result.good()) << ReportText(result);
+  ASSERT_EQ(result.nodes.size(), 3u);
+  EXPECT_EQ(result.nodes[0].compared, 199u);
+  EXPECT_EQ(result.nodes[1].compared, 200u);
+  EXPECT_EQ(result.nodes[2].ticks, 2000u);
+  EXPECT_GE(result.nodes[2].compared, 199u);
+}
+
+TEST_F(LockStepTest, GoesOnAcrossRestarts) {
+  EXPECT_GT(Record({.seconds = 2, .kill_physics_s = 1.234, .kill_haptics_s = 0.8}), 1e-3f);
+  const LockStepResult result = Replay(kAll);
+  EXPECT_TRUE(result.good()) << ReportText(result);
+  EXPECT_EQ(result.nodes[0].starts, 2u);
+  EXPECT_EQ(result.nodes[2].starts, 2u);
+}
+
+TEST_F(LockStepTest, NamesWhatDiffersFirst) {
+  CartStory story{.seconds = 1};
+  story.tool_change = [](ToolState* tools) {
+    if (tools->stamp.sequence > 700) tools->tools[0].p_WT.x() += 1e-4f;
+    return true;
+  };
+  Record(story);
+  const LockStepResult result = Replay({NodeId::kPhysics, NodeId::kThermal});
+  EXPECT_FALSE(result.good());
+  ASSERT_TRUE(result.nodes[0].departure) << ReportText(result);
+  EXPECT_EQ(result.nodes[0].departure->tick, 70u);
+  EXPECT_NE(result.nodes[0].departure->field.find("TissueFrame.xyz["), std::string::npos) << ReportText(result);
+  EXPECT_TRUE(result.nodes[1].good()) << "thermal has its own inputs";
+}
+
+TEST_F(LockStepTest, SaysWhatTheRecordingLacks) {
+  CartStory story{.seconds = 1};
+  story.tool_change = [](ToolState* tools) { return tools->stamp.sequence != 501; };
+  Record(story);
+  LockStepResult result = Replay({NodeId::kPhysics, NodeId::kHaptics});
+  EXPECT_FALSE(result.good());
+  EXPECT_NE(result.nodes[0].missing.find("ToolState #501"), std::string::npos) << ReportText(result);
+  EXPECT_NE(result.nodes[1].missing.find("lacks 1 ticks of haptics_node"), std::string::npos) << ReportText(result);
+
+  story = {.seconds = 1};
+  story.manifest_change = [](TickManifest* m) { return m->node != NodeId::kThermal || m->tick >= 3; };
+  Record(story);
+  result = Replay({NodeId::kThermal});
+  EXPECT_NE(result.nodes[0].missing.find("lacks 3 ticks of thermal_node"), std::string::npos) << ReportText(result);
+}
+
+TEST_F(LockStepTest, AnotherSceneIsRefused) {
+  Record({.seconds = 0.1});
+  view_.hash ^= 1;
+  EXPECT_THROW(Replay({NodeId::kThermal}), MismatchError);
+}
+
+}  // namespace
+}  // namespace fulcrum::replay

@@ -1,0 +1,202 @@
+// Physics, thermal and haptics in one process on a clock of their own, recorded as a recorder would.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "haptics_node/node/haptics_node.h"
+#include "physics_node/node/physics_checkpoint.h"
+#include "physics_node/node/physics_node.h"
+#include "services/bus/convert/cdr.h"
+#include "services/bus/in_process.h"
+#include "services/core/operator_script.h"
+#include "services/recording/mcap_writer.h"
+#include "services/runtime/checkpoint.h"
+#include "thermal_node/node/thermal_node.h"
+
+namespace fulcrum::replay::testing {
+
+/// A topic of the cart with a reader that records.
+template <class T>
+class TappedTopic {
+ public:
+  explicit TappedTopic(recording::McapWriter* writer)
+      : writer_(writer), channel_(writer->AddChannel(0, bus::RoleOf<T>().name, "cdr", {})) {}
+  [[nodiscard]] auto MakeInput() { return topic_.MakeInput(); }
+  [[nodiscard]] auto MakeOutput() { return topic_.MakeOutput(); }
+  /// What has come since. `change` may spoil a sample on its way into the recording, or drop it (false).
+  void Record(std::int64_t now_ns, const std::function<bool(T*)>& change = {}) {
+    while (tap_->TakeNext(&sample_)) {
+      if (change && !change(&sample_)) continue;
+      if (!bus::EncodeCdr(sample_, &bytes_)) continue;
+      writer_->Write(channel_, static_cast<std::uint32_t>(bus::StampOf(sample_).sequence),
+                     static_cast<std::uint64_t>(now_ns), static_cast<std::uint64_t>(now_ns),
+                     std::as_bytes(std::span(bytes_)));
+    }
+  }
+
+ private:
+  recording::McapWriter* writer_;
+  std::uint16_t channel_;
+  bus::InProcessTopic<T> topic_;
+  std::unique_ptr<bus::Input<T>> tap_ = topic_.MakeInput(4096);
+  T sample_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+struct CartStory {
+  double seconds = 3;
+  double kill_physics_s = -1;  ///< Ended without notice, started again 30 ms later.
+  double kill_haptics_s = -1;
+  double late_physics_s = -1;                            ///< One period is skipped.
+  int threads = 1;                                       ///< Of physics.
+  std::function<bool(ToolState*)> tool_change{};         ///< Of what is recorded only.
+  std::function<bool(TickManifest*)> manifest_change{};  ///< The same.
+};
+
+/// Runs and records it into `folder`/recording.mcap. Returns the length that was cut [m].
+inline float RecordCart(const SceneView& scene, const std::filesystem::path& folder, const CartStory& story) {
+  recording::McapWriter writer(folder / "recording.mcap", "", "test");
+  TappedTopic<ToolState> tools(&writer);
+  TappedTopic<HandleState> handles(&writer);
+  TappedTopic<TissueFrame> frames(&writer);
+  TappedTopic<ContactModel> models(&writer);
+  TappedTopic<CauteryContact> cautery(&writer);
+  TappedTopic<TopologyState> topology(&writer);
+  TappedTopic<TemperaturePatch> patches(&writer);
+  TappedTopic<ThermalEvent> events(&writer);
+  TappedTopic<TickManifest> manifests(&writer);
+  TappedTopic<SceneManifest> sessions(&writer);
+
+  constexpr std::int64_t kMillisecond = 1'000'000;
+  constexpr std::int64_t kStart = 1'000'000'000'000;
+  auto session_out = sessions.MakeOutput();
+  SceneManifest session;
+  session.stamp = {1, kStart, kStart};
+  session.scene_name = scene.name;
+  session.scene_hash = scene.hash;
+  session.session_start_ns = kStart;
+  session_out->Write(session);
+
+  struct PhysicsProcess {
+    std::unique_ptr<bus::Input<ToolState>> tools;
+    std::unique_ptr<bus::Input<HandleState>> handles;
+    std::unique_ptr<bus::Input<TopologyState>> topology;
+    std::unique_ptr<bus::LoanOutput<TissueFrame>> frames;
+    std::unique_ptr<bus::Output<ContactModel>> models;
+    std::unique_ptr<bus::Output<CauteryContact>> cautery;
+    std::unique_ptr<bus::Output<TickManifest>> manifests;
+    std::unique_ptr<physics::PhysicsNode> node;
+    std::uint64_t ticks = 0;
+  };
+  runtime::CheckpointFile physics_checkpoint(
+      folder / "physics.checkpoint", scene.hash, physics::kCheckpointLayout,
+      physics::CheckpointCapacity(static_cast<Index>(scene.rest_position.size())));
+  const auto start_physics = [&](std::int64_t epoch) {
+    PhysicsProcess p{tools.MakeInput(),
+                     handles.MakeInput(),
+                     topology.MakeInput(),
+                     frames.MakeOutput(),
+                     models.MakeOutput(),
+                     cautery.MakeOutput(),
+                     manifests.MakeOutput(),
+                     nullptr,
+                     0};
+    p.node = std::make_unique<physics::PhysicsNode>(
+        scene,
+        physics::PhysicsNode::Ports{*p.tools, *p.handles, *p.topology, *p.frames, *p.models, *p.cautery, *p.manifests},
+        &physics_checkpoint, epoch, story.threads);
+    return p;
+  };
+  struct HapticsProcess {
+    std::unique_ptr<bus::Input<ContactModel>> models;
+    std::unique_ptr<bus::Output<ToolState>> tools;
+    std::unique_ptr<bus::Output<TickManifest>> manifests;
+    std::unique_ptr<haptics::HapticsNode> node;
+  };
+  const auto start_haptics = [&](std::int64_t epoch) {
+    HapticsProcess h{models.MakeInput(), tools.MakeOutput(), manifests.MakeOutput(), nullptr};
+    h.node =
+        std::make_unique<haptics::HapticsNode>(scene, std::array<bool, kMaxTools>{true, true},
+                                               haptics::HapticsNode::Ports{*h.models, *h.tools, *h.manifests}, epoch);
+    return h;
+  };
+  std::optional<PhysicsProcess> physics = start_physics(kStart - 5);
+  std::optional<HapticsProcess> haptics = start_haptics(kStart - 4);
+  runtime::CheckpointFile thermal_checkpoint(folder / "thermal.checkpoint", scene.hash, thermal::kCheckpointLayout,
+                                             thermal::ThermalSolver::CheckpointCapacity(scene));
+  auto thermal_in = cautery.MakeInput();
+  auto topology_out = topology.MakeOutput();
+  auto patch_out = patches.MakeOutput();
+  auto event_out = events.MakeOutput();
+  auto thermal_manifest_out = manifests.MakeOutput();
+  thermal::ThermalNode thermal(scene, {*thermal_in, *topology_out, *patch_out, *event_out, *thermal_manifest_out},
+                               &thermal_checkpoint, kStart - 3);
+  auto handle_out = handles.MakeOutput();
+
+  const auto seconds_of = [](std::int64_t ns) { return 1e-9 * static_cast<double>(ns - kStart); };
+  const auto milliseconds = static_cast<std::int64_t>(1e3 * story.seconds);
+  const auto at = [](double time_s) { return static_cast<std::int64_t>(1e3 * time_s); };
+  std::uint64_t physics_index = 0, thermal_index = 0, haptics_index = 0, handle_sequence = 0;
+  for (std::int64_t ms = 0; ms < milliseconds; ++ms) {
+    // Wakes are a little late, each time by another amount.
+    const std::int64_t now = kStart + ms * kMillisecond + (ms * 7919) % 30011;
+    const double time = seconds_of(now);
+    if (ms == at(story.kill_physics_s)) physics.reset();
+    if (ms == at(story.kill_physics_s) + 30) {
+      physics = start_physics(now);
+      physics_index = 0;
+    }
+    if (ms == at(story.kill_haptics_s)) {
+      haptics.reset();
+      haptics = start_haptics(now);
+      haptics_index = 0;
+    }
+    if (ms % 2 == 0) {
+      HandleState state;
+      state.stamp = {++handle_sequence, kStart - 2, now};
+      for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+        const ScriptPoint point = EvaluateScript(scene.script, i, time);
+        state.handles[i] = {point.present, point.jaw_rad, 0, 1, 500};
+        state.pedals = static_cast<std::uint8_t>(state.pedals | point.pedals);
+      }
+      handle_out->Write(state);
+    }
+    haptics->node->BusStep();
+    haptics->node->ServoStep({haptics_index++, time, 1e-3, now});
+    haptics->node->BusStep();
+    const bool late = ms == at(story.late_physics_s);
+    if (physics && ms % 10 == 0) {
+      if (late) {
+        ++physics_index;
+      } else {
+        physics->node->Step({physics_index++, time, 1e-2, now});
+      }
+    }
+    if (ms % 10 == 3) thermal.Step({thermal_index++, time, 1e-2, now});
+
+    sessions.Record(now);
+    // Manifests overtake what they speak of.
+    manifests.Record(now, story.manifest_change);
+    tools.Record(now, story.tool_change);
+    handles.Record(now);
+    frames.Record(now);
+    models.Record(now);
+    cautery.Record(now);
+    topology.Record(now);
+    patches.Record(now);
+    events.Record(now);
+  }
+  writer.Close();
+  return thermal.solver().cut_length_m();
+}
+
+}  // namespace fulcrum::replay::testing
