@@ -1,9 +1,7 @@
 #include "services/replayer/lock_step.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <cmath>
 #include <condition_variable>
 #include <deque>
 #include <memory>
@@ -11,9 +9,9 @@
 #include <thread>
 #include <utility>
 
-#include "services/core/error.h"
 #include "services/replayer/published_difference.h"
 #include "services/replayer/replayed_node.h"
+#include "services/replayer/session_facts.h"
 #include "services/replayer/tick_source.h"
 #include "services/runtime/cyclic_thread.h"
 
@@ -127,14 +125,7 @@ bool LockStepResult::good() const {
 
 LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneView& scene,
                                 const config::CartConfig& cart, const std::function<void(double)>& progress) {
-  std::array<double, kNodeCount> period_s{};
-  for (int i = 0; i < kNodeCount; ++i) {
-    const auto node = static_cast<NodeId>(i);
-    // As the cyclic thread counts: whole nanoseconds.
-    period_s[static_cast<std::size_t>(i)] =
-        node == NodeId::kSupervisor ? 0.0 : kNsToS * std::round(1e9 / cart.timing(node).rate_Hz);
-  }
-  TickSource source(settings.recording, settings.nodes, period_s);
+  TickSource source(settings.recording, settings.nodes, NodePeriods(cart));
   std::vector<std::unique_ptr<NodeRunner>> runners;
   for (const NodeId node : settings.nodes) {
     runners.push_back(std::make_unique<NodeRunner>(node, NodeMaking{scene, cart, settings.folder}));
@@ -147,10 +138,7 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
   RecordedTick tick;
   std::vector<bool> running(runners.size(), true);
   while (std::find(running.begin(), running.end(), true) != running.end() && source.Next(&tick)) {
-    if (source.session() && source.session()->scene_hash != scene.hash) {
-      throw MismatchError(settings.recording.string() + " was recorded with another scene (\"" +
-                          source.session()->scene_name + "\"): give the compiled scene of that session with --scene");
-    }
+    RefuseOtherScene(settings.recording, source.session(), scene);
     const double time = tick.tick.session_time_s;
     if (settings.until_s >= 0 && time > settings.until_s) break;
     if (first_stamp == 0) {

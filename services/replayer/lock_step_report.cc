@@ -1,31 +1,9 @@
 #include "services/replayer/lock_step_report.h"
 
-#include <cstdarg>
-#include <cstdio>
-#include <fstream>
-
-#include "services/core/error.h"
+#include "services/replayer/report_format.h"
 
 namespace fulcrum::replay {
 namespace {
-
-__attribute__((format(printf, 1, 2))) std::string Format(const char* format, ...) {
-  char text[512];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text, sizeof(text), format, arguments);
-  va_end(arguments);
-  return text;
-}
-
-std::string Quoted(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    quoted += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return quoted + '"';
-}
 
 std::string Describe(const Departure& departure) {
   return Format("tick %llu (session time %.3f s): state hash recorded %016llx, replayed %016llx; ",
@@ -74,9 +52,7 @@ void WriteReportJson(const LockStepResult& result, const std::filesystem::path& 
     add("missing", Quoted(node.missing));
   }
   json += "\n}\n";
-  std::ofstream out(file);
-  out << json;
-  if (!out.flush()) throw InputError(file.string() + ": cannot be written");
+  WriteText(file, json);
 }
 
 }  // namespace fulcrum::replay

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <sstream>
 #include <string>
@@ -14,8 +15,11 @@
 #include "services/config/cart.h"
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
+#include "services/replayer/changed_scene.h"
 #include "services/replayer/lock_step.h"
 #include "services/replayer/lock_step_report.h"
+#include "services/replayer/what_if.h"
+#include "services/replayer/what_if_report.h"
 #include "services/scene/scene_file.h"
 
 namespace {
@@ -32,6 +36,11 @@ index. Needs no bus, no devices and no real time.
 
   replayer out/latest/recording.mcap --into physics thermal haptics
 
+With --set it replays them twice instead, as they were and with a parameter of the scene changed, each time feeding each
+other, and reports what the change does to positions, forces, temperature and the cut.
+
+  replayer out/latest/recording.mcap --into physics thermal --set physics.grip_force_N=4
+
 )";
 
 constexpr const char* kExitCodes =
@@ -41,6 +50,7 @@ constexpr const char* kExitCodes =
 
 struct Options {
   replay::LockStepSettings lock_step;
+  std::vector<std::string> changes;  ///< --set.
   std::filesystem::path scene, cart, json;
   bool quiet = false;
   std::string answer;
@@ -67,9 +77,11 @@ Options Parse(int argc, char** argv) {
   po::options_description visible("Options"), all;
   visible.add_options()  //
       ("into", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
-       "physics, thermal, haptics: one or more")                                                                 //
-      ("rate", po::value<double>()->value_name("X")->default_value(0), "times real time; 0: as fast as it can")  //
-      ("until", po::value<double>()->value_name("S")->default_value(-1), "end at this session time [s]")         //
+       "physics, thermal, haptics: one or more")  //
+      ("set", po::value<std::vector<std::string>>()->value_name("SECTION.KEY=VALUE"),
+       "a parameter to change, as in the scene's description; as often as needed")(
+          "rate", po::value<double>()->value_name("X")->default_value(0), "times real time; 0: as fast as it can")  //
+      ("until", po::value<double>()->value_name("S")->default_value(-1), "end at this session time [s]")            //
       ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
        "compiled scene; default: scene.fulcrum beside the recording")  //
       ("cart", po::value<std::string>()->value_name("FILE")->default_value(""),
@@ -110,6 +122,10 @@ Options Parse(int argc, char** argv) {
     options.lock_step.rate = values["rate"].as<double>();
     if (!(options.lock_step.rate >= 0)) throw InputError("--rate: must be 0 (as fast as it can) or more");
     options.lock_step.until_s = values["until"].as<double>();
+    if (values.count("set") != 0) options.changes = values["set"].as<std::vector<std::string>>();
+    if (!options.changes.empty() && options.lock_step.rate > 0) {
+      throw InputError("--rate says nothing with --set: both replays run as fast as they can");
+    }
     options.scene = BesideRecording(values["scene"].as<std::string>(), options.lock_step.recording, "scene.fulcrum");
     options.cart = BesideRecording(values["cart"].as<std::string>(), options.lock_step.recording, "cart.yaml");
     options.json = values["json"].as<std::string>();
@@ -154,13 +170,21 @@ int Run(int argc, char** argv) {
   const config::CartConfig cart = options.cart.empty() ? config::CartConfig() : config::LoadCart(options.cart);
   const ScratchFolder scratch;
   options.lock_step.folder = scratch.path();
-  const auto progress = [&](double time_s) { std::fprintf(stderr, "\rsession time %.1f s ", time_s); };
-  const replay::LockStepResult result = options.quiet
-                                            ? ReplayInLockStep(options.lock_step, scene.view(), cart, {})
-                                            : ReplayInLockStep(options.lock_step, scene.view(), cart, progress);
-  if (!options.quiet) std::fputs("\r\033[K", stderr);
+  std::function<void(double)> progress;
+  if (!options.quiet) progress = [](double time_s) { std::fprintf(stderr, "\rsession time %.1f s ", time_s); };
+  const auto end_progress = [&] { std::fputs(options.quiet ? "" : "\r\033[K", stderr); };
+  if (!options.changes.empty()) {
+    const SceneView changed = replay::WithChanges(scene, options.changes);
+    const replay::WhatIfResult result = ReplayWhatIf(options.lock_step, scene.view(), changed, cart, progress);
+    end_progress();
+    std::cout << ReportText(result, options.lock_step.nodes);
+    if (!options.json.empty()) WriteReportJson(result, options.json);
+    return static_cast<int>(result.missing.empty() ? ExitCode::kDone : ExitCode::kFailure);
+  }
+  const replay::LockStepResult result = ReplayInLockStep(options.lock_step, scene.view(), cart, progress);
+  end_progress();
   std::cout << ReportText(result);
-  if (!options.json.empty()) replay::WriteReportJson(result, options.json);
+  if (!options.json.empty()) WriteReportJson(result, options.json);
   return static_cast<int>(result.good() ? ExitCode::kDone : ExitCode::kFailure);
 }
 

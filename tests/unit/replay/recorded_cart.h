@@ -178,7 +178,9 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
       if (late) {
         ++physics_index;
       } else {
-        physics->node->Step({physics_index++, time, 1e-2, now});
+        // It looks a little after the servo.
+        const std::int64_t then = now + kMillisecond / 5;
+        physics->node->Step({physics_index++, seconds_of(then), 1e-2, then});
       }
     }
     if (ms % 10 == 3) thermal.Step({thermal_index++, time, 1e-2, now});

@@ -1,0 +1,77 @@
+#include "services/replayer/coupled_nodes.h"
+
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include "services/bus/convert/cdr.h"
+#include "services/bus/topics.h"
+#include "services/replayer/what_if.h"
+
+namespace fulcrum::replay {
+namespace {
+
+constexpr std::size_t kKept = 2048;
+constexpr auto kDelay_ns = static_cast<std::int64_t>(1e9 * kCouplingDelay_s);
+
+template <class T>
+bool Decode(const Published& published, std::optional<T>* message) {
+  if (published.topic != bus::kTopicOf<T>) return false;
+  if (!bus::DecodeCdr(published.bytes, &message->emplace())) message->reset();
+  return message->has_value();
+}
+
+template <class T>
+void Keep(const std::optional<T>& sample, std::map<std::int64_t, T>* sent) {
+  if (!sample) return;
+  sent->insert_or_assign(sample->stamp.stamp_ns, *sample);
+  if (sent->size() > kKept) sent->erase(sent->begin());
+}
+
+}  // namespace
+
+CoupledNodes::CoupledNodes(const std::vector<NodeId>& nodes, const NodeMaking& making) {
+  std::filesystem::create_directories(making.folder);
+  for (const NodeId node : nodes) nodes_.emplace(node, MakeReplayedNode(node, making));
+}
+
+template <class T>
+void CoupledNodes::Replace(NodeId owner, std::optional<T>* input, const std::map<std::int64_t, T>& sent) const {
+  if (!Has(owner) || !*input) return;
+  const auto found = sent.find((*input)->stamp.stamp_ns);
+  // What the replayed node did not send at that moment does not come.
+  *input = found == sent.end() ? std::nullopt : std::optional(found->second);
+}
+
+Outcome CoupledNodes::Step(const RecordedTick& recorded) {
+  RecordedTick tick = recorded;
+  Replace(NodeId::kHaptics, &tick.tools, tools_);
+  Replace(NodeId::kPhysics, &tick.model, models_);
+  Replace(NodeId::kPhysics, &tick.cautery, cautery_);
+  if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) {
+    tick.topology.reset();
+    while (!topology_.empty() && topology_.front().stamp.stamp_ns + kDelay_ns <= tick.tick.stamp_ns) {
+      tick.topology = std::move(topology_.front());
+      topology_.pop_front();
+    }
+  }
+  ReplayedNode& node = *nodes_.at(tick.node);
+  Outcome outcome;
+  outcome.state_hash = node.Step(tick);
+  for (const Published& published : node.TakeOutputs()) {
+    if (std::optional<ThermalEvent> event; Decode(published, &event)) {
+      outcome.events.push_back(*event);
+    } else {
+      (void)(Decode(published, &outcome.tools) || Decode(published, &outcome.frame) ||
+             Decode(published, &outcome.model) || Decode(published, &outcome.cautery) ||
+             Decode(published, &outcome.topology) || Decode(published, &outcome.patch));
+    }
+  }
+  Keep(outcome.tools, &tools_);
+  Keep(outcome.model, &models_);
+  Keep(outcome.cautery, &cautery_);
+  if (outcome.topology && Has(NodeId::kPhysics)) topology_.push_back(*outcome.topology);
+  return outcome;
+}
+
+}  // namespace fulcrum::replay

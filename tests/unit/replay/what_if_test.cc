@@ -1,0 +1,91 @@
+#include "services/replayer/what_if.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "services/core/error.h"
+#include "services/replayer/changed_scene.h"
+#include "services/replayer/what_if_report.h"
+#include "services/scene/compile.h"
+#include "services/scene/scene_file.h"
+#include "services/scene/scene_yaml.h"
+#include "tests/unit/replay/recorded_cart.h"
+
+namespace fulcrum::replay {
+namespace {
+
+class WhatIfTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::filesystem::temp_directory_path() / ("fulcrum_what_if_test_" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+    const std::filesystem::path yaml = std::filesystem::path(FULCRUM_SOURCE_DIR) / "deploy/scenes/small.yaml";
+    const auto description = scene::ReadSceneYaml(yaml, {});
+    const scene::SceneData data = scene::BuildScene(description.settings, {});
+    scene::WriteSceneFile(data, description.effective_yaml, folder_ / "scene");
+    scene_ = std::make_unique<scene::SceneFile>(folder_ / "scene");
+    testing::RecordCart(scene_->view(), folder_, {.seconds = 3.2});
+  }
+  static void TearDownTestSuite() {
+    scene_.reset();
+    std::filesystem::remove_all(folder_);
+  }
+
+  static WhatIfResult WhatIf(const std::vector<std::string>& changes, const std::vector<NodeId>& nodes) {
+    const LockStepSettings settings{folder_ / "recording.mcap", nodes, folder_ / "again"};
+    std::filesystem::remove_all(settings.folder);
+    return ReplayWhatIf(settings, scene_->view(), WithChanges(*scene_, changes), {}, {});
+  }
+
+  static std::filesystem::path folder_;
+  static std::unique_ptr<scene::SceneFile> scene_;
+};
+std::filesystem::path WhatIfTest::folder_;
+std::unique_ptr<scene::SceneFile> WhatIfTest::scene_;
+
+TEST_F(WhatIfTest, NothingChangedIsNoDifference) {
+  const WhatIfResult result = WhatIf({}, {NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics});
+  EXPECT_LT(result.first_difference_s, 0);
+  EXPECT_EQ(result.missing, "");
+  EXPECT_GT(result.frames, 200u);
+  EXPECT_EQ(result.max_position_mm, 0);
+  EXPECT_GT(result.cut_length_mm.before, 1);
+  EXPECT_EQ(result.cut_length_mm.before, result.cut_length_mm.after);
+}
+
+TEST_F(WhatIfTest, AWeakGripLetsGo) {
+  const WhatIfResult result = WhatIf({"physics.grip_force_N=0.2"}, {NodeId::kPhysics});
+  EXPECT_GT(result.first_difference_s, 1.0) << "the tissue is not pulled before";
+  EXPECT_GT(result.max_position_mm, 2);
+  EXPECT_LT(result.peak_tissue_force_N.after, result.peak_tissue_force_N.before);
+}
+
+TEST_F(WhatIfTest, WetterTissueIsCutLess) {
+  const WhatIfResult result = WhatIf({"thermal.latent_heat_J_m3=2.3e9"}, {NodeId::kPhysics, NodeId::kThermal});
+  EXPECT_EQ(result.first_node, NodeId::kThermal);
+  EXPECT_LT(result.cut_length_mm.after, result.cut_length_mm.before);
+  EXPECT_GT(result.max_position_mm, 0) << "what is not cut moves otherwise: physics is fed by thermal";
+  EXPECT_NE(ReportText(result, {NodeId::kPhysics, NodeId::kThermal}).find("cut length"), std::string::npos);
+}
+
+TEST_F(WhatIfTest, BadChangesAreNamed) {
+  const auto refusal = [](const std::string& change) {
+    try {
+      (void)WithChanges(*scene_, {change});
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(refusal("membrane.rows=7").find("section of physics"), std::string::npos);
+  EXPECT_NE(refusal("physics").find("section.key=value"), std::string::npos);
+  EXPECT_NE(refusal("physics.tube_poisson=0.7").find("0.495"), std::string::npos);
+  EXPECT_NE(refusal("physics.grip=7").find("grip"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace fulcrum::replay
