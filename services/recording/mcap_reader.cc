@@ -13,7 +13,7 @@
 
 namespace fulcrum::recording {
 
-McapReader::McapReader(const std::filesystem::path& file) : in_(file, std::ios::binary) {
+McapReader::McapReader(const std::filesystem::path& file) : file_(file), in_(file, std::ios::binary) {
   if (!in_) {
     throw InputError(file.string() + ": cannot be read: " + std::strerror(errno));
   }
@@ -28,6 +28,14 @@ McapReader::McapReader(const std::filesystem::path& file) : in_(file, std::ios::
     throw InputError(file.string() + ": is not a recording: it does not begin with the eight bytes of an MCAP file");
   }
   next_ = magic.size();
+}
+
+void McapReader::Reopen() {
+  in_ = std::ifstream(file_, std::ios::binary);
+  in_.seekg(static_cast<std::streamoff>(next_));
+  if (!in_) {
+    throw InputError(file_.string() + ": cannot be read any more: " + std::strerror(errno));
+  }
 }
 
 void McapReader::Fault(std::string what) {

@@ -44,6 +44,10 @@ class McapReader {
   /// The next message, in the order of the file; false at the end of what can be read.
   bool Next(McapMessage* message);
 
+  /// Goes on where it was, with a file handle of its own: for a process that was forked, which shares the old one's
+  /// position. Throws InputError when the file is gone.
+  void Reopen();
+
   // What has been met so far.
   [[nodiscard]] const std::string& profile() const { return profile_; }
   [[nodiscard]] const std::string& library() const { return library_; }
@@ -71,6 +75,7 @@ class McapReader {
   void OpenChunk(std::span<const std::uint8_t> content);
   void Fault(std::string what);
 
+  std::filesystem::path file_;
   std::ifstream in_;
   std::uint64_t size_ = 0, next_ = 0, at_ = 0;  ///< Of the file; of the next record; of the one at hand.
   std::vector<std::uint8_t> content_, chunk_;

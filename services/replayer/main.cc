@@ -16,6 +16,7 @@
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
 #include "services/replayer/changed_scene.h"
+#include "services/replayer/console.h"
 #include "services/replayer/lock_step.h"
 #include "services/replayer/lock_step_report.h"
 #include "services/replayer/what_if.h"
@@ -41,6 +42,8 @@ other, and reports what the change does to positions, forces, temperature and th
 
   replayer out/latest/recording.mcap --into physics thermal --set physics.grip_force_N=4
 
+With --console it is led by hand: go, pause, step, seek forward and back.
+
 )";
 
 constexpr const char* kExitCodes =
@@ -52,7 +55,7 @@ struct Options {
   replay::LockStepSettings lock_step;
   std::vector<std::string> changes;  ///< --set.
   std::filesystem::path scene, cart, json;
-  bool quiet = false;
+  bool quiet = false, console = false;
   std::string answer;
 };
 
@@ -79,9 +82,10 @@ Options Parse(int argc, char** argv) {
       ("into", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
        "physics, thermal, haptics: one or more")  //
       ("set", po::value<std::vector<std::string>>()->value_name("SECTION.KEY=VALUE"),
-       "a parameter to change, as in the scene's description; as often as needed")(
-          "rate", po::value<double>()->value_name("X")->default_value(0), "times real time; 0: as fast as it can")  //
-      ("until", po::value<double>()->value_name("S")->default_value(-1), "end at this session time [s]")            //
+       "a parameter to change, as in the scene's description; as often as needed")                               //
+      ("console", "read commands from standard input; \"help\" lists them")                                      //
+      ("rate", po::value<double>()->value_name("X")->default_value(0), "times real time; 0: as fast as it can")  //
+      ("until", po::value<double>()->value_name("S")->default_value(-1), "end at this session time [s]")         //
       ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
        "compiled scene; default: scene.fulcrum beside the recording")  //
       ("cart", po::value<std::string>()->value_name("FILE")->default_value(""),
@@ -125,6 +129,10 @@ Options Parse(int argc, char** argv) {
     if (values.count("set") != 0) options.changes = values["set"].as<std::vector<std::string>>();
     if (!options.changes.empty() && options.lock_step.rate > 0) {
       throw InputError("--rate says nothing with --set: both replays run as fast as they can");
+    }
+    options.console = values.count("console") != 0;
+    if (options.console && !(options.changes.empty() && values["json"].as<std::string>().empty())) {
+      throw InputError("--console goes with neither --set nor --json");
     }
     options.scene = BesideRecording(values["scene"].as<std::string>(), options.lock_step.recording, "scene.fulcrum");
     options.cart = BesideRecording(values["cart"].as<std::string>(), options.lock_step.recording, "cart.yaml");
@@ -170,6 +178,7 @@ int Run(int argc, char** argv) {
   const config::CartConfig cart = options.cart.empty() ? config::CartConfig() : config::LoadCart(options.cart);
   const ScratchFolder scratch;
   options.lock_step.folder = scratch.path();
+  if (options.console) return RunConsole(options.lock_step, scene.view(), cart);
   std::function<void(double)> progress;
   if (!options.quiet) progress = [](double time_s) { std::fprintf(stderr, "\rsession time %.1f s ", time_s); };
   const auto end_progress = [&] { std::fputs(options.quiet ? "" : "\r\033[K", stderr); };

@@ -54,6 +54,9 @@ class TickSource {
   /// The next tick in the order of their times; false at the end of the recording.
   bool Next(RecordedTick* tick);
 
+  /// See McapReader::Reopen().
+  void Reopen() { reader_.Reopen(); }
+
   /// The session, once it was met.
   [[nodiscard]] const std::optional<SceneManifest>& session() const { return session_; }
   [[nodiscard]] const recording::McapReader& reader() const { return reader_; }
