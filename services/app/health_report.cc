@@ -3,15 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/bus/gate.h"
+
 namespace fulcrum::app {
 namespace {
 
 constexpr std::int64_t kRateWindowNs = 1'000'000'000;
-// Limits of the Health message (services/core/messages.h).
-constexpr std::size_t kMaxInputs = 8;
-constexpr std::size_t kMaxMetrics = 16;
-constexpr std::size_t kMaxMetricName = 31;
-constexpr std::size_t kMaxError = 255;
 
 }  // namespace
 
@@ -64,15 +61,15 @@ Health HealthReport::Make(std::int64_t now_ns, HealthState state, const runtime:
 }
 
 void FitToMessage(Health* health) {
-  health->inputs.resize(std::min(health->inputs.size(), kMaxInputs));
-  health->metrics.resize(std::min(health->metrics.size(), kMaxMetrics));
+  health->inputs.resize(std::min(health->inputs.size(), bus::kMaxInputHealths));
+  health->metrics.resize(std::min(health->metrics.size(), bus::kMaxMetrics));
   for (Metric& metric : health->metrics) {
-    metric.name.resize(std::min(metric.name.size(), kMaxMetricName));
+    metric.name.resize(std::min(metric.name.size(), bus::kMaxMetricName));
     if (!std::isfinite(metric.value)) {
       metric.value = 0;
     }
   }
-  health->last_error.resize(std::min(health->last_error.size(), kMaxError));
+  health->last_error.resize(std::min(health->last_error.size(), bus::kMaxErrorText));
 }
 
 }  // namespace fulcrum::app

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <thread>
 
@@ -59,19 +60,33 @@ struct NodeApp::Impl {
     Command command;
     while (commands->TakeNext(&command)) {
       if (command.target != node) continue;
-      const bool known = command.verb == "stop";
       CommandReply reply;
+      try {
+        const auto handler = handlers.find(command.verb);
+        if (handler == handlers.end()) {
+          throw InputError("unknown verb \"" + command.verb + "\"; " + NodeName(node) + " knows: " + Verbs());
+        }
+        reply.text = handler->second(command.argument);
+        reply.ok = true;
+      } catch (const std::exception& error) {
+        reply.text = error.what();
+      }
       reply.stamp = reply_stamper.Next(MonotonicNs());
       reply.request_id = command.request_id;
       reply.from = node;
-      reply.ok = known;
-      reply.text = known ? "stopping" : "unknown verb \"" + command.verb + "\"; a node knows: stop";
       replies->Write(reply);
-      if (known) End(ExitCode::kDone, "stopped by command");
     }
     if (const std::string mismatch = participant.schema_mismatch(); !mismatch.empty()) {
       End(ExitCode::kMismatch, mismatch);
     }
+  }
+
+  [[nodiscard]] std::string Verbs() const {
+    std::string verbs;
+    for (const auto& [verb, handler] : handlers) {
+      verbs += verbs.empty() ? verb : ", " + verb;
+    }
+    return verbs;
   }
 
   void End(ExitCode code, std::string_view reason) {
@@ -108,6 +123,11 @@ struct NodeApp::Impl {
   std::vector<HealthReport::InputWatch> inputs;
   std::vector<HealthReport::OutputWatch> outputs;
   std::vector<std::shared_ptr<void>> ports;
+  std::map<std::string, std::function<std::string(const std::string&)>> handlers{{"stop", [this](const std::string&) {
+                                                                                    End(ExitCode::kDone,
+                                                                                        "stopped by command");
+                                                                                    return "stopping";
+                                                                                  }}};
 
   // Relaxed: one number, nothing else is published through it.
   std::atomic<std::int64_t> session_start_ns{kSessionUnknown};
@@ -151,6 +171,10 @@ void NodeApp::Keep(std::shared_ptr<void> port) { impl_->ports.push_back(std::mov
 double NodeApp::SessionTime(std::int64_t stamp_ns) const noexcept {
   const std::int64_t start = impl_->session_start_ns.load(std::memory_order_relaxed);
   return start == kSessionUnknown ? -1.0 : 1e-9 * static_cast<double>(stamp_ns - start);
+}
+
+void NodeApp::OnCommand(std::string verb, std::function<std::string(const std::string&)> handler) {
+  impl_->handlers[std::move(verb)] = std::move(handler);
 }
 
 void NodeApp::Finish(ExitCode code, std::string_view reason) { impl_->End(code, reason); }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <string_view>
+#include <type_traits>
 
 #include "services/core/messages.h"
 
@@ -103,6 +104,40 @@ inline constexpr TopicId kTopicOf<TickManifest> = TopicId::kTickManifest;
 template <class T>
 [[nodiscard]] constexpr const TopicRole& RoleOf() {
   return RoleOf(kTopicOf<T>);
+}
+
+/// Calls `f(std::type_identity<T>())` with the message type of a topic that is only known at run time.
+template <class F>
+decltype(auto) WithMessageOf(TopicId id, F&& f) {
+  switch (id) {
+    case TopicId::kHandleState:
+      return f(std::type_identity<HandleState>());
+    case TopicId::kToolState:
+      return f(std::type_identity<ToolState>());
+    case TopicId::kTissueFrame:
+      return f(std::type_identity<TissueFrame>());
+    case TopicId::kContactModel:
+      return f(std::type_identity<ContactModel>());
+    case TopicId::kCauteryContact:
+      return f(std::type_identity<CauteryContact>());
+    case TopicId::kTopologyState:
+      return f(std::type_identity<TopologyState>());
+    case TopicId::kTemperaturePatch:
+      return f(std::type_identity<TemperaturePatch>());
+    case TopicId::kThermalEvent:
+      return f(std::type_identity<ThermalEvent>());
+    case TopicId::kSceneManifest:
+      return f(std::type_identity<SceneManifest>());
+    case TopicId::kCommand:
+      return f(std::type_identity<Command>());
+    case TopicId::kCommandReply:
+      return f(std::type_identity<CommandReply>());
+    case TopicId::kTickManifest:
+      return f(std::type_identity<TickManifest>());
+    case TopicId::kHealth:
+      break;
+  }
+  return f(std::type_identity<Health>());
 }
 
 /// "ToolState": the topic's name for people.

@@ -244,6 +244,7 @@ CartConfig::CartConfig() {
   timing_of(NodeId::kPhysics) = {.rate_Hz = 100, .fifo_priority = 40};
   timing_of(NodeId::kThermal) = {.rate_Hz = 100, .fifo_priority = 30};
   timing_of(NodeId::kRender) = {.rate_Hz = 30};
+  timing_of(NodeId::kRecorder) = {.rate_Hz = 20};
 }
 
 void Validate(const CartConfig& cart) {

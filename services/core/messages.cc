@@ -16,6 +16,8 @@ const char* NodeName(NodeId node) {
       return "thermal_node";
     case NodeId::kRender:
       return "render_node";
+    case NodeId::kRecorder:
+      return "recorder";
   }
   return "unknown";
 }

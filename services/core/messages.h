@@ -29,8 +29,8 @@ struct Stamp {
   std::int64_t stamp_ns = 0;   ///< CLOCK_MONOTONIC of the data [ns].
 };
 
-enum class NodeId : std::uint8_t { kSupervisor, kHandleBridge, kHaptics, kPhysics, kThermal, kRender };
-inline constexpr int kNodeCount = 6;
+enum class NodeId : std::uint8_t { kSupervisor, kHandleBridge, kHaptics, kPhysics, kThermal, kRender, kRecorder };
+inline constexpr int kNodeCount = 7;
 /// "supervisor", "handle_bridge", "haptics_node", ...: the name of the executable.
 const char* NodeName(NodeId node);
 
@@ -332,7 +332,7 @@ struct Health {
   TimingSummary step;               ///< Of the step itself, since the start.
   TimingSummary wake;               ///< Lateness of the wake-up, since the start.
   std::string last_error;           ///< At most 255 characters; empty when all is well.
-  std::vector<InputHealth> inputs;  ///< At most 8.
+  std::vector<InputHealth> inputs;  ///< At most 16.
   std::vector<Metric> metrics;      ///< At most 16.
 };
 

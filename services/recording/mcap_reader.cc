@@ -12,8 +12,15 @@
 #include "services/recording/byte_stream.h"
 
 namespace fulcrum::recording {
+namespace {
 
-McapReader::McapReader(const std::filesystem::path& file) : file_(file), in_(file, std::ios::binary) {
+/// First and last time, at the beginning of a chunk.
+constexpr std::uint64_t kChunkTimes = 2 * sizeof(std::uint64_t);
+
+}  // namespace
+
+McapReader::McapReader(const std::filesystem::path& file, Depth depth)
+    : file_(file), depth_(depth), in_(file, std::ios::binary) {
   if (!in_) {
     throw InputError(file.string() + ": cannot be read: " + std::strerror(errno));
   }
@@ -64,12 +71,16 @@ std::optional<McapReader::Record> McapReader::ReadFromFile() {
     Fault("the file ends within a record of " + std::to_string(length) + " bytes");
     return std::nullopt;
   }
-  content_.resize(length);
-  if (!read(content_.data(), length)) {
+  next_ += head.size() + length;
+  const bool only_times = depth_ == Depth::kChunkHeads && head[0] == static_cast<std::uint8_t>(Opcode::kChunk);
+  content_.resize(only_times ? std::min<std::uint64_t>(length, kChunkTimes) : length);
+  if (!read(content_.data(), content_.size())) {
     Fault("the file cannot be read on");
     return std::nullopt;
   }
-  next_ += head.size() + length;
+  if (only_times) {
+    in_.seekg(static_cast<std::streamoff>(next_));
+  }
   return Record{head[0], content_};
 }
 
@@ -89,7 +100,15 @@ std::optional<McapReader::Record> McapReader::TakeFromChunk() {
 
 void McapReader::OpenChunk(std::span<const std::uint8_t> content) {
   ByteReader from(content);
-  (void)from.Take(2 * sizeof(std::uint64_t));  // First and last time.
+  const auto first_ns = from.Number<std::uint64_t>();
+  const auto last_ns = from.Number<std::uint64_t>();
+  if (from.good()) {
+    first_ns_ = first_ns_ == 0 ? first_ns : std::min(first_ns_, first_ns);
+    last_ns_ = std::max(last_ns_, last_ns);
+  }
+  if (depth_ == Depth::kChunkHeads) {
+    return;
+  }
   const auto size = from.Number<std::uint64_t>();
   const auto crc = from.Number<std::uint32_t>();
   const std::string packing = from.Text();

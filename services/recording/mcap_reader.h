@@ -38,8 +38,12 @@ struct McapFault {
 /// may be plain or packed with zstd. Records that it does not know are passed over, as the format asks.
 class McapReader {
  public:
+  enum class Depth {
+    kMessages,
+    kChunkHeads,  ///< Passes chunks over and gives no message: fast, for first_ns, last_ns and metadata.
+  };
   /// Throws InputError when the file cannot be read or does not begin as an MCAP file.
-  explicit McapReader(const std::filesystem::path& file);
+  explicit McapReader(const std::filesystem::path& file, Depth depth = Depth::kMessages);
 
   /// The next message, in the order of the file; false at the end of what can be read.
   bool Next(McapMessage* message);
@@ -55,6 +59,9 @@ class McapReader {
   [[nodiscard]] const std::map<std::uint16_t, McapChannel>& channels() const { return channels_; }
   [[nodiscard]] const std::map<std::string, std::map<std::string, std::string>>& metadata() const { return metadata_; }
   [[nodiscard]] const std::vector<McapFault>& faults() const { return faults_; }
+  /// First and last log time of the chunks met so far; 0: none.
+  [[nodiscard]] std::uint64_t first_ns() const { return first_ns_; }
+  [[nodiscard]] std::uint64_t last_ns() const { return last_ns_; }
   /// Its writer has closed it: it ends with a footer.
   [[nodiscard]] bool closed() const { return closed_; }
 
@@ -76,7 +83,9 @@ class McapReader {
   void Fault(std::string what);
 
   std::filesystem::path file_;
+  const Depth depth_;
   std::ifstream in_;
+  std::uint64_t first_ns_ = 0, last_ns_ = 0;
   std::uint64_t size_ = 0, next_ = 0, at_ = 0;  ///< Of the file; of the next record; of the one at hand.
   std::vector<std::uint8_t> content_, chunk_;
   std::span<const std::uint8_t> left_;  ///< Of the chunk.

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <unistd.h>
 #include <zlib.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -14,9 +13,6 @@
 
 namespace fulcrum::recording {
 namespace {
-
-/// The fastest that still packs: a recorder runs beside solvers.
-constexpr int kZstdLevel = 1;
 
 std::uint32_t Crc(std::span<const std::uint8_t> bytes, std::uint32_t before = 0) {
   return static_cast<std::uint32_t>(crc32_z(before, bytes.data(), bytes.size()));
@@ -37,7 +33,6 @@ McapWriter::McapWriter(const std::filesystem::path& file, std::string_view profi
     throw InputError(file.string() + ": cannot be written: " + std::strerror(errno) +
                      "; choose a folder that exists and is yours");
   }
-  chunk_.reserve(2 * kChunkBytes);
   record_.assign(kMcapMagic.begin(), kMcapMagic.end());
   ByteWriter to(&record_);
   to.Record(Opcode::kHeader, [&] {
@@ -78,8 +73,8 @@ std::uint16_t McapWriter::AddSchema(std::string_view name, std::string_view enco
 
 std::uint16_t McapWriter::AddChannel(std::uint16_t schema, std::string_view topic, std::string_view message_encoding,
                                      const TextMap& metadata) {
-  const auto number = static_cast<std::uint16_t>(channel_.size());
-  channel_.emplace_back();
+  const auto number = static_cast<std::uint16_t>(counts_.size());
+  counts_.push_back(0);
   record_.clear();
   ByteWriter to(&record_);
   to.Record(Opcode::kChannel, [&] {
@@ -105,66 +100,37 @@ void McapWriter::AddMetadata(std::string_view name, const TextMap& values) {
 
 void McapWriter::Write(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns,
                        std::uint64_t publish_time_ns, std::span<const std::byte> data) {
-  if (file_ < 0 || !error_.empty() || channel >= channel_.size()) {
+  if (file_ < 0 || !error_.empty() || channel >= counts_.size()) {
     return;
   }
-  chunk_first_ns_ = chunk_.empty() ? log_time_ns : std::min(chunk_first_ns_, log_time_ns);
-  chunk_last_ns_ = chunk_.empty() ? log_time_ns : std::max(chunk_last_ns_, log_time_ns);
-  channel_[channel].index.push_back({log_time_ns, chunk_.size()});
-  ++channel_[channel].count;
-  ByteWriter to(&chunk_);
-  to.Record(Opcode::kMessage, [&] {
-    to.Number(channel);
-    to.Number(sequence);
-    to.Number(log_time_ns);
-    to.Number(publish_time_ns);
-    to.Bytes(data.data(), data.size());
-  });
-  first_ns_ = message_count_ == 0 ? log_time_ns : std::min(first_ns_, log_time_ns);
-  last_ns_ = std::max(last_ns_, log_time_ns);
-  ++message_count_;
-  if (chunk_.size() >= kChunkBytes) {
+  chunk_.Add(channel, sequence, log_time_ns, publish_time_ns, data);
+  if (chunk_.size() >= ChunkBuilder::kChunkBytes) {
     EndChunk();
   }
 }
 
 void McapWriter::EndChunk() {
-  if (chunk_.empty()) {
+  if (chunk_.size() > 0) {
+    Append(chunk_.Pack());
+  }
+}
+
+void McapWriter::Append(const PackedChunk& chunk) {
+  const std::uint64_t start = offset_;
+  Put(chunk.bytes);
+  if (!error_.empty()) {
     return;
   }
-  packed_.resize(ZSTD_compressBound(chunk_.size()));
-  const std::size_t packed = ZSTD_compress(packed_.data(), packed_.size(), chunk_.data(), chunk_.size(), kZstdLevel);
-  // It fails only without memory; then as it is.
-  const bool plain = ZSTD_isError(packed) != 0;
-  const std::span<const std::uint8_t> body = plain ? std::span(chunk_) : std::span(packed_).first(packed);
-  record_.clear();
-  ByteWriter to(&record_);
-  to.Record(Opcode::kChunk, [&] {
-    to.Number(chunk_first_ns_);
-    to.Number(chunk_last_ns_);
-    to.Number(std::uint64_t{chunk_.size()});
-    to.Number(Crc(chunk_));
-    to.Text(plain ? "" : "zstd");
-    to.Number(std::uint64_t{body.size()});
-    to.Bytes(body.data(), body.size());
-  });
-  ChunkPlace place{chunk_first_ns_, chunk_last_ns_, offset_, record_.size(), 0, body.size(), chunk_.size(), plain, {}};
-  for (std::size_t c = 0; c < channel_.size(); ++c) {
-    ChannelState& channel = channel_[c];
-    if (channel.index.empty()) {
-      continue;
-    }
-    place.index_offset.emplace_back(static_cast<std::uint16_t>(c), offset_ + record_.size());
-    to.Record(Opcode::kMessageIndex, [&] {
-      to.Number(static_cast<std::uint16_t>(c));
-      to.Sized<std::uint32_t>([&] { to.Bytes(channel.index.data(), channel.index.size() * sizeof(IndexEntry)); });
-    });
-    channel.index.clear();
+  first_ns_ = chunks_.empty() ? chunk.first_ns : std::min(first_ns_, chunk.first_ns);
+  last_ns_ = std::max(last_ns_, chunk.last_ns);
+  for (const PackedChunk::Part& part : chunk.parts) {
+    counts_[part.channel] += part.messages;
+    message_count_ += part.messages;
   }
-  place.index_length = record_.size() - place.length;
-  chunks_.push_back(std::move(place));
-  chunk_.clear();
-  Put(record_);
+  chunks_.push_back(
+      {start,
+       chunk.bytes.size() - chunk.length,
+       {{}, chunk.first_ns, chunk.last_ns, chunk.length, chunk.packed, chunk.unpacked, chunk.plain, chunk.parts}});
 }
 
 std::vector<std::uint8_t> McapWriter::Statistics() const {
@@ -173,16 +139,16 @@ std::vector<std::uint8_t> McapWriter::Statistics() const {
   to.Record(Opcode::kStatistics, [&] {
     to.Number(message_count_);
     to.Number(schema_count_);
-    to.Number(static_cast<std::uint32_t>(channel_.size()));
+    to.Number(static_cast<std::uint32_t>(counts_.size()));
     to.Number(std::uint32_t{0});  // Attachments.
     to.Number(static_cast<std::uint32_t>(metadata_.size()));
     to.Number(static_cast<std::uint32_t>(chunks_.size()));
     to.Number(first_ns_);
     to.Number(last_ns_);
     to.Sized<std::uint32_t>([&] {
-      for (std::size_t c = 0; c < channel_.size(); ++c) {
+      for (std::size_t c = 0; c < counts_.size(); ++c) {
         to.Number(static_cast<std::uint16_t>(c));
-        to.Number(channel_[c].count);
+        to.Number(counts_[c]);
       }
     });
   });
@@ -212,22 +178,22 @@ void McapWriter::PutSummary() {
     to.Bytes(statistics.data(), statistics.size());
   });
   group(Opcode::kChunkIndex, [&] {
-    for (const ChunkPlace& chunk : chunks_) {
+    for (const auto& [start_of_chunk, index_B, chunk] : chunks_) {
       to.Record(Opcode::kChunkIndex, [&] {
         to.Number(chunk.first_ns);
         to.Number(chunk.last_ns);
-        to.Number(chunk.start);
+        to.Number(start_of_chunk);
         to.Number(chunk.length);
         to.Sized<std::uint32_t>([&] {
-          for (const auto& [channel, offset] : chunk.index_offset) {
-            to.Number(channel);
-            to.Number(offset);
+          for (const PackedChunk::Part& part : chunk.parts) {
+            to.Number(part.channel);
+            to.Number(std::uint64_t{start_of_chunk + part.index_offset});
           }
         });
-        to.Number(chunk.index_length);
+        to.Number(index_B);
         to.Text(chunk.plain ? "" : "zstd");
-        to.Number(chunk.compressed);
-        to.Number(chunk.uncompressed);
+        to.Number(chunk.packed);
+        to.Number(chunk.unpacked);
       });
     }
   });

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "services/recording/mcap_chunk.h"
+
 namespace fulcrum::recording {
 
 using TextMap = std::map<std::string, std::string>;
@@ -32,32 +34,27 @@ class McapWriter {
   std::uint16_t AddChannel(std::uint16_t schema, std::string_view topic, std::string_view message_encoding,
                            const TextMap& metadata);
   void AddMetadata(std::string_view name, const TextMap& values);
-  /// Adds a message to the open chunk, and ends that when it is kChunkBytes long. Times are nanoseconds of one clock.
+  /// Adds a message to the open chunk, and ends that when it is ChunkBuilder::kChunkBytes long. Times are nanoseconds
+  /// of one clock.
   void Write(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns, std::uint64_t publish_time_ns,
              std::span<const std::byte> data);
+  /// Adds a chunk that was packed elsewhere, of channels that this file has.
+  void Append(const PackedChunk& chunk);
   /// Ends the open chunk, if it holds anything: all messages so far are then in the file.
   void EndChunk();
   /// Ends the last chunk and adds the summary. Nothing can be written afterwards.
   void Close();
 
   [[nodiscard]] const std::string& error() const { return error_; }
+  /// In the chunks that were ended.
   [[nodiscard]] std::uint64_t message_count() const { return message_count_; }
   [[nodiscard]] std::uint64_t bytes_written() const { return offset_; }
 
-  static constexpr std::size_t kChunkBytes = std::size_t{1} << 20;
-
  private:
-  struct IndexEntry {
-    std::uint64_t log_time_ns, offset;
-  };
-  struct ChannelState {
-    std::vector<IndexEntry> index;  ///< Of the open chunk.
-    std::uint64_t count = 0;
-  };
   struct ChunkPlace {
-    std::uint64_t first_ns, last_ns, start, length, index_length, compressed, uncompressed;
-    bool plain;
-    std::vector<std::pair<std::uint16_t, std::uint64_t>> index_offset;  ///< By channel.
+    std::uint64_t start;
+    std::uint64_t index_B;  ///< Length of the message indexes behind it.
+    PackedChunk chunk;      ///< Without its bytes.
   };
   struct MetadataPlace {
     std::uint64_t start, length;
@@ -71,12 +68,12 @@ class McapWriter {
   int file_ = -1;
   std::string error_;
   std::uint64_t offset_ = 0, message_count_ = 0;
-  std::uint64_t first_ns_ = 0, last_ns_ = 0;              ///< Of all messages.
-  std::uint64_t chunk_first_ns_ = 0, chunk_last_ns_ = 0;  ///< Of the open chunk.
-  std::vector<std::uint8_t> chunk_, packed_, record_;
+  std::uint64_t first_ns_ = 0, last_ns_ = 0;  ///< Of all messages.
+  ChunkBuilder chunk_;
+  std::vector<std::uint8_t> record_;
   std::vector<std::uint8_t> schemas_, channels_;  ///< Their records, again for the summary.
   std::uint16_t schema_count_ = 0;
-  std::vector<ChannelState> channel_;
+  std::vector<std::uint64_t> counts_;  ///< Messages, by channel.
   std::vector<ChunkPlace> chunks_;
   std::vector<MetadataPlace> metadata_;
 };

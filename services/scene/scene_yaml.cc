@@ -348,13 +348,15 @@ std::uint32_t ReadNodes(StrictMap* root, std::uint32_t all) {
   if (names.empty()) {
     return all;
   }
+  // The supervisor and the recorder are the session's and not the scene's.
+  constexpr int kSceneNodes = static_cast<int>(NodeId::kRecorder);
   std::uint32_t mask = 0;
   for (const std::string& name : names) {
     int node = 1;
-    while (node < kNodeCount && name != NodeName(static_cast<NodeId>(node))) {
+    while (node < kSceneNodes && name != NodeName(static_cast<NodeId>(node))) {
       ++node;
     }
-    if (node == kNodeCount) {
+    if (node == kSceneNodes) {
       root->Fail("nodes",
                  "no node '" + name + "'; valid: handle_bridge, haptics_node, physics_node, thermal_node, render_node");
     }

@@ -91,6 +91,11 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
           {"png_written", "pictures", "", 0, record.peak("png_written")}};
 }
 
+std::string RecordingLosses(const SessionRecord& record) {
+  const std::uint64_t lost = record.node(NodeId::kRecorder).drops;
+  return lost == 0 ? "no sample lost" : std::to_string(lost) + " samples lost";
+}
+
 std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& record) {
   FlatJson json;
   json.Add("scene", outcome.scene_name);
@@ -104,6 +109,10 @@ std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& reco
   json.Add("wanted_seconds", outcome.wanted_s);
   for (const KeyFigure& figure : KeyFigures(record)) {
     json.Add(figure.key, figure.value);
+  }
+  if (!outcome.recording.empty()) {
+    json.Add("recording", outcome.recording.string());
+    json.Add("samples_not_recorded", static_cast<double>(record.node(NodeId::kRecorder).drops));
   }
   json.Add("restarts", static_cast<double>(record.restarts().size()));
   for (const auto& [kind, count] : record.event_counts()) {
@@ -173,6 +182,9 @@ std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& recor
             (restart.rejoin_s >= 0 ? std::string(", back after ") + Fixed(restart.rejoin_s, 2) + " s"
                                    : ", did not come back") +
             "\n";
+  }
+  if (!outcome.recording.empty()) {
+    text += "recording: " + outcome.recording.string() + ", " + RecordingLosses(record) + "\n";
   }
   text += std::string("\n") + Fixed(outcome.duration_s, 1) + " s of \"" + outcome.scene_name + "\": ";
   text += outcome.verdict.empty() ? "all well\n" : "NOT WELL: " + outcome.verdict + "\n";

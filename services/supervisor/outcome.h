@@ -20,6 +20,8 @@ struct SessionOutcome {
   double duration_s = 0;      ///< Session time reached.
   double wanted_s = 0;        ///< Session time asked for; 0: until stopped.
   ExitCode exit_code = ExitCode::kDone;
+  /// Of all topics; a recorder that was restarted has written another beside it, "-2" and so on. Empty: none.
+  std::filesystem::path recording;
   std::string verdict;  ///< Empty when all is well; else one line that says what is not.
 };
 
@@ -32,6 +34,9 @@ struct KeyFigure {
   double value;
 };
 [[nodiscard]] std::vector<KeyFigure> KeyFigures(const SessionRecord& record);
+
+/// "no sample lost" or how many.
+[[nodiscard]] std::string RecordingLosses(const SessionRecord& record);
 
 /// Flat JSON object; the keys are documented in services/supervisor/DESIGN.md.
 [[nodiscard]] std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& record);

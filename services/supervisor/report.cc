@@ -207,6 +207,10 @@ std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& recor
   html += "</style></head><body><main>\n";
   html += Header(outcome) + Tiles(record) + Pictures(frames, clip) + Plots(outcome, record) + Nodes(outcome, record) +
           Restarts(record) + Events(record);
+  if (!outcome.recording.empty()) {
+    html += Tag("h2", "Recording") + Tag("p", "All topics: " + outcome.recording.string() + ", " +
+                                                  RecordingLosses(record) + " (fulcrum log info says more).");
+  }
   html += Tag("h2", "Configuration") + "<details><summary>Effective configuration of this session</summary><pre>" +
           EscapeHtml(outcome.configuration) + "</pre></details>\n</main></body></html>\n";
   return html;

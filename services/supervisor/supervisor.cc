@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <optional>
+#include <span>
 #include <thread>
 
 #include "services/app/health_report.h"
@@ -13,6 +14,7 @@
 #include "services/bus/dds/shared_memory.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
+#include "services/recording/free_name.h"
 #include "services/runtime/realtime.h"
 #include "services/scene/scene_file.h"
 #include "services/supervisor/clip.h"
@@ -43,13 +45,19 @@ constexpr std::int64_t kSweepAfter = 2 * kSecond;
 // A gap in our own loop: a suspended machine, a stopped supervisor. Then silence proves nothing.
 constexpr std::int64_t kHeldUp = kSecond;
 
-std::vector<NodeId> NodesOf(const SceneView& scene) {
+std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) {
   std::vector<NodeId> nodes;
   for (int i = 0; i < kNodeCount; ++i) {
     const auto id = static_cast<NodeId>(i);
     if (id != NodeId::kSupervisor && (scene.node_mask >> i & 1u) != 0) {
       nodes.push_back(id);
     }
+  }
+  if (nodes.empty()) {
+    throw InputError(settings.scene.string() + ": the scene names no node to start");
+  }
+  if (settings.record || settings.keep_s > 0) {
+    nodes.push_back(NodeId::kRecorder);
   }
   return nodes;
 }
@@ -62,7 +70,17 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
   const auto yes_no = [](bool value) { return value ? "true" : "false"; };
   return "  seconds: " + (end_s > 0 ? Fixed(end_s, 3) : std::string("until stopped")) +
          "\n  domain: " + std::to_string(settings.cart.domain) + "\n  window: " + yes_no(settings.window) +
-         "\n  keep_going: " + yes_no(settings.keep_going) + "\n";
+         "\n  keep_going: " + yes_no(settings.keep_going) + "\n  record: " + yes_no(settings.record.has_value()) + "\n";
+}
+
+std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFolder& folder) {
+  if (!settings.record) {
+    return {};
+  }
+  const std::filesystem::path& wanted = *settings.record;
+  return recording::FreeName(wanted.empty()                          ? folder.path / "recording.mcap"
+                             : std::filesystem::is_directory(wanted) ? wanted / (folder.session_id + ".mcap")
+                                                                     : wanted);
 }
 
 }  // namespace
@@ -74,11 +92,9 @@ struct Supervisor::Impl {
         end_s(EndOfSession(up, scene.view())),
         guard(up.cart.domain),
         folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
+        recording(RecordingFile(up, folder)),
         memory(bus::SharedMemoryDirectory(up.cart.domain)),
-        node_ids(NodesOf(scene.view())) {
-    if (node_ids.empty()) {
-      throw InputError(up.scene.string() + ": the scene names no node to start");
-    }
+        node_ids(NodesOf(scene.view(), up)) {
     // Left by a supervisor that was killed: its nodes died with it.
     bus::SweepSharedMemory(memory);
     participant.emplace(bus::DdsSettings{.domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory});
@@ -87,6 +103,7 @@ struct Supervisor::Impl {
     healths_out = participant->MakeOutput<Health>();
     events = participant->MakeInput<ThermalEvent>();
     commands = participant->MakeInput<Command>();
+    orders = participant->MakeOutput<Command>();
     replies = participant->MakeOutput<CommandReply>();
     for (const NodeId id : node_ids) {
       nodes.emplace_back(CommandFor(id));
@@ -106,6 +123,12 @@ struct Supervisor::Impl {
       if (settings.window) {
         command.arguments.emplace_back("--window");
       }
+    }
+    if (id == NodeId::kRecorder) {
+      if (settings.record) {
+        command.arguments.insert(command.arguments.end(), {"--file", recording.string()});
+      }
+      command.arguments.insert(command.arguments.end(), {"--keep", Fixed(settings.keep_s, 3)});
     }
     command.log = folder.logs / (std::string(NodeName(id)) + ".log");
     return command;
@@ -147,6 +170,9 @@ struct Supervisor::Impl {
       sweep_ns = now + kSweepAfter;
       record.AddDeath(SessionTime(now), node.id(), death->cause, death->for_good);
       const std::string what = std::string(NodeName(node.id())) + " " + death->cause;
+      if (!death->asked) {
+        AskDump(now, what);
+      }
       if (!death->for_good) {
         progress.Say("! " + what + ": starting it again");
         continue;
@@ -156,7 +182,8 @@ struct Supervisor::Impl {
       const bool own_code = death->end.signal == 0 && death->end.exit_code >= 2 && death->end.exit_code <= 4;
       failed_code = own_code ? static_cast<ExitCode>(death->end.exit_code) : ExitCode::kFailure;
       failed_why = what + ", for good";
-      if (!settings.keep_going) {
+      // A session that runs goes on without its recorder: it is then not well, but not lost.
+      if (!settings.keep_going && (node.id() != NodeId::kRecorder || start_ns == 0)) {
         ending = true;
       }
     }
@@ -164,6 +191,21 @@ struct Supervisor::Impl {
       sweep_ns = 0;
       bus::SweepSharedMemory(memory);
     }
+  }
+
+  /// The last seconds to a file, unless one was written that shows them.
+  void AskDump(std::int64_t now, const std::string& reason) {
+    if (settings.keep_s <= 0 || now < next_dump_ns) {
+      return;
+    }
+    next_dump_ns = now + static_cast<std::int64_t>(1e9 * settings.keep_s);
+    Command dump;
+    dump.stamp = order_stamper.Next(now);
+    dump.request_id = static_cast<std::uint64_t>(now);
+    dump.target = NodeId::kRecorder;
+    dump.verb = "dump";
+    dump.argument = reason;
+    orders->Write(dump);
   }
 
   void TakeReports(std::int64_t now) {
@@ -200,6 +242,12 @@ struct Supervisor::Impl {
       if (command.verb == "down") {
         reply.text = "ending the session";
         ending = true;
+      } else if (command.verb == "dump") {
+        next_dump_ns = 0;
+        reply.ok = settings.keep_s > 0;
+        reply.text = reply.ok ? "writing the last seconds into " + folder.path.string()
+                              : "this session keeps no past: start it with fulcrum up --keep-last";
+        AskDump(now, command.argument);
       } else if (command.verb == "restart") {
         NodeProcess* node = Find(command.argument);
         if (node != nullptr && node->running()) {
@@ -211,7 +259,7 @@ struct Supervisor::Impl {
         }
       } else {
         reply.ok = false;
-        reply.text = "unknown verb \"" + command.verb + "\"; the supervisor knows: restart, down";
+        reply.text = "unknown verb \"" + command.verb + "\"; the supervisor knows: restart, dump, down";
       }
       replies->Write(reply);
     }
@@ -308,15 +356,23 @@ struct Supervisor::Impl {
     TakeReports(MonotonicNs());
     reached_s = ReachedTime();
     ended = true;
-    for (const NodeProcess& node : nodes) {
+    const auto recorder = std::find_if(nodes.begin(), nodes.end(),
+                                       [](const NodeProcess& node) { return node.id() == NodeId::kRecorder; });
+    End({nodes.begin(), recorder});
+    // Last, so that it has seen the others end.
+    End({recorder, nodes.end()});
+  }
+
+  void End(std::span<NodeProcess> some) {
+    for (const NodeProcess& node : some) {
       node.Signal(SIGTERM);
     }
     const std::int64_t begin = MonotonicNs();
     const auto is_gone = [](NodeProcess& node) { return node.HasEnded(); };
-    while (!std::all_of(nodes.begin(), nodes.end(), is_gone)) {
+    while (!std::all_of(some.begin(), some.end(), is_gone)) {
       const std::int64_t now = MonotonicNs();
       if (now - begin > kLongestEnd) {
-        for (const NodeProcess& node : nodes) {
+        for (const NodeProcess& node : some) {
           if (node.running()) {
             progress.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and was killed");
           }
@@ -347,6 +403,7 @@ struct Supervisor::Impl {
   void CleanUp() {
     commands.reset();
     replies.reset();
+    orders.reset();
     events.reset();
     healths_in.reset();
     healths_out.reset();
@@ -372,6 +429,7 @@ struct Supervisor::Impl {
     outcome.wanted_s = end_s;
     outcome.exit_code = exit_code;
     outcome.verdict = verdict;
+    outcome.recording = recording;
     WriteFile(folder.path / "summary.json", SummaryJson(outcome, record));
     const std::filesystem::path clip = folder.path / "clip.mp4";
     (void)MakeClip(folder.frames, clip, folder.logs / "clip.log");
@@ -384,6 +442,7 @@ struct Supervisor::Impl {
   const double end_s;  ///< 0: until stopped.
   DomainGuard guard;
   SessionFolder folder;
+  const std::filesystem::path recording;  ///< The recorder's first file; empty: none.
   const std::filesystem::path memory;
   const std::vector<NodeId> node_ids;
 
@@ -394,7 +453,8 @@ struct Supervisor::Impl {
   std::unique_ptr<bus::Input<ThermalEvent>> events;
   std::unique_ptr<bus::Input<Command>> commands;
   std::unique_ptr<bus::Output<CommandReply>> replies;
-  bus::Stamper health_stamper{MonotonicNs()}, reply_stamper{MonotonicNs()};
+  std::unique_ptr<bus::Output<Command>> orders;  ///< To nodes.
+  bus::Stamper health_stamper{MonotonicNs()}, reply_stamper{MonotonicNs()}, order_stamper{MonotonicNs()};
 
   std::vector<NodeProcess> nodes;
   SessionRecord record;
@@ -404,6 +464,7 @@ struct Supervisor::Impl {
   std::uint64_t own_ticks = 0;
   std::int64_t start_ns = 0;  ///< CLOCK_MONOTONIC at session time 0; 0: not begun.
   std::int64_t last_loop_ns = 0, next_health_ns = 0;
+  std::int64_t next_dump_ns = 0;
   std::int64_t sweep_ns = 0;  ///< When to sweep; 0: nothing to sweep.
   double reached_s = 0;
   bool ending = false;                     ///< No further turn.

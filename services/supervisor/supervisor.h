@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "services/config/cart.h"
@@ -18,7 +19,12 @@ struct UpSettings {
   double seconds = -1;             ///< Session time; negative: the script's duration, or until stopped without one.
   bool window = false;
   std::string quality = "auto";  ///< Of the picture: auto, low, high.
-  bool keep_going = false;       ///< A node that failed for good does not end the session.
+  /// Recording of all topics; a folder: <session>.mcap in it; empty: recording.mcap in the session folder.
+  std::optional<std::filesystem::path> record;
+  /// The recorder keeps so much of the newest past in memory [s] and writes it into a file of its own when a node dies
+  /// or a dump is asked for. 0: it does not.
+  double keep_s = 0;
+  bool keep_going = false;  ///< A node that failed for good does not end the session.
 };
 
 class Supervisor {

@@ -15,6 +15,7 @@
 #include <mutex>
 
 #include "services/bus/dds/ports.h"
+#include "services/bus/dds/raw_reader.h"
 #include "services/bus/dds/shared_memory.h"
 #include "services/core/error.h"
 
@@ -42,6 +43,7 @@ std::string Hex(std::uint64_t value) {
 
 /// USER_DATA of our participants: "fulcrum <hash> <node> <pid>".
 constexpr std::string_view kUserDataTag = "fulcrum ";
+constexpr std::string_view kPidTag = " (pid ";
 
 /// Compares the schema of each peer that appears.
 class PeerWatch final : public fast::DomainParticipantListener {
@@ -62,8 +64,12 @@ class PeerWatch final : public fast::DomainParticipantListener {
       return;  // not one of ours: another program on this domain is none of our business
     }
     const std::string hash = text.substr(kUserDataTag.size(), own_hash_.size());
-    if (hash == own_hash_) return;
     const std::size_t name_at = kUserDataTag.size() + hash.size();
+    int pid = 0;
+    const std::size_t pid_at = text.rfind(kPidTag);
+    if (pid_at != std::string::npos) std::sscanf(text.c_str() + pid_at + kPidTag.size(), "%d", &pid);
+    peers_[guid.guidPrefix] = {info.info.m_participantName.c_str(), pid};
+    if (hash == own_hash_) return;
     mismatches_[guid] = "schema mismatch: peer" + text.substr(name_at) + " speaks schema " + hash + ", this " +
                         own_name_ + " speaks " + own_hash_ + "; rebuild and restart both from the same sources";
   }
@@ -73,9 +79,17 @@ class PeerWatch final : public fast::DomainParticipantListener {
     return mismatches_.empty() ? std::string() : mismatches_.begin()->second;
   }
 
+  /// Also of one that is gone by now.
+  [[nodiscard]] Peer PeerOf(const rtps::GuidPrefix_t& prefix) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = peers_.find(prefix);
+    return found == peers_.end() ? Peer() : found->second;
+  }
+
  private:
   const std::string own_name_, own_hash_;
   mutable std::mutex mutex_;
+  std::map<rtps::GuidPrefix_t, Peer> peers_;
   std::map<rtps::GUID_t, std::string> mismatches_;
 };
 
@@ -91,8 +105,8 @@ void ForgetOutsideSettings() {
 fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash) {
   fast::DomainParticipantQos qos;
   qos.name(settings.node_name);
-  const std::string user_data = std::string(kUserDataTag) + Hex(schema_hash) + " " + settings.node_name + " (pid " +
-                                std::to_string(getpid()) + ")";
+  const std::string user_data = std::string(kUserDataTag) + Hex(schema_hash) + " " + settings.node_name +
+                                std::string(kPidTag) + std::to_string(getpid()) + ")";
   qos.user_data().data_vec({user_data.begin(), user_data.end()});
   auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {"127.0.0.1"};
@@ -177,12 +191,21 @@ struct DdsParticipant::Impl {
         throw std::logic_error(std::string(role.name) + ": the generated type is not plain");
       }
     }
-    type->setName((std::string(role.name) + "#" + Hex(schema_hash)).c_str());
+    type->setName(TypeName(role).c_str());
+    return topic = MakeTopic(role, type);
+  }
+
+  fast::Topic* MakeTopic(const TopicRole& role, fast::TypeSupport type) {
+    fast::Topic* topic = nullptr;
     if (type.register_type(participant) == dds::ReturnCode::RETCODE_OK) {
       topic = participant->create_topic(role.name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
     }
     if (topic == nullptr) throw InputError(std::string(role.name) + ": cannot make the topic");
     return topic;
+  }
+
+  [[nodiscard]] std::string TypeName(const TopicRole& role) const {
+    return std::string(role.name) + "#" + Hex(schema_hash);
   }
 
   const std::uint64_t schema_hash;
@@ -223,6 +246,26 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos);
   if (!port->ok()) throw InputError(std::string(role.name) + ": cannot make a writer");
   return port;
+}
+
+std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink) {
+  const TopicRole& role = RoleOf(id);
+  const std::uint32_t payload_B = WithMessageOf(
+      id, []<class T>(std::type_identity<T>) { return typename dds::TypeSupportOf<T>::type().m_typeSize; });
+  const bool plain = role.path == Path::kSharedMemory;
+  fast::Topic* topic =
+      impl_->MakeTopic(role, fast::TypeSupport(new dds::RawType(impl_->TypeName(role), payload_B, plain)));
+  fast::DataReaderQos qos;
+  ApplyRole(role, role.reader_depth, impl_->shared_memory, &qos);
+  auto input = std::make_unique<dds::RawReader>(impl_->subscriber, topic, qos, id, payload_B, std::move(sink));
+  if (!input->ok()) throw InputError(std::string(role.name) + ": cannot make a reader");
+  return input;
+}
+
+Peer DdsParticipant::PeerOf(const WriterGuid& writer) const {
+  rtps::GuidPrefix_t prefix;
+  std::copy_n(writer.begin(), rtps::GuidPrefix_t::size, prefix.value);
+  return impl_->watch.PeerOf(prefix);
 }
 
 #define FULCRUM_INSTANTIATE_PORTS(T)                                                   \

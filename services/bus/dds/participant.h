@@ -9,6 +9,7 @@
 #include <string>
 
 #include "services/bus/port.h"
+#include "services/bus/raw_input.h"
 #include "services/bus/schema.h"
 
 namespace fulcrum::bus {
@@ -35,6 +36,11 @@ class DdsParticipant {
   [[nodiscard]] std::unique_ptr<Input<T>> MakeInput(std::function<void()> notify = {});
   template <class T>
   [[nodiscard]] std::unique_ptr<typename OutputOf<T>::type> MakeOutput();
+
+  /// Receives a topic undecoded. The type stands for any here, so this participant can have no other port of the topic.
+  [[nodiscard]] std::unique_ptr<RawInput> MakeRawInput(TopicId id, RawSink sink);
+  /// Whose a writer is or was.
+  [[nodiscard]] Peer PeerOf(const WriterGuid& writer) const;
 
   /// Empty, or one line naming a peer whose schema hash differs (both hashes, both names).
   [[nodiscard]] std::string schema_mismatch() const;

@@ -19,6 +19,8 @@ ExitCode Status(const Words& words);
 ExitCode Top(const Words& words);
 ExitCode Restart(const Words& words);
 ExitCode Down(const Words& words);
+ExitCode Dump(const Words& words);
+ExitCode Log(const Words& words);
 ExitCode Doctor(const Words& words);
 
 struct CommandEntry {

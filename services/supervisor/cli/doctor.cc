@@ -181,7 +181,7 @@ Finding Disk(const fs::path& out) {
 Finding Programs() {
   std::string missing;
   for (const char* name :
-       {"handle_bridge", "haptics_node", "physics_node", "thermal_node", "render_node", "scene_compiler"}) {
+       {"handle_bridge", "haptics_node", "physics_node", "thermal_node", "render_node", "recorder", "scene_compiler"}) {
     if (::access((ProgramFolder() / name).c_str(), X_OK) != 0) {
       missing += std::string(" ") + name;
     }

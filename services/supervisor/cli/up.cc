@@ -37,7 +37,11 @@ ExitCode Up(const Words& words) {
        "of the picture: auto, low, high")                                                                             //
       ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration (default: everything simulated)")    //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")            //
-      ("keep-going", "go on without a node that failed for good");
+      ("record", "record all topics into recording.mcap of the session folder")(
+          "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
+          "keep-last", po::value<double>()->value_name("SECONDS"),
+          "keep the newest past in memory and write it into a file when a node dies or at fulcrum dump")(
+          "keep-going", "go on without a node that failed for good");
   AddDomain(&options);
   const Arguments arguments = Parse("up", words, options, {"scene"});
   if (arguments.help) {
@@ -65,6 +69,17 @@ ExitCode Up(const Words& words) {
     constexpr double kLongest = 7 * 24 * 3600.0;
     if (!(settings.seconds > 0 && settings.seconds <= kLongest)) {
       throw InputError("--seconds: must be above 0 and at most " + std::to_string(static_cast<int>(kLongest)));
+    }
+  }
+  if (values.count("record-to") != 0) {
+    settings.record = fs::absolute(values["record-to"].as<std::string>());
+  } else if (values.count("record") != 0) {
+    settings.record = fs::path();
+  }
+  if (values.count("keep-last") != 0) {
+    settings.keep_s = values["keep-last"].as<double>();
+    if (!(settings.keep_s > 0 && settings.keep_s <= 3600)) {
+      throw InputError("--keep-last: must be above 0 and at most 3600 seconds");
     }
   }
   SceneRequest request;

@@ -119,7 +119,7 @@ TEST(HealthReportTest, FitsToTheMessage) {
   }
   health.last_error = std::string(1000, 'e');
   FitToMessage(&health);
-  EXPECT_EQ(health.inputs.size(), 8u);
+  EXPECT_EQ(health.inputs.size(), 16u);
   EXPECT_EQ(health.metrics.size(), 16u);
   EXPECT_EQ(health.metrics[0].name.size(), 31u);
   EXPECT_EQ(health.metrics[0].value, 0);

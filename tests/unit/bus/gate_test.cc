@@ -219,7 +219,7 @@ TEST(GateRanges, Health) {
                          {"negative rate", [](auto& m) { m.rate_achieved_Hz = -1; }},
                          {"negative time", [](auto& m) { m.step.p99_us = -1; }},
                          {"unknown topic", [](auto& m) { m.inputs[0].topic = BeyondLast<TopicId>(); }},
-                         {"too many inputs", [](auto& m) { m.inputs.resize(9); }},
+                         {"too many inputs", [](auto& m) { m.inputs.resize(17); }},
                          {"too many metrics", [](auto& m) { m.metrics.resize(17); }},
                          {"metric's name too long", [](auto& m) { m.metrics[0].name = std::string(32, 'x'); }}});
 }

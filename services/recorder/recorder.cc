@@ -1,0 +1,226 @@
+#include "services/recorder/recorder.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cstring>
+
+#include "services/bus/schema.h"
+#include "services/bus/topics.h"
+#include "services/core/error.h"
+#include "services/runtime/cyclic_thread.h"
+
+namespace fulcrum::recorder {
+namespace {
+
+constexpr std::string_view kProfile = "fulcrum";
+
+std::int64_t WallMinusMonotonic() {
+  timespec wall{};
+  ::clock_gettime(CLOCK_REALTIME, &wall);
+  return std::int64_t{1'000'000'000} * wall.tv_sec + wall.tv_nsec - runtime::MonotonicNs();
+}
+
+std::string Hex(const bus::WriterGuid& guid) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (const std::uint8_t byte : guid) {
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 15];
+  }
+  return text;
+}
+
+}  // namespace
+
+/// Stands before each payload in a batch, copied byte by byte.
+struct Recorder::Entry {
+  std::uint32_t writer;
+  std::uint32_t size;
+  std::uint64_t sequence;
+  std::int64_t received_ns, source_ns;
+};
+
+Recorder::Recorder(const RecorderSettings& settings)
+    : settings_(settings), wall_minus_monotonic_ns_(WallMinusMonotonic()) {
+  for (Batch* batch : {&filling_, &writing_}) {
+    batch->bytes = std::make_unique_for_overwrite<std::byte[]>(settings.queue_B);
+  }
+  if (settings.file.empty()) return;
+  file_.emplace(settings.file, kProfile, settings.library);
+  Introduce(&*file_);
+}
+
+Recorder::~Recorder() { Close(runtime::MonotonicNs()); }
+
+void Recorder::Introduce(recording::McapWriter* file) const {
+  for (const auto& [name, values] : settings_.metadata) file->AddMetadata(name, values);
+  // Log times are CLOCK_MONOTONIC, like all stamps of the topics, but told as wall clock.
+  file->AddMetadata("clock", {{"log_time_minus_monotonic_ns", std::to_string(wall_minus_monotonic_ns_)}});
+}
+
+void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole, std::int64_t now_ns) {
+  const std::size_t size = sample.head.size() + sample.body.size();
+  const std::lock_guard lock(mutex_);
+  Counts& counts = counts_[static_cast<std::size_t>(sample.topic)];
+  auto writer = std::find_if(writers_.begin(), writers_.end(), [&](const Writer& known) {
+    return known.topic == sample.topic && known.guid == sample.writer;
+  });
+  if (writer == writers_.end()) {
+    // What it sent before is nobody's loss.
+    writer = writers_.insert(writers_.end(), {sample.topic, sample.writer, sample.sequence - 1});
+  }
+  if (sample.sequence <= writer->last_sequence) return;
+  const bool room = filling_.used + sizeof(Entry) + size <= settings_.queue_B;
+  if (room) {
+    const Entry entry{static_cast<std::uint32_t>(writer - writers_.begin()), static_cast<std::uint32_t>(size),
+                      sample.sequence, now_ns, sample.source_ns};
+    std::byte* at = filling_.bytes.get() + filling_.used;
+    std::memcpy(at, &entry, sizeof entry);
+    at = std::copy(sample.head.begin(), sample.head.end(), at + sizeof entry);
+    std::copy(sample.body.begin(), sample.body.end(), at);
+    if (!is_whole()) return;  // Missed: the next one's sequence tells.
+    filling_.used += sizeof entry + size;
+    most_used_ = std::max(most_used_, filling_.used);
+  }
+  counts.missed += sample.sequence - writer->last_sequence - 1;
+  writer->last_sequence = sample.sequence;
+  counts.newest_ns = now_ns;
+  ++(room ? counts.received : counts.overflow);
+}
+
+void Recorder::AddNewChannels() {
+  const std::size_t first = channels_.size();
+  {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t i = first; i < writers_.size(); ++i) {
+      channels_.push_back({writers_[i].topic, writers_[i].guid, {}});
+    }
+  }
+  for (std::size_t i = first; i < channels_.size(); ++i) {
+    Channel& channel = channels_[i];
+    if (settings_.describe) channel.about = settings_.describe(channel.writer);
+    channel.about["writer"] = Hex(channel.writer);
+  }
+  if (file_) AddChannels(&*file_, first, &schemas_);
+}
+
+void Recorder::AddChannels(recording::McapWriter* file, std::size_t first,
+                           std::array<std::uint16_t, kTopicCount>* schemas) const {
+  for (std::size_t i = first; i < channels_.size(); ++i) {
+    const TopicId topic = channels_[i].topic;
+    const std::string type(bus::TopicLabel(topic));
+    std::uint16_t& schema = (*schemas)[static_cast<std::size_t>(topic)];
+    if (schema == 0) schema = file->AddSchema("fulcrum::idl::" + type, "omgidl", bus::SchemaText(type));
+    file->AddChannel(schema, bus::RoleOf(topic).name, "cdr", channels_[i].about);
+  }
+}
+
+void Recorder::Flush(std::int64_t now_ns) {
+  {
+    const std::lock_guard lock(mutex_);
+    std::swap(filling_, writing_);
+  }
+  AddNewChannels();
+  const auto wall = [this](std::int64_t ns) { return static_cast<std::uint64_t>(ns + wall_minus_monotonic_ns_); };
+  for (std::size_t at = 0; at < writing_.used;) {
+    Entry entry;
+    std::memcpy(&entry, writing_.bytes.get() + at, sizeof entry);
+    at += sizeof entry;
+    if (chunk_.size() == 0) chunk_begin_ns_ = entry.received_ns;
+    chunk_.Add(static_cast<std::uint16_t>(entry.writer), static_cast<std::uint32_t>(entry.sequence),
+               wall(entry.received_ns), static_cast<std::uint64_t>(entry.source_ns),
+               {writing_.bytes.get() + at, entry.size});
+    ++in_chunk_[static_cast<std::size_t>(channels_[entry.writer].topic)];
+    at += entry.size;
+    if (chunk_.size() >= recording::ChunkBuilder::kChunkBytes) EndChunk();
+  }
+  writing_.used = 0;
+  if (chunk_.size() > 0 && now_ns - chunk_begin_ns_ >= kLongestChunk_ns) EndChunk();
+}
+
+void Recorder::EndChunk() {
+  if (chunk_.size() == 0) return;
+  recording::PackedChunk chunk = chunk_.Pack();
+  if (file_) {
+    file_->Append(chunk);
+    const std::lock_guard lock(mutex_);
+    error_ = file_->error();
+    file_B_ = file_->bytes_written();
+    for (std::size_t topic = 0; topic < counts_.size() && !error_.empty(); ++topic) {
+      counts_[topic].unwritten += in_chunk_[topic];
+    }
+  }
+  in_chunk_ = {};
+  if (settings_.keep_s > 0) Keep(std::move(chunk));
+}
+
+void Recorder::Keep(recording::PackedChunk chunk) {
+  const std::uint64_t newest_ns = chunk.last_ns;
+  kept_B_ += chunk.bytes.size();
+  kept_.push_back(std::move(chunk));
+  const auto is_old = [&](const recording::PackedChunk& oldest) {
+    return kept_B_ > settings_.keep_B || 1e-9 * static_cast<double>(newest_ns - oldest.last_ns) > settings_.keep_s;
+  };
+  while (kept_.size() > 1 && is_old(kept_.front())) {
+    kept_B_ -= kept_.front().bytes.size();
+    kept_.pop_front();
+  }
+}
+
+void Recorder::Dump(const std::filesystem::path& path, std::string_view reason, std::int64_t now_ns) {
+  Flush(now_ns);
+  EndChunk();
+  recording::McapWriter file(path, kProfile, settings_.library);
+  Introduce(&file);
+  file.AddMetadata("dump", {{"reason", std::string(reason)}});
+  std::array<std::uint16_t, kTopicCount> schemas{};
+  AddChannels(&file, 0, &schemas);
+  for (const recording::PackedChunk& chunk : kept_) file.Append(chunk);
+  file.Close();
+  if (!file.error().empty()) throw InputError(path.string() + ": " + file.error());
+}
+
+void Recorder::Close(std::int64_t now_ns) {
+  if (!file_) return;
+  Flush(now_ns);
+  EndChunk();
+  const std::lock_guard lock(mutex_);
+  for (const auto& role : bus::kTopicRoles) {
+    const Counts& counts = counts_[static_cast<std::size_t>(role.id)];
+    if (counts.missed + counts.overflow + counts.unwritten == 0) continue;
+    file_->AddMetadata("lost " + std::string(bus::TopicLabel(role.id)),
+                       {{"not_received", std::to_string(counts.missed)},
+                        {"queue_full", std::to_string(counts.overflow)},
+                        {"not_written", std::to_string(counts.unwritten)}});
+  }
+  file_->Close();
+  file_.reset();
+}
+
+RecorderStats Recorder::stats() const {
+  const std::lock_guard lock(mutex_);
+  RecorderStats stats;
+  for (const Counts& counts : counts_) {
+    stats.received += counts.received;
+    stats.missed += counts.missed;
+    stats.overflow += counts.overflow;
+    stats.unwritten += counts.unwritten;
+  }
+  stats.file_B = file_B_;
+  stats.queue_pct = 100.0 * static_cast<double>(most_used_) / static_cast<double>(settings_.queue_B);
+  stats.error = error_;
+  return stats;
+}
+
+bus::InputStats Recorder::topic_stats(TopicId topic) const {
+  const std::lock_guard lock(mutex_);
+  const Counts& counts = counts_[static_cast<std::size_t>(topic)];
+  bus::InputStats stats;
+  stats.received = counts.received;
+  stats.lost = counts.missed + counts.overflow + counts.unwritten;
+  stats.newest_stamp_ns = counts.newest_ns;
+  return stats;
+}
+
+}  // namespace fulcrum::recorder

@@ -1,0 +1,15 @@
+#include "services/supervisor/cli/commands.h"
+
+namespace fulcrum::supervisor::cli {
+
+ExitCode Dump(const Words& words) {
+  boost::program_options::options_description options;
+  AddDomain(&options);
+  const Arguments arguments = Parse("dump", words, options);
+  if (arguments.help) {
+    return ExitCode::kDone;
+  }
+  return Ask(DomainOf(arguments, kDefaultDomain), "dump", "asked for");
+}
+
+}  // namespace fulcrum::supervisor::cli

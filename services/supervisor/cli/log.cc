@@ -1,0 +1,141 @@
+// fulcrum log: recordings, read and compared.
+#include <algorithm>
+#include <array>
+#include <iostream>
+#include <limits>
+
+#include "services/core/error.h"
+#include "services/log_tools/tools.h"
+#include "services/supervisor/cli/commands.h"
+
+namespace fulcrum::supervisor::cli {
+namespace {
+
+namespace fs = std::filesystem;
+namespace po = boost::program_options;
+using Files = std::vector<fs::path>;
+
+struct Tool {
+  const char* name;
+  const char* usage;  ///< After "fulcrum log ".
+  const char* purpose;
+  void (*add_options)(po::options_description*);
+  ExitCode (*run)(const po::variables_map&, const Files&);
+};
+
+// -------------------------------------------------------------------------------------------------- options
+
+void NoOptions(po::options_description*) {}
+
+void AddFilter(po::options_description* options) {
+  options->add_options()                                                                                           //
+      ("topic", po::value<std::vector<std::string>>()->value_name("NAME"), "only this topic; may be given again")  //
+      ("from", po::value<double>()->value_name("SECONDS"), "from here on; 0 is the first message of the file")     //
+      ("to", po::value<double>()->value_name("SECONDS"), "up to here");
+}
+
+void AddCatOptions(po::options_description* options) {
+  AddFilter(options);
+  options->add_options()("full", "print long lists whole, too");
+}
+
+log_tools::Filter FilterOf(const po::variables_map& values) {
+  log_tools::Filter filter;
+  if (values.count("topic") != 0) {
+    const auto& topics = values["topic"].as<std::vector<std::string>>();
+    filter.topics = {topics.begin(), topics.end()};
+  }
+  if (values.count("from") != 0) {
+    filter.from_s = values["from"].as<double>();
+  }
+  if (values.count("to") != 0) {
+    filter.to_s = values["to"].as<double>();
+  }
+  return filter;
+}
+
+// ---------------------------------------------------------------------------------------------------- tools
+
+ExitCode Info(const po::variables_map&, const Files& files) {
+  for (const fs::path& file : files) {
+    log_tools::PrintInfo(file, &std::cout);
+  }
+  return ExitCode::kDone;
+}
+
+ExitCode List(const po::variables_map&, const Files& folders) {
+  for (const fs::path& folder : folders.empty() ? Files{"out"} : folders) {
+    log_tools::PrintList(folder, &std::cout);
+  }
+  return ExitCode::kDone;
+}
+
+ExitCode Cat(const po::variables_map& values, const Files& files) {
+  constexpr std::size_t kLongest = 24;
+  const std::size_t longest = values.count("full") != 0 ? std::numeric_limits<std::size_t>::max() : kLongest;
+  for (const fs::path& file : files) {
+    log_tools::PrintMessages(file, FilterOf(values), longest, &std::cout);
+  }
+  return ExitCode::kDone;
+}
+
+constexpr std::array kTools{
+    Tool{"info", "info FILE...", "What a recording holds: session, topics, rates, losses.", NoOptions, Info},
+    Tool{"list", "list [FOLDER...]", "The recordings in a folder (default: out), oldest first.", NoOptions, List},
+    Tool{"cat", "cat FILE... [options]", "The messages as JSON, one a line.", AddCatOptions, Cat},
+};
+
+void PrintTools() {
+  std::cout << "usage: fulcrum log TOOL FILE... [options]\n\nReads recordings.\n\n";
+  for (const Tool& tool : kTools) {
+    std::cout << "  " << tool.name << std::string(9 - std::string_view(tool.name).size(), ' ') << tool.purpose << '\n';
+  }
+  std::cout << "\nfulcrum log TOOL --help: options of one tool.\n";
+}
+
+ExitCode Run(const Tool& tool, const Words& words) {
+  po::options_description visible("Options"), all;
+  tool.add_options(&visible);
+  visible.add_options()("help", "print this");
+  all.add(visible).add_options()("file", po::value<std::vector<std::string>>());
+  po::positional_options_description places;
+  places.add("file", -1);
+  po::variables_map values;
+  try {
+    const auto style = po::command_line_style::default_style & ~po::command_line_style::allow_guessing;
+    po::store(po::command_line_parser(words).options(all).positional(places).style(style).run(), values);
+  } catch (const po::error& error) {
+    throw InputError(std::string(error.what()) + "; see fulcrum log " + tool.name + " --help");
+  }
+  if (values.count("help") != 0) {
+    std::cout << "usage: fulcrum log " << tool.usage << "\n\n" << tool.purpose << "\n\n" << visible;
+    return ExitCode::kDone;
+  }
+  Files files;
+  if (values.count("file") != 0) {
+    for (const std::string& file : values["file"].as<std::vector<std::string>>()) {
+      files.emplace_back(file);
+    }
+  }
+  if (files.empty() && std::string_view(tool.usage).find("FILE") != std::string_view::npos) {
+    throw InputError(std::string("which file? see fulcrum log ") + tool.name + " --help");
+  }
+  return tool.run(values, files);
+}
+
+}  // namespace
+
+ExitCode Log(const Words& words) {
+  if (words.empty() || words[0] == "--help") {
+    PrintTools();
+    return words.empty() ? ExitCode::kBadUsage : ExitCode::kDone;
+  }
+  const auto* tool =
+      std::find_if(kTools.begin(), kTools.end(), [&](const Tool& known) { return words[0] == known.name; });
+  if (tool == kTools.end()) {
+    throw InputError("no tool \"" + words[0] + "\"; see fulcrum log --help");
+  }
+  return Run(*tool, {words.begin() + 1, words.end()});
+}
+
+}  // namespace fulcrum::supervisor::cli
