@@ -135,9 +135,10 @@ void PhysicsNode::Step(const Tick& tick) {
   PublishContacts(tick);
   PublishCautery(tick);
   PublishFrame(tick);
-  PublishManifest(tick);
   Measure();
+  // Before the manifest: whoever has seen that can rely on the checkpoint of its tick.
   SaveCheckpoint();
+  PublishManifest(tick);
   ++ticks_;
 }
 
@@ -179,21 +180,25 @@ void PhysicsNode::PublishFrame(const Tick& tick) {
   }
   frame_version_ = simulation_.state_version();
   ports_.frames.WriteInPlace([&](TissueFrame::View view) {
-    TissueFrameHeader& header = view.header;
-    header.stamp = frame_stamper_.Next(tick.stamp_ns);
-    header.scene_hash = scene_.hash;
-    header.topology_revision = simulation_.model().revision();
-    header.tool_sequence = tool_state_.stamp.sequence;
-    header.handle_sequence = handle_state_.stamp.sequence;
-    header.session_time_s = tick.session_time_s;
-    header.simulated_time_s = simulation_.simulated_time_s();
-    header.vertex_count = simulation_.particles().particle_count();
-    header.grasping_tools = 0;
-    for (std::uint32_t i = 0; i < kMaxTools; ++i) {
-      header.grasping_tools |= simulation_.grasp(i).holding() ? 1u << i : 0u;
-    }
-    simulation_.particles().CopyPositions(view.xyz.first(3 * std::size_t{header.vertex_count}));
+    FillFrame(tick, view);
+    view.header.stamp = frame_stamper_.Next(tick.stamp_ns);
   });
+}
+
+void PhysicsNode::FillFrame(const Tick& tick, TissueFrame::View view) const {
+  TissueFrameHeader& header = view.header;
+  header.scene_hash = scene_.hash;
+  header.topology_revision = simulation_.model().revision();
+  header.tool_sequence = tool_state_.stamp.sequence;
+  header.handle_sequence = handle_state_.stamp.sequence;
+  header.session_time_s = tick.session_time_s;
+  header.simulated_time_s = simulation_.simulated_time_s();
+  header.vertex_count = simulation_.particles().particle_count();
+  header.grasping_tools = 0;
+  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+    header.grasping_tools |= simulation_.grasp(i).holding() ? 1u << i : 0u;
+  }
+  simulation_.particles().CopyPositions(view.xyz.first(3 * std::size_t{header.vertex_count}));
 }
 
 void PhysicsNode::PublishManifest(const Tick& tick) {

@@ -41,6 +41,9 @@ class PhysicsNode {
   /// Metrics and last error. Any thread.
   void FillHealth(Health* health) const;
 
+  /// Header and positions after the last Step, its own stamp apart: what a TissueFrame would tell.
+  void FillFrame(const Tick& tick, TissueFrame::View view) const;
+
   [[nodiscard]] const TissueSimulation& simulation() const { return simulation_; }
   /// It went on from a checkpoint.
   [[nodiscard]] bool restored() const { return restored_; }

@@ -52,6 +52,9 @@ class RenderNode {
 
   /// The last picture of the session, when it differs from the last one written. After the last Step, any thread.
   void Finish();
+  /// Until the pictures drawn so far are in their files; live nobody waits for a disk. Same thread as Step.
+  void WaitForFiles() { writer_.Wait(); }
+  [[nodiscard]] std::uint64_t pictures_written() const { return writer_.written(); }
 
   /// Metrics and last error. Any thread.
   void FillHealth(Health* health) const;

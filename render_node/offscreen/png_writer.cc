@@ -74,6 +74,11 @@ bool FrameWriter::Add(Picture picture, double session_time_s) {
   return true;
 }
 
+void FrameWriter::Wait() {
+  std::unique_lock lock(mutex_);
+  idle_.wait(lock, [this] { return jobs_.empty() && !writing_; });
+}
+
 std::uint64_t FrameWriter::written() const {
   const std::lock_guard lock(mutex_);
   return written_;
@@ -93,6 +98,7 @@ void FrameWriter::Work() {
     }
     const Job job = std::move(jobs_.front());
     jobs_.pop_front();
+    writing_ = true;
     lock.unlock();
     std::array<char, 32> name;
     std::snprintf(name.data(), name.size(), "frame_%07d.png", static_cast<int>(std::lround(1000 * job.session_time_s)));
@@ -103,6 +109,8 @@ void FrameWriter::Work() {
       error = failure.what();
     }
     lock.lock();
+    writing_ = false;
+    idle_.notify_all();
     if (error.empty()) {
       ++written_;
     } else {

@@ -32,6 +32,8 @@ class FrameWriter {
 
   /// Queues a picture; false when the disk is more than kQueue pictures behind and this one was dropped.
   bool Add(Picture picture, double session_time_s);
+  /// Until all that is queued has been written, or could not be.
+  void Wait();
   [[nodiscard]] std::uint64_t written() const;
   /// Empty, or why the last write failed.
   [[nodiscard]] std::string last_error() const;
@@ -46,9 +48,9 @@ class FrameWriter {
 
   std::filesystem::path folder_;
   mutable std::mutex mutex_;
-  std::condition_variable wake_;
+  std::condition_variable wake_, idle_;
   std::deque<Job> jobs_;
-  bool stop_ = false;
+  bool stop_ = false, writing_ = false;
   std::uint64_t written_ = 0;
   std::string last_error_;
   std::thread thread_;

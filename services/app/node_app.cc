@@ -24,6 +24,9 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max();
 constexpr auto kPollPeriod = std::chrono::milliseconds(10);
+// A recorder finds a node that has just started within this time, if there is one. The first ticks must not pass it by:
+// a replay could not begin without them.
+constexpr std::int64_t kLongestWaitForRecorder = 100'000'000;
 constexpr auto kHealthPeriod = std::chrono::milliseconds(100);
 // A node that cannot end within this time has hung; its checkpoint is safe against a kill.
 constexpr unsigned kLongestEndS = 3;
@@ -123,6 +126,7 @@ struct NodeApp::Impl {
   std::vector<HealthReport::InputWatch> inputs;
   std::vector<HealthReport::OutputWatch> outputs;
   std::vector<std::shared_ptr<void>> ports;
+  std::function<bool()> is_recorded;  ///< Somebody reads its TickManifest; empty: it has none.
   std::map<std::string, std::function<std::string(const std::string&)>> handlers{{"stop", [this](const std::string&) {
                                                                                     End(ExitCode::kDone,
                                                                                         "stopped by command");
@@ -166,6 +170,7 @@ void NodeApp::Watch(TopicId topic, std::function<bus::InputStats()> stats) {
   impl_->inputs.emplace_back(topic, std::move(stats));
 }
 void NodeApp::Watch(std::function<bus::OutputStats()> stats) { impl_->outputs.push_back(std::move(stats)); }
+void NodeApp::AwaitReaders(std::function<bool()> has_readers) { impl_->is_recorded = std::move(has_readers); }
 void NodeApp::Keep(std::shared_ptr<void> port) { impl_->ports.push_back(std::move(port)); }
 
 double NodeApp::SessionTime(std::int64_t stamp_ns) const noexcept {
@@ -207,9 +212,14 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
   });
 
   bool stepping = false;
+  std::int64_t known_ns = 0;
   while (!app.ShouldEnd()) {
     app.PollBus();
-    if (!stepping && SessionTime(MonotonicNs()) >= 0) {
+    const std::int64_t now = MonotonicNs();
+    if (known_ns == 0 && app.session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown) known_ns = now;
+    const bool recorded =
+        !app.is_recorded || app.is_recorded() || (known_ns != 0 && now - known_ns > kLongestWaitForRecorder);
+    if (!stepping && recorded && SessionTime(now) >= 0) {
       stepping = true;
       app.state = HealthState::kRunning;
       thread.Start();

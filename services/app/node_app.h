@@ -17,6 +17,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -87,6 +88,7 @@ class NodeApp {
     auto port = bus().MakeOutput<T>();
     typename bus::OutputOf<T>::type& output = *port;
     Watch([&output] { return output.stats(); });
+    if constexpr (std::is_same_v<T, TickManifest>) AwaitReaders([&output] { return output.has_readers(); });
     Keep(std::shared_ptr<void>(std::move(port)));
     return output;
   }
@@ -115,6 +117,7 @@ class NodeApp {
 
  private:
   void Keep(std::shared_ptr<void> port);
+  void AwaitReaders(std::function<bool()> has_readers);
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -53,7 +53,7 @@ class Console {
         rate_(settings.rate),
         source_(settings.recording, settings.nodes, NodePeriods(cart)) {
     for (const NodeId node : settings.nodes) {
-      nodes_.emplace(node, MakeReplayedNode(node, {scene, cart, settings.folder}));
+      nodes_.emplace(node, MakeReplayedNode(node, {scene, cart, settings.folder, 1}));
     }
   }
 

@@ -128,7 +128,8 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
   TickSource source(settings.recording, settings.nodes, NodePeriods(cart));
   std::vector<std::unique_ptr<NodeRunner>> runners;
   for (const NodeId node : settings.nodes) {
-    runners.push_back(std::make_unique<NodeRunner>(node, NodeMaking{scene, cart, settings.folder}));
+    runners.push_back(
+        std::make_unique<NodeRunner>(node, NodeMaking{scene, cart, settings.folder, settings.physics_threads}));
   }
 
   LockStepResult result;

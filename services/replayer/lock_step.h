@@ -20,6 +20,7 @@ struct LockStepSettings {
   std::vector<NodeId> nodes;     ///< Of physics, thermal, haptics.
   std::filesystem::path folder;  ///< For checkpoints of the replayed nodes; must exist.
   double rate = 0;               ///< Times real time; 0: as fast as it can.
+  int physics_threads = 1;       ///< That share a step of physics; the states do not depend on it.
   double until_s = -1;           ///< Session time at which it ends; negative: the end of the recording.
 };
 

@@ -1,6 +1,7 @@
 // replayer: a recorded session again.
 #include <unistd.h>
 
+#include <algorithm>
 #include <boost/program_options.hpp>
 #include <cstdio>
 #include <cstdlib>
@@ -17,10 +18,13 @@
 #include "services/core/exit_code.h"
 #include "services/replayer/changed_scene.h"
 #include "services/replayer/console.h"
+#include "services/replayer/live.h"
 #include "services/replayer/lock_step.h"
 #include "services/replayer/lock_step_report.h"
+#include "services/replayer/pictures.h"
 #include "services/replayer/what_if.h"
 #include "services/replayer/what_if_report.h"
+#include "services/runtime/realtime.h"
 #include "services/scene/scene_file.h"
 
 namespace {
@@ -30,10 +34,11 @@ namespace po = boost::program_options;
 
 constexpr const char* kUsage =
     R"(usage: replayer RECORDING --into NODE... [options]
+       replayer RECORDING --live [--only NODE... | --except NODE...] [options]
 
 Lets nodes make the ticks of a recorded session again, with exactly the inputs that they had then, and compares their
 state with the recorded one after each tick. Stops a node at its first difference and says which tick, topic, field and
-index. Needs no bus, no devices and no real time.
+index. Needs no bus, no devices and no real time. Into render: the pictures are drawn again.
 
   replayer out/latest/recording.mcap --into physics thermal haptics
 
@@ -43,6 +48,11 @@ other, and reports what the change does to positions, forces, temperature and th
   replayer out/latest/recording.mcap --into physics thermal --set physics.grip_force_N=4
 
 With --console it is led by hand: go, pause, step, seek forward and back.
+
+With --live the recorded topics are published on the bus in real time, as if the session took place: for a node under
+development, or in the place of one.
+
+  replayer out/latest/recording.mcap --live --except physics
 
 )";
 
@@ -55,17 +65,35 @@ struct Options {
   replay::LockStepSettings lock_step;
   std::vector<std::string> changes;  ///< --set.
   std::filesystem::path scene, cart, json;
-  bool quiet = false, console = false;
+  std::filesystem::path frames;
+  replay::LiveSettings live_settings;
+  bool quiet = false, console = false, live = false, pictures = false;
   std::string answer;
 };
 
-NodeId NodeNamed(const std::string& name) {
-  for (const NodeId node : {NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics}) {
-    const std::string full = NodeName(node);
-    if (name == full || name + "_node" == full) return node;
+/// All nodes of `option` by name, each once; `valid` says which there are.
+std::vector<NodeId> NodesNamed(const po::variables_map& values, const char* option, const std::vector<NodeId>& valid) {
+  std::vector<NodeId> nodes;
+  if (values.count(option) == 0) return nodes;
+  for (const std::string& name : values[option].as<std::vector<std::string>>()) {
+    const auto named = [&](NodeId node) {
+      const std::string full = NodeName(node);
+      return name == full || name + "_node" == full || name + "_bridge" == full;
+    };
+    const auto node = std::find_if(valid.begin(), valid.end(), named);
+    if (node == valid.end()) {
+      std::string names;
+      for (const NodeId v : valid) names += (names.empty() ? "" : ", ") + std::string(NodeName(v));
+      throw InputError(std::string("--") + option + " " + name + ": no such node here; valid: " + names);
+    }
+    if (std::find(nodes.begin(), nodes.end(), *node) == nodes.end()) nodes.push_back(*node);
   }
-  throw InputError("--into " + name + ": cannot be replayed; valid: physics, thermal, haptics");
+  return nodes;
 }
+
+/// All that publish.
+const std::vector<NodeId> kPublishers{NodeId::kSupervisor, NodeId::kHandleBridge, NodeId::kHaptics,
+                                      NodeId::kPhysics,    NodeId::kThermal,      NodeId::kRender};
 
 /// What stands beside the recording in its session's folder, unless it was given.
 std::filesystem::path BesideRecording(const std::string& given, const std::filesystem::path& recording,
@@ -75,15 +103,37 @@ std::filesystem::path BesideRecording(const std::string& given, const std::files
   return std::filesystem::exists(beside) ? beside : std::filesystem::path();
 }
 
+replay::LiveSettings LiveSettingsFrom(const po::variables_map& values) {
+  replay::LiveSettings settings;
+  settings.recording = values["recording"].as<std::string>();
+  settings.domain = values["domain"].as<int>();
+  settings.from_s = values["from"].as<double>();
+  if (values.count("only") != 0 && values.count("except") != 0) throw InputError("give --only or --except, not both");
+  settings.nodes = values.count("only") != 0 ? NodesNamed(values, "only", kPublishers) : kPublishers;
+  for (const NodeId node : NodesNamed(values, "except", kPublishers)) std::erase(settings.nodes, node);
+  return settings;
+}
+
 Options Parse(int argc, char** argv) {
   Options options;
   po::options_description visible("Options"), all;
   visible.add_options()  //
       ("into", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
-       "physics, thermal, haptics: one or more")  //
+       "physics, thermal, haptics, render: one or more")  //
       ("set", po::value<std::vector<std::string>>()->value_name("SECTION.KEY=VALUE"),
-       "a parameter to change, as in the scene's description; as often as needed")                               //
-      ("console", "read commands from standard input; \"help\" lists them")                                      //
+       "a parameter to change, as in the scene's description; as often as needed")  //
+      ("console", "read commands from standard input; \"help\" lists them")         //
+      ("live", "publish the recorded topics on the bus in real time")               //
+      ("only", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
+       "live: those of these nodes")  //
+      ("except", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
+       "live: those of all but these nodes")                                                                         //
+      ("domain", po::value<int>()->value_name("N")->default_value(7), "live: DDS domain, 1 to 100")                  //
+      ("from", po::value<double>()->value_name("S")->default_value(0), "live: begin so far into the recording [s]")  //
+      ("frames", po::value<std::string>()->value_name("DIR")->default_value(""),
+       "folder for the pictures of render; default: replayed_frames beside the recording")  //
+      ("threads", po::value<int>()->value_name("N")->default_value(1),
+       "that share a step of physics; the states do not depend on it")                                           //
       ("rate", po::value<double>()->value_name("X")->default_value(0), "times real time; 0: as fast as it can")  //
       ("until", po::value<double>()->value_name("S")->default_value(-1), "end at this session time [s]")         //
       ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
@@ -114,17 +164,27 @@ Options Parse(int argc, char** argv) {
       return options;
     }
     if (values.count("recording") == 0) throw InputError("which recording? See --help");
-    if (values.count("into") == 0) throw InputError("--into is missing: which nodes? See --help");
     options.lock_step.recording = values["recording"].as<std::string>();
-    for (const std::string& name : values["into"].as<std::vector<std::string>>()) {
-      const NodeId node = NodeNamed(name);
-      for (const NodeId other : options.lock_step.nodes) {
-        if (other == node) throw InputError("--into " + name + ": named twice");
-      }
-      options.lock_step.nodes.push_back(node);
+    options.live = values.count("live") != 0;
+    if (options.live == (values.count("into") != 0)) {
+      throw InputError("give either --into NODE... or --live; see --help");
     }
+    if (options.live) {
+      options.live_settings = LiveSettingsFrom(values);
+      return options;
+    }
+    options.lock_step.nodes =
+        NodesNamed(values, "into", {NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics, NodeId::kRender});
+    options.pictures = std::erase(options.lock_step.nodes, NodeId::kRender) > 0;
+    const std::string frames = values["frames"].as<std::string>();
+    options.frames =
+        frames.empty() ? options.lock_step.recording.parent_path() / "replayed_frames" : std::filesystem::path(frames);
     options.lock_step.rate = values["rate"].as<double>();
     if (!(options.lock_step.rate >= 0)) throw InputError("--rate: must be 0 (as fast as it can) or more");
+    options.lock_step.physics_threads = values["threads"].as<int>();
+    if (options.lock_step.physics_threads < 1 || options.lock_step.physics_threads > 64) {
+      throw InputError("--threads: must be 1 to 64");
+    }
     options.lock_step.until_s = values["until"].as<double>();
     if (values.count("set") != 0) options.changes = values["set"].as<std::vector<std::string>>();
     if (!options.changes.empty() && options.lock_step.rate > 0) {
@@ -168,12 +228,22 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
+int RunLive(const replay::LiveSettings& settings) {
+  runtime::InstallStopSignals();
+  const replay::LiveResult result = ReplayLive(settings, [] { return runtime::ShouldStop(); });
+  std::printf("published %llu messages, at most %.1f ms late; %llu could not be sent, %llu could not be read\n",
+              static_cast<unsigned long long>(result.published), 1e3 * result.latest_s,
+              static_cast<unsigned long long>(result.failed), static_cast<unsigned long long>(result.undecodable));
+  return static_cast<int>(result.published > 0 ? ExitCode::kDone : ExitCode::kFailure);
+}
+
 int Run(int argc, char** argv) {
   Options options = Parse(argc, argv);
   if (!options.answer.empty()) {
     std::cout << options.answer;
     return static_cast<int>(ExitCode::kDone);
   }
+  if (options.live) return RunLive(options.live_settings);
   const scene::SceneFile scene(options.scene);
   const config::CartConfig cart = options.cart.empty() ? config::CartConfig() : config::LoadCart(options.cart);
   const ScratchFolder scratch;
@@ -182,6 +252,13 @@ int Run(int argc, char** argv) {
   std::function<void(double)> progress;
   if (!options.quiet) progress = [](double time_s) { std::fprintf(stderr, "\rsession time %.1f s ", time_s); };
   const auto end_progress = [&] { std::fputs(options.quiet ? "" : "\r\033[K", stderr); };
+  if (options.pictures) {
+    const replay::PicturesSettings pictures{options.lock_step.recording, options.frames, options.lock_step.until_s};
+    const std::uint64_t written = ReplayPictures(pictures, scene.view(), progress);
+    end_progress();
+    std::cout << written << " pictures in " << options.frames.string() << '\n';
+    if (options.lock_step.nodes.empty()) return static_cast<int>(written > 0 ? ExitCode::kDone : ExitCode::kFailure);
+  }
   if (!options.changes.empty()) {
     const SceneView changed = replay::WithChanges(scene, options.changes);
     const replay::WhatIfResult result = ReplayWhatIf(options.lock_step, scene.view(), changed, cart, progress);

@@ -57,12 +57,20 @@ class ReplayedPhysics final : public ReplayedNode {
   explicit ReplayedPhysics(const NodeMaking& making)
       : ReplayedNode(NodeId::kPhysics),
         scene_(making.scene),
+        threads_(making.threads),
         checkpoint_(CheckpointPath(making, id()), scene_.hash, physics::kCheckpointLayout,
                     physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size()))) {}
 
   std::vector<Published> TakeOutputs() override {
     std::vector<Published> published;
-    frames_.TakeInto(&published);
+    // Nobody reads the frames of a replay, so they are made only when one is asked for.
+    TissueFrame frame;
+    frame.xyz.resize(3 * scene_.rest_position.size());
+    node_->FillFrame(tick_, {frame.header, frame.xyz});
+    frame.header.stamp.epoch = epoch();
+    frame.header.stamp.stamp_ns = tick_.stamp_ns;
+    Published message{TopicId::kTissueFrame, {}};
+    if (bus::EncodeCdr(frame, &message.bytes)) published.push_back(std::move(message));
     contacts_.TakeInto(&published);
     cautery_.TakeInto(&published);
     return published;
@@ -76,13 +84,13 @@ class ReplayedPhysics final : public ReplayedNode {
     handles_ = {};
     topology_ = {};
     node_.emplace(scene_,
-                  physics::PhysicsNode::Ports{*tools_.in, *handles_.in, *topology_.in, *frames_.out, *contacts_.out,
+                  physics::PhysicsNode::Ports{*tools_.in, *handles_.in, *topology_.in, *frames_, *contacts_.out,
                                               *cautery_.out, *manifests_.out},
-                  &checkpoint_, epoch_ns);
+                  &checkpoint_, epoch_ns, threads_);
   }
 
   std::uint64_t Advance(const RecordedTick& tick) override {
-    frames_.Drop();
+    tick_ = tick.tick;
     contacts_.Drop();
     cautery_.Drop();
     tools_.Give(tick.tools);
@@ -94,11 +102,14 @@ class ReplayedPhysics final : public ReplayedNode {
   }
 
   const SceneView& scene_;
+  const int threads_;
   runtime::CheckpointFile checkpoint_;
   Inlet<ToolState> tools_;
   Inlet<HandleState> handles_;
   Inlet<TopologyState> topology_;
-  Outlet<TissueFrame> frames_;
+  bus::InProcessTopic<TissueFrame> frame_topic_;
+  std::unique_ptr<bus::LoanOutput<TissueFrame>> frames_ = frame_topic_.MakeOutput();
+  Tick tick_;
   Outlet<ContactModel> contacts_;
   Outlet<CauteryContact> cautery_;
   Outlet<TickManifest> manifests_;
@@ -204,9 +215,9 @@ std::uint64_t ReplayedNode::Step(const RecordedTick& tick) {
   const unsigned outside = _mm_getcsr();
   if (!started_ || tick.epoch != epoch_) {
     float_state_ = outside;
-    Start(static_cast<std::int64_t>(tick.epoch));
     started_ = true;
     epoch_ = tick.epoch;
+    Start(static_cast<std::int64_t>(tick.epoch));
   }
   _mm_setcsr(float_state_);
   const std::uint64_t hash = Advance(tick);

@@ -35,6 +35,7 @@ class ReplayedNode {
 
  protected:
   explicit ReplayedNode(NodeId id) : id_(id) {}
+  [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
   virtual void Start(std::int64_t epoch_ns) = 0;
   virtual std::uint64_t Advance(const RecordedTick& tick) = 0;
 
@@ -50,6 +51,7 @@ struct NodeMaking {
   const SceneView& scene;
   const config::CartConfig& cart;
   std::filesystem::path folder;  ///< For its checkpoint.
+  int threads = 1;               ///< That share a step of physics; its state does not depend on it.
 };
 
 /// For physics, thermal and haptics. Throws InputError when the node cannot be replayed.

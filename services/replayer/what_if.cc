@@ -112,8 +112,8 @@ class Comparison {
 WhatIfResult ReplayWhatIf(const LockStepSettings& settings, const SceneView& before, const SceneView& after,
                           const config::CartConfig& cart, const std::function<void(double)>& progress) {
   TickSource source(settings.recording, settings.nodes, NodePeriods(cart));
-  CoupledNodes nodes_before(settings.nodes, {before, cart, settings.folder / "before"});
-  CoupledNodes nodes_after(settings.nodes, {after, cart, settings.folder / "after"});
+  CoupledNodes nodes_before(settings.nodes, {before, cart, settings.folder / "before", 1});
+  CoupledNodes nodes_after(settings.nodes, {after, cart, settings.folder / "after", 1});
   Comparison comparison;
   RecordedTick tick;
   const std::int64_t begin = runtime::MonotonicNs();

@@ -36,7 +36,7 @@ class WhatIfTest : public ::testing::Test {
   }
 
   static WhatIfResult WhatIf(const std::vector<std::string>& changes, const std::vector<NodeId>& nodes) {
-    const LockStepSettings settings{folder_ / "recording.mcap", nodes, folder_ / "again"};
+    const LockStepSettings settings{folder_ / "recording.mcap", nodes, folder_ / "again", 0, 1, -1};
     std::filesystem::remove_all(settings.folder);
     return ReplayWhatIf(settings, scene_->view(), WithChanges(*scene_, changes), {}, {});
   }

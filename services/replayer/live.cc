@@ -1,0 +1,171 @@
+#include "services/replayer/live.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <type_traits>
+
+#include "services/bus/convert/cdr.h"
+#include "services/bus/dds/participant.h"
+#include "services/bus/dds/shared_memory.h"
+#include "services/bus/gate.h"
+#include "services/bus/topics.h"
+#include "services/core/message_fields.h"
+#include "services/recording/mcap_reader.h"
+#include "services/runtime/cyclic_thread.h"
+
+namespace fulcrum::replay {
+namespace {
+
+// Readers find the writers before the first message: a round of discovery.
+constexpr auto kDiscovery = std::chrono::milliseconds(300);
+// A longer silence in the recording is waited for in pieces, so that a stop is heard.
+constexpr std::int64_t kLongestSleep_ns = 50'000'000;
+
+/// Moves what is a time of CLOCK_MONOTONIC by its name, wherever it stands.
+template <class T>
+void MoveAll(std::int64_t by_ns, T* value) {
+  if constexpr (HasFields<T>) {
+    ForEachField<T>([&](const char* field, auto member) {
+      const std::string_view name = field;
+      auto& part = value->*member;
+      if constexpr (std::is_integral_v<std::remove_reference_t<decltype(part)>>) {
+        // Zero stands for none.
+        if (part != 0 && (name == "epoch" || name.ends_with("_ns"))) {
+          part += static_cast<std::remove_reference_t<decltype(part)>>(by_ns);
+        }
+      } else {
+        MoveAll(by_ns, &part);
+      }
+    });
+  } else if constexpr (requires { requires HasFields<typename T::value_type>; }) {
+    for (auto& part : *value) MoveAll(by_ns, &part);
+  }
+}
+
+/// Who sends a topic; none for those that several nodes send.
+std::optional<NodeId> OwnerOf(TopicId topic) {
+  switch (topic) {
+    case TopicId::kHandleState:
+      return NodeId::kHandleBridge;
+    case TopicId::kToolState:
+      return NodeId::kHaptics;
+    case TopicId::kTissueFrame:
+    case TopicId::kContactModel:
+    case TopicId::kCauteryContact:
+      return NodeId::kPhysics;
+    case TopicId::kTopologyState:
+    case TopicId::kTemperaturePatch:
+    case TopicId::kThermalEvent:
+      return NodeId::kThermal;
+    case TopicId::kSceneManifest:
+      return NodeId::kSupervisor;
+    default:
+      return std::nullopt;
+  }
+}
+
+/// A topic on its way out.
+class Channel {
+ public:
+  virtual ~Channel() = default;
+  /// Decodes and moves it; false: not to be sent.
+  virtual bool Prepare(std::span<const std::uint8_t> bytes, std::int64_t by_ns, LiveResult* result) = 0;
+  virtual bool Send() = 0;
+};
+
+template <class T>
+class ChannelOf final : public Channel {
+ public:
+  ChannelOf(bus::DdsParticipant* participant, const std::vector<NodeId>& nodes)
+      : output_(participant->MakeOutput<T>()), nodes_(nodes) {}
+
+  bool Prepare(std::span<const std::uint8_t> bytes, std::int64_t by_ns, LiveResult* result) override {
+    if (!bus::DecodeCdr(bytes, &message_) || !bus::PassesGate(message_)) {
+      ++result->undecodable;
+      return false;
+    }
+    if constexpr (requires { message_.node; }) {
+      if (std::find(nodes_.begin(), nodes_.end(), message_.node) == nodes_.end()) return false;
+    }
+    MoveAll(by_ns, &message_);
+    return true;
+  }
+  bool Send() override { return output_->Write(message_); }
+
+ private:
+  std::unique_ptr<typename bus::OutputOf<T>::type> output_;
+  const std::vector<NodeId>& nodes_;
+  T message_;
+};
+
+bool IsSent(TopicId topic, const std::vector<NodeId>& nodes) {
+  if (topic == TopicId::kCommand || topic == TopicId::kCommandReply) return false;
+  const std::optional<NodeId> owner = OwnerOf(topic);
+  return !owner || std::find(nodes.begin(), nodes.end(), *owner) != nodes.end();
+}
+
+const bus::TopicRole* RoleNamed(const std::string& name) {
+  const auto role =
+      std::find_if(bus::kTopicRoles.begin(), bus::kTopicRoles.end(), [&](const auto& r) { return name == r.name; });
+  return role == bus::kTopicRoles.end() ? nullptr : &*role;
+}
+
+/// Log times are told as wall clock; the recorder says how far that was from the clock of the stamps.
+std::int64_t ClockOffset(const recording::McapReader& reader) {
+  const auto clock = reader.metadata().find("clock");
+  if (clock == reader.metadata().end()) return 0;
+  const auto offset = clock->second.find("log_time_minus_monotonic_ns");
+  return offset == clock->second.end() ? 0 : std::strtoll(offset->second.c_str(), nullptr, 10);
+}
+
+}  // namespace
+
+LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>& stop) {
+  recording::McapReader reader(settings.recording);
+  const std::filesystem::path memory = bus::SharedMemoryDirectory(settings.domain);
+  bus::DdsParticipant participant({.domain = settings.domain, .node_name = "replayer", .shared_memory = memory});
+  std::map<TopicId, std::unique_ptr<Channel>> channels;
+  for (const bus::TopicRole& role : bus::kTopicRoles) {
+    if (!IsSent(role.id, settings.nodes)) continue;
+    channels[role.id] = bus::WithMessageOf(role.id, [&]<class T>(std::type_identity<T>) -> std::unique_ptr<Channel> {
+      return std::make_unique<ChannelOf<T>>(&participant, settings.nodes);
+    });
+  }
+  std::this_thread::sleep_for(kDiscovery);
+
+  LiveResult result;
+  recording::McapMessage message{};
+  std::optional<std::int64_t> first_ns;
+  std::int64_t moved_ns = 0;  // From the recording's clock to now's.
+  const std::int64_t begin_ns = runtime::MonotonicNs();
+  while (!stop() && reader.Next(&message)) {
+    const std::int64_t then_ns = static_cast<std::int64_t>(message.log_time_ns) - ClockOffset(reader);
+    if (!first_ns) {
+      first_ns = then_ns + static_cast<std::int64_t>(1e9 * settings.from_s);
+      moved_ns = begin_ns - *first_ns;
+    }
+    const bus::TopicRole* role = RoleNamed(reader.channels().at(message.channel).topic);
+    const auto channel = role == nullptr ? channels.end() : channels.find(role->id);
+    if (channel == channels.end()) continue;
+    // Of the time before only what a late joiner would have been given.
+    if (then_ns < *first_ns && !role->late_joiners_served) continue;
+    if (!channel->second->Prepare(message.data, moved_ns, &result)) continue;
+    const std::int64_t due_ns = std::max(begin_ns, then_ns + moved_ns);
+    for (std::int64_t now = runtime::MonotonicNs(); now < due_ns && !stop(); now = runtime::MonotonicNs()) {
+      std::this_thread::sleep_for(std::chrono::nanoseconds(std::min(due_ns - now, kLongestSleep_ns)));
+    }
+    result.latest_s = std::max(result.latest_s, 1e-9 * static_cast<double>(runtime::MonotonicNs() - due_ns));
+    ++(channel->second->Send() ? result.published : result.failed);
+  }
+  return result;
+}
+
+}  // namespace fulcrum::replay
