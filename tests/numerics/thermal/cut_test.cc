@@ -94,7 +94,8 @@ TEST(CutPropertiesTest, CouplingStepHasConverged) {
   for (int n = 0; n < 2; ++n) {
     ThermalSolver solver(scene);
     if (n == 1) {
-      solver.source()->min_step_s = 2.5e-4f;
+      solver.source()->max_change = 0.02f;
+      solver.source()->min_step_s = 2.5e-5f;
       solver.source()->tolerance = 1e-3f;
     }
     RunDrag(Slanted(0.006f, 0.012f), kDt, &solver);
