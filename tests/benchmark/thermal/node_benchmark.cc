@@ -6,9 +6,9 @@
 #include <numeric>
 #include <vector>
 
-#include "services/bus/in_process.h"
 #include "services/scene/build.h"
 #include "tests/benchmark/thermal/thermal_cases.h"
+#include "tests/unit/thermal/node_bus.h"
 #include "thermal_node/coupling/patch.h"
 #include "thermal_node/node/thermal_node.h"
 
@@ -28,9 +28,7 @@ class Session {
     std::filesystem::create_directories(folder_);
     checkpoint_ = std::make_unique<runtime::CheckpointFile>(folder_ / "checkpoint", scene.hash, kCheckpointLayout,
                                                             ThermalSolver::CheckpointCapacity(scene));
-    node_ = std::make_unique<ThermalNode>(
-        scene_, ThermalNode::Ports{*contact_in_, *topology_out_, *patch_out_, *event_out_, *manifest_out_},
-        checkpoint_.get(), 1);
+    node_ = std::make_unique<ThermalNode>(scene_, bus_.ports(), checkpoint_.get(), 1);
   }
   ~Session() { std::filesystem::remove_all(folder_); }
   Session(const Session&) = delete;
@@ -38,22 +36,12 @@ class Session {
 
   /// Puts the tip where the input says; to be seen by the next Step.
   void Touch(const TipInput& tip) {
-    CauteryContact contact;
+    CauteryContact contact = TouchAt(tip.path.to, tip.mode, tip.power_W, tip.path.radius_m);
     contact.stamp = {++sequence_, 1, tick_.stamp_ns};
-    contact.touching = true;
-    contact.mode = tip.mode;
-    contact.power_W = tip.power_W;
-    contact.contact_radius_m = tip.path.radius_m;
-    contact.material = tip.path.to;
-    contact.triangle = 0;
-    contact.barycentric = {1, 0, 0};
-    contact_out_->Write(contact);
+    bus_.contact_out->Write(contact);
   }
   void Step() {
-    ++tick_.index;
-    tick_.dt_s = kFrame_s;
-    tick_.session_time_s += kFrame_s;
-    tick_.stamp_ns += 10'000'000;
+    Advance(&tick_);
     node_->Step(tick_);
   }
   [[nodiscard]] const ThermalSolver& solver() const { return node_->solver(); }
@@ -61,22 +49,8 @@ class Session {
  private:
   SceneView scene_;
   std::filesystem::path folder_;
-  bus::InProcessTopic<CauteryContact> contact_topic_;
-  bus::InProcessTopic<TopologyState> topology_topic_;
-  bus::InProcessTopic<TemperaturePatch> patch_topic_;
-  bus::InProcessTopic<ThermalEvent> event_topic_;
-  bus::InProcessTopic<TickManifest> manifest_topic_;
-  std::unique_ptr<bus::Output<CauteryContact>> contact_out_ = contact_topic_.MakeOutput();
-  std::unique_ptr<bus::Input<CauteryContact>> contact_in_ = contact_topic_.MakeInput();
-  std::unique_ptr<bus::Output<TopologyState>> topology_out_ = topology_topic_.MakeOutput();
-  std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patch_out_ = patch_topic_.MakeOutput();
-  std::unique_ptr<bus::Output<ThermalEvent>> event_out_ = event_topic_.MakeOutput();
-  std::unique_ptr<bus::Output<TickManifest>> manifest_out_ = manifest_topic_.MakeOutput();
-  // Readers that keep the newest sample, as their queues on the bus do.
-  std::unique_ptr<bus::Input<TopologyState>> topology_in_ = topology_topic_.MakeInput(1);
-  std::unique_ptr<bus::Input<TemperaturePatch>> patch_in_ = patch_topic_.MakeInput(1);
-  std::unique_ptr<bus::Input<ThermalEvent>> event_in_ = event_topic_.MakeInput(4096);
-  std::unique_ptr<bus::Input<TickManifest>> manifest_in_ = manifest_topic_.MakeInput(4096);
+  NodeBus bus_;
+  std::unique_ptr<bus::Input<TemperaturePatch>> patch_in_ = bus_.patches.MakeInput(1);
   std::unique_ptr<runtime::CheckpointFile> checkpoint_;
   std::unique_ptr<ThermalNode> node_;
   Tick tick_;
