@@ -154,6 +154,17 @@ void SourceWindow::SetSigma() {
   }
 }
 
+TipPath SourceWindow::Fitted(const TipPath& path) {
+  const float reach = kMetalReach * material_.cell_m;
+  const float in_material = std::sqrt(std::max(metric_.ss, metric_.tt)) / metric_.area();  // of a length on the sheet
+  TipPath fitted = path;
+  fitted.radius_m = std::min(path.radius_m, reach / in_material);
+  const float room = reach - fitted.radius_m * in_material, half = path.half.norm();
+  if (half > room) fitted.half *= std::max(room, 0.0f) / half;
+  stats_.shortened = stats_.shortened || half > room || fitted.radius_m < path.radius_m;
+  return fitted;
+}
+
 void SourceWindow::SetContact(const Vec2f& tip, const Vec2f& half, float radius_m, float arc_m) {
   problem_.contact.fill(0);
   const float cell = material_.cell_m;
@@ -283,6 +294,7 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   SetSigma();
   SetGround(centre, path.tented);
   const float cells = (path.to - path.from).norm() / material_.cell_m;
+  const TipPath metal = Fitted(path);
   const float by_way = duration_s / std::max(cells / kMaxWay, 1.0f);
   const float longest = std::max(by_way, std::min(min_step_s, duration_s));
   leak_V2s_.fill(0);
@@ -290,7 +302,7 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   for (bool last = !(duration_s > 0.0f); !last;) {
     const float rest = duration_s - t;
     const float at = (t + 0.5f * std::min(step_s_, rest)) / duration_s;
-    SetContact(path.from + at * (path.to - path.from), path.half, path.radius_m, drive.arc_m);
+    SetContact(path.from + at * (path.to - path.from), metal.half, metal.radius_m, drive.arc_m);
     const PotentialResult solved = potential_.Solve(problem_, tolerance);
     const float voltage = RegulatedVoltage(drive, solved.conductance_S);
     const float v2 = voltage * voltage;

@@ -15,6 +15,9 @@
 namespace fulcrum::thermal {
 
 inline constexpr float kMaxWay = 0.26f;  ///< Of the tip in a coupling step [cells]: 5 mm/s in half a frame.
+/// From the middle of the metal to its end [cells]: what is longer is shortened, and counted. The other six cells to
+/// the window's border are for the tip's way and the sparks.
+inline constexpr float kMetalReach = 26.0f;
 /// Corner of a window that has not been used yet: far from any sheet, yet no overflow in differences.
 inline constexpr CellIndex kNowhere{-(1 << 24), -(1 << 24)};
 inline constexpr float kTentRadius_m = 0.015f;  ///< A tented sheet returns its current to the tissue from here on.
@@ -33,6 +36,7 @@ struct SourceStats {
   int by_change = 0;               ///< Coupling steps that ended where the tissue had changed by max_change.
   int by_way = 0;                  ///< Where the tip had gone kMaxWay.
   int by_floor = 0;                ///< At min_step_s, where one of these asked for less. The rest ended with the run.
+  bool shortened = false;          ///< The metal did not fit into the window.
   int removed_cells = 0;
   CellIndex low{INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN};  ///< Box of the removed cells.
   float voltage_V = 0, current_A = 0;                               ///< Of the last solve.
@@ -79,6 +83,8 @@ class SourceWindow {
   /// The tissue in the window lies as it does under the tip: tented or not.
   void Store(HeatField* field, bool tented);
   void SetGround(const Vec2f& middle, bool tented);
+  /// The path with the metal shortened to kMetalReach, where it is longer.
+  [[nodiscard]] TipPath Fitted(const TipPath& path);
   void SetContact(const Vec2f& tip, const Vec2f& half, float radius_m, float arc_m);
   void SetSigma();
   /// How far the potential goes wrong while the tissue takes `v2_s` [V^2 s] with the heat of the last solve. A round
