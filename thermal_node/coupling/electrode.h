@@ -18,7 +18,7 @@ class Electrode {
  public:
   /// @param middle of the segment. @param half way from there to either end.
   Electrode(const SurfaceMetric& metric, const Vec2f& middle, const Vec2f& half, float radius, float arc)
-      : metric_(metric), middle_(middle), half_(half), radius_(radius), arc_(arc) {
+      : metric_(metric), middle_(middle), half_(half), radius_(radius), arc_(arc), per_arc_(1.0f / arc) {
     const Vec2f lowered(metric.ss * half.x() + metric.st * half.y(), metric.st * half.x() + metric.tt * half.y());
     const float length2 = lowered.dot(half);
     if (length2 > 0.0f) share_ = lowered / length2;
@@ -38,7 +38,7 @@ class Electrode {
     const float r = std::sqrt(r2);
     const float metal = std::clamp(radius_ - r + 0.5f, 0.0f, 1.0f);
     const float beyond = std::max(r - radius_, 0.5f * (1.0f - metal));  // of the middle of what is not covered
-    const float rarer = std::max(1.0f - beyond / arc_, 0.0f);
+    const float rarer = std::max(1.0f - beyond * per_arc_, 0.0f);
     return metal + (1.0f - metal) * kArcConductance * rarer * rarer;
   }
 
@@ -55,7 +55,7 @@ class Electrode {
   SurfaceMetric metric_;
   Vec2f middle_, half_;
   Vec2f share_ = Vec2f::Zero();  ///< Its product with a way from the middle: how far along the half that leads.
-  float radius_, arc_;
+  float radius_, arc_, per_arc_;
   float covered2_, reach2_;  ///< Squares of the distances within which all, and beyond which nothing is covered.
 };
 

@@ -16,6 +16,17 @@ constexpr float kFaintRow = 0.01f;
 /// seconds, which dries everything, each comes down by 1 / max_change at most.
 constexpr int kStepTrials = 6;
 
+/// What a run of cells is apart from its heat: one over the volume, and the electrical conductivity wet at body
+/// temperature.
+FULCRUM_WIDE
+void LoadTissue(const std::uint8_t* __restrict flags, const float* __restrict inverse_area, float per_flat_volume,
+                float sigma, int count, float* __restrict inverse_volume, float* __restrict tissue) {
+  for (int n = 0; n < count; ++n) {
+    inverse_volume[n] = inverse_area[n] * per_flat_volume;
+    tissue[n] = (flags[n] & kNoTissue) != 0 ? 0.0f : sigma;
+  }
+}
+
 }  // namespace
 
 SourceWindow::SourceWindow(const Material& material, const Sheet& sheet) : material_(material), sheet_(sheet) {
@@ -91,10 +102,8 @@ void SourceWindow::Load(HeatField* field, Ledger* ledger) {
     std::copy_n(&tile->state.enthalpy[from], count, &enthalpy_[to]);
     std::copy_n(&tile->state.water[from], count, &water_[to]);
     std::copy_n(&tile->state.flags[from], count, &flags_[to]);
-    for (int n = 0; n < count; ++n) {
-      inverse_volume_[to + n] = tile->geometry.inverse_area[from + n] / tile->flat_volume;
-      tissue_[to + n] = (tile->state.flags[from + n] & kNoTissue) != 0 ? 0.0f : material_.sigma;
-    }
+    LoadTissue(&tile->state.flags[from], &tile->geometry.inverse_area[from], 1.0f / tile->flat_volume, material_.sigma,
+               count, &inverse_volume_[to], &tissue_[to]);
   });
 }
 
