@@ -19,10 +19,10 @@ constexpr int kStepTrials = 6;
 /// What a run of cells is apart from its heat: one over the volume, and the electrical conductivity wet at body
 /// temperature.
 FULCRUM_WIDE
-void LoadTissue(const std::uint8_t* __restrict flags, const float* __restrict inverse_area, float per_flat_volume,
+void LoadTissue(const std::uint8_t* __restrict flags, const float* __restrict inverse_area, float flat_volume,
                 float sigma, int count, float* __restrict inverse_volume, float* __restrict tissue) {
   for (int n = 0; n < count; ++n) {
-    inverse_volume[n] = inverse_area[n] * per_flat_volume;
+    inverse_volume[n] = inverse_area[n] / flat_volume;
     tissue[n] = (flags[n] & kNoTissue) != 0 ? 0.0f : sigma;
   }
 }
@@ -102,8 +102,8 @@ void SourceWindow::Load(HeatField* field, Ledger* ledger) {
     std::copy_n(&tile->state.enthalpy[from], count, &enthalpy_[to]);
     std::copy_n(&tile->state.water[from], count, &water_[to]);
     std::copy_n(&tile->state.flags[from], count, &flags_[to]);
-    LoadTissue(&tile->state.flags[from], &tile->geometry.inverse_area[from], 1.0f / tile->flat_volume, material_.sigma,
-               count, &inverse_volume_[to], &tissue_[to]);
+    LoadTissue(&tile->state.flags[from], &tile->geometry.inverse_area[from], tile->flat_volume, material_.sigma, count,
+               &inverse_volume_[to], &tissue_[to]);
   });
 }
 

@@ -84,6 +84,7 @@ void NodeCutting(Report* report) {
     if (repeat == 0) Picture(session.solver(), scene, drag.to - Vec2f(0, 0.004f), "scene");
   }
   std::vector<double> times;
+  times.reserve(repeats.size());
   for (const std::vector<double>& frame : repeats) times.push_back(Quantile(frame, 0.5));
   const double mean = std::accumulate(times.begin(), times.end(), 0.0) / static_cast<double>(times.size());
   report->Add("thermal.node_cutting_5mm_s.frame_ms_mean", mean, "ms");

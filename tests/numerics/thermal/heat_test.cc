@@ -179,7 +179,8 @@ void AddBlob(HeatField* field, int tx, int ty, float peak) {
   Ledger ledger;
   Tile* tile = field->Wake(tx, ty);
   for (int k = 0; k < kTileCells; ++k) {
-    const float x = static_cast<float>(k % kTile) - 15.5f, y = static_cast<float>(k / kTile) - 15.5f;
+    const int i = k % kTile, j = k / kTile;
+    const float x = static_cast<float>(i) - 15.5f, y = static_cast<float>(j) - 15.5f;
     tile->state.enthalpy[k] =
         peak * std::exp(-(x * x + y * y) / 25) * field->material().HeatCapacity(tile->state.water[k]);
   }
