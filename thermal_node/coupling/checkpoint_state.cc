@@ -14,7 +14,7 @@ namespace fulcrum::thermal {
 namespace {
 
 /// Change it with the layout.
-constexpr std::uint64_t kLayout = 0x7468726d'00000003ull;
+constexpr std::uint64_t kLayout = 0x7468726d'00000004ull;
 /// A checkpoint of one model is none of another.
 constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
 /// Some hundred tiles with all their arrays; a session that cuts more than half a metre would need more.
@@ -271,7 +271,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   }
   // A start value, so any number will do; between 0 and 1 where the last solve converged.
   if (!AllWithin(window.start, -1e3f, 1e3f) || std::abs(window.corner.ix) > -kNowhere.ix ||
-      std::abs(window.corner.iy) > -kNowhere.iy) {
+      std::abs(window.corner.iy) > -kNowhere.iy || !(window.step_s >= 0.0f && std::isfinite(window.step_s))) {
     return false;
   }
   CellIndex paper_corner;

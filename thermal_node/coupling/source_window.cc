@@ -10,6 +10,22 @@ namespace fulcrum::thermal {
 namespace {
 
 constexpr float kFarFieldSpacing = 0.1f;  ///< Of the table, in windows.
+/// Rows with less of the heat than this do not count as changing: there it is so thin that they hardly do.
+constexpr float kFaintRow = 0.01f;
+/// Evaluations of Change() to find a step: one more than are needed where change goes with the step; from a step of
+/// seconds, which dries everything, each comes down by 1 / max_change at most.
+constexpr int kStepTrials = 6;
+
+/// What a run of cells is apart from its heat: one over the volume, and the electrical conductivity wet at body
+/// temperature.
+FULCRUM_WIDE
+void LoadTissue(const std::uint8_t* __restrict flags, const float* __restrict inverse_area, float flat_volume,
+                float sigma, int count, float* __restrict inverse_volume, float* __restrict tissue) {
+  for (int n = 0; n < count; ++n) {
+    inverse_volume[n] = inverse_area[n] / flat_volume;
+    tissue[n] = (flags[n] & kNoTissue) != 0 ? 0.0f : sigma;
+  }
+}
 
 }  // namespace
 
@@ -25,11 +41,13 @@ SourceWindow::SourceWindow(const Material& material, const Sheet& sheet) : mater
 
 void SourceWindow::Export(State* state) const {
   state->corner = corner_;
+  state->step_s = step_s_;
   potential_.ExportStart(&state->start);
 }
 
 void SourceWindow::Import(const State& state) {
   corner_ = state.corner;
+  step_s_ = state.step_s;
   potential_.ImportStart(state.start);
 }
 
@@ -39,6 +57,7 @@ void SourceWindow::MoveTo(CellIndex corner) {
   // A touch-down elsewhere shares nothing with the last potential.
   const bool near = std::abs(di) < kWindow / 4 && std::abs(dj) < kWindow / 4;
   near ? potential_.Shift(di, dj) : potential_.ImportStart({});
+  if (!near) step_s_ = 0;
   corner_ = corner;
 }
 
@@ -46,16 +65,15 @@ void SourceWindow::MoveTo(CellIndex corner) {
 /// beyond the sheet are visited with tile == nullptr.
 template <class Visit>
 void SourceWindow::ForTileRows(HeatField* field, const Visit& visit) {
-  for (int j = 0; j < kWindow; ++j) {
-    const int iy = corner_.iy + j;
-    const int ty = iy >= 0 ? iy / kTile : -1;
-    for (int i = 0; i < kWindow;) {
-      const int ix = corner_.ix + i;
-      const int in_tile = ((ix % kTile) + kTile) % kTile;
-      const int run = std::min(kTile - in_tile, kWindow - i);
-      Tile* tile = ix >= 0 && ty >= 0 ? field->Wake(ix / kTile, ty) : nullptr;
-      visit(tile, tile != nullptr ? (iy % kTile) * kTile + in_tile : 0, j * kWindow + i, run);
-      i += run;
+  const auto place = [](int cell) { return ((cell % kTile) + kTile) % kTile; };  // in its tile
+  for (int j = 0, rows = 0; j < kWindow; j += rows) {
+    const int iy = corner_.iy + j, in_y = place(iy);
+    rows = std::min(kTile - in_y, kWindow - j);
+    for (int i = 0, run = 0; i < kWindow; i += run) {
+      const int ix = corner_.ix + i, in_x = place(ix);
+      run = std::min(kTile - in_x, kWindow - i);
+      Tile* tile = ix >= 0 && iy >= 0 ? field->Wake(ix / kTile, iy / kTile) : nullptr;
+      for (int n = 0; n < rows; ++n) visit(tile, (in_y + n) * kTile + in_x, (j + n) * kWindow + i, run);
     }
   }
 }
@@ -84,10 +102,8 @@ void SourceWindow::Load(HeatField* field, Ledger* ledger) {
     std::copy_n(&tile->state.enthalpy[from], count, &enthalpy_[to]);
     std::copy_n(&tile->state.water[from], count, &water_[to]);
     std::copy_n(&tile->state.flags[from], count, &flags_[to]);
-    for (int n = 0; n < count; ++n) {
-      inverse_volume_[to + n] = tile->geometry.inverse_area[from + n] / tile->flat_volume;
-      tissue_[to + n] = (tile->state.flags[from + n] & kNoTissue) != 0 ? 0.0f : material_.sigma;
-    }
+    LoadTissue(&tile->state.flags[from], &tile->geometry.inverse_area[from], tile->flat_volume, material_.sigma, count,
+               &inverse_volume_[to], &tissue_[to]);
   });
 }
 
@@ -147,6 +163,17 @@ void SourceWindow::SetSigma() {
   }
 }
 
+TipPath SourceWindow::Fitted(const TipPath& path) {
+  const float reach = kMetalReach * material_.cell_m;
+  const float in_material = std::sqrt(std::max(metric_.ss, metric_.tt)) / metric_.area();  // of a length on the sheet
+  TipPath fitted = path;
+  fitted.radius_m = std::min(path.radius_m, reach / in_material);
+  const float room = reach - fitted.radius_m * in_material, half = path.half.norm();
+  if (half > room) fitted.half *= std::max(room, 0.0f) / half;
+  stats_.shortened = stats_.shortened || half > room || fitted.radius_m < path.radius_m;
+  return fitted;
+}
+
 void SourceWindow::SetContact(const Vec2f& tip, const Vec2f& half, float radius_m, float arc_m) {
   problem_.contact.fill(0);
   const float cell = material_.cell_m;
@@ -167,32 +194,47 @@ void SourceWindow::SetContact(const Vec2f& tip, const Vec2f& half, float radius_
 }
 
 FULCRUM_WIDE
-float SourceWindow::TimeToEvent(float v2) const {
-  const float* __restrict q = potential_.heat().data();
-  const float* __restrict h = enthalpy_.data();
-  const float* __restrict w = water_.data();
-  const float* __restrict iv = inverse_volume_.data();
+float SourceWindow::Change(float v2_s, float heat_S) const {
   const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
-  const float boil = material_.theta_boil, latent = material_.latent;
-  alignas(64) float fastest[kWindow] = {};
-  // The largest rate of progress towards an event, as 1 / time, so that cells without heat need no special case.
+  const float boil = material_.theta_boil, slope = material_.sigma_per_K, per_latent = 1.0f / material_.latent;
+  alignas(64) float sum[kWindow] = {};
   for (int j = 0; j < kWindow; ++j) {
+    if (potential_.row_heat()[j] < kFaintRow * heat_S) continue;
+    const float* __restrict q = &potential_.heat()[j * kWindow];
+    const float* __restrict h = &enthalpy_[j * kWindow];
+    const float* __restrict w = &water_[j * kWindow];
+    const float* __restrict iv = &inverse_volume_[j * kWindow];
+    const float* __restrict sigma = &problem_.sigma[j * kWindow];
+    const float* __restrict tissue = &tissue_[j * kWindow];
     for (int i = 0; i < kWindow; ++i) {
-      const int k = j * kWindow + i;
-      const float power = q[k] * iv[k];
-      const float rc = rc_dry + w[k] * rc_water;
-      const float below = rc * boil - h[k];
-      const float to_dry = (below > 0.0f ? below : 0.0f) + w[k] * latent;
-      const float to_warm = kMaxWarming * rc < to_dry ? kMaxWarming * rc : to_dry;
-      // Close to boiling, warming ends by itself.
-      const float heat = below > kMaxWarming * 0.1f * rc ? to_warm : to_dry;
-      const float possible = power / (heat + 1.0f);
-      const float rate = w[k] > 0.0f ? possible : 0.0f;
-      fastest[i] = fastest[i] > rate ? fastest[i] : rate;
+      const float after = h[i] + v2_s * q[i] * iv[i];
+      const float rc = rc_dry + w[i] * rc_water;
+      const float excess = (after - rc * boil) * per_latent;
+      const float some = excess > 0.0f ? excess : 0.0f;
+      const float boiled = some < w[i] ? some : w[i];
+      const float theta = after / rc;
+      const float capped = theta < boil ? theta : boil;
+      const float left = w[i] - boiled;
+      const float wet = w[i] > kDrySigmaFraction ? w[i] : kDrySigmaFraction;
+      const float dried = left > kDrySigmaFraction ? left : kDrySigmaFraction;
+      const float warmed = tissue[i] * (1.0f + slope * capped) * wet;
+      const float change = (warmed - sigma[i]) / (warmed + sigma[i] + 1e-20f) + (wet - dried) / (wet + dried);
+      sum[i] += q[i] * change * change;
     }
   }
-  const float rate = *std::max_element(fastest, fastest + kWindow) * v2;
-  return rate > 0.0f ? 1.0f / rate : 1.0f;
+  float total = 0;
+  for (const float s : sum) total += s;
+  return std::sqrt(total / heat_S);
+}
+
+float SourceWindow::StepByChange(float v2, float heat_S, float longest) const {
+  float step = longest;
+  for (int n = 0; n < kStepTrials; ++n) {
+    const float change = Change(v2 * step, heat_S);
+    if (!(change > 1.1f * max_change)) break;  // nor where nothing is heated
+    step *= max_change / change;
+  }
+  return step;
 }
 
 void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
@@ -223,9 +265,9 @@ void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
 }
 
 FULCRUM_WIDE
-void SourceWindow::Deposit(float v2, float dt_s, float remove_theta, Ledger* ledger) {
+void SourceWindow::Deposit(float v2_s, float remove_theta, Ledger* ledger) {
   const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
-  const float boil = material_.theta_boil, scale = v2 * dt_s;
+  const float boil = material_.theta_boil;
   for (int j = 0; j < kWindow; ++j) {
     const float* __restrict q = &potential_.heat()[j * kWindow];
     float* __restrict h = &enthalpy_[j * kWindow];
@@ -233,20 +275,19 @@ void SourceWindow::Deposit(float v2, float dt_s, float remove_theta, Ledger* led
     const float* __restrict iv = &inverse_volume_[j * kWindow];
     std::uint32_t boiling = 0;
     for (int i = 0; i < kWindow; ++i) {
-      h[i] += scale * q[i] * iv[i];
+      h[i] += v2_s * q[i] * iv[i];
       boiling |= h[i] >= (rc_dry + w[i] * rc_water) * boil ? 1u : 0u;
     }
     if (boiling != 0) BoilRow(j, remove_theta, ledger);
   }
 }
 
-void SourceWindow::AddLeak(float v2, float dt_s) {
-  const float scale = v2 * dt_s;
+void SourceWindow::AddLeak(float v2_s) {
   for (int j = 0; j < kWindow; ++j) {
     for (int i = 0; i < kWindow; ++i) {
       const int k = j * kWindow + i;
       const float volts = potential_.Voltage(i, j);
-      leak_V2s_[k] += tissue_[k] > 0.0f ? scale * volts * volts : 0.0f;
+      leak_V2s_[k] += tissue_[k] > 0.0f ? v2_s * volts * volts : 0.0f;
     }
   }
 }
@@ -262,31 +303,39 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   SetSigma();
   SetGround(centre, path.tented);
   const float cells = (path.to - path.from).norm() / material_.cell_m;
-  const float longest = std::max(duration_s / std::max(cells / kMaxWay, 1.0f), 0.1f * min_step_s);
-  const float shortest = std::min(min_step_s, longest);
+  const TipPath metal = Fitted(path);
+  const float by_way = duration_s / std::max(cells / kMaxWay, 1.0f);
+  const float longest = std::max(by_way, std::min(min_step_s, duration_s));
   leak_V2s_.fill(0);
-  float t = 0, guess = shortest;
-  while (t < duration_s) {
-    const float at = std::min(t + 0.5f * guess, duration_s) / duration_s;
-    SetContact(path.from + at * (path.to - path.from), path.half, path.radius_m, drive.arc_m);
+  float t = 0;
+  for (bool last = !(duration_s > 0.0f); !last;) {
+    const float rest = duration_s - t;
+    const float at = (t + 0.5f * std::min(step_s_, rest)) / duration_s;
+    SetContact(path.from + at * (path.to - path.from), metal.half, metal.radius_m, drive.arc_m);
     const PotentialResult solved = potential_.Solve(problem_, tolerance);
     const float voltage = RegulatedVoltage(drive, solved.conductance_S);
     const float v2 = voltage * voltage;
-    const float rest = duration_s - t;
-    float dt = std::min(std::clamp(TimeToEvent(v2), shortest, longest), rest);
-    if (rest - dt < 0.5f * shortest) dt = rest;  // no sliver at the end
-    if (keep_leak_ && !path.tented) AddLeak(v2, dt);
-    Deposit(v2, dt, drive.remove_theta, ledger);
+    const float asked = StepByChange(v2, static_cast<float>(solved.heat_S), longest);
+    const float step = std::max(asked, min_step_s);
+    // What is left goes into steps of one length: no sliver at the end.
+    const float steps = std::ceil(rest / step);
+    last = steps <= 1.0f;
+    const float dt = last ? rest : rest / steps;
+    const float v2_s = v2 * dt;
+    if (keep_leak_ && !path.tented) AddLeak(v2_s);
+    Deposit(v2_s, drive.remove_theta, ledger);
     SetSigma();
-    ledger->joule += static_cast<double>(v2) * dt * solved.heat_S;
-    ledger->generator += static_cast<double>(v2) * dt * solved.conductance_S;
+    ledger->joule += v2_s * solved.heat_S;
+    ledger->generator += static_cast<double>(v2_s) * solved.conductance_S;
     stats_.voltage_V = voltage;
     stats_.current_A = voltage * solved.conductance_S;
     stats_.imbalance = std::max(stats_.imbalance, solved.imbalance);
     stats_.iterations += solved.iterations;
     ++stats_.solves;
-    t = dt == rest ? duration_s : t + dt;
-    guess = dt;
+    if (!last)
+      ++(std::min(asked, by_way) < min_step_s ? stats_.by_floor : asked < longest ? stats_.by_change : stats_.by_way);
+    t += dt;
+    step_s_ = dt;
   }
   Store(field, path.tented);
   RefreshTiles(field, ledger);

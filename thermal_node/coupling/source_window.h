@@ -1,8 +1,8 @@
 // Current and Joule heat around the tip: a 64 x 64 copy of the cells, advanced from event to event.
 //
-// A potential is valid until the tissue changes. So after each solve the step goes to the earliest moment at which a
-// cell has spent its water (or has warmed by more than kMaxWarming), within [min_step, rest]; the tip is taken at
-// mid-step. A fixed step of a frame would be wrong by about the whole energy (lab notes).
+// A potential is valid until the tissue changes. So after each solve the step is as long as the change of the tissue's
+// conductivity over it keeps the potential, and with it the heat, within `max_change` (see Change()); the tip is taken
+// at mid-step. A fixed step of a frame would be wrong by about the whole energy (lab notes).
 #pragma once
 
 #include <array>
@@ -14,8 +14,10 @@
 
 namespace fulcrum::thermal {
 
-inline constexpr float kMaxWarming = 20.0f;  ///< Per coupling step [K]: sigma then changes by less than 30 %.
-inline constexpr float kMaxWay = 0.26f;      ///< Of the tip in a coupling step [cells]: 5 mm/s in half a frame.
+inline constexpr float kMaxWay = 0.26f;  ///< Of the tip in a coupling step [cells]: 5 mm/s in half a frame.
+/// From the middle of the metal to its end [cells]: what is longer is shortened, and counted. The other six cells to
+/// the window's border are for the tip's way and the sparks.
+inline constexpr float kMetalReach = 26.0f;
 /// Corner of a window that has not been used yet: far from any sheet, yet no overflow in differences.
 inline constexpr CellIndex kNowhere{-(1 << 24), -(1 << 24)};
 inline constexpr float kTentRadius_m = 0.015f;  ///< A tented sheet returns its current to the tissue from here on.
@@ -30,7 +32,11 @@ struct TipPath {
 
 /// Accumulated over Run() calls until ClearStats().
 struct SourceStats {
-  int solves = 0, iterations = 0;
+  int solves = 0, iterations = 0;  ///< A solve per coupling step.
+  int by_change = 0;               ///< Coupling steps that ended where the tissue had changed by max_change.
+  int by_way = 0;                  ///< Where the tip had gone kMaxWay.
+  int by_floor = 0;                ///< At min_step_s, where one of these asked for less. The rest ended with the run.
+  bool shortened = false;          ///< The metal did not fit into the window.
   int removed_cells = 0;
   CellIndex low{INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN};  ///< Box of the removed cells.
   float voltage_V = 0, current_A = 0;                               ///< Of the last solve.
@@ -54,13 +60,17 @@ class SourceWindow {
   [[nodiscard]] const SourceStats& stats() const { return stats_; }
   void ClearStats() { stats_ = {}; }
 
-  /// Shortest coupling step, unless the tip moves more than kMaxWay in it. See thermal.coupling_error_pct.
-  float min_step_s = 2.0e-3f;
-  float tolerance = 1e-2f;  ///< Of the potential, energy norm; 1e-3 changes the energy of a cut by less than 0.1 %.
+  /// Change() over a coupling step. At 0.1 a cell that gets one hundredth of the heat and dries ends it. See
+  /// thermal.coupling_error_pct.
+  float max_change = 0.1f;
+  /// Shortest coupling step [s]: a guard against endless ones, seldom reached.
+  float min_step_s = 2.5e-4f;
+  float tolerance = kWorkingTolerance;  ///< Of the potential.
 
-  /// For checkpoints: where the window stood and the start value of the next solve.
+  /// For checkpoints: where the window stood, the last coupling step and the start value of the next solve.
   struct State {
     CellIndex corner = kNowhere;
+    float step_s = 0;
     std::array<float, kWindowCells> start{};
   };
   void Export(State* state) const;
@@ -73,11 +83,19 @@ class SourceWindow {
   /// The tissue in the window lies as it does under the tip: tented or not.
   void Store(HeatField* field, bool tented);
   void SetGround(const Vec2f& middle, bool tented);
+  /// The path with the metal shortened to kMetalReach, where it is longer.
+  [[nodiscard]] TipPath Fitted(const TipPath& path);
   void SetContact(const Vec2f& tip, const Vec2f& half, float radius_m, float arc_m);
   void SetSigma();
-  [[nodiscard]] float TimeToEvent(float v2) const;
-  void Deposit(float v2, float dt_s, float remove_theta, Ledger* ledger);
-  void AddLeak(float v2, float dt_s);
+  /// How far the potential goes wrong while the tissue takes `v2_s` [V^2 s] with the heat of the last solve. A round
+  /// inclusion whose conductivity goes from s to s' changes a field about it, in the energy norm, by sqrt(2) b of what
+  /// it dissipated, b = |s' - s| / (s' + s) (dipole in two dimensions); cells are taken as such inclusions, each for
+  /// itself: the root of the mean of b^2, weighted by heat. Warming and drying count apart, because they would cancel.
+  [[nodiscard]] float Change(float v2_s, float heat_S) const;
+  /// The longest step, at most `longest`, with no more than max_change [s].
+  [[nodiscard]] float StepByChange(float v2, float heat_S, float longest) const;
+  void Deposit(float v2_s, float remove_theta, Ledger* ledger);
+  void AddLeak(float v2_s);
   void BoilRow(int j, float remove_theta, Ledger* ledger);
   template <class Visit>
   void ForTileRows(HeatField* field, const Visit& visit);
@@ -87,6 +105,7 @@ class SourceWindow {
   PotentialSolver potential_;
   PotentialProblem problem_;
   CellIndex corner_ = kNowhere;
+  float step_s_ = 0;                   ///< The last coupling step: the next one is expected to be as long.
   SurfaceMetric metric_;               ///< Under the tip; one for the whole window.
   std::array<float, 64> far_field_{};  ///< K1/(lambda K0) over distance [1/m].
   SourceStats stats_;

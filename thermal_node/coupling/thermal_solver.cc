@@ -77,6 +77,7 @@ void ThermalSolver::AccurateFrame(const TipInput& tip, float dt_s) {
   UpdateDamage(dt_s);
   UpdateTopology();
   figures_.voltage_V = tip.active ? source_.stats().voltage_V : 0.0f;
+  figures_.shortened += source_.stats().shortened ? 1 : 0;
   figures_.solves = source_.stats().solves;
   figures_.iterations = source_.stats().iterations;
 }

@@ -41,6 +41,7 @@ struct SolverFigures {
   float voltage_V = 0;
   float burn_depth_m = 0;  ///< Deepest dead tissue below the sheet since the start; 0 without a volume.
   std::uint32_t warnings = 0, injuries = 0;
+  std::uint32_t shortened = 0;  ///< Frames whose metal was longer than the potential's window holds; see kMetalReach.
   int substeps = 0, solves = 0, iterations = 0;
 };
 

@@ -128,8 +128,34 @@ int HeatField::Diffuse(float dt_s, Ledger* ledger) {
   if (awake_.empty()) return 0;
   WakeNeighbours();
   RebuildStaleFaces();
+  int most = 0;
+  for (Tile* tile : awake_) tile->substeps = 0;
+  for (Tile* seed : awake_) {
+    if (seed->substeps > 0) continue;
+    CollectIsland(seed);
+    most = std::max(most, DiffuseIsland(dt_s, ledger));
+  }
+  SleepCold(ledger);
+  return most;
+}
+
+void HeatField::CollectIsland(Tile* seed) {
+  // From its lowest tile on, so that the order within an island does not depend on the other islands.
+  island_.assign(1, seed);
+  seed->substeps = 1;
+  for (std::size_t n = 0; n < island_.size(); ++n) {
+    const int tx = island_[n]->tx, ty = island_[n]->ty;
+    for (Tile* other : {Find(tx - 1, ty), Find(tx + 1, ty), Find(tx, ty - 1), Find(tx, ty + 1)}) {
+      if (other == nullptr || other->state.awake == 0 || other->substeps > 0) continue;
+      other->substeps = 1;
+      island_.push_back(other);
+    }
+  }
+}
+
+int HeatField::DiffuseIsland(float dt_s, Ledger* ledger) {
   float rate = 0;
-  for (const Tile* tile : awake_) rate = std::max(rate, tile->rate);
+  for (const Tile* tile : island_) rate = std::max(rate, tile->rate);
   const float needed = std::ceil(dt_s * rate / kExplicitLimit);
   const bool stiff = !(needed <= kMaxSubsteps);
   // In wet tissue waves of four cells and longer should keep their fourth-order fluxes whole.
@@ -139,29 +165,29 @@ int HeatField::Diffuse(float dt_s, Ledger* ledger) {
   const float h = dt_s / static_cast<float>(substeps);
   if (stiff) {
     ++stiff_steps_;
-    for (Tile* tile : awake_) LimitFaces(tile, kExplicitLimit / h);
+    for (Tile* tile : island_) LimitFaces(tile, kExplicitLimit / h);
   }
   const float gain = stiff ? 1.0f : std::min(kFluxGain, kExplicitLimit / (h * rate));
   for (int n = 0; n < substeps; ++n) {
     // Halos first: a tile may then go through all of a stage while it is in the cache.
-    for (Tile* tile : awake_) ExchangeHalos(tile);
-    for (Tile* tile : awake_) {
+    for (Tile* tile : island_) ExchangeHalos(tile);
+    for (Tile* tile : island_) {
       RunStage(tile, false, h, gain, !stiff, ledger);
       ComputeMiddleTheta(tile);
     }
-    for (Tile* tile : awake_) ExchangeHalos(tile);
-    for (Tile* tile : awake_) {
+    for (Tile* tile : island_) ExchangeHalos(tile);
+    for (Tile* tile : island_) {
       RunStage(tile, true, h, gain, !stiff, ledger);
       if (stiff) Cool(tile, h, ledger);
       RefreshTheta(tile, ledger);
       Boil(tile, ledger);
-      tile->patch_stale = true;
     }
   }
-  if (stiff) {
-    for (Tile* tile : awake_) tile->faces_stale = true;
+  for (Tile* tile : island_) {
+    tile->substeps = substeps;
+    tile->patch_stale = true;
+    tile->faces_stale = tile->faces_stale || stiff;
   }
-  SleepCold(ledger);
   return substeps;
 }
 

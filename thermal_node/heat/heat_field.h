@@ -48,11 +48,12 @@ class HeatField {
   /// Wakes (and on first use creates) the tile. nullptr beyond the sheet.
   Tile* Wake(int tx, int ty);
 
-  /// One step of conduction and losses, of second order in time, in as many substeps as the fastest awake cell needs
-  /// to be stable and wet tissue to be accurate, with boiling, waking of neighbours and sleeping of cold tiles. A step
-  /// that would need more than kMaxSubsteps is stiff: cells that are too fast for it conduct as fast as it allows and
-  /// the sink is taken exactly, after each substep. So it stays bounded by what was there and conserves heat, whatever
-  /// its length. Returns the number of substeps.
+  /// One step of conduction and losses, of second order in time, with boiling, waking of neighbours and sleeping of
+  /// cold tiles. Each island of awake tiles takes as many substeps as its fastest tile needs to be stable and wet
+  /// tissue to be accurate. One that would need more than kMaxSubsteps is stiff: cells that are too fast for it conduct
+  /// as fast as it allows and the sink is taken exactly, after each substep. So it stays bounded by what was there and
+  /// conserves heat, whatever the step's length. Returns the largest number of substeps; that of a tile is in
+  /// Tile::substeps.
   int Diffuse(float dt_s, Ledger* ledger);
 
   /// Recomputes theta, its sums and extremes from the enthalpy. Quarantines bad cells.
@@ -66,6 +67,7 @@ class HeatField {
   [[nodiscard]] double Stored() const;
   /// Highest theta of awake tissue [K]; 0 when all sleep.
   [[nodiscard]] float MaxTheta() const;
+  /// Steps of islands that were stiff.
   [[nodiscard]] std::uint64_t stiff_steps() const { return stiff_steps_; }
   [[nodiscard]] std::uint64_t quarantined() const { return quarantined_; }
   /// Where the last quarantined cell was.
@@ -83,6 +85,10 @@ class HeatField {
  private:
   void BuildFaces(Tile* tile);
   void RebuildStaleFaces();
+  /// Fills island_ with the awake tiles that faces join to the seed. A link across a corner is open only where one of
+  /// the two other tiles at that corner is awake, so links join no islands that faces do not.
+  void CollectIsland(Tile* seed);
+  int DiffuseIsland(float dt_s, Ledger* ledger);
   void ExchangeHalos(Tile* tile);
   void LimitFaces(Tile* tile, float rate);
   void RunStage(Tile* tile, bool second, float dt_s, float gain, bool sink, Ledger* ledger);
@@ -105,7 +111,7 @@ class HeatField {
   Material material_;
   std::vector<std::unique_ptr<Tile>> tiles_;  ///< By index; null until first use.
   std::vector<Tile*> awake_;
-  std::vector<Tile*> scratch_;
+  std::vector<Tile*> scratch_, island_;
   std::uint64_t quarantined_ = 0, stiff_steps_ = 0;
   CellIndex last_quarantined_;
 };

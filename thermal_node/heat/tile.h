@@ -78,6 +78,7 @@ struct Tile {
   float theta_max = 0, theta_min = 0;
   float water_off = 0;         ///< Largest distance of the water from 0.5; above that it is no fraction.
   float rate = 0;              ///< The largest of cell_rate.
+  int substeps = 0;            ///< Of its island in the last step.
   bool material_stale = true;  ///< Its conductivity has changed.
   bool faces_stale = true;     ///< Its faces have to be built again.
   bool patch_stale = true;     ///< Changed since it was last drawn into a patch.

@@ -1,6 +1,7 @@
 #include "thermal_node/node/thermal_node.h"
 
 #include <optional>
+#include <string>
 
 #include "services/runtime/realtime.h"
 
@@ -160,6 +161,10 @@ void ThermalNode::FillHealth(Health* health) const {
                      {"awake_tiles", static_cast<double>(f.awake_tiles)},
                      {"quarantined_cells", static_cast<double>(f.quarantined)},
                      {"contacts_refused", static_cast<double>(f.refused)}};
+  if (f.solver.shortened > 0) {
+    health->last_error =
+        "metal longer than the window of the potential: shortened in " + std::to_string(f.solver.shortened) + " frames";
+  }
   if (f.checkpoint_full != 0) health->last_error = "checkpoint has no room for the tissue that was heated";
 }
 

@@ -209,13 +209,16 @@ PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
     const float* contact = &problem.contact[j * kWindow];
     float* q = &heat_[j * kWindow];
     RowHeat(fine, g.v, g.sigma, problem.face_s, problem.face_t, j, contact, q);
+    const double before = balance.heat;
     AddRow(contact, &problem.ground[j * kWindow], &g.v[fine.At(0, j)], q, &balance);
+    row_heat_[j] = static_cast<float>(balance.heat - before);
   }
   const auto& [in, heat, grounded] = balance;
   PotentialResult result;
   if (!(in > 0.0) || !std::isfinite(in + heat + grounded)) {
     // No contact; or the matrix held a bad number: start afresh and deliver nothing this time.
     heat_.fill(0);
+    row_heat_.fill(0);
     std::fill(g.v.begin(), g.v.end(), 0.0f);
     return result;
   }
@@ -224,7 +227,8 @@ PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
   result.imbalance = static_cast<float>(std::abs(in - out) / in);
   const auto scale = static_cast<float>(in / out);
   for (float& q : heat_) q *= scale;
-  result.heat_S = static_cast<float>(heat) * scale;
+  for (float& q : row_heat_) q *= scale;
+  result.heat_S = heat * static_cast<double>(scale);
   return result;
 }
 

@@ -57,8 +57,8 @@ double SlitLength(const ThermalSolver& solver, const Drag& drag) {
   return gone * static_cast<double>(step);
 }
 
-/// Energy and slit length against a run whose every coupling step is ten times shorter: the bound of the step from
-/// below, and with the frame also the one from above.
+/// Energy and slit length against a run whose every coupling step is ten times shorter: those that the change of the
+/// tissue ends, and with the frame also those that end with it.
 void CouplingStep(Report* report) {
   if (!report->Wants("thermal.coupling")) return;
   const scene::SceneData data = FlatScene(41, 61, 1e-3f);
@@ -72,6 +72,7 @@ void CouplingStep(Report* report) {
     ThermalSolver solver(scene);
     RunDrag(drag, kFrame_s, &solver);
     ThermalSolver fine(scene);
+    fine.source()->max_change *= 0.1f;
     fine.source()->min_step_s *= 0.1f;
     fine.source()->tolerance = 1e-4f;
     RunDrag(drag, 0.1f * kFrame_s, &fine);

@@ -92,7 +92,7 @@ void HeatCases(Report* report) {
 
 void PotentialCases(Report* report) {
   if (!report->Wants("thermal.potential_")) return;
-  const RingsResult result = SolveRings(6.3, 29.2, 1e-2f);
+  const RingsResult result = SolveRings(6.3, 29.2, kWorkingTolerance);
   report->Add("thermal.potential_window.ms", result.solve_ms_warm, "ms");
   report->Add("thermal.potential_window.cold_ms", result.solve_ms_cold, "ms");
   report->Add("thermal.potential_window.q_error_pct", 100 * result.heat_error, "%");

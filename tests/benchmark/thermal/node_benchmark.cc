@@ -6,9 +6,9 @@
 #include <numeric>
 #include <vector>
 
-#include "services/bus/in_process.h"
 #include "services/scene/build.h"
 #include "tests/benchmark/thermal/thermal_cases.h"
+#include "tests/unit/thermal/node_bus.h"
 #include "thermal_node/coupling/patch.h"
 #include "thermal_node/node/thermal_node.h"
 
@@ -28,9 +28,7 @@ class Session {
     std::filesystem::create_directories(folder_);
     checkpoint_ = std::make_unique<runtime::CheckpointFile>(folder_ / "checkpoint", scene.hash, kCheckpointLayout,
                                                             ThermalSolver::CheckpointCapacity(scene));
-    node_ = std::make_unique<ThermalNode>(
-        scene_, ThermalNode::Ports{*contact_in_, *topology_out_, *patch_out_, *event_out_, *manifest_out_},
-        checkpoint_.get(), 1);
+    node_ = std::make_unique<ThermalNode>(scene_, bus_.ports(), checkpoint_.get(), 1);
   }
   ~Session() { std::filesystem::remove_all(folder_); }
   Session(const Session&) = delete;
@@ -38,22 +36,12 @@ class Session {
 
   /// Puts the tip where the input says; to be seen by the next Step.
   void Touch(const TipInput& tip) {
-    CauteryContact contact;
+    CauteryContact contact = TouchAt(tip.path.to, tip.mode, tip.power_W, tip.path.radius_m);
     contact.stamp = {++sequence_, 1, tick_.stamp_ns};
-    contact.touching = true;
-    contact.mode = tip.mode;
-    contact.power_W = tip.power_W;
-    contact.contact_radius_m = tip.path.radius_m;
-    contact.material = tip.path.to;
-    contact.triangle = 0;
-    contact.barycentric = {1, 0, 0};
-    contact_out_->Write(contact);
+    bus_.contact_out->Write(contact);
   }
   void Step() {
-    ++tick_.index;
-    tick_.dt_s = kFrame_s;
-    tick_.session_time_s += kFrame_s;
-    tick_.stamp_ns += 10'000'000;
+    Advance(&tick_);
     node_->Step(tick_);
   }
   [[nodiscard]] const ThermalSolver& solver() const { return node_->solver(); }
@@ -61,22 +49,8 @@ class Session {
  private:
   SceneView scene_;
   std::filesystem::path folder_;
-  bus::InProcessTopic<CauteryContact> contact_topic_;
-  bus::InProcessTopic<TopologyState> topology_topic_;
-  bus::InProcessTopic<TemperaturePatch> patch_topic_;
-  bus::InProcessTopic<ThermalEvent> event_topic_;
-  bus::InProcessTopic<TickManifest> manifest_topic_;
-  std::unique_ptr<bus::Output<CauteryContact>> contact_out_ = contact_topic_.MakeOutput();
-  std::unique_ptr<bus::Input<CauteryContact>> contact_in_ = contact_topic_.MakeInput();
-  std::unique_ptr<bus::Output<TopologyState>> topology_out_ = topology_topic_.MakeOutput();
-  std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patch_out_ = patch_topic_.MakeOutput();
-  std::unique_ptr<bus::Output<ThermalEvent>> event_out_ = event_topic_.MakeOutput();
-  std::unique_ptr<bus::Output<TickManifest>> manifest_out_ = manifest_topic_.MakeOutput();
-  // Readers that keep the newest sample, as their queues on the bus do.
-  std::unique_ptr<bus::Input<TopologyState>> topology_in_ = topology_topic_.MakeInput(1);
-  std::unique_ptr<bus::Input<TemperaturePatch>> patch_in_ = patch_topic_.MakeInput(1);
-  std::unique_ptr<bus::Input<ThermalEvent>> event_in_ = event_topic_.MakeInput(4096);
-  std::unique_ptr<bus::Input<TickManifest>> manifest_in_ = manifest_topic_.MakeInput(4096);
+  NodeBus bus_;
+  std::unique_ptr<bus::Input<TemperaturePatch>> patch_in_ = bus_.patches.MakeInput(1);
   std::unique_ptr<runtime::CheckpointFile> checkpoint_;
   std::unique_ptr<ThermalNode> node_;
   Tick tick_;
@@ -93,21 +67,36 @@ void NodeCutting(Report* report) {
   // The repeats are the same to the last bit, so the median over them is the time of that frame and not of whatever
   // else the machine did meanwhile.
   std::vector<std::vector<double>> repeats(drag.frames(kFrame_s));
+  SourceStats steps;
   for (int repeat = 0; repeat < (report->quick() ? 3 : 7); ++repeat) {
     Session session(scene);
     session.Step();  // the first one publishes the whole topology
+    steps = {};
     for (int frame = 0; frame < drag.frames(kFrame_s); ++frame) {
       session.Touch(drag.At(frame, kFrame_s));
       repeats[frame].push_back(TimeMs(0, 1, [&] { session.Step(); }).front());
+      const SourceStats& stats = session.solver().source_stats();
+      steps.solves += stats.solves;
+      steps.by_change += stats.by_change;
+      steps.by_way += stats.by_way;
+      steps.by_floor += stats.by_floor;
     }
     if (repeat == 0) Picture(session.solver(), scene, drag.to - Vec2f(0, 0.004f), "scene");
   }
   std::vector<double> times;
+  times.reserve(repeats.size());
   for (const std::vector<double>& frame : repeats) times.push_back(Quantile(frame, 0.5));
   const double mean = std::accumulate(times.begin(), times.end(), 0.0) / static_cast<double>(times.size());
   report->Add("thermal.node_cutting_5mm_s.frame_ms_mean", mean, "ms");
   report->Add("thermal.node_cutting_5mm_s.frame_ms_p50", Quantile(times, 0.5), "ms");
   report->Add("thermal.node_cutting_5mm_s.frame_ms_p99", Quantile(times, 0.99), "ms");
+  // What ended the coupling steps; the others ended with their half of the frame.
+  const auto percent = [&](int count) { return 100.0 * count / steps.solves; };
+  const double frames = static_cast<double>(times.size());
+  report->Add("thermal.node_cutting_5mm_s.coupling_steps_per_frame", steps.solves / frames, "1");
+  report->Add("thermal.node_cutting_5mm_s.coupling_steps_by_change_pct", percent(steps.by_change), "%");
+  report->Add("thermal.node_cutting_5mm_s.coupling_steps_by_way_pct", percent(steps.by_way), "%");
+  report->Add("thermal.node_cutting_5mm_s.coupling_steps_by_floor_pct", percent(steps.by_floor), "%");
 }
 
 /// Where the energy of a cut of ten seconds went, at its worst moment.

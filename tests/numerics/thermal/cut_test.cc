@@ -94,7 +94,8 @@ TEST(CutPropertiesTest, CouplingStepHasConverged) {
   for (int n = 0; n < 2; ++n) {
     ThermalSolver solver(scene);
     if (n == 1) {
-      solver.source()->min_step_s = 2.5e-4f;
+      solver.source()->max_change = 0.02f;
+      solver.source()->min_step_s = 2.5e-5f;
       solver.source()->tolerance = 1e-3f;
     }
     RunDrag(Slanted(0.006f, 0.012f), kDt, &solver);
@@ -119,6 +120,26 @@ TEST(CutPropertiesTest, ALineOfMetalWidensTheSlitAcrossTheCutAndNotAlongIt) {
   const float point = width(Vec2f::Zero());
   EXPECT_NEAR(width(0.0005f * along), point, 2.5e-4f);
   EXPECT_NEAR(width(0.0005f * across), point + 0.001f, 3e-4f);
+}
+
+TEST(CutPropertiesTest, MetalThatTheWindowDoesNotHoldIsShortenedAndCounted) {
+  scene::SceneData data = FlatScene(16, 16, 1e-3f);
+  const auto run = [&](float cell_m, float half_m) {
+    data.fixed.thermal.cell_m = cell_m;
+    ThermalSolver solver(data.View());
+    Drag drag{.from = {0.007f, 0.0075f}, .to = {0.008f, 0.0075f}, .speed_m_s = 0.01f};
+    drag.half = {0, half_m};
+    RunDrag(drag, kDt, &solver);
+    EXPECT_GT(solver.ledger().joule, 0.0);
+    return std::pair(solver.figures().shortened, solver.ledger().joule);
+  };
+  EXPECT_EQ(run(1e-4f, 2e-3f).first, 0u);
+  const float most = kMetalReach * 5e-5f - Drag{}.radius_m;
+  const auto [none, fits] = run(5e-5f, 0.9999f * most);
+  const auto [all, shortened] = run(5e-5f, 2e-3f);
+  EXPECT_EQ(none, 0u);
+  EXPECT_EQ(all, 10u);
+  EXPECT_NEAR(shortened, fits, 1e-3 * fits);
 }
 
 TEST(CutPropertiesTest, GoingOverAnOldSlitAddsNoLength) {

@@ -174,6 +174,97 @@ TEST(HeatTest, HeatIsConservedAcrossTilesSleepAndLosses) {
   EXPECT_LT(ledger.dropped, 0.1 * start);
 }
 
+/// A blob of `peak` kelvin around the middle of tile (tx, ty).
+void AddBlob(HeatField* field, int tx, int ty, float peak) {
+  Ledger ledger;
+  Tile* tile = field->Wake(tx, ty);
+  for (int k = 0; k < kTileCells; ++k) {
+    const int i = k % kTile, j = k / kTile;
+    const float x = static_cast<float>(i) - 15.5f, y = static_cast<float>(j) - 15.5f;
+    tile->state.enthalpy[k] =
+        peak * std::exp(-(x * x + y * y) / 25) * field->material().HeatCapacity(tile->state.water[k]);
+  }
+  field->RefreshTheta(tile, &ledger);
+}
+
+/// The same, of tissue whose cells are dry by turns: at 0.1 mm it needs more substeps than wet tissue.
+void AddDryBlob(HeatField* field, int tx, int ty, float peak) {
+  Tile* tile = field->Wake(tx, ty);
+  for (int k = 0; k < kTileCells; k += 3) tile->state.water[k] = 0;
+  tile->material_stale = true;
+  AddBlob(field, tx, ty, peak);
+}
+
+TEST(HeatTest, EachIslandTakesItsOwnSubstepsAndTheSameBitsAsAlone) {
+  const auto make = [] { return HeatField(MakeFlatSheet(64e-3f, 16e-3f, 1e-4f), MakeMaterial(ThermalParams{})); };
+  HeatField both = make(), slow = make(), fast = make();
+  AddBlob(&both, 15, 3, 50);
+  AddBlob(&slow, 15, 3, 50);
+  AddDryBlob(&both, 2, 1, 50);
+  AddDryBlob(&fast, 2, 1, 50);
+  Ledger ledger, of_slow, of_fast;
+  for (int n = 0; n < 60; ++n) {
+    EXPECT_EQ(slow.Diffuse(0.01f, &of_slow), 1);
+    const int fastest = fast.Diffuse(0.01f, &of_fast);
+    EXPECT_GT(fastest, 1);
+    EXPECT_EQ(both.Diffuse(0.01f, &ledger), fastest);
+    EXPECT_EQ(both.Find(15, 3)->substeps, 1);
+    EXPECT_EQ(both.Find(2, 1)->substeps, fastest);
+  }
+  ASSERT_GT(slow.awake().size(), 1u);  // islands of several tiles
+  ASSERT_GT(fast.awake().size(), 1u);
+  for (const HeatField* alone : {&slow, &fast}) {
+    for (const Tile* tile : alone->awake()) {
+      const Tile* same = both.Find(tile->tx, tile->ty);
+      ASSERT_NE(same, nullptr);
+      EXPECT_EQ(same->state.enthalpy, tile->state.enthalpy);
+      EXPECT_EQ(same->state.water, tile->state.water);
+    }
+  }
+  EXPECT_NEAR(ledger.Out(), of_slow.Out() + of_fast.Out(), 1e-9 * ledger.Out());
+}
+
+TEST(HeatTest, IslandsThatMeetBecomeOneAndKeepTheHeat) {
+  HeatField field(MakeFlatSheet(32e-3f, 9.6e-3f, 1e-4f), MakeMaterial(Lossless()));
+  Ledger ledger;
+  AddDryBlob(&field, 2, 1, 55);
+  AddBlob(&field, 6, 1, 55);
+  const double start = field.Stored();
+  bool apart = false, together = false;
+  for (int n = 0; n < 3000 && !together; ++n) {
+    const int most = field.Diffuse(0.01f, &ledger);
+    ASSERT_NEAR(field.Stored() + ledger.Out(), start, 1e-6 * start);
+    const int of_dry = field.Find(2, 1)->substeps, of_wet = field.Find(6, 1)->substeps;
+    ASSERT_EQ(of_dry, most);
+    const bool bridged = field.Find(4, 1) != nullptr && field.Find(4, 1)->state.awake != 0;
+    apart = apart || (of_dry > 1 && of_wet == 1);
+    together = bridged && of_wet == of_dry;
+  }
+  EXPECT_TRUE(apart);
+  EXPECT_TRUE(together);
+}
+
+TEST(HeatTest, TilesThatTouchAtACornerOnlyAreTwoIslands) {
+  // On a sheared map, whose cells have links across corners: none leads past two sleeping tiles.
+  Sheet sheet = MakeFlatSheet(6.4e-3f, 6.4e-3f, 1e-4f);
+  SetMetric(&sheet, [](const Vec2f& /*at*/) { return SurfaceMetric{1.0f, -0.4f, 1.0f}; });
+  HeatField field(sheet, MakeMaterial(Lossless()));
+  Ledger ledger;
+  AddDryBlob(&field, 0, 0, 50);
+  Tile* first = field.Find(0, 0);
+  Tile* second = field.Wake(1, 1);
+  second->state.enthalpy[0] = 0.9f * kWakeTheta * field.material().rc_wet;  // too cold to wake its neighbours
+  second->state.enthalpy[kTileCells / 2 + kTile / 2] = 20.0f * kSleepTheta * field.material().rc_wet;
+  field.RefreshTheta(second, &ledger);
+  const double heat_of_first = first->Heat(), heat_of_second = second->Heat();
+  const int most = field.Diffuse(0.01f, &ledger);
+  ASSERT_EQ(field.awake().size(), 2u);
+  EXPECT_EQ(first->substeps, most);
+  EXPECT_LT(second->substeps, most);
+  EXPECT_NEAR(first->Heat(), heat_of_first, 1e-6 * heat_of_first);
+  EXPECT_NEAR(second->Heat(), heat_of_second, 1e-6 * heat_of_second);
+}
+
 TEST(HeatTest, BadCellIsQuarantinedAndItsNeighboursAreNot) {
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), 1e30f}) {
     HeatField field(MakeFlatSheet(9.6e-3f, 9.6e-3f, 1e-4f), MakeMaterial(ThermalParams{}));

@@ -19,7 +19,7 @@ TEST(PotentialTest, CurrentBetweenCirclesIsTheLogarithms) {
 }
 
 TEST(PotentialTest, WorkingToleranceKeepsCurrentAndHeat) {
-  const RingsResult result = SolveRings(6.3, 29.2, 1e-2f);
+  const RingsResult result = SolveRings(6.3, 29.2, kWorkingTolerance);
   EXPECT_LT(result.current_error, 0.01);
   EXPECT_LT(result.heat_error, 0.02);
 }

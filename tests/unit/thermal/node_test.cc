@@ -7,9 +7,8 @@
 #include <memory>
 #include <optional>
 
-#include "services/bus/in_process.h"
 #include "tests/numerics/thermal/flat_scene.h"
-#include "thermal_node/node/thermal_node.h"
+#include "tests/unit/thermal/node_bus.h"
 
 namespace fulcrum::thermal {
 namespace {
@@ -21,15 +20,6 @@ class ThermalNodeTest : public ::testing::Test {
         std::filesystem::temp_directory_path() / ("fulcrum_thermal_node_" + std::to_string(::getpid()) + "_" +
                                                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
     std::filesystem::create_directories(folder_);
-    physics_ = contact_topic_.MakeOutput();
-    contact_in_ = contact_topic_.MakeInput();
-    topology_out_ = topology_topic_.MakeOutput();
-    patch_out_ = patch_topic_.MakeOutput();
-    event_out_ = event_topic_.MakeOutput();
-    manifest_out_ = manifest_topic_.MakeOutput();
-    topology_in_ = topology_topic_.MakeInput(64);
-    event_in_ = event_topic_.MakeInput(1024);
-    manifest_in_ = manifest_topic_.MakeInput(4);
   }
   ~ThermalNodeTest() override { std::filesystem::remove_all(folder_); }
 
@@ -39,30 +29,18 @@ class ThermalNodeTest : public ::testing::Test {
         folder_ / "thermal_node.checkpoint", scene_.hash, kCheckpointLayout, ThermalSolver::CheckpointCapacity(scene_));
   }
   std::unique_ptr<ThermalNode> MakeNode() {
-    return std::make_unique<ThermalNode>(
-        scene_, ThermalNode::Ports{*contact_in_, *topology_out_, *patch_out_, *event_out_, *manifest_out_},
-        checkpoint_.get(), ++epoch_);
+    return std::make_unique<ThermalNode>(scene_, bus_.ports(), checkpoint_.get(), ++epoch_);
   }
 
   /// One tick with the tip at (s, 10.2 mm), energised.
   void Touch(ThermalNode* node, float s) {
-    CauteryContact contact;
+    CauteryContact contact = TouchAt({s, 0.0102f}, CauteryMode::kCut, 35, 5e-4f);
     contact.stamp = {++sequence_, 1, tick_.stamp_ns};
-    contact.touching = true;
-    contact.mode = CauteryMode::kCut;
-    contact.power_W = 35;
-    contact.contact_radius_m = 5e-4f;
-    contact.material = {s, 0.0102f};
-    contact.triangle = 0;
-    contact.barycentric = {1, 0, 0};
-    ASSERT_TRUE(physics_->Write(contact));
-    Advance(node);
+    ASSERT_TRUE(bus_.contact_out->Write(contact));
+    Step(node);
   }
-  void Advance(ThermalNode* node) {
-    ++tick_.index;
-    tick_.dt_s = 0.01;
-    tick_.session_time_s += 0.01;
-    tick_.stamp_ns += 10'000'000;
+  void Step(ThermalNode* node) {
+    Advance(&tick_);
     node->Step(tick_);
   }
   /// Cuts from s0 to s1 at 8 mm/s.
@@ -71,26 +49,13 @@ class ThermalNodeTest : public ::testing::Test {
   }
   std::optional<TopologyState> NewestTopology() {
     TopologyState state;
-    return topology_in_->TakeLatest(&state) ? std::optional(state) : std::nullopt;
+    return bus_.topology_in->TakeLatest(&state) ? std::optional(state) : std::nullopt;
   }
 
   scene::SceneData data_;
   SceneView scene_;
   std::filesystem::path folder_;
-  bus::InProcessTopic<CauteryContact> contact_topic_;
-  bus::InProcessTopic<TopologyState> topology_topic_;
-  bus::InProcessTopic<TemperaturePatch> patch_topic_;
-  bus::InProcessTopic<ThermalEvent> event_topic_;
-  bus::InProcessTopic<TickManifest> manifest_topic_;
-  std::unique_ptr<bus::Output<CauteryContact>> physics_;
-  std::unique_ptr<bus::Input<CauteryContact>> contact_in_;
-  std::unique_ptr<bus::Output<TopologyState>> topology_out_;
-  std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patch_out_;
-  std::unique_ptr<bus::Output<ThermalEvent>> event_out_;
-  std::unique_ptr<bus::Output<TickManifest>> manifest_out_;
-  std::unique_ptr<bus::Input<TopologyState>> topology_in_;
-  std::unique_ptr<bus::Input<ThermalEvent>> event_in_;
-  std::unique_ptr<bus::Input<TickManifest>> manifest_in_;
+  NodeBus bus_;
   std::unique_ptr<runtime::CheckpointFile> checkpoint_;
   Tick tick_;
   std::uint64_t sequence_ = 0;
@@ -99,14 +64,14 @@ class ThermalNodeTest : public ::testing::Test {
 
 TEST_F(ThermalNodeTest, CutGivesTopologyEventsPatchesAndMetrics) {
   auto node = MakeNode();
-  auto patches = patch_topic_.MakeInput(64);
-  Advance(node.get());
+  auto patches = bus_.patches.MakeInput(64);
+  Step(node.get());
   const auto first = NewestTopology();
   ASSERT_TRUE(first);  // late joiners always find one
   EXPECT_EQ(first->revision, 0u);
   EXPECT_EQ(first->scene_hash, scene_.hash);
   Cut(node.get(), 0.010f, 0.020f);
-  for (int n = 0; n < 10; ++n) Advance(node.get());
+  for (int n = 0; n < 10; ++n) Step(node.get());
 
   const auto cut = NewestTopology();
   ASSERT_TRUE(cut);
@@ -120,7 +85,7 @@ TEST_F(ThermalNodeTest, CutGivesTopologyEventsPatchesAndMetrics) {
   std::vector<int> seen(16, 0);
   ThermalEvent event;
   std::uint64_t last = 0;
-  while (event_in_->TakeNext(&event)) {
+  while (bus_.event_in->TakeNext(&event)) {
     ++seen[static_cast<int>(event.kind)];
     EXPECT_EQ(event.stamp.sequence, ++last);
   }
@@ -165,7 +130,7 @@ TEST_F(ThermalNodeTest, RestartGoesOnWithTheSameTopologyAndHeat) {
   node = MakeNode();
   EXPECT_TRUE(node->restored());
   EXPECT_NEAR(node->solver().field().Stored(), stored, 0.3 * stored);  // at most 0.2 s older
-  Advance(node.get());
+  Step(node.get());
   const auto after = NewestTopology();
   ASSERT_TRUE(after);
   EXPECT_EQ(after->revision, before->revision);
@@ -183,7 +148,7 @@ TEST_F(ThermalNodeTest, PaperModelRunsInTheSameNodeAndComesBack) {
   scene_.thermal.model = ThermalModel::kPaper;
   OpenCheckpoint();
   auto node = MakeNode();
-  auto patches = patch_topic_.MakeInput(64);
+  auto patches = bus_.patches.MakeInput(64);
   Cut(node.get(), 0.010f, 0.016f);
   const auto before = NewestTopology();
   ASSERT_TRUE(before);
@@ -197,7 +162,7 @@ TEST_F(ThermalNodeTest, PaperModelRunsInTheSameNodeAndComesBack) {
   OpenCheckpoint();
   node = MakeNode();
   EXPECT_TRUE(node->restored());
-  Advance(node.get());
+  Step(node.get());
   const auto after = NewestTopology();
   ASSERT_TRUE(after);
   EXPECT_EQ(after->revision, before->revision);
@@ -206,21 +171,21 @@ TEST_F(ThermalNodeTest, PaperModelRunsInTheSameNodeAndComesBack) {
 }
 
 TEST_F(ThermalNodeTest, IdleNodeSendsNothingButItsManifest) {
-  auto patches = patch_topic_.MakeInput(4);
+  auto patches = bus_.patches.MakeInput(4);
   auto node = MakeNode();
-  for (int n = 0; n < 300; ++n) Advance(node.get());
-  EXPECT_EQ(topology_out_->stats().written, 1u);
-  EXPECT_EQ(patch_out_->stats().written, 0u);
-  EXPECT_EQ(event_out_->stats().written, 0u);
-  EXPECT_EQ(manifest_out_->stats().written, 300u);
+  for (int n = 0; n < 300; ++n) Step(node.get());
+  EXPECT_EQ(bus_.topology_out->stats().written, 1u);
+  EXPECT_EQ(bus_.patch_out->stats().written, 0u);
+  EXPECT_EQ(bus_.event_out->stats().written, 0u);
+  EXPECT_EQ(bus_.manifest_out->stats().written, 300u);
 }
 
 TEST_F(ThermalNodeTest, WithoutReadersNoPatchIsBuiltAndALateReaderGetsAll) {
   auto node = MakeNode();
   Cut(node.get(), 0.010f, 0.012f);
-  EXPECT_EQ(patch_out_->stats().written, 0u);
-  auto patches = patch_topic_.MakeInput(4);
-  for (int n = 0; n < 8; ++n) Advance(node.get());
+  EXPECT_EQ(bus_.patch_out->stats().written, 0u);
+  auto patches = bus_.patches.MakeInput(4);
+  for (int n = 0; n < 8; ++n) Step(node.get());
   TemperaturePatch patch;
   EXPECT_TRUE(patches->TakeLatest(&patch));
 }
@@ -232,7 +197,7 @@ TEST_F(ThermalNodeTest, SameInputsGiveTheSameHashes) {
     auto node = MakeNode();
     Cut(node.get(), 0.010f, 0.014f);
     TickManifest manifest;
-    EXPECT_TRUE(manifest_in_->TakeLatest(&manifest));
+    EXPECT_TRUE(bus_.manifest_in->TakeLatest(&manifest));
     EXPECT_EQ(manifest.node, NodeId::kThermal);
     EXPECT_EQ(manifest.consumed.at(0).sequence, sequence_);
     return manifest.state_hash;
@@ -242,10 +207,10 @@ TEST_F(ThermalNodeTest, SameInputsGiveTheSameHashes) {
 
 TEST_F(ThermalNodeTest, ContactOfNoNumbersIsCountedAndChangesNothing) {
   auto node = MakeNode();
-  Advance(node.get());
+  Step(node.get());
   const std::uint64_t before = node->solver().FullHash();
   for (const float bad : {NAN, INFINITY, -INFINITY}) Touch(node.get(), bad);
-  EXPECT_EQ(contact_in_->stats().rejected, 3u);
+  EXPECT_EQ(bus_.contact_in->stats().rejected, 3u);
   EXPECT_EQ(node->solver().FullHash(), before);
   Touch(node.get(), 0.01f);  // and the next good one is used
   EXPECT_TRUE(node->solver().stepped());

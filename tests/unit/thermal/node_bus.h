@@ -1,0 +1,55 @@
+// In-process topics of a ThermalNode with their other ends.
+#pragma once
+
+#include <memory>
+
+#include "services/bus/in_process.h"
+#include "thermal_node/node/thermal_node.h"
+
+namespace fulcrum::thermal {
+
+struct NodeBus {
+  bus::InProcessTopic<CauteryContact> contacts;
+  bus::InProcessTopic<TopologyState> topology;
+  bus::InProcessTopic<TemperaturePatch> patches;
+  bus::InProcessTopic<ThermalEvent> events;
+  bus::InProcessTopic<TickManifest> manifests;
+  std::unique_ptr<bus::Output<CauteryContact>> contact_out = contacts.MakeOutput();
+  std::unique_ptr<bus::Input<CauteryContact>> contact_in = contacts.MakeInput();
+  std::unique_ptr<bus::Output<TopologyState>> topology_out = topology.MakeOutput();
+  std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patch_out = patches.MakeOutput();
+  std::unique_ptr<bus::Output<ThermalEvent>> event_out = events.MakeOutput();
+  std::unique_ptr<bus::Output<TickManifest>> manifest_out = manifests.MakeOutput();
+  // Of patches a test makes its own reader: without one the node draws none.
+  std::unique_ptr<bus::Input<TopologyState>> topology_in = topology.MakeInput(64);
+  std::unique_ptr<bus::Input<ThermalEvent>> event_in = events.MakeInput(4096);
+  std::unique_ptr<bus::Input<TickManifest>> manifest_in = manifests.MakeInput(4);
+
+  /// The node's.
+  [[nodiscard]] ThermalNode::Ports ports() const {
+    return {*contact_in, *topology_out, *patch_out, *event_out, *manifest_out};
+  }
+};
+
+/// Metal on the membrane at a place, energised.
+inline CauteryContact TouchAt(const Vec2f& material, CauteryMode mode, float power_W, float radius_m) {
+  CauteryContact contact;
+  contact.touching = true;
+  contact.mode = mode;
+  contact.power_W = power_W;
+  contact.contact_radius_m = radius_m;
+  contact.material = material;
+  contact.triangle = 0;
+  contact.barycentric = {1, 0, 0};
+  return contact;
+}
+
+/// The next frame of 10 ms.
+inline void Advance(Tick* tick) {
+  ++tick->index;
+  tick->dt_s = 0.01;
+  tick->session_time_s += 0.01;
+  tick->stamp_ns += 10'000'000;
+}
+
+}  // namespace fulcrum::thermal
