@@ -57,12 +57,15 @@ bool Session(benchmark::Report* report) {
   const bool begun = testing::WaitFor(kPatience_s, [&] {
     const auto nodes = cart.nodes();
     if (nodes.contains("recorder")) recorder = nodes.at("recorder");
-    return recorder > 0 && cart.Said().find("t 2.") != std::string::npos;
+    // Its progress comes every two seconds.
+    return recorder > 0 && cart.Said().find(" s · ") != std::string::npos;
   });
   if (!begun) return false;
+  constexpr auto kSettle = std::chrono::seconds(2);
+  std::this_thread::sleep_for(kSettle);
   const double cpu_begin_s = CpuTime(recorder);
   const std::int64_t begin_ns = MonotonicNs();
-  std::this_thread::sleep_for(std::chrono::duration<double>(seconds - 5));
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds - 6));
   const double used_s = CpuTime(recorder) - cpu_begin_s;
   report->Add("record.cpu_pct", 100 * used_s / Seconds(MonotonicNs() - begin_ns), "%");
   if (!cart.WaitForEnd(kPatience_s)) return false;

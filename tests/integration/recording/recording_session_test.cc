@@ -21,7 +21,7 @@ constexpr int kCartDomain = 57, kProbeDomain = 58;
 TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
   // Long enough for the hook to have burnt something.
   Cart cart("small", kCartDomain, {"--record", "--seconds", "3.5"});
-  ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.Said().find("t 0.") != std::string::npos; })) << cart.Said();
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.Said().find(" s · ") != std::string::npos; })) << cart.Said();
   // A command and its reply: this session keeps nothing for a dump, so it is refused.
   EXPECT_EQ(Program("fulcrum", {"dump", "--domain", std::to_string(kCartDomain)}).End(0), 1);
   EXPECT_EQ(cart.WaitForEnd(60), 0) << cart.Said();
