@@ -13,6 +13,10 @@ fulcrum_fail() {
 fulcrum_packages() {
   local wanted missing
   mapfile -t wanted < <(sed -e 's/#.*//' -e 's/[[:space:]]//g' -e '/^$/d' "$fulcrum_root/deploy/packages.txt")
+  # Node.js from elsewhere brings an npm of its own, which Debian's would conflict with.
+  if command -v npm >/dev/null; then
+    mapfile -t wanted < <(printf '%s\n' "${wanted[@]}" | grep -vx -e nodejs -e npm)
+  fi
   # Names of virtual or unknown packages make dpkg-query fail; what it printed is still right.
   mapfile -t missing < <(comm -23 <(printf '%s\n' "${wanted[@]}" | sort -u) \
     <(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "${wanted[@]}" 2>/dev/null | sed -n 's/^installed //p' | sort -u))

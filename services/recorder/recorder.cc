@@ -141,9 +141,9 @@ void Recorder::Flush(std::int64_t now_ns) {
 
 void Recorder::EndChunk() {
   if (chunk_.size() == 0) return;
-  recording::PackedChunk chunk = chunk_.Pack();
+  chunk_.Pack(&packed_);
   if (file_) {
-    file_->Append(chunk);
+    file_->Append(packed_);
     const std::lock_guard lock(mutex_);
     error_ = file_->error();
     file_B_ = file_->bytes_written();
@@ -152,15 +152,15 @@ void Recorder::EndChunk() {
     }
   }
   in_chunk_ = {};
-  if (settings_.keep_s > 0) Keep(std::move(chunk));
+  if (settings_.keep_s > 0) Keep();
 }
 
-void Recorder::Keep(recording::PackedChunk chunk) {
-  const std::uint64_t newest_ns = chunk.last_ns;
-  kept_B_ += chunk.bytes.size();
-  kept_.push_back(std::move(chunk));
+void Recorder::Keep() {
+  kept_B_ += packed_.bytes.size();
+  kept_.push_back(packed_);
   const auto is_old = [&](const recording::PackedChunk& oldest) {
-    return kept_B_ > settings_.keep_B || 1e-9 * static_cast<double>(newest_ns - oldest.last_ns) > settings_.keep_s;
+    return kept_B_ > settings_.keep_B ||
+           1e-9 * static_cast<double>(packed_.last_ns - oldest.last_ns) > settings_.keep_s;
   };
   while (kept_.size() > 1 && is_old(kept_.front())) {
     kept_B_ -= kept_.front().bytes.size();

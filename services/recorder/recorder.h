@@ -28,10 +28,10 @@
 namespace fulcrum::recorder {
 
 struct RecorderSettings {
-  std::filesystem::path file;                   ///< Empty: nothing is written but dumps.
-  double keep_s = 0;                            ///< For dumps: so much of the newest past is kept in memory [s].
-  std::size_t keep_B = std::size_t{512} << 20;  ///< But no more than this.
-  std::string library;                          ///< Who writes: "fulcrum 0.1.0".
+  std::filesystem::path file;                 ///< Empty: nothing is written but dumps.
+  double keep_s = 0;                          ///< For dumps: so much of the newest past is kept in memory [s].
+  std::size_t keep_B = std::size_t{1} << 30;  ///< But no more than this.
+  std::string library;                        ///< Who writes: "fulcrum 0.1.0".
   /// What a file tells of the session, each a metadata record.
   std::map<std::string, recording::TextMap> metadata;
   /// What a file tells of a writer, beside its guid: called once for each, on the writing thread.
@@ -102,7 +102,7 @@ class Recorder {
 
   void AddNewChannels();
   void EndChunk();
-  void Keep(recording::PackedChunk chunk);
+  void Keep();
   /// Metadata into a new file.
   void Introduce(recording::McapWriter* file) const;
   /// Channels from number `first` on, with the schemas that the file does not have yet.
@@ -125,6 +125,7 @@ class Recorder {
   std::array<std::uint16_t, kTopicCount> schemas_{};  ///< In `file_`; 0: not yet.
   std::vector<Channel> channels_;                     ///< By writer.
   recording::ChunkBuilder chunk_;
+  recording::PackedChunk packed_;
   std::int64_t chunk_begin_ns_ = 0;
   Losses in_chunk_{};  ///< Samples in the open chunk: lost if it cannot be written.
   std::deque<recording::PackedChunk> kept_;

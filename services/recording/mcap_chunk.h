@@ -26,7 +26,8 @@ struct PackedChunk {
   std::vector<Part> parts;
 };
 
-/// Collects messages. Memory is kept from chunk to chunk.
+/// Collects messages. Allocates nothing once the buffers have grown: fresh megabytes several times a second would cost
+/// more than packing them.
 class ChunkBuilder {
  public:
   ChunkBuilder();
@@ -37,11 +38,11 @@ class ChunkBuilder {
   void Add(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns, std::uint64_t publish_time_ns,
            std::span<const std::byte> data);
   [[nodiscard]] std::size_t size() const { return messages_.size(); }
-  /// Compresses what was added and begins anew.
-  [[nodiscard]] PackedChunk Pack();
+  /// Compresses what was added into `chunk`, whose memory is used again, and begins anew.
+  void Pack(PackedChunk* chunk);
 
   /// A chunk of this size is worth ending.
-  static constexpr std::size_t kChunkBytes = std::size_t{1} << 20;
+  static constexpr std::size_t kChunkBytes = std::size_t{2} << 20;
 
  private:
   struct IndexEntry {

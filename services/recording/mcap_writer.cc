@@ -111,7 +111,8 @@ void McapWriter::Write(std::uint16_t channel, std::uint32_t sequence, std::uint6
 
 void McapWriter::EndChunk() {
   if (chunk_.size() > 0) {
-    Append(chunk_.Pack());
+    chunk_.Pack(&packed_);
+    Append(packed_);
   }
 }
 

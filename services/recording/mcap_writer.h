@@ -70,6 +70,7 @@ class McapWriter {
   std::uint64_t offset_ = 0, message_count_ = 0;
   std::uint64_t first_ns_ = 0, last_ns_ = 0;  ///< Of all messages.
   ChunkBuilder chunk_;
+  PackedChunk packed_;
   std::vector<std::uint8_t> record_;
   std::vector<std::uint8_t> schemas_, channels_;  ///< Their records, again for the summary.
   std::uint16_t schema_count_ = 0;

@@ -79,10 +79,78 @@ ExitCode Cat(const po::variables_map& values, const Files& files) {
   return ExitCode::kDone;
 }
 
+void AddExportOptions(po::options_description* options) {
+  AddFilter(options);
+  options->add_options()("out", po::value<std::string>()->value_name("DIR"),
+                         "folder of the tables (default: beside it)");
+}
+
+ExitCode Export(const po::variables_map& values, const Files& files) {
+  for (const fs::path& file : files) {
+    const fs::path beside = fs::path(file).replace_extension() += "-tables";
+    const fs::path folder = values.count("out") != 0 ? fs::path(values["out"].as<std::string>()) : beside;
+    for (const fs::path& table : log_tools::ExportTables(file, FilterOf(values), folder)) {
+      std::cout << table.string() << '\n';
+    }
+  }
+  return ExitCode::kDone;
+}
+
+ExitCode Verify(const po::variables_map&, const Files& files) {
+  ExitCode worst = ExitCode::kDone;
+  for (const fs::path& file : files) {
+    worst = std::max(worst, log_tools::Verify(file, &std::cout));
+  }
+  return worst;
+}
+
+void AddDiffOptions(po::options_description* options) {
+  AddFilter(options);
+  options->add_options()("without", po::value<std::string>()->value_name("FIELD")->default_value(""),
+                         "leave this field out wherever it is, for example stamp");
+}
+
+ExitCode Diff(const po::variables_map& values, const Files& files) {
+  if (files.size() != 2) {
+    throw InputError("diff compares two files; see fulcrum log diff --help");
+  }
+  return log_tools::Diff(files[0], files[1], FilterOf(values), values["without"].as<std::string>(), &std::cout);
+}
+
+void AddRecoverOptions(po::options_description* options) {
+  options->add_options()("out", po::value<std::string>()->value_name("FILE"),
+                         "the whole file (default: FILE with -recovered in its name)");
+}
+
+ExitCode Recover(const po::variables_map& values, const Files& files) {
+  if (values.count("out") != 0 && files.size() != 1) {
+    throw InputError("--out names one file: give one to recover");
+  }
+  for (const fs::path& file : files) {
+    fs::path mended = file;
+    mended.replace_filename(file.stem().string() + "-recovered" + file.extension().string());
+    if (values.count("out") != 0) {
+      mended = values["out"].as<std::string>();
+    }
+    for (const std::string& wrong : log_tools::Recover(file, mended)) {
+      std::cout << "! " << wrong << '\n';
+    }
+    std::cout << mended.string() << '\n';
+  }
+  return ExitCode::kDone;
+}
+
 constexpr std::array kTools{
     Tool{"info", "info FILE...", "What a recording holds: session, topics, rates, losses.", NoOptions, Info},
     Tool{"list", "list [FOLDER...]", "The recordings in a folder (default: out), oldest first.", NoOptions, List},
     Tool{"cat", "cat FILE... [options]", "The messages as JSON, one a line.", AddCatOptions, Cat},
+    Tool{"export", "export FILE... [options]", "One CSV table a topic.", AddExportOptions, Export},
+    Tool{"verify", "verify FILE...",
+         "Checksums, indexes, decoding, gate, sequences; exit code 1 when anything is wrong.", NoOptions, Verify},
+    Tool{"diff", "diff FILE FILE [options]", "First difference of each topic; exit code 1 when there is one.",
+         AddDiffOptions, Diff},
+    Tool{"recover", "recover FILE... [options]", "What can be read of a cut or damaged file into a whole one.",
+         AddRecoverOptions, Recover},
 };
 
 void PrintTools() {

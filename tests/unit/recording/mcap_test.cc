@@ -57,6 +57,8 @@ class McapTest : public testing::Test {
     return {std::istreambuf_iterator<char>(in), {}};
   }
   void Put(std::span<const std::uint8_t> bytes) const {
+    // A new file each time: some file systems write one that is replaced to the disk at once.
+    std::filesystem::remove(file_);
     std::ofstream out(file_, std::ios::binary | std::ios::trunc);
     out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }

@@ -1,0 +1,178 @@
+// The recorder.
+//
+//   record.cpu_pct                  of one core, of the process, in the middle of a session of the built-in scene
+//   record.lost_samples             in that whole session, by the sequences in the file
+//   record.file_MB_per_s            what that session writes
+//   record.readable_after_kill_pct  samples older than a second at kill -9 of the recorder that its file gives back
+//   record.write_MB_per_s           frames, patches and tool states as such a session has them, as fast as they are
+//                                   packed and written into a file in the folder for temporary files
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "services/log_tools/sequence_gaps.h"
+#include "services/log_tools/tools.h"
+#include "services/recorder/recorder.h"
+#include "services/runtime/cyclic_thread.h"
+#include "tests/benchmark/report.h"
+#include "tests/support/cart.h"
+#include "tests/support/recorder_probe.h"
+
+namespace fulcrum {
+namespace {
+
+namespace fs = std::filesystem;
+using runtime::MonotonicNs;
+
+constexpr int kCartDomain = 59, kProbeDomain = 60;
+constexpr double kPatience_s = 60;
+
+double Seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+
+/// CPU time that a process has used [s]; negative when it is gone.
+double CpuTime(pid_t pid) {
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+  std::string line;
+  if (!std::getline(stat, line)) return -1;
+  std::istringstream fields(line.substr(line.rfind(')') + 1));
+  std::string skipped;
+  constexpr int kBeforeUserTime = 11;
+  for (int i = 0; i < kBeforeUserTime; ++i) fields >> skipped;
+  double user = 0, system = 0;
+  fields >> user >> system;
+  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
+
+/// False when the session did not come about.
+bool Session(benchmark::Report* report) {
+  const double seconds = report->quick() ? 15 : 60;
+  testing::Cart cart("built-in", kCartDomain, {"--record", "--seconds", std::to_string(seconds)});
+  pid_t recorder = -1;
+  const bool begun = testing::WaitFor(kPatience_s, [&] {
+    const auto nodes = cart.nodes();
+    if (nodes.contains("recorder")) recorder = nodes.at("recorder");
+    // Its progress comes every two seconds.
+    return recorder > 0 && cart.Said().find(" s · ") != std::string::npos;
+  });
+  if (!begun) return false;
+  constexpr auto kSettle = std::chrono::seconds(2);
+  std::this_thread::sleep_for(kSettle);
+  const double cpu_begin_s = CpuTime(recorder);
+  const std::int64_t begin_ns = MonotonicNs();
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds - 6));
+  const double used_s = CpuTime(recorder) - cpu_begin_s;
+  report->Add("record.cpu_pct", 100 * used_s / Seconds(MonotonicNs() - begin_ns), "%");
+  if (!cart.WaitForEnd(kPatience_s)) return false;
+  const fs::path file = cart.session() / "recording.mcap";
+  log_tools::Recording recording(file);
+  log_tools::SequenceGaps gaps;
+  log_tools::Entry entry;
+  std::uint64_t lost = 0, samples = 0;
+  double end_s = 0;
+  while (recording.Next(&entry)) {
+    ++samples;
+    lost += gaps.Before(entry.message);
+    end_s = std::max(end_s, entry.time_s);
+  }
+  report->Add("record.lost_samples", static_cast<double>(lost), "samples");
+  report->Add("record.samples", static_cast<double>(samples), "samples");
+  report->Add("record.file_MB_per_s", 1e-6 * static_cast<double>(fs::file_size(file)) / end_s, "MB/s");
+  return true;
+}
+
+void Kills(benchmark::Report* report) {
+  testing::RecorderProbe probe(kProbeDomain);
+  std::uint64_t due = 0, read = 0, missed = 0;
+  for (int kill = 0; kill < (report->quick() ? 4 : 20); ++kill) {
+    // Kills at all phases of a chunk.
+    const auto result = probe.RecordAndKill(1.6 + 0.037 * kill);
+    due += result.due;
+    read += result.read;
+    missed += result.missed;
+  }
+  report->Add("record.readable_after_kill_pct", 100.0 * static_cast<double>(read) / static_cast<double>(due), "%");
+  report->Add("record.readable_after_kill_missed", static_cast<double>(missed), "samples");
+}
+
+/// A second of the cart: bytes that pack about as the real ones do.
+class Second {
+ public:
+  Second() {
+    std::uint64_t noise = 1;
+    frame_.resize(307'296);
+    for (std::size_t i = 0; i < frame_.size(); ++i) {
+      noise = noise * 6364136223846793005u + 1442695040888963407u;
+      // Two of three bytes of a position are noise; a fifth of the frame is room for more vertices.
+      if (i % 4 < 3 && i < frame_.size() * 4 / 5) frame_[i] = static_cast<std::byte>(noise >> 56);
+    }
+    patch_.resize(262'184);
+    for (std::size_t i = 0; i < patch_.size(); ++i) patch_[i] = static_cast<std::byte>(i % 4 == 0 ? (i >> 8) & 31u : 0);
+    tool_.resize(168);
+  }
+  std::uint64_t Receive(recorder::Recorder* recorder) {
+    std::uint64_t bytes = 0;
+    const auto put = [&](TopicId topic, const std::vector<std::byte>& body, std::uint64_t* sequence) {
+      recorder->Receive(
+          {topic, {1}, ++*sequence, 0, head_, body}, [] { return true; }, MonotonicNs());
+      bytes += head_.size() + body.size();
+    };
+    for (int ms = 0; ms < 1000; ++ms) {
+      put(TopicId::kToolState, tool_, &tools_);
+      if (ms % 10 == 0) put(TopicId::kTissueFrame, frame_, &frames_);
+      if (ms % 40 == 0) put(TopicId::kTemperaturePatch, patch_, &patches_);
+      if (ms % 50 == 0) recorder->Flush(MonotonicNs());
+    }
+    return bytes;
+  }
+
+ private:
+  const std::array<std::byte, 4> head_{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
+  std::vector<std::byte> frame_, patch_, tool_;
+  std::uint64_t frames_ = 0, patches_ = 0, tools_ = 0;
+};
+
+void Write(benchmark::Report* report) {
+  const fs::path file = fs::temp_directory_path() / ("bench_recording." + std::to_string(::getpid()));
+  recorder::RecorderSettings settings;
+  settings.file = file;
+  Second second;
+  std::vector<double> rates;
+  for (int repeat = 0; repeat < (report->quick() ? 3 : 9); ++repeat) {
+    recorder::Recorder recorder(settings);
+    const std::int64_t begin_ns = MonotonicNs();
+    std::uint64_t bytes = 0;
+    for (int i = 0; i < 5; ++i) bytes += second.Receive(&recorder);
+    recorder.Close(MonotonicNs());
+    rates.push_back(1e-6 * static_cast<double>(bytes) / Seconds(MonotonicNs() - begin_ns));
+    if (!recorder.stats().error.empty()) std::fprintf(stderr, "bench_recording: %s\n", recorder.stats().error.c_str());
+  }
+  report->Add("record.write_MB_per_s", benchmark::Quantile(rates, 0.5), "MB/s");
+  std::error_code ignored;
+  fs::remove(file, ignored);
+}
+
+int Run(benchmark::Report* report) {
+  if (report->Wants("record.write_MB_per_s")) Write(report);
+  if (report->Wants("record.readable_after_kill")) Kills(report);
+  for (const char* key : {"record.cpu_pct", "record.lost_samples", "record.samples", "record.file_MB_per_s"}) {
+    if (!report->Wants(key)) continue;
+    if (Session(report)) break;
+    std::fprintf(stderr, "bench_recording: the session did not begin or end within %.0f s\n", kPatience_s);
+    return 1;
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace fulcrum
+
+int main(int argc, char** argv) {
+  fulcrum::benchmark::Report report(argc, argv);
+  return fulcrum::Run(&report);
+}

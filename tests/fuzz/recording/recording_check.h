@@ -1,0 +1,62 @@
+// What must hold for any bytes in a recording's file: reading, decoding and mending end without a crash, nothing is
+// read that the file has no room for, and what was mended reads as a whole file with the same messages.
+#pragma once
+
+#include <unistd.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <span>
+#include <string>
+
+#include "services/core/error.h"
+#include "services/log_tools/recording.h"
+#include "services/log_tools/tools.h"
+#include "services/recording/mcap_index.h"
+
+namespace fulcrum::log_tools {
+
+struct RecordingVerdict {
+  std::string broken;  ///< Empty: all holds.
+  std::uint64_t messages = 0, decoded = 0, faults = 0;
+};
+
+/// Files lie in `folder`, best one in memory: a file system on a disk would be what is tested.
+inline RecordingVerdict CheckRecording(std::span<const std::uint8_t> bytes, const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "fuzzed.mcap", mended = folder / "mended.mcap";
+  std::filesystem::remove(file);
+  std::filesystem::remove(mended);
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  RecordingVerdict verdict;
+  try {
+    const auto read = [](const std::filesystem::path& from, RecordingVerdict* counts) {
+      Recording recording(from);
+      Entry entry;
+      while (recording.Next(&entry)) {
+        ++counts->messages;
+        const bool decoded =
+            entry.source->topic && WithDecoded(*entry.source->topic, entry.message.data, [](const auto&) {});
+        counts->decoded += decoded ? 1 : 0;
+      }
+      counts->faults = recording.reader().faults().size();
+    };
+    read(file, &verdict);
+    std::uint64_t indexed = 0;
+    (void)recording::CheckIndex(file, &indexed);
+    (void)Recover(file, mended);
+    RecordingVerdict whole;
+    read(mended, &whole);
+    if (whole.faults != 0) verdict.broken = "what was mended has faults";
+    if (whole.messages != verdict.messages || whole.decoded != verdict.decoded) {
+      verdict.broken = "what was mended has other messages";
+    }
+    if (!recording::CheckIndex(mended, &indexed).empty()) verdict.broken = "what was mended has a wrong index";
+  } catch (const InputError&) {
+    // Told to the user.
+  }
+  return verdict;
+}
+
+}  // namespace fulcrum::log_tools

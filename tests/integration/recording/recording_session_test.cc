@@ -1,0 +1,80 @@
+// Recordings of real processes over the real bus.
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "services/bus/gate.h"
+#include "services/log_tools/tools.h"
+#include "tests/support/cart.h"
+#include "tests/support/recorder_probe.h"
+
+namespace fulcrum {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::Cart;
+using testing::Program;
+using testing::RecorderProbe;
+
+constexpr int kCartDomain = 57, kProbeDomain = 58;
+
+TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
+  // Long enough for the hook to have burnt something.
+  Cart cart("small", kCartDomain, {"--record", "--seconds", "3.5"});
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.Said().find(" s · ") != std::string::npos; })) << cart.Said();
+  // A command and its reply: this session keeps nothing for a dump, so it is refused.
+  EXPECT_EQ(Program("fulcrum", {"dump", "--domain", std::to_string(kCartDomain)}).End(0), 1);
+  EXPECT_EQ(cart.WaitForEnd(60), 0) << cart.Said();
+  EXPECT_NE(cart.Said().find("recording.mcap"), std::string::npos) << "the report names it\n" << cart.Said();
+  const fs::path file = cart.session() / "recording.mcap";
+
+  log_tools::Recording recording(file);
+  log_tools::Entry entry;
+  std::map<std::string, int> decoded;
+  std::uint64_t scene_hash = 0;
+  while (recording.Next(&entry)) {
+    ASSERT_TRUE(entry.source->topic.has_value()) << entry.source->name;
+    EXPECT_FALSE(entry.source->node.empty()) << entry.source->name;
+    const bool good = log_tools::WithDecoded(*entry.source->topic, entry.message.data, [&](const auto& message) {
+      EXPECT_TRUE(bus::PassesGate(message)) << entry.source->name;
+      if constexpr (std::is_same_v<decltype(message), const SceneManifest&>) scene_hash = message.scene_hash;
+    });
+    ASSERT_TRUE(good) << entry.source->name;
+    ++decoded[entry.source->name];
+  }
+  for (const bus::TopicRole& role : bus::kTopicRoles) {
+    EXPECT_GE(decoded[std::string(bus::TopicLabel(role.id))], 1) << role.name;
+  }
+  EXPECT_GT(decoded["ToolState"], 2500) << "1 kHz";
+  EXPECT_GT(decoded["TissueFrame"], 200) << "100 Hz";
+  EXPECT_TRUE(recording.reader().closed());
+  EXPECT_TRUE(recording.reader().faults().empty());
+  const auto& metadata = recording.reader().metadata();
+  EXPECT_EQ(std::stoull(metadata.at("session").at("scene_hash"), nullptr, 16), scene_hash);
+  EXPECT_EQ(metadata.at("session").at("scene"), "small");
+  EXPECT_NE(metadata.at("cart").at("yaml").find("physics_node"), std::string::npos);
+
+  // For the readers of others.
+  fs::copy_file(file, fs::path(FULCRUM_BIN_DIR).parent_path() / "recorded_session.mcap",
+                fs::copy_options::overwrite_existing);
+}
+
+TEST(KilledRecorder, LeavesAFileWithAllThatIsOlderThanASecond) {
+  RecorderProbe probe(kProbeDomain);
+  for (int kill = 0; kill < 2; ++kill) {
+    const RecorderProbe::Result result = probe.RecordAndKill(1.7 + 0.13 * kill);
+    EXPECT_GT(result.due, 400u);
+    EXPECT_EQ(result.read, result.due);
+    const fs::path mended = result.file.parent_path() / ("mended" + std::to_string(kill) + ".mcap");
+    EXPECT_FALSE(log_tools::Recover(result.file, mended).empty()) << "it was not closed";
+    log_tools::Recording whole(mended);
+    log_tools::Entry entry;
+    while (whole.Next(&entry)) {
+    }
+    EXPECT_TRUE(whole.reader().closed());
+    EXPECT_TRUE(whole.reader().faults().empty());
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum

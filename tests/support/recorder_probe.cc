@@ -1,0 +1,139 @@
+#include "tests/support/recorder_probe.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "services/bus/convert/cdr.h"
+#include "services/bus/dds/shared_memory.h"
+#include "services/bus/topics.h"
+#include "services/recording/mcap_reader.h"
+#include "services/runtime/cyclic_thread.h"
+#include "services/scene/build.h"
+#include "services/scene/scene_file.h"
+#include "tests/support/cart.h"
+
+namespace fulcrum::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using runtime::MonotonicNs;
+
+constexpr double kPatience_s = 20;
+constexpr std::int64_t kPromise_ns = 1'000'000'000;  ///< What is older than this is in the file.
+constexpr int kFrameEvery = 10;                      ///< ToolStates.
+constexpr std::uint32_t kVertices = 20'000;
+
+}  // namespace
+
+RecorderProbe::RecorderProbe(int domain)
+    : domain_(domain),
+      folder_(fs::temp_directory_path() / ("recorder-probe-" + std::to_string(::getpid()))),
+      scene_(folder_ / "scene"),
+      tool_stamper_(MonotonicNs()),
+      frame_stamper_(MonotonicNs()) {
+  fs::create_directories(folder_);
+  manifest_.scene_hash = scene::WriteSceneFile(scene::BuildProcedural(scene::Small()), "name: small\n", scene_);
+  participant_ = std::make_unique<bus::DdsParticipant>(
+      bus::DdsSettings{.domain = domain, .node_name = "probe", .shared_memory = {}});
+  manifests_ = participant_->MakeOutput<SceneManifest>();
+  tools_ = participant_->MakeOutput<ToolState>();
+  frames_ = participant_->MakeOutput<TissueFrame>();
+  manifest_.scene_name = "small";
+  manifest_.session_id = "probe";
+  manifest_.session_start_ns = MonotonicNs();
+  manifest_.stamp = {1, static_cast<std::uint64_t>(manifest_.session_start_ns), manifest_.session_start_ns};
+  manifests_->Write(manifest_);
+}
+
+RecorderProbe::~RecorderProbe() {
+  manifests_.reset();
+  tools_.reset();
+  frames_.reset();
+  participant_.reset();
+  bus::RemoveSharedMemory(bus::SharedMemoryDirectory(domain_));
+  std::error_code ignored;
+  fs::remove_all(folder_, ignored);
+}
+
+bool RecorderProbe::Connect(const Program& recorder) {
+  // The reader of a killed recorder counts until its lease is over: only the log says that the new one is there.
+  return WaitFor(kPatience_s, [&] {
+    return recorder.Said().find("joined session") != std::string::npos && tools_->has_readers() &&
+           frames_->has_readers();
+  });
+}
+
+void RecorderProbe::SendFor(double seconds) {
+  using Clock = std::chrono::steady_clock;
+  auto next = Clock::now();
+  const auto end = next + std::chrono::duration<double>(seconds);
+  ToolState tool;
+  for (int i = 0; Clock::now() < end; ++i) {
+    const std::int64_t now = MonotonicNs();
+    tool.stamp = tool_stamper_.Next(now);
+    if (tools_->Write(tool)) sent_tools_.push_back({tool.stamp.sequence, now});
+    if (i % kFrameEvery == 0) {
+      const Stamp stamp = frame_stamper_.Next(now);
+      const bool sent = frames_->WriteInPlace([&](TissueFrame::View view) {
+        view.header.stamp = stamp;
+        view.header.scene_hash = manifest_.scene_hash;
+        view.header.vertex_count = kVertices;
+        for (std::size_t k = 0; k < std::size_t{3} * kVertices; ++k) {
+          view.xyz[k] = 1e-6f * static_cast<float>((k * 2654435761u + stamp.sequence) & 0xffffu);
+        }
+      });
+      if (sent) sent_frames_.push_back({stamp.sequence, now});
+    }
+    next += std::chrono::milliseconds(1);
+    std::this_thread::sleep_until(next);
+  }
+}
+
+void RecorderProbe::Count(const std::vector<Sent>& sent, const std::vector<std::uint64_t>& read, std::int64_t kill_ns,
+                          Result* result) {
+  // What was sent before the two knew each other was not received.
+  const std::uint64_t first = read.empty() ? 0 : read.front();
+  for (const Sent& sample : sent) {
+    if (sample.sequence < first || sample.time_ns > kill_ns - kPromise_ns) continue;
+    ++result->due;
+    if (read.empty() || sample.sequence > read.back()) continue;
+    ++result->read;
+    result->missed += std::binary_search(read.begin(), read.end(), sample.sequence) ? 0 : 1;
+  }
+}
+
+RecorderProbe::Result RecorderProbe::RecordAndKill(double seconds) {
+  Result result;
+  result.file = folder_ / ("recording" + std::to_string(++runs_) + ".mcap");
+  Program recorder("recorder", {"--scene", scene_, "--session", folder_, "--domain", std::to_string(domain_), "--file",
+                                result.file});
+  if (!Connect(recorder)) return result;
+  sent_tools_.clear();
+  sent_frames_.clear();
+  SendFor(seconds);
+  const std::int64_t kill_ns = MonotonicNs();
+  recorder.End(SIGKILL);
+
+  std::vector<std::uint64_t> tools, frames;
+  recording::McapReader reader(result.file);
+  recording::McapMessage message;
+  while (reader.Next(&message)) {
+    const std::string& topic = reader.channels().at(message.channel).topic;
+    ToolState tool;
+    TissueFrame frame;
+    if (topic == bus::RoleOf<ToolState>().name && bus::DecodeCdr(message.data, &tool)) {
+      tools.push_back(tool.stamp.sequence);
+    } else if (topic == bus::RoleOf<TissueFrame>().name && bus::DecodeCdr(message.data, &frame)) {
+      frames.push_back(frame.header.stamp.sequence);
+    }
+  }
+  Count(sent_tools_, tools, kill_ns, &result);
+  Count(sent_frames_, frames, kill_ns, &result);
+  return result;
+}
+
+}  // namespace fulcrum::testing

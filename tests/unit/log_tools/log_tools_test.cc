@@ -1,0 +1,251 @@
+// The tools of `fulcrum log` on recordings whose content is known.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <sstream>
+
+#include "services/bus/schema.h"
+#include "services/core/error.h"
+#include "services/log_tools/text.h"
+#include "services/log_tools/tools.h"
+#include "services/recording/mcap_index.h"
+#include "services/recording/mcap_writer.h"
+#include "tests/unit/bus/same.h"
+#include "tests/unit/bus/samples.h"
+
+namespace fulcrum::log_tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kBegin_ns = 1'700'000'000'000'000'000;
+constexpr std::uint64_t kStep_ns = 10'000'000;
+
+class LogTools : public testing::Test {
+ protected:
+  LogTools() { fs::create_directory(folder_); }
+  ~LogTools() override { fs::remove_all(folder_); }
+
+  /// One message of each topic, 10 ms apart, and three more ToolStates after a gap of two.
+  fs::path Make(const std::string& name, const std::function<void(ToolState*)>& change = {}) const {
+    const fs::path file = folder_ / name;
+    recording::McapWriter writer(file, "fulcrum", "fulcrum test");
+    writer.AddMetadata("session", {{"id", "s-1"}, {"scene", "small"}, {"scene_hash", "77"}});
+    std::uint64_t time = kBegin_ns;
+    for (const bus::TopicRole& role : bus::kTopicRoles) {
+      const std::string type(bus::TopicLabel(role.id));
+      const std::uint16_t schema = writer.AddSchema("fulcrum::idl::" + type, "omgidl", bus::SchemaText(type));
+      const std::uint16_t channel = writer.AddChannel(schema, role.name, "cdr", {{"node", "some_node"}});
+      bus::WithMessageOf(role.id, [&]<class T>(std::type_identity<T>) {
+        Write(&writer, channel, 7, &time, bus::test::Sample<T>());
+        if constexpr (std::is_same_v<T, ToolState>) {
+          for (std::uint32_t sequence = 10; sequence < 13; ++sequence) {
+            ToolState m = bus::test::Sample<ToolState>(sequence);
+            if (change && sequence == 11) change(&m);
+            Write(&writer, channel, sequence, &time, m);
+          }
+        }
+      });
+    }
+    return file;
+  }
+  template <class T>
+  static void Write(recording::McapWriter* writer, std::uint16_t channel, std::uint32_t sequence, std::uint64_t* time,
+                    const T& message) {
+    std::vector<std::uint8_t> bytes;
+    ASSERT_TRUE(bus::EncodeCdr(message, &bytes));
+    writer->Write(channel, sequence, *time, *time - 1, std::as_bytes(std::span(bytes)));
+    *time += kStep_ns;
+  }
+  static std::vector<std::string> Lines(const std::string& text) {
+    std::istringstream in(text);
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(in, line);) lines.push_back(line);
+    return lines;
+  }
+  static std::string Text(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+
+  const fs::path folder_ = fs::path(testing::TempDir()) / ("log_tools_" + std::to_string(getpid()));
+};
+
+TEST_F(LogTools, EveryMessageComesBackFromItsBytes) {
+  for (const bus::TopicRole& role : bus::kTopicRoles) {
+    bus::WithMessageOf(role.id, [&]<class T>(std::type_identity<T>) {
+      std::vector<std::uint8_t> bytes;
+      T back;
+      ASSERT_TRUE(bus::EncodeCdr(bus::test::Sample<T>(), &bytes));
+      ASSERT_TRUE(bus::DecodeCdr(bytes, &back));
+      EXPECT_TRUE(Same(back, bus::test::Sample<T>())) << role.name;
+      // Cut anywhere, it is no message.
+      for (std::size_t size = 0; size < bytes.size(); size += 1 + bytes.size() / 50) {
+        EXPECT_FALSE(bus::DecodeCdr(std::span(bytes).first(size), &back)) << role.name << " of " << size;
+      }
+    });
+  }
+}
+
+TEST_F(LogTools, InfoTellsSessionTopicsAndLosses) {
+  std::ostringstream out;
+  PrintInfo(Make("a.mcap"), &out);
+  const std::string text = out.str();
+  for (const char* part : {"whole", "scene \"small\" 77", "2023-11-14 22:13:20 UTC · 0.15 s · 16 messages · 2 lost"}) {
+    EXPECT_NE(text.find(part), std::string::npos) << part << " in\n" << text;
+  }
+  for (const bus::TopicRole& role : bus::kTopicRoles) {
+    EXPECT_NE(text.find(bus::TopicLabel(role.id)), std::string::npos) << role.name;
+  }
+}
+
+TEST_F(LogTools, ListNamesWhatIsThereAndWhatIsNone) {
+  Make("a.mcap");
+  std::ofstream(folder_ / "b.mcap") << "no recording";
+  std::ostringstream out;
+  PrintList(folder_, &out);
+  EXPECT_NE(out.str().find("0.2 s"), std::string::npos) << out.str();
+  EXPECT_NE(out.str().find("! " + (folder_ / "b.mcap").string()), std::string::npos) << out.str();
+  EXPECT_THROW(PrintList(folder_ / "none", &out), InputError);
+}
+
+TEST_F(LogTools, CatPrintsOneObjectALineAndFilters) {
+  const fs::path file = Make("a.mcap");
+  std::ostringstream all, some;
+  PrintMessages(file, {}, 4, &all);
+  EXPECT_EQ(Lines(all.str()).size(), 16u);
+  EXPECT_NE(all.str().find("61664 more\"]"), std::string::npos) << "long lists are cut";
+  PrintMessages(file, {{"ToolState"}, 0.025, 0.045}, 100, &some);
+  ASSERT_EQ(Lines(some.str()).size(), 2u) << some.str();
+  const std::string line = Lines(some.str())[0];
+  EXPECT_TRUE(line.starts_with("{\"time_s\":0.030000,")) << line;
+  EXPECT_NE(line.find("\"sequence\":11,\"message\":{\"stamp\":{\"sequence\":11,\"epoch\":12,\"stamp_ns\":2000}"),
+            std::string::npos)
+      << line;
+  EXPECT_THROW(PrintMessages(file, {{"ToolStat"}, 0, 1}, 4, &all), InputError);
+}
+
+TEST_F(LogTools, NumbersPrintSoThatTheyReadBackTheSame) {
+  std::string text;
+  PutJson(0.1f, 1, &text);
+  EXPECT_EQ(text, "0.1");
+  EXPECT_EQ(std::strtof(text.c_str(), nullptr), 0.1f);
+  text.clear();
+  PutJson(std::numeric_limits<std::uint64_t>::max(), 1, &text);
+  EXPECT_EQ(text, "18446744073709551615");
+  text.clear();
+  PutJson(std::numeric_limits<float>::quiet_NaN(), 1, &text);
+  EXPECT_EQ(text, "null");
+  EXPECT_EQ(JsonString("a\"\\\n"), "\"a\\\"\\\\\\u000a\"");
+}
+
+TEST_F(LogTools, ExportWritesATableATopic) {
+  const fs::path file = Make("a.mcap");
+  const std::vector<fs::path> tables = ExportTables(file, {}, folder_ / "tables");
+  EXPECT_EQ(tables.size(), static_cast<std::size_t>(kTopicCount));
+  const std::vector<std::string> lines = Lines(Text(folder_ / "tables" / "ToolState.csv"));
+  ASSERT_EQ(lines.size(), 5u);
+  EXPECT_TRUE(lines[0].starts_with("time_s,node,stamp.sequence,stamp.epoch,stamp.stamp_ns,tools[0].kind")) << lines[0];
+  EXPECT_TRUE(lines[2].starts_with("0.020000,some_node,10,12,2000,1,1,0.1,")) << lines[2];
+  const auto columns = [](const std::string& line) { return std::count(line.begin(), line.end(), ','); };
+  for (const std::string& line : lines) EXPECT_EQ(columns(line), columns(lines[0]));
+  EXPECT_THROW((void)ExportTables(file, {}, folder_ / "tables"), InputError) << "nothing is replaced";
+}
+
+TEST_F(LogTools, VerifyFindsGapsDamageAndWhatNoNodeWouldUse) {
+  std::ostringstream out;
+  EXPECT_EQ(Verify(Make("gap.mcap"), &out), ExitCode::kFailure);
+  EXPECT_NE(out.str().find("ToolState: 2 messages are missing"), std::string::npos) << out.str();
+  EXPECT_NE(out.str().find("1 problems"), std::string::npos) << "and nothing else\n" << out.str();
+
+  const fs::path nan = Make("nan.mcap", [](ToolState* m) { m->tools[0].f_W.x() = NAN; });
+  out.str("");
+  (void)Verify(nan, &out);
+  EXPECT_NE(out.str().find("ToolState: 1 messages do not pass the gate"), std::string::npos) << out.str();
+
+  std::string bytes = Text(nan);
+  std::ofstream(folder_ / "cut.mcap", std::ios::binary) << bytes.substr(0, bytes.size() / 2);
+  out.str("");
+  EXPECT_EQ(Verify(folder_ / "cut.mcap", &out), ExitCode::kFailure);
+  EXPECT_NE(out.str().find("the file ends within a record"), std::string::npos) << out.str();
+  EXPECT_NE(out.str().find("not closed"), std::string::npos) << out.str();
+}
+
+TEST_F(LogTools, ADamagedIndexIsFound) {
+  const fs::path file = Make("a.mcap");
+  const std::string bytes = Text(file);
+  std::uint64_t messages = 0;
+  EXPECT_TRUE(recording::CheckIndex(file, &messages).empty());
+  EXPECT_EQ(messages, 16u);
+  int found = 0, tried = 0;
+  // The summary is behind the data's end.
+  for (std::size_t at = bytes.size() - 1500; at < bytes.size() - 8; at += 7, ++tried) {
+    std::string damaged = bytes;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x20);
+    // A new file each time: some file systems write one that is replaced to the disk at once.
+    fs::remove(folder_ / "damaged.mcap");
+    std::ofstream(folder_ / "damaged.mcap", std::ios::binary) << damaged;
+    found += recording::CheckIndex(folder_ / "damaged.mcap", &messages).empty() ? 0 : 1;
+  }
+  EXPECT_EQ(found, tried);
+}
+
+TEST_F(LogTools, DiffNamesTheFirstFieldThatDiffers) {
+  const fs::path a = Make("a.mcap"), same = Make("b.mcap");
+  const fs::path other = Make("c.mcap", [](ToolState* m) {
+    m->stamp.stamp_ns = 1;
+    m->tools[1].f_W.y() = 0.5f;
+  });
+  std::ostringstream out;
+  EXPECT_EQ(Diff(a, same, {}, "", &out), ExitCode::kDone) << out.str();
+  out.str("");
+  EXPECT_EQ(Diff(a, other, {}, "", &out), ExitCode::kFailure);
+  EXPECT_NE(out.str().find("first at sequence 11: stamp.stamp_ns = 2000 | 1"), std::string::npos) << out.str();
+  out.str("");
+  EXPECT_EQ(Diff(a, other, {}, "stamp", &out), ExitCode::kFailure);
+  EXPECT_NE(out.str().find("first at sequence 11: tools[1].f_W[1] = "), std::string::npos) << out.str();
+  EXPECT_NE(out.str().find(" | 0.5"), std::string::npos) << out.str();
+  out.str("");
+  EXPECT_EQ(Diff(a, other, {{"Health"}}, "", &out), ExitCode::kDone) << "only what was asked for";
+}
+
+TEST_F(LogTools, RecoverMendsWhatAKillHasLeft) {
+  const fs::path cut = folder_ / "cut.mcap";
+  {
+    recording::McapWriter writer(cut, "fulcrum", "fulcrum test");
+    writer.AddMetadata("session", {{"scene", "small"}});
+    const std::uint16_t channel =
+        writer.AddChannel(writer.AddSchema("fulcrum::idl::Health", "omgidl", "struct Health {};"), "fulcrum/Health",
+                          "cdr", {{"node", "n"}});
+    std::uint64_t time = kBegin_ns;
+    for (std::uint32_t i = 1; i <= 5; ++i) Write(&writer, channel, i, &time, bus::test::Sample<Health>(i));
+    writer.EndChunk();
+    fs::copy_file(cut, folder_ / "killed.mcap");
+  }
+  EXPECT_EQ(Recover(folder_ / "killed.mcap", folder_ / "mended.mcap").size(), 1u) << "it was not closed";
+  std::ostringstream out;
+  EXPECT_EQ(Verify(folder_ / "mended.mcap", &out), ExitCode::kDone) << out.str();
+  EXPECT_NE(out.str().find("5 messages, all well"), std::string::npos) << out.str();
+  recording::McapReader reader(folder_ / "mended.mcap");
+  recording::McapMessage message;
+  while (reader.Next(&message)) {
+  }
+  EXPECT_EQ(reader.schemas().at(1).text, "struct Health {};");
+  EXPECT_EQ(reader.channels().at(0).metadata.at("node"), "n");
+  EXPECT_EQ(reader.metadata().at("session").at("scene"), "small");
+  EXPECT_THROW((void)Recover(folder_ / "killed.mcap", folder_ / "mended.mcap"), InputError) << "nothing is replaced";
+}
+
+TEST_F(LogTools, WhatIsNoRecordingIsRefused) {
+  std::ostringstream out;
+  EXPECT_THROW(PrintInfo(folder_ / "none.mcap", &out), InputError);
+  EXPECT_THROW((void)Verify(folder_ / "none.mcap", &out), InputError);
+  EXPECT_THROW((void)Recover(folder_ / "none.mcap", folder_ / "x.mcap"), InputError);
+  EXPECT_FALSE(fs::exists(folder_ / "x.mcap"));
+}
+
+}  // namespace
+}  // namespace fulcrum::log_tools

@@ -1,0 +1,255 @@
+// The recorder without a bus: samples in, files out.
+#include "services/recorder/recorder.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <thread>
+
+#include "services/bus/topics.h"
+#include "services/recording/free_name.h"
+#include "services/recording/mcap_reader.h"
+
+namespace fulcrum::recorder {
+namespace {
+
+namespace fs = std::filesystem;
+using recording::McapMessage;
+using recording::McapReader;
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::array<std::byte, 4> kHead{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
+
+struct Read {
+  std::uint16_t channel;
+  std::uint32_t sequence;
+  std::size_t size;
+  std::uint64_t log_time_ns, publish_time_ns;
+};
+
+class RecorderTest : public testing::Test {
+ protected:
+  RecorderTest() { fs::create_directory(folder_); }
+  ~RecorderTest() override { fs::remove_all(folder_); }
+
+  RecorderSettings Settings() const {
+    RecorderSettings settings;
+    settings.file = folder_ / "recording.mcap";
+    settings.library = "test";
+    settings.metadata = {{"session", {{"scene", "small"}}}};
+    settings.describe = [](const bus::WriterGuid& writer) {
+      return recording::TextMap{{"node", "node " + std::to_string(writer[0])}};
+    };
+    return settings;
+  }
+  /// A sample of `size` bytes, encapsulation included, at `now_ns`.
+  static void Send(Recorder* recorder, TopicId topic, std::uint8_t writer, std::uint64_t sequence,
+                   std::size_t size = 40, std::int64_t now_ns = 0, bool whole = true) {
+    const std::vector<std::byte> body(size - kHead.size(), static_cast<std::byte>(sequence));
+    bus::RawSample sample{topic, {writer}, sequence, 1000 + now_ns, kHead, body};
+    recorder->Receive(
+        sample, [whole] { return whole; }, now_ns);
+  }
+  static std::vector<Read> ReadAll(McapReader* reader) {
+    std::vector<Read> all;
+    McapMessage m;
+    while (reader->Next(&m)) all.push_back({m.channel, m.sequence, m.data.size(), m.log_time_ns, m.publish_time_ns});
+    return all;
+  }
+
+  const fs::path folder_ = fs::path(testing::TempDir()) / ("recorder_" + std::to_string(getpid()));
+};
+
+TEST_F(RecorderTest, KeepsTopicsAndWritersApartAndTellsOfThem) {
+  {
+    Recorder recorder(Settings());
+    Send(&recorder, TopicId::kHealth, 1, 7, 40, 5 * kMs);
+    Send(&recorder, TopicId::kHealth, 2, 1, 44, 6 * kMs);
+    Send(&recorder, TopicId::kToolState, 1, 3, 48, 8 * kMs);
+    Send(&recorder, TopicId::kHealth, 1, 8, 52, 9 * kMs);
+    recorder.Close(10 * kMs);
+    EXPECT_EQ(recorder.stats().received, 4u);
+    EXPECT_EQ(recorder.stats().lost(), 0u);
+  }
+  McapReader reader(folder_ / "recording.mcap");
+  const std::vector<Read> read = ReadAll(&reader);
+  ASSERT_EQ(read.size(), 4u);
+  EXPECT_TRUE(reader.closed());
+  EXPECT_EQ(read[0].channel, read[3].channel);
+  EXPECT_NE(read[0].channel, read[1].channel);
+  EXPECT_EQ(read[3].sequence, 8u);
+  EXPECT_EQ(read[3].size, 52u);
+  EXPECT_EQ(read[2].publish_time_ns, 1000u + 8 * kMs);
+  EXPECT_EQ(read[3].log_time_ns - read[0].log_time_ns, 4u * kMs);
+  const auto& channel = reader.channels().at(read[1].channel);
+  EXPECT_EQ(channel.topic, "fulcrum/Health");
+  EXPECT_EQ(channel.metadata.at("node"), "node 2");
+  EXPECT_EQ(channel.metadata.at("writer").substr(0, 4), "0200");
+  const auto& schema = reader.schemas().at(channel.schema);
+  EXPECT_EQ(schema.name, "fulcrum::idl::Health");
+  EXPECT_NE(schema.text.find("struct Stamp"), std::string::npos) << "what it needs is in it";
+  EXPECT_EQ(reader.metadata().at("session").at("scene"), "small");
+  // Stamps and log times are of one clock.
+  const auto offset = std::stoll(reader.metadata().at("clock").at("log_time_minus_monotonic_ns"));
+  EXPECT_EQ(read[0].log_time_ns, static_cast<std::uint64_t>(offset + 5 * kMs));
+}
+
+TEST_F(RecorderTest, EverySchemaIsThere) {
+  {
+    Recorder recorder(Settings());
+    for (const auto& role : bus::kTopicRoles) Send(&recorder, role.id, 1, 1);
+  }
+  McapReader reader(folder_ / "recording.mcap");
+  ASSERT_EQ(ReadAll(&reader).size(), static_cast<std::size_t>(kTopicCount));
+  for (const auto& [number, schema] : reader.schemas()) {
+    const std::string type = schema.name.substr(schema.name.rfind(':') + 1);
+    EXPECT_NE(schema.text.find("struct " + type + " {"), std::string::npos) << schema.name;
+    EXPECT_EQ(schema.text.find('#'), std::string::npos) << "no preprocessor";
+  }
+}
+
+TEST_F(RecorderTest, WhatIsMissingIsCountedByTopicAndWrittenIntoTheFile) {
+  RecorderSettings settings = Settings();
+  settings.queue_B = 1000;
+  {
+    Recorder recorder(settings);
+    Send(&recorder, TopicId::kToolState, 1, 100);
+    Send(&recorder, TopicId::kToolState, 1, 104);                // three did not arrive
+    Send(&recorder, TopicId::kTissueFrame, 1, 1, 40, 0, false);  // overwritten while it was copied
+    Send(&recorder, TopicId::kTissueFrame, 1, 2);
+    Send(&recorder, TopicId::kHealth, 1, 1, 2000);  // no room
+    Send(&recorder, TopicId::kHealth, 1, 1);        // a late copy is no news
+    EXPECT_EQ(recorder.stats().missed, 4u);
+    EXPECT_EQ(recorder.stats().overflow, 1u);
+    EXPECT_EQ(recorder.topic_stats(TopicId::kToolState).lost, 3u);
+    EXPECT_EQ(recorder.topic_stats(TopicId::kTissueFrame).lost, 1u);
+    EXPECT_EQ(recorder.topic_stats(TopicId::kHealth).lost, 1u);
+    EXPECT_EQ(recorder.topic_stats(TopicId::kToolState).received, 2u);
+  }
+  McapReader reader(folder_ / "recording.mcap");
+  EXPECT_EQ(ReadAll(&reader).size(), 3u);
+  EXPECT_EQ(reader.metadata().at("lost ToolState").at("not_received"), "3");
+  EXPECT_EQ(reader.metadata().at("lost Health").at("queue_full"), "1");
+}
+
+TEST_F(RecorderTest, AfterAKillTheFileHoldsWhatIsOlderThanAChunkLasts) {
+  Recorder recorder(Settings());
+  Send(&recorder, TopicId::kToolState, 1, 1, 40, 0);
+  recorder.Flush(50 * kMs);
+  Send(&recorder, TopicId::kToolState, 1, 2, 40, 400 * kMs);
+  recorder.Flush(Recorder::kLongestChunk_ns);
+  Send(&recorder, TopicId::kToolState, 1, 3, 40, 600 * kMs);
+  recorder.Flush(650 * kMs);
+  // As the operating system would keep it: nothing closes the recorder.
+  fs::copy_file(folder_ / "recording.mcap", folder_ / "killed.mcap");
+  McapReader reader(folder_ / "killed.mcap");
+  EXPECT_EQ(ReadAll(&reader).size(), 2u);
+  EXPECT_FALSE(reader.closed());
+  EXPECT_TRUE(reader.faults().empty());
+}
+
+TEST_F(RecorderTest, ADumpHoldsTheNewestPast) {
+  RecorderSettings settings = Settings();
+  settings.file.clear();
+  settings.keep_s = 2;
+  Recorder recorder(settings);
+  for (std::uint64_t i = 1; i <= 100; ++i) {
+    const std::int64_t now = static_cast<std::int64_t>(i) * 100 * kMs;
+    Send(&recorder, TopicId::kToolState, 1, i, 40, now);
+    recorder.Flush(now);
+  }
+  recorder.Dump(folder_ / "dump.mcap", "a node died", 10'000 * kMs);
+  McapReader reader(folder_ / "dump.mcap");
+  const std::vector<Read> read = ReadAll(&reader);
+  EXPECT_TRUE(reader.closed());
+  ASSERT_FALSE(read.empty());
+  EXPECT_EQ(read.back().sequence, 100u);
+  // The oldest chunk reaches back beyond the two seconds by what it holds.
+  EXPECT_LE(read.front().sequence, 80u);
+  EXPECT_GE(read.front().sequence, 72u);
+  EXPECT_EQ(reader.metadata().at("dump").at("reason"), "a node died");
+  EXPECT_FALSE(fs::exists(folder_ / "recording.mcap"));
+}
+
+TEST_F(RecorderTest, WhatIsKeptForADumpIsBounded) {
+  RecorderSettings settings = Settings();
+  settings.file.clear();
+  settings.keep_s = 1000;
+  settings.keep_B = 20'000;
+  Recorder recorder(settings);
+  for (std::uint64_t i = 1; i <= 200; ++i) {
+    const std::int64_t now = static_cast<std::int64_t>(i) * 1000 * kMs;
+    Send(&recorder, TopicId::kToolState, 1, i, 40, now);
+    recorder.Flush(now + 500 * kMs);
+  }
+  recorder.Dump(folder_ / "dump.mcap", "", 0);
+  McapReader reader(folder_ / "dump.mcap");
+  EXPECT_EQ(ReadAll(&reader).back().sequence, 200u);
+  EXPECT_LT(fs::file_size(folder_ / "dump.mcap"), 60'000u) << "schema, index and what was kept";
+}
+
+TEST_F(RecorderTest, AFullDiskIsToldAndCountedAndNeverThrows) {
+  // A limit on the size of files is what an unprivileged test can have of a full disk.
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  signal(SIGXFSZ, SIG_IGN);
+  const rlimit limit{200'000, before.rlim_max};
+  Recorder recorder(Settings());
+  setrlimit(RLIMIT_FSIZE, &limit);
+  std::uint64_t noise = 1;
+  for (std::uint64_t i = 1; i <= 20; ++i) {
+    std::vector<std::byte> body(100'000);
+    for (std::byte& b : body)
+      b = static_cast<std::byte>((noise = noise * 6364136223846793005u + 1442695040888963407u) >> 56);
+    recorder.Receive(
+        {TopicId::kTissueFrame, {1}, i, 0, kHead, body}, [] { return true; }, 0);
+    recorder.Flush(static_cast<std::int64_t>(i) * 1000 * kMs);
+  }
+  setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_NE(recorder.stats().error.find("File too large"), std::string::npos) << recorder.stats().error;
+  EXPECT_EQ(recorder.stats().received, 20u);
+  EXPECT_GE(recorder.stats().unwritten, 18u);
+  EXPECT_EQ(recorder.topic_stats(TopicId::kTissueFrame).lost, recorder.stats().unwritten);
+  recorder.Close(0);
+  McapReader reader(folder_ / "recording.mcap");
+  EXPECT_EQ(ReadAll(&reader).size(), 20 - recorder.stats().unwritten);
+}
+
+TEST_F(RecorderTest, ThreadsOfTheBusDoNotDisturbOneAnother) {
+  constexpr std::uint64_t kSamples = 3000;
+  {
+    Recorder recorder(Settings());
+    std::vector<std::jthread> threads;
+    for (std::uint8_t writer = 1; writer <= 3; ++writer) {
+      threads.emplace_back([&recorder, writer] {
+        for (std::uint64_t i = 1; i <= kSamples; ++i) Send(&recorder, TopicId::kHealth, writer, i, 100 + writer);
+      });
+    }
+    for (int i = 0; i < 50; ++i) recorder.Flush(0);
+    threads.clear();
+    EXPECT_EQ(recorder.stats().lost(), 0u);
+  }
+  McapReader reader(folder_ / "recording.mcap");
+  std::map<std::uint16_t, std::uint32_t> last;
+  std::uint64_t count = 0;
+  for (const Read& read : ReadAll(&reader)) {
+    EXPECT_EQ(read.sequence, ++last[read.channel]);
+    ++count;
+  }
+  EXPECT_EQ(count, 3 * kSamples);
+}
+
+TEST_F(RecorderTest, ARecordingIsNeverReplaced) {
+  const fs::path wanted = folder_ / "r.mcap";
+  EXPECT_EQ(recording::FreeName(wanted), wanted);
+  for (const char* name : {"r.mcap", "r-2.mcap"}) {
+    recording::McapWriter(folder_ / name, "", "");
+  }
+  EXPECT_EQ(recording::FreeName(wanted), folder_ / "r-3.mcap");
+}
+
+}  // namespace
+}  // namespace fulcrum::recorder
