@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -39,6 +40,8 @@ struct SlotHeader {
 };
 
 std::size_t RoundUpToPage(std::size_t bytes) { return (bytes + kPage - 1) / kPage * kPage; }
+
+std::size_t SlotStride(std::size_t capacity) { return kPage + RoundUpToPage(capacity); }
 
 std::uint64_t Checksum(std::uint64_t sequence, std::span<const std::byte> payload) {
   Hash64 hash;
@@ -153,7 +156,7 @@ CheckpointFile::CheckpointFile(const std::filesystem::path& file, std::uint64_t 
                                std::uint32_t layout_version, std::size_t capacity_bytes)
     : impl_(std::make_unique<Impl>()) {
   impl_->capacity = capacity_bytes;
-  impl_->slot_stride = kPage + RoundUpToPage(capacity_bytes);
+  impl_->slot_stride = SlotStride(capacity_bytes);
   impl_->file_bytes = kPage + 2 * impl_->slot_stride;
   const FileHeader wanted{kMagic, scene_hash, layout_version, capacity_bytes};
   impl_->fd = OpenExisting(file, wanted, impl_->file_bytes);
@@ -205,6 +208,24 @@ void CheckpointFile::Commit(std::size_t bytes) {
   header->sequence = sequence;
   impl_->last_sequence = sequence;
   impl_->newest = slot;
+}
+
+std::uint64_t NewestSequence(const std::filesystem::path& file) {
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  FileHeader header{};
+  if (fd.get() < 0 || ::pread(fd.get(), &header, sizeof(header), 0) != static_cast<ssize_t>(sizeof(header)) ||
+      header.magic != kMagic) {
+    return 0;
+  }
+  std::uint64_t newest = 0;
+  for (std::size_t i = 0; i < 2; ++i) {
+    SlotHeader slot{};
+    const auto at = static_cast<off_t>(kPage + i * SlotStride(header.capacity));
+    if (::pread(fd.get(), &slot, sizeof(slot), at) == static_cast<ssize_t>(sizeof(slot))) {
+      newest = std::max(newest, slot.sequence);
+    }
+  }
+  return newest;
 }
 
 }  // namespace fulcrum::runtime

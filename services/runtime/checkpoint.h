@@ -38,4 +38,8 @@ class CheckpointFile {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Sequence of the newest sealed slot of a file that another process may be writing; 0 without one. Payloads are not
+/// read: it says how far that process has come, not that its checkpoint is whole.
+[[nodiscard]] std::uint64_t NewestSequence(const std::filesystem::path& file);
+
 }  // namespace fulcrum::runtime

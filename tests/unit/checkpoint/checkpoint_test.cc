@@ -80,6 +80,19 @@ TEST_F(CheckpointTest, LastCommitComesBackAfterReopening) {
   EXPECT_TRUE(Matches(latest->payload, 3));
 }
 
+TEST_F(CheckpointTest, NewestSequenceIsSeenFromOutside) {
+  EXPECT_EQ(NewestSequence(file_), 0u) << "no file";
+  CheckpointFile checkpoint(file_, kScene, kLayout, 800);
+  EXPECT_EQ(NewestSequence(file_), 0u);
+  Write(&checkpoint, 1, 100);
+  Write(&checkpoint, 2, 100);
+  EXPECT_EQ(NewestSequence(file_), 2u);
+  (void)checkpoint.Begin();
+  EXPECT_EQ(NewestSequence(file_), 2u) << "the older slot is being filled";
+  std::ofstream(folder_ / "other") << "not a checkpoint, but as long as the header of one";
+  EXPECT_EQ(NewestSequence(folder_ / "other"), 0u);
+}
+
 TEST_F(CheckpointTest, UnsealedSlotLeavesTheOlderOne) {
   {
     CheckpointFile checkpoint(file_, kScene, kLayout, 800);
