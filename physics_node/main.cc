@@ -4,7 +4,6 @@
 #include "services/app/node_app.h"
 #include "services/runtime/checkpoint.h"
 #include "services/runtime/cyclic_thread.h"
-#include "services/runtime/realtime.h"
 
 namespace {
 
@@ -18,9 +17,7 @@ fulcrum::ExitCode RunPhysics(fulcrum::app::NodeApp& app) {
                              app.MakeOutput<TissueFrame>(), app.MakeOutput<ContactModel>(),
                              app.MakeOutput<CauteryContact>(), app.MakeOutput<TickManifest>()},
                             &checkpoint, runtime::MonotonicNs(), app.cart().timing(NodeId::kPhysics).threads);
-  if (node.restored()) {
-    runtime::Log(runtime::LogLevel::kInfo, "goes on from its checkpoint");
-  }
+  app::LogCheckpoint(checkpoint, node.restored());
   return app.Run(
       app.timing(), [&](const Tick& tick) { node.Step(tick); }, [&](Health* health) { node.FillHealth(health); });
 }

@@ -17,6 +17,7 @@ ExitCode RunThermal(app::NodeApp& app) {
       {app.MakeInput<CauteryContact>(), app.MakeOutput<TopologyState>(), app.MakeOutput<TemperaturePatch>(),
        app.MakeOutput<ThermalEvent>(), app.MakeOutput<TickManifest>()},
       &checkpoint, runtime::MonotonicNs());
+  app::LogCheckpoint(checkpoint, node.restored());
   return app.Run(
       app.timing(), [&](const Tick& tick) { node.Step(tick); }, [&](Health* health) { node.FillHealth(health); });
 }

@@ -236,6 +236,15 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
   return app.exit_code;
 }
 
+void LogCheckpoint(const runtime::CheckpointFile& checkpoint, bool restored) {
+  if (!checkpoint.complaint().empty()) Log(LogLevel::kWarning, checkpoint.complaint());
+  if (restored) {
+    Log(LogLevel::kInfo, "goes on from its checkpoint");
+  } else if (checkpoint.Latest()) {
+    Log(LogLevel::kWarning, "its checkpoint holds what this node cannot have written: begins anew");
+  }
+}
+
 int NodeMain(int argc, char** argv, NodeId node, const char* description,
              const std::function<ExitCode(NodeApp&)>& run) {
   runtime::SetLogName(NodeName(node));

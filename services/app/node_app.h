@@ -28,6 +28,7 @@
 #include "services/core/exit_code.h"
 #include "services/core/messages.h"
 #include "services/core/tick.h"
+#include "services/runtime/checkpoint.h"
 #include "services/runtime/cyclic_thread.h"
 #include "services/scene/scene_file.h"
 
@@ -122,6 +123,9 @@ class NodeApp {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Tells the log what a node found in its checkpoint. @param restored it goes on from there.
+void LogCheckpoint(const runtime::CheckpointFile& checkpoint, bool restored);
 
 /// main() of a node: parses options, turns exceptions into one clear line and the right exit code. Options left in
 /// `extra` after `run` has taken its own are refused before Run() starts.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 namespace fulcrum::bus {
 namespace {
@@ -25,6 +26,13 @@ bool IsTopic(TopicId id) { return static_cast<int>(id) < kTopicCount; }
 bool IsNode(NodeId id) { return static_cast<int>(id) < kNodeCount; }
 
 bool IsStamp(const Stamp& s) { return s.stamp_ns >= 0; }
+
+/// A name that people read. What other bytes decode to is empty or holds characters that nobody types.
+bool IsName(const std::string& name, std::size_t longest) {
+  return !name.empty() && name.size() <= longest && std::none_of(name.begin(), name.end(), [](char c) {
+    return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
+  });
+}
 
 /// Session times are negative before the session is known.
 bool IsSessionTime(double t) { return Magnitude(t, 1e9); }
@@ -122,9 +130,10 @@ bool PassesGate(const ThermalEvent& m) noexcept {
          std::isfinite(m.value);
 }
 
+// A manifest of another scene ends a node: nothing that merely decodes to one may pass.
 bool PassesGate(const SceneManifest& m) noexcept {
   return IsStamp(m.stamp) && UpTo(m.mode, SessionMode::kLockStep) && m.session_start_ns >= 0 &&
-         m.scene_name.size() <= kMaxSceneName && m.session_id.size() <= kMaxSessionId;
+         IsName(m.scene_name, kMaxSceneName) && IsName(m.session_id, kMaxSessionId);
 }
 
 bool PassesGate(const Command& m) noexcept {

@@ -30,7 +30,7 @@ class InputAccount {
   /// A sample that passed nothing but whose place in the sequence is known: refused, yet not lost.
   void Reject(const Stamp& stamp) noexcept {
     Reject();
-    Follow(stamp);
+    if (stamp.sequence != 0) Follow(stamp);  // 0: bytes that were no message.
   }
 
   /// A sample put aside unread because a newer one was wanted.

@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -39,6 +40,8 @@ struct SlotHeader {
 };
 
 std::size_t RoundUpToPage(std::size_t bytes) { return (bytes + kPage - 1) / kPage * kPage; }
+
+std::size_t SlotStride(std::size_t capacity) { return kPage + RoundUpToPage(capacity); }
 
 std::uint64_t Checksum(std::uint64_t sequence, std::span<const std::byte> payload) {
   Hash64 hash;
@@ -80,8 +83,19 @@ void Lock(const std::filesystem::path& file, int fd) {
   }
 }
 
-/// The existing file, locked, when its header and size are those wanted.
-FileDescriptor OpenExisting(const std::filesystem::path& file, const FileHeader& wanted, std::size_t file_bytes) {
+std::string WhyUnusable(const FileHeader& found, const FileHeader& wanted) {
+  if (found.magic != wanted.magic) return "is no checkpoint";
+  if (found.scene_hash != wanted.scene_hash) return "is of another scene";
+  if (found.layout_version != wanted.layout_version) {
+    return "has layout " + std::to_string(found.layout_version) + ", this build reads " +
+           std::to_string(wanted.layout_version);
+  }
+  return "has not the size that its scene asks for";
+}
+
+/// The existing file, locked, when its header and size are those wanted; otherwise says in `complaint` why not.
+FileDescriptor OpenExisting(const std::filesystem::path& file, const FileHeader& wanted, std::size_t file_bytes,
+                            std::string* complaint) {
   FileDescriptor fd(::open(file.c_str(), O_RDWR | O_CLOEXEC));
   if (fd.get() < 0) {
     if (errno == ENOENT) {
@@ -95,6 +109,7 @@ FileDescriptor OpenExisting(const std::filesystem::path& file, const FileHeader&
   const bool usable = ::fstat(fd.get(), &info) == 0 && static_cast<std::size_t>(info.st_size) == file_bytes &&
                       ::pread(fd.get(), &found, sizeof(found), 0) == static_cast<ssize_t>(sizeof(found)) &&
                       found == wanted;
+  if (!usable) *complaint = file.string() + " " + WhyUnusable(found, wanted) + ": replaced, the node begins anew";
   return usable ? std::move(fd) : FileDescriptor();
 }
 
@@ -133,6 +148,7 @@ struct CheckpointFile::Impl {
   int newest = -1;  // Whole slot with the highest sequence.
   int filling = -1;
   std::uint64_t last_sequence = 0;
+  std::string complaint;
 
   ~Impl() {
     if (map != nullptr) {
@@ -153,10 +169,10 @@ CheckpointFile::CheckpointFile(const std::filesystem::path& file, std::uint64_t 
                                std::uint32_t layout_version, std::size_t capacity_bytes)
     : impl_(std::make_unique<Impl>()) {
   impl_->capacity = capacity_bytes;
-  impl_->slot_stride = kPage + RoundUpToPage(capacity_bytes);
+  impl_->slot_stride = SlotStride(capacity_bytes);
   impl_->file_bytes = kPage + 2 * impl_->slot_stride;
   const FileHeader wanted{kMagic, scene_hash, layout_version, capacity_bytes};
-  impl_->fd = OpenExisting(file, wanted, impl_->file_bytes);
+  impl_->fd = OpenExisting(file, wanted, impl_->file_bytes, &impl_->complaint);
   if (impl_->fd.get() < 0) {
     impl_->fd = Create(file, wanted, impl_->file_bytes);
   }
@@ -165,11 +181,19 @@ CheckpointFile::CheckpointFile(const std::filesystem::path& file, std::uint64_t 
     Fail(file, "mapped");
   }
   impl_->map = static_cast<std::byte*>(map);
+  bool altered = false;
   for (int i = 0; i < 2; ++i) {
-    if (impl_->IsWhole(i) && impl_->header(i)->sequence > impl_->last_sequence) {
+    const std::uint64_t sequence = impl_->header(i)->sequence;
+    if (!impl_->IsWhole(i)) {
+      altered = altered || sequence != 0;  // A kill leaves no seal on a torn slot.
+    } else if (sequence > impl_->last_sequence) {
       impl_->newest = i;
-      impl_->last_sequence = impl_->header(i)->sequence;
+      impl_->last_sequence = sequence;
     }
+  }
+  if (altered) {
+    impl_->complaint = file.string() + " was altered from outside: the node " +
+                       (impl_->newest < 0 ? "begins anew" : "goes on from what is whole");
   }
 }
 
@@ -182,6 +206,8 @@ std::optional<CheckpointFile::Loaded> CheckpointFile::Latest() const {
   const SlotHeader& h = *impl_->header(impl_->newest);
   return Loaded{h.sequence, impl_->payload(impl_->newest).first(h.bytes)};
 }
+
+const std::string& CheckpointFile::complaint() const { return impl_->complaint; }
 
 // A kill ends the process between two instructions and the kernel keeps every store made so far, so the order of the
 // stores is all that matters: the fences keep the compiler from moving payload stores across the seal.
@@ -205,6 +231,24 @@ void CheckpointFile::Commit(std::size_t bytes) {
   header->sequence = sequence;
   impl_->last_sequence = sequence;
   impl_->newest = slot;
+}
+
+std::uint64_t NewestSequence(const std::filesystem::path& file) {
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  FileHeader header{};
+  if (fd.get() < 0 || ::pread(fd.get(), &header, sizeof(header), 0) != static_cast<ssize_t>(sizeof(header)) ||
+      header.magic != kMagic) {
+    return 0;
+  }
+  std::uint64_t newest = 0;
+  for (std::size_t i = 0; i < 2; ++i) {
+    SlotHeader slot{};
+    const auto at = static_cast<off_t>(kPage + i * SlotStride(header.capacity));
+    if (::pread(fd.get(), &slot, sizeof(slot), at) == static_cast<ssize_t>(sizeof(slot))) {
+      newest = std::max(newest, slot.sequence);
+    }
+  }
+  return newest;
 }
 
 }  // namespace fulcrum::runtime

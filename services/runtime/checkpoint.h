@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 
 namespace fulcrum::runtime {
 
@@ -27,6 +28,8 @@ class CheckpointFile {
   };
   /// Newest whole slot, or nothing.
   [[nodiscard]] std::optional<Loaded> Latest() const;
+  /// Empty, or one line for the log: what was found in the file and could not be used.
+  [[nodiscard]] const std::string& complaint() const;
 
   /// The slot to fill, `capacity_bytes` long.
   [[nodiscard]] std::span<std::byte> Begin();
@@ -37,5 +40,9 @@ class CheckpointFile {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Sequence of the newest sealed slot of a file that another process may be writing; 0 without one. Payloads are not
+/// read: it says how far that process has come, not that its checkpoint is whole.
+[[nodiscard]] std::uint64_t NewestSequence(const std::filesystem::path& file);
 
 }  // namespace fulcrum::runtime

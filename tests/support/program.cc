@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <filesystem>
 #include <stdexcept>
 #include <utility>
 
@@ -18,7 +19,7 @@ Program::Program(const std::string& name, const std::vector<std::string>& argume
   if (in < 0 || output_ < 0 || ::pwrite(in, input.data(), input.size(), 0) != static_cast<ssize_t>(input.size())) {
     throw std::runtime_error("no memory for the input and output of " + name);
   }
-  const std::string program = std::string(FULCRUM_BIN_DIR) + "/" + name;
+  const std::string program = std::filesystem::path(FULCRUM_BIN_DIR) / name;
   std::vector<char*> words{const_cast<char*>(name.c_str())};
   for (const std::string& argument : arguments) words.push_back(const_cast<char*>(argument.c_str()));
   words.push_back(nullptr);

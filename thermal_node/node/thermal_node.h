@@ -23,7 +23,7 @@ inline constexpr std::uint64_t kTicksPerClosure = 10;  ///< Of the energy for He
 /// When nothing changes, one old patch goes out this often, for readers that came late.
 inline constexpr std::uint64_t kTicksPerHistoryPatch = 100;
 /// A checkpoint at each new revision, and this often while the tissue is warm [frames of the solver].
-inline constexpr std::uint64_t kFramesPerCheckpoint = 20;
+inline constexpr std::uint64_t kFramesPerCheckpoint = 10;
 /// Changes with the layout of the checkpoint.
 inline constexpr std::uint32_t kCheckpointLayout = 2;
 

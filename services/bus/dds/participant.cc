@@ -184,7 +184,7 @@ struct DdsParticipant::Impl {
     const std::lock_guard lock(mutex);
     fast::Topic*& topic = topics[static_cast<std::size_t>(role.id)];
     if (topic != nullptr) return topic;
-    fast::TypeSupport type(new typename dds::TypeSupportOf<T>::type());
+    fast::TypeSupport type(new dds::CheckedType<T>());
     if constexpr (dds::Loanable<T>) {
       // Both together say that memory and wire look the same, which is what a loan relies on.
       if (!type->is_plain() || type->m_typeSize != sizeof(dds::WireOf<T>) + 4) {

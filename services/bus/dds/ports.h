@@ -113,7 +113,7 @@ class DdsInput final : public InputBase<T> {
   }
 
  private:
-  /// Next valid sample into wire_. The library throws on payloads that do not decode: refused like any bad message.
+  /// Next valid sample into wire_.
   bool TakeWire() {
     for (;;) {
       try {

@@ -8,6 +8,7 @@
 #include "services/core/error.h"
 #include "tests/integration/bus/count_new.h"
 #include "tests/integration/bus/support.h"
+#include "tests/support/rogue.h"
 #include "tests/unit/bus/same.h"
 #include "tests/unit/bus/samples.h"
 
@@ -17,7 +18,7 @@ namespace {
 using test::Eventually;
 
 constexpr int kDomain = 11;
-const auto* const kClean = testing::AddGlobalTestEnvironment(new test::CleanDomain(kDomain));
+const auto* const kClean = ::testing::AddGlobalTestEnvironment(new test::CleanDomain(kDomain));
 
 /// An output and a matched input of the same topic on two participants.
 template <class T>
@@ -32,10 +33,10 @@ struct Pair {
 };
 
 template <class T>
-class EveryTopic : public testing::Test {};
+class EveryTopic : public ::testing::Test {};
 using Types =
-    testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState, TemperaturePatch,
-                   ThermalEvent, SceneManifest, Command, CommandReply, TickManifest, Health>;
+    ::testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState, TemperaturePatch,
+                     ThermalEvent, SceneManifest, Command, CommandReply, TickManifest, Health>;
 TYPED_TEST_SUITE(EveryTopic, Types);
 
 TYPED_TEST(EveryTopic, ArrivesUnchanged) {
@@ -79,6 +80,26 @@ TEST(DdsInput, NaNIsStoppedAndTheNextGoodOnePasses) {
   ASSERT_TRUE(bus.out->Write(test::Sample<TissueFrame>(2)));
   ASSERT_TRUE(Eventually([&] { return bus.in->TakeNext(&got); }));
   EXPECT_EQ(got.header.stamp.sequence, 2u);
+}
+
+TEST(DdsInput, BytesThatAreNoMessageAreRefusedAndHoldNothingUp) {
+  Pair<ContactModel> models;
+  Pair<Health> healths;
+  EXPECT_GT(fulcrum::testing::Rogue(kDomain).PourBytes(30, 1), 0u);
+  ASSERT_TRUE(models.out->Write(test::Sample<ContactModel>()));
+  ASSERT_TRUE(healths.out->Write(test::Sample<Health>()));
+  ContactModel model;
+  Health health;
+  ASSERT_TRUE(Eventually([&] { return models.in->TakeNext(&model); }));
+  // Bytes with many zeros may decode to a node that has done nothing yet.
+  ASSERT_TRUE(Eventually([&] { return healths.in->TakeNext(&health) && Same(health, test::Sample<Health>()); }));
+  EXPECT_TRUE(Same(model, test::Sample<ContactModel>()));
+  const std::uint64_t refused = models.in->stats().rejected;
+  EXPECT_GT(refused, 5u) << "some are longer than any message and do not get this far";
+  EXPECT_GT(healths.in->stats().rejected, 5u);
+  EXPECT_FALSE(models.in->TakeNext(&model));
+  EXPECT_EQ(models.in->stats().rejected, refused) << "each one once";
+  EXPECT_EQ(models.in->stats().received, 1u);
 }
 
 TEST(DdsInput, TakeLatestPassesOverOlderFramesAndKeepsTheBooks) {

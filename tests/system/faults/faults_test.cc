@@ -22,7 +22,7 @@
 #include "services/runtime/cyclic_thread.h"
 #include "services/scene/scene_yaml.h"
 #include "tests/support/cart.h"
-#include "tests/system/faults/force_judge.h"
+#include "tests/support/force_judge.h"
 
 namespace fulcrum {
 namespace {

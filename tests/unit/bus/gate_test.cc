@@ -201,6 +201,9 @@ TEST(GateRanges, ThermalEvent) {
 TEST(GateRanges, SessionMessages) {
   ExpectRefused<SceneManifest>({{"unknown mode", [](auto& m) { m.mode = BeyondLast<SessionMode>(); }},
                                 {"name too long", [](auto& m) { m.scene_name = std::string(64, 'x'); }},
+                                {"no name", [](auto& m) { m.scene_name.clear(); }},
+                                {"no session", [](auto& m) { m.session_id.clear(); }},
+                                {"no text", [](auto& m) { m.session_id[0] = '\x01'; }},
                                 {"session too long", [](auto& m) { m.session_id = std::string(64, 'x'); }},
                                 {"negative start", [](auto& m) { m.session_start_ns = -1; }}});
   ExpectRefused<Command>({{"unknown node", [](auto& m) { m.target = BeyondLast<NodeId>(); }},

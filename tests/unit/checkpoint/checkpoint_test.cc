@@ -80,6 +80,19 @@ TEST_F(CheckpointTest, LastCommitComesBackAfterReopening) {
   EXPECT_TRUE(Matches(latest->payload, 3));
 }
 
+TEST_F(CheckpointTest, NewestSequenceIsSeenFromOutside) {
+  EXPECT_EQ(NewestSequence(file_), 0u) << "no file";
+  CheckpointFile checkpoint(file_, kScene, kLayout, 800);
+  EXPECT_EQ(NewestSequence(file_), 0u);
+  Write(&checkpoint, 1, 100);
+  Write(&checkpoint, 2, 100);
+  EXPECT_EQ(NewestSequence(file_), 2u);
+  (void)checkpoint.Begin();
+  EXPECT_EQ(NewestSequence(file_), 2u) << "the older slot is being filled";
+  std::ofstream(folder_ / "other") << "not a checkpoint, but as long as the header of one";
+  EXPECT_EQ(NewestSequence(folder_ / "other"), 0u);
+}
+
 TEST_F(CheckpointTest, UnsealedSlotLeavesTheOlderOne) {
   {
     CheckpointFile checkpoint(file_, kScene, kLayout, 800);
@@ -100,6 +113,8 @@ TEST_F(CheckpointTest, AlteredNewestSlotFallsBackToTheOlderOneAndIsOverwrittenNe
   }
   FlipByte(3 * 4096 + 4096 + 17);  // Slot 1: header page at 3 * 4096, then its payload.
   CheckpointFile checkpoint(file_, kScene, kLayout, 800);
+  EXPECT_TRUE(checkpoint.complaint().ends_with("was altered from outside: the node goes on from what is whole"))
+      << checkpoint.complaint();
   ASSERT_TRUE(checkpoint.Latest().has_value());
   EXPECT_EQ(checkpoint.Latest()->sequence, 1u);
   EXPECT_TRUE(Matches(checkpoint.Latest()->payload, 1));
@@ -115,22 +130,31 @@ TEST_F(CheckpointTest, BothSlotsAlteredIsAnEmptyCheckpoint) {
   }
   FlipByte(2 * 4096 + 3);
   FlipByte(4 * 4096 + 3);
-  EXPECT_FALSE(CheckpointFile(file_, kScene, kLayout, 800).Latest().has_value());
+  const CheckpointFile checkpoint(file_, kScene, kLayout, 800);
+  EXPECT_FALSE(checkpoint.Latest().has_value());
+  EXPECT_TRUE(checkpoint.complaint().ends_with("was altered from outside: the node begins anew"))
+      << checkpoint.complaint();
 }
 
-TEST_F(CheckpointTest, OtherSceneLayoutOrCapacityIsIgnoredAndReplaced) {
-  const auto write = [&] {
-    CheckpointFile checkpoint(file_, kScene, kLayout, 800);
-    Write(&checkpoint, 1, 100);
+TEST_F(CheckpointTest, OtherSceneLayoutOrCapacityIsReplacedAndToldWithTheReason) {
+  const auto refused = [&](std::uint64_t scene, std::uint32_t layout, std::size_t capacity, const std::string& why) {
+    {
+      CheckpointFile checkpoint(file_, kScene, kLayout, 800);
+      Write(&checkpoint, 1, 100);
+    }
+    const CheckpointFile checkpoint(file_, scene, layout, capacity);
+    EXPECT_FALSE(checkpoint.Latest().has_value()) << why;
+    EXPECT_EQ(checkpoint.complaint(), file_.string() + " " + why + ": replaced, the node begins anew");
   };
-  write();
-  EXPECT_FALSE(CheckpointFile(file_, kScene + 1, kLayout, 800).Latest().has_value());
-  write();
-  EXPECT_FALSE(CheckpointFile(file_, kScene, kLayout + 1, 800).Latest().has_value());
-  write();
-  EXPECT_FALSE(CheckpointFile(file_, kScene, kLayout, 808).Latest().has_value());
+  refused(kScene + 1, kLayout, 800, "is of another scene");
+  refused(kScene, kLayout + 1, 800, "has layout 1, this build reads 2");
+  refused(kScene, kLayout, 808, "has not the size that its scene asks for");
+  std::filesystem::remove(file_);
+  EXPECT_EQ(CheckpointFile(file_, kScene, kLayout, 800).complaint(), "") << "a new file is no fault";
   std::ofstream(file_) << "not a checkpoint";
-  EXPECT_FALSE(CheckpointFile(file_, kScene, kLayout, 800).Latest().has_value());
+  const CheckpointFile checkpoint(file_, kScene, kLayout, 800);
+  EXPECT_FALSE(checkpoint.Latest().has_value());
+  EXPECT_EQ(checkpoint.complaint(), file_.string() + " is no checkpoint: replaced, the node begins anew");
 }
 
 TEST_F(CheckpointTest, SecondProcessIsRefusedWithTheFileName) {

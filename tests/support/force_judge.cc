@@ -1,6 +1,7 @@
-#include "tests/system/faults/force_judge.h"
+#include "tests/support/force_judge.h"
 
 #include <algorithm>
+#include <iterator>
 #include <sstream>
 
 namespace fulcrum::testing {
@@ -21,17 +22,20 @@ constexpr std::int64_t kFadeAndSome_ns = 500'000'000;
 }  // namespace
 
 void ForceJudge::Add(const ToolState& state) {
-  const ToolSample& tool = state.tools[0];
+  const ToolSample& tool = state.tools[tool_];
   const haptics::TrocarPose pose =
       haptics::PoseFromAttachPoint(trocar_, haptics::AttachPointForTip(trocar_, tool.p_WT.cast<double>()));
   const Vec3d f_A = haptics::ForceAtAttachPoint(pose, tool.f_W.cast<double>());
   const double force = f_A.norm();
   if (!(force <= kLever * kLimit_N)) Object(state, "force [N]", force);
-  if (samples_ > 0 && state.stamp.epoch == last_.epoch) {
-    const auto ticks = static_cast<double>(state.stamp.sequence - last_.sequence);
-    const double step = (f_A - f_A_).norm();
+  if (samples_ > 0) {
+    const bool same_servo = state.stamp.epoch == last_.epoch;
+    if (!same_servo) std::fill(std::begin(past_), std::end(past_), Past{});
+    const auto ticks = static_cast<double>(state.stamp.sequence - (same_servo ? last_.sequence : 0));
+    const double step = (f_A - (same_servo ? f_A_ : Vec3d::Zero())).norm();
+    peak_step_ = std::max(peak_step_, step / ticks);
     if (step > kLever * kSlew_N_per_tick * ticks) Object(state, "step of the force [N]", step);
-    if (state.stamp.stamp_ns - last_.stamp_ns > kLongestTick_ns) held_up_ns_ = state.stamp.stamp_ns;
+    if (!same_servo || state.stamp.stamp_ns - last_.stamp_ns > kLongestTick_ns) held_up_ns_ = state.stamp.stamp_ns;
   }
   const bool in_time = state.stamp.stamp_ns - held_up_ns_ > kFadeAndSome_ns;
   if (in_time && tool.model_age_s > kGone_s + 0.002 && force > kGone_N) Object(state, "force without a model", force);
@@ -50,13 +54,15 @@ void ForceJudge::Add(const ToolState& state) {
   state_ = tool.state;
   least_ = std::min(least_, force);
   most_ = std::max(most_, force);
+  peak_ = std::max(peak_, force);
 }
 
 void ForceJudge::Object(const ToolState& state, const char* what, double value) {
   if (!verdict_.empty()) return;
   std::ostringstream text;
   text << what << ' ' << value << " at tick " << state.stamp.sequence << ", state "
-       << static_cast<int>(state.tools[0].state) << ", model " << 1e3f * state.tools[0].model_age_s << " ms old";
+       << static_cast<int>(state.tools[tool_].state) << ", model " << 1e3f * state.tools[tool_].model_age_s
+       << " ms old";
   verdict_ = text.str();
 }
 

@@ -1,6 +1,7 @@
 // What the hand may feel, whatever happens to the rest of the cart: judged on every ToolState of a run.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -11,9 +12,10 @@ namespace fulcrum::testing {
 
 class ForceJudge {
  public:
-  explicit ForceJudge(const haptics::Trocar& trocar) : trocar_(trocar) {}
+  explicit ForceJudge(const haptics::Trocar& trocar, std::size_t tool = 0) : trocar_(trocar), tool_(tool) {}
 
-  /// Samples of tool 0 in order; some may be missing.
+  /// Samples in order; some may be missing. A new servo begins without force: the devices let go when the old one
+  /// ended.
   void Add(const ToolState& state);
 
   [[nodiscard]] double force_N() const { return force_; }
@@ -23,6 +25,9 @@ class ForceJudge {
   [[nodiscard]] double least_N() const { return least_; }
   void ResetRange() { least_ = most_ = force_; }
   [[nodiscard]] double most_N() const { return most_; }
+  /// Over all samples: force [N], and the largest change from one millisecond to the next [N].
+  [[nodiscard]] double peak_N() const { return peak_; }
+  [[nodiscard]] double peak_step_N() const { return peak_step_; }
   /// Empty, or the first thing that the hand should not have felt.
   [[nodiscard]] const std::string& verdict() const { return verdict_; }
 
@@ -30,10 +35,11 @@ class ForceJudge {
   void Object(const ToolState& state, const char* what, double value);
 
   haptics::Trocar trocar_;
+  std::size_t tool_;
   std::uint64_t samples_ = 0;
   Stamp last_;
   Vec3d f_A_ = Vec3d::Zero();
-  double force_ = 0, least_ = 0, most_ = 0;
+  double force_ = 0, least_ = 0, most_ = 0, peak_ = 0, peak_step_ = 0;
   ServoState state_ = ServoState::kOff;
   // Where the present rise was a few ticks ago.
   static constexpr std::uint64_t kWindow = 5;

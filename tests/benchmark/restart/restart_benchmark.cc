@@ -1,0 +1,165 @@
+// kill -9 of each node of a real cart in turn, while it pulls and cuts. The benchmark reads every topic and tells how
+// long it took until the new process was of use, what was lost, and what the hands felt.
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "services/bus/dds/shared_memory.h"
+#include "services/runtime/cyclic_thread.h"
+#include "tests/benchmark/report.h"
+#include "tests/support/cart.h"
+#include "tests/support/cart_watch.h"
+#include "tests/support/working_scene.h"
+
+namespace fulcrum {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::CartState;
+
+constexpr int kDomain = 95;
+constexpr int kKillsPerSession = 10, kKillsQuick = 3;
+constexpr int kSessions = 2;
+// Five nodes in turn: each lives a little longer than the 5 s after which the supervisor counts it as healthy, so none
+// waits for its restart as one that dies again and again does.
+constexpr double kBetweenKills_s = 1.03;
+constexpr double kPatience_s = 20;
+
+struct Node {
+  NodeId id;
+  const char* key;
+};
+constexpr std::array<Node, 5> kNodes{{{NodeId::kPhysics, "physics"},
+                                      {NodeId::kThermal, "thermal"},
+                                      {NodeId::kHaptics, "haptics"},
+                                      {NodeId::kHandleBridge, "handle"},
+                                      {NodeId::kRender, "render"}}};
+
+struct Findings {
+  std::map<NodeId, std::vector<double>> rejoin_ms;
+  double tissue_lost_ms = 0, heat_lost_ms = 0, force_step_N = 0, force_N = 0;
+  std::uint64_t topology_lost = 0, shared_memory_left_B = 0;
+};
+
+/// In the cart's directory, and what the library would put beside it.
+std::uint64_t SharedMemoryLeft() {
+  std::uint64_t bytes = 0;
+  std::error_code none;
+  const auto add = [&](const fs::directory_entry& entry) {
+    if (entry.is_regular_file(none)) bytes += entry.file_size(none);
+  };
+  for (const auto& entry : fs::directory_iterator("/dev/shm", none)) {
+    const std::string name = entry.path().filename();
+    if (name.starts_with("fastrtps_") || name.starts_with("fast_datasharing") || name.starts_with("sem.fastrtps")) {
+      add(entry);
+    }
+  }
+  for (const auto& entry : fs::directory_iterator(bus::SharedMemoryDirectory(kDomain), none)) add(entry);
+  return bytes;
+}
+
+/// Kills one node; false when nothing was heard of its successor.
+bool Kill(const Node& node, const testing::Cart& cart, testing::CartWatch* watch, Findings* findings) {
+  const auto processes = cart.nodes();
+  const auto victim = processes.find(NodeName(node.id));
+  if (victim == processes.end()) return false;
+  const auto index = static_cast<std::size_t>(node.id);
+  const auto [epoch, sealed_ns] = watch->See([&](const CartState& state) {
+    const auto seal = state.seals.find(node.id);
+    return std::pair(state.voices[index].epoch, seal == state.seals.end() ? 0 : seal->second.before_ns);
+  });
+  const std::int64_t killed_ns = runtime::MonotonicNs();
+  ::kill(victim->second, SIGKILL);
+  if (node.id == NodeId::kThermal) {
+    findings->heat_lost_ms = std::max(findings->heat_lost_ms, 1e-6 * static_cast<double>(killed_ns - sealed_ns));
+  }
+  std::int64_t heard_ns = 0;
+  const bool heard = watch->WaitUntil(kPatience_s, [&](const CartState& state) {
+    heard_ns = state.voices[index].heard_ns;
+    return state.voices[index].epoch > epoch;
+  });
+  if (heard) findings->rejoin_ms[node.id].push_back(1e-6 * static_cast<double>(heard_ns - killed_ns));
+  return heard;
+}
+
+/// One session in which each node is killed `rounds` times; what went wrong, or nothing.
+std::string RunSession(int rounds, const fs::path& scene, Findings* findings) {
+  testing::Cart cart(scene, kDomain);
+  testing::CartWatch watch(kDomain, scene, cart.session());
+  const bool works = watch.WaitUntil(60, [](const CartState& state) {
+    return state.topology.revision > 0 && state.peak_force_N() > 0.1 &&
+           state.voices[static_cast<std::size_t>(NodeId::kRender)].epoch > 0;
+  });
+  if (!works) return "the cart did not come to work\n" + cart.Said();
+  auto next = std::chrono::steady_clock::now();
+  for (int round = 0; round < rounds; ++round) {
+    for (const Node& node : kNodes) {
+      std::this_thread::sleep_until(next);
+      next = std::chrono::steady_clock::now() +
+             std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(kBetweenKills_s));
+      if (!Kill(node, cart, &watch, findings)) return std::string(node.key) + " was not heard again\n" + cart.Said();
+    }
+  }
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  watch.See([&](const CartState& state) {
+    findings->tissue_lost_ms = std::max(findings->tissue_lost_ms, 1e3 * state.tissue_lost_s);
+    findings->topology_lost += state.topology_lost;
+    findings->force_step_N = std::max(findings->force_step_N, state.peak_step_N());
+    findings->force_N = std::max(findings->force_N, state.peak_force_N());
+  });
+  cart.Signal(SIGINT);
+  const std::optional<int> code = cart.WaitForEnd(kPatience_s);
+  if (code != 0) return "the session ended badly\n" + cart.Said();
+  return {};
+}
+
+int Run(benchmark::Report* report) {
+  const fs::path folder = fs::temp_directory_path() / ("bench_restart." + std::to_string(::getpid()));
+  fs::create_directories(folder);
+  const int sessions = report->quick() ? 1 : kSessions;
+  const int rounds = report->quick() ? kKillsQuick : kKillsPerSession;
+  const fs::path scene = folder / "working.yaml";
+  std::ofstream(scene) << testing::WorkingScene("built-in", 120);
+  Findings findings;
+  std::string wrong;
+  for (int session = 0; session < sessions && wrong.empty(); ++session) {
+    wrong = RunSession(rounds, scene, &findings);
+    findings.shared_memory_left_B += SharedMemoryLeft();
+  }
+  fs::remove_all(folder);
+  if (!wrong.empty()) {
+    std::fprintf(stderr, "bench_restart: %s\n", wrong.c_str());
+    return 1;
+  }
+  for (const Node& node : kNodes) {
+    const auto& times = findings.rejoin_ms[node.id];
+    report->Add(std::string("restart.rejoin_ms_p50.") + node.key, benchmark::Quantile(times, 0.5), "ms");
+    report->Add(std::string("restart.rejoin_ms_max.") + node.key, benchmark::Quantile(times, 1), "ms");
+  }
+  report->Add("restart.lost_topology_events", static_cast<double>(findings.topology_lost), "1");
+  report->Add("restart.state_lost_ms_max.tissue", findings.tissue_lost_ms, "ms");
+  report->Add("restart.state_lost_ms_max.heat", findings.heat_lost_ms, "ms");
+  report->Add("restart.force_step_N_max", findings.force_step_N, "N/ms");
+  report->Add("restart.force_N_max", findings.force_N, "N");
+  report->Add("restart.shm_left_bytes", static_cast<double>(findings.shared_memory_left_B), "B");
+  return 0;
+}
+
+}  // namespace
+}  // namespace fulcrum
+
+int main(int argc, char** argv) {
+  fulcrum::benchmark::Report report(argc, argv);
+  return report.Wants("restart.") ? fulcrum::Run(&report) : 0;
+}

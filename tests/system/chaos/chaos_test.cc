@@ -1,0 +1,183 @@
+// One cart, as a user starts it, that suffers one fault after another while it pulls and cuts. After each it must go on
+// by itself; in the end the session ends well, nothing was lost that others had seen, no number was broken, no hand was
+// hurt, and nothing is left in shared memory.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <numeric>
+#include <string>
+
+#include "services/bus/dds/participant.h"
+#include "services/bus/dds/shared_memory.h"
+#include "tests/system/chaos/chaos_cart.h"
+#include "tests/system/chaos/small_room.h"
+
+namespace fulcrum {
+namespace {
+
+using testing::CartState;
+using testing::ChaosCart;
+using testing::Damage;
+using testing::Flood;
+using testing::Program;
+
+constexpr int kDomain = 81;
+constexpr double kSession_s = 120;  // Never reached.
+constexpr double kPatience_s = 30;
+constexpr double kRounding_N = 1e-3;
+
+std::uint64_t Rejected(const CartState& state) {
+  return std::accumulate(state.rejected.begin(), state.rejected.end(), std::uint64_t{0});
+}
+
+/// What a node says it refused on a topic.
+std::uint64_t RefusedBy(const CartState& state, NodeId node, TopicId topic) {
+  for (const InputHealth& input : state.healths.at(node).inputs) {
+    if (input.topic == topic) return input.rejected;
+  }
+  return 0;
+}
+
+class Chaos : public ::testing::Test {
+ protected:
+  /// Exit code of the session after Ctrl-C.
+  int End() {
+    chaos_.cart().Signal(SIGINT);
+    return chaos_.cart().WaitForEnd(kPatience_s).value_or(-1);
+  }
+  void KillEachNode();
+  void StopEachNode();
+  void Flooded();
+  void SpoilCheckpoints();
+  void RefuseASecondCart();
+
+  ChaosCart chaos_{kSession_s, kDomain, 7};
+};
+
+void Chaos::KillEachNode() {
+  for (const NodeId node : testing::kNodes) {
+    chaos_.WaitAMoment(0.3);
+    chaos_.Kill(node);
+  }
+  EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
+}
+
+void Chaos::StopEachNode() {
+  for (const NodeId node : testing::kNodes) {
+    // Longer than the others' patience with its messages; once longer than its lease on the bus, too.
+    chaos_.Stop(node, node == NodeId::kThermal ? 1.4 : 0.2);
+    chaos_.WaitAMoment(0.1);
+  }
+  EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
+}
+
+void Chaos::Flooded() {
+  EXPECT_EQ(chaos_.watch().See(Rejected), 0u) << "the cart itself has sent a broken number";
+  for (const Flood flood : {Flood::kToolState, Flood::kContactModel, Flood::kCommand}) {
+    EXPECT_GT(chaos_.Pour(flood, 0.4), 1000u);
+  }
+  EXPECT_GT(chaos_.PourBytes(50), 100u);
+  EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
+  chaos_.watch().See([](const CartState& state) {
+    EXPECT_GT(RefusedBy(state, NodeId::kPhysics, TopicId::kToolState), 100u);
+    EXPECT_GT(RefusedBy(state, NodeId::kHaptics, TopicId::kContactModel), 100u);
+  });
+  const auto rejected = [](const CartState& state) { return state.rejected; };
+  const auto before = chaos_.watch().See(rejected);
+  EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
+  EXPECT_EQ(chaos_.watch().See(rejected), before) << "the flood is over";
+}
+
+TEST_F(Chaos, TheSessionOutlivesItsFaults) {
+  ASSERT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
+  {
+    SCOPED_TRACE("each node killed");
+    KillEachNode();
+  }
+  chaos_.SetWallClock(5);
+  {
+    SCOPED_TRACE("each node stopped for a while");
+    StopEachNode();
+  }
+  {
+    SCOPED_TRACE("no time on the cores");
+    chaos_.Starve(1);
+    EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
+  }
+  chaos_.watch().See([](const CartState& state) {
+    EXPECT_EQ(state.topology_lost, 0u);
+    EXPECT_LE(state.tissue_lost_s, 0.15);
+  });
+  chaos_.SetWallClock(-7);
+  {
+    SCOPED_TRACE("flooded");
+    Flooded();
+  }
+  {
+    SCOPED_TRACE("spoiled checkpoints");
+    SpoilCheckpoints();
+  }
+  RefuseASecondCart();
+  EXPECT_EQ(End(), 0) << chaos_.Trouble();
+  const CartState state = chaos_.watch().See([](const CartState& s) { return s; });
+  EXPECT_EQ(state.force_verdict(), "");
+  EXPECT_LE(state.peak_force_N(), 3.3 + kRounding_N);
+  EXPECT_LE(state.peak_step_N(), 0.4 + kRounding_N);
+  EXPECT_FALSE(std::filesystem::exists(bus::SharedMemoryDirectory(kDomain)));
+  EXPECT_EQ(chaos_.clock().waits, 0u) << "somebody waits until a time of the wall clock";
+}
+
+void Chaos::SpoilCheckpoints() {
+  chaos_.KillAndSpoil(NodeId::kPhysics, Damage::kFlippedNewest);
+  chaos_.KillAndSpoil(NodeId::kThermal, Damage::kOfTheFuture);
+  EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
+  EXPECT_NE(chaos_.Log(NodeId::kPhysics).find("altered from outside: the node goes on"), std::string::npos);
+  EXPECT_NE(chaos_.Log(NodeId::kThermal).find("replaced, the node begins anew"), std::string::npos);
+}
+
+void Chaos::RefuseASecondCart() {
+  Program second("fulcrum", {"up", chaos_.scene(), "--domain", std::to_string(kDomain), "--out",
+                             chaos_.scene().parent_path() / "second"});
+  EXPECT_EQ(second.End(0), 2);
+  EXPECT_NE(second.Said().find("a session runs in domain 81"), std::string::npos) << second.Said();
+  EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
+}
+
+TEST(ChaosSchema, APeerOfAnotherSchemaEndsTheSessionAndBothSidesSaySo) {
+  ChaosCart chaos(kSession_s, kDomain + 1, 1);
+  ASSERT_TRUE(chaos.GoesOn()) << chaos.Trouble();
+  bus::DdsParticipant other(
+      {.domain = kDomain + 1, .node_name = "old_node", .shared_memory = {}, .schema_hash = 0x1234});
+  EXPECT_TRUE(testing::WaitFor(kPatience_s, [&] { return !other.schema_mismatch().empty(); }));
+  EXPECT_EQ(chaos.cart().WaitForEnd(kPatience_s), 3) << chaos.Trouble();
+  EXPECT_NE(chaos.cart().Said().find("schema mismatch"), std::string::npos) << chaos.cart().Said();
+}
+
+class ChaosRoom : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!testing::CanMakeRoom()) GTEST_SKIP() << "this user may make no namespaces: no small file systems here";
+    std::filesystem::create_directories(out_);
+  }
+  void TearDown() override { std::filesystem::remove_all(out_); }
+  /// Exit code and last words of a cart with such a file system.
+  void ExpectRefused(const std::filesystem::path& place, const std::string& options, const std::string& words) {
+    testing::SmallRoom room(place, options, "small", kDomain + 2, out_);
+    EXPECT_EQ(room.up().End(0), 2) << room.up().Said();
+    EXPECT_NE(room.up().Said().find(words), std::string::npos) << room.up().Said();
+  }
+
+  const std::filesystem::path out_ =
+      std::filesystem::temp_directory_path() / ("fulcrum-room-" + std::to_string(::getpid()));
+};
+
+TEST_F(ChaosRoom, ACartWithoutRoomIsRefusedWithOneLine) {
+  ExpectRefused("/dev/shm", "size=20m", "has 20 MiB free, at least 32 MiB are needed");
+  ExpectRefused(out_, "size=64k", "session folder: ");
+  ExpectRefused(out_, "ro", "Read-only file system");
+}
+
+}  // namespace
+}  // namespace fulcrum

@@ -1,0 +1,146 @@
+// More of each fault, at random moments, than the default tests have time for. One seed a run; FULCRUM_CHAOS_SEED
+// repeats one.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <random>
+#include <string>
+
+#include "services/bus/dds/shared_memory.h"
+#include "tests/system/chaos/chaos_cart.h"
+#include "tests/system/chaos/small_room.h"
+
+namespace fulcrum {
+namespace {
+
+using testing::CartState;
+using testing::ChaosCart;
+using testing::Damage;
+using testing::Flood;
+using testing::SmallRoom;
+
+constexpr int kDomain = 85;
+constexpr double kSession_s = 300;  // Never reached.
+constexpr double kPatience_s = 30;
+constexpr double kRounding_N = 1e-3;
+
+std::uint32_t Seed() {
+  const char* given = std::getenv("FULCRUM_CHAOS_SEED");
+  return given != nullptr ? static_cast<std::uint32_t>(std::strtoul(given, nullptr, 10)) : std::random_device()();
+}
+
+TEST(ChaosMatrix, FaultsInAnyOrder) {
+  const std::uint32_t seed = Seed();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 random(seed);
+  ChaosCart chaos(kSession_s, kDomain, seed);
+  ASSERT_TRUE(chaos.GoesOn()) << chaos.Trouble();
+  constexpr int kRounds = 25;
+  for (int round = 0; round < kRounds; ++round) {
+    const NodeId node = testing::kNodes[random() % testing::kNodes.size()];
+    const double seconds = std::uniform_real_distribution<double>(0.01, 2.5)(random);
+    const unsigned fault = random() % 7;
+    SCOPED_TRACE("round " + std::to_string(round) + ": fault " + std::to_string(fault) + ", " + NodeName(node) + ", " +
+                 std::to_string(seconds) + " s");
+    switch (fault) {
+      case 0:
+      case 1:
+        chaos.Kill(node);
+        break;
+      case 2:
+      case 3:
+        chaos.Stop(node, seconds);
+        break;
+      case 4:
+        chaos.Starve(seconds);
+        break;
+      case 5:
+        chaos.SetWallClock(std::uniform_real_distribution<double>(-12, 12)(random));
+        break;
+      default:
+        EXPECT_GT(chaos.Pour(static_cast<Flood>(random() % 3), seconds), 0u);
+    }
+    chaos.WaitAMoment(1);
+    ASSERT_TRUE(chaos.GoesOn()) << chaos.Trouble();
+  }
+  EXPECT_GT(chaos.PourBytes(1000), 1000u);
+  ASSERT_TRUE(chaos.GoesOn()) << chaos.Trouble();
+  chaos.cart().Signal(SIGINT);
+  EXPECT_EQ(chaos.cart().WaitForEnd(kPatience_s), 0) << chaos.Trouble();
+  const CartState state = chaos.watch().See([](const CartState& s) { return s; });
+  EXPECT_EQ(state.force_verdict(), "");
+  EXPECT_LE(state.peak_force_N(), 3.3 + kRounding_N);
+  EXPECT_LE(state.peak_step_N(), 0.4 + kRounding_N);
+  EXPECT_EQ(state.topology_lost, 0u);
+  EXPECT_LE(state.tissue_lost_s, 0.15);
+  EXPECT_FALSE(std::filesystem::exists(bus::SharedMemoryDirectory(kDomain)));
+}
+
+class EveryDamage : public ::testing::TestWithParam<Damage> {};
+
+// What was lost is lost: the tissue is whole again and nothing is in the jaws. The session goes on.
+TEST_P(EveryDamage, OfACheckpointIsToldAndSurvived) {
+  ChaosCart chaos(kSession_s, kDomain + 1, 1);
+  ASSERT_TRUE(chaos.GoesOn()) << chaos.Trouble();
+  for (const NodeId node : {NodeId::kThermal, NodeId::kPhysics}) {
+    chaos.KillAndSpoil(node, GetParam());
+    const bool told = testing::WaitFor(kPatience_s, [&] {
+      const std::string log = chaos.Log(node);
+      return log.find("begins anew") != std::string::npos ||
+             log.find("goes on from what is whole") != std::string::npos;
+    });
+    EXPECT_TRUE(told) << chaos.Log(node);
+  }
+  const std::uint64_t revision = chaos.watch().See([](const CartState& state) { return state.topology.revision; });
+  EXPECT_TRUE(chaos.watch().WaitUntil(kPatience_s, [&](const CartState& state) {
+    return state.topology.revision > revision;
+  })) << "nothing is cut any more";
+  chaos.cart().Signal(SIGINT);
+  EXPECT_EQ(chaos.cart().WaitForEnd(kPatience_s), 0) << chaos.Trouble();
+  EXPECT_EQ(chaos.watch().See([](const CartState& state) { return state.force_verdict(); }), "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Checkpoint, EveryDamage,
+                         ::testing::Values(Damage::kFlippedNewest, Damage::kFlippedAll, Damage::kCutShort,
+                                           Damage::kOfTheFuture, Damage::kOfAnotherScene));
+
+class Filled : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!testing::CanMakeRoom()) GTEST_SKIP() << "this user may make no namespaces: no small file systems here";
+    std::filesystem::create_directories(out_);
+  }
+  void TearDown() override { std::filesystem::remove_all(out_); }
+  static bool SaysThatItCuts(const SmallRoom& room) {
+    return testing::WaitFor(kPatience_s, [&] {
+      const std::string log = testing::ReadFile(room.Inside(room.out() / "latest/logs/physics_node.log"));
+      return log.find("joined session") != std::string::npos;
+    });
+  }
+
+  const std::filesystem::path out_ =
+      std::filesystem::temp_directory_path() / ("fulcrum-filled-" + std::to_string(::getpid()));
+};
+
+// Logs and pictures are lost, and the report says so; checkpoints have had their room from the beginning.
+TEST_F(Filled, DiskIsReportedAndTheSessionEndsWell) {
+  SmallRoom room(out_, "size=64m", "small", kDomain + 2, out_);
+  ASSERT_TRUE(SaysThatItCuts(room)) << room.up().Said();
+  EXPECT_GT(room.Fill(), 1u << 20);
+  EXPECT_EQ(room.up().End(0), 0) << room.up().Said();
+  EXPECT_NE(room.up().Said().find("cannot write the picture"), std::string::npos) << room.up().Said();
+}
+
+// Who runs has its memory and goes on; who would have to start anew is refused with one line.
+TEST_F(Filled, SharedMemoryHurtsNobodyWhoRuns) {
+  SmallRoom room("/dev/shm", "size=80m", "small", kDomain + 2, out_);
+  ASSERT_TRUE(SaysThatItCuts(room)) << room.up().Said();
+  EXPECT_GT(room.Fill(), 1u << 20);
+  EXPECT_EQ(room.up().End(0), 0) << room.up().Said();
+}
+
+}  // namespace
+}  // namespace fulcrum

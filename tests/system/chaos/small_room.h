@@ -1,0 +1,35 @@
+// A cart that is given a small /dev/shm, or a small or read-only folder for its sessions: in mount and user namespaces
+// of its own, so that nobody else runs short.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "tests/support/program.h"
+
+namespace fulcrum::testing {
+
+/// The system lets this user make namespaces.
+[[nodiscard]] bool CanMakeRoom();
+
+class SmallRoom {
+ public:
+  /// Runs `fulcrum up SCENE` with a file system of its own at `place`.
+  /// @param options of that mount, as "size=20m" or "ro".
+  SmallRoom(const std::filesystem::path& place, const std::string& options, const std::string& scene, int domain,
+            const std::filesystem::path& out);
+
+  [[nodiscard]] Program& up() { return up_; }
+  [[nodiscard]] const std::filesystem::path& out() const { return out_; }
+  /// As its own processes see it.
+  [[nodiscard]] std::filesystem::path Inside(const std::filesystem::path& path) const;
+  /// Fills that file system to its last byte; how much that was.
+  std::uint64_t Fill() const;
+
+ private:
+  std::filesystem::path place_, out_;
+  Program up_;
+};
+
+}  // namespace fulcrum::testing
