@@ -1,32 +1,99 @@
 // physics_node: deforms the tissue under the tools at 100 Hz.
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "physics_node/node/pair.h"
 #include "physics_node/node/physics_checkpoint.h"
 #include "physics_node/node/physics_node.h"
 #include "services/app/node_app.h"
+#include "services/core/error.h"
 #include "services/runtime/checkpoint.h"
 #include "services/runtime/cyclic_thread.h"
+#include "services/runtime/realtime.h"
 
 namespace {
 
-fulcrum::ExitCode RunPhysics(fulcrum::app::NodeApp& app) {
-  using namespace fulcrum;
-  const auto particles = static_cast<Index>(app.scene().rest_position.size());
-  runtime::CheckpointFile checkpoint(app.options().session / "physics_node.checkpoint", app.scene().hash,
-                                     physics::kCheckpointLayout, physics::CheckpointCapacity(particles));
+using namespace fulcrum;  // NOLINT: a main is nothing but names of other modules
+
+/// A node of its own, or one of a pair: "a" and "b" have a checkpoint each.
+struct Seat {
+  std::string own, other;  ///< Names of the checkpoint files; `other` empty: no pair.
+  bool follows = false;
+};
+
+Seat TakeSeat(app::NodeOptions* options) {
+  const std::string pair = options->TakeValue("--pair", "");
+  const bool follows = options->TakeFlag("--follow");
+  if (pair.empty() && !follows) return {"physics_node.checkpoint", "", false};
+  if (pair != "a" && pair != "b") throw InputError("--pair must be a or b, and --follow goes with it only");
+  const auto file = [](const std::string& seat) { return "physics_node-" + seat + ".checkpoint"; };
+  return {file(pair), file(pair == "a" ? "b" : "a"), follows};
+}
+
+ExitCode RunPhysics(app::NodeApp& app) {
+  const Seat seat = TakeSeat(&app.options());
+  const std::filesystem::path& session = app.options().session;
+  const std::size_t capacity = physics::CheckpointCapacity(static_cast<Index>(app.scene().rest_position.size()));
+  runtime::CheckpointFile checkpoint(session / seat.own, app.scene().hash, physics::kCheckpointLayout, capacity);
+  const std::int64_t epoch_ns = runtime::MonotonicNs();
   physics::PhysicsNode node(app.scene(),
                             {app.MakeInput<ToolState>(), app.MakeInput<HandleState>(), app.MakeInput<TopologyState>(),
                              app.MakeOutput<TissueFrame>(), app.MakeOutput<ContactModel>(),
                              app.MakeOutput<CauteryContact>(), app.MakeOutput<TickManifest>()},
-                            &checkpoint, runtime::MonotonicNs(), app.cart().timing(NodeId::kPhysics).threads);
-  app::LogCheckpoint(checkpoint, node.restored());
-  return app.Run(
-      app.timing(), [&](const Tick& tick) { node.Step(tick); }, [&](Health* health) { node.FillHealth(health); });
+                            &checkpoint, epoch_ns, app.cart().timing(NodeId::kPhysics).threads, seat.follows);
+  if (!seat.follows) app::LogCheckpoint(checkpoint, node.restored());
+  const auto fill = [&](Health* health) { node.FillHealth(health); };
+  if (seat.other.empty()) {
+    return app.Run(
+        app.timing(), [&](const Tick& tick) { node.Step(tick); }, fill);
+  }
+
+  physics::Pair pair(app.MakeInput<TickManifest>(), NodeId::kPhysics, !seat.follows,
+                     static_cast<std::uint64_t>(epoch_ns));
+  std::atomic<bool> leads{!seat.follows};
+  const auto step = [&](const Tick& tick) {
+    switch (pair.Update(tick.stamp_ns)) {
+      case physics::Pair::Role::kFollows:
+        node.Follow(tick);
+        return;
+      case physics::Pair::Role::kTakesOver: {
+        const auto left =
+            runtime::CheckpointFile::Peek(session / seat.other, app.scene().hash, physics::kCheckpointLayout, capacity);
+        const bool restored = node.TakeOver(left ? std::span<const std::byte>(*left) : std::span<const std::byte>(),
+                                            static_cast<std::int64_t>(pair.own_epoch()));
+        leads.store(true, std::memory_order_relaxed);
+        node.Step(tick);
+        runtime::Log(runtime::LogLevel::kWarning,
+                     std::string("the leading process is silent: this one has taken over, ") +
+                         (restored ? "from the newest checkpoint" : "from the beginning: there is no checkpoint"));
+        return;
+      }
+      case physics::Pair::Role::kLeads:
+        node.Step(tick);
+        return;
+      case physics::Pair::Role::kRetires:
+        app.Finish(ExitCode::kFailure, "another process has taken over while this one was held up");
+        return;
+    }
+  };
+  return app.Run(app.timing(), step, [&](Health* health) {
+    fill(health);
+    if (!leads.load(std::memory_order_relaxed) && health->state == HealthState::kRunning) {
+      health->state = HealthState::kWaiting;
+    }
+  });
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kPhysics,
-                                "Deforms the tissue under the tools; publishes TissueFrame, ContactModel and "
-                                "CauteryContact at 100 Hz.",
-                                RunPhysics);
+  return app::NodeMain(argc, argv, NodeId::kPhysics,
+                       "Deforms the tissue under the tools; publishes TissueFrame, ContactModel and CauteryContact at "
+                       "100 Hz.\n"
+                       "--pair a|b: one of two processes; --follow: the one that waits and takes over.",
+                       RunPhysics);
 }

@@ -68,6 +68,14 @@ std::size_t WriteCheckpoint(const TissueSimulation& simulation, float max_displa
   return static_cast<std::size_t>(at - slot.data());
 }
 
+std::uint64_t CheckpointSteps(std::span<const std::byte> payload) {
+  Header header{};
+  if (payload.size() >= sizeof(header)) {
+    std::memcpy(&header, payload.data(), sizeof(header));
+  }
+  return header.steps;
+}
+
 std::optional<RestoredCheckpoint> ReadCheckpoint(std::span<const std::byte> payload, TissueSimulation* simulation) {
   Header header;
   if (payload.size() < sizeof(header)) {

@@ -20,6 +20,9 @@ inline constexpr std::uint32_t kCheckpointLayout = 1;
 /// Fills `slot`, at least CheckpointCapacity() long; returns the bytes used.
 std::size_t WriteCheckpoint(const TissueSimulation& simulation, float max_displacement_m, std::span<std::byte> slot);
 
+/// How many steps had been made when it was written; 0 when the bytes are no checkpoint.
+[[nodiscard]] std::uint64_t CheckpointSteps(std::span<const std::byte> payload);
+
 struct RestoredCheckpoint {
   float max_displacement_m = 0;
 };

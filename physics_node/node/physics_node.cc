@@ -48,7 +48,7 @@ CauteryMode ModeOf(std::uint8_t pedals) {
 }  // namespace
 
 PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint,
-                         std::int64_t epoch_ns, int threads)
+                         std::int64_t epoch_ns, int threads, bool follows)
     : scene_(scene),
       ports_(ports),
       checkpoint_(checkpoint),
@@ -63,25 +63,47 @@ PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::Ch
     // Until a handle speaks, jaws neither grasp nor let go.
     input.pose.jaw_rad = 0.5f * (scene.physics.grasp_close_rad + scene.physics.grasp_open_rad);
   }
-  if (checkpoint_ == nullptr) {
+  if (checkpoint_ == nullptr || follows) {
     return;
   }
   if (const auto latest = checkpoint_->Latest()) {
-    if (const auto state = ReadCheckpoint(latest->payload, &simulation_)) {
-      restored_ = true;
-      max_displacement_m_ = state->max_displacement_m;
-      const SimulationMemory memory = simulation_.Save();
-      for (std::size_t i = 0; i < kMaxTools; ++i) {
-        if (memory.known[i]) {
-          inputs_[i] = {true, memory.pose[i]};
-        }
-      }
-    }
+    restored_ = Restore(latest->payload);
   }
 }
 
+bool PhysicsNode::Restore(std::span<const std::byte> checkpoint) {
+  const auto state = ReadCheckpoint(checkpoint, &simulation_);
+  if (!state) {
+    return false;
+  }
+  max_displacement_m_ = state->max_displacement_m;
+  const SimulationMemory memory = simulation_.Save();
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    if (memory.known[i]) {
+      inputs_[i] = {true, memory.pose[i]};
+    }
+  }
+  return true;
+}
+
+void PhysicsNode::Follow(const Tick& tick) {
+  last_index_ = tick.index;
+  // What they say is not applied before this process leads: it then goes the way of one that has just started.
+  tools_wait_ |= ports_.tools.TakeLatest(&tool_state_);
+  handles_wait_ |= ports_.handles.TakeLatest(&handle_state_);
+  topology_waits_ |= ports_.topology.TakeLatest(&topology_state_);
+}
+
+bool PhysicsNode::TakeOver(std::span<const std::byte> other, std::int64_t epoch_ns) {
+  frame_stamper_ = contact_stamper_ = cautery_stamper_ = manifest_stamper_ = bus::Stamper(epoch_ns);
+  const auto own = checkpoint_ == nullptr ? std::nullopt : checkpoint_->Latest();
+  const bool own_is_newer = own && CheckpointSteps(own->payload) > CheckpointSteps(other);
+  restored_ = Restore(own_is_newer ? own->payload : other);
+  return restored_;
+}
+
 void PhysicsNode::TakeInputs() {
-  if (ports_.tools.TakeLatest(&tool_state_)) {
+  if (ports_.tools.TakeLatest(&tool_state_) || tools_wait_) {
     for (std::size_t i = 0; i < kMaxTools; ++i) {
       const ToolSample& sample = tool_state_.tools[i];
       if (sample.kind != ToolKind::kNone && scene_.tools[i].kind != ToolKind::kNone) {
@@ -94,7 +116,7 @@ void PhysicsNode::TakeInputs() {
       }
     }
   }
-  if (ports_.handles.TakeLatest(&handle_state_)) {
+  if (ports_.handles.TakeLatest(&handle_state_) || handles_wait_) {
     for (std::size_t i = 0; i < kMaxTools; ++i) {
       const HandleSample& handle = handle_state_.handles[i];
       if (handle.present && handle.quality > 0.0f) {
@@ -102,7 +124,7 @@ void PhysicsNode::TakeInputs() {
       }
     }
   }
-  if (ports_.topology.TakeLatest(&topology_state_)) {
+  if (ports_.topology.TakeLatest(&topology_state_) || topology_waits_) {
     const int edits = topology_state_.scene_hash == scene_.hash ? simulation_.ApplyTopology(topology_state_) : -1;
     if (edits < 0) {
       topology_refused_.fetch_add(1, std::memory_order_relaxed);
@@ -110,6 +132,7 @@ void PhysicsNode::TakeInputs() {
       topology_edits_.fetch_add(static_cast<std::uint64_t>(edits), std::memory_order_relaxed);
     }
   }
+  tools_wait_ = handles_wait_ = topology_waits_ = false;
 }
 
 /// A skipped period means that the step before ran late: go on with a cheaper preset, for a while. The first step looks

@@ -4,7 +4,9 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/bus/input_account.h"
@@ -32,11 +34,18 @@ class PhysicsNode {
   /// @param checkpoint null: nothing is kept.
   /// @param epoch_ns CLOCK_MONOTONIC at the start of the process [ns].
   /// @param threads that share a step; the state does not depend on it.
+  /// @param follows begins with Follow(), and looks at the checkpoint in TakeOver() only.
   PhysicsNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint, std::int64_t epoch_ns,
-              int threads = 1);
+              int threads = 1, bool follows = false);
 
   /// One period. @pre called by one thread.
   void Step(const Tick& tick);
+
+  /// In the place of Step() while another process leads: keeps the newest inputs and publishes nothing.
+  void Follow(const Tick& tick);
+  /// From now on this process leads: goes on from the other's checkpoint (may be empty) or its own, whichever is newer.
+  /// False: there is neither. @param epoch_ns of what it publishes from now on.
+  bool TakeOver(std::span<const std::byte> other, std::int64_t epoch_ns);
 
   /// Metrics and last error. Any thread.
   void FillHealth(Health* health) const;
@@ -49,6 +58,7 @@ class PhysicsNode {
   [[nodiscard]] bool restored() const { return restored_; }
 
  private:
+  bool Restore(std::span<const std::byte> checkpoint);
   void TakeInputs();
   void MindTheTime(const Tick& tick);
   void PublishFrame(const Tick& tick);
@@ -71,6 +81,7 @@ class PhysicsNode {
   TopologyState topology_state_;
   std::array<ToolInput, kMaxTools> inputs_;
   std::array<int, kMaxTools> absent_ticks_{};
+  bool tools_wait_ = false, handles_wait_ = false, topology_waits_ = false;  ///< Came while another process led.
   std::uint64_t ticks_ = 0;
   std::uint64_t last_index_ = 0;
   int ticks_in_time_ = 0;  ///< Since the last skipped period.

@@ -58,7 +58,7 @@ template <class T>
 class HubInput final : public Input<T> {
  public:
   HubInput(std::shared_ptr<Hub<T>> hub, std::size_t depth)
-      : hub_(std::move(hub)), unread_(depth), account_(RoleOf<T>().gap_is_loss) {
+      : hub_(std::move(hub)), unread_(depth), account_(RoleOf<T>().gap_is_loss, RoleOf<T>().one_owner()) {
     const std::lock_guard lock(hub_->mutex);
     for (Ring<T>* history : hub_->history) {
       for (std::size_t i = 0; i < history->size(); ++i) unread_.Push(history->At(i));
@@ -80,7 +80,7 @@ class HubInput final : public Input<T> {
     const std::lock_guard lock(hub_->mutex);
     while (!unread_.empty()) {
       T& oldest = unread_.At(0);
-      const bool good = PassesGate(oldest);
+      const bool good = PassesGate(oldest) && account_.IsOfOwner(StampOf(oldest));
       if (good) {
         account_.Accept(StampOf(oldest));
         std::swap(*sample, oldest);

@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <limits>
 
 #include "services/bus/port.h"
 #include "services/core/messages.h"
@@ -14,7 +15,18 @@ namespace fulcrum::bus {
 /// Written by the reading thread, read by any (the health thread asks for stats).
 class InputAccount {
  public:
-  explicit InputAccount(bool gap_is_loss) : gap_is_loss_(gap_is_loss) {}
+  /// @param one_owner of two epochs only the later one is taken from.
+  explicit InputAccount(bool gap_is_loss, bool one_owner = false) : gap_is_loss_(gap_is_loss), one_owner_(one_owner) {}
+
+  /// Of the owner, as far as is known: not of a process that another one has replaced. Reading thread only.
+  /// @param now_ns an epoch after it is no process's: one such sample would shut out all that come after it [ns].
+  [[nodiscard]] bool IsOfOwner(const Stamp& stamp,
+                               std::int64_t now_ns = std::numeric_limits<std::int64_t>::max()) noexcept {
+    if (!one_owner_) return true;
+    if (stamp.epoch < owner_epoch_ || stamp.epoch > static_cast<std::uint64_t>(now_ns)) return false;
+    owner_epoch_ = stamp.epoch;
+    return true;
+  }
 
   /// A sample that passed the gate.
   void Accept(const Stamp& stamp) noexcept {
@@ -74,7 +86,8 @@ class InputAccount {
     std::uint64_t last_sequence = 0;  ///< 0: entry unused.
   };
 
-  const bool gap_is_loss_;
+  const bool gap_is_loss_, one_owner_;
+  std::uint64_t owner_epoch_ = 0;
   std::array<Writer, 16> writers_{};  ///< More than the nodes of a cart; the oldest entry makes room.
   std::size_t next_victim_ = 0;
   // Relaxed: each counter stands for itself and nothing is published through it.

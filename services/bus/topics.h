@@ -29,6 +29,11 @@ struct TopicRole {
   bool gap_is_loss;
   int writer_depth;
   int reader_depth;
+  /// One process at a time sends it: once a later epoch has been heard, what an earlier one still sends is refused.
+  [[nodiscard]] constexpr bool one_owner() const {
+    return id != TopicId::kCommand && id != TopicId::kCommandReply && id != TopicId::kTickManifest &&
+           id != TopicId::kHealth;
+  }
 };
 
 // Reader depths cover the slowest reader of a topic between two looks: a software frame on a loaded machine takes up to

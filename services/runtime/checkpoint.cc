@@ -199,6 +199,36 @@ CheckpointFile::CheckpointFile(const std::filesystem::path& file, std::uint64_t 
 
 CheckpointFile::~CheckpointFile() = default;
 
+std::optional<std::vector<std::byte>> CheckpointFile::Peek(const std::filesystem::path& file, std::uint64_t scene_hash,
+                                                           std::uint32_t layout_version, std::size_t capacity_bytes) {
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  FileHeader found{};
+  if (fd.get() < 0 || ::pread(fd.get(), &found, sizeof(found), 0) != static_cast<ssize_t>(sizeof(found)) ||
+      found != FileHeader{kMagic, scene_hash, layout_version, capacity_bytes}) {
+    return std::nullopt;
+  }
+  const std::size_t stride = kPage + RoundUpToPage(capacity_bytes);
+  std::optional<std::vector<std::byte>> newest;
+  std::uint64_t newest_sequence = 0;
+  for (std::size_t i = 0; i < 2; ++i) {
+    SlotHeader header{};
+    const auto at = static_cast<off_t>(kPage + i * stride);
+    if (::pread(fd.get(), &header, sizeof(header), at) != static_cast<ssize_t>(sizeof(header)) ||
+        header.sequence <= newest_sequence || header.bytes > capacity_bytes) {
+      continue;
+    }
+    // The copy is judged, not the slot: whoever writes may go on meanwhile.
+    std::vector<std::byte> payload(header.bytes);
+    if (::pread(fd.get(), payload.data(), payload.size(), at + static_cast<off_t>(kPage)) ==
+            static_cast<ssize_t>(payload.size()) &&
+        Checksum(header.sequence, payload) == header.checksum) {
+      newest_sequence = header.sequence;
+      newest = std::move(payload);
+    }
+  }
+  return newest;
+}
+
 std::optional<CheckpointFile::Loaded> CheckpointFile::Latest() const {
   if (impl_->newest < 0) {
     return std::nullopt;

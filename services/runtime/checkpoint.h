@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace fulcrum::runtime {
 
@@ -21,6 +22,13 @@ class CheckpointFile {
   ~CheckpointFile();
   CheckpointFile(const CheckpointFile&) = delete;
   CheckpointFile& operator=(const CheckpointFile&) = delete;
+
+  /// Newest whole slot of a file that another process may hold and may have been stopped over. Nothing when there is
+  /// none, or when the file is of another scene, layout or capacity.
+  [[nodiscard]] static std::optional<std::vector<std::byte>> Peek(const std::filesystem::path& file,
+                                                                  std::uint64_t scene_hash,
+                                                                  std::uint32_t layout_version,
+                                                                  std::size_t capacity_bytes);
 
   struct Loaded {
     std::uint64_t sequence;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <fastdds/dds/core/LoanableSequence.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
@@ -68,7 +69,7 @@ class InputBase : public Input<T> {
       : events_(std::move(notify)),
         subscriber_(subscriber),
         reader_(subscriber->create_datareader(topic, qos, &events_, events_.mask())),
-        account_(RoleOf<T>().gap_is_loss) {}
+        account_(RoleOf<T>().gap_is_loss, RoleOf<T>().one_owner()) {}
   ~InputBase() override {
     if (reader_ == nullptr) return;
     reader_->set_listener(nullptr);
@@ -81,6 +82,11 @@ class InputBase : public Input<T> {
   InputStats stats() const override { return account_.stats(events_.any()); }
 
  protected:
+  /// steady_clock is CLOCK_MONOTONIC, the clock of all stamps.
+  [[nodiscard]] bool IsOfOwner(const T& sample) noexcept {
+    return account_.IsOfOwner(StampOf(sample), std::chrono::steady_clock::now().time_since_epoch().count());
+  }
+
   ReaderEvents events_;
   fast::Subscriber* subscriber_;
   fast::DataReader* reader_;
@@ -102,7 +108,7 @@ class DdsInput final : public InputBase<T> {
   bool TakeNext(T* sample) override {
     while (TakeWire()) {
       FromWire(wire_, &candidate_);
-      if (PassesGate(candidate_)) {
+      if (PassesGate(candidate_) && this->IsOfOwner(candidate_)) {
         this->account_.Accept(StampOf(candidate_));
         std::swap(*sample, candidate_);
         return true;
@@ -164,7 +170,7 @@ class DdsInput<T> final : public InputBase<T> {
       const bool complete = FromLoan(loan(i), &candidate_);
       // The writer may have taken the place back while we read: only now is it known whether what we have is whole.
       if (!this->reader_->is_sample_valid(data[i], &infos_[i])) continue;
-      if (!complete || !PassesGate(candidate_)) {
+      if (!complete || !PassesGate(candidate_) || !this->IsOfOwner(candidate_)) {
         this->account_.Reject();
         continue;
       }
