@@ -1,14 +1,15 @@
 // Principal curvatures at a contact: on shapes that have known ones, with noise, with a border, with triangles that are
-// none; and what the contact model sends.
+// none.
 #include "physics_node/contact_model/surface_curvature.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <random>
+#include <vector>
 
-#include "physics_node/simulation/tissue_simulation.h"
 #include "services/scene/build.h"
 #include "tests/unit/physics/sheet_scene.h"
 
