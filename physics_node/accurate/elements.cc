@@ -20,6 +20,11 @@ constexpr float kContactDamping = 1.0f;
 /// A contact's viscosity against sliding over its normal stiffness, at most [s]. By time and not by substep: else what
 /// sticks creeps slowly in long substeps and at once in short ones.
 constexpr float kSlideTime = 3e-4f;
+/// Depth over which the contact of a tool gets stiff [m]: more than a tool moves in a substep (0.06 mm at most while it
+/// presses). Stiff at once, contacts come and go all together: in one substep some are missing from the linearisation,
+/// in the next they push back what fell in meanwhile, and the force of a tool that moves along a surface, be it by the
+/// rounding of its place, jumps by more than itself.
+constexpr float kOnset = 8e-5f;
 
 template <class Sum>
 Vec3f Combine(const Sum& e, const float* field) {
@@ -78,6 +83,22 @@ bool AnyMarked(const Sum& e, const Regions& regions, std::span<const std::uint8_
   return false;
 }
 
+/// Of a contact `depth` deep, without damping.
+struct Elastic {
+  float force;      ///< [N]
+  float stiffness;  ///< d force / d depth [N/m]
+  float energy;     ///< [J]
+};
+Elastic ElasticOf(const ContactRow& row, float depth) {
+  const float full = Elements::ContactStiffness(row), onset = Elements::IsTissue(row) ? 0.0f : kOnset;
+  if (depth < onset) {
+    const float stiffness = full * depth / onset;
+    return {0.5f * stiffness * depth, stiffness, stiffness * depth * depth / 6.0f};
+  }
+  const float past = depth - 0.5f * onset;
+  return {full * past, full, full * (0.5f * past * past + onset * onset / 24.0f)};
+}
+
 /// What a contact does to its particles at `place`.
 struct ContactState {
   float stiffness, damping;  ///< [N/m]; damping against the movement in this substep.
@@ -94,10 +115,11 @@ ContactState StateOf(float h, const ContactRow& row, const Vec3f& here, const fl
   if (!(gap < 0.0f)) {
     return state;
   }
-  state.stiffness = Elements::ContactStiffness(row);
+  const Elastic elastic = ElasticOf(row, -gap);
+  state.stiffness = elastic.stiffness;
   state.damping = kContactDamping * state.stiffness;
   const float approach = row.normal.dot(moved);
-  state.force = -state.stiffness * gap - state.damping * approach;
+  state.force = elastic.force - state.damping * approach;
   // Coulomb with the normal force at hand, viscous below it.
   state.slide = moved - approach * row.normal;
   state.tangential = std::min(kSlideTime / h * state.stiffness,
@@ -109,8 +131,9 @@ ContactState StateOf(float h, const ContactRow& row, const Vec3f& here, const fl
 
 float Elements::ContactStiffness(const ContactRow& row) {
   constexpr float kTool = 2000.0f, kTissue = 30.0f;
-  return (row.source & TissueCollision::kSource) != 0 ? kTissue : kTool;
+  return IsTissue(row) ? kTissue : kTool;
 }
+bool Elements::IsTissue(const ContactRow& row) { return (row.source & TissueCollision::kSource) != 0; }
 
 Elements::Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
     : hinges_(model, particles), guard_(model) {
@@ -231,8 +254,8 @@ double Elements::Energy(const float* place, std::span<const ContactRow> contacts
     sum += 0.5 * static_cast<double>(binding_rest_[i].stiffness * stretch * stretch);
   }
   for (const ContactRow& row : contacts) {
-    const float gap = std::min(row.normal.dot(Combine(row, place)) - row.offset, 0.0f);
-    sum += 0.5 * static_cast<double>(ContactStiffness(row) * gap * gap);
+    const float depth = std::max(row.offset - row.normal.dot(Combine(row, place)), 0.0f);
+    sum += static_cast<double>(depth > 0.0f ? ElasticOf(row, depth).energy : 0.0f);
   }
   return sum;
 }

@@ -67,6 +67,8 @@ class Elements {
   /// Stiffness of a contact in its normal direction: of tissue against a tool, and of soft tissue against tissue; an
   /// edge of the membrane has some 200 N/m [N/m].
   [[nodiscard]] static float ContactStiffness(const ContactRow& row);
+  /// Of tissue with tissue, not with a tool.
+  [[nodiscard]] static bool IsTissue(const ContactRow& row);
 
  private:
   struct BindingRest {

@@ -32,6 +32,7 @@ ContactProbe::ContactProbe(const SceneView& scene, const TissueModel* model, con
       model_(model),
       particles_(particles),
       elastic_(scene, model, particles),
+      curvature_(scene, model, particles),
       compliance_(scene.physics.dt_s) {}
 
 ContactProbe::Motion ContactProbe::MeanMotion(std::span<const Index> particles) const {
@@ -238,6 +239,11 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   const float dent = -memory.normal.dot(memory.u);
   contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - scene_.physics.collision_margin_m);
   contact.p_s = pose.p_WT + (touching ? push / contact.k1 + dent : -contact.gap) * memory.normal;
+  const PrincipalCurvatures surface = RolledOver(curvature_.At(nearest, touching, memory.normal),
+                                                 scene_.tools[tool].tip_radius_m + scene_.physics.collision_margin_m);
+  contact.e1 = surface.e1;
+  contact.kappa1 = surface.kappa1;
+  contact.kappa2 = surface.kappa2;
   contact.radius = kSurfaceRadius;
   device.p_ext_W = std::clamp(memory.force.dot(memory.v_s), 0.0f, kMostExternal);
   device.contacts[device.count++] = contact;

@@ -10,6 +10,8 @@
 //   k_body  twice the secant f / u (a sheet in tension stiffens with depth: its tangent lies above the secant; too
 //           soft a model would be active, too stiff only dissipates), within [kMinBody, kMaxBody]
 //   b_body  k_body * kRelaxation
+//   kappa   of the surface as it would be without this tool, as u_c and p_s mean it: before touch the present shape,
+//           from touch on the shape at rest (the present one is the dent), seen by the middle of a tip that rolls on it
 // Both are asked of the solver instead where it offers a ComplianceSolver.
 #pragma once
 
@@ -19,6 +21,7 @@
 #include "physics_node/collision/tool_collision.h"
 #include "physics_node/contact_model/compliance_probe.h"
 #include "physics_node/contact_model/elastic_force.h"
+#include "physics_node/contact_model/surface_curvature.h"
 #include "physics_node/grasp/grasp.h"
 
 namespace fulcrum::physics {
@@ -68,6 +71,7 @@ class ContactProbe {
   const TissueModel* model_;
   const ParticleStore* particles_;
   ElasticForce elastic_;
+  SurfaceCurvature curvature_;
   std::array<ToolMemory, kMaxTools> tools_;
   ComplianceProbe compliance_;
   ComplianceSolver* solver_ = nullptr;

@@ -1,8 +1,10 @@
 // What the tools' collision costs in each step of the built-in scene's script.
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 
 #include "physics_node/collision/tissue_collision.h"
+#include "physics_node/contact_model/surface_curvature.h"
 #include "services/scene/build.h"
 #include "tests/benchmark/report.h"
 #include "tests/numerics/physics/script_player.h"
@@ -19,11 +21,13 @@ double NowUs() {
 /// Microseconds per tool of one step.
 struct Cost {
   double find = 3e38, project = 3e38, rows = 3e38;
-  double tissue = 3e38;  ///< Not per tool.
+  double curvature = 3e38;  ///< Of all tools that are near a surface; 0: none is.
+  double tissue = 3e38;     ///< Not per tool.
   void TakeLess(const Cost& other) {
     find = std::min(find, other.find);
     project = std::min(project, other.project);
     rows = std::min(rows, other.rows);
+    curvature = std::min(curvature, other.curvature);
     tissue = std::min(tissue, other.tissue);
   }
 };
@@ -39,6 +43,7 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
   TissueModel model(scene, &particles);
   ToolCollision collision(scene, &model, &particles);
   TissueCollision tissue(scene, &model, &particles);
+  SurfaceCurvature curvature(scene, &model, &particles);
   std::vector<Cost> costs;
   std::vector<float> moved, xyz(3 * std::size_t{particles.particle_count()}), previous(xyz.size());
   std::vector<ContactRow> rows;
@@ -89,8 +94,22 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
       tissue.Rows(u, u + 0.5f, &rows);
     }
     const double t5 = NowUs();
+    std::array<SurfacePoint, kMaxTools> nearest;
+    for (std::size_t i = 0; i < kMaxTools; ++i) {
+      constexpr float kReach = 0.010f;
+      nearest[i] =
+          tools[i].present ? collision.Nearest(WorkingLine(scene.tools[i], tools[i].pose), kReach) : nearest[i];
+    }
+    const double t6 = NowUs();
+    for (const SurfacePoint& point : nearest) {
+      (void)curvature.At(point, false, (point.closest.on_segment - point.closest.on_triangle).stableNormalized());
+    }
+    const double t7 = NowUs();
     most->tissue_rows = std::max(most->tissue_rows, rows.size());
-    costs.push_back({(t1 - t0) / count, (t3 - t2) / count, (t2 - t1) / count, t5 - t4});
+    costs.push_back(
+        {(t1 - t0) / count, (t3 - t2) / count, (t2 - t1) / count,
+         std::any_of(nearest.begin(), nearest.end(), [](const SurfacePoint& p) { return p.found; }) ? t7 - t6 : 0,
+         t5 - t4});
     most->pairs = std::max(most->pairs, collision.pairs().size());
   }
   return costs;
@@ -106,10 +125,13 @@ void Collide(const SceneView& scene, benchmark::Report* report) {
       costs[i].TakeLess(again[i]);
     }
   }
-  std::vector<double> find, with_rows, with_projection, tissue;
+  std::vector<double> find, with_rows, with_projection, curvature, tissue;
   for (const Cost& cost : costs) {
     find.push_back(cost.find);
     tissue.push_back(cost.tissue);
+    if (cost.curvature > 0) {
+      curvature.push_back(cost.curvature);  // Of the tools that are near a surface.
+    }
     with_rows.push_back(cost.find + cost.rows);
     with_projection.push_back(cost.find + cost.project);
   }
@@ -119,6 +141,8 @@ void Collide(const SceneView& scene, benchmark::Report* report) {
   report->Add("physics.collide.paper_us_per_tool_p99", Quantile(with_projection, 0.99), "us");
   report->Add("physics.collide.find_us_per_tool_p50", Quantile(find, 0.5), "us");
   report->Add("physics.collide.find_us_per_tool_p99", Quantile(find, 0.99), "us");
+  report->Add("physics.collide.curvature_us_p50", Quantile(curvature, 0.5), "us");
+  report->Add("physics.collide.curvature_us_p99", Quantile(curvature, 0.99), "us");
   report->Add("physics.collide.tissue_us_p50", Quantile(tissue, 0.5), "us");
   report->Add("physics.collide.tissue_us_p99", Quantile(tissue, 0.99), "us");
   report->Add("physics.collide.tissue_rows_max", static_cast<double>(most.tissue_rows), "1");
