@@ -16,8 +16,9 @@ constexpr float kTransition = 0.006f;      // From the tip's radius to the shaft
 constexpr float kLeastPenumbra = 0.6e-3f;  // [m]
 constexpr float kPenumbra = 0.05f;  // Half width of the soft edge per height: what the crescent of fibres subtends.
 constexpr float kDarkest = 0.62f;
-constexpr float kFade = 0.10f;  // At this height half of the darkness is left: light from the walls fills it [m].
-constexpr int kFillRounds = 4;   // Vertices of what stands still lie several cells apart.
+constexpr float kFade = 0.10f;     // At this height half of the darkness is left: light from the walls fills it [m].
+constexpr float kTipEnd = 0.005f;  // [m]
+constexpr int kFillRounds = 4;     // Vertices of what stands still lie several cells apart.
 
 float SmoothStep(float low, float high, float x) {
   const float t = std::clamp((x - low) / (high - low), 0.0f, 1.0f);
@@ -117,8 +118,8 @@ float ToolShadow::DepthAt(const Vec2f& direction) const {
 
 void ToolShadow::AppendRibbon(const Laparoscope& scope, const ToolDescription& tool, const ToolSample& sample) {
   struct Section {
-    Vec3f ray;  // From the light to the axis, camera frame.
-    float radius, depth;
+    Vec3f ray;                        // From the light to the axis, camera frame.
+    float behind_tip, radius, depth;  // [m]
   };
   std::array<Section, kSamples> sections;
   const Mat3f turn = scope.view.block<3, 3>(0, 0);
@@ -129,6 +130,7 @@ void ToolShadow::AppendRibbon(const Laparoscope& scope, const ToolDescription& t
     const float share = static_cast<float>(k) / (kSamples - 1);
     const float behind_tip_m = std::min(kLength, tool.shaft_length_m) * (0.35f * share + 0.65f * share * share);
     Section& section = sections[static_cast<std::size_t>(k)];
+    section.behind_tip = behind_tip_m;
     section.ray = tip + behind_tip_m * back - light;
     section.radius = RadiusAt(tool, behind_tip_m);
     section.depth = section.ray.z() < 0 ? DepthAt(section.ray.head<2>() / -section.ray.z()) : 0;
@@ -144,12 +146,16 @@ void ToolShadow::AppendRibbon(const Laparoscope& scope, const ToolDescription& t
     const float height = depth + here.ray.z();
     const Vec3f place = light + magnified * here.ray;
     const Vec3f across = (after.ray / -after.ray.z() - before.ray / -before.ray.z()).cross(place).normalized();
-    const float core = magnified * here.radius, penumbra = kLeastPenumbra + kPenumbra * std::max(0.0f, height);
+    // The tip's end is round and soft.
+    const float end = std::min(1.0f, here.behind_tip / kTipEnd);
+    const float core = magnified * here.radius * std::sqrt(end),
+                penumbra = kLeastPenumbra + kPenumbra * std::max(0.0f, height);
     const float share = static_cast<float>(k) / (kSamples - 1);
     // Nothing where the tissue is unknown or the instrument dips into it; the ends fade out.
-    const float opacity = known && here.ray.z() < 0 && k > 0
+    const float opacity = known && here.ray.z() < 0
                               ? kDarkest * std::min(1.0f, core / penumbra) * kFade / (kFade + std::max(0.0f, height)) *
-                                    SmoothStep(-here.radius, 0.5f * here.radius, height) * SmoothStep(1.0f, 0.8f, share)
+                                    SmoothStep(-here.radius, 0.5f * here.radius, height) *
+                                    SmoothStep(1.0f, 0.8f, share) * SmoothStep(0.0f, 1.0f, end)
                               : 0.0f;
     const float half_width = core + penumbra;
     const float in_front = std::clamp(0.7f * height, 0.0005f, 0.004f);

@@ -304,6 +304,22 @@ void CheckConstraints(const SceneView& s) {
   CheckColours("binding_colours", s.binding_colours, s.bindings, total);
 }
 
+/// A mesh that is a range of shared vertices and triangles.
+template <class Mesh>
+void CheckRanges(const char* section, std::size_t element, const Mesh& mesh, std::span<const Vec3f> vertices,
+                 const char* triangle_section, std::span<const Triangle> triangles) {
+  const std::uint64_t vertex_end = static_cast<std::uint64_t>(mesh.first_vertex) + mesh.vertex_count;
+  const std::uint64_t triangle_end = static_cast<std::uint64_t>(mesh.first_triangle) + mesh.triangle_count;
+  if (vertex_end > vertices.size() || triangle_end > triangles.size()) {
+    Fail(section, "element ", element, ": reaches beyond the vertices or triangles");
+  }
+  for (std::uint64_t k = mesh.first_triangle; k < triangle_end; ++k) {
+    for (const Index v : triangles[k]) {
+      CheckIndex(triangle_section, k, v, mesh.first_vertex, vertex_end);
+    }
+  }
+}
+
 void CheckSurfaces(const SceneView& s) {
   for (std::size_t i = 0; i < s.tube_surface.size(); ++i) {
     for (const Index v : s.tube_surface[i]) {
@@ -325,23 +341,46 @@ void CheckSurfaces(const SceneView& s) {
   }
   for (std::size_t i = 0; i < s.static_surfaces.size(); ++i) {
     const StaticSurface& f = s.static_surfaces[i];
-    const std::uint64_t vertex_end = static_cast<std::uint64_t>(f.first_vertex) + f.vertex_count;
-    const std::uint64_t triangle_end = static_cast<std::uint64_t>(f.first_triangle) + f.triangle_count;
-    if (vertex_end > s.static_vertices.size() || triangle_end > s.static_triangles.size()) {
-      Fail("static_surfaces", "element ", i, ": reaches beyond the vertices or triangles");
-    }
+    CheckRanges("static_surfaces", i, f, s.static_vertices, "static_triangles", s.static_triangles);
     if (std::memchr(f.name, 0, sizeof(f.name)) == nullptr || f.role > SurfaceRole::kOther || f.collides > 1) {
       Fail("static_surfaces", "element ", i, ": bad name, role or flag");
-    }
-    for (std::uint64_t k = f.first_triangle; k < triangle_end; ++k) {
-      for (const Index v : s.static_triangles[k]) {
-        CheckIndex("static_triangles", k, v, f.first_vertex, vertex_end);
-      }
     }
   }
   for (std::size_t i = 0; i < s.static_triangles.size(); ++i) {
     for (const Index v : s.static_triangles[i]) {
       CheckIndex("static_triangles", i, v, 0, s.static_vertices.size());
+    }
+  }
+}
+
+void CheckToolMeshes(const SceneView& s) {
+  for (std::size_t i = 0; i < s.tool_vertices.size(); ++i) {
+    CheckPoint("tool_vertices", i, s.tool_vertices[i]);
+  }
+  std::array<std::uint32_t, kMaxTools> parts{};  // Bit per part.
+  for (std::size_t i = 0; i < s.tool_meshes.size(); ++i) {
+    const ToolMesh& mesh = s.tool_meshes[i];
+    CheckIndex("tool_meshes", i, mesh.tool, 0, kMaxTools);
+    if (mesh.part > ToolPart::kJawMinus) {
+      Fail("tool_meshes", "element ", i, ": unknown part ", static_cast<std::uint32_t>(mesh.part));
+    }
+    const std::uint32_t part = 1u << static_cast<std::uint32_t>(mesh.part);
+    if ((parts[mesh.tool] & part) != 0) {
+      Fail("tool_meshes", "element ", i, ": a part of tool ", mesh.tool, " twice");
+    }
+    parts[mesh.tool] |= part;
+    CheckRanges("tool_meshes", i, mesh, s.tool_vertices, "tool_triangles", s.tool_triangles);
+  }
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const ToolKind kind = s.tools[k].kind;
+    const std::uint32_t whole = kind == ToolKind::kNone ? 0 : kind == ToolKind::kHook ? 1 : 7;
+    if (parts[k] != 0 && parts[k] != whole) {
+      Fail("tool_meshes", "tool ", k, ": not the parts that its kind has");
+    }
+  }
+  for (std::size_t i = 0; i < s.tool_triangles.size(); ++i) {
+    for (const Index v : s.tool_triangles[i]) {
+      CheckIndex("tool_triangles", i, v, 0, s.tool_vertices.size());
     }
   }
 }
@@ -386,6 +425,7 @@ std::optional<SceneFault> FindFault(const SceneView& scene) {
     CheckParticles(scene);
     CheckConstraints(scene);
     CheckSurfaces(scene);
+    CheckToolMeshes(scene);
     CheckStructuresAndScript(scene);
   } catch (const Fault& fault) {
     return fault.what;
