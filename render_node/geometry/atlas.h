@@ -42,7 +42,7 @@ class Atlas {
   /// The texel at (s, t) [m]; nothing outside the sheet.
   [[nodiscard]] std::optional<std::array<std::uint8_t, 4>> At(const Vec2f& material) const;
 
-  /// Tissue within 3 mm of (s, t) [m] has been damaged or cut.
+  /// In the block of 16 x 16 texels at (s, t) [m] tissue has been damaged or cut.
   [[nodiscard]] bool Touched(const Vec2f& material) const;
   /// Counts the times that Touched() has become true somewhere.
   [[nodiscard]] std::uint64_t touches() const { return touches_; }

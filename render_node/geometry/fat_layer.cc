@@ -84,4 +84,19 @@ void FatLayer::Update(std::span<const float> xyz, const MembraneMesh& membrane) 
   ComputeNormals(positions_, triangles_, normals_);
 }
 
+void FatLayer::FindBared(const std::function<bool(const Vec2f& material)>& opened, const MembraneMesh& membrane,
+                         std::vector<float>* bared) const {
+  bared->assign(anchors_.size(), 0.0f);
+  for (std::size_t k = 0; k < anchors_.size(); ++k) {
+    (*bared)[k] = opened(materials_[k]) || membrane.node_gone(anchors_[k].node) ? 1.0f : 0.0f;
+  }
+  for (const Triangle& t : triangles_) {
+    if ((*bared)[t[0]] == 1 || (*bared)[t[1]] == 1 || (*bared)[t[2]] == 1) {
+      for (const Index corner : t) {
+        (*bared)[corner] = std::max((*bared)[corner], 0.5f);
+      }
+    }
+  }
+}
+
 }  // namespace fulcrum::render

@@ -2,6 +2,7 @@
 // follows both (the binding of the paper's eq. 9, used here for a position instead of a force). Pure.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -24,6 +25,10 @@ class FatLayer {
   /// 0 where membrane and tube lie as close as anywhere, 1 where there is room for 4 mm more fat. At rest.
   [[nodiscard]] std::span<const float> thickness() const { return thickness_; }
   [[nodiscard]] std::span<const Triangle> triangles() const { return triangles_; }
+  /// How far each vertex has been laid bare, 0 … 1: 1 where `opened` says so of (s, t) [m] or the membrane above is
+  /// gone, half beside such a vertex, nothing farther away, so that it ends within triangles and not with them.
+  void FindBared(const std::function<bool(const Vec2f& material)>& opened, const MembraneMesh& membrane,
+                 std::vector<float>* bared) const;
 
  private:
   struct Anchor {

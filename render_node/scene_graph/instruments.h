@@ -1,4 +1,5 @@
-// The instruments: built once from the scene's tools, posed by ToolState and opened by HandleState.
+// The instruments: built once from the scene's tools, from their meshes where it has some, posed by ToolState and
+// opened by HandleState.
 #pragma once
 
 #include <array>
@@ -21,9 +22,14 @@ class Instruments {
  private:
   struct Instrument {
     osg::ref_ptr<osg::MatrixTransform> body;
-    std::array<osg::ref_ptr<osg::MatrixTransform>, 2> jaws;
+    std::array<osg::ref_ptr<osg::MatrixTransform>, 2> jaws;  // They open towards +x and -x.
+    // From a jaw's own frame to frame T, closed.
+    std::array<osg::Matrix, 2> closed;
     float hinge_m = 0;
   };
+  static void Build(const ToolDescription& tool, Instrument* instrument);
+  static void BuildFromMeshes(const SceneView& scene, std::uint32_t tool, Instrument* instrument);
+
   osg::ref_ptr<osg::Group> root_;
   std::array<Instrument, kMaxTools> instruments_;
 };

@@ -9,10 +9,12 @@
 #include "render_node/geometry/bleeding.h"
 #include "render_node/geometry/texel.h"
 #include "render_node/geometry/tissue_pattern.h"
+#include "render_node/geometry/tool_shadow.h"
 #include "render_node/scene_graph/atlas_texture.h"
 #include "render_node/scene_graph/instruments.h"
 #include "render_node/scene_graph/optics.h"
 #include "render_node/scene_graph/order.h"
+#include "render_node/scene_graph/program.h"
 #include "render_node/scene_graph/smoke.h"
 #include "render_node/scene_graph/surroundings.h"
 #include "render_node/scene_graph/tissue_layers.h"
@@ -37,6 +39,7 @@ struct LaparoscopeView::Impl {
   explicit Impl(const SceneView& view);
   void BindTextures();
   void ShowFat();
+  void CastShadows();
   void ShineFrom(const Laparoscope& from);
 
   SceneView scene;
@@ -46,6 +49,10 @@ struct LaparoscopeView::Impl {
   TissueLayers layers;
   Surroundings surroundings;
   Instruments instruments;
+  ToolShadow shadow;
+  Mesh shadow_mesh{"shadow", true};
+  std::array<ToolSample, kMaxTools> tools{};
+  bool tools_moved = true;
   Smoke smoke;
   std::vector<std::uint8_t> serosa = MakeSerosaPattern(kSerosaTexels);
   Bleeding bleeding;
@@ -70,15 +77,21 @@ LaparoscopeView::Impl::Impl(const SceneView& view)
       layers(view, scope),
       surroundings(view, scope),
       instruments(view),
+      shadow(view),
       bleeding(view, serosa, kSerosaTexels, kSerosaPerMetre),
       overlay(static_cast<int>(view.render.width), static_cast<int>(view.render.height)),
       optics(scope, static_cast<int>(view.render.width), static_cast<int>(view.render.height), surroundings.fixed(),
              scene_root) {
   DrawIn(Order::kInstruments, instruments.node()->getOrCreateStateSet());
-  Blend(smoke.state());
-  smoke.state()->setAttributeAndModes(new osg::Depth(osg::Depth::LESS, 0, 1, false));
+  shadow_mesh.state()->setAttributeAndModes(MakeProgram("shadow.vert", "shadow.frag"));
+  DrawIn(Order::kShadow, shadow_mesh.state());
   DrawIn(Order::kSmoke, smoke.state());
+  for (osg::StateSet* state : {shadow_mesh.state(), smoke.state()}) {
+    Blend(state);
+    state->setAttributeAndModes(new osg::Depth(osg::Depth::LESS, 0, 1, false));
+  }
   const osg::ref_ptr<osg::Geode> effects = new osg::Geode;
+  effects->addDrawable(shadow_mesh.geometry());
   effects->addDrawable(smoke.geometry());
   for (osg::Node* node :
        std::initializer_list<osg::Node*>{surroundings.breathing(), layers.node(), instruments.node(), effects.get()}) {
@@ -138,15 +151,24 @@ void LaparoscopeView::Impl::ShowFat() {
   const auto wrapped = [](float value) {
     return static_cast<int>(std::floor(value * kNoiseTexels)) & (kNoiseTexels - 1);
   };
-  layers.ShowFat([&](const Vec2f& m, float thickness) {
+  const auto visible = [&](const Vec2f& m, float thickness) {
     const std::size_t texel = TexelIndex(wrapped(9 * m.x()), wrapped(9 * m.y()), kNoiseTexels);
     const float cover = 0.8f * static_cast<float>(noise[4 * texel]) / 255 + 0.45f * thickness;
     const Vec2f place = m.cwiseProduct(Vec2f(1 / size.x(), 1 / size.y()));
     const int x = std::min(structures.width - 1, static_cast<int>(place.x() * static_cast<float>(structures.width)));
     const int y = std::min(structures.height - 1, static_cast<int>(place.y() * static_cast<float>(structures.height)));
     const std::uint8_t* structure = structures.texels.data() + 2 * TexelIndex(x, y, structures.width);
-    return cover > kFatCover || structure[0] > 0 || structure[1] > 0 || atlas.Touched(m);
-  });
+    return cover > kFatCover || structure[0] > 0 || structure[1] > 0;
+  };
+  layers.ShowFat(visible, [&](const Vec2f& m) { return atlas.Touched(m); });
+}
+
+void LaparoscopeView::Impl::CastShadows() {
+  tools_moved = false;
+  shadow.Update(scope, layers.particles(), tools);
+  shadow_mesh.SetPositions(shadow.positions());
+  shadow_mesh.SetCoordinates(shadow.coordinates());
+  shadow_mesh.SetTriangles(shadow.triangles());
 }
 
 LaparoscopeView::LaparoscopeView(const SceneView& scene) : impl_(std::make_unique<Impl>(scene)) { Update(); }
@@ -170,6 +192,7 @@ bool LaparoscopeView::SetTopology(const TopologyState& topology) {
     return false;
   }
   impl_->atlas_texture.Update(impl_->atlas.PaintCuts(impl_->scene, topology));
+  impl_->fat_touches = ~std::uint64_t{0};  // Pieces may be gone.
   return true;
 }
 
@@ -185,6 +208,8 @@ bool LaparoscopeView::ApplyPatch(const TemperaturePatch& patch) {
 
 void LaparoscopeView::SetTool(int tool, const ToolSample& sample) {
   impl_->instruments.SetPose(tool, sample);
+  impl_->tools[static_cast<std::size_t>(tool)] = sample;
+  impl_->tools_moved = true;
   impl_->optics.SceneChanged();
 }
 
@@ -210,6 +235,10 @@ void LaparoscopeView::Update() {
   impl_->ShowFat();
   if (impl_->layers.Update()) {
     impl_->optics.SceneChanged();
+    impl_->tools_moved = true;
+  }
+  if (impl_->tools_moved) {
+    impl_->CastShadows();
   }
 }
 

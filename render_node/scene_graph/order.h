@@ -7,7 +7,7 @@ namespace fulcrum::render {
 
 /// Near to far among the opaque ones, so that hidden fragments are not shaded; then the layers that let light through,
 /// from the inside out.
-enum class Order { kBackground, kMask, kInstruments, kRectum, kSurroundings, kFat, kBlood, kMembrane, kSmoke };
+enum class Order { kBackground, kMask, kInstruments, kRectum, kSurroundings, kFat, kMembrane, kShadow, kSmoke };
 
 /// Texture units; the samplers of all programs are bound once at the scene's root.
 enum TextureUnit { kAtlasUnit, kNoiseUnit, kSerosaUnit, kStructureUnit };

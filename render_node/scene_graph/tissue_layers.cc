@@ -18,6 +18,7 @@ constexpr std::uint32_t kFatStride = 2;
 // Layers of tissue that press on each other overlap by a millimetre in the simulation: the inner one gives way.
 constexpr float kFatBehind = 0.0015f;     // [m]
 constexpr float kRectumBehind = 0.0025f;  // [m]
+constexpr float kFasciaDepth = 0.0006f;   // [m] Below the peritoneum: as near as the fat comes.
 
 Vec3f EyeOf(const Laparoscope& scope) {
   return -scope.view.block<3, 3>(0, 0).transpose() * scope.view.block<3, 1>(0, 3);
@@ -82,15 +83,9 @@ void TissueLayers::AddSheets() {
   Add(&fat_layer_, "fat", Order::kFat, "fat.frag");
   Blend(fat_layer_.mesh->state());
   fat_layer_.mesh->state()->addUniform(new osg::Uniform("behind", kFatBehind));
-  std::vector<Float4> coordinates;
-  for (std::size_t k = 0; k < fat_.materials().size(); ++k) {
-    const Vec2f& m = fat_.materials()[k];
-    coordinates.push_back({m.x(), m.y(), fat_.thickness()[k], 0});
-  }
-  fat_layer_.mesh->SetCoordinates(coordinates);
-
   Add(&sheet_, "membrane", Order::kMembrane, "membrane.frag");
   Blend(sheet_.mesh->state());
+  sheet_.mesh->state()->addUniform(new osg::Uniform("fascia_depth", kFasciaDepth));
 }
 
 void TissueLayers::SetTissue(std::span<const float> xyz) {
@@ -113,11 +108,17 @@ void TissueLayers::SetScope(const Laparoscope& scope) {
   scope_changed_ = true;
 }
 
-void TissueLayers::ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible) {
+void TissueLayers::ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible,
+                           const std::function<bool(const Vec2f& material)>& opened) {
+  fat_.FindBared(opened, membrane_, &fat_bared_);
   std::vector<std::uint8_t> seen(fat_.materials().size());
+  std::vector<Float4> coordinates(seen.size());
   for (std::size_t k = 0; k < seen.size(); ++k) {
-    seen[k] = visible(fat_.materials()[k], fat_.thickness()[k]) ? 1 : 0;
+    const Vec2f& m = fat_.materials()[k];
+    seen[k] = fat_bared_[k] > 0 || visible(m, fat_.thickness()[k]) ? 1 : 0;
+    coordinates[k] = {m.x(), m.y(), fat_.thickness()[k], fat_bared_[k]};
   }
+  fat_layer_.mesh->SetCoordinates(coordinates);
   fat_shown_.clear();
   for (const Triangle& t : fat_.triangles()) {
     if (seen[t[0]] || seen[t[1]] || seen[t[2]]) {

@@ -27,12 +27,15 @@ class TissueLayers {
   /// False, and nothing changes, when it belongs to another grid.
   bool SetTopology(const TopologyState& topology);
   void SetScope(const Laparoscope& scope);
-  /// Fat is drawn where some corner of a triangle is `visible`, from (s, t) [m] and thickness 0 … 1.
-  void ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible);
+  /// Fat is drawn where some corner of a triangle is `visible`, from (s, t) [m] and thickness 0 … 1, or laid bare
+  /// because the sheet above is `opened`.
+  void ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible,
+               const std::function<bool(const Vec2f& material)>& opened);
   /// Carries what was set over to the meshes. False when there was nothing.
   bool Update();
 
   [[nodiscard]] const MembraneMesh& membrane() const { return membrane_; }
+  [[nodiscard]] std::span<const float> particles() const { return xyz_; }  ///< As SetTissue.
   [[nodiscard]] osg::Geode* node() const { return geode_; }
 
  private:
@@ -59,6 +62,7 @@ class TissueLayers {
   std::vector<float> xyz_;
   std::vector<Vec3f> rectum_positions_, rectum_normals_;
   std::vector<Triangle> fat_shown_;
+  std::vector<float> fat_bared_;
   std::vector<Triangle> chosen_;  // Scratch: the membrane's triangles, as finely as needed.
   bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
   osg::ref_ptr<osg::Geode> geode_ = new osg::Geode;

@@ -1,5 +1,5 @@
 // Loose fat between membrane and organ: yellow lobules, a thin veil over the organ's front and thick beside it, with
-// ureter and nerve shining through. coordinate: material (s, t) [m], thickness 0 … 1.
+// ureter and nerve shining through. coordinate: material (s, t) [m], thickness 0 … 1, how far laid bare 0 … 1.
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
@@ -27,7 +27,9 @@ void main() {
   albedo = mix(albedo, vec3(0.92, 0.82, 0.58), 0.80 * nerve);
   // Islands where the layer is thin, closed where it is thick; in an opened slit it wells up.
   float cover = smoothstep(0.51, 0.66, broad.r * 0.8 + 0.45 * coordinate.z);
-  float opened = max(heat.a < 0.5 ? 1.0 : 0.0, smoothstep(0.1, 0.5, heat.g));
+  // What is laid bare ends lobule by lobule, not along a line.
+  float bared = smoothstep(0.30, 0.75, coordinate.w + 0.7 * (lobule - 0.5) + 1.2 * (broad.g - 0.5));
+  float opened = max(heat.a < 0.5 ? 1.0 : 0.0, bared * smoothstep(0.0, 0.35, coordinate.w));
   float alpha = (0.45 + 0.45 * lobule) * cover;
   alpha = max(alpha, (0.62 + 0.30 * lobule) * opened);
   alpha = clamp(max(alpha, 0.9 * max(cord, nerve)), 0.0, 0.97);

@@ -1,5 +1,9 @@
-// The peritoneum: a thin glossy sheet with faint vessels, through which fat and organ are seen. Its colour follows the
-// history of the tissue (damage, water, char) more than the temperature of the moment: burns stay.
+// The membrane, a double sheet through which fat and organ are seen: the peritoneum, thin and glossy with faint
+// vessels, and the fascia beneath it, of pale fibres. Colours follow the history of the tissue (damage, water, char)
+// more than the temperature of the moment: burns stay.
+// One triangle draws both: the fascia is looked up where the line of sight meets it, and the two are laid over each
+// other here, the nearer one on top. So their order is right for each pixel, whichever side is seen and in whatever
+// order the triangles come.
 // coordinate: material (s, t) [m], side (see geometry/membrane_mesh.h).
 in vec3 position;
 in vec3 normal;
@@ -8,12 +12,26 @@ uniform sampler2D atlas;
 uniform sampler2D serosa_pattern;
 uniform vec2 atlas_per_metre;
 uniform float colour_by_temperature; // 1: the paper's eq. 15, from the temperature of the moment.
+uniform float fascia_depth;          // Below the peritoneum, along the normal [m].
+uniform mat4 osg_ProjectionMatrix;
 out vec4 fragment;
+
+// From a place of the sheet to the one over that place of the fascia which the same pixel shows [m]. The surface point
+// above the latter lies in the picture where `depth` along the normal leads from here.
+vec2 ToFascia(vec2 m, vec3 n) {
+  vec2 pixels = osg_ProjectionMatrix[1][1] * picture_centre.y * fascia_depth / -position.z *
+                (n.xy - n.z * position.xy / position.z);
+  vec2 step = pixels.x * dFdx(m) + pixels.y * dFdy(m);
+  // Seen edge on it would go on and on.
+  return step * min(1.0, 4.0 * fascia_depth * inversesqrt(dot(step, step) + 1e-12));
+}
 
 void main() {
   vec2 m = coordinate.xy;
   vec4 heat = texture(atlas, m * atlas_per_metre);
-  if (coordinate.z < 0.0 || heat.a < 0.5) discard;
+  vec2 m_fascia = m + ToFascia(m, normalize(normal));
+  vec4 heat_below = texture(atlas, m_fascia * atlas_per_metre);
+  if (coordinate.z < 0.0 || max(heat.a, heat_below.a) < 0.5) discard;
   vec4 noise = texture(serosa_pattern, m * 16.0);
   float vessel = noise.a;
   float celsius = 20.0 + 127.5 * heat.r;
@@ -27,7 +45,7 @@ void main() {
   float facing = abs(dot(n, normalize(position)));
   float grazing = (1.0 - facing) * (1.0 - facing);
   vec3 albedo = mix(vec3(0.84, 0.40, 0.30), vec3(0.90, 0.60, 0.45), noise.g);
-  float alpha = 0.27 + 0.22 * noise.r + 0.45 * grazing;
+  float alpha = 0.21 + 0.22 * noise.r + 0.45 * grazing;
 
   float living = 1.0 - smoothstep(0.05, 0.5, damage);
   // Warm tissue reddens, then pales as its protein coagulates (from about 60 degrees).
@@ -55,8 +73,23 @@ void main() {
   alpha = mix(alpha, 0.96, blood);
 
   float wet = 1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale));
+
+  // The fascia's fibres run askew across the organ, here denser and there; what burns the peritoneum burns them.
+  vec4 fibres = texture(serosa_pattern, vec2(dot(m_fascia, vec2(22.0, 9.0)), dot(m_fascia, vec2(-65.0, 130.0))));
+  float strand = smoothstep(0.44, 0.70, fibres.r) * (0.3 + 1.2 * fibres.g * noise.b);
+  float seared = smoothstep(0.02, 0.4, 2.0 * heat_below.b);
+  float tanned = 0.6 * smoothstep(0.1, 0.5, heat_below.g);
+  vec3 fascia = mix(vec3(0.86, 0.76, 0.66), vec3(0.26, 0.10, 0.035), seared);
+  vec4 upper = vec4(albedo, heat.a < 0.5 ? 0.0 : alpha);
+  vec4 lower = vec4(fascia, heat_below.a < 0.5 ? 0.0 : mix(0.09 + 0.30 * strand, 0.9, max(seared, tanned)));
+  bool from_above = dot(normal, position) < 0.0;
+  vec4 near = from_above ? upper : lower, far = from_above ? lower : upper;
+  float through = (1.0 - near.a) * far.a, both = near.a + through;
+  albedo = (near.a * near.rgb + through * far.rgb) / both;
+  wet *= from_above && heat.a >= 0.5 ? 1.0 : 0.4;
+
   // What glitters is not see-through.
   float gloss;
   vec3 shaded = ShadeTissue(albedo, vec3(0.30, 0.16, 0.10), n, film, position, wet, gloss);
-  fragment = vec4(ToneMap(shaded), min(alpha + 0.8 * gloss, 1.0));
+  fragment = vec4(ToneMap(shaded), min(both + 0.8 * gloss, 1.0));
 }

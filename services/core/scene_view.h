@@ -180,6 +180,18 @@ struct ToolDescription {
   float tip_length_m;  ///< Length of jaws, or of the hook's foot.
 };
 
+/// What the mesh of an instrument stands for: all of it that does not turn, or the jaw that opens towards +x or -x.
+enum class ToolPart : std::uint32_t { kBody, kJawPlus, kJawMinus };
+
+/// A part of a tool's mesh: ranges of tool_vertices and tool_triangles (indices into tool_vertices). Vertices in frame
+/// T, jaws closed; a jaw turns about the y axis through (0, 0, -tip_length_m).
+struct ToolMesh {
+  std::uint32_t tool;
+  ToolPart part;
+  Index first_vertex, vertex_count;
+  Index first_triangle, triangle_count;
+};
+
 /// One key of the scripted operator; linear in time between keys with smooth ends.
 struct ScriptKey {
   float time_s;
@@ -233,6 +245,9 @@ struct SceneView {
   std::span<const ProtectedPoint> protected_points;
 
   std::array<ToolDescription, kMaxTools> tools{};
+  std::span<const ToolMesh> tool_meshes;  ///< How tools look; one that has none is drawn by its dimensions.
+  std::span<const Vec3f> tool_vertices;
+  std::span<const Triangle> tool_triangles;
   std::span<const ScriptKey> script;  ///< Sorted by tool, then time.
   float script_duration_s = 0;
 

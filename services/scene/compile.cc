@@ -3,14 +3,15 @@
 #include "services/scene/build.h"
 #include "services/scene/import.h"
 #include "services/scene/scene_yaml.h"
+#include "services/scene/tool_meshes.h"
 
 namespace fulcrum::scene {
 
 SceneData BuildScene(const SceneSettings& settings, const Progress& progress) {
-  if (settings.import) {
-    return AssembleScene(settings, ImportAnatomy(settings, progress));
-  }
-  return BuildProcedural(settings);
+  SceneData scene =
+      settings.import ? AssembleScene(settings, ImportAnatomy(settings, progress)) : BuildProcedural(settings);
+  AddToolMeshes(settings, &scene);
+  return scene;
 }
 
 CompiledScene CompileScene(const std::filesystem::path& yaml, const std::filesystem::path& data,

@@ -24,6 +24,9 @@ SceneView SceneData::View() const {
   view.static_triangles = static_triangles;
   view.protected_structures = protected_structures;
   view.protected_points = protected_points;
+  view.tool_meshes = tool_meshes;
+  view.tool_vertices = tool_vertices;
+  view.tool_triangles = tool_triangles;
   view.script = script;
   return view;
 }

@@ -11,7 +11,7 @@
 
 namespace fulcrum::scene {
 
-inline constexpr std::uint32_t kSceneFileVersion = 5;
+inline constexpr std::uint32_t kSceneFileVersion = 6;
 
 /// Owns the arrays of a scene under construction or in a test; `View()` gives what the nodes read.
 struct SceneData {
@@ -36,6 +36,9 @@ struct SceneData {
   std::vector<Triangle> static_triangles;
   std::vector<ProtectedStructure> protected_structures;
   std::vector<ProtectedPoint> protected_points;
+  std::vector<ToolMesh> tool_meshes;
+  std::vector<Vec3f> tool_vertices;
+  std::vector<Triangle> tool_triangles;
   std::vector<ScriptKey> script;
 
   [[nodiscard]] SceneView View() const;

@@ -100,6 +100,16 @@ struct ScriptKeySettings {
   double power_W = 0;
 };
 
+/// How a tool looks, from mesh files. Their z axis runs along the shaft to the tip; jaws are closed and, after the
+/// turn, their hinge is parallel to y.
+struct ToolMeshSettings {
+  double scale_m = 0.001;                        ///< Metres per unit of the files.
+  double turn_rad = 0;                           ///< About z, from the files' frame to frame T.
+  Vec3f origin_m = Vec3f::Zero();                ///< Where the files' origin lies in frame T.
+  std::filesystem::path body_file;               ///< Empty: the tool is drawn by its dimensions.
+  std::vector<std::filesystem::path> jaw_files;  ///< Of grasper and scissors: the one that opens towards +x, the other.
+};
+
 struct SceneSettings {
   std::string name;
   std::string description;
@@ -114,6 +124,7 @@ struct SceneSettings {
   MembraneSettings membrane;
   std::vector<StructureSettings> structures;
   std::array<ToolDescription, kMaxTools> tools{};
+  std::array<ToolMeshSettings, kMaxTools> tool_meshes;
   std::vector<ScriptKeySettings> script;
   double script_duration_s = 20;
   std::uint32_t node_mask = 0x3e;  ///< Bit per NodeId.

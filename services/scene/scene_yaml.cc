@@ -1,9 +1,8 @@
 #include "services/scene/scene_yaml.h"
 
 #include <algorithm>
-#include <charconv>
 
-#include "services/config/strict_yaml.h"
+#include "services/scene/yaml_parameters.h"
 
 namespace fulcrum::scene {
 namespace {
@@ -11,6 +10,8 @@ namespace {
 using config::Range;
 using config::StrictMap;
 using config::StrictYaml;
+
+using Folders = std::vector<std::filesystem::path>;
 
 constexpr std::size_t kMaxKeys = 2000;
 constexpr std::size_t kMaxStructures = 64;
@@ -31,127 +32,6 @@ const StrictMap::Choices<std::uint32_t> kPedals = {
     {"up", kPedalNone}, {"cut", kPedalCut}, {"coag", kPedalCoag}, {"blend", kPedalBlend}};
 const StrictMap::Choices<BrickSplit> kSplits = {{"six", BrickSplit::kSix}, {"five", BrickSplit::kFive}};
 const StrictMap::Choices<double> kLengthUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
-
-/// The double with the float's shortest decimal form: 0.8f becomes 0.8, not 0.800000011920929.
-double Decimal(float value) {
-  char text[32];
-  const auto end = std::to_chars(text, text + sizeof(text), value).ptr;
-  double result = 0;
-  std::from_chars(text, end, result);
-  return result;
-}
-
-/// One key per field, default = the field's own.
-void ReadSi(StrictMap* map, const char* key, const Range& range, float* field) {
-  *field = static_cast<float>(map->NumberSi(key, Decimal(*field), range));
-}
-void ReadSi(StrictMap* map, const char* key, const Range& range, double* field) {
-  *field = map->NumberSi(key, *field, range);
-}
-void ReadInteger(StrictMap* map, const char* key, int min, int max, int* field) {
-  *field = static_cast<int>(map->Integer(key, *field, min, max));
-}
-void ReadInteger(StrictMap* map, const char* key, int min, int max, std::uint32_t* field) {
-  *field = static_cast<std::uint32_t>(map->Integer(key, *field, min, max));
-}
-
-void ReadPhysics(StrictMap map, PhysicsParams* p) {
-  p->mode =
-      map.Choice("mode", p->mode,
-                 {{"paper", PhysicsMode::kPaper}, {"xpbd", PhysicsMode::kXpbd}, {"accurate", PhysicsMode::kAccurate}});
-  p->preset = map.Choice("preset", p->preset,
-                         {{"fast", PhysicsPreset::kFast},
-                          {"default", PhysicsPreset::kDefault},
-                          {"accurate", PhysicsPreset::kAccurate},
-                          {"reference", PhysicsPreset::kReference}});
-  ReadInteger(&map, "substeps", 1, 1000, &p->substeps);
-  ReadInteger(&map, "iterations", 1, 1000, &p->iterations);
-  ReadSi(&map, "dt_ms", Range::Between(0.1, 100), &p->dt_s);
-  ReadSi(&map, "damping_per_s", Range::Between(0, 1000), &p->damping_per_s);
-  p->gravity = map.Vector3Si("gravity_m_s2", p->gravity, Range::Between(-50, 50));
-  ReadSi(&map, "k_stretch_tube", Range::Above(0, 1), &p->k_stretch_tube);
-  ReadSi(&map, "k_stretch_membrane", Range::Above(0, 1), &p->k_stretch_membrane);
-  ReadSi(&map, "k_volume", Range::Between(0, 1), &p->k_volume);
-  ReadSi(&map, "k_bending", Range::Between(0, 1), &p->k_bending);
-  ReadSi(&map, "k_binding", Range::Between(0, 1), &p->k_binding);
-  ReadSi(&map, "tube_youngs_modulus_kPa", Range::Between(0.001, 1e6), &p->tube_youngs_modulus_Pa);
-  ReadSi(&map, "tube_poisson", Range::Between(0, 0.495), &p->tube_poisson);
-  ReadSi(&map, "membrane_Et_N_per_m", Range::Between(0.001, 1e7), &p->membrane_Et_N_per_m);
-  ReadSi(&map, "membrane_stiffening", Range::Between(0, 1000), &p->membrane_stiffening);
-  ReadSi(&map, "membrane_prestrain", Range::Between(0, 0.5), &p->membrane_prestrain);
-  ReadSi(&map, "membrane_bending_uNm", Range::Between(0, 1e6), &p->membrane_bending_Nm);
-  ReadSi(&map, "fat_youngs_modulus_kPa", Range::Between(0.001, 1e6), &p->fat_youngs_modulus_Pa);
-  ReadSi(&map, "friction", Range::Between(0, 2), &p->friction);
-  ReadSi(&map, "collision_margin_mm", Range::Between(0, 10), &p->collision_margin_m);
-  ReadSi(&map, "grasp_radius_mm", Range::Between(0.1, 50), &p->grasp_radius_m);
-  ReadSi(&map, "grasp_close_deg", Range::Between(0, 85), &p->grasp_close_rad);
-  ReadSi(&map, "grasp_open_deg", Range::Between(0, 90), &p->grasp_open_rad);
-  ReadSi(&map, "grip_force_N", Range::Between(0, 1000), &p->grip_force_N);
-  if (!(p->grasp_open_rad > p->grasp_close_rad)) {
-    map.Fail("grasp_open_deg", "must be above grasp_close_deg");
-  }
-}
-
-void ReadThermal(StrictMap map, ThermalParams* t) {
-  t->model = map.Choice("model", t->model, {{"accurate", ThermalModel::kAccurate}, {"paper", ThermalModel::kPaper}});
-  ReadSi(&map, "cell_um", Range::Between(10, 10000), &t->cell_m);
-  ReadSi(&map, "thickness_mm", Range::Between(0.01, 10), &t->thickness_m);
-  ReadSi(&map, "density_kg_m3", Range::Between(1, 1e5), &t->density_kg_m3);
-  ReadSi(&map, "heat_capacity_J_kgK", Range::Between(1, 1e5), &t->heat_capacity_J_kgK);
-  ReadSi(&map, "conductivity_W_mK", Range::Between(0, 1e4), &t->conductivity_W_mK);
-  ReadSi(&map, "latent_heat_J_m3", Range::Between(0, 1e11), &t->latent_heat_J_m3);
-  ReadSi(&map, "body_temperature_C", Range::Between(0, 60), &t->body_temperature_C);
-  ReadSi(&map, "h_top_W_m2K", Range::Between(0, 1e5), &t->h_top_W_m2K);
-  ReadSi(&map, "h_below_W_m2K", Range::Between(0, 1e5), &t->h_below_W_m2K);
-  ReadSi(&map, "h_tented_W_m2K", Range::Between(0, 1e5), &t->h_tented_W_m2K);
-  ReadSi(&map, "perfusion_per_s", Range::Between(0, 10), &t->perfusion_per_s);
-  ReadSi(&map, "sigma_S_m", Range::Between(1e-4, 100), &t->sigma_S_m);
-  ReadSi(&map, "sigma_per_K", Range::Between(0, 1), &t->sigma_per_K);
-  ReadSi(&map, "sigma_fat_S_m", Range::Between(0, 100), &t->sigma_fat_S_m);
-  ReadSi(&map, "fat_depth_mm", Range::Between(0.1, 1000), &t->fat_depth_m);
-  ReadSi(&map, "v_max_V", Range::Between(1, 1e4), &t->v_max_V);
-  ReadSi(&map, "i_max_A", Range::Between(0.001, 100), &t->i_max_A);
-  ReadSi(&map, "hook_radius_mm", Range::Between(0.01, 10), &t->hook_radius_m);
-  ReadSi(&map, "shrink_max", Range::Between(0, 0.5), &t->shrink_max);
-  t->volume = map.Flag("volume", t->volume != 0) ? 1 : 0;
-}
-
-void ReadRender(StrictMap map, RenderParams* r) {
-  ReadInteger(&map, "width", 16, 7680, &r->width);
-  ReadInteger(&map, "height", 16, 4320, &r->height);
-  ReadSi(&map, "rate_Hz", Range::Between(0.1, 240), &r->rate_Hz);
-  ReadSi(&map, "png_rate_Hz", Range::Between(0, 240), &r->png_rate_Hz);
-  r->scope_tip_W = map.Vector3Si("scope_tip_mm", r->scope_tip_W, Range::Between(-1000, 1000));
-  r->scope_target_W = map.Vector3Si("scope_target_mm", r->scope_target_W, Range::Between(-1000, 1000));
-  r->fov_deg = static_cast<float>(map.Number("fov_deg", Decimal(r->fov_deg), Range::Between(10, 150)));
-  r->scope_angle_deg =
-      static_cast<float>(map.Number("scope_angle_deg", Decimal(r->scope_angle_deg), Range::Between(0, 90)));
-  r->roll_deg = static_cast<float>(map.Number("roll_deg", Decimal(r->roll_deg), Range::Between(-180, 180)));
-  ReadInteger(&map, "hud", 0, 1, &r->hud);
-}
-
-void ReadHaptics(StrictMap map, HapticsParams* h) {
-  ReadSi(&map, "force_limit_N", Range::Between(0.01, 100), &h->force_limit_N);
-  h->slew_N_per_ms =
-      static_cast<float>(map.Number("slew_N_per_ms", Decimal(h->slew_N_per_ms), Range::Between(1e-4, 100)));
-  ReadSi(&map, "hand_mass_kg", Range::Between(0.001, 100), &h->hand_mass_kg);
-  ReadSi(&map, "hand_stiffness_N_m", Range::Between(0, 1e5), &h->hand_stiffness_N_m);
-  ReadSi(&map, "hand_damping_Ns_m", Range::Between(0, 1e4), &h->hand_damping_Ns_m);
-  ReadSi(&map, "force_scale", Range::Between(0, 100), &h->force_scale);
-}
-
-void ReadBreathing(StrictMap map, PhysicsMode mode, Breathing* b) {
-  b->direction = map.Vector3Si("direction", b->direction, Range::Between(-1, 1));
-  if (!(b->direction.norm() > 0.1f)) {
-    map.Fail("direction", "must be a direction, not (nearly) zero");
-  }
-  b->direction.normalize();
-  ReadSi(&map, "amplitude_mm", Range::Between(0, 50), &b->amplitude_m);
-  ReadSi(&map, "period_s", Range::Between(0.5, 60), &b->period_s);
-  if (b->amplitude_m > 0 && mode == PhysicsMode::kPaper) {
-    map.Fail("amplitude_mm", "needs physics.mode accurate or xpbd: in mode paper nothing touches the surroundings");
-  }
-}
 
 void ReadTube(StrictMap map, TubeSettings* t) {
   ReadInteger(&map, "rings", 3, 1000, &t->rings);
@@ -174,7 +54,7 @@ void ReadTube(StrictMap map, TubeSettings* t) {
 
 /// Finds a mesh file, or refuses in one line with every place that was looked at.
 std::filesystem::path FindFile(const StrictMap& map, const std::string& key, const std::string& name,
-                               const std::vector<std::filesystem::path>& folders) {
+                               const Folders& folders) {
   std::string tried;
   for (const auto& folder : folders) {
     std::filesystem::path candidate = (folder / name).lexically_normal();
@@ -206,19 +86,14 @@ void ReadCentreline(StrictMap map, std::vector<Vec3f>* points) {
   }
 }
 
-void ReadImport(StrictMap map, const std::filesystem::path& base, const std::filesystem::path& data,
-                ImportSettings* import) {
-  std::vector<std::filesystem::path> folders;
-  if (!data.empty()) {
-    folders.push_back(data);
-  }
+void ReadImport(StrictMap map, const std::filesystem::path& base, ImportSettings* import, Folders* folders) {
   for (const std::string& folder : map.Texts("folders", 0, 16)) {
-    folders.push_back(base / folder);
+    folders->push_back(base / folder);
   }
-  folders.push_back(base);
+  folders->push_back(base);
   import->scale_m = map.Choice("unit", import->scale_m, kLengthUnits);
   import->origin_m = map.Vector3Si("origin_mm", import->origin_m, Range::Between(-2000, 2000));
-  import->organ_file = FindFile(map, "organ", map.Text("organ"), folders);
+  import->organ_file = FindFile(map, "organ", map.Text("organ"), *folders);
   import->remesh = map.Flag("remesh", import->remesh);
   import->cap_openings = map.Flag("cap_openings", import->cap_openings);
   ReadSi(&map, "wall_mm", Range::Between(0, 30), &import->wall_m);
@@ -247,7 +122,7 @@ void ReadImport(StrictMap map, const std::filesystem::path& base, const std::fil
     ImportSettings::Surrounding s;
     s.name = entry.Text("name", 31);
     s.role = entry.Choice("role", s.role, kRoles);
-    s.file = FindFile(entry, "file", entry.Text("file"), folders);
+    s.file = FindFile(entry, "file", entry.Text("file"), *folders);
     s.offset_m = entry.Vector3Si("offset_mm", s.offset_m, Range::Between(-500, 500));
     ReadInteger(&entry, "triangles_max", 100, 100000, &s.triangles_max);
     s.collides = entry.Flag("collides", s.collides);
@@ -292,7 +167,24 @@ StructureSettings ReadStructure(StrictMap map) {
   return s;
 }
 
-void ReadTool(StrictMap map, ToolDescription* tool) {
+void ReadToolMeshes(StrictMap map, const ToolDescription& tool, const Folders& folders, ToolMeshSettings* meshes) {
+  const bool has_jaws = tool.kind != ToolKind::kHook;
+  meshes->scale_m = map.Choice("unit", meshes->scale_m, kLengthUnits);
+  if (!has_jaws && map.Has("jaws")) {
+    map.Fail("jaws", "a hook has none");
+  }
+  meshes->body_file = FindFile(map, "body", map.Text("body"), folders);
+  if (has_jaws) {
+    for (const std::string& name : map.Texts("jaws", 2, 2)) {
+      meshes->jaw_files.push_back(FindFile(map, "jaws", name, folders));
+    }
+  }
+  ReadSi(&map, "turn_deg", Range::Between(-180, 180), &meshes->turn_rad);
+  meshes->origin_m = Vec3f(0, 0, has_jaws ? -tool.tip_length_m : 0);
+  meshes->origin_m = map.Vector3Si("origin_mm", meshes->origin_m, Range::Between(-500, 500));
+}
+
+void ReadTool(StrictMap map, const Folders& folders, ToolDescription* tool, ToolMeshSettings* meshes) {
   tool->kind = map.Choice("kind", tool->kind, kToolKinds);
   if (tool->kind == ToolKind::kNone) {
     return;
@@ -302,6 +194,9 @@ void ReadTool(StrictMap map, ToolDescription* tool) {
   ReadSi(&map, "shaft_length_mm", Range::Between(50, 1000), &tool->shaft_length_m);
   ReadSi(&map, "tip_radius_mm", Range::Between(0.05, 20), &tool->tip_radius_m);
   ReadSi(&map, "tip_length_mm", Range::Between(0.1, 100), &tool->tip_length_m);
+  if (auto entry = map.OptionalMap("meshes")) {
+    ReadToolMeshes(*entry, *tool, folders, meshes);
+  }
 }
 
 ScriptKeySettings ReadKey(StrictMap map, double duration_s) {
@@ -375,10 +270,15 @@ SceneDescription Read(StrictYaml* yaml, const std::filesystem::path& base, const
   if (organ.Has("import") == organ.Has("procedural")) {
     root.Fail("organ", "needs either `procedural` or `import`");
   }
+  Folders folders;  // Where mesh files are looked for, in this order.
+  if (!data.empty()) {
+    folders.push_back(data);
+  }
   if (organ.Has("import")) {
-    ReadImport(organ.Map("import"), base, data, &scene.import.emplace());
+    ReadImport(organ.Map("import"), base, &scene.import.emplace(), &folders);
   } else {
     ReadTube(organ.Map("procedural"), &scene.tube);
+    folders.push_back(base);
   }
   ReadMembrane(root.MapOrDefaults("membrane"), &scene.membrane);
   for (StrictMap& entry : root.Maps("structures", 0, kMaxStructures)) {
@@ -387,7 +287,7 @@ SceneDescription Read(StrictYaml* yaml, const std::filesystem::path& base, const
   StrictMap tools = root.MapOrDefaults("tools");
   for (int i = 0; i < kMaxTools; ++i) {
     const std::string key = "tool" + std::to_string(i);
-    ReadTool(tools.MapOrDefaults(key), &scene.tools[i]);
+    ReadTool(tools.MapOrDefaults(key), folders, &scene.tools[i], &scene.tool_meshes[i]);
   }
   ReadPhysics(root.MapOrDefaults("physics"), &scene.physics);
   ReadBreathing(root.MapOrDefaults("breathing"), scene.physics.mode, &scene.breathing);

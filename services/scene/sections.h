@@ -28,6 +28,9 @@ void ForEachSection(View& view, Visitor&& visit) {
   visit("static_triangles", view.static_triangles);
   visit("protected_structures", view.protected_structures);
   visit("protected_points", view.protected_points);
+  visit("tool_meshes", view.tool_meshes);
+  visit("tool_vertices", view.tool_vertices);
+  visit("tool_triangles", view.tool_triangles);
   visit("script", view.script);
 }
 

@@ -7,7 +7,11 @@
 #include <cstdlib>
 #include <functional>
 #include <osg/Geode>
+#include <osg/Geometry>
 #include <osg/NodeVisitor>
+#include <osg/Program>
+#include <string>
+#include <utility>
 
 #include "render_node/geometry/texel.h"
 #include "render_node/node/hud.h"
@@ -72,6 +76,70 @@ Difference Compare(const Picture& a, const Picture& b) {
   difference.mean /= blocks;
   return difference;
 }
+
+/// Rewrites a line of the membrane's shader: what would be drawn with that fault.
+class Rewrite : public osg::NodeVisitor {
+ public:
+  Rewrite(std::string before, std::string after)
+      : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN), before_(std::move(before)), after_(std::move(after)) {}
+  void apply(osg::Geode& geode) override {
+    for (unsigned k = 0; k < geode.getNumDrawables(); ++k) {
+      if (geode.getDrawable(k)->getName() != "membrane") {
+        continue;
+      }
+      auto* program = static_cast<osg::Program*>(
+          geode.getDrawable(k)->getOrCreateStateSet()->getAttribute(osg::StateAttribute::PROGRAM));
+      for (unsigned s = 0; s < program->getNumShaders(); ++s) {
+        std::string text = program->getShader(s)->getShaderSource();
+        if (const std::size_t place = text.find(before_); place != std::string::npos) {
+          program->getShader(s)->setShaderSource(text.replace(place, before_.size(), after_));
+          ++found;
+        }
+      }
+    }
+  }
+  int found = 0;
+
+ private:
+  std::string before_, after_;
+};
+
+class Remove : public osg::NodeVisitor {
+ public:
+  explicit Remove(std::string name) : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN), name_(std::move(name)) {}
+  void apply(osg::Geode& geode) override {
+    for (unsigned k = geode.getNumDrawables(); k-- > 0;) {
+      if (geode.getDrawable(k)->getName() == name_) {
+        geode.removeDrawables(k);
+        ++found;
+      }
+    }
+  }
+  int found = 0;
+
+ private:
+  std::string name_;
+};
+
+class ReverseTriangles : public osg::NodeVisitor {
+ public:
+  ReverseTriangles() : osg::NodeVisitor(TRAVERSE_ALL_CHILDREN) {}
+  void apply(osg::Geode& geode) override {
+    for (unsigned k = 0; k < geode.getNumDrawables(); ++k) {
+      if (geode.getDrawable(k)->getName() == "membrane") {
+        auto* indices = static_cast<osg::DrawElementsUInt*>(geode.getDrawable(k)->asGeometry()->getPrimitiveSet(0));
+        for (std::size_t i = 0; i + 3 <= indices->size() / 6 * 3; i += 3) {
+          std::swap_ranges(indices->begin() + static_cast<std::ptrdiff_t>(i),
+                           indices->begin() + static_cast<std::ptrdiff_t>(i + 3),
+                           indices->end() - static_cast<std::ptrdiff_t>(i + 3));
+        }
+        indices->dirty();
+        ++found;
+      }
+    }
+  }
+  int found = 0;
+};
 
 class Opaque : public osg::NodeVisitor {
  public:
@@ -223,6 +291,72 @@ TEST_F(GoldenTest, AnOpaqueMembraneIsSeen) {
   });
   const Difference difference = Compare(picture, Golden("at_rest"));
   EXPECT_GT(difference.worst_block, 3 * kWorstBlock);
+}
+
+TEST_F(GoldenTest, AShadowThatIsMissingIsSeen) {
+  const SyntheticMoment moment = MakeSyntheticMoment(view_, 6.0);
+  const Picture picture = Draw(moment, [](LaparoscopeView* view) {
+    Remove shadow("shadow");
+    view->root()->accept(shadow);
+    EXPECT_EQ(shadow.found, 1);
+  });
+  EXPECT_TRUE(Compare(picture, Golden("pulled")).visible());
+}
+
+TEST_F(GoldenTest, AMembraneOfOneLayerIsSeen) {
+  const SyntheticMoment moment = MakeSyntheticMoment(view_, 0.5);
+  for (const char* layer : {"upper", "lower"}) {
+    const std::string name(layer);
+    const Picture picture = Draw(moment, [&](LaparoscopeView* view) {
+      Rewrite gone("bool from_above", name + ".a = 0.0;\n  bool from_above");
+      view->root()->accept(gone);
+      EXPECT_EQ(gone.found, 1);
+    });
+    EXPECT_TRUE(Compare(picture, Golden("at_rest")).visible()) << layer;
+  }
+}
+
+// Both layers half opaque, the peritoneum red and the fascia green: of the nearer one twice as much is seen.
+TEST_F(GoldenTest, TheNearerLayerOfTheMembraneLiesOnTop) {
+  SyntheticMoment above = MakeSyntheticMoment(view_, 0.5);
+  above.tools = {};
+  SyntheticMoment beneath = above;  // The sheet turned over, left to right.
+  const Index first = view_.membrane.first;
+  const float middle = view_.render.scope_target_W.x();
+  for (std::size_t i = first; i < view_.rest_position.size(); ++i) {
+    beneath.tissue.xyz[3 * i] = 2 * middle - beneath.tissue.xyz[3 * i];
+  }
+  for (const bool reversed : {false, true}) {
+    for (const bool from_above : {true, false}) {
+      const Picture picture = Draw(from_above ? above : beneath, [&](LaparoscopeView* view) {
+        Rewrite paint("bool from_above",
+                      "wet = 0.0;\n  upper = vec4(1.0, 0.0, 0.0, 0.5);\n  lower = vec4(0.0, 1.0, 0.0, 0.5);\n"
+                      "  bool from_above");
+        view->root()->accept(paint);
+        EXPECT_EQ(paint.found, 1);
+        if (reversed) {
+          ReverseTriangles reverse;
+          view->root()->accept(reverse);
+          EXPECT_EQ(reverse.found, 1);
+        }
+      });
+      double red = 0, green = 0;
+      for (int y = picture.height / 2 - 10; y < picture.height / 2 + 10; ++y) {
+        for (int x = picture.width / 2 - 10; x < picture.width / 2 + 10; ++x) {
+          const std::size_t pixel = 3 * TexelIndex(x, y, picture.width);
+          red += picture.rgb[pixel];
+          green += picture.rgb[pixel + 1];
+        }
+      }
+      // What lies beneath the membrane is red in both cases: a quarter of it shines through.
+      EXPECT_GT(green, 20 * 400) << "no fascia";
+      if (from_above) {
+        EXPECT_GT(red, 1.25 * green) << "reversed " << reversed;
+      } else {
+        EXPECT_LT(red, 1.05 * green) << "reversed " << reversed;
+      }
+    }
+  }
 }
 
 TEST_F(GoldenTest, ACutOfMissingTrianglesIsSeen) {

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <numeric>
 
+#include "render_node/geometry/solid.h"
 #include "render_node/offscreen/png_writer.h"
 #include "render_node/scene_graph/display.h"
 #include "services/scene/build.h"
@@ -211,6 +213,54 @@ TEST_F(PictureTest, InstrumentsAreDrawnWhereTheirTipsAreAndJawsOpen) {
   const Picture closed = with_jaw(0), open = with_jaw(0.9f);
   EXPECT_GT(MeanDifference(none, closed), 0.2);
   EXPECT_GT(MeanDifference(closed, open), 0.05);
+}
+
+// The grasper's own shape, given as meshes, is drawn like the grasper; jaws open by the same angle.
+TEST_F(PictureTest, MeshesOfTheSceneAreDrawnInPlaceOfAnInstrument) {
+  const ToolDescription& tool = view_.tools[0];
+  const ToolShape shape{tool.shaft_radius_m, tool.shaft_length_m, tool.tip_radius_m, tool.tip_length_m};
+  scene::SceneData with_meshes = data_;
+  const auto add = [&](ToolPart part, const Solid& solid, const Mat3f& turn, float z) {
+    const auto first = static_cast<Index>(with_meshes.tool_vertices.size());
+    with_meshes.tool_meshes.push_back({0, part, first, static_cast<Index>(solid.positions.size()),
+                                       static_cast<Index>(with_meshes.tool_triangles.size()),
+                                       static_cast<Index>(solid.triangles.size())});
+    for (const Vec3f& p : solid.positions) {
+      with_meshes.tool_vertices.emplace_back(turn * p + Vec3f(0, 0, z));
+    }
+    for (const Triangle& t : solid.triangles) {
+      with_meshes.tool_triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    }
+  };
+  const Mat3f half_turn = Vec3f(-1, -1, 1).asDiagonal();
+  add(ToolPart::kBody, GrasperShaft(shape), Mat3f::Identity(), 0);
+  add(ToolPart::kJawPlus, GrasperJaw(shape), Mat3f::Identity(), -tool.tip_length_m);
+  add(ToolPart::kJawMinus, GrasperJaw(shape), half_turn, -tool.tip_length_m);
+  const SceneView mesh_view = with_meshes.View();
+  const SyntheticMoment moment = MakeSyntheticMoment(view_, 0.0);
+  // Where the picture is grey, as nothing of the body is.
+  const auto outline = [&](const SceneView& scene, float angle) {
+    LaparoscopeView laparoscope(scene);
+    const auto display = MakeOffscreenDisplay(laparoscope, scene.render);
+    ToolSample sample = moment.tools.tools[0];
+    sample.p_WT = scene.render.scope_target_W + Vec3f(0, 0, 0.012f);
+    laparoscope.SetTool(0, sample);
+    laparoscope.SetJaw(0, angle);
+    laparoscope.Update();
+    Picture picture;
+    display->DrawAndRead(&picture);
+    std::vector<bool> covered;
+    for (std::size_t i = 0; i < picture.rgb.size(); i += 3) {
+      covered.push_back(picture.rgb[i + 2] > 0.9 * picture.rgb[i]);
+    }
+    return covered;
+  };
+  const auto differing = [](const std::vector<bool>& a, const std::vector<bool>& b) {
+    return std::inner_product(a.begin(), a.end(), b.begin(), 0, std::plus<>(), std::not_equal_to<>());
+  };
+  const auto open = outline(view_, 0.9f), mesh_open = outline(mesh_view, 0.9f), mesh_closed = outline(mesh_view, 0);
+  EXPECT_GT(differing(mesh_open, mesh_closed), 50);
+  EXPECT_LT(differing(open, mesh_open), 0.2 * differing(mesh_open, mesh_closed));
 }
 
 TEST_F(PictureTest, TheTentMovesThePicture) {

@@ -176,5 +176,26 @@ TEST_F(MembraneMeshTest, FatLiesBetweenMembraneAndTubeAndFollowsHalfwayIntoATent
   }
 }
 
+TEST_F(MembraneMeshTest, FatLaidBareEndsWithinTrianglesNotWithThem) {
+  const FatLayer fat(view_, 2);
+  const Vec2f middle = fat.materials()[fat.materials().size() / 2];
+  std::vector<float> bared;
+  fat.FindBared([&](const Vec2f& m) { return (m - middle).norm() < 0.004f; }, mesh_, &bared);
+  EXPECT_EQ(std::count(bared.begin(), bared.end(), 1.0f),
+            std::count_if(fat.materials().begin(), fat.materials().end(),
+                          [&](const Vec2f& m) { return (m - middle).norm() < 0.004f; }));
+  EXPECT_GT(std::count(bared.begin(), bared.end(), 0.0f), 0);
+  for (const Triangle& t : fat.triangles()) {
+    const auto [least, most] = std::minmax({bared[t[0]], bared[t[1]], bared[t[2]]});
+    EXPECT_LE(most - least, 0.5f);
+  }
+  // Where the sheet is gone, too.
+  SetBit(topology_.dead_nodes, 0);
+  ASSERT_TRUE(mesh_.SetTopology(topology_));
+  fat.FindBared([](const Vec2f&) { return false; }, mesh_, &bared);
+  EXPECT_EQ(bared[0], 1);
+  EXPECT_EQ(std::count(bared.begin(), bared.end(), 1.0f), 1);
+}
+
 }  // namespace
 }  // namespace fulcrum::render

@@ -1,4 +1,4 @@
-// One small valid file for every variant of every mesh format, written here and nowhere else: for tests of the readers.
+// One small valid file for every variant of every mesh format, for tests of the readers.
 #pragma once
 
 #include <map>

@@ -193,6 +193,19 @@ struct Rule {
   std::function<void(SceneData&)> spoil;
 };
 
+/// Gives the hook a mesh of one triangle.
+SceneData* AddBody(SceneData* scene) {
+  scene->tool_vertices = {{0, 0, 0}, {0.001f, 0, 0}, {0, 0.001f, 0}};
+  scene->tool_triangles = {{0, 1, 2}};
+  scene->tool_meshes = {{1, ToolPart::kBody, 0, 3, 0, 1}};
+  return scene;
+}
+
+TEST(SceneValidation, ToolMeshesAreSound) {
+  SceneData scene = SmallScene();
+  EXPECT_FALSE(FindFault(AddBody(&scene)->View()));
+}
+
 TEST(SceneValidation, ShippedGeometryIsSound) {
   EXPECT_FALSE(FindFault(SmallScene().View()));
   EXPECT_FALSE(FindFault(BuildProcedural(BuiltIn()).View()));
@@ -260,6 +273,14 @@ TEST(SceneValidation, EveryRuleRefusesAndNamesItsSection) {
       {"protected_structures", "kind",
        [](SceneData& s) { s.protected_structures[0].kind = static_cast<ProtectedKind>(9); }},
       {"protected_points", "coordinate", [](SceneData& s) { s.protected_points[0].p_W.x() = kNan; }},
+      {"tool_vertices", "coordinate", [](SceneData& s) { AddBody(&s)->tool_vertices[1].y() = kNan; }},
+      {"tool_triangles", "index 3", [](SceneData& s) { AddBody(&s)->tool_triangles[0][2] = 3; }},
+      {"tool_meshes", "index 2", [](SceneData& s) { AddBody(&s)->tool_meshes[0].tool = 2; }},
+      {"tool_meshes", "unknown part",
+       [](SceneData& s) { AddBody(&s)->tool_meshes[0].part = static_cast<ToolPart>(3); }},
+      {"tool_meshes", "beyond", [](SceneData& s) { AddBody(&s)->tool_meshes[0].triangle_count = 0xffffffffu; }},
+      {"tool_meshes", "twice", [](SceneData& s) { s.tool_meshes.push_back(AddBody(&s)->tool_meshes[0]); }},
+      {"tool_meshes", "parts", [](SceneData& s) { AddBody(&s)->tool_meshes[0].tool = 0; }},
       {"script", "index 2", [](SceneData& s) { s.script[0].tool = 2; }},
       {"script", "sorted", [](SceneData& s) { std::swap(s.script[0], s.script[1]); }},
       {"script", "power", [](SceneData& s) { s.script[0].power_W = 1e6f; }},

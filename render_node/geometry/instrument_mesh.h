@@ -1,0 +1,13 @@
+// Instruments whose meshes the scene gives, as solids to draw. Pure.
+#pragma once
+
+#include "render_node/geometry/solid.h"
+#include "services/core/scene_view.h"
+
+namespace fulcrum::render {
+
+/// A part of `scene`'s tool meshes in frame T: smooth where faces meet at less than 40 degrees, with an edge where they
+/// meet more sharply; insulated along the shaft and bare steel from the hinge or the electrode's neck on.
+[[nodiscard]] Solid InstrumentSolid(const SceneView& scene, const ToolMesh& mesh);
+
+}  // namespace fulcrum::render
