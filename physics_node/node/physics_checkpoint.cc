@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 
 namespace fulcrum::physics {
 namespace {
@@ -26,6 +27,22 @@ struct Header {
   ToolRecord tools[kMaxTools];
 };
 // Followed by positions, previous positions (3 floats a particle each), then the held particles tool by tool.
+
+// Beyond what a tool does: no session sees them.
+constexpr float kMostCoordinate_m = 10;
+constexpr float kMostJaw_rad = 3;
+constexpr float kUnitTolerance = 1e-3f;
+constexpr std::uint64_t kMostSteps = 1'000'000'000;  // Months.
+
+bool IsPlausible(const ToolRecord& tool) {
+  const auto within = [](float value, float limit) { return std::abs(value) <= limit; };  // false for NaN
+  float norm = 0;
+  for (const float q : tool.q_WT) norm += q * q;
+  return tool.grasp_state <= static_cast<std::uint32_t>(Grasp::State::kClosedEmpty) &&
+         (tool.known == 0 || (std::all_of(std::begin(tool.p_WT), std::end(tool.p_WT),
+                                          [&](float x) { return within(x, kMostCoordinate_m); }) &&
+                              within(norm - 1, kUnitTolerance) && within(tool.jaw_rad, kMostJaw_rad)));
+}
 
 std::size_t PositionsBytes(Index particles) { return 3 * sizeof(float) * std::size_t{particles}; }
 
@@ -87,7 +104,8 @@ std::optional<RestoredCheckpoint> ReadCheckpoint(std::span<const std::byte> payl
   for (const ToolRecord& tool : header.tools) {
     size += sizeof(HeldRecord) * std::size_t{tool.held_count};
   }
-  if (payload.size() != size) {
+  if (payload.size() != size || header.steps > kMostSteps ||
+      !(header.max_displacement_m >= 0 && header.max_displacement_m <= kMostCoordinate_m)) {
     return std::nullopt;
   }
   std::vector<float> xyz(floats), previous(floats);
@@ -98,15 +116,13 @@ std::optional<RestoredCheckpoint> ReadCheckpoint(std::span<const std::byte> payl
   memory.steps = header.steps;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolRecord& tool = header.tools[i];
+    if (!IsPlausible(tool)) {
+      return std::nullopt;
+    }
     const Quatf q(tool.q_WT[0], tool.q_WT[1], tool.q_WT[2], tool.q_WT[3]);
     memory.pose[i] = {Vec3f(tool.p_WT[0], tool.p_WT[1], tool.p_WT[2]), q.normalized(), tool.jaw_rad};
     memory.known[i] = tool.known != 0;
     memory.grasp_state[i] = static_cast<Grasp::State>(tool.grasp_state);
-    if (tool.grasp_state > static_cast<std::uint32_t>(Grasp::State::kClosedEmpty) ||
-        (memory.known[i] && !(memory.pose[i].p_WT.allFinite() && memory.pose[i].q_WT.coeffs().allFinite() &&
-                              std::isfinite(tool.jaw_rad)))) {
-      return std::nullopt;
-    }
     for (std::uint32_t h = 0; h < tool.held_count; ++h, at += sizeof(HeldRecord)) {
       HeldRecord record;
       std::memcpy(&record, at, sizeof(record));

@@ -21,6 +21,9 @@ constexpr int kGoodSubsteps = 3, kMostSubsteps = 8;
 /// With one substep a step forces are wrong by half of themselves, however slow the tool.
 constexpr int kLeastSubsteps = 2;
 
+/// A state beyond this is none that a step has left: places, and the way of a step, of which none is over 60 mm [m].
+constexpr float kMostCoordinate_m = 10.0f, kMostTravel_m = 0.1f;
+
 float AngleBetween(const Quatf& a, const Quatf& b) { return 2.0f * std::acos(std::min(1.0f, std::abs(a.dot(b)))); }
 
 /// From `from` towards `to`, at most `step` metres and `turn` radians.
@@ -381,15 +384,20 @@ SimulationMemory TissueSimulation::Save() const {
 bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float> previous_xyz,
                                const SimulationMemory& memory) {
   const std::size_t floats = 3 * std::size_t{particles_.particle_count()};
-  const auto finite = [](std::span<const float> values) {
-    return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
+  // False for NaN. Not only what is not finite: squares of what is far away are not, and velocities come from
+  // differences.
+  const auto near = [](float a, float b, float limit) { return std::abs(a - b) <= limit; };
+  const auto within = [](std::span<const float> values) {
+    return std::all_of(values.begin(), values.end(), [](float v) { return std::abs(v) <= kMostCoordinate_m; });
   };
-  if (xyz.size() != floats || previous_xyz.size() != floats || !finite(xyz) || !finite(previous_xyz)) {
+  if (xyz.size() != floats || previous_xyz.size() != floats || !within(xyz) ||
+      !std::equal(xyz.begin(), xyz.end(), previous_xyz.begin(),
+                  [&](float now, float before) { return near(now, before, kMostTravel_m); })) {
     return false;
   }
   for (const auto& held : memory.held) {
     if (!std::all_of(held.begin(), held.end(), [&](const HeldParticle& h) {
-          return h.particle < particles_.particle_count() && h.p_T.allFinite();
+          return h.particle < particles_.particle_count() && h.p_T.norm() <= kMostCoordinate_m;
         })) {
       return false;
     }

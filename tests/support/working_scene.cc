@@ -12,7 +12,7 @@ namespace {
 struct Work {
   double grasp_s, pull_mm, depth_mm, cut_s, line_step, line_s;
 };
-constexpr Work kSmall{0.33, 9, -2.0, 0.55, 0.03, 8};
+constexpr Work kSmall{0.33, 9, -2.0, 0.55, 0.03, 10};
 constexpr Work kBuiltIn{0.36, 10, -1.0, 0.52, 0.02, 20};
 constexpr double kLineBegin = 0.3, kLineEnd = 0.7, kLastLine = 0.8;
 

@@ -231,6 +231,7 @@ std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()> notify
   ApplyRole(role, role.reader_depth, impl_->shared_memory, &qos);
   auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos, std::move(notify));
   if (!port->ok()) throw InputError(std::string(role.name) + ": cannot make a reader");
+  if (role.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
   return port;
 }
 
@@ -245,6 +246,7 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
   auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos);
   if (!port->ok()) throw InputError(std::string(role.name) + ": cannot make a writer");
+  if (role.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
   return port;
 }
 

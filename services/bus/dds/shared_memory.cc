@@ -1,5 +1,6 @@
 #include "services/bus/dds/shared_memory.h"
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -84,6 +85,23 @@ void PrepareSharedMemory(const fs::path& directory) {
     throw InputError("shared memory: " + name + " has " + std::to_string(free >> 20) + " MiB free, at least " +
                      std::to_string(kNeededSharedMemory_B >> 20) +
                      " MiB are needed; free some or mount /dev/shm larger (mount -o remount,size=1G /dev/shm)");
+  }
+}
+
+void ReserveSharedMemory(const fs::path& directory) {
+  const auto own = static_cast<ShortPid>(getpid() & 0xffff);
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(directory, error)) {
+    if (OwnerOf(entry.path().filename()) != own) continue;
+    const int fd = open(entry.path().c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
+    struct stat status {};
+    const bool known = fd >= 0 && fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
+    const int failed = known && status.st_size > 0 ? posix_fallocate(fd, 0, status.st_size) : 0;
+    if (fd >= 0) close(fd);
+    if (failed != 0) {
+      throw InputError("shared memory: no room for " + std::to_string(status.st_size >> 10) + " KiB in " +
+                       directory.string() + ": " + std::strerror(failed));
+    }
   }
 }
 

@@ -19,6 +19,10 @@ inline constexpr std::uint64_t kNeededSharedMemory_B = 32u << 20;
 /// others or has less than kNeededSharedMemory_B free.
 void PrepareSharedMemory(const std::filesystem::path& directory);
 
+/// Takes the memory of all files that this process has made there. The library leaves them sparse, and who first writes
+/// to a page when /dev/shm is full gets a SIGBUS. Throws InputError when there is not enough.
+void ReserveSharedMemory(const std::filesystem::path& directory);
+
 struct SweepResult {
   int files = 0;
   std::uint64_t bytes = 0;

@@ -28,8 +28,8 @@ class ChaosCart {
   ChaosCart(const ChaosCart&) = delete;
   ChaosCart& operator=(const ChaosCart&) = delete;
 
-  /// Whether, from now on, every node reports that it runs, tissue moves, the hand feels it, the cut goes on and
-  /// pictures are drawn. If not, Trouble() tells what is missing.
+  /// Whether, from now on, every node reports that it runs, tissue moves, the hand feels it, heat hears of the hook
+  /// and pictures are drawn. If not, Trouble() tells what is missing.
   [[nodiscard]] bool GoesOn();
   [[nodiscard]] std::string Trouble() const { return missing_ + "\n" + cart_.Said(); }
 

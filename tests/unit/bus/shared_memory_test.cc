@@ -51,6 +51,19 @@ TEST_F(SharedMemory, LinkIsRefused) {
 
 TEST_F(SharedMemory, UnreachablePlaceIsRefused) { EXPECT_THROW(PrepareSharedMemory("/nowhere/fulcrum"), InputError); }
 
+TEST_F(SharedMemory, FilesOfThisProcessGetAllOfTheirMemory) {
+  PrepareSharedMemory(directory_);
+  const auto blocks = [](const fs::path& file) {
+    struct stat status {};
+    return stat(file.c_str(), &status) == 0 ? status.st_blocks : -1;
+  };
+  const fs::path own = Touch(getpid()), other = Touch(getpid() ^ 0x0101);
+  for (const fs::path& file : {own, other}) fs::resize_file(file, 1 << 20);
+  ReserveSharedMemory(directory_);
+  EXPECT_GE(blocks(own), (1 << 20) / 512);
+  EXPECT_LT(blocks(other), 100);
+}
+
 TEST_F(SharedMemory, SweepRemovesOnlyWhatTheDeadLeft) {
   PrepareSharedMemory(directory_);
   const pid_t child = fork();
