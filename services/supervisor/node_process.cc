@@ -3,6 +3,7 @@
 #include <signal.h>
 
 #include <fstream>
+#include <utility>
 
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
@@ -53,6 +54,8 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
   }
   if (due_ns_ != 0) {
     if (now_ns >= due_ns_) {
+      command_.arguments.insert(command_.arguments.end(), command_.again.begin(), command_.again.end());
+      command_.again.clear();
       try {
         Start(now_ns);
       } catch (const InputError& error) {
@@ -68,6 +71,22 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
     return std::nullopt;
   }
   Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false};
+  if (next_) {
+    before_ = std::exchange(command_, std::move(*next_));
+    next_.reset();
+    death.cause = "was replaced by command";
+    death.asked = true;
+    due_ns_ = now_ns;
+    return death;
+  }
+  if (before_ && !has_reported()) {
+    death.cause =
+        "was replaced by " + command_.program.string() + ", which " + death.cause + ": the one before comes back";
+    command_ = std::move(*before_);
+    before_.reset();
+    due_ns_ = now_ns;
+    return death;
+  }
   if (kill_ns_ != 0) {
     death.cause = "was restarted by command";
     death.asked = true;
@@ -91,6 +110,11 @@ void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
 void NodeProcess::AskRestart(std::int64_t now_ns) {
   Signal(SIGTERM);
   kill_ns_ = now_ns + kPatienceWithRestart;
+}
+
+void NodeProcess::Swap(NodeCommand command, std::int64_t now_ns) {
+  next_ = std::move(command);
+  AskRestart(now_ns);
 }
 
 bool NodeProcess::HasEnded() {

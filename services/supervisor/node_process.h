@@ -19,6 +19,8 @@ struct NodeCommand {
   std::filesystem::path program;
   std::vector<std::string> arguments;
   std::filesystem::path log;
+  std::vector<std::string> again;  ///< More arguments, from the second start on.
+  bool foreign = false;            ///< Not one of our nodes: its Health, if any, may name another process.
 };
 
 class NodeProcess {
@@ -41,6 +43,8 @@ class NodeProcess {
   /// Forgives silence up to now, because the supervisor itself was held up.
   void ForgiveSilence(std::int64_t now_ns);
   void AskRestart(std::int64_t now_ns);
+  /// Restarts as another program. When that ends before its first Health, the one before is started again.
+  void Swap(NodeCommand command, std::int64_t now_ns);
   void Signal(int signal) const { process_.Signal(signal); }
   /// For the end of the session: reaps without starting again. True when no process is left.
   [[nodiscard]] bool HasEnded();
@@ -49,6 +53,7 @@ class NodeProcess {
   [[nodiscard]] pid_t pid() const { return process_.pid(); }
   [[nodiscard]] bool running() const { return process_.running(); }
   [[nodiscard]] bool failed() const { return failed_; }
+  [[nodiscard]] bool foreign() const { return command_.foreign; }
   [[nodiscard]] bool has_reported() const { return last_health_ns_ != 0; }
   [[nodiscard]] const std::filesystem::path& log() const { return command_.log; }
 
@@ -56,6 +61,7 @@ class NodeProcess {
   void WatchForSilence(std::int64_t now_ns);
 
   NodeCommand command_;
+  std::optional<NodeCommand> next_, before_;  ///< Of a swap.
   ChildProcess process_;
   RestartPolicy policy_;
   std::int64_t started_ns_ = 0;

@@ -4,10 +4,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstring>
 #include <optional>
 #include <span>
+#include <sstream>
 #include <thread>
+#include <utility>
 
 #include "services/app/health_report.h"
 #include "services/bus/dds/participant.h"
@@ -70,7 +74,8 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
   const auto yes_no = [](bool value) { return value ? "true" : "false"; };
   return "  seconds: " + (end_s > 0 ? Fixed(end_s, 3) : std::string("until stopped")) +
          "\n  domain: " + std::to_string(settings.cart.domain) + "\n  window: " + yes_no(settings.window) +
-         "\n  keep_going: " + yes_no(settings.keep_going) + "\n  record: " + yes_no(settings.record.has_value()) + "\n";
+         "\n  keep_going: " + yes_no(settings.keep_going) + "\n  standby: " + yes_no(settings.standby) +
+         "\n  record: " + yes_no(settings.record.has_value()) + "\n";
 }
 
 std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFolder& folder) {
@@ -106,8 +111,22 @@ struct Supervisor::Impl {
     orders = participant->MakeOutput<Command>();
     replies = participant->MakeOutput<CommandReply>();
     for (const NodeId id : node_ids) {
-      nodes.emplace_back(CommandFor(id));
+      if (id == NodeId::kPhysics && up.standby) {
+        nodes.emplace_back(CommandInPair("a", false));
+        nodes.emplace_back(CommandInPair("b", true));
+      } else {
+        nodes.emplace_back(CommandFor(id));
+      }
     }
+  }
+
+  /// One of two physics nodes. Whoever comes back follows, for the other one leads by then.
+  [[nodiscard]] NodeCommand CommandInPair(const std::string& seat, bool follows) const {
+    NodeCommand command = CommandFor(NodeId::kPhysics);
+    command.arguments.insert(command.arguments.end(), {"--pair", seat});
+    (follows ? command.arguments : command.again).emplace_back("--follow");
+    command.log = folder.logs / (std::string(NodeName(NodeId::kPhysics)) + "-" + seat + ".log");
+    return command;
   }
 
   [[nodiscard]] NodeCommand CommandFor(NodeId id) const {
@@ -211,10 +230,13 @@ struct Supervisor::Impl {
   void TakeReports(std::int64_t now) {
     while (healths_in->TakeNext(&health)) {
       for (NodeProcess& node : nodes) {
-        if (node.id() == health.node && node.pid() == health.pid) {
+        if (node.id() == health.node && (node.pid() == health.pid || node.foreign())) {
           node.OnHealth(now);
+          // Of a pair the leader's counts, once there is one.
+          const bool follows = settings.standby && node.id() == NodeId::kPhysics &&
+                               health.state == HealthState::kWaiting && start_ns != 0;
           // The record closes with the session: what a node says of peers that have just ended is no finding.
-          if (!ended) record.AddHealth(SessionTime(now), health);
+          if (!ended && !follows) record.AddHealth(SessionTime(now), health);
         }
       }
     }
@@ -257,12 +279,53 @@ struct Supervisor::Impl {
           reply.ok = false;
           reply.text = "no running node \"" + command.argument + "\" in this session";
         }
+      } else if (command.verb == "swap") {
+        reply.ok = Swap(command.argument, now, &reply.text);
       } else {
         reply.ok = false;
-        reply.text = "unknown verb \"" + command.verb + "\"; the supervisor knows: restart, dump, down";
+        reply.text = "unknown verb \"" + command.verb + "\"; the supervisor knows: restart, swap, dump, down";
       }
       replies->Write(reply);
     }
+  }
+
+  /// @param argument the node, then the words of the command, a line each.
+  bool Swap(const std::string& argument, std::int64_t now, std::string* answer) {
+    std::vector<std::string> words;
+    std::istringstream lines(argument);
+    for (std::string word; std::getline(lines, word);) words.push_back(Filled(word));
+    NodeProcess* node = words.size() < 2 ? nullptr : Find(words[0]);
+    if (node == nullptr || !node->running()) {
+      *answer = "no running node \"" + (words.empty() ? std::string() : words[0]) + "\" in this session";
+      return false;
+    }
+    if (::access(words[1].c_str(), X_OK) != 0) {
+      *answer = words[1] + ": cannot be run; nothing was changed";
+      return false;
+    }
+    NodeCommand command = CommandFor(node->id());
+    command.program = words[1];
+    if (words.size() > 2) {
+      command.arguments.assign(words.begin() + 2, words.end());
+      command.foreign = true;
+    }
+    *answer = "replacing " + words[0] + " (pid " + std::to_string(node->pid()) + ") by " + words[1];
+    node->Swap(std::move(command), now);
+    return true;
+  }
+
+  /// {scene}, {session}, {domain} and {cart} stand for what a node of this session is given.
+  [[nodiscard]] std::string Filled(std::string word) const {
+    const std::array<std::pair<const char*, std::string>, 4> names{{{"{scene}", folder.scene.string()},
+                                                                    {"{session}", folder.path.string()},
+                                                                    {"{domain}", std::to_string(settings.cart.domain)},
+                                                                    {"{cart}", folder.cart.string()}}};
+    for (const auto& [name, value] : names) {
+      if (const std::size_t at = word.find(name); at != std::string::npos) {
+        word.replace(at, std::strlen(name), value);
+      }
+    }
+    return word;
   }
 
   void PublishOwnHealth(std::int64_t now) {
@@ -411,9 +474,9 @@ struct Supervisor::Impl {
     participant.reset();
     bus::RemoveSharedMemory(memory);
     // Checkpoints are for restarts within the session, and large.
-    for (const NodeId id : node_ids) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path)) {
       std::error_code ignored;
-      std::filesystem::remove(folder.path / (std::string(NodeName(id)) + ".checkpoint"), ignored);
+      if (entry.path().extension() == ".checkpoint") std::filesystem::remove(entry.path(), ignored);
     }
   }
 

@@ -138,7 +138,11 @@ void CartWatch::Take() {
   TakeTopology(now);
   while (p.healths->TakeNext(&p.health)) {
     if (!ours(p.health.stamp)) continue;
-    state_.healths[p.health.node] = p.health;
+    // Of a pair of processes the leader's; the one that follows waits.
+    const Health& known = state_.healths[p.health.node];
+    const bool follows =
+        p.health.state == HealthState::kWaiting && known.state == HealthState::kRunning && known.pid != p.health.pid;
+    if (!follows) state_.healths[p.health.node] = p.health;
     const bool drawn = p.health.node == NodeId::kRender && state_.Metric(NodeId::kRender, "frames_drawn") > 0;
     if (drawn) Hear(NodeId::kRender, p.health.stamp, now);
   }

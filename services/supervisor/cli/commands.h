@@ -18,6 +18,7 @@ ExitCode Up(const Words& words);
 ExitCode Status(const Words& words);
 ExitCode Top(const Words& words);
 ExitCode Restart(const Words& words);
+ExitCode Swap(const Words& words);
 ExitCode Down(const Words& words);
 ExitCode Dump(const Words& words);
 ExitCode Log(const Words& words);

@@ -11,11 +11,13 @@
 namespace fulcrum::supervisor::cli {
 
 std::span<const CommandEntry> Commands() {
-  static constexpr std::array<CommandEntry, 8> kCommands{{
+  static constexpr std::array<CommandEntry, 9> kCommands{{
       {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
       {"status", "status [--domain N]", "Print the nodes of the running session once.", Status},
       {"top", "top [--domain N]", "Show the nodes of the running session, refreshed until Ctrl-C.", Top},
       {"restart", "restart NODE [--domain N]", "Restart one node of the running session.", Restart},
+      {"swap", "swap NODE --with COMMAND [--domain N]",
+       "Replace a node of the running session by another build, or by a recording.", Swap},
       {"down", "down [--domain N]", "End the running session.", Down},
       {"dump", "dump [--domain N]",
        "Write the newest seconds of the running session into a file (fulcrum up --keep-last).", Dump},

@@ -47,7 +47,11 @@ void SessionView::Update() {
   Health health;
   while (healths_->TakeNext(&health)) {
     Health& newest = newest_[static_cast<std::size_t>(health.node)];
-    if (health.stamp.stamp_ns >= newest.stamp.stamp_ns) {
+    // Of a pair of processes the one that leads is shown.
+    const bool follows = health.state == HealthState::kWaiting && newest.pid != health.pid &&
+                         newest.state == HealthState::kRunning &&
+                         health.stamp.stamp_ns - newest.stamp.stamp_ns < kStale;
+    if (health.stamp.stamp_ns >= newest.stamp.stamp_ns && !follows) {
       newest = health;
     }
     has_supervisor_ |= health.node == NodeId::kSupervisor;

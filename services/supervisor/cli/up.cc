@@ -41,6 +41,7 @@ ExitCode Up(const Words& words) {
           "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
           "keep-last", po::value<double>()->value_name("SECONDS"),
           "keep the newest past in memory and write it into a file when a node dies or at fulcrum dump")(
+          "standby", "a second physics_node that takes over when the first falls silent")(
           "keep-going", "go on without a node that failed for good");
   AddDomain(&options);
   const Arguments arguments = Parse("up", words, options, {"scene"});
@@ -63,6 +64,7 @@ ExitCode Up(const Words& words) {
   if (settings.quality != "auto" && settings.quality != "low" && settings.quality != "high") {
     throw InputError("--quality: \"" + settings.quality + "\"; valid: auto, low, high");
   }
+  settings.standby = values.count("standby") != 0;
   settings.keep_going = values.count("keep-going") != 0;
   if (values.count("seconds") != 0) {
     settings.seconds = values["seconds"].as<double>();

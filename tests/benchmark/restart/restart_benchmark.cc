@@ -124,6 +124,65 @@ std::string RunSession(int rounds, const fs::path& scene, Findings* findings) {
   return {};
 }
 
+/// A session with a physics node in standby, whose leader is killed again and again; what went wrong, or nothing.
+std::string RunStandby(int kills, const fs::path& scene, std::vector<double>* gap_ms, Findings* findings) {
+  constexpr auto kIndex = static_cast<std::size_t>(NodeId::kPhysics);
+  testing::Cart cart(scene, kDomain, {"--standby"});
+  testing::CartWatch watch(kDomain, scene, cart.session());
+  const auto leader = [](const CartState& state) {
+    const auto health = state.healths.find(NodeId::kPhysics);
+    return health != state.healths.end() && health->second.state == HealthState::kRunning ? health->second.pid : 0;
+  };
+  if (!watch.WaitUntil(60, [&](const CartState& s) { return s.peak_force_N() > 0.1 && leader(s) != 0; })) {
+    return "the cart did not come to work\n" + cart.Said();
+  }
+  for (int i = 0; i < kills; ++i) {
+    // Each of the two lives for more than 5 s then, and comes back at once.
+    std::this_thread::sleep_for(std::chrono::milliseconds(2700));
+    const auto [epoch, pid] =
+        watch.See([&](const CartState& s) { return std::pair(s.voices[kIndex].epoch, leader(s)); });
+    const std::int64_t killed_ns = runtime::MonotonicNs();
+    ::kill(pid, SIGKILL);
+    std::int64_t heard_ns = 0;
+    if (!watch.WaitUntil(kPatience_s, [&, before = epoch](const CartState& state) {
+          heard_ns = state.voices[kIndex].heard_ns;
+          return state.voices[kIndex].epoch > before;
+        })) {
+      return "nobody took over\n" + cart.Said();
+    }
+    gap_ms->push_back(1e-6 * static_cast<double>(heard_ns - killed_ns));
+  }
+  watch.See([&](const CartState& state) {
+    findings->force_step_N = std::max(findings->force_step_N, state.peak_step_N());
+    findings->force_N = std::max(findings->force_N, state.peak_force_N());
+    findings->tissue_lost_ms = std::max(findings->tissue_lost_ms, 1e3 * state.tissue_lost_s);
+  });
+  cart.Signal(SIGINT);
+  return cart.WaitForEnd(kPatience_s) == 0 ? std::string() : "the session ended badly\n" + cart.Said();
+}
+
+int Fail(const std::string& wrong) {
+  std::fprintf(stderr, "bench_restart: %s\n", wrong.c_str());
+  return 1;
+}
+
+int Standby(benchmark::Report* report) {
+  const fs::path folder = fs::temp_directory_path() / ("bench_standby." + std::to_string(::getpid()));
+  fs::create_directories(folder);
+  const fs::path scene = folder / "working.yaml";
+  std::ofstream(scene) << testing::WorkingScene("built-in", 120);
+  std::vector<double> gap_ms;
+  Findings findings;
+  const std::string wrong = RunStandby(report->quick() ? kKillsQuick : 2 * kKillsPerSession, scene, &gap_ms, &findings);
+  fs::remove_all(folder);
+  if (!wrong.empty()) return Fail(wrong);
+  report->Add("standby.gap_ms_p50", benchmark::Quantile(gap_ms, 0.5), "ms");
+  report->Add("standby.gap_ms_max", benchmark::Quantile(gap_ms, 1), "ms");
+  report->Add("standby.state_lost_ms_max", findings.tissue_lost_ms, "ms");
+  report->Add("standby.force_step_N_max", findings.force_step_N, "N/ms");
+  return 0;
+}
+
 int Run(benchmark::Report* report) {
   const fs::path folder = fs::temp_directory_path() / ("bench_restart." + std::to_string(::getpid()));
   fs::create_directories(folder);
@@ -138,10 +197,7 @@ int Run(benchmark::Report* report) {
     findings.shared_memory_left_B += SharedMemoryLeft();
   }
   fs::remove_all(folder);
-  if (!wrong.empty()) {
-    std::fprintf(stderr, "bench_restart: %s\n", wrong.c_str());
-    return 1;
-  }
+  if (!wrong.empty()) return Fail(wrong);
   for (const Node& node : kNodes) {
     const auto& times = findings.rejoin_ms[node.id];
     report->Add(std::string("restart.rejoin_ms_p50.") + node.key, benchmark::Quantile(times, 0.5), "ms");
@@ -161,5 +217,8 @@ int Run(benchmark::Report* report) {
 
 int main(int argc, char** argv) {
   fulcrum::benchmark::Report report(argc, argv);
-  return report.Wants("restart.") ? fulcrum::Run(&report) : 0;
+  int code = 0;
+  if (report.Wants("restart.")) code = fulcrum::Run(&report);
+  if (report.Wants("standby.")) code = std::max(code, fulcrum::Standby(&report));
+  return code;
 }
