@@ -38,7 +38,7 @@ class ToolMeshTest : public testing::Test {
   [[nodiscard]] std::filesystem::path Describe(const std::string& grasper, const std::string& hook) const {
     std::string text = small_;
     const auto add = [&](const std::string& tool, const std::string& meshes) {
-      const std::size_t at = text.find("}", text.find(tool));
+      const std::size_t at = text.find('}', text.find(tool));
       if (!meshes.empty()) {
         text.insert(at, ", meshes: {" + meshes + "}");
       }
