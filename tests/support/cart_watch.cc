@@ -114,6 +114,11 @@ bool CartWatch::WaitForState(double limit_s, const std::function<bool()>& done) 
   return done();
 }
 
+/// Bytes that are no message may decode to one, of a writer that has not begun yet.
+bool CartWatch::IsOfTheCart(const Stamp& stamp, std::int64_t now) const {
+  return stamp.epoch != 0 && stamp.epoch <= static_cast<std::uint64_t>(now) && !ignored_.contains(stamp.epoch);
+}
+
 void CartWatch::Hear(NodeId node, const Stamp& stamp, std::int64_t now) {
   CartState::Voice& voice = state_.voices[static_cast<std::size_t>(node)];
   if (stamp.epoch > voice.epoch) voice = {stamp.epoch, now};
@@ -122,7 +127,7 @@ void CartWatch::Hear(NodeId node, const Stamp& stamp, std::int64_t now) {
 void CartWatch::Take() {
   Ports& p = *ports_;
   const std::int64_t now = runtime::MonotonicNs();
-  const auto ours = [this](const Stamp& stamp) { return !ignored_.contains(stamp.epoch); };
+  const auto ours = [this, now](const Stamp& stamp) { return IsOfTheCart(stamp, now); };
   while (p.handles->TakeNext(&p.handle)) {
     const auto& handles = p.handle.handles;
     const bool useful =
@@ -169,7 +174,7 @@ void CartWatch::TakeFrames(std::int64_t now) {
   TissueFrame& frame = ports_->frame;
   while (ports_->frames->TakeLatest(&frame)) {
     const TissueFrameHeader& before = state_.frame;
-    if (frame.header.stamp.epoch < before.stamp.epoch) continue;
+    if (!IsOfTheCart(frame.header.stamp, now) || frame.header.stamp.epoch < before.stamp.epoch) continue;
     const bool new_process = before.stamp.epoch != 0 && frame.header.stamp.epoch > before.stamp.epoch;
     if (new_process) {
       const double restored_s = frame.header.simulated_time_s - kPhysicsStep_s;
@@ -183,6 +188,7 @@ void CartWatch::TakeFrames(std::int64_t now) {
 void CartWatch::TakeTopology(std::int64_t now) {
   TopologyState& topology = ports_->topology;
   while (ports_->topologies->TakeLatest(&topology)) {
+    if (!IsOfTheCart(topology.stamp, now)) continue;
     const TopologyState& known = state_.topology;
     if (topology.revision < known.revision) state_.topology_lost += known.revision - topology.revision;
     state_.topology_lost += BitsGone(known.dead_edges, topology.dead_edges);

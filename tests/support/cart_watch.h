@@ -78,6 +78,7 @@ class CartWatch {
   struct Ports;
   static bool WaitForState(double limit_s, const std::function<bool()>& done);
   void Take();
+  [[nodiscard]] bool IsOfTheCart(const Stamp& stamp, std::int64_t now) const;
   void Hear(NodeId node, const Stamp& stamp, std::int64_t now);
   void TakeTopology(std::int64_t now);
   void TakeFrames(std::int64_t now);

@@ -75,9 +75,11 @@ bool Kill(const Node& node, const testing::Cart& cart, testing::CartWatch* watch
   const auto victim = processes.find(NodeName(node.id));
   if (victim == processes.end()) return false;
   const auto index = static_cast<std::size_t>(node.id);
-  const auto [epoch, sealed_ns] = watch->See([&](const CartState& state) {
-    const auto seal = state.seals.find(node.id);
-    return std::pair(state.voices[index].epoch, seal == state.seals.end() ? 0 : seal->second.before_ns);
+  std::uint64_t epoch = 0;
+  std::int64_t sealed_ns = 0;
+  watch->See([&](const CartState& state) {
+    epoch = state.voices[index].epoch;
+    if (node.id == NodeId::kThermal) sealed_ns = state.seals.at(node.id).before_ns;
   });
   const std::int64_t killed_ns = runtime::MonotonicNs();
   ::kill(victim->second, SIGKILL);

@@ -66,8 +66,7 @@ void Chaos::KillEachNode() {
 
 void Chaos::StopEachNode() {
   for (const NodeId node : testing::kNodes) {
-    // Longer than the others' patience with its messages; once longer than its lease on the bus, too.
-    chaos_.Stop(node, node == NodeId::kThermal ? 1.4 : 0.2);
+    chaos_.Stop(node, 0.2);  // Longer than the others' patience with its messages.
     chaos_.WaitAMoment(0.1);
   }
   EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();

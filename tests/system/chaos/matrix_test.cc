@@ -85,6 +85,10 @@ class EveryDamage : public ::testing::TestWithParam<Damage> {};
 TEST_P(EveryDamage, OfACheckpointIsToldAndSurvived) {
   ChaosCart chaos(kSession_s, kDomain + 1, 1);
   ASSERT_TRUE(chaos.GoesOn()) << chaos.Trouble();
+  const auto both_slots_are_sealed = [](const CartState& state) {
+    return state.seals.at(NodeId::kThermal).sequence >= 2 && state.seals.at(NodeId::kPhysics).sequence >= 2;
+  };
+  ASSERT_TRUE(chaos.watch().WaitUntil(kPatience_s, both_slots_are_sealed));
   for (const NodeId node : {NodeId::kThermal, NodeId::kPhysics}) {
     chaos.KillAndSpoil(node, GetParam());
     const bool told = testing::WaitFor(kPatience_s, [&] {
