@@ -63,8 +63,8 @@ ExitCode RunPhysics(app::NodeApp& app) {
       case physics::Pair::Role::kTakesOver: {
         const auto left =
             runtime::CheckpointFile::Peek(session / seat.other, app.scene().hash, physics::kCheckpointLayout, capacity);
-        const bool restored = node.TakeOver(left ? std::span<const std::byte>(*left) : std::span<const std::byte>(),
-                                            static_cast<std::int64_t>(pair.own_epoch()));
+        const bool restored =
+            node.TakeOver(left ? std::span<const std::byte>(*left) : std::span<const std::byte>(), tick);
         leads.store(true, std::memory_order_relaxed);
         node.Step(tick);
         runtime::Log(runtime::LogLevel::kWarning,

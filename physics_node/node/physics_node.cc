@@ -94,8 +94,9 @@ void PhysicsNode::Follow(const Tick& tick) {
   topology_waits_ |= ports_.topology.TakeLatest(&topology_state_);
 }
 
-bool PhysicsNode::TakeOver(std::span<const std::byte> other, std::int64_t epoch_ns) {
-  frame_stamper_ = contact_stamper_ = cautery_stamper_ = manifest_stamper_ = bus::Stamper(epoch_ns);
+bool PhysicsNode::TakeOver(std::span<const std::byte> other, const Tick& tick) {
+  frame_stamper_ = contact_stamper_ = cautery_stamper_ = manifest_stamper_ = bus::Stamper(tick.stamp_ns);
+  first_index_ = tick.index;
   const auto own = checkpoint_ == nullptr ? std::nullopt : checkpoint_->Latest();
   const bool own_is_newer = own && CheckpointSteps(own->payload) > CheckpointSteps(other);
   restored_ = Restore(own_is_newer ? own->payload : other);
@@ -234,7 +235,7 @@ void PhysicsNode::PublishManifest(const Tick& tick) {
   }
   manifest_.stamp = manifest_stamper_.Next(tick.stamp_ns);
   manifest_.node = NodeId::kPhysics;
-  manifest_.tick = tick.index;
+  manifest_.tick = tick.index - first_index_;
   manifest_.session_time_s = tick.session_time_s;
   manifest_.state_hash = state_hash_;
   const auto consumed = [](TopicId topic, const Stamp& stamp) {

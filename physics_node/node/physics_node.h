@@ -44,8 +44,8 @@ class PhysicsNode {
   /// In the place of Step() while another process leads: keeps the newest inputs and publishes nothing.
   void Follow(const Tick& tick);
   /// From now on this process leads: goes on from the other's checkpoint (may be empty) or its own, whichever is newer.
-  /// False: there is neither. @param epoch_ns of what it publishes from now on.
-  bool TakeOver(std::span<const std::byte> other, std::int64_t epoch_ns);
+  /// False: there is neither. Before the Step() of that tick, whose time is the epoch of what it publishes from now on.
+  bool TakeOver(std::span<const std::byte> other, const Tick& tick);
 
   /// Metrics and last error. Any thread.
   void FillHealth(Health* health) const;
@@ -84,7 +84,8 @@ class PhysicsNode {
   bool tools_wait_ = false, handles_wait_ = false, topology_waits_ = false;  ///< Came while another process led.
   std::uint64_t ticks_ = 0;
   std::uint64_t last_index_ = 0;
-  int ticks_in_time_ = 0;  ///< Since the last skipped period.
+  std::uint64_t first_index_ = 0;  ///< Manifests count from the tick in which this process took over.
+  int ticks_in_time_ = 0;          ///< Since the last skipped period.
   std::uint64_t frame_version_ = 0, hash_version_ = 0, saved_version_ = 0, measured_version_ = 0;
   std::uint64_t state_hash_ = 0;
   bool restored_ = false;
