@@ -103,15 +103,19 @@ void McapWriter::Write(std::uint16_t channel, std::uint32_t sequence, std::uint6
   if (file_ < 0 || !error_.empty() || channel >= counts_.size()) {
     return;
   }
-  chunk_.Add(channel, sequence, log_time_ns, publish_time_ns, data);
-  if (chunk_.size() >= ChunkBuilder::kChunkBytes) {
+  const std::size_t at = chunk_.size();
+  chunk_.resize(at + kMessageHead);
+  PutMessageHead(channel, sequence, log_time_ns, publish_time_ns, data.size(), chunk_.data() + at);
+  ByteWriter(&chunk_).Bytes(data.data(), data.size());
+  if (chunk_.size() >= ChunkPacker::kChunkBytes) {
     EndChunk();
   }
 }
 
 void McapWriter::EndChunk() {
-  if (chunk_.size() > 0) {
-    chunk_.Pack(&packed_);
+  if (!chunk_.empty()) {
+    (void)packer_.Pack(chunk_, chunk_.size(), &packed_);
+    chunk_.clear();
     Append(packed_);
   }
 }
