@@ -183,19 +183,20 @@ void McapWriter::PutSummary() {
     to.Bytes(statistics.data(), statistics.size());
   });
   group(Opcode::kChunkIndex, [&] {
-    for (const auto& [start_of_chunk, index_B, chunk] : chunks_) {
+    for (const ChunkPlace& place : chunks_) {
+      const PackedChunk& chunk = place.chunk;
       to.Record(Opcode::kChunkIndex, [&] {
         to.Number(chunk.first_ns);
         to.Number(chunk.last_ns);
-        to.Number(start_of_chunk);
+        to.Number(place.start);
         to.Number(chunk.length);
         to.Sized<std::uint32_t>([&] {
           for (const PackedChunk::Part& part : chunk.parts) {
             to.Number(part.channel);
-            to.Number(std::uint64_t{start_of_chunk + part.index_offset});
+            to.Number(std::uint64_t{place.start + part.index_offset});
           }
         });
-        to.Number(index_B);
+        to.Number(place.index_B);
         to.Text(chunk.plain ? "" : "zstd");
         to.Number(chunk.packed);
         to.Number(chunk.unpacked);
