@@ -2,9 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
-#include <cstring>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -36,6 +37,17 @@ std::string TextOf(const T& value) {
   }
 }
 
+/// By their bits: what is not a number equals itself here.
+template <class T>
+bool SameBits(T a, T b) {
+  if constexpr (std::is_floating_point_v<T>) {
+    using Bits = std::conditional_t<sizeof(T) == sizeof(std::uint32_t), std::uint32_t, std::uint64_t>;
+    return std::bit_cast<Bits>(a) == std::bit_cast<Bits>(b);
+  } else {
+    return a == b;
+  }
+}
+
 template <class T>
 std::optional<Difference> Find(const T& a, const T& b, const std::string& path, std::string_view without);
 
@@ -46,7 +58,7 @@ std::optional<Difference> FindInRange(const Range& a, const Range& b, const std:
   for (std::size_t i = 0; i < size_a; ++i) {
     // Names are made for what differs only: a frame has tens of thousands of numbers.
     if constexpr (std::is_arithmetic_v<std::decay_t<decltype(a[i])>>) {
-      if (std::memcmp(&a[i], &b[i], sizeof(a[i])) == 0) continue;
+      if (SameBits(a[i], b[i])) continue;
     }
     if (auto found = Find(a[i], b[i], path + "[" + std::to_string(i) + "]", {})) return found;
   }
@@ -67,8 +79,7 @@ std::optional<Difference> Find(const T& a, const T& b, const std::string& path, 
   } else if constexpr (std::is_same_v<T, std::string>) {
     return a == b ? std::nullopt : std::optional(Difference{path, TextOf(a), TextOf(b)});
   } else if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T>) {
-    // By their bits: what is not a number equals itself here.
-    if (std::memcmp(&a, &b, sizeof(T)) == 0) return std::nullopt;
+    if (SameBits(a, b)) return std::nullopt;
     return Difference{path, TextOf(a), TextOf(b)};
   } else {
     return FindInRange(a, b, path);

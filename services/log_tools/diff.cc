@@ -34,7 +34,7 @@ void AddTo(Hash64* hash, const T& value, std::string_view without) {
 struct Stream {
   std::string topic, node;
   int process = 1;
-  auto operator<=>(const Stream&) const = default;
+  auto operator<=>(const Stream&) const = default;  // NOLINT(modernize-use-nullptr): a check older than the operator
 };
 
 std::ostream& operator<<(std::ostream& out, const Stream& stream) {
@@ -117,8 +117,9 @@ ExitCode Diff(const std::filesystem::path& first, const std::filesystem::path& s
   const Digest a = MakeDigest(first, filter, without);
   Digest b = MakeDigest(second, filter, without);
   bool same = true;
-  for (const auto& [stream, samples] : a) {
-    const Count count = Compare(samples, b[stream]);
+  for (const auto& known : a) {
+    const Stream& stream = known.first;
+    const Count count = Compare(known.second, b[stream]);
     *out << stream << ": " << count.common << " in both, " << count.different << " different, " << count.only_first
          << " only in the first, " << count.only_second << " only in the second\n";
     b.erase(stream);

@@ -35,15 +35,13 @@ bool Recording::Next(Entry* entry) {
 }
 
 void CheckTopics(const Filter& filter) {
+  std::set<std::string> known;
+  for (const bus::TopicRole& role : bus::kTopicRoles) known.emplace(bus::TopicLabel(role.id));
   for (const std::string& name : filter.topics) {
-    std::string known;
-    bool found = false;
-    for (const bus::TopicRole& role : bus::kTopicRoles) {
-      const std::string label(bus::TopicLabel(role.id));
-      found |= label == name;
-      known += (known.empty() ? "" : ", ") + label;
-    }
-    if (!found) throw InputError("no topic \"" + name + "\"; valid: " + known);
+    if (known.contains(name)) continue;
+    std::string message = "no topic \"" + name + "\"; valid:";
+    for (const std::string& label : known) message.append(" ").append(label);
+    throw InputError(message);
   }
 }
 

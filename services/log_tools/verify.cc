@@ -44,7 +44,9 @@ ExitCode Verify(const std::filesystem::path& file, std::ostream* out) {
     problem("the indexes lead to " + std::to_string(indexed) + " messages, the chunks hold " +
             std::to_string(messages));
   }
-  for (const auto& [topic, tally] : tallies) {
+  for (const auto& known : tallies) {
+    const std::string& topic = known.first;
+    const Tally& tally = known.second;
     const auto tell = [&](std::uint64_t count, const char* what) {
       if (count > 0) problem(topic + ": " + std::to_string(count) + what);
     };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <span>
 
 #include "services/bus/schema.h"
 #include "services/bus/topics.h"
@@ -33,18 +34,10 @@ std::string Hex(const bus::WriterGuid& guid) {
 
 }  // namespace
 
-/// Stands before each payload in a batch, copied byte by byte.
-struct Recorder::Entry {
-  std::uint32_t writer;
-  std::uint32_t size;
-  std::uint64_t sequence;
-  std::int64_t received_ns, source_ns;
-};
-
 Recorder::Recorder(const RecorderSettings& settings)
     : settings_(settings), wall_minus_monotonic_ns_(WallMinusMonotonic()) {
   for (Batch* batch : {&filling_, &writing_}) {
-    batch->bytes = std::make_unique_for_overwrite<std::byte[]>(settings.queue_B);
+    batch->bytes = std::make_unique_for_overwrite<std::uint8_t[]>(settings.queue_B);
   }
   if (settings.file.empty()) return;
   file_.emplace(settings.file, kProfile, settings.library);
@@ -71,16 +64,19 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
     writer = writers_.insert(writers_.end(), {sample.topic, sample.writer, sample.sequence - 1});
   }
   if (sample.sequence <= writer->last_sequence) return;
-  const bool room = filling_.used + sizeof(Entry) + size <= settings_.queue_B;
+  const bool room = filling_.used + recording::kMessageHead + size <= settings_.queue_B;
   if (room) {
-    const Entry entry{static_cast<std::uint32_t>(writer - writers_.begin()), static_cast<std::uint32_t>(size),
-                      sample.sequence, now_ns, sample.source_ns};
-    std::byte* at = filling_.bytes.get() + filling_.used;
-    std::memcpy(at, &entry, sizeof entry);
-    at = std::copy(sample.head.begin(), sample.head.end(), at + sizeof entry);
-    std::copy(sample.body.begin(), sample.body.end(), at);
+    std::uint8_t* at = filling_.bytes.get() + filling_.used;
+    recording::PutMessageHead(static_cast<std::uint16_t>(writer - writers_.begin()),
+                              static_cast<std::uint32_t>(sample.sequence),
+                              static_cast<std::uint64_t>(now_ns + wall_minus_monotonic_ns_),
+                              static_cast<std::uint64_t>(sample.source_ns), size, at);
+    at += recording::kMessageHead;
+    std::memcpy(at, sample.head.data(), sample.head.size());
+    if (!sample.body.empty()) std::memcpy(at + sample.head.size(), sample.body.data(), sample.body.size());
     if (!is_whole()) return;  // Missed: the next one's sequence tells.
-    filling_.used += sizeof entry + size;
+    if (filling_.used == 0) filling_.begin_ns = now_ns;
+    filling_.used += recording::kMessageHead + size;
     most_used_ = std::max(most_used_, filling_.used);
   }
   counts.missed += sample.sequence - writer->last_sequence - 1;
@@ -116,43 +112,36 @@ void Recorder::AddChannels(recording::McapWriter* file, std::size_t first,
   }
 }
 
-void Recorder::Flush(std::int64_t now_ns) {
+void Recorder::Flush(std::int64_t now_ns) { Exchange(now_ns, false); }
+
+void Recorder::Exchange(std::int64_t now_ns, bool all) {
+  constexpr std::size_t kChunk = recording::ChunkPacker::kChunkBytes;
   {
     const std::lock_guard lock(mutex_);
+    const bool due = filling_.used >= kChunk || now_ns - filling_.begin_ns >= kLongestChunk_ns;
+    if (filling_.used == 0 || !(due || all)) return;
     std::swap(filling_, writing_);
   }
   AddNewChannels();
-  const auto wall = [this](std::int64_t ns) { return static_cast<std::uint64_t>(ns + wall_minus_monotonic_ns_); };
-  for (std::size_t at = 0; at < writing_.used;) {
-    Entry entry;
-    std::memcpy(&entry, writing_.bytes.get() + at, sizeof entry);
-    at += sizeof entry;
-    if (chunk_.size() == 0) chunk_begin_ns_ = entry.received_ns;
-    chunk_.Add(static_cast<std::uint16_t>(entry.writer), static_cast<std::uint32_t>(entry.sequence),
-               wall(entry.received_ns), static_cast<std::uint64_t>(entry.source_ns),
-               {writing_.bytes.get() + at, entry.size});
-    ++in_chunk_[static_cast<std::size_t>(channels_[entry.writer].topic)];
-    at += entry.size;
-    if (chunk_.size() >= recording::ChunkBuilder::kChunkBytes) EndChunk();
+  std::span<const std::uint8_t> records(writing_.bytes.get(), writing_.used);
+  while (!records.empty()) {
+    // Up to twice a chunk is one: no crumb is left behind.
+    records = records.subspan(packer_.Pack(records, records.size() <= 2 * kChunk ? records.size() : kChunk, &packed_));
+    if (file_) Write();
+    if (settings_.keep_s > 0) Keep();
   }
   writing_.used = 0;
-  if (chunk_.size() > 0 && now_ns - chunk_begin_ns_ >= kLongestChunk_ns) EndChunk();
 }
 
-void Recorder::EndChunk() {
-  if (chunk_.size() == 0) return;
-  chunk_.Pack(&packed_);
-  if (file_) {
-    file_->Append(packed_);
-    const std::lock_guard lock(mutex_);
-    error_ = file_->error();
-    file_B_ = file_->bytes_written();
-    for (std::size_t topic = 0; topic < counts_.size() && !error_.empty(); ++topic) {
-      counts_[topic].unwritten += in_chunk_[topic];
-    }
+void Recorder::Write() {
+  file_->Append(packed_);
+  const std::lock_guard lock(mutex_);
+  error_ = file_->error();
+  file_B_ = file_->bytes_written();
+  if (error_.empty()) return;
+  for (const recording::PackedChunk::Part& part : packed_.parts) {
+    counts_[static_cast<std::size_t>(channels_[part.channel].topic)].unwritten += part.messages;
   }
-  in_chunk_ = {};
-  if (settings_.keep_s > 0) Keep();
 }
 
 void Recorder::Keep() {
@@ -169,8 +158,7 @@ void Recorder::Keep() {
 }
 
 void Recorder::Dump(const std::filesystem::path& path, std::string_view reason, std::int64_t now_ns) {
-  Flush(now_ns);
-  EndChunk();
+  Exchange(now_ns, true);
   recording::McapWriter file(path, kProfile, settings_.library);
   Introduce(&file);
   file.AddMetadata("dump", {{"reason", std::string(reason)}});
@@ -183,8 +171,7 @@ void Recorder::Dump(const std::filesystem::path& path, std::string_view reason, 
 
 void Recorder::Close(std::int64_t now_ns) {
   if (!file_) return;
-  Flush(now_ns);
-  EndChunk();
+  Exchange(now_ns, true);
   const std::lock_guard lock(mutex_);
   for (const auto& role : bus::kTopicRoles) {
     const Counts& counts = counts_[static_cast<std::size_t>(role.id)];

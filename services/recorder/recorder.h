@@ -64,11 +64,12 @@ class Recorder {
   void Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole, std::int64_t now_ns);
 
   // One thread, the writing one:
-  /// Writes what has come; a chunk is ended at ChunkBuilder::kChunkBytes or kLongestChunk_ns.
+  /// Writes what has come once it is ChunkPacker::kChunkBytes or kLongestChunk_ns old.
   void Flush(std::int64_t now_ns);
-  /// Flush, and writes what is kept of the last seconds into a file of its own. Throws InputError when that cannot be.
+  /// Writes what has come, and what is kept of the last seconds into a file of its own. Throws InputError when that
+  /// cannot be.
   void Dump(const std::filesystem::path& file, std::string_view reason, std::int64_t now_ns);
-  /// Flush, what was lost, and the end of the file.
+  /// Writes what has come, what was lost, and the end of the file.
   void Close(std::int64_t now_ns);
 
   [[nodiscard]] RecorderStats stats() const;
@@ -79,10 +80,11 @@ class Recorder {
   static constexpr std::int64_t kLongestChunk_ns = 500'000'000;
 
  private:
-  struct Entry;
+  /// Message records, as they stand in a chunk: a sample is copied once and packed from there.
   struct Batch {
-    std::unique_ptr<std::byte[]> bytes;
+    std::unique_ptr<std::uint8_t[]> bytes;
     std::size_t used = 0;
+    std::int64_t begin_ns = 0;  ///< When its first sample came.
   };
   struct Writer {
     TopicId topic;
@@ -98,10 +100,13 @@ class Recorder {
     bus::WriterGuid writer;
     recording::TextMap about;
   };
-  using Losses = std::array<std::uint64_t, kTopicCount>;
 
   void AddNewChannels();
-  void EndChunk();
+  /// Takes over what has come when that is worth a chunk, or all.
+  void Exchange(std::int64_t now_ns, bool all);
+  /// The packed chunk into the file.
+  void Write();
+  /// The packed chunk to those that a dump holds.
   void Keep();
   /// Metadata into a new file.
   void Introduce(recording::McapWriter* file) const;
@@ -124,10 +129,8 @@ class Recorder {
   std::optional<recording::McapWriter> file_;
   std::array<std::uint16_t, kTopicCount> schemas_{};  ///< In `file_`; 0: not yet.
   std::vector<Channel> channels_;                     ///< By writer.
-  recording::ChunkBuilder chunk_;
+  recording::ChunkPacker packer_;
   recording::PackedChunk packed_;
-  std::int64_t chunk_begin_ns_ = 0;
-  Losses in_chunk_{};  ///< Samples in the open chunk: lost if it cannot be written.
   std::deque<recording::PackedChunk> kept_;
   std::size_t kept_B_ = 0;
 };

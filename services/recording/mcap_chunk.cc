@@ -4,6 +4,8 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <cstring>
+#include <limits>
 
 #include "services/recording/byte_stream.h"
 
@@ -15,47 +17,63 @@ constexpr int kZstdLevel = -1;
 
 }  // namespace
 
-ChunkBuilder::ChunkBuilder() : zstd_(ZSTD_createCCtx()) {}
-
-ChunkBuilder::~ChunkBuilder() { ZSTD_freeCCtx(zstd_); }
-
-void ChunkBuilder::Add(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns,
-                       std::uint64_t publish_time_ns, std::span<const std::byte> data) {
-  first_ns_ = messages_.empty() ? log_time_ns : std::min(first_ns_, log_time_ns);
-  last_ns_ = messages_.empty() ? log_time_ns : std::max(last_ns_, log_time_ns);
-  if (index_.size() <= channel) {
-    index_.resize(channel + std::size_t{1});
-  }
-  index_[channel].push_back({log_time_ns, messages_.size()});
-  ByteWriter to(&messages_);
-  to.Record(Opcode::kMessage, [&] {
-    to.Number(channel);
-    to.Number(sequence);
-    to.Number(log_time_ns);
-    to.Number(publish_time_ns);
-    to.Bytes(data.data(), data.size());
-  });
+void PutMessageHead(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns,
+                    std::uint64_t publish_time_ns, std::size_t data_B, std::uint8_t* to) {
+  const auto put = [&to](auto value) {
+    std::memcpy(to, &value, sizeof value);
+    to += sizeof value;
+  };
+  put(static_cast<std::uint8_t>(Opcode::kMessage));
+  put(std::uint64_t{kMessageHead - kRecordHead + data_B});
+  put(channel);
+  put(sequence);
+  put(log_time_ns);
+  put(publish_time_ns);
 }
 
-void ChunkBuilder::Pack(PackedChunk* chunk) {
-  packed_.resize(std::max(packed_.size(), ZSTD_compressBound(messages_.size())));
+ChunkPacker::ChunkPacker() : zstd_(ZSTD_createCCtx()) {}
+
+ChunkPacker::~ChunkPacker() { ZSTD_freeCCtx(zstd_); }
+
+std::size_t ChunkPacker::Pack(std::span<const std::uint8_t> records, std::size_t most, PackedChunk* chunk) {
+  std::size_t length = 0;
+  chunk->first_ns = std::numeric_limits<std::uint64_t>::max();
+  chunk->last_ns = 0;
+  while (length < records.size()) {
+    ByteReader from(records.subspan(length));
+    (void)from.Number<std::uint8_t>();
+    const std::size_t next = length + kRecordHead + from.Number<std::uint64_t>();
+    if (length > 0 && next > most) {
+      break;
+    }
+    const auto channel = from.Number<std::uint16_t>();
+    (void)from.Number<std::uint32_t>();
+    const auto log_time_ns = from.Number<std::uint64_t>();
+    if (index_.size() <= channel) {
+      index_.resize(channel + std::size_t{1});
+    }
+    index_[channel].push_back({log_time_ns, length});
+    chunk->first_ns = std::min(chunk->first_ns, log_time_ns);
+    chunk->last_ns = std::max(chunk->last_ns, log_time_ns);
+    length = next;
+  }
+  const std::span<const std::uint8_t> messages = records.first(length);
+  packed_.resize(std::max(packed_.size(), ZSTD_compressBound(length)));
   const std::size_t size =
-      ZSTD_compressCCtx(zstd_, packed_.data(), packed_.size(), messages_.data(), messages_.size(), kZstdLevel);
+      ZSTD_compressCCtx(zstd_, packed_.data(), packed_.size(), messages.data(), length, kZstdLevel);
   // It fails only without memory; then as it is.
   chunk->plain = ZSTD_isError(size) != 0;
-  const std::span<const std::uint8_t> body = chunk->plain ? std::span(messages_) : std::span(packed_).first(size);
-  chunk->first_ns = first_ns_;
-  chunk->last_ns = last_ns_;
+  const std::span<const std::uint8_t> body = chunk->plain ? messages : std::span(packed_).first(size);
   chunk->packed = body.size();
-  chunk->unpacked = messages_.size();
+  chunk->unpacked = length;
   chunk->bytes.clear();
   chunk->parts.clear();
   ByteWriter to(&chunk->bytes);
   to.Record(Opcode::kChunk, [&] {
-    to.Number(first_ns_);
-    to.Number(last_ns_);
-    to.Number(std::uint64_t{messages_.size()});
-    to.Number(static_cast<std::uint32_t>(crc32_z(0, messages_.data(), messages_.size())));
+    to.Number(chunk->first_ns);
+    to.Number(chunk->last_ns);
+    to.Number(std::uint64_t{length});
+    to.Number(static_cast<std::uint32_t>(crc32_z(0, messages.data(), length)));
     to.Text(chunk->plain ? "" : "zstd");
     to.Number(std::uint64_t{body.size()});
     to.Bytes(body.data(), body.size());
@@ -73,7 +91,7 @@ void ChunkBuilder::Pack(PackedChunk* chunk) {
     });
     index_[c].clear();
   }
-  messages_.clear();
+  return length;
 }
 
 }  // namespace fulcrum::recording

@@ -26,30 +26,31 @@ struct PackedChunk {
   std::vector<Part> parts;
 };
 
-/// Collects messages. Allocates nothing once the buffers have grown: fresh megabytes several times a second would cost
-/// more than packing them.
-class ChunkBuilder {
- public:
-  ChunkBuilder();
-  ~ChunkBuilder();
-  ChunkBuilder(const ChunkBuilder&) = delete;
-  ChunkBuilder& operator=(const ChunkBuilder&) = delete;
+/// A message as a record of a chunk is kMessageHead bytes, which PutMessageHead writes, and its data.
+inline constexpr std::size_t kMessageHead = 31;
+void PutMessageHead(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns,
+                    std::uint64_t publish_time_ns, std::size_t data_B, std::uint8_t* to);
 
-  void Add(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns, std::uint64_t publish_time_ns,
-           std::span<const std::byte> data);
-  [[nodiscard]] std::size_t size() const { return messages_.size(); }
-  /// Compresses what was added into `chunk`, whose memory is used again, and begins anew.
-  void Pack(PackedChunk* chunk);
+/// Allocates nothing once the buffers have grown: fresh megabytes several times a second would cost more than packing
+/// them.
+class ChunkPacker {
+ public:
+  ChunkPacker();
+  ~ChunkPacker();
+  ChunkPacker(const ChunkPacker&) = delete;
+  ChunkPacker& operator=(const ChunkPacker&) = delete;
+
+  /// Packs the first of these message records, as many as fit into `most` bytes but at least one. Returns their length.
+  std::size_t Pack(std::span<const std::uint8_t> records, std::size_t most, PackedChunk* chunk);
 
   /// A chunk of this size is worth ending.
-  static constexpr std::size_t kChunkBytes = std::size_t{2} << 20;
+  static constexpr std::size_t kChunkBytes = std::size_t{1} << 20;
 
  private:
   struct IndexEntry {
     std::uint64_t log_time_ns, offset;
   };
-  std::uint64_t first_ns_ = 0, last_ns_ = 0;
-  std::vector<std::uint8_t> messages_, packed_;
+  std::vector<std::uint8_t> packed_;
   std::vector<std::vector<IndexEntry>> index_;  ///< By channel.
   ZSTD_CCtx_s* zstd_;
 };

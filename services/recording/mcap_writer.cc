@@ -103,15 +103,19 @@ void McapWriter::Write(std::uint16_t channel, std::uint32_t sequence, std::uint6
   if (file_ < 0 || !error_.empty() || channel >= counts_.size()) {
     return;
   }
-  chunk_.Add(channel, sequence, log_time_ns, publish_time_ns, data);
-  if (chunk_.size() >= ChunkBuilder::kChunkBytes) {
+  const std::size_t at = chunk_.size();
+  chunk_.resize(at + kMessageHead);
+  PutMessageHead(channel, sequence, log_time_ns, publish_time_ns, data.size(), chunk_.data() + at);
+  ByteWriter(&chunk_).Bytes(data.data(), data.size());
+  if (chunk_.size() >= ChunkPacker::kChunkBytes) {
     EndChunk();
   }
 }
 
 void McapWriter::EndChunk() {
-  if (chunk_.size() > 0) {
-    chunk_.Pack(&packed_);
+  if (!chunk_.empty()) {
+    (void)packer_.Pack(chunk_, chunk_.size(), &packed_);
+    chunk_.clear();
     Append(packed_);
   }
 }
@@ -179,19 +183,20 @@ void McapWriter::PutSummary() {
     to.Bytes(statistics.data(), statistics.size());
   });
   group(Opcode::kChunkIndex, [&] {
-    for (const auto& [start_of_chunk, index_B, chunk] : chunks_) {
+    for (const ChunkPlace& place : chunks_) {
+      const PackedChunk& chunk = place.chunk;
       to.Record(Opcode::kChunkIndex, [&] {
         to.Number(chunk.first_ns);
         to.Number(chunk.last_ns);
-        to.Number(start_of_chunk);
+        to.Number(place.start);
         to.Number(chunk.length);
         to.Sized<std::uint32_t>([&] {
           for (const PackedChunk::Part& part : chunk.parts) {
             to.Number(part.channel);
-            to.Number(std::uint64_t{start_of_chunk + part.index_offset});
+            to.Number(std::uint64_t{place.start + part.index_offset});
           }
         });
-        to.Number(index_B);
+        to.Number(place.index_B);
         to.Text(chunk.plain ? "" : "zstd");
         to.Number(chunk.packed);
         to.Number(chunk.unpacked);

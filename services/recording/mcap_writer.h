@@ -34,7 +34,7 @@ class McapWriter {
   std::uint16_t AddChannel(std::uint16_t schema, std::string_view topic, std::string_view message_encoding,
                            const TextMap& metadata);
   void AddMetadata(std::string_view name, const TextMap& values);
-  /// Adds a message to the open chunk, and ends that when it is ChunkBuilder::kChunkBytes long. Times are nanoseconds
+  /// Adds a message to the open chunk, and ends that when it is ChunkPacker::kChunkBytes long. Times are nanoseconds
   /// of one clock.
   void Write(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns, std::uint64_t publish_time_ns,
              std::span<const std::byte> data);
@@ -69,7 +69,8 @@ class McapWriter {
   std::string error_;
   std::uint64_t offset_ = 0, message_count_ = 0;
   std::uint64_t first_ns_ = 0, last_ns_ = 0;  ///< Of all messages.
-  ChunkBuilder chunk_;
+  std::vector<std::uint8_t> chunk_;           ///< Messages of the open one.
+  ChunkPacker packer_;
   PackedChunk packed_;
   std::vector<std::uint8_t> record_;
   std::vector<std::uint8_t> schemas_, channels_;  ///< Their records, again for the summary.

@@ -195,7 +195,7 @@ struct DdsParticipant::Impl {
     return topic = MakeTopic(role, type);
   }
 
-  fast::Topic* MakeTopic(const TopicRole& role, fast::TypeSupport type) {
+  fast::Topic* MakeTopic(const TopicRole& role, const fast::TypeSupport& type) {
     fast::Topic* topic = nullptr;
     if (type.register_type(participant) == dds::ReturnCode::RETCODE_OK) {
       topic = participant->create_topic(role.name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT);

@@ -93,7 +93,7 @@ TEST_F(McapTest, WhatIsWrittenIsReadAgain) {
 }
 
 TEST_F(McapTest, AMessageMayBeLargerThanAChunk) {
-  const Bytes large(3 * ChunkBuilder::kChunkBytes + 17, 0x5a);
+  const Bytes large(3 * ChunkPacker::kChunkBytes + 17, 0x5a);
   {
     McapWriter writer(file_, "", "");
     const std::uint16_t channel = writer.AddChannel(0, "tissue", "cdr", {});
