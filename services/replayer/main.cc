@@ -10,6 +10,7 @@
 #include <iostream>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "services/app/version.h"
@@ -132,7 +133,8 @@ Options Parse(int argc, char** argv) {
       ("from", po::value<double>()->value_name("S")->default_value(0), "live: begin so far into the recording [s]")  //
       ("frames", po::value<std::string>()->value_name("DIR")->default_value(""),
        "folder for the pictures of render; default: replayed_frames beside the recording")  //
-      ("threads", po::value<int>()->value_name("N")->default_value(1),
+      ("threads",
+       po::value<int>()->value_name("N")->default_value(static_cast<int>(std::thread::hardware_concurrency())),
        "that share a step of physics; the states do not depend on it")                                           //
       ("rate", po::value<double>()->value_name("X")->default_value(0), "times real time; 0: as fast as it can")  //
       ("until", po::value<double>()->value_name("S")->default_value(-1), "end at this session time [s]")         //
@@ -248,6 +250,7 @@ int Run(int argc, char** argv) {
   const config::CartConfig cart = options.cart.empty() ? config::CartConfig() : config::LoadCart(options.cart);
   const ScratchFolder scratch;
   options.lock_step.folder = scratch.path();
+  // A process with one thread: its moments are kept by forking it.
   if (options.console) return RunConsole(options.lock_step, scene.view(), cart);
   std::function<void(double)> progress;
   if (!options.quiet) progress = [](double time_s) { std::fprintf(stderr, "\rsession time %.1f s ", time_s); };

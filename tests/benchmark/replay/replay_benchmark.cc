@@ -1,0 +1,57 @@
+// Lock-step replay of a session of the real cart.
+//
+//   replay.hash_mismatches    states that differ, of physics, thermal and haptics over the whole recording
+//   replay.states_compared
+//   replay.speed_x_realtime   physics and thermal together, physics on as many threads as there are cores
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include "tests/benchmark/report.h"
+#include "tests/support/cart.h"
+#include "tests/support/replay_run.h"
+
+namespace fulcrum {
+namespace {
+
+constexpr int kDomain = 58;
+constexpr double kPatience_s = 120;
+
+int Fail(const char* what, const std::string& said) {
+  std::fprintf(stderr, "bench_replay: %s\n%s", what, said.c_str());
+  return 1;
+}
+
+int Run(benchmark::Report* report) {
+  testing::Cart cart(report->quick() ? "small" : "built-in", kDomain, {"--record"});
+  if (cart.WaitForEnd(kPatience_s) != 0) return Fail("the session did not end well", cart.Said());
+  const auto recording = cart.session() / "recording.mcap";
+  const auto all = testing::Replay(recording, {"--into", "physics", "thermal", "haptics"}, kPatience_s);
+  double mismatches = 0, compared = 0;
+  for (const char* node : {"physics_node", "thermal_node", "haptics_node"}) {
+    mismatches +=
+        all.figures.contains(std::string(node) + ".mismatches") ? all.figures.at(std::string(node) + ".mismatches") : 1;
+    if (all.figures.contains(std::string(node) + ".compared")) {
+      compared += all.figures.at(std::string(node) + ".compared");
+    }
+  }
+  if (all.exit_code != 0) std::fprintf(stderr, "%s", all.said.c_str());
+  report->Add("replay.hash_mismatches", mismatches, "states");
+  report->Add("replay.states_compared", compared, "states");
+  std::vector<double> speeds;
+  for (int i = 0; i < 3; ++i) {
+    const auto run = testing::Replay(recording, {"--into", "physics", "thermal"}, kPatience_s);
+    if (run.exit_code != 0) return Fail("the replay differs", run.said);
+    speeds.push_back(run.figures.at("speed_x_realtime"));
+  }
+  report->Add("replay.speed_x_realtime", benchmark::Quantile(speeds, 0.5), "1");
+  return all.exit_code;
+}
+
+}  // namespace
+}  // namespace fulcrum
+
+int main(int argc, char** argv) {
+  fulcrum::benchmark::Report report(argc, argv);
+  return report.Wants("replay.") ? fulcrum::Run(&report) : 0;
+}

@@ -1,0 +1,35 @@
+// What the README promises: record, kill, replay, the same states.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <thread>
+
+#include "tests/support/cart.h"
+#include "tests/support/replay_run.h"
+
+namespace fulcrum {
+namespace {
+
+TEST(ReplayOfTheCart, ComesToTheSameStatesThroughKillsAndATakeover) {
+  testing::Cart cart("small", 57, {"--record", "--standby"});
+  // While it pulls, and then cuts.
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.Said().find("t 1.") != std::string::npos; })) << cart.Said();
+  std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+  for (const char* node : {"haptics_node", "thermal_node", "physics_node"}) {
+    const auto nodes = cart.nodes();
+    ASSERT_TRUE(nodes.contains(node)) << cart.Said();
+    ::kill(nodes.at(node), SIGKILL);
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  }
+  EXPECT_EQ(cart.WaitForEnd(60), 0) << cart.Said();
+  const auto run = testing::Replay(cart.session() / "recording.mcap", {"--into", "physics", "thermal", "haptics"}, 60);
+  EXPECT_EQ(run.exit_code, 0) << run.said;
+  EXPECT_GT(run.figures.at("physics_node.compared"), 400) << run.said;
+  EXPECT_GT(run.figures.at("thermal_node.compared"), 400) << run.said;
+  EXPECT_EQ(run.figures.at("thermal_node.starts"), 2) << run.said;
+  EXPECT_EQ(run.figures.at("haptics_node.starts"), 2) << run.said;
+}
+
+}  // namespace
+}  // namespace fulcrum
