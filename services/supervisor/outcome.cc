@@ -93,7 +93,11 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
 
 std::string RecordingLosses(const SessionRecord& record) {
   const std::uint64_t lost = record.node(NodeId::kRecorder).drops;
-  return lost == 0 ? "no sample lost" : std::to_string(lost) + " samples lost";
+  const int restarts = record.node(NodeId::kRecorder).restarts;
+  return (lost == 0 ? "no sample lost" : std::to_string(lost) + " samples lost") +
+         (restarts == 0 ? ""
+                        : " but for those of " + std::to_string(restarts) +
+                              " restarts of the recorder, each with a file of its own");
 }
 
 std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& record) {

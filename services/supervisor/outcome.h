@@ -35,7 +35,7 @@ struct KeyFigure {
 };
 [[nodiscard]] std::vector<KeyFigure> KeyFigures(const SessionRecord& record);
 
-/// "no sample lost" or how many.
+/// "no sample lost" or how many, and whether the recorder was down.
 [[nodiscard]] std::string RecordingLosses(const SessionRecord& record);
 
 /// Flat JSON object; the keys are documented in services/supervisor/DESIGN.md.
