@@ -24,9 +24,11 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max();
 constexpr auto kPollPeriod = std::chrono::milliseconds(10);
-// A recorder finds a node that has just started within this time, if there is one. The first ticks must not pass it by:
-// a replay could not begin without them.
+// A recorder, if there is one, is found within this time of the session …
 constexpr std::int64_t kLongestWaitForRecorder = 100'000'000;
+// … and has found all writers of a node so long after that. The first samples must not pass it by: a replay could not
+// begin without them.
+constexpr std::int64_t kRecorderListens = 80'000'000;
 constexpr auto kHealthPeriod = std::chrono::milliseconds(100);
 // A node that cannot end within this time has hung; its checkpoint is safe against a kill.
 constexpr unsigned kLongestEndS = 3;
@@ -126,7 +128,6 @@ struct NodeApp::Impl {
   std::vector<HealthReport::InputWatch> inputs;
   std::vector<HealthReport::OutputWatch> outputs;
   std::vector<std::shared_ptr<void>> ports;
-  std::function<bool()> is_recorded;  ///< Somebody reads its TickManifest; empty: it has none.
   std::map<std::string, std::function<std::string(const std::string&)>> handlers{{"stop", [this](const std::string&) {
                                                                                     End(ExitCode::kDone,
                                                                                         "stopped by command");
@@ -170,7 +171,6 @@ void NodeApp::Watch(TopicId topic, std::function<bus::InputStats()> stats) {
   impl_->inputs.emplace_back(topic, std::move(stats));
 }
 void NodeApp::Watch(std::function<bus::OutputStats()> stats) { impl_->outputs.push_back(std::move(stats)); }
-void NodeApp::AwaitReaders(std::function<bool()> has_readers) { impl_->is_recorded = std::move(has_readers); }
 void NodeApp::Keep(std::shared_ptr<void> port) { impl_->ports.push_back(std::move(port)); }
 
 double NodeApp::SessionTime(std::int64_t stamp_ns) const noexcept {
@@ -217,8 +217,10 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
     app.PollBus();
     const std::int64_t now = MonotonicNs();
     if (known_ns == 0 && app.session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown) known_ns = now;
+    const std::int64_t recorder_ns = app.participant.KnownSince(bus::kRecorderPeer);
     const bool recorded =
-        !app.is_recorded || app.is_recorded() || (known_ns != 0 && now - known_ns > kLongestWaitForRecorder);
+        app.node == NodeId::kRecorder || (recorder_ns != 0 ? now - recorder_ns > kRecorderListens
+                                                           : known_ns != 0 && now - known_ns > kLongestWaitForRecorder);
     if (!stepping && recorded && SessionTime(now) >= 0) {
       stepping = true;
       app.state = HealthState::kRunning;

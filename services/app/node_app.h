@@ -17,7 +17,6 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -89,7 +88,6 @@ class NodeApp {
     auto port = bus().MakeOutput<T>();
     typename bus::OutputOf<T>::type& output = *port;
     Watch([&output] { return output.stats(); });
-    if constexpr (std::is_same_v<T, TickManifest>) AwaitReaders([&output] { return output.has_readers(); });
     Keep(std::shared_ptr<void>(std::move(port)));
     return output;
   }
@@ -118,7 +116,6 @@ class NodeApp {
 
  private:
   void Keep(std::shared_ptr<void> port);
-  void AwaitReaders(std::function<bool()> has_readers);
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

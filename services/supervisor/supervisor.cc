@@ -232,9 +232,9 @@ struct Supervisor::Impl {
       for (NodeProcess& node : nodes) {
         if (node.id() == health.node && (node.pid() == health.pid || node.foreign())) {
           node.OnHealth(now);
-          // Of a pair the leader's counts, once there is one.
+          // Of a pair the leader's counts.
           const bool follows = settings.standby && node.id() == NodeId::kPhysics &&
-                               health.state == HealthState::kWaiting && start_ns != 0;
+                               health.state != HealthState::kRunning && health.state != HealthState::kDegraded;
           // The record closes with the session: what a node says of peers that have just ended is no finding.
           if (!ended && !follows) record.AddHealth(SessionTime(now), health);
         }

@@ -59,7 +59,7 @@ std::map<std::string, pid_t> Cart::nodes() const {
     char state = '?';
     pid_t ppid = 0;
     rest >> state >> ppid;
-    if (ppid == up_.pid() && state != 'Z') children[line.substr(open + 1, close - open - 1)] = std::stoi(name);
+    if (ppid == up_.pid() && state != 'Z') children.emplace(line.substr(open + 1, close - open - 1), std::stoi(name));
   }
   return children;
 }

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -56,6 +57,7 @@ class PeerWatch final : public fast::DomainParticipantListener {
     const std::lock_guard lock(mutex_);
     if (info.status == Status::REMOVED_PARTICIPANT || info.status == Status::DROPPED_PARTICIPANT) {
       mismatches_.erase(guid);
+      since_.erase(guid.guidPrefix);
       return;
     }
     const auto& bytes = info.info.m_userData;
@@ -69,6 +71,7 @@ class PeerWatch final : public fast::DomainParticipantListener {
     const std::size_t pid_at = text.rfind(kPidTag);
     if (pid_at != std::string::npos) std::sscanf(text.c_str() + pid_at + kPidTag.size(), "%d", &pid);
     peers_[guid.guidPrefix] = {info.info.m_participantName.c_str(), pid};
+    since_.try_emplace(guid.guidPrefix, std::chrono::steady_clock::now().time_since_epoch().count());
     if (hash == own_hash_) return;
     mismatches_[guid] = "schema mismatch: peer" + text.substr(name_at) + " speaks schema " + hash + ", this " +
                         own_name_ + " speaks " + own_hash_ + "; rebuild and restart both from the same sources";
@@ -77,6 +80,16 @@ class PeerWatch final : public fast::DomainParticipantListener {
   [[nodiscard]] std::string mismatch() const {
     const std::lock_guard lock(mutex_);
     return mismatches_.empty() ? std::string() : mismatches_.begin()->second;
+  }
+
+  [[nodiscard]] std::int64_t KnownSince(const std::string& name) const {
+    const std::lock_guard lock(mutex_);
+    std::int64_t first = 0;
+    for (const auto& [prefix, since_ns] : since_) {
+      const auto peer = peers_.find(prefix);
+      if (peer != peers_.end() && peer->second.name == name && (first == 0 || since_ns < first)) first = since_ns;
+    }
+    return first;
   }
 
   /// Also of one that is gone by now.
@@ -90,6 +103,7 @@ class PeerWatch final : public fast::DomainParticipantListener {
   const std::string own_name_, own_hash_;
   mutable std::mutex mutex_;
   std::map<rtps::GuidPrefix_t, Peer> peers_;
+  std::map<rtps::GuidPrefix_t, std::int64_t> since_;  ///< Of those that live.
   std::map<rtps::GUID_t, std::string> mismatches_;
 };
 
@@ -263,6 +277,8 @@ std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink)
   if (!input->ok()) throw InputError(std::string(role.name) + ": cannot make a reader");
   return input;
 }
+
+std::int64_t DdsParticipant::KnownSince(const std::string& name) const { return impl_->watch.KnownSince(name); }
 
 Peer DdsParticipant::PeerOf(const WriterGuid& writer) const {
   rtps::GuidPrefix_t prefix;

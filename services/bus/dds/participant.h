@@ -21,6 +21,9 @@ struct DdsSettings {
   std::uint64_t schema_hash = SchemaHash();  ///< What peers must speak too; a test gives another one.
 };
 
+/// Name of the participant that records: nodes wait for it before they begin.
+inline constexpr const char* kRecorderPeer = "recording";
+
 class DdsParticipant {
  public:
   /// Throws InputError when the domain is out of range, shared memory is short or the participant cannot be made.
@@ -41,6 +44,9 @@ class DdsParticipant {
   [[nodiscard]] std::unique_ptr<RawInput> MakeRawInput(TopicId id, RawSink sink);
   /// Whose a writer is or was.
   [[nodiscard]] Peer PeerOf(const WriterGuid& writer) const;
+
+  /// When a participant of that name was discovered, CLOCK_MONOTONIC [ns]; 0: none is known.
+  [[nodiscard]] std::int64_t KnownSince(const std::string& name) const;
 
   /// Empty, or one line naming a peer whose schema hash differs (both hashes, both names).
   [[nodiscard]] std::string schema_mismatch() const;

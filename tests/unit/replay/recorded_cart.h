@@ -82,6 +82,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   SceneManifest session;
   session.stamp = {1, kStart, kStart};
   session.scene_name = scene.name;
+  session.session_id = "test";
   session.scene_hash = scene.hash;
   session.session_start_ns = kStart;
   session_out->Write(session);

@@ -64,8 +64,8 @@ TEST_F(WhatIfTest, AWeakGripLetsGo) {
   EXPECT_LT(result.peak_tissue_force_N.after, result.peak_tissue_force_N.before);
 }
 
-TEST_F(WhatIfTest, WetterTissueIsCutLess) {
-  const WhatIfResult result = WhatIf({"thermal.latent_heat_J_m3=2.3e9"}, {NodeId::kPhysics, NodeId::kThermal});
+TEST_F(WhatIfTest, AWeakGeneratorCutsLess) {
+  const WhatIfResult result = WhatIf({"thermal.v_max_V=100"}, {NodeId::kPhysics, NodeId::kThermal});
   EXPECT_EQ(result.first_node, NodeId::kThermal);
   EXPECT_LT(result.cut_length_mm.after, result.cut_length_mm.before);
   EXPECT_GT(result.max_position_mm, 0) << "what is not cut moves otherwise: physics is fed by thermal";
