@@ -13,7 +13,8 @@ namespace fulcrum::testing {
 class Program {
  public:
   Program() = default;
-  /// Starts bin/`name`, or a path from the root, with `arguments`; `input` stands in its standard input, what it says is kept in memory.
+  /// Starts bin/`name`, or a path from the root, with `arguments`; `input` stands in its standard input, what it says
+  /// is kept in memory.
   Program(const std::string& name, const std::vector<std::string>& arguments, const std::string& input = "");
   ~Program();
   Program(Program&& other) noexcept;
