@@ -55,6 +55,9 @@ void RenderNode::WarmUp() {
   UpdateTexts();
   view_.AddSmoke(Vec2f::Zero(), -10);
   static_cast<void>(view_.UpdateEffects(-9.9));
+  // Few pixels: it is the shaders that must be met, and a node that comes back is waited for.
+  constexpr float kFewPixels = 0.25f;
+  view_.SetScale(kFewPixels);
   display_->DrawAndRead(&picture_);
   for (int k = 0; k < kMaxTools; ++k) {
     view_.SetTool(k, ToolSample());

@@ -218,8 +218,8 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
     const std::int64_t now = MonotonicNs();
     if (known_ns == 0 && app.session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown) known_ns = now;
     const std::int64_t recorder_ns = app.participant.KnownSince(bus::kRecorderPeer);
-    const bool recorded =
-        app.node == NodeId::kRecorder || (recorder_ns != 0 ? now - recorder_ns > kRecorderListens
+    const bool replayable = app.node != NodeId::kRecorder && app.node != NodeId::kRender;
+    const bool recorded = !replayable || (recorder_ns != 0 ? now - recorder_ns > kRecorderListens
                                                            : known_ns != 0 && now - known_ns > kLongestWaitForRecorder);
     if (!stepping && recorded && SessionTime(now) >= 0) {
       stepping = true;

@@ -151,9 +151,10 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
       const double now_s = kNsToS * static_cast<double>(runtime::MonotonicNs() - begin);
       if (due_s > now_s) std::this_thread::sleep_for(std::chrono::duration<double>(due_s - now_s));
     }
-    for (std::size_t i = 0; i < runners.size(); ++i) {
-      if (running[i] && runners[i]->result().node == tick.node) running[i] = runners[i]->Give(std::move(tick));
-    }
+    const auto taker = std::find_if(runners.begin(), runners.end(),
+                                    [&](const auto& runner) { return runner->result().node == tick.node; });
+    const auto i = static_cast<std::size_t>(taker - runners.begin());
+    if (running[i]) running[i] = (*taker)->Give(std::move(tick));
     result.session_s = std::max(result.session_s, time - first_time);
     if (progress && time > told_s + 0.1) {
       told_s = time;
