@@ -136,9 +136,10 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
   const std::int64_t begin = runtime::MonotonicNs();
   std::int64_t first_stamp = 0;
   double first_time = 0, told_s = 0;
-  RecordedTick tick;
   std::vector<bool> running(runners.size(), true);
-  while (std::find(running.begin(), running.end(), true) != running.end() && source.Next(&tick)) {
+  while (std::find(running.begin(), running.end(), true) != running.end()) {
+    RecordedTick tick;
+    if (!source.Next(&tick)) break;
     RefuseOtherScene(settings.recording, source.session(), scene);
     const double time = tick.tick.session_time_s;
     if (settings.until_s >= 0 && time > settings.until_s) break;

@@ -83,9 +83,10 @@ std::vector<NodeId> NodesNamed(const po::variables_map& values, const char* opti
     };
     const auto node = std::find_if(valid.begin(), valid.end(), named);
     if (node == valid.end()) {
-      std::string names;
-      for (const NodeId v : valid) names.append(names.empty() ? "" : ", ").append(NodeName(v));
-      throw InputError(std::string("--") + option + " " + name + ": no such node here; valid: " + names);
+      std::string problem = "--";
+      problem.append(option).append(" ").append(name).append(": no such node here; valid:");
+      for (const NodeId v : valid) problem.append(" ").append(NodeName(v));
+      throw InputError(problem);
     }
     if (std::find(nodes.begin(), nodes.end(), *node) == nodes.end()) nodes.push_back(*node);
   }
