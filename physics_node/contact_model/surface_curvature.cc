@@ -68,7 +68,7 @@ Mat3f FrameOf(const Vec3f& normal) {
 }  // namespace
 
 PrincipalCurvatures FitCurvatures(std::span<const Vec3f> points, float radius, const Vec3f& normal) {
-  const PrincipalCurvatures none{normal, normal.unitOrthogonal(), 0, 0};
+  PrincipalCurvatures none{normal, normal.unitOrthogonal(), 0, 0};
   // Twice: over a plane that is tilted, what is around is not around.
   Mat3f frame = FrameOf(normal);
   Vec6d q;
@@ -161,7 +161,7 @@ void SurfaceCurvature::VisitNeighbours(Index particle) {
 }
 
 PrincipalCurvatures SurfaceCurvature::At(const SurfacePoint& at, bool at_rest, const Vec3f& n) {
-  const PrincipalCurvatures none{n, n.unitOrthogonal(), 0, 0};
+  PrincipalCurvatures none{n, n.unitOrthogonal(), 0, 0};
   if (!at.found) {
     return none;
   }
