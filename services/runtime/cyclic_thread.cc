@@ -77,15 +77,16 @@ struct CyclicThread::Impl {
     }
   }
 
-  /// False when asked to stop.
-  bool WaitFor(std::int64_t wake_ns) const {
+  /// False when asked to stop. `*begin_ns`: the time at which it went on, by the last look at the clock.
+  bool WaitFor(std::int64_t wake_ns, std::int64_t* begin_ns) const {
     const std::int64_t sleep_end = wake_ns - settings.spin_ns;
     for (std::int64_t now = MonotonicNs(); now < sleep_end; now = MonotonicNs()) {
       if (stop.load(std::memory_order_relaxed)) return false;
       SleepUntil(std::min(sleep_end, now + kMaxSleepNs));
     }
-    while (MonotonicNs() < wake_ns) {
-    }
+    do {
+      *begin_ns = MonotonicNs();
+    } while (*begin_ns < wake_ns);
     return !stop.load(std::memory_order_relaxed);
   }
 
@@ -94,8 +95,8 @@ struct CyclicThread::Impl {
     Tick tick;
     tick.dt_s = 1e-9 * static_cast<double>(settings.period_ns);
     std::int64_t wake_ns = MonotonicNs() + settings.period_ns;
-    while (WaitFor(wake_ns)) {
-      const std::int64_t begin = MonotonicNs();
+    std::int64_t begin = 0;
+    while (WaitFor(wake_ns, &begin)) {
       wake.Add(begin - wake_ns);
       tick.stamp_ns = begin;
       callback(tick);
