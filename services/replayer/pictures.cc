@@ -42,8 +42,8 @@ class Feed {
 
 }  // namespace
 
-std::uint64_t ReplayPictures(const PicturesSettings& settings, const SceneView& scene,
-                             const std::function<void(double)>& progress) {
+PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView& scene,
+                              const std::function<void(double)>& progress) {
   recording::McapReader reader(settings.recording);
   Feed<TissueFrame> tissue;
   Feed<TopologyState> topology;
@@ -95,7 +95,9 @@ std::uint64_t ReplayPictures(const PicturesSettings& settings, const SceneView& 
   }
   node.Finish();
   node.WaitForFiles();
-  return node.pictures_written();
+  Health health;
+  node.FillHealth(&health);
+  return {node.pictures_written(), health.metrics};
 }
 
 }  // namespace fulcrum::replay
