@@ -21,7 +21,7 @@ class ConsoleTest : public ::testing::Test {
       if (tools->stamp.sequence > 3000) tools->tools[0].p_WT.x() += 1e-3f;
       return true;
     };
-    session_ = std::make_unique<testing::ShortSession>("console_test", story);
+    session_ = std::make_unique<testing::ShortSession>("console_test", story, [](scene::SceneData*) {});
   }
   static void TearDownTestSuite() { session_.reset(); }
 

@@ -28,6 +28,7 @@ std::map<std::string, std::string> Pictures(const std::filesystem::path& folder)
 
 TEST(IntoRender, DrawsTheSamePicturesToTheLastByte) {
   const testing::ShortSession session("pictures_test", {.seconds = 1.6}, [](scene::SceneData* data) {
+    testing::ShortSession::Hurry(data);
     data->fixed.render.width = 320;
     data->fixed.render.height = 180;
     data->fixed.render.rate_Hz = 4;

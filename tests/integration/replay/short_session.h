@@ -1,4 +1,4 @@
-// A recording that the programs' tests read: the small scene in a hurry, touched, grasped and cut.
+// A recording of the small scene that the programs' tests read.
 #pragma once
 
 #include <unistd.h>
@@ -16,15 +16,17 @@ namespace fulcrum::replay::testing {
 /// Folder with recording.mcap and scene.fulcrum; it goes with the object.
 class ShortSession {
  public:
-  /// @param change of the scene before it is compiled.
-  explicit ShortSession(
-      const std::string& name, const CartStory& story = {.seconds = 1.6},
-      const std::function<void(scene::SceneData*)>& change = [](scene::SceneData*) {})
+  /// Of the scene before it is compiled: touched, grasped and cut within two seconds.
+  static void Hurry(scene::SceneData* data) {
+    for (ScriptKey& key : data->script) key.time_s *= 0.4f;
+  }
+
+  explicit ShortSession(const std::string& name, const CartStory& story = {.seconds = 2},
+                        const std::function<void(scene::SceneData*)>& change = Hurry)
       : folder_(std::filesystem::temp_directory_path() / ("fulcrum_" + name + "_" + std::to_string(::getpid()))) {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
     scene::SceneData data = scene::BuildProcedural(scene::Small());
-    for (ScriptKey& key : data.script) key.time_s *= 0.4f;
     change(&data);
     scene::WriteSceneFile(data, "", folder_ / "scene.fulcrum");
     const scene::SceneFile scene(folder_ / "scene.fulcrum");

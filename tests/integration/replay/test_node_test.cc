@@ -51,6 +51,7 @@ TEST_F(TestNodeTest, EachNodeComesToItsRecordedStates) {
     EXPECT_EQ(answer.code, 0) << answer.said;
     EXPECT_NE(answer.said.find("ok     hash_mismatches == 0"), std::string::npos) << answer.said;
   }
+  ASSERT_GT(session_->cut_length_m(), 1e-3f);
 }
 
 TEST_F(TestNodeTest, TheHashThatOneRunPrintsIsTheOneThatTheNextExpects) {
@@ -91,7 +92,7 @@ TEST_F(TestNodeTest, BadUseAndBadFilesAreToldApart) {
   const Case cases[] = {
       {{}, "which node"},
       {{"physics"}, "which node"},
-      {{"kitchen", "--inputs", log}, "--test kitchen: no such node here; valid: haptics_node"},
+      {{"kitchen", "--inputs", log}, "--test kitchen: no such node here; valid: physics_node"},
       {{"physics", "--inputs", "/nonexistent.mcap"}, "/nonexistent.mcap: no such file"},
       {{"physics", "--inputs", log, "--assert", "max_displacement_mm"}, "a comparison is missing"},
       {{"physics", "--inputs", log, "--assert", "speed > 3"}, "physics_node has no figure \"speed\""},
