@@ -27,7 +27,8 @@ TEST(ReplayOfTheCart, ComesToTheSameStatesThroughKillsAndATakeover) {
   EXPECT_GT(run.figures.at("physics_node.compared"), 400) << run.said;
   EXPECT_GT(run.figures.at("thermal_node.compared"), 400) << run.said;
   // Each death is in the recording: physics went over to the one that followed, the others were started again.
-  EXPECT_EQ(run.figures.at("physics_node.starts"), 2) << run.said;
+  // On a machine that holds a leader up for longer than its deadline it goes over once more.
+  EXPECT_GE(run.figures.at("physics_node.starts"), 2) << run.said;
   EXPECT_EQ(run.figures.at("thermal_node.starts"), 2) << run.said;
   EXPECT_EQ(run.figures.at("haptics_node.starts"), 2) << run.said;
 }
