@@ -138,6 +138,6 @@ ExitCode Run(app::NodeApp& node) {
 int main(int argc, char** argv) {
   return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kRecorder,
                                 "Every topic of the cart into a file (--file FILE), and the newest seconds (--keep\n"
-                                "SECONDS) into dumps when a node dies or `fulcrum dump` asks for one.",
+                                "SECONDS) into dumps when a node dies or is degraded, or `fulcrum dump` asks for\none.",
                                 fulcrum::recorder::Run);
 }

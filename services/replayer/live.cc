@@ -26,6 +26,8 @@ namespace {
 
 // Readers find the writers before the first message: a round of discovery.
 constexpr auto kDiscovery = std::chrono::milliseconds(300);
+// What was sent last reaches its readers before its writer is gone.
+constexpr auto kLeave = std::chrono::milliseconds(200);
 // A longer silence in the recording is waited for in pieces, so that a stop is heard.
 constexpr std::int64_t kLongestSleep_ns = 50'000'000;
 
@@ -160,6 +162,7 @@ LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>&
     result.latest_s = std::max(result.latest_s, 1e-9 * static_cast<double>(runtime::MonotonicNs() - due_ns));
     ++(channel->second->Send() ? result.published : result.failed);
   }
+  std::this_thread::sleep_for(kLeave);
   return result;
 }
 

@@ -42,8 +42,8 @@ class Feed {
 
 }  // namespace
 
-std::uint64_t ReplayPictures(const PicturesSettings& settings, const SceneView& scene,
-                             const std::function<void(double)>& progress) {
+PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView& scene,
+                              const std::function<void(double)>& progress) {
   recording::TimeOrder messages(settings.recording);
   const recording::McapReader& reader = messages.reader();
   Feed<TissueFrame> tissue;
@@ -96,7 +96,9 @@ std::uint64_t ReplayPictures(const PicturesSettings& settings, const SceneView& 
   }
   node.Finish();
   node.WaitForFiles();
-  return node.pictures_written();
+  Health health;
+  node.FillHealth(&health);
+  return {node.pictures_written(), health.metrics};
 }
 
 }  // namespace fulcrum::replay

@@ -28,14 +28,20 @@ TickSource::TickSource(const std::filesystem::path& file, const std::vector<Node
 
 bool TickSource::Next(RecordedTick* tick) {
   recording::McapMessage message{};
-  while (!ended_ && (pending_.empty() || pending_.begin()->first > newest_ns_ - kSettle_ns)) {
-    if (reader_.Next(&message)) {
-      Take(message);
-    } else {
-      ended_ = true;
+  for (;;) {
+    while (!ended_ && (pending_.empty() || pending_.begin()->first > newest_ns_ - kSettle_ns)) {
+      if (reader_.Next(&message)) {
+        Take(message);
+      } else {
+        ended_ = true;
+      }
     }
+    if (pending_.empty()) return false;
+    // What a process still said after its successor led is nobody's: readers refuse it, too.
+    const RecordedTick& next = pending_.begin()->second.tick;
+    if (next.epoch >= progress_[static_cast<std::size_t>(next.node)].epoch) break;
+    pending_.erase(pending_.begin());
   }
-  if (pending_.empty()) return false;
   *tick = std::move(pending_.begin()->second.tick);
   const Pending rest = std::move(pending_.begin()->second);
   pending_.erase(pending_.begin());

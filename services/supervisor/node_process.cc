@@ -59,6 +59,7 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
       try {
         Start(now_ns);
       } catch (const InputError& error) {
+        if (before_) return GiveBack(error.what(), {}, now_ns);
         failed_ = true;
         return Death{error.what(), true, {}, false};
       }
@@ -80,12 +81,7 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
     return death;
   }
   if (before_ && !has_reported()) {
-    death.cause =
-        "was replaced by " + command_.program.string() + ", which " + death.cause + ": the one before comes back";
-    command_ = std::move(*before_);
-    before_.reset();
-    due_ns_ = now_ns;
-    return death;
+    return GiveBack("was replaced by " + command_.program.string() + ", which " + death.cause, *end, now_ns);
   }
   if (kill_ns_ != 0) {
     death.cause = "was restarted by command";
@@ -96,6 +92,14 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
   const std::optional<std::int64_t> delay = IsFinal(*end) ? std::nullopt : policy_.OnDeath(now_ns - started_ns_);
   death.for_good = failed_ = !delay.has_value();
   due_ns_ = now_ns + delay.value_or(0);
+  return death;
+}
+
+NodeProcess::Death NodeProcess::GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns) {
+  Death death{why + ": the one before comes back", false, end, false};
+  command_ = std::move(*before_);
+  before_.reset();
+  due_ns_ = now_ns;
   return death;
 }
 

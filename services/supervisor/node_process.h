@@ -63,6 +63,8 @@ class NodeProcess {
 
  private:
   void WatchForSilence(std::int64_t now_ns);
+  /// In the place of a replacement that was never heard of.
+  Death GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns);
 
   NodeCommand command_;
   std::optional<NodeCommand> next_, before_;  ///< Of a swap; `before_` until the new one has reported.

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <vector>
 
+#include "services/core/escape.h"
 #include "services/supervisor/picture.h"
 #include "services/supervisor/svg_plot.h"
 

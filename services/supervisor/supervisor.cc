@@ -47,6 +47,8 @@ constexpr std::int64_t kLongestEnd = 4 * kSecond;
 constexpr std::int64_t kSweepAfter = 2 * kSecond;
 // A gap in our own loop: a suspended machine, a stopped supervisor. Then silence proves nothing.
 constexpr std::int64_t kHeldUp = kSecond;
+// What a node says of a peer that is being restarted by command is no fault.
+constexpr std::int64_t kAskedFor = 3 * kSecond;
 
 std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) {
   std::vector<NodeId> nodes;
@@ -194,6 +196,12 @@ struct Supervisor::Impl {
     orders->Write(dump);
   }
 
+  /// A node that goes on, but no longer well: what led to it is in the newest past.
+  void DumpFault(std::int64_t now) {
+    AskDump(now, std::string(NodeName(health.node)) + " is degraded" +
+                     (health.last_error.empty() ? std::string() : ": " + health.last_error));
+  }
+
   void TakeReports(std::int64_t now) {
     while (healths_in->TakeNext(&health)) {
       for (NodeProcess& node : nodes) {
@@ -203,7 +211,11 @@ struct Supervisor::Impl {
           const bool follows = settings.standby && node.id() == NodeId::kPhysics &&
                                health.state != HealthState::kRunning && health.state != HealthState::kDegraded;
           // The record closes with the session: what a node says of peers that have just ended is no finding.
-          if (!ended && !follows) record.AddHealth(SessionTime(now), health);
+          if (!ended && !follows) {
+            const bool was_well = record.node(health.node).state != HealthState::kDegraded;
+            record.AddHealth(SessionTime(now), health);
+            if (was_well && health.state == HealthState::kDegraded && now >= excused_ns) DumpFault(now);
+          }
         }
       }
     }
@@ -242,6 +254,7 @@ struct Supervisor::Impl {
         if (node != nullptr && node->running()) {
           reply.text = "restarting " + command.argument + " (pid " + std::to_string(node->pid()) + ")";
           node->AskRestart(now);
+          excused_ns = now + kAskedFor;
         } else {
           reply.ok = false;
           reply.text = "no running node \"" + command.argument + "\" in this session";
@@ -272,6 +285,7 @@ struct Supervisor::Impl {
       NodeCommand command = starter.Replacement(node->command(), words);
       *answer = "replacing " + name + " (pid " + std::to_string(node->pid()) + ") by " + command.program.string();
       node->Swap(std::move(command), now);
+      excused_ns = now + kAskedFor;
       return true;
     } catch (const InputError& error) {
       *answer = error.what();
@@ -480,7 +494,8 @@ struct Supervisor::Impl {
   std::int64_t start_ns = 0;  ///< CLOCK_MONOTONIC at session time 0; 0: not begun.
   std::int64_t last_loop_ns = 0, next_health_ns = 0;
   std::int64_t next_dump_ns = 0;
-  std::int64_t sweep_ns = 0;  ///< When to sweep; 0: nothing to sweep.
+  std::int64_t excused_ns = 0;  ///< Until then a degraded node is no fault.
+  std::int64_t sweep_ns = 0;    ///< When to sweep; 0: nothing to sweep.
   double reached_s = 0;
   bool ending = false;                     ///< No further turn.
   bool ended = false;                      ///< Session time has stopped.

@@ -2,7 +2,9 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <fstream>
 #include <sstream>
 #include <system_error>
@@ -62,6 +64,17 @@ std::map<std::string, pid_t> Cart::nodes() const {
     if (ppid == up_.pid() && state != 'Z') children.emplace(line.substr(open + 1, close - open - 1), std::stoi(name));
   }
   return children;
+}
+
+double Cart::PictureTime() const {
+  double newest_s = -1;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(session() / "frames", ignored)) {
+    int ms = 0;
+    if (std::sscanf(entry.path().filename().c_str(), "frame_%d.png", &ms) == 1)
+      newest_s = std::max(newest_s, 1e-3 * ms);
+  }
+  return newest_s;
 }
 
 std::optional<int> Cart::WaitForEnd(double limit_s) {

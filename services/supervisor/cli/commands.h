@@ -22,6 +22,7 @@ ExitCode Swap(const Words& words);
 ExitCode Down(const Words& words);
 ExitCode Dump(const Words& words);
 ExitCode Log(const Words& words);
+ExitCode TestNode(const Words& words);
 ExitCode Doctor(const Words& words);
 ExitCode Reference(const Words& words);
 

@@ -11,7 +11,7 @@
 namespace fulcrum::supervisor::cli {
 
 std::span<const CommandEntry> Commands() {
-  static constexpr std::array<CommandEntry, 10> kCommands{{
+  static constexpr std::array<CommandEntry, 11> kCommands{{
       {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
       {"status", "status [--domain N]", "Print the nodes of the running session once.", Status},
       {"top", "top [--domain N]", "Show the nodes of the running session, refreshed until Ctrl-C.", Top},
@@ -22,6 +22,8 @@ std::span<const CommandEntry> Commands() {
       {"dump", "dump [--domain N]",
        "Write the newest seconds of the running session into a file (fulcrum up --keep-last).", Dump},
       {"log", "log TOOL FILE...", "Read recordings: info, list, cat, export, verify, diff, recover.", Log},
+      {"test-node", "test-node NODE --inputs LOG [--expect HASH] [--assert EXPR]... [--junit FILE]",
+       "Run one node headless against a recording, for QA and CI.", TestNode},
       {"doctor", "doctor [--domain N] [--out DIR]", "Check what this machine permits, and say how to permit more.",
        Doctor},
       {"reference", "reference cart|scene FILE...", "Print every key of cart or scene files, with what is valid.",

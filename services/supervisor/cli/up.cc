@@ -40,8 +40,9 @@ ExitCode Up(const Words& words) {
       ("record", "record all topics into recording.mcap of the session folder")(
           "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
           "keep-last", po::value<double>()->value_name("SECONDS"),
-          "keep the newest past in memory and write it into a file when a node dies or at fulcrum dump")(
-          "standby", "a second physics_node that takes over when the first falls silent")(
+          "keep the newest past in memory and write it into a file when a node dies, when its Health turns to "
+          "degraded, "
+          "and at fulcrum dump")("standby", "a second physics_node that takes over when the first falls silent")(
           "keep-going", "go on without a node that failed for good");
   AddDomain(&options);
   const Arguments arguments = Parse("up", words, options, {"scene"});
