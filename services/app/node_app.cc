@@ -41,7 +41,9 @@ struct NodeApp::Impl {
         options(node_options),
         cart(node_options.cart.empty() ? config::CartConfig() : config::LoadCart(node_options.cart)),
         scene(node_options.scene),
-        participant({.domain = node_options.domain, .node_name = NodeName(node_id), .shared_memory = {}}),
+        participant({.domain = node_options.domain,
+                     .node_name = NodeName(node_id),
+                     .security = {cart.security.keys, NodeName(node_id), cart.security.encrypt}}),
         manifests(participant.MakeInput<SceneManifest>()),
         commands(participant.MakeInput<Command>()),
         replies(participant.MakeOutput<CommandReply>()),
@@ -83,6 +85,10 @@ struct NodeApp::Impl {
     }
     if (const std::string mismatch = participant.schema_mismatch(); !mismatch.empty()) {
       End(ExitCode::kMismatch, mismatch);
+    }
+    const bus::Refusals refusals = participant.refusals();
+    for (; refusals_told < refusals.texts.size(); ++refusals_told) {
+      Log(LogLevel::kWarning, "refused: " + refusals.texts[refusals_told]);
     }
   }
 
@@ -134,6 +140,7 @@ struct NodeApp::Impl {
                                                                                     return "stopping";
                                                                                   }}};
 
+  std::size_t refusals_told = 0;
   // Relaxed: one number, nothing else is published through it.
   std::atomic<std::int64_t> session_start_ns{kSessionUnknown};
   std::atomic<HealthState> state{HealthState::kStarting};

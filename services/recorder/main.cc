@@ -84,7 +84,10 @@ ExitCode Run(app::NodeApp& node) {
   const fs::path folder = node.options().session;
   RecorderSettings settings = TakeSettings(&node);
   // The app's own participant has typed ports of some topics: there a type can be registered in one way only.
-  bus::DdsParticipant bus({.domain = node.options().domain, .node_name = bus::kRecorderPeer, .shared_memory = {}});
+  const config::SecurityConfig& security = node.cart().security;
+  bus::DdsParticipant bus({.domain = node.options().domain,
+                           .node_name = bus::kRecorderPeer,
+                           .security = {security.keys, NodeName(NodeId::kRecorder), security.encrypt}});
   settings.describe = [&](const bus::WriterGuid& writer) { return Describe(bus.PeerOf(writer)); };
   Recorder recorder(settings);
   std::vector<std::unique_ptr<bus::RawInput>> inputs;

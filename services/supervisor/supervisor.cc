@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <ctime>
 #include <optional>
 #include <span>
 #include <sstream>
@@ -18,6 +19,7 @@
 #include "services/bus/dds/shared_memory.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
+#include "services/keys/key_folder.h"
 #include "services/recording/free_name.h"
 #include "services/runtime/realtime.h"
 #include "services/scene/scene_file.h"
@@ -46,6 +48,7 @@ constexpr std::int64_t kLeadTime = kSecond / 5;
 constexpr std::int64_t kLongestEnd = 4 * kSecond;
 // Peers let go of a dead process's files when its lease of 1 s is over.
 constexpr std::int64_t kSweepAfter = 2 * kSecond;
+constexpr std::time_t kExpiryWarning_s = 30 * 24 * 3600;
 // A gap in our own loop: a suspended machine, a stopped supervisor. Then silence proves nothing.
 constexpr std::int64_t kHeldUp = kSecond;
 
@@ -102,7 +105,11 @@ struct Supervisor::Impl {
         node_ids(NodesOf(scene.view(), up)) {
     // Left by a supervisor that was killed: its nodes died with it.
     bus::SweepSharedMemory(memory);
-    participant.emplace(bus::DdsSettings{.domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory});
+    const bus::Security security = SecurityFor(NodeId::kSupervisor);
+    CheckKeys();
+    participant.emplace(bus::DdsSettings{
+        .domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory, .security = security});
+    bus::AnnounceSecurity(memory, security);
     manifests = participant->MakeOutput<SceneManifest>();
     healths_in = participant->MakeInput<Health>();
     healths_out = participant->MakeOutput<Health>();
@@ -116,6 +123,26 @@ struct Supervisor::Impl {
         nodes.emplace_back(CommandInPair("b", true));
       } else {
         nodes.emplace_back(CommandFor(id));
+      }
+    }
+  }
+
+  [[nodiscard]] bus::Security SecurityFor(NodeId id) const {
+    return {settings.cart.security.keys, NodeName(id), settings.cart.security.encrypt};
+  }
+
+  /// Before a node is started: its own refusal would be found in its log only.
+  void CheckKeys() {
+    if (settings.cart.security.keys.empty()) return;
+    const std::time_t now = std::time(nullptr);
+    std::vector<NodeId> ids = node_ids;
+    ids.push_back(NodeId::kSupervisor);
+    for (const NodeId id : ids) {
+      const bus::Security security = SecurityFor(id);
+      const std::time_t until = keys::CheckIdentity(security.keys, security.identity, security.encrypt, now).until;
+      if (until - now < kExpiryWarning_s && id == NodeId::kSupervisor) {
+        progress.Say("! the keys of this cart hold until " + keys::DateOf(until) +
+                     " only: make new ones with fulcrum keys init " + security.keys.string() + " --force");
       }
     }
   }
@@ -248,6 +275,11 @@ struct Supervisor::Impl {
       Fail(ExitCode::kMismatch, mismatch);
       ending = true;
     }
+    refusals = participant->refusals();
+    for (std::size_t i = record.refused().size(); i < refusals.texts.size(); ++i) {
+      progress.Say("! refused: " + refusals.texts[i]);
+    }
+    record.AddRefusals(SessionTime(now), refusals);
   }
 
   void TakeCommands(std::int64_t now) {
@@ -345,10 +377,11 @@ struct Supervisor::Impl {
     own.ticks = own_ticks;
     own.metrics.push_back({"session_time_s", SessionTime(now)});
     own.metrics.push_back({"session_end_s", end_s});
+    own.metrics.push_back({"refused", static_cast<double>(refusals.count())});
     for (const NodeId id : node_ids) {
       own.metrics.push_back({std::string("restarts_") + NodeName(id), static_cast<double>(record.node(id).restarts)});
     }
-    own.last_error = failed_why;
+    own.last_error = failed_why.empty() && !refusals.texts.empty() ? "refused: " + refusals.texts.back() : failed_why;
     app::FitToMessage(&own);
     healths_out->Write(own);
   }
@@ -522,6 +555,7 @@ struct Supervisor::Impl {
   std::vector<NodeProcess> nodes;
   SessionRecord record;
   Progress progress;
+  bus::Refusals refusals;
   Health health;  ///< Reused by TakeReports.
   app::RateMeter own_rate;
   std::uint64_t own_ticks = 0;

@@ -22,6 +22,7 @@ ExitCode Swap(const Words& words);
 ExitCode Down(const Words& words);
 ExitCode Dump(const Words& words);
 ExitCode Log(const Words& words);
+ExitCode Keys(const Words& words);
 ExitCode Doctor(const Words& words);
 
 struct CommandEntry {

@@ -11,7 +11,7 @@
 namespace fulcrum::supervisor::cli {
 
 std::span<const CommandEntry> Commands() {
-  static constexpr std::array<CommandEntry, 9> kCommands{{
+  static constexpr std::array<CommandEntry, 10> kCommands{{
       {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
       {"status", "status [--domain N]", "Print the nodes of the running session once.", Status},
       {"top", "top [--domain N]", "Show the nodes of the running session, refreshed until Ctrl-C.", Top},
@@ -22,6 +22,8 @@ std::span<const CommandEntry> Commands() {
       {"dump", "dump [--domain N]",
        "Write the newest seconds of the running session into a file (fulcrum up --keep-last).", Dump},
       {"log", "log TOOL FILE...", "Read recordings: info, list, cat, export, verify, diff, recover.", Log},
+      {"keys", "keys init|show|check [DIR] [--days N] [--force]",
+       "Make and check the keys of a secured cart: who may join, and write and read what.", Keys},
       {"doctor", "doctor [--domain N] [--out DIR]", "Check what this machine permits, and say how to permit more.",
        Doctor},
   }};
