@@ -4,12 +4,15 @@
 
 #include <atomic>
 #include <cmath>
+#include <condition_variable>
 #include <cstdio>
 #include <limits>
 #include <map>
 #include <mutex>
 #include <thread>
+#include <utility>
 
+#include "services/app/cart_security.h"
 #include "services/app/health_report.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
@@ -43,7 +46,7 @@ struct NodeApp::Impl {
         scene(node_options.scene),
         participant({.domain = node_options.domain,
                      .node_name = NodeName(node_id),
-                     .security = {cart.security.keys, NodeName(node_id), cart.security.encrypt}}),
+                     .security = SecurityOf(cart, NodeName(node_id))}),
         manifests(participant.MakeInput<SceneManifest>()),
         commands(participant.MakeInput<Command>()),
         replies(participant.MakeOutput<CommandReply>()),
@@ -144,6 +147,9 @@ struct NodeApp::Impl {
   // Relaxed: one number, nothing else is published through it.
   std::atomic<std::int64_t> session_start_ns{kSessionUnknown};
   std::atomic<HealthState> state{HealthState::kStarting};
+  std::mutex health_mutex;
+  std::condition_variable_any health_wanted;
+  bool health_now = false;
   std::mutex end_mutex;
   std::atomic<bool> ended{false};
   ExitCode exit_code = ExitCode::kDone;
@@ -189,6 +195,14 @@ void NodeApp::OnCommand(std::string verb, std::function<std::string(const std::s
   impl_->handlers[std::move(verb)] = std::move(handler);
 }
 
+void NodeApp::PublishHealthNow() {
+  {
+    const std::lock_guard lock(impl_->health_mutex);
+    impl_->health_now = true;
+  }
+  impl_->health_wanted.notify_one();
+}
+
 void NodeApp::Finish(ExitCode code, std::string_view reason) { impl_->End(code, reason); }
 
 ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::function<void(const Tick&)>& step,
@@ -213,8 +227,9 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
     auto next = std::chrono::steady_clock::now();
     while (!stop.stop_requested()) {
       app.PublishHealth(&report, thread, fill_health);
-      next += kHealthPeriod;
-      std::this_thread::sleep_until(next);
+      if (std::chrono::steady_clock::now() >= next) next += kHealthPeriod;
+      std::unique_lock lock(app.health_mutex);
+      app.health_wanted.wait_until(lock, stop, next, [&app] { return std::exchange(app.health_now, false); });
     }
   });
 

@@ -3,8 +3,10 @@
 #include <iterator>
 #include <mutex>
 
+#include "services/app/cart_security.h"
 #include "services/app/node_app.h"
 #include "services/app/version.h"
+#include "services/bus/hex.h"
 #include "services/bus/schema.h"
 #include "services/core/error.h"
 #include "services/recorder/recorder.h"
@@ -16,12 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using runtime::MonotonicNs;
-
-std::string Hex(std::uint64_t value) {
-  std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(value));
-  return text.data();
-}
 
 /// Its arguments, as /proc knows them while it lives.
 std::string CommandLine(int pid) {
@@ -56,8 +52,8 @@ RecorderSettings TakeSettings(app::NodeApp* node) {
        {{"id", options.session.filename()},
         {"scene", node->scene().name},
         {"scene_file", fs::absolute(options.scene)},
-        {"scene_hash", Hex(node->scene().hash)}}},
-      {"versions", {{"fulcrum", app::kVersion}, {"schema_hash", Hex(bus::SchemaHash())}}},
+        {"scene_hash", bus::Hex(node->scene().hash)}}},
+      {"versions", {{"fulcrum", app::kVersion}, {"schema_hash", bus::Hex(bus::SchemaHash())}}},
       {"cart", {{"yaml", config::CartToYaml(node->cart())}}},
   };
   return settings;
@@ -84,10 +80,9 @@ ExitCode Run(app::NodeApp& node) {
   const fs::path folder = node.options().session;
   RecorderSettings settings = TakeSettings(&node);
   // The app's own participant has typed ports of some topics: there a type can be registered in one way only.
-  const config::SecurityConfig& security = node.cart().security;
   bus::DdsParticipant bus({.domain = node.options().domain,
                            .node_name = bus::kRecorderPeer,
-                           .security = {security.keys, NodeName(NodeId::kRecorder), security.encrypt}});
+                           .security = app::SecurityOf(node.cart(), NodeName(NodeId::kRecorder))});
   settings.describe = [&](const bus::WriterGuid& writer) { return Describe(bus.PeerOf(writer)); };
   Recorder recorder(settings);
   std::vector<std::unique_ptr<bus::RawInput>> inputs;

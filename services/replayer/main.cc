@@ -13,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "services/app/cart_security.h"
 #include "services/app/version.h"
 #include "services/bus/access.h"
 #include "services/config/cart.h"
@@ -115,8 +116,7 @@ replay::LiveSettings LiveSettingsFrom(const po::variables_map& values) {
   settings.nodes = values.count("only") != 0 ? NodesNamed(values, "only", kPublishers) : kPublishers;
   for (const NodeId node : NodesNamed(values, "except", kPublishers)) std::erase(settings.nodes, node);
   if (const std::string cart = values["cart"].as<std::string>(); !cart.empty()) {
-    const config::SecurityConfig security = config::LoadCart(cart).security;
-    settings.security = {security.keys, std::string(bus::kReplayerIdentity), security.encrypt};
+    settings.security = app::SecurityOf(config::LoadCart(cart), bus::kReplayerIdentity);
   }
   return settings;
 }

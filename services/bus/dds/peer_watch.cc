@@ -3,14 +3,13 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstdio>
-#include <optional>
 #include <string_view>
 #include <utility>
 
 #include "services/bus/dds/security.h"
+#include "services/bus/hex.h"
 #include "services/bus/topics.h"
 #include "services/keys/key_folder.h"
 
@@ -29,12 +28,6 @@ constexpr std::int64_t kLongestHandshake_ns = 3'000'000'000;
 constexpr std::size_t kMostForbidden = 1024;
 constexpr std::size_t kLongestName = 80;
 
-std::string Hex(std::uint64_t value) {
-  std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(value));
-  return text.data();
-}
-
 std::int64_t NowNs() { return std::chrono::steady_clock::now().time_since_epoch().count(); }
 
 /// A stranger's words, fit for a log.
@@ -50,13 +43,6 @@ std::string ValueOf(const rtps::Token& token, std::string_view name) {
     if (property.name() == name) return property.value();
   }
   return {};
-}
-
-std::optional<TopicId> TopicNamed(const std::string& name) {
-  for (const TopicRole& role : kTopicRoles) {
-    if (name == role.name) return role.id;
-  }
-  return std::nullopt;
 }
 
 }  // namespace
@@ -138,8 +124,8 @@ void PeerWatch::CheckEndpoint(const Prefix& prefix, const std::string& topic, bo
   if (!security_.on()) return;
   const std::string identity = IdentityBehind(prefix);
   const AccessRole* role = AccessRoleOf(identity);
-  const std::optional<TopicId> id = TopicNamed(topic);
-  if (role != nullptr && id && Contains(writes ? role->writes : role->reads, *id)) return;
+  const TopicRole* known = RoleNamed(topic);
+  if (role != nullptr && known != nullptr && Contains(writes ? role->writes : role->reads, known->id)) return;
   const std::lock_guard lock(mutex_);
   const std::string what = (writes ? "may not write " : "may not read ") + Printable(topic);
   if (forbidden_.size() >= kMostForbidden || !forbidden_.emplace(prefix, what).second) return;
