@@ -13,8 +13,8 @@
 namespace fulcrum::bus {
 
 struct Security {
-  std::filesystem::path keys;  ///< Folder of `fulcrum keys init`; empty: no security.
-  std::string identity;        ///< Row of services/bus/access.h.
+  std::filesystem::path keys = {};  ///< Folder of `fulcrum keys init`; empty: no security.
+  std::string identity = {};        ///< Row of services/bus/access.h.
   bool encrypt = false;
 
   [[nodiscard]] bool on() const { return !keys.empty(); }

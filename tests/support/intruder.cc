@@ -20,6 +20,7 @@
 #include "services/keys/key_folder.h"
 #include "tests/support/cart.h"
 #include "tests/support/program.h"
+#include "tests/unit/bus/samples.h"
 
 namespace fulcrum::testing {
 namespace {
@@ -79,7 +80,7 @@ class TwoFacedPipe {
   std::thread thread_;
 };
 
-/// As much of a cart as a stranger could reach: a supervisor that says how it is, a physics node that takes ToolState.
+/// As much of a cart as a stranger could reach: a supervisor that tells its scene, a physics node that takes ToolState.
 class Target {
  public:
   Target(int domain, const fs::path& keys)
@@ -87,10 +88,9 @@ class Target {
         physics_({.domain = domain, .node_name = "physics_node", .security = {keys, "physics_node"}}) {}
 
   void Turn() {
-    const std::int64_t now = std::chrono::steady_clock::now().time_since_epoch().count();
-    Health health;
-    health.stamp = stamper_.Next(now);
-    health_->Write(health);
+    SceneManifest scene = bus::test::Sample<SceneManifest>();
+    scene.stamp = stamper_.Next(std::chrono::steady_clock::now().time_since_epoch().count());
+    scenes_->Write(scene);
     ToolState tool;
     came_through_ |= tools_->TakeNext(&tool) || tools_->stats().matched;
   }
@@ -105,7 +105,7 @@ class Target {
 
  private:
   bus::DdsParticipant supervisor_, physics_;
-  std::unique_ptr<bus::Output<Health>> health_ = supervisor_.MakeOutput<Health>();
+  std::unique_ptr<bus::Output<SceneManifest>> scenes_ = supervisor_.MakeOutput<SceneManifest>();
   std::unique_ptr<bus::Input<ToolState>> tools_ = physics_.MakeInput<ToolState>();
   bus::Stamper stamper_{std::chrono::steady_clock::now().time_since_epoch().count()};
   bool came_through_ = false;

@@ -3,7 +3,7 @@
 //   security_intruder DOMAIN NAME KEYS IDENTITY CA FIFO   one that has forged its own side: it holds the authorities in
 //                                                         CA for good and its permissions, read from FIFO, for whatever
 //                                                         is there at that moment
-// Writes ToolState and listens to Health. Exit codes as everywhere; 5: a sample of the cart came.
+// Writes ToolState and listens to SceneManifest. Exit codes as everywhere; 5: a sample of the cart came.
 #include <unistd.h>
 
 #include <chrono>
@@ -33,15 +33,15 @@ ToolState Forged() {
 
 int Knock(const bus::DdsSettings& settings) {
   bus::DdsParticipant participant(settings);
-  const auto healths = participant.MakeInput<Health>();
   const auto tools = participant.MakeOutput<ToolState>();
+  const auto scenes = participant.MakeInput<SceneManifest>();
   ToolState state = Forged();
   const auto begin = std::chrono::steady_clock::now();
   while (std::chrono::steady_clock::now() - begin < kLongest) {
     tools->Write(state);
     ++state.stamp.sequence;
-    Health health;
-    if (healths->TakeNext(&health)) return kHeard;
+    SceneManifest scene;
+    if (scenes->TakeNext(&scene)) return kHeard;
     if (const std::string mismatch = participant.schema_mismatch(); !mismatch.empty()) throw MismatchError(mismatch);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }

@@ -16,9 +16,10 @@
 namespace fulcrum::bus {
 
 struct DdsSettings {
-  int domain = 7;                       ///< 1 … 100: one per cart, one per test.
-  std::string node_name = "fulcrum";    ///< Seen by peers in USER_DATA.
-  std::filesystem::path shared_memory;  ///< Private 0700 directory on /dev/shm for data-sharing; empty: one per domain.
+  int domain = 7;                     ///< 1 … 100: one per cart, one per test.
+  std::string node_name = "fulcrum";  ///< Seen by peers in USER_DATA.
+  std::filesystem::path shared_memory =
+      {};  ///< Private 0700 directory on /dev/shm for data-sharing; empty: one per domain.
   std::uint64_t schema_hash = SchemaHash();  ///< What peers must speak too; a test gives another one.
   Security security = {};                    ///< Off unless keys are named.
 };

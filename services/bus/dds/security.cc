@@ -97,27 +97,30 @@ class SecurityLog final : public fast::StdoutConsumer {
  public:
   void Consume(const fast::Log::Entry& entry) override {
     const std::string_view category = entry.context.category;
-    if (category.starts_with("SECURITY")) {
-      Note(entry.message);
-    } else if (entry.kind == fast::Log::Kind::Error) {
+    const bool told_elsewhere = category.starts_with("SECURITY") && Note(entry.message);
+    if (!told_elsewhere && entry.kind == fast::Log::Kind::Error) {
       fast::StdoutConsumer::Consume(entry);
     }
   }
 
  private:
-  static void Note(const std::string& text) {
+  /// @return whether we tell of it ourselves, in words of ours.
+  static bool Note(const std::string& text) {
     constexpr std::string_view kRemote = "Error validating remote permissions for ";
     constexpr std::string_view kDomain = "Error checking remote participant  ";
     if (text.starts_with("Invalidation error of certificate")) {
       Notes().Certificate(InBrackets(text));
-      return;
+      return true;
     }
     for (const std::string_view head : {kRemote, kDomain}) {
       if (!text.starts_with(head)) continue;
       // "…80.1f.….0c|0.0.1.c1 (reason)."
       const std::string prefix = text.substr(head.size(), text.find('|') - head.size());
       Notes().Permissions(prefix, InBrackets(text));
+      return true;
     }
+    // An endpoint without a right to its topic: PeerWatch sees those of others, the port that cannot be made our own.
+    return text.starts_with("Error checking creat");
   }
 };
 
