@@ -56,7 +56,7 @@ class TwoFacedPipe {
   TwoFacedPipe(fs::path path, std::string first, std::string second) : path_(std::move(path)) {
     fs::remove(path_);
     if (::mkfifo(path_.c_str(), 0600) != 0) throw std::runtime_error("cannot make " + path_.string());
-    thread_ = std::thread([this, texts = {std::move(first), std::move(second)}] {
+    thread_ = std::thread([this, texts = std::vector<std::string>{std::move(first), std::move(second)}] {
       for (const std::string& text : texts) {
         const int fd = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
         (void)!::write(fd, text.data(), text.size());

@@ -97,7 +97,8 @@ class SecurityLog final : public fast::StdoutConsumer {
  public:
   void Consume(const fast::Log::Entry& entry) override {
     const std::string_view category = entry.context.category;
-    const bool told_elsewhere = category.starts_with("SECURITY") && Note(entry.message);
+    const bool told_elsewhere = (category.starts_with("SECURITY") && Note(entry.message)) ||
+                                entry.message.starts_with("Problem creating associated ");
     if (!told_elsewhere && entry.kind == fast::Log::Kind::Error) {
       fast::StdoutConsumer::Consume(entry);
     }
@@ -120,7 +121,7 @@ class SecurityLog final : public fast::StdoutConsumer {
       return true;
     }
     // An endpoint without a right to its topic: PeerWatch sees those of others, the port that cannot be made our own.
-    return text.starts_with("Error checking creat");
+    return text.starts_with("Error checking creat") || text.find("topic not found in allow rule") != std::string::npos;
   }
 };
 
