@@ -15,6 +15,7 @@
 #include <cstring>
 #include <ctime>
 #include <fstream>
+#include <functional>
 #include <string_view>
 #include <thread>
 
@@ -159,7 +160,7 @@ std::string Logs(const fs::path& session) {
   return text;
 }
 
-std::string Run(const std::string& program, const std::vector<std::string>& arguments, int wanted_code) {
+std::string RunProgram(const std::string& program, const std::vector<std::string>& arguments, int wanted_code) {
   Program run(program, arguments);
   EXPECT_EQ(run.End(0), wanted_code) << run.Said();
   return run.Said();
@@ -171,9 +172,11 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
   const std::string domain = std::to_string(kSessionDomain);
   const Sniffer sniffer;
   Cart cart(NamedScene(scratch.path()), kSessionDomain, {"--cart", cart_file, "--record"});
-  ASSERT_TRUE(WaitFor(40, [&] { return cart.Said().find("t 1.") != std::string::npos || cart.nodes().size() == 6; }));
-  ASSERT_TRUE(WaitFor(20, [&] { return fs::exists(cart.session() / "scene.fulcrum"); }));
-  const std::string status = Run("fulcrum", {"status", "--domain", domain}, 0);
+  // The session runs once the handles' log says so.
+  ASSERT_TRUE(WaitFor(60, [&] {
+    return ReadFile(cart.session() / "logs" / "handle_bridge.log").find("joined session") != std::string::npos;
+  })) << cart.Said();
+  const std::string status = RunProgram("fulcrum", {"status", "--domain", domain}, 0);
   for (const char* node :
        {"handle_bridge", "haptics_node", "physics_node", "thermal_node", "render_node", "recorder"}) {
     EXPECT_NE(status.find(node), std::string::npos) << status;
@@ -181,8 +184,8 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
   // A killed node joins again with its keys; a node without keys does not.
   ::kill(cart.nodes()["thermal_node"], SIGKILL);
   const std::string stranger =
-      Run("handle_bridge",
-          {"--scene", cart.session() / "scene.fulcrum", "--session", scratch.path(), "--domain", domain}, 3);
+      RunProgram("handle_bridge",
+                 {"--scene", cart.session() / "scene.fulcrum", "--session", scratch.path(), "--domain", domain}, 3);
   EXPECT_NE(stranger.find("admits nobody without keys"), std::string::npos) << stranger;
 
   ASSERT_EQ(cart.WaitForEnd(90), 0) << cart.Said();
@@ -287,21 +290,22 @@ TEST(KeyFolder, SaysWhatIsWrongWithAKeyAndWhatToDo) {
 TEST(KeysCommand, MakesShowsAndChecksAndOverwritesNothing) {
   const Scratch scratch("command");
   const std::string folder = scratch.path() / "keys";
-  ExpectSaid(Run("fulcrum", {"keys", "init", folder, "--days", "30"}, 0), {"security: {keys: " + folder, "until"});
+  ExpectSaid(RunProgram("fulcrum", {"keys", "init", folder, "--days", "30"}, 0),
+             {"security: {keys: " + folder, "until"});
   const std::string key = ReadFile(scratch.path() / "keys" / "physics_node.key");
-  ExpectSaid(Run("fulcrum", {"keys", "init", folder}, 2), {"has keys already", "--force"});
+  ExpectSaid(RunProgram("fulcrum", {"keys", "init", folder}, 2), {"has keys already", "--force"});
   EXPECT_EQ(ReadFile(scratch.path() / "keys" / "physics_node.key"), key);
-  ExpectSaid(Run("fulcrum", {"keys", "show", folder}, 0),
+  ExpectSaid(RunProgram("fulcrum", {"keys", "show", folder}, 0),
              {"physics_node", "30 days", "writes TissueFrame, ContactModel, CauteryContact", "reads  everything"});
-  ExpectSaid(Run("fulcrum", {"keys", "check", folder}, 0), {"✓ physics_node"});
+  ExpectSaid(RunProgram("fulcrum", {"keys", "check", folder}, 0), {"✓ physics_node"});
   fs::permissions(fs::path(folder) / "physics_node.key", fs::perms(0644));
-  ExpectSaid(Run("fulcrum", {"keys", "check", folder}, 2), {"✗ physics_node", "open to others"});
-  Run("fulcrum", {"keys", "init", folder, "--force"}, 0);
+  ExpectSaid(RunProgram("fulcrum", {"keys", "check", folder}, 2), {"✗ physics_node", "open to others"});
+  RunProgram("fulcrum", {"keys", "init", folder, "--force"}, 0);
   EXPECT_NE(ReadFile(scratch.path() / "keys" / "physics_node.key"), key);
   Write(fs::path(folder) / "notes.txt", "mine");
-  ExpectSaid(Run("fulcrum", {"keys", "init", folder, "--force"}, 2), {"notes.txt", "is no key"});
-  ExpectSaid(Run("fulcrum", {"keys", "init", folder, "--days", "0"}, 2), {"1 to 3650"});
-  ExpectSaid(Run("fulcrum", {"keys", "made"}, 2), {"init, show, check"});
+  ExpectSaid(RunProgram("fulcrum", {"keys", "init", folder, "--force"}, 2), {"notes.txt", "is no key"});
+  ExpectSaid(RunProgram("fulcrum", {"keys", "init", folder, "--days", "0"}, 2), {"1 to 3650"});
+  ExpectSaid(RunProgram("fulcrum", {"keys", "made"}, 2), {"init, show, check"});
 }
 
 }  // namespace
