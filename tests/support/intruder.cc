@@ -91,6 +91,9 @@ class Target {
     SceneManifest scene = bus::test::Sample<SceneManifest>();
     scene.stamp = stamper_.Next(std::chrono::steady_clock::now().time_since_epoch().count());
     scenes_->Write(scene);
+    // As every node does: who has left by the end has still been seen.
+    (void)supervisor_.refusals();
+    (void)physics_.refusals();
     ToolState tool;
     came_through_ |= tools_->TakeNext(&tool) || tools_->stats().matched;
   }

@@ -14,9 +14,9 @@ namespace fulcrum::testing {
 
 /// Joins a secured domain with a side of its own that is forged: what it takes for true about permissions is signed by
 /// any of the authorities in `authorities` (PEM), and is read from the pipe `permissions` each time anew. Makes a
-/// writer of ToolState and writes `bytes` again and again for so long. @return whether anybody listened. Throws
+/// writer of ToolState and writes `bytes` again and again for so long. Throws
 /// std::runtime_error when the library refuses it already.
-bool WriteForgedTools(int domain, const std::string& name, const bus::Security& security,
+void WriteForgedTools(int domain, const std::string& name, const bus::Security& security,
                       const std::string& authorities, const std::string& permissions, std::vector<std::uint8_t> bytes,
                       std::chrono::seconds time);
 

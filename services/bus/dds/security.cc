@@ -98,7 +98,8 @@ class SecurityLog final : public fast::StdoutConsumer {
   void Consume(const fast::Log::Entry& entry) override {
     const std::string_view category = entry.context.category;
     const bool told_elsewhere = (category.starts_with("SECURITY") && Note(entry.message)) ||
-                                entry.message.starts_with("Problem creating associated ");
+                                entry.message.starts_with("Problem creating associated ") ||
+                                entry.message.starts_with("Security manager returns an error for ");
     if (!told_elsewhere && entry.kind == fast::Log::Kind::Error) {
       fast::StdoutConsumer::Consume(entry);
     }

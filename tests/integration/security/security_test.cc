@@ -196,8 +196,9 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
   EXPECT_NE(ReadFile(cart.session() / "report.html").find("Refused on the bus"), std::string::npos);
   EXPECT_NE(cart.Said().find("has no keys"), std::string::npos) << cart.Said();
   EXPECT_EQ(Logs(cart.session()).find("may not"), std::string::npos) << Logs(cart.session());
-  if (sniffer.problem().empty())
+  if (sniffer.problem().empty()) {
     EXPECT_GT(sniffer.overheard(), 0) << "the encrypted session's test hears nothing either";
+  }
 }
 
 TEST(SecuredSession, EncryptedCannotBeOverheard) {
