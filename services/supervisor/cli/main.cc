@@ -26,6 +26,8 @@ std::span<const CommandEntry> Commands() {
        "Make and check the keys of a secured cart: who may join, and write and read what.", Keys},
       {"doctor", "doctor [--domain N] [--out DIR]", "Check what this machine permits, and say how to permit more.",
        Doctor},
+      {"reference", "reference cart|scene FILE...", "Print every key of cart or scene files, with what is valid.",
+       Reference},
   }};
   return kCommands;
 }
