@@ -11,7 +11,7 @@
 namespace fulcrum::supervisor::cli {
 
 std::span<const CommandEntry> Commands() {
-  static constexpr std::array<CommandEntry, 10> kCommands{{
+  static constexpr std::array<CommandEntry, 11> kCommands{{
       {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
       {"status", "status [--domain N]", "Print the nodes of the running session once.", Status},
       {"top", "top [--domain N]", "Show the nodes of the running session, refreshed until Ctrl-C.", Top},
