@@ -12,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "services/app/cart_security.h"
 #include "services/app/health_report.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
@@ -43,7 +44,9 @@ struct NodeApp::Impl {
         options(node_options),
         cart(node_options.cart.empty() ? config::CartConfig() : config::LoadCart(node_options.cart)),
         scene(node_options.scene),
-        participant({.domain = node_options.domain, .node_name = NodeName(node_id), .shared_memory = {}}),
+        participant({.domain = node_options.domain,
+                     .node_name = NodeName(node_id),
+                     .security = SecurityOf(cart, NodeName(node_id))}),
         manifests(participant.MakeInput<SceneManifest>()),
         commands(participant.MakeInput<Command>()),
         replies(participant.MakeOutput<CommandReply>()),
@@ -85,6 +88,10 @@ struct NodeApp::Impl {
     }
     if (const std::string mismatch = participant.schema_mismatch(); !mismatch.empty()) {
       End(ExitCode::kMismatch, mismatch);
+    }
+    const bus::Refusals refusals = participant.refusals();
+    for (; refusals_told < refusals.texts.size(); ++refusals_told) {
+      Log(LogLevel::kWarning, "refused: " + refusals.texts[refusals_told]);
     }
   }
 
@@ -136,6 +143,7 @@ struct NodeApp::Impl {
                                                                                     return "stopping";
                                                                                   }}};
 
+  std::size_t refusals_told = 0;
   // Relaxed: one number, nothing else is published through it.
   std::atomic<std::int64_t> session_start_ns{kSessionUnknown};
   std::atomic<HealthState> state{HealthState::kStarting};

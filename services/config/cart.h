@@ -101,6 +101,12 @@ struct NodeTiming {
   int threads = 1;        ///< That share a period's work; physics_node only.
 };
 
+/// Who may join the session's bus: services/bus/DESIGN.md.
+struct SecurityConfig {
+  std::string keys;      ///< Folder made by `fulcrum keys init`; empty: anybody may.
+  bool encrypt = false;  ///< Encrypt what travels, for traffic between hosts.
+};
+
 struct CartConfig {
   std::string name = "simulated";
   int domain = 7;  ///< DDS domain, 1 … 100.
@@ -108,6 +114,7 @@ struct CartConfig {
   PedalConfig pedal;
   std::array<DeviceConfig, kMaxTools> devices;  ///< By tool.
   std::array<NodeTiming, kNodeCount> nodes;     ///< By NodeId.
+  SecurityConfig security;
 
   /// Everything simulated, at the rates of the architecture page.
   CartConfig();

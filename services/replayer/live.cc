@@ -12,6 +12,7 @@
 #include <thread>
 #include <type_traits>
 
+#include "services/bus/access.h"
 #include "services/bus/convert/cdr.h"
 #include "services/bus/dds/participant.h"
 #include "services/bus/dds/shared_memory.h"
@@ -128,7 +129,12 @@ LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>&
   recording::TimeOrder messages(settings.recording);
   const recording::McapReader& reader = messages.reader();
   const std::filesystem::path memory = bus::SharedMemoryDirectory(settings.domain);
-  bus::DdsParticipant participant({.domain = settings.domain, .node_name = "replayer", .shared_memory = memory});
+  const bus::Security security =
+      settings.security.on() ? settings.security : bus::AnnouncedSecurity(memory, bus::kReplayerIdentity);
+  bus::DdsParticipant participant({.domain = settings.domain,
+                                   .node_name = std::string(bus::kReplayerIdentity),
+                                   .shared_memory = memory,
+                                   .security = security});
   std::map<TopicId, std::unique_ptr<Channel>> channels;
   for (const bus::TopicRole& role : bus::kTopicRoles) {
     if (!IsSent(role.id, settings.nodes)) continue;

@@ -13,7 +13,9 @@
 #include <thread>
 #include <vector>
 
+#include "services/app/cart_security.h"
 #include "services/app/version.h"
+#include "services/bus/access.h"
 #include "services/config/cart.h"
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
@@ -124,6 +126,9 @@ replay::LiveSettings LiveSettingsFrom(const po::variables_map& values) {
   if (values.count("only") != 0 && values.count("except") != 0) throw InputError("give --only or --except, not both");
   settings.nodes = values.count("only") != 0 ? NodesNamed(values, "only", kPublishers) : kPublishers;
   for (const NodeId node : NodesNamed(values, "except", kPublishers)) std::erase(settings.nodes, node);
+  if (const std::string cart = values["cart"].as<std::string>(); !cart.empty()) {
+    settings.security = app::SecurityOf(config::LoadCart(cart), bus::kReplayerIdentity);
+  }
   return settings;
 }
 
@@ -182,7 +187,8 @@ Options Parse(int argc, char** argv) {
       ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
        "compiled scene; default: scene.fulcrum beside the recording")  //
       ("cart", po::value<std::string>()->value_name("FILE")->default_value(""),
-       "cart configuration; default: cart.yaml beside the recording")                                           //
+       "cart configuration; default: cart.yaml beside the recording; live: its keys, by default those of the session "
+       "that runs")                                                                                             //
       ("json", po::value<std::string>()->value_name("FILE")->default_value(""), "write the result there, too")  //
       ("quiet", "no progress")                                                                                  //
       ("version", "print the version")                                                                          //

@@ -102,6 +102,8 @@ std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& reco
     json.Add("samples_not_recorded", static_cast<double>(record.node(NodeId::kRecorder).drops));
   }
   json.Add("restarts", static_cast<double>(record.restarts().size()));
+  json.Add("refused.participants", static_cast<double>(record.refusals().participants));
+  json.Add("refused.endpoints", static_cast<double>(record.refusals().endpoints));
   for (const auto& [kind, count] : record.event_counts()) {
     std::string name = EventName(kind);
     for (char& c : name) {
@@ -169,6 +171,9 @@ std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& recor
             (restart.rejoin_s >= 0 ? std::string(", back after ") + Fixed(restart.rejoin_s, 2) + " s"
                                    : ", did not come back") +
             "\n";
+  }
+  for (const RefusalRecord& refusal : record.refused()) {
+    text += "refused at " + Fixed(refusal.time_s, 1) + " s: " + refusal.what + "\n";
   }
   if (!outcome.recording.empty()) {
     text += "recording: " + outcome.recording.string() + ", " + RecordingLosses(record) + "\n";

@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
 #include <optional>
 #include <span>
 #include <sstream>
 #include <thread>
 #include <utility>
 
+#include "services/app/cart_security.h"
 #include "services/app/health_report.h"
 #include "services/bus/dds/participant.h"
 #include "services/bus/dds/shared_memory.h"
@@ -28,6 +30,7 @@
 #include "services/supervisor/report.h"
 #include "services/supervisor/script_outlook.h"
 #include "services/supervisor/session_folder.h"
+#include "services/supervisor/session_keys.h"
 #include "services/supervisor/session_record.h"
 
 namespace fulcrum::supervisor {
@@ -104,7 +107,13 @@ struct Supervisor::Impl {
         node_ids(NodesOf(scene.view(), up)) {
     // Left by a supervisor that was killed: its nodes died with it.
     bus::SweepSharedMemory(memory);
-    participant.emplace(bus::DdsSettings{.domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory});
+    const bus::Security security = app::SecurityOf(up.cart, NodeName(NodeId::kSupervisor));
+    if (const std::string warning = CheckSessionKeys(up.cart, node_ids, std::time(nullptr)); !warning.empty()) {
+      progress.Say("! " + warning);
+    }
+    participant.emplace(bus::DdsSettings{
+        .domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory, .security = security});
+    bus::AnnounceSecurity(memory, security);
     manifests = participant->MakeOutput<SceneManifest>();
     healths_in = participant->MakeInput<Health>();
     healths_out = participant->MakeOutput<Health>();
@@ -227,6 +236,11 @@ struct Supervisor::Impl {
       Fail(ExitCode::kMismatch, mismatch);
       ending = true;
     }
+    refusals = participant->refusals();
+    for (std::size_t i = record.refused().size(); i < refusals.texts.size(); ++i) {
+      progress.Say("! refused: " + refusals.texts[i]);
+    }
+    record.AddRefusals(SessionTime(now), refusals);
   }
 
   void TakeCommands(std::int64_t now) {
@@ -310,10 +324,11 @@ struct Supervisor::Impl {
     own.ticks = own_ticks;
     own.metrics.push_back({"session_time_s", SessionTime(now)});
     own.metrics.push_back({"session_end_s", end_s});
+    own.metrics.push_back({"refused", static_cast<double>(refusals.count())});
     for (const NodeId id : node_ids) {
       own.metrics.push_back({std::string("restarts_") + NodeName(id), static_cast<double>(record.node(id).restarts)});
     }
-    own.last_error = failed_why;
+    own.last_error = failed_why.empty() && !refusals.texts.empty() ? "refused: " + refusals.texts.back() : failed_why;
     app::FitToMessage(&own);
     healths_out->Write(own);
   }
@@ -488,6 +503,7 @@ struct Supervisor::Impl {
   std::vector<NodeProcess> nodes;
   SessionRecord record;
   Progress progress;
+  bus::Refusals refusals;
   Health health;  ///< Reused by TakeReports.
   app::RateMeter own_rate;
   std::uint64_t own_ticks = 0;

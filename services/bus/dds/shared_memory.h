@@ -19,6 +19,10 @@ inline constexpr std::uint64_t kNeededSharedMemory_B = 32u << 20;
 /// others or has less than kNeededSharedMemory_B free.
 void PrepareSharedMemory(const std::filesystem::path& directory);
 
+/// Says whose the files named after this address ("xx.xx.….xx", 12 bytes) are: the address of a participant that has
+/// authenticated does not tell its process. Goes with the process's other files.
+void ClaimSharedMemory(const std::filesystem::path& directory, const std::string& address);
+
 /// Takes the memory of all files that this process has made there. The library leaves them sparse, and who first writes
 /// to a page when /dev/shm is full gets a SIGBUS. Throws InputError when there is not enough.
 void ReserveSharedMemory(const std::filesystem::path& directory);

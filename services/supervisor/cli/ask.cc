@@ -17,7 +17,7 @@ ExitCode Ask(int domain, const std::string& verb, const std::string& argument) {
   if (!DomainGuard::IsHeld(domain)) {
     throw InputError("no session runs in domain " + std::to_string(domain) + "; start one with fulcrum up SCENE");
   }
-  bus::DdsParticipant participant({.domain = domain, .node_name = "fulcrum", .shared_memory = {}});
+  bus::DdsParticipant participant(bus::ToolSettings(domain));
   const auto replies = participant.MakeInput<CommandReply>();
   const auto commands = participant.MakeOutput<Command>();
   const std::int64_t epoch = runtime::MonotonicNs();

@@ -23,6 +23,7 @@ ExitCode Down(const Words& words);
 ExitCode Dump(const Words& words);
 ExitCode Log(const Words& words);
 ExitCode TestNode(const Words& words);
+ExitCode Keys(const Words& words);
 ExitCode Doctor(const Words& words);
 ExitCode Reference(const Words& words);
 

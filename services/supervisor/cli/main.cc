@@ -11,7 +11,7 @@
 namespace fulcrum::supervisor::cli {
 
 std::span<const CommandEntry> Commands() {
-  static constexpr std::array<CommandEntry, 11> kCommands{{
+  static constexpr auto kCommands = std::to_array<CommandEntry>({
       {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
       {"status", "status [--domain N]", "Print the nodes of the running session once.", Status},
       {"top", "top [--domain N]", "Show the nodes of the running session, refreshed until Ctrl-C.", Top},
@@ -24,11 +24,13 @@ std::span<const CommandEntry> Commands() {
       {"log", "log TOOL FILE...", "Read recordings: info, list, cat, export, verify, diff, recover.", Log},
       {"test-node", "test-node NODE --inputs LOG [--expect HASH] [--assert EXPR]... [--junit FILE]",
        "Run one node headless against a recording, for QA and CI.", TestNode},
+      {"keys", "keys init|show|check [DIR] [--days N] [--force]",
+       "Make and check the keys of a secured cart: who may join, and write and read what.", Keys},
       {"doctor", "doctor [--domain N] [--out DIR]", "Check what this machine permits, and say how to permit more.",
        Doctor},
       {"reference", "reference cart|scene FILE...", "Print every key of cart or scene files, with what is valid.",
        Reference},
-  }};
+  });
   return kCommands;
 }
 

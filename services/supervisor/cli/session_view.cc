@@ -39,7 +39,7 @@ std::string OldestInput(const Health& health) {
 }  // namespace
 
 SessionView::SessionView(int domain)
-    : participant_({.domain = domain, .node_name = "fulcrum", .shared_memory = {}}),
+    : participant_(bus::ToolSettings(domain)),
       healths_(participant_.MakeInput<Health>()),
       manifests_(participant_.MakeInput<SceneManifest>()) {}
 
@@ -61,6 +61,7 @@ void SessionView::Update() {
 
 std::string SessionView::Text() const {
   const Health& supervisor = newest_[static_cast<std::size_t>(NodeId::kSupervisor)];
+  const double refused = MetricOf(supervisor, "refused");
   const std::int64_t now = runtime::MonotonicNs();
   std::string text;
   if (manifest_.session_start_ns == 0) {
@@ -103,6 +104,9 @@ std::string SessionView::Text() const {
       own += metric.name + " " + Fixed(metric.value, 2);
     }
     figures += own;
+  }
+  if (refused > 0) {
+    text += "\nrefused on the bus: " + Fixed(refused, 0) + "; newest: " + supervisor.last_error + "\n";
   }
   return text + figures + "\n";
 }

@@ -15,6 +15,8 @@ class SessionView {
 
   /// Takes what has come since the last call.
   void Update();
+  /// Empty, or why this one and the supervisor do not speak with each other.
+  [[nodiscard]] std::string mismatch() const { return participant_.schema_mismatch(); }
   /// True when a supervisor has been heard.
   [[nodiscard]] bool has_supervisor() const { return has_supervisor_; }
   /// Scene, session time, node table, figures.

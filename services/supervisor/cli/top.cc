@@ -29,6 +29,7 @@ ExitCode Top(const Words& words) {
   auto next = std::chrono::steady_clock::now() + kRefresh;
   while (!runtime::ShouldStop() && DomainGuard::IsHeld(domain)) {
     view.Update();
+    if (const std::string mismatch = view.mismatch(); !mismatch.empty()) throw MismatchError(mismatch);
     if (std::chrono::steady_clock::now() >= next) {
       next += kRefresh;
       // Home, text, then clear what an earlier longer text left below: no flicker.
