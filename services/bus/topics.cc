@@ -15,6 +15,27 @@ constexpr std::string_view kPrefix = "fulcrum/";
 
 }  // namespace
 
+std::optional<NodeId> OwnerOf(TopicId topic) {
+  switch (topic) {
+    case TopicId::kHandleState:
+      return NodeId::kHandleBridge;
+    case TopicId::kToolState:
+      return NodeId::kHaptics;
+    case TopicId::kTissueFrame:
+    case TopicId::kContactModel:
+    case TopicId::kCauteryContact:
+      return NodeId::kPhysics;
+    case TopicId::kTopologyState:
+    case TopicId::kTemperaturePatch:
+    case TopicId::kThermalEvent:
+      return NodeId::kThermal;
+    case TopicId::kSceneManifest:
+      return NodeId::kSupervisor;
+    default:
+      return std::nullopt;
+  }
+}
+
 std::string_view TopicLabel(TopicId id) {
   if (static_cast<int>(id) >= kTopicCount) return "unknown";
   return std::string_view(RoleOf(id).name).substr(kPrefix.size());

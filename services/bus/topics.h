@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string_view>
 #include <type_traits>
 
@@ -144,6 +145,9 @@ decltype(auto) WithMessageOf(TopicId id, F&& f) {
   }
   return f(std::type_identity<Health>());
 }
+
+/// The node that sends a topic; none for those that several nodes send.
+[[nodiscard]] std::optional<NodeId> OwnerOf(TopicId topic);
 
 /// "ToolState": the topic's name for people.
 [[nodiscard]] std::string_view TopicLabel(TopicId id);

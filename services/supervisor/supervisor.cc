@@ -43,7 +43,6 @@ constexpr std::int64_t kHealthPeriod = kSecond / 10;
 constexpr std::int64_t kLongestStart = 30 * kSecond;
 // The manifest reaches all nodes before session time 0.
 constexpr std::int64_t kLeadTime = kSecond / 5;
-constexpr std::int64_t kLongestEnd = 4 * kSecond;
 // Peers let go of a dead process's files when its lease of 1 s is over.
 constexpr std::int64_t kSweepAfter = 2 * kSecond;
 // A gap in our own loop: a suspended machine, a stopped supervisor. Then silence proves nothing.
@@ -53,15 +52,27 @@ std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) 
   std::vector<NodeId> nodes;
   for (int i = 0; i < kNodeCount; ++i) {
     const auto id = static_cast<NodeId>(i);
-    if (id != NodeId::kSupervisor && (scene.node_mask >> i & 1u) != 0) {
+    if (id != NodeId::kSupervisor && (scene.node_mask >> i & 1u) != 0 && (settings.remote >> i & 1u) == 0) {
       nodes.push_back(id);
     }
+  }
+  if (settings.remote != 0) {
+    nodes.push_back(NodeId::kLink);
   }
   if (nodes.empty()) {
     throw InputError(settings.scene.string() + ": the scene names no node to start");
   }
   if (settings.record || settings.keep_s > 0) {
     nodes.push_back(NodeId::kRecorder);
+  }
+  return nodes;
+}
+
+/// Those of the scene that run on another host.
+std::vector<NodeId> RemoteNodesOf(const SceneView& scene, const UpSettings& settings) {
+  std::vector<NodeId> nodes;
+  for (int i = 0; i < kNodeCount; ++i) {
+    if ((scene.node_mask & settings.remote) >> i & 1u) nodes.push_back(static_cast<NodeId>(i));
   }
   return nodes;
 }
@@ -99,7 +110,8 @@ struct Supervisor::Impl {
         folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
         recording(RecordingFile(up, folder)),
         memory(bus::SharedMemoryDirectory(up.cart.domain)),
-        node_ids(NodesOf(scene.view(), up)) {
+        node_ids(NodesOf(scene.view(), up)),
+        remote_ids(RemoteNodesOf(scene.view(), up)) {
     // Left by a supervisor that was killed: its nodes died with it.
     bus::SweepSharedMemory(memory);
     participant.emplace(bus::DdsSettings{.domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory});
@@ -143,6 +155,15 @@ struct Supervisor::Impl {
         command.arguments.emplace_back("--window");
       }
     }
+    if (id == NodeId::kLink) {
+      std::string names;
+      for (const NodeId node : remote_ids) names += (names.empty() ? "" : ",") + std::string(NodeName(node));
+      command.arguments.insert(command.arguments.end(), {"--peer", settings.peer, "--remote", names, "--link-domain",
+                                                         std::to_string(settings.link_domain)});
+      if (!settings.address.empty()) {
+        command.arguments.insert(command.arguments.end(), {"--address", settings.address});
+      }
+    }
     if (id == NodeId::kRecorder) {
       if (settings.record) {
         command.arguments.insert(command.arguments.end(), {"--file", recording.string()});
@@ -162,6 +183,12 @@ struct Supervisor::Impl {
     const auto found =
         std::find_if(nodes.begin(), nodes.end(), [&](const NodeProcess& node) { return name == NodeName(node.id()); });
     return found == nodes.end() ? nullptr : &*found;
+  }
+
+  const NodeId* FindRemote(std::string_view name) const {
+    const auto found =
+        std::find_if(remote_ids.begin(), remote_ids.end(), [&](NodeId node) { return name == NodeName(node); });
+    return found == remote_ids.end() ? nullptr : &*found;
   }
 
   /// Ends the session; the first cause counts.
@@ -239,6 +266,10 @@ struct Supervisor::Impl {
           if (!ended && !follows) record.AddHealth(SessionTime(now), health);
         }
       }
+      // Of the other host: watched and started again there.
+      if (!ended && std::find(remote_ids.begin(), remote_ids.end(), health.node) != remote_ids.end()) {
+        record.AddHealth(SessionTime(now), health);
+      }
     }
     ThermalEvent event;
     while (events->TakeNext(&event)) {
@@ -275,6 +306,14 @@ struct Supervisor::Impl {
         if (node != nullptr && node->running()) {
           reply.text = "restarting " + command.argument + " (pid " + std::to_string(node->pid()) + ")";
           node->AskRestart(now);
+        } else if (const NodeId* remote = FindRemote(command.argument); remote != nullptr) {
+          reply.text = "asking " + command.argument + " on " + settings.peer + " to end: it is started again there";
+          Command stop;
+          stop.stamp = order_stamper.Next(now);
+          stop.request_id = static_cast<std::uint64_t>(now);
+          stop.target = *remote;
+          stop.verb = "stop";
+          orders->Write(stop);
         } else {
           reply.ok = false;
           reply.text = "no running node \"" + command.argument + "\" in this session";
@@ -395,7 +434,11 @@ struct Supervisor::Impl {
       node.Start(begin);
     }
     const auto ready = [](const NodeProcess& node) { return node.has_reported() || node.failed(); };
-    while (!ending && !std::all_of(nodes.begin(), nodes.end(), ready) && MonotonicNs() - begin < kLongestStart) {
+    const auto seen = [this](NodeId node) { return record.node(node).seen; };
+    while (
+        !ending &&
+        !(std::all_of(nodes.begin(), nodes.end(), ready) && std::all_of(remote_ids.begin(), remote_ids.end(), seen)) &&
+        MonotonicNs() - begin < kLongestStart) {
       Turn();
     }
   }
@@ -427,25 +470,15 @@ struct Supervisor::Impl {
   }
 
   void End(std::span<NodeProcess> some) {
-    for (const NodeProcess& node : some) {
-      node.Signal(SIGTERM);
-    }
-    const std::int64_t begin = MonotonicNs();
-    const auto is_gone = [](NodeProcess& node) { return node.HasEnded(); };
-    while (!std::all_of(some.begin(), some.end(), is_gone)) {
-      const std::int64_t now = MonotonicNs();
-      if (now - begin > kLongestEnd) {
-        for (const NodeProcess& node : some) {
-          if (node.running()) {
-            progress.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and was killed");
-          }
-          node.Signal(SIGKILL);
-        }
-      }
-      TakeReports(now);
-      PublishOwnHealth(now);
-      std::this_thread::sleep_for(kLoopPeriod);
-    }
+    EndAll(
+        some,
+        [this](std::int64_t now) {
+          TakeReports(now);
+          PublishOwnHealth(now);
+        },
+        [this](const NodeProcess& node) {
+          progress.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and was killed");
+        });
   }
 
   void Judge() {
@@ -456,6 +489,13 @@ struct Supervisor::Impl {
       const NodeFigures& figures = record.node(node.id());
       if (!figures.seen) {
         Fail(ExitCode::kFailure, std::string(NodeName(node.id())) + " never reported; see " + node.log().string());
+      }
+    }
+    for (const NodeId node : remote_ids) {
+      if (!record.node(node).seen) {
+        Fail(ExitCode::kFailure,
+             std::string(NodeName(node)) + " on " + settings.peer +
+                 " never reported; does `fulcrum host` run there, with this machine as its --peer?");
       }
     }
     if (const std::string missing = MissingFrom(record, DemandsUntil(scene.view(), reached_s)); !missing.empty()) {
@@ -473,11 +513,7 @@ struct Supervisor::Impl {
     manifests.reset();
     participant.reset();
     bus::RemoveSharedMemory(memory);
-    // Checkpoints are for restarts within the session, and large.
-    for (const auto& entry : std::filesystem::directory_iterator(folder.path)) {
-      std::error_code ignored;
-      if (entry.path().extension() == ".checkpoint") std::filesystem::remove(entry.path(), ignored);
-    }
+    RemoveCheckpoints(folder);
   }
 
   void Report() {
@@ -488,6 +524,7 @@ struct Supervisor::Impl {
     outcome.machine = DescribeMachine();
     outcome.configuration = folder.configuration;
     outcome.nodes = node_ids;
+    outcome.nodes.insert(outcome.nodes.end(), remote_ids.begin(), remote_ids.end());
     outcome.duration_s = reached_s;
     outcome.wanted_s = end_s;
     outcome.exit_code = exit_code;
@@ -508,6 +545,7 @@ struct Supervisor::Impl {
   const std::filesystem::path recording;  ///< The recorder's first file; empty: none.
   const std::filesystem::path memory;
   const std::vector<NodeId> node_ids;
+  const std::vector<NodeId> remote_ids;  ///< Of the scene, on another host.
 
   std::optional<bus::DdsParticipant> participant;
   std::unique_ptr<bus::Output<SceneManifest>> manifests;

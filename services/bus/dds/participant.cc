@@ -1,13 +1,11 @@
 #include "services/bus/dds/participant.h"
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/xmlparser/XMLProfileManager.h>
 #include <unistd.h>
 
 #include <array>
 #include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
@@ -15,6 +13,7 @@
 #include <map>
 #include <mutex>
 
+#include "services/bus/dds/library.h"
 #include "services/bus/dds/ports.h"
 #include "services/bus/dds/raw_reader.h"
 #include "services/bus/dds/shared_memory.h"
@@ -107,15 +106,6 @@ class PeerWatch final : public fast::DomainParticipantListener {
   std::map<rtps::GUID_t, std::string> mismatches_;
 };
 
-/// Settings from outside would silently replace the ones that were measured.
-void ForgetOutsideSettings() {
-  for (const char* name :
-       {"FASTDDS_STATISTICS", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_ENVIRONMENT_FILE", "ROS_DISCOVERY_SERVER"}) {
-    unsetenv(name);
-  }
-  setenv("SKIP_DEFAULT_XML", "1", 1);  // no DEFAULT_FASTRTPS_PROFILES.xml from the current directory
-}
-
 fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash) {
   fast::DomainParticipantQos qos;
   qos.name(settings.node_name);
@@ -168,10 +158,7 @@ struct DdsParticipant::Impl {
     }
     if (shared_memory.empty()) shared_memory = SharedMemoryDirectory(settings.domain);
     PrepareSharedMemory(shared_memory);
-    ForgetOutsideSettings();
-    eprosima::fastrtps::LibrarySettingsAttributes library;
-    library.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
-    eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(library);
+    dds::PrepareLibrary();
 
     participant = fast::DomainParticipantFactory::get_instance()->create_participant(
         static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash), &watch, fast::StatusMask::none());
