@@ -1,5 +1,7 @@
 #include "services/bus/topics.h"
 
+#include <algorithm>
+
 namespace fulcrum::bus {
 namespace {
 
@@ -34,6 +36,12 @@ std::optional<NodeId> OwnerOf(TopicId topic) {
     default:
       return std::nullopt;
   }
+}
+
+const TopicRole* RoleNamed(std::string_view name) {
+  const auto* role = std::find_if(kTopicRoles.begin(), kTopicRoles.end(),
+                                  [name](const TopicRole& known) { return name == known.name; });
+  return role == kTopicRoles.end() ? nullptr : role;
 }
 
 std::string_view TopicLabel(TopicId id) {

@@ -149,6 +149,9 @@ decltype(auto) WithMessageOf(TopicId id, F&& f) {
 /// The node that sends a topic; none for those that several nodes send.
 [[nodiscard]] std::optional<NodeId> OwnerOf(TopicId topic);
 
+/// The role of the topic of that name on the bus, as "fulcrum/ToolState"; null: not one of ours.
+[[nodiscard]] const TopicRole* RoleNamed(std::string_view name);
+
 /// "ToolState": the topic's name for people.
 [[nodiscard]] std::string_view TopicLabel(TopicId id);
 

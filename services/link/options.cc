@@ -37,7 +37,7 @@ std::string NamesOfNodes(std::uint32_t nodes) {
   std::string names;
   for (const NodeId node : kMovable) {
     if ((nodes >> static_cast<unsigned>(node) & 1u) == 0) continue;
-    names += (names.empty() ? "" : ", ") + std::string(NodeName(node));
+    names += (names.empty() ? "" : ",") + std::string(NodeName(node));
   }
   return names;
 }

@@ -12,7 +12,7 @@ namespace fulcrum::link {
 
 /// "render_node,thermal_node" as a bit per NodeId. Throws InputError for what is no node that can run on another host.
 [[nodiscard]] std::uint32_t NodesFromNames(const std::string& names);
-/// "render_node, thermal_node".
+/// "thermal_node,render_node".
 [[nodiscard]] std::string NamesOfNodes(std::uint32_t nodes);
 
 /// @param peer address or name of the other host. @param address ours; empty: of the interface that leads there.

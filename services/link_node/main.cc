@@ -56,7 +56,10 @@ bool SessionEnds(fulcrum::bus::Input<fulcrum::Health>* healths) {
 fulcrum::ExitCode RunLink(fulcrum::app::NodeApp& app) {
   const std::string peer = app.options().TakeValue("--peer", "");
   if (peer.empty()) throw InputError("--peer: which host runs the other nodes?");
-  const std::uint32_t nodes = fulcrum::link::NodesFromNames(app.options().TakeValue("--remote", ""));
+  // What the scene does not name is not started.
+  const std::uint32_t nodes =
+      fulcrum::link::NodesFromNames(app.options().TakeValue("--remote", "")) & app.scene().node_mask;
+  if (nodes == 0) throw InputError("--remote: none of these nodes is of this scene");
   const std::string address = app.options().TakeValue("--address", "");
   const int link_domain = Number("--link-domain", app.options().TakeValue("--link-domain", "0"), 0, 200);
   fulcrum::link::LinkSettings settings;

@@ -21,6 +21,7 @@
 #include "services/scene/scene_file.h"
 #include "services/supervisor/domain_guard.h"
 #include "services/supervisor/node_process.h"
+#include "services/supervisor/node_starter.h"
 #include "services/supervisor/outcome.h"
 #include "services/supervisor/progress.h"
 #include "services/supervisor/session_folder.h"
@@ -111,26 +112,19 @@ class Host {
     healths_out_ = local_->MakeOutput<Health>();
     link_.Join(&*local_, ~offer.nodes);
     last_turn_ns_ = MonotonicNs();
+    UpSettings as_there;
+    as_there.programs = settings_.programs;
+    as_there.cart = cart;
+    as_there.quality = settings_.quality;
+    as_there.window = settings_.window;
+    const std::filesystem::path no_recording;
+    const NodeStarter starter{as_there, folder_, no_recording};
     for (int i = 0; i < kNodeCount; ++i) {
-      if ((offer.nodes >> i & 1u) != 0) nodes_.emplace_back(CommandFor(static_cast<NodeId>(i)));
+      if ((offer.nodes >> i & 1u) != 0) nodes_.emplace_back(starter.Usual(static_cast<NodeId>(i)));
     }
     for (NodeProcess& node : nodes_) node.Start(MonotonicNs());
     progress_.Say("session " + offer.session_id + ": " + link::NamesOfNodes(offer.nodes) + " in domain " +
                   std::to_string(settings_.domain) + ", logs in " + folder_.logs.string());
-  }
-
-  [[nodiscard]] NodeCommand CommandFor(NodeId id) const {
-    NodeCommand command;
-    command.id = id;
-    command.program = settings_.programs / NodeName(id);
-    command.arguments = {"--scene",  folder_.scene.string(),           "--session", folder_.path.string(),
-                         "--domain", std::to_string(settings_.domain), "--cart",    folder_.cart.string()};
-    if (id == NodeId::kRender) {
-      command.arguments.insert(command.arguments.end(), {"--quality", settings_.quality});
-      if (settings_.window) command.arguments.emplace_back("--window");
-    }
-    command.log = folder_.logs / (std::string(NodeName(id)) + ".log");
-    return command;
   }
 
   /// The cart said so, or begins another session. A cable that is out is no end.
