@@ -20,7 +20,6 @@ struct InputStats {
 struct OutputStats {
   std::uint64_t written = 0;
   std::uint64_t failed = 0;  ///< write() threw, blocked past its limit or had no room.
-  int readers = 0;           ///< That listen now.
 };
 
 /// Receives T. One thread at a time.

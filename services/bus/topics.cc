@@ -17,27 +17,6 @@ constexpr std::string_view kPrefix = "fulcrum/";
 
 }  // namespace
 
-std::optional<NodeId> OwnerOf(TopicId topic) {
-  switch (topic) {
-    case TopicId::kHandleState:
-      return NodeId::kHandleBridge;
-    case TopicId::kToolState:
-      return NodeId::kHaptics;
-    case TopicId::kTissueFrame:
-    case TopicId::kContactModel:
-    case TopicId::kCauteryContact:
-      return NodeId::kPhysics;
-    case TopicId::kTopologyState:
-    case TopicId::kTemperaturePatch:
-    case TopicId::kThermalEvent:
-      return NodeId::kThermal;
-    case TopicId::kSceneManifest:
-      return NodeId::kSupervisor;
-    default:
-      return std::nullopt;
-  }
-}
-
 const TopicRole* RoleNamed(std::string_view name) {
   const auto* role = std::find_if(kTopicRoles.begin(), kTopicRoles.end(),
                                   [name](const TopicRole& known) { return name == known.name; });

@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstddef>
-#include <optional>
 #include <string_view>
 #include <type_traits>
 
@@ -145,9 +144,6 @@ decltype(auto) WithMessageOf(TopicId id, F&& f) {
   }
   return f(std::type_identity<Health>());
 }
-
-/// The node that sends a topic; none for those that several nodes send.
-[[nodiscard]] std::optional<NodeId> OwnerOf(TopicId topic);
 
 /// The role of the topic of that name on the bus, as "fulcrum/ToolState"; null: not one of ours.
 [[nodiscard]] const TopicRole* RoleNamed(std::string_view name);

@@ -245,7 +245,6 @@ CartConfig::CartConfig() {
   timing_of(NodeId::kThermal) = {.rate_Hz = 100, .fifo_priority = 30};
   timing_of(NodeId::kRender) = {.rate_Hz = 30};
   timing_of(NodeId::kRecorder) = {.rate_Hz = 20};
-  timing_of(NodeId::kLink) = {.rate_Hz = 10};
 }
 
 void Validate(const CartConfig& cart) {

@@ -18,8 +18,6 @@ const char* NodeName(NodeId node) {
       return "render_node";
     case NodeId::kRecorder:
       return "recorder";
-    case NodeId::kLink:
-      return "link_node";
   }
   return "unknown";
 }

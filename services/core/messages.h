@@ -29,17 +29,8 @@ struct Stamp {
   std::int64_t stamp_ns = 0;   ///< CLOCK_MONOTONIC of the data [ns].
 };
 
-enum class NodeId : std::uint8_t {
-  kSupervisor,
-  kHandleBridge,
-  kHaptics,
-  kPhysics,
-  kThermal,
-  kRender,
-  kRecorder,
-  kLink
-};
-inline constexpr int kNodeCount = 8;
+enum class NodeId : std::uint8_t { kSupervisor, kHandleBridge, kHaptics, kPhysics, kThermal, kRender, kRecorder };
+inline constexpr int kNodeCount = 7;
 /// "supervisor", "handle_bridge", "haptics_node", ...: the name of the executable.
 const char* NodeName(NodeId node);
 

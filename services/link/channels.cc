@@ -8,6 +8,7 @@
 
 #include "services/bus/convert/cdr.h"
 #include "services/bus/gate.h"
+#include "services/bus/topic_owner.h"
 #include "services/bus/topics.h"
 #include "services/core/message_time.h"
 #include "services/link/codec/byte_delta.h"
@@ -17,6 +18,8 @@ namespace {
 
 using bus::FarLane;
 
+/// Of a pose, a jaw angle, a contact on its way to a picture [ns].
+constexpr std::int64_t kThinned_ns = 10'000'000;
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// No message of the bus is longer, but for those that travel in chunks.
 constexpr std::size_t kLargestSample_B = bus::kOrderedPacket_B;
@@ -36,7 +39,7 @@ Stamp& MutableStampOf(T* message) {
 template <class T>
 bool Leaves(const T& message, const LinkContext& link) {
   if constexpr (std::is_same_v<T, Command>) {
-    return !link.IsNative(message.target) && message.target != NodeId::kLink;
+    return !link.IsNative(message.target);
   } else if constexpr (std::is_same_v<T, CommandReply>) {
     return link.IsNative(message.from);
   } else if constexpr (requires { message.node; }) {
@@ -93,6 +96,9 @@ class OutgoingSamples final : public Outgoing {
     if (std::exchange(repeat_, false)) {
       for (const auto& [epoch, message] : newest_) Send(message, link);
     }
+    if constexpr (kThinnable) {
+      if (link->for_pictures) return PumpThinned(link);
+    }
     while (input_->TakeNext(&message_)) {
       if (!Leaves(message_, *link)) continue;
       NameAsThere(&message_, *link);
@@ -108,6 +114,20 @@ class OutgoingSamples final : public Outgoing {
 
  private:
   static constexpr std::size_t kMostWriters = 16;
+  /// Where only the newest counts for a picture.
+  static constexpr bool kThinnable =
+      std::is_same_v<T, ToolState> || std::is_same_v<T, HandleState> || std::is_same_v<T, CauteryContact>;
+
+  std::int64_t PumpThinned(LinkContext* link) {
+    if (link->now_ns < due_ns_) return due_ns_;
+    due_ns_ = std::max(due_ns_ + kThinned_ns, link->now_ns);
+    if (input_->TakeLatest(&message_)) {
+      // What is left out on purpose is not lost.
+      message_.stamp.sequence = std::uint64_t{number_} + 1;
+      Send(message_, link);
+    }
+    return due_ns_;
+  }
 
   void Send(const T& message, LinkContext* link) {
     if (!bus::EncodeCdr(message, &cdr_)) return;
@@ -124,6 +144,7 @@ class OutgoingSamples final : public Outgoing {
   T message_;
   std::map<std::uint64_t, T> newest_;  ///< By epoch: what a late joiner gets.
   std::uint32_t number_ = 0;
+  std::int64_t due_ns_ = 0;
   bool repeat_ = false;
   std::vector<std::uint8_t> cdr_;
 };
@@ -230,7 +251,7 @@ template <class T>
 class IncomingBase : public Incoming {
  public:
   explicit IncomingBase(std::unique_ptr<typename bus::OutputOf<T>::type> output) : output_(std::move(output)) {}
-  [[nodiscard]] int readers() const override { return output_->stats().readers; }
+  [[nodiscard]] bool wanted() const override { return output_->has_readers(); }
 
  protected:
   bool Publish(T* message, LinkContext* link) {

@@ -22,6 +22,8 @@ struct LinkContext {
   /// Sends a packet; `put` appends its body.
   std::function<bool(bus::FarLane, PacketKind, const std::function<void(std::vector<std::uint8_t>*)>& put)> send;
   std::uint32_t native = 0;  ///< Bit per NodeId: nodes of this host.
+  /// Only pictures are made there: streams of a thousand a second are thinned.
+  bool for_pictures = false;
   double picture_rate_Hz = 30;
   EpochMap epochs;
   std::int64_t now_ns = 0;
@@ -47,8 +49,8 @@ class Incoming {
   virtual bool Take(std::span<const std::uint8_t> body, LinkContext* link) = 0;
   /// The link on the other side is another one from here on.
   virtual void Restart() = 0;
-  /// Readers of what is republished, as of now.
-  [[nodiscard]] virtual int readers() const = 0;
+  /// Somebody on this host reads it, as of now.
+  [[nodiscard]] virtual bool wanted() const = 0;
   /// What the other side is to be asked for, once.
   virtual bool TakeAll() { return false; }
   virtual std::vector<std::uint32_t> TakeQuestions() { return {}; }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "services/bus/schema.h"
+#include "services/bus/topic_owner.h"
 #include "services/bus/topics.h"
 #include "services/core/error.h"
 #include "services/runtime/cyclic_thread.h"
@@ -28,7 +29,6 @@ constexpr std::int64_t kPatience = 3 * kSecond;
 constexpr std::int64_t kUnwanted = 2 * kSecond;
 constexpr std::int64_t kLongestSleep = 20 * kMilli;
 constexpr std::size_t kLongestInbox = 4096;
-constexpr std::uint32_t kLinkBit = 1u << static_cast<unsigned>(NodeId::kLink);
 constexpr std::uint32_t kAllNodes = (1u << kNodeCount) - 1;
 
 constexpr std::size_t At(TopicId topic) { return static_cast<std::size_t>(topic); }
@@ -77,8 +77,8 @@ void Link::Wake() {
 void Link::Join(bus::DdsParticipant* local, std::uint32_t far_nodes) {
   const std::lock_guard lock(mutex_);
   local_ = local;
-  far_nodes_ = far_nodes & ~kLinkBit;
-  context_.native = kAllNodes & ~far_nodes & ~kLinkBit;
+  context_.native = kAllNodes & ~far_nodes;
+  context_.for_pictures = (far_nodes & kAllNodes) == 1u << static_cast<unsigned>(NodeId::kRender);
   for (std::size_t topic = 0; topic < channels_.size(); ++topic) {
     const std::optional<NodeId> owner = bus::OwnerOf(static_cast<TopicId>(topic));
     if (owner && context_.IsNative(*owner)) continue;
@@ -344,6 +344,21 @@ std::int64_t Link::PumpChannels(std::int64_t now) {
   return due;
 }
 
+bool Link::IsWanted(TopicId topic, const Incoming& in) const {
+  // Of topics that both sides send our own input reads our own output as well: that somebody reads them proves nothing.
+  switch (topic) {
+    case TopicId::kHealth:
+    case TopicId::kCommand:
+    case TopicId::kCommandReply:
+      return true;
+    case TopicId::kTickManifest:
+      // For the recorder, which is the cart's.
+      return settings_.far.side == bus::FarSide::kCart && in.wanted();
+    default:
+      return in.wanted();
+  }
+}
+
 void Link::SendPulse(std::int64_t now) {
   if (now < next_pulse_ns_) return;
   next_pulse_ns_ = now + kPulsePeriod;
@@ -355,10 +370,9 @@ void Link::SendPulse(std::int64_t now) {
   pulse.wants_offer = settings_.far.side == bus::FarSide::kHost && session_.number == 0;
   for (std::size_t topic = 0; topic < channels_.size() && clock_.known(); ++topic) {
     Channel& channel = channels_[topic];
-    // Our own input of a topic that both sides send reads our output as well.
-    if (channel.in == nullptr || channel.in->readers() <= (channel.out != nullptr ? 1 : 0)) continue;
-    pulse.wanted |= BitOf(topic);
     const auto id = static_cast<TopicId>(topic);
+    if (channel.in == nullptr || !IsWanted(id, *channel.in)) continue;
+    pulse.wanted |= BitOf(topic);
     if (id == TopicId::kTissueFrame) {
       pulse.wants_all_tissue = channel.in->TakeAll();
       pulse.missing_tissue = channel.in->TakeQuestions();

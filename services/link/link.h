@@ -61,6 +61,7 @@ class Link {
   /// Tells the other side that the session is over. The link goes on until its end.
   void SayBye();
 
+  [[nodiscard]] const LinkSettings& settings() const { return settings_; }
   [[nodiscard]] LinkStatus status();
   /// The host's side: the newest offer, with a number that grows when another session begins.
   struct Session {
@@ -99,6 +100,7 @@ class Link {
   void FollowWishes(std::uint32_t wanted, std::int64_t now);
   std::int64_t PumpChannels(std::int64_t now);
   void SendPulse(std::int64_t now);
+  [[nodiscard]] bool IsWanted(TopicId topic, const Incoming& in) const;
   void WatchSilence(std::int64_t now);
   void CountRates(std::int64_t now);
 
@@ -118,7 +120,6 @@ class Link {
   std::mutex mutex_;  ///< Guards all below but the thread.
   std::unique_ptr<bus::FarParticipant> far_;
   bus::DdsParticipant* local_ = nullptr;
-  std::uint32_t far_nodes_ = 0;
   std::array<Channel, kTopicCount> channels_;
   LinkContext context_;
   ClockFilter clock_;

@@ -1,19 +1,14 @@
 #include "services/supervisor/host.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <optional>
 #include <thread>
 #include <vector>
 
-#include "services/app/health_report.h"
 #include "services/bus/dds/participant.h"
 #include "services/bus/dds/shared_memory.h"
-#include "services/bus/input_account.h"
 #include "services/core/error.h"
-#include "services/link/health.h"
 #include "services/link/link.h"
 #include "services/link/options.h"
 #include "services/runtime/cyclic_thread.h"
@@ -33,7 +28,6 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr auto kLoopPeriod = std::chrono::milliseconds(5);
-constexpr std::int64_t kHealthPeriod = kSecond / 10;
 constexpr std::int64_t kSweepAfter = 2 * kSecond;  // The dead process's lease is over then.
 constexpr std::int64_t kHeldUp = kSecond;          // A gap in our own loop: silence proves nothing.
 
@@ -109,7 +103,6 @@ class Host {
     bus::SweepSharedMemory(memory_);
     local_.emplace(bus::DdsSettings{.domain = settings_.domain, .node_name = "host", .shared_memory = memory_});
     healths_in_ = local_->MakeInput<Health>();
-    healths_out_ = local_->MakeOutput<Health>();
     link_.Join(&*local_, ~offer.nodes);
     last_turn_ns_ = MonotonicNs();
     UpSettings as_there;
@@ -154,7 +147,6 @@ class Host {
       bus::SweepSharedMemory(memory_);
     }
     Check();
-    PublishHealth(now, HealthState::kRunning);
     ShowProgress(now);
     std::this_thread::sleep_for(kLoopPeriod);
   }
@@ -174,25 +166,6 @@ class Host {
     failed_ = own_code ? static_cast<ExitCode>(death->end.exit_code) : ExitCode::kFailure;
   }
 
-  /// The link's figures, for `fulcrum status` on this host.
-  void PublishHealth(std::int64_t now, HealthState state) {
-    if (now < next_health_ns_) return;
-    next_health_ns_ = now + kHealthPeriod;
-    Health own;
-    own.stamp = stamper_.Next(now);
-    own.node = NodeId::kLink;
-    own.state = state;
-    own.pid = ::getpid();
-    own.schema_hash = bus::SchemaHash();
-    own.scene_hash = session_.offer.scene_hash;
-    own.rate_asked_Hz = 1e9f / static_cast<float>(kHealthPeriod);
-    own.rate_achieved_Hz = static_cast<float>(rate_.Observe(now, ++ticks_));
-    own.ticks = ticks_;
-    link::FillHealth(link_.status(), &own);
-    app::FitToMessage(&own);
-    healths_out_->Write(own);
-  }
-
   void ShowProgress(std::int64_t now) {
     if (!progress_.IsDue(now)) return;
     const link::LinkStatus status = link_.status();
@@ -209,17 +182,12 @@ class Host {
   void End() {
     progress_.Say(failed_ ? "ending: a node failed" : IsOver() ? "the session is over" : "stopped");
     EndAll(
-        nodes_,
-        [this](std::int64_t now) {
-          TakeHealths(now);
-          PublishHealth(now, HealthState::kStopping);
-        },
+        nodes_, [this](std::int64_t now) { TakeHealths(now); },
         [this](const NodeProcess& node) {
           progress_.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and was killed");
         });
     link_.Leave();
     healths_in_.reset();
-    healths_out_.reset();
     local_.reset();
     bus::RemoveSharedMemory(memory_);
     RemoveCheckpoints(folder_);
@@ -235,13 +203,9 @@ class Host {
   std::optional<scene::SceneFile> scene_;
   SessionFolder folder_;
   std::unique_ptr<bus::Input<Health>> healths_in_;
-  std::unique_ptr<bus::Output<Health>> healths_out_;
   std::vector<NodeProcess> nodes_;
   Health health_;
-  bus::Stamper stamper_{MonotonicNs()};
-  app::RateMeter rate_;
-  std::uint64_t ticks_ = 0;
-  std::int64_t last_turn_ns_ = 0, next_health_ns_ = 0, sweep_ns_ = 0;
+  std::int64_t last_turn_ns_ = 0, sweep_ns_ = 0;
   std::optional<ExitCode> failed_;
 };
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "services/core/error.h"
-#include "services/link/options.h"
 #include "services/supervisor/outcome.h"
 
 namespace fulcrum::supervisor {
@@ -24,14 +23,6 @@ NodeCommand NodeStarter::Usual(NodeId id) const {
     command.arguments.insert(command.arguments.end(), {"--quality", settings.quality});
     if (settings.window) {
       command.arguments.emplace_back("--window");
-    }
-  }
-  if (id == NodeId::kLink) {
-    command.arguments.insert(command.arguments.end(),
-                             {"--peer", settings.peer, "--remote", link::NamesOfNodes(settings.remote), "--link-domain",
-                              std::to_string(settings.link_domain)});
-    if (!settings.address.empty()) {
-      command.arguments.insert(command.arguments.end(), {"--address", settings.address});
     }
   }
   if (id == NodeId::kRecorder) {

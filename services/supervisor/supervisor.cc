@@ -16,7 +16,10 @@
 #include "services/bus/dds/shared_memory.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
+#include "services/link/health.h"
+#include "services/link/link.h"
 #include "services/link/options.h"
+#include "services/link/scene_transfer.h"
 #include "services/recording/free_name.h"
 #include "services/runtime/realtime.h"
 #include "services/scene/scene_file.h"
@@ -56,11 +59,8 @@ std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) 
       nodes.push_back(id);
     }
   }
-  if ((scene.node_mask & settings.remote) != 0) {
-    nodes.push_back(NodeId::kLink);
-  }
   if (nodes.empty()) {
-    throw InputError(settings.scene.string() + ": the scene names no node to start");
+    throw InputError(settings.scene.string() + ": the scene names no node to start here");
   }
   if (settings.record || settings.keep_s > 0) {
     nodes.push_back(NodeId::kRecorder);
@@ -126,6 +126,10 @@ struct Supervisor::Impl {
     commands = participant->MakeInput<Command>();
     orders = participant->MakeOutput<Command>();
     replies = participant->MakeOutput<CommandReply>();
+    if (!remote_ids.empty()) {
+      link.emplace(link::LinkSettings{.far = FarOf(up), .offer = MakeOffer(), .scene = folder.scene});
+      link->Join(&*participant, link->settings().offer->nodes);
+    }
     for (const NodeId id : node_ids) {
       if (id == NodeId::kPhysics && up.standby) {
         nodes.emplace_back(starter.InPair("a", false));
@@ -134,6 +138,24 @@ struct Supervisor::Impl {
         nodes.emplace_back(starter.Usual(id));
       }
     }
+  }
+
+  static bus::FarSettings FarOf(const UpSettings& up) {
+    return link::FarSettingsFor(bus::FarSide::kCart, up.peer, up.address, up.cart.domain, up.link_domain);
+  }
+
+  /// What the other host is to do.
+  [[nodiscard]] link::Offer MakeOffer() const {
+    const link::FileFacts facts = link::FactsOf(folder.scene);
+    link::Offer offer;
+    offer.session_id = folder.session_id;
+    offer.scene_name = scene.view().name;
+    offer.scene_hash = scene.view().hash;
+    offer.scene_B = facts.size_B;
+    offer.scene_checksum = facts.checksum;
+    for (const NodeId node : remote_ids) offer.nodes |= 1u << static_cast<unsigned>(node);
+    offer.cart_yaml = config::CartToYaml(settings.cart);
+    return offer;
   }
 
   [[nodiscard]] double SessionTime(std::int64_t now) const {
@@ -241,6 +263,10 @@ struct Supervisor::Impl {
       Fail(ExitCode::kMismatch, mismatch);
       ending = true;
     }
+    if (const std::string mismatch = link ? link->mismatch() : std::string(); !mismatch.empty()) {
+      Fail(ExitCode::kMismatch, mismatch);
+      ending = true;
+    }
   }
 
   void TakeCommands(std::int64_t now) {
@@ -334,6 +360,9 @@ struct Supervisor::Impl {
       own.metrics.push_back({std::string("restarts_") + NodeName(id), static_cast<double>(record.node(id).restarts)});
     }
     own.last_error = failed_why;
+    if (link) {
+      link::FillHealth(link->status(), &own);
+    }
     app::FitToMessage(&own);
     healths_out->Write(own);
   }
@@ -408,6 +437,9 @@ struct Supervisor::Impl {
     TakeReports(MonotonicNs());
     reached_s = ReachedTime();
     ended = true;
+    if (link) {
+      link->SayBye();
+    }
     const auto recorder = std::find_if(nodes.begin(), nodes.end(),
                                        [](const NodeProcess& node) { return node.id() == NodeId::kRecorder; });
     End({nodes.begin(), recorder});
@@ -450,6 +482,7 @@ struct Supervisor::Impl {
   }
 
   void CleanUp() {
+    link.reset();
     commands.reset();
     replies.reset();
     orders.reset();
@@ -495,6 +528,7 @@ struct Supervisor::Impl {
   const std::vector<NodeId> remote_ids;  ///< Of the scene, on another host.
 
   std::optional<bus::DdsParticipant> participant;
+  std::optional<link::Link> link;  ///< To the host of remote_ids.
   std::unique_ptr<bus::Output<SceneManifest>> manifests;
   std::unique_ptr<bus::Input<Health>> healths_in;
   std::unique_ptr<bus::Output<Health>> healths_out;

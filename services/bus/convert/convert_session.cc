@@ -11,7 +11,7 @@ namespace fulcrum::bus {
 using convert::Octet;
 namespace cv = convert;
 
-static_assert(idl::NODE_LINK == kNodeCount - 1 && idl::NODE_PHYSICS == static_cast<int>(NodeId::kPhysics));
+static_assert(idl::NODE_RECORDER == kNodeCount - 1 && idl::NODE_PHYSICS == static_cast<int>(NodeId::kPhysics));
 static_assert(idl::TOPIC_HEALTH == kTopicCount - 1 && idl::TOPIC_COMMAND == static_cast<int>(TopicId::kCommand));
 static_assert(idl::MODE_LOCK_STEP == static_cast<int>(SessionMode::kLockStep));
 static_assert(idl::HEALTH_STOPPING == static_cast<int>(HealthState::kStopping));

@@ -54,8 +54,7 @@ class WriterEvents final : public fast::DataWriterListener {
   void on_publication_matched(fast::DataWriter*, const fast::PublicationMatchedStatus& status) override {
     count_.store(status.current_count, std::memory_order_relaxed);  // as above
   }
-  [[nodiscard]] int count() const noexcept { return count_.load(std::memory_order_relaxed); }
-  [[nodiscard]] bool any() const noexcept { return count() > 0; }
+  [[nodiscard]] bool any() const noexcept { return count_.load(std::memory_order_relaxed) > 0; }
 
  private:
   std::atomic<int> count_{0};
@@ -208,7 +207,7 @@ class OutputBase : public OutputOf<T>::type {
   [[nodiscard]] bool ok() const { return writer_ != nullptr; }
   bool has_readers() const noexcept override { return events_.any(); }
   OutputStats stats() const override {
-    return {written_.load(std::memory_order_relaxed), failed_.load(std::memory_order_relaxed), events_.count()};
+    return {written_.load(std::memory_order_relaxed), failed_.load(std::memory_order_relaxed)};
   }
 
  protected:

@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
       std::fprintf(text, "health %s %d %d %llu\n", NodeName(health.node), static_cast<int>(health.state), health.pid,
                    static_cast<unsigned long long>(health.ticks));
       for (const Metric& metric : health.metrics) {
-        if (health.node == NodeId::kLink) std::fprintf(text, "link %s %.6g\n", metric.name.c_str(), metric.value);
+        if (metric.name.starts_with("link_")) std::fprintf(text, "link %s %.10g\n", metric.name.c_str(), metric.value);
       }
     }
     while (frames != nullptr && frames->TakeLatest(&frame)) {

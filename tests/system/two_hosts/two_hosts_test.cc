@@ -87,7 +87,7 @@ TEST(TwoHosts, ThePictureIsDrawnOnAnotherHostAndACutCableIsNoEnd) {
   session.hosts.Mend();
   Sleep(2);
   EXPECT_EQ(ChildrenOf(session.host.pid()), children) << "a node was started again\n" << session.Said();
-  const auto offsets = HeardLinkFigure(session.File("near"), "clock_offset_us");
+  const auto offsets = HeardLinkFigure(session.File("near"), "link_clock_offset_us");
   const auto [code, there] = session.End();
   EXPECT_EQ(code, 0) << session.Said();
   EXPECT_EQ(there, 0) << session.Said();
