@@ -50,41 +50,52 @@ constexpr std::uint32_t kSocketBuffer_B = 4u << 20;
 /// The payload of UDP in an Ethernet frame: a lost frame then costs one fragment and not a datagram of forty.
 constexpr std::uint32_t kLargestDatagram_B = 1472;
 constexpr int kStreamBurst = 1024;  ///< Packets that may wait for the reader.
-constexpr std::uint32_t kEncapsulation_B = 4;
+constexpr std::uint32_t kEncapsulation_B = 4, kMostPadding_B = 3;
 
 /// A packet on its way into the library.
 struct Packet {
   std::span<const std::uint8_t> bytes;
 };
 
+std::uint32_t PaddingOf(std::span<const std::uint8_t> bytes) { return static_cast<std::uint32_t>(-bytes.size() & 3u); }
+std::uint32_t SizeOf(std::span<const std::uint8_t> bytes) {
+  return kEncapsulation_B + static_cast<std::uint32_t>(bytes.size()) + PaddingOf(bytes);
+}
+
 /// Bytes as they are. Written from a Packet, read into a vector.
 class PacketType final : public fast::TopicDataType {
  public:
   PacketType(const char* name, std::uint32_t largest_B) {
     setName(name);
-    m_typeSize = largest_B + kEncapsulation_B;
+    m_typeSize = largest_B + kEncapsulation_B + kMostPadding_B;
     m_isGetKeyDefined = false;
     auto_fill_type_object(false);
     auto_fill_type_information(false);
   }
   bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
     const std::span<const std::uint8_t> bytes = static_cast<const Packet*>(data)->bytes;
-    if (payload->max_size < bytes.size() + kEncapsulation_B) return false;
-    constexpr std::array<std::uint8_t, kEncapsulation_B> kCdrLe{0, 1, 0, 0};
-    std::memcpy(payload->data, kCdrLe.data(), kCdrLe.size());
-    std::memcpy(payload->data + kCdrLe.size(), bytes.data(), bytes.size());
-    payload->length = static_cast<std::uint32_t>(bytes.size()) + kEncapsulation_B;
+    // RTPS fills a sample up to a multiple of four, but not one in fragments: so we do, and by how much stands in the
+    // options (as in XTypes 1.2, 7.6.2.1.2).
+    const std::uint32_t padding = PaddingOf(bytes);
+    if (payload->max_size < SizeOf(bytes)) return false;
+    const std::array<std::uint8_t, kEncapsulation_B> head{0, 1, 0, static_cast<std::uint8_t>(padding)};
+    std::memcpy(payload->data, head.data(), head.size());
+    std::memcpy(payload->data + head.size(), bytes.data(), bytes.size());
+    std::memset(payload->data + head.size() + bytes.size(), 0, padding);
+    payload->length = SizeOf(bytes);
     payload->encapsulation = CDR_LE;
     return true;
   }
   bool deserialize(rtps::SerializedPayload_t* payload, void* data) override {
     auto* bytes = static_cast<std::vector<std::uint8_t>*>(data);
-    const std::uint32_t skip = std::min(payload->length, kEncapsulation_B);
-    bytes->assign(payload->data + skip, payload->data + payload->length);
+    const std::uint32_t padding = payload->length > kEncapsulation_B ? payload->data[kEncapsulation_B - 1] & 3u : 0;
+    const bool whole = payload->length >= kEncapsulation_B + padding;
+    bytes->assign(payload->data + (whole ? kEncapsulation_B : 0),
+                  payload->data + (whole ? payload->length - padding : 0));
     return true;
   }
   std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
-    const auto size = static_cast<std::uint32_t>(static_cast<const Packet*>(data)->bytes.size()) + kEncapsulation_B;
+    const std::uint32_t size = SizeOf(static_cast<const Packet*>(data)->bytes);
     return [size] { return size; };
   }
   void* createData() override { return new std::vector<std::uint8_t>(); }
