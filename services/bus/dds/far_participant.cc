@@ -120,6 +120,10 @@ fast::DomainParticipantQos QosOf(const FarSettings& settings) {
   qos.transport().user_transports.push_back(udp);
   qos.wire_protocol().builtin.discovery_config.leaseDuration = kLease;
   qos.wire_protocol().builtin.discovery_config.leaseDuration_announcementperiod = kAnnouncement;
+  // Known to the peer beforehand: it looks at the ports of ids 0 to 3. Automatic ones grow with each participant of a
+  // process, also with one that is made again. Not 0 and 1, which a process gives to its bus.
+  constexpr int kCartId = 2, kHostId = 3;
+  qos.wire_protocol().participant_id = settings.side == FarSide::kCart ? kCartId : kHostId;
   rtps::Locator_t peer;
   peer.kind = LOCATOR_KIND_UDPv4;
   rtps::IPLocator::setIPv4(peer, settings.peer);
