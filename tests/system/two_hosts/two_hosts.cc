@@ -45,7 +45,7 @@ std::string TwoHosts::WhyNot() {
   const std::string name = "fulcrum-try-" + std::to_string(::getpid());
   std::string said;
   if (Ip({"netns", "add", name}, &said) != 0) return "no network namespace can be made here: " + said;
-  const int veth = Ip({"-n", name, "link", "add", "a", "type", "veth", "peer", "name", "b"}, &said);
+  const int veth = Ip({"-n", name, "link", "add", "wc", "type", "veth", "peer", "name", "wh"}, &said);
   (void)Ip({"netns", "del", name});
   if (veth != 0) return "no virtual cable can be made here: " + said;
   Program time("/usr/bin/unshare", {"--time", "--mount", "--fork", "true"});
