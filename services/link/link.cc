@@ -188,9 +188,9 @@ bool Link::IsOfPeer(std::uint64_t epoch, std::int64_t now) {
   their_epoch_ = epoch;
   clock_ = ClockFilter();
   heard_sent_ns_ = heard_pulse_ns_ = 0;
+  wished_ = 0;
   for (Channel& channel : channels_) {
     if (channel.in) channel.in->Restart();
-    if (channel.out) channel.out->Repeat();
   }
   return true;
 }
@@ -324,6 +324,8 @@ void Link::FollowWishes(std::uint32_t wanted, std::int64_t now) {
     Channel& channel = channels_[topic];
     if ((wanted & BitOf(topic)) != 0) {
       channel.unwanted_since_ns = 0;
+      // A reader who has just come there was not given what went before.
+      if (channel.out != nullptr && (wished_ & BitOf(topic)) == 0) channel.out->Repeat();
       const std::optional<NodeId> owner = bus::OwnerOf(static_cast<TopicId>(topic));
       if (channel.out == nullptr && (!owner || context_.IsNative(*owner))) {
         channel.out = MakeOutgoing(static_cast<TopicId>(topic), local_, [this] { Wake(); });
@@ -333,6 +335,7 @@ void Link::FollowWishes(std::uint32_t wanted, std::int64_t now) {
       if (now - channel.unwanted_since_ns > kUnwanted) channel.out.reset();
     }
   }
+  wished_ = wanted;
 }
 
 std::int64_t Link::PumpChannels(std::int64_t now) {

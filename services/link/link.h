@@ -124,6 +124,7 @@ class Link {
   LinkContext context_;
   ClockFilter clock_;
   std::uint64_t their_epoch_ = 0;
+  std::uint32_t wished_ = 0;  ///< Bit per TopicId: by the other side's last pulse.
   std::int64_t heard_ns_ = 0, heard_pulse_ns_ = 0, heard_sent_ns_ = 0;
   std::int64_t connected_ns_ = 0;  ///< When the present participant was made.
   std::int64_t next_pulse_ns_ = 0;
