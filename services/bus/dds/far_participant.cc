@@ -120,13 +120,16 @@ fast::DomainParticipantQos QosOf(const FarSettings& settings) {
   qos.transport().user_transports.push_back(udp);
   qos.wire_protocol().builtin.discovery_config.leaseDuration = kLease;
   qos.wire_protocol().builtin.discovery_config.leaseDuration_announcementperiod = kAnnouncement;
-  // Known to the peer beforehand: it looks at the ports of ids 0 to 3. Automatic ones grow with each participant of a
-  // process, also with one that is made again. Not 0 and 1, which a process gives to its bus.
-  constexpr int kCartId = 2, kHostId = 3;
-  qos.wire_protocol().participant_id = settings.side == FarSide::kCart ? kCartId : kHostId;
+  // Known to the peer beforehand, so that it looks at one port only. Not automatic: those grow with each participant of
+  // a process, also with one that is made again, and begin at 0.
+  constexpr int kCartId = 100, kHostId = 101;
+  const bool cart = settings.side == FarSide::kCart;
+  qos.wire_protocol().participant_id = cart ? kCartId : kHostId;
   rtps::Locator_t peer;
   peer.kind = LOCATOR_KIND_UDPv4;
   rtps::IPLocator::setIPv4(peer, settings.peer);
+  // RTPS 2.3, 9.6.1.1: PB + DG * domain + d1 + PG * id.
+  peer.port = static_cast<std::uint32_t>(7400 + 250 * settings.domain + 10 + 2 * (cart ? kHostId : kCartId));
   qos.wire_protocol().builtin.initialPeersList.push_back(peer);
   return qos;
 }
