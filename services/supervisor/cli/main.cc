@@ -25,6 +25,8 @@ std::span<const CommandEntry> Commands() {
       {"log", "log TOOL FILE...", "Read recordings: info, list, cat, export, verify, diff, recover.", Log},
       {"doctor", "doctor [--domain N] [--out DIR]", "Check what this machine permits, and say how to permit more.",
        Doctor},
+      {"reference", "reference cart|scene FILE...", "Print every key of cart or scene files, with what is valid.",
+       Reference},
   }};
   return kCommands;
 }
