@@ -11,7 +11,7 @@
 namespace fulcrum::supervisor::cli {
 
 std::span<const CommandEntry> Commands() {
-  static constexpr std::array<CommandEntry, 10> kCommands{{
+  static constexpr std::array<CommandEntry, 11> kCommands{{
       {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
       {"host", "host --peer ADDR [options]", "Run nodes of a cart that is on another machine, one session.", Host},
       {"status", "status [--domain N]", "Print the nodes of the running session once.", Status},
