@@ -2,11 +2,15 @@
 
 #include <signal.h>
 
+#include <algorithm>
+#include <chrono>
 #include <fstream>
+#include <thread>
 #include <utility>
 
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
+#include "services/runtime/cyclic_thread.h"
 
 namespace fulcrum::supervisor {
 namespace {
@@ -17,6 +21,8 @@ constexpr std::int64_t kLongestSilence = 5 * kSecond;
 // Until the first Health a node maps the scene and builds its solver.
 constexpr std::int64_t kLongestStart = 60 * kSecond;
 constexpr std::int64_t kPatienceWithRestart = 3 * kSecond;
+constexpr std::int64_t kLongestEnd = 4 * kSecond;
+constexpr auto kLook = std::chrono::milliseconds(5);
 
 /// Starting again with the same arguments would end the same way.
 bool IsFinal(const ProcessEnd& end) {
@@ -124,6 +130,28 @@ void NodeProcess::Swap(NodeCommand command, std::int64_t now_ns) {
 bool NodeProcess::HasEnded() {
   (void)process_.Poll();
   return !process_.running();
+}
+
+void EndAll(std::span<NodeProcess> nodes, const std::function<void(std::int64_t now_ns)>& turn,
+            const std::function<void(const NodeProcess&)>& killed) {
+  for (const NodeProcess& node : nodes) {
+    node.Signal(SIGTERM);
+  }
+  const std::int64_t begin = runtime::MonotonicNs();
+  const auto is_gone = [](NodeProcess& node) { return node.HasEnded(); };
+  while (!std::all_of(nodes.begin(), nodes.end(), is_gone)) {
+    const std::int64_t now = runtime::MonotonicNs();
+    if (now - begin > kLongestEnd) {
+      for (const NodeProcess& node : nodes) {
+        if (node.running()) {
+          killed(node);
+        }
+        node.Signal(SIGKILL);
+      }
+    }
+    turn(now);
+    std::this_thread::sleep_for(kLook);
+  }
 }
 
 std::string LastLine(const std::filesystem::path& log) {

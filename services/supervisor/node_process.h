@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -77,6 +79,11 @@ class NodeProcess {
   bool silent_ = false;              ///< Killed for silence.
   bool failed_ = false;
 };
+
+/// Ends all of them: SIGTERM, and SIGKILL for who has not ended 4 s later, told to `killed`. `turn` is called while
+/// they end.
+void EndAll(std::span<NodeProcess> nodes, const std::function<void(std::int64_t now_ns)>& turn,
+            const std::function<void(const NodeProcess&)>& killed);
 
 /// Last line of a log, for people; empty when there is none.
 [[nodiscard]] std::string LastLine(const std::filesystem::path& log);

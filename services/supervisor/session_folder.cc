@@ -85,6 +85,13 @@ SessionFolder MakeSessionFolder(const fs::path& out, const fs::path& scene_file,
   return folder;
 }
 
+void RemoveCheckpoints(const SessionFolder& folder) {
+  for (const auto& entry : fs::directory_iterator(folder.path)) {
+    std::error_code ignored;
+    if (entry.path().extension() == ".checkpoint") fs::remove(entry.path(), ignored);
+  }
+}
+
 std::string DescribeMachine() {
   std::ifstream cpuinfo("/proc/cpuinfo");
   std::string line, model = "unknown CPU";

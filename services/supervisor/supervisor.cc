@@ -18,6 +18,10 @@
 #include "services/bus/dds/shared_memory.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
+#include "services/link/health.h"
+#include "services/link/link.h"
+#include "services/link/options.h"
+#include "services/link/scene_transfer.h"
 #include "services/recording/free_name.h"
 #include "services/runtime/realtime.h"
 #include "services/scene/scene_file.h"
@@ -45,7 +49,6 @@ constexpr std::int64_t kHealthPeriod = kSecond / 10;
 constexpr std::int64_t kLongestStart = 30 * kSecond;
 // The manifest reaches all nodes before session time 0.
 constexpr std::int64_t kLeadTime = kSecond / 5;
-constexpr std::int64_t kLongestEnd = 4 * kSecond;
 // Peers let go of a dead process's files when its lease of 1 s is over.
 constexpr std::int64_t kSweepAfter = 2 * kSecond;
 // A gap in our own loop: a suspended machine, a stopped supervisor. Then silence proves nothing.
@@ -57,15 +60,24 @@ std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) 
   std::vector<NodeId> nodes;
   for (int i = 0; i < kNodeCount; ++i) {
     const auto id = static_cast<NodeId>(i);
-    if (id != NodeId::kSupervisor && (scene.node_mask >> i & 1u) != 0) {
+    if (id != NodeId::kSupervisor && (scene.node_mask >> i & 1u) != 0 && (settings.remote >> i & 1u) == 0) {
       nodes.push_back(id);
     }
   }
   if (nodes.empty()) {
-    throw InputError(settings.scene.string() + ": the scene names no node to start");
+    throw InputError(settings.scene.string() + ": the scene names no node to start here");
   }
   if (settings.record || settings.keep_s > 0) {
     nodes.push_back(NodeId::kRecorder);
+  }
+  return nodes;
+}
+
+/// Those of the scene that run on another host.
+std::vector<NodeId> RemoteNodesOf(const SceneView& scene, const UpSettings& settings) {
+  std::vector<NodeId> nodes;
+  for (int i = 0; i < kNodeCount; ++i) {
+    if ((scene.node_mask & settings.remote) >> i & 1u) nodes.push_back(static_cast<NodeId>(i));
   }
   return nodes;
 }
@@ -79,7 +91,10 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
   return "  seconds: " + (end_s > 0 ? Fixed(end_s, 3) : std::string("until stopped")) +
          "\n  domain: " + std::to_string(settings.cart.domain) + "\n  window: " + yes_no(settings.window) +
          "\n  keep_going: " + yes_no(settings.keep_going) + "\n  standby: " + yes_no(settings.standby) +
-         "\n  record: " + yes_no(settings.record.has_value()) + "\n";
+         "\n  record: " + yes_no(settings.record.has_value()) +
+         (settings.remote != 0 ? "\n  peer: " + settings.peer + "\n  remote: " + link::NamesOfNodes(settings.remote)
+                               : "") +
+         "\n";
 }
 
 std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFolder& folder) {
@@ -104,7 +119,8 @@ struct Supervisor::Impl {
         recording(RecordingFile(up, folder)),
         memory(bus::SharedMemoryDirectory(up.cart.domain)),
         starter{settings, folder, recording},
-        node_ids(NodesOf(scene.view(), up)) {
+        node_ids(NodesOf(scene.view(), up)),
+        remote_ids(RemoteNodesOf(scene.view(), up)) {
     // Left by a supervisor that was killed: its nodes died with it.
     bus::SweepSharedMemory(memory);
     const bus::Security security = app::SecurityOf(up.cart, NodeName(NodeId::kSupervisor));
@@ -121,6 +137,10 @@ struct Supervisor::Impl {
     commands = participant->MakeInput<Command>();
     orders = participant->MakeOutput<Command>();
     replies = participant->MakeOutput<CommandReply>();
+    if (!remote_ids.empty()) {
+      link.emplace(link::LinkSettings{.far = FarOf(up), .offer = MakeOffer(), .scene = folder.scene});
+      link->Join(&*participant, link->settings().offer->nodes);
+    }
     for (const NodeId id : node_ids) {
       if (id == NodeId::kPhysics && up.standby) {
         nodes.emplace_back(starter.InPair("a", false));
@@ -129,6 +149,24 @@ struct Supervisor::Impl {
         nodes.emplace_back(starter.Usual(id));
       }
     }
+  }
+
+  static bus::FarSettings FarOf(const UpSettings& up) {
+    return link::FarSettingsFor(bus::FarSide::kCart, up.peer, up.address, up.cart.domain, up.link_domain);
+  }
+
+  /// What the other host is to do.
+  [[nodiscard]] link::Offer MakeOffer() const {
+    const link::FileFacts facts = link::FactsOf(folder.scene);
+    link::Offer offer;
+    offer.session_id = folder.session_id;
+    offer.scene_name = scene.view().name;
+    offer.scene_hash = scene.view().hash;
+    offer.scene_B = facts.size_B;
+    offer.scene_checksum = facts.checksum;
+    for (const NodeId node : remote_ids) offer.nodes |= 1u << static_cast<unsigned>(node);
+    offer.cart_yaml = config::CartToYaml(settings.cart);
+    return offer;
   }
 
   [[nodiscard]] double SessionTime(std::int64_t now) const {
@@ -140,6 +178,12 @@ struct Supervisor::Impl {
     const auto found =
         std::find_if(nodes.begin(), nodes.end(), [&](const NodeProcess& node) { return name == NodeName(node.id()); });
     return found == nodes.end() ? nullptr : &*found;
+  }
+
+  const NodeId* FindRemote(std::string_view name) const {
+    const auto found =
+        std::find_if(remote_ids.begin(), remote_ids.end(), [&](NodeId node) { return name == NodeName(node); });
+    return found == remote_ids.end() ? nullptr : &*found;
   }
 
   /// Ends the session; the first cause counts.
@@ -227,6 +271,10 @@ struct Supervisor::Impl {
           }
         }
       }
+      // Of the other host: watched and started again there.
+      if (!ended && std::find(remote_ids.begin(), remote_ids.end(), health.node) != remote_ids.end()) {
+        record.AddHealth(SessionTime(now), health);
+      }
     }
     ThermalEvent event;
     while (events->TakeNext(&event)) {
@@ -241,6 +289,10 @@ struct Supervisor::Impl {
       progress.Say("! refused: " + refusals.texts[i]);
     }
     record.AddRefusals(SessionTime(now), refusals);
+    if (const std::string mismatch = link ? link->mismatch() : std::string(); !mismatch.empty()) {
+      Fail(ExitCode::kMismatch, mismatch);
+      ending = true;
+    }
   }
 
   void TakeCommands(std::int64_t now) {
@@ -269,6 +321,14 @@ struct Supervisor::Impl {
           reply.text = "restarting " + command.argument + " (pid " + std::to_string(node->pid()) + ")";
           node->AskRestart(now);
           excused_ns = now + kAskedFor;
+        } else if (const NodeId* remote = FindRemote(command.argument); remote != nullptr) {
+          reply.text = "asking " + command.argument + " on " + settings.peer + " to end: it is started again there";
+          Command stop;
+          stop.stamp = order_stamper.Next(now);
+          stop.request_id = static_cast<std::uint64_t>(now);
+          stop.target = *remote;
+          stop.verb = "stop";
+          orders->Write(stop);
         } else {
           reply.ok = false;
           reply.text = "no running node \"" + command.argument + "\" in this session";
@@ -329,6 +389,9 @@ struct Supervisor::Impl {
       own.metrics.push_back({std::string("restarts_") + NodeName(id), static_cast<double>(record.node(id).restarts)});
     }
     own.last_error = failed_why.empty() && !refusals.texts.empty() ? "refused: " + refusals.texts.back() : failed_why;
+    if (link) {
+      link::FillHealth(link->status(), &own);
+    }
     app::FitToMessage(&own);
     healths_out->Write(own);
   }
@@ -375,7 +438,11 @@ struct Supervisor::Impl {
       node.Start(begin);
     }
     const auto ready = [](const NodeProcess& node) { return node.has_reported() || node.failed(); };
-    while (!ending && !std::all_of(nodes.begin(), nodes.end(), ready) && MonotonicNs() - begin < kLongestStart) {
+    const auto seen = [this](NodeId node) { return record.node(node).seen; };
+    while (
+        !ending &&
+        !(std::all_of(nodes.begin(), nodes.end(), ready) && std::all_of(remote_ids.begin(), remote_ids.end(), seen)) &&
+        MonotonicNs() - begin < kLongestStart) {
       Turn();
     }
   }
@@ -399,6 +466,9 @@ struct Supervisor::Impl {
     TakeReports(MonotonicNs());
     reached_s = ReachedTime();
     ended = true;
+    if (link) {
+      link->SayBye();
+    }
     const auto recorder = std::find_if(nodes.begin(), nodes.end(),
                                        [](const NodeProcess& node) { return node.id() == NodeId::kRecorder; });
     End({nodes.begin(), recorder});
@@ -407,25 +477,15 @@ struct Supervisor::Impl {
   }
 
   void End(std::span<NodeProcess> some) {
-    for (const NodeProcess& node : some) {
-      node.Signal(SIGTERM);
-    }
-    const std::int64_t begin = MonotonicNs();
-    const auto is_gone = [](NodeProcess& node) { return node.HasEnded(); };
-    while (!std::all_of(some.begin(), some.end(), is_gone)) {
-      const std::int64_t now = MonotonicNs();
-      if (now - begin > kLongestEnd) {
-        for (const NodeProcess& node : some) {
-          if (node.running()) {
-            progress.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and was killed");
-          }
-          node.Signal(SIGKILL);
-        }
-      }
-      TakeReports(now);
-      PublishOwnHealth(now);
-      std::this_thread::sleep_for(kLoopPeriod);
-    }
+    EndAll(
+        some,
+        [this](std::int64_t now) {
+          TakeReports(now);
+          PublishOwnHealth(now);
+        },
+        [this](const NodeProcess& node) {
+          progress.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and was killed");
+        });
   }
 
   void Judge() {
@@ -438,12 +498,20 @@ struct Supervisor::Impl {
         Fail(ExitCode::kFailure, std::string(NodeName(node.id())) + " never reported; see " + node.log().string());
       }
     }
+    for (const NodeId node : remote_ids) {
+      if (!record.node(node).seen) {
+        Fail(ExitCode::kFailure,
+             std::string(NodeName(node)) + " on " + settings.peer +
+                 " never reported; does `fulcrum host` run there, with this machine as its --peer?");
+      }
+    }
     if (const std::string missing = MissingFrom(record, DemandsUntil(scene.view(), reached_s)); !missing.empty()) {
       Fail(ExitCode::kFailure, missing);
     }
   }
 
   void CleanUp() {
+    link.reset();
     commands.reset();
     replies.reset();
     orders.reset();
@@ -453,11 +521,7 @@ struct Supervisor::Impl {
     manifests.reset();
     participant.reset();
     bus::RemoveSharedMemory(memory);
-    // Checkpoints are for restarts within the session, and large.
-    for (const auto& entry : std::filesystem::directory_iterator(folder.path)) {
-      std::error_code ignored;
-      if (entry.path().extension() == ".checkpoint") std::filesystem::remove(entry.path(), ignored);
-    }
+    RemoveCheckpoints(folder);
   }
 
   void Report() {
@@ -468,6 +532,7 @@ struct Supervisor::Impl {
     outcome.machine = DescribeMachine();
     outcome.configuration = folder.configuration;
     outcome.nodes = node_ids;
+    outcome.nodes.insert(outcome.nodes.end(), remote_ids.begin(), remote_ids.end());
     outcome.duration_s = reached_s;
     outcome.wanted_s = end_s;
     outcome.exit_code = exit_code;
@@ -489,8 +554,10 @@ struct Supervisor::Impl {
   const std::filesystem::path memory;
   const NodeStarter starter;
   const std::vector<NodeId> node_ids;
+  const std::vector<NodeId> remote_ids;  ///< Of the scene, on another host.
 
   std::optional<bus::DdsParticipant> participant;
+  std::optional<link::Link> link;  ///< To the host of remote_ids.
   std::unique_ptr<bus::Output<SceneManifest>> manifests;
   std::unique_ptr<bus::Input<Health>> healths_in;
   std::unique_ptr<bus::Output<Health>> healths_out;

@@ -1,6 +1,7 @@
 // Runs one session: starts the nodes of a scene, watches and restarts them, records what they report, ends them.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -24,7 +25,11 @@ struct UpSettings {
   /// The recorder keeps so much of the newest past in memory [s] and writes it into a file of its own when a node dies
   /// or a dump is asked for. 0: it does not.
   double keep_s = 0;
-  bool standby = false;     ///< A second physics_node follows the first and takes over when that falls silent.
+  bool standby = false;  ///< A second physics_node follows the first and takes over when that falls silent.
+  /// Nodes that run on another host, bit per NodeId, and how to reach it; 0: all run here.
+  std::uint32_t remote = 0;
+  std::string peer, address;
+  int link_domain = 0;      ///< 0: the usual one of the cart's domain.
   bool keep_going = false;  ///< A node that failed for good does not end the session.
 };
 

@@ -47,7 +47,7 @@ Cart::~Cart() {
   fs::remove_all(folder_, ignored);
 }
 
-std::map<std::string, pid_t> Cart::nodes() const {
+std::map<std::string, pid_t> ChildrenOf(pid_t parent) {
   std::map<std::string, pid_t> children;
   for (const auto& entry : fs::directory_iterator("/proc")) {
     const std::string name = entry.path().filename();
@@ -61,7 +61,7 @@ std::map<std::string, pid_t> Cart::nodes() const {
     char state = '?';
     pid_t ppid = 0;
     rest >> state >> ppid;
-    if (ppid == up_.pid() && state != 'Z') children.emplace(line.substr(open + 1, close - open - 1), std::stoi(name));
+    if (ppid == parent && state != 'Z') children.emplace(line.substr(open + 1, close - open - 1), std::stoi(name));
   }
   return children;
 }
@@ -76,6 +76,7 @@ double Cart::PictureTime() const {
   }
   return newest_s;
 }
+std::map<std::string, pid_t> Cart::nodes() const { return ChildrenOf(up_.pid()); }
 
 std::optional<int> Cart::WaitForEnd(double limit_s) {
   std::optional<int> code;

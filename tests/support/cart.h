@@ -19,6 +19,9 @@ bool WaitFor(double limit_s, const std::function<bool()>& done);
 
 [[nodiscard]] std::string ReadFile(const std::filesystem::path& file);
 
+/// The processes that a process has started and that still run, by name.
+[[nodiscard]] std::map<std::string, pid_t> ChildrenOf(pid_t parent);
+
 /// One run of `fulcrum up SCENE`; everything is gone when the object is.
 class Cart {
  public:

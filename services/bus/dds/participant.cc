@@ -1,11 +1,9 @@
 #include "services/bus/dds/participant.h"
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/xmlparser/XMLProfileManager.h>
 
 #include <array>
 #include <cstdio>
-#include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
@@ -13,6 +11,7 @@
 #include <sstream>
 
 #include "services/bus/access.h"
+#include "services/bus/dds/library.h"
 #include "services/bus/dds/peer_watch.h"
 #include "services/bus/dds/ports.h"
 #include "services/bus/dds/raw_reader.h"
@@ -36,15 +35,6 @@ const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
 constexpr std::uint32_t kSocketBuffer_B = 4u << 20;
 /// Samples above this do not fit one UDP datagram and are sent in fragments.
 constexpr std::uint32_t kDatagram_B = 64'000;
-
-/// Settings from outside would silently replace the ones that were measured.
-void ForgetOutsideSettings() {
-  for (const char* name :
-       {"FASTDDS_STATISTICS", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_ENVIRONMENT_FILE", "ROS_DISCOVERY_SERVER"}) {
-    unsetenv(name);
-  }
-  setenv("SKIP_DEFAULT_XML", "1", 1);  // no DEFAULT_FASTRTPS_PROFILES.xml from the current directory
-}
 
 fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash) {
   fast::DomainParticipantQos qos;
@@ -109,10 +99,7 @@ struct DdsParticipant::Impl {
     }
     if (shared_memory.empty()) shared_memory = SharedMemoryDirectory(settings.domain);
     PrepareSharedMemory(shared_memory);
-    ForgetOutsideSettings();
-    eprosima::fastrtps::LibrarySettingsAttributes library;
-    library.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
-    eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(library);
+    dds::PrepareLibrary();
 
     participant = fast::DomainParticipantFactory::get_instance()->create_participant(
         static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash), &watch, fast::StatusMask::none());

@@ -15,6 +15,7 @@ namespace fulcrum::supervisor::cli {
 using Words = std::vector<std::string>;
 
 ExitCode Up(const Words& words);
+ExitCode Host(const Words& words);
 ExitCode Status(const Words& words);
 ExitCode Top(const Words& words);
 ExitCode Restart(const Words& words);
@@ -53,6 +54,9 @@ inline constexpr int kDefaultDomain = 7;
 
 /// Folder of this program: the nodes and the compiler lie beside it.
 [[nodiscard]] std::filesystem::path ProgramFolder();
+
+/// Compiled scenes are kept here: beside the programs in a build tree, else in the user's cache.
+[[nodiscard]] std::filesystem::path SceneCache(const std::filesystem::path& programs);
 
 /// Sends a command to the supervisor of the domain and prints its answer. Throws InputError when none runs there.
 ExitCode Ask(int domain, const std::string& verb, const std::string& argument);

@@ -36,6 +36,19 @@ std::string OldestInput(const Health& health) {
   return std::string(bus::TopicLabel(oldest->topic)) + " " + Fixed(static_cast<double>(oldest->age_ms), 0) + " ms";
 }
 
+/// "\nlink: …" where some nodes run on another host.
+std::string LinkFigures(const Health& supervisor) {
+  std::string text;
+  for (const Metric& metric : supervisor.metrics) {
+    constexpr std::string_view kLink = "link_";
+    if (!metric.name.starts_with(kLink)) continue;
+    text += text.empty() ? "\nlink: " : " · ";
+    text += metric.name.substr(kLink.size()) + " " + Fixed(metric.value, 2);
+  }
+  if (!text.empty() && !supervisor.last_error.empty()) text += "\n      └ " + supervisor.last_error;
+  return text;
+}
+
 }  // namespace
 
 SessionView::SessionView(int domain)
@@ -76,7 +89,7 @@ std::string SessionView::Text() const {
   std::snprintf(line.data(), line.size(), "\n%-14s %7s  %-9s %15s %24s %9s %6s %8s  %s\n", "node", "pid", "state",
                 "rate / asked Hz", "step p50/p99/max ms", "overruns", "drops", "restarts", "oldest input");
   text += line.data();
-  std::string figures;
+  std::string figures = LinkFigures(supervisor);
   for (const Health& health : newest_) {
     if (health.pid == 0 || health.node == NodeId::kSupervisor) {
       continue;

@@ -1,6 +1,7 @@
 #include <cstdlib>
 
 #include "services/core/error.h"
+#include "services/link/options.h"
 #include "services/supervisor/cli/commands.h"
 #include "services/supervisor/scene_cache.h"
 #include "services/supervisor/supervisor.h"
@@ -11,7 +12,8 @@ namespace {
 namespace fs = std::filesystem;
 namespace po = boost::program_options;
 
-/// Beside the programs in a build tree, else in the user's cache.
+}  // namespace
+
 fs::path SceneCache(const fs::path& programs) {
   if (fs::exists(programs.parent_path() / "CMakeCache.txt")) {
     return programs.parent_path() / "scenes";
@@ -23,8 +25,6 @@ fs::path SceneCache(const fs::path& programs) {
   }
   return (home != nullptr ? fs::path(home) / ".cache" : fs::temp_directory_path()) / "fulcrum" / "scenes";
 }
-
-}  // namespace
 
 ExitCode Up(const Words& words) {
   po::options_description options;
@@ -41,8 +41,15 @@ ExitCode Up(const Words& words) {
           "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
           "keep-last", po::value<double>()->value_name("SECONDS"),
           "keep the newest past in memory and write it into a file when a node dies, when its Health turns to "
-          "degraded, "
-          "and at fulcrum dump")("standby", "a second physics_node that takes over when the first falls silent")(
+          "degraded, and at fulcrum dump")(
+          "peer", po::value<std::string>()->value_name("ADDR"),
+          "host that runs the nodes of --remote; there: fulcrum host --peer (this machine)")(
+          "remote", po::value<std::string>()->value_name("NODE,..."), "nodes that run on the host --peer")(
+          "address", po::value<std::string>()->value_name("ADDR"),
+          "own address towards the peer (default: of the interface that leads there)")(
+          "link-domain", po::value<int>()->value_name("N"),
+          "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
+          "standby", "a second physics_node that takes over when the first falls silent")(
           "keep-going", "go on without a node that failed for good");
   AddDomain(&options);
   const Arguments arguments = Parse("up", words, options, {"scene"});
@@ -66,6 +73,21 @@ ExitCode Up(const Words& words) {
     throw InputError("--quality: \"" + settings.quality + "\"; valid: auto, low, high");
   }
   settings.standby = values.count("standby") != 0;
+  if (values.count("peer") != values.count("remote")) {
+    throw InputError("--peer and --remote belong together: which host, and which nodes run there");
+  }
+  if (values.count("peer") != 0) {
+    settings.peer = values["peer"].as<std::string>();
+    settings.remote = link::NodesFromNames(values["remote"].as<std::string>());
+    settings.address = values.count("address") != 0 ? values["address"].as<std::string>() : "";
+    settings.link_domain = values.count("link-domain") != 0 ? values["link-domain"].as<int>() : 0;
+    // What cannot be reached is refused here and not by a node.
+    (void)link::FarSettingsFor(bus::FarSide::kCart, settings.peer, settings.address, settings.cart.domain,
+                               settings.link_domain);
+    if (settings.standby && (settings.remote >> static_cast<unsigned>(NodeId::kPhysics) & 1u) != 0) {
+      throw InputError("--standby: not for a physics_node on another host");
+    }
+  }
   settings.keep_going = values.count("keep-going") != 0;
   if (values.count("seconds") != 0) {
     settings.seconds = values["seconds"].as<double>();
