@@ -23,6 +23,7 @@ ExitCode Down(const Words& words);
 ExitCode Dump(const Words& words);
 ExitCode Log(const Words& words);
 ExitCode Doctor(const Words& words);
+ExitCode Console(const Words& words);
 
 struct CommandEntry {
   const char* name;

@@ -11,8 +11,10 @@
 namespace fulcrum::supervisor::cli {
 
 std::span<const CommandEntry> Commands() {
-  static constexpr std::array<CommandEntry, 9> kCommands{{
+  static constexpr std::array<CommandEntry, 10> kCommands{{
       {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
+      {"console", "console [options]",
+       "Serve the page of the cart's touch screen: start, watch, stop, calibrate, replay.", Console},
       {"status", "status [--domain N]", "Print the nodes of the running session once.", Status},
       {"top", "top [--domain N]", "Show the nodes of the running session, refreshed until Ctrl-C.", Top},
       {"restart", "restart NODE [--domain N]", "Restart one node of the running session.", Restart},
