@@ -16,6 +16,7 @@
 #include "services/console/access.h"
 #include "services/console/guided_task.h"
 #include "services/console/http_server.h"
+#include "services/console/json.h"
 #include "services/console/library.h"
 #include "services/console/live_state.h"
 #include "services/console/page.h"
@@ -24,7 +25,6 @@
 #include "services/console/session_run.h"
 #include "services/console/session_watch.h"
 #include "services/core/error.h"
-#include "services/log_tools/text.h"
 #include "services/runtime/cyclic_thread.h"
 #include "services/runtime/realtime.h"
 #include "services/supervisor/ask.h"
@@ -284,30 +284,23 @@ struct Console::Impl {
   }
 
   [[nodiscard]] std::string ChoicesJson() const {
-    std::string json;
+    Json scenes('[');
     for (const SceneChoice& scene : FindScenes(settings.scenes)) {
-      json += (json.empty() ? "{\"name\":" : ",{\"name\":") + log_tools::JsonString(scene.name) +
-              ",\"description\":" + log_tools::JsonString(ValidUtf8(scene.description)) + ",\"duration\":";
-      log_tools::PutJson(scene.duration_s, 0, &json);
-      json += ",\"power\":";
-      log_tools::PutJson(scene.power_W, 0, &json);
-      json += ",\"picture_rate\":";
-      log_tools::PutJson(scene.picture_rate_Hz, 0, &json);
-      json += '}';
+      Json one('{');
+      one.Text("name", scene.name).Text("description", scene.description).Number("duration", scene.duration_s, 0.1);
+      scenes.Item(one.Number("power", scene.power_W, 0.1).Number("picture_rate", scene.picture_rate_Hz, 0.1).Done());
     }
-    return "{\"scenes\":[" + json +
-           "],\"cart\":" + log_tools::JsonString(settings.cart.empty() ? "simulated" : settings.cart.stem().string()) +
-           ",\"simulated\":" + (settings.cart.empty() ? "true" : "false") +
-           ",\"keep_seconds\":" + std::to_string(SessionRun::kKeep_s) + "}";
+    Json json('{');
+    json.Raw("scenes", scenes.Done()).Flag("simulated", settings.cart.empty());
+    return json.Text("cart", settings.cart.empty() ? "simulated" : settings.cart.stem().string()).Done();
   }
 
   [[nodiscard]] std::string RecordingsJson() const {
-    std::string json;
+    Json recordings('[');
     for (const RecordingChoice& one : FindRecordings(settings.out, kMostRecordings)) {
-      json += (json.empty() ? "{\"name\":" : ",{\"name\":") + log_tools::JsonString(one.name) +
-              ",\"bytes\":" + std::to_string(one.bytes) + "}";
+      recordings.Item(Json('{').Text("name", one.name).Raw("bytes", std::to_string(one.bytes)).Done());
     }
-    return "{\"recordings\":[" + json + "]}";
+    return Json('{').Raw("recordings", recordings.Done()).Done();
   }
 
   [[nodiscard]] fs::path SessionFile(const char* name) const {

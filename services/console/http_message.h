@@ -15,8 +15,8 @@ struct HttpResponse {
   int status = 200;
   std::string type = "application/json";
   std::string body = {};
-  std::string policy = {};   ///< Content-Security-Policy; empty: the page's own.
-  bool stream = false;  ///< The body is the first of many parts, and the connection stays.
+  std::string policy = {};  ///< Content-Security-Policy; empty: the page's own.
+  bool stream = false;      ///< The body is the first of many parts, and the connection stays.
 };
 
 }  // namespace fulcrum::console

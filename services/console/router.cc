@@ -4,8 +4,8 @@
 #include <array>
 #include <span>
 
+#include "services/core/json_text.h"
 #include "services/core/messages.h"
-#include "services/log_tools/text.h"
 
 namespace fulcrum::console {
 namespace {
@@ -77,7 +77,7 @@ constexpr std::array kEntries{
 HttpResponse Answer(int status, bool ok, std::string_view text) {
   HttpResponse response;
   response.status = status;
-  response.body = std::string("{\"ok\":") + (ok ? "true" : "false") + ",\"text\":" + log_tools::JsonString(text) + "}";
+  response.body = std::string("{\"ok\":") + (ok ? "true" : "false") + ",\"text\":" + JsonString(text) + "}";
   return response;
 }
 
