@@ -144,8 +144,8 @@ function enterPhase(before) {
 function showStatus() {
   const s = state;
   const worst = (s.nodes || []).some(n => n.level === 'bad') ? 'bad' : (s.nodes || []).some(n => n.level === 'busy') ? 'busy' : 'good';
-  const clock = s.time === undefined ? '' : `${Math.max(0, s.time).toFixed(0)}${s.end > 0 ? ` of ${s.end.toFixed(0)}` : ''} s`;
-  if (s.phase === 'running') setStatus(worst, 'Running', `${clock} · ${s.scene}${s.recording ? ' · recording' : ''}`);
+  const clock = s.time === undefined ? '' : `${Math.max(0, s.time).toFixed(0)}${s.end > 0 ? ` / ${s.end.toFixed(0)}` : ''} s`;
+  if (s.phase === 'running') setStatus(worst, worst === 'bad' ? 'Trouble' : 'Running', `${clock} · ${s.scene}${s.recording ? ' · rec' : ''}`);
   else if (s.phase === 'starting') setStatus('off', 'Starting', s.said || '');
   else if (s.phase === 'stopping') setStatus('off', 'Ending', 'the report is being written');
   else setStatus('good', 'Ready', '');
@@ -176,13 +176,13 @@ function showNodes(nodes) {
     parts.mark.className = `mark level-${node.level}`;
     setText(parts.word, node.word);
     parts.word.className = `word level-${node.level}`;
-    const ms = v => v < 10 ? v.toFixed(2) : v.toFixed(0);
-    const more = [`${node.rate.toFixed(0)} Hz`, `step ${ms(node.p50)}, ${ms(node.p99)} ms`];
+    const ms = v => v < 0.1 ? v.toFixed(2) : v < 10 ? v.toFixed(1) : v.toFixed(0);
+    const more = [`${node.rate.toFixed(0)} Hz`, `step < ${ms(node.p99)} ms`];
     if (node.input) more.push(`input ${node.age} ms`);
-    if (node.restarts) more.push(`restarts ${node.restarts}`);
+    setText(parts.name, node.label + (node.restarts ? ` ↻${node.restarts}` : ''));
     setText(parts.more, node.pid ? more.join(' · ') : 'not heard yet');
-    parts.row.title = `${node.name}: asked for ${node.asked} Hz; step median, 99th percentile; oldest input ${node.input || 'none'}; ` +
-      `${node.drops} samples lost or refused, ${node.overruns} periods skipped, pid ${node.pid}`;
+    parts.row.title = `${node.name}: asked for ${node.asked} Hz; 99 of 100 steps were shorter than told, the median is ${ms(node.p50)} ms; oldest input ${node.input || 'none'}; ` +
+      `${node.restarts} restarts, ${node.drops} samples lost or refused, ${node.overruns} periods skipped, pid ${node.pid}`;
     parts.button.disabled = state.phase !== 'running';
   }
 }
@@ -204,7 +204,7 @@ function showWarnings(warnings) {
 function showFigures(figures) {
   if (!figures) return;
   setText($('temperature'), `${figures.temperature_C.toFixed(0)} °C`);
-  setText($('temperature-more'), `highest ${figures.highest_C.toFixed(0)} °C · ${figures.power_W.toFixed(0)} W · cut ${figures.cut_mm.toFixed(1)} mm`);
+  setText($('temperature-more'), `${figures.power_W.toFixed(0)} W · cut ${figures.cut_mm.toFixed(1)} mm`);
   setText($('force'), `${Math.max(figures.force0_N, figures.force1_N).toFixed(2)} N`);
   setText($('force-more'), `highest ${figures.peak_N.toFixed(2)} N`);
   drawPlot($('plot-temperature'), points, {span: kSpan, floor: 20, least: 60, unit: '°C', lines: [{at: 1, colour: '#ff8a5c'}]});
@@ -251,6 +251,9 @@ async function loadChoices() {
   if (!answer) return;
   const chosen = choices ? $('start-form').scene.value : 'built-in';
   choices = answer;
+  setText($('cart-name'), choices.simulated ? 'Simulated' : choices.cart);
+  setText($('cart-more'), choices.simulated ? 'Handles, pedal and devices are simulated: the scene\u2019s script moves them.'
+    : 'What its cart file does not name is simulated.');
   $('scenes').replaceChildren(...choices.scenes.map(scene => chip('scene', scene.name, scene.name, scene.description)));
   const first = choices.scenes.find(s => s.name === chosen) || choices.scenes[0];
   if (first) {

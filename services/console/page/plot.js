@@ -22,7 +22,7 @@ function drawPlot(canvas, points, {span, floor, least, unit, lines}) {
   g.clearRect(0, 0, width, height);
   g.font = `${rem}px system-ui, "DejaVu Sans", sans-serif`;
 
-  const end = points.length ? Math.max(points[points.length - 1][0], span) : span;
+  const end = points.length ? points[points.length - 1][0] : span;
   let top = least;
   for (const p of points) for (const l of lines) if (p[l.at] > top) top = p[l.at];
   const step = niceStep((top - floor) * 1.02, height < 8 * rem ? 3 : 4);
