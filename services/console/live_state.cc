@@ -9,13 +9,26 @@
 namespace fulcrum::console {
 namespace {
 
-/// Age of the oldest input that has a writer.
-const InputHealth* OldestInput(const Health& health) {
-  const InputHealth* oldest = nullptr;
+/// What a node lives on: the age of its newest sample is the node's latency. Others come only when something changes.
+const InputHealth* MainInput(const Health& health) {
+  const auto is_main = [&](TopicId topic) {
+    switch (health.node) {
+      case NodeId::kHaptics:
+        return topic == TopicId::kContactModel;
+      case NodeId::kPhysics:
+        return topic == TopicId::kToolState;
+      case NodeId::kThermal:
+        return topic == TopicId::kCauteryContact;
+      case NodeId::kRender:
+        return topic == TopicId::kTissueFrame;
+      default:
+        return false;
+    }
+  };
   for (const InputHealth& input : health.inputs) {
-    if (input.matched && input.age_ms >= 0 && (oldest == nullptr || input.age_ms > oldest->age_ms)) oldest = &input;
+    if (is_main(input.topic) && input.matched && input.age_ms >= 0) return &input;
   }
-  return oldest;
+  return nullptr;
 }
 
 NodeReport ReportOf(const SessionWatch& watch, NodeId node) {
@@ -32,8 +45,8 @@ std::string NodeJson(const NodeReport& report, std::int64_t now_ns) {
   json.Number("asked", static_cast<double>(health.rate_asked_Hz), 0.1);
   json.Number("p50", 1e-3 * static_cast<double>(health.step.p50_us), 0.001);
   json.Number("p99", 1e-3 * static_cast<double>(health.step.p99_us), 0.001);
-  if (const InputHealth* oldest = OldestInput(health)) {
-    json.Text("input", bus::TopicLabel(oldest->topic)).Number("age", static_cast<double>(oldest->age_ms), 1);
+  if (const InputHealth* input = MainInput(health)) {
+    json.Text("input", bus::TopicLabel(input->topic)).Number("age", static_cast<double>(input->age_ms), 1);
   }
   json.Number("drops", static_cast<double>(supervisor::DropsOf(health)), 1);
   json.Number("overruns", static_cast<double>(health.overruns), 1);

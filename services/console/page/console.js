@@ -181,7 +181,7 @@ function showNodes(nodes) {
     if (node.input) more.push(`input ${node.age} ms`);
     setText(parts.name, node.label + (node.restarts ? ` ↻${node.restarts}` : ''));
     setText(parts.more, node.pid ? more.join(' · ') : 'not heard yet');
-    parts.row.title = `${node.name}: asked for ${node.asked} Hz; 99 of 100 steps were shorter than told, the median is ${ms(node.p50)} ms; oldest input ${node.input || 'none'}; ` +
+    parts.row.title = `${node.name}: asked for ${node.asked} Hz; 99 of 100 steps were shorter than told, the median is ${ms(node.p50)} ms; lives on ${node.input || 'nothing'}; ` +
       `${node.restarts} restarts, ${node.drops} samples lost or refused, ${node.overruns} periods skipped, pid ${node.pid}`;
     parts.button.disabled = state.phase !== 'running';
   }

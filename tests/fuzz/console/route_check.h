@@ -52,7 +52,7 @@ inline std::string Broken(const HttpRequest& request) {
       if (static_cast<unsigned char>(c) <= ' ') return "a name with control characters";
     }
   }
-  if (routed.path.find("..") != std::string::npos || routed.path.find("//") != std::string::npos)
+  if (routed.path.find("/.") != std::string::npos || routed.path.find("//") != std::string::npos)
     return "a path that climbs";
   return {};
 }

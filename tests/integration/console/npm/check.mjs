@@ -1,6 +1,6 @@
 // The page as an operator uses it: check.mjs FULCRUM CHROMIUM FOLDER. Leaves screenshots in FOLDER.
 import {join} from 'node:path';
-import {expect, healthy, pictureShown, pidOf, sizes, withConsole} from './console.mjs';
+import {expect, pictureShown, pidOf, running, sizes, withConsole} from './console.mjs';
 
 const [fulcrum, browser, folder] = process.argv.slice(2);
 
@@ -56,7 +56,7 @@ await withConsole(fulcrum, browser, 75, async ({address, newPage, trouble, out})
   await page.keyboard.press('Tab');
   expect(await page.evaluate('document.activeElement.id') === 'start', 'Start is reached with Tab');
   await page.keyboard.press('Enter');
-  await page.waitForFunction(healthy(6), null, {timeout: 60_000});
+  await page.waitForFunction(running(6), null, {timeout: 60_000});
   await page.waitForFunction(pictureShown, null, {timeout: 20_000});
   await page.waitForFunction(() => parseFloat(document.getElementById('temperature').textContent) > 60, null, {timeout: 20_000});
   await look(page, 'running');
@@ -67,7 +67,7 @@ await withConsole(fulcrum, browser, 75, async ({address, newPage, trouble, out})
   await page.waitForFunction(() => document.querySelector('#warning-list .fault')?.textContent.includes('Heat has been silent'));
   await look(page, 'silent');
   await page.click('[data-node=thermal_node] button');
-  await page.waitForFunction(healthy(6), null, {timeout: 20_000});
+  await page.waitForFunction(running(6), null, {timeout: 20_000});
 
   await page.click('#stop');
   await page.click('#stop-yes');
