@@ -14,16 +14,21 @@
 namespace fulcrum::console {
 namespace {
 
-/// `fulcrum up` says at its end why, as "fulcrum: reason" or below its table.
+constexpr std::size_t kLongestReason = 1000;
+
+/// `fulcrum up` says at its end why: below its table, or as "fulcrum: reason" with all that follows.
 std::string Reason(const std::filesystem::path& log) {
   std::ifstream stream(log);
   std::string line, reason;
-  for (; std::getline(stream, line);) {
+  for (bool to_the_end = false; std::getline(stream, line);) {
+    if (to_the_end && !line.empty()) reason += "\n" + line;
     for (const std::string_view begin : {"fulcrum: ", "! ", "NOT WELL: "}) {
-      if (line.starts_with(begin)) reason = line.substr(begin.size());
+      if (to_the_end || !line.starts_with(begin)) continue;
+      reason = line.substr(begin.size());
+      to_the_end = begin == "fulcrum: ";
     }
   }
-  return ValidUtf8(reason);
+  return ValidUtf8(reason.substr(0, kLongestReason));
 }
 
 }  // namespace

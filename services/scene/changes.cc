@@ -11,12 +11,13 @@ namespace {
 
 constexpr std::string_view kPower = "script.power_W";
 
-/// The physics node sets the generator once, to the most that the script asks for.
+/// The physics node sets the generator once, to the most that the script asks for. Each key gets a value of its own:
+/// a shared one would be written as an anchor.
 void SetPower(YAML::Node description, const YAML::Node& value) {
   for (auto entry : description["script"]) {
     if (!entry.second.IsSequence()) continue;
     for (YAML::Node key : entry.second) {
-      if (key["power_W"] && key["power_W"].as<double>(0) > 0) key["power_W"] = value;
+      if (key["power_W"] && key["power_W"].as<double>(0) > 0) key["power_W"] = YAML::Clone(value);
     }
   }
 }

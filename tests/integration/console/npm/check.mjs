@@ -1,6 +1,6 @@
 // The page as an operator uses it: check.mjs FULCRUM CHROMIUM FOLDER. Leaves screenshots in FOLDER.
 import {join} from 'node:path';
-import {expect, pictureShown, pidOf, running, sizes, withConsole} from './console.mjs';
+import {allRun, expect, pictureShown, pidOf, sizes, until, withConsole} from './console.mjs';
 
 const [fulcrum, browser, folder] = process.argv.slice(2);
 
@@ -52,22 +52,22 @@ await withConsole(fulcrum, browser, 75, async ({address, newPage, trouble, out})
   expect(await page.textContent('#power') === '30 W', '5 W less than the scene says');
   await page.locator('#lengths label', {hasText: '1 min'}).click();
   // By keyboard alone from here to the start.
-  await page.focus('#lengths input');
+  await page.focus('#lengths input:checked');
   await page.keyboard.press('Tab');
-  expect(await page.evaluate('document.activeElement.id') === 'start', 'Start is reached with Tab');
+  expect(await page.evaluate(() => document.activeElement.id) === 'start', 'Start is reached with Tab');
   await page.keyboard.press('Enter');
-  await page.waitForFunction(running(6), null, {timeout: 60_000});
-  await page.waitForFunction(pictureShown, null, {timeout: 20_000});
-  await page.waitForFunction(() => parseFloat(document.getElementById('temperature').textContent) > 60, null, {timeout: 20_000});
+  await until(page, 60, allRun, 6);
+  await until(page, 20, pictureShown);
+  await until(page, 20, () => parseFloat(document.getElementById('temperature').textContent) > 60);
   await look(page, 'running');
 
   // A node that hangs is seen, named and restarted.
   process.kill(pidOf('thermal_node', out), 'SIGSTOP');
-  await page.waitForFunction(() => document.querySelector('[data-node=thermal_node] .word').textContent === 'Silent', null, {timeout: 10_000});
-  await page.waitForFunction(() => document.querySelector('#warning-list .fault')?.textContent.includes('Heat has been silent'));
+  await until(page, 10, () => document.querySelector('[data-node=thermal_node] .word').textContent === 'Silent');
+  await until(page, 5, () => document.querySelector('#warning-list').textContent.includes('Heat has been silent'));
   await look(page, 'silent');
   await page.click('[data-node=thermal_node] button');
-  await page.waitForFunction(running(6), null, {timeout: 20_000});
+  await until(page, 20, allRun, 6);
 
   await page.click('#stop');
   await page.click('#stop-yes');

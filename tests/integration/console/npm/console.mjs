@@ -17,6 +17,7 @@ export async function withConsole(fulcrum, browserPath, domain, use) {
   const program = spawn(fulcrum, ['console', '--port', '0', '--domain', String(domain), '--out', join(out, 'out'), '--token-file', join(out, 'token')]);
   let said = '';
   let browser = null;
+  const trouble = [];
   try {
     const address = await new Promise((found, failed) => {
       const hear = bytes => {
@@ -30,7 +31,6 @@ export async function withConsole(fulcrum, browserPath, domain, use) {
       setTimeout(() => failed(new Error(`the console does not listen: ${said}`)), 20_000);
     });
     browser = await chromium.launch({executablePath: browserPath, args: ['--no-sandbox', '--disable-gpu', '--force-color-profile=srgb']});
-    const trouble = [];
     const newPage = async size => {
       const page = await (await browser.newContext({viewport: size})).newPage();
       page.on('pageerror', error => trouble.push(`error in the page: ${error.message}`));
@@ -40,6 +40,11 @@ export async function withConsole(fulcrum, browserPath, domain, use) {
     };
     await use({address, newPage, trouble, pid: program.pid, out: join(out, 'out')});
     expect(trouble.length === 0, `no trouble in the page, but: ${trouble.join('; ')}`);
+  } catch (error) {
+    let log = '';
+    try { log = readFileSync(join(out, 'out', 'console.log'), 'utf8'); } catch { /* no session */ }
+    console.error(`trouble in the page: ${trouble.join('; ') || 'none'}\nfulcrum up said:\n${log.slice(-2000)}`);
+    throw error;
   } finally {
     await browser?.close();
     const gone = new Promise(done => program.once('exit', done));
@@ -61,6 +66,15 @@ export function pidOf(node, out) {
   throw new Error(`${node} does not run`);
 }
 
+/** Waits until `done(argument)` in the page is true. The driver's own way evaluates texts, which the page's policy refuses. */
+export async function until(page, limit_s, done, argument) {
+  for (const end = performance.now() + 1000 * limit_s; performance.now() < end;) {
+    if (await page.evaluate(done, argument)) return;
+    await new Promise(next => setTimeout(next, 100));
+  }
+  throw new Error(`after ${limit_s} s it does not hold: ${done}`);
+}
+
 /** All nodes run; slow ones, on a busy machine, too. */
-export const running = count => `document.querySelectorAll('#nodes .word.level-good, #nodes .word.level-busy').length === ${count}`;
-export const pictureShown = '!!document.getElementById("picture").dataset.shown';
+export const allRun = count => document.querySelectorAll('#nodes .word.level-good, #nodes .word.level-busy').length === count;
+export const pictureShown = () => !!document.getElementById('picture').dataset.shown;

@@ -1,6 +1,6 @@
 // measure.mjs FULCRUM CHROMIUM FOLDER: prints `key value` for tests/benchmark/console.
 import {readFileSync} from 'node:fs';
-import {pictureShown, sizes, withConsole} from './console.mjs';
+import {pictureShown, sizes, until, withConsole} from './console.mjs';
 
 const [fulcrum, browser] = process.argv.slice(2);
 const kLoads = 7, kWatch_s = 10;
@@ -27,7 +27,7 @@ await withConsole(fulcrum, browser, 76, async ({address, newPage, pid}) => {
   await page.locator('#scenes label', {hasText: 'small'}).click();
   await page.locator('#lengths label', {hasText: '5 min'}).click();
   await page.click('#start');
-  await page.waitForFunction(pictureShown, null, {timeout: 60_000});
+  await until(page, 60, pictureShown);
   const begin = cpu_s(pid), from = performance.now();
   await new Promise(done => setTimeout(done, 1000 * kWatch_s));
   console.log(`cpu_pct ${(100 * (cpu_s(pid) - begin) / (1e-3 * (performance.now() - from))).toFixed(2)}`);
