@@ -130,14 +130,14 @@ class Connection : public std::enable_shared_from_this<Connection> {
     }
     const bool keep_alive = parser_->get().keep_alive();
     HttpResponse response = shared_->handler(Plain(parser_->release()));
-    if (!response.stream) return Send(response, keep_alive);
+    if (!response.stream) return Send(std::move(response), keep_alive);
     if (streams_->size() >= shared_->limits.streams) return Refuse(503);
     BeginStream(std::move(response));
   }
 
-  void Send(const HttpResponse& from, bool keep_alive) {
+  void Send(HttpResponse from, bool keep_alive) {
     auto response = std::make_shared<http::response<http::string_body>>(Head<http::string_body>(from, keep_alive));
-    response->body() = from.body;
+    response->body() = std::move(from.body);
     response->prepare_payload();
     stream_.expires_after(shared_->limits.response);
     http::async_write(stream_, *response,

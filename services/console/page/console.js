@@ -177,11 +177,11 @@ function showNodes(nodes) {
     setText(parts.word, node.word);
     parts.word.className = `word level-${node.level}`;
     const ms = v => v < 0.1 ? v.toFixed(2) : v < 10 ? v.toFixed(1) : v.toFixed(0);
-    const more = [`${node.rate.toFixed(0)} Hz`, `step < ${ms(node.p99)} ms`];
-    if (node.input) more.push(`input ${node.age} ms`);
+    const more = [`${node.rate.toFixed(0)} Hz`, `step ${ms(node.p99)} ms`];
+    if (node.input) more.push(`age ${node.age} ms`);
     setText(parts.name, node.label + (node.restarts ? ` ↻${node.restarts}` : ''));
     setText(parts.more, node.pid ? more.join(' · ') : 'not heard yet');
-    parts.row.title = `${node.name}: asked for ${node.asked} Hz; 99 of 100 steps were shorter than told, the median is ${ms(node.p50)} ms; lives on ${node.input || 'nothing'}; ` +
+    parts.row.title = `${node.name}: asked for ${node.asked} Hz; 99 of 100 steps were shorter than told, the median is ${ms(node.p50)} ms; age of the newest ${node.input || 'input'} when it was used; ` +
       `${node.restarts} restarts, ${node.drops} samples lost or refused, ${node.overruns} periods skipped, pid ${node.pid}`;
     parts.button.disabled = state.phase !== 'running';
   }

@@ -1,5 +1,5 @@
-// The operator's page in headless Chromium: until something is painted, and what the console itself costs while a page
-// watches a session. tests/integration/console/npm/measure.mjs does both; without a browser there are no lines.
+// The operator's page in headless Chromium: until something is painted, what the console itself costs while a page
+// watches a session, and how old the picture on it is. tests/integration/console/npm/measure.mjs does both; without a browser there are no lines.
 #include <cstdio>
 #include <sstream>
 #include <string>
@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
     std::string key;
     double value = 0;
     if (words >> key >> value) {
-      report.Add("console." + key, value, key.ends_with("_ms") ? "ms" : "%");
+      report.Add("console." + key, value, key.ends_with("_ms") ? "ms" : key.ends_with("_s") ? "s" : "%");
     } else {
       std::fprintf(stderr, "%s", line);
     }

@@ -3,7 +3,7 @@ import {readFileSync} from 'node:fs';
 import {pictureShown, sizes, until, withConsole} from './console.mjs';
 
 const [fulcrum, browser] = process.argv.slice(2);
-const kLoads = 7, kWatch_s = 10;
+const kLoads = 7, kWatch_s = 20;
 const median = values => values.sort((a, b) => a - b)[values.length >> 1];
 const cpu_s = pid => {
   const stat = readFileSync(`/proc/${pid}/stat`, 'utf8');
@@ -29,8 +29,13 @@ await withConsole(fulcrum, browser, 76, async ({address, newPage, pid}) => {
   await page.click('#start');
   await until(page, 60, pictureShown);
   const begin = cpu_s(pid), from = performance.now();
-  await new Promise(done => setTimeout(done, 1000 * kWatch_s));
+  const lags = [];
+  for (const end = from + 1000 * kWatch_s; performance.now() < end;) {
+    await new Promise(done => setTimeout(done, 250));
+    lags.push(await page.evaluate(() => parseFloat(state.time) - 1e-3 * document.getElementById('picture').dataset.shown.match(/(\d+).png/)[1]));
+  }
   console.log(`cpu_pct ${(100 * (cpu_s(pid) - begin) / (1e-3 * (performance.now() - from))).toFixed(2)}`);
+  console.log(`picture_age_s ${median(lags).toFixed(2)}`);
   await page.click('#stop');
   await page.click('#stop-yes');
   await page.waitForSelector('#report:visible', {timeout: 30_000});
