@@ -18,7 +18,7 @@
 #include "services/bus/gate.h"
 #include "services/bus/topics.h"
 #include "services/core/message_fields.h"
-#include "services/recording/mcap_reader.h"
+#include "services/recording/time_order.h"
 #include "services/runtime/cyclic_thread.h"
 
 namespace fulcrum::replay {
@@ -123,7 +123,8 @@ std::int64_t ClockOffset(const recording::McapReader& reader) {
 }  // namespace
 
 LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>& stop) {
-  recording::McapReader reader(settings.recording);
+  recording::TimeOrder messages(settings.recording);
+  const recording::McapReader& reader = messages.reader();
   const std::filesystem::path memory = bus::SharedMemoryDirectory(settings.domain);
   bus::DdsParticipant participant({.domain = settings.domain, .node_name = "replayer", .shared_memory = memory});
   std::map<TopicId, std::unique_ptr<Channel>> channels;
@@ -140,7 +141,7 @@ LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>&
   std::optional<std::int64_t> first_ns;
   std::int64_t moved_ns = 0;  // From the recording's clock to now's.
   const std::int64_t begin_ns = runtime::MonotonicNs();
-  while (!stop() && reader.Next(&message)) {
+  while (!stop() && messages.Next(&message)) {
     const std::int64_t then_ns = static_cast<std::int64_t>(message.log_time_ns) - ClockOffset(reader);
     if (!first_ns) {
       first_ns = then_ns + static_cast<std::int64_t>(1e9 * settings.from_s);

@@ -19,6 +19,11 @@ TickSource::TickSource(const std::filesystem::path& file, const std::vector<Node
                        const std::array<double, kNodeCount>& period_s)
     : reader_(file), period_s_(period_s) {
   for (const NodeId node : nodes) wanted_[static_cast<std::size_t>(node)] = true;
+  // No node that is replayed reads frames or patches: they are most of a recording, and in chunks of their own.
+  reader_.PassOver([](const recording::McapChannel& channel) {
+    const bus::TopicRole* role = bus::RoleNamed(channel.topic);
+    return role != nullptr && role->path != bus::Path::kSharedMemory;
+  });
 }
 
 bool TickSource::Next(RecordedTick* tick) {
