@@ -69,6 +69,7 @@ std::vector<RecordingChoice> FindRecordings(const fs::path& out, std::size_t mos
   std::sort(found.begin(), found.end(), [](const Found& a, const Found& b) { return a.time > b.time; });
   found.resize(std::min(found.size(), most));
   std::vector<RecordingChoice> choices;
+  choices.reserve(found.size());
   for (Found& one : found) choices.push_back(std::move(one.choice));
   return choices;
 }

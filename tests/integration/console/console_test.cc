@@ -141,7 +141,7 @@ TEST_F(ConsoleTest, ASessionFromStartToReport) {
               "\r\nAuthorization: Bearer " + console.token() + "\r\n\r\n");
   EXPECT_EQ(events.Reply().head.at("content-type"), "text/event-stream");
 
-  EXPECT_EQ(console.Post("/api/start", "scene=small&power=30&picture_rate=5&seconds=60&record=off").status, 200);
+  EXPECT_EQ(console.Post("/api/start", "scene=small&power=30&picture_rate=5&seconds=60&record=on").status, 200);
   EXPECT_EQ(console.Post("/api/start", "scene=small").status, 409);
   ASSERT_TRUE(WaitFor(60, [&] { return Says(console, {"\"phase\":\"running\""}); }))
       << ReadFile(out() + "/console.log");
@@ -188,7 +188,15 @@ TEST_F(ConsoleTest, ASessionFromStartToReport) {
   EXPECT_EQ(first.status, 200);
   EXPECT_NE(first.head.at("content-security-policy").find("sandbox"), std::string::npos);
   EXPECT_EQ(console.Ask("GET", report, host).status, 401) << "a ticket is good once";
-  EXPECT_NE(console.Get("/api/recordings").body.find("dump"), std::string::npos) << console.Get("/api/recordings").body;
+
+  const std::string recordings = console.Get("/api/recordings").body;
+  EXPECT_NE(recordings.find("/dump.mcap"), std::string::npos) << recordings;
+  const std::string session = Between(recordings, "\"name\":\"", "/");
+  EXPECT_EQ(console.Post("/api/replay", "name=" + session + "%2Fnothing.mcap").status, 404);
+  EXPECT_EQ(console.Post("/api/replay", "name=" + session + "%2Frecording.mcap").status, 200);
+  EXPECT_TRUE(WaitFor(60, [&] {
+    return Says(console, {"all the same", "\"running\":false", "\"ok\":true"});
+  })) << console.Get("/api/state").body;
 }
 
 TEST_F(ConsoleTest, ASessionOutlivesItsConsoleAndIsFoundAgain) {
