@@ -248,7 +248,8 @@ async function showPicture() {
 let choices = null, power = 0;
 async function loadChoices() {
   const answer = await call('/api/choices').then(r => r.ok ? r.json() : null).catch(() => null);
-  if (!answer) return;
+  // What was chosen before a session stays chosen after it.
+  if (!answer || JSON.stringify(answer) === JSON.stringify(choices)) return;
   const chosen = choices ? $('start-form').scene.value : 'built-in';
   choices = answer;
   setText($('cart-name'), choices.simulated ? 'Simulated' : choices.cart);

@@ -73,6 +73,7 @@ await withConsole(fulcrum, browser, 75, async ({address, newPage, trouble, out})
   await page.click('#stop-yes');
   await page.waitForSelector('#report:visible', {timeout: 30_000});
   await page.waitForSelector('#result-figures dd');
+  expect(await page.textContent('#power') === '30 W', 'the power chosen before stays chosen');
   await look(page, 'ended');
   await page.click('#report');
   await page.frameLocator('#report-frame').locator('h1, h2').first().waitFor({timeout: 20_000});
