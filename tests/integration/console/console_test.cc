@@ -25,7 +25,7 @@ using fulcrum::testing::HttpReply;
 using fulcrum::testing::ReadFile;
 using fulcrum::testing::WaitFor;
 
-constexpr int kDomain = 74;
+constexpr int kDomain = 64;
 
 class ConsoleTest : public ::testing::Test {
  protected:

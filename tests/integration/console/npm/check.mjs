@@ -30,7 +30,7 @@ async function look(page, name) {
   }
 }
 
-await withConsole(fulcrum, browser, 75, async ({address, newPage, trouble, out}) => {
+await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out}) => {
   // A stranger's page shows no session.
   const stranger = await newPage(sizes[0]);
   await stranger.goto(address.replace(/#.*/, '#wrong'));

@@ -35,6 +35,9 @@ export async function withConsole(fulcrum, browserPath, domain, use) {
       const page = await (await browser.newContext({viewport: size})).newPage();
       page.on('pageerror', error => trouble.push(`error in the page: ${error.message}`));
       page.on('console', message => { if (message.type() === 'error') trouble.push(`console: ${message.text()}`); });
+      page.on('response', async response => {
+        if (response.status() >= 400) trouble.push(`${response.url()}: ${response.status()} ${await response.text().catch(() => '')}`);
+      });
       page.on('request', request => { if (!request.url().startsWith(new URL(address).origin)) trouble.push(`asks elsewhere: ${request.url()}`); });
       return page;
     };

@@ -11,7 +11,7 @@ const cpu_s = pid => {
   return (Number(fields[11]) + Number(fields[12])) / 100;  // User and system, in ticks of 10 ms.
 };
 
-await withConsole(fulcrum, browser, 76, async ({address, newPage, pid}) => {
+await withConsole(fulcrum, browser, 66, async ({address, newPage, pid}) => {
   const paints = [];
   for (let i = 0; i < kLoads; ++i) {
     const page = await newPage(sizes[0]);
