@@ -132,7 +132,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     HttpResponse response = shared_->handler(Plain(parser_->release()));
     if (!response.stream) return Send(std::move(response), keep_alive);
     if (streams_->size() >= shared_->limits.streams) return Refuse(503);
-    BeginStream(std::move(response));
+    BeginStream(response);
   }
 
   void Send(HttpResponse from, bool keep_alive) {
@@ -147,7 +147,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
                       });
   }
 
-  void BeginStream(HttpResponse from) {
+  void BeginStream(const HttpResponse& from) {
     auto response = std::make_shared<http::response<http::empty_body>>(Head<http::empty_body>(from, true));
     response->chunked(true);
     auto serializer = std::make_shared<http::response_serializer<http::empty_body>>(*response);
