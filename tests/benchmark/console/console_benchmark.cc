@@ -1,5 +1,6 @@
 // The operator's page in headless Chromium: until something is painted, what the console itself costs while a page
-// watches a session, and how old the picture on it is. tests/integration/console/npm/measure.mjs does both; without a browser there are no lines.
+// watches a session, and how old the picture on it is. tests/integration/console/npm/measure.mjs does both; without a
+// browser there are no lines.
 #include <cstdio>
 #include <sstream>
 #include <string>
