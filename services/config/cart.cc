@@ -277,6 +277,12 @@ CartConfig LoadCartText(const std::string& text, const std::string& name) {
   return ReadAndValidate(&yaml, name);
 }
 
+std::vector<KeyRule> CartRules(const std::filesystem::path& file) {
+  StrictYaml yaml = StrictYaml::FromFile(file);
+  (void)ReadAndValidate(&yaml, file.string());
+  return yaml.Rules();
+}
+
 std::string CartToYaml(const CartConfig& cart) {
   StrictYaml empty = StrictYaml::FromText("{}", "cart");
   ReadCart(&empty, cart);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "services/config/strict_yaml.h"
 #include "services/core/messages.h"
 
 namespace fulcrum::config {
@@ -120,6 +121,9 @@ void Validate(const CartConfig& cart);
 [[nodiscard]] CartConfig LoadCart(const std::filesystem::path& file);
 /// The same for text in memory; `name` stands for the file in messages.
 [[nodiscard]] CartConfig LoadCartText(const std::string& text, const std::string& name);
+
+/// Every key that a cart file may have; comments are in the lines of `file`.
+[[nodiscard]] std::vector<KeyRule> CartRules(const std::filesystem::path& file);
 
 /// The whole configuration, defaults included, as a cart file that loads to the same.
 [[nodiscard]] std::string CartToYaml(const CartConfig& cart);

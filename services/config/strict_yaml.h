@@ -132,6 +132,8 @@ class StrictMap {
 
   internal::Node* Use(std::string_view key);
   internal::Node* Require(std::string_view key, std::string_view what);
+  /// Of the key that was asked for last.
+  void Rule(std::string valid, std::optional<std::string> standard);
   double ReadNumber(std::string_view key, const double* default_value, const Range& range);
   std::optional<std::vector<double>> ReadNumbers(std::string_view key, std::size_t min_count, std::size_t max_count,
                                                  const Range& range);
@@ -143,6 +145,14 @@ class StrictMap {
 
   internal::Document* document_;
   internal::Node* node_;
+};
+
+/// A key that was asked for, and what it may be.
+struct KeyRule {
+  std::string path;                     ///< "handles.tool0.simulated.noise_mV"; of a list's maps "structures[].kind".
+  int line = 0;                         ///< Where the file has it; 0: it does not.
+  std::optional<std::string> standard;  ///< Its default; none: it must be given, or is a map.
+  std::string valid;                    ///< In words; empty for maps.
 };
 
 /// One configuration file.
@@ -161,6 +171,8 @@ class StrictYaml {
   void Finish() const;
   /// What was read, defaults included, as YAML in the order of reading. Reads back to the same.
   [[nodiscard]] std::string Effective() const;
+  /// Every key that was asked for, in the order of asking; of the maps of a list the first stands for all.
+  [[nodiscard]] std::vector<KeyRule> Rules() const;
 
  private:
   explicit StrictYaml(std::unique_ptr<internal::Document> document);

@@ -300,7 +300,7 @@ SceneDescription Read(StrictYaml* yaml, const std::filesystem::path& base, const
   ReadScript(root.MapOrDefaults("script"), &scene);
   scene.node_mask = ReadNodes(&root, scene.node_mask);
   yaml->Finish();
-  return {scene, yaml->Effective()};
+  return {scene, yaml->Effective(), yaml->Rules()};
 }
 
 }  // namespace

@@ -6,13 +6,15 @@
 #include <string_view>
 #include <vector>
 
+#include "services/config/strict_yaml.h"
 #include "services/scene/scene_settings.h"
 
 namespace fulcrum::scene {
 
 struct SceneDescription {
   SceneSettings settings;
-  std::string effective_yaml;  ///< What was read, defaults included. Reads back to the same settings.
+  std::string effective_yaml;          ///< What was read, defaults included. Reads back to the same settings.
+  std::vector<config::KeyRule> rules;  ///< Every key that was asked for.
 };
 
 /// Reads and checks a scene description. Mesh files are looked up in `data` (when not empty), then in the folders that

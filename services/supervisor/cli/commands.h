@@ -24,6 +24,7 @@ ExitCode Dump(const Words& words);
 ExitCode Log(const Words& words);
 ExitCode Doctor(const Words& words);
 ExitCode Console(const Words& words);
+ExitCode Reference(const Words& words);
 
 struct CommandEntry {
   const char* name;

@@ -11,7 +11,7 @@
 namespace fulcrum::supervisor::cli {
 
 std::span<const CommandEntry> Commands() {
-  static constexpr std::array<CommandEntry, 10> kCommands{{
+  static constexpr std::array<CommandEntry, 11> kCommands{{
       {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
       {"console", "console [options]",
        "Serve the page of the cart's touch screen: start, watch, stop, calibrate, replay.", Console},
@@ -26,6 +26,8 @@ std::span<const CommandEntry> Commands() {
       {"log", "log TOOL FILE...", "Read recordings: info, list, cat, export, verify, diff, recover.", Log},
       {"doctor", "doctor [--domain N] [--out DIR]", "Check what this machine permits, and say how to permit more.",
        Doctor},
+      {"reference", "reference cart|scene FILE...", "Print every key of cart or scene files, with what is valid.",
+       Reference},
   }};
   return kCommands;
 }
