@@ -1,7 +1,10 @@
 #include "services/scene/scene_yaml.h"
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 
+#include "services/scene/changes.h"
 #include "services/scene/yaml_parameters.h"
 
 namespace fulcrum::scene {
@@ -302,8 +305,14 @@ SceneDescription Read(StrictYaml* yaml, const std::filesystem::path& base, const
 
 }  // namespace
 
-SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data) {
+SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
+                               const std::vector<std::string>& changes) {
   StrictYaml yaml = StrictYaml::FromFile(file);
+  if (!changes.empty()) {
+    std::ifstream stream(file, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(stream), {}};
+    yaml = StrictYaml::FromText(ApplyChanges(text, changes, kCompileSections), file.string() + " with --set applied");
+  }
   return Read(&yaml, file.parent_path(), data);
 }
 

@@ -18,8 +18,9 @@ struct SceneDescription {
 };
 
 /// Reads and checks a scene description. Mesh files are looked up in `data` (when not empty), then in the folders that
-/// the description names. Throws InputError "file:line: key: reason; valid: range".
-SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data);
+/// the description names. `changes`: see ApplyChanges. Throws InputError "file:line: key: reason; valid: range".
+SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
+                               const std::vector<std::string>& changes = {});
 
 /// The same for a text; `name` stands for the file in messages, relative folders start from the working directory.
 SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data);

@@ -26,6 +26,7 @@ ExitCode Log(const Words& words);
 ExitCode TestNode(const Words& words);
 ExitCode Keys(const Words& words);
 ExitCode Doctor(const Words& words);
+ExitCode Console(const Words& words);
 ExitCode Reference(const Words& words);
 
 struct CommandEntry {

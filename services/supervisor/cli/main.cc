@@ -13,6 +13,8 @@ namespace fulcrum::supervisor::cli {
 std::span<const CommandEntry> Commands() {
   static constexpr auto kCommands = std::to_array<CommandEntry>({
       {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
+      {"console", "console [options]",
+       "Serve the page of the cart's touch screen: start, watch, stop, calibrate, replay.", Console},
       {"host", "host --peer ADDR [options]", "Run nodes of a cart that is on another machine, one session.", Host},
       {"status", "status [--domain N]", "Print the nodes of the running session once.", Status},
       {"top", "top [--domain N]", "Show the nodes of the running session, refreshed until Ctrl-C.", Top},

@@ -4,8 +4,8 @@
 
 #include "services/core/error.h"
 #include "services/supervisor/cli/commands.h"
-#include "services/supervisor/cli/session_view.h"
 #include "services/supervisor/domain_guard.h"
+#include "services/supervisor/session_view.h"
 
 namespace fulcrum::supervisor::cli {
 

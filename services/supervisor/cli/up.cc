@@ -37,6 +37,9 @@ ExitCode Up(const Words& words) {
        "of the picture: auto, low, high")                                                                             //
       ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration (default: everything simulated)")    //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")            //
+      ("set", po::value<Words>()->value_name("SECTION.KEY=VALUE")->composing(),
+       "a parameter of physics, thermal, haptics, breathing or render other than the scene has it, or script.power_W, "
+       "the generator's setting; as often as needed")  //
       ("record", "record all topics into recording.mcap of the session folder")(
           "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
           "keep-last", po::value<double>()->value_name("SECONDS"),
@@ -111,6 +114,9 @@ ExitCode Up(const Words& words) {
   request.name = values["scene"].as<std::string>();
   if (values.count("data") != 0) {
     request.data = fs::absolute(values["data"].as<std::string>());
+  }
+  if (values.count("set") != 0) {
+    request.changes = values["set"].as<Words>();
   }
   request.library = FULCRUM_SCENE_DIR;
   request.compiler = settings.programs / "scene_compiler";

@@ -1,4 +1,4 @@
-#include "services/supervisor/cli/session_view.h"
+#include "services/supervisor/session_view.h"
 
 #include <cstdio>
 
@@ -6,19 +6,8 @@
 #include "services/runtime/cyclic_thread.h"
 #include "services/supervisor/outcome.h"
 
-namespace fulcrum::supervisor::cli {
+namespace fulcrum::supervisor {
 namespace {
-
-constexpr std::int64_t kStale = 1'000'000'000;
-
-double MetricOf(const Health& health, std::string_view name) {
-  for (const Metric& metric : health.metrics) {
-    if (metric.name == name) {
-      return metric.value;
-    }
-  }
-  return 0;
-}
 
 std::string Ms(float us) { return Fixed(1e-3 * static_cast<double>(us), 2); }
 
@@ -51,6 +40,23 @@ std::string LinkFigures(const Health& supervisor) {
 
 }  // namespace
 
+double MetricOf(const Health& health, std::string_view name, double missing) {
+  for (const Metric& metric : health.metrics) {
+    if (metric.name == name) {
+      return metric.value;
+    }
+  }
+  return missing;
+}
+
+std::uint64_t DropsOf(const Health& health) {
+  std::uint64_t drops = health.write_failures;
+  for (const InputHealth& input : health.inputs) {
+    drops += input.lost + input.rejected;
+  }
+  return drops;
+}
+
 SessionView::SessionView(int domain)
     : participant_(bus::ToolSettings(domain)),
       healths_(participant_.MakeInput<Health>()),
@@ -63,7 +69,7 @@ void SessionView::Update() {
     // Of a pair of processes the one that leads is shown.
     const bool follows = health.state == HealthState::kWaiting && newest.pid != health.pid &&
                          newest.state == HealthState::kRunning &&
-                         health.stamp.stamp_ns - newest.stamp.stamp_ns < kStale;
+                         health.stamp.stamp_ns - newest.stamp.stamp_ns < kSilence_ns;
     if (health.stamp.stamp_ns >= newest.stamp.stamp_ns && !follows) {
       newest = health;
     }
@@ -94,11 +100,8 @@ std::string SessionView::Text() const {
     if (health.pid == 0 || health.node == NodeId::kSupervisor) {
       continue;
     }
-    std::uint64_t drops = health.write_failures;
-    for (const InputHealth& input : health.inputs) {
-      drops += input.lost + input.rejected;
-    }
-    const bool stale = now - health.stamp.stamp_ns > kStale;
+    const std::uint64_t drops = DropsOf(health);
+    const bool stale = now - health.stamp.stamp_ns > kSilence_ns;
     const std::string rate = Fixed(static_cast<double>(health.rate_achieved_Hz), 1) + " / " +
                              Fixed(static_cast<double>(health.rate_asked_Hz), 0);
     const std::string step = Ms(health.step.p50_us) + "/" + Ms(health.step.p99_us) + "/" + Ms(health.step.max_us);
@@ -124,4 +127,4 @@ std::string SessionView::Text() const {
   return text + figures + "\n";
 }
 
-}  // namespace fulcrum::supervisor::cli
+}  // namespace fulcrum::supervisor
