@@ -28,7 +28,7 @@ struct AccessRole {
 };
 
 /// Participants that are no node.
-inline constexpr std::string_view kToolIdentity = "fulcrum";       ///< status, top, restart, swap, dump, down.
+inline constexpr std::string_view kToolIdentity = "fulcrum";       ///< status, top, restart, swap, dump, down, console.
 inline constexpr std::string_view kReplayerIdentity = "replayer";  ///< Stands in for nodes: replayer --live.
 
 namespace access {
@@ -52,7 +52,7 @@ inline constexpr std::array kRoles{
                                   kThermalEvent, kCauteryContact)},
     AccessRole{"recorder", kNodeWrites, kAll},
     AccessRole{kReplayerIdentity, kAll & ~SetOf(kCommand, kCommandReply), 0},
-    AccessRole{kToolIdentity, SetOf(kCommand), SetOf(kSceneManifest, kCommandReply, kHealth)},
+    AccessRole{kToolIdentity, SetOf(kCommand), SetOf(kSceneManifest, kCommandReply, kThermalEvent, kHealth)},
 };
 }  // namespace access
 
