@@ -1,52 +1,13 @@
 #include "services/supervisor/outcome.h"
 
 #include <array>
-#include <cmath>
 #include <cstdio>
+
+#include "services/supervisor/flat_json.h"
+#include "services/supervisor/score_sheet.h"
 
 namespace fulcrum::supervisor {
 namespace {
-
-std::string Quote(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') {
-      quoted += '\\';
-      quoted += c;
-    } else if (byte < 0x20) {
-      std::array<char, 8> escaped{};
-      std::snprintf(escaped.data(), escaped.size(), "\\u%04x", byte);
-      quoted += escaped.data();
-    } else {
-      quoted += c;
-    }
-  }
-  quoted += '"';
-  return quoted;
-}
-
-class FlatJson {
- public:
-  void Add(const std::string& key, const std::string& value) { AddRaw(key, Quote(value)); }
-  void Add(const std::string& key, const char* value) { AddRaw(key, Quote(value)); }
-  void Add(const std::string& key, bool value) { AddRaw(key, value ? "true" : "false"); }
-  void Add(const std::string& key, double value) {
-    std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), "%.9g", value);
-    AddRaw(key, std::isfinite(value) ? text.data() : "null");
-  }
-  [[nodiscard]] std::string text() const { return "{" + body_ + "\n}\n"; }
-
- private:
-  void AddRaw(const std::string& key, const std::string& value) {
-    body_ += body_.empty() ? "\n  " : ",\n  ";
-    body_ += Quote(key);
-    body_ += ": ";
-    body_ += value;
-  }
-  std::string body_;
-};
 
 double Ms(float us) { return 1e-3 * static_cast<double>(us); }
 
@@ -117,6 +78,9 @@ std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& reco
   if (!outcome.recording.empty()) {
     json.Add("recording", outcome.recording.string());
     json.Add("samples_not_recorded", static_cast<double>(record.node(NodeId::kRecorder).drops));
+  }
+  if (outcome.sheet) {
+    json.Add("score_pct", outcome.sheet->score.percent());
   }
   json.Add("restarts", static_cast<double>(record.restarts().size()));
   for (const auto& [kind, count] : record.event_counts()) {
@@ -189,6 +153,9 @@ std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& recor
   }
   if (!outcome.recording.empty()) {
     text += "recording: " + outcome.recording.string() + ", " + RecordingLosses(record) + "\n";
+  }
+  if (outcome.sheet) {
+    text += "\n" + SheetTable(*outcome.sheet);
   }
   text += std::string("\n") + Fixed(outcome.duration_s, 1) + " s of \"" + outcome.scene_name + "\": ";
   text += outcome.verdict.empty() ? "all well\n" : "NOT WELL: " + outcome.verdict + "\n";

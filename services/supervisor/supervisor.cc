@@ -27,9 +27,12 @@
 #include "services/supervisor/outcome.h"
 #include "services/supervisor/progress.h"
 #include "services/supervisor/report.h"
+#include "services/supervisor/score_sheet.h"
 #include "services/supervisor/script_outlook.h"
+#include "services/supervisor/session_assessment.h"
 #include "services/supervisor/session_folder.h"
 #include "services/supervisor/session_record.h"
+#include "services/supervisor/training_log.h"
 
 namespace fulcrum::supervisor {
 namespace {
@@ -88,6 +91,18 @@ std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFol
                                                                      : wanted);
 }
 
+/// Before anything is started: a session that cannot be remembered is better not begun.
+std::optional<TrainingLog> OpenTrainingLog(const UpSettings& settings, const SceneView& scene) {
+  if (settings.trainee.empty()) {
+    return std::nullopt;
+  }
+  if (scene.assessment.on == 0) {
+    throw InputError(std::string("--trainee: scene \"") + scene.name +
+                     "\" has no section `assessment`, so there is nothing to remember; take one that has");
+  }
+  return std::optional<TrainingLog>(std::in_place, settings.training_database);
+}
+
 }  // namespace
 
 struct Supervisor::Impl {
@@ -96,6 +111,7 @@ struct Supervisor::Impl {
         scene(up.scene),
         end_s(EndOfSession(up, scene.view())),
         guard(up.cart.domain),
+        training(OpenTrainingLog(up, scene.view())),
         folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
         recording(RecordingFile(up, folder)),
         memory(bus::SharedMemoryDirectory(up.cart.domain)),
@@ -110,6 +126,9 @@ struct Supervisor::Impl {
     commands = participant->MakeInput<Command>();
     orders = participant->MakeOutput<Command>();
     replies = participant->MakeOutput<CommandReply>();
+    if (scene.view().assessment.on != 0) {
+      assessed.emplace(scene.view(), &*participant);
+    }
     for (const NodeId id : node_ids) {
       if (id == NodeId::kPhysics && up.standby) {
         nodes.emplace_back(CommandInPair("a", false));
@@ -154,6 +173,9 @@ struct Supervisor::Impl {
   }
 
   [[nodiscard]] double SessionTime(std::int64_t now) const {
+    if (ended) {
+      return reached_s;
+    }
     return start_ns == 0 ? -1.0 : 1e-9 * static_cast<double>(now - start_ns);
   }
   [[nodiscard]] double ReachedTime() const { return std::max(0.0, SessionTime(MonotonicNs())); }
@@ -243,7 +265,9 @@ struct Supervisor::Impl {
     ThermalEvent event;
     while (events->TakeNext(&event)) {
       record.AddEvent(event);
+      if (assessed) assessed->Add(event);
     }
+    if (assessed) assessed->Take();
     if (const std::string mismatch = participant->schema_mismatch(); !mismatch.empty()) {
       Fail(ExitCode::kMismatch, mismatch);
       ending = true;
@@ -348,6 +372,9 @@ struct Supervisor::Impl {
     for (const NodeId id : node_ids) {
       own.metrics.push_back({std::string("restarts_") + NodeName(id), static_cast<double>(record.node(id).restarts)});
     }
+    if (assessed && start_ns != 0) {
+      assessed->AddTo(SessionTime(now), &own);
+    }
     own.last_error = failed_why;
     app::FitToMessage(&own);
     healths_out->Write(own);
@@ -370,6 +397,7 @@ struct Supervisor::Impl {
       line += " · force " + Fixed(std::max(last("force0_N"), last("force1_N")), 2) + " N · displaced " +
               Fixed(last("displacement_mm"), 1) + " mm · " + Fixed(last("temperature_C"), 0) + " °C · cut " +
               Fixed(last("cut_length_mm"), 1) + " mm";
+      line += assessed ? assessed->Line(SessionTime(now)) : "";
     }
     progress.Show(now, line + " · " + std::to_string(alive) + "/" + std::to_string(nodes.size()) + " nodes");
   }
@@ -409,6 +437,7 @@ struct Supervisor::Impl {
     manifest.session_id = folder.session_id;
     manifest.scene_hash = scene.view().hash;
     manifest.session_start_ns = start_ns;
+    if (assessed) assessed->Begin(start_ns);
     if (!manifests->Write(manifest)) {
       Fail(ExitCode::kFailure, "the session could not be announced on the bus");
       ending = true;
@@ -419,6 +448,7 @@ struct Supervisor::Impl {
     TakeReports(MonotonicNs());
     reached_s = ReachedTime();
     ended = true;
+    if (assessed) assessed->End(reached_s);
     const auto recorder = std::find_if(nodes.begin(), nodes.end(),
                                        [](const NodeProcess& node) { return node.id() == NodeId::kRecorder; });
     End({nodes.begin(), recorder});
@@ -471,12 +501,25 @@ struct Supervisor::Impl {
     healths_in.reset();
     healths_out.reset();
     manifests.reset();
+    if (assessed) assessed->Close();
     participant.reset();
     bus::RemoveSharedMemory(memory);
     // Checkpoints are for restarts within the session, and large.
     for (const auto& entry : std::filesystem::directory_iterator(folder.path)) {
       std::error_code ignored;
       if (entry.path().extension() == ".checkpoint") std::filesystem::remove(entry.path(), ignored);
+    }
+  }
+
+  /// A row in the trainees' database. What cannot be written there is still in assessment.json.
+  void Remember(SessionOutcome* outcome) {
+    if (!training) return;
+    try {
+      training->Add(TrainingRowOf(*outcome));
+    } catch (const InputError& error) {
+      Fail(ExitCode::kFailure, error.what());
+      outcome->exit_code = exit_code;
+      outcome->verdict = verdict;
     }
   }
 
@@ -493,6 +536,15 @@ struct Supervisor::Impl {
     outcome.exit_code = exit_code;
     outcome.verdict = verdict;
     outcome.recording = recording;
+    outcome.trainee = settings.trainee;
+    if (assessed) {
+      assessed->assessor().Finish();
+      const assessment::Figures figures = assessed->assessor().figures();
+      outcome.sheet = ScoreSheet{figures, assessment::Evaluate(scene.view().assessment, figures)};
+      WriteFile(folder.path / "assessment.json", SheetJson(*outcome.sheet, {outcome.scene_name, outcome.session_id,
+                                                                            outcome.trainee, outcome.started_utc}));
+      Remember(&outcome);
+    }
     WriteFile(folder.path / "summary.json", SummaryJson(outcome, record));
     const std::filesystem::path clip = folder.path / "clip.mp4";
     (void)MakeClip(folder.frames, clip, folder.logs / "clip.log");
@@ -504,6 +556,7 @@ struct Supervisor::Impl {
   scene::SceneFile scene;
   const double end_s;  ///< 0: until stopped.
   DomainGuard guard;
+  std::optional<TrainingLog> training;  ///< Of the trainee, if one was named.
   SessionFolder folder;
   const std::filesystem::path recording;  ///< The recorder's first file; empty: none.
   const std::filesystem::path memory;
@@ -518,6 +571,8 @@ struct Supervisor::Impl {
   std::unique_ptr<bus::Output<CommandReply>> replies;
   std::unique_ptr<bus::Output<Command>> orders;  ///< To nodes.
   bus::Stamper health_stamper{MonotonicNs()}, reply_stamper{MonotonicNs()}, order_stamper{MonotonicNs()};
+
+  std::optional<SessionAssessment> assessed;
 
   std::vector<NodeProcess> nodes;
   SessionRecord record;

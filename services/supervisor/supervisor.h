@@ -24,8 +24,10 @@ struct UpSettings {
   /// The recorder keeps so much of the newest past in memory [s] and writes it into a file of its own when a node dies
   /// or a dump is asked for. 0: it does not.
   double keep_s = 0;
-  bool standby = false;     ///< A second physics_node follows the first and takes over when that falls silent.
-  bool keep_going = false;  ///< A node that failed for good does not end the session.
+  bool standby = false;  ///< A second physics_node follows the first and takes over when that falls silent.
+  std::string trainee;   ///< The session's score is remembered under this name; empty: it is not.
+  std::filesystem::path training_database;  ///< Where; services/supervisor/training_log.h.
+  bool keep_going = false;                  ///< A node that failed for good does not end the session.
 };
 
 class Supervisor {

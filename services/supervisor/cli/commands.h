@@ -23,6 +23,8 @@ ExitCode Down(const Words& words);
 ExitCode Dump(const Words& words);
 ExitCode Log(const Words& words);
 ExitCode Doctor(const Words& words);
+ExitCode Assess(const Words& words);
+ExitCode Trainee(const Words& words);
 
 struct CommandEntry {
   const char* name;
@@ -50,6 +52,13 @@ inline constexpr int kDefaultDomain = 7;
 
 /// Folder of this program: the nodes and the compiler lie beside it.
 [[nodiscard]] std::filesystem::path ProgramFolder();
+
+/// The user's folder for what a program keeps, as the XDG base directories have it: `variable`, or `fallback` in the
+/// home folder, and "fulcrum" in that.
+[[nodiscard]] std::filesystem::path UserFolder(const char* variable, const char* fallback);
+/// --database, and where it is without.
+void AddDatabase(boost::program_options::options_description* options);
+[[nodiscard]] std::filesystem::path DatabaseOf(const Arguments& arguments);
 
 /// Sends a command to the supervisor of the domain and prints its answer. Throws InputError when none runs there.
 ExitCode Ask(int domain, const std::string& verb, const std::string& argument);

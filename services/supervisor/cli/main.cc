@@ -11,7 +11,7 @@
 namespace fulcrum::supervisor::cli {
 
 std::span<const CommandEntry> Commands() {
-  static constexpr std::array<CommandEntry, 9> kCommands{{
+  static constexpr std::array<CommandEntry, 11> kCommands{{
       {"up", "up SCENE [options]", "Run a session: compile the scene if need be, start its nodes, watch, report.", Up},
       {"status", "status [--domain N]", "Print the nodes of the running session once.", Status},
       {"top", "top [--domain N]", "Show the nodes of the running session, refreshed until Ctrl-C.", Top},
@@ -22,6 +22,10 @@ std::span<const CommandEntry> Commands() {
       {"dump", "dump [--domain N]",
        "Write the newest seconds of the running session into a file (fulcrum up --keep-last).", Dump},
       {"log", "log TOOL FILE...", "Read recordings: info, list, cat, export, verify, diff, recover.", Log},
+      {"assess", "assess RECORDING [--scene FILE] [--json FILE]",
+       "Score a recorded session, as it was scored while it lasted.", Assess},
+      {"trainee", "trainee [NAME] [--scene NAME] [--svg FILE] [--database FILE]",
+       "A trainee's sessions (fulcrum up --trainee) as a table and plots; without a name: who there is.", Trainee},
       {"doctor", "doctor [--domain N] [--out DIR]", "Check what this machine permits, and say how to permit more.",
        Doctor},
   }};

@@ -1,0 +1,37 @@
+#include "services/assessment/damage_map.h"
+
+namespace fulcrum::assessment {
+namespace {
+
+/// Of the texel's damage, 255 (1 - exp(-Omega)): Omega of collagen is 1 or more. Blanched, for the eye.
+constexpr std::uint8_t kCoagulated = 162;
+constexpr std::size_t kDamageByte = 1, kTexelBytes = 4;
+
+}  // namespace
+
+DamageMap::DamageMap(const SheetLine& line, double margin_m, double texel_m)
+    : line_(line), margin_m_(margin_m), texel_m_(texel_m) {}
+
+void DamageMap::Add(const TemperaturePatch& patch) {
+  constexpr std::size_t kEdge = kPatchTexels;
+  if (line_.empty() || patch.texels.size() != kTexelBytes * kEdge * kEdge ||
+      patch.header.origin_x > kAtlasTexels - kPatchTexels || patch.header.origin_y > kAtlasTexels - kPatchTexels) {
+    return;
+  }
+  if (damaged_.empty()) damaged_.resize(std::size_t{kAtlasTexels} * kAtlasTexels / 8, 0);
+  for (std::size_t y = 0; y < kEdge; ++y) {
+    const std::uint8_t* row = &patch.texels[kTexelBytes * kEdge * y + kDamageByte];
+    const std::size_t first = (patch.header.origin_y + y) * kAtlasTexels + patch.header.origin_x;
+    for (std::size_t x = 0; x < kEdge; ++x) {
+      if (row[kTexelBytes * x] < kCoagulated || TestBit(damaged_, first + x)) continue;
+      SetBit(damaged_, first + x);
+      const Eigen::Vector2d at(static_cast<double>(patch.header.origin_x + x) + 0.5,
+                               static_cast<double>(patch.header.origin_y + y) + 0.5);
+      beyond_ += line_.Nearest(texel_m_ * at).distance_m > margin_m_ ? 1 : 0;
+    }
+  }
+}
+
+double DamageMap::beyond_margin_m2() const { return static_cast<double>(beyond_) * texel_m_ * texel_m_; }
+
+}  // namespace fulcrum::assessment
