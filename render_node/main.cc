@@ -31,10 +31,15 @@ fulcrum::ExitCode RunRender(fulcrum::app::NodeApp& app) {
   // The scene says how many pictures it wants, the cart how many the machine can give: the slower of the two.
   fulcrum::runtime::CyclicThreadSettings timing = app.timing();
   timing.period_ns = std::max(timing.period_ns, std::int64_t{std::llround(1e9 / app.scene().render.rate_Hz)});
+  bool seen = false;
   const fulcrum::ExitCode code = app.Run(
       timing,
       [&](const fulcrum::Tick& tick) {
         node.Step(tick);
+        if (!seen && node.pictures_drawn() > 0) {
+          seen = true;
+          app.PublishHealthNow();  // A node that came back is waited for.
+        }
         if (node.closed()) {
           app.Finish(fulcrum::ExitCode::kDone, "the window was closed");
         }

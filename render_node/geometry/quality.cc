@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "services/core/error.h"
 
@@ -28,7 +29,8 @@ Quality QualityFromName(std::string_view name) {
   throw InputError("--quality: \"" + std::string(name) + "\"; valid: auto, low, high");
 }
 
-QualityControl::QualityControl(Quality quality, int height) : automatic_(quality == Quality::kAuto) {
+QualityControl::QualityControl(Quality quality, int height)
+    : automatic_(quality == Quality::kAuto), first_(automatic_) {
   while (last_step_ + 1 < kScales.size() && kScales[last_step_ + 1] * static_cast<float>(height) >= kFewestLines) {
     ++last_step_;
   }
@@ -40,6 +42,9 @@ QualityControl::QualityControl(Quality quality, int height) : automatic_(quality
 void QualityControl::Add(double draw_ms) {
   if (!automatic_) {
     return;
+  }
+  if (std::exchange(first_, false)) {
+    return;  // It was not drawn as the next ones will be.
   }
   cost_ms_[count_++] = draw_ms;
   if (count_ < kWindow) {

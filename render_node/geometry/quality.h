@@ -14,7 +14,8 @@ enum class Quality { kAuto, kLow, kHigh };
 [[nodiscard]] Quality QualityFromName(std::string_view name);
 
 /// Chooses the scene's share of the picture's width and height. With kAuto it goes by what pictures cost: down a step
-/// when the median of the last ones is above the budget, up when a step more would still stay below it.
+/// when the median of the last ones is above the budget, up when a step more would still stay below it. The very first
+/// picture is drawn coarsely: somebody waits for it, after a restart in mid-operation.
 class QualityControl {
  public:
   /// `height` of the picture [pixels]: the scene never has fewer than 270 lines, or as many as the picture.
@@ -22,7 +23,7 @@ class QualityControl {
 
   /// Cost of one picture [ms].
   void Add(double draw_ms);
-  [[nodiscard]] float scale() const { return kScales[step_]; }
+  [[nodiscard]] float scale() const { return kScales[first_ ? last_step_ : step_]; }
 
  private:
   // Each has about 0.7 of the pixels of the one before.
@@ -30,6 +31,7 @@ class QualityControl {
   static constexpr std::size_t kWindow = 9;
 
   bool automatic_;
+  bool first_;
   std::size_t step_ = 0;
   std::size_t last_step_ = 0;  // The coarsest that is still legible.
   std::array<double, kWindow> cost_ms_{};

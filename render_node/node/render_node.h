@@ -54,6 +54,7 @@ class RenderNode {
   void Finish();
   /// Until the pictures drawn so far are in their files; live nobody waits for a disk. Same thread as Step.
   void WaitForFiles() { writer_.Wait(); }
+  [[nodiscard]] std::uint64_t pictures_drawn() const { return frames_drawn_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t pictures_written() const { return writer_.written(); }
 
   /// Metrics and last error. Any thread.

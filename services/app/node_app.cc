@@ -4,11 +4,13 @@
 
 #include <atomic>
 #include <cmath>
+#include <condition_variable>
 #include <cstdio>
 #include <limits>
 #include <map>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "services/app/health_report.h"
 #include "services/bus/input_account.h"
@@ -137,6 +139,9 @@ struct NodeApp::Impl {
   // Relaxed: one number, nothing else is published through it.
   std::atomic<std::int64_t> session_start_ns{kSessionUnknown};
   std::atomic<HealthState> state{HealthState::kStarting};
+  std::mutex health_mutex;
+  std::condition_variable_any health_wanted;
+  bool health_now = false;
   std::mutex end_mutex;
   std::atomic<bool> ended{false};
   ExitCode exit_code = ExitCode::kDone;
@@ -182,6 +187,14 @@ void NodeApp::OnCommand(std::string verb, std::function<std::string(const std::s
   impl_->handlers[std::move(verb)] = std::move(handler);
 }
 
+void NodeApp::PublishHealthNow() {
+  {
+    const std::lock_guard lock(impl_->health_mutex);
+    impl_->health_now = true;
+  }
+  impl_->health_wanted.notify_one();
+}
+
 void NodeApp::Finish(ExitCode code, std::string_view reason) { impl_->End(code, reason); }
 
 ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::function<void(const Tick&)>& step,
@@ -206,8 +219,9 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
     auto next = std::chrono::steady_clock::now();
     while (!stop.stop_requested()) {
       app.PublishHealth(&report, thread, fill_health);
-      next += kHealthPeriod;
-      std::this_thread::sleep_until(next);
+      if (std::chrono::steady_clock::now() >= next) next += kHealthPeriod;
+      std::unique_lock lock(app.health_mutex);
+      app.health_wanted.wait_until(lock, stop, next, [&app] { return std::exchange(app.health_now, false); });
     }
   });
 

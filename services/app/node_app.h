@@ -111,6 +111,10 @@ class NodeApp {
   ExitCode Run(const runtime::CyclicThreadSettings& settings, const std::function<void(const Tick&)>& step,
                const HealthFill& fill_health);
 
+  /// Health goes out now instead of at its next turn: something that others wait for has happened. Any thread but a
+  /// real-time one.
+  void PublishHealthNow();
+
   /// Ends Run() with this code, for example kDeviceLost; `reason` is logged. Any thread but a real-time one.
   void Finish(ExitCode code, std::string_view reason);
 

@@ -1,5 +1,7 @@
 #include "services/bus/topics.h"
 
+#include <algorithm>
+
 namespace fulcrum::bus {
 namespace {
 
@@ -14,6 +16,12 @@ static_assert(TableIsInOrder(), "kTopicRoles is indexed by TopicId");
 constexpr std::string_view kPrefix = "fulcrum/";
 
 }  // namespace
+
+const TopicRole* RoleNamed(std::string_view name) {
+  const auto* role = std::find_if(kTopicRoles.begin(), kTopicRoles.end(),
+                                  [name](const TopicRole& known) { return name == known.name; });
+  return role == kTopicRoles.end() ? nullptr : role;
+}
 
 std::string_view TopicLabel(TopicId id) {
   if (static_cast<int>(id) >= kTopicCount) return "unknown";

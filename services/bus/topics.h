@@ -145,6 +145,9 @@ decltype(auto) WithMessageOf(TopicId id, F&& f) {
   return f(std::type_identity<Health>());
 }
 
+/// The role of the topic of that name on the bus, as "fulcrum/ToolState"; null: not one of ours.
+[[nodiscard]] const TopicRole* RoleNamed(std::string_view name);
+
 /// "ToolState": the topic's name for people.
 [[nodiscard]] std::string_view TopicLabel(TopicId id);
 

@@ -13,10 +13,9 @@ const Source& Recording::SourceOf(std::uint16_t channel) {
   if (found != sources_.end()) return found->second;
   const recording::McapChannel& told = reader_.channels().at(channel);
   Source source{std::nullopt, told.topic, {}};
-  for (const bus::TopicRole& role : bus::kTopicRoles) {
-    if (told.topic != role.name) continue;
-    source.topic = role.id;
-    source.name = bus::TopicLabel(role.id);
+  if (const bus::TopicRole* role = bus::RoleNamed(told.topic)) {
+    source.topic = role->id;
+    source.name = bus::TopicLabel(role->id);
   }
   const auto node = told.metadata.find("node");
   if (node != told.metadata.end()) source.node = node->second;

@@ -10,12 +10,10 @@
 #include <type_traits>
 #include <vector>
 
+#include "services/core/json_text.h"
 #include "services/core/message_fields.h"
 
 namespace fulcrum::log_tools {
-
-/// Quoted and escaped.
-[[nodiscard]] std::string JsonString(std::string_view text);
 
 /// `longest`: a list of more numbers is cut there and ends in a string that says how many are missing.
 template <class T>

@@ -5,6 +5,7 @@
 
 #include "services/app/node_app.h"
 #include "services/app/version.h"
+#include "services/bus/hex.h"
 #include "services/bus/schema.h"
 #include "services/core/error.h"
 #include "services/recorder/recorder.h"
@@ -16,12 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using runtime::MonotonicNs;
-
-std::string Hex(std::uint64_t value) {
-  std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(value));
-  return text.data();
-}
 
 /// Its arguments, as /proc knows them while it lives.
 std::string CommandLine(int pid) {
@@ -56,8 +51,8 @@ RecorderSettings TakeSettings(app::NodeApp* node) {
        {{"id", options.session.filename()},
         {"scene", node->scene().name},
         {"scene_file", fs::absolute(options.scene)},
-        {"scene_hash", Hex(node->scene().hash)}}},
-      {"versions", {{"fulcrum", app::kVersion}, {"schema_hash", Hex(bus::SchemaHash())}}},
+        {"scene_hash", bus::Hex(node->scene().hash)}}},
+      {"versions", {{"fulcrum", app::kVersion}, {"schema_hash", bus::Hex(bus::SchemaHash())}}},
       {"cart", {{"yaml", config::CartToYaml(node->cart())}}},
   };
   return settings;

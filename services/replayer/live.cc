@@ -112,12 +112,6 @@ bool IsSent(TopicId topic, const std::vector<NodeId>& nodes) {
   return !owner || std::find(nodes.begin(), nodes.end(), *owner) != nodes.end();
 }
 
-const bus::TopicRole* RoleNamed(const std::string& name) {
-  const auto role =
-      std::find_if(bus::kTopicRoles.begin(), bus::kTopicRoles.end(), [&](const auto& r) { return name == r.name; });
-  return role == bus::kTopicRoles.end() ? nullptr : &*role;
-}
-
 /// Log times are told as wall clock; the recorder says how far that was from the clock of the stamps.
 std::int64_t ClockOffset(const recording::McapReader& reader) {
   const auto clock = reader.metadata().find("clock");
@@ -152,7 +146,7 @@ LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>&
       first_ns = then_ns + static_cast<std::int64_t>(1e9 * settings.from_s);
       moved_ns = begin_ns - *first_ns;
     }
-    const bus::TopicRole* role = RoleNamed(reader.channels().at(message.channel).topic);
+    const bus::TopicRole* role = bus::RoleNamed(reader.channels().at(message.channel).topic);
     const auto channel = role == nullptr ? channels.end() : channels.find(role->id);
     if (channel == channels.end()) continue;
     // Of the time before only what a late joiner would have been given.

@@ -48,8 +48,8 @@ void WriteReportJson(const LockStepResult& result, const std::filesystem::path& 
     add("mismatches", node.departure ? "1" : "0");
     add("starts", std::to_string(node.starts));
     add("busy_s", Format("%.6f", node.busy_s));
-    add("departure", Quoted(node.departure ? Describe(*node.departure) : std::string()));
-    add("missing", Quoted(node.missing));
+    add("departure", JsonString(node.departure ? Describe(*node.departure) : std::string()));
+    add("missing", JsonString(node.missing));
   }
   json += "\n}\n";
   WriteText(file, json);

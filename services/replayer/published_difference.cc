@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 #include <span>
+#include <type_traits>
 
 #include "services/bus/convert/cdr.h"
 #include "services/bus/topics.h"
@@ -32,11 +33,6 @@ std::optional<std::string> Compare(std::span<const std::uint8_t> bytes, std::uin
   return label + "." + difference->field + ": recorded " + difference->first + ", replayed " + difference->second;
 }
 
-template <class T>
-bool Is(const std::string& topic) {
-  return topic == bus::RoleOf<T>().name;
-}
-
 }  // namespace
 
 std::string DescribeDifference(const std::filesystem::path& recording, std::uint64_t epoch, std::int64_t stamp_ns,
@@ -44,18 +40,11 @@ std::string DescribeDifference(const std::filesystem::path& recording, std::uint
   recording::McapReader reader(recording);
   recording::McapMessage message{};
   while (reader.Next(&message)) {
-    const std::string& topic = reader.channels().at(message.channel).topic;
-    std::optional<std::string> found;
-    const auto look = [&]<class T>(const T*) {
-      if (!found && Is<T>(topic)) found = Compare<T>(message.data, epoch, stamp_ns, now);
-    };
-    look(static_cast<const TissueFrame*>(nullptr));
-    look(static_cast<const ContactModel*>(nullptr));
-    look(static_cast<const CauteryContact*>(nullptr));
-    look(static_cast<const TopologyState*>(nullptr));
-    look(static_cast<const TemperaturePatch*>(nullptr));
-    look(static_cast<const ThermalEvent*>(nullptr));
-    look(static_cast<const ToolState*>(nullptr));
+    const bus::TopicRole* role = bus::RoleNamed(reader.channels().at(message.channel).topic);
+    // What a node says of itself is no result.
+    if (role == nullptr || !role->one_owner()) continue;
+    const auto found = bus::WithMessageOf(
+        role->id, [&]<class T>(std::type_identity<T>) { return Compare<T>(message.data, epoch, stamp_ns, now); });
     if (found) return *found;
   }
   return "nothing that it published in this tick differs: the difference is inside";

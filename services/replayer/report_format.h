@@ -8,6 +8,7 @@
 #include <string>
 
 #include "services/core/error.h"
+#include "services/core/json_text.h"
 
 namespace fulcrum::replay {
 
@@ -18,16 +19,6 @@ __attribute__((format(printf, 1, 2))) inline std::string Format(const char* form
   std::vsnprintf(text, sizeof(text), format, arguments);
   va_end(arguments);
   return text;
-}
-
-/// A string of JSON.
-inline std::string Quoted(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    quoted += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-  }
-  return quoted + '"';
 }
 
 /// Throws InputError when it cannot be written.

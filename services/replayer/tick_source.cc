@@ -13,12 +13,6 @@ std::string Describe(TopicId topic, const SampleKey& key) {
          std::to_string(key.first);
 }
 
-std::optional<TopicId> TopicNamed(const std::string& name) {
-  const auto role = std::find_if(bus::kTopicRoles.begin(), bus::kTopicRoles.end(),
-                                 [&](const bus::TopicRole& r) { return name == r.name; });
-  return role == bus::kTopicRoles.end() ? std::nullopt : std::optional(role->id);
-}
-
 }  // namespace
 
 TickSource::TickSource(const std::filesystem::path& file, const std::vector<NodeId>& nodes,
@@ -122,9 +116,9 @@ bool TickSource::Decode(const recording::McapMessage& message, T* sample) {
 void TickSource::Take(const recording::McapMessage& message) {
   auto known = topic_of_.find(message.channel);
   if (known == topic_of_.end()) {
-    const auto topic = TopicNamed(reader_.channels().at(message.channel).topic);
-    if (!topic) return;
-    known = topic_of_.emplace(message.channel, *topic).first;
+    const bus::TopicRole* role = bus::RoleNamed(reader_.channels().at(message.channel).topic);
+    if (role == nullptr) return;
+    known = topic_of_.emplace(message.channel, role->id).first;
   }
   switch (known->second) {
     case TopicId::kToolState:

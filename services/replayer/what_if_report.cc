@@ -41,7 +41,7 @@ std::string ReportText(const WhatIfResult& result, const std::vector<NodeId>& no
 }
 
 void WriteReportJson(const WhatIfResult& result, const std::filesystem::path& file) {
-  std::string json = "{\n  \"missing\": " + Quoted(result.missing);
+  std::string json = "{\n  \"missing\": " + JsonString(result.missing);
   const auto add = [&](const std::string& name, double value) {
     json += ",\n  \"" + name + "\": " + Format("%.9g", value);
   };

@@ -39,7 +39,10 @@ class NodeProcess {
   /// Notices a death and starts again when that is due.
   [[nodiscard]] std::optional<Death> Update(std::int64_t now_ns);
 
-  void OnHealth(std::int64_t now_ns) { last_health_ns_ = now_ns; }
+  void OnHealth(std::int64_t now_ns) {
+    last_health_ns_ = now_ns;
+    before_.reset();
+  }
   /// Forgives silence up to now, because the supervisor itself was held up.
   void ForgiveSilence(std::int64_t now_ns);
   void AskRestart(std::int64_t now_ns);
@@ -53,6 +56,7 @@ class NodeProcess {
   [[nodiscard]] pid_t pid() const { return process_.pid(); }
   [[nodiscard]] bool running() const { return process_.running(); }
   [[nodiscard]] bool failed() const { return failed_; }
+  [[nodiscard]] const NodeCommand& command() const { return command_; }
   [[nodiscard]] bool foreign() const { return command_.foreign; }
   [[nodiscard]] bool has_reported() const { return last_health_ns_ != 0; }
   [[nodiscard]] const std::filesystem::path& log() const { return command_.log; }
@@ -61,7 +65,7 @@ class NodeProcess {
   void WatchForSilence(std::int64_t now_ns);
 
   NodeCommand command_;
-  std::optional<NodeCommand> next_, before_;  ///< Of a swap.
+  std::optional<NodeCommand> next_, before_;  ///< Of a swap; `before_` until the new one has reported.
   ChildProcess process_;
   RestartPolicy policy_;
   std::int64_t started_ns_ = 0;

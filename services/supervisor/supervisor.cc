@@ -4,9 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <cstring>
 #include <optional>
 #include <span>
 #include <sstream>
@@ -24,6 +22,7 @@
 #include "services/supervisor/clip.h"
 #include "services/supervisor/domain_guard.h"
 #include "services/supervisor/node_process.h"
+#include "services/supervisor/node_starter.h"
 #include "services/supervisor/outcome.h"
 #include "services/supervisor/progress.h"
 #include "services/supervisor/report.h"
@@ -115,6 +114,7 @@ struct Supervisor::Impl {
         folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
         recording(RecordingFile(up, folder)),
         memory(bus::SharedMemoryDirectory(up.cart.domain)),
+        starter{settings, folder, recording},
         node_ids(NodesOf(scene.view(), up)) {
     // Left by a supervisor that was killed: its nodes died with it.
     bus::SweepSharedMemory(memory);
@@ -131,45 +131,12 @@ struct Supervisor::Impl {
     }
     for (const NodeId id : node_ids) {
       if (id == NodeId::kPhysics && up.standby) {
-        nodes.emplace_back(CommandInPair("a", false));
-        nodes.emplace_back(CommandInPair("b", true));
+        nodes.emplace_back(starter.InPair("a", false));
+        nodes.emplace_back(starter.InPair("b", true));
       } else {
-        nodes.emplace_back(CommandFor(id));
+        nodes.emplace_back(starter.Usual(id));
       }
     }
-  }
-
-  /// One of two physics nodes. Whoever comes back follows, for the other one leads by then.
-  [[nodiscard]] NodeCommand CommandInPair(const std::string& seat, bool follows) const {
-    NodeCommand command = CommandFor(NodeId::kPhysics);
-    command.arguments.insert(command.arguments.end(), {"--pair", seat});
-    (follows ? command.arguments : command.again).emplace_back("--follow");
-    command.log = folder.logs / (std::string(NodeName(NodeId::kPhysics)) + "-" + seat + ".log");
-    return command;
-  }
-
-  [[nodiscard]] NodeCommand CommandFor(NodeId id) const {
-    NodeCommand command;
-    command.id = id;
-    command.program = settings.programs / NodeName(id);
-    command.arguments = {"--scene",   folder.scene.string(),
-                         "--session", folder.path.string(),
-                         "--domain",  std::to_string(settings.cart.domain),
-                         "--cart",    folder.cart.string()};
-    if (id == NodeId::kRender) {
-      command.arguments.insert(command.arguments.end(), {"--quality", settings.quality});
-      if (settings.window) {
-        command.arguments.emplace_back("--window");
-      }
-    }
-    if (id == NodeId::kRecorder) {
-      if (settings.record) {
-        command.arguments.insert(command.arguments.end(), {"--file", recording.string()});
-      }
-      command.arguments.insert(command.arguments.end(), {"--keep", Fixed(settings.keep_s, 3)});
-    }
-    command.log = folder.logs / (std::string(NodeName(id)) + ".log");
-    return command;
   }
 
   [[nodiscard]] double SessionTime(std::int64_t now) const {
@@ -317,39 +284,23 @@ struct Supervisor::Impl {
   bool Swap(const std::string& argument, std::int64_t now, std::string* answer) {
     std::vector<std::string> words;
     std::istringstream lines(argument);
-    for (std::string word; std::getline(lines, word);) words.push_back(Filled(word));
-    NodeProcess* node = words.size() < 2 ? nullptr : Find(words[0]);
+    for (std::string word; std::getline(lines, word);) words.push_back(std::move(word));
+    const std::string name = words.empty() ? std::string() : words.front();
+    NodeProcess* node = Find(name);
     if (node == nullptr || !node->running()) {
-      *answer = "no running node \"" + (words.empty() ? std::string() : words[0]) + "\" in this session";
+      *answer = "no running node \"" + name + "\" in this session";
       return false;
     }
-    if (::access(words[1].c_str(), X_OK) != 0) {
-      *answer = words[1] + ": cannot be run; nothing was changed";
+    try {
+      words.erase(words.begin());
+      NodeCommand command = starter.Replacement(node->command(), words);
+      *answer = "replacing " + name + " (pid " + std::to_string(node->pid()) + ") by " + command.program.string();
+      node->Swap(std::move(command), now);
+      return true;
+    } catch (const InputError& error) {
+      *answer = error.what();
       return false;
     }
-    NodeCommand command = CommandFor(node->id());
-    command.program = words[1];
-    if (words.size() > 2) {
-      command.arguments.assign(words.begin() + 2, words.end());
-      command.foreign = true;
-    }
-    *answer = "replacing " + words[0] + " (pid " + std::to_string(node->pid()) + ") by " + words[1];
-    node->Swap(std::move(command), now);
-    return true;
-  }
-
-  /// {scene}, {session}, {domain} and {cart} stand for what a node of this session is given.
-  [[nodiscard]] std::string Filled(std::string word) const {
-    const std::array<std::pair<const char*, std::string>, 4> names{{{"{scene}", folder.scene.string()},
-                                                                    {"{session}", folder.path.string()},
-                                                                    {"{domain}", std::to_string(settings.cart.domain)},
-                                                                    {"{cart}", folder.cart.string()}}};
-    for (const auto& [name, value] : names) {
-      if (const std::size_t at = word.find(name); at != std::string::npos) {
-        word.replace(at, std::strlen(name), value);
-      }
-    }
-    return word;
   }
 
   void PublishOwnHealth(std::int64_t now) {
@@ -560,6 +511,7 @@ struct Supervisor::Impl {
   SessionFolder folder;
   const std::filesystem::path recording;  ///< The recorder's first file; empty: none.
   const std::filesystem::path memory;
+  const NodeStarter starter;
   const std::vector<NodeId> node_ids;
 
   std::optional<bus::DdsParticipant> participant;

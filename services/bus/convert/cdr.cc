@@ -5,6 +5,7 @@
 #include <fastcdr/exceptions/Exception.h>
 
 #include "services/bus/convert/convert.h"
+#include "services/bus/convert/generated_types.h"
 
 namespace fulcrum::bus {
 namespace {
@@ -14,40 +15,12 @@ using eprosima::fastcdr::FastBuffer;
 
 constexpr std::size_t kEncapsulation = 4;
 
-template <class T>
-struct WireOf;
-#define FULCRUM_WIRE(T)  \
-  template <>            \
-  struct WireOf<T> {     \
-    using type = idl::T; \
-  };
-FULCRUM_WIRE(HandleState)
-FULCRUM_WIRE(ToolState)
-FULCRUM_WIRE(TissueFrame)
-FULCRUM_WIRE(ContactModel)
-FULCRUM_WIRE(CauteryContact)
-FULCRUM_WIRE(TopologyState)
-FULCRUM_WIRE(TemperaturePatch)
-FULCRUM_WIRE(ThermalEvent)
-FULCRUM_WIRE(SceneManifest)
-FULCRUM_WIRE(Command)
-FULCRUM_WIRE(CommandReply)
-FULCRUM_WIRE(TickManifest)
-FULCRUM_WIRE(Health)
-#undef FULCRUM_WIRE
-
-/// Travels as its memory, which for a plain type is its CDR.
-template <class T>
-concept Plain = requires {
-  typename T::View;
-};
-
 }  // namespace
 
 template <class T>
 bool DecodeCdr(std::span<const std::uint8_t> bytes, T* message) {
-  using Wire = typename WireOf<T>::type;
-  if constexpr (Plain<T>) {
+  using Wire = WireOf<T>;
+  if constexpr (Loanable<T>) {
     return bytes.size() >= kEncapsulation + sizeof(Wire) &&
            FromLoan(reinterpret_cast<const std::byte*>(bytes.data() + kEncapsulation), message);
   } else {
@@ -68,8 +41,8 @@ bool DecodeCdr(std::span<const std::uint8_t> bytes, T* message) {
 
 template <class T>
 bool EncodeCdr(const T& message, std::vector<std::uint8_t>* bytes) {
-  using Wire = typename WireOf<T>::type;
-  if constexpr (Plain<T>) {
+  using Wire = WireOf<T>;
+  if constexpr (Loanable<T>) {
     bytes->assign(kEncapsulation + sizeof(Wire), 0);
     (*bytes)[1] = 1;  // Little-endian CDR.
     return ToLoan(message, reinterpret_cast<std::byte*>(bytes->data() + kEncapsulation));

@@ -18,6 +18,7 @@
 #include "services/bus/dds/ports.h"
 #include "services/bus/dds/raw_reader.h"
 #include "services/bus/dds/shared_memory.h"
+#include "services/bus/hex.h"
 #include "services/core/error.h"
 
 namespace fulcrum::bus {
@@ -35,12 +36,6 @@ const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
 constexpr std::uint32_t kSocketBuffer_B = 4u << 20;
 /// Samples above this do not fit one UDP datagram and are sent in fragments.
 constexpr std::uint32_t kDatagram_B = 64'000;
-
-std::string Hex(std::uint64_t value) {
-  std::array<char, 17> text{};
-  std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(value));
-  return text.data();
-}
 
 /// USER_DATA of our participants: "fulcrum <hash> <node> <pid>".
 constexpr std::string_view kUserDataTag = "fulcrum ";
@@ -199,9 +194,9 @@ struct DdsParticipant::Impl {
     fast::Topic*& topic = topics[static_cast<std::size_t>(role.id)];
     if (topic != nullptr) return topic;
     fast::TypeSupport type(new dds::CheckedType<T>());
-    if constexpr (dds::Loanable<T>) {
+    if constexpr (Loanable<T>) {
       // Both together say that memory and wire look the same, which is what a loan relies on.
-      if (!type->is_plain() || type->m_typeSize != sizeof(dds::WireOf<T>) + 4) {
+      if (!type->is_plain() || type->m_typeSize != sizeof(WireOf<T>) + 4) {
         throw std::logic_error(std::string(role.name) + ": the generated type is not plain");
       }
     }
@@ -255,8 +250,7 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   fast::Topic* topic = impl_->TopicFor<T>();
   fast::DataWriterQos qos;
   ApplyRole(role, role.writer_depth, impl_->shared_memory, &qos);
-  const bool fragmented =
-      role.path == Path::kLoopback && typename dds::TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
+  const bool fragmented = role.path == Path::kLoopback && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
   qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
   auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos);
   if (!port->ok()) throw InputError(std::string(role.name) + ": cannot make a writer");
@@ -266,8 +260,8 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
 
 std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink) {
   const TopicRole& role = RoleOf(id);
-  const std::uint32_t payload_B = WithMessageOf(
-      id, []<class T>(std::type_identity<T>) { return typename dds::TypeSupportOf<T>::type().m_typeSize; });
+  const std::uint32_t payload_B =
+      WithMessageOf(id, []<class T>(std::type_identity<T>) { return typename TypeSupportOf<T>::type().m_typeSize; });
   const bool plain = role.path == Path::kSharedMemory;
   fast::Topic* topic =
       impl_->MakeTopic(role, fast::TypeSupport(new dds::RawType(impl_->TypeName(role), payload_B, plain)));

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "services/bus/dds/type_support.h"
+#include "services/bus/convert/generated_types.h"
 #include "services/bus/gate.h"
 #include "tests/unit/bus/same.h"
 #include "tests/unit/bus/samples.h"
@@ -19,8 +19,8 @@ using Payload = eprosima::fastrtps::rtps::SerializedPayload_t;
 /// Through the generated type and its serialised bytes, as over UDP.
 template <class T>
 bool OverTheWire(const T& from, T* to) {
-  typename dds::TypeSupportOf<T>::type type;
-  dds::WireOf<T> sent, received;
+  typename TypeSupportOf<T>::type type;
+  WireOf<T> sent, received;
   if (!ToWire(from, &sent)) return false;
   Payload payload(type.m_typeSize);
   if (!type.serialize(&sent, &payload) || !type.deserialize(&payload, &received)) return false;
@@ -29,9 +29,9 @@ bool OverTheWire(const T& from, T* to) {
 }
 
 /// Through a loan at the worst alignment the library gives.
-template <dds::Loanable T>
+template <Loanable T>
 bool OverTheWire(const T& from, T* to) {
-  std::vector<std::uint64_t> memory(sizeof(dds::WireOf<T>) / 8 + 2);
+  std::vector<std::uint64_t> memory(sizeof(WireOf<T>) / 8 + 2);
   std::byte* loan = reinterpret_cast<std::byte*>(memory.data()) + 4;
   return ToLoan(from, loan) && FromLoan(loan, to);
 }
@@ -52,8 +52,8 @@ TYPED_TEST(Convert, RoundTripKeepsEveryField) {
 
 /// As a writer does, which keeps its wire object.
 TEST(ConvertHealth, ShorterErrorLeavesNothingOfTheLongerOneBefore) {
-  dds::TypeSupportOf<Health>::type type;
-  dds::WireOf<Health> wire, received;
+  TypeSupportOf<Health>::type type;
+  WireOf<Health> wire, received;
   Health sent = test::Sample<Health>();
   for (const char* error : {"handle 0: unplugged", "handle", ""}) {
     sent.last_error = error;
@@ -75,10 +75,10 @@ TYPED_TEST(Convert, ReusedTargetHoldsNothingOfThePreviousMessage) {
 }
 
 TYPED_TEST(Convert, FitsTheSizeThatPoolsAreMadeFor) {
-  typename dds::TypeSupportOf<TypeParam>::type type;
+  typename TypeSupportOf<TypeParam>::type type;
   EXPECT_TRUE(type.is_bounded());
   // 64 KB is the largest datagram; only TopologyState may be sent in fragments, only loans may be larger.
-  if constexpr (!dds::Loanable<TypeParam> && !std::is_same_v<TypeParam, TopologyState>) {
+  if constexpr (!Loanable<TypeParam> && !std::is_same_v<TypeParam, TopologyState>) {
     EXPECT_LT(type.m_typeSize, 60'000u);
   }
 }

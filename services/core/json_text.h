@@ -1,8 +1,13 @@
-#include "services/log_tools/text.h"
+// A string as JSON has it.
+#pragma once
 
-namespace fulcrum::log_tools {
+#include <string>
+#include <string_view>
 
-std::string JsonString(std::string_view text) {
+namespace fulcrum {
+
+/// Quoted and escaped.
+[[nodiscard]] inline std::string JsonString(std::string_view text) {
   constexpr const char* kDigits = "0123456789abcdef";
   std::string quoted = "\"";
   for (const char c : text) {
@@ -21,4 +26,4 @@ std::string JsonString(std::string_view text) {
   return quoted += '"';
 }
 
-}  // namespace fulcrum::log_tools
+}  // namespace fulcrum
