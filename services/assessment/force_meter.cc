@@ -8,6 +8,8 @@ namespace {
 constexpr double kGap_s = 0.1;  ///< Longer silence is not counted.
 /// A slip is over when the traction has fallen to this part of what the jaws hold.
 constexpr double kHeldAgain = 0.9;
+/// What jaws hold falls faster than that, per message, when they are opened: the noise of a handle is a third of it.
+constexpr float kSteadyGrip = 0.985f;
 
 const Contact* GraspOf(const DeviceContacts& contacts) {
   const auto end = contacts.contacts.begin() + std::min<std::uint32_t>(contacts.count, kMaxContacts);
@@ -68,7 +70,10 @@ bool ForceMeter::FollowHold(const DeviceContacts& contacts, double force_N, doub
     hold->holding = true;
     hold->begin_z = grasp->x_ref.z();
   }
-  hold->closed = grasp->slip_force > closed_grip_N_;
+  // Jaws that are being opened let go because they are meant to.
+  const bool opens = grasp->slip_force < kSteadyGrip * hold->grip_N;
+  hold->grip_N = grasp->slip_force;
+  hold->closed = grasp->slip_force > closed_grip_N_ && !opens;
   const bool was_slipping = hold->slipping;
   const auto grip_N = static_cast<double>(grasp->slip_force);
   hold->slipping = hold->closed && force_N > (was_slipping ? kHeldAgain * grip_N : grip_N);

@@ -34,7 +34,8 @@ class ForceMeter {
  private:
   struct Hold {
     bool holding = false;
-    bool closed = false;    ///< The jaws, when last heard.
+    bool closed = false;    ///< The jaws, and not on their way to open, when last heard.
+    float grip_N = 0;       ///< What they held then.
     bool slipping = false;  ///< The traction is more than they hold.
     float begin_z = 0;
     double held_s = 0;  ///< At height, so far.

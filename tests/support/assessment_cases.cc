@@ -55,7 +55,7 @@ struct Reaches {
 /// The spectral arc length of a speed profile on [0, 1], from its Fourier integral on a fine grid: the definition, with
 /// neither sampling, filter nor segmentation.
 double SpectralArc(const std::function<double(double)>& speed, double duration_s) {
-  constexpr int kSamples = 4000, kFrequencies = 4000;
+  constexpr int kSamples = 1000, kFrequencies = 1000;
   constexpr double kHighest_Hz = 10, kLeast = 0.05;
   std::vector<double> magnitude;
   for (int j = 0; j <= kFrequencies; ++j) {
@@ -158,7 +158,12 @@ void AddForces(const SceneView& scene, std::vector<KnownAnswer>* answers) {
   const auto gap = [&] {
     for (int i = 0; i < 20; ++i) holds.Add(PushAt(time_s += kModelPeriod_s, 0));
   };
-  gap();
+  const auto open = [&] {  // In 0.4 s, under the traction that is there.
+    for (int i = 0; i < 40; ++i)
+      holds.Add(GraspAt(time_s += kModelPeriod_s, Vec3d::Zero(), 5, std::max(0.0, 8 - 0.25 * i)));
+    gap();
+  };
+  open();
   for (int i = 0; i < 100; ++i) holds.Add(GraspAt(time_s += kModelPeriod_s, Vec3d::Zero(), 5, 8));
   gap();  // Gone with the jaws closed: lost.
   for (int i = 0; i < 100; ++i)
@@ -331,7 +336,7 @@ TemperaturePatch PatchAt(double time_s, std::uint32_t x, std::uint32_t y,
   patch.header.stamp = StampAt(time_s);
   patch.header.origin_x = x;
   patch.header.origin_y = y;
-  patch.texels.resize(std::size_t{4} * kPatchTexels * kPatchTexels, 0);
+  patch.texels.assign(std::size_t{4} * kPatchTexels * kPatchTexels, 0);
   for (std::uint32_t j = 0; j < kPatchTexels; ++j) {
     for (std::uint32_t i = 0; i < kPatchTexels; ++i) {
       const Eigen::Vector2d at(1e-4 * (x + i + 0.5), 1e-4 * (y + j + 0.5));
