@@ -1,6 +1,7 @@
 #include "services/assessment/assessor.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace fulcrum::assessment {
@@ -94,75 +95,81 @@ void Assessor::Add(const TemperaturePatch& patch) {
   if (Counts(TimeOf(patch.header.stamp))) damage_.Add(patch);
 }
 
+MeasureValues Assessor::ToolFigures(int i) const {
+  MeasureValues own;
+  own.fill(kNone);
+  const ToolMotion& motion = motion_.tool(i);
+  const ToolForce& force = force_.tool(i);
+  const ToolKind kind = scene_.tools[static_cast<std::size_t>(i)].kind;
+  if (kind == ToolKind::kNone) return own;
+  const auto set = [&](Measure measure, double value) { own[At(measure)] = value; };
+  set(Measure::kTime, motion.first_s < 0 ? 0 : motion.last_s - motion.first_s);
+  set(Measure::kPathLength, 1e3 * motion.path_m);
+  set(Measure::kMovements, motion.movements);
+  set(Measure::kIdle, motion.idle.total_s());
+  if (motion.smoothness_count > 0) set(Measure::kSmoothness, motion.smoothness_sum / motion.smoothness_count);
+  set(Measure::kForceTime, force.force_time_Ns);
+  set(Measure::kPeakForce, force.peak_N);
+  if (kind == ToolKind::kGrasper) {
+    set(Measure::kGraspSlips, force.slips);
+    set(Measure::kLift, 1e3 * force.lift_m);
+    set(Measure::kLiftHold, force.lift_hold_s);
+  }
+  return own;
+}
+
+void Assessor::SetOfMotion(MeasureValues* session) const {
+  double first_s = std::numeric_limits<double>::infinity(), last_s = 0, smoothness = 0;
+  int smooth_movements = 0;
+  for (int i = 0; i < kMaxTools; ++i) {
+    const ToolMotion& motion = motion_.tool(i);
+    smoothness += motion.smoothness_sum;
+    smooth_movements += motion.smoothness_count;
+    if (motion.first_s < 0) continue;
+    first_s = std::min(first_s, motion.first_s);
+    last_s = std::max(last_s, motion.last_s);
+  }
+  (*session)[At(Measure::kTime)] = std::max(0.0, last_s - first_s);
+  (*session)[At(Measure::kIdle)] = motion_.idle_s();
+  if (smooth_movements > 0) (*session)[At(Measure::kSmoothness)] = smoothness / smooth_movements;
+}
+
+void Assessor::SetOfHook(MeasureValues* session) const {
+  const auto set = [&](Measure measure, double value) { (*session)[At(measure)] = value; };
+  set(Measure::kPedalWithoutContact, line_.pedal_without_contact_s());
+  set(Measure::kCutLength, 1e3 * cut_length_m_);
+  set(Measure::kUreterWarnings, alarms_[0]);
+  set(Measure::kUreterInjuries, alarms_[1]);
+  set(Measure::kNerveWarnings, alarms_[2]);
+  set(Measure::kNerveInjuries, alarms_[3]);
+  if (line_.line().empty()) return;
+  set(Measure::kLineDone, 100 * line_.done());
+  if (const auto mean = line_.deviation_mean_m()) set(Measure::kDeviationMean, 1e3 * *mean);
+  if (const auto most = line_.deviation_max_m()) set(Measure::kDeviationMax, 1e3 * *most);
+  set(Measure::kDamageBeyondMargin, 1e6 * damage_.beyond_margin_m2());
+}
+
 Figures Assessor::figures() const {
   Figures figures;
   figures.session.fill(kNone);
-  double first_s = std::numeric_limits<double>::infinity(), last_s = 0, smoothness = 0;
-  double path_m = 0, force_time_Ns = 0, peak_N = 0, lift_m = 0, lift_hold_s = 0;
-  int movements = 0, smooth_movements = 0, slips = 0;
-  for (int i = 0; i < kMaxTools; ++i) {
-    MeasureValues& own = figures.tool[static_cast<std::size_t>(i)];
-    own.fill(kNone);
-    const ToolMotion& motion = motion_.tool(i);
-    const ToolForce& force = force_.tool(i);
-    const ToolKind kind = scene_.tools[static_cast<std::size_t>(i)].kind;
-    if (kind == ToolKind::kNone) continue;
-    own[At(Measure::kTime)] = motion.first_s < 0 ? 0 : motion.last_s - motion.first_s;
-    own[At(Measure::kPathLength)] = 1e3 * motion.path_m;
-    own[At(Measure::kMovements)] = motion.movements;
-    own[At(Measure::kIdle)] = motion.idle.total_s();
-    if (motion.smoothness_count > 0) own[At(Measure::kSmoothness)] = motion.smoothness_sum / motion.smoothness_count;
-    own[At(Measure::kForceTime)] = force.force_time_Ns;
-    own[At(Measure::kPeakForce)] = force.peak_N;
-    if (kind == ToolKind::kGrasper) {
-      own[At(Measure::kGraspSlips)] = force.slips;
-      own[At(Measure::kLift)] = 1e3 * force.lift_m;
-      own[At(Measure::kLiftHold)] = force.lift_hold_s;
-    }
-    if (motion.first_s >= 0) {
-      first_s = std::min(first_s, motion.first_s);
-      last_s = std::max(last_s, motion.last_s);
-    }
-    path_m += motion.path_m;
-    movements += motion.movements;
-    smoothness += motion.smoothness_sum;
-    smooth_movements += motion.smoothness_count;
-    force_time_Ns += force.force_time_Ns;
-    peak_N = std::max(peak_N, force.peak_N);
-    slips += force.slips;
-    lift_m = std::max(lift_m, force.lift_m);
-    lift_hold_s = std::max(lift_hold_s, force.lift_hold_s);
-  }
-  const auto has = [&](ToolKind kind) {
-    return std::any_of(scene_.tools.begin(), scene_.tools.end(), [&](const auto& tool) { return tool.kind == kind; });
-  };
-  const auto set = [&](Measure measure, double value) { figures.session[At(measure)] = value; };
-  set(Measure::kTime, std::max(0.0, last_s - first_s));
-  set(Measure::kPathLength, 1e3 * path_m);
-  set(Measure::kMovements, movements);
-  set(Measure::kIdle, motion_.idle_s());
-  if (smooth_movements > 0) set(Measure::kSmoothness, smoothness / smooth_movements);
-  set(Measure::kForceTime, force_time_Ns);
-  set(Measure::kPeakForce, peak_N);
-  if (has(ToolKind::kGrasper)) {
-    set(Measure::kGraspSlips, slips);
-    set(Measure::kLift, 1e3 * lift_m);
-    set(Measure::kLiftHold, lift_hold_s);
-  }
-  if (has(ToolKind::kHook)) {
-    set(Measure::kPedalWithoutContact, line_.pedal_without_contact_s());
-    set(Measure::kCutLength, 1e3 * cut_length_m_);
-    set(Measure::kUreterWarnings, alarms_[0]);
-    set(Measure::kUreterInjuries, alarms_[1]);
-    set(Measure::kNerveWarnings, alarms_[2]);
-    set(Measure::kNerveInjuries, alarms_[3]);
-    if (!line_.line().empty()) {
-      set(Measure::kLineDone, 100 * line_.done());
-      if (const auto mean = line_.deviation_mean_m()) set(Measure::kDeviationMean, 1e3 * *mean);
-      if (const auto most = line_.deviation_max_m()) set(Measure::kDeviationMax, 1e3 * *most);
-      set(Measure::kDamageBeyondMargin, 1e6 * damage_.beyond_margin_m2());
+  bool hook = false;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    figures.tool[i] = ToolFigures(static_cast<int>(i));
+    hook |= scene_.tools[i].kind == ToolKind::kHook;
+    for (std::size_t k = 0; k < kMeasureCount; ++k) {
+      double& whole = figures.session[k];
+      const double own = figures.tool[i][k];
+      const auto measure = static_cast<Measure>(k);
+      const bool highest = measure == Measure::kPeakForce || measure == Measure::kLift || measure == Measure::kLiftHold;
+      if (!std::isnan(own)) whole = std::isnan(whole) ? own : highest ? std::max(whole, own) : whole + own;
     }
   }
+  // These are no sums.
+  for (const Measure measure : {Measure::kTime, Measure::kIdle, Measure::kSmoothness}) {
+    figures.session[At(measure)] = kNone;
+  }
+  SetOfMotion(&figures.session);
+  if (hook) SetOfHook(&figures.session);
   return figures;
 }
 

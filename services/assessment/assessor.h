@@ -54,6 +54,9 @@ class Assessor {
   [[nodiscard]] double TimeOf(const Stamp& stamp) const;
   [[nodiscard]] bool Counts(double time_s) const { return begun_ && time_s >= 0 && time_s <= end_s_; }
   void Raise(Prompt prompt, double until_s);
+  [[nodiscard]] MeasureValues ToolFigures(int i) const;
+  void SetOfMotion(MeasureValues* session) const;
+  void SetOfHook(MeasureValues* session) const;
 
   SceneView scene_;
   bool begun_ = false;
