@@ -25,7 +25,7 @@ Session FindSession(const std::filesystem::path& file) {
   Session session;
   Recording recording(file, {.topics = {"SceneManifest", "Health"}});
   Entry entry;
-  while (recording.Next(&entry) && !session.end_s) {
+  while (recording.Next(&entry)) {
     (void)WithDecoded(*entry.source->topic, entry.message.data, [&]<class T>(const T& message) {
       if constexpr (std::is_same_v<T, SceneManifest>) {
         if (!session.manifest) session.manifest = message;
@@ -33,6 +33,7 @@ Session FindSession(const std::filesystem::path& file) {
         if (message.node != NodeId::kSupervisor || message.state != HealthState::kStopping) return;
         const auto time = std::find_if(message.metrics.begin(), message.metrics.end(),
                                        [](const Metric& metric) { return metric.name == "session_time_s"; });
+        // The last counts: one that was asked to end the session says so before its clock has stopped.
         if (time != message.metrics.end()) session.end_s = time->value;
       }
     });

@@ -1,7 +1,5 @@
 #include "services/supervisor/session_assessment.h"
 
-#include "services/supervisor/outcome.h"
-
 namespace fulcrum::supervisor {
 
 SessionAssessment::SessionAssessment(const SceneView& scene, bus::DdsParticipant* participant)
@@ -38,6 +36,12 @@ std::string SessionAssessment::Line(double session_time_s) const {
 void SessionAssessment::AddTo(double session_time_s, Health* health) const {
   health->metrics.push_back({"prompts", static_cast<double>(assessor_.PromptsAt(session_time_s))});
   health->metrics.push_back({"score_pct", assessment::Evaluate(params_, assessor_.figures()).percent()});
+}
+
+ScoreSheet SessionAssessment::Finish() {
+  assessor_.Finish();
+  const assessment::Figures figures = assessor_.figures();
+  return {figures, assessment::Evaluate(params_, figures)};
 }
 
 void SessionAssessment::Close() {

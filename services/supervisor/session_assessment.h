@@ -7,6 +7,7 @@
 #include "services/assessment/assessor.h"
 #include "services/bus/dds/participant.h"
 #include "services/bus/port.h"
+#include "services/supervisor/outcome.h"
 
 namespace fulcrum::supervisor {
 
@@ -27,7 +28,8 @@ class SessionAssessment {
   /// Closes the inputs; the figures stay.
   void Close();
 
-  [[nodiscard]] assessment::Assessor& assessor() { return assessor_; }
+  /// The session is over: what it came to.
+  [[nodiscard]] ScoreSheet Finish();
 
  private:
   const AssessmentParams params_;

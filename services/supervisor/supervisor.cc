@@ -90,18 +90,6 @@ std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFol
                                                                      : wanted);
 }
 
-/// Before anything is started: a session that cannot be remembered is better not begun.
-std::optional<TrainingLog> OpenTrainingLog(const UpSettings& settings, const SceneView& scene) {
-  if (settings.trainee.empty()) {
-    return std::nullopt;
-  }
-  if (scene.assessment.on == 0) {
-    throw InputError(std::string("--trainee: scene \"") + scene.name +
-                     "\" has no section `assessment`, so there is nothing to remember; take one that has");
-  }
-  return std::optional<TrainingLog>(std::in_place, settings.training_database);
-}
-
 }  // namespace
 
 struct Supervisor::Impl {
@@ -110,7 +98,7 @@ struct Supervisor::Impl {
         scene(up.scene),
         end_s(EndOfSession(up, scene.view())),
         guard(up.cart.domain),
-        training(OpenTrainingLog(up, scene.view())),
+        training(OpenTrainingLog(up.trainee, up.training_database, scene.view())),
         folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
         recording(RecordingFile(up, folder)),
         memory(bus::SharedMemoryDirectory(up.cart.domain)),
@@ -400,6 +388,9 @@ struct Supervisor::Impl {
     reached_s = ReachedTime();
     ended = true;
     if (assessed) assessed->End(reached_s);
+    // At once: a recording tells by it when the session was over.
+    next_health_ns = 0;
+    PublishOwnHealth(MonotonicNs());
     const auto recorder = std::find_if(nodes.begin(), nodes.end(),
                                        [](const NodeProcess& node) { return node.id() == NodeId::kRecorder; });
     End({nodes.begin(), recorder});
@@ -489,9 +480,7 @@ struct Supervisor::Impl {
     outcome.recording = recording;
     outcome.trainee = settings.trainee;
     if (assessed) {
-      assessed->assessor().Finish();
-      const assessment::Figures figures = assessed->assessor().figures();
-      outcome.sheet = ScoreSheet{figures, assessment::Evaluate(scene.view().assessment, figures)};
+      outcome.sheet = assessed->Finish();
       WriteFile(folder.path / "assessment.json", SheetJson(*outcome.sheet, {outcome.scene_name, outcome.session_id,
                                                                             outcome.trainee, outcome.started_utc}));
       Remember(&outcome);

@@ -76,6 +76,16 @@ void CheckTraineeName(const std::string& name) {
   }
 }
 
+std::optional<TrainingLog> OpenTrainingLog(const std::string& trainee, const std::filesystem::path& file,
+                                           const SceneView& scene) {
+  if (trainee.empty()) return std::nullopt;
+  if (scene.assessment.on == 0) {
+    throw InputError(std::string("--trainee: scene \"") + scene.name +
+                     "\" has no section `assessment`, so there is nothing to remember; take one that has");
+  }
+  return std::optional<TrainingLog>(std::in_place, file);
+}
+
 TrainingRow TrainingRowOf(const SessionOutcome& outcome) {
   TrainingRow row{outcome.trainee,
                   outcome.session_id,

@@ -4,9 +4,11 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "services/core/scene_view.h"
 #include "services/supervisor/outcome.h"
 
 struct sqlite3;
@@ -52,6 +54,11 @@ class TrainingLog {
   std::filesystem::path file_;
   std::unique_ptr<sqlite3, Closer> database_;
 };
+
+/// Of a session, before anything of it is started: one that cannot be remembered is better not begun. None without a
+/// trainee. Throws InputError, also when the scene is not assessed.
+[[nodiscard]] std::optional<TrainingLog> OpenTrainingLog(const std::string& trainee, const std::filesystem::path& file,
+                                                         const SceneView& scene);
 
 /// Throws InputError unless 1 to 63 bytes without control characters, not all blank.
 void CheckTraineeName(const std::string& name);
