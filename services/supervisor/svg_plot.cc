@@ -81,7 +81,7 @@ std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& l
   }
   const Axis value = MakeAxis(largest, 5);
   const double end_s = settings.end_s > 0 ? settings.end_s : 1.0;
-  const double time_step = NiceStep(end_s, 8);
+  const double time_step = std::max(NiceStep(end_s, 8), settings.dots ? 1.0 : 0.0);
   const auto x_of = [&](double t) { return kLeft + (kWidth - kLeft - kRight) * std::clamp(t / end_s, 0.0, 1.0); };
   const auto y_of = [&](double v) {
     return kHeight - kBottom - (kHeight - kTop - kBottom) * std::clamp(v / value.end, 0.0, 1.0);

@@ -20,7 +20,7 @@ struct PlotSettings {
   double end_s = 0;             ///< Right end of the time axis.
   std::vector<double> marks_s;  ///< Restarts: dashed vertical lines.
   std::string x_label = "session time [s]";
-  bool dots = false;  ///< A dot at each point.
+  bool dots = false;  ///< Over whole numbers: a dot at each point.
 };
 
 /// Empty when no line has a point.

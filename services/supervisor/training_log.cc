@@ -121,6 +121,8 @@ TrainingLog::TrainingLog(const std::filesystem::path& file, Access access) : fil
   const int code = sqlite3_open_v2(file.c_str(), &opened, flags, nullptr);
   database_.reset(opened);
   if (code != SQLITE_OK) Fail("cannot be opened");
+  // Opened for writing, a file that is not ours to write to is quietly opened for reading.
+  if (access == Access::kAdd && sqlite3_db_readonly(opened, "main") == 1) Fail("cannot be written to");
   sqlite3_busy_timeout(opened, kBusy_ms);
   CheckOrMake(access);
 }

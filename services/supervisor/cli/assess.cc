@@ -1,5 +1,7 @@
 #include "services/log_tools/assess.h"
 
+#include <cstdio>
+
 #include "services/assessment/score.h"
 #include "services/core/error.h"
 #include "services/recording/recorded_scene.h"

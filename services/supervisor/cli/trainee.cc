@@ -1,3 +1,5 @@
+#include <cstdio>
+
 #include "services/core/error.h"
 #include "services/supervisor/cli/commands.h"
 #include "services/supervisor/session_folder.h"

@@ -74,7 +74,8 @@ class AssessRecording : public testing::Test {
       }
       std::vector<std::uint8_t> bytes;
       EXPECT_TRUE(bus::EncodeCdr(message, &bytes)) << type;
-      writer.Write(channels[id], ++sequence, 1000 * sequence, 1000 * sequence, std::as_bytes(std::span(bytes)));
+      ++sequence;
+      writer.Write(channels[id], sequence, 1000 * sequence, 1000 * sequence, std::as_bytes(std::span(bytes)));
     };
     SceneManifest manifest;
     manifest.stamp = test::StampAt(-0.2);
