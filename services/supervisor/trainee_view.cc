@@ -13,7 +13,8 @@ namespace {
 constexpr std::array kShown{Measure::kTime,           Measure::kPathLength,    Measure::kMovements,
                             Measure::kPeakForce,      Measure::kDeviationMean, Measure::kDamageBeyondMargin,
                             Measure::kUreterInjuries, Measure::kNerveInjuries};
-constexpr std::array kHeads{"time s", "path mm", "moves", "peak N", "off line mm", "damage mm²", "ureter", "nerve"};
+constexpr std::array kHeads{"time s",      "path mm",    "moves",      "peak N",
+                            "off line mm", "damage mm²", "ureter inj", "nerve inj"};
 constexpr std::array kPlotted{Measure::kTime, Measure::kPathLength, Measure::kPeakForce, Measure::kDeviationMean,
                               Measure::kDamageBeyondMargin};
 constexpr std::array kColours{"#1f6feb", "#8250df", "#bc4c00", "#1a7f37", "#cf222e"};

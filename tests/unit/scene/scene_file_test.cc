@@ -286,7 +286,8 @@ TEST(SceneValidation, EveryRuleRefusesAndNamesItsSection) {
       {"planned_line", "at least two", [](SceneData& s) { s.planned_line = {Vec2f::Zero()}; }},
       {"planned_line", "t = nan",
        [](SceneData& s) {
-         s.planned_line = {Vec2f::Zero(), Vec2f(0, kNan)};
+         s.planned_line.assign(2, Vec2f::Zero());
+         s.planned_line[1].y() = kNan;
        }},
       {"static_surfaces", "beyond", [](SceneData& s) { s.static_surfaces[0].vertex_count = 0xffffffffu; }},
       {"static_surfaces", "role", [](SceneData& s) { s.static_surfaces[0].role = static_cast<SurfaceRole>(9); }},
