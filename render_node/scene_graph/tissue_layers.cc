@@ -16,9 +16,11 @@ using Float4 = std::array<float, 4>;
 
 constexpr std::uint32_t kFatStride = 2;
 // Layers of tissue that press on each other overlap by a millimetre in the simulation: the inner one gives way.
-constexpr float kFatBehind = 0.0015f;     // [m]
-constexpr float kRectumBehind = 0.0025f;  // [m]
-constexpr float kFasciaDepth = 0.0006f;   // [m] Below the peritoneum: as near as the fat comes.
+constexpr float kFatBehind = 0.0015f;        // [m]
+constexpr float kRectumBehind = 0.0025f;     // [m]
+constexpr std::size_t kMostLinePoints = 64;  // As in membrane.frag.
+constexpr float kInkReach = 0.001f;          // [m] The box around a planned line in which pixels look for it.
+constexpr float kFasciaDepth = 0.0006f;      // [m] Below the peritoneum: as near as the fat comes.
 
 Vec3f EyeOf(const Laparoscope& scope) {
   return -scope.view.block<3, 3>(0, 0).transpose() * scope.view.block<3, 1>(0, 3);
@@ -86,6 +88,29 @@ void TissueLayers::AddSheets() {
   Add(&sheet_, "membrane", Order::kMembrane, "membrane.frag");
   Blend(sheet_.mesh->state());
   sheet_.mesh->state()->addUniform(new osg::Uniform("fascia_depth", kFasciaDepth));
+  AddPlannedLine();
+}
+
+void TissueLayers::AddPlannedLine() {
+  const std::size_t all = scene_.planned_line.size();
+  const std::size_t count = std::min(all, kMostLinePoints);
+  osg::StateSet* state = sheet_.mesh->state();
+  state->addUniform(new osg::Uniform("planned_points", static_cast<int>(count)));
+  if (count < 2) {
+    return;
+  }
+  osg::ref_ptr<osg::Uniform> line =
+      new osg::Uniform(osg::Uniform::FLOAT_VEC2, "planned_line", static_cast<int>(kMostLinePoints));
+  Vec2f low = scene_.planned_line[0], high = low;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vec2f& p = scene_.planned_line[i * (all - 1) / (count - 1)];
+    line->setElement(static_cast<unsigned>(i), osg::Vec2(p.x(), p.y()));
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  state->addUniform(line);
+  state->addUniform(new osg::Uniform(
+      "planned_box", osg::Vec4(low.x() - kInkReach, low.y() - kInkReach, high.x() + kInkReach, high.y() + kInkReach)));
 }
 
 void TissueLayers::SetTissue(std::span<const float> xyz) {

@@ -48,6 +48,8 @@ class TissueLayers {
   void Show(Layer* layer, std::span<const Vec3f> positions, std::span<const Triangle> triangles, Sides sides);
   void AddRectum();
   void AddSheets();
+  /// The line that an exercise asks for, drawn on the membrane.
+  void AddPlannedLine();
   void UpdateRectum();
   void UpdateMembrane();
   void UpdateFat();

@@ -14,7 +14,28 @@ uniform vec2 atlas_per_metre;
 uniform float colour_by_temperature; // 1: the paper's eq. 15, from the temperature of the moment.
 uniform float fascia_depth;          // Below the peritoneum, along the normal [m].
 uniform mat4 osg_ProjectionMatrix;
+uniform int planned_points;            // Of the line that an exercise asks for; 0: none.
+uniform vec2 planned_line[64];         // [m] of the sheet.
+uniform vec4 planned_box;              // Lowest and highest (s, t) where its ink can be.
 out vec4 fragment;
+
+// Ink of the planned line: dashes half a millimetre wide.
+float PlannedInk(vec2 m) {
+  float edge = 0.5 * (fwidth(m.x) + fwidth(m.y)) + 5e-5; // Before any branch: derivatives need the neighbours.
+  if (planned_points < 2 || any(lessThan(m, planned_box.xy)) || any(greaterThan(m, planned_box.zw))) return 0.0;
+  float nearest = 1.0, along = 0.0, passed = 0.0;
+  for (int i = 0; i + 1 < planned_points; ++i) {
+    vec2 piece = planned_line[i + 1] - planned_line[i], from = m - planned_line[i];
+    float u = clamp(dot(from, piece) / dot(piece, piece), 0.0, 1.0);
+    float away = length(from - u * piece);
+    if (away < nearest) {
+      nearest = away;
+      along = passed + u * length(piece);
+    }
+    passed += length(piece);
+  }
+  return (1.0 - smoothstep(2.5e-4, 2.5e-4 + edge, nearest)) * step(fract(along / 0.002), 0.65);
+}
 
 // From a place of the sheet to the one over that place of the fascia which the same pixel shows [m]. The surface point
 // above the latter lies in the picture where `depth` along the normal leads from here.
@@ -39,6 +60,7 @@ void main() {
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
   float burnt = clamp(2.0 * heat.b - 1.0, 0.0, 1.0);
 
+  float ink = PlannedInk(m);
   vec3 bend = noise.rgb - 0.5;
   vec3 n = normalize(normal + 0.12 * bend);
   vec3 film = normalize(normal + 0.42 * bend);
@@ -55,6 +77,8 @@ void main() {
   float pale = max(smoothstep(0.05, 0.55, damage), smoothstep(58.0, 75.0, celsius));
   albedo = mix(albedo, vec3(0.92, 0.82, 0.66), pale);
   alpha = mix(alpha, 0.80, pale);
+  albedo = mix(albedo, vec3(0.06, 0.10, 0.42), 0.9 * ink);
+  alpha = mix(alpha, 0.95, ink);
   // Coagulated through and through it turns tan, dry it turns brown, charred it turns black.
   albedo = mix(albedo, vec3(0.46, 0.22, 0.08), 0.9 * smoothstep(0.3, 0.8, damage));
   float brown = smoothstep(0.02, 0.4, dry);

@@ -40,7 +40,8 @@ inline constexpr TopicSet kNodeReads = SetOf(kSceneManifest, kCommand);
 
 inline constexpr std::array kRoles{
     AccessRole{"supervisor", SetOf(kSceneManifest, kCommand, kCommandReply, kHealth),
-               SetOf(kCommand, kThermalEvent, kHealth)},
+               SetOf(kCommand, kThermalEvent, kHealth, kToolState, kContactModel, kCauteryContact, kTopologyState,
+                     kTemperaturePatch)},
     AccessRole{"handle_bridge", kNodeWrites | SetOf(kHandleState), kNodeReads},
     AccessRole{"haptics_node", kNodeWrites | SetOf(kToolState, kTickManifest), kNodeReads | SetOf(kContactModel)},
     AccessRole{"physics_node", kNodeWrites | SetOf(kTissueFrame, kContactModel, kCauteryContact, kTickManifest),

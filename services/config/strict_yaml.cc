@@ -493,6 +493,51 @@ StrictYaml StrictYaml::FromText(std::string_view text, std::string_view name) {
   return StrictYaml(internal::ParseDocument(text, name));
 }
 
+StrictYaml StrictYaml::FromFileOnBases(const std::filesystem::path& file, const std::vector<std::string_view>& own,
+                                       std::string_view text) {
+  constexpr std::size_t kMostBases = 8;  // More is a circle.
+  constexpr std::string_view kBase = "base";
+  const auto parse = [](const std::filesystem::path& at) {
+    return internal::ParseDocument(internal::ReadTextFile(at.string()), at.string());
+  };
+  const auto take = [&](Document* document, std::string_view key) -> const Node* {
+    auto& entries = document->root->entries;
+    const auto at = std::find_if(entries.begin(), entries.end(), [&](const auto& entry) { return entry.first == key; });
+    const Node* node = at == entries.end() ? nullptr : at->second;
+    if (node != nullptr) entries.erase(at);
+    return node;
+  };
+  auto document = text.empty() ? parse(file) : internal::ParseDocument(text, file.string() + " with --set applied");
+  std::filesystem::path folder = file.parent_path();
+  const Node* next = take(document.get(), kBase);
+  while (next != nullptr) {
+    if (next->kind != NodeKind::kScalar || next->text.empty()) {
+      document->Fail(next->line, kBase, std::string("expected the name of a file, found ") + KindName(*next));
+    }
+    if (document->bases.size() == kMostBases) {
+      document->Fail(next->line, kBase, "more than 8 files stand on one another: is there a circle?");
+    }
+    const std::filesystem::path at = (folder / next->text).lexically_normal();
+    if (!std::filesystem::is_regular_file(at)) {
+      document->Fail(next->line, kBase,
+                     Quoted(next->text) + " is not at " + at.string() + "; give a file beside this one");
+    }
+    auto below = parse(at);
+    const Node* after = take(below.get(), kBase);
+    for (const std::string_view key : own) (void)take(below.get(), key);
+    folder = at.parent_path();
+    internal::LayOver(std::move(below), document.get());
+    next = after;
+  }
+  return StrictYaml(std::move(document));
+}
+
+std::vector<std::filesystem::path> StrictYaml::files() const {
+  std::vector<std::filesystem::path> all{document_->name};
+  all.insert(all.end(), document_->bases.begin(), document_->bases.end());
+  return all;
+}
+
 StrictYaml::StrictYaml(std::unique_ptr<Document> document) : document_(std::move(document)) {}
 StrictYaml::~StrictYaml() = default;
 StrictYaml::StrictYaml(StrictYaml&&) noexcept = default;

@@ -162,11 +162,19 @@ class StrictYaml {
   static StrictYaml FromFile(const std::filesystem::path& file);
   /// The same for text in memory; `name` stands for the file in messages.
   static StrictYaml FromText(std::string_view text, std::string_view name);
+  /// The same of a file that may stand on others: its key `base` names one, relative to its folder, and so on. Maps
+  /// join key by key, anything else replaces what the base says, lists as a whole; `own` keys are never taken from a
+  /// base.
+  /// @param text stands for the content of `file` when it is not empty.
+  static StrictYaml FromFileOnBases(const std::filesystem::path& file, const std::vector<std::string_view>& own,
+                                    std::string_view text = {});
   ~StrictYaml();
   StrictYaml(StrictYaml&&) noexcept;
   StrictYaml& operator=(StrictYaml&&) noexcept;
 
   [[nodiscard]] StrictMap root();
+  /// The files that it was read from: itself, then its bases.
+  [[nodiscard]] std::vector<std::filesystem::path> files() const;
   /// Refuses keys that nobody asked for. Call when everything has been read.
   void Finish() const;
   /// What was read, defaults included, as YAML in the order of reading. Reads back to the same.

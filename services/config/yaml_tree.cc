@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 #include "services/core/error.h"
@@ -195,10 +196,11 @@ Node* Document::NewNode(NodeKind kind, int line, std::string path) {
 }
 
 void Document::Fail(int line, std::string_view path, std::string_view reason) const {
-  std::string message = name;
+  const auto file = static_cast<std::size_t>(line / kLinesPerFile);
+  std::string message = file == 0 ? name : bases[file - 1];
   if (line > 0) {
     message += ':';
-    message += std::to_string(line);
+    message += std::to_string(line % kLinesPerFile);
   }
   message += ": ";
   if (!path.empty()) {
@@ -206,6 +208,36 @@ void Document::Fail(int line, std::string_view path, std::string_view reason) co
     message += ": ";
   }
   throw InputError(message.append(reason));
+}
+
+namespace {
+
+void Join(Node* base, const Node& over) {
+  for (const auto& [key, node] : over.entries) {
+    const auto known =
+        std::find_if(base->entries.begin(), base->entries.end(),
+                     [&, name = std::string_view(key)](const auto& entry) { return entry.first == name; });
+    if (known == base->entries.end()) {
+      base->entries.emplace_back(key, node);
+    } else if (known->second->kind == NodeKind::kMap && node->kind == NodeKind::kMap) {
+      Join(known->second, *node);
+    } else {
+      known->second = node;
+    }
+  }
+}
+
+}  // namespace
+
+void LayOver(std::unique_ptr<Document> base, Document* document) {
+  const int shift = kLinesPerFile * static_cast<int>(document->bases.size() + 1);
+  for (const auto& node : base->nodes) {
+    node->line += shift;
+  }
+  Join(base->root, *document->root);
+  document->root = base->root;
+  document->bases.push_back(base->name);
+  std::move(base->nodes.begin(), base->nodes.end(), std::back_inserter(document->nodes));
 }
 
 std::unique_ptr<Document> ParseDocument(std::string_view text, std::string_view name) {

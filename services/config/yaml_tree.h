@@ -36,8 +36,12 @@ struct Node {
   [[nodiscard]] Node* Find(std::string_view key) const;
 };
 
+/// Lines of the k-th file that a document was laid over count from k times this: more than any file of ours has.
+inline constexpr int kLinesPerFile = 1 << 21;
+
 struct Document {
-  std::string name;  ///< File, as given by the user.
+  std::string name;                ///< File, as given by the user.
+  std::vector<std::string> bases;  ///< The files beneath it, the nearest first.
   std::vector<std::unique_ptr<Node>> nodes;
   Node* root = nullptr;
 
@@ -45,6 +49,9 @@ struct Document {
   /// Throws InputError "file:line: path: reason".
   [[noreturn]] void Fail(int line, std::string_view path, std::string_view reason) const;
 };
+
+/// Lays `document` over `base`: maps join key by key, anything else replaces what is there. `base` is used up.
+void LayOver(std::unique_ptr<Document> base, Document* document);
 
 /// Parses one YAML document whose root is a map. Throws InputError.
 std::unique_ptr<Document> ParseDocument(std::string_view text, std::string_view name);

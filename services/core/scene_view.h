@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "services/core/assessment.h"
 #include "services/core/messages.h"
 #include "services/core/types.h"
 
@@ -215,6 +216,7 @@ struct SceneView {
   RenderParams render;
   HapticsParams haptics;
   Breathing breathing;
+  AssessmentParams assessment = UsualAssessment();
 
   /// Particles: tube vertices [0, tube_vertex_count), then the membrane grid.
   Index tube_vertex_count = 0;
@@ -250,6 +252,7 @@ struct SceneView {
   std::span<const Triangle> tool_triangles;
   std::span<const ScriptKey> script;  ///< Sorted by tool, then time.
   float script_duration_s = 0;
+  std::span<const Vec2f> planned_line;  ///< Of the assessment: (s, t) on the flattened sheet, m; empty: none.
 
   /// Bit per NodeId: what the supervisor starts for this scene.
   std::uint32_t node_mask = 0x3e;

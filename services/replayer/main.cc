@@ -19,6 +19,7 @@
 #include "services/config/cart.h"
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
+#include "services/recording/recorded_scene.h"
 #include "services/replayer/changed_scene.h"
 #include "services/replayer/console.h"
 #include "services/replayer/live.h"
@@ -109,14 +110,6 @@ std::vector<NodeId> NodesNamed(const po::variables_map& values, const char* opti
 /// All that publish.
 const std::vector<NodeId> kPublishers{NodeId::kSupervisor, NodeId::kHandleBridge, NodeId::kHaptics,
                                       NodeId::kPhysics,    NodeId::kThermal,      NodeId::kRender};
-
-/// What stands beside the recording in its session's folder, unless it was given.
-std::filesystem::path BesideRecording(const std::string& given, const std::filesystem::path& recording,
-                                      const char* name) {
-  if (!given.empty()) return given;
-  const std::filesystem::path beside = recording.parent_path() / name;
-  return std::filesystem::exists(beside) ? beside : std::filesystem::path();
-}
 
 replay::LiveSettings LiveSettingsFrom(const po::variables_map& values) {
   replay::LiveSettings settings;
@@ -248,8 +241,10 @@ Options Parse(int argc, char** argv) {
     if (options.console && !(options.changes.empty() && values["json"].as<std::string>().empty())) {
       throw InputError("--console goes with neither --set nor --json");
     }
-    options.scene = BesideRecording(values["scene"].as<std::string>(), options.lock_step.recording, "scene.fulcrum");
-    options.cart = BesideRecording(values["cart"].as<std::string>(), options.lock_step.recording, "cart.yaml");
+    options.scene =
+        recording::BesideRecording(values["scene"].as<std::string>(), options.lock_step.recording, "scene.fulcrum");
+    options.cart =
+        recording::BesideRecording(values["cart"].as<std::string>(), options.lock_step.recording, "cart.yaml");
     options.json = values["json"].as<std::string>();
     options.quiet = values.count("quiet") != 0 || ::isatty(STDERR_FILENO) == 0;
     if (options.scene.empty()) {

@@ -4,14 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <filesystem>
-#include <optional>
-#include <string>
 
 #include "services/config/cart.h"
-#include "services/core/error.h"
 #include "services/core/messages.h"
-#include "services/core/scene_view.h"
+#include "services/recording/recorded_scene.h"
 
 namespace fulcrum::replay {
 
@@ -24,12 +20,6 @@ namespace fulcrum::replay {
   return period_s;
 }
 
-/// Throws MismatchError when the session that was recorded is of another scene.
-inline void RefuseOtherScene(const std::filesystem::path& recording, const std::optional<SceneManifest>& session,
-                             const SceneView& scene) {
-  if (!session || session->scene_hash == scene.hash) return;
-  throw MismatchError(recording.string() + " was recorded with another scene (\"" + session->scene_name +
-                      "\"): give the compiled scene of that session with --scene");
-}
+using recording::RefuseOtherScene;
 
 }  // namespace fulcrum::replay

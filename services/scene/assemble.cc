@@ -14,7 +14,9 @@ namespace fulcrum::scene {
 namespace {
 
 constexpr double kAtlasMargin_m = 0.001;  ///< Sheet coordinates begin here, so that a patch has texels all round.
-constexpr int kStructurePoints = 33;      ///< Along each ureter or nerve: 6 mm apart on a 200 mm sheet.
+constexpr float kLineStep =
+    0.01f;  ///< Of a planned line, in fractions of the sheet: the sheet is not straight between.
+constexpr int kStructurePoints = 33;  ///< Along each ureter or nerve: 6 mm apart on a 200 mm sheet.
 /// A tip may lie this far from the pivot at most: a laparoscopic shaft is about 330 mm long.
 constexpr double kLongestReach_m = 0.30;
 /// … and at least this far, also from the end of its shaft: the devices do not turn a shorter lever.
@@ -316,6 +318,18 @@ void AddScript(const SceneSettings& settings, const Sheet& sheet, SceneData* sce
   scene->fixed.script_duration_s = static_cast<float>(settings.script_duration_s);
 }
 
+void AddPlannedLine(const SceneSettings& settings, const Sheet& sheet, SceneData* scene) {
+  for (std::size_t i = 0; i < settings.planned_line.size(); ++i) {
+    const Vec2f& to = settings.planned_line[i];
+    const Vec2f& from = settings.planned_line[i > 0 ? i - 1 : 0];
+    const int parts = i > 0 ? std::max(1, static_cast<int>(std::ceil((to - from).norm() / kLineStep))) : 1;
+    for (int k = 1; k <= parts; ++k) {
+      const Vec2f at = from + static_cast<float>(k) / static_cast<float>(parts) * (to - from);
+      scene->planned_line.push_back(sheet.At(at.x(), at.y()).material);
+    }
+  }
+}
+
 }  // namespace
 
 SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
@@ -328,6 +342,7 @@ SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
   fixed.render = settings.render;
   fixed.haptics = settings.haptics;
   fixed.breathing = settings.breathing;
+  fixed.assessment = settings.assessment;
   fixed.tools = settings.tools;
   fixed.node_mask = settings.node_mask;
   fixed.tube_vertex_count = static_cast<Index>(anatomy.organ_vertices.size());
@@ -344,6 +359,7 @@ SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
   const Sheet sheet(settings.membrane, anatomy.sheet, scene.membrane_material);
   AddStructures(settings, sheet, &scene);
   AddScript(settings, sheet, &scene);
+  AddPlannedLine(settings, sheet, &scene);
 
   const std::size_t n = scene.rest_position.size();
   const auto particles = [](const auto& c) { return ParticlesOf(c); };

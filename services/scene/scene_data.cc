@@ -28,6 +28,7 @@ SceneView SceneData::View() const {
   view.tool_vertices = tool_vertices;
   view.tool_triangles = tool_triangles;
   view.script = script;
+  view.planned_line = planned_line;
   return view;
 }
 

@@ -58,6 +58,7 @@ struct FixedPart {
   RenderParams render;
   HapticsParams haptics;
   Breathing breathing;
+  AssessmentParams assessment;
   MembraneGrid membrane;
   Index tube_vertex_count;
   FixedTool tools[kMaxTools];
@@ -65,8 +66,8 @@ struct FixedPart {
   std::uint32_t node_mask;
 };
 static_assert(sizeof(FixedPart) == 64 + sizeof(PhysicsParams) + sizeof(ThermalParams) + sizeof(RenderParams) +
-                                       sizeof(HapticsParams) + sizeof(Breathing) + sizeof(MembraneGrid) + 4 +
-                                       kMaxTools * 32 + 8);
+                                       sizeof(HapticsParams) + sizeof(Breathing) + sizeof(AssessmentParams) +
+                                       sizeof(MembraneGrid) + 4 + kMaxTools * 32 + 8);
 
 FixedPart ToFixed(const SceneView& view) {
   FixedPart fixed{};
@@ -76,6 +77,7 @@ FixedPart ToFixed(const SceneView& view) {
   fixed.render = view.render;
   fixed.haptics = view.haptics;
   fixed.breathing = view.breathing;
+  fixed.assessment = view.assessment;
   fixed.membrane = view.membrane;
   fixed.tube_vertex_count = view.tube_vertex_count;
   for (int i = 0; i < kMaxTools; ++i) {
@@ -95,6 +97,7 @@ void FromFixed(const FixedPart& fixed, SceneView* view) {
   view->render = fixed.render;
   view->haptics = fixed.haptics;
   view->breathing = fixed.breathing;
+  view->assessment = fixed.assessment;
   view->membrane = fixed.membrane;
   view->tube_vertex_count = fixed.tube_vertex_count;
   for (int i = 0; i < kMaxTools; ++i) {

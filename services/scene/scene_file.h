@@ -11,7 +11,7 @@
 
 namespace fulcrum::scene {
 
-inline constexpr std::uint32_t kSceneFileVersion = 6;
+inline constexpr std::uint32_t kSceneFileVersion = 7;
 
 /// Owns the arrays of a scene under construction or in a test; `View()` gives what the nodes read.
 struct SceneData {
@@ -40,6 +40,7 @@ struct SceneData {
   std::vector<Vec3f> tool_vertices;
   std::vector<Triangle> tool_triangles;
   std::vector<ScriptKey> script;
+  std::vector<Vec2f> planned_line;
 
   [[nodiscard]] SceneView View() const;
 };

@@ -127,7 +127,9 @@ struct SceneSettings {
   std::array<ToolMeshSettings, kMaxTools> tool_meshes;
   std::vector<ScriptKeySettings> script;
   double script_duration_s = 20;
-  std::uint32_t node_mask = 0x3e;  ///< Bit per NodeId.
+  AssessmentParams assessment = UsualAssessment();
+  std::vector<Vec2f> planned_line;  ///< Of the assessment: (s, t) fractions in [0, 1], straight from point to point.
+  std::uint32_t node_mask = 0x3e;   ///< Bit per NodeId.
 };
 
 /// A tool with the usual dimensions and its trocar at `p_WP`.

@@ -89,11 +89,11 @@ void ReadCentreline(StrictMap map, std::vector<Vec3f>* points) {
   }
 }
 
-void ReadImport(StrictMap map, const std::filesystem::path& base, ImportSettings* import, Folders* folders) {
+void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Folders* folders) {
   for (const std::string& folder : map.Texts("folders", 0, 16)) {
-    folders->push_back(base / folder);
+    for (const auto& base : bases) folders->push_back(base / folder);
   }
-  folders->push_back(base);
+  folders->insert(folders->end(), bases.begin(), bases.end());
   import->scale_m = map.Choice("unit", import->scale_m, kLengthUnits);
   import->origin_m = map.Vector3Si("origin_mm", import->origin_m, Range::Between(-2000, 2000));
   import->organ_file = FindFile(map, "organ", map.Text("organ"), *folders);
@@ -263,7 +263,8 @@ std::uint32_t ReadNodes(StrictMap* root, std::uint32_t all) {
   return mask;
 }
 
-SceneDescription Read(StrictYaml* yaml, const std::filesystem::path& base, const std::filesystem::path& data) {
+/// `bases`: where relative names of the description start from.
+SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesystem::path& data) {
   SceneSettings scene;
   StrictMap root = yaml->root();
   scene.name = root.Text("name", 63);
@@ -278,10 +279,10 @@ SceneDescription Read(StrictYaml* yaml, const std::filesystem::path& base, const
     folders.push_back(data);
   }
   if (organ.Has("import")) {
-    ReadImport(organ.Map("import"), base, &scene.import.emplace(), &folders);
+    ReadImport(organ.Map("import"), bases, &scene.import.emplace(), &folders);
   } else {
     ReadTube(organ.Map("procedural"), &scene.tube);
-    folders.push_back(base);
+    folders.insert(folders.end(), bases.begin(), bases.end());
   }
   ReadMembrane(root.MapOrDefaults("membrane"), &scene.membrane);
   for (StrictMap& entry : root.Maps("structures", 0, kMaxStructures)) {
@@ -298,6 +299,9 @@ SceneDescription Read(StrictYaml* yaml, const std::filesystem::path& base, const
   ReadRender(root.MapOrDefaults("render"), &scene.render);
   ReadHaptics(root.MapOrDefaults("haptics"), &scene.haptics);
   ReadScript(root.MapOrDefaults("script"), &scene);
+  if (auto assessment = root.OptionalMap("assessment")) {
+    ReadAssessment(*assessment, &scene.assessment, &scene.planned_line);
+  }
   scene.node_mask = ReadNodes(&root, scene.node_mask);
   yaml->Finish();
   return {scene, yaml->Effective(), yaml->Rules()};
@@ -307,18 +311,24 @@ SceneDescription Read(StrictYaml* yaml, const std::filesystem::path& base, const
 
 SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
                                const std::vector<std::string>& changes) {
-  StrictYaml yaml = StrictYaml::FromFile(file);
+  std::string changed;
   if (!changes.empty()) {
     std::ifstream stream(file, std::ios::binary);
     const std::string text{std::istreambuf_iterator<char>(stream), {}};
-    yaml = StrictYaml::FromText(ApplyChanges(text, changes, kCompileSections), file.string() + " with --set applied");
+    changed = ApplyChanges(text, changes, kCompileSections);
   }
-  return Read(&yaml, file.parent_path(), data);
+  // A scene of the same name as the one it stands on would be taken for that.
+  StrictYaml yaml = StrictYaml::FromFileOnBases(file, {"name", "description"}, changed);
+  Folders bases;
+  for (const auto& from : yaml.files()) {
+    if (std::find(bases.begin(), bases.end(), from.parent_path()) == bases.end()) bases.push_back(from.parent_path());
+  }
+  return Read(&yaml, bases, data);
 }
 
 SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data) {
   StrictYaml yaml = StrictYaml::FromText(text, name);
-  return Read(&yaml, {}, data);
+  return Read(&yaml, {std::filesystem::path()}, data);
 }
 
 std::vector<SceneSummary> ListScenes(const std::filesystem::path& folder) {

@@ -32,6 +32,7 @@ void ForEachSection(View& view, Visitor&& visit) {
   visit("tool_vertices", view.tool_vertices);
   visit("tool_triangles", view.tool_triangles);
   visit("script", view.script);
+  visit("planned_line", view.planned_line);
 }
 
 }  // namespace fulcrum::scene

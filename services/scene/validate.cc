@@ -199,6 +199,13 @@ void CheckStructuresAndScript(const SceneView& s) {
     CheckRange("protected_points", "s", i, s.protected_points[i].material.x(), -1, 1);
     CheckRange("protected_points", "t", i, s.protected_points[i].material.y(), -1, 1);
   }
+  if (s.planned_line.size() == 1) {
+    Fail("planned_line", "needs at least two points");
+  }
+  for (std::size_t i = 0; i < s.planned_line.size(); ++i) {
+    CheckRange("planned_line", "s", i, s.planned_line[i].x(), -1, 1);
+    CheckRange("planned_line", "t", i, s.planned_line[i].y(), -1, 1);
+  }
   for (std::size_t i = 0; i < s.script.size(); ++i) {
     const ScriptKey& key = s.script[i];
     CheckIndex("script", i, key.tool, 0, kMaxTools);

@@ -18,6 +18,23 @@ void CheckBounds(std::initializer_list<Bound> bounds) {
   }
 }
 
+void CheckAssessment(const AssessmentParams& a) {
+  if (a.tracing > LineTracing::kTouch) {
+    Fail("scene", "assessment.line.by = ", static_cast<std::uint32_t>(a.tracing), "; valid: 0 (cut), 1 (touch)");
+  }
+  CheckBounds({{"assessment", static_cast<float>(a.on), 0, 1},
+               {"assessment.line.reach", a.line_reach_m, 1e-4f, 0.05f},
+               {"assessment.margin", a.margin_m, 0, 0.05f},
+               {"assessment.near", a.near_m, 0, 0.05f},
+               {"assessment.movement_speed", a.movement_speed_m_s, 1e-4f, 1},
+               {"assessment.idle_speed", a.idle_speed_m_s, 1e-5f, a.movement_speed_m_s},
+               {"assessment.idle_after", a.idle_after_s, 0, 60}});
+  for (std::size_t i = 0; i < kMeasureCount; ++i) {
+    const MeasureInfo& info = kMeasures[i];
+    CheckBounds({{info.key, a.limit[i], info.low, info.high}, {info.name, a.points[i], 0, kMostPoints}});
+  }
+}
+
 }  // namespace
 
 void CheckParameters(const SceneView& s) {
@@ -96,6 +113,7 @@ void CheckParameters(const SceneView& s) {
                {"breathing.period", s.breathing.period_s, 0.5f, 60},
                {"script duration", s.script_duration_s, 0, 86400},
                {"membrane texel", s.membrane.texel_m, 1e-6f, 0.01f}});
+  CheckAssessment(s.assessment);
   CheckPoint("scene", 0, r.scope_tip_W);
   CheckPoint("scene", 1, r.scope_target_W);
   for (std::size_t i = 0; i < s.tools.size(); ++i) {

@@ -131,4 +131,47 @@ void ReadBreathing(StrictMap map, PhysicsMode mode, Breathing* b) {
   }
 }
 
+namespace {
+
+constexpr std::size_t kMaxLinePoints = 64;
+
+void ReadLine(StrictMap map, AssessmentParams* a, std::vector<Vec2f>* line) {
+  const auto across = map.Numbers("s", 2, kMaxLinePoints, Range::Between(0, 1));
+  const auto along = map.Numbers("t", 2, kMaxLinePoints, Range::Between(0, 1));
+  if (across.size() != along.size()) {
+    map.Fail("t", "must have as many entries as s");
+  }
+  for (std::size_t i = 0; i < across.size(); ++i) {
+    line->emplace_back(static_cast<float>(across[i]), static_cast<float>(along[i]));
+    if (i > 0 && (*line)[i] == (*line)[i - 1]) {
+      map.Fail("t", "a point of the line stands twice");
+    }
+  }
+  a->tracing = map.Choice("by", a->tracing, {{"cut", LineTracing::kCut}, {"touch", LineTracing::kTouch}});
+  ReadSi(&map, "reach_mm", Range::Between(0.1, 50), &a->line_reach_m);
+}
+
+}  // namespace
+
+void ReadAssessment(StrictMap map, AssessmentParams* a, std::vector<Vec2f>* line) {
+  a->on = 1;
+  if (auto entry = map.OptionalMap("line")) {
+    ReadLine(*entry, a, line);
+  }
+  ReadSi(&map, "margin_mm", Range::Between(0, 50), &a->margin_m);
+  ReadSi(&map, "near_mm", Range::Between(0, 50), &a->near_m);
+  ReadSi(&map, "movement_speed_mm_s", Range::Between(0.1, 1000), &a->movement_speed_m_s);
+  ReadSi(&map, "idle_speed_mm_s", Range::Between(0.01, 1000), &a->idle_speed_m_s);
+  if (a->idle_speed_m_s > a->movement_speed_m_s) {
+    map.Fail("idle_speed_mm_s", "must not exceed movement_speed_mm_s");
+  }
+  ReadSi(&map, "idle_after_s", Range::Between(0, 60), &a->idle_after_s);
+  StrictMap limits = map.MapOrDefaults("limits"), points = map.MapOrDefaults("points");
+  for (std::size_t i = 0; i < kMeasureCount; ++i) {
+    const MeasureInfo& m = kMeasures[i];
+    a->limit[i] = static_cast<float>(limits.Number(m.key, Decimal(m.limit), Range::Between(Decimal(m.low), m.high)));
+    a->points[i] = static_cast<float>(points.Number(m.name, Decimal(m.points), Range::Between(0, kMostPoints)));
+  }
+}
+
 }  // namespace fulcrum::scene

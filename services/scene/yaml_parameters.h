@@ -1,5 +1,8 @@
-// Reading the sections of a scene description that are plain parameters: physics, thermal, render, haptics, breathing.
+// Reading the sections of a scene description that are plain parameters: physics, thermal, render, haptics, breathing,
+// assessment.
 #pragma once
+
+#include <vector>
 
 #include "services/config/strict_yaml.h"
 #include "services/core/scene_view.h"
@@ -19,5 +22,8 @@ void ReadRender(config::StrictMap map, RenderParams* r);
 void ReadHaptics(config::StrictMap map, HapticsParams* h);
 /// `mode`: of the physics that was read; in mode paper nothing breathes.
 void ReadBreathing(config::StrictMap map, PhysicsMode mode, Breathing* b);
+
+/// `line`: the planned line, fractions of the sheet.
+void ReadAssessment(config::StrictMap map, AssessmentParams* a, std::vector<Vec2f>* line);
 
 }  // namespace fulcrum::scene

@@ -1,35 +1,13 @@
 #include "services/supervisor/outcome.h"
 
 #include <array>
-#include <cmath>
 #include <cstdio>
 
-#include "services/core/json_text.h"
+#include "services/supervisor/flat_json.h"
+#include "services/supervisor/score_sheet.h"
 
 namespace fulcrum::supervisor {
 namespace {
-
-class FlatJson {
- public:
-  void Add(const std::string& key, const std::string& value) { AddRaw(key, JsonString(value)); }
-  void Add(const std::string& key, const char* value) { AddRaw(key, JsonString(value)); }
-  void Add(const std::string& key, bool value) { AddRaw(key, value ? "true" : "false"); }
-  void Add(const std::string& key, double value) {
-    std::array<char, 32> text{};
-    std::snprintf(text.data(), text.size(), "%.9g", value);
-    AddRaw(key, std::isfinite(value) ? text.data() : "null");
-  }
-  [[nodiscard]] std::string text() const { return "{" + body_ + "\n}\n"; }
-
- private:
-  void AddRaw(const std::string& key, const std::string& value) {
-    body_ += body_.empty() ? "\n  " : ",\n  ";
-    body_ += JsonString(key);
-    body_ += ": ";
-    body_ += value;
-  }
-  std::string body_;
-};
 
 double Ms(float us) { return 1e-3 * static_cast<double>(us); }
 
@@ -100,6 +78,9 @@ std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& reco
   if (!outcome.recording.empty()) {
     json.Add("recording", outcome.recording.string());
     json.Add("samples_not_recorded", static_cast<double>(record.node(NodeId::kRecorder).drops));
+  }
+  if (outcome.sheet) {
+    json.Add("score_pct", outcome.sheet->score.percent());
   }
   json.Add("restarts", static_cast<double>(record.restarts().size()));
   json.Add("refused.participants", static_cast<double>(record.refusals().participants));
@@ -177,6 +158,9 @@ std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& recor
   }
   if (!outcome.recording.empty()) {
     text += "recording: " + outcome.recording.string() + ", " + RecordingLosses(record) + "\n";
+  }
+  if (outcome.sheet) {
+    text += "\n" + SheetTable(*outcome.sheet);
   }
   text += std::string("\n") + Fixed(outcome.duration_s, 1) + " s of \"" + outcome.scene_name + "\": ";
   text += outcome.verdict.empty() ? "all well\n" : "NOT WELL: " + outcome.verdict + "\n";

@@ -2,13 +2,21 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "services/assessment/score.h"
 #include "services/core/exit_code.h"
 #include "services/supervisor/session_record.h"
 
 namespace fulcrum::supervisor {
+
+/// What an assessed session came to.
+struct ScoreSheet {
+  assessment::Figures figures;
+  assessment::Score score;
+};
 
 struct SessionOutcome {
   std::string scene_name;
@@ -22,7 +30,9 @@ struct SessionOutcome {
   ExitCode exit_code = ExitCode::kDone;
   /// Of all topics; a recorder that was restarted has written another beside it, "-2" and so on. Empty: none.
   std::filesystem::path recording;
-  std::string verdict;  ///< Empty when all is well; else one line that says what is not.
+  std::optional<ScoreSheet> sheet;  ///< None: the scene has no section `assessment`.
+  std::string trainee;              ///< Empty: not told.
+  std::string verdict;              ///< Empty when all is well; else one line that says what is not.
 };
 
 /// The figures of a session by name: the one list that table, JSON and report take theirs from.

@@ -6,6 +6,7 @@
 
 #include "services/core/escape.h"
 #include "services/supervisor/picture.h"
+#include "services/supervisor/score_sheet.h"
 #include "services/supervisor/svg_plot.h"
 
 namespace fulcrum::supervisor {
@@ -38,7 +39,7 @@ svg .mark { stroke: #d1242f; stroke-width: 1.5; stroke-dasharray: 5 4; }
 table { width: 100%; border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 17px; }
 th { text-align: right; font-weight: 600; color: var(--soft); font-size: 15px; border-bottom: 2px solid var(--line); }
 th, td { padding: 9px 10px; } td { text-align: right; border-bottom: 1px solid var(--line); }
-th:first-child, td:first-child, td.text, th.text { text-align: left; } tr.bad td { color: #8d1512; } .scroll { overflow-x: auto; }
+th:first-child, td:first-child, td.text, th.text { text-align: left; } tr.bad td { color: #8d1512; } tr.soft td { color: var(--soft); } tr.sum td { font-weight: 600; } .scroll { overflow-x: auto; }
 details { margin-top: 14px; } summary { cursor: pointer; font-weight: 600; }
 pre { background: #fff; border: 1px solid var(--line); border-radius: 12px; padding: 18px; overflow-x: auto; font-size: 15px; }
 @media (max-width: 760px) { .sheet { grid-template-columns: 1fr; } .plots { grid-template-columns: 1fr; } }
@@ -219,8 +220,9 @@ std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& recor
       "<meta name='viewport' content='width=device-width, initial-scale=1'><title>Fulcrum · ";
   html += EscapeHtml(outcome.scene_name + " · " + outcome.session_id) + "</title><style>" + kStyle;
   html += "</style></head><body><main>\n";
-  html += Header(outcome) + Tiles(record) + Pictures(frames, clip) + Plots(outcome, record) + Nodes(outcome, record) +
-          Restarts(record) + Refusals(record) + Events(record);
+  html += Header(outcome) + Tiles(record) + (outcome.sheet ? SheetHtml(*outcome.sheet, outcome.trainee) : "") +
+          Pictures(frames, clip) + Plots(outcome, record) + Nodes(outcome, record) + Restarts(record) +
+          Refusals(record) + Events(record);
   if (!outcome.recording.empty()) {
     html += Tag("h2", "Recording") + Tag("p", "All topics: " + outcome.recording.string() + ", " +
                                                   RecordingLosses(record) + " (fulcrum log info says more).");

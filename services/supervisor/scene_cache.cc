@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <set>
 #include <thread>
 
 #include "services/core/error.h"
@@ -50,7 +51,8 @@ std::vector<std::string> PathWords(const std::string& yaml) {
 
 /// Any word that names an existing file, in the scene's folder, the data folder or a folder that the YAML names, is
 /// taken for an input: too many cost a compilation, too few would run yesterday's anatomy.
-void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::path& data, Hash64* hash) {
+void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::path& data, std::set<fs::path>* seen,
+                     Hash64* hash) {
   const std::vector<std::string> words = PathWords(yaml);
   std::vector<fs::path> bases{folder};
   if (!data.empty()) {
@@ -66,6 +68,10 @@ void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::
     for (const fs::path& base : bases) {
       if (fs::is_regular_file(base / word, error)) {
         AddFile(hash, base / word);
+        // A scene that this one stands on may name others.
+        if (fs::path(word).extension() == ".yaml" && seen->insert(fs::canonical(base / word, error)).second) {
+          AddFilesNamedIn(ReadText(base / word), (base / word).parent_path(), data, seen, hash);
+        }
       }
     }
   }
@@ -146,7 +152,8 @@ fs::path ResolveScene(const SceneRequest& request) {
     hash.Add(std::string_view(change + "\n"));
   }
   AddFile(&hash, request.compiler);
-  AddFilesNamedIn(yaml, source.parent_path(), request.data, &hash);
+  std::set<fs::path> seen;
+  AddFilesNamedIn(yaml, source.parent_path(), request.data, &seen, &hash);
   std::array<char, 24> key{};
   std::snprintf(key.data(), key.size(), "-%016llx", static_cast<unsigned long long>(hash.value()));
   fs::path target = request.cache / (source.stem().string() + key.data() + ".fulcrum");

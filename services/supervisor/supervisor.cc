@@ -32,10 +32,13 @@
 #include "services/supervisor/outcome.h"
 #include "services/supervisor/progress.h"
 #include "services/supervisor/report.h"
+#include "services/supervisor/score_sheet.h"
 #include "services/supervisor/script_outlook.h"
+#include "services/supervisor/session_assessment.h"
 #include "services/supervisor/session_folder.h"
 #include "services/supervisor/session_keys.h"
 #include "services/supervisor/session_record.h"
+#include "services/supervisor/training_log.h"
 
 namespace fulcrum::supervisor {
 namespace {
@@ -115,6 +118,7 @@ struct Supervisor::Impl {
         scene(up.scene),
         end_s(EndOfSession(up, scene.view())),
         guard(up.cart.domain),
+        training(OpenTrainingLog(up.trainee, up.training_database, scene.view())),
         folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
         recording(RecordingFile(up, folder)),
         memory(bus::SharedMemoryDirectory(up.cart.domain)),
@@ -140,6 +144,9 @@ struct Supervisor::Impl {
     if (!remote_ids.empty()) {
       link.emplace(link::LinkSettings{.far = FarOf(up), .offer = MakeOffer(), .scene = folder.scene});
       link->Join(&*participant, link->settings().offer->nodes);
+    }
+    if (scene.view().assessment.on != 0) {
+      assessed.emplace(scene.view(), &*participant);
     }
     for (const NodeId id : node_ids) {
       if (id == NodeId::kPhysics && up.standby) {
@@ -170,6 +177,9 @@ struct Supervisor::Impl {
   }
 
   [[nodiscard]] double SessionTime(std::int64_t now) const {
+    if (ended) {
+      return reached_s;
+    }
     return start_ns == 0 ? -1.0 : 1e-9 * static_cast<double>(now - start_ns);
   }
   [[nodiscard]] double ReachedTime() const { return std::max(0.0, SessionTime(MonotonicNs())); }
@@ -279,7 +289,9 @@ struct Supervisor::Impl {
     ThermalEvent event;
     while (events->TakeNext(&event)) {
       record.AddEvent(event);
+      if (assessed) assessed->Add(event);
     }
+    if (assessed) assessed->Take();
     if (const std::string mismatch = participant->schema_mismatch(); !mismatch.empty()) {
       Fail(ExitCode::kMismatch, mismatch);
       ending = true;
@@ -388,6 +400,9 @@ struct Supervisor::Impl {
     for (const NodeId id : node_ids) {
       own.metrics.push_back({std::string("restarts_") + NodeName(id), static_cast<double>(record.node(id).restarts)});
     }
+    if (assessed && start_ns != 0) {
+      assessed->AddTo(SessionTime(now), &own);
+    }
     own.last_error = failed_why.empty() && !refusals.texts.empty() ? "refused: " + refusals.texts.back() : failed_why;
     if (link) {
       link::FillHealth(link->status(), &own);
@@ -413,6 +428,7 @@ struct Supervisor::Impl {
       line += " · force " + Fixed(std::max(last("force0_N"), last("force1_N")), 2) + " N · displaced " +
               Fixed(last("displacement_mm"), 1) + " mm · " + Fixed(last("temperature_C"), 0) + " °C · cut " +
               Fixed(last("cut_length_mm"), 1) + " mm";
+      line += assessed ? assessed->Line(SessionTime(now)) : "";
     }
     progress.Show(now, line + " · " + std::to_string(alive) + "/" + std::to_string(nodes.size()) + " nodes");
   }
@@ -456,6 +472,7 @@ struct Supervisor::Impl {
     manifest.session_id = folder.session_id;
     manifest.scene_hash = scene.view().hash;
     manifest.session_start_ns = start_ns;
+    if (assessed) assessed->Begin(start_ns);
     if (!manifests->Write(manifest)) {
       Fail(ExitCode::kFailure, "the session could not be announced on the bus");
       ending = true;
@@ -466,6 +483,10 @@ struct Supervisor::Impl {
     TakeReports(MonotonicNs());
     reached_s = ReachedTime();
     ended = true;
+    if (assessed) assessed->End(reached_s);
+    // At once: a recording tells by it when the session was over.
+    next_health_ns = 0;
+    PublishOwnHealth(MonotonicNs());
     if (link) {
       link->SayBye();
     }
@@ -519,9 +540,22 @@ struct Supervisor::Impl {
     healths_in.reset();
     healths_out.reset();
     manifests.reset();
+    if (assessed) assessed->Close();
     participant.reset();
     bus::RemoveSharedMemory(memory);
     RemoveCheckpoints(folder);
+  }
+
+  /// A row in the trainees' database. What cannot be written there is still in assessment.json.
+  void Remember(SessionOutcome* outcome) {
+    if (!training) return;
+    try {
+      training->Add(TrainingRowOf(*outcome));
+    } catch (const InputError& error) {
+      Fail(ExitCode::kFailure, error.what());
+      outcome->exit_code = exit_code;
+      outcome->verdict = verdict;
+    }
   }
 
   void Report() {
@@ -538,6 +572,13 @@ struct Supervisor::Impl {
     outcome.exit_code = exit_code;
     outcome.verdict = verdict;
     outcome.recording = recording;
+    outcome.trainee = settings.trainee;
+    if (assessed) {
+      outcome.sheet = assessed->Finish();
+      WriteFile(folder.path / "assessment.json", SheetJson(*outcome.sheet, {outcome.scene_name, outcome.session_id,
+                                                                            outcome.trainee, outcome.started_utc}));
+      Remember(&outcome);
+    }
     WriteFile(folder.path / "summary.json", SummaryJson(outcome, record));
     const std::filesystem::path clip = folder.path / "clip.mp4";
     (void)MakeClip(folder.frames, clip, folder.logs / "clip.log");
@@ -549,6 +590,7 @@ struct Supervisor::Impl {
   scene::SceneFile scene;
   const double end_s;  ///< 0: until stopped.
   DomainGuard guard;
+  std::optional<TrainingLog> training;  ///< Of the trainee, if one was named.
   SessionFolder folder;
   const std::filesystem::path recording;  ///< The recorder's first file; empty: none.
   const std::filesystem::path memory;
@@ -566,6 +608,8 @@ struct Supervisor::Impl {
   std::unique_ptr<bus::Output<CommandReply>> replies;
   std::unique_ptr<bus::Output<Command>> orders;  ///< To nodes.
   bus::Stamper health_stamper{MonotonicNs()}, reply_stamper{MonotonicNs()}, order_stamper{MonotonicNs()};
+
+  std::optional<SessionAssessment> assessed;
 
   std::vector<NodeProcess> nodes;
   SessionRecord record;

@@ -29,8 +29,10 @@ struct UpSettings {
   /// Nodes that run on another host, bit per NodeId, and how to reach it; 0: all run here.
   std::uint32_t remote = 0;
   std::string peer, address;
-  int link_domain = 0;      ///< 0: the usual one of the cart's domain.
-  bool keep_going = false;  ///< A node that failed for good does not end the session.
+  int link_domain = 0;                      ///< 0: the usual one of the cart's domain.
+  std::string trainee;                      ///< The session's score is remembered under this name; empty: it is not.
+  std::filesystem::path training_database;  ///< Where; services/supervisor/training_log.h.
+  bool keep_going = false;                  ///< A node that failed for good does not end the session.
 };
 
 class Supervisor {

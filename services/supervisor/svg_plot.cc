@@ -56,7 +56,7 @@ std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& l
   }
   const Axis value = MakeAxis(largest, 5);
   const double end_s = settings.end_s > 0 ? settings.end_s : 1.0;
-  const double time_step = NiceStep(end_s, 8);
+  const double time_step = std::max(NiceStep(end_s, 8), settings.dots ? 1.0 : 0.0);
   const auto x_of = [&](double t) { return kLeft + (kWidth - kLeft - kRight) * std::clamp(t / end_s, 0.0, 1.0); };
   const auto y_of = [&](double v) {
     return kHeight - kBottom - (kHeight - kTop - kBottom) * std::clamp(v / value.end, 0.0, 1.0);
@@ -74,7 +74,7 @@ std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& l
   for (double t = 0; t <= end_s * (1 + 1e-9); t += time_step) {
     svg += Text(x_of(t), kHeight - kBottom + 23, "middle", Fixed(t, time_decimals));
   }
-  svg += Text(kWidth - kRight, kHeight - 6, "end", "session time [s]");
+  svg += Text(kWidth - kRight, kHeight - 6, "end", settings.x_label);
   for (const double mark : settings.marks_s) {
     svg += "<line class='mark' x1='" + Fixed(x_of(mark), 1) + "' x2='" + Fixed(x_of(mark), 1) + "' y1='" +
            Fixed(kTop - 6, 1) + "' y2='" + Fixed(kHeight - kBottom, 1) + "'><title>restart</title></line>\n";
@@ -91,6 +91,10 @@ std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& l
       svg += Fixed(x_of(points[i].time_s), 1) + "," + Fixed(y_of(points[i].value), 1) + " ";
     }
     svg += "'/>\n";
+    for (std::size_t i = 0; settings.dots && i < points.size(); i += stride) {
+      svg += "<circle r='5' fill='" + line->colour + "' cx='" + Fixed(x_of(points[i].time_s), 1) + "' cy='" +
+             Fixed(y_of(points[i].value), 1) + "'/>\n";
+    }
     if (lines.size() > 1) {
       svg += Text(legend_x, 24, "end", line->label,
                   ("fill='" + line->colour + "' style='fill:" + line->colour + "'").c_str());

@@ -1,4 +1,4 @@
-// Line plots over session time as inline SVG.
+// Line plots over session time, or over whole numbers, as inline SVG.
 #pragma once
 
 #include <string>
@@ -19,6 +19,8 @@ struct PlotSettings {
   std::string unit;
   double end_s = 0;             ///< Right end of the time axis.
   std::vector<double> marks_s;  ///< Restarts: dashed vertical lines.
+  std::string x_label = "session time [s]";
+  bool dots = false;  ///< Over whole numbers: a dot at each point.
 };
 
 /// Empty when no line has a point.

@@ -1,6 +1,7 @@
 #include <unistd.h>
 
 #include <climits>
+#include <cstdlib>
 #include <iostream>
 
 #include "services/core/error.h"
@@ -50,6 +51,28 @@ int DomainOf(const Arguments& arguments, int fallback) {
     throw InputError("--domain " + std::to_string(domain) + ": must be 1 to 100");
   }
   return domain;
+}
+
+std::filesystem::path UserFolder(const char* variable, const char* fallback) {
+  const char* own = std::getenv(variable);
+  const char* home = std::getenv("HOME");
+  if (own != nullptr && *own == '/') {
+    return std::filesystem::path(own) / "fulcrum";
+  }
+  return (home != nullptr ? std::filesystem::path(home) / fallback : std::filesystem::temp_directory_path()) /
+         "fulcrum";
+}
+
+void AddDatabase(po::options_description* options) {
+  options->add_options()(
+      "database", po::value<std::string>()->value_name("FILE"),
+      "the trainees' database (default: fulcrum/trainees.sqlite in $XDG_STATE_HOME or ~/.local/state)");
+}
+
+std::filesystem::path DatabaseOf(const Arguments& arguments) {
+  return arguments.values.count("database") != 0
+             ? std::filesystem::absolute(arguments.values["database"].as<std::string>())
+             : UserFolder("XDG_STATE_HOME", ".local/state") / "trainees.sqlite";
 }
 
 std::filesystem::path ProgramFolder() { return std::filesystem::read_symlink("/proc/self/exe").parent_path(); }

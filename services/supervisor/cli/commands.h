@@ -28,6 +28,8 @@ ExitCode Keys(const Words& words);
 ExitCode Doctor(const Words& words);
 ExitCode Console(const Words& words);
 ExitCode Reference(const Words& words);
+ExitCode Assess(const Words& words);
+ExitCode Trainee(const Words& words);
 
 struct CommandEntry {
   const char* name;
@@ -58,6 +60,12 @@ inline constexpr int kDefaultDomain = 7;
 
 /// Compiled scenes are kept here: beside the programs in a build tree, else in the user's cache.
 [[nodiscard]] std::filesystem::path SceneCache(const std::filesystem::path& programs);
+/// The user's folder for what a program keeps, as the XDG base directories have it: `variable`, or `fallback` in the
+/// home folder, and "fulcrum" in that.
+[[nodiscard]] std::filesystem::path UserFolder(const char* variable, const char* fallback);
+/// --database, and where it is without.
+void AddDatabase(boost::program_options::options_description* options);
+[[nodiscard]] std::filesystem::path DatabaseOf(const Arguments& arguments);
 
 /// Sends a command to the supervisor of the domain and prints its answer. Throws InputError when none runs there.
 ExitCode Ask(int domain, const std::string& verb, const std::string& argument);

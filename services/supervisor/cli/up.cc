@@ -1,10 +1,9 @@
-#include <cstdlib>
-
 #include "services/core/error.h"
 #include "services/link/options.h"
 #include "services/supervisor/cli/commands.h"
 #include "services/supervisor/scene_cache.h"
 #include "services/supervisor/supervisor.h"
+#include "services/supervisor/training_log.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {
@@ -18,12 +17,7 @@ fs::path SceneCache(const fs::path& programs) {
   if (fs::exists(programs.parent_path() / "CMakeCache.txt")) {
     return programs.parent_path() / "scenes";
   }
-  const char* cache = std::getenv("XDG_CACHE_HOME");
-  const char* home = std::getenv("HOME");
-  if (cache != nullptr && *cache != '\0') {
-    return fs::path(cache) / "fulcrum" / "scenes";
-  }
-  return (home != nullptr ? fs::path(home) / ".cache" : fs::temp_directory_path()) / "fulcrum" / "scenes";
+  return UserFolder("XDG_CACHE_HOME", ".cache") / "scenes";
 }
 
 ExitCode Up(const Words& words) {
@@ -54,6 +48,9 @@ ExitCode Up(const Words& words) {
           "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
           "standby", "a second physics_node that takes over when the first falls silent")(
           "keep-going", "go on without a node that failed for good");
+  options.add_options()("trainee", po::value<std::string>()->value_name("NAME"),
+                        "remember the score under this name: see fulcrum trainee");
+  AddDatabase(&options);
   AddDomain(&options);
   const Arguments arguments = Parse("up", words, options, {"scene"});
   if (arguments.help) {
@@ -109,6 +106,13 @@ ExitCode Up(const Words& words) {
     if (!(settings.keep_s > 0 && settings.keep_s <= 3600)) {
       throw InputError("--keep-last: must be above 0 and at most 3600 seconds");
     }
+  }
+  if (values.count("trainee") != 0) {
+    settings.trainee = values["trainee"].as<std::string>();
+    CheckTraineeName(settings.trainee);
+    settings.training_database = DatabaseOf(arguments);
+  } else if (values.count("database") != 0) {
+    throw InputError("--database goes with --trainee NAME: whose session is it?");
   }
   SceneRequest request;
   request.name = values["scene"].as<std::string>();

@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
 # A solver archive must know nothing of the middleware, the scene graph, the configuration or the network.
 #   check_symbols.sh BUILD_DIR
-# Every static library below a node's folder is a solver, except the node's own library lib<project>_<node>.a.
+# Every static library below a node's folder is a solver, except the node's own library lib<project>_<node>.a; so is the
+# assessment.
 set -euo pipefail
 build=$1
 forbidden='eprosima|fastrtps|fastdds|fastcdr|osg::|YAML::|fulcrum::idl::|fulcrum::app::|boost::'
-nodes=(physics_node thermal_node haptics_node handle_bridge render_node)
+nodes=(physics_node thermal_node haptics_node handle_bridge render_node services/assessment)
 checked=0
 failed=0
 for node in "${nodes[@]}"; do

@@ -329,12 +329,50 @@ TEST_F(SupervisorTest, ScriptThatAsksForACutWithoutOneIsAFailure) {
   EXPECT_NE(Log().find("nothing was cut"), std::string::npos) << Log();
 }
 
+TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
+  const std::string database = (folder_ / "trainees.sqlite").string();
+  const auto end_of = [&](const std::vector<std::string>& words) {
+    ChildProcess up = Up(words);
+    return Wait(&up).exit_code;
+  };
+  EXPECT_EQ(end_of({"--seconds", "1", "--trainee", "Ann", "--database", database}), 2);
+  EXPECT_NE(Log().find("no section `assessment`"), std::string::npos) << Log();
+  EXPECT_FALSE(fs::exists(database));
+
+  scene::SceneData data = TinyScene(1u << static_cast<unsigned>(NodeId::kPhysics));
+  data.fixed.assessment.on = 1;
+  scene::WriteSceneFile(data, "name: tiny\n", scene_);
+  EXPECT_EQ(end_of({"--seconds", "1", "--trainee", "Ann", "--database", database}), 0) << Log();
+  EXPECT_NE(Log().find("score "), std::string::npos) << Log();
+  EXPECT_NE(ReadAll(Session() / "assessment.json").find("\"trainee\": \"Ann\""), std::string::npos);
+  EXPECT_NE(ReadAll(Session() / "report.html").find("Score sheet of Ann"), std::string::npos);
+  EXPECT_NE(ReadAll(Session() / "summary.json").find("\"score_pct\": "), std::string::npos);
+  const auto trainee = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), "trainee");
+    words.insert(words.end(), {"--database", database});
+    ChildProcess process = ChildProcess::Start(folder_ / "bin" / "fulcrum", words, folder_ / "trainee.log");
+    return Wait(&process).exit_code;
+  };
+  EXPECT_EQ(trainee({"Ann", "--svg", (folder_ / "ann.svg").string()}), 0);
+  EXPECT_NE(ReadAll(folder_ / "trainee.log").find(" tiny "), std::string::npos) << ReadAll(folder_ / "trainee.log");
+  EXPECT_NE(ReadAll(folder_ / "ann.svg").find("Ann, 1 session"), std::string::npos);
+  fs::remove(folder_ / "trainee.log");
+  EXPECT_EQ(trainee({"Bob"}), 2);
+  EXPECT_NE(ReadAll(folder_ / "trainee.log").find("Ann: 1 session"), std::string::npos);
+
+  std::ofstream(database) << std::string(9000, 'x');
+  EXPECT_EQ(end_of({"--seconds", "1", "--trainee", "Ann", "--database", database}), 2);
+  EXPECT_NE(Log().find("is not a database of trainees, or damaged"), std::string::npos) << Log();
+  EXPECT_EQ(ReadAll(database), std::string(9000, 'x'));
+}
+
 TEST_F(SupervisorTest, BadUseSaysWhatIsWrong) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases{
       {{"up"}, "which scene"},
       {{"up", "no-such-scene"}, "no scene \"no-such-scene\""},
       {{"up", scene_.string(), "--seconds", "-1"}, "--seconds"},
       {{"up", scene_.string(), "--sekonds", "1"}, "sekonds"},
+      {{"up", scene_.string(), "--database", "x"}, "--database goes with --trainee"},
       {{"restart"}, "which node"},
       {{"jump"}, "unknown command"},
   };

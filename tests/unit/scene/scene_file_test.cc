@@ -97,6 +97,19 @@ TEST_F(SceneFileTest, BreathingIsKept) {
   EXPECT_EQ(file.view().breathing.period_s, 3.5f);
 }
 
+TEST_F(SceneFileTest, AssessmentIsKept) {
+  SceneSettings settings = Small();
+  settings.assessment.on = 1;
+  settings.assessment.limit[static_cast<std::size_t>(Measure::kTime)] = 33;
+  settings.planned_line = {Vec2f(0.5f, 0.2f), Vec2f(0.5f, 0.8f)};
+  EXPECT_NE(WriteSceneFile(BuildProcedural(settings), kSource, file_), hash_);
+  const SceneFile file(file_);
+  EXPECT_EQ(file.view().assessment.on, 1u);
+  EXPECT_EQ(file.view().assessment.limit, settings.assessment.limit);
+  EXPECT_EQ(file.view().assessment.points, settings.assessment.points);
+  EXPECT_GT(file.view().planned_line.size(), 50u);
+}
+
 TEST_F(SceneFileTest, SameSceneGivesTheSameFile) {
   const auto again = dir_ / "again.scene";
   EXPECT_EQ(WriteSceneFile(BuildProcedural(Small()), kSource, again), hash_);
@@ -266,6 +279,16 @@ TEST(SceneValidation, EveryRuleRefusesAndNamesItsSection) {
       {"scene", "breathing.amplitude", [](SceneData& s) { s.fixed.breathing.amplitude_m = kNan; }},
       {"scene", "breathing.period", [](SceneData& s) { s.fixed.breathing.period_s = 0; }},
       {"scene", "breathing.direction", [](SceneData& s) { s.fixed.breathing.direction.setZero(); }},
+      {"scene", "line_done_pct", [](SceneData& s) { s.fixed.assessment.limit[3] = 101; }},
+      {"scene", "lift_hold = nan", [](SceneData& s) { s.fixed.assessment.points[1] = kNan; }},
+      {"scene", "assessment.line.by", [](SceneData& s) { s.fixed.assessment.tracing = static_cast<LineTracing>(2); }},
+      {"scene", "assessment.idle_speed", [](SceneData& s) { s.fixed.assessment.idle_speed_m_s = 0.5f; }},
+      {"planned_line", "at least two", [](SceneData& s) { s.planned_line = {Vec2f::Zero()}; }},
+      {"planned_line", "t = nan",
+       [](SceneData& s) {
+         s.planned_line.assign(2, Vec2f::Zero());
+         s.planned_line[1].y() = kNan;
+       }},
       {"static_surfaces", "beyond", [](SceneData& s) { s.static_surfaces[0].vertex_count = 0xffffffffu; }},
       {"static_surfaces", "role", [](SceneData& s) { s.static_surfaces[0].role = static_cast<SurfaceRole>(9); }},
       {"static_triangles", "index", [](SceneData& s) { s.static_triangles[0][0] = kNoIndex; }},

@@ -47,7 +47,7 @@ TEST(ShippedScenes, AreListedWithNameAndDescription) {
     EXPECT_FALSE(scene.description.empty());
     names.insert(scene.name);
   }
-  EXPECT_EQ(names, (std::set<std::string>{"built-in", "openhelp", "small"}));
+  EXPECT_EQ(names, (std::set<std::string>{"built-in", "dissection", "line", "openhelp", "small", "traction"}));
 }
 
 TEST(ShippedScenes, SayTheSameAsThePresets) {
@@ -60,6 +60,20 @@ TEST(ShippedScenes, EffectiveYamlReadsBackToTheSameScene) {
   const SceneDescription again = ParseSceneYaml(scene.effective_yaml, "effective.yaml", {});
   EXPECT_EQ(BuildProcedural(again.settings).fixed.hash, scene.data.fixed.hash);
   EXPECT_NE(scene.effective_yaml.find("shrink_max: 0.3"), std::string::npos) << "defaults are written out, plainly";
+}
+
+TEST(ShippedScenes, ExercisesCompileAndAreAssessed) {
+  for (const char* name : {"traction.yaml", "line.yaml", "dissection.yaml"}) {
+    const CompiledScene scene = CompileScene(kScenes / name, {}, {});
+    const SceneView view = scene.data.View();
+    EXPECT_EQ(view.assessment.on, 1u) << name;
+    EXPECT_FALSE(view.script.empty()) << name;
+    double task = 0;
+    for (std::size_t i = 0; i < kMeasureCount; ++i) {
+      task += kMeasures[i].role == MeasureRole::kTask ? static_cast<double>(view.assessment.points[i]) : 0;
+    }
+    EXPECT_GT(task, 0) << name << ": whoever does nothing is given nothing";
+  }
 }
 
 TEST(ShippedScenes, OpenHelpGivesASoundSceneOrSaysWhatIsMissing) {
@@ -148,6 +162,33 @@ const Rule kRules[] = {
     {"BreathingPeriod", "thermal:", "breathing: {period_s: 0}\nthermal:", {"breathing.period_s", "0.5 to 60"}},
     {"BreathingNowhere", "thermal:", "breathing: {direction: [0, 0, 0]}\nthermal:", {"breathing.direction"}},
     {"BreathingUnit", "thermal:", "breathing: {amplitude_mm: 2 s}\nthermal:", {"amplitude_mm", "wrong unit"}},
+    {"LimitOutOfRange",
+     "thermal:",
+     "assessment: {limits: {line_done_pct: 190}}\nthermal:",
+     {"assessment.limits.line_done_pct", "0 to 100"}},
+    {"LimitUnit",
+     "thermal:",
+     "assessment: {limits: {time_s: 20 mm}}\nthermal:",
+     {"assessment.limits.time_s", "wrong unit", "0 to 86400"}},
+    {"LimitName", "thermal:", "assessment: {limits: {tim_s: 20}}\nthermal:", {"assessment.limits.tim_s", "time_s"}},
+    {"Points", "thermal:", "assessment: {points: {time: -1}}\nthermal:", {"assessment.points.time", "0 to 1000"}},
+    {"LineCounts",
+     "thermal:",
+     "assessment: {line: {s: [0.1, 0.2], t: [0.1, 0.2, 0.3]}}\nthermal:",
+     {"assessment.line.t", "as many entries as s"}},
+    {"LineOnThePlace",
+     "thermal:",
+     "assessment: {line: {s: [0.1, 0.1], t: [0.1, 0.1]}}\nthermal:",
+     {"assessment.line.t", "stands twice"}},
+    {"LineBy",
+     "thermal:",
+     "assessment: {line: {s: [0.1, 0.2], t: [0.1, 0.2], by: chalk}}\nthermal:",
+     {"assessment.line.by", "touch"}},
+    {"IdleSpeed",
+     "thermal:",
+     "assessment: {idle_speed_mm_s: 6}\nthermal:",
+     {"assessment.idle_speed_mm_s", "must not exceed movement_speed_mm_s"}},
+    {"BaseOfAText", "name: small", "name: small\nbase: built-in.yaml", {"base"}},
     {"NoName", "name: small", "label: small", {"name"}},
     {"Grasp", "grasp_radius_mm: 4", "grasp_close_deg: 50", {"grasp_open_deg", "above grasp_close_deg"}},
 };
@@ -232,6 +273,97 @@ TEST(SceneYaml, BreathingIsOptionalAndCompiled) {
   EXPECT_EQ(BuildProcedural(ParseSceneYaml(read.effective_yaml, "x.yaml", {}).settings).fixed.hash, scene.fixed.hash);
   const std::string in_paper = Refusal(With(breathing, "mode: accurate", "mode: paper"));
   EXPECT_NE(in_paper.find("breathing.amplitude_mm: needs physics.mode"), std::string::npos) << in_paper;
+}
+
+TEST(SceneYaml, AssessmentIsOptionalAndCompiled) {
+  const std::string small = TextOf(kScenes / "small.yaml");
+  EXPECT_EQ(ParseSceneYaml(small, "x.yaml", {}).settings.assessment.on, 0u);
+  const SceneDescription read = ParseSceneYaml(With(small, "thermal:",
+                                                    "assessment: {line: {s: [0.5, 0.5], t: [0.2, 0.8]}, margin_mm: 3, "
+                                                    "limits: {time_s: 1 min}, points: {time: 7}}\n"
+                                                    "thermal:"),
+                                               "x.yaml", {});
+  const AssessmentParams& a = read.settings.assessment;
+  EXPECT_EQ(a.on, 1u);
+  EXPECT_EQ(a.margin_m, 0.003f);
+  EXPECT_EQ(a.limit[static_cast<std::size_t>(Measure::kTime)], 60.0f);
+  EXPECT_EQ(a.points[static_cast<std::size_t>(Measure::kTime)], 7.0f);
+  EXPECT_EQ(a.limit[static_cast<std::size_t>(Measure::kPathLength)], InfoOf(Measure::kPathLength).limit);
+  const SceneData scene = BuildProcedural(read.settings);
+  EXPECT_EQ(FindFault(scene.View()), std::nullopt);
+  // Straight along the sheet: 0.6 of its length, within what flattening and its bend change.
+  double length = 0;
+  for (std::size_t i = 1; i < scene.planned_line.size(); ++i) {
+    length += static_cast<double>((scene.planned_line[i] - scene.planned_line[i - 1]).norm());
+  }
+  EXPECT_NEAR(length, 0.6 * 0.080, 0.1 * 0.048);
+  EXPECT_EQ(BuildProcedural(ParseSceneYaml(read.effective_yaml, "x.yaml", {}).settings).fixed.hash, scene.fixed.hash);
+  SceneData without = scene;
+  without.planned_line.clear();
+  EXPECT_NE(ContentHash(without.View()), scene.fixed.hash);
+}
+
+// ---------------------------------------------------------------------------------------------------- on a base
+
+class SceneOnBase : public testing::Test {
+ protected:
+  SceneOnBase() { std::filesystem::create_directories(folder_ / "below"); }
+  ~SceneOnBase() override { std::filesystem::remove_all(folder_); }
+  std::filesystem::path Write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+  std::string RefusalOf(const std::filesystem::path& file) const {
+    try {
+      (void)ReadSceneYaml(file, {});
+      return "";
+    } catch (const InputError& error) {
+      return error.what();
+    }
+  }
+  const std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) / ("scene_on_base_" + std::to_string(getpid()));
+};
+
+TEST_F(SceneOnBase, SaysOnlyWhatIsDifferent) {
+  Write("below/small.yaml", TextOf(kScenes / "small.yaml"));
+  Write("middle.yaml", "name: middle\nbase: below/small.yaml\nphysics: {friction: 0.3}\nmembrane: {gap_mm: 5}\n");
+  const auto file = Write("top.yaml",
+                          "name: top\nbase: middle.yaml\nmembrane: {gap_mm: 4}\n"
+                          "script: {tool0: [{time_s: 1, sheet: [0.5, 0.5], height_mm: 20}]}\n");
+  const SceneDescription read = ReadSceneYaml(file, {});
+  SceneSettings wanted = Small();
+  wanted.name = "top";
+  wanted.physics.friction = 0.3f;
+  wanted.membrane.gap_m = 0.004;
+  std::erase_if(wanted.script, [](const ScriptKeySettings& key) { return key.tool == 0; });
+  ScriptKeySettings key;
+  key.time_s = 1;
+  key.height_m = 0.02;
+  wanted.script.push_back(key);
+  EXPECT_EQ(BuildProcedural(read.settings).fixed.hash, BuildProcedural(wanted).fixed.hash);
+  EXPECT_EQ(read.settings.description, "") << "a description is the scene's own";
+  const SceneDescription again = ParseSceneYaml(read.effective_yaml, "effective.yaml", {});
+  EXPECT_EQ(BuildProcedural(again.settings).fixed.hash, BuildProcedural(wanted).fixed.hash);
+}
+
+TEST_F(SceneOnBase, IsRefusedWithTheFileAndLineThatIsWrong) {
+  const std::string small = TextOf(kScenes / "small.yaml");
+  Write("below/small.yaml", With(small, "rings: 11", "rings: 100000"));
+  const std::string of_base = RefusalOf(Write("top.yaml", "name: top\nbase: below/small.yaml\n"));
+  EXPECT_NE(of_base.find("below/small.yaml:8: organ.procedural.rings"), std::string::npos) << of_base;
+  const std::string of_top = RefusalOf(
+      Write("top.yaml", "name: top\nbase: below/small.yaml\norgan: {procedural: {rings: 11, segments: 10000}}\n"));
+  EXPECT_NE(of_top.find("top.yaml:3: organ.procedural.segments"), std::string::npos) << of_top;
+  const std::string missing = RefusalOf(Write("top.yaml", "name: top\nbase: nowhere.yaml\n"));
+  EXPECT_NE(missing.find("top.yaml:2: base: 'nowhere.yaml' is not at "), std::string::npos) << missing;
+  const std::string circle = RefusalOf(Write("round.yaml", "name: round\nbase: round.yaml\n"));
+  EXPECT_NE(circle.find("base: more than 8 files"), std::string::npos) << circle;
+  const std::string list = RefusalOf(Write("top.yaml", "name: top\nbase: [small.yaml]\n"));
+  EXPECT_NE(list.find("top.yaml:2: base: expected the name of a file, found a list"), std::string::npos) << list;
+  Write("below/small.yaml", small);
+  const std::string nameless = RefusalOf(Write("top.yaml", "base: below/small.yaml\n"));
+  EXPECT_NE(nameless.find("name"), std::string::npos) << nameless;
 }
 
 TEST(SceneYaml, VolumeIsASwitchAndCompiled) {

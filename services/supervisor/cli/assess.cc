@@ -1,0 +1,48 @@
+#include "services/log_tools/assess.h"
+
+#include <cstdio>
+
+#include "services/assessment/score.h"
+#include "services/core/error.h"
+#include "services/recording/recorded_scene.h"
+#include "services/scene/scene_file.h"
+#include "services/supervisor/cli/commands.h"
+#include "services/supervisor/score_sheet.h"
+#include "services/supervisor/session_folder.h"
+
+namespace fulcrum::supervisor::cli {
+namespace po = boost::program_options;
+
+ExitCode Assess(const Words& words) {
+  po::options_description options;
+  options.add_options()  //
+      ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
+       "compiled scene; default: scene.fulcrum beside the recording")  //
+      ("json", po::value<std::string>()->value_name("FILE"), "write the sheet here, too, as assessment.json has it");
+  const Arguments arguments = Parse("assess", words, options, {"recording"});
+  if (arguments.help) {
+    return ExitCode::kDone;
+  }
+  if (arguments.values.count("recording") == 0) {
+    throw InputError("which recording? see fulcrum help assess");
+  }
+  const std::filesystem::path recording = arguments.values["recording"].as<std::string>();
+  const std::filesystem::path file =
+      recording::BesideRecording(arguments.values["scene"].as<std::string>(), recording, "scene.fulcrum");
+  if (file.empty()) {
+    throw InputError("no scene.fulcrum beside " + recording.string() +
+                     ": give the compiled scene of that session with --scene");
+  }
+  const scene::SceneFile scene(file);
+  const log_tools::RecordedAssessment result = log_tools::Assess(recording, scene.view());
+  const ScoreSheet sheet{result.figures, assessment::Evaluate(scene.view().assessment, result.figures)};
+  std::printf("session %s of \"%s\", %s s\n\n%s", result.session_id.c_str(), scene.view().name,
+              Fixed(result.end_s, 1).c_str(), SheetTable(sheet).c_str());
+  if (arguments.values.count("json") != 0) {
+    WriteFile(arguments.values["json"].as<std::string>(),
+              SheetJson(sheet, {scene.view().name, result.session_id, {}, {}}));
+  }
+  return ExitCode::kDone;
+}
+
+}  // namespace fulcrum::supervisor::cli

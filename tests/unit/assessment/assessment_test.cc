@@ -1,0 +1,229 @@
+// The assessment: known answers, what does not count, prompts, points.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "services/assessment/assessor.h"
+#include "services/assessment/smoothness.h"
+#include "tests/support/assessment_cases.h"
+
+namespace fulcrum::assessment {
+namespace {
+
+using test::KnownAnswer;
+using test::PatchAt;
+using test::PushAt;
+using test::StampAt;
+using test::TipAt;
+using test::ToolAt;
+
+double ValueOf(const Assessor& assessor, Measure measure) {
+  return assessor.figures().session[static_cast<std::size_t>(measure)];
+}
+
+struct Running {
+  Running() : assessor(scene.view) { assessor.Begin(test::kStart_ns); }
+  test::AssessedScene scene;
+  Assessor assessor;
+};
+
+TEST(Assessment, KnownAnswersAreFoundWithinOnePercent) {
+  std::set<std::string> seen;
+  for (const KnownAnswer& answer : test::KnownAnswers()) {
+    EXPECT_LE(answer.error_pct(), 1.0) << answer.name << ": " << answer.measured << ", known: " << answer.known;
+    seen.insert(answer.name.substr(0, answer.name.find('.')));
+  }
+  for (const MeasureInfo& info : kMeasures) EXPECT_TRUE(seen.contains(info.name)) << info.name;
+}
+
+TEST(Smoothness, IsThatOfTheShapeAndNotOfSizeOrDuration) {
+  const auto reach = [](int samples, double peak) {
+    std::vector<double> speed;
+    for (int i = 0; i <= samples; ++i) {
+      const double u = static_cast<double>(i) / samples;
+      speed.push_back(peak * 16 * u * u * (1 - u) * (1 - u));
+    }
+    return SpectralArcLength(speed, 100);
+  };
+  EXPECT_NEAR(reach(100, 0.1), reach(100, 3.0), 1e-12);
+  EXPECT_NEAR(reach(100, 1), reach(240, 1), 0.005 * std::abs(reach(100, 1)));
+}
+
+TEST(Smoothness, OfNothingIsNotANumber) {
+  EXPECT_TRUE(std::isnan(SpectralArcLength({}, 100)));
+  EXPECT_TRUE(std::isnan(SpectralArcLength(std::vector<double>(50, 0.0), 100)));
+}
+
+TEST(Assessment, NothingCountsBeforeTheSessionNorAfterItsEnd) {
+  Running run;
+  run.assessor.End(2);
+  for (int i = -1000; i < 4000; ++i) {
+    const double time_s = 1e-3 * i, far = time_s < 0 ? 0.1 : time_s > 2 ? 0.2 : 0;
+    run.assessor.Add(ToolAt(time_s, Vec3d(far, 0, 0), Vec3d::Zero()));
+  }
+  for (int i = -100; i < 400; ++i) run.assessor.Add(PushAt(0.01 * i, i < 0 || i > 200 ? 14 : 1));
+  run.assessor.Finish();
+  EXPECT_EQ(ValueOf(run.assessor, Measure::kPathLength), 0);
+  EXPECT_NEAR(ValueOf(run.assessor, Measure::kPeakForce), 1, 1e-6);
+  EXPECT_NEAR(ValueOf(run.assessor, Measure::kForceTime), 2, 1e-6);
+}
+
+TEST(Assessment, ASilenceIsNotCounted) {
+  Running run;
+  for (const double from_s : {0.0, 5.0}) {
+    for (int i = 0; i <= 1000; ++i) {
+      const double time_s = from_s + 1e-3 * i;
+      run.assessor.Add(ToolAt(time_s, Vec3d(from_s, 0, 0), Vec3d::Zero()));
+      if (i % 10 == 0) run.assessor.Add(PushAt(time_s, 3));
+      if (i % 10 == 0) run.assessor.Add(TipAt(time_s, Vec2f::Zero(), false, CauteryMode::kCut));
+    }
+  }
+  EXPECT_EQ(ValueOf(run.assessor, Measure::kPathLength), 0) << "the jump to where the tool was found again";
+  EXPECT_NEAR(ValueOf(run.assessor, Measure::kForceTime), 6, 1e-6);
+  EXPECT_NEAR(ValueOf(run.assessor, Measure::kPedalWithoutContact), 2, 1e-6);
+}
+
+TEST(Assessment, TheOrderBetweenTopicsDoesNotMatter) {
+  const auto figures = [](bool tools_first) {
+    Running run;
+    const auto tools = [&] {
+      for (int i = 0; i < 3000; ++i)
+        run.assessor.Add(ToolAt(1e-3 * i, Vec3d(0.1 * test::MinimumJerk(i / 3000.0), 0, 0), Vec3d::Zero()));
+    };
+    if (tools_first) tools();
+    for (int i = 0; i < 300; ++i) run.assessor.Add(PushAt(0.01 * i, 0.01 * i));
+    for (int i = 0; i < 300; ++i)
+      run.assessor.Add(TipAt(0.01 * i, Vec2f(0.021f, 0.02f + 1e-4f * static_cast<float>(i)), true, CauteryMode::kCut));
+    if (!tools_first) tools();
+    run.assessor.Finish();
+    return run.assessor.figures();
+  };
+  const Figures a = figures(true), b = figures(false);
+  for (std::size_t i = 0; i < kMeasureCount; ++i) {
+    EXPECT_TRUE(a.session[i] == b.session[i] || (std::isnan(a.session[i]) && std::isnan(b.session[i])))
+        << kMeasures[i].key;
+  }
+}
+
+TEST(Assessment, APhysicsNodeThatComesBackIsNoSlip) {
+  Running run;
+  for (int i = 0; i < 300; ++i) {
+    ContactModel model = test::GraspAt(0.01 * i, Vec3d::Zero(), 3, 8);
+    if (i >= 150) model.stamp.epoch = 2;
+    if (i >= 150 && i < 155) model.devices[0].count = 0;  // Not restored yet.
+    run.assessor.Add(model);
+  }
+  EXPECT_EQ(ValueOf(run.assessor, Measure::kGraspSlips), 0);
+}
+
+TEST(Assessment, PatchesThatOverlapAndComeAgainCountOnce) {
+  Running run;
+  const auto block = [](const Eigen::Vector2d& at) {
+    return at.x() > 0.024 && at.x() < 0.026 && at.y() > 0.03 && at.y() < 0.033;
+  };
+  for (int i = 0; i < 3; ++i) {
+    run.assessor.Add(PatchAt(1 + i, 100, 200, block));
+    run.assessor.Add(PatchAt(1 + i, 180, 210, block));
+  }
+  EXPECT_NEAR(ValueOf(run.assessor, Measure::kDamageBeyondMargin), 6, 0.05);
+}
+
+TEST(Assessment, WithoutALineNothingIsSaidOfIt) {
+  test::AssessedScene scene;
+  scene.view.planned_line = {};
+  Assessor assessor(scene.view);
+  EXPECT_FALSE(assessor.needs_patches());
+  assessor.Begin(test::kStart_ns);
+  assessor.Add(TipAt(1, Vec2f(0.02f, 0.03f), true, CauteryMode::kCut));
+  EXPECT_TRUE(std::isnan(ValueOf(assessor, Measure::kLineDone)));
+  const Score score = Evaluate(scene.view.assessment, assessor.figures());
+  EXPECT_TRUE(std::none_of(score.items.begin(), score.items.end(),
+                           [](const ScoreItem& item) { return item.measure == Measure::kDeviationMean; }));
+}
+
+// --------------------------------------------------------------------------------------------------- prompts
+
+TEST(Prompts, SayWhatIsWrongWhileItIs) {
+  Running run;
+  EXPECT_EQ(run.assessor.PromptsAt(0), 0u);
+  run.assessor.Add(PushAt(1, 12));
+  EXPECT_EQ(run.assessor.PromptsAt(1.1), BitOf(Prompt::kForceTooHigh));
+  EXPECT_EQ(run.assessor.PromptsAt(2), 0u);
+  for (int i = 0; i < 40; ++i) run.assessor.Add(TipAt(3 + 0.01 * i, Vec2f::Zero(), false, CauteryMode::kCoag));
+  EXPECT_EQ(run.assessor.PromptsAt(3.4), BitOf(Prompt::kPedalWithoutContact));
+  run.assessor.Add(TipAt(5, Vec2f(0.03f, 0.04f), true, CauteryMode::kCut));
+  EXPECT_EQ(run.assessor.PromptsAt(5.1), BitOf(Prompt::kUreterNear) | BitOf(Prompt::kOffLine));
+  run.assessor.Add(TipAt(6, Vec2f(0.03f, 0.04f), true, CauteryMode::kOff));
+  EXPECT_EQ(run.assessor.PromptsAt(6.1), 0u) << "without current it may be touched";
+  ThermalEvent event;
+  event.session_time_s = 8;
+  event.kind = ThermalEventKind::kNerveInjury;
+  run.assessor.Add(event);
+  EXPECT_EQ(MostUrgent(run.assessor.PromptsAt(9)), "injury: stop");
+}
+
+TEST(Prompts, TheMostUrgentIsSaid) {
+  EXPECT_EQ(MostUrgent(0), "");
+  EXPECT_EQ(MostUrgent(BitOf(Prompt::kOffLine) | BitOf(Prompt::kUreterHot)), "ureter is getting hot");
+}
+
+// ---------------------------------------------------------------------------------------------------- points
+
+TEST(Points, FallInProportionToNoneAtTwiceTheThreshold) {
+  EXPECT_EQ(Kept(3, 4, false), 1);
+  EXPECT_EQ(Kept(6, 4, false), 0.5);
+  EXPECT_EQ(Kept(9, 4, false), 0);
+  EXPECT_EQ(Kept(1, 0, false), 0);
+  EXPECT_EQ(Kept(0, 0, false), 1);
+  EXPECT_EQ(Kept(90, 90, true), 1);
+  EXPECT_NEAR(Kept(67.5, 90, true), 0.5, 1e-12);
+  EXPECT_EQ(Kept(40, 90, true), 0);
+  EXPECT_EQ(Kept(-2, -3, true), 1);
+  EXPECT_NEAR(Kept(-4.5, -3, true), 0.5, 1e-12);
+  EXPECT_EQ(Kept(-9, -3, true), 0);
+  EXPECT_EQ(Kept(std::nan(""), 3, false), 0);
+}
+
+TEST(Points, WhoeverDoesNothingIsGivenNothing) {
+  Running run;
+  for (int i = 0; i < 5000; ++i) run.assessor.Add(ToolAt(1e-3 * i, Vec3d::Zero(), Vec3d::Zero()));
+  run.assessor.Finish();
+  const Score score = Evaluate(run.scene.view.assessment, run.assessor.figures());
+  EXPECT_GT(score.of, 50);
+  EXPECT_EQ(score.points, 0);
+}
+
+TEST(Points, AllThatIsKeptIsAllThereIs) {
+  AssessmentParams params = UsualAssessment();
+  Figures figures;
+  for (std::size_t i = 0; i < kMeasureCount; ++i) figures.session[i] = static_cast<double>(params.limit[i]);
+  const Score whole = Evaluate(params, figures);
+  EXPECT_EQ(whole.points, whole.of);
+  EXPECT_EQ(whole.percent(), 100);
+  figures.session[static_cast<std::size_t>(Measure::kUreterInjuries)] = 1;
+  const Score hurt = Evaluate(params, figures);
+  EXPECT_EQ(hurt.of - hurt.points, 15);
+  const auto item = std::find_if(hurt.items.begin(), hurt.items.end(),
+                                 [](const ScoreItem& i) { return i.measure == Measure::kUreterInjuries; });
+  ASSERT_NE(item, hurt.items.end());
+  EXPECT_FALSE(item->passed);
+}
+
+TEST(Measures, UsualThresholdsAreValidAndNamesDiffer) {
+  std::set<std::string> names, keys;
+  for (const MeasureInfo& info : kMeasures) {
+    EXPECT_GE(info.limit, info.low) << info.key;
+    EXPECT_LE(info.limit, info.high) << info.key;
+    EXPECT_EQ(std::string(info.key).substr(0, std::string(info.name).size()), info.name);
+    EXPECT_LE(std::string(info.key).size(), 31u);
+    names.insert(info.name);
+    keys.insert(info.key);
+  }
+  EXPECT_EQ(names.size(), kMeasureCount);
+  EXPECT_EQ(keys.size(), kMeasureCount);
+}
+
+}  // namespace
+}  // namespace fulcrum::assessment

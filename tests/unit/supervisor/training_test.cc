@@ -1,0 +1,200 @@
+// The score sheet and the trainees' database.
+#include <gtest/gtest.h>
+#include <sqlite3.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "services/core/error.h"
+#include "services/supervisor/score_sheet.h"
+#include "services/supervisor/trainee_view.h"
+#include "services/supervisor/training_log.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+namespace fs = std::filesystem;
+
+ScoreSheet Sheet() {
+  ScoreSheet sheet;
+  for (auto* values : {&sheet.figures.session, &sheet.figures.tool[0], &sheet.figures.tool[1]})
+    values->fill(std::nan(""));
+  const auto set = [&](Measure measure, double value) {
+    sheet.figures.session[static_cast<std::size_t>(measure)] = value;
+  };
+  set(Measure::kLineDone, 95);
+  set(Measure::kTime, 30);
+  set(Measure::kPeakForce, 17.1);
+  sheet.figures.tool[1][static_cast<std::size_t>(Measure::kPeakForce)] = 17.1;
+  sheet.score = assessment::Evaluate(UsualAssessment(), sheet.figures);
+  return sheet;
+}
+
+TEST(ScoreSheetTest, SaysValueThresholdAndPointsEverywhere) {
+  const ScoreSheet sheet = Sheet();
+  EXPECT_EQ(sheet.score.of, 35);
+  EXPECT_NEAR(sheet.score.points, 27.5, 1e-4);
+  const std::string table = SheetTable(sheet);
+  EXPECT_NE(table.find("peak force on tissue [N]"), std::string::npos) << table;
+  EXPECT_NE(table.find("≤ 11.40 ✗"), std::string::npos) << table;
+  EXPECT_NE(table.find("score 79 % (27.5 of 35 points)"), std::string::npos) << table;
+  const std::string json = SheetJson(sheet, {"line", "s-1", "Ann \"A\"", ""});
+  for (const char* part :
+       {"\"score_pct\": 78.5", "\"peak_force_N\": 17.1", "\"peak_force_N.passed\": false",
+        "\"peak_force_N.threshold\": 11.3999", "\"tool1.peak_force_N\": 17.1", "\"line_done_pct.passed\": true",
+        "\"time_s.points\": 5", "\"trainee\": \"Ann \\\"A\\\"\""}) {
+    EXPECT_NE(json.find(part), std::string::npos) << part << " in " << json;
+  }
+  EXPECT_EQ(json.find("nan"), std::string::npos);
+  const std::string html = SheetHtml(sheet, "Ann <b>");
+  EXPECT_NE(html.find("Ann &lt;b&gt;"), std::string::npos);
+  EXPECT_NE(html.find("<tr class='bad'><td class='text'>peak force on tissue [N]</td>"), std::string::npos) << html;
+}
+
+class TrainingLogTest : public testing::Test {
+ protected:
+  TrainingLogTest() { fs::create_directory(folder_); }
+  ~TrainingLogTest() override { fs::remove_all(folder_); }
+
+  static TrainingRow Row(const std::string& trainee, int day, double score) {
+    return {trainee,
+            "s-" + std::to_string(day),
+            day % 2 == 0 ? "line" : "traction",
+            "2024-05-0" + std::to_string(day) + " 10:00:00 UTC",
+            20.5,
+            true,
+            score,
+            {{"time_s", 20.0 + day}, {"peak_force_N", 1.25}}};
+  }
+  template <class Do>
+  static std::string Refusal(const Do& act) {
+    try {
+      act();
+      return "";
+    } catch (const InputError& error) {
+      return error.what();
+    }
+  }
+  static std::string Bytes(const fs::path& file) {
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+  }
+  void Sql(const fs::path& file, const std::string& sql) const {
+    sqlite3* database = nullptr;
+    ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+    sqlite3_close(database);
+  }
+
+  const fs::path folder_ = fs::path(testing::TempDir()) / ("training_" + std::to_string(getpid()));
+  const fs::path file_ = folder_ / "deep" / "trainees.sqlite";
+};
+
+TEST_F(TrainingLogTest, KeepsWhatIsAddedInOrderOfTime) {
+  {
+    TrainingLog log(file_);
+    log.Add(Row("Ann", 3, 70));
+    log.Add(Row("Ann", 2, 60));
+    log.Add(Row("O'Neil; DROP TABLE sessions", 4, 10));
+  }
+  TrainingLog again(file_);
+  again.Add(Row("Ann", 5, 90));
+  const TrainingLog log(file_, TrainingLog::Access::kRead);
+  EXPECT_EQ(log.Trainees(), (std::map<std::string, int>{{"Ann", 3}, {"O'Neil; DROP TABLE sessions", 1}}));
+  const auto rows = log.SessionsOf("Ann", "");
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[0].session, "s-2");
+  EXPECT_EQ(rows[2].score_pct, 90);
+  EXPECT_TRUE(rows[1].well);
+  EXPECT_EQ(rows[1].measures, (std::map<std::string, double>{{"time_s", 23}, {"peak_force_N", 1.25}}));
+  EXPECT_EQ(log.SessionsOf("Ann", "line").size(), 1u);
+  EXPECT_TRUE(log.SessionsOf("Bob", "").empty());
+}
+
+TEST_F(TrainingLogTest, WhatIsNotOursIsRefusedAndLeftAsItIs) {
+  EXPECT_NE(Refusal([&] { TrainingLog(file_, TrainingLog::Access::kRead); }).find("no such database"),
+            std::string::npos);
+  fs::create_directories(file_.parent_path());
+  std::ofstream(file_) << std::string(5000, 'x');
+  const std::string text = Bytes(file_);
+  for (const auto access : {TrainingLog::Access::kAdd, TrainingLog::Access::kRead}) {
+    const std::string refusal = Refusal([&] { TrainingLog(file_, access); });
+    EXPECT_NE(refusal.find(file_.string() + ": is not a database of trainees, or damaged"), std::string::npos)
+        << refusal;
+    EXPECT_NE(refusal.find("--database"), std::string::npos);
+  }
+  EXPECT_EQ(Bytes(file_), text);
+  const fs::path other = folder_ / "other.sqlite";
+  Sql(other, "CREATE TABLE t (x); INSERT INTO t VALUES (1)");
+  const std::string bytes = Bytes(other);
+  EXPECT_NE(Refusal([&] { TrainingLog{other}; }).find("of another program"), std::string::npos);
+  EXPECT_EQ(Bytes(other), bytes);
+}
+
+TEST_F(TrainingLogTest, ANewerVersionIsRefusedAndLeftAsItIs) {
+  TrainingLog{file_}.Add(Row("Ann", 1, 50));
+  Sql(file_, "PRAGMA user_version = 2");
+  const std::string bytes = Bytes(file_);
+  const std::string refusal = Refusal([&] { TrainingLog{file_}; });
+  EXPECT_NE(refusal.find("is of version 2, and this program knows 1"), std::string::npos) << refusal;
+  EXPECT_EQ(Bytes(file_), bytes);
+}
+
+TEST_F(TrainingLogTest, ADamagedPageIsFoundBeforeTheSessionBegins) {
+  {
+    TrainingLog log(file_);
+    for (int i = 0; i < 80; ++i) log.Add(Row("Ann", 1 + i % 9, 50));
+  }
+  std::string bytes = Bytes(file_);
+  ASSERT_GE(bytes.size(), 12288u);
+  for (std::size_t i = 8192; i < 12288; ++i) bytes[i] = 'x';
+  std::ofstream(file_, std::ios::binary) << bytes;
+  const std::string refusal = Refusal([&] { TrainingLog{file_}; });
+  EXPECT_NE(refusal.find("damaged"), std::string::npos) << refusal;
+  EXPECT_EQ(Bytes(file_), bytes);
+}
+
+TEST_F(TrainingLogTest, ARowThatCannotBeWrittenIsSaidSo) {
+  TrainingLog log(file_);
+  Sql(file_, "CREATE TRIGGER full BEFORE INSERT ON measures BEGIN SELECT RAISE(ABORT, 'no room'); END");
+  const std::string refusal = Refusal([&] { log.Add(Row("Ann", 1, 50)); });
+  EXPECT_NE(refusal.find("could not be added (no room)"), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find("assessment.json"), std::string::npos);
+  EXPECT_TRUE(log.SessionsOf("Ann", "").empty()) << "whole or not at all";
+}
+
+TEST(TraineeNameTest, IsChecked) {
+  EXPECT_NO_THROW(CheckTraineeName("Ann Müller"));
+  for (const std::string& bad : {std::string(), std::string("  "), std::string("a\nb"), std::string(64, 'a')}) {
+    EXPECT_THROW(CheckTraineeName(bad), InputError);
+  }
+}
+
+TEST(TraineeViewTest, TableAndPlotsShowEachSession) {
+  std::vector<TrainingRow> rows;
+  for (int i = 1; i <= 4; ++i) {
+    rows.push_back({"Ann",
+                    "s",
+                    "line",
+                    "2024-05-01 10:00:00 UTC",
+                    20,
+                    i != 2,
+                    40.0 + 10 * i,
+                    {{"time_s", 30.0 - i}, {"path_length_mm", 200.0 - 20 * i}}});
+  }
+  const std::string table = TraineeTable(rows);
+  EXPECT_NE(table.find("4  2024-05-01 10:00:00 UTC  line"), std::string::npos) << table;
+  EXPECT_NE(table.find("the cart was not well"), std::string::npos);
+  const std::string svg = TraineeSvg("A & B", rows);
+  EXPECT_NE(svg.find("A &amp; B, 4 sessions"), std::string::npos);
+  std::size_t dots = 0;
+  for (std::size_t at = svg.find("<circle"); at != std::string::npos; at = svg.find("<circle", at + 1)) ++dots;
+  EXPECT_EQ(dots, 12u) << "score, time and path length of four sessions";
+  EXPECT_TRUE(TraineeSvg("Ann", {}).empty());
+}
+
+}  // namespace
+}  // namespace fulcrum::supervisor
