@@ -7,6 +7,7 @@
 
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
+#include "services/runtime/install_places.h"
 #include "services/scene/compile.h"
 #include "services/scene/quality.h"
 #include "services/scene/scene_file.h"
@@ -21,7 +22,7 @@ constexpr const char* kUsage =
   scene_compiler SCENE.yaml --out FILE [--data DIR] [--quiet]   compile, then report quality
   scene_compiler --info FILE                                    what a compiled scene holds
   scene_compiler --source FILE                                  the effective YAML it was compiled from
-  scene_compiler --list [DIR]                                   the scenes described in DIR (default deploy/scenes)
+  scene_compiler --list [DIR]                                   the scenes described in DIR (default: those shipped)
 
   --data DIR   look here first for the mesh files that the description names
   --quiet      no progress and no report
@@ -105,7 +106,7 @@ ExitCode Run(const Arguments& arguments) {
   } else if (!arguments.source.empty()) {
     std::cout << SceneFile(arguments.source).source_yaml();
   } else if (arguments.list) {
-    List(arguments.plain.empty() ? "deploy/scenes" : arguments.plain[0]);
+    List(arguments.plain.empty() ? runtime::ShareFolder() / "scenes" : std::filesystem::path(arguments.plain[0]));
   } else {
     Compile(arguments);
   }

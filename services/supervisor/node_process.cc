@@ -41,14 +41,14 @@ void NodeProcess::WatchForSilence(std::int64_t now_ns) {
       last_health_ns_ != 0 ? now_ns - last_health_ns_ > kLongestSilence : now_ns - started_ns_ > kLongestStart;
   if (too_long && !silent_) {
     silent_ = true;
-    Signal(SIGKILL);
+    process_.Signal(SIGKILL);
   }
   if (kill_ns_ != 0 && now_ns >= kill_ns_) {
-    Signal(SIGKILL);
+    process_.Signal(SIGKILL);
   }
 }
 
-std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
+std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
   if (failed_) {
     return std::nullopt;
   }
@@ -99,6 +99,13 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
   return death;
 }
 
+bool NodeProcess::OnHealth(const Health& health, std::int64_t now_ns) {
+  if (health.node != id() || (health.pid != pid() && !command_.foreign)) return false;
+  last_health_ns_ = now_ns;
+  before_.reset();
+  return true;
+}
+
 void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
   if (last_health_ns_ != 0) {
     last_health_ns_ = now_ns;
@@ -108,13 +115,20 @@ void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
 }
 
 void NodeProcess::AskRestart(std::int64_t now_ns) {
-  Signal(SIGTERM);
+  process_.Signal(SIGTERM);
   kill_ns_ = now_ns + kPatienceWithRestart;
 }
 
 void NodeProcess::Swap(NodeCommand command, std::int64_t now_ns) {
   next_ = std::move(command);
   AskRestart(now_ns);
+}
+
+void NodeProcess::Stop() { process_.Signal(SIGTERM); }
+
+const char* NodeProcess::GiveUp() {
+  process_.Signal(SIGKILL);
+  return "was killed";
 }
 
 bool NodeProcess::HasEnded() {

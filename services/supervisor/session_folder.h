@@ -22,6 +22,9 @@ struct SessionFolder {
                                               const scene::SceneFile& scene, const config::CartConfig& cart,
                                               const std::string& run_yaml);
 
+/// Makes `link` point to `folder`, whatever it was, in one step. Throws InputError.
+void PointTo(const std::filesystem::path& link, const std::filesystem::path& folder);
+
 /// Throws InputError that names the file.
 void WriteFile(const std::filesystem::path& file, const std::string& text);
 

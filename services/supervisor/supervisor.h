@@ -26,6 +26,8 @@ struct UpSettings {
   double keep_s = 0;
   bool standby = false;     ///< A second physics_node follows the first and takes over when that falls silent.
   bool keep_going = false;  ///< A node that failed for good does not end the session.
+  /// Not empty: nodes are started by somebody else, systemd, who finds what they need below this folder's "session".
+  std::filesystem::path attach;
 };
 
 class Supervisor {

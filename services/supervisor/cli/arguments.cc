@@ -52,6 +52,4 @@ int DomainOf(const Arguments& arguments, int fallback) {
   return domain;
 }
 
-std::filesystem::path ProgramFolder() { return std::filesystem::read_symlink("/proc/self/exe").parent_path(); }
-
 }  // namespace fulcrum::supervisor::cli

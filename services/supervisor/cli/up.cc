@@ -1,6 +1,7 @@
 #include <cstdlib>
 
 #include "services/core/error.h"
+#include "services/runtime/install_places.h"
 #include "services/supervisor/cli/commands.h"
 #include "services/supervisor/scene_cache.h"
 #include "services/supervisor/supervisor.h"
@@ -24,6 +25,26 @@ fs::path SceneCache(const fs::path& programs) {
   return (home != nullptr ? fs::path(home) / ".cache" : fs::temp_directory_path()) / "fulcrum" / "scenes";
 }
 
+/// Empty: the nodes are children.
+fs::path AttachTo(const po::variables_map& values) {
+  if (values.count("attach") == 0) return {};
+  if (values.count("standby") != 0) {
+    throw InputError("--attach: a standby is not possible, as each node is one service");
+  }
+  const char* folder = std::getenv("RUNTIME_DIRECTORY");
+  if (folder == nullptr || !fs::is_directory(folder)) {
+    throw InputError(
+        "--attach: RUNTIME_DIRECTORY names no folder; it is for services of systemd (fulcrum-supervisor.service), "
+        "which sets it");
+  }
+  return folder;
+}
+
+std::string CartHelp() {
+  const fs::path machine = runtime::MachineCart();
+  return "cart configuration (default: " + (machine.empty() ? "everything simulated)" : machine.string() + ")");
+}
+
 }  // namespace
 
 ExitCode Up(const Words& words) {
@@ -35,14 +56,15 @@ ExitCode Up(const Words& words) {
       ("window", "show the picture in a window as well")                                                              //
       ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                                //
        "of the picture: auto, low, high")                                                                             //
-      ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration (default: everything simulated)")    //
+      ("cart", po::value<std::string>()->value_name("FILE"), CartHelp().c_str())                                      //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")            //
       ("record", "record all topics into recording.mcap of the session folder")(
           "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
           "keep-last", po::value<double>()->value_name("SECONDS"),
           "keep the newest past in memory and write it into a file when a node dies or at fulcrum dump")(
           "standby", "a second physics_node that takes over when the first falls silent")(
-          "keep-going", "go on without a node that failed for good");
+          "keep-going", "go on without a node that failed for good")(
+          "attach", "the nodes are services: wait for them below $RUNTIME_DIRECTORY/session, start and kill none");
   AddDomain(&options);
   const Arguments arguments = Parse("up", words, options, {"scene"});
   if (arguments.help) {
@@ -53,9 +75,12 @@ ExitCode Up(const Words& words) {
     throw InputError("which scene? see fulcrum help up");
   }
   UpSettings settings;
-  settings.programs = ProgramFolder();
+  settings.programs = runtime::ProgramFolder();
+  const fs::path machine = runtime::MachineCart();
   if (values.count("cart") != 0) {
     settings.cart = config::LoadCart(values["cart"].as<std::string>());
+  } else if (!machine.empty() && fs::exists(machine)) {
+    settings.cart = config::LoadCart(machine);
   }
   settings.cart.domain = DomainOf(arguments, settings.cart.domain);
   settings.out = values["out"].as<std::string>();
@@ -66,6 +91,7 @@ ExitCode Up(const Words& words) {
   }
   settings.standby = values.count("standby") != 0;
   settings.keep_going = values.count("keep-going") != 0;
+  settings.attach = AttachTo(values);
   if (values.count("seconds") != 0) {
     settings.seconds = values["seconds"].as<double>();
     constexpr double kLongest = 7 * 24 * 3600.0;
@@ -89,7 +115,7 @@ ExitCode Up(const Words& words) {
   if (values.count("data") != 0) {
     request.data = fs::absolute(values["data"].as<std::string>());
   }
-  request.library = FULCRUM_SCENE_DIR;
+  request.library = runtime::ShareFolder() / "scenes";
   request.compiler = settings.programs / "scene_compiler";
   request.cache = SceneCache(settings.programs);
   settings.scene = ResolveScene(request);
