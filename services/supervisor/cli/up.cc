@@ -40,11 +40,6 @@ fs::path AttachTo(const po::variables_map& values) {
   return folder;
 }
 
-std::string CartHelp() {
-  const fs::path machine = runtime::MachineCart();
-  return "cart configuration (default: " + (machine.empty() ? "everything simulated)" : machine.string() + ")");
-}
-
 }  // namespace
 
 ExitCode Up(const Words& words) {
@@ -56,8 +51,9 @@ ExitCode Up(const Words& words) {
       ("window", "show the picture in a window as well")                                                              //
       ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                                //
        "of the picture: auto, low, high")                                                                             //
-      ("cart", po::value<std::string>()->value_name("FILE"), CartHelp().c_str())                                      //
-      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")            //
+      ("cart", po::value<std::string>()->value_name("FILE"),
+       "cart configuration (default: /etc/fulcrum/cart.yaml of an installation, else everything simulated)")  //
+      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")    //
       ("record", "record all topics into recording.mcap of the session folder")(
           "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
           "keep-last", po::value<double>()->value_name("SECONDS"),

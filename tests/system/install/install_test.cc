@@ -34,8 +34,8 @@ using testing::WaitFor;
 constexpr double kStartLimit_s = 60.0;  // compiling the scene and six starts, on a busy machine
 constexpr double kEndLimit_s = 60.0;
 
-/// Runs to its end; returns what it said, and fails the test when it does not end well.
-std::string Run(const std::string& program, const std::vector<std::string>& arguments) {
+/// Runs a program to its end; returns what it said, and fails the test when it does not end well.
+std::string Output(const std::string& program, const std::vector<std::string>& arguments) {
   Program run(program, arguments);
   const int code = run.End(0);
   EXPECT_EQ(code, 0) << program << " said:\n" << run.Said();
@@ -50,13 +50,13 @@ class InstallTest : public ::testing::Test {
     ASSERT_NE(::mkdtemp(name.data()), nullptr);
     folder_ = name;
     // No test of compression: that of a package for others takes most of the time.
-    Run("/usr/bin/env", {FULCRUM_CPACK, "--config", FULCRUM_BUILD_DIR "/CPackConfig.cmake", "-G", "DEB", "-B",
-                         folder_ / "package", "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip"});
+    Output("/usr/bin/env", {FULCRUM_CPACK, "--config", FULCRUM_BUILD_DIR "/CPackConfig.cmake", "-G", "DEB", "-B",
+                            folder_ / "package", "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip"});
     for (const auto& entry : fs::directory_iterator(folder_ / "package")) {
       if (entry.path().extension() == ".deb") package_ = entry.path();
     }
     ASSERT_FALSE(package_.empty()) << "cpack made no package";
-    Run("/usr/bin/dpkg-deb", {"-x", package_, root_ = folder_ / "root"});
+    Output("/usr/bin/dpkg-deb", {"-x", package_, root_ = folder_ / "root"});
     fs::remove_all(folder_ / "package" / "_CPack_Packages");
   }
   static void TearDownTestSuite() { fs::remove_all(folder_); }
@@ -70,14 +70,14 @@ class InstallTest : public ::testing::Test {
 fs::path InstallTest::folder_, InstallTest::package_, InstallTest::root_;
 
 TEST_F(InstallTest, PackageSaysWhatItNeedsAndKeepsTheConfigurationOfTheLab) {
-  const std::string control = Run("/usr/bin/dpkg-deb", {"-f", package_});
+  const std::string control = Output("/usr/bin/dpkg-deb", {"-f", package_});
   EXPECT_NE(control.find("Package: fulcrum\n"), std::string::npos) << control;
   // Found in the programs by dpkg-shlibdeps; loaded at run time.
   for (const char* needed : {"libfastrtps", "libopenscenegraph", "libserialport", "libsystemd0", "libegl-mesa0"}) {
     EXPECT_NE(control.find(needed), std::string::npos) << needed << "\n" << control;
   }
   EXPECT_EQ(control.find("googletest"), std::string::npos);
-  for (const std::string file : testing::SplitWords(Run("/usr/bin/dpkg-deb", {"-I", package_, "conffiles"}))) {
+  for (const std::string file : testing::SplitWords(Output("/usr/bin/dpkg-deb", {"-I", package_, "conffiles"}))) {
     EXPECT_TRUE(fs::is_regular_file(root_.string() + file)) << file;
   }
   EXPECT_EQ(fs::read_symlink(root_ / "usr/bin/fulcrum"), "../libexec/fulcrum/fulcrum");
@@ -104,15 +104,15 @@ TEST_F(InstallTest, UnitsPassTheCheckOfSystemd) {
     if (copy.parent_path() == units) arguments.push_back(copy);
   }
   ASSERT_EQ(arguments.size(), 4u + 8u) << "a target, the supervisor, six nodes";
-  EXPECT_EQ(Run("/usr/bin/env", arguments), "") << "systemd found fault with the units";
+  EXPECT_EQ(Output("/usr/bin/env", arguments), "") << "systemd found fault with the units";
 }
 
 TEST_F(InstallTest, SessionRunsFromTheInstalledPlaces) {
   const fs::path elsewhere = folder_ / "elsewhere";
   fs::create_directory(elsewhere);
   const std::string fulcrum = root_ / "usr/bin/fulcrum";
-  const std::string said = Run("/usr/bin/env", {"-C", elsewhere, "XDG_CACHE_HOME=" + (folder_ / "cache").string(),
-                                                fulcrum, "up", "small", "--domain", "83", "--seconds", "1"});
+  const std::string said = Output("/usr/bin/env", {"-C", elsewhere, "XDG_CACHE_HOME=" + (folder_ / "cache").string(),
+                                                   fulcrum, "up", "small", "--domain", "83", "--seconds", "1"});
   EXPECT_TRUE(fs::exists(elsewhere / "out/latest/report.html")) << said;
   // What else it finds is a matter of this machine.
   Program program(fulcrum, {"doctor", "--domain", "83"});
