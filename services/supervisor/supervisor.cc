@@ -490,7 +490,7 @@ struct Supervisor::Impl {
 
   std::vector<std::unique_ptr<SupervisedNode>> nodes;
   SessionRecord record;
-  Progress progress;
+  Progress progress{!settings.attach.empty()};
   runtime::ServiceNotify service;
   std::string service_status = "starting";
   std::uint64_t turns = 0;

@@ -64,19 +64,25 @@ Finding SharedMemory(int domain) {
   return {true, found, ""};
 }
 
+/// How to be given a limit of /etc/security.
+std::string FixOfLimit(const std::string& entry, const std::string& capability) {
+  const std::string how = runtime::MachineCart().empty()
+                              ? "add \"@fulcrum - " + entry + "\" to /etc/security/limits.conf and join that group"
+                              : "sudo adduser $USER fulcrum, then log in again";
+  return how + ", or run in a container with --cap-add=" + capability;
+}
+
 Finding RealTime() {
   std::string problem;
   std::thread([&] { problem = runtime::SetFifoPriority(80); }).join();
   return {problem.empty(), problem.empty() ? "SCHED_FIFO is permitted" : "SCHED_FIFO is not permitted",
-          "add \"@fulcrum - rtprio 90\" to /etc/security/limits.conf and join that group, or run in a container with "
-          "--cap-add=SYS_NICE; without it cycles start late under load"};
+          FixOfLimit("rtprio 90", "SYS_NICE") + "; without it cycles start late under load"};
 }
 
 Finding LockedMemory() {
   const std::string problem = runtime::LockMemory();
-  return {
-      problem.empty(), problem.empty() ? "memory may be locked" : "memory may not be locked",
-      "add \"@fulcrum - memlock unlimited\" to /etc/security/limits.conf and join that group, or --cap-add=IPC_LOCK"};
+  return {problem.empty(), problem.empty() ? "memory may be locked" : "memory may not be locked",
+          FixOfLimit("memlock unlimited", "IPC_LOCK")};
 }
 
 // Loaded at run time: a machine without EGL must get a diagnosis, not a loader error.
