@@ -16,6 +16,8 @@ namespace {
 constexpr std::int64_t kSecond = 1'000'000'000;
 // Longer than a node takes to start; whoever starts it has then given up.
 constexpr std::int64_t kLongestAbsence = 60 * kSecond;
+// The Health of one that ends in good order may come after its end is seen.
+constexpr std::int64_t kLastWords = kSecond / 4;
 
 }  // namespace
 
@@ -75,28 +77,37 @@ void AttachedNode::Start(std::int64_t now_ns) {
 
 std::optional<SupervisedNode::Death> AttachedNode::Update(std::int64_t now_ns) {
   if (failed_) return std::nullopt;
-  if (std::exchange(back_, false)) return Death{"was restarted", false, {}, true};
+  if (std::exchange(back_, false)) return Death{"was restarted", false, {}, true, std::exchange(ended_ns_, 0)};
   if (process_.HasEnded()) {
+    if (ended_ns_ == 0) ended_ns_ = now_ns;
+    if (!ending_ && !replaced_ && now_ns - ended_ns_ < kLastWords) return std::nullopt;
     process_.Forget();
     missing_since_ns_ = now_ns;
     // One that ended in good order is reported once it is back: when the whole cart is stopped it does not come back.
     asked_ = ending_;
-    if (!asked_) return Death{"has died", false, {}, false};
+    if (!asked_) return Death{"has died", false, {}, false, ended_ns_};
   }
   if (!running() && now_ns - missing_since_ns_ > kLongestAbsence) {
     failed_ = true;
-    return Death{has_reported_ ? "did not come back" : "was not started", true, {}, false};
+    return Death{has_reported_ ? "did not come back" : "was not started", true, {}, false, 0};
   }
   return std::nullopt;
 }
 
 bool AttachedNode::OnHealth(const Health& health, std::int64_t /*now_ns*/) {
   if (health.node != id()) return false;
-  // A late sample of a dead process finds none to watch.
-  if (!running() && !process_.Watch(health.pid)) return false;
-  if (health.pid != pid()) return false;
+  if (!running()) {
+    // A late sample of a dead process finds none to watch.
+    if (!process_.Watch(health.pid)) return false;
+    back_ = std::exchange(asked_, false);
+    if (!back_) ended_ns_ = 0;
+    ending_ = replaced_ = false;
+  }
+  if (health.pid != pid()) {
+    replaced_ |= process_.HasEnded();
+    return false;
+  }
   has_reported_ = true;
-  back_ |= std::exchange(asked_, false);
   ending_ = health.state == HealthState::kStopping;
   return true;
 }

@@ -62,6 +62,8 @@ class AttachedNode final : public SupervisedNode {
   Order order_;
   WatchedProcess process_;
   std::int64_t missing_since_ns_ = 0;  ///< While no process is known.
+  std::int64_t ended_ns_ = 0;          ///< When the last one was seen to have ended.
+  bool replaced_ = false;              ///< Another one has reported since.
   bool has_reported_ = false;
   bool ending_ = false;  ///< Its last Health said so: it was asked to.
   bool asked_ = false;   ///< Ended as it was asked to, and not back yet.

@@ -60,7 +60,7 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
         Start(now_ns);
       } catch (const InputError& error) {
         failed_ = true;
-        return Death{error.what(), true, {}, false};
+        return Death{error.what(), true, {}, false, 0};
       }
     }
     return std::nullopt;
@@ -70,7 +70,7 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
     WatchForSilence(now_ns);
     return std::nullopt;
   }
-  Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false};
+  Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false, 0};
   if (next_) {
     before_ = std::exchange(command_, std::move(*next_));
     next_.reset();

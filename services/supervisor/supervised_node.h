@@ -34,7 +34,8 @@ class SupervisedNode {
     std::string cause;
     bool for_good = false;
     ProcessEnd end;
-    bool asked = false;  ///< By AskRestart.
+    bool asked = false;      ///< By AskRestart.
+    std::int64_t at_ns = 0;  ///< When; 0: now.
   };
   /// Notices a death and sees to it that the node comes back.
   [[nodiscard]] virtual std::optional<Death> Update(std::int64_t now_ns) = 0;

@@ -160,7 +160,7 @@ struct Supervisor::Impl {
         continue;
       }
       sweep_ns = now + kSweepAfter;
-      record.AddDeath(SessionTime(now), node.id(), death->cause, death->for_good);
+      record.AddDeath(SessionTime(death->at_ns != 0 ? death->at_ns : now), node.id(), death->cause, death->for_good);
       const std::string what = std::string(NodeName(node.id())) + " " + death->cause;
       if (!death->asked) {
         AskDump(now, what);

@@ -95,15 +95,37 @@ TEST_F(AttachedNodeTest, NoticesADeathAndTheReturn) {
   EXPECT_FALSE(node_.Update(kStart).has_value());
   const pid_t dead = first.pid();
   Kill(&first);
-  const auto death = node_.Update(kStart);
+  EXPECT_FALSE(node_.Update(kStart).has_value()) << "it may have said that it ends";
+  const auto death = node_.Update(kStart + 300 * kMs);
   ASSERT_TRUE(death.has_value());
   EXPECT_FALSE(death->for_good);
   EXPECT_FALSE(death->asked);
+  EXPECT_EQ(death->at_ns, kStart);
   EXPECT_FALSE(node_.running());
   EXPECT_FALSE(Report(dead)) << "a late sample of the dead one";
-  EXPECT_FALSE(node_.Update(kStart).has_value()) << "told once";
+  EXPECT_FALSE(node_.Update(kStart + 400 * kMs).has_value()) << "told once";
   EXPECT_TRUE(Report(other.pid()));
   EXPECT_TRUE(node_.running());
+}
+
+TEST_F(AttachedNodeTest, DoesNotWaitForLastWordsWhenTheNextOneSpeaks) {
+  ChildProcess first = Sleeper(), second = Sleeper();
+  ASSERT_TRUE(Report(first.pid()));
+  Kill(&first);
+  EXPECT_FALSE(node_.Update(kStart).has_value());
+  EXPECT_FALSE(Report(second.pid())) << "the death is told first";
+  EXPECT_TRUE(node_.Update(kStart).has_value());
+  EXPECT_TRUE(Report(second.pid()));
+}
+
+TEST_F(AttachedNodeTest, LastWordsMayComeAfterTheEnd) {
+  ChildProcess first = Sleeper();
+  ASSERT_TRUE(Report(first.pid()));
+  const pid_t dead = first.pid();
+  Kill(&first);
+  EXPECT_FALSE(node_.Update(kStart).has_value());
+  EXPECT_TRUE(Report(dead, HealthState::kStopping));
+  EXPECT_FALSE(node_.Update(kStart + 300 * kMs).has_value()) << "it was stopped, it did not die";
 }
 
 TEST_F(AttachedNodeTest, OneThatWasStoppedIsReportedWhenItIsBack) {
@@ -115,9 +137,10 @@ TEST_F(AttachedNodeTest, OneThatWasStoppedIsReportedWhenItIsBack) {
   Kill(&first);
   EXPECT_FALSE(node_.Update(kStart).has_value());
   ASSERT_TRUE(Report(second.pid()));
-  const auto death = node_.Update(kStart);
+  const auto death = node_.Update(kStart + kMs);
   ASSERT_TRUE(death.has_value());
   EXPECT_TRUE(death->asked);
+  EXPECT_EQ(death->at_ns, kStart) << "how long it took to come back counts from its end";
 }
 
 TEST_F(AttachedNodeTest, HasFailedForGoodWhenItStaysAway) {
