@@ -7,6 +7,7 @@
 
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
+#include "services/runtime/install_places.h"
 #include "services/scene/compile.h"
 #include "services/scene/quality.h"
 #include "services/scene/scene_file.h"
@@ -22,7 +23,7 @@ constexpr const char* kUsage =
                                                                 compile, then report quality
   scene_compiler --info FILE                                    what a compiled scene holds
   scene_compiler --source FILE                                  the effective YAML it was compiled from
-  scene_compiler --list [DIR]                                   the scenes described in DIR (default deploy/scenes)
+  scene_compiler --list [DIR]                                   the scenes described in DIR (default: those shipped)
 
   --data DIR   look here first for the mesh files that the description names
   --set        a parameter of physics, thermal, haptics, breathing or render other than the description has it, or
@@ -110,7 +111,7 @@ ExitCode Run(const Arguments& arguments) {
   } else if (!arguments.source.empty()) {
     std::cout << SceneFile(arguments.source).source_yaml();
   } else if (arguments.list) {
-    List(arguments.plain.empty() ? "deploy/scenes" : arguments.plain[0]);
+    List(arguments.plain.empty() ? runtime::ShareFolder() / "scenes" : std::filesystem::path(arguments.plain[0]));
   } else {
     Compile(arguments);
   }

@@ -129,7 +129,7 @@ class Host {
   void TakeHealths(std::int64_t now) {
     while (healths_in_->TakeNext(&health_)) {
       for (NodeProcess& node : nodes_) {
-        if (node.id() == health_.node && node.pid() == health_.pid) node.OnHealth(now);
+        node.OnHealth(health_, now);
       }
     }
   }
@@ -161,7 +161,7 @@ class Host {
       return;
     }
     const std::string last = LastLine(node->log());
-    progress_.Say("! " + what + ", for good; see " + node->log().string() + (last.empty() ? "" : "\n  " + last));
+    progress_.Say("! " + what + ", for good; see " + node->log() + (last.empty() ? "" : "\n  " + last));
     const bool own_code = death->end.signal == 0 && death->end.exit_code >= 2 && death->end.exit_code <= 4;
     failed_ = own_code ? static_cast<ExitCode>(death->end.exit_code) : ExitCode::kFailure;
   }
@@ -181,10 +181,12 @@ class Host {
 
   void End() {
     progress_.Say(failed_ ? "ending: a node failed" : IsOver() ? "the session is over" : "stopped");
+    std::vector<SupervisedNode*> all;
+    for (NodeProcess& node : nodes_) all.push_back(&node);
     EndAll(
-        nodes_, [this](std::int64_t now) { TakeHealths(now); },
-        [this](const NodeProcess& node) {
-          progress_.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and was killed");
+        all, [this](std::int64_t now) { TakeHealths(now); },
+        [this](const SupervisedNode& node, const char* done) {
+          progress_.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and " + done);
         });
     link_.Leave();
     healths_in_.reset();

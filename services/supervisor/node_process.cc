@@ -47,14 +47,14 @@ void NodeProcess::WatchForSilence(std::int64_t now_ns) {
       last_health_ns_ != 0 ? now_ns - last_health_ns_ > kLongestSilence : now_ns - started_ns_ > kLongestStart;
   if (too_long && !silent_) {
     silent_ = true;
-    Signal(SIGKILL);
+    process_.Signal(SIGKILL);
   }
   if (kill_ns_ != 0 && now_ns >= kill_ns_) {
-    Signal(SIGKILL);
+    process_.Signal(SIGKILL);
   }
 }
 
-std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
+std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
   if (failed_) {
     return std::nullopt;
   }
@@ -67,7 +67,7 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
       } catch (const InputError& error) {
         if (before_) return GiveBack(error.what(), {}, now_ns);
         failed_ = true;
-        return Death{error.what(), true, {}, false};
+        return Death{error.what(), true, {}, false, 0};
       }
     }
     return std::nullopt;
@@ -77,7 +77,7 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
     WatchForSilence(now_ns);
     return std::nullopt;
   }
-  Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false};
+  Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false, 0};
   if (next_) {
     before_ = std::exchange(command_, std::move(*next_));
     next_.reset();
@@ -101,12 +101,19 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
   return death;
 }
 
-NodeProcess::Death NodeProcess::GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns) {
-  Death death{why + ": the one before comes back", false, end, false};
+SupervisedNode::Death NodeProcess::GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns) {
+  Death death{why + ": the one before comes back", false, end, false, 0};
   command_ = std::move(*before_);
   before_.reset();
   due_ns_ = now_ns;
   return death;
+}
+
+bool NodeProcess::OnHealth(const Health& health, std::int64_t now_ns) {
+  if (health.node != id() || (health.pid != pid() && !command_.foreign)) return false;
+  last_health_ns_ = now_ns;
+  before_.reset();
+  return true;
 }
 
 void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
@@ -118,7 +125,7 @@ void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
 }
 
 void NodeProcess::AskRestart(std::int64_t now_ns) {
-  Signal(SIGTERM);
+  process_.Signal(SIGTERM);
   kill_ns_ = now_ns + kPatienceWithRestart;
 }
 
@@ -127,26 +134,28 @@ void NodeProcess::Swap(NodeCommand command, std::int64_t now_ns) {
   AskRestart(now_ns);
 }
 
+void NodeProcess::Stop() { process_.Signal(SIGTERM); }
+
+const char* NodeProcess::GiveUp() {
+  process_.Signal(SIGKILL);
+  return "was killed";
+}
+
 bool NodeProcess::HasEnded() {
   (void)process_.Poll();
   return !process_.running();
 }
 
-void EndAll(std::span<NodeProcess> nodes, const std::function<void(std::int64_t now_ns)>& turn,
-            const std::function<void(const NodeProcess&)>& killed) {
-  for (const NodeProcess& node : nodes) {
-    node.Signal(SIGTERM);
-  }
+void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(std::int64_t now_ns)>& turn,
+            const std::function<void(const SupervisedNode& node, const char* done)>& given_up) {
+  for (SupervisedNode* node : nodes) node->Stop();
   const std::int64_t begin = runtime::MonotonicNs();
-  const auto is_gone = [](NodeProcess& node) { return node.HasEnded(); };
+  const auto is_gone = [](SupervisedNode* node) { return node->HasEnded(); };
   while (!std::all_of(nodes.begin(), nodes.end(), is_gone)) {
     const std::int64_t now = runtime::MonotonicNs();
     if (now - begin > kLongestEnd) {
-      for (const NodeProcess& node : nodes) {
-        if (node.running()) {
-          killed(node);
-        }
-        node.Signal(SIGKILL);
+      for (SupervisedNode* node : nodes) {
+        if (!node->HasEnded()) given_up(*node, node->GiveUp());
       }
     }
     turn(now);

@@ -23,22 +23,6 @@ std::string Fixed(double value, int decimals) {
   return result;
 }
 
-const char* StateName(HealthState state) {
-  switch (state) {
-    case HealthState::kStarting:
-      return "starting";
-    case HealthState::kWaiting:
-      return "waiting";
-    case HealthState::kRunning:
-      return "running";
-    case HealthState::kDegraded:
-      return "degraded";
-    case HealthState::kStopping:
-      return "ended";
-  }
-  return "unknown";
-}
-
 std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
   return {{"peak_force_N", "peak force", "N", 2, record.peak("peak_force_N")},
           {"highest_temperature_C", "highest temperature", "°C", 0, record.peak("highest_temperature_C")},

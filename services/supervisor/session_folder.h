@@ -24,6 +24,8 @@ struct SessionFolder {
 
 /// Removes the nodes' checkpoints: they are for restarts within the session, and large.
 void RemoveCheckpoints(const SessionFolder& folder);
+/// Makes `link` point to `folder`, whatever it was, in one step. Throws InputError.
+void PointTo(const std::filesystem::path& link, const std::filesystem::path& folder);
 
 /// Throws InputError that names the file.
 void WriteFile(const std::filesystem::path& file, const std::string& text);

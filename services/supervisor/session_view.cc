@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "services/app/health_report.h"
 #include "services/bus/topics.h"
 #include "services/runtime/cyclic_thread.h"
 #include "services/supervisor/outcome.h"
@@ -107,7 +108,7 @@ std::string SessionView::Text() const {
     const std::string step = Ms(health.step.p50_us) + "/" + Ms(health.step.p99_us) + "/" + Ms(health.step.max_us);
     const double restarts = MetricOf(supervisor, std::string("restarts_") + NodeName(health.node));
     std::snprintf(line.data(), line.size(), "%-14s %7d  %-9s %15s %24s %9llu %6llu %8.0f  %s\n", NodeName(health.node),
-                  health.pid, stale ? "silent" : StateName(health.state), rate.c_str(), step.c_str(),
+                  health.pid, stale ? "silent" : app::StateName(health.state), rate.c_str(), step.c_str(),
                   static_cast<unsigned long long>(health.overruns), static_cast<unsigned long long>(drops), restarts,
                   OldestInput(health).c_str());
     text += line.data();

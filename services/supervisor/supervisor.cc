@@ -24,7 +24,9 @@
 #include "services/link/scene_transfer.h"
 #include "services/recording/free_name.h"
 #include "services/runtime/realtime.h"
+#include "services/runtime/service_notify.h"
 #include "services/scene/scene_file.h"
+#include "services/supervisor/attached_node.h"
 #include "services/supervisor/clip.h"
 #include "services/supervisor/domain_guard.h"
 #include "services/supervisor/node_process.h"
@@ -149,11 +151,14 @@ struct Supervisor::Impl {
       assessed.emplace(scene.view(), &*participant);
     }
     for (const NodeId id : node_ids) {
-      if (id == NodeId::kPhysics && up.standby) {
-        nodes.emplace_back(starter.InPair("a", false));
-        nodes.emplace_back(starter.InPair("b", true));
+      if (!up.attach.empty()) {
+        nodes.push_back(std::make_unique<AttachedNode>(starter.Usual(id), folder.path / AttachedNode::kFolder,
+                                                       [this](NodeId to, const char* verb) { Order(to, verb, ""); }));
+      } else if (id == NodeId::kPhysics && up.standby) {
+        nodes.push_back(std::make_unique<NodeProcess>(starter.InPair("a", false)));
+        nodes.push_back(std::make_unique<NodeProcess>(starter.InPair("b", true)));
       } else {
-        nodes.emplace_back(starter.Usual(id));
+        nodes.push_back(std::make_unique<NodeProcess>(starter.Usual(id)));
       }
     }
   }
@@ -184,10 +189,10 @@ struct Supervisor::Impl {
   }
   [[nodiscard]] double ReachedTime() const { return std::max(0.0, SessionTime(MonotonicNs())); }
 
-  NodeProcess* Find(std::string_view name) {
+  SupervisedNode* Find(std::string_view name) {
     const auto found =
-        std::find_if(nodes.begin(), nodes.end(), [&](const NodeProcess& node) { return name == NodeName(node.id()); });
-    return found == nodes.end() ? nullptr : &*found;
+        std::find_if(nodes.begin(), nodes.end(), [&](const auto& node) { return name == NodeName(node->id()); });
+    return found == nodes.end() ? nullptr : found->get();
   }
 
   const NodeId* FindRemote(std::string_view name) const {
@@ -208,28 +213,29 @@ struct Supervisor::Impl {
 
   void WatchNodes(std::int64_t now) {
     if (now - last_loop_ns > kHeldUp) {
-      for (NodeProcess& node : nodes) {
-        node.ForgiveSilence(now);
+      for (const auto& node : nodes) {
+        node->ForgiveSilence(now);
       }
     }
     last_loop_ns = now;
-    for (NodeProcess& node : nodes) {
-      const std::optional<NodeProcess::Death> death = node.Update(now);
+    for (const auto& entry : nodes) {
+      SupervisedNode& node = *entry;
+      const std::optional<SupervisedNode::Death> death = node.Update(now);
       if (!death) {
         continue;
       }
       sweep_ns = now + kSweepAfter;
-      record.AddDeath(SessionTime(now), node.id(), death->cause, death->for_good);
+      record.AddDeath(SessionTime(death->at_ns != 0 ? death->at_ns : now), node.id(), death->cause, death->for_good);
       const std::string what = std::string(NodeName(node.id())) + " " + death->cause;
       if (!death->asked) {
         AskDump(now, what);
       }
       if (!death->for_good) {
-        progress.Say("! " + what + ": starting it again");
+        progress.Say("! " + what + (settings.attach.empty() ? ": starting it again" : ""));
         continue;
       }
-      const std::string last = LastLine(node.log());
-      progress.Say("! " + what + ", for good; see " + node.log().string() + (last.empty() ? "" : "\n  " + last));
+      const std::string last = LastLine(node.command().log);
+      progress.Say("! " + what + ", for good; see " + node.log() + (last.empty() ? "" : "\n  " + last));
       const bool own_code = death->end.signal == 0 && death->end.exit_code >= 2 && death->end.exit_code <= 4;
       failed_code = own_code ? static_cast<ExitCode>(death->end.exit_code) : ExitCode::kFailure;
       failed_why = what + ", for good";
@@ -250,13 +256,18 @@ struct Supervisor::Impl {
       return;
     }
     next_dump_ns = now + static_cast<std::int64_t>(1e9 * settings.keep_s);
-    Command dump;
-    dump.stamp = order_stamper.Next(now);
-    dump.request_id = static_cast<std::uint64_t>(now);
-    dump.target = NodeId::kRecorder;
-    dump.verb = "dump";
-    dump.argument = reason;
-    orders->Write(dump);
+    Order(NodeId::kRecorder, "dump", reason);
+  }
+
+  void Order(NodeId target, const char* verb, const std::string& argument) {
+    const std::int64_t now = MonotonicNs();
+    Command order;
+    order.stamp = order_stamper.Next(now);
+    order.request_id = static_cast<std::uint64_t>(now);
+    order.target = target;
+    order.verb = verb;
+    order.argument = argument;
+    orders->Write(order);
   }
 
   /// A node that goes on, but no longer well: what led to it is in the newest past.
@@ -267,11 +278,10 @@ struct Supervisor::Impl {
 
   void TakeReports(std::int64_t now) {
     while (healths_in->TakeNext(&health)) {
-      for (NodeProcess& node : nodes) {
-        if (node.id() == health.node && (node.pid() == health.pid || node.foreign())) {
-          node.OnHealth(now);
+      for (const auto& node : nodes) {
+        if (node->OnHealth(health, now)) {
           // Of a pair the leader's counts.
-          const bool follows = settings.standby && node.id() == NodeId::kPhysics &&
+          const bool follows = settings.standby && node->id() == NodeId::kPhysics &&
                                health.state != HealthState::kRunning && health.state != HealthState::kDegraded;
           // The record closes with the session: what a node says of peers that have just ended is no finding.
           if (!ended && !follows) {
@@ -328,7 +338,7 @@ struct Supervisor::Impl {
                               : "this session keeps no past: start it with fulcrum up --keep-last";
         AskDump(now, command.argument);
       } else if (command.verb == "restart") {
-        NodeProcess* node = Find(command.argument);
+        SupervisedNode* node = Find(command.argument);
         if (node != nullptr && node->running()) {
           reply.text = "restarting " + command.argument + " (pid " + std::to_string(node->pid()) + ")";
           node->AskRestart(now);
@@ -361,7 +371,7 @@ struct Supervisor::Impl {
     std::istringstream lines(argument);
     for (std::string word; std::getline(lines, word);) words.push_back(std::move(word));
     const std::string name = words.empty() ? std::string() : words.front();
-    NodeProcess* node = Find(name);
+    SupervisedNode* node = Find(name);
     if (node == nullptr || !node->running()) {
       *answer = "no running node \"" + name + "\" in this session";
       return false;
@@ -415,7 +425,7 @@ struct Supervisor::Impl {
     if (!progress.IsDue(now)) {
       return;
     }
-    const auto alive = std::count_if(nodes.begin(), nodes.end(), [](const NodeProcess& n) { return n.running(); });
+    const auto alive = std::count_if(nodes.begin(), nodes.end(), [](const auto& node) { return node->running(); });
     std::string line = start_ns == 0 ? "starting" : "t " + Fixed(std::max(0.0, SessionTime(now)), 1);
     if (start_ns != 0) {
       const std::string phase = PhaseAt(scene.view(), SessionTime(now));
@@ -430,7 +440,9 @@ struct Supervisor::Impl {
               Fixed(last("cut_length_mm"), 1) + " mm";
       line += assessed ? assessed->Line(SessionTime(now)) : "";
     }
-    progress.Show(now, line + " · " + std::to_string(alive) + "/" + std::to_string(nodes.size()) + " nodes");
+    line += " · " + std::to_string(alive) + "/" + std::to_string(nodes.size()) + " nodes";
+    service_status = line;
+    progress.Show(now, line);
   }
 
   void Turn() {
@@ -440,6 +452,7 @@ struct Supervisor::Impl {
     TakeCommands(now);
     PublishOwnHealth(now);
     ShowProgress(now);
+    service.Update(now, {++turns}, service_status);
     ending |= runtime::ShouldStop();
     std::this_thread::sleep_for(kLoopPeriod);
   }
@@ -450,10 +463,12 @@ struct Supervisor::Impl {
   void WaitForNodes() {
     const std::int64_t begin = MonotonicNs();
     last_loop_ns = begin;
-    for (NodeProcess& node : nodes) {
-      node.Start(begin);
+    for (const auto& node : nodes) {
+      node->Start(begin);
     }
-    const auto ready = [](const NodeProcess& node) { return node.has_reported() || node.failed(); };
+    if (!settings.attach.empty()) PointTo(settings.attach / "session", folder.path);
+    service.Ready();
+    const auto ready = [](const auto& node) { return node->has_reported() || node->failed(); };
     const auto seen = [this](NodeId node) { return record.node(node).seen; };
     while (
         !ending &&
@@ -490,22 +505,25 @@ struct Supervisor::Impl {
     if (link) {
       link->SayBye();
     }
-    const auto recorder = std::find_if(nodes.begin(), nodes.end(),
-                                       [](const NodeProcess& node) { return node.id() == NodeId::kRecorder; });
+    service.Stopping();
+    const auto recorder =
+        std::find_if(nodes.begin(), nodes.end(), [](const auto& node) { return node->id() == NodeId::kRecorder; });
     End({nodes.begin(), recorder});
     // Last, so that it has seen the others end.
     End({recorder, nodes.end()});
   }
 
-  void End(std::span<NodeProcess> some) {
+  void End(std::span<std::unique_ptr<SupervisedNode>> some) {
+    std::vector<SupervisedNode*> all;
+    for (const auto& node : some) all.push_back(node.get());
     EndAll(
-        some,
+        all,
         [this](std::int64_t now) {
           TakeReports(now);
           PublishOwnHealth(now);
         },
-        [this](const NodeProcess& node) {
-          progress.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and was killed");
+        [this](const SupervisedNode& node, const char* done) {
+          progress.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and " + done);
         });
   }
 
@@ -513,10 +531,10 @@ struct Supervisor::Impl {
     if (failed_code != ExitCode::kDone) {
       Fail(failed_code, failed_why);
     }
-    for (const NodeProcess& node : nodes) {
-      const NodeFigures& figures = record.node(node.id());
+    for (const auto& node : nodes) {
+      const NodeFigures& figures = record.node(node->id());
       if (!figures.seen) {
-        Fail(ExitCode::kFailure, std::string(NodeName(node.id())) + " never reported; see " + node.log().string());
+        Fail(ExitCode::kFailure, std::string(NodeName(node->id())) + " never reported; see " + node->log());
       }
     }
     for (const NodeId node : remote_ids) {
@@ -543,6 +561,8 @@ struct Supervisor::Impl {
     if (assessed) assessed->Close();
     participant.reset();
     bus::RemoveSharedMemory(memory);
+    std::error_code no_link;
+    if (!settings.attach.empty()) std::filesystem::remove(settings.attach / "session", no_link);
     RemoveCheckpoints(folder);
   }
 
@@ -611,10 +631,13 @@ struct Supervisor::Impl {
 
   std::optional<SessionAssessment> assessed;
 
-  std::vector<NodeProcess> nodes;
+  std::vector<std::unique_ptr<SupervisedNode>> nodes;
   SessionRecord record;
-  Progress progress;
+  Progress progress{!settings.attach.empty()};
   bus::Refusals refusals;
+  runtime::ServiceNotify service;
+  std::string service_status = "starting";
+  std::uint64_t turns = 0;
   Health health;  ///< Reused by TakeReports.
   app::RateMeter own_rate;
   std::uint64_t own_ticks = 0;

@@ -33,6 +33,8 @@ struct UpSettings {
   std::string trainee;                      ///< The session's score is remembered under this name; empty: it is not.
   std::filesystem::path training_database;  ///< Where; services/supervisor/training_log.h.
   bool keep_going = false;                  ///< A node that failed for good does not end the session.
+  /// Not empty: nodes are started by somebody else, systemd, who finds what they need below this folder's "session".
+  std::filesystem::path attach;
 };
 
 class Supervisor {

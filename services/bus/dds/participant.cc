@@ -191,6 +191,7 @@ std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()> notify
   const TopicRole& role = RoleOf<T>();
   fast::DataReaderQos qos;
   ApplyRole(role, role.reader_depth, impl_->SharedMemoryFor(role), &qos);
+  const WorkingIn here(impl_->shared_memory);
   auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos, std::move(notify));
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "reader"));
   if (role.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
@@ -206,6 +207,7 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   const bool fragmented =
       impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
   qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
+  const WorkingIn here(impl_->shared_memory);
   auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos);
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "writer"));
   if (role.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
@@ -221,6 +223,7 @@ std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink)
       impl_->MakeTopic(role, fast::TypeSupport(new dds::RawType(impl_->TypeName(role), payload_B, plain)));
   fast::DataReaderQos qos;
   ApplyRole(role, role.reader_depth, impl_->SharedMemoryFor(role), &qos);
+  const WorkingIn here(impl_->shared_memory);
   auto input = std::make_unique<dds::RawReader>(impl_->subscriber, topic, qos, id, payload_B, std::move(sink));
   if (!input->ok()) throw InputError(impl_->CannotMake(role, "reader"));
   return input;

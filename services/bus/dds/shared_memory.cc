@@ -1,6 +1,7 @@
 #include "services/bus/dds/shared_memory.h"
 
 #include <fcntl.h>
+#include <sched.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -136,6 +137,22 @@ void ReserveSharedMemory(const fs::path& directory) {
                        directory.string() + ": " + std::strerror(failed));
     }
   }
+}
+
+WorkingIn::WorkingIn(const fs::path& directory) : before_(open(".", O_PATH | O_DIRECTORY | O_CLOEXEC)) {
+  // From here on this thread has a current directory of its own. Where that is not permitted it is everybody's, for a
+  // moment.
+  unshare(CLONE_FS);
+  if (before_ >= 0 && chdir(directory.c_str()) != 0) {
+    close(before_);
+    before_ = -1;
+  }
+}
+
+WorkingIn::~WorkingIn() {
+  if (before_ < 0) return;
+  [[maybe_unused]] const int ignored = fchdir(before_);  // All paths of ours are absolute by now.
+  close(before_);
 }
 
 SweepResult SweepSharedMemory(const fs::path& directory) {

@@ -27,6 +27,19 @@ void ClaimSharedMemory(const std::filesystem::path& directory, const std::string
 /// to a page when /dev/shm is full gets a SIGBUS. Throws InputError when there is not enough.
 void ReserveSharedMemory(const std::filesystem::path& directory);
 
+/// While it lives, the calling thread works in this directory; other threads do not. For making endpoints: once in a
+/// process the library tries out a mapping with a file in the current directory, which may be "/" or not be writable.
+class WorkingIn {
+ public:
+  explicit WorkingIn(const std::filesystem::path& directory);
+  ~WorkingIn();
+  WorkingIn(const WorkingIn&) = delete;
+  WorkingIn& operator=(const WorkingIn&) = delete;
+
+ private:
+  int before_;
+};
+
 struct SweepResult {
   int files = 0;
   std::uint64_t bytes = 0;

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <boost/program_options.hpp>
-#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -55,8 +54,11 @@ void AddDomain(boost::program_options::options_description* options);
 
 inline constexpr int kDefaultDomain = 7;
 
-/// Folder of this program: the nodes and the compiler lie beside it.
-[[nodiscard]] std::filesystem::path ProgramFolder();
+/// The other programs of the installation.
+[[nodiscard]] std::span<const char* const> Programs();
+[[nodiscard]] bool IsProgram(const std::string& name);
+/// Goes on as one of them: its name, then its arguments. Throws InputError when it cannot be started.
+[[noreturn]] void Become(const Words& words);
 
 /// Compiled scenes are kept here: beside the programs in a build tree, else in the user's cache.
 [[nodiscard]] std::filesystem::path SceneCache(const std::filesystem::path& programs);

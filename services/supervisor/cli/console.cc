@@ -4,6 +4,7 @@
 
 #include "services/config/cart.h"
 #include "services/core/error.h"
+#include "services/runtime/install_places.h"
 #include "services/supervisor/cli/commands.h"
 
 namespace fulcrum::supervisor::cli {
@@ -45,8 +46,8 @@ ExitCode Console(const Words& words) {
   settings.cart = path("cart");
   settings.data = path("data");
   settings.out = path("out");
-  settings.scenes = FULCRUM_SCENE_DIR;
-  settings.programs = ProgramFolder();
+  settings.scenes = runtime::ShareFolder() / "scenes";
+  settings.programs = runtime::ProgramFolder();
   settings.domain =
       DomainOf(arguments, settings.cart.empty() ? kDefaultDomain : config::LoadCart(settings.cart).domain);
   console::Console console(settings);

@@ -2,6 +2,7 @@
 
 #include "services/core/error.h"
 #include "services/link/options.h"
+#include "services/runtime/install_places.h"
 #include "services/supervisor/cli/commands.h"
 
 namespace fulcrum::supervisor::cli {
@@ -40,7 +41,7 @@ ExitCode Host(const Words& words) {
     settings.allowed = link::NodesFromNames(text("nodes"));
   }
   settings.out = text("out");
-  settings.programs = ProgramFolder();
+  settings.programs = runtime::ProgramFolder();
   settings.cache = values.count("cache") != 0 ? std::filesystem::path(text("cache")) : SceneCache(settings.programs);
   settings.window = values.count("window") != 0;
   settings.quality = text("quality");

@@ -51,6 +51,8 @@ void PrintHelp() {
   std::puts(
       "  help      help COMMAND: options of one command.\n"
       "  version   Print the version.\n\n"
+      "fulcrum PROGRAM ... runs another program of the installation with its own options (--help):\n"
+      "  handle_bridge calibrate, haptics_node calibrate-trocar, replayer, scene_compiler, or a node.\n\n"
       "Exit codes: 0 done, 1 failure, 2 bad use or configuration, 3 scene or schema mismatch, 4 device lost.");
 }
 
@@ -70,6 +72,9 @@ ExitCode Dispatch(Words words) {
     if (words[0] == entry.name) {
       return entry.run({words.begin() + 1, words.end()});
     }
+  }
+  if (IsProgram(words[0])) {
+    Become(words);
   }
   throw InputError("unknown command \"" + words[0] + "\"; see fulcrum --help");
 }

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "services/core/error.h"
+#include "services/runtime/install_places.h"
 #include "services/supervisor/cli/commands.h"
 
 namespace fulcrum::supervisor::cli {
@@ -67,7 +68,7 @@ ExitCode TestNode(const Words& words) {
       command.push_back("--assert=" + text);
     }
   }
-  Become(ProgramFolder() / "replayer", command);
+  Become(runtime::ProgramFolder() / "replayer", command);
 }
 
 }  // namespace fulcrum::supervisor::cli

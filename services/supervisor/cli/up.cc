@@ -1,5 +1,6 @@
 #include "services/core/error.h"
 #include "services/link/options.h"
+#include "services/runtime/install_places.h"
 #include "services/supervisor/cli/commands.h"
 #include "services/supervisor/scene_cache.h"
 #include "services/supervisor/supervisor.h"
@@ -20,6 +21,21 @@ fs::path SceneCache(const fs::path& programs) {
   return UserFolder("XDG_CACHE_HOME", ".cache") / "scenes";
 }
 
+/// Empty: the nodes are children.
+fs::path AttachTo(const po::variables_map& values) {
+  if (values.count("attach") == 0) return {};
+  if (values.count("standby") != 0) {
+    throw InputError("--attach: a standby is not possible, as each node is one service");
+  }
+  const char* folder = std::getenv("RUNTIME_DIRECTORY");
+  if (folder == nullptr || !fs::is_directory(folder)) {
+    throw InputError(
+        "--attach: RUNTIME_DIRECTORY names no folder; it is for services of systemd (fulcrum-supervisor.service), "
+        "which sets it");
+  }
+  return folder;
+}
+
 ExitCode Up(const Words& words) {
   po::options_description options;
   options.add_options()                                                                                               //
@@ -29,8 +45,9 @@ ExitCode Up(const Words& words) {
       ("window", "show the picture in a window as well")                                                              //
       ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                                //
        "of the picture: auto, low, high")                                                                             //
-      ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration (default: everything simulated)")    //
-      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")            //
+      ("cart", po::value<std::string>()->value_name("FILE"),
+       "cart configuration (default: /etc/fulcrum/cart.yaml of an installation, else everything simulated)")  //
+      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")    //
       ("set", po::value<Words>()->value_name("SECTION.KEY=VALUE")->composing(),
        "a parameter of physics, thermal, haptics, breathing or render other than the scene has it, or script.power_W, "
        "the generator's setting; as often as needed")  //
@@ -47,7 +64,8 @@ ExitCode Up(const Words& words) {
           "link-domain", po::value<int>()->value_name("N"),
           "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
           "standby", "a second physics_node that takes over when the first falls silent")(
-          "keep-going", "go on without a node that failed for good");
+          "keep-going", "go on without a node that failed for good")(
+          "attach", "the nodes are services: wait for them below $RUNTIME_DIRECTORY/session, start and kill none");
   options.add_options()("trainee", po::value<std::string>()->value_name("NAME"),
                         "remember the score under this name: see fulcrum trainee");
   AddDatabase(&options);
@@ -61,9 +79,12 @@ ExitCode Up(const Words& words) {
     throw InputError("which scene? see fulcrum help up");
   }
   UpSettings settings;
-  settings.programs = ProgramFolder();
+  settings.programs = runtime::ProgramFolder();
+  const fs::path machine = runtime::MachineCart();
   if (values.count("cart") != 0) {
     settings.cart = config::LoadCart(values["cart"].as<std::string>());
+  } else if (!machine.empty() && fs::exists(machine)) {
+    settings.cart = config::LoadCart(machine);
   }
   settings.cart.domain = DomainOf(arguments, settings.cart.domain);
   settings.out = values["out"].as<std::string>();
@@ -89,6 +110,7 @@ ExitCode Up(const Words& words) {
     }
   }
   settings.keep_going = values.count("keep-going") != 0;
+  settings.attach = AttachTo(values);
   if (values.count("seconds") != 0) {
     settings.seconds = values["seconds"].as<double>();
     constexpr double kLongest = 7 * 24 * 3600.0;
@@ -122,7 +144,7 @@ ExitCode Up(const Words& words) {
   if (values.count("set") != 0) {
     request.changes = values["set"].as<Words>();
   }
-  request.library = FULCRUM_SCENE_DIR;
+  request.library = runtime::ShareFolder() / "scenes";
   request.compiler = settings.programs / "scene_compiler";
   request.cache = SceneCache(settings.programs);
   settings.scene = ResolveScene(request);
