@@ -60,6 +60,22 @@ Health HealthReport::Make(std::int64_t now_ns, HealthState state, const runtime:
   return health;
 }
 
+const char* StateName(HealthState state) {
+  switch (state) {
+    case HealthState::kStarting:
+      return "starting";
+    case HealthState::kWaiting:
+      return "waiting";
+    case HealthState::kRunning:
+      return "running";
+    case HealthState::kDegraded:
+      return "degraded";
+    case HealthState::kStopping:
+      return "ended";
+  }
+  return "unknown";
+}
+
 void FitToMessage(Health* health) {
   health->inputs.resize(std::min(health->inputs.size(), bus::kMaxInputHealths));
   health->metrics.resize(std::min(health->metrics.size(), bus::kMaxMetrics));

@@ -49,6 +49,9 @@ class HealthReport {
   RateMeter rate_;
 };
 
+/// "starting", "running", …
+[[nodiscard]] const char* StateName(HealthState state);
+
 /// Cuts names, texts and lists to what the message holds, and metrics that are not finite to 0.
 void FitToMessage(Health* health);
 

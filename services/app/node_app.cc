@@ -12,10 +12,12 @@
 #include <thread>
 #include <utility>
 
+#include "services/app/cart_security.h"
 #include "services/app/health_report.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
 #include "services/runtime/realtime.h"
+#include "services/runtime/service_notify.h"
 
 namespace fulcrum::app {
 namespace {
@@ -35,6 +37,15 @@ constexpr auto kHealthPeriod = std::chrono::milliseconds(100);
 // A node that cannot end within this time has hung; its checkpoint is safe against a kill.
 constexpr unsigned kLongestEndS = 3;
 
+/// For people who ask `systemctl status`.
+std::string StatusLine(const Health& health) {
+  if (health.state == HealthState::kWaiting) return "waits for a session";
+  std::array<char, 64> rate{};
+  std::snprintf(rate.data(), rate.size(), "%s, %.1f of %.0f Hz", StateName(health.state),
+                static_cast<double>(health.rate_achieved_Hz), static_cast<double>(health.rate_asked_Hz));
+  return rate.data() + (health.last_error.empty() ? std::string() : "; " + health.last_error);
+}
+
 }  // namespace
 
 struct NodeApp::Impl {
@@ -43,7 +54,9 @@ struct NodeApp::Impl {
         options(node_options),
         cart(node_options.cart.empty() ? config::CartConfig() : config::LoadCart(node_options.cart)),
         scene(node_options.scene),
-        participant({.domain = node_options.domain, .node_name = NodeName(node_id), .shared_memory = {}}),
+        participant({.domain = node_options.domain,
+                     .node_name = NodeName(node_id),
+                     .security = SecurityOf(cart, NodeName(node_id))}),
         manifests(participant.MakeInput<SceneManifest>()),
         commands(participant.MakeInput<Command>()),
         replies(participant.MakeOutput<CommandReply>()),
@@ -86,6 +99,10 @@ struct NodeApp::Impl {
     if (const std::string mismatch = participant.schema_mismatch(); !mismatch.empty()) {
       End(ExitCode::kMismatch, mismatch);
     }
+    const bus::Refusals refusals = participant.refusals();
+    for (; refusals_told < refusals.texts.size(); ++refusals_told) {
+      Log(LogLevel::kWarning, "refused: " + refusals.texts[refusals_told]);
+    }
   }
 
   [[nodiscard]] std::string Verbs() const {
@@ -108,13 +125,14 @@ struct NodeApp::Impl {
     return ended.load(std::memory_order_acquire) || runtime::ShouldStop();
   }
 
-  void PublishHealth(HealthReport* report, const runtime::CyclicThread& thread, const HealthFill& fill) {
+  Health PublishHealth(HealthReport* report, const runtime::CyclicThread& thread, const HealthFill& fill) {
     const std::int64_t now = MonotonicNs();
     Health health = report->Make(now, state.load(std::memory_order_relaxed), thread.stats(), inputs, outputs);
     health.stamp = health_stamper.Next(now);
     if (fill) fill(&health);
     FitToMessage(&health);
     healths->Write(health);
+    return health;
   }
 
   const NodeId node;
@@ -130,18 +148,27 @@ struct NodeApp::Impl {
   std::vector<HealthReport::InputWatch> inputs;
   std::vector<HealthReport::OutputWatch> outputs;
   std::vector<std::shared_ptr<void>> ports;
-  std::map<std::string, std::function<std::string(const std::string&)>> handlers{{"stop", [this](const std::string&) {
-                                                                                    End(ExitCode::kDone,
-                                                                                        "stopped by command");
-                                                                                    return "stopping";
-                                                                                  }}};
+  std::map<std::string, std::function<std::string(const std::string&)>> handlers{
+      {"stop",
+       [this](const std::string&) {
+         End(ExitCode::kDone, "stopped by command");
+         return "stopping";
+       }},
+      {"restart", [this](const std::string&) {
+         // A failure to whoever started this node, who starts it again.
+         End(ExitCode::kFailure, "ends to be started again");
+         return "restarting";
+       }}};
 
+  std::size_t refusals_told = 0;
   // Relaxed: one number, nothing else is published through it.
   std::atomic<std::int64_t> session_start_ns{kSessionUnknown};
   std::atomic<HealthState> state{HealthState::kStarting};
   std::mutex health_mutex;
   std::condition_variable_any health_wanted;
   bool health_now = false;
+  std::atomic<std::uint64_t> polls{0};  ///< Rounds of the main thread.
+  std::atomic<bool> stepping{false};
   std::mutex end_mutex;
   std::atomic<bool> ended{false};
   ExitCode exit_code = ExitCode::kDone;
@@ -216,29 +243,35 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
   HealthReport report(app.node, settings.period_ns, bus::SchemaHash(), app.scene.view().hash, ::getpid());
   app.state = HealthState::kWaiting;
   std::jthread health([&](const std::stop_token& stop) {
+    runtime::ServiceNotify service;
     auto next = std::chrono::steady_clock::now();
-    while (!stop.stop_requested()) {
-      app.PublishHealth(&report, thread, fill_health);
+    for (bool first = true; !stop.stop_requested(); first = false) {
+      const Health now = app.PublishHealth(&report, thread, fill_health);
+      if (first) service.Ready();
+      std::vector<std::uint64_t> counters{app.polls.load(std::memory_order_relaxed)};
+      if (app.stepping.load(std::memory_order_relaxed)) counters.push_back(now.ticks);
+      service.Update(now.stamp.stamp_ns, counters, StatusLine(now));
       if (std::chrono::steady_clock::now() >= next) next += kHealthPeriod;
       std::unique_lock lock(app.health_mutex);
       app.health_wanted.wait_until(lock, stop, next, [&app] { return std::exchange(app.health_now, false); });
     }
+    service.Stopping();
   });
 
-  bool stepping = false;
   std::int64_t known_ns = 0;
   while (!app.ShouldEnd()) {
     app.PollBus();
+    app.polls.fetch_add(1, std::memory_order_relaxed);
     const std::int64_t now = MonotonicNs();
     if (known_ns == 0 && app.session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown) known_ns = now;
     const std::int64_t recorder_ns = app.participant.KnownSince(bus::kRecorderPeer);
     const bool replayable = app.node != NodeId::kRecorder && app.node != NodeId::kRender;
     const bool recorded = !replayable || (recorder_ns != 0 ? now - recorder_ns > kRecorderListens
                                                            : known_ns != 0 && now - known_ns > kLongestWaitForRecorder);
-    if (!stepping && recorded && SessionTime(now) >= 0) {
-      stepping = true;
+    if (!app.stepping.load(std::memory_order_relaxed) && recorded && SessionTime(now) >= 0) {
       app.state = HealthState::kRunning;
       thread.Start();
+      app.stepping.store(true, std::memory_order_relaxed);
     }
     std::this_thread::sleep_for(kPollPeriod);
   }

@@ -119,6 +119,9 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
     const auto id = static_cast<NodeId>(node);
     ReadTiming(nodes.MapOrDefaults(NodeName(id)), id, &cart.nodes[node]);
   }
+  StrictMap security = root.MapOrDefaults("security");
+  cart.security.keys = security.TextOr("keys", cart.security.keys);
+  cart.security.encrypt = security.Flag("encrypt", cart.security.encrypt);
   file->Finish();
   return cart;
 }
@@ -259,22 +262,31 @@ void Validate(const CartConfig& cart) {
   ValidateLink("pedal", cart.pedal.kind, cart.pedal.link);
   ValidatePorts(cart);
   ValidateDevices(cart);
+  if (cart.security.encrypt && cart.security.keys.empty()) {
+    Refuse("security.encrypt", "is true, but `keys` names no folder; make one with fulcrum keys init");
+  }
 }
 
 CartConfig LoadCart(const std::filesystem::path& file) {
   StrictYaml yaml = StrictYaml::FromFile(file);
   CartConfig cart = ReadAndValidate(&yaml, file.string());
-  for (DeviceConfig& device : cart.devices) {
-    if (!device.motion.empty()) {
-      device.motion = (std::filesystem::absolute(file).parent_path() / device.motion).lexically_normal().string();
-    }
-  }
+  const auto from_its_folder = [&file](std::string* path) {
+    if (!path->empty()) *path = (std::filesystem::absolute(file).parent_path() / *path).lexically_normal().string();
+  };
+  for (DeviceConfig& device : cart.devices) from_its_folder(&device.motion);
+  from_its_folder(&cart.security.keys);
   return cart;
 }
 
 CartConfig LoadCartText(const std::string& text, const std::string& name) {
   StrictYaml yaml = StrictYaml::FromText(text, name);
   return ReadAndValidate(&yaml, name);
+}
+
+std::vector<KeyRule> CartRules(const std::filesystem::path& file) {
+  StrictYaml yaml = StrictYaml::FromFile(file);
+  (void)ReadAndValidate(&yaml, file.string());
+  return yaml.Rules();
 }
 
 std::string CartToYaml(const CartConfig& cart) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "services/config/strict_yaml.h"
 #include "services/core/messages.h"
 
 namespace fulcrum::config {
@@ -100,6 +101,12 @@ struct NodeTiming {
   int threads = 1;        ///< That share a period's work; physics_node only.
 };
 
+/// Who may join the session's bus: services/bus/DESIGN.md.
+struct SecurityConfig {
+  std::string keys;      ///< Folder made by `fulcrum keys init`; empty: anybody may.
+  bool encrypt = false;  ///< Encrypt what travels, for traffic between hosts.
+};
+
 struct CartConfig {
   std::string name = "simulated";
   int domain = 7;  ///< DDS domain, 1 … 100.
@@ -107,6 +114,7 @@ struct CartConfig {
   PedalConfig pedal;
   std::array<DeviceConfig, kMaxTools> devices;  ///< By tool.
   std::array<NodeTiming, kNodeCount> nodes;     ///< By NodeId.
+  SecurityConfig security;
 
   /// Everything simulated, at the rates of the architecture page.
   CartConfig();
@@ -120,6 +128,9 @@ void Validate(const CartConfig& cart);
 [[nodiscard]] CartConfig LoadCart(const std::filesystem::path& file);
 /// The same for text in memory; `name` stands for the file in messages.
 [[nodiscard]] CartConfig LoadCartText(const std::string& text, const std::string& name);
+
+/// Every key that a cart file may have; comments are in the lines of `file`.
+[[nodiscard]] std::vector<KeyRule> CartRules(const std::filesystem::path& file);
 
 /// The whole configuration, defaults included, as a cart file that loads to the same.
 [[nodiscard]] std::string CartToYaml(const CartConfig& cart);

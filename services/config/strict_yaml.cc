@@ -127,6 +127,21 @@ double SiFactor(std::string_view key) {
   return unit ? unit->si : 1.0;
 }
 
+std::string Count(std::size_t min_count, std::size_t max_count) {
+  return (min_count == max_count ? "" : std::to_string(min_count) + " to ") + std::to_string(max_count);
+}
+
+void AddRules(const Node& map, const std::string& path, std::vector<KeyRule>* rules) {
+  for (const Node::Asked& asked : map.asked) {
+    const Node* node = map.Find(asked.key);
+    rules->push_back({path + asked.key, node ? node->line : 0, asked.standard, asked.valid});
+    const std::string inner = path + asked.key + (asked.form == Node::Form::kMaps ? "[]." : ".");
+    if (!asked.maps.empty()) {
+      AddRules(*asked.maps.front(), inner, rules);
+    }
+  }
+}
+
 void CheckAllUsed(const Document& document, const Node& map) {
   for (const auto& entry : map.entries) {
     const std::string& key = entry.first;
@@ -191,6 +206,11 @@ Node* StrictMap::Require(std::string_view key, std::string_view what) {
   return node;
 }
 
+void StrictMap::Rule(std::string valid, std::optional<std::string> standard) {
+  node_->asked.back().valid = std::move(valid);
+  node_->asked.back().standard = std::move(standard);
+}
+
 void StrictMap::Fail(std::string_view key, std::string_view reason) const {
   const Node* node = node_->Find(key);
   const std::string path = node_->path.empty() ? std::string(key) : node_->path + "." + std::string(key);
@@ -203,6 +223,7 @@ double StrictMap::ReadNumber(std::string_view key, const double* default_value, 
   const double value = node ? ParseNumber(*document_, *node, unit, range) : *default_value;
   node_->asked.back().form = Node::Form::kPlain;
   node_->asked.back().text = node ? Shortest(value) : DefaultText(value);
+  Rule(Describe(range, unit), default_value ? std::optional(DefaultText(*default_value)) : std::nullopt);
   return value;
 }
 
@@ -238,6 +259,7 @@ std::int64_t StrictMap::ReadInteger(std::string_view key, const std::int64_t* de
   }
   node_->asked.back().form = Node::Form::kPlain;
   node_->asked.back().text = std::to_string(value);
+  Rule(valid, default_value ? std::optional(std::to_string(*default_value)) : std::nullopt);
   return value;
 }
 
@@ -262,6 +284,7 @@ bool StrictMap::ReadFlag(std::string_view key, const bool* default_value) {
   }
   node_->asked.back().form = Node::Form::kPlain;
   node_->asked.back().text = value ? "true" : "false";
+  Rule("true, false", default_value ? std::optional<std::string>(*default_value ? "true" : "false") : std::nullopt);
   return value;
 }
 
@@ -285,6 +308,7 @@ std::string StrictMap::ReadText(std::string_view key, const std::string_view* de
   }
   node_->asked.back().form = value.empty() ? Node::Form::kAbsent : Node::Form::kQuoted;
   node_->asked.back().text = value;
+  Rule(valid, default_value ? std::optional<std::string>(*default_value) : std::nullopt);
   return value;
 }
 
@@ -312,19 +336,20 @@ std::size_t StrictMap::ChoiceIndex(std::string_view key, const std::size_t* defa
   }
   node_->asked.back().form = Node::Form::kPlain;
   node_->asked.back().text = words[index];
+  Rule(valid, default_index ? std::optional<std::string>(words[*default_index]) : std::nullopt);
   return index;
 }
 
 std::optional<std::vector<double>> StrictMap::ReadNumbers(std::string_view key, std::size_t min_count,
                                                           std::size_t max_count, const Range& range) {
+  const Unit* unit = UnitOfKey(key);
+  const std::string count = Count(min_count, max_count);
   const Node* node = Use(key);
+  Rule(count + " numbers, each " + Describe(range, unit), std::nullopt);
   if (!node) {
     return {};
   }
-  const Unit* unit = UnitOfKey(key);
   if (node->kind != NodeKind::kList || node->items.size() < min_count || node->items.size() > max_count) {
-    const std::string count = min_count == max_count ? std::to_string(min_count)
-                                                     : std::to_string(min_count) + " to " + std::to_string(max_count);
     const std::string found = node->kind == NodeKind::kList ? "a list of " + std::to_string(node->items.size())
                                                             : std::string(KindName(*node));
     document_->Fail(node->line, node->path,
@@ -364,9 +389,12 @@ std::vector<double> StrictMap::NumbersSi(std::string_view key, const std::vector
   }
   Use(key);
   node_->asked.back().form = Node::Form::kFlow;
+  std::string standard = "[";
   for (const double value : default_si) {
     node_->asked.back().list.push_back(DefaultText(value / SiFactor(key)));
+    standard += (standard.size() == 1 ? "" : ", ") + node_->asked.back().list.back();
   }
+  Rule(Count(min_count, max_count) + " numbers, each " + Describe(range, UnitOfKey(key)), standard + "]");
   return default_si;
 }
 
@@ -383,6 +411,7 @@ Vec3f StrictMap::Vector3Si(std::string_view key, const Vec3f& default_si, const 
 std::vector<std::string> StrictMap::Texts(std::string_view key, std::size_t min_count, std::size_t max_count) {
   const std::string valid = "a list of " + std::to_string(min_count) + " to " + std::to_string(max_count) + " texts";
   const Node* node = min_count == 0 ? Use(key) : Require(key, valid);
+  Rule(valid, min_count == 0 ? std::optional<std::string>("none") : std::nullopt);
   if (!node) {
     return {};
   }
@@ -434,6 +463,7 @@ std::optional<StrictMap> StrictMap::OptionalMap(std::string_view key) {
 std::vector<StrictMap> StrictMap::Maps(std::string_view key, std::size_t min_count, std::size_t max_count) {
   const std::string valid = "a list of " + std::to_string(min_count) + " to " + std::to_string(max_count) + " maps";
   const Node* node = min_count == 0 ? Use(key) : Require(key, valid);
+  Rule(valid, min_count == 0 ? std::optional<std::string>("none") : std::nullopt);
   if (!node) {
     return {};
   }
@@ -463,7 +493,8 @@ StrictYaml StrictYaml::FromText(std::string_view text, std::string_view name) {
   return StrictYaml(internal::ParseDocument(text, name));
 }
 
-StrictYaml StrictYaml::FromFileOnBases(const std::filesystem::path& file, const std::vector<std::string_view>& own) {
+StrictYaml StrictYaml::FromFileOnBases(const std::filesystem::path& file, const std::vector<std::string_view>& own,
+                                       std::string_view text) {
   constexpr std::size_t kMostBases = 8;  // More is a circle.
   constexpr std::string_view kBase = "base";
   const auto parse = [](const std::filesystem::path& at) {
@@ -476,7 +507,7 @@ StrictYaml StrictYaml::FromFileOnBases(const std::filesystem::path& file, const 
     if (node != nullptr) entries.erase(at);
     return node;
   };
-  auto document = parse(file);
+  auto document = text.empty() ? parse(file) : internal::ParseDocument(text, file.string() + " with --set applied");
   std::filesystem::path folder = file.parent_path();
   const Node* next = take(document.get(), kBase);
   while (next != nullptr) {
@@ -517,5 +548,11 @@ StrictMap StrictYaml::root() { return {document_.get(), document_->root}; }
 void StrictYaml::Finish() const { CheckAllUsed(*document_, *document_->root); }
 
 std::string StrictYaml::Effective() const { return internal::EmitAsked(*document_->root); }
+
+std::vector<KeyRule> StrictYaml::Rules() const {
+  std::vector<KeyRule> rules;
+  AddRules(*document_->root, "", &rules);
+  return rules;
+}
 
 }  // namespace fulcrum::config

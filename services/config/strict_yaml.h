@@ -132,6 +132,8 @@ class StrictMap {
 
   internal::Node* Use(std::string_view key);
   internal::Node* Require(std::string_view key, std::string_view what);
+  /// Of the key that was asked for last.
+  void Rule(std::string valid, std::optional<std::string> standard);
   double ReadNumber(std::string_view key, const double* default_value, const Range& range);
   std::optional<std::vector<double>> ReadNumbers(std::string_view key, std::size_t min_count, std::size_t max_count,
                                                  const Range& range);
@@ -145,6 +147,14 @@ class StrictMap {
   internal::Node* node_;
 };
 
+/// A key that was asked for, and what it may be.
+struct KeyRule {
+  std::string path;                     ///< "handles.tool0.simulated.noise_mV"; of a list's maps "structures[].kind".
+  int line = 0;                         ///< Where the file has it; 0: it does not.
+  std::optional<std::string> standard;  ///< Its default; none: it must be given, or is a map.
+  std::string valid;                    ///< In words; empty for maps.
+};
+
 /// One configuration file.
 class StrictYaml {
  public:
@@ -155,7 +165,9 @@ class StrictYaml {
   /// The same of a file that may stand on others: its key `base` names one, relative to its folder, and so on. Maps
   /// join key by key, anything else replaces what the base says, lists as a whole; `own` keys are never taken from a
   /// base.
-  static StrictYaml FromFileOnBases(const std::filesystem::path& file, const std::vector<std::string_view>& own);
+  /// @param text stands for the content of `file` when it is not empty.
+  static StrictYaml FromFileOnBases(const std::filesystem::path& file, const std::vector<std::string_view>& own,
+                                    std::string_view text = {});
   ~StrictYaml();
   StrictYaml(StrictYaml&&) noexcept;
   StrictYaml& operator=(StrictYaml&&) noexcept;
@@ -167,6 +179,8 @@ class StrictYaml {
   void Finish() const;
   /// What was read, defaults included, as YAML in the order of reading. Reads back to the same.
   [[nodiscard]] std::string Effective() const;
+  /// Every key that was asked for, in the order of asking; of the maps of a list the first stands for all.
+  [[nodiscard]] std::vector<KeyRule> Rules() const;
 
  private:
   explicit StrictYaml(std::unique_ptr<internal::Document> document);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -27,6 +28,8 @@ struct Node {
     std::string text;
     std::vector<std::string> list;
     std::vector<Node*> maps;
+    std::string valid;                    ///< What would be, in words.
+    std::optional<std::string> standard;  ///< The default.
   };
   std::vector<Asked> asked;
 

@@ -6,12 +6,12 @@
 
 namespace fulcrum::log_tools {
 
-Recording::Recording(const std::filesystem::path& file, Filter filter) : reader_(file), filter_(std::move(filter)) {}
+Recording::Recording(const std::filesystem::path& file, Filter filter) : messages_(file), filter_(std::move(filter)) {}
 
 const Source& Recording::SourceOf(std::uint16_t channel) {
   const auto found = sources_.find(channel);
   if (found != sources_.end()) return found->second;
-  const recording::McapChannel& told = reader_.channels().at(channel);
+  const recording::McapChannel& told = reader().channels().at(channel);
   Source source{std::nullopt, told.topic, {}};
   if (const bus::TopicRole* role = bus::RoleNamed(told.topic)) {
     source.topic = role->id;
@@ -23,7 +23,7 @@ const Source& Recording::SourceOf(std::uint16_t channel) {
 }
 
 bool Recording::Next(Entry* entry) {
-  while (reader_.Next(&entry->message)) {
+  while (messages_.Next(&entry->message)) {
     if (!first_ns_) first_ns_ = entry->message.log_time_ns;
     entry->time_s = 1e-9 * static_cast<double>(static_cast<std::int64_t>(entry->message.log_time_ns - *first_ns_));
     entry->source = &SourceOf(entry->message.channel);

@@ -11,7 +11,7 @@
 #include "services/bus/convert/cdr.h"
 #include "services/bus/topics.h"
 #include "services/core/messages.h"
-#include "services/recording/mcap_reader.h"
+#include "services/recording/time_order.h"
 
 namespace fulcrum::log_tools {
 
@@ -44,12 +44,12 @@ class Recording {
 
   /// The next message that the filter lets through.
   bool Next(Entry* entry);
-  [[nodiscard]] const recording::McapReader& reader() const { return reader_; }
+  [[nodiscard]] const recording::McapReader& reader() const { return messages_.reader(); }
 
  private:
   const Source& SourceOf(std::uint16_t channel);
 
-  recording::McapReader reader_;
+  recording::TimeOrder messages_;
   Filter filter_;
   std::map<std::uint16_t, Source> sources_;
   std::optional<std::uint64_t> first_ns_;

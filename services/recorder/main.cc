@@ -3,6 +3,7 @@
 #include <iterator>
 #include <mutex>
 
+#include "services/app/cart_security.h"
 #include "services/app/node_app.h"
 #include "services/app/version.h"
 #include "services/bus/hex.h"
@@ -79,7 +80,9 @@ ExitCode Run(app::NodeApp& node) {
   const fs::path folder = node.options().session;
   RecorderSettings settings = TakeSettings(&node);
   // The app's own participant has typed ports of some topics: there a type can be registered in one way only.
-  bus::DdsParticipant bus({.domain = node.options().domain, .node_name = bus::kRecorderPeer, .shared_memory = {}});
+  bus::DdsParticipant bus({.domain = node.options().domain,
+                           .node_name = bus::kRecorderPeer,
+                           .security = app::SecurityOf(node.cart(), NodeName(NodeId::kRecorder))});
   settings.describe = [&](const bus::WriterGuid& writer) { return Describe(bus.PeerOf(writer)); };
   Recorder recorder(settings);
   std::vector<std::unique_ptr<bus::RawInput>> inputs;
@@ -138,6 +141,6 @@ ExitCode Run(app::NodeApp& node) {
 int main(int argc, char** argv) {
   return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kRecorder,
                                 "Every topic of the cart into a file (--file FILE), and the newest seconds (--keep\n"
-                                "SECONDS) into dumps when a node dies or `fulcrum dump` asks for one.",
+                                "SECONDS) into dumps when a node dies or is degraded, or `fulcrum dump` asks for\none.",
                                 fulcrum::recorder::Run);
 }

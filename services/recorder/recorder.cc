@@ -37,7 +37,9 @@ std::string Hex(const bus::WriterGuid& guid) {
 Recorder::Recorder(const RecorderSettings& settings)
     : settings_(settings), wall_minus_monotonic_ns_(WallMinusMonotonic()) {
   for (Batch* batch : {&filling_, &writing_}) {
-    batch->bytes = std::make_unique_for_overwrite<std::uint8_t[]>(settings.queue_B);
+    for (Batch::Part* part : {&batch->large, &batch->small}) {
+      part->bytes = std::make_unique_for_overwrite<std::uint8_t[]>(settings.queue_B);
+    }
   }
   if (settings.file.empty()) return;
   file_.emplace(settings.file, kProfile, settings.library);
@@ -64,9 +66,11 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
     writer = writers_.insert(writers_.end(), {sample.topic, sample.writer, sample.sequence - 1});
   }
   if (sample.sequence <= writer->last_sequence) return;
-  const bool room = filling_.used + recording::kMessageHead + size <= settings_.queue_B;
+  const bool room = filling_.used() + recording::kMessageHead + size <= settings_.queue_B;
   if (room) {
-    std::uint8_t* at = filling_.bytes.get() + filling_.used;
+    const bool is_large = bus::RoleOf(sample.topic).path == bus::Path::kSharedMemory;
+    Batch::Part& part = is_large ? filling_.large : filling_.small;
+    std::uint8_t* at = part.bytes.get() + part.used;
     recording::PutMessageHead(static_cast<std::uint16_t>(writer - writers_.begin()),
                               static_cast<std::uint32_t>(sample.sequence),
                               static_cast<std::uint64_t>(now_ns + wall_minus_monotonic_ns_),
@@ -75,9 +79,9 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
     std::memcpy(at, sample.head.data(), sample.head.size());
     if (!sample.body.empty()) std::memcpy(at + sample.head.size(), sample.body.data(), sample.body.size());
     if (!is_whole()) return;  // Missed: the next one's sequence tells.
-    if (filling_.used == 0) filling_.begin_ns = now_ns;
-    filling_.used += recording::kMessageHead + size;
-    most_used_ = std::max(most_used_, filling_.used);
+    if (filling_.used() == 0) filling_.begin_ns = now_ns;
+    part.used += recording::kMessageHead + size;
+    most_used_ = std::max(most_used_, filling_.used());
   }
   counts.missed += sample.sequence - writer->last_sequence - 1;
   writer->last_sequence = sample.sequence;
@@ -115,22 +119,28 @@ void Recorder::AddChannels(recording::McapWriter* file, std::size_t first,
 void Recorder::Flush(std::int64_t now_ns) { Exchange(now_ns, false); }
 
 void Recorder::Exchange(std::int64_t now_ns, bool all) {
-  constexpr std::size_t kChunk = recording::ChunkPacker::kChunkBytes;
   {
     const std::lock_guard lock(mutex_);
-    const bool due = filling_.used >= kChunk || now_ns - filling_.begin_ns >= kLongestChunk_ns;
-    if (filling_.used == 0 || !(due || all)) return;
+    const bool due =
+        filling_.used() >= recording::ChunkPacker::kChunkBytes || now_ns - filling_.begin_ns >= kLongestChunk_ns;
+    if (filling_.used() == 0 || !(due || all)) return;
     std::swap(filling_, writing_);
   }
   AddNewChannels();
-  std::span<const std::uint8_t> records(writing_.bytes.get(), writing_.used);
+  Pack(&writing_.large);
+  Pack(&writing_.small);
+}
+
+void Recorder::Pack(Batch::Part* part) {
+  constexpr std::size_t kChunk = recording::ChunkPacker::kChunkBytes;
+  std::span<const std::uint8_t> records(part->bytes.get(), part->used);
   while (!records.empty()) {
     // Up to twice a chunk is one: no crumb is left behind.
     records = records.subspan(packer_.Pack(records, records.size() <= 2 * kChunk ? records.size() : kChunk, &packed_));
     if (file_) Write();
     if (settings_.keep_s > 0) Keep();
   }
-  writing_.used = 0;
+  part->used = 0;
 }
 
 void Recorder::Write() {

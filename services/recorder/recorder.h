@@ -82,9 +82,15 @@ class Recorder {
  private:
   /// Message records, as they stand in a chunk: a sample is copied once and packed from there.
   struct Batch {
-    std::unique_ptr<std::uint8_t[]> bytes;
-    std::size_t used = 0;
+    /// Large topics and small ones apart, and so in chunks of their own: most readers want only the small ones, which
+    /// are a thirtieth of the bytes.
+    struct Part {
+      std::unique_ptr<std::uint8_t[]> bytes;
+      std::size_t used = 0;
+    };
+    Part large, small;
     std::int64_t begin_ns = 0;  ///< When its first sample came.
+    [[nodiscard]] std::size_t used() const { return large.used + small.used; }
   };
   struct Writer {
     TopicId topic;
@@ -102,6 +108,7 @@ class Recorder {
   };
 
   void AddNewChannels();
+  void Pack(Batch::Part* part);
   /// Takes over what has come when that is worth a chunk, or all.
   void Exchange(std::int64_t now_ns, bool all);
   /// The packed chunk into the file.

@@ -72,16 +72,42 @@ std::optional<McapReader::Record> McapReader::ReadFromFile() {
     return std::nullopt;
   }
   next_ += head.size() + length;
-  const bool only_times = depth_ == Depth::kChunkHeads && head[0] == static_cast<std::uint8_t>(Opcode::kChunk);
-  content_.resize(only_times ? std::min<std::uint64_t>(length, kChunkTimes) : length);
+  const bool passed_over = head[0] == static_cast<std::uint8_t>(Opcode::kChunk) &&
+                           (depth_ == Depth::kChunkHeads || (wanted_ && !HoldsWanted(next_)));
+  content_.resize(passed_over ? std::min<std::uint64_t>(length, kChunkTimes) : length);
   if (!read(content_.data(), content_.size())) {
     Fault("the file cannot be read on");
     return std::nullopt;
   }
-  if (only_times) {
+  if (passed_over) {
     in_.seekg(static_cast<std::streamoff>(next_));
   }
-  return Record{head[0], content_};
+  return Record{head[0], content_, passed_over};
+}
+
+bool McapReader::HoldsWanted(std::uint64_t indexes) {
+  const std::streampos here = in_.tellg();
+  bool told = false, wanted = false;
+  std::array<std::uint8_t, kRecordHead + sizeof(std::uint16_t)> head{};
+  while (!wanted && size_ - indexes >= head.size()) {
+    in_.seekg(static_cast<std::streamoff>(indexes));
+    in_.read(reinterpret_cast<char*>(head.data()), head.size());
+    ByteReader from(head);
+    if (!in_ || from.Number<std::uint8_t>() != static_cast<std::uint8_t>(Opcode::kMessageIndex)) {
+      break;
+    }
+    const auto length = from.Number<std::uint64_t>();
+    const auto channel = channels_.find(from.Number<std::uint16_t>());
+    if (length > size_ - indexes - kRecordHead) {
+      break;
+    }
+    told = true;
+    wanted = channel == channels_.end() || wanted_(channel->second);
+    indexes += kRecordHead + length;
+  }
+  in_.clear();
+  in_.seekg(here);
+  return wanted || !told;
 }
 
 std::optional<McapReader::Record> McapReader::TakeFromChunk() {
@@ -98,15 +124,15 @@ std::optional<McapReader::Record> McapReader::TakeFromChunk() {
   return Record{opcode, content};
 }
 
-void McapReader::OpenChunk(std::span<const std::uint8_t> content) {
-  ByteReader from(content);
+void McapReader::OpenChunk(const Record& record) {
+  ByteReader from(record.content);
   const auto first_ns = from.Number<std::uint64_t>();
   const auto last_ns = from.Number<std::uint64_t>();
   if (from.good()) {
     first_ns_ = first_ns_ == 0 ? first_ns : std::min(first_ns_, first_ns);
     last_ns_ = std::max(last_ns_, last_ns);
   }
-  if (depth_ == Depth::kChunkHeads) {
+  if (record.passed_over) {
     return;
   }
   const auto size = from.Number<std::uint64_t>();
@@ -203,7 +229,7 @@ bool McapReader::Next(McapMessage* message) {
       break;
     }
     if (record->opcode == static_cast<std::uint8_t>(Opcode::kChunk)) {
-      OpenChunk(record->content);
+      OpenChunk(*record);
     } else if (record->opcode == static_cast<std::uint8_t>(Opcode::kDataEnd)) {
       // What follows repeats what has been met; only its end says more.
       std::array<std::uint8_t, kMcapMagic.size()> end{};

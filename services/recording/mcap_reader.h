@@ -5,10 +5,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace fulcrum::recording {
@@ -45,6 +47,10 @@ class McapReader {
   /// Throws InputError when the file cannot be read or does not begin as an MCAP file.
   explicit McapReader(const std::filesystem::path& file, Depth depth = Depth::kMessages);
 
+  /// From now on chunks that hold only messages of channels for which this is false are passed over, unread where their
+  /// index tells. Such messages in other chunks come nevertheless.
+  void PassOver(std::function<bool(const McapChannel&)> wanted) { wanted_ = std::move(wanted); }
+
   /// The next message, in the order of the file; false at the end of what can be read.
   bool Next(McapMessage* message);
 
@@ -74,15 +80,19 @@ class McapReader {
   struct Record {
     std::uint8_t opcode;
     std::span<const std::uint8_t> content;
+    bool passed_over = false;  ///< Of a chunk only the times were read.
   };
   std::optional<Record> ReadFromFile();
   std::optional<Record> TakeFromChunk();
+  /// Looks into the message indexes behind a chunk, which begin there.
+  bool HoldsWanted(std::uint64_t indexes);
   /// True when it is a message.
   bool Take(const Record& record, McapMessage* message);
-  void OpenChunk(std::span<const std::uint8_t> content);
+  void OpenChunk(const Record& record);
   void Fault(std::string what);
 
   std::filesystem::path file_;
+  std::function<bool(const McapChannel&)> wanted_;
   const Depth depth_;
   std::ifstream in_;
   std::uint64_t first_ns_ = 0, last_ns_ = 0;

@@ -12,13 +12,15 @@
 #include <thread>
 #include <type_traits>
 
+#include "services/bus/access.h"
 #include "services/bus/convert/cdr.h"
 #include "services/bus/dds/participant.h"
 #include "services/bus/dds/shared_memory.h"
 #include "services/bus/gate.h"
+#include "services/bus/topic_owner.h"
 #include "services/bus/topics.h"
-#include "services/core/message_fields.h"
-#include "services/recording/mcap_reader.h"
+#include "services/core/message_time.h"
+#include "services/recording/time_order.h"
 #include "services/runtime/cyclic_thread.h"
 
 namespace fulcrum::replay {
@@ -26,51 +28,10 @@ namespace {
 
 // Readers find the writers before the first message: a round of discovery.
 constexpr auto kDiscovery = std::chrono::milliseconds(300);
+// What was sent last reaches its readers before its writer is gone.
+constexpr auto kLeave = std::chrono::milliseconds(200);
 // A longer silence in the recording is waited for in pieces, so that a stop is heard.
 constexpr std::int64_t kLongestSleep_ns = 50'000'000;
-
-/// Moves what is a time of CLOCK_MONOTONIC by its name, wherever it stands.
-template <class T>
-void MoveAll(std::int64_t by_ns, T* value) {
-  if constexpr (HasFields<T>) {
-    ForEachField<T>([&](const char* field, auto member) {
-      const std::string_view name = field;
-      auto& part = value->*member;
-      if constexpr (std::is_integral_v<std::remove_reference_t<decltype(part)>>) {
-        // Zero stands for none.
-        if (part != 0 && (name == "epoch" || name.ends_with("_ns"))) {
-          part += static_cast<std::remove_reference_t<decltype(part)>>(by_ns);
-        }
-      } else {
-        MoveAll(by_ns, &part);
-      }
-    });
-  } else if constexpr (requires { requires HasFields<typename T::value_type>; }) {
-    for (auto& part : *value) MoveAll(by_ns, &part);
-  }
-}
-
-/// Who sends a topic; none for those that several nodes send.
-std::optional<NodeId> OwnerOf(TopicId topic) {
-  switch (topic) {
-    case TopicId::kHandleState:
-      return NodeId::kHandleBridge;
-    case TopicId::kToolState:
-      return NodeId::kHaptics;
-    case TopicId::kTissueFrame:
-    case TopicId::kContactModel:
-    case TopicId::kCauteryContact:
-      return NodeId::kPhysics;
-    case TopicId::kTopologyState:
-    case TopicId::kTemperaturePatch:
-    case TopicId::kThermalEvent:
-      return NodeId::kThermal;
-    case TopicId::kSceneManifest:
-      return NodeId::kSupervisor;
-    default:
-      return std::nullopt;
-  }
-}
 
 /// A topic on its way out.
 class Channel {
@@ -95,7 +56,9 @@ class ChannelOf final : public Channel {
     if constexpr (requires { message_.node; }) {
       if (std::find(nodes_.begin(), nodes_.end(), message_.node) == nodes_.end()) return false;
     }
-    MoveAll(by_ns, &message_);
+    ForEachTime(&message_, [by_ns](std::string_view, auto& time) {
+      time += static_cast<std::remove_reference_t<decltype(time)>>(by_ns);
+    });
     return true;
   }
   bool Send() override { return output_->Write(message_); }
@@ -108,7 +71,7 @@ class ChannelOf final : public Channel {
 
 bool IsSent(TopicId topic, const std::vector<NodeId>& nodes) {
   if (topic == TopicId::kCommand || topic == TopicId::kCommandReply) return false;
-  const std::optional<NodeId> owner = OwnerOf(topic);
+  const std::optional<NodeId> owner = bus::OwnerOf(topic);
   return !owner || std::find(nodes.begin(), nodes.end(), *owner) != nodes.end();
 }
 
@@ -123,9 +86,15 @@ std::int64_t ClockOffset(const recording::McapReader& reader) {
 }  // namespace
 
 LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>& stop) {
-  recording::McapReader reader(settings.recording);
+  recording::TimeOrder messages(settings.recording);
+  const recording::McapReader& reader = messages.reader();
   const std::filesystem::path memory = bus::SharedMemoryDirectory(settings.domain);
-  bus::DdsParticipant participant({.domain = settings.domain, .node_name = "replayer", .shared_memory = memory});
+  const bus::Security security =
+      settings.security.on() ? settings.security : bus::AnnouncedSecurity(memory, bus::kReplayerIdentity);
+  bus::DdsParticipant participant({.domain = settings.domain,
+                                   .node_name = std::string(bus::kReplayerIdentity),
+                                   .shared_memory = memory,
+                                   .security = security});
   std::map<TopicId, std::unique_ptr<Channel>> channels;
   for (const bus::TopicRole& role : bus::kTopicRoles) {
     if (!IsSent(role.id, settings.nodes)) continue;
@@ -140,7 +109,7 @@ LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>&
   std::optional<std::int64_t> first_ns;
   std::int64_t moved_ns = 0;  // From the recording's clock to now's.
   const std::int64_t begin_ns = runtime::MonotonicNs();
-  while (!stop() && reader.Next(&message)) {
+  while (!stop() && messages.Next(&message)) {
     const std::int64_t then_ns = static_cast<std::int64_t>(message.log_time_ns) - ClockOffset(reader);
     if (!first_ns) {
       first_ns = then_ns + static_cast<std::int64_t>(1e9 * settings.from_s);
@@ -159,6 +128,7 @@ LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>&
     result.latest_s = std::max(result.latest_s, 1e-9 * static_cast<double>(runtime::MonotonicNs() - due_ns));
     ++(channel->second->Send() ? result.published : result.failed);
   }
+  std::this_thread::sleep_for(kLeave);
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "services/bus/security.h"
 #include "services/core/messages.h"
 
 namespace fulcrum::replay {
@@ -13,8 +14,9 @@ namespace fulcrum::replay {
 struct LiveSettings {
   std::filesystem::path recording;
   int domain = 7;
-  double from_s = 0;          ///< Of the recording, from its first message [s].
-  std::vector<NodeId> nodes;  ///< Whose messages are published.
+  bus::Security security = {};  ///< Off: as the session that runs in the domain says.
+  double from_s = 0;            ///< Of the recording, from its first message [s].
+  std::vector<NodeId> nodes;    ///< Whose messages are published.
 };
 
 struct LiveResult {

@@ -23,7 +23,7 @@ constexpr double kNsToS = 1e-9;
 /// A node that makes the ticks it is given, on its own thread.
 class NodeRunner {
  public:
-  NodeRunner(NodeId node, const NodeMaking& making) : node_(MakeReplayedNode(node, making)) {
+  NodeRunner(NodeId node, const NodeMaking& making, bool go_on) : node_(MakeReplayedNode(node, making)), go_on_(go_on) {
     result_.node = node;
     thread_ = std::thread([this] { Run(); });
   }
@@ -57,12 +57,14 @@ class NodeRunner {
 
  private:
   static constexpr std::size_t kQueue = 64;
+  static constexpr std::int64_t kHealthPeriod_ns = 100'000'000;
 
   void Run() {
     RecordedTick tick;
     while (Take(&tick)) {
       if (!Make(tick)) break;
     }
+    if (result_.ticks > 0 && result_.missing.empty()) LookAtHealth(next_look_ns_);
     const std::lock_guard lock(mutex_);
     stopped_ = true;
     changed_.notify_all();
@@ -96,19 +98,39 @@ class NodeRunner {
     result_.starts += tick.epoch != epoch_ ? 1 : 0;
     epoch_ = tick.epoch;
     result_.session_time_s = tick.tick.session_time_s;
+    result_.state_hash = hash;
+    if (tick.tick.stamp_ns >= next_look_ns_) LookAtHealth(tick.tick.stamp_ns);
     if (!tick.state_hash) return true;
     ++result_.compared;
     if (*tick.state_hash == hash) return true;
+    ++result_.mismatches;
+    if (result_.departure) return go_on_;
     result_.departure = Departure{
         tick.tick.index, tick.tick.session_time_s, tick.tick.stamp_ns, tick.epoch, *tick.state_hash, hash, {}};
     outputs_ = node_->TakeOutputs();
-    return false;
+    return go_on_;
+  }
+
+  void LookAtHealth(std::int64_t now_ns) {
+    next_look_ns_ = now_ns + kHealthPeriod_ns;
+    Health health;
+    health.state = HealthState::kRunning;
+    node_->FillHealth(&health);
+    for (const Metric& metric : health.metrics) {
+      const auto [known, fresh] =
+          result_.health.try_emplace(metric.name, HealthFigure{metric.value, metric.value, metric.value});
+      if (fresh) continue;
+      HealthFigure& figure = known->second;
+      figure = {metric.value, std::min(figure.least, metric.value), std::max(figure.most, metric.value)};
+    }
   }
 
   std::unique_ptr<ReplayedNode> node_;
   NodeResult result_;
   std::vector<Published> outputs_;
+  const bool go_on_;
   std::uint64_t epoch_ = 0;
+  std::int64_t next_look_ns_ = 0;
 
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -128,8 +150,8 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
   TickSource source(settings.recording, settings.nodes, NodePeriods(cart));
   std::vector<std::unique_ptr<NodeRunner>> runners;
   for (const NodeId node : settings.nodes) {
-    runners.push_back(
-        std::make_unique<NodeRunner>(node, NodeMaking{scene, cart, settings.folder, settings.physics_threads}));
+    runners.push_back(std::make_unique<NodeRunner>(
+        node, NodeMaking{scene, cart, settings.folder, settings.physics_threads}, settings.go_on));
   }
 
   LockStepResult result;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -22,6 +23,7 @@ struct LockStepSettings {
   double rate = 0;               ///< Times real time; 0: as fast as it can.
   int physics_threads = 1;       ///< That share a step of physics; the states do not depend on it.
   double until_s = -1;           ///< Session time at which it ends; negative: the end of the recording.
+  bool go_on = false;            ///< Past a state that differs.
 };
 
 /// The first tick after which a node's state is not what it was.
@@ -34,14 +36,22 @@ struct Departure {
   std::string field;  ///< Topic, field, index and both values of what it published; or that nothing of it shows.
 };
 
+/// A figure of a node's Health, looked at as often as the node would have told it.
+struct HealthFigure {
+  double last = 0, least = 0, most = 0;
+};
+
 struct NodeResult {
   NodeId node = NodeId::kPhysics;
-  std::uint64_t ticks = 0;     ///< Made.
-  std::uint64_t compared = 0;  ///< Of them, those whose hash the recording has.
-  std::uint64_t starts = 0;    ///< Of the node: 1 and its restarts.
-  double session_time_s = 0;   ///< Of its last tick.
-  double busy_s = 0;           ///< Computing.
-  std::optional<Departure> departure;
+  std::uint64_t ticks = 0;             ///< Made.
+  std::uint64_t compared = 0;          ///< Of them, those whose hash the recording has.
+  std::uint64_t starts = 0;            ///< Of the node: 1 and its restarts.
+  double session_time_s = 0;           ///< Of its last tick.
+  double busy_s = 0;                   ///< Computing.
+  std::uint64_t state_hash = 0;        ///< After its last tick.
+  std::uint64_t mismatches = 0;        ///< Of those compared.
+  std::optional<Departure> departure;  ///< The first.
+  std::map<std::string, HealthFigure> health;
   std::string missing;  ///< Why it could not go on; empty: nothing was missing.
   [[nodiscard]] bool good() const { return !departure && missing.empty() && compared > 0; }
 };
@@ -55,7 +65,7 @@ struct LockStepResult {
 };
 
 /// Each node on a thread of its own: with recorded inputs they need nothing of each other. Stops a node at its first
-/// departure. `progress` is called now and then with the session time [s], by the calling thread.
+/// departure, unless told to go on. `progress` is called now and then with the session time [s], by the calling thread.
 /// Throws InputError when recording, scene or cart do not allow a replay, MismatchError when the recording is of
 /// another scene.
 LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneView& scene,

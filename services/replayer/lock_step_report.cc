@@ -45,7 +45,7 @@ void WriteReportJson(const LockStepResult& result, const std::filesystem::path& 
     };
     add("ticks", std::to_string(node.ticks));
     add("compared", std::to_string(node.compared));
-    add("mismatches", node.departure ? "1" : "0");
+    add("mismatches", std::to_string(node.mismatches));
     add("starts", std::to_string(node.starts));
     add("busy_s", Format("%.6f", node.busy_s));
     add("departure", JsonString(node.departure ? Describe(*node.departure) : std::string()));

@@ -12,8 +12,8 @@ namespace fulcrum::replay {
 [[nodiscard]] std::string ReportText(const LockStepResult& result);
 
 /// One flat object: `same`, `speed_x_realtime`, `session_s`, and for each node `<node>.ticks`, `.compared`,
-/// `.mismatches` (0 or 1: a node stops at its first), `.starts`, `.busy_s`, `.departure`, `.missing`. Throws InputError
-/// when the file cannot be written.
+/// `.mismatches` (at most 1 when a node stops at its first), `.starts`, `.busy_s`, `.departure`, `.missing`. Throws
+/// InputError when the file cannot be written.
 void WriteReportJson(const LockStepResult& result, const std::filesystem::path& file);
 
 }  // namespace fulcrum::replay

@@ -13,7 +13,9 @@
 #include <thread>
 #include <vector>
 
+#include "services/app/cart_security.h"
 #include "services/app/version.h"
+#include "services/bus/access.h"
 #include "services/config/cart.h"
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
@@ -23,9 +25,11 @@
 #include "services/replayer/live.h"
 #include "services/replayer/lock_step.h"
 #include "services/replayer/lock_step_report.h"
+#include "services/replayer/node_test.h"
 #include "services/replayer/pictures.h"
 #include "services/replayer/what_if.h"
 #include "services/replayer/what_if_report.h"
+#include "services/runtime/cyclic_thread.h"
 #include "services/runtime/realtime.h"
 #include "services/scene/scene_file.h"
 
@@ -37,6 +41,7 @@ namespace po = boost::program_options;
 constexpr const char* kUsage =
     R"(usage: replayer RECORDING --into NODE... [options]
        replayer RECORDING --live [--only NODE... | --except NODE...] [options]
+       replayer RECORDING --test NODE [--expect HASH] [--assert EXPR...] [options]
 
 Lets nodes make the ticks of a recorded session again, with exactly the inputs that they had then, and compares their
 state with the recorded one after each tick. Stops a node at its first difference and says which tick, topic, field and
@@ -56,12 +61,18 @@ development, or in the place of one.
 
   replayer out/latest/recording.mcap --live --except physics
 
+With --test one node makes all ticks of the session headless, past states that differ, and its figures are held against
+what was asked for; --junit writes the result for a CI system. Without --expect and --assert each state must be the
+recorded one. fulcrum test-node is the same.
+
+  replayer out/latest/recording.mcap --test thermal --assert "cut_length_mm > 30" --junit thermal.xml
+
 )";
 
 constexpr const char* kExitCodes =
     "\nExit code: 0 every state was the same, 1 a state differed or the recording lacks something, 2 bad usage or "
     "file,\n"
-    "3 the recording is of another scene.\n";
+    "3 the recording is of another scene. With --test: 0 passed, 1 failed.\n";
 
 struct Options {
   replay::LockStepSettings lock_step;
@@ -69,7 +80,9 @@ struct Options {
   std::filesystem::path scene, cart, json;
   std::filesystem::path frames;
   replay::LiveSettings live_settings;
-  bool quiet = false, console = false, live = false, pictures = false;
+  bool quiet = false, console = false, live = false, pictures = false, test = false;
+  replay::Demands demands;
+  std::filesystem::path junit;
   std::string answer;
 };
 
@@ -106,7 +119,28 @@ replay::LiveSettings LiveSettingsFrom(const po::variables_map& values) {
   if (values.count("only") != 0 && values.count("except") != 0) throw InputError("give --only or --except, not both");
   settings.nodes = values.count("only") != 0 ? NodesNamed(values, "only", kPublishers) : kPublishers;
   for (const NodeId node : NodesNamed(values, "except", kPublishers)) std::erase(settings.nodes, node);
+  if (const std::string cart = values["cart"].as<std::string>(); !cart.empty()) {
+    settings.security = app::SecurityOf(config::LoadCart(cart), bus::kReplayerIdentity);
+  }
   return settings;
+}
+
+void ReadDemands(const po::variables_map& values, Options* options) {
+  const bool asked = values.count("expect") + values.count("assert") > 0 || !values["junit"].as<std::string>().empty();
+  if (!options->test && asked) throw InputError("--expect, --assert and --junit go with --test");
+  if (!options->test) return;
+  if (options->lock_step.nodes.size() != 1) throw InputError("--test: one node at a time");
+  if (values.count("set") + values.count("console") > 0)
+    throw InputError("--test goes with neither --set nor --console");
+  if (values.count("expect") != 0) {
+    options->demands.state_hash = replay::ParseStateHash(values["expect"].as<std::string>());
+  }
+  if (values.count("assert") != 0) {
+    for (const std::string& text : values["assert"].as<std::vector<std::string>>()) {
+      options->demands.assertions.push_back(replay::ParseAssertion(text));
+    }
+  }
+  options->junit = values["junit"].as<std::string>();
 }
 
 Options Parse(int argc, char** argv) {
@@ -114,7 +148,17 @@ Options Parse(int argc, char** argv) {
   po::options_description visible("Options"), all;
   visible.add_options()  //
       ("into", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
-       "physics, thermal, haptics, render: one or more")  //
+       "physics, thermal, haptics, render: one or more")                                                          //
+      ("test", po::value<std::vector<std::string>>()->value_name("NODE"), "physics, thermal, haptics or render")  //
+      ("expect", po::value<std::string>()->value_name("HASH"),
+       "test: the state hash after the last tick, 16 hexadecimal digits")  //
+      ("assert", po::value<std::vector<std::string>>()->value_name("EXPR"),
+       "test: FIGURE < | <= | == | != | >= | > NUMBER, over the figures of the node's Health, each also as NAME.min "
+       "and "
+       "NAME.max of the session, and ticks, compared, hash_mismatches, starts, session_s, busy_s; as often as "
+       "needed")  //
+      ("junit", po::value<std::string>()->value_name("FILE")->default_value(""),
+       "test: write the result as JUnit XML, too")  //
       ("set", po::value<std::vector<std::string>>()->value_name("SECTION.KEY=VALUE"),
        "a parameter to change, as in the scene's description; as often as needed")  //
       ("console", "read commands from standard input; \"help\" lists them")         //
@@ -126,7 +170,8 @@ Options Parse(int argc, char** argv) {
       ("domain", po::value<int>()->value_name("N")->default_value(7), "live: DDS domain, 1 to 100")                  //
       ("from", po::value<double>()->value_name("S")->default_value(0), "live: begin so far into the recording [s]")  //
       ("frames", po::value<std::string>()->value_name("DIR")->default_value(""),
-       "folder for the pictures of render; default: replayed_frames beside the recording")  //
+       "folder for the pictures of render; default: replayed_frames beside the recording; in a test they are not "
+       "kept")  //
       ("threads",
        po::value<int>()->value_name("N")->default_value(static_cast<int>(std::thread::hardware_concurrency())),
        "that share a step of physics; the states do not depend on it")                                           //
@@ -135,7 +180,8 @@ Options Parse(int argc, char** argv) {
       ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
        "compiled scene; default: scene.fulcrum beside the recording")  //
       ("cart", po::value<std::string>()->value_name("FILE")->default_value(""),
-       "cart configuration; default: cart.yaml beside the recording")                                           //
+       "cart configuration; default: cart.yaml beside the recording; live: its keys, by default those of the session "
+       "that runs")                                                                                             //
       ("json", po::value<std::string>()->value_name("FILE")->default_value(""), "write the result there, too")  //
       ("quiet", "no progress")                                                                                  //
       ("version", "print the version")                                                                          //
@@ -161,20 +207,25 @@ Options Parse(int argc, char** argv) {
     }
     if (values.count("recording") == 0) throw InputError("which recording? See --help");
     options.lock_step.recording = values["recording"].as<std::string>();
+    if (!std::filesystem::exists(options.lock_step.recording)) {
+      throw InputError(options.lock_step.recording.string() + ": no such file");
+    }
     options.live = values.count("live") != 0;
-    if (options.live == (values.count("into") != 0)) {
-      throw InputError("give either --into NODE... or --live; see --help");
+    options.test = values.count("test") != 0;
+    if (values.count("into") + values.count("live") + values.count("test") != 1) {
+      throw InputError("give one of --into NODE..., --live and --test NODE; see --help");
     }
     if (options.live) {
       options.live_settings = LiveSettingsFrom(values);
       return options;
     }
-    options.lock_step.nodes =
-        NodesNamed(values, "into", {NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics, NodeId::kRender});
+    options.lock_step.nodes = NodesNamed(values, options.test ? "test" : "into",
+                                         {NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics, NodeId::kRender});
+    ReadDemands(values, &options);
     options.pictures = std::erase(options.lock_step.nodes, NodeId::kRender) > 0;
     const std::string frames = values["frames"].as<std::string>();
-    options.frames =
-        frames.empty() ? options.lock_step.recording.parent_path() / "replayed_frames" : std::filesystem::path(frames);
+    options.frames = !frames.empty() || options.test ? std::filesystem::path(frames)
+                                                     : options.lock_step.recording.parent_path() / "replayed_frames";
     options.lock_step.rate = values["rate"].as<double>();
     if (!(options.lock_step.rate >= 0)) throw InputError("--rate: must be 0 (as fast as it can) or more");
     options.lock_step.physics_threads = values["threads"].as<int>();
@@ -235,6 +286,61 @@ int RunLive(const replay::LiveSettings& settings) {
   return static_cast<int>(result.published > 0 ? ExitCode::kDone : ExitCode::kFailure);
 }
 
+config::CartConfig LoadCart(const Options& options) {
+  return options.cart.empty() ? config::CartConfig() : config::LoadCart(options.cart);
+}
+
+std::function<void(double)> ProgressOf(const Options& options) {
+  if (options.quiet) return {};
+  return [](double time_s) { std::fprintf(stderr, "\rsession time %.1f s ", time_s); };
+}
+
+replay::NodeTestResult TestRender(const Options& options, const SceneView& scene) {
+  if (options.demands.state_hash) {
+    throw InputError("--expect: render_node has no state hash, its pictures are its machine's; use --assert");
+  }
+  const replay::PicturesSettings settings{options.lock_step.recording, options.frames, options.lock_step.until_s};
+  const std::int64_t begin = runtime::MonotonicNs();
+  const replay::PicturesResult pictures = ReplayPictures(settings, scene, ProgressOf(options));
+  replay::NodeTestResult result;
+  result.node = NodeId::kRender;
+  result.recording = options.lock_step.recording;
+  result.wall_s = 1e-9 * static_cast<double>(runtime::MonotonicNs() - begin);
+  for (const Metric& metric : pictures.health) result.figures[metric.name] = metric.value;
+  result.cases.push_back({"draws the recording", replay::Verdict::kPassed, {}});
+  if (pictures.written == 0) {
+    result.cases.back() = {"draws the recording", replay::Verdict::kError, "the recording holds nothing to draw"};
+  }
+  Judge(options.demands, &result);
+  return result;
+}
+
+int RunTest(Options* options) {
+  const bool render = options->pictures;
+  const NodeId node = render ? NodeId::kRender : options->lock_step.nodes[0];
+  const auto report = [&](const replay::NodeTestResult& result) {
+    if (!options->junit.empty()) WriteJUnit(result, options->junit);
+  };
+  try {
+    const scene::SceneFile scene(options->scene);
+    const config::CartConfig cart = LoadCart(*options);
+    const ScratchFolder scratch;
+    options->lock_step.folder = scratch.path();
+    if (options->frames.empty()) options->frames = scratch.path() / "frames";
+    const replay::NodeTestResult result =
+        render ? TestRender(*options, scene.view())
+               : TestNode(options->lock_step, options->demands, scene.view(), cart, ProgressOf(*options));
+    std::fputs(options->quiet ? "" : "\r\033[K", stderr);
+    std::cout << ReportText(result);
+    report(result);
+    return static_cast<int>(result.passed() ? ExitCode::kDone : ExitCode::kFailure);
+  } catch (const std::exception& error) {
+    // A CI system reads the file, not the exit code.
+    report(replay::FailedTest(node, options->lock_step.recording, error.what()));
+    throw;
+  }
+}
+
 int Run(int argc, char** argv) {
   Options options = Parse(argc, argv);
   if (!options.answer.empty()) {
@@ -242,18 +348,18 @@ int Run(int argc, char** argv) {
     return static_cast<int>(ExitCode::kDone);
   }
   if (options.live) return RunLive(options.live_settings);
+  if (options.test) return RunTest(&options);
   const scene::SceneFile scene(options.scene);
-  const config::CartConfig cart = options.cart.empty() ? config::CartConfig() : config::LoadCart(options.cart);
+  const config::CartConfig cart = LoadCart(options);
   const ScratchFolder scratch;
   options.lock_step.folder = scratch.path();
   // A process with one thread: its moments are kept by forking it.
   if (options.console) return RunConsole(options.lock_step, scene.view(), cart);
-  std::function<void(double)> progress;
-  if (!options.quiet) progress = [](double time_s) { std::fprintf(stderr, "\rsession time %.1f s ", time_s); };
+  const std::function<void(double)> progress = ProgressOf(options);
   const auto end_progress = [&] { std::fputs(options.quiet ? "" : "\r\033[K", stderr); };
   if (options.pictures) {
     const replay::PicturesSettings pictures{options.lock_step.recording, options.frames, options.lock_step.until_s};
-    const std::uint64_t written = ReplayPictures(pictures, scene.view(), progress);
+    const std::uint64_t written = ReplayPictures(pictures, scene.view(), progress).written;
     end_progress();
     std::cout << written << " pictures in " << options.frames.string() << '\n';
     if (options.lock_step.nodes.empty()) return static_cast<int>(written > 0 ? ExitCode::kDone : ExitCode::kFailure);

@@ -12,7 +12,7 @@
 #include "services/bus/convert/cdr.h"
 #include "services/bus/in_process.h"
 #include "services/bus/topics.h"
-#include "services/recording/mcap_reader.h"
+#include "services/recording/time_order.h"
 #include "services/replayer/session_facts.h"
 
 namespace fulcrum::replay {
@@ -42,9 +42,10 @@ class Feed {
 
 }  // namespace
 
-std::uint64_t ReplayPictures(const PicturesSettings& settings, const SceneView& scene,
-                             const std::function<void(double)>& progress) {
-  recording::McapReader reader(settings.recording);
+PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView& scene,
+                              const std::function<void(double)>& progress) {
+  recording::TimeOrder messages(settings.recording);
+  const recording::McapReader& reader = messages.reader();
   Feed<TissueFrame> tissue;
   Feed<TopologyState> topology;
   Feed<TemperaturePatch> patches;
@@ -67,7 +68,7 @@ std::uint64_t ReplayPictures(const PicturesSettings& settings, const SceneView& 
   tick.dt_s = period_s;
   recording::McapMessage message{};
   double told_s = 0;
-  while (reader.Next(&message)) {
+  while (messages.Next(&message)) {
     const std::string& topic = reader.channels().at(message.channel).topic;
     if (topic == bus::RoleOf<SceneManifest>().name) {
       if (SceneManifest manifest; bus::DecodeCdr(message.data, &manifest)) session = manifest;
@@ -95,7 +96,9 @@ std::uint64_t ReplayPictures(const PicturesSettings& settings, const SceneView& 
   }
   node.Finish();
   node.WaitForFiles();
-  return node.pictures_written();
+  Health health;
+  node.FillHealth(&health);
+  return {node.pictures_written(), health.metrics};
 }
 
 }  // namespace fulcrum::replay

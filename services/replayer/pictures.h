@@ -4,7 +4,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <vector>
 
+#include "services/core/messages.h"
 #include "services/core/scene_view.h"
 
 namespace fulcrum::replay {
@@ -15,10 +17,15 @@ struct PicturesSettings {
   double until_s = -1;           ///< Session time; negative: to the end.
 };
 
+struct PicturesResult {
+  std::uint64_t written = 0;
+  std::vector<Metric> health;  ///< As the node tells them at the end.
+};
+
 /// Lets the class of render_node draw the recorded topics at the scene's rate of pictures, on the clock of the
-/// recording, at high quality: the same pictures each time. Returns how many were written. Throws InputError,
+/// recording, at high quality: the same pictures each time. Throws InputError,
 /// MismatchError, std::runtime_error when OpenGL is missing.
-std::uint64_t ReplayPictures(const PicturesSettings& settings, const SceneView& scene,
-                             const std::function<void(double)>& progress);
+PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView& scene,
+                              const std::function<void(double)>& progress);
 
 }  // namespace fulcrum::replay

@@ -75,6 +75,7 @@ class ReplayedPhysics final : public ReplayedNode {
     cautery_.TakeInto(&published);
     return published;
   }
+  void FillHealth(Health* health) const override { node_->FillHealth(health); }
 
  private:
   void Start(std::int64_t epoch_ns) override {
@@ -131,6 +132,7 @@ class ReplayedThermal final : public ReplayedNode {
     events_.TakeInto(&published);
     return published;
   }
+  void FillHealth(Health* health) const override { node_->FillHealth(health); }
 
  private:
   void Start(std::int64_t epoch_ns) override {
@@ -180,6 +182,7 @@ class ReplayedHaptics final : public ReplayedNode {
     tools_.TakeInto(&published);
     return published;
   }
+  void FillHealth(Health* health) const override { node_->FillHealth(health); }
 
  private:
   void Start(std::int64_t epoch_ns) override {

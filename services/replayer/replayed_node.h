@@ -33,6 +33,9 @@ class ReplayedNode {
   /// What the node published in its last tick; once for each tick.
   [[nodiscard]] virtual std::vector<Published> TakeOutputs() = 0;
 
+  /// Metrics and last error, as the node tells them after its last tick; at least one was made.
+  virtual void FillHealth(Health* health) const = 0;
+
  protected:
   explicit ReplayedNode(NodeId id) : id_(id) {}
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }

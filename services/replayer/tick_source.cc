@@ -19,18 +19,29 @@ TickSource::TickSource(const std::filesystem::path& file, const std::vector<Node
                        const std::array<double, kNodeCount>& period_s)
     : reader_(file), period_s_(period_s) {
   for (const NodeId node : nodes) wanted_[static_cast<std::size_t>(node)] = true;
+  // No node that is replayed reads frames or patches: they are most of a recording, and in chunks of their own.
+  reader_.PassOver([](const recording::McapChannel& channel) {
+    const bus::TopicRole* role = bus::RoleNamed(channel.topic);
+    return role != nullptr && role->path != bus::Path::kSharedMemory;
+  });
 }
 
 bool TickSource::Next(RecordedTick* tick) {
   recording::McapMessage message{};
-  while (!ended_ && (pending_.empty() || pending_.begin()->first > newest_ns_ - kSettle_ns)) {
-    if (reader_.Next(&message)) {
-      Take(message);
-    } else {
-      ended_ = true;
+  for (;;) {
+    while (!ended_ && (pending_.empty() || pending_.begin()->first > newest_ns_ - kSettle_ns)) {
+      if (reader_.Next(&message)) {
+        Take(message);
+      } else {
+        ended_ = true;
+      }
     }
+    if (pending_.empty()) return false;
+    // What a process still said after its successor led is nobody's: readers refuse it, too.
+    const RecordedTick& next = pending_.begin()->second.tick;
+    if (next.epoch >= progress_[static_cast<std::size_t>(next.node)].epoch) break;
+    pending_.erase(pending_.begin());
   }
-  if (pending_.empty()) return false;
   *tick = std::move(pending_.begin()->second.tick);
   const Pending rest = std::move(pending_.begin()->second);
   pending_.erase(pending_.begin());

@@ -15,11 +15,11 @@ SceneData BuildScene(const SceneSettings& settings, const Progress& progress) {
 }
 
 CompiledScene CompileScene(const std::filesystem::path& yaml, const std::filesystem::path& data,
-                           const Progress& progress) {
+                           const Progress& progress, const std::vector<std::string>& changes) {
   if (progress) {
     progress("reading " + yaml.string());
   }
-  SceneDescription description = ReadSceneYaml(yaml, data);
+  SceneDescription description = ReadSceneYaml(yaml, data, changes);
   if (progress) {
     progress("building '" + description.settings.name + "'");
   }

@@ -21,8 +21,8 @@ struct CompiledScene {
   SceneData data;
   std::string effective_yaml;
 };
-/// Reads the YAML and builds the scene. Throws InputError.
+/// Reads the YAML, with `changes` made (ApplyChanges), and builds the scene. Throws InputError.
 CompiledScene CompileScene(const std::filesystem::path& yaml, const std::filesystem::path& data,
-                           const Progress& progress);
+                           const Progress& progress, const std::vector<std::string>& changes = {});
 
 }  // namespace fulcrum::scene

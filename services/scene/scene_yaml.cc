@@ -1,7 +1,10 @@
 #include "services/scene/scene_yaml.h"
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 
+#include "services/scene/changes.h"
 #include "services/scene/yaml_parameters.h"
 
 namespace fulcrum::scene {
@@ -301,14 +304,21 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   }
   scene.node_mask = ReadNodes(&root, scene.node_mask);
   yaml->Finish();
-  return {scene, yaml->Effective()};
+  return {scene, yaml->Effective(), yaml->Rules()};
 }
 
 }  // namespace
 
-SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data) {
+SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
+                               const std::vector<std::string>& changes) {
+  std::string changed;
+  if (!changes.empty()) {
+    std::ifstream stream(file, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(stream), {}};
+    changed = ApplyChanges(text, changes, kCompileSections);
+  }
   // A scene of the same name as the one it stands on would be taken for that.
-  StrictYaml yaml = StrictYaml::FromFileOnBases(file, {"name", "description"});
+  StrictYaml yaml = StrictYaml::FromFileOnBases(file, {"name", "description"}, changed);
   Folders bases;
   for (const auto& from : yaml.files()) {
     if (std::find(bases.begin(), bases.end(), from.parent_path()) == bases.end()) bases.push_back(from.parent_path());

@@ -6,18 +6,21 @@
 #include <string_view>
 #include <vector>
 
+#include "services/config/strict_yaml.h"
 #include "services/scene/scene_settings.h"
 
 namespace fulcrum::scene {
 
 struct SceneDescription {
   SceneSettings settings;
-  std::string effective_yaml;  ///< What was read, defaults included. Reads back to the same settings.
+  std::string effective_yaml;          ///< What was read, defaults included. Reads back to the same settings.
+  std::vector<config::KeyRule> rules;  ///< Every key that was asked for.
 };
 
 /// Reads and checks a scene description. Mesh files are looked up in `data` (when not empty), then in the folders that
-/// the description names. Throws InputError "file:line: key: reason; valid: range".
-SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data);
+/// the description names. `changes`: see ApplyChanges. Throws InputError "file:line: key: reason; valid: range".
+SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
+                               const std::vector<std::string>& changes = {});
 
 /// The same for a text; `name` stands for the file in messages, relative folders start from the working directory.
 SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data);

@@ -7,6 +7,7 @@
 
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
+#include "services/runtime/install_places.h"
 #include "services/scene/compile.h"
 #include "services/scene/quality.h"
 #include "services/scene/scene_file.h"
@@ -18,12 +19,15 @@ namespace {
 constexpr const char* kUsage =
     R"(scene_compiler: compiles a scene description into the file that the nodes map
 
-  scene_compiler SCENE.yaml --out FILE [--data DIR] [--quiet]   compile, then report quality
+  scene_compiler SCENE.yaml --out FILE [--data DIR] [--set SECTION.KEY=VALUE]... [--quiet]
+                                                                compile, then report quality
   scene_compiler --info FILE                                    what a compiled scene holds
   scene_compiler --source FILE                                  the effective YAML it was compiled from
-  scene_compiler --list [DIR]                                   the scenes described in DIR (default deploy/scenes)
+  scene_compiler --list [DIR]                                   the scenes described in DIR (default: those shipped)
 
   --data DIR   look here first for the mesh files that the description names
+  --set        a parameter of physics, thermal, haptics, breathing or render other than the description has it, or
+               script.power_W, the generator's setting; as often as needed
   --quiet      no progress and no report
 
 Keys of a description: services/scene/README.md.
@@ -31,7 +35,7 @@ Exit code: 0 done, 1 failure, 2 bad usage or input, 3 a compiled scene of anothe
 )";
 
 struct Arguments {
-  std::vector<std::string> plain;
+  std::vector<std::string> plain, changes;
   std::string out, data, info, source;
   bool list = false, quiet = false, help = false;
 };
@@ -50,6 +54,8 @@ Arguments Parse(const std::vector<std::string>& words) {
       arguments.help = true;
     } else if (word == "--out") {
       arguments.out = value();
+    } else if (word == "--set") {
+      arguments.changes.push_back(value());
     } else if (word == "--data") {
       arguments.data = value();
     } else if (word == "--info") {
@@ -86,7 +92,7 @@ void Compile(const Arguments& arguments) {
       std::fprintf(stderr, "%6.2f s  %s\n", seconds(), text.c_str());
     }
   };
-  const CompiledScene scene = CompileScene(arguments.plain[0], arguments.data, progress);
+  const CompiledScene scene = CompileScene(arguments.plain[0], arguments.data, progress, arguments.changes);
   progress("writing " + arguments.out);
   WriteSceneFile(scene.data, scene.effective_yaml, arguments.out);
   const SceneFile written(arguments.out);  // Reads it back with every check a node makes.
@@ -105,7 +111,7 @@ ExitCode Run(const Arguments& arguments) {
   } else if (!arguments.source.empty()) {
     std::cout << SceneFile(arguments.source).source_yaml();
   } else if (arguments.list) {
-    List(arguments.plain.empty() ? "deploy/scenes" : arguments.plain[0]);
+    List(arguments.plain.empty() ? runtime::ShareFolder() / "scenes" : std::filesystem::path(arguments.plain[0]));
   } else {
     Compile(arguments);
   }

@@ -34,18 +34,21 @@ const char* Meaning(int exit_code) {
 
 /// In the child, between fork and exec: other threads of the parent may have held any lock, so only
 /// async-signal-safe calls. Returns only when something failed, with errno set.
-void Become(const char* program, char* const* arguments, int log, pid_t parent) {
-  // SIGKILL, since a node that hangs must not outlive its supervisor either; checkpoints make it harmless.
-  if (::prctl(PR_SET_PDEATHSIG, SIGKILL) != 0) return;
-  if (::getppid() != parent) ::_exit(1);  // The parent died before prctl took effect.
+void Become(const char* program, char* const* arguments, const ChildStreams& streams, WithParent with_parent,
+            pid_t parent) {
+  if (with_parent == WithParent::kDies) {
+    // SIGKILL, since a node that hangs must not outlive its supervisor either; checkpoints make it harmless.
+    if (::prctl(PR_SET_PDEATHSIG, SIGKILL) != 0) return;
+    if (::getppid() != parent) ::_exit(1);  // The parent died before prctl took effect.
+  }
   sigset_t none;
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
   // A group of its own: Ctrl-C on the terminal reaches the supervisor alone, which ends its children in good order.
   if (::setpgid(0, 0) != 0) return;
-  const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
-  if (nothing < 0 || ::dup2(nothing, STDIN_FILENO) < 0) return;
-  if (::dup2(log, STDOUT_FILENO) < 0 || ::dup2(log, STDERR_FILENO) < 0) return;
+  const int input = streams.input >= 0 ? streams.input : ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  if (input < 0 || ::dup2(input, STDIN_FILENO) < 0) return;
+  if (::dup2(streams.output, STDOUT_FILENO) < 0 || ::dup2(streams.output, STDERR_FILENO) < 0) return;
   ::execv(program, arguments);
 }
 
@@ -59,50 +62,62 @@ std::string ProcessEnd::Describe() const {
 }
 
 ChildProcess::~ChildProcess() {
-  if (running()) {
+  if (running() && with_parent_ == WithParent::kDies) {
     ::kill(pid_, SIGKILL);
     ::waitpid(pid_, nullptr, 0);
   }
 }
 
-ChildProcess::ChildProcess(ChildProcess&& other) noexcept : pid_(std::exchange(other.pid_, -1)) {}
+ChildProcess::ChildProcess(ChildProcess&& other) noexcept
+    : pid_(std::exchange(other.pid_, -1)), with_parent_(other.with_parent_) {}
 
 ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
   std::swap(pid_, other.pid_);
+  std::swap(with_parent_, other.with_parent_);
   return *this;
 }
 
 ChildProcess ChildProcess::Start(const std::filesystem::path& program, const std::vector<std::string>& arguments,
-                                 const std::filesystem::path& log) {
+                                 const std::filesystem::path& log, WithParent with_parent) {
+  const int log_fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  if (log_fd < 0) {
+    throw InputError("cannot write " + log.string() + ": " + ::strerror(errno));
+  }
+  try {
+    ChildProcess process = StartOn(program, arguments, {.output = log_fd}, with_parent);
+    ::close(log_fd);
+    return process;
+  } catch (...) {
+    ::close(log_fd);
+    throw;
+  }
+}
+
+ChildProcess ChildProcess::StartOn(const std::filesystem::path& program, const std::vector<std::string>& arguments,
+                                   const ChildStreams& streams, WithParent with_parent) {
   const auto fail = [&](int error) { throw InputError("cannot start " + program.string() + ": " + ::strerror(error)); };
   std::vector<char*> pointers{const_cast<char*>(program.c_str())};
   for (const std::string& argument : arguments) {
     pointers.push_back(const_cast<char*>(argument.c_str()));
   }
   pointers.push_back(nullptr);
-  const int log_fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (log_fd < 0) {
-    throw InputError("cannot write " + log.string() + ": " + ::strerror(errno));
-  }
   // The child reports a failed start through this pipe; a successful exec closes it.
   int report[2];
   if (::pipe2(report, O_CLOEXEC) != 0) {
-    const int error = errno;
-    ::close(log_fd);
-    fail(error);
+    fail(errno);
   }
   const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child == 0) {
-    Become(program.c_str(), pointers.data(), log_fd, parent);
+    Become(program.c_str(), pointers.data(), streams, with_parent, parent);
     const int error = errno;
     [[maybe_unused]] const ssize_t written = ::write(report[1], &error, sizeof(error));
     ::_exit(127);
   }
   int error = child < 0 ? errno : 0;
-  ::close(log_fd);
   ::close(report[1]);
   ChildProcess process;
+  process.with_parent_ = with_parent;
   if (child > 0) {
     process.pid_ = child;
     if (::read(report[0], &error, sizeof(error)) != static_cast<ssize_t>(sizeof(error))) {
@@ -111,6 +126,7 @@ ChildProcess ChildProcess::Start(const std::filesystem::path& program, const std
   }
   ::close(report[0]);
   if (error != 0) {
+    process.with_parent_ = WithParent::kDies;  // It never became what might stay.
     fail(error);
   }
   return process;

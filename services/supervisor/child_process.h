@@ -10,6 +10,15 @@
 
 namespace fulcrum::supervisor {
 
+/// What a child has for a terminal.
+struct ChildStreams {
+  int input = -1;  ///< -1: nothing to read.
+  int output = -1;
+};
+
+/// What becomes of a child whose parent ends, however that ends.
+enum class WithParent { kDies, kStays };
+
 /// How a child ended.
 struct ProcessEnd {
   int exit_code = 0;  ///< When signal is 0.
@@ -21,14 +30,19 @@ struct ProcessEnd {
 class ChildProcess {
  public:
   ChildProcess() = default;
-  ~ChildProcess();  ///< Kills and reaps a child that still runs.
+  ~ChildProcess();  ///< Kills and reaps a child that still runs, unless it may stay.
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&& other) noexcept;
 
   /// Starts `program` with `arguments`; standard output and error are appended to `log`. The child is killed when the
   /// calling thread ends, so start children from the main thread. Throws InputError when the program cannot be started.
   [[nodiscard]] static ChildProcess Start(const std::filesystem::path& program,
-                                          const std::vector<std::string>& arguments, const std::filesystem::path& log);
+                                          const std::vector<std::string>& arguments, const std::filesystem::path& log,
+                                          WithParent with_parent = WithParent::kDies);
+  /// The same on open files, which stay the caller's.
+  [[nodiscard]] static ChildProcess StartOn(const std::filesystem::path& program,
+                                            const std::vector<std::string>& arguments, const ChildStreams& streams,
+                                            WithParent with_parent = WithParent::kDies);
 
   [[nodiscard]] bool running() const { return pid_ > 0; }
   [[nodiscard]] pid_t pid() const { return pid_; }
@@ -38,6 +52,7 @@ class ChildProcess {
 
  private:
   pid_t pid_ = -1;
+  WithParent with_parent_ = WithParent::kDies;
 };
 
 }  // namespace fulcrum::supervisor

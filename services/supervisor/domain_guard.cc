@@ -14,15 +14,22 @@
 namespace fulcrum::supervisor {
 namespace {
 
-/// Socket bound to the domain's name, or -1 with errno set.
-int Bind(int domain) {
+/// The domain's name as an address, and how long that is.
+socklen_t AddressOf(int domain, sockaddr_un* address) {
   const std::string name = "fulcrum-" + std::to_string(::getuid()) + "-" + std::to_string(domain);
+  address->sun_family = AF_UNIX;
+  std::memcpy(address->sun_path + 1, name.data(), name.size());  // A leading zero byte: abstract.
+  return static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+}
+
+using Call = int (*)(int, const sockaddr*, socklen_t);
+
+/// Socket on which `call` with the domain's name went well, or -1 with errno set.
+int SocketWith(Call call, int domain) {
   sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  std::memcpy(address.sun_path + 1, name.data(), name.size());  // A leading zero byte: abstract.
-  const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
-  const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (fd >= 0 && ::bind(fd, reinterpret_cast<const sockaddr*>(&address), length) != 0) {
+  const socklen_t length = AddressOf(domain, &address);
+  const int fd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (fd >= 0 && call(fd, reinterpret_cast<const sockaddr*>(&address), length) != 0) {
     const int error = errno;
     ::close(fd);
     errno = error;
@@ -33,7 +40,7 @@ int Bind(int domain) {
 
 }  // namespace
 
-DomainGuard::DomainGuard(int domain) : socket_(Bind(domain)) {
+DomainGuard::DomainGuard(int domain) : socket_(SocketWith(::bind, domain)) {
   if (socket_ < 0 && errno == EADDRINUSE) {
     throw InputError("a session runs in domain " + std::to_string(domain) + "; end it (fulcrum down --domain " +
                      std::to_string(domain) + ") or take another one (--domain N)");
@@ -46,12 +53,12 @@ DomainGuard::DomainGuard(int domain) : socket_(Bind(domain)) {
 DomainGuard::~DomainGuard() { ::close(socket_); }
 
 bool DomainGuard::IsHeld(int domain) {
-  const int fd = Bind(domain);
-  if (fd < 0) {
-    return errno == EADDRINUSE;
+  // Connecting, not binding: who asks must not hold the name meanwhile, or a session that starts just then is refused.
+  const int fd = SocketWith(::connect, domain);
+  if (fd >= 0) {
+    ::close(fd);
   }
-  ::close(fd);
-  return false;
+  return fd >= 0;
 }
 
 }  // namespace fulcrum::supervisor

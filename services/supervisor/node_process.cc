@@ -2,11 +2,15 @@
 
 #include <signal.h>
 
+#include <algorithm>
+#include <chrono>
 #include <fstream>
+#include <thread>
 #include <utility>
 
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
+#include "services/runtime/cyclic_thread.h"
 
 namespace fulcrum::supervisor {
 namespace {
@@ -17,6 +21,8 @@ constexpr std::int64_t kLongestSilence = 5 * kSecond;
 // Until the first Health a node maps the scene and builds its solver.
 constexpr std::int64_t kLongestStart = 60 * kSecond;
 constexpr std::int64_t kPatienceWithRestart = 3 * kSecond;
+constexpr std::int64_t kLongestEnd = 4 * kSecond;
+constexpr auto kLook = std::chrono::milliseconds(5);
 
 /// Starting again with the same arguments would end the same way.
 bool IsFinal(const ProcessEnd& end) {
@@ -41,14 +47,14 @@ void NodeProcess::WatchForSilence(std::int64_t now_ns) {
       last_health_ns_ != 0 ? now_ns - last_health_ns_ > kLongestSilence : now_ns - started_ns_ > kLongestStart;
   if (too_long && !silent_) {
     silent_ = true;
-    Signal(SIGKILL);
+    process_.Signal(SIGKILL);
   }
   if (kill_ns_ != 0 && now_ns >= kill_ns_) {
-    Signal(SIGKILL);
+    process_.Signal(SIGKILL);
   }
 }
 
-std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
+std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
   if (failed_) {
     return std::nullopt;
   }
@@ -59,8 +65,9 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
       try {
         Start(now_ns);
       } catch (const InputError& error) {
+        if (before_) return GiveBack(error.what(), {}, now_ns);
         failed_ = true;
-        return Death{error.what(), true, {}, false};
+        return Death{error.what(), true, {}, false, 0};
       }
     }
     return std::nullopt;
@@ -70,7 +77,7 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
     WatchForSilence(now_ns);
     return std::nullopt;
   }
-  Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false};
+  Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false, 0};
   if (next_) {
     before_ = std::exchange(command_, std::move(*next_));
     next_.reset();
@@ -80,12 +87,7 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
     return death;
   }
   if (before_ && !has_reported()) {
-    death.cause =
-        "was replaced by " + command_.program.string() + ", which " + death.cause + ": the one before comes back";
-    command_ = std::move(*before_);
-    before_.reset();
-    due_ns_ = now_ns;
-    return death;
+    return GiveBack("was replaced by " + command_.program.string() + ", which " + death.cause, *end, now_ns);
   }
   if (kill_ns_ != 0) {
     death.cause = "was restarted by command";
@@ -99,6 +101,21 @@ std::optional<NodeProcess::Death> NodeProcess::Update(std::int64_t now_ns) {
   return death;
 }
 
+SupervisedNode::Death NodeProcess::GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns) {
+  Death death{why + ": the one before comes back", false, end, false, 0};
+  command_ = std::move(*before_);
+  before_.reset();
+  due_ns_ = now_ns;
+  return death;
+}
+
+bool NodeProcess::OnHealth(const Health& health, std::int64_t now_ns) {
+  if (health.node != id() || (health.pid != pid() && !command_.foreign)) return false;
+  last_health_ns_ = now_ns;
+  before_.reset();
+  return true;
+}
+
 void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
   if (last_health_ns_ != 0) {
     last_health_ns_ = now_ns;
@@ -108,7 +125,7 @@ void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
 }
 
 void NodeProcess::AskRestart(std::int64_t now_ns) {
-  Signal(SIGTERM);
+  process_.Signal(SIGTERM);
   kill_ns_ = now_ns + kPatienceWithRestart;
 }
 
@@ -117,9 +134,33 @@ void NodeProcess::Swap(NodeCommand command, std::int64_t now_ns) {
   AskRestart(now_ns);
 }
 
+void NodeProcess::Stop() { process_.Signal(SIGTERM); }
+
+const char* NodeProcess::GiveUp() {
+  process_.Signal(SIGKILL);
+  return "was killed";
+}
+
 bool NodeProcess::HasEnded() {
   (void)process_.Poll();
   return !process_.running();
+}
+
+void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(std::int64_t now_ns)>& turn,
+            const std::function<void(const SupervisedNode& node, const char* done)>& given_up) {
+  for (SupervisedNode* node : nodes) node->Stop();
+  const std::int64_t begin = runtime::MonotonicNs();
+  const auto is_gone = [](SupervisedNode* node) { return node->HasEnded(); };
+  while (!std::all_of(nodes.begin(), nodes.end(), is_gone)) {
+    const std::int64_t now = runtime::MonotonicNs();
+    if (now - begin > kLongestEnd) {
+      for (SupervisedNode* node : nodes) {
+        if (!node->HasEnded()) given_up(*node, node->GiveUp());
+      }
+    }
+    turn(now);
+    std::this_thread::sleep_for(kLook);
+  }
 }
 
 std::string LastLine(const std::filesystem::path& log) {

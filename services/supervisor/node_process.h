@@ -1,68 +1,44 @@
-// One supervised node: process, health watch, restarts.
+// A node as a child of the supervisor: process, health watch, restarts.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
-#include <vector>
 
-#include "services/core/messages.h"
-#include "services/supervisor/child_process.h"
 #include "services/supervisor/restart_policy.h"
+#include "services/supervisor/supervised_node.h"
 
 namespace fulcrum::supervisor {
 
-/// How to start it.
-struct NodeCommand {
-  NodeId id = NodeId::kSupervisor;
-  std::filesystem::path program;
-  std::vector<std::string> arguments;
-  std::filesystem::path log;
-  std::vector<std::string> again;  ///< More arguments, from the second start on.
-  bool foreign = false;            ///< Not one of our nodes: its Health, if any, may name another process.
-};
-
-class NodeProcess {
+class NodeProcess final : public SupervisedNode {
  public:
   explicit NodeProcess(NodeCommand command) : command_(std::move(command)) {}
 
-  /// Throws InputError when the program cannot be started.
-  void Start(std::int64_t now_ns);
+  void Start(std::int64_t now_ns) override;
+  [[nodiscard]] std::optional<Death> Update(std::int64_t now_ns) override;
 
-  struct Death {
-    std::string cause;
-    bool for_good = false;
-    ProcessEnd end;
-    bool asked = false;  ///< By AskRestart.
-  };
-  /// Notices a death and starts again when that is due.
-  [[nodiscard]] std::optional<Death> Update(std::int64_t now_ns);
+  bool OnHealth(const Health& health, std::int64_t now_ns) override;
+  void ForgiveSilence(std::int64_t now_ns) override;
+  void AskRestart(std::int64_t now_ns) override;
+  void Swap(NodeCommand command, std::int64_t now_ns) override;
+  void Stop() override;
+  [[nodiscard]] bool HasEnded() override;
+  const char* GiveUp() override;
 
-  void OnHealth(std::int64_t now_ns) {
-    last_health_ns_ = now_ns;
-    before_.reset();
-  }
-  /// Forgives silence up to now, because the supervisor itself was held up.
-  void ForgiveSilence(std::int64_t now_ns);
-  void AskRestart(std::int64_t now_ns);
-  /// Restarts as another program. When that ends before its first Health, the one before is started again.
-  void Swap(NodeCommand command, std::int64_t now_ns);
-  void Signal(int signal) const { process_.Signal(signal); }
-  /// For the end of the session: reaps without starting again. True when no process is left.
-  [[nodiscard]] bool HasEnded();
-
-  [[nodiscard]] NodeId id() const { return command_.id; }
-  [[nodiscard]] pid_t pid() const { return process_.pid(); }
-  [[nodiscard]] bool running() const { return process_.running(); }
-  [[nodiscard]] bool failed() const { return failed_; }
-  [[nodiscard]] const NodeCommand& command() const { return command_; }
-  [[nodiscard]] bool foreign() const { return command_.foreign; }
-  [[nodiscard]] bool has_reported() const { return last_health_ns_ != 0; }
-  [[nodiscard]] const std::filesystem::path& log() const { return command_.log; }
+  [[nodiscard]] pid_t pid() const override { return process_.pid(); }
+  [[nodiscard]] bool running() const override { return process_.running(); }
+  [[nodiscard]] bool failed() const override { return failed_; }
+  [[nodiscard]] bool has_reported() const override { return last_health_ns_ != 0; }
+  [[nodiscard]] const NodeCommand& command() const override { return command_; }
+  [[nodiscard]] std::string log() const override { return command_.log.string(); }
 
  private:
   void WatchForSilence(std::int64_t now_ns);
+  /// In the place of a replacement that was never heard of.
+  Death GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns);
 
   NodeCommand command_;
   std::optional<NodeCommand> next_, before_;  ///< Of a swap; `before_` until the new one has reported.
@@ -75,6 +51,11 @@ class NodeProcess {
   bool silent_ = false;              ///< Killed for silence.
   bool failed_ = false;
 };
+
+/// Ends all of them: asks, and gives up who has not ended 4 s later; `given_up` is told who, and what was done. `turn`
+/// is called while they end.
+void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(std::int64_t now_ns)>& turn,
+            const std::function<void(const SupervisedNode& node, const char* done)>& given_up);
 
 /// Last line of a log, for people; empty when there is none.
 [[nodiscard]] std::string LastLine(const std::filesystem::path& log);

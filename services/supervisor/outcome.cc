@@ -23,22 +23,6 @@ std::string Fixed(double value, int decimals) {
   return result;
 }
 
-const char* StateName(HealthState state) {
-  switch (state) {
-    case HealthState::kStarting:
-      return "starting";
-    case HealthState::kWaiting:
-      return "waiting";
-    case HealthState::kRunning:
-      return "running";
-    case HealthState::kDegraded:
-      return "degraded";
-    case HealthState::kStopping:
-      return "ended";
-  }
-  return "unknown";
-}
-
 std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
   return {{"peak_force_N", "peak force", "N", 2, record.peak("peak_force_N")},
           {"highest_temperature_C", "highest temperature", "°C", 0, record.peak("highest_temperature_C")},
@@ -83,6 +67,8 @@ std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& reco
     json.Add("score_pct", outcome.sheet->score.percent());
   }
   json.Add("restarts", static_cast<double>(record.restarts().size()));
+  json.Add("refused.participants", static_cast<double>(record.refusals().participants));
+  json.Add("refused.endpoints", static_cast<double>(record.refusals().endpoints));
   for (const auto& [kind, count] : record.event_counts()) {
     std::string name = EventName(kind);
     for (char& c : name) {
@@ -150,6 +136,9 @@ std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& recor
             (restart.rejoin_s >= 0 ? std::string(", back after ") + Fixed(restart.rejoin_s, 2) + " s"
                                    : ", did not come back") +
             "\n";
+  }
+  for (const RefusalRecord& refusal : record.refused()) {
+    text += "refused at " + Fixed(refusal.time_s, 1) + " s: " + refusal.what + "\n";
   }
   if (!outcome.recording.empty()) {
     text += "recording: " + outcome.recording.string() + ", " + RecordingLosses(record) + "\n";

@@ -54,9 +54,6 @@ struct KeyFigure {
 /// Node table, key figures, restarts and verdict.
 [[nodiscard]] std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& record);
 
-/// "starting", "running", …
-[[nodiscard]] const char* StateName(HealthState state);
-
 /// printf for one number: fixed, without "-0".
 [[nodiscard]] std::string Fixed(double value, int decimals);
 

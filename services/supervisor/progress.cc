@@ -18,7 +18,7 @@ std::size_t Columns() {
 
 }  // namespace
 
-Progress::Progress() : live_(::isatty(STDOUT_FILENO) == 1) {}
+Progress::Progress(bool quiet) : quiet_(quiet), live_(::isatty(STDOUT_FILENO) == 1) {}
 
 bool Progress::IsDue(std::int64_t now_ns) const {
   return last_ns_ == 0 || now_ns - last_ns_ >= (live_ ? kLivePeriod : kPlainPeriod);
@@ -26,6 +26,7 @@ bool Progress::IsDue(std::int64_t now_ns) const {
 
 void Progress::Show(std::int64_t now_ns, const std::string& line) {
   last_ns_ = now_ns;
+  if (quiet_) return;
   if (!live_) {
     Say(line);
     return;

@@ -8,7 +8,8 @@ namespace fulcrum::supervisor {
 
 class Progress {
  public:
-  Progress();
+  /// `quiet`: shows nothing, for a service whose status says the same.
+  explicit Progress(bool quiet);
   /// True when it is time to show a new line; ask before building one.
   [[nodiscard]] bool IsDue(std::int64_t now_ns) const;
   void Show(std::int64_t now_ns, const std::string& line);
@@ -17,6 +18,7 @@ class Progress {
 
  private:
   void ClearLive();
+  bool quiet_;
   bool live_;          ///< Standard output is a terminal.
   bool open_ = false;  ///< A live line stands on the terminal.
   std::int64_t last_ns_ = 0;

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <vector>
 
+#include "services/core/escape.h"
 #include "services/supervisor/picture.h"
 #include "services/supervisor/score_sheet.h"
 #include "services/supervisor/svg_plot.h"
@@ -175,6 +176,19 @@ std::string Restarts(const SessionRecord& record) {
   return html + "</table></div>\n";
 }
 
+std::string Refusals(const SessionRecord& record) {
+  if (record.refused().empty()) {
+    return {};
+  }
+  std::string html = Tag("h2", "Refused on the bus") +
+                     "<div class='card scroll'><table><tr><th class='text'>session time</th><th class='text'>who, and "
+                     "why</th></tr>\n";
+  for (const RefusalRecord& refusal : record.refused()) {
+    html += "<tr>" + Tag("td", Fixed(refusal.time_s, 1) + " s") + Tag("td class='text'", refusal.what) + "</tr>\n";
+  }
+  return html + "</table></div>\n";
+}
+
 std::string Events(const SessionRecord& record) {
   std::string html = Tag("h2", "Thermal events");
   if (record.events().empty()) {
@@ -207,7 +221,8 @@ std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& recor
   html += EscapeHtml(outcome.scene_name + " · " + outcome.session_id) + "</title><style>" + kStyle;
   html += "</style></head><body><main>\n";
   html += Header(outcome) + Tiles(record) + (outcome.sheet ? SheetHtml(*outcome.sheet, outcome.trainee) : "") +
-          Pictures(frames, clip) + Plots(outcome, record) + Nodes(outcome, record) + Restarts(record) + Events(record);
+          Pictures(frames, clip) + Plots(outcome, record) + Nodes(outcome, record) + Restarts(record) +
+          Refusals(record) + Events(record);
   if (!outcome.recording.empty()) {
     html += Tag("h2", "Recording") + Tag("p", "All topics: " + outcome.recording.string() + ", " +
                                                   RecordingLosses(record) + " (fulcrum log info says more).");

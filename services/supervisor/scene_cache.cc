@@ -101,6 +101,9 @@ void Compile(const SceneRequest& request, const fs::path& yaml, const fs::path& 
   if (!request.data.empty()) {
     arguments.insert(arguments.end(), {"--data", request.data.string()});
   }
+  for (const std::string& change : request.changes) {
+    arguments.insert(arguments.end(), {"--set", change});
+  }
   std::printf("compiling scene %s ...\n", yaml.filename().c_str());
   std::fflush(stdout);
   ChildProcess compiler = ChildProcess::Start(request.compiler, arguments, log);
@@ -136,12 +139,18 @@ std::vector<std::string> ShippedScenes(const fs::path& library) {
 fs::path ResolveScene(const SceneRequest& request) {
   fs::path source = FindYaml(request);
   if (source.extension() != ".yaml") {
+    if (!request.changes.empty()) {
+      throw InputError("--set: " + source.string() + " is compiled already; give its description (.yaml)");
+    }
     return source;
   }
   const std::string yaml = ReadText(source);
   Hash64 hash;
   hash.Add(std::string_view(yaml));
   hash.Add(std::string_view(request.data.native()));
+  for (const std::string& change : request.changes) {
+    hash.Add(std::string_view(change + "\n"));
+  }
   AddFile(&hash, request.compiler);
   std::set<fs::path> seen;
   AddFilesNamedIn(yaml, source.parent_path(), request.data, &seen, &hash);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "services/core/escape.h"
 #include "services/supervisor/flat_json.h"
 #include "services/supervisor/svg_plot.h"
 

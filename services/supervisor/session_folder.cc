@@ -49,6 +49,16 @@ void WriteFile(const fs::path& file, const std::string& text) {
   }
 }
 
+void PointTo(const fs::path& link, const fs::path& folder) {
+  fs::path next = link;
+  next += ".next";
+  std::error_code error;
+  fs::remove(next, error);
+  fs::create_symlink(folder, next, error);
+  if (!error) fs::rename(next, link, error);
+  if (error) throw InputError("cannot make " + link.string() + ": " + error.message());
+}
+
 SessionFolder MakeSessionFolder(const fs::path& out, const fs::path& scene_file, const scene::SceneFile& scene,
                                 const config::CartConfig& cart, const std::string& run_yaml) {
   SessionFolder folder;
@@ -83,6 +93,13 @@ SessionFolder MakeSessionFolder(const fs::path& out, const fs::path& scene_file,
       "run:\n" + run_yaml + "cart:\n" + Indent(config::CartToYaml(cart)) + "scene:\n" + Indent(scene.source_yaml());
   WriteFile(folder.path / "configuration.yaml", folder.configuration);
   return folder;
+}
+
+void RemoveCheckpoints(const SessionFolder& folder) {
+  for (const auto& entry : fs::directory_iterator(folder.path)) {
+    std::error_code ignored;
+    if (entry.path().extension() == ".checkpoint") fs::remove(entry.path(), ignored);
+  }
 }
 
 std::string DescribeMachine() {

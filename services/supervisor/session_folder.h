@@ -22,6 +22,11 @@ struct SessionFolder {
                                               const scene::SceneFile& scene, const config::CartConfig& cart,
                                               const std::string& run_yaml);
 
+/// Removes the nodes' checkpoints: they are for restarts within the session, and large.
+void RemoveCheckpoints(const SessionFolder& folder);
+/// Makes `link` point to `folder`, whatever it was, in one step. Throws InputError.
+void PointTo(const std::filesystem::path& link, const std::filesystem::path& folder);
+
 /// Throws InputError that names the file.
 void WriteFile(const std::filesystem::path& file, const std::string& text);
 

@@ -126,6 +126,13 @@ void SessionRecord::AddDeath(double time_s, NodeId node, const std::string& caus
   restarts_.push_back({time_s, node, cause, -1});
 }
 
+void SessionRecord::AddRefusals(double time_s, const bus::Refusals& refusals) {
+  for (std::size_t i = refused_.size(); i < refusals.texts.size(); ++i) {
+    refused_.push_back({std::max(time_s, 0.0), refusals.texts[i]});
+  }
+  refusals_ = refusals;
+}
+
 const Curve& SessionRecord::curve(const std::string& metric) const {
   static const Curve kNone;
   const auto found = curves_.find(metric);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "services/bus/security.h"
 #include "services/core/messages.h"
 #include "services/supervisor/script_outlook.h"
 
@@ -62,6 +63,11 @@ struct EventRecord {
   ThermalEventKind kind = ThermalEventKind::kContact;
   double temperature_C = 0;
 };
+/// Somebody who was kept off the bus.
+struct RefusalRecord {
+  double time_s = 0;
+  std::string what;
+};
 /// "cut", "steam", "ureter warning", …
 [[nodiscard]] const char* EventName(ThermalEventKind kind);
 
@@ -70,6 +76,8 @@ class SessionRecord {
   void AddHealth(double time_s, const Health& health);
   void AddEvent(const ThermalEvent& event);
   void AddDeath(double time_s, NodeId node, const std::string& cause, bool for_good);
+  /// All since the start; those that are new are of now.
+  void AddRefusals(double time_s, const bus::Refusals& refusals);
 
   [[nodiscard]] const NodeFigures& node(NodeId id) const { return nodes_[static_cast<std::size_t>(id)].figures; }
   /// Curve of a metric of whichever node reports it; empty when none does.
@@ -80,6 +88,9 @@ class SessionRecord {
   /// The first kMostEvents events.
   [[nodiscard]] const std::vector<EventRecord>& events() const { return events_; }
   [[nodiscard]] const std::map<ThermalEventKind, std::uint64_t>& event_counts() const { return event_counts_; }
+
+  [[nodiscard]] const bus::Refusals& refusals() const { return refusals_; }
+  [[nodiscard]] const std::vector<RefusalRecord>& refused() const { return refused_; }
 
   static constexpr std::size_t kMostEvents = 500;
 
@@ -98,6 +109,8 @@ class SessionRecord {
   std::map<std::string, Curve> curves_;
   std::vector<RestartRecord> restarts_;
   std::vector<EventRecord> events_;
+  bus::Refusals refusals_;
+  std::vector<RefusalRecord> refused_;
   std::map<ThermalEventKind, std::uint64_t> event_counts_;
 };
 

@@ -5,20 +5,28 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
 #include <optional>
 #include <span>
 #include <sstream>
 #include <thread>
 #include <utility>
 
+#include "services/app/cart_security.h"
 #include "services/app/health_report.h"
 #include "services/bus/dds/participant.h"
 #include "services/bus/dds/shared_memory.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
+#include "services/link/health.h"
+#include "services/link/link.h"
+#include "services/link/options.h"
+#include "services/link/scene_transfer.h"
 #include "services/recording/free_name.h"
 #include "services/runtime/realtime.h"
+#include "services/runtime/service_notify.h"
 #include "services/scene/scene_file.h"
+#include "services/supervisor/attached_node.h"
 #include "services/supervisor/clip.h"
 #include "services/supervisor/domain_guard.h"
 #include "services/supervisor/node_process.h"
@@ -30,6 +38,7 @@
 #include "services/supervisor/script_outlook.h"
 #include "services/supervisor/session_assessment.h"
 #include "services/supervisor/session_folder.h"
+#include "services/supervisor/session_keys.h"
 #include "services/supervisor/session_record.h"
 #include "services/supervisor/training_log.h"
 
@@ -45,25 +54,35 @@ constexpr std::int64_t kHealthPeriod = kSecond / 10;
 constexpr std::int64_t kLongestStart = 30 * kSecond;
 // The manifest reaches all nodes before session time 0.
 constexpr std::int64_t kLeadTime = kSecond / 5;
-constexpr std::int64_t kLongestEnd = 4 * kSecond;
 // Peers let go of a dead process's files when its lease of 1 s is over.
 constexpr std::int64_t kSweepAfter = 2 * kSecond;
 // A gap in our own loop: a suspended machine, a stopped supervisor. Then silence proves nothing.
 constexpr std::int64_t kHeldUp = kSecond;
+// What a node says of a peer that is being restarted by command is no fault.
+constexpr std::int64_t kAskedFor = 3 * kSecond;
 
 std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) {
   std::vector<NodeId> nodes;
   for (int i = 0; i < kNodeCount; ++i) {
     const auto id = static_cast<NodeId>(i);
-    if (id != NodeId::kSupervisor && (scene.node_mask >> i & 1u) != 0) {
+    if (id != NodeId::kSupervisor && (scene.node_mask >> i & 1u) != 0 && (settings.remote >> i & 1u) == 0) {
       nodes.push_back(id);
     }
   }
   if (nodes.empty()) {
-    throw InputError(settings.scene.string() + ": the scene names no node to start");
+    throw InputError(settings.scene.string() + ": the scene names no node to start here");
   }
   if (settings.record || settings.keep_s > 0) {
     nodes.push_back(NodeId::kRecorder);
+  }
+  return nodes;
+}
+
+/// Those of the scene that run on another host.
+std::vector<NodeId> RemoteNodesOf(const SceneView& scene, const UpSettings& settings) {
+  std::vector<NodeId> nodes;
+  for (int i = 0; i < kNodeCount; ++i) {
+    if ((scene.node_mask & settings.remote) >> i & 1u) nodes.push_back(static_cast<NodeId>(i));
   }
   return nodes;
 }
@@ -77,7 +96,10 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
   return "  seconds: " + (end_s > 0 ? Fixed(end_s, 3) : std::string("until stopped")) +
          "\n  domain: " + std::to_string(settings.cart.domain) + "\n  window: " + yes_no(settings.window) +
          "\n  keep_going: " + yes_no(settings.keep_going) + "\n  standby: " + yes_no(settings.standby) +
-         "\n  record: " + yes_no(settings.record.has_value()) + "\n";
+         "\n  record: " + yes_no(settings.record.has_value()) +
+         (settings.remote != 0 ? "\n  peer: " + settings.peer + "\n  remote: " + link::NamesOfNodes(settings.remote)
+                               : "") +
+         "\n";
 }
 
 std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFolder& folder) {
@@ -103,10 +125,17 @@ struct Supervisor::Impl {
         recording(RecordingFile(up, folder)),
         memory(bus::SharedMemoryDirectory(up.cart.domain)),
         starter{settings, folder, recording},
-        node_ids(NodesOf(scene.view(), up)) {
+        node_ids(NodesOf(scene.view(), up)),
+        remote_ids(RemoteNodesOf(scene.view(), up)) {
     // Left by a supervisor that was killed: its nodes died with it.
     bus::SweepSharedMemory(memory);
-    participant.emplace(bus::DdsSettings{.domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory});
+    const bus::Security security = app::SecurityOf(up.cart, NodeName(NodeId::kSupervisor));
+    if (const std::string warning = CheckSessionKeys(up.cart, node_ids, std::time(nullptr)); !warning.empty()) {
+      progress.Say("! " + warning);
+    }
+    participant.emplace(bus::DdsSettings{
+        .domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory, .security = security});
+    bus::AnnounceSecurity(memory, security);
     manifests = participant->MakeOutput<SceneManifest>();
     healths_in = participant->MakeInput<Health>();
     healths_out = participant->MakeOutput<Health>();
@@ -114,17 +143,42 @@ struct Supervisor::Impl {
     commands = participant->MakeInput<Command>();
     orders = participant->MakeOutput<Command>();
     replies = participant->MakeOutput<CommandReply>();
+    if (!remote_ids.empty()) {
+      link.emplace(link::LinkSettings{.far = FarOf(up), .offer = MakeOffer(), .scene = folder.scene});
+      link->Join(&*participant, link->settings().offer->nodes);
+    }
     if (scene.view().assessment.on != 0) {
       assessed.emplace(scene.view(), &*participant);
     }
     for (const NodeId id : node_ids) {
-      if (id == NodeId::kPhysics && up.standby) {
-        nodes.emplace_back(starter.InPair("a", false));
-        nodes.emplace_back(starter.InPair("b", true));
+      if (!up.attach.empty()) {
+        nodes.push_back(std::make_unique<AttachedNode>(starter.Usual(id), folder.path / AttachedNode::kFolder,
+                                                       [this](NodeId to, const char* verb) { Order(to, verb, ""); }));
+      } else if (id == NodeId::kPhysics && up.standby) {
+        nodes.push_back(std::make_unique<NodeProcess>(starter.InPair("a", false)));
+        nodes.push_back(std::make_unique<NodeProcess>(starter.InPair("b", true)));
       } else {
-        nodes.emplace_back(starter.Usual(id));
+        nodes.push_back(std::make_unique<NodeProcess>(starter.Usual(id)));
       }
     }
+  }
+
+  static bus::FarSettings FarOf(const UpSettings& up) {
+    return link::FarSettingsFor(bus::FarSide::kCart, up.peer, up.address, up.cart.domain, up.link_domain);
+  }
+
+  /// What the other host is to do.
+  [[nodiscard]] link::Offer MakeOffer() const {
+    const link::FileFacts facts = link::FactsOf(folder.scene);
+    link::Offer offer;
+    offer.session_id = folder.session_id;
+    offer.scene_name = scene.view().name;
+    offer.scene_hash = scene.view().hash;
+    offer.scene_B = facts.size_B;
+    offer.scene_checksum = facts.checksum;
+    for (const NodeId node : remote_ids) offer.nodes |= 1u << static_cast<unsigned>(node);
+    offer.cart_yaml = config::CartToYaml(settings.cart);
+    return offer;
   }
 
   [[nodiscard]] double SessionTime(std::int64_t now) const {
@@ -135,10 +189,16 @@ struct Supervisor::Impl {
   }
   [[nodiscard]] double ReachedTime() const { return std::max(0.0, SessionTime(MonotonicNs())); }
 
-  NodeProcess* Find(std::string_view name) {
+  SupervisedNode* Find(std::string_view name) {
     const auto found =
-        std::find_if(nodes.begin(), nodes.end(), [&](const NodeProcess& node) { return name == NodeName(node.id()); });
-    return found == nodes.end() ? nullptr : &*found;
+        std::find_if(nodes.begin(), nodes.end(), [&](const auto& node) { return name == NodeName(node->id()); });
+    return found == nodes.end() ? nullptr : found->get();
+  }
+
+  const NodeId* FindRemote(std::string_view name) const {
+    const auto found =
+        std::find_if(remote_ids.begin(), remote_ids.end(), [&](NodeId node) { return name == NodeName(node); });
+    return found == remote_ids.end() ? nullptr : &*found;
   }
 
   /// Ends the session; the first cause counts.
@@ -153,28 +213,29 @@ struct Supervisor::Impl {
 
   void WatchNodes(std::int64_t now) {
     if (now - last_loop_ns > kHeldUp) {
-      for (NodeProcess& node : nodes) {
-        node.ForgiveSilence(now);
+      for (const auto& node : nodes) {
+        node->ForgiveSilence(now);
       }
     }
     last_loop_ns = now;
-    for (NodeProcess& node : nodes) {
-      const std::optional<NodeProcess::Death> death = node.Update(now);
+    for (const auto& entry : nodes) {
+      SupervisedNode& node = *entry;
+      const std::optional<SupervisedNode::Death> death = node.Update(now);
       if (!death) {
         continue;
       }
       sweep_ns = now + kSweepAfter;
-      record.AddDeath(SessionTime(now), node.id(), death->cause, death->for_good);
+      record.AddDeath(SessionTime(death->at_ns != 0 ? death->at_ns : now), node.id(), death->cause, death->for_good);
       const std::string what = std::string(NodeName(node.id())) + " " + death->cause;
       if (!death->asked) {
         AskDump(now, what);
       }
       if (!death->for_good) {
-        progress.Say("! " + what + ": starting it again");
+        progress.Say("! " + what + (settings.attach.empty() ? ": starting it again" : ""));
         continue;
       }
-      const std::string last = LastLine(node.log());
-      progress.Say("! " + what + ", for good; see " + node.log().string() + (last.empty() ? "" : "\n  " + last));
+      const std::string last = LastLine(node.command().log);
+      progress.Say("! " + what + ", for good; see " + node.log() + (last.empty() ? "" : "\n  " + last));
       const bool own_code = death->end.signal == 0 && death->end.exit_code >= 2 && death->end.exit_code <= 4;
       failed_code = own_code ? static_cast<ExitCode>(death->end.exit_code) : ExitCode::kFailure;
       failed_why = what + ", for good";
@@ -195,26 +256,44 @@ struct Supervisor::Impl {
       return;
     }
     next_dump_ns = now + static_cast<std::int64_t>(1e9 * settings.keep_s);
-    Command dump;
-    dump.stamp = order_stamper.Next(now);
-    dump.request_id = static_cast<std::uint64_t>(now);
-    dump.target = NodeId::kRecorder;
-    dump.verb = "dump";
-    dump.argument = reason;
-    orders->Write(dump);
+    Order(NodeId::kRecorder, "dump", reason);
+  }
+
+  void Order(NodeId target, const char* verb, const std::string& argument) {
+    const std::int64_t now = MonotonicNs();
+    Command order;
+    order.stamp = order_stamper.Next(now);
+    order.request_id = static_cast<std::uint64_t>(now);
+    order.target = target;
+    order.verb = verb;
+    order.argument = argument;
+    orders->Write(order);
+  }
+
+  /// A node that goes on, but no longer well: what led to it is in the newest past.
+  void DumpFault(std::int64_t now) {
+    AskDump(now, std::string(NodeName(health.node)) + " is degraded" +
+                     (health.last_error.empty() ? std::string() : ": " + health.last_error));
   }
 
   void TakeReports(std::int64_t now) {
     while (healths_in->TakeNext(&health)) {
-      for (NodeProcess& node : nodes) {
-        if (node.id() == health.node && (node.pid() == health.pid || node.foreign())) {
-          node.OnHealth(now);
+      for (const auto& node : nodes) {
+        if (node->OnHealth(health, now)) {
           // Of a pair the leader's counts.
-          const bool follows = settings.standby && node.id() == NodeId::kPhysics &&
+          const bool follows = settings.standby && node->id() == NodeId::kPhysics &&
                                health.state != HealthState::kRunning && health.state != HealthState::kDegraded;
           // The record closes with the session: what a node says of peers that have just ended is no finding.
-          if (!ended && !follows) record.AddHealth(SessionTime(now), health);
+          if (!ended && !follows) {
+            const bool was_well = record.node(health.node).state != HealthState::kDegraded;
+            record.AddHealth(SessionTime(now), health);
+            if (was_well && health.state == HealthState::kDegraded && now >= excused_ns) DumpFault(now);
+          }
         }
+      }
+      // Of the other host: watched and started again there.
+      if (!ended && std::find(remote_ids.begin(), remote_ids.end(), health.node) != remote_ids.end()) {
+        record.AddHealth(SessionTime(now), health);
       }
     }
     ThermalEvent event;
@@ -224,6 +303,15 @@ struct Supervisor::Impl {
     }
     if (assessed) assessed->Take();
     if (const std::string mismatch = participant->schema_mismatch(); !mismatch.empty()) {
+      Fail(ExitCode::kMismatch, mismatch);
+      ending = true;
+    }
+    refusals = participant->refusals();
+    for (std::size_t i = record.refused().size(); i < refusals.texts.size(); ++i) {
+      progress.Say("! refused: " + refusals.texts[i]);
+    }
+    record.AddRefusals(SessionTime(now), refusals);
+    if (const std::string mismatch = link ? link->mismatch() : std::string(); !mismatch.empty()) {
       Fail(ExitCode::kMismatch, mismatch);
       ending = true;
     }
@@ -250,10 +338,19 @@ struct Supervisor::Impl {
                               : "this session keeps no past: start it with fulcrum up --keep-last";
         AskDump(now, command.argument);
       } else if (command.verb == "restart") {
-        NodeProcess* node = Find(command.argument);
+        SupervisedNode* node = Find(command.argument);
         if (node != nullptr && node->running()) {
           reply.text = "restarting " + command.argument + " (pid " + std::to_string(node->pid()) + ")";
           node->AskRestart(now);
+          excused_ns = now + kAskedFor;
+        } else if (const NodeId* remote = FindRemote(command.argument); remote != nullptr) {
+          reply.text = "asking " + command.argument + " on " + settings.peer + " to end: it is started again there";
+          Command stop;
+          stop.stamp = order_stamper.Next(now);
+          stop.request_id = static_cast<std::uint64_t>(now);
+          stop.target = *remote;
+          stop.verb = "stop";
+          orders->Write(stop);
         } else {
           reply.ok = false;
           reply.text = "no running node \"" + command.argument + "\" in this session";
@@ -274,7 +371,7 @@ struct Supervisor::Impl {
     std::istringstream lines(argument);
     for (std::string word; std::getline(lines, word);) words.push_back(std::move(word));
     const std::string name = words.empty() ? std::string() : words.front();
-    NodeProcess* node = Find(name);
+    SupervisedNode* node = Find(name);
     if (node == nullptr || !node->running()) {
       *answer = "no running node \"" + name + "\" in this session";
       return false;
@@ -284,6 +381,7 @@ struct Supervisor::Impl {
       NodeCommand command = starter.Replacement(node->command(), words);
       *answer = "replacing " + name + " (pid " + std::to_string(node->pid()) + ") by " + command.program.string();
       node->Swap(std::move(command), now);
+      excused_ns = now + kAskedFor;
       return true;
     } catch (const InputError& error) {
       *answer = error.what();
@@ -308,13 +406,17 @@ struct Supervisor::Impl {
     own.ticks = own_ticks;
     own.metrics.push_back({"session_time_s", SessionTime(now)});
     own.metrics.push_back({"session_end_s", end_s});
+    own.metrics.push_back({"refused", static_cast<double>(refusals.count())});
     for (const NodeId id : node_ids) {
       own.metrics.push_back({std::string("restarts_") + NodeName(id), static_cast<double>(record.node(id).restarts)});
     }
     if (assessed && start_ns != 0) {
       assessed->AddTo(SessionTime(now), &own);
     }
-    own.last_error = failed_why;
+    own.last_error = failed_why.empty() && !refusals.texts.empty() ? "refused: " + refusals.texts.back() : failed_why;
+    if (link) {
+      link::FillHealth(link->status(), &own);
+    }
     app::FitToMessage(&own);
     healths_out->Write(own);
   }
@@ -323,7 +425,7 @@ struct Supervisor::Impl {
     if (!progress.IsDue(now)) {
       return;
     }
-    const auto alive = std::count_if(nodes.begin(), nodes.end(), [](const NodeProcess& n) { return n.running(); });
+    const auto alive = std::count_if(nodes.begin(), nodes.end(), [](const auto& node) { return node->running(); });
     std::string line = start_ns == 0 ? "starting" : "t " + Fixed(std::max(0.0, SessionTime(now)), 1);
     if (start_ns != 0) {
       const std::string phase = PhaseAt(scene.view(), SessionTime(now));
@@ -338,7 +440,9 @@ struct Supervisor::Impl {
               Fixed(last("cut_length_mm"), 1) + " mm";
       line += assessed ? assessed->Line(SessionTime(now)) : "";
     }
-    progress.Show(now, line + " · " + std::to_string(alive) + "/" + std::to_string(nodes.size()) + " nodes");
+    line += " · " + std::to_string(alive) + "/" + std::to_string(nodes.size()) + " nodes";
+    service_status = line;
+    progress.Show(now, line);
   }
 
   void Turn() {
@@ -348,6 +452,7 @@ struct Supervisor::Impl {
     TakeCommands(now);
     PublishOwnHealth(now);
     ShowProgress(now);
+    service.Update(now, {++turns}, service_status);
     ending |= runtime::ShouldStop();
     std::this_thread::sleep_for(kLoopPeriod);
   }
@@ -358,11 +463,17 @@ struct Supervisor::Impl {
   void WaitForNodes() {
     const std::int64_t begin = MonotonicNs();
     last_loop_ns = begin;
-    for (NodeProcess& node : nodes) {
-      node.Start(begin);
+    for (const auto& node : nodes) {
+      node->Start(begin);
     }
-    const auto ready = [](const NodeProcess& node) { return node.has_reported() || node.failed(); };
-    while (!ending && !std::all_of(nodes.begin(), nodes.end(), ready) && MonotonicNs() - begin < kLongestStart) {
+    if (!settings.attach.empty()) PointTo(settings.attach / "session", folder.path);
+    service.Ready();
+    const auto ready = [](const auto& node) { return node->has_reported() || node->failed(); };
+    const auto seen = [this](NodeId node) { return record.node(node).seen; };
+    while (
+        !ending &&
+        !(std::all_of(nodes.begin(), nodes.end(), ready) && std::all_of(remote_ids.begin(), remote_ids.end(), seen)) &&
+        MonotonicNs() - begin < kLongestStart) {
       Turn();
     }
   }
@@ -391,43 +502,46 @@ struct Supervisor::Impl {
     // At once: a recording tells by it when the session was over.
     next_health_ns = 0;
     PublishOwnHealth(MonotonicNs());
-    const auto recorder = std::find_if(nodes.begin(), nodes.end(),
-                                       [](const NodeProcess& node) { return node.id() == NodeId::kRecorder; });
+    if (link) {
+      link->SayBye();
+    }
+    service.Stopping();
+    const auto recorder =
+        std::find_if(nodes.begin(), nodes.end(), [](const auto& node) { return node->id() == NodeId::kRecorder; });
     End({nodes.begin(), recorder});
     // Last, so that it has seen the others end.
     End({recorder, nodes.end()});
   }
 
-  void End(std::span<NodeProcess> some) {
-    for (const NodeProcess& node : some) {
-      node.Signal(SIGTERM);
-    }
-    const std::int64_t begin = MonotonicNs();
-    const auto is_gone = [](NodeProcess& node) { return node.HasEnded(); };
-    while (!std::all_of(some.begin(), some.end(), is_gone)) {
-      const std::int64_t now = MonotonicNs();
-      if (now - begin > kLongestEnd) {
-        for (const NodeProcess& node : some) {
-          if (node.running()) {
-            progress.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and was killed");
-          }
-          node.Signal(SIGKILL);
-        }
-      }
-      TakeReports(now);
-      PublishOwnHealth(now);
-      std::this_thread::sleep_for(kLoopPeriod);
-    }
+  void End(std::span<std::unique_ptr<SupervisedNode>> some) {
+    std::vector<SupervisedNode*> all;
+    for (const auto& node : some) all.push_back(node.get());
+    EndAll(
+        all,
+        [this](std::int64_t now) {
+          TakeReports(now);
+          PublishOwnHealth(now);
+        },
+        [this](const SupervisedNode& node, const char* done) {
+          progress.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and " + done);
+        });
   }
 
   void Judge() {
     if (failed_code != ExitCode::kDone) {
       Fail(failed_code, failed_why);
     }
-    for (const NodeProcess& node : nodes) {
-      const NodeFigures& figures = record.node(node.id());
+    for (const auto& node : nodes) {
+      const NodeFigures& figures = record.node(node->id());
       if (!figures.seen) {
-        Fail(ExitCode::kFailure, std::string(NodeName(node.id())) + " never reported; see " + node.log().string());
+        Fail(ExitCode::kFailure, std::string(NodeName(node->id())) + " never reported; see " + node->log());
+      }
+    }
+    for (const NodeId node : remote_ids) {
+      if (!record.node(node).seen) {
+        Fail(ExitCode::kFailure,
+             std::string(NodeName(node)) + " on " + settings.peer +
+                 " never reported; does `fulcrum host` run there, with this machine as its --peer?");
       }
     }
     if (const std::string missing = MissingFrom(record, DemandsUntil(scene.view(), reached_s)); !missing.empty()) {
@@ -436,6 +550,7 @@ struct Supervisor::Impl {
   }
 
   void CleanUp() {
+    link.reset();
     commands.reset();
     replies.reset();
     orders.reset();
@@ -446,11 +561,9 @@ struct Supervisor::Impl {
     if (assessed) assessed->Close();
     participant.reset();
     bus::RemoveSharedMemory(memory);
-    // Checkpoints are for restarts within the session, and large.
-    for (const auto& entry : std::filesystem::directory_iterator(folder.path)) {
-      std::error_code ignored;
-      if (entry.path().extension() == ".checkpoint") std::filesystem::remove(entry.path(), ignored);
-    }
+    std::error_code no_link;
+    if (!settings.attach.empty()) std::filesystem::remove(settings.attach / "session", no_link);
+    RemoveCheckpoints(folder);
   }
 
   /// A row in the trainees' database. What cannot be written there is still in assessment.json.
@@ -473,6 +586,7 @@ struct Supervisor::Impl {
     outcome.machine = DescribeMachine();
     outcome.configuration = folder.configuration;
     outcome.nodes = node_ids;
+    outcome.nodes.insert(outcome.nodes.end(), remote_ids.begin(), remote_ids.end());
     outcome.duration_s = reached_s;
     outcome.wanted_s = end_s;
     outcome.exit_code = exit_code;
@@ -502,8 +616,10 @@ struct Supervisor::Impl {
   const std::filesystem::path memory;
   const NodeStarter starter;
   const std::vector<NodeId> node_ids;
+  const std::vector<NodeId> remote_ids;  ///< Of the scene, on another host.
 
   std::optional<bus::DdsParticipant> participant;
+  std::optional<link::Link> link;  ///< To the host of remote_ids.
   std::unique_ptr<bus::Output<SceneManifest>> manifests;
   std::unique_ptr<bus::Input<Health>> healths_in;
   std::unique_ptr<bus::Output<Health>> healths_out;
@@ -515,16 +631,21 @@ struct Supervisor::Impl {
 
   std::optional<SessionAssessment> assessed;
 
-  std::vector<NodeProcess> nodes;
+  std::vector<std::unique_ptr<SupervisedNode>> nodes;
   SessionRecord record;
-  Progress progress;
+  Progress progress{!settings.attach.empty()};
+  bus::Refusals refusals;
+  runtime::ServiceNotify service;
+  std::string service_status = "starting";
+  std::uint64_t turns = 0;
   Health health;  ///< Reused by TakeReports.
   app::RateMeter own_rate;
   std::uint64_t own_ticks = 0;
   std::int64_t start_ns = 0;  ///< CLOCK_MONOTONIC at session time 0; 0: not begun.
   std::int64_t last_loop_ns = 0, next_health_ns = 0;
   std::int64_t next_dump_ns = 0;
-  std::int64_t sweep_ns = 0;  ///< When to sweep; 0: nothing to sweep.
+  std::int64_t excused_ns = 0;  ///< Until then a degraded node is no fault.
+  std::int64_t sweep_ns = 0;    ///< When to sweep; 0: nothing to sweep.
   double reached_s = 0;
   bool ending = false;                     ///< No further turn.
   bool ended = false;                      ///< Session time has stopped.

@@ -1,6 +1,7 @@
 // Runs one session: starts the nodes of a scene, watches and restarts them, records what they report, ends them.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -25,9 +26,15 @@ struct UpSettings {
   /// or a dump is asked for. 0: it does not.
   double keep_s = 0;
   bool standby = false;  ///< A second physics_node follows the first and takes over when that falls silent.
-  std::string trainee;   ///< The session's score is remembered under this name; empty: it is not.
+  /// Nodes that run on another host, bit per NodeId, and how to reach it; 0: all run here.
+  std::uint32_t remote = 0;
+  std::string peer, address;
+  int link_domain = 0;                      ///< 0: the usual one of the cart's domain.
+  std::string trainee;                      ///< The session's score is remembered under this name; empty: it is not.
   std::filesystem::path training_database;  ///< Where; services/supervisor/training_log.h.
   bool keep_going = false;                  ///< A node that failed for good does not end the session.
+  /// Not empty: nodes are started by somebody else, systemd, who finds what they need below this folder's "session".
+  std::filesystem::path attach;
 };
 
 class Supervisor {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/core/escape.h"
 #include "services/supervisor/outcome.h"
 
 namespace fulcrum::supervisor {
@@ -41,32 +42,6 @@ double NiceStep(double span, int most) {
     }
   }
   return 10 * power;
-}
-
-std::string EscapeHtml(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
 }
 
 std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& lines) {

@@ -29,7 +29,4 @@ struct PlotSettings {
 /// A step of 1, 2 or 5 times a power of ten that divides `span` into at most `most` parts. span > 0.
 [[nodiscard]] double NiceStep(double span, int most);
 
-/// Replaces the characters that HTML and SVG reserve.
-[[nodiscard]] std::string EscapeHtml(const std::string& text);
-
 }  // namespace fulcrum::supervisor

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 
+#include "services/core/escape.h"
 #include "services/supervisor/svg_plot.h"
 
 namespace fulcrum::supervisor {

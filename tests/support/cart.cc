@@ -2,7 +2,9 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <fstream>
 #include <sstream>
 #include <system_error>
@@ -45,7 +47,7 @@ Cart::~Cart() {
   fs::remove_all(folder_, ignored);
 }
 
-std::map<std::string, pid_t> Cart::nodes() const {
+std::map<std::string, pid_t> ChildrenOf(pid_t parent) {
   std::map<std::string, pid_t> children;
   for (const auto& entry : fs::directory_iterator("/proc")) {
     const std::string name = entry.path().filename();
@@ -59,10 +61,22 @@ std::map<std::string, pid_t> Cart::nodes() const {
     char state = '?';
     pid_t ppid = 0;
     rest >> state >> ppid;
-    if (ppid == up_.pid() && state != 'Z') children.emplace(line.substr(open + 1, close - open - 1), std::stoi(name));
+    if (ppid == parent && state != 'Z') children.emplace(line.substr(open + 1, close - open - 1), std::stoi(name));
   }
   return children;
 }
+
+double Cart::PictureTime() const {
+  double newest_s = -1;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(session() / "frames", ignored)) {
+    int ms = 0;
+    if (std::sscanf(entry.path().filename().c_str(), "frame_%d.png", &ms) == 1)
+      newest_s = std::max(newest_s, 1e-3 * ms);
+  }
+  return newest_s;
+}
+std::map<std::string, pid_t> Cart::nodes() const { return ChildrenOf(up_.pid()); }
 
 std::optional<int> Cart::WaitForEnd(double limit_s) {
   std::optional<int> code;

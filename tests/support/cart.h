@@ -19,6 +19,9 @@ bool WaitFor(double limit_s, const std::function<bool()>& done);
 
 [[nodiscard]] std::string ReadFile(const std::filesystem::path& file);
 
+/// The processes that a process has started and that still run, by name.
+[[nodiscard]] std::map<std::string, pid_t> ChildrenOf(pid_t parent);
+
 /// One run of `fulcrum up SCENE`; everything is gone when the object is.
 class Cart {
  public:
@@ -31,6 +34,8 @@ class Cart {
   [[nodiscard]] std::map<std::string, pid_t> nodes() const;
   [[nodiscard]] std::string Said() const { return up_.Said(); }
   [[nodiscard]] std::filesystem::path session() const { return folder_ / "latest"; }
+  /// Session time of the newest picture [s]: how far the cart has come, seen from outside. Negative: none yet.
+  [[nodiscard]] double PictureTime() const;
   /// To `fulcrum up`.
   void Signal(int signal) const { up_.Signal(signal); }
   /// Exit code of `fulcrum up`, minus a signal; nothing if it does not end within the limit.

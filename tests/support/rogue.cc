@@ -16,11 +16,13 @@
 #include <functional>
 #include <limits>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "services/bus/dds/participant.h"
+#include "services/bus/dds/security.h"
 #include "services/bus/input_account.h"
 #include "services/bus/topics.h"
 #include "services/runtime/cyclic_thread.h"
@@ -80,6 +82,35 @@ Bytes NoMessage(std::mt19937* random) {
   const std::array<std::uint8_t, 4> header{0, static_cast<std::uint8_t>(kind == 3 ? (*random)() : 1), 0, 0};
   std::copy(header.begin(), header.end(), bytes.begin());
   return bytes;
+}
+
+fast::DomainParticipant* Join(int domain, fast::DomainParticipantQos qos) {
+  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  udp->interfaceWhiteList = {"127.0.0.1"};
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports.push_back(udp);
+  return fast::DomainParticipantFactory::get_instance()->create_participant(static_cast<std::uint32_t>(domain), qos);
+}
+
+void Leave(fast::DomainParticipant* participant) {
+  participant->delete_contained_entities();
+  fast::DomainParticipantFactory::get_instance()->delete_participant(participant);
+}
+
+/// Bytes on any topic, whatever its readers ask for.
+fast::DataWriter* MakeWriter(fast::DomainParticipant* participant, fast::Publisher* publisher,
+                             const bus::TopicRole& role) {
+  fast::TypeSupport type(new RawType(TypeName(role)));
+  type.register_type(participant);
+  fast::DataWriterQos writer;
+  writer.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
+  writer.reliability().max_blocking_time = {0, 5'000'000};
+  writer.durability().kind = fast::TRANSIENT_LOCAL_DURABILITY_QOS;
+  writer.history().depth = 1;
+  writer.data_sharing().off();
+  writer.endpoint().history_memory_policy = rtps::DYNAMIC_RESERVE_MEMORY_MODE;
+  auto* topic = participant->create_topic(role.name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
+  return publisher->create_datawriter(topic, writer);
 }
 
 }  // namespace
@@ -174,28 +205,12 @@ std::uint64_t Rogue::Pour(Flood what, double seconds, std::uint32_t seed) {
 
 std::uint64_t Rogue::PourBytes(int per_topic, std::uint32_t seed) {
   std::mt19937 random(seed);
-  fast::DomainParticipantQos qos;
-  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  udp->interfaceWhiteList = {"127.0.0.1"};
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(udp);
-  auto* factory = fast::DomainParticipantFactory::get_instance();
-  auto* participant = factory->create_participant(static_cast<std::uint32_t>(impl_->domain), qos);
+  fast::DomainParticipant* participant = Join(impl_->domain, fast::DomainParticipantQos());
   if (participant == nullptr) return 0;
   fast::Publisher* publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
   std::vector<fast::DataWriter*> writers;
   for (const bus::TopicRole& role : bus::kTopicRoles) {
-    fast::TypeSupport type(new RawType(TypeName(role)));
-    type.register_type(participant);
-    fast::DataWriterQos writer;
-    writer.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
-    writer.reliability().max_blocking_time = {0, 5'000'000};
-    writer.durability().kind = fast::TRANSIENT_LOCAL_DURABILITY_QOS;
-    writer.history().depth = 1;
-    writer.data_sharing().off();
-    writer.endpoint().history_memory_policy = rtps::DYNAMIC_RESERVE_MEMORY_MODE;
-    auto* topic = participant->create_topic(role.name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
-    writers.push_back(publisher->create_datawriter(topic, writer));
+    writers.push_back(MakeWriter(participant, publisher, role));
   }
   std::this_thread::sleep_for(kMatchTime);
   std::uint64_t sent = 0;
@@ -206,9 +221,31 @@ std::uint64_t Rogue::PourBytes(int per_topic, std::uint32_t seed) {
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  participant->delete_contained_entities();
-  factory->delete_participant(participant);
+  Leave(participant);
   return sent;
+}
+
+void WriteForgedTools(int domain, const std::string& name, const bus::Security& security,
+                      const std::string& authorities, const std::string& permissions, Bytes bytes,
+                      std::chrono::seconds time) {
+  fast::DomainParticipantQos qos;
+  qos.name(name);
+  bus::dds::ApplySecurity(security, &qos);
+  for (rtps::Property& property : qos.properties().properties()) {
+    if (property.name().ends_with(".permissions_ca")) property.value("file://" + authorities);
+    if (property.name().ends_with(".permissions")) property.value("file://" + permissions);
+  }
+  fast::DomainParticipant* participant = Join(domain, qos);
+  if (participant == nullptr) throw std::runtime_error("the library made no participant");
+  fast::DataWriter* writer = MakeWriter(participant, participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT),
+                                        bus::RoleOf(TopicId::kToolState));
+  if (writer == nullptr) throw std::runtime_error("the library made no writer");
+  const auto begin = std::chrono::steady_clock::now();
+  while (std::chrono::steady_clock::now() - begin < time) {
+    writer->write(&bytes);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  Leave(participant);
 }
 
 }  // namespace fulcrum::testing

@@ -1,12 +1,24 @@
 // A participant that does not belong to the cart and speaks on its topics.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <vector>
 
+#include "services/bus/security.h"
 #include "services/core/messages.h"
 
 namespace fulcrum::testing {
+
+/// Joins a secured domain with a side of its own that is forged: what it takes for true about permissions is signed by
+/// any of the authorities in `authorities` (PEM), and is read from the pipe `permissions` each time anew. Makes a
+/// writer of ToolState and writes `bytes` again and again for so long. Throws
+/// std::runtime_error when the library refuses it already.
+void WriteForgedTools(int domain, const std::string& name, const bus::Security& security,
+                      const std::string& authorities, const std::string& permissions, std::vector<std::uint8_t> bytes,
+                      std::chrono::seconds time);
 
 /// What a flood is to hold.
 enum class Flood {

@@ -1,22 +1,21 @@
 #include "services/bus/dds/participant.h"
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/xmlparser/XMLProfileManager.h>
-#include <unistd.h>
 
 #include <array>
-#include <chrono>
 #include <cstdio>
-#include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
-#include <map>
 #include <mutex>
+#include <sstream>
 
+#include "services/bus/access.h"
+#include "services/bus/dds/library.h"
+#include "services/bus/dds/peer_watch.h"
 #include "services/bus/dds/ports.h"
 #include "services/bus/dds/raw_reader.h"
+#include "services/bus/dds/security.h"
 #include "services/bus/dds/shared_memory.h"
 #include "services/bus/hex.h"
 #include "services/core/error.h"
@@ -37,85 +36,10 @@ constexpr std::uint32_t kSocketBuffer_B = 4u << 20;
 /// Samples above this do not fit one UDP datagram and are sent in fragments.
 constexpr std::uint32_t kDatagram_B = 64'000;
 
-/// USER_DATA of our participants: "fulcrum <hash> <node> <pid>".
-constexpr std::string_view kUserDataTag = "fulcrum ";
-constexpr std::string_view kPidTag = " (pid ";
-
-/// Compares the schema of each peer that appears.
-class PeerWatch final : public fast::DomainParticipantListener {
- public:
-  PeerWatch(std::string own_name, std::uint64_t own_hash) : own_name_(std::move(own_name)), own_hash_(Hex(own_hash)) {}
-
-  void on_participant_discovery(fast::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& info) override {
-    using Status = rtps::ParticipantDiscoveryInfo::DISCOVERY_STATUS;
-    const rtps::GUID_t guid = info.info.m_guid;
-    const std::lock_guard lock(mutex_);
-    if (info.status == Status::REMOVED_PARTICIPANT || info.status == Status::DROPPED_PARTICIPANT) {
-      mismatches_.erase(guid);
-      since_.erase(guid.guidPrefix);
-      return;
-    }
-    const auto& bytes = info.info.m_userData;
-    const std::string text(bytes.begin(), bytes.end());
-    if (text.size() < kUserDataTag.size() + own_hash_.size() || text.compare(0, kUserDataTag.size(), kUserDataTag)) {
-      return;  // not one of ours: another program on this domain is none of our business
-    }
-    const std::string hash = text.substr(kUserDataTag.size(), own_hash_.size());
-    const std::size_t name_at = kUserDataTag.size() + hash.size();
-    int pid = 0;
-    const std::size_t pid_at = text.rfind(kPidTag);
-    if (pid_at != std::string::npos) std::sscanf(text.c_str() + pid_at + kPidTag.size(), "%d", &pid);
-    peers_[guid.guidPrefix] = {info.info.m_participantName.c_str(), pid};
-    since_.try_emplace(guid.guidPrefix, std::chrono::steady_clock::now().time_since_epoch().count());
-    if (hash == own_hash_) return;
-    mismatches_[guid] = "schema mismatch: peer" + text.substr(name_at) + " speaks schema " + hash + ", this " +
-                        own_name_ + " speaks " + own_hash_ + "; rebuild and restart both from the same sources";
-  }
-
-  [[nodiscard]] std::string mismatch() const {
-    const std::lock_guard lock(mutex_);
-    return mismatches_.empty() ? std::string() : mismatches_.begin()->second;
-  }
-
-  [[nodiscard]] std::int64_t KnownSince(const std::string& name) const {
-    const std::lock_guard lock(mutex_);
-    std::int64_t first = 0;
-    for (const auto& [prefix, since_ns] : since_) {
-      const auto peer = peers_.find(prefix);
-      if (peer != peers_.end() && peer->second.name == name && (first == 0 || since_ns < first)) first = since_ns;
-    }
-    return first;
-  }
-
-  /// Also of one that is gone by now.
-  [[nodiscard]] Peer PeerOf(const rtps::GuidPrefix_t& prefix) const {
-    const std::lock_guard lock(mutex_);
-    const auto found = peers_.find(prefix);
-    return found == peers_.end() ? Peer() : found->second;
-  }
-
- private:
-  const std::string own_name_, own_hash_;
-  mutable std::mutex mutex_;
-  std::map<rtps::GuidPrefix_t, Peer> peers_;
-  std::map<rtps::GuidPrefix_t, std::int64_t> since_;  ///< Of those that live.
-  std::map<rtps::GUID_t, std::string> mismatches_;
-};
-
-/// Settings from outside would silently replace the ones that were measured.
-void ForgetOutsideSettings() {
-  for (const char* name :
-       {"FASTDDS_STATISTICS", "FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_ENVIRONMENT_FILE", "ROS_DISCOVERY_SERVER"}) {
-    unsetenv(name);
-  }
-  setenv("SKIP_DEFAULT_XML", "1", 1);  // no DEFAULT_FASTRTPS_PROFILES.xml from the current directory
-}
-
 fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash) {
   fast::DomainParticipantQos qos;
   qos.name(settings.node_name);
-  const std::string user_data = std::string(kUserDataTag) + Hex(schema_hash) + " " + settings.node_name +
-                                std::string(kPidTag) + std::to_string(getpid()) + ")";
+  const std::string user_data = dds::UserDataOf(settings.node_name, schema_hash);
   qos.user_data().data_vec({user_data.begin(), user_data.end()});
   auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {"127.0.0.1"};
@@ -126,10 +50,11 @@ fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = kLease;
   discovery.leaseDuration_announcementperiod = kAnnouncement;
+  if (settings.security.on()) dds::ApplySecurity(settings.security, &qos);
   return qos;
 }
 
-/// What a DataReaderQos and a DataWriterQos have in common.
+/// What a DataReaderQos and a DataWriterQos have in common. `shared_memory` empty: no data-sharing.
 template <class Qos>
 void ApplyRole(const TopicRole& role, int depth, const std::string& shared_memory, Qos* qos) {
   qos->reliability().kind = role.reliable ? fast::RELIABLE_RELIABILITY_QOS : fast::BEST_EFFORT_RELIABILITY_QOS;
@@ -146,7 +71,7 @@ void ApplyRole(const TopicRole& role, int depth, const std::string& shared_memor
   qos->resource_limits().max_samples_per_instance = samples;
   qos->resource_limits().allocated_samples = 0;
   qos->endpoint().history_memory_policy = rtps::PREALLOCATED_MEMORY_MODE;
-  if (role.path == Path::kSharedMemory) {
+  if (!shared_memory.empty()) {
     qos->data_sharing().on(shared_memory);
   } else {
     qos->data_sharing().off();
@@ -155,24 +80,37 @@ void ApplyRole(const TopicRole& role, int depth, const std::string& shared_memor
 
 }  // namespace
 
+DdsSettings ToolSettings(int domain) {
+  const std::filesystem::path memory = SharedMemoryDirectory(domain);
+  return {.domain = domain,
+          .node_name = std::string(kToolIdentity),
+          .shared_memory = memory,
+          .security = AnnouncedSecurity(memory, kToolIdentity)};
+}
+
 struct DdsParticipant::Impl {
   Impl(const DdsSettings& settings, std::uint64_t hash)
-      : schema_hash(hash), shared_memory(settings.shared_memory), watch(settings.node_name, hash) {
+      : schema_hash(hash),
+        shared_memory(settings.shared_memory),
+        security(settings.security),
+        watch(settings.node_name, hash, settings.security) {
     if (settings.domain < 1 || settings.domain > 100) {
       throw InputError("domain " + std::to_string(settings.domain) + " is out of range: 1 to 100");
     }
     if (shared_memory.empty()) shared_memory = SharedMemoryDirectory(settings.domain);
     PrepareSharedMemory(shared_memory);
-    ForgetOutsideSettings();
-    eprosima::fastrtps::LibrarySettingsAttributes library;
-    library.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
-    eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(library);
+    dds::PrepareLibrary();
 
     participant = fast::DomainParticipantFactory::get_instance()->create_participant(
         static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash), &watch, fast::StatusMask::none());
     if (participant == nullptr) {
       throw InputError("domain " + std::to_string(settings.domain) +
                        ": cannot open the bus; are its UDP ports on 127.0.0.1 free?");
+    }
+    if (security.on()) {
+      std::ostringstream address;
+      address << participant->guid().guidPrefix;
+      ClaimSharedMemory(shared_memory, address.str());
     }
     publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
     subscriber = participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
@@ -217,9 +155,23 @@ struct DdsParticipant::Impl {
     return std::string(role.name) + "#" + Hex(schema_hash);
   }
 
+  /// Where the samples of a topic are shared; empty: they travel by UDP.
+  [[nodiscard]] std::string SharedMemoryFor(const TopicRole& role) const {
+    return role.path == Path::kSharedMemory && !security.encrypt ? shared_memory.string() : std::string();
+  }
+
+  /// Why the library made no endpoint.
+  [[nodiscard]] std::string CannotMake(const TopicRole& role, const char* what) const {
+    return std::string(role.name) + ": cannot make a " + what +
+           (security.on() ? ": access control refuses it to \"" + security.identity + "\" (keys of " +
+                                security.keys.string() + "; fulcrum keys show lists who may what)"
+                          : "");
+  }
+
   const std::uint64_t schema_hash;
   std::filesystem::path shared_memory;
-  PeerWatch watch;
+  const Security security;
+  dds::PeerWatch watch;
   fast::DomainParticipant* participant = nullptr;
   fast::Publisher* publisher = nullptr;
   fast::Subscriber* subscriber = nullptr;
@@ -232,14 +184,16 @@ DdsParticipant::DdsParticipant(const DdsSettings& settings)
 DdsParticipant::~DdsParticipant() = default;
 
 std::string DdsParticipant::schema_mismatch() const { return impl_->watch.mismatch(); }
+Refusals DdsParticipant::refusals() const { return impl_->watch.refusals(); }
 
 template <class T>
 std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()> notify) {
   const TopicRole& role = RoleOf<T>();
   fast::DataReaderQos qos;
-  ApplyRole(role, role.reader_depth, impl_->shared_memory, &qos);
+  ApplyRole(role, role.reader_depth, impl_->SharedMemoryFor(role), &qos);
+  const WorkingIn here(impl_->shared_memory);
   auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos, std::move(notify));
-  if (!port->ok()) throw InputError(std::string(role.name) + ": cannot make a reader");
+  if (!port->ok()) throw InputError(impl_->CannotMake(role, "reader"));
   if (role.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
   return port;
 }
@@ -249,11 +203,13 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   const TopicRole& role = RoleOf<T>();
   fast::Topic* topic = impl_->TopicFor<T>();
   fast::DataWriterQos qos;
-  ApplyRole(role, role.writer_depth, impl_->shared_memory, &qos);
-  const bool fragmented = role.path == Path::kLoopback && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
+  ApplyRole(role, role.writer_depth, impl_->SharedMemoryFor(role), &qos);
+  const bool fragmented =
+      impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
   qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
+  const WorkingIn here(impl_->shared_memory);
   auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos);
-  if (!port->ok()) throw InputError(std::string(role.name) + ": cannot make a writer");
+  if (!port->ok()) throw InputError(impl_->CannotMake(role, "writer"));
   if (role.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
   return port;
 }
@@ -266,9 +222,10 @@ std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink)
   fast::Topic* topic =
       impl_->MakeTopic(role, fast::TypeSupport(new dds::RawType(impl_->TypeName(role), payload_B, plain)));
   fast::DataReaderQos qos;
-  ApplyRole(role, role.reader_depth, impl_->shared_memory, &qos);
+  ApplyRole(role, role.reader_depth, impl_->SharedMemoryFor(role), &qos);
+  const WorkingIn here(impl_->shared_memory);
   auto input = std::make_unique<dds::RawReader>(impl_->subscriber, topic, qos, id, payload_B, std::move(sink));
-  if (!input->ok()) throw InputError(std::string(role.name) + ": cannot make a reader");
+  if (!input->ok()) throw InputError(impl_->CannotMake(role, "reader"));
   return input;
 }
 

@@ -11,15 +11,21 @@
 #include "services/bus/port.h"
 #include "services/bus/raw_input.h"
 #include "services/bus/schema.h"
+#include "services/bus/security.h"
 
 namespace fulcrum::bus {
 
 struct DdsSettings {
-  int domain = 7;                       ///< 1 … 100: one per cart, one per test.
-  std::string node_name = "fulcrum";    ///< Seen by peers in USER_DATA.
-  std::filesystem::path shared_memory;  ///< Private 0700 directory on /dev/shm for data-sharing; empty: one per domain.
+  int domain = 7;                     ///< 1 … 100: one per cart, one per test.
+  std::string node_name = "fulcrum";  ///< Seen by peers in USER_DATA.
+  std::filesystem::path shared_memory =
+      {};  ///< Private 0700 directory on /dev/shm for data-sharing; empty: one per domain.
   std::uint64_t schema_hash = SchemaHash();  ///< What peers must speak too; a test gives another one.
+  Security security = {};                    ///< Off unless keys are named.
 };
+
+/// To join the session that runs in a domain as one who asks and looks: `fulcrum status` and the like.
+[[nodiscard]] DdsSettings ToolSettings(int domain);
 
 /// Name of the participant that records: nodes wait for it before they begin.
 inline constexpr const char* kRecorderPeer = "recording";
@@ -48,8 +54,11 @@ class DdsParticipant {
   /// When a participant of that name was discovered, CLOCK_MONOTONIC [ns]; 0: none is known.
   [[nodiscard]] std::int64_t KnownSince(const std::string& name) const;
 
-  /// Empty, or one line naming a peer whose schema hash differs (both hashes, both names).
+  /// Empty, or one line: a peer whose schema hash differs (both hashes, both names), or a supervisor that has other
+  /// keys than this participant, or keys where this one has none.
   [[nodiscard]] std::string schema_mismatch() const;
+  /// Who was refused on a secured cart, since the start.
+  [[nodiscard]] Refusals refusals() const;
 
  private:
   struct Impl;

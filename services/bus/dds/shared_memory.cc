@@ -1,6 +1,7 @@
 #include "services/bus/dds/shared_memory.h"
 
 #include <fcntl.h>
+#include <sched.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -8,9 +9,13 @@
 #include <bitset>
 #include <cctype>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <optional>
+#include <string_view>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include "services/core/error.h"
 
@@ -21,9 +26,30 @@ namespace {
 /// Low 16 bits of a process id: all that a participant's GUID keeps of it.
 using ShortPid = std::uint16_t;
 
+constexpr std::string_view kClaim = "owner_";
+
+/// Of secured participants, whose addresses say nothing of their process: from "owner_<address>_<pid>".
+using Claims = std::vector<std::pair<std::string, ShortPid>>;
+
+Claims ClaimsIn(const fs::path& directory) {
+  Claims claims;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(directory, error)) {
+    const std::string name = entry.path().filename();
+    const std::size_t pid_at = name.rfind('_');
+    if (!name.starts_with(kClaim) || pid_at <= kClaim.size()) continue;
+    claims.emplace_back(name.substr(kClaim.size(), pid_at - kClaim.size()),
+                        static_cast<ShortPid>(std::strtoul(name.c_str() + pid_at + 1, nullptr, 10) & 0xffffu));
+  }
+  return claims;
+}
+
 /// Files are named after the GUID of their endpoint, "..._01.0f.hh.hh.pp.pp.rr.rr.…", with the process id in bytes 4
-/// and 5, little endian.
-std::optional<ShortPid> OwnerOf(const std::string& name) {
+/// and 5, little endian; on a secured cart after an address that was claimed.
+std::optional<ShortPid> OwnerOf(const std::string& name, const Claims& claims) {
+  for (const auto& [address, pid] : claims) {
+    if (name.find(address) != std::string::npos) return pid;
+  }
   const std::size_t guid = name.find("01.0f.");
   if (guid == std::string::npos) return std::nullopt;
   unsigned bytes[6];
@@ -88,11 +114,19 @@ void PrepareSharedMemory(const fs::path& directory) {
   }
 }
 
+void ClaimSharedMemory(const fs::path& directory, const std::string& address) {
+  const fs::path claim = directory / (std::string(kClaim) + address + "_" + std::to_string(getpid()));
+  const int fd = open(claim.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+  if (fd < 0) throw InputError("shared memory: cannot make " + claim.string() + ": " + std::strerror(errno));
+  close(fd);
+}
+
 void ReserveSharedMemory(const fs::path& directory) {
   const auto own = static_cast<ShortPid>(getpid() & 0xffff);
+  const Claims claims = ClaimsIn(directory);
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(directory, error)) {
-    if (OwnerOf(entry.path().filename()) != own) continue;
+    if (OwnerOf(entry.path().filename(), claims) != own) continue;
     const int fd = open(entry.path().c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
     struct stat status {};
     const bool known = fd >= 0 && fstat(fd, &status) == 0 && S_ISREG(status.st_mode);
@@ -105,10 +139,27 @@ void ReserveSharedMemory(const fs::path& directory) {
   }
 }
 
+WorkingIn::WorkingIn(const fs::path& directory) : before_(open(".", O_PATH | O_DIRECTORY | O_CLOEXEC)) {
+  // From here on this thread has a current directory of its own. Where that is not permitted it is everybody's, for a
+  // moment.
+  unshare(CLONE_FS);
+  if (before_ >= 0 && chdir(directory.c_str()) != 0) {
+    close(before_);
+    before_ = -1;
+  }
+}
+
+WorkingIn::~WorkingIn() {
+  if (before_ < 0) return;
+  [[maybe_unused]] const int ignored = fchdir(before_);  // All paths of ours are absolute by now.
+  close(before_);
+}
+
 SweepResult SweepSharedMemory(const fs::path& directory) {
   const auto live = LiveProcesses();
-  return RemoveFiles(directory, [&live](const std::string& name) {
-    const auto owner = OwnerOf(name);
+  const Claims claims = ClaimsIn(directory);
+  return RemoveFiles(directory, [&](const std::string& name) {
+    const auto owner = OwnerOf(name, claims);
     return owner && !live.test(*owner);
   });
 }

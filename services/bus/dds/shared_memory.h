@@ -19,9 +19,26 @@ inline constexpr std::uint64_t kNeededSharedMemory_B = 32u << 20;
 /// others or has less than kNeededSharedMemory_B free.
 void PrepareSharedMemory(const std::filesystem::path& directory);
 
+/// Says whose the files named after this address ("xx.xx.….xx", 12 bytes) are: the address of a participant that has
+/// authenticated does not tell its process. Goes with the process's other files.
+void ClaimSharedMemory(const std::filesystem::path& directory, const std::string& address);
+
 /// Takes the memory of all files that this process has made there. The library leaves them sparse, and who first writes
 /// to a page when /dev/shm is full gets a SIGBUS. Throws InputError when there is not enough.
 void ReserveSharedMemory(const std::filesystem::path& directory);
+
+/// While it lives, the calling thread works in this directory; other threads do not. For making endpoints: once in a
+/// process the library tries out a mapping with a file in the current directory, which may be "/" or not be writable.
+class WorkingIn {
+ public:
+  explicit WorkingIn(const std::filesystem::path& directory);
+  ~WorkingIn();
+  WorkingIn(const WorkingIn&) = delete;
+  WorkingIn& operator=(const WorkingIn&) = delete;
+
+ private:
+  int before_;
+};
 
 struct SweepResult {
   int files = 0;

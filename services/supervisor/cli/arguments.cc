@@ -75,6 +75,4 @@ std::filesystem::path DatabaseOf(const Arguments& arguments) {
              : UserFolder("XDG_STATE_HOME", ".local/state") / "trainees.sqlite";
 }
 
-std::filesystem::path ProgramFolder() { return std::filesystem::read_symlink("/proc/self/exe").parent_path(); }
-
 }  // namespace fulcrum::supervisor::cli

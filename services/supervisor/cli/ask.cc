@@ -1,56 +1,15 @@
-#include <unistd.h>
+#include "services/supervisor/ask.h"
 
-#include <chrono>
 #include <cstdio>
-#include <thread>
 
-#include "services/bus/dds/participant.h"
-#include "services/core/error.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/runtime/realtime.h"
 #include "services/supervisor/cli/commands.h"
-#include "services/supervisor/domain_guard.h"
 
 namespace fulcrum::supervisor::cli {
 
 ExitCode Ask(int domain, const std::string& verb, const std::string& argument) {
-  if (!DomainGuard::IsHeld(domain)) {
-    throw InputError("no session runs in domain " + std::to_string(domain) + "; start one with fulcrum up SCENE");
-  }
-  bus::DdsParticipant participant({.domain = domain, .node_name = "fulcrum", .shared_memory = {}});
-  const auto replies = participant.MakeInput<CommandReply>();
-  const auto commands = participant.MakeOutput<Command>();
-  const std::int64_t epoch = runtime::MonotonicNs();
-  Command command;
-  command.request_id = static_cast<std::uint64_t>(epoch) ^ static_cast<std::uint64_t>(::getpid()) << 48;
-  command.target = NodeId::kSupervisor;
-  command.verb = verb;
-  command.argument = argument;
-  using Clock = std::chrono::steady_clock;
-  constexpr auto kPatience = std::chrono::seconds(5);
-  constexpr auto kDiscovery = std::chrono::milliseconds(300);
-  const auto begin = Clock::now();
-  bool sent = false;
-  while (Clock::now() - begin < kPatience && !runtime::ShouldStop()) {
-    // Commands are not kept for late joiners: the answer's way and the command's way must both stand first.
-    const bool ready = commands->has_readers() && replies->stats().matched;
-    if (!sent && ready && Clock::now() - begin > kDiscovery) {
-      command.stamp = {1, static_cast<std::uint64_t>(epoch), runtime::MonotonicNs()};
-      sent = commands->Write(command);
-    }
-    CommandReply reply;
-    while (replies->TakeNext(&reply)) {
-      if (reply.request_id == command.request_id && reply.from == NodeId::kSupervisor) {
-        std::fprintf(reply.ok ? stdout : stderr, "%s\n", reply.text.c_str());
-        return reply.ok ? ExitCode::kDone : ExitCode::kFailure;
-      }
-    }
-    if (const std::string mismatch = participant.schema_mismatch(); !mismatch.empty()) {
-      throw MismatchError(mismatch);
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-  throw std::runtime_error("the supervisor of domain " + std::to_string(domain) + " did not answer");
+  const CommandReply reply = AskSupervisor(domain, verb, argument);
+  std::fprintf(reply.ok ? stdout : stderr, "%s\n", reply.text.c_str());
+  return reply.ok ? ExitCode::kDone : ExitCode::kFailure;
 }
 
 }  // namespace fulcrum::supervisor::cli

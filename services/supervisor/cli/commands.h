@@ -3,7 +3,6 @@
 #pragma once
 
 #include <boost/program_options.hpp>
-#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,6 +14,7 @@ namespace fulcrum::supervisor::cli {
 using Words = std::vector<std::string>;
 
 ExitCode Up(const Words& words);
+ExitCode Host(const Words& words);
 ExitCode Status(const Words& words);
 ExitCode Top(const Words& words);
 ExitCode Restart(const Words& words);
@@ -22,7 +22,11 @@ ExitCode Swap(const Words& words);
 ExitCode Down(const Words& words);
 ExitCode Dump(const Words& words);
 ExitCode Log(const Words& words);
+ExitCode TestNode(const Words& words);
+ExitCode Keys(const Words& words);
 ExitCode Doctor(const Words& words);
+ExitCode Console(const Words& words);
+ExitCode Reference(const Words& words);
 ExitCode Assess(const Words& words);
 ExitCode Trainee(const Words& words);
 
@@ -50,9 +54,14 @@ void AddDomain(boost::program_options::options_description* options);
 
 inline constexpr int kDefaultDomain = 7;
 
-/// Folder of this program: the nodes and the compiler lie beside it.
-[[nodiscard]] std::filesystem::path ProgramFolder();
+/// The other programs of the installation.
+[[nodiscard]] std::span<const char* const> Programs();
+[[nodiscard]] bool IsProgram(const std::string& name);
+/// Goes on as one of them: its name, then its arguments. Throws InputError when it cannot be started.
+[[noreturn]] void Become(const Words& words);
 
+/// Compiled scenes are kept here: beside the programs in a build tree, else in the user's cache.
+[[nodiscard]] std::filesystem::path SceneCache(const std::filesystem::path& programs);
 /// The user's folder for what a program keeps, as the XDG base directories have it: `variable`, or `fallback` in the
 /// home folder, and "fulcrum" in that.
 [[nodiscard]] std::filesystem::path UserFolder(const char* variable, const char* fallback);

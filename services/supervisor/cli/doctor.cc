@@ -16,9 +16,13 @@
 #include <thread>
 
 #include "services/bus/dds/shared_memory.h"
+#include "services/config/cart.h"
+#include "services/core/error.h"
+#include "services/runtime/install_places.h"
 #include "services/runtime/realtime.h"
 #include "services/supervisor/cli/commands.h"
 #include "services/supervisor/domain_guard.h"
+#include "services/supervisor/scene_cache.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {
@@ -60,19 +64,25 @@ Finding SharedMemory(int domain) {
   return {true, found, ""};
 }
 
+/// How to be given a limit of /etc/security.
+std::string FixOfLimit(const std::string& entry, const std::string& capability) {
+  const std::string how = runtime::MachineCart().empty()
+                              ? "add \"@fulcrum - " + entry + "\" to /etc/security/limits.conf and join that group"
+                              : "sudo adduser $USER fulcrum, then log in again";
+  return how + ", or run in a container with --cap-add=" + capability;
+}
+
 Finding RealTime() {
   std::string problem;
   std::thread([&] { problem = runtime::SetFifoPriority(80); }).join();
   return {problem.empty(), problem.empty() ? "SCHED_FIFO is permitted" : "SCHED_FIFO is not permitted",
-          "add \"@fulcrum - rtprio 90\" to /etc/security/limits.conf and join that group, or run in a container with "
-          "--cap-add=SYS_NICE; without it cycles start late under load"};
+          FixOfLimit("rtprio 90", "SYS_NICE") + "; without it cycles start late under load"};
 }
 
 Finding LockedMemory() {
   const std::string problem = runtime::LockMemory();
-  return {
-      problem.empty(), problem.empty() ? "memory may be locked" : "memory may not be locked",
-      "add \"@fulcrum - memlock unlimited\" to /etc/security/limits.conf and join that group, or --cap-add=IPC_LOCK"};
+  return {problem.empty(), problem.empty() ? "memory may be locked" : "memory may not be locked",
+          FixOfLimit("memlock unlimited", "IPC_LOCK")};
 }
 
 // Loaded at run time: a machine without EGL must get a diagnosis, not a loader error.
@@ -178,16 +188,41 @@ Finding Disk(const fs::path& out) {
           "free at least 1 GiB, or give --out DIR on another disk"};
 }
 
-Finding Programs() {
+Finding NodePrograms() {
+  const fs::path folder = runtime::ProgramFolder();
   std::string missing;
-  for (const char* name :
-       {"handle_bridge", "haptics_node", "physics_node", "thermal_node", "render_node", "recorder", "scene_compiler"}) {
-    if (::access((ProgramFolder() / name).c_str(), X_OK) != 0) {
+  for (const char* name : cli::Programs()) {
+    if (::access((folder / name).c_str(), X_OK) != 0) {
       missing += std::string(" ") + name;
     }
   }
-  return {missing.empty(), missing.empty() ? "all in " + ProgramFolder().string() : "missing:" + missing,
-          "build them: cmake --build build/release"};
+  return {missing.empty(),
+          missing.empty() ? "all in " + folder.string() : "missing from " + folder.string() + ":" + missing,
+          runtime::MachineCart().empty() ? "build them: cmake --build build/release"
+                                         : "install the package again: apt-get install --reinstall fulcrum"};
+}
+
+Finding Scenes() {
+  const fs::path folder = runtime::ShareFolder() / "scenes";
+  std::string names;
+  for (const std::string& name : ShippedScenes(folder)) {
+    names += ' ' + name;
+  }
+  return {!names.empty(), names.empty() ? "none in " + folder.string() : folder.string() + ":" + names,
+          "install the package again, or build from a whole source tree"};
+}
+
+Finding Cart() {
+  const fs::path cart = runtime::MachineCart();
+  if (cart.empty() || !fs::exists(cart)) {
+    return {true, "no cart file of this machine: everything is simulated, unless --cart says otherwise", ""};
+  }
+  try {
+    return {true, cart.string() + ", \"" + config::LoadCart(cart).name + "\"", ""};
+  } catch (const InputError& error) {
+    return {false, error.what(),
+            "correct it, or begin again with one of " + (runtime::ShareFolder() / "carts").string()};
+  }
 }
 
 }  // namespace
@@ -204,7 +239,9 @@ ExitCode Doctor(const Words& words) {
   }
   const int domain = DomainOf(arguments, kDefaultDomain);
   const std::vector<std::pair<const char*, Finding>> findings{
-      {"programs", Programs()},
+      {"programs", NodePrograms()},
+      {"scenes", Scenes()},
+      {"cart", Cart()},
       {"shared memory", SharedMemory(domain)},
       {"domain", DomainInUse(domain)},
       {"real-time priority", RealTime()},

@@ -4,8 +4,8 @@
 
 #include "services/core/error.h"
 #include "services/supervisor/cli/commands.h"
-#include "services/supervisor/cli/session_view.h"
 #include "services/supervisor/domain_guard.h"
+#include "services/supervisor/session_view.h"
 
 namespace fulcrum::supervisor::cli {
 
@@ -24,9 +24,13 @@ ExitCode Status(const Words& words) {
   SessionView view(domain);
   // Health is late-joiner topic at 10 Hz: after this each live node has been heard several times.
   constexpr auto kListen = std::chrono::milliseconds(700);
-  const auto end = std::chrono::steady_clock::now() + kListen;
-  while (std::chrono::steady_clock::now() < end) {
+  // Who is not accepted by the supervisor learns it from its silence.
+  constexpr auto kPatience = std::chrono::seconds(4);
+  const auto begin = std::chrono::steady_clock::now();
+  for (auto heard = begin; heard - begin < (view.has_supervisor() ? kListen : kPatience);
+       heard = std::chrono::steady_clock::now()) {
     view.Update();
+    if (const std::string mismatch = view.mismatch(); !mismatch.empty()) throw MismatchError(mismatch);
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   std::fputs(view.Text().c_str(), stdout);

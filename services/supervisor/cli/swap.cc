@@ -1,6 +1,7 @@
 #include <boost/program_options/parsers.hpp>
 
 #include "services/core/error.h"
+#include "services/runtime/install_places.h"
 #include "services/supervisor/cli/commands.h"
 
 namespace fulcrum::supervisor::cli {
@@ -11,7 +12,7 @@ namespace fs = std::filesystem;
 /// As a shell would find it, but beside this program first.
 std::string Found(const std::string& program) {
   if (program.find('/') != std::string::npos) return fs::absolute(program);
-  return ProgramFolder() / program;
+  return runtime::ProgramFolder() / program;
 }
 
 }  // namespace

@@ -7,8 +7,8 @@
 #include "services/core/error.h"
 #include "services/runtime/realtime.h"
 #include "services/supervisor/cli/commands.h"
-#include "services/supervisor/cli/session_view.h"
 #include "services/supervisor/domain_guard.h"
+#include "services/supervisor/session_view.h"
 
 namespace fulcrum::supervisor::cli {
 
@@ -29,6 +29,7 @@ ExitCode Top(const Words& words) {
   auto next = std::chrono::steady_clock::now() + kRefresh;
   while (!runtime::ShouldStop() && DomainGuard::IsHeld(domain)) {
     view.Update();
+    if (const std::string mismatch = view.mismatch(); !mismatch.empty()) throw MismatchError(mismatch);
     if (std::chrono::steady_clock::now() >= next) {
       next += kRefresh;
       // Home, text, then clear what an earlier longer text left below: no flicker.

@@ -1,4 +1,6 @@
 #include "services/core/error.h"
+#include "services/link/options.h"
+#include "services/runtime/install_places.h"
 #include "services/supervisor/cli/commands.h"
 #include "services/supervisor/scene_cache.h"
 #include "services/supervisor/supervisor.h"
@@ -10,7 +12,8 @@ namespace {
 namespace fs = std::filesystem;
 namespace po = boost::program_options;
 
-/// Beside the programs in a build tree, else in the user's cache.
+}  // namespace
+
 fs::path SceneCache(const fs::path& programs) {
   if (fs::exists(programs.parent_path() / "CMakeCache.txt")) {
     return programs.parent_path() / "scenes";
@@ -18,7 +21,20 @@ fs::path SceneCache(const fs::path& programs) {
   return UserFolder("XDG_CACHE_HOME", ".cache") / "scenes";
 }
 
-}  // namespace
+/// Empty: the nodes are children.
+fs::path AttachTo(const po::variables_map& values) {
+  if (values.count("attach") == 0) return {};
+  if (values.count("standby") != 0) {
+    throw InputError("--attach: a standby is not possible, as each node is one service");
+  }
+  const char* folder = std::getenv("RUNTIME_DIRECTORY");
+  if (folder == nullptr || !fs::is_directory(folder)) {
+    throw InputError(
+        "--attach: RUNTIME_DIRECTORY names no folder; it is for services of systemd (fulcrum-supervisor.service), "
+        "which sets it");
+  }
+  return folder;
+}
 
 ExitCode Up(const Words& words) {
   po::options_description options;
@@ -29,14 +45,27 @@ ExitCode Up(const Words& words) {
       ("window", "show the picture in a window as well")                                                              //
       ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                                //
        "of the picture: auto, low, high")                                                                             //
-      ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration (default: everything simulated)")    //
-      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")            //
+      ("cart", po::value<std::string>()->value_name("FILE"),
+       "cart configuration (default: /etc/fulcrum/cart.yaml of an installation, else everything simulated)")  //
+      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")    //
+      ("set", po::value<Words>()->value_name("SECTION.KEY=VALUE")->composing(),
+       "a parameter of physics, thermal, haptics, breathing or render other than the scene has it, or script.power_W, "
+       "the generator's setting; as often as needed")  //
       ("record", "record all topics into recording.mcap of the session folder")(
           "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
           "keep-last", po::value<double>()->value_name("SECONDS"),
-          "keep the newest past in memory and write it into a file when a node dies or at fulcrum dump")(
+          "keep the newest past in memory and write it into a file when a node dies, when its Health turns to "
+          "degraded, and at fulcrum dump")(
+          "peer", po::value<std::string>()->value_name("ADDR"),
+          "host that runs the nodes of --remote; there: fulcrum host --peer (this machine)")(
+          "remote", po::value<std::string>()->value_name("NODE,..."), "nodes that run on the host --peer")(
+          "address", po::value<std::string>()->value_name("ADDR"),
+          "own address towards the peer (default: of the interface that leads there)")(
+          "link-domain", po::value<int>()->value_name("N"),
+          "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
           "standby", "a second physics_node that takes over when the first falls silent")(
-          "keep-going", "go on without a node that failed for good");
+          "keep-going", "go on without a node that failed for good")(
+          "attach", "the nodes are services: wait for them below $RUNTIME_DIRECTORY/session, start and kill none");
   options.add_options()("trainee", po::value<std::string>()->value_name("NAME"),
                         "remember the score under this name: see fulcrum trainee");
   AddDatabase(&options);
@@ -50,9 +79,12 @@ ExitCode Up(const Words& words) {
     throw InputError("which scene? see fulcrum help up");
   }
   UpSettings settings;
-  settings.programs = ProgramFolder();
+  settings.programs = runtime::ProgramFolder();
+  const fs::path machine = runtime::MachineCart();
   if (values.count("cart") != 0) {
     settings.cart = config::LoadCart(values["cart"].as<std::string>());
+  } else if (!machine.empty() && fs::exists(machine)) {
+    settings.cart = config::LoadCart(machine);
   }
   settings.cart.domain = DomainOf(arguments, settings.cart.domain);
   settings.out = values["out"].as<std::string>();
@@ -62,7 +94,23 @@ ExitCode Up(const Words& words) {
     throw InputError("--quality: \"" + settings.quality + "\"; valid: auto, low, high");
   }
   settings.standby = values.count("standby") != 0;
+  if (values.count("peer") != values.count("remote")) {
+    throw InputError("--peer and --remote belong together: which host, and which nodes run there");
+  }
+  if (values.count("peer") != 0) {
+    settings.peer = values["peer"].as<std::string>();
+    settings.remote = link::NodesFromNames(values["remote"].as<std::string>());
+    settings.address = values.count("address") != 0 ? values["address"].as<std::string>() : "";
+    settings.link_domain = values.count("link-domain") != 0 ? values["link-domain"].as<int>() : 0;
+    // What cannot be reached is refused here and not by a node.
+    (void)link::FarSettingsFor(bus::FarSide::kCart, settings.peer, settings.address, settings.cart.domain,
+                               settings.link_domain);
+    if (settings.standby && (settings.remote >> static_cast<unsigned>(NodeId::kPhysics) & 1u) != 0) {
+      throw InputError("--standby: not for a physics_node on another host");
+    }
+  }
   settings.keep_going = values.count("keep-going") != 0;
+  settings.attach = AttachTo(values);
   if (values.count("seconds") != 0) {
     settings.seconds = values["seconds"].as<double>();
     constexpr double kLongest = 7 * 24 * 3600.0;
@@ -93,7 +141,10 @@ ExitCode Up(const Words& words) {
   if (values.count("data") != 0) {
     request.data = fs::absolute(values["data"].as<std::string>());
   }
-  request.library = FULCRUM_SCENE_DIR;
+  if (values.count("set") != 0) {
+    request.changes = values["set"].as<Words>();
+  }
+  request.library = runtime::ShareFolder() / "scenes";
   request.compiler = settings.programs / "scene_compiler";
   request.cache = SceneCache(settings.programs);
   settings.scene = ResolveScene(request);

@@ -2,14 +2,12 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "services/scene/build.h"
-#include "services/scene/scene_file.h"
+#include "tests/integration/replay/short_session.h"
 #include "tests/support/program.h"
-#include "tests/unit/replay/recorded_cart.h"
 
 namespace fulcrum::replay {
 namespace {
@@ -17,28 +15,22 @@ namespace {
 class ConsoleTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = std::filesystem::temp_directory_path() / ("fulcrum_console_test_" + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder_);
-    const scene::SceneData data = scene::BuildProcedural(scene::Small());
-    scene::WriteSceneFile(data, "", folder_ / "scene.fulcrum");
-    const scene::SceneFile scene(folder_ / "scene.fulcrum");
     // Beyond 3 s it is not what it was.
     testing::CartStory story{.seconds = 3.2};
     story.tool_change = [](ToolState* tools) {
       if (tools->stamp.sequence > 3000) tools->tools[0].p_WT.x() += 1e-3f;
       return true;
     };
-    testing::RecordCart(scene.view(), folder_, story);
+    session_ = std::make_unique<testing::ShortSession>("console_test", story, [](scene::SceneData*) {});
   }
-  static void TearDownTestSuite() { std::filesystem::remove_all(folder_); }
+  static void TearDownTestSuite() { session_.reset(); }
 
   struct Answer {
     std::string text;
     int code = -1;
   };
   static Answer Ask(const std::string& commands, const std::string& into = "physics") {
-    fulcrum::testing::Program program("replayer", {(folder_ / "recording.mcap").string(), "--into", into, "--console"},
-                                      commands);
+    fulcrum::testing::Program program("replayer", {session_->recording(), "--into", into, "--console"}, commands);
     for (int i = 0; i < 600; ++i) {
       if (const auto code = program.Poll()) return {program.Said(), *code};
       ::usleep(50'000);
@@ -46,9 +38,9 @@ class ConsoleTest : public ::testing::Test {
     return {program.Said(), -1};
   }
 
-  static std::filesystem::path folder_;
+  static std::unique_ptr<testing::ShortSession> session_;
 };
-std::filesystem::path ConsoleTest::folder_;
+std::unique_ptr<testing::ShortSession> ConsoleTest::session_;
 
 TEST_F(ConsoleTest, Steps) {
   const Answer answer = Ask("step\nstep 9\nquit\n");

@@ -1,5 +1,6 @@
 // A node that computes nothing: the supervisor's tests start it under the names of the real ones. What it does besides
-// is told by a file <session>/../<node name>.do: "crash" (abort at once), "exit N", "hang" (in the step), "mismatch".
+// is told by a file <session>/../<node name>.do: "crash" (abort at once), "exit N", "hang" (in the step), "mismatch",
+// "flicker" (degraded every other 0.1 s of the session).
 #include <unistd.h>
 
 #include <chrono>
@@ -16,6 +17,7 @@
 namespace {
 
 using fulcrum::ExitCode;
+using fulcrum::HealthState;
 using fulcrum::NodeId;
 
 NodeId IdOf(const std::string& program) {
@@ -53,7 +55,7 @@ int main(int argc, char** argv) {
     (void)app.options().TakeValue("--quality", "auto");
     auto& frames = app.MakeOutput<fulcrum::TissueFrame>();
     (void)app.MakeInput<fulcrum::TissueFrame>();
-    std::uint64_t sequence = 0;
+    std::uint64_t sequence = 0, reports = 0;
     return app.Run(
         {.name = "fake", .period_ns = 10'000'000},
         [&](const fulcrum::Tick& tick) {
@@ -71,6 +73,10 @@ int main(int argc, char** argv) {
         [&](fulcrum::Health* health) {
           if (node == NodeId::kPhysics) {
             health->metrics.push_back({"max_displacement_mm", 12.5});
+          }
+          if (order == "flicker" && ++reports % 2 == 0 && health->state == HealthState::kRunning) {
+            health->state = HealthState::kDegraded;
+            health->last_error = "a plug is loose";
           }
         });
   });

@@ -281,6 +281,73 @@ TEST_F(SupervisorTest, StatusRestartAndDownReachTheSupervisor) {
   EXPECT_EQ(Wait(&nothing).exit_code, 2) << Log();
 }
 
+TEST_F(SupervisorTest, ADegradedNodeHasTheNewestPastDumpedOnce) {
+  fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "recorder", folder_ / "bin" / "recorder");
+  Order(NodeId::kThermal, "flicker");
+  ChildProcess up = Up({"--seconds", "1.5", "--keep-last", "30"});
+  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
+  EXPECT_EQ(Count(NodeLog(NodeId::kRecorder), "dump.mcap: thermal_node is degraded: a plug is loose"), 1u)
+      << NodeLog(NodeId::kRecorder);
+  EXPECT_TRUE(fs::exists(Session() / "dump.mcap"));
+  EXPECT_FALSE(fs::exists(Session() / "dump-2.mcap")) << "it turned well and ill again within the 30 s of the first";
+}
+
+TEST_F(SupervisorTest, ADegradedNodeAfterACommandIsNoFault) {
+  fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "recorder", folder_ / "bin" / "recorder");
+  ChildProcess up = Up({"--keep-last", "30"});
+  ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
+  Order(NodeId::kThermal, "flicker");
+  ChildProcess restart = Fulcrum({"restart", "thermal_node"});
+  EXPECT_EQ(Wait(&restart).exit_code, 0) << Log();
+  ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 2); })) << Log();
+  std::this_thread::sleep_for(500ms);
+  up.Signal(SIGINT);
+  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
+  EXPECT_FALSE(fs::exists(Session() / "dump.mcap")) << NodeLog(NodeId::kRecorder);
+}
+
+// Another build of a node is run in its place; what cannot be run leaves everything as it is, and what ends before it
+// was ever heard of is replaced by what was there.
+TEST_F(SupervisorTest, SwapReplacesANodeAndABadReplacementGivesItBack) {
+  const fs::path other = folder_ / "other" / NodeName(NodeId::kThermal);
+  fs::create_directory(folder_ / "other");
+  fs::create_symlink(fs::path(FULCRUM_BIN_DIR) / "supervisor_fake_node", other);
+  ChildProcess up = Up();
+  ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
+  const std::vector<pid_t> before = PidsOf(NodeId::kThermal);
+  ASSERT_EQ(before.size(), 1u);
+
+  ChildProcess nonsense = Fulcrum({"swap", "thermal_node", "--with", "/nonexistent"});
+  EXPECT_EQ(Wait(&nonsense).exit_code, 1) << Log();
+  EXPECT_NE(Log().find("/nonexistent: cannot be run; nothing was changed"), std::string::npos) << Log();
+  EXPECT_EQ(PidsOf(NodeId::kThermal), before);
+
+  ChildProcess swap = Fulcrum({"swap", "thermal_node", "--with", other.string()});
+  EXPECT_EQ(Wait(&swap).exit_code, 0) << Log();
+  ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 2); })) << Log();
+  EXPECT_TRUE(PidsOf(NodeId::kThermal).empty()) << "the other build runs, and nothing else";
+  EXPECT_EQ(Count(Log(), "thermal_node was replaced by command"), 1u) << Log();
+
+  ChildProcess bad = Fulcrum({"swap", "thermal_node", "--with", "/bin/false"});
+  EXPECT_EQ(Wait(&bad).exit_code, 0) << Log();
+  ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 3); })) << Log();
+  EXPECT_NE(Log().find("thermal_node was replaced by /bin/false, which ended with exit code 1"), std::string::npos)
+      << Log();
+  EXPECT_NE(Log().find("the one before comes back"), std::string::npos) << Log();
+
+  const fs::path text = folder_ / "other" / "text";
+  std::ofstream(text) << "not a program";
+  fs::permissions(text, fs::perms::owner_all);
+  ChildProcess worse = Fulcrum({"swap", "thermal_node", "--with", text.string()});
+  EXPECT_EQ(Wait(&worse).exit_code, 0) << Log();
+  ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 4); })) << Log();
+  EXPECT_NE(Log().find("cannot start " + text.string()), std::string::npos) << Log();
+
+  up.Signal(SIGINT);
+  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
+  EXPECT_EQ(SharedMemory(), std::vector<std::string>{});
+}
+
 TEST_F(SupervisorTest, ScriptThatAsksForACutWithoutOneIsAFailure) {
   scene::SceneData data = TinyScene(1u << static_cast<unsigned>(NodeId::kPhysics));
   data.fixed.script_duration_s = 4;

@@ -13,9 +13,8 @@ namespace {
 
 TEST(ReplayOfTheCart, ComesToTheSameStatesThroughKillsAndATakeover) {
   testing::Cart cart("small", 57, {"--record", "--standby"});
-  // While it pulls, and then cuts.
-  ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.Said().find("t 1.") != std::string::npos; })) << cart.Said();
-  std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+  // While it pulls and cuts.
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.PictureTime() >= 2.4; })) << cart.Said();
   for (const char* node : {"haptics_node", "thermal_node", "physics_node"}) {
     const auto nodes = cart.nodes();
     ASSERT_TRUE(nodes.contains(node)) << cart.Said();
@@ -27,6 +26,9 @@ TEST(ReplayOfTheCart, ComesToTheSameStatesThroughKillsAndATakeover) {
   EXPECT_EQ(run.exit_code, 0) << run.said;
   EXPECT_GT(run.figures.at("physics_node.compared"), 400) << run.said;
   EXPECT_GT(run.figures.at("thermal_node.compared"), 400) << run.said;
+  // Each death is in the recording: physics went over to the one that followed, the others were started again.
+  // On a machine that holds a leader up for longer than its deadline it goes over once more.
+  EXPECT_GE(run.figures.at("physics_node.starts"), 2) << run.said;
   EXPECT_EQ(run.figures.at("thermal_node.starts"), 2) << run.said;
   EXPECT_EQ(run.figures.at("haptics_node.starts"), 2) << run.said;
 }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <vector>
 
@@ -77,6 +78,58 @@ TEST(InProcess, TwoWritersOfOneTopicAreFollowedApart) {
   }
   EXPECT_EQ(in->stats().received, 8u);
   EXPECT_EQ(in->stats().lost, 3u);
+}
+
+// Of a process that was replaced nothing is taken any more, whether it was stopped and goes on or is served late.
+TEST(InProcess, ALaterProcessShutsOutTheEarlierOne) {
+  InProcessTopic<ToolState> topic;
+  auto before = topic.MakeOutput();
+  auto after = topic.MakeOutput();
+  auto in = topic.MakeInput(8);
+  before->Write(MakeTool(1, 10));
+  after->Write(MakeTool(1, 20));
+  before->Write(MakeTool(2, 10));
+  ToolState got;
+  ASSERT_TRUE(in->TakeNext(&got));
+  EXPECT_EQ(got.stamp.epoch, 10u);
+  ASSERT_TRUE(in->TakeNext(&got));
+  EXPECT_EQ(got.stamp.epoch, 20u);
+  EXPECT_FALSE(in->TakeNext(&got));
+  EXPECT_EQ(in->stats().rejected, 1u);
+  EXPECT_EQ(in->stats().lost, 0u);
+  before->Write(MakeTool(3, 10));
+  after->Write(MakeTool(2, 20));
+  before->Write(MakeTool(4, 10));
+  ASSERT_TRUE(in->TakeLatest(&got));
+  EXPECT_EQ(got.stamp.epoch, 20u) << "not the newest that came, but the newest of the owner";
+  EXPECT_EQ(in->stats().rejected, 3u);
+}
+
+TEST(InputAccount, OfOneOwnerOnlyTheLatestEpochCounts) {
+  InputAccount account(true, true);
+  EXPECT_TRUE(account.IsOfOwner({1, 10, 0}));
+  EXPECT_TRUE(account.IsOfOwner({2, 10, 0}));
+  EXPECT_TRUE(account.IsOfOwner({1, 11, 0}));
+  EXPECT_FALSE(account.IsOfOwner({3, 10, 0}));
+  EXPECT_TRUE(account.IsOfOwner({2, 11, 0})) << "the refused one is forgotten";
+}
+
+TEST(InputAccount, OfSeveralOwnersEachEpochCounts) {
+  InputAccount account(true, false);
+  EXPECT_TRUE(account.IsOfOwner({1, 20, 0}, 30));
+  EXPECT_TRUE(account.IsOfOwner({1, 10, 0}, 30));
+  EXPECT_TRUE(account.IsOfOwner({1, 40, 0}, 30)) << "nobody can be shut out";
+}
+
+TEST(InputAccount, AnEpochOfTheFutureIsNobodysAndShutsNobodyOut) {
+  constexpr std::int64_t kNow = 1000;
+  InputAccount account(true, true);
+  EXPECT_TRUE(account.IsOfOwner({1, 10, 0}, kNow));
+  EXPECT_FALSE(account.IsOfOwner({1, kNow + 1, 0}, kNow));
+  EXPECT_FALSE(account.IsOfOwner({1, std::numeric_limits<std::uint64_t>::max(), 0}, kNow));
+  EXPECT_TRUE(account.IsOfOwner({2, 10, 0}, kNow));
+  EXPECT_TRUE(account.IsOfOwner({1, kNow, 0}, kNow)) << "begun just now";
+  EXPECT_FALSE(account.IsOfOwner({1, std::numeric_limits<std::uint64_t>::max(), 0})) << "no clock is so late";
 }
 
 TEST(InProcess, GateDropsAndCounts) {

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "services/bus/security.h"
 #include "services/core/error.h"
 
 namespace fulcrum::bus {
@@ -76,6 +77,38 @@ TEST_F(SharedMemory, SweepRemovesOnlyWhatTheDeadLeft) {
   EXPECT_FALSE(fs::exists(dead));
   EXPECT_TRUE(fs::exists(own));
   EXPECT_TRUE(fs::exists(directory_ / "something_else"));
+}
+
+TEST_F(SharedMemory, SweepKnowsSecuredOwnersByTheirClaims) {
+  PrepareSharedMemory(directory_);
+  const std::string ours = "9f.01.02.03.04.05.06.07.08.09.0a.0b", theirs = "9f.01.02.03.04.05.aa.bb.cc.dd.ee.ff";
+  const auto touch = [this](const std::string& address) {
+    std::ofstream(directory_ / ("fast_datasharing_" + address + "|0.0.1.3")) << "payload";
+  };
+  const pid_t child = fork();
+  if (child == 0) {
+    ClaimSharedMemory(directory_, theirs);
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  ClaimSharedMemory(directory_, ours);
+  touch(ours);
+  touch(theirs);
+  EXPECT_EQ(SweepSharedMemory(directory_).files, 2) << "of the dead process its file and its claim";
+  EXPECT_TRUE(fs::exists(directory_ / ("fast_datasharing_" + ours + "|0.0.1.3")));
+  EXPECT_FALSE(fs::exists(directory_ / ("fast_datasharing_" + theirs + "|0.0.1.3")));
+}
+
+TEST_F(SharedMemory, TellsHowTheSessionIsSecured) {
+  PrepareSharedMemory(directory_);
+  EXPECT_FALSE(AnnouncedSecurity(directory_, "fulcrum").on());
+  AnnounceSecurity(directory_, {"/some where/keys", "supervisor", true});
+  const Security told = AnnouncedSecurity(directory_, "fulcrum");
+  EXPECT_EQ(told.keys, "/some where/keys");
+  EXPECT_EQ(told.identity, "fulcrum");
+  EXPECT_TRUE(told.encrypt);
+  AnnounceSecurity(directory_, {});
+  EXPECT_FALSE(AnnouncedSecurity(directory_, "fulcrum").on()) << "the word of an earlier session";
 }
 
 TEST_F(SharedMemory, RemoveTakesAllAndTheDirectory) {

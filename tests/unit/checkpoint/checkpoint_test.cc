@@ -93,6 +93,49 @@ TEST_F(CheckpointTest, NewestSequenceIsSeenFromOutside) {
   EXPECT_EQ(NewestSequence(folder_ / "other"), 0u);
 }
 
+TEST_F(CheckpointTest, PeekReadsTheNewestWholeSlotOfAFileThatIsInUse) {
+  EXPECT_FALSE(CheckpointFile::Peek(file_, kScene, kLayout, 800)) << "no file";
+  CheckpointFile checkpoint(file_, kScene, kLayout, 800);
+  EXPECT_FALSE(CheckpointFile::Peek(file_, kScene, kLayout, 800)) << "nothing in it";
+  // Either slot may be the newest.
+  for (const std::uint64_t value : {1, 2, 3}) {
+    Write(&checkpoint, value, 20 * value);
+    const auto peeked = CheckpointFile::Peek(file_, kScene, kLayout, 800);
+    ASSERT_TRUE(peeked);
+    EXPECT_EQ(peeked->size(), 160 * value);
+    EXPECT_TRUE(Matches(*peeked, value));
+  }
+  // Its process is stopped in the middle of the next.
+  const auto slot = checkpoint.Begin();
+  std::memset(slot.data(), 0xff, 400);
+  const auto peeked = CheckpointFile::Peek(file_, kScene, kLayout, 800);
+  ASSERT_TRUE(peeked);
+  EXPECT_TRUE(Matches(*peeked, 3));
+  checkpoint.Commit(400);
+  EXPECT_EQ(checkpoint.Latest()->sequence, 4u) << "whoever looked has left nothing";
+}
+
+TEST_F(CheckpointTest, PeekTakesNothingThatIsAlteredOrOfAnother) {
+  {
+    CheckpointFile checkpoint(file_, kScene, kLayout, 800);
+    Write(&checkpoint, 1, 100);
+    Write(&checkpoint, 2, 100);
+  }
+  EXPECT_FALSE(CheckpointFile::Peek(file_, kScene + 1, kLayout, 800));
+  EXPECT_FALSE(CheckpointFile::Peek(file_, kScene, kLayout + 1, 800));
+  EXPECT_FALSE(CheckpointFile::Peek(file_, kScene, kLayout, 808));
+  FlipByte(4 * 4096 + 17);  // The payload of slot 1.
+  const auto peeked = CheckpointFile::Peek(file_, kScene, kLayout, 800);
+  ASSERT_TRUE(peeked);
+  EXPECT_TRUE(Matches(*peeked, 1));
+  FlipByte(2 * 4096 + 17);
+  EXPECT_FALSE(CheckpointFile::Peek(file_, kScene, kLayout, 800));
+  std::filesystem::resize_file(file_, 4096);
+  EXPECT_FALSE(CheckpointFile::Peek(file_, kScene, kLayout, 800)) << "cut after its header";
+  std::ofstream(folder_ / "other") << "not a checkpoint, but as long as the header of one";
+  EXPECT_FALSE(CheckpointFile::Peek(folder_ / "other", kScene, kLayout, 800));
+}
+
 TEST_F(CheckpointTest, UnsealedSlotLeavesTheOlderOne) {
   {
     CheckpointFile checkpoint(file_, kScene, kLayout, 800);

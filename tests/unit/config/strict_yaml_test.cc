@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -60,6 +61,25 @@ std::string Refusal(const std::function<void()>& body) {
     return e.what();
   }
   return "accepted";
+}
+
+TEST(StrictYaml, TellsTheRulesOfEveryKeyThatWasAskedFor) {
+  StrictYaml file = StrictYaml::FromText("# how it is\nstiffness: 0.5\n", "rules.yaml");
+  Read(&file);
+  const std::vector<KeyRule> rules = file.Rules();
+  const auto rule = [&](const std::string& path) {
+    const auto found = std::find_if(rules.begin(), rules.end(), [&](const KeyRule& r) { return r.path == path; });
+    return found == rules.end() ? KeyRule{"none", 0, std::nullopt, ""} : *found;
+  };
+  EXPECT_EQ(rule("stiffness").line, 2);
+  EXPECT_EQ(rule("stiffness").standard, "0.8") << "its default, whatever the file says";
+  EXPECT_EQ(rule("stiffness").valid, "above 0 up to 1");
+  EXPECT_EQ(rule("thickness_mm").line, 0);
+  EXPECT_EQ(rule("thickness_mm").standard, "0.3");
+  EXPECT_EQ(rule("thickness_mm").valid, "0.05 to 5 mm");
+  EXPECT_EQ(rule("mode").valid, "paper, accurate");
+  EXPECT_EQ(rule("tip_mm").standard, "[0, 0, 200]");
+  EXPECT_EQ(rule("iterations").valid, "an integer from 1 to 100");
 }
 
 TEST(StrictYaml, ReadsValuesInTheirUnits) {

@@ -97,6 +97,21 @@ TEST_F(RecorderTest, KeepsTopicsAndWritersApartAndTellsOfThem) {
   EXPECT_EQ(read[0].log_time_ns, static_cast<std::uint64_t>(offset + 5 * kMs));
 }
 
+TEST_F(RecorderTest, LargeTopicsHaveChunksOfTheirOwn) {
+  {
+    Recorder recorder(Settings());
+    for (std::uint64_t i = 1; i <= 20; ++i) {
+      const auto now = static_cast<std::int64_t>(i) * kMs;
+      Send(&recorder, TopicId::kToolState, 1, i, 168, now);
+      if (i % 5 == 0) Send(&recorder, TopicId::kTissueFrame, 2, i / 5, 3000, now);
+    }
+    recorder.Close(30 * kMs);
+  }
+  McapReader reader(folder_ / "recording.mcap");
+  reader.PassOver([](const recording::McapChannel& channel) { return channel.topic != "fulcrum/TissueFrame"; });
+  EXPECT_EQ(ReadAll(&reader).size(), 20u) << "no frame came with the tools";
+}
+
 TEST_F(RecorderTest, EverySchemaIsThere) {
   {
     Recorder recorder(Settings());

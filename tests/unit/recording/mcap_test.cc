@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 #include <random>
 #include <string>
@@ -11,6 +12,7 @@
 #include "services/recording/byte_stream.h"
 #include "services/recording/mcap_reader.h"
 #include "services/recording/mcap_writer.h"
+#include "services/recording/time_order.h"
 
 namespace fulcrum::recording {
 namespace {
@@ -105,6 +107,70 @@ TEST_F(McapTest, AMessageMayBeLargerThanAChunk) {
   ASSERT_EQ(read.size(), 2u);
   EXPECT_EQ(read[0].data, large);
   EXPECT_TRUE(read[1].data.empty());
+}
+
+/// Three chunks: frames of 5 and 15 ms, tools of 1 … 20 ms, frames of 25 ms.
+void FillApart(McapWriter* writer) {
+  const std::uint16_t frame = writer->AddChannel(0, "frame", "cdr", {});
+  const std::uint16_t tool = writer->AddChannel(0, "tool", "cdr", {});
+  const auto write = [&](std::uint16_t channel, std::uint64_t ms, std::size_t size) {
+    const Bytes data(size, static_cast<std::uint8_t>(ms));
+    writer->Write(channel, static_cast<std::uint32_t>(ms), ms * 1'000'000, 0, std::as_bytes(std::span(data)));
+  };
+  write(frame, 5, 1000);
+  write(frame, 15, 1000);
+  writer->EndChunk();
+  for (std::uint64_t ms = 1; ms <= 20; ++ms) write(tool, ms, 10);
+  writer->EndChunk();
+  write(frame, 25, 1000);
+}
+
+TEST_F(McapTest, ChunksThatOverlapInTimeAreReadByTime) {
+  {
+    McapWriter writer(file_, "", "");
+    FillApart(&writer);
+  }
+  TimeOrder messages(file_);
+  McapMessage message{};
+  std::uint64_t last_ns = 0;
+  int count = 0, frames = 0;
+  while (messages.Next(&message)) {
+    EXPECT_GE(message.log_time_ns, last_ns);
+    last_ns = message.log_time_ns;
+    const bool is_frame = messages.reader().channels().at(message.channel).topic == "frame";
+    EXPECT_EQ(message.data.size(), is_frame ? 1000u : 10u);
+    EXPECT_EQ(message.data[0], message.log_time_ns / 1'000'000);
+    ++count;
+    frames += is_frame ? 1 : 0;
+  }
+  EXPECT_EQ(count, 23);
+  EXPECT_EQ(frames, 3);
+}
+
+TEST_F(McapTest, ChunksThatNobodyWantsAreNotUnpacked) {
+  {
+    McapWriter writer(file_, "", "");
+    FillApart(&writer);
+  }
+  // Whoever unpacks the first chunk finds it damaged.
+  Bytes bytes = FileBytes();
+  const Bytes zstd{0x28, 0xb5, 0x2f, 0xfd};
+  const auto packed = std::search(bytes.begin(), bytes.end(), zstd.begin(), zstd.end());
+  ASSERT_NE(packed, bytes.end());
+  packed[8] ^= 0xff;
+  Put(bytes);
+  McapReader all(file_);
+  EXPECT_EQ(Read(&all).size(), 21u);
+  EXPECT_EQ(all.faults().size(), 1u);
+
+  McapReader reader(file_);
+  reader.PassOver([](const McapChannel& channel) { return channel.topic == "tool"; });
+  const std::vector<Sample> read = Read(&reader);
+  ASSERT_EQ(read.size(), 20u);
+  for (const Sample& sample : read) EXPECT_EQ(sample.topic, "tool");
+  EXPECT_EQ(reader.last_ns(), 25'000'000u) << "what was passed over counts all the same";
+  EXPECT_TRUE(reader.closed());
+  EXPECT_TRUE(reader.faults().empty());
 }
 
 TEST_F(McapTest, AfterAKillItReadsUpToTheLastChunk) {

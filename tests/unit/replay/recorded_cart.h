@@ -60,6 +60,7 @@ struct CartStory {
   int threads = 1;                                       ///< Of physics.
   std::function<bool(ToolState*)> tool_change{};         ///< Of what is recorded only.
   std::function<bool(TickManifest*)> manifest_change{};  ///< The same.
+  bool record_frames = true;                             ///< TissueFrame is most of the bytes.
 };
 
 /// Runs and records it into `folder`/recording.mcap. Returns the length that was cut [m].
@@ -191,7 +192,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     manifests.Record(now, story.manifest_change);
     tools.Record(now, story.tool_change);
     handles.Record(now);
-    frames.Record(now);
+    frames.Record(now, [&](TissueFrame*) { return story.record_frames; });
     models.Record(now);
     cautery.Record(now);
     topology.Record(now);

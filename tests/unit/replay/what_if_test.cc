@@ -28,7 +28,7 @@ class WhatIfTest : public ::testing::Test {
     const scene::SceneData data = scene::BuildScene(description.settings, {});
     scene::WriteSceneFile(data, description.effective_yaml, folder_ / "scene");
     scene_ = std::make_unique<scene::SceneFile>(folder_ / "scene");
-    testing::RecordCart(scene_->view(), folder_, {.seconds = 3.2});
+    cut_m_ = testing::RecordCart(scene_->view(), folder_, {.seconds = 3.2});
   }
   static void TearDownTestSuite() {
     scene_.reset();
@@ -43,8 +43,10 @@ class WhatIfTest : public ::testing::Test {
 
   static std::filesystem::path folder_;
   static std::unique_ptr<scene::SceneFile> scene_;
+  static float cut_m_;  ///< As recorded.
 };
 std::filesystem::path WhatIfTest::folder_;
+float WhatIfTest::cut_m_ = 0;
 std::unique_ptr<scene::SceneFile> WhatIfTest::scene_;
 
 TEST_F(WhatIfTest, NothingChangedIsNoDifference) {
@@ -70,6 +72,18 @@ TEST_F(WhatIfTest, AWeakGeneratorCutsLess) {
   EXPECT_LT(result.cut_length_mm.after, result.cut_length_mm.before);
   EXPECT_GT(result.max_position_mm, 0) << "what is not cut moves otherwise: physics is fed by thermal";
   EXPECT_NE(ReportText(result, {NodeId::kPhysics, NodeId::kThermal}).find("cut length"), std::string::npos);
+}
+
+// Open loop: the hook goes where it went, through tissue that takes longer to boil.
+TEST_F(WhatIfTest, TissueThatTakesMoreHeatIsCutLess) {
+  const WhatIfResult result = WhatIf({"thermal.latent_heat_J_m3=2.3e9"}, {NodeId::kThermal});
+  EXPECT_EQ(result.missing, "");
+  EXPECT_EQ(result.first_node, NodeId::kThermal);
+  EXPECT_GT(result.first_difference_s, 2.0) << "the pedal is up before";
+  EXPECT_FLOAT_EQ(static_cast<float>(result.cut_length_mm.before), 1e3f * cut_m_) << "as it was recorded";
+  EXPECT_LT(result.cut_length_mm.after, 0.95 * result.cut_length_mm.before);
+  EXPECT_GT(result.cut_length_mm.after, 1);
+  EXPECT_EQ(result.frames, 0u) << "nothing but thermal was replayed";
 }
 
 TEST_F(WhatIfTest, BadChangesAreNamed) {

@@ -234,6 +234,29 @@ TEST(SceneYamlImport, RulesOfTheImport) {
   std::filesystem::remove_all(folder);
 }
 
+TEST(SceneChanges, AreMadeBeforeTheSceneIsRead) {
+  const SceneDescription changed = ReadSceneYaml(
+      kScenes / "small.yaml", {}, {"script.power_W=50", "render.png_rate_Hz=5", "physics.grip_force_N=4"});
+  float most = 0;
+  for (const ScriptKeySettings& key : changed.settings.script) {
+    EXPECT_EQ(key.power_W, key.pedals == kPedalNone ? 0 : 50);
+    most = std::max(most, static_cast<float>(key.power_W));
+  }
+  EXPECT_EQ(most, 50);
+  EXPECT_EQ(changed.settings.render.png_rate_Hz, 5);
+  EXPECT_EQ(changed.settings.physics.grip_force_N, 4);
+  EXPECT_NE(changed.effective_yaml.find("power_W: 50"), std::string::npos);
+  EXPECT_EQ(changed.effective_yaml.find("power_W: 35"), std::string::npos);
+}
+
+TEST(SceneChanges, ThatCannotBeAreRefused) {
+  for (const char* change :
+       {"power=3", "script.duration_s=3", "organ.density_kg_m3=1", "physics.nothing=1", "script.power_W=1000",
+        "render.png_rate_Hz=x", "physics.=1", "=", "physics.grip_force_N=["}) {
+    EXPECT_THROW((void)ReadSceneYaml(kScenes / "small.yaml", {}, {change}), InputError) << change;
+  }
+}
+
 TEST(SceneYaml, BreathingIsOptionalAndCompiled) {
   const std::string small = TextOf(kScenes / "small.yaml");
   EXPECT_EQ(ParseSceneYaml(small, "x.yaml", {}).settings.breathing.amplitude_m, 0.0f);

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "services/core/error.h"
+#include "services/supervisor/attached_node.h"
 #include "services/supervisor/child_process.h"
 #include "services/supervisor/clip.h"
 #include "services/supervisor/outcome.h"
@@ -42,6 +43,113 @@ class Folder {
  private:
   fs::path path_;
 };
+
+// ------------------------------------------------------------------------------------------------- attached node
+
+/// A node that somebody else runs: here a process that only sleeps.
+class AttachedNodeTest : public ::testing::Test {
+ protected:
+  AttachedNodeTest() : node_(Command(), folder_.path() / "nodes", [this](NodeId, const char* verb) { order_ = verb; }) {
+    node_.Start(kStart);
+  }
+  static NodeCommand Command() {
+    NodeCommand command;
+    command.id = NodeId::kPhysics;
+    command.arguments = {"--scene", "/run/scene.fulcrum"};
+    return command;
+  }
+  ChildProcess Sleeper() const { return ChildProcess::Start("/bin/sleep", {"600"}, folder_.path() / "log"); }
+  bool Report(pid_t pid, HealthState state = HealthState::kRunning) {
+    Health health;
+    health.node = NodeId::kPhysics;
+    health.pid = pid;
+    health.state = state;
+    return node_.OnHealth(health, kStart);
+  }
+  static void Kill(ChildProcess* process) {
+    process->Signal(SIGKILL);
+    while (!process->Poll()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+
+  static constexpr std::int64_t kStart = 1'000'000'000'000;
+  Folder folder_;
+  std::string order_;
+  AttachedNode node_;
+};
+
+TEST_F(AttachedNodeTest, WritesWhatItsServiceIsGiven) {
+  std::ifstream file(folder_.path() / "nodes" / "physics_node");
+  std::string line;
+  std::getline(file, line);
+  EXPECT_EQ(line, "FULCRUM_ARGUMENTS=\"--scene /run/scene.fulcrum\"");
+  EXPECT_THROW((void)AttachedNode::ArgumentsFile({"--file", "/my recordings/a.mcap"}), InputError);
+  EXPECT_THROW((void)AttachedNode::ArgumentsFile({"$HOME"}), InputError);
+  node_.Stop();
+  EXPECT_FALSE(fs::exists(folder_.path() / "nodes" / "physics_node")) << "it would be started after the session";
+}
+
+TEST_F(AttachedNodeTest, NoticesADeathAndTheReturn) {
+  ChildProcess first = Sleeper(), other = Sleeper();
+  EXPECT_TRUE(Report(first.pid()));
+  EXPECT_FALSE(Report(other.pid())) << "the first one lives";
+  EXPECT_FALSE(node_.Update(kStart).has_value());
+  const pid_t dead = first.pid();
+  Kill(&first);
+  EXPECT_FALSE(node_.Update(kStart).has_value()) << "it may have said that it ends";
+  const auto death = node_.Update(kStart + 300 * kMs);
+  ASSERT_TRUE(death.has_value());
+  EXPECT_FALSE(death->for_good);
+  EXPECT_FALSE(death->asked);
+  EXPECT_EQ(death->at_ns, kStart);
+  EXPECT_FALSE(node_.running());
+  EXPECT_FALSE(Report(dead)) << "a late sample of the dead one";
+  EXPECT_FALSE(node_.Update(kStart + 400 * kMs).has_value()) << "told once";
+  EXPECT_TRUE(Report(other.pid()));
+  EXPECT_TRUE(node_.running());
+}
+
+TEST_F(AttachedNodeTest, DoesNotWaitForLastWordsWhenTheNextOneSpeaks) {
+  ChildProcess first = Sleeper(), second = Sleeper();
+  ASSERT_TRUE(Report(first.pid()));
+  Kill(&first);
+  EXPECT_FALSE(node_.Update(kStart).has_value());
+  EXPECT_FALSE(Report(second.pid())) << "the death is told first";
+  EXPECT_TRUE(node_.Update(kStart).has_value());
+  EXPECT_TRUE(Report(second.pid()));
+}
+
+TEST_F(AttachedNodeTest, LastWordsMayComeAfterTheEnd) {
+  ChildProcess first = Sleeper();
+  ASSERT_TRUE(Report(first.pid()));
+  const pid_t dead = first.pid();
+  Kill(&first);
+  EXPECT_FALSE(node_.Update(kStart).has_value());
+  EXPECT_TRUE(Report(dead, HealthState::kStopping));
+  EXPECT_FALSE(node_.Update(kStart + 300 * kMs).has_value()) << "it was stopped, it did not die";
+}
+
+TEST_F(AttachedNodeTest, OneThatWasStoppedIsReportedWhenItIsBack) {
+  ChildProcess first = Sleeper(), second = Sleeper();
+  node_.AskRestart(kStart);
+  EXPECT_EQ(order_, "restart");
+  ASSERT_TRUE(Report(first.pid()));
+  ASSERT_TRUE(Report(first.pid(), HealthState::kStopping));
+  Kill(&first);
+  EXPECT_FALSE(node_.Update(kStart).has_value());
+  ASSERT_TRUE(Report(second.pid()));
+  const auto death = node_.Update(kStart + kMs);
+  ASSERT_TRUE(death.has_value());
+  EXPECT_TRUE(death->asked);
+  EXPECT_EQ(death->at_ns, kStart) << "how long it took to come back counts from its end";
+}
+
+TEST_F(AttachedNodeTest, HasFailedForGoodWhenItStaysAway) {
+  EXPECT_FALSE(node_.Update(kStart + 59'000 * kMs).has_value());
+  const auto death = node_.Update(kStart + 61'000 * kMs);
+  ASSERT_TRUE(death.has_value());
+  EXPECT_TRUE(death->for_good);
+  EXPECT_TRUE(node_.failed());
+}
 
 // ------------------------------------------------------------------------------------------------ restart policy
 

@@ -1,0 +1,70 @@
+// Who may write and read what: the one table that the permissions of a secured cart are made from (services/keys).
+// A port that is not here is refused on such a cart; the test of a whole session with security on holds the two
+// together (tests/integration/security).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+#include "services/core/messages.h"
+
+namespace fulcrum::bus {
+
+/// Bits of TopicId.
+using TopicSet = std::uint32_t;
+static_assert(kTopicCount <= 32);
+
+template <class... Ids>
+[[nodiscard]] constexpr TopicSet SetOf(Ids... ids) {
+  return (TopicSet{0} | ... | (TopicSet{1} << static_cast<unsigned>(ids)));
+}
+[[nodiscard]] constexpr bool Contains(TopicSet set, TopicId id) { return (set >> static_cast<unsigned>(id) & 1u) != 0; }
+
+struct AccessRole {
+  std::string_view identity;  ///< Subject of the certificate; for a node its name.
+  TopicSet writes;
+  TopicSet reads;
+};
+
+/// Participants that are no node.
+inline constexpr std::string_view kToolIdentity = "fulcrum";       ///< status, top, restart, swap, dump, down, console.
+inline constexpr std::string_view kReplayerIdentity = "replayer";  ///< Stands in for nodes: replayer --live.
+
+namespace access {
+using enum TopicId;
+inline constexpr TopicSet kAll = (TopicSet{1} << kTopicCount) - 1;
+/// What services/app does for every node.
+inline constexpr TopicSet kNodeWrites = SetOf(kCommandReply, kHealth);
+inline constexpr TopicSet kNodeReads = SetOf(kSceneManifest, kCommand);
+
+inline constexpr std::array kRoles{
+    AccessRole{"supervisor", SetOf(kSceneManifest, kCommand, kCommandReply, kHealth),
+               SetOf(kCommand, kThermalEvent, kHealth, kToolState, kContactModel, kCauteryContact, kTopologyState,
+                     kTemperaturePatch)},
+    AccessRole{"handle_bridge", kNodeWrites | SetOf(kHandleState), kNodeReads},
+    AccessRole{"haptics_node", kNodeWrites | SetOf(kToolState, kTickManifest), kNodeReads | SetOf(kContactModel)},
+    AccessRole{"physics_node", kNodeWrites | SetOf(kTissueFrame, kContactModel, kCauteryContact, kTickManifest),
+               kNodeReads | SetOf(kToolState, kHandleState, kTopologyState, kTickManifest)},
+    AccessRole{"thermal_node", kNodeWrites | SetOf(kTopologyState, kTemperaturePatch, kThermalEvent, kTickManifest),
+               kNodeReads | SetOf(kCauteryContact)},
+    AccessRole{"render_node", kNodeWrites,
+               kNodeReads | SetOf(kTissueFrame, kTopologyState, kTemperaturePatch, kToolState, kHandleState,
+                                  kThermalEvent, kCauteryContact)},
+    AccessRole{"recorder", kNodeWrites, kAll},
+    AccessRole{kReplayerIdentity, kAll & ~SetOf(kCommand, kCommandReply), 0},
+    AccessRole{kToolIdentity, SetOf(kCommand), SetOf(kSceneManifest, kCommandReply, kThermalEvent, kHealth)},
+};
+}  // namespace access
+
+inline constexpr const auto& kAccessRoles = access::kRoles;
+
+/// nullptr: nobody of that name.
+[[nodiscard]] constexpr const AccessRole* AccessRoleOf(std::string_view identity) {
+  for (const AccessRole& role : kAccessRoles) {
+    if (role.identity == identity) return &role;
+  }
+  return nullptr;
+}
+
+}  // namespace fulcrum::bus

@@ -1,0 +1,54 @@
+#include "services/supervisor/host.h"
+
+#include "services/core/error.h"
+#include "services/link/options.h"
+#include "services/runtime/install_places.h"
+#include "services/supervisor/cli/commands.h"
+
+namespace fulcrum::supervisor::cli {
+
+ExitCode Host(const Words& words) {
+  namespace po = boost::program_options;
+  po::options_description options;
+  options.add_options()("peer", po::value<std::string>()->value_name("ADDR"),
+                        "machine of the cart, which runs fulcrum up --peer (this machine) --remote NODE,...")  //
+      ("nodes", po::value<std::string>()->value_name("NODE,..."),
+       "the only nodes that a cart may run here (default: any)")(
+          "address", po::value<std::string>()->value_name("ADDR"),
+          "own address towards the cart (default: of the interface that leads there)")(
+          "link-domain", po::value<int>()->value_name("N"),
+          "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
+          "out", po::value<std::string>()->value_name("DIR")->default_value("out"), "session folders are made in here")(
+          "cache", po::value<std::string>()->value_name("DIR"), "scenes are kept here by their hash")(
+          "window", "show the picture in a window as well")(
+          "quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),
+          "of the picture: auto, low, high");
+  AddDomain(&options);
+  const Arguments arguments = Parse("host", words, options);
+  if (arguments.help) {
+    return ExitCode::kDone;
+  }
+  const auto& values = arguments.values;
+  if (values.count("peer") == 0) {
+    throw InputError("--peer: on which machine is the cart? see fulcrum help host");
+  }
+  const auto text = [&](const char* name) { return values.count(name) != 0 ? values[name].as<std::string>() : ""; };
+  HostSettings settings;
+  settings.domain = DomainOf(arguments, kDefaultDomain);
+  settings.far = link::FarSettingsFor(bus::FarSide::kHost, text("peer"), text("address"), settings.domain,
+                                      values.count("link-domain") != 0 ? values["link-domain"].as<int>() : 0);
+  if (values.count("nodes") != 0) {
+    settings.allowed = link::NodesFromNames(text("nodes"));
+  }
+  settings.out = text("out");
+  settings.programs = runtime::ProgramFolder();
+  settings.cache = values.count("cache") != 0 ? std::filesystem::path(text("cache")) : SceneCache(settings.programs);
+  settings.window = values.count("window") != 0;
+  settings.quality = text("quality");
+  if (settings.quality != "auto" && settings.quality != "low" && settings.quality != "high") {
+    throw InputError("--quality: \"" + settings.quality + "\"; valid: auto, low, high");
+  }
+  return RunHost(settings);
+}
+
+}  // namespace fulcrum::supervisor::cli

@@ -1,0 +1,74 @@
+// fulcrum test-node: one node, headless, against a recorded log. The program `replayer` holds the node classes, so it
+// makes the test.
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+#include "services/core/error.h"
+#include "services/runtime/install_places.h"
+#include "services/supervisor/cli/commands.h"
+
+namespace fulcrum::supervisor::cli {
+namespace {
+
+namespace po = boost::program_options;
+
+/// Options that replayer knows by the same name.
+constexpr const char* kPassedOn[] = {"expect", "junit", "scene", "cart", "threads", "until"};
+
+[[noreturn]] void Become(const std::filesystem::path& program, const Words& words) {
+  std::vector<char*> pointers{const_cast<char*>(program.c_str())};
+  for (const std::string& word : words) pointers.push_back(const_cast<char*>(word.c_str()));
+  pointers.push_back(nullptr);
+  ::execv(program.c_str(), pointers.data());
+  throw InputError(program.string() + ": cannot be run: " + std::strerror(errno));
+}
+
+}  // namespace
+
+ExitCode TestNode(const Words& words) {
+  po::options_description options;
+  options.add_options()  //
+      ("inputs", po::value<std::string>()->value_name("LOG"),
+       "recording of a session (fulcrum up --record); the node makes its ticks again with the inputs of then")  //
+      ("expect", po::value<std::string>()->value_name("HASH"),
+       "the state hash after the last tick, 16 hexadecimal digits, as an earlier test has printed it")  //
+      ("assert", po::value<std::vector<std::string>>()->value_name("EXPR"),
+       "FIGURE < | <= | == | != | >= | > NUMBER, for example \"cut_length_mm > 30\", over the figures of the node's "
+       "Health (NAME: the last value, NAME.min and NAME.max of the session) and ticks, compared, hash_mismatches, "
+       "starts, session_s, busy_s; as often as needed")                                              //
+      ("junit", po::value<std::string>()->value_name("FILE"), "write the result as JUnit XML, too")  //
+      ("scene", po::value<std::string>()->value_name("FILE"),
+       "compiled scene (default: scene.fulcrum beside the log)")  //
+      ("cart", po::value<std::string>()->value_name("FILE"),
+       "cart configuration (default: cart.yaml beside the log)")  //
+      ("threads", po::value<std::string>()->value_name("N"),
+       "that share a step of physics (default: all cores); the states do not depend on it")  //
+      ("until", po::value<std::string>()->value_name("S"), "end at this session time [s] (default: of the log)");
+  const Arguments arguments = Parse("test-node", words, options, {"node"});
+  if (arguments.help) {
+    std::puts(
+        "Nodes: physics, thermal, haptics, render. Without --expect and --assert each state must be the recorded one.\n"
+        "Exit codes: 0 passed, 1 an assertion failed, 2 bad use or file, 3 the log is of another scene.");
+    return ExitCode::kDone;
+  }
+  const auto& values = arguments.values;
+  if (values.count("node") == 0 || values.count("inputs") == 0) {
+    throw InputError(
+        "which node, and against which log? For example: fulcrum test-node thermal --inputs out/latest/recording.mcap "
+        "--assert \"cut_length_mm > 30\"");
+  }
+  Words command{values["inputs"].as<std::string>(), "--test", values["node"].as<std::string>()};
+  for (const char* name : kPassedOn) {
+    if (values.count(name) != 0) command.push_back(std::string("--") + name + '=' + values[name].as<std::string>());
+  }
+  if (values.count("assert") != 0) {
+    for (const std::string& text : values["assert"].as<std::vector<std::string>>()) {
+      command.push_back("--assert=" + text);
+    }
+  }
+  Become(runtime::ProgramFolder() / "replayer", command);
+}
+
+}  // namespace fulcrum::supervisor::cli

@@ -1,0 +1,106 @@
+// A secured cart: who gets in, and what it costs to join.
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "services/bus/dds/participant.h"
+#include "services/bus/dds/shared_memory.h"
+#include "services/bus/input_account.h"
+#include "services/keys/key_folder.h"
+#include "tests/benchmark/report.h"
+#include "tests/support/intruder.h"
+
+namespace fulcrum {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kDomain = 74, kJoinDomain = 75;
+
+void Attempts(benchmark::Report* report, const fs::path& scratch) {
+  int refused = 0, all = 0;
+  for (const testing::Attempt& attempt : testing::TryAllAttempts(kDomain, scratch)) {
+    ++all;
+    refused += attempt.refused() ? 1 : 0;
+    std::fprintf(stderr, "%s %s: exit code %d of %d, %s, %s: %s\n", attempt.refused() ? "refused" : "NOT REFUSED",
+                 attempt.name.c_str(), attempt.exit_code, attempt.wanted_exit_code,
+                 attempt.came_through ? "came through" : "nothing came through",
+                 attempt.reported ? "reported" : "not reported", attempt.who.c_str());
+  }
+  report->Add("security.refused", 100.0 * refused / all, "%");
+  report->Add("security.attempts", all, "");
+}
+
+/// Who comes anew, from the making of his participant to the first sample of a writer that was there.
+double JoinMs(int domain, const bus::Security& writer, const bus::Security& reader) {
+  const auto now_ns = [] { return std::chrono::steady_clock::now().time_since_epoch().count(); };
+  bus::DdsParticipant there({.domain = domain, .node_name = "supervisor", .security = writer});
+  const auto out = there.MakeOutput<Health>();
+  std::jthread writing([&](const std::stop_token& stop) {
+    bus::Stamper stamper(now_ns());
+    Health health;
+    while (!stop.stop_requested()) {
+      health.stamp = stamper.Next(now_ns());
+      out->Write(health);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  std::this_thread::sleep_for(std::chrono::milliseconds(150));
+  const std::int64_t begin_ns = now_ns();
+  bus::DdsParticipant anew({.domain = domain, .node_name = "fulcrum", .security = reader});
+  const auto in = anew.MakeInput<Health>();
+  Health health;
+  constexpr std::int64_t kPatience_ns = 20'000'000'000;
+  while (!in->TakeNext(&health) && now_ns() - begin_ns < kPatience_ns) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return 1e-6 * static_cast<double>(now_ns() - begin_ns);
+}
+
+void Joining(benchmark::Report* report, const fs::path& keys) {
+  struct Mode {
+    const char* name;
+    bool secured, encrypt;
+  };
+  for (const Mode& mode : {Mode{"off", false, false}, {"on", true, false}, {"encrypted", true, true}}) {
+    const std::string key = std::string("security.join.") + mode.name;
+    if (!report->Wants(key)) continue;
+    const auto as = [&](const char* identity) {
+      return mode.secured ? bus::Security{keys, identity, mode.encrypt} : bus::Security();
+    };
+    std::vector<double> times_ms;
+    for (int i = 0; i < (report->quick() ? 5 : 20); ++i) {
+      times_ms.push_back(JoinMs(kJoinDomain, as("supervisor"), as("fulcrum")));
+    }
+    report->Add(key + ".ms_p50", benchmark::Quantile(times_ms, 0.5), "ms");
+    report->Add(key + ".ms_max", benchmark::Quantile(times_ms, 1), "ms");
+  }
+  bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kJoinDomain));
+}
+
+}  // namespace
+}  // namespace fulcrum
+
+int main(int argc, char** argv) {
+  using namespace fulcrum;
+  benchmark::Report report(argc, argv);
+  if (!report.Wants("security.")) return 0;
+  const fs::path scratch = fs::temp_directory_path() / ("fulcrum-bench-security-" + std::to_string(::getpid()));
+  fs::create_directories(scratch);
+  if (report.Wants("security.join")) {
+    const std::time_t now = std::time(nullptr);
+    keys::MakeKeyFolder(scratch / "join", {now, now + 24 * 3600}, false);
+    Joining(&report, scratch / "join");
+  }
+  if (report.Wants("security.refused") || report.Wants("security.attempts")) Attempts(&report, scratch);
+  fs::remove_all(scratch);
+  bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kDomain));
+  return 0;
+}

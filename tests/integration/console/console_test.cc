@@ -1,0 +1,242 @@
+// `fulcrum console` as a stranger, a page and an operator meet it: a real server, real sessions, a raw client.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+
+#include "services/console/http_server.h"
+#include "services/console/session_run.h"
+#include "tests/support/cart.h"
+#include "tests/support/http_client.h"
+
+namespace fulcrum::console {
+namespace {
+
+namespace fs = std::filesystem;
+using fulcrum::testing::ConsoleProgram;
+using fulcrum::testing::HttpConnection;
+using fulcrum::testing::HttpReply;
+using fulcrum::testing::ReadFile;
+using fulcrum::testing::WaitFor;
+
+constexpr int kDomain = 64;
+
+class ConsoleTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "fulcrum_console_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  [[nodiscard]] std::string out() const { return folder_ / "out"; }
+  [[nodiscard]] std::vector<std::string> Token() const { return {"--token-file", (folder_ / "token").string()}; }
+  /// The state that the page would be shown says all of these.
+  static bool Says(const ConsoleProgram& console, std::initializer_list<const char*> texts) {
+    const std::string state = console.Get("/api/state").body;
+    return std::all_of(texts.begin(), texts.end(),
+                       [&](const char* text) { return state.find(text) != std::string::npos; });
+  }
+  /// The supervisor did what was asked. It may be late with its answer on a busy machine: then it is asked again.
+  static bool Obeys(const ConsoleProgram& console, const std::string& call, const std::string& body) {
+    const auto number = [&] { return Between(console.Get("/api/state").body, "\"notice\":{\"number\":", ","); };
+    for (int attempt = 0; attempt < 3; ++attempt) {
+      const std::string before = number();
+      if (console.Post(call, body).status != 200 || !WaitFor(20, [&] { return number() != before; })) return false;
+      if (Between(console.Get("/api/state").body, "\"notice\":{", "}").find("\"ok\":true") != std::string::npos)
+        return true;
+    }
+    return false;
+  }
+  static std::string Between(const std::string& text, const std::string& begin, const std::string& end) {
+    const std::size_t from = text.find(begin);
+    return from == std::string::npos
+               ? ""
+               : text.substr(from + begin.size(), text.find(end, from + begin.size()) - from - begin.size());
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(ConsoleTest, StrangersGetThePageAndNothingElse) {
+  ConsoleProgram console(kDomain, out(), Token());
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(console.port()) + "\r\n";
+  const std::string token = "Authorization: Bearer " + console.token() + "\r\n";
+  const HttpReply page = console.Ask("GET", "/", host);
+  EXPECT_EQ(page.status, 200);
+  EXPECT_NE(page.body.find("Fulcrum"), std::string::npos);
+  EXPECT_TRUE(page.head.at("content-security-policy").starts_with("default-src 'self';"));
+  EXPECT_EQ(page.head.at("x-content-type-options"), "nosniff");
+
+  EXPECT_EQ(console.Get("/api/state").status, 200);
+  EXPECT_EQ(console.Ask("GET", "/api/state", host).status, 401);
+  EXPECT_EQ(console.Ask("GET", "/api/state", host + "Authorization: Bearer " + std::string(64, '0') + "\r\n").status,
+            401);
+  EXPECT_EQ(console.Ask("GET", "/api/state", "Host: evil.example\r\n" + token).status, 421);
+  EXPECT_EQ(console.Ask("GET", "/api/state", host + host + token).status, 421);
+  EXPECT_EQ(console.Ask("GET", "/api/state", token).status, 421);
+  EXPECT_EQ(
+      console.Ask("POST", "/api/stop", host + token + "Origin: http://evil.example\r\nContent-Length: 0\r\n").status,
+      403);
+  EXPECT_EQ(
+      console.Ask("POST", "/api/stop", host + token + "Sec-Fetch-Site: cross-site\r\nContent-Length: 0\r\n").status,
+      403);
+
+  for (const char* target :
+       {"/../../etc/passwd", "/%2e%2e/etc/passwd", "/api/picture?name=../../../etc/passwd", "//etc/passwd"}) {
+    EXPECT_EQ(console.Ask("GET", target, host + token).status, 400) << target;
+  }
+  EXPECT_EQ(console.Ask("GET", "/index.htm", host).status, 404);
+  EXPECT_EQ(console.Ask("GET", "/api/picture?name=frame_1.png", host + token).status, 404);
+  EXPECT_EQ(console.Ask("DELETE", "/", host).status, 405);
+  EXPECT_EQ(console.Ask("GET", "/", host + "X: " + std::string(20'000, 'x') + "\r\n").status, 431);
+  EXPECT_EQ(console.Ask("POST", "/api/stop", host + token + "Content-Length: 100000\r\n").status, 413);
+  EXPECT_EQ(console.Ask("GET ", "/", host).status, 400);
+  HttpConnection garbage(console.port());
+  garbage.Send(std::string("\0\xff\x16\x03\x01 nothing that is HTTP\r\n\r\n", 31));
+  EXPECT_EQ(garbage.Reply().status, 400);
+
+  EXPECT_EQ(console.Post("/api/restart", "node=physics_node").status, 409);
+  EXPECT_EQ(console.Post("/api/start", "scene=nothing").status, 404);
+  EXPECT_EQ(console.program().End(SIGTERM), 0);
+}
+
+TEST_F(ConsoleTest, SlowAndManyClientsHoldNobodyUp) {
+  HttpLimits limits;
+  limits.connections = 3;
+  limits.streams = 1;
+  limits.request = std::chrono::seconds(1);
+  HttpServer server(
+      "127.0.0.1", 0, [](const HttpRequest& request) { return HttpResponse{.stream = request.target == "/stream"}; },
+      limits);
+  std::jthread serving([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      server.Turn(std::chrono::milliseconds(20));
+      server.Feed([](std::uint64_t* cursor) { return "part " + std::to_string(++*cursor); });
+    }
+  });
+  HttpConnection slow(server.port()), stream(server.port());
+  slow.Send("GET / HT");
+  stream.Send("GET /stream HTTP/1.1\r\nHost: x\r\n\r\n");
+  EXPECT_NE(stream.Receive(5, "part 3").find("part 1"), std::string::npos);
+  {
+    HttpConnection second(server.port());
+    second.Send("GET /stream HTTP/1.1\r\nHost: x\r\n\r\n");
+    EXPECT_EQ(second.Reply().status, 503);
+  }
+  HttpConnection third(server.port());
+  EXPECT_TRUE(WaitFor(5, [&] {
+    HttpConnection fourth(server.port());
+    return fourth.Reply(0.2).status == 503;
+  }));
+  // Drops of a request, each well before the limit would be over, do not move it.
+  bool closed = false;
+  for (int i = 0; i < 50 && !closed; ++i) {
+    slow.Send("T");
+    closed = slow.Closes(0.1);
+  }
+  EXPECT_TRUE(closed);
+}
+
+TEST_F(ConsoleTest, ASessionFromStartToReport) {
+  ConsoleProgram console(kDomain, out(), Token());
+  HttpConnection events(console.port());
+  events.Send("GET /api/events HTTP/1.1\r\nHost: 127.0.0.1:" + std::to_string(console.port()) +
+              "\r\nAuthorization: Bearer " + console.token() + "\r\n\r\n");
+  EXPECT_EQ(events.Reply().head.at("content-type"), "text/event-stream");
+
+  EXPECT_EQ(console.Post("/api/start", "scene=small&power=30&picture_rate=5&seconds=60&record=on").status, 200);
+  EXPECT_EQ(console.Post("/api/start", "scene=small").status, 409);
+  ASSERT_TRUE(WaitFor(60, [&] { return Says(console, {"\"phase\":\"running\""}); }))
+      << ReadFile(out() + "/console.log");
+  // All run: five of the scene, and the recorder of what is kept. Slow is no failure of this test's.
+  EXPECT_TRUE(WaitFor(20, [&] {
+    const std::string state = console.Get("/api/state").body;
+    std::size_t running = 0;
+    for (const char* level : {"\"level\":\"good\",\"word\"", "\"level\":\"busy\",\"word\""}) {
+      for (std::size_t at = 0; (at = state.find(level, at)) != std::string::npos; ++at) ++running;
+    }
+    return running == 6;
+  })) << console.Get("/api/state").body;
+
+  std::string name;
+  EXPECT_TRUE(
+      WaitFor(10, [&] { return !(name = Between(console.Get("/api/state").body, "\"picture\":\"", "\"")).empty(); }));
+  const HttpReply picture = console.Get("/api/picture?name=" + name);
+  EXPECT_EQ(picture.head.at("content-type"), "image/png");
+  EXPECT_TRUE(picture.body.starts_with("\x89PNG\r\n"));
+  EXPECT_GT(picture.body.size(), 1000u);
+  EXPECT_NE(events.Receive(5, "\"points\":[[").find("data: {"), std::string::npos);
+
+  EXPECT_TRUE(Obeys(console, "/api/restart", "node=thermal_node")) << console.Get("/api/state").body;
+  EXPECT_TRUE(WaitFor(30, [&] { return Says(console, {"\"restarts\":1"}); })) << console.Get("/api/state").body;
+  EXPECT_TRUE(Obeys(console, "/api/dump", "")) << console.Get("/api/state").body;
+  EXPECT_EQ(console.Post("/api/calibrate", "what=handle&tool=0").status, 409);
+
+  EXPECT_EQ(console.Post("/api/stop").status, 200);
+  ASSERT_TRUE(WaitFor(30, [&] { return Says(console, {"\"phase\":\"idle\"", "\"has_report\":true"}); }));
+  EXPECT_TRUE(Says(console, {"\"ended\":{\"well\":true"})) << ReadFile(out() + "/console.log");
+  EXPECT_NE(console.Get("/api/summary").body.find("\"scene\": \"small\""), std::string::npos);
+  // What was chosen on the page is what ran.
+  const std::string configuration = ReadFile(fs::path(out()) / "latest" / "configuration.yaml");
+  EXPECT_NE(configuration.find("power_W: 30"), std::string::npos);
+  EXPECT_EQ(configuration.find("power_W: 35"), std::string::npos);
+  EXPECT_NE(configuration.find("png_rate_Hz: 5"), std::string::npos);
+
+  const std::string report = "/report?ticket=" + Between(console.Post("/api/ticket").body, "\"text\":\"", "\"");
+  const std::string host = "Host: 127.0.0.1:" + std::to_string(console.port()) + "\r\n";
+  const HttpReply first = console.Ask("GET", report, host);
+  EXPECT_EQ(first.status, 200);
+  EXPECT_NE(first.head.at("content-security-policy").find("sandbox"), std::string::npos);
+  EXPECT_EQ(console.Ask("GET", report, host).status, 401) << "a ticket is good once";
+
+  const std::string recordings = console.Get("/api/recordings").body;
+  EXPECT_NE(recordings.find("/dump.mcap"), std::string::npos) << recordings;
+  const std::string session = Between(recordings, "\"name\":\"", "/");
+  EXPECT_EQ(console.Post("/api/replay", "name=" + session + "%2Fnothing.mcap").status, 404);
+  EXPECT_EQ(console.Post("/api/replay", "name=" + session + "%2Frecording.mcap").status, 200);
+  EXPECT_TRUE(WaitFor(60, [&] {
+    return Says(console, {"all the same", "\"running\":false", "\"ok\":true"});
+  })) << console.Get("/api/state").body;
+}
+
+TEST_F(ConsoleTest, ASessionOutlivesItsConsoleAndIsFoundAgain) {
+  {
+    ConsoleProgram console(kDomain, out(), Token());
+    EXPECT_EQ(console.Post("/api/start", "scene=small&seconds=60&record=off").status, 200);
+    ASSERT_TRUE(WaitFor(60, [&] { return Says(console, {"\"phase\":\"running\"", "\"own\":true"}); }));
+    console.program().End(SIGKILL);
+  }
+  ConsoleProgram again(kDomain, out(), Token());
+  EXPECT_TRUE(WaitFor(10, [&] { return Says(again, {"\"phase\":\"running\"", "\"own\":false"}); }));
+  EXPECT_TRUE(WaitFor(10, [&] { return Says(again, {"\"picture\":\"frame_"}); }));
+  EXPECT_EQ(again.Post("/api/stop").status, 200);
+  EXPECT_TRUE(WaitFor(30, [&] { return Says(again, {"\"phase\":\"idle\"", "\"has_report\":true"}); }));
+}
+
+TEST_F(ConsoleTest, ACalibrationIsLedStepByStep) {
+  ConsoleProgram console(kDomain, out(), Token());
+  EXPECT_EQ(console.Post("/api/calibrate", "what=trocar&tool=0").status, 409)
+      << "nothing to measure on a simulated cart";
+  EXPECT_EQ(console.Post("/api/calibrate", "what=handle&tool=0").status, 200);
+  EXPECT_TRUE(WaitFor(10, [&] { return Says(console, {"Set the jaw to 0 deg", "\"wants_enter\":true"}); }));
+  EXPECT_EQ(console.Post("/api/start", "scene=small").status, 409);
+  EXPECT_EQ(console.Post("/api/task/enter").status, 200);
+  EXPECT_TRUE(WaitFor(10, [&] {
+    return Says(console, {"taken from", "Set the jaw to 15 deg", "\"wants_enter\":true"});
+  })) << console.Get("/api/state").body;
+  EXPECT_EQ(console.Post("/api/task/cancel").status, 200);
+  EXPECT_TRUE(WaitFor(10, [&] { return Says(console, {"\"running\":false", "\"cancelled\":true"}); }));
+  EXPECT_EQ(console.Post("/api/task/close").status, 200);
+  EXPECT_EQ(console.Get("/api/state").body.find("\"task\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace fulcrum::console

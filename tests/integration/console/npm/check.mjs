@@ -1,0 +1,94 @@
+// The page as an operator uses it: check.mjs FULCRUM CHROMIUM FOLDER. Leaves screenshots in FOLDER.
+import {join} from 'node:path';
+import {allRun, expect, pictureShown, pidOf, sizes, until, withConsole} from './console.mjs';
+
+const [fulcrum, browser, folder] = process.argv.slice(2);
+
+/** Everything that can be pressed is big enough and on the screen; nothing has to be scrolled sideways. */
+async function checkLayout(page, what) {
+  const found = await page.evaluate(() => {
+    const bad = [];
+    const covered = e => e.closest('#view-session') && !document.getElementById('task').hidden;
+    for (const e of document.querySelectorAll('button, input, label:has(input)')) {
+      if (e.matches('.chips input') || !e.checkVisibility() || covered(e)) continue;
+      const box = e.getBoundingClientRect();
+      if (box.width < 48 || box.height < 48) bad.push(`${e.id || e.textContent}: ${box.width} x ${box.height}`);
+      if (box.left < 0 || box.right > innerWidth + 0.5) bad.push(`${e.id || e.textContent}: beyond the screen`);
+    }
+    if (document.documentElement.scrollWidth > innerWidth) bad.push('wider than the screen');
+    return bad;
+  });
+  expect(found.length === 0, `${what}: all targets of 48 px and on the screen, but ${found.join('; ')}`);
+}
+
+async function look(page, name) {
+  for (const size of sizes) {
+    await page.setViewportSize(size);
+    await page.waitForTimeout(300);
+    await checkLayout(page, `${name} at ${size.width} x ${size.height}`);
+    await page.screenshot({path: join(folder, `${name}-${size.width}.png`)});
+  }
+}
+
+await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out}) => {
+  // A stranger's page shows no session.
+  const stranger = await newPage(sizes[0]);
+  await stranger.goto(address.replace(/#.*/, '#wrong'));
+  await stranger.waitForSelector('#ask-token[open]');
+  expect(!(await stranger.isVisible('#nodes li')), 'nothing without the token');
+  await stranger.context().close();
+  expect(trouble.every(t => t.includes('401')), `401 alone for a stranger, but ${trouble}`);
+  trouble.length = 0;
+
+  const page = await newPage(sizes[0]);
+  await page.goto(address);
+  expect(!page.url().includes('#'), 'the token does not stay in the address line');
+  expect(await page.getAttribute('html', 'lang') === 'en', 'a language');
+  await page.waitForSelector('#scenes label');
+  await look(page, 'idle');
+
+  await page.locator('#scenes label', {hasText: 'small'}).click();
+  await page.click('#power-less');
+  expect(await page.textContent('#power') === '30 W', '5 W less than the scene says');
+  await page.locator('#lengths label', {hasText: '1 min'}).click();
+  // By keyboard alone from here to the start.
+  await page.focus('#lengths input:checked');
+  await page.keyboard.press('Tab');
+  expect(await page.evaluate(() => document.activeElement.id) === 'start', 'Start is reached with Tab');
+  await page.keyboard.press('Enter');
+  await until(page, 60, allRun, 6);
+  await until(page, 20, pictureShown);
+  await until(page, 20, () => parseFloat(document.getElementById('temperature').textContent) > 60);
+  await look(page, 'running');
+
+  // A node that hangs is seen, named and restarted.
+  process.kill(pidOf('thermal_node', out), 'SIGSTOP');
+  await until(page, 10, () => document.querySelector('[data-node=thermal_node] .word').textContent === 'Silent');
+  await until(page, 5, () => document.querySelector('#warning-list').textContent.includes('Heat has been silent'));
+  await look(page, 'silent');
+  await page.click('[data-node=thermal_node] button');
+  await until(page, 20, allRun, 6);
+
+  await page.click('#stop');
+  await page.click('#stop-yes');
+  await page.waitForSelector('#report:visible', {timeout: 30_000});
+  await page.waitForSelector('#result-figures dd');
+  expect(await page.textContent('#power') === '30 W', 'the power chosen before stays chosen');
+  await look(page, 'ended');
+  await page.click('#report');
+  await page.frameLocator('#report-frame').locator('h1, h2').first().waitFor({timeout: 20_000});
+  await page.screenshot({path: join(folder, 'report-1920.png')});
+  await page.click('#report-close');
+
+  await page.click('nav [data-goto=recordings]');
+  await page.waitForSelector('#recordings button');
+  await look(page, 'recordings');
+  await page.click('nav [data-goto=calibration]');
+  await page.click('[data-what=handle][data-tool="0"]');
+  await page.waitForSelector('#task-enter:enabled');
+  await look(page, 'calibration');
+  await page.click('#task-cancel');
+  await page.waitForSelector('#task-close:visible');
+  await page.click('#task-close');
+});
+console.log('the page was opened, a session started, watched, healed and stopped');

@@ -1,0 +1,83 @@
+// What check and measure share: a console in a folder of its own, a browser on its page.
+import {spawn} from 'node:child_process';
+import {mkdtempSync, readFileSync, readdirSync, rmSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
+import {chromium} from 'playwright-core';
+
+export const sizes = [{width: 1280, height: 800}, {width: 1920, height: 1080}];
+
+export function expect(condition, what) {
+  if (!condition) throw new Error(`expected: ${what}`);
+}
+
+/** Runs `use({page, console, newPage})`, and ends everything afterwards. */
+export async function withConsole(fulcrum, browserPath, domain, use) {
+  const out = mkdtempSync(join(tmpdir(), 'fulcrum-console-'));
+  const program = spawn(fulcrum, ['console', '--port', '0', '--domain', String(domain), '--out', join(out, 'out'), '--token-file', join(out, 'token')]);
+  let said = '';
+  let browser = null;
+  const trouble = [];
+  try {
+    const address = await new Promise((found, failed) => {
+      const hear = bytes => {
+        said += bytes;
+        const match = said.match(/open (http:\S+)/);
+        if (match) found(match[1]);
+      };
+      program.stdout.on('data', hear);
+      program.stderr.on('data', hear);
+      program.on('exit', () => failed(new Error(`the console ended: ${said}`)));
+      setTimeout(() => failed(new Error(`the console does not listen: ${said}`)), 20_000);
+    });
+    browser = await chromium.launch({executablePath: browserPath, args: ['--no-sandbox', '--disable-gpu', '--force-color-profile=srgb']});
+    const newPage = async size => {
+      const page = await (await browser.newContext({viewport: size})).newPage();
+      page.on('pageerror', error => trouble.push(`error in the page: ${error.message}`));
+      page.on('console', message => { if (message.type() === 'error') trouble.push(`console: ${message.text()}`); });
+      page.on('response', async response => {
+        if (response.status() >= 400) trouble.push(`${response.url()}: ${response.status()} ${await response.text().catch(() => '')}`);
+      });
+      page.on('request', request => { if (!request.url().startsWith(new URL(address).origin)) trouble.push(`asks elsewhere: ${request.url()}`); });
+      return page;
+    };
+    await use({address, newPage, trouble, pid: program.pid, out: join(out, 'out')});
+    expect(trouble.length === 0, `no trouble in the page, but: ${trouble.join('; ')}`);
+  } catch (error) {
+    let log = '';
+    try { log = readFileSync(join(out, 'out', 'console.log'), 'utf8'); } catch { /* no session */ }
+    console.error(`trouble in the page: ${trouble.join('; ') || 'none'}\nfulcrum up said:\n${log.slice(-2000)}`);
+    throw error;
+  } finally {
+    await browser?.close();
+    const gone = new Promise(done => program.once('exit', done));
+    program.kill('SIGTERM');
+    await gone;
+    rmSync(out, {recursive: true, force: true});
+  }
+}
+
+/** The process of a node of the session in `out`. */
+export function pidOf(node, out) {
+  for (const name of readdirSync('/proc')) {
+    if (!/^\d+$/.test(name)) continue;
+    try {
+      const words = readFileSync(`/proc/${name}/cmdline`, 'utf8').split('\0');
+      if (words[0].endsWith(`/${node}`) && words.some(word => word.startsWith(out))) return Number(name);
+    } catch { /* it has just ended */ }
+  }
+  throw new Error(`${node} does not run`);
+}
+
+/** Waits until `done(argument)` in the page is true. The driver's own way evaluates texts, which the page's policy refuses. */
+export async function until(page, limit_s, done, argument) {
+  for (const end = performance.now() + 1000 * limit_s; performance.now() < end;) {
+    if (await page.evaluate(done, argument)) return;
+    await new Promise(next => setTimeout(next, 100));
+  }
+  throw new Error(`after ${limit_s} s it does not hold: ${done}`);
+}
+
+/** All nodes run; slow ones, on a busy machine, too. */
+export const allRun = count => document.querySelectorAll('#nodes .word.level-good, #nodes .word.level-busy').length === count;
+export const pictureShown = () => !!document.getElementById('picture').dataset.shown;

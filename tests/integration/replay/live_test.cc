@@ -1,0 +1,117 @@
+// The replayer on the bus: what it publishes reaches a reader in another process, as if it took place now.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "services/bus/convert/cdr.h"
+#include "services/bus/dds/participant.h"
+#include "services/bus/dds/shared_memory.h"
+#include "services/bus/topics.h"
+#include "services/recording/mcap_reader.h"
+#include "services/runtime/cyclic_thread.h"
+#include "tests/integration/replay/short_session.h"
+#include "tests/support/cart.h"
+#include "tests/support/program.h"
+#include "tests/unit/bus/same.h"
+
+namespace fulcrum::replay {
+namespace {
+
+constexpr int kDomain = 33;
+constexpr double kPatience_s = 30;
+
+/// Messages of one topic by sequence; of several senders, those of `node`.
+template <class T>
+std::map<std::uint64_t, T> Recorded(const std::filesystem::path& file) {
+  std::map<std::uint64_t, T> messages;
+  recording::McapReader reader(file);
+  recording::McapMessage message{};
+  while (reader.Next(&message)) {
+    T sample;
+    if (reader.channels().at(message.channel).topic == bus::RoleOf<T>().name && bus::DecodeCdr(message.data, &sample)) {
+      messages.emplace(bus::StampOf(sample).sequence, sample);
+    }
+  }
+  return messages;
+}
+
+/// What came of one topic, and when.
+template <class T>
+struct Heard {
+  explicit Heard(bus::DdsParticipant* participant) : input(participant->MakeInput<T>()) {}
+  void Take() {
+    while (input->TakeNext(&sample)) {
+      samples.push_back(sample);
+      if (bus::StampOf(sample).stamp_ns > runtime::MonotonicNs()) ++of_the_future;
+    }
+  }
+  std::unique_ptr<bus::Input<T>> input;
+  T sample;
+  std::vector<T> samples;
+  int of_the_future = 0;
+};
+
+TEST(Live, ReadersGetTheRecordedMessagesAsOfNow) {
+  const testing::ShortSession session("live_test");
+  bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kDomain));
+  const std::int64_t begin_ns = runtime::MonotonicNs();
+  {
+    bus::DdsParticipant participant({.domain = kDomain, .node_name = "test", .shared_memory = {}});
+    Heard<ToolState> tools(&participant);
+    Heard<TopologyState> topology(&participant);
+    Heard<SceneManifest> sessions(&participant);
+    Heard<TickManifest> ticks(&participant);
+    Heard<TissueFrame> frames(&participant);
+    fulcrum::testing::Program replayer(
+        "replayer", {session.recording(), "--live", "--except", "physics", "--domain", std::to_string(kDomain)});
+    std::optional<int> code;
+    ASSERT_TRUE(fulcrum::testing::WaitFor(kPatience_s, [&] {
+      code = replayer.Poll();
+      tools.Take();
+      topology.Take();
+      sessions.Take();
+      ticks.Take();
+      frames.Take();
+      return code.has_value();
+    })) << replayer.Said();
+    EXPECT_EQ(*code, 0) << replayer.Said();
+
+    // One shift for all of them, and it leads to now.
+    ASSERT_FALSE(sessions.samples.empty());
+    const auto manifests = Recorded<SceneManifest>(session.recording());
+    const std::int64_t shift_ns = sessions.samples[0].session_start_ns - manifests.begin()->second.session_start_ns;
+    EXPECT_GE(sessions.samples[0].session_start_ns, begin_ns);
+    EXPECT_EQ(sessions.samples[0].scene_hash, manifests.begin()->second.scene_hash);
+
+    const auto then = Recorded<ToolState>(session.recording());
+    EXPECT_GT(tools.samples.size(), then.size() / 2) << "best effort, but over the loopback";
+    EXPECT_EQ(tools.of_the_future, 0);
+    for (const ToolState& now : tools.samples) {
+      ASSERT_TRUE(then.contains(now.stamp.sequence));
+      ToolState expected = then.at(now.stamp.sequence);
+      expected.stamp.stamp_ns += shift_ns;
+      expected.stamp.epoch += static_cast<std::uint64_t>(shift_ns);
+      ASSERT_TRUE(Same(now, expected)) << "ToolState #" << now.stamp.sequence;
+    }
+    ASSERT_FALSE(topology.samples.empty());
+    const auto last = Recorded<TopologyState>(session.recording()).rbegin()->second;
+    EXPECT_EQ(topology.samples.back().revision, last.revision);
+    EXPECT_EQ(topology.samples.back().dead_edges, last.dead_edges);
+    EXPECT_EQ(topology.samples.back().stamp.stamp_ns, last.stamp.stamp_ns + shift_ns);
+
+    // Physics was left out, of the topics that it shares with others, too.
+    EXPECT_TRUE(frames.samples.empty());
+    std::map<NodeId, int> told;
+    for (const TickManifest& tick : ticks.samples) ++told[tick.node];
+    EXPECT_GT(told[NodeId::kThermal], 0);
+    EXPECT_GT(told[NodeId::kHaptics], 0);
+    EXPECT_EQ(told[NodeId::kPhysics], 0);
+  }
+  bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kDomain));
+}
+
+}  // namespace
+}  // namespace fulcrum::replay

@@ -1,0 +1,192 @@
+#include "tests/support/intruder.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+#include "services/bus/access.h"
+#include "services/bus/dds/participant.h"
+#include "services/bus/input_account.h"
+#include "services/keys/key_folder.h"
+#include "tests/support/cart.h"
+#include "tests/support/program.h"
+#include "tests/unit/bus/samples.h"
+
+namespace fulcrum::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::time_t kDay_s = 24 * 3600;
+// Long enough to start a process, short enough to wait for.
+constexpr std::time_t kShortLife_s = 2;
+constexpr double kPatience_s = 20;
+
+void Write(const fs::path& file, const std::string& text) {
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  if (!(out << text).flush()) throw std::runtime_error("cannot write " + file.string());
+}
+
+fs::path Folder(const fs::path& path) {
+  fs::create_directories(path);
+  fs::permissions(path, fs::perms::owner_all);
+  return path;
+}
+
+/// The permissions of the thermal node, changed by hand so that they allow ToolState.
+std::string Tampered(const fs::path& keys) {
+  std::string text = ReadFile(keys / "thermal_node.p7s");
+  const std::string was = "fulcrum/ThermalEvent";
+  return text.replace(text.find(was), was.size(), "fulcrum/ToolState");
+}
+
+/// Gives whoever opens the pipe one document, the next one another.
+class TwoFacedPipe {
+ public:
+  TwoFacedPipe(fs::path path, std::string first, std::string second) : path_(std::move(path)) {
+    fs::remove(path_);
+    if (::mkfifo(path_.c_str(), 0600) != 0) throw std::runtime_error("cannot make " + path_.string());
+    thread_ = std::thread([this, texts = std::vector<std::string>{std::move(first), std::move(second)}] {
+      for (const std::string& text : texts) {
+        const int fd = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
+        (void)!::write(fd, text.data(), text.size());
+        ::close(fd);
+        // The first reader must have closed before the next text comes.
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      }
+    });
+  }
+  ~TwoFacedPipe() {
+    // Frees the thread if nobody came.
+    const int fd = ::open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
+    thread_.join();
+    ::close(fd);
+  }
+  TwoFacedPipe(const TwoFacedPipe&) = delete;
+  TwoFacedPipe& operator=(const TwoFacedPipe&) = delete;
+
+ private:
+  fs::path path_;
+  std::thread thread_;
+};
+
+/// As much of a cart as a stranger could reach: a supervisor that tells its scene, a physics node that takes ToolState.
+class Target {
+ public:
+  Target(int domain, const fs::path& keys)
+      : supervisor_({.domain = domain, .node_name = "supervisor", .security = {keys, "supervisor"}}),
+        physics_({.domain = domain, .node_name = "physics_node", .security = {keys, "physics_node"}}) {}
+
+  void Turn() {
+    SceneManifest scene = bus::test::Sample<SceneManifest>();
+    scene.stamp = stamper_.Next(std::chrono::steady_clock::now().time_since_epoch().count());
+    scenes_->Write(scene);
+    // As every node does: who has left by the end has still been seen.
+    (void)supervisor_.refusals();
+    (void)physics_.refusals();
+    ToolState tool;
+    came_through_ |= tools_->TakeNext(&tool) || tools_->stats().matched;
+  }
+  [[nodiscard]] bool came_through() const { return came_through_; }
+  [[nodiscard]] bool Reports(const std::string& name, const std::string& what) const {
+    const auto names_it = [&](const std::string& text) {
+      return text.find(name) != std::string::npos && text.find(what) != std::string::npos;
+    };
+    return std::ranges::any_of(supervisor_.refusals().texts, names_it) ||
+           std::ranges::any_of(physics_.refusals().texts, names_it);
+  }
+
+ private:
+  bus::DdsParticipant supervisor_, physics_;
+  std::unique_ptr<bus::Output<SceneManifest>> scenes_ = supervisor_.MakeOutput<SceneManifest>();
+  std::unique_ptr<bus::Input<ToolState>> tools_ = physics_.MakeInput<ToolState>();
+  bus::Stamper stamper_{std::chrono::steady_clock::now().time_since_epoch().count()};
+  bool came_through_ = false;
+};
+
+struct Running {
+  Attempt attempt;
+  Program program;
+  std::optional<int> code = std::nullopt;  ///< Once it has ended.
+
+  bool HasEnded() {
+    if (!code) code = program.Poll();
+    return code.has_value();
+  }
+};
+
+}  // namespace
+
+std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
+  const std::time_t now = std::time(nullptr);
+  const keys::Validity today{now - kDay_s, now + kDay_s};
+  const keys::Authority ours(today), theirs(today);
+  const fs::path real = Folder(scratch / "real");
+  keys::FillKeyFolder(real, ours, today);
+  keys::FillKeyFolder(Folder(scratch / "theirs"), theirs, today);
+  keys::FillKeyFolder(Folder(scratch / "expired"), ours, {now - 2 * kDay_s, now - kDay_s});
+  keys::FillKeyFolder(Folder(scratch / "tampered"), ours, today);
+  Write(scratch / "tampered" / "thermal_node.p7s", Tampered(real));
+  // What somebody could make true on his own side: his own authority beside ours, and all rights from it.
+  bus::AccessRole all = *bus::AccessRoleOf("thermal_node");
+  all.writes = all.reads = bus::access::kAll;
+  const std::string all_rights = theirs.Sign(keys::PermissionsXml(all, today));
+  Write(scratch / "both.pem", ours.certificate() + theirs.certificate());
+
+  std::vector<Running> running;
+  const auto start = [&](const std::string& name, const fs::path& folder, const std::string& identity, int wanted_code,
+                         const std::string& wanted_of_cart, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{std::to_string(domain), name, folder.string(), identity};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    running.push_back({{.name = name, .who = "", .wanted_exit_code = wanted_code, .wanted_of_cart = wanted_of_cart},
+                       Program("security_intruder", arguments)});
+  };
+  keys::FillKeyFolder(Folder(scratch / "short"), ours, {now - kDay_s, std::time(nullptr) + kShortLife_s});
+  start("expires_meanwhile", scratch / "short", "haptics_node", 3, "expired");
+  std::this_thread::sleep_for(std::chrono::seconds(kShortLife_s + 1));
+
+  Target target(domain, real);
+  const TwoFacedPipe honest_outside(scratch / "pipe1", all_rights, ReadFile(real / "thermal_node.p7s"));
+  const TwoFacedPipe tampered_outside(scratch / "pipe2", all_rights, Tampered(real));
+  start("no_keys", "-", "-", 3, "has no keys");
+  start("other_authority", scratch / "theirs", "haptics_node", 3, "another authority");
+  start("encrypts", real, "haptics_node/encrypt", 3, "encrypts");
+  start("expired", scratch / "expired", "haptics_node", 2, "");
+  start("other_topic", real, "thermal_node", 2, "");
+  start("tampered", scratch / "tampered", "thermal_node", 2, "");
+  start("forged_other_topic", real, "thermal_node", 0, "may not write fulcrum/ToolState",
+        {scratch / "both.pem", scratch / "pipe1"});
+  start("forged_tampered", real, "thermal_node", 0, "permissions of no use", {scratch / "both.pem", scratch / "pipe2"});
+
+  std::vector<Attempt> attempts;
+  (void)WaitFor(kPatience_s, [&] {
+    target.Turn();
+    return std::ranges::count_if(running, [](Running& one) { return !one.HasEnded(); }) == 0;
+  });
+  for (Running& one : running) {
+    Attempt& attempt = one.attempt;
+    attempt.exit_code = one.code ? *one.code : one.program.End(SIGKILL);
+    const std::string said = one.program.Said();
+    const std::size_t end = said.find_last_not_of('\n');
+    attempt.who = end == std::string::npos ? "" : said.substr(0, end + 1);
+    attempt.who = attempt.who.substr(attempt.who.rfind('\n') + 1);
+    attempt.came_through = target.came_through();
+    // An endpoint is named after the keys of its process, everybody else as he names himself.
+    const std::string name = attempt.name == "forged_other_topic" ? "thermal_node" : attempt.name;
+    attempt.reported = !attempt.wanted_of_cart.empty() && target.Reports(name, attempt.wanted_of_cart);
+    attempts.push_back(attempt);
+  }
+  return attempts;
+}
+
+}  // namespace fulcrum::testing

@@ -1,0 +1,213 @@
+// The Debian package, unpacked into a folder: what is in it, whether its units stand up to systemd's own check, a
+// session as a user starts it, and a session whose nodes are started as their units say, by the test in the place of
+// systemd.
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include "tests/support/cart.h"
+#include "tests/support/program.h"
+#include "tests/system/install/notify_socket.h"
+#include "tests/system/install/unit_file.h"
+
+namespace fulcrum {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::NotifySocket;
+using testing::Program;
+using testing::ReadFile;
+using testing::UnitFile;
+using testing::WaitFor;
+
+constexpr double kStartLimit_s = 60.0;  // compiling the scene and six starts, on a busy machine
+constexpr double kEndLimit_s = 60.0;
+
+/// Runs a program to its end; returns what it said, and fails the test when it does not end well.
+std::string Output(const std::string& program, const std::vector<std::string>& arguments) {
+  Program run(program, arguments);
+  const int code = run.End(0);
+  EXPECT_EQ(code, 0) << program << " said:\n" << run.Said();
+  return run.Said();
+}
+
+/// The package is made and unpacked once for all tests.
+class InstallTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    std::string name = (fs::temp_directory_path() / "fulcrum_install_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    // No test of compression: that of a package for others takes most of the time.
+    Output("/usr/bin/env", {FULCRUM_CPACK, "--config", FULCRUM_BUILD_DIR "/CPackConfig.cmake", "-G", "DEB", "-B",
+                            folder_ / "package", "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip"});
+    for (const auto& entry : fs::directory_iterator(folder_ / "package")) {
+      if (entry.path().extension() == ".deb") package_ = entry.path();
+    }
+    ASSERT_FALSE(package_.empty()) << "cpack made no package";
+    Output("/usr/bin/dpkg-deb", {"-x", package_, root_ = folder_ / "root"});
+    fs::remove_all(folder_ / "package" / "_CPack_Packages");
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+
+  static fs::path UnitPath(const std::string& name) { return root_ / "lib/systemd/system" / name; }
+  static UnitFile Unit(const std::string& name) { return {UnitPath(name), root_}; }
+  static std::vector<std::string> NodeUnits() { return Unit("fulcrum-supervisor.service").Words("Wants"); }
+
+  static fs::path folder_, package_, root_;
+};
+fs::path InstallTest::folder_, InstallTest::package_, InstallTest::root_;
+
+TEST_F(InstallTest, PackageSaysWhatItNeedsAndKeepsTheConfigurationOfTheLab) {
+  const std::string control = Output("/usr/bin/dpkg-deb", {"-f", package_});
+  EXPECT_NE(control.find("Package: fulcrum\n"), std::string::npos) << control;
+  // Found in the programs by dpkg-shlibdeps; loaded at run time.
+  for (const char* needed : {"libfastrtps", "libopenscenegraph", "libserialport", "libsystemd0", "libegl-mesa0"}) {
+    EXPECT_NE(control.find(needed), std::string::npos) << needed << "\n" << control;
+  }
+  EXPECT_EQ(control.find("googletest"), std::string::npos);
+  for (const std::string& file : testing::SplitWords(Output("/usr/bin/dpkg-deb", {"-I", package_, "conffiles"}))) {
+    EXPECT_TRUE(fs::is_regular_file(root_.string() + file)) << file;
+  }
+  EXPECT_EQ(fs::read_symlink(root_ / "usr/bin/fulcrum"), "../libexec/fulcrum/fulcrum");
+  EXPECT_TRUE(fs::exists(root_ / "usr/share/man/man1/fulcrum-up.1.gz"));
+  // Nothing may point back to where it was built.
+  for (const auto& entry : fs::recursive_directory_iterator(root_)) {
+    if (!entry.is_regular_file() || entry.path().extension() == ".gz") continue;
+    EXPECT_EQ(ReadFile(entry.path()).find(FULCRUM_BUILD_DIR), std::string::npos) << entry.path();
+  }
+}
+
+TEST_F(InstallTest, UnitsPassTheCheckOfSystemd) {
+  if (::access("/usr/bin/systemd-analyze", X_OK) != 0) GTEST_SKIP() << "systemd-analyze is not installed";
+  // The units with the paths of this tree; those of the system itself come from where they are.
+  const fs::path units = folder_ / "units";
+  fs::create_directories(units / "fulcrum-.service.d");
+  std::vector<std::string> arguments{"SYSTEMD_UNIT_PATH=" + units.string() + ":/lib/systemd/system", "systemd-analyze",
+                                     "verify", "--man=no"};
+  for (const auto& entry : fs::recursive_directory_iterator(root_ / "lib/systemd/system")) {
+    if (!entry.is_regular_file()) continue;
+    const fs::path copy = units / fs::relative(entry.path(), root_ / "lib/systemd/system");
+    std::ofstream(copy) << std::regex_replace(ReadFile(entry.path()), std::regex("=/usr/"),
+                                              "=" + root_.string() + "/usr/");
+    if (copy.parent_path() == units) arguments.push_back(copy);
+  }
+  ASSERT_EQ(arguments.size(), 4u + 8u) << "a target, the supervisor, six nodes";
+  EXPECT_EQ(Output("/usr/bin/env", arguments), "") << "systemd found fault with the units";
+}
+
+TEST_F(InstallTest, SessionRunsFromTheInstalledPlaces) {
+  const fs::path elsewhere = folder_ / "elsewhere";
+  fs::create_directory(elsewhere);
+  // Called where nobody may write, not even root.
+  const std::string fulcrum = root_ / "usr/bin/fulcrum";
+  const std::string said =
+      Output("/usr/bin/env", {"-C", "/proc", "XDG_CACHE_HOME=" + (folder_ / "cache").string(), fulcrum, "up", "small",
+                              "--domain", "83", "--seconds", "1", "--out", elsewhere});
+  EXPECT_TRUE(fs::exists(elsewhere / "latest/report.html")) << said;
+  // What else it finds is a matter of this machine.
+  Program program(fulcrum, {"doctor", "--domain", "83"});
+  program.End(0);
+  const std::string doctor = program.Said();
+  EXPECT_NE(doctor.find("all in " + (root_ / "usr/libexec/fulcrum").string()), std::string::npos) << doctor;
+  EXPECT_NE(doctor.find((root_ / "etc/fulcrum/cart.yaml").string()), std::string::npos) << doctor;
+}
+
+/// One unit, started.
+class Service {
+ public:
+  Service(const std::string& name, const UnitFile& unit, const fs::path& folder, const fs::path& runtime)
+      : unit_(unit), socket_(folder / (name + ".notify")) {
+    const std::string watchdog = unit.Value("WatchdogSec") + "000000";
+    environment_ = {"-C", "/proc", "NOTIFY_SOCKET=" + (folder / (name + ".notify")).string(),
+                    "WATCHDOG_USEC=" + watchdog, "RUNTIME_DIRECTORY=" + runtime.string()};
+    for (const std::string& values : unit.Values("Environment")) {
+      for (const std::string& value : testing::SplitWords(values)) environment_.push_back(value);
+    }
+  }
+
+  void Start() {
+    std::vector<std::string> words = environment_;
+    for (const std::string& word : unit_.Command()) words.push_back(word);
+    socket_.Forget();
+    program_ = Program("/usr/bin/env", words);
+  }
+  [[nodiscard]] bool Heard(const std::string& beginning) { return socket_.HasHeard(beginning); }
+  [[nodiscard]] Program& program() { return program_; }
+  [[nodiscard]] std::string All() { return program_.Said() + socket_.Heard(); }
+
+ private:
+  UnitFile unit_;
+  NotifySocket socket_;
+  std::vector<std::string> environment_;
+  Program program_;
+};
+
+TEST_F(InstallTest, SessionOfServicesRunsAsTheUnitsSay) {
+  const fs::path runtime = root_ / "run/fulcrum";
+  fs::create_directories(runtime);
+  fs::create_directories(root_ / "var/lib/fulcrum");
+  std::ofstream(root_ / "etc/default/fulcrum")
+      << "# as the lab would\nFULCRUM_SCENE=small\nFULCRUM_OPTIONS=--record --domain 84 --seconds 5\n";
+
+  Service supervisor("supervisor", Unit("fulcrum-supervisor.service"), folder_, runtime);
+  supervisor.Start();
+  // Type=notify: what comes After= is started then.
+  ASSERT_TRUE(WaitFor(kStartLimit_s, [&] { return supervisor.Heard("READY=1"); })) << supervisor.All();
+
+  std::map<std::string, std::unique_ptr<Service>> nodes;
+  for (const std::string& name : NodeUnits()) {
+    const UnitFile unit = Unit(name);
+    ASSERT_TRUE(fs::exists(unit.Value("ConditionPathExists"))) << name << "\n" << supervisor.All();
+    nodes[name] = std::make_unique<Service>(name, unit, folder_, runtime);
+    nodes[name]->Start();
+  }
+  ASSERT_EQ(nodes.size(), 6u);
+  for (auto& [name, node] : nodes) {
+    ASSERT_TRUE(WaitFor(kStartLimit_s, [&] { return node->Heard("READY=1"); })) << name << "\n" << node->All();
+  }
+  for (auto& [name, node] : nodes) {
+    EXPECT_TRUE(WaitFor(kStartLimit_s, [&] { return node->Heard("STATUS=running"); })) << name << "\n" << node->All();
+    EXPECT_TRUE(node->Heard("WATCHDOG=1")) << name << "\n" << node->All();
+  }
+  EXPECT_TRUE(supervisor.Heard("WATCHDOG=1")) << supervisor.All();
+
+  // Restart=on-failure.
+  Service& physics = *nodes["fulcrum-physics.service"];
+  EXPECT_EQ(physics.program().End(SIGKILL), -SIGKILL);
+  physics.Start();
+  ASSERT_TRUE(WaitFor(kStartLimit_s, [&] { return physics.Heard("STATUS=running"); })) << physics.All();
+
+  std::optional<int> code;
+  ASSERT_TRUE(WaitFor(kEndLimit_s, [&] { return (code = supervisor.program().Poll()).has_value(); }))
+      << supervisor.All();
+  EXPECT_EQ(*code, 0) << supervisor.All();
+  EXPECT_TRUE(supervisor.Heard("STOPPING=1"));
+  for (auto& [name, node] : nodes) {
+    ASSERT_TRUE(WaitFor(kEndLimit_s, [&] { return (code = node->program().Poll()).has_value(); }))
+        << name << " was not told to end\n"
+        << node->All();
+    EXPECT_EQ(*code, 0) << name << "\n" << node->All();
+    EXPECT_FALSE(fs::exists(Unit(name).Value("ConditionPathExists"))) << name << " would start once more";
+  }
+  const fs::path session = root_ / "var/lib/fulcrum/sessions/latest";
+  EXPECT_TRUE(fs::exists(session / "report.html"));
+  EXPECT_TRUE(fs::exists(session / "recording.mcap"));
+  const std::string summary = ReadFile(session / "summary.json");
+  EXPECT_NE(summary.find("\"physics_node.restarts\": 1,"), std::string::npos) << summary;
+  EXPECT_EQ(summary.find("\"physics_node.longest_rejoin_s\": 0,"), std::string::npos) << summary;
+}
+
+}  // namespace
+}  // namespace fulcrum

@@ -1,0 +1,65 @@
+// Listens on the bus of the host that it runs on and writes down what it hears, for a test on another host to compare.
+//
+//   two_hosts_probe DOMAIN FILE [tissue]
+//
+// FILE gets a line per sample: "tool <session time s> <force 0 N> <force 1 N> <model age s>",
+// "health <node> <state> <pid> <ticks>", "link <name> <value>", "event ..."; FILE.tissue, with "tissue", binary:
+// sequence (u64), age when it came (f64, s), vertex count (u32), floats.
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <thread>
+
+#include "services/bus/dds/participant.h"
+#include "services/runtime/cyclic_thread.h"
+#include "services/runtime/realtime.h"
+
+using namespace fulcrum;  // NOLINT(google-build-using-namespace): a program of one page.
+
+int main(int argc, char** argv) {
+  if (argc < 3) return 2;
+  runtime::InstallStopSignals();
+  bus::DdsParticipant participant({.domain = std::atoi(argv[1]), .node_name = "probe", .shared_memory = {}});
+  const bool with_tissue = argc > 3 && std::strcmp(argv[3], "tissue") == 0;
+  const auto manifests = participant.MakeInput<SceneManifest>();
+  const auto tools = participant.MakeInput<ToolState>();
+  const auto healths = participant.MakeInput<Health>();
+  const auto frames = with_tissue ? participant.MakeInput<TissueFrame>() : nullptr;
+  std::FILE* text = std::fopen(argv[2], "w");
+  std::FILE* tissue = with_tissue ? std::fopen((std::string(argv[2]) + ".tissue").c_str(), "w") : nullptr;
+  if (text == nullptr) return 1;
+  SceneManifest manifest;
+  ToolState tool;
+  Health health;
+  TissueFrame frame;
+  while (!runtime::ShouldStop()) {
+    (void)manifests->TakeLatest(&manifest);
+    const auto session_s = [&](std::int64_t stamp_ns) {
+      return manifest.session_start_ns == 0 ? -1.0 : 1e-9 * static_cast<double>(stamp_ns - manifest.session_start_ns);
+    };
+    while (tools->TakeNext(&tool)) {
+      std::fprintf(text, "tool %.4f %.5f %.5f %.4f\n", session_s(tool.stamp.stamp_ns),
+                   static_cast<double>(tool.tools[0].f_W.norm()), static_cast<double>(tool.tools[1].f_W.norm()),
+                   static_cast<double>(tool.tools[0].model_age_s));
+    }
+    while (healths->TakeNext(&health)) {
+      std::fprintf(text, "health %s %d %d %llu\n", NodeName(health.node), static_cast<int>(health.state), health.pid,
+                   static_cast<unsigned long long>(health.ticks));
+      for (const Metric& metric : health.metrics) {
+        if (metric.name.starts_with("link_")) std::fprintf(text, "link %s %.10g\n", metric.name.c_str(), metric.value);
+      }
+    }
+    while (frames != nullptr && frames->TakeLatest(&frame)) {
+      const double age_s = 1e-9 * static_cast<double>(runtime::MonotonicNs() - frame.header.stamp.stamp_ns);
+      std::fwrite(&frame.header.stamp.sequence, 8, 1, tissue);
+      std::fwrite(&age_s, 8, 1, tissue);
+      std::fwrite(&frame.header.vertex_count, 4, 1, tissue);
+      std::fwrite(frame.xyz.data(), sizeof(float), frame.xyz.size(), tissue);
+    }
+    std::fflush(text);
+    if (tissue != nullptr) std::fflush(tissue);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return 0;
+}

@@ -1,0 +1,101 @@
+// One hash a scene: the states that physics, thermal and haptics come to after a while of the scene's own script, over
+// ports as on the cart. They are the same on each number of threads, on a CPU with AVX-512 and on one with neither it
+// nor AVX2 nor FMA (tried under an emulator: baseline kernels, the C library's other mathematics), so one committed
+// number stands for all of them. It is that of gcc's release build.
+//
+// A change of the numerics changes them, and is allowed to: the failed test says what to write here then. A change that
+// was to leave the numerics alone is found out.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "physics_node/pbd/kernels.h"
+#include "services/scene/compile.h"
+#include "services/scene/scene_yaml.h"
+#include "tests/unit/replay/recorded_cart.h"
+
+namespace fulcrum::replay {
+namespace {
+
+using Hashes = std::map<std::string, std::uint64_t>;
+
+struct Expected {
+  const char* scene;
+  double seconds;  ///< Of the script: the hook has cut for a while.
+  std::uint64_t physics, thermal, haptics;
+};
+
+constexpr Expected kSmall{"small", 3.2, 0xd3b24f14f56bd462, 0xf81ad5c1416a371a, 0x97c26fad9da77da8};
+constexpr Expected kBuiltIn{"built-in", 9.0, 0xd45e7a6accc08d6c, 0x151ec51ada1b674a, 0x5e9901aa2b05a1f5};
+
+// Nobody has compared what clang and the sanitizers come to, and under these it takes minutes.
+#if defined(__clang__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool kOtherBuild = true;
+#else
+constexpr bool kOtherBuild = false;
+#endif
+
+std::string Row(const Expected& scene, const Hashes& hashes) {
+  std::array<char, 200> row{};
+  const auto at = [&](const char* name) { return static_cast<unsigned long long>(hashes.at(name)); };
+  std::snprintf(row.data(), row.size(), "{\"%s\", %.1f, 0x%016llx, 0x%016llx, 0x%016llx}", scene.scene, scene.seconds,
+                at("physics_node"), at("thermal_node"), at("haptics_node"));
+  return row.data();
+}
+
+class StateHash : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (kOtherBuild) GTEST_SKIP() << "the committed states are those of a build by gcc";
+  }
+  StateHash() : folder_(std::filesystem::temp_directory_path() / ("fulcrum_state_hash_" + std::to_string(::getpid()))) {
+    std::filesystem::create_directories(folder_);
+  }
+  ~StateHash() override { std::filesystem::remove_all(folder_); }
+
+  /// Of the last tick of each node.
+  [[nodiscard]] Hashes Play(const SceneView& scene, double seconds, int threads) const {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    Hashes hashes;
+    testing::CartStory story{.seconds = seconds, .threads = threads};
+    story.record_frames = false;
+    story.manifest_change = [&](const TickManifest* manifest) {
+      hashes[NodeName(manifest->node)] = manifest->state_hash;
+      return true;
+    };
+    cut_length_m_ = testing::RecordCart(scene, folder_, story);
+    return hashes;
+  }
+
+  void Check(const Expected& expected, int threads) {
+    const std::filesystem::path yaml =
+        std::filesystem::path(FULCRUM_SOURCE_DIR) / "deploy/scenes" / (std::string(expected.scene) + ".yaml");
+    const auto description = scene::ReadSceneYaml(yaml, {});
+    scene::SceneData data = scene::BuildScene(description.settings, {});
+    const Hashes hashes = Play(data.View(), expected.seconds, threads);
+    EXPECT_GT(cut_length_m_, 2e-3f) << "nothing was cut: the hash says little";
+    const Hashes committed{
+        {"physics_node", expected.physics}, {"thermal_node", expected.thermal}, {"haptics_node", expected.haptics}};
+    EXPECT_EQ(hashes, committed) << threads << " threads, kernels " << physics::BestKernels().name
+                                 << "; if the numerics were meant to change, its row is now:\n"
+                                 << Row(expected, hashes);
+  }
+
+  const std::filesystem::path folder_;
+  mutable float cut_length_m_ = 0;
+};
+
+TEST_F(StateHash, OfSmallIsTheCommittedOneOnOneThread) { Check(kSmall, 1); }
+
+TEST_F(StateHash, OfSmallIsTheCommittedOneOnTwoThreads) { Check(kSmall, 2); }
+
+TEST_F(StateHash, OfBuiltInIsTheCommittedOne) { Check(kBuiltIn, 2); }
+
+}  // namespace
+}  // namespace fulcrum::replay
