@@ -18,7 +18,7 @@
 #include "services/bus/dds/participant.h"
 #include "services/bus/input_account.h"
 #include "services/core/messages.h"
-#include "services/runtime/realtime.h"
+#include "services/runtime/cyclic_thread.h"
 #include "services/scene/build.h"
 #include "services/scene/scene_file.h"
 #include "services/supervisor/child_process.h"
@@ -141,7 +141,7 @@ class SupervisorTest : public ::testing::Test {
   }
 
   /// In the place of haptics and physics: tool 0 goes round at 40 mm/s, tool 1 presses with 12.5 N.
-  static void PublishMotion(ChildProcess* until_end) {
+  static ProcessEnd PublishMotion(ChildProcess* until_end) {
     bus::DdsParticipant bus(bus::DdsSettings{.domain = kDomain, .node_name = "hands"});
     const auto tools = bus.MakeOutput<ToolState>();
     const auto models = bus.MakeOutput<ContactModel>();
@@ -152,7 +152,10 @@ class SupervisorTest : public ::testing::Test {
     model.devices[1].count = 1;
     model.devices[1].contacts[0].kind = ContactKind::kSurface;
     model.devices[1].contacts[0].f_ref = Vec3f(0, 0, 12.5f);
-    while (until_end->running()) {
+    for (;;) {
+      if (const auto end = until_end->Poll()) {
+        return *end;
+      }
       const std::int64_t now = runtime::MonotonicNs();
       const double angle = 1e-9 * static_cast<double>(now % 1'000'000'000'000) * 0.040 / 0.020;
       tool.stamp = tool_stamper.Next(now);
@@ -162,7 +165,6 @@ class SupervisorTest : public ::testing::Test {
       tools->Write(tool);
       models->Write(model);
       std::this_thread::sleep_for(2ms);
-      (void)until_end->Poll();
     }
   }
 
@@ -373,8 +375,7 @@ TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
   data.fixed.assessment.on = 1;
   scene::WriteSceneFile(data, "name: tiny\n", scene_);
   ChildProcess up = Up({"--seconds", "3", "--trainee", "Ann", "--database", database});
-  PublishMotion(&up);
-  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
+  EXPECT_EQ(PublishMotion(&up).exit_code, 0) << Log();
   EXPECT_NE(Log().find("! force too high · score "), std::string::npos) << Log();
   const std::string json = ReadAll(Session() / "assessment.json");
   EXPECT_NE(json.find("\"peak_force_N\": 12.5,"), std::string::npos) << json;
