@@ -198,7 +198,7 @@ class Host {
   const HostSettings settings_;
   DomainGuard guard_;
   const std::filesystem::path memory_;
-  Progress progress_;
+  Progress progress_{false};
   std::optional<bus::DdsParticipant> local_;
   link::Link link_;  ///< Ends before the bus that it has ports of.
   link::Link::Session session_;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <boost/program_options.hpp>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -53,6 +54,11 @@ void AddDomain(boost::program_options::options_description* options);
 [[nodiscard]] int DomainOf(const Arguments& arguments, int fallback);
 
 inline constexpr int kDefaultDomain = 7;
+
+/// Adds --cart.
+void AddCart(boost::program_options::options_description* options);
+/// Its value, else the cart of this machine if it has one; empty: everything is simulated.
+[[nodiscard]] std::filesystem::path CartOf(const Arguments& arguments);
 
 /// The other programs of the installation.
 [[nodiscard]] std::span<const char* const> Programs();
