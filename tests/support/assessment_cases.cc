@@ -324,6 +324,8 @@ CauteryContact TipAt(double time_s, const Vec2f& material, bool touching, Cauter
   contact.session_time_s = time_s;
   contact.touching = touching;
   contact.material = material;
+  contact.triangle = 0;
+  contact.barycentric = {1, 0, 0};
   contact.mode = mode;
   contact.power_W = mode == CauteryMode::kOff ? 0.0f : 35.0f;
   contact.tool = 1;

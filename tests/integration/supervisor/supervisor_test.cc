@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -14,7 +15,10 @@
 #include <thread>
 #include <vector>
 
+#include "services/bus/dds/participant.h"
+#include "services/bus/input_account.h"
 #include "services/core/messages.h"
+#include "services/runtime/cyclic_thread.h"
 #include "services/scene/build.h"
 #include "services/scene/scene_file.h"
 #include "services/supervisor/child_process.h"
@@ -134,6 +138,34 @@ class SupervisorTest : public ::testing::Test {
       names.push_back(entry.path().filename());
     }
     return names;
+  }
+
+  /// In the place of haptics and physics: tool 0 goes round at 40 mm/s, tool 1 presses with 12.5 N.
+  static ProcessEnd PublishMotion(ChildProcess* until_end) {
+    bus::DdsParticipant bus(bus::DdsSettings{.domain = kDomain, .node_name = "hands"});
+    const auto tools = bus.MakeOutput<ToolState>();
+    const auto models = bus.MakeOutput<ContactModel>();
+    bus::Stamper tool_stamper(runtime::MonotonicNs()), model_stamper(runtime::MonotonicNs());
+    ToolState tool;
+    tool.tools[0].kind = ToolKind::kGrasper;
+    ContactModel model;
+    model.devices[1].count = 1;
+    model.devices[1].contacts[0].kind = ContactKind::kSurface;
+    model.devices[1].contacts[0].f_ref = Vec3f(0, 0, 12.5f);
+    for (;;) {
+      if (const auto end = until_end->Poll()) {
+        return *end;
+      }
+      const std::int64_t now = runtime::MonotonicNs();
+      const double angle = 1e-9 * static_cast<double>(now % 1'000'000'000'000) * 0.040 / 0.020;
+      tool.stamp = tool_stamper.Next(now);
+      tool.tools[0].p_WT = 0.020f * Vec3f(static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), 0);
+      model.stamp = model_stamper.Next(now);
+      model.tool_stamp_ns = now;
+      tools->Write(tool);
+      models->Write(model);
+      std::this_thread::sleep_for(2ms);
+    }
   }
 
   fs::path folder_, scene_;
@@ -342,8 +374,18 @@ TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
   scene::SceneData data = TinyScene(1u << static_cast<unsigned>(NodeId::kPhysics));
   data.fixed.assessment.on = 1;
   scene::WriteSceneFile(data, "name: tiny\n", scene_);
-  EXPECT_EQ(end_of({"--seconds", "1", "--trainee", "Ann", "--database", database}), 0) << Log();
-  EXPECT_NE(Log().find("score "), std::string::npos) << Log();
+  ChildProcess up = Up({"--seconds", "3", "--trainee", "Ann", "--database", database});
+  EXPECT_EQ(PublishMotion(&up).exit_code, 0) << Log();
+  EXPECT_NE(Log().find("! force too high · score "), std::string::npos) << Log();
+  const std::string json = ReadAll(Session() / "assessment.json");
+  EXPECT_NE(json.find("\"peak_force_N\": 12.5,"), std::string::npos) << json;
+  EXPECT_NE(json.find("\"peak_force_N.passed\": false"), std::string::npos) << json;
+  const std::size_t path = json.find("\"path_length_mm\": ");
+  ASSERT_NE(path, std::string::npos) << json;
+  // 40 mm a second, from when the bus has brought us together.
+  const double path_mm = std::stod(json.substr(path + 18));
+  EXPECT_GT(path_mm, 60);
+  EXPECT_LT(path_mm, 125);
   EXPECT_NE(ReadAll(Session() / "assessment.json").find("\"trainee\": \"Ann\""), std::string::npos);
   EXPECT_NE(ReadAll(Session() / "report.html").find("Score sheet of Ann"), std::string::npos);
   EXPECT_NE(ReadAll(Session() / "summary.json").find("\"score_pct\": "), std::string::npos);
