@@ -98,8 +98,8 @@ class NodeApp {
   /// Session time of a monotonic stamp, from SceneManifest; negative until the session is known. Real-time safe.
   [[nodiscard]] double SessionTime(std::int64_t stamp_ns) const noexcept;
 
-  /// What the node does on a Command with this verb, beside "stop" and "restart": gets the argument and returns the reply's text; an
-  /// exception refuses. Called on the thread of Run(). Before Run().
+  /// What the node does on a Command with this verb, beside "stop" and "restart": gets the argument and returns the
+  /// reply's text; an exception refuses. Called on the thread of Run(). Before Run().
   void OnCommand(std::string verb, std::function<std::string(const std::string&)> handler);
 
   /// What goes into Health beside rates and timing: metrics, state, last_error. Called at 10 Hz on the health thread,

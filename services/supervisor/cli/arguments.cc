@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "services/core/error.h"
+#include "services/runtime/install_places.h"
 #include "services/supervisor/cli/commands.h"
 
 namespace fulcrum::supervisor::cli {
@@ -51,6 +52,20 @@ int DomainOf(const Arguments& arguments, int fallback) {
     throw InputError("--domain " + std::to_string(domain) + ": must be 1 to 100");
   }
   return domain;
+}
+
+void AddCart(po::options_description* options) {
+  options->add_options()(
+      "cart", po::value<std::string>()->value_name("FILE"),
+      "cart configuration (default: /etc/fulcrum/cart.yaml of an installation, else everything simulated)");
+}
+
+std::filesystem::path CartOf(const Arguments& arguments) {
+  if (arguments.values.count("cart") != 0) {
+    return std::filesystem::absolute(arguments.values["cart"].as<std::string>());
+  }
+  const std::filesystem::path machine = runtime::MachineCart();
+  return std::filesystem::exists(machine) ? machine : std::filesystem::path();
 }
 
 std::filesystem::path UserFolder(const char* variable, const char* fallback) {

@@ -55,6 +55,11 @@ void AddDomain(boost::program_options::options_description* options);
 
 inline constexpr int kDefaultDomain = 7;
 
+/// Adds --cart.
+void AddCart(boost::program_options::options_description* options);
+/// Its value, else the cart of this machine if it has one; empty: everything is simulated.
+[[nodiscard]] std::filesystem::path CartOf(const Arguments& arguments);
+
 /// The other programs of the installation.
 [[nodiscard]] std::span<const char* const> Programs();
 [[nodiscard]] bool IsProgram(const std::string& name);

@@ -22,8 +22,8 @@ ExitCode Console(const Words& words) {
       ("token-file", po::value<std::string>()->value_name("FILE"),                                                    //
        "keep the token in this file, and use the one that is in it (default: a new one at each start)")               //
       ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "session folders are made in here")  //
-      ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration (default: everything simulated)")    //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that scenes import");
+  AddCart(&options);
   AddDomain(&options);
   const Arguments arguments = Parse("console", words, options);
   if (arguments.help) {
@@ -43,7 +43,7 @@ ExitCode Console(const Words& words) {
     settings.host_names = values["host-name"].as<Words>();
   }
   settings.token_file = path("token-file");
-  settings.cart = path("cart");
+  settings.cart = CartOf(arguments);
   settings.data = path("data");
   settings.out = path("out");
   settings.scenes = runtime::ShareFolder() / "scenes";

@@ -1,12 +1,6 @@
 // fulcrum test-node: one node, headless, against a recorded log. The program `replayer` holds the node classes, so it
 // makes the test.
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
-
 #include "services/core/error.h"
-#include "services/runtime/install_places.h"
 #include "services/supervisor/cli/commands.h"
 
 namespace fulcrum::supervisor::cli {
@@ -16,14 +10,6 @@ namespace po = boost::program_options;
 
 /// Options that replayer knows by the same name.
 constexpr const char* kPassedOn[] = {"expect", "junit", "scene", "cart", "threads", "until"};
-
-[[noreturn]] void Become(const std::filesystem::path& program, const Words& words) {
-  std::vector<char*> pointers{const_cast<char*>(program.c_str())};
-  for (const std::string& word : words) pointers.push_back(const_cast<char*>(word.c_str()));
-  pointers.push_back(nullptr);
-  ::execv(program.c_str(), pointers.data());
-  throw InputError(program.string() + ": cannot be run: " + std::strerror(errno));
-}
 
 }  // namespace
 
@@ -59,7 +45,7 @@ ExitCode TestNode(const Words& words) {
         "which node, and against which log? For example: fulcrum test-node thermal --inputs out/latest/recording.mcap "
         "--assert \"cut_length_mm > 30\"");
   }
-  Words command{values["inputs"].as<std::string>(), "--test", values["node"].as<std::string>()};
+  Words command{"replayer", values["inputs"].as<std::string>(), "--test", values["node"].as<std::string>()};
   for (const char* name : kPassedOn) {
     if (values.count(name) != 0) command.push_back(std::string("--") + name + '=' + values[name].as<std::string>());
   }
@@ -68,7 +54,7 @@ ExitCode TestNode(const Words& words) {
       command.push_back("--assert=" + text);
     }
   }
-  Become(runtime::ProgramFolder() / "replayer", command);
+  Become(command);
 }
 
 }  // namespace fulcrum::supervisor::cli

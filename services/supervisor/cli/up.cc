@@ -27,6 +27,9 @@ fs::path AttachTo(const po::variables_map& values) {
   if (values.count("standby") != 0) {
     throw InputError("--attach: a standby is not possible, as each node is one service");
   }
+  if (values.count("peer") != 0) {
+    throw InputError("--attach: nodes on another host are not possible with it");
+  }
   const char* folder = std::getenv("RUNTIME_DIRECTORY");
   if (folder == nullptr || !fs::is_directory(folder)) {
     throw InputError(
@@ -45,9 +48,7 @@ ExitCode Up(const Words& words) {
       ("window", "show the picture in a window as well")                                                              //
       ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                                //
        "of the picture: auto, low, high")                                                                             //
-      ("cart", po::value<std::string>()->value_name("FILE"),
-       "cart configuration (default: /etc/fulcrum/cart.yaml of an installation, else everything simulated)")  //
-      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")    //
+      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")            //
       ("set", po::value<Words>()->value_name("SECTION.KEY=VALUE")->composing(),
        "a parameter of physics, thermal, haptics, breathing or render other than the scene has it, or script.power_W, "
        "the generator's setting; as often as needed")  //
@@ -69,6 +70,7 @@ ExitCode Up(const Words& words) {
   options.add_options()("trainee", po::value<std::string>()->value_name("NAME"),
                         "remember the score under this name: see fulcrum trainee");
   AddDatabase(&options);
+  AddCart(&options);
   AddDomain(&options);
   const Arguments arguments = Parse("up", words, options, {"scene"});
   if (arguments.help) {
@@ -80,11 +82,8 @@ ExitCode Up(const Words& words) {
   }
   UpSettings settings;
   settings.programs = runtime::ProgramFolder();
-  const fs::path machine = runtime::MachineCart();
-  if (values.count("cart") != 0) {
-    settings.cart = config::LoadCart(values["cart"].as<std::string>());
-  } else if (!machine.empty() && fs::exists(machine)) {
-    settings.cart = config::LoadCart(machine);
+  if (const fs::path cart = CartOf(arguments); !cart.empty()) {
+    settings.cart = config::LoadCart(cart);
   }
   settings.cart.domain = DomainOf(arguments, settings.cart.domain);
   settings.out = values["out"].as<std::string>();
