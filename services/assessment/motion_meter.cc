@@ -27,7 +27,7 @@ Vec3d LowPass::Filter(const Vec3d& x) {
     fresh_ = false;
     x1_ = x2_ = y1_ = y2_ = x;
   }
-  const Vec3d y = b * (x + 2 * x1_ + x2_) - a1 * y1_ - a2 * y2_;
+  Vec3d y = b * (x + 2 * x1_ + x2_) - a1 * y1_ - a2 * y2_;
   x2_ = std::exchange(x1_, x);
   y2_ = std::exchange(y1_, y);
   return y;

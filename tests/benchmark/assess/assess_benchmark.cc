@@ -27,6 +27,7 @@ void MeasureCost(const char* name, int count, const Make& make, Report* report) 
   using Message = decltype(make(0));
   const test::AssessedScene scene;
   std::vector<Message> messages;
+  messages.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) messages.push_back(make(i));
   const auto times_ms = TimeMs(1, report->quick() ? 3 : 15, [&] {
     assessment::Assessor assessor(scene.view);

@@ -61,7 +61,7 @@ class AssessRecording : public testing::Test {
     std::uint64_t scene_hash = 0;
   };
   fs::path Record(const Told& told) const {
-    const fs::path file = folder_ / "session.mcap";
+    fs::path file = folder_ / "session.mcap";
     recording::McapWriter writer(file, "fulcrum", "fulcrum test");
     std::map<TopicId, std::uint16_t> channels;
     std::uint32_t sequence = 0;
