@@ -252,7 +252,7 @@ TEST(KeyFolder, SaysWhatIsWrongWithAKeyAndWhatToDo) {
   const auto nothing = [](const keys::KeyFiles&) {};
   EXPECT_EQ(ProblemAfter(nothing), "");
   ExpectSaid(ProblemAfter([](const auto& files) { fs::remove(files.key); }),
-             {"render_node.key", "cannot be read", "fulcrum keys init"});
+             {"render_node.key", "No such file", "fulcrum keys init"});
   ExpectSaid(ProblemAfter([](const auto& files) { Write(files.key, "no key"); }),
              {"render_node.key", "is no private key"});
   ExpectSaid(ProblemAfter([](const auto& files) {
