@@ -161,8 +161,8 @@ void WriteJUnit(const NodeTestResult& result, const std::filesystem::path& file)
       continue;
     }
     const std::string kind = test.verdict == Verdict::kFailed ? "failure" : "error";
-    xml += ">\n      <" + kind + attribute("message", test.message) + ">" +
-           EscapeHtml(test.name + ": " + test.message) + "</" + kind + ">\n    </testcase>\n";
+    xml.append(">\n      <").append(kind).append(attribute("message", test.message)).append(">");
+    xml.append(EscapeHtml(test.name + ": " + test.message)).append("</").append(kind).append(">\n    </testcase>\n");
   }
   WriteText(file, xml + "  </testsuite>\n</testsuites>\n");
 }
