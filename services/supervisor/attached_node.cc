@@ -51,8 +51,8 @@ void WatchedProcess::Forget() {
   pid_ = 0;
 }
 
-AttachedNode::AttachedNode(NodeCommand command, std::filesystem::path folder, Order order)
-    : command_(std::move(command)), file_(std::move(folder) / NodeName(command_.id)), order_(std::move(order)) {}
+AttachedNode::AttachedNode(NodeCommand command, const std::filesystem::path& folder, Order order)
+    : command_(std::move(command)), file_(folder / NodeName(command_.id)), order_(std::move(order)) {}
 
 std::string AttachedNode::ArgumentsFile(const std::vector<std::string>& arguments) {
   std::string words;

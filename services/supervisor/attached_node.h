@@ -32,7 +32,7 @@ class AttachedNode final : public SupervisedNode {
   /// Sends a Command with this verb to a node.
   using Order = std::function<void(NodeId, const char* verb)>;
   /// `folder`: the file of arguments is written here, under the node's name.
-  AttachedNode(NodeCommand command, std::filesystem::path folder, Order order);
+  AttachedNode(NodeCommand command, const std::filesystem::path& folder, Order order);
 
   /// The folder of the files, in the session's.
   static constexpr const char* kFolder = "nodes";
