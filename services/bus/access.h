@@ -4,7 +4,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "services/core/messages.h"
@@ -38,6 +40,7 @@ inline constexpr TopicSet kAll = (TopicSet{1} << kTopicCount) - 1;
 inline constexpr TopicSet kNodeWrites = SetOf(kCommandReply, kHealth);
 inline constexpr TopicSet kNodeReads = SetOf(kSceneManifest, kCommand);
 
+/// The nodes first, by NodeId.
 inline constexpr std::array kRoles{
     AccessRole{"supervisor", SetOf(kSceneManifest, kCommand, kCommandReply, kHealth),
                SetOf(kCommand, kThermalEvent, kHealth, kToolState, kContactModel, kCauteryContact, kTopologyState,
@@ -66,5 +69,20 @@ inline constexpr const auto& kAccessRoles = access::kRoles;
   }
   return nullptr;
 }
+
+/// The node that sends a topic; none for those that several participants send. A replayer only stands in.
+[[nodiscard]] constexpr std::optional<NodeId> OwnerOf(TopicId topic) {
+  std::optional<NodeId> owner;
+  int writers = 0;
+  for (std::size_t i = 0; i < kAccessRoles.size(); ++i) {
+    if (kAccessRoles[i].identity == kReplayerIdentity || !Contains(kAccessRoles[i].writes, topic)) continue;
+    ++writers;
+    if (i < kNodeCount) owner = static_cast<NodeId>(i);
+  }
+  return writers == 1 ? owner : std::nullopt;
+}
+static_assert(OwnerOf(TopicId::kSceneManifest) == NodeId::kSupervisor &&
+              OwnerOf(TopicId::kToolState) == NodeId::kHaptics && OwnerOf(TopicId::kThermalEvent) == NodeId::kThermal &&
+              !OwnerOf(TopicId::kCommand));
 
 }  // namespace fulcrum::bus

@@ -6,9 +6,9 @@
 #include <type_traits>
 #include <utility>
 
+#include "services/bus/access.h"
 #include "services/bus/convert/cdr.h"
 #include "services/bus/gate.h"
-#include "services/bus/topic_owner.h"
 #include "services/bus/topics.h"
 #include "services/core/message_time.h"
 #include "services/link/codec/byte_delta.h"

@@ -5,10 +5,11 @@
 #include <fstream>
 #include <utility>
 
+#include "services/bus/access.h"
 #include "services/bus/schema.h"
-#include "services/bus/topic_owner.h"
 #include "services/bus/topics.h"
 #include "services/core/error.h"
+#include "services/core/tick.h"
 #include "services/runtime/cyclic_thread.h"
 
 namespace fulcrum::link {
@@ -17,16 +18,16 @@ namespace {
 using bus::FarLane;
 using runtime::MonotonicNs;
 
-constexpr std::int64_t kMilli = 1'000'000, kSecond = 1'000'000'000;
+constexpr std::int64_t kMilli = 1'000'000;
 constexpr std::int64_t kPulsePeriod = 50 * kMilli;
 // A pulse that is missing for so long: the other side is not connected, and will have missed what was sent.
-constexpr std::int64_t kSilence = kSecond;
+constexpr std::int64_t kSilence = kSecond_ns;
 // Within the lease of the participants a cable that comes back finds all as it was; about the lease one side may have
 // dropped the other but not the other way round, which the library sorts out only after long. New ones find each other
 // at once.
-constexpr std::int64_t kPatience = 3 * kSecond;
+constexpr std::int64_t kPatience = 3 * kSecond_ns;
 // A topic is carried on for so long after its last reader has gone: he may be restarting.
-constexpr std::int64_t kUnwanted = 2 * kSecond;
+constexpr std::int64_t kUnwanted = 2 * kSecond_ns;
 constexpr std::int64_t kLongestSleep = 20 * kMilli;
 constexpr std::size_t kLongestInbox = 4096;
 constexpr std::uint32_t kAllNodes = (1u << kNodeCount) - 1;

@@ -17,7 +17,6 @@
 #include "services/bus/dds/participant.h"
 #include "services/bus/dds/shared_memory.h"
 #include "services/bus/gate.h"
-#include "services/bus/topic_owner.h"
 #include "services/bus/topics.h"
 #include "services/core/message_time.h"
 #include "services/recording/time_order.h"
