@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "handle_bridge/estimator/jaw_calibration.h"
+#include "handle_bridge/protocol/jaw_line.h"
 #include "services/config/strict_yaml.h"
 
 namespace fulcrum::handle_bridge {
@@ -15,8 +16,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using config::Range;
-
-constexpr double kMaxCode = 1023;
 
 /// A file name for any serial number.
 std::string FileName(const std::string& unit) {

@@ -5,7 +5,6 @@
 namespace fulcrum::handle_bridge {
 namespace {
 
-constexpr std::string_view kHex = "0123456789ABCDEF";
 constexpr std::size_t kBodyBegin = 1, kBodySize = 8, kLineSize = 12;
 
 constexpr std::array<std::uint8_t, 256> MakeCrcTable() {
@@ -31,7 +30,7 @@ std::uint8_t Crc8(std::string_view bytes) {
 }
 
 std::optional<std::uint8_t> ParseHexByte(char high, char low) {
-  const std::size_t h = kHex.find(high), l = kHex.find(low);
+  const std::size_t h = kHexDigits.find(high), l = kHexDigits.find(low);
   if (h == std::string_view::npos || l == std::string_view::npos) {
     return {};
   }
@@ -62,16 +61,16 @@ std::optional<Frame> ParseFrame(std::string_view line) noexcept {
 
 std::array<char, 14> FormatFrame(const Frame& frame) noexcept {
   std::array<char, 14> line = {'$', frame.sender, '0', '0', ',', '0', '0', '0', '0', '*', '0', '0', '\r', '\n'};
-  line[2] = kHex[frame.sequence >> 4];
-  line[3] = kHex[frame.sequence & 15];
+  line[2] = kHexDigits[frame.sequence >> 4];
+  line[3] = kHexDigits[frame.sequence & 15];
   int value = frame.value;
   for (std::size_t place = 8; place >= 5; --place) {
     line[place] = static_cast<char>('0' + value % 10);
     value /= 10;
   }
   const std::uint8_t crc = Crc8({line.data() + kBodyBegin, kBodySize});
-  line[10] = kHex[crc >> 4];
-  line[11] = kHex[crc & 15];
+  line[10] = kHexDigits[crc >> 4];
+  line[11] = kHexDigits[crc & 15];
   return line;
 }
 

@@ -20,6 +20,7 @@ namespace fulcrum::handle_bridge {
 inline constexpr char kLeftHandle = 'L';
 inline constexpr char kRightHandle = 'R';
 inline constexpr char kPedalSender = 'P';
+inline constexpr std::string_view kHexDigits = "0123456789ABCDEF";
 
 struct Frame {
   char sender = kLeftHandle;

@@ -3,13 +3,6 @@
 #include <algorithm>
 
 namespace fulcrum::physics {
-namespace {
-
-/// With a particle that cannot move, the others must not make up for all of it; as in ToolCollision.
-constexpr float kLeastShare = 0.25f;
-
-}  // namespace
-
 std::size_t ProjectRows(std::span<ContactRow> rows, float max_push, float dt_s, ParticleStore* particles) {
   std::size_t pushed = 0;
   for (ContactRow& row : rows) {

@@ -8,6 +8,10 @@
 
 namespace fulcrum::physics {
 
+/// With a corner that cannot move, the others must not make up for all of it: they move at most as if this part of the
+/// lightest corner's inverse mass stood against them. Three free corners of equal mass have at least 1/3.
+inline constexpr float kLeastShare = 0.25f;
+
 /// Moves particles until each violated row in turn holds, by at most `max_push` [m] a row, with Coulomb friction
 /// against the movement since ParticleStore::Previous. Inverse masses share the work. Adds to each row's force_N the
 /// force that would have moved the particles as far within dt_s. Returns how many rows pushed.

@@ -14,7 +14,7 @@ constexpr float kMaxReach = 0.005f;
 /// Closest points are exact for pairs that come this near to touch [m].
 constexpr float kNear = 0.001f;
 /// A tool deeper behind a triangle than this has gone through it for good: pushing would only tear [m].
-constexpr float kMaxBehind = 0.004f;
+constexpr float kMostBehindTool = 0.004f;
 /// After closing or letting go, jaws collide again when nothing has been in their way for so many steps.
 constexpr int kClearSteps = 5;
 /// Jaws that have closed on nothing are clear of what is further than this part of their radius from their axis.
@@ -24,7 +24,7 @@ constexpr float kClearPart = 0.5f;
 constexpr Index kPatch = 3;
 /// On which side of a triangle the tool is, can be told only where its offset is this much along the normal, and not
 /// beside an edge.
-constexpr float kBesideCosine = 0.7f;
+constexpr float kBesideToolCosine = 0.7f;
 /// Squared distances at least so large are of triangles that were left alone [m^2].
 constexpr float kLeftAlone = 1e38f;
 /// Room for the pairs of a step: a tool among crumpled membrane.
@@ -177,7 +177,7 @@ void ToolCollision::FindSide(ContactPair* pair) {
   const Vec3f offset = motion_[pair->capsule].PointAt(pair->closest.t, 0.0f) -
                        (b[0] * particles_->Previous(pair->at[0]) + b[1] * particles_->Previous(pair->at[1]) +
                         b[2] * particles_->Previous(pair->at[2]));
-  const float height = NormalOf(*pair, true).dot(offset), steep = kBesideCosine * offset.norm();
+  const float height = NormalOf(*pair, true).dot(offset), steep = kBesideToolCosine * offset.norm();
   if (std::abs(height) > steep && steep > 0.0f) {
     pair->side = height > 0.0f ? std::int8_t{1} : std::int8_t{-1};
   } else if (known) {
@@ -359,12 +359,12 @@ ToolCollision::Push ToolCollision::PushOf(const ContactPair& pair, const Capsule
     }
     const float behind = std::min(side * pair.normal.dot(capsule.a - closest.on_triangle),
                                   side * pair.normal.dot(capsule.b - closest.on_triangle));
-    return behind > -kMaxBehind ? Push{reach - behind, -side * pair.normal} : Push{};
+    return behind > -kMostBehindTool ? Push{reach - behind, -side * pair.normal} : Push{};
   }
-  if (side * pair.normal.dot(offset) < -kBesideCosine * distance && !OnRim(pair)) {
+  if (side * pair.normal.dot(offset) < -kBesideToolCosine * distance && !OnRim(pair)) {
     // What did not touch it in the last step has come behind it in this one, or past a rim.
     const float come = reach + motion_[pair.capsule].travel + band_;
-    return distance < (pair.remembers ? kMaxBehind : std::min(kMaxBehind, come))
+    return distance < (pair.remembers ? kMostBehindTool : std::min(kMostBehindTool, come))
                ? Push{reach + distance, -side * pair.normal}
                : Push{};
   }

@@ -20,6 +20,9 @@
 
 namespace fulcrum::physics {
 
+/// Squared distance of a pair that is not near enough to look at [m^2].
+inline constexpr float kFarSq = 1.0f;
+
 /// A capsule near a triangle in this step.
 struct ContactPair {
   std::uint32_t capsule = 0;     ///< tool * kMaxCapsules + capsule of the tool.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "physics_node/collision/row_projection.h"
 #include "physics_node/collision/tool_collision.h"
 
 namespace fulcrum::physics {
@@ -11,10 +12,6 @@ namespace {
 constexpr float kSweepPiece = 0.8f;
 /// … but at most into this many.
 constexpr int kMaxPieces = 16;
-/// With a corner that cannot move, the others must not make up for all of it: they move at most as if this part of the
-/// lightest corner's inverse mass stood against them. Three free corners of equal mass have at least 1/3.
-constexpr float kLeastShare = 0.25f;
-constexpr float kFarSq = 1.0f;
 
 }  // namespace
 

@@ -12,7 +12,6 @@ constexpr float kSmallMove = 0.25f;
 /// On the way to the first touch a look is at least this part of the radius further, or kMaxLooks would not do.
 constexpr float kLeastAdvance = 0.5f;
 constexpr float kMaxLooks = 24.0f;
-constexpr float kFarSq = 1.0f;
 
 /// The corners that a row rests on when they are one or two: equal for all triangles that share them.
 std::uint64_t SharedFeature(const ContactRow& row) {

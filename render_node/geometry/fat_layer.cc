@@ -10,7 +10,7 @@ namespace {
 // that the two surfaces do not fight for the same pixel.
 constexpr float kMostDepth = 0.0025f;   // [m]
 constexpr float kLeastDepth = 0.0006f;  // [m]
-constexpr float kThick = 0.004f;        // [m]
+constexpr float kThickFat = 0.004f;     // [m]
 // Share of the membrane's lift beyond rest that the loose fat follows; the rest is torn open areolar tissue.
 constexpr float kFollow = 0.45f;
 
@@ -55,7 +55,7 @@ FatLayer::FatLayer(const SceneView& scene, std::uint32_t stride) {
   }
   std::nth_element(gaps.begin(), gaps.begin() + static_cast<std::ptrdiff_t>(gaps.size() / 10), gaps.end());
   for (const Anchor& anchor : anchors_) {
-    thickness_.push_back(std::clamp((anchor.rest_gap - gaps[gaps.size() / 10]) / kThick, 0.0f, 1.0f));
+    thickness_.push_back(std::clamp((anchor.rest_gap - gaps[gaps.size() / 10]) / kThickFat, 0.0f, 1.0f));
   }
   const auto width = static_cast<Index>(cols.size());
   for (Index r = 0; r + 1 < rows.size(); ++r) {

@@ -10,7 +10,6 @@ constexpr Colour kSteel{0.52f, 0.53f, 0.55f, 1.0f};
 constexpr Colour kInsulation{0.012f, 0.012f, 0.014f, 0.25f};
 // Steel begins this far behind the hinge, as on the instruments of geometry/solid.cc, or behind the hook's heel.
 constexpr float kBehindHinge = 0.008f;  // [m]
-constexpr float kHookNeck = 0.012f;     // [m]
 
 }  // namespace
 

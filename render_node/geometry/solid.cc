@@ -11,7 +11,6 @@ constexpr Colour kSteel{0.42f, 0.44f, 0.46f, 1.0f};
 constexpr Colour kPolishedSteel{0.60f, 0.61f, 0.63f, 1.0f};
 constexpr Colour kInsulation{0.012f, 0.012f, 0.014f, 0.25f};
 constexpr Colour kCeramic{0.70f, 0.67f, 0.60f, 0.10f};
-constexpr float kHookNeck = 0.012f;  // [m], as the collision shape of the physics node.
 
 void AppendQuadFace(const std::array<Vec3f, 4>& corners, const Colour& colour, Solid* solid) {
   const Vec3f area = (corners[2] - corners[0]).cross(corners[3] - corners[1]);

@@ -19,6 +19,8 @@ struct Solid {
 
 using Colour = std::array<float, 4>;
 
+inline constexpr float kHookNeck = 0.012f;  ///< [m], as the collision shape of the physics node.
+
 /// A round tube along a polyline, with `segments` sides and capped ends. @pre two points or more; radii as many.
 void AppendTube(std::span<const Vec3f> path, std::span<const float> radii, int segments, const Colour& colour,
                 Solid* solid);

@@ -11,7 +11,6 @@ namespace {
 
 constexpr int kSamples = 28;               // Along an instrument …
 constexpr float kLength = 0.13f;           // … over so much of it, from the tip [m]; denser near the tip.
-constexpr float kHookNeck = 0.012f;        // [m], as geometry/solid.cc draws it.
 constexpr float kTransition = 0.006f;      // From the tip's radius to the shaft's [m].
 constexpr float kLeastPenumbra = 0.6e-3f;  // [m]
 constexpr float kPenumbra = 0.05f;  // Half width of the soft edge per height: what the crescent of fibres subtends.

@@ -1,6 +1,5 @@
 #include "render_node/offscreen/framebuffer.h"
 
-#define GL_GLEXT_PROTOTYPES
 #include <GL/gl.h>
 #include <GL/glext.h>
 

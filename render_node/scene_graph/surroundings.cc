@@ -79,16 +79,16 @@ void Surroundings::AddMask(const Laparoscope& scope) {
   Mesh mask("mask", false);
   mask.state()->setAttributeAndModes(MakeProgram("mask.vert", "mask.frag"));
   DrawIn(Order::kMask, mask.state());
-  constexpr Index kSides = 128;
+  constexpr Index kRimSides = 128;
   std::vector<Vec3f> positions;
   std::vector<Triangle> triangles;
-  for (Index k = 0; k < kSides; ++k) {
-    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kSides;
+  for (Index k = 0; k < kRimSides; ++k) {
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / kRimSides;
     for (const float radius : {scope.circle_radius, 4 * scope.picture_centre.maxCoeff()}) {
       positions.emplace_back(radius * std::cos(angle) / scope.picture_centre.x(),
                              radius * std::sin(angle) / scope.picture_centre.y(), 0.0f);
     }
-    const Index a = 2 * k, b = 2 * ((k + 1) % kSides);
+    const Index a = 2 * k, b = 2 * ((k + 1) % kRimSides);
     triangles.push_back({a, a + 1, b + 1});
     triangles.push_back({a, b + 1, b});
   }

@@ -2,10 +2,11 @@
 
 #include <algorithm>
 
+#include "services/assessment/gap.h"
+
 namespace fulcrum::assessment {
 namespace {
 
-constexpr double kGap_s = 0.1;  ///< Longer silence is not counted.
 /// A slip is over when the traction has fallen to this part of what the jaws hold.
 constexpr double kHeldAgain = 0.9;
 /// What jaws hold falls faster than that, per message, when they are opened: the noise of a handle is a third of it.

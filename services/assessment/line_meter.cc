@@ -4,10 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "services/assessment/gap.h"
+
 namespace fulcrum::assessment {
 namespace {
 
-constexpr double kGap_s = 0.1;  ///< Longer silence is not counted.
 constexpr double kBin_m = 1e-4;
 /// The spot of contact does not jump farther from one message to the next while it stays on the membrane [m].
 constexpr double kJump_m = 0.005;

@@ -4,13 +4,12 @@
 #include <numbers>
 #include <utility>
 
+#include "services/assessment/gap.h"
 #include "services/assessment/smoothness.h"
 
 namespace fulcrum::assessment {
 namespace {
 
-/// Longer silence is a gap: what happened in it is not known and not counted [s].
-constexpr double kGap_s = 0.1;
 /// A movement ends when the tip has been slow for so long: a turn stops it for a moment, too.
 constexpr int kSlowSamples = 10;
 /// A longer one is cut here, which bounds memory and the transform.

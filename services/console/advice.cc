@@ -4,16 +4,16 @@
 #include <string_view>
 #include <utility>
 
+#include "services/core/tick.h"
 #include "services/supervisor/outcome.h"
 #include "services/supervisor/session_view.h"
 
 namespace fulcrum::console {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 // A warning of heat stands as long as one has come lately; injuries stay.
-constexpr std::int64_t kWarningStands = 4 * kSecond;
-constexpr std::int64_t kRestartTold = 10 * kSecond;
+constexpr std::int64_t kWarningStands = 4 * kSecond_ns;
+constexpr std::int64_t kRestartTold = 10 * kSecond_ns;
 // Below this share of the rate asked for a node is slow: above the scatter of a second's count.
 constexpr float kSlowShare = 0.8f;
 
@@ -58,7 +58,7 @@ void WarnOfNode(const NodeReport& report, const SituationReport& situation, std:
     return;
   }
   if (IsStale(health, situation.now_ns)) {
-    const std::int64_t s = (situation.now_ns - health.stamp.stamp_ns) / kSecond;
+    const std::int64_t s = (situation.now_ns - health.stamp.stamp_ns) / kSecond_ns;
     warnings->push_back(
         {"fault", name + " has been silent for " + std::to_string(s) + " s. " + std::string(Missing(report.node)),
          "It is restarted by itself after 5 s. To be faster, press Restart at its row."});

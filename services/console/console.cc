@@ -24,6 +24,7 @@
 #include "services/console/session_run.h"
 #include "services/console/session_watch.h"
 #include "services/core/error.h"
+#include "services/core/tick.h"
 #include "services/runtime/cyclic_thread.h"
 #include "services/runtime/realtime.h"
 #include "services/supervisor/ask.h"
@@ -35,9 +36,8 @@ namespace fs = std::filesystem;
 using runtime::MonotonicNs;
 
 constexpr auto kTurn = std::chrono::milliseconds(200);
-constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kFeedPeriod = kSecond / 5;
-constexpr std::int64_t kTicketLife = 60 * kSecond;
+constexpr std::int64_t kFeedPeriod = kSecond_ns / 5;
+constexpr std::int64_t kTicketLife = 60 * kSecond_ns;
 constexpr std::size_t kMostRecordings = 50;
 // A report carries its own style and pictures, and nothing that runs.
 constexpr const char* kReportPolicy =

@@ -6,6 +6,8 @@
 
 namespace fulcrum {
 
+inline constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
 struct Tick {
   std::uint64_t index = 0;      ///< Counts periods since the node's epoch began; skipped periods are counted too.
   double session_time_s = 0.0;  ///< Time since the session started [s]; negative before a session is known.

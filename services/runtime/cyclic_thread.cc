@@ -65,10 +65,12 @@ struct CyclicThread::Impl {
     }
     if (settings.fifo_priority > 0) {
       const std::string warning = SetFifoPriority(settings.fifo_priority);
-      if (!warning.empty()) {
-        // Said once per process: every further thread would only repeat it.
-        static std::atomic<bool> said{false};
-        if (!said.exchange(true)) Log(LogLevel::kWarning, settings.name + ": " + warning);
+      // Once per process: every further thread would only repeat it.
+      static std::atomic<bool> done{false};
+      if (!done.exchange(true)) {
+        for (const std::string& problem : {warning, LockMemory()}) {
+          if (!problem.empty()) Log(LogLevel::kWarning, settings.name + ": " + problem);
+        }
       }
     } else {
       // A thread inherits its creator's policy: without this a helper of a FIFO thread would be FIFO too.

@@ -144,7 +144,10 @@ std::uint64_t ContentHash(const SceneView& view) {
 
 std::uint64_t WriteSceneFile(const SceneData& scene, const std::string& source_yaml,
                              const std::filesystem::path& file) {
-  const SceneView view = scene.View();
+  return WriteSceneFile(scene.View(), source_yaml, file);
+}
+
+std::uint64_t WriteSceneFile(const SceneView& view, const std::string& source_yaml, const std::filesystem::path& file) {
   if (const auto fault = FindFault(view)) {
     throw InputError("scene '" + std::string(view.name) + "': section '" + fault->section + "': " + fault->reason);
   }

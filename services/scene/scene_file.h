@@ -50,6 +50,7 @@ struct SceneData {
 
 /// Checks the scene and writes it atomically (temporary file, then rename). Returns the content hash.
 /// Throws InputError.
+std::uint64_t WriteSceneFile(const SceneView& scene, const std::string& source_yaml, const std::filesystem::path& file);
 std::uint64_t WriteSceneFile(const SceneData& scene, const std::string& source_yaml, const std::filesystem::path& file);
 
 class SceneFile {

@@ -8,16 +8,16 @@
 #include <utility>
 
 #include "services/core/error.h"
+#include "services/core/tick.h"
 #include "services/supervisor/session_folder.h"
 
 namespace fulcrum::supervisor {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 // Longer than a node takes to start; whoever starts it has then given up.
-constexpr std::int64_t kLongestAbsence = 60 * kSecond;
+constexpr std::int64_t kLongestAbsence = 60 * kSecond_ns;
 // The Health of one that ends in good order may come after its end is seen.
-constexpr std::int64_t kLastWords = kSecond / 4;
+constexpr std::int64_t kLastWords = kSecond_ns / 4;
 
 }  // namespace
 

@@ -9,6 +9,7 @@
 #include "services/bus/dds/participant.h"
 #include "services/bus/dds/shared_memory.h"
 #include "services/core/error.h"
+#include "services/core/tick.h"
 #include "services/link/link.h"
 #include "services/link/options.h"
 #include "services/runtime/cyclic_thread.h"
@@ -26,10 +27,9 @@ namespace {
 
 using runtime::MonotonicNs;
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr auto kLoopPeriod = std::chrono::milliseconds(5);
-constexpr std::int64_t kSweepAfter = 2 * kSecond;  // The dead process's lease is over then.
-constexpr std::int64_t kHeldUp = kSecond;          // A gap in our own loop: silence proves nothing.
+constexpr std::int64_t kSweepAfter = 2 * kSecond_ns;  // The dead process's lease is over then.
+constexpr std::int64_t kHeldUp = kSecond_ns;          // A gap in our own loop: silence proves nothing.
 
 class Host {
  public:

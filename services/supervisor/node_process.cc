@@ -10,18 +10,18 @@
 
 #include "services/core/error.h"
 #include "services/core/exit_code.h"
+#include "services/core/tick.h"
 #include "services/runtime/cyclic_thread.h"
 
 namespace fulcrum::supervisor {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 // Health comes ten times a second from a thread of its own: a node that is silent this long hangs.
-constexpr std::int64_t kLongestSilence = 5 * kSecond;
+constexpr std::int64_t kLongestSilence = 5 * kSecond_ns;
 // Until the first Health a node maps the scene and builds its solver.
-constexpr std::int64_t kLongestStart = 60 * kSecond;
-constexpr std::int64_t kPatienceWithRestart = 3 * kSecond;
-constexpr std::int64_t kLongestEnd = 4 * kSecond;
+constexpr std::int64_t kLongestStart = 60 * kSecond_ns;
+constexpr std::int64_t kPatienceWithRestart = 3 * kSecond_ns;
+constexpr std::int64_t kLongestEnd = 4 * kSecond_ns;
 constexpr auto kLook = std::chrono::milliseconds(5);
 
 /// Starting again with the same arguments would end the same way.

@@ -49,7 +49,7 @@ std::string Tag(const std::string& name, const std::string& text) {
   return "<" + name + ">" + EscapeHtml(text) + "</" + name.substr(0, name.find(' ')) + ">";
 }
 
-std::string Ms(float us) { return Fixed(1e-3 * static_cast<double>(us), 2); }
+std::string MsText(float us) { return Fixed(1e-3 * static_cast<double>(us), 2); }
 
 std::string Header(const SessionOutcome& outcome) {
   const bool good = outcome.exit_code == ExitCode::kDone;
@@ -144,9 +144,10 @@ std::string Nodes(const SessionOutcome& outcome, const SessionRecord& record) {
     html += node.failed ? "<tr class='bad'>" : "<tr>";
     html += Tag("td", std::string(NodeName(id)) + (node.failed ? " (failed)" : node.seen ? "" : " (silent)"));
     for (const std::string& cell :
-         {Fixed(node.rate_asked_Hz, 0), Fixed(node.rate_achieved_Hz, 1), Ms(node.step.p50_us), Ms(node.step.p99_us),
-          Ms(node.step.max_us), Ms(node.wake.p99_us), std::to_string(node.overruns), std::to_string(node.drops),
-          std::to_string(node.restarts), node.restarts > 0 ? Fixed(node.longest_rejoin_s, 2) : std::string("–")}) {
+         {Fixed(node.rate_asked_Hz, 0), Fixed(node.rate_achieved_Hz, 1), MsText(node.step.p50_us),
+          MsText(node.step.p99_us), MsText(node.step.max_us), MsText(node.wake.p99_us), std::to_string(node.overruns),
+          std::to_string(node.drops), std::to_string(node.restarts),
+          node.restarts > 0 ? Fixed(node.longest_rejoin_s, 2) : std::string("–")}) {
       html += Tag("td", cell);
     }
     html += "</tr>\n";
@@ -212,6 +213,8 @@ std::string Events(const SessionRecord& record) {
 }
 
 }  // namespace
+
+const char* PageStyle() { return kStyle; }
 
 std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& record, const std::filesystem::path& frames,
                        const std::filesystem::path& clip) {

@@ -18,6 +18,7 @@
 #include "services/bus/dds/shared_memory.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
+#include "services/core/tick.h"
 #include "services/link/health.h"
 #include "services/link/link.h"
 #include "services/link/options.h"
@@ -47,19 +48,18 @@ namespace {
 
 using runtime::MonotonicNs;
 
-constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr auto kLoopPeriod = std::chrono::milliseconds(5);
-constexpr std::int64_t kHealthPeriod = kSecond / 10;
+constexpr std::int64_t kHealthPeriod = kSecond_ns / 10;
 // A node that cannot start holds the session up no longer than this; it is then missing from the beginning.
-constexpr std::int64_t kLongestStart = 30 * kSecond;
+constexpr std::int64_t kLongestStart = 30 * kSecond_ns;
 // The manifest reaches all nodes before session time 0.
-constexpr std::int64_t kLeadTime = kSecond / 5;
+constexpr std::int64_t kLeadTime = kSecond_ns / 5;
 // Peers let go of a dead process's files when its lease of 1 s is over.
-constexpr std::int64_t kSweepAfter = 2 * kSecond;
+constexpr std::int64_t kSweepAfter = 2 * kSecond_ns;
 // A gap in our own loop: a suspended machine, a stopped supervisor. Then silence proves nothing.
-constexpr std::int64_t kHeldUp = kSecond;
+constexpr std::int64_t kHeldUp = kSecond_ns;
 // What a node says of a peer that is being restarted by command is no fault.
-constexpr std::int64_t kAskedFor = 3 * kSecond;
+constexpr std::int64_t kAskedFor = 3 * kSecond_ns;
 
 std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) {
   std::vector<NodeId> nodes;

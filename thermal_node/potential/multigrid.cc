@@ -9,7 +9,6 @@ namespace {
 
 /// Sweeps on the 2 x 2 level: enough that its error does not show.
 constexpr int kCoarsestSweeps = 8;
-constexpr float kTiny = std::numeric_limits<float>::min();
 
 }  // namespace
 

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <new>
 #include <vector>
 
 namespace fulcrum::thermal {
 
 inline constexpr float kJacobiWeight = 0.8f;  ///< Best smoothing of the five-point operator (factor 0.6).
+inline constexpr float kTiny = std::numeric_limits<float>::min();  ///< Keeps 0/0 where nothing conducts at 0.
 
 /// Widest vector of any CPU; a load that straddles two of its kind costs twice.
 inline constexpr std::size_t kVectorBytes = 64;

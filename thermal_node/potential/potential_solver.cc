@@ -62,8 +62,6 @@ void Add(float f, const Field& x, Field* y) {
   for (int k = 0; k < static_cast<int>(x.size()); ++k) py[k] += f * px[k];
 }
 
-constexpr float kTiny = std::numeric_limits<float>::min();
-
 /// Face conductances of the finest level. The halo of sigma is 0, which closes the window's border; what flows on
 /// beyond it is in `ground`.
 FULCRUM_WIDE

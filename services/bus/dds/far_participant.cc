@@ -37,16 +37,15 @@ namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
-constexpr std::uint32_t kMilli_ns = 1'000'000;
 // A cable that is put back within the lease finds everything as it was. services/link makes a new participant after a
 // longer silence, so a longer lease would only keep dead ones.
-const Duration_t kLease{5, 0};
-const Duration_t kAnnouncement{0, 200 * kMilli_ns};
-const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
+const Duration_t kFarLease{5, 0};
+const Duration_t kFarAnnouncement{0, 200 * kMilli_ns};
+const Duration_t kFarMaxBlocking{0, 5 * kMilli_ns};
 // The library's 3 s would be the price of each last packet that is lost.
 const Duration_t kHeartbeat{0, 20 * kMilli_ns};
 const Duration_t kResponse{0, 1 * kMilli_ns};
-constexpr std::uint32_t kSocketBuffer_B = 4u << 20;
+constexpr std::uint32_t kFarSocketBuffer_B = 4u << 20;
 /// The payload of UDP in an Ethernet frame: a lost frame then costs one fragment and not a datagram of forty.
 constexpr std::uint32_t kLargestDatagram_B = 1472;
 constexpr int kStreamBurst = 1024;  ///< Packets that may wait for the reader.
@@ -113,13 +112,13 @@ fast::DomainParticipantQos QosOf(const FarSettings& settings) {
   qos.name(settings.node_name);
   auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {settings.address};
-  udp->sendBufferSize = kSocketBuffer_B;
-  udp->receiveBufferSize = kSocketBuffer_B;
+  udp->sendBufferSize = kFarSocketBuffer_B;
+  udp->receiveBufferSize = kFarSocketBuffer_B;
   udp->maxMessageSize = kLargestDatagram_B;
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports.push_back(udp);
-  qos.wire_protocol().builtin.discovery_config.leaseDuration = kLease;
-  qos.wire_protocol().builtin.discovery_config.leaseDuration_announcementperiod = kAnnouncement;
+  qos.wire_protocol().builtin.discovery_config.leaseDuration = kFarLease;
+  qos.wire_protocol().builtin.discovery_config.leaseDuration_announcementperiod = kFarAnnouncement;
   // Known to the peer beforehand, so that it looks at one port only. Not automatic: those grow with each participant of
   // a process, also with one that is made again, and begin at 0.
   constexpr int kCartId = 100, kHostId = 101;
@@ -138,7 +137,7 @@ template <class Qos>
 void ApplyLane(FarLane lane, int depth, Qos* qos) {
   const bool ordered = lane == FarLane::kOrdered;
   qos->reliability().kind = ordered ? fast::RELIABLE_RELIABILITY_QOS : fast::BEST_EFFORT_RELIABILITY_QOS;
-  qos->reliability().max_blocking_time = kMaxBlocking;
+  qos->reliability().max_blocking_time = kFarMaxBlocking;
   qos->durability().kind = fast::VOLATILE_DURABILITY_QOS;
   qos->history().kind = fast::KEEP_LAST_HISTORY_QOS;
   qos->history().depth = depth;

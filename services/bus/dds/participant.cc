@@ -27,7 +27,6 @@ namespace fast = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 
-constexpr std::uint32_t kMilli_ns = 1'000'000;
 const Duration_t kLease{1, 0};
 const Duration_t kAnnouncement{0, 100 * kMilli_ns};
 /// A node's period is 10 ms or more wherever a reliable write may have to wait.

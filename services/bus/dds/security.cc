@@ -21,12 +21,12 @@
 namespace fulcrum::bus {
 namespace {
 
-constexpr const char* kAnnouncement = "security";
+constexpr const char* kAnnouncementFile = "security";
 
 }  // namespace
 
 void AnnounceSecurity(const std::filesystem::path& shared_memory, const Security& security) {
-  const std::filesystem::path file = shared_memory / kAnnouncement;
+  const std::filesystem::path file = shared_memory / kAnnouncementFile;
   std::error_code ignored;
   std::filesystem::remove(file, ignored);
   if (!security.on()) return;
@@ -36,7 +36,7 @@ void AnnounceSecurity(const std::filesystem::path& shared_memory, const Security
 }
 
 Security AnnouncedSecurity(const std::filesystem::path& shared_memory, std::string_view identity) {
-  std::ifstream in(shared_memory / kAnnouncement);
+  std::ifstream in(shared_memory / kAnnouncementFile);
   std::string mode, keys;
   if (!std::getline(in, mode) || !std::getline(in, keys)) return {};
   return {keys, std::string(identity), mode == "encrypt"};

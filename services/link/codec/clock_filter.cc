@@ -3,18 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/core/tick.h"
+
 namespace fulcrum::link {
 namespace {
 
-constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr std::int64_t kMemory_ns = 30 * kSecond;
+constexpr std::int64_t kMemory_ns = 30 * kSecond_ns;
 /// A trip that took longer than the quickest by more than this was held up on one of its ways.
 constexpr std::int64_t kHeldUp_ns = 200'000;
 /// Over less a line tells noise, not drift.
-constexpr std::int64_t kShortestLine_ns = 8 * kSecond;
+constexpr std::int64_t kShortestLine_ns = 8 * kSecond_ns;
 constexpr std::size_t kFewestForLine = 5;
 /// No round trip takes longer than this: the clock of one of the two went elsewhere.
-constexpr std::int64_t kLongestTrip_ns = 10 * kSecond;
+constexpr std::int64_t kLongestTrip_ns = 10 * kSecond_ns;
 
 }  // namespace
 
@@ -30,7 +31,7 @@ void ClockFilter::Add(const Trip& trip) {
   const std::int64_t offset = one + minus(two, one) / 2;
   const Best now{trip.t4_ns, offset, delay};
   if (!best_.empty() && trip.t4_ns < best_.back().time_ns) return;
-  if (!best_.empty() && trip.t4_ns / kSecond == best_.back().time_ns / kSecond) {
+  if (!best_.empty() && trip.t4_ns / kSecond_ns == best_.back().time_ns / kSecond_ns) {
     if (delay < best_.back().delay_ns) best_.back() = now;
   } else {
     best_.push_back(now);

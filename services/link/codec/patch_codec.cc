@@ -20,8 +20,8 @@ constexpr std::uint32_t kTiles = kTilesAcross * kTilesAcross;
 constexpr std::size_t kTexels = kEdge * kEdge;
 constexpr std::size_t kRow_B = kPlanes * kPatchTexels, kTileRow_B = kPlanes * kEdge, kTile_B = kPlanes * kTexels;
 constexpr std::size_t kPatch_B = kRow_B * kPatchTexels;
-constexpr std::uint32_t kRefresh = 1;  ///< Tiles told again with each patch, so that what was lost twice heals.
-constexpr std::size_t kLastAt = 8;     ///< Where `last` stands.
+constexpr std::uint32_t kPatchRefresh = 1;  ///< Tiles told again with each patch, so that what was lost twice heals.
+constexpr std::size_t kPatchLastAt = 8;     ///< Where `last` stands.
 
 std::size_t PlaceOf(std::uint32_t tile) {
   return (tile / kTilesAcross) * kEdge * kRow_B + (tile % kTilesAcross) * kTileRow_B;
@@ -86,7 +86,7 @@ void PatchSender::Encode(const TemperaturePatch& patch, const SendChunk& send) {
     slot.dirty.assign(kTiles, true);
   }
   slot.header = header;
-  for (std::uint32_t i = 0; i < kRefresh; ++i) {
+  for (std::uint32_t i = 0; i < kPatchRefresh; ++i) {
     slot.next_refresh = (slot.next_refresh + 1) % kTiles;
     slot.dirty[slot.next_refresh] = true;
   }
@@ -127,7 +127,7 @@ void PatchSender::Emit(Slot* slot, const SendChunk& send) {
     sent_.Tell(slot->header.slot * kTiles + tile);
     chunk_.insert(chunk_.end(), block_.begin(), block_.end());
   }
-  chunk_[kLastAt] = 1;
+  chunk_[kPatchLastAt] = 1;
   send(chunk_);
 }
 

@@ -20,7 +20,7 @@ constexpr double kStepsPerMetre = 1 / kTissueStep_m;
 constexpr int kWidest = 25;
 constexpr std::uint8_t kSecondDifferences = 0x80;
 /// Each frame tells so many blocks that did not move as well, so that what was lost twice heals in about 10 s.
-constexpr std::uint32_t kRefresh = 2;
+constexpr std::uint32_t kTissueRefresh = 2;
 
 std::uint32_t BlocksOf(std::uint32_t vertices) { return (vertices + kTissueBlock - 1) / kTissueBlock; }
 std::uint32_t SizeOf(std::uint32_t block, std::uint32_t vertices) {
@@ -45,7 +45,7 @@ void PutHeader(std::uint32_t chunk, std::uint32_t frame, const TissueFrameHeader
   w.Number(header.vertex_count);
   w.Number(static_cast<std::uint8_t>(header.grasping_tools));
 }
-constexpr std::size_t kLastAt = 8;  ///< Where `last` stands.
+constexpr std::size_t kTissueLastAt = 8;  ///< Where `last` stands.
 
 TissueFrameHeader TakeHeader(ByteReader* r) {
   TissueFrameHeader header;
@@ -134,7 +134,7 @@ void TissueSender::Encode(const TissueFrame& frame, const SendChunk& send) {
     told_.assign(std::size_t{3} * count, 0);
     dirty_.assign(BlocksOf(count), true);
   }
-  for (std::uint32_t i = 0; i < kRefresh && !dirty_.empty(); ++i) {
+  for (std::uint32_t i = 0; i < kTissueRefresh && !dirty_.empty(); ++i) {
     next_refresh_ = (next_refresh_ + 1) % static_cast<std::uint32_t>(dirty_.size());
     dirty_[next_refresh_] = true;
   }
@@ -166,7 +166,7 @@ void TissueSender::Emit(const SendChunk& send) {
     sent_.Tell(block);
     chunk_.insert(chunk_.end(), block_.begin(), block_.end());
   }
-  chunk_[kLastAt] = 1;
+  chunk_[kTissueLastAt] = 1;
   send(chunk_);
 }
 

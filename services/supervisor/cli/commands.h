@@ -16,6 +16,7 @@ using Words = std::vector<std::string>;
 
 ExitCode Up(const Words& words);
 ExitCode Host(const Words& words);
+ExitCode Soak(const Words& words);
 ExitCode Status(const Words& words);
 ExitCode Top(const Words& words);
 ExitCode Restart(const Words& words);

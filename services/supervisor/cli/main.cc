@@ -27,6 +27,8 @@ std::span<const CommandEntry> Commands() {
       {"log", "log TOOL FILE...", "Read recordings: info, list, cat, export, verify, diff, recover.", Log},
       {"test-node", "test-node NODE --inputs LOG [--expect HASH] [--assert EXPR]... [--junit FILE]",
        "Run one node headless against a recording, for QA and CI.", TestNode},
+      {"soak", "soak SCENE [--minutes N] [--chaos]",
+       "Run a session for long, under blows if asked for: what grows, drifts, ends?", Soak},
       {"keys", "keys init|show|check [DIR] [--days N] [--force]",
        "Make and check the keys of a secured cart: who may join, and write and read what.", Keys},
       {"assess", "assess RECORDING [--scene FILE] [--json FILE]",

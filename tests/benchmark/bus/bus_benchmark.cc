@@ -227,11 +227,11 @@ void Take(benchmark::Report* report) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
     ToolState got;
     std::int64_t start_ns = NowNs();
-    in->TakeLatest(&got);
+    static_cast<void>(in->TakeLatest(&got));
     const double us = Us(NowNs() - start_ns);
     if (in->stats().received == before + 10) ten_us.push_back(us);
     start_ns = NowNs();
-    in->TakeLatest(&got);
+    static_cast<void>(in->TakeLatest(&got));
     empty_us.push_back(Us(NowNs() - start_ns));
   }
   report->Add("bus.take.nothing_us_p50", benchmark::Quantile(empty_us, 0.5), "us");

@@ -44,15 +44,15 @@ CycleEnergy Cycle(const TissueParameters& parameters, double depth, double wall_
     return 0.001 - 0.5 * (depth + 0.001) * (1 - std::cos(2 * std::numbers::pi * t / kCycle_s));
   };
   // Forces are up before the first cycle.
-  constexpr double kReady_s = 0.6;
-  GuidedDevice device(BenchTrocar(), [&](double t) { return Vec3d(0, 0, place(std::max(0.0, t - kReady_s))); });
+  constexpr double kUp_s = 0.6;
+  GuidedDevice device(BenchTrocar(), [&](double t) { return Vec3d(0, 0, place(std::max(0.0, t - kUp_s))); });
   Loop loop(BenchScene(1.0), &device, parameters);
-  loop.Run(static_cast<int>(1e3 * (kReady_s + kCycle_s)), kNothing);
+  loop.Run(static_cast<int>(1e3 * (kUp_s + kCycle_s)), kNothing);
   CycleEnergy result;
   Vec3d force = device.force;
   Vec3d last(0, 0, place(0));
   loop.Run(static_cast<int>(1e3 * kCycles * kCycle_s), [&](const Tick& tick) {
-    const Vec3d now(0, 0, place(tick.session_time_s - kReady_s));
+    const Vec3d now(0, 0, place(tick.session_time_s - kUp_s));
     // What was sent at the last tick acted over the way since then; the lever of the bench is 1.
     result.lost_mJ -= 1e3 / kCycles * force.dot(now - last);
     result.stored_mJ = std::max(result.stored_mJ, 1e3 * 0.5 * device.force.squaredNorm() / wall_N_m);

@@ -12,7 +12,7 @@
 namespace fulcrum::thermal {
 namespace {
 
-constexpr float kDt = 0.01f;
+constexpr float kFrame_s = 0.01f;
 
 void Block(benchmark::Report* report) {
   const VolumeTimes times = TimeVolume();
@@ -36,8 +36,8 @@ void BuiltInCut(benchmark::Report* report) {
   drag.radius_m = scene.tools[1].tip_radius_m;
   ThermalSolver solver(scene);
   std::vector<double> times;
-  for (int frame = 0; frame < drag.frames(kDt); ++frame) {
-    times.push_back(benchmark::TimeMs(0, 1, [&] { solver.Step(drag.At(frame, kDt), kDt); }).front());
+  for (int frame = 0; frame < drag.frames(kFrame_s); ++frame) {
+    times.push_back(benchmark::TimeMs(0, 1, [&] { solver.Step(drag.At(frame, kFrame_s), kFrame_s); }).front());
   }
   const VolumeField& volume = *solver.volume();
   report->Add("thermal.volume_cut.frame_ms_p50", benchmark::Quantile(times, 0.5), "ms");
@@ -63,7 +63,7 @@ void Dwells(benchmark::Report* report) {
     tip.power_W = static_cast<float>(power);
     ThermalSolver solver(data.View());
     for (int second = 1; second <= 4; ++second) {
-      for (int frame = 0; frame < 100; ++frame) solver.Step(tip, kDt);
+      for (int frame = 0; frame < 100; ++frame) solver.Step(tip, kFrame_s);
       if (second == 3) continue;
       const std::string stem =
           "thermal.volume_dwell.coag_" + std::to_string(power) + "W_" + std::to_string(second) + "s.";

@@ -15,7 +15,7 @@
 namespace fulcrum::replay {
 namespace {
 
-constexpr double kPatience_s = 100;  // A software rasteriser on a busy machine.
+constexpr double kPicturePatience_s = 100;  // A software rasteriser on a busy machine.
 
 /// The files of a folder by name.
 std::map<std::string, std::string> Pictures(const std::filesystem::path& folder) {
@@ -38,7 +38,7 @@ TEST(IntoRender, DrawsTheSamePicturesToTheLastByte) {
     const std::filesystem::path frames = session.folder() / name;
     fulcrum::testing::Program replayer("replayer", {session.recording(), "--into", "render", "--frames", frames});
     std::optional<int> code;
-    fulcrum::testing::WaitFor(kPatience_s, [&] { return (code = replayer.Poll()).has_value(); });
+    fulcrum::testing::WaitFor(kPicturePatience_s, [&] { return (code = replayer.Poll()).has_value(); });
     EXPECT_EQ(code, 0) << replayer.Said();
     return Pictures(frames);
   };

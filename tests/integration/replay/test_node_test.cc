@@ -15,7 +15,7 @@ namespace fulcrum::replay {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr double kPatience_s = 60;
+constexpr double kVerdictPatience_s = 60;
 
 class TestNodeTest : public ::testing::Test {
  protected:
@@ -31,7 +31,7 @@ class TestNodeTest : public ::testing::Test {
     all.insert(all.end(), words.begin(), words.end());
     fulcrum::testing::Program program("fulcrum", all);
     std::optional<int> code;
-    fulcrum::testing::WaitFor(kPatience_s, [&] { return (code = program.Poll()).has_value(); });
+    fulcrum::testing::WaitFor(kVerdictPatience_s, [&] { return (code = program.Poll()).has_value(); });
     return {code.value_or(-1), program.Said()};
   }
   static Answer Test(const std::string& node, const std::vector<std::string>& more = {}) {

@@ -68,7 +68,7 @@ double HalfSpaceError(float pitch_m) {
 }
 
 double SheetOnFatError(float cell_m) {
-  constexpr float kStart = 40, kDt = 0.01f;
+  constexpr float kStart_C = 40, kFrame_s = 0.01f;
   ThermalParams params = PlainFat(cell_m);
   params.h_top_W_m2K = params.h_below_W_m2K = 0;
   params.conductivity_W_mK = 2;  // the formula's layer has no resistance of its own
@@ -80,7 +80,7 @@ double SheetOnFatError(float cell_m) {
   for (int ty = 0; ty < kBrickTiles; ++ty) {
     for (int tx = 0; tx < kBrickTiles; ++tx) {
       Tile* tile = field.Wake(tx, ty);
-      tile->state.enthalpy.fill(material.rc_wet * kStart);
+      tile->state.enthalpy.fill(material.rc_wet * kStart_C);
       field.RefreshTheta(tile, &ledger);
     }
   }
@@ -89,11 +89,11 @@ double SheetOnFatError(float cell_m) {
                    (material.rc_wet * material.thickness_m);
   double error = 0;
   for (int n = 1; n <= 400; ++n) {
-    contact.Step(kDt, &field, &volume, &ledger);
-    const double t = n * kDt;
+    contact.Step(kFrame_s, &field, &volume, &ledger);
+    const double t = n * kFrame_s;
     if (n < 100) continue;
     const double exact = std::exp(b * b * t) * std::erfc(b * std::sqrt(t));
-    error = std::max(error, std::abs(field.MaxTheta() / kStart - exact));
+    error = std::max(error, std::abs(field.MaxTheta() / kStart_C - exact));
   }
   return error;
 }
@@ -127,7 +127,7 @@ double CosineError(int half_waves) {
 
 VolumeTimes TimeVolume() {
   using Clock = std::chrono::steady_clock;
-  constexpr float kDt = 0.01f;
+  constexpr float kFrame_s = 0.01f;
   constexpr int kRuns = 101;
   const ThermalParams params;
   const auto time = [&](bool contact, float floor_K) {
@@ -157,11 +157,11 @@ VolumeTimes TimeVolume() {
       brick->has_source = true;
       const auto start = Clock::now();
       if (contact) {
-        between.Step(kDt, &field, &volume, &ledger);
+        between.Step(kFrame_s, &field, &volume, &ledger);
       } else {
         volume.Spread();
-        volume.Advance(kDt);
-        volume.Finish(kDt);
+        volume.Advance(kFrame_s);
+        volume.Finish(kFrame_s);
       }
       times.push_back(std::chrono::duration<double, std::milli>(Clock::now() - start).count());
     }

@@ -175,10 +175,12 @@ TEST_F(InstallTest, SessionOfServicesRunsAsTheUnitsSay) {
   }
   ASSERT_EQ(nodes.size(), 6u);
   for (auto& [name, node] : nodes) {
-    ASSERT_TRUE(WaitFor(kStartLimit_s, [&] { return node->Heard("READY=1"); })) << name << "\n" << node->All();
+    ASSERT_TRUE(WaitFor(kStartLimit_s, [node = node.get()] { return node->Heard("READY=1"); })) << name << "\n"
+                                                                                                << node->All();
   }
   for (auto& [name, node] : nodes) {
-    EXPECT_TRUE(WaitFor(kStartLimit_s, [&] { return node->Heard("STATUS=running"); })) << name << "\n" << node->All();
+    EXPECT_TRUE(WaitFor(kStartLimit_s, [node = node.get()] { return node->Heard("STATUS=running"); })) << name << "\n"
+                                                                                                       << node->All();
     EXPECT_TRUE(node->Heard("WATCHDOG=1")) << name << "\n" << node->All();
   }
   EXPECT_TRUE(supervisor.Heard("WATCHDOG=1")) << supervisor.All();
@@ -195,7 +197,8 @@ TEST_F(InstallTest, SessionOfServicesRunsAsTheUnitsSay) {
   EXPECT_EQ(*code, 0) << supervisor.All();
   EXPECT_TRUE(supervisor.Heard("STOPPING=1"));
   for (auto& [name, node] : nodes) {
-    ASSERT_TRUE(WaitFor(kEndLimit_s, [&] { return (code = node->program().Poll()).has_value(); }))
+    ASSERT_TRUE(
+        WaitFor(kEndLimit_s, [&code, node = node.get()] { return (code = node->program().Poll()).has_value(); }))
         << name << " was not told to end\n"
         << node->All();
     EXPECT_EQ(*code, 0) << name << "\n" << node->All();

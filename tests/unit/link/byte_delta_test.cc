@@ -9,10 +9,10 @@
 namespace fulcrum::link {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
+using Buffer = std::vector<std::uint8_t>;
 
-Bytes There(const Bytes& base, const Bytes& bytes, std::size_t* delta_B = nullptr) {
-  Bytes delta, got;
+Buffer There(const Buffer& base, const Buffer& bytes, std::size_t* delta_B = nullptr) {
+  Buffer delta, got;
   PutDelta(base, bytes, &delta);
   if (delta_B != nullptr) *delta_B = delta.size();
   EXPECT_TRUE(TakeDelta(base, delta, bytes.size(), &got));
@@ -23,18 +23,18 @@ TEST(ByteDelta, ComesBackWhateverTheBase) {
   std::mt19937 random(1);
   for (int round = 0; round < 300; ++round) {
     const auto some = [&] {
-      Bytes bytes(random() % 200);
+      Buffer bytes(random() % 200);
       for (std::uint8_t& b : bytes) b = random() % 3 == 0 ? static_cast<std::uint8_t>(random()) : 0;
       return bytes;
     };
-    const Bytes base = some(), bytes = some();
+    const Buffer base = some(), bytes = some();
     EXPECT_EQ(There(base, bytes), bytes);
   }
-  EXPECT_EQ(There({}, {}), Bytes());
+  EXPECT_EQ(There({}, {}), Buffer());
 }
 
 TEST(ByteDelta, TellsOnlyWhatDiffers) {
-  Bytes base(80'000, 7), bytes = base;
+  Buffer base(80'000, 7), bytes = base;
   std::size_t delta_B = 0;
   EXPECT_EQ(There(base, bytes, &delta_B), bytes);
   EXPECT_LE(delta_B, 4u);
@@ -45,12 +45,12 @@ TEST(ByteDelta, TellsOnlyWhatDiffers) {
 }
 
 TEST(ByteDelta, RefusesMoreThanTheLargest) {
-  Bytes delta, got;
-  PutDelta({}, Bytes(100, 1), &delta);
+  Buffer delta, got;
+  PutDelta({}, Buffer(100, 1), &delta);
   EXPECT_FALSE(TakeDelta({}, delta, 99, &got));
-  EXPECT_FALSE(TakeDelta({}, Bytes{0xff, 0xff, 0xff, 0xff, 0x0f}, 1000, &got));
-  EXPECT_FALSE(TakeDelta({}, Bytes{10, 11, 0}, 1000, &got));
-  EXPECT_FALSE(TakeDelta({}, Bytes{10, 0, 4, 1}, 1000, &got));
+  EXPECT_FALSE(TakeDelta({}, Buffer{0xff, 0xff, 0xff, 0xff, 0x0f}, 1000, &got));
+  EXPECT_FALSE(TakeDelta({}, Buffer{10, 11, 0}, 1000, &got));
+  EXPECT_FALSE(TakeDelta({}, Buffer{10, 0, 4, 1}, 1000, &got));
 }
 
 TEST(Bits, OfAnyWidth) {
@@ -59,7 +59,7 @@ TEST(Bits, OfAnyWidth) {
     for (std::uint32_t i = 0; i < 37; ++i) {
       values.push_back(width == 0 ? 0 : (i * 2654435761u) >> (32 - width));
     }
-    Bytes bytes;
+    Buffer bytes;
     PutBits(values, width, &bytes);
     std::vector<std::uint32_t> got(values.size());
     recording::ByteReader reader(bytes);
@@ -72,13 +72,13 @@ TEST(Bits, OfAnyWidth) {
 TEST(Bits, VarintsAndZigzag) {
   for (const std::int32_t value : {0, 1, -1, 63, -64, 64, 1 << 20, -(1 << 30), INT32_MAX, INT32_MIN}) {
     EXPECT_EQ(Unzigzag(Zigzag(value)), value);
-    Bytes bytes;
+    Buffer bytes;
     PutVarint(Zigzag(value), &bytes);
     recording::ByteReader reader(bytes);
     EXPECT_EQ(TakeVarint(&reader), Zigzag(value));
     EXPECT_TRUE(reader.good() && reader.empty());
   }
-  const Bytes too_long{0xff, 0xff, 0xff, 0xff, 0xff, 0x01};
+  const Buffer too_long{0xff, 0xff, 0xff, 0xff, 0xff, 0x01};
   recording::ByteReader reader(too_long);
   EXPECT_EQ(TakeVarint(&reader), 0u);
   EXPECT_FALSE(reader.good());

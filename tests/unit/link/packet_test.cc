@@ -7,7 +7,7 @@
 namespace fulcrum::link {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
+using Buffer = std::vector<std::uint8_t>;
 
 Offer SomeOffer() {
   Offer offer;
@@ -22,7 +22,7 @@ Offer SomeOffer() {
 }
 
 TEST(Packet, EnvelopeComesBackAndAnotherVersionIsTold) {
-  Bytes packet;
+  Buffer packet;
   PutEnvelope({PacketKind::kTissue, 99}, &packet);
   packet.push_back(5);
   Envelope envelope;
@@ -51,7 +51,7 @@ TEST(Packet, PulseComesBack) {
   pulse.wants_offer = pulse.wants_all_patches = true;
   pulse.missing_tissue = {7, 8};
   pulse.missing_patches = {9};
-  Bytes body;
+  Buffer body;
   PutPulse(pulse, &body);
   Pulse got;
   ASSERT_TRUE(TakePulse(body, &got));
@@ -67,7 +67,7 @@ TEST(Packet, PulseComesBack) {
 }
 
 TEST(Packet, OfferComesBackAndMustBeUsable) {
-  Bytes body;
+  Buffer body;
   PutOffer(SomeOffer(), &body);
   Offer got;
   ASSERT_TRUE(TakeOffer(body, &got));
@@ -77,7 +77,7 @@ TEST(Packet, OfferComesBackAndMustBeUsable) {
   const auto refused = [](auto change) {
     Offer offer = SomeOffer();
     change(&offer);
-    Bytes bytes;
+    Buffer bytes;
     PutOffer(offer, &bytes);
     Offer ignored;
     return !TakeOffer(bytes, &ignored);
@@ -91,16 +91,16 @@ TEST(Packet, OfferComesBackAndMustBeUsable) {
 }
 
 TEST(Packet, SamplesAndPiecesOfASceneComeBack) {
-  Bytes body;
-  const Bytes cdr{1, 2, 3};
-  PutSample({TopicId::kToolState, 5, 4}, Bytes{1, 2}, cdr, &body);
+  Buffer body;
+  const Buffer cdr{1, 2, 3};
+  PutSample({TopicId::kToolState, 5, 4}, Buffer{1, 2}, cdr, &body);
   SampleHead head;
   std::span<const std::uint8_t> delta;
   ASSERT_TRUE(TakeSample(body, &head, &delta));
   EXPECT_EQ(head.topic, TopicId::kToolState);
   EXPECT_EQ(head.base, 4u);
-  Bytes got;
-  ASSERT_TRUE(TakeDelta(Bytes{1, 2}, delta, 100, &got));
+  Buffer got;
+  ASSERT_TRUE(TakeDelta(Buffer{1, 2}, delta, 100, &got));
   EXPECT_EQ(got, cdr);
 
   body.clear();
@@ -109,7 +109,7 @@ TEST(Packet, SamplesAndPiecesOfASceneComeBack) {
   std::span<const std::uint8_t> piece;
   ASSERT_TRUE(TakeSceneChunk(body, &where, &piece));
   EXPECT_EQ(where.offset, 2 * kSceneChunk_B);
-  EXPECT_EQ(Bytes(piece.begin(), piece.end()), cdr);
+  EXPECT_EQ(Buffer(piece.begin(), piece.end()), cdr);
   body.clear();
   PutSceneAsk({42, 17}, &body);
   EXPECT_FALSE(TakeSceneAsk(body, &where));

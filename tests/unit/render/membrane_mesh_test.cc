@@ -6,17 +6,10 @@
 
 #include "render_node/geometry/fat_layer.h"
 #include "services/scene/build.h"
+#include "tests/unit/render/interleaved.h"
 
 namespace fulcrum::render {
 namespace {
-
-std::vector<float> Interleaved(std::span<const Vec3f> positions) {
-  std::vector<float> xyz;
-  for (const Vec3f& p : positions) {
-    xyz.insert(xyz.end(), {p.x(), p.y(), p.z()});
-  }
-  return xyz;
-}
 
 class MembraneMeshTest : public testing::Test {
  protected:

@@ -6,20 +6,13 @@
 #include <random>
 
 #include "services/scene/build.h"
+#include "tests/unit/render/interleaved.h"
 
 namespace fulcrum::render {
 namespace {
 
 // Single precision over coordinates of 0.1 m.
 constexpr float kRounding_m = 1e-6f;
-
-std::vector<float> Interleaved(std::span<const Vec3f> positions) {
-  std::vector<float> xyz;
-  for (const Vec3f& p : positions) {
-    xyz.insert(xyz.end(), {p.x(), p.y(), p.z()});
-  }
-  return xyz;
-}
 
 class SmallScene : public testing::Test {
  protected:

@@ -1,0 +1,19 @@
+// The processes of a session as the kernel sees them.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+namespace fulcrum::soak {
+
+/// Resident memory [bytes], shared memory included; nothing when there is no such process or it has ended.
+[[nodiscard]] std::optional<std::uint64_t> ResidentBytes(pid_t process);
+
+/// The living children of a process by the name of their program.
+[[nodiscard]] std::multimap<std::string, pid_t> ChildrenOf(pid_t parent);
+
+}  // namespace fulcrum::soak

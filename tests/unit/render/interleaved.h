@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "services/core/types.h"
+
+namespace fulcrum::render {
+
+/// x, y, z of one after the other, as a Tissue message holds them.
+inline std::vector<float> Interleaved(std::span<const Vec3f> positions) {
+  std::vector<float> xyz;
+  for (const Vec3f& p : positions) xyz.insert(xyz.end(), {p.x(), p.y(), p.z()});
+  return xyz;
+}
+
+}  // namespace fulcrum::render
