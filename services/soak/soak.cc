@@ -18,6 +18,7 @@
 #include "services/soak/soak_page.h"
 #include "services/supervisor/child_process.h"
 #include "services/supervisor/flat_json.h"
+#include "services/supervisor/outcome.h"
 #include "services/supervisor/progress.h"
 #include "services/supervisor/session_folder.h"
 #include "services/supervisor/session_view.h"
@@ -101,13 +102,12 @@ class Soak {
     if (settings_.chaos) {
       plan_ = PlanChaos(settings_.seed, nodes_, std::min(10.0, 0.1 * total_s_), (1 - kQuiet) * total_s_, kPause_s);
     }
-    bool asked_to_end = false;
     while (!ended_) {
       Turn();
       const double late_s = NowS() - total_s_;
-      if (!asked_to_end && (runtime::ShouldStop() || late_s > kEnd_s)) {
+      if (!asked_to_end_ && (runtime::ShouldStop() || late_s > kEnd_s)) {
         up_.Signal(SIGINT);
-        asked_to_end = true;
+        asked_to_end_ = true;
       }
       if (late_s > 2 * kEnd_s) up_.Signal(SIGKILL);
       std::this_thread::sleep_for(kTurn);
@@ -168,7 +168,7 @@ class Soak {
     Look();
     const double now_s = NowS();
     // The session ends its nodes by itself.
-    const bool over = ended_ || now_s > total_s_ - 1;
+    const bool over = ended_ || asked_to_end_ || now_s > total_s_ - 1;
     if (!over) {
       Judge(now_s);
       Strike(now_s);
@@ -242,8 +242,9 @@ class Soak {
 
   ExitCode Conclude() {
     const double duration_s = std::min(NowS(), total_s_);
-    if (well_ && duration_s < total_s_ - 2) verdict_ = "ended before its time";
-    record_.End(duration_s, well_, verdict_);
+    if (well_ && duration_s < total_s_ - 2)
+      verdict_ = asked_to_end_ ? "ended before its time, as asked for" : "ended before its time";
+    record_.End(duration_s, well_ && (asked_to_end_ || verdict_.empty()), verdict_);
     const fs::path session = fs::exists(folder_ / "latest") ? fs::path("latest") : fs::path(".");
     supervisor::FlatJson json;
     json.Add("passed", record_.Passes(settings_.limits));
@@ -275,7 +276,7 @@ class Soak {
   double thaw_s_ = 0;
   std::vector<std::thread> crowd_;
   std::int64_t begin_ns_ = 0, next_sample_ns_ = 0;
-  bool ended_ = false, well_ = false;
+  bool asked_to_end_ = false, ended_ = false, well_ = false;
   std::string verdict_;
   SoakRecord record_;
 };

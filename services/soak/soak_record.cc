@@ -44,6 +44,7 @@ void SoakRecord::AddMemory(double time_s, const std::string& program, std::int32
     life->program = program;
     life->process = process;
   }
+  duration_s_ = std::max(duration_s_, time_s);
   life->memory_MB.Add(time_s, static_cast<double>(resident_B) / kMega);
 }
 

@@ -19,21 +19,25 @@ constexpr double kShortest_min = 0.2, kLongest_min = 7 * 24 * 60;
 ExitCode Soak(const Words& words) {
   soak::SoakSettings settings;
   po::options_description options;
-  options.add_options()("minutes", po::value(&settings.minutes)->value_name("N")->default_value(10, "10"),
-                        "session time")(
-      "chaos", "kill and freeze nodes and take the processors away, until a third before the end")(
-      "seed", po::value(&settings.seed)->value_name("N")->default_value(1), "of the blows")(
-      "most-growth", po::value(&settings.limits.rss_growth_MB)->value_name("MB")->default_value(20, "20"),
-      "of the resident memory of one process")("record", "record all topics meanwhile: some 4 MB a second of disk")(
-      "out", po::value<std::string>()->value_name("DIR")->default_value("out"), "soak/ is made in here")(
-      "set", po::value<Words>()->value_name("SECTION.KEY=VALUE")->composing(),
-      "a parameter other than in the scene; as often as needed");
+  options.add_options()                                                                                    //
+      ("minutes", po::value<double>()->value_name("N")->default_value(10, "10"), "session time")           //
+      ("chaos", "kill and freeze nodes and take the processors away, until a third before the end")        //
+      ("seed", po::value<std::uint32_t>()->value_name("N")->default_value(1), "of the blows")              //
+      ("most-growth", po::value<double>()->value_name("MB")->default_value(20, "20"),                      //
+       "of the resident memory of one process")                                                            //
+      ("record", "record all topics meanwhile: some 4 MB a second of disk")                                //
+      ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "soak/ is made in here")  //
+      ("set", po::value<Words>()->value_name("SECTION.KEY=VALUE")->composing(),
+       "a parameter other than in the scene; as often as needed");
   AddCart(&options);
   AddDomain(&options);
   const Arguments arguments = Parse("soak", words, options, {"scene"});
   if (arguments.help) return ExitCode::kDone;
   const auto& values = arguments.values;
   if (values.count("scene") == 0) throw InputError("which scene? see fulcrum help soak");
+  settings.minutes = values["minutes"].as<double>();
+  settings.seed = values["seed"].as<std::uint32_t>();
+  settings.limits.rss_growth_MB = values["most-growth"].as<double>();
   if (!(settings.minutes >= kShortest_min && settings.minutes <= kLongest_min)) {
     throw InputError("--minutes: must be 0.2 to 10080");
   }

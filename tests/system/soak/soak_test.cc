@@ -9,7 +9,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path Out() { return fs::path(testing::TempDir()) / "soak_test"; }
+fs::path Out() { return fs::path(::testing::TempDir()) / "soak_test"; }
 
 TEST(Soak, BlowsAreSurvivedAndTold) {
   fs::remove_all(Out());

@@ -58,7 +58,9 @@ TEST(ScriptRounds, RepeatsEachToolWithPedalsUpInBetween) {
   for (const ScriptKey& key : rounds) {
     const float in_round = std::fmod(key.time_s, 7.0f);
     EXPECT_EQ(key.pedals != 0, key.tool == 1 && (in_round == 1 || in_round == 4)) << key.tool << " " << key.time_s;
-    if (in_round < 5) EXPECT_EQ(key.p_W.x(), in_round);
+    if (in_round < 5) {
+      EXPECT_EQ(key.p_W.x(), in_round);
+    }
   }
 }
 
