@@ -24,6 +24,7 @@ std::string Plot(const SoakRecord& record, const char* title, const char* unit, 
     for (const auto& point : (life.*figure).points()) curves[life.program].Add(point.time_s / 60, point.value);
   }
   std::vector<supervisor::PlotLine> lines;
+  lines.reserve(curves.size());
   for (const auto& [program, curve] : curves) {
     lines.push_back({program, kColours[lines.size() % kColours.size()], &curve});
   }
