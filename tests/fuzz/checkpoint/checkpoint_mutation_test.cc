@@ -11,6 +11,7 @@
 #include <random>
 #include <string>
 
+#include "services/core/sanitizers.h"
 #include "tests/fuzz/checkpoint/checkpoint_check.h"
 
 namespace fulcrum {
@@ -19,7 +20,7 @@ namespace {
 using testing::CheckpointCheck;
 using testing::Outcome;
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if FULCRUM_SANITIZED
 constexpr int kInputs = 20;
 #else
 constexpr int kInputs = 120;

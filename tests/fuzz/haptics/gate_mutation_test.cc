@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "haptics_node/servo/model_gate.h"
+#include "services/core/sanitizers.h"
 #include "tests/fuzz/haptics/gate_check.h"
 
 namespace fulcrum::haptics {
@@ -19,7 +20,7 @@ namespace {
 
 using testing::GateCheck;
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if FULCRUM_SANITIZED
 constexpr int kInputs = 20'000;  ///< Some thirty times as slow, and their finds do not need the same numbers.
 #else
 constexpr int kInputs = 1'000'000;

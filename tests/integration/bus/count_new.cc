@@ -3,6 +3,8 @@
 #include <cstdlib>
 #include <new>
 
+#include "services/core/sanitizers.h"
+
 namespace {
 constinit thread_local long new_calls = 0;
 }
@@ -11,7 +13,7 @@ namespace fulcrum::bus::test {
 long NewCalls() { return new_calls; }
 }  // namespace fulcrum::bus::test
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !FULCRUM_SANITIZED
 void* operator new(std::size_t size) {
   ++new_calls;
   if (void* p = std::malloc(size)) return p;

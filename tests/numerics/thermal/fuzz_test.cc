@@ -10,13 +10,14 @@
 #include <random>
 #include <vector>
 
+#include "services/core/sanitizers.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "tests/numerics/thermal/topology_validator.h"
 
 namespace fulcrum::thermal {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if FULCRUM_SANITIZED
 constexpr int kBurns = 300;
 #else
 constexpr int kBurns = 10'000;

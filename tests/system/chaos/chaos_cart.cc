@@ -14,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include "services/core/sanitizers.h"
 #include "services/runtime/cyclic_thread.h"
 #include "tests/support/working_scene.h"
 
@@ -25,7 +26,7 @@ namespace fs = std::filesystem;
 constexpr double kPatience_s = 20;  // On a busy machine.
 constexpr double kFelt_N = 0.1;
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if FULCRUM_SANITIZED
 constexpr bool kCanPreload = false;  // A sanitizer's library must come first.
 #else
 constexpr bool kCanPreload = true;

@@ -6,6 +6,8 @@
 #include <cerrno>
 #include <cstddef>
 
+#include "services/core/sanitizers.h"
+
 namespace {
 
 // constinit: a thread-local that needs no initialisation at run time can be read inside malloc.
@@ -27,7 +29,7 @@ AllocationGuard::AllocationGuard() {
 AllocationGuard::~AllocationGuard() { watched = false; }
 std::int64_t AllocationGuard::violations() const { return violation_count; }
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if FULCRUM_SANITIZED
 bool AllocationGuard::active() { return false; }
 #else
 bool AllocationGuard::active() { return true; }
@@ -35,7 +37,7 @@ bool AllocationGuard::active() { return true; }
 
 }  // namespace fulcrum::testing
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if !FULCRUM_SANITIZED
 
 // glibc's own entry points stay reachable under these names when the public ones are replaced.
 extern "C" {
