@@ -102,6 +102,19 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
          "\n";
 }
 
+bus::Security SecurityOf(const config::CartConfig& cart) {
+  return app::SecurityOf(cart, NodeName(NodeId::kSupervisor));
+}
+
+/// The session's, without what a supervisor that was killed has left there (its nodes died with it).
+std::filesystem::path OpenSharedMemory(const config::CartConfig& cart) {
+  std::filesystem::path memory = bus::SharedMemoryDirectory(cart.domain);
+  bus::PrepareSharedMemory(memory);
+  bus::SweepSharedMemory(memory);
+  bus::AnnounceSecurity(memory, SecurityOf(cart));
+  return memory;
+}
+
 std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFolder& folder) {
   if (!settings.record) {
     return {};
@@ -119,23 +132,18 @@ struct Supervisor::Impl {
       : settings(up),
         scene(up.scene),
         end_s(EndOfSession(up, scene.view())),
+        keys_warning(CheckSessionKeys(up.cart, NodesOf(scene.view(), up), std::time(nullptr))),
         guard(up.cart.domain),
+        memory(OpenSharedMemory(up.cart)),
         training(OpenTrainingLog(up.trainee, up.training_database, scene.view())),
         folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
         recording(RecordingFile(up, folder)),
-        memory(bus::SharedMemoryDirectory(up.cart.domain)),
         starter{settings, folder, recording},
         node_ids(NodesOf(scene.view(), up)),
         remote_ids(RemoteNodesOf(scene.view(), up)) {
-    // Left by a supervisor that was killed: its nodes died with it.
-    bus::SweepSharedMemory(memory);
-    const bus::Security security = app::SecurityOf(up.cart, NodeName(NodeId::kSupervisor));
-    if (const std::string warning = CheckSessionKeys(up.cart, node_ids, std::time(nullptr)); !warning.empty()) {
-      progress.Say("! " + warning);
-    }
+    if (!keys_warning.empty()) progress.Say("! " + keys_warning);
     participant.emplace(bus::DdsSettings{
-        .domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory, .security = security});
-    bus::AnnounceSecurity(memory, security);
+        .domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory, .security = SecurityOf(up.cart)});
     manifests = participant->MakeOutput<SceneManifest>();
     healths_in = participant->MakeInput<Health>();
     healths_out = participant->MakeOutput<Health>();
@@ -609,11 +617,12 @@ struct Supervisor::Impl {
   const UpSettings settings;
   scene::SceneFile scene;
   const double end_s;  ///< 0: until stopped.
+  const std::string keys_warning;
   DomainGuard guard;
+  const std::filesystem::path memory;   ///< Right after the guard: who finds a session asks here for its keys.
   std::optional<TrainingLog> training;  ///< Of the trainee, if one was named.
   SessionFolder folder;
   const std::filesystem::path recording;  ///< The recorder's first file; empty: none.
-  const std::filesystem::path memory;
   const NodeStarter starter;
   const std::vector<NodeId> node_ids;
   const std::vector<NodeId> remote_ids;  ///< Of the scene, on another host.
