@@ -32,6 +32,13 @@ struct AccessRole {
 /// Participants that are no node.
 inline constexpr std::string_view kToolIdentity = "fulcrum";       ///< status, top, restart, swap, dump, down, console.
 inline constexpr std::string_view kReplayerIdentity = "replayer";  ///< Stands in for nodes: replayer --live.
+inline constexpr std::string_view kLinkIdentity = "link";          ///< Stands in for the nodes of another host.
+/// Domains of carts, and of what joins two hosts of one.
+inline constexpr int kFirstCartDomain = 1, kLastCartDomain = 100, kFirstLinkDomain = 101, kLastLinkDomain = 200;
+/// Between two hosts only, in a link domain: bytes, by lane and by who writes.
+inline constexpr std::array<std::string_view, 4> kLinkTopics{
+    "fulcrum/link/stream/from_cart", "fulcrum/link/stream/from_host", "fulcrum/link/ordered/from_cart",
+    "fulcrum/link/ordered/from_host"};
 
 namespace access {
 using enum TopicId;
@@ -56,6 +63,7 @@ inline constexpr std::array kRoles{
                                   kThermalEvent, kCauteryContact)},
     AccessRole{"recorder", kNodeWrites, kAll},
     AccessRole{kReplayerIdentity, kAll & ~SetOf(kCommand, kCommandReply), 0},
+    AccessRole{kLinkIdentity, kAll, kAll},
     AccessRole{kToolIdentity, SetOf(kCommand), SetOf(kSceneManifest, kCommandReply, kThermalEvent, kHealth)},
 };
 }  // namespace access
@@ -70,12 +78,17 @@ inline constexpr const auto& kAccessRoles = access::kRoles;
   return nullptr;
 }
 
-/// The node that sends a topic; none for those that several participants send. A replayer only stands in.
+/// Sends what is others' to send.
+[[nodiscard]] constexpr bool StandsIn(std::string_view identity) {
+  return identity == kReplayerIdentity || identity == kLinkIdentity;
+}
+
+/// The node that sends a topic; none for those that several participants send, those who stand in apart.
 [[nodiscard]] constexpr std::optional<NodeId> OwnerOf(TopicId topic) {
   std::optional<NodeId> owner;
   int writers = 0;
   for (std::size_t i = 0; i < kAccessRoles.size(); ++i) {
-    if (kAccessRoles[i].identity == kReplayerIdentity || !Contains(kAccessRoles[i].writes, topic)) continue;
+    if (StandsIn(kAccessRoles[i].identity) || !Contains(kAccessRoles[i].writes, topic)) continue;
     ++writers;
     if (i < kNodeCount) owner = static_cast<NodeId>(i);
   }

@@ -8,7 +8,10 @@ namespace fulcrum::keys {
 namespace {
 
 constexpr const char* kHead = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<dds>\n";
-constexpr const char* kDomains = "<domains><id_range><min>1</min><max>100</max></id_range></domains>\n";
+std::string Domains(int first, int last) {
+  return "<domains><id_range><min>" + std::to_string(first) + "</min><max>" + std::to_string(last) +
+         "</max></id_range></domains>\n";
+}
 
 std::string Topics(const char* verb, bus::TopicSet set) {
   std::string text;
@@ -16,6 +19,14 @@ std::string Topics(const char* verb, bus::TopicSet set) {
     if (bus::Contains(set, role.id)) text += std::string("<topic>") + role.name + "</topic>";
   }
   return text.empty() ? text : std::string("<") + verb + "><topics>" + text + "</topics></" + verb + ">\n";
+}
+
+/// What joins two hosts writes and reads between them as well, whichever of the two it is on.
+std::string LinkRule() {
+  std::string topics;
+  for (const std::string_view topic : bus::kLinkTopics) topics += "<topic>" + std::string(topic) + "</topic>";
+  return "<allow_rule>\n" + Domains(bus::kFirstLinkDomain, bus::kLastLinkDomain) + "<publish><topics>" + topics +
+         "</topics></publish>\n<subscribe><topics>" + topics + "</topics></subscribe>\n</allow_rule>\n";
 }
 
 std::string Moment(std::time_t time) {
@@ -31,7 +42,8 @@ std::string Moment(std::time_t time) {
 std::string SubjectOf(const bus::AccessRole& role) { return "CN=" + std::string(role.identity); }
 
 std::string GovernanceXml(bool encrypt) {
-  return std::string(kHead) + "<domain_access_rules><domain_rule>\n" + kDomains +
+  return std::string(kHead) + "<domain_access_rules><domain_rule>\n" +
+         Domains(bus::kFirstCartDomain, bus::kLastLinkDomain) +
          "<allow_unauthenticated_participants>false</allow_unauthenticated_participants>\n"
          "<enable_join_access_control>true</enable_join_access_control>\n"
          "<discovery_protection_kind>NONE</discovery_protection_kind>\n"
@@ -57,8 +69,10 @@ std::string PermissionsXml(const bus::AccessRole& role, const Validity& validity
   return std::string(kHead) + "<permissions><grant name=\"" + std::string(role.identity) + "\">\n<subject_name>" +
          SubjectOf(role) + "</subject_name>\n<validity><not_before>" + Moment(validity.from - kDay) +
          "</not_before><not_after>" + Moment(validity.until + kDay) + "</not_after></validity>\n<allow_rule>\n" +
-         kDomains + Topics("publish", role.writes) + Topics("subscribe", role.reads) +
-         "</allow_rule>\n<default>DENY</default>\n</grant></permissions>\n</dds>\n";
+         Domains(bus::kFirstCartDomain, bus::kLastCartDomain) + Topics("publish", role.writes) +
+         Topics("subscribe", role.reads) + "</allow_rule>\n" +
+         (role.identity == bus::kLinkIdentity ? LinkRule() : std::string()) +
+         "<default>DENY</default>\n</grant></permissions>\n</dds>\n";
 }
 
 }  // namespace fulcrum::keys

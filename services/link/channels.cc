@@ -23,6 +23,7 @@ constexpr std::int64_t kThinned_ns = 10'000'000;
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 /// No message of the bus is longer, but for those that travel in chunks.
 constexpr std::size_t kLargestSample_B = bus::kOrderedPacket_B;
+static_assert(kChunk_B + 20 <= bus::kStreamPacket_B, "a chunk and the head of its packet go as one");
 
 /// Health is reliable on the bus so that a late joiner gets the newest; on its way between hosts the newest is enough,
 /// and ten a second of each node must not wait in a queue while a cable is out.

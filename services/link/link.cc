@@ -54,6 +54,7 @@ Link::~Link() {
 }
 
 void Link::Connect() {
+  KeepRefusals();
   far_.reset();
   connected_ns_ = MonotonicNs();
   far_ =
@@ -130,7 +131,23 @@ Link::Session Link::session() {
 
 std::string Link::mismatch() {
   const std::lock_guard lock(mutex_);
-  return mismatch_;
+  return !mismatch_.empty() || !far_ ? mismatch_ : far_->mismatch();
+}
+
+bus::Refusals Link::refusals() {
+  const std::lock_guard lock(mutex_);
+  KeepRefusals();
+  return refusals_;
+}
+
+void Link::KeepRefusals() {
+  if (!far_) return;
+  for (std::string& text : far_->refusals().texts) {
+    if (refusals_.texts.size() == bus::Refusals::kMostTexts) return;
+    if (std::ranges::find(refusals_.texts, text) != refusals_.texts.end()) continue;
+    refusals_.texts.push_back(std::move(text));
+    ++refusals_.participants;
+  }
 }
 
 bool Link::FetchScene(const Offer& offer, const std::filesystem::path& cache, double* progress) {
@@ -400,7 +417,9 @@ void Link::SendPulse(std::int64_t now) {
 }
 
 void Link::WatchSilence(std::int64_t now) {
-  if (now - std::max(heard_ns_, connected_ns_) < kPatience) return;
+  // Whoever was never heard may be one that is being refused, which takes a while to show.
+  const std::int64_t patience = heard_ns_ == 0 ? 2 * kPatience : kPatience;
+  if (now - std::max(heard_ns_, connected_ns_) < patience) return;
   try {
     rebuilt_ += heard_ns_ != 0 ? 1 : 0;
     Connect();

@@ -70,8 +70,11 @@ class Link {
     Offer offer;
   };
   [[nodiscard]] Session session();
-  /// The other side speaks another schema or wire version: one line; empty: it does not.
+  /// The other side speaks another schema or wire version, or the cart does not accept our keys: one line; empty: all
+  /// well.
   [[nodiscard]] std::string mismatch();
+  /// Who wanted to be the other side and has not its keys. Each once.
+  [[nodiscard]] bus::Refusals refusals();
 
   /// The host's side: fetches the scene of the offer into the cache; once true it lies there. Call until then.
   [[nodiscard]] bool FetchScene(const Offer& offer, const std::filesystem::path& cache, double* progress);
@@ -106,6 +109,7 @@ class Link {
 
   bool Send(bus::FarLane lane, PacketKind kind, const std::function<void(std::vector<std::uint8_t>*)>& put);
   void Connect();
+  void KeepRefusals();
   void Wake();
 
   const LinkSettings settings_;
@@ -133,6 +137,7 @@ class Link {
   std::optional<SceneFetch> fetch_;
   std::string mismatch_, error_;
   std::uint64_t refused_ = 0, rebuilt_ = 0;
+  bus::Refusals refusals_;  ///< Of all connections.
   struct Traffic {
     std::uint64_t sent_B = 0, received_B = 0, tissue_B = 0;
   };

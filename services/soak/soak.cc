@@ -254,7 +254,8 @@ class Soak {
       json.Add(figure.key, figure.value);
     }
     supervisor::WriteFile(folder_ / "soak.json", json.text());
-    supervisor::WriteFile(folder_ / "soak.html", SoakPage(record_, settings_.limits, settings_.scene.stem(), session));
+    supervisor::WriteFile(folder_ / "soak.html",
+                          SoakPage(record_, settings_.limits, view_.manifest().scene_name, session));
     supervisor::WriteFile(folder_ / "samples.csv", SamplesCsv(record_));
     if (!verdict_.empty()) std::printf("! %s\n", verdict_.c_str());
     std::printf("%s: %s\n", record_.Passes(settings_.limits) ? "passed" : "FAILED", (folder_ / "soak.html").c_str());

@@ -13,7 +13,8 @@ namespace {
 using supervisor::Curve;
 using supervisor::Fixed;
 
-constexpr std::array kColours{"#1f6feb", "#bc4c00", "#1a7f37", "#8250df", "#cf222e", "#0b7285", "#9a6700", "#57606a"};
+// No red: the marks of the kills are.
+constexpr std::array kColours{"#1f6feb", "#bc4c00", "#1a7f37", "#8250df", "#57606a", "#0b7285", "#9a6700", "#bf3989"};
 
 std::string Cell(const std::string& text) { return "<td>" + EscapeHtml(text) + "</td>"; }
 
@@ -21,6 +22,7 @@ std::string Cell(const std::string& text) { return "<td>" + EscapeHtml(text) + "
 std::string Plot(const SoakRecord& record, const char* title, const char* unit, Curve Life::*figure) {
   std::map<std::string, Curve> curves;
   for (const Life& life : record.lives()) {
+    curves[life.program];  // One without points keeps its colour: it is the same in all plots.
     for (const auto& point : (life.*figure).points()) curves[life.program].Add(point.time_s / 60, point.value);
   }
   std::vector<supervisor::PlotLine> lines;

@@ -153,7 +153,15 @@ struct Supervisor::Impl {
     replies = participant->MakeOutput<CommandReply>();
     if (!remote_ids.empty()) {
       link.emplace(link::LinkSettings{.far = FarOf(up), .offer = MakeOffer(), .scene = folder.scene});
-      link->Join(&*participant, link->settings().offer->nodes);
+      bus::DdsParticipant* bus = &*participant;
+      if (!up.cart.security.keys.empty()) {
+        // What others own is not the supervisor's to write.
+        bus = &link_bus.emplace(bus::DdsSettings{.domain = up.cart.domain,
+                                                 .node_name = "link",
+                                                 .shared_memory = memory,
+                                                 .security = app::SecurityOf(up.cart, bus::kLinkIdentity)});
+      }
+      link->Join(bus, link->settings().offer->nodes);
     }
     if (scene.view().assessment.on != 0) {
       assessed.emplace(scene.view(), &*participant);
@@ -172,7 +180,10 @@ struct Supervisor::Impl {
   }
 
   static bus::FarSettings FarOf(const UpSettings& up) {
-    return link::FarSettingsFor(bus::FarSide::kCart, up.peer, up.address, up.cart.domain, up.link_domain);
+    bus::FarSettings far =
+        link::FarSettingsFor(bus::FarSide::kCart, up.peer, up.address, up.cart.domain, up.link_domain);
+    far.keys = up.cart.security.keys;
+    return far;
   }
 
   /// What the other host is to do.
@@ -314,15 +325,26 @@ struct Supervisor::Impl {
       Fail(ExitCode::kMismatch, mismatch);
       ending = true;
     }
-    refusals = participant->refusals();
-    for (std::size_t i = record.refused().size(); i < refusals.texts.size(); ++i) {
-      progress.Say("! refused: " + refusals.texts[i]);
-    }
-    record.AddRefusals(SessionTime(now), refusals);
+    TakeRefusals(now);
     if (const std::string mismatch = link ? link->mismatch() : std::string(); !mismatch.empty()) {
       Fail(ExitCode::kMismatch, mismatch);
       ending = true;
     }
+  }
+
+  /// Of the bus and of the link, in the order in which they were told.
+  void TakeRefusals(std::int64_t now) {
+    const std::array<bus::Refusals, 2> sources{participant->refusals(), link ? link->refusals() : bus::Refusals()};
+    refusals.participants = refusals.endpoints = 0;
+    for (std::size_t i = 0; i < sources.size(); ++i) {
+      refusals.participants += sources[i].participants;
+      refusals.endpoints += sources[i].endpoints;
+      for (; refusals_told[i] < sources[i].texts.size(); ++refusals_told[i]) {
+        refusals.texts.push_back(sources[i].texts[refusals_told[i]]);
+        progress.Say("! refused: " + refusals.texts.back());
+      }
+    }
+    record.AddRefusals(SessionTime(now), refusals);
   }
 
   void TakeCommands(std::int64_t now) {
@@ -559,6 +581,7 @@ struct Supervisor::Impl {
 
   void CleanUp() {
     link.reset();
+    link_bus.reset();
     commands.reset();
     replies.reset();
     orders.reset();
@@ -628,7 +651,8 @@ struct Supervisor::Impl {
   const std::vector<NodeId> remote_ids;  ///< Of the scene, on another host.
 
   std::optional<bus::DdsParticipant> participant;
-  std::optional<link::Link> link;  ///< To the host of remote_ids.
+  std::optional<bus::DdsParticipant> link_bus;  ///< On a secured cart: where `link` stands in for remote_ids.
+  std::optional<link::Link> link;               ///< To the host of remote_ids.
   std::unique_ptr<bus::Output<SceneManifest>> manifests;
   std::unique_ptr<bus::Input<Health>> healths_in;
   std::unique_ptr<bus::Output<Health>> healths_out;
@@ -644,6 +668,7 @@ struct Supervisor::Impl {
   SessionRecord record;
   Progress progress{!settings.attach.empty()};
   bus::Refusals refusals;
+  std::array<std::size_t, 2> refusals_told{};  ///< Of the bus, of the link.
   runtime::ServiceNotify service;
   std::string service_status = "starting";
   std::uint64_t turns = 0;

@@ -27,6 +27,9 @@
 #include <vector>
 
 #include "services/bus/dds/library.h"
+#include "services/bus/dds/peer_watch.h"
+#include "services/bus/dds/security.h"
+#include "services/bus/schema.h"
 #include "services/core/error.h"
 
 namespace fulcrum::bus {
@@ -48,6 +51,8 @@ const Duration_t kResponse{0, 1 * kMilli_ns};
 constexpr std::uint32_t kFarSocketBuffer_B = 4u << 20;
 /// The payload of UDP in an Ethernet frame: a lost frame then costs one fragment and not a datagram of forty.
 constexpr std::uint32_t kLargestDatagram_B = 1472;
+/// A handshake carries certificate and signed permissions in one message, which the library cannot divide.
+constexpr std::uint32_t kLargestSecuredDatagram_B = 16 * 1024;
 constexpr int kStreamBurst = 1024;  ///< Packets that may wait for the reader.
 constexpr std::uint32_t kEncapsulation_B = 4, kMostPadding_B = 3;
 
@@ -107,14 +112,25 @@ bool IsAddress(const std::string& text) {
   return inet_pton(AF_INET, text.c_str(), &address) == 1;
 }
 
+constexpr const char* kCartEnd = "link of the cart";
+constexpr const char* kHostEnd = "link of the other host";
+const char* NameOf(FarSide side) { return side == FarSide::kCart ? kCartEnd : kHostEnd; }
+
+/// Between hosts there is no security without encryption.
+Security SecurityOf(const FarSettings& settings) {
+  return {settings.keys, std::string(kLinkIdentity), !settings.keys.empty()};
+}
+
 fast::DomainParticipantQos QosOf(const FarSettings& settings) {
   fast::DomainParticipantQos qos;
-  qos.name(settings.node_name);
+  qos.name(NameOf(settings.side));
+  const std::string user_data = dds::UserDataOf(NameOf(settings.side), SchemaHash());
+  qos.user_data().data_vec({user_data.begin(), user_data.end()});
   auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {settings.address};
   udp->sendBufferSize = kFarSocketBuffer_B;
   udp->receiveBufferSize = kFarSocketBuffer_B;
-  udp->maxMessageSize = kLargestDatagram_B;
+  udp->maxMessageSize = settings.keys.empty() ? kLargestDatagram_B : kLargestSecuredDatagram_B;
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports.push_back(udp);
   qos.wire_protocol().builtin.discovery_config.leaseDuration = kFarLease;
@@ -130,6 +146,7 @@ fast::DomainParticipantQos QosOf(const FarSettings& settings) {
   // RTPS 2.3, 9.6.1.1: PB + DG * domain + d1 + PG * id.
   peer.port = static_cast<std::uint32_t>(7400 + 250 * settings.domain + 10 + 2 * (cart ? kHostId : kCartId));
   qos.wire_protocol().builtin.initialPeersList.push_back(peer);
+  if (!settings.keys.empty()) dds::ApplySecurity(SecurityOf(settings), &qos);
   return qos;
 }
 
@@ -160,14 +177,14 @@ class Lane final : private fast::DataReaderListener, private fast::DataWriterLis
     fast::TypeSupport type(new PacketType(ordered ? "fulcrum/OrderedPacket" : "fulcrum/StreamPacket",
                                           static_cast<std::uint32_t>(largest_B_)));
     type.register_type(participant);
-    const std::string stem = std::string("fulcrum/link/") + (ordered ? "ordered/" : "stream/");
     const auto topic = [&](bool from_cart) {
-      return participant->create_topic(stem + (from_cart ? "from_cart" : "from_host"), type.get_type_name(),
+      const std::size_t name = (ordered ? 2u : 0u) + (from_cart ? 0u : 1u);
+      return participant->create_topic(std::string(kLinkTopics.at(name)), type.get_type_name(),
                                        fast::TOPIC_QOS_DEFAULT);
     };
     fast::Topic* out = topic(side == FarSide::kCart);
     fast::Topic* in = topic(side != FarSide::kCart);
-    if (out == nullptr || in == nullptr) throw InputError(stem + ": cannot make the topics of the link");
+    if (out == nullptr || in == nullptr) throw InputError("cannot make the topics of the link");
 
     fast::DataWriterQos writer_qos;
     ApplyLane(lane, ordered ? kOrderedBacklog : 1, &writer_qos);
@@ -179,7 +196,7 @@ class Lane final : private fast::DataReaderListener, private fast::DataWriterLis
     ApplyLane(lane, ordered ? kOrderedBacklog : kStreamBurst, &reader_qos);
     reader_qos.reliable_reader_qos().times.heartbeatResponseDelay = kResponse;
     reader_ = subscriber->create_datareader(in, reader_qos, this, fast::StatusMask::data_available());
-    if (writer_ == nullptr || reader_ == nullptr) throw InputError(stem + ": cannot make the ports of the link");
+    if (writer_ == nullptr || reader_ == nullptr) throw InputError("cannot make the ports of the link");
   }
   ~Lane() override {
     // Nothing is called any more from here on.
@@ -233,8 +250,9 @@ class Lane final : private fast::DataReaderListener, private fast::DataWriterLis
 }  // namespace
 
 struct FarParticipant::Impl {
-  Impl(const FarSettings& settings, FarSink far_sink) : sink(std::move(far_sink)) {
-    if (settings.domain < 101 || settings.domain > 200) {
+  Impl(const FarSettings& settings, FarSink far_sink)
+      : sink(std::move(far_sink)), watch(NameOf(settings.side), SchemaHash(), SecurityOf(settings), kCartEnd) {
+    if (settings.domain < kFirstLinkDomain || settings.domain > kLastLinkDomain) {
       throw InputError("link domain " + std::to_string(settings.domain) + " is out of range: 101 to 200");
     }
     for (const std::string& address : {settings.address, settings.peer}) {
@@ -242,7 +260,7 @@ struct FarParticipant::Impl {
     }
     dds::PrepareLibrary();
     participant = fast::DomainParticipantFactory::get_instance()->create_participant(
-        static_cast<std::uint32_t>(settings.domain), QosOf(settings), nullptr, fast::StatusMask::none());
+        static_cast<std::uint32_t>(settings.domain), QosOf(settings), &watch, fast::StatusMask::none());
     if (participant == nullptr) {
       throw InputError("cannot open the link on " + settings.address +
                        ": is that an address of this machine, and are its UDP ports of link domain " +
@@ -255,6 +273,7 @@ struct FarParticipant::Impl {
   }
   ~Impl() {
     if (participant == nullptr) return;
+    participant->set_listener(nullptr);
     stream.reset();
     ordered.reset();
     participant->delete_contained_entities();
@@ -262,6 +281,7 @@ struct FarParticipant::Impl {
   }
 
   const FarSink sink;
+  dds::PeerWatch watch;
   fast::DomainParticipant* participant = nullptr;
   std::unique_ptr<Lane> stream, ordered;
 };
@@ -275,6 +295,9 @@ bool FarParticipant::Send(FarLane lane, std::span<const std::uint8_t> packet) no
 }
 
 bool FarParticipant::matched() const noexcept { return impl_->stream->matched() && impl_->ordered->matched(); }
+
+std::string FarParticipant::mismatch() { return impl_->watch.mismatch(); }
+Refusals FarParticipant::refusals() { return impl_->watch.refusals(); }
 
 std::string ResolveAddress(const std::string& name) {
   addrinfo hints{};

@@ -9,6 +9,8 @@
 #include <span>
 #include <string>
 
+#include "services/bus/security.h"
+
 namespace fulcrum::bus {
 
 enum class FarSide : std::uint8_t {
@@ -20,7 +22,7 @@ enum class FarLane : std::uint8_t {
   kStream,   ///< Best effort: what is lost is lost, nothing waits for it. At most kStreamPacket_B.
   kOrdered,  ///< Reliable and in order while both are connected; the newest kOrderedBacklog wait for a slow way.
 };
-inline constexpr std::size_t kStreamPacket_B = 1360;
+inline constexpr std::size_t kStreamPacket_B = 1300;  ///< One Ethernet frame, encrypted or not.
 inline constexpr std::size_t kOrderedPacket_B = 128 * 1024;
 inline constexpr int kOrderedBacklog = 256;
 
@@ -29,7 +31,7 @@ struct FarSettings {
   std::string address;  ///< IPv4 of the interface that leads to the other host: no other is used.
   std::string peer;     ///< IPv4 of the other host.
   FarSide side = FarSide::kCart;
-  std::string node_name = "link";
+  std::filesystem::path keys = {};  ///< Of `fulcrum keys init`: only who has such keys is heard, and nobody overhears.
 };
 
 /// Takes a packet; called on threads of the bus, one at a time for each lane; must not throw.
@@ -37,7 +39,7 @@ using FarSink = std::function<void(FarLane lane, std::span<const std::uint8_t> p
 
 class FarParticipant {
  public:
-  /// Throws InputError when an address or the domain cannot be used.
+  /// Throws InputError when an address, the domain or the keys cannot be used.
   FarParticipant(const FarSettings& settings, FarSink sink);
   ~FarParticipant();
   FarParticipant(const FarParticipant&) = delete;
@@ -47,6 +49,10 @@ class FarParticipant {
   bool Send(FarLane lane, std::span<const std::uint8_t> packet) noexcept;
   /// The other side is there, as far as is known.
   [[nodiscard]] bool matched() const noexcept;
+  /// The host's side: empty, or one line why the cart will never speak with it.
+  [[nodiscard]] std::string mismatch();
+  /// Who was refused since the start of this object.
+  [[nodiscard]] Refusals refusals();
 
  private:
   struct Impl;

@@ -21,7 +21,6 @@ using DiscoveryStatus = rtps::ParticipantDiscoveryInfo::DISCOVERY_STATUS;
 
 constexpr std::string_view kUserDataTag = "fulcrum ";
 constexpr std::string_view kPidTag = " (pid ";
-constexpr const char* kSupervisor = "supervisor";
 // A handshake takes milliseconds; one whose first message was lost is tried again after 1 s.
 constexpr std::int64_t kLongestHandshake_ns = 3'000'000'000;
 // What a stranger can make us remember.
@@ -52,9 +51,10 @@ std::string UserDataOf(const std::string& name, std::uint64_t schema_hash) {
          ")";
 }
 
-PeerWatch::PeerWatch(std::string own_name, std::uint64_t own_hash, const Security& security)
+PeerWatch::PeerWatch(std::string own_name, std::uint64_t own_hash, const Security& security, std::string leader)
     : own_name_(std::move(own_name)),
       own_hash_(Hex(own_hash)),
+      leader_(std::move(leader)),
       security_(security),
       authority_(security.on() ? "/CN=" + keys::AuthorityName(security.keys) : "") {}
 
@@ -123,6 +123,7 @@ void PeerWatch::on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipan
 void PeerWatch::CheckEndpoint(const Prefix& prefix, const std::string& topic, bool writes) {
   if (!security_.on()) return;
   const std::string identity = IdentityBehind(prefix);
+  if (identity == kLinkIdentity && std::ranges::find(kLinkTopics, topic) != kLinkTopics.end()) return;
   const AccessRole* role = AccessRoleOf(identity);
   const TopicRole* known = RoleNamed(topic);
   if (role != nullptr && known != nullptr && Contains(writes ? role->writes : role->reads, known->id)) return;
@@ -187,21 +188,21 @@ std::string PeerWatch::mismatch() {
   if (!mismatches_.empty()) return mismatches_.begin()->second;
   const std::int64_t now_ns = NowNs();
   LookAtStrangers(now_ns);
-  if (own_name_ == kSupervisor) return {};
+  if (own_name_ == leader_) return {};
   // Whoever calls itself a supervisor and is none does no harm as long as the true one is there.
-  const auto is_supervisor = [](const auto& entry) { return entry.second.name == kSupervisor; };
-  const bool has_supervisor = std::any_of(since_.begin(), since_.end(), [&](const auto& entry) {
+  const auto is_leader = [&](const auto& entry) { return entry.second.name == leader_; };
+  const bool has_leader = std::any_of(since_.begin(), since_.end(), [&](const auto& entry) {
     const auto peer = peers_.find(entry.first);
-    return peer != peers_.end() && is_supervisor(*peer);
+    return peer != peers_.end() && is_leader(*peer);
   });
-  if (has_supervisor) return {};
-  const auto found = std::find_if(strangers_.begin(), strangers_.end(), is_supervisor);
+  if (has_leader) return {};
+  const auto found = std::find_if(strangers_.begin(), strangers_.end(), is_leader);
   if (found == strangers_.end() || now_ns - found->second.since_ns < kLongestHandshake_ns) return {};
   if (!security_.on()) {
     return "this cart admits nobody without keys, and this " + own_name_ +
-           " has none: name them in the section `security` of its cart file (fulcrum keys show)";
+           " has none: name them in the section `security` of its cart file or with --keys (fulcrum keys show)";
   }
-  return "refused: the supervisor of this session " + found->second.has + ", as this " + own_name_ +
+  return "refused: the " + leader_ + " of this session " + found->second.has + ", as this " + own_name_ +
          " sees it with the keys of " + security_.keys.string() + "; both need the same keys and settings";
 }
 

@@ -24,7 +24,8 @@ namespace fulcrum::bus::dds {
 /// others say of themselves is believed only as far as to name them.
 class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
-  PeerWatch(std::string own_name, std::uint64_t own_hash, const Security& security);
+  /// @param leader name of the participant without which nobody stays.
+  PeerWatch(std::string own_name, std::uint64_t own_hash, const Security& security, std::string leader = "supervisor");
 
   void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant*,
                                 eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
@@ -35,7 +36,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
   void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant*,
                                eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
 
-  /// Empty, or one line naming a peer of another schema, or a supervisor that does not accept this participant.
+  /// Empty, or one line naming a peer of another schema, or a leader that does not accept this participant.
   [[nodiscard]] std::string mismatch();
   [[nodiscard]] Refusals refusals();
   [[nodiscard]] std::int64_t KnownSince(const std::string& name) const;
@@ -61,7 +62,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
   void CheckEndpoint(const Prefix& prefix, const std::string& topic, bool writes);
   void LookAtStrangers(std::int64_t now_ns);
 
-  const std::string own_name_, own_hash_;
+  const std::string own_name_, own_hash_, leader_;
   const Security security_;
   const std::string authority_;  ///< Name of our authority, as announcements carry it.
   mutable std::mutex mutex_;

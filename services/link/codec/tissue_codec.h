@@ -15,8 +15,8 @@
 
 namespace fulcrum::link {
 
-/// Of one message on the wire: what fits an Ethernet frame of 1500 with the headers of IP, UDP and RTPS.
-inline constexpr std::size_t kChunk_B = 1340;
+/// Of one message on the wire: what fits an Ethernet frame of 1500 with the headers of IP, UDP and RTPS, encrypted.
+inline constexpr std::size_t kChunk_B = 1280;
 
 /// Positions are told in steps of this [m].
 inline constexpr double kTissueStep_m = 5e-6;

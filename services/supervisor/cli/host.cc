@@ -20,6 +20,8 @@ ExitCode Host(const Words& words) {
           "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
           "out", po::value<std::string>()->value_name("DIR")->default_value("out"), "session folders are made in here")(
           "cache", po::value<std::string>()->value_name("DIR"), "scenes are kept here by their hash")(
+          "keys", po::value<std::string>()->value_name("DIR"),
+          "folder of a secured cart's keys, as fulcrum keys init made it (default: not secured)")(
           "window", "show the picture in a window as well")(
           "quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),
           "of the picture: auto, low, high");
@@ -39,6 +41,10 @@ ExitCode Host(const Words& words) {
                                       values.count("link-domain") != 0 ? values["link-domain"].as<int>() : 0);
   if (values.count("nodes") != 0) {
     settings.allowed = link::NodesFromNames(text("nodes"));
+  }
+  if (values.count("keys") != 0) {
+    settings.keys = std::filesystem::absolute(text("keys"));
+    settings.far.keys = settings.keys;
   }
   settings.out = text("out");
   settings.programs = runtime::ProgramFolder();

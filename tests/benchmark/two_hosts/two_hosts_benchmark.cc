@@ -95,9 +95,9 @@ Run RunSession(const std::string& scene_yaml, double seconds, const std::string&
   run.tissue_kB_per_s = figures("link_tissue_kB_per_s");
   run.offset_us = figures("link_clock_offset_us");
   run.round_trip_us = figures("link_round_trip_us");
+  if (cart.End(0) != 0) run.wrong = "the session ended badly\n" + cart.Said() + (host ? host->Said() : "");
   near.End(SIGTERM);
   far.End(SIGTERM);
-  if (cart.End(0) != 0) run.wrong = "the session ended badly\n" + cart.Said() + (host ? host->Said() : "");
   run.tools = testing::HeardTools(file("near"));
   if (with_tissue && !remote.empty()) run.frames = testing::CompareFrames(file("near.tissue"), file("far.tissue"));
   return run;

@@ -176,7 +176,8 @@ TEST_F(HandleProcess, CalibrationInTheHandIsStoredAndUsedUnlessRefused) {
   const std::string cart = WriteCart(
       "handles: {tool0: {simulated: {protocol: framed, closed_V: 2.36, open_V: 2.545, bow_percent: 3, "
       "tremor_deg: 0.25}}}");
-  Program good = Bridge({"calibrate", "--cart", cart}, "\n\n\n\n\n");
+  // More lines than points: a busy machine may have a point taken again.
+  Program good = Bridge({"calibrate", "--cart", cart}, "\n\n\n\n\n\n\n\n");
   EXPECT_EQ(good.End(0), 0);
   EXPECT_NE(good.Said().find("stored for simulated-tool0"), std::string::npos) << good.Said();
   for (Case& c : cases) {

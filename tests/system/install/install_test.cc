@@ -103,7 +103,7 @@ TEST_F(InstallTest, UnitsPassTheCheckOfSystemd) {
                                               "=" + root_.string() + "/usr/");
     if (copy.parent_path() == units) arguments.push_back(copy);
   }
-  ASSERT_EQ(arguments.size(), 4u + 8u) << "a target, the supervisor, six nodes";
+  ASSERT_EQ(arguments.size(), 4u + 9u) << "a target, the supervisor, the console, six nodes";
   EXPECT_EQ(Output("/usr/bin/env", arguments), "") << "systemd found fault with the units";
 }
 

@@ -1,8 +1,9 @@
 // A cable between two interfaces of this network namespace: passes each Ethernet frame on after a delay, and loses
 // some.
 //
-//   two_hosts_cable INTERFACE INTERFACE DELAY_MS LOSS_PERCENT
+//   two_hosts_cable INTERFACE INTERFACE DELAY_MS LOSS_PERCENT WORD
 //
+// It says so, once, when a frame has WORD in the clear.
 // It stands for tc's netem, which not every kernel has.
 #include <arpa/inet.h>
 #include <linux/if_packet.h>
@@ -21,6 +22,7 @@
 #include <cstdlib>
 #include <deque>
 #include <random>
+#include <string_view>
 #include <vector>
 
 namespace {
@@ -53,8 +55,8 @@ struct Waiting {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 5) {
-    std::fputs("usage: two_hosts_cable INTERFACE INTERFACE DELAY_MS LOSS_PERCENT\n", stderr);
+  if (argc != 6) {
+    std::fputs("usage: two_hosts_cable INTERFACE INTERFACE DELAY_MS LOSS_PERCENT WORD\n", stderr);
     return 2;
   }
   prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -63,6 +65,8 @@ int main(int argc, char** argv) {
       std::chrono::duration<double, std::milli>(std::strtod(argv[3], nullptr)));
   std::mt19937 random(1);
   std::bernoulli_distribution lost(std::strtod(argv[4], nullptr) / 100);
+  const std::string_view word = argv[5];
+  bool overheard = false;
   std::deque<Waiting> wire;  // In order: all wait equally long.
   std::array<char, 70'000> buffer{};
   for (;;) {
@@ -90,6 +94,12 @@ int main(int argc, char** argv) {
           break;
         }
         if (sender.sll_pkttype == PACKET_OUTGOING || lost(random)) continue;
+        const std::string_view frame(buffer.data(), static_cast<std::size_t>(size));
+        if (!overheard && frame.find(word) != std::string_view::npos) {
+          overheard = true;
+          std::puts("overheard");
+          std::fflush(stdout);
+        }
         wire.push_back({Clock::now() + delay, ends[1 - from], {buffer.data(), buffer.data() + size}});
       }
     }

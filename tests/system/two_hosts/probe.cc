@@ -1,7 +1,8 @@
 // Listens on the bus of the host that it runs on and writes down what it hears, for a test on another host to compare.
 //
-//   two_hosts_probe DOMAIN FILE [tissue]
+//   two_hosts_probe DOMAIN FILE [tissue [secured]]
 //
+// With "secured" it waits for a secured session, and joins as the one who may read all.
 // FILE gets a line per sample: "tool <session time s> <force 0 N> <force 1 N> <model age s>",
 // "health <node> <state> <pid> <ticks>", "link <name> <value>", "event ..."; FILE.tissue, with "tissue", binary:
 // sequence (u64), age when it came (f64, s), vertex count (u32), floats.
@@ -12,6 +13,7 @@
 #include <thread>
 
 #include "services/bus/dds/participant.h"
+#include "services/bus/dds/shared_memory.h"
 #include "services/runtime/cyclic_thread.h"
 #include "services/runtime/realtime.h"
 
@@ -20,7 +22,15 @@ using namespace fulcrum;  // NOLINT(google-build-using-namespace): a program of 
 int main(int argc, char** argv) {
   if (argc < 3) return 2;
   runtime::InstallStopSignals();
-  bus::DdsParticipant participant({.domain = std::atoi(argv[1]), .node_name = "probe", .shared_memory = {}});
+  const int domain = std::atoi(argv[1]);
+  const std::filesystem::path memory = bus::SharedMemoryDirectory(domain);
+  bus::Security security;
+  while (argc > 4 && std::strcmp(argv[4], "secured") == 0 && !security.on() && !runtime::ShouldStop()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    security = bus::AnnouncedSecurity(memory, NodeName(NodeId::kRecorder));
+  }
+  bus::DdsParticipant participant(
+      {.domain = domain, .node_name = "probe", .shared_memory = memory, .security = security});
   const bool with_tissue = argc > 3 && std::strcmp(argv[3], "tissue") == 0;
   const auto manifests = participant.MakeInput<SceneManifest>();
   const auto tools = participant.MakeInput<ToolState>();

@@ -62,7 +62,7 @@ TwoHosts::TwoHosts(const Settings& settings)
   MakeHost("cart", "wc", kCartAddress, 0, &cart_holder_, &cart_pid_);
   MakeHost("host", "wh", kHostAddress, settings.far_clock_ahead_s, &host_holder_, &host_pid_);
   cable_ = Program(kIp, {"netns", "exec", Name("wire"), std::string(FULCRUM_BIN_DIR) + "/two_hosts_cable", "wc", "wh",
-                         std::to_string(settings.delay_ms), std::to_string(settings.loss_percent)});
+                         std::to_string(settings.delay_ms), std::to_string(settings.loss_percent), settings.word});
 }
 
 void TwoHosts::MakeHost(const std::string& name, const char* end, const char* address, double clock_ahead_s,

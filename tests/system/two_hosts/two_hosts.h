@@ -18,6 +18,7 @@ class TwoHosts {
     double delay_ms = 0;           ///< Each way.
     double loss_percent = 0;       ///< Each way.
     double far_clock_ahead_s = 0;  ///< Whole seconds.
+    std::string word = "fulcrum";  ///< For Overheard.
   };
   static constexpr const char* kCartAddress = "10.77.0.1";
   static constexpr const char* kHostAddress = "10.77.0.2";
@@ -36,6 +37,8 @@ class TwoHosts {
   /// Pulls the plug, and puts it back.
   void Cut() const;
   void Mend() const;
+  /// Settings::word went over the cable in the clear.
+  [[nodiscard]] bool Overheard() const { return !cable_.Said().empty(); }
   /// A folder of this object's, gone with it.
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
 

@@ -6,9 +6,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <ctime>
 #include <fstream>
 #include <thread>
 
+#include "services/keys/key_folder.h"
 #include "services/link/codec/tissue_codec.h"
 #include "tests/support/cart.h"
 #include "tests/support/working_scene.h"
@@ -21,18 +23,57 @@ namespace fs = std::filesystem;
 const char* const kDomain = "61";
 constexpr double kAhead_s = 1000;
 
+constexpr const char* kSceneName = "overheard_scene";
+
+/// The working scene under a name that an eavesdropper knows when he hears it.
+std::string NamedScene() {
+  std::string scene = WorkingScene("small", 120);
+  const std::string was = "name: small\n";
+  scene.replace(scene.find(was), was.size(), std::string("name: ") + kSceneName + '\n');
+  return scene;
+}
+
 /// One session with `remote` on the far host; its probes' files are near.txt and far.txt of the folder.
 struct Session {
-  explicit Session(const std::string& remote)
-      : hosts({.delay_ms = 5, .loss_percent = 1, .far_clock_ahead_s = kAhead_s}) {
+  explicit Session(const std::string& remote, bool secured = false)
+      : hosts({.delay_ms = 5, .loss_percent = 1, .far_clock_ahead_s = kAhead_s, .word = kSceneName}) {
     const fs::path scene = hosts.folder() / "working.yaml";
-    std::ofstream(scene) << WorkingScene("small", 120);
-    host = hosts.OnHost("fulcrum", {"host", "--peer", TwoHosts::kCartAddress, "--domain", kDomain, "--quality", "low",
-                                    "--out", hosts.folder() / "host", "--cache", hosts.folder() / "cache"});
-    cart = hosts.OnCart("fulcrum", {"up", scene, "--domain", kDomain, "--peer", TwoHosts::kHostAddress, "--remote",
-                                    remote, "--quality", "low", "--out", hosts.folder() / "cart"});
-    near = hosts.OnCart("two_hosts_probe", {kDomain, File("near"), "tissue"});
-    far = hosts.OnHost("two_hosts_probe", {kDomain, File("far"), "tissue"});
+    std::ofstream(scene) << NamedScene();
+    std::vector<std::string> up{"up",       scene,  "--domain",  kDomain, "--peer", TwoHosts::kHostAddress,
+                                "--remote", remote, "--quality", "low",   "--out",  hosts.folder() / "cart"};
+    if (secured) {
+      const std::time_t now = std::time(nullptr);
+      keys::MakeKeyFolder(hosts.folder() / "keys", {now, now + 24 * 3600}, false);
+      std::ofstream(hosts.folder() / "cart.yaml") << "security: {keys: keys}\n";
+      up.insert(up.end(), {"--cart", hosts.folder() / "cart.yaml"});
+      cart = hosts.OnCart("fulcrum", up);
+      // One without keys, which ends by itself.
+      Program stranger = Host({});
+      (void)WaitFor(30, [&] { return (stranger_code = stranger.Poll().value_or(-1000)) != -1000; });
+      stranger_said = stranger.Said();
+      host = Host({"--keys", hosts.folder() / "keys"});
+    } else {
+      host = Host({});
+      cart = hosts.OnCart("fulcrum", up);
+    }
+    const char* bus = secured ? "secured" : "open";
+    near = hosts.OnCart("two_hosts_probe", {kDomain, File("near"), "tissue", bus});
+    far = hosts.OnHost("two_hosts_probe", {kDomain, File("far"), "tissue", bus});
+  }
+  [[nodiscard]] Program Host(const std::vector<std::string>& more) const {
+    std::vector<std::string> words{"host",
+                                   "--peer",
+                                   TwoHosts::kCartAddress,
+                                   "--domain",
+                                   kDomain,
+                                   "--quality",
+                                   "low",
+                                   "--out",
+                                   hosts.folder() / "host",
+                                   "--cache",
+                                   hosts.folder() / "cache"};
+    words.insert(words.end(), more.begin(), more.end());
+    return hosts.OnHost("fulcrum", words);
   }
   [[nodiscard]] fs::path File(const char* side) const { return hosts.folder() / (std::string(side) + ".txt"); }
   [[nodiscard]] fs::path Tissue(const char* side) const { return File(side).string() + ".tissue"; }
@@ -60,6 +101,8 @@ struct Session {
 
   TwoHosts hosts;
   Program host, cart, near, far;
+  int stranger_code = 0;
+  std::string stranger_said;
 };
 
 void Sleep(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
@@ -105,6 +148,39 @@ TEST(TwoHosts, ThePictureIsDrawnOnAnotherHostAndACutCableIsNoEnd) {
   ASSERT_FALSE(offsets.empty());
   EXPECT_NEAR(offsets.back(), 1e6 * kAhead_s, 5e3);
   EXPECT_NE(session.host.Said().find("received"), std::string::npos) << "the scene was not transferred";
+  EXPECT_TRUE(session.hosts.Overheard()) << "the secured cart's test hears nothing either";
+}
+
+TEST(TwoHosts, ASecuredCartCannotBeOverheardAndRefusesAHostWithoutKeys) {
+  if (const std::string why = TwoHosts::WhyNot(); !why.empty()) GTEST_SKIP() << why;
+  Session session("physics_node", true);
+  EXPECT_EQ(session.stranger_code, 3) << session.stranger_said;
+  EXPECT_NE(session.stranger_said.find("admits nobody without keys"), std::string::npos) << session.stranger_said;
+  ASSERT_TRUE(session.WaitForForce()) << session.Said();
+  Sleep(2);
+  // As long as it takes to begin a connection anew, and to prove oneself again.
+  session.hosts.Cut();
+  Sleep(4);
+  session.hosts.Mend();
+  const double mended_s = HeardTools(session.File("near")).back().time_s;
+  EXPECT_TRUE(WaitFor(20,
+                      [&] {
+                        const std::vector<HeardTool> tools = HeardTools(session.File("near"));
+                        return std::any_of(tools.begin(), tools.end(), [&](const HeardTool& tool) {
+                          return tool.time_s > mended_s && tool.force0_N > 0.1 && tool.model_age_s < 0.1;
+                        });
+                      }))
+      << "the force did not come back\n"
+      << session.Said();
+  Sleep(2);
+  const auto [code, there] = session.End();
+  EXPECT_EQ(code, 0) << session.Said();
+  EXPECT_EQ(there, 0) << session.Said();
+  EXPECT_FALSE(session.hosts.Overheard()) << "the scene's name went over the cable in the clear";
+  EXPECT_GT(CompareFrames(session.Tissue("far"), session.Tissue("near")).compared, 40u);
+  const std::string summary = ReadFile(session.hosts.folder() / "cart" / "latest" / "summary.json");
+  EXPECT_NE(summary.find("\"refused.participants\": 1"), std::string::npos) << summary << session.Said();
+  EXPECT_NE(summary.find("\"refused.endpoints\": 0"), std::string::npos) << summary << session.Said();
 }
 
 TEST(TwoHosts, ForceComesFromAnotherHostAndNeverJumps) {
