@@ -30,16 +30,28 @@ void AddValueNoise(int size, int cells, float amplitude, Uniform* uniform, std::
   for (float& value : lattice) {
     value = (*uniform)() - 0.5f;
   }
-  const auto at = [&](int x, int y) { return lattice[TexelIndex(x % cells, y % cells, cells)]; };
+  // Along x the same in each row: where in the lattice, and between which two of its columns.
+  struct Column {
+    std::size_t left, right;
+    float share;
+  };
+  const auto place = [&](int texel) {
+    const float f = static_cast<float>(texel) * cells / size;
+    const int cell = static_cast<int>(f);
+    return Column{static_cast<std::size_t>(cell % cells), static_cast<std::size_t>((cell + 1) % cells),
+                  SmoothStep(f - cell)};
+  };
+  std::vector<Column> columns;
+  columns.reserve(static_cast<std::size_t>(size));
+  for (int x = 0; x < size; ++x) columns.push_back(place(x));
+  std::vector<float> row(static_cast<std::size_t>(cells));
   for (int y = 0; y < size; ++y) {
-    for (int x = 0; x < size; ++x) {
-      const float fx = static_cast<float>(x) * cells / size, fy = static_cast<float>(y) * cells / size;
-      const int ix = static_cast<int>(fx), iy = static_cast<int>(fy);
-      const float tx = SmoothStep(fx - ix), ty = SmoothStep(fy - iy);
-      const float low = at(ix, iy) + tx * (at(ix + 1, iy) - at(ix, iy));
-      const float high = at(ix, iy + 1) + tx * (at(ix + 1, iy + 1) - at(ix, iy + 1));
-      (*field)[TexelIndex(x, y, size)] += amplitude * (low + ty * (high - low));
-    }
+    const Column& between = columns[static_cast<std::size_t>(y)];
+    const float* low = lattice.data() + between.left * static_cast<std::size_t>(cells);
+    const float* high = lattice.data() + between.right * static_cast<std::size_t>(cells);
+    for (std::size_t k = 0; k < row.size(); ++k) row[k] = amplitude * (low[k] + between.share * (high[k] - low[k]));
+    float* out = field->data() + TexelIndex(0, y, size);
+    for (const Column& x : columns) *out++ += row[x.left] + x.share * (row[x.right] - row[x.left]);
   }
 }
 
@@ -49,11 +61,10 @@ float Wrapped(float a, float b) {
   return std::min(d, 1 - d);
 }
 
-std::uint8_t ToByte(float value) { return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0f, 255.0f))); }
+std::uint8_t ToByte(float value) { return static_cast<std::uint8_t>(std::clamp(value, 0.0f, 255.0f) + 0.5f); }
 
-}  // namespace
-
-std::vector<std::uint8_t> MakeNoisePattern(int size) {
+/// Square RGBA8 image with the three noises, alpha 0.
+std::vector<std::uint8_t> MakeNoises(int size) {
   std::vector<std::uint8_t> image(4u * static_cast<std::size_t>(size) * size);
   for (std::size_t channel = 0; channel < 3; ++channel) {
     Uniform uniform(static_cast<std::uint32_t>(17 + channel));
@@ -65,6 +76,13 @@ std::vector<std::uint8_t> MakeNoisePattern(int size) {
       image[4 * i + channel] = ToByte(128 + 115 * field[i]);
     }
   }
+  return image;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> MakeNoisePattern(int size) {
+  std::vector<std::uint8_t> image = MakeNoises(size);
   // Lobules: distance to the second nearest minus distance to the nearest of jittered centres.
   constexpr int kCells = 9;
   Uniform uniform(5);
@@ -78,19 +96,20 @@ std::vector<std::uint8_t> MakeNoisePattern(int size) {
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
       const float u = (static_cast<float>(x) + 0.5f) / size, v = (static_cast<float>(y) + 0.5f) / size;
-      float nearest = 9, second = 9;
+      float nearest = 9, second = 9;  // Squared.
       for (int dy = -2; dy <= 2; ++dy) {
         for (int dx = -2; dx <= 2; ++dx) {
           const int cx = (static_cast<int>(u * kCells) + dx + kCells) % kCells;
           const int cy = (static_cast<int>(v * kCells) + dy + kCells) % kCells;
           const auto& centre = centres[TexelIndex(cx, cy, kCells)];
-          const float d = std::hypot(Wrapped(u, centre[0]), Wrapped(v, centre[1]));
+          const float du = Wrapped(u, centre[0]), dv = Wrapped(v, centre[1]);
+          const float d = du * du + dv * dv;
           second = std::min(second, std::max(d, nearest));
           nearest = std::min(nearest, d);
         }
       }
       image[4 * TexelIndex(x, y, size) + 3] =
-          ToByte(255 * SmoothStep(std::min(1.0f, 1.6f * kCells * (second - nearest))));
+          ToByte(255 * SmoothStep(std::min(1.0f, 1.6f * kCells * (std::sqrt(second) - std::sqrt(nearest)))));
     }
   }
   return image;
@@ -116,7 +135,8 @@ std::vector<std::uint8_t> MakeVesselPattern(int size) {
       for (int dy = -reach; dy <= reach; ++dy) {
         for (int dx = -reach; dx <= reach; ++dx) {
           const int x = static_cast<int>(std::floor(walker.x)) + dx, y = static_cast<int>(std::floor(walker.y)) + dy;
-          const float d = std::hypot(static_cast<float>(x) + 0.5f - walker.x, static_cast<float>(y) + 0.5f - walker.y);
+          const float ex = static_cast<float>(x) + 0.5f - walker.x, ey = static_cast<float>(y) + 0.5f - walker.y;
+          const float d = std::sqrt(ex * ex + ey * ey);
           const float strength = std::min(1.0f, 0.35f + walker.radius / (0.004f * size)) *
                                  SmoothStep(std::clamp(walker.radius + 1 - d, 0.0f, 1.0f));
           float& texel = image[TexelIndex((x % size + size) % size, (y % size + size) % size, size)];
@@ -142,7 +162,7 @@ std::vector<std::uint8_t> MakeVesselPattern(int size) {
 }
 
 std::vector<std::uint8_t> MakeSerosaPattern(int size) {
-  std::vector<std::uint8_t> image = MakeNoisePattern(size);
+  std::vector<std::uint8_t> image = MakeNoises(size);
   const std::vector<std::uint8_t> vessels = MakeVesselPattern(size);
   for (std::size_t i = 0; i < vessels.size(); ++i) {
     image[4 * i + 3] = vessels[i];
