@@ -58,10 +58,12 @@ std::string FiguresJson(const SessionWatch& watch) {
   const auto add = [&](const char* key, NodeId node, const char* metric, double step) {
     json.Number(key, supervisor::MetricOf(watch.health(node), metric), step);
   };
-  add("temperature_C", NodeId::kThermal, "temperature_C", 0.1);
-  add("highest_C", NodeId::kThermal, "highest_temperature_C", 0.1);
-  add("power_W", NodeId::kThermal, "power_W", 0.1);
-  add("cut_mm", NodeId::kThermal, "cut_length_mm", 0.1);
+  if (watch.expects(NodeId::kThermal)) {
+    add("temperature_C", NodeId::kThermal, "temperature_C", 0.1);
+    add("highest_C", NodeId::kThermal, "highest_temperature_C", 0.1);
+    add("power_W", NodeId::kThermal, "power_W", 0.1);
+    add("cut_mm", NodeId::kThermal, "cut_length_mm", 0.1);
+  }
   add("force0_N", NodeId::kHaptics, "force0_N", 0.01);
   add("force1_N", NodeId::kHaptics, "force1_N", 0.01);
   add("peak_N", NodeId::kHaptics, "peak_force_N", 0.01);

@@ -341,6 +341,21 @@ int RunTest(Options* options) {
   }
 }
 
+/// Not every scene has each node (an exercise without heat): those are left out, with a line.
+void LeaveOutMissing(const SceneView& scene, Options* options) {
+  const auto missing = [&](NodeId node) { return (scene.node_mask >> static_cast<unsigned>(node) & 1u) == 0; };
+  std::string names;
+  std::erase_if(options->lock_step.nodes, [&](NodeId node) {
+    if (missing(node)) names += std::string(names.empty() ? "" : ", ") + NodeName(node);
+    return missing(node);
+  });
+  if (names.empty()) return;
+  if (options->lock_step.nodes.empty() && !options->pictures) {
+    throw InputError("--into: scene \"" + std::string(scene.name) + "\" has no " + names);
+  }
+  std::cout << names << ": not in scene \"" << scene.name << "\", left out\n";
+}
+
 int Run(int argc, char** argv) {
   Options options = Parse(argc, argv);
   if (!options.answer.empty()) {
@@ -350,6 +365,7 @@ int Run(int argc, char** argv) {
   if (options.live) return RunLive(options.live_settings);
   if (options.test) return RunTest(&options);
   const scene::SceneFile scene(options.scene);
+  LeaveOutMissing(scene.view(), &options);
   const config::CartConfig cart = LoadCart(options);
   const ScratchFolder scratch;
   options.lock_step.folder = scratch.path();

@@ -24,16 +24,28 @@ std::string Fixed(double value, int decimals) {
 }
 
 std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
-  return {{"peak_force_N", "peak force", "N", 2, record.peak("peak_force_N")},
-          {"highest_temperature_C", "highest temperature", "°C", 0, record.peak("highest_temperature_C")},
-          {"cut_length_mm", "cut length", "mm", 1, record.peak("cut_length_mm")},
-          {"max_displacement_mm", "largest displacement", "mm", 1, record.peak("max_displacement_mm")},
-          {"grasped_particles", "particles grasped at most", "", 0, record.peak("grasped_particles")},
-          {"dead_edges", "membrane edges severed", "", 0, record.peak("dead_edges")},
-          {"warnings", "warnings", "", 0, record.peak("warnings")},
-          {"injuries", "injuries", "", 0, record.peak("injuries")},
-          {"quarantined", "particles quarantined", "", 0, record.peak("quarantined")},
-          {"png_written", "pictures", "", 0, record.peak("png_written")}};
+  using enum NodeId;
+  struct Source {
+    NodeId node;
+    const char *key, *label, *unit;
+    int decimals;
+  };
+  constexpr std::array kSources{Source{kHaptics, "peak_force_N", "peak force", "N", 2},
+                                Source{kThermal, "highest_temperature_C", "highest temperature", "°C", 0},
+                                Source{kThermal, "cut_length_mm", "cut length", "mm", 1},
+                                Source{kPhysics, "max_displacement_mm", "largest displacement", "mm", 1},
+                                Source{kPhysics, "grasped_particles", "particles grasped at most", "", 0},
+                                Source{kThermal, "dead_edges", "membrane edges severed", "", 0},
+                                Source{kThermal, "warnings", "warnings", "", 0},
+                                Source{kThermal, "injuries", "injuries", "", 0},
+                                Source{kPhysics, "quarantined", "particles quarantined", "", 0},
+                                Source{kRender, "png_written", "pictures", "", 0}};
+  std::vector<KeyFigure> figures;
+  for (const Source& source : kSources) {
+    if (!record.node(source.node).seen) continue;  // An exercise without heat has no temperature, not one of 0.
+    figures.push_back({source.key, source.label, source.unit, source.decimals, record.peak(source.key)});
+  }
+  return figures;
 }
 
 std::string RecordingLosses(const SessionRecord& record) {

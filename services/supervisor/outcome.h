@@ -43,6 +43,7 @@ struct KeyFigure {
   int decimals;
   double value;
 };
+/// Of the nodes that took part.
 [[nodiscard]] std::vector<KeyFigure> KeyFigures(const SessionRecord& record);
 
 /// "no sample lost" or how many, and whether the recorder was down.

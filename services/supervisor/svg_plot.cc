@@ -33,9 +33,9 @@ std::string Text(double x, double y, const char* anchor, const std::string& text
          EscapeHtml(text) + "</text>\n";
 }
 
-/// Where a line's label ends.
+/// Where a line's label begins.
 struct Place {
-  double end_x, y;
+  double x, y;
 };
 
 double WidthOf(const std::string& label) { return kGlyph * static_cast<double>(label.size()); }
@@ -46,13 +46,13 @@ std::vector<Place> LegendOf(const std::vector<PlotLine>& lines, const std::strin
   for (const PlotLine& line : lines) width += line.curve->points().empty() ? 0 : WidthOf(line.label) + kLegendGap;
   const double title_end = kTitleX + kTitleGlyph * static_cast<double>(title.size());
   const bool beside = title_end + width <= kWidth - kRight;
-  Place next{beside ? kWidth - kRight - width : kTitleX - kLegendGap, beside ? kTitleY : kTitleY + kLegendRow};
+  Place next{beside ? kWidth - kRight - width + kLegendGap : kTitleX, beside ? kTitleY : kTitleY + kLegendRow};
   std::vector<Place> places;
   for (const PlotLine& line : lines) {
-    const double step = line.curve->points().empty() ? 0 : kLegendGap + WidthOf(line.label);
-    if (next.end_x + step > kWidth - kRight + 1e-9) next = {kTitleX - kLegendGap, next.y + kLegendRow};
-    next.end_x += step;
+    const double step = line.curve->points().empty() ? 0 : WidthOf(line.label);
+    if (next.x + step > kWidth - kRight + 1e-9) next = {kTitleX, next.y + kLegendRow};
     places.push_back(next);
+    next.x += step > 0 ? step + kLegendGap : 0;
   }
   return places;
 }
@@ -127,7 +127,7 @@ std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& l
              Fixed(y_of(points[i].value), 1) + "'/>\n";
     }
     if (!legend.empty()) {
-      svg += Text(legend[n].end_x, legend[n].y, "end", line.label,
+      svg += Text(legend[n].x, legend[n].y, "start", line.label,
                   ("fill='" + line.colour + "' style='fill:" + line.colour + "'").c_str());
     }
   }

@@ -203,11 +203,12 @@ function showWarnings(warnings) {
 
 function showFigures(figures) {
   if (!figures) return;
-  setText($('temperature'), `${figures.temperature_C.toFixed(0)} °C`);
-  setText($('temperature-more'), `${figures.power_W.toFixed(0)} W · cut ${figures.cut_mm.toFixed(1)} mm`);
+  const heat = figures.temperature_C !== undefined;  // Not every exercise has it.
+  setText($('temperature'), heat ? `${figures.temperature_C.toFixed(0)} °C` : '–');
+  setText($('temperature-more'), heat ? `${figures.power_W.toFixed(0)} W · cut ${figures.cut_mm.toFixed(1)} mm` : 'no heat in this scene');
   setText($('force'), `${Math.max(figures.force0_N, figures.force1_N).toFixed(2)} N`);
   setText($('force-more'), `highest ${figures.peak_N.toFixed(2)} N`);
-  drawPlot($('plot-temperature'), points, {span: kSpan, floor: 20, least: 60, unit: '°C', lines: [{at: 1, colour: '#ff8a5c'}]});
+  drawPlot($('plot-temperature'), points, {span: kSpan, floor: 20, least: 60, unit: '°C', lines: heat ? [{at: 1, colour: '#ff8a5c'}] : []});
   drawPlot($('plot-force'), points, {span: kSpan, floor: 0, least: 0.5, unit: 'N',
     lines: [{at: 2, colour: '#58bcff'}, {at: 3, colour: '#ffd866'}]});
 }

@@ -81,6 +81,7 @@ TEST_F(InstallTest, PackageSaysWhatItNeedsAndKeepsTheConfigurationOfTheLab) {
     EXPECT_TRUE(fs::is_regular_file(root_.string() + file)) << file;
   }
   EXPECT_EQ(fs::read_symlink(root_ / "usr/bin/fulcrum"), "../libexec/fulcrum/fulcrum");
+  EXPECT_EQ(fs::read_symlink(root_ / "usr/bin/replayer"), "../libexec/fulcrum/replayer");
   EXPECT_TRUE(fs::exists(root_ / "usr/share/man/man1/fulcrum-up.1.gz"));
   // Nothing may point back to where it was built.
   for (const auto& entry : fs::recursive_directory_iterator(root_)) {
