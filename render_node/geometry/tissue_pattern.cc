@@ -61,7 +61,10 @@ float Wrapped(float a, float b) {
   return std::min(d, 1 - d);
 }
 
-std::uint8_t ToByte(float value) { return static_cast<std::uint8_t>(std::clamp(value, 0.0f, 255.0f) + 0.5f); }
+/// Nearest, halves up; std::lround would be a call for each texel.
+std::uint8_t ToByte(float value) {
+  return static_cast<std::uint8_t>(static_cast<int>(2 * std::clamp(value, 0.0f, 255.0f) + 1) / 2);
+}
 
 /// Square RGBA8 image with the three noises, alpha 0.
 std::vector<std::uint8_t> MakeNoises(int size) {
