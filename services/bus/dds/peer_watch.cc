@@ -21,8 +21,11 @@ using DiscoveryStatus = rtps::ParticipantDiscoveryInfo::DISCOVERY_STATUS;
 
 constexpr std::string_view kUserDataTag = "fulcrum ";
 constexpr std::string_view kPidTag = " (pid ";
-// A handshake takes milliseconds; one whose first message was lost is tried again after 1 s.
-constexpr std::int64_t kLongestHandshake_ns = 3'000'000'000;
+// What shows at once, no keys or others, is believed after this: the true leader may come a little later.
+constexpr std::int64_t kLatecomer_ns = 3'000'000'000;
+// A handshake takes milliseconds; one whose first message was lost is tried again after 1 s, and six programs that
+// start together on a busy machine have thirty of them.
+constexpr std::int64_t kLongestHandshake_ns = 8'000'000'000;
 // What a stranger can make us remember.
 constexpr std::size_t kMostForbidden = 1024;
 constexpr std::size_t kLongestName = 80;
@@ -197,7 +200,9 @@ std::string PeerWatch::mismatch() {
   });
   if (has_leader) return {};
   const auto found = std::find_if(strangers_.begin(), strangers_.end(), is_leader);
-  if (found == strangers_.end() || now_ns - found->second.since_ns < kLongestHandshake_ns) return {};
+  if (found == strangers_.end()) return {};
+  const bool shows = !security_.on() || !found->second.has.empty();
+  if (now_ns - found->second.since_ns < (shows ? kLatecomer_ns : kLongestHandshake_ns)) return {};
   if (!security_.on()) {
     return "this cart admits nobody without keys, and this " + own_name_ +
            " has none: name them in the section `security` of its cart file or with --keys (fulcrum keys show)";

