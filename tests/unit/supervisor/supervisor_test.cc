@@ -341,6 +341,8 @@ TEST(OutcomeTest, SummaryIsFlatJsonWithTextEscaped) {
   EXPECT_NE(json.find(R"("scene": "a \"b\"\u000a\\")"), std::string::npos) << json;
   EXPECT_NE(json.find("\"max_displacement_mm\": 3.25"), std::string::npos) << json;
   EXPECT_NE(json.find("\"physics_node.step_p99_ms\": 2"), std::string::npos) << json;
+  // Without heat there is no temperature, not one of 0.
+  EXPECT_EQ(json.find("highest_temperature_C"), std::string::npos) << json;
   EXPECT_EQ(std::count(json.begin(), json.end(), '{'), 1);
 }
 
