@@ -8,6 +8,7 @@ namespace fulcrum::keys {
 namespace {
 
 constexpr const char* kHead = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<dds>\n";
+
 std::string Domains(int first, int last) {
   return "<domains><id_range><min>" + std::to_string(first) + "</min><max>" + std::to_string(last) +
          "</max></id_range></domains>\n";

@@ -2,6 +2,7 @@
 
 #include <sstream>
 
+#include "services/bus/access.h"
 #include "services/core/error.h"
 
 namespace fulcrum::link {
@@ -49,7 +50,7 @@ bus::FarSettings FarSettingsFor(bus::FarSide side, const std::string& peer, cons
   far.peer = bus::ResolveAddress(peer);
   far.address = address.empty() ? bus::AddressTowards(far.peer) : bus::ResolveAddress(address);
   far.domain = link_domain != 0 ? link_domain : cart_domain + kBetweenDomains;
-  if (far.domain < 101 || far.domain > 200) {
+  if (far.domain < bus::kFirstLinkDomain || far.domain > bus::kLastLinkDomain) {
     throw InputError("link domain " + std::to_string(far.domain) + ": must be 101 to 200, the same on both hosts");
   }
   return far;

@@ -98,15 +98,13 @@ class Host {
     const std::filesystem::path file = link::CachedScene(settings_.cache, offer.scene_hash);
     config::CartConfig cart = config::LoadCartText(offer.cart_yaml, "the cart of " + settings_.far.peer);
     cart.domain = settings_.domain;
-    cart.security.keys = settings_.keys;  // Where they lie is each host's own affair.
+    cart.security.keys = settings_.far.keys;  // Where they lie is each host's own affair.
     scene_.emplace(file);
     folder_ = MakeSessionFolder(settings_.out, file, *scene_, cart,
                                 "  session: " + offer.session_id + "\n  peer: " + settings_.far.peer +
                                     "\n  nodes: " + link::NamesOfNodes(offer.nodes) + "\n");
     const bus::Security security = app::SecurityOf(cart, bus::kLinkIdentity);
-    bus::PrepareSharedMemory(memory_);
-    bus::SweepSharedMemory(memory_);
-    bus::AnnounceSecurity(memory_, security);
+    bus::OpenSharedMemory(settings_.domain, security);
     local_.emplace(bus::DdsSettings{
         .domain = settings_.domain, .node_name = "host", .shared_memory = memory_, .security = security});
     healths_in_ = local_->MakeInput<Health>();

@@ -18,7 +18,6 @@ struct HostSettings {
   std::filesystem::path programs;  ///< Folder of the node programs.
   std::filesystem::path cache;     ///< Scenes are kept here by their hash.
   std::string quality = "auto";    ///< Of the picture.
-  std::filesystem::path keys;      ///< Of a secured cart; empty: none.
   bool window = false;
 };
 

@@ -106,15 +106,6 @@ bus::Security SecurityOf(const config::CartConfig& cart) {
   return app::SecurityOf(cart, NodeName(NodeId::kSupervisor));
 }
 
-/// The session's, without what a supervisor that was killed has left there (its nodes died with it).
-std::filesystem::path OpenSharedMemory(const config::CartConfig& cart) {
-  std::filesystem::path memory = bus::SharedMemoryDirectory(cart.domain);
-  bus::PrepareSharedMemory(memory);
-  bus::SweepSharedMemory(memory);
-  bus::AnnounceSecurity(memory, SecurityOf(cart));
-  return memory;
-}
-
 std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFolder& folder) {
   if (!settings.record) {
     return {};
@@ -134,7 +125,7 @@ struct Supervisor::Impl {
         end_s(EndOfSession(up, scene.view())),
         keys_warning(CheckSessionKeys(up.cart, NodesOf(scene.view(), up), std::time(nullptr))),
         guard(up.cart.domain),
-        memory(OpenSharedMemory(up.cart)),
+        memory(bus::OpenSharedMemory(up.cart.domain, SecurityOf(up.cart))),
         training(OpenTrainingLog(up.trainee, up.training_database, scene.view())),
         folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
         recording(RecordingFile(up, folder)),

@@ -93,7 +93,7 @@ struct DdsParticipant::Impl {
         shared_memory(settings.shared_memory),
         security(settings.security),
         watch(settings.node_name, hash, settings.security) {
-    if (settings.domain < 1 || settings.domain > 100) {
+    if (settings.domain < kFirstCartDomain || settings.domain > kLastCartDomain) {
       throw InputError("domain " + std::to_string(settings.domain) + " is out of range: 1 to 100");
     }
     if (shared_memory.empty()) shared_memory = SharedMemoryDirectory(settings.domain);

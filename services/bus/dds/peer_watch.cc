@@ -192,7 +192,7 @@ std::string PeerWatch::mismatch() {
   const std::int64_t now_ns = NowNs();
   LookAtStrangers(now_ns);
   if (own_name_ == leader_) return {};
-  // Whoever calls itself a supervisor and is none does no harm as long as the true one is there.
+  // Whoever calls itself the leader and is none does no harm as long as the true one is there.
   const auto is_leader = [&](const auto& entry) { return entry.second.name == leader_; };
   const bool has_leader = std::any_of(since_.begin(), since_.end(), [&](const auto& entry) {
     const auto peer = peers_.find(entry.first);
@@ -205,7 +205,8 @@ std::string PeerWatch::mismatch() {
   if (now_ns - found->second.since_ns < (shows ? kLatecomer_ns : kLongestHandshake_ns)) return {};
   if (!security_.on()) {
     return "this cart admits nobody without keys, and this " + own_name_ +
-           " has none: name them in the section `security` of its cart file or with --keys (fulcrum keys show)";
+           " has none: name them in the section `security` of its cart file, for fulcrum host with --keys (fulcrum "
+           "keys show)";
   }
   return "refused: the " + leader_ + " of this session " + found->second.has + ", as this " + own_name_ +
          " sees it with the keys of " + security_.keys.string() + "; both need the same keys and settings";

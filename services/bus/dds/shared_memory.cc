@@ -164,6 +164,14 @@ SweepResult SweepSharedMemory(const fs::path& directory) {
   });
 }
 
+fs::path OpenSharedMemory(int domain, const Security& security) {
+  fs::path directory = SharedMemoryDirectory(domain);
+  PrepareSharedMemory(directory);
+  SweepSharedMemory(directory);
+  AnnounceSecurity(directory, security);
+  return directory;
+}
+
 SweepResult RemoveSharedMemory(const fs::path& directory) {
   const SweepResult result = RemoveFiles(directory, [](const std::string&) { return true; });
   rmdir(directory.c_str());

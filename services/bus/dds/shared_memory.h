@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <string>
 
+#include "services/bus/security.h"
+
 namespace fulcrum::bus {
 
 /// What a cart needs free on /dev/shm: all pools of all large topics, twice, because a restarted node makes new ones
@@ -18,6 +20,10 @@ inline constexpr std::uint64_t kNeededSharedMemory_B = 32u << 20;
 /// Makes the directory, mode 0700. Throws InputError when it cannot be made, belongs to somebody else, is open to
 /// others or has less than kNeededSharedMemory_B free.
 void PrepareSharedMemory(const std::filesystem::path& directory);
+
+/// The same for whoever begins a session in the domain: without what one that was killed has left there, and with word
+/// of how this one is secured. @return the directory.
+std::filesystem::path OpenSharedMemory(int domain, const Security& security);
 
 /// Says whose the files named after this address ("xx.xx.….xx", 12 bytes) are: the address of a participant that has
 /// authenticated does not tell its process. Goes with the process's other files.

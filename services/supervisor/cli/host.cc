@@ -43,8 +43,7 @@ ExitCode Host(const Words& words) {
     settings.allowed = link::NodesFromNames(text("nodes"));
   }
   if (values.count("keys") != 0) {
-    settings.keys = std::filesystem::absolute(text("keys"));
-    settings.far.keys = settings.keys;
+    settings.far.keys = std::filesystem::absolute(text("keys"));
   }
   settings.out = text("out");
   settings.programs = runtime::ProgramFolder();
