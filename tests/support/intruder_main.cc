@@ -21,7 +21,7 @@ namespace fulcrum {
 namespace {
 
 constexpr int kHeard = 5;
-constexpr auto kLongest = std::chrono::seconds(16);
+constexpr auto kLongest = std::chrono::seconds(12);
 constexpr auto kForgedFor = std::chrono::seconds(4);
 
 ToolState Forged() {

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "services/bus/access.h"
+#include "services/bus/dds/serial_transport.h"
 #include "services/core/error.h"
 #include "services/keys/authority.h"
 #include "services/keys/key_folder.h"
@@ -151,6 +152,7 @@ void ApplySecurity(const Security& security, fast::DomainParticipantQos* qos) {
   add("access.builtin.Access-Permissions.governance", file(files.governance));
   add("access.builtin.Access-Permissions.permissions", file(files.permissions));
   if (security.encrypt) add("crypto.plugin", "builtin.AES-GCM-GMAC");
+  for (auto& transport : qos->transport().user_transports) transport = OneDiscoveryAtATime(std::move(transport));
   ListenToSecurityLog();
 }
 

@@ -10,7 +10,8 @@
 
 namespace fulcrum::bus::dds {
 
-/// Authentication (PKI-DH), access control, and with `encrypt` AES-GCM. Throws InputError when the keys are of no use.
+/// Authentication (PKI-DH), access control, and with `encrypt` AES-GCM, over the transports that `qos` names already,
+/// each with OneDiscoveryAtATime. Throws InputError when the keys are of no use.
 void ApplySecurity(const Security& security, eprosima::fastdds::dds::DomainParticipantQos* qos);
 
 /// Whose keys a participant has authenticated with; "?" when they are nobody's of the table. The library and all peers

@@ -26,7 +26,7 @@ std::string Labels(bus::TopicSet set) {
 }
 
 std::string DaysLeft(std::time_t until, std::time_t now) {
-  return keys::DateOf(until) + " (" + std::to_string((until - now) / kDay_s) + " days)";
+  return keys::DateOf(until) + " (" + std::to_string((until - now + kDay_s / 2) / kDay_s) + " days)";
 }
 
 ExitCode Init(const std::filesystem::path& folder, int days, bool force) {

@@ -73,25 +73,18 @@ keys::Validity Today() {
 // ------------------------------------------------------------------------------------------------------- strangers
 
 TEST(SecuredBus, EveryAttemptIsRefusedAndReported) {
-  // Nobody ever comes through. Told it is to who has got as far as a handshake, and one of those now and then does not
-  // end (known gap of services/bus/DESIGN.md): then all is tried again.
-  constexpr int kTries = 3;
-  std::string untold = "nothing was tried";
-  for (int i = 0; i < kTries && !untold.empty(); ++i) {
-    untold.clear();
-    bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kAttemptsDomain));
-    const Scratch scratch("attempts");
-    for (const testing::Attempt& attempt : testing::TryAllAttempts(kAttemptsDomain, scratch.path())) {
-      EXPECT_FALSE(attempt.came_through) << attempt.name << ": " << attempt.who;
-      const bool told = attempt.exit_code == attempt.wanted_exit_code &&
-                        (attempt.reported || attempt.wanted_of_cart.empty()) &&
-                        (attempt.wanted_exit_code == 0 || !attempt.who.empty());
-      if (!told) untold += attempt.name + ": exit code " + std::to_string(attempt.exit_code) + " " + attempt.who + "\n";
-      RecordProperty(attempt.name, attempt.who);
-    }
-    bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kAttemptsDomain));
+  bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kAttemptsDomain));
+  const Scratch scratch("attempts");
+  for (const testing::Attempt& attempt : testing::TryAllAttempts(kAttemptsDomain, scratch.path())) {
+    SCOPED_TRACE(attempt.name + ": " + attempt.who);
+    EXPECT_FALSE(attempt.came_through);
+    EXPECT_EQ(attempt.exit_code, attempt.wanted_exit_code);
+    EXPECT_TRUE(attempt.reported || attempt.wanted_of_cart.empty())
+        << "the cart says nothing of " << attempt.wanted_of_cart;
+    EXPECT_TRUE(attempt.wanted_exit_code == 0 || !attempt.who.empty());
+    RecordProperty(attempt.name, attempt.who);
   }
-  EXPECT_EQ(untold, "");
+  bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kAttemptsDomain));
 }
 
 // -------------------------------------------------------------------------------------------------- whole sessions
