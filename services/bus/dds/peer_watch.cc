@@ -23,8 +23,8 @@ constexpr std::string_view kUserDataTag = "fulcrum ";
 constexpr std::string_view kPidTag = " (pid ";
 // What shows at once, no keys or others, is believed after this: the true leader may come a little later.
 constexpr std::int64_t kLatecomer_ns = 3'000'000'000;
-// A handshake takes milliseconds (0.3 s with thirty of them at once on two busy cores); one that lost a message is tried
-// again after 1 s.
+// A handshake takes milliseconds (0.3 s with thirty of them at once on two busy cores); one that lost a message is
+// tried again after 1 s.
 constexpr std::int64_t kLongestHandshake_ns = 5'000'000'000;
 // What a stranger can make us remember.
 constexpr std::size_t kMostForbidden = 1024;
