@@ -30,7 +30,7 @@ namespace {
 using runtime::MonotonicNs;
 
 constexpr auto kLoopPeriod = std::chrono::milliseconds(5);
-constexpr std::int64_t kSweepAfter = 2 * kSecond_ns;  // The dead process's lease is over then.
+constexpr std::int64_t kSweepAfter = 2 * kSecond_ns;  // As the supervisor does.
 constexpr std::int64_t kHeldUp = kSecond_ns;          // A gap in our own loop: silence proves nothing.
 
 class Host {

@@ -54,7 +54,7 @@ constexpr std::int64_t kHealthPeriod = kSecond_ns / 10;
 constexpr std::int64_t kLongestStart = 30 * kSecond_ns;
 // The manifest reaches all nodes before session time 0.
 constexpr std::int64_t kLeadTime = kSecond_ns / 5;
-// Peers let go of a dead process's files when its lease of 1 s is over.
+// A dead process's files lose their names only: who has them open keeps them until its lease is over.
 constexpr std::int64_t kSweepAfter = 2 * kSecond_ns;
 // A gap in our own loop: a suspended machine, a stopped supervisor. Then silence proves nothing.
 constexpr std::int64_t kHeldUp = kSecond_ns;

@@ -27,7 +27,6 @@ namespace fast = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 
-const Duration_t kLease{1, 0};
 const Duration_t kAnnouncement{0, 100 * kMilli_ns};
 /// A node's period is 10 ms or more wherever a reliable write may have to wait.
 const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
@@ -47,7 +46,7 @@ fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports.push_back(udp);
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
-  discovery.leaseDuration = kLease;
+  discovery.leaseDuration = Duration_t(settings.lease_s, 0);
   discovery.leaseDuration_announcementperiod = kAnnouncement;
   if (settings.security.on()) dds::ApplySecurity(settings.security, &qos);
   return qos;

@@ -22,6 +22,10 @@ struct DdsSettings {
       {};  ///< Private 0700 directory on /dev/shm for data-sharing; empty: one per domain.
   std::uint64_t schema_hash = SchemaHash();  ///< What peers must speak too; a test gives another one.
   Security security = {};                    ///< Off unless keys are named.
+  /// Silence after which the others forget this participant [s]. Longer than the 5 s after which the supervisor starts
+  /// a silent node again: who is forgotten by a peer, having merely stood still, and has not forgotten that peer is
+  /// heard by it again only after long, with keys never.
+  int lease_s = 8;
 };
 
 /// To join the session that runs in a domain as one who asks and looks: `fulcrum status` and the like.

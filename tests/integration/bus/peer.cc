@@ -91,6 +91,7 @@ int Main(int argc, char** argv) {
   settings.domain = std::atoi(argv[1]);
   settings.node_name = "peer_" + role;
   if (role == "alien") settings.schema_hash = 0xa11e5ull;
+  settings.lease_s = 1;  // So that tests need not wait until it is forgotten.
   DdsParticipant bus(settings);
   if (role == "tools") PublishTools(&bus);
   if (role == "frames") PublishFrames(&bus);
