@@ -1,43 +1,70 @@
-#include <map>
+#include <algorithm>
+#include <cstdint>
+#include <utility>
 
 #include "physics_node/energy/elastic_model.h"
 
 namespace fulcrum::physics {
+namespace {
 
-void AddOrganPatches(ElasticModel* model) {
-  // Ordered maps: links come out sorted, and sums are in the order of the tets, the same in every run.
-  std::map<Index, double> volume;
-  std::map<std::pair<Index, Index>, Vec3d> gradient;  // (patch, vertex): V_n g_nj.
-  std::map<std::pair<Index, Index>, double> weight;   // (a, b), a < b: w_ab.
-  for (const ElasticTet& tet : model->tets) {
+/// What one tet adds to the pair of its vertices n and v.
+struct Share {
+  Vec3d gradient;  ///< V_n g_nv.
+  double weight;   ///< w_nv.
+};
+
+struct Shares {
+  std::vector<Share> all;                                       ///< As the tets follow each other.
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> sorted;  ///< (n, v) in one number, and the place in `all`.
+};
+
+Shares SharesOf(const std::vector<ElasticTet>& tets) {
+  Shares shares;
+  shares.all.reserve(16 * tets.size());
+  shares.sorted.reserve(16 * tets.size());
+  for (const ElasticTet& tet : tets) {
     Eigen::Matrix<double, 3, 4> g;
     g.rightCols<3>() = tet.inverse_edges.transpose();
     g.col(0) = -g.rightCols<3>().rowwise().sum();
     for (int i = 0; i < 4; ++i) {
-      const Index n = tet.v[static_cast<std::size_t>(i)];
-      volume[n] += tet.volume / 4;
       for (int j = 0; j < 4; ++j) {
-        const Index v = tet.v[static_cast<std::size_t>(j)];
-        gradient.try_emplace({n, v}, Vec3d::Zero()).first->second += tet.volume / 4 * g.col(j);
-        if (n < v) {
-          weight[{n, v}] -= tet.volume * g.col(i).dot(g.col(j));
-        }
+        const std::uint64_t n = tet.v[static_cast<std::size_t>(i)], v = tet.v[static_cast<std::size_t>(j)];
+        shares.sorted.emplace_back(n << 32 | v, static_cast<std::uint32_t>(shares.all.size()));
+        shares.all.push_back({tet.volume / 4 * g.col(j), -tet.volume * g.col(i).dot(g.col(j))});
       }
     }
   }
+  // The place counts too: sums are taken in the order of the tets, the same in every run.
+  std::sort(shares.sorted.begin(), shares.sorted.end());
+  return shares;
+}
+
+}  // namespace
+
+void AddOrganPatches(ElasticModel* model) {
+  std::vector<double> volume(model->rest_position.size());
+  for (const ElasticTet& tet : model->tets) {
+    for (const Index n : tet.v) volume[n] += tet.volume / 4;
+  }
+  const Shares shares = SharesOf(model->tets);
   model->patches.clear();
   model->patch_links.clear();
   model->shear_links.clear();
-  for (const auto& [pair, sum] : gradient) {
-    const auto& [n, v] = pair;
-    if (model->patches.empty() || model->patches.back().vertex != n) {
-      model->patches.push_back({n, volume.at(n), static_cast<Index>(model->patch_links.size()), 0});
+  for (std::size_t i = 0; i < shares.sorted.size();) {
+    const std::uint64_t pair = shares.sorted[i].first;
+    Share sum{Vec3d::Zero(), 0};
+    for (; i < shares.sorted.size() && shares.sorted[i].first == pair; ++i) {
+      const Share& share = shares.all[shares.sorted[i].second];
+      sum.gradient += share.gradient;
+      sum.weight += share.weight;
     }
-    model->patch_links.push_back({v, sum / model->patches.back().volume});
+    const auto n = static_cast<Index>(pair >> 32), v = static_cast<Index>(pair);
+    if (model->patches.empty() || model->patches.back().vertex != n) {
+      model->patches.push_back({n, volume[n], static_cast<Index>(model->patch_links.size()), 0});
+    }
+    model->patch_links.push_back({v, sum.gradient / model->patches.back().volume});
     ++model->patches.back().link_count;
-  }
-  for (const auto& [pair, w] : weight) {
-    model->shear_links.push_back({pair.first, pair.second, kPatchVariance * model->mu_Pa * w});
+    if (n < v) model->shear_links.push_back({n, v, kPatchVariance * model->mu_Pa * sum.weight});
   }
 }
 

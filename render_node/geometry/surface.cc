@@ -108,6 +108,11 @@ NearestOnSurface::NearestOnSurface(std::span<const Vec3f> positions, std::span<c
   for (std::size_t k = 0; k < triangles.size(); ++k) {
     order_[next[cell_of[k]]++] = static_cast<Index>(k);
   }
+  for (const Index k : order_) {
+    Ball ball{centres[k], 0};
+    for (const Index v : triangles[k]) ball.radius = std::max(ball.radius, (positions[v] - centres[k]).norm());
+    balls_.push_back(ball);
+  }
 }
 
 std::array<int, 3> NearestOnSurface::CellOf(const Vec3f& point) const {
@@ -125,7 +130,7 @@ std::size_t NearestOnSurface::CellIndex(int x, int y, int z) const {
 SurfacePoint NearestOnSurface::Find(const Vec3f& point) const {
   const auto centre = CellOf(point);
   SurfacePoint best{};
-  float best_distance = std::numeric_limits<float>::max();
+  float best_distance = std::numeric_limits<float>::max(), best_root = 1e18f;
   int last_ring = std::max({size_[0], size_[1], size_[2]});
   for (int ring = 0; ring <= last_ring; ++ring) {
     for (int z = std::max(0, centre[2] - ring); z <= std::min(size_[2] - 1, centre[2] + ring); ++z) {
@@ -137,12 +142,16 @@ SurfacePoint NearestOnSurface::Find(const Vec3f& point) const {
           }
           const std::size_t cell = CellIndex(x, y, z);
           for (Index k = start_[cell]; k < start_[cell + 1]; ++k) {
+            const float reach = best_root + balls_[k].radius;
+            if ((balls_[k].centre - point).squaredNorm() > reach * reach) continue;
             const Triangle& t = triangles_[order_[k]];
             const Vec3f &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
             const auto w = NearestBarycentric(point, a, b, c);
             const float d = (w[0] * a + w[1] * b + w[2] * c - point).squaredNorm();
             if (d < best_distance) {
               best_distance = d;
+              // A little more: roots and radii are rounded.
+              best_root = 1.001f * std::sqrt(d);
               best = {t, w};
             }
           }

@@ -52,6 +52,11 @@ class NearestOnSurface {
   std::array<int, 3> size_{1, 1, 1};
   std::vector<Index> start_;  // Triangles of cell c are order_[start_[c] .. start_[c + 1]).
   std::vector<Index> order_;
+  struct Ball {
+    Vec3f centre;
+    float radius;
+  };
+  std::vector<Ball> balls_;  // Round each triangle, in the order of order_.
 };
 
 /// Barycentric coordinates of the point of triangle (a, b, c) nearest to p (Ericson, Real-Time Collision Detection,
