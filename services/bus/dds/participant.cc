@@ -30,7 +30,6 @@ using eprosima::fastrtps::Duration_t;
 const Duration_t kAnnouncement{0, 100 * kMilli_ns};
 /// A node's period is 10 ms or more wherever a reliable write may have to wait.
 const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
-constexpr std::uint32_t kSocketBuffer_B = 4u << 20;
 /// Samples above this do not fit one UDP datagram and are sent in fragments.
 constexpr std::uint32_t kDatagram_B = 64'000;
 

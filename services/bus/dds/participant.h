@@ -28,6 +28,9 @@ struct DdsSettings {
   int lease_s = 8;
 };
 
+/// What a participant asks the kernel for, each way: the stream of a second or two, for a reader that is kept waiting.
+inline constexpr std::uint32_t kSocketBuffer_B = 4u << 20;
+
 /// To join the session that runs in a domain as one who asks and looks: `fulcrum status` and the like.
 [[nodiscard]] DdsSettings ToolSettings(int domain);
 

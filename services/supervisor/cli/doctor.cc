@@ -3,6 +3,7 @@
 #include <EGL/eglext.h>
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <sys/socket.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
@@ -15,6 +16,7 @@
 #include <sstream>
 #include <thread>
 
+#include "services/bus/dds/participant.h"
 #include "services/bus/dds/shared_memory.h"
 #include "services/config/cart.h"
 #include "services/core/error.h"
@@ -62,6 +64,23 @@ Finding SharedMemory(int domain) {
     found += "; swept " + std::to_string(swept.files) + " files of dead processes in " + folder.string();
   }
   return {true, found, ""};
+}
+
+/// A kernel that grants less than asked for says nothing.
+Finding SocketBuffers() {
+  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const int wanted = static_cast<int>(bus::kSocketBuffer_B);
+  int granted = 0;
+  socklen_t size = sizeof(granted);
+  ::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &wanted, sizeof(wanted));
+  ::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &granted, &size);
+  ::close(socket);
+  granted /= 2;  // The kernel doubles what it grants, for its own books.
+  const std::string fix =
+      "sysctl -w net.core.rmem_max=" + std::to_string(wanted) + " net.core.wmem_max=" + std::to_string(wanted) +
+      ", and the same in /etc/sysctl.d to keep it; without it a recorder that is kept waiting loses samples";
+  return {granted >= wanted,
+          std::to_string(granted >> 10) + " KiB granted of " + std::to_string(wanted >> 10) + " KiB wanted", fix};
 }
 
 /// How to be given a limit of /etc/security.
@@ -243,6 +262,7 @@ ExitCode Doctor(const Words& words) {
       {"scenes", Scenes()},
       {"cart", Cart()},
       {"shared memory", SharedMemory(domain)},
+      {"socket buffers", SocketBuffers()},
       {"domain", DomainInUse(domain)},
       {"real-time priority", RealTime()},
       {"locked memory", LockedMemory()},
