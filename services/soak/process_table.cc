@@ -51,4 +51,15 @@ std::multimap<std::string, pid_t> ChildrenOf(pid_t parent) {
   return children;
 }
 
+ProcessorTimes ReadProcessorTimes() {
+  // proc(5): user nice system idle iowait irq softirq steal; guests are in user and nice already.
+  constexpr int kColumns = 8;
+  std::ifstream in("/proc/stat");
+  std::string name;
+  in >> name;
+  ProcessorTimes times;
+  for (int column = 0; column < kColumns && in >> times.stolen; ++column) times.all += times.stolen;
+  return times;
+}
+
 }  // namespace fulcrum::soak

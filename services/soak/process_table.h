@@ -16,4 +16,11 @@ namespace fulcrum::soak {
 /// The living children of a process by the name of their program.
 [[nodiscard]] std::multimap<std::string, pid_t> ChildrenOf(pid_t parent);
 
+/// What the processors of this machine have done since it started, in ticks of the kernel. `stolen`: the host of a
+/// virtual machine gave them to others meanwhile. Zeros where the kernel does not tell.
+struct ProcessorTimes {
+  std::uint64_t all = 0, stolen = 0;
+};
+[[nodiscard]] ProcessorTimes ReadProcessorTimes();
+
 }  // namespace fulcrum::soak

@@ -140,6 +140,7 @@ class Soak {
       std::this_thread::sleep_for(kTurn);
     }
     begin_ns_ = view_.manifest().session_start_ns;
+    processors_ = ReadProcessorTimes();
     progress_.Say("soak: " + std::to_string(nodes_.size()) + " nodes run, " + Fixed(settings_.minutes, 1) + " min" +
                   (settings_.chaos ? " with blows" : ""));
   }
@@ -244,6 +245,11 @@ class Soak {
     const double duration_s = std::min(NowS(), total_s_);
     if (well_ && duration_s < total_s_ - 2)
       verdict_ = asked_to_end_ ? "ended before its time, as asked for" : "ended before its time";
+    const ProcessorTimes now = ReadProcessorTimes();
+    if (now.all > processors_.all) {
+      record_.SetStolen(100.0 * static_cast<double>(now.stolen - processors_.stolen) /
+                        static_cast<double>(now.all - processors_.all));
+    }
     record_.End(duration_s, well_ && (asked_to_end_ || verdict_.empty()), verdict_);
     const fs::path session = fs::exists(folder_ / "latest") ? fs::path("latest") : fs::path(".");
     supervisor::FlatJson json;
@@ -272,6 +278,7 @@ class Soak {
   std::multimap<std::string, pid_t> children_;
   std::vector<std::string> nodes_;
   std::vector<Blow> plan_;
+  ProcessorTimes processors_;
   std::size_t next_blow_ = 0;
   std::vector<pid_t> frozen_;
   double thaw_s_ = 0;

@@ -142,7 +142,8 @@ std::vector<SoakFigure> FiguresOf(const SoakRecord& record) {
           {"soak.freezes", static_cast<double>(record.Count(BlowKind::kFreeze)), "blows"},
           {"soak.crowds", static_cast<double>(record.Count(BlowKind::kCrowd)), "blows"},
           {"soak.rate_pct_lowest", record.LowestRate_pct(), "%"},
-          {"soak.drift_ms_largest", record.LargestDrift_ms(), "ms"}};
+          {"soak.drift_ms_largest", record.LargestDrift_ms(), "ms"},
+          {"soak.stolen_pct", record.stolen_pct(), "%"}};
 }
 
 }  // namespace fulcrum::soak

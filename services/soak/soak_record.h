@@ -64,12 +64,16 @@ class SoakRecord {
   [[nodiscard]] double LargestDrift_ms() const;
   [[nodiscard]] bool Passes(const Limits& limits) const;
 
+  /// Of the processors' time, what the host of a virtual machine gave to others [%].
+  void SetStolen(double stolen_pct) { stolen_pct_ = stolen_pct; }
+  [[nodiscard]] double stolen_pct() const { return stolen_pct_; }
+
  private:
   [[nodiscard]] Life* Find(std::int32_t process);
 
   std::vector<Life> lives_;
   std::vector<Blow> blows_;
-  double duration_s_ = 0;
+  double duration_s_ = 0, stolen_pct_ = 0;
   std::uint64_t refused_ = 0;
   int crashes_ = 0;
   bool ended_ = false;

@@ -103,6 +103,15 @@ TEST(ProcessTable, KnowsChildrenAndWhatTheyHold) {
   EXPECT_FALSE(ResidentBytes(child.pid()).has_value()) << "it is a zombie";
 }
 
+TEST(ProcessTable, ProcessorsGoOnCounting) {
+  const ProcessorTimes before = ReadProcessorTimes();
+  EXPECT_GT(before.all, before.stolen);
+  ProcessorTimes after = before;
+  while (after.all == before.all) after = ReadProcessorTimes();
+  EXPECT_GT(after.all, before.all);
+  EXPECT_GE(after.stolen, before.stolen);
+}
+
 /// A node that grows by `leak_MB_per_min` over `minutes`.
 SoakRecord Grown(double minutes, double leak_MB_per_min) {
   SoakRecord record;
