@@ -12,6 +12,7 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <ctime>
 #include <fstream>
@@ -188,8 +189,14 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
                                });
                       }))
       << status << cart.Said();
-  // A killed node joins again with its keys; a node without keys does not.
+  // Who merely stands still for a while is heard again: the library authenticates nobody twice whom it has forgotten.
   const auto nodes = cart.nodes();
+  const auto handles = nodes.find("handle_bridge");
+  ASSERT_NE(handles, nodes.end()) << cart.Said();
+  ::kill(handles->second, SIGSTOP);
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  ::kill(handles->second, SIGCONT);
+  // A killed node joins again with its keys; a node without keys does not.
   const auto thermal = nodes.find("thermal_node");
   ASSERT_NE(thermal, nodes.end()) << cart.Said();
   ::kill(thermal->second, SIGKILL);
@@ -201,6 +208,7 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
   ASSERT_EQ(cart.WaitForEnd(90), 0) << cart.Said();
   const std::string summary = ReadFile(cart.session() / "summary.json");
   EXPECT_NE(summary.find("\"thermal_node.restarts\": 1"), std::string::npos) << summary;
+  EXPECT_NE(summary.find("\"handle_bridge.restarts\": 0"), std::string::npos) << summary;
   EXPECT_NE(summary.find("\"refused.participants\": 1"), std::string::npos) << summary << cart.Said();
   EXPECT_NE(summary.find("\"refused.endpoints\": 0"), std::string::npos) << summary;
   EXPECT_NE(ReadFile(cart.session() / "report.html").find("Refused on the bus"), std::string::npos);
