@@ -160,9 +160,10 @@ void PhysicsNode::Step(const Tick& tick) {
   PublishCautery(tick);
   PublishFrame(tick);
   Measure();
-  // Before the manifest: whoever has seen that can rely on the checkpoint of its tick.
-  SaveCheckpoint();
+  // The manifest first: a replay finds every tick that a checkpoint holds, and sees from the next process's first state
+  // whether the last one reached its checkpoint.
   PublishManifest(tick);
+  SaveCheckpoint();
   ++ticks_;
 }
 

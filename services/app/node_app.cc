@@ -28,11 +28,13 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max();
 constexpr auto kPollPeriod = std::chrono::milliseconds(10);
-// A recorder, if there is one, is found within this time of the session …
-constexpr std::int64_t kLongestWaitForRecorder = 100'000'000;
-// … and has found all writers of a node so long after that. The first samples must not pass it by: a replay could not
-// begin without them.
-constexpr std::int64_t kRecorderListens = 80'000'000;
+// The first samples must not pass the recorder by: a replay could not begin without them. If there is one it is found
+// within so many looks of the session's first; each look proves that this process was given time …
+constexpr int kLooksForRecorder = 10;
+// … its readers are seen within so many; a recorder that stands still holds nobody up for longer …
+constexpr int kLooksForReaders = 50;
+// … and have seen our writers so many later.
+constexpr int kLooksAfterReaders = 3;
 constexpr auto kHealthPeriod = std::chrono::milliseconds(100);
 // A node that cannot end within this time has hung; its checkpoint is safe against a kill.
 constexpr unsigned kLongestEndS = 3;
@@ -130,6 +132,9 @@ struct NodeApp::Impl {
     Health health = report->Make(now, state.load(std::memory_order_relaxed), thread.stats(), inputs, outputs);
     health.stamp = health_stamper.Next(now);
     if (fill) fill(&health);
+    if (const std::uint64_t locks = bus::DdsParticipant::inherited_locks(); locks > 0) {
+      health.metrics.push_back({"locks_inherited", static_cast<double>(locks)});
+    }
     FitToMessage(&health);
     healths->Write(health);
     return health;
@@ -258,17 +263,20 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
     service.Stopping();
   });
 
-  std::int64_t known_ns = 0;
+  const bool replayable = app.node != NodeId::kRecorder && app.node != NodeId::kRender;
+  int looks = 0, looks_read = 0;
   while (!app.ShouldEnd()) {
     app.PollBus();
     app.polls.fetch_add(1, std::memory_order_relaxed);
     const std::int64_t now = MonotonicNs();
-    if (known_ns == 0 && app.session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown) known_ns = now;
-    const std::int64_t recorder_ns = app.participant.KnownSince(bus::kRecorderPeer);
-    const bool replayable = app.node != NodeId::kRecorder && app.node != NodeId::kRender;
-    const bool recorded = !replayable || (recorder_ns != 0 ? now - recorder_ns > kRecorderListens
-                                                           : known_ns != 0 && now - known_ns > kLongestWaitForRecorder);
-    if (!app.stepping.load(std::memory_order_relaxed) && recorded && SessionTime(now) >= 0) {
+    const bool waits = !app.stepping.load(std::memory_order_relaxed);
+    if (waits && replayable) {
+      if (app.session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown) ++looks;
+      if (app.participant.IsReadBy(bus::kRecorderPeer)) ++looks_read;
+    }
+    const bool recorded = !replayable || looks_read > kLooksAfterReaders || looks > kLooksForReaders ||
+                          (looks > kLooksForRecorder && !app.participant.Knows(bus::kRecorderPeer));
+    if (waits && recorded && SessionTime(now) >= 0) {
       app.state = HealthState::kRunning;
       thread.Start();
       app.stepping.store(true, std::memory_order_relaxed);

@@ -2,6 +2,8 @@
 
 #include <xmmintrin.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,7 +16,6 @@
 #include "services/bus/convert/cdr.h"
 #include "services/bus/in_process.h"
 #include "services/core/error.h"
-#include "services/runtime/checkpoint.h"
 #include "thermal_node/node/thermal_node.h"
 
 namespace fulcrum::replay {
@@ -78,6 +79,7 @@ class ReplayedPhysics final : public ReplayedNode {
   void FillHealth(Health* health) const override { node_->FillHealth(health); }
 
  private:
+  runtime::CheckpointFile* checkpoint() override { return &checkpoint_; }
   void Start(std::int64_t epoch_ns) override {
     node_.reset();
     // Nothing of the process before is left, in its ports neither.
@@ -135,6 +137,7 @@ class ReplayedThermal final : public ReplayedNode {
   void FillHealth(Health* health) const override { node_->FillHealth(health); }
 
  private:
+  runtime::CheckpointFile* checkpoint() override { return &checkpoint_; }
   void Start(std::int64_t epoch_ns) override {
     node_.reset();
     contacts_ = {};
@@ -215,18 +218,49 @@ class ReplayedHaptics final : public ReplayedNode {
 }  // namespace
 
 std::uint64_t ReplayedNode::Step(const RecordedTick& tick) {
+  const bool again = started_ && tick.epoch != epoch_;
+  const bool first = !started_;
+  started_ = true;
+  epoch_ = tick.epoch;
   const unsigned outside = _mm_getcsr();
-  if (!started_ || tick.epoch != epoch_) {
-    float_state_ = outside;
-    started_ = true;
-    epoch_ = tick.epoch;
-    Start(static_cast<std::int64_t>(tick.epoch));
+  std::uint64_t hash = 0;
+  if (first || again) {
+    hash = again ? StartAgain(tick) : StartWith(tick);
+  } else {
+    _mm_setcsr(float_state_);
+    hash = Advance(tick);
   }
-  _mm_setcsr(float_state_);
-  const std::uint64_t hash = Advance(tick);
   float_state_ = _mm_getcsr();
   _mm_setcsr(outside);
   return hash;
+}
+
+/// Leaves the thread with the node's floating-point state.
+std::uint64_t ReplayedNode::StartWith(const RecordedTick& tick) {
+  Start(static_cast<std::int64_t>(tick.epoch));
+  return Advance(tick);
+}
+
+std::uint64_t ReplayedNode::StartAgain(const RecordedTick& tick) {
+  using Bytes = std::vector<std::byte>;
+  runtime::CheckpointFile* const file = checkpoint();
+  const auto copy = [](const auto& loaded) {
+    return loaded ? Bytes(loaded->payload.begin(), loaded->payload.end()) : Bytes();
+  };
+  // The first tick may write a checkpoint of its own.
+  const Bytes newest = file != nullptr ? copy(file->Latest()) : Bytes();
+  const Bytes previous = file != nullptr ? copy(file->Previous()) : Bytes();
+  const unsigned outside = _mm_getcsr();
+  const auto from = [&](const Bytes& bytes) {
+    std::ranges::copy(bytes, file->Begin().begin());
+    file->Commit(bytes.size());
+    _mm_setcsr(outside);
+    return StartWith(tick);
+  };
+  const std::uint64_t hash = StartWith(tick);
+  if (previous.empty() || !tick.state_hash || hash == *tick.state_hash) return hash;
+  if (const std::uint64_t other = from(previous); other == *tick.state_hash) return other;
+  return from(newest);
 }
 
 std::unique_ptr<ReplayedNode> MakeReplayedNode(NodeId node, const NodeMaking& making) {

@@ -9,6 +9,7 @@
 #include "services/config/cart.h"
 #include "services/core/scene_view.h"
 #include "services/replayer/recorded_tick.h"
+#include "services/runtime/checkpoint.h"
 
 namespace fulcrum::replay {
 
@@ -27,7 +28,8 @@ class ReplayedNode {
   [[nodiscard]] NodeId id() const { return id_; }
 
   /// Makes the tick and returns the state hash after it. A tick of another epoch first starts the node anew, from the
-  /// checkpoint that it has written so far, as its process was. Any thread, one at a time.
+  /// checkpoint that it has written so far, as its process was: the newest, or the one before if the process died
+  /// between telling of a tick and sealing its checkpoint, which the first state shows. Any thread, one at a time.
   std::uint64_t Step(const RecordedTick& tick);
 
   /// What the node published in its last tick; once for each tick.
@@ -41,8 +43,13 @@ class ReplayedNode {
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
   virtual void Start(std::int64_t epoch_ns) = 0;
   virtual std::uint64_t Advance(const RecordedTick& tick) = 0;
+  /// Null: the node keeps none.
+  virtual runtime::CheckpointFile* checkpoint() { return nullptr; }
 
  private:
+  std::uint64_t StartWith(const RecordedTick& tick);
+  std::uint64_t StartAgain(const RecordedTick& tick);
+
   NodeId id_;
   bool started_ = false;
   std::uint64_t epoch_ = 0;

@@ -237,6 +237,13 @@ std::optional<CheckpointFile::Loaded> CheckpointFile::Latest() const {
   return Loaded{h.sequence, impl_->payload(impl_->newest).first(h.bytes)};
 }
 
+std::optional<CheckpointFile::Loaded> CheckpointFile::Previous() const {
+  const int other = impl_->newest == 0 ? 1 : 0;
+  if (impl_->newest < 0 || !impl_->IsWhole(other)) return std::nullopt;
+  const SlotHeader& h = *impl_->header(other);
+  return Loaded{h.sequence, impl_->payload(other).first(h.bytes)};
+}
+
 const std::string& CheckpointFile::complaint() const { return impl_->complaint; }
 
 // A kill ends the process between two instructions and the kernel keeps every store made so far, so the order of the

@@ -36,6 +36,8 @@ class CheckpointFile {
   };
   /// Newest whole slot, or nothing.
   [[nodiscard]] std::optional<Loaded> Latest() const;
+  /// The whole slot before the newest, or nothing.
+  [[nodiscard]] std::optional<Loaded> Previous() const;
   /// Empty, or one line for the log: what was found in the file and could not be used.
   [[nodiscard]] const std::string& complaint() const;
 

@@ -28,16 +28,18 @@ CommandReply AskSupervisor(int domain, const std::string& verb, const std::strin
   command.verb = verb;
   command.argument = argument;
   using Clock = std::chrono::steady_clock;
-  constexpr auto kPatience = std::chrono::seconds(5);
-  constexpr auto kDiscovery = std::chrono::milliseconds(300);
+  constexpr auto kPatience = std::chrono::seconds(10);
+  constexpr auto kDiscovery = std::chrono::milliseconds(300), kAgain = std::chrono::milliseconds(500);
   const auto begin = Clock::now();
-  bool sent = false;
+  auto next = begin + kDiscovery;
+  std::uint64_t sent = 0;
   while (Clock::now() - begin < kPatience && !runtime::ShouldStop()) {
-    // Commands are not kept for late joiners: the answer's way and the command's way must both stand first.
-    const bool ready = commands->has_readers() && replies->stats().matched;
-    if (!sent && ready && Clock::now() - begin > kDiscovery) {
-      command.stamp = {1, static_cast<std::uint64_t>(epoch), runtime::MonotonicNs()};
-      sent = commands->Write(command);
+    // Commands are not kept for late joiners: the answer's way and the command's way must both stand first. Whose ways
+    // stand cannot be seen, and on a busy machine those to the nodes may be first: asked again, as the same request.
+    if (commands->has_readers() && replies->stats().matched && Clock::now() > next) {
+      command.stamp = {++sent, static_cast<std::uint64_t>(epoch), runtime::MonotonicNs()};
+      commands->Write(command);
+      next = Clock::now() + kAgain;
     }
     CommandReply reply;
     while (replies->TakeNext(&reply)) {

@@ -7,7 +7,7 @@
 
 namespace fulcrum::supervisor {
 
-/// Sends a command to the supervisor of the domain and waits for its answer, at most 5 s. Throws InputError when none
+/// Sends a command to the supervisor of the domain and waits for its answer, at most 10 s. Throws InputError when none
 /// runs there, MismatchError when it speaks another schema.
 [[nodiscard]] CommandReply AskSupervisor(int domain, const std::string& verb, const std::string& argument);
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <ctime>
+#include <deque>
 #include <optional>
 #include <span>
 #include <sstream>
@@ -60,6 +61,8 @@ constexpr std::int64_t kSweepAfter = 2 * kSecond_ns;
 constexpr std::int64_t kHeldUp = kSecond_ns;
 // What a node says of a peer that is being restarted by command is no fault.
 constexpr std::int64_t kAskedFor = 3 * kSecond_ns;
+// Commands whose askers may not have heard the answer yet.
+constexpr std::size_t kAnswersKept = 8;
 
 std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) {
   std::vector<NodeId> nodes;
@@ -344,6 +347,13 @@ struct Supervisor::Impl {
       if (command.target != NodeId::kSupervisor) {
         continue;
       }
+      // Who hears no answer asks again: done once, answered each time.
+      const auto same = [&](const CommandReply& past) { return past.request_id == command.request_id; };
+      if (const auto past = std::find_if(answered.begin(), answered.end(), same); past != answered.end()) {
+        past->stamp = reply_stamper.Next(now);
+        replies->Write(*past);
+        continue;
+      }
       CommandReply reply;
       reply.stamp = reply_stamper.Next(now);
       reply.request_id = command.request_id;
@@ -383,6 +393,8 @@ struct Supervisor::Impl {
         reply.text = "unknown verb \"" + command.verb + "\"; the supervisor knows: restart, swap, dump, down";
       }
       replies->Write(reply);
+      if (answered.size() == kAnswersKept) answered.pop_front();
+      answered.push_back(reply);
     }
   }
 
@@ -651,6 +663,7 @@ struct Supervisor::Impl {
   std::unique_ptr<bus::Input<Command>> commands;
   std::unique_ptr<bus::Output<CommandReply>> replies;
   std::unique_ptr<bus::Output<Command>> orders;  ///< To nodes.
+  std::deque<CommandReply> answered;  ///< The newest, for those who ask again.
   bus::Stamper health_stamper{MonotonicNs()}, reply_stamper{MonotonicNs()}, order_stamper{MonotonicNs()};
 
   std::optional<SessionAssessment> assessed;

@@ -33,11 +33,13 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
 void ThermalNode::Step(const Tick& tick) {
   if (ticks_++ == 0) runtime::FlushDenormals();
   solver_.Step(TakeContact(tick.dt_s), static_cast<float>(tick.dt_s));
+  // The manifest first: a replay finds every tick that a checkpoint holds, and sees from the next process's first state
+  // whether the last one reached its checkpoint.
+  PublishManifest(tick);
   SaveCheckpoint();
   PublishTopology(tick);
   PublishEvents(tick);
   PublishPatch(tick);
-  PublishManifest(tick);
   if (solver_.stepped()) NoteHealth();
 }
 

@@ -2,6 +2,7 @@
 
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -11,6 +12,8 @@
 #include <sstream>
 
 #include "services/bus/access.h"
+#include "services/bus/dds/abandoned_mutex.h"
+#include "services/bus/dds/audience.h"
 #include "services/bus/dds/library.h"
 #include "services/bus/dds/peer_watch.h"
 #include "services/bus/dds/ports.h"
@@ -169,6 +172,7 @@ struct DdsParticipant::Impl {
   std::filesystem::path shared_memory;
   const Security security;
   dds::PeerWatch watch;
+  dds::Audience audience;
   fast::DomainParticipant* participant = nullptr;
   fast::Publisher* publisher = nullptr;
   fast::Subscriber* subscriber = nullptr;
@@ -205,7 +209,7 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
       impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
   qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
   const WorkingIn here(impl_->shared_memory);
-  auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos);
+  auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos, &impl_->audience);
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "writer"));
   if (role.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
   return port;
@@ -226,7 +230,14 @@ std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink)
   return input;
 }
 
-std::int64_t DdsParticipant::KnownSince(const std::string& name) const { return impl_->watch.KnownSince(name); }
+std::uint64_t DdsParticipant::inherited_locks() { return dds::SharedLocks().inherited; }
+
+bool DdsParticipant::Knows(const std::string& name) const { return !impl_->watch.Named(name).empty(); }
+
+bool DdsParticipant::IsReadBy(const std::string& name) const {
+  return std::ranges::any_of(impl_->watch.Named(name),
+                             [&](const rtps::GuidPrefix_t& prefix) { return impl_->audience.Reaches(prefix); });
+}
 
 Peer DdsParticipant::PeerOf(const WriterGuid& writer) const {
   rtps::GuidPrefix_t prefix;

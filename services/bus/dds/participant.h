@@ -58,12 +58,17 @@ class DdsParticipant {
   /// Whose a writer is or was.
   [[nodiscard]] Peer PeerOf(const WriterGuid& writer) const;
 
-  /// When a participant of that name was discovered, CLOCK_MONOTONIC [ns]; 0: none is known.
-  [[nodiscard]] std::int64_t KnownSince(const std::string& name) const;
+  /// Whether a participant of that name is there.
+  [[nodiscard]] bool Knows(const std::string& name) const;
+  /// Whether one of that name reads all that this participant writes, as far as our side knows: what is written within
+  /// some milliseconds may still come before it knows our writers.
+  [[nodiscard]] bool IsReadBy(const std::string& name) const;
 
   /// Empty, or one line: a peer whose schema hash differs (both hashes, both names), or a supervisor that has other
   /// keys than this participant, or keys where this one has none.
   [[nodiscard]] std::string schema_mismatch() const;
+  /// Locks in shared memory that this process took over from dead ones, since its start.
+  [[nodiscard]] static std::uint64_t inherited_locks();
   /// Who was refused on a secured cart, since the start.
   [[nodiscard]] Refusals refusals() const;
 

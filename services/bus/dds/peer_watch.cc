@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <iterator>
 #include <string_view>
 #include <utility>
 
@@ -149,7 +150,7 @@ void PeerWatch::Admit(const Prefix& prefix, const std::string& text, const std::
   const std::size_t pid_at = text.rfind(kPidTag);
   if (pid_at != std::string::npos) std::sscanf(text.c_str() + pid_at + kPidTag.size(), "%d", &pid);
   peers_[prefix] = {name, pid};
-  since_.try_emplace(prefix, NowNs());
+  living_.insert(prefix);
   if (hash == own_hash_) return;
   mismatches_[prefix] = "schema mismatch: peer" + text.substr(name_at) + " speaks schema " + hash + ", this " +
                         own_name_ + " speaks " + own_hash_ + "; rebuild and restart both from the same sources";
@@ -157,7 +158,7 @@ void PeerWatch::Admit(const Prefix& prefix, const std::string& text, const std::
 
 void PeerWatch::Forget(const Prefix& prefix) {
   mismatches_.erase(prefix);
-  since_.erase(prefix);
+  living_.erase(prefix);
   strangers_.erase(prefix);
 }
 
@@ -194,8 +195,8 @@ std::string PeerWatch::mismatch() {
   if (own_name_ == leader_) return {};
   // Whoever calls itself the leader and is none does no harm as long as the true one is there.
   const auto is_leader = [&](const auto& entry) { return entry.second.name == leader_; };
-  const bool has_leader = std::any_of(since_.begin(), since_.end(), [&](const auto& entry) {
-    const auto peer = peers_.find(entry.first);
+  const bool has_leader = std::any_of(living_.begin(), living_.end(), [&](const Prefix& prefix) {
+    const auto peer = peers_.find(prefix);
     return peer != peers_.end() && is_leader(*peer);
   });
   if (has_leader) return {};
@@ -218,14 +219,14 @@ Refusals PeerWatch::refusals() {
   return refusals_;
 }
 
-std::int64_t PeerWatch::KnownSince(const std::string& name) const {
+std::vector<rtps::GuidPrefix_t> PeerWatch::Named(const std::string& name) const {
   const std::lock_guard lock(mutex_);
-  std::int64_t first = 0;
-  for (const auto& [prefix, since_ns] : since_) {
+  std::vector<rtps::GuidPrefix_t> named;
+  std::ranges::copy_if(living_, std::back_inserter(named), [&](const Prefix& prefix) {
     const auto peer = peers_.find(prefix);
-    if (peer != peers_.end() && peer->second.name == name && (first == 0 || since_ns < first)) first = since_ns;
-  }
-  return first;
+    return peer != peers_.end() && peer->second.name == name;
+  });
+  return named;
 }
 
 Peer PeerWatch::PeerOf(const Prefix& prefix) const {

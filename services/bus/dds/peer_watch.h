@@ -10,6 +10,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "services/bus/access.h"
 #include "services/bus/raw_input.h"
@@ -39,7 +40,8 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
   /// Empty, or one line naming a peer of another schema, or a leader that does not accept this participant.
   [[nodiscard]] std::string mismatch();
   [[nodiscard]] Refusals refusals();
-  [[nodiscard]] std::int64_t KnownSince(const std::string& name) const;
+  /// Those of that name that live.
+  [[nodiscard]] std::vector<eprosima::fastrtps::rtps::GuidPrefix_t> Named(const std::string& name) const;
   /// Also of one that is gone by now.
   [[nodiscard]] Peer PeerOf(const eprosima::fastrtps::rtps::GuidPrefix_t& prefix) const;
 
@@ -67,7 +69,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
   const std::string authority_;  ///< Name of our authority, as announcements carry it.
   mutable std::mutex mutex_;
   std::map<Prefix, Peer> peers_;
-  std::map<Prefix, std::int64_t> since_;  ///< Of those that live.
+  std::set<Prefix> living_;
   std::map<Prefix, std::string> mismatches_;
   std::map<Prefix, Stranger> strangers_;
   std::set<std::pair<Prefix, std::string>> forbidden_;  ///< Endpoints that were counted.

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <limits>
 
+#include "services/bus/dds/abandoned_mutex.h"
 #include "services/core/error.h"
 #include "tests/integration/bus/count_new.h"
 #include "tests/integration/bus/support.h"
@@ -80,6 +81,15 @@ TEST(DdsInput, NaNIsStoppedAndTheNextGoodOnePasses) {
   ASSERT_TRUE(bus.out->Write(test::Sample<TissueFrame>(2)));
   ASSERT_TRUE(Eventually([&] { return bus.in->TakeNext(&got); }));
   EXPECT_EQ(got.header.stamp.sequence, 2u);
+}
+
+TEST(DdsInput, WhatWritersAndReadersShareIsLockedByUs) {
+  const std::uint64_t before = dds::SharedLocks().locked;
+  Pair<TissueFrame> bus;
+  ASSERT_TRUE(bus.out->Write(test::Sample<TissueFrame>(1)));
+  TissueFrame got;
+  ASSERT_TRUE(Eventually([&] { return bus.in->TakeNext(&got); }));
+  EXPECT_GT(dds::SharedLocks().locked, before) << "see services/bus/dds/abandoned_mutex.h";
 }
 
 TEST(DdsInput, BytesThatAreNoMessageAreRefusedAndHoldNothingUp) {

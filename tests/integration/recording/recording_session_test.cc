@@ -31,6 +31,7 @@ TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
   log_tools::Recording recording(file);
   log_tools::Entry entry;
   std::map<std::string, int> decoded;
+  std::map<std::string, std::pair<std::uint32_t, std::uint32_t>> sequences;  // First and last.
   std::uint64_t scene_hash = 0;
   while (recording.Next(&entry)) {
     ASSERT_TRUE(entry.source->topic.has_value()) << entry.source->name;
@@ -41,12 +42,17 @@ TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
     });
     ASSERT_TRUE(good) << entry.source->name;
     ++decoded[entry.source->name];
+    sequences.try_emplace(entry.source->name, entry.message.sequence, 0).first->second.second = entry.message.sequence;
   }
   for (const bus::TopicRole& role : bus::kTopicRoles) {
     EXPECT_GE(decoded[std::string(bus::TopicLabel(role.id))], 1) << role.name;
   }
-  EXPECT_GT(decoded["ToolState"], 2500) << "1 kHz";
-  EXPECT_GT(decoded["TissueFrame"], 200) << "100 Hz";
+  // How many there are is a matter of the machine; that they are in the file is not.
+  for (const std::string topic : {"ToolState", "TissueFrame"}) {
+    const auto [first, last] = sequences[topic];
+    EXPECT_GT(decoded[topic], 100) << topic;
+    EXPECT_GT(decoded[topic], 0.9 * (last - first + 1)) << topic;
+  }
   EXPECT_TRUE(recording.reader().closed());
   EXPECT_TRUE(recording.reader().faults().empty());
   const auto& metadata = recording.reader().metadata();

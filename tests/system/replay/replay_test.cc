@@ -24,8 +24,8 @@ TEST(ReplayOfTheCart, ComesToTheSameStatesThroughKillsAndATakeover) {
   EXPECT_EQ(cart.WaitForEnd(60), 0) << cart.Said();
   const auto run = testing::Replay(cart.session() / "recording.mcap", {"--into", "physics", "thermal", "haptics"}, 60);
   EXPECT_EQ(run.exit_code, 0) << run.said;
-  EXPECT_GT(run.figures.at("physics_node.compared"), 400) << run.said;
-  EXPECT_GT(run.figures.at("thermal_node.compared"), 400) << run.said;
+  EXPECT_GT(run.figures.at("physics_node.compared"), 200) << run.said;
+  EXPECT_GT(run.figures.at("thermal_node.compared"), 200) << run.said;
   // Each death is in the recording: physics went over to the one that followed, the others were started again.
   // On a machine that holds a leader up for longer than its deadline it goes over once more.
   EXPECT_GE(run.figures.at("physics_node.starts"), 2) << run.said;

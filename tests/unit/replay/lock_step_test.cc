@@ -74,6 +74,13 @@ TEST_F(LockStepTest, GoesOnAcrossRestarts) {
   EXPECT_EQ(result.nodes[2].starts, 2u);
 }
 
+TEST_F(LockStepTest, FindsTheCheckpointOfAProcessThatDiedBeforeItSealedItsLast) {
+  Record({.seconds = 1.6, .kill_physics_s = 1.201, .kill_before_seal = true});
+  const LockStepResult result = Replay({NodeId::kPhysics});
+  EXPECT_TRUE(result.good()) << ReportText(result);
+  EXPECT_EQ(result.nodes[0].starts, 2u);
+}
+
 TEST_F(LockStepTest, NamesWhatDiffersFirst) {
   CartStory story{.seconds = 1};
   story.tool_change = [](ToolState* tools) {

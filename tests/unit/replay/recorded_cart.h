@@ -1,7 +1,9 @@
 // Physics, thermal and haptics in one process on a clock of their own, recorded as a recorder would.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -55,6 +57,7 @@ class TappedTopic {
 struct CartStory {
   double seconds = 3;
   double kill_physics_s = -1;  ///< Ended without notice, started again 30 ms later.
+  bool kill_before_seal = false;  ///< Physics: after it has told of its last tick, before that tick's checkpoint.
   double kill_haptics_s = -1;
   double late_physics_s = -1;                            ///< One period is skipped.
   int threads = 1;                                       ///< Of physics.
@@ -62,6 +65,14 @@ struct CartStory {
   std::function<bool(TickManifest*)> manifest_change{};  ///< The same.
   bool record_frames = true;                             ///< TissueFrame is most of the bytes.
 };
+
+/// As if the newest slot had not been sealed.
+inline void Unseal(runtime::CheckpointFile* file) {
+  const auto previous = file->Previous();
+  const std::vector<std::byte> bytes(previous->payload.begin(), previous->payload.end());
+  std::ranges::copy(bytes, file->Begin().begin());
+  file->Commit(bytes.size());
+}
 
 /// Runs and records it into `folder`/recording.mcap. Returns the length that was cut [m].
 inline float RecordCart(const SceneView& scene, const std::filesystem::path& folder, const CartStory& story) {
@@ -152,7 +163,10 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     // Wakes are a little late, each time by another amount.
     const std::int64_t now = kStart + ms * kMillisecond + (ms * 7919) % 30011;
     const double time = seconds_of(now);
-    if (ms == at(story.kill_physics_s)) physics.reset();
+    if (ms == at(story.kill_physics_s)) {
+      physics.reset();
+      if (story.kill_before_seal) Unseal(&physics_checkpoint);
+    }
     if (ms == at(story.kill_physics_s) + 30) {
       physics = start_physics(now);
       physics_index = 0;
