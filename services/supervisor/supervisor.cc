@@ -663,7 +663,7 @@ struct Supervisor::Impl {
   std::unique_ptr<bus::Input<Command>> commands;
   std::unique_ptr<bus::Output<CommandReply>> replies;
   std::unique_ptr<bus::Output<Command>> orders;  ///< To nodes.
-  std::deque<CommandReply> answered;  ///< The newest, for those who ask again.
+  std::deque<CommandReply> answered;             ///< The newest, for those who ask again.
   bus::Stamper health_stamper{MonotonicNs()}, reply_stamper{MonotonicNs()}, order_stamper{MonotonicNs()};
 
   std::optional<SessionAssessment> assessed;

@@ -272,7 +272,7 @@ class DdsOutput<T> final : public OutputBase<T> {
  private:
   template <class Fill>
   bool Lend(const Fill& fill) noexcept {
-    const BoundedLocks bounded;
+    const BoundedLocks patience;
     void* loan = nullptr;
     try {
       using Init = fast::DataWriter::LoanInitializationKind;

@@ -56,7 +56,7 @@ class TappedTopic {
 
 struct CartStory {
   double seconds = 3;
-  double kill_physics_s = -1;  ///< Ended without notice, started again 30 ms later.
+  double kill_physics_s = -1;     ///< Ended without notice, started again 30 ms later.
   bool kill_before_seal = false;  ///< Physics: after it has told of its last tick, before that tick's checkpoint.
   double kill_haptics_s = -1;
   double late_physics_s = -1;                            ///< One period is skipped.
