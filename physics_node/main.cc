@@ -56,7 +56,8 @@ ExitCode RunPhysics(app::NodeApp& app) {
                      static_cast<std::uint64_t>(epoch_ns));
   std::atomic<bool> leads{!seat.follows};
   const auto step = [&](const Tick& tick) {
-    switch (pair.Update(tick.stamp_ns)) {
+    const bool other_holds = !leads.load(std::memory_order_relaxed) && runtime::IsInUse(session / seat.other);
+    switch (pair.Update(tick.stamp_ns, other_holds)) {
       case physics::Pair::Role::kFollows:
         node.Follow(tick);
         return;
@@ -68,7 +69,7 @@ ExitCode RunPhysics(app::NodeApp& app) {
         leads.store(true, std::memory_order_relaxed);
         node.Step(tick);
         runtime::Log(runtime::LogLevel::kWarning,
-                     std::string("the leading process is silent: this one has taken over, ") +
+                     std::string("the leading process is gone or silent: this one has taken over, ") +
                          (restored ? "from the newest checkpoint" : "from the beginning: there is no checkpoint"));
         return;
       }

@@ -4,7 +4,7 @@
 
 namespace fulcrum::physics {
 
-Pair::Role Pair::Update(std::int64_t now_ns) {
+Pair::Role Pair::Update(std::int64_t now_ns, bool other_holds) {
   bool heard = false;
   while (manifests_.TakeNext(&manifest_)) {
     if (manifest_.node != node_ || manifest_.stamp.epoch == own_epoch_) continue;
@@ -17,7 +17,10 @@ Pair::Role Pair::Update(std::int64_t now_ns) {
   if (heard || absent || heard_ns_ == 0) heard_ns_ = now_ns;
   if (role_ == Role::kTakesOver) role_ = Role::kLeads;
   if (role_ == Role::kLeads && leader_epoch_ > own_epoch_) role_ = Role::kRetires;
-  if (role_ == Role::kFollows && now_ns - heard_ns_ > (leader_epoch_ == 0 ? kLongestStart_ns : kDeadline_ns)) {
+  if (heard && other_holds) holder_epoch_ = leader_epoch_;
+  const bool gone = leader_epoch_ != 0 && holder_epoch_ == leader_epoch_ && !other_holds;
+  const bool silent = now_ns - heard_ns_ > (leader_epoch_ == 0 ? kLongestStart_ns : kDeadline_ns);
+  if (role_ == Role::kFollows && (gone || silent)) {
     role_ = Role::kTakesOver;
     own_epoch_ = static_cast<std::uint64_t>(now_ns);
   }

@@ -15,7 +15,7 @@ class Pair {
  public:
   enum class Role : std::uint8_t {
     kFollows,
-    kTakesOver,  ///< In this tick the leader has been silent for too long: this process leads from now on.
+    kTakesOver,  ///< The leader is gone, or has been silent for too long: from this tick on this process leads.
     kLeads,
     kRetires  ///< Another process has taken over: this one has to end.
   };
@@ -25,7 +25,9 @@ class Pair {
       : manifests_(manifests), node_(node), role_(leads ? Role::kLeads : Role::kFollows), own_epoch_(own_epoch) {}
 
   /// Once in each tick, before anything else.
-  [[nodiscard]] Role Update(std::int64_t now_ns);
+  /// @param other_holds the other process holds its checkpoint. The kernel takes it from it when it dies, so one that
+  ///   held it and no longer does is gone, whatever the deadline.
+  [[nodiscard]] Role Update(std::int64_t now_ns, bool other_holds);
   /// Of the manifests since kTakesOver.
   [[nodiscard]] std::uint64_t own_epoch() const { return own_epoch_; }
 
@@ -40,8 +42,9 @@ class Pair {
   Role role_;
   std::uint64_t own_epoch_;
   std::uint64_t leader_epoch_ = 0;
-  std::int64_t heard_ns_ = 0;   ///< When the leader was last heard, or can have been; 0: not yet updated.
-  std::int64_t looked_ns_ = 0;  ///< Last Update().
+  std::uint64_t holder_epoch_ = 0;  ///< Of the newest leader that was seen to hold its checkpoint.
+  std::int64_t heard_ns_ = 0;       ///< When the leader was last heard, or can have been; 0: not yet updated.
+  std::int64_t looked_ns_ = 0;      ///< Last Update().
   TickManifest manifest_;
 };
 

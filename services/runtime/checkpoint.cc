@@ -75,7 +75,13 @@ class FileDescriptor {
 
 /// One process at a time: two writers would seal each other's half-filled slots.
 void Lock(const std::filesystem::path& file, int fd) {
-  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+  int result = ::flock(fd, LOCK_EX | LOCK_NB);
+  // Whoever looks (IsInUse) has it for microseconds.
+  for (int i = 0; i < 5 && result != 0 && errno == EWOULDBLOCK; ++i) {
+    ::usleep(1000);
+    result = ::flock(fd, LOCK_EX | LOCK_NB);
+  }
+  if (result != 0) {
     if (errno == EWOULDBLOCK) {
       throw InputError(file.string() + ": checkpoint is in use by another process; stop that node first");
     }
@@ -268,6 +274,12 @@ void CheckpointFile::Commit(std::size_t bytes) {
   header->sequence = sequence;
   impl_->last_sequence = sequence;
   impl_->newest = slot;
+}
+
+bool IsInUse(const std::filesystem::path& file) {
+  const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  // Given back when the descriptor is closed.
+  return fd.get() >= 0 && ::flock(fd.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 
 std::uint64_t NewestSequence(const std::filesystem::path& file) {

@@ -51,6 +51,9 @@ class CheckpointFile {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Whether a process has this checkpoint file open.
+[[nodiscard]] bool IsInUse(const std::filesystem::path& file);
+
 /// Sequence of the newest sealed slot of a file that another process may be writing; 0 without one. Payloads are not
 /// read: it says how far that process has come, not that its checkpoint is whole.
 [[nodiscard]] std::uint64_t NewestSequence(const std::filesystem::path& file);

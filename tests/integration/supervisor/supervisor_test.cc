@@ -283,6 +283,34 @@ TEST_F(SupervisorTest, StatusRestartAndDownReachTheSupervisor) {
   EXPECT_EQ(Wait(&nothing).exit_code, 2) << Log();
 }
 
+TEST_F(SupervisorTest, ARequestThatIsAskedAgainIsDoneOnceAndAnsweredEachTime) {
+  ChildProcess up = Up();
+  ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
+  {
+    bus::DdsParticipant bus(bus::DdsSettings{.domain = kDomain, .node_name = "asker"});
+    const auto replies = bus.MakeInput<CommandReply>();
+    const auto commands = bus.MakeOutput<Command>();
+    bus::Stamper stamper(runtime::MonotonicNs());
+    int answers = 0;
+    EXPECT_TRUE(WaitUntil([&] {
+      Command command;
+      command.stamp = stamper.Next(runtime::MonotonicNs());
+      command.request_id = 12345;
+      command.target = NodeId::kSupervisor;
+      command.verb = "restart";
+      command.argument = "thermal_node";
+      commands->Write(command);
+      CommandReply reply;
+      while (replies->TakeNext(&reply)) answers += reply.request_id == 12345 && reply.ok ? 1 : 0;
+      return answers >= 5;
+    })) << Log();
+  }
+  EXPECT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 2); })) << Log();
+  up.Signal(SIGINT);
+  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
+  EXPECT_EQ(Count(NodeLog(NodeId::kThermal), "joined session"), 2u) << NodeLog(NodeId::kThermal);
+}
+
 TEST_F(SupervisorTest, ADegradedNodeHasTheNewestPastDumpedOnce) {
   fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "recorder", folder_ / "bin" / "recorder");
   Order(NodeId::kThermal, "flicker");

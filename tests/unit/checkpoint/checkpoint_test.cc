@@ -93,6 +93,31 @@ TEST_F(CheckpointTest, NewestSequenceIsSeenFromOutside) {
   EXPECT_EQ(NewestSequence(folder_ / "other"), 0u);
 }
 
+TEST_F(CheckpointTest, ThePreviousSlotIsThereUntilItIsFilledAnew) {
+  CheckpointFile checkpoint(file_, kScene, kLayout, 800);
+  EXPECT_FALSE(checkpoint.Previous());
+  Write(&checkpoint, 1, 100);
+  EXPECT_FALSE(checkpoint.Previous());
+  Write(&checkpoint, 2, 50);
+  const auto previous = checkpoint.Previous();
+  ASSERT_TRUE(previous);
+  EXPECT_EQ(previous->sequence, 1u);
+  EXPECT_TRUE(Matches(previous->payload, 1));
+  (void)checkpoint.Begin();
+  EXPECT_FALSE(checkpoint.Previous());
+}
+
+TEST_F(CheckpointTest, WhetherAProcessHasItIsSeenFromOutside) {
+  EXPECT_FALSE(IsInUse(file_)) << "no file";
+  {
+    const CheckpointFile checkpoint(file_, kScene, kLayout, 800);
+    EXPECT_TRUE(IsInUse(file_));
+  }
+  EXPECT_FALSE(IsInUse(file_));
+  const CheckpointFile again(file_, kScene, kLayout, 800);
+  EXPECT_TRUE(IsInUse(file_)) << "looking leaves nothing behind";
+}
+
 TEST_F(CheckpointTest, PeekReadsTheNewestWholeSlotOfAFileThatIsInUse) {
   EXPECT_FALSE(CheckpointFile::Peek(file_, kScene, kLayout, 800)) << "no file";
   CheckpointFile checkpoint(file_, kScene, kLayout, 800);

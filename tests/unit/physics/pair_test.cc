@@ -22,7 +22,7 @@ class PairTest : public ::testing::Test {
   /// A period later.
   Pair::Role Next(Pair* pair, std::int64_t later = kPeriod) {
     now_ += later;
-    return pair->Update(now_);
+    return pair->Update(now_, other_holds_);
   }
 
   bus::InProcessTopic<TickManifest> topic_;
@@ -30,6 +30,7 @@ class PairTest : public ::testing::Test {
   std::unique_ptr<bus::Input<TickManifest>> in_ = topic_.MakeInput(64);
   std::int64_t now_ = kStart;
   std::uint64_t sequence_ = 0;
+  bool other_holds_ = false;
 };
 
 TEST_F(PairTest, FollowsWhileTheLeaderSpeaks) {
@@ -54,6 +55,26 @@ TEST_F(PairTest, TakesOverFromASilentLeaderWithinFourPeriods) {
   EXPECT_EQ(pair.own_epoch(), static_cast<std::uint64_t>(now_)) << "later than the leader's";
   LeaderSpeaks(pair.own_epoch());
   EXPECT_EQ(Next(&pair), Pair::Role::kLeads) << "its own word is no other leader's";
+}
+
+TEST_F(PairTest, TakesOverAtOnceFromALeaderThatHasLostItsCheckpoint) {
+  Pair pair(*in_, NodeId::kPhysics, false, 5);
+  other_holds_ = true;
+  ASSERT_EQ(Next(&pair), Pair::Role::kFollows) << "not heard yet";
+  LeaderSpeaks(1);
+  ASSERT_EQ(Next(&pair), Pair::Role::kFollows);
+  other_holds_ = false;
+  LeaderSpeaks(1);
+  EXPECT_EQ(Next(&pair), Pair::Role::kTakesOver) << "its last word";
+}
+
+TEST_F(PairTest, ALeaderWithoutACheckpointIsJudgedByItsSilenceOnly) {
+  Pair pair(*in_, NodeId::kPhysics, false, 5);
+  for (int i = 0; i < 5; ++i) {
+    LeaderSpeaks(1);
+    ASSERT_EQ(Next(&pair), Pair::Role::kFollows);
+    ASSERT_EQ(Next(&pair), Pair::Role::kFollows);
+  }
 }
 
 TEST_F(PairTest, WaitsLongerForTheFirstWord) {
