@@ -112,8 +112,10 @@ void TickSource::Fetch(const RecordedTick& tick, const ConsumedInput& consumed, 
   if (const T* found = shelf.Find(key)) {
     *sample = *found;
   } else if (missing->empty()) {
-    *missing = std::string(NodeName(tick.node)) + " consumed " + Describe(consumed.topic, key) +
-               ", which the recording does not hold";
+    *missing =
+        std::string(NodeName(tick.node)) + " consumed " + Describe(consumed.topic, key) +
+        ", which the recording does not hold" +
+        (shelf.EndsBefore(key) ? ": the last of its process, which did not live to send it to the recorder" : "");
   }
 }
 

@@ -32,6 +32,12 @@ class SampleShelf {
     const auto found = samples_.find(key);
     return found == samples_.end() ? nullptr : &found->second;
   }
+  /// Whether all of that writer is there up to the one before, and nothing after.
+  [[nodiscard]] bool EndsBefore(const SampleKey& key) const {
+    const auto next = samples_.lower_bound(key);
+    const bool nothing_after = next == samples_.end() || next->first.first != key.first;
+    return nothing_after && Find({key.first, key.second - 1}) != nullptr;
+  }
 
  private:
   std::size_t limit_;

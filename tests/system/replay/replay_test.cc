@@ -24,8 +24,8 @@ TEST(ReplayOfTheCart, ComesToTheSameStatesThroughKillsAndATakeover) {
   EXPECT_EQ(cart.WaitForEnd(60), 0) << cart.Said();
   const auto run = testing::Replay(cart.session() / "recording.mcap", {"--into", "physics", "thermal", "haptics"}, 60);
   // A sample goes to each reader by itself. Killed between two of these, a process has told a node what it has not told
-  // the recorder (1 of 16 runs on half of one processor); no recording can hold that.
-  if (run.said.find("which the recording does not hold") != std::string::npos) GTEST_SKIP() << run.said;
+  // the recorder; no recording can hold that. Any other sample that is missing is a failure.
+  if (run.said.find("the last of its process") != std::string::npos) GTEST_SKIP() << run.said;
   EXPECT_EQ(run.exit_code, 0) << run.said;
   EXPECT_GT(run.figures.at("physics_node.compared"), 200) << run.said;
   EXPECT_GT(run.figures.at("thermal_node.compared"), 200) << run.said;

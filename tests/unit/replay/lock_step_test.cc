@@ -103,6 +103,7 @@ TEST_F(LockStepTest, SaysWhatTheRecordingLacks) {
   LockStepResult result = Replay({NodeId::kPhysics, NodeId::kHaptics});
   EXPECT_FALSE(result.good());
   EXPECT_NE(result.nodes[0].missing.find("ToolState #501"), std::string::npos) << ReportText(result);
+  EXPECT_EQ(result.nodes[0].missing.find("the last of its process"), std::string::npos) << ReportText(result);
   EXPECT_NE(result.nodes[1].missing.find("lacks 1 ticks of haptics_node"), std::string::npos) << ReportText(result);
 
   story = {.seconds = 1};
@@ -110,6 +111,15 @@ TEST_F(LockStepTest, SaysWhatTheRecordingLacks) {
   Record(story);
   result = Replay({NodeId::kThermal});
   EXPECT_NE(result.nodes[0].missing.find("lacks 3 ticks of thermal_node"), std::string::npos) << ReportText(result);
+}
+
+TEST_F(LockStepTest, TellsASampleThatAKilledProcessDidNotSendToTheRecorder) {
+  CartStory story{.seconds = 1, .kill_haptics_s = 0.801};
+  story.tool_change = [](ToolState* tools) { return tools->stamp.sequence != 801; };
+  Record(story);
+  const LockStepResult result = Replay({NodeId::kPhysics});
+  EXPECT_NE(result.nodes[0].missing.find("ToolState #801"), std::string::npos) << ReportText(result);
+  EXPECT_NE(result.nodes[0].missing.find("the last of its process"), std::string::npos) << ReportText(result);
 }
 
 TEST_F(LockStepTest, AnotherSceneIsRefused) {
