@@ -4,7 +4,7 @@
 // robust: who dies while he holds one leaves it locked. Whoever wants it next gives up after a second of the wall clock
 // and throws; on the thread that listens for data nobody catches that, and the process ends (later versions catch it,
 // Fast DDS pull request 5468). A writer that the reader it has just woken displaces holds such a mutex as long as it
-// waits for a processor, so on a busy machine a kill finds one held in a few cases of a hundred.
+// waits for a processor, so on a busy machine a kill finds one held now and then.
 //
 // Linking this defines pthread_mutex_timedlock for the process, which only the library calls:
 //   - a mutex of a dead owner passes to the one that waits for it. What these mutexes guard bears it: a flag, and a
