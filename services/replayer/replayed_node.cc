@@ -218,17 +218,17 @@ class ReplayedHaptics final : public ReplayedNode {
 }  // namespace
 
 std::uint64_t ReplayedNode::Step(const RecordedTick& tick) {
-  const bool again = started_ && tick.epoch != epoch_;
-  const bool first = !started_;
-  started_ = true;
-  epoch_ = tick.epoch;
+  const bool first = !std::exchange(started_, true);
+  const bool goes_on = tick.epoch == std::exchange(epoch_, tick.epoch);
   const unsigned outside = _mm_getcsr();
   std::uint64_t hash = 0;
-  if (first || again) {
-    hash = again ? StartAgain(tick) : StartWith(tick);
-  } else {
+  if (first) {
+    hash = StartWith(tick);
+  } else if (goes_on) {
     _mm_setcsr(float_state_);
     hash = Advance(tick);
+  } else {
+    hash = StartAgain(tick);
   }
   float_state_ = _mm_getcsr();
   _mm_setcsr(outside);
