@@ -9,10 +9,11 @@
 #include <cerrno>
 #include <ctime>
 
+#include "services/core/tick.h"
+
 namespace fulcrum::bus::dds {
 namespace {
 
-constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::int64_t kLook_ns = 5'000'000;  // How often the owner is looked at.
 // Between taking or leaving a mutex and saying so lie a few instructions. Whoever died in them is nobody by name;
 // whoever stands still in them for so long is taken for dead.
@@ -76,6 +77,7 @@ LockCounts SharedLocks() noexcept {
 extern "C" __attribute__((visibility("default"))) int pthread_mutex_timedlock(pthread_mutex_t* mutex,
                                                                               const timespec* deadline) noexcept {
   using namespace fulcrum::bus::dds;
+  using fulcrum::kSecond_ns;
   if ((mutex->__data.__kind & kShared) == 0) return pthread_mutex_clocklock(mutex, CLOCK_REALTIME, deadline);
   const std::int64_t left_ns = deadline->tv_sec * kSecond_ns + deadline->tv_nsec - NowNs(CLOCK_REALTIME);
   const int result = LockShared(mutex, std::clamp<std::int64_t>(left_ns, 0, kSecond_ns));
