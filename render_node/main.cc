@@ -3,13 +3,19 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <set>
+#include <future>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "render_node/node/render_node.h"
 #include "services/app/node_app.h"
+#include "services/app/spare.h"
 #include "services/runtime/realtime.h"
 
 namespace {
@@ -17,39 +23,54 @@ namespace {
 // A software rasteriser takes every core it can get: below the servo and the solvers where they share cores.
 constexpr int kNice = 5;
 
-std::set<int> Threads() {
-  std::set<int> threads;
+std::vector<int> Threads() {
+  std::vector<int> threads;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/task")) {
-    threads.insert(std::atoi(entry.path().filename().c_str()));
+    threads.push_back(std::atoi(entry.path().filename().c_str()));
   }
   return threads;
 }
 
-/// Of this thread, which draws, of the rasteriser's and of what they begin: all but those that came `earlier`, the
-/// bus's.
-void LowerPriorityOfDrawing(const std::set<int>& earlier) {
-  for (const int thread : Threads()) {
-    if ((thread == gettid() || !earlier.contains(thread)) && setpriority(PRIO_PROCESS, thread, kNice) != 0) {
+/// Of these threads and of what they begin.
+void LowerPriority(std::span<const int> threads) {
+  for (const int thread : threads) {
+    if (setpriority(PRIO_PROCESS, static_cast<id_t>(thread), kNice) != 0) {
       fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kWarning, "cannot lower the priority of drawing");
       return;
     }
   }
 }
 
+/// A node that comes back is waited for, a spare is not: its thread, and the rasteriser's with it, give way from the
+/// first.
+std::unique_ptr<fulcrum::render::Stage> MakeStage(const fulcrum::SceneView& scene, bool window, bool spare) {
+  const auto make = [&] {
+    if (spare) LowerPriority(std::array{gettid()});
+    return std::make_unique<fulcrum::render::Stage>(scene, window);
+  };
+  return std::async(spare ? std::launch::async : std::launch::deferred, make).get();
+}
+
 fulcrum::ExitCode RunRender(fulcrum::app::NodeApp& app) {
-  const std::set<int> earlier = Threads();
+  const bool spare = app.options().TakeFlag("--spare");
+  if (spare) fulcrum::app::BecomeSpare(fulcrum::NodeId::kRender);
   fulcrum::render::RenderSettings settings;
   settings.window = app.options().TakeFlag("--window");
   settings.quality = fulcrum::render::QualityFromName(app.options().TakeValue("--quality", "auto"));
   settings.frames = app.options().session / "frames";
-  fulcrum::render::RenderNode node(app.scene(), settings,
-                                   {app.MakeInput<fulcrum::TissueFrame>(), app.MakeInput<fulcrum::TopologyState>(),
-                                    app.MakeInput<fulcrum::TemperaturePatch>(), app.MakeInput<fulcrum::ToolState>(),
-                                    app.MakeInput<fulcrum::HandleState>(), app.MakeInput<fulcrum::ThermalEvent>(),
-                                    app.MakeInput<fulcrum::CauteryContact>()});
+  auto stage = MakeStage(app.scene(), settings.window, spare);
+  if (spare && !fulcrum::app::WaitUntilNeeded(fulcrum::NodeId::kRender)) return fulcrum::ExitCode::kDone;
+
+  // This one, which draws, and the rasteriser's, not those of the bus.
+  const std::vector<int> drawing = Threads();
+  const fulcrum::render::RenderPorts ports{
+      app.MakeInput<fulcrum::TissueFrame>(),      app.MakeInput<fulcrum::TopologyState>(),
+      app.MakeInput<fulcrum::TemperaturePatch>(), app.MakeInput<fulcrum::ToolState>(),
+      app.MakeInput<fulcrum::HandleState>(),      app.MakeInput<fulcrum::ThermalEvent>(),
+      app.MakeInput<fulcrum::CauteryContact>()};
+  LowerPriority(drawing);
+  fulcrum::render::RenderNode node(app.scene(), settings, ports, std::move(stage));
   fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, node.display_description());
-  // Not before: a node that comes back is waited for.
-  LowerPriorityOfDrawing(earlier);
 
   // The scene says how many pictures it wants, the cart how many the machine can give: the slower of the two.
   fulcrum::runtime::CyclicThreadSettings timing = app.timing();

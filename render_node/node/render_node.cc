@@ -25,44 +25,20 @@ bool LooksTheSame(const ToolSample& a, const ToolSample& b) {
          std::abs(a.f_W.norm() - b.f_W.norm()) < kSameForce;
 }
 
-std::unique_ptr<Display> OpenDisplay(const LaparoscopeView& view, const RenderParams& params, bool window) {
-  return window ? MakeWindowDisplay(view, params) : MakeOffscreenDisplay(view, params);
-}
-
 }  // namespace
 
-RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, const RenderPorts& ports)
+RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, const RenderPorts& ports,
+                       std::unique_ptr<Stage> stage)
     : scene_(scene),
       window_(settings.window),
       ports_(ports),
-      view_(scene),
-      display_(OpenDisplay(view_, scene.render, settings.window)),
+      stage_(stage ? std::move(stage) : std::make_unique<Stage>(scene, settings.window)),
+      view_(stage_->view),
+      display_(*stage_->display),
       writer_(settings.frames),
       quality_(settings.quality, static_cast<int>(scene.render.height)),
       camera_(scene.render),
-      figures_(scene.render.hud != 0) {
-  WarmUp();
-}
-
-// The first picture costs seconds on a busy machine, since the rasteriser translates each shader when it first meets
-// it: better now than in the session.
-void RenderNode::WarmUp() {
-  for (int k = 0; k < kMaxTools; ++k) {
-    ToolSample shown;
-    shown.kind = scene_.tools[static_cast<std::size_t>(k)].kind;
-    view_.SetTool(k, shown);
-  }
-  UpdateTexts();
-  view_.AddSmoke(Vec2f::Zero(), -10);
-  static_cast<void>(view_.UpdateEffects(-9.9));
-  // Few pixels: it is the shaders that must be met, and a node that comes back is waited for.
-  constexpr float kFewPixels = 0.25f;
-  view_.SetScale(kFewPixels);
-  display_->DrawAndRead(&picture_);
-  for (int k = 0; k < kMaxTools; ++k) {
-    view_.SetTool(k, ToolSample());
-  }
-}
+      figures_(scene.render.hud != 0) {}
 
 RenderNode::~RenderNode() = default;
 
@@ -208,7 +184,7 @@ void RenderNode::TakeContact() {
 }
 
 void RenderNode::TakeKeys() {
-  for (const int key : display_->TakeKeys()) {
+  for (const int key : display_.TakeKeys()) {
     Press(key);
     changed_on_screen_ = true;
   }
@@ -295,7 +271,7 @@ void RenderNode::Draw(double session_time_s, bool write_png) {
   view_.Update();
   UpdateTexts();
   if (write_png) {
-    display_->DrawAndRead(&picture_);
+    display_.DrawAndRead(&picture_);
     if (!writer_.Add(picture_, session_time_s)) {
       pictures_dropped_.fetch_add(1, std::memory_order_relaxed);
     }
@@ -303,7 +279,7 @@ void RenderNode::Draw(double session_time_s, bool write_png) {
     next_png_s_ = period * (std::floor(session_time_s / period) + 1);
     changed_in_file_ = moving;
   } else {
-    display_->Draw();
+    display_.Draw();
   }
   changed_on_screen_ = moving;
   frames_drawn_.fetch_add(1, std::memory_order_relaxed);

@@ -12,9 +12,8 @@
 #include "render_node/geometry/camera_control.h"
 #include "render_node/geometry/quality.h"
 #include "render_node/node/hud.h"
+#include "render_node/node/stage.h"
 #include "render_node/offscreen/png_writer.h"
-#include "render_node/scene_graph/display.h"
-#include "render_node/scene_graph/laparoscope_view.h"
 #include "services/bus/port.h"
 #include "services/core/tick.h"
 
@@ -38,9 +37,10 @@ struct RenderSettings {
 
 class RenderNode {
  public:
-  /// Builds the graph and opens OpenGL. Throws InputError when a window is asked for and no display can be opened,
-  /// std::runtime_error when OpenGL is missing. The arrays of `scene` and the ports must outlive the node.
-  RenderNode(const SceneView& scene, const RenderSettings& settings, const RenderPorts& ports);
+  /// @param stage of the same scene and settings; makes its own, and throws what that throws, when there is none. The
+  /// arrays of `scene` and the ports must outlive the node.
+  RenderNode(const SceneView& scene, const RenderSettings& settings, const RenderPorts& ports,
+             std::unique_ptr<Stage> stage = nullptr);
   ~RenderNode();
 
   /// Takes what has come and draws when somebody will see it: in a window whenever something changed, off screen when
@@ -61,11 +61,10 @@ class RenderNode {
   void FillHealth(Health* health) const;
 
   /// The user closed the window.
-  [[nodiscard]] bool closed() const { return display_->closed(); }
-  [[nodiscard]] std::string display_description() const { return display_->description(); }
+  [[nodiscard]] bool closed() const { return display_.closed(); }
+  [[nodiscard]] std::string display_description() const { return display_.description(); }
 
  private:
-  void WarmUp();
   void TakeTissue();
   void TakeThermal();
   void TakeTools();
@@ -82,8 +81,9 @@ class RenderNode {
   SceneView scene_;
   bool window_;
   RenderPorts ports_;
-  LaparoscopeView view_;
-  std::unique_ptr<Display> display_;
+  std::unique_ptr<Stage> stage_;
+  LaparoscopeView& view_;
+  Display& display_;
   FrameWriter writer_;
   QualityControl quality_;
 

@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -55,21 +56,36 @@ struct NodeApp::Impl {
       : node(node_id),
         options(node_options),
         cart(node_options.cart.empty() ? config::CartConfig() : config::LoadCart(node_options.cart)),
-        scene(node_options.scene),
-        participant({.domain = node_options.domain,
-                     .node_name = NodeName(node_id),
-                     .security = SecurityOf(cart, NodeName(node_id))}),
-        manifests(participant.MakeInput<SceneManifest>()),
-        commands(participant.MakeInput<Command>()),
-        replies(participant.MakeOutput<CommandReply>()),
-        healths(participant.MakeOutput<Health>()),
-        reply_stamper(MonotonicNs()),
-        health_stamper(MonotonicNs()) {}
+        scene(node_options.scene) {}
+
+  /// What every node has on the bus.
+  struct Joined {
+    explicit Joined(const bus::DdsSettings& settings)
+        : participant(settings),
+          manifests(participant.MakeInput<SceneManifest>()),
+          commands(participant.MakeInput<Command>()),
+          replies(participant.MakeOutput<CommandReply>()),
+          healths(participant.MakeOutput<Health>()) {}
+
+    bus::DdsParticipant participant;
+    std::unique_ptr<bus::Input<SceneManifest>> manifests;
+    std::unique_ptr<bus::Input<Command>> commands;
+    std::unique_ptr<bus::OutputOf<CommandReply>::type> replies;
+    std::unique_ptr<bus::OutputOf<Health>::type> healths;
+    bus::Stamper reply_stamper{MonotonicNs()}, health_stamper{MonotonicNs()};
+  };
+  Joined& Join() {
+    if (!joined) {
+      joined.emplace(bus::DdsSettings{
+          .domain = options.domain, .node_name = NodeName(node), .security = SecurityOf(cart, NodeName(node))});
+    }
+    return *joined;
+  }
 
   /// What the bus says to every node, looked at by the main thread.
   void PollBus() {
     SceneManifest manifest;
-    while (manifests->TakeNext(&manifest)) {
+    while (joined->manifests->TakeNext(&manifest)) {
       if (manifest.scene_hash != scene.view().hash) {
         End(ExitCode::kMismatch, "the session runs another scene (\"" + manifest.scene_name +
                                      "\"): stop it, or start this node with the scene of the session");
@@ -80,7 +96,7 @@ struct NodeApp::Impl {
       }
     }
     Command command;
-    while (commands->TakeNext(&command)) {
+    while (joined->commands->TakeNext(&command)) {
       if (command.target != node) continue;
       CommandReply reply;
       try {
@@ -93,15 +109,15 @@ struct NodeApp::Impl {
       } catch (const std::exception& error) {
         reply.text = error.what();
       }
-      reply.stamp = reply_stamper.Next(MonotonicNs());
+      reply.stamp = joined->reply_stamper.Next(MonotonicNs());
       reply.request_id = command.request_id;
       reply.from = node;
-      replies->Write(reply);
+      joined->replies->Write(reply);
     }
-    if (const std::string mismatch = participant.schema_mismatch(); !mismatch.empty()) {
+    if (const std::string mismatch = joined->participant.schema_mismatch(); !mismatch.empty()) {
       End(ExitCode::kMismatch, mismatch);
     }
-    const bus::Refusals refusals = participant.refusals();
+    const bus::Refusals refusals = joined->participant.refusals();
     for (; refusals_told < refusals.texts.size(); ++refusals_told) {
       Log(LogLevel::kWarning, "refused: " + refusals.texts[refusals_told]);
     }
@@ -130,13 +146,13 @@ struct NodeApp::Impl {
   Health PublishHealth(HealthReport* report, const runtime::CyclicThread& thread, const HealthFill& fill) {
     const std::int64_t now = MonotonicNs();
     Health health = report->Make(now, state.load(std::memory_order_relaxed), thread.stats(), inputs, outputs);
-    health.stamp = health_stamper.Next(now);
+    health.stamp = joined->health_stamper.Next(now);
     if (fill) fill(&health);
     if (const std::uint64_t locks = bus::DdsParticipant::inherited_locks(); locks > 0) {
       health.metrics.push_back({"locks_inherited", static_cast<double>(locks)});
     }
     FitToMessage(&health);
-    healths->Write(health);
+    joined->healths->Write(health);
     return health;
   }
 
@@ -144,12 +160,7 @@ struct NodeApp::Impl {
   NodeOptions options;
   config::CartConfig cart;
   scene::SceneFile scene;
-  bus::DdsParticipant participant;
-  std::unique_ptr<bus::Input<SceneManifest>> manifests;
-  std::unique_ptr<bus::Input<Command>> commands;
-  std::unique_ptr<bus::OutputOf<CommandReply>::type> replies;
-  std::unique_ptr<bus::OutputOf<Health>::type> healths;
-  bus::Stamper reply_stamper, health_stamper;
+  std::optional<Joined> joined;
   std::vector<HealthReport::InputWatch> inputs;
   std::vector<HealthReport::OutputWatch> outputs;
   std::vector<std::shared_ptr<void>> ports;
@@ -191,7 +202,7 @@ NodeApp::~NodeApp() = default;
 const SceneView& NodeApp::scene() const { return impl_->scene.view(); }
 NodeOptions& NodeApp::options() { return impl_->options; }
 const config::CartConfig& NodeApp::cart() const { return impl_->cart; }
-bus::DdsParticipant& NodeApp::bus() { return impl_->participant; }
+bus::DdsParticipant& NodeApp::bus() { return impl_->Join().participant; }
 
 runtime::CyclicThreadSettings NodeApp::timing() const {
   const config::NodeTiming& timing = impl_->cart.timing(impl_->node);
@@ -232,6 +243,7 @@ void NodeApp::Finish(ExitCode code, std::string_view reason) { impl_->End(code, 
 ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::function<void(const Tick&)>& step,
                       const HealthFill& fill_health) {
   Impl& app = *impl_;
+  app.Join();
   if (!app.options.extra.empty()) {
     throw InputError("unknown option \"" + app.options.extra.front() + "\"; see --help");
   }
@@ -272,10 +284,10 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
     const bool waits = !app.stepping.load(std::memory_order_relaxed);
     if (waits && replayable) {
       if (app.session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown) ++looks;
-      if (app.participant.IsReadBy(bus::kRecorderPeer)) ++looks_read;
+      if (app.joined->participant.IsReadBy(bus::kRecorderPeer)) ++looks_read;
     }
     const bool recorded = !replayable || looks_read > kLooksAfterReaders || looks > kLooksForReaders ||
-                          (looks > kLooksForRecorder && !app.participant.Knows(bus::kRecorderPeer));
+                          (looks > kLooksForRecorder && !app.joined->participant.Knows(bus::kRecorderPeer));
     if (waits && recorded && SessionTime(now) >= 0) {
       app.state = HealthState::kRunning;
       thread.Start();

@@ -59,7 +59,8 @@ struct ParsedOptions {
 /// Everything a node needs around its own object.
 class NodeApp {
  public:
-  /// Opens scene and bus. Throws InputError (exit 2) or MismatchError (exit 3).
+  /// Opens the scene. The bus is joined when the first port is made. Throws InputError (exit 2) or MismatchError
+  /// (exit 3), both do.
   NodeApp(NodeId node, const NodeOptions& options);
   ~NodeApp();
   NodeApp(const NodeApp&) = delete;

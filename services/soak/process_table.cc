@@ -37,8 +37,8 @@ std::optional<std::uint64_t> ResidentBytes(pid_t process) {
   return std::stoull(resident) * 1024;
 }
 
-std::multimap<std::string, pid_t> ChildrenOf(pid_t parent) {
-  std::multimap<std::string, pid_t> children;
+std::map<std::string, pid_t> ChildrenOf(pid_t parent) {
+  std::map<std::string, pid_t> children;
   const std::string wanted = std::to_string(parent);
   for (const auto& entry : fs::directory_iterator("/proc")) {
     const std::string name = entry.path().filename();

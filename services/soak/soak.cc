@@ -275,7 +275,7 @@ class Soak {
   supervisor::SessionView view_;
   Listener listener_;
   supervisor::ChildProcess up_;
-  std::multimap<std::string, pid_t> children_;
+  std::map<std::string, pid_t> children_;
   std::vector<std::string> nodes_;
   std::vector<Blow> plan_;
   ProcessorTimes processors_;

@@ -78,13 +78,13 @@ ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
 }
 
 ChildProcess ChildProcess::Start(const std::filesystem::path& program, const std::vector<std::string>& arguments,
-                                 const std::filesystem::path& log, WithParent with_parent) {
+                                 const std::filesystem::path& log, WithParent with_parent, int input) {
   const int log_fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   if (log_fd < 0) {
     throw InputError("cannot write " + log.string() + ": " + ::strerror(errno));
   }
   try {
-    ChildProcess process = StartOn(program, arguments, {.output = log_fd}, with_parent);
+    ChildProcess process = StartOn(program, arguments, {.input = input, .output = log_fd}, with_parent);
     ::close(log_fd);
     return process;
   } catch (...) {

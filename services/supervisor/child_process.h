@@ -34,11 +34,12 @@ class ChildProcess {
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&& other) noexcept;
 
-  /// Starts `program` with `arguments`; standard output and error are appended to `log`. The child is killed when the
-  /// calling thread ends, so start children from the main thread. Throws InputError when the program cannot be started.
+  /// Starts `program` with `arguments`; standard output and error are appended to `log`, `input` is an open file or -1.
+  /// The child is killed when the calling thread ends, so start children from the main thread. Throws InputError when
+  /// the program cannot be started.
   [[nodiscard]] static ChildProcess Start(const std::filesystem::path& program,
                                           const std::vector<std::string>& arguments, const std::filesystem::path& log,
-                                          WithParent with_parent = WithParent::kDies);
+                                          WithParent with_parent = WithParent::kDies, int input = -1);
   /// The same on open files, which stay the caller's.
   [[nodiscard]] static ChildProcess StartOn(const std::filesystem::path& program,
                                             const std::vector<std::string>& arguments, const ChildStreams& streams,

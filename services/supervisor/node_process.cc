@@ -22,6 +22,8 @@ constexpr std::int64_t kLongestSilence = 5 * kSecond_ns;
 constexpr std::int64_t kLongestStart = 60 * kSecond_ns;
 constexpr std::int64_t kPatienceWithRestart = 3 * kSecond_ns;
 constexpr std::int64_t kLongestEnd = 4 * kSecond_ns;
+// When a node that has come back is no longer busy with it.
+constexpr std::int64_t kBeforeSpare = kSecond_ns;
 constexpr auto kLook = std::chrono::milliseconds(5);
 
 /// Starting again with the same arguments would end the same way.
@@ -34,7 +36,9 @@ bool IsFinal(const ProcessEnd& end) {
 }  // namespace
 
 void NodeProcess::Start(std::int64_t now_ns) {
-  process_ = ChildProcess::Start(command_.program, command_.arguments, command_.log);
+  process_ = spare_ && spare_->IsThere() ? spare_->Take()
+                                         : ChildProcess::Start(command_.program, command_.arguments, command_.log);
+  spare_.reset();
   started_ns_ = now_ns;
   last_health_ns_ = 0;
   due_ns_ = 0;
@@ -51,6 +55,15 @@ void NodeProcess::WatchForSilence(std::int64_t now_ns) {
   }
   if (kill_ns_ != 0 && now_ns >= kill_ns_) {
     process_.Signal(SIGKILL);
+  }
+}
+
+void NodeProcess::KeepSpare(std::int64_t now_ns) {
+  if (!command_.has_spare || spare_ || kill_ns_ != 0 || !has_reported() || now_ns - started_ns_ < kBeforeSpare) return;
+  try {
+    spare_ = std::make_unique<SpareProcess>(command_);
+  } catch (const InputError&) {
+    command_.has_spare = false;  // The node can do without.
   }
 }
 
@@ -75,6 +88,7 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
   const std::optional<ProcessEnd> end = process_.Poll();
   if (!end) {
     WatchForSilence(now_ns);
+    KeepSpare(now_ns);
     return std::nullopt;
   }
   Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false, 0};
@@ -125,6 +139,7 @@ void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
 }
 
 void NodeProcess::AskRestart(std::int64_t now_ns) {
+  spare_.reset();  // Who asks may have built the program anew.
   process_.Signal(SIGTERM);
   kill_ns_ = now_ns + kPatienceWithRestart;
 }
@@ -134,7 +149,10 @@ void NodeProcess::Swap(NodeCommand command, std::int64_t now_ns) {
   AskRestart(now_ns);
 }
 
-void NodeProcess::Stop() { process_.Signal(SIGTERM); }
+void NodeProcess::Stop() {
+  spare_.reset();
+  process_.Signal(SIGTERM);
+}
 
 const char* NodeProcess::GiveUp() {
   process_.Signal(SIGKILL);

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 
 #include "services/supervisor/restart_policy.h"
+#include "services/supervisor/spare_process.h"
 #include "services/supervisor/supervised_node.h"
 
 namespace fulcrum::supervisor {
@@ -37,12 +39,15 @@ class NodeProcess final : public SupervisedNode {
 
  private:
   void WatchForSilence(std::int64_t now_ns);
+  /// Starts a spare when the node runs; one that ends is not started again before the node is.
+  void KeepSpare(std::int64_t now_ns);
   /// In the place of a replacement that was never heard of.
   Death GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns);
 
   NodeCommand command_;
   std::optional<NodeCommand> next_, before_;  ///< Of a swap; `before_` until the new one has reported.
   ChildProcess process_;
+  std::unique_ptr<SpareProcess> spare_;
   RestartPolicy policy_;
   std::int64_t started_ns_ = 0;
   std::int64_t last_health_ns_ = 0;  ///< 0: none since the start.

@@ -24,6 +24,7 @@ NodeCommand NodeStarter::Usual(NodeId id) const {
     if (settings.window) {
       command.arguments.emplace_back("--window");
     }
+    command.has_spare = !settings.window;  // It would open a second one.
   }
   if (id == NodeId::kRecorder) {
     if (settings.record) {
@@ -52,6 +53,7 @@ NodeCommand NodeStarter::Replacement(const NodeCommand& now, const std::vector<s
   command.program = words.front();
   command.foreign = words.size() > 1;
   if (command.foreign) {
+    command.has_spare = false;
     command.arguments.clear();
     command.again.clear();
     for (std::size_t i = 1; i < words.size(); ++i) command.arguments.push_back(Filled(words[i]));

@@ -20,7 +20,8 @@ struct NodeCommand {
   std::vector<std::string> arguments;
   std::filesystem::path log;
   std::vector<std::string> again;  ///< More arguments, from the second start on.
-  bool foreign = false;            ///< Not one of our nodes: its Health, if any, may name another process.
+  bool has_spare = false;  ///< Understands --spare (services/app/spare.h), and starts slowly enough to need one.
+  bool foreign = false;    ///< Not one of our nodes: its Health, if any, may name another process.
 };
 
 class SupervisedNode {

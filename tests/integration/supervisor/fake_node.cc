@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "services/app/node_app.h"
+#include "services/app/spare.h"
 #include "services/core/error.h"
 #include "services/runtime/realtime.h"
 
@@ -41,6 +42,10 @@ std::string OrderFor(const fulcrum::app::NodeOptions& options, NodeId node) {
 int main(int argc, char** argv) {
   const NodeId node = IdOf(std::filesystem::path(argv[0]).filename());
   return fulcrum::app::NodeMain(argc, argv, node, "Computes nothing.", [&](fulcrum::app::NodeApp& app) {
+    if (app.options().TakeFlag("--spare")) {
+      fulcrum::app::BecomeSpare(node);
+      if (!fulcrum::app::WaitUntilNeeded(node)) return ExitCode::kDone;
+    }
     const std::string order = OrderFor(app.options(), node);
     if (order == "crash") {
       std::abort();

@@ -89,7 +89,7 @@ TEST(ScriptRounds, TheSceneOfRoundsIsValidAndOtherwiseTheSame) {
 TEST(ProcessTable, KnowsChildrenAndWhatTheyHold) {
   auto child = supervisor::ChildProcess::Start("/bin/sleep", {"20"}, "/dev/null");
   EXPECT_GT(ResidentBytes(::getpid()).value_or(0), 1'000'000u);
-  std::multimap<std::string, pid_t> children;
+  std::map<std::string, pid_t> children;
   // Until it is a shell no longer.
   for (int i = 0; i < 1000 && !children.contains("sleep"); ++i) {
     children = ChildrenOf(::getpid());

@@ -1,0 +1,42 @@
+#include "render_node/node/stage.h"
+
+#include "render_node/node/hud.h"
+
+namespace fulcrum::render {
+namespace {
+
+std::unique_ptr<Display> OpenDisplay(const LaparoscopeView& view, const RenderParams& params, bool window) {
+  return window ? MakeWindowDisplay(view, params) : MakeOffscreenDisplay(view, params);
+}
+
+/// The first picture costs seconds on a busy machine, since the rasteriser translates each shader when it first meets
+/// it: better now than in the session.
+void WarmUp(const SceneView& scene, Stage* stage) {
+  LaparoscopeView& view = stage->view;
+  for (int k = 0; k < kMaxTools; ++k) {
+    ToolSample shown;
+    shown.kind = scene.tools[static_cast<std::size_t>(k)].kind;
+    view.SetTool(k, shown);
+  }
+  HudState hud;
+  hud.force_limit_N = scene.haptics.force_limit_N;
+  view.SetTexts(HudTexts(hud, scene.render.hud != 0));
+  view.AddSmoke(Vec2f::Zero(), -10);
+  static_cast<void>(view.UpdateEffects(-9.9));
+  // Few pixels: it is the shaders that must be met, and a node that comes back is waited for.
+  constexpr float kFewPixels = 0.25f;
+  view.SetScale(kFewPixels);
+  Picture picture;
+  stage->display->DrawAndRead(&picture);
+  for (int k = 0; k < kMaxTools; ++k) {
+    view.SetTool(k, ToolSample());
+  }
+}
+
+}  // namespace
+
+Stage::Stage(const SceneView& scene, bool window) : view(scene), display(OpenDisplay(view, scene.render, window)) {
+  WarmUp(scene, this);
+}
+
+}  // namespace fulcrum::render
