@@ -126,6 +126,9 @@ class AccurateSolver {
   }
   template <class Body>
   void ForTasks(const Part& part, const Body& body);
+  /// And once, by whichever thread comes first, errand().
+  template <class Body, class Errand>
+  void ForTasks(const Body& body, const Errand& errand);
   /// body(first float, count) for the parts of a field that belong to a task.
   template <class Body>
   void ForParts(const Task& task, const Body& body) const;

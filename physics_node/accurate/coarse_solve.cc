@@ -8,7 +8,34 @@
 namespace fulcrum::physics::accurate {
 
 void CoarseSpace::Solve(std::span<const Task> tasks, const float* row_sums, const float* tube_residual,
-                        const float* tube) {
+                        const float* tube, Workers* workers) {
+  // The two layers give to the coarse nodes apart from each other.
+  workers->Run(coarse_rests_ ? 1 : 2, 0, [&](int layer, int) {
+    if (layer == 0) {
+      SumRows(tasks, row_sums);
+      if (!coarse_rests_) RestrictMiddle();
+      return;
+    }
+    std::fill_n(tube_nodes4_.data(), tube_nodes4_.size(), 0.0f);
+    for (const Task& task : tasks) {
+      if (!task.sheet && !organ_alone_) {
+        RestrictTube(task.first, task.end, tube_residual, tube);
+      }
+    }
+  });
+  if (!coarse_rests_) {
+    for (std::size_t i = 0; i < nodes4_.size(); ++i) {
+      nodes4_[i] += tube_nodes4_[i];
+    }
+    factor_.Solve(kernels_, nodes4_.data());
+  }
+  constexpr int kPieces = 4;
+  workers->Run(kPieces, 0, [&](int piece, int) {
+    ProlongMiddle(middle_rows_ * piece / kPieces, middle_rows_ * (piece + 1) / kPieces);
+  });
+}
+
+void CoarseSpace::SumRows(std::span<const Task> tasks, const float* row_sums) {
   std::fill_n(residual_.data(), residual_.size(), 0.0f);
   const std::size_t width = row_width();
   for (const Task& task : tasks) {
@@ -27,20 +54,7 @@ void CoarseSpace::Solve(std::span<const Task> tasks, const float* row_sums, cons
       }
     }
   }
-  if (!coarse_rests_) {
-    std::fill_n(nodes4_.data(), nodes4_.size(), 0.0f);
-    RestrictMiddle();
-    for (const Task& task : tasks) {
-      if (!task.sheet && !organ_alone_) {
-        RestrictTube(task.first, task.end, tube_residual, tube);
-      }
-    }
-    SolveCoarse();
-  }
-  ProlongMiddle();
 }
-
-void CoarseSpace::SolveCoarse() { factor_.Solve(kernels_, nodes4_.data()); }
 
 /// Vertices that follow one another mostly lie in the same cell: what its nodes get is summed in registers.
 void CoarseSpace::RestrictTube(int first, int end, const float* tube_residual, const float* tube) {
@@ -53,7 +67,7 @@ void CoarseSpace::RestrictTube(int first, int end, const float* tube_residual, c
   std::fill(std::begin(sum), std::end(sum), _mm_setzero_ps());
   const auto flush = [&] {
     for (std::size_t i = 0; i < 8; ++i) {
-      float* out = nodes4_.data() + 4 * std::size_t{cell->node[i]};
+      float* out = tube_nodes4_.data() + 4 * std::size_t{cell->node[i]};
       _mm_store_ps(out, _mm_add_ps(_mm_load_ps(out), sum[i]));
     }
   };
@@ -76,6 +90,7 @@ void CoarseSpace::RestrictTube(int first, int end, const float* tube_residual, c
 
 /// Right side of the coarse nodes from the middle level's residual: first along a row, then to the two coarse rows.
 void CoarseSpace::RestrictMiddle() {
+  std::fill_n(nodes4_.data(), nodes4_.size(), 0.0f);
   for (std::size_t r = 0; r < static_cast<std::size_t>(middle_rows_); ++r) {
     const float *x = residual_.data() + 3 * r * width_, *y = x + width_, *z = y + width_;
     const float* yields = yields_.data() + r * width_;
@@ -101,8 +116,8 @@ void CoarseSpace::RestrictMiddle() {
 }
 
 /// The middle level's value: its blocks times the residual, and the coarse nodes' part where it yields.
-void CoarseSpace::ProlongMiddle() {
-  for (std::size_t r = 0; r < static_cast<std::size_t>(middle_rows_); ++r) {
+void CoarseSpace::ProlongMiddle(int first, int end) {
+  for (auto r = static_cast<std::size_t>(first); r < static_cast<std::size_t>(end); ++r) {
     if (middle_rests_[r] != 0) {
       continue;
     }

@@ -114,6 +114,7 @@ CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, cons
   }
   factor_ = CoarseFactor(AlongLongestSide(place));
   nodes4_ = FloatArray(4 * static_cast<std::size_t>(nodes_));
+  tube_nodes4_ = FloatArray(4 * static_cast<std::size_t>(nodes_));
   AddTube(model);
   AddBindings(model, particles);
 }

@@ -12,6 +12,7 @@
 #include "physics_node/accurate/elements.h"
 #include "physics_node/accurate/kernels.h"
 #include "physics_node/accurate/regions.h"
+#include "physics_node/accurate/workers.h"
 #include "physics_node/energy/elastic_model.h"
 #include "physics_node/pbd/particle_store.h"
 
@@ -56,7 +57,8 @@ class CoarseSpace {
 
   /// From the residual of what is computed - `row_sums` [rows][row_width()] by Kernels::sheet_restrict, tube xyz_ - to
   /// Middle::value and the coarse solution.
-  void Solve(std::span<const Task> tasks, const float* row_sums, const float* tube_residual, const float* tube);
+  void Solve(std::span<const Task> tasks, const float* row_sums, const float* tube_residual, const float* tube,
+             Workers* workers);
   /// tube_z += P y for vertices [first, end) that move (w of `tube` > 0). Returns tube_residual . tube_z.
   double Prolong(const float* tube, const float* tube_residual, float* tube_z, int first, int end) const;
 
@@ -79,9 +81,10 @@ class CoarseSpace {
   void Factorise();
   void BuildMiddle();
   void RestrictTube(int first, int end, const float* tube_residual, const float* tube);
-  void SolveCoarse();
+  void SumRows(std::span<const Task> tasks, const float* row_sums);
   void RestrictMiddle();
-  void ProlongMiddle();
+  /// Of middle rows [first, end).
+  void ProlongMiddle(int first, int end);
 
   const Kernels& kernels_;
   int columns_ = 0, coarse_rows_ = 0, rows_ = 0, stride_ = 0;
@@ -111,7 +114,8 @@ class CoarseSpace {
   Eigen::MatrixXf constant_, tube_mass_;  ///< Parts that do not change: organ and bindings at rest; mass of the organ.
   Eigen::MatrixXf building_;
   CoarseFactor factor_;
-  FloatArray nodes4_;  ///< Right side, then solution, xyz_ per coarse node.
+  FloatArray nodes4_;       ///< Right side, then solution, xyz_ per coarse node.
+  FloatArray tube_nodes4_;  ///< What the organ gives to the right side.
   int next_row_ = 0;
 };
 

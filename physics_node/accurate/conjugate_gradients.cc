@@ -24,7 +24,7 @@ double AccurateSolver::Precondition() {
                              residual_.data() + tube_floats_ + 2 * plane_};
   float* const z[3] = {z_.data() + tube_floats_, z_.data() + tube_floats_ + plane_,
                        z_.data() + tube_floats_ + 2 * plane_};
-  coarse_.Solve(regions_.part().tasks, row_sums_.data(), residual_.data(), particles_->tube());
+  coarse_.Solve(regions_.part().tasks, row_sums_.data(), residual_.data(), particles_->tube(), &workers_);
   ForTasks([&](const Task& task, int index, int) {
     double& partial = partial_[static_cast<std::size_t>(index)];
     if (task.sheet) {
@@ -47,7 +47,13 @@ double AccurateSolver::Apply(const FloatArray& direction, float inertia, const P
                              direction.data() + tube_floats_ + 2 * plane_};
   float* const q[3] = {q_.data() + tube_floats_, q_.data() + tube_floats_ + plane_,
                        q_.data() + tube_floats_ + 2 * plane_};
-  workers_.Run(static_cast<int>(part.patches.size()), 0, [&](int index, int) {
+  const int patches = static_cast<int>(part.patches.size());
+  double of_elements = 0;
+  workers_.Run(patches + 1, 0, 1, [&](int index, int) {
+    if (index == patches) {
+      of_elements = elements_.Multiply(direction.data(), elements);
+      return;
+    }
     const Task& task = part.patches[static_cast<std::size_t>(index)];
     kernels_.organ_stress(organ, organ_matrix, direction.data(), Vertex(task.first), Vertex(task.end));
   });
@@ -58,7 +64,7 @@ double AccurateSolver::Apply(const FloatArray& direction, float inertia, const P
                    : kernels_.organ_apply(organ, organ_matrix, inertia, direction.data(), q_.data(), Vertex(task.first),
                                           Vertex(task.end));
   });
-  return SumOfPartials(part.tasks.size()) + elements_.Apply(direction.data(), q_.data(), elements);
+  return SumOfPartials(part.tasks.size()) + of_elements + elements_.AddProduct(direction.data(), q_.data(), elements);
 }
 
 /// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d.
@@ -178,15 +184,18 @@ void AccurateSolver::LimitCorrection(float largest) {
 /// Halves the correction until the energy is no larger than without it.
 void AccurateSolver::SearchAlongCorrection(const Inertia& inertia, std::span<const ContactRow> contacts) {
   const double before = EnergyAt(place_, inertia, contacts);
-  const std::size_t count = tube_floats_ + 3 * plane_;
   for (int halving = 0; halving <= kHalvings; ++halving) {
-    for (std::size_t i = 0; i < count; ++i) {
-      q_[i] = place_[i] + d_[i];
-    }
+    ForTasks([&](const Task& task, int, int) {
+      ForParts(task, [&](std::size_t first, std::size_t floats) {
+        for (std::size_t i = first; i < first + floats; ++i) {
+          q_[i] = place_[i] + d_[i];
+        }
+      });
+    });
     if (EnergyAt(q_, inertia, contacts) <= before || halving == kHalvings) {
       break;
     }
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < tube_floats_ + 3 * plane_; ++i) {
       d_[i] *= 0.5f;
     }
   }

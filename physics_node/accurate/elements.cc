@@ -150,8 +150,10 @@ Elements::Elements(const SceneView& scene, const ElasticModel& model, const Part
                              binding.membrane - scene.membrane.first});
   }
   computed_.bindings.reserve(bindings_.size());
+  binding_force_ = FloatArray(4 * bindings_.size() + 4);
   contacts_.reserve(kMostContacts);
   contact_force_.reserve(kMostContacts);
+  contact_product_.reserve(kMostContacts);
 }
 
 void Elements::Follow(const TissueModel& tissue) {
@@ -210,7 +212,7 @@ void Elements::Touch(float h, const float* place, const float* start, const Regi
   }
 }
 
-void Elements::Linearise(const float* place, float* residual) {
+void Elements::Linearise(const float* place) {
   for (const std::uint32_t i : computed_.bindings) {
     Element& e = bindings_[i];
     const __m128 d = CombineBinding(e, place);
@@ -220,28 +222,49 @@ void Elements::Linearise(const float* place, float* residual) {
     alignas(16) float m[4];
     _mm_store_ps(m, _mm_mul_ps(d, _mm_set1_ps(std::sqrt(std::max(k - e.kt, 0.0f)) / length)));
     e.m = Vec3f(m[0], m[1], m[2]);
-    SpreadBinding(e, _mm_mul_ps(d, _mm_set1_ps(-tension / length)), residual);
+    _mm_store_ps(binding_force_.data() + 4 * std::size_t{i}, _mm_mul_ps(d, _mm_set1_ps(-tension / length)));
   }
-  hinges_.AddForce(place, residual, computed_.hinge_rows);
+  hinges_.MakeForce(place, computed_.hinge_rows);
+}
+
+void Elements::AddForces(float* residual) const {
+  for (const std::uint32_t i : computed_.bindings) {
+    SpreadBinding(bindings_[i], _mm_load_ps(binding_force_.data() + 4 * std::size_t{i}), residual);
+  }
+  hinges_.Add(residual, computed_.hinge_rows);
   guard_.AddForce(residual);
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     Spread(contacts_[i], contact_force_[i], residual);
   }
 }
 
-double Elements::Apply(const float* p, float* out, const Selection& selection) {
-  double sum = hinges_.Apply(p, out, selection.hinge_rows) + guard_.Apply(p, out);
+double Elements::Multiply(const float* p, const Selection& selection) {
+  double sum = hinges_.Multiply(p, selection.hinge_rows);
   for (const std::uint32_t i : selection.bindings) {
     const Element& e = bindings_[i];
     const __m128 d = CombineBinding(e, p), m = Xyz(e.m);
     const __m128 force = _mm_add_ps(_mm_mul_ps(_mm_set1_ps(e.kt), d), _mm_mul_ps(m, Dot3(m, d)));
     sum += static_cast<double>(_mm_cvtss_f32(Dot3(d, force)));
-    SpreadBinding(e, force, out);
+    _mm_store_ps(binding_force_.data() + 4 * std::size_t{i}, force);
   }
-  for (const Element& e : contacts_out_ ? std::span<const Element>() : std::span<const Element>(contacts_)) {
+  contact_product_.clear();
+  for (const Element& e : contacts_in_product()) {
     const Vec3f d = Combine(e, p), force = e.kt * d + e.m * e.m.dot(d);
     sum += static_cast<double>(d.dot(force));
-    Spread(e, force, out);
+    contact_product_.push_back(force);
+  }
+  return sum;
+}
+
+double Elements::AddProduct(const float* p, float* out, const Selection& selection) {
+  hinges_.Add(out, selection.hinge_rows);
+  const double sum = guard_.Apply(p, out);
+  for (const std::uint32_t i : selection.bindings) {
+    SpreadBinding(bindings_[i], _mm_load_ps(binding_force_.data() + 4 * std::size_t{i}), out);
+  }
+  const std::span<const Element> contacts = contacts_in_product();
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    Spread(contacts[i], contact_product_[i], out);
   }
   return sum;
 }

@@ -50,13 +50,18 @@ class Elements {
              std::span<const ContactRow> contacts);
   [[nodiscard]] std::span<const Element> touching() const { return contacts_; }
   [[nodiscard]] const InversionGuard& guard() const { return guard_; }
-  /// Linearises at `place` and adds the forces to `residual`, those of the touching contacts included.
-  void Linearise(const float* place, float* residual);
+  // What reads fields and what writes them are apart: the first runs beside kernels that write other fields.
+  /// Linearises at `place`, for AddForces.
+  void Linearise(const float* place);
+  /// residual += forces where it was linearised, those of the touching contacts included.
+  void AddForces(float* residual) const;
   /// While set, contacts take no part in Apply.
   void LeaveContactsOut(bool out) { contacts_out_ = out; }
-  /// out += K p; returns p . K p.
-  /// p is 0 wherever elements act that are not selected. All contacts are.
-  double Apply(const float* p, float* out, const Selection& selection);
+  /// K p, for AddProduct; returns p . K p. p is 0 wherever elements act that are not selected. All contacts are.
+  double Multiply(const float* p, const Selection& selection);
+  /// out += what Multiply has made. The guard, which seldom has anything to do, is multiplied here; returns its share
+  /// of p . K p.
+  double AddProduct(const float* p, float* out, const Selection& selection);
   [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts);
   /// Contacts stiffer than this are with a tool; softer ones are tissue on tissue, as the fat around [N/m].
   static constexpr float kStiffContact = 500.0f;
@@ -78,7 +83,12 @@ class Elements {
   std::vector<Element> bindings_, contacts_;
   std::vector<BindingRest> binding_rest_;
   Selection computed_;
-  std::vector<Vec3f> contact_force_;
+  [[nodiscard]] std::span<const Element> contacts_in_product() const {
+    return contacts_out_ ? std::span<const Element>() : std::span<const Element>(contacts_);
+  }
+
+  FloatArray binding_force_;  ///< xyz_ by binding: at the linearisation, or of the last product.
+  std::vector<Vec3f> contact_force_, contact_product_;
   bool contacts_out_ = false;
   HingeMatrix hinges_;
   InversionGuard guard_;

@@ -13,6 +13,19 @@ void AccurateSolver::ForTasks(const Part& part, const Body& body) {
                [&](int index, int worker) { body(part.tasks[static_cast<std::size_t>(index)], index, worker); });
 }
 
+template <class Body, class Errand>
+void AccurateSolver::ForTasks(const Body& body, const Errand& errand) {
+  const std::span<const Task> tasks = regions_.part().tasks;
+  const int count = static_cast<int>(tasks.size());
+  workers_.Run(count + 1, regions_.part().sheet_tasks, 1, [&](int index, int worker) {
+    if (index == count) {
+      errand();
+    } else {
+      body(tasks[static_cast<std::size_t>(index)], index, worker);
+    }
+  });
+}
+
 template <class Body>
 void AccurateSolver::ForParts(const Task& task, const Body& body) const {
   if (!task.sheet) {

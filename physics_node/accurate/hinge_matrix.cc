@@ -16,6 +16,7 @@ HingeMatrix::HingeMatrix(const ElasticModel& model, const ParticleStore& particl
   }
   rest_ = FloatArray(4 * number.size());
   vector_ = FloatArray(4 * number.size());
+  product_ = FloatArray(4 * number.size());
   for (auto& [v, n] : number) {
     n = static_cast<std::uint32_t>(particles_.size());
     for (int axis = 0; axis < 3; ++axis) {
@@ -108,7 +109,7 @@ void HingeMatrix::Take(const float* field, const float* minus) {
 }
 
 template <class Load, class Use>
-double HingeMatrix::Multiply(std::span<const std::uint32_t> rows, const Load& load, const Use& use) const {
+double HingeMatrix::ForRows(std::span<const std::uint32_t> rows, const Load& load, const Use& use) const {
   double dot = 0;
   alignas(16) float row[4], here[4];
   for (const std::uint32_t i : rows) {
@@ -117,33 +118,23 @@ double HingeMatrix::Multiply(std::span<const std::uint32_t> rows, const Load& lo
       sum = _mm_add_ps(sum, _mm_mul_ps(_mm_set1_ps(value_[k]), load(column_[k])));
     }
     _mm_store_ps(row, sum);
-    use(i, row);
+    use(i, sum);
     _mm_store_ps(here, load(i));
     dot += static_cast<double>(here[0] * row[0] + here[1] * row[1] + here[2] * row[2]);
   }
   return dot;
 }
 
-void HingeMatrix::AddForce(const float* place, float* force, std::span<const std::uint32_t> rows) {
+void HingeMatrix::MakeForce(const float* place, std::span<const std::uint32_t> rows) {
   Take(place, rest_.data());
   const auto load = [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + 4 * std::size_t{k}); };
-  (void)Multiply(rows, load, [&](std::uint32_t i, const float* row) {
-    const std::size_t step = particles_[i].step;
-    float* at = force + particles_[i].base;
-    at[0] -= row[0];
-    at[step] -= row[1];
-    at[2 * step] -= row[2];
+  (void)ForRows(rows, load, [&](std::uint32_t i, __m128 row) {
+    _mm_store_ps(product_.data() + 4 * std::size_t{i}, _mm_sub_ps(_mm_setzero_ps(), row));
   });
 }
 
-double HingeMatrix::Apply(const float* p, float* out, std::span<const std::uint32_t> rows) {
-  const auto add = [&](std::uint32_t i, const float* row) {
-    const std::size_t step = particles_[i].step;
-    float* at = out + particles_[i].base;
-    at[0] += row[0];
-    at[step] += row[1];
-    at[2 * step] += row[2];
-  };
+double HingeMatrix::Multiply(const float* p, std::span<const std::uint32_t> rows) {
+  const auto keep = [&](std::uint32_t i, __m128 row) { _mm_store_ps(product_.data() + 4 * std::size_t{i}, row); };
   // A few rows are quicker without a copy of all particles.
   if (4 * rows.size() < particles_.size()) {
     const auto load = [&](std::uint32_t k) {
@@ -151,17 +142,28 @@ double HingeMatrix::Apply(const float* p, float* out, std::span<const std::uint3
       const std::size_t step = particles_[k].step;
       return _mm_set_ps(0, from[2 * step], from[step], from[0]);
     };
-    return Multiply(rows, load, add);
+    return ForRows(rows, load, keep);
   }
   Take(p, nullptr);
-  return Multiply(
-      rows, [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + 4 * std::size_t{k}); }, add);
+  return ForRows(
+      rows, [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + 4 * std::size_t{k}); }, keep);
+}
+
+void HingeMatrix::Add(float* field, std::span<const std::uint32_t> rows) const {
+  for (const std::uint32_t i : rows) {
+    const float* row = product_.data() + 4 * std::size_t{i};
+    const std::size_t step = particles_[i].step;
+    float* at = field + particles_[i].base;
+    at[0] += row[0];
+    at[step] += row[1];
+    at[2 * step] += row[2];
+  }
 }
 
 double HingeMatrix::Energy(const float* place, std::span<const std::uint32_t> rows) {
   Take(place, rest_.data());
   const auto load = [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + 4 * std::size_t{k}); };
-  return 0.5 * Multiply(rows, load, [](std::uint32_t, const float*) {});
+  return 0.5 * ForRows(rows, load, [](std::uint32_t, __m128) {});
 }
 
 }  // namespace fulcrum::physics::accurate

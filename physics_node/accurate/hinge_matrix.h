@@ -22,10 +22,13 @@ class HingeMatrix {
 
   /// Of each particle's diagonal: pool offset of x and what all hinges, severed or not, add to it [N/m].
   [[nodiscard]] std::vector<std::pair<std::uint32_t, float>> Diagonal() const;
-  /// force -= K (place - rest), in these rows.
-  void AddForce(const float* place, float* force, std::span<const std::uint32_t> rows);
-  /// out += K p, in these rows; returns their share of p . K p.
-  double Apply(const float* p, float* out, std::span<const std::uint32_t> rows);
+  // A product is made in two halves, of which the first may run while others write fields: for Add.
+  /// -K (place - rest), in these rows.
+  void MakeForce(const float* place, std::span<const std::uint32_t> rows);
+  /// K p, in these rows; returns their share of p . K p.
+  double Multiply(const float* p, std::span<const std::uint32_t> rows);
+  /// Adds what was made last to a field, in the same rows.
+  void Add(float* field, std::span<const std::uint32_t> rows) const;
   /// Of these rows at `place` [J].
   [[nodiscard]] double Energy(const float* place, std::span<const std::uint32_t> rows);
 
@@ -41,13 +44,13 @@ class HingeMatrix {
   void Take(const float* field, const float* minus);
   /// use(i, xyz_ of row i of K x) for these rows; returns their share of x . K x. load(k): xyz_ of particle k in x.
   template <class Load, class Use>
-  double Multiply(std::span<const std::uint32_t> rows, const Load& load, const Use& use) const;
+  double ForRows(std::span<const std::uint32_t> rows, const Load& load, const Use& use) const;
 
   std::vector<Hinge> hinges_;
   std::vector<ParticleRef> particles_;
   std::vector<std::uint32_t> start_, column_;
   std::vector<float> value_;
-  FloatArray rest_, vector_;  ///< xyz_ per particle.
+  FloatArray rest_, vector_, product_;  ///< xyz_ per particle.
 };
 
 }  // namespace fulcrum::physics::accurate

@@ -95,12 +95,15 @@ double AccurateSolver::EnergyAt(const FloatArray& place, const Inertia& inertia,
   const Organ organ = MakeOrgan();
   const SheetLinearise at = At(place, nullptr);
   const OrganLinearisation organ_at = OrganAt(place);
-  ForTasks([&](const Task& task, int index, int) {
-    partial_[static_cast<std::size_t>(index)] =
-        task.sheet ? kernels_.sheet_energy(sheet, inertia, at, task.first, task.end)
-                   : kernels_.organ_energy(organ, inertia, organ_at, Vertex(task.first), Vertex(task.end));
-  });
-  return SumOfPartials(regions_.part().tasks.size()) + elements_.Energy(place.data(), contacts);
+  double of_elements = 0;
+  ForTasks(
+      [&](const Task& task, int index, int) {
+        partial_[static_cast<std::size_t>(index)] =
+            task.sheet ? kernels_.sheet_energy(sheet, inertia, at, task.first, task.end)
+                       : kernels_.organ_energy(organ, inertia, organ_at, Vertex(task.first), Vertex(task.end));
+      },
+      [&] { of_elements = elements_.Energy(place.data(), contacts); });
+  return SumOfPartials(regions_.part().tasks.size()) + of_elements;
 }
 
 /// Contacts and folds stiffen the diagonal of what they touch.
@@ -170,7 +173,12 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   // Stresses reach the vertices around, edges the row below: two phases.
   const std::span<const Task> tasks = regions_.part().tasks, patches = regions_.part().patches;
   const auto sheet_tasks = static_cast<std::size_t>(regions_.part().sheet_tasks);
-  workers_.Run(static_cast<int>(sheet_tasks + patches.size()), regions_.part().sheet_tasks, [&](int index, int worker) {
+  const int kernels = static_cast<int>(sheet_tasks + patches.size());
+  workers_.Run(kernels + 1, regions_.part().sheet_tasks, 1, [&](int index, int worker) {
+    if (index == kernels) {
+      elements_.Linearise(place_.data());
+      return;
+    }
     const auto i = static_cast<std::size_t>(index);
     const Task& task = i < sheet_tasks ? tasks[i] : patches[i - sheet_tasks];
     if (task.sheet) {
@@ -184,7 +192,7 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   const bool all_blocks = inertia.inertia != blocks_inertia_, half_of_blocks = organ_blocks_due_;
   blocks_inertia_ = inertia.inertia;
   organ_blocks_due_ = false;
-  ForTasks([&](const Task& task, int, int) {
+  const auto second = [&](const Task& task, int, int) {
     if (task.sheet) {
       const auto [first, end] = coarse_.MiddleRows(task.first, task.end);
       kernels_.middle_blocks(sheet, middle, matrix, inertia.inertia, first, end);
@@ -201,6 +209,12 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
       }
       stiffened = static_cast<std::uint8_t>(stiffened >> 1);
     }
+  };
+  ForTasks(second, [&] {
+    if (refresh_due_ && regions_.everything()) {
+      coarse_.Refresh(sheet, matrix, inertia.inertia, kRefreshRows);
+      refresh_due_ = false;
+    }
   });
   coarse_.LeaveOrganAlone(elements_.guard().folded());
   coarse_.ForgetContacts();
@@ -211,7 +225,7 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   }
   coarse_.FadeAtContacts();
   FollowContacts();
-  elements_.Linearise(place_.data(), residual_.data());
+  elements_.AddForces(residual_.data());
 }
 
 /// Positions and velocities from place + d. What is not finite stays where it was, at rest.
@@ -272,10 +286,6 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
     }
   }
   Linearise(inertia, contacts);
-  if (refresh_due_ && regions_.everything()) {
-    coarse_.Refresh(MakeSheet(), MakeMatrix(), inertia.inertia, kRefreshRows);
-    refresh_due_ = false;
-  }
   Solve(inertia.inertia, iterations);
   if (stiff_contacts_) {
     SolveAtContacts(inertia.inertia);

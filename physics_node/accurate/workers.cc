@@ -13,7 +13,7 @@ constexpr int kSpins = 1500;
 
 }  // namespace
 
-Workers::Workers(int threads) : tickets_(static_cast<std::size_t>(std::max(threads, 1))) {
+Workers::Workers(int threads) : tickets_(static_cast<std::size_t>(std::max(threads, 1)) + 1) {
   for (int worker = 1; worker < threads; ++worker) {
     threads_.emplace_back([this, worker] { Loop(worker); });
   }
@@ -29,9 +29,13 @@ Workers::~Workers() {
 }
 
 void Workers::Help(int worker) {
+  if (worker != 0) {
+    HelpPart(count(), worker);
+  }
   for (int i = 0; i < count(); ++i) {
     HelpPart((worker + i) % count(), worker);
   }
+  HelpPart(count(), worker);
 }
 
 void Workers::HelpPart(int part, int worker) {
@@ -46,25 +50,30 @@ void Workers::HelpPart(int part, int worker) {
       continue;
     }
     // The phase cannot end before this task has, so all of this is its own.
-    const int tasks = tasks_.load(std::memory_order_relaxed), split = split_.load(std::memory_order_relaxed);
-    const int first = First(split, part), of_first = First(split, part + 1) - first;
-    const int task = next < of_first ? first + next : split + First(tasks - split, part) + next - of_first;
+    const int shared = shared_.load(std::memory_order_relaxed), split = split_.load(std::memory_order_relaxed);
+    int task = shared + next;
+    if (part < count()) {
+      const int first = First(split, part), of_first = First(split, part + 1) - first;
+      task = next < of_first ? first + next : split + First(shared - split, part) + next - of_first;
+    }
     call_.load(std::memory_order_relaxed)(body_.load(std::memory_order_relaxed), task, worker);
     done_.fetch_add(1, std::memory_order_release);
     ticket = word.load(std::memory_order_acquire);
   }
 }
 
-void Workers::RunShared(int tasks, int split, Call call, const void* body) {
+void Workers::RunShared(int tasks, int split, int errands, Call call, const void* body) {
+  const int shared = tasks - errands;
   call_.store(call, std::memory_order_relaxed);
   body_.store(body, std::memory_order_relaxed);
-  tasks_.store(tasks, std::memory_order_relaxed);
+  shared_.store(shared, std::memory_order_relaxed);
   split_.store(split, std::memory_order_relaxed);
   done_.store(0, std::memory_order_relaxed);
   const std::uint32_t phase = phase_.load(std::memory_order_relaxed) + 1;
-  for (int part = 0; part < count(); ++part) {
-    const int own =
-        First(split, part + 1) - First(split, part) + First(tasks - split, part + 1) - First(tasks - split, part);
+  for (int part = 0; part <= count(); ++part) {
+    const int own = part == count() ? errands
+                                    : First(split, part + 1) - First(split, part) + First(shared - split, part + 1) -
+                                          First(shared - split, part);
     tickets_[static_cast<std::size_t>(part)].word.store(
         std::uint64_t{phase} << 32 | static_cast<std::uint64_t>(own) << 16, std::memory_order_release);
   }

@@ -19,13 +19,14 @@ class Workers {
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
 
-  [[nodiscard]] int count() const { return static_cast<int>(tickets_.size()); }
+  [[nodiscard]] int count() const { return static_cast<int>(tickets_.size()) - 1; }
 
   /// body(task, worker) once for each task in [0, tasks), worker in [0, count()); returns when all are done. The first
-  /// `split` tasks are of one kind, the others of another: each worker's part has its share of both. At most 65,535
-  /// tasks. Not from within a body.
+  /// `split` tasks are of one kind, the others of another: each worker's part has its share of both. The last
+  /// `errands` of them are nobody's part: the thread that calls, which has the serial stretches to itself, takes them
+  /// last, the others first. At most 65,535 tasks. Not from within a body.
   template <class Body>
-  void Run(int tasks, int split, const Body& body) {
+  void Run(int tasks, int split, int errands, const Body& body) {
     if (threads_.empty() || tasks < 2) {
       for (int task = 0; task < tasks; ++task) {
         body(task, 0);
@@ -33,7 +34,12 @@ class Workers {
       return;
     }
     RunShared(
-        tasks, split, [](const void* b, int task, int worker) { (*static_cast<const Body*>(b))(task, worker); }, &body);
+        tasks, split, errands,
+        [](const void* b, int task, int worker) { (*static_cast<const Body*>(b))(task, worker); }, &body);
+  }
+  template <class Body>
+  void Run(int tasks, int split, const Body& body) {
+    Run(tasks, split, 0, body);
   }
 
  private:
@@ -41,7 +47,7 @@ class Workers {
 
   /// First of `tasks` in a worker's part.
   [[nodiscard]] int First(int tasks, int worker) const { return tasks * worker / count(); }
-  void RunShared(int tasks, int split, Call call, const void* body);
+  void RunShared(int tasks, int split, int errands, Call call, const void* body);
   /// Does tasks of the phase until none is left.
   void Help(int worker);
   /// Does tasks of one part.
@@ -53,8 +59,8 @@ class Workers {
   struct alignas(64) Ticket {
     std::atomic<std::uint64_t> word{0};
   };
-  std::vector<Ticket> tickets_;  ///< By worker.
-  std::atomic<int> tasks_{0}, split_{0};
+  std::vector<Ticket> tickets_;  ///< By worker; the last one: errands.
+  std::atomic<int> shared_{0}, split_{0};  ///< Tasks that are no errands; the first kind of them.
   std::atomic<Call> call_{nullptr};
   std::atomic<const void*> body_{nullptr};
   alignas(64) std::atomic<int> done_{0};
