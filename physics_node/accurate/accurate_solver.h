@@ -79,6 +79,8 @@ class AccurateSolver {
   /// False: all is asleep, or no sound answer. The state stays as it is.
   bool Stiffness(const Question& question, float* newton_per_m);
 
+  /// Its threads, between substeps.
+  [[nodiscard]] Workers& workers() { return workers_; }
   /// What is computed at present, and what is awake.
   [[nodiscard]] const Regions& regions() const { return regions_; }
 

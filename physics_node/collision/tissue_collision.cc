@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "physics_node/collision/closest.h"
 #include "services/core/breathing.h"
@@ -236,6 +237,7 @@ template <class Stand, class Look>
 void TissueCollision::LookAtDue(Watches* watches, std::span<const float> moved, float others_travel, float others_moved,
                                 const Stand& stand, const Look& look) {
   watches->near.clear();
+  watches->looked_at = 0;
   for (Group& group : watches->groups) {
     const float travel = travel_[group.block] + others_travel, step = moved[group.block] + others_moved;
     if (travel >= group.times.due) {
@@ -248,7 +250,7 @@ void TissueCollision::LookAtDue(Watches* watches, std::span<const float> moved, 
           float others = watch.near ? 0.0f : kElsewhere * (others_travel - watch.others);
           const float left = watch.near ? kKeep - watch.gone : watch.gap - watch.gone - others - Band(watch.way);
           if (!(left > 0.0f)) {
-            ++looked_at_;
+            ++watches->looked_at;
             watch.gap = look(&watch);
             watch.near = watch.blocks && watch.gap < Band(watch.way) + kKeep;
             watch.others = others_travel;
@@ -303,29 +305,37 @@ void TissueCollision::LookAtFixed(Fixed* fixed, std::span<const float> moved) {
       });
 }
 
-void TissueCollision::FindPairs(std::span<const float> moved, double time0_s, double time1_s) {
-  looked_at_ = 0;
+void TissueCollision::BeginPairs(std::span<const float> moved, double time0_s, double time1_s) {
   ++step_;
   const Index organ_blocks = particles_->tube_blocks();
-  float organ_moved = 0;
+  organ_moved_ = 0;
   for (Index b = 0; b < travel_.size(); ++b) {
     travel_[b] += moved[b];
-    organ_moved = b < organ_blocks ? std::max(organ_moved, moved[b]) : organ_moved;
+    organ_moved_ = b < organ_blocks ? std::max(organ_moved_, moved[b]) : organ_moved_;
   }
-  organ_travel_ += organ_moved;
+  organ_travel_ += organ_moved_;
   breath0_ = BreathingOffset(scene_.breathing, time0_s);
   breath1_ = BreathingOffset(scene_.breathing, time1_s);
   breath_travel_ += (breath1_ - breath0_).norm();
+}
+
+void TissueCollision::FindPairsOf(int surface, std::span<const float> moved) {
+  if (surface > 0) {
+    LookAtFixed(&fixed_[static_cast<std::size_t>(surface) - 1], moved);
+    return;
+  }
   LookAtDue(
-      &organ_, moved, organ_travel_, organ_moved, [&](const Watch& watch) { return Standpoint(watch); },
+      &organ_, moved, organ_travel_, organ_moved_, [&](const Watch& watch) { return Standpoint(watch); },
       [&](Watch* watch) {
         const Vec3f p = particles_->At(watch->at);
         Walk(watch, p);
         return SignedDistance(p, OrganCorners(watch->triangle)).distance - watch->clearance;
       });
-  for (Fixed& fixed : fixed_) {
-    LookAtFixed(&fixed, moved);
-  }
+}
+
+std::size_t TissueCollision::looked_at() const {
+  return std::accumulate(fixed_.begin(), fixed_.end(), organ_.looked_at,
+                         [](std::size_t sum, const Fixed& fixed) { return sum + fixed.watches.looked_at; });
 }
 
 /// Dead and loose membrane touches nothing.

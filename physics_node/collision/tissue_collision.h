@@ -31,7 +31,14 @@ class TissueCollision {
   /// Once a step, before it. `moved`: at least how far any particle of each block of the ParticleStore has moved since
   /// the last call [m], [block_count()]; 0 for blocks at rest. Simulated time at the begin and the end of the step [s]:
   /// what breathes moves from one to the other.
-  void FindPairs(std::span<const float> moved, double time0_s, double time1_s);
+  void FindPairs(std::span<const float> moved, double time0_s, double time1_s) {
+    BeginPairs(moved, time0_s, time1_s);
+    for (int surface = 0; surface < surfaces(); ++surface) FindPairsOf(surface, moved);
+  }
+  // The same in pieces: after BeginPairs each surface by any thread.
+  void BeginPairs(std::span<const float> moved, double time0_s, double time1_s);
+  [[nodiscard]] int surfaces() const { return 1 + static_cast<int>(fixed_.size()); }
+  void FindPairsOf(int surface, std::span<const float> moved);
   /// Appends the contacts of the substep from part u0 to u1 of the step; at most kMaxRows.
   void Rows(float u0, float u1, std::vector<ContactRow>* rows) const;
 
@@ -40,7 +47,7 @@ class TissueCollision {
   /// Particles near something in this step.
   [[nodiscard]] std::size_t near_count() const;
   /// Particles looked at by the last FindPairs.
-  [[nodiscard]] std::size_t looked_at() const { return looked_at_; }
+  [[nodiscard]] std::size_t looked_at() const;
 
  private:
   /// What a particle must stay in front of.
@@ -89,7 +96,8 @@ class TissueCollision {
     std::vector<Watch> all;
     std::vector<Times> times;  ///< Of each, apart from the rest: most steps read nothing else.
     std::vector<Group> groups;
-    std::vector<Near> near;  ///< In this step.
+    std::vector<Near> near;     ///< In this step.
+    std::size_t looked_at = 0;  ///< In this step.
     void MakeGroups(const ParticleStore& particles);
   };
 
@@ -133,9 +141,8 @@ class TissueCollision {
   std::vector<Fixed> fixed_;
 
   std::vector<float> travel_;  ///< Of each block since the beginning [m].
-  float organ_travel_ = 0, breath_travel_ = 0;
+  float organ_travel_ = 0, organ_moved_ = 0, breath_travel_ = 0;
   Vec3f breath0_ = Vec3f::Zero(), breath1_ = Vec3f::Zero();
-  std::size_t looked_at_ = 0;
   std::uint32_t step_ = 1;  ///< Calls of FindPairs.
 };
 

@@ -157,6 +157,17 @@ Contact ContactProbe::MakeContact(std::uint32_t tool) {
   return contact;
 }
 
+void ContactProbe::Forget(std::uint32_t tool, const ToolPose& pose) {
+  ToolMemory& memory = tools_[tool];
+  memory.tip = pose.p_WT;
+  if (memory.kind != ContactKind::kNone) {
+    const std::uint32_t id = memory.id;
+    Enter(&memory, ContactKind::kNone);
+    memory.id = id;
+  }
+  compliance_.Forget(tool);
+}
+
 DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision,
                                     const Grasp& grasp, const Vec3f* solver_force) {
   ToolMemory& memory = tools_[tool];

@@ -34,6 +34,8 @@ class ContactProbe {
   /// tissue on the tool [N], from a solver that knows; null: estimated from the edges.
   DeviceContacts Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision, const Grasp& grasp,
                         const Vec3f* solver_force);
+  /// Before an Update that does not follow the last one: what it measured then is of another time.
+  void Forget(std::uint32_t tool, const ToolPose& pose);
   /// Stiffness and viscosity come from `solver` from now on; nullptr: estimated from force and dent again.
   void AskSolver(ComplianceSolver* solver) { solver_ = solver; }
   [[nodiscard]] const Compliance& compliance(std::uint32_t tool) const { return compliance_.compliance(tool); }

@@ -168,12 +168,19 @@ void PhysicsNode::Step(const Tick& tick) {
 }
 
 void PhysicsNode::PublishContacts(const Tick& tick) {
-  // The servo dates the model by the tool sample: without one there is nothing to say. Slip, too, needs the forces.
+  // Unless the solver tells the forces, slip needs them, too.
+  if (scene_.physics.mode == PhysicsMode::kAccurate && !ports_.contacts.has_readers()) {
+    for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+      force_N_[i].store(simulation_.solver_force(i).norm(), std::memory_order_relaxed);
+    }
+    return;
+  }
   ContactModel model;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     model.devices[i] = simulation_.Contacts(i);
     force_N_[i].store(simulation_.force(i).norm(), std::memory_order_relaxed);
   }
+  // The servo dates the model by the tool sample: without one there is nothing to say.
   if (tool_state_.stamp.sequence == 0 || !ports_.contacts.has_readers()) {
     return;
   }

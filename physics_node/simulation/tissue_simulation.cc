@@ -189,8 +189,22 @@ void TissueSimulation::PlaceHeld(float u) {
 
 /// Pairs of tools and tissue and of tissue with itself, for substeps of h.
 void TissueSimulation::FindAllContacts(float h) {
-  FindContacts(true, largest_speed_ * h);
-  FindTissueContacts();
+  if (!accurate_) {
+    FindContacts(true, largest_speed_ * h);
+    FindTissueContacts();
+    return;
+  }
+  const double now = simulated_time_s();
+  tissue_collision_.BeginPairs(moved_, now - static_cast<double>(scene_.physics.dt_s), now);
+  // Those of the tools and of each surface know nothing of one another. The longest, the organ's, first.
+  const int surfaces = tissue_collision_.surfaces();
+  accurate_->workers().Run(surfaces + 1, 0, surfaces + 1, [&](int task, int) {
+    if (task < surfaces) {
+      tissue_collision_.FindPairsOf(task, moved_);
+    } else {
+      FindContacts(true, largest_speed_ * h);
+    }
+  });
 }
 
 StepReport TissueSimulation::StepXpbd() {
@@ -339,6 +353,9 @@ DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
   if (!tracks_[tool].present) {
     return {};
   }
+  if (std::exchange(contacts_step_[tool], steps_) + 1 != steps_) {
+    contacts_.Forget(tool, tracks_[tool].now);
+  }
   return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool], accurate_ ? &tool_force_[tool] : nullptr);
 }
 
@@ -364,7 +381,7 @@ float TissueSimulation::awake_part() const {
 
 std::uint64_t TissueSimulation::StateHash() const {
   Hash64 hash;
-  hash.Add(particles_.raw());
+  hash.AddLong(particles_.raw());
   hash.AddValue(model_.revision());
   return hash.value();
 }

@@ -59,7 +59,7 @@ class TissueSimulation {
   /// Goes on with the preset that many below the scene's (mode accurate; at most down to fast); returns how many it is.
   std::uint32_t SetCheaper(std::uint32_t presets);
 
-  /// After a Step: what a tool feels, and where a hook touches.
+  /// After a Step: what a tool feels, and where a hook touches. What is asked of each step is smooth over the steps.
   [[nodiscard]] DeviceContacts Contacts(std::uint32_t tool);
   [[nodiscard]] CauteryContact Cautery(std::uint32_t tool);
 
@@ -70,7 +70,10 @@ class TissueSimulation {
   /// Contacts of the last substep, forces in them; none in mode paper.
   [[nodiscard]] std::span<const ContactRow> rows() const { return rows_; }
   [[nodiscard]] const Grasp& grasp(std::uint32_t tool) const { return grasps_[tool]; }
+  /// Of the tissue on a tool, as Contacts has told it [N].
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return contacts_.force(tool); }
+  /// In mode accurate, of the last step alone [N].
+  [[nodiscard]] Vec3f solver_force(std::uint32_t tool) const { return tool_force_[tool]; }
   [[nodiscard]] bool asleep() const { return asleep_; }
   /// Part of the tissue that is awake.
   [[nodiscard]] float awake_part() const;
@@ -149,6 +152,7 @@ class TissueSimulation {
   bool asleep_ = false;
   int still_steps_ = 0;
   std::uint64_t steps_ = 0;
+  std::array<std::uint64_t, kMaxTools> contacts_step_{};  ///< In which a tool's contacts were last asked for.
   std::uint64_t quarantined_ = 0, state_version_ = 1;
 };
 

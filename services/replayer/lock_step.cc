@@ -151,7 +151,7 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
   std::vector<std::unique_ptr<NodeRunner>> runners;
   for (const NodeId node : settings.nodes) {
     runners.push_back(std::make_unique<NodeRunner>(
-        node, NodeMaking{scene, cart, settings.folder, settings.physics_threads}, settings.go_on));
+        node, NodeMaking{scene, cart, settings.folder, settings.physics_threads, settings.figures}, settings.go_on));
   }
 
   LockStepResult result;

@@ -24,6 +24,7 @@ struct LockStepSettings {
   int physics_threads = 1;       ///< That share a step of physics; the states do not depend on it.
   double until_s = -1;           ///< Session time at which it ends; negative: the end of the recording.
   bool go_on = false;            ///< Past a state that differs.
+  bool figures = false;          ///< Of Health are all asked for, those of the force on tools among them.
 };
 
 /// The first tick after which a node's state is not what it was.

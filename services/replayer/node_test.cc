@@ -92,6 +92,7 @@ NodeTestResult TestNode(const LockStepSettings& settings, const Demands& demands
                         const config::CartConfig& cart, const std::function<void(double)>& progress) {
   LockStepSettings to_the_end = settings;
   to_the_end.go_on = true;
+  to_the_end.figures = true;
   const LockStepResult replay = ReplayInLockStep(to_the_end, scene, cart, progress);
   const NodeResult& node = replay.nodes.at(0);
   NodeTestResult result;

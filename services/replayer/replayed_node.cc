@@ -41,12 +41,15 @@ struct Outlet {
   T sample;
   /// Those of the last tick, oldest first.
   void TakeInto(std::vector<Published>* published) {
-    while (in->TakeNext(&sample)) {
+    if (!in) published->push_back({bus::kTopicOf<T>, {}});
+    while (in && in->TakeNext(&sample)) {
       Published message{bus::kTopicOf<T>, {}};
       if (bus::EncodeCdr(sample, &message.bytes)) published->push_back(std::move(message));
     }
   }
-  void Drop() { (void)in->TakeLatest(&sample); }
+  void Drop() {
+    if (in) (void)in->TakeLatest(&sample);
+  }
 };
 
 std::filesystem::path CheckpointPath(const NodeMaking& making, NodeId node) {
@@ -60,7 +63,12 @@ class ReplayedPhysics final : public ReplayedNode {
         scene_(making.scene),
         threads_(making.threads),
         checkpoint_(CheckpointPath(making, id()), scene_.hash, physics::kCheckpointLayout,
-                    physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size()))) {}
+                    physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size()))) {
+    if (!making.contacts_read) {
+      contacts_.in.reset();
+      cautery_.in.reset();
+    }
+  }
 
   std::vector<Published> TakeOutputs() override {
     std::vector<Published> published;

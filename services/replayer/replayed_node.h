@@ -16,7 +16,7 @@ namespace fulcrum::replay {
 /// A message as it would have travelled.
 struct Published {
   TopicId topic;
-  std::vector<std::uint8_t> bytes;  ///< CDR with its encapsulation.
+  std::vector<std::uint8_t> bytes;  ///< CDR with its encapsulation; empty: nobody reads the topic, so it was not made.
 };
 
 class ReplayedNode {
@@ -62,6 +62,9 @@ struct NodeMaking {
   const config::CartConfig& cart;
   std::filesystem::path folder;  ///< For its checkpoint.
   int threads = 1;               ///< That share a step of physics; its state does not depend on it.
+  /// Somebody reads ContactModel and CauteryContact; otherwise physics, as live, does not make them. No state depends
+  /// on it.
+  bool contacts_read = true;
 };
 
 /// For physics, thermal and haptics. Throws InputError when the node cannot be replayed.
