@@ -276,12 +276,13 @@ inline double OrganEnergy(const Organ& organ, const Inertia& inertia, const Orga
     sum += static_cast<double>(density * organ.volume[n]);
     const std::size_t i = 4 * static_cast<std::size_t>(n);
     const F4 here = F4::Load(at.place + i);
-    float edges = 0;
+    F4 edges = F4::All(0);
     for (std::uint32_t k = organ.patch_start[n]; k < organ.patch_start[n + 1]; ++k) {
       const F4 d = here - F4::Load(at.place + 4 * static_cast<std::size_t>(organ.patch[k]));
-      edges += organ.patch_gradient[4 * static_cast<std::size_t>(k) + 3] * DotProduct(d, d);
+      edges = edges + d * d * F4::All(organ.patch_gradient[4 * static_cast<std::size_t>(k) + 3]);
     }
-    sum += 0.25 * static_cast<double>(edges);  // Each edge is met from both ends.
+    // Each edge is met from both ends.
+    sum += 0.25 * static_cast<double>(DotProduct(edges, F4::All(1.0f)));
     if (at.start[i + 3] > 0.0f) {
       const F4 moved = here - F4::Load(at.start + i);
       const F4 momentum = moved * half - F4::Load(at.velocity + i) * inverse_h - gravity;
