@@ -59,7 +59,7 @@ class Workers {
   struct alignas(64) Ticket {
     std::atomic<std::uint64_t> word{0};
   };
-  std::vector<Ticket> tickets_;  ///< By worker; the last one: errands.
+  std::vector<Ticket> tickets_;            ///< By worker; the last one: errands.
   std::atomic<int> shared_{0}, split_{0};  ///< Tasks that are no errands; the first kind of them.
   std::atomic<Call> call_{nullptr};
   std::atomic<const void*> body_{nullptr};

@@ -64,7 +64,7 @@ class ReplayedPhysics final : public ReplayedNode {
         threads_(making.threads),
         checkpoint_(CheckpointPath(making, id()), scene_.hash, physics::kCheckpointLayout,
                     physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size()))) {
-    if (!making.contacts_read) {
+    if (!making.outputs_read) {
       contacts_.in.reset();
       cautery_.in.reset();
     }
@@ -133,7 +133,9 @@ class ReplayedThermal final : public ReplayedNode {
       : ReplayedNode(NodeId::kThermal),
         scene_(making.scene),
         checkpoint_(CheckpointPath(making, id()), scene_.hash, thermal::kCheckpointLayout,
-                    thermal::ThermalSolver::CheckpointCapacity(scene_)) {}
+                    thermal::ThermalSolver::CheckpointCapacity(scene_)) {
+    if (!making.outputs_read) patches_.in.reset();
+  }
 
   std::vector<Published> TakeOutputs() override {
     std::vector<Published> published;

@@ -62,9 +62,9 @@ struct NodeMaking {
   const config::CartConfig& cart;
   std::filesystem::path folder;  ///< For its checkpoint.
   int threads = 1;               ///< That share a step of physics; its state does not depend on it.
-  /// Somebody reads ContactModel and CauteryContact; otherwise physics, as live, does not make them. No state depends
-  /// on it.
-  bool contacts_read = true;
+  /// Somebody reads ContactModel, CauteryContact and TemperaturePatch; otherwise their nodes, as live, do not make
+  /// them. No state depends on it.
+  bool outputs_read = true;
 };
 
 /// For physics, thermal and haptics. Throws InputError when the node cannot be replayed.
