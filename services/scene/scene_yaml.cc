@@ -14,7 +14,10 @@ using config::Range;
 using config::StrictMap;
 using config::StrictYaml;
 
-using Folders = std::vector<std::filesystem::path>;
+/// Where mesh files are looked for, in this order.
+struct Folders : std::vector<std::filesystem::path> {
+  bool files_needed = true;  ///< False: the first place will do, whether or not a file is there.
+};
 
 constexpr std::size_t kMaxKeys = 2000;
 constexpr std::size_t kMaxStructures = 64;
@@ -61,7 +64,7 @@ std::filesystem::path FindFile(const StrictMap& map, const std::string& key, con
   std::string tried;
   for (const auto& folder : folders) {
     std::filesystem::path candidate = (folder / name).lexically_normal();
-    if (std::filesystem::is_regular_file(candidate)) {
+    if (!folders.files_needed || std::filesystem::is_regular_file(candidate)) {
       return candidate;
     }
     tried += tried.empty() ? "" : ", ";
@@ -274,7 +277,8 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   if (organ.Has("import") == organ.Has("procedural")) {
     root.Fail("organ", "needs either `procedural` or `import`");
   }
-  Folders folders;  // Where mesh files are looked for, in this order.
+  Folders folders;
+  folders.files_needed = bases.files_needed;
   if (!data.empty()) {
     folders.push_back(data);
   }
@@ -307,10 +311,8 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   return {scene, yaml->Effective(), yaml->Rules()};
 }
 
-}  // namespace
-
-SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
-                               const std::vector<std::string>& changes) {
+SceneDescription ReadFile(const std::filesystem::path& file, const std::filesystem::path& data,
+                          const std::vector<std::string>& changes, bool files_needed) {
   std::string changed;
   if (!changes.empty()) {
     std::ifstream stream(file, std::ios::binary);
@@ -320,15 +322,29 @@ SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::fil
   // A scene of the same name as the one it stands on would be taken for that.
   StrictYaml yaml = StrictYaml::FromFileOnBases(file, {"name", "description"}, changed);
   Folders bases;
+  bases.files_needed = files_needed;
   for (const auto& from : yaml.files()) {
     if (std::find(bases.begin(), bases.end(), from.parent_path()) == bases.end()) bases.push_back(from.parent_path());
   }
   return Read(&yaml, bases, data);
 }
 
+}  // namespace
+
+SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
+                               const std::vector<std::string>& changes) {
+  return ReadFile(file, data, changes, true);
+}
+
+std::vector<config::KeyRule> SceneRules(const std::filesystem::path& file) {
+  return ReadFile(file, {}, {}, false).rules;
+}
+
 SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data) {
   StrictYaml yaml = StrictYaml::FromText(text, name);
-  return Read(&yaml, {std::filesystem::path()}, data);
+  Folders here;
+  here.emplace_back();
+  return Read(&yaml, here, data);
 }
 
 std::vector<SceneSummary> ListScenes(const std::filesystem::path& folder) {

@@ -25,6 +25,9 @@ SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::fil
 /// The same for a text; `name` stands for the file in messages, relative folders start from the working directory.
 SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data);
 
+/// Every key that the description asks for. Its mesh files need not be there.
+std::vector<config::KeyRule> SceneRules(const std::filesystem::path& file);
+
 struct SceneSummary {
   std::string name, description;
   std::filesystem::path file;

@@ -83,8 +83,7 @@ ExitCode Reference(const Words& words) {
   std::map<std::string, std::size_t> known;
   for (std::size_t i = 1; i < words.size(); ++i) {
     const std::vector<std::string> lines = LinesOf(words[i]);
-    const std::vector<KeyRule> rules =
-        words[0] == "cart" ? config::CartRules(words[i]) : scene::ReadSceneYaml(words[i], {}).rules;
+    const std::vector<KeyRule> rules = words[0] == "cart" ? config::CartRules(words[i]) : scene::SceneRules(words[i]);
     for (KeyRule rule : rules) {
       // Both tools have the same keys.
       for (const char* tool : {"tool0", "tool1"}) {

@@ -325,6 +325,14 @@ class SceneOnBase : public testing::Test {
       std::filesystem::path(testing::TempDir()) / ("scene_on_base_" + std::to_string(getpid()));
 };
 
+TEST_F(SceneOnBase, ItsKeysAreToldWhereMeshFilesAreMissing) {
+  const auto file = Write("openhelp.yaml", TextOf(kScenes / "openhelp.yaml"));
+  EXPECT_THROW((void)ReadSceneYaml(file, {}), InputError);
+  const auto rules = SceneRules(file);
+  EXPECT_TRUE(std::any_of(rules.begin(), rules.end(),
+                          [](const config::KeyRule& rule) { return rule.path == "organ.import.organ"; }));
+}
+
 TEST_F(SceneOnBase, SaysOnlyWhatIsDifferent) {
   Write("below/small.yaml", TextOf(kScenes / "small.yaml"));
   Write("middle.yaml", "name: middle\nbase: below/small.yaml\nphysics: {friction: 0.3}\nmembrane: {gap_mm: 5}\n");
