@@ -55,7 +55,7 @@ class Elements {
   void Linearise(const float* place);
   /// residual += forces where it was linearised, those of the touching contacts included.
   void AddForces(float* residual) const;
-  /// While set, contacts take no part in Apply.
+  /// While set, contacts take no part in Multiply.
   void LeaveContactsOut(bool out) { contacts_out_ = out; }
   /// K p, for AddProduct; returns p . K p. p is 0 wherever elements act that are not selected. All contacts are.
   double Multiply(const float* p, const Selection& selection);
@@ -80,13 +80,13 @@ class Elements {
     float length, stiffness;
     Index node;
   };
-  std::vector<Element> bindings_, contacts_;
-  std::vector<BindingRest> binding_rest_;
-  Selection computed_;
   [[nodiscard]] std::span<const Element> contacts_in_product() const {
     return contacts_out_ ? std::span<const Element>() : std::span<const Element>(contacts_);
   }
 
+  std::vector<Element> bindings_, contacts_;
+  std::vector<BindingRest> binding_rest_;
+  Selection computed_;
   FloatArray binding_force_;  ///< xyz_ by binding: at the linearisation, or of the last product.
   std::vector<Vec3f> contact_force_, contact_product_;
   bool contacts_out_ = false;
