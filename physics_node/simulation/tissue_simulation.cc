@@ -120,10 +120,7 @@ void TissueSimulation::FindContacts(bool tissue_moved, float tissue_step) {
 }
 
 /// Of tissue with itself and its surroundings, for the step that leads to the present time.
-void TissueSimulation::FindTissueContacts() {
-  const double now = simulated_time_s();
-  tissue_collision_.FindPairs(moved_, now - static_cast<double>(scene_.physics.dt_s), now);
-}
+void TissueSimulation::FindTissueContacts() { tissue_collision_.FindPairs(moved_, step_begin_s(), simulated_time_s()); }
 
 /// Asleep: what breathes has come near the tissue.
 bool TissueSimulation::BreathStirs() {
@@ -194,8 +191,7 @@ void TissueSimulation::FindAllContacts(float h) {
     FindTissueContacts();
     return;
   }
-  const double now = simulated_time_s();
-  tissue_collision_.BeginPairs(moved_, now - static_cast<double>(scene_.physics.dt_s), now);
+  tissue_collision_.BeginPairs(moved_, step_begin_s(), simulated_time_s());
   // Those of the tools and of each surface know nothing of one another. The longest, the organ's, first.
   const int surfaces = tissue_collision_.surfaces();
   accurate_->workers().Run(surfaces + 1, 0, surfaces + 1, [&](int task, int) {

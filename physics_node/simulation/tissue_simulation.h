@@ -125,6 +125,7 @@ class TissueSimulation {
   void PlaceHeld(float u);
   void FindAllContacts(float h);
   void UpdateGrasps();
+  [[nodiscard]] double step_begin_s() const { return simulated_time_s() - static_cast<double>(scene_.physics.dt_s); }
   void FindTissueContacts();
   void FindContacts(bool tissue_moved, float tissue_step = 0);
 
