@@ -349,7 +349,7 @@ DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
   if (!tracks_[tool].present) {
     return {};
   }
-  if (std::exchange(contacts_step_[tool], steps_) + 1 != steps_) {
+  if (std::exchange(contacts_step_[tool], steps_) + 1 < steps_) {
     contacts_.Forget(tool, tracks_[tool].now);
   }
   return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool], accurate_ ? &tool_force_[tool] : nullptr);
