@@ -95,6 +95,7 @@ class AccurateSolver {
   void PackSheet(const ElasticModel& model);
   void PackOrgan(const ElasticModel& model, std::uint32_t tube_count);
   [[nodiscard]] Regions MakeRegions(const ElasticModel& model) const;
+  void FindFrayed();
   void FollowEdge(const TissueModel& tissue, Index row, Index col, std::size_t direction);
 
   void Measure(const Task& task, std::vector<float>* moved) const;
@@ -109,6 +110,7 @@ class AccurateSolver {
   [[nodiscard]] double EnergyAt(const FloatArray& place, const Inertia& inertia, std::span<const ContactRow> contacts);
   void Linearise(const Inertia& inertia, std::span<const ContactRow> contacts);
   void RefreshContactStiffness();
+  void HoldFrayed();
   double Precondition();
   double Apply(const FloatArray& p, float inertia) { return Apply(p, inertia, regions_.part(), elements_.computed()); }
   double Apply(const FloatArray& p, float inertia, const Part& part, const Selection& elements);
@@ -148,6 +150,12 @@ class AccurateSolver {
   std::array<FloatArray, 3> inverse_rest_, axial_, axial_uncut_;
   std::vector<int> missing_edges_;   ///< By place in a plane: how many edges a node has lost to cuts.
   std::vector<ParticleRef> frayed_;  ///< Nodes that have lost half of them or more.
+  struct FrayedEdge {
+    std::size_t direction;
+    std::array<std::uint32_t, 2> at;  ///< Ends, by place in a plane.
+    float stiffness;                  ///< At least, in the solve, whatever way the ends part [N/m].
+  };
+  std::vector<FrayedEdge> frayed_edges_;  ///< What is left of theirs.
   FloatArray sheet_mass_;
   std::vector<std::uint32_t> start_, vertex_, patch_start_, patch_;
   FloatArray gradient_, patch_gradient_, volume_, organ_mass_;

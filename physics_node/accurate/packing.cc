@@ -6,6 +6,8 @@ namespace {
 
 /// A node is frayed when cuts have left it at most half of its six edges: the border of a clean cut keeps four.
 constexpr int kFrayed = 3;
+/// Of what is left of a frayed node's edges: stiffness across them, in the solve only, over that along them.
+constexpr float kFrayedStiffness = 0.05f;
 
 }  // namespace
 
@@ -116,6 +118,35 @@ void AccurateSolver::FollowEdge(const TissueModel& tissue, Index row, Index col,
   }
 }
 
+void AccurateSolver::FindFrayed() {
+  const GridLayout& layout = particles_->layout();
+  frayed_.clear();
+  frayed_edges_.clear();
+  const auto add = [&](std::size_t direction, std::uint32_t at, std::uint32_t other) {
+    const float along = axial_[direction][at] * inverse_rest_[direction][at];
+    if (along > 0.0f) {
+      frayed_edges_.push_back({direction, {at, other}, kFrayedStiffness * along});
+    }
+  };
+  for (std::uint32_t at = 0; at < missing_edges_.size(); ++at) {
+    if (missing_edges_[at] < kFrayed) {
+      continue;
+    }
+    frayed_.push_back({static_cast<std::uint32_t>(tube_floats_) + at, static_cast<std::uint32_t>(plane_)});
+    const Index row = layout.RowAt(at), col = layout.ColAt(at);
+    for (std::size_t d = 0; d < 3; ++d) {
+      const Index down = d != 0 ? 1 : 0, right = d != 1 ? 1 : 0;
+      if (row + down < layout.rows && col + right < layout.cols) {
+        add(d, at, layout.Offset(row + down, col + right));
+      }
+      // Of an edge between two frayed nodes the first one tells.
+      if (row >= down && col >= right && missing_edges_[layout.Offset(row - down, col - right)] < kFrayed) {
+        add(d, layout.Offset(row - down, col - right), at);
+      }
+    }
+  }
+}
+
 void AccurateSolver::Follow(const TissueModel& tissue) {
   const GridLayout& layout = particles_->layout();
   for (const Index edge : tissue.edited_edges()) {
@@ -125,12 +156,7 @@ void AccurateSolver::Follow(const TissueModel& tissue) {
     regions_.Wake(regions_.Of(particles_->NodeRef(row, col)));
     regions_.Wake(regions_.Of(particles_->NodeRef(std::min(row + 1, layout.rows - 1), col)));
   }
-  frayed_.clear();
-  for (std::uint32_t at = 0; at < missing_edges_.size(); ++at) {
-    if (missing_edges_[at] >= kFrayed) {
-      frayed_.push_back({static_cast<std::uint32_t>(tube_floats_) + at, static_cast<std::uint32_t>(plane_)});
-    }
-  }
+  FindFrayed();
   coarse_.ScaleBlocks(MakeSheet());
   elements_.Follow(tissue);
   elements_.FollowRegions(regions_);

@@ -131,8 +131,22 @@ void AccurateSolver::RefreshContactStiffness() {
       stiffen(contact.at[i], stiffness * contact.weight[i] * contact.weight[i], IsStiff(contact));
     }
   }
+  for (const FrayedEdge& edge : frayed_edges_) {
+    for (const std::uint32_t i : edge.at) {
+      extra_[i] += edge.stiffness;
+      extra_changed_.push_back(i);
+    }
+  }
   elements_.guard().ForDiagonal(
       [&](Index vertex, float stiffness) { stiffen(ParticleRef{4 * vertex}, stiffness, true); });
+}
+
+/// What hangs on little turns freely: nothing but its small mass then resists a correction across its edges.
+void AccurateSolver::HoldFrayed() {
+  for (const FrayedEdge& edge : frayed_edges_) {
+    float& kt = kt_[edge.direction][edge.at[0]];
+    kt = std::max(kt, edge.stiffness);
+  }
 }
 
 /// Notes which regions stiff contacts press.
@@ -188,6 +202,7 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
       kernels_.organ_linearise(organ, organ_matrix, place_.data(), Vertex(task.first), Vertex(task.end));
     }
   });
+  HoldFrayed();
   // What touches the organ changes its blocks there; left alone it does not turn enough in two steps to matter.
   const bool all_blocks = inertia.inertia != blocks_inertia_, half_of_blocks = organ_blocks_due_;
   blocks_inertia_ = inertia.inertia;

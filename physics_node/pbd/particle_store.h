@@ -56,6 +56,10 @@ struct GridLayout {
   [[nodiscard]] std::uint32_t Offset(std::uint32_t row, std::uint32_t col) const {
     return row * stride + (col % slots) * kLanes + col / slots;
   }
+  [[nodiscard]] std::uint32_t RowAt(std::uint32_t offset) const { return offset / stride; }
+  [[nodiscard]] std::uint32_t ColAt(std::uint32_t offset) const {
+    return offset % kLanes * slots + offset % stride / kLanes;
+  }
   [[nodiscard]] std::uint32_t plane() const { return rows * stride; }
 };
 
