@@ -98,6 +98,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
       }
     }
   }
+  elements_.Divide(regions_);
   elements_.Follow(tissue);
   FollowRegions();
   // The first coarse matrix: all of it, at rest.

@@ -112,6 +112,7 @@ class AccurateSolver {
   void RefreshContactStiffness();
   void HoldFrayed();
   double Precondition();
+  /// q <- A p less what bindings and hinges do to it: the next phase adds that. Returns p . A p.
   double Apply(const FloatArray& p, float inertia) { return Apply(p, inertia, regions_.part(), elements_.computed()); }
   double Apply(const FloatArray& p, float inertia, const Part& part, const Selection& elements);
   void Solve(float inertia, int iterations);
@@ -123,6 +124,8 @@ class AccurateSolver {
   void SearchAlongCorrection(const Inertia& inertia, std::span<const ContactRow> contacts);
   SubstepReport Finish(float h);
 
+  /// field += what bindings and hinges do to a task's particles.
+  void AddElements(const Task& task, FloatArray* field) const;
   /// body(task, index, worker) for all that is computed, shared by the threads.
   template <class Body>
   void ForTasks(const Body& body) {
@@ -198,6 +201,7 @@ class AccurateSolver {
   float blocks_inertia_ = 0;         ///< Inertia for which the organ's blocks of the diagonal were made; 0: make all.
   std::uint32_t steps_ = 0;
   bool organ_blocks_due_ = true, refresh_due_ = false, stiff_contacts_ = false;
+  bool forces_due_ = false;  ///< The residual lacks those of bindings and hinges.
 
   // Around the stiff contacts.
   Part pressed_, around_;

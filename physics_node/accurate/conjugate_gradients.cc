@@ -37,7 +37,6 @@ double AccurateSolver::Precondition() {
   return SumOfPartials(regions_.part().tasks.size());
 }
 
-/// q <- A p in `part`; returns p . q.
 double AccurateSolver::Apply(const FloatArray& direction, float inertia, const Part& part, const Selection& elements) {
   const Sheet sheet = MakeSheet();
   const SheetMatrix matrix = MakeMatrix();
@@ -64,7 +63,14 @@ double AccurateSolver::Apply(const FloatArray& direction, float inertia, const P
                    : kernels_.organ_apply(organ, organ_matrix, inertia, direction.data(), q_.data(), Vertex(task.first),
                                           Vertex(task.end));
   });
-  return SumOfPartials(part.tasks.size()) + of_elements + elements_.AddProduct(direction.data(), q_.data(), elements);
+  return SumOfPartials(part.tasks.size()) + of_elements + elements_.AddContactProduct(direction.data(), q_.data());
+}
+
+void AccurateSolver::AddElements(const Task& task, FloatArray* field) const {
+  const int size = task.sheet ? Regions::kRows : Regions::kVertices;
+  for (int first = task.first; first < task.end; first += size) {
+    elements_.AddInRegion(regions_.At(task.sheet, first), field->data());
+  }
 }
 
 /// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d.
@@ -78,7 +84,13 @@ void AccurateSolver::Solve(float inertia, int iterations) {
       kernels_.sheet_restrict(sheet, middle, r, row_sums_.data(), task.first, task.end);
     }
   };
-  ForTasks([&](const Task& task, int, int) { restrict_rows(task); });
+  ForTasks([&](const Task& task, int, int) {
+    if (forces_due_) {
+      AddElements(task, &residual_);
+    }
+    restrict_rows(task);
+  });
+  forces_due_ = false;
   double rz = Precondition();
   FloatArray* direction = &z_;
   for (int i = 0; i < iterations; ++i) {
@@ -88,6 +100,7 @@ void AccurateSolver::Solve(float inertia, int iterations) {
     const auto alpha = stop ? 0.0f : static_cast<float>(rz / curvature);
     const auto step = i == 0 ? kernels_.start : kernels_.advance;
     ForTasks([&](const Task& task, int, int) {
+      AddElements(task, &q_);
       ForParts(task, [&](std::size_t first, std::size_t count) {
         step(alpha, direction->data() + first, q_.data() + first, d_.data() + first, residual_.data() + first, count);
       });
@@ -131,6 +144,7 @@ void AccurateSolver::SolveAtContacts(float inertia) {
   });
   const double rz = SumOfPartials(pressed_.tasks.size());
   const double curvature = Apply(local_, inertia, around_, around_elements_);
+  elements_.Add(around_elements_, q_.data());
   if (!(rz > 0.0) || !(curvature > 0.0)) {
     return;
   }

@@ -60,17 +60,17 @@ __m128 CombineBinding(const Element& e, const float* field) {
   const __m128 at = _mm_mul_ps(_mm_set1_ps(e.weight[0]), _mm_set_ps(0, node[2 * step], node[step], node[0]));
   return _mm_add_ps(_mm_add_ps(at, vertex(1)), _mm_add_ps(vertex(2), vertex(3)));
 }
-void SpreadBinding(const Element& e, __m128 v, float* field) {
-  alignas(16) float at[4];
-  _mm_store_ps(at, _mm_mul_ps(_mm_set1_ps(e.weight[0]), v));
-  float* node = field + e.at[0].base;
-  const std::size_t step = e.at[0].step;
-  node[0] += at[0];
-  node[step] += at[1];
-  node[2 * step] += at[2];
-  for (std::size_t k = 1; k < 4; ++k) {
-    float* vertex = field + e.at[k].base;
-    _mm_store_ps(vertex, _mm_add_ps(_mm_load_ps(vertex), _mm_mul_ps(_mm_set1_ps(e.weight[k]), v)));
+void AddShare(float weight, ParticleRef to, __m128 v, float* field) {
+  float* const out = field + to.base;
+  const __m128 share = _mm_mul_ps(_mm_set1_ps(weight), v);
+  if (to.step == 1) {
+    _mm_store_ps(out, _mm_add_ps(_mm_load_ps(out), share));
+    return;
+  }
+  alignas(16) float part[4];
+  _mm_store_ps(part, share);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    out[axis * to.step] += part[axis];
   }
 }
 template <class Sum>
@@ -156,9 +156,23 @@ Elements::Elements(const SceneView& scene, const ElasticModel& model, const Part
   contact_product_.reserve(kMostContacts);
 }
 
+void Elements::Divide(const Regions& regions) {
+  shares_.assign(static_cast<std::size_t>(regions.count()), {});
+  for (std::uint32_t i = 0; i < bindings_.size(); ++i) {
+    const Element& e = bindings_[i];
+    for (std::size_t k = 0; k < 4; ++k) {
+      shares_[static_cast<std::size_t>(regions.Of(e.at[k]))].push_back({i, e.weight[k], e.at[k]});
+    }
+  }
+  hinges_.Divide(regions);
+}
+
 void Elements::Follow(const TissueModel& tissue) {
   for (std::size_t i = 0; i < bindings_.size(); ++i) {
     bindings_[i].active = tissue.NodeAlive(binding_rest_[i].node);
+    if (!bindings_[i].active) {
+      std::fill_n(binding_force_.data() + 4 * i, 4, 0.0f);
+    }
   }
   hinges_.Follow(tissue);
 }
@@ -227,11 +241,7 @@ void Elements::Linearise(const float* place) {
   hinges_.MakeForce(place, computed_.hinge_rows);
 }
 
-void Elements::AddForces(float* residual) const {
-  for (const std::uint32_t i : computed_.bindings) {
-    SpreadBinding(bindings_[i], _mm_load_ps(binding_force_.data() + 4 * std::size_t{i}), residual);
-  }
-  hinges_.Add(residual, computed_.hinge_rows);
+void Elements::AddContactForces(float* residual) const {
   guard_.AddForce(residual);
   for (std::size_t i = 0; i < contacts_.size(); ++i) {
     Spread(contacts_[i], contact_force_[i], residual);
@@ -256,17 +266,30 @@ double Elements::Multiply(const float* p, const Selection& selection) {
   return sum;
 }
 
-double Elements::AddProduct(const float* p, float* out, const Selection& selection) {
-  hinges_.Add(out, selection.hinge_rows);
+double Elements::AddContactProduct(const float* p, float* out) {
   const double sum = guard_.Apply(p, out);
-  for (const std::uint32_t i : selection.bindings) {
-    SpreadBinding(bindings_[i], _mm_load_ps(binding_force_.data() + 4 * std::size_t{i}), out);
-  }
   const std::span<const Element> contacts = contacts_in_product();
   for (std::size_t i = 0; i < contacts.size(); ++i) {
     Spread(contacts[i], contact_product_[i], out);
   }
   return sum;
+}
+
+void Elements::AddInRegion(int region, float* field) const {
+  for (const Share& share : shares_[static_cast<std::size_t>(region)]) {
+    AddShare(share.weight, share.at, _mm_load_ps(binding_force_.data() + 4 * std::size_t{share.binding}), field);
+  }
+  hinges_.AddInRegion(region, field);
+}
+
+void Elements::Add(const Selection& selection, float* field) const {
+  for (const std::uint32_t i : selection.bindings) {
+    const Element& e = bindings_[i];
+    for (std::size_t k = 0; k < 4; ++k) {
+      AddShare(e.weight[k], e.at[k], _mm_load_ps(binding_force_.data() + 4 * std::size_t{i}), field);
+    }
+  }
+  hinges_.Add(field, selection.hinge_rows);
 }
 
 double Elements::Energy(const float* place, std::span<const ContactRow> contacts) {

@@ -33,6 +33,8 @@ class Elements {
  public:
   Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles);
 
+  /// Once, before the first Linearise: which region each of their particles is in.
+  void Divide(const Regions& regions);
   /// Switches off what a cut has severed.
   void Follow(const TissueModel& tissue);
   /// From now on only elements with a particle in a region that is computed.
@@ -50,18 +52,26 @@ class Elements {
              std::span<const ContactRow> contacts);
   [[nodiscard]] std::span<const Element> touching() const { return contacts_; }
   [[nodiscard]] const InversionGuard& guard() const { return guard_; }
-  // What reads fields and what writes them are apart: the first runs beside kernels that write other fields.
-  /// Linearises at `place`, for AddForces.
+  // What reads fields and what writes them are apart: the first runs beside kernels that write other fields. What
+  // bindings and hinges have made is then added by region, each by whoever works there next; the guard and the contacts,
+  // which are few, at once.
+  /// Linearises at `place`, for AddInRegion.
   void Linearise(const float* place);
-  /// residual += forces where it was linearised, those of the touching contacts included.
-  void AddForces(float* residual) const;
+  /// residual += forces of the guard and of the touching contacts.
+  void AddContactForces(float* residual) const;
   /// While set, contacts take no part in Multiply.
   void LeaveContactsOut(bool out) { contacts_out_ = out; }
-  /// K p, for AddProduct; returns p . K p. p is 0 wherever elements act that are not selected. All contacts are.
+  /// K p, for AddContactProduct and then AddInRegion or Add; returns p . K p. p is 0 wherever elements act that are not
+  /// selected. All contacts are.
   double Multiply(const float* p, const Selection& selection);
-  /// out += what Multiply has made. The guard, which seldom has anything to do, is multiplied here; returns its share
-  /// of p . K p.
-  double AddProduct(const float* p, float* out, const Selection& selection);
+  /// out += what Multiply has made of the contacts. The guard, which seldom has anything to do, is multiplied here;
+  /// returns its share of p . K p.
+  double AddContactProduct(const float* p, float* out);
+  /// field += what the last Linearise, or the last Multiply of all that is computed, has made of bindings and hinges in
+  /// a region that is computed.
+  void AddInRegion(int region, float* field) const;
+  /// field += what the last Multiply has made of bindings and hinges, in all its regions.
+  void Add(const Selection& selection, float* field) const;
   [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts);
   /// Contacts stiffer than this are with a tool; softer ones are tissue on tissue, as the fat around [N/m].
   static constexpr float kStiffContact = 500.0f;
@@ -86,8 +96,15 @@ class Elements {
 
   std::vector<Element> bindings_, contacts_;
   std::vector<BindingRest> binding_rest_;
+  /// What a binding does to one of its particles.
+  struct Share {
+    std::uint32_t binding = 0;
+    float weight = 0;
+    ParticleRef at;
+  };
+  std::vector<std::vector<Share>> shares_;  ///< By region, in order of the bindings.
   Selection computed_;
-  FloatArray binding_force_;  ///< xyz_ by binding: at the linearisation, or of the last product.
+  FloatArray binding_force_;  ///< xyz_ by binding: at the linearisation, or of the last product; 0 where severed.
   std::vector<Vec3f> contact_force_, contact_product_;
   bool contacts_out_ = false;
   HingeMatrix hinges_;

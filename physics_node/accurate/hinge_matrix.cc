@@ -76,6 +76,13 @@ void HingeMatrix::Follow(const TissueModel& tissue) {
   }
 }
 
+void HingeMatrix::Divide(const Regions& regions) {
+  in_region_.assign(static_cast<std::size_t>(regions.count()), {});
+  for (std::uint32_t i = 0; i < particles_.size(); ++i) {
+    in_region_[static_cast<std::size_t>(regions.Of(particles_[i]))].push_back(i);
+  }
+}
+
 void HingeMatrix::Select(const Regions& regions, std::span<const std::uint8_t> marked,
                          std::vector<std::uint32_t>* rows) const {
   rows->clear();

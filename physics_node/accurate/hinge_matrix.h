@@ -17,6 +17,8 @@ class HingeMatrix {
 
   /// Takes out hinges that a cut has severed, and puts back those that are whole again.
   void Follow(const TissueModel& tissue);
+  /// Once, before AddInRegion: which region each particle is in.
+  void Divide(const Regions& regions);
   /// Rows of particles in marked regions.
   void Select(const Regions& regions, std::span<const std::uint8_t> marked, std::vector<std::uint32_t>* rows) const;
 
@@ -29,6 +31,8 @@ class HingeMatrix {
   double Multiply(const float* p, std::span<const std::uint32_t> rows);
   /// Adds what was made last to a field, in the same rows.
   void Add(float* field, std::span<const std::uint32_t> rows) const;
+  /// The same in all rows of a region.
+  void AddInRegion(int region, float* field) const { Add(field, in_region_[static_cast<std::size_t>(region)]); }
   /// Of these rows at `place` [J].
   [[nodiscard]] double Energy(const float* place, std::span<const std::uint32_t> rows);
 
@@ -48,6 +52,7 @@ class HingeMatrix {
 
   std::vector<Hinge> hinges_;
   std::vector<ParticleRef> particles_;
+  std::vector<std::vector<std::uint32_t>> in_region_;  ///< Rows by region.
   std::vector<std::uint32_t> start_, column_;
   std::vector<float> value_;
   FloatArray rest_, vector_, product_;  ///< xyz_ per particle.

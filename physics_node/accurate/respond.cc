@@ -66,6 +66,7 @@ bool AccurateSolver::Stiffness(const Question& question, float* newton_per_m) {
   elements_.LeaveContactsOut(true);
   (void)Apply(u, inertia);
   ForTasks([&](const Task& task, int, int) {
+    AddElements(task, &q_);
     ForParts(task, [&](std::size_t first, std::size_t count) {
       for (std::size_t i = first; i < first + count; ++i) {
         residual_[i] = -q_[i];

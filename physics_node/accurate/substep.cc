@@ -240,7 +240,8 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   }
   coarse_.FadeAtContacts();
   FollowContacts();
-  elements_.AddForces(residual_.data());
+  elements_.AddContactForces(residual_.data());
+  forces_due_ = true;
 }
 
 /// Positions and velocities from place + d. What is not finite stays where it was, at rest.
