@@ -53,8 +53,8 @@ class Elements {
   [[nodiscard]] std::span<const Element> touching() const { return contacts_; }
   [[nodiscard]] const InversionGuard& guard() const { return guard_; }
   // What reads fields and what writes them are apart: the first runs beside kernels that write other fields. What
-  // bindings and hinges have made is then added by region, each by whoever works there next; the guard and the contacts,
-  // which are few, at once.
+  // bindings and hinges have made is then added by region, each by whoever works there next; the guard and the
+  // contacts, which are few, at once.
   /// Linearises at `place`, for AddInRegion.
   void Linearise(const float* place);
   /// residual += forces of the guard and of the touching contacts.
