@@ -77,7 +77,7 @@ ExitCode RunPhysics(app::NodeApp& app) {
         node.Step(tick);
         return;
       case physics::Pair::Role::kRetires:
-        app.Finish(ExitCode::kFailure, "another process has taken over while this one was held up");
+        app.Finish(ExitCode::kDone, "another process has taken over while this one was held up");
         return;
     }
   };
