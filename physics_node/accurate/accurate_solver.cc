@@ -106,6 +106,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   const Inertia inertia = MakeInertia(scene.physics.dt_s / static_cast<float>(effort.substeps));
   (void)Guess(inertia.h, 0.0f);
   Linearise(inertia, {});
+  forces_due_ = false;  // Nothing is solved for these.
   coarse_.Refresh(MakeSheet(), MakeMatrix(), inertia.inertia, rows_);
 }
 

@@ -31,9 +31,11 @@ std::string WorkingScene(const std::string& base, double duration_s, const std::
   };
   grasper(0.0, 10, 50);
   grasper(0.4, -2.5, 50);
-  grasper(0.6, -2.5, 50);
-  grasper(0.9, -2.5, 0);
-  double time_s = 1.5;
+  // Late enough for everybody to hear it on a machine with too much to do: who has not seen the jaws close holds
+  // nothing.
+  grasper(1.2, -2.5, 50);
+  grasper(1.6, -2.5, 0);
+  double time_s = 2.2;
   for (int i = 0; time_s < duration_s; ++i, time_s += 0.5) grasper(time_s, work.pull_mm + (i % 2 == 0 ? 1 : -1), 0);
   script << "  tool1:\n";
   const auto hook = [&](double at_s, double s, double t, double height_mm, const char* pedal) {
