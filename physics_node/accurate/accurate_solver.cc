@@ -176,8 +176,16 @@ OrganLinearisation AccurateSolver::OrganAt(const FloatArray& place) {
 
 std::uint32_t AccurateSolver::BeginStep() {
   std::uint32_t resets = 0;
-  if (!kernels_.within(particles_->tube(), kFarthest, 4 * std::size_t{tube_count_}, true) ||
-      !kernels_.within(particles_->plane(0), kFarthest, 3 * plane_, false)) {
+  std::array<bool, ParticleStore::kParts> sound{};
+  workers_.Run(ParticleStore::kParts, 0, [&](int part, int) {
+    const auto [tube, x, y, z, mass] = particles_->Part(part);
+    const auto within = [&](std::span<const float> floats, bool xyzw) {
+      return kernels_.within(floats.data(), kFarthest, floats.size(), xyzw);
+    };
+    sound[static_cast<std::size_t>(part)] =
+        within(tube, true) && within(x, false) && within(y, false) && within(z, false);
+  });
+  if (std::find(sound.begin(), sound.end(), false) != sound.end()) {
     resets = particles_->RepairPlaces(kFarthest);
     regions_.WakeAll();
   }

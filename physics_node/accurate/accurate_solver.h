@@ -79,8 +79,8 @@ class AccurateSolver {
   /// False: all is asleep, or no sound answer. The state stays as it is.
   bool Stiffness(const Question& question, float* newton_per_m);
 
-  /// Its threads, between substeps.
-  [[nodiscard]] Workers& workers() { return workers_; }
+  /// Its threads, between substeps. Nothing that is computed depends on them.
+  [[nodiscard]] Workers& workers() const { return workers_; }
   /// What is computed at present, and what is awake.
   [[nodiscard]] const Regions& regions() const { return regions_; }
 
@@ -170,7 +170,7 @@ class AccurateSolver {
   std::vector<std::uint32_t> extra_changed_;
 
   // Who works on what.
-  Workers workers_;
+  mutable Workers workers_;
   Regions regions_;
   std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_, pressed_now_,
       stiffened_;             ///< By region.

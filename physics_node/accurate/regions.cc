@@ -5,7 +5,7 @@
 namespace fulcrum::physics::accurate {
 namespace {
 
-constexpr int kRegionsPerTask = 4;
+constexpr int kRegionsPerTask = 3;
 
 }  // namespace
 

@@ -13,7 +13,7 @@
 
 namespace fulcrum::physics::accurate {
 
-/// A stretch of work: rows of the membrane or vertices of the organ, at most four regions long.
+/// A stretch of work: rows of the membrane or vertices of the organ, at most three regions long.
 struct Task {
   bool sheet = true;
   int first = 0, end = 0;

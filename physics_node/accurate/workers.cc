@@ -8,8 +8,26 @@
 namespace fulcrum::physics::accurate {
 namespace {
 
-/// Pauses before a thread without work sleeps: some 50 us, longer than the stretch between two phases of a step.
-constexpr int kSpins = 1500;
+/// A thread without work sleeps after this: longer than most stretches between two phases of a step, or between two
+/// steps of a replay. To be woken takes as long as a phase.
+constexpr std::chrono::microseconds kPatience{200};
+/// Pauses between two looks at the clock.
+constexpr int kPauses = 32;
+
+/// Spins until done() or out of patience, and returns whether done().
+template <class Done>
+bool SpinUntil(const Done& done) {
+  const auto start = std::chrono::steady_clock::now();
+  do {
+    for (int pause = 0; pause < kPauses; ++pause) {
+      if (done()) {
+        return true;
+      }
+      _mm_pause();
+    }
+  } while (std::chrono::steady_clock::now() - start < kPatience);
+  return false;
+}
 
 }  // namespace
 
@@ -80,26 +98,18 @@ void Workers::RunShared(int tasks, int split, int errands, Call call, const void
   phase_.store(phase, std::memory_order_release);
   phase_.notify_all();
   Help(0);
-  for (int spins = 0; done_.load(std::memory_order_acquire) < tasks; ++spins) {
-    if (spins < kSpins) {
-      _mm_pause();
-    } else {
-      // A thread of lower priority may need this very core to finish its task.
-      std::this_thread::sleep_for(std::chrono::microseconds(20));
-    }
+  const auto all_done = [&] { return done_.load(std::memory_order_acquire) == tasks; };
+  for (bool done = SpinUntil(all_done); !done; done = all_done()) {
+    // A thread of lower priority may need this very core to finish its task.
+    std::this_thread::sleep_for(std::chrono::microseconds(20));
   }
 }
 
 void Workers::Loop(int worker) {
   std::uint32_t seen = 0;
   while (!stop_.load(std::memory_order_relaxed)) {
-    int spins = 0;
-    while (phase_.load(std::memory_order_acquire) == seen) {
-      if (++spins < kSpins) {
-        _mm_pause();
-      } else {
-        phase_.wait(seen, std::memory_order_acquire);
-      }
+    if (!SpinUntil([&] { return phase_.load(std::memory_order_acquire) != seen; })) {
+      phase_.wait(seen, std::memory_order_acquire);
     }
     seen = phase_.load(std::memory_order_acquire);
     Help(worker);

@@ -21,13 +21,16 @@ class Workers {
 
   [[nodiscard]] int count() const { return static_cast<int>(tickets_.size()) - 1; }
 
+  /// Whether the other threads help in what is run from now on; else they sleep. What comes out does not depend on it.
+  void LetHelp(bool help) { help_ = help; }
+
   /// body(task, worker) once for each task in [0, tasks), worker in [0, count()); returns when all are done. The first
   /// `split` tasks are of one kind, the others of another: each worker's part has its share of both. The last
   /// `errands` of them are nobody's part: the thread that calls, which has the serial stretches to itself, takes them
   /// last, the others first. At most 65,535 tasks. Not from within a body.
   template <class Body>
   void Run(int tasks, int split, int errands, const Body& body) {
-    if (threads_.empty() || tasks < 2) {
+    if (threads_.empty() || !help_ || tasks < 2) {
       for (int task = 0; task < tasks; ++task) {
         body(task, 0);
       }
@@ -66,6 +69,7 @@ class Workers {
   alignas(64) std::atomic<int> done_{0};
   alignas(64) std::atomic<std::uint32_t> phase_{0};
   std::atomic<bool> stop_{false};
+  bool help_ = true;  ///< Of the thread that calls.
   std::vector<std::thread> threads_;
 };
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "physics_node/collision/closest.h"
 #include "services/core/breathing.h"
@@ -35,7 +34,6 @@ constexpr int kMaxWalk = 8;
 TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
                                  const Kernels& kernels)
     : scene_(scene), model_(model), particles_(particles), kernels_(kernels) {
-  travel_.assign(particles->block_count(), 0.0f);
   WatchOrgan();
   for (const StaticSurface& surface : scene.static_surfaces) {
     if (surface.collides) {
@@ -71,12 +69,11 @@ void TissueCollision::Watches::MakeGroups(const ParticleStore& particles) {
   for (Index i = 0; i < all.size(); ++i) {
     const Index block = particles.BlockOf(all[i].particle);
     if (groups.empty() || groups.back().block != block) {
-      groups.push_back({block, i, i, {}});
+      groups.push_back({block, i, i, 0.0f, {}, {}});
     }
     groups.back().last = i + 1;
   }
   times.resize(all.size());
-  near.reserve(all.size());
 }
 
 std::array<Vec3f, 3> TissueCollision::OrganCorners(Index triangle) const {
@@ -166,17 +163,30 @@ void TissueCollision::WatchFixed(const StaticSurface& surface) {
 
 bool TissueCollision::breath_near() const {
   return std::any_of(fixed_.begin(), fixed_.end(), [this](const Fixed& fixed) {
-    return fixed.breathes && std::any_of(fixed.watches.near.begin(), fixed.watches.near.end(), [&](const Near& near) {
-             return Touches(fixed.watches.all[near.watch].particle);
-           });
+    const auto touches = [&](const Near& near) { return Touches(fixed.watches.all[near.watch].particle); };
+    return fixed.breathes &&
+           std::any_of(fixed.watches.found.begin(), fixed.watches.found.end(),
+                       [&](const Found& part) { return std::any_of(part.near.begin(), part.near.end(), touches); });
   });
 }
 
-std::size_t TissueCollision::near_count() const {
-  std::size_t count = organ_.near.size();
+template <class Body>
+void TissueCollision::ForFound(const Body& body) const {
+  std::for_each(organ_.found.begin(), organ_.found.end(), body);
   for (const Fixed& fixed : fixed_) {
-    count += fixed.watches.near.size();
+    std::for_each(fixed.watches.found.begin(), fixed.watches.found.end(), body);
   }
+}
+
+std::size_t TissueCollision::near_count() const {
+  std::size_t count = 0;
+  ForFound([&](const Found& part) { count += part.near.size(); });
+  return count;
+}
+
+std::size_t TissueCollision::looked_at() const {
+  std::size_t count = 0;
+  ForFound([&](const Found& part) { count += part.looked_at; });
   return count;
 }
 
@@ -213,7 +223,7 @@ void TissueCollision::Walk(Watch* watch, const Vec3f& p) const {
   }
 }
 
-Vec3f TissueCollision::Standpoint(const Watch& watch) const {
+inline Vec3f TissueCollision::Standpoint(const Watch& watch) const {
   const auto x = OrganCorners(watch.triangle);
   return particles_->At(watch.at) - (x[0] + x[1] + x[2]) / 3.0f;
 }
@@ -232,14 +242,18 @@ void TissueCollision::AskWay(Watch* watch, float others_moved, float unknown, co
 }
 
 /// look(watch) tells how far the particle is from contact. stand(watch) is where it is, as far as that concerns what
-/// it watches; what others move there, is in others_travel.
-template <class Stand, class Look>
-void TissueCollision::LookAtDue(Watches* watches, std::span<const float> moved, float others_travel, float others_moved,
-                                const Stand& stand, const Look& look) {
-  watches->near.clear();
-  watches->looked_at = 0;
-  for (Group& group : watches->groups) {
-    const float travel = travel_[group.block] + others_travel, step = moved[group.block] + others_moved;
+/// it watches.
+template <class Around, class Stand, class Look>
+void TissueCollision::LookAtDue(Watches* watches, int part, std::span<const float> moved, float others_travel,
+                                float others_moved, const Around& around, const Stand& stand, const Look& look) {
+  Found& found = watches->found[static_cast<std::size_t>(part)];
+  found.near.clear();
+  found.looked_at = 0;
+  const auto bound = [&](int p) { return watches->groups.size() * static_cast<std::size_t>(p) / kParts; };
+  for (Group& group : std::span(watches->groups).subspan(bound(part), bound(part + 1) - bound(part))) {
+    const float step = moved[group.block] + around(group);
+    const float travel = group.travel += step;
+    const std::size_t looked_at_before = found.looked_at;
     if (travel >= group.times.due) {
       group.times = {kNever, kNever};
       for (Index i = group.first; i < group.last; ++i) {
@@ -250,7 +264,7 @@ void TissueCollision::LookAtDue(Watches* watches, std::span<const float> moved, 
           float others = watch.near ? 0.0f : kElsewhere * (others_travel - watch.others);
           const float left = watch.near ? kKeep - watch.gone : watch.gap - watch.gone - others - Band(watch.way);
           if (!(left > 0.0f)) {
-            ++watches->looked_at;
+            ++found.looked_at;
             watch.gap = look(&watch);
             watch.near = watch.blocks && watch.gap < Band(watch.way) + kKeep;
             watch.others = others_travel;
@@ -264,6 +278,9 @@ void TissueCollision::LookAtDue(Watches* watches, std::span<const float> moved, 
         }
         group.times = {std::min(group.times.due, times.due), std::min(group.times.start, times.start)};
       }
+      if (watches == &organ_ && found.looked_at != looked_at_before) {
+        FindBeside(&group);
+      }
     }
     // A row may come of what gets into its band in the first half of this step.
     const float from = travel + step + Band(step);
@@ -272,19 +289,32 @@ void TissueCollision::LookAtDue(Watches* watches, std::span<const float> moved, 
         Watch& watch = watches->all[i];
         AskWay(&watch, others_moved, step, stand);
         if (watch.gap - watch.gone - watch.way < Band(watch.way)) {
-          watches->near.push_back({i, Band(watch.way)});
+          found.near.push_back({i, Band(watch.way)});
         }
       }
     }
   }
 }
 
-void TissueCollision::LookAtFixed(Fixed* fixed, std::span<const float> moved) {
+void TissueCollision::FindBeside(Group* group) const {
+  group->beside.clear();
+  for (Index i = group->first; i < group->last; ++i) {
+    for (const Index vertex : scene_.tube_surface[organ_.all[i].triangle]) {
+      const Index block = particles_->BlockOf(vertex);
+      if (std::find(group->beside.begin(), group->beside.end(), block) == group->beside.end()) {
+        group->beside.push_back(block);
+      }
+    }
+  }
+}
+
+void TissueCollision::LookAtFixed(Fixed* fixed, int part, std::span<const float> moved) {
   const Vec3f shift = fixed->breathes ? breath0_ : Vec3f(Vec3f::Zero());
   const TriangleTree& tree = fixed->tree;
   const float breathed = fixed->breathes ? (breath1_ - breath0_).norm() : 0.0f;
   LookAtDue(
-      &fixed->watches, moved, fixed->breathes ? breath_travel_ : 0.0f, breathed,
+      &fixed->watches, part, moved, fixed->breathes ? breath_travel_ : 0.0f, breathed,
+      [&](const Group&) { return breathed; },
       [&](const Watch& watch) { return Vec3f(particles_->At(watch.at) - shift); },
       [&](Watch* watch) {
         const Vec3f p = particles_->At(watch->at) - shift;
@@ -309,9 +339,8 @@ void TissueCollision::BeginPairs(std::span<const float> moved, double time0_s, d
   ++step_;
   const Index organ_blocks = particles_->tube_blocks();
   organ_moved_ = 0;
-  for (Index b = 0; b < travel_.size(); ++b) {
-    travel_[b] += moved[b];
-    organ_moved_ = b < organ_blocks ? std::max(organ_moved_, moved[b]) : organ_moved_;
+  for (Index b = 0; b < organ_blocks; ++b) {
+    organ_moved_ = std::max(organ_moved_, moved[b]);
   }
   organ_travel_ += organ_moved_;
   breath0_ = BreathingOffset(scene_.breathing, time0_s);
@@ -319,13 +348,17 @@ void TissueCollision::BeginPairs(std::span<const float> moved, double time0_s, d
   breath_travel_ += (breath1_ - breath0_).norm();
 }
 
-void TissueCollision::FindPairsOf(int surface, std::span<const float> moved) {
-  if (surface > 0) {
-    LookAtFixed(&fixed_[static_cast<std::size_t>(surface) - 1], moved);
-    return;
-  }
+void TissueCollision::LookAtOrgan(int part, std::span<const float> moved) {
   LookAtDue(
-      &organ_, moved, organ_travel_, organ_moved_, [&](const Watch& watch) { return Standpoint(watch); },
+      &organ_, part, moved, organ_travel_, organ_moved_,
+      [&](const Group& group) {
+        float largest = 0;
+        for (const Index block : group.beside) {
+          largest = std::max(largest, moved[block]);
+        }
+        return largest + kElsewhere * organ_moved_;
+      },
+      [&](const Watch& watch) { return Standpoint(watch); },
       [&](Watch* watch) {
         const Vec3f p = particles_->At(watch->at);
         Walk(watch, p);
@@ -333,9 +366,13 @@ void TissueCollision::FindPairsOf(int surface, std::span<const float> moved) {
       });
 }
 
-std::size_t TissueCollision::looked_at() const {
-  return std::accumulate(fixed_.begin(), fixed_.end(), organ_.looked_at,
-                         [](std::size_t sum, const Fixed& fixed) { return sum + fixed.watches.looked_at; });
+void TissueCollision::FindPairsOf(int task, std::span<const float> moved) {
+  const int surfaces = tasks() / kParts, surface = task % surfaces, part = task / surfaces;
+  if (surface == 0) {
+    LookAtOrgan(part, moved);
+  } else {
+    LookAtFixed(&fixed_[static_cast<std::size_t>(surface) - 1], part, moved);
+  }
 }
 
 /// Dead and loose membrane touches nothing.
@@ -344,27 +381,23 @@ bool TissueCollision::Touches(Index particle) const {
   return particle < first || (model_->NodeAlive(particle - first) && !model_->IsDebris(particle - first));
 }
 
-void TissueCollision::AddFixedRows(const Fixed& fixed, float u0, float u1, std::size_t limit,
-                                   std::vector<ContactRow>* rows) const {
+void TissueCollision::FindFixedRows(const Fixed& fixed, Found* found, float u0, float u1) const {
   ContactRow row;
   row.friction = scene_.physics.friction;
   row.count = 1;
   row.weight[0] = 1.0f;
   const Vec3f shift = fixed.breathes ? Vec3f(breath0_ + u1 * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
   row.drift = fixed.breathes ? Vec3f((u1 - u0) * (breath1_ - breath0_)) : Vec3f(Vec3f::Zero());
-  for (const Near& near : fixed.watches.near) {
+  for (const Near& near : found->near) {
     const Watch& watch = fixed.watches.all[near.watch];
     row.offset = watch.normal.dot(watch.point + shift) + watch.clearance;
     if (watch.normal.dot(particles_->At(watch.at)) > row.offset + (u1 - u0) * near.band || !Touches(watch.particle)) {
       continue;
     }
-    if (rows->size() == limit) {
-      return;
-    }
     row.at[0] = watch.at;
     row.normal = watch.normal;
     row.source = kSource | near.watch;
-    rows->push_back(row);
+    found->rows.push_back(row);
   }
 }
 
@@ -388,15 +421,14 @@ void TissueCollision::AddOrganRow(const Near& near, const Signed& now, std::vect
   rows->push_back(row);
 }
 
-void TissueCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) const {
-  const std::size_t limit = rows->size() + kMaxRows;
+void TissueCollision::FindOrganRows(Found* found, float u0, float u1) const {
   const float* tube = particles_->raw().data();
   PointBatch points{};
   FootBatch feet;
-  for (std::size_t first = 0; first < organ_.near.size(); first += kLanes) {
-    const std::size_t count = std::min<std::size_t>(kLanes, organ_.near.size() - first);
+  for (std::size_t first = 0; first < found->near.size(); first += kLanes) {
+    const std::size_t count = std::min<std::size_t>(kLanes, found->near.size() - first);
     for (std::size_t lane = 0; lane < count; ++lane) {
-      const Watch& watch = organ_.all[organ_.near[first + lane].watch];
+      const Watch& watch = organ_.all[found->near[first + lane].watch];
       const Vec3f p = particles_->At(watch.at);
       for (std::size_t i = 0; i < 3; ++i) {
         points.point[i][lane] = p[static_cast<int>(i)];
@@ -405,7 +437,7 @@ void TissueCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) co
     }
     kernels_.feet(tube, points, &feet);
     for (std::size_t lane = 0; lane < count; ++lane) {
-      const Near& near = organ_.near[first + lane];
+      const Near& near = found->near[first + lane];
       const Watch& watch = organ_.all[near.watch];
       const float reach = feet.side[lane] < 0.0f ? kMaxBehind : watch.clearance + (u1 - u0) * near.band;
       if (feet.distance_sq[lane] > reach * reach || !Touches(watch.particle)) {
@@ -413,15 +445,28 @@ void TissueCollision::Rows(float u0, float u1, std::vector<ContactRow>* rows) co
       }
       const Signed now = SignedDistance(particles_->At(watch.at), OrganCorners(watch.triangle),
                                         {feet.weight[0][lane], feet.weight[1][lane], feet.weight[2][lane]});
-      if (rows->size() == limit) {
-        return;
-      }
-      AddOrganRow(near, now, rows);
+      AddOrganRow(near, now, &found->rows);
     }
   }
-  for (const Fixed& fixed : fixed_) {
-    AddFixedRows(fixed, u0, u1, limit, rows);
+}
+
+void TissueCollision::FindRows(int part, float u0, float u1) {
+  const auto i = static_cast<std::size_t>(part);
+  organ_.found[i].rows.clear();
+  FindOrganRows(&organ_.found[i], u0, u1);
+  for (Fixed& fixed : fixed_) {
+    fixed.watches.found[i].rows.clear();
+    FindFixedRows(fixed, &fixed.watches.found[i], u0, u1);
   }
+}
+
+void TissueCollision::JoinRows(std::vector<ContactRow>* rows) const {
+  std::size_t room = kMaxRows;
+  ForFound([&](const Found& part) {
+    const std::size_t count = std::min(room, part.rows.size());
+    rows->insert(rows->end(), part.rows.begin(), part.rows.begin() + static_cast<std::ptrdiff_t>(count));
+    room -= count;
+  });
 }
 
 }  // namespace fulcrum::physics

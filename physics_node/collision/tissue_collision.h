@@ -33,14 +33,21 @@ class TissueCollision {
   /// what breathes moves from one to the other.
   void FindPairs(std::span<const float> moved, double time0_s, double time1_s) {
     BeginPairs(moved, time0_s, time1_s);
-    for (int surface = 0; surface < surfaces(); ++surface) FindPairsOf(surface, moved);
+    for (int task = 0; task < tasks(); ++task) FindPairsOf(task, moved);
   }
-  // The same in pieces: after BeginPairs each surface by any thread.
+  // The same in pieces: tasks by any thread, those of rows close to one another next to one another.
   void BeginPairs(std::span<const float> moved, double time0_s, double time1_s);
-  [[nodiscard]] int surfaces() const { return 1 + static_cast<int>(fixed_.size()); }
-  void FindPairsOf(int surface, std::span<const float> moved);
+  [[nodiscard]] int tasks() const { return kParts * (1 + static_cast<int>(fixed_.size())); }
+  void FindPairsOf(int task, std::span<const float> moved);
   /// Appends the contacts of the substep from part u0 to u1 of the step; at most kMaxRows.
-  void Rows(float u0, float u1, std::vector<ContactRow>* rows) const;
+  void Rows(float u0, float u1, std::vector<ContactRow>* rows) {
+    for (int part = 0; part < kParts; ++part) FindRows(part, u0, u1);
+    JoinRows(rows);
+  }
+  // The same in pieces: parts [0, kParts) by any thread.
+  static constexpr int kParts = 8;
+  void FindRows(int part, float u0, float u1);
+  void JoinRows(std::vector<ContactRow>* rows) const;
 
   /// Something that breathes is near live tissue in this step: it will push.
   [[nodiscard]] bool breath_near() const;
@@ -78,6 +85,8 @@ class TissueCollision {
   /// Watches of one block: [first, last).
   struct Group {
     Index block = 0, first = 0, last = 0;
+    float travel = 0;           ///< Of it and of what it may touch, since the beginning [m].
+    std::vector<Index> beside;  ///< Blocks of the organ that its triangles are in.
     Times times;
   };
   /// One that is near in this step.
@@ -91,13 +100,18 @@ class TissueCollision {
     float distance = 0;            ///< Negative: behind [m].
   };
 
+  /// Found in a part of a surface's groups.
+  struct Found {
+    std::vector<Near> near;        ///< In this step.
+    std::size_t looked_at = 0;     ///< In this step.
+    std::vector<ContactRow> rows;  ///< In this substep.
+  };
   /// All that watches one surface.
   struct Watches {
     std::vector<Watch> all;
     std::vector<Times> times;  ///< Of each, apart from the rest: most steps read nothing else.
     std::vector<Group> groups;
-    std::vector<Near> near;     ///< In this step.
-    std::size_t looked_at = 0;  ///< In this step.
+    std::array<Found, kParts> found;
     void MakeGroups(const ParticleStore& particles);
   };
 
@@ -123,13 +137,21 @@ class TissueCollision {
   /// Fills watch->gone and way; `unknown` is the way of one that was not asked in the last step.
   template <class Stand>
   void AskWay(Watch* watch, float others_moved, float unknown, const Stand& stand) const;
-  template <class Stand, class Look>
-  void LookAtDue(Watches* watches, std::span<const float> moved, float others_travel, float others_moved,
-                 const Stand& stand, const Look& look);
+  /// A surface, in whole, has travelled and moved in this step by `others_travel` and `others_moved` at most; what a
+  /// group may touch of it has moved by around(group).
+  template <class Around, class Stand, class Look>
+  void LookAtDue(Watches* watches, int part, std::span<const float> moved, float others_travel, float others_moved,
+                 const Around& around, const Stand& stand, const Look& look);
+  void FindBeside(Group* group) const;
   void AddOrganRow(const Near& near, const Signed& now, std::vector<ContactRow>* rows) const;
-  void LookAtFixed(Fixed* fixed, std::span<const float> moved);
+  void LookAtOrgan(int part, std::span<const float> moved);
+  void LookAtFixed(Fixed* fixed, int part, std::span<const float> moved);
   [[nodiscard]] bool Touches(Index particle) const;
-  void AddFixedRows(const Fixed& fixed, float u0, float u1, std::size_t limit, std::vector<ContactRow>* rows) const;
+  void FindOrganRows(Found* found, float u0, float u1) const;
+  void FindFixedRows(const Fixed& fixed, Found* found, float u0, float u1) const;
+  /// body(part) for all that was found: the organ's parts, then those of each fixed surface.
+  template <class Body>
+  void ForFound(const Body& body) const;
 
   SceneView scene_;
   const TissueModel* model_;
@@ -140,7 +162,6 @@ class TissueCollision {
   Watches organ_;
   std::vector<Fixed> fixed_;
 
-  std::vector<float> travel_;  ///< Of each block since the beginning [m].
   float organ_travel_ = 0, organ_moved_ = 0, breath_travel_ = 0;
   Vec3f breath0_ = Vec3f::Zero(), breath1_ = Vec3f::Zero();
   std::uint32_t step_ = 1;  ///< Calls of FindPairs.

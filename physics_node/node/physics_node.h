@@ -41,6 +41,9 @@ class PhysicsNode {
   /// One period. @pre called by one thread.
   void Step(const Tick& tick);
 
+  /// Whether the threads beside the caller's help in the next steps; they do from the start.
+  void LetThreadsHelp(bool help) { simulation_.LetThreadsHelp(help); }
+
   /// In the place of Step() while another process leads: keeps the newest inputs and publishes nothing.
   void Follow(const Tick& tick);
   /// From now on this process leads: goes on from the other's checkpoint (may be empty) or its own, whichever is newer.

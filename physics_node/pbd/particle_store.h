@@ -152,9 +152,9 @@ class ParticleStore {
   }
 
   /// Blocks of particles whose movement is told together: 64 vertices of the tube; then of each row of the membrane
-  /// the columns in lanes 0..3, and those in lanes 4..7.
+  /// the columns in each lane.
   static constexpr Index kBlockVertices = 64;
-  static constexpr std::uint32_t kBlocksPerRow = 2;
+  static constexpr std::uint32_t kBlocksPerRow = 8;
   [[nodiscard]] Index tube_blocks() const { return (tube_count_ + kBlockVertices - 1) / kBlockVertices; }
   [[nodiscard]] Index block_count() const { return tube_blocks() + kBlocksPerRow * layout_.rows; }
   [[nodiscard]] Index BlockOf(Index particle) const {
@@ -199,8 +199,26 @@ class ParticleStore {
     }
     PadGrid();
   }
-  /// Bytes of the positions as they lie in memory, for a state hash. The padding is constant.
+  /// The pool as it lies in memory. The padding is constant.
   [[nodiscard]] std::span<const float> raw() const { return {now_.data(), now_.size()}; }
+  /// All of it in parts that threads may share: of each the stretches of the tube, of x, y and z and of the inverse
+  /// mass of the membrane. Neighbours in the tissue are mostly neighbours here.
+  static constexpr int kParts = 8;
+  [[nodiscard]] std::array<std::span<const float>, 5> Part(int part) const {
+    const auto cut = [part](std::size_t first, std::size_t units, std::size_t unit) {
+      const std::size_t begin = units * static_cast<std::size_t>(part) / kParts;
+      const std::size_t end = units * (static_cast<std::size_t>(part) + 1) / kParts;
+      return std::pair(first + begin * unit, (end - begin) * unit);
+    };
+    std::array<std::span<const float>, 5> stretches;
+    for (std::size_t i = 0; i < stretches.size(); ++i) {
+      const auto [first, count] =
+          i == 0 ? cut(0, tube_floats_ / 16, 16)
+                 : cut(tube_floats_ + (i - 1) * std::size_t{layout_.plane()}, layout_.rows, layout_.stride);
+      stretches[i] = {now_.data() + first, count};
+    }
+    return stretches;
+  }
 
  private:
   void Copy(const float* pool, std::span<float> xyz) const {

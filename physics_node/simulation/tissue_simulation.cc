@@ -192,10 +192,10 @@ void TissueSimulation::FindAllContacts(float h) {
     return;
   }
   tissue_collision_.BeginPairs(moved_, step_begin_s(), simulated_time_s());
-  // Those of the tools and of each surface know nothing of one another. The longest, the organ's, first.
-  const int surfaces = tissue_collision_.surfaces();
-  accurate_->workers().Run(surfaces + 1, 0, surfaces + 1, [&](int task, int) {
-    if (task < surfaces) {
+  // Those of the tools and of each part of a surface know nothing of one another.
+  const int tasks = tissue_collision_.tasks();
+  accurate_->workers().Run(tasks + 1, 0, 1, [&](int task, int) {
+    if (task < tasks) {
       tissue_collision_.FindPairsOf(task, moved_);
     } else {
       FindContacts(true, largest_speed_ * h);
@@ -266,7 +266,9 @@ StepReport TissueSimulation::StepAccurate() {
     const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
     PlaceHeld(u1);
     collision_.Rows(u0, u1, &rows_);
-    tissue_collision_.Rows(u0, u1, &rows_);
+    accurate_->workers().Run(TissueCollision::kParts, 0,
+                             [&](int part, int) { tissue_collision_.FindRows(part, u0, u1); });
+    tissue_collision_.JoinRows(&rows_);
     const accurate::SubstepReport substep = accurate_->Substep(h, effort_.iterations, held_places_, rows_);
     collision_.TakeForces(rows_);
     for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
@@ -320,6 +322,12 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
     still_steps_ = 0;
   }
   return report;
+}
+
+void TissueSimulation::LetThreadsHelp(bool help) {
+  if (accurate_) {
+    accurate_->workers().LetHelp(help);
+  }
 }
 
 std::uint32_t TissueSimulation::SetCheaper(std::uint32_t presets) {
@@ -376,8 +384,23 @@ float TissueSimulation::awake_part() const {
 }
 
 std::uint64_t TissueSimulation::StateHash() const {
+  std::array<std::uint64_t, ParticleStore::kParts> of_part{};
+  const auto hash_part = [&](int part, int) {
+    Hash64 hash;
+    for (const std::span<const float> floats : particles_.Part(part)) {
+      hash.AddLong(floats);
+    }
+    of_part[static_cast<std::size_t>(part)] = hash.value();
+  };
+  if (accurate_) {
+    accurate_->workers().Run(ParticleStore::kParts, 0, hash_part);
+  } else {
+    for (int part = 0; part < ParticleStore::kParts; ++part) {
+      hash_part(part, 0);
+    }
+  }
   Hash64 hash;
-  hash.AddLong(particles_.raw());
+  hash.Add(std::span<const std::uint64_t>(of_part));
   hash.AddValue(model_.revision());
   return hash.value();
 }

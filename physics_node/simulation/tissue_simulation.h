@@ -56,6 +56,9 @@ class TissueSimulation {
   /// Cut and shrunk edges; see TissueModel::Apply. Wakes the tissue when something changed.
   int ApplyTopology(const TopologyState& topology);
 
+  /// Whether the threads beside the caller's help in the next steps.
+  void LetThreadsHelp(bool help);
+
   /// Goes on with the preset that many below the scene's (mode accurate; at most down to fast); returns how many it is.
   std::uint32_t SetCheaper(std::uint32_t presets);
 

@@ -1,6 +1,7 @@
 #include "services/replayer/lock_step.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -20,10 +21,12 @@ namespace {
 
 constexpr double kNsToS = 1e-9;
 
-/// A node that makes the ticks it is given, on its own thread.
+/// A node that makes the ticks it is given, on its own thread. While so many nodes compute (`at_work`) that each core
+/// has one, none takes further threads for itself.
 class NodeRunner {
  public:
-  NodeRunner(NodeId node, const NodeMaking& making, bool go_on) : node_(MakeReplayedNode(node, making)), go_on_(go_on) {
+  NodeRunner(NodeId node, const NodeMaking& making, bool go_on, std::atomic<int>* at_work)
+      : node_(MakeReplayedNode(node, making)), go_on_(go_on), further_threads_(making.threads - 1), at_work_(*at_work) {
     result_.node = node;
     thread_ = std::thread([this] { Run(); });
   }
@@ -31,13 +34,16 @@ class NodeRunner {
   NodeRunner(const NodeRunner&) = delete;
   NodeRunner& operator=(const NodeRunner&) = delete;
 
-  /// Waits for room. False: the node has stopped and wants no more.
+  /// Waits for room, once there is none for much of it: so the quicker ones of several nodes compute in long stretches,
+  /// with long ones between in which the slowest has all cores. False: the node has stopped and wants no more.
   bool Give(RecordedTick tick) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return stopped_ || queue_.size() < kQueue; });
+    if (queue_.size() >= kQueue) {
+      changed_.wait(lock, [&] { return stopped_ || queue_.size() <= kQueue / 2; });
+    }
     if (stopped_) return false;
     queue_.push_back(std::move(tick));
-    changed_.notify_all();
+    if (queue_.size() == 1) changed_.notify_all();
     return true;
   }
 
@@ -56,14 +62,16 @@ class NodeRunner {
   [[nodiscard]] const std::vector<Published>& outputs() const { return outputs_; }
 
  private:
-  static constexpr std::size_t kQueue = 64;
+  static constexpr std::size_t kQueue = 256;
   static constexpr std::int64_t kHealthPeriod_ns = 100'000'000;
 
   void Run() {
     RecordedTick tick;
+    ++at_work_;
     while (Take(&tick)) {
       if (!Make(tick)) break;
     }
+    --at_work_;
     if (result_.ticks > 0 && result_.missing.empty()) LookAtHealth(next_look_ns_);
     const std::lock_guard lock(mutex_);
     stopped_ = true;
@@ -72,11 +80,15 @@ class NodeRunner {
 
   bool Take(RecordedTick* tick) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return ended_ || !queue_.empty(); });
+    if (queue_.empty() && !ended_) {
+      --at_work_;
+      changed_.wait(lock, [&] { return ended_ || !queue_.empty(); });
+      ++at_work_;
+    }
     if (queue_.empty()) return false;
     *tick = std::move(queue_.front());
     queue_.pop_front();
-    changed_.notify_all();
+    if (queue_.size() == kQueue / 2) changed_.notify_all();
     return true;
   }
 
@@ -87,6 +99,9 @@ class NodeRunner {
     }
     const std::int64_t begin = runtime::MonotonicNs();
     std::uint64_t hash = 0;
+    const int others = at_work_.load(std::memory_order_relaxed) - 1;
+    node_->LetThreadsHelp(others == 0 ||
+                          others + further_threads_ < static_cast<int>(std::thread::hardware_concurrency()));
     try {
       hash = node_->Step(tick);
     } catch (const std::exception& error) {
@@ -129,6 +144,8 @@ class NodeRunner {
   NodeResult result_;
   std::vector<Published> outputs_;
   const bool go_on_;
+  const int further_threads_;
+  std::atomic<int>& at_work_;
   std::uint64_t epoch_ = 0;
   std::int64_t next_look_ns_ = 0;
 
@@ -148,10 +165,12 @@ bool LockStepResult::good() const {
 LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneView& scene,
                                 const config::CartConfig& cart, const std::function<void(double)>& progress) {
   TickSource source(settings.recording, settings.nodes, NodePeriods(cart));
+  std::atomic<int> at_work{0};
   std::vector<std::unique_ptr<NodeRunner>> runners;
   for (const NodeId node : settings.nodes) {
     runners.push_back(std::make_unique<NodeRunner>(
-        node, NodeMaking{scene, cart, settings.folder, settings.physics_threads, settings.figures}, settings.go_on));
+        node, NodeMaking{scene, cart, settings.folder, settings.physics_threads, settings.figures}, settings.go_on,
+        &at_work));
   }
 
   LockStepResult result;

@@ -85,6 +85,7 @@ class ReplayedPhysics final : public ReplayedNode {
     return published;
   }
   void FillHealth(Health* health) const override { node_->FillHealth(health); }
+  void LetThreadsHelp(bool help) override { help_ = help; }
 
  private:
   runtime::CheckpointFile* checkpoint() override { return &checkpoint_; }
@@ -107,6 +108,7 @@ class ReplayedPhysics final : public ReplayedNode {
     tools_.Give(tick.tools);
     handles_.Give(tick.handles);
     topology_.Give(tick.topology);
+    node_->LetThreadsHelp(help_);
     node_->Step(tick.tick);
     (void)manifests_.in->TakeLatest(&manifests_.sample);
     return manifests_.sample.state_hash;
@@ -114,6 +116,7 @@ class ReplayedPhysics final : public ReplayedNode {
 
   const SceneView& scene_;
   const int threads_;
+  bool help_ = true;
   runtime::CheckpointFile checkpoint_;
   Inlet<ToolState> tools_;
   Inlet<HandleState> handles_;

@@ -32,6 +32,9 @@ class ReplayedNode {
   /// between telling of a tick and sealing its checkpoint, which the first state shows. Any thread, one at a time.
   std::uint64_t Step(const RecordedTick& tick);
 
+  /// Whether threads of its own, beside the caller's, help in the next ticks. The state does not depend on it.
+  virtual void LetThreadsHelp(bool /*help*/) {}
+
   /// What the node published in its last tick; once for each tick.
   [[nodiscard]] virtual std::vector<Published> TakeOutputs() = 0;
 

@@ -30,8 +30,8 @@ struct Expected {
   std::uint64_t physics, thermal, haptics;
 };
 
-constexpr Expected kSmall{"small", 3.2, 0x4c6889f50ae4feb4, 0xfa1be26decf47121, 0x2c1ab011dbdf8aaf};
-constexpr Expected kBuiltIn{"built-in", 9.0, 0x52046f37ae5ecbaf, 0x9fad9526df5651d6, 0xb9129ff90c7c564e};
+constexpr Expected kSmall{"small", 3.2, 0x84eab1e799757706, 0x574417c7580d5eb4, 0x53147c55e7158a32};
+constexpr Expected kBuiltIn{"built-in", 9.0, 0x2124b997b0cea73f, 0x374f8758a669c592, 0x38f1a4b1c4fc760d};
 
 // Nobody has compared what clang and the sanitizers come to, and under these it takes minutes.
 #if defined(__clang__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
