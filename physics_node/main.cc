@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 
@@ -40,49 +42,61 @@ ExitCode RunPhysics(app::NodeApp& app) {
   const std::size_t capacity = physics::CheckpointCapacity(static_cast<Index>(app.scene().rest_position.size()));
   runtime::CheckpointFile checkpoint(session / seat.own, app.scene().hash, physics::kCheckpointLayout, capacity);
   const std::int64_t epoch_ns = runtime::MonotonicNs();
-  physics::PhysicsNode node(app.scene(),
-                            {app.MakeInput<ToolState>(), app.MakeInput<HandleState>(), app.MakeInput<TopologyState>(),
-                             app.MakeOutput<TissueFrame>(), app.MakeOutput<ContactModel>(),
-                             app.MakeOutput<CauteryContact>(), app.MakeOutput<TickManifest>()},
-                            &checkpoint, epoch_ns, app.cart().timing(NodeId::kPhysics).threads, seat.follows);
-  if (!seat.follows) app::LogCheckpoint(checkpoint, node.restored());
-  const auto fill = [&](Health* health) { node.FillHealth(health); };
+  const physics::PhysicsNode::Ports ports{
+      app.MakeInput<ToolState>(),     app.MakeInput<HandleState>(),   app.MakeInput<TopologyState>(),
+      app.MakeOutput<TissueFrame>(),  app.MakeOutput<ContactModel>(), app.MakeOutput<CauteryContact>(),
+      app.MakeOutput<TickManifest>(),
+  };
+  std::optional<physics::PhysicsNode> node;
+  const auto make = [&](bool follows) {
+    node.emplace(app.scene(), ports, &checkpoint, epoch_ns, app.cart().timing(NodeId::kPhysics).threads, follows);
+  };
+  make(seat.follows);
+  if (!seat.follows) app::LogCheckpoint(checkpoint, node->restored());
   if (seat.other.empty()) {
     return app.Run(
-        app.timing(), [&](const Tick& tick) { node.Step(tick); }, fill);
+        app.timing(), [&](const Tick& tick) { node->Step(tick); }, [&](Health* health) { node->FillHealth(health); });
   }
 
   physics::Pair pair(app.MakeInput<TickManifest>(), NodeId::kPhysics, !seat.follows,
                      static_cast<std::uint64_t>(epoch_ns));
   std::atomic<bool> leads{!seat.follows};
+  std::mutex replacing;  ///< Of the node, against the health thread.
   const auto step = [&](const Tick& tick) {
     const bool other_holds = !leads.load(std::memory_order_relaxed) && runtime::IsInUse(session / seat.other);
     switch (pair.Update(tick.stamp_ns, other_holds)) {
       case physics::Pair::Role::kFollows:
-        node.Follow(tick);
+        node->Follow(tick);
         return;
       case physics::Pair::Role::kTakesOver: {
         const auto left =
             runtime::CheckpointFile::Peek(session / seat.other, app.scene().hash, physics::kCheckpointLayout, capacity);
         const bool restored =
-            node.TakeOver(left ? std::span<const std::byte>(*left) : std::span<const std::byte>(), tick);
+            node->TakeOver(left ? std::span<const std::byte>(*left) : std::span<const std::byte>(), tick);
         leads.store(true, std::memory_order_relaxed);
-        node.Step(tick);
+        node->Step(tick);
         runtime::Log(runtime::LogLevel::kWarning,
                      std::string("the leading process is gone or silent: this one has taken over, ") +
                          (restored ? "from the newest checkpoint" : "from the beginning: there is no checkpoint"));
         return;
       }
       case physics::Pair::Role::kLeads:
-        node.Step(tick);
+        node->Step(tick);
         return;
-      case physics::Pair::Role::kRetires:
-        app.Finish(ExitCode::kDone, "another process has taken over while this one was held up");
+      case physics::Pair::Role::kRetires: {
+        // What this one has computed since nobody has read. To take over again it must be as one that has just started.
+        const std::lock_guard lock(replacing);
+        leads.store(false, std::memory_order_relaxed);
+        make(true);
+        runtime::Log(runtime::LogLevel::kWarning,
+                     "the other process has taken over while this one was held up: it follows from now on");
         return;
+      }
     }
   };
   return app.Run(app.timing(), step, [&](Health* health) {
-    fill(health);
+    const std::lock_guard lock(replacing);
+    node->FillHealth(health);
     if (!leads.load(std::memory_order_relaxed) && health->state == HealthState::kRunning) {
       health->state = HealthState::kWaiting;
     }

@@ -57,6 +57,7 @@ void Workers::Help(int worker) {
 }
 
 void Workers::HelpPart(int part, int worker) {
+  const bool own = part == worker || part == count();
   std::atomic<std::uint64_t>& word = tickets_[static_cast<std::size_t>(part)].word;
   std::uint64_t ticket = word.load(std::memory_order_acquire);
   for (;;) {
@@ -64,15 +65,17 @@ void Workers::HelpPart(int part, int worker) {
     if (next >= end) {
       return;
     }
-    if (!word.compare_exchange_weak(ticket, ticket + 1, std::memory_order_acq_rel, std::memory_order_acquire)) {
+    const std::uint64_t claimed = own ? ticket + 1 : ticket - 0x10000u;
+    if (!word.compare_exchange_weak(ticket, claimed, std::memory_order_acq_rel, std::memory_order_acquire)) {
       continue;
     }
+    const int claim = own ? next : end - 1;
     // The phase cannot end before this task has, so all of this is its own.
     const int shared = shared_.load(std::memory_order_relaxed), split = split_.load(std::memory_order_relaxed);
-    int task = shared + next;
+    int task = shared + claim;
     if (part < count()) {
       const int first = First(split, part), of_first = First(split, part + 1) - first;
-      task = next < of_first ? first + next : split + First(shared - split, part) + next - of_first;
+      task = claim < of_first ? first + claim : split + First(shared - split, part) + claim - of_first;
     }
     call_.load(std::memory_order_relaxed)(body_.load(std::memory_order_relaxed), task, worker);
     done_.fetch_add(1, std::memory_order_release);

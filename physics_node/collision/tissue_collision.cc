@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "physics_node/collision/closest.h"
 #include "services/core/breathing.h"
@@ -105,10 +106,12 @@ void TissueCollision::WatchOrgan() {
     ring_start_.push_back(static_cast<Index>(ring_.size()));
   }
   const TriangleTree tree(corners);
+  Index guess = kNoIndex;
   for (Index node = 0; node < scene_.membrane.node_count() && !tree.empty(); ++node) {
     const Index particle = scene_.membrane.first + node;
     const Vec3f& p = scene_.rest_position[particle];
-    const TriangleTree::Hit hit = tree.Nearest(p, 1.0f);
+    const TriangleTree::Hit hit = tree.Nearest(p, 1.0f, guess);
+    guess = hit.triangle;
     if (scene_.inverse_mass[particle] > 0.0f && hit.triangle != kNoIndex) {
       const float rest = SignedDistance(p, corners[hit.triangle]).distance;
       if (rest > 0.0f) {
@@ -142,23 +145,28 @@ void TissueCollision::WatchFixed(const StaticSurface& surface) {
     if (!(scene_.inverse_mass[particle] > 0.0f) || (particle < scene_.tube_vertex_count && !on_surface[particle])) {
       continue;
     }
-    const Vec3f& p = scene_.rest_position[particle];
-    const TriangleTree::Hit hit = fixed.tree.Nearest(p, kAnywhere);
-    if (hit.triangle == kNoIndex) {
-      continue;
-    }
-    const float height = fixed.tree.normal(hit.triangle).dot(p - hit.point);
-    if (height < 0.0f) {
-      continue;
-    }
     Watch watch;
     watch.particle = particle;
     watch.at = particles_->Ref(particle);
-    watch.clearance = std::min(scene_.physics.collision_margin_m, 0.5f * height);
-    fixed.watches.all.push_back(watch);
+    Judge(fixed.tree, kSight, &watch);
+    if (!watch.behind) {
+      fixed.watches.all.push_back(watch);
+    }
   }
   fixed.watches.MakeGroups(*particles_);
   fixed_.push_back(std::move(fixed));
+}
+
+/// On which side of a fixed surface the particle lies at rest, if that is within range.
+void TissueCollision::Judge(const TriangleTree& tree, float range, Watch* watch) const {
+  const Vec3f& p = scene_.rest_position[watch->particle];
+  const TriangleTree::Hit hit = tree.Nearest(p, range, watch->triangle);
+  watch->judged = hit.triangle != kNoIndex;
+  if (watch->judged) {
+    const float height = tree.normal(hit.triangle).dot(p - hit.point);
+    watch->behind = height < 0.0f;
+    watch->clearance = std::min(scene_.physics.collision_margin_m, 0.5f * height);
+  }
 }
 
 bool TissueCollision::breath_near() const {
@@ -273,7 +281,8 @@ void TissueCollision::LookAtDue(Watches* watches, int part, std::span<const floa
           }
           // Asked again a step before the block's fastest could have come there: then its own way is known.
           const float alone = watch.gap - watch.gone - others - Band(step) - step;
-          times.due = travel + (watch.near ? kKeep - watch.gone : std::max(0.0f, std::min(alone, kSight)));
+          const float far = watch.gap < kNever ? kSight : kNever;
+          times.due = travel + (watch.near ? kKeep - watch.gone : std::max(0.0f, std::min(alone, far)));
           times.start = watch.near ? travel - watch.gone + watch.gap : kNever;
         }
         group.times = {std::min(group.times.due, times.due), std::min(group.times.start, times.start)};
@@ -318,10 +327,18 @@ void TissueCollision::LookAtFixed(Fixed* fixed, int part, std::span<const float>
       [&](const Watch& watch) { return Vec3f(particles_->At(watch.at) - shift); },
       [&](Watch* watch) {
         const Vec3f p = particles_->At(watch->at) - shift;
-        const TriangleTree::Hit hit = tree.Nearest(p, kSight);
+        const TriangleTree::Hit hit = tree.Nearest(p, kSight, watch->triangle);
         if (hit.triangle == kNoIndex) {
           watch->front = watch->blocks = false;
           return kSight;
+        }
+        watch->triangle = hit.triangle;
+        if (!watch->judged) {
+          Judge(tree, kAnywhere, watch);
+        }
+        if (watch->behind) {
+          watch->blocks = false;
+          return kNever;
         }
         watch->point = hit.point;
         watch->normal = tree.normal(hit.triangle);

@@ -73,6 +73,9 @@ class TissueCollision {
     bool front = false;  ///< Seen in front of the surface and not lost from sight since.
     bool blocks = true;  ///< What it was seen nearest to can hold it back: not out of sight, nor past a rim.
     bool near = false;   ///< Rows may come of it before it is looked at again.
+    // Of a fixed surface:
+    bool judged = false;  ///< It is known where the particle lies at rest, as far as the next two tell.
+    bool behind = false;  ///< Behind the surface: it is not the surface's business.
     Vec3f point = Vec3f::Zero();   ///< Of a fixed surface: the nearest one …
     Vec3f normal = Vec3f::Zero();  ///< … and its normal.
   };
@@ -125,6 +128,7 @@ class TissueCollision {
 
   void WatchOrgan();
   void WatchFixed(const StaticSurface& surface);
+  void Judge(const TriangleTree& tree, float range, Watch* watch) const;
   [[nodiscard]] std::array<Vec3f, 3> OrganCorners(Index triangle) const;
   /// Walks to the nearest triangle of the organ from the one known.
   void Walk(Watch* watch, const Vec3f& p) const;

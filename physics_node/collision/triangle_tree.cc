@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <utility>
 
 #include "physics_node/collision/closest.h"
 
@@ -12,10 +13,6 @@ namespace {
 constexpr Index kLeafSize = 4;
 /// Deeper than any tree of 2^32 triangles halved at each node.
 constexpr std::size_t kMaxDepth = 64;
-
-float DistanceSqToBox(const Vec3f& p, const Vec3f& low, const Vec3f& high) {
-  return (p - p.cwiseMax(low).cwiseMin(high)).squaredNorm();
-}
 
 }  // namespace
 
@@ -43,8 +40,8 @@ void TriangleTree::Build(Index node, Index first, Index last) {
       high = high.cwiseMax(p);
     }
   }
-  nodes_[node].low = low;
-  nodes_[node].high = high;
+  nodes_[node].low = F4{low.x(), low.y(), low.z(), 0};
+  nodes_[node].high = F4{high.x(), high.y(), high.z(), 0};
   if (last - first <= kLeafSize) {
     nodes_[node].first = first;
     nodes_[node].count = last - first;
@@ -64,36 +61,60 @@ void TriangleTree::Build(Index node, Index first, Index last) {
   Build(left + 1, middle, last);
 }
 
-TriangleTree::Hit TriangleTree::Nearest(const Vec3f& p, float range) const {
+inline float TriangleTree::DistanceSq(const F4& p, const Node& box) {
+  const F4 zero{}, below = box.low - p, above = p - box.high;
+  F4 out = below > above ? below : above;
+  out = out > zero ? out : zero;
+  out *= out;
+  return out[0] + out[1] + out[2];
+}
+
+inline void TriangleTree::Try(Index triangle, const Vec3f& p, Hit* hit) const {
+  const auto& t = triangles_[triangle];
+  const auto b = ClosestOnTriangle(p, t[0], t[1], t[2]);
+  const Vec3f point = b[0] * t[0] + b[1] * t[1] + b[2] * t[2];
+  const float distance_sq = (p - point).squaredNorm();
+  if (distance_sq < hit->distance_sq ||
+      (distance_sq == hit->distance_sq && (hit->triangle == kNoIndex || triangle < hit->triangle))) {
+    *hit = {triangle, point, distance_sq};
+  }
+}
+
+TriangleTree::Hit TriangleTree::Nearest(const Vec3f& p, float range, Index guess) const {
   Hit hit;
   hit.distance_sq = range * range;
   if (nodes_.empty()) {
     return hit;
   }
-  std::array<Index, kMaxDepth> stack;
+  if (guess != kNoIndex) {
+    Try(guess, p, &hit);
+  }
+  const F4 from{p.x(), p.y(), p.z(), 0};
+  struct Waiting {
+    Index node;
+    float distance_sq;
+  };
+  std::array<Waiting, kMaxDepth> stack;
   std::size_t depth = 0;
-  stack[depth++] = 0;
+  stack[depth++] = {0, 0.0f};
   while (depth > 0) {
-    const Node& node = nodes_[stack[--depth]];
-    if (DistanceSqToBox(p, node.low, node.high) > hit.distance_sq) {
+    const Waiting next = stack[--depth];
+    if (next.distance_sq > hit.distance_sq) {
       continue;
     }
+    const Node& node = nodes_[next.node];
     if (node.count == 0) {
-      const Node &left = nodes_[node.first], &right = nodes_[node.first + 1];
-      const bool left_first = DistanceSqToBox(p, left.low, left.high) <= DistanceSqToBox(p, right.low, right.high);
-      stack[depth++] = left_first ? node.first + 1 : node.first;
-      stack[depth++] = left_first ? node.first : node.first + 1;
+      Waiting near{node.first, DistanceSq(from, nodes_[node.first])};
+      Waiting far{node.first + 1, DistanceSq(from, nodes_[node.first + 1])};
+      if (far.distance_sq < near.distance_sq) {
+        std::swap(near, far);
+      }
+      stack[depth++] = far;
+      stack[depth++] = near;
       continue;
     }
     for (Index i = node.first; i < node.first + node.count; ++i) {
-      const auto& t = triangles_[order_[i]];
-      const auto b = ClosestOnTriangle(p, t[0], t[1], t[2]);
-      const Vec3f point = b[0] * t[0] + b[1] * t[1] + b[2] * t[2];
-      const float distance_sq = (p - point).squaredNorm();
-      if (distance_sq < hit.distance_sq ||
-          (distance_sq == hit.distance_sq && (hit.triangle == kNoIndex || order_[i] < hit.triangle))) {
-        hit = {order_[i], point, distance_sq};
-      }
+      Try(order_[i], p, &hit);
     }
   }
   return hit;

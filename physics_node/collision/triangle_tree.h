@@ -21,18 +21,23 @@ class TriangleTree {
   explicit TriangleTree(std::vector<std::array<Vec3f, 3>> triangles);
 
   [[nodiscard]] bool empty() const { return nodes_.empty(); }
-  /// The nearest triangle to `p` within `range` [m]; of equally near ones that with the least index.
-  [[nodiscard]] Hit Nearest(const Vec3f& p, float range) const;
+  /// The nearest triangle to `p` within `range` [m]; of equally near ones that with the least index. Quicker with the
+  /// guess that some triangle is near, such as the one nearest to a point beside; kNoIndex: none.
+  [[nodiscard]] Hit Nearest(const Vec3f& p, float range, Index guess = kNoIndex) const;
   /// Unit normal, counter-clockwise.
   [[nodiscard]] const Vec3f& normal(Index triangle) const { return normals_[triangle]; }
 
  private:
+  using F4 = float __attribute__((vector_size(16)));  ///< A point; the last lane is 0.
   struct Node {
-    Vec3f low, high;
+    F4 low, high;
     Index first = 0;  ///< Leaf: of order_; else left child, the right one follows it.
     Index count = 0;  ///< 0: inner node.
   };
   void Build(Index node, Index first, Index last);
+  [[nodiscard]] static float DistanceSq(const F4& p, const Node& box);
+  /// Takes the triangle if it is nearer.
+  void Try(Index triangle, const Vec3f& p, Hit* hit) const;
 
   std::vector<std::array<Vec3f, 3>> triangles_;
   std::vector<Vec3f> normals_;

@@ -16,6 +16,7 @@ Pair::Role Pair::Update(std::int64_t now_ns, bool other_holds) {
   looked_ns_ = now_ns;
   if (heard || absent || heard_ns_ == 0) heard_ns_ = now_ns;
   if (role_ == Role::kTakesOver) role_ = Role::kLeads;
+  if (role_ == Role::kRetires) role_ = Role::kFollows;
   if (role_ == Role::kLeads && leader_epoch_ > own_epoch_) role_ = Role::kRetires;
   if (heard && other_holds) holder_epoch_ = leader_epoch_;
   const bool gone = leader_epoch_ != 0 && holder_epoch_ == leader_epoch_ && !other_holds;

@@ -17,7 +17,7 @@ class Pair {
     kFollows,
     kTakesOver,  ///< The leader is gone, or has been silent for too long: from this tick on this process leads.
     kLeads,
-    kRetires  ///< Another process has taken over: this one has to end.
+    kRetires  ///< Another process has taken over: from now on this one follows.
   };
 
   /// @param own_epoch of the manifests that this process sends if it leads from the start.

@@ -29,8 +29,9 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max();
 constexpr auto kPollPeriod = std::chrono::milliseconds(10);
-// The first samples must not pass the recorder by: a replay could not begin without them. If there is one it is found
-// within so many looks of the session's first; each look proves that this process was given time …
+// The first samples must not pass the recorder by: a replay could not begin without them. In a session that is recorded
+// it is found within so many looks of the session's first, or is gone; each look proves that this process was given
+// time …
 constexpr int kLooksForRecorder = 10;
 // … its readers are seen within so many; a recorder that stands still holds nobody up for longer …
 constexpr int kLooksForReaders = 50;
@@ -91,6 +92,7 @@ struct NodeApp::Impl {
                                      "\"): stop it, or start this node with the scene of the session");
         return;
       }
+      session_recorded = manifest.recorded;
       if (session_start_ns.exchange(manifest.session_start_ns, std::memory_order_relaxed) == kSessionUnknown) {
         Log(LogLevel::kInfo, "joined session " + manifest.session_id);
       }
@@ -177,6 +179,7 @@ struct NodeApp::Impl {
        }}};
 
   std::size_t refusals_told = 0;
+  bool session_recorded = false;
   // Relaxed: one number, nothing else is published through it.
   std::atomic<std::int64_t> session_start_ns{kSessionUnknown};
   std::atomic<HealthState> state{HealthState::kStarting};
@@ -286,9 +289,10 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
       if (app.session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown) ++looks;
       if (app.joined->participant.IsReadBy(bus::kRecorderPeer)) ++looks_read;
     }
-    const bool recorded = !replayable || looks_read > kLooksAfterReaders || looks > kLooksForReaders ||
-                          (looks > kLooksForRecorder && !app.joined->participant.Knows(bus::kRecorderPeer));
-    if (waits && recorded && SessionTime(now) >= 0) {
+    const bool begins = !replayable || !app.session_recorded || looks_read > kLooksAfterReaders ||
+                        looks > kLooksForReaders ||
+                        (looks > kLooksForRecorder && !app.joined->participant.Knows(bus::kRecorderPeer));
+    if (waits && begins && SessionTime(now) >= 0) {
       app.state = HealthState::kRunning;
       thread.Start();
       app.stepping.store(true, std::memory_order_relaxed);

@@ -151,7 +151,8 @@ struct FieldsOf<SceneManifest> {
                                           FULCRUM_FIELD(SceneManifest, session_id),
                                           FULCRUM_FIELD(SceneManifest, scene_hash),
                                           FULCRUM_FIELD(SceneManifest, session_start_ns),
-                                          FULCRUM_FIELD(SceneManifest, mode)};
+                                          FULCRUM_FIELD(SceneManifest, mode),
+                                          FULCRUM_FIELD(SceneManifest, recorded)};
 };
 template <>
 struct FieldsOf<Command> {

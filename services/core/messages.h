@@ -244,6 +244,7 @@ struct SceneManifest {
   std::uint64_t scene_hash = 0;
   std::int64_t session_start_ns = 0;  ///< CLOCK_MONOTONIC at session time 0 [ns].
   SessionMode mode = SessionMode::kLive;
+  bool recorded = false;  ///< By a recorder of the session: who has just come lets it find him before he begins.
 };
 
 struct Command {

@@ -109,11 +109,6 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
     due_ns_ = now_ns;
     return death;
   }
-  if (command_.of_pair && end->signal == 0 && static_cast<ExitCode>(end->exit_code) == ExitCode::kDone) {
-    death.cause = "was relieved by the other process of its pair";
-    due_ns_ = now_ns;
-    return death;
-  }
   const std::optional<std::int64_t> delay = IsFinal(*end) ? std::nullopt : policy_.OnDeath(now_ns - started_ns_);
   death.for_good = failed_ = !delay.has_value();
   due_ns_ = now_ns + delay.value_or(0);

@@ -39,7 +39,6 @@ NodeCommand NodeStarter::Usual(NodeId id) const {
 NodeCommand NodeStarter::InPair(const std::string& seat, bool follows) const {
   NodeCommand command = Usual(NodeId::kPhysics);
   command.arguments.insert(command.arguments.end(), {"--pair", seat});
-  command.of_pair = true;
   (follows ? command.arguments : command.again).emplace_back("--follow");
   command.log = folder.logs / (std::string(NodeName(NodeId::kPhysics)) + "-" + seat + ".log");
   return command;
@@ -54,7 +53,7 @@ NodeCommand NodeStarter::Replacement(const NodeCommand& now, const std::vector<s
   command.program = words.front();
   command.foreign = words.size() > 1;
   if (command.foreign) {
-    command.has_spare = command.of_pair = false;
+    command.has_spare = false;
     command.arguments.clear();
     command.again.clear();
     for (std::size_t i = 1; i < words.size(); ++i) command.arguments.push_back(Filled(words[i]));

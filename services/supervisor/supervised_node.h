@@ -21,7 +21,6 @@ struct NodeCommand {
   std::filesystem::path log;
   std::vector<std::string> again;  ///< More arguments, from the second start on.
   bool has_spare = false;  ///< Understands --spare (services/app/spare.h), and starts slowly enough to need one.
-  bool of_pair = false;    ///< One of two processes: one that ends well has been relieved by the other.
   bool foreign = false;    ///< Not one of our nodes: its Health, if any, may name another process.
 };
 

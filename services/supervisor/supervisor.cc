@@ -64,6 +64,8 @@ constexpr std::int64_t kAskedFor = 3 * kSecond_ns;
 // Commands whose askers may not have heard the answer yet.
 constexpr std::size_t kAnswersKept = 8;
 
+bool HasRecorder(const UpSettings& settings) { return settings.record || settings.keep_s > 0; }
+
 std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) {
   std::vector<NodeId> nodes;
   for (int i = 0; i < kNodeCount; ++i) {
@@ -75,7 +77,7 @@ std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) 
   if (nodes.empty()) {
     throw InputError(settings.scene.string() + ": the scene names no node to start here");
   }
-  if (settings.record || settings.keep_s > 0) {
+  if (HasRecorder(settings)) {
     nodes.push_back(NodeId::kRecorder);
   }
   return nodes;
@@ -520,6 +522,7 @@ struct Supervisor::Impl {
     manifest.session_id = folder.session_id;
     manifest.scene_hash = scene.view().hash;
     manifest.session_start_ns = start_ns;
+    manifest.recorded = HasRecorder(settings);
     if (assessed) assessed->Begin(start_ns);
     if (!manifests->Write(manifest)) {
       Fail(ExitCode::kFailure, "the session could not be announced on the bus");

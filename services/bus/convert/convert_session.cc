@@ -59,6 +59,7 @@ bool ToWire(const SceneManifest& from, idl::SceneManifest* to) {
   to->scene_hash(from.scene_hash);
   to->session_start_ns(from.session_start_ns);
   to->mode(Octet(from.mode));
+  to->recorded(from.recorded);
   return PutName(from.scene_name, &to->scene_name()) && PutName(from.session_id, &to->session_id());
 }
 
@@ -67,6 +68,7 @@ void FromWire(const idl::SceneManifest& from, SceneManifest* to) {
   to->scene_hash = from.scene_hash();
   to->session_start_ns = from.session_start_ns();
   to->mode = static_cast<SessionMode>(from.mode());
+  to->recorded = from.recorded();
   Get(from.scene_name(), &to->scene_name);
   Get(from.session_id(), &to->session_id);
 }

@@ -3,6 +3,8 @@
 #include <signal.h>
 
 #include <chrono>
+#include <filesystem>
+#include <string>
 #include <thread>
 
 #include "tests/support/cart.h"
@@ -10,6 +12,19 @@
 
 namespace fulcrum {
 namespace {
+
+/// The process of the cart that was started with these arguments, one after the other; 0: none.
+pid_t ProcessWith(const testing::Cart& cart, const std::string& option, const std::string& value) {
+  const std::string session = std::filesystem::canonical(cart.session()).filename();
+  const std::string wanted = option + '\0' + value + '\0';
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    const std::string arguments = testing::ReadFile(entry.path() / "cmdline");
+    if (arguments.find(session) != std::string::npos && arguments.find(wanted) != std::string::npos) {
+      return std::stoi(entry.path().filename());
+    }
+  }
+  return 0;
+}
 
 TEST(ReplayOfTheCart, ComesToTheSameStatesThroughKillsAndATakeover) {
   testing::Cart cart("small", 57, {"--record", "--standby"});
@@ -34,6 +49,25 @@ TEST(ReplayOfTheCart, ComesToTheSameStatesThroughKillsAndATakeover) {
   EXPECT_GE(run.figures.at("physics_node.starts"), 2) << run.said;
   EXPECT_EQ(run.figures.at("thermal_node.starts"), 2) << run.said;
   EXPECT_EQ(run.figures.at("haptics_node.starts"), 2) << run.said;
+}
+
+TEST(ReplayOfTheCart, ALeaderThatWasHeldUpFollowsAndTakesOverAgain) {
+  testing::Cart cart("small", 57, {"--record", "--standby"});
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.PictureTime() >= 1; })) << cart.Said();
+  const pid_t first = ProcessWith(cart, "--pair", "a"), second = ProcessWith(cart, "--pair", "b");
+  ASSERT_GT(first, 0) << cart.Said();
+  ASSERT_GT(second, 0) << cart.Said();
+  ::kill(first, SIGSTOP);
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  ::kill(first, SIGCONT);
+  std::this_thread::sleep_for(std::chrono::milliseconds(1000));
+  EXPECT_EQ(ProcessWith(cart, "--pair", "a"), first) << "it goes on, following";
+  ::kill(second, SIGKILL);
+  EXPECT_EQ(cart.WaitForEnd(60), 0) << cart.Said();
+  const auto run = testing::Replay(cart.session() / "recording.mcap", {"--into", "physics"}, 60);
+  if (run.said.find("the last of its process") != std::string::npos) GTEST_SKIP() << run.said;
+  EXPECT_EQ(run.exit_code, 0) << run.said;
+  EXPECT_GE(run.figures.at("physics_node.starts"), 3) << run.said;
 }
 
 }  // namespace

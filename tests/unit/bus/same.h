@@ -81,7 +81,8 @@ inline bool Same(const ThermalEvent& a, const ThermalEvent& b) {
 
 inline bool Same(const SceneManifest& a, const SceneManifest& b) {
   return Same(a.stamp, b.stamp) && a.scene_name == b.scene_name && a.session_id == b.session_id &&
-         a.scene_hash == b.scene_hash && a.session_start_ns == b.session_start_ns && a.mode == b.mode;
+         a.scene_hash == b.scene_hash && a.session_start_ns == b.session_start_ns && a.mode == b.mode &&
+         a.recorded == b.recorded;
 }
 
 inline bool Same(const Command& a, const Command& b) {

@@ -146,6 +146,7 @@ inline SceneManifest Sample(std::uint64_t sequence) {
   m.scene_hash = 0x1122334455667788ull;
   m.session_start_ns = 123456789012345;
   m.mode = SessionMode::kLockStep;
+  m.recorded = true;
   return m;
 }
 

@@ -94,7 +94,7 @@ TEST_F(PairTest, ItsOwnAbsenceIsNotTheLeaders) {
   EXPECT_EQ(Next(&pair), Pair::Role::kFollows);
 }
 
-TEST_F(PairTest, AReplacedLeaderRetires) {
+TEST_F(PairTest, AReplacedLeaderRetiresAndFollows) {
   Pair pair(*in_, NodeId::kPhysics, true, 5);
   LeaderSpeaks(5);
   ASSERT_EQ(Next(&pair), Pair::Role::kLeads);
@@ -102,6 +102,18 @@ TEST_F(PairTest, AReplacedLeaderRetires) {
   ASSERT_EQ(Next(&pair), Pair::Role::kLeads) << "one that was replaced earlier means nothing";
   LeaderSpeaks(static_cast<std::uint64_t>(now_));
   EXPECT_EQ(Next(&pair, 100 * kPeriod), Pair::Role::kRetires);
+  // It was away for so long as it takes to become one that follows.
+  EXPECT_EQ(Next(&pair, 15 * kPeriod), Pair::Role::kFollows);
+  const auto other = static_cast<std::uint64_t>(now_);
+  for (int i = 0; i < 10; ++i) {
+    LeaderSpeaks(other);
+    ASSERT_EQ(Next(&pair), Pair::Role::kFollows);
+  }
+  int periods = 0;
+  while (Next(&pair) == Pair::Role::kFollows) ++periods;
+  EXPECT_EQ(periods, 3);
+  EXPECT_GT(pair.own_epoch(), other);
+  EXPECT_EQ(Next(&pair), Pair::Role::kLeads);
 }
 
 }  // namespace
