@@ -1,6 +1,7 @@
 #include "physics_node/accurate/workers.h"
 
 #include <immintrin.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <chrono>
@@ -28,6 +29,28 @@ bool SpinUntil(const Done& done) {
   } while (std::chrono::steady_clock::now() - start < kPatience);
   return false;
 }
+
+/// Where the calling thread may run: all that it might at first, but one.
+class OtherCpus {
+ public:
+  OtherCpus() { known_ = ::sched_getaffinity(0, sizeof(all_), &all_) == 0; }
+  void KeepOff(int cpu) {
+    if (cpu == kept_off_ || cpu < 0 || !known_) {
+      return;
+    }
+    kept_off_ = cpu;
+    cpu_set_t others = all_;
+    CPU_CLR(static_cast<std::size_t>(cpu), &others);
+    if (CPU_COUNT(&others) > 0) {
+      (void)::sched_setaffinity(0, sizeof(others), &others);
+    }
+  }
+
+ private:
+  cpu_set_t all_{};
+  bool known_ = false;
+  int kept_off_ = -1;
+};
 
 }  // namespace
 
@@ -90,6 +113,7 @@ void Workers::RunShared(int tasks, int split, int errands, Call call, const void
   shared_.store(shared, std::memory_order_relaxed);
   split_.store(split, std::memory_order_relaxed);
   done_.store(0, std::memory_order_relaxed);
+  caller_cpu_.store(::sched_getcpu(), std::memory_order_relaxed);
   const std::uint32_t phase = phase_.load(std::memory_order_relaxed) + 1;
   for (int part = 0; part <= count(); ++part) {
     const int own = part == count() ? errands
@@ -109,12 +133,14 @@ void Workers::RunShared(int tasks, int split, int errands, Call call, const void
 }
 
 void Workers::Loop(int worker) {
+  OtherCpus cpus;
   std::uint32_t seen = 0;
   while (!stop_.load(std::memory_order_relaxed)) {
     if (!SpinUntil([&] { return phase_.load(std::memory_order_acquire) != seen; })) {
       phase_.wait(seen, std::memory_order_acquire);
     }
     seen = phase_.load(std::memory_order_acquire);
+    cpus.KeepOff(caller_cpu_.load(std::memory_order_relaxed));
     Help(worker);
   }
 }

@@ -163,6 +163,7 @@ void TissueCollision::Judge(const TriangleTree& tree, float range, Watch* watch)
   const TriangleTree::Hit hit = tree.Nearest(p, range, watch->triangle);
   watch->judged = hit.triangle != kNoIndex;
   if (watch->judged) {
+    watch->triangle = hit.triangle;
     const float height = tree.normal(hit.triangle).dot(p - hit.point);
     watch->behind = height < 0.0f;
     watch->clearance = std::min(scene_.physics.collision_margin_m, 0.5f * height);

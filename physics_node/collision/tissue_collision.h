@@ -74,8 +74,8 @@ class TissueCollision {
     bool blocks = true;  ///< What it was seen nearest to can hold it back: not out of sight, nor past a rim.
     bool near = false;   ///< Rows may come of it before it is looked at again.
     // Of a fixed surface:
-    bool judged = false;  ///< It is known where the particle lies at rest, as far as the next two tell.
-    bool behind = false;  ///< Behind the surface: it is not the surface's business.
+    bool judged = false;           ///< It is known where the particle lies at rest, as far as the next two tell.
+    bool behind = false;           ///< Behind the surface: it is not the surface's business.
     Vec3f point = Vec3f::Zero();   ///< Of a fixed surface: the nearest one …
     Vec3f normal = Vec3f::Zero();  ///< … and its normal.
   };
