@@ -66,6 +66,14 @@ TissueCollision::Signed TissueCollision::SignedDistance(const Vec3f& p, const st
   return result;
 }
 
+void TissueCollision::Watch::SetGap(float from_contact, const Vec3f& where, float others_travel) {
+  gap = from_contact;
+  near = blocks && gap < Band(way) + kKeep;
+  others = others_travel;
+  gone = 0.0f;
+  seen = last = where;
+}
+
 void TissueCollision::Watches::MakeGroups(const ParticleStore& particles) {
   for (Index i = 0; i < all.size(); ++i) {
     const Index block = particles.BlockOf(all[i].particle);
@@ -121,6 +129,7 @@ void TissueCollision::WatchOrgan() {
         watch.at = particles_->Ref(particle);
         watch.triangle = hit.triangle;
         watch.clearance = clearance;
+        watch.SetGap(rest - clearance, Standpoint(watch), 0.0f);
         organ_.all.push_back(watch);
       }
     }
@@ -148,26 +157,14 @@ void TissueCollision::WatchFixed(const StaticSurface& surface) {
     Watch watch;
     watch.particle = particle;
     watch.at = particles_->Ref(particle);
-    Judge(fixed.tree, kSight, &watch);
+    const Vec3f& rest = scene_.rest_position[particle];
+    watch.SetGap(See(fixed.tree, rest, &watch), rest, 0.0f);
     if (!watch.behind) {
       fixed.watches.all.push_back(watch);
     }
   }
   fixed.watches.MakeGroups(*particles_);
   fixed_.push_back(std::move(fixed));
-}
-
-/// On which side of a fixed surface the particle lies at rest, if that is within range.
-void TissueCollision::Judge(const TriangleTree& tree, float range, Watch* watch) const {
-  const Vec3f& p = scene_.rest_position[watch->particle];
-  const TriangleTree::Hit hit = tree.Nearest(p, range, watch->triangle);
-  watch->judged = hit.triangle != kNoIndex;
-  if (watch->judged) {
-    watch->triangle = hit.triangle;
-    const float height = tree.normal(hit.triangle).dot(p - hit.point);
-    watch->behind = height < 0.0f;
-    watch->clearance = std::min(scene_.physics.collision_margin_m, 0.5f * height);
-  }
 }
 
 bool TissueCollision::breath_near() const {
@@ -274,11 +271,8 @@ void TissueCollision::LookAtDue(Watches* watches, int part, std::span<const floa
           const float left = watch.near ? kKeep - watch.gone : watch.gap - watch.gone - others - Band(watch.way);
           if (!(left > 0.0f)) {
             ++found.looked_at;
-            watch.gap = look(&watch);
-            watch.near = watch.blocks && watch.gap < Band(watch.way) + kKeep;
-            watch.others = others_travel;
-            watch.gone = others = 0.0f;
-            watch.seen = watch.last = stand(watch);
+            watch.SetGap(look(&watch), stand(watch), others_travel);
+            others = 0.0f;
           }
           // Asked again a step before the block's fastest could have come there: then its own way is known.
           const float alone = watch.gap - watch.gone - others - Band(step) - step;
@@ -326,31 +320,37 @@ void TissueCollision::LookAtFixed(Fixed* fixed, int part, std::span<const float>
       &fixed->watches, part, moved, fixed->breathes ? breath_travel_ : 0.0f, breathed,
       [&](const Group&) { return breathed; },
       [&](const Watch& watch) { return Vec3f(particles_->At(watch.at) - shift); },
-      [&](Watch* watch) {
-        const Vec3f p = particles_->At(watch->at) - shift;
-        const TriangleTree::Hit hit = tree.Nearest(p, kSight, watch->triangle);
-        if (hit.triangle == kNoIndex) {
-          watch->front = watch->blocks = false;
-          return kSight;
-        }
-        watch->triangle = hit.triangle;
-        if (!watch->judged) {
-          Judge(tree, kAnywhere, watch);
-        }
-        if (watch->behind) {
-          watch->blocks = false;
-          return kNever;
-        }
-        watch->point = hit.point;
-        watch->normal = tree.normal(hit.triangle);
-        const float distance = std::sqrt(hit.distance_sq), height = watch->normal.dot(p - hit.point);
-        const bool beside = distance > kTouching && std::abs(height) < kBesideCosine * distance;
-        // What goes round a rim has not come through: from beneath, nothing throws it back up.
-        watch->front = !beside && (watch->front || height > 0.0f);
-        watch->blocks = watch->front && !beside && height > -kMaxBehind;
-        // Past a rim or behind, it comes to contact only round the rim.
-        return watch->blocks ? height - watch->clearance : std::max(distance, 2.0f * kKeep);
-      });
+      [&](Watch* watch) { return See(tree, particles_->At(watch->at) - shift, watch); });
+}
+
+/// How far a particle at p is from contact with a fixed surface.
+float TissueCollision::See(const TriangleTree& tree, const Vec3f& p, Watch* watch) const {
+  const TriangleTree::Hit hit = tree.Nearest(p, kSight, watch->triangle);
+  if (hit.triangle == kNoIndex) {
+    watch->front = watch->blocks = false;
+    return kSight;
+  }
+  watch->triangle = hit.triangle;
+  if (!std::exchange(watch->judged, true)) {
+    const Vec3f& rest = scene_.rest_position[watch->particle];
+    const TriangleTree::Hit at_rest = tree.Nearest(rest, kAnywhere, hit.triangle);
+    const float height = tree.normal(at_rest.triangle).dot(rest - at_rest.point);
+    watch->behind = height < 0.0f;
+    watch->clearance = std::min(scene_.physics.collision_margin_m, 0.5f * height);
+  }
+  if (watch->behind) {
+    watch->blocks = false;
+    return kNever;
+  }
+  watch->point = hit.point;
+  watch->normal = tree.normal(hit.triangle);
+  const float distance = std::sqrt(hit.distance_sq), height = watch->normal.dot(p - hit.point);
+  const bool beside = distance > kTouching && std::abs(height) < kBesideCosine * distance;
+  // What goes round a rim has not come through: from beneath, nothing throws it back up.
+  watch->front = !beside && (watch->front || height > 0.0f);
+  watch->blocks = watch->front && !beside && height > -kMaxBehind;
+  // Past a rim or behind, it comes to contact only round the rim.
+  return watch->blocks ? height - watch->clearance : std::max(distance, 2.0f * kKeep);
 }
 
 void TissueCollision::BeginPairs(std::span<const float> moved, double time0_s, double time1_s) {

@@ -78,6 +78,8 @@ class TissueCollision {
     bool behind = false;           ///< Behind the surface: it is not the surface's business.
     Vec3f point = Vec3f::Zero();   ///< Of a fixed surface: the nearest one …
     Vec3f normal = Vec3f::Zero();  ///< … and its normal.
+    /// It was looked at.
+    void SetGap(float from_contact, const Vec3f& where, float others_travel);
   };
   /// Of a watch, or the least of a group's: the travel that concerns it at which something is to be done [m].
   struct Times {
@@ -128,7 +130,7 @@ class TissueCollision {
 
   void WatchOrgan();
   void WatchFixed(const StaticSurface& surface);
-  void Judge(const TriangleTree& tree, float range, Watch* watch) const;
+  float See(const TriangleTree& tree, const Vec3f& p, Watch* watch) const;
   [[nodiscard]] std::array<Vec3f, 3> OrganCorners(Index triangle) const;
   /// Walks to the nearest triangle of the organ from the one known.
   void Walk(Watch* watch, const Vec3f& p) const;
