@@ -1,9 +1,8 @@
 // Threads that share the tasks of a phase. Each begins with its own part of them, the same in each phase, so that data
 // stay in the cache of its core; then it takes what others have left. Tasks are claimed one by one, so that a thread
 // whose core is taken away costs the time of its task and no more; whoever finds nothing to do spins for a while and
-// then sleeps. The other threads keep off the core of the one that calls: schedulers like to wake a thread where it was
-// woken from, and may leave both there for tens of milliseconds while another core idles. Which thread does a task must
-// not matter to its result.
+// then sleeps. The other threads keep off the core of the one that calls: on one core each waits for the other. Which
+// thread does a task must not matter to its result.
 #pragma once
 
 #include <atomic>
