@@ -54,7 +54,7 @@ void Recorder::Introduce(recording::McapWriter* file) const {
   file->AddMetadata("clock", {{"log_time_minus_monotonic_ns", std::to_string(wall_minus_monotonic_ns_)}});
 }
 
-void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole, std::int64_t now_ns) {
+void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole) {
   const std::size_t size = sample.head.size() + sample.body.size();
   const std::lock_guard lock(mutex_);
   Counts& counts = counts_[static_cast<std::size_t>(sample.topic)];
@@ -63,9 +63,11 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
   });
   if (writer == writers_.end()) {
     // What it sent before is nobody's loss.
-    writer = writers_.insert(writers_.end(), {sample.topic, sample.writer, sample.sequence - 1});
+    writer = writers_.insert(writers_.end(), {sample.topic, sample.writer, sample.sequence - 1, sample.written_ns});
   }
   if (sample.sequence <= writer->last_sequence) return;
+  // Readers go by this time: what one writer sent stays in its order though clocks were set between.
+  const std::int64_t written_ns = std::max(sample.written_ns, writer->last_ns);
   const bool room = filling_.used() + recording::kMessageHead + size <= settings_.queue_B;
   if (room) {
     const bool is_large = bus::RoleOf(sample.topic).path == bus::Path::kSharedMemory;
@@ -73,19 +75,20 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
     std::uint8_t* at = part.bytes.get() + part.used;
     recording::PutMessageHead(static_cast<std::uint16_t>(writer - writers_.begin()),
                               static_cast<std::uint32_t>(sample.sequence),
-                              static_cast<std::uint64_t>(now_ns + wall_minus_monotonic_ns_),
+                              static_cast<std::uint64_t>(written_ns + wall_minus_monotonic_ns_),
                               static_cast<std::uint64_t>(sample.source_ns), size, at);
     at += recording::kMessageHead;
     std::memcpy(at, sample.head.data(), sample.head.size());
     if (!sample.body.empty()) std::memcpy(at + sample.head.size(), sample.body.data(), sample.body.size());
     if (!is_whole()) return;  // Missed: the next one's sequence tells.
-    if (filling_.used() == 0) filling_.begin_ns = now_ns;
+    if (filling_.used() == 0) filling_.begin_ns = written_ns;
     part.used += recording::kMessageHead + size;
     most_used_ = std::max(most_used_, filling_.used());
   }
   counts.missed += sample.sequence - writer->last_sequence - 1;
   writer->last_sequence = sample.sequence;
-  counts.newest_ns = now_ns;
+  writer->last_ns = written_ns;
+  counts.newest_ns = written_ns;
   ++(room ? counts.received : counts.overflow);
 }
 

@@ -60,8 +60,8 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// Any thread. `now_ns`: CLOCK_MONOTONIC.
-  void Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole, std::int64_t now_ns);
+  /// Any thread.
+  void Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole);
 
   // One thread, the writing one:
   /// Writes what has come once it is ChunkPacker::kChunkBytes or kLongestChunk_ns old.
@@ -96,6 +96,7 @@ class Recorder {
     TopicId topic;
     bus::WriterGuid guid;
     std::uint64_t last_sequence;
+    std::int64_t last_ns;
   };
   struct Counts {
     std::uint64_t received = 0, missed = 0, overflow = 0, unwritten = 0;

@@ -39,9 +39,8 @@ class ByteWriter {
     });
   }
   void Bytes(const void* data, std::size_t size) {
-    const std::size_t at = out_->size();
-    out_->resize(at + size);
-    if (size > 0) std::memcpy(out_->data() + at, data, size);
+    const auto* const begin = static_cast<const std::uint8_t*>(data);
+    out_->insert(out_->end(), begin, begin + size);
   }
   /// What `put` appends, with its length in bytes in front of it.
   template <std::integral Length, class Put>

@@ -1,6 +1,6 @@
 #include "services/recording/mcap_chunk.h"
 
-#include <zlib.h>
+#include <libdeflate.h>
 #include <zstd.h>
 
 #include <algorithm>
@@ -12,8 +12,9 @@
 namespace fulcrum::recording {
 namespace {
 
-/// A recorder runs beside solvers: level 1 packs a tenth better, but takes two and a half times as long.
-constexpr int kZstdLevel = -1;
+/// A recorder runs beside solvers: of the built-in scene's bytes it leaves 0.67 where level -1 leaves 0.65 and level 1
+/// 0.60, in four tenths of the time and a tenth.
+constexpr int kZstdLevel = -64;
 
 }  // namespace
 
@@ -73,7 +74,7 @@ std::size_t ChunkPacker::Pack(std::span<const std::uint8_t> records, std::size_t
     to.Number(chunk->first_ns);
     to.Number(chunk->last_ns);
     to.Number(std::uint64_t{length});
-    to.Number(static_cast<std::uint32_t>(crc32_z(0, messages.data(), length)));
+    to.Number(libdeflate_crc32(0, messages.data(), length));
     to.Text(chunk->plain ? "" : "zstd");
     to.Number(std::uint64_t{body.size()});
     to.Bytes(body.data(), body.size());

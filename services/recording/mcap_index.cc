@@ -1,6 +1,6 @@
 #include "services/recording/mcap_index.h"
 
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include <algorithm>
 #include <array>
@@ -39,7 +39,7 @@ class IndexCheck {
     }
     const std::vector<std::uint8_t> summary = Read(start, size_ - start);
     const std::size_t covered = summary.size() - kMcapMagic.size() - sizeof crc;
-    if (crc != 0 && crc32_z(0, summary.data(), covered) != crc) {
+    if (crc != 0 && libdeflate_crc32(0, summary.data(), covered) != crc) {
       Problem("the checksum of the summary does not fit it");
     }
     ByteReader records{std::span(summary).first(summary.size() - kTail)};

@@ -1,6 +1,6 @@
 #include "services/recording/mcap_reader.h"
 
-#include <zlib.h>
+#include <libdeflate.h>
 #include <zstd.h>
 
 #include <algorithm>
@@ -156,7 +156,7 @@ void McapReader::OpenChunk(const Record& record) {
     Fault("a chunk is packed with \"" + packing.substr(0, 16) + "\"; this reader knows zstd and none");
     return;
   }
-  if (chunk_.size() != size || (crc != 0 && crc32_z(0, chunk_.data(), chunk_.size()) != crc)) {
+  if (chunk_.size() != size || (crc != 0 && libdeflate_crc32(0, chunk_.data(), chunk_.size()) != crc)) {
     Fault("a chunk's checksum does not fit its content");
     return;
   }
@@ -229,6 +229,7 @@ bool McapReader::Next(McapMessage* message) {
       break;
     }
     if (record->opcode == static_cast<std::uint8_t>(Opcode::kChunk)) {
+      chunked_ = true;
       OpenChunk(*record);
     } else if (record->opcode == static_cast<std::uint8_t>(Opcode::kDataEnd)) {
       // What follows repeats what has been met; only its end says more.
@@ -237,6 +238,9 @@ bool McapReader::Next(McapMessage* message) {
       in_.read(reinterpret_cast<char*>(end.data()), end.size());
       closed_ = in_ && end == kMcapMagic;
       done_ = true;
+    } else if (chunked_ && record->opcode == static_cast<std::uint8_t>(Opcode::kMessage)) {
+      // Nothing checks a record outside of chunks: a message index is one bit away from being a message.
+      Fault("a message outside of the chunks, where this file has its messages");
     } else if (Take(*record, message)) {
       return true;
     }

@@ -104,7 +104,7 @@ class McapReader {
   std::map<std::uint16_t, McapChannel> channels_;
   std::map<std::string, std::map<std::string, std::string>> metadata_;
   std::vector<McapFault> faults_;
-  bool closed_ = false, done_ = false;
+  bool closed_ = false, done_ = false, chunked_ = false;
 };
 
 }  // namespace fulcrum::recording

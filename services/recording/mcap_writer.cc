@@ -2,7 +2,7 @@
 
 #include <fcntl.h>
 #include <unistd.h>
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -13,10 +13,6 @@
 
 namespace fulcrum::recording {
 namespace {
-
-std::uint32_t Crc(std::span<const std::uint8_t> bytes, std::uint32_t before = 0) {
-  return static_cast<std::uint32_t>(crc32_z(before, bytes.data(), bytes.size()));
-}
 
 void PutMetadata(ByteWriter* to, std::string_view name, const TextMap& values) {
   to->Record(Opcode::kMetadata, [&] {
@@ -219,7 +215,7 @@ void McapWriter::PutSummary() {
   to.Number(std::uint64_t{20});
   to.Number(start);
   to.Number(offset_start);
-  to.Number(Crc(summary));
+  to.Number(libdeflate_crc32(0, summary.data(), summary.size()));
   to.Bytes(kMcapMagic.data(), kMcapMagic.size());
   Put(summary);
 }

@@ -49,7 +49,7 @@ class RawType final : public fast::TopicDataType {
   const bool plain_;
 };
 
-/// Hands each sample on as soon as it comes.
+/// Hands each sample on; rests once it has caught up with a small topic's writers.
 class RawReader final : public RawInput, private fast::DataReaderListener {
  public:
   RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos, TopicId id,

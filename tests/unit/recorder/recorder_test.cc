@@ -49,9 +49,8 @@ class RecorderTest : public testing::Test {
   static void Send(Recorder* recorder, TopicId topic, std::uint8_t writer, std::uint64_t sequence,
                    std::size_t size = 40, std::int64_t now_ns = 0, bool whole = true) {
     const std::vector<std::byte> body(size - kHead.size(), static_cast<std::byte>(sequence));
-    bus::RawSample sample{topic, {writer}, sequence, 1000 + now_ns, kHead, body};
-    recorder->Receive(
-        sample, [whole] { return whole; }, now_ns);
+    bus::RawSample sample{topic, {writer}, sequence, 1000 + now_ns, now_ns, kHead, body};
+    recorder->Receive(sample, [whole] { return whole; });
   }
   static std::vector<Read> ReadAll(McapReader* reader) {
     std::vector<Read> all;
@@ -95,6 +94,22 @@ TEST_F(RecorderTest, KeepsTopicsAndWritersApartAndTellsOfThem) {
   // Stamps and log times are of one clock.
   const auto offset = std::stoll(reader.metadata().at("clock").at("log_time_minus_monotonic_ns"));
   EXPECT_EQ(read[0].log_time_ns, static_cast<std::uint64_t>(offset + 5 * kMs));
+}
+
+TEST_F(RecorderTest, WhatOneWriterSentKeepsItsOrderWhateverTheClocksSay) {
+  {
+    Recorder recorder(Settings());
+    Send(&recorder, TopicId::kHealth, 1, 1, 40, 5 * kMs);
+    Send(&recorder, TopicId::kHealth, 1, 2, 40, 4 * kMs);
+    Send(&recorder, TopicId::kHealth, 2, 1, 40, 3 * kMs);
+    Send(&recorder, TopicId::kHealth, 1, 3, 40, 6 * kMs);
+  }
+  McapReader reader(folder_ / "recording.mcap");
+  const std::vector<Read> read = ReadAll(&reader);
+  ASSERT_EQ(read.size(), 4u);
+  EXPECT_EQ(read[1].log_time_ns, read[0].log_time_ns);
+  EXPECT_EQ(read[0].log_time_ns - read[2].log_time_ns, 2u * kMs);
+  EXPECT_EQ(read[3].log_time_ns - read[0].log_time_ns, 1u * kMs);
 }
 
 TEST_F(RecorderTest, LargeTopicsHaveChunksOfTheirOwn) {
@@ -219,8 +234,7 @@ TEST_F(RecorderTest, AFullDiskIsToldAndCountedAndNeverThrows) {
     std::vector<std::byte> body(100'000);
     for (std::byte& b : body)
       b = static_cast<std::byte>((noise = noise * 6364136223846793005u + 1442695040888963407u) >> 56);
-    recorder.Receive(
-        {TopicId::kTissueFrame, {1}, i, 0, kHead, body}, [] { return true; }, 0);
+    recorder.Receive({TopicId::kTissueFrame, {1}, i, 0, 0, kHead, body}, [] { return true; });
     recorder.Flush(static_cast<std::int64_t>(i) * 1000 * kMs);
   }
   setrlimit(RLIMIT_FSIZE, &before);

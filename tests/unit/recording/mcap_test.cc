@@ -265,6 +265,32 @@ TEST_F(McapTest, ADamagedChunkCostsItsOwnMessagesOnly) {
   EXPECT_TRUE(reader.closed());
 }
 
+TEST_F(McapTest, AnIndexThatLooksLikeAMessageIsNone) {
+  std::uint64_t index = 0;
+  {
+    McapWriter writer(file_, "", "");
+    Fill(&writer, 40);
+    writer.EndChunk();
+    index = writer.bytes_written();
+  }
+  Bytes damaged = FileBytes();
+  // The last of the indexes behind the chunk.
+  const auto is_index = [&](std::uint64_t at) {
+    std::uint64_t length = 0;
+    std::memcpy(&length, damaged.data() + at + 1, sizeof length);
+    return damaged[at] == static_cast<std::uint8_t>(Opcode::kMessageIndex) && at + kRecordHead + length == index;
+  };
+  std::uint64_t at = index - kRecordHead;
+  while (at > 0 && !is_index(at)) --at;
+  ASSERT_GT(at, 0u);
+  damaged[at] = static_cast<std::uint8_t>(Opcode::kMessage);
+  Put(damaged);
+  McapReader reader(file_);
+  EXPECT_EQ(Read(&reader).size(), 40u);
+  ASSERT_EQ(reader.faults().size(), 1u);
+  EXPECT_NE(reader.faults()[0].what.find("outside of the chunks"), std::string::npos) << reader.faults()[0].what;
+}
+
 TEST_F(McapTest, RecordsOfALaterVersionArePassedOver) {
   Bytes bytes(kMcapMagic.begin(), kMcapMagic.end());
   ByteWriter to(&bytes);
