@@ -87,9 +87,8 @@ ExitCode Run(app::NodeApp& node) {
   Recorder recorder(settings);
   std::vector<std::unique_ptr<bus::RawInput>> inputs;
   for (const auto& role : bus::kTopicRoles) {
-    inputs.push_back(bus.MakeRawInput(role.id, [&](const bus::RawSample& sample, const auto& is_whole) {
-      recorder.Receive(sample, is_whole);
-    }));
+    inputs.push_back(bus.MakeRawInput(
+        role.id, [&](const bus::RawSample& sample, const auto& is_whole) { recorder.Receive(sample, is_whole); }));
     node.Watch(role.id, [&recorder, id = role.id, input = inputs.back().get()] {
       bus::InputStats stats = recorder.topic_stats(id);
       stats.matched = input->matched();
