@@ -64,7 +64,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   }
   organ_stress_ = FloatArray(16 * (tube_count_ + std::size_t{1}));
   const std::size_t pool = particles->raw().size();
-  pressed_ = around_ = regions_.MakePart();
+  pressed_ = around_ = wanted_ = regions_.MakePart();
   for (FloatArray* a : {&velocity_, &place_, &residual_, &z_, &p_, &q_, &d_, &load_, &local_}) {
     *a = FloatArray(pool);
   }
@@ -80,7 +80,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   }
   row_sums_ = FloatArray(static_cast<std::size_t>(rows_) * coarse_.row_width());
   const auto regions = static_cast<std::size_t>(regions_.count());
-  for (auto* flags : {&held_before_, &touched_before_, &held_now_, &touched_now_, &pressed_now_}) {
+  for (auto* flags : {&held_before_, &touched_before_, &held_now_, &touched_now_, &pressed_now_, &wanted_now_}) {
     flags->assign(regions, 0);
   }
   stiffened_.assign(regions, 0);

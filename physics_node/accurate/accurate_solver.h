@@ -115,6 +115,10 @@ class AccurateSolver {
   /// q <- A p less what bindings and hinges do to it: the next phase adds that. Returns p . A p.
   double Apply(const FloatArray& p, float inertia) { return Apply(p, inertia, regions_.part(), elements_.computed()); }
   double Apply(const FloatArray& p, float inertia, const Part& part, const Selection& elements);
+  /// p . A p in one phase, for LastStep.
+  double Curvature(const FloatArray& p, float inertia);
+  void LastStep(float alpha, const FloatArray& p, float inertia);
+  void WantResidual(std::span<const std::uint8_t> regions);
   void Solve(float inertia, int iterations);
   void FollowContacts();
   void SolveAtContacts(float inertia);
@@ -172,8 +176,9 @@ class AccurateSolver {
   // Who works on what.
   mutable Workers workers_;
   Regions regions_;
-  std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_, pressed_now_,
+  std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_, pressed_now_, wanted_now_,
       stiffened_;             ///< By region.
+  Part wanted_;               ///< Where Solve leaves the residual.
   std::vector<float> speed_;  ///< By region [m/s].
 
   std::vector<float> moved_, moved_asleep_;  ///< By block [m]; since BeginStep of what has fallen asleep since.

@@ -1,5 +1,6 @@
 // The linear solve of a substep: conjugate gradients with the three-level preconditioner, a phase at a time over what
 // is awake.
+#include <algorithm>
 #include <cmath>
 
 #include "physics_node/accurate/accurate_solver.h"
@@ -63,7 +64,82 @@ double AccurateSolver::Apply(const FloatArray& direction, float inertia, const P
                    : kernels_.organ_apply(organ, organ_matrix, inertia, direction.data(), q_.data(), Vertex(task.first),
                                           Vertex(task.end));
   });
-  return SumOfPartials(part.tasks.size()) + of_elements + elements_.AddContactProduct(direction.data(), q_.data());
+  return SumOfPartials(part.tasks.size()) + of_elements +
+         elements_.AddContactProduct(direction.data(), 1.0f, q_.data());
+}
+
+double AccurateSolver::Curvature(const FloatArray& direction, float inertia) {
+  const Sheet sheet = MakeSheet();
+  const SheetMatrix matrix = MakeMatrix();
+  const Organ organ = MakeOrgan();
+  const OrganMatrix organ_matrix = MakeOrganMatrix();
+  const float* const p[3] = {direction.data() + tube_floats_, direction.data() + tube_floats_ + plane_,
+                             direction.data() + tube_floats_ + 2 * plane_};
+  const std::span<const Task> tasks = regions_.part().tasks, patches = regions_.part().patches;
+  const auto sheet_tasks = static_cast<std::size_t>(regions_.part().sheet_tasks);
+  const std::size_t kernels = sheet_tasks + patches.size();
+  double of_elements = 0;
+  workers_.Run(static_cast<int>(kernels) + 1, regions_.part().sheet_tasks, 1, [&](int index, int) {
+    const auto i = static_cast<std::size_t>(index);
+    if (i == kernels) {
+      of_elements = elements_.Multiply(direction.data(), elements_.computed());
+      return;
+    }
+    const Task& task = i < sheet_tasks ? tasks[i] : patches[i - sheet_tasks];
+    if (task.sheet) {
+      // Edges from a row that is not computed are nobody else's.
+      const bool above = task.first > 0 && !regions_.computed(regions_.At(true, task.first - 1));
+      partial_[i] = kernels_.sheet_curvature(sheet, inertia, matrix, p, above, task.first, task.end);
+    } else {
+      partial_[i] = kernels_.organ_curvature(organ, organ_matrix, inertia, direction.data(), Vertex(task.first),
+                                             Vertex(task.end));
+    }
+  });
+  return SumOfPartials(kernels) + of_elements + elements_.guard().Curvature(direction.data());
+}
+
+/// d += alpha p, and the residual that belongs to it where it is wanted. After Curvature.
+void AccurateSolver::LastStep(float alpha, const FloatArray& direction, float inertia) {
+  const Sheet sheet = MakeSheet();
+  const SheetMatrix matrix = MakeMatrix();
+  const Organ organ = MakeOrgan();
+  const OrganMatrix organ_matrix = MakeOrganMatrix();
+  const float* const p[3] = {direction.data() + tube_floats_, direction.data() + tube_floats_ + plane_,
+                             direction.data() + tube_floats_ + 2 * plane_};
+  float* const q[3] = {q_.data() + tube_floats_, q_.data() + tube_floats_ + plane_,
+                       q_.data() + tube_floats_ + 2 * plane_};
+  const std::span<const Task> tasks = regions_.part().tasks, wanted = wanted_.tasks;
+  workers_.Run(static_cast<int>(tasks.size() + wanted.size()), regions_.part().sheet_tasks, [&](int index, int worker) {
+    const auto i = static_cast<std::size_t>(index);
+    if (i < tasks.size()) {
+      ForParts(tasks[i], [&](std::size_t first, std::size_t count) {
+        kernels_.add(alpha, direction.data() + first, d_.data() + first, count);
+      });
+      return;
+    }
+    const Task& task = wanted[i - tasks.size()];
+    if (task.sheet) {
+      kernels_.sheet_apply(sheet, inertia, matrix, p, q, carry_[static_cast<std::size_t>(worker)].data(), task.first,
+                           task.end);
+    } else {
+      kernels_.organ_apply(organ, organ_matrix, inertia, direction.data(), q_.data(), Vertex(task.first),
+                           Vertex(task.end));
+    }
+    AddElements(task, &q_);
+    ForParts(task, [&](std::size_t first, std::size_t count) {
+      kernels_.add(-alpha, q_.data() + first, residual_.data() + first, count);
+    });
+  });
+  elements_.AddContactProduct(direction.data(), -alpha, residual_.data());
+}
+
+/// Where Solve is to leave the residual: where it is somebody's force, or steepest descent goes on from it.
+void AccurateSolver::WantResidual(std::span<const std::uint8_t> regions) {
+  if (std::equal(regions.begin(), regions.end(), wanted_.marked.begin())) {
+    return;
+  }
+  std::copy(regions.begin(), regions.end(), wanted_.marked.begin());
+  regions_.FindTasks(&wanted_);
 }
 
 void AccurateSolver::AddElements(const Task& task, FloatArray* field) const {
@@ -73,7 +149,8 @@ void AccurateSolver::AddElements(const Task& task, FloatArray* field) const {
   }
 }
 
-/// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d.
+/// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d where it is wanted. The last
+/// of several iterations needs no more of the matrix than the curvature along its direction.
 void AccurateSolver::Solve(float inertia, int iterations) {
   const Sheet sheet = MakeSheet();
   const Middle middle = coarse_.middle();
@@ -94,10 +171,15 @@ void AccurateSolver::Solve(float inertia, int iterations) {
   double rz = Precondition();
   FloatArray* direction = &z_;
   for (int i = 0; i < iterations; ++i) {
-    const double curvature = Apply(*direction, inertia);
+    const bool ends = i > 0 && i + 1 == iterations;
+    const double curvature = ends ? Curvature(*direction, inertia) : Apply(*direction, inertia);
     // Nothing left to solve, or not finite: Finish counts what is not.
     const bool stop = !(rz > 0.0) || !(curvature > 0.0), last = stop || i + 1 == iterations;
     const auto alpha = stop ? 0.0f : static_cast<float>(rz / curvature);
+    if (ends) {
+      LastStep(alpha, *direction, inertia);
+      return;
+    }
     const auto step = i == 0 ? kernels_.start : kernels_.advance;
     ForTasks([&](const Task& task, int, int) {
       AddElements(task, &q_);

@@ -266,11 +266,11 @@ double Elements::Multiply(const float* p, const Selection& selection) {
   return sum;
 }
 
-double Elements::AddContactProduct(const float* p, float* out) {
-  const double sum = guard_.Apply(p, out);
+double Elements::AddContactProduct(const float* p, float scale, float* out) {
+  const double sum = guard_.Apply(p, scale, out);
   const std::span<const Element> contacts = contacts_in_product();
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    Spread(contacts[i], contact_product_[i], out);
+    Spread(contacts[i], scale * contact_product_[i], out);
   }
   return sum;
 }

@@ -64,9 +64,9 @@ class Elements {
   /// K p, for AddContactProduct and then AddInRegion or Add; returns p . K p. p is 0 wherever elements act that are not
   /// selected. All contacts are.
   double Multiply(const float* p, const Selection& selection);
-  /// out += what Multiply has made of the contacts. The guard, which seldom has anything to do, is multiplied here;
-  /// returns its share of p . K p.
-  double AddContactProduct(const float* p, float* out);
+  /// out += scale * what Multiply has made of the contacts. The guard, which seldom has anything to do, is multiplied
+  /// here; returns its share of p . K p.
+  double AddContactProduct(const float* p, float scale, float* out);
   /// field += what the last Linearise, or the last Multiply of all that is computed, has made of bindings and hinges in
   /// a region that is computed.
   void AddInRegion(int region, float* field) const;

@@ -88,15 +88,23 @@ void InversionGuard::AddForce(float* residual) const {
   }
 }
 
-double InversionGuard::Apply(const float* p, float* out) const {
+double InversionGuard::Apply(const float* p, float scale, float* out) const {
   double sum = 0;
   for (const Found& found : found_) {
     const Shape& shape = shapes_[found.tet];
     const Eigen::Matrix3f f = Gradient(found.tet, p);
     for (std::size_t k = 0; k < 4; ++k) {
-      Add(out, tets_[found.tet][k], shape.stiffness * (f * shape.gradient[k]));
+      Add(out, tets_[found.tet][k], scale * shape.stiffness * (f * shape.gradient[k]));
     }
     sum += static_cast<double>(shape.stiffness * f.squaredNorm());
+  }
+  return sum;
+}
+
+double InversionGuard::Curvature(const float* p) const {
+  double sum = 0;
+  for (const Found& found : found_) {
+    sum += static_cast<double>(shapes_[found.tet].stiffness * Gradient(found.tet, p).squaredNorm());
   }
   return sum;
 }

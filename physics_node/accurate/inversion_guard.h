@@ -30,8 +30,10 @@ class InversionGuard {
   void ForDiagonal(const Body& body) const;
   /// Adds the forces of the last Linearise to the tube part of `residual`.
   void AddForce(float* residual) const;
-  /// out += K p; returns p . K p.
-  double Apply(const float* p, float* out) const;
+  /// out += scale * K p; returns p . K p.
+  double Apply(const float* p, float scale, float* out) const;
+  /// p . K p.
+  [[nodiscard]] double Curvature(const float* p) const;
   /// Of those found, at `place` [J].
   [[nodiscard]] double Energy(const float* place) const;
 

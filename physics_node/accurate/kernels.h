@@ -70,11 +70,12 @@ struct SheetLinearise {
 /// The organ: one patch per vertex (energy/elastic_model.h), links in compressed rows.
 struct Organ {
   std::uint32_t vertices;
-  /// Vertices of a patch: start[vertices + 1], the vertex, and g xyz_ with F = sum x_j (x) g.
+  /// Vertices of a patch: start[vertices + 1], the vertex, and g xyz_ with F = sum x_j (x) g; in w the stiffness of the
+  /// edge between that vertex and the patch's [N/m].
   const std::uint32_t* start;
   const std::uint32_t* vertex;
   const float* gradient;
-  /// The patches of a vertex: the same links by vertex; in w the stiffness of the edge to that patch's vertex [N/m].
+  /// The patches of a vertex: the same links by vertex.
   const std::uint32_t* patch_start;
   const std::uint32_t* patch;
   const float* patch_gradient;
@@ -132,6 +133,10 @@ struct Kernels {
   /// out <- K p + mass * inertia * p. Returns p . out.
   double (*sheet_apply)(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
                         float* const out[3], float* carry, int row0, int row1);
+  /// p . (K p + mass * inertia * p) of the nodes of rows [row0, row1) and of the edges that begin there or, with
+  /// `above`, end there.
+  double (*sheet_curvature)(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
+                            bool above, int row0, int row1);
   /// Elastic and inertial energy at `place` of the edges and nodes that rows [row0, row1) own [J].
   double (*sheet_energy)(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at, int row0, int row1);
 
@@ -161,6 +166,8 @@ struct Kernels {
   /// d <- alpha p, or d += alpha p; r -= alpha q.
   void (*start)(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count);
   void (*advance)(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count);
+  /// d += alpha p.
+  void (*add)(float alpha, const float* p, float* d, std::size_t count);
   /// True while all of `count` floats, of xyzw ones all but w, are between -limit and limit.
   bool (*within)(const float* p, float limit, std::size_t count, bool xyzw);
 
@@ -182,6 +189,9 @@ struct Kernels {
   /// out <- K p + mass * inertia * p on vertices, after organ_stress of their patches. Returns p . out.
   double (*organ_apply)(const Organ& organ, const OrganMatrix& matrix, float inertia, const float* p, float* out,
                         std::uint32_t first, std::uint32_t last);
+  /// As organ_stress; returns what these patches and their own vertices have of p . (K p + mass * inertia * p).
+  double (*organ_curvature)(const Organ& organ, const OrganMatrix& matrix, float inertia, const float* p,
+                            std::uint32_t first, std::uint32_t last);
   /// z <- D^-1 r. Returns r . z.
   double (*organ_block_solve)(const OrganMatrix& matrix, const float* r, float* z, std::uint32_t first,
                               std::uint32_t last);

@@ -14,6 +14,7 @@ constexpr accurate::Kernels MakeKernels(const char* name) {
   k.sheet_guess = SheetGuess;
   k.sheet_linearise = SheetLineariseRows;
   k.sheet_apply = SheetApply;
+  k.sheet_curvature = SheetCurvature;
   k.sheet_energy = SheetEnergy;
   k.middle_blocks = MiddleBlocks;
   k.sheet_restrict = SheetRestrict;
@@ -25,6 +26,7 @@ constexpr accurate::Kernels MakeKernels(const char* name) {
   k.combine = Combine;
   k.start = StartFields;
   k.advance = AdvanceFields;
+  k.add = AddFields;
   k.within = Within;
   k.organ_guess = OrganGuess;
   k.organ_linearise = OrganLinearise;
@@ -32,6 +34,7 @@ constexpr accurate::Kernels MakeKernels(const char* name) {
   k.organ_blocks = OrganBlocks;
   k.organ_stress = OrganStress;
   k.organ_apply = OrganApply;
+  k.organ_curvature = OrganCurvature;
   k.organ_block_solve = OrganBlockSolve;
   k.organ_energy = OrganEnergy;
   k.organ_finish = OrganFinish;

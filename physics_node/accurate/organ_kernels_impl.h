@@ -163,18 +163,44 @@ inline void OrganLinearise(const Organ& organ, const OrganMatrix& matrix, const 
   }
 }
 
+/// V dP of patch n where its vertices move by p with gradient `d`.
+inline Columns StressAlong(const OrganMatrix& matrix, const Columns& d, std::uint32_t n) {
+  const std::size_t at = 12 * static_cast<std::size_t>(n);
+  const Columns c = LoadColumns(matrix.c + at), f = LoadColumns(matrix.f + at);
+  const F4 shear = SpreadLane<3>(c.c0), along = F4::All(DotColumns(c, d));
+  // d(cof F)[dF], columns: dF1 x F2 + F1 x dF2 and so on.
+  return {d.c0 * shear + c.c0 * along + (CrossProduct(d.c1, f.c2) + CrossProduct(f.c1, d.c2)),
+          d.c1 * shear + c.c1 * along + (CrossProduct(d.c2, f.c0) + CrossProduct(f.c2, d.c0)),
+          d.c2 * shear + c.c2 * along + (CrossProduct(d.c0, f.c1) + CrossProduct(f.c0, d.c1))};
+}
+
 inline void OrganStress(const Organ& organ, const OrganMatrix& matrix, const float* p, std::uint32_t first,
                         std::uint32_t last) {
   for (std::uint32_t n = first; n < last; ++n) {
-    const std::size_t at = 12 * static_cast<std::size_t>(n);
-    const Columns d = PatchGradient(organ, p, n), c = LoadColumns(matrix.c + at), f = LoadColumns(matrix.f + at);
-    const F4 shear = SpreadLane<3>(c.c0), along = F4::All(DotColumns(c, d));
-    // d(cof F)[dF], columns: dF1 x F2 + F1 x dF2 and so on.
-    const Columns stress = {d.c0 * shear + c.c0 * along + (CrossProduct(d.c1, f.c2) + CrossProduct(f.c1, d.c2)),
-                            d.c1 * shear + c.c1 * along + (CrossProduct(d.c2, f.c0) + CrossProduct(f.c2, d.c0)),
-                            d.c2 * shear + c.c2 * along + (CrossProduct(d.c0, f.c1) + CrossProduct(f.c0, d.c1))};
-    StoreLine(stress, F4::All(1.0f), p, n, matrix.stress);
+    StoreLine(StressAlong(matrix, PatchGradient(organ, p, n), n), F4::All(1.0f), p, n, matrix.stress);
   }
+}
+
+inline double OrganCurvature(const Organ& organ, const OrganMatrix& matrix, float inertia, const float* p,
+                             std::uint32_t first, std::uint32_t last) {
+  double sum = 0;
+  for (std::uint32_t n = first; n < last; ++n) {
+    const F4 here = F4::Load(p + 4 * static_cast<std::size_t>(n));
+    const Quad centre = Quad::Repeat(here);
+    Quad f = Quad::Zero();
+    for (std::uint32_t i = organ.start[n]; i < organ.start[n + 1]; ++i) {
+      const F4 x = F4::Load(p + 4 * static_cast<std::size_t>(organ.vertex[i]));
+      f = f + (Quad::Repeat(x) - centre) * Quad::Spread(F4::Load(organ.gradient + 4 * static_cast<std::size_t>(i)));
+    }
+    // The gradients of a patch add up to 0, so its vertices may be measured from its own.
+    const Columns d = {f.Column<0>(), f.Column<1>(), f.Column<2>()};
+    const Columns stress = StressAlong(matrix, d, n);
+    StoreLine(stress, F4::All(1.0f), p, n, matrix.stress);
+    // Each edge is met from both ends, and from each has the share of that end.
+    const F4 own = here * F4::All(organ.mass[n] * inertia) - f.Column<3>();
+    sum += static_cast<double>(DotColumns(stress, d) + DotProduct(here, own));
+  }
+  return sum;
 }
 
 /// sum over the patches of vertex v of stress * gradient + stiffness * (x_v - x_n).

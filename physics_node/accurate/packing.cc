@@ -85,6 +85,14 @@ void AccurateSolver::PackOrgan(const ElasticModel& model, std::uint32_t tube_cou
     edge(link.a, link.b) = k;
     edge(link.b, link.a) = k;
   }
+  // The same by patch, for products that gather nothing.
+  next.assign(patch_start_.begin(), patch_start_.end());
+  for (const ElasticPatch& patch : model.patches) {
+    for (Index i = 0; i < patch.link_count; ++i) {
+      const std::uint32_t back = next[model.patch_links[patch.first_link + i].v]++;
+      gradient_[4 * std::size_t{start_[patch.vertex] + i} + 3] = patch_gradient_[4 * std::size_t{back} + 3];
+    }
+  }
 }
 
 /// Regions, and which of them the organ's patches and the bindings join.

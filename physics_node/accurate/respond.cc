@@ -73,6 +73,12 @@ bool AccurateSolver::Stiffness(const Question& question, float* newton_per_m) {
       }
     });
   });
+  std::fill(wanted_now_.begin(), wanted_now_.end(), std::uint8_t{0});
+  for (const ParticleRef at : question.at) {
+    const int region = regions_.Of(at);
+    wanted_now_[static_cast<std::size_t>(region)] = regions_.computed(region) ? 1 : 0;
+  }
+  WantResidual(wanted_now_);
   Solve(inertia, kIterations);
   ForTasks([&](const Task& task, int, int) {
     ForParts(task, [&](std::size_t first, std::size_t count) {

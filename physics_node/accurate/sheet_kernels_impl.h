@@ -152,6 +152,13 @@ inline void AdvanceFields(float alpha, const float* p, const float* q, float* d,
   }
 }
 
+inline void AddFields(float alpha, const float* p, float* d, std::size_t count) {
+  const F8 a = F8::All(alpha);
+  for (std::size_t i = 0; i < count; i += 8) {
+    (F8::Load(d + i) + F8::Load(p + i) * a).Store(d + i);
+  }
+}
+
 inline bool Within(const float* p, float limit, std::size_t count, bool xyzw) {
   const F8 far = F8::All(limit);
   F8 inside = far > F8::All(0);

@@ -309,4 +309,38 @@ inline double SheetApply(const Sheet& sheet, float inertia, const SheetMatrix& m
   return sum;
 }
 
+/// p . K p of the edges that begin in one row and of its inertia, or of those alone that lead down from it.
+template <bool only_below>
+FULCRUM_INLINE double RowCurvature(const Sheet& sheet, float inertia, const SheetMatrix& matrix,
+                                   const float* const p[3], int row) {
+  const std::size_t start = RowStart(sheet, row), down_by = Below(sheet, row);
+  RowSum sum;
+  ForSlots(sheet.slots, [&]<class F>(int s) FULCRUM_INLINE_LAMBDA {
+    const std::size_t node = start + 8 * static_cast<std::size_t>(s);
+    const V<F> x = LoadSlots<F>(matrix.place, node), here = LoadSlots<F>(p, node);
+    const EndsOf<F> x_ends = LoadEndsOf<F>(sheet, matrix.place, start, s, down_by),
+                    p_ends = LoadEndsOf<F>(sheet, p, start, s, down_by);
+    const auto edge = [&](int e, const V<F>& d, const V<F>& dp) FULCRUM_INLINE_LAMBDA {
+      const F along = Dot(d, dp);
+      return F(Dot(dp, dp) * F::Load(matrix.kt[e] + node) + along * along * F::Load(matrix.along[e] + node));
+    };
+    F of_node = edge(1, x_ends.below - x, p_ends.below - here) + edge(2, x_ends.diagonal - x, p_ends.diagonal - here);
+    if (!only_below) {
+      const F mass = (F::Load(sheet.mass + node) & (F::Load(sheet.w + node) > F::All(0))) * F::All(inertia);
+      of_node = of_node + edge(0, x_ends.right - x, p_ends.right - here) + Dot(here, here) * mass;
+    }
+    sum.Add(of_node, s);
+  });
+  return sum.Value();
+}
+
+inline double SheetCurvature(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
+                             bool above, int row0, int row1) {
+  double sum = above && row0 > 0 ? RowCurvature<true>(sheet, inertia, matrix, p, row0 - 1) : 0;
+  for (int row = row0; row < row1; ++row) {
+    sum += RowCurvature<false>(sheet, inertia, matrix, p, row);
+  }
+  return sum;
+}
+
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

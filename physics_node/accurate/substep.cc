@@ -302,6 +302,10 @@ SubstepReport AccurateSolver::Substep(float h, int iterations, std::span<const H
     }
   }
   Linearise(inertia, contacts);
+  for (std::size_t i = 0; i < wanted_now_.size(); ++i) {
+    wanted_now_[i] = pressed_now_[i] != 0 || (held_before_[i] != 0 && regions_.computed(static_cast<int>(i))) ? 1 : 0;
+  }
+  WantResidual(wanted_now_);
   Solve(inertia.inertia, iterations);
   if (stiff_contacts_) {
     SolveAtContacts(inertia.inertia);

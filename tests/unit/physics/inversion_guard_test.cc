@@ -86,7 +86,7 @@ TEST(InversionGuard, ForceIsTheGradientAndTheMatrixNeverTooSmall) {
     ASSERT_TRUE(guard.folded());
     Field residual{}, product{};
     guard.AddForce(residual.data());
-    const double curvature = guard.Apply(direction.data(), product.data());
+    const double curvature = guard.Apply(direction.data(), 1.0f, product.data());
     double pull = 0, power = 0;
     for (std::size_t i = 0; i < residual.size(); ++i) {
       pull += static_cast<double>(residual[i] * direction[i]);
