@@ -66,7 +66,7 @@ class AccurateSolver {
   [[nodiscard]] std::span<const float> moved() const { return moved_; }
   SubstepReport Substep(float h, int iterations, std::span<const HeldPlace> held, std::span<ContactRow> contacts);
 
-  /// Elastic force on a particle at the end of the last substep [N]; of a held one, what the tissue pulls at it with.
+  /// What the tissue pulls with at a particle that the last substep held [N]. Of others it is not known.
   [[nodiscard]] Vec3f ForceOn(ParticleRef at) const;
   [[nodiscard]] Vec3f Velocity(ParticleRef at) const;
   void Stop();
