@@ -1,5 +1,6 @@
 #include "services/supervisor/session_view.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "services/app/health_report.h"
@@ -77,6 +78,10 @@ void SessionView::Update() {
     has_supervisor_ |= health.node == NodeId::kSupervisor;
   }
   (void)manifests_->TakeLatest(&manifest_);
+}
+
+int SessionView::heard() const {
+  return static_cast<int>(std::ranges::count_if(newest_, [](const Health& health) { return health.pid != 0; }));
 }
 
 std::string SessionView::Text() const {

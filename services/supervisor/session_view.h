@@ -28,6 +28,8 @@ class SessionView {
   [[nodiscard]] std::string mismatch() const { return participant_.schema_mismatch(); }
   /// True when a supervisor has been heard.
   [[nodiscard]] bool has_supervisor() const { return has_supervisor_; }
+  /// How many nodes have been heard.
+  [[nodiscard]] int heard() const;
   /// Scene, session time, node table, figures.
   [[nodiscard]] std::string Text() const;
 

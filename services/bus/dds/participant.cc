@@ -34,6 +34,8 @@ using eprosima::fastrtps::Duration_t;
 /// other a thousand times a second.
 const Duration_t kAnnouncement{0, 200 * kMilli_ns}, kFirstAnnouncements{0, 20 * kMilli_ns};
 constexpr std::uint32_t kFirstAnnouncementCount = 25;
+/// With keys each announcement of somebody not yet authenticated is looked at by the handshake.
+const Duration_t kSecuredAnnouncement{0, 100 * kMilli_ns};
 /// A reader asks again for what a writer had before; the first heartbeat may have come before the two were matched.
 const Duration_t kFirstAcknack{0, 10 * kMilli_ns};
 /// A node's period is 10 ms or more wherever a reliable write may have to wait.
@@ -54,8 +56,8 @@ fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint
   qos.transport().user_transports.push_back(udp);
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = Duration_t(settings.lease_s, 0);
-  discovery.leaseDuration_announcementperiod = kAnnouncement;
-  discovery.initial_announcements = {kFirstAnnouncementCount, kFirstAnnouncements};
+  discovery.leaseDuration_announcementperiod = settings.security.on() ? kSecuredAnnouncement : kAnnouncement;
+  if (!settings.security.on()) discovery.initial_announcements = {kFirstAnnouncementCount, kFirstAnnouncements};
   if (settings.security.on()) dds::ApplySecurity(settings.security, &qos);
   return qos;
 }

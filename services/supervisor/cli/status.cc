@@ -22,14 +22,20 @@ ExitCode Status(const Words& words) {
     return ExitCode::kFailure;
   }
   SessionView view(domain);
-  // Health is late-joiner topic at 10 Hz: after this each live node has been heard several times.
+  // Health is for late joiners, too, and comes at 10 Hz: when nobody new has been heard for so long, all that live have
+  // been. With keys they prove themselves one after the other.
   constexpr auto kListen = std::chrono::milliseconds(700);
   // Who is not accepted by the supervisor learns it from its silence.
   constexpr auto kPatience = std::chrono::seconds(4);
-  const auto begin = std::chrono::steady_clock::now();
-  for (auto heard = begin; heard - begin < (view.has_supervisor() ? kListen : kPatience);
-       heard = std::chrono::steady_clock::now()) {
+  int heard = 0;
+  auto newest = std::chrono::steady_clock::now();
+  for (auto now = newest; now - newest < (view.has_supervisor() ? kListen : kPatience);
+       now = std::chrono::steady_clock::now()) {
     view.Update();
+    if (view.heard() > heard) {
+      heard = view.heard();
+      newest = now;
+    }
     if (const std::string mismatch = view.mismatch(); !mismatch.empty()) throw MismatchError(mismatch);
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
