@@ -8,6 +8,7 @@
 #pragma once
 
 #include <array>
+#include <boost/container/small_vector.hpp>
 #include <span>
 #include <vector>
 
@@ -57,25 +58,24 @@ class TissueCollision {
   [[nodiscard]] std::size_t looked_at() const;
 
  private:
-  /// What a particle must stay in front of.
-  struct Watch {
-    Index particle = 0;
+  /// What a particle must stay in front of. What most steps ask for fills the first cache line.
+  struct alignas(64) Watch {
     ParticleRef at;
     Index triangle = kNoIndex;   ///< Of tube_surface, or of the tree.
-    float clearance = 0;         ///< Kept from the surface: less where it rests nearer [m].
-    float gap = 0;               ///< From contact when it was looked at [m].
-    float others = 0;            ///< Travel of what it may touch at that time [m].
-    Vec3f seen = Vec3f::Zero();  ///< Where it was then: see Standpoint.
-    Vec3f last = Vec3f::Zero();  ///< Where it was in step `asked`, in which it was asked for its way.
-    std::uint32_t asked = 0;
-    float gone = 0;      ///< From `seen` to `last` [m].
-    float way = 0;       ///< In the step before that one, with what it may touch: its next is about the same [m].
-    bool front = false;  ///< Seen in front of the surface and not lost from sight since.
-    bool blocks = true;  ///< What it was seen nearest to can hold it back: not out of sight, nor past a rim.
-    bool near = false;   ///< Rows may come of it before it is looked at again.
-    // Of a fixed surface:
-    bool judged = false;           ///< It is known where the particle lies at rest, as far as the next two tell.
-    bool behind = false;           ///< Behind the surface: it is not the surface's business.
+    std::uint32_t asked = 0;     ///< The step in which it was last asked for its way.
+    Vec3f seen = Vec3f::Zero();  ///< Where it was when it was looked at: see Standpoint.
+    Vec3f last = Vec3f::Zero();  ///< Where it was in step `asked`.
+    float gone = 0;              ///< From `seen` to `last` [m].
+    float way = 0;     ///< In the step before that one, with what it may touch: its next is about the same [m].
+    float gap = 0;     ///< From contact when it was looked at [m].
+    float others = 0;  ///< Travel of what it may touch at that time [m].
+    bool front = false;   ///< Seen in front of the surface and not lost from sight since.
+    bool blocks = true;   ///< What it was seen nearest to can hold it back: not out of sight, nor past a rim.
+    bool near = false;    ///< Rows may come of it before it is looked at again.
+    bool judged = false;  ///< Of a fixed surface: it is known where the particle lies at rest, as `behind` tells.
+    bool behind = false;  ///< Behind a fixed surface: it is not the surface's business.
+    float clearance = 0;  ///< Kept from the surface: less where it rests nearer [m].
+    Index particle = 0;
     Vec3f point = Vec3f::Zero();   ///< Of a fixed surface: the nearest one …
     Vec3f normal = Vec3f::Zero();  ///< … and its normal.
     /// It was looked at.
@@ -91,7 +91,8 @@ class TissueCollision {
   struct Group {
     Index block = 0, first = 0, last = 0;
     float travel = 0;           ///< Of it and of what it may touch, since the beginning [m].
-    std::vector<Index> beside;  ///< Blocks of the organ that its triangles are in.
+    /// Blocks of the organ that its triangles are in.
+    boost::container::small_vector<Index, 6> beside;
     Times times;
   };
   /// One that is near in this step.
