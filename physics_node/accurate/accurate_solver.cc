@@ -85,6 +85,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   }
   stiffened_.assign(regions, 0);
   speed_.assign(regions, 0.0f);
+  largest_sq_.assign(regions, 0.0f);
   moved_.assign(particles->block_count(), 0.0f);
   moved_asleep_.assign(particles->block_count(), 0.0f);
   partial_.assign(regions, 0.0);

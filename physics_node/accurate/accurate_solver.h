@@ -117,13 +117,17 @@ class AccurateSolver {
   double Apply(const FloatArray& p, float inertia, const Part& part, const Selection& elements);
   /// p . A p in one phase, for LastStep.
   double Curvature(const FloatArray& p, float inertia);
-  void LastStep(float alpha, const FloatArray& p, float inertia);
+  /// The last of Solve: along z + beta p by alpha, and along p by of_before in all.
+  struct Step {
+    float alpha = 0, beta = 0, of_before = 0;
+  };
+  void LastStep(const Step& last, bool adds, float inertia);
   void WantResidual(std::span<const std::uint8_t> regions);
   void Solve(float inertia, int iterations);
   void FollowContacts();
   void SolveAtContacts(float inertia);
   void SwapBlock(ParticleRef at, std::array<float, 12>* block);
-  [[nodiscard]] float LargestCorrection();
+  [[nodiscard]] float LargestCorrection() const;
   void LimitCorrection(float largest);
   void SearchAlongCorrection(const Inertia& inertia, std::span<const ContactRow> contacts);
   SubstepReport Finish(float h);
@@ -143,6 +147,9 @@ class AccurateSolver {
   /// body(first float, count) for the parts of a field that belong to a task.
   template <class Body>
   void ForParts(const Task& task, const Body& body) const;
+  /// body(region, first, end) for the rows or vertices of each region of a task.
+  template <class Body>
+  void ForRegions(const Task& task, const Body& body) const;
   [[nodiscard]] double SumOfPartials(std::size_t tasks) const;
 
   const Kernels& kernels_;
@@ -177,9 +184,10 @@ class AccurateSolver {
   mutable Workers workers_;
   Regions regions_;
   std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_, pressed_now_, wanted_now_,
-      stiffened_;             ///< By region.
-  Part wanted_;               ///< Where Solve leaves the residual.
-  std::vector<float> speed_;  ///< By region [m/s].
+      stiffened_;                  ///< By region.
+  Part wanted_;                    ///< Where Solve leaves the residual.
+  std::vector<float> speed_;       ///< By region [m/s].
+  std::vector<float> largest_sq_;  ///< By region: correction [m^2].
 
   std::vector<float> moved_, moved_asleep_;  ///< By block [m]; since BeginStep of what has fallen asleep since.
 

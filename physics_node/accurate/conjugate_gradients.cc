@@ -98,39 +98,52 @@ double AccurateSolver::Curvature(const FloatArray& direction, float inertia) {
   return SumOfPartials(kernels) + of_elements + elements_.guard().Curvature(direction.data());
 }
 
-/// d += alpha p, and the residual that belongs to it where it is wanted. After Curvature.
-void AccurateSolver::LastStep(float alpha, const FloatArray& direction, float inertia) {
+/// d, or its increment, <- before p + alpha (z + beta p); the residual, where it is wanted, goes on from that without
+/// the second part. After Curvature of z; q is that of p.
+void AccurateSolver::LastStep(const Step& last, bool adds, float inertia) {
   const Sheet sheet = MakeSheet();
   const SheetMatrix matrix = MakeMatrix();
   const Organ organ = MakeOrgan();
   const OrganMatrix organ_matrix = MakeOrganMatrix();
-  const float* const p[3] = {direction.data() + tube_floats_, direction.data() + tube_floats_ + plane_,
-                             direction.data() + tube_floats_ + 2 * plane_};
-  float* const q[3] = {q_.data() + tube_floats_, q_.data() + tube_floats_ + plane_,
-                       q_.data() + tube_floats_ + 2 * plane_};
+  const auto planes = [&](FloatArray& field) {
+    float* at = field.data() + tube_floats_;
+    return std::array<float*, 3>{at, at + plane_, at + 2 * plane_};
+  };
+  // Without a direction before it, p is anything, and need not be finite.
+  FloatArray& before = last.of_before == 0.0f ? z_ : p_;
+  const std::array<float*, 3> p = planes(before), z = planes(z_), q = planes(q_), d = planes(d_);
   const std::span<const Task> tasks = regions_.part().tasks, wanted = wanted_.tasks;
+  std::fill(largest_sq_.begin(), largest_sq_.end(), 0.0f);
   workers_.Run(static_cast<int>(tasks.size() + wanted.size()), regions_.part().sheet_tasks, [&](int index, int worker) {
     const auto i = static_cast<std::size_t>(index);
     if (i < tasks.size()) {
-      ForParts(tasks[i], [&](std::size_t first, std::size_t count) {
-        kernels_.add(alpha, direction.data() + first, d_.data() + first, count);
+      ForRegions(tasks[i], [&](int region, int first, int end) {
+        largest_sq_[static_cast<std::size_t>(region)] =
+            tasks[i].sheet
+                ? kernels_.sheet_step(sheet, last.of_before, p.data(), last.alpha, z.data(), adds, d.data(), first, end)
+                : kernels_.organ_step(last.of_before, before.data(), last.alpha, z_.data(), adds, d_.data(),
+                                      Vertex(first), Vertex(end));
       });
       return;
     }
     const Task& task = wanted[i - tasks.size()];
+    if (last.beta != 0.0f) {
+      ForParts(task, [&](std::size_t first, std::size_t count) {
+        kernels_.add(-last.alpha * last.beta, q_.data() + first, residual_.data() + first, count);
+      });
+    }
     if (task.sheet) {
-      kernels_.sheet_apply(sheet, inertia, matrix, p, q, carry_[static_cast<std::size_t>(worker)].data(), task.first,
-                           task.end);
+      kernels_.sheet_apply(sheet, inertia, matrix, z.data(), q.data(), carry_[static_cast<std::size_t>(worker)].data(),
+                           task.first, task.end);
     } else {
-      kernels_.organ_apply(organ, organ_matrix, inertia, direction.data(), q_.data(), Vertex(task.first),
-                           Vertex(task.end));
+      kernels_.organ_apply(organ, organ_matrix, inertia, z_.data(), q_.data(), Vertex(task.first), Vertex(task.end));
     }
     AddElements(task, &q_);
     ForParts(task, [&](std::size_t first, std::size_t count) {
-      kernels_.add(-alpha, q_.data() + first, residual_.data() + first, count);
+      kernels_.add(-last.alpha, q_.data() + first, residual_.data() + first, count);
     });
   });
-  elements_.AddContactProduct(direction.data(), -alpha, residual_.data());
+  elements_.AddContactProduct(z_.data(), -last.alpha, residual_.data());
 }
 
 /// Where Solve is to leave the residual: where it is somebody's force, or steepest descent goes on from it.
@@ -143,14 +156,14 @@ void AccurateSolver::WantResidual(std::span<const std::uint8_t> regions) {
 }
 
 void AccurateSolver::AddElements(const Task& task, FloatArray* field) const {
-  const int size = task.sheet ? Regions::kRows : Regions::kVertices;
-  for (int first = task.first; first < task.end; first += size) {
-    elements_.AddInRegion(regions_.At(task.sheet, first), field->data());
-  }
+  ForRegions(task, [&](int region, int, int) { elements_.AddInRegion(region, field->data()); });
 }
 
-/// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d where it is wanted. The last
-/// of several iterations needs no more of the matrix than the curvature along its direction.
+/// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d where it is wanted.
+///
+/// Of the last direction z + beta p no more is needed than the curvature along it, and it is never stored: p and it are
+/// conjugate, so its curvature is that of z less beta^2 times that of p. Nor is the step along p before it: both are
+/// made at once.
 void AccurateSolver::Solve(float inertia, int iterations) {
   const Sheet sheet = MakeSheet();
   const Middle middle = coarse_.middle();
@@ -168,44 +181,55 @@ void AccurateSolver::Solve(float inertia, int iterations) {
     restrict_rows(task);
   });
   forces_due_ = false;
-  double rz = Precondition();
-  FloatArray* direction = &z_;
-  for (int i = 0; i < iterations; ++i) {
-    const bool ends = i > 0 && i + 1 == iterations;
-    const double curvature = ends ? Curvature(*direction, inertia) : Apply(*direction, inertia);
+  double rz = Precondition(), curvature = 0;
+  Step step;
+  for (int i = 0; i + 1 < iterations; ++i) {
+    const bool last_but_one = i + 2 == iterations;
+    FloatArray& direction = i == 0 ? z_ : p_;
+    curvature = Apply(direction, inertia);
     // Nothing left to solve, or not finite: Finish counts what is not.
-    const bool stop = !(rz > 0.0) || !(curvature > 0.0), last = stop || i + 1 == iterations;
-    const auto alpha = stop ? 0.0f : static_cast<float>(rz / curvature);
-    if (ends) {
-      LastStep(alpha, *direction, inertia);
+    if (!(rz > 0.0) || !(curvature > 0.0)) {
+      LastStep({}, i > 0, inertia);
       return;
     }
-    const auto step = i == 0 ? kernels_.start : kernels_.advance;
+    const auto alpha = static_cast<float>(rz / curvature);
     ForTasks([&](const Task& task, int, int) {
       AddElements(task, &q_);
       ForParts(task, [&](std::size_t first, std::size_t count) {
-        step(alpha, direction->data() + first, q_.data() + first, d_.data() + first, residual_.data() + first, count);
+        float *q = q_.data() + first, *residual = residual_.data() + first, *d = d_.data() + first;
+        if (last_but_one) {
+          kernels_.add(-alpha, q, residual, count);
+        } else if (i == 0) {
+          kernels_.start(alpha, direction.data() + first, q, d, residual, count);
+        } else {
+          kernels_.advance(alpha, direction.data() + first, q, d, residual, count);
+        }
       });
-      if (!last) {
-        restrict_rows(task);
-      }
+      restrict_rows(task);
     });
-    if (last) {
-      return;
-    }
     if (i == 0) {
       std::swap(z_, p_);
     }
     const double next = Precondition();
-    const auto beta = static_cast<float>(next / rz);
+    step.beta = static_cast<float>(next / rz);
+    rz = next;
+    if (last_but_one) {
+      step.of_before = alpha;
+      break;
+    }
     ForTasks([&](const Task& task, int, int) {
       ForParts(task, [&](std::size_t first, std::size_t count) {
-        kernels_.combine(z_.data() + first, beta, p_.data() + first, count);
+        kernels_.combine(z_.data() + first, step.beta, p_.data() + first, count);
       });
     });
-    direction = &p_;
-    rz = next;
   }
+  const auto beta = static_cast<double>(step.beta);
+  curvature = Curvature(z_, inertia) - beta * beta * curvature;
+  if (rz > 0.0 && curvature > 0.0) {
+    step.alpha = static_cast<float>(rz / curvature);
+    step.of_before += step.alpha * step.beta;
+  }
+  LastStep(step, iterations > 2, inertia);
 }
 
 /// One step of steepest descent with the blocks of the diagonal, where stiff contacts press: with two iterations alone
@@ -218,6 +242,8 @@ void AccurateSolver::SolveAtContacts(float inertia) {
                              residual_.data() + tube_floats_ + 2 * plane_};
   float* const z[3] = {local_.data() + tube_floats_, local_.data() + tube_floats_ + plane_,
                        local_.data() + tube_floats_ + 2 * plane_};
+  const float* const d[3] = {d_.data() + tube_floats_, d_.data() + tube_floats_ + plane_,
+                             d_.data() + tube_floats_ + 2 * plane_};
   ForTasks(pressed_, [&](const Task& task, int index, int) {
     partial_[static_cast<std::size_t>(index)] =
         task.sheet ? kernels_.sheet_block_solve(sheet, matrix, r, z, task.first, task.end)
@@ -236,23 +262,16 @@ void AccurateSolver::SolveAtContacts(float inertia) {
       kernels_.advance(alpha, local_.data() + first, q_.data() + first, d_.data() + first, residual_.data() + first,
                        count);
     });
+    ForRegions(task, [&](int region, int first, int end) {
+      largest_sq_[static_cast<std::size_t>(region)] =
+          task.sheet ? kernels_.sheet_largest(sheet, d, first, end)
+                     : kernels_.organ_largest(d_.data(), Vertex(first), Vertex(end));
+    });
   });
 }
 
-float AccurateSolver::LargestCorrection() {
-  const Sheet sheet = MakeSheet();
-  const float* const d[3] = {d_.data() + tube_floats_, d_.data() + tube_floats_ + plane_,
-                             d_.data() + tube_floats_ + 2 * plane_};
-  ForTasks([&](const Task& task, int index, int) {
-    partial_[static_cast<std::size_t>(index)] =
-        task.sheet ? static_cast<double>(kernels_.sheet_largest(sheet, d, task.first, task.end))
-                   : static_cast<double>(kernels_.organ_largest(d_.data(), Vertex(task.first), Vertex(task.end)));
-  });
-  double largest = 0;
-  for (std::size_t i = 0; i < regions_.part().tasks.size(); ++i) {
-    largest = std::max(largest, partial_[i]);
-  }
-  return std::sqrt(static_cast<float>(largest));
+float AccurateSolver::LargestCorrection() const {
+  return std::sqrt(*std::max_element(largest_sq_.begin(), largest_sq_.end()));
 }
 
 void AccurateSolver::LimitCorrection(float largest) {

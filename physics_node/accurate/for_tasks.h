@@ -1,6 +1,8 @@
 // Bodies of AccurateSolver's loops over what is awake; for its own sources.
 #pragma once
 
+#include <algorithm>
+
 #include "physics_node/accurate/accurate_solver.h"
 
 namespace fulcrum::physics::accurate {
@@ -37,6 +39,14 @@ void AccurateSolver::ForParts(const Task& task, const Body& body) const {
                     count = stride * static_cast<std::size_t>(task.end - task.first);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     body(tube_floats_ + axis * plane_ + first, count);
+  }
+}
+
+template <class Body>
+void AccurateSolver::ForRegions(const Task& task, const Body& body) const {
+  const int size = task.sheet ? Regions::kRows : Regions::kVertices;
+  for (int first = task.first; first < task.end; first += size) {
+    body(regions_.At(task.sheet, first), first, std::min(first + size, task.end));
   }
 }
 

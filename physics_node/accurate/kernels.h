@@ -155,6 +155,9 @@ struct Kernels {
   /// Positions and velocities of nodes: place + d, at most `speed` fast; what is not finite stays, at rest.
   FinishCount (*sheet_finish)(const Sheet& sheet, const float* const place[3], const float* const d[3], float h,
                               float speed, float* const x[3], float* const velocity[3], int row0, int row1);
+  /// d <- a p + b z, or d += that if it `adds`. Returns the largest |d|^2.
+  float (*sheet_step)(const Sheet& sheet, float a, const float* const p[3], float b, const float* const z[3], bool adds,
+                      float* const d[3], int row0, int row1);
   /// Largest |d|^2 of nodes.
   float (*sheet_largest)(const Sheet& sheet, const float* const d[3], int row0, int row1);
 
@@ -200,6 +203,9 @@ struct Kernels {
   /// As sheet_finish; `pool` xyzw.
   FinishCount (*organ_finish)(const float* place, const float* d, float h, float speed, float* pool, float* velocity,
                               std::uint32_t first, std::uint32_t last);
+  /// As sheet_step.
+  float (*organ_step)(float a, const float* p, float b, const float* z, bool adds, float* d, std::uint32_t first,
+                      std::uint32_t last);
   float (*organ_largest)(const float* d, std::uint32_t first, std::uint32_t last);
 };
 

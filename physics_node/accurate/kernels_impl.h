@@ -21,6 +21,7 @@ constexpr accurate::Kernels MakeKernels(const char* name) {
   k.sheet_precondition = SheetPrecondition;
   k.sheet_block_solve = SheetBlockSolve;
   k.sheet_finish = SheetFinish;
+  k.sheet_step = SheetStep;
   k.sheet_largest = SheetLargest;
   k.substitute = Substitute;
   k.combine = Combine;
@@ -38,6 +39,7 @@ constexpr accurate::Kernels MakeKernels(const char* name) {
   k.organ_block_solve = OrganBlockSolve;
   k.organ_energy = OrganEnergy;
   k.organ_finish = OrganFinish;
+  k.organ_step = OrganStep;
   k.organ_largest = OrganLargest;
   return k;
 }

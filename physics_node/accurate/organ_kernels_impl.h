@@ -362,6 +362,21 @@ inline accurate::FinishCount OrganFinish(const float* place, const float* d, flo
   return count;
 }
 
+inline float OrganStep(float a, const float* p, float b, const float* z, bool adds, float* d, std::uint32_t first,
+                       std::uint32_t last) {
+  const F4 of_p = F4::All(a), of_z = F4::All(b);
+  float largest = 0;
+  for (std::size_t i = 4 * static_cast<std::size_t>(first); i < 4 * static_cast<std::size_t>(last); i += 4) {
+    F4 v = F4::Load(p + i) * of_p + F4::Load(z + i) * of_z;
+    if (adds) {
+      v = F4::Load(d + i) + v;
+    }
+    v.Store(d + i);
+    largest = Larger(DotProduct(v, v), largest);
+  }
+  return largest;
+}
+
 inline float OrganLargest(const float* d, std::uint32_t first, std::uint32_t last) {
   float largest = 0;
   for (std::size_t i = 4 * static_cast<std::size_t>(first); i < 4 * static_cast<std::size_t>(last); i += 4) {

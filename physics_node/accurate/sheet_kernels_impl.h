@@ -168,6 +168,21 @@ inline bool Within(const float* p, float limit, std::size_t count, bool xyzw) {
   return (Bits(inside) | (xyzw ? 0x88u : 0u)) == 0xffu;
 }
 
+inline float SheetStep(const Sheet& sheet, float a, const float* const p[3], float b, const float* const z[3],
+                       bool adds, float* const d[3], int row0, int row1) {
+  const F8 of_p = F8::All(a), of_z = F8::All(b);
+  F8 largest = F8::All(0);
+  for (std::size_t i = RowStart(sheet, row0), end = RowStart(sheet, row1); i < end; i += 8) {
+    V8 v = LoadV(p, i) * of_p + LoadV(z, i) * of_z;
+    if (adds) {
+      v = LoadV(d, i) + v;
+    }
+    StoreV(v, d, i);
+    largest = Max(Dot(v, v), largest);
+  }
+  return LargestOf(largest);
+}
+
 inline float SheetLargest(const Sheet& sheet, const float* const d[3], int row0, int row1) {
   F8 largest = F8::All(0);
   for (std::size_t i = RowStart(sheet, row0), end = RowStart(sheet, row1); i < end; i += 8) {

@@ -256,18 +256,16 @@ SubstepReport AccurateSolver::Finish(float h) {
   std::fill(speed_.begin(), speed_.end(), 0.0f);
   ForTasks([&](const Task& task, int index, int) {
     FinishCount& total = finish_[static_cast<std::size_t>(index)] = {};
-    const int size = task.sheet ? Regions::kRows : Regions::kVertices;
-    for (int first = task.first; first < task.end; first += size) {
-      const int end = std::min(first + size, task.end);
+    ForRegions(task, [&](int region, int first, int end) {
       const FinishCount part =
           task.sheet
               ? kernels_.sheet_finish(sheet, place.data(), d.data(), h, kLargestSpeed, x, velocity.data(), first, end)
               : kernels_.organ_finish(place_.data(), d_.data(), h, kLargestSpeed, particles_->pool(), velocity_.data(),
                                       Vertex(first), Vertex(end));
-      speed_[static_cast<std::size_t>(regions_.At(task.sheet, first))] = std::sqrt(part.largest_speed_sq);
+      speed_[static_cast<std::size_t>(region)] = std::sqrt(part.largest_speed_sq);
       total.largest_speed_sq = std::max(total.largest_speed_sq, part.largest_speed_sq);
       total.resets += part.resets;
-    }
+    });
   });
   SubstepReport report;
   float largest = 0;

@@ -66,9 +66,9 @@ class TissueCollision {
     Vec3f seen = Vec3f::Zero();  ///< Where it was when it was looked at: see Standpoint.
     Vec3f last = Vec3f::Zero();  ///< Where it was in step `asked`.
     float gone = 0;              ///< From `seen` to `last` [m].
-    float way = 0;     ///< In the step before that one, with what it may touch: its next is about the same [m].
-    float gap = 0;     ///< From contact when it was looked at [m].
-    float others = 0;  ///< Travel of what it may touch at that time [m].
+    float way = 0;        ///< In the step before that one, with what it may touch: its next is about the same [m].
+    float gap = 0;        ///< From contact when it was looked at [m].
+    float others = 0;     ///< Travel of what it may touch at that time [m].
     bool front = false;   ///< Seen in front of the surface and not lost from sight since.
     bool blocks = true;   ///< What it was seen nearest to can hold it back: not out of sight, nor past a rim.
     bool near = false;    ///< Rows may come of it before it is looked at again.
@@ -90,7 +90,7 @@ class TissueCollision {
   /// Watches of one block: [first, last).
   struct Group {
     Index block = 0, first = 0, last = 0;
-    float travel = 0;           ///< Of it and of what it may touch, since the beginning [m].
+    float travel = 0;  ///< Of it and of what it may touch, since the beginning [m].
     /// Blocks of the organ that its triangles are in.
     boost::container::small_vector<Index, 6> beside;
     Times times;
