@@ -175,6 +175,9 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   const Vec3f tool_velocity = (pose.p_WT - std::exchange(memory.tip, pose.p_WT)) / scene_.physics.dt_s;
   DeviceContacts device;
   device.force_cap_N = kForceCap;
+  const auto force = [&] {
+    return solver_force == nullptr || memory.touched.empty() ? elastic_.OnSet(memory.touched) : *solver_force;
+  };
   const auto enter = [&](ContactKind kind) {
     if (memory.kind != kind) {
       const std::uint32_t id = memory.id;
@@ -190,7 +193,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
       memory.touched.push_back(held.particle);
     }
     std::sort(memory.touched.begin(), memory.touched.end());
-    Follow(&memory, elastic_.OnSet(memory.touched), MeanMotion(memory.touched).displacement);
+    Follow(&memory, force(), MeanMotion(memory.touched).displacement);
     if (solver_force != nullptr) {
       FollowSolver(&memory, *solver_force);
       memory.u = MeanMotion(memory.touched).displacement;
@@ -237,7 +240,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   }
   const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kSmoothing);
   memory.v_s += share * (Limited(around.velocity, 1.0f) - memory.v_s);
-  Follow(&memory, elastic_.OnSet(memory.touched),
+  Follow(&memory, force(),
          touching ? Vec3f(MeanMotion(memory.touched).displacement - around.displacement) : Vec3f(Vec3f::Zero()));
 
   memory.steps = touching ? memory.steps : 0;
