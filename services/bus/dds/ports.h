@@ -14,6 +14,7 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <functional>
+#include <thread>
 #include <utility>
 
 #include "services/bus/convert/convert.h"
@@ -29,6 +30,10 @@ namespace fulcrum::bus::dds {
 
 namespace fast = eprosima::fastdds::dds;
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
+
+/// A writer of a small topic leaves no sooner than this after its last sample: what rests in a raw input's socket
+/// (raw_reader.cc, 8 ms) is nobody's once its writer has said that it leaves.
+constexpr std::chrono::milliseconds kLinger{40};
 
 /// Counts the live endpoints on the other side; asking the reader or writer itself would take its lock every tick.
 class ReaderEvents final : public fast::DataReaderListener {
@@ -239,8 +244,14 @@ template <class T>
 class DdsOutput final : public OutputBase<T> {
  public:
   using OutputBase<T>::OutputBase;
+  ~DdsOutput() override {
+    if (this->has_readers()) std::this_thread::sleep_until(last_write_ + kLinger);
+  }
+  DdsOutput(const DdsOutput&) = delete;
+  DdsOutput& operator=(const DdsOutput&) = delete;
 
   bool Write(const T& sample) noexcept override {
+    last_write_ = std::chrono::steady_clock::now();
     try {
       return this->Count(ToWire(sample, &wire_) && this->writer_->write(&wire_));
     } catch (...) {
@@ -250,6 +261,7 @@ class DdsOutput final : public OutputBase<T> {
 
  private:
   WireOf<T> wire_;
+  std::chrono::steady_clock::time_point last_write_{};
 };
 
 template <Loanable T>

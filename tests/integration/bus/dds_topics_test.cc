@@ -1,6 +1,7 @@
 // Every topic through the real bus between two participants of one process.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cstdlib>
 #include <fstream>
 #include <limits>
@@ -139,6 +140,24 @@ TEST(DdsInput, BurstOfReliableEventsArrivesWhole) {
   for (std::uint64_t i = 1; i <= 200; ++i) {
     ASSERT_TRUE(Eventually([&] { return bus.in->TakeNext(&got); }));
     ASSERT_EQ(got.stamp.sequence, i);
+  }
+}
+
+TEST(RawInput, HearsAllThatAWriterSaidBeforeItLeft) {
+  DdsParticipant listener({.domain = kDomain, .node_name = "listener", .shared_memory = {}});
+  std::atomic<int> heard{0};
+  const auto input = listener.MakeRawInput(TopicId::kToolState, [&](const RawSample&, const auto&) { ++heard; });
+  constexpr int kSamples = 40;
+  for (int writer = 1; writer <= 5; ++writer) {
+    DdsParticipant teller({.domain = kDomain, .node_name = "teller", .shared_memory = {}});
+    auto output = teller.MakeOutput<ToolState>();
+    ASSERT_TRUE(Eventually([&] { return output->has_readers() && input->matched(); }));
+    for (std::uint64_t i = 1; i <= kSamples; ++i) {
+      ASSERT_TRUE(output->Write(test::Sample<ToolState>(i)));
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    output.reset();
+    EXPECT_TRUE(Eventually([&] { return heard == writer * kSamples; })) << heard << " by " << writer << " writers";
   }
 }
 
