@@ -8,8 +8,11 @@
 #include <memory>
 #include <mutex>
 #include <thread>
+#include <tuple>
 #include <utility>
 
+#include "services/bus/topics.h"
+#include "services/recording/mcap_reader.h"
 #include "services/replayer/published_difference.h"
 #include "services/replayer/replayed_node.h"
 #include "services/replayer/session_facts.h"
@@ -156,6 +159,21 @@ class NodeRunner {
   std::thread thread_;
 };
 
+/// Whether more than one process was this node, or the recording does not tell. Each has a channel of its own.
+bool StartsAgain(const std::filesystem::path& recording, NodeId node) {
+  recording::McapReader heads(recording, recording::McapReader::Depth::kChunkHeads);
+  recording::McapMessage none;
+  while (heads.Next(&none)) {
+  }
+  const auto tells_of_its_ticks = [&](const auto& channel) {
+    const auto& [topic, about] = std::tie(channel.second.topic, channel.second.metadata);
+    const auto name = about.find("node");
+    return topic == bus::RoleOf(TopicId::kTickManifest).name && name != about.end() && name->second == NodeName(node);
+  };
+  return !heads.closed() || !heads.faults().empty() ||
+         std::count_if(heads.channels().begin(), heads.channels().end(), tells_of_its_ticks) != 1;
+}
+
 }  // namespace
 
 bool LockStepResult::good() const {
@@ -168,9 +186,10 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
   std::atomic<int> at_work{0};
   std::vector<std::unique_ptr<NodeRunner>> runners;
   for (const NodeId node : settings.nodes) {
-    runners.push_back(std::make_unique<NodeRunner>(
-        node, NodeMaking{scene, cart, settings.folder, settings.physics_threads, settings.figures}, settings.go_on,
-        &at_work));
+    runners.push_back(std::make_unique<NodeRunner>(node,
+                                                   NodeMaking{scene, cart, settings.folder, settings.physics_threads,
+                                                              settings.figures, StartsAgain(settings.recording, node)},
+                                                   settings.go_on, &at_work));
   }
 
   LockStepResult result;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -52,9 +53,18 @@ struct Outlet {
   }
 };
 
-std::filesystem::path CheckpointPath(const NodeMaking& making, NodeId node) {
-  return making.folder / (std::string(NodeName(node)) + ".checkpoint");
-}
+/// Where a node that may start again keeps what it goes on from.
+class Keepsake {
+ public:
+  Keepsake(const NodeMaking& making, NodeId node, std::uint32_t layout, std::size_t capacity) {
+    if (!making.starts_again) return;
+    file_.emplace(making.folder / (std::string(NodeName(node)) + ".checkpoint"), making.scene.hash, layout, capacity);
+  }
+  [[nodiscard]] runtime::CheckpointFile* file() { return file_ ? &*file_ : nullptr; }
+
+ private:
+  std::optional<runtime::CheckpointFile> file_;
+};
 
 class ReplayedPhysics final : public ReplayedNode {
  public:
@@ -62,7 +72,7 @@ class ReplayedPhysics final : public ReplayedNode {
       : ReplayedNode(NodeId::kPhysics),
         scene_(making.scene),
         threads_(making.threads),
-        checkpoint_(CheckpointPath(making, id()), scene_.hash, physics::kCheckpointLayout,
+        checkpoint_(making, id(), physics::kCheckpointLayout,
                     physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size()))) {
     if (!making.outputs_read) {
       contacts_.in.reset();
@@ -88,7 +98,7 @@ class ReplayedPhysics final : public ReplayedNode {
   void LetThreadsHelp(bool help) override { help_ = help; }
 
  private:
-  runtime::CheckpointFile* checkpoint() override { return &checkpoint_; }
+  runtime::CheckpointFile* checkpoint() override { return checkpoint_.file(); }
   void Start(std::int64_t epoch_ns) override {
     node_.reset();
     // Nothing of the process before is left, in its ports neither.
@@ -98,7 +108,7 @@ class ReplayedPhysics final : public ReplayedNode {
     node_.emplace(scene_,
                   physics::PhysicsNode::Ports{*tools_.in, *handles_.in, *topology_.in, *frames_, *contacts_.out,
                                               *cautery_.out, *manifests_.out},
-                  &checkpoint_, epoch_ns, threads_);
+                  checkpoint_.file(), epoch_ns, threads_);
   }
 
   std::uint64_t Advance(const RecordedTick& tick) override {
@@ -117,7 +127,7 @@ class ReplayedPhysics final : public ReplayedNode {
   const SceneView& scene_;
   const int threads_;
   bool help_ = true;
-  runtime::CheckpointFile checkpoint_;
+  Keepsake checkpoint_;
   Inlet<ToolState> tools_;
   Inlet<HandleState> handles_;
   Inlet<TopologyState> topology_;
@@ -135,8 +145,7 @@ class ReplayedThermal final : public ReplayedNode {
   explicit ReplayedThermal(const NodeMaking& making)
       : ReplayedNode(NodeId::kThermal),
         scene_(making.scene),
-        checkpoint_(CheckpointPath(making, id()), scene_.hash, thermal::kCheckpointLayout,
-                    thermal::ThermalSolver::CheckpointCapacity(scene_)) {
+        checkpoint_(making, id(), thermal::kCheckpointLayout, thermal::ThermalSolver::CheckpointCapacity(scene_)) {
     if (!making.outputs_read) patches_.in.reset();
   }
 
@@ -150,14 +159,14 @@ class ReplayedThermal final : public ReplayedNode {
   void FillHealth(Health* health) const override { node_->FillHealth(health); }
 
  private:
-  runtime::CheckpointFile* checkpoint() override { return &checkpoint_; }
+  runtime::CheckpointFile* checkpoint() override { return checkpoint_.file(); }
   void Start(std::int64_t epoch_ns) override {
     node_.reset();
     contacts_ = {};
     node_.emplace(
         scene_,
         thermal::ThermalNode::Ports{*contacts_.in, *topology_.out, *patches_.out, *events_.out, *manifests_.out},
-        &checkpoint_, epoch_ns);
+        checkpoint_.file(), epoch_ns);
   }
 
   std::uint64_t Advance(const RecordedTick& tick) override {
@@ -171,7 +180,7 @@ class ReplayedThermal final : public ReplayedNode {
   }
 
   const SceneView& scene_;
-  runtime::CheckpointFile checkpoint_;
+  Keepsake checkpoint_;
   Inlet<CauteryContact> contacts_;
   Outlet<TopologyState> topology_;
   Outlet<TemperaturePatch> patches_;

@@ -68,6 +68,8 @@ struct NodeMaking {
   /// Somebody reads ContactModel, CauteryContact and TemperaturePatch; otherwise their nodes, as live, do not make
   /// them. No state depends on it.
   bool outputs_read = true;
+  /// It may be started again in the session, and needs a checkpoint to go on from.
+  bool starts_again = true;
 };
 
 /// For physics, thermal and haptics. Throws InputError when the node cannot be replayed.
