@@ -31,8 +31,8 @@ constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max(
 constexpr auto kPollPeriod = std::chrono::milliseconds(10);
 // The first samples must not pass the recorder by: a replay could not begin without them. In a session that is recorded
 // it is found within so many looks of the session's first, or is gone; each look proves that this process was given
-// time …
-constexpr int kLooksForRecorder = 10;
+// time (with ten, one start in a hundred did not find it while others were killed) …
+constexpr int kLooksForRecorder = 30;
 // … its readers are seen within so many; a recorder that stands still holds nobody up for longer …
 constexpr int kLooksForReaders = 50;
 // … and have seen our writers so many later.
@@ -293,6 +293,9 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
                         looks > kLooksForReaders ||
                         (looks > kLooksForRecorder && !app.joined->participant.Knows(bus::kRecorderPeer));
     if (waits && begins && SessionTime(now) >= 0) {
+      if (replayable && app.session_recorded && looks_read <= kLooksAfterReaders) {
+        Log(LogLevel::kWarning, "begins though no recorder hears it: a replay will not have its first ticks");
+      }
       app.state = HealthState::kRunning;
       thread.Start();
       app.stepping.store(true, std::memory_order_relaxed);

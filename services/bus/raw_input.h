@@ -36,8 +36,8 @@ struct Peer {
 /// in memory that its writer takes back some time: after it has been copied, `is_whole` says whether that was in time.
 using RawSink = std::function<void(const RawSample& sample, const std::function<bool()>& is_whole)>;
 
-/// Receives one topic from its making to its end. Small samples come up to 8 ms late, many at a time: a thread that was
-/// woken for each would take twice the processor.
+/// Receives one topic from its making to its end. Where the participant lets them gather, small samples come up to 8 ms
+/// late, many at a time.
 class RawInput {
  public:
   virtual ~RawInput() = default;

@@ -82,7 +82,8 @@ ExitCode Run(app::NodeApp& node) {
   // The app's own participant has typed ports of some topics: there a type can be registered in one way only.
   bus::DdsParticipant bus({.domain = node.options().domain,
                            .node_name = bus::kRecorderPeer,
-                           .security = app::SecurityOf(node.cart(), NodeName(NodeId::kRecorder))});
+                           .security = app::SecurityOf(node.cart(), NodeName(NodeId::kRecorder)),
+                           .gathers = true});
   settings.describe = [&](const bus::WriterGuid& writer) { return Describe(bus.PeerOf(writer)); };
   Recorder recorder(settings);
   std::vector<std::unique_ptr<bus::RawInput>> inputs;

@@ -14,6 +14,7 @@
 #include "services/bus/access.h"
 #include "services/bus/dds/abandoned_mutex.h"
 #include "services/bus/dds/audience.h"
+#include "services/bus/dds/chained_transport.h"
 #include "services/bus/dds/library.h"
 #include "services/bus/dds/peer_watch.h"
 #include "services/bus/dds/ports.h"
@@ -43,7 +44,8 @@ const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
 /// Samples above this do not fit one UDP datagram and are sent in fragments.
 constexpr std::uint32_t kDatagram_B = 64'000;
 
-fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash) {
+fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash,
+                                          const std::shared_ptr<dds::Gathering>& gathering) {
   fast::DomainParticipantQos qos;
   qos.name(settings.node_name);
   const std::string user_data = dds::UserDataOf(settings.node_name, schema_hash);
@@ -54,6 +56,7 @@ fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint
   udp->receiveBufferSize = kSocketBuffer_B;
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports.push_back(udp);
+  if (gathering) qos.transport().user_transports.back() = dds::LetGather(udp, gathering);
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
   discovery.leaseDuration = Duration_t(settings.lease_s, 0);
   discovery.leaseDuration_announcementperiod = settings.security.on() ? kSecuredAnnouncement : kAnnouncement;
@@ -101,6 +104,7 @@ struct DdsParticipant::Impl {
       : schema_hash(hash),
         shared_memory(settings.shared_memory),
         security(settings.security),
+        gathering(settings.gathers ? std::make_shared<dds::Gathering>() : nullptr),
         watch(settings.node_name, hash, settings.security) {
     if (settings.domain < kFirstCartDomain || settings.domain > kLastCartDomain) {
       throw InputError("domain " + std::to_string(settings.domain) + " is out of range: 1 to 100");
@@ -110,7 +114,8 @@ struct DdsParticipant::Impl {
     dds::PrepareLibrary();
 
     participant = fast::DomainParticipantFactory::get_instance()->create_participant(
-        static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash), &watch, fast::StatusMask::none());
+        static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash, gathering), &watch,
+        fast::StatusMask::none());
     if (participant == nullptr) {
       throw InputError("domain " + std::to_string(settings.domain) +
                        ": cannot open the bus; are its UDP ports on 127.0.0.1 free?");
@@ -179,6 +184,7 @@ struct DdsParticipant::Impl {
   const std::uint64_t schema_hash;
   std::filesystem::path shared_memory;
   const Security security;
+  const std::shared_ptr<dds::Gathering> gathering;
   dds::PeerWatch watch;
   dds::Audience audience;
   fast::DomainParticipant* participant = nullptr;
@@ -235,7 +241,8 @@ std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink)
   ApplyRole(role, role.reader_depth, impl_->SharedMemoryFor(role), &qos);
   qos.reliable_reader_qos().times.initialAcknackDelay = kFirstAcknack;
   const WorkingIn here(impl_->shared_memory);
-  auto input = std::make_unique<dds::RawReader>(impl_->subscriber, topic, qos, id, payload_B, std::move(sink));
+  auto input =
+      std::make_unique<dds::RawReader>(impl_->subscriber, topic, qos, id, payload_B, std::move(sink), impl_->gathering);
   if (!input->ok()) throw InputError(impl_->CannotMake(role, "reader"));
   return input;
 }

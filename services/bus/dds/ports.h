@@ -32,7 +32,7 @@ namespace fast = eprosima::fastdds::dds;
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
 /// A writer of a small topic leaves no sooner than this after its last sample: what rests in a raw input's socket
-/// (raw_reader.cc, 8 ms) is nobody's once its writer has said that it leaves.
+/// (chained_transport.h, 8 ms) is nobody's once its writer has said that it leaves.
 constexpr std::chrono::milliseconds kLinger{40};
 
 /// Counts the live endpoints on the other side; asking the reader or writer itself would take its lock every tick.

@@ -2,10 +2,8 @@
 
 #include <time.h>
 
-#include <chrono>
 #include <cstring>
 #include <optional>
-#include <thread>
 
 namespace fulcrum::bus::dds {
 namespace {
@@ -15,9 +13,6 @@ using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 /// What stands before a loan on the wire: CDR, little endian.
 constexpr std::array<std::byte, 4> kEncapsulation{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
 
-/// How long the thread that receives the small topics lets them gather in its socket. The smallest buffer that we meet
-/// (Debian's default) holds thirty times as much.
-constexpr std::chrono::milliseconds kRest(8);
 /// A sample of at most this age was waited for; an older one was in the socket, and more may be [ns].
 constexpr std::int64_t kFresh_ns = 500'000;
 
@@ -40,8 +35,12 @@ std::optional<std::int64_t> Age(std::int64_t source_ns) {
 }  // namespace
 
 RawReader::RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos, TopicId id,
-                     std::uint32_t payload_B, RawSink sink)
-    : role_(RoleOf(id)), payload_B_(payload_B), sink_(std::move(sink)), subscriber_(subscriber) {
+                     std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering)
+    : role_(RoleOf(id)),
+      payload_B_(payload_B),
+      sink_(std::move(sink)),
+      gathering_(std::move(gathering)),
+      subscriber_(subscriber) {
   payload_.reserve(payload_B);
   fast::StatusMask mask = fast::StatusMask::subscription_matched();
   mask << fast::StatusMask::data_available();
@@ -90,7 +89,7 @@ void RawReader::TakeCopies(fast::DataReader* reader) {
     sink_(sample, [] { return true; });
     age_ns = Age(sample.source_ns);
   }
-  if (age_ns && *age_ns <= kFresh_ns) std::this_thread::sleep_for(kRest);
+  if (age_ns && gathering_) gathering_->caught_up = *age_ns <= kFresh_ns;
 }
 
 void RawReader::TakeLoans(fast::DataReader* reader) {

@@ -9,8 +9,10 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
+#include <memory>
 #include <vector>
 
+#include "services/bus/dds/chained_transport.h"
 #include "services/bus/raw_input.h"
 #include "services/bus/topics.h"
 
@@ -49,11 +51,11 @@ class RawType final : public fast::TopicDataType {
   const bool plain_;
 };
 
-/// Hands each sample on; rests once it has caught up with a small topic's writers.
+/// Hands each sample on; tells its transport when it has caught up with a small topic's writers.
 class RawReader final : public RawInput, private fast::DataReaderListener {
  public:
   RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos, TopicId id,
-            std::uint32_t payload_B, RawSink sink);
+            std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering);
   ~RawReader() override;
   RawReader(const RawReader&) = delete;
   RawReader& operator=(const RawReader&) = delete;
@@ -73,6 +75,7 @@ class RawReader final : public RawInput, private fast::DataReaderListener {
   const TopicRole& role_;
   const std::uint32_t payload_B_;
   const RawSink sink_;
+  const std::shared_ptr<Gathering> gathering_;  ///< Null: nobody gathers.
   fast::Subscriber* subscriber_;
   fast::DataReader* reader_;
   std::atomic<int> writers_{0};

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "services/bus/access.h"
-#include "services/bus/dds/serial_transport.h"
+#include "services/bus/dds/chained_transport.h"
 #include "services/core/error.h"
 #include "services/keys/authority.h"
 #include "services/keys/key_folder.h"

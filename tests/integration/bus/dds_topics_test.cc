@@ -144,7 +144,7 @@ TEST(DdsInput, BurstOfReliableEventsArrivesWhole) {
 }
 
 TEST(RawInput, HearsAllThatAWriterSaidBeforeItLeft) {
-  DdsParticipant listener({.domain = kDomain, .node_name = "listener", .shared_memory = {}});
+  DdsParticipant listener({.domain = kDomain, .node_name = "listener", .shared_memory = {}, .gathers = true});
   std::atomic<int> heard{0};
   const auto input = listener.MakeRawInput(TopicId::kToolState, [&](const RawSample&, const auto&) { ++heard; });
   constexpr int kSamples = 40;

@@ -1,8 +1,9 @@
-// A transport that hands discovery and handshakes to the library one datagram at a time. Internal to services/bus/dds.
+// What comes between the library and the sockets. Internal to services/bus/dds.
 #pragma once
 
 #include <fastdds/rtps/transport/TransportDescriptorInterface.h>
 
+#include <atomic>
 #include <memory>
 
 namespace fulcrum::bus::dds {
@@ -16,5 +17,19 @@ namespace fulcrum::bus::dds {
 /// User data is handed on as it comes.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> OneDiscoveryAtATime(
     std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport);
+
+/// Between the raw inputs of a participant and its transport.
+struct Gathering {
+  std::atomic<bool> caught_up{false};  ///< The newest small sample was waited for: no other is in the socket.
+};
+
+/// `transport`, whose thread of user data rests for 8 ms whenever a datagram leaves `gathering` caught up, so that
+/// small samples gather in the socket.
+///
+/// It rests here and not where a sample is taken: there the library holds the reader's lock, and whoever discovers a new
+/// writer would wait for it, 8 ms a reader.
+[[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> LetGather(
+    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport,
+    std::shared_ptr<Gathering> gathering);
 
 }  // namespace fulcrum::bus::dds
