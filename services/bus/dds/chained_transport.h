@@ -26,8 +26,8 @@ struct Gathering {
 /// `transport`, whose thread of user data rests for 8 ms whenever a datagram leaves `gathering` caught up, so that
 /// small samples gather in the socket.
 ///
-/// It rests here and not where a sample is taken: there the library holds the reader's lock, and whoever discovers a new
-/// writer would wait for it, 8 ms a reader.
+/// It rests here and not where a sample is taken: there the library holds the reader's lock, and whoever discovers a
+/// new writer would wait for it, 8 ms a reader.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> LetGather(
     std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport,
     std::shared_ptr<Gathering> gathering);
