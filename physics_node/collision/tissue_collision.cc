@@ -80,7 +80,7 @@ void TissueCollision::Watches::MakeGroups(const ParticleStore& particles) {
   for (Index i = 0; i < all.size(); ++i) {
     const Index block = particles.BlockOf(all[i].particle);
     if (groups.empty() || groups.back().block != block) {
-      groups.push_back({block, i, i, 0.0f, {}, {}});
+      groups.push_back({.block = block, .first = i, .last = i, .times = {}});
     }
     groups.back().last = i + 1;
   }
@@ -309,13 +309,19 @@ void TissueCollision::LookAtDue(Watches* watches, int part, std::span<const floa
 }
 
 void TissueCollision::FindBeside(Group* group) const {
-  group->beside.clear();
+  group->beside_count = 0;
   for (Index i = group->first; i < group->last; ++i) {
     for (const Index vertex : scene_.tube_surface[organ_.all[i].triangle]) {
       const Index block = particles_->BlockOf(vertex);
-      if (std::find(group->beside.begin(), group->beside.end(), block) == group->beside.end()) {
-        group->beside.push_back(block);
+      const auto end = group->beside.begin() + group->beside_count;
+      if (std::find(group->beside.begin(), end, block) != end) {
+        continue;
       }
+      if (group->beside_count == Group::kMostBeside) {
+        ++group->beside_count;
+        return;
+      }
+      group->beside[group->beside_count++] = block;
     }
   }
 }
@@ -378,9 +384,9 @@ void TissueCollision::LookAtOrgan(int part, std::span<const float> moved) {
   LookAtDue(
       &organ_, part, moved, organ_travel_, organ_moved_,
       [&](const Group& group) {
-        float largest = 0;
-        for (const Index block : group.beside) {
-          largest = std::max(largest, moved[block]);
+        float largest = group.beside_count > Group::kMostBeside ? organ_moved_ : 0.0f;
+        for (Index i = 0; i < std::min(group.beside_count, Group::kMostBeside); ++i) {
+          largest = std::max(largest, moved[group.beside[i]]);
         }
         return largest + kElsewhere * organ_moved_;
       },

@@ -8,7 +8,6 @@
 #pragma once
 
 #include <array>
-#include <boost/container/small_vector.hpp>
 #include <span>
 #include <vector>
 
@@ -91,8 +90,10 @@ class TissueCollision {
   struct Group {
     Index block = 0, first = 0, last = 0;
     float travel = 0;  ///< Of it and of what it may touch, since the beginning [m].
-    /// Blocks of the organ that its triangles are in.
-    boost::container::small_vector<Index, 6> beside;
+    /// Blocks of the organ that its triangles are in; with a count of more than there is room for, any.
+    static constexpr Index kMostBeside = 8;
+    std::array<Index, kMostBeside> beside{};
+    Index beside_count = 0;
     Times times;
   };
   /// One that is near in this step.
