@@ -149,6 +149,7 @@ TEST(RawInput, HearsAllThatAWriterSaidBeforeItLeft) {
   const auto input = listener.MakeRawInput(TopicId::kToolState, [&](const RawSample&, const auto&) { ++heard; });
   constexpr int kSamples = 40;
   for (int writer = 1; writer <= 5; ++writer) {
+    ASSERT_TRUE(Eventually([&] { return !input->matched(); })) << "the one before has left";
     DdsParticipant teller({.domain = kDomain, .node_name = "teller", .shared_memory = {}});
     auto output = teller.MakeOutput<ToolState>();
     ASSERT_TRUE(Eventually([&] { return output->has_readers() && input->matched(); }));
