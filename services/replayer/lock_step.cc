@@ -159,19 +159,24 @@ class NodeRunner {
   std::thread thread_;
 };
 
-/// Whether more than one process was this node, or the recording does not tell. Each has a channel of its own.
-bool StartsAgain(const std::filesystem::path& recording, NodeId node) {
+/// Nodes that more than one process was, or all, when the recording does not tell. Each process has a channel of its
+/// own.
+std::vector<NodeId> ThoseThatStartAgain(const std::filesystem::path& recording, const std::vector<NodeId>& nodes) {
   recording::McapReader heads(recording, recording::McapReader::Depth::kChunkHeads);
   recording::McapMessage none;
   while (heads.Next(&none)) {
   }
-  const auto tells_of_its_ticks = [&](const auto& channel) {
-    const auto& [topic, about] = std::tie(channel.second.topic, channel.second.metadata);
-    const auto name = about.find("node");
-    return topic == bus::RoleOf(TopicId::kTickManifest).name && name != about.end() && name->second == NodeName(node);
-  };
-  return !heads.closed() || !heads.faults().empty() ||
-         std::count_if(heads.channels().begin(), heads.channels().end(), tells_of_its_ticks) != 1;
+  std::vector<NodeId> again = nodes;
+  if (!heads.closed() || !heads.faults().empty()) return again;
+  std::erase_if(again, [&](NodeId node) {
+    return std::count_if(heads.channels().begin(), heads.channels().end(), [&](const auto& channel) {
+             const auto& [topic, about] = std::tie(channel.second.topic, channel.second.metadata);
+             const auto name = about.find("node");
+             return topic == bus::RoleOf(TopicId::kTickManifest).name && name != about.end() &&
+                    name->second == NodeName(node);
+           }) == 1;
+  });
+  return again;
 }
 
 }  // namespace
@@ -186,11 +191,11 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
   TickSource source(settings.recording, settings.nodes, NodePeriods(cart));
   std::atomic<int> at_work{0};
   std::vector<std::unique_ptr<NodeRunner>> runners;
+  const std::vector<NodeId> start_again = ThoseThatStartAgain(settings.recording, settings.nodes);
   for (const NodeId node : settings.nodes) {
-    runners.push_back(std::make_unique<NodeRunner>(node,
-                                                   NodeMaking{scene, cart, settings.folder, settings.physics_threads,
-                                                              settings.figures, StartsAgain(settings.recording, node)},
-                                                   settings.go_on, &at_work));
+    const bool starts_again = std::find(start_again.begin(), start_again.end(), node) != start_again.end();
+    const NodeMaking making{scene, cart, settings.folder, settings.physics_threads, settings.figures, starts_again};
+    runners.push_back(std::make_unique<NodeRunner>(node, making, settings.go_on, &at_work));
   }
 
   LockStepResult result;

@@ -56,9 +56,11 @@ struct Outlet {
 /// Where a node that may start again keeps what it goes on from.
 class Keepsake {
  public:
-  Keepsake(const NodeMaking& making, NodeId node, std::uint32_t layout, std::size_t capacity) {
+  /// capacity() may take a while, and is asked only where there is something to keep.
+  template <class Capacity>
+  Keepsake(const NodeMaking& making, NodeId node, std::uint32_t layout, const Capacity& capacity) {
     if (!making.starts_again) return;
-    file_.emplace(making.folder / (std::string(NodeName(node)) + ".checkpoint"), making.scene.hash, layout, capacity);
+    file_.emplace(making.folder / (std::string(NodeName(node)) + ".checkpoint"), making.scene.hash, layout, capacity());
   }
   [[nodiscard]] runtime::CheckpointFile* file() { return file_ ? &*file_ : nullptr; }
 
@@ -73,7 +75,7 @@ class ReplayedPhysics final : public ReplayedNode {
         scene_(making.scene),
         threads_(making.threads),
         checkpoint_(making, id(), physics::kCheckpointLayout,
-                    physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size()))) {
+                    [this] { return physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size())); }) {
     if (!making.outputs_read) {
       contacts_.in.reset();
       cautery_.in.reset();
@@ -145,7 +147,8 @@ class ReplayedThermal final : public ReplayedNode {
   explicit ReplayedThermal(const NodeMaking& making)
       : ReplayedNode(NodeId::kThermal),
         scene_(making.scene),
-        checkpoint_(making, id(), thermal::kCheckpointLayout, thermal::ThermalSolver::CheckpointCapacity(scene_)) {
+        checkpoint_(making, id(), thermal::kCheckpointLayout,
+                    [this] { return thermal::ThermalSolver::CheckpointCapacity(scene_); }) {
     if (!making.outputs_read) patches_.in.reset();
   }
 
