@@ -108,7 +108,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
   (void)Guess(inertia.h, 0.0f);
   Linearise(inertia, {});
   forces_due_ = false;  // Nothing is solved for these.
-  coarse_.Refresh(MakeSheet(), MakeMatrix(), inertia.inertia, rows_);
+  coarse_.Renew(MakeSheet(), MakeMatrix(), inertia.inertia);
 }
 
 Sheet AccurateSolver::MakeSheet() const {

@@ -1,78 +1,133 @@
 #include "physics_node/accurate/coarse_factor.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <utility>
 
 namespace fulcrum::physics::accurate {
 
-CoarseFactor::CoarseFactor(std::vector<std::uint32_t> order)
-    : order_(std::move(order)), llt_(static_cast<Eigen::Index>(3 * order_.size())) {
-  const auto size = static_cast<Eigen::Index>(3 * order_.size());
-  const Eigen::Index blocks = (size + kFactorBlock - 1) / kFactorBlock;
-  permuted_ = Eigen::MatrixXf::Identity(size, size);
-  llt_.compute(permuted_);  // Not left without a state.
-  factor_ = Eigen::MatrixXf::Identity(kFactorBlock * blocks, kFactorBlock * blocks);
-  solution_ = FloatArray(static_cast<std::size_t>(kFactorBlock * blocks));
-  const auto most = static_cast<std::size_t>(blocks * (blocks + 1) / 2);
-  for (Triangle* triangle : {&down_, &up_}) {
-    triangle->start.reserve(static_cast<std::size_t>(blocks) + 1);
-    triangle->block.reserve(most);
-    triangle->value = FloatArray(most * kFactorBlock * kFactorBlock);
-  }
-  Pack(false, &down_);
-  Pack(true, &up_);
+void CoarseFactor::Triangle::Clear() {
+  start.assign(1, 0);
+  block.clear();
 }
 
-/// From factor_: its columns from the first on, or those of its transpose from the last.
-void CoarseFactor::Pack(bool up, Triangle* triangle) {
-  using Block = Eigen::Matrix<float, kFactorBlock, kFactorBlock>;
-  const auto blocks = static_cast<std::uint32_t>(factor_.rows() / kFactorBlock);
-  const auto at = [&](std::uint32_t row, std::uint32_t column) -> Block {
-    const auto block = [&](std::uint32_t i, std::uint32_t j) {
-      return factor_.block<kFactorBlock, kFactorBlock>(kFactorBlock * i, kFactorBlock * j);
+void CoarseFactor::Triangle::Put(int row, const Block& block_of_row) {
+  constexpr std::size_t kFloats = kFactorBlock * kFactorBlock;
+  std::copy_n(block_of_row.data(), kFloats, value.data() + kFloats * block.size());
+  block.push_back(static_cast<std::uint32_t>(row));
+}
+
+CoarseFactor::CoarseFactor(std::vector<std::uint32_t> order)
+    : order_(std::move(order)), columns_((3 * static_cast<int>(order_.size()) + kFactorBlock - 1) / kFactorBlock) {
+  const auto blocks = static_cast<std::size_t>(columns_);
+  solution_ = FloatArray(kFactorBlock * blocks);
+  making_ = FloatArray(kFactorBlock * kFactorBlock * blocks * blocks);
+  filled_.assign(blocks * blocks, 0);
+  for (Triangle* triangle : {&down_, &up_, &next_down_, &next_up_}) {
+    triangle->start.reserve(blocks + 1);
+    triangle->block.reserve(blocks * (blocks + 1) / 2);
+    triangle->value = FloatArray(blocks * (blocks + 1) / 2 * kFactorBlock * kFactorBlock);
+  }
+  const auto size = static_cast<Eigen::Index>(3 * order_.size());
+  (void)Take(Eigen::MatrixXf::Identity(size, size));  // Not left without one.
+}
+
+/// The lower part of a column of blocks of P A P^T, with ones on the diagonal beyond its last row.
+void CoarseFactor::LoadColumn(const Eigen::MatrixXf& matrix, int column) {
+  const int size = 3 * static_cast<int>(order_.size());
+  for (int row = column; row < columns_; ++row) {
+    BlockAt(row, column).setZero();
+  }
+  for (int c = 0; c < kFactorBlock; ++c) {
+    const int at = kFactorBlock * column + c;
+    if (at >= size) {
+      BlockAt(column, column)(c, c) = 1.0f;
+      continue;
+    }
+    const auto number = [&](int i) {
+      return 3 * order_[static_cast<std::size_t>(i / 3)] + static_cast<unsigned>(i % 3);
     };
-    return up ? Block(block(column, row).transpose()) : Block(block(row, column));
-  };
-  float* to = triangle->value.data();
-  const auto put = [&](std::uint32_t row, const Block& block) {
-    triangle->block.push_back(row);
-    to = std::copy_n(block.data(), block.size(), to);
-  };
-  triangle->start.assign(1, 0);
-  triangle->block.clear();
-  for (std::uint32_t step = 0; step < blocks; ++step) {
-    const std::uint32_t own = up ? blocks - 1 - step : step;
-    const Block diagonal = at(own, own), identity = Block::Identity();
-    put(own, up ? Block(diagonal.triangularView<Eigen::Upper>().solve(identity))
-                : Block(diagonal.triangularView<Eigen::Lower>().solve(identity)));
-    for (std::uint32_t later = 1; later < blocks - step; ++later) {
-      const std::uint32_t row = up ? own - later : own + later;
-      const Block block = at(row, own);
-      if (!block.isZero(0)) {
-        put(row, block);
+    const float* const from = matrix.data() + static_cast<std::size_t>(size) * number(at);
+    for (int row = column; row < columns_; ++row) {
+      float* const to = BlockAt(row, column).col(c).data();
+      const int first = kFactorBlock * row, end = std::min(first + kFactorBlock, size);
+      for (int i = first; i < end; ++i) {
+        to[i - first] = from[number(i)];
       }
     }
-    triangle->start.push_back(static_cast<std::uint32_t>(triangle->block.size()));
   }
+  for (int row = column; row < columns_; ++row) {
+    filled_[At(row, column)] = BlockAt(row, column).isZero(0) ? 0 : 1;
+  }
+}
+
+bool CoarseFactor::FactorColumn(int column) {
+  for (int before = 0; before < column; ++before) {
+    if (filled_[At(column, before)] == 0) {
+      continue;
+    }
+    const Block own = BlockAt(column, before).transpose();
+    for (int row = column; row < columns_; ++row) {
+      if (filled_[At(row, before)] != 0) {
+        BlockAt(row, column).noalias() -= BlockAt(row, before).lazyProduct(own);
+        filled_[At(row, column)] = 1;
+      }
+    }
+  }
+  const Eigen::LLT<Block> diagonal(BlockAt(column, column));
+  if (diagonal.info() != Eigen::Success || !diagonal.matrixLLT().diagonal().allFinite()) {
+    return false;
+  }
+  const Block inverse = diagonal.matrixL().solve(Block::Identity()), transposed = inverse.transpose();
+  BlockAt(column, column) = inverse;
+  next_down_.Put(column, inverse);
+  for (int row = column + 1; row < columns_; ++row) {
+    if (filled_[At(row, column)] != 0) {
+      const Block block = BlockAt(row, column).lazyProduct(transposed);
+      BlockAt(row, column) = block;
+      next_down_.Put(row, block);
+    }
+  }
+  next_down_.EndColumn();
+  return true;
+}
+
+void CoarseFactor::PackTransposed() {
+  next_up_.Clear();
+  for (int column = columns_ - 1; column >= 0; --column) {
+    for (int row = column; row >= 0; --row) {
+      if (filled_[At(column, row)] != 0) {
+        next_up_.Put(row, BlockAt(column, row).transpose());
+      }
+    }
+    next_up_.EndColumn();
+  }
+}
+
+CoarseFactor::Progress CoarseFactor::Continue(const Eigen::MatrixXf& matrix, int columns) {
+  if (next_column_ == 0) {
+    next_down_.Clear();
+  }
+  for (const int end = std::min(next_column_ + columns, columns_); next_column_ < end; ++next_column_) {
+    LoadColumn(matrix, next_column_);
+    if (!FactorColumn(next_column_)) {
+      next_column_ = 0;
+      return Progress::kRefused;
+    }
+  }
+  if (next_column_ < columns_) {
+    return Progress::kMore;
+  }
+  next_column_ = 0;
+  PackTransposed();
+  std::swap(down_, next_down_);
+  std::swap(up_, next_up_);
+  return Progress::kTaken;
 }
 
 bool CoarseFactor::Take(const Eigen::MatrixXf& matrix) {
-  const std::size_t nodes = order_.size(), size = 3 * nodes;
-  for (std::size_t column = 0; column < size; ++column) {
-    const float* from = matrix.data() + size * (3 * order_[column / 3] + column % 3);
-    float* to = permuted_.data() + size * column + 3 * (column / 3);
-    for (std::size_t i = column / 3; i < nodes; ++i) {
-      to = std::copy_n(from + 3 * std::size_t{order_[i]}, 3, to);
-    }
-  }
-  llt_.compute(permuted_);
-  if (llt_.info() != Eigen::Success || !llt_.matrixLLT().diagonal().allFinite()) {
-    return false;
-  }
-  factor_.topLeftCorner(permuted_.rows(), permuted_.cols()).triangularView<Eigen::Lower>() = llt_.matrixLLT();
-  Pack(false, &down_);
-  Pack(true, &up_);
-  return true;
+  next_column_ = 0;
+  return Continue(matrix, columns_) == Progress::kTaken;
 }
 
 void CoarseFactor::Solve(const Kernels& kernels, float* x) {

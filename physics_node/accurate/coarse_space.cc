@@ -392,23 +392,33 @@ void CoarseSpace::AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, flo
   flush();
 }
 
-void CoarseSpace::Factorise() {
-  const float mean = building_.diagonal().mean();
-  building_.diagonal().array() += kRegularisation * mean;
-  (void)factor_.Take(building_);  // If it fails, the last one serves on.
-}
-
-void CoarseSpace::Refresh(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows) {
+void CoarseSpace::AddRows(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows) {
   if (next_row_ == 0) {
     building_ = constant_ + inertia * tube_mass_;
   }
-  const int end = std::min(next_row_ + rows, rows_);
-  for (; next_row_ < end; ++next_row_) {
+  for (const int end = std::min(next_row_ + rows, rows_); next_row_ < end; ++next_row_) {
     AddSheetRow(sheet, matrix, inertia, next_row_);
   }
-  if (next_row_ == rows_) {
-    Factorise();
+  complete_ = next_row_ == rows_;
+  if (complete_) {
     next_row_ = 0;
+    building_.diagonal().array() += kRegularisation * building_.diagonal().mean();
+  }
+}
+
+void CoarseSpace::Renew(const Sheet& sheet, const SheetMatrix& matrix, float inertia) {
+  next_row_ = 0;
+  AddRows(sheet, matrix, inertia, rows_);
+  (void)factor_.Take(building_);
+  complete_ = false;
+}
+
+void CoarseSpace::Refresh(const Sheet& sheet, const SheetMatrix& matrix, float inertia) {
+  if (complete_) {
+    // If it is refused, the last one serves on.
+    complete_ = factor_.Continue(building_, kRefreshColumns) == CoarseFactor::Progress::kMore;
+  } else {
+    AddRows(sheet, matrix, inertia, kRefreshRows);
   }
 }
 

@@ -23,9 +23,11 @@ class CoarseSpace {
   CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles,
               const Kernels& kernels);
 
-  /// Begins a new matrix when the last one is in force, adds the next `rows` rows of the membrane to it, and puts it in
-  /// force when it is complete: so no step pays for all of it. A hundred steps old it serves as well as new.
-  void Refresh(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows);
+  /// A new matrix, in force at once.
+  void Renew(const Sheet& sheet, const SheetMatrix& matrix, float inertia);
+  /// The next part of the next matrix: rows of the membrane, and when it has them all columns of its factor, with the
+  /// last of which it is in force. So no step pays for all of it. A hundred steps old it serves as well as new.
+  void Refresh(const Sheet& sheet, const SheetMatrix& matrix, float inertia);
 
   /// The middle level as the kernels see it.
   [[nodiscard]] Middle middle();
@@ -64,6 +66,9 @@ class CoarseSpace {
 
  private:
   static constexpr int kSheetColumns = 4;
+  /// Of a Refresh. With three times as many steps from one matrix to the next the errors in a pull are two thirds
+  /// larger.
+  static constexpr int kRefreshRows = 14, kRefreshColumns = 4;
   [[nodiscard]] std::array<std::uint32_t, 2> FunctionsOf(std::uint32_t col) const;
   [[nodiscard]] float Hat(std::uint32_t function, int row, int col) const;
   struct alignas(16) Weights8 {
@@ -75,10 +80,10 @@ class CoarseSpace {
     int cell;
     float fraction;
   };
+  void AddRows(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows);
   void AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int row);
   void AddTube(const ElasticModel& model);
   void AddBindings(const ElasticModel& model, const ParticleStore& particles);
-  void Factorise();
   void BuildMiddle();
   void RestrictTube(int first, int end, const float* tube_residual, const float* tube);
   void SumRows(std::span<const Task> tasks, const float* row_sums);
@@ -116,7 +121,8 @@ class CoarseSpace {
   CoarseFactor factor_;
   FloatArray nodes4_;       ///< Right side, then solution, xyz_ per coarse node.
   FloatArray tube_nodes4_;  ///< What the organ gives to the right side.
-  int next_row_ = 0;
+  int next_row_ = 0;        ///< Of building_.
+  bool complete_ = false;   ///< building_ waits to be factored.
 };
 
 }  // namespace fulcrum::physics::accurate

@@ -106,5 +106,36 @@ TEST(CoarseFactor, KeepsTheLastFactorWhenTheMatrixIsNone) {
   EXPECT_TRUE(std::equal(before.data(), before.data() + before.size(), after.data()));
 }
 
+TEST(CoarseFactor, IsTheSameWhenItIsMadeAFewColumnsAtATime) {
+  using Progress = CoarseFactor::Progress;
+  CoarseFactor at_once(AlongChain()), by_parts(AlongChain());
+  ASSERT_TRUE(at_once.Take(Chain(4)));
+  ASSERT_TRUE(by_parts.Take(Chain(2)));
+  FloatArray wanted = RightSide(), old = RightSide();
+  at_once.Solve(BaselineKernels(), wanted.data());
+  by_parts.Solve(BaselineKernels(), old.data());
+  Eigen::MatrixXf bad = Chain(4);
+  bad(5, 5) = -1.0f;
+  for (const Eigen::MatrixXf& matrix : {bad, Chain(4)}) {
+    Progress progress = Progress::kMore;
+    int parts = 0;
+    for (; progress == Progress::kMore; ++parts) {
+      FloatArray x = RightSide();
+      by_parts.Solve(BaselineKernels(), x.data());
+      EXPECT_TRUE(std::equal(x.data(), x.data() + x.size(), old.data())) << "in force until the next one is whole";
+      progress = by_parts.Continue(matrix, 2);
+    }
+    if (matrix(5, 5) < 0) {
+      EXPECT_EQ(progress, Progress::kRefused);
+      continue;
+    }
+    EXPECT_EQ(progress, Progress::kTaken);
+    EXPECT_EQ(parts, 4) << "of seven columns";
+  }
+  FloatArray x = RightSide();
+  by_parts.Solve(BaselineKernels(), x.data());
+  EXPECT_TRUE(std::equal(x.data(), x.data() + x.size(), wanted.data()));
+}
+
 }  // namespace
 }  // namespace fulcrum::physics::accurate
