@@ -110,7 +110,6 @@ struct ContactState {
 };
 ContactState StateOf(float h, const ContactRow& row, const Vec3f& here, const float* start) {
   ContactState state{};
-  const Vec3f moved = here - Combine(row, start) - row.drift;
   const float gap = row.normal.dot(here) - row.offset;
   if (!(gap < 0.0f)) {
     return state;
@@ -118,6 +117,7 @@ ContactState StateOf(float h, const ContactRow& row, const Vec3f& here, const fl
   const Elastic elastic = ElasticOf(row, -gap);
   state.stiffness = elastic.stiffness;
   state.damping = kContactDamping * state.stiffness;
+  const Vec3f moved = here - Combine(row, start) - row.drift;
   const float approach = row.normal.dot(moved);
   state.force = elastic.force - state.damping * approach;
   // Coulomb with the normal force at hand, viscous below it.
@@ -205,11 +205,10 @@ void Elements::Select(const Regions& regions, std::span<const std::uint8_t> move
 
 void Elements::Touch(float h, const float* place, const float* start, const Regions& regions,
                      std::span<const ContactRow> contacts) {
-  guard_.Linearise(place);
   contacts_.clear();
   contact_force_.clear();
   for (const ContactRow& row : contacts) {
-    if (!AnyMarked(row, regions, regions.part().marked)) {
+    if (!regions.everything() && !AnyMarked(row, regions, regions.part().marked)) {
       continue;
     }
     const ContactState state = StateOf(h, row, Combine(row, place), start);
@@ -225,6 +224,8 @@ void Elements::Touch(float h, const float* place, const float* start, const Regi
     }
   }
 }
+
+void Elements::LookForFolds(const float* place) { guard_.Linearise(place); }
 
 void Elements::Linearise(const float* place) {
   for (const std::uint32_t i : computed_.bindings) {

@@ -46,8 +46,10 @@ class Elements {
 
   /// Stiffness that bindings and hinges add to the diagonal, by pool offset of x.
   [[nodiscard]] std::vector<std::pair<std::uint32_t, float>> Diagonal() const;
-  /// Finds what folds the organ has (see InversionGuard), and which contacts push at `place`, sliding measured from
-  /// `start`, a substep of h ago; they act until the next call.
+  /// Finds what folds the organ has (see InversionGuard), which act until the next call. Knows nothing of Touch.
+  void LookForFolds(const float* place);
+  /// Finds which contacts push at `place`, sliding measured from `start`, a substep of h ago; they act until the next
+  /// call.
   void Touch(float h, const float* place, const float* start, const Regions& regions,
              std::span<const ContactRow> contacts);
   [[nodiscard]] std::span<const Element> touching() const { return contacts_; }

@@ -16,9 +16,6 @@ constexpr float kGuessedSpeed = 0.08f, kFasterThanTools = 1.5f;
 constexpr float kDoubtfulCorrection = 0.0002f;
 /// Nothing moves faster: ten times a quick hand [m/s].
 constexpr float kLargestSpeed = 5.0f;
-/// Rows of the membrane that the coarse matrix takes over per step: complete about once in 30 steps. Twice as old, its
-/// errors in the pull are two thirds larger.
-constexpr int kRefreshRows = 10;
 
 bool IsStiff(const Element& contact) { return contact.m.squaredNorm() > Elements::kStiffContact; }
 
@@ -176,7 +173,13 @@ void AccurateSolver::FollowContacts() {
 }
 
 void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRow> contacts) {
-  elements_.Touch(inertia.h, place_.data(), particles_->pool(), regions_, contacts);
+  workers_.Run(2, 0, [&](int task, int) {
+    if (task == 0) {
+      elements_.Touch(inertia.h, place_.data(), particles_->pool(), regions_, contacts);
+    } else {
+      elements_.LookForFolds(place_.data());
+    }
+  });
   RefreshContactStiffness();
   const Sheet sheet = MakeSheet();
   const SheetMatrix matrix = MakeMatrix();
@@ -227,7 +230,7 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   };
   ForTasks(second, [&] {
     if (refresh_due_ && regions_.everything()) {
-      coarse_.Refresh(sheet, matrix, inertia.inertia, kRefreshRows);
+      coarse_.Refresh(sheet, matrix, inertia.inertia);
       refresh_due_ = false;
     }
   });

@@ -20,6 +20,8 @@ constexpr float kGoodWayPerSubstep = 2e-5f, kWayPerSubstep = 6e-5f;
 constexpr int kGoodSubsteps = 3, kMostSubsteps = 8;
 /// With one substep a step forces are wrong by half of themselves, however slow the tool.
 constexpr int kLeastSubsteps = 2;
+/// Where tools ask for more substeps than the preset: these are shorter, and then as many are enough in all presets.
+constexpr int kIterationsOfShort = 2;
 
 /// A state beyond this is none that a step has left: places, and the way of a step, of which none is over 60 mm [m].
 constexpr float kMostCoordinate_m = 10.0f, kMostTravel_m = 0.1f;
@@ -256,6 +258,8 @@ int TissueSimulation::SubstepsForTools() const {
 StepReport TissueSimulation::StepAccurate() {
   StepReport report;
   const int count = SubstepsForTools();
+  const int iterations =
+      count > effort_.substeps ? std::min(effort_.iterations, kIterationsOfShort) : effort_.iterations;
   const auto substeps = static_cast<float>(count);
   const float h = scene_.physics.dt_s / substeps;
   report.resets = accurate_->BeginStep();
@@ -265,11 +269,16 @@ StepReport TissueSimulation::StepAccurate() {
   for (int i = 0; i < count; ++i) {
     const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
     PlaceHeld(u1);
-    collision_.Rows(u0, u1, &rows_);
-    accurate_->workers().Run(TissueCollision::kParts, 0,
-                             [&](int part, int) { tissue_collision_.FindRows(part, u0, u1); });
+    constexpr int kParts = TissueCollision::kParts;
+    accurate_->workers().Run(kParts + 1, 0, 1, [&](int part, int) {
+      if (part < kParts) {
+        tissue_collision_.FindRows(part, u0, u1);
+      } else {
+        collision_.Rows(u0, u1, &rows_);
+      }
+    });
     tissue_collision_.JoinRows(&rows_);
-    const accurate::SubstepReport substep = accurate_->Substep(h, effort_.iterations, held_places_, rows_);
+    const accurate::SubstepReport substep = accurate_->Substep(h, iterations, held_places_, rows_);
     collision_.TakeForces(rows_);
     for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
       tool_force_[tool] += (collision_.force(tool) - tool_force_[tool]) / static_cast<float>(i + 1);
@@ -367,16 +376,35 @@ CauteryContact TissueSimulation::Cautery(std::uint32_t tool) {
   return cautery_.Update(tool, tracks_[tool].last, tracks_[tool].now, collision_);
 }
 
-float TissueSimulation::MaxDisplacement() const {
-  float largest = 0;
-  for (Index p = 0; p < particles_.particle_count(); ++p) {
-    const Index first = scene_.membrane.first;
-    if (p >= first && (!model_.NodeAlive(p - first) || model_.IsDebris(p - first))) {
-      continue;
-    }
-    largest = std::max(largest, (particles_.At(particles_.Ref(p)) - scene_.rest_position[p]).squaredNorm());
+/// body(part, worker) for each of ParticleStore::kParts, shared by the threads that a solver has.
+template <class Body>
+void TissueSimulation::InParts(const Body& body) const {
+  if (accurate_) {
+    accurate_->workers().Run(ParticleStore::kParts, 0, body);
+    return;
   }
-  return std::sqrt(largest);
+  for (int part = 0; part < ParticleStore::kParts; ++part) {
+    body(part, 0);
+  }
+}
+
+float TissueSimulation::MaxDisplacement() const {
+  std::array<float, ParticleStore::kParts> of_part{};
+  InParts([&](int part, int) {
+    const Index count = particles_.particle_count(), first = scene_.membrane.first;
+    const auto cut = [count](int at) {
+      return static_cast<Index>(std::uint64_t{count} * static_cast<unsigned>(at) / ParticleStore::kParts);
+    };
+    float largest = 0;
+    for (Index p = cut(part); p < cut(part + 1); ++p) {
+      if (p >= first && (!model_.NodeAlive(p - first) || model_.IsDebris(p - first))) {
+        continue;
+      }
+      largest = std::max(largest, (particles_.At(particles_.Ref(p)) - scene_.rest_position[p]).squaredNorm());
+    }
+    of_part[static_cast<std::size_t>(part)] = largest;
+  });
+  return std::sqrt(*std::max_element(of_part.begin(), of_part.end()));
 }
 
 float TissueSimulation::awake_part() const {
@@ -385,20 +413,13 @@ float TissueSimulation::awake_part() const {
 
 std::uint64_t TissueSimulation::StateHash() const {
   std::array<std::uint64_t, ParticleStore::kParts> of_part{};
-  const auto hash_part = [&](int part, int) {
+  InParts([&](int part, int) {
     Hash64 hash;
     for (const std::span<const float> floats : particles_.Part(part)) {
       hash.AddLong(floats);
     }
     of_part[static_cast<std::size_t>(part)] = hash.value();
-  };
-  if (accurate_) {
-    accurate_->workers().Run(ParticleStore::kParts, 0, hash_part);
-  } else {
-    for (int part = 0; part < ParticleStore::kParts; ++part) {
-      hash_part(part, 0);
-    }
-  }
+  });
   Hash64 hash;
   hash.Add(std::span<const std::uint64_t>(of_part));
   hash.AddValue(model_.revision());

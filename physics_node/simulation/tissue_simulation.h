@@ -99,6 +99,9 @@ class TissueSimulation {
   bool Restore(std::span<const float> xyz, std::span<const float> previous_xyz, const SimulationMemory& memory);
 
  private:
+  template <class Body>
+  void InParts(const Body& body) const;
+
   /// The accurate solver's answers to ContactProbe's questions: one a tool every kAskEvery steps, so that asking costs
   /// a tenth of a step at most.
   class Answers final : public ComplianceSolver {
