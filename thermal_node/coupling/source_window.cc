@@ -237,22 +237,43 @@ float SourceWindow::StepByChange(float v2, float heat_S, float longest) const {
   return step;
 }
 
+FULCRUM_WIDE
 void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
-  const float latent = material_.latent;
+  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
+  const float boil = material_.theta_boil, latent = material_.latent, too_hot = rc_dry * std::max(remove_theta, boil);
+  float* __restrict h = &enthalpy_[j * kWindow];
+  float* __restrict w = &water_[j * kWindow];
+  const float* __restrict tissue = &tissue_[j * kWindow];
+  alignas(64) float before[kWindow];
+  std::uint32_t gone = 0;
+  for (int i = 0; i < kWindow; ++i) {
+    const float enthalpy = h[i], water = w[i];
+    const float excess = enthalpy - (rc_dry + water * rc_water) * boil;
+    // Nothing where nothing boils: no branch keeps this from vectors.
+    const float some = (excess > 0.0f ? excess : 0.0f) / latent, there = tissue[i] > 0.0f ? water : 0.0f;
+    const float boiled = some < there ? some : there, left = water - boiled;
+    const float after = (rc_dry + left * rc_water) * boil + (excess - boiled * latent);
+    before[i] = enthalpy;
+    h[i] = boiled > 0.0f ? after : enthalpy;
+    w[i] = left;
+    const float dry = left > 0.0f ? 0.0f : h[i], hot = tissue[i] > 0.0f ? dry : 0.0f;
+    gone |= hot >= too_hot ? 1u : 0u;
+  }
+  double steam = 0;
+  for (int i = 0; i < kWindow; ++i) {
+    if (h[i] == before[i]) continue;
+    steam += (static_cast<double>(before[i]) - static_cast<double>(h[i])) / inverse_volume_[j * kWindow + i];
+  }
+  ledger->vapour += steam;
+  if (gone != 0) RemoveDry(j, too_hot, ledger);
+}
+
+/// Takes out what is dry and has at least such an enthalpy [J/m^3].
+void SourceWindow::RemoveDry(int j, float too_hot, Ledger* ledger) {
   for (int i = 0; i < kWindow; ++i) {
     const int k = j * kWindow + i;
-    const float excess = enthalpy_[k] - material_.BoilingEnthalpy(water_[k]);
-    if (excess < 0.0f || (flags_[k] & kNoTissue) != 0) continue;
-    const double volume = 1.0 / inverse_volume_[k];
-    if (excess > 0.0f && water_[k] > 0.0f) {
-      const float before = enthalpy_[k];
-      const float boiled = std::min(water_[k], excess / latent);
-      water_[k] -= boiled;
-      enthalpy_[k] = material_.BoilingEnthalpy(water_[k]) + (excess - boiled * latent);
-      ledger->vapour += (static_cast<double>(before) - static_cast<double>(enthalpy_[k])) * volume;
-    }
-    if (water_[k] > 0.0f || enthalpy_[k] < material_.rc_dry * remove_theta) continue;
-    ledger->removed += static_cast<double>(enthalpy_[k]) * volume;
+    if (!(tissue_[k] > 0.0f) || water_[k] > 0.0f || !(enthalpy_[k] >= too_hot)) continue;
+    ledger->removed += static_cast<double>(enthalpy_[k]) / static_cast<double>(inverse_volume_[k]);
     enthalpy_[k] = 0;
     water_[k] = 0;
     flags_[k] = static_cast<std::uint8_t>(flags_[k] | kRemoved);

@@ -97,6 +97,7 @@ class SourceWindow {
   void Deposit(float v2_s, float remove_theta, Ledger* ledger);
   void AddLeak(float v2_s);
   void BoilRow(int j, float remove_theta, Ledger* ledger);
+  void RemoveDry(int j, float too_hot, Ledger* ledger);
   template <class Visit>
   void ForTileRows(HeatField* field, const Visit& visit);
 
