@@ -144,6 +144,9 @@ class AccurateSolver {
   /// And once, by whichever thread comes first, errand().
   template <class Body, class Errand>
   void ForTasks(const Body& body, const Errand& errand);
+  /// body(index, worker) for so many tasks of one kind and of another, beside two jobs of about the same length.
+  template <class Body, class First, class Second>
+  void ForTasksBeside(int kind0, int kind1, const Body& body, const First& first, const Second& second);
   /// body(first float, count) for the parts of a field that belong to a task.
   template <class Body>
   void ForParts(const Task& task, const Body& body) const;

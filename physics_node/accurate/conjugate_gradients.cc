@@ -47,16 +47,15 @@ double AccurateSolver::Apply(const FloatArray& direction, float inertia, const P
                              direction.data() + tube_floats_ + 2 * plane_};
   float* const q[3] = {q_.data() + tube_floats_, q_.data() + tube_floats_ + plane_,
                        q_.data() + tube_floats_ + 2 * plane_};
-  const int patches = static_cast<int>(part.patches.size());
-  double of_elements = 0;
-  workers_.Run(patches + 1, 0, 1, [&](int index, int) {
-    if (index == patches) {
-      of_elements = elements_.Multiply(direction.data(), elements);
-      return;
-    }
-    const Task& task = part.patches[static_cast<std::size_t>(index)];
-    kernels_.organ_stress(organ, organ_matrix, direction.data(), Vertex(task.first), Vertex(task.end));
-  });
+  double of_hinges = 0, of_others = 0;
+  ForTasksBeside(
+      0, static_cast<int>(part.patches.size()),
+      [&](int index, int) {
+        const Task& task = part.patches[static_cast<std::size_t>(index)];
+        kernels_.organ_stress(organ, organ_matrix, direction.data(), Vertex(task.first), Vertex(task.end));
+      },
+      [&] { of_hinges = elements_.MultiplyHinges(direction.data(), elements); },
+      [&] { of_others = elements_.MultiplyOthers(direction.data(), elements); });
   ForTasks(part, [&](const Task& task, int index, int worker) {
     partial_[static_cast<std::size_t>(index)] =
         task.sheet ? kernels_.sheet_apply(sheet, inertia, matrix, p, q, carry_[static_cast<std::size_t>(worker)].data(),
@@ -64,7 +63,7 @@ double AccurateSolver::Apply(const FloatArray& direction, float inertia, const P
                    : kernels_.organ_apply(organ, organ_matrix, inertia, direction.data(), q_.data(), Vertex(task.first),
                                           Vertex(task.end));
   });
-  return SumOfPartials(part.tasks.size()) + of_elements +
+  return SumOfPartials(part.tasks.size()) + (of_hinges + of_others) +
          elements_.AddContactProduct(direction.data(), 1.0f, q_.data());
 }
 
@@ -77,25 +76,25 @@ double AccurateSolver::Curvature(const FloatArray& direction, float inertia) {
                              direction.data() + tube_floats_ + 2 * plane_};
   const std::span<const Task> tasks = regions_.part().tasks, patches = regions_.part().patches;
   const auto sheet_tasks = static_cast<std::size_t>(regions_.part().sheet_tasks);
-  const std::size_t kernels = sheet_tasks + patches.size();
-  double of_elements = 0;
-  workers_.Run(static_cast<int>(kernels) + 1, regions_.part().sheet_tasks, 1, [&](int index, int) {
-    const auto i = static_cast<std::size_t>(index);
-    if (i == kernels) {
-      of_elements = elements_.Multiply(direction.data(), elements_.computed());
-      return;
-    }
-    const Task& task = i < sheet_tasks ? tasks[i] : patches[i - sheet_tasks];
-    if (task.sheet) {
-      // Edges from a row that is not computed are nobody else's.
-      const bool above = task.first > 0 && !regions_.computed(regions_.At(true, task.first - 1));
-      partial_[i] = kernels_.sheet_curvature(sheet, inertia, matrix, p, above, task.first, task.end);
-    } else {
-      partial_[i] = kernels_.organ_curvature(organ, organ_matrix, inertia, direction.data(), Vertex(task.first),
-                                             Vertex(task.end));
-    }
-  });
-  return SumOfPartials(kernels) + of_elements + elements_.guard().Curvature(direction.data());
+  double of_hinges = 0, of_others = 0;
+  ForTasksBeside(
+      regions_.part().sheet_tasks, static_cast<int>(patches.size()),
+      [&](int index, int) {
+        const auto i = static_cast<std::size_t>(index);
+        const Task& task = i < sheet_tasks ? tasks[i] : patches[i - sheet_tasks];
+        if (task.sheet) {
+          // Edges from a row that is not computed are nobody else's.
+          const bool above = task.first > 0 && !regions_.computed(regions_.At(true, task.first - 1));
+          partial_[i] = kernels_.sheet_curvature(sheet, inertia, matrix, p, above, task.first, task.end);
+        } else {
+          partial_[i] = kernels_.organ_curvature(organ, organ_matrix, inertia, direction.data(), Vertex(task.first),
+                                                 Vertex(task.end));
+        }
+      },
+      [&] { of_hinges = elements_.MultiplyHinges(direction.data(), elements_.computed()); },
+      [&] { of_others = elements_.MultiplyOthers(direction.data(), elements_.computed()); });
+  return SumOfPartials(sheet_tasks + patches.size()) + (of_hinges + of_others) +
+         elements_.guard().Curvature(direction.data());
 }
 
 /// d, or its increment, <- before p + alpha (z + beta p); the residual, where it is wanted, goes on from that without

@@ -227,7 +227,7 @@ void Elements::Touch(float h, const float* place, const float* start, const Regi
 
 void Elements::LookForFolds(const float* place) { guard_.Linearise(place); }
 
-void Elements::Linearise(const float* place) {
+void Elements::LineariseOthers(const float* place) {
   for (const std::uint32_t i : computed_.bindings) {
     Element& e = bindings_[i];
     const __m128 d = CombineBinding(e, place);
@@ -239,7 +239,6 @@ void Elements::Linearise(const float* place) {
     e.m = Vec3f(m[0], m[1], m[2]);
     _mm_store_ps(binding_force_.data() + 4 * std::size_t{i}, _mm_mul_ps(d, _mm_set1_ps(-tension / length)));
   }
-  hinges_.MakeForce(place, computed_.hinge_rows);
 }
 
 void Elements::AddContactForces(float* residual) const {
@@ -249,8 +248,8 @@ void Elements::AddContactForces(float* residual) const {
   }
 }
 
-double Elements::Multiply(const float* p, const Selection& selection) {
-  double sum = hinges_.Multiply(p, selection.hinge_rows);
+double Elements::MultiplyOthers(const float* p, const Selection& selection) {
+  double sum = 0;
   for (const std::uint32_t i : selection.bindings) {
     const Element& e = bindings_[i];
     const __m128 d = CombineBinding(e, p), m = Xyz(e.m);
@@ -293,8 +292,8 @@ void Elements::Add(const Selection& selection, float* field) const {
   hinges_.Add(field, selection.hinge_rows);
 }
 
-double Elements::Energy(const float* place, std::span<const ContactRow> contacts) {
-  double sum = hinges_.Energy(place, computed_.hinge_rows) + guard_.Energy(place);
+double Elements::EnergyOfOthers(const float* place, std::span<const ContactRow> contacts) const {
+  double sum = guard_.Energy(place);
   for (const std::uint32_t i : computed_.bindings) {
     const __m128 d = CombineBinding(bindings_[i], place);
     const float stretch = std::sqrt(_mm_cvtss_f32(Dot3(d, d))) - binding_rest_[i].length;

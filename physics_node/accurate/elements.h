@@ -56,25 +56,31 @@ class Elements {
   [[nodiscard]] const InversionGuard& guard() const { return guard_; }
   // What reads fields and what writes them are apart: the first runs beside kernels that write other fields. What
   // bindings and hinges have made is then added by region, each by whoever works there next; the guard and the
-  // contacts, which are few, at once.
+  // contacts, which are few, at once. The first comes in two halves that take about as long and know nothing of one
+  // another: hinges, and the others.
   /// Linearises at `place`, for AddInRegion.
-  void Linearise(const float* place);
+  void LineariseHinges(const float* place) { hinges_.MakeForce(place, computed_.hinge_rows); }
+  void LineariseOthers(const float* place);
   /// residual += forces of the guard and of the touching contacts.
   void AddContactForces(float* residual) const;
-  /// While set, contacts take no part in Multiply.
+  /// While set, contacts take no part in products.
   void LeaveContactsOut(bool out) { contacts_out_ = out; }
   /// K p, for AddContactProduct and then AddInRegion or Add; returns p . K p. p is 0 wherever elements act that are not
   /// selected. All contacts are.
-  double Multiply(const float* p, const Selection& selection);
-  /// out += scale * what Multiply has made of the contacts. The guard, which seldom has anything to do, is multiplied
-  /// here; returns its share of p . K p.
+  double MultiplyHinges(const float* p, const Selection& selection) {
+    return hinges_.Multiply(p, selection.hinge_rows);
+  }
+  double MultiplyOthers(const float* p, const Selection& selection);
+  /// out += scale * what the product has made of the contacts. The guard, which seldom has anything to do, is
+  /// multiplied here; returns its share of p . K p.
   double AddContactProduct(const float* p, float scale, float* out);
-  /// field += what the last Linearise, or the last Multiply of all that is computed, has made of bindings and hinges in
-  /// a region that is computed.
+  /// field += what the last linearisation, or the last product of all that is computed, has made of bindings and hinges
+  /// in a region that is computed.
   void AddInRegion(int region, float* field) const;
-  /// field += what the last Multiply has made of bindings and hinges, in all its regions.
+  /// field += what the last product has made of bindings and hinges, in all its regions.
   void Add(const Selection& selection, float* field) const;
-  [[nodiscard]] double Energy(const float* place, std::span<const ContactRow> contacts);
+  [[nodiscard]] double EnergyOfHinges(const float* place) { return hinges_.Energy(place, computed_.hinge_rows); }
+  [[nodiscard]] double EnergyOfOthers(const float* place, std::span<const ContactRow> contacts) const;
   /// Contacts stiffer than this are with a tool; softer ones are tissue on tissue, as the fat around [N/m].
   static constexpr float kStiffContact = 500.0f;
   /// Normal and friction forces of contacts with tools at `place` + `d`, sliding measured from `start`, h ago.

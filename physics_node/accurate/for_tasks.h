@@ -28,6 +28,20 @@ void AccurateSolver::ForTasks(const Body& body, const Errand& errand) {
   });
 }
 
+/// The first and the last thread have one of the jobs each, so all keep the tasks that they have in other phases.
+template <class Body, class First, class Second>
+void AccurateSolver::ForTasksBeside(int kind0, int kind1, const Body& body, const First& first, const Second& second) {
+  workers_.Run(kind0 + kind1 + 2, kind0 + 2, [&](int index, int worker) {
+    if (index == 0) {
+      first();
+    } else if (index == kind0 + 1) {
+      second();
+    } else {
+      body(index <= kind0 ? index - 1 : index - 2, worker);
+    }
+  });
+}
+
 template <class Body>
 void AccurateSolver::ForParts(const Task& task, const Body& body) const {
   if (!task.sheet) {

@@ -92,15 +92,21 @@ double AccurateSolver::EnergyAt(const FloatArray& place, const Inertia& inertia,
   const Organ organ = MakeOrgan();
   const SheetLinearise at = At(place, nullptr);
   const OrganLinearisation organ_at = OrganAt(place);
-  double of_elements = 0;
-  ForTasks(
-      [&](const Task& task, int index, int) {
-        partial_[static_cast<std::size_t>(index)] =
-            task.sheet ? kernels_.sheet_energy(sheet, inertia, at, task.first, task.end)
-                       : kernels_.organ_energy(organ, inertia, organ_at, Vertex(task.first), Vertex(task.end));
+  const std::span<const Task> tasks = regions_.part().tasks;
+  const int sheet_tasks = regions_.part().sheet_tasks;
+  double of_hinges = 0, of_others = 0;
+  ForTasksBeside(
+      sheet_tasks, static_cast<int>(tasks.size()) - sheet_tasks,
+      [&](int index, int) {
+        const auto i = static_cast<std::size_t>(index);
+        const Task& task = tasks[i];
+        partial_[i] = task.sheet
+                          ? kernels_.sheet_energy(sheet, inertia, at, task.first, task.end)
+                          : kernels_.organ_energy(organ, inertia, organ_at, Vertex(task.first), Vertex(task.end));
       },
-      [&] { of_elements = elements_.Energy(place.data(), contacts); });
-  return SumOfPartials(regions_.part().tasks.size()) + of_elements;
+      [&] { of_hinges = elements_.EnergyOfHinges(place.data()); },
+      [&] { of_others = elements_.EnergyOfOthers(place.data(), contacts); });
+  return SumOfPartials(tasks.size()) + (of_hinges + of_others);
 }
 
 /// Contacts and folds stiffen the diagonal of what they touch.
@@ -190,21 +196,19 @@ void AccurateSolver::Linearise(const Inertia& inertia, std::span<const ContactRo
   // Stresses reach the vertices around, edges the row below: two phases.
   const std::span<const Task> tasks = regions_.part().tasks, patches = regions_.part().patches;
   const auto sheet_tasks = static_cast<std::size_t>(regions_.part().sheet_tasks);
-  const int kernels = static_cast<int>(sheet_tasks + patches.size());
-  workers_.Run(kernels + 1, regions_.part().sheet_tasks, 1, [&](int index, int worker) {
-    if (index == kernels) {
-      elements_.Linearise(place_.data());
-      return;
-    }
-    const auto i = static_cast<std::size_t>(index);
-    const Task& task = i < sheet_tasks ? tasks[i] : patches[i - sheet_tasks];
-    if (task.sheet) {
-      kernels_.sheet_linearise(sheet, inertia, at, matrix, carry_[static_cast<std::size_t>(worker)].data(), task.first,
-                               task.end);
-    } else {
-      kernels_.organ_linearise(organ, organ_matrix, place_.data(), Vertex(task.first), Vertex(task.end));
-    }
-  });
+  ForTasksBeside(
+      regions_.part().sheet_tasks, static_cast<int>(patches.size()),
+      [&](int index, int worker) {
+        const auto i = static_cast<std::size_t>(index);
+        const Task& task = i < sheet_tasks ? tasks[i] : patches[i - sheet_tasks];
+        if (task.sheet) {
+          kernels_.sheet_linearise(sheet, inertia, at, matrix, carry_[static_cast<std::size_t>(worker)].data(),
+                                   task.first, task.end);
+        } else {
+          kernels_.organ_linearise(organ, organ_matrix, place_.data(), Vertex(task.first), Vertex(task.end));
+        }
+      },
+      [&] { elements_.LineariseHinges(place_.data()); }, [&] { elements_.LineariseOthers(place_.data()); });
   HoldFrayed();
   // What touches the organ changes its blocks there; left alone it does not turn enough in two steps to matter.
   const bool all_blocks = inertia.inertia != blocks_inertia_, half_of_blocks = organ_blocks_due_;
