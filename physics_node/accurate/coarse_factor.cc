@@ -29,7 +29,7 @@ CoarseFactor::CoarseFactor(std::vector<std::uint32_t> order)
     triangle->value = FloatArray(blocks * (blocks + 1) / 2 * kFactorBlock * kFactorBlock);
   }
   const auto size = static_cast<Eigen::Index>(3 * order_.size());
-  (void)Take(Eigen::MatrixXf::Identity(size, size));  // Not left without one.
+  (void)Take(BestKernels(), Eigen::MatrixXf::Identity(size, size));  // Not left without one.
 }
 
 /// The lower part of a column of blocks of P A P^T, with ones on the diagonal beyond its last row.
@@ -61,15 +61,15 @@ void CoarseFactor::LoadColumn(const Eigen::MatrixXf& matrix, int column) {
   }
 }
 
-bool CoarseFactor::FactorColumn(int column) {
+bool CoarseFactor::FactorColumn(const Kernels& kernels, int column) {
   for (int before = 0; before < column; ++before) {
     if (filled_[At(column, before)] == 0) {
       continue;
     }
-    const Block own = BlockAt(column, before).transpose();
     for (int row = column; row < columns_; ++row) {
       if (filled_[At(row, before)] != 0) {
-        BlockAt(row, column).noalias() -= BlockAt(row, before).lazyProduct(own);
+        kernels.block_product(BlockAt(row, before).data(), BlockAt(column, before).data(), true,
+                              BlockAt(row, column).data());
         filled_[At(row, column)] = 1;
       }
     }
@@ -78,12 +78,13 @@ bool CoarseFactor::FactorColumn(int column) {
   if (diagonal.info() != Eigen::Success || !diagonal.matrixLLT().diagonal().allFinite()) {
     return false;
   }
-  const Block inverse = diagonal.matrixL().solve(Block::Identity()), transposed = inverse.transpose();
+  alignas(64) const Block inverse = diagonal.matrixL().solve(Block::Identity());
   BlockAt(column, column) = inverse;
   next_down_.Put(column, inverse);
   for (int row = column + 1; row < columns_; ++row) {
     if (filled_[At(row, column)] != 0) {
-      const Block block = BlockAt(row, column).lazyProduct(transposed);
+      alignas(64) Block block;
+      kernels.block_product(BlockAt(row, column).data(), inverse.data(), false, block.data());
       BlockAt(row, column) = block;
       next_down_.Put(row, block);
     }
@@ -104,13 +105,13 @@ void CoarseFactor::PackTransposed() {
   }
 }
 
-CoarseFactor::Progress CoarseFactor::Continue(const Eigen::MatrixXf& matrix, int columns) {
+CoarseFactor::Progress CoarseFactor::Continue(const Kernels& kernels, const Eigen::MatrixXf& matrix, int columns) {
   if (next_column_ == 0) {
     next_down_.Clear();
   }
   for (const int end = std::min(next_column_ + columns, columns_); next_column_ < end; ++next_column_) {
     LoadColumn(matrix, next_column_);
-    if (!FactorColumn(next_column_)) {
+    if (!FactorColumn(kernels, next_column_)) {
       next_column_ = 0;
       return Progress::kRefused;
     }
@@ -125,9 +126,9 @@ CoarseFactor::Progress CoarseFactor::Continue(const Eigen::MatrixXf& matrix, int
   return Progress::kTaken;
 }
 
-bool CoarseFactor::Take(const Eigen::MatrixXf& matrix) {
+bool CoarseFactor::Take(const Kernels& kernels, const Eigen::MatrixXf& matrix) {
   next_column_ = 0;
-  return Continue(matrix, columns_) == Progress::kTaken;
+  return Continue(kernels, matrix, columns_) == Progress::kTaken;
 }
 
 void CoarseFactor::Solve(const Kernels& kernels, float* x) {

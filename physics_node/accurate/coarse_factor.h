@@ -23,9 +23,9 @@ class CoarseFactor {
   /// Factors the next `columns` columns of blocks of `matrix`, symmetric, 3 rows per node, which must stay as it is
   /// from the first of them to the last. Then the factor is in force, and what follows begins anew. Refused as soon as
   /// the matrix turns out not to be positive definite: the last factor stays.
-  Progress Continue(const Eigen::MatrixXf& matrix, int columns);
+  Progress Continue(const Kernels& kernels, const Eigen::MatrixXf& matrix, int columns);
   /// All columns at once. False when refused.
-  bool Take(const Eigen::MatrixXf& matrix);
+  bool Take(const Kernels& kernels, const Eigen::MatrixXf& matrix);
   /// x <- A^-1 x, xyz_ per node; the fourth stays.
   void Solve(const Kernels& kernels, float* x);
   /// Columns of blocks.
@@ -52,7 +52,7 @@ class CoarseFactor {
     return Eigen::Map<Block, Eigen::Aligned64>(making_.data() + kFactorBlock * kFactorBlock * At(row, column));
   }
   void LoadColumn(const Eigen::MatrixXf& matrix, int column);
-  bool FactorColumn(int column);
+  bool FactorColumn(const Kernels& kernels, int column);
   void PackTransposed();
 
   std::vector<std::uint32_t> order_;

@@ -409,14 +409,14 @@ void CoarseSpace::AddRows(const Sheet& sheet, const SheetMatrix& matrix, float i
 void CoarseSpace::Renew(const Sheet& sheet, const SheetMatrix& matrix, float inertia) {
   next_row_ = 0;
   AddRows(sheet, matrix, inertia, rows_);
-  (void)factor_.Take(building_);
+  (void)factor_.Take(kernels_, building_);
   complete_ = false;
 }
 
 void CoarseSpace::Refresh(const Sheet& sheet, const SheetMatrix& matrix, float inertia) {
   if (complete_) {
     // If it is refused, the last one serves on.
-    complete_ = factor_.Continue(building_, kRefreshColumns) == CoarseFactor::Progress::kMore;
+    complete_ = factor_.Continue(kernels_, building_, kRefreshColumns) == CoarseFactor::Progress::kMore;
   } else {
     AddRows(sheet, matrix, inertia, kRefreshRows);
   }

@@ -161,6 +161,9 @@ struct Kernels {
   /// Largest |d|^2 of nodes.
   float (*sheet_largest)(const Sheet& sheet, const float* const d[3], int row0, int row1);
 
+  /// a <- b c^T, or a - b c^T, of blocks of kFactorBlock rows, stored by columns and aligned to 64 bytes; a is neither
+  /// of the others.
+  void (*block_product)(const float* b, const float* c, bool take_off, float* a);
   /// x <- T^-1 x for the triangular T that `order` and `blocks` describe.
   void (*substitute)(const Substitution& order, const float* blocks, float* x);
 

@@ -23,6 +23,7 @@ constexpr accurate::Kernels MakeKernels(const char* name) {
   k.sheet_finish = SheetFinish;
   k.sheet_step = SheetStep;
   k.sheet_largest = SheetLargest;
+  k.block_product = BlockProduct;
   k.substitute = Substitute;
   k.combine = Combine;
   k.start = StartFields;

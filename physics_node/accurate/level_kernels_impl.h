@@ -160,6 +160,30 @@ FULCRUM_INLINE void TakeBlock(const float* block, const float* y, float* out) {
   }
 }
 
+/// Four columns of the product at a time, each summed over the columns of `b` in their order.
+inline void BlockProduct(const float* b, const float* c, bool take_off, float* a) {
+  constexpr int kColumns = 4, kRows = kFactorBlock / (8 * Widest::kBatches);
+  constexpr std::size_t kWide = std::size_t{8} * Widest::kBatches;
+  for (std::size_t j = 0; j < kFactorBlock; j += kColumns) {
+    Widest sum[kColumns][kRows];
+    for (std::size_t k = 0; k < kFactorBlock; ++k) {
+      for (std::size_t i = 0; i < kColumns; ++i) {
+        const Widest factor = Widest::All(c[kFactorBlock * k + j + i]);
+        for (std::size_t r = 0; r < kRows; ++r) {
+          const Widest term = Widest::Load(b + kFactorBlock * k + kWide * r) * factor;
+          sum[i][r] = k == 0 ? term : sum[i][r] + term;
+        }
+      }
+    }
+    for (std::size_t i = 0; i < kColumns; ++i) {
+      for (std::size_t r = 0; r < kRows; ++r) {
+        float* const out = a + kFactorBlock * (j + i) + kWide * r;
+        (take_off ? Widest::Load(out) - sum[i][r] : sum[i][r]).Store(out);
+      }
+    }
+  }
+}
+
 inline void Substitute(const Substitution& order, const float* blocks, float* x) {
   constexpr std::size_t kFloats = std::size_t{kFactorBlock} * kFactorBlock;
   alignas(64) float y[kFactorBlock];

@@ -58,7 +58,7 @@ TEST(CoarseFactor, SolvesAsADenseOneInAnyOrder) {
   std::iota(as_numbered.begin(), as_numbered.end(), 0u);
   for (const auto& order : {as_numbered, AlongChain()}) {
     CoarseFactor factor(order);
-    ASSERT_TRUE(factor.Take(matrix));
+    ASSERT_TRUE(factor.Take(BaselineKernels(), matrix));
     FloatArray x = RightSide();
     factor.Solve(BaselineKernels(), x.data());
     for (Eigen::Index i = 0; i < right.size(); ++i) {
@@ -69,15 +69,17 @@ TEST(CoarseFactor, SolvesAsADenseOneInAnyOrder) {
 }
 
 TEST(CoarseFactor, IsTheSameOnEveryInstructionSet) {
-  CoarseFactor factor(AlongChain());
-  ASSERT_TRUE(factor.Take(Chain(4)));
+  CoarseFactor baseline(AlongChain());
+  ASSERT_TRUE(baseline.Take(BaselineKernels(), Chain(4)));
   FloatArray narrow = RightSide();
-  factor.Solve(BaselineKernels(), narrow.data());
+  baseline.Solve(BaselineKernels(), narrow.data());
   std::vector<const Kernels*> sets{&BestKernels()};
   if (__builtin_cpu_supports("avx2")) {
     sets.push_back(&Avx2Kernels());
   }
   for (const Kernels* kernels : sets) {
+    CoarseFactor factor(AlongChain());
+    ASSERT_TRUE(factor.Take(*kernels, Chain(4)));
     FloatArray wide = RightSide();
     factor.Solve(*kernels, wide.data());
     EXPECT_TRUE(std::equal(narrow.data(), narrow.data() + narrow.size(), wide.data())) << kernels->name;
@@ -86,22 +88,22 @@ TEST(CoarseFactor, IsTheSameOnEveryInstructionSet) {
 
 TEST(CoarseFactor, LeavesOutBlocksOfZeros) {
   CoarseFactor banded(AlongChain()), whole(AlongChain());
-  ASSERT_TRUE(banded.Take(Chain(4)));
-  ASSERT_TRUE(whole.Take(Chain(kNodes)));
+  ASSERT_TRUE(banded.Take(BaselineKernels(), Chain(4)));
+  ASSERT_TRUE(whole.Take(BaselineKernels(), Chain(kNodes)));
   EXPECT_EQ(whole.block_count(), 7u * 8u / 2u);
   EXPECT_EQ(banded.block_count(), 7u + 6u) << "a band within 15 rows reaches into the next block only";
 }
 
 TEST(CoarseFactor, KeepsTheLastFactorWhenTheMatrixIsNone) {
   CoarseFactor factor(AlongChain());
-  ASSERT_TRUE(factor.Take(Chain(4)));
+  ASSERT_TRUE(factor.Take(BaselineKernels(), Chain(4)));
   FloatArray before = RightSide(), after = RightSide();
   factor.Solve(BaselineKernels(), before.data());
   Eigen::MatrixXf bad = Chain(4);
   bad(5, 5) = -1.0f;
-  EXPECT_FALSE(factor.Take(bad));
+  EXPECT_FALSE(factor.Take(BaselineKernels(), bad));
   bad(5, 5) = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_FALSE(factor.Take(bad));
+  EXPECT_FALSE(factor.Take(BaselineKernels(), bad));
   factor.Solve(BaselineKernels(), after.data());
   EXPECT_TRUE(std::equal(before.data(), before.data() + before.size(), after.data()));
 }
@@ -109,8 +111,8 @@ TEST(CoarseFactor, KeepsTheLastFactorWhenTheMatrixIsNone) {
 TEST(CoarseFactor, IsTheSameWhenItIsMadeAFewColumnsAtATime) {
   using Progress = CoarseFactor::Progress;
   CoarseFactor at_once(AlongChain()), by_parts(AlongChain());
-  ASSERT_TRUE(at_once.Take(Chain(4)));
-  ASSERT_TRUE(by_parts.Take(Chain(2)));
+  ASSERT_TRUE(at_once.Take(BaselineKernels(), Chain(4)));
+  ASSERT_TRUE(by_parts.Take(BaselineKernels(), Chain(2)));
   FloatArray wanted = RightSide(), old = RightSide();
   at_once.Solve(BaselineKernels(), wanted.data());
   by_parts.Solve(BaselineKernels(), old.data());
@@ -123,7 +125,7 @@ TEST(CoarseFactor, IsTheSameWhenItIsMadeAFewColumnsAtATime) {
       FloatArray x = RightSide();
       by_parts.Solve(BaselineKernels(), x.data());
       EXPECT_TRUE(std::equal(x.data(), x.data() + x.size(), old.data())) << "in force until the next one is whole";
-      progress = by_parts.Continue(matrix, 2);
+      progress = by_parts.Continue(BaselineKernels(), matrix, 2);
     }
     if (matrix(5, 5) < 0) {
       EXPECT_EQ(progress, Progress::kRefused);
