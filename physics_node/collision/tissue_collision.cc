@@ -76,97 +76,9 @@ void TissueCollision::Watch::SetGap(float from_contact, const Vec3f& where, floa
   seen = last = where;
 }
 
-void TissueCollision::Watches::MakeGroups(const ParticleStore& particles) {
-  for (Index i = 0; i < all.size(); ++i) {
-    const Index block = particles.BlockOf(all[i].particle);
-    if (groups.empty() || groups.back().block != block) {
-      groups.push_back({.block = block, .first = i, .last = i, .times = {}});
-    }
-    groups.back().last = i + 1;
-  }
-  times.resize(all.size());
-}
-
 std::array<Vec3f, 3> TissueCollision::OrganCorners(Index triangle) const {
   const Triangle& v = scene_.tube_surface[triangle];
   return {particles_->At({4 * v[0], 1}), particles_->At({4 * v[1], 1}), particles_->At({4 * v[2], 1})};
-}
-
-void TissueCollision::WatchOrgan() {
-  std::vector<std::array<Vec3f, 3>> corners;
-  std::vector<std::vector<Index>> around(scene_.tube_vertex_count);
-  for (Index t = 0; t < scene_.tube_surface.size(); ++t) {
-    const Triangle& v = scene_.tube_surface[t];
-    corners.push_back({scene_.rest_position[v[0]], scene_.rest_position[v[1]], scene_.rest_position[v[2]]});
-    for (const Index vertex : v) {
-      around[vertex].push_back(t);
-    }
-  }
-  ring_start_.push_back(0);
-  for (Index t = 0; t < scene_.tube_surface.size(); ++t) {
-    std::vector<Index> ring;
-    for (const Index vertex : scene_.tube_surface[t]) {
-      ring.insert(ring.end(), around[vertex].begin(), around[vertex].end());
-    }
-    std::sort(ring.begin(), ring.end());
-    ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
-    std::erase(ring, t);
-    ring.insert(ring.begin(), t);
-    ring_.insert(ring_.end(), ring.begin(), ring.end());
-    ring_start_.push_back(static_cast<Index>(ring_.size()));
-  }
-  const TriangleTree tree(corners);
-  Index guess = kNoIndex;
-  for (Index node = 0; node < scene_.membrane.node_count() && !tree.empty(); ++node) {
-    const Index particle = scene_.membrane.first + node;
-    const Vec3f& p = scene_.rest_position[particle];
-    const TriangleTree::Hit hit = tree.Nearest(p, 1.0f, guess);
-    guess = hit.triangle;
-    if (scene_.inverse_mass[particle] > 0.0f && hit.triangle != kNoIndex) {
-      const float rest = SignedDistance(p, corners[hit.triangle]).distance;
-      if (rest > 0.0f) {
-        const float clearance = std::min(scene_.physics.collision_margin_m, 0.5f * rest);
-        Watch watch;
-        watch.particle = particle;
-        watch.at = particles_->Ref(particle);
-        watch.triangle = hit.triangle;
-        watch.clearance = clearance;
-        watch.SetGap(rest - clearance, Standpoint(watch), 0.0f);
-        organ_.all.push_back(watch);
-      }
-    }
-  }
-  organ_.MakeGroups(*particles_);
-}
-
-void TissueCollision::WatchFixed(const StaticSurface& surface) {
-  std::vector<std::array<Vec3f, 3>> corners;
-  for (Index t = surface.first_triangle; t < surface.first_triangle + surface.triangle_count; ++t) {
-    const Triangle& v = scene_.static_triangles[t];
-    corners.push_back({scene_.static_vertices[v[0]], scene_.static_vertices[v[1]], scene_.static_vertices[v[2]]});
-  }
-  Fixed fixed;
-  fixed.tree = TriangleTree(std::move(corners));
-  fixed.breathes = scene_.breathing.amplitude_m > 0.0f && Breathes(surface.role);
-  std::vector<bool> on_surface(particles_->particle_count(), false);
-  for (const Triangle& t : scene_.tube_surface) {
-    on_surface[t[0]] = on_surface[t[1]] = on_surface[t[2]] = true;
-  }
-  for (Index particle = 0; particle < particles_->particle_count(); ++particle) {
-    if (!(scene_.inverse_mass[particle] > 0.0f) || (particle < scene_.tube_vertex_count && !on_surface[particle])) {
-      continue;
-    }
-    Watch watch;
-    watch.particle = particle;
-    watch.at = particles_->Ref(particle);
-    const Vec3f& rest = scene_.rest_position[particle];
-    watch.SetGap(See(fixed.tree, rest, &watch), rest, 0.0f);
-    if (!watch.behind) {
-      fixed.watches.all.push_back(watch);
-    }
-  }
-  fixed.watches.MakeGroups(*particles_);
-  fixed_.push_back(std::move(fixed));
 }
 
 bool TissueCollision::breath_near() const {
@@ -229,11 +141,6 @@ void TissueCollision::Walk(Watch* watch, const Vec3f& p) const {
       return;
     }
   }
-}
-
-inline Vec3f TissueCollision::Standpoint(const Watch& watch) const {
-  const auto x = OrganCorners(watch.triangle);
-  return particles_->At(watch.at) - (x[0] + x[1] + x[2]) / 3.0f;
 }
 
 template <class Stand>

@@ -141,7 +141,10 @@ class TissueCollision {
   [[nodiscard]] static Signed SignedDistance(const Vec3f& p, const std::array<Vec3f, 3>& corners,
                                              const std::array<float, 3>& barycentric);
   /// Whose movement concerns a particle that watches the organ: its own against the middle of its triangle.
-  [[nodiscard]] Vec3f Standpoint(const Watch& watch) const;
+  [[nodiscard]] Vec3f Standpoint(const Watch& watch) const {
+    const auto x = OrganCorners(watch.triangle);
+    return particles_->At(watch.at) - (x[0] + x[1] + x[2]) / 3.0f;
+  }
   /// Fills watch->gone and way; `unknown` is the way of one that was not asked in the last step.
   template <class Stand>
   void AskWay(Watch* watch, float others_moved, float unknown, const Stand& stand) const;
