@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <set>
 #include <string>
 
 #include "services/core/error.h"
@@ -46,6 +47,15 @@ class LockStepTest : public ::testing::Test {
     return ReplayInLockStep(settings, view_, SimulatedCart(), {});
   }
 
+  /// Nodes of the last replay that kept a checkpoint.
+  [[nodiscard]] std::set<std::string> Keepers() const {
+    std::set<std::string> keepers;
+    for (const auto& file : std::filesystem::directory_iterator(folder_ / "again")) {
+      keepers.insert(file.path().stem().string());
+    }
+    return keepers;
+  }
+
   static config::CartConfig SimulatedCart() { return {}; }
 
   scene::SceneData data_;
@@ -64,6 +74,7 @@ TEST_F(LockStepTest, ComesToTheSameStates) {
   EXPECT_EQ(result.nodes[1].compared, 200u);
   EXPECT_EQ(result.nodes[2].ticks, 2000u);
   EXPECT_GE(result.nodes[2].compared, 199u);
+  EXPECT_EQ(Keepers(), std::set<std::string>{}) << "nobody is started again";
 }
 
 TEST_F(LockStepTest, GoesOnAcrossRestarts) {
@@ -72,6 +83,7 @@ TEST_F(LockStepTest, GoesOnAcrossRestarts) {
   EXPECT_TRUE(result.good()) << ReportText(result);
   EXPECT_EQ(result.nodes[0].starts, 2u);
   EXPECT_EQ(result.nodes[2].starts, 2u);
+  EXPECT_EQ(Keepers(), std::set<std::string>{"physics_node"});
 }
 
 TEST_F(LockStepTest, FindsTheCheckpointOfAProcessThatDiedBeforeItSealedItsLast) {

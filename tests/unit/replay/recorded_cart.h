@@ -12,6 +12,8 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "haptics_node/node/haptics_node.h"
@@ -30,8 +32,7 @@ namespace fulcrum::replay::testing {
 template <class T>
 class TappedTopic {
  public:
-  explicit TappedTopic(recording::McapWriter* writer)
-      : writer_(writer), channel_(writer->AddChannel(0, bus::RoleOf<T>().name, "cdr", {})) {}
+  explicit TappedTopic(recording::McapWriter* writer) : writer_(writer) {}
   [[nodiscard]] auto MakeInput() { return topic_.MakeInput(); }
   [[nodiscard]] auto MakeOutput() { return topic_.MakeOutput(); }
   /// What has come since. `change` may spoil a sample on its way into the recording, or drop it (false).
@@ -39,15 +40,29 @@ class TappedTopic {
     while (tap_->TakeNext(&sample_)) {
       if (change && !change(&sample_)) continue;
       if (!bus::EncodeCdr(sample_, &bytes_)) continue;
-      writer_->Write(channel_, static_cast<std::uint32_t>(bus::StampOf(sample_).sequence),
+      writer_->Write(ChannelOf(sample_), static_cast<std::uint32_t>(bus::StampOf(sample_).sequence),
                      static_cast<std::uint64_t>(now_ns), static_cast<std::uint64_t>(now_ns),
                      std::as_bytes(std::span(bytes_)));
     }
   }
 
  private:
+  using Process = std::pair<std::string, std::uint64_t>;
+  /// One for each process that tells of its ticks; of other topics one is enough here.
+  std::uint16_t ChannelOf(const T& sample) {
+    Process process;
+    recording::TextMap about;
+    if constexpr (std::is_same_v<T, TickManifest>) {
+      process = {NodeName(sample.node), sample.stamp.epoch};
+      about = {{"node", process.first}};
+    }
+    const auto [known, fresh] = channels_.try_emplace(process);
+    if (fresh) known->second = writer_->AddChannel(0, bus::RoleOf<T>().name, "cdr", about);
+    return known->second;
+  }
+
   recording::McapWriter* writer_;
-  std::uint16_t channel_;
+  std::map<Process, std::uint16_t> channels_;
   bus::InProcessTopic<T> topic_;
   std::unique_ptr<bus::Input<T>> tap_ = topic_.MakeInput(4096);
   T sample_;
