@@ -2,7 +2,7 @@
 //
 //   replay.hash_mismatches    states that differ, of physics, thermal and haptics over the whole recording
 //   replay.states_compared
-//   replay.speed_x_realtime   physics and thermal together, physics on as many threads as there are cores; median
+//   replay.speed_x_realtime   physics and thermal together, physics on as many threads as there are cores
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -16,8 +16,6 @@ namespace {
 
 constexpr int kDomain = 58;
 constexpr double kPatience_s = 120;
-/// On a shared machine one replay of a file may take a third longer than the next.
-constexpr int kReplays = 9;
 
 int Fail(const char* what, const std::string& said) {
   std::fprintf(stderr, "bench_replay: %s\n%s", what, said.c_str());
@@ -41,7 +39,7 @@ int Run(benchmark::Report* report) {
   report->Add("replay.hash_mismatches", mismatches, "states");
   report->Add("replay.states_compared", compared, "states");
   std::vector<double> speeds;
-  for (int i = 0; i < (report->quick() ? 3 : kReplays); ++i) {
+  for (int i = 0; i < 3; ++i) {
     const auto run = testing::Replay(recording, {"--into", "physics", "thermal"}, kPatience_s);
     if (run.exit_code != 0) return Fail("the replay differs", run.said);
     speeds.push_back(run.figures.at("speed_x_realtime"));
