@@ -66,7 +66,7 @@ class CoarseSpace {
 
  private:
   static constexpr int kSheetColumns = 4;
-  /// Of a Refresh. With three times as many steps from one matrix to the next the errors in a pull are two thirds
+  /// Of a Refresh. Whole every 60 steps instead of every 30, the errors in a pull are two thirds larger.
   /// larger.
   static constexpr int kRefreshRows = 14, kRefreshColumns = 4;
   [[nodiscard]] std::array<std::uint32_t, 2> FunctionsOf(std::uint32_t col) const;
