@@ -67,7 +67,6 @@ class CoarseSpace {
  private:
   static constexpr int kSheetColumns = 4;
   /// Of a Refresh. Whole every 60 steps instead of every 30, the errors in a pull are two thirds larger.
-  /// larger.
   static constexpr int kRefreshRows = 14, kRefreshColumns = 4;
   [[nodiscard]] std::array<std::uint32_t, 2> FunctionsOf(std::uint32_t col) const;
   [[nodiscard]] float Hat(std::uint32_t function, int row, int col) const;
