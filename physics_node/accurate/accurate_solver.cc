@@ -60,7 +60,7 @@ AccurateSolver::AccurateSolver(const SceneView& scene, const ElasticModel& model
     block = FloatArray(plane_);
   }
   for (FloatArray* a : {&organ_c_, &organ_f_, &organ_block_}) {
-    *a = FloatArray(12 * (tube_count_ + std::size_t{1}));
+    *a = FloatArray(12 * (tube_count_ + std::size_t{kPatchGroup}));
   }
   organ_stress_ = FloatArray(16 * (tube_count_ + std::size_t{1}));
   const std::size_t pool = particles->raw().size();

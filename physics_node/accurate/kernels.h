@@ -67,6 +67,9 @@ struct SheetLinearise {
   float* residual[3];        ///< Out: elastic force + load + gravity - inertia.
 };
 
+/// Kernels read the organ's patches in groups of so many: what there is of one by patch goes on for so many more.
+inline constexpr std::uint32_t kPatchGroup = 16;
+
 /// The organ: one patch per vertex (energy/elastic_model.h), links in compressed rows.
 struct Organ {
   std::uint32_t vertices;

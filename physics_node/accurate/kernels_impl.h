@@ -3,6 +3,7 @@
 
 #include "physics_node/accurate/level_kernels_impl.h"
 #include "physics_node/accurate/organ_kernels_impl.h"
+#include "physics_node/accurate/organ_patches_impl.h"
 #include "physics_node/accurate/sheet_kernels_impl.h"
 #include "physics_node/accurate/sheet_rows_impl.h"
 

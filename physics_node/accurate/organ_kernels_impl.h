@@ -1,11 +1,5 @@
 // Bodies of the organ's kernels, compiled once per instruction set with FULCRUM_KERNEL_NAMESPACE set: a vertex or a
-// column of a 3 x 3 matrix is one register xyz_.
-//
-// The law at a patch: stable neo-Hookean (energy/tet_energy.h) less the part of mu that the edges carry. Its
-// derivative,
-//   dP = (1 - a) mu dF + lambda (cof F : dF) cof F + p d(cof F)[dF],   p = lambda (J - 1) - mu,
-// together with the edges is positive semi-definite while |p| <= mu / sigma_max(F), so p is held there; the force stays
-// exact.
+// column of a 3 x 3 matrix is one register xyz_. Those that go over patches are in organ_patches_impl.h.
 #pragma once
 
 #include <immintrin.h>
@@ -56,10 +50,6 @@ inline void StoreColumns(const Columns& m, F4 scale, float* p) {
 }
 inline Columns CofactorColumns(const Columns& f) {
   return {CrossProduct(f.c1, f.c2), CrossProduct(f.c2, f.c0), CrossProduct(f.c0, f.c1)};
-}
-inline float DotColumns(const Columns& a, const Columns& b) {
-  const F4 p = a.c0 * b.c0 + a.c1 * b.c1 + a.c2 * b.c2;
-  return (p.First() + SpreadLane<1>(p).First()) + SpreadLane<2>(p).First();
 }
 
 /// Four columns xyz_ next to one another. In two registers even where one would do: sums of four cycles each follow one
@@ -113,95 +103,8 @@ inline Quad operator*(const Quad& a, const Quad& b) {
 }
 #endif
 
-/// sum x_j (x) g_j over the patch of vertex n.
-inline Columns PatchGradient(const Organ& organ, const float* tube, std::uint32_t n) {
-  Quad f = Quad::Zero();
-  for (std::uint32_t i = organ.start[n]; i < organ.start[n + 1]; ++i) {
-    const F4 x = F4::Load(tube + 4 * static_cast<std::size_t>(organ.vertex[i]));
-    f = f + Quad::Repeat(x) * Quad::Spread(F4::Load(organ.gradient + 4 * static_cast<std::size_t>(i)));
-  }
-  return {f.Column<0>(), f.Column<1>(), f.Column<2>()};
-}
-
 inline float Larger(float a, float b) { return a > b ? a : b; }
-inline float Smaller(float a, float b) { return a < b ? a : b; }
-
-/// Upper bound of sigma_max(F)^2: Gershgorin on F^T F, tight near rest.
-inline float LargestStretchSq(const Columns& f) {
-  const float a01 = __builtin_fabsf(DotProduct(f.c0, f.c1)), a02 = __builtin_fabsf(DotProduct(f.c0, f.c2)),
-              a12 = __builtin_fabsf(DotProduct(f.c1, f.c2));
-  return Larger(Larger(DotProduct(f.c0, f.c0) + a01 + a02, DotProduct(f.c1, f.c1) + a01 + a12),
-                DotProduct(f.c2, f.c2) + a02 + a12);
-}
 inline float Root(float v) { return _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(v))); }
-
-/// What the vertices of patch n gather: its stress, and in the fourth column where its own vertex is.
-inline void StoreLine(const Columns& stress, F4 scale, const float* p, std::uint32_t n, float* lines) {
-  float* line = lines + 16 * static_cast<std::size_t>(n);
-  StoreColumns(stress, scale, line);
-  F4::Load(p + 4 * static_cast<std::size_t>(n)).Store(line + 12);
-}
-
-inline void OrganLinearise(const Organ& organ, const OrganMatrix& matrix, const float* place, std::uint32_t first,
-                           std::uint32_t last) {
-  for (std::uint32_t n = first; n < last; ++n) {
-    const Columns f = PatchGradient(organ, place, n), cofactor = CofactorColumns(f);
-    const float j = DotProduct(f.c0, cofactor.c0), volume = organ.volume[n];
-    const float pressure = organ.lambda * (j - 1.0f) - organ.mu;
-    const F4 shear = F4::All((1.0f - organ.variance) * organ.mu), p = F4::All(pressure);
-    const Columns stress = {f.c0 * shear + cofactor.c0 * p, f.c1 * shear + cofactor.c1 * p,
-                            f.c2 * shear + cofactor.c2 * p};
-    const std::size_t at = 12 * static_cast<std::size_t>(n);
-    StoreLine(stress, F4::All(volume), place, n, matrix.stress);
-    const float sigma = Root(Larger(LargestStretchSq(f), 1e-12f)), bound = organ.mu / sigma;
-    // Flattened and inverted patches leave the indefinite part out altogether.
-    const float fade = Smaller(Larger((j - 0.1f) * 2.5f, 0.0f), 1.0f);
-    const float q = Larger(Smaller(pressure, bound), -bound) * fade;
-    StoreColumns(cofactor, F4::All(Root(organ.lambda * volume)), matrix.c + at);
-    StoreColumns(f, F4::All(q * volume), matrix.f + at);
-    matrix.c[at + 3] = ((1.0f - organ.variance) * organ.mu + __builtin_fabsf(pressure - q) * sigma) * volume;
-  }
-}
-
-/// V dP of patch n where its vertices move by p with gradient `d`.
-inline Columns StressAlong(const OrganMatrix& matrix, const Columns& d, std::uint32_t n) {
-  const std::size_t at = 12 * static_cast<std::size_t>(n);
-  const Columns c = LoadColumns(matrix.c + at), f = LoadColumns(matrix.f + at);
-  const F4 shear = SpreadLane<3>(c.c0), along = F4::All(DotColumns(c, d));
-  // d(cof F)[dF], columns: dF1 x F2 + F1 x dF2 and so on.
-  return {d.c0 * shear + c.c0 * along + (CrossProduct(d.c1, f.c2) + CrossProduct(f.c1, d.c2)),
-          d.c1 * shear + c.c1 * along + (CrossProduct(d.c2, f.c0) + CrossProduct(f.c2, d.c0)),
-          d.c2 * shear + c.c2 * along + (CrossProduct(d.c0, f.c1) + CrossProduct(f.c0, d.c1))};
-}
-
-inline void OrganStress(const Organ& organ, const OrganMatrix& matrix, const float* p, std::uint32_t first,
-                        std::uint32_t last) {
-  for (std::uint32_t n = first; n < last; ++n) {
-    StoreLine(StressAlong(matrix, PatchGradient(organ, p, n), n), F4::All(1.0f), p, n, matrix.stress);
-  }
-}
-
-inline double OrganCurvature(const Organ& organ, const OrganMatrix& matrix, float inertia, const float* p,
-                             std::uint32_t first, std::uint32_t last) {
-  double sum = 0;
-  for (std::uint32_t n = first; n < last; ++n) {
-    const F4 here = F4::Load(p + 4 * static_cast<std::size_t>(n));
-    const Quad centre = Quad::Repeat(here);
-    Quad f = Quad::Zero();
-    for (std::uint32_t i = organ.start[n]; i < organ.start[n + 1]; ++i) {
-      const F4 x = F4::Load(p + 4 * static_cast<std::size_t>(organ.vertex[i]));
-      f = f + (Quad::Repeat(x) - centre) * Quad::Spread(F4::Load(organ.gradient + 4 * static_cast<std::size_t>(i)));
-    }
-    // The gradients of a patch add up to 0, so its vertices may be measured from its own.
-    const Columns d = {f.Column<0>(), f.Column<1>(), f.Column<2>()};
-    const Columns stress = StressAlong(matrix, d, n);
-    StoreLine(stress, F4::All(1.0f), p, n, matrix.stress);
-    // Each edge is met from both ends, and from each has the share of that end.
-    const F4 own = here * F4::All(organ.mass[n] * inertia) - f.Column<3>();
-    sum += static_cast<double>(DotColumns(stress, d) + DotProduct(here, own));
-  }
-  return sum;
-}
 
 /// sum over the patches of vertex v of stress * gradient + stiffness * (x_v - x_n).
 inline F4 GatherVertex(const Organ& organ, const OrganMatrix& matrix, F4 here, std::uint32_t v) {
@@ -285,36 +188,6 @@ inline double OrganBlockSolve(const OrganMatrix& matrix, const float* r, float* 
     const F4 result = block.c0 * SpreadLane<0>(b) + block.c1 * SpreadLane<1>(b) + block.c2 * SpreadLane<2>(b);
     result.Store(z + 4 * static_cast<std::size_t>(v));
     sum += static_cast<double>(DotProduct(b, result));
-  }
-  return sum;
-}
-
-inline double OrganEnergy(const Organ& organ, const Inertia& inertia, const OrganLinearisation& at, std::uint32_t first,
-                          std::uint32_t last) {
-  const F4 gravity = {_mm_set_ps(0, inertia.gravity[2], inertia.gravity[1], inertia.gravity[0])};
-  const F4 half = F4::All(0.5f * inertia.inertia), inverse_h = F4::All(1.0f / inertia.h);
-  double sum = 0;
-  for (std::uint32_t n = first; n < last; ++n) {
-    const Columns f = PatchGradient(organ, at.place, n);
-    const float j = DotProduct(f.c0, CrossProduct(f.c1, f.c2)) - 1.0f;
-    const float density = 0.5f * organ.mu * (1.0f - organ.variance) * (DotColumns(f, f) - 3.0f) - organ.mu * j +
-                          0.5f * organ.lambda * (j * j);
-    sum += static_cast<double>(density * organ.volume[n]);
-    const std::size_t i = 4 * static_cast<std::size_t>(n);
-    const F4 here = F4::Load(at.place + i);
-    F4 edges = F4::All(0);
-    for (std::uint32_t k = organ.patch_start[n]; k < organ.patch_start[n + 1]; ++k) {
-      const F4 d = here - F4::Load(at.place + 4 * static_cast<std::size_t>(organ.patch[k]));
-      edges = edges + d * d * F4::All(organ.patch_gradient[4 * static_cast<std::size_t>(k) + 3]);
-    }
-    // Each edge is met from both ends.
-    sum += 0.25 * static_cast<double>(DotProduct(edges, F4::All(1.0f)));
-    if (at.start[i + 3] > 0.0f) {
-      const F4 moved = here - F4::Load(at.start + i);
-      const F4 momentum = moved * half - F4::Load(at.velocity + i) * inverse_h - gravity;
-      sum +=
-          static_cast<double>(organ.mass[n] * DotProduct(moved, momentum) - DotProduct(moved, F4::Load(at.load + i)));
-    }
   }
   return sum;
 }

@@ -38,8 +38,8 @@ void AccurateSolver::PackSheet(const ElasticModel& model) {
 void AccurateSolver::PackOrgan(const ElasticModel& model, std::uint32_t tube_count) {
   mu_ = static_cast<float>(model.mu_Pa);
   lambda_ = static_cast<float>(model.lambda_Pa + model.mu_Pa);
-  volume_ = FloatArray(tube_count + 1);
-  organ_mass_ = FloatArray(tube_count + 1);
+  volume_ = FloatArray(tube_count + kPatchGroup);
+  organ_mass_ = FloatArray(tube_count + kPatchGroup);
   start_.assign(tube_count + 1, 0);
   patch_start_.assign(tube_count + 1, 0);
   for (const ElasticPatch& patch : model.patches) {
