@@ -124,18 +124,27 @@ FULCRUM_INLINE F AddOther(F sum, F other, int c) {
   return c < 3 ? sum - other : sum + other;
 }
 
-/// Linearises edges along `d`: stiffness kt I + along d d^T.
+/// Edges along `d`: their tension over their length, and their stiffness kt I + along d d^T.
 template <class F>
-FULCRUM_INLINE Edge9<F> LineariseEdge(const V<F>& d, F inverse_rest, F axial, F stiffening, F* kt, F* along) {
+struct Linear {
+  V<F> d;
+  F tension, kt, along;
+};
+template <class F>
+FULCRUM_INLINE Linear<F> LineariseEdge(const V<F>& d, F inverse_rest, F axial, F stiffening) {
   const F zero = F::All(0), one = F::All(1.0f);
   const F length = Sqrt(Max(Dot(d, d), F::All(1e-24f))), inverse = one / length;
   const F strain = length * inverse_rest - one, j = stiffening * (strain * strain);
   const F tension = axial * (strain * (one + j)) * inverse;
   const F tangent = axial * inverse_rest * (one + F::All(3.0f) * j);
-  *kt = Max(tension, zero);
-  *along = Max(tangent - *kt, zero) * (inverse * inverse);
-  const V<F> f = d * tension, a = d * *along;
-  return {{f.x, f.y, f.z, *kt + a.x * d.x, *kt + a.y * d.y, *kt + a.z * d.z, a.x * d.y, a.x * d.z, a.y * d.z}};
+  const F kt = Max(tension, zero);
+  return {d, tension, kt, Max(tangent - kt, zero) * (inverse * inverse)};
+}
+template <class F>
+FULCRUM_INLINE Edge9<F> ActingOnEnds(const Linear<F>& e) {
+  const V<F> f = e.d * e.tension, a = e.d * e.along;
+  return {{f.x, f.y, f.z, e.kt + a.x * e.d.x, e.kt + a.y * e.d.y, e.kt + a.z * e.d.z, a.x * e.d.y, a.x * e.d.z,
+           a.y * e.d.z}};
 }
 
 /// Handed on from slot to slot along a row: what edges to the right and along diagonals do at their other end. What
@@ -157,19 +166,17 @@ FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, con
                                  const SheetMatrix& matrix, const float* above, float* below, int row) {
   const std::size_t start = RowStart(sheet, row), stride = 8 * static_cast<std::size_t>(sheet.slots),
                     down_by = Below(sheet, row);
-  const auto linearise = [&]<class F>(int d, const V<F>& vector, std::size_t node, F* kt,
-                                      F* along) FULCRUM_INLINE_LAMBDA {
+  const auto linearise = [&]<class F>(int d, const V<F>& vector, std::size_t node) FULCRUM_INLINE_LAMBDA {
     return LineariseEdge<F>(vector, F::Load(sheet.inverse_rest[d] + node), F::Load(sheet.axial[d] + node),
-                            F::All(sheet.stiffening), kt, along);
+                            F::All(sheet.stiffening));
   };
   Carried<9> left, diagonal;
   {
-    F8 kt, along;
     const std::size_t last = start + stride - 8;
     const V8 x = LoadV(at.place, last);
     const EndsOf<F8> ends = LoadEndsOf<F8>(sheet, at.place, start, sheet.slots - 1, down_by);
-    const Edge9<F8> to_right = linearise(0, ends.right - x, last, &kt, &along),
-                    to_diagonal = linearise(2, ends.diagonal - x, last, &kt, &along);
+    const Edge9<F8> to_right = ActingOnEnds(linearise(0, ends.right - x, last)),
+                    to_diagonal = ActingOnEnds(linearise(2, ends.diagonal - x, last));
     for (int c = 0; c < 9; ++c) {
       left.Begin(RotateUp(to_right.v[c]), c);
       diagonal.Begin(RotateUp(to_diagonal.v[c]), c);
@@ -179,18 +186,19 @@ FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, con
     const std::size_t slot = 8 * static_cast<std::size_t>(s), node = start + slot;
     const V<F> x = LoadSlots<F>(at.place, node);
     const EndsOf<F> ends = LoadEndsOf<F>(sheet, at.place, start, s, down_by);
-    F kt, along;
     const auto edge = [&](int d, const V<F>& vector) FULCRUM_INLINE_LAMBDA {
-      const Edge9<F> result = linearise(d, vector, node, &kt, &along);
+      const Linear<F> result = linearise(d, vector, node);
       if (!only_below) {
-        kt.Store(matrix.kt[d] + node);
-        along.Store(matrix.along[d] + node);
+        result.kt.Store(matrix.kt[d] + node);
+        result.along.Store(matrix.along[d] + node);
       }
       return result;
     };
+    const Linear<F> lines[3] = {edge(1, ends.below - x), edge(2, ends.diagonal - x),
+                                only_below ? Linear<F>{} : edge(0, ends.right - x)};
     Edge9<F> sum;
     {
-      const Edge9<F> down = edge(1, ends.below - x), across = edge(2, ends.diagonal - x);
+      const Edge9<F> down = ActingOnEnds(lines[0]), across = ActingOnEnds(lines[1]);
       for (int c = 0; c < 9; ++c) {
         const auto plane = static_cast<std::size_t>(c) * stride + slot;
         if (!only_below) {
@@ -203,7 +211,7 @@ FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, con
       return;
     }
     {
-      const Edge9<F> right = edge(0, ends.right - x);
+      const Edge9<F> right = ActingOnEnds(lines[2]);
       for (int c = 0; c < 9; ++c) {
         sum.v[c] = AddOther(sum.v[c], left.Pass(right.v[c], c), c) + right.v[c];
       }
