@@ -98,7 +98,9 @@ void Workers::HelpPart(int part, int worker) {
     int task = shared + claim;
     if (part < count()) {
       const int first = First(split, part), of_first = First(split, part + 1) - first;
-      task = claim < of_first ? first + claim : split + First(shared - split, part) + claim - of_first;
+      const int second = First(shared - split, part), of_second = First(shared - split, part + 1) - second;
+      const int i = backwards_.load(std::memory_order_relaxed) ? of_first + of_second - 1 - claim : claim;
+      task = i < of_first ? first + i : split + second + i - of_first;
     }
     call_.load(std::memory_order_relaxed)(body_.load(std::memory_order_relaxed), task, worker);
     done_.fetch_add(1, std::memory_order_release);

@@ -25,6 +25,10 @@ class Workers {
   /// Whether the other threads help in what is run from now on; else they sleep. What comes out does not depend on it.
   void LetHelp(bool help) { help_ = help; }
 
+  /// In which order each thread does its part in what is run from now on: that with which a phase begins is best what
+  /// the one before it has ended with, for that is still in the cache of its core.
+  void Go(bool backwards) { backwards_ = backwards; }
+
   /// body(task, worker) once for each task in [0, tasks), worker in [0, count()); returns when all are done. The first
   /// `split` tasks are of one kind, the others of another: each worker's part has its share of both. The last
   /// `errands` of them are nobody's part: the thread that calls, which has the serial stretches to itself, takes them
@@ -32,8 +36,9 @@ class Workers {
   template <class Body>
   void Run(int tasks, int split, int errands, const Body& body) {
     if (threads_.empty() || !help_ || tasks < 2) {
-      for (int task = 0; task < tasks; ++task) {
-        body(task, 0);
+      const int shared = tasks - errands;
+      for (int i = 0; i < tasks; ++i) {
+        body(backwards_ && i < shared ? shared - 1 - i : i, 0);
       }
       return;
     }
@@ -71,6 +76,7 @@ class Workers {
   alignas(64) std::atomic<std::uint32_t> phase_{0};
   std::atomic<int> caller_cpu_{-1};  ///< That the phase was begun on.
   std::atomic<bool> stop_{false};
+  std::atomic<bool> backwards_{false};
   bool help_ = true;  ///< Of the thread that calls.
   std::vector<std::thread> threads_;
 };
