@@ -29,8 +29,8 @@ constexpr float kBesideCosine = 0.5f;
 constexpr float kTouching = 0.0003f;
 /// Steps of a walk over the organ's surface in one look.
 constexpr int kMaxWalk = 8;
-/// Watches are fetched so many ahead, and their times two and three times as many: a core's cache does not hold all.
-constexpr Index kAhead = 8;
+/// What is known of watches is fetched so many ahead: a core's cache does not hold all.
+constexpr std::size_t kAhead = 8;
 
 }  // namespace
 
@@ -156,6 +156,69 @@ void TissueCollision::AskWay(Watch* watch, float others_moved, float unknown, co
   watch->asked = step_;
 }
 
+/// Groups in which a watch may have to be asked, in order.
+template <class Around>
+auto TissueCollision::FindDue(Watches* watches, int part, std::span<const float> moved, const Around& around,
+                              std::vector<Due>* found) -> std::span<Due> {
+  const auto bound = [&](int p) { return watches->groups.size() * static_cast<std::size_t>(p) / kParts; };
+  const std::size_t begin = bound(part), end = bound(part + 1);
+  found->resize(std::max(found->size(), end - begin));
+  std::size_t count = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    Group& group = watches->groups[i];
+    const float step = moved[group.block] + around(i), travel = group.travel += step;
+    // A row may come of what gets into its band in the first half of this step.
+    const float from = travel + step + Band(step);
+    const bool is_due = travel >= group.times.due;
+    (*found)[count] = {.group = static_cast<Index>(i), .step = step, .travel = travel, .from = from, .is_due = is_due};
+    count += is_due || group.times.start < from ? 1 : 0;
+  }
+  return {found->data(), count};
+}
+
+/// Watches of `due` for which wanted(due, group's times or its own) holds.
+template <class Wanted>
+void TissueCollision::FindAsked(const Watches& watches, std::span<const Due> due, const Wanted& wanted,
+                                std::vector<Asked>* asked) {
+  asked->clear();
+  for (std::size_t k = 0; k < due.size(); ++k) {
+    const Index ahead = due[std::min(k + kAhead, due.size() - 1)].group;
+    __builtin_prefetch(&watches.times[watches.first[ahead]]);
+    __builtin_prefetch(&watches.times[watches.first[ahead + 1] - 1]);
+    if (wanted(due[k], watches.groups[due[k].group].times)) {
+      for (Index i = watches.first[due[k].group]; i < watches.first[due[k].group + 1]; ++i) {
+        if (wanted(due[k], watches.times[i])) {
+          asked->push_back({i, static_cast<Index>(k)});
+        }
+      }
+    }
+  }
+}
+
+/// body(watch, asked) for each, with what it takes to say where it stands fetched ahead.
+template <class Body>
+void TissueCollision::ForAsked(Watches* watches, std::span<const Asked> asked, const Body& body) const {
+  const bool of_organ = watches == &organ_;
+  const float* pool = particles_->raw().data();
+  for (std::size_t k = 0; k < asked.size() + kAhead; ++k) {
+    if (k < asked.size()) {
+      __builtin_prefetch(&watches->all[asked[k].watch]);
+    }
+    if (const std::size_t next = k - kAhead / 2; k >= kAhead / 2 && next < asked.size()) {
+      const Watch& watch = watches->all[asked[next].watch];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        __builtin_prefetch(pool + watch.at.base + axis * watch.at.step);
+      }
+      if (of_organ) {
+        __builtin_prefetch(&scene_.tube_surface[watch.triangle]);
+      }
+    }
+    if (k >= kAhead) {
+      body(&watches->all[asked[k - kAhead].watch], asked[k - kAhead]);
+    }
+  }
+}
+
 /// look(watch) tells how far the particle is from contact. stand(watch) is where it is, as far as that concerns what
 /// it watches.
 template <class Around, class Stand, class Look>
@@ -164,73 +227,69 @@ void TissueCollision::LookAtDue(Watches* watches, int part, std::span<const floa
   Found& found = watches->found[static_cast<std::size_t>(part)];
   found.near.clear();
   found.looked_at = 0;
-  const Index last = static_cast<Index>(watches->all.size()) - 1;
-  const auto bound = [&](int p) { return watches->groups.size() * static_cast<std::size_t>(p) / kParts; };
-  for (Group& group : std::span(watches->groups).subspan(bound(part), bound(part + 1) - bound(part))) {
-    for (const Index ahead : {2 * kAhead, 3 * kAhead}) {
-      __builtin_prefetch(&watches->times[std::min(group.first + ahead, last)]);
+  const std::span<Due> groups = FindDue(watches, part, moved, around, &found.due);
+  FindAsked(
+      *watches, groups, [](const Due& due, const Times& times) { return due.is_due && due.travel >= times.due; },
+      &found.asked);
+  ForAsked(watches, found.asked, [&](Watch* watch, const Asked& asked) {
+    Due& due = groups[asked.due];
+    AskWay(watch, others_moved, due.step, stand);
+    float others = watch->near ? 0.0f : kElsewhere * (others_travel - watch->others);
+    const float left = watch->near ? kKeep - watch->gone : watch->gap - watch->gone - others - Band(watch->way);
+    if (!(left > 0.0f)) {
+      ++found.looked_at;
+      watch->SetGap(look(watch), stand(*watch), others_travel);
+      others = 0.0f;
+      due.looked = true;
     }
-    const float step = moved[group.block] + around(group);
-    const float travel = group.travel += step;
-    const std::size_t looked_at_before = found.looked_at;
-    if (travel >= group.times.due) {
-      group.times = {kNever, kNever};
-      for (Index i = group.first; i < group.last; ++i) {
-        Times& times = watches->times[i];
-        __builtin_prefetch(&watches->all[std::min(i + kAhead, last)]);
-        if (travel >= times.due) {
-          Watch& watch = watches->all[i];
-          AskWay(&watch, others_moved, step, stand);
-          float others = watch.near ? 0.0f : kElsewhere * (others_travel - watch.others);
-          const float left = watch.near ? kKeep - watch.gone : watch.gap - watch.gone - others - Band(watch.way);
-          if (!(left > 0.0f)) {
-            ++found.looked_at;
-            watch.SetGap(look(&watch), stand(watch), others_travel);
-            others = 0.0f;
-          }
-          // Asked again a step before the block's fastest could have come there: then its own way is known.
-          const float alone = watch.gap - watch.gone - others - Band(step) - step;
-          const float far = watch.gap < kNever ? kSight : kNever;
-          times.due = travel + (watch.near ? kKeep - watch.gone : std::max(0.0f, std::min(alone, far)));
-          times.start = watch.near ? travel - watch.gone + watch.gap : kNever;
-        }
-        group.times = {std::min(group.times.due, times.due), std::min(group.times.start, times.start)};
+    // Asked again a step before the block's fastest could have come there: then its own way is known.
+    const float alone = watch->gap - watch->gone - others - Band(due.step) - due.step;
+    const float far = watch->gap < kNever ? kSight : kNever;
+    watches->times[asked.watch] = {
+        due.travel + (watch->near ? kKeep - watch->gone : std::max(0.0f, std::min(alone, far))),
+        watch->near ? due.travel - watch->gone + watch->gap : kNever};
+  });
+  for (const Due& due : groups) {
+    if (due.is_due) {
+      Times& least = watches->groups[due.group].times = {kNever, kNever};
+      for (Index i = watches->first[due.group]; i < watches->first[due.group + 1]; ++i) {
+        const Times& times = watches->times[i];
+        least = {std::min(least.due, times.due), std::min(least.start, times.start)};
       }
-      if (watches == &organ_ && found.looked_at != looked_at_before) {
-        FindBeside(&group);
-      }
-    }
-    // A row may come of what gets into its band in the first half of this step.
-    const float from = travel + step + Band(step);
-    for (Index i = group.times.start < from ? group.first : group.last; i < group.last; ++i) {
-      __builtin_prefetch(&watches->all[std::min(i + kAhead, last)]);
-      if (watches->times[i].start < from) {
-        Watch& watch = watches->all[i];
-        AskWay(&watch, others_moved, step, stand);
-        if (watch.gap - watch.gone - watch.way < Band(watch.way)) {
-          found.near.push_back({i, Band(watch.way)});
-        }
+      if (watches == &organ_ && due.looked) {
+        FindBeside(due.group);
       }
     }
   }
+  FindAsked(
+      *watches, groups, [](const Due& due, const Times& times) { return times.start < due.from; }, &found.asked);
+  ForAsked(watches, found.asked, [&](Watch* watch, const Asked& asked) {
+    AskWay(watch, others_moved, groups[asked.due].step, stand);
+    if (watch->gap - watch->gone - watch->way < Band(watch->way)) {
+      found.near.push_back({asked.watch, Band(watch->way)});
+    }
+  });
 }
 
-void TissueCollision::FindBeside(Group* group) const {
-  group->beside_count = 0;
-  for (Index i = group->first; i < group->last; ++i) {
+void TissueCollision::FindBeside(Index group) {
+  const Index any = particles_->tube_blocks();
+  Beside& beside = organ_.beside[group];
+  std::size_t count = 0;
+  for (Index i = organ_.first[group]; i < organ_.first[group + 1]; ++i) {
     for (const Index vertex : scene_.tube_surface[organ_.all[i].triangle]) {
       const Index block = particles_->BlockOf(vertex);
-      const auto end = group->beside.begin() + group->beside_count;
-      if (std::find(group->beside.begin(), end, block) != end) {
+      const auto end = beside.begin() + static_cast<std::ptrdiff_t>(count);
+      if (std::find(beside.begin(), end, block) != end) {
         continue;
       }
-      if (group->beside_count == Group::kMostBeside) {
-        ++group->beside_count;
+      if (count == kMostBeside) {
+        beside.fill(any);
         return;
       }
-      group->beside[group->beside_count++] = block;
+      beside[count++] = block;
     }
   }
+  std::fill(beside.begin() + static_cast<std::ptrdiff_t>(count), beside.end(), beside[count - 1]);
 }
 
 void TissueCollision::LookAtFixed(Fixed* fixed, int part, std::span<const float> moved) {
@@ -239,7 +298,7 @@ void TissueCollision::LookAtFixed(Fixed* fixed, int part, std::span<const float>
   const float breathed = fixed->breathes ? (breath1_ - breath0_).norm() : 0.0f;
   LookAtDue(
       &fixed->watches, part, moved, fixed->breathes ? breath_travel_ : 0.0f, breathed,
-      [&](const Group&) { return breathed; },
+      [&](std::size_t) { return breathed; },
       [&](const Watch& watch) { return Vec3f(particles_->At(watch.at) - shift); },
       [&](Watch* watch) { return See(tree, particles_->At(watch->at) - shift, watch); });
 }
@@ -280,7 +339,9 @@ void TissueCollision::BeginPairs(std::span<const float> moved, double time0_s, d
   organ_moved_ = 0;
   for (Index b = 0; b < organ_blocks; ++b) {
     organ_moved_ = std::max(organ_moved_, moved[b]);
+    organ_moved_of_[b] = moved[b];
   }
+  organ_moved_of_[organ_blocks] = organ_moved_;
   organ_travel_ += organ_moved_;
   breath0_ = BreathingOffset(scene_.breathing, time0_s);
   breath1_ = BreathingOffset(scene_.breathing, time1_s);
@@ -290,12 +351,13 @@ void TissueCollision::BeginPairs(std::span<const float> moved, double time0_s, d
 void TissueCollision::LookAtOrgan(int part, std::span<const float> moved) {
   LookAtDue(
       &organ_, part, moved, organ_travel_, organ_moved_,
-      [&](const Group& group) {
-        float largest = group.beside_count > Group::kMostBeside ? organ_moved_ : 0.0f;
-        for (Index i = 0; i < std::min(group.beside_count, Group::kMostBeside); ++i) {
-          largest = std::max(largest, moved[group.beside[i]]);
-        }
-        return largest + kElsewhere * organ_moved_;
+      [&](std::size_t group) {
+        const Beside& beside = organ_.beside[group];
+        const auto larger = [&](std::size_t i, std::size_t j) {
+          return std::max(organ_moved_of_[beside[i]], organ_moved_of_[beside[j]]);
+        };
+        return std::max(std::max(larger(0, 1), larger(2, 3)), std::max(larger(4, 5), larger(6, 7))) +
+               kElsewhere * organ_moved_;
       },
       [&](const Watch& watch) { return Standpoint(watch); },
       [&](Watch* watch) {

@@ -86,15 +86,27 @@ class TissueCollision {
     float start = kNever;  ///< Rows may come of it from here on, until it is looked at again; told without the band.
   };
   static constexpr float kNever = 3e38f;
-  /// Watches of one block: [first, last).
+  /// Watches of one block. Most steps read nothing else of them.
   struct Group {
-    Index block = 0, first = 0, last = 0;
     float travel = 0;  ///< Of it and of what it may touch, since the beginning [m].
-    /// Blocks of the organ that its triangles are in; with a count of more than there is room for, any.
-    static constexpr Index kMostBeside = 8;
-    std::array<Index, kMostBeside> beside{};
-    Index beside_count = 0;
     Times times;
+    Index block = 0;
+  };
+  /// Blocks of the organ that a group's triangles are in, the last one repeated.
+  static constexpr std::size_t kMostBeside = 8;
+  using Beside = std::array<Index, kMostBeside>;
+  /// A group of which a watch may have to be asked in this step.
+  struct Due {
+    Index group = 0;
+    float step = 0;       ///< It and what it may touch move so far in this step [m].
+    float travel = 0;     ///< Of the group, with this step [m].
+    float from = 0;       ///< Rows may come of what starts before this travel [m].
+    bool is_due = false;  ///< One of it is to be looked at, if its own way was as far.
+    bool looked = false;  ///< One was.
+  };
+  struct Asked {
+    Index watch = 0;
+    Index due = 0;  ///< Its group's place among those.
   };
   /// One that is near in this step.
   struct Near {
@@ -109,6 +121,8 @@ class TissueCollision {
 
   /// Found in a part of a surface's groups.
   struct Found {
+    std::vector<Due> due;          ///< In this step.
+    std::vector<Asked> asked;      ///< Of them, in this step.
     std::vector<Near> near;        ///< In this step.
     std::size_t looked_at = 0;     ///< In this step.
     std::vector<ContactRow> rows;  ///< In this substep.
@@ -118,6 +132,8 @@ class TissueCollision {
     std::vector<Watch> all;
     std::vector<Times> times;  ///< Of each, apart from the rest: most steps read nothing else.
     std::vector<Group> groups;
+    std::vector<Index> first;    ///< Watch of each group, and how many there are in all.
+    std::vector<Beside> beside;  ///< By group, of what watches the organ.
     std::array<Found, kParts> found;
     void MakeGroups(const ParticleStore& particles);
   };
@@ -149,11 +165,19 @@ class TissueCollision {
   template <class Stand>
   void AskWay(Watch* watch, float others_moved, float unknown, const Stand& stand) const;
   /// A surface, in whole, has travelled and moved in this step by `others_travel` and `others_moved` at most; what a
-  /// group may touch of it has moved by around(group).
+  /// group may touch of it has moved by around(index of the group).
   template <class Around, class Stand, class Look>
   void LookAtDue(Watches* watches, int part, std::span<const float> moved, float others_travel, float others_moved,
                  const Around& around, const Stand& stand, const Look& look);
-  void FindBeside(Group* group) const;
+  template <class Around>
+  static std::span<Due> FindDue(Watches* watches, int part, std::span<const float> moved, const Around& around,
+                                std::vector<Due>* found);
+  template <class Wanted>
+  static void FindAsked(const Watches& watches, std::span<const Due> due, const Wanted& wanted,
+                        std::vector<Asked>* asked);
+  template <class Body>
+  void ForAsked(Watches* watches, std::span<const Asked> asked, const Body& body) const;
+  void FindBeside(Index group);
   void AddOrganRow(const Near& near, const Signed& now, std::vector<ContactRow>* rows) const;
   void LookAtOrgan(int part, std::span<const float> moved);
   void LookAtFixed(Fixed* fixed, int part, std::span<const float> moved);
@@ -174,6 +198,7 @@ class TissueCollision {
   std::vector<Fixed> fixed_;
 
   float organ_travel_ = 0, organ_moved_ = 0, breath_travel_ = 0;
+  std::vector<float> organ_moved_of_;  ///< By block of the organ; then the largest, and 0.
   Vec3f breath0_ = Vec3f::Zero(), breath1_ = Vec3f::Zero();
   std::uint32_t step_ = 1;  ///< Calls of FindPairs.
 };

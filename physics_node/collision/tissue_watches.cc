@@ -11,10 +11,11 @@ void TissueCollision::Watches::MakeGroups(const ParticleStore& particles) {
   for (Index i = 0; i < all.size(); ++i) {
     const Index block = particles.BlockOf(all[i].particle);
     if (groups.empty() || groups.back().block != block) {
-      groups.push_back({.block = block, .first = i, .last = i, .times = {}});
+      groups.push_back({.travel = 0, .times = {}, .block = block});
+      first.push_back(i);
     }
-    groups.back().last = i + 1;
   }
+  first.push_back(static_cast<Index>(all.size()));
   times.resize(all.size());
 }
 
@@ -63,6 +64,12 @@ void TissueCollision::WatchOrgan() {
     }
   }
   organ_.MakeGroups(*particles_);
+  const std::size_t blocks = particles_->tube_blocks();
+  organ_moved_of_.assign(blocks + 2, 0.0f);
+  organ_.beside.resize(organ_.groups.size());
+  for (Beside& beside : organ_.beside) {
+    beside.fill(static_cast<Index>(blocks + 1));
+  }
 }
 
 void TissueCollision::WatchFixed(const StaticSurface& surface) {
