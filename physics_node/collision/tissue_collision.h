@@ -198,7 +198,7 @@ class TissueCollision {
   std::vector<Fixed> fixed_;
 
   float organ_travel_ = 0, organ_moved_ = 0, breath_travel_ = 0;
-  std::vector<float> organ_moved_of_;  ///< By block of the organ; then the largest, and 0.
+  std::vector<float> organ_moved_of_;  ///< By block of the organ; then the largest.
   Vec3f breath0_ = Vec3f::Zero(), breath1_ = Vec3f::Zero();
   std::uint32_t step_ = 1;  ///< Calls of FindPairs.
 };

@@ -64,11 +64,10 @@ void TissueCollision::WatchOrgan() {
     }
   }
   organ_.MakeGroups(*particles_);
-  const std::size_t blocks = particles_->tube_blocks();
-  organ_moved_of_.assign(blocks + 2, 0.0f);
+  organ_moved_of_.assign(std::size_t{particles_->tube_blocks()} + 1, 0.0f);
   organ_.beside.resize(organ_.groups.size());
-  for (Beside& beside : organ_.beside) {
-    beside.fill(static_cast<Index>(blocks + 1));
+  for (Index group = 0; group < organ_.groups.size(); ++group) {
+    FindBeside(group);
   }
 }
 
