@@ -238,9 +238,10 @@ void TissueCollision::LookAtDue(Watches* watches, int part, std::span<const floa
     const float left = watch->near ? kKeep - watch->gone : watch->gap - watch->gone - others - Band(watch->way);
     if (!(left > 0.0f)) {
       ++found.looked_at;
+      const Index before = watch->triangle;
       watch->SetGap(look(watch), stand(*watch), others_travel);
       others = 0.0f;
-      due.looked = true;
+      due.strayed |= watch->triangle != before;
     }
     // Asked again a step before the block's fastest could have come there: then its own way is known.
     const float alone = watch->gap - watch->gone - others - Band(due.step) - due.step;
@@ -256,7 +257,7 @@ void TissueCollision::LookAtDue(Watches* watches, int part, std::span<const floa
         const Times& times = watches->times[i];
         least = {std::min(least.due, times.due), std::min(least.start, times.start)};
       }
-      if (watches == &organ_ && due.looked) {
+      if (watches == &organ_ && due.strayed) {
         FindBeside(due.group);
       }
     }

@@ -98,11 +98,11 @@ class TissueCollision {
   /// A group of which a watch may have to be asked in this step.
   struct Due {
     Index group = 0;
-    float step = 0;       ///< It and what it may touch move so far in this step [m].
-    float travel = 0;     ///< Of the group, with this step [m].
-    float from = 0;       ///< Rows may come of what starts before this travel [m].
-    bool is_due = false;  ///< One of it is to be looked at, if its own way was as far.
-    bool looked = false;  ///< One was.
+    float step = 0;        ///< It and what it may touch move so far in this step [m].
+    float travel = 0;      ///< Of the group, with this step [m].
+    float from = 0;        ///< Rows may come of what starts before this travel [m].
+    bool is_due = false;   ///< One of it is to be looked at, if its own way was as far.
+    bool strayed = false;  ///< One was nearest to another triangle.
   };
   struct Asked {
     Index watch = 0;

@@ -105,7 +105,7 @@ struct Particles {
 };
 /// Of xyzw particles; the one of lane i stands at rows + index[i].
 template <class F>
-inline Particles<F> GatherXyzw(const float* rows, const std::uint32_t* index, std::size_t next) {
+FULCRUM_INLINE Particles<F> GatherXyzw(const float* rows, const std::uint32_t* index, std::size_t next) {
   F x = Batches<F>::LoadRow(rows, index, 0, next);
   F y = Batches<F>::LoadRow(rows, index, 1, next);
   F z = Batches<F>::LoadRow(rows, index, 2, next);
@@ -114,7 +114,7 @@ inline Particles<F> GatherXyzw(const float* rows, const std::uint32_t* index, st
   return {{x, y, z}, w};
 }
 template <class F>
-inline void ScatterXyzw(const Particles<F>& q, float* rows, const std::uint32_t* index, std::size_t next) {
+FULCRUM_INLINE void ScatterXyzw(const Particles<F>& q, float* rows, const std::uint32_t* index, std::size_t next) {
   F r[4] = {q.p.x, q.p.y, q.p.z, q.w};
   Transpose(&r[0], &r[1], &r[2], &r[3]);
   for (int i = 0; i < 4; ++i) {

@@ -151,9 +151,9 @@ class ParticleStore {
     std::copy_n(now_.data() + first, count, previous_.data() + first);
   }
 
-  /// Blocks of particles whose movement is told together: 64 vertices of the tube; then of each row of the membrane
-  /// the columns in each lane.
-  static constexpr Index kBlockVertices = 64;
+  /// Blocks of particles whose movement is told together: 8 vertices of the tube; then of each row of the membrane the
+  /// columns in each lane.
+  static constexpr Index kBlockVertices = 8;
   static constexpr std::uint32_t kBlocksPerRow = 8;
   [[nodiscard]] Index tube_blocks() const { return (tube_count_ + kBlockVertices - 1) / kBlockVertices; }
   [[nodiscard]] Index block_count() const { return tube_blocks() + kBlocksPerRow * layout_.rows; }

@@ -391,16 +391,24 @@ void TissueSimulation::InParts(const Body& body) const {
 float TissueSimulation::MaxDisplacement() const {
   std::array<float, ParticleStore::kParts> of_part{};
   InParts([&](int part, int) {
-    const Index count = particles_.particle_count(), first = scene_.membrane.first;
-    const auto cut = [count](int at) {
+    const Index first = scene_.membrane.first, cols = scene_.membrane.cols;
+    const auto cut = [](Index count, int at) {
       return static_cast<Index>(std::uint64_t{count} * static_cast<unsigned>(at) / ParticleStore::kParts);
     };
     float largest = 0;
-    for (Index p = cut(part); p < cut(part + 1); ++p) {
-      if (p >= first && (!model_.NodeAlive(p - first) || model_.IsDebris(p - first))) {
-        continue;
+    const auto look = [&](ParticleRef at, Index particle) {
+      largest = std::max(largest, (particles_.At(at) - scene_.rest_position[particle]).squaredNorm());
+    };
+    for (Index v = cut(particles_.tube_count(), part); v < cut(particles_.tube_count(), part + 1); ++v) {
+      look({4 * v, 1}, v);
+    }
+    for (Index row = cut(scene_.membrane.rows, part); row < cut(scene_.membrane.rows, part + 1); ++row) {
+      for (Index col = 0; col < cols; ++col) {
+        const Index node = row * cols + col;
+        if (model_.NodeAlive(node) && !model_.IsDebris(node)) {
+          look(particles_.NodeRef(row, col), first + node);
+        }
       }
-      largest = std::max(largest, (particles_.At(particles_.Ref(p)) - scene_.rest_position[p]).squaredNorm());
     }
     of_part[static_cast<std::size_t>(part)] = largest;
   });
