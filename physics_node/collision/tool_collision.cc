@@ -320,6 +320,11 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
   }
 }
 
+void ToolCollision::FitAtRest() {
+  bounds_.Forget();
+  bounds_.Update({});
+}
+
 bool ToolCollision::OnRim(const ContactPair& pair) const {
   if (pair.triangle >= membrane_triangles_ || pair.closest.crosses) {
     return false;

@@ -69,6 +69,9 @@ class ToolCollision {
   /// its bounds still hold. `tissue_step`: about how far tissue will move in one substep (largest speed times its
   /// length; what is beyond kMaxReach is not looked for) [m].
   void FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bool tissue_moved, float tissue_step = 0);
+  /// The tissue has come to rest: until it moves, FindPairs finds what is near a tool wherever that goes. Its bounds
+  /// are otherwise fitted only around the tools.
+  void FitAtRest();
   /// Carries the tissue along with the tools from their last places to the present ones.
   void Sweep();
   /// Moves the tissue out of the tools in their places at the end of the step.

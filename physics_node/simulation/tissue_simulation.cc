@@ -12,6 +12,9 @@ namespace {
 /// Tissue that moves less than this per step (0.1 mm/s at 100 Hz), for so many steps, is at rest.
 constexpr float kStill = 1e-6f;
 constexpr int kStillSteps = 50;
+/// And so is what moves less than this, for fewer steps: tissue at rest moves by rounding alone [m].
+constexpr float kAtRest = 1e-7f;
+constexpr int kRestSteps = 10;
 /// A tool that moves less is standing still: the resolution of a haptic device is 9 um.
 constexpr float kToolStill = 1e-7f;
 /// How far a tool that presses may move in a substep of mode accurate [m], at the price of at most so many substeps:
@@ -134,6 +137,18 @@ bool TissueSimulation::BreathStirs() {
   return tissue_collision_.breath_near();
 }
 
+/// Asleep: a tool comes to touch the tissue in this step. Where contacts are rows, one that is merely near does not: a
+/// jaw that closes around tissue, a tip that hovers over it.
+bool TissueSimulation::ToolsStir() {
+  if (!accurate_) {
+    return !collision_.pairs().empty();
+  }
+  collision_.Rows(0.0f, 1.0f, &rows_);
+  return std::any_of(rows_.begin(), rows_.end(), [this](const ContactRow& row) {
+    return !(row.normal.dot(row.At(particles_.raw().data())) >= row.offset);
+  });
+}
+
 /// True while the tissue sleeps and nothing stirs it.
 bool TissueSimulation::MayRest() {
   if (!asleep_) {
@@ -144,7 +159,7 @@ bool TissueSimulation::MayRest() {
   if (stirred) {
     const bool touched = collision_.any_touching();
     FindContacts(false);
-    asleep_ = !touched && collision_.pairs().empty();
+    asleep_ = !touched && !ToolsStir();
   }
   asleep_ = asleep_ && !BreathStirs();
   return asleep_;
@@ -315,9 +330,9 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
   quarantined_ += report.resets;
   const bool stirred = std::any_of(tracks_.begin(), tracks_.end(),
                                    [](const ToolTrack& track) { return track.present && track.moved(); });
-  still_steps_ = report.max_step_m < kStill && !holds && !(stirred && !collision_.pairs().empty()) &&
-                         !tissue_collision_.breath_near()
-                     ? still_steps_ + 1
+  const bool worked_on = stirred && (accurate_ ? collision_.any_touching() : !collision_.pairs().empty());
+  still_steps_ = report.max_step_m < kStill && !holds && !worked_on && !tissue_collision_.breath_near()
+                     ? still_steps_ + (report.max_step_m < kAtRest ? kStillSteps / kRestSteps : 1)
                      : 0;
   if (still_steps_ >= kStillSteps) {
     solver_.Stop();
@@ -327,6 +342,7 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
     if (xpbd_) {
       xpbd_->Stop();
     }
+    collision_.FitAtRest();
     asleep_ = true;
     still_steps_ = 0;
   }

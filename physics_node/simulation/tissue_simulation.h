@@ -122,6 +122,7 @@ class TissueSimulation {
   };
 
   void FollowTools(const std::array<ToolInput, kMaxTools>& tools);
+  [[nodiscard]] bool ToolsStir();
   [[nodiscard]] bool MayRest();
   [[nodiscard]] bool BreathStirs();
   [[nodiscard]] StepReport StepPaper();

@@ -101,6 +101,29 @@ TEST(Closest, DegenerateShapesAreFinite) {
   }
 }
 
+TEST_F(OnSheet, BoundsFittedAtRestHoldFarFromWhereTheToolsWere) {
+  ParticleStore particles(scene_);
+  const TissueModel model(scene_, &particles);
+  ToolCollision collision(scene_, &model, &particles);
+  const auto motion = [&](const Vec3f& tip) {
+    const ToolShape shape = ShapeOf(scene_.tools[1], Down(tip));
+    return std::array<ToolCollision::ToolMotion, kMaxTools>{ToolCollision::ToolMotion{}, {shape, shape}};
+  };
+  // While a tool is far away the sheet rises, more than it is taken to in so few steps.
+  const Vec3f away = kMiddle + Vec3f(0, 0, 0.3f), above = kMiddle + Vec3f(0, 0, 0.051f);
+  for (int step = 0; step < 3; ++step) {
+    for (Index p = 0; p < kRows * kCols; ++p) {
+      const ParticleRef at = particles.Ref(p);
+      particles.Set(at, scene_.rest_position[p] + Vec3f(0, 0, 0.05f));
+      particles.SetPrevious(at, particles.At(at));
+    }
+    collision.FindPairs(motion(away), true);
+  }
+  collision.FitAtRest();
+  collision.FindPairs(motion(above), false);
+  EXPECT_FALSE(collision.pairs().empty());
+}
+
 TEST_F(OnSheet, HookDentsTheMembraneAndStaysInFront) {
   const ToolPose above = Down(kMiddle + Vec3f(0, 0, 0.01f)), pressed = Down(kMiddle - Vec3f(0, 0, 0.003f));
   Run(1, above, 5);

@@ -44,6 +44,37 @@ TEST_F(OnSmallScene, FallsAsleepAndIsWokenByATouchOnly) {
   EXPECT_TRUE(awake);
 }
 
+TEST_F(OnSmallScene, AToolThatHoversLeavesItAsleep) {
+  TissueSimulation simulation(scene_);
+  const auto at = [&](int i) { return ScriptedTools(scene_, 0.01 * i); };
+  while (!simulation.Step(at(0)).asleep) {
+  }
+  int touch = 0;
+  while (simulation.Step(at(touch)).asleep) {
+    ASSERT_LT(++touch, 1000);
+  }
+  // The script from its begin, this time with a halt just before it touches.
+  TissueSimulation again(scene_);
+  while (!again.Step(at(0)).asleep) {
+  }
+  for (int i = 0; i < touch; ++i) {
+    ASSERT_TRUE(again.Step(at(i)).asleep) << i;
+  }
+  const std::uint64_t version = again.state_version();
+  bool near = false;
+  for (int i = 0; i < 40; ++i) {
+    auto tools = at(touch - 1);
+    for (ToolInput& tool : tools) {
+      tool.pose.p_WT.z() += i % 2 == 0 ? 0.00002f : 0.0f;
+    }
+    EXPECT_TRUE(again.Step(tools).asleep) << i;
+    near |= !again.collision().pairs().empty();
+  }
+  EXPECT_TRUE(near) << "near enough to be looked at";
+  EXPECT_EQ(again.state_version(), version);
+  EXPECT_FALSE(again.Step(at(touch)).asleep);
+}
+
 TEST_F(OnSmallScene, ATopologyChangeWakes) {
   TissueSimulation simulation(scene_);
   for (int i = 0; i < 100; ++i) {
