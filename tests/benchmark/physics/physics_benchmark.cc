@@ -28,6 +28,39 @@ void Hover(const SceneView& scene, Report* report) {
   report->Add("physics.hover.step_us_p50", 1e3 * Quantile(ms, 0.5), "us");
 }
 
+/// Tools that move as near to the tissue as they come in the script before they touch it, and then touch it.
+void HoverNear(const SceneView& scene, Report* report) {
+  const auto at = [&](int i) { return ScriptedTools(scene, 0.01 * i); };
+  const auto asleep_until = [&](TissueSimulation* simulation, int end) {
+    for (int i = 0; i < 200; ++i) {
+      simulation->Step(at(0));
+    }
+    int i = 0;
+    while (i < end && simulation->Step(at(i)).asleep) {
+      ++i;
+    }
+    return i;
+  };
+  TissueSimulation first(scene), simulation(scene);
+  const int touch = asleep_until(&first, static_cast<int>(100 * scene.script_duration_s));
+  (void)asleep_until(&simulation, touch);
+  auto tools = at(std::max(touch - 1, 0));
+  double asleep = 0;
+  bool up = true;
+  constexpr int kSteps = 500;
+  const auto near = TimeMs(0, kSteps, [&] {
+    tools[0].pose.p_WT.z() += up ? 1e-6f : -1e-6f;
+    up = !up;
+    asleep += simulation.Step(tools).asleep ? 1 : 0;
+  });
+  report->Add("physics.hover.near_pairs", static_cast<double>(simulation.collision().pairs().size()), "pairs");
+  report->Add("physics.hover.near_asleep_pct", 100 * asleep / kSteps, "%");
+  report->Add("physics.hover.near_step_us_p50", 1e3 * Quantile(near, 0.5), "us");
+  int step = touch;
+  const auto touched = TimeMs(0, 50, [&] { simulation.Step(at(step++)); });
+  report->Add("physics.hover.touched_step_us_p50", 1e3 * Quantile(touched, 0.5), "us");
+}
+
 /// A step of a scene in which nothing moves, not even a tool.
 void Rest(const SceneView& scene, Report* report) {
   TissueSimulation simulation(scene);
@@ -134,6 +167,7 @@ int main(int argc, char** argv) {
   const SceneView scene = data.View();
   if (report.Wants("physics.hover.")) {
     physics::Hover(scene, &report);
+    physics::HoverNear(scene, &report);
   }
   if (report.Wants("physics.idle.")) {
     physics::Idle(scene, &report);
