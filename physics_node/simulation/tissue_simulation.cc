@@ -9,12 +9,6 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Tissue that moves less than this per step (0.1 mm/s at 100 Hz), for so many steps, is at rest.
-constexpr float kStill = 1e-6f;
-constexpr int kStillSteps = 50;
-/// And so is what moves less than this, for fewer steps: tissue at rest moves by rounding alone [m].
-constexpr float kAtRest = 1e-7f;
-constexpr int kRestSteps = 10;
 /// A tool that moves less is standing still: the resolution of a haptic device is 9 um.
 constexpr float kToolStill = 1e-7f;
 /// How far a tool that presses may move in a substep of mode accurate [m], at the price of at most so many substeps:
@@ -126,44 +120,6 @@ void TissueSimulation::FindContacts(bool tissue_moved, float tissue_step) {
 
 /// Of tissue with itself and its surroundings, for the step that leads to the present time.
 void TissueSimulation::FindTissueContacts() { tissue_collision_.FindPairs(moved_, step_begin_s(), simulated_time_s()); }
-
-/// Asleep: what breathes has come near the tissue.
-bool TissueSimulation::BreathStirs() {
-  if (!(scene_.breathing.amplitude_m > 0.0f) || scene_.physics.mode == PhysicsMode::kPaper) {
-    return false;
-  }
-  moved_.assign(particles_.block_count(), 0.0f);
-  FindTissueContacts();
-  return tissue_collision_.breath_near();
-}
-
-/// Asleep: a tool comes to touch the tissue in this step. Where contacts are rows, one that is merely near does not: a
-/// jaw that closes around tissue, a tip that hovers over it.
-bool TissueSimulation::ToolsStir() {
-  if (!accurate_) {
-    return !collision_.pairs().empty();
-  }
-  collision_.Rows(0.0f, 1.0f, &rows_);
-  return std::any_of(rows_.begin(), rows_.end(), [this](const ContactRow& row) {
-    return !(row.normal.dot(row.At(particles_.raw().data())) >= row.offset);
-  });
-}
-
-/// True while the tissue sleeps and nothing stirs it.
-bool TissueSimulation::MayRest() {
-  if (!asleep_) {
-    return false;
-  }
-  const bool stirred = std::any_of(tracks_.begin(), tracks_.end(),
-                                   [](const ToolTrack& track) { return track.present && track.moved(); });
-  if (stirred) {
-    const bool touched = collision_.any_touching();
-    FindContacts(false);
-    asleep_ = !touched && !ToolsStir();
-  }
-  asleep_ = asleep_ && !BreathStirs();
-  return asleep_;
-}
 
 StepReport TissueSimulation::StepPaper() {
   StepReport report;
@@ -328,24 +284,7 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
   ++state_version_;
   const StepReport report = accurate_ ? StepAccurate() : xpbd_ ? StepXpbd() : StepPaper();
   quarantined_ += report.resets;
-  const bool stirred = std::any_of(tracks_.begin(), tracks_.end(),
-                                   [](const ToolTrack& track) { return track.present && track.moved(); });
-  const bool worked_on = stirred && (accurate_ ? collision_.any_touching() : !collision_.pairs().empty());
-  still_steps_ = report.max_step_m < kStill && !holds && !worked_on && !tissue_collision_.breath_near()
-                     ? still_steps_ + (report.max_step_m < kAtRest ? kStillSteps / kRestSteps : 1)
-                     : 0;
-  if (still_steps_ >= kStillSteps) {
-    solver_.Stop();
-    if (accurate_) {
-      accurate_->Stop();
-    }
-    if (xpbd_) {
-      xpbd_->Stop();
-    }
-    collision_.FitAtRest();
-    asleep_ = true;
-    still_steps_ = 0;
-  }
+  MayFallAsleep(report, holds);
   return report;
 }
 

@@ -70,7 +70,7 @@ class TissueSimulation {
   [[nodiscard]] const ParticleStore& particles() const { return particles_; }
   [[nodiscard]] const TissueModel& model() const { return model_; }
   [[nodiscard]] const ToolCollision& collision() const { return collision_; }
-  /// Contacts of the last substep, forces in them; none in mode paper.
+  /// Contacts of the last substep, forces in them; none in mode paper. Asleep: those of tools near by, without forces.
   [[nodiscard]] std::span<const ContactRow> rows() const { return rows_; }
   [[nodiscard]] const Grasp& grasp(std::uint32_t tool) const { return grasps_[tool]; }
   /// Of the tissue on a tool, as Contacts has told it [N].
@@ -122,9 +122,11 @@ class TissueSimulation {
   };
 
   void FollowTools(const std::array<ToolInput, kMaxTools>& tools);
+  [[nodiscard]] bool ToolsMove() const;
   [[nodiscard]] bool ToolsStir();
   [[nodiscard]] bool MayRest();
   [[nodiscard]] bool BreathStirs();
+  void MayFallAsleep(const StepReport& report, bool holds);
   [[nodiscard]] StepReport StepPaper();
   [[nodiscard]] StepReport StepXpbd();
   [[nodiscard]] int SubstepsForTools() const;
