@@ -135,7 +135,6 @@ class AccurateSolver {
   /// field += what bindings and hinges do to a task's particles.
   void AddElements(const Task& task, FloatArray* field) const;
   /// body(task, index, worker) for all that is computed, shared by the threads.
-  void Turn();
   template <class Body>
   void ForTasks(const Body& body) {
     ForTasks(regions_.part(), body);
@@ -186,7 +185,6 @@ class AccurateSolver {
 
   // Who works on what.
   mutable Workers workers_;
-  bool backwards_ = false;  ///< The order of the phase before.
   Regions regions_;
   std::vector<std::uint8_t> held_before_, touched_before_, held_now_, touched_now_, pressed_now_, wanted_now_,
       stiffened_;                  ///< By region.

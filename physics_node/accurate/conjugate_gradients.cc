@@ -113,7 +113,7 @@ void AccurateSolver::LastStep(const Step& last, bool adds, float inertia) {
   const std::array<float*, 3> p = planes(before), z = planes(z_), q = planes(q_), d = planes(d_);
   const std::span<const Task> tasks = regions_.part().tasks, wanted = wanted_.tasks;
   std::fill(largest_sq_.begin(), largest_sq_.end(), 0.0f);
-  Turn();
+  workers_.Turn();
   workers_.Run(static_cast<int>(tasks.size() + wanted.size()), regions_.part().sheet_tasks, [&](int index, int worker) {
     const auto i = static_cast<std::size_t>(index);
     if (i < tasks.size()) {

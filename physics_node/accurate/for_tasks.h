@@ -9,11 +9,9 @@ namespace fulcrum::physics::accurate {
 
 inline std::uint32_t Vertex(int v) { return static_cast<std::uint32_t>(v); }
 
-inline void AccurateSolver::Turn() { workers_.Go(backwards_ = !backwards_); }
-
 template <class Body>
 void AccurateSolver::ForTasks(const Part& part, const Body& body) {
-  Turn();
+  workers_.Turn();
   workers_.Run(static_cast<int>(part.tasks.size()), part.sheet_tasks,
                [&](int index, int worker) { body(part.tasks[static_cast<std::size_t>(index)], index, worker); });
 }
@@ -22,7 +20,7 @@ template <class Body, class Errand>
 void AccurateSolver::ForTasks(const Body& body, const Errand& errand) {
   const std::span<const Task> tasks = regions_.part().tasks;
   const int count = static_cast<int>(tasks.size());
-  Turn();
+  workers_.Turn();
   workers_.Run(count + 1, regions_.part().sheet_tasks, 1, [&](int index, int worker) {
     if (index == count) {
       errand();
@@ -35,7 +33,7 @@ void AccurateSolver::ForTasks(const Body& body, const Errand& errand) {
 /// The first and the last thread have one of the jobs each, so all keep the tasks that they have in other phases.
 template <class Body, class First, class Second>
 void AccurateSolver::ForTasksBeside(int kind0, int kind1, const Body& body, const First& first, const Second& second) {
-  workers_.Go(backwards_ = false);
+  workers_.TurnForward();
   workers_.Run(kind0 + kind1 + 2, kind0 + 2, [&](int index, int worker) {
     if (index == 0) {
       first();

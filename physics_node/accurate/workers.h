@@ -25,9 +25,10 @@ class Workers {
   /// Whether the other threads help in what is run from now on; else they sleep. What comes out does not depend on it.
   void LetHelp(bool help) { help_ = help; }
 
-  /// In which order each thread does its part in what is run from now on: that with which a phase begins is best what
-  /// the one before it has ended with, for that is still in the cache of its core.
-  void Go(bool backwards) { backwards_ = backwards; }
+  /// Each thread does its part in the other order, or in that of the tasks, in what is run from now on: that with which
+  /// a phase begins is best what the one before it has ended with, for that is still in the cache of its core.
+  void Turn() { backwards_ = !backwards_; }
+  void TurnForward() { backwards_ = false; }
 
   /// body(task, worker) once for each task in [0, tasks), worker in [0, count()); returns when all are done. The first
   /// `split` tasks are of one kind, the others of another: each worker's part has its share of both. The last
