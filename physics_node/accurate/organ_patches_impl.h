@@ -15,6 +15,7 @@ namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
 /// Patches treated at a time.
 constexpr std::uint32_t kPatchLanes = 8 * Widest::kBatches;
+static_assert(kPatchLanes <= accurate::kPatchGroup);
 
 /// A 3 x 3 matrix a lane, by columns.
 template <class F>

@@ -121,7 +121,7 @@ class TissueCollision {
 
   /// Found in a part of a surface's groups.
   struct Found {
-    std::vector<Due> due;          ///< In this step.
+    std::vector<Due> due;          ///< Room for those of a step.
     std::vector<Asked> asked;      ///< Of them, in this step.
     std::vector<Near> near;        ///< In this step.
     std::size_t looked_at = 0;     ///< In this step.
