@@ -296,7 +296,7 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
       const Capsule from = moved.from.capsules[static_cast<std::size_t>(i)];
       const Capsule to = moved.to.capsules[static_cast<std::size_t>(i)];
       motion_[c] = {from, to, std::max((to.a - from.a).norm(), (to.b - from.b).norm()), true, SegmentOf(from, to)};
-      const float range = to.radius + scene_.physics.collision_margin_m + kSlack + band_ - kRowBand + motion_[c].travel;
+      const float range = to.radius + ContactMargin(scene_, to.part) + kSlack + band_ - kRowBand + motion_[c].travel;
       if (!bounds_.MayTouch(to.a, to.b, range)) {
         continue;
       }
@@ -354,7 +354,7 @@ bool ToolCollision::OnRim(const ContactPair& pair) const {
 
 ToolCollision::Push ToolCollision::PushOf(const ContactPair& pair, const Capsule& capsule) const {
   const ClosestPoints& closest = pair.closest;
-  const float reach = capsule.radius + scene_.physics.collision_margin_m;
+  const float reach = capsule.radius + ContactMargin(scene_, capsule.part);
   const auto side = static_cast<float>(pair.side);
   const Vec3f offset = closest.on_segment - closest.on_triangle;
   const float distance = std::sqrt(closest.distance_sq);

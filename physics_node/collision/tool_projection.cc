@@ -39,7 +39,7 @@ void ToolCollision::Sweep() {
 void ToolCollision::ProjectPair(ContactPair* pair, const Capsule& capsule) {
   const std::array<Vec3f, 3> x{particles_->At(pair->at[0]), particles_->At(pair->at[1]), particles_->At(pair->at[2])};
   pair->touching = false;
-  if (IsFar(x, capsule, capsule.radius + scene_.physics.collision_margin_m + Probed(capsule))) {
+  if (IsFar(x, capsule, capsule.radius + ContactMargin(scene_, capsule.part) + Probed(capsule))) {
     pair->closest.distance_sq = kFarSq;
     pair->closest.crosses = false;
     return;

@@ -101,7 +101,7 @@ void ToolCollision::DropShallow(std::size_t first, std::vector<ContactRow>* rows
 
 void ToolCollision::AddRows(Index first, Index last, float u0, float u1, std::vector<ContactRow>* rows) {
   const Motion& m = motion_[pairs_[first].capsule];
-  const float reach = m.to.radius + scene_.physics.collision_margin_m;
+  const float reach = m.to.radius + ContactMargin(scene_, m.to.part);
   const float range = reach + (u1 < 1.0f ? band_ : std::max(band_, Probed(m.to))) + 0.5f * m.travel * (u1 - u0);
   const bool moves = (u1 - u0) * m.travel > kSmallMove * m.to.radius;
   const float least = moves ? std::max(kLeastAdvance * m.to.radius / m.travel, (u1 - u0) / kMaxLooks) : 1.0f;

@@ -3,40 +3,37 @@
 #include <algorithm>
 #include <cmath>
 
-#include "physics_node/collision/closest.h"
-
 namespace fulcrum::physics {
 namespace {
 
-/// The arc strikes across a gap of this size between metal and membrane. Once struck it holds over kHoldSpacings of the
-/// mesh more: where the membrane has burnt away it ends a triangle further on, not where the heat really ended [m].
-constexpr float kStrikeGap = 0.0004f;
-constexpr float kHoldSpacings = 0.5f;
+/// An arc strikes across a gap of this size between metal and sheet, and holds up to the second one [m]. At the 500 V
+/// peak of a cutting generator air and steam break down across 0.05 to 0.15 mm (Paschen).
+constexpr float kStrikeGap = 1.0e-4f, kHoldGap = 2.5e-4f;
 /// Bare metal up the neck [m].
 constexpr float kBareNeck = 0.005f;
-/// The weight of a touching point falls to a quarter this far from the aim; at the reach it is out of the circuit [m].
-constexpr float kSpotSize = 0.001f;
-constexpr float kSpotReach = 0.003f;
-/// The aim lies so far ahead of the spot when the tool moves faster than kSlow [m], [m/s].
-constexpr float kLead = 0.0008f;
-constexpr float kSlow = 0.001f;
-/// The spot follows the touch along the metal at most this fast [m/s]. After this time without a touch it is chosen
-/// anew and the arc is out [s].
-constexpr float kSpotSpeed = 0.010f;
-constexpr float kSpotMemory = 0.3f;
+/// Between two stations along the metal [m]; more where they would be too many.
+constexpr float kStationSpacing = 5.0e-4f;
+/// The metal between two stations is looked at in so many places for the centre of the contact.
+constexpr int kLooks = 4;
+/// Pieces of metal whose ends lie farther apart on the sheet lie on two folds of it [m].
+constexpr float kLongestPiece = 0.002f;
+/// A station that is so much nearer to another part of the sheet goes over to it [m].
+constexpr float kNearerElsewhere = 3.0e-4f;
+/// Beyond this nothing is followed any more [m].
+constexpr float kLost = 0.008f;
 /// The membrane counts as lifted off what lies beneath from here on [m].
 constexpr float kTentHeight = 0.002f;
 /// A binding this many rows and columns away still tells how the organ beneath has moved.
 constexpr int kBindingWindow = 6;
 constexpr float kRateSmoothing = 0.03f;  ///< [s]
-/// The line of contact is cut off here [m]: the spot reaches no farther, whatever the metal lies on.
-constexpr float kLongestHalf = 0.002f;
 
 }  // namespace
 
-std::array<float, 3> BarycentricInPlane(const Vec2f& p, const Vec2f& a, const Vec2f& b, const Vec2f& c) {
-  const auto lift = [](const Vec2f& v) { return Vec3f(v.x(), v.y(), 0.0f); };
-  return ClosestOnTriangle(lift(p), lift(a), lift(b), lift(c));
+CauteryProbe::CauteryProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
+    : scene_(scene), model_(model), particles_(particles), walk_(scene, model, particles) {
+  for (const float length : scene.membrane_rest_length) {
+    spacing_ = std::max(spacing_, length);
+  }
 }
 
 bool CauteryProbe::Tented(Index triangle, const std::array<float, 3>& barycentric) const {
@@ -46,7 +43,7 @@ bool CauteryProbe::Tented(Index triangle, const std::array<float, 3>& barycentri
   Vec3f displacement = Vec3f::Zero();
   for (std::size_t i = 0; i < 3; ++i) {
     rest[i] = scene_.rest_position[first + nodes[i]];
-    displacement += barycentric[i] * (particles_->At(particles_->Ref(first + nodes[i])) - rest[i]);
+    displacement += barycentric[i] * (walk_.NodePlace(nodes[i]) - rest[i]);
   }
   const auto cols = static_cast<int>(model_->cols()), rows = static_cast<int>(model_->rows());
   const int row = static_cast<int>(nodes[0]) / cols, col = static_cast<int>(nodes[0]) % cols;
@@ -71,160 +68,155 @@ bool CauteryProbe::Tented(Index triangle, const std::array<float, 3>& barycentri
   return normal.dot(displacement - beneath) > kTentHeight;
 }
 
-CauteryProbe::CauteryProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
-    : scene_(scene), model_(model), particles_(particles) {
-  double sum = 0, count = 0;
-  for (Index edge = 0; edge < scene.membrane_rest_length.size(); ++edge) {
-    if (edge % 3 != 2 && scene.membrane_rest_length[edge] > 0.0f) {
-      sum += scene.membrane_rest_length[edge];
-      count += 1;
-    }
+/// From the end of the foot to the heel and up the neck.
+void CauteryProbe::SetStations(const ToolDescription& tool) {
+  const float length = tool.tip_length_m + kBareNeck;
+  const float spacing = std::max(kStationSpacing, length / static_cast<float>(kMaxMetalPoints - 3));
+  const auto parts = [spacing](float part) { return std::max(1, static_cast<int>(std::ceil(part / spacing))); };
+  const int foot = parts(tool.tip_length_m), neck = parts(kBareNeck);
+  for (int i = 0; i < foot; ++i) {
+    stations_.emplace_back().p_T = Vec3f(tool.tip_length_m * static_cast<float>(foot - i) / static_cast<float>(foot), 0, 0);
   }
-  spacing_ = static_cast<float>(sum / std::max(count, 1.0));
+  for (int i = 0; i <= neck; ++i) {
+    stations_.emplace_back().p_T = Vec3f(0, 0, -kBareNeck * static_cast<float>(i) / static_cast<float>(neck));
+  }
 }
 
-bool CauteryProbe::IsFresh() const { return static_cast<float>(steps_away_) * scene_.physics.dt_s > kSpotMemory; }
-
-void CauteryProbe::FindTouches(std::uint32_t tool, const ToolCollision& collision) {
-  const ToolDescription& description = scene_.tools[tool];
-  const float hold = IsFresh() ? 0.0f : kHoldSpacings * spacing_;
-  const float metal = description.tip_radius_m + scene_.physics.collision_margin_m, limit = metal + kStrikeGap + hold;
-  touches_.clear();
+void CauteryProbe::FollowSheet(const ToolPose& pose, std::uint32_t tool, const ToolCollision& collision) {
+  // Of the tool's pairs with living membrane: the nearest, and how near each station is to any.
+  const ContactPair* nearest = nullptr;
+  std::array<float, kMaxMetalPoints> alive_sq;
+  alive_sq.fill(1.0f);
+  for (std::size_t i = 0; i < stations_.size(); ++i) {
+    stations_[i].p_W = pose.ToWorld(stations_[i].p_T);
+  }
   for (const ContactPair& pair : collision.pairs()) {
-    // ShapeOf: the hook's first capsule is the foot, its second the neck; both begin at the heel.
-    const std::uint32_t part = pair.capsule - tool * kMaxCapsules;
-    if (pair.capsule / kMaxCapsules != tool || part > 1 || pair.triangle >= collision.membrane_triangle_count() ||
-        pair.closest.distance_sq > limit * limit) {
+    // ShapeOf: the hook's first capsule is the foot, its second the neck.
+    if (pair.capsule / kMaxCapsules != tool || pair.capsule % kMaxCapsules > 1 ||
+        pair.triangle >= collision.membrane_triangle_count() || !(pair.closest.distance_sq < kFarSq)) {
       continue;
     }
-    const float along = part == 0 ? pair.closest.t * description.tip_length_m : -pair.closest.t * kHookNeck;
-    if (along >= -kBareNeck) {
-      const float distance = std::sqrt(pair.closest.distance_sq);
-      touches_.push_back({&pair, along, limit - distance, metal - distance, pair.closest.on_triangle});
+    if (nearest == nullptr || pair.closest.distance_sq < nearest->closest.distance_sq) {
+      nearest = &pair;
+    }
+    for (std::size_t i = 0; i < stations_.size(); ++i) {
+      alive_sq[i] = std::min(alive_sq[i], (stations_[i].p_W - pair.closest.on_triangle).squaredNorm());
     }
   }
-}
-
-float CauteryProbe::Nearness(const Touch& touch) const {
-  const float away = (touch.place - aim_).norm();
-  if (away > kSpotReach) {
-    return 0.0f;
-  }
-  const float fall = 1.0f / (1.0f + away * away / (kSpotSize * kSpotSize));
-  return fall * fall;
-}
-
-float CauteryProbe::Weight(const Touch& touch) const { return touch.closeness * Nearness(touch); }
-
-Vec2f CauteryProbe::MaterialOf(const Touch& touch) const {
-  Vec2f place = Vec2f::Zero();
-  for (std::size_t i = 0; i < 3; ++i) {
-    place +=
-        touch.pair->closest.barycentric[i] * scene_.membrane_material[touch.pair->particle[i] - scene_.membrane.first];
-  }
-  return place;
-}
-
-Vec2f CauteryProbe::HalfLine() const {
-  float sum = 0, along = 0, square = 0;
-  Vec2f place = Vec2f::Zero(), product = Vec2f::Zero();
-  for (const Touch& touch : touches_) {
-    const float weight = touch.along >= 0.0f ? std::max(touch.metal, 0.0f) * Nearness(touch) : 0.0f;
-    if (weight > 0.0f) {
-      const Vec2f at = MaterialOf(touch);
-      sum += weight;
-      along += weight * touch.along;
-      square += weight * touch.along * touch.along;
-      place += weight * at;
-      product += weight * touch.along * at;
+  const Index seed = nearest != nullptr ? nearest->triangle / 2 : kNoIndex;
+  float least = kLost;
+  for (std::size_t i = 0; i < stations_.size(); ++i) {
+    Station& station = stations_[i];
+    SheetPlace place = station.place.found() && known_ ? walk_.Nearest(station.p_W, station.place.cell()) : SheetPlace{};
+    const auto offer = [&](Index cell) {
+      const SheetPlace other = walk_.Nearest(station.p_W, cell);
+      if (!place.found() || other.distance_m < place.distance_m - kNearerElsewhere) {
+        place = other;
+      }
+    };
+    if (seed != kNoIndex && (!place.found() || place.distance_m > std::sqrt(alive_sq[i]) + kNearerElsewhere)) {
+      offer(seed);
     }
+    if (i > 0 && stations_[i - 1].place.found() && (!place.found() || place.cell() != stations_[i - 1].place.cell())) {
+      offer(stations_[i - 1].place.cell());
+    }
+    station.place = place;
+    if (!place.found()) {
+      continue;
+    }
+    station.height_m = place.distance_m;
+    if (!model_->TriangleAlive(place.triangle)) {
+      // Cells that live beyond the last living triangle hang on it and reach no farther than one edge.
+      station.height_m = std::max(station.height_m, std::sqrt(alive_sq[i]) - spacing_);
+    }
+    least = std::min(least, place.distance_m);
   }
-  const float variance = sum > 0.0f ? square / sum - along * along / (sum * sum) : 0.0f;
-  if (!(variance > 1e-10f)) {
-    return Vec2f::Zero();
-  }
-  const Vec2f slope = (product / sum - along * place / (sum * sum)) / variance;
-  const Vec2f half = slope * std::sqrt(3.0f * variance);
-  const float length = half.norm();
-  return length > kLongestHalf ? Vec2f(half * (kLongestHalf / length)) : half;
+  known_ = least < kLost;
 }
 
-void CauteryProbe::FollowSpot(const ToolPose& pose, const ToolPose& last_pose, const ToolDescription& tool) {
-  const float dt = scene_.physics.dt_s;
-  motion_ += dt / (dt + kRateSmoothing) * ((pose.p_WT - last_pose.p_WT) / dt - motion_);
-  float sum = 0, along = 0;
-  const bool fresh = IsFresh();
-  const float speed = motion_.norm();
-  const Vec3f lead = speed > kSlow ? Vec3f(motion_ * (kLead / speed)) : Vec3f(Vec3f::Zero());
-  const auto aim_at = [&](float spot) {
-    return Vec3f(pose.ToWorld(spot >= 0.0f ? Vec3f(spot, 0, 0) : Vec3f(0, 0, spot)) + lead);
-  };
-  aim_ = aim_at(spot_);
-  for (const Touch& touch : touches_) {
-    // Nothing near the spot: wherever it touches draws the spot to itself.
-    const float weight = fresh ? touch.closeness * touch.closeness : Weight(touch) + 1e-3f * touch.closeness;
-    sum += weight;
-    along += weight * touch.along;
+/// The sign of a height is that of the station before it, or the opposite where the metal between them goes through the
+/// sheet; over all, what agrees with the last step.
+void CauteryProbe::SignHeights() {
+  float sign = 1.0f, agreement = 0;
+  for (std::size_t i = 0; i < stations_.size(); ++i) {
+    Station& station = stations_[i];
+    if (i > 0) {
+      const Station& last = stations_[i - 1];
+      const float length = (station.p_W - last.p_W).norm();
+      const bool near = std::min(last.place.distance_m, station.place.distance_m) < length;
+      sign = near && walk_.Crossing(last.p_W, station.p_W, last.place.cell()).found() ? -sign : sign;
+    }
+    station.height_m *= sign;
+    agreement += station.height_m * station.last_height_m;
+  }
+  for (Station& station : stations_) {
+    station.height_m = agreement < 0.0f ? -station.height_m : station.height_m;
+    station.last_height_m = station.height_m;
+  }
+}
+
+bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) const {
+  // Where the sheet lies against the metal, its middle is half its thickness farther from the axis.
+  const float touch = radius_m + 0.5f * scene_.thermal.thickness_m;
+  const float limit = touch + (was_touching_ ? kHoldGap : kStrikeGap);
+  float sum = 0;
+  Vec2f mean = Vec2f::Zero();
+  for (std::size_t i = 0; i + 1 < stations_.size(); ++i) {
+    const Station &a = stations_[i], &b = stations_[i + 1];
+    const float length = (b.place.material - a.place.material).norm();
+    if (length > kLongestPiece) {
+      continue;
+    }
+    for (int k = 0; k < kLooks; ++k) {
+      const float u = (static_cast<float>(k) + 0.5f) / kLooks;
+      const float nearer = limit - std::abs(a.height_m + u * (b.height_m - a.height_m));
+      if (nearer > 0.0f) {
+        // Metal that stands on the sheet covers it no less than metal that lies on it.
+        const float weight = nearer * nearer * std::max(length, radius_m);
+        sum += weight;
+        mean += weight * (a.place.material + u * (b.place.material - a.place.material));
+      }
+    }
   }
   if (!(sum > 0.0f)) {
-    ++steps_away_;
-    return;
+    return false;
   }
-  steps_away_ = 0;
-  const float step = kSpotSpeed * dt;
-  spot_ = fresh ? along / sum : spot_ + std::clamp(along / sum - spot_, -step, step);
-  spot_ = std::clamp(spot_, -kBareNeck, tool.tip_length_m);
-  aim_ = aim_at(spot_);
+  *centre = mean / sum;
+  return true;
 }
 
-CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& last_pose, const ToolPose& pose,
-                                    const ToolCollision& collision) {
+CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision) {
   CauteryContact contact;
   contact.tool = static_cast<std::uint8_t>(tool);
   const ToolDescription& description = scene_.tools[tool];
-  const auto& material = scene_.membrane_material;
-  const float dt = scene_.physics.dt_s;
-  FindTouches(tool, collision);
-  FollowSpot(pose, last_pose, description);
-  Vec2f mean = Vec2f::Zero();
-  float sum = 0;
-  for (const Touch& touch : touches_) {
-    const float weight = Weight(touch);
-    mean += weight * MaterialOf(touch);
-    sum += weight;
+  if (stations_.empty()) {
+    SetStations(description);
   }
-  if (!(sum > 0.0f)) {
+  FollowSheet(pose, tool, collision);
+  Vec2f centre = Vec2f::Zero();
+  if (known_) {
+    SignHeights();
+  }
+  if (!known_ || !FindCentre(description.tip_radius_m, &centre)) {
     was_touching_ = false;
     rate_.setZero();
-    half_.setZero();
     return contact;
   }
-  mean /= sum;
-  float nearest = 3e38f;
-  for (const Touch& touch : touches_) {
-    if (!(Weight(touch) > 0.0f)) {
-      continue;
-    }
-    const auto nodes = model_->TriangleNodes(touch.pair->triangle);
-    const auto barycentric = BarycentricInPlane(mean, material[nodes[0]], material[nodes[1]], material[nodes[2]]);
-    const Vec2f place =
-        barycentric[0] * material[nodes[0]] + barycentric[1] * material[nodes[1]] + barycentric[2] * material[nodes[2]];
-    const float distance = (place - mean).squaredNorm();
-    if (distance < nearest) {
-      nearest = distance;
-      contact.triangle = touch.pair->triangle;
-      contact.barycentric = barycentric;
-      contact.material = place;
-    }
+  for (const Station& station : stations_) {
+    contact.metal[contact.metal_count++] = {station.place.material, station.height_m};
   }
+  const auto station = std::min_element(stations_.begin(), stations_.end(), [&](const Station& a, const Station& b) {
+    return (a.place.material - centre).squaredNorm() < (b.place.material - centre).squaredNorm();
+  });
+  const SheetPlace place = walk_.At(centre, station->place.cell());
+  contact.triangle = place.triangle;
+  contact.barycentric = place.barycentric;
+  contact.material = place.material;
   contact.touching = true;
-  contact.tented = Tented(contact.triangle, contact.barycentric);
+  contact.tented = Tented(place.triangle, place.barycentric);
   contact.contact_radius_m = description.tip_radius_m;
-  // A line has no direction: towards the end that was told of last.
-  const Vec2f half = HalfLine();
-  half_ += dt / (dt + kRateSmoothing) * ((half.dot(half_) < 0.0f ? Vec2f(-half) : half) - half_);
-  contact.contact_half = half_;
   if (was_touching_) {
+    const float dt = scene_.physics.dt_s;
     rate_ += dt / (dt + kRateSmoothing) * ((contact.material - last_material_) / dt - rate_);
   }
   contact.material_rate = rate_;

@@ -1,9 +1,11 @@
-// Where the electrode touches the membrane, and whether there is tissue behind it.
+// The electrode on the membrane: where the hook's bare metal lies on the sheet, and whether there is tissue behind it.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "physics_node/collision/tool_collision.h"
+#include "physics_node/contact_model/sheet_place.h"
 
 namespace fulcrum::physics {
 
@@ -11,52 +13,39 @@ class CauteryProbe {
  public:
   CauteryProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
 
-  /// Contact of hook `tool` after a step: place, rate, size, tented. Mode, power and stamps are the caller's.
+  /// Contact of hook `tool` after a step: the metal's axis as the sheet sees it, its centre, rate, tented. Mode, power and
+  /// stamps are the caller's.
   ///
-  /// The bare metal is the foot and the end of the neck. The current leaves it at one spot and the cut is the path of
-  /// that spot: where it first touched, then wherever along the metal the membrane ahead of it touches. Membrane that
-  /// touches elsewhere, such as the sides of the slit, counts little or not at all. The place is the mean of the
-  /// material coordinates of the points that count, so that it moves smoothly from triangle to triangle.
-  [[nodiscard]] CauteryContact Update(std::uint32_t tool, const ToolPose& last_pose, const ToolPose& pose,
-                                      const ToolCollision& collision);
+  /// The bare metal is the foot and the end of the neck. Stations along its axis each follow the nearest place of the
+  /// deformed sheet from step to step, over slits as well, so the footprint jumps only where the tool does. What touches
+  /// is told by the distances, with hysteresis.
+  [[nodiscard]] CauteryContact Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision);
 
  private:
-  /// A point of the membrane that touches the metal.
-  struct Touch {
-    const ContactPair* pair;
-    float along;      ///< On the metal from the heel: positive on the foot, negative up the neck [m].
-    float closeness;  ///< How much nearer than the reach of the current [m].
-    float metal;      ///< How much nearer than where the metal itself touches; negative: an arc at most [m].
-    Vec3f place;
+  /// A point of the metal's axis.
+  struct Station {
+    Vec3f p_T = Vec3f::Zero();
+    Vec3f p_W = Vec3f::Zero();
+    SheetPlace place;
+    /// Of the axis off the sheet; where that is cut, at least what its living border allows.
+    float height_m = 0, last_height_m = 0;
   };
-  /// Nothing has touched for a while.
-  [[nodiscard]] bool IsFresh() const;
-  void FindTouches(std::uint32_t tool, const ToolCollision& collision);
-  void FollowSpot(const ToolPose& pose, const ToolPose& last_pose, const ToolDescription& tool);
-  /// 1 at the aim, 0 out of the spot's reach.
-  [[nodiscard]] float Nearness(const Touch& touch) const;
-  [[nodiscard]] float Weight(const Touch& touch) const;
-  [[nodiscard]] Vec2f MaterialOf(const Touch& touch) const;
-  /// Half of the line along which the foot itself touches near the spot, in material coordinates: its direction by
-  /// least squares of the touching points over their places on the metal, as long as an even line of their spread.
-  [[nodiscard]] Vec2f HalfLine() const;
+  void SetStations(const ToolDescription& tool);
+  void FollowSheet(const ToolPose& pose, std::uint32_t tool, const ToolCollision& collision);
+  void SignHeights();
+  /// Mean place of the metal that is near enough for a current, weighted by how much nearer. False: none is.
+  bool FindCentre(float radius_m, Vec2f* centre) const;
   [[nodiscard]] bool Tented(Index triangle, const std::array<float, 3>& barycentric) const;
 
   SceneView scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
-  float spacing_ = 0;  ///< Mean length of the membrane's edges [m].
+  SheetWalk walk_;
+  std::vector<Station> stations_;
+  float spacing_ = 0;      ///< Longest edge of the membrane at rest [m].
+  bool known_ = false;     ///< The stations have places.
   bool was_touching_ = false;
-  std::vector<Touch> touches_;
-  float spot_ = 0;                ///< Along the metal, as in Touch [m].
-  Vec3f aim_ = Vec3f::Zero();     ///< A little ahead of the spot.
-  Vec3f motion_ = Vec3f::Zero();  ///< Of the tool, low-passed [m/s].
-  int steps_away_ = 1000;         ///< Since anything touched.
   Vec2f last_material_ = Vec2f::Zero(), rate_ = Vec2f::Zero();
-  Vec2f half_ = Vec2f::Zero();  ///< HalfLine, low-passed.
 };
-
-/// Barycentric coordinates of `p` in triangle abc of the plane, clamped into it.
-[[nodiscard]] std::array<float, 3> BarycentricInPlane(const Vec2f& p, const Vec2f& a, const Vec2f& b, const Vec2f& c);
 
 }  // namespace fulcrum::physics

@@ -25,6 +25,11 @@ Vec3f Limited(const Vec3f& v, float limit) {
   return norm > limit ? Vec3f(v * (limit / norm)) : v;
 }
 
+/// The part of a tool that is held to touch.
+ToolPart TipPart(const SceneView& scene, std::uint32_t tool) {
+  return scene.tools[tool].kind == ToolKind::kHook ? ToolPart::kTip : ToolPart::kJaw;
+}
+
 }  // namespace
 
 ContactProbe::ContactProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
@@ -251,10 +256,10 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   Contact contact = MakeContact(tool);
   const float push = std::max(0.0f, memory.normal.dot(memory.force));
   const float dent = -memory.normal.dot(memory.u);
-  contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - scene_.physics.collision_margin_m);
+  contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - ContactMargin(scene_, TipPart(scene_, tool)));
   contact.p_s = pose.p_WT + (touching ? push / contact.k1 + dent : -contact.gap) * memory.normal;
   const PrincipalCurvatures surface = RolledOver(curvature_.At(nearest, touching, memory.normal),
-                                                 scene_.tools[tool].tip_radius_m + scene_.physics.collision_margin_m);
+                                                 scene_.tools[tool].tip_radius_m + ContactMargin(scene_, TipPart(scene_, tool)));
   contact.e1 = surface.e1;
   contact.kappa1 = surface.kappa1;
   contact.kappa2 = surface.kappa2;

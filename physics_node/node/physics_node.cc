@@ -89,8 +89,8 @@ bool PhysicsNode::Restore(std::span<const std::byte> checkpoint) {
 void PhysicsNode::Follow(const Tick& tick) {
   last_index_ = tick.index;
   // What they say is not applied before this process leads: it then goes the way of one that has just started.
-  tools_wait_ |= ports_.tools.TakeLatest(&tool_state_);
-  handles_wait_ |= ports_.handles.TakeLatest(&handle_state_);
+  tool_states_.Take(&ports_.tools);
+  handle_states_.Take(&ports_.handles);
   topology_waits_ |= ports_.topology.TakeLatest(&topology_state_);
 }
 
@@ -103,28 +103,62 @@ bool PhysicsNode::TakeOver(std::span<const std::byte> other, const Tick& tick) {
   return restored_;
 }
 
-void PhysicsNode::TakeInputs() {
-  if (ports_.tools.TakeLatest(&tool_state_) || tools_wait_) {
-    for (std::size_t i = 0; i < kMaxTools; ++i) {
-      const ToolSample& sample = tool_state_.tools[i];
-      if (sample.kind != ToolKind::kNone && scene_.tools[i].kind != ToolKind::kNone) {
-        inputs_[i].present = true;
-        inputs_[i].pose.p_WT = sample.p_WT;
-        inputs_[i].pose.q_WT = sample.q_WT.normalized();
-        absent_ticks_[i] = 0;
-      } else if (inputs_[i].present && ++absent_ticks_[i] > kAbsentTicks) {
-        inputs_[i].present = false;
-      }
+/// Poses at `now_ns`, between the two samples around it.
+void PhysicsNode::TakeTools(std::int64_t now_ns) {
+  tool_states_.Take(&ports_.tools);
+  if (tool_states_.empty()) {
+    return;
+  }
+  tool_states_.Forget(now_ns);
+  const ToolState& before = tool_states_.before();
+  const ToolState& after = tool_states_.after() != nullptr ? *tool_states_.after() : before;
+  const std::int64_t begin = before.stamp.stamp_ns, end = after.stamp.stamp_ns;
+  const float u = end > begin ? std::clamp(static_cast<float>(now_ns - begin) / static_cast<float>(end - begin), 0.0f, 1.0f)
+                              : 0.0f;
+  const bool is_new = before.stamp.sequence != tool_before_.sequence || before.stamp.epoch != tool_before_.epoch;
+  tool_before_ = before.stamp;
+  tool_after_ = after.stamp;
+  pose_ns_ = begin + static_cast<std::int64_t>(u * static_cast<float>(end - begin));
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    const ToolSample &a = before.tools[i], &b = after.tools[i];
+    if (a.kind != ToolKind::kNone && scene_.tools[i].kind != ToolKind::kNone) {
+      const bool both = b.kind == a.kind;
+      const ToolPose from{a.p_WT, a.q_WT.normalized(), inputs_[i].pose.jaw_rad};
+      const ToolPose to = both ? ToolPose{b.p_WT, b.q_WT.normalized(), from.jaw_rad} : from;
+      inputs_[i].present = true;
+      inputs_[i].pose = Interpolate(from, to, u);
+      absent_ticks_[i] = 0;
+    } else if (inputs_[i].present && is_new && ++absent_ticks_[i] > kAbsentTicks) {
+      inputs_[i].present = false;
     }
   }
-  if (ports_.handles.TakeLatest(&handle_state_) || handles_wait_) {
-    for (std::size_t i = 0; i < kMaxTools; ++i) {
-      const HandleSample& handle = handle_state_.handles[i];
-      if (handle.present && handle.quality > 0.0f) {
-        inputs_[i].pose.jaw_rad = std::clamp(handle.jaw_angle_rad, 0.0f, 1.6f);
-      }
+}
+
+void PhysicsNode::TakeHandles(std::int64_t now_ns) {
+  handle_states_.Take(&ports_.handles);
+  if (handle_states_.empty()) {
+    return;
+  }
+  handle_states_.Forget(now_ns);
+  const HandleState& state = handle_states_.before();
+  handle_stamp_ = state.stamp;
+  pedals_ = state.pedals;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    const HandleSample& handle = state.handles[i];
+    if (handle.present && handle.quality > 0.0f) {
+      inputs_[i].pose.jaw_rad = std::clamp(handle.jaw_angle_rad, 0.0f, 1.6f);
     }
   }
+}
+
+void PhysicsNode::TakeInputs(const Tick& tick) {
+  // The step stands for session time k dt, whenever within its period the thread was woken: the same hand gives the same
+  // poses on a busy machine.
+  const double step_s = tick.dt_s > 0 ? std::floor(tick.session_time_s / tick.dt_s) * tick.dt_s : tick.session_time_s;
+  const auto now_ns = tick.stamp_ns - static_cast<std::int64_t>(1e9 * (tick.session_time_s - step_s));
+  step_time_s_ = std::max(step_s, 0.0);
+  TakeTools(now_ns);
+  TakeHandles(now_ns);
   if (ports_.topology.TakeLatest(&topology_state_) || topology_waits_) {
     const int edits = topology_state_.scene_hash == scene_.hash ? simulation_.ApplyTopology(topology_state_) : -1;
     if (edits < 0) {
@@ -133,7 +167,7 @@ void PhysicsNode::TakeInputs() {
       topology_edits_.fetch_add(static_cast<std::uint64_t>(edits), std::memory_order_relaxed);
     }
   }
-  tools_wait_ = handles_wait_ = topology_waits_ = false;
+  topology_waits_ = false;
 }
 
 /// A skipped period means that the step before ran late: go on with a cheaper preset, for a while. The first step looks
@@ -153,7 +187,7 @@ void PhysicsNode::MindTheTime(const Tick& tick) {
 
 void PhysicsNode::Step(const Tick& tick) {
   MindTheTime(tick);
-  TakeInputs();
+  TakeInputs(tick);
   const StepReport report = simulation_.Step(inputs_);
   asleep_ticks_.fetch_add(report.asleep ? 1 : 0, std::memory_order_relaxed);
   PublishContacts(tick);
@@ -181,12 +215,12 @@ void PhysicsNode::PublishContacts(const Tick& tick) {
     force_N_[i].store(simulation_.force(i).norm(), std::memory_order_relaxed);
   }
   // The servo dates the model by the tool sample: without one there is nothing to say.
-  if (tool_state_.stamp.sequence == 0 || !ports_.contacts.has_readers()) {
+  if (tool_before_.sequence == 0 || !ports_.contacts.has_readers()) {
     return;
   }
   model.stamp = contact_stamper_.Next(tick.stamp_ns);
-  model.tool_sequence = tool_state_.stamp.sequence;
-  model.tool_stamp_ns = tool_state_.stamp.stamp_ns;
+  model.tool_sequence = tool_before_.sequence;
+  model.tool_stamp_ns = pose_ns_;
   model.physics_dt_s = scene_.physics.dt_s;
   ports_.contacts.Write(model);
 }
@@ -197,10 +231,10 @@ void PhysicsNode::PublishCautery(const Tick& tick) {
   }
   CauteryContact contact = simulation_.Cautery(hook_);
   contact.stamp = cautery_stamper_.Next(tick.stamp_ns);
-  contact.session_time_s = tick.session_time_s;
+  contact.session_time_s = step_time_s_;
   contact.topology_revision = simulation_.model().revision();
-  const bool heard = tick.stamp_ns - handle_state_.stamp.stamp_ns <= kPedalTimeoutNs;
-  contact.mode = heard ? ModeOf(handle_state_.pedals) : CauteryMode::kOff;
+  const bool heard = tick.stamp_ns - handle_stamp_.stamp_ns <= kPedalTimeoutNs;
+  contact.mode = heard ? ModeOf(pedals_) : CauteryMode::kOff;
   contact.power_W = contact.mode == CauteryMode::kOff ? 0.0f : power_W_;
   ports_.cautery.Write(contact);
 }
@@ -221,8 +255,8 @@ void PhysicsNode::FillFrame(const Tick& tick, TissueFrame::View view) const {
   TissueFrameHeader& header = view.header;
   header.scene_hash = scene_.hash;
   header.topology_revision = simulation_.model().revision();
-  header.tool_sequence = tool_state_.stamp.sequence;
-  header.handle_sequence = handle_state_.stamp.sequence;
+  header.tool_sequence = tool_before_.sequence;
+  header.handle_sequence = handle_stamp_.sequence;
   header.session_time_s = tick.session_time_s;
   header.simulated_time_s = simulation_.simulated_time_s();
   header.vertex_count = simulation_.particles().particle_count();
@@ -249,8 +283,9 @@ void PhysicsNode::PublishManifest(const Tick& tick) {
   const auto consumed = [](TopicId topic, const Stamp& stamp) {
     return ConsumedInput{topic, stamp.epoch, stamp.sequence};
   };
-  manifest_.consumed = {consumed(TopicId::kToolState, tool_state_.stamp),
-                        consumed(TopicId::kHandleState, handle_state_.stamp),
+  manifest_.consumed = {consumed(TopicId::kToolState, tool_before_),
+                        consumed(TopicId::kToolState, tool_after_),
+                        consumed(TopicId::kHandleState, handle_stamp_),
                         consumed(TopicId::kTopologyState, topology_state_.stamp)};
   ports_.manifests.Write(manifest_);
 }

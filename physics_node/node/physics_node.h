@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <span>
 
+#include "physics_node/node/input_history.h"
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/bus/input_account.h"
 #include "services/bus/port.h"
@@ -62,7 +63,9 @@ class PhysicsNode {
 
  private:
   bool Restore(std::span<const std::byte> checkpoint);
-  void TakeInputs();
+  void TakeInputs(const Tick& tick);
+  void TakeTools(std::int64_t now_ns);
+  void TakeHandles(std::int64_t now_ns);
   void MindTheTime(const Tick& tick);
   void PublishFrame(const Tick& tick);
   void PublishContacts(const Tick& tick);
@@ -79,12 +82,16 @@ class PhysicsNode {
   std::uint32_t hook_ = kMaxTools;  ///< The tool that cuts; kMaxTools: none.
   float power_W_;
 
-  ToolState tool_state_;
-  HandleState handle_state_;
+  InputHistory<ToolState> tool_states_;
+  InputHistory<HandleState> handle_states_;
+  Stamp tool_before_, tool_after_, handle_stamp_;  ///< Samples that the last step took.
+  std::int64_t pose_ns_ = 0;                       ///< Time of the tools' poses in the last step.
+  std::uint8_t pedals_ = kPedalNone;
+  double step_time_s_ = 0;  ///< Session time that the last step stands for.
   TopologyState topology_state_;
   std::array<ToolInput, kMaxTools> inputs_;
   std::array<int, kMaxTools> absent_ticks_{};
-  bool tools_wait_ = false, handles_wait_ = false, topology_waits_ = false;  ///< Came while another process led.
+  bool topology_waits_ = false;  ///< Came while another process led.
   std::uint64_t ticks_ = 0;
   std::uint64_t last_index_ = 0;
   std::uint64_t first_index_ = 0;  ///< Manifests count from the tick in which this process took over.

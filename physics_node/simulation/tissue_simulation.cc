@@ -328,7 +328,7 @@ DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
 }
 
 CauteryContact TissueSimulation::Cautery(std::uint32_t tool) {
-  return cautery_.Update(tool, tracks_[tool].last, tracks_[tool].now, collision_);
+  return cautery_.Update(tool, tracks_[tool].now, collision_);
 }
 
 /// body(part, worker) for each of ParticleStore::kParts, shared by the threads that a solver has.

@@ -37,6 +37,9 @@ constexpr int kLooksForRecorder = 30;
 constexpr int kLooksForReaders = 50;
 // … and have seen our writers so many later.
 constexpr int kLooksAfterReaders = 3;
+/// Phase of a node's steps against k periods of the session, in periods. Physics begins just after k dt, when the
+/// ToolState of that moment has arrived; thermal when the contact of that step has.
+constexpr double kPhysicsPhase = 0.12, kThermalPhase = 0.65;
 constexpr auto kHealthPeriod = std::chrono::milliseconds(100);
 // A node that cannot end within this time has hung; its checkpoint is safe against a kill.
 constexpr unsigned kLongestEndS = 3;
@@ -297,7 +300,9 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
         Log(LogLevel::kWarning, "begins though no recorder hears it: a replay will not have its first ticks");
       }
       app.state = HealthState::kRunning;
-      thread.Start();
+      const double phase = app.node == NodeId::kPhysics ? kPhysicsPhase : app.node == NodeId::kThermal ? kThermalPhase : -1;
+      const std::int64_t start_ns = app.session_start_ns.load(std::memory_order_relaxed);
+      thread.Start(phase < 0 ? 0 : start_ns + static_cast<std::int64_t>(phase * static_cast<double>(settings.period_ns)));
       app.stepping.store(true, std::memory_order_relaxed);
     }
     std::this_thread::sleep_for(kPollPeriod);

@@ -106,8 +106,10 @@ bool PassesGate(const CauteryContact& m) noexcept {
   return IsStamp(m.stamp) && IsSessionTime(m.session_time_s) && UpTo(m.mode, CauteryMode::kBlend) &&
          m.tool < kMaxTools && weights_in_range && (!m.touching || place_is_known) &&
          Magnitude(m.material, kMaxCoordinate_m) && Magnitude(m.material_rate, kMaxSpeed_m_s) &&
-         Magnitude(m.contact_half, kMaxCoordinate_m) && Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) &&
-         Within(m.power_W, 0.0, kMaxPower_W);
+         Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) && Within(m.power_W, 0.0, kMaxPower_W) &&
+         m.metal_count <= kMaxMetalPoints && std::all_of(m.metal.begin(), m.metal.end(), [](const MetalPoint& point) {
+           return Magnitude(point.material, kMaxCoordinate_m) && Magnitude(point.height_m, kMaxCoordinate_m);
+         });
 }
 
 bool PassesGate(const TopologyState& m) noexcept {

@@ -97,6 +97,10 @@ struct FieldsOf<ContactModel> {
                  FULCRUM_FIELD(ContactModel, devices)};
 };
 template <>
+struct FieldsOf<MetalPoint> {
+  static constexpr auto list = std::tuple{FULCRUM_FIELD(MetalPoint, material), FULCRUM_FIELD(MetalPoint, height_m)};
+};
+template <>
 struct FieldsOf<CauteryContact> {
   static constexpr auto list = std::tuple{FULCRUM_FIELD(CauteryContact, stamp),
                                           FULCRUM_FIELD(CauteryContact, session_time_s),
@@ -109,8 +113,9 @@ struct FieldsOf<CauteryContact> {
                                           FULCRUM_FIELD(CauteryContact, barycentric),
                                           FULCRUM_FIELD(CauteryContact, material),
                                           FULCRUM_FIELD(CauteryContact, material_rate),
-                                          FULCRUM_FIELD(CauteryContact, contact_half),
                                           FULCRUM_FIELD(CauteryContact, contact_radius_m),
+                                          FULCRUM_FIELD(CauteryContact, metal_count),
+                                          FULCRUM_FIELD(CauteryContact, metal),
                                           FULCRUM_FIELD(CauteryContact, power_W)};
 };
 template <>

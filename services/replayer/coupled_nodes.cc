@@ -36,11 +36,15 @@ CoupledNodes::CoupledNodes(const std::vector<NodeId>& nodes, const NodeMaking& m
 }
 
 template <class T>
-void CoupledNodes::Replace(NodeId owner, std::optional<T>* input, const std::map<std::int64_t, T>& sent) const {
-  if (!Has(owner) || !*input) return;
-  const auto found = sent.find((*input)->stamp.stamp_ns);
-  // What the replayed node did not send at that moment does not come.
-  *input = found == sent.end() ? std::nullopt : std::optional(found->second);
+void CoupledNodes::Replace(NodeId owner, std::vector<T>* inputs, const std::map<std::int64_t, T>& sent) const {
+  if (!Has(owner)) return;
+  std::vector<T> replaced;
+  for (const T& input : *inputs) {
+    // What the replayed node did not send at that moment does not come.
+    const auto found = sent.find(input.stamp.stamp_ns);
+    if (found != sent.end()) replaced.push_back(found->second);
+  }
+  *inputs = std::move(replaced);
 }
 
 Outcome CoupledNodes::Step(const RecordedTick& recorded) {
@@ -49,9 +53,9 @@ Outcome CoupledNodes::Step(const RecordedTick& recorded) {
   Replace(NodeId::kPhysics, &tick.model, models_);
   Replace(NodeId::kPhysics, &tick.cautery, cautery_);
   if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) {
-    tick.topology.reset();
+    tick.topology.clear();
     while (!topology_.empty() && topology_.front().stamp.stamp_ns + kDelay_ns <= tick.tick.stamp_ns) {
-      tick.topology = std::move(topology_.front());
+      tick.topology = {std::move(topology_.front())};
       topology_.pop_front();
     }
   }

@@ -35,7 +35,7 @@ class CoupledNodes {
 
  private:
   template <class T>
-  void Replace(NodeId owner, std::optional<T>* input, const std::map<std::int64_t, T>& sent) const;
+  void Replace(NodeId owner, std::vector<T>* inputs, const std::map<std::int64_t, T>& sent) const;
   [[nodiscard]] bool Has(NodeId node) const { return nodes_.count(node) != 0; }
 
   std::map<NodeId, std::unique_ptr<ReplayedNode>> nodes_;

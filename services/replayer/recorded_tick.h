@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "services/core/messages.h"
 #include "services/core/tick.h"
@@ -16,12 +17,12 @@ struct RecordedTick {
   Tick tick;
   /// Of the node after the tick; none where it said nothing (haptics says it with each model and each tenth tick).
   std::optional<std::uint64_t> state_hash;
-  // What the node took in that it had not yet had.
-  std::optional<ToolState> tools;
-  std::optional<HandleState> handles;
-  std::optional<TopologyState> topology;
-  std::optional<CauteryContact> cautery;
-  std::optional<ContactModel> model;
+  // What the node took in that it had not yet had, oldest first.
+  std::vector<ToolState> tools;
+  std::vector<HandleState> handles;
+  std::vector<TopologyState> topology;
+  std::vector<CauteryContact> cautery;
+  std::vector<ContactModel> model;
   /// Why this tick cannot be made again; empty: it can.
   std::string missing;
 };

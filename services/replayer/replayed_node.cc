@@ -28,8 +28,8 @@ struct Inlet {
   bus::InProcessTopic<T> topic;
   std::unique_ptr<bus::Input<T>> in = topic.MakeInput();
   std::unique_ptr<typename bus::OutputOf<T>::type> out = topic.MakeOutput();
-  void Give(const std::optional<T>& sample) {
-    if (sample) out->Write(*sample);
+  void Give(const std::vector<T>& samples) {
+    for (const T& sample : samples) out->Write(sample);
   }
 };
 

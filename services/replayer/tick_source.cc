@@ -104,13 +104,13 @@ void TickSource::CompleteHaptics(RecordedTick* tick) {
 
 template <class T>
 void TickSource::Fetch(const RecordedTick& tick, const ConsumedInput& consumed, const SampleShelf<T>& shelf,
-                       std::optional<T>* sample, std::string* missing) {
+                       std::vector<T>* samples, std::string* missing) {
   const SampleKey key{consumed.epoch, consumed.sequence};
   SampleKey& last = progress_[static_cast<std::size_t>(tick.node)].consumed[consumed.topic];
   if (key.second == 0 || key == last) return;
   last = key;
   if (const T* found = shelf.Find(key)) {
-    *sample = *found;
+    samples->push_back(*found);
   } else if (missing->empty()) {
     *missing =
         std::string(NodeName(tick.node)) + " consumed " + Describe(consumed.topic, key) +

@@ -82,7 +82,7 @@ class TickSource {
   void CompleteHaptics(RecordedTick* tick);
   template <class T>
   void Fetch(const RecordedTick& tick, const ConsumedInput& consumed, const SampleShelf<T>& shelf,
-             std::optional<T>* sample, std::string* missing);
+             std::vector<T>* samples, std::string* missing);
   [[nodiscard]] bool wanted(NodeId node) const { return wanted_[static_cast<std::size_t>(node)]; }
 
   struct Pending {

@@ -42,6 +42,7 @@ NextPeriod PlanNextPeriod(std::int64_t previous_wake_ns, std::int64_t period_ns,
 
 struct CyclicThread::Impl {
   CyclicThreadSettings settings;
+  std::int64_t grid_ns = 0;  ///< Of Start().
   Callback callback;
   std::thread thread;
   std::atomic<bool> stop{false};
@@ -96,7 +97,9 @@ struct CyclicThread::Impl {
     SetUpThread();
     Tick tick;
     tick.dt_s = 1e-9 * static_cast<double>(settings.period_ns);
-    std::int64_t wake_ns = MonotonicNs() + settings.period_ns;
+    const std::int64_t start_ns = MonotonicNs();
+    std::int64_t wake_ns =
+        grid_ns == 0 ? start_ns + settings.period_ns : PlanNextPeriod(grid_ns, settings.period_ns, start_ns).wake_ns;
     std::int64_t begin = 0;
     while (WaitFor(wake_ns, &begin)) {
       wake.Add(begin - wake_ns);
@@ -120,8 +123,9 @@ CyclicThread::CyclicThread(const CyclicThreadSettings& settings, Callback callba
 
 CyclicThread::~CyclicThread() { Stop(); }
 
-void CyclicThread::Start() {
+void CyclicThread::Start(std::int64_t grid_ns) {
   if (impl_->thread.joinable()) return;
+  impl_->grid_ns = grid_ns;
   impl_->stop.store(false, std::memory_order_relaxed);
   impl_->thread = std::thread([impl = impl_.get()] { impl->Loop(); });
 }

@@ -39,7 +39,8 @@ class CyclicThread {
   CyclicThread(const CyclicThread&) = delete;
   CyclicThread& operator=(const CyclicThread&) = delete;
 
-  void Start();
+  /// @param grid_ns wake-ups are at this time and whole periods from it (CLOCK_MONOTONIC); 0: a period from now on.
+  void Start(std::int64_t grid_ns = 0);
   void Stop();
   [[nodiscard]] CyclicStats stats() const;
 

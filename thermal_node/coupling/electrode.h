@@ -1,62 +1,69 @@
-// The metal on the grid of the source window, as the part of each cell that it covers.
+// The metal on the grid of the source window: how far each cell of the sheet is from its surface.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "services/core/types.h"
 #include "thermal_node/heat/sheet.h"
 
 namespace fulcrum::thermal {
 
-/// Conductance of sparks across the steam, relative to metal on tissue; assumed.
+/// Conductance of sparks across the gap beside dry contact, relative to metal on tissue; assumed.
 inline constexpr float kArcConductance = 0.15f;
 
-/// The points nearer than `radius` to a segment: a capsule, or a disc where the segment has no length. Material
-/// coordinates in cells; distances by the metric, in cells.
+/// A straight piece of the metal's axis as the sheet sees it: its ends in material coordinates, and how far the axis is
+/// from the sheet there. The sign of the height changes where the metal goes through the sheet.
+struct MetalPiece {
+  Vec2f a = Vec2f::Zero(), b = Vec2f::Zero();
+  float height_a = 0, height_b = 0;
+};
+
+/// All points nearer than `radius` to the pieces' axes. A cell at lateral distance x from an axis at height h is
+/// sqrt(x^2 + h^2) - radius away from the metal: metal that lies on the sheet touches along a line, metal that stands in
+/// it covers a disc. Lengths in cells, lateral distances by the metric.
 class Electrode {
  public:
-  /// @param middle of the segment. @param half way from there to either end.
-  Electrode(const SurfaceMetric& metric, const Vec2f& middle, const Vec2f& half, float radius, float arc)
-      : metric_(metric), middle_(middle), half_(half), radius_(radius), arc_(arc), per_arc_(1.0f / arc) {
-    const Vec2f lowered(metric.ss * half.x() + metric.st * half.y(), metric.st * half.x() + metric.tt * half.y());
-    const float length2 = lowered.dot(half);
-    if (length2 > 0.0f) share_ = lowered / length2;
-    const float inner = std::max(radius - 0.5f, 0.0f), outer = radius + arc + 0.5f;
-    covered2_ = inner * inner;
-    reach2_ = outer * outer;
+  Electrode(const SurfaceMetric& metric, const MetalPiece& piece, float radius) : radius_(radius) {
+    // g = L^T L: L maps cells to lengths on the rest shape.
+    l_ss_ = std::sqrt(metric.ss);
+    l_st_ = metric.st / l_ss_;
+    l_tt_ = std::sqrt(std::max(metric.tt - l_st_ * l_st_, 1e-12f));
+    a_ = Map(piece.a);
+    ab_ = Map(piece.b) - a_;
+    height_a_ = piece.height_a;
+    rise_ = piece.height_b - piece.height_a;
+    const float length2 = ab_.squaredNorm() + rise_ * rise_;
+    per_length2_ = length2 > 0.0f ? 1.0f / length2 : 0.0f;
+    low_ = piece.a.cwiseMin(piece.b);
+    high_ = piece.a.cwiseMax(piece.b);
+    across_ = Vec2f(std::sqrt(metric.tt), std::sqrt(metric.ss)) / metric.area();
   }
 
-  /// Conductance of the cell at `centre` to the metal, over that of a covered cell: the part of it under the metal, by
-  /// its distance to the edge; beyond the edge sparks, which fall to 0 at `arc` as they get rarer.
-  [[nodiscard]] float Covered(const Vec2f& centre) const {
-    const Vec2f from_middle = centre - middle_;
-    const Vec2f d = from_middle - std::clamp(from_middle.dot(share_), -1.0f, 1.0f) * half_;
-    const float r2 = metric_.ss * d.x() * d.x() + 2.0f * metric_.st * d.x() * d.y() + metric_.tt * d.y() * d.y();
-    if (r2 < covered2_) return 1.0f;
-    if (r2 > reach2_) return 0.0f;
-    const float r = std::sqrt(r2);
-    const float metal = std::clamp(radius_ - r + 0.5f, 0.0f, 1.0f);
-    const float beyond = std::max(r - radius_, 0.5f * (1.0f - metal));  // of the middle of what is not covered
-    const float rarer = std::max(1.0f - beyond * per_arc_, 0.0f);
-    return metal + (1.0f - metal) * kArcConductance * rarer * rarer;
+  /// Distance of a cell's centre from the metal's surface; negative under it [cells].
+  [[nodiscard]] float Gap(const Vec2f& centre) const {
+    const Vec2f d = Map(centre) - a_;
+    const float u = std::clamp((d.dot(ab_) - height_a_ * rise_) * per_length2_, 0.0f, 1.0f);
+    const Vec2f lateral = d - u * ab_;
+    const float height = height_a_ + u * rise_;
+    return std::sqrt(lateral.squaredNorm() + height * height) - radius_;
   }
+  /// Part of a cell that is under the metal, by its gap [cells].
+  [[nodiscard]] static float Covered(float gap) { return std::clamp(0.5f - gap, 0.0f, 1.0f); }
 
-  /// The box that holds every centre with Covered() > 0.
-  [[nodiscard]] Vec2f low() const { return middle_ - half_.cwiseAbs() - Reach(); }
-  [[nodiscard]] Vec2f high() const { return middle_ + half_.cwiseAbs() + Reach(); }
+  /// The box that holds every centre with a gap below `reach`.
+  [[nodiscard]] Vec2f low(float reach) const { return low_ - (radius_ + reach + 1.0f) * across_; }
+  [[nodiscard]] Vec2f high(float reach) const { return high_ + (radius_ + reach + 1.0f) * across_; }
 
  private:
-  /// Of the ellipse g(d, d) = reach^2.
-  [[nodiscard]] Vec2f Reach() const {
-    return (radius_ + arc_ + 1.0f) / metric_.area() * Vec2f(std::sqrt(metric_.tt), std::sqrt(metric_.ss));
-  }
+  [[nodiscard]] Vec2f Map(const Vec2f& v) const { return {l_ss_ * v.x() + l_st_ * v.y(), l_tt_ * v.y()}; }
 
-  SurfaceMetric metric_;
-  Vec2f middle_, half_;
-  Vec2f share_ = Vec2f::Zero();  ///< Its product with a way from the middle: how far along the half that leads.
-  float radius_, arc_, per_arc_;
-  float covered2_, reach2_;  ///< Squares of the distances within which all, and beyond which nothing is covered.
+  float l_ss_, l_st_, l_tt_;
+  float radius_;
+  Vec2f a_, ab_;
+  float height_a_, rise_, per_length2_;
+  Vec2f low_, high_, across_;
 };
 
 }  // namespace fulcrum::thermal

@@ -19,15 +19,15 @@ namespace fulcrum::thermal {
 struct ModeRule {
   float duty;  ///< Part of the time in which the current is on.
   float remove_C;
-  float arc_m;  ///< Sparks reach tissue this far from the metal, ever more rarely.
+  float arc_m;  ///< Without a film, sparks reach tissue this far from the metal, ever more rarely.
 };
 
 inline ModeRule RuleOf(CauteryMode mode) {
   switch (mode) {
     case CauteryMode::kCut:
-      return {1.0f, 100.0f, 4.0e-4f};
+      return {1.0f, 100.0f, 0.0f};
     case CauteryMode::kBlend:
-      return {0.64f, 130.0f, 4.0e-4f};
+      return {0.64f, 130.0f, 0.0f};
     case CauteryMode::kCoag:
       return {0.25f, 400.0f, 4.0e-4f};
     case CauteryMode::kOff:
@@ -42,13 +42,21 @@ struct Drive {
   float v_max_V = 0;       ///< [V rms]
   float i_max_A = 0;       ///< [A rms]
   float remove_theta = 0;  ///< [K]
+  float duty = 1;          ///< Part of the time in which the current is on.
+  bool discharges = false; ///< The waveform sustains discharges across a film of steam.
   float arc_m = 0;
 };
 
 inline Drive MakeDrive(const ThermalParams& params, CauteryMode mode, float power_W) {
   const ModeRule rule = RuleOf(mode);
   const float rms = std::sqrt(rule.duty);
-  return {power_W, rms * params.v_max_V, rms * params.i_max_A, rule.remove_C - params.body_temperature_C, rule.arc_m};
+  return {.power_W = power_W,
+          .v_max_V = rms * params.v_max_V,
+          .i_max_A = rms * params.i_max_A,
+          .remove_theta = rule.remove_C - params.body_temperature_C,
+          .duty = rule.duty,
+          .discharges = mode == CauteryMode::kCut || mode == CauteryMode::kBlend,
+          .arc_m = rule.arc_m};
 }
 
 /// Electrode voltage into a conductance: the asked power, within the limits of voltage and current [V rms].

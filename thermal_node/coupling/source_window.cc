@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "thermal_node/coupling/electrode.h"
 #include "thermal_node/heat/wide.h"
 
 namespace fulcrum::thermal {
@@ -12,6 +11,10 @@ namespace {
 constexpr float kFarFieldSpacing = 0.1f;  ///< Of the table, in windows.
 /// Rows with less of the heat than this do not count as changing: there it is so thin that they hardly do.
 constexpr float kFaintRow = 0.01f;
+/// No metal near [cells].
+constexpr float kFarGap = 1e6f;
+/// Pieces of metal whose ends lie farther apart on the sheet lie on two folds of it [m].
+constexpr float kLongestPiece_m = 0.002f;
 /// Evaluations of Change() to find a step: one more than are needed where change goes with the step; from a step of
 /// seconds, which dries everything, each comes down by 1 / max_change at most.
 constexpr int kStepTrials = 6;
@@ -29,7 +32,24 @@ void LoadTissue(const std::uint8_t* __restrict flags, const float* __restrict in
 
 }  // namespace
 
+TipPath PartOf(const TipPath& path, float a, float b) {
+  TipPath part = path;
+  part.from = path.from + a * (path.to - path.from);
+  part.to = path.from + b * (path.to - path.from);
+  if (path.begin.count != path.end.count) return part;
+  for (std::uint32_t n = 0; n < path.end.count; ++n) {
+    const MetalPoint &p = path.begin.points[n], &q = path.end.points[n];
+    const auto at = [&](float u) {
+      return MetalPoint{p.material + u * (q.material - p.material), p.height_m + u * (q.height_m - p.height_m)};
+    };
+    part.begin.points[n] = at(a);
+    part.end.points[n] = at(b);
+  }
+  return part;
+}
+
 SourceWindow::SourceWindow(const Material& material, const Sheet& sheet) : material_(material), sheet_(sheet) {
+  gap_.fill(kFarGap);
   // Beyond the window the sheet goes on: V ~ K0(r / lambda) with lambda = sqrt(sigma d / leak).
   const double lambda = std::sqrt(material.sigma * material.thickness_m / std::max(material.leak_S_m2, 1e-3f));
   for (std::size_t n = 0; n < far_field_.size(); ++n) {
@@ -42,12 +62,14 @@ SourceWindow::SourceWindow(const Material& material, const Sheet& sheet) : mater
 void SourceWindow::Export(State* state) const {
   state->corner = corner_;
   state->step_s = step_s_;
+  state->interface = interface_;
   potential_.ExportStart(&state->start);
 }
 
 void SourceWindow::Import(const State& state) {
   corner_ = state.corner;
   step_s_ = state.step_s;
+  interface_ = state.interface;
   potential_.ImportStart(state.start);
 }
 
@@ -163,34 +185,140 @@ void SourceWindow::SetSigma() {
   }
 }
 
-TipPath SourceWindow::Fitted(const TipPath& path) {
-  const float reach = kMetalReach * material_.cell_m;
-  const float in_material = std::sqrt(std::max(metric_.ss, metric_.tt)) / metric_.area();  // of a length on the sheet
-  TipPath fitted = path;
-  fitted.radius_m = std::min(path.radius_m, reach / in_material);
-  const float room = reach - fitted.radius_m * in_material, half = path.half.norm();
-  if (half > room) fitted.half *= std::max(room, 0.0f) / half;
-  stats_.shortened = stats_.shortened || half > room || fitted.radius_m < path.radius_m;
-  return fitted;
-}
-
-void SourceWindow::SetContact(const Vec2f& tip, const Vec2f& half, float radius_m, float arc_m) {
-  problem_.contact.fill(0);
-  const float cell = material_.cell_m;
-  const Vec2f origin(static_cast<float>(corner_.ix + sheet_.origin_x),
-                     static_cast<float>(corner_.iy + sheet_.origin_y));
-  const Electrode electrode(metric_, tip / cell - origin, half / cell, radius_m / cell, arc_m / cell);
-  const Vec2f low = electrode.low(), high = electrode.high();
+void SourceWindow::AddPiece(const MetalPiece& piece, float radius, float reach) {
+  const Electrode electrode(metric_, piece, radius);
+  const Vec2f low = electrode.low(reach), high = electrode.high(reach);
   const int i0 = std::max(0, static_cast<int>(low.x())), i1 = std::min(kWindow - 1, static_cast<int>(high.x()));
   const int j0 = std::max(0, static_cast<int>(low.y())), j1 = std::min(kWindow - 1, static_cast<int>(high.y()));
-  // From the face that the metal touches to the middle of the sheet: sigma / (d / 2) per area.
-  const float per_sigma = 2.0f * cell * cell * metric_.area() / material_.thickness_m;
+  if (i0 > i1 || j0 > j1) return;
   for (int j = j0; j <= j1; ++j) {
     for (int i = i0; i <= i1; ++i) {
-      const Vec2f centre(static_cast<float>(i) + 0.5f, static_cast<float>(j) + 0.5f);
-      problem_.contact[j * kWindow + i] = electrode.Covered(centre) * per_sigma * problem_.sigma[j * kWindow + i];
+      float& gap = gap_[j * kWindow + i];
+      gap = std::min(gap, electrode.Gap({static_cast<float>(i) + 0.5f, static_cast<float>(j) + 0.5f}));
     }
   }
+  gap_low_ = {std::min(gap_low_.ix, i0), std::min(gap_low_.iy, j0)};
+  gap_high_ = {std::max(gap_high_.ix, i1), std::max(gap_high_.iy, j1)};
+}
+
+void SourceWindow::SetGaps(const TipPath& path, float at, float reach_m) {
+  for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
+    std::fill(&gap_[j * kWindow + gap_low_.ix], &gap_[j * kWindow + gap_high_.ix] + 1, kFarGap);
+  }
+  gap_low_ = {kWindow, kWindow};
+  gap_high_ = {-1, -1};
+  const float per_cell = 1.0f / material_.cell_m, radius = path.radius_m * per_cell, reach = reach_m * per_cell;
+  const Vec2f origin(static_cast<float>(corner_.ix + sheet_.origin_x),
+                     static_cast<float>(corner_.iy + sheet_.origin_y));
+  const Vec2f window_middle = Vec2f::Constant(0.5f * kWindow);
+  // What does not fit into the window is left out, and counted.
+  const auto add = [&](MetalPiece piece) {
+    const Vec2f a = piece.a - window_middle, b = piece.b - window_middle;
+    const float out = std::max(a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff()) + radius;
+    if (out > kMetalReach) {
+      const float far_a = a.cwiseAbs().maxCoeff() + radius, far_b = b.cwiseAbs().maxCoeff() + radius;
+      stats_.shortened = true;
+      const float inner = std::min(far_a, far_b);
+      if (!(inner < kMetalReach)) return;
+      const float part = (kMetalReach - inner) / (out - inner);
+      Vec2f& end = far_a > far_b ? piece.a : piece.b;
+      float& height = far_a > far_b ? piece.height_a : piece.height_b;
+      const Vec2f start = far_a > far_b ? piece.b : piece.a;
+      const float from = far_a > far_b ? piece.height_b : piece.height_a;
+      end = start + part * (end - start);
+      height = from + part * (height - from);
+    }
+    AddPiece(piece, radius, reach);
+  };
+  if (path.end.count == 0) {
+    const Vec2f middle = (path.from + at * (path.to - path.from)) * per_cell - origin, half = path.half * per_cell;
+    add({middle - half, middle + half, 0.0f, 0.0f});
+    return;
+  }
+  // Where the sheet lies against the metal, its middle is half its thickness farther from the axis.
+  const float cushion = (0.5f * material_.thickness_m + kContactSlack_m) * per_cell;
+  const auto point = [&](std::uint32_t n, float* height) {
+    const MetalPoint& end = path.end.points[n];
+    const MetalPoint& begin = path.begin.count == path.end.count ? path.begin.points[n] : end;
+    *height = (begin.height_m + at * (end.height_m - begin.height_m)) * per_cell;
+    return Vec2f((begin.material + at * (end.material - begin.material)) * per_cell - origin);
+  };
+  float height_a = 0, height_b = 0;
+  Vec2f a = point(0, &height_a);
+  const auto off_sheet = [cushion](float height) {
+    return std::copysign(std::max(std::abs(height) - cushion, 0.0f), height);
+  };
+  for (std::uint32_t n = 1; n < path.end.count; ++n, height_a = height_b) {
+    const Vec2f b = point(n, &height_b);
+    // Ends farther apart lie on two folds of the sheet.
+    const bool one_piece = (b - a).norm() * material_.cell_m <= kLongestPiece_m;
+    const bool near = std::min(std::abs(height_a), std::abs(height_b)) <= cushion + radius + reach ||
+                      (height_a < 0.0f) != (height_b < 0.0f);
+    if (one_piece && near) add({a, b, off_sheet(height_a), off_sheet(height_b)});
+    a = b;
+  }
+}
+
+void SourceWindow::SetContact(const Drive& drive) {
+  problem_.contact.fill(0);
+  problem_.lost.fill(0);
+  const float cell = material_.cell_m, area = cell * cell * metric_.area();
+  // From the face that the metal touches to the middle of the sheet: sigma / (d / 2) per area.
+  const float per_sigma = (1.0f - interface_.film) * 2.0f * area / material_.thickness_m;
+  const float burning = interface_.film * interface_.burning * kDischarge_S_m2 * area;
+  const float per_arc = drive.arc_m > 0.0f ? cell / drive.arc_m : 1e6f, per_reach = cell / kFilmReach_m;
+  for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
+    for (int i = gap_low_.ix; i <= gap_high_.ix; ++i) {
+      const int k = j * kWindow + i;
+      if (!(gap_[k] < kFarGap) || !(tissue_[k] > 0.0f)) continue;
+      const float covered = Electrode::Covered(gap_[k]);
+      const float beyond = std::max(gap_[k], 0.5f * (1.0f - covered));  // of the middle of what is not covered
+      const float rarer = std::max(1.0f - beyond * per_arc, 0.0f), fewer = std::max(1.0f - beyond * per_reach, 0.0f);
+      const float wet = covered + (1.0f - covered) * kArcConductance * rarer * rarer;
+      const float film = burning * (covered + (1.0f - covered) * fewer * fewer);
+      problem_.contact[k] = wet * per_sigma * problem_.sigma[k] + film;
+      problem_.lost[k] = (1.0f - kTissueShare) * film;
+    }
+  }
+}
+
+float SourceWindow::Boiling() const {
+  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
+  constexpr float kNearlyBoils = 0.98f;
+  const float reach = kFilmReach_m / material_.cell_m;
+  float all = 0, boiling = 0;
+  for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
+    for (int i = gap_low_.ix; i <= gap_high_.ix; ++i) {
+      const int k = j * kWindow + i;
+      if (!(gap_[k] < reach) || !(tissue_[k] > 0.0f)) continue;
+      const float weight = std::min(1.0f - gap_[k] / reach, 1.0f);
+      all += weight;
+      const bool boils = enthalpy_[k] >= kNearlyBoils * (rc_dry + water_[k] * rc_water) * material_.theta_boil;
+      boiling += boils ? weight : 0.0f;
+    }
+  }
+  return all > 0.0f ? boiling / all : 0.0f;
+}
+
+void SourceWindow::ExchangeWithHook(float dt_s, Ledger* ledger) {
+  const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
+  const float transfer = kHookContact_W_m2K + interface_.film * (kHookFilm_W_m2K - kHookContact_W_m2K);
+  const float per_area = transfer * dt_s / material_.thickness_m;  // [J/m^3K] of a covered cell
+  double given = 0;
+  for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
+    for (int i = gap_low_.ix; i <= gap_high_.ix; ++i) {
+      const int k = j * kWindow + i;
+      if (!(gap_[k] < 0.5f) || !(tissue_[k] > 0.0f)) continue;
+      const float rc = rc_dry + water_[k] * rc_water;
+      // Half the way to balance at most, whatever the time.
+      const float rate = std::min(per_area * Electrode::Covered(gap_[k]), 0.5f * rc);
+      const float heat = rate * (interface_.hook_theta - enthalpy_[k] / rc);
+      enthalpy_[k] += heat;
+      given += static_cast<double>(heat) / static_cast<double>(inverse_volume_[k]);
+    }
+  }
+  ledger->hook += given;
+  interface_.hook_theta -= static_cast<float>(given) / kHookHeatCapacity_J_K;
 }
 
 FULCRUM_WIDE
@@ -324,35 +452,24 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   SetSigma();
   SetGround(centre, path.tented);
   const float cells = (path.to - path.from).norm() / material_.cell_m;
-  const TipPath metal = Fitted(path);
   const float by_way = duration_s / std::max(cells / kMaxWay, 1.0f);
   const float longest = std::max(by_way, std::min(min_step_s, duration_s));
+  const float reach_m = std::max(drive.arc_m, kFilmReach_m);
   leak_V2s_.fill(0);
   float t = 0;
   for (bool last = !(duration_s > 0.0f); !last;) {
     const float rest = duration_s - t;
-    const float at = (t + 0.5f * std::min(step_s_, rest)) / duration_s;
-    SetContact(path.from + at * (path.to - path.from), metal.half, metal.radius_m, drive.arc_m);
-    const PotentialResult solved = potential_.Solve(problem_, tolerance);
-    const float voltage = RegulatedVoltage(drive, solved.conductance_S);
-    const float v2 = voltage * voltage;
-    const float asked = StepByChange(v2, static_cast<float>(solved.heat_S), longest);
+    SetGaps(path, (t + 0.5f * std::min(step_s_, rest)) / duration_s, reach_m);
+    const float asked = drive.power_W > 0.0f ? SolveStep(drive, longest) : longest;
     const float step = std::max(asked, min_step_s);
     // What is left goes into steps of one length: no sliver at the end.
     const float steps = std::ceil(rest / step);
     last = steps <= 1.0f;
     const float dt = last ? rest : rest / steps;
-    const float v2_s = v2 * dt;
-    if (keep_leak_ && !path.tented) AddLeak(v2_s);
-    Deposit(v2_s, drive.remove_theta, ledger);
+    if (drive.power_W > 0.0f) Heat(drive, path.tented, dt, ledger);
+    ExchangeWithHook(dt, ledger);
+    interface_.Follow(Boiling(), drive.power_W > 0.0f && drive.discharges, dt);
     SetSigma();
-    ledger->joule += v2_s * solved.heat_S;
-    ledger->generator += static_cast<double>(v2_s) * solved.conductance_S;
-    stats_.voltage_V = voltage;
-    stats_.current_A = voltage * solved.conductance_S;
-    stats_.imbalance = std::max(stats_.imbalance, solved.imbalance);
-    stats_.iterations += solved.iterations;
-    ++stats_.solves;
     if (!last)
       ++(std::min(asked, by_way) < min_step_s ? stats_.by_floor : asked < longest ? stats_.by_change : stats_.by_way);
     t += dt;
@@ -360,6 +477,34 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   }
   Store(field, path.tented);
   RefreshTiles(field, ledger);
+}
+
+/// Solves for the potential; returns how long it holds [s].
+float SourceWindow::SolveStep(const Drive& drive, float longest) {
+  SetContact(drive);
+  solved_ = potential_.Solve(problem_, tolerance);
+  stats_.voltage_V = RegulatedVoltage(drive, solved_.conductance_S);
+  stats_.current_A = stats_.voltage_V * solved_.conductance_S;
+  stats_.imbalance = std::max(stats_.imbalance, solved_.imbalance);
+  stats_.iterations += solved_.iterations;
+  ++stats_.solves;
+  if (drive.discharges && interface_.film > 0.0f && stats_.voltage_V > 0.0f) {
+    interface_.Regulate(stats_.voltage_V / std::sqrt(drive.duty));
+  }
+  return StepByChange(stats_.voltage_V * stats_.voltage_V, static_cast<float>(solved_.heat_S), longest);
+}
+
+void SourceWindow::Heat(const Drive& drive, bool tented, float dt_s, Ledger* ledger) {
+  const float v2_s = stats_.voltage_V * stats_.voltage_V * dt_s;
+  if (keep_leak_ && !tented) AddLeak(v2_s);
+  Deposit(v2_s, drive.remove_theta, ledger);
+  const double film = static_cast<double>(v2_s) * solved_.lost_S;
+  const double metal = film * static_cast<double>(kMetalShare / (1.0f - kTissueShare));
+  interface_.hook_theta += static_cast<float>(metal) / kHookHeatCapacity_J_K;
+  ledger->joule += static_cast<double>(v2_s) * solved_.heat_S;
+  ledger->film += film;
+  ledger->plume += film - metal;
+  ledger->generator += static_cast<double>(v2_s) * static_cast<double>(solved_.conductance_S);
 }
 
 }  // namespace fulcrum::thermal

@@ -8,6 +8,8 @@
 #include <array>
 #include <cstdint>
 
+#include "thermal_node/coupling/electrode.h"
+#include "thermal_node/coupling/film.h"
 #include "thermal_node/coupling/generator.h"
 #include "thermal_node/heat/heat_field.h"
 #include "thermal_node/potential/potential_solver.h"
@@ -22,13 +24,23 @@ inline constexpr float kMetalReach = 26.0f;
 inline constexpr CellIndex kNowhere{-(1 << 24), -(1 << 24)};
 inline constexpr float kTentRadius_m = 0.015f;  ///< A tented sheet returns its current to the tissue from here on.
 
-/// Tip path over a span of time, in material space.
+/// The bare metal's axis as the sheet sees it; see MetalPoint.
+struct Metal {
+  std::uint32_t count = 0;  ///< 0: a capsule around the contact's centre instead; see TipPath.
+  std::array<MetalPoint, kMaxMetalPoints> points;
+};
+
+/// What the metal does over a span of time, in material space.
 struct TipPath {
-  Vec2f from = Vec2f::Zero(), to = Vec2f::Zero();  ///< [m]
-  Vec2f half = Vec2f::Zero();  ///< From the tip to either end of the line of metal that touches [m].
-  float radius_m = 0;          ///< Around that line.
+  Vec2f from = Vec2f::Zero(), to = Vec2f::Zero();  ///< Of the contact's centre [m].
+  Metal begin, end;            ///< Points of the same index are the same points of the metal.
+  Vec2f half = Vec2f::Zero();  ///< Without points: from the centre to either end of an axis that lies in the sheet [m].
+  float radius_m = 0;          ///< Of the metal around its axis.
   bool tented = false;
 };
+
+/// Of a path, from part a to part b of it.
+[[nodiscard]] TipPath PartOf(const TipPath& path, float a, float b);
 
 /// Accumulated over Run() calls until ClearStats().
 struct SourceStats {
@@ -67,10 +79,15 @@ class SourceWindow {
   float min_step_s = 2.5e-4f;
   float tolerance = kWorkingTolerance;  ///< Of the potential.
 
+  [[nodiscard]] const Interface& interface() const { return interface_; }
+  /// The metal cools on its shaft and in the air.
+  void CoolHook(float dt_s) { interface_.Cool(dt_s); }
+
   /// For checkpoints: where the window stood, the last coupling step and the start value of the next solve.
   struct State {
     CellIndex corner = kNowhere;
     float step_s = 0;
+    Interface interface;
     std::array<float, kWindowCells> start{};
   };
   void Export(State* state) const;
@@ -83,9 +100,14 @@ class SourceWindow {
   /// The tissue in the window lies as it does under the tip: tented or not.
   void Store(HeatField* field, bool tented);
   void SetGround(const Vec2f& middle, bool tented);
-  /// The path with the metal shortened to kMetalReach, where it is longer.
-  [[nodiscard]] TipPath Fitted(const TipPath& path);
-  void SetContact(const Vec2f& tip, const Vec2f& half, float radius_m, float arc_m);
+  /// Gap of each cell from the metal at part `at` of the path.
+  void SetGaps(const TipPath& path, float at, float reach_m);
+  void AddPiece(const MetalPiece& piece, float radius, float reach);
+  void SetContact(const Drive& drive);
+  /// Part of the footprint that boils.
+  [[nodiscard]] float Boiling() const;
+  /// Heat between metal and what it touches, for a time.
+  void ExchangeWithHook(float dt_s, Ledger* ledger);
   void SetSigma();
   /// How far the potential goes wrong while the tissue takes `v2_s` [V^2 s] with the heat of the last solve. A round
   /// inclusion whose conductivity goes from s to s' changes a field about it, in the energy norm, by sqrt(2) b of what
@@ -94,6 +116,8 @@ class SourceWindow {
   [[nodiscard]] float Change(float v2_s, float heat_S) const;
   /// The longest step, at most `longest`, with no more than max_change [s].
   [[nodiscard]] float StepByChange(float v2, float heat_S, float longest) const;
+  [[nodiscard]] float SolveStep(const Drive& drive, float longest);
+  void Heat(const Drive& drive, bool tented, float dt_s, Ledger* ledger);
   void Deposit(float v2_s, float remove_theta, Ledger* ledger);
   void AddLeak(float v2_s);
   void BoilRow(int j, float remove_theta, Ledger* ledger);
@@ -116,6 +140,11 @@ class SourceWindow {
   alignas(64) std::array<float, kWindowCells> enthalpy_{}, water_{}, inverse_volume_{};
   alignas(64) std::array<float, kWindowCells> tissue_{};  ///< sigma wet at body temperature [S/m]; 0: no tissue.
   alignas(64) std::array<std::uint8_t, kWindowCells> flags_{};
+  /// From the metal's surface [cells]; kFarGap where nothing of it is near. Set within [gap_low_, gap_high_].
+  alignas(64) std::array<float, kWindowCells> gap_{};
+  CellIndex gap_low_{kWindow, kWindow}, gap_high_{-1, -1};
+  Interface interface_;
+  PotentialResult solved_;
 };
 
 }  // namespace fulcrum::thermal

@@ -15,6 +15,15 @@ constexpr int kSearchCells = 12;
 constexpr float kSteamQuiet_s = 0.2f, kCutQuiet_s = 0.1f, kQuarantineQuiet_s = 1.0f;
 constexpr float kCutReport_m = 5e-4f;  ///< A cut event per half millimetre.
 
+constexpr float kHookWarm = 2.0f;  ///< Metal that is no warmer than this does nothing to tissue [K].
+
+float DurationOf(const TipInput& tip, float dt_s) { return tip.duration_s > 0.0f ? tip.duration_s : dt_s; }
+float Duration(std::span<const TipInput> tips, float dt_s) {
+  float sum = 0;
+  for (const TipInput& tip : tips) sum += DurationOf(tip, dt_s);
+  return sum;
+}
+
 /// With the tissue beneath computed, the sheet's own sink to it goes.
 ThermalParams SheetParams(ThermalParams params) {
   if (params.volume != 0) params.h_below_W_m2K = 0;
@@ -43,46 +52,58 @@ ThermalSolver::ThermalSolver(const SceneView& scene)
   figures_.highest_C = figures_.present_C = material_.body_C;
 }
 
-bool ThermalSolver::Idle(const TipInput& tip) const {
+bool ThermalSolver::Idle(std::span<const TipInput> tips) const {
   const bool below_idle = volume_ == nullptr || volume_->idle();
-  return !tip.active && field_.idle() && below_idle && !topology_.staged() && !protected_.warm();
+  // Metal that is as warm as the tissue does nothing to it.
+  const bool hot_metal = std::abs(source_.interface().hook_theta) > kHookWarm;
+  const bool acts = std::any_of(tips.begin(), tips.end(),
+                                [&](const TipInput& tip) { return tip.active || (tip.touching && hot_metal); });
+  return !acts && field_.idle() && below_idle && !topology_.staged() && !protected_.warm();
 }
 
-void ThermalSolver::Step(const TipInput& tip, float dt_s) {
+void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
   events_.clear();
   committed_ = false;
-  stepped_ = !Idle(tip);
+  stepped_ = !Idle(tips);
+  source_.CoolHook(dt_s);
+  figures_.hook_C = material_.body_C + source_.interface().hook_theta;
   if (!stepped_) {
     memory_.energised = 0;
-    figures_.power_W = 0;
+    figures_.power_W = figures_.set_power_W = 0;
     return;
   }
   ++frame_;
   clock_s_ += dt_s;
   const double before_J = ledger_.generator;
-  paper_ == nullptr ? AccurateFrame(tip, dt_s) : PaperFrame(tip, dt_s);
+  paper_ == nullptr ? AccurateFrame(tips, dt_s) : PaperFrame(tips, dt_s);
   UpdateProtected(dt_s);
-  figures_.power_W = static_cast<float>((ledger_.generator - before_J) / dt_s);
+  if (!tips.empty()) {
+    const float time_s = Duration(tips, dt_s);
+    figures_.power_W = static_cast<float>((ledger_.generator - before_J) / static_cast<double>(time_s));
+    figures_.set_power_W = tips.back().active ? tips.back().power_W : 0.0f;
+    last_tip_ = tips.back();
+  }
   figures_.present_C = material_.body_C + field_.MaxTheta();
   figures_.highest_C = std::max(figures_.highest_C, figures_.present_C);
-  ReportEvents(tip);
+  ReportEvents(last_tip_);
 }
 
-void ThermalSolver::AccurateFrame(const TipInput& tip, float dt_s) {
+void ThermalSolver::AccurateFrame(std::span<const TipInput> tips, float dt_s) {
   source_.ClearStats();
-  ApplySource(tip, dt_s, 0.0f, 0.5f);
+  ApplySource(tips, dt_s, 0.0f, 0.5f);
   figures_.substeps = field_.Diffuse(dt_s, &ledger_);
-  ApplySource(tip, dt_s, 0.5f, 1.0f);
+  ApplySource(tips, dt_s, 0.5f, 1.0f);
   UpdateVolume(dt_s);
   UpdateDamage(dt_s);
   UpdateTopology();
-  figures_.voltage_V = tip.active ? source_.stats().voltage_V : 0.0f;
+  if (!tips.empty()) figures_.voltage_V = tips.back().active ? source_.stats().voltage_V : 0.0f;
   figures_.shortened += source_.stats().shortened ? 1 : 0;
   figures_.solves = source_.stats().solves;
   figures_.iterations = source_.stats().iterations;
 }
 
-void ThermalSolver::PaperFrame(const TipInput& tip, float dt_s) {
+void ThermalSolver::PaperFrame(std::span<const TipInput> tips, float dt_s) {
+  const TipInput tip = tips.empty() ? TipInput{} : tips.back();
   // The voltage is that of the mode, whatever power was asked.
   const float voltage = tip.active ? MakeDrive(params_, tip.mode, tip.power_W).v_max_V : 0.0f;
   if (tip.active) paper_->Heat(&field_, {tip.path.from, tip.path.radius_m, voltage, tip.path.tented}, dt_s, &ledger_);
@@ -95,13 +116,20 @@ void ThermalSolver::PaperFrame(const TipInput& tip, float dt_s) {
   figures_.iterations = tip.active ? kPaperSweeps : 0;
 }
 
-void ThermalSolver::ApplySource(const TipInput& tip, float dt_s, float from, float to) {
-  if (!tip.active) return;
-  TipPath part = tip.path;
-  part.from = tip.path.from + from * (tip.path.to - tip.path.from);
-  part.to = tip.path.from + to * (tip.path.to - tip.path.from);
-  source_.Run(&field_, part, MakeDrive(params_, tip.mode, tip.power_W), (to - from) * dt_s, &ledger_);
-  if (volume_ != nullptr) AddLeakHeat((to - from) * dt_s);
+void ThermalSolver::ApplySource(std::span<const TipInput> tips, float dt_s, float from, float to) {
+  const float all_s = Duration(tips, dt_s), from_s = from * all_s, to_s = to * all_s;
+  float begin_s = 0;
+  for (const TipInput& tip : tips) {
+    const float length_s = DurationOf(tip, dt_s), end_s = begin_s + length_s;
+    const float a = (std::max(from_s, begin_s) - begin_s) / length_s, b = (std::min(to_s, end_s) - begin_s) / length_s;
+    begin_s = end_s;
+    const bool hot_metal = std::abs(source_.interface().hook_theta) > kHookWarm;
+    if (!(b > a) || !(tip.active || (tip.touching && hot_metal))) continue;
+    const TipPath part = PartOf(tip.path, a, b);
+    const Drive drive = tip.active ? MakeDrive(params_, tip.mode, tip.power_W) : Drive{};
+    source_.Run(&field_, part, drive, (b - a) * length_s, &ledger_);
+    if (volume_ != nullptr && tip.active) AddLeakHeat((b - a) * length_s);
+  }
 }
 
 void ThermalSolver::AddLeakHeat(float duration_s) {

@@ -37,7 +37,10 @@ struct SolverEvent {
 struct SolverFigures {
   float highest_C = 0;  ///< Since the start.
   float present_C = 0;
-  float power_W = 0;  ///< Of the generator, mean over the last frame.
+  float power_W = 0;       ///< Of the generator, mean over the time of the last samples.
+  float set_power_W = 0;   ///< Asked of it.
+  float hook_C = 0;        ///< Temperature of the metal.
+  float debris_m2 = 0;     ///< Crumbs that were taken out.
   float voltage_V = 0;
   float burn_depth_m = 0;  ///< Deepest dead tissue below the sheet since the start; 0 without a volume.
   std::uint32_t warnings = 0, injuries = 0;
@@ -52,8 +55,10 @@ class ThermalSolver {
   ThermalSolver(const ThermalSolver&) = delete;  // parts refer to each other
   ThermalSolver& operator=(const ThermalSolver&) = delete;
 
-  /// Advances one frame. Does nothing, in some ns, when there is no current, all is cold and nothing is staged.
-  void Step(const TipInput& tip, float dt_s);
+  /// Advances one frame with what the electrode did, sample by sample. Does nothing, in some ns, when there is no current,
+  /// all is cold and nothing is staged.
+  void Step(std::span<const TipInput> tips, float dt_s);
+  void Step(const TipInput& tip, float dt_s) { Step(std::span(&tip, 1), dt_s); }
 
   /// Events of the last Step.
   [[nodiscard]] std::span<const SolverEvent> events() const { return events_; }
@@ -92,9 +97,10 @@ class ThermalSolver {
 
  private:
   struct Header;
-  void AccurateFrame(const TipInput& tip, float dt_s);
-  void PaperFrame(const TipInput& tip, float dt_s);
-  void ApplySource(const TipInput& tip, float dt_s, float from, float to);
+  void AccurateFrame(std::span<const TipInput> tips, float dt_s);
+  void PaperFrame(std::span<const TipInput> tips, float dt_s);
+  /// Current and touch from part `from` to part `to` of the samples' whole time.
+  void ApplySource(std::span<const TipInput> tips, float dt_s, float from, float to);
   void AddLeakHeat(float duration_s);
   void UpdateVolume(float dt_s);
   void UpdateDamage(float dt_s);
@@ -103,7 +109,7 @@ class ThermalSolver {
   void UpdateProtected(float dt_s);
   void ReportEvents(const TipInput& tip);
   void Report(ThermalEventKind kind, const Vec2f& at, float theta, float value, float quiet_s);
-  [[nodiscard]] bool Idle(const TipInput& tip) const;
+  [[nodiscard]] bool Idle(std::span<const TipInput> tips) const;
 
   /// What an event needs to be said once, or not too often.
   struct EventMemory {
@@ -128,6 +134,7 @@ class ThermalSolver {
   Ledger ledger_;
   SolverFigures figures_;
   EventMemory memory_;
+  TipInput last_tip_;  ///< The newest sample; events name its place.
   std::vector<SolverEvent> events_;
   std::vector<ProtectedAlarm> alarms_;
   std::uint64_t frame_ = 0;

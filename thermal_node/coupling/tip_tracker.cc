@@ -6,37 +6,53 @@
 namespace fulcrum::thermal {
 
 bool TipTracker::Accepts(const CauteryContact& sample) const {
+  if (!std::isfinite(sample.session_time_s)) return false;
   if (!sample.touching) return true;
   const bool numbers = sample.material.allFinite() && std::isfinite(sample.power_W) && sample.power_W >= 0 &&
                        sample.power_W <= kPowerMax_W && std::isfinite(sample.contact_radius_m) &&
-                       sample.contact_half.norm() <= kHalfContactMax_m && sample.contact_radius_m >= 0 &&
-                       sample.mode <= CauteryMode::kBlend;
-  return numbers && sheet_.OnSheet(sample.material);
+                       sample.contact_radius_m >= 0 && sample.mode <= CauteryMode::kBlend &&
+                       sample.metal_count <= kMaxMetalPoints;
+  return numbers && sheet_.OnSheet(sample.material) &&
+         std::all_of(sample.metal.begin(), sample.metal.end(), [](const MetalPoint& point) {
+           return point.material.allFinite() && std::isfinite(point.height_m);
+         });
 }
 
-TipInput TipTracker::Advance(const CauteryContact* sample, double dt_s) {
-  age_s_ += dt_s;
-  if (sample != nullptr) {
-    last_ = *sample;
-    age_s_ = 0;
-  }
+TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
   TipInput input;
-  if (!last_.touching || age_s_ > kContactTimeout_s) {
+  // The first sample, one after a gap and one from before the last stand for a frame.
+  const double since_s = sample.session_time_s - last_s_;
+  const bool follows = last_s_ >= 0 && since_s > 0 && since_s <= kLongestGap_s;
+  input.duration_s = static_cast<float>(follows ? since_s : dt_s);
+  on_path_ = on_path_ && follows;
+  last_s_ = sample.session_time_s;
+  if (!sample.touching) {
     on_path_ = false;
     return input;
   }
-  const float reach = kTipSpeedMax_m_s * static_cast<float>(std::max(dt_s, 0.01));
-  const bool jumped = !on_path_ || (last_.material - at_).norm() > reach;
-  input.path.from = jumped ? last_.material : at_;
-  input.path.to = last_.material;
-  const float radius = last_.contact_radius_m > 0 ? last_.contact_radius_m : default_radius_m_;
+  const float reach = kTipSpeedMax_m_s * std::max(input.duration_s, 0.01f);
+  input.path.to = sample.material;
+  input.path.end.count = sample.metal_count;
+  input.path.end.points = sample.metal;
+  bool jumped = !on_path_ || metal_.count != sample.metal_count;
+  if (sample.metal_count == 0) {
+    jumped = jumped || (sample.material - at_).norm() > reach;
+  } else {
+    for (std::uint32_t n = 0; n < sample.metal_count && !jumped; ++n) {
+      jumped = (sample.metal[n].material - metal_.points[n].material).norm() > reach;
+    }
+  }
+  input.path.from = jumped ? sample.material : at_;
+  input.path.begin = jumped ? input.path.end : metal_;
+  const float radius = sample.contact_radius_m > 0 ? sample.contact_radius_m : default_radius_m_;
   input.path.radius_m = std::clamp(radius, kContactRadiusMin_m, kContactRadiusMax_m);
-  input.path.half = last_.contact_half;
-  input.path.tented = last_.tented;
-  input.mode = last_.mode;
-  input.power_W = last_.power_W;
-  input.active = last_.mode != CauteryMode::kOff && last_.power_W > 0;
+  input.path.tented = sample.tented;
+  input.mode = sample.mode;
+  input.power_W = sample.mode == CauteryMode::kOff ? 0.0f : sample.power_W;
+  input.touching = true;
+  input.active = input.power_W > 0;
   at_ = input.path.to;
+  metal_ = input.path.end;
   on_path_ = true;
   return input;
 }

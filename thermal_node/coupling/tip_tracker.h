@@ -6,38 +6,42 @@
 
 namespace fulcrum::thermal {
 
-/// Without news for this long the generator is off: physics may be gone while the pedal was down.
-inline constexpr double kContactTimeout_s = 0.1;
+/// Between two energised samples the electrode went straight and had its current, however late the second one comes: a
+/// process that was away must not leave a bridge in the slit. After a longer gap a new path begins.
+inline constexpr double kLongestGap_s = 1.0;
 inline constexpr float kTipSpeedMax_m_s = 0.3f;  ///< Farther between two samples is a jump, not a cut.
 inline constexpr float kContactRadiusMin_m = 1e-4f, kContactRadiusMax_m = 2e-3f;
-inline constexpr float kHalfContactMax_m = 2e-3f;  ///< A longer line of contact does not fit into the source's window.
 inline constexpr float kPowerMax_W = 400.0f;
 
-/// What the solver needs of one frame.
+/// What the electrode does from one sample of its contact to the next.
 struct TipInput {
-  bool active = false;  ///< Touching, energised, with power.
+  bool active = false;    ///< Touching, energised, with power.
+  bool touching = false;  ///< The metal is on the tissue, energised or not.
   TipPath path;
   CauteryMode mode = CauteryMode::kOff;
   float power_W = 0;
+  float duration_s = 0;  ///< 0: as long as the frame.
 };
+/// Samples of one frame at most; of more, the oldest are left out.
+inline constexpr std::size_t kMostSamples = 8;
 
 class TipTracker {
  public:
   TipTracker(const Sheet& sheet, float default_radius_m) : sheet_(sheet), default_radius_m_(default_radius_m) {}
 
-  /// Newest sample, or nullptr when none came. The path runs from where the last frame ended to the newest tip, so that
-  /// it has no gaps whatever the phase of the two clocks.
-  [[nodiscard]] TipInput Advance(const CauteryContact* sample, double dt_s);
+  /// The next sample. Its path runs from where the last one ended, for the session time between the two: what the tissue
+  /// gets does not depend on when samples arrive.
+  [[nodiscard]] TipInput Advance(const CauteryContact& sample, double dt_s);
   /// False: out of range or off the sheet; such a sample must not reach Advance.
   [[nodiscard]] bool Accepts(const CauteryContact& sample) const;
 
  private:
   const Sheet& sheet_;
   float default_radius_m_;
-  CauteryContact last_;
+  double last_s_ = -1;  ///< Session time of the last sample; negative: none.
+  Metal metal_;
   bool on_path_ = false;
   Vec2f at_ = Vec2f::Zero();
-  double age_s_ = 0;
 };
 
 }  // namespace fulcrum::thermal

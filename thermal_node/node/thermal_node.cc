@@ -23,7 +23,9 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
   topology_.rows = scene_.membrane.rows;
   topology_.cols = scene_.membrane.cols;
   manifest_.node = NodeId::kThermal;
-  manifest_.consumed = {{TopicId::kCauteryContact, 0, 0}};
+  contacts_.reserve(kMostSamples);
+  tips_.reserve(kMostSamples);
+  manifest_.consumed.reserve(kMostSamples);
   if (checkpoint_ != nullptr) {
     if (const auto latest = checkpoint_->Latest()) restored_ = solver_.Restore(latest->payload);
   }
@@ -32,7 +34,7 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
 
 void ThermalNode::Step(const Tick& tick) {
   if (ticks_++ == 0) runtime::FlushDenormals();
-  solver_.Step(TakeContact(tick.dt_s), static_cast<float>(tick.dt_s));
+  solver_.Step(TakeContacts(tick.dt_s), static_cast<float>(tick.dt_s));
   // The manifest first: a replay finds every tick that a checkpoint holds, and sees from the next process's first state
   // whether the last one reached its checkpoint.
   PublishManifest(tick);
@@ -43,15 +45,25 @@ void ThermalNode::Step(const Tick& tick) {
   if (solver_.stepped()) NoteHealth();
 }
 
-TipInput ThermalNode::TakeContact(double dt_s) {
-  CauteryContact newest;
-  bool fresh = ports_.contact.TakeLatest(&newest);
-  if (fresh && !tracker_.Accepts(newest)) {
-    ++refused_;
-    fresh = false;
+std::span<const TipInput> ThermalNode::TakeContacts(double dt_s) {
+  tips_.clear();
+  contacts_.clear();
+  manifest_.consumed.clear();
+  CauteryContact next;
+  while (ports_.contact.TakeNext(&next)) {
+    if (!tracker_.Accepts(next)) {
+      ++refused_;
+      continue;
+    }
+    // A replay sees no more of them than the manifest names.
+    if (contacts_.size() == kMostSamples) contacts_.erase(contacts_.begin());
+    contacts_.push_back(next);
   }
-  if (fresh) contact_ = newest;
-  return tracker_.Advance(fresh ? &contact_ : nullptr, dt_s);
+  for (const CauteryContact& contact : contacts_) {
+    tips_.push_back(tracker_.Advance(contact, dt_s));
+    manifest_.consumed.push_back({TopicId::kCauteryContact, contact.stamp.epoch, contact.stamp.sequence});
+  }
+  return tips_;
 }
 
 /// Before anything of a new revision is published: whoever saw a revision can rely on it to survive this process.
@@ -122,8 +134,6 @@ void ThermalNode::PublishManifest(const Tick& tick) {
   manifest_.tick = tick.index;
   manifest_.session_time_s = tick.session_time_s;
   manifest_.state_hash = solver_.TickHash();
-  manifest_.consumed[0].epoch = contact_.stamp.epoch;
-  manifest_.consumed[0].sequence = contact_.stamp.sequence;
   ports_.manifest.Write(manifest_);
 }
 

@@ -53,7 +53,8 @@ class ThermalNode {
   [[nodiscard]] bool restored() const { return restored_; }
 
  private:
-  [[nodiscard]] TipInput TakeContact(double dt_s);
+  /// What the electrode did since the last tick.
+  [[nodiscard]] std::span<const TipInput> TakeContacts(double dt_s);
   void SaveCheckpoint();
   void PublishTopology(const Tick& tick);
   void PublishEvents(const Tick& tick);
@@ -77,7 +78,8 @@ class ThermalNode {
   PatchPlanner planner_;
   bus::Stamper topology_stamper_, patch_stamper_, event_stamper_, manifest_stamper_;
 
-  CauteryContact contact_;
+  std::vector<CauteryContact> contacts_;
+  std::vector<TipInput> tips_;
   TopologyState topology_;
   TickManifest manifest_;
   std::uint64_t ticks_ = 0, refused_ = 0, frames_since_checkpoint_ = 0;

@@ -83,7 +83,7 @@ void SetFaces(const Field& sigma, float face_s, float face_t, Level* fine) {
 /// leaves I^2 / (2 sigma face) in it.
 FULCRUM_WIDE
 void RowHeat(const Level& fine, const Field& voltage, const Field& sigma, float face_s, float face_t, int j,
-             const float* __restrict contact, float* __restrict q) {
+             const float* __restrict contact, const float* __restrict lost, float* __restrict q) {
   const int o = fine.At(0, j), up = fine.stride;
   const float* __restrict v = &voltage[o];
   const float* __restrict s = &sigma[o];
@@ -95,23 +95,24 @@ void RowHeat(const Level& fine, const Field& voltage, const Field& sigma, float 
     const float above = fy[i] * (v[i] - v[i - up]), below = fy[i + up] * (v[i] - v[i + up]);
     const float drop = 1.0f - v[i];
     q[i] = (half_s * (left * left + right * right) + half_t * (above * above + below * below)) / (s[i] + kTiny) +
-           contact[i] * drop * drop;
+           (contact[i] - lost[i]) * drop * drop;
   }
 }
 
-/// Power into the sheet, heat in it and power into ground, at 1 V [W/V^2].
+/// Power into the sheet, heat in it, what is lost at the contact and power into ground, at 1 V [W/V^2].
 struct Balance {
-  double in = 0, heat = 0, grounded = 0;
+  double in = 0, heat = 0, lost = 0, grounded = 0;
 };
 
 FULCRUM_WIDE
-void AddRow(const float* __restrict contact, const float* __restrict ground, const float* __restrict v,
+void AddRow(const float* __restrict contact, const float* __restrict lost, const float* __restrict ground, const float* __restrict v,
             const float* __restrict q, Balance* balance) {
-  alignas(64) float in[kLanes] = {}, heat[kLanes] = {}, grounded[kLanes] = {};
+  alignas(64) float in[kLanes] = {}, heat[kLanes] = {}, gone[kLanes] = {}, grounded[kLanes] = {};
   for (int i = 0; i < kWindow; i += kLanes) {
     for (int l = 0; l < kLanes; ++l) {
       in[l] += contact[i + l] * (1.0f - v[i + l]);
       heat[l] += q[i + l];
+      gone[l] += lost[i + l] * (1.0f - v[i + l]) * (1.0f - v[i + l]);
       grounded[l] += ground[i + l] * v[i + l] * v[i + l];
     }
   }
@@ -119,11 +120,13 @@ void AddRow(const float* __restrict contact, const float* __restrict ground, con
     for (int l = 0; l < width; ++l) {
       in[l] += in[l + width];
       heat[l] += heat[l + width];
+      gone[l] += gone[l + width];
       grounded[l] += grounded[l + width];
     }
   }
   balance->in += in[0];
   balance->heat += heat[0];
+  balance->lost += gone[0];
   balance->grounded += grounded[0];
 }
 
@@ -206,27 +209,29 @@ PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
   for (int j = 0; j < kWindow; ++j) {
     const float* contact = &problem.contact[j * kWindow];
     float* q = &heat_[j * kWindow];
-    RowHeat(fine, g.v, g.sigma, problem.face_s, problem.face_t, j, contact, q);
+    const float* lost_row = &problem.lost[j * kWindow];
+    RowHeat(fine, g.v, g.sigma, problem.face_s, problem.face_t, j, contact, lost_row, q);
     const double before = balance.heat;
-    AddRow(contact, &problem.ground[j * kWindow], &g.v[fine.At(0, j)], q, &balance);
+    AddRow(contact, lost_row, &problem.ground[j * kWindow], &g.v[fine.At(0, j)], q, &balance);
     row_heat_[j] = static_cast<float>(balance.heat - before);
   }
-  const auto& [in, heat, grounded] = balance;
+  const auto& [in, heat, lost, grounded] = balance;
   PotentialResult result;
-  if (!(in > 0.0) || !std::isfinite(in + heat + grounded)) {
+  if (!(in > 0.0) || !std::isfinite(in + heat + lost + grounded)) {
     // No contact; or the matrix held a bad number: start afresh and deliver nothing this time.
     heat_.fill(0);
     row_heat_.fill(0);
     std::fill(g.v.begin(), g.v.end(), 0.0f);
     return result;
   }
-  const double out = heat + grounded;
+  const double out = heat + lost + grounded;
   result.conductance_S = static_cast<float>(in);
   result.imbalance = static_cast<float>(std::abs(in - out) / in);
   const auto scale = static_cast<float>(in / out);
   for (float& q : heat_) q *= scale;
   for (float& q : row_heat_) q *= scale;
   result.heat_S = heat * static_cast<double>(scale);
+  result.lost_S = lost * static_cast<double>(scale);
   return result;
 }
 

@@ -18,6 +18,7 @@ inline constexpr int kWindowCells = kWindow * kWindow;
 struct PotentialProblem {
   alignas(64) std::array<float, kWindowCells> sigma{};    ///< Electrical conductivity [S/m]; 0: no tissue.
   alignas(64) std::array<float, kWindowCells> contact{};  ///< Conductance to the electrode [S].
+  alignas(64) std::array<float, kWindowCells> lost{};     ///< Part of `contact` whose heat does not go into the cell [S].
   alignas(64) std::array<float, kWindowCells> ground{};   ///< Conductance to the return electrode [S].
   float face_s = 0;  ///< d * lt / ls: conductance of a face across s is this times the harmonic sigma [m].
   float face_t = 0;
@@ -26,7 +27,8 @@ struct PotentialProblem {
 struct PotentialResult {
   float conductance_S = 0;  ///< Electrode current at 1 V.
   double heat_S = 0;        ///< Joule heat in the window at 1 V [W/V^2].
-  float imbalance = 0;      ///< |power in - heat - power into ground| / power in, before the rescaling.
+  double lost_S = 0;        ///< Power in the `lost` part of the contact at 1 V [W/V^2].
+  float imbalance = 0;      ///< |power in - heat - lost - power into ground| / power in, before the rescaling.
   int iterations = 0;
 };
 
@@ -41,8 +43,8 @@ class PotentialSolver {
   ~PotentialSolver();
 
   /// Iterates until the error is `tolerance` in the energy norm, relative to the solution; then, while the energy guard
-  /// is not met, ten times less, at most twice. The heat is rescaled so that power in equals heat plus power into
-  /// ground.
+  /// is not met, ten times less, at most twice. The heat is rescaled so that power in equals heat plus what is lost
+  /// plus power into ground.
   PotentialResult Solve(const PotentialProblem& problem, float tolerance);
 
   /// Joule heat per cell at 1 V [W/V^2] of the last solve; shared between two cells as their resistances.

@@ -169,8 +169,12 @@ bool ToWire(const CauteryContact& from, idl::CauteryContact* to) {
   to->barycentric(from.barycentric);
   to->material(cv::ToWire(from.material));
   to->material_rate(cv::ToWire(from.material_rate));
-  to->contact_half(cv::ToWire(from.contact_half));
   to->contact_radius_m(from.contact_radius_m);
+  to->metal_count(from.metal_count);
+  for (std::size_t i = 0; i < from.metal.size(); ++i) {
+    to->metal()[i].material(cv::ToWire(from.metal[i].material));
+    to->metal()[i].height_m(from.metal[i].height_m);
+  }
   to->power_W(from.power_W);
   return true;
 }
@@ -187,8 +191,11 @@ void FromWire(const idl::CauteryContact& from, CauteryContact* to) {
   to->barycentric = from.barycentric();
   to->material = cv::FromWire(from.material());
   to->material_rate = cv::FromWire(from.material_rate());
-  to->contact_half = cv::FromWire(from.contact_half());
   to->contact_radius_m = from.contact_radius_m();
+  to->metal_count = from.metal_count();
+  for (std::size_t i = 0; i < to->metal.size(); ++i) {
+    to->metal[i] = {cv::FromWire(from.metal()[i].material()), from.metal()[i].height_m()};
+  }
   to->power_W = from.power_W();
 }
 

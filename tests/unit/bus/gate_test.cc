@@ -46,7 +46,8 @@ struct Floats {
   }
   void operator()(CauteryContact& m) const {
     Each(m.session_time_s, m.barycentric[0], m.barycentric[1], m.barycentric[2], m.material, m.material_rate,
-         m.contact_half, m.contact_radius_m, m.power_W);
+         m.contact_radius_m, m.power_W);
+    for (MetalPoint& point : m.metal) Each(point.material, point.height_m);
   }
   void operator()(TopologyState& m) const { (*this)(m.cut_length_m); }
   void operator()(TemperaturePatch& m) const { (*this)(m.header.max_temperature_C); }
@@ -171,6 +172,8 @@ TEST(GateRanges, CauteryContact) {
                                   [](auto& m) {
                                     m.barycentric = {0.1f, 0.1f, 0.1f};
                                   }},
+                                 {"more metal than there is room for", [](auto& m) { m.metal_count = kMaxMetalPoints + 1; }},
+                                 {"metal beyond the room", [](auto& m) { m.metal[2].height_m = -1e3f; }},
                                  {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }},
                                  {"negative power", [](auto& m) { m.power_W = -1; }},
                                  {"power beyond any generator", [](auto& m) { m.power_W = 1001; }}});

@@ -92,8 +92,12 @@ inline CauteryContact Sample(std::uint64_t sequence) {
   m.barycentric = {0.25f, 0.125f, 0.625f};
   m.material = {0.03f, 0.04f};
   m.material_rate = {-0.01f, 0.02f};
-  m.contact_half = Vec2f(0.0012f, -0.0007f);
   m.contact_radius_m = 0.0005f;
+  m.metal_count = 3;
+  for (std::size_t i = 0; i < m.metal.size(); ++i) {
+    const float x = 1e-3f * static_cast<float>(i);
+    m.metal[i] = {Vec2f(0.03f + x, 0.04f - 0.5f * x), 2.0f * x};
+  }
   m.power_W = 35;
   return m;
 }

@@ -1,0 +1,132 @@
+#include "physics_node/contact_model/sheet_place.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "physics_node/collision/closest.h"
+
+namespace fulcrum::physics {
+namespace {
+
+/// Cells that a descent crosses at most: a point cannot come farther than that from its last place in one step.
+constexpr int kMostSteps = 40;
+
+}  // namespace
+
+Vec3f SheetWalk::NodePlace(Index node) const {
+  const Index cols = scene_.membrane.cols, rows = scene_.membrane.rows, row = node / cols, col = node % cols;
+  if (model_->NodeAlive(node) && !model_->IsDebris(node)) {
+    return particles_->At(particles_->NodeRef(row, col));
+  }
+  Vec3f sum = Vec3f::Zero();
+  int count = 0;
+  for (Index r = row > 0 ? row - 1 : 0; r <= std::min(row + 1, rows - 1); ++r) {
+    for (Index c = col > 0 ? col - 1 : 0; c <= std::min(col + 1, cols - 1); ++c) {
+      const Index other = r * cols + c;
+      if (model_->NodeAlive(other) && !model_->IsDebris(other)) {
+        sum += particles_->At(particles_->NodeRef(r, c));
+        ++count;
+      }
+    }
+  }
+  return count > 0 ? Vec3f(sum / static_cast<float>(count)) : particles_->At(particles_->NodeRef(row, col));
+}
+
+Vec2f SheetWalk::MaterialAt(const std::array<Index, 3>& nodes, const std::array<float, 3>& barycentric) const {
+  Vec2f place = Vec2f::Zero();
+  for (std::size_t i = 0; i < 3; ++i) {
+    place += barycentric[i] * scene_.membrane_material[nodes[i]];
+  }
+  return place;
+}
+
+/// visit(triangle, nodes, corners in frame W) for the triangles of a cell and of the eight around it.
+template <class Visit>
+void SheetWalk::ForTrianglesAround(Index cell, const Visit& visit) const {
+  const Index cells = scene_.membrane.cols - 1, cell_rows = scene_.membrane.rows - 1;
+  const Index row = cell / cells, col = cell % cells;
+  const Index r0 = row > 0 ? row - 1 : 0, r1 = std::min(row + 1, cell_rows - 1);
+  const Index c0 = col > 0 ? col - 1 : 0, c1 = std::min(col + 1, cells - 1);
+  std::array<Vec3f, 16> place;  // of the nodes of these cells
+  for (Index r = r0; r <= r1 + 1; ++r) {
+    for (Index c = c0; c <= c1 + 1; ++c) {
+      place[4 * (r - r0) + (c - c0)] = NodePlace(r * scene_.membrane.cols + c);
+    }
+  }
+  for (Index r = r0; r <= r1; ++r) {
+    for (Index c = c0; c <= c1; ++c) {
+      const Index n00 = r * scene_.membrane.cols + c, n10 = n00 + scene_.membrane.cols, at = 4 * (r - r0) + (c - c0);
+      const Index triangle = 2 * (r * cells + c);
+      visit(triangle, std::array<Index, 3>{n00, n00 + 1, n10 + 1},
+            std::array<Vec3f, 3>{place[at], place[at + 1], place[at + 5]});
+      visit(triangle + 1, std::array<Index, 3>{n00, n10 + 1, n10},
+            std::array<Vec3f, 3>{place[at], place[at + 5], place[at + 4]});
+    }
+  }
+}
+
+SheetPlace SheetWalk::Nearest(const Vec3f& p_W, Index start_cell) const {
+  SheetPlace best;
+  float best_sq = 3e38f;
+  Index cell = start_cell;
+  for (int step = 0; step < kMostSteps; ++step) {
+    std::array<Index, 3> best_nodes{};
+    bool nearer = false;
+    ForTrianglesAround(cell, [&](Index triangle, const std::array<Index, 3>& nodes, const std::array<Vec3f, 3>& x) {
+      const auto barycentric = ClosestOnTriangle(p_W, x[0], x[1], x[2]);
+      const float distance_sq =
+          (barycentric[0] * x[0] + barycentric[1] * x[1] + barycentric[2] * x[2] - p_W).squaredNorm();
+      if (distance_sq < best_sq) {
+        best_sq = distance_sq;
+        best.triangle = triangle;
+        best.barycentric = barycentric;
+        best_nodes = nodes;
+        nearer = true;
+      }
+    });
+    if (!nearer) {
+      break;
+    }
+    best.material = MaterialAt(best_nodes, best.barycentric);
+    if (best.cell() == cell) {
+      break;
+    }
+    cell = best.cell();
+  }
+  best.distance_m = std::sqrt(best_sq);
+  return best;
+}
+
+SheetPlace SheetWalk::Crossing(const Vec3f& a_W, const Vec3f& b_W, Index cell) const {
+  SheetPlace crossing;
+  ForTrianglesAround(cell, [&](Index triangle, const std::array<Index, 3>& nodes, const std::array<Vec3f, 3>& x) {
+    if (crossing.found()) {
+      return;
+    }
+    const ClosestPoints closest = ClosestSegmentTriangle(a_W, b_W, x[0], x[1], x[2]);
+    if (closest.crosses) {
+      crossing = {triangle, closest.barycentric, MaterialAt(nodes, closest.barycentric), 0.0f};
+    }
+  });
+  return crossing;
+}
+
+SheetPlace SheetWalk::At(const Vec2f& material, Index cell) const {
+  const auto lift = [](const Vec2f& v) { return Vec3f(v.x(), v.y(), 0.0f); };
+  SheetPlace best;
+  float nearest = 3e38f;
+  ForTrianglesAround(cell, [&](Index triangle, const std::array<Index, 3>& nodes, const std::array<Vec3f, 3>&) {
+    const auto& m = scene_.membrane_material;
+    const auto barycentric =
+        ClosestOnTriangle(lift(material), lift(m[nodes[0]]), lift(m[nodes[1]]), lift(m[nodes[2]]));
+    const Vec2f place = MaterialAt(nodes, barycentric);
+    const float distance = (place - material).squaredNorm();
+    if (distance < nearest) {
+      nearest = distance;
+      best = {triangle, barycentric, place, 0.0f};
+    }
+  });
+  return best;
+}
+
+}  // namespace fulcrum::physics
