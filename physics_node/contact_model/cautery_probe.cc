@@ -75,7 +75,8 @@ void CauteryProbe::SetStations(const ToolDescription& tool) {
   const auto parts = [spacing](float part) { return std::max(1, static_cast<int>(std::ceil(part / spacing))); };
   const int foot = parts(tool.tip_length_m), neck = parts(kBareNeck);
   for (int i = 0; i < foot; ++i) {
-    stations_.emplace_back().p_T = Vec3f(tool.tip_length_m * static_cast<float>(foot - i) / static_cast<float>(foot), 0, 0);
+    stations_.emplace_back().p_T =
+        Vec3f(tool.tip_length_m * static_cast<float>(foot - i) / static_cast<float>(foot), 0, 0);
   }
   for (int i = 0; i <= neck; ++i) {
     stations_.emplace_back().p_T = Vec3f(0, 0, -kBareNeck * static_cast<float>(i) / static_cast<float>(neck));
@@ -107,7 +108,8 @@ void CauteryProbe::FollowSheet(const ToolPose& pose, std::uint32_t tool, const T
   float least = kLost;
   for (std::size_t i = 0; i < stations_.size(); ++i) {
     Station& station = stations_[i];
-    SheetPlace place = station.place.found() && known_ ? walk_.Nearest(station.p_W, station.place.cell()) : SheetPlace{};
+    SheetPlace place =
+        station.place.found() && known_ ? walk_.Nearest(station.p_W, station.place.cell()) : SheetPlace{};
     const auto offer = [&](Index cell) {
       const SheetPlace other = walk_.Nearest(station.p_W, cell);
       if (!place.found() || other.distance_m < place.distance_m - kNearerElsewhere) {
@@ -127,7 +129,8 @@ void CauteryProbe::FollowSheet(const ToolPose& pose, std::uint32_t tool, const T
     station.height_m = place.distance_m;
     if (!model_->TriangleAlive(place.triangle)) {
       // Cells that live beyond the last living triangle hang on it and reach no farther than one edge.
-      station.height_m = std::max(station.height_m, std::sqrt(alive_sq[i]) - spacing_);
+      const float living_m = walk_.DistanceToLiving(station.p_W, place.cell());
+      station.height_m = std::max(station.height_m, std::min(living_m - spacing_, kLost));
     }
     least = std::min(least, place.distance_m);
   }

@@ -13,12 +13,12 @@ class CauteryProbe {
  public:
   CauteryProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
 
-  /// Contact of hook `tool` after a step: the metal's axis as the sheet sees it, its centre, rate, tented. Mode, power and
-  /// stamps are the caller's.
+  /// Contact of hook `tool` after a step: the metal's axis as the sheet sees it, its centre, rate, tented. Mode, power
+  /// and stamps are the caller's.
   ///
   /// The bare metal is the foot and the end of the neck. Stations along its axis each follow the nearest place of the
-  /// deformed sheet from step to step, over slits as well, so the footprint jumps only where the tool does. What touches
-  /// is told by the distances, with hysteresis.
+  /// deformed sheet from step to step, over slits as well, so the footprint jumps only where the tool does. What
+  /// touches is told by the distances, with hysteresis.
   [[nodiscard]] CauteryContact Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision);
 
  private:
@@ -42,8 +42,8 @@ class CauteryProbe {
   const ParticleStore* particles_;
   SheetWalk walk_;
   std::vector<Station> stations_;
-  float spacing_ = 0;      ///< Longest edge of the membrane at rest [m].
-  bool known_ = false;     ///< The stations have places.
+  float spacing_ = 0;   ///< Longest edge of the membrane at rest [m].
+  bool known_ = false;  ///< The stations have places.
   bool was_touching_ = false;
   Vec2f last_material_ = Vec2f::Zero(), rate_ = Vec2f::Zero();
 };

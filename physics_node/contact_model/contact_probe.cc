@@ -258,8 +258,9 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   const float dent = -memory.normal.dot(memory.u);
   contact.gap = touching ? 0.0f : std::max(0.0f, nearest.gap - ContactMargin(scene_, TipPart(scene_, tool)));
   contact.p_s = pose.p_WT + (touching ? push / contact.k1 + dent : -contact.gap) * memory.normal;
-  const PrincipalCurvatures surface = RolledOver(curvature_.At(nearest, touching, memory.normal),
-                                                 scene_.tools[tool].tip_radius_m + ContactMargin(scene_, TipPart(scene_, tool)));
+  const PrincipalCurvatures surface =
+      RolledOver(curvature_.At(nearest, touching, memory.normal),
+                 scene_.tools[tool].tip_radius_m + ContactMargin(scene_, TipPart(scene_, tool)));
   contact.e1 = surface.e1;
   contact.kappa1 = surface.kappa1;
   contact.kappa2 = surface.kappa2;

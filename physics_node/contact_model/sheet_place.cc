@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "physics_node/collision/closest.h"
 
@@ -97,6 +98,26 @@ SheetPlace SheetWalk::Nearest(const Vec3f& p_W, Index start_cell) const {
   return best;
 }
 
+float SheetWalk::DistanceToLiving(const Vec3f& p_W, Index cell) const {
+  const Index cells = scene_.membrane.cols - 1, cell_rows = scene_.membrane.rows - 1;
+  const Index row = cell / cells, col = cell % cells;
+  float nearest_sq = std::numeric_limits<float>::infinity();
+  for (Index r = row > 1 ? row - 2 : 0; r <= std::min(row + 2, cell_rows - 1); ++r) {
+    for (Index c = col > 1 ? col - 2 : 0; c <= std::min(col + 2, cells - 1); ++c) {
+      for (const Index triangle : {2 * (r * cells + c), 2 * (r * cells + c) + 1}) {
+        if (!model_->TriangleAlive(triangle)) {
+          continue;
+        }
+        const auto nodes = model_->TriangleNodes(triangle);
+        const Vec3f x = NodePlace(nodes[0]), y = NodePlace(nodes[1]), z = NodePlace(nodes[2]);
+        const auto b = ClosestOnTriangle(p_W, x, y, z);
+        nearest_sq = std::min(nearest_sq, (b[0] * x + b[1] * y + b[2] * z - p_W).squaredNorm());
+      }
+    }
+  }
+  return std::sqrt(nearest_sq);
+}
+
 SheetPlace SheetWalk::Crossing(const Vec3f& a_W, const Vec3f& b_W, Index cell) const {
   SheetPlace crossing;
   ForTrianglesAround(cell, [&](Index triangle, const std::array<Index, 3>& nodes, const std::array<Vec3f, 3>& x) {
@@ -117,8 +138,7 @@ SheetPlace SheetWalk::At(const Vec2f& material, Index cell) const {
   float nearest = 3e38f;
   ForTrianglesAround(cell, [&](Index triangle, const std::array<Index, 3>& nodes, const std::array<Vec3f, 3>&) {
     const auto& m = scene_.membrane_material;
-    const auto barycentric =
-        ClosestOnTriangle(lift(material), lift(m[nodes[0]]), lift(m[nodes[1]]), lift(m[nodes[2]]));
+    const auto barycentric = ClosestOnTriangle(lift(material), lift(m[nodes[0]]), lift(m[nodes[1]]), lift(m[nodes[2]]));
     const Vec2f place = MaterialAt(nodes, barycentric);
     const float distance = (place - material).squaredNorm();
     if (distance < nearest) {

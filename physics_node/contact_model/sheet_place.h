@@ -19,8 +19,8 @@ struct SheetPlace {
 };
 
 /// Walks over the grid's triangles, those that a cut has switched off included: the sheet between the lips of a slit is
-/// then the straight line from lip to lip, so a tool that stands in its own slit has a place in material coordinates that
-/// moves on continuously. A node that is dead lies where its living neighbours say.
+/// then the straight line from lip to lip, so a tool that stands in its own slit has a place in material coordinates
+/// that moves on continuously. A node that is dead lies where its living neighbours say.
 class SheetWalk {
  public:
   SheetWalk(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
@@ -28,6 +28,8 @@ class SheetWalk {
 
   /// Descends from a cell to the nearest place around it: a local minimum of the distance, not the global one.
   [[nodiscard]] SheetPlace Nearest(const Vec3f& p_W, Index start_cell) const;
+  /// Distance of a point from the nearest living triangle within two cells of `cell`; infinity: there is none.
+  [[nodiscard]] float DistanceToLiving(const Vec3f& p_W, Index cell) const;
   /// Where segment ab goes through one of the triangles within one cell of `cell`; none: not found().
   [[nodiscard]] SheetPlace Crossing(const Vec3f& a_W, const Vec3f& b_W, Index cell) const;
   /// The triangle around `material` within one cell of `cell`, or the nearest of these with the place clamped into it.

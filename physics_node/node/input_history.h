@@ -1,4 +1,5 @@
-// The samples of one input around a moment, so that a step takes what was true then and not what happened to arrive last.
+// The samples of one input around a moment, so that a step takes what was true then and not what happened to arrive
+// last.
 #pragma once
 
 #include <cstddef>

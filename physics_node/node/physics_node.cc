@@ -113,8 +113,8 @@ void PhysicsNode::TakeTools(std::int64_t now_ns) {
   const ToolState& before = tool_states_.before();
   const ToolState& after = tool_states_.after() != nullptr ? *tool_states_.after() : before;
   const std::int64_t begin = before.stamp.stamp_ns, end = after.stamp.stamp_ns;
-  const float u = end > begin ? std::clamp(static_cast<float>(now_ns - begin) / static_cast<float>(end - begin), 0.0f, 1.0f)
-                              : 0.0f;
+  const float u =
+      end > begin ? std::clamp(static_cast<float>(now_ns - begin) / static_cast<float>(end - begin), 0.0f, 1.0f) : 0.0f;
   const bool is_new = before.stamp.sequence != tool_before_.sequence || before.stamp.epoch != tool_before_.epoch;
   tool_before_ = before.stamp;
   tool_after_ = after.stamp;
@@ -152,8 +152,8 @@ void PhysicsNode::TakeHandles(std::int64_t now_ns) {
 }
 
 void PhysicsNode::TakeInputs(const Tick& tick) {
-  // The step stands for session time k dt, whenever within its period the thread was woken: the same hand gives the same
-  // poses on a busy machine.
+  // The step stands for session time k dt, whenever within its period the thread was woken: the same hand gives the
+  // same poses on a busy machine.
   const double step_s = tick.dt_s > 0 ? std::floor(tick.session_time_s / tick.dt_s) * tick.dt_s : tick.session_time_s;
   const auto now_ns = tick.stamp_ns - static_cast<std::int64_t>(1e9 * (tick.session_time_s - step_s));
   step_time_s_ = std::max(step_s, 0.0);
@@ -283,8 +283,7 @@ void PhysicsNode::PublishManifest(const Tick& tick) {
   const auto consumed = [](TopicId topic, const Stamp& stamp) {
     return ConsumedInput{topic, stamp.epoch, stamp.sequence};
   };
-  manifest_.consumed = {consumed(TopicId::kToolState, tool_before_),
-                        consumed(TopicId::kToolState, tool_after_),
+  manifest_.consumed = {consumed(TopicId::kToolState, tool_before_), consumed(TopicId::kToolState, tool_after_),
                         consumed(TopicId::kHandleState, handle_stamp_),
                         consumed(TopicId::kTopologyState, topology_state_.stamp)};
   ports_.manifests.Write(manifest_);

@@ -300,9 +300,12 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
         Log(LogLevel::kWarning, "begins though no recorder hears it: a replay will not have its first ticks");
       }
       app.state = HealthState::kRunning;
-      const double phase = app.node == NodeId::kPhysics ? kPhysicsPhase : app.node == NodeId::kThermal ? kThermalPhase : -1;
+      const double phase = app.node == NodeId::kPhysics   ? kPhysicsPhase
+                           : app.node == NodeId::kThermal ? kThermalPhase
+                                                          : -1;
       const std::int64_t start_ns = app.session_start_ns.load(std::memory_order_relaxed);
-      thread.Start(phase < 0 ? 0 : start_ns + static_cast<std::int64_t>(phase * static_cast<double>(settings.period_ns)));
+      thread.Start(phase < 0 ? 0
+                             : start_ns + static_cast<std::int64_t>(phase * static_cast<double>(settings.period_ns)));
       app.stepping.store(true, std::memory_order_relaxed);
     }
     std::this_thread::sleep_for(kPollPeriod);

@@ -14,7 +14,7 @@ namespace fulcrum::thermal {
 namespace {
 
 /// Change it with the layout.
-constexpr std::uint64_t kLayout = 0x7468726d'00000004ull;
+constexpr std::uint64_t kLayout = 0x7468726d'00000005ull;
 /// A checkpoint of one model is none of another.
 constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
 /// Some hundred tiles with all their arrays; a session that cuts more than half a metre would need more.
@@ -185,8 +185,12 @@ struct ThermalSolver::Header {
   [[nodiscard]] bool Finite() const {
     float sum = clock_s + protected_dt_s + memory.reported_cut_m;
     for (const float quiet : memory.quiet_until_s) sum += quiet;
-    for (const float figure : {figures.highest_C, figures.present_C, figures.power_W, figures.voltage_V}) sum += figure;
-    return std::isfinite(sum) && std::isfinite(ledger.joule + ledger.generator + ledger.Out() + memory.vapour);
+    for (const float figure :
+         {figures.highest_C, figures.present_C, figures.power_W, figures.voltage_V, figures.debris_m2})
+      sum += figure;
+    return std::isfinite(sum) &&
+           std::isfinite(ledger.joule + ledger.generator + ledger.Out() + ledger.hook + ledger.film + ledger.plume) &&
+           std::isfinite(memory.vapour);
   }
 };
 
@@ -271,7 +275,8 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   }
   // A start value, so any number will do; between 0 and 1 where the last solve converged.
   if (!AllWithin(window.start, -1e3f, 1e3f) || std::abs(window.corner.ix) > -kNowhere.ix ||
-      std::abs(window.corner.iy) > -kNowhere.iy || !(window.step_s >= 0.0f && std::isfinite(window.step_s))) {
+      std::abs(window.corner.iy) > -kNowhere.iy || !(window.step_s >= 0.0f && std::isfinite(window.step_s)) ||
+      !window.interface.IsPlausible()) {
     return false;
   }
   CellIndex paper_corner;
@@ -333,6 +338,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   cut_meter_.Restore(marks);
   ledger_ = header.ledger;
   figures_ = header.figures;
+  crumbs_.Restore(figures_.debris_m2);
   memory_ = header.memory;
   clock_s_ = header.clock_s;
   protected_dt_s_ = header.protected_dt_s;

@@ -21,8 +21,8 @@ struct MetalPiece {
 };
 
 /// All points nearer than `radius` to the pieces' axes. A cell at lateral distance x from an axis at height h is
-/// sqrt(x^2 + h^2) - radius away from the metal: metal that lies on the sheet touches along a line, metal that stands in
-/// it covers a disc. Lengths in cells, lateral distances by the metric.
+/// sqrt(x^2 + h^2) - radius away from the metal: metal that lies on the sheet touches along a line, metal that stands
+/// in it covers a disc. Lengths in cells, lateral distances by the metric.
 class Electrode {
  public:
   Electrode(const SurfaceMetric& metric, const MetalPiece& piece, float radius) : radius_(radius) {

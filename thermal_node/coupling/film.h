@@ -1,14 +1,15 @@
 // What lies between metal and tissue: wet contact, a film of steam, discharges across it; and the metal's own heat.
 //
 // Wet tissue touches the metal, and the current crowds at the metal's rim. Once tissue beneath boils, steam lifts the
-// metal off it. Where the mode's waveform sustains discharges (cut, blend) these carry the current across the film, over
-// the whole footprint: their conductance is small beside that of the sheet, so the current is even there, and what the
-// metal sweeps is vaporised. In coag the film collapses between the bursts, the tissue dries onto the metal and the
+// metal off it. Where the mode's waveform sustains discharges (cut, blend) these carry the current across the film,
+// over the whole footprint: their conductance is small beside that of the sheet, so the current is even there, and what
+// the metal sweeps is vaporised. In coag the film collapses between the bursts, the tissue dries onto the metal and the
 // current ends.
 //
 // Sources. Film and discharge as the mechanism of cutting: Palanker, Vankov, Jayaraman, New J. Phys. 10 (2008) 123022
-// (threshold of some 250 V peak in steam); 200 V peak as the least voltage that cuts: manufacturers' manuals (recalled).
-// Conductance of the discharges and the shares of their heat are assumed; see DESIGN.md for what follows from them.
+// (threshold of some 250 V peak in steam); 200 V peak as the least voltage that cuts: manufacturers' manuals
+// (recalled). Conductance of the discharges and the shares of their heat are assumed; see DESIGN.md for what follows
+// from them.
 #pragma once
 
 #include <algorithm>
@@ -24,8 +25,8 @@ inline constexpr float kFilmReach_m = 2.0e-4f;
 inline constexpr float kStrike_V = 141.0f;
 /// Of the heat of a discharge: what the tissue gets, what the metal gets. The rest leaves with the plume.
 inline constexpr float kTissueShare = 0.75f, kMetalShare = 0.15f;
-/// The film grows to its full extent in this time where tissue beneath boils, and collapses in the second one where none
-/// does [s].
+/// The film grows to its full extent in this time where tissue beneath boils, and collapses in the second one where
+/// none does [s].
 inline constexpr float kFilmGrows_s = 1.0e-3f, kFilmCollapses_s = 5.0e-3f;
 /// So much of the footprint must boil for a film under all of it: steam spreads.
 inline constexpr float kBoilingForFilm = 0.1f;
@@ -39,9 +40,9 @@ inline constexpr float kHookContact_W_m2K = 2.0e4f, kHookFilm_W_m2K = 500.0f;
 
 /// State of the interface of one electrode.
 struct Interface {
-  float film = 0;       ///< Part of the footprint that the film lifts off, 0 ... 1.
-  float burning = 1;    ///< Part of the film in which discharges burn: as many as keep the voltage at kStrike_V.
-  float hook_theta = 0; ///< Temperature of the metal above body temperature [K].
+  float film = 0;        ///< Part of the footprint that the film lifts off, 0 ... 1.
+  float burning = 1;     ///< Part of the film in which discharges burn: as many as keep the voltage at kStrike_V.
+  float hook_theta = 0;  ///< Temperature of the metal above body temperature [K].
 
   /// @param boiling part of the footprint that boils. @param sustains the waveform sustains discharges.
   void Follow(float boiling, bool sustains, float dt_s) {
@@ -53,6 +54,10 @@ struct Interface {
   void Regulate(float on_V) {
     const float ratio = on_V / kStrike_V;
     burning = std::clamp(burning * std::clamp(ratio * ratio, 0.5f, 2.0f), 0.02f, 1.0f);
+  }
+  /// What the solver itself can have left.
+  [[nodiscard]] bool IsPlausible() const {
+    return film >= 0.0f && film <= 1.0f && burning >= 0.0f && burning <= 1.0f && std::abs(hook_theta) <= 5000.0f;
   }
   void Cool(float dt_s) { hook_theta *= std::exp(-dt_s / kHookCools_s); }
 };

@@ -39,11 +39,11 @@ inline ModeRule RuleOf(CauteryMode mode) {
 /// Setting of the generator for one step.
 struct Drive {
   float power_W = 0;
-  float v_max_V = 0;       ///< [V rms]
-  float i_max_A = 0;       ///< [A rms]
-  float remove_theta = 0;  ///< [K]
-  float duty = 1;          ///< Part of the time in which the current is on.
-  bool discharges = false; ///< The waveform sustains discharges across a film of steam.
+  float v_max_V = 0;        ///< [V rms]
+  float i_max_A = 0;        ///< [A rms]
+  float remove_theta = 0;   ///< [K]
+  float duty = 1;           ///< Part of the time in which the current is on.
+  bool discharges = false;  ///< The waveform sustains discharges across a film of steam.
   float arc_m = 0;
 };
 

@@ -33,7 +33,7 @@ struct Metal {
 /// What the metal does over a span of time, in material space.
 struct TipPath {
   Vec2f from = Vec2f::Zero(), to = Vec2f::Zero();  ///< Of the contact's centre [m].
-  Metal begin, end;            ///< Points of the same index are the same points of the metal.
+  Metal begin, end;                                ///< Points of the same index are the same points of the metal.
   Vec2f half = Vec2f::Zero();  ///< Without points: from the centre to either end of an axis that lies in the sheet [m].
   float radius_m = 0;          ///< Of the metal around its axis.
   bool tented = false;

@@ -170,9 +170,17 @@ void ThermalSolver::UpdateTopology() {
   const SourceStats& stats = source_.stats();
   if (stats.removed_cells > 0) {
     topology_.StageCut(field_, stats.low, stats.high);
-    cut_meter_.Update(&field_, stats.low, stats.high);
+    removed_.Add(RemovedBox{stats.low, stats.high});
   }
   if (!at_commit_frame()) return;
+  if (!removed_.empty()) {
+    const RemovedBox crumbs = crumbs_.TakeOut(&field_, removed_, &ledger_);
+    if (!crumbs.empty()) topology_.StageCut(field_, crumbs.low, crumbs.high);
+    removed_.Add(crumbs);
+    cut_meter_.Update(&field_, removed_.low, removed_.high);
+    removed_ = {};
+    figures_.debris_m2 = static_cast<float>(crumbs_.area_m2());
+  }
   for (const Tile* tile : field_.awake()) {
     // Collagen does not change below this; see DamageModel.
     if (tile->theta_max > kDamageStart) topology_.StageShrink(field_, *tile);

@@ -16,6 +16,7 @@
 #include "thermal_node/damage/protected_structures.h"
 #include "thermal_node/heat/heat_field.h"
 #include "thermal_node/paper/paper_model.h"
+#include "thermal_node/topology/crumbs.h"
 #include "thermal_node/topology/mesh_topology.h"
 #include "thermal_node/volume/sheet_contact.h"
 
@@ -37,10 +38,10 @@ struct SolverEvent {
 struct SolverFigures {
   float highest_C = 0;  ///< Since the start.
   float present_C = 0;
-  float power_W = 0;       ///< Of the generator, mean over the time of the last samples.
-  float set_power_W = 0;   ///< Asked of it.
-  float hook_C = 0;        ///< Temperature of the metal.
-  float debris_m2 = 0;     ///< Crumbs that were taken out.
+  float power_W = 0;      ///< Of the generator, mean over the time of the last samples.
+  float set_power_W = 0;  ///< Asked of it.
+  float hook_C = 0;       ///< Temperature of the metal.
+  float debris_m2 = 0;    ///< Crumbs that were taken out.
   float voltage_V = 0;
   float burn_depth_m = 0;  ///< Deepest dead tissue below the sheet since the start; 0 without a volume.
   std::uint32_t warnings = 0, injuries = 0;
@@ -55,8 +56,8 @@ class ThermalSolver {
   ThermalSolver(const ThermalSolver&) = delete;  // parts refer to each other
   ThermalSolver& operator=(const ThermalSolver&) = delete;
 
-  /// Advances one frame with what the electrode did, sample by sample. Does nothing, in some ns, when there is no current,
-  /// all is cold and nothing is staged.
+  /// Advances one frame with what the electrode did, sample by sample. Does nothing, in some ns, when there is no
+  /// current, all is cold and nothing is staged.
   void Step(std::span<const TipInput> tips, float dt_s);
   void Step(const TipInput& tip, float dt_s) { Step(std::span(&tip, 1), dt_s); }
 
@@ -130,6 +131,8 @@ class ThermalSolver {
   std::unique_ptr<VolumeField> volume_;  ///< Null: the tissue beneath is a boundary condition.
   std::unique_ptr<SheetContact> contact_;
   std::unique_ptr<PaperModel> paper_;  ///< Null in the accurate model.
+  Crumbs crumbs_;
+  RemovedBox removed_;  ///< Since the last commit.
   CutMeter cut_meter_;
   Ledger ledger_;
   SolverFigures figures_;

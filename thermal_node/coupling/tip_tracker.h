@@ -29,8 +29,8 @@ class TipTracker {
  public:
   TipTracker(const Sheet& sheet, float default_radius_m) : sheet_(sheet), default_radius_m_(default_radius_m) {}
 
-  /// The next sample. Its path runs from where the last one ended, for the session time between the two: what the tissue
-  /// gets does not depend on when samples arrive.
+  /// The next sample. Its path runs from where the last one ended, for the session time between the two: what the
+  /// tissue gets does not depend on when samples arrive.
   [[nodiscard]] TipInput Advance(const CauteryContact& sample, double dt_s);
   /// False: out of range or off the sheet; such a sample must not reach Advance.
   [[nodiscard]] bool Accepts(const CauteryContact& sample) const;

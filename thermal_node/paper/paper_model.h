@@ -13,6 +13,7 @@
 #include "services/core/scene_view.h"
 #include "thermal_node/heat/heat_field.h"
 #include "thermal_node/paper/texture_potential.h"
+#include "thermal_node/topology/crumbs.h"
 #include "thermal_node/topology/mesh_topology.h"
 
 namespace fulcrum::thermal {
@@ -26,12 +27,6 @@ inline constexpr int kPaperSweeps = 32;  ///< Jacobi sweeps a frame; our choice,
 /// Constant material without water: nothing boils, the conductivities follow neither temperature nor dryness, no leak.
 /// Throws InputError as MakeMaterial does.
 [[nodiscard]] Material MakePaperMaterial(const ThermalParams& params);
-
-/// Cells that a call removed; `low` > `high` when none.
-struct RemovedBox {
-  CellIndex low{INT32_MAX, INT32_MAX}, high{INT32_MIN, INT32_MIN};
-  [[nodiscard]] bool empty() const { return low.ix > high.ix; }
-};
 
 class PaperModel {
  public:

@@ -105,8 +105,8 @@ struct Balance {
 };
 
 FULCRUM_WIDE
-void AddRow(const float* __restrict contact, const float* __restrict lost, const float* __restrict ground, const float* __restrict v,
-            const float* __restrict q, Balance* balance) {
+void AddRow(const float* __restrict contact, const float* __restrict lost, const float* __restrict ground,
+            const float* __restrict v, const float* __restrict q, Balance* balance) {
   alignas(64) float in[kLanes] = {}, heat[kLanes] = {}, gone[kLanes] = {}, grounded[kLanes] = {};
   for (int i = 0; i < kWindow; i += kLanes) {
     for (int l = 0; l < kLanes; ++l) {
