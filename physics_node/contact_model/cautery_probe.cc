@@ -26,6 +26,9 @@ constexpr float kTentHeight = 0.002f;
 /// A binding this many rows and columns away still tells how the organ beneath has moved.
 constexpr int kBindingWindow = 6;
 constexpr float kRateSmoothing = 0.03f;  ///< [s]
+/// The centre of the contact moves along the metal this slowly: where metal lies flat, which part of it touches most is
+/// noise [s].
+constexpr float kCentreFollows = 0.15f;
 
 }  // namespace
 
@@ -158,12 +161,11 @@ void CauteryProbe::SignHeights() {
   }
 }
 
-bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) const {
+bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) {
   // Where the sheet lies against the metal, its middle is half its thickness farther from the axis.
   const float touch = radius_m + 0.5f * scene_.thermal.thickness_m;
   const float limit = touch + (was_touching_ ? kHoldGap : kStrikeGap);
-  float sum = 0;
-  Vec2f mean = Vec2f::Zero();
+  float sum = 0, mean = 0;
   for (std::size_t i = 0; i + 1 < stations_.size(); ++i) {
     const Station &a = stations_[i], &b = stations_[i + 1];
     const float length = (b.place.material - a.place.material).norm();
@@ -177,14 +179,19 @@ bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) const {
         // Metal that stands on the sheet covers it no less than metal that lies on it.
         const float weight = nearer * nearer * std::max(length, radius_m);
         sum += weight;
-        mean += weight * (a.place.material + u * (b.place.material - a.place.material));
+        mean += weight * (static_cast<float>(i) + u);
       }
     }
   }
   if (!(sum > 0.0f)) {
     return false;
   }
-  *centre = mean / sum;
+  const float share = 1.0f - std::exp(-scene_.physics.dt_s / kCentreFollows);
+  centre_ = was_touching_ ? centre_ + share * (mean / sum - centre_) : mean / sum;
+  const auto i = std::min(static_cast<std::size_t>(centre_), stations_.size() - 2);
+  const float u = centre_ - static_cast<float>(i);
+  const Vec2f &a = stations_[i].place.material, &b = stations_[i + 1].place.material;
+  *centre = (b - a).norm() > kLongestPiece ? (u < 0.5f ? a : b) : Vec2f(a + u * (b - a));
   return true;
 }
 

@@ -34,7 +34,7 @@ class CauteryProbe {
   void FollowSheet(const ToolPose& pose, std::uint32_t tool, const ToolCollision& collision);
   void SignHeights();
   /// Mean place of the metal that is near enough for a current, weighted by how much nearer. False: none is.
-  bool FindCentre(float radius_m, Vec2f* centre) const;
+  bool FindCentre(float radius_m, Vec2f* centre);
   [[nodiscard]] bool Tented(Index triangle, const std::array<float, 3>& barycentric) const;
 
   SceneView scene_;
@@ -44,6 +44,7 @@ class CauteryProbe {
   std::vector<Station> stations_;
   float spacing_ = 0;   ///< Longest edge of the membrane at rest [m].
   bool known_ = false;  ///< The stations have places.
+  float centre_ = 0;    ///< Of the contact, along the metal [stations].
   bool was_touching_ = false;
   Vec2f last_material_ = Vec2f::Zero(), rate_ = Vec2f::Zero();
 };

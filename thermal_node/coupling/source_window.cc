@@ -452,7 +452,7 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   SetSigma();
   SetGround(centre, path.tented);
   const float cells = (path.to - path.from).norm() / material_.cell_m;
-  const float by_way = duration_s / std::max(cells / kMaxWay, 1.0f);
+  const float by_way = duration_s / std::clamp(cells / kMaxWay, 1.0f, kMostByWay);
   const float longest = std::max(by_way, std::min(min_step_s, duration_s));
   const float reach_m = std::max(drive.arc_m, kFilmReach_m);
   leak_V2s_.fill(0);

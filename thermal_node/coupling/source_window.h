@@ -17,6 +17,8 @@
 namespace fulcrum::thermal {
 
 inline constexpr float kMaxWay = 0.26f;  ///< Of the tip in a coupling step [cells]: 5 mm/s in half a frame.
+/// Coupling steps of a run for the tip's way at most: half a radius each at 50 mm/s, and no more at a jump.
+inline constexpr float kMostByWay = 4.0f;
 /// From the middle of the metal to its end [cells]: what is longer is shortened, and counted. The other six cells to
 /// the window's border are for the tip's way and the sparks.
 inline constexpr float kMetalReach = 26.0f;
