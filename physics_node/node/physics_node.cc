@@ -17,6 +17,8 @@ constexpr int kAbsentTicks = 100;
 constexpr std::int64_t kPedalTimeoutNs = 100'000'000;
 /// After so long in time a cheaper preset gives way to the next dearer one [ticks].
 constexpr int kRecoveryTicks = 200;
+/// A session time of k dt in double may be this much less than k dt: 0.29 / 0.01 < 29 [ticks].
+constexpr double kRoundingTicks = 1e-6;
 /// Of a generator that the script says nothing about [W].
 constexpr float kDefaultPower = 35.0f;
 
@@ -154,7 +156,8 @@ void PhysicsNode::TakeHandles(std::int64_t now_ns) {
 void PhysicsNode::TakeInputs(const Tick& tick) {
   // The step stands for session time k dt, whenever within its period the thread was woken: the same hand gives the
   // same poses on a busy machine.
-  const double step_s = tick.dt_s > 0 ? std::floor(tick.session_time_s / tick.dt_s) * tick.dt_s : tick.session_time_s;
+  const double step_s =
+      tick.dt_s > 0 ? std::floor(tick.session_time_s / tick.dt_s + kRoundingTicks) * tick.dt_s : tick.session_time_s;
   const auto now_ns = tick.stamp_ns - static_cast<std::int64_t>(1e9 * (tick.session_time_s - step_s));
   step_time_s_ = std::max(step_s, 0.0);
   TakeTools(now_ns);
