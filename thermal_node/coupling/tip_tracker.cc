@@ -23,11 +23,12 @@ TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
   // The first sample, one after a gap and one from before the last stand for a frame.
   const double since_s = sample.session_time_s - last_s_;
   const bool follows = last_s_ >= 0 && since_s > 0 && since_s <= kLongestGap_s;
-  input.duration_s = static_cast<float>(follows ? since_s : dt_s);
+  // Where the last one had no current, nobody knows when the pedal went down.
+  input.duration_s = static_cast<float>(!follows ? dt_s : energised_ ? since_s : std::min(since_s, dt_s));
   on_path_ = on_path_ && follows;
   last_s_ = sample.session_time_s;
   if (!sample.touching) {
-    on_path_ = false;
+    on_path_ = energised_ = false;
     return input;
   }
   const float reach = kTipSpeedMax_m_s * std::max(input.duration_s, 0.01f);
@@ -54,6 +55,7 @@ TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
   at_ = input.path.to;
   metal_ = input.path.end;
   on_path_ = true;
+  energised_ = input.active;
   return input;
 }
 

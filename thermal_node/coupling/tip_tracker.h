@@ -41,6 +41,7 @@ class TipTracker {
   double last_s_ = -1;  ///< Session time of the last sample; negative: none.
   Metal metal_;
   bool on_path_ = false;
+  bool energised_ = false;  ///< The last sample had current.
   Vec2f at_ = Vec2f::Zero();
 };
 
