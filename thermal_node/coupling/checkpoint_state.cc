@@ -14,7 +14,7 @@ namespace fulcrum::thermal {
 namespace {
 
 /// Change it with the layout.
-constexpr std::uint64_t kLayout = 0x7468726d'00000005ull;
+constexpr std::uint64_t kLayout = 0x7468726d'00000006ull;
 /// A checkpoint of one model is none of another.
 constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
 /// Some hundred tiles with all their arrays; a session that cuts more than half a metre would need more.
@@ -181,6 +181,7 @@ struct ThermalSolver::Header {
   std::uint32_t tile_count, mark_count, sample_count, structure_count;
   std::uint32_t node_bytes, edge_bytes, shrink_bytes, protected_warm;
   std::uint64_t has_volume;
+  RemovedBox removed;
 
   [[nodiscard]] bool Finite() const {
     float sum = clock_s + protected_dt_s + memory.reported_cut_m;
@@ -231,6 +232,7 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   header.shrink_bytes = static_cast<std::uint32_t>(bits.shrink.size());
   header.protected_warm = protected_.warm() ? 1 : 0;
   header.has_volume = volume_ != nullptr ? 1 : 0;
+  header.removed = removed_;
   writer.PutValue(header);
   SourceWindow::State window;
   source_.Export(&window);
@@ -287,7 +289,9 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
       header.shrink_bytes != bits.shrink.size() || header.sample_count != protected_.samples().size() ||
       header.has_volume != (volume_ != nullptr ? 1u : 0u) ||
       header.structure_count != protected_.alarm_state().size() || header.mark_count > (1u << 20) ||
-      header.tile_count > static_cast<std::uint32_t>(field_.sheet().tile_count())) {
+      header.tile_count > static_cast<std::uint32_t>(field_.sheet().tile_count()) ||
+      !(header.removed.empty() ||
+        (field_.sheet().Contains(header.removed.low) && field_.sheet().Contains(header.removed.high)))) {
     return false;
   }
   std::vector<CutMeter::Mark> marks(header.mark_count);
@@ -342,6 +346,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   memory_ = header.memory;
   clock_s_ = header.clock_s;
   protected_dt_s_ = header.protected_dt_s;
+  removed_ = header.removed.empty() ? RemovedBox{} : header.removed;
   source_.Import(window);
   if (paper_ != nullptr) {
     paper_->set_corner(paper_corner);

@@ -288,6 +288,8 @@ std::uint64_t ThermalSolver::FullHash() const {
       hash.Add(std::span<const float>(brick->omega));
     }
   }
+  const Interface& interface = source_.interface();
+  for (const float value : {interface.film, interface.burning, interface.hook_theta}) hash.AddValue(value);
   const TopologyBits& bits = topology_.committed();
   for (const auto* field : {&bits.dead_nodes, &bits.dead_edges, &bits.shrink}) {
     hash.Add(std::span<const std::uint8_t>(*field));
