@@ -15,6 +15,8 @@ constexpr float kFaintRow = 0.01f;
 constexpr float kFarGap = 1e6f;
 /// Pieces of metal whose ends lie farther apart on the sheet lie on two folds of it [m].
 constexpr float kLongestPiece_m = 0.002f;
+/// A piece that goes no farther than this along an axis is as good as parallel to the other [cells].
+constexpr float kShortWay = 1e-4f;
 /// Evaluations of Change() to find a step: one more than are needed where change goes with the step; from a step of
 /// seconds, which dries everything, each comes down by 1 / max_change at most.
 constexpr int kStepTrials = 6;
@@ -213,20 +215,24 @@ void SourceWindow::SetGaps(const TipPath& path, float at, float reach_m) {
   const Vec2f window_middle = Vec2f::Constant(0.5f * kWindow);
   // What does not fit into the window is left out, and counted.
   const auto add = [&](MetalPiece piece) {
-    const Vec2f a = piece.a - window_middle, b = piece.b - window_middle;
-    const float out = std::max(a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff()) + radius;
-    if (out > kMetalReach) {
-      const float far_a = a.cwiseAbs().maxCoeff() + radius, far_b = b.cwiseAbs().maxCoeff() + radius;
+    const Vec2f start = piece.a - window_middle, way = piece.b - piece.a;
+    // Of the piece, from part `from` to part `to` of it: within `most` of the middle along both axes.
+    const float most = std::max(kMetalReach - radius, 0.0f);
+    float from = 0, to = 1;
+    for (int axis = 0; axis < 2; ++axis) {
+      if (std::abs(way[axis]) < kShortWay) {
+        if (std::abs(start[axis]) > most) to = -1;
+        continue;
+      }
+      const float enters = (-most - start[axis]) / way[axis], leaves = (most - start[axis]) / way[axis];
+      from = std::max(from, std::min(enters, leaves));
+      to = std::min(to, std::max(enters, leaves));
+    }
+    if (from > 0.0f || to < 1.0f) {
       stats_.shortened = true;
-      const float inner = std::min(far_a, far_b);
-      if (!(inner < kMetalReach)) return;
-      const float part = (kMetalReach - inner) / (out - inner);
-      Vec2f& end = far_a > far_b ? piece.a : piece.b;
-      float& height = far_a > far_b ? piece.height_a : piece.height_b;
-      const Vec2f start = far_a > far_b ? piece.b : piece.a;
-      const float from = far_a > far_b ? piece.height_b : piece.height_a;
-      end = start + part * (end - start);
-      height = from + part * (height - from);
+      if (!(from < to)) return;
+      const float rise = piece.height_b - piece.height_a, height = piece.height_a;
+      piece = {piece.a + from * way, piece.a + to * way, height + from * rise, height + to * rise};
     }
     AddPiece(piece, radius, reach);
   };
