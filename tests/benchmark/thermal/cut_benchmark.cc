@@ -27,7 +27,7 @@ void Looks(Report* report) {
       drag.mode = mode;
       drag.power_W = power;
       RunDrag(drag, kFrame_s, &solver);
-      while (!solver.at_commit_frame()) solver.Step({}, kFrame_s);
+      while (!solver.at_commit_frame()) solver.Step(TipInput{}, kFrame_s);
       const std::string stem = std::string("cut.") + name + "_" + std::to_string(speed) + "_mm_s";
       if (speed == 4) Picture(solver, scene, drag.to - Vec2f(0.003f, 0), name);
       const SlitFigures slit = MeasureSlit(solver, scene, drag);

@@ -38,6 +38,7 @@ class Session {
   void Touch(const TipInput& tip) {
     CauteryContact contact = TouchAt(tip.path.to, tip.mode, tip.power_W, tip.path.radius_m);
     contact.stamp = {++sequence_, 1, tick_.stamp_ns};
+    contact.session_time_s = tick_.session_time_s;
     bus_.contact_out->Write(contact);
   }
   void Step() {
@@ -121,7 +122,7 @@ void CheckpointAndPatch(Report* report) {
   const SceneView scene = data.View();
   ThermalSolver solver(scene);
   RunDrag(BuiltInDrag(scene, 0.005f), kFrame_s, &solver);
-  while (!solver.at_commit_frame()) solver.Step({}, kFrame_s);
+  while (!solver.at_commit_frame()) solver.Step(TipInput{}, kFrame_s);
   std::vector<std::byte> slot(ThermalSolver::CheckpointCapacity(scene));
   std::size_t bytes = 0;
   report->Add("thermal.checkpoint_ms", Quantile(TimeMs(2, 15, [&] { bytes = solver.Save(slot); }), 0.5), "ms");
@@ -137,7 +138,7 @@ void Idle(Report* report) {
   ThermalSolver solver(data.View());
   constexpr int kFrames = 100000;
   const auto body = [&] {
-    for (int n = 0; n < kFrames; ++n) solver.Step({}, kFrame_s);
+    for (int n = 0; n < kFrames; ++n) solver.Step(TipInput{}, kFrame_s);
   };
   report->Add("thermal.idle_frame_ns", Quantile(TimeMs(1, 5, body), 0.5) * 1e6 / kFrames, "ns");
 }

@@ -50,7 +50,7 @@ CutFigures Cut(ThermalModel model, const char* name) {
     const std::filesystem::path file = std::filesystem::path(folder) / (std::string("model_") + name + ".png");
     WritePicture(solver, scene, drag.to, 0.016f, file);
   }
-  for (int n = 0; n < kCommitFrames; ++n) solver.Step({}, kDt);
+  for (int n = 0; n < kCommitFrames; ++n) solver.Step(TipInput{}, kDt);
   double removed_m3 = 0;
   for (const Tile* tile : solver.field().Existing()) {
     for (int k = 0; k < kTileCells; ++k) removed_m3 += (tile->state.flags[k] & kRemoved) != 0 ? tile->Volume(k) : 0.0;

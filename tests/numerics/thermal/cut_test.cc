@@ -47,7 +47,7 @@ TEST_P(CutTest, SlitIsContinuousAndEnergyCloses) {
     if (!solver.committed()) continue;
     ASSERT_EQ(validator.Check(solver), "");
   }
-  for (int n = 0; n < kCommitFrames; ++n) solver.Step({}, kDt);
+  for (int n = 0; n < kCommitFrames; ++n) solver.Step(TipInput{}, kDt);
   const SlitFigures slit = MeasureSlit(solver, scene, drag);
   EXPECT_EQ(slit.surviving_crossings, 0);
   EXPECT_GE(slit.width_min_m, 5e-4f);
@@ -162,7 +162,7 @@ TEST(CutPropertiesTest, CoagulationDriesAndBrownsButDoesNotCut) {
   drag.mode = CauteryMode::kCoag;
   drag.power_W = 30;
   RunChecked(scene, drag, &solver);
-  for (int n = 0; n < kCommitFrames; ++n) solver.Step({}, kDt);
+  for (int n = 0; n < kCommitFrames; ++n) solver.Step(TipInput{}, kDt);
   const SlitFigures slit = MeasureSlit(solver, scene, drag);
   EXPECT_EQ(slit.width_max_m, 0.0f);
   EXPECT_GT(slit.brown_m, 2e-4f);
@@ -240,7 +240,7 @@ TEST(CutPropertiesTest, BrokenCheckpointsAreRefusedAndLeaveAFreshState) {
   const SceneView scene = data.View();
   ThermalSolver solver(scene);
   RunDrag(Slanted(0.008f), kDt, &solver);
-  while (!solver.at_commit_frame()) solver.Step({}, kDt);
+  while (!solver.at_commit_frame()) solver.Step(TipInput{}, kDt);
   std::vector<std::byte> bytes(ThermalSolver::CheckpointCapacity(scene));
   const std::size_t used = solver.Save(bytes);
   const std::uint64_t fresh = ThermalSolver(scene).FullHash();
@@ -260,7 +260,7 @@ TEST(CutPropertiesTest, IdleSolverDoesNothing) {
   ThermalSolver solver(data.View());
   const std::uint64_t before = solver.FullHash();
   for (int n = 0; n < 1000; ++n) {
-    solver.Step({}, kDt);
+    solver.Step(TipInput{}, kDt);
     ASSERT_FALSE(solver.stepped());
   }
   EXPECT_EQ(solver.FullHash(), before);
@@ -274,7 +274,7 @@ TEST(CutPropertiesTest, CooledTissueFallsAsleepAndKeepsItsHistory) {
   const Drag drag = Slanted(0.008f);
   RunChecked(scene, drag, &solver);
   int frames = 0;
-  while (solver.Step({}, kDt), solver.stepped()) ASSERT_LT(++frames, 6000);
+  while (solver.Step(TipInput{}, kDt), solver.stepped()) ASSERT_LT(++frames, 6000);
   EXPECT_TRUE(solver.field().idle());
   EXPECT_GT(MeasureSlit(solver, scene, drag).width_min_m, 4e-4f);
   EXPECT_LE(solver.ledger().ClosureError(0.0), 1e-4);

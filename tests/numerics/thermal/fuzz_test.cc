@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "services/core/sanitizers.h"
@@ -60,7 +61,12 @@ class Fuzz {
     if (OneIn(60)) contact.material.y() = Absurd();
     if (OneIn(60)) contact.power_W = Absurd();
     if (OneIn(60)) contact.contact_radius_m = Absurd();
-    if (OneIn(60)) contact.contact_half.x() = Absurd();
+    // Its metal lies about it as it did about the burn's first place.
+    for (MetalPoint& point : contact.metal) point.material += at;
+    if (OneIn(60)) contact.metal_count = static_cast<std::uint32_t>(Below(2 * static_cast<int>(kMaxMetalPoints)));
+    if (OneIn(60)) contact.metal[Below(kMaxMetalPoints)].material.x() = Absurd();
+    if (OneIn(60)) contact.metal[Below(kMaxMetalPoints)].height_m = Absurd();
+    if (OneIn(60)) contact.session_time_s = OneIn(2) ? NAN : static_cast<double>(Absurd());
     if (OneIn(60)) contact.mode = static_cast<CauteryMode>(Below(256));
     if (OneIn(60)) contact.material_rate = Vec2f::Constant(Absurd());
     return contact;
@@ -107,22 +113,41 @@ class Patient {
     burn.mode = static_cast<CauteryMode>(1 + fuzz->Below(3));
     burn.power_W = fuzz->OneIn(5) ? 400.0f : fuzz->Between(0, 80);
     burn.contact_radius_m = fuzz->OneIn(5) ? fuzz->Between(0, 5e-3f) : fuzz->Between(2e-4f, 1e-3f);
-    if (fuzz->OneIn(3)) burn.contact_half = {fuzz->Between(-1.5e-3f, 1.5e-3f), fuzz->Between(-1.5e-3f, 1.5e-3f)};
+    if (fuzz->OneIn(2)) SetMetal(fuzz, &burn);
     burn.tented = fuzz->OneIn(3);
     const float heading = fuzz->Between(-4, 4), speed = std::pow(10.0f, fuzz->Between(-3.5f, -0.5f));
     const Vec2f rate = speed * Vec2f(std::cos(heading), std::sin(heading));
     Vec2f at = fuzz->Anywhere();
     const float dt = fuzz->OneIn(10) ? fuzz->Between(1e-4f, 0.05f) : 0.01f;
-    for (int frame = 1 + fuzz->Below(6); frame > 0; --frame, at += rate * dt) {
-      CauteryContact contact = fuzz->Contact(at, burn);
-      const bool used = !fuzz->OneIn(20) && tracker_->Accepts(contact);
-      Step(tracker_->Advance(used ? &contact : nullptr, dt), dt);
+    for (int frame = 1 + fuzz->Below(6); frame > 0; --frame) {
+      // Samples come one a frame, or none, or several at once.
+      std::vector<TipInput> tips;
+      for (int n = fuzz->OneIn(10) ? fuzz->Below(4) : 1; n > 0; --n, at += rate * dt) {
+        time_s_ += fuzz->OneIn(50) ? static_cast<double>(fuzz->Between(-0.1f, 1.2f)) : static_cast<double>(dt);
+        burn.session_time_s = time_s_;
+        const CauteryContact contact = fuzz->Contact(at, burn);
+        if (tracker_->Accepts(contact)) tips.push_back(tracker_->Advance(contact, dt));
+      }
+      Step(tips, dt);
       if (::testing::Test::HasFatalFailure()) return;
+    }
+  }
+
+  /// A piece of straight metal at any slant, some of it through the sheet, about (0, 0).
+  static void SetMetal(Fuzz* fuzz, CauteryContact* burn) {
+    burn->metal_count = static_cast<std::uint32_t>(2 + fuzz->Below(kMaxMetalPoints - 1));
+    const Vec2f from(fuzz->Between(-1.5e-3f, 1.5e-3f), fuzz->Between(-1.5e-3f, 1.5e-3f));
+    const Vec2f step(fuzz->Between(-6e-4f, 6e-4f), fuzz->Between(-6e-4f, 6e-4f));
+    const float height = fuzz->Between(-2e-3f, 2e-3f), rise = fuzz->Between(-5e-4f, 5e-4f);
+    for (std::uint32_t n = 0; n < burn->metal_count; ++n) {
+      const auto k = static_cast<float>(n);
+      burn->metal[n] = {from + k * step, height + k * rise};
     }
   }
 
   /// Pause, with the current off.
   void Rest(int frames) {
+    time_s_ += 0.01 * frames;
     for (int n = 0; n < frames; ++n) Step({}, 0.01f);
   }
 
@@ -173,8 +198,8 @@ class Patient {
   [[nodiscard]] int refused() const { return refused_; }
 
  private:
-  void Step(const TipInput& tip, float dt_s) {
-    solver_->Step(tip, dt_s);
+  void Step(std::span<const TipInput> tips, float dt_s) {
+    solver_->Step(tips, dt_s);
     CheckState(*solver_);
     if (solver_->committed()) {
       ASSERT_EQ(validator_->Check(*solver_), "");
@@ -186,6 +211,7 @@ class Patient {
   std::unique_ptr<ThermalSolver> solver_;
   std::unique_ptr<TipTracker> tracker_;
   std::unique_ptr<TopologyValidator> validator_;
+  double time_s_ = 0;
   int refused_ = 0;
 };
 

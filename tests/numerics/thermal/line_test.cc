@@ -96,7 +96,7 @@ class LineTest : public ::testing::Test {
     Hold(drag.At(0, kDt), from, &solver);
     for (int frame = 0; frame < drag.frames(kDt); ++frame) solver.Step(drag.At(frame, kDt), kDt);
     Hold(drag.At(0, kDt), to, &solver);
-    while (!solver.at_commit_frame()) solver.Step({}, kDt);
+    while (!solver.at_commit_frame()) solver.Step(TipInput{}, kDt);
     EXPECT_EQ(validator.Check(solver), "");
     EXPECT_EQ(FalseBridges(scene_, solver), 0);
     if (speed_m_s > kFastestCut_m_s) return;

@@ -89,7 +89,7 @@ TEST(RestartRefusalTest, ValuesThatTheSolverCannotHaveWrittenAreRefused) {
   drag.from = {0.0053f, 0.0051f};
   drag.to = {0.0083f, 0.0051f};
   RunDrag(drag, kDt, &solver);
-  while (!solver.at_commit_frame()) solver.Step({}, kDt);
+  while (!solver.at_commit_frame()) solver.Step(TipInput{}, kDt);
   std::vector<std::byte> bytes(ThermalSolver::CheckpointCapacity(scene));
   // Spoilt in memory and then saved: what a bit that flipped in a cell would leave.
   const auto refuses = [&](auto* value, auto bad) {

@@ -249,7 +249,7 @@ TEST_P(BadCellTest, IsQuarantinedCountedAndAlone) {
       Tile* tile = solver->mutable_field()->Wake(cell.ix / kTile, cell.iy / kTile);
       (tile->state.*fault.value)[(cell.iy % kTile) * kTile + cell.ix % kTile] = fault.bad;
     }
-    for (int n = 0; n < kCommitFrames; ++n) solver->Step({}, 0.01f);
+    for (int n = 0; n < kCommitFrames; ++n) solver->Step(TipInput{}, 0.01f);
     return solver;
   };
   const auto healthy = run(false), spoilt = run(true);

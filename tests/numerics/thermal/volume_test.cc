@@ -319,7 +319,7 @@ TEST(VolumeTest, OffCostsNothingAndColdSleeps) {
   EXPECT_EQ(ThermalSolver(off.View()).volume(), nullptr);
   const scene::SceneData on = SceneWithVolume();
   ThermalSolver solver(on.View());
-  solver.Step({}, kDt);
+  solver.Step(TipInput{}, kDt);
   EXPECT_FALSE(solver.stepped());
   EXPECT_TRUE(solver.volume()->idle());
   TipInput tip = Dwell(10);

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <utility>
 
 #include "physics_node/simulation/tissue_simulation.h"
 #include "services/scene/build.h"
@@ -145,34 +146,64 @@ TEST_F(OnSheet, HookDentsTheMembraneAndStaysInFront) {
   EXPECT_GT(Lowest(), -3e-4f);
 }
 
-TEST_F(OnSheet, CauteryTellsTheLineAlongWhichTheFootTouches) {
+TEST_F(OnSheet, CauteryTellsWhereTheMetalLiesOnTheSheet) {
   const Vec3f place = kMiddle - Vec3f(0, 0, 0.002f);
-  const auto half_at = [&](const Quatf& turn) {
+  const float touch = scene_.tools[1].tip_radius_m + 0.5f * scene_.thermal.thickness_m;
+  /// From one end to the other of the metal that is near enough for a current.
+  const auto touched_at = [&](const Quatf& turn) {
     TissueSimulation simulation(scene_);
     const ToolPose down = Down(place), pose{place, turn * down.q_WT, 0};
-    CauteryContact contact;
-    Vec2f before = Vec2f::Zero();
+    CauteryContact contact, before;
     for (int i = 0; i <= 150; ++i) {
       ToolPose now = pose;
       now.p_WT.z() += std::max(0.0f, 0.008f - 1e-4f * static_cast<float>(i));
       simulation.Step(Only(1, now));
       contact = simulation.Cautery(1);
-      EXPECT_LE(contact.contact_half.norm(), 0.002f);
-      EXPECT_LE((contact.contact_half - before).norm(), 7e-4f) << "step " << i;
-      before = contact.contact_half;
+      EXPECT_EQ(contact.metal_count == 0, !contact.touching);
+      EXPECT_LE(contact.metal_count, kMaxMetalPoints);
+      for (std::uint32_t n = 0; n < contact.metal_count && n < before.metal_count; ++n) {
+        EXPECT_LE((contact.metal[n].material - before.metal[n].material).norm(), 7e-4f) << "step " << i << ", " << n;
+      }
+      before = contact;
     }
     EXPECT_TRUE(contact.touching);
-    return contact.contact_half;
+    EXPECT_FLOAT_EQ(contact.contact_radius_m, scene_.tools[1].tip_radius_m);
+    Vec2f extent = Vec2f::Zero(), first = Vec2f::Zero();
+    bool any = false;
+    for (std::uint32_t n = 0; n < contact.metal_count; ++n) {
+      if (std::abs(contact.metal[n].height_m) > touch + 1e-4f) continue;
+      if (!std::exchange(any, true)) first = contact.metal[n].material;
+      const Vec2f span = contact.metal[n].material - first;
+      extent = span.norm() > extent.norm() ? span : extent;
+    }
+    EXPECT_TRUE(any);
+    return extent;
   };
   const auto turned = [](float angle, const Vec3f& axis) { return Quatf(Eigen::AngleAxisf(angle, axis)); };
-  const Vec2f lying = half_at(Quatf::Identity());
-  EXPECT_GT(std::abs(lying.x()), 4e-4f);
+  const Vec2f lying = touched_at(Quatf::Identity());
+  EXPECT_GT(std::abs(lying.x()), 8e-4f);
   EXPECT_LT(std::abs(lying.y()), 0.3f * std::abs(lying.x()));
-  const Vec2f across = half_at(turned(static_cast<float>(M_PI / 2), Vec3f::UnitZ()));
-  EXPECT_GT(std::abs(across.y()), 4e-4f);
+  const Vec2f across = touched_at(turned(static_cast<float>(M_PI / 2), Vec3f::UnitZ()));
+  EXPECT_GT(std::abs(across.y()), 8e-4f);
   EXPECT_LT(std::abs(across.x()), 0.3f * std::abs(across.y()));
   // The foot points up: its heel alone touches.
-  EXPECT_LT(half_at(turned(static_cast<float>(-M_PI / 3), Vec3f::UnitY())).norm(), 0.5f * lying.norm());
+  EXPECT_LT(touched_at(turned(static_cast<float>(-M_PI / 3), Vec3f::UnitY())).norm(), 0.5f * lying.norm());
+}
+
+TEST_F(OnSheet, HeightsChangeTheirSignWhereTheMetalGoesThroughTheSheet) {
+  // The hook stands on its foot's end, which has been pushed through a slit; the sheet around it is whole again.
+  TissueSimulation simulation(scene_);
+  const Vec3f place = kMiddle + Vec3f(0, 0, 0.0025f);
+  ToolPose pose = Down(place);
+  pose.q_WT = Quatf(Eigen::AngleAxisf(static_cast<float>(M_PI / 2), Vec3f::UnitY())) * pose.q_WT;
+  simulation.Step(Only(1, pose));  // a tool is first where it is, on whichever side
+  const CauteryContact contact = simulation.Cautery(1);
+  ASSERT_TRUE(contact.touching);
+  int changes = 0;
+  for (std::uint32_t n = 1; n < contact.metal_count; ++n) {
+    changes += (contact.metal[n].height_m < 0) != (contact.metal[n - 1].height_m < 0) ? 1 : 0;
+  }
+  EXPECT_EQ(changes, 1);
 }
 
 TEST_F(OnSheet, AThinToolAtFullSpeedDoesNotTunnel) {

@@ -58,6 +58,20 @@ class Bench {
     tool_out_->Write(tools);
     handle_out_->Write(handles);
   }
+  /// A tool at a place at a moment of the session.
+  void SendTool(std::uint32_t tool, const Vec3f& p_WT, std::int64_t stamp_ns, std::uint64_t epoch = 1) {
+    ToolState tools;
+    tools.stamp = {++sequence_, epoch, stamp_ns};
+    tools.tools[tool].kind = scene_.tools[tool].kind;
+    tools.tools[tool].p_WT = p_WT;
+    tool_out_->Write(tools);
+  }
+  /// Step `index`, woken `late_ns` after its time.
+  void StepAt(std::uint64_t index, std::int64_t late_ns) {
+    const std::int64_t ns = static_cast<std::int64_t>(index) * kPeriod + late_ns;
+    node_.Step({index, 1e-9 * static_cast<double>(ns), 0.01, 1 + ns});
+  }
+  [[nodiscard]] Vec3f ToolPlace(std::uint32_t tool) const { return node_.simulation().Save().pose[tool].p_WT; }
   void Step() {
     const auto index = static_cast<std::int64_t>(tick_.index);
     tick_.stamp_ns = 1 + index * kPeriod;
@@ -156,17 +170,77 @@ TEST_F(PhysicsNodeTest, TellsEachReaderWhatItNeeds) {
   CauteryContact contact;
   ASSERT_TRUE(cautery->TakeLatest(&contact));
   EXPECT_TRUE(contact.touching);
+  EXPECT_GE(contact.metal_count, 2u);
   EXPECT_EQ(contact.mode, CauteryMode::kCut);
   EXPECT_FLOAT_EQ(contact.power_W, 35.0f);
+  EXPECT_NEAR(contact.session_time_s, 2.99, 1e-9);
   TickManifest manifest;
   ASSERT_TRUE(manifests->TakeLatest(&manifest));
   EXPECT_EQ(manifest.tick, 299u);
   EXPECT_EQ(manifest.state_hash, bench.node_.simulation().StateHash());
-  ASSERT_EQ(manifest.consumed.size(), 3u);
+  ASSERT_EQ(manifest.consumed.size(), 4u);
+  EXPECT_EQ(manifest.consumed[0].topic, TopicId::kToolState);
   EXPECT_EQ(manifest.consumed[0].sequence, 300u);
+  EXPECT_EQ(manifest.consumed[1].topic, TopicId::kToolState);
+  EXPECT_EQ(manifest.consumed[1].sequence, 300u) << "nothing later had come";
+  EXPECT_EQ(manifest.consumed[2].topic, TopicId::kHandleState);
+  EXPECT_EQ(manifest.consumed[2].sequence, 300u);
+  EXPECT_EQ(manifest.consumed[3].topic, TopicId::kTopologyState);
   EXPECT_GT(bench.Figure("max_displacement_mm"), 5.0);
   EXPECT_GT(bench.Figure("grasped_particles"), 0.0);
   EXPECT_EQ(bench.Figure("quarantined"), 0.0);
+}
+
+TEST_F(PhysicsNodeTest, PosesAreThoseOfItsOwnMomentHoweverLateItIsWoken) {
+  const Vec3f start = scene_.tools[1].p_WP + Vec3f(0, 0, -0.02f), per_ms(1e-4f, 0, 0);
+  const auto run = [&](std::int64_t late_ns, std::uint64_t* hash) {
+    Bench bench(scene_, nullptr);
+    auto manifests = bench.bus_.manifests.MakeInput();
+    // A sample every millisecond, half a millisecond off the steps.
+    std::int64_t ms = 1;
+    for (std::uint64_t k = 0; k < 20; ++k) {
+      const std::int64_t woken_ns = static_cast<std::int64_t>(k) * kPeriod + late_ns;
+      for (; ms * 1'000'000 - 500'000 <= woken_ns; ++ms) {
+        bench.SendTool(1, start + static_cast<float>(ms) * per_ms, 1 + ms * 1'000'000 - 500'000);
+      }
+      bench.StepAt(k, late_ns);
+    }
+    TickManifest manifest;
+    EXPECT_TRUE(manifests->TakeLatest(&manifest));
+    *hash = manifest.state_hash;
+    EXPECT_EQ(manifest.consumed[1].sequence, manifest.consumed[0].sequence + 1) << "the samples around its moment";
+    return bench.ToolPlace(1);
+  };
+  std::uint64_t soon_hash = 0, late_hash = 0;
+  const Vec3f soon = run(1'200'000, &soon_hash), late = run(7'900'000, &late_hash);
+  EXPECT_LT((soon - (start + 190.5f * per_ms)).norm(), 2e-6f);  // rounding: metres in float, and of u
+  EXPECT_EQ(soon, late);
+  EXPECT_EQ(soon_hash, late_hash);
+}
+
+TEST_F(PhysicsNodeTest, AStepThatIsWokenAtItsVeryMomentIsThatMoments) {
+  // 0.29 / 0.01 is less than 29 in double.
+  Bench bench(scene_, nullptr);
+  auto cautery = bench.bus_.cautery.MakeInput();
+  CauteryContact contact;
+  for (int k = 0; k < 100; ++k) {
+    bench.Step();
+    ASSERT_TRUE(cautery->TakeLatest(&contact));
+    ASSERT_NEAR(contact.session_time_s, 0.01 * k, 1e-9);
+  }
+}
+
+TEST_F(PhysicsNodeTest, AWriterOfPosesThatIsStartedAnewIsFollowed) {
+  Bench bench(scene_, nullptr);
+  const Vec3f start = scene_.tools[1].p_WP + Vec3f(0, 0, -0.02f), moved = start + Vec3f(0, 0.003f, 0);
+  bench.SendTool(1, start, 1, 5);
+  bench.StepAt(0, 1'000'000);
+  bench.StepAt(1, 1'000'000);
+  EXPECT_EQ(bench.ToolPlace(1), start);
+  bench.sequence_ = 0;
+  bench.SendTool(1, moved, 1 + 15'000'000, 6);
+  bench.StepAt(2, 1'000'000);
+  EXPECT_EQ(bench.ToolPlace(1), moved);
 }
 
 TEST_F(PhysicsNodeTest, AtRestAFrameComesTenTimesASecond) {

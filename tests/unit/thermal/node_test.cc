@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "tests/numerics/thermal/flat_scene.h"
 #include "tests/unit/thermal/node_bus.h"
@@ -32,12 +33,22 @@ class ThermalNodeTest : public ::testing::Test {
     return std::make_unique<ThermalNode>(scene_, bus_.ports(), checkpoint_.get(), ++epoch_);
   }
 
-  /// One tick with the tip at (s, 10.2 mm), energised.
-  void Touch(ThermalNode* node, float s) {
+  /// The tip is at (s, 10.2 mm), energised, at a moment of the session.
+  void Send(float s, double time_s) {
     CauteryContact contact = TouchAt({s, 0.0102f}, CauteryMode::kCut, 35, 5e-4f);
+    contact.session_time_s = time_s;
     contact.stamp = {++sequence_, 1, tick_.stamp_ns};
     ASSERT_TRUE(bus_.contact_out->Write(contact));
+  }
+  /// One tick with the tip there.
+  void Touch(ThermalNode* node, float s) {
+    Send(s, tick_.session_time_s);
     Step(node);
+  }
+  [[nodiscard]] TickManifest NewestManifest() {
+    TickManifest manifest;
+    EXPECT_TRUE(bus_.manifest_in->TakeLatest(&manifest));
+    return manifest;
   }
   void Step(ThermalNode* node) {
     Advance(&tick_);
@@ -196,13 +207,57 @@ TEST_F(ThermalNodeTest, SameInputsGiveTheSameHashes) {
     tick_ = {};
     auto node = MakeNode();
     Cut(node.get(), 0.010f, 0.014f);
-    TickManifest manifest;
-    EXPECT_TRUE(bus_.manifest_in->TakeLatest(&manifest));
+    const TickManifest manifest = NewestManifest();
     EXPECT_EQ(manifest.node, NodeId::kThermal);
     EXPECT_EQ(manifest.consumed.at(0).sequence, sequence_);
     return manifest.state_hash;
   };
   EXPECT_EQ(run(), run());
+}
+
+TEST_F(ThermalNodeTest, EveryContactIsConsumedAndNamedInTheManifest) {
+  auto node = MakeNode();
+  for (int n = 0; n < 3; ++n) Send(0.010f + 4e-5f * static_cast<float>(n), 0.01 * n);
+  Step(node.get());
+  TickManifest manifest = NewestManifest();
+  ASSERT_EQ(manifest.consumed.size(), 3u);
+  for (std::uint64_t n = 0; n < 3; ++n) {
+    EXPECT_EQ(manifest.consumed[n].topic, TopicId::kCauteryContact);
+    EXPECT_EQ(manifest.consumed[n].sequence, n + 1);
+  }
+  EXPECT_GT(node->solver().ledger().joule, 0.0);
+  Step(node.get());
+  EXPECT_TRUE(NewestManifest().consumed.empty());
+}
+
+TEST_F(ThermalNodeTest, OfTooManyContactsTheNewestAreConsumed) {
+  auto node = MakeNode();
+  for (int n = 0; n < 12; ++n) Send(0.010f + 4e-5f * static_cast<float>(n), 0.01 * n);
+  Step(node.get());
+  const TickManifest manifest = NewestManifest();
+  ASSERT_EQ(manifest.consumed.size(), kMostSamples);
+  EXPECT_EQ(manifest.consumed.front().sequence, 12 - kMostSamples + 1);
+  EXPECT_EQ(manifest.consumed.back().sequence, 12u);
+}
+
+TEST_F(ThermalNodeTest, ContactsThatComeTwoByTwoCutWhatTheyCutOneByOne) {
+  // 12 mm at 8 mm/s; in the second run thermal is woken for every other contact, and as often in between.
+  const auto cut = [&](int at_once) {
+    tick_ = {};
+    auto node = MakeNode();
+    for (int n = 0; n < 150; ++n) {
+      Send(0.010f + 8e-5f * static_cast<float>(n), 0.01 * n);
+      if (n % at_once == at_once - 1) Step(node.get());
+    }
+    for (int n = 0; n < kCommitFrames; ++n) Step(node.get());
+    return std::pair(node->solver().cut_length_m(), node->solver().ledger().joule);
+  };
+  const auto [length_m, joule] = cut(1);
+  const auto [length2_m, joule2] = cut(2);
+  EXPECT_GT(length_m, 0.011f);
+  EXPECT_NEAR(length2_m, length_m, 0.0015f);
+  // Conduction and source alternate over steps of twice the length, and conduction has half the time.
+  EXPECT_NEAR(joule2, joule, 0.1 * joule);
 }
 
 TEST_F(ThermalNodeTest, ContactOfNoNumbersIsCountedAndChangesNothing) {

@@ -49,7 +49,7 @@ TEST(PaperModelTest, CutKillsNodesAndShrinksEdgesOncePerInvalidEnd) {
   const SceneView scene = data.View();
   ThermalSolver solver(scene);
   RunDrag(Along(0.0101f), kDt, &solver);
-  for (int n = 0; n < kCommitFrames; ++n) solver.Step({}, kDt);
+  for (int n = 0; n < kCommitFrames; ++n) solver.Step(TipInput{}, kDt);
   const TopologyBits& bits = solver.topology().committed();
   EXPECT_GE(solver.topology().dead_node_count(), 9u);
   EXPECT_GT(solver.cut_length_m(), 0.008f);
@@ -102,7 +102,7 @@ TEST(PaperModelTest, SlitBetweenTwoRowsIsMissedByTheNodeRule) {
   }
   Ledger ledger;
   solver.mutable_field()->RefreshTheta(tile, &ledger);
-  for (int n = 0; n < 100; ++n) solver.Step({}, kDt);
+  for (int n = 0; n < 100; ++n) solver.Step(TipInput{}, kDt);
   EXPECT_EQ(solver.topology().dead_node_count(), 0u);
 }
 

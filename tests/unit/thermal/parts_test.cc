@@ -5,11 +5,13 @@
 #include <cmath>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "services/core/error.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "thermal_node/coupling/cut_meter.h"
 #include "thermal_node/coupling/electrode.h"
+#include "thermal_node/coupling/film.h"
 #include "thermal_node/coupling/patch.h"
 #include "thermal_node/coupling/tip_tracker.h"
 
@@ -67,8 +69,10 @@ TEST(SheetTest, SceneWithoutMembraneIsRefused) {
 
 class TipTest : public ::testing::Test {
  protected:
-  [[nodiscard]] static CauteryContact At(float s, float t) {
+  static constexpr double kFrame_s = 0.01;
+  [[nodiscard]] static CauteryContact At(float s, float t, double time_s = 1.0) {
     CauteryContact contact;
+    contact.session_time_s = time_s;
     contact.touching = true;
     contact.mode = CauteryMode::kCut;
     contact.power_W = 35;
@@ -76,44 +80,113 @@ class TipTest : public ::testing::Test {
     contact.material = {s, t};
     return contact;
   }
+  /// The same with metal that lies along t from there on.
+  [[nodiscard]] static CauteryContact MetalAt(float s, float t, double time_s = 1.0) {
+    CauteryContact contact = At(s, t, time_s);
+    contact.metal_count = 3;
+    for (std::uint32_t n = 0; n < contact.metal_count; ++n) {
+      contact.metal[n] = {{s, t + 5e-4f * static_cast<float>(n)}, 1e-4f * static_cast<float>(n)};
+    }
+    return contact;
+  }
+  [[nodiscard]] TipInput Advance(const CauteryContact& contact) { return tip_.Advance(contact, kFrame_s); }
+
   Sheet sheet_ = MakeFlatSheet(0.02f, 0.02f, 1e-4f);
   TipTracker tip_{sheet_, 5e-4f};
 };
 
-TEST_F(TipTest, PathsOfSuccessiveFramesJoin) {
-  CauteryContact a = At(0.005f, 0.01f), b = At(0.0051f, 0.01f), c = At(0.0055f, 0.0102f);
-  EXPECT_EQ(tip_.Advance(&a, 0.01).path.from, a.material);
-  const TipInput second = tip_.Advance(&b, 0.01);
+TEST_F(TipTest, PathsOfSuccessiveSamplesJoin) {
+  const CauteryContact a = At(0.005f, 0.01f, 1.00), b = At(0.0051f, 0.01f, 1.01), c = At(0.0055f, 0.0102f, 1.03);
+  EXPECT_EQ(Advance(a).path.from, a.material);
+  const TipInput second = Advance(b);
   EXPECT_EQ(second.path.from, a.material);
   EXPECT_EQ(second.path.to, b.material);
-  // No sample in one frame, two samples' way in the next.
-  const TipInput third = tip_.Advance(nullptr, 0.01);
-  EXPECT_EQ(third.path.from, third.path.to);
-  const TipInput fourth = tip_.Advance(&c, 0.01);
-  EXPECT_EQ(fourth.path.from, b.material);
-  EXPECT_EQ(fourth.path.to, c.material);
+  // A sample is missing: the next one's way is as long as two.
+  const TipInput third = Advance(c);
+  EXPECT_EQ(third.path.from, b.material);
+  EXPECT_EQ(third.path.to, c.material);
+}
+
+TEST_F(TipTest, ASampleStandsForTheSessionTimeSinceTheLast) {
+  EXPECT_FLOAT_EQ(Advance(At(0.005f, 0.01f, 1.00)).duration_s, 0.01f) << "the first stands for a frame";
+  EXPECT_NEAR(Advance(At(0.005f, 0.01f, 1.02)).duration_s, 0.02f, 1e-6);
+  EXPECT_NEAR(Advance(At(0.005f, 0.01f, 1.025)).duration_s, 0.005f, 1e-6);
+  EXPECT_FLOAT_EQ(Advance(At(0.005f, 0.01f, 1.025)).duration_s, 0.01f) << "nor can one that is no later";
+  EXPECT_FLOAT_EQ(Advance(At(0.005f, 0.01f, 0.5)).duration_s, 0.01f) << "the session began anew";
+}
+
+TEST_F(TipTest, MetalIsSweptFromSampleToSample) {
+  const CauteryContact a = MetalAt(0.005f, 0.010f, 1.00), b = MetalAt(0.0051f, 0.0101f, 1.01);
+  EXPECT_EQ(Advance(a).path.begin.points[2].material, a.metal[2].material) << "at rest in its first sample";
+  const TipInput swept = Advance(b);
+  ASSERT_EQ(swept.path.begin.count, 3u);
+  ASSERT_EQ(swept.path.end.count, 3u);
+  for (std::size_t n = 0; n < 3; ++n) {
+    EXPECT_EQ(swept.path.begin.points[n].material, a.metal[n].material);
+    EXPECT_EQ(swept.path.end.points[n].material, b.metal[n].material);
+  }
+  const TipPath half = PartOf(swept.path, 0.25f, 0.75f);
+  EXPECT_NEAR(half.begin.points[1].material.x(), 0.005025f, 1e-8f);
+  EXPECT_NEAR(half.end.points[1].material.y(), 0.010575f, 1e-8f);
+  EXPECT_NEAR(half.to.x(), 0.005075f, 1e-8f);
 }
 
 TEST_F(TipTest, JumpStartsANewPath) {
-  const CauteryContact a = At(0.005f, 0.01f), b = At(0.012f, 0.01f);
-  (void)tip_.Advance(&a, 0.01);
-  const TipInput jumped = tip_.Advance(&b, 0.01);
+  const CauteryContact a = At(0.005f, 0.01f, 1.00), b = At(0.012f, 0.01f, 1.01);
+  (void)Advance(a);
+  const TipInput jumped = Advance(b);
   EXPECT_EQ(jumped.path.from, b.material);
   EXPECT_TRUE(jumped.active);
 }
 
-TEST_F(TipTest, SilenceTurnsTheCurrentOff) {
-  const CauteryContact a = At(0.005f, 0.01f);
-  EXPECT_TRUE(tip_.Advance(&a, 0.01).active);
-  for (int n = 0; n < 9; ++n) EXPECT_TRUE(tip_.Advance(nullptr, 0.01).active);
-  for (int n = 0; n < 5; ++n) (void)tip_.Advance(nullptr, 0.01);
-  EXPECT_FALSE(tip_.Advance(nullptr, 0.01).active);
+TEST_F(TipTest, OnePointOfTheMetalThatJumpsStartsANewPathForAll) {
+  (void)Advance(MetalAt(0.005f, 0.010f, 1.00));
+  CauteryContact b = MetalAt(0.0051f, 0.010f, 1.01);
+  b.metal[0].material.x() += 1.1f * kTipSpeedMax_m_s * 0.01f;  // another fold of the sheet is nearer now
+  const TipInput jumped = Advance(b);
+  EXPECT_EQ(jumped.path.from, b.material);
+  for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(jumped.path.begin.points[n].material, b.metal[n].material);
+  CauteryContact c = b;
+  c.session_time_s = 1.02;
+  c.metal_count = 2;  // other metal
+  EXPECT_EQ(Advance(c).path.begin.count, 2u);
+}
+
+TEST_F(TipTest, LiftedMetalStartsANewPath) {
+  (void)Advance(At(0.005f, 0.01f, 1.00));
+  CauteryContact lifted = At(0.0052f, 0.01f, 1.01);
+  lifted.touching = false;
+  EXPECT_FALSE(Advance(lifted).active);
+  EXPECT_EQ(Advance(At(0.0054f, 0.01f, 1.02)).path.from.x(), 0.0054f);
+}
+
+TEST_F(TipTest, AGapBetweenEnergisedSamplesIsBridged) {
+  // Physics was away for 0.4 s while the hand went on at 4 mm/s.
+  (void)Advance(At(0.005f, 0.01f, 1.0));
+  const TipInput bridged = Advance(At(0.0066f, 0.01f, 1.4));
+  EXPECT_TRUE(bridged.active);
+  EXPECT_EQ(bridged.path.from.x(), 0.005f);
+  EXPECT_NEAR(bridged.duration_s, 0.4f, 1e-6);
+  // Longer ones are not: nobody knows what the hand did meanwhile.
+  const TipInput anew = Advance(At(0.0074f, 0.01f, 1.4 + 1.01 * kLongestGap_s));
+  EXPECT_EQ(anew.path.from.x(), 0.0074f);
+  EXPECT_FLOAT_EQ(anew.duration_s, 0.01f);
+}
+
+TEST_F(TipTest, AGapAfterASampleWithoutCurrentBringsACurrentForAFrameOnly) {
+  CauteryContact up = At(0.005f, 0.01f, 1.0);
+  up.mode = CauteryMode::kOff;
+  EXPECT_FALSE(Advance(up).active);
+  const TipInput down = Advance(At(0.0052f, 0.01f, 1.8));
+  EXPECT_TRUE(down.active);
+  EXPECT_FLOAT_EQ(down.duration_s, 0.01f) << "the pedal may have gone down just now";
 }
 
 TEST_F(TipTest, SamplesOutOfRangeAreNotAccepted) {
   EXPECT_TRUE(tip_.Accepts(At(0.005f, 0.01f)));
   EXPECT_FALSE(tip_.Accepts(At(0.03f, 0.01f)));
   EXPECT_FALSE(tip_.Accepts(At(NAN, 0.01f)));
+  EXPECT_FALSE(tip_.Accepts(At(0.005f, 0.01f, NAN)));
   CauteryContact strong = At(0.005f, 0.01f);
   strong.power_W = 1e4f;
   EXPECT_FALSE(tip_.Accepts(strong));
@@ -125,36 +198,44 @@ TEST_F(TipTest, SamplesOutOfRangeAreNotAccepted) {
   EXPECT_TRUE(tip_.Accepts(lifted));
 }
 
-TEST_F(TipTest, ALineOfMetalGoesWithTheTipAndAnAbsurdOneIsRefused) {
-  CauteryContact contact = At(0.010f, 0.010f);
-  contact.contact_half = {1.5e-3f, -1e-3f};
-  ASSERT_TRUE(tip_.Accepts(contact));
-  EXPECT_EQ(tip_.Advance(&contact, 0.01).path.half, contact.contact_half);
-  for (const float bad : {1.01f * kHalfContactMax_m, NAN, INFINITY}) {
-    contact.contact_half = {bad, 0};
+TEST_F(TipTest, MetalOfNoNumbersOrOfTooManyPointsIsRefused) {
+  EXPECT_TRUE(tip_.Accepts(MetalAt(0.005f, 0.010f)));
+  for (const float bad : {NAN, INFINITY}) {
+    CauteryContact contact = MetalAt(0.005f, 0.010f);
+    contact.metal[1].height_m = bad;
+    EXPECT_FALSE(tip_.Accepts(contact)) << bad;
+    contact = MetalAt(0.005f, 0.010f);
+    contact.metal[2].material.y() = bad;
     EXPECT_FALSE(tip_.Accepts(contact)) << bad;
   }
+  CauteryContact contact = MetalAt(0.005f, 0.010f);
+  contact.metal_count = kMaxMetalPoints + 1;
+  EXPECT_FALSE(tip_.Accepts(contact));
 }
 
-/// Area under a capsule in units of radius squared, by cells of 1 / `fine` of its radius.
-double CoveredArea(float length, float heading, float fine) {
-  constexpr float kNoArc = 1e-6f;
-  const Vec2f middle(0.31f, 0.17f), half = 0.5f * length * fine * Vec2f(std::cos(heading), std::sin(heading));
-  const Electrode electrode({1, 0, 1}, middle, half, fine, kNoArc);
+constexpr SurfaceMetric kFlat{1, 0, 1};
+
+/// Area under the metal in units of radius squared, by cells of 1 / `fine` of its radius.
+double CoveredArea(const MetalPiece& piece, float fine) {
+  const Electrode electrode(kFlat, piece, fine);
   double sum = 0;
-  const Vec2f low = electrode.low().array().floor(), high = electrode.high();
+  const Vec2f low = electrode.low(0).array().floor(), high = electrode.high(0);
   for (float y = low.y() + 0.5f; y <= high.y(); y += 1) {
-    for (float x = low.x() + 0.5f; x <= high.x(); x += 1) sum += electrode.Covered({x, y});
+    for (float x = low.x() + 0.5f; x <= high.x(); x += 1) sum += Electrode::Covered(electrode.Gap({x, y}));
   }
   return sum / (fine * fine);
 }
 
 TEST(ElectrodeTest, CoverageIsTheAreaOfTheCapsuleAnyWay) {
+  const Vec2f middle(0.31f, 0.17f);
   for (const float length : {0.0f, 0.5f, 3.0f}) {
     const double exact = std::numbers::pi + 2.0 * length;
     for (float heading = 0; heading < 3.1f; heading += 0.23f) {
-      EXPECT_NEAR(CoveredArea(length, heading, 5) / exact, 1, 0.02) << length << " " << heading;  // 0.5 mm in 0.1 mm
-      EXPECT_NEAR(CoveredArea(length, heading, 40) / exact, 1, 1e-3) << length << " " << heading;
+      for (const float fine : {5.0f, 40.0f}) {  // 0.5 mm in 0.1 mm; an eighth of that
+        const Vec2f half = 0.5f * length * fine * Vec2f(std::cos(heading), std::sin(heading));
+        const MetalPiece piece{.a = middle - half, .b = middle + half};
+        EXPECT_NEAR(CoveredArea(piece, fine) / exact, 1, fine < 10 ? 0.02 : 1e-3) << length << " " << heading;
+      }
     }
   }
 }
@@ -162,13 +243,124 @@ TEST(ElectrodeTest, CoverageIsTheAreaOfTheCapsuleAnyWay) {
 TEST(ElectrodeTest, DistanceIsThatOnTheStretchedSheet) {
   // The same capsule in material coordinates that are stretched 2 : 1 and sheared covers what the map leaves of it.
   const SurfaceMetric metric{4.0f, 0.6f, 1.5f};
-  const Electrode electrode(metric, {0, 0}, {4, 1.5f}, 12, 1e-6f);
+  const Electrode electrode(metric, {.a = {-4, -1.5f}, .b = {4, 1.5f}}, 12);
   const double length = std::sqrt(metric.ss * 64 + 2 * metric.st * 24 + metric.tt * 9);
+  constexpr float kReach = 3;
+  const Vec2f low = electrode.low(kReach), high = electrode.high(kReach);
   double sum = 0;
   for (float y = -60.5f; y < 60; y += 1) {
-    for (float x = -60.5f; x < 60; x += 1) sum += electrode.Covered({x, y});
+    for (float x = -60.5f; x < 60; x += 1) {
+      const float gap = electrode.Gap({x, y});
+      sum += Electrode::Covered(gap);
+      if (gap >= kReach) continue;
+      EXPECT_TRUE(x >= low.x() && y >= low.y() && x <= high.x() && y <= high.y()) << "outside the box of its reach";
+    }
   }
   EXPECT_NEAR(sum * metric.area() / (std::numbers::pi * 144 + 2 * 12 * length), 1, 0.02);
+}
+
+TEST(ElectrodeTest, ALyingRodTouchesAlongItselfAndOneAboveNowhere) {
+  constexpr float kRadius = 5;
+  const Electrode lying(kFlat, {.a = {-10, 0}, .b = {10, 0}}, kRadius);
+  EXPECT_NEAR(lying.Gap({3, 7}), 7 - kRadius, 1e-5f);
+  EXPECT_NEAR(lying.Gap({13, 4}), 5 - kRadius, 1e-5f) << "a round end";
+  // 3 cells of air between metal and sheet beneath its middle.
+  const Electrode above(kFlat, {.a = {-10, 0}, .b = {10, 0}, .height_a = 8, .height_b = 8}, kRadius);
+  EXPECT_NEAR(above.Gap({0, 0}), 3, 1e-5f);
+  EXPECT_NEAR(above.Gap({2, 6}), 10 - kRadius, 1e-5f);
+  EXPECT_EQ(CoveredArea({.a = {-10, 0}, .b = {10, 0}, .height_a = 8, .height_b = 8}, kRadius), 0.0);
+}
+
+TEST(ElectrodeTest, AStandingRodCoversADiscAndASlantedOneAnEllipse) {
+  constexpr float kFine = 40;
+  // Through the sheet, however far on either side.
+  const MetalPiece standing{.a = {0.2f, 0.4f}, .b = {0.2f, 0.4f}, .height_a = -100, .height_b = 200};
+  EXPECT_NEAR(Electrode(kFlat, standing, 5).Gap({3.2f, 4.4f}), 0, 1e-4f);
+  EXPECT_NEAR(CoveredArea(standing, kFine), std::numbers::pi, 1e-3 * std::numbers::pi);
+  // It ends above the sheet: its round end is that far off.
+  const MetalPiece ends{.a = {0, 0}, .b = {0, 0}, .height_a = 9, .height_b = 300};
+  EXPECT_NEAR(Electrode(kFlat, ends, 5).Gap({0, 0}), 4, 1e-4f);
+  // At 30 degrees to the sheet the section is twice as long as it is wide. The gap is a distance in space, so the edge
+  // of what is covered is a little less sharp along it.
+  const float run = 300 * std::cos(0.5236f), rise = 300 * std::sin(0.5236f);
+  const MetalPiece slanted{.a = {-run, 0}, .b = {run, 0}, .height_a = -rise, .height_b = rise};
+  EXPECT_NEAR(Electrode(kFlat, slanted, 5).Gap({10, 0}), 0, 1e-3f);
+  EXPECT_NEAR(Electrode(kFlat, slanted, 5).Gap({0, 5}), 0, 1e-3f);
+  EXPECT_NEAR(CoveredArea(slanted, kFine), 2 * std::numbers::pi, 2e-3 * std::numbers::pi);
+}
+
+TEST(ElectrodeTest, AStandingRodOnAShearedSheetCoversADiscOfTheRestShape) {
+  const SurfaceMetric metric{1.3f, 0.5f, 0.9f};
+  const Electrode rod(metric, {.height_a = -50, .height_b = 50}, 12);
+  double sum = 0;
+  for (float y = -40.5f; y < 40; y += 1) {
+    for (float x = -40.5f; x < 40; x += 1) {
+      sum += Electrode::Covered(rod.Gap({x, y}));
+      const float distance = std::sqrt(metric.ss * x * x + 2 * metric.st * x * y + metric.tt * y * y);
+      ASSERT_NEAR(rod.Gap({x, y}), distance - 12, 1e-3f);
+    }
+  }
+  EXPECT_NEAR(sum * metric.area() / (std::numbers::pi * 144), 1, 0.01);
+}
+
+constexpr float kMillisecond = 1e-3f;
+
+TEST(FilmTest, GrowsWhereTissueBoilsAndOnlyWhereTheWaveformSustainsIt) {
+  Interface film;
+  film.Follow(kBoilingForFilm, true, kFilmGrows_s);
+  EXPECT_NEAR(film.film, 1 - std::exp(-1.0f), 1e-5f);
+  film.Follow(1, true, 20 * kFilmGrows_s);
+  EXPECT_NEAR(film.film, 1, 1e-5f);
+  Interface partial;
+  partial.Follow(0.5f * kBoilingForFilm, true, 1);
+  EXPECT_NEAR(partial.film, 0.5f, 1e-5f) << "too little boils for all of it";
+  Interface coag;
+  coag.Follow(1, false, 1);
+  EXPECT_EQ(coag.film, 0.0f);
+}
+
+TEST(FilmTest, CollapsesOnceNothingBoilsAndThenBeginsAnew) {
+  Interface film{.film = 1, .burning = 0.3f};
+  film.Follow(0, true, kFilmCollapses_s);
+  EXPECT_NEAR(film.film, std::exp(-1.0f), 1e-5f);
+  EXPECT_EQ(film.burning, 0.3f) << "there is still a film";
+  film.Follow(0, true, 10 * kFilmCollapses_s);
+  EXPECT_LT(film.film, 1e-3f);
+  EXPECT_EQ(film.burning, 1.0f);
+  Interface split{.film = 1}, whole{.film = 1};
+  for (int n = 0; n < 8; ++n) split.Follow(0, true, kMillisecond);
+  whole.Follow(0, true, 8 * kMillisecond);
+  EXPECT_NEAR(split.film, whole.film, 1e-5f) << "whatever the steps";
+}
+
+TEST(FilmTest, AsManyDischargesBurnAsKeepTheStrikeVoltage) {
+  constexpr float kFootprint_m2 = 4e-6f;  // 1 mm by 4 mm
+  const Drive drive = MakeDrive(ThermalParams{}, CauteryMode::kCut, 20);
+  const auto settled = [&](float power_W) {
+    Interface film{.film = 1};
+    Drive asked = drive;
+    asked.power_W = power_W;
+    float voltage = 0;
+    for (int n = 0; n < 20; ++n) {
+      voltage = RegulatedVoltage(asked, film.burning * kDischarge_S_m2 * kFootprint_m2);
+      film.Regulate(voltage);
+    }
+    return std::pair(voltage, film.burning);
+  };
+  const auto [voltage, burning] = settled(20);
+  EXPECT_NEAR(voltage, kStrike_V, 1e-3f * kStrike_V);
+  EXPECT_NEAR(burning, 20 / (kStrike_V * kStrike_V * kDischarge_S_m2 * kFootprint_m2), 1e-3f);
+  // More power than the whole footprint takes at that voltage raises it; next to none lets a few burn on.
+  EXPECT_GT(settled(60).first, 1.2f * kStrike_V);
+  EXPECT_EQ(settled(60).second, 1.0f);
+  EXPECT_LT(settled(0.01f).first, kStrike_V);
+  EXPECT_GT(settled(0.01f).second, 0.0f);
+}
+
+TEST(FilmTest, MetalCoolsOnItsShaft) {
+  Interface hook{.hook_theta = 100};
+  for (int n = 0; n < 1600; ++n) hook.Cool(0.01f);
+  EXPECT_NEAR(hook.hook_theta, 100 * std::exp(-16 / kHookCools_s), 0.1f);
 }
 
 TEST(GeneratorTest, PowerThenVoltageThenCurrentLimits) {
