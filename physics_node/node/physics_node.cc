@@ -155,9 +155,13 @@ void PhysicsNode::TakeHandles(std::int64_t now_ns) {
 
 void PhysicsNode::TakeInputs(const Tick& tick) {
   // The step stands for session time k dt, whenever within its period the thread was woken: the same hand gives the
-  // same poses on a busy machine.
-  const double step_s =
-      tick.dt_s > 0 ? std::floor(tick.session_time_s / tick.dt_s + kRoundingTicks) * tick.dt_s : tick.session_time_s;
+  // same poses on a busy machine. One that is woken in the next period is still its own: k goes on by whole periods.
+  double step_s = tick.session_time_s;
+  if (tick.dt_s > 0) {
+    const double latest = std::floor(tick.session_time_s / tick.dt_s + kRoundingTicks);
+    step_ = ticks_ == 0 ? latest : std::clamp(step_ + static_cast<double>(periods_), latest - 1, latest);
+    step_s = step_ * tick.dt_s;
+  }
   const auto now_ns = tick.stamp_ns - static_cast<std::int64_t>(1e9 * (tick.session_time_s - step_s));
   step_time_s_ = std::max(step_s, 0.0);
   TakeTools(now_ns);
@@ -178,6 +182,7 @@ void PhysicsNode::TakeInputs(const Tick& tick) {
 /// do not depend on the machine.
 void PhysicsNode::MindTheTime(const Tick& tick) {
   const bool late = ticks_ > 1 && tick.index > last_index_ + 1;
+  periods_ = tick.index > last_index_ ? tick.index - last_index_ : 1;
   last_index_ = tick.index;
   ticks_in_time_ = late ? 0 : ticks_in_time_ + 1;
   const std::uint32_t cheaper = cheaper_.load(std::memory_order_relaxed);

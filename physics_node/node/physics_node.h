@@ -88,12 +88,14 @@ class PhysicsNode {
   std::int64_t pose_ns_ = 0;                       ///< Time of the tools' poses in the last step.
   std::uint8_t pedals_ = kPedalNone;
   double step_time_s_ = 0;  ///< Session time that the last step stands for.
+  double step_ = 0;         ///< The same in periods.
   TopologyState topology_state_;
   std::array<ToolInput, kMaxTools> inputs_;
   std::array<int, kMaxTools> absent_ticks_{};
   bool topology_waits_ = false;  ///< Came while another process led.
   std::uint64_t ticks_ = 0;
   std::uint64_t last_index_ = 0;
+  std::uint64_t periods_ = 1;      ///< Since the last step.
   std::uint64_t first_index_ = 0;  ///< Manifests count from the tick in which this process took over.
   int ticks_in_time_ = 0;          ///< Since the last skipped period.
   std::uint64_t frame_version_ = 0, hash_version_ = 0, saved_version_ = 0, measured_version_ = 0;

@@ -56,7 +56,7 @@ class ThermalCheck final : public CheckpointCheck {
   ThermalCheck() {
     thermal::ThermalSolver worker(scene_);
     thermal::RunDrag(drag_, kDt, &worker);
-    while (!worker.at_commit_frame()) worker.Step(TipInput{}, kDt);
+    while (!worker.at_commit_frame()) worker.Step(thermal::TipInput{}, kDt);
     good_.resize(thermal::ThermalSolver::CheckpointCapacity(scene_));
     good_.resize(worker.Save(good_));
   }

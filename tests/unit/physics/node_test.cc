@@ -230,6 +230,24 @@ TEST_F(PhysicsNodeTest, AStepThatIsWokenAtItsVeryMomentIsThatMoments) {
   }
 }
 
+TEST_F(PhysicsNodeTest, AStepThatIsWokenInTheNextPeriodIsStillItsOwn) {
+  Bench bench(scene_, nullptr);
+  auto cautery = bench.bus_.cautery.MakeInput();
+  CauteryContact contact;
+  const auto moment = [&](std::uint64_t index, std::int64_t late_ns) {
+    bench.StepAt(index, late_ns);
+    EXPECT_TRUE(cautery->TakeLatest(&contact));
+    return contact.session_time_s;
+  };
+  // The very first is late: nobody can know that, and the next one puts it right.
+  EXPECT_NEAR(moment(0, 10'300'000), 0.01, 1e-9);
+  EXPECT_NEAR(moment(1, 1'200'000), 0.01, 1e-9);
+  EXPECT_NEAR(moment(2, 1'200'000), 0.02, 1e-9);
+  EXPECT_NEAR(moment(3, 10'300'000), 0.03, 1e-9) << "0.2 ms before its successor";
+  EXPECT_NEAR(moment(4, 1'200'000), 0.04, 1e-9);
+  EXPECT_NEAR(moment(7, 1'200'000), 0.07, 1e-9) << "periods were skipped";
+}
+
 TEST_F(PhysicsNodeTest, AWriterOfPosesThatIsStartedAnewIsFollowed) {
   Bench bench(scene_, nullptr);
   const Vec3f start = scene_.tools[1].p_WP + Vec3f(0, 0, -0.02f), moved = start + Vec3f(0, 0.003f, 0);
