@@ -1,6 +1,6 @@
-// Checkpoint layout of the thermal solver: a header, the potential's start value, the marks of the cut length,
-// protected structures, topology, then every tile that is not blank, each with only those arrays that hold anything,
-// then the bricks of the volume with the rows that hold anything.
+// Checkpoint layout of the thermal solver: a header, the potential's start value, the cut's centre line and
+// way, protected structures, topology, then every tile that is not blank, each with only those arrays that hold
+// anything, then the bricks of the volume with the rows that hold anything.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -19,6 +19,8 @@ constexpr std::uint64_t kLayout = 0x7468726d'00000006ull;
 constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
 /// Some hundred tiles with all their arrays; a session that cuts more than half a metre would need more.
 constexpr std::size_t kTileCapacity = std::size_t{24} << 20;
+/// The centre line of three metres of cut, and the contact's way.
+constexpr std::size_t kCutCapacity = (std::size_t{1} << 15) * sizeof(CellIndex) + kWayCapacity * sizeof(ToolWay::Point);
 /// Some thirty bricks burned to the bottom.
 constexpr std::size_t kVolumeCapacity = std::size_t{32} << 20;
 
@@ -177,17 +179,19 @@ struct ThermalSolver::Header {
   Ledger ledger;
   SolverFigures figures;
   EventMemory memory;
-  float clock_s, protected_dt_s;
-  std::uint32_t tile_count, mark_count, sample_count, structure_count;
+  RemovedBox removed;
+  ToolWay::End way_end;
+  float cut_length_m, clock_s, protected_dt_s;
+  std::uint32_t tile_count, line_count, way_count, sample_count, structure_count;
   std::uint32_t node_bytes, edge_bytes, shrink_bytes, protected_warm;
   std::uint64_t has_volume;
-  RemovedBox removed;
 
   [[nodiscard]] bool Finite() const {
     float sum = clock_s + protected_dt_s + memory.reported_cut_m;
     for (const float quiet : memory.quiet_until_s) sum += quiet;
     for (const float figure :
-         {figures.highest_C, figures.present_C, figures.power_W, figures.voltage_V, figures.debris_m2})
+         {figures.highest_C, figures.present_C, figures.power_W, figures.voltage_V, figures.debris_m2,
+          figures.cut_width_p50_m, figures.cut_width_p95_m, figures.cut_off_way_m})
       sum += figure;
     return std::isfinite(sum) &&
            std::isfinite(ledger.joule + ledger.generator + ledger.Out() + ledger.hook + ledger.film + ledger.plume) &&
@@ -197,7 +201,7 @@ struct ThermalSolver::Header {
 
 std::size_t ThermalSolver::CheckpointCapacity(const SceneView& scene) {
   const std::size_t nodes = scene.membrane.node_count();
-  const std::size_t fixed = (std::size_t{1} << 18) + 64 * scene.protected_points.size() + 4 * nodes;
+  const std::size_t fixed = (std::size_t{1} << 18) + kCutCapacity + 64 * scene.protected_points.size() + 4 * nodes;
   const Sheet sheet = MakeSheet(scene);
   const std::size_t tiles = std::min(kTileCapacity, sheet.tile_count() * (sizeof(TileState) + 64));
   if (scene.thermal.model == ThermalModel::kPaper) return fixed + tiles + TexturePotential::StateBytes();
@@ -223,7 +227,14 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   header.protected_dt_s = protected_dt_s_;
   const auto blank = [](const Tile* tile) { return IsBlank(tile->state); };
   header.tile_count = static_cast<std::uint32_t>(tiles.size() - std::count_if(tiles.begin(), tiles.end(), blank));
-  header.mark_count = static_cast<std::uint32_t>(cut_meter_.marks().size());
+  std::vector<CellIndex> line;
+  for (const LineCell& cell : cut_meter_.line()) line.push_back(cell.at);
+  const std::span<const ToolWay::Point> way = cut_meter_.way().points();
+  header.removed = removed_;
+  header.way_end = cut_meter_.way().end();
+  header.cut_length_m = cut_meter_.length_m();
+  header.line_count = static_cast<std::uint32_t>(line.size());
+  header.way_count = static_cast<std::uint32_t>(way.size());
   header.sample_count = static_cast<std::uint32_t>(protected_.samples().size());
   header.structure_count = static_cast<std::uint32_t>(protected_.alarm_state().size());
   const TopologyBits& bits = topology_.committed();
@@ -241,7 +252,8 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
     writer.PutValue(paper_->corner());
     writer.Put(std::as_const(*paper_).potential());
   }
-  writer.Put(std::span<const CutMeter::Mark>(cut_meter_.marks()));
+  writer.Put(std::span<const CellIndex>(line));
+  writer.Put(way);
   writer.Put(protected_.samples());
   writer.Put(protected_.alarm_state());
   for (const auto* field : {&bits.dead_nodes, &bits.dead_edges, &bits.shrink}) {
@@ -288,14 +300,16 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   if (header.node_bytes != bits.dead_nodes.size() || header.edge_bytes != bits.dead_edges.size() ||
       header.shrink_bytes != bits.shrink.size() || header.sample_count != protected_.samples().size() ||
       header.has_volume != (volume_ != nullptr ? 1u : 0u) ||
-      header.structure_count != protected_.alarm_state().size() || header.mark_count > (1u << 20) ||
-      header.tile_count > static_cast<std::uint32_t>(field_.sheet().tile_count()) ||
+      header.structure_count != protected_.alarm_state().size() || header.way_count > kWayCapacity ||
+      header.line_count > static_cast<std::uint32_t>(field_.sheet().tile_count()) * kTileCells ||
       !(header.removed.empty() ||
-        (field_.sheet().Contains(header.removed.low) && field_.sheet().Contains(header.removed.high)))) {
+        (field_.sheet().Contains(header.removed.low) && field_.sheet().Contains(header.removed.high))) ||
+      header.tile_count > static_cast<std::uint32_t>(field_.sheet().tile_count())) {
     return false;
   }
-  std::vector<CutMeter::Mark> marks(header.mark_count);
-  if (!reader.Get(std::span(marks))) return false;
+  std::vector<CellIndex> line(header.line_count);
+  std::vector<ToolWay::Point> way(header.way_count);
+  if (!reader.Get(std::span(line)) || !reader.Get(std::span(way))) return false;
   std::vector<ProtectedSample> samples(header.sample_count);
   std::vector<std::uint8_t> alarm_state(header.structure_count);
   if (!reader.Get(std::span(samples)) || !reader.Get(std::span(alarm_state)) ||
@@ -303,10 +317,8 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
       !reader.Get(std::span(bits.shrink))) {
     return false;
   }
-  const auto on_sheet = [&](const CutMeter::Mark& mark) { return field_.sheet().OnSheet({mark[0], mark[1]}); };
   const auto finite = [](const ProtectedSample& sample) { return std::isfinite(sample.theta + sample.omega); };
-  if (!std::all_of(marks.begin(), marks.end(), on_sheet) || !std::all_of(samples.begin(), samples.end(), finite) ||
-      !topology_.Fits(bits)) {
+  if (!std::all_of(samples.begin(), samples.end(), finite) || !topology_.Fits(bits)) {
     return false;
   }
   TileState state;
@@ -331,15 +343,16 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
     state.tented = static_cast<std::uint8_t>(record[3]);
     field_.Restore(static_cast<int>(record[0]), state);
   }
-  if (volume_ != nullptr && !GetVolume(&reader, volume_.get())) {
+  const bool volume_good = volume_ == nullptr || GetVolume(&reader, volume_.get());
+  if (!volume_good || !cut_meter_.Restore(field_, header.cut_length_m, line, way, header.way_end)) {
     field_.Clear();
-    volume_->Clear();
+    if (volume_ != nullptr) volume_->Clear();
     return false;
   }
   frame_ = header.frame;
   topology_.Restore(header.revision, bits);
   field_.RestoreQuarantined(header.quarantined);
-  cut_meter_.Restore(marks);
+  removed_ = header.removed;
   ledger_ = header.ledger;
   figures_ = header.figures;
   crumbs_.Restore(figures_.debris_m2);

@@ -106,10 +106,12 @@ void ThermalSolver::PaperFrame(std::span<const TipInput> tips, float dt_s) {
   const TipInput tip = tips.empty() ? TipInput{} : tips.back();
   // The voltage is that of the mode, whatever power was asked.
   const float voltage = tip.active ? MakeDrive(params_, tip.mode, tip.power_W).v_max_V : 0.0f;
+  if (tip.active) AddWay(tip.path, tip.mode);
   if (tip.active) paper_->Heat(&field_, {tip.path.from, tip.path.radius_m, voltage, tip.path.tented}, dt_s, &ledger_);
   figures_.substeps = field_.Diffuse(dt_s, &ledger_);
   const RemovedBox removed = paper_->RemoveNodes(&field_, &topology_, &ledger_);
-  if (!removed.empty()) cut_meter_.Update(&field_, removed.low, removed.high);
+  removed_.Add(removed);
+  if (at_commit_frame()) UpdateCutMeter(std::exchange(removed_, {}));
   committed_ = at_commit_frame() && topology_.Commit();
   figures_.voltage_V = voltage;
   figures_.solves = tip.active ? 1 : 0;
@@ -127,6 +129,7 @@ void ThermalSolver::ApplySource(std::span<const TipInput> tips, float dt_s, floa
     if (!(b > a) || !(tip.active || (tip.touching && hot_metal))) continue;
     const TipPath part = PartOf(tip.path, a, b);
     const Drive drive = tip.active ? MakeDrive(params_, tip.mode, tip.power_W) : Drive{};
+    if (tip.active) AddWay(part, tip.mode);
     source_.Run(&field_, part, drive, (b - a) * length_s, &ledger_);
     if (volume_ != nullptr && tip.active) AddLeakHeat((b - a) * length_s);
   }
@@ -177,8 +180,7 @@ void ThermalSolver::UpdateTopology() {
     const RemovedBox crumbs = crumbs_.TakeOut(&field_, removed_, &ledger_);
     if (!crumbs.empty()) topology_.StageCut(field_, crumbs.low, crumbs.high);
     removed_.Add(crumbs);
-    cut_meter_.Update(&field_, removed_.low, removed_.high);
-    removed_ = {};
+    UpdateCutMeter(std::exchange(removed_, {}));
     figures_.debris_m2 = static_cast<float>(crumbs_.area_m2());
   }
   for (const Tile* tile : field_.awake()) {
@@ -186,6 +188,18 @@ void ThermalSolver::UpdateTopology() {
     if (tile->theta_max > kDamageStart) topology_.StageShrink(field_, *tile);
   }
   committed_ = topology_.Commit();
+}
+
+void ThermalSolver::AddWay(const TipPath& path, CauteryMode mode) {
+  if (mode == CauteryMode::kCut || mode == CauteryMode::kBlend) cut_meter_.AddWay(path.from, path.to);
+}
+
+void ThermalSolver::UpdateCutMeter(const RemovedBox& removed) {
+  if (removed.empty()) return;
+  cut_meter_.Update(field_, removed.low, removed.high);
+  figures_.cut_width_p50_m = cut_meter_.width_p50_m();
+  figures_.cut_width_p95_m = cut_meter_.width_p95_m();
+  figures_.cut_off_way_m = cut_meter_.off_way_p95_m();
 }
 
 void ThermalSolver::UpdateProtected(float dt_s) {

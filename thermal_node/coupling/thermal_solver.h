@@ -38,10 +38,12 @@ struct SolverEvent {
 struct SolverFigures {
   float highest_C = 0;  ///< Since the start.
   float present_C = 0;
-  float power_W = 0;      ///< Of the generator, mean over the time of the last samples.
-  float set_power_W = 0;  ///< Asked of it.
-  float hook_C = 0;       ///< Temperature of the metal.
-  float debris_m2 = 0;    ///< Crumbs that were taken out.
+  float power_W = 0;                               ///< Of the generator, mean over the time of the last samples.
+  float set_power_W = 0;                           ///< Asked of it.
+  float hook_C = 0;                                ///< Temperature of the metal.
+  float debris_m2 = 0;                             ///< Crumbs that were taken out.
+  float cut_width_p50_m = 0, cut_width_p95_m = 0;  ///< See CutMeter.
+  float cut_off_way_m = 0;                         ///< Of the slit's centre line from the contact's way; see CutMeter.
   float voltage_V = 0;
   float burn_depth_m = 0;  ///< Deepest dead tissue below the sheet since the start; 0 without a volume.
   std::uint32_t warnings = 0, injuries = 0;
@@ -107,6 +109,8 @@ class ThermalSolver {
   void UpdateDamage(float dt_s);
   void QuarantineBadDamage(Tile* tile);
   void UpdateTopology();
+  void AddWay(const TipPath& path, CauteryMode mode);
+  void UpdateCutMeter(const RemovedBox& removed);
   void UpdateProtected(float dt_s);
   void ReportEvents(const TipInput& tip);
   void Report(ThermalEventKind kind, const Vec2f& at, float theta, float value, float quiet_s);

@@ -13,7 +13,6 @@ enum CellFlag : std::uint8_t {
   kRemoved = 1,      ///< Vaporised: a hole.
   kOutside = 2,      ///< Never was tissue.
   kQuarantined = 4,  ///< Held a number that was not finite; taken out of the computation.
-  kCounted = 8,      ///< Already counted in the cut length.
 };
 inline constexpr std::uint8_t kNoTissue = kRemoved | kOutside | kQuarantined;
 

@@ -60,11 +60,12 @@ TEST_P(CutTest, SlitIsContinuousAndEnergyCloses) {
   EXPECT_GE(slit.dead_m, slit.brown_m);
   EXPECT_LE(slit.dead_m, 1.5e-3f);  // … but not far
   EXPECT_LE(slit.warm_m, 3e-3f);
-  // The hole reaches half its width beyond both ends of the path. The meter may miss up to a mark at each end; its way
-  // from mark to mark is not quite straight.
-  const float hole_m = 0.030f + slit.width_max_m;
-  EXPECT_GE(solver.cut_length_m(), hole_m - 2.0f * kMarkSpacing);
-  EXPECT_LE(solver.cut_length_m(), 1.05f * hole_m);
+  // The hole reaches half its width beyond both ends of the path.
+  const float hole_m = 0.030f + slit.width_mean_m;
+  EXPECT_NEAR(solver.cut_length_m(), hole_m, 0.03f * hole_m);
+  EXPECT_NEAR(solver.figures().cut_width_p50_m, slit.width_mean_m, 2e-4f);
+  EXPECT_GE(solver.figures().cut_width_p95_m, solver.figures().cut_width_p50_m);
+  EXPECT_LE(solver.figures().cut_off_way_m, 3e-4f);
   EXPECT_LE(solver.ledger().ClosureError(solver.field().Stored()), 1e-4);
   // 37 to 100 C and all the water: no more tissue can go than the energy allows.
   const Material& m = solver.field().material();
@@ -274,7 +275,7 @@ TEST(CutPropertiesTest, GoingOverAnOldSlitAddsNoLength) {
   const float once = solver.cut_length_m();
   std::swap(drag.from, drag.to);
   RunChecked(scene, drag, &solver);
-  EXPECT_NEAR(solver.cut_length_m(), once, kMarkSpacing);
+  EXPECT_NEAR(solver.cut_length_m(), once, 5e-4f);
 }
 
 TEST(CutPropertiesTest, CoagulationDriesAndBrownsButDoesNotCut) {

@@ -9,7 +9,6 @@
 
 #include "services/core/error.h"
 #include "tests/numerics/thermal/flat_scene.h"
-#include "thermal_node/coupling/cut_meter.h"
 #include "thermal_node/coupling/electrode.h"
 #include "thermal_node/coupling/film.h"
 #include "thermal_node/coupling/patch.h"
@@ -477,61 +476,6 @@ TEST(PatchTest, PlannerSendsWhatChangedOnceAndOnlyThat) {
   EXPECT_TRUE(planner.NextOfHistory());
   planner.Note(solver.mutable_field(), true);
   EXPECT_TRUE(planner.Next(solver.field()));
-}
-
-/// Removes all cells within `half_width_m` of the segment a-b and tells the meter in `strokes` boxes along it.
-void Slit(const Vec2f& a, const Vec2f& b, float half_width_m, HeatField* field, CutMeter* meter) {
-  constexpr int kStrokes = 40;
-  const auto reach = static_cast<int>(std::ceil(half_width_m / field->material().cell_m));
-  for (int n = 0; n <= kStrokes; ++n) {
-    const CellIndex centre = field->sheet().CellOf(a + (b - a) * (static_cast<float>(n) / kStrokes));
-    const CellIndex low{centre.ix - reach, centre.iy - reach}, high{centre.ix + reach, centre.iy + reach};
-    for (int iy = low.iy; iy <= high.iy; ++iy) {
-      for (int ix = low.ix; ix <= high.ix; ++ix) {
-        const Vec2f away = field->sheet().CentreOf({ix, iy}) - field->sheet().CentreOf(centre);
-        if (away.norm() > half_width_m) continue;
-        Tile* tile = field->Wake(ix / kTile, iy / kTile);
-        std::uint8_t& flags = tile->state.flags[(iy % kTile) * kTile + ix % kTile];
-        flags = static_cast<std::uint8_t>(flags | kRemoved);
-      }
-    }
-    meter->Update(field, low, high);
-  }
-}
-
-class CutMeterTest : public testing::Test {
- protected:
-  const scene::SceneData data_ = FlatScene(41, 41, 1e-3f);
-  HeatField field_{MakeSheet(data_.View()), MakeMaterial(ThermalParams{})};
-  CutMeter meter_;
-};
-
-TEST_F(CutMeterTest, LengthDoesNotDependOnTheWidthOfTheSlit) {
-  for (const float half_width_m : {0.0003f, 0.0008f, 0.0018f}) {
-    HeatField field{MakeSheet(data_.View()), MakeMaterial(ThermalParams{})};
-    CutMeter meter;
-    Slit({0.008f, 0.010f}, {0.030f, 0.024f}, half_width_m, &field, &meter);
-    const float hole_m = Vec2f(0.022f, 0.014f).norm() + 2 * half_width_m;
-    EXPECT_GE(meter.length_m(), hole_m - 2.0f * kMarkSpacing) << half_width_m;
-    EXPECT_LE(meter.length_m(), 1.08f * hole_m) << half_width_m;
-  }
-}
-
-TEST_F(CutMeterTest, CrossingAndSeparateSlitsAddUp) {
-  Slit({0.005f, 0.010f}, {0.025f, 0.010f}, 0.0007f, &field_, &meter_);
-  Slit({0.015f, 0.004f}, {0.015f, 0.016f}, 0.0007f, &field_, &meter_);
-  EXPECT_NEAR(meter_.length_m(), 0.032f, 0.004f);
-  Slit({0.005f, 0.032f}, {0.015f, 0.032f}, 0.0007f, &field_, &meter_);
-  EXPECT_NEAR(meter_.length_m(), 0.042f, 0.005f);
-}
-
-TEST_F(CutMeterTest, GoesOnFromItsMarks) {
-  Slit({0.005f, 0.010f}, {0.025f, 0.010f}, 0.0007f, &field_, &meter_);
-  CutMeter restored;
-  restored.Restore(meter_.marks());
-  EXPECT_EQ(restored.length_m(), meter_.length_m());
-  Slit({0.025f, 0.010f}, {0.025f, 0.020f}, 0.0007f, &field_, &restored);
-  EXPECT_NEAR(restored.length_m(), 0.030f, 0.003f);
 }
 
 }  // namespace
