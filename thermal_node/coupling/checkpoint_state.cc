@@ -243,7 +243,6 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   header.shrink_bytes = static_cast<std::uint32_t>(bits.shrink.size());
   header.protected_warm = protected_.warm() ? 1 : 0;
   header.has_volume = volume_ != nullptr ? 1 : 0;
-  header.removed = removed_;
   writer.PutValue(header);
   SourceWindow::State window;
   source_.Export(&window);
@@ -359,7 +358,6 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   memory_ = header.memory;
   clock_s_ = header.clock_s;
   protected_dt_s_ = header.protected_dt_s;
-  removed_ = header.removed.empty() ? RemovedBox{} : header.removed;
   source_.Import(window);
   if (paper_ != nullptr) {
     paper_->set_corner(paper_corner);
