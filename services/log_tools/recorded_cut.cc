@@ -1,0 +1,239 @@
+#include "services/log_tools/recorded_cut.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <map>
+#include <optional>
+#include <type_traits>
+
+#include "services/bus/gate.h"
+#include "services/bus/input_account.h"
+#include "services/core/error.h"
+#include "services/log_tools/deformed_sheet.h"
+#include "services/log_tools/recording.h"
+#include "services/recording/recorded_scene.h"
+
+namespace fulcrum::log_tools {
+namespace {
+
+/// Distance between two samples of the metal's axis [m].
+constexpr float kAxisStep_m = 0.25e-3f;
+/// Of the neck, from the heel upwards, so much is bare [m].
+constexpr float kBareNeck_m = 5e-3f;
+/// A CauteryContact tells of this time after its own and no more: five of its periods [s].
+constexpr double kCurrentHolds_s = 0.05;
+/// A pose is not interpolated over a longer gap [ns].
+constexpr std::int64_t kPoseGap_ns = 50'000'000;
+
+struct Pose {
+  std::int64_t stamp_ns = 0;
+  Vec3f p_WT = Vec3f::Zero();
+  Quatf q_WT = Quatf::Identity();
+};
+
+/// Samples of the bare metal's axis in frame T: the foot from the heel along +x, the neck from the heel along -z.
+std::vector<Vec3f> MetalAxis(const ToolDescription& tool) {
+  std::vector<Vec3f> axis;
+  const auto add = [&](const Vec3f& end, bool with_heel) {
+    const int steps = std::max(1, static_cast<int>(std::lround(end.norm() / kAxisStep_m)));
+    for (int i = with_heel ? 0 : 1; i <= steps; ++i) {
+      axis.push_back(end * static_cast<float>(i) / static_cast<float>(steps));
+    }
+  };
+  add(Vec3f(tool.tip_length_m, 0, 0), true);
+  add(Vec3f(0, 0, -kBareNeck_m), false);
+  return axis;
+}
+
+SheetTexels TexelsOf(const SceneView& scene) {
+  SheetTexels texels;
+  texels.texel_m = static_cast<double>(scene.membrane.texel_m);
+  Vec2f low = scene.membrane_material.front(), high = low;
+  for (const Vec2f& place : scene.membrane_material) {
+    low = low.cwiseMin(place);
+    high = high.cwiseMax(place);
+  }
+  const auto texel = [&](float metres) { return static_cast<int>(std::floor(metres / scene.membrane.texel_m)); };
+  texels.x0 = texel(low.x());
+  texels.y0 = texel(low.y());
+  texels.width = texel(high.x()) + 1 - texels.x0;
+  texels.height = texel(high.y()) + 1 - texels.y0;
+  const std::size_t count = static_cast<std::size_t>(texels.width) * static_cast<std::size_t>(texels.height);
+  texels.removed.assign(count, 0);
+  texels.damage.assign(count, 0);
+  texels.temperature.assign(count, 0);
+  return texels;
+}
+
+/// Takes the messages of a session in the order of the recording.
+class Reader {
+ public:
+  Reader(const SceneView& scene, const ContactReach& reach) : scene_(scene), sheet_(scene) {
+    while (tool_ < scene.tools.size() && scene.tools[tool_].kind != ToolKind::kHook) ++tool_;
+    if (tool_ == scene.tools.size()) {
+      throw InputError(std::string("scene \"") + scene.name + "\" has no hook: nothing in it can cut");
+    }
+    const ToolDescription& tool = scene.tools[tool_];
+    axis_ = MetalAxis(tool);
+    limit_m_ = tool.tip_radius_m + reach.beyond_m +
+               (reach.with_collision_margin ? scene.physics.collision_margin_m : 0.0f);
+    cut_.texels = TexelsOf(scene);
+  }
+
+  void Begin(const SceneManifest& session) {
+    start_ns_ = session.session_start_ns;
+    cut_.session_id = session.session_id;
+  }
+
+  void Add(const ToolState& state) {
+    const ToolSample& sample = state.tools[tool_];
+    poses_.push_back({state.stamp.stamp_ns, sample.p_WT, sample.q_WT.normalized()});
+    Settle(false);
+  }
+
+  void Add(const TissueFrame& frame) {
+    if (frame.header.session_time_s < 0) return;
+    waiting_.push_back(frame);
+    Settle(false);
+  }
+
+  void Add(const CauteryContact& contact) {
+    if (contact.tool != tool_) return;
+    const CauteryMode mode = contact.power_W > 0 ? contact.mode : CauteryMode::kOff;
+    cut_.current.push_back({contact.session_time_s, contact.touching, mode, contact.power_W, contact.material});
+  }
+
+  void Add(const TopologyState& topology) {
+    dead_nodes_ = topology.dead_nodes;
+    dead_nodes_changed_ = true;
+    const double time_s = 1e-9 * static_cast<double>(topology.stamp.stamp_ns - start_ns_);
+    cut_.lengths.push_back({time_s, static_cast<double>(topology.cut_length_m)});
+  }
+
+  void Add(const TemperaturePatch& patch) {
+    if (patch.texels.size() < std::size_t{4} * kPatchTexels * kPatchTexels) return;
+    SheetTexels& texels = cut_.texels;
+    for (int y = 0; y < kPatchTexels; ++y) {
+      const int row = static_cast<int>(patch.header.origin_y) + y - texels.y0;
+      if (row < 0 || row >= texels.height) continue;
+      for (int x = 0; x < kPatchTexels; ++x) {
+        const int column = static_cast<int>(patch.header.origin_x) + x - texels.x0;
+        if (column < 0 || column >= texels.width) continue;
+        const std::uint8_t* texel = &patch.texels[4 * (static_cast<std::size_t>(y) * kPatchTexels + x)];
+        const std::size_t i = texels.Index(column, row);
+        const std::uint8_t removed = texel[3] == 0 ? 1 : 0;
+        texels.revived += texels.removed[i] > removed ? 1 : 0;
+        texels.removed[i] = removed;
+        texels.damage[i] = texel[1];
+        texels.temperature[i] = std::max({texels.temperature[i], texel[0], std::uint8_t{1}});
+      }
+    }
+  }
+
+  void Add(const Health& health) {
+    if (health.node == NodeId::kThermal && health.step.p50_us > 0) cut_.thermal_step = health.step;
+  }
+
+  RecordedCut Finish() {
+    Settle(true);
+    std::size_t at = 0;
+    for (MetalFrame& frame : cut_.metal) {
+      while (at + 1 < cut_.current.size() && cut_.current[at + 1].time_s <= frame.time_s + 1e-6) ++at;
+      if (at >= cut_.current.size()) break;
+      const double age_s = frame.time_s - cut_.current[at].time_s;
+      if (age_s > -1e-6 && age_s <= kCurrentHolds_s) frame.mode = cut_.current[at].mode;
+    }
+    return std::move(cut_);
+  }
+
+ private:
+  /// Frames whose tool pose is known by now; at the end those that are left are given up.
+  void Settle(bool end) {
+    while (!waiting_.empty()) {
+      const TissueFrame& frame = waiting_.front();
+      const std::int64_t stamp_ns = start_ns_ + std::llround(1e9 * frame.header.session_time_s);
+      if (!end && (poses_.empty() || poses_.back().stamp_ns < stamp_ns)) return;
+      // Poses before it are of no use to later frames, but for one.
+      while (poses_.size() > 1 && poses_[1].stamp_ns <= stamp_ns) poses_.pop_front();
+      if (const std::optional<Pose> pose = PoseAt(stamp_ns)) Locate(frame, *pose);
+      waiting_.pop_front();
+    }
+  }
+
+  [[nodiscard]] std::optional<Pose> PoseAt(std::int64_t stamp_ns) const {
+    if (poses_.size() < 2) return std::nullopt;
+    const Pose &a = poses_[0], &b = poses_[1];
+    if (stamp_ns < a.stamp_ns || stamp_ns > b.stamp_ns || b.stamp_ns - a.stamp_ns > kPoseGap_ns) return std::nullopt;
+    const auto u =
+        static_cast<float>(static_cast<double>(stamp_ns - a.stamp_ns) / static_cast<double>(b.stamp_ns - a.stamp_ns));
+    return Pose{stamp_ns, a.p_WT + u * (b.p_WT - a.p_WT), a.q_WT.slerp(u, b.q_WT)};
+  }
+
+  void Locate(const TissueFrame& frame, const Pose& pose) {
+    if (dead_nodes_changed_) sheet_.SetDeadNodes(dead_nodes_);
+    dead_nodes_changed_ = false;
+    if (!sheet_.SetPositions(frame.xyz)) return;
+    MetalFrame metal;
+    metal.time_s = frame.header.session_time_s;
+    metal.nearest_m = std::numeric_limits<float>::infinity();
+    Vec2f sum = Vec2f::Zero();
+    float weight = 0;
+    for (const Vec3f& p_T : axis_) {
+      const auto place = sheet_.Nearest(pose.p_WT + pose.q_WT * p_T, limit_m_);
+      if (!place) continue;
+      metal.touched.push_back(place->material);
+      metal.nearest_m = std::min(metal.nearest_m, place->distance_m);
+      sum += (limit_m_ - place->distance_m) * place->material;
+      weight += limit_m_ - place->distance_m;
+    }
+    metal.in_contact = weight > 0;
+    if (metal.in_contact) metal.centre = sum / weight;
+    cut_.metal.push_back(std::move(metal));
+  }
+
+  const SceneView& scene_;
+  std::size_t tool_ = 0;
+  std::vector<Vec3f> axis_;
+  float limit_m_ = 0;
+  std::int64_t start_ns_ = 0;
+  DeformedSheet sheet_;
+  std::vector<std::uint8_t> dead_nodes_;
+  bool dead_nodes_changed_ = false;
+  std::deque<Pose> poses_;
+  std::deque<TissueFrame> waiting_;
+  RecordedCut cut_;
+};
+
+}  // namespace
+
+RecordedCut ReadCut(const std::filesystem::path& file, const SceneView& scene, const ContactReach& reach) {
+  Reader reader(scene, reach);
+  Recording recording(file, {.topics = {"SceneManifest", "ToolState", "TissueFrame", "CauteryContact", "TopologyState",
+                                        "TemperaturePatch", "Health"}});
+  std::map<std::pair<TopicId, std::string>, bus::InputAccount> accounts;  // Of nodes that were restarted the newest.
+  std::optional<SceneManifest> session;
+  Entry entry;
+  while (recording.Next(&entry)) {
+    bus::InputAccount& account =
+        accounts.try_emplace({*entry.source->topic, entry.source->node}, false, true).first->second;
+    (void)WithDecoded(*entry.source->topic, entry.message.data, [&]<class T>(const T& message) {
+      if constexpr (std::is_same_v<T, SceneManifest>) {
+        if (session) return;
+        recording::RefuseOtherScene(file, message, scene);
+        session = message;
+        reader.Begin(message);
+      } else if constexpr (requires { reader.Add(message); }) {
+        if (!session || !bus::PassesGate(message) || !account.IsOfOwner(bus::StampOf(message))) return;
+        reader.Add(message);
+      }
+    });
+  }
+  if (!session) {
+    throw InputError(file.string() + ": no session begins in it (no SceneManifest); is it a dump of the last seconds?");
+  }
+  return reader.Finish();
+}
+
+}  // namespace fulcrum::log_tools

@@ -1,0 +1,75 @@
+// What a recording tells of a cut: the sheet's texels at the end, where the metal was on the sheet, where the current
+// was put, and the length that was reported.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "services/core/scene_view.h"
+
+namespace fulcrum::log_tools {
+
+/// Metal touches the sheet where it is nearer than its radius, and by so much more: what physics keeps between the two
+/// (its collision margin), and what the sheet's triangles differ from a smooth sheet.
+struct ContactReach {
+  bool with_collision_margin = true;  ///< Adds PhysicsParams::collision_margin_m.
+  float beyond_m = 0.15e-3f;
+};
+
+/// Texels of the atlas that cover the sheet, row by row; what they were in the last patch that showed them.
+struct SheetTexels {
+  int x0 = 0, y0 = 0;  ///< Atlas texel of the first column and row.
+  int width = 0, height = 0;
+  double texel_m = 1e-4;
+  std::vector<std::uint8_t> removed;      ///< 1 where there is nothing any more.
+  std::vector<std::uint8_t> damage;       ///< 255 * (1 - exp(-Omega)).
+  std::vector<std::uint8_t> temperature;  ///< Highest of all patches: 20 C + value * 0.5 K; 0: never shown.
+  int revived = 0;                        ///< Texels that were removed and were tissue again in a later patch.
+
+  [[nodiscard]] std::size_t Index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+  }
+};
+
+/// Where the metal touched the sheet at the time of one TissueFrame.
+struct MetalFrame {
+  double time_s = 0;                    ///< Session time.
+  std::vector<Vec2f> touched;           ///< Places of the sheet [m].
+  bool in_contact = false;              ///< `touched` is not empty.
+  Vec2f centre = Vec2f::Zero();         ///< Of these, the nearer the heavier [m].
+  float nearest_m = 0;                  ///< Least distance of the metal's axis to the sheet.
+  CauteryMode mode = CauteryMode::kOff; ///< Of the CauteryContact of that time; off without power.
+};
+
+/// One CauteryContact.
+struct CurrentSample {
+  double time_s = 0;
+  bool touching = false;
+  CauteryMode mode = CauteryMode::kOff;  ///< Off where there was no power.
+  float power_W = 0;
+  Vec2f material = Vec2f::Zero();  ///< [m]
+  [[nodiscard]] bool energised() const { return mode != CauteryMode::kOff; }
+};
+
+struct ReportedLength {
+  double time_s = 0;
+  double length_m = 0;
+};
+
+struct RecordedCut {
+  std::string session_id;
+  SheetTexels texels;
+  std::vector<MetalFrame> metal;
+  std::vector<CurrentSample> current;
+  std::vector<ReportedLength> lengths;
+  TimingSummary thermal_step;  ///< As thermal_node last told.
+};
+
+/// Of the hook of the scene. Throws InputError (no recording, no session in it, a scene without a hook) or
+/// MismatchError (a recording of another scene).
+[[nodiscard]] RecordedCut ReadCut(const std::filesystem::path& recording, const SceneView& scene,
+                                  const ContactReach& reach = {});
+
+}  // namespace fulcrum::log_tools
