@@ -124,6 +124,9 @@ class Reader {
         const std::uint8_t* texel = &patch.texels[4 * (static_cast<std::size_t>(y) * kPatchTexels + x)];
         const std::size_t i = texels.Index(column, row);
         const std::uint8_t removed = texel[3] == 0 ? 1 : 0;
+        if (removed != 0 && !first_removed_s_) {
+          first_removed_s_ = 1e-9 * static_cast<double>(patch.header.stamp.stamp_ns - start_ns_);
+        }
         texels.revived += texels.removed[i] > removed ? 1 : 0;
         texels.removed[i] = removed;
         texels.damage[i] = texel[1];
@@ -145,6 +148,12 @@ class Reader {
       const double age_s = frame.time_s - cut_.current[at].time_s;
       if (age_s > -1e-6 && age_s <= kCurrentHolds_s) frame.mode = cut_.current[at].mode;
     }
+    const auto touch = std::find_if(cut_.current.begin(), cut_.current.end(), [](const CurrentSample& sample) {
+      return sample.touching && sample.energised();
+    });
+    cut_.first_opening_s = touch != cut_.current.end() && first_removed_s_
+                               ? *first_removed_s_ - touch->time_s
+                               : std::numeric_limits<double>::quiet_NaN();
     return std::move(cut_);
   }
 
@@ -201,6 +210,7 @@ class Reader {
   DeformedSheet sheet_;
   std::vector<std::uint8_t> dead_nodes_;
   bool dead_nodes_changed_ = false;
+  std::optional<double> first_removed_s_;
   std::deque<Pose> poses_;
   std::deque<TissueFrame> waiting_;
   RecordedCut cut_;

@@ -65,6 +65,9 @@ struct RecordedCut {
   std::vector<CurrentSample> current;
   std::vector<ReportedLength> lengths;
   TimingSummary thermal_step;  ///< As thermal_node last told.
+  /// From the first energised touch to the first patch with a removed texel [s]; NaN: none. Patches show their hole up
+  /// to a period of theirs late.
+  double first_opening_s = 0;
 };
 
 /// Of the hook of the scene. Throws InputError (no recording, no session in it, a scene without a hook) or

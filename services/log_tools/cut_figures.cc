@@ -1,0 +1,181 @@
+#include "services/log_tools/cut_figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+
+namespace fulcrum::log_tools {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+/// The way is sampled at this distance, and open where a texel no farther than this is removed [m].
+constexpr double kWayStep_m = 0.1e-3, kOpenWithin_m = 0.15e-3;
+/// Of a smooth length nothing more than what the metal goes in this time can be new [s].
+constexpr double kJumpWindow_s = 0.05;
+/// Samples of one way are no farther apart; they come at 100 Hz [s].
+constexpr double kWayGap_s = 0.035;
+
+double Quantile(std::vector<double> values, double q) {
+  if (values.empty()) return kNone;
+  std::sort(values.begin(), values.end());
+  const double at = q * static_cast<double>(values.size() - 1);
+  const auto low = static_cast<std::size_t>(at);
+  const std::size_t high = std::min(low + 1, values.size() - 1);
+  return std::lerp(values[low], values[high], at - static_cast<double>(low));
+}
+
+bool Cuts(CauteryMode mode) { return mode == CauteryMode::kCut || mode == CauteryMode::kBlend; }
+
+bool IsOpen(const CutMap& map, const Vec2d& texel) {
+  const double reach = kOpenWithin_m / map.recorded.texels.texel_m;
+  const int x0 = static_cast<int>(std::floor(texel.x())), y0 = static_cast<int>(std::floor(texel.y()));
+  if (map.removed.At(x0, y0)) return true;
+  const int around = static_cast<int>(std::ceil(reach)) + 1;
+  for (int y = y0 - around; y <= y0 + around; ++y) {
+    for (int x = x0 - around; x <= x0 + around; ++x) {
+      if (map.removed.At(x, y) && (Vec2d(x + 0.5, y + 0.5) - texel).norm() <= reach) return true;
+    }
+  }
+  return false;
+}
+
+void MeasureWay(CutMap* map) {
+  int samples = 0, open = 0;
+  double way = 0, next = 0;
+  const MetalFrame* last = nullptr;
+  const double step = kWayStep_m / map->recorded.texels.texel_m;
+  for (const MetalFrame& frame : map->recorded.metal) {
+    if (!frame.in_contact || !Cuts(frame.mode)) {
+      last = nullptr;
+      continue;
+    }
+    const Vec2d to = map->ToTexel(frame.centre);
+    const Vec2d from = last != nullptr && frame.time_s - last->time_s < kWayGap_s ? map->ToTexel(last->centre) : to;
+    const double length = (to - from).norm();
+    for (; next <= length; next += step) {
+      const Vec2d at = length > 0 ? Vec2d(from + next / length * (to - from)) : to;
+      ++samples;
+      open += IsOpen(*map, at) ? 1 : 0;
+    }
+    next -= length;
+    way += length;
+    last = &frame;
+  }
+  map->figures.way_mm = 1e3 * way * map->recorded.texels.texel_m;
+  map->figures.open_pct = samples > 0 ? 100.0 * open / samples : kNone;
+}
+
+/// The place where the current was reported and the metal's, over the same times.
+void MeasureSpotWay(CutMap* map) {
+  const auto& metal = map->recorded.metal;
+  double spot = 0, centre = 0;
+  const CurrentSample* last_sample = nullptr;
+  const MetalFrame* last_frame = nullptr;
+  std::size_t at = 0;
+  for (const CurrentSample& sample : map->recorded.current) {
+    while (at + 1 < metal.size() &&
+           std::abs(metal[at + 1].time_s - sample.time_s) <= std::abs(metal[at].time_s - sample.time_s)) {
+      ++at;
+    }
+    const bool both = sample.energised() && sample.touching && at < metal.size() && metal[at].in_contact &&
+                      std::abs(metal[at].time_s - sample.time_s) < kWayGap_s;
+    if (both && last_sample != nullptr && sample.time_s - last_sample->time_s < kWayGap_s) {
+      spot += static_cast<double>((sample.material - last_sample->material).norm());
+      centre += static_cast<double>((metal[at].centre - last_frame->centre).norm());
+    }
+    last_sample = both ? &sample : nullptr;
+    last_frame = both ? &metal[at] : nullptr;
+  }
+  map->figures.spot_way_ratio = centre > 0 ? spot / centre : kNone;
+}
+
+/// Places where energised metal touched, by cells of a millimetre.
+class TouchedPlaces {
+ public:
+  explicit TouchedPlaces(const CutMap& map) {
+    for (const MetalFrame& frame : map.recorded.metal) {
+      if (frame.mode == CauteryMode::kOff) continue;
+      for (const Vec2f& place : frame.touched) cells_[CellOf(place.cast<double>())].push_back(place.cast<double>());
+    }
+  }
+  [[nodiscard]] bool empty() const { return cells_.empty(); }
+
+  [[nodiscard]] double DistanceTo(const Vec2d& place_m) const {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (int reach = 1; reach < 64; reach *= 2) {
+      const int x0 = Along(place_m.x()), y0 = Along(place_m.y());
+      for (int y = y0 - reach; y <= y0 + reach; ++y) {
+        for (int x = x0 - reach; x <= x0 + reach; ++x) {
+          const auto cell = cells_.find(Key(x, y));
+          if (cell == cells_.end()) continue;
+          for (const Vec2d& touched : cell->second) nearest = std::min(nearest, (touched - place_m).norm());
+        }
+      }
+      if (nearest <= reach * kCell_m) break;
+    }
+    return nearest;
+  }
+
+ private:
+  static constexpr double kCell_m = 1e-3;
+  static int Along(double metres) { return static_cast<int>(std::floor(metres / kCell_m)); }
+  static std::int64_t Key(int x, int y) { return (static_cast<std::int64_t>(x) << 32) ^ static_cast<std::uint32_t>(y); }
+  static std::int64_t CellOf(const Vec2d& place) { return Key(Along(place.x()), Along(place.y())); }
+
+  std::unordered_map<std::int64_t, std::vector<Vec2d>> cells_;
+};
+
+void MeasureCentreLine(CutMap* map) {
+  const double texel_mm = 1e3 * map->recorded.texels.texel_m;
+  CutFigures& figures = map->figures;
+  figures.length_mm = texel_mm * map->centre_line.length();
+  const TouchedPlaces touched(*map);
+  std::vector<double> widths, off_way;
+  for (const CentreLine::Stretch& stretch : map->centre_line.stretches) {
+    for (const CentrePoint& point : stretch.points) {
+      widths.push_back(texel_mm * point.width);
+      if (!touched.empty()) off_way.push_back(1e3 * touched.DistanceTo(map->ToSheet(point.place)));
+    }
+  }
+  figures.width_mm_p05 = Quantile(widths, 0.05);
+  figures.width_mm_p50 = Quantile(widths, 0.5);
+  figures.width_mm_p95 = Quantile(widths, 0.95);
+  figures.off_way_mm_p95 = Quantile(off_way, 0.95);
+}
+
+void MeasureReported(CutMap* map) {
+  const auto& lengths = map->recorded.lengths;
+  CutFigures& figures = map->figures;
+  std::size_t before = 0;
+  double largest = 0;
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    // What was told last at the beginning of the window held there.
+    while (before + 1 < i && lengths[before + 1].time_s <= lengths[i].time_s - kJumpWindow_s) ++before;
+    const bool known = lengths[before].time_s <= lengths[i].time_s - kJumpWindow_s;
+    if (i > 0) {
+      const double from = known ? lengths[before].length_m : lengths.front().length_m;
+      largest = std::max(largest, lengths[i].length_m - from);
+      figures.falls += lengths[i].length_m < lengths[i - 1].length_m ? 1 : 0;
+    }
+  }
+  figures.jump_mm_max = 1e3 * largest;
+  figures.reported_length_mm = lengths.empty() ? 0 : 1e3 * lengths.back().length_m;
+  figures.length_error_pct =
+      figures.length_mm > 0 ? 100 * (figures.reported_length_mm - figures.length_mm) / figures.length_mm : kNone;
+}
+
+}  // namespace
+
+void MeasureCut(CutMap* map) {
+  MeasureWay(map);
+  MeasureSpotWay(map);
+  MeasureCentreLine(map);
+  MeasureReported(map);
+  map->figures.revived = map->recorded.texels.revived;
+  map->figures.first_opening_s = map->recorded.first_opening_s;
+  map->figures.thermal_step_p50_ms = 1e-3 * static_cast<double>(map->recorded.thermal_step.p50_us);
+  map->figures.thermal_step_p99_ms = 1e-3 * static_cast<double>(map->recorded.thermal_step.p99_us);
+}
+
+}  // namespace fulcrum::log_tools
