@@ -25,18 +25,18 @@ struct CutFigures {
   double removed_mm2 = 0;
   int islands = 0;  ///< Living pieces below 4 mm^2 that are cut off from the sheet.
   double islands_mm2 = 0;
-  int pieces = 0;             ///< Living pieces of 4 mm^2 or more.
-  int holes = 0;              ///< Removed pieces.
-  int revived = 0;            ///< Texels that were removed and came back.
-  double open_pct = 0;        ///< Share of the metal's energised way that is open.
-  double way_mm = 0;          ///< Length of that way.
+  int pieces = 0;       ///< Living pieces of 4 mm^2 or more.
+  int holes = 0;        ///< Removed pieces.
+  int revived = 0;      ///< Texels that were removed and came back.
+  double open_pct = 0;  ///< Share of the metal's energised way that is open.
+  double way_mm = 0;    ///< Length of that way.
   double width_mm_p05 = 0, width_mm_p50 = 0, width_mm_p95 = 0;
   double off_way_mm_p95 = 0;  ///< From the centre line to the nearest place where energised metal touched.
   double spot_way_ratio = 0;  ///< Way of the reported place of the current per way of the metal.
   double length_mm = 0;       ///< Of the centre line, from end to end.
   double reported_length_mm = 0, length_error_pct = 0;
-  double jump_mm_max = 0;  ///< Largest rise of the reported length within 50 ms.
-  int falls = 0;           ///< How often it fell.
+  double jump_mm_max = 0;      ///< Largest rise of the reported length within 50 ms.
+  int falls = 0;               ///< How often it fell.
   double first_opening_s = 0;  ///< From the first energised touch to the first texel removed.
   double thermal_step_p50_ms = 0, thermal_step_p99_ms = 0;
 };
@@ -53,12 +53,10 @@ struct CutMap {
   [[nodiscard]] bool has_cut() const { return figures.removed_mm2 > 0; }
   /// Texels of `removed` to metres of the sheet, and back.
   [[nodiscard]] Vec2d ToSheet(const Vec2d& texel) const {
-    return recorded.texels.texel_m *
-           (texel + Vec2d(x0 + recorded.texels.x0, y0 + recorded.texels.y0));
+    return recorded.texels.texel_m * (texel + Vec2d(x0 + recorded.texels.x0, y0 + recorded.texels.y0));
   }
   [[nodiscard]] Vec2d ToTexel(const Vec2f& sheet_m) const {
-    return sheet_m.cast<double>() / recorded.texels.texel_m -
-           Vec2d(x0 + recorded.texels.x0, y0 + recorded.texels.y0);
+    return sheet_m.cast<double>() / recorded.texels.texel_m - Vec2d(x0 + recorded.texels.x0, y0 + recorded.texels.y0);
   }
 };
 

@@ -77,8 +77,8 @@ class Reader {
     }
     const ToolDescription& tool = scene.tools[tool_];
     axis_ = MetalAxis(tool);
-    limit_m_ = tool.tip_radius_m + reach.beyond_m +
-               (reach.with_collision_margin ? scene.physics.collision_margin_m : 0.0f);
+    limit_m_ =
+        tool.tip_radius_m + reach.beyond_m + (reach.with_collision_margin ? scene.physics.collision_margin_m : 0.0f);
     cut_.texels = TexelsOf(scene);
   }
 
@@ -148,12 +148,10 @@ class Reader {
       const double age_s = frame.time_s - cut_.current[at].time_s;
       if (age_s > -1e-6 && age_s <= kCurrentHolds_s) frame.mode = cut_.current[at].mode;
     }
-    const auto touch = std::find_if(cut_.current.begin(), cut_.current.end(), [](const CurrentSample& sample) {
-      return sample.touching && sample.energised();
-    });
-    cut_.first_opening_s = touch != cut_.current.end() && first_removed_s_
-                               ? *first_removed_s_ - touch->time_s
-                               : std::numeric_limits<double>::quiet_NaN();
+    const auto touch = std::find_if(cut_.current.begin(), cut_.current.end(),
+                                    [](const CurrentSample& sample) { return sample.touching && sample.energised(); });
+    cut_.first_opening_s = touch != cut_.current.end() && first_removed_s_ ? *first_removed_s_ - touch->time_s
+                                                                           : std::numeric_limits<double>::quiet_NaN();
     return std::move(cut_);
   }
 

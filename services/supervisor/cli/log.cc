@@ -1,12 +1,18 @@
 // fulcrum log: recordings, read and compared.
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <iostream>
 #include <limits>
 
 #include "services/core/error.h"
+#include "services/log_tools/cut_map.h"
+#include "services/log_tools/cut_picture.h"
 #include "services/log_tools/tools.h"
+#include "services/recording/recorded_scene.h"
+#include "services/scene/scene_file.h"
 #include "services/supervisor/cli/commands.h"
+#include "services/supervisor/session_folder.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {
@@ -140,6 +146,38 @@ ExitCode Recover(const po::variables_map& values, const Files& files) {
   return ExitCode::kDone;
 }
 
+void AddMapOptions(po::options_description* options) {
+  options->add_options()                                                                                            //
+      ("out", po::value<std::string>()->value_name("FILE"), "the picture (default: cut.png beside the recording)")  //
+      ("json", po::value<std::string>()->value_name("FILE"), "write the figures here, too")                         //
+      ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
+       "compiled scene; default: scene.fulcrum beside the recording");
+}
+
+ExitCode Map(const po::variables_map& values, const Files& files) {
+  if (files.size() != 1) {
+    throw InputError("map draws one recording; see fulcrum log map --help");
+  }
+  const fs::path scene_file = recording::BesideRecording(values["scene"].as<std::string>(), files[0], "scene.fulcrum");
+  if (scene_file.empty()) {
+    throw InputError("no scene.fulcrum beside " + files[0].string() +
+                     ": give the compiled scene of that session with --scene");
+  }
+  const scene::SceneFile scene(scene_file);
+  const log_tools::CutMap map = log_tools::ReadCutMap(files[0], scene.view());
+  const fs::path picture = values.count("out") != 0 ? fs::path(values["out"].as<std::string>())
+                                                    : fs::path(files[0]).replace_filename("cut.png");
+  WriteFile(picture, log_tools::DrawCutMap(map, std::string(scene.view().name) + "  " + map.recorded.session_id));
+  if (values.count("json") != 0) {
+    WriteFile(values["json"].as<std::string>(), log_tools::FiguresJson(map));
+  }
+  for (const auto& [name, value] : log_tools::FigureList(map.figures)) {
+    std::printf("%-22s %10.3f\n", name.c_str(), value);
+  }
+  std::printf("%s\n", picture.c_str());
+  return ExitCode::kDone;
+}
+
 constexpr std::array kTools{
     Tool{"info", "info FILE...", "What a recording holds: session, topics, rates, losses.", NoOptions, Info},
     Tool{"list", "list [FOLDER...]", "The recordings in a folder (default: out), oldest first.", NoOptions, List},
@@ -151,6 +189,7 @@ constexpr std::array kTools{
          AddDiffOptions, Diff},
     Tool{"recover", "recover FILE... [options]", "What can be read of a cut or damaged file into a whole one.",
          AddRecoverOptions, Recover},
+    Tool{"map", "map FILE [options]", "What was cut, as a picture, and its figures.", AddMapOptions, Map},
 };
 
 void PrintTools() {
