@@ -58,29 +58,42 @@ Vec2d Outward(const std::vector<Vec2d>& points, double window) {
   return out.norm() > 0 ? Vec2d(out.normalized()) : Vec2d::UnitX();
 }
 
+/// Distance to what is clear where the ridge is: thinning leaves a line up to a pixel beside it.
+double RidgeAt(const Pixel& at, const std::vector<float>& distance, const Mask& fine) {
+  float ridge = 0;
+  for (int y = at.y - 1; y <= at.y + 1; ++y) {
+    for (int x = at.x - 1; x <= at.x + 1; ++x) {
+      if (fine.Contains(x, y)) ridge = std::max(ridge, distance[fine.Index(x, y)]);
+    }
+  }
+  return static_cast<double>(ridge);
+}
+
 CentreLine::Stretch StretchOf(const Branch& branch, const Skeleton& skeleton, const std::vector<float>& distance,
                               const Mask& fine, double window) {
   Course course;
   course.closed = branch.closed;
   for (const Pixel& at : branch.pixels) {
     course.points.emplace_back(at.x + 0.5, at.y + 0.5);
-    course.half_widths.push_back(static_cast<double>(distance[fine.Index(at.x, at.y)]) - kToEdge);
+    course.half_widths.push_back(RidgeAt(at, distance, fine) - kToEdge);
   }
   const auto junction = [&](int number) { return skeleton.junctions[static_cast<std::size_t>(number)]; };
   if (branch.from >= 0) {
     course.points.insert(course.points.begin(), junction(branch.from).centre);
-    course.half_widths.insert(course.half_widths.begin(), static_cast<double>(junction(branch.from).half_width));
+    course.half_widths.insert(course.half_widths.begin(),
+                              static_cast<double>(junction(branch.from).half_width) - kToEdge);
   }
   if (branch.to >= 0) {
     course.points.push_back(junction(branch.to).centre);
-    course.half_widths.push_back(static_cast<double>(junction(branch.to).half_width));
+    course.half_widths.push_back(static_cast<double>(junction(branch.to).half_width) - kToEdge);
   }
   std::vector<Vec2d> points = Smoothed(course, window);
   std::vector<double> half_widths = course.half_widths;
   // A free end goes on to the end of the hole; a single pixel to both sides.
   for (int side = 0; side < 2; ++side) {
     if (!branch.closed && (side == 0 ? branch.from : branch.to) < 0) {
-      const double reach = half_widths.front();
+      const Pixel& last = side == 0 ? branch.pixels.front() : branch.pixels.back();
+      const double reach = static_cast<double>(distance[fine.Index(last.x, last.y)]) - kToEdge;
       const Vec2d out = points.size() > 1 ? Outward(points, 0.5 * window) : Vec2d(side == 0 ? -1 : 1, 0);
       const Vec2d end = points.front() + reach * out;
       points.insert(points.begin(), end);

@@ -7,7 +7,7 @@
 namespace fulcrum::log_tools {
 namespace {
 
-/// Clockwise from the upper one: P2 … P9 of Zhang and Suen.
+/// Clockwise from the upper one: P2 … P9 of Guo and Hall.
 constexpr std::array<Pixel, 8> kRing{Pixel{0, -1}, {1, -1}, {1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}};
 
 std::array<bool, 8> RingOf(const Mask& mask, int x, int y) {
@@ -18,25 +18,6 @@ std::array<bool, 8> RingOf(const Mask& mask, int x, int y) {
 
 int CountOf(const std::array<bool, 8>& ring) { return static_cast<int>(std::count(ring.begin(), ring.end(), true)); }
 
-/// One of the two passes; the pixels that remain stay in `pixels`. True when any was removed.
-bool Pass(Mask* mask, std::vector<Pixel>* pixels, bool first) {
-  std::vector<Pixel> removed, kept;
-  kept.reserve(pixels->size());
-  for (const Pixel& at : *pixels) {
-    const auto p = RingOf(*mask, at.x, at.y);
-    const int count = CountOf(p);
-    int rises = 0;
-    for (std::size_t i = 0; i < p.size(); ++i) rises += !p[i] && p[(i + 1) % p.size()] ? 1 : 0;
-    const bool north = p[0], east = p[2], south = p[4], west = p[6];
-    const bool edge = first ? !(north && east && south) && !(east && south && west)
-                            : !(north && east && west) && !(north && south && west);
-    (count >= 2 && count <= 6 && rises == 1 && edge ? removed : kept).push_back(at);
-  }
-  for (const Pixel& at : removed) mask->Put(at.x, at.y, false);
-  pixels->swap(kept);
-  return !removed.empty();
-}
-
 /// Whether the set pixels and the clear ones around stay connected as they are without this one: its 8-neighbours that
 /// are set are connected among themselves (Yokoi's number is 1).
 bool IsSimple(const std::array<bool, 8>& p) {
@@ -45,6 +26,27 @@ bool IsSimple(const std::array<bool, 8>& p) {
     number += !p[i] && (p[i + 1] || p[(i + 2) % p.size()]) ? 1 : 0;
   }
   return number == 1;
+}
+
+/// One of the two passes; the pixels that remain stay in `pixels`. True when any was removed.
+bool Pass(Mask* mask, std::vector<Pixel>* pixels, bool first) {
+  std::vector<Pixel> removed, kept;
+  kept.reserve(pixels->size());
+  for (const Pixel& at : *pixels) {
+    const auto p = RingOf(*mask, at.x, at.y);
+    // Guo and Hall's N: pairs of neighbours of which one is set, from either beginning.
+    int even = 0, odd = 0;
+    for (std::size_t i = 0; i < p.size(); i += 2) {
+      even += p[i] || p[i + 1] ? 1 : 0;
+      odd += p[i + 1] || p[(i + 2) % p.size()] ? 1 : 0;
+    }
+    const int pairs = std::min(even, odd);
+    const bool needed = first ? (p[4] || p[5] || !p[7]) && p[6] : (p[0] || p[1] || !p[3]) && p[2];
+    (IsSimple(p) && pairs >= 2 && pairs <= 3 && !needed ? removed : kept).push_back(at);
+  }
+  for (const Pixel& at : removed) mask->Put(at.x, at.y, false);
+  pixels->swap(kept);
+  return !removed.empty();
 }
 
 std::vector<Pixel> PixelsOf(const Mask& mask) {
@@ -65,7 +67,7 @@ void RemoveSteps(Mask* mask) {
   }
 }
 
-/// Zhang and Suen's passes erase squares of 2 x 2.
+/// A piece may be gone that ends nowhere.
 void RestoreLostPieces(const Mask& mask, std::span<const float> distance, Mask* thin) {
   const Pieces found = FindPieces(mask, true, Neighbours::kEight);
   std::vector<bool> kept(found.pieces.size());

@@ -9,8 +9,9 @@
 
 namespace fulcrum::log_tools {
 
-/// Zhang and Suen, "A fast parallel algorithm for thinning digital patterns" (1984), then sequential removal of what is
-/// still not needed for the connection. Every 8-connected piece keeps at least a pixel.
+/// Guo and Hall, "Parallel thinning with two-subiteration algorithms" (1989), A1, then sequential removal of what is
+/// still not needed for the connection. Zhang and Suen's passes would erase slanting lines of two pixels' width. Every
+/// 8-connected piece keeps at least a pixel.
 /// @param distance DistanceToClear(mask).
 [[nodiscard]] Mask Thinned(const Mask& mask, std::span<const float> distance);
 

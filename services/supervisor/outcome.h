@@ -30,6 +30,7 @@ struct SessionOutcome {
   ExitCode exit_code = ExitCode::kDone;
   /// Of all topics; a recorder that was restarted has written another beside it, "-2" and so on. Empty: none.
   std::filesystem::path recording;
+  std::filesystem::path cut_map;    ///< Picture of what was cut; empty: no recording, or nothing cut.
   std::optional<ScoreSheet> sheet;  ///< None: the scene has no section `assessment`.
   std::string trainee;              ///< Empty: not told.
   std::string verdict;              ///< Empty when all is well; else one line that says what is not.

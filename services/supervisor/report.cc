@@ -103,6 +103,18 @@ std::string Pictures(const std::filesystem::path& folder, const std::filesystem:
   return html + "</div>\n";
 }
 
+/// What the recording shows of the cut.
+std::string CutMap(const std::filesystem::path& picture) {
+  const std::string data = picture.empty() ? std::string() : EmbedPng(picture, 1);
+  return data.empty() ? std::string()
+                      : Tag("h2", "The cut") +
+                            "<div class='card'><figure><img style='width: auto; max-width: 100%; margin: 0 auto' "
+                            "alt='map of the cut' src='" +
+                            data +
+                            "'><figcaption>From the recording alone; fulcrum log map draws it again."
+                            "</figcaption></figure></div>\n";
+}
+
 std::string Plots(const SessionOutcome& outcome, const SessionRecord& record) {
   PlotSettings settings;
   settings.end_s = outcome.duration_s;
@@ -224,8 +236,8 @@ std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& recor
   html += EscapeHtml(outcome.scene_name + " · " + outcome.session_id) + "</title><style>" + kStyle;
   html += "</style></head><body><main>\n";
   html += Header(outcome) + Tiles(record) + (outcome.sheet ? SheetHtml(*outcome.sheet, outcome.trainee) : "") +
-          Pictures(frames, clip) + Plots(outcome, record) + Nodes(outcome, record) + Restarts(record) +
-          Refusals(record) + Events(record);
+          Pictures(frames, clip) + CutMap(outcome.cut_map) + Plots(outcome, record) + Nodes(outcome, record) +
+          Restarts(record) + Refusals(record) + Events(record);
   if (!outcome.recording.empty()) {
     html += Tag("h2", "Recording") + Tag("p", "All topics: " + outcome.recording.string() + ", " +
                                                   RecordingLosses(record) + " (fulcrum log info says more).");

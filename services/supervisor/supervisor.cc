@@ -30,6 +30,7 @@
 #include "services/scene/scene_file.h"
 #include "services/supervisor/attached_node.h"
 #include "services/supervisor/clip.h"
+#include "services/supervisor/cut_map_file.h"
 #include "services/supervisor/domain_guard.h"
 #include "services/supervisor/node_process.h"
 #include "services/supervisor/node_starter.h"
@@ -637,6 +638,7 @@ struct Supervisor::Impl {
       Remember(&outcome);
     }
     WriteFile(folder.path / "summary.json", SummaryJson(outcome, record));
+    outcome.cut_map = WriteCutMap(recording, scene.view(), folder.path);
     const std::filesystem::path clip = folder.path / "clip.mp4";
     (void)MakeClip(folder.frames, clip, folder.logs / "clip.log");
     WriteFile(folder.path / "report.html", ReportHtml(outcome, record, folder.frames, clip));
