@@ -15,6 +15,7 @@
 
 #include "services/app/cart_security.h"
 #include "services/app/health_report.h"
+#include "services/bus/access.h"
 #include "services/bus/dds/participant.h"
 #include "services/bus/dds/shared_memory.h"
 #include "services/bus/input_account.h"

@@ -1,0 +1,254 @@
+#include "tests/benchmark/cut/session.h"
+
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <thread>
+
+#include "services/core/error.h"
+#include "services/log_tools/cut_picture.h"
+#include "services/log_tools/recording.h"
+#include "services/scene/compile.h"
+#include "services/scene/scene_file.h"
+#include "tests/support/cart.h"
+#include "tests/support/program.h"
+
+namespace fulcrum::benchmark {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// As in the scene that it goes by: deep enough to touch all the way on a sheet that gives way [m].
+constexpr double kHeel_m = -1.0e-3;
+constexpr double kTouch_s = 1.0, kTouchBesideGrasper_s = 2.6, kTail_s = 0.4;
+/// A session takes its time and this to start, end and report.
+constexpr double kPatience_s = 40;
+
+struct Place {
+  double s, t;
+};
+Place MiddleOf(Held held) { return held == Held::kOrgan ? Place{0.5, 0.5} : Place{0.56, 0.5}; }
+
+const char* TrocarOf(Foot foot) {
+  switch (foot) {
+    case Foot::kUp:
+      return "[-85, -45, 115]";
+    case Foot::kLevel:
+      return "[0, -120, 110]";
+    case Foot::kDown:
+      break;
+  }
+  return "[85, -45, 115]";
+}
+
+bool UsesGrasper(Held held) { return held == Held::kTaut || held == Held::kTented; }
+
+std::string GrasperKeys(Held held) {
+  if (!UsesGrasper(held)) return "    - {time_s: 0, sheet: [0.36, 0.5], height_mm: 55, jaw_deg: 20}\n";
+  std::ostringstream keys;
+  const auto key = [&](double time_s, const char* rest) {
+    keys << "    - {time_s: " << time_s << ", sheet: [0.36, 0.5], " << rest << "}\n";
+  };
+  key(0.0, "height_mm: 10, jaw_deg: 50");
+  key(0.4, "height_mm: -2.5, jaw_deg: 50");
+  key(0.6, "height_mm: -2.5, jaw_deg: 50");
+  key(1.0, "height_mm: -2.5, jaw_deg: 0");
+  key(2.4, held == Held::kTented ? "height_mm: 18, offset_mm: [-2, 0, 0], jaw_deg: 0"
+                                 : "height_mm: 4, offset_mm: [-6, 0, 0], jaw_deg: 0");
+  return keys.str();
+}
+
+std::string SceneYaml(const SessionPlan& plan, const StrokeTimes& times) {
+  const Place middle = MiddleOf(plan.held);
+  std::ostringstream yaml;
+  yaml << "name: " << plan.name << "\nbase: " << FULCRUM_SOURCE_DIR << "/deploy/scenes/built-in.yaml\n"
+       << "nodes: [handle_bridge, haptics_node, physics_node, thermal_node]\n"
+       << "tools:\n  tool0: {kind: grasper, trocar_mm: "
+       << (plan.foot == Foot::kUp ? "[-85, 45, 115]" : "[-85, -45, 115]")
+       << "}\n  tool1: {kind: hook, trocar_mm: " << TrocarOf(plan.foot) << ", tip_radius_mm: 0.5}\n"
+       << "physics: {dt_ms: " << plan.dt_ms << ", preset: " << plan.preset
+       << (plan.held == Held::kSlack ? ", membrane_prestrain: 0" : "") << "}\n"
+       << "script:\n  duration_s: " << times.over_s + kTail_s << "\n  tool0:\n"
+       << GrasperKeys(plan.held) << "  tool1:\n";
+  // Places are those of the recorded motion; of the script only pedal and power are played.
+  const auto key = [&](double time_s, const std::string& pedal) {
+    yaml << "    - {time_s: " << time_s << ", sheet: [" << middle.s << ", " << middle.t << "], height_mm: 25" << pedal
+         << "}\n";
+  };
+  std::ostringstream pressed;
+  pressed << ", pedal: " << plan.pedal << ", power_W: " << plan.power_W;
+  key(0, "");
+  key(times.touch_s, pressed.str());
+  key(times.end_s, "");
+  return yaml.str();
+}
+
+std::string CartYaml(const SessionPlan& plan, const std::string& motion) {
+  std::ostringstream yaml;
+  yaml << "name: bench\nhandles:\n  tool0: {kind: simulated}\n  tool1: {kind: simulated, hand: right}\n"
+       << "pedal: {kind: simulated}\ndevices:\n  tool0: {kind: simulated}\n  tool1:\n    kind: simulated\n"
+       << "    motion: " << motion << "\n    workspace: {rotation_deg: [0, 0, 0], trocar_mm: [0, 0, 0], scale: 1}\n"
+       << "nodes:\n  physics_node: {rate_Hz: " << 1000 / plan.dt_ms << "}\n";
+  return yaml.str();
+}
+
+void Write(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
+
+/// Two threads that do nothing but take processor time.
+class Load {
+ public:
+  explicit Load(bool on) {
+    for (int i = 0; on && i < 2; ++i) {
+      threads_.emplace_back([this] {
+        while (!ends_.load(std::memory_order_relaxed)) {
+        }
+      });
+    }
+  }
+  ~Load() {
+    ends_ = true;
+    for (std::thread& thread : threads_) thread.join();
+  }
+  Load(const Load&) = delete;
+  Load& operator=(const Load&) = delete;
+
+ private:
+  std::atomic<bool> ends_{false};
+  std::vector<std::thread> threads_;
+};
+
+/// Positions of the last TissueFrame before the hook comes.
+std::vector<Vec3f> LastNodes(const fs::path& recording, const SceneView& scene) {
+  std::vector<Vec3f> nodes;
+  log_tools::Recording file(recording, {.topics = {"TissueFrame"}});
+  log_tools::Entry entry;
+  while (file.Next(&entry)) {
+    (void)log_tools::WithDecoded(*entry.source->topic, entry.message.data, [&]<class T>(const T& message) {
+      if constexpr (std::is_same_v<T, TissueFrame>) {
+        const std::size_t first = scene.membrane.first, count = scene.membrane.node_count();
+        if (message.xyz.size() < 3 * (first + count)) return;
+        nodes.resize(count);
+        for (std::size_t i = 0; i < count; ++i) {
+          nodes[i] = Eigen::Map<const Vec3f>(&message.xyz[3 * (first + i)]);
+        }
+      }
+    });
+  }
+  return nodes;
+}
+
+}  // namespace
+
+std::string Describe(const SessionPlan& plan) {
+  constexpr const char* kHeld[] = {"free", "slack", "organ", "taut", "tented"};
+  constexpr const char* kFoot[] = {"down", "up", "level"};
+  std::ostringstream text;
+  text << plan.name << ": " << NameOf(plan.shape) << ", " << plan.speed_mm_s << " mm/s, " << plan.power_W << " W "
+       << plan.pedal << ", " << kHeld[static_cast<int>(plan.held)] << ", foot " << kFoot[static_cast<int>(plan.foot)]
+       << (plan.loaded ? ", loaded" : "") << ", " << plan.dt_ms << " ms, " << plan.preset;
+  return text.str();
+}
+
+SessionRunner::SessionRunner(fs::path keep)
+    : folder_(fs::temp_directory_path() / ("bench_cut." + std::to_string(::getpid()))),
+      keep_(std::move(keep)),
+      // Of another cart on this machine nothing is to be heard.
+      domain_(20 + static_cast<int>(::getpid() % 75)) {
+  fs::create_directories(folder_);
+  if (!keep_.empty()) fs::create_directories(keep_);
+}
+
+SessionRunner::~SessionRunner() {
+  std::error_code ignored;
+  fs::remove_all(folder_, ignored);
+}
+
+std::optional<log_tools::CutMap> SessionRunner::Run(const SessionPlan& plan) {
+  std::fprintf(stderr, "%s\n", Describe(plan).c_str());
+  const fs::path yaml = folder_ / (plan.name + ".yaml"), cart = folder_ / (plan.name + "-cart.yaml"),
+                 motion = folder_ / (plan.name + ".csv");
+  // Times do not matter to the sheet.
+  Write(yaml, SceneYaml(plan, {1, 1.1, 2, 3}));
+  const scene::CompiledScene compiled = scene::CompileScene(yaml, {}, {});
+  const SceneView view = compiled.data.View();
+  std::vector<Vec3f> nodes(view.rest_position.begin() + view.membrane.first,
+                           view.rest_position.begin() + view.membrane.first + view.membrane.node_count());
+  if (plan.held == Held::kTented) nodes = TentedNodes(plan);
+  if (nodes.empty()) return std::nullopt;
+  const Sheet sheet{view, nodes};
+  const Place middle = MiddleOf(plan.held);
+  std::vector<Vec2d> course = CourseOf(plan.shape, 1e-3 * plan.longest_mm);
+  for (Vec2d& place : course) place += sheet.MaterialAt(middle.s, middle.t);
+  Stroke stroke = MakeStroke(sheet, course, 1e-3 * plan.speed_mm_s, kHeel_m,
+                             UsesGrasper(plan.held) ? kTouchBesideGrasper_s : kTouch_s, plan.stay_s);
+  Write(motion, haptics::ToText(stroke.motion));
+  Write(yaml, SceneYaml(plan, stroke.times));
+  Write(cart, CartYaml(plan, motion));
+  return RunFiles(plan.name, yaml, cart, stroke.times.over_s + kTail_s, plan.loaded);
+}
+
+std::optional<log_tools::CutMap> SessionRunner::RunScene(const std::string& name, const std::string& base) {
+  const fs::path yaml = folder_ / (name + ".yaml");
+  Write(yaml, "name: " + name + "\nbase: " + FULCRUM_SOURCE_DIR + "/deploy/scenes/" + base +
+                  ".yaml\nnodes: [handle_bridge, haptics_node, physics_node, thermal_node]\n");
+  const double seconds = static_cast<double>(scene::CompileScene(yaml, {}, {}).data.fixed.script_duration_s);
+  std::fprintf(stderr, "%s: script of %s\n", name.c_str(), base.c_str());
+  return RunFiles(name, yaml, {}, seconds, false);
+}
+
+std::optional<log_tools::CutMap> SessionRunner::RunFiles(const std::string& name, const fs::path& scene,
+                                                         const fs::path& cart, double seconds, bool loaded) {
+  const fs::path out = folder_ / name;
+  std::vector<std::string> arguments{"up", scene, "--record", "--domain", std::to_string(domain_), "--out", out};
+  if (!cart.empty()) arguments.insert(arguments.end(), {"--cart", cart});
+  std::optional<int> code;
+  std::string said;
+  {
+    const Load load(loaded);
+    testing::Program up("fulcrum", arguments);
+    (void)testing::WaitFor(seconds + kPatience_s, [&] { return (code = up.Poll()).has_value(); });
+    said = up.Said();
+  }
+  const fs::path session = out / "latest";
+  std::optional<log_tools::CutMap> map;
+  if (fs::exists(session / "recording.mcap")) {
+    const scene::SceneFile file(session / "scene.fulcrum");
+    map = log_tools::ReadCutMap(session / "recording.mcap", file.view());
+    if (!keep_.empty()) {
+      Write(keep_ / (name + ".png"), log_tools::DrawCutMap(*map, name));
+      Write(keep_ / (name + ".json"), log_tools::FiguresJson(*map));
+      std::error_code ignored;
+      fs::remove_all(keep_ / name, ignored);
+      fs::create_directories(keep_ / name);
+      for (const char* part : {"recording.mcap", "scene.fulcrum", "configuration.yaml", "cart.yaml"}) {
+        fs::copy_file(session / part, keep_ / name / part, ignored);
+      }
+    }
+  }
+  // A node that ran late makes `fulcrum up` complain, not the recording useless.
+  if (code != 0) std::fprintf(stderr, "%s: fulcrum up: %s\n", name.c_str(), said.c_str());
+  if (name.ends_with("-probe")) return map;
+  fs::remove_all(out);
+  return map;
+}
+
+std::vector<Vec3f> SessionRunner::TentedNodes(const SessionPlan& plan) {
+  // The hook stays away.
+  SessionPlan probe = plan;
+  probe.name = plan.name + "-probe";
+  const fs::path yaml = folder_ / (probe.name + ".yaml");
+  Write(yaml, SceneYaml(probe, {1, 1.1, 2, kTouchBesideGrasper_s}));
+  if (!RunFiles(probe.name, yaml, {}, kTouchBesideGrasper_s + kTail_s, false)) return {};
+  const fs::path session = folder_ / probe.name / "latest";
+  const scene::SceneFile file(session / "scene.fulcrum");
+  std::vector<Vec3f> nodes = LastNodes(session / "recording.mcap", file.view());
+  fs::remove_all(folder_ / probe.name);
+  return nodes;
+}
+
+}  // namespace fulcrum::benchmark

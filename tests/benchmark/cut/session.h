@@ -1,0 +1,61 @@
+// One session of the real nodes: a hook that follows a stroke on the built-in scene, recorded, and the map of its cut.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/log_tools/cut_map.h"
+#include "tests/benchmark/cut/stroke.h"
+
+namespace fulcrum::benchmark {
+
+/// How the membrane is held: free, free and without prestrain, over the middle of the organ, pulled by the grasper
+/// beside the path, or lifted by it.
+enum class Held { kFree, kSlack, kOrgan, kTaut, kTented };
+/// How the foot lies, which goes by the trocar: its end deep in the tissue, up (the heel cuts), or level.
+enum class Foot { kDown, kUp, kLevel };
+
+struct SessionPlan {
+  std::string name;  ///< Part of its keys, "s07".
+  Shape shape = Shape::kAlong;
+  double speed_mm_s = 4;
+  double power_W = 35;
+  std::string pedal = "cut";
+  Held held = Held::kFree;
+  Foot foot = Foot::kDown;
+  bool loaded = false;  ///< Two busy threads beside.
+  double dt_ms = 10;
+  std::string preset = "default";
+  double longest_mm = 22;
+  double stay_s = 0.1;  ///< Down before it sets out, pedal pressed already.
+};
+
+[[nodiscard]] std::string Describe(const SessionPlan& plan);
+
+/// Runs it; nothing when the session did not end well, which is told on stderr.
+class SessionRunner {
+ public:
+  /// @param keep recordings and maps stay there; empty: nothing stays.
+  explicit SessionRunner(std::filesystem::path keep);
+  ~SessionRunner();
+  SessionRunner(const SessionRunner&) = delete;
+  SessionRunner& operator=(const SessionRunner&) = delete;
+
+  [[nodiscard]] std::optional<log_tools::CutMap> Run(const SessionPlan& plan);
+  /// A scene as it is, with its own script.
+  [[nodiscard]] std::optional<log_tools::CutMap> RunScene(const std::string& name, const std::string& base);
+
+ private:
+  [[nodiscard]] std::optional<log_tools::CutMap> RunFiles(const std::string& name, const std::filesystem::path& scene,
+                                                          const std::filesystem::path& cart, double seconds,
+                                                          bool loaded);
+  /// Where the nodes of the sheet are once the grasper has lifted it.
+  [[nodiscard]] std::vector<Vec3f> TentedNodes(const SessionPlan& plan);
+
+  std::filesystem::path folder_, keep_;
+  int domain_;
+};
+
+}  // namespace fulcrum::benchmark
