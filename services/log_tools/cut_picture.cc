@@ -55,7 +55,7 @@ class Drawing {
         width_(scale_ * map.removed.width),
         height_(scale_ * map.removed.height),
         canvas_(kLeft + width_ + kGap + kPanel, std::max(kTop + height_ + kBottom, kTop + kPanelHeight), kPaper) {
-    canvas_.Text(kLeft, 14, title, kInk);
+    canvas_.Text(kLeft + 24, 14, title, kInk);
   }
 
   std::string Run() {

@@ -2,7 +2,8 @@
 //
 //   bench_cut [--quick] [--session N] [--keep DIR] [PREFIX]
 //
-// --session N: only this one of the matrix. --keep DIR: recordings, maps and their figures stay there, to be looked at.
+// --session N: only this one of the matrix; 0: the script of the built-in scene. --keep DIR: recordings, maps and their
+// figures stay there, to be looked at.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -32,8 +33,8 @@ struct Row {
   Foot foot;
   bool loaded;
 };
-/// Each value meets nearly each other value once; what is left out are shapes too long for 2 mm/s, and some of the 40
-/// pairs of shape and hold.
+/// The first six are the usual stroke in six shapes. Each value meets nearly each other value once; what is left out
+/// are shapes too long for 2 mm/s, and some of the 40 pairs of shape and hold.
 constexpr std::array kMatrix{
     Row{Shape::kAlong, 4, 35, Held::kFree, Foot::kDown, false},
     Row{Shape::kCircle, 4, 35, Held::kFree, Foot::kUp, false},
@@ -118,6 +119,12 @@ class Bench {
       if (!map) continue;
       all.push_back(map->figures);
       if (plan.power_W == 35 && plan.speed_mm_s == 4) usual.push_back(map->figures);
+    }
+    if (only ? *only == 0 : !report_->quick() && WantsSummary()) {
+      const std::optional<CutMap> map = runner_.RunScene("script", "built-in");
+      failed_ += map ? 0 : 1;
+      if (map) AddFigures("script", map->figures, report_);
+      if (map) all.push_back(map->figures);
     }
     if (!only) Summarise(all, usual);
   }
@@ -305,8 +312,8 @@ int Main(int argc, char** argv) {
       rest.push_back(argv[i]);
     }
   }
-  if (only && (*only < 1 || *only > kMatrix.size())) {
-    std::fprintf(stderr, "bench_cut: --session: valid: 1 to %zu\n", kMatrix.size());
+  if (only && *only > kMatrix.size()) {
+    std::fprintf(stderr, "bench_cut: --session: valid: 1 to %zu; 0: the script of built-in\n", kMatrix.size());
     return 2;
   }
   Report report(static_cast<int>(rest.size()), rest.data());

@@ -23,8 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// As in the scene that it goes by: deep enough to touch all the way on a sheet that gives way [m].
-constexpr double kHeel_m = -1.0e-3;
+/// Deep enough to touch all the way on a sheet that gives way [m].
+constexpr double kLowest_m = -1.0e-3;
 constexpr double kTouch_s = 1.0, kTouchBesideGrasper_s = 2.6, kTail_s = 0.4;
 /// A session takes its time and this to start, end and report.
 constexpr double kPatience_s = 40;
@@ -184,7 +184,7 @@ std::optional<log_tools::CutMap> SessionRunner::Run(const SessionPlan& plan) {
   const Place middle = MiddleOf(plan.held);
   std::vector<Vec2d> course = CourseOf(plan.shape, 1e-3 * plan.longest_mm);
   for (Vec2d& place : course) place += sheet.MaterialAt(middle.s, middle.t);
-  Stroke stroke = MakeStroke(sheet, course, 1e-3 * plan.speed_mm_s, kHeel_m,
+  Stroke stroke = MakeStroke(sheet, course, 1e-3 * plan.speed_mm_s, kLowest_m,
                              UsesGrasper(plan.held) ? kTouchBesideGrasper_s : kTouch_s, plan.stay_s);
   Write(motion, haptics::ToText(stroke.motion));
   Write(yaml, SceneYaml(plan, stroke.times));
