@@ -77,8 +77,9 @@ class Reader {
     }
     const ToolDescription& tool = scene.tools[tool_];
     axis_ = MetalAxis(tool);
-    limit_m_ =
-        tool.tip_radius_m + reach.beyond_m + (reach.with_collision_margin ? scene.physics.collision_margin_m : 0.0f);
+    const float margin_m = scene.physics.collision_margin_m;
+    limit_m_ = tool.tip_radius_m + reach.beyond_m +
+               (reach.with_collision_margin ? margin_m : std::min(margin_m, 0.5f * scene.thermal.thickness_m));
     cut_.texels = TexelsOf(scene);
   }
 

@@ -11,10 +11,12 @@
 
 namespace fulcrum::log_tools {
 
-/// Metal touches the sheet where it is nearer than its radius, and by so much more: what physics keeps between the two
-/// (its collision margin), and what the sheet's triangles differ from a smooth sheet.
+/// Metal touches the sheet where its axis is nearer to the sheet's middle than its radius, what physics keeps between
+/// the two, and what the sheet's triangles differ from a smooth sheet.
 struct ContactReach {
-  bool with_collision_margin = true;  ///< Adds PhysicsParams::collision_margin_m.
+  /// False: physics keeps half the sheet's thickness from bare metal. True: all of PhysicsParams::collision_margin_m,
+  /// as in recordings from before CauteryContact had points of the metal.
+  bool with_collision_margin = false;
   float beyond_m = 0.15e-3f;
 };
 

@@ -28,6 +28,9 @@ constexpr double kLowest_m = -1.0e-3;
 constexpr double kTouch_s = 1.0, kTouchBesideGrasper_s = 2.6, kTail_s = 0.4;
 /// A session takes its time and this to start, end and report.
 constexpr double kPatience_s = 40;
+/// Of the time for which the pedal is pressed, this much at least must have reached the generator.
+constexpr double kLeastEnergised = 0.9;
+constexpr int kTries = 3;
 
 struct Place {
   double s, t;
@@ -144,6 +147,21 @@ std::vector<Vec3f> LastNodes(const fs::path& recording, const SceneView& scene) 
 
 }  // namespace
 
+namespace {
+
+/// Share of [from, to) in which the generator was on.
+double EnergisedShare(const log_tools::CutMap& map, const StrokeTimes& times) {
+  int all = 0, on = 0;
+  for (const log_tools::CurrentSample& sample : map.recorded.current) {
+    if (sample.time_s < times.touch_s || sample.time_s >= times.end_s) continue;
+    ++all;
+    on += sample.energised() ? 1 : 0;
+  }
+  return all > 0 ? static_cast<double>(on) / all : 0;
+}
+
+}  // namespace
+
 std::string Describe(const SessionPlan& plan) {
   constexpr const char* kHeld[] = {"free", "slack", "organ", "taut", "tented"};
   constexpr const char* kFoot[] = {"down", "up", "level"};
@@ -189,7 +207,17 @@ std::optional<log_tools::CutMap> SessionRunner::Run(const SessionPlan& plan) {
   Write(motion, haptics::ToText(stroke.motion));
   Write(yaml, SceneYaml(plan, stroke.times));
   Write(cart, CartYaml(plan, motion));
-  return RunFiles(plan.name, yaml, cart, stroke.times.over_s + kTail_s, plan.loaded);
+  std::optional<log_tools::CutMap> map;
+  for (int i = 0; i < kTries; ++i) {
+    map = RunFiles(plan.name, yaml, cart, stroke.times.over_s + kTail_s, plan.loaded);
+    if (!map) break;
+    const double share = EnergisedShare(*map, stroke.times);
+    if (share >= kLeastEnergised) break;
+    std::fprintf(stderr, "%s: the pedal was heard for %.0f %% of the stroke only: no measure of the cut\n",
+                 plan.name.c_str(), 100 * share);
+    map.reset();
+  }
+  return map;
 }
 
 std::optional<log_tools::CutMap> SessionRunner::RunScene(const std::string& name, const std::string& base) {

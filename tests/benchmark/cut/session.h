@@ -43,6 +43,8 @@ class SessionRunner {
   SessionRunner(const SessionRunner&) = delete;
   SessionRunner& operator=(const SessionRunner&) = delete;
 
+  /// Again, and once more, when the pedal was not heard for most of the stroke: simulated firmware that gets no
+  /// processor time sends nothing, and physics takes its pedal for up.
   [[nodiscard]] std::optional<log_tools::CutMap> Run(const SessionPlan& plan);
   /// A scene as it is, with its own script.
   [[nodiscard]] std::optional<log_tools::CutMap> RunScene(const std::string& name, const std::string& base);
