@@ -58,12 +58,21 @@ Rgb Mix(const Rgb& a, const Rgb& b, double f) {
 Canvas::Canvas(int width, int height, const Rgb& background)
     : width_(width),
       height_(height),
+      right_(width),
+      bottom_(height),
       pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), background) {}
+
+void Canvas::Clip(int x0, int y0, int x1, int y1) {
+  left_ = std::max(0, x0);
+  top_ = std::max(0, y0);
+  right_ = std::min(width_, x1);
+  bottom_ = std::min(height_, y1);
+}
 
 void Canvas::Put(int x, int y, const Rgb& colour) { Blend(x, y, colour, 1); }
 
 void Canvas::Blend(int x, int y, const Rgb& colour, double cover) {
-  if (x < 0 || y < 0 || x >= width_ || y >= height_) return;
+  if (x < left_ || y < top_ || x >= right_ || y >= bottom_) return;
   Rgb& pixel = pixels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
   pixel = Mix(pixel, colour, std::clamp(cover, 0.0, 1.0));
 }

@@ -23,6 +23,10 @@ class Canvas {
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
 
+  /// From now on only x0 … x1 - 1 and y0 … y1 - 1 are drawn on.
+  void Clip(int x0, int y0, int x1, int y1);
+  void Unclip() { Clip(0, 0, width_, height_); }
+
   // Nothing happens beyond the borders.
   void Put(int x, int y, const Rgb& colour);
   /// Mixes with what is there; `cover` 0 … 1.
@@ -45,6 +49,7 @@ class Canvas {
 
  private:
   int width_, height_;
+  int left_ = 0, top_ = 0, right_, bottom_;  ///< What may be drawn on.
   std::vector<Rgb> pixels_;
 };
 

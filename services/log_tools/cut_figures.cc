@@ -15,6 +15,8 @@ constexpr double kWayStep_m = 0.1e-3, kOpenWithin_m = 0.15e-3;
 constexpr double kJumpWindow_s = 0.05;
 /// Samples of one way are no farther apart; they come at 100 Hz [s].
 constexpr double kWayGap_s = 0.035;
+/// A way of samples goes on from one to the next that is so far away: what is nearer is noise and no way [m].
+constexpr double kVertex_m = 0.2e-3;
 
 double Quantile(std::vector<double> values, double q) {
   if (values.empty()) return kNone;
@@ -66,12 +68,28 @@ void MeasureWay(CutMap* map) {
   map->figures.open_pct = samples > 0 ? 100.0 * open / samples : kNone;
 }
 
+/// Length of a way that samples show with noise.
+class NoisyWay {
+ public:
+  void Begin(const Vec2f& at) { last_ = at; }
+  void GoTo(const Vec2f& at) {
+    const auto step = static_cast<double>((at - last_).norm());
+    if (step < kVertex_m) return;
+    length_m_ += step;
+    last_ = at;
+  }
+  [[nodiscard]] double length_m() const { return length_m_; }
+
+ private:
+  Vec2f last_ = Vec2f::Zero();
+  double length_m_ = 0;
+};
+
 /// The place where the current was reported and the metal's, over the same times.
 void MeasureSpotWay(CutMap* map) {
   const auto& metal = map->recorded.metal;
-  double spot = 0, centre = 0;
-  const CurrentSample* last_sample = nullptr;
-  const MetalFrame* last_frame = nullptr;
+  NoisyWay spot, centre;
+  const CurrentSample* last = nullptr;
   std::size_t at = 0;
   for (const CurrentSample& sample : map->recorded.current) {
     while (at + 1 < metal.size() &&
@@ -80,14 +98,16 @@ void MeasureSpotWay(CutMap* map) {
     }
     const bool both = sample.energised() && sample.touching && at < metal.size() && metal[at].in_contact &&
                       std::abs(metal[at].time_s - sample.time_s) < kWayGap_s;
-    if (both && last_sample != nullptr && sample.time_s - last_sample->time_s < kWayGap_s) {
-      spot += static_cast<double>((sample.material - last_sample->material).norm());
-      centre += static_cast<double>((metal[at].centre - last_frame->centre).norm());
+    if (both && last != nullptr && sample.time_s - last->time_s < kWayGap_s) {
+      spot.GoTo(sample.material);
+      centre.GoTo(metal[at].centre);
+    } else if (both) {
+      spot.Begin(sample.material);
+      centre.Begin(metal[at].centre);
     }
-    last_sample = both ? &sample : nullptr;
-    last_frame = both ? &metal[at] : nullptr;
+    last = both ? &sample : nullptr;
   }
-  map->figures.spot_way_ratio = centre > 0 ? spot / centre : kNone;
+  map->figures.spot_way_ratio = centre.length_m() > 0 ? spot.length_m() / centre.length_m() : kNone;
 }
 
 /// Places where energised metal touched, by cells of a millimetre.

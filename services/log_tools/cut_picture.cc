@@ -59,10 +59,12 @@ class Drawing {
   }
 
   std::string Run() {
+    canvas_.Clip(kLeft, kTop, kLeft + width_, kTop + height_);
     DrawTexels();
     DrawTouched();
     DrawCentreLine();
     DrawWays();
+    canvas_.Unclip();
     DrawAxes();
     DrawPanel();
     return canvas_.Png();

@@ -232,6 +232,20 @@ TEST(CutMap, StraightCutFollowsItsMetal) {
   EXPECT_NEAR(figures.jump_mm_max, 11.8, 1e-4);
 }
 
+TEST(CutMap, NoiseOfTheSpotIsNoWayButItsLeapsAre) {
+  Mask mask(200, 300);
+  Stroke(&mask, {{100, 50}, {100, 250}}, 6);
+  RecordedCut noisy = SheetOf(mask);
+  AddWay(&noisy, {10, 5}, {10, 25});
+  RecordedCut leaping = noisy;
+  for (std::size_t i = 0; i < noisy.current.size(); ++i) {
+    noisy.current[i].material.x() += i % 2 == 0 ? 0.03e-3f : -0.03e-3f;
+    leaping.current[i].material.x() += i % 2 == 0 ? 1e-3f : -1e-3f;
+  }
+  EXPECT_NEAR(MakeCutMap(std::move(noisy)).figures.spot_way_ratio, 1, 0.1);
+  EXPECT_NEAR(MakeCutMap(std::move(leaping)).figures.spot_way_ratio, 20, 0.5);
+}
+
 TEST(CutMap, ClosedHalfOfTheWayIsTold) {
   Mask mask(200, 300);
   Stroke(&mask, {{100, 50}, {100, 150}}, 6);
