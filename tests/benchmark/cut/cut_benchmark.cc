@@ -202,6 +202,8 @@ class Bench {
     report_->Add("cut.live.hook_place_spread_mm_p95", PlaceSpread(same), "mm");
   }
 
+  /// Sessions that were run again, as starved firmware did not send the pedal.
+  void TellRepeated() { report_->Add("cut.live.repeated_sessions", runner_.repeated(), "1"); }
   [[nodiscard]] int failed() const { return failed_; }
 
  private:
@@ -325,6 +327,7 @@ int Main(int argc, char** argv) {
     bench.RunCoag();
     bench.RunRepeats();
   }
+  bench.TellRepeated();
   return bench.failed() == 0 ? 0 : 1;
 }
 

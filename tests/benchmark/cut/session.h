@@ -14,7 +14,8 @@ namespace fulcrum::benchmark {
 /// How the membrane is held: free, free and without prestrain, over the middle of the organ, pulled by the grasper
 /// beside the path, or lifted by it.
 enum class Held { kFree, kSlack, kOrgan, kTaut, kTented };
-/// How the foot lies, which goes by the trocar: its end deep in the tissue, up (the heel cuts), or level.
+/// How the foot lies, which goes by the trocar: its end first, pointing steeply into the sheet, its heel first with the
+/// end up, or level.
 enum class Foot { kDown, kUp, kLevel };
 
 struct SessionPlan {
@@ -46,6 +47,8 @@ class SessionRunner {
   /// Again, and once more, when the pedal was not heard for most of the stroke: simulated firmware that gets no
   /// processor time sends nothing, and physics takes its pedal for up.
   [[nodiscard]] std::optional<log_tools::CutMap> Run(const SessionPlan& plan);
+  /// Runs that were given up for their pedal: what is left is no fair sample where there are many.
+  [[nodiscard]] int repeated() const { return repeated_; }
   /// A scene as it is, with its own script.
   [[nodiscard]] std::optional<log_tools::CutMap> RunScene(const std::string& name, const std::string& base);
 
@@ -54,10 +57,11 @@ class SessionRunner {
                                                           const std::filesystem::path& cart, double seconds,
                                                           bool loaded);
   /// Where the nodes of the sheet are once the grasper has lifted it.
-  [[nodiscard]] std::vector<Vec3f> TentedNodes(const SessionPlan& plan);
+  [[nodiscard]] std::vector<Vec3f> TentedNodes(const SessionPlan& plan, const Vec3d& trocar_W);
 
   std::filesystem::path folder_, keep_;
   int domain_;
+  int repeated_ = 0;
 };
 
 }  // namespace fulcrum::benchmark

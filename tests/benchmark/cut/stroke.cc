@@ -109,16 +109,9 @@ Vec2d Sheet::MaterialAt(double s, double t) const {
   return scene.membrane_material[row * grid.cols + col].cast<double>();
 }
 
-Stroke MakeStroke(const Sheet& sheet, const std::vector<Vec2d>& course_m, double speed_m_s, double lowest_m,
-                  double touch_s, double stay_s) {
-  const ToolDescription& tool = sheet.scene.tools[1];
-  const haptics::Trocar trocar{tool.p_WP.cast<double>(), static_cast<double>(tool.shaft_length_m)};
-  // Where the foot points downwards its end is the lowest.
-  const Vec3d middle = sheet.Above(course_m[course_m.size() / 2], 0);
-  const Vec3d normal = (sheet.Above(course_m[course_m.size() / 2], 1e-3) - middle).normalized();
-  const Eigen::Quaterniond q_WT = haptics::ToolOrientation((middle - trocar.p_WP).normalized(), Vec3d::UnitX());
-  const double end_m = static_cast<double>(tool.tip_length_m) * (q_WT * Vec3d::UnitX()).dot(normal);
-  const double heel_m = lowest_m - std::min(0.0, end_m);
+Stroke MakeStroke(const Sheet& sheet, const std::vector<Vec2d>& course_m, const Vec3d& trocar_W, double speed_m_s,
+                  double heel_m, double touch_s, double stay_s) {
+  const haptics::Trocar trocar{trocar_W, static_cast<double>(sheet.scene.tools[1].shaft_length_m)};
   std::vector<Vec3d> path;
   std::vector<double> along{0};
   for (const Vec2d& place : course_m) path.push_back(sheet.Above(place, heel_m));

@@ -44,8 +44,8 @@ struct Stroke {
 };
 
 /// The heel of tool 1 comes down at the first place, waits, goes along the course at `speed_m_s`, and is lifted.
-/// @param lowest_m height above the sheet of the foot's lowest place, heel or end; negative: below.
-[[nodiscard]] Stroke MakeStroke(const Sheet& sheet, const std::vector<Vec2d>& course_m, double speed_m_s,
-                                double lowest_m, double touch_s, double stay_s);
+/// @param heel_m its height above the sheet; negative: below.
+[[nodiscard]] Stroke MakeStroke(const Sheet& sheet, const std::vector<Vec2d>& course_m, const Vec3d& trocar_W,
+                                double speed_m_s, double heel_m, double touch_s, double stay_s);
 
 }  // namespace fulcrum::benchmark
