@@ -28,7 +28,7 @@ inline constexpr float kUnitTolerance = 1e-2f;
 
 inline constexpr std::size_t kMaxConsumedInputs = 8;
 inline constexpr std::size_t kMaxInputHealths = 16;
-inline constexpr std::size_t kMaxMetrics = 16;
+inline constexpr std::size_t kMaxMetrics = 24;
 inline constexpr std::size_t kMaxMetricName = 31;
 inline constexpr std::size_t kMaxSceneName = 63;
 inline constexpr std::size_t kMaxSessionId = 63;

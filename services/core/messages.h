@@ -343,7 +343,7 @@ struct Health {
   TimingSummary wake;               ///< Lateness of the wake-up, since the start.
   std::string last_error;           ///< At most 255 characters; empty when all is well.
   std::vector<InputHealth> inputs;  ///< At most 16.
-  std::vector<Metric> metrics;      ///< At most 16.
+  std::vector<Metric> metrics;      ///< At most 24.
 };
 
 }  // namespace fulcrum

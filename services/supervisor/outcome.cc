@@ -33,6 +33,8 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
   constexpr std::array kSources{Source{kHaptics, "peak_force_N", "peak force", "N", 2},
                                 Source{kThermal, "highest_temperature_C", "highest temperature", "°C", 0},
                                 Source{kThermal, "cut_length_mm", "cut length", "mm", 1},
+                                Source{kThermal, "cut_width_p50_mm", "width of the slit, median", "mm", 2},
+                                Source{kThermal, "hook_temperature_C", "highest temperature of the hook", "°C", 0},
                                 Source{kPhysics, "max_displacement_mm", "largest displacement", "mm", 1},
                                 Source{kPhysics, "grasped_particles", "particles grasped at most", "", 0},
                                 Source{kThermal, "dead_edges", "membrane edges severed", "", 0},

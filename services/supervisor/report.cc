@@ -136,6 +136,7 @@ std::string Plots(const SessionOutcome& outcome, const SessionRecord& record) {
   add("Force on the hand", "N", {line("tool 0", "#1f6feb", "force0_N"), line("tool 1", "#bc4c00", "force1_N")});
   add("Hottest spot", "°C", {line("temperature", "#cf222e", "temperature_C")});
   add("Cut length", "mm", {line("cut", "#8250df", "cut_length_mm")});
+  add("Power of the generator", "W", {line("set", "#57606a", "set_power_W"), line("delivered", "#bc4c00", "power_W")});
   add("Displacement of the tissue", "mm", {line("displacement", "#1a7f37", "displacement_mm")});
   if (html.empty()) {
     return {};
