@@ -42,8 +42,8 @@ struct ToolShape {
 /// scissors: two jaws about a hinge at -z * tip_length, opening in the x-z plane by jaw_rad / 2 each, and the shaft.
 [[nodiscard]] ToolShape ShapeOf(const ToolDescription& tool, const ToolPose& pose);
 
-/// Tissue is kept this far from a capsule's surface, measured to the middle of the sheet. Of a hook's bare metal that is
-/// half the sheet's thickness, so that what the solver holds in contact touches the metal electrically as well [m].
+/// Tissue is kept this far from a capsule's surface, measured to the middle of the sheet. Of a hook's bare metal that
+/// is half the sheet's thickness, so that what the solver holds in contact touches the metal electrically as well [m].
 [[nodiscard]] inline float ContactMargin(const SceneView& scene, ToolPart part) {
   const float margin = scene.physics.collision_margin_m;
   return part == ToolPart::kTip ? std::min(margin, 0.5f * scene.thermal.thickness_m) : margin;

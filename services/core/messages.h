@@ -145,11 +145,12 @@ struct ContactModel {
 
 enum class CauteryMode : std::uint8_t { kOff, kCut, kCoag, kBlend };
 
-/// A point of the bare metal's axis as the sheet sees it. Successive points bound a piece of metal between them; the points
-/// are the same points of the metal in each sample.
+/// A point of the bare metal's axis as the sheet sees it. Successive points bound a piece of metal between them; the
+/// points are the same points of the metal in each sample.
 struct MetalPoint {
   Vec2f material = Vec2f::Zero();  ///< (s, t) of the place on the rest sheet that is nearest to the point [m].
-  /// Distance of the axis from the middle of the deformed sheet there; its sign changes where the axis goes through it [m].
+  /// Distance of the axis from the middle of the deformed sheet there; its sign changes where the axis goes through it
+  /// [m].
   float height_m = 0;
 };
 inline constexpr std::size_t kMaxMetalPoints = 24;
@@ -159,17 +160,17 @@ struct CauteryContact {
   double session_time_s = 0;
   std::uint64_t topology_revision = 0;
   bool touching = false;  ///< The metal touches the membrane, or an arc reaches it.
-  bool tented = false;  ///< Membrane lifted off the tissue beneath.
+  bool tented = false;    ///< Membrane lifted off the tissue beneath.
   CauteryMode mode = CauteryMode::kOff;
   std::uint8_t tool = 0;
   std::uint32_t triangle = kNoIndex;  ///< Membrane triangle: 2 * cell + half, cell = row * (cols-1) + col.
   std::array<float, 3> barycentric{0, 0, 0};
-  Vec2f material = Vec2f::Zero();       ///< (s, t) of the contact's centre on the rest sheet [m].
-  Vec2f material_rate = Vec2f::Zero();  ///< [m/s].
-  float contact_radius_m = 0;           ///< Of the metal around its axis.
-  std::uint32_t metal_count = 0;        ///< Points filled; 0 unless touching.
+  Vec2f material = Vec2f::Zero();                 ///< (s, t) of the contact's centre on the rest sheet [m].
+  Vec2f material_rate = Vec2f::Zero();            ///< [m/s].
+  float contact_radius_m = 0;                     ///< Of the metal around its axis.
+  std::uint32_t metal_count = 0;                  ///< Points filled; 0 unless touching.
   std::array<MetalPoint, kMaxMetalPoints> metal;  ///< From the end of the foot up the neck.
-  float power_W = 0;  ///< Asked of the generator; 0 with the pedal up.
+  float power_W = 0;                              ///< Asked of the generator; 0 with the pedal up.
 };
 
 // -------------------------------------------------------------------------------------------- TopologyState

@@ -18,8 +18,8 @@ inline constexpr int kWindowCells = kWindow * kWindow;
 struct PotentialProblem {
   alignas(64) std::array<float, kWindowCells> sigma{};    ///< Electrical conductivity [S/m]; 0: no tissue.
   alignas(64) std::array<float, kWindowCells> contact{};  ///< Conductance to the electrode [S].
-  alignas(64) std::array<float, kWindowCells> lost{};     ///< Part of `contact` whose heat does not go into the cell [S].
-  alignas(64) std::array<float, kWindowCells> ground{};   ///< Conductance to the return electrode [S].
+  alignas(64) std::array<float, kWindowCells> lost{};  ///< Part of `contact` whose heat does not go into the cell [S].
+  alignas(64) std::array<float, kWindowCells> ground{};  ///< Conductance to the return electrode [S].
   float face_s = 0;  ///< d * lt / ls: conductance of a face across s is this times the harmonic sigma [m].
   float face_t = 0;
 };

@@ -162,21 +162,22 @@ TEST(GateRanges, ContactModel) {
 }
 
 TEST(GateRanges, CauteryContact) {
-  ExpectRefused<CauteryContact>({{"unknown mode", [](auto& m) { m.mode = BeyondLast<CauteryMode>(); }},
-                                 {"third tool", [](auto& m) { m.tool = 2; }},
-                                 {"weights beyond 1",
-                                  [](auto& m) {
-                                    m.barycentric = {2, -1, 0};
-                                  }},
-                                 {"weights do not sum to 1",
-                                  [](auto& m) {
-                                    m.barycentric = {0.1f, 0.1f, 0.1f};
-                                  }},
-                                 {"more metal than there is room for", [](auto& m) { m.metal_count = kMaxMetalPoints + 1; }},
-                                 {"metal beyond the room", [](auto& m) { m.metal[2].height_m = -1e3f; }},
-                                 {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }},
-                                 {"negative power", [](auto& m) { m.power_W = -1; }},
-                                 {"power beyond any generator", [](auto& m) { m.power_W = 1001; }}});
+  ExpectRefused<CauteryContact>(
+      {{"unknown mode", [](auto& m) { m.mode = BeyondLast<CauteryMode>(); }},
+       {"third tool", [](auto& m) { m.tool = 2; }},
+       {"weights beyond 1",
+        [](auto& m) {
+          m.barycentric = {2, -1, 0};
+        }},
+       {"weights do not sum to 1",
+        [](auto& m) {
+          m.barycentric = {0.1f, 0.1f, 0.1f};
+        }},
+       {"more metal than there is room for", [](auto& m) { m.metal_count = kMaxMetalPoints + 1; }},
+       {"metal beyond the room", [](auto& m) { m.metal[2].height_m = -1e3f; }},
+       {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }},
+       {"negative power", [](auto& m) { m.power_W = -1; }},
+       {"power beyond any generator", [](auto& m) { m.power_W = 1001; }}});
 }
 
 TEST(GateRanges, TopologyState) {
@@ -226,7 +227,7 @@ TEST(GateRanges, Health) {
                          {"negative time", [](auto& m) { m.step.p99_us = -1; }},
                          {"unknown topic", [](auto& m) { m.inputs[0].topic = BeyondLast<TopicId>(); }},
                          {"too many inputs", [](auto& m) { m.inputs.resize(17); }},
-                         {"too many metrics", [](auto& m) { m.metrics.resize(17); }},
+                         {"too many metrics", [](auto& m) { m.metrics.resize(25); }},
                          {"metric's name too long", [](auto& m) { m.metrics[0].name = std::string(32, 'x'); }}});
 }
 

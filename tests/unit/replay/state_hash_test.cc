@@ -30,8 +30,8 @@ struct Expected {
   std::uint64_t physics, thermal, haptics;
 };
 
-constexpr Expected kSmall{"small", 3.2, 0xe738997ef17fe03a, 0x89425c1e8582d53c, 0x9f02c953bcd2f2e9};
-constexpr Expected kBuiltIn{"built-in", 9.0, 0x0b80f03c4cd1f21c, 0x496ce5dfeb63bbcb, 0x0df4653ebfd545d1};
+constexpr Expected kSmall{"small", 3.2, 0xf7841ba3fa073273, 0x19ca500bc7d2e26a, 0x36686dbf74047d42};
+constexpr Expected kBuiltIn{"built-in", 9.0, 0xa60854d541e9d490, 0xb10948c54b32975e, 0x15a420a95d4ee24a};
 
 // Nobody has compared what clang and the sanitizers come to, and under these it takes minutes.
 #if defined(__clang__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)

@@ -74,8 +74,8 @@ TEST_F(WhatIfTest, AWeakGeneratorCutsLess) {
   EXPECT_NE(ReportText(result, {NodeId::kPhysics, NodeId::kThermal}).find("cut length"), std::string::npos);
 }
 
-// Open loop: the hook goes where it went, and no discharge burns across the steam beneath it. (Tissue that boils at once is
-// no such change: it is opened wider, and the centre line of a wide hole is not longer.)
+// Open loop: the hook goes where it went, and no discharge burns across the steam beneath it. (Tissue that boils at
+// once is no such change: it is opened wider, and the centre line of a wide hole is not longer.)
 TEST_F(WhatIfTest, BelowTheVoltageOfDischargesHardlyAnythingIsCut) {
   const WhatIfResult result = WhatIf({"thermal.v_max_V=60"}, {NodeId::kThermal});
   EXPECT_EQ(result.missing, "");

@@ -112,7 +112,7 @@ TEST_F(ThermalNodeTest, CutGivesTopologyEventsPatchesAndMetrics) {
 
   Health health;
   node->FillHealth(&health);
-  EXPECT_LE(health.metrics.size(), 16u);
+  EXPECT_LE(health.metrics.size(), 24u);
   const auto metric = [&](const std::string& name) {
     for (const Metric& m : health.metrics) {
       if (m.name == name) return m.value;
