@@ -70,7 +70,7 @@ SheetTexels TexelsOf(const SceneView& scene) {
 /// Takes the messages of a session in the order of the recording.
 class Reader {
  public:
-  Reader(const SceneView& scene, const ContactReach& reach) : scene_(scene), sheet_(scene) {
+  Reader(const SceneView& scene, const ContactReach& reach) : sheet_(scene) {
     while (tool_ < scene.tools.size() && scene.tools[tool_].kind != ToolKind::kHook) ++tool_;
     if (tool_ == scene.tools.size()) {
       throw InputError(std::string("scene \"") + scene.name + "\" has no hook: nothing in it can cut");
@@ -201,7 +201,6 @@ class Reader {
     cut_.metal.push_back(std::move(metal));
   }
 
-  const SceneView& scene_;
   std::size_t tool_ = 0;
   std::vector<Vec3f> axis_;
   float limit_m_ = 0;
