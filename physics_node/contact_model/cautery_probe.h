@@ -17,8 +17,8 @@ class CauteryProbe {
   /// and stamps are the caller's.
   ///
   /// The bare metal is the foot and the end of the neck. Stations along its axis each follow the nearest place of the
-  /// deformed sheet from step to step, over slits as well, so the footprint jumps only where the tool does. What
-  /// touches is told by the distances, with hysteresis.
+  /// deformed sheet from step to step, over slits as well, so the footprint jumps only where the tool does. Their
+  /// distances decide what touches, with hysteresis.
   [[nodiscard]] CauteryContact Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision);
 
  private:

@@ -170,7 +170,7 @@ void MeasureReported(CutMap* map) {
   std::size_t before = 0;
   double largest = 0;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
-    // What was told last at the beginning of the window held there.
+    // The last length published before the window began is the one in force at its beginning.
     while (before + 1 < i && lengths[before + 1].time_s <= lengths[i].time_s - kJumpWindow_s) ++before;
     const bool known = lengths[before].time_s <= lengths[i].time_s - kJumpWindow_s;
     if (i > 0) {

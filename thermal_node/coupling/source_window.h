@@ -22,6 +22,7 @@ inline constexpr float kMostByWay = 4.0f;
 /// From the middle of the metal to its end [cells]: what is longer is shortened, and counted. The other six cells to
 /// the window's border are for the tip's way and the sparks.
 inline constexpr float kMetalReach = 26.0f;
+inline constexpr float kFarGap = 1e6f;  ///< No metal near [cells].
 /// Corner of a window that has not been used yet: far from any sheet, yet no overflow in differences.
 inline constexpr CellIndex kNowhere{-(1 << 24), -(1 << 24)};
 inline constexpr float kTentRadius_m = 0.015f;  ///< A tented sheet returns its current to the tissue from here on.

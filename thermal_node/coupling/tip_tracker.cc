@@ -23,7 +23,7 @@ TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
   // The first sample, one after a gap and one from before the last stand for a frame.
   const double since_s = sample.session_time_s - last_s_;
   const bool follows = last_s_ >= 0 && since_s > 0 && since_s <= kLongestGap_s;
-  // Where the last one had no current, nobody knows when the pedal went down.
+  // After a sample without current the time at which the pedal went down is unknown.
   input.duration_s = static_cast<float>(!follows ? dt_s : energised_ ? since_s : std::min(since_s, dt_s));
   on_path_ = on_path_ && follows;
   last_s_ = sample.session_time_s;

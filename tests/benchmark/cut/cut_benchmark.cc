@@ -219,7 +219,7 @@ class Bench {
     const auto values = [](const std::vector<CutFigures>& of, auto member) {
       std::vector<double> list;
       for (const CutFigures& figures : of) {
-        // What could not be measured, for nothing was cut, is told by open_pct.
+        // A session that cut nothing has no such figure; open_pct shows it.
         const auto value = static_cast<double>(figures.*member);
         if (std::isfinite(value)) list.push_back(std::abs(value));
       }

@@ -35,7 +35,7 @@ struct SessionPlan {
 
 [[nodiscard]] std::string Describe(const SessionPlan& plan);
 
-/// Runs it; nothing when the session did not end well, which is told on stderr.
+/// Runs sessions. One that does not end well yields no figures; its reason goes to stderr.
 class SessionRunner {
  public:
   /// @param keep recordings and maps stay there; empty: nothing stays.

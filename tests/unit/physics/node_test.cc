@@ -239,7 +239,7 @@ TEST_F(PhysicsNodeTest, AStepThatIsWokenInTheNextPeriodIsStillItsOwn) {
     EXPECT_TRUE(cautery->TakeLatest(&contact));
     return contact.session_time_s;
   };
-  // The very first is late: nobody can know that, and the next one puts it right.
+  // The first step runs late and has nothing to compare with; the next one corrects it.
   EXPECT_NEAR(moment(0, 10'300'000), 0.01, 1e-9);
   EXPECT_NEAR(moment(1, 1'200'000), 0.01, 1e-9);
   EXPECT_NEAR(moment(2, 1'200'000), 0.02, 1e-9);

@@ -166,7 +166,7 @@ TEST_F(TipTest, AGapBetweenEnergisedSamplesIsBridged) {
   EXPECT_TRUE(bridged.active);
   EXPECT_EQ(bridged.path.from.x(), 0.005f);
   EXPECT_NEAR(bridged.duration_s, 0.4f, 1e-6);
-  // Longer ones are not: nobody knows what the hand did meanwhile.
+  // Longer gaps are not bridged: the way of the metal in them is unknown.
   const TipInput anew = Advance(At(0.0074f, 0.01f, 1.4 + 1.01 * kLongestGap_s));
   EXPECT_EQ(anew.path.from.x(), 0.0074f);
   EXPECT_FLOAT_EQ(anew.duration_s, 0.01f);
