@@ -9,6 +9,8 @@ namespace {
 
 /// Pieces of metal whose ends lie farther apart on the sheet lie on two folds of it [m].
 constexpr float kLongestPiece_m = 0.002f;
+/// A piece that goes no farther than this along an axis is as good as parallel to the other [cells].
+constexpr float kShortWay = 1e-4f;
 
 }  // namespace
 

@@ -11,8 +11,6 @@ namespace {
 constexpr float kFarFieldSpacing = 0.1f;  ///< Of the table, in windows.
 /// Rows with less of the heat than this do not count as changing: there it is so thin that they hardly do.
 constexpr float kFaintRow = 0.01f;
-/// A piece that goes no farther than this along an axis is as good as parallel to the other [cells].
-constexpr float kShortWay = 1e-4f;
 /// Evaluations of Change() to find a step: one more than are needed where change goes with the step; from a step of
 /// seconds, which dries everything, each comes down by 1 / max_change at most.
 constexpr int kStepTrials = 6;
