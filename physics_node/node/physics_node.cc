@@ -238,6 +238,12 @@ void PhysicsNode::PublishCautery(const Tick& tick) {
     return;
   }
   CauteryContact contact = simulation_.Cautery(hook_);
+  // A process that has just been started again does not know the pedal yet. Without a sample the current goes on along
+  // the metal's way to the next one; a sample without current would leave a bridge in the slit.
+  start_ns_ = ticks_ == 0 ? tick.stamp_ns : start_ns_;
+  if (restored_ && tick.stamp_ns - start_ns_ < kPedalTimeoutNs && (tool_states_.empty() || handle_states_.empty())) {
+    return;
+  }
   contact.stamp = cautery_stamper_.Next(tick.stamp_ns);
   contact.session_time_s = step_time_s_;
   contact.topology_revision = simulation_.model().revision();

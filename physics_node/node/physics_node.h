@@ -94,6 +94,7 @@ class PhysicsNode {
   std::array<int, kMaxTools> absent_ticks_{};
   bool topology_waits_ = false;  ///< Came while another process led.
   std::uint64_t ticks_ = 0;
+  std::int64_t start_ns_ = 0;  ///< Of the first step.
   std::uint64_t last_index_ = 0;
   std::uint64_t periods_ = 1;      ///< Since the last step.
   std::uint64_t first_index_ = 0;  ///< Manifests count from the tick in which this process took over.

@@ -148,7 +148,7 @@ class ReplayedThermal final : public ReplayedNode {
       : ReplayedNode(NodeId::kThermal),
         scene_(making.scene),
         checkpoint_(making, id(), thermal::kCheckpointLayout,
-                    [this] { return thermal::ThermalSolver::CheckpointCapacity(scene_); }) {
+                    [this] { return thermal::ThermalNode::CheckpointCapacity(scene_); }) {
     if (!making.outputs_read) patches_.in.reset();
   }
 

@@ -59,4 +59,37 @@ TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
   return input;
 }
 
+TipTracker::State TipTracker::Save() const {
+  State state;
+  state.last_s = last_s_;
+  state.at = {at_.x(), at_.y()};
+  state.metal_count = metal_.count;
+  for (std::uint32_t n = 0; n < metal_.count; ++n) {
+    const MetalPoint& point = metal_.points[n];
+    state.metal[n] = {point.material.x(), point.material.y(), point.height_m};
+  }
+  state.on_path = on_path_ ? 1 : 0;
+  state.energised = energised_ ? 1 : 0;
+  return state;
+}
+
+bool TipTracker::Restore(const State& state) {
+  const auto finite = [](const auto& values) {
+    return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
+  };
+  const bool plausible = std::isfinite(state.last_s) && finite(state.at) && state.metal_count <= kMaxMetalPoints &&
+                         std::all_of(state.metal.begin(), state.metal.end(), finite) && state.on_path <= 1 &&
+                         state.energised <= 1;
+  if (!plausible) return false;
+  last_s_ = state.last_s;
+  at_ = {state.at[0], state.at[1]};
+  metal_.count = state.metal_count;
+  for (std::uint32_t n = 0; n < metal_.count; ++n) {
+    metal_.points[n] = {{state.metal[n][0], state.metal[n][1]}, state.metal[n][2]};
+  }
+  on_path_ = state.on_path != 0;
+  energised_ = state.energised != 0;
+  return true;
+}
+
 }  // namespace fulcrum::thermal

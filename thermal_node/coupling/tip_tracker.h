@@ -35,6 +35,19 @@ class TipTracker {
   /// False: out of range or off the sheet; such a sample must not reach Advance.
   [[nodiscard]] bool Accepts(const CauteryContact& sample) const;
 
+  /// The last sample, for checkpoints: a process that was away goes on from where the metal was. Copied byte by byte.
+  struct State {
+    double last_s = -1;
+    std::array<float, 2> at{};
+    std::array<std::array<float, 3>, kMaxMetalPoints> metal{};  ///< (s, t), height [m].
+    std::uint32_t metal_count = 0;
+    std::uint8_t on_path = 0, energised = 0;
+    std::array<std::uint8_t, 2> unused{};
+  };
+  [[nodiscard]] State Save() const;
+  /// False, and nothing is changed, when no tracker can have been in this state.
+  [[nodiscard]] bool Restore(const State& state);
+
  private:
   const Sheet& sheet_;
   float default_radius_m_;

@@ -1,5 +1,6 @@
 #include "thermal_node/node/thermal_node.h"
 
+#include <cstring>
 #include <optional>
 #include <string>
 
@@ -27,7 +28,7 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
   tips_.reserve(kMostSamples);
   manifest_.consumed.reserve(kMostSamples);
   if (checkpoint_ != nullptr) {
-    if (const auto latest = checkpoint_->Latest()) restored_ = solver_.Restore(latest->payload);
+    if (const auto latest = checkpoint_->Latest()) restored_ = Restore(latest->payload);
   }
   NoteHealth();
 }
@@ -66,15 +67,33 @@ std::span<const TipInput> ThermalNode::TakeContacts(double dt_s) {
   return tips_;
 }
 
+std::size_t ThermalNode::CheckpointCapacity(const SceneView& scene) {
+  return sizeof(TipTracker::State) + ThermalSolver::CheckpointCapacity(scene);
+}
+
+bool ThermalNode::Restore(std::span<const std::byte> checkpoint) {
+  TipTracker::State tip;
+  if (checkpoint.size() < sizeof(tip)) return false;
+  std::memcpy(&tip, checkpoint.data(), sizeof(tip));
+  // Both or neither: the tip's way goes on from what the solver has cut.
+  TipTracker tracker = tracker_;
+  return tracker.Restore(tip) && solver_.Restore(checkpoint.subspan(sizeof(tip))) && tracker_.Restore(tip);
+}
+
 /// Before anything of a new revision is published: whoever saw a revision can rely on it to survive this process.
 void ThermalNode::SaveCheckpoint() {
   if (checkpoint_ == nullptr || !solver_.stepped()) return;
   ++frames_since_checkpoint_;
   const bool due = solver_.committed() || frames_since_checkpoint_ >= kFramesPerCheckpoint;
   if (!due || !solver_.at_commit_frame()) return;
-  const std::size_t bytes = solver_.Save(checkpoint_->Begin());
+  const std::span<std::byte> slot = checkpoint_->Begin();
+  const std::size_t bytes = solver_.Save(slot.subspan(sizeof(TipTracker::State)));
   checkpoint_full_ = bytes == 0;
-  if (bytes > 0) checkpoint_->Commit(bytes);
+  if (bytes > 0) {
+    const TipTracker::State tip = tracker_.Save();
+    std::memcpy(slot.data(), &tip, sizeof(tip));
+    checkpoint_->Commit(sizeof(tip) + bytes);
+  }
   frames_since_checkpoint_ = 0;
 }
 

@@ -25,7 +25,7 @@ inline constexpr std::uint64_t kTicksPerHistoryPatch = 100;
 /// A checkpoint at each new revision, and this often while the tissue is warm [frames of the solver].
 inline constexpr std::uint64_t kFramesPerCheckpoint = 10;
 /// Changes with the layout of the checkpoint.
-inline constexpr std::uint32_t kCheckpointLayout = 3;
+inline constexpr std::uint32_t kCheckpointLayout = 4;
 
 class ThermalNode {
  public:
@@ -42,6 +42,8 @@ class ThermalNode {
   /// @param epoch_ns CLOCK_MONOTONIC at the start of the process [ns].
   ThermalNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint, std::int64_t epoch_ns);
 
+  [[nodiscard]] static std::size_t CheckpointCapacity(const SceneView& scene);
+
   /// One period. Always called by the same thread.
   void Step(const Tick& tick);
 
@@ -56,6 +58,7 @@ class ThermalNode {
   /// What the electrode did since the last tick.
   [[nodiscard]] std::span<const TipInput> TakeContacts(double dt_s);
   void SaveCheckpoint();
+  [[nodiscard]] bool Restore(std::span<const std::byte> checkpoint);
   void PublishTopology(const Tick& tick);
   void PublishEvents(const Tick& tick);
   void PublishPatch(const Tick& tick);

@@ -174,6 +174,33 @@ class Bench {
     report_->Add("cut.live.coag_open_mm2", largest, "mm2");
   }
 
+  /// thermal_node and physics_node are killed in mid-stroke, twenty times in all.
+  void RunKills() {
+    if (!report_->Wants("cut.live.killed")) return;
+    constexpr int kSessions = 5, kKillsEach = 4;
+    int islands = 0, bridges = 0, sessions = 0;
+    double open_pct = 100;
+    for (int i = 0; i < kSessions; ++i) {
+      SessionPlan plan;
+      plan.name = "killed" + std::to_string(i + 1);
+      plan.shape = std::array{Shape::kAlong, Shape::kAcross, Shape::k45deg, Shape::kCircle, Shape::kAlong}[i];
+      plan.foot = i == kSessions - 1 ? Foot::kUp : Foot::kDown;
+      plan.longest_mm = 24;
+      plan.kills = kKillsEach;
+      const std::optional<CutMap> map = Run(plan);
+      if (!map) continue;
+      ++sessions;
+      islands += map->figures.islands;
+      bridges += std::max(map->figures.holes - 1, 0);
+      open_pct = std::min(open_pct, map->figures.open_pct);
+    }
+    report_->Add("cut.live.killed.kills", runner_.killed(), "1");
+    report_->Add("cut.live.killed.sessions", sessions, "1");
+    report_->Add("cut.live.killed.islands", islands, "1");
+    report_->Add("cut.live.killed.bridges", bridges, "1");
+    report_->Add("cut.live.killed.open_pct", open_pct, "%");
+  }
+
   /// The same script again and again.
   void RunRepeats() {
     if (!report_->Wants("cut.live.same_script_spread_pct") && !report_->Wants("cut.live.hook_place_spread_mm_p95")) {
@@ -325,6 +352,7 @@ int Main(int argc, char** argv) {
   if (!only && !report.quick()) {
     bench.RunPowers();
     bench.RunCoag();
+    bench.RunKills();
     bench.RunRepeats();
   }
   bench.TellRepeated();

@@ -4,7 +4,9 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <fstream>
 #include <map>
@@ -14,6 +16,7 @@
 #include "services/core/error.h"
 #include "services/log_tools/cut_picture.h"
 #include "services/log_tools/recording.h"
+#include "services/runtime/checkpoint.h"
 #include "services/scene/compile.h"
 #include "services/scene/scene_file.h"
 #include "tests/support/cart.h"
@@ -162,6 +165,30 @@ class Load {
   std::vector<std::thread> threads_;
 };
 
+/// Kills thermal_node and physics_node in turn, so many times in all; how many of them came back.
+int KillNodes(const testing::Program& up, const fs::path& session, double limit_s, int kills) {
+  // Once tissue is warm there are checkpoints.
+  if (!testing::WaitFor(limit_s, [&] { return runtime::NewestSequence(session / "thermal_node.checkpoint") > 0; })) {
+    return 0;
+  }
+  int back = 0;
+  for (int i = 0; i < kills; ++i) {
+    const auto next = std::chrono::steady_clock::now() + std::chrono::duration<double>(kKillPeriod_s);
+    std::this_thread::sleep_for(next - std::chrono::steady_clock::now());
+    const std::string node = i % 2 == 0 ? "thermal_node" : "physics_node";
+    const auto before = testing::ChildrenOf(up.pid());
+    if (!before.contains(node) || ::kill(before.at(node), SIGKILL) != 0) continue;
+    back += testing::WaitFor(kKillPeriod_s,
+                             [&] {
+                               const auto now = testing::ChildrenOf(up.pid());
+                               return now.contains(node) && now.at(node) != before.at(node);
+                             })
+                ? 1
+                : 0;
+  }
+  return back;
+}
+
 /// Positions of the last TissueFrame before the hook comes.
 std::vector<Vec3f> LastNodes(const fs::path& recording, const SceneView& scene) {
   std::vector<Vec3f> nodes;
@@ -205,7 +232,8 @@ std::string Describe(const SessionPlan& plan) {
   std::ostringstream text;
   text << plan.name << ": " << NameOf(plan.shape) << ", " << plan.speed_mm_s << " mm/s, " << plan.power_W << " W "
        << plan.pedal << ", " << kHeld[static_cast<int>(plan.held)] << ", foot " << kFoot[static_cast<int>(plan.foot)]
-       << (plan.loaded ? ", loaded" : "") << ", " << plan.dt_ms << " ms, " << plan.preset;
+       << (plan.loaded ? ", loaded" : "") << (plan.kills > 0 ? ", nodes killed" : "") << ", " << plan.dt_ms << " ms, "
+       << plan.preset;
   return text.str();
 }
 
@@ -248,7 +276,7 @@ std::optional<log_tools::CutMap> SessionRunner::Run(const SessionPlan& plan) {
   Write(cart, CartYaml(plan, motion));
   std::optional<log_tools::CutMap> map;
   for (int i = 0; i < kTries; ++i) {
-    map = RunFiles(plan.name, yaml, cart, stroke.times.over_s + kTail_s, plan.loaded);
+    map = RunFiles(plan.name, yaml, cart, stroke.times.over_s + kTail_s, plan.loaded, plan.kills);
     if (!map) break;
     const double share = EnergisedShare(*map, stroke.times);
     if (share >= kLeastEnergised) break;
@@ -270,7 +298,7 @@ std::optional<log_tools::CutMap> SessionRunner::RunScene(const std::string& name
 }
 
 std::optional<log_tools::CutMap> SessionRunner::RunFiles(const std::string& name, const fs::path& scene,
-                                                         const fs::path& cart, double seconds, bool loaded) {
+                                                         const fs::path& cart, double seconds, bool loaded, int kills) {
   const fs::path out = folder_ / name;
   std::vector<std::string> arguments{"up", scene, "--record", "--domain", std::to_string(domain_), "--out", out};
   if (!cart.empty()) arguments.insert(arguments.end(), {"--cart", cart});
@@ -282,6 +310,7 @@ std::optional<log_tools::CutMap> SessionRunner::RunFiles(const std::string& name
       const Niceness above(kCartNice);
       return testing::Program("fulcrum", arguments);
     }();
+    if (kills > 0) killed_ += KillNodes(up, out / "latest", seconds + kPatience_s, kills);
     (void)testing::WaitFor(seconds + kPatience_s, [&] { return (code = up.Poll()).has_value(); });
     said = up.Said();
   }

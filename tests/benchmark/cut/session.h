@@ -18,6 +18,9 @@ enum class Held { kFree, kSlack, kOrgan, kTaut, kTented };
 /// end up, or level.
 enum class Foot { kDown, kUp, kLevel };
 
+/// From one kill to the next: twice what a killed node may take to come back to its work, and more.
+inline constexpr double kKillPeriod_s = 1.1;
+
 struct SessionPlan {
   std::string name;  ///< Part of its keys, "s07".
   Shape shape = Shape::kAlong;
@@ -31,6 +34,7 @@ struct SessionPlan {
   std::string preset = "default";
   double longest_mm = 22;
   double stay_s = 0.1;  ///< Down before it sets out, pedal pressed already.
+  int kills = 0;  ///< Of thermal_node and physics_node in turn, kKillPeriod_s apart, from kKillPeriod_s into the cut.
 };
 
 [[nodiscard]] std::string Describe(const SessionPlan& plan);
@@ -49,19 +53,21 @@ class SessionRunner {
   [[nodiscard]] std::optional<log_tools::CutMap> Run(const SessionPlan& plan);
   /// Runs that were given up for their pedal: what is left is no fair sample where there are many.
   [[nodiscard]] int repeated() const { return repeated_; }
+  /// Nodes that were killed and came back, in all sessions.
+  [[nodiscard]] int killed() const { return killed_; }
   /// A scene as it is, with its own script.
   [[nodiscard]] std::optional<log_tools::CutMap> RunScene(const std::string& name, const std::string& base);
 
  private:
   [[nodiscard]] std::optional<log_tools::CutMap> RunFiles(const std::string& name, const std::filesystem::path& scene,
                                                           const std::filesystem::path& cart, double seconds,
-                                                          bool loaded);
+                                                          bool loaded, int kills = 0);
   /// Where the nodes of the sheet are once the grasper has lifted it.
   [[nodiscard]] std::vector<Vec3f> TentedNodes(const SessionPlan& plan, const Vec3d& trocar_W);
 
   std::filesystem::path folder_, keep_;
   int domain_;
-  int repeated_ = 0;
+  int repeated_ = 0, killed_ = 0;
 };
 
 }  // namespace fulcrum::benchmark

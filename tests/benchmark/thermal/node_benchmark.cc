@@ -27,7 +27,7 @@ class Session {
     folder_ = std::filesystem::temp_directory_path() / name;
     std::filesystem::create_directories(folder_);
     checkpoint_ = std::make_unique<runtime::CheckpointFile>(folder_ / "checkpoint", scene.hash, kCheckpointLayout,
-                                                            ThermalSolver::CheckpointCapacity(scene));
+                                                            ThermalNode::CheckpointCapacity(scene));
     node_ = std::make_unique<ThermalNode>(scene_, bus_.ports(), checkpoint_.get(), 1);
   }
   ~Session() { std::filesystem::remove_all(folder_); }

@@ -26,8 +26,8 @@ class ThermalNodeTest : public ::testing::Test {
 
   void OpenCheckpoint() {
     checkpoint_.reset();  // the file is locked by its owner
-    checkpoint_ = std::make_unique<runtime::CheckpointFile>(
-        folder_ / "thermal_node.checkpoint", scene_.hash, kCheckpointLayout, ThermalSolver::CheckpointCapacity(scene_));
+    checkpoint_ = std::make_unique<runtime::CheckpointFile>(folder_ / "thermal_node.checkpoint", scene_.hash,
+                                                            kCheckpointLayout, ThermalNode::CheckpointCapacity(scene_));
   }
   std::unique_ptr<ThermalNode> MakeNode() {
     return std::make_unique<ThermalNode>(scene_, bus_.ports(), checkpoint_.get(), ++epoch_);
@@ -153,6 +153,28 @@ TEST_F(ThermalNodeTest, RestartGoesOnWithTheSameTopologyAndHeat) {
   const auto later = NewestTopology();
   ASSERT_TRUE(later);
   EXPECT_GT(later->revision, before->revision);
+}
+
+TEST_F(ThermalNodeTest, MetalThatMovedOnDuringAnOutageLeavesNoBridge) {
+  OpenCheckpoint();
+  auto node = MakeNode();
+  Cut(node.get(), 0.010f, 0.0147f);
+  node.reset();
+  // Back after 0.3 s; the hook went on at 8 mm/s.
+  tick_.index += 30;
+  tick_.session_time_s += 0.3;
+  tick_.stamp_ns += 300'000'000;
+  OpenCheckpoint();
+  node = MakeNode();
+  ASSERT_TRUE(node->restored());
+  Cut(node.get(), 0.0171f, 0.020f);
+  const HeatField& field = node->solver().field();
+  for (float s = 0.0105f; s < 0.0195f; s += 1e-4f) {
+    const CellIndex cell = field.sheet().CellOf({s, 0.0102f});
+    const Tile* tile = field.Find(cell.ix / kTile, cell.iy / kTile);
+    ASSERT_NE(tile, nullptr) << s;
+    EXPECT_NE(tile->state.flags[(cell.iy % kTile) * kTile + cell.ix % kTile] & kRemoved, 0) << "living at s = " << s;
+  }
 }
 
 TEST_F(ThermalNodeTest, PaperModelRunsInTheSameNodeAndComesBack) {
