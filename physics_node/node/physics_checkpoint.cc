@@ -24,6 +24,7 @@ struct Header {
   std::uint64_t steps;
   std::uint32_t particle_count;
   float max_displacement_m;
+  double contact_time_s;
   ToolRecord tools[kMaxTools];
 };
 // Followed by positions, previous positions (3 floats a particle each), then the held particles tool by tool.
@@ -53,14 +54,15 @@ std::size_t CheckpointCapacity(Index particle_count) {
          kMaxTools * sizeof(HeldRecord) * std::size_t{particle_count};
 }
 
-std::size_t WriteCheckpoint(const TissueSimulation& simulation, float max_displacement_m, std::span<std::byte> slot) {
+std::size_t WriteCheckpoint(const TissueSimulation& simulation, const NodeMemory& node, std::span<std::byte> slot) {
   const ParticleStore& particles = simulation.particles();
   const Index count = particles.particle_count();
   const SimulationMemory memory = simulation.Save();
   Header header{};
   header.steps = memory.steps;
   header.particle_count = count;
-  header.max_displacement_m = max_displacement_m;
+  header.max_displacement_m = node.max_displacement_m;
+  header.contact_time_s = node.contact_time_s;
   std::byte* at = slot.data() + sizeof(Header) + 2 * PositionsBytes(count);
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     ToolRecord& tool = header.tools[i];
@@ -93,7 +95,7 @@ std::uint64_t CheckpointSteps(std::span<const std::byte> payload) {
   return header.steps;
 }
 
-std::optional<RestoredCheckpoint> ReadCheckpoint(std::span<const std::byte> payload, TissueSimulation* simulation) {
+std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, TissueSimulation* simulation) {
   Header header;
   if (payload.size() < sizeof(header)) {
     return std::nullopt;
@@ -105,7 +107,8 @@ std::optional<RestoredCheckpoint> ReadCheckpoint(std::span<const std::byte> payl
     size += sizeof(HeldRecord) * std::size_t{tool.held_count};
   }
   if (payload.size() != size || header.steps > kMostSteps ||
-      !(header.max_displacement_m >= 0 && header.max_displacement_m <= kMostCoordinate_m)) {
+      !(header.max_displacement_m >= 0 && header.max_displacement_m <= kMostCoordinate_m) ||
+      !std::isfinite(header.contact_time_s)) {
     return std::nullopt;
   }
   std::vector<float> xyz(floats), previous(floats);
@@ -132,7 +135,7 @@ std::optional<RestoredCheckpoint> ReadCheckpoint(std::span<const std::byte> payl
   if (!simulation->Restore(xyz, previous, memory)) {
     return std::nullopt;
   }
-  return RestoredCheckpoint{header.max_displacement_m};
+  return NodeMemory{header.max_displacement_m, header.contact_time_s};
 }
 
 }  // namespace fulcrum::physics

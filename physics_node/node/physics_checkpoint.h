@@ -13,20 +13,23 @@
 namespace fulcrum::physics {
 
 /// Grows with any change of the layout below.
-inline constexpr std::uint32_t kCheckpointLayout = 1;
+inline constexpr std::uint32_t kCheckpointLayout = 2;
 
 [[nodiscard]] std::size_t CheckpointCapacity(Index particle_count);
 
+/// What the node itself remembers, beside the simulation.
+struct NodeMemory {
+  float max_displacement_m = 0;
+  double contact_time_s = 0;  ///< Session time at which the tools were where they are for the tissue.
+};
+
 /// Fills `slot`, at least CheckpointCapacity() long; returns the bytes used.
-std::size_t WriteCheckpoint(const TissueSimulation& simulation, float max_displacement_m, std::span<std::byte> slot);
+std::size_t WriteCheckpoint(const TissueSimulation& simulation, const NodeMemory& memory, std::span<std::byte> slot);
 
 /// How many steps had been made when it was written; 0 when the bytes are no checkpoint.
 [[nodiscard]] std::uint64_t CheckpointSteps(std::span<const std::byte> payload);
 
-struct RestoredCheckpoint {
-  float max_displacement_m = 0;
-};
 /// Puts the simulation where the checkpoint was. Nothing, and the simulation as it was, when the bytes do not fit.
-std::optional<RestoredCheckpoint> ReadCheckpoint(std::span<const std::byte> payload, TissueSimulation* simulation);
+std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, TissueSimulation* simulation);
 
 }  // namespace fulcrum::physics

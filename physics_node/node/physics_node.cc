@@ -17,6 +17,12 @@ constexpr int kAbsentTicks = 100;
 constexpr std::int64_t kPedalTimeoutNs = 100'000'000;
 /// After so long in time a cheaper preset gives way to the next dearer one [ticks].
 constexpr int kRecoveryTicks = 200;
+/// A process that was started again waits for tools and pedals, but no longer than this [ns].
+constexpr std::int64_t kWaitNs = 100'000'000;
+/// After a restart the tools go from where they last were for the tissue to where they are now in this time [s], and
+/// the current is dated accordingly: what happened during the outage happens faster, and no tool goes through tissue
+/// that it was pushing. Not after a longer outage [s], nor farther than this [m].
+constexpr float kCatchUp_s = 0.4f, kLongestOutage_s = 0.8f, kCatchUpMost_m = 0.01f;
 /// A session time of k dt in double may be this much less than k dt: 0.29 / 0.01 < 29 [ticks].
 constexpr double kRoundingTicks = 1e-6;
 /// Of a generator that the script says nothing about [W].
@@ -79,6 +85,8 @@ bool PhysicsNode::Restore(std::span<const std::byte> checkpoint) {
     return false;
   }
   max_displacement_m_ = state->max_displacement_m;
+  contact_time_s_ = state->contact_time_s;
+  catch_up_steps_ = std::max(1, static_cast<int>(std::ceil(kCatchUp_s / scene_.physics.dt_s)));
   const SimulationMemory memory = simulation_.Save();
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     if (memory.known[i]) {
@@ -107,8 +115,8 @@ bool PhysicsNode::TakeOver(std::span<const std::byte> other, const Tick& tick) {
 
 /// Poses at `now_ns`, between the two samples around it.
 void PhysicsNode::TakeTools(std::int64_t now_ns) {
-  tool_states_.Take(&ports_.tools);
   if (tool_states_.empty()) {
+    contact_time_s_ = step_time_s_;
     return;
   }
   tool_states_.Forget(now_ns);
@@ -121,6 +129,7 @@ void PhysicsNode::TakeTools(std::int64_t now_ns) {
   tool_before_ = before.stamp;
   tool_after_ = after.stamp;
   pose_ns_ = begin + static_cast<std::int64_t>(u * static_cast<float>(end - begin));
+  const std::array<ToolInput, kMaxTools> last = inputs_;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolSample &a = before.tools[i], &b = after.tools[i];
     if (a.kind != ToolKind::kNone && scene_.tools[i].kind != ToolKind::kNone) {
@@ -134,10 +143,27 @@ void PhysicsNode::TakeTools(std::int64_t now_ns) {
       inputs_[i].present = false;
     }
   }
+  CatchUp(last);
+}
+
+void PhysicsNode::CatchUp(const std::array<ToolInput, kMaxTools>& last) {
+  const double behind_s = step_time_s_ - contact_time_s_;
+  if (catch_up_steps_ == 0 || !(behind_s > 0 && behind_s < kLongestOutage_s)) {
+    catch_up_steps_ = 0;
+    contact_time_s_ = step_time_s_;
+    return;
+  }
+  const float share = 1.0f / static_cast<float>(catch_up_steps_--);
+  contact_time_s_ += static_cast<double>(share) * behind_s;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    const ToolPose &from = last[i].pose, &to = inputs_[i].pose;
+    if (inputs_[i].present && last[i].present && (to.p_WT - from.p_WT).norm() < kCatchUpMost_m) {
+      inputs_[i].pose = Interpolate(from, to, share);
+    }
+  }
 }
 
 void PhysicsNode::TakeHandles(std::int64_t now_ns) {
-  handle_states_.Take(&ports_.handles);
   if (handle_states_.empty()) {
     return;
   }
@@ -164,8 +190,14 @@ void PhysicsNode::TakeInputs(const Tick& tick) {
   }
   const auto now_ns = tick.stamp_ns - static_cast<std::int64_t>(1e9 * (tick.session_time_s - step_s));
   step_time_s_ = std::max(step_s, 0.0);
-  TakeTools(now_ns);
-  TakeHandles(now_ns);
+  tool_states_.Take(&ports_.tools);
+  handle_states_.Take(&ports_.handles);
+  start_ns_ = ticks_ == 0 ? tick.stamp_ns : start_ns_;
+  waits_ = restored_ && (tool_states_.empty() || handle_states_.empty()) && tick.stamp_ns - start_ns_ < kWaitNs;
+  if (!waits_) {
+    TakeTools(now_ns);
+    TakeHandles(now_ns);
+  }
   if (ports_.topology.TakeLatest(&topology_state_) || topology_waits_) {
     const int edits = topology_state_.scene_hash == scene_.hash ? simulation_.ApplyTopology(topology_state_) : -1;
     if (edits < 0) {
@@ -234,18 +266,14 @@ void PhysicsNode::PublishContacts(const Tick& tick) {
 }
 
 void PhysicsNode::PublishCautery(const Tick& tick) {
-  if (hook_ == kMaxTools || !ports_.cautery.has_readers()) {
+  // While it waits it does not know the pedal. Without a sample the current goes on along the metal's way to the next
+  // one; a sample without current would leave a bridge in the slit.
+  if (hook_ == kMaxTools || waits_ || !ports_.cautery.has_readers()) {
     return;
   }
   CauteryContact contact = simulation_.Cautery(hook_);
-  // A process that has just been started again does not know the pedal yet. Without a sample the current goes on along
-  // the metal's way to the next one; a sample without current would leave a bridge in the slit.
-  start_ns_ = ticks_ == 0 ? tick.stamp_ns : start_ns_;
-  if (restored_ && tick.stamp_ns - start_ns_ < kPedalTimeoutNs && (tool_states_.empty() || handle_states_.empty())) {
-    return;
-  }
   contact.stamp = cautery_stamper_.Next(tick.stamp_ns);
-  contact.session_time_s = step_time_s_;
+  contact.session_time_s = contact_time_s_;
   contact.topology_revision = simulation_.model().revision();
   const bool heard = tick.stamp_ns - handle_stamp_.stamp_ns <= kPedalTimeoutNs;
   contact.mode = heard ? ModeOf(pedals_) : CauteryMode::kOff;
@@ -322,7 +350,7 @@ void PhysicsNode::SaveCheckpoint() {
     return;
   }
   saved_version_ = simulation_.state_version();
-  checkpoint_->Commit(WriteCheckpoint(simulation_, max_displacement_m_, checkpoint_->Begin()));
+  checkpoint_->Commit(WriteCheckpoint(simulation_, {max_displacement_m_, contact_time_s_}, checkpoint_->Begin()));
 }
 
 void PhysicsNode::FillHealth(Health* health) const {

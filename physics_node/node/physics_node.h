@@ -66,6 +66,7 @@ class PhysicsNode {
   void TakeInputs(const Tick& tick);
   void TakeTools(std::int64_t now_ns);
   void TakeHandles(std::int64_t now_ns);
+  void CatchUp(const std::array<ToolInput, kMaxTools>& last);
   void MindTheTime(const Tick& tick);
   void PublishFrame(const Tick& tick);
   void PublishContacts(const Tick& tick);
@@ -102,6 +103,9 @@ class PhysicsNode {
   std::uint64_t frame_version_ = 0, hash_version_ = 0, saved_version_ = 0, measured_version_ = 0;
   std::uint64_t state_hash_ = 0;
   bool restored_ = false;
+  bool waits_ = false;      ///< Started again, and has not heard tools and pedals yet: the tools stay where they were.
+  int catch_up_steps_ = 0;  ///< Until the tools are where their samples say, after a restart.
+  double contact_time_s_ = 0;  ///< Session time of the tools' poses; behind step_time_s_ while they catch up.
   float max_displacement_m_ = 0;
   TickManifest manifest_;
 

@@ -34,6 +34,10 @@ class TipTracker {
   [[nodiscard]] TipInput Advance(const CauteryContact& sample, double dt_s);
   /// False: out of range or off the sheet; such a sample must not reach Advance.
   [[nodiscard]] bool Accepts(const CauteryContact& sample) const;
+  /// The way to this sample has been gone: a physics node that was started again repeats the last tenth of a second.
+  [[nodiscard]] bool Repeats(const CauteryContact& sample) const {
+    return sample.session_time_s < last_s_ && sample.session_time_s > last_s_ - kLongestGap_s;
+  }
 
   /// The last sample, for checkpoints: a process that was away goes on from where the metal was. Copied byte by byte.
   struct State {

@@ -56,6 +56,7 @@ std::span<const TipInput> ThermalNode::TakeContacts(double dt_s) {
       ++refused_;
       continue;
     }
+    if (tracker_.Repeats(next)) continue;
     // A replay sees no more of them than the manifest names.
     if (contacts_.size() == kMostSamples) contacts_.erase(contacts_.begin());
     contacts_.push_back(next);

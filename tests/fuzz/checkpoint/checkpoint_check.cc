@@ -24,7 +24,7 @@ class PhysicsCheck final : public CheckpointCheck {
     physics::TissueSimulation worker(scene_);
     for (int step = 0; step < kSteps; ++step) (void)worker.Step(physics::ScriptedTools(scene_, 0.01 * step));
     good_.resize(physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size())));
-    good_.resize(physics::WriteCheckpoint(worker, 0.01f, good_));
+    good_.resize(physics::WriteCheckpoint(worker, {0.01f, 1.0}, good_));
   }
   Outcome Offer(std::span<const std::byte> payload) override {
     physics::TissueSimulation simulation(scene_);

@@ -84,7 +84,7 @@ TEST(Breathing, GoesOnFromTheCheckpoint) {
     first.Step({});
   }
   std::vector<std::byte> slot(CheckpointCapacity(first.particles().particle_count()));
-  const std::size_t size = WriteCheckpoint(first, 0, slot);
+  const std::size_t size = WriteCheckpoint(first, {}, slot);
   ASSERT_TRUE(ReadCheckpoint(std::span<const std::byte>(slot).first(size), &second));
   EXPECT_EQ(second.simulated_time_s(), first.simulated_time_s());
   for (int step = 0; step < kPeriodSteps / 4; ++step) {
