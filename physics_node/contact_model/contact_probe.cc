@@ -16,7 +16,6 @@ constexpr float kBodyOverSecant = 2.0f;
 constexpr float kJaws = 1e4f;  ///< What is held has no skin to give way [N/m].
 /// Of what breathing or the other tool does to the surroundings of a contact [W].
 constexpr float kMostExternal = 0.05f;
-constexpr float kForceCap = 15.0f;                              ///< Rectal tissue is damaged above this [N].
 constexpr float kSurfaceRadius = 0.012f, kGraspRadius = 0.03f;  ///< Where the model holds [m].
 constexpr float kLeastDent = 0.0005f;                           ///< Below this a secant is noise [m].
 
@@ -100,7 +99,7 @@ void ContactProbe::Enter(ToolMemory* memory, ContactKind kind) const {
 
 void ContactProbe::Follow(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const {
   const float dt = scene_.physics.dt_s, share = dt / (dt + kSmoothing);
-  memory->force += share * (Limited(force, kForceCap) - memory->force);
+  memory->force += share * (Limited(force, ContactProbe::kForceCap_N) - memory->force);
   const Vec3f before = memory->u;
   memory->u += share * (Limited(u, 0.2f) - memory->u);
   memory->du += share * (Limited((memory->u - before) / dt, 2.0f) - memory->du);
@@ -112,7 +111,7 @@ void ContactProbe::Follow(ToolMemory* memory, const Vec3f& force, const Vec3f& u
 }
 
 void ContactProbe::FollowSolver(ToolMemory* memory, const Vec3f& force) const {
-  const Vec3f limited = Limited(force, kForceCap);
+  const Vec3f limited = Limited(force, ContactProbe::kForceCap_N);
   if (memory->kind == ContactKind::kGrasp) {
     memory->force = limited;
     memory->x_ref = memory->tip;
@@ -179,7 +178,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   memory.x_ref = pose.p_WT;
   const Vec3f tool_velocity = (pose.p_WT - std::exchange(memory.tip, pose.p_WT)) / scene_.physics.dt_s;
   DeviceContacts device;
-  device.force_cap_N = kForceCap;
+  device.force_cap_N = ContactProbe::kForceCap_N;
   const auto force = [&] {
     return solver_force == nullptr || memory.touched.empty() ? elastic_.OnSet(memory.touched) : *solver_force;
   };

@@ -28,6 +28,9 @@ namespace fulcrum::physics {
 
 class ContactProbe {
  public:
+  /// No force on a tool is told above this: rectal tissue is damaged by more [N].
+  static constexpr float kForceCap_N = 15.0f;
+
   ContactProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
 
   /// Contacts of one tool after a step: a grasp, or the nearest surface within reach, or none. `solver_force`: of the

@@ -25,9 +25,12 @@ struct Header {
   std::uint32_t particle_count;
   float max_displacement_m;
   double contact_time_s;
+  std::uint32_t torn_bytes;  ///< 0: nothing has torn.
+  std::uint32_t unused;
   ToolRecord tools[kMaxTools];
 };
-// Followed by positions, previous positions (3 floats a particle each), then the held particles tool by tool.
+// Followed by positions, previous positions (3 floats a particle each), then the held particles tool by tool,
+// then the bits of the torn edges.
 
 // Beyond what a tool does: no session sees them.
 constexpr float kMostCoordinate_m = 10;
@@ -50,7 +53,8 @@ std::size_t PositionsBytes(Index particles) { return 3 * sizeof(float) * std::si
 }  // namespace
 
 std::size_t CheckpointCapacity(Index particle_count) {
-  return sizeof(Header) + 2 * PositionsBytes(particle_count) +
+  // No more edges than three a particle.
+  return sizeof(Header) + 2 * PositionsBytes(particle_count) + (3 * std::size_t{particle_count} + 7) / 8 +
          kMaxTools * sizeof(HeldRecord) * std::size_t{particle_count};
 }
 
@@ -80,6 +84,9 @@ std::size_t WriteCheckpoint(const TissueSimulation& simulation, const NodeMemory
       at += sizeof(record);
     }
   }
+  header.torn_bytes = static_cast<std::uint32_t>(memory.torn_edges.size());
+  std::copy(memory.torn_edges.begin(), memory.torn_edges.end(), reinterpret_cast<std::uint8_t*>(at));
+  at += memory.torn_edges.size();
   std::memcpy(slot.data(), &header, sizeof(header));
   auto* floats = reinterpret_cast<float*>(slot.data() + sizeof(Header));
   particles.CopyPositions({floats, 3 * std::size_t{count}});
@@ -106,7 +113,8 @@ std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, Tis
   for (const ToolRecord& tool : header.tools) {
     size += sizeof(HeldRecord) * std::size_t{tool.held_count};
   }
-  if (payload.size() != size || header.steps > kMostSteps ||
+  size += header.torn_bytes;
+  if (payload.size() != size || header.unused != 0 || header.steps > kMostSteps ||
       !(header.max_displacement_m >= 0 && header.max_displacement_m <= kMostCoordinate_m) ||
       !std::isfinite(header.contact_time_s)) {
     return std::nullopt;
@@ -132,6 +140,8 @@ std::optional<NodeMemory> ReadCheckpoint(std::span<const std::byte> payload, Tis
       memory.held[i].push_back({record.particle, Vec3f(record.p_T[0], record.p_T[1], record.p_T[2])});
     }
   }
+  const auto* torn = reinterpret_cast<const std::uint8_t*>(at);
+  memory.torn_edges.assign(torn, torn + header.torn_bytes);
   if (!simulation->Restore(xyz, previous, memory)) {
     return std::nullopt;
   }

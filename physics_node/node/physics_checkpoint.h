@@ -1,5 +1,5 @@
-// What a restarted physics node continues from, as bytes: positions now and one step before, tools and grasps.
-// Topology is not in it: TopologyState brings it.
+// What a restarted physics node continues from, as bytes: positions now and one step before, tools and grasps,
+// what has torn. Topology is not in it: TopologyState brings it.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 namespace fulcrum::physics {
 
 /// Grows with any change of the layout below.
-inline constexpr std::uint32_t kCheckpointLayout = 2;
+inline constexpr std::uint32_t kCheckpointLayout = 3;
 
 [[nodiscard]] std::size_t CheckpointCapacity(Index particle_count);
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <string>
 
 #include "physics_node/node/physics_checkpoint.h"
 
@@ -25,6 +27,8 @@ constexpr std::int64_t kWaitNs = 100'000'000;
 constexpr float kCatchUp_s = 0.4f, kLongestOutage_s = 0.8f, kCatchUpMost_m = 0.01f;
 /// A session time of k dt in double may be this much less than k dt: 0.29 / 0.01 < 29 [ticks].
 constexpr double kRoundingTicks = 1e-6;
+/// A force that was cut off is told for so long: Health goes out ten times a second [ticks].
+constexpr std::uint64_t kTellTicks = 100;
 /// Of a generator that the script says nothing about [W].
 constexpr float kDefaultPower = 35.0f;
 
@@ -64,6 +68,7 @@ PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::Ch
       frame_stamper_(epoch_ns),
       contact_stamper_(epoch_ns),
       cautery_stamper_(epoch_ns),
+      tear_stamper_(epoch_ns),
       manifest_stamper_(epoch_ns),
       hook_(FindHook(scene)),
       power_W_(GeneratorPower(scene, hook_)) {
@@ -87,6 +92,7 @@ bool PhysicsNode::Restore(std::span<const std::byte> checkpoint) {
   max_displacement_m_ = state->max_displacement_m;
   contact_time_s_ = state->contact_time_s;
   catch_up_steps_ = std::max(1, static_cast<int>(std::ceil(kCatchUp_s / scene_.physics.dt_s)));
+  saved_tears_ = simulation_.tears().torn_count();
   const SimulationMemory memory = simulation_.Save();
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     if (memory.known[i]) {
@@ -105,7 +111,8 @@ void PhysicsNode::Follow(const Tick& tick) {
 }
 
 bool PhysicsNode::TakeOver(std::span<const std::byte> other, const Tick& tick) {
-  frame_stamper_ = contact_stamper_ = cautery_stamper_ = manifest_stamper_ = bus::Stamper(tick.stamp_ns);
+  frame_stamper_ = contact_stamper_ = cautery_stamper_ = tear_stamper_ = manifest_stamper_ =
+      bus::Stamper(tick.stamp_ns);
   first_index_ = tick.index;
   const auto own = checkpoint_ == nullptr ? std::nullopt : checkpoint_->Latest();
   const bool own_is_newer = own && CheckpointSteps(own->payload) > CheckpointSteps(other);
@@ -238,6 +245,7 @@ void PhysicsNode::Step(const Tick& tick) {
   // whether the last one reached its checkpoint.
   PublishManifest(tick);
   SaveCheckpoint();
+  PublishTears(tick);
   ++ticks_;
 }
 
@@ -335,6 +343,20 @@ void PhysicsNode::Measure() {
   quarantined_.store(simulation_.quarantined(), std::memory_order_relaxed);
   grasped_.store(static_cast<std::uint32_t>(simulation_.grasp(0).held().size() + simulation_.grasp(1).held().size()),
                  std::memory_order_relaxed);
+  torn_edges_.store(simulation_.tears().torn_count(), std::memory_order_relaxed);
+  stretch_.store(simulation_.tears().largest_stretch(), std::memory_order_relaxed);
+  largest_stretch_.store(simulation_.tears().largest_stretch_ever(), std::memory_order_relaxed);
+  std::uint32_t limited = 0;
+  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+    const bool asks = scene_.physics.mode == PhysicsMode::kAccurate;
+    const float force = (asks ? simulation_.solver_force(i) : simulation_.force(i)).norm();
+    // Unless the solver tells forces, what is known of them is what is left of them.
+    if (force >= (asks ? ContactProbe::kForceCap_N : 0.99f * ContactProbe::kForceCap_N)) {
+      limited_until_[i] = ticks_ + kTellTicks;
+    }
+    limited |= limited_until_[i] > ticks_ ? 1u << i : 0u;
+  }
+  limited_.store(limited, std::memory_order_relaxed);
   if (ticks_ % kSlowTicks != kSlowTicks / 2 || measured_version_ == simulation_.state_version()) {
     return;
   }
@@ -346,11 +368,31 @@ void PhysicsNode::Measure() {
 }
 
 void PhysicsNode::SaveCheckpoint() {
-  if (checkpoint_ == nullptr || ticks_ % kSlowTicks != 0 || saved_version_ == simulation_.state_version()) {
+  const std::uint32_t torn = simulation_.tears().torn_count();
+  const bool due = torn != saved_tears_ || (ticks_ % kSlowTicks == 0 && saved_version_ != simulation_.state_version());
+  if (checkpoint_ == nullptr || !due) {
     return;
   }
+  saved_tears_ = torn;
   saved_version_ = simulation_.state_version();
   checkpoint_->Commit(WriteCheckpoint(simulation_, {max_displacement_m_, contact_time_s_}, checkpoint_->Begin()));
+}
+
+/// After the checkpoint: who has read of a tear can rely on it to survive this process.
+void PhysicsNode::PublishTears(const Tick& tick) {
+  const TearWatch& tears = simulation_.tears();
+  if (tears.torn_count() == told_tears_) {
+    return;
+  }
+  tear_state_.stamp = tear_stamper_.Next(tick.stamp_ns);
+  tear_state_.scene_hash = scene_.hash;
+  tear_state_.rows = scene_.membrane.rows;
+  tear_state_.cols = scene_.membrane.cols;
+  tear_state_.torn_edges.assign(tears.torn().begin(), tears.torn().end());
+  // Tried again in the next tick when it could not be sent.
+  if (ports_.tears.Write(tear_state_)) {
+    told_tears_ = tears.torn_count();
+  }
 }
 
 void PhysicsNode::FillHealth(Health* health) const {
@@ -363,6 +405,21 @@ void PhysicsNode::FillHealth(Health* health) const {
   add("tissue_force1_N", force_N_[1].load(std::memory_order_relaxed));
   add("asleep_ticks", static_cast<double>(asleep_ticks_.load(std::memory_order_relaxed)));
   add("topology_edits", static_cast<double>(topology_edits_.load(std::memory_order_relaxed)));
+  add("torn_edges", torn_edges_.load(std::memory_order_relaxed));
+  add("largest_stretch", largest_stretch_.load(std::memory_order_relaxed));
+  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+    if ((limited_.load(std::memory_order_relaxed) >> i & 1u) != 0) {
+      health->last_error = "force on tool " + std::to_string(i) + " limited to " +
+                           std::to_string(static_cast<int>(ContactProbe::kForceCap_N)) + " N";
+    }
+  }
+  const float limit = scene_.physics.tear_stretch, stretch = stretch_.load(std::memory_order_relaxed);
+  if (limit > 0 && stretch > TearWatch::kNear * limit) {
+    char text[64];
+    std::snprintf(text, sizeof(text), "membrane near tearing: stretch %.2f of %.2f", static_cast<double>(stretch),
+                  static_cast<double>(limit));
+    health->last_error = text;
+  }
   if (const std::uint32_t cheaper = cheaper_.load(std::memory_order_relaxed); cheaper > 0) {
     add("cheaper_presets", cheaper);
     health->last_error = "steps ran late: a cheaper preset for the next seconds";

@@ -28,6 +28,7 @@ class PhysicsNode {
     bus::LoanOutput<TissueFrame>& frames;
     bus::Output<ContactModel>& contacts;
     bus::Output<CauteryContact>& cautery;
+    bus::Output<TearState>& tears;
     bus::Output<TickManifest>& manifests;
   };
 
@@ -72,6 +73,7 @@ class PhysicsNode {
   void PublishContacts(const Tick& tick);
   void PublishCautery(const Tick& tick);
   void PublishManifest(const Tick& tick);
+  void PublishTears(const Tick& tick);
   void SaveCheckpoint();
   void Measure();
 
@@ -79,7 +81,7 @@ class PhysicsNode {
   Ports ports_;
   runtime::CheckpointFile* checkpoint_;
   TissueSimulation simulation_;
-  bus::Stamper frame_stamper_, contact_stamper_, cautery_stamper_, manifest_stamper_;
+  bus::Stamper frame_stamper_, contact_stamper_, cautery_stamper_, tear_stamper_, manifest_stamper_;
   std::uint32_t hook_ = kMaxTools;  ///< The tool that cuts; kMaxTools: none.
   float power_W_;
 
@@ -108,12 +110,18 @@ class PhysicsNode {
   double contact_time_s_ = 0;  ///< Session time of the tools' poses; behind step_time_s_ while they catch up.
   float max_displacement_m_ = 0;
   TickManifest manifest_;
+  TearState tear_state_;
+  std::uint32_t told_tears_ = 0, saved_tears_ = 0;        ///< How many edges had torn then.
+  std::array<std::uint64_t, kMaxTools> limited_until_{};  ///< Tick up to which a force that was cut off is told.
 
   // For the health thread. Relaxed: each figure stands for itself.
   std::atomic<std::uint32_t> cheaper_{0};  ///< Presets below the scene's.
   std::atomic<float> displacement_mm_{0}, max_displacement_mm_{0}, force_N_[kMaxTools]{};
   std::atomic<std::uint32_t> grasped_{0};
   std::atomic<std::uint64_t> quarantined_{0}, asleep_ticks_{0}, topology_refused_{0}, topology_edits_{0};
+  std::atomic<std::uint32_t> torn_edges_{0};
+  std::atomic<std::uint32_t> limited_{0};  ///< Bit per tool: the force on it is above what is told.
+  std::atomic<float> stretch_{0}, largest_stretch_{0};
 };
 
 }  // namespace fulcrum::physics

@@ -54,7 +54,8 @@ TissueSimulation::TissueSimulation(const SceneView& scene, int threads, const Ke
       tissue_collision_(scene, &model_, &particles_),
       grasps_{Grasp(scene), Grasp(scene)},
       contacts_(scene, &model_, &particles_),
-      cautery_(scene, &model_, &particles_) {
+      cautery_(scene, &model_, &particles_),
+      tears_(scene, &model_, &particles_) {
   if (scene.physics.mode != PhysicsMode::kPaper) {
     const ElasticModel elastic = BuildElasticModel(scene);
     if (scene.physics.mode == PhysicsMode::kXpbd) {
@@ -284,8 +285,25 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
   ++state_version_;
   const StepReport report = accurate_ ? StepAccurate() : xpbd_ ? StepXpbd() : StepPaper();
   quarantined_ += report.resets;
+  WatchTears(report.max_step_m);
   MayFallAsleep(report, holds);
   return report;
+}
+
+/// Movements in mode accurate are those of the step before, by blocks of particles: a step late, far below what lies
+/// between near tearing and tearing.
+void TissueSimulation::WatchTears(float max_step_m) {
+  const auto rows = scene_.membrane.rows;
+  if (accurate_) {
+    constexpr std::uint32_t kBlocks = ParticleStore::kBlocksPerRow;
+    for (std::uint32_t row = 0; row < rows; ++row) {
+      const float* of_row = moved_.data() + particles_.tube_blocks() + row * kBlocks;
+      tears_.RowsMoved(row, row + 1, *std::max_element(of_row, of_row + kBlocks));
+    }
+  } else {
+    tears_.RowsMoved(0, rows, max_step_m);
+  }
+  (void)tears_.Look(steps_);
 }
 
 void TissueSimulation::LetThreadsHelp(bool help) {
@@ -311,6 +329,7 @@ int TissueSimulation::ApplyTopology(const TopologyState& topology) {
     for (Grasp& grasp : grasps_) {
       grasp.DropDead(model_, &particles_);
     }
+    tears_.Follow();
     asleep_ = false;
     still_steps_ = 0;
   }
@@ -386,6 +405,9 @@ std::uint64_t TissueSimulation::StateHash() const {
   Hash64 hash;
   hash.Add(std::span<const std::uint64_t>(of_part));
   hash.AddValue(model_.revision());
+  if (tears_.torn_count() > 0) {
+    hash.Add(tears_.torn());
+  }
   return hash.value();
 }
 
@@ -397,6 +419,9 @@ SimulationMemory TissueSimulation::Save() const {
     memory.known[i] = tracks_[i].present;
     memory.grasp_state[i] = grasps_[i].state();
     memory.held[i] = grasps_[i].held();
+  }
+  if (tears_.torn_count() > 0) {
+    memory.torn_edges.assign(tears_.torn().begin(), tears_.torn().end());
   }
   return memory;
 }
@@ -413,6 +438,9 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
   if (xyz.size() != floats || previous_xyz.size() != floats || !within(xyz) ||
       !std::equal(xyz.begin(), xyz.end(), previous_xyz.begin(),
                   [&](float now, float before) { return near(now, before, kMostTravel_m); })) {
+    return false;
+  }
+  if (!memory.torn_edges.empty() && !tears_.Fits(memory.torn_edges)) {
     return false;
   }
   for (const auto& held : memory.held) {
@@ -433,6 +461,7 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
     tracks_[i] = {memory.known[i], memory.pose[i], memory.pose[i]};
     grasps_[i].Restore(memory.grasp_state[i], memory.held[i], &particles_);
   }
+  tears_.Restore(memory.torn_edges);
   steps_ = memory.steps;
   asleep_ = false;
   still_steps_ = 0;

@@ -14,6 +14,7 @@
 #include "physics_node/contact_model/contact_probe.h"
 #include "physics_node/grasp/grasp.h"
 #include "physics_node/pbd/pbd_solver.h"
+#include "physics_node/tear/tear_watch.h"
 #include "physics_node/xpbd/xpbd_solver.h"
 
 namespace fulcrum::physics {
@@ -36,6 +37,7 @@ struct SimulationMemory {
   std::array<bool, kMaxTools> known{};
   std::array<Grasp::State, kMaxTools> grasp_state{};
   std::array<std::vector<HeldParticle>, kMaxTools> held;
+  std::vector<std::uint8_t> torn_edges;  ///< Bits as in TearState; empty: none.
 };
 
 class TissueSimulation {
@@ -77,6 +79,8 @@ class TissueSimulation {
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return contacts_.force(tool); }
   /// In mode accurate, of the last step alone [N].
   [[nodiscard]] Vec3f solver_force(std::uint32_t tool) const { return tool_force_[tool]; }
+  /// What traction has torn. Torn edges hold until ApplyTopology says that they are severed.
+  [[nodiscard]] const TearWatch& tears() const { return tears_; }
   [[nodiscard]] bool asleep() const { return asleep_; }
   /// Part of the tissue that is awake.
   [[nodiscard]] float awake_part() const;
@@ -134,6 +138,7 @@ class TissueSimulation {
   void PlaceHeld(float u);
   void FindAllContacts(float h);
   void UpdateGrasps();
+  void WatchTears(float max_step_m);
   [[nodiscard]] double step_begin_s() const { return simulated_time_s() - static_cast<double>(scene_.physics.dt_s); }
   void FindTissueContacts();
   void FindContacts(bool tissue_moved, float tissue_step = 0);
@@ -158,6 +163,7 @@ class TissueSimulation {
   ContactProbe contacts_;
   Answers answers_{this};
   CauteryProbe cautery_;
+  TearWatch tears_;
   std::array<ToolTrack, kMaxTools> tracks_;
   bool asleep_ = false;
   int still_steps_ = 0;

@@ -118,6 +118,11 @@ bool PassesGate(const TopologyState& m) noexcept {
          m.dead_edges.size() == (3 * nodes + 7) / 8 && m.shrink.size() == 3 * nodes && Within(m.cut_length_m, 0.0, 1e3);
 }
 
+bool PassesGate(const TearState& m) noexcept {
+  const std::uint64_t nodes = std::uint64_t{m.rows} * m.cols;
+  return IsStamp(m.stamp) && nodes <= kMaxMembraneNodes && m.torn_edges.size() == (3 * nodes + 7) / 8;
+}
+
 bool PassesGate(const TemperaturePatch& m) noexcept {
   const TemperaturePatchHeader& h = m.header;
   constexpr std::uint32_t kLastOrigin = kAtlasTexels - kPatchTexels;

@@ -26,7 +26,7 @@ inline constexpr float kMaxPower_W = 1000.0f;
 /// Room for rounding in unit normals, unit quaternions and barycentric sums held in single precision.
 inline constexpr float kUnitTolerance = 1e-2f;
 
-inline constexpr std::size_t kMaxConsumedInputs = 8;
+inline constexpr std::size_t kMaxConsumedInputs = 9;
 inline constexpr std::size_t kMaxInputHealths = 16;
 inline constexpr std::size_t kMaxMetrics = 24;
 inline constexpr std::size_t kMaxMetricName = 31;
@@ -44,6 +44,7 @@ inline constexpr std::size_t kMaxReplyText = 1023;
 [[nodiscard]] bool PassesGate(const ContactModel& m) noexcept;
 [[nodiscard]] bool PassesGate(const CauteryContact& m) noexcept;
 [[nodiscard]] bool PassesGate(const TopologyState& m) noexcept;
+[[nodiscard]] bool PassesGate(const TearState& m) noexcept;
 [[nodiscard]] bool PassesGate(const TemperaturePatch& m) noexcept;
 [[nodiscard]] bool PassesGate(const ThermalEvent& m) noexcept;
 [[nodiscard]] bool PassesGate(const SceneManifest& m) noexcept;

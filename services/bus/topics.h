@@ -74,6 +74,7 @@ inline constexpr std::array<TopicRole, kTopicCount> kTopicRoles{{
     {TopicId::kTickManifest, "fulcrum/TickManifest", Path::kLoopback, true, false, false, true, kEventBurst,
      kEventBurst},
     {TopicId::kHealth, "fulcrum/Health", Path::kLoopback, true, true, false, true, kLatestOnly, kAllWriters},
+    {TopicId::kTearState, "fulcrum/TearState", Path::kLoopback, true, true, false, false, kLatestOnly, kFrameRing},
 }};
 
 [[nodiscard]] constexpr const TopicRole& RoleOf(TopicId id) { return kTopicRoles[static_cast<std::size_t>(id)]; }
@@ -105,6 +106,8 @@ template <>
 inline constexpr TopicId kTopicOf<CommandReply> = TopicId::kCommandReply;
 template <>
 inline constexpr TopicId kTopicOf<TickManifest> = TopicId::kTickManifest;
+template <>
+inline constexpr TopicId kTopicOf<TearState> = TopicId::kTearState;
 
 template <class T>
 [[nodiscard]] constexpr const TopicRole& RoleOf() {
@@ -139,6 +142,8 @@ decltype(auto) WithMessageOf(TopicId id, F&& f) {
       return f(std::type_identity<CommandReply>());
     case TopicId::kTickManifest:
       return f(std::type_identity<TickManifest>());
+    case TopicId::kTearState:
+      return f(std::type_identity<TearState>());
     case TopicId::kHealth:
       break;
   }

@@ -128,6 +128,12 @@ struct FieldsOf<TopologyState> {
                  FULCRUM_FIELD(TopologyState, shrink)};
 };
 template <>
+struct FieldsOf<TearState> {
+  static constexpr auto list =
+      std::tuple{FULCRUM_FIELD(TearState, stamp), FULCRUM_FIELD(TearState, scene_hash), FULCRUM_FIELD(TearState, rows),
+                 FULCRUM_FIELD(TearState, cols), FULCRUM_FIELD(TearState, torn_edges)};
+};
+template <>
 struct FieldsOf<TemperaturePatchHeader> {
   static constexpr auto list = std::tuple{
       FULCRUM_FIELD(TemperaturePatchHeader, stamp),    FULCRUM_FIELD(TemperaturePatchHeader, topology_revision),

@@ -190,6 +190,16 @@ struct TopologyState {
 };
 inline constexpr float kShrinkUnit = 0.002f;
 
+/// Whole state of what traction has torn since the start of the session. The owner of the topology severs these edges;
+/// until TopologyState says so, they hold.
+struct TearState {
+  Stamp stamp;
+  std::uint64_t scene_hash = 0;
+  std::uint32_t rows = 0;
+  std::uint32_t cols = 0;
+  std::vector<std::uint8_t> torn_edges;  ///< Bit field, 3 * rows * cols bits, as TopologyState::dead_edges.
+};
+
 inline bool TestBit(std::span<const std::uint8_t> bits, std::size_t i) { return (bits[i >> 3] >> (i & 7u)) & 1u; }
 inline void SetBit(std::span<std::uint8_t> bits, std::size_t i) {
   bits[i >> 3] = static_cast<std::uint8_t>(bits[i >> 3] | (1u << (i & 7u)));
@@ -286,9 +296,10 @@ enum class TopicId : std::uint8_t {
   kCommand,
   kCommandReply,
   kTickManifest,
-  kHealth
+  kHealth,
+  kTearState
 };
-inline constexpr int kTopicCount = 13;
+inline constexpr int kTopicCount = 14;
 
 struct ConsumedInput {
   TopicId topic = TopicId::kHandleState;

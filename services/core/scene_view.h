@@ -47,6 +47,9 @@ struct PhysicsParams {
   float grasp_close_rad = 0.25f;  ///< The jaw grasps below this angle …
   float grasp_open_rad = 0.45f;   ///< … and lets go above this one.
   float grip_force_N = 8.0f;      ///< Slips above this traction.
+  /// Principal stretch at which the membrane tears; 0: never. Porcine mesentery and peritoneum fail at 1.77 to 3.18;
+  /// the built-in scene's script comes to 2.72 beside the jaws.
+  float tear_stretch = 3.1f;
 };
 
 /// What thermal_node computes; thermal_node/DESIGN.md.

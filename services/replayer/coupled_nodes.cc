@@ -52,13 +52,15 @@ Outcome CoupledNodes::Step(const RecordedTick& recorded) {
   Replace(NodeId::kHaptics, &tick.tools, tools_);
   Replace(NodeId::kPhysics, &tick.model, models_);
   Replace(NodeId::kPhysics, &tick.cautery, cautery_);
-  if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) {
-    tick.topology.clear();
-    while (!topology_.empty() && topology_.front().stamp.stamp_ns + kDelay_ns <= tick.tick.stamp_ns) {
-      tick.topology = {std::move(topology_.front())};
-      topology_.pop_front();
+  const auto take_newest = [&tick]<class T>(std::deque<T>* sent, std::vector<T>* inputs) {
+    inputs->clear();
+    while (!sent->empty() && sent->front().stamp.stamp_ns + kDelay_ns <= tick.tick.stamp_ns) {
+      *inputs = {std::move(sent->front())};
+      sent->pop_front();
     }
-  }
+  };
+  if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) take_newest(&topology_, &tick.topology);
+  if (tick.node == NodeId::kThermal && Has(NodeId::kPhysics)) take_newest(&tears_, &tick.tears);
   ReplayedNode& node = *nodes_.at(tick.node);
   Outcome outcome;
   outcome.state_hash = node.Step(tick);
@@ -68,13 +70,15 @@ Outcome CoupledNodes::Step(const RecordedTick& recorded) {
     } else {
       (void)(Decode(published, &outcome.tools) || Decode(published, &outcome.frame) ||
              Decode(published, &outcome.model) || Decode(published, &outcome.cautery) ||
-             Decode(published, &outcome.topology) || Decode(published, &outcome.patch));
+             Decode(published, &outcome.topology) || Decode(published, &outcome.tear) ||
+             Decode(published, &outcome.patch));
     }
   }
   Keep(outcome.tools, &tools_);
   Keep(outcome.model, &models_);
   Keep(outcome.cautery, &cautery_);
   if (outcome.topology && Has(NodeId::kPhysics)) topology_.push_back(*outcome.topology);
+  if (outcome.tear && Has(NodeId::kThermal)) tears_.push_back(*outcome.tear);
   return outcome;
 }
 

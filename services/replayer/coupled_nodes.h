@@ -20,6 +20,7 @@ struct Outcome {
   std::optional<TissueFrame> frame;
   std::optional<ContactModel> model;
   std::optional<CauteryContact> cautery;
+  std::optional<TearState> tear;
   std::optional<TopologyState> topology;
   std::optional<TemperaturePatch> patch;
   std::vector<ThermalEvent> events;
@@ -44,6 +45,7 @@ class CoupledNodes {
   std::map<std::int64_t, ContactModel> models_;
   std::map<std::int64_t, CauteryContact> cautery_;
   std::deque<TopologyState> topology_;  ///< Not yet taken.
+  std::deque<TearState> tears_;         ///< The same.
 };
 
 }  // namespace fulcrum::replay

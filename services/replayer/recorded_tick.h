@@ -22,6 +22,7 @@ struct RecordedTick {
   std::vector<HandleState> handles;
   std::vector<TopologyState> topology;
   std::vector<CauteryContact> cautery;
+  std::vector<TearState> tears;
   std::vector<ContactModel> model;
   /// Why this tick cannot be made again; empty: it can.
   std::string missing;

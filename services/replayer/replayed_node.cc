@@ -94,6 +94,7 @@ class ReplayedPhysics final : public ReplayedNode {
     if (bus::EncodeCdr(frame, &message.bytes)) published.push_back(std::move(message));
     contacts_.TakeInto(&published);
     cautery_.TakeInto(&published);
+    tears_.TakeInto(&published);
     return published;
   }
   void FillHealth(Health* health) const override { node_->FillHealth(health); }
@@ -109,7 +110,7 @@ class ReplayedPhysics final : public ReplayedNode {
     topology_ = {};
     node_.emplace(scene_,
                   physics::PhysicsNode::Ports{*tools_.in, *handles_.in, *topology_.in, *frames_, *contacts_.out,
-                                              *cautery_.out, *manifests_.out},
+                                              *cautery_.out, *tears_.out, *manifests_.out},
                   checkpoint_.file(), epoch_ns, threads_);
   }
 
@@ -117,6 +118,7 @@ class ReplayedPhysics final : public ReplayedNode {
     tick_ = tick.tick;
     contacts_.Drop();
     cautery_.Drop();
+    tears_.Drop();
     tools_.Give(tick.tools);
     handles_.Give(tick.handles);
     topology_.Give(tick.topology);
@@ -138,6 +140,7 @@ class ReplayedPhysics final : public ReplayedNode {
   Tick tick_;
   Outlet<ContactModel> contacts_;
   Outlet<CauteryContact> cautery_;
+  Outlet<TearState> tears_;
   Outlet<TickManifest> manifests_;
   std::optional<physics::PhysicsNode> node_;
 };
@@ -166,10 +169,11 @@ class ReplayedThermal final : public ReplayedNode {
   void Start(std::int64_t epoch_ns) override {
     node_.reset();
     contacts_ = {};
-    node_.emplace(
-        scene_,
-        thermal::ThermalNode::Ports{*contacts_.in, *topology_.out, *patches_.out, *events_.out, *manifests_.out},
-        checkpoint_.file(), epoch_ns);
+    tears_ = {};
+    node_.emplace(scene_,
+                  thermal::ThermalNode::Ports{*contacts_.in, *tears_.in, *topology_.out, *patches_.out, *events_.out,
+                                              *manifests_.out},
+                  checkpoint_.file(), epoch_ns);
   }
 
   std::uint64_t Advance(const RecordedTick& tick) override {
@@ -177,6 +181,7 @@ class ReplayedThermal final : public ReplayedNode {
     patches_.Drop();
     events_.Drop();
     contacts_.Give(tick.cautery);
+    tears_.Give(tick.tears);
     node_->Step(tick.tick);
     (void)manifests_.in->TakeLatest(&manifests_.sample);
     return manifests_.sample.state_hash;
@@ -185,6 +190,7 @@ class ReplayedThermal final : public ReplayedNode {
   const SceneView& scene_;
   Keepsake checkpoint_;
   Inlet<CauteryContact> contacts_;
+  Inlet<TearState> tears_;
   Outlet<TopologyState> topology_;
   Outlet<TemperaturePatch> patches_;
   Outlet<ThermalEvent> events_;

@@ -73,6 +73,9 @@ bool TickSource::Next(RecordedTick* tick) {
       case TopicId::kTopologyState:
         Fetch(*tick, consumed, topology_, &tick->topology, &tick->missing);
         break;
+      case TopicId::kTearState:
+        Fetch(*tick, consumed, tears_, &tick->tears, &tick->missing);
+        break;
       case TopicId::kCauteryContact:
         Fetch(*tick, consumed, cautery_, &tick->cautery, &tick->missing);
         break;
@@ -145,6 +148,9 @@ void TickSource::Take(const recording::McapMessage& message) {
       break;
     case TopicId::kTopologyState:
       if (TopologyState topology; wanted(NodeId::kPhysics) && Decode(message, &topology)) topology_.Put(topology);
+      break;
+    case TopicId::kTearState:
+      if (TearState tear; wanted(NodeId::kThermal) && Decode(message, &tear)) tears_.Put(tear);
       break;
     case TopicId::kCauteryContact:
       if (CauteryContact contact; wanted(NodeId::kThermal) && Decode(message, &contact)) cautery_.Put(contact);

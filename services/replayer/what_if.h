@@ -39,8 +39,8 @@ struct WhatIfResult {
 
 /// Replays the nodes twice, side by side: with `before` and with `after`. Nodes that are replayed together feed each
 /// other; the rest of their inputs are the recorded ones. A sample of another replayed node stands in for the recorded
-/// one of the same moment; TopologyState, which has moments of its own, comes kCouplingDelay_s after it was sent.
-/// Throws as ReplayInLockStep.
+/// one of the same moment; TopologyState and TearState, which have moments of their own, come kCouplingDelay_s after it
+/// was sent. Throws as ReplayInLockStep.
 WhatIfResult ReplayWhatIf(const LockStepSettings& settings, const SceneView& before, const SceneView& after,
                           const config::CartConfig& cart, const std::function<void(double)>& progress);
 

@@ -11,7 +11,7 @@
 
 namespace fulcrum::scene {
 
-inline constexpr std::uint32_t kSceneFileVersion = 7;
+inline constexpr std::uint32_t kSceneFileVersion = 8;
 
 /// Owns the arrays of a scene under construction or in a test; `View()` gives what the nodes read.
 struct SceneData {

@@ -70,7 +70,11 @@ void CheckParameters(const SceneView& s) {
                {"physics.grasp_radius", p.grasp_radius_m, 1e-4f, 0.05f},
                {"physics.grasp_close", p.grasp_close_rad, 0, 1.5f},
                {"physics.grasp_open", p.grasp_open_rad, p.grasp_close_rad, 1.6f},
-               {"physics.grip_force", p.grip_force_N, 0, 1000}});
+               {"physics.grip_force", p.grip_force_N, 0, 1000},
+               {"physics.tear_stretch", p.tear_stretch, 0, 10}});
+  if (p.tear_stretch != 0.0f && !(p.tear_stretch > 1.0f + p.membrane_prestrain)) {
+    Fail("scene", "physics.tear_stretch = ", p.tear_stretch, "; valid: 0 (never) or above 1 + membrane_prestrain");
+  }
   if (t.model > ThermalModel::kPaper) {
     Fail("scene", "thermal.model = ", static_cast<std::uint32_t>(t.model), "; valid: 0 (accurate), 1 (paper)");
   }

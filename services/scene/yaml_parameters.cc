@@ -65,6 +65,10 @@ void ReadPhysics(StrictMap map, PhysicsParams* p) {
   ReadSi(&map, "grasp_close_deg", Range::Between(0, 85), &p->grasp_close_rad);
   ReadSi(&map, "grasp_open_deg", Range::Between(0, 90), &p->grasp_open_rad);
   ReadSi(&map, "grip_force_N", Range::Between(0, 1000), &p->grip_force_N);
+  ReadSi(&map, "tear_stretch", Range::Between(0, 10), &p->tear_stretch);
+  if (p->tear_stretch != 0.0f && !(p->tear_stretch > 1.0f + p->membrane_prestrain)) {
+    map.Fail("tear_stretch", "must be above 1 + membrane_prestrain, or 0 (never)");
+  }
   if (!(p->grasp_open_rad > p->grasp_close_rad)) {
     map.Fail("grasp_open_deg", "must be above grasp_close_deg");
   }

@@ -58,7 +58,7 @@ bool ThermalSolver::Idle(std::span<const TipInput> tips) const {
   const bool hot_metal = std::abs(source_.interface().hook_theta) > kHookWarm;
   const bool acts = std::any_of(tips.begin(), tips.end(),
                                 [&](const TipInput& tip) { return tip.active || (tip.touching && hot_metal); });
-  return !acts && field_.idle() && below_idle && !topology_.staged() && !protected_.warm();
+  return !acts && field_.idle() && below_idle && !topology_.staged() && tears_.empty() && !protected_.warm();
 }
 
 void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
@@ -88,6 +88,44 @@ void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
   ReportEvents(last_tip_);
 }
 
+void ThermalSolver::Tear(std::span<const std::uint8_t> torn_edges) {
+  const std::size_t edges = 3 * std::size_t{topology_.rows()} * topology_.cols();
+  tears_.clear();
+  for (std::size_t byte = 0; byte < std::min(torn_edges.size(), (edges + 7) / 8); ++byte) {
+    if (torn_edges[byte] == 0) continue;
+    for (std::size_t edge = 8 * byte; edge < std::min(8 * byte + 8, edges); ++edge) {
+      if (TestBit(torn_edges, edge) && topology_.EdgeLives(static_cast<Index>(edge))) {
+        tears_.push_back(static_cast<Index>(edge));
+      }
+    }
+  }
+}
+
+/// Cells and mesh agree, so an edge is torn by taking a line of cells out of its strand.
+void ThermalSolver::StageTears() {
+  if (tears_.empty()) return;
+  RemovedBox taken;
+  for (const Index edge : tears_) {
+    topology_.ForCellsAcross(field_.sheet(), edge, [&](CellIndex cell) {
+      Tile* tile = field_.Wake(cell.ix / kTile, cell.iy / kTile);
+      const int k = (cell.iy % kTile) * kTile + cell.ix % kTile;
+      if (tile == nullptr || (tile->state.flags[k] & kNoTissue) != 0) return;
+      field_.TakeOut(tile, k, kRemoved, &ledger_.removed);
+      taken.Add(cell);
+    });
+  }
+  tears_.clear();
+  if (taken.empty()) return;
+  for (int ty = taken.low.iy / kTile; ty <= taken.high.iy / kTile; ++ty) {
+    for (int tx = taken.low.ix / kTile; tx <= taken.high.ix / kTile; ++tx) {
+      if (Tile* tile = field_.Find(tx, ty); tile != nullptr && tile->state.awake != 0)
+        field_.RefreshTheta(tile, &ledger_);
+    }
+  }
+  topology_.StageCut(field_, taken.low, taken.high);
+  torn_.Add(taken);
+}
+
 void ThermalSolver::AccurateFrame(std::span<const TipInput> tips, float dt_s) {
   source_.ClearStats();
   ApplySource(tips, dt_s, 0.0f, 0.5f);
@@ -95,6 +133,7 @@ void ThermalSolver::AccurateFrame(std::span<const TipInput> tips, float dt_s) {
   ApplySource(tips, dt_s, 0.5f, 1.0f);
   UpdateVolume(dt_s);
   UpdateDamage(dt_s);
+  StageTears();
   UpdateTopology();
   if (!tips.empty()) figures_.voltage_V = tips.back().active ? source_.stats().voltage_V : 0.0f;
   figures_.shortened += source_.stats().shortened ? 1 : 0;
@@ -109,6 +148,8 @@ void ThermalSolver::PaperFrame(std::span<const TipInput> tips, float dt_s) {
   if (tip.active) AddWay(tip.path, tip.mode);
   if (tip.active) paper_->Heat(&field_, {tip.path.from, tip.path.radius_m, voltage, tip.path.tented}, dt_s, &ledger_);
   figures_.substeps = field_.Diffuse(dt_s, &ledger_);
+  StageTears();
+  torn_ = {};
   const RemovedBox removed = paper_->RemoveNodes(&field_, &topology_, &ledger_);
   removed_.Add(removed);
   if (at_commit_frame()) UpdateCutMeter(std::exchange(removed_, {}));
@@ -176,11 +217,16 @@ void ThermalSolver::UpdateTopology() {
     removed_.Add(RemovedBox{stats.low, stats.high});
   }
   if (!at_commit_frame()) return;
-  if (!removed_.empty()) {
-    const RemovedBox crumbs = crumbs_.TakeOut(&field_, removed_, &ledger_);
+  if (!removed_.empty() || !torn_.empty()) {
+    RemovedBox changed = removed_;
+    changed.Add(torn_);
+    const RemovedBox crumbs = crumbs_.TakeOut(&field_, changed, &ledger_);
     if (!crumbs.empty()) topology_.StageCut(field_, crumbs.low, crumbs.high);
-    removed_.Add(crumbs);
-    UpdateCutMeter(std::exchange(removed_, {}));
+    if (!removed_.empty()) {
+      removed_.Add(crumbs);
+      UpdateCutMeter(std::exchange(removed_, {}));
+    }
+    torn_ = {};
     figures_.debris_m2 = static_cast<float>(crumbs_.area_m2());
   }
   for (const Tile* tile : field_.awake()) {

@@ -63,6 +63,10 @@ class ThermalSolver {
   void Step(std::span<const TipInput> tips, float dt_s);
   void Step(const TipInput& tip, float dt_s) { Step(std::span(&tip, 1), dt_s); }
 
+  /// Edges (3 * node + direction) that traction has torn since the start of the session, bit by bit: those that still
+  /// live are severed in the next Step, and their cells with them. Bits that are no edge's are ignored.
+  void Tear(std::span<const std::uint8_t> torn_edges);
+
   /// Events of the last Step.
   [[nodiscard]] std::span<const SolverEvent> events() const { return events_; }
   /// True when the last Step made a new topology revision.
@@ -108,6 +112,7 @@ class ThermalSolver {
   void UpdateVolume(float dt_s);
   void UpdateDamage(float dt_s);
   void QuarantineBadDamage(Tile* tile);
+  void StageTears();
   void UpdateTopology();
   void AddWay(const TipPath& path, CauteryMode mode);
   void UpdateCutMeter(const RemovedBox& removed);
@@ -136,7 +141,9 @@ class ThermalSolver {
   std::unique_ptr<SheetContact> contact_;
   std::unique_ptr<PaperModel> paper_;  ///< Null in the accurate model.
   Crumbs crumbs_;
-  RemovedBox removed_;  ///< Since the last commit.
+  RemovedBox removed_;        ///< By heat, since the last commit.
+  RemovedBox torn_;           ///< By traction, likewise: no part of the cut's length.
+  std::vector<Index> tears_;  ///< Edges to be severed in the next Step.
   CutMeter cut_meter_;
   Ledger ledger_;
   SolverFigures figures_;

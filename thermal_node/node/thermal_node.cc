@@ -26,7 +26,7 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
   manifest_.node = NodeId::kThermal;
   contacts_.reserve(kMostSamples);
   tips_.reserve(kMostSamples);
-  manifest_.consumed.reserve(kMostSamples);
+  manifest_.consumed.reserve(kMostSamples + 1);
   if (checkpoint_ != nullptr) {
     if (const auto latest = checkpoint_->Latest()) restored_ = Restore(latest->payload);
   }
@@ -35,7 +35,9 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
 
 void ThermalNode::Step(const Tick& tick) {
   if (ticks_++ == 0) runtime::FlushDenormals();
-  solver_.Step(TakeContacts(tick.dt_s), static_cast<float>(tick.dt_s));
+  const std::span<const TipInput> tips = TakeContacts(tick.dt_s);
+  TakeTears();
+  solver_.Step(tips, static_cast<float>(tick.dt_s));
   // The manifest first: a replay finds every tick that a checkpoint holds, and sees from the next process's first state
   // whether the last one reached its checkpoint.
   PublishManifest(tick);
@@ -79,6 +81,17 @@ bool ThermalNode::Restore(std::span<const std::byte> checkpoint) {
   // Both or neither: the tip's way goes on from what the solver has cut.
   TipTracker tracker = tracker_;
   return tracker.Restore(tip) && solver_.Restore(checkpoint.subspan(sizeof(tip))) && tracker_.Restore(tip);
+}
+
+/// The whole state each time: one that was missed, or one that comes again after a restart, makes no difference.
+void ThermalNode::TakeTears() {
+  if (!ports_.tears.TakeLatest(&tears_)) return;
+  manifest_.consumed.push_back({TopicId::kTearState, tears_.stamp.epoch, tears_.stamp.sequence});
+  if (tears_.scene_hash != scene_.hash || tears_.rows != scene_.membrane.rows || tears_.cols != scene_.membrane.cols) {
+    ++refused_;
+    return;
+  }
+  solver_.Tear(tears_.torn_edges);
 }
 
 /// Before anything of a new revision is published: whoever saw a revision can rely on it to survive this process.

@@ -31,6 +31,7 @@ class ThermalNode {
  public:
   struct Ports {
     bus::Input<CauteryContact>& contact;
+    bus::Input<TearState>& tears;
     bus::Output<TopologyState>& topology;
     bus::LoanOutput<TemperaturePatch>& patch;
     bus::Output<ThermalEvent>& event;
@@ -57,6 +58,8 @@ class ThermalNode {
  private:
   /// What the electrode did since the last tick.
   [[nodiscard]] std::span<const TipInput> TakeContacts(double dt_s);
+  /// What has torn; only what is new.
+  void TakeTears();
   void SaveCheckpoint();
   [[nodiscard]] bool Restore(std::span<const std::byte> checkpoint);
   void PublishTopology(const Tick& tick);
@@ -84,6 +87,7 @@ class ThermalNode {
   std::vector<CauteryContact> contacts_;
   std::vector<TipInput> tips_;
   TopologyState topology_;
+  TearState tears_;
   TickManifest manifest_;
   std::uint64_t ticks_ = 0, refused_ = 0, frames_since_checkpoint_ = 0;
   bool restored_ = false, topology_due_ = true, patch_readers_ = false, patch_note_due_ = false;

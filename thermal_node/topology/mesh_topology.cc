@@ -12,9 +12,6 @@ struct Box {
   [[nodiscard]] bool Overlaps(const Box& o) const { return x0 <= o.x1 && o.x0 <= x1 && y0 <= o.y1 && o.y0 <= y1; }
 };
 
-/// At least one cell to either side, so that a diagonal strand is connected.
-float BandOf(const Vec2f& a, const Vec2f& b) { return std::max(1.0f, kBandHalfWidth * (b - a).norm()); }
-
 Box BoxOf(const Vec2f& a, const Vec2f& b) {
   const float band = BandOf(a, b);
   const Vec2f low = a.cwiseMin(b), high = a.cwiseMax(b);

@@ -9,6 +9,8 @@
 // at rest, because the cells do not resolve an acute corner.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -22,6 +24,10 @@ inline constexpr float kBandHalfWidth = 0.25f;  ///< Of an edge's band, relative
 inline constexpr float kInvalidShrink = 0.7f;   ///< Of the paper: what is left of an edge's length per invalid end.
 inline constexpr int kShrinkStep = 4;           ///< Shrink moves in steps of 4 kShrinkUnit: 0.8 % of the rest length.
 
+/// Half the width of the strand of an edge from a to b, in cells: at least one to either side, so that a diagonal
+/// strand is connected.
+inline float BandOf(const Vec2f& a, const Vec2f& b) { return std::max(1.0f, kBandHalfWidth * (b - a).norm()); }
+
 /// The published arrays, packed as in the TopologyState message.
 struct TopologyBits {
   std::vector<std::uint8_t> dead_nodes, dead_edges, shrink;
@@ -33,6 +39,11 @@ class MeshTopology {
 
   /// Looks again at every edge whose band touches the box of cells, after cells in it were removed.
   void StageCut(const HeatField& field, CellIndex low, CellIndex high);
+  /// Calls take(cell) for each cell of tissue that lies across the middle of the edge's strand: a line of one cell over
+  /// the strand's width, through which no path over faces leads. Nothing for an edge that is dead or does not exist.
+  /// Take the cells out, then StageCut().
+  template <class Take>
+  void ForCellsAcross(const Sheet& sheet, Index edge, const Take& take) const;
   /// Shrink from collagen damage of the edges near the tile: L = L0 (1 - shrink_max (1 - exp(-Omega))), mean over the
   /// cells of the segment, once from the rest length and never back.
   void StageShrink(const HeatField& field, const Tile& tile);
@@ -45,6 +56,8 @@ class MeshTopology {
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   [[nodiscard]] bool staged() const { return changed_; }
   [[nodiscard]] const TopologyBits& committed() const { return committed_; }
+  /// In what is staged.
+  [[nodiscard]] bool EdgeLives(Index edge) const { return EdgeExists(edge) && !TestBit(staged_.dead_edges, edge); }
   [[nodiscard]] std::uint32_t rows() const { return rows_; }
   [[nodiscard]] std::uint32_t cols() const { return cols_; }
   [[nodiscard]] std::uint32_t dead_edge_count() const { return dead_edge_count_; }
@@ -87,5 +100,29 @@ class MeshTopology {
   std::vector<std::uint8_t> open_;
   std::vector<int> queue_;
 };
+
+template <class Take>
+void MeshTopology::ForCellsAcross(const Sheet& sheet, Index edge, const Take& take) const {
+  if (!EdgeLives(edge)) return;
+  const Vec2f a = node_[edge / 3], b = node_[OtherEnd(edge)], middle = 0.5f * (a + b);
+  const float length = (b - a).norm();
+  const Vec2f along = (b - a) / std::max(length, 1e-6f);  // An edge of no length has all cells within its band taken.
+  // Cells whose centre is nearer to the line than half a cell along the axis that it is steeper to join over corners at
+  // least, so paths over faces end at it; the rest is for rounding.
+  const float half = 0.5f * std::max(std::abs(along.x()), std::abs(along.y())) + 0.01f, band = BandOf(a, b);
+  // One more cell to either side: the cells of the nodes belong to a strand however far their centres lie.
+  const float reach = band + 1.0f;
+  const Vec2f low = middle.array() - reach - 1.0f, high = middle.array() + reach + 1.0f;
+  for (int iy = std::max(0, static_cast<int>(std::floor(low.y())));
+       iy <= std::min(sheet.ny - 1, static_cast<int>(high.y())); ++iy) {
+    for (int ix = std::max(0, static_cast<int>(std::floor(low.x())));
+         ix <= std::min(sheet.nx - 1, static_cast<int>(high.x())); ++ix) {
+      const Vec2f d = Vec2f(static_cast<float>(ix) + 0.5f, static_cast<float>(iy) + 0.5f) - middle;
+      const float u = d.dot(along);
+      if (std::abs(u) > half || (d - u * along).norm() > reach || sheet.IsOutside(ix, iy)) continue;
+      take(CellIndex{ix, iy});
+    }
+  }
+}
 
 }  // namespace fulcrum::thermal

@@ -1,4 +1,4 @@
-// TissueFrame and TemperaturePatch in their loans, TopologyState, ThermalEvent.
+// TissueFrame and TemperaturePatch in their loans, TopologyState, TearState, ThermalEvent.
 #include <algorithm>
 #include <cstring>
 
@@ -161,6 +161,24 @@ void FromWire(const idl::TopologyState& from, TopologyState* to) {
   to->dead_nodes = from.dead_nodes();
   to->dead_edges = from.dead_edges();
   to->shrink = from.shrink();
+}
+
+bool ToWire(const TearState& from, idl::TearState* to) {
+  if (from.torn_edges.size() > idl::MAX_EDGE_BYTES) return false;
+  to->stamp(cv::ToWire(from.stamp));
+  to->scene_hash(from.scene_hash);
+  to->rows(from.rows);
+  to->cols(from.cols);
+  to->torn_edges(from.torn_edges);
+  return true;
+}
+
+void FromWire(const idl::TearState& from, TearState* to) {
+  to->stamp = cv::FromWire(from.stamp());
+  to->scene_hash = from.scene_hash();
+  to->rows = from.rows();
+  to->cols = from.cols();
+  to->torn_edges = from.torn_edges();
 }
 
 bool ToWire(const ThermalEvent& from, idl::ThermalEvent* to) {

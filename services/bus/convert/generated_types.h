@@ -42,6 +42,10 @@ struct TypeSupportOf<TopologyState> {
   using type = idl::TopologyStatePubSubType;
 };
 template <>
+struct TypeSupportOf<TearState> {
+  using type = idl::TearStatePubSubType;
+};
+template <>
 struct TypeSupportOf<TemperaturePatch> {
   using type = idl::TemperaturePatchPubSubType;
 };

@@ -37,8 +37,8 @@ struct Pair {
 template <class T>
 class EveryTopic : public ::testing::Test {};
 using Types =
-    ::testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState, TemperaturePatch,
-                     ThermalEvent, SceneManifest, Command, CommandReply, TickManifest, Health>;
+    ::testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState, TearState,
+                     TemperaturePatch, ThermalEvent, SceneManifest, Command, CommandReply, TickManifest, Health>;
 TYPED_TEST_SUITE(EveryTopic, Types);
 
 TYPED_TEST(EveryTopic, ArrivesUnchanged) {

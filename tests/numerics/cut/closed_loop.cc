@@ -23,6 +23,7 @@ const LoopStep& ClosedLoop::Step(const Moment& moment) {
   step_.contact.session_time_s = step_.time_s;
   step_.contact.mode = moment.mode;
   step_.contact.power_W = moment.power_W;
+  if (const auto& tears = physics_.tears(); tears.torn_count() > 0) thermal_.Tear(tears.torn());
   if (tracker_.Accepts(step_.contact)) thermal_.Step(tracker_.Advance(step_.contact, dt_s), dt_s);
   if (thermal_.committed()) {
     const thermal::MeshTopology& mesh = thermal_.topology();

@@ -50,6 +50,7 @@ struct Floats {
     for (MetalPoint& point : m.metal) Each(point.material, point.height_m);
   }
   void operator()(TopologyState& m) const { (*this)(m.cut_length_m); }
+  void operator()(TearState&) const {}
   void operator()(TemperaturePatch& m) const { (*this)(m.header.max_temperature_C); }
   void operator()(ThermalEvent& m) const { Each(m.session_time_s, m.material, m.temperature_C, m.value); }
   void operator()(SceneManifest&) const {}
@@ -67,8 +68,8 @@ struct Floats {
 template <class T>
 class Gate : public testing::Test {};
 using Types =
-    testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState, TemperaturePatch,
-                   ThermalEvent, SceneManifest, Command, CommandReply, TickManifest, Health>;
+    testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState, TearState,
+                   TemperaturePatch, ThermalEvent, SceneManifest, Command, CommandReply, TickManifest, Health>;
 TYPED_TEST_SUITE(Gate, Types);
 
 TYPED_TEST(Gate, PassesAGoodMessage) { EXPECT_TRUE(PassesGate(test::Sample<TypeParam>())); }
@@ -189,6 +190,13 @@ TEST(GateRanges, TopologyState) {
                                 {"negative length", [](auto& m) { m.cut_length_m = -1; }}});
 }
 
+TEST(GateRanges, TearState) {
+  ExpectRefused<TearState>({{"grid beyond capacity", [](auto& m) { m.rows = 97; }},
+                            {"product overflows 32 bits", [](auto& m) { m.rows = m.cols = 0x10000; }},
+                            {"edge bits too short", [](auto& m) { m.torn_edges.pop_back(); }},
+                            {"edge bits too long", [](auto& m) { m.torn_edges.push_back(0); }}});
+}
+
 TEST(GateRanges, TemperaturePatch) {
   ExpectRefused<TemperaturePatch>({{"reaches beyond the atlas", [](auto& m) { m.header.origin_x = 3841; }},
                                    {"reaches beyond the atlas", [](auto& m) { m.header.origin_y = 3841; }},
@@ -216,7 +224,7 @@ TEST(GateRanges, SessionMessages) {
   ExpectRefused<CommandReply>({{"unknown node", [](auto& m) { m.from = BeyondLast<NodeId>(); }}});
   ExpectRefused<TickManifest>({{"unknown node", [](auto& m) { m.node = BeyondLast<NodeId>(); }},
                                {"unknown topic", [](auto& m) { m.consumed[1].topic = BeyondLast<TopicId>(); }},
-                               {"too many inputs", [](auto& m) { m.consumed.resize(9); }}});
+                               {"too many inputs", [](auto& m) { m.consumed.resize(10); }}});
 }
 
 TEST(GateRanges, Health) {

@@ -69,6 +69,11 @@ inline bool Same(const TopologyState& a, const TopologyState& b) {
          a.dead_edges == b.dead_edges && a.shrink == b.shrink;
 }
 
+inline bool Same(const TearState& a, const TearState& b) {
+  return Same(a.stamp, b.stamp) && a.scene_hash == b.scene_hash && a.rows == b.rows && a.cols == b.cols &&
+         a.torn_edges == b.torn_edges;
+}
+
 inline bool Same(const TemperaturePatch& a, const TemperaturePatch& b) {
   const TemperaturePatchHeader &p = a.header, &q = b.header;
   return Same(p.stamp, q.stamp) && p.topology_revision == q.topology_revision && p.slot == q.slot &&

@@ -120,6 +120,19 @@ inline TopologyState Sample(std::uint64_t sequence) {
   return m;
 }
 
+/// The largest there is.
+template <>
+inline TearState Sample(std::uint64_t sequence) {
+  TearState m;
+  m.stamp = {sequence, 16, 6500};
+  m.scene_hash = 0xabcdef;
+  m.rows = 96;
+  m.cols = 256;
+  for (std::size_t i = 0; i < std::size_t{3} * 96 * 256 / 8; ++i)
+    m.torn_edges.push_back(static_cast<std::uint8_t>(i * 5));
+  return m;
+}
+
 template <>
 inline TemperaturePatch Sample(std::uint64_t sequence) {
   TemperaturePatch m;

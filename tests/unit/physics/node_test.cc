@@ -22,6 +22,7 @@ struct Bus {
   bus::InProcessTopic<TissueFrame> frames;
   bus::InProcessTopic<ContactModel> contacts;
   bus::InProcessTopic<CauteryContact> cautery;
+  bus::InProcessTopic<TearState> tears;
   bus::InProcessTopic<TickManifest> manifests;
 };
 
@@ -36,11 +37,14 @@ class Bench {
         frame_out_(bus_.frames.MakeOutput()),
         contact_out_(bus_.contacts.MakeOutput()),
         cautery_out_(bus_.cautery.MakeOutput()),
+        tear_out_(bus_.tears.MakeOutput()),
         manifest_out_(bus_.manifests.MakeOutput()),
         tool_out_(bus_.tools.MakeOutput()),
         handle_out_(bus_.handles.MakeOutput()),
         topology_out_(bus_.topology.MakeOutput()),
-        node_(scene, {*tool_in_, *handle_in_, *topology_in_, *frame_out_, *contact_out_, *cautery_out_, *manifest_out_},
+        node_(scene,
+              {*tool_in_, *handle_in_, *topology_in_, *frame_out_, *contact_out_, *cautery_out_, *tear_out_,
+               *manifest_out_},
               checkpoint, epoch) {}
 
   void Send(double time_s) {
@@ -104,6 +108,7 @@ class Bench {
   std::unique_ptr<bus::LoanOutput<TissueFrame>> frame_out_;
   std::unique_ptr<bus::Output<ContactModel>> contact_out_;
   std::unique_ptr<bus::Output<CauteryContact>> cautery_out_;
+  std::unique_ptr<bus::Output<TearState>> tear_out_;
   std::unique_ptr<bus::Output<TickManifest>> manifest_out_;
   std::unique_ptr<bus::Output<ToolState>> tool_out_;
   std::unique_ptr<bus::Output<HandleState>> handle_out_;
@@ -352,6 +357,53 @@ TEST_F(PhysicsRestart, GoesOnWhereItWasKilled) {
   }
   EXPECT_LT(jump, 0.0015f);
   EXPECT_TRUE(bench.node_.simulation().grasp(0).holding());
+}
+
+/// The script stretches the small scene's membrane to 2.2.
+TEST_F(PhysicsRestart, NeitherForgetsNorRepeatsWhatHasTorn) {
+  scene_.physics.tear_stretch = 1.8f;
+  TearState before, after;
+  {
+    auto checkpoint = Open();
+    Bench bench(scene_, checkpoint.get());
+    auto tears = bench.bus_.tears.MakeInput();
+    bench.Play(0, 1.0);
+    EXPECT_FALSE(tears->TakeLatest(&before)) << "nothing has torn, nothing is said";
+    // Ended in the tick in which something tears.
+    while (bench.node_.simulation().tears().torn_count() == 0 && bench.tick_.index < 500) {
+      const double now_s = 0.01 * static_cast<double>(bench.tick_.index);
+      bench.Play(now_s, now_s + 0.01);
+    }
+    ASSERT_TRUE(tears->TakeLatest(&before));
+    EXPECT_EQ(before.scene_hash, scene_.hash);
+    EXPECT_EQ(before.rows, scene_.membrane.rows);
+    EXPECT_EQ(before.stamp.sequence, 1u);
+    EXPECT_GT(bench.Figure("torn_edges"), 0);
+    EXPECT_GE(bench.Figure("largest_stretch"), 1.8);
+    for (Index edge = 0; edge < 3 * scene_.membrane.node_count(); ++edge) {
+      if (!TestBit(before.torn_edges, edge)) continue;
+      EXPECT_TRUE(bench.node_.simulation().model().EdgeAlive(edge / 3, static_cast<int>(edge % 3)))
+          << "holds until the owner of the topology has severed it";
+    }
+  }
+  auto checkpoint = Open();
+  Bench bench(scene_, checkpoint.get(), 2);
+  ASSERT_TRUE(bench.node_.restored());
+  auto tears = bench.bus_.tears.MakeInput();
+  for (int i = 0; i < 50; ++i) bench.Step();
+  ASSERT_TRUE(tears->TakeNext(&after)) << "whoever has come meanwhile gets it";
+  EXPECT_EQ(after.torn_edges, before.torn_edges);
+  EXPECT_FALSE(tears->TakeNext(&after)) << "once";
+}
+
+TEST_F(PhysicsNodeTest, WarnsBeforeTheMembraneTears) {
+  scene_.physics.tear_stretch = 2.3f;
+  Bench bench(scene_, nullptr);
+  bench.Play(0, 4);
+  Health health;
+  bench.node_.FillHealth(&health);
+  EXPECT_EQ(health.last_error.rfind("membrane near tearing: stretch 2.2", 0), 0u) << health.last_error;
+  EXPECT_EQ(bench.Figure("torn_edges"), 0);
 }
 
 TEST_F(PhysicsRestart, ABrokenCheckpointIsAFreshStart) {

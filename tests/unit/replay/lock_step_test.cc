@@ -8,6 +8,7 @@
 #include <string>
 
 #include "services/core/error.h"
+#include "services/recording/mcap_reader.h"
 #include "services/replayer/lock_step_report.h"
 #include "services/scene/build.h"
 #include "services/scene/scene_settings.h"
@@ -91,6 +92,21 @@ TEST_F(LockStepTest, FindsTheCheckpointOfAProcessThatDiedBeforeItSealedItsLast) 
   const LockStepResult result = Replay({NodeId::kPhysics});
   EXPECT_TRUE(result.good()) << ReportText(result);
   EXPECT_EQ(result.nodes[0].starts, 2u);
+}
+
+/// What tears, and a physics that is killed while it tears, is replayed from what the manifests name.
+TEST_F(LockStepTest, ReplaysWhatTractionTears) {
+  data_.fixed.physics.tear_stretch = 1.8f;
+  data_.fixed.hash = scene::ContentHash(data_.View());
+  view_ = data_.View();
+  Record({.seconds = 2, .kill_physics_s = 1.234});
+  const LockStepResult result = Replay(kAll);
+  EXPECT_TRUE(result.good()) << ReportText(result);
+  recording::McapReader reader(folder_ / "recording.mcap");
+  recording::McapMessage message{};
+  int tears = 0;
+  while (reader.Next(&message)) tears += reader.channels().at(message.channel).topic == "fulcrum/TearState" ? 1 : 0;
+  EXPECT_GE(tears, 2) << "a tear, and again after the restart";
 }
 
 TEST_F(LockStepTest, NamesWhatDiffersFirst) {

@@ -97,6 +97,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   TappedTopic<TissueFrame> frames(&writer);
   TappedTopic<ContactModel> models(&writer);
   TappedTopic<CauteryContact> cautery(&writer);
+  TappedTopic<TearState> tears(&writer);
   TappedTopic<TopologyState> topology(&writer);
   TappedTopic<TemperaturePatch> patches(&writer);
   TappedTopic<ThermalEvent> events(&writer);
@@ -121,6 +122,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     std::unique_ptr<bus::LoanOutput<TissueFrame>> frames;
     std::unique_ptr<bus::Output<ContactModel>> models;
     std::unique_ptr<bus::Output<CauteryContact>> cautery;
+    std::unique_ptr<bus::Output<TearState>> tears;
     std::unique_ptr<bus::Output<TickManifest>> manifests;
     std::unique_ptr<physics::PhysicsNode> node;
     std::uint64_t ticks = 0;
@@ -135,12 +137,14 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
                      frames.MakeOutput(),
                      models.MakeOutput(),
                      cautery.MakeOutput(),
+                     tears.MakeOutput(),
                      manifests.MakeOutput(),
                      nullptr,
                      0};
     p.node = std::make_unique<physics::PhysicsNode>(
         scene,
-        physics::PhysicsNode::Ports{*p.tools, *p.handles, *p.topology, *p.frames, *p.models, *p.cautery, *p.manifests},
+        physics::PhysicsNode::Ports{*p.tools, *p.handles, *p.topology, *p.frames, *p.models, *p.cautery, *p.tears,
+                                    *p.manifests},
         &physics_checkpoint, epoch, story.threads);
     return p;
   };
@@ -160,13 +164,15 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   std::optional<PhysicsProcess> physics = start_physics(kStart - 5);
   std::optional<HapticsProcess> haptics = start_haptics(kStart - 4);
   runtime::CheckpointFile thermal_checkpoint(folder / "thermal.checkpoint", scene.hash, thermal::kCheckpointLayout,
-                                             thermal::ThermalSolver::CheckpointCapacity(scene));
+                                             thermal::ThermalNode::CheckpointCapacity(scene));
   auto thermal_in = cautery.MakeInput();
+  auto tear_in = tears.MakeInput();
   auto topology_out = topology.MakeOutput();
   auto patch_out = patches.MakeOutput();
   auto event_out = events.MakeOutput();
   auto thermal_manifest_out = manifests.MakeOutput();
-  thermal::ThermalNode thermal(scene, {*thermal_in, *topology_out, *patch_out, *event_out, *thermal_manifest_out},
+  thermal::ThermalNode thermal(scene,
+                               {*thermal_in, *tear_in, *topology_out, *patch_out, *event_out, *thermal_manifest_out},
                                &thermal_checkpoint, kStart - 3);
   auto handle_out = handles.MakeOutput();
 
@@ -225,6 +231,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     models.Record(now);
     cautery.Record(now);
     topology.Record(now);
+    tears.Record(now);
     patches.Record(now);
     events.Record(now);
   }

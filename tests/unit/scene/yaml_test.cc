@@ -191,6 +191,7 @@ const Rule kRules[] = {
      {"assessment.idle_speed_mm_s", "must not exceed movement_speed_mm_s"}},
     {"BaseOfAText", "name: small", "name: small\nbase: built-in.yaml", {"base"}},
     {"NoName", "name: small", "label: small", {"name"}},
+    {"TearStretch", "grasp_radius_mm: 4", "tear_stretch: 0.9", {"tear_stretch", "above 1 + membrane_prestrain"}},
     {"Grasp", "grasp_radius_mm: 4", "grasp_close_deg: 50", {"grasp_open_deg", "above grasp_close_deg"}},
 };
 INSTANTIATE_TEST_SUITE_P(Rules, SceneYamlRule, testing::ValuesIn(kRules),

@@ -10,12 +10,15 @@ namespace fulcrum::thermal {
 
 struct NodeBus {
   bus::InProcessTopic<CauteryContact> contacts;
+  bus::InProcessTopic<TearState> tears;
   bus::InProcessTopic<TopologyState> topology;
   bus::InProcessTopic<TemperaturePatch> patches;
   bus::InProcessTopic<ThermalEvent> events;
   bus::InProcessTopic<TickManifest> manifests;
   std::unique_ptr<bus::Output<CauteryContact>> contact_out = contacts.MakeOutput();
   std::unique_ptr<bus::Input<CauteryContact>> contact_in = contacts.MakeInput();
+  std::unique_ptr<bus::Output<TearState>> tear_out = tears.MakeOutput();
+  std::unique_ptr<bus::Input<TearState>> tear_in = tears.MakeInput();
   std::unique_ptr<bus::Output<TopologyState>> topology_out = topology.MakeOutput();
   std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patch_out = patches.MakeOutput();
   std::unique_ptr<bus::Output<ThermalEvent>> event_out = events.MakeOutput();
@@ -27,7 +30,7 @@ struct NodeBus {
 
   /// The node's.
   [[nodiscard]] ThermalNode::Ports ports() const {
-    return {*contact_in, *topology_out, *patch_out, *event_out, *manifest_out};
+    return {*contact_in, *tear_in, *topology_out, *patch_out, *event_out, *manifest_out};
   }
 };
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "tests/numerics/thermal/flat_scene.h"
+#include "tests/numerics/thermal/topology_validator.h"
 #include "tests/unit/thermal/node_bus.h"
 
 namespace fulcrum::thermal {
@@ -221,6 +222,56 @@ TEST_F(ThermalNodeTest, WithoutReadersNoPatchIsBuiltAndALateReaderGetsAll) {
   for (int n = 0; n < 8; ++n) Step(node.get());
   TemperaturePatch patch;
   EXPECT_TRUE(patches->TakeLatest(&patch));
+}
+
+TEST_F(ThermalNodeTest, SeversWhatHasTornWhereAllIsIdle) {
+  OpenCheckpoint();
+  auto node = MakeNode();
+  for (int n = 0; n < 3; ++n) Step(node.get());
+  (void)NewestTopology();
+  TopologyValidator validator(scene_, node->solver().field().sheet());
+  // Along a row, a column and a diagonal.
+  const Index cols = scene_.membrane.cols;
+  TearState tears;
+  tears.stamp = {1, 1, 1};
+  tears.scene_hash = scene_.hash;
+  tears.rows = scene_.membrane.rows;
+  tears.cols = cols;
+  tears.torn_edges.assign((3 * scene_.membrane.node_count() + 7) / 8, 0);
+  const Index torn[] = {3 * (10 * cols + 20), 3 * (15 * cols + 5) + 1, 3 * (20 * cols + 30) + 2};
+  for (const Index edge : torn) SetBit(tears.torn_edges, edge);
+  TearState of_another = tears;
+  of_another.scene_hash ^= 1;
+  ASSERT_TRUE(bus_.tear_out->Write(of_another));
+  for (int n = 0; n < kCommitFrames; ++n) Step(node.get());
+  EXPECT_FALSE(NewestTopology()) << "of another scene";
+  ASSERT_TRUE(bus_.tear_out->Write(tears));
+  Step(node.get());
+  TickManifest manifest;
+  ASSERT_TRUE(bus_.manifest_in->TakeLatest(&manifest));
+  ASSERT_EQ(manifest.consumed.size(), 1u);
+  EXPECT_EQ(manifest.consumed[0].topic, TopicId::kTearState);
+  EXPECT_EQ(manifest.consumed[0].sequence, tears.stamp.sequence);
+  for (int n = 1; n < kCommitFrames; ++n) Step(node.get());
+  const auto topology = NewestTopology();
+  ASSERT_TRUE(topology) << "at the next commit";
+  for (const Index edge : torn) EXPECT_TRUE(TestBit(topology->dead_edges, edge)) << edge;
+  EXPECT_EQ(node->solver().topology().dead_edge_count(), 3u) << "and nothing beside";
+  EXPECT_EQ(node->solver().topology().dead_node_count(), 0u);
+  EXPECT_EQ(validator.Check(node->solver()), "");
+  EXPECT_EQ(node->solver().cut_length_m(), 0.0f) << "a tear is no cut";
+
+  // The same again, and after a restart: no difference.
+  node.reset();
+  OpenCheckpoint();
+  node = MakeNode();
+  EXPECT_TRUE(node->restored());
+  const auto restored = node->solver().topology().revision();
+  EXPECT_EQ(restored, topology->revision);
+  ASSERT_TRUE(bus_.tear_out->Write(tears));
+  for (int n = 0; n < 2 * kCommitFrames; ++n) Step(node.get());
+  EXPECT_EQ(node->solver().topology().revision(), restored);
+  EXPECT_EQ(validator.Check(node->solver()), "");
 }
 
 TEST_F(ThermalNodeTest, SameInputsGiveTheSameHashes) {
