@@ -91,30 +91,37 @@ void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
 void ThermalSolver::Tear(std::span<const std::uint8_t> torn_edges) {
   const std::size_t edges = 3 * std::size_t{topology_.rows()} * topology_.cols();
   tears_.clear();
+  crack_.clear();
   for (std::size_t byte = 0; byte < std::min(torn_edges.size(), (edges + 7) / 8); ++byte) {
     if (torn_edges[byte] == 0) continue;
     for (std::size_t edge = 8 * byte; edge < std::min(8 * byte + 8, edges); ++edge) {
       if (TestBit(torn_edges, edge) && topology_.EdgeLives(static_cast<Index>(edge))) {
-        tears_.push_back(static_cast<Index>(edge));
+        const auto index = static_cast<Index>(edge);
+        tears_.push_back(index);
+        topology_.ForEdgesBeside(index, [&](Index other) {
+          if (TestBit(torn_edges, other)) crack_.emplace_back(index, other);
+        });
       }
     }
   }
 }
 
-/// Cells and mesh agree, so an edge is torn by taking a line of cells out of its strand.
+/// Cells and mesh agree, so an edge is torn by taking a line of cells out of its strand, and these lines are joined
+/// across the triangles between them: one crack, over which neither heat nor current goes.
 void ThermalSolver::StageTears() {
   if (tears_.empty()) return;
   RemovedBox taken;
-  for (const Index edge : tears_) {
-    topology_.ForCellsAcross(field_.sheet(), edge, [&](CellIndex cell) {
-      Tile* tile = field_.Wake(cell.ix / kTile, cell.iy / kTile);
-      const int k = (cell.iy % kTile) * kTile + cell.ix % kTile;
-      if (tile == nullptr || (tile->state.flags[k] & kNoTissue) != 0) return;
-      field_.TakeOut(tile, k, kRemoved, &ledger_.removed);
-      taken.Add(cell);
-    });
-  }
+  const auto take = [&](CellIndex cell) {
+    Tile* tile = field_.Wake(cell.ix / kTile, cell.iy / kTile);
+    const int k = (cell.iy % kTile) * kTile + cell.ix % kTile;
+    if (tile == nullptr || (tile->state.flags[k] & kNoTissue) != 0) return;
+    field_.TakeOut(tile, k, kRemoved, &ledger_.removed);
+    taken.Add(cell);
+  };
+  for (const Index edge : tears_) topology_.ForCellsAcross(field_.sheet(), edge, take);
+  for (const auto& [edge, other] : crack_) topology_.ForCellsBetween(field_.sheet(), edge, other, take);
   tears_.clear();
+  crack_.clear();
   if (taken.empty()) return;
   for (int ty = taken.low.iy / kTile; ty <= taken.high.iy / kTile; ++ty) {
     for (int tx = taken.low.ix / kTile; tx <= taken.high.ix / kTile; ++tx) {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "services/core/scene_view.h"
@@ -141,9 +142,10 @@ class ThermalSolver {
   std::unique_ptr<SheetContact> contact_;
   std::unique_ptr<PaperModel> paper_;  ///< Null in the accurate model.
   Crumbs crumbs_;
-  RemovedBox removed_;        ///< By heat, since the last commit.
-  RemovedBox torn_;           ///< By traction, likewise: no part of the cut's length.
-  std::vector<Index> tears_;  ///< Edges to be severed in the next Step.
+  RemovedBox removed_;                          ///< By heat, since the last commit.
+  RemovedBox torn_;                             ///< By traction, likewise: no part of the cut's length.
+  std::vector<Index> tears_;                    ///< Edges to be severed in the next Step.
+  std::vector<std::pair<Index, Index>> crack_;  ///< Torn edges of one triangle: joined by then.
   CutMeter cut_meter_;
   Ledger ledger_;
   SolverFigures figures_;

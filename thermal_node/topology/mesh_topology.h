@@ -10,6 +10,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -44,6 +45,12 @@ class MeshTopology {
   /// Take the cells out, then StageCut().
   template <class Take>
   void ForCellsAcross(const Sheet& sheet, Index edge, const Take& take) const;
+  /// The same from the middle of an edge to that of another one.
+  template <class Take>
+  void ForCellsBetween(const Sheet& sheet, Index edge, Index other, const Take& take) const;
+  /// Calls visit(other) for the other edges of the two triangles beside an edge.
+  template <class Visit>
+  void ForEdgesBeside(Index edge, const Visit& visit) const;
   /// Shrink from collagen damage of the edges near the tile: L = L0 (1 - shrink_max (1 - exp(-Omega))), mean over the
   /// cells of the segment, once from the rest length and never back.
   void StageShrink(const HeatField& field, const Tile& tile);
@@ -101,28 +108,59 @@ class MeshTopology {
   std::vector<int> queue_;
 };
 
+/// Cells of the sheet whose centre is nearer to the line from p to q than half a cell along the axis that it is steeper
+/// to: they join over corners at least, so paths over faces end at them.
 template <class Take>
-void MeshTopology::ForCellsAcross(const Sheet& sheet, Index edge, const Take& take) const {
-  if (!EdgeLives(edge)) return;
-  const Vec2f a = node_[edge / 3], b = node_[OtherEnd(edge)], middle = 0.5f * (a + b);
-  const float length = (b - a).norm();
-  const Vec2f along = (b - a) / std::max(length, 1e-6f);  // An edge of no length has all cells within its band taken.
-  // Cells whose centre is nearer to the line than half a cell along the axis that it is steeper to join over corners at
-  // least, so paths over faces end at it; the rest is for rounding.
-  const float half = 0.5f * std::max(std::abs(along.x()), std::abs(along.y())) + 0.01f, band = BandOf(a, b);
-  // One more cell to either side: the cells of the nodes belong to a strand however far their centres lie.
-  const float reach = band + 1.0f;
-  const Vec2f low = middle.array() - reach - 1.0f, high = middle.array() + reach + 1.0f;
+void ForCellsOnLine(const Sheet& sheet, const Vec2f& p, const Vec2f& q, const Take& take) {
+  const float length = (q - p).norm();
+  const Vec2f along = (q - p) / std::max(length, 1e-6f), across(-along.y(), along.x());
+  const float half = 0.5f * std::max(std::abs(along.x()), std::abs(along.y())) + 0.01f;  // The rest is for rounding.
+  const Vec2f low = p.cwiseMin(q).array() - 1.0f, high = p.cwiseMax(q).array() + 1.0f;
   for (int iy = std::max(0, static_cast<int>(std::floor(low.y())));
        iy <= std::min(sheet.ny - 1, static_cast<int>(high.y())); ++iy) {
     for (int ix = std::max(0, static_cast<int>(std::floor(low.x())));
          ix <= std::min(sheet.nx - 1, static_cast<int>(high.x())); ++ix) {
-      const Vec2f d = Vec2f(static_cast<float>(ix) + 0.5f, static_cast<float>(iy) + 0.5f) - middle;
+      const Vec2f d = Vec2f(static_cast<float>(ix) + 0.5f, static_cast<float>(iy) + 0.5f) - p;
       const float u = d.dot(along);
-      if (std::abs(u) > half || (d - u * along).norm() > reach || sheet.IsOutside(ix, iy)) continue;
+      if (std::abs(d.dot(across)) > half || u < -0.5f || u > length + 0.5f || sheet.IsOutside(ix, iy)) continue;
       take(CellIndex{ix, iy});
     }
   }
+}
+
+template <class Take>
+void MeshTopology::ForCellsAcross(const Sheet& sheet, Index edge, const Take& take) const {
+  if (!EdgeLives(edge)) return;
+  const Vec2f a = node_[edge / 3], b = node_[OtherEnd(edge)], middle = 0.5f * (a + b);
+  const Vec2f along = (b - a) / std::max((b - a).norm(), 1e-6f);
+  // One more cell to either side: the cells of the nodes belong to a strand however far their centres lie.
+  const Vec2f reach = (BandOf(a, b) + 0.5f) * Vec2f(-along.y(), along.x());
+  ForCellsOnLine(sheet, middle - reach, middle + reach, take);
+}
+
+template <class Take>
+void MeshTopology::ForCellsBetween(const Sheet& sheet, Index edge, Index other, const Take& take) const {
+  const auto middle = [this](Index e) { return Vec2f(0.5f * (node_[e / 3] + node_[OtherEnd(e)])); };
+  ForCellsOnLine(sheet, middle(edge), middle(other), take);
+}
+
+template <class Visit>
+void MeshTopology::ForEdgesBeside(Index edge, const Visit& visit) const {
+  const Index row = edge / 3 / cols_, col = edge / 3 % cols_, direction = edge % 3;
+  // Triangles of a cell: (n00, n01, n11) and (n00, n11, n10).
+  const auto triangle = [&](Index r, Index c, int half) {
+    if (r + 1 >= rows_ || c + 1 >= cols_) return;  //
+    const Index n00 = r * cols_ + c, diagonal = 3 * n00 + 2;
+    const std::array<Index, 3> edges = half == 0 ? std::array{3 * n00, 3 * (n00 + 1) + 1, diagonal}
+                                                 : std::array{3 * (n00 + cols_), 3 * n00 + 1, diagonal};
+    for (const Index other : edges) {
+      if (other != edge) visit(other);
+    }
+  };
+  if (direction != 1) triangle(row, col, 0);
+  if (direction != 0) triangle(row, col, 1);
+  if (direction == 0 && row > 0) triangle(row - 1, col, 1);
+  if (direction == 1 && col > 0) triangle(row, col - 1, 0);
 }
 
 }  // namespace fulcrum::thermal
