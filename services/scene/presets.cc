@@ -20,8 +20,9 @@ class ScriptWriter {
     keys_->push_back({time_s, 0, std::nullopt, Vec2f(s, t), Millimetres(height_mm), (offset_mm * 1e-3).cast<float>(),
                       Degrees(jaw_deg), kPedalNone, 0});
   }
-  void Hook(double time_s, float s, float t, double height_mm, double cut_W = 0) {
-    keys_->push_back({time_s, 1, std::nullopt, Vec2f(s, t), Millimetres(height_mm), Vec3f::Zero(), 0,
+  void Hook(double time_s, float s, float t, double height_mm, double cut_W = 0,
+            const Vec3d& offset_mm = Vec3d::Zero()) {
+    keys_->push_back({time_s, 1, std::nullopt, Vec2f(s, t), Millimetres(height_mm), (offset_mm * 1e-3).cast<float>(), 0,
                       cut_W > 0 ? kPedalCut : kPedalNone, cut_W});
   }
 
@@ -98,7 +99,7 @@ SceneSettings BuiltIn() {
       {ProtectedKind::kNerve, Millimetres(0.6), Millimetres(3), {{0.16f, 0.40f}, {0.13f, 0.55f}, {0.15f, 0.7f}}},
   };
   scene.tools = {DefaultTool(ToolKind::kGrasper, Vec3f(-0.085f, -0.045f, 0.115f)),
-                 DefaultTool(ToolKind::kHook, Vec3f(0.085f, -0.045f, 0.115f))};
+                 DefaultTool(ToolKind::kHook, Vec3f(0.098f, 0.0f, 0.057f))};
   scene.render.scope_tip_W = Vec3f(0.004f, -0.060f, 0.082f);
   scene.render.scope_target_W = Vec3f(0.0f, 0.002f, 0.022f);
   ScriptWriter key(&scene.script);
@@ -117,17 +118,18 @@ SceneSettings BuiltIn() {
   key.Grasper(17.2, 0.36f, 0.50f, 5, 50, Vec3d(-1, 0, 0));
   key.Grasper(19.0, 0.36f, 0.50f, 50, 50);
   key.Grasper(20.0, 0.36f, 0.50f, 55, 50);
-  // Right hand: waits, touches down beside the tent, cuts 30 mm along the organ at 4 mm/s, lifts off.
-  key.Hook(0.0, 0.68f, 0.40f, 45);
-  key.Hook(4.5, 0.68f, 0.40f, 45);
-  key.Hook(6.3, 0.56f, 0.42f, 7);
-  key.Hook(7.0, 0.56f, 0.42f, -1.0);
-  key.Hook(7.3, 0.56f, 0.42f, -1.0, 35);
-  key.Hook(14.8, 0.56f, 0.57f, -1.0, 35);
-  key.Hook(14.9, 0.56f, 0.57f, -1.0);
-  key.Hook(15.8, 0.60f, 0.57f, 12);
-  key.Hook(18.0, 0.70f, 0.50f, 45);
-  key.Hook(20.0, 0.70f, 0.50f, 45);
+  // Right hand: waits aside, pricks the end of its foot through the sheet beside the tent, cuts 30 mm along the organ
+  // at 4 mm/s, lifts off. From a low trocar at its side the foot points down into the sheet, the heel above it.
+  key.Hook(0.0, 0.68f, 0.40f, 20, 0, Vec3d(0, -60, 0));
+  key.Hook(4.0, 0.68f, 0.40f, 20, 0, Vec3d(0, -60, 0));
+  key.Hook(6.3, 0.56f, 0.42f, 10);
+  key.Hook(7.0, 0.56f, 0.42f, 3.0);
+  key.Hook(7.3, 0.56f, 0.42f, 3.0, 35);
+  key.Hook(14.8, 0.56f, 0.575f, 3.0, 35);
+  key.Hook(14.9, 0.56f, 0.575f, 3.0);
+  key.Hook(15.8, 0.58f, 0.575f, 14);
+  key.Hook(18.0, 0.68f, 0.50f, 20);
+  key.Hook(20.0, 0.68f, 0.50f, 20);
   scene.script_duration_s = 20;
   return scene;
 }
@@ -157,7 +159,7 @@ SceneSettings Small() {
                     .binding_reach_m = Millimetres(5.8)};
   scene.structures.resize(4);
   scene.tools = {DefaultTool(ToolKind::kGrasper, Vec3f(-0.075f, -0.045f, 0.110f)),
-                 DefaultTool(ToolKind::kHook, Vec3f(0.075f, -0.045f, 0.110f))};
+                 DefaultTool(ToolKind::kHook, Vec3f(0.097f, 0.0f, 0.047f))};
   scene.render.scope_tip_W = Vec3f(0.004f, -0.055f, 0.070f);
   scene.render.scope_target_W = Vec3f(0.0f, 0.002f, 0.012f);
   scene.script.clear();
@@ -171,14 +173,14 @@ SceneSettings Small() {
   key.Grasper(5.2, 0.33f, 0.50f, 3, 0.0);
   key.Grasper(5.4, 0.33f, 0.50f, 4, 50);
   key.Grasper(6.0, 0.33f, 0.50f, 20, 50);
-  key.Hook(0.0, 0.58f, 0.42f, 20);
-  key.Hook(1.4, 0.58f, 0.42f, 15);
-  key.Hook(2.1, 0.58f, 0.42f, -2.0);
-  key.Hook(2.3, 0.58f, 0.42f, -2.0, 35);
-  key.Hook(4.8, 0.58f, 0.545f, -2.0, 35);
-  key.Hook(4.9, 0.58f, 0.545f, -2.0);
-  key.Hook(5.4, 0.58f, 0.545f, 10);
-  key.Hook(6.0, 0.58f, 0.50f, 20);
+  key.Hook(0.0, 0.58f, 0.42f, 15, 0, Vec3d(0, -50, 0));
+  key.Hook(1.4, 0.58f, 0.42f, 12);
+  key.Hook(2.1, 0.58f, 0.42f, 2.5);
+  key.Hook(2.3, 0.58f, 0.42f, 2.5, 35);
+  key.Hook(4.8, 0.58f, 0.545f, 2.5, 35);
+  key.Hook(4.9, 0.58f, 0.545f, 2.5);
+  key.Hook(5.4, 0.58f, 0.545f, 12);
+  key.Hook(6.0, 0.58f, 0.50f, 15);
   scene.script_duration_s = 6;
   return scene;
 }

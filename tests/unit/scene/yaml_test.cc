@@ -151,7 +151,7 @@ const Rule kRules[] = {
     {"TimeBackwards", "time_s: 0.6", "time_s: 0.0", {"time_s", "follow one another"}},
     {"ToolKind", "kind: grasper", "kind: spoon", {"tools.tool0.kind", "scissors"}},
     {"NoTrocar", "kind: grasper, trocar_mm: [-75, -45, 110]", "kind: grasper", {"trocar_mm"}},
-    {"ScriptWithoutTool", "tool1: {kind: hook, trocar_mm: [75, -45, 110]}", "tool1: {kind: none}", {"no tool1"}},
+    {"ScriptWithoutTool", "tool1: {kind: hook, trocar_mm: [97, 0, 47]}", "tool1: {kind: none}", {"no tool1"}},
     {"StructureLists", "t: [0, 0.3, 0.6, 1]", "t: [0, 1]", {"structures", "as many entries as s"}},
     {"StructureKind", "kind: ureter", "kind: artery", {"structures", "nerve"}},
     {"Camera", "fov_deg: 60", "fov_deg: 400", {"render.fov_deg", "10 to 150"}},
