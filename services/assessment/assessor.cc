@@ -88,6 +88,8 @@ void Assessor::Add(const TopologyState& topology) {
   // A thermal node that comes back says first what it was told.
   if (Counts(TimeOf(topology.stamp))) {
     cut_length_m_ = std::max(cut_length_m_, static_cast<double>(topology.cut_length_m));
+    cut_width_m_ = static_cast<double>(topology.cut_width_m);
+    cut_off_way_m_ = static_cast<double>(topology.cut_off_way_m);
   }
 }
 
@@ -138,6 +140,8 @@ void Assessor::SetOfHook(MeasureValues* session) const {
   const auto set = [&](Measure measure, double value) { (*session)[At(measure)] = value; };
   set(Measure::kPedalWithoutContact, line_.pedal_without_contact_s());
   set(Measure::kCutLength, 1e3 * cut_length_m_);
+  set(Measure::kCutWidth, 1e3 * cut_width_m_);
+  set(Measure::kCutOffWay, 1e3 * cut_off_way_m_);
   set(Measure::kUreterWarnings, alarms_[0]);
   set(Measure::kUreterInjuries, alarms_[1]);
   set(Measure::kNerveWarnings, alarms_[2]);

@@ -66,7 +66,7 @@ class Assessor {
   ForceMeter force_;
   LineMeter line_;
   DamageMap damage_;
-  double cut_length_m_ = 0;
+  double cut_length_m_ = 0, cut_width_m_ = 0, cut_off_way_m_ = 0;
   std::array<int, 4> alarms_{};  ///< Ureter warnings and injuries, nerve warnings and injuries.
   std::array<double, kPromptCount> prompt_until_s_{};
 };

@@ -115,7 +115,8 @@ bool PassesGate(const CauteryContact& m) noexcept {
 bool PassesGate(const TopologyState& m) noexcept {
   const std::uint64_t nodes = std::uint64_t{m.rows} * m.cols;
   return IsStamp(m.stamp) && nodes <= kMaxMembraneNodes && m.dead_nodes.size() == (nodes + 7) / 8 &&
-         m.dead_edges.size() == (3 * nodes + 7) / 8 && m.shrink.size() == 3 * nodes && Within(m.cut_length_m, 0.0, 1e3);
+         m.dead_edges.size() == (3 * nodes + 7) / 8 && m.shrink.size() == 3 * nodes &&
+         Within(m.cut_length_m, 0.0, 1e3) && Within(m.cut_width_m, 0.0, 1.0) && Within(m.cut_off_way_m, 0.0, 1.0);
 }
 
 bool PassesGate(const TearState& m) noexcept {

@@ -16,6 +16,8 @@ enum class Measure : std::uint32_t {
   kLift,
   kLiftHold,
   kCutLength,
+  kCutWidth,
+  kCutOffWay,
   kLineDone,
   kTime,
   kPathLength,
@@ -34,7 +36,7 @@ enum class Measure : std::uint32_t {
   kNerveWarnings,
   kNerveInjuries
 };
-inline constexpr std::size_t kMeasureCount = 20;
+inline constexpr std::size_t kMeasureCount = 22;
 
 /// What a measure is for.
 enum class MeasureRole : std::uint8_t {
@@ -62,6 +64,10 @@ inline constexpr std::array<MeasureInfo, kMeasureCount> kMeasures{{
     {"lift", "lift_mm", "lift of the grasped tissue", "mm", 1, MeasureRole::kTask, true, true, 8, 0, 200, 0},
     {"lift_hold", "lift_hold_s", "held lifted within the force", "s", 1, MeasureRole::kTask, true, true, 2, 0, 3600, 0},
     {"cut_length", "cut_length_mm", "cut length", "mm", 1, MeasureRole::kTask, true, false, 10, 0, 1000, 0},
+    {"cut_width", "cut_width_mm", "width of the slit, 95 % below", "mm", 2, MeasureRole::kSkill, false, false, 2.2f, 0,
+     100, 0},
+    {"cut_off_way", "cut_off_way_mm", "slit off the metal's way, 95 % below", "mm", 2, MeasureRole::kSkill, false,
+     false, 0.5f, 0, 100, 0},
     {"line_done", "line_done_pct", "planned line done", "%", 0, MeasureRole::kTask, true, false, 90, 0, 100, 15},
     {"time", "time_s", "time from first to last movement", "s", 1, MeasureRole::kSkill, false, true, 120, 0, 86400, 5},
     {"path_length", "path_length_mm", "path length", "mm", 0, MeasureRole::kSkill, false, true, 2000, 0, 1e6f, 5},

@@ -121,10 +121,11 @@ struct FieldsOf<CauteryContact> {
 template <>
 struct FieldsOf<TopologyState> {
   static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(TopologyState, stamp),      FULCRUM_FIELD(TopologyState, scene_hash),
-                 FULCRUM_FIELD(TopologyState, revision),   FULCRUM_FIELD(TopologyState, rows),
-                 FULCRUM_FIELD(TopologyState, cols),       FULCRUM_FIELD(TopologyState, cut_length_m),
-                 FULCRUM_FIELD(TopologyState, dead_nodes), FULCRUM_FIELD(TopologyState, dead_edges),
+      std::tuple{FULCRUM_FIELD(TopologyState, stamp),       FULCRUM_FIELD(TopologyState, scene_hash),
+                 FULCRUM_FIELD(TopologyState, revision),    FULCRUM_FIELD(TopologyState, rows),
+                 FULCRUM_FIELD(TopologyState, cols),        FULCRUM_FIELD(TopologyState, cut_length_m),
+                 FULCRUM_FIELD(TopologyState, cut_width_m), FULCRUM_FIELD(TopologyState, cut_off_way_m),
+                 FULCRUM_FIELD(TopologyState, dead_nodes),  FULCRUM_FIELD(TopologyState, dead_edges),
                  FULCRUM_FIELD(TopologyState, shrink)};
 };
 template <>

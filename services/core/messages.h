@@ -184,6 +184,8 @@ struct TopologyState {
   std::uint32_t rows = 0;
   std::uint32_t cols = 0;
   float cut_length_m = 0;
+  float cut_width_m = 0;                 ///< Of the slit, 95th percentile along it.
+  float cut_off_way_m = 0;               ///< Of the slit's centre line from the metal's way, 95th percentile.
   std::vector<std::uint8_t> dead_nodes;  ///< Bit field, rows * cols bits, least significant bit first.
   std::vector<std::uint8_t> dead_edges;  ///< Bit field, 3 * rows * cols bits.
   std::vector<std::uint8_t> shrink;      ///< Per edge: rest length is scaled by 1 - kShrinkUnit * value.

@@ -136,6 +136,10 @@ class Reader {
     }
   }
 
+  void Add(const ThermalEvent& event) {
+    if (event.kind == ThermalEventKind::kCut) cut_events_s_.push_back(event.session_time_s);
+  }
+
   void Add(const Health& health) {
     if (health.node == NodeId::kThermal && health.step.p50_us > 0) cut_.thermal_step = health.step;
   }
@@ -151,8 +155,14 @@ class Reader {
     }
     const auto touch = std::find_if(cut_.current.begin(), cut_.current.end(),
                                     [](const CurrentSample& sample) { return sample.touching && sample.energised(); });
-    cut_.first_opening_s = touch != cut_.current.end() && first_removed_s_ ? *first_removed_s_ - touch->time_s
-                                                                           : std::numeric_limits<double>::quiet_NaN();
+    cut_.first_opening_s = std::numeric_limits<double>::quiet_NaN();
+    if (touch != cut_.current.end() && first_removed_s_) {
+      // A patch shows the hole up to a period late; the event dates it to a frame.
+      const auto event = std::find_if(cut_events_s_.begin(), cut_events_s_.end(),
+                                      [&](double time_s) { return time_s >= touch->time_s; });
+      const bool sooner = event != cut_events_s_.end() && *event < *first_removed_s_;
+      cut_.first_opening_s = (sooner ? *event : *first_removed_s_) - touch->time_s;
+    }
     return std::move(cut_);
   }
 
@@ -209,6 +219,7 @@ class Reader {
   std::vector<std::uint8_t> dead_nodes_;
   bool dead_nodes_changed_ = false;
   std::optional<double> first_removed_s_;
+  std::vector<double> cut_events_s_;
   std::deque<Pose> poses_;
   std::deque<TissueFrame> waiting_;
   RecordedCut cut_;
@@ -219,7 +230,7 @@ class Reader {
 RecordedCut ReadCut(const std::filesystem::path& file, const SceneView& scene, const ContactReach& reach) {
   Reader reader(scene, reach);
   Recording recording(file, {.topics = {"SceneManifest", "ToolState", "TissueFrame", "CauteryContact", "TopologyState",
-                                        "TemperaturePatch", "Health"}});
+                                        "TemperaturePatch", "ThermalEvent", "Health"}});
   std::map<std::pair<TopicId, std::string>, bus::InputAccount> accounts;  // Of nodes that were restarted the newest.
   std::optional<SceneManifest> session;
   Entry entry;

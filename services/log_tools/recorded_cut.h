@@ -67,8 +67,8 @@ struct RecordedCut {
   std::vector<CurrentSample> current;
   std::vector<ReportedLength> lengths;
   TimingSummary thermal_step;  ///< As thermal_node last told.
-  /// From the first energised touch to the first patch with a removed texel [s]; NaN: none. Patches show their hole up
-  /// to a period of theirs late.
+  /// From the first energised touch to the first cut that thermal_node tells of, or to the first patch with a removed
+  /// texel where that is sooner [s]; NaN: no patch has one.
   double first_opening_s = 0;
 };
 

@@ -243,11 +243,15 @@ void AddHeat(const SceneView& scene, std::vector<KnownAnswer>* answers) {
   TopologyState topology;
   topology.stamp = StampAt(2);
   topology.cut_length_m = 0.0123f;
+  topology.cut_width_m = 0.0019f;
+  topology.cut_off_way_m = 0.0003f;
   assessor.Add(topology);
   topology.stamp = StampAt(3);
   topology.cut_length_m = 0.004f;  // Of a thermal node that has just come back.
   assessor.Add(topology);
   answers->push_back({"cut_length.state", ValueOf(assessor, Measure::kCutLength), 12.3});
+  answers->push_back({"cut_width.state", ValueOf(assessor, Measure::kCutWidth), 1.9});
+  answers->push_back({"cut_off_way.state", ValueOf(assessor, Measure::kCutOffWay), 0.3});
   const std::array kinds{ThermalEventKind::kUreterWarning, ThermalEventKind::kUreterInjury,
                          ThermalEventKind::kNerveWarning, ThermalEventKind::kNerveInjury};
   const std::array measures{Measure::kUreterWarnings, Measure::kUreterInjuries, Measure::kNerveWarnings,

@@ -14,7 +14,7 @@ namespace fulcrum::thermal {
 namespace {
 
 /// Change it with the layout.
-constexpr std::uint64_t kLayout = 0x7468726d'00000006ull;
+constexpr std::uint64_t kLayout = 0x7468726d'00000007ull;
 /// A checkpoint of one model is none of another.
 constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
 /// Some hundred tiles with all their arrays; a session that cuts more than half a metre would need more.
@@ -181,10 +181,9 @@ struct ThermalSolver::Header {
   EventMemory memory;
   RemovedBox removed;
   ToolWay::End way_end;
-  float cut_length_m, clock_s, protected_dt_s;
+  float measured_length_m, cut_length_m, clock_s, protected_dt_s;
   std::uint32_t tile_count, line_count, way_count, sample_count, structure_count;
-  std::uint32_t node_bytes, edge_bytes, shrink_bytes, protected_warm;
-  std::uint64_t has_volume;
+  std::uint32_t node_bytes, edge_bytes, shrink_bytes, protected_warm, has_volume;
 
   [[nodiscard]] bool Finite() const {
     float sum = clock_s + protected_dt_s + memory.reported_cut_m;
@@ -232,7 +231,8 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   const std::span<const ToolWay::Point> way = cut_meter_.way().points();
   header.removed = removed_;
   header.way_end = cut_meter_.way().end();
-  header.cut_length_m = cut_meter_.length_m();
+  header.measured_length_m = cut_meter_.length_m();
+  header.cut_length_m = cut_length_m_;
   header.line_count = static_cast<std::uint32_t>(line.size());
   header.way_count = static_cast<std::uint32_t>(way.size());
   header.sample_count = static_cast<std::uint32_t>(protected_.samples().size());
@@ -343,7 +343,9 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
     field_.Restore(static_cast<int>(record[0]), state);
   }
   const bool volume_good = volume_ == nullptr || GetVolume(&reader, volume_.get());
-  if (!volume_good || !cut_meter_.Restore(field_, header.cut_length_m, line, way, header.way_end)) {
+  const bool length_good = header.cut_length_m >= 0.0f && header.cut_length_m <= header.measured_length_m;
+  if (!volume_good || !length_good ||
+      !cut_meter_.Restore(field_, header.measured_length_m, line, way, header.way_end)) {
     field_.Clear();
     if (volume_ != nullptr) volume_->Clear();
     return false;
@@ -356,6 +358,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   figures_ = header.figures;
   crumbs_.Restore(figures_.debris_m2);
   memory_ = header.memory;
+  cut_length_m_ = header.cut_length_m;
   clock_s_ = header.clock_s;
   protected_dt_s_ = header.protected_dt_s;
   source_.Import(window);

@@ -58,7 +58,8 @@ bool ThermalSolver::Idle(std::span<const TipInput> tips) const {
   const bool hot_metal = std::abs(source_.interface().hook_theta) > kHookWarm;
   const bool acts = std::any_of(tips.begin(), tips.end(),
                                 [&](const TipInput& tip) { return tip.active || (tip.touching && hot_metal); });
-  return !acts && field_.idle() && below_idle && !topology_.staged() && tears_.empty() && !protected_.warm();
+  return !acts && field_.idle() && below_idle && !topology_.staged() && tears_.empty() && !protected_.warm() &&
+         cut_length_m_ == cut_meter_.length_m();
 }
 
 void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
@@ -76,6 +77,7 @@ void ThermalSolver::Step(std::span<const TipInput> tips, float dt_s) {
   clock_s_ += dt_s;
   const double before_J = ledger_.generator;
   paper_ == nullptr ? AccurateFrame(tips, dt_s) : PaperFrame(tips, dt_s);
+  FollowLength(dt_s);
   UpdateProtected(dt_s);
   if (!tips.empty()) {
     const float time_s = Duration(tips, dt_s);
@@ -255,6 +257,11 @@ void ThermalSolver::UpdateCutMeter(const RemovedBox& removed) {
   figures_.cut_off_way_m = cut_meter_.off_way_p95_m();
 }
 
+void ThermalSolver::FollowLength(float dt_s) {
+  if (!at_commit_frame()) return;
+  cut_length_m_ = std::min(cut_meter_.length_m(), cut_length_m_ + kLengthRate_m_s * kCommitFrames * dt_s);
+}
+
 void ThermalSolver::UpdateProtected(float dt_s) {
   protected_dt_s_ += dt_s;
   if (frame_ % kProtectedFrames != 0) return;
@@ -279,7 +286,7 @@ void ThermalSolver::Report(ThermalEventKind kind, const Vec2f& at, float theta, 
 void ThermalSolver::ReportEvents(const TipInput& tip) {
   const Vec2f at = tip.path.to;
   if (tip.active && memory_.energised == 0) {
-    memory_.blanched = memory_.charred = 0;
+    memory_.blanched = memory_.charred = memory_.opened = 0;
     Report(ThermalEventKind::kContact, at, field_.MaxTheta(), tip.power_W, 0.0f);
   }
   memory_.energised = tip.active ? 1 : 0;
@@ -287,7 +294,9 @@ void ThermalSolver::ReportEvents(const TipInput& tip) {
     Report(ThermalEventKind::kSteam, at, material_.theta_boil, figures_.power_W, kSteamQuiet_s);
   }
   memory_.vapour = ledger_.vapour;
-  if (cut_length_m() >= memory_.reported_cut_m + kCutReport_m) {
+  const bool opens = tip.active && memory_.opened == 0 && source_.stats().removed_cells > 0;
+  if (opens) memory_.opened = 1;
+  if (opens || cut_length_m() >= memory_.reported_cut_m + kCutReport_m) {
     memory_.reported_cut_m = cut_length_m();
     Report(ThermalEventKind::kCut, at, field_.MaxTheta(), cut_length_m(), kCutQuiet_s);
   }

@@ -28,6 +28,10 @@ inline constexpr int kCommitFrames = 5;
 /// Protected structures are looked at as often: their time constants are seconds.
 inline constexpr int kProtectedFrames = 5;
 
+/// The cut length grows no faster than this: where the hook slips through tissue that it was pulling, or two holes
+/// meet, the slit itself grows by millimetres between two commits. A fifth above the fastest stroke [m/s].
+inline constexpr float kLengthRate_m_s = 0.0098f;
+
 struct SolverEvent {
   ThermalEventKind kind;
   Vec2f material;
@@ -83,7 +87,8 @@ class ThermalSolver {
   [[nodiscard]] const SolverFigures& figures() const { return figures_; }
   [[nodiscard]] const ProtectedStructures& protected_structures() const { return protected_; }
   [[nodiscard]] const SourceStats& source_stats() const { return source_.stats(); }
-  [[nodiscard]] float cut_length_m() const { return cut_meter_.length_m(); }
+  /// Of the slit's centre line; after a leap it grows by kLengthRate_m_s until it is the meter's.
+  [[nodiscard]] float cut_length_m() const { return cut_length_m_; }
   /// Study knob of the benchmarks.
   [[nodiscard]] SourceWindow* source() { return &source_; }
 
@@ -117,6 +122,7 @@ class ThermalSolver {
   void UpdateTopology();
   void AddWay(const TipPath& path, CauteryMode mode);
   void UpdateCutMeter(const RemovedBox& removed);
+  void FollowLength(float dt_s);
   void UpdateProtected(float dt_s);
   void ReportEvents(const TipInput& tip);
   void Report(ThermalEventKind kind, const Vec2f& at, float theta, float value, float quiet_s);
@@ -128,7 +134,7 @@ class ThermalSolver {
     float reported_cut_m = 0;
     std::uint64_t quarantined = 0;
     double vapour = 0;
-    std::uint8_t energised = 0, blanched = 0, charred = 0;
+    std::uint8_t energised = 0, blanched = 0, charred = 0, opened = 0;
   };
 
   ThermalParams params_;
@@ -155,6 +161,7 @@ class ThermalSolver {
   std::vector<ProtectedAlarm> alarms_;
   std::uint64_t frame_ = 0;
   float clock_s_ = 0;
+  float cut_length_m_ = 0;  ///< Published.
   float protected_dt_s_ = 0;
   bool committed_ = false, stepped_ = false;
 };

@@ -112,12 +112,14 @@ void ThermalNode::SaveCheckpoint() {
 }
 
 void ThermalNode::PublishTopology(const Tick& tick) {
-  topology_due_ = topology_due_ || solver_.committed();
+  topology_due_ = topology_due_ || solver_.committed() || topology_.cut_length_m != solver_.cut_length_m();
   if (!topology_due_) return;
   const MeshTopology& mesh = solver_.topology();
   topology_.stamp = topology_stamper_.Next(tick.stamp_ns);
   topology_.revision = mesh.revision();
   topology_.cut_length_m = solver_.cut_length_m();
+  topology_.cut_width_m = solver_.figures().cut_width_p95_m;
+  topology_.cut_off_way_m = solver_.figures().cut_off_way_m;
   topology_.dead_nodes = mesh.committed().dead_nodes;
   topology_.dead_edges = mesh.committed().dead_edges;
   topology_.shrink = mesh.committed().shrink;

@@ -25,7 +25,7 @@ inline constexpr std::uint64_t kTicksPerHistoryPatch = 100;
 /// A checkpoint at each new revision, and this often while the tissue is warm [frames of the solver].
 inline constexpr std::uint64_t kFramesPerCheckpoint = 10;
 /// Changes with the layout of the checkpoint.
-inline constexpr std::uint32_t kCheckpointLayout = 4;
+inline constexpr std::uint32_t kCheckpointLayout = 5;
 
 class ThermalNode {
  public:

@@ -145,6 +145,8 @@ bool ToWire(const TopologyState& from, idl::TopologyState* to) {
   to->rows(from.rows);
   to->cols(from.cols);
   to->cut_length_m(from.cut_length_m);
+  to->cut_width_m(from.cut_width_m);
+  to->cut_off_way_m(from.cut_off_way_m);
   to->dead_nodes(from.dead_nodes);
   to->dead_edges(from.dead_edges);
   to->shrink(from.shrink);
@@ -158,6 +160,8 @@ void FromWire(const idl::TopologyState& from, TopologyState* to) {
   to->rows = from.rows();
   to->cols = from.cols();
   to->cut_length_m = from.cut_length_m();
+  to->cut_width_m = from.cut_width_m();
+  to->cut_off_way_m = from.cut_off_way_m();
   to->dead_nodes = from.dead_nodes();
   to->dead_edges = from.dead_edges();
   to->shrink = from.shrink();

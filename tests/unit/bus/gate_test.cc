@@ -49,7 +49,7 @@ struct Floats {
          m.contact_radius_m, m.power_W);
     for (MetalPoint& point : m.metal) Each(point.material, point.height_m);
   }
-  void operator()(TopologyState& m) const { (*this)(m.cut_length_m); }
+  void operator()(TopologyState& m) const { Each(m.cut_length_m, m.cut_width_m, m.cut_off_way_m); }
   void operator()(TearState&) const {}
   void operator()(TemperaturePatch& m) const { (*this)(m.header.max_temperature_C); }
   void operator()(ThermalEvent& m) const { Each(m.session_time_s, m.material, m.temperature_C, m.value); }

@@ -65,8 +65,9 @@ inline bool Same(const CauteryContact& a, const CauteryContact& b) {
 
 inline bool Same(const TopologyState& a, const TopologyState& b) {
   return Same(a.stamp, b.stamp) && a.scene_hash == b.scene_hash && a.revision == b.revision && a.rows == b.rows &&
-         a.cols == b.cols && a.cut_length_m == b.cut_length_m && a.dead_nodes == b.dead_nodes &&
-         a.dead_edges == b.dead_edges && a.shrink == b.shrink;
+         a.cols == b.cols && a.cut_length_m == b.cut_length_m && a.cut_width_m == b.cut_width_m &&
+         a.cut_off_way_m == b.cut_off_way_m && a.dead_nodes == b.dead_nodes && a.dead_edges == b.dead_edges &&
+         a.shrink == b.shrink;
 }
 
 inline bool Same(const TearState& a, const TearState& b) {

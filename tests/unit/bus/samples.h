@@ -112,6 +112,8 @@ inline TopologyState Sample(std::uint64_t sequence) {
   m.rows = 96;
   m.cols = 256;
   m.cut_length_m = 0.025f;
+  m.cut_width_m = 0.0016f;
+  m.cut_off_way_m = 0.0003f;
   const std::size_t nodes = 96 * 256;
   static_assert(96 * 256 == kMaxMembraneNodes);
   for (std::size_t i = 0; i < nodes / 8; ++i) m.dead_nodes.push_back(static_cast<std::uint8_t>(i * 7));
