@@ -96,7 +96,7 @@ CutMap MakeCutMap(RecordedCut recorded) {
   map.figures.removed_mm2 = 1e6 * texel_m * texel_m * static_cast<double>(removed);
   map.figures.holes = static_cast<int>(FindPieces(map.removed, true, Neighbours::kEight).pieces.size());
   const Mask hole = FindIslands(&map);
-  map.centre_line = FindCentreLine(hole, {.smooth = 1e-3 / texel_m, .spur = 0.3e-3 / texel_m});
+  map.centre_line = FindCentreLine(hole, {.smooth = 1e-3 / texel_m, .spur = 0.2e-3 / texel_m});
   MeasureCut(&map);
   return map;
 }

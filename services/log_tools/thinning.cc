@@ -164,9 +164,9 @@ class Tracer {
 
 Vec2d CentreOf(const Pixel& at) { return {at.x + 0.5, at.y + 0.5}; }
 
-/// A spur is shorter than this share of its junction's half width more than that: from the middle of a square end to
-/// its corners it is 1.41.
-constexpr double kCorner = 1.45;
+/// A branch reaches beyond the edge of the hole beside it by more than three quarters of the half width there: less is
+/// a rough edge. (From the middle of a square end to its corners it is 0.41.)
+constexpr double kRough = 1.75;
 
 }  // namespace
 
@@ -215,7 +215,7 @@ void PruneSpurs(Mask* thin, std::span<const float> distance, double beyond) {
       const Pixel end = branch.pixels.back();
       const double reach = LengthOf(branch, skeleton) + static_cast<double>(distance[thin->Index(end.x, end.y)]);
       const double edge = static_cast<double>(skeleton.junctions[junction].half_width);
-      if (reach < std::max(edge + beyond, kCorner * edge)) spurs[junction].push_back({reach, &branch});
+      if (reach < kRough * edge + beyond) spurs[junction].push_back({reach, &branch});
     }
     for (std::size_t junction = 0; junction < spurs.size(); ++junction) {
       auto& here = spurs[junction];

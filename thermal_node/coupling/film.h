@@ -6,10 +6,10 @@
 // the metal sweeps is vaporised. In coag the film collapses between the bursts, the tissue dries onto the metal and the
 // current ends.
 //
-// Sources. Film and discharge as the mechanism of cutting: Palanker, Vankov, Jayaraman, New J. Phys. 10 (2008) 123022
-// (threshold of some 250 V peak in steam); 200 V peak as the least voltage that cuts: manufacturers' manuals
-// (recalled). Conductance of the discharges and the shares of their heat are assumed; see DESIGN.md for what follows
-// from them.
+// Sources. The discharge of electrosurgery in air, a contracted glow that goes out at each zero of the voltage and
+// strikes again above a threshold: "Electric discharge during electrosurgery", Sci. Rep. 5:9946 (2015). Some 200 V peak
+// as the least voltage for arcs between electrode and tissue: user manual of the Erbe VIO. Conductance of the
+// discharges and the shares of their heat are assumed; see DESIGN.md for what follows from them.
 #pragma once
 
 #include <algorithm>
