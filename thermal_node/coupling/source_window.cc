@@ -11,6 +11,8 @@ namespace {
 constexpr float kFarFieldSpacing = 0.1f;  ///< Of the table, in windows.
 /// Rows with less of the heat than this do not count as changing: there it is so thin that they hardly do.
 constexpr float kFaintRow = 0.01f;
+/// Longest coupling step in a mode with discharges: what boils dry beneath a film is taken out at the end of it [s].
+constexpr float kFilmStep_s = 1.6e-3f;
 /// Evaluations of Change() to find a step: one more than are needed where change goes with the step; from a step of
 /// seconds, which dries everything, each comes down by 1 / max_change at most.
 constexpr int kStepTrials = 6;
@@ -227,6 +229,19 @@ void SourceWindow::ExchangeWithHook(float dt_s, Ledger* ledger) {
   interface_.hook_theta -= static_cast<float>(given) / kHookHeatCapacity_J_K;
 }
 
+/// The heat of a film does not change with the tissue beneath it.
+void SourceWindow::LeaveOutFilm() {
+  for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
+    for (int i = gap_low_.ix; i <= gap_high_.ix; ++i) {
+      const int k = j * kWindow + i;
+      if (!(problem_.lost[k] > 0.0f)) continue;
+      const float drop = 1.0f - potential_.Voltage(i, j);
+      const float film = problem_.lost[k] * (kTissueShare / (1.0f - kTissueShare)) * drop * drop;
+      dissipated_[k] = std::max(dissipated_[k] - film, 0.0f);
+    }
+  }
+}
+
 FULCRUM_WIDE
 float SourceWindow::Change(float v2_s, float heat_S) const {
   const float rc_dry = material_.rc_dry, rc_water = material_.rc_wet - material_.rc_dry;
@@ -235,6 +250,7 @@ float SourceWindow::Change(float v2_s, float heat_S) const {
   for (int j = 0; j < kWindow; ++j) {
     if (potential_.row_heat()[j] < kFaintRow * heat_S) continue;
     const float* __restrict q = &potential_.heat()[j * kWindow];
+    const float* __restrict dissipated = &dissipated_[j * kWindow];
     const float* __restrict h = &enthalpy_[j * kWindow];
     const float* __restrict w = &water_[j * kWindow];
     const float* __restrict iv = &inverse_volume_[j * kWindow];
@@ -253,7 +269,7 @@ float SourceWindow::Change(float v2_s, float heat_S) const {
       const float dried = left > kDrySigmaFraction ? left : kDrySigmaFraction;
       const float warmed = tissue[i] * (1.0f + slope * capped) * wet;
       const float change = (warmed - sigma[i]) / (warmed + sigma[i] + 1e-20f) + (wet - dried) / (wet + dried);
-      sum[i] += q[i] * change * change;
+      sum[i] += dissipated[i] * change * change;
     }
   }
   float total = 0;
@@ -359,7 +375,8 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   SetGround(centre, path.tented);
   const float cells = (path.to - path.from).norm() / material_.cell_m;
   const float by_way = duration_s / std::clamp(cells / kMaxWay, 1.0f, kMostByWay);
-  const float longest = std::max(by_way, std::min(min_step_s, duration_s));
+  const float by_film = drive.discharges ? kFilmStep_s : by_way;
+  const float longest = std::max(std::min(by_way, by_film), std::min(min_step_s, duration_s));
   const float reach_m = std::max(drive.arc_m, kFilmReach_m);
   leak_V2s_.fill(0);
   float t = 0;
@@ -397,6 +414,8 @@ float SourceWindow::SolveStep(const Drive& drive, float longest) {
   if (drive.discharges && interface_.film > 0.0f && stats_.voltage_V > 0.0f) {
     interface_.Regulate(stats_.voltage_V / std::sqrt(drive.duty));
   }
+  dissipated_ = potential_.heat();
+  if (interface_.film > 0.0f) LeaveOutFilm();
   return StepByChange(stats_.voltage_V * stats_.voltage_V, static_cast<float>(solved_.heat_S), longest);
 }
 

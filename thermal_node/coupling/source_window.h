@@ -112,6 +112,7 @@ class SourceWindow {
   /// Heat between metal and what it touches, for a time.
   void ExchangeWithHook(float dt_s, Ledger* ledger);
   void SetSigma();
+  void LeaveOutFilm();
   /// How far the potential goes wrong while the tissue takes `v2_s` [V^2 s] with the heat of the last solve. A round
   /// inclusion whose conductivity goes from s to s' changes a field about it, in the energy norm, by sqrt(2) b of what
   /// it dissipated, b = |s' - s| / (s' + s) (dipole in two dimensions); cells are taken as such inclusions, each for
@@ -140,6 +141,7 @@ class SourceWindow {
   bool keep_leak_ = false;
   alignas(64) std::array<float, kWindowCells> leak_V2s_{};
 
+  alignas(64) std::array<float, kWindowCells> dissipated_{};  ///< Of the last solve, in tissue alone [W/V^2].
   alignas(64) std::array<float, kWindowCells> enthalpy_{}, water_{}, inverse_volume_{};
   alignas(64) std::array<float, kWindowCells> tissue_{};  ///< sigma wet at body temperature [S/m]; 0: no tissue.
   alignas(64) std::array<std::uint8_t, kWindowCells> flags_{};
