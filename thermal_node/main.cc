@@ -10,8 +10,7 @@ using namespace fulcrum;  // NOLINT: a main is nothing but names of other module
 
 ExitCode RunThermal(app::NodeApp& app) {
   runtime::CheckpointFile checkpoint(app.options().session / "thermal_node.checkpoint", app.scene().hash,
-                                     thermal::kCheckpointLayout,
-                                     thermal::ThermalNode::CheckpointCapacity(app.scene()));
+                                     thermal::kCheckpointLayout, thermal::ThermalNode::CheckpointCapacity(app.scene()));
   thermal::ThermalNode node(
       app.scene(),
       {app.MakeInput<CauteryContact>(), app.MakeInput<TearState>(), app.MakeOutput<TopologyState>(),

@@ -41,8 +41,8 @@ struct Skeleton {
 
 [[nodiscard]] Skeleton Trace(const Mask& thin, std::span<const float> distance);
 
-/// Removes branches with a free end that reach less than three quarters of the half width at their junction and `beyond`
-/// pixels farther than the hole's edge there, until there is none.
+/// Removes branches with a free end that reach less than three quarters of the half width at their junction and
+/// `beyond` pixels farther than the hole's edge there, until there is none.
 void PruneSpurs(Mask* thin, std::span<const float> distance, double beyond);
 
 /// Length of a branch from junction to junction or end [pixels].
