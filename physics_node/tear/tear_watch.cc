@@ -381,8 +381,8 @@ void TearWatch::Crack(std::uint32_t row, std::uint32_t col) {
   look(row > 0 && col > 0, node - cols_ - 1, 2);
   if (begin == kNoIndex) return;
   const Index a = begin / 3, b = OtherEnd(begin);
-  const Place middle{0.5f * static_cast<float>(a % cols_ + b % cols_),
-                     0.5f * static_cast<float>(a / cols_ + b / cols_)};
+  const Index cols_sum = a % cols_ + b % cols_, rows_sum = a / cols_ + b / cols_;
+  const Place middle{0.5f * static_cast<float>(cols_sum), 0.5f * static_cast<float>(rows_sum)};
   Tear(begin);
 
   float sum[3] = {};
