@@ -28,7 +28,7 @@ namespace fulcrum::physics {
 
 class ContactProbe {
  public:
-  /// No force on a tool is told above this: rectal tissue is damaged by more [N].
+  /// Published forces on a tool are limited to this: rectal tissue is damaged by more [N].
   static constexpr float kForceCap_N = 15.0f;
 
   ContactProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);

@@ -27,8 +27,8 @@ constexpr std::int64_t kWaitNs = 100'000'000;
 constexpr float kCatchUp_s = 0.4f, kLongestOutage_s = 0.8f, kCatchUpMost_m = 0.01f;
 /// A session time of k dt in double may be this much less than k dt: 0.29 / 0.01 < 29 [ticks].
 constexpr double kRoundingTicks = 1e-6;
-/// A force that was cut off is told for so long: Health goes out ten times a second [ticks].
-constexpr std::uint64_t kTellTicks = 100;
+/// Health, which goes out ten times a second, warns of a limited force for so long [ticks].
+constexpr std::uint64_t kWarnTicks = 100;
 /// Of a generator that the script says nothing about [W].
 constexpr float kDefaultPower = 35.0f;
 
@@ -350,9 +350,9 @@ void PhysicsNode::Measure() {
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     const bool asks = scene_.physics.mode == PhysicsMode::kAccurate;
     const float force = (asks ? simulation_.solver_force(i) : simulation_.force(i)).norm();
-    // Unless the solver tells forces, what is known of them is what is left of them.
+    // Forces that do not come from the solver have been limited and smoothed already.
     if (force >= (asks ? ContactProbe::kForceCap_N : 0.99f * ContactProbe::kForceCap_N)) {
-      limited_until_[i] = ticks_ + kTellTicks;
+      limited_until_[i] = ticks_ + kWarnTicks;
     }
     limited |= limited_until_[i] > ticks_ ? 1u << i : 0u;
   }

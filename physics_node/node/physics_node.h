@@ -112,7 +112,7 @@ class PhysicsNode {
   TickManifest manifest_;
   TearState tear_state_;
   std::uint32_t told_tears_ = 0, saved_tears_ = 0;        ///< How many edges had torn then.
-  std::array<std::uint64_t, kMaxTools> limited_until_{};  ///< Tick up to which a force that was cut off is told.
+  std::array<std::uint64_t, kMaxTools> limited_until_{};  ///< Tick until which Health warns of a limited force.
 
   // For the health thread. Relaxed: each figure stands for itself.
   std::atomic<std::uint32_t> cheaper_{0};  ///< Presets below the scene's.
@@ -120,7 +120,7 @@ class PhysicsNode {
   std::atomic<std::uint32_t> grasped_{0};
   std::atomic<std::uint64_t> quarantined_{0}, asleep_ticks_{0}, topology_refused_{0}, topology_edits_{0};
   std::atomic<std::uint32_t> torn_edges_{0};
-  std::atomic<std::uint32_t> limited_{0};  ///< Bit per tool: the force on it is above what is told.
+  std::atomic<std::uint32_t> limited_{0};  ///< Bit per tool: the force on it was limited.
   std::atomic<float> stretch_{0}, largest_stretch_{0};
 };
 

@@ -280,9 +280,8 @@ const float* TearWatch::FilteredRow(std::uint32_t row) {
   return out;
 }
 
-/// Mean metrics around a node.
-TearWatch::Principal TearWatch::At(std::uint32_t row, std::uint32_t col) {
-  float sum[kSums] = {};
+std::array<float, TearWatch::kSums> TearWatch::SumsAt(std::uint32_t row, std::uint32_t col) {
+  std::array<float, kSums> sum{};
   for (std::uint32_t i = 0; i < weight_row_.size(); ++i) {
     for (int side = 0; side < 2; ++side) {
       if (side == 0 ? row + i + 1 >= rows_ : row < i + 1) continue;
@@ -290,6 +289,11 @@ TearWatch::Principal TearWatch::At(std::uint32_t row, std::uint32_t col) {
       for (std::size_t k = 0; k < kSums; ++k) sum[k] += weight_row_[i] * in[k * cols_ + col];
     }
   }
+  return sum;
+}
+
+TearWatch::Principal TearWatch::At(std::uint32_t row, std::uint32_t col) {
+  const auto sum = SumsAt(row, col);
   return PrincipalOf({sum[0], sum[1], sum[2]}, {sum[3], sum[4], sum[5]});
 }
 
@@ -385,17 +389,10 @@ void TearWatch::Crack(std::uint32_t row, std::uint32_t col) {
   const Place middle{0.5f * static_cast<float>(cols_sum), 0.5f * static_cast<float>(rows_sum)};
   Tear(begin);
 
-  float sum[3] = {};
-  for (std::uint32_t i = 0; i < weight_row_.size(); ++i) {
-    for (int way = 0; way < 2; ++way) {
-      if (way == 0 ? row + i + 1 >= rows_ : row < i + 1) continue;
-      const float* in = FilteredRow(way == 0 ? row + i : row - 1 - i);
-      for (std::size_t k = 0; k < 3; ++k) sum[k] += weight_row_[i] * in[(k + 3) * cols_ + col];
-    }
-  }
+  const auto sum = SumsAt(row, col);  // Of these the metric at rest: 3, 4, 5.
   // Across: v . G w = 0. Of unit length in a typical cell, since the mean metric is a sum of some.
   const Place v = At(row, col).along;
-  Place w{-(sum[1] * v.col + sum[2] * v.row), sum[0] * v.col + sum[1] * v.row};
+  Place w{-(sum[4] * v.col + sum[5] * v.row), sum[3] * v.col + sum[4] * v.row};
   const float cell_col = scene_.membrane_rest_length[3 * a], cell_row = scene_.membrane_rest_length[3 * a + 1];
   const float length = std::hypot(w.col, w.row);
   if (!(length > 0.0f)) return;
@@ -407,8 +404,7 @@ void TearWatch::Crack(std::uint32_t row, std::uint32_t col) {
     const float step = way == 0 ? kCrackStep : -kCrackStep;
     Place at = middle;
     for (int i = 0; i < most_steps; ++i) {
-      const Place next{at.col + step * w.col, at.row + step * w.row};
-      at = next;
+      at = {at.col + step * w.col, at.row + step * w.row};
       if (!(StretchAt(at) >= kNear * limit_)) break;
     }
     ends[way] = at;

@@ -43,8 +43,8 @@ class TearWatch {
   static constexpr float kAdvance_m = 0.005f;
   /// From a change of the topology to the next crack: what a cut has freed must have moved first [steps].
   static constexpr std::uint64_t kRelax = 4;
-  /// A crack that nobody cuts is waited for so long; and after a restart the topology, without which a cut that gapes
-  /// looks like stretch [steps].
+  /// Longest wait for the topology: for the edges of a crack to be severed, and after a restart for the first
+  /// TopologyState, without which an open cut looks like stretch [steps].
   static constexpr std::uint64_t kPatience = 100;
 
   /// Model and particles must outlive it.
@@ -52,8 +52,8 @@ class TearWatch {
 
   /// After TissueModel::Apply: what it has edited.
   void Follow();
-  /// Nodes of these rows of the membrane have moved by at most so much [m] since the last call. Rows of which nobody
-  /// says so are not looked at again.
+  /// Nodes of rows [first, end) of the membrane have moved by at most `moved` [m] since the last call. Look() passes
+  /// over rows that have not moved.
   void RowsMoved(std::uint32_t first, std::uint32_t end, float moved);
   /// After each step that moved something. True when edges have torn.
   bool Look(std::uint64_t step);
@@ -97,6 +97,8 @@ class TearWatch {
   float LargestInRow(std::uint32_t row);
   const float* FilteredRow(std::uint32_t row);
   void SmoothRow(std::uint32_t row);
+  /// Sums around a node over the window of the average.
+  [[nodiscard]] std::array<float, kSums> SumsAt(std::uint32_t row, std::uint32_t col);
   [[nodiscard]] Principal At(std::uint32_t row, std::uint32_t col);
   [[nodiscard]] float StretchAt(const Place& place) const;
   [[nodiscard]] Index OtherEnd(Index edge) const;

@@ -391,7 +391,7 @@ TEST_F(PhysicsRestart, NeitherForgetsNorRepeatsWhatHasTorn) {
   ASSERT_TRUE(bench.node_.restored());
   auto tears = bench.bus_.tears.MakeInput();
   for (int i = 0; i < 50; ++i) bench.Step();
-  ASSERT_TRUE(tears->TakeNext(&after)) << "whoever has come meanwhile gets it";
+  ASSERT_TRUE(tears->TakeNext(&after)) << "a late reader gets the newest state";
   EXPECT_EQ(after.torn_edges, before.torn_edges);
   EXPECT_FALSE(tears->TakeNext(&after)) << "once";
 }
