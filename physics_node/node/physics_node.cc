@@ -91,7 +91,7 @@ bool PhysicsNode::Restore(std::span<const std::byte> checkpoint) {
   }
   max_displacement_m_ = state->max_displacement_m;
   contact_time_s_ = state->contact_time_s;
-  catch_up_steps_ = std::max(1, static_cast<int>(std::ceil(kCatchUp_s / scene_.physics.dt_s)));
+  catch_up_steps_ = std::max(1, static_cast<int>(std::lround(kCatchUp_s / scene_.physics.dt_s)));
   saved_tears_ = simulation_.tears().torn_count();
   const SimulationMemory memory = simulation_.Save();
   for (std::size_t i = 0; i < kMaxTools; ++i) {
@@ -160,8 +160,11 @@ void PhysicsNode::CatchUp(const std::array<ToolInput, kMaxTools>& last) {
     contact_time_s_ = step_time_s_;
     return;
   }
-  const float share = 1.0f / static_cast<float>(catch_up_steps_--);
-  contact_time_s_ += static_cast<double>(share) * behind_s;
+  // Evenly: what is behind now, and what is added to it until then.
+  const double dt = static_cast<double>(scene_.physics.dt_s), steps = catch_up_steps_--;
+  const double way_s = std::min(behind_s, (behind_s + (steps - 1) * dt) / steps);
+  const auto share = static_cast<float>(way_s / behind_s);
+  contact_time_s_ += way_s;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolPose &from = last[i].pose, &to = inputs_[i].pose;
     if (inputs_[i].present && last[i].present && (to.p_WT - from.p_WT).norm() < kCatchUpMost_m) {

@@ -63,12 +63,19 @@ class Bench {
     handle_out_->Write(handles);
   }
   /// A tool at a place at a moment of the session.
-  void SendTool(std::uint32_t tool, const Vec3f& p_WT, std::int64_t stamp_ns, std::uint64_t epoch = 1) {
+  void SendTool(std::uint32_t tool, const Vec3f& p_WT, std::int64_t stamp_ns, std::uint64_t epoch = 1,
+                const Quatf& q_WT = Quatf::Identity()) {
     ToolState tools;
     tools.stamp = {++sequence_, epoch, stamp_ns};
     tools.tools[tool].kind = scene_.tools[tool].kind;
     tools.tools[tool].p_WT = p_WT;
+    tools.tools[tool].q_WT = q_WT;
     tool_out_->Write(tools);
+  }
+  void SendHandle(std::int64_t stamp_ns) {
+    HandleState handles;
+    handles.stamp = {++sequence_, 1, stamp_ns};
+    handle_out_->Write(handles);
   }
   /// Step `index`, woken `late_ns` after its time.
   void StepAt(std::uint64_t index, std::int64_t late_ns) {
@@ -404,6 +411,43 @@ TEST_F(PhysicsNodeTest, WarnsBeforeTheMembraneTears) {
   bench.node_.FillHealth(&health);
   EXPECT_EQ(health.last_error.rfind("membrane near tearing: stretch 2.2", 0), 0u) << health.last_error;
   EXPECT_EQ(bench.Figure("torn_edges"), 0);
+}
+
+TEST_F(PhysicsRestart, GoesTheWayOfTheOutageAndDatesItsContactsByIt) {
+  Vec3f before = Vec3f::Zero();
+  Quatf turn = Quatf::Identity();
+  {
+    auto checkpoint = Open();
+    Bench bench(scene_, checkpoint.get());
+    bench.Play(0, 2.81);  // The last step writes a checkpoint.
+    before = bench.ToolPlace(1);
+    turn = bench.node_.simulation().Save().pose[1].q_WT;
+  }
+  auto checkpoint = Open();
+  Bench bench(scene_, checkpoint.get());
+  ASSERT_TRUE(bench.node_.restored());
+  auto cautery = bench.bus_.cautery.MakeInput();
+  CauteryContact contact;
+  bench.tick_.index = 310;
+  bench.SendTool(1, before + Vec3f(0, 0.002f, 0), 1 + 309 * kPeriod, 1, turn);
+  bench.Step();
+  EXPECT_FALSE(cautery->TakeLatest(&contact)) << "the pedal has not been heard";
+  EXPECT_EQ(bench.ToolPlace(1), before) << "nor is the way to be gone without it";
+  float longest = 0;
+  double last_s = 2.8;
+  for (int i = 0; i < 40; ++i) {
+    const Vec3f place = bench.ToolPlace(1);
+    bench.SendHandle(1 + static_cast<std::int64_t>(bench.tick_.index) * kPeriod);
+    bench.Step();
+    longest = std::max(longest, (bench.ToolPlace(1) - place).norm());
+    ASSERT_TRUE(cautery->TakeLatest(&contact)) << i;
+    EXPECT_GT(contact.session_time_s, last_s) << "time goes on from the checkpoint";
+    EXPECT_NEAR(contact.session_time_s - last_s, 0.0175, i == 0 ? 0.01 : 1e-6) << "evenly";
+    last_s = contact.session_time_s;
+  }
+  EXPECT_LT(longest, 0.00015f) << "2 mm in 40 steps";
+  EXPECT_NEAR(last_s, 3.50, 1e-6);
+  EXPECT_LT((bench.ToolPlace(1) - before - Vec3f(0, 0.002f, 0)).norm(), 1e-6f);
 }
 
 TEST_F(PhysicsRestart, ABrokenCheckpointIsAFreshStart) {

@@ -178,6 +178,46 @@ TEST_F(ThermalNodeTest, MetalThatMovedOnDuringAnOutageLeavesNoBridge) {
   }
 }
 
+TEST_F(ThermalNodeTest, SamplesOfATimeThatWasAppliedArePassedOver) {
+  auto node = MakeNode();
+  Cut(node.get(), 0.010f, 0.012f);
+  Step(node.get());
+  const double joule = node->solver().ledger().joule, now_s = tick_.session_time_s;
+  // A physics node that was started again repeats the last tenth of a second.
+  for (int back = 10; back > 1; --back) {
+    Send(0.011f, now_s - 0.01 * back - 0.01);
+    Step(node.get());
+  }
+  EXPECT_EQ(node->solver().ledger().joule, joule);
+}
+
+TEST_F(ThermalNodeTest, TornEdgesOfOneTriangleAreJoinedToOneCrack) {
+  auto node = MakeNode();
+  const Index cols = scene_.membrane.cols, cell = 10 * cols + 20;
+  TearState tears;
+  tears.stamp = {1, 1, 1};
+  tears.scene_hash = scene_.hash;
+  tears.rows = scene_.membrane.rows;
+  tears.cols = cols;
+  tears.torn_edges.assign((3 * scene_.membrane.node_count() + 7) / 8, 0);
+  SetBit(tears.torn_edges, 3 * cell);           // Along the row,
+  SetBit(tears.torn_edges, 3 * cell + 2);       // the diagonal,
+  SetBit(tears.torn_edges, 3 * (cell + cols));  // and the row below: across the cell.
+  ASSERT_TRUE(bus_.tear_out->Write(tears));
+  for (int n = 0; n < kCommitFrames; ++n) Step(node.get());
+  const HeatField& field = node->solver().field();
+  const auto at = [&](Index n) { return scene_.membrane_material[n]; };
+  const Vec2f from = 0.5f * (at(cell) + at(cell + 1)), to = 0.5f * (at(cell + cols) + at(cell + cols + 1));
+  for (float u = 0.02f; u < 1.0f; u += 0.02f) {
+    const CellIndex place = field.sheet().CellOf(from + u * (to - from));
+    const auto gone = [&](int dx) {
+      const Tile* tile = field.Find((place.ix + dx) / kTile, place.iy / kTile);
+      return tile != nullptr && (tile->state.flags[place.iy % kTile * kTile + (place.ix + dx) % kTile] & kRemoved) != 0;
+    };
+    EXPECT_TRUE(gone(0) || gone(-1) || gone(1)) << u;
+  }
+}
+
 TEST_F(ThermalNodeTest, PaperModelRunsInTheSameNodeAndComesBack) {
   scene_.thermal.model = ThermalModel::kPaper;
   OpenCheckpoint();
