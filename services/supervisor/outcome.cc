@@ -29,12 +29,13 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
     NodeId node;
     const char *key, *label, *unit;
     int decimals;
+    bool at_end = false;  ///< As last reported; else the highest. A short slit is as ragged as it is long.
   };
   constexpr std::array kSources{Source{kHaptics, "peak_force_N", "peak force", "N", 2},
                                 Source{kThermal, "highest_temperature_C", "highest temperature", "°C", 0},
                                 Source{kThermal, "cut_length_mm", "cut length", "mm", 1},
-                                Source{kThermal, "cut_width_p50_mm", "width of the slit, median", "mm", 2},
-                                Source{kThermal, "cut_off_way_mm", "slit off the metal's way, 95 %", "mm", 2},
+                                Source{kThermal, "cut_width_p50_mm", "width of the slit, median", "mm", 2, true},
+                                Source{kThermal, "cut_off_way_mm", "slit off the metal's way, 95 %", "mm", 2, true},
                                 Source{kThermal, "hook_temperature_C", "highest temperature of the hook", "°C", 0},
                                 Source{kPhysics, "max_displacement_mm", "largest displacement", "mm", 1},
                                 Source{kPhysics, "largest_stretch", "largest stretch of the membrane", "", 2},
@@ -48,7 +49,8 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
   std::vector<KeyFigure> figures;
   for (const Source& source : kSources) {
     if (!record.node(source.node).seen) continue;  // An exercise without heat has no temperature, not one of 0.
-    figures.push_back({source.key, source.label, source.unit, source.decimals, record.peak(source.key)});
+    figures.push_back({source.key, source.label, source.unit, source.decimals,
+                       source.at_end ? record.last(source.key) : record.peak(source.key)});
   }
   return figures;
 }
@@ -143,7 +145,7 @@ std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& recor
   std::string text = NodeTable(outcome.nodes, record) + "\n";
   for (const KeyFigure& figure : KeyFigures(record)) {
     std::array<char, 128> line{};
-    std::snprintf(line.data(), line.size(), "%-28s %10s %s\n", figure.label,
+    std::snprintf(line.data(), line.size(), "%-34s %10s %s\n", figure.label,
                   Fixed(figure.value, figure.decimals).c_str(), figure.unit);
     text += line.data();
   }

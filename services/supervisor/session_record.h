@@ -82,6 +82,11 @@ class SessionRecord {
   [[nodiscard]] const NodeFigures& node(NodeId id) const { return nodes_[static_cast<std::size_t>(id)].figures; }
   /// Curve of a metric of whichever node reports it; empty when none does.
   [[nodiscard]] const Curve& curve(const std::string& metric) const;
+  /// Newest value reported; 0 when none was.
+  [[nodiscard]] double last(const std::string& metric) const {
+    const auto& points = curve(metric).points();
+    return points.empty() ? 0.0 : points.back().value;
+  }
   /// Highest value ever reported; 0 when none was.
   [[nodiscard]] double peak(const std::string& metric) const { return curve(metric).max(); }
   [[nodiscard]] const std::vector<RestartRecord>& restarts() const { return restarts_; }

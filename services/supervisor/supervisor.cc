@@ -466,10 +466,7 @@ struct Supervisor::Impl {
     std::string line = start_ns == 0 ? "starting" : "t " + Fixed(std::max(0.0, SessionTime(now)), 1);
     if (start_ns != 0) {
       const std::string phase = PhaseAt(scene.view(), SessionTime(now));
-      const auto last = [&](const char* metric) {
-        const auto& points = record.curve(metric).points();
-        return points.empty() ? 0.0 : points.back().value;
-      };
+      const auto last = [&](const char* metric) { return record.last(metric); };
       line += (end_s > 0 ? " / " + Fixed(end_s, 1) : std::string()) + " s";
       line += phase.empty() ? "" : " · " + phase;
       line += " · force " + Fixed(std::max(last("force0_N"), last("force1_N")), 2) + " N · displaced " +
