@@ -34,32 +34,41 @@ struct Row {
   bool loaded;
 };
 /// The first six are the usual stroke in six shapes. Each value meets nearly each other value once; what is left out
-/// are shapes too long for 2 mm/s, and some of the 40 pairs of shape and hold.
+/// are shapes too long for 2 mm/s, and some of the 40 pairs of shape and hold. The slanted foot lies across its stroke,
+/// but for those across.
 constexpr std::array kMatrix{
     Row{Shape::kAlong, 4, 35, Held::kFree, Foot::kDown, false},
     Row{Shape::kCircle, 4, 35, Held::kFree, Foot::kUp, false},
-    Row{Shape::kZigzag, 4, 35, Held::kFree, Foot::kLevel, true},
+    Row{Shape::kZigzag, 4, 35, Held::kFree, Foot::kSlanted, true},
     Row{Shape::kAcross, 4, 35, Held::kSlack, Foot::kDown, true},
     Row{Shape::kSpiral, 4, 35, Held::kOrgan, Foot::kUp, true},
-    Row{Shape::kEight, 4, 35, Held::kTaut, Foot::kLevel, false},
+    Row{Shape::kEight, 4, 35, Held::kTaut, Foot::kSlanted, false},
     Row{Shape::k45deg, 2, 60, Held::kOrgan, Foot::kDown, false},
-    Row{Shape::k30deg, 8, 60, Held::kTented, Foot::kLevel, true},
+    Row{Shape::k30deg, 8, 60, Held::kTented, Foot::kSlanted, true},
     Row{Shape::kAlong, 2, 20, Held::kTaut, Foot::kUp, true},
     Row{Shape::kSpiral, 8, 20, Held::kSlack, Foot::kDown, false},
-    Row{Shape::kAcross, 2, 20, Held::kTented, Foot::kLevel, false},
+    Row{Shape::kAcross, 2, 20, Held::kTented, Foot::kSlanted, false},
     Row{Shape::kEight, 8, 60, Held::kFree, Foot::kUp, true},
     Row{Shape::k45deg, 8, 35, Held::kTented, Foot::kUp, true},
     Row{Shape::k30deg, 2, 35, Held::kSlack, Foot::kUp, false},
     Row{Shape::kCircle, 8, 60, Held::kTaut, Foot::kDown, true},
-    Row{Shape::kZigzag, 8, 20, Held::kOrgan, Foot::kLevel, false},
+    Row{Shape::kZigzag, 8, 20, Held::kOrgan, Foot::kSlanted, false},
     Row{Shape::kEight, 4, 20, Held::kTented, Foot::kDown, false},
-    Row{Shape::k45deg, 4, 60, Held::kSlack, Foot::kLevel, true},
+    Row{Shape::k45deg, 4, 60, Held::kSlack, Foot::kSlanted, true},
     Row{Shape::k30deg, 2, 20, Held::kFree, Foot::kDown, true},
-    Row{Shape::kAlong, 8, 60, Held::kTented, Foot::kLevel, true},
+    Row{Shape::kAlong, 8, 60, Held::kTented, Foot::kSlanted, true},
     Row{Shape::kAcross, 8, 60, Held::kOrgan, Foot::kUp, true},
-    Row{Shape::kCircle, 2, 20, Held::kSlack, Foot::kLevel, false},
+    Row{Shape::kCircle, 2, 20, Held::kSlack, Foot::kSlanted, false},
     Row{Shape::kZigzag, 8, 60, Held::kSlack, Foot::kUp, true},
-    Row{Shape::kSpiral, 4, 60, Held::kTented, Foot::kLevel, true},
+    Row{Shape::kSpiral, 4, 60, Held::kTented, Foot::kSlanted, true},
+};
+/// A level foot, 5 mm of metal on the sheet, across its stroke: it cuts as wide as it touches, so these have figures of
+/// their own and no part in the summary.
+constexpr std::array kLevel{
+    Row{Shape::kAlong, 4, 35, Held::kFree, Foot::kLevel, false},
+    Row{Shape::kAcross, 4, 35, Held::kFree, Foot::kLevel, false},
+    Row{Shape::kZigzag, 4, 35, Held::kFree, Foot::kLevel, false},
+    Row{Shape::kAlong, 8, 60, Held::kTented, Foot::kLevel, false},
 };
 /// Sessions of --quick: along, across, circle.
 constexpr std::array<std::size_t, 3> kQuick{0, 3, 1};
@@ -67,10 +76,13 @@ constexpr std::array<std::size_t, 3> kQuick{0, 3, 1};
 /// What a stroke of so many seconds is long [mm].
 double LongestFor(double speed_mm_s) { return speed_mm_s < 3 ? 13 : speed_mm_s < 6 ? 22 : 30; }
 
-SessionPlan PlanOf(std::size_t number) {
-  const Row& row = kMatrix[number];
+std::string Numbered(const char* series, std::size_t number) {
+  return (number < 10 ? std::string(series) + "0" : series) + std::to_string(number);
+}
+
+SessionPlan PlanOf(const Row& row, const std::string& name) {
   SessionPlan plan;
-  plan.name = (number + 1 < 10 ? "s0" : "s") + std::to_string(number + 1);
+  plan.name = name;
   plan.shape = row.shape;
   plan.speed_mm_s = row.speed_mm_s;
   plan.power_W = row.power_W;
@@ -113,7 +125,7 @@ class Bench {
     for (std::size_t i = 0; i < kMatrix.size(); ++i) {
       const bool quick = std::find(kQuick.begin(), kQuick.end(), i) != kQuick.end();
       if (only ? i + 1 != *only : report_->quick() && !quick) continue;
-      const SessionPlan plan = PlanOf(i);
+      const SessionPlan plan = PlanOf(kMatrix[i], Numbered("s", i + 1));
       if (!report_->Wants("cut.live." + plan.name) && !WantsSummary()) continue;
       const std::optional<CutMap> map = Run(plan);
       if (!map) continue;
@@ -127,6 +139,13 @@ class Bench {
       if (map) all.push_back(map->figures);
     }
     if (!only) Summarise(all, usual);
+  }
+
+  void RunLevel() {
+    for (std::size_t i = 0; i < kLevel.size(); ++i) {
+      const std::string name = Numbered("level", i + 1);
+      if (report_->Wants("cut.live." + name)) (void)Run(PlanOf(kLevel[i], name));
+    }
   }
 
   void RunPowers() {
@@ -354,6 +373,7 @@ int Main(int argc, char** argv) {
   Bench bench(&report, keep);
   bench.RunMatrix(only);
   if (!only && !report.quick()) {
+    bench.RunLevel();
     bench.RunPowers();
     bench.RunCoag();
     bench.RunKills();

@@ -1,9 +1,9 @@
 #include "tests/benchmark/cut/session.h"
 
-#include <sys/resource.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -27,16 +27,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of the trocar from the stroke's middle where the foot points 70 degrees down into the sheet [m].
-const Vec3d kTipFirst_m(94e-3, 0, 34e-3);
+/// Of the trocar from the stroke's middle where the foot points 70 and 45 degrees down into the sheet [m].
+const Vec3d kTipFirst_m(94e-3, 0, 34e-3), kSlanted_m(71e-3, 0, 71e-3);
 constexpr double kTouch_s = 1.0, kTouchBesideGrasper_s = 2.6, kTail_s = 0.4;
 /// A session takes its time and this to start, end and report.
 constexpr double kPatience_s = 40;
 /// Of the time for which the pedal is pressed, this much at least must have reached the generator.
 constexpr double kLeastEnergised = 0.9;
 constexpr int kTries = 3;
-/// Below and above what else runs, as far as this user may.
-constexpr int kLoadNice = 10, kCartNice = -10;
 
 struct Place {
   double s, t;
@@ -50,6 +48,8 @@ Vec3d TrocarOf(Foot foot, const Vec3d& middle_W) {
       return {-85e-3, -45e-3, 115e-3};
     case Foot::kLevel:
       return {0, -120e-3, 110e-3};
+    case Foot::kSlanted:
+      return middle_W + kSlanted_m;
     case Foot::kDown:
       break;
   }
@@ -63,10 +63,13 @@ double HeelHeightOf(Foot foot) {
       return 0.3e-3;
     case Foot::kLevel:
       return -1.0e-3;
+    case Foot::kSlanted:
+      return 1.8e-3;
     case Foot::kDown:
       break;
   }
-  // The end of the foot is then 1.7 mm below the sheet: the foot stands in its slit like a needle.
+  // The end of the foot is then 1.7 mm below the sheet, as it is where it is slanted: it stands in its slit like a
+  // needle.
   return 3.0e-3;
 }
 
@@ -125,44 +128,37 @@ std::string CartYaml(const SessionPlan& plan, const std::string& motion) {
 
 void Write(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
 
-/// Of the calling thread, and of the processes that it starts.
-class Niceness {
- public:
-  explicit Niceness(int nice) : before_(::getpriority(PRIO_PROCESS, Self())) {
-    (void)::setpriority(PRIO_PROCESS, Self(), nice);
-  }
-  ~Niceness() { (void)::setpriority(PRIO_PROCESS, Self(), before_); }
-  Niceness(const Niceness&) = delete;
-  Niceness& operator=(const Niceness&) = delete;
-
- private:
-  static id_t Self() { return static_cast<id_t>(::gettid()); }
-  int before_;
-};
-
-/// Two threads that do nothing but take processor time; below the simulated firmware, which is no part of what is
-/// measured and would go silent.
+/// Two programs that do nothing but take processor time. In sessions of their own, as other people's programs are: in
+/// the cart's own session, whose processes share one part of the machine, the kernel's thread that moves a pseudo
+/// terminal's bytes is not run for seconds, and the pedal counts as up.
 class Load {
  public:
   explicit Load(bool on) {
     for (int i = 0; on && i < 2; ++i) {
-      threads_.emplace_back([this] {
-        const Niceness below(kLoadNice);
-        while (!ends_.load(std::memory_order_relaxed)) {
-        }
-      });
+      const pid_t child = ::fork();
+      if (child != 0) {
+        children_.push_back(child);
+        continue;
+      }
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+      ::setsid();
+      volatile std::uint64_t busy = 0;
+      while (true) {
+        busy = busy + 1;
+      }
     }
   }
   ~Load() {
-    ends_ = true;
-    for (std::thread& thread : threads_) thread.join();
+    for (const pid_t child : children_) {
+      if (child > 0) ::kill(child, SIGKILL);
+      if (child > 0) ::waitpid(child, nullptr, 0);
+    }
   }
   Load(const Load&) = delete;
   Load& operator=(const Load&) = delete;
 
  private:
-  std::atomic<bool> ends_{false};
-  std::vector<std::thread> threads_;
+  std::vector<pid_t> children_;
 };
 
 /// Kills thermal_node and physics_node in turn, so many times in all; how many of them came back.
@@ -228,7 +224,7 @@ double EnergisedShare(const log_tools::CutMap& map, const StrokeTimes& times) {
 
 std::string Describe(const SessionPlan& plan) {
   constexpr const char* kHeld[] = {"free", "slack", "organ", "taut", "tented"};
-  constexpr const char* kFoot[] = {"down", "up", "level"};
+  constexpr const char* kFoot[] = {"down", "slanted", "up", "level"};
   std::ostringstream text;
   text << plan.name << ": " << NameOf(plan.shape) << ", " << plan.speed_mm_s << " mm/s, " << plan.power_W << " W "
        << plan.pedal << ", " << kHeld[static_cast<int>(plan.held)] << ", foot " << kFoot[static_cast<int>(plan.foot)]
@@ -264,7 +260,7 @@ std::optional<log_tools::CutMap> SessionRunner::Run(const SessionPlan& plan) {
   const Sheet sheet{view, nodes};
   const Place middle = MiddleOf(plan.held);
   const Vec3d trocar_W = TrocarOf(plan.foot, sheet.Above(sheet.MaterialAt(middle.s, middle.t), 0));
-  if (plan.held == Held::kTented) nodes = TentedNodes(plan, trocar_W);
+  if (UsesGrasper(plan.held)) nodes = PulledNodes(plan, trocar_W);
   if (nodes.empty()) return std::nullopt;
   const Sheet held{view, nodes};
   std::vector<Vec2d> course = CourseOf(plan.shape, 1e-3 * plan.longest_mm);
@@ -306,10 +302,7 @@ std::optional<log_tools::CutMap> SessionRunner::RunFiles(const std::string& name
   std::string said;
   {
     const Load load(loaded);
-    testing::Program up = [&] {
-      const Niceness above(kCartNice);
-      return testing::Program("fulcrum", arguments);
-    }();
+    testing::Program up("fulcrum", arguments);
     if (kills > 0) killed_ += KillNodes(up, out / "latest", seconds + kPatience_s, kills);
     (void)testing::WaitFor(seconds + kPatience_s, [&] { return (code = up.Poll()).has_value(); });
     said = up.Said();
@@ -337,7 +330,7 @@ std::optional<log_tools::CutMap> SessionRunner::RunFiles(const std::string& name
   return map;
 }
 
-std::vector<Vec3f> SessionRunner::TentedNodes(const SessionPlan& plan, const Vec3d& trocar_W) {
+std::vector<Vec3f> SessionRunner::PulledNodes(const SessionPlan& plan, const Vec3d& trocar_W) {
   // The hook stays away.
   SessionPlan probe = plan;
   probe.name = plan.name + "-probe";

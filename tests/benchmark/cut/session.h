@@ -14,9 +14,9 @@ namespace fulcrum::benchmark {
 /// How the membrane is held: free, free and without prestrain, over the middle of the organ, pulled by the grasper
 /// beside the path, or lifted by it.
 enum class Held { kFree, kSlack, kOrgan, kTaut, kTented };
-/// How the foot lies, which goes by the trocar: its end first, pointing steeply into the sheet, its heel first with the
-/// end up, or level.
-enum class Foot { kDown, kUp, kLevel };
+/// How the foot lies, which goes by the trocar: pointing into the sheet at 70 degrees, at 45 degrees, its heel first
+/// with the end up, or level.
+enum class Foot { kDown, kSlanted, kUp, kLevel };
 
 /// From one kill to the next: twice what a killed node may take to come back to its work, and more.
 inline constexpr double kKillPeriod_s = 1.1;
@@ -62,8 +62,8 @@ class SessionRunner {
   [[nodiscard]] std::optional<log_tools::CutMap> RunFiles(const std::string& name, const std::filesystem::path& scene,
                                                           const std::filesystem::path& cart, double seconds,
                                                           bool loaded, int kills = 0);
-  /// Where the nodes of the sheet are once the grasper has lifted it.
-  [[nodiscard]] std::vector<Vec3f> TentedNodes(const SessionPlan& plan, const Vec3d& trocar_W);
+  /// Where the nodes of the sheet are once the grasper has pulled it.
+  [[nodiscard]] std::vector<Vec3f> PulledNodes(const SessionPlan& plan, const Vec3d& trocar_W);
 
   std::filesystem::path folder_, keep_;
   int domain_;

@@ -65,8 +65,9 @@ std::vector<Vec2d> CourseOf(Shape shape, double longest_m) {
       return Curve(
           [&](double u) { return Vec2d(longest_m / kTurn * Vec2d(std::cos(kTurn * u), std::sin(kTurn * u))); });
     case Shape::kSpiral:
+      // 4 mm from turn to turn.
       return Curve([&](double u) {
-        return Vec2d((1.5e-3 + 4.5e-3 * u) * Vec2d(std::cos(1.75 * kTurn * u), std::sin(1.75 * kTurn * u)));
+        return Vec2d((1.5e-3 + 6e-3 * u) * Vec2d(std::cos(1.5 * kTurn * u), std::sin(1.5 * kTurn * u)));
       });
     case Shape::kEight:
       return Curve([&](double u) { return Vec2d(3e-3 * std::sin(2 * kTurn * u), 5.5e-3 * std::sin(kTurn * u)); });
