@@ -43,9 +43,9 @@ ExitCode RunPhysics(app::NodeApp& app) {
   runtime::CheckpointFile checkpoint(session / seat.own, app.scene().hash, physics::kCheckpointLayout, capacity);
   const std::int64_t epoch_ns = runtime::MonotonicNs();
   const physics::PhysicsNode::Ports ports{
-      app.MakeInput<ToolState>(),    app.MakeInput<HandleState>(),   app.MakeInput<TopologyState>(),
-      app.MakeOutput<TissueFrame>(), app.MakeOutput<ContactModel>(), app.MakeOutput<CauteryContact>(),
-      app.MakeOutput<TearState>(),   app.MakeOutput<TickManifest>(),
+      app.MakeInput<ToolState>(),       app.MakeInput<HandleState>(),  app.MakeInput<TopologyState>(),
+      app.MakeInput<OpenCells>(),       app.MakeOutput<TissueFrame>(), app.MakeOutput<ContactModel>(),
+      app.MakeOutput<CauteryContact>(), app.MakeOutput<TearState>(),   app.MakeOutput<TickManifest>(),
   };
   std::optional<physics::PhysicsNode> node;
   const auto make = [&](bool follows) {

@@ -14,7 +14,8 @@ ExitCode RunThermal(app::NodeApp& app) {
   thermal::ThermalNode node(
       app.scene(),
       {app.MakeInput<CauteryContact>(), app.MakeInput<TearState>(), app.MakeOutput<TopologyState>(),
-       app.MakeOutput<TemperaturePatch>(), app.MakeOutput<ThermalEvent>(), app.MakeOutput<TickManifest>()},
+       app.MakeOutput<OpenCells>(), app.MakeOutput<TemperaturePatch>(), app.MakeOutput<ThermalEvent>(),
+       app.MakeOutput<TickManifest>()},
       &checkpoint, runtime::MonotonicNs());
   app::LogCheckpoint(checkpoint, node.restored());
   return app.Run(

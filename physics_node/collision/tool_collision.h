@@ -14,6 +14,7 @@
 
 #include "physics_node/collision/closest.h"
 #include "physics_node/collision/contact_row.h"
+#include "physics_node/collision/open_cells.h"
 #include "physics_node/collision/surface_bounds.h"
 #include "physics_node/collision/tool_shape.h"
 #include "physics_node/pbd/pbd_solver.h"
@@ -88,6 +89,8 @@ class ToolCollision {
   void Rows(float u0, float u1, std::vector<ContactRow>* rows);
   /// Forces of the last Rows as the solver has written them: those on the tools, and which pairs touch.
   void TakeForces(std::span<const ContactRow> rows);
+  /// What is gone of triangles that still live, for the next Rows.
+  void SetOpenCells(const OpenCells& cells) { open_ = cells; }
   /// Sum of normal and friction force of the tissue on a tool after TakeForces [N].
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return force_[tool]; }
 
@@ -163,6 +166,10 @@ class ToolCollision {
   void LoadTriangle(const std::array<ParticleRef, 3>& at, std::size_t lane);
   /// What the last look has found in a lane; `now` is the capsule where that was.
   void TakeTouch(const Capsule& now, std::size_t lane, ClosestPoints* closest) const;
+  /// Moves a pair's closest point off cells that are gone. False: within `range` nothing of the triangle is left.
+  [[nodiscard]] bool KeepOffOpenCells(const Capsule& capsule, float range, ContactPair* pair) const;
+  /// How much nearer than along the sheet's normal a tool comes to it along `direction` [m].
+  [[nodiscard]] float RimGives(const ContactPair& pair, ToolPart part, const Vec3f& direction) const;
   /// Rows of at most eight pairs of one capsule.
   void AddRows(Index first, Index last, float u0, float u1, std::vector<ContactRow>* rows);
   void AddRow(Index index, const Push& push, const Vec3f& tool_step, std::vector<ContactRow>* rows) const;
@@ -184,6 +191,7 @@ class ToolCollision {
   std::size_t waiting_count_ = 0;
   TriangleBatch triangles_{};
   TouchBatch touch_{};
+  OpenCells open_;
   std::array<Patch, 2> patch_;  ///< The last one asked for, now and before this step.
   float band_ = 0;              ///< Rows are made for what is so near to touch [m].
   std::array<Vec3f, kMaxTools> force_{Vec3f::Zero(), Vec3f::Zero()};

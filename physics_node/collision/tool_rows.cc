@@ -48,6 +48,38 @@ void ToolCollision::AddRow(Index index, const Push& push, const Vec3f& tool_step
   rows->push_back(row);
 }
 
+bool ToolCollision::KeepOffOpenCells(const Capsule& capsule, float range, ContactPair* pair) const {
+  if (pair->triangle >= membrane_triangles_) {
+    return true;
+  }
+  const float cell = scene_.thermal.cell_m;
+  SheetTriangle triangle;
+  Vec2f material = Vec2f::Zero();
+  const auto nodes = model_->TriangleNodes(pair->triangle);
+  for (std::size_t i = 0; i < 3; ++i) {
+    triangle.material[i] = scene_.membrane_material[nodes[i]];
+    material += pair->closest.barycentric[i] * triangle.material[i];
+  }
+  if (!IsOpenAt(open_, cell, material)) {
+    return true;
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    triangle.place[i] = particles_->At(pair->at[i]);
+  }
+  return NearestLeft(open_, cell, triangle, capsule.a, capsule.b, range, &pair->closest);
+}
+
+/// A margin is kept from the middle of the sheet, for half of its thickness; a rim is met along the sheet, where there
+/// is nothing of that.
+float ToolCollision::RimGives(const ContactPair& pair, ToolPart part, const Vec3f& direction) const {
+  if (pair.triangle >= membrane_triangles_ || part != ToolPart::kTip) {
+    return 0.0f;
+  }
+  const Vec3f a = particles_->At(pair.at[0]);
+  const Vec3f normal = (particles_->At(pair.at[1]) - a).cross(particles_->At(pair.at[2]) - a).normalized();
+  return ContactMargin(scene_, part) * (1.0f - std::abs(normal.dot(direction)));
+}
+
 /// Takes out rows marked by count 0.
 void ToolCollision::DropMarked(std::size_t first, std::vector<ContactRow>* rows) {
   rows->erase(std::remove_if(rows->begin() + static_cast<std::ptrdiff_t>(first), rows->end(),
@@ -121,7 +153,13 @@ void ToolCollision::AddRows(Index first, Index last, float u0, float u1, std::ve
     const float u = touch_.u[lane];
     const Capsule now = m.At(u);
     TakeTouch(now, lane, &pair.closest);
+    if (!KeepOffOpenCells(now, range, &pair)) {
+      pair.closest.distance_sq = kFarSq;
+      pair.closest.crosses = false;
+      continue;
+    }
     Push push = PushOf(pair, now);
+    push.depth -= RimGives(pair, now.part, push.direction);
     const Vec3f end = m.PointAt(pair.closest.t, u1), tool_step = end - m.PointAt(pair.closest.t, u0);
     push.depth += push.direction.dot(end - m.PointAt(pair.closest.t, u));
     push.depth = std::min(push.depth, kMaxPush + std::max(0.0f, push.direction.dot(tool_step)));

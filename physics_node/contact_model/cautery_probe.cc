@@ -9,10 +9,17 @@ namespace {
 /// An arc strikes across a gap of this size between metal and sheet, and holds up to the second one [m]. At the 500 V
 /// peak of a cutting generator air and steam break down across 0.05 to 0.15 mm (Paschen).
 constexpr float kStrikeGap = 1.0e-4f, kHoldGap = 2.5e-4f;
+/// Gaps are given up to this one: what discharges and sparks reach [m].
+constexpr float kFootprintReach = 7.0e-4f;
+/// Tissue gives under the metal, and its surface is wet: so much of a gap along the normal is none [m].
+constexpr float kContactSlack = 5.0e-5f;
+/// Edges of the mesh count as no shorter than this, so that few are looked at [m].
+constexpr float kShortestEdge = 1.0e-4f;
 /// Bare metal up the neck [m].
 constexpr float kBareNeck = 0.005f;
 /// Between two stations along the metal [m]; more where they would be too many.
 constexpr float kStationSpacing = 5.0e-4f;
+constexpr std::size_t kMostStations = 24;
 /// The metal between two stations is looked at in so many places for the centre of the contact.
 constexpr int kLooks = 4;
 /// Pieces of metal whose ends lie farther apart on the sheet lie on two folds of it [m].
@@ -74,7 +81,7 @@ bool CauteryProbe::Tented(Index triangle, const std::array<float, 3>& barycentri
 /// From the end of the foot to the heel and up the neck.
 void CauteryProbe::SetStations(const ToolDescription& tool) {
   const float length = tool.tip_length_m + kBareNeck;
-  const float spacing = std::max(kStationSpacing, length / static_cast<float>(kMaxMetalPoints - 3));
+  const float spacing = std::max(kStationSpacing, length / static_cast<float>(kMostStations - 3));
   const auto parts = [spacing](float part) { return std::max(1, static_cast<int>(std::ceil(part / spacing))); };
   const int foot = parts(tool.tip_length_m), neck = parts(kBareNeck);
   for (int i = 0; i < foot; ++i) {
@@ -89,7 +96,7 @@ void CauteryProbe::SetStations(const ToolDescription& tool) {
 void CauteryProbe::FollowSheet(const ToolPose& pose, std::uint32_t tool, const ToolCollision& collision) {
   // Of the tool's pairs with living membrane: the nearest, and how near each station is to any.
   const ContactPair* nearest = nullptr;
-  std::array<float, kMaxMetalPoints> alive_sq;
+  std::array<float, kMostStations> alive_sq;
   alive_sq.fill(1.0f);
   for (std::size_t i = 0; i < stations_.size(); ++i) {
     stations_[i].p_W = pose.ToWorld(stations_[i].p_T);
@@ -195,6 +202,98 @@ bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) {
   return true;
 }
 
+/// Of a gap along the sheet's normal the half of its thickness is none, and what soft, wet tissue gives.
+void CauteryProbe::AddGaps(Index triangle, const MetalAxis& axis, float radius_m) {
+  const auto nodes = model_->TriangleNodes(triangle);
+  SheetTriangle sheet;
+  for (std::size_t i = 0; i < 3; ++i) {
+    sheet.material[i] = scene_.membrane_material[nodes[i]];
+    sheet.place[i] = walk_.NodePlace(nodes[i]);
+  }
+  const auto& x = sheet.place;
+  const Vec3f normal = (x[1] - x[0]).cross(x[2] - x[0]).normalized();
+  const float cushion = 0.5f * scene_.thermal.thickness_m + kContactSlack;
+  ForCellsIn(sheet.material, scene_.thermal.cell_m, gap_x_, gap_y_, gap_x_ + kGapCells - 1, gap_y_ + kGapCells - 1,
+             [&](std::int32_t ix, std::int32_t iy, const std::array<float, 3>& w) {
+               const Vec3f p = w[0] * x[0] + w[1] * x[1] + w[2] * x[2];
+               float& gap = gap_m_[static_cast<std::size_t>((iy - gap_y_) * kGapCells + ix - gap_x_)];
+               for (std::size_t k = 1; k < axis.size(); ++k) {
+                 const Vec3f along = axis[k] - axis[k - 1];
+                 const Vec3f offset = axis[k - 1] + ClosestOnSegment(p, axis[k - 1], axis[k]) * along - p;
+                 const float height = normal.dot(offset), off = std::max(std::abs(height) - cushion, 0.0f);
+                 const float lateral_sq = std::max(offset.squaredNorm() - height * height, 0.0f);
+                 gap = std::min(gap, std::sqrt(lateral_sq + off * off) - radius_m);
+               }
+             });
+}
+
+/// Cells of the mesh that the metal may be near to: around the places of its stations, and those of its contacts, which
+/// find other folds, too.
+void CauteryProbe::FindNearCells(float reach_m, const ToolCollision& collision) {
+  near_cells_.clear();
+  const Index cols = scene_.membrane.cols - 1, rows = scene_.membrane.rows - 1;
+  const auto& m = scene_.membrane_material;
+  const auto count = [reach_m](const Vec2f& edge) {
+    return static_cast<Index>(std::ceil(reach_m / std::max(edge.norm(), kShortestEdge)));
+  };
+  for (const Station& station : stations_) {
+    if (!station.place.found() || station.place.distance_m > reach_m + spacing_) {
+      continue;
+    }
+    const Index cell = station.place.cell(), row = cell / cols, col = cell % cols;
+    const auto nodes = model_->TriangleNodes(2 * cell);
+    const Index across = count(m[nodes[1]] - m[nodes[0]]), down = count(m[nodes[2]] - m[nodes[1]]);
+    for (Index r = row - std::min(row, down); r <= std::min(row + down, rows - 1); ++r) {
+      for (Index c = col - std::min(col, across); c <= std::min(col + across, cols - 1); ++c) {
+        near_cells_.push_back(r * cols + c);
+      }
+    }
+  }
+  for (const ContactPair& pair : collision.pairs()) {
+    if (pair.triangle < collision.membrane_triangle_count() && pair.closest.distance_sq < reach_m * reach_m) {
+      near_cells_.push_back(pair.triangle / 2);
+    }
+  }
+  std::sort(near_cells_.begin(), near_cells_.end());
+  near_cells_.erase(std::unique(near_cells_.begin(), near_cells_.end()), near_cells_.end());
+}
+
+void CauteryProbe::FillFootprint(const ToolPose& pose, const ToolDescription& tool, const ToolCollision& collision,
+                                 const Vec2f& centre, Footprint* print) {
+  const float cell = scene_.thermal.cell_m;
+  gap_x_ = static_cast<std::int32_t>(std::floor(centre.x() / cell)) - kGapCells / 2;
+  gap_y_ = static_cast<std::int32_t>(std::floor(centre.y() / cell)) - kGapCells / 2;
+  gap_m_.fill(2 * kFootprintReach);
+  const MetalAxis axis{pose.ToWorld(Vec3f(tool.tip_length_m, 0, 0)), pose.p_WT, pose.ToWorld(Vec3f(0, 0, -kBareNeck))};
+  FindNearCells(tool.tip_radius_m + kFootprintReach, collision);
+  for (const Index near : near_cells_) {
+    AddGaps(2 * near, axis, tool.tip_radius_m);
+    AddGaps(2 * near + 1, axis, tool.tip_radius_m);
+  }
+  int left = kGapCells, right = -1, top = kGapCells, bottom = -1;
+  for (int j = 0; j < kGapCells; ++j) {
+    for (int i = 0; i < kGapCells; ++i) {
+      if (gap_m_[static_cast<std::size_t>(j * kGapCells + i)] < kFootprintReach) {
+        left = std::min(left, i);
+        right = std::max(right, i);
+        top = std::min(top, j);
+        bottom = j;
+      }
+    }
+  }
+  if (right < 0) {
+    return;
+  }
+  print->x = gap_x_ + left;
+  print->y = gap_y_ + top;
+  print->width = static_cast<std::uint32_t>(right - left + 1);
+  for (int j = top; j <= bottom; ++j) {
+    for (int i = left; i <= right; ++i) {
+      print->gap.push_back(Footprint::Encode(gap_m_[static_cast<std::size_t>(j * kGapCells + i)]));
+    }
+  }
+}
+
 CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision) {
   CauteryContact contact;
   contact.tool = static_cast<std::uint8_t>(tool);
@@ -212,9 +311,6 @@ CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     rate_.setZero();
     return contact;
   }
-  for (const Station& station : stations_) {
-    contact.metal[contact.metal_count++] = {station.place.material, station.height_m};
-  }
   const auto station = std::min_element(stations_.begin(), stations_.end(), [&](const Station& a, const Station& b) {
     return (a.place.material - centre).squaredNorm() < (b.place.material - centre).squaredNorm();
   });
@@ -223,6 +319,7 @@ CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   contact.barycentric = place.barycentric;
   contact.material = place.material;
   contact.touching = true;
+  FillFootprint(pose, description, collision, contact.material, &contact.footprint);
   contact.tented = Tented(place.triangle, place.barycentric);
   contact.contact_radius_m = description.tip_radius_m;
   if (was_touching_) {

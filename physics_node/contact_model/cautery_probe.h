@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "physics_node/collision/open_cells.h"
 #include "physics_node/collision/tool_collision.h"
 #include "physics_node/contact_model/sheet_place.h"
 
@@ -13,12 +14,13 @@ class CauteryProbe {
  public:
   CauteryProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
 
-  /// Contact of hook `tool` after a step: the metal's axis as the sheet sees it, its centre, rate, tented. Mode, power
-  /// and stamps are the caller's.
+  /// Contact of hook `tool` after a step: the metal's footprint, its centre, rate, tented. Mode, power and stamps are
+  /// the caller's.
   ///
-  /// The bare metal is the foot and the end of the neck. Stations along its axis each follow the nearest place of the
-  /// deformed sheet from step to step, over slits as well, so the footprint jumps only where the tool does. Their
-  /// distances decide what touches, with hysteresis.
+  /// The bare metal is the foot and the end of the neck. The footprint is its distance from each cell of the deformed
+  /// sheet around it; over triangles that a cut has switched off the sheet is the straight line from lip to lip.
+  /// Stations along the metal's axis each follow the nearest place of the sheet from step to step, over slits as well,
+  /// so the contact's centre jumps only where the tool does. Their distances decide what touches, with hysteresis.
   [[nodiscard]] CauteryContact Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision);
 
  private:
@@ -35,6 +37,13 @@ class CauteryProbe {
   void SignHeights();
   /// Mean place of the metal that is near enough for a current, weighted by how much nearer. False: none is.
   bool FindCentre(float radius_m, Vec2f* centre);
+  /// End of the foot, heel, end of the bare neck, in frame W.
+  using MetalAxis = std::array<Vec3f, 3>;
+  /// Gaps of the cells around `centre` from the metal.
+  void FillFootprint(const ToolPose& pose, const ToolDescription& tool, const ToolCollision& collision,
+                     const Vec2f& centre, Footprint* print);
+  void FindNearCells(float reach_m, const ToolCollision& collision);
+  void AddGaps(Index triangle, const MetalAxis& axis, float radius_m);
   [[nodiscard]] bool Tented(Index triangle, const std::array<float, 3>& barycentric) const;
 
   SceneView scene_;
@@ -42,6 +51,10 @@ class CauteryProbe {
   const ParticleStore* particles_;
   SheetWalk walk_;
   std::vector<Station> stations_;
+  static constexpr int kGapCells = static_cast<int>(kFootprintCells);
+  std::array<float, std::size_t{kGapCells} * kGapCells> gap_m_{};  ///< Row by row.
+  std::int32_t gap_x_ = 0, gap_y_ = 0;                             ///< Cell of the first.
+  std::vector<Index> near_cells_;
   float spacing_ = 0;   ///< Longest edge of the membrane at rest [m].
   bool known_ = false;  ///< The stations have places.
   float centre_ = 0;    ///< Of the contact, along the metal [stations].

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "physics_node/collision/closest.h"
 
@@ -11,26 +12,59 @@ namespace {
 
 /// Cells that a descent crosses at most: a point cannot come farther than that from its last place in one step.
 constexpr int kMostSteps = 40;
+/// Lines of the grid through a node: steps along rows and columns.
+constexpr std::array<std::pair<int, int>, 4> kLines{{{0, 1}, {1, 0}, {1, 1}, {1, -1}}};
+/// A lip farther than so many steps from a dead node says nothing about its place.
+constexpr int kLipReach = 4;
 
 }  // namespace
 
 Vec3f SheetWalk::NodePlace(Index node) const {
-  const Index cols = scene_.membrane.cols, rows = scene_.membrane.rows, row = node / cols, col = node % cols;
-  if (model_->NodeAlive(node) && !model_->IsDebris(node)) {
-    return particles_->At(particles_->NodeRef(row, col));
+  const auto cols = static_cast<int>(scene_.membrane.cols), rows = static_cast<int>(scene_.membrane.rows);
+  const int row = static_cast<int>(node) / cols, col = static_cast<int>(node) % cols;
+  const auto lives = [&](int r, int c) {
+    if (r < 0 || c < 0 || r >= rows || c >= cols) {
+      return false;
+    }
+    const auto other = static_cast<Index>(r * cols + c);
+    return model_->NodeAlive(other) && !model_->IsDebris(other);
+  };
+  const auto at = [&](int r, int c) {
+    return particles_->At(particles_->NodeRef(static_cast<Index>(r), static_cast<Index>(c)));
+  };
+  if (lives(row, col)) {
+    return at(row, col);
   }
+  // At its share of the way from lip to lip, on each line of the grid that has both within reach.
   Vec3f sum = Vec3f::Zero();
-  int count = 0;
-  for (Index r = row > 0 ? row - 1 : 0; r <= std::min(row + 1, rows - 1); ++r) {
-    for (Index c = col > 0 ? col - 1 : 0; c <= std::min(col + 1, cols - 1); ++c) {
-      const Index other = r * cols + c;
-      if (model_->NodeAlive(other) && !model_->IsDebris(other)) {
-        sum += particles_->At(particles_->NodeRef(r, c));
-        ++count;
+  float weights = 0;
+  for (const auto& [dr, dc] : kLines) {
+    int before = 1, after = 1;
+    while (before <= kLipReach && !lives(row - before * dr, col - before * dc)) {
+      ++before;
+    }
+    while (after <= kLipReach && !lives(row + after * dr, col + after * dc)) {
+      ++after;
+    }
+    if (before > kLipReach || after > kLipReach) {
+      continue;
+    }
+    const float weight = 1.0f / static_cast<float>(before + after), share = static_cast<float>(before) * weight;
+    sum += weight *
+           ((1.0f - share) * at(row - before * dr, col - before * dc) + share * at(row + after * dr, col + after * dc));
+    weights += weight;
+  }
+  if (weights == 0.0f) {
+    for (int r = row - 1; r <= row + 1; ++r) {
+      for (int c = col - 1; c <= col + 1; ++c) {
+        if (lives(r, c)) {
+          sum += at(r, c);
+          weights += 1.0f;
+        }
       }
     }
   }
-  return count > 0 ? Vec3f(sum / static_cast<float>(count)) : particles_->At(particles_->NodeRef(row, col));
+  return weights > 0.0f ? Vec3f(sum / weights) : at(row, col);
 }
 
 Vec2f SheetWalk::MaterialAt(const std::array<Index, 3>& nodes, const std::array<float, 3>& barycentric) const {

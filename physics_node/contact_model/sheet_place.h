@@ -20,7 +20,8 @@ struct SheetPlace {
 
 /// Walks over the grid's triangles, those that a cut has switched off included: the sheet between the lips of a slit is
 /// then the straight line from lip to lip, so a tool that stands in its own slit has a place in material coordinates
-/// that moves on continuously. A node that is dead lies where its living neighbours say.
+/// that moves on continuously. A node that is dead lies at its share of the way from
+/// lip to lip.
 class SheetWalk {
  public:
   SheetWalk(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
@@ -34,7 +35,8 @@ class SheetWalk {
   [[nodiscard]] SheetPlace Crossing(const Vec3f& a_W, const Vec3f& b_W, Index cell) const;
   /// The triangle around `material` within one cell of `cell`, or the nearest of these with the place clamped into it.
   [[nodiscard]] SheetPlace At(const Vec2f& material, Index cell) const;
-  /// World place of a node; of a dead one the mean of its living neighbours, if it has any.
+  /// World place of a node; of a dead one its share of the way between the living ones on opposite sides of it, else
+  /// the mean of its living neighbours, if it has any.
   [[nodiscard]] Vec3f NodePlace(Index node) const;
 
  private:

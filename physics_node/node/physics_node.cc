@@ -217,6 +217,9 @@ void PhysicsNode::TakeInputs(const Tick& tick) {
     }
   }
   topology_waits_ = false;
+  if (ports_.open_cells.TakeLatest(&open_cells_) && !simulation_.SetOpenCells(open_cells_)) {
+    topology_refused_.fetch_add(1, std::memory_order_relaxed);
+  }
 }
 
 /// A skipped period means that the step before ran late: go on with a cheaper preset, for a while. The first step looks
@@ -277,8 +280,7 @@ void PhysicsNode::PublishContacts(const Tick& tick) {
 }
 
 void PhysicsNode::PublishCautery(const Tick& tick) {
-  // While it waits it does not know the pedal. Without a sample the current goes on along the metal's way to the next
-  // one; a sample without current would leave a bridge in the slit.
+  // While it waits it does not know the pedal; a sample without current would leave a bridge in the slit.
   if (hook_ == kMaxTools || waits_ || !ports_.cautery.has_readers()) {
     return;
   }
@@ -338,7 +340,8 @@ void PhysicsNode::PublishManifest(const Tick& tick) {
   };
   manifest_.consumed = {consumed(TopicId::kToolState, tool_before_), consumed(TopicId::kToolState, tool_after_),
                         consumed(TopicId::kHandleState, handle_stamp_),
-                        consumed(TopicId::kTopologyState, topology_state_.stamp)};
+                        consumed(TopicId::kTopologyState, topology_state_.stamp),
+                        consumed(TopicId::kOpenCells, open_cells_.stamp)};
   ports_.manifests.Write(manifest_);
 }
 

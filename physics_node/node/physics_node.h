@@ -25,6 +25,7 @@ class PhysicsNode {
     bus::Input<ToolState>& tools;
     bus::Input<HandleState>& handles;
     bus::Input<TopologyState>& topology;
+    bus::Input<OpenCells>& open_cells;
     bus::LoanOutput<TissueFrame>& frames;
     bus::Output<ContactModel>& contacts;
     bus::Output<CauteryContact>& cautery;
@@ -93,6 +94,7 @@ class PhysicsNode {
   double step_time_s_ = 0;  ///< Session time that the last step stands for.
   double step_ = 0;         ///< The same in periods.
   TopologyState topology_state_;
+  OpenCells open_cells_;
   std::array<ToolInput, kMaxTools> inputs_;
   std::array<int, kMaxTools> absent_ticks_{};
   bool topology_waits_ = false;  ///< Came while another process led.

@@ -336,6 +336,17 @@ int TissueSimulation::ApplyTopology(const TopologyState& topology) {
   return edits;
 }
 
+bool TissueSimulation::SetOpenCells(const OpenCells& cells) {
+  if (cells.scene_hash != scene_.hash) {
+    return false;
+  }
+  collision_.SetOpenCells(cells);
+  // A tool that rests against what has gone is to move on.
+  asleep_ = false;
+  still_steps_ = 0;
+  return true;
+}
+
 DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
   if (!tracks_[tool].present) {
     return {};

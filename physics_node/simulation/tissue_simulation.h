@@ -55,6 +55,8 @@ class TissueSimulation {
 
   /// Advances by PhysicsParams.dt_s. A tool that is not present leaves the tissue where it is and lets go.
   StepReport Step(const std::array<ToolInput, kMaxTools>& tools);
+  /// Which cells around the hook are gone. Cells of another scene are refused: false.
+  bool SetOpenCells(const OpenCells& cells);
   /// Cut and shrunk edges; see TissueModel::Apply. Wakes the tissue when something changed.
   int ApplyTopology(const TopologyState& topology);
 

@@ -67,6 +67,14 @@ bool IsDevice(const DeviceContacts& d) {
          std::all_of(d.contacts.begin(), d.contacts.end(), IsContact);
 }
 
+/// Far beyond any sheet, and no sum of two overflows.
+bool IsCell(std::int32_t index) { return Magnitude(index, 1e8); }
+bool IsFootprint(const Footprint& print) noexcept {
+  if (print.width == 0) return print.gap.empty();
+  return IsCell(print.x) && IsCell(print.y) && print.width <= kFootprintCells && !print.gap.empty() &&
+         print.gap.size() % print.width == 0 && print.height() <= kFootprintCells;
+}
+
 bool IsTiming(const TimingSummary& t) {
   return Within(t.p50_us, 0.0, 1e12) && Within(t.p99_us, 0.0, 1e12) && Within(t.max_us, 0.0, 1e12);
 }
@@ -107,9 +115,7 @@ bool PassesGate(const CauteryContact& m) noexcept {
          m.tool < kMaxTools && weights_in_range && (!m.touching || place_is_known) &&
          Magnitude(m.material, kMaxCoordinate_m) && Magnitude(m.material_rate, kMaxSpeed_m_s) &&
          Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) && Within(m.power_W, 0.0, kMaxPower_W) &&
-         m.metal_count <= kMaxMetalPoints && std::all_of(m.metal.begin(), m.metal.end(), [](const MetalPoint& point) {
-           return Magnitude(point.material, kMaxCoordinate_m) && Magnitude(point.height_m, kMaxCoordinate_m);
-         });
+         IsFootprint(m.footprint);
 }
 
 bool PassesGate(const TopologyState& m) noexcept {
@@ -123,6 +129,8 @@ bool PassesGate(const TearState& m) noexcept {
   const std::uint64_t nodes = std::uint64_t{m.rows} * m.cols;
   return IsStamp(m.stamp) && nodes <= kMaxMembraneNodes && m.torn_edges.size() == (3 * nodes + 7) / 8;
 }
+
+bool PassesGate(const OpenCells& m) noexcept { return IsStamp(m.stamp) && IsCell(m.x) && IsCell(m.y); }
 
 bool PassesGate(const TemperaturePatch& m) noexcept {
   const TemperaturePatchHeader& h = m.header;

@@ -45,6 +45,7 @@ inline constexpr std::size_t kMaxReplyText = 1023;
 [[nodiscard]] bool PassesGate(const CauteryContact& m) noexcept;
 [[nodiscard]] bool PassesGate(const TopologyState& m) noexcept;
 [[nodiscard]] bool PassesGate(const TearState& m) noexcept;
+[[nodiscard]] bool PassesGate(const OpenCells& m) noexcept;
 [[nodiscard]] bool PassesGate(const TemperaturePatch& m) noexcept;
 [[nodiscard]] bool PassesGate(const ThermalEvent& m) noexcept;
 [[nodiscard]] bool PassesGate(const SceneManifest& m) noexcept;

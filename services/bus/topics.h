@@ -43,6 +43,8 @@ struct TopicRole {
 inline constexpr int kLatestOnly = 1;
 inline constexpr int kStreamAtSlowestReader = 1024;
 inline constexpr int kFrameRing = 4;
+/// What a reader that was started again has missed: more than half a second of a stream of 100 Hz.
+inline constexpr int kOutage = 64;
 /// Each patch belongs to one slot of the atlas, so a renderer at 15 Hz needs every one of the 60 Hz stream.
 inline constexpr int kPatchRing = 16;
 inline constexpr int kEventBurst = 512;
@@ -58,7 +60,7 @@ inline constexpr std::array<TopicRole, kTopicCount> kTopicRoles{{
      kFrameRing},
     {TopicId::kContactModel, "fulcrum/ContactModel", Path::kLoopback, false, false, false, true, kLatestOnly,
      kStreamAtSlowestReader},
-    {TopicId::kCauteryContact, "fulcrum/CauteryContact", Path::kLoopback, false, false, false, true, kLatestOnly,
+    {TopicId::kCauteryContact, "fulcrum/CauteryContact", Path::kLoopback, true, true, false, true, kOutage,
      kStreamAtSlowestReader},
     {TopicId::kTopologyState, "fulcrum/TopologyState", Path::kLoopback, true, true, false, false, kLatestOnly,
      kFrameRing},
@@ -75,6 +77,7 @@ inline constexpr std::array<TopicRole, kTopicCount> kTopicRoles{{
      kEventBurst},
     {TopicId::kHealth, "fulcrum/Health", Path::kLoopback, true, true, false, true, kLatestOnly, kAllWriters},
     {TopicId::kTearState, "fulcrum/TearState", Path::kLoopback, true, true, false, false, kLatestOnly, kFrameRing},
+    {TopicId::kOpenCells, "fulcrum/OpenCells", Path::kLoopback, true, true, false, false, kLatestOnly, kFrameRing},
 }};
 
 [[nodiscard]] constexpr const TopicRole& RoleOf(TopicId id) { return kTopicRoles[static_cast<std::size_t>(id)]; }
@@ -108,6 +111,8 @@ template <>
 inline constexpr TopicId kTopicOf<TickManifest> = TopicId::kTickManifest;
 template <>
 inline constexpr TopicId kTopicOf<TearState> = TopicId::kTearState;
+template <>
+inline constexpr TopicId kTopicOf<OpenCells> = TopicId::kOpenCells;
 
 template <class T>
 [[nodiscard]] constexpr const TopicRole& RoleOf() {
@@ -144,6 +149,8 @@ decltype(auto) WithMessageOf(TopicId id, F&& f) {
       return f(std::type_identity<TickManifest>());
     case TopicId::kTearState:
       return f(std::type_identity<TearState>());
+    case TopicId::kOpenCells:
+      return f(std::type_identity<OpenCells>());
     case TopicId::kHealth:
       break;
   }

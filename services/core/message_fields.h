@@ -97,8 +97,9 @@ struct FieldsOf<ContactModel> {
                  FULCRUM_FIELD(ContactModel, devices)};
 };
 template <>
-struct FieldsOf<MetalPoint> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(MetalPoint, material), FULCRUM_FIELD(MetalPoint, height_m)};
+struct FieldsOf<Footprint> {
+  static constexpr auto list = std::tuple{FULCRUM_FIELD(Footprint, x), FULCRUM_FIELD(Footprint, y),
+                                          FULCRUM_FIELD(Footprint, width), FULCRUM_FIELD(Footprint, gap)};
 };
 template <>
 struct FieldsOf<CauteryContact> {
@@ -114,8 +115,7 @@ struct FieldsOf<CauteryContact> {
                                           FULCRUM_FIELD(CauteryContact, material),
                                           FULCRUM_FIELD(CauteryContact, material_rate),
                                           FULCRUM_FIELD(CauteryContact, contact_radius_m),
-                                          FULCRUM_FIELD(CauteryContact, metal_count),
-                                          FULCRUM_FIELD(CauteryContact, metal),
+                                          FULCRUM_FIELD(CauteryContact, footprint),
                                           FULCRUM_FIELD(CauteryContact, power_W)};
 };
 template <>
@@ -133,6 +133,12 @@ struct FieldsOf<TearState> {
   static constexpr auto list =
       std::tuple{FULCRUM_FIELD(TearState, stamp), FULCRUM_FIELD(TearState, scene_hash), FULCRUM_FIELD(TearState, rows),
                  FULCRUM_FIELD(TearState, cols), FULCRUM_FIELD(TearState, torn_edges)};
+};
+template <>
+struct FieldsOf<OpenCells> {
+  static constexpr auto list =
+      std::tuple{FULCRUM_FIELD(OpenCells, stamp), FULCRUM_FIELD(OpenCells, scene_hash), FULCRUM_FIELD(OpenCells, x),
+                 FULCRUM_FIELD(OpenCells, y), FULCRUM_FIELD(OpenCells, rows)};
 };
 template <>
 struct FieldsOf<TemperaturePatchHeader> {

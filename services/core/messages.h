@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "services/core/footprint.h"
 #include "services/core/types.h"
 
 namespace fulcrum {
@@ -145,16 +146,6 @@ struct ContactModel {
 
 enum class CauteryMode : std::uint8_t { kOff, kCut, kCoag, kBlend };
 
-/// A point of the bare metal's axis as the sheet sees it. Successive points bound a piece of metal between them; the
-/// points are the same points of the metal in each sample.
-struct MetalPoint {
-  Vec2f material = Vec2f::Zero();  ///< (s, t) of the place on the rest sheet that is nearest to the point [m].
-  /// Distance of the axis from the middle of the deformed sheet there; its sign changes where the axis goes through it
-  /// [m].
-  float height_m = 0;
-};
-inline constexpr std::size_t kMaxMetalPoints = 24;
-
 struct CauteryContact {
   Stamp stamp;
   double session_time_s = 0;
@@ -165,12 +156,11 @@ struct CauteryContact {
   std::uint8_t tool = 0;
   std::uint32_t triangle = kNoIndex;  ///< Membrane triangle: 2 * cell + half, cell = row * (cols-1) + col.
   std::array<float, 3> barycentric{0, 0, 0};
-  Vec2f material = Vec2f::Zero();                 ///< (s, t) of the contact's centre on the rest sheet [m].
-  Vec2f material_rate = Vec2f::Zero();            ///< [m/s].
-  float contact_radius_m = 0;                     ///< Of the metal around its axis.
-  std::uint32_t metal_count = 0;                  ///< Points filled; 0 unless touching.
-  std::array<MetalPoint, kMaxMetalPoints> metal;  ///< From the end of the foot up the neck.
-  float power_W = 0;                              ///< Asked of the generator; 0 with the pedal up.
+  Vec2f material = Vec2f::Zero();       ///< (s, t) of the contact's centre on the rest sheet [m].
+  Vec2f material_rate = Vec2f::Zero();  ///< [m/s].
+  float contact_radius_m = 0;           ///< Of the metal around its axis.
+  Footprint footprint;                  ///< Of the bare metal on the deformed sheet.
+  float power_W = 0;                    ///< Asked of the generator; 0 with the pedal up.
 };
 
 // -------------------------------------------------------------------------------------------- TopologyState
@@ -200,6 +190,23 @@ struct TearState {
   std::uint32_t rows = 0;
   std::uint32_t cols = 0;
   std::vector<std::uint8_t> torn_edges;  ///< Bit field, 3 * rows * cols bits, as TopologyState::dead_edges.
+};
+
+inline constexpr int kOpenWindow = 64;  ///< Cells along the edge of OpenCells.
+
+/// Which cells of the sheet around the hook are gone. A cut opens cells long before it severs the edges of the mesh
+/// that they belong to.
+struct OpenCells {
+  Stamp stamp;
+  std::uint64_t scene_hash = 0;
+  std::int32_t x = 0, y = 0;                      ///< floor(s / cell_m), floor(t / cell_m) of the first cell.
+  std::array<std::uint64_t, kOpenWindow> rows{};  ///< Bit per cell.
+
+  [[nodiscard]] bool IsOpen(std::int32_t ix, std::int32_t iy) const {
+    const std::int64_t i = std::int64_t{ix} - x, j = std::int64_t{iy} - y;
+    return i >= 0 && j >= 0 && i < kOpenWindow && j < kOpenWindow &&
+           ((rows[static_cast<std::size_t>(j)] >> static_cast<unsigned>(i)) & 1u) != 0;
+  }
 };
 
 inline bool TestBit(std::span<const std::uint8_t> bits, std::size_t i) { return (bits[i >> 3] >> (i & 7u)) & 1u; }
@@ -299,9 +306,10 @@ enum class TopicId : std::uint8_t {
   kCommandReply,
   kTickManifest,
   kHealth,
-  kTearState
+  kTearState,
+  kOpenCells
 };
-inline constexpr int kTopicCount = 14;
+inline constexpr int kTopicCount = 15;
 
 struct ConsumedInput {
   TopicId topic = TopicId::kHandleState;

@@ -60,6 +60,7 @@ Outcome CoupledNodes::Step(const RecordedTick& recorded) {
     }
   };
   if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) take_newest(&topology_, &tick.topology);
+  if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) take_newest(&open_cells_, &tick.open_cells);
   if (tick.node == NodeId::kThermal && Has(NodeId::kPhysics)) take_newest(&tears_, &tick.tears);
   ReplayedNode& node = *nodes_.at(tick.node);
   Outcome outcome;
@@ -70,14 +71,15 @@ Outcome CoupledNodes::Step(const RecordedTick& recorded) {
     } else {
       (void)(Decode(published, &outcome.tools) || Decode(published, &outcome.frame) ||
              Decode(published, &outcome.model) || Decode(published, &outcome.cautery) ||
-             Decode(published, &outcome.topology) || Decode(published, &outcome.tear) ||
-             Decode(published, &outcome.patch));
+             Decode(published, &outcome.topology) || Decode(published, &outcome.open_cells) ||
+             Decode(published, &outcome.tear) || Decode(published, &outcome.patch));
     }
   }
   Keep(outcome.tools, &tools_);
   Keep(outcome.model, &models_);
   Keep(outcome.cautery, &cautery_);
   if (outcome.topology && Has(NodeId::kPhysics)) topology_.push_back(*outcome.topology);
+  if (outcome.open_cells && Has(NodeId::kPhysics)) open_cells_.push_back(*outcome.open_cells);
   if (outcome.tear && Has(NodeId::kThermal)) tears_.push_back(*outcome.tear);
   return outcome;
 }

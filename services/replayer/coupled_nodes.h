@@ -22,6 +22,7 @@ struct Outcome {
   std::optional<CauteryContact> cautery;
   std::optional<TearState> tear;
   std::optional<TopologyState> topology;
+  std::optional<OpenCells> open_cells;
   std::optional<TemperaturePatch> patch;
   std::vector<ThermalEvent> events;
 };
@@ -45,6 +46,7 @@ class CoupledNodes {
   std::map<std::int64_t, ContactModel> models_;
   std::map<std::int64_t, CauteryContact> cautery_;
   std::deque<TopologyState> topology_;  ///< Not yet taken.
+  std::deque<OpenCells> open_cells_;    ///< The same.
   std::deque<TearState> tears_;         ///< The same.
 };
 

@@ -21,6 +21,7 @@ struct RecordedTick {
   std::vector<ToolState> tools;
   std::vector<HandleState> handles;
   std::vector<TopologyState> topology;
+  std::vector<OpenCells> open_cells;
   std::vector<CauteryContact> cautery;
   std::vector<TearState> tears;
   std::vector<ContactModel> model;

@@ -108,9 +108,10 @@ class ReplayedPhysics final : public ReplayedNode {
     tools_ = {};
     handles_ = {};
     topology_ = {};
+    open_cells_ = {};
     node_.emplace(scene_,
-                  physics::PhysicsNode::Ports{*tools_.in, *handles_.in, *topology_.in, *frames_, *contacts_.out,
-                                              *cautery_.out, *tears_.out, *manifests_.out},
+                  physics::PhysicsNode::Ports{*tools_.in, *handles_.in, *topology_.in, *open_cells_.in, *frames_,
+                                              *contacts_.out, *cautery_.out, *tears_.out, *manifests_.out},
                   checkpoint_.file(), epoch_ns, threads_);
   }
 
@@ -122,6 +123,7 @@ class ReplayedPhysics final : public ReplayedNode {
     tools_.Give(tick.tools);
     handles_.Give(tick.handles);
     topology_.Give(tick.topology);
+    open_cells_.Give(tick.open_cells);
     node_->LetThreadsHelp(help_);
     node_->Step(tick.tick);
     (void)manifests_.in->TakeLatest(&manifests_.sample);
@@ -135,6 +137,7 @@ class ReplayedPhysics final : public ReplayedNode {
   Inlet<ToolState> tools_;
   Inlet<HandleState> handles_;
   Inlet<TopologyState> topology_;
+  Inlet<OpenCells> open_cells_;
   bus::InProcessTopic<TissueFrame> frame_topic_;
   std::unique_ptr<bus::LoanOutput<TissueFrame>> frames_ = frame_topic_.MakeOutput();
   Tick tick_;
@@ -158,6 +161,7 @@ class ReplayedThermal final : public ReplayedNode {
   std::vector<Published> TakeOutputs() override {
     std::vector<Published> published;
     topology_.TakeInto(&published);
+    open_cells_.TakeInto(&published);
     patches_.TakeInto(&published);
     events_.TakeInto(&published);
     return published;
@@ -171,13 +175,14 @@ class ReplayedThermal final : public ReplayedNode {
     contacts_ = {};
     tears_ = {};
     node_.emplace(scene_,
-                  thermal::ThermalNode::Ports{*contacts_.in, *tears_.in, *topology_.out, *patches_.out, *events_.out,
-                                              *manifests_.out},
+                  thermal::ThermalNode::Ports{*contacts_.in, *tears_.in, *topology_.out, *open_cells_.out,
+                                              *patches_.out, *events_.out, *manifests_.out},
                   checkpoint_.file(), epoch_ns);
   }
 
   std::uint64_t Advance(const RecordedTick& tick) override {
     topology_.Drop();
+    open_cells_.Drop();
     patches_.Drop();
     events_.Drop();
     contacts_.Give(tick.cautery);
@@ -192,6 +197,7 @@ class ReplayedThermal final : public ReplayedNode {
   Inlet<CauteryContact> contacts_;
   Inlet<TearState> tears_;
   Outlet<TopologyState> topology_;
+  Outlet<OpenCells> open_cells_;
   Outlet<TemperaturePatch> patches_;
   Outlet<ThermalEvent> events_;
   Outlet<TickManifest> manifests_;

@@ -73,6 +73,9 @@ bool TickSource::Next(RecordedTick* tick) {
       case TopicId::kTopologyState:
         Fetch(*tick, consumed, topology_, &tick->topology, &tick->missing);
         break;
+      case TopicId::kOpenCells:
+        Fetch(*tick, consumed, open_cells_, &tick->open_cells, &tick->missing);
+        break;
       case TopicId::kTearState:
         Fetch(*tick, consumed, tears_, &tick->tears, &tick->missing);
         break;
@@ -148,6 +151,9 @@ void TickSource::Take(const recording::McapMessage& message) {
       break;
     case TopicId::kTopologyState:
       if (TopologyState topology; wanted(NodeId::kPhysics) && Decode(message, &topology)) topology_.Put(topology);
+      break;
+    case TopicId::kOpenCells:
+      if (OpenCells cells; wanted(NodeId::kPhysics) && Decode(message, &cells)) open_cells_.Put(cells);
       break;
     case TopicId::kTearState:
       if (TearState tear; wanted(NodeId::kThermal) && Decode(message, &tear)) tears_.Put(tear);

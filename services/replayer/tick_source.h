@@ -103,6 +103,7 @@ class TickSource {
   SampleShelf<ToolState> tools_{4096};
   SampleShelf<HandleState> handles_{4096};
   SampleShelf<TopologyState> topology_{128};
+  SampleShelf<OpenCells> open_cells_{512};
   SampleShelf<TearState> tears_{128};
   SampleShelf<CauteryContact> cautery_{1024};
   SampleShelf<ContactModel> models_{1024};

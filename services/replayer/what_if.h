@@ -39,12 +39,12 @@ struct WhatIfResult {
 
 /// Replays the nodes twice, side by side: with `before` and with `after`. Nodes that are replayed together feed each
 /// other; the rest of their inputs are the recorded ones. A sample of another replayed node stands in for the recorded
-/// one of the same moment; TopologyState and TearState, which have moments of their own, come kCouplingDelay_s after it
-/// was sent. Throws as ReplayInLockStep.
+/// one of the same moment; TopologyState, OpenCells and TearState, which have moments of their own, come
+/// kCouplingDelay_s after it was sent. Throws as ReplayInLockStep.
 WhatIfResult ReplayWhatIf(const LockStepSettings& settings, const SceneView& before, const SceneView& after,
                           const config::CartConfig& cart, const std::function<void(double)>& progress);
 
-/// From a topology that thermal sends to the tick of physics that finds it [s].
+/// From what thermal sends of its topology to the tick of physics that finds it [s].
 inline constexpr double kCouplingDelay_s = 0.002;
 
 }  // namespace fulcrum::replay

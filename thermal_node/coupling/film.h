@@ -41,7 +41,7 @@ inline constexpr float kHookContact_W_m2K = 2.0e4f, kHookFilm_W_m2K = 500.0f;
 /// State of the interface of one electrode.
 struct Interface {
   float film = 0;        ///< Part of the footprint that the film lifts off, 0 ... 1.
-  float burning = 1;     ///< Part of the film in which discharges burn: as many as keep the voltage at kStrike_V.
+  float burning = 1;     ///< Part of the film in which discharges burn: as many as keep kStrike_V across it.
   float hook_theta = 0;  ///< Temperature of the metal above body temperature [K].
 
   /// @param boiling part of the footprint that boils. @param sustains the waveform sustains discharges.
@@ -50,9 +50,9 @@ struct Interface {
     film += (target - film) * (1.0f - std::exp(-dt_s / (target > film ? kFilmGrows_s : kFilmCollapses_s)));
     if (film < 0.05f) burning = 1.0f;
   }
-  /// After a solve, with the voltage that the generator regulates to while the current is on.
-  void Regulate(float on_V) {
-    const float ratio = on_V / kStrike_V;
+  /// After a solve. @param across_V across the film while the current is on.
+  void Regulate(float across_V) {
+    const float ratio = across_V / kStrike_V;
     burning = std::clamp(burning * std::clamp(ratio * ratio, 0.5f, 2.0f), 0.02f, 1.0f);
   }
   /// What the solver itself can have left.

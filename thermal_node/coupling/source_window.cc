@@ -229,6 +229,16 @@ void SourceWindow::ExchangeWithHook(float dt_s, Ledger* ledger) {
   interface_.hook_theta -= static_cast<float>(given) / kHookHeatCapacity_J_K;
 }
 
+/// Part of the electrode voltage across the film: root of the mean square, by conductance.
+float SourceWindow::FilmDrop() const {
+  double conductance = 0;
+  for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
+    for (int i = gap_low_.ix; i <= gap_high_.ix; ++i)
+      conductance += static_cast<double>(problem_.lost[j * kWindow + i]);
+  }
+  return conductance > 0.0 ? static_cast<float>(std::sqrt(static_cast<double>(solved_.lost_S) / conductance)) : 1.0f;
+}
+
 /// The heat of a film does not change with the tissue beneath it.
 void SourceWindow::LeaveOutFilm() {
   for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
@@ -412,7 +422,7 @@ float SourceWindow::SolveStep(const Drive& drive, float longest) {
   stats_.iterations += solved_.iterations;
   ++stats_.solves;
   if (drive.discharges && interface_.film > 0.0f && stats_.voltage_V > 0.0f) {
-    interface_.Regulate(stats_.voltage_V / std::sqrt(drive.duty));
+    interface_.Regulate(FilmDrop() * stats_.voltage_V / std::sqrt(drive.duty));
   }
   dissipated_ = potential_.heat();
   if (interface_.film > 0.0f) LeaveOutFilm();

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 
+#include "services/core/footprint.h"
 #include "thermal_node/coupling/electrode.h"
 #include "thermal_node/coupling/film.h"
 #include "thermal_node/coupling/generator.h"
@@ -19,26 +20,23 @@ namespace fulcrum::thermal {
 inline constexpr float kMaxWay = 0.26f;  ///< Of the tip in a coupling step [cells]: 5 mm/s in half a frame.
 /// Coupling steps of a run for the tip's way at most: half a radius each at 50 mm/s, and no more at a jump.
 inline constexpr float kMostByWay = 4.0f;
-/// From the middle of the metal to its end [cells]: what is longer is shortened, and counted. The other six cells to
-/// the window's border are for the tip's way and the sparks.
+/// From the window's middle to the end of the metal [cells]: what lies beyond is left out, and counted. The other six
+/// cells to the window's border are for the tip's way and the sparks.
 inline constexpr float kMetalReach = 26.0f;
 inline constexpr float kFarGap = 1e6f;  ///< No metal near [cells].
 /// Corner of a window that has not been used yet: far from any sheet, yet no overflow in differences.
 inline constexpr CellIndex kNowhere{-(1 << 24), -(1 << 24)};
 inline constexpr float kTentRadius_m = 0.015f;  ///< A tented sheet returns its current to the tissue from here on.
 
-/// The bare metal's axis as the sheet sees it; see MetalPoint.
-struct Metal {
-  std::uint32_t count = 0;  ///< 0: a capsule around the contact's centre instead; see TipPath.
-  std::array<MetalPoint, kMaxMetalPoints> points;
-};
-
-/// What the metal does over a span of time, in material space.
+/// What the metal does over a span of time, in material space: it goes from one footprint to the next. Without
+/// footprints it is a capsule about the contact's centre, its axis in the sheet.
 struct TipPath {
   Vec2f from = Vec2f::Zero(), to = Vec2f::Zero();  ///< Of the contact's centre [m].
-  Metal begin, end;                                ///< Points of the same index are the same points of the metal.
-  Vec2f half = Vec2f::Zero();  ///< Without points: from the centre to either end of an axis that lies in the sheet [m].
-  float radius_m = 0;          ///< Of the metal around its axis.
+  Footprint begin, end;
+  float part_from = 0, part_to = 1;  ///< The part of the way from `begin` to `end` that this path is.
+  Vec2f way = Vec2f::Zero();         ///< Of the centre from `begin` to `end`, over all parts [m].
+  Vec2f half = Vec2f::Zero();        ///< Of the capsule: from the centre to either end of its axis [m].
+  float radius_m = 0;                ///< Of the metal around its axis.
   bool tented = false;
 };
 
@@ -105,13 +103,16 @@ class SourceWindow {
   void SetGround(const Vec2f& middle, bool tented);
   /// Gap of each cell from the metal at part `at` of the path.
   void SetGaps(const TipPath& path, float at, float reach_m);
-  void AddPiece(const MetalPiece& piece, float radius, float reach);
+  void AddCapsule(const TipPath& path, float at, float reach);
+  void AddFootprint(const TipPath& path, float at, float reach);
+  void AddGap(int i, int j, float gap);
   void SetContact(const Drive& drive);
   /// Part of the footprint that boils.
   [[nodiscard]] float Boiling() const;
   /// Heat between metal and what it touches, for a time.
   void ExchangeWithHook(float dt_s, Ledger* ledger);
   void SetSigma();
+  [[nodiscard]] float FilmDrop() const;
   void LeaveOutFilm();
   /// How far the potential goes wrong while the tissue takes `v2_s` [V^2 s] with the heat of the last solve. A round
   /// inclusion whose conductivity goes from s to s' changes a field about it, in the energy norm, by sqrt(2) b of what

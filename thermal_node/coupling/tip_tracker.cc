@@ -2,20 +2,30 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <utility>
 
 namespace fulcrum::thermal {
+namespace {
+
+/// Cells beyond this are of no sheet.
+constexpr std::int32_t kLastCell = 1 << 24;
+
+bool IsWhole(const Footprint& print) {
+  if (print.width == 0) return print.gap.empty();
+  return print.width <= kFootprintCells && print.height() > 0 && print.height() <= kFootprintCells &&
+         print.gap.size() % print.width == 0 && std::abs(print.x) < kLastCell && std::abs(print.y) < kLastCell;
+}
+
+}  // namespace
 
 bool TipTracker::Accepts(const CauteryContact& sample) const {
   if (!std::isfinite(sample.session_time_s)) return false;
   if (!sample.touching) return true;
   const bool numbers = sample.material.allFinite() && std::isfinite(sample.power_W) && sample.power_W >= 0 &&
                        sample.power_W <= kPowerMax_W && std::isfinite(sample.contact_radius_m) &&
-                       sample.contact_radius_m >= 0 && sample.mode <= CauteryMode::kBlend &&
-                       sample.metal_count <= kMaxMetalPoints;
-  return numbers && sheet_.OnSheet(sample.material) &&
-         std::all_of(sample.metal.begin(), sample.metal.end(), [](const MetalPoint& point) {
-           return point.material.allFinite() && std::isfinite(point.height_m);
-         });
+                       sample.contact_radius_m >= 0 && sample.mode <= CauteryMode::kBlend;
+  return numbers && sheet_.OnSheet(sample.material) && IsWhole(sample.footprint);
 }
 
 TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
@@ -33,18 +43,12 @@ TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
   }
   const float reach = kTipSpeedMax_m_s * std::max(input.duration_s, 0.01f);
   input.path.to = sample.material;
-  input.path.end.count = sample.metal_count;
-  input.path.end.points = sample.metal;
-  bool jumped = !on_path_ || metal_.count != sample.metal_count;
-  if (sample.metal_count == 0) {
-    jumped = jumped || (sample.material - at_).norm() > reach;
-  } else {
-    for (std::uint32_t n = 0; n < sample.metal_count && !jumped; ++n) {
-      jumped = (sample.metal[n].material - metal_.points[n].material).norm() > reach;
-    }
-  }
+  input.path.end = sample.footprint;
+  const bool jumped =
+      !on_path_ || (sample.footprint.width > 0) != (print_.width > 0) || (sample.material - at_).norm() > reach;
   input.path.from = jumped ? sample.material : at_;
-  input.path.begin = jumped ? input.path.end : metal_;
+  input.path.begin = jumped ? sample.footprint : print_;
+  input.path.way = input.path.to - input.path.from;
   const float radius = sample.contact_radius_m > 0 ? sample.contact_radius_m : default_radius_m_;
   input.path.radius_m = std::clamp(radius, kContactRadiusMin_m, kContactRadiusMax_m);
   input.path.tented = sample.tented;
@@ -53,7 +57,7 @@ TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
   input.touching = true;
   input.active = input.power_W > 0;
   at_ = input.path.to;
-  metal_ = input.path.end;
+  print_ = sample.footprint;
   on_path_ = true;
   energised_ = input.active;
   return input;
@@ -63,30 +67,26 @@ TipTracker::State TipTracker::Save() const {
   State state;
   state.last_s = last_s_;
   state.at = {at_.x(), at_.y()};
-  state.metal_count = metal_.count;
-  for (std::uint32_t n = 0; n < metal_.count; ++n) {
-    const MetalPoint& point = metal_.points[n];
-    state.metal[n] = {point.material.x(), point.material.y(), point.height_m};
-  }
+  state.x = print_.x;
+  state.y = print_.y;
+  state.width = print_.width;
+  state.height = print_.height();
+  std::copy(print_.gap.begin(), print_.gap.end(), state.gap.begin());
   state.on_path = on_path_ ? 1 : 0;
   state.energised = energised_ ? 1 : 0;
   return state;
 }
 
 bool TipTracker::Restore(const State& state) {
-  const auto finite = [](const auto& values) {
-    return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
-  };
-  const bool plausible = std::isfinite(state.last_s) && finite(state.at) && state.metal_count <= kMaxMetalPoints &&
-                         std::all_of(state.metal.begin(), state.metal.end(), finite) && state.on_path <= 1 &&
-                         state.energised <= 1;
+  Footprint print{state.x, state.y, state.width, {}};
+  const bool fits = state.width <= kFootprintCells && state.height <= kFootprintCells;
+  if (fits) print.gap.assign(state.gap.begin(), state.gap.begin() + state.width * state.height);
+  const bool plausible = std::isfinite(state.last_s) && std::isfinite(state.at[0]) && std::isfinite(state.at[1]) &&
+                         fits && IsWhole(print) && state.on_path <= 1 && state.energised <= 1;
   if (!plausible) return false;
   last_s_ = state.last_s;
   at_ = {state.at[0], state.at[1]};
-  metal_.count = state.metal_count;
-  for (std::uint32_t n = 0; n < metal_.count; ++n) {
-    metal_.points[n] = {{state.metal[n][0], state.metal[n][1]}, state.metal[n][2]};
-  }
+  print_ = std::move(print);
   on_path_ = state.on_path != 0;
   energised_ = state.energised != 0;
   return true;

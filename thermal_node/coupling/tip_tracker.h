@@ -6,8 +6,8 @@
 
 namespace fulcrum::thermal {
 
-/// Between two energised samples the electrode went straight and had its current, however late the second one comes: a
-/// process that was away must not leave a bridge in the slit. After a longer gap a new path begins.
+/// Between two energised samples the electrode went straight and had its current, however late the second one comes.
+/// After a longer gap a new path begins.
 inline constexpr double kLongestGap_s = 1.0;
 inline constexpr float kTipSpeedMax_m_s = 0.3f;  ///< Farther between two samples is a jump, not a cut.
 inline constexpr float kContactRadiusMin_m = 1e-4f, kContactRadiusMax_m = 2e-3f;
@@ -22,7 +22,7 @@ struct TipInput {
   float power_W = 0;
   float duration_s = 0;  ///< 0: as long as the frame.
 };
-/// Samples of one frame at most; of more, the oldest are left out.
+/// Samples of one frame at most; more wait for the next one.
 inline constexpr std::size_t kMostSamples = 8;
 
 class TipTracker {
@@ -43,10 +43,11 @@ class TipTracker {
   struct State {
     double last_s = -1;
     std::array<float, 2> at{};
-    std::array<std::array<float, 3>, kMaxMetalPoints> metal{};  ///< (s, t), height [m].
-    std::uint32_t metal_count = 0;
+    std::int32_t x = 0, y = 0;
+    std::uint32_t width = 0, height = 0;
+    std::array<std::uint8_t, std::size_t{kFootprintCells} * kFootprintCells> gap{};
     std::uint8_t on_path = 0, energised = 0;
-    std::array<std::uint8_t, 2> unused{};
+    std::array<std::uint8_t, 6> unused{};
   };
   [[nodiscard]] State Save() const;
   /// False, and nothing is changed, when no tracker can have been in this state.
@@ -56,7 +57,7 @@ class TipTracker {
   const Sheet& sheet_;
   float default_radius_m_;
   double last_s_ = -1;  ///< Session time of the last sample; negative: none.
-  Metal metal_;
+  Footprint print_;
   bool on_path_ = false;
   bool energised_ = false;  ///< The last sample had current.
   Vec2f at_ = Vec2f::Zero();

@@ -17,6 +17,7 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
       tracker_(solver_.field().sheet(), scene_.thermal.hook_radius_m),
       planner_(solver_.field(), scene_.membrane.texel_m),
       topology_stamper_(epoch_ns),
+      open_stamper_(epoch_ns),
       patch_stamper_(epoch_ns),
       event_stamper_(epoch_ns),
       manifest_stamper_(epoch_ns) {
@@ -43,6 +44,7 @@ void ThermalNode::Step(const Tick& tick) {
   PublishManifest(tick);
   SaveCheckpoint();
   PublishTopology(tick);
+  PublishOpenCells(tick);
   PublishEvents(tick);
   PublishPatch(tick);
   if (solver_.stepped()) NoteHealth();
@@ -53,14 +55,12 @@ std::span<const TipInput> ThermalNode::TakeContacts(double dt_s) {
   contacts_.clear();
   manifest_.consumed.clear();
   CauteryContact next;
-  while (ports_.contact.TakeNext(&next)) {
+  while (contacts_.size() < kMostSamples && ports_.contact.TakeNext(&next)) {
     if (!tracker_.Accepts(next)) {
       ++refused_;
       continue;
     }
     if (tracker_.Repeats(next)) continue;
-    // A replay sees no more of them than the manifest names.
-    if (contacts_.size() == kMostSamples) contacts_.erase(contacts_.begin());
     contacts_.push_back(next);
   }
   for (const CauteryContact& contact : contacts_) {
@@ -125,6 +125,15 @@ void ThermalNode::PublishTopology(const Tick& tick) {
   topology_.shrink = mesh.committed().shrink;
   // Tried again next tick when it could not be sent.
   topology_due_ = !ports_.topology.Write(topology_);
+}
+
+void ThermalNode::PublishOpenCells(const Tick& tick) {
+  if (contacts_.empty() || !contacts_.back().touching || !ports_.open_cells.has_readers()) return;
+  FillOpenCells(solver_.field(), contacts_.back().material, &open_now_);
+  if (open_now_.x == open_cells_.x && open_now_.y == open_cells_.y && open_now_.rows == open_cells_.rows) return;
+  open_now_.scene_hash = scene_.hash;
+  open_now_.stamp = open_stamper_.Next(tick.stamp_ns);
+  if (ports_.open_cells.Write(open_now_)) open_cells_ = open_now_;
 }
 
 void ThermalNode::PublishEvents(const Tick& tick) {

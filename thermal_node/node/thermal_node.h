@@ -11,6 +11,7 @@
 #include "services/core/tick.h"
 #include "services/runtime/checkpoint.h"
 #include "services/runtime/seqlock.h"
+#include "thermal_node/coupling/open_window.h"
 #include "thermal_node/coupling/patch.h"
 #include "thermal_node/coupling/thermal_solver.h"
 #include "thermal_node/coupling/tip_tracker.h"
@@ -25,7 +26,7 @@ inline constexpr std::uint64_t kTicksPerHistoryPatch = 100;
 /// A checkpoint at each new revision, and this often while the tissue is warm [frames of the solver].
 inline constexpr std::uint64_t kFramesPerCheckpoint = 10;
 /// Changes with the layout of the checkpoint.
-inline constexpr std::uint32_t kCheckpointLayout = 5;
+inline constexpr std::uint32_t kCheckpointLayout = 6;
 
 class ThermalNode {
  public:
@@ -33,6 +34,7 @@ class ThermalNode {
     bus::Input<CauteryContact>& contact;
     bus::Input<TearState>& tears;
     bus::Output<TopologyState>& topology;
+    bus::Output<OpenCells>& open_cells;
     bus::LoanOutput<TemperaturePatch>& patch;
     bus::Output<ThermalEvent>& event;
     bus::Output<TickManifest>& manifest;
@@ -63,6 +65,8 @@ class ThermalNode {
   void SaveCheckpoint();
   [[nodiscard]] bool Restore(std::span<const std::byte> checkpoint);
   void PublishTopology(const Tick& tick);
+  /// While the hook touches: what has changed around it.
+  void PublishOpenCells(const Tick& tick);
   void PublishEvents(const Tick& tick);
   void PublishPatch(const Tick& tick);
   void PublishManifest(const Tick& tick);
@@ -82,11 +86,12 @@ class ThermalNode {
   ThermalSolver solver_;
   TipTracker tracker_;
   PatchPlanner planner_;
-  bus::Stamper topology_stamper_, patch_stamper_, event_stamper_, manifest_stamper_;
+  bus::Stamper topology_stamper_, open_stamper_, patch_stamper_, event_stamper_, manifest_stamper_;
 
   std::vector<CauteryContact> contacts_;
   std::vector<TipInput> tips_;
   TopologyState topology_;
+  OpenCells open_cells_, open_now_;  ///< As published, and as they are.
   TearState tears_;
   TickManifest manifest_;
   std::uint64_t ticks_ = 0, refused_ = 0, frames_since_checkpoint_ = 0;

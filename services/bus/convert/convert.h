@@ -25,6 +25,7 @@ namespace fulcrum::bus {
 [[nodiscard]] bool ToWire(const CauteryContact& from, idl::CauteryContact* to);
 [[nodiscard]] bool ToWire(const TopologyState& from, idl::TopologyState* to);
 [[nodiscard]] bool ToWire(const TearState& from, idl::TearState* to);
+[[nodiscard]] bool ToWire(const OpenCells& from, idl::OpenCells* to);
 [[nodiscard]] bool ToWire(const ThermalEvent& from, idl::ThermalEvent* to);
 [[nodiscard]] bool ToWire(const SceneManifest& from, idl::SceneManifest* to);
 [[nodiscard]] bool ToWire(const Command& from, idl::Command* to);
@@ -39,6 +40,7 @@ void FromWire(const idl::ContactModel& from, ContactModel* to);
 void FromWire(const idl::CauteryContact& from, CauteryContact* to);
 void FromWire(const idl::TopologyState& from, TopologyState* to);
 void FromWire(const idl::TearState& from, TearState* to);
+void FromWire(const idl::OpenCells& from, OpenCells* to);
 void FromWire(const idl::ThermalEvent& from, ThermalEvent* to);
 void FromWire(const idl::SceneManifest& from, SceneManifest* to);
 void FromWire(const idl::Command& from, Command* to);

@@ -12,6 +12,7 @@ static_assert(idl::PEDAL_CUT == kPedalCut && idl::PEDAL_COAG == kPedalCoag && id
 static_assert(idl::TOOL_SCISSORS == static_cast<int>(ToolKind::kScissors));
 static_assert(idl::SERVO_RISE == static_cast<int>(ServoState::kRise));
 static_assert(idl::CONTACT_GRASP == static_cast<int>(ContactKind::kGrasp));
+static_assert(idl::MAX_FOOTPRINT == kFootprintCells * kFootprintCells);
 static_assert(idl::CAUTERY_BLEND == static_cast<int>(CauteryMode::kBlend));
 
 bool ToWire(const HandleState& from, idl::HandleState* to) {
@@ -158,6 +159,7 @@ void FromWire(const idl::ContactModel& from, ContactModel* to) {
 }
 
 bool ToWire(const CauteryContact& from, idl::CauteryContact* to) {
+  if (from.footprint.gap.size() > idl::MAX_FOOTPRINT) return false;
   to->stamp(cv::ToWire(from.stamp));
   to->session_time_s(from.session_time_s);
   to->topology_revision(from.topology_revision);
@@ -170,11 +172,10 @@ bool ToWire(const CauteryContact& from, idl::CauteryContact* to) {
   to->material(cv::ToWire(from.material));
   to->material_rate(cv::ToWire(from.material_rate));
   to->contact_radius_m(from.contact_radius_m);
-  to->metal_count(from.metal_count);
-  for (std::size_t i = 0; i < from.metal.size(); ++i) {
-    to->metal()[i].material(cv::ToWire(from.metal[i].material));
-    to->metal()[i].height_m(from.metal[i].height_m);
-  }
+  to->footprint().x(from.footprint.x);
+  to->footprint().y(from.footprint.y);
+  to->footprint().width(from.footprint.width);
+  to->footprint().gap(from.footprint.gap);
   to->power_W(from.power_W);
   return true;
 }
@@ -192,10 +193,10 @@ void FromWire(const idl::CauteryContact& from, CauteryContact* to) {
   to->material = cv::FromWire(from.material());
   to->material_rate = cv::FromWire(from.material_rate());
   to->contact_radius_m = from.contact_radius_m();
-  to->metal_count = from.metal_count();
-  for (std::size_t i = 0; i < to->metal.size(); ++i) {
-    to->metal[i] = {cv::FromWire(from.metal()[i].material()), from.metal()[i].height_m()};
-  }
+  to->footprint.x = from.footprint().x();
+  to->footprint.y = from.footprint().y();
+  to->footprint.width = from.footprint().width();
+  to->footprint.gap = from.footprint().gap();
   to->power_W = from.power_W();
 }
 

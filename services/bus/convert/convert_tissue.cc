@@ -1,4 +1,4 @@
-// TissueFrame and TemperaturePatch in their loans, TopologyState, TearState, ThermalEvent.
+// TissueFrame and TemperaturePatch in their loans, TopologyState, TearState, OpenCells, ThermalEvent.
 #include <algorithm>
 #include <cstring>
 
@@ -183,6 +183,23 @@ void FromWire(const idl::TearState& from, TearState* to) {
   to->rows = from.rows();
   to->cols = from.cols();
   to->torn_edges = from.torn_edges();
+}
+
+bool ToWire(const OpenCells& from, idl::OpenCells* to) {
+  to->stamp(cv::ToWire(from.stamp));
+  to->scene_hash(from.scene_hash);
+  to->x(from.x);
+  to->y(from.y);
+  to->rows(from.rows);
+  return true;
+}
+
+void FromWire(const idl::OpenCells& from, OpenCells* to) {
+  to->stamp = cv::FromWire(from.stamp());
+  to->scene_hash = from.scene_hash();
+  to->x = from.x();
+  to->y = from.y();
+  to->rows = from.rows();
 }
 
 bool ToWire(const ThermalEvent& from, idl::ThermalEvent* to) {

@@ -46,6 +46,10 @@ struct TypeSupportOf<TearState> {
   using type = idl::TearStatePubSubType;
 };
 template <>
+struct TypeSupportOf<OpenCells> {
+  using type = idl::OpenCellsPubSubType;
+};
+template <>
 struct TypeSupportOf<TemperaturePatch> {
   using type = idl::TemperaturePatchPubSubType;
 };

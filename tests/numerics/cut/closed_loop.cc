@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "thermal_node/coupling/open_window.h"
+
 namespace fulcrum::cut {
 
 ClosedLoop::ClosedLoop(const SceneView& scene)
@@ -10,7 +12,7 @@ ClosedLoop::ClosedLoop(const SceneView& scene)
       physics_(scene_),
       thermal_(scene_),
       tracker_(thermal_.field().sheet(), scene_.thermal.hook_radius_m) {
-  topology_.scene_hash = scene_.hash;
+  topology_.scene_hash = open_cells_.scene_hash = scene_.hash;
   topology_.rows = scene_.membrane.rows;
   topology_.cols = scene_.membrane.cols;
 }
@@ -32,6 +34,10 @@ const LoopStep& ClosedLoop::Step(const Moment& moment) {
     topology_.dead_edges = mesh.committed().dead_edges;
     topology_.shrink = mesh.committed().shrink;
     physics_.ApplyTopology(topology_);
+  }
+  if (step_.contact.touching) {
+    thermal::FillOpenCells(thermal_.field(), step_.contact.material, &open_cells_);
+    physics_.SetOpenCells(open_cells_);
   }
   step_.length_m = thermal_.cut_length_m();
   step_.power_W = thermal_.figures().power_W;

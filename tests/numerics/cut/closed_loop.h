@@ -46,6 +46,7 @@ class ClosedLoop {
   thermal::ThermalSolver thermal_;
   thermal::TipTracker tracker_;
   TopologyState topology_;
+  OpenCells open_cells_;
   LoopStep step_;
   std::uint64_t steps_ = 0;
 };

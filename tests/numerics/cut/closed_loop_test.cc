@@ -28,6 +28,7 @@ const Vec3f kTrocar(0.094f, 0, 0.034f);
 /// Of the heel over the sheet: of the foot's 5 mm some 2 reach through it [m].
 constexpr float kHeel_m = 0.003f;
 constexpr float kSpeed_m_s = 0.004f;
+constexpr double kSmallestPiece_m2 = 4e-6;  ///< What a circle cuts out stays.
 /// The hook comes down from kAbove_m until kDown_s, cuts from kBegin_s on, is lifted kRest_s after the end.
 constexpr float kAbove_m = 0.012f, kLift_m_s = 0.02f;
 constexpr double kDown_s = 0.8, kBegin_s = 1.0, kRest_s = 0.2, kAfter_s = 0.8;
@@ -117,7 +118,7 @@ class Cut {
     const thermal::SurfaceMetric g = sheet().MetricAt(static_cast<float>(cell.ix), static_cast<float>(cell.iy));
     return std::sqrt(g.ss * chord.x() * chord.x() + 2 * g.st * chord.x() * chord.y() + g.tt * chord.y() * chord.y());
   }
-  /// Areas of the pieces of tissue within the hole [m^2].
+  /// Areas of the pieces of tissue within the hole that are too small to stay pieces [m^2].
   [[nodiscard]] std::vector<double> Islands() const {
     std::vector<std::uint8_t> seen(static_cast<std::size_t>(sheet().nx) * sheet().ny);
     const auto flood = [&](CellIndex from) {
@@ -143,7 +144,8 @@ class Cut {
     for (int iy = 0; iy < sheet().ny; ++iy) {
       for (int ix = 0; ix < sheet().nx; ++ix) {
         if (seen[Number({ix, iy})] != 0 || Open({ix, iy})) continue;
-        islands.push_back(static_cast<double>(sheet().cell_m * sheet().cell_m) * flood({ix, iy}));
+        const double area = static_cast<double>(sheet().cell_m * sheet().cell_m) * flood({ix, iy});
+        if (area < kSmallestPiece_m2) islands.push_back(area);
       }
     }
     return islands;
@@ -195,17 +197,20 @@ class Cut {
     ++energised_;
     if (step.contact.touching) way_.push_back(MetalPlace(step.contact));
   }
-  /// Where the metal goes through the sheet; where it does not, where it comes nearest.
+  /// Middle of the cells that the metal covers; of the nearest one where it covers none.
   static Vec2f MetalPlace(const CauteryContact& contact) {
-    const MetalPoint* nearest = &contact.metal[0];
-    for (std::uint32_t n = 1; n < contact.metal_count; ++n) {
-      const MetalPoint &a = contact.metal[n - 1], &b = contact.metal[n];
-      if ((a.height_m < 0) != (b.height_m < 0)) {
-        return a.material + a.height_m / (a.height_m - b.height_m) * (b.material - a.material);
-      }
-      if (std::abs(b.height_m) < std::abs(nearest->height_m)) nearest = &b;
+    const Footprint& print = contact.footprint;
+    const std::uint8_t covered = Footprint::Encode(0);
+    const std::uint8_t limit = std::max(covered, *std::min_element(print.gap.begin(), print.gap.end()));
+    Vec2f sum = Vec2f::Zero();
+    float count = 0;
+    for (std::uint32_t n = 0; n < print.gap.size(); ++n) {
+      if (print.gap[n] > limit) continue;
+      sum += Vec2f(static_cast<float>(print.x) + static_cast<float>(n % print.width) + 0.5f,
+                   static_cast<float>(print.y) + static_cast<float>(n / print.width) + 0.5f);
+      ++count;
     }
-    return nearest->material;
+    return 1e-4f * sum / count;
   }
 
   Stroke stroke_;

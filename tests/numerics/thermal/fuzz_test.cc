@@ -62,10 +62,11 @@ class Fuzz {
     if (OneIn(60)) contact.power_W = Absurd();
     if (OneIn(60)) contact.contact_radius_m = Absurd();
     // Its metal lies about it as it did about the burn's first place.
-    for (MetalPoint& point : contact.metal) point.material += at;
-    if (OneIn(60)) contact.metal_count = static_cast<std::uint32_t>(Below(2 * static_cast<int>(kMaxMetalPoints)));
-    if (OneIn(60)) contact.metal[Below(kMaxMetalPoints)].material.x() = Absurd();
-    if (OneIn(60)) contact.metal[Below(kMaxMetalPoints)].height_m = Absurd();
+    contact.footprint.x += static_cast<std::int32_t>(1e4f * at.x());
+    contact.footprint.y += static_cast<std::int32_t>(1e4f * at.y());
+    if (OneIn(60)) contact.footprint.width = static_cast<std::uint32_t>(Below(2 * static_cast<int>(kFootprintCells)));
+    if (OneIn(60)) contact.footprint.x = INT32_MAX - Below(99);
+    if (OneIn(60)) contact.footprint.gap.resize(static_cast<std::size_t>(Below(8192)));
     if (OneIn(60)) contact.session_time_s = OneIn(2) ? NAN : static_cast<double>(Absurd());
     if (OneIn(60)) contact.mode = static_cast<CauteryMode>(Below(256));
     if (OneIn(60)) contact.material_rate = Vec2f::Constant(Absurd());
@@ -133,15 +134,20 @@ class Patient {
     }
   }
 
-  /// A piece of straight metal at any slant, some of it through the sheet, about (0, 0).
+  /// A piece of straight metal at any slant, some of it through the sheet, about (0, 0); or gaps without any sense.
   static void SetMetal(Fuzz* fuzz, CauteryContact* burn) {
-    burn->metal_count = static_cast<std::uint32_t>(2 + fuzz->Below(kMaxMetalPoints - 1));
-    const Vec2f from(fuzz->Between(-1.5e-3f, 1.5e-3f), fuzz->Between(-1.5e-3f, 1.5e-3f));
-    const Vec2f step(fuzz->Between(-6e-4f, 6e-4f), fuzz->Between(-6e-4f, 6e-4f));
-    const float height = fuzz->Between(-2e-3f, 2e-3f), rise = fuzz->Between(-5e-4f, 5e-4f);
-    for (std::uint32_t n = 0; n < burn->metal_count; ++n) {
-      const auto k = static_cast<float>(n);
-      burn->metal[n] = {from + k * step, height + k * rise};
+    const int width = 1 + fuzz->Below(static_cast<int>(kFootprintCells)), height = 1 + fuzz->Below(width);
+    const Vec2f along = Vec2f(fuzz->Between(-1, 1), fuzz->Between(-1, 1)).normalized();
+    const float above_m = fuzz->Between(-2e-4f, 2e-4f);
+    const bool senseless = fuzz->OneIn(4);
+    burn->footprint = {-width / 2, -height / 2, static_cast<std::uint32_t>(width), {}};
+    for (int j = 0; j < height; ++j) {
+      for (int i = 0; i < width; ++i) {
+        const Vec2f off = 1e-4f * Vec2f(static_cast<float>(i - width / 2), static_cast<float>(j - height / 2));
+        const float across = std::abs(along.x() * off.y() - along.y() * off.x());
+        burn->footprint.gap.push_back(senseless ? static_cast<std::uint8_t>(fuzz->Below(256))
+                                                : Footprint::Encode(across - 5e-4f + above_m));
+      }
     }
   }
 

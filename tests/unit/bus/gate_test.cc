@@ -47,10 +47,10 @@ struct Floats {
   void operator()(CauteryContact& m) const {
     Each(m.session_time_s, m.barycentric[0], m.barycentric[1], m.barycentric[2], m.material, m.material_rate,
          m.contact_radius_m, m.power_W);
-    for (MetalPoint& point : m.metal) Each(point.material, point.height_m);
   }
   void operator()(TopologyState& m) const { Each(m.cut_length_m, m.cut_width_m, m.cut_off_way_m); }
   void operator()(TearState&) const {}
+  void operator()(OpenCells&) const {}
   void operator()(TemperaturePatch& m) const { (*this)(m.header.max_temperature_C); }
   void operator()(ThermalEvent& m) const { Each(m.session_time_s, m.material, m.temperature_C, m.value); }
   void operator()(SceneManifest&) const {}
@@ -67,9 +67,9 @@ struct Floats {
 
 template <class T>
 class Gate : public testing::Test {};
-using Types =
-    testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState, TearState,
-                   TemperaturePatch, ThermalEvent, SceneManifest, Command, CommandReply, TickManifest, Health>;
+using Types = testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState,
+                             TearState, OpenCells, TemperaturePatch, ThermalEvent, SceneManifest, Command, CommandReply,
+                             TickManifest, Health>;
 TYPED_TEST_SUITE(Gate, Types);
 
 TYPED_TEST(Gate, PassesAGoodMessage) { EXPECT_TRUE(PassesGate(test::Sample<TypeParam>())); }
@@ -174,8 +174,12 @@ TEST(GateRanges, CauteryContact) {
         [](auto& m) {
           m.barycentric = {0.1f, 0.1f, 0.1f};
         }},
-       {"more metal than there is room for", [](auto& m) { m.metal_count = kMaxMetalPoints + 1; }},
-       {"metal beyond the room", [](auto& m) { m.metal[2].height_m = -1e3f; }},
+       {"a footprint wider than there is room for", [](auto& m) { m.footprint.width = kFootprintCells + 1; }},
+       {"a footprint of another size than it says", [](auto& m) { m.footprint.gap.pop_back(); }},
+       {"a footprint higher than there is room for", [](auto& m) { m.footprint.width /= 2; }},
+       {"gaps without a footprint", [](auto& m) { m.footprint.width = 0; }},
+       {"a footprint without gaps", [](auto& m) { m.footprint.gap.clear(); }},
+       {"a footprint beyond all sheets", [](auto& m) { m.footprint.x = -200'000'000; }},
        {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }},
        {"negative power", [](auto& m) { m.power_W = -1; }},
        {"power beyond any generator", [](auto& m) { m.power_W = 1001; }}});
@@ -195,6 +199,11 @@ TEST(GateRanges, TearState) {
                             {"product overflows 32 bits", [](auto& m) { m.rows = m.cols = 0x10000; }},
                             {"edge bits too short", [](auto& m) { m.torn_edges.pop_back(); }},
                             {"edge bits too long", [](auto& m) { m.torn_edges.push_back(0); }}});
+}
+
+TEST(GateRanges, OpenCells) {
+  ExpectRefused<OpenCells>({{"beyond all sheets", [](auto& m) { m.x = 200'000'000; }},
+                            {"before all sheets", [](auto& m) { m.y = -200'000'000; }}});
 }
 
 TEST(GateRanges, TemperaturePatch) {

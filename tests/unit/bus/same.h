@@ -52,14 +52,14 @@ inline bool Same(const ContactModel& a, const ContactModel& b) {
          a.physics_dt_s == b.physics_dt_s && AllSame(a.devices, b.devices);
 }
 
-inline bool Same(const MetalPoint& a, const MetalPoint& b) {
-  return a.material == b.material && a.height_m == b.height_m;
+inline bool Same(const Footprint& a, const Footprint& b) {
+  return a.x == b.x && a.y == b.y && a.width == b.width && a.gap == b.gap;
 }
 inline bool Same(const CauteryContact& a, const CauteryContact& b) {
   return Same(a.stamp, b.stamp) && a.session_time_s == b.session_time_s && a.topology_revision == b.topology_revision &&
          a.touching == b.touching && a.tented == b.tented && a.mode == b.mode && a.tool == b.tool &&
          a.triangle == b.triangle && a.barycentric == b.barycentric && a.material == b.material &&
-         a.material_rate == b.material_rate && a.metal_count == b.metal_count && AllSame(a.metal, b.metal) &&
+         a.material_rate == b.material_rate && Same(a.footprint, b.footprint) &&
          a.contact_radius_m == b.contact_radius_m && a.power_W == b.power_W;
 }
 
@@ -73,6 +73,10 @@ inline bool Same(const TopologyState& a, const TopologyState& b) {
 inline bool Same(const TearState& a, const TearState& b) {
   return Same(a.stamp, b.stamp) && a.scene_hash == b.scene_hash && a.rows == b.rows && a.cols == b.cols &&
          a.torn_edges == b.torn_edges;
+}
+
+inline bool Same(const OpenCells& a, const OpenCells& b) {
+  return Same(a.stamp, b.stamp) && a.scene_hash == b.scene_hash && a.x == b.x && a.y == b.y && a.rows == b.rows;
 }
 
 inline bool Same(const TemperaturePatch& a, const TemperaturePatch& b) {

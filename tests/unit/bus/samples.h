@@ -93,10 +93,9 @@ inline CauteryContact Sample(std::uint64_t sequence) {
   m.material = {0.03f, 0.04f};
   m.material_rate = {-0.01f, 0.02f};
   m.contact_radius_m = 0.0005f;
-  m.metal_count = 3;
-  for (std::size_t i = 0; i < m.metal.size(); ++i) {
-    const float x = 1e-3f * static_cast<float>(i);
-    m.metal[i] = {Vec2f(0.03f + x, 0.04f - 0.5f * x), 2.0f * x};
+  m.footprint = {-300, 400, kFootprintCells, {}};
+  for (std::uint32_t i = 0; i < kFootprintCells * kFootprintCells; ++i) {
+    m.footprint.gap.push_back(static_cast<std::uint8_t>(i * 3));
   }
   m.power_W = 35;
   return m;
@@ -132,6 +131,17 @@ inline TearState Sample(std::uint64_t sequence) {
   m.cols = 256;
   for (std::size_t i = 0; i < std::size_t{3} * 96 * 256 / 8; ++i)
     m.torn_edges.push_back(static_cast<std::uint8_t>(i * 5));
+  return m;
+}
+
+template <>
+inline OpenCells Sample(std::uint64_t sequence) {
+  OpenCells m;
+  m.stamp = {sequence, 16, 6600};
+  m.scene_hash = 0xabcdef;
+  m.x = -8;
+  m.y = 1200;
+  for (std::size_t i = 0; i < m.rows.size(); ++i) m.rows[i] = 0x9e3779b97f4a7c15u * (i + 1);
   return m;
 }
 

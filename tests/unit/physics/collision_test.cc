@@ -146,64 +146,150 @@ TEST_F(OnSheet, HookDentsTheMembraneAndStaysInFront) {
   EXPECT_GT(Lowest(), -3e-4f);
 }
 
-TEST_F(OnSheet, CauteryTellsWhereTheMetalLiesOnTheSheet) {
+/// Cells of a footprint that the metal covers: their number, their middle and their extent, in cells.
+struct Covered {
+  double count = 0;
+  Vec2f middle = Vec2f::Zero(), extent = Vec2f::Zero();
+};
+Covered CoveredBy(const Footprint& print) {
+  Covered covered;
+  Vec2f low = Vec2f::Constant(1e9f), high = -low;
+  for (std::uint32_t n = 0; n < print.gap.size(); ++n) {
+    if (Footprint::Decode(print.gap[n]) > 0.0f) continue;
+    const Vec2f cell(static_cast<float>(print.x) + static_cast<float>(n % print.width) + 0.5f,
+                     static_cast<float>(print.y) + static_cast<float>(n / print.width) + 0.5f);
+    covered.count += 1;
+    covered.middle += cell;
+    low = low.cwiseMin(cell);
+    high = high.cwiseMax(cell);
+  }
+  if (covered.count > 0) {
+    covered.middle /= static_cast<float>(covered.count);
+    covered.extent = high - low + Vec2f::Ones();
+  }
+  return covered;
+}
+
+TEST_F(OnSheet, TheFootprintOfPressedMetalLiesAlongIt) {
   const Vec3f place = kMiddle - Vec3f(0, 0, 0.002f);
-  const float touch = scene_.tools[1].tip_radius_m + 0.5f * scene_.thermal.thickness_m;
-  /// From one end to the other of the metal that is near enough for a current.
-  const auto touched_at = [&](const Quatf& turn) {
+  const auto pressed = [&](const Quatf& turn) {
     TissueSimulation simulation(scene_);
     const ToolPose down = Down(place), pose{place, turn * down.q_WT, 0};
-    CauteryContact contact, before;
+    CauteryContact contact;
     for (int i = 0; i <= 150; ++i) {
       ToolPose now = pose;
       now.p_WT.z() += std::max(0.0f, 0.008f - 1e-4f * static_cast<float>(i));
       simulation.Step(Only(1, now));
       contact = simulation.Cautery(1);
-      EXPECT_EQ(contact.metal_count == 0, !contact.touching);
-      EXPECT_LE(contact.metal_count, kMaxMetalPoints);
-      for (std::uint32_t n = 0; n < contact.metal_count && n < before.metal_count; ++n) {
-        EXPECT_LE((contact.metal[n].material - before.metal[n].material).norm(), 7e-4f) << "step " << i << ", " << n;
-      }
-      before = contact;
+      EXPECT_TRUE(contact.touching || contact.footprint.width == 0);
     }
     EXPECT_TRUE(contact.touching);
     EXPECT_FLOAT_EQ(contact.contact_radius_m, scene_.tools[1].tip_radius_m);
-    Vec2f extent = Vec2f::Zero(), first = Vec2f::Zero();
-    bool any = false;
-    for (std::uint32_t n = 0; n < contact.metal_count; ++n) {
-      if (std::abs(contact.metal[n].height_m) > touch + 1e-4f) continue;
-      if (!std::exchange(any, true)) first = contact.metal[n].material;
-      const Vec2f span = contact.metal[n].material - first;
-      extent = span.norm() > extent.norm() ? span : extent;
-    }
-    EXPECT_TRUE(any);
-    return extent;
+    return CoveredBy(contact.footprint);
   };
   const auto turned = [](float angle, const Vec3f& axis) { return Quatf(Eigen::AngleAxisf(angle, axis)); };
-  const Vec2f lying = touched_at(Quatf::Identity());
-  EXPECT_GT(std::abs(lying.x()), 8e-4f);
-  EXPECT_LT(std::abs(lying.y()), 0.3f * std::abs(lying.x()));
-  const Vec2f across = touched_at(turned(static_cast<float>(M_PI / 2), Vec3f::UnitZ()));
-  EXPECT_GT(std::abs(across.y()), 8e-4f);
-  EXPECT_LT(std::abs(across.x()), 0.3f * std::abs(across.y()));
+  const Covered lying = pressed(Quatf::Identity());
+  EXPECT_GT(lying.extent.x(), 8);
+  EXPECT_LT(lying.extent.y(), 0.6f * lying.extent.x());
+  const Covered across = pressed(turned(static_cast<float>(M_PI / 2), Vec3f::UnitZ()));
+  EXPECT_GT(across.extent.y(), 8);
+  EXPECT_LT(across.extent.x(), 0.6f * across.extent.y());
   // The foot points up: its heel alone touches.
-  EXPECT_LT(touched_at(turned(static_cast<float>(-M_PI / 3), Vec3f::UnitY())).norm(), 0.5f * lying.norm());
+  EXPECT_LT(pressed(turned(static_cast<float>(-M_PI / 3), Vec3f::UnitY())).count, 0.5 * lying.count);
 }
 
-TEST_F(OnSheet, HeightsChangeTheirSignWhereTheMetalGoesThroughTheSheet) {
-  // The hook stands on its foot's end, which has been pushed through a slit; the sheet around it is whole again.
-  TissueSimulation simulation(scene_);
-  const Vec3f place = kMiddle + Vec3f(0, 0, 0.0025f);
-  ToolPose pose = Down(place);
-  pose.q_WT = Quatf(Eigen::AngleAxisf(static_cast<float>(M_PI / 2), Vec3f::UnitY())) * pose.q_WT;
-  simulation.Step(Only(1, pose));  // a tool is first where it is, on whichever side
-  const CauteryContact contact = simulation.Cautery(1);
-  ASSERT_TRUE(contact.touching);
-  int changes = 0;
-  for (std::uint32_t n = 1; n < contact.metal_count; ++n) {
-    changes += (contact.metal[n].height_m < 0) != (contact.metal[n - 1].height_m < 0) ? 1 : 0;
+/// Metal and a flat sheet that does not move.
+class Still {
+ public:
+  explicit Still(const SceneView& scene)
+      : scene_(scene),
+        particles_(scene),
+        model_(scene, &particles_),
+        collision_(scene, &model_, &particles_),
+        probe_(scene, &model_, &particles_) {}
+  /// The foot goes through the middle of the sheet, slanted to it, `along` further along x.
+  [[nodiscard]] CauteryContact Through(float slant_deg, float along = 0) {
+    const float slant = slant_deg * static_cast<float>(M_PI) / 180;
+    ToolPose pose = Down(kMiddle + Vec3f(along, 0, 0) + 0.0025f * Vec3f(-std::cos(slant), 0, std::sin(slant)));
+    pose.q_WT = Quatf(Eigen::AngleAxisf(slant, Vec3f::UnitY())) * pose.q_WT;
+    std::array<ToolCollision::ToolMotion, kMaxTools> motion;
+    motion[1] = {ShapeOf(scene_.tools[1], pose), ShapeOf(scene_.tools[1], pose)};
+    collision_.FindPairs(motion, true);
+    return probe_.Update(1, pose, collision_);
   }
-  EXPECT_EQ(changes, 1);
+  /// Places of the sheet that the foot of the last Through() would push.
+  [[nodiscard]] int Pushed() {
+    std::vector<ContactRow> rows;
+    collision_.Rows(0, 1, &rows);
+    return static_cast<int>(std::count_if(rows.begin(), rows.end(), [&](const ContactRow& row) {
+      Vec3f place = Vec3f::Zero();
+      for (std::size_t k = 0; k < static_cast<std::size_t>(row.count); ++k) {
+        place += row.weight[k] * particles_.At(row.at[k]);
+      }
+      return collision_.pairs()[row.source].capsule == kMaxCapsules && row.normal.dot(place) < row.offset;
+    }));
+  }
+  void SetOpenCells(const OpenCells& open) { collision_.SetOpenCells(open); }
+
+ private:
+  SceneView scene_;
+  ParticleStore particles_;
+  TissueModel model_;
+  ToolCollision collision_;
+  CauteryProbe probe_;
+};
+
+TEST_F(OnSheet, MetalThroughTheSheetCoversItsSection) {
+  // Upright a disc; at 30 degrees to the sheet an ellipse, twice as long. A gap along the normal counts less by half
+  // the sheet's thickness and a twentieth of a millimetre: so much farther the slanted one reaches along itself.
+  const double radius = static_cast<double>(scene_.tools[1].tip_radius_m / scene_.thermal.cell_m),
+               disc = M_PI * radius * radius;
+  Still still(scene_);
+  const Covered upright = CoveredBy(still.Through(90).footprint);
+  EXPECT_NEAR(upright.count, disc, 0.04 * disc);
+  EXPECT_NEAR(upright.extent.x(), 2 * radius, 1.01);
+  EXPECT_NEAR(upright.extent.y(), 2 * radius, 1.01);
+  EXPECT_LT((upright.middle * scene_.thermal.cell_m - Vec2f(kMiddle.x(), kMiddle.y())).norm(), scene_.thermal.cell_m);
+  const Covered slanted = CoveredBy(Still(scene_).Through(30).footprint);
+  const double cushion = static_cast<double>((0.5f * scene_.thermal.thickness_m + 5e-5f) / scene_.thermal.cell_m);
+  EXPECT_NEAR(slanted.extent.x(), 2 * (2 * radius + std::sqrt(3) * cushion), 2.01);
+  EXPECT_NEAR(slanted.extent.y(), 2 * radius, 1.01);
+}
+
+TEST_F(OnSheet, AFootprintMovesOnEvenly) {
+  Still still(scene_);
+  Covered before;
+  for (int i = 0; i < 60; ++i) {
+    const Covered now = CoveredBy(still.Through(80, 5e-5f * static_cast<float>(i)).footprint);
+    ASSERT_GT(now.count, 0);
+    if (i > 0) {
+      EXPECT_LT((now.middle - before.middle).norm(), 0.8f) << i;
+    }
+    before = now;
+  }
+}
+
+TEST_F(OnSheet, MetalPushesOnlyWhatIsLeftOfATriangle) {
+  // The cells in a box of 4 mm about the middle are gone, and no edge of the mesh is severed.
+  OpenCells open;
+  open.scene_hash = scene_.hash;
+  open.x = static_cast<std::int32_t>(std::floor(kMiddle.x() / scene_.thermal.cell_m)) - kOpenWindow / 2;
+  open.y = static_cast<std::int32_t>(std::floor(kMiddle.y() / scene_.thermal.cell_m)) - kOpenWindow / 2;
+  for (std::size_t j = 12; j < 52; ++j) open.rows[j] = ((std::uint64_t{1} << 40) - 1) << 12;
+  const auto pushed = [&](bool knows, float along_m) {
+    Still still(scene_);
+    if (knows) still.SetOpenCells(open);
+    (void)still.Through(90, along_m);
+    return still.Pushed();
+  };
+  EXPECT_GT(pushed(false, 0), 0);
+  EXPECT_EQ(pushed(true, 0), 0);
+  // It is 1.2 mm across, and 2 mm away is the rim.
+  EXPECT_EQ(pushed(true, 0.0013f), 0);
+  EXPECT_GT(pushed(true, 0.0016f), 0);
+  EXPECT_TRUE(simulation_.SetOpenCells(open));
+  open.scene_hash ^= 1;
+  EXPECT_FALSE(simulation_.SetOpenCells(open)) << "cells of another scene";
 }
 
 TEST_F(OnSheet, AThinToolAtFullSpeedDoesNotTunnel) {

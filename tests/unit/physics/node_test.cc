@@ -19,6 +19,7 @@ struct Bus {
   bus::InProcessTopic<ToolState> tools;
   bus::InProcessTopic<HandleState> handles;
   bus::InProcessTopic<TopologyState> topology;
+  bus::InProcessTopic<OpenCells> open_cells;
   bus::InProcessTopic<TissueFrame> frames;
   bus::InProcessTopic<ContactModel> contacts;
   bus::InProcessTopic<CauteryContact> cautery;
@@ -34,6 +35,7 @@ class Bench {
         tool_in_(bus_.tools.MakeInput()),
         handle_in_(bus_.handles.MakeInput()),
         topology_in_(bus_.topology.MakeInput()),
+        open_in_(bus_.open_cells.MakeInput()),
         frame_out_(bus_.frames.MakeOutput()),
         contact_out_(bus_.contacts.MakeOutput()),
         cautery_out_(bus_.cautery.MakeOutput()),
@@ -42,8 +44,9 @@ class Bench {
         tool_out_(bus_.tools.MakeOutput()),
         handle_out_(bus_.handles.MakeOutput()),
         topology_out_(bus_.topology.MakeOutput()),
+        open_out_(bus_.open_cells.MakeOutput()),
         node_(scene,
-              {*tool_in_, *handle_in_, *topology_in_, *frame_out_, *contact_out_, *cautery_out_, *tear_out_,
+              {*tool_in_, *handle_in_, *topology_in_, *open_in_, *frame_out_, *contact_out_, *cautery_out_, *tear_out_,
                *manifest_out_},
               checkpoint, epoch) {}
 
@@ -112,6 +115,7 @@ class Bench {
   std::unique_ptr<bus::Input<ToolState>> tool_in_;
   std::unique_ptr<bus::Input<HandleState>> handle_in_;
   std::unique_ptr<bus::Input<TopologyState>> topology_in_;
+  std::unique_ptr<bus::Input<OpenCells>> open_in_;
   std::unique_ptr<bus::LoanOutput<TissueFrame>> frame_out_;
   std::unique_ptr<bus::Output<ContactModel>> contact_out_;
   std::unique_ptr<bus::Output<CauteryContact>> cautery_out_;
@@ -120,6 +124,7 @@ class Bench {
   std::unique_ptr<bus::Output<ToolState>> tool_out_;
   std::unique_ptr<bus::Output<HandleState>> handle_out_;
   std::unique_ptr<bus::Output<TopologyState>> topology_out_;
+  std::unique_ptr<bus::Output<OpenCells>> open_out_;
   PhysicsNode node_;
   Tick tick_{0, 0.0, 0.01, 1};
   std::uint64_t sequence_ = 0;
@@ -182,7 +187,7 @@ TEST_F(PhysicsNodeTest, TellsEachReaderWhatItNeeds) {
   CauteryContact contact;
   ASSERT_TRUE(cautery->TakeLatest(&contact));
   EXPECT_TRUE(contact.touching);
-  EXPECT_GE(contact.metal_count, 2u);
+  EXPECT_GE(contact.footprint.width, 5u);
   EXPECT_EQ(contact.mode, CauteryMode::kCut);
   EXPECT_FLOAT_EQ(contact.power_W, 35.0f);
   EXPECT_NEAR(contact.session_time_s, 2.99, 1e-9);
@@ -190,7 +195,7 @@ TEST_F(PhysicsNodeTest, TellsEachReaderWhatItNeeds) {
   ASSERT_TRUE(manifests->TakeLatest(&manifest));
   EXPECT_EQ(manifest.tick, 299u);
   EXPECT_EQ(manifest.state_hash, bench.node_.simulation().StateHash());
-  ASSERT_EQ(manifest.consumed.size(), 4u);
+  ASSERT_EQ(manifest.consumed.size(), 5u);
   EXPECT_EQ(manifest.consumed[0].topic, TopicId::kToolState);
   EXPECT_EQ(manifest.consumed[0].sequence, 300u);
   EXPECT_EQ(manifest.consumed[1].topic, TopicId::kToolState);
@@ -198,6 +203,7 @@ TEST_F(PhysicsNodeTest, TellsEachReaderWhatItNeeds) {
   EXPECT_EQ(manifest.consumed[2].topic, TopicId::kHandleState);
   EXPECT_EQ(manifest.consumed[2].sequence, 300u);
   EXPECT_EQ(manifest.consumed[3].topic, TopicId::kTopologyState);
+  EXPECT_EQ(manifest.consumed[4].topic, TopicId::kOpenCells);
   EXPECT_GT(bench.Figure("max_displacement_mm"), 5.0);
   EXPECT_GT(bench.Figure("grasped_particles"), 0.0);
   EXPECT_EQ(bench.Figure("quarantined"), 0.0);

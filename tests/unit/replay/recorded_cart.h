@@ -99,6 +99,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   TappedTopic<CauteryContact> cautery(&writer);
   TappedTopic<TearState> tears(&writer);
   TappedTopic<TopologyState> topology(&writer);
+  TappedTopic<OpenCells> open_cells(&writer);
   TappedTopic<TemperaturePatch> patches(&writer);
   TappedTopic<ThermalEvent> events(&writer);
   TappedTopic<TickManifest> manifests(&writer);
@@ -119,6 +120,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     std::unique_ptr<bus::Input<ToolState>> tools;
     std::unique_ptr<bus::Input<HandleState>> handles;
     std::unique_ptr<bus::Input<TopologyState>> topology;
+    std::unique_ptr<bus::Input<OpenCells>> open_cells;
     std::unique_ptr<bus::LoanOutput<TissueFrame>> frames;
     std::unique_ptr<bus::Output<ContactModel>> models;
     std::unique_ptr<bus::Output<CauteryContact>> cautery;
@@ -134,6 +136,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     PhysicsProcess p{tools.MakeInput(),
                      handles.MakeInput(),
                      topology.MakeInput(),
+                     open_cells.MakeInput(),
                      frames.MakeOutput(),
                      models.MakeOutput(),
                      cautery.MakeOutput(),
@@ -143,8 +146,8 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
                      0};
     p.node = std::make_unique<physics::PhysicsNode>(
         scene,
-        physics::PhysicsNode::Ports{*p.tools, *p.handles, *p.topology, *p.frames, *p.models, *p.cautery, *p.tears,
-                                    *p.manifests},
+        physics::PhysicsNode::Ports{*p.tools, *p.handles, *p.topology, *p.open_cells, *p.frames, *p.models, *p.cautery,
+                                    *p.tears, *p.manifests},
         &physics_checkpoint, epoch, story.threads);
     return p;
   };
@@ -168,12 +171,13 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   auto thermal_in = cautery.MakeInput();
   auto tear_in = tears.MakeInput();
   auto topology_out = topology.MakeOutput();
+  auto open_out = open_cells.MakeOutput();
   auto patch_out = patches.MakeOutput();
   auto event_out = events.MakeOutput();
   auto thermal_manifest_out = manifests.MakeOutput();
-  thermal::ThermalNode thermal(scene,
-                               {*thermal_in, *tear_in, *topology_out, *patch_out, *event_out, *thermal_manifest_out},
-                               &thermal_checkpoint, kStart - 3);
+  thermal::ThermalNode thermal(
+      scene, {*thermal_in, *tear_in, *topology_out, *open_out, *patch_out, *event_out, *thermal_manifest_out},
+      &thermal_checkpoint, kStart - 3);
   auto handle_out = handles.MakeOutput();
 
   const auto seconds_of = [](std::int64_t ns) { return 1e-9 * static_cast<double>(ns - kStart); };
@@ -231,6 +235,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     models.Record(now);
     cautery.Record(now);
     topology.Record(now);
+    open_cells.Record(now);
     tears.Record(now);
     patches.Record(now);
     events.Record(now);

@@ -12,6 +12,7 @@ struct NodeBus {
   bus::InProcessTopic<CauteryContact> contacts;
   bus::InProcessTopic<TearState> tears;
   bus::InProcessTopic<TopologyState> topology;
+  bus::InProcessTopic<OpenCells> open_cells;
   bus::InProcessTopic<TemperaturePatch> patches;
   bus::InProcessTopic<ThermalEvent> events;
   bus::InProcessTopic<TickManifest> manifests;
@@ -20,17 +21,19 @@ struct NodeBus {
   std::unique_ptr<bus::Output<TearState>> tear_out = tears.MakeOutput();
   std::unique_ptr<bus::Input<TearState>> tear_in = tears.MakeInput();
   std::unique_ptr<bus::Output<TopologyState>> topology_out = topology.MakeOutput();
+  std::unique_ptr<bus::Output<OpenCells>> open_out = open_cells.MakeOutput();
   std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patch_out = patches.MakeOutput();
   std::unique_ptr<bus::Output<ThermalEvent>> event_out = events.MakeOutput();
   std::unique_ptr<bus::Output<TickManifest>> manifest_out = manifests.MakeOutput();
   // Of patches a test makes its own reader: without one the node draws none.
   std::unique_ptr<bus::Input<TopologyState>> topology_in = topology.MakeInput(64);
+  std::unique_ptr<bus::Input<OpenCells>> open_in = open_cells.MakeInput(64);
   std::unique_ptr<bus::Input<ThermalEvent>> event_in = events.MakeInput(4096);
   std::unique_ptr<bus::Input<TickManifest>> manifest_in = manifests.MakeInput(4);
 
   /// The node's.
   [[nodiscard]] ThermalNode::Ports ports() const {
-    return {*contact_in, *tear_in, *topology_out, *patch_out, *event_out, *manifest_out};
+    return {*contact_in, *tear_in, *topology_out, *open_out, *patch_out, *event_out, *manifest_out};
   }
 };
 

@@ -343,14 +343,48 @@ TEST_F(ThermalNodeTest, EveryContactIsConsumedAndNamedInTheManifest) {
   EXPECT_TRUE(NewestManifest().consumed.empty());
 }
 
-TEST_F(ThermalNodeTest, OfTooManyContactsTheNewestAreConsumed) {
+TEST_F(ThermalNodeTest, OfManyContactsTheLaterOnesWaitForTheNextFrame) {
   auto node = MakeNode();
   for (int n = 0; n < 12; ++n) Send(0.010f + 4e-5f * static_cast<float>(n), 0.01 * n);
   Step(node.get());
-  const TickManifest manifest = NewestManifest();
-  ASSERT_EQ(manifest.consumed.size(), kMostSamples);
-  EXPECT_EQ(manifest.consumed.front().sequence, 12 - kMostSamples + 1);
-  EXPECT_EQ(manifest.consumed.back().sequence, 12u);
+  const TickManifest first = NewestManifest();
+  ASSERT_EQ(first.consumed.size(), kMostSamples);
+  EXPECT_EQ(first.consumed.front().sequence, 1u);
+  Step(node.get());
+  const TickManifest second = NewestManifest();
+  ASSERT_EQ(second.consumed.size(), 12 - kMostSamples);
+  EXPECT_EQ(second.consumed.front().sequence, kMostSamples + 1);
+  EXPECT_EQ(second.consumed.back().sequence, 12u);
+}
+
+TEST_F(ThermalNodeTest, TellsPhysicsWhatIsGoneAroundTheHook) {
+  auto node = MakeNode();
+  const Sheet& sheet = node->solver().field().sheet();
+  OpenCells cells;
+  int before = 0;
+  for (int n = 0; n < 60; ++n) {
+    Send(0.010f + 4e-5f * static_cast<float>(n), 0.01 * n);
+    Step(node.get());
+    if (!bus_.open_in->TakeLatest(&cells)) continue;
+    EXPECT_EQ(cells.scene_hash, scene_.hash);
+    int count = 0;
+    for (int j = 0; j < kOpenWindow; ++j) {
+      for (int i = 0; i < kOpenWindow; ++i) {
+        const CellIndex cell{cells.x + i - sheet.origin_x, cells.y + j - sheet.origin_y};
+        const Tile* tile = node->solver().field().Find(cell.ix / kTile, cell.iy / kTile);
+        const int k = (cell.iy % kTile) * kTile + cell.ix % kTile;
+        const bool gone = tile != nullptr && (tile->state.flags[k] & kRemoved) != 0;
+        ASSERT_EQ(cells.IsOpen(cells.x + i, cells.y + j), gone) << i << ", " << j;
+        count += gone ? 1 : 0;
+      }
+    }
+    EXPECT_GE(count, before);
+    before = count;
+  }
+  EXPECT_GT(before, 50);
+  // Nothing changes: nothing is sent.
+  for (int n = 60; n < 70; ++n) Step(node.get());
+  EXPECT_FALSE(bus_.open_in->TakeLatest(&cells));
 }
 
 TEST_F(ThermalNodeTest, ContactsThatComeTwoByTwoCutWhatTheyCutOneByOne) {

@@ -79,13 +79,11 @@ class TipTest : public ::testing::Test {
     contact.material = {s, t};
     return contact;
   }
-  /// The same with metal that lies along t from there on.
+  /// The same with a footprint of three by four cells.
   [[nodiscard]] static CauteryContact MetalAt(float s, float t, double time_s = 1.0) {
     CauteryContact contact = At(s, t, time_s);
-    contact.metal_count = 3;
-    for (std::uint32_t n = 0; n < contact.metal_count; ++n) {
-      contact.metal[n] = {{s, t + 5e-4f * static_cast<float>(n)}, 1e-4f * static_cast<float>(n)};
-    }
+    contact.footprint = {static_cast<std::int32_t>(1e4f * s) - 1, static_cast<std::int32_t>(1e4f * t) - 2, 3, {}};
+    for (int n = 0; n < 12; ++n) contact.footprint.gap.push_back(static_cast<std::uint8_t>(10 * n));
     return contact;
   }
   [[nodiscard]] TipInput Advance(const CauteryContact& contact) { return tip_.Advance(contact, kFrame_s); }
@@ -115,19 +113,18 @@ TEST_F(TipTest, ASampleStandsForTheSessionTimeSinceTheLast) {
 }
 
 TEST_F(TipTest, MetalIsSweptFromSampleToSample) {
-  const CauteryContact a = MetalAt(0.005f, 0.010f, 1.00), b = MetalAt(0.0051f, 0.0101f, 1.01);
-  EXPECT_EQ(Advance(a).path.begin.points[2].material, a.metal[2].material) << "at rest in its first sample";
+  const CauteryContact a = MetalAt(0.005f, 0.010f, 1.00), b = MetalAt(0.0053f, 0.0101f, 1.01);
+  EXPECT_EQ(Advance(a).path.begin.x, a.footprint.x) << "at rest in its first sample";
   const TipInput swept = Advance(b);
-  ASSERT_EQ(swept.path.begin.count, 3u);
-  ASSERT_EQ(swept.path.end.count, 3u);
-  for (std::size_t n = 0; n < 3; ++n) {
-    EXPECT_EQ(swept.path.begin.points[n].material, a.metal[n].material);
-    EXPECT_EQ(swept.path.end.points[n].material, b.metal[n].material);
-  }
-  const TipPath half = PartOf(swept.path, 0.25f, 0.75f);
-  EXPECT_NEAR(half.begin.points[1].material.x(), 0.005025f, 1e-8f);
-  EXPECT_NEAR(half.end.points[1].material.y(), 0.010575f, 1e-8f);
-  EXPECT_NEAR(half.to.x(), 0.005075f, 1e-8f);
+  EXPECT_EQ(swept.path.begin.x, a.footprint.x);
+  EXPECT_EQ(swept.path.end.x, b.footprint.x);
+  EXPECT_EQ(swept.path.end.gap, b.footprint.gap);
+  EXPECT_EQ(swept.path.way, b.material - a.material);
+  const TipPath half = PartOf(swept.path, 0.25f, 0.75f), quarter = PartOf(half, 0, 0.5f);
+  EXPECT_FLOAT_EQ(quarter.part_from, 0.25f);
+  EXPECT_FLOAT_EQ(quarter.part_to, 0.5f);
+  EXPECT_EQ(quarter.way, swept.path.way);
+  EXPECT_NEAR(half.to.x(), 0.005225f, 1e-8f);
 }
 
 TEST_F(TipTest, JumpStartsANewPath) {
@@ -138,17 +135,12 @@ TEST_F(TipTest, JumpStartsANewPath) {
   EXPECT_TRUE(jumped.active);
 }
 
-TEST_F(TipTest, OnePointOfTheMetalThatJumpsStartsANewPathForAll) {
-  (void)Advance(MetalAt(0.005f, 0.010f, 1.00));
-  CauteryContact b = MetalAt(0.0051f, 0.010f, 1.01);
-  b.metal[0].material.x() += 1.1f * kTipSpeedMax_m_s * 0.01f;  // another fold of the sheet is nearer now
-  const TipInput jumped = Advance(b);
-  EXPECT_EQ(jumped.path.from, b.material);
-  for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(jumped.path.begin.points[n].material, b.metal[n].material);
-  CauteryContact c = b;
-  c.session_time_s = 1.02;
-  c.metal_count = 2;  // other metal
-  EXPECT_EQ(Advance(c).path.begin.count, 2u);
+TEST_F(TipTest, AFootprintThatComesStartsANewPath) {
+  (void)Advance(At(0.005f, 0.010f, 1.00));
+  const CauteryContact b = MetalAt(0.0051f, 0.010f, 1.01);
+  const TipInput came = Advance(b);
+  EXPECT_EQ(came.path.from, b.material);
+  EXPECT_EQ(came.path.begin.gap, b.footprint.gap);
 }
 
 TEST_F(TipTest, LiftedMetalStartsANewPath) {
@@ -197,26 +189,25 @@ TEST_F(TipTest, SamplesOutOfRangeAreNotAccepted) {
   EXPECT_TRUE(tip_.Accepts(lifted));
 }
 
-TEST_F(TipTest, MetalOfNoNumbersOrOfTooManyPointsIsRefused) {
+TEST_F(TipTest, AFootprintOfAnotherSizeThanItSaysIsRefused) {
   EXPECT_TRUE(tip_.Accepts(MetalAt(0.005f, 0.010f)));
-  for (const float bad : {NAN, INFINITY}) {
+  const auto refused = [&](const auto& change) {
     CauteryContact contact = MetalAt(0.005f, 0.010f);
-    contact.metal[1].height_m = bad;
-    EXPECT_FALSE(tip_.Accepts(contact)) << bad;
-    contact = MetalAt(0.005f, 0.010f);
-    contact.metal[2].material.y() = bad;
-    EXPECT_FALSE(tip_.Accepts(contact)) << bad;
-  }
-  CauteryContact contact = MetalAt(0.005f, 0.010f);
-  contact.metal_count = kMaxMetalPoints + 1;
-  EXPECT_FALSE(tip_.Accepts(contact));
+    change(&contact.footprint);
+    return !tip_.Accepts(contact);
+  };
+  EXPECT_TRUE(refused([](Footprint* print) { print->gap.pop_back(); }));
+  EXPECT_TRUE(refused([](Footprint* print) { print->gap.clear(); }));
+  EXPECT_TRUE(refused([](Footprint* print) { print->width = 0; }));
+  EXPECT_TRUE(refused([](Footprint* print) { print->width = kFootprintCells + 1; }));
+  EXPECT_TRUE(refused([](Footprint* print) { print->x = INT32_MIN; }));
 }
 
 constexpr SurfaceMetric kFlat{1, 0, 1};
 
 /// Area under the metal in units of radius squared, by cells of 1 / `fine` of its radius.
-double CoveredArea(const MetalPiece& piece, float fine) {
-  const Electrode electrode(kFlat, piece, fine);
+double CoveredArea(const Vec2f& a, const Vec2f& b, float fine) {
+  const Electrode electrode(kFlat, a, b, fine);
   double sum = 0;
   const Vec2f low = electrode.low(0).array().floor(), high = electrode.high(0);
   for (float y = low.y() + 0.5f; y <= high.y(); y += 1) {
@@ -232,8 +223,8 @@ TEST(ElectrodeTest, CoverageIsTheAreaOfTheCapsuleAnyWay) {
     for (float heading = 0; heading < 3.1f; heading += 0.23f) {
       for (const float fine : {5.0f, 40.0f}) {  // 0.5 mm in 0.1 mm; an eighth of that
         const Vec2f half = 0.5f * length * fine * Vec2f(std::cos(heading), std::sin(heading));
-        const MetalPiece piece{.a = middle - half, .b = middle + half};
-        EXPECT_NEAR(CoveredArea(piece, fine) / exact, 1, fine < 10 ? 0.02 : 1e-3) << length << " " << heading;
+        EXPECT_NEAR(CoveredArea(middle - half, middle + half, fine) / exact, 1, fine < 10 ? 0.02 : 1e-3)
+            << length << " " << heading;
       }
     }
   }
@@ -242,7 +233,7 @@ TEST(ElectrodeTest, CoverageIsTheAreaOfTheCapsuleAnyWay) {
 TEST(ElectrodeTest, DistanceIsThatOnTheStretchedSheet) {
   // The same capsule in material coordinates that are stretched 2 : 1 and sheared covers what the map leaves of it.
   const SurfaceMetric metric{4.0f, 0.6f, 1.5f};
-  const Electrode electrode(metric, {.a = {-4, -1.5f}, .b = {4, 1.5f}}, 12);
+  const Electrode electrode(metric, {-4, -1.5f}, {4, 1.5f}, 12);
   const double length = std::sqrt(metric.ss * 64 + 2 * metric.st * 24 + metric.tt * 9);
   constexpr float kReach = 3;
   const Vec2f low = electrode.low(kReach), high = electrode.high(kReach);
@@ -256,50 +247,6 @@ TEST(ElectrodeTest, DistanceIsThatOnTheStretchedSheet) {
     }
   }
   EXPECT_NEAR(sum * metric.area() / (std::numbers::pi * 144 + 2 * 12 * length), 1, 0.02);
-}
-
-TEST(ElectrodeTest, ALyingRodTouchesAlongItselfAndOneAboveNowhere) {
-  constexpr float kRadius = 5;
-  const Electrode lying(kFlat, {.a = {-10, 0}, .b = {10, 0}}, kRadius);
-  EXPECT_NEAR(lying.Gap({3, 7}), 7 - kRadius, 1e-5f);
-  EXPECT_NEAR(lying.Gap({13, 4}), 5 - kRadius, 1e-5f) << "a round end";
-  // 3 cells of air between metal and sheet beneath its middle.
-  const Electrode above(kFlat, {.a = {-10, 0}, .b = {10, 0}, .height_a = 8, .height_b = 8}, kRadius);
-  EXPECT_NEAR(above.Gap({0, 0}), 3, 1e-5f);
-  EXPECT_NEAR(above.Gap({2, 6}), 10 - kRadius, 1e-5f);
-  EXPECT_EQ(CoveredArea({.a = {-10, 0}, .b = {10, 0}, .height_a = 8, .height_b = 8}, kRadius), 0.0);
-}
-
-TEST(ElectrodeTest, AStandingRodCoversADiscAndASlantedOneAnEllipse) {
-  constexpr float kFine = 40;
-  // Through the sheet, however far on either side.
-  const MetalPiece standing{.a = {0.2f, 0.4f}, .b = {0.2f, 0.4f}, .height_a = -100, .height_b = 200};
-  EXPECT_NEAR(Electrode(kFlat, standing, 5).Gap({3.2f, 4.4f}), 0, 1e-4f);
-  EXPECT_NEAR(CoveredArea(standing, kFine), std::numbers::pi, 1e-3 * std::numbers::pi);
-  // It ends above the sheet: its round end is that far off.
-  const MetalPiece ends{.a = {0, 0}, .b = {0, 0}, .height_a = 9, .height_b = 300};
-  EXPECT_NEAR(Electrode(kFlat, ends, 5).Gap({0, 0}), 4, 1e-4f);
-  // At 30 degrees to the sheet the section is twice as long as it is wide. The gap is a distance in space, so the edge
-  // of what is covered is a little less sharp along it.
-  const float run = 300 * std::cos(0.5236f), rise = 300 * std::sin(0.5236f);
-  const MetalPiece slanted{.a = {-run, 0}, .b = {run, 0}, .height_a = -rise, .height_b = rise};
-  EXPECT_NEAR(Electrode(kFlat, slanted, 5).Gap({10, 0}), 0, 1e-3f);
-  EXPECT_NEAR(Electrode(kFlat, slanted, 5).Gap({0, 5}), 0, 1e-3f);
-  EXPECT_NEAR(CoveredArea(slanted, kFine), 2 * std::numbers::pi, 2e-3 * std::numbers::pi);
-}
-
-TEST(ElectrodeTest, AStandingRodOnAShearedSheetCoversADiscOfTheRestShape) {
-  const SurfaceMetric metric{1.3f, 0.5f, 0.9f};
-  const Electrode rod(metric, {.height_a = -50, .height_b = 50}, 12);
-  double sum = 0;
-  for (float y = -40.5f; y < 40; y += 1) {
-    for (float x = -40.5f; x < 40; x += 1) {
-      sum += Electrode::Covered(rod.Gap({x, y}));
-      const float distance = std::sqrt(metric.ss * x * x + 2 * metric.st * x * y + metric.tt * y * y);
-      ASSERT_NEAR(rod.Gap({x, y}), distance - 12, 1e-3f);
-    }
-  }
-  EXPECT_NEAR(sum * metric.area() / (std::numbers::pi * 144), 1, 0.01);
 }
 
 constexpr float kMillisecond = 1e-3f;
