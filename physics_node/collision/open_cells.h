@@ -5,7 +5,10 @@
 // along between two of them.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 
 #include "physics_node/collision/closest.h"
 #include "services/core/messages.h"

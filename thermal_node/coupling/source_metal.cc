@@ -1,5 +1,6 @@
 // Where the metal of a path lies on the cells of the source window.
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "thermal_node/coupling/source_window.h"
@@ -11,13 +12,15 @@ namespace {
 /// more than its film reaches in one sample would else leave out what lies between [cells].
 constexpr float kFarApart = 2.0f;
 
-/// Gap at a cell of a footprint [m].
-float GapAt(const Footprint& print, std::int32_t x, std::int32_t y) {
-  const std::int32_t i = x - print.x, j = y - print.y;
-  const bool inside =
-      i >= 0 && j >= 0 && i < static_cast<std::int32_t>(print.width) && j < static_cast<std::int32_t>(print.height());
-  return Footprint::Decode(inside ? print.gap[static_cast<std::size_t>(j) * print.width + static_cast<std::size_t>(i)]
-                                  : kBeyond);
+/// Gaps of the cells (x, y) to (x + kWindow - 1, y) [m].
+void DecodeRow(const Footprint& print, std::int32_t x, std::int32_t y, float* row) {
+  std::fill_n(row, kWindow, Footprint::Decode(kBeyond));
+  const std::int32_t j = y - print.y, width = static_cast<std::int32_t>(print.width);
+  if (j < 0 || j >= static_cast<std::int32_t>(print.height())) return;
+  const std::int32_t first = std::max(x, print.x), last = std::min(x + kWindow, print.x + width);
+  for (std::int32_t cell = first; cell < last; ++cell) {
+    row[cell - x] = Footprint::Decode(print.gap[static_cast<std::size_t>(j * width + cell - print.x)]);
+  }
 }
 
 }  // namespace
@@ -48,23 +51,26 @@ void SourceWindow::AddFootprint(const TipPath& path, float at, float reach) {
   // What lies at x is taken from x - u way of the first and from x + (1 - u) way of the last.
   const CellIndex back = far ? cells(u * way) : CellIndex{}, ahead = far ? cells((1 - u) * way) : CellIndex{};
   const Footprint &a = path.begin, &b = path.end;
-  const auto extent = [](std::int32_t first, std::uint32_t size) { return first + static_cast<std::int32_t>(size); };
-  const std::int32_t x0 = std::min(a.x + back.ix, b.x - ahead.ix), y0 = std::min(a.y + back.iy, b.y - ahead.iy);
-  const std::int32_t x1 = std::max(extent(a.x, a.width) + back.ix, extent(b.x, b.width) - ahead.ix);
-  const std::int32_t y1 = std::max(extent(a.y, a.height()) + back.iy, extent(b.y, b.height()) - ahead.iy);
+  const std::int32_t y0 = std::min(a.y + back.iy, b.y - ahead.iy);
+  const std::int32_t y1 = std::max(a.y + static_cast<std::int32_t>(a.height()) + back.iy,
+                                   b.y + static_cast<std::int32_t>(b.height()) - ahead.iy);
   const std::int32_t left = corner_.ix + sheet_.origin_x, top = corner_.iy + sheet_.origin_y;
+  constexpr auto kMargin = static_cast<int>(0.5f * kWindow - kMetalReach);
+  const auto fits = [](int n) { return n >= kMargin && n < kWindow - kMargin; };
+  std::array<float, kWindow> first, last;
   for (std::int32_t y = std::max(y0, top); y < std::min(y1, top + kWindow); ++y) {
-    for (std::int32_t x = std::max(x0, left); x < std::min(x1, left + kWindow); ++x) {
-      const float gap_m = (1 - u) * GapAt(a, x - back.ix, y - back.iy) + u * GapAt(b, x + ahead.ix, y + ahead.iy);
-      const float gap = gap_m * per_cell;
+    DecodeRow(a, left - back.ix, y - back.iy, first.data());
+    DecodeRow(b, left + ahead.ix, y + ahead.iy, last.data());
+    const int j = y - top;
+    for (int i = 0; i < kWindow; ++i) {
+      const auto n = static_cast<std::size_t>(i);
+      const float gap = ((1 - u) * first[n] + u * last[n]) * per_cell;
       if (!(gap < reach)) continue;
-      const int i = x - left, j = y - top;
-      const float off = static_cast<float>(std::max(std::abs(2 * i + 1 - kWindow), std::abs(2 * j + 1 - kWindow)));
-      if (off > 2 * kMetalReach) {
+      if (fits(i) && fits(j)) {
+        AddGap(i, j, gap);
+      } else {
         stats_.shortened = stats_.shortened || gap < 0.0f;
-        continue;
       }
-      AddGap(i, j, gap);
     }
   }
 }

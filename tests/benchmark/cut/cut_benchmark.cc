@@ -73,8 +73,10 @@ constexpr std::array kLevel{
 /// Sessions of --quick: along, across, circle.
 constexpr std::array<std::size_t, 3> kQuick{0, 3, 1};
 
-/// What a stroke of so many seconds is long [mm].
+/// What a stroke of a few seconds is long [mm].
 double LongestFor(double speed_mm_s) { return speed_mm_s < 3 ? 13 : speed_mm_s < 6 ? 22 : 30; }
+/// Of a smaller circle no disc is left [mm].
+constexpr double kShortestCircle_mm = 22;
 
 std::string Numbered(const char* series, std::size_t number) {
   return (number < 10 ? std::string(series) + "0" : series) + std::to_string(number);
@@ -90,6 +92,7 @@ SessionPlan PlanOf(const Row& row, const std::string& name) {
   plan.foot = row.foot;
   plan.loaded = row.loaded;
   plan.longest_mm = LongestFor(row.speed_mm_s);
+  if (row.shape == Shape::kCircle) plan.longest_mm = std::max(plan.longest_mm, kShortestCircle_mm);
   return plan;
 }
 
