@@ -191,7 +191,7 @@ class ToolCollision {
   std::size_t waiting_count_ = 0;
   TriangleBatch triangles_{};
   TouchBatch touch_{};
-  OpenCells open_;  ///< What is gone around the hook.
+  OpenCells open_;              ///< What is gone around the hook.
   std::array<Patch, 2> patch_;  ///< The last one asked for, now and before this step.
   float band_ = 0;              ///< Rows are made for what is so near to touch [m].
   std::array<Vec3f, kMaxTools> force_{Vec3f::Zero(), Vec3f::Zero()};
