@@ -67,14 +67,6 @@ bool IsDevice(const DeviceContacts& d) {
          std::all_of(d.contacts.begin(), d.contacts.end(), IsContact);
 }
 
-/// Far beyond any sheet, and no sum of two overflows.
-bool IsCell(std::int32_t index) { return Magnitude(index, 1e8); }
-bool IsFootprint(const Footprint& print) noexcept {
-  if (print.width == 0) return print.gap.empty();
-  return IsCell(print.x) && IsCell(print.y) && print.width <= kFootprintCells && !print.gap.empty() &&
-         print.gap.size() % print.width == 0 && print.height() <= kFootprintCells;
-}
-
 bool IsTiming(const TimingSummary& t) {
   return Within(t.p50_us, 0.0, 1e12) && Within(t.p99_us, 0.0, 1e12) && Within(t.max_us, 0.0, 1e12);
 }
@@ -115,7 +107,7 @@ bool PassesGate(const CauteryContact& m) noexcept {
          m.tool < kMaxTools && weights_in_range && (!m.touching || place_is_known) &&
          Magnitude(m.material, kMaxCoordinate_m) && Magnitude(m.material_rate, kMaxSpeed_m_s) &&
          Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) && Within(m.power_W, 0.0, kMaxPower_W) &&
-         IsFootprint(m.footprint);
+         m.footprint.whole();
 }
 
 bool PassesGate(const TopologyState& m) noexcept {
@@ -130,7 +122,7 @@ bool PassesGate(const TearState& m) noexcept {
   return IsStamp(m.stamp) && nodes <= kMaxMembraneNodes && m.torn_edges.size() == (3 * nodes + 7) / 8;
 }
 
-bool PassesGate(const OpenCells& m) noexcept { return IsStamp(m.stamp) && IsCell(m.x) && IsCell(m.y); }
+bool PassesGate(const OpenCells& m) noexcept { return IsStamp(m.stamp) && Magnitude(m.x, 1e8) && Magnitude(m.y, 1e8); }
 
 bool PassesGate(const TemperaturePatch& m) noexcept {
   const TemperaturePatchHeader& h = m.header;

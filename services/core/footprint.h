@@ -21,6 +21,14 @@ struct Footprint {
   std::vector<std::uint8_t> gap;
 
   [[nodiscard]] std::uint32_t height() const { return width > 0 ? static_cast<std::uint32_t>(gap.size()) / width : 0; }
+  /// Its numbers agree, and it lies where a sheet can be: no sum of two of its cells overflows.
+  [[nodiscard]] bool whole() const {
+    constexpr std::int32_t kLastCell = 1 << 24;
+    const auto near = [](std::int32_t cell) { return cell > -kLastCell && cell < kLastCell; };
+    return width == 0 ? gap.empty()
+                      : near(x) && near(y) && width <= kFootprintCells && !gap.empty() && gap.size() % width == 0 &&
+                            height() <= kFootprintCells;
+  }
   [[nodiscard]] static std::uint8_t Encode(float gap_m) {
     return static_cast<std::uint8_t>(std::clamp((gap_m - kLeastGap_m) / kGapStep_m + 0.5f, 0.0f, 255.0f));
   }

@@ -30,8 +30,6 @@ inline constexpr float kTissueShare = 0.75f, kMetalShare = 0.15f;
 inline constexpr float kFilmGrows_s = 1.0e-3f, kFilmCollapses_s = 5.0e-3f;
 /// So much of the footprint must boil for a film under all of it: steam spreads.
 inline constexpr float kBoilingForFilm = 0.1f;
-/// Tissue gives under the metal, and its surface is wet: so much of a gap is none [m].
-inline constexpr float kContactSlack_m = 5.0e-5f;
 
 /// A hook of 1 mm steel wire, 10 mm of it bare: 0.03 J/K. It loses heat to its shaft and the air in 16 s.
 inline constexpr float kHookHeatCapacity_J_K = 0.03f, kHookCools_s = 16.0f;

@@ -2,22 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <utility>
 
 namespace fulcrum::thermal {
-namespace {
-
-/// Cells beyond this are of no sheet.
-constexpr std::int32_t kLastCell = 1 << 24;
-
-bool IsWhole(const Footprint& print) {
-  if (print.width == 0) return print.gap.empty();
-  return print.width <= kFootprintCells && print.height() > 0 && print.height() <= kFootprintCells &&
-         print.gap.size() % print.width == 0 && std::abs(print.x) < kLastCell && std::abs(print.y) < kLastCell;
-}
-
-}  // namespace
 
 bool TipTracker::Accepts(const CauteryContact& sample) const {
   if (!std::isfinite(sample.session_time_s)) return false;
@@ -25,7 +12,7 @@ bool TipTracker::Accepts(const CauteryContact& sample) const {
   const bool numbers = sample.material.allFinite() && std::isfinite(sample.power_W) && sample.power_W >= 0 &&
                        sample.power_W <= kPowerMax_W && std::isfinite(sample.contact_radius_m) &&
                        sample.contact_radius_m >= 0 && sample.mode <= CauteryMode::kBlend;
-  return numbers && sheet_.OnSheet(sample.material) && IsWhole(sample.footprint);
+  return numbers && sheet_.OnSheet(sample.material) && sample.footprint.whole();
 }
 
 TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
@@ -82,7 +69,8 @@ bool TipTracker::Restore(const State& state) {
   const bool fits = state.width <= kFootprintCells && state.height <= kFootprintCells;
   if (fits) print.gap.assign(state.gap.begin(), state.gap.begin() + state.width * state.height);
   const bool plausible = std::isfinite(state.last_s) && std::isfinite(state.at[0]) && std::isfinite(state.at[1]) &&
-                         fits && IsWhole(print) && state.on_path <= 1 && state.energised <= 1;
+                         fits && print.whole() && print.height() == state.height && state.on_path <= 1 &&
+                         state.energised <= 1;
   if (!plausible) return false;
   last_s_ = state.last_s;
   at_ = {state.at[0], state.at[1]};

@@ -189,6 +189,32 @@ TEST_F(TipTest, SamplesOutOfRangeAreNotAccepted) {
   EXPECT_TRUE(tip_.Accepts(lifted));
 }
 
+TEST_F(TipTest, ARestoredTrackerGoesOnWhereTheMetalWas) {
+  const CauteryContact a = MetalAt(0.005f, 0.010f, 1.00), b = MetalAt(0.0051f, 0.010f, 1.01);
+  (void)Advance(a);
+  TipTracker other(sheet_, 5e-4f);
+  ASSERT_TRUE(other.Restore(tip_.Save()));
+  const TipInput here = Advance(b), there = other.Advance(b, kFrame_s);
+  EXPECT_EQ(there.path.from, here.path.from);
+  EXPECT_EQ(there.path.begin.x, a.footprint.x);
+  EXPECT_EQ(there.path.begin.gap, a.footprint.gap);
+  EXPECT_EQ(there.duration_s, here.duration_s);
+  // What no tracker can have been in changes nothing.
+  const TipTracker::State good = tip_.Save();
+  const auto refused = [&](const auto& change) {
+    TipTracker::State state = good;
+    change(&state);
+    return !other.Restore(state) && other.Save().last_s == 1.01;
+  };
+  EXPECT_TRUE(refused([](TipTracker::State* s) { s->last_s = NAN; }));
+  EXPECT_TRUE(refused([](TipTracker::State* s) { s->at[1] = INFINITY; }));
+  EXPECT_TRUE(refused([](TipTracker::State* s) { s->width = 0; }));
+  EXPECT_TRUE(refused([](TipTracker::State* s) { s->height = kFootprintCells + 1; }));
+  EXPECT_TRUE(refused([](TipTracker::State* s) { s->width = s->height = UINT32_MAX; }));
+  EXPECT_TRUE(refused([](TipTracker::State* s) { s->x = INT32_MAX; }));
+  EXPECT_TRUE(refused([](TipTracker::State* s) { s->on_path = 2; }));
+}
+
 TEST_F(TipTest, AFootprintOfAnotherSizeThanItSaysIsRefused) {
   EXPECT_TRUE(tip_.Accepts(MetalAt(0.005f, 0.010f)));
   const auto refused = [&](const auto& change) {
