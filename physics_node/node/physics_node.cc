@@ -432,7 +432,7 @@ void PhysicsNode::FillHealth(Health* health) const {
   }
   if (const std::uint64_t refused = topology_refused_.load(std::memory_order_relaxed); refused > 0) {
     add("topology_refused", static_cast<double>(refused));
-    health->last_error = "TopologyState of another scene refused";
+    health->last_error = "TopologyState or OpenCells of another scene refused";
   }
 }
 
