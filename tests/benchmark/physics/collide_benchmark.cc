@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "physics_node/collision/tissue_collision.h"
+#include "physics_node/contact_model/cautery_probe.h"
 #include "physics_node/contact_model/surface_curvature.h"
 #include "services/scene/build.h"
 #include "tests/benchmark/report.h"
@@ -23,12 +24,14 @@ struct Cost {
   double find = 3e38, project = 3e38, rows = 3e38;
   double curvature = 3e38;  ///< Of all tools that are near a surface; 0: none is.
   double tissue = 3e38;     ///< Not per tool.
+  double footprint = 3e38;  ///< Contact of the hook, its footprint included; 0: it does not touch.
   void TakeLess(const Cost& other) {
     find = std::min(find, other.find);
     project = std::min(project, other.project);
     rows = std::min(rows, other.rows);
     curvature = std::min(curvature, other.curvature);
     tissue = std::min(tissue, other.tissue);
+    footprint = std::min(footprint, other.footprint);
   }
 };
 
@@ -44,6 +47,7 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
   ToolCollision collision(scene, &model, &particles);
   TissueCollision tissue(scene, &model, &particles);
   SurfaceCurvature curvature(scene, &model, &particles);
+  CauteryProbe cautery(scene, &model, &particles);
   std::vector<Cost> costs;
   std::vector<float> moved, xyz(3 * std::size_t{particles.particle_count()}), previous(xyz.size());
   std::vector<ContactRow> rows;
@@ -105,11 +109,20 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
       (void)curvature.At(point, false, (point.closest.on_segment - point.closest.on_triangle).stableNormalized());
     }
     const double t7 = NowUs();
+    double footprint = 0;
+    for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+      if (!tools[i].present || scene.tools[i].kind != ToolKind::kHook) {
+        continue;
+      }
+      const double begin = NowUs();
+      const bool touches = cautery.Update(i, tools[i].pose, collision).touching;
+      footprint = touches ? NowUs() - begin : 0;
+    }
     most->tissue_rows = std::max(most->tissue_rows, rows.size());
     costs.push_back(
         {(t1 - t0) / count, (t3 - t2) / count, (t2 - t1) / count,
          std::any_of(nearest.begin(), nearest.end(), [](const SurfacePoint& p) { return p.found; }) ? t7 - t6 : 0,
-         t5 - t4});
+         t5 - t4, footprint});
     most->pairs = std::max(most->pairs, collision.pairs().size());
   }
   return costs;
@@ -125,12 +138,15 @@ void Collide(const SceneView& scene, benchmark::Report* report) {
       costs[i].TakeLess(again[i]);
     }
   }
-  std::vector<double> find, with_rows, with_projection, curvature, tissue;
+  std::vector<double> find, with_rows, with_projection, curvature, tissue, footprint;
   for (const Cost& cost : costs) {
     find.push_back(cost.find);
     tissue.push_back(cost.tissue);
     if (cost.curvature > 0) {
       curvature.push_back(cost.curvature);  // Of the tools that are near a surface.
+    }
+    if (cost.footprint > 0) {
+      footprint.push_back(cost.footprint);
     }
     with_rows.push_back(cost.find + cost.rows);
     with_projection.push_back(cost.find + cost.project);
@@ -142,6 +158,8 @@ void Collide(const SceneView& scene, benchmark::Report* report) {
   report->Add("physics.collide.find_us_per_tool_p50", Quantile(find, 0.5), "us");
   report->Add("physics.collide.find_us_per_tool_p99", Quantile(find, 0.99), "us");
   report->Add("physics.collide.curvature_us_p50", Quantile(curvature, 0.5), "us");
+  report->Add("physics.collide.footprint_us_p50", Quantile(footprint, 0.5), "us");
+  report->Add("physics.collide.footprint_us_p99", Quantile(footprint, 0.99), "us");
   report->Add("physics.collide.curvature_us_p99", Quantile(curvature, 0.99), "us");
   report->Add("physics.collide.tissue_us_p50", Quantile(tissue, 0.5), "us");
   report->Add("physics.collide.tissue_us_p99", Quantile(tissue, 0.99), "us");
