@@ -1,15 +1,6 @@
 // The membrane as triangles to draw, with its cuts. Pure.
 //
-// The simulation keeps one grid of particles, also across a cut: only the edges over the slit are dead. Drawn as it
-// stands, a triangle over the slit would stretch like chewing gum while the slit opens. Therefore such a triangle is
-// drawn once for each of the parts that its dead edges leave behind. A part keeps its own corners and gets ghosts for
-// the others, put where the sheet would be if it went on unstretched:
-//
-//         a───────b        dead edges a-c, b-c:                 a───────b
-//          \     /         part {a, b} with ghost c'    and      \ {ab}/       c
-//     ══════\═══/══ cut    part {c} with ghosts a', b'            ·---·   a'·-/{c}\-·b'
-//            \ /
-//             c
+// Triangles over a slit fall into parts with ghost corners (services/core/slit_sheet.h); a part is drawn once.
 //
 // `side` is +1 at a part's own corners and -1 at its ghosts: the shader drops fragments where it is negative, and the
 // atlas decides texel by texel where the slit runs.
@@ -23,6 +14,7 @@
 #include <vector>
 
 #include "services/core/scene_view.h"
+#include "services/core/slit_sheet.h"
 
 namespace fulcrum::render {
 
@@ -63,24 +55,24 @@ class MembraneMesh {
 
  private:
   struct Part {
-    Triangle nodes;      // Of the cut triangle.
-    std::uint8_t owned;  // Bit per corner.
+    Triangle nodes;  // Of the cut triangle.
+    OwnedCorners owned;
   };
-  struct Frame {
-    Vec3f ds, dt;  // d(position)/ds and /dt at a node.
-    bool valid;
+  /// The mesh as a SlitSheet holds it.
+  struct Held {
+    const MembraneMesh& mesh;
+    [[nodiscard]] std::uint32_t rows() const { return mesh.rows_; }
+    [[nodiscard]] std::uint32_t cols() const { return mesh.cols_; }
+    [[nodiscard]] bool Gone(Index node) const { return mesh.node_gone(node); }
+    [[nodiscard]] bool Severed(std::size_t edge) const { return TestBit(mesh.dead_edges_, edge); }
+    [[nodiscard]] Vec3f Place(Index node) const { return mesh.positions_[node]; }
+    [[nodiscard]] Vec3f Rest(Index node) const { return mesh.scene_.rest_position[mesh.scene_.membrane.first + node]; }
+    [[nodiscard]] Vec2f Material(Index node) const { return mesh.scene_.membrane_material[node]; }
   };
 
-  [[nodiscard]] bool edge_dead(std::size_t edge) const { return TestBit(dead_edges_, edge); }
   void FindGone();
   void BuildTriangles();
   bool AddTriangles(std::uint32_t row, std::uint32_t col);
-  void AddParts(const Triangle& nodes, const std::array<bool, 3>& edge_alive);
-  /// visit(other node, edge between the two) for the up to six neighbours in the grid.
-  template <class Visit>
-  void ForEachNeighbour(Index node, const Visit& visit) const;
-  [[nodiscard]] Frame FrameAt(Index node) const;
-  [[nodiscard]] Vec3f GhostFrom(Index owner, Index ghost) const;
   void PlaceGoneNodes();
 
   SceneView scene_;
@@ -100,12 +92,5 @@ class MembraneMesh {
   std::vector<std::uint8_t> block_intact_;
   std::size_t whole_triangles_ = 0;
 };
-
-/// Corners and edges of membrane triangle `index` = 2 * cell + half (numbering of CauteryContact and TopologyState).
-struct MembraneTriangle {
-  Triangle nodes;
-  std::array<std::size_t, 3> edges;  ///< Between corners (0, 1), (1, 2), (2, 0).
-};
-[[nodiscard]] MembraneTriangle MembraneTriangleAt(std::uint32_t cols, std::uint32_t row, std::uint32_t col, int half);
 
 }  // namespace fulcrum::render
