@@ -202,19 +202,43 @@ bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) {
   return true;
 }
 
-/// Of a gap along the sheet's normal the half of its thickness is none, and what soft, wet tissue gives.
+/// A cell belongs to the part of its triangle whose own corners are nearest to it.
 void CauteryProbe::AddGaps(Index triangle, const MetalAxis& axis, float radius_m) {
-  const auto nodes = model_->TriangleNodes(triangle);
-  SheetTriangle sheet;
-  for (std::size_t i = 0; i < 3; ++i) {
-    sheet.material[i] = scene_.membrane_material[nodes[i]];
-    sheet.place[i] = walk_.NodePlace(nodes[i]);
+  const Index cols = scene_.membrane.cols - 1, cell = triangle / 2;
+  const MembraneTriangle t =
+      MembraneTriangleAt(scene_.membrane.cols, cell / cols, cell % cols, static_cast<int>(triangle % 2));
+  const Held held{scene_, *model_, *particles_};
+  const SlitSheet sheet(held);
+  const TriangleParts parts = sheet.Parts(t);
+  SheetTriangle piece;
+  for (std::size_t k = 0; k < 3; ++k) {
+    piece.material[k] = scene_.membrane_material[t.nodes[k]];
   }
-  const auto& x = sheet.place;
+  if (parts.count == 0) {
+    // Nothing that lives holds it: it lies between the lips.
+    for (std::size_t k = 0; k < 3; ++k) {
+      piece.place[k] = walk_.NodePlace(t.nodes[k]);
+    }
+    AddGaps(piece, axis, radius_m, [](const std::array<float, 3>&) { return true; });
+    return;
+  }
+  for (std::size_t i = 0; i < parts.count; ++i) {
+    piece.place = sheet.Corners(t.nodes, parts.owned[i]);
+    AddGaps(piece, axis, radius_m, [&](const std::array<float, 3>& w) { return parts.IsOf(i, w); });
+  }
+}
+
+/// Of a gap along the sheet's normal the half of its thickness is none, and what soft, wet tissue gives.
+template <class Belongs>
+void CauteryProbe::AddGaps(const SheetTriangle& piece, const MetalAxis& axis, float radius_m, const Belongs& belongs) {
+  const auto& x = piece.place;
   const Vec3f normal = (x[1] - x[0]).cross(x[2] - x[0]).normalized();
   const float cushion = 0.5f * scene_.thermal.thickness_m + kContactSlack;
-  ForCellsIn(sheet.material, scene_.thermal.cell_m, gap_x_, gap_y_, gap_x_ + kGapCells - 1, gap_y_ + kGapCells - 1,
+  ForCellsIn(piece.material, scene_.thermal.cell_m, gap_x_, gap_y_, gap_x_ + kGapCells - 1, gap_y_ + kGapCells - 1,
              [&](std::int32_t ix, std::int32_t iy, const std::array<float, 3>& w) {
+               if (!belongs(w)) {
+                 return;
+               }
                const Vec3f p = w[0] * x[0] + w[1] * x[1] + w[2] * x[2];
                float& gap = gap_m_[static_cast<std::size_t>((iy - gap_y_) * kGapCells + ix - gap_x_)];
                for (std::size_t k = 1; k < axis.size(); ++k) {

@@ -7,6 +7,7 @@
 #include "physics_node/collision/open_cells.h"
 #include "physics_node/collision/tool_collision.h"
 #include "physics_node/contact_model/sheet_place.h"
+#include "services/core/slit_sheet.h"
 
 namespace fulcrum::physics {
 
@@ -18,12 +19,29 @@ class CauteryProbe {
   /// the caller's.
   ///
   /// The bare metal is the foot and the end of the neck. The footprint is its distance from each cell of the deformed
-  /// sheet around it; over triangles that a cut has switched off the sheet is the straight line from lip to lip.
+  /// sheet around it; each side of a slit goes on unstretched up to its lip.
   /// Stations along the metal's axis each follow the nearest place of the sheet from step to step, over slits as well,
   /// so the contact's centre jumps only where the tool does. Their distances decide what touches, with hysteresis.
   [[nodiscard]] CauteryContact Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision);
 
  private:
+  /// The membrane as a SlitSheet holds it.
+  struct Held {
+    const SceneView& scene;
+    const TissueModel& model;
+    const ParticleStore& particles;
+    [[nodiscard]] std::uint32_t rows() const { return scene.membrane.rows; }
+    [[nodiscard]] std::uint32_t cols() const { return scene.membrane.cols; }
+    [[nodiscard]] bool Gone(Index node) const { return !model.NodeAlive(node) || model.IsDebris(node); }
+    [[nodiscard]] bool Severed(std::size_t edge) const {
+      return !model.EdgeAlive(static_cast<Index>(edge / 3), static_cast<int>(edge % 3));
+    }
+    [[nodiscard]] Vec3f Place(Index node) const {
+      return particles.At(particles.NodeRef(node / cols(), node % cols()));
+    }
+    [[nodiscard]] Vec3f Rest(Index node) const { return scene.rest_position[scene.membrane.first + node]; }
+    [[nodiscard]] Vec2f Material(Index node) const { return scene.membrane_material[node]; }
+  };
   /// A point of the metal's axis.
   struct Station {
     Vec3f p_T = Vec3f::Zero();
@@ -44,6 +62,8 @@ class CauteryProbe {
                      const Vec2f& centre, Footprint* print);
   void FindNearCells(float reach_m, const ToolCollision& collision);
   void AddGaps(Index triangle, const MetalAxis& axis, float radius_m);
+  template <class Belongs>
+  void AddGaps(const SheetTriangle& piece, const MetalAxis& axis, float radius_m, const Belongs& belongs);
   [[nodiscard]] bool Tented(Index triangle, const std::array<float, 3>& barycentric) const;
 
   SceneView scene_;

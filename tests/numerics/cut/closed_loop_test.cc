@@ -249,7 +249,7 @@ TEST_P(StrokeTest, IsOneSlitAlongTheWholeWay) {
   EXPECT_GE(cut.OpenAlongTheWay(), 0.98);
   // Metal that cuts goes free of force: what it would push is gone before.
   RecordProperty("free_pct", 100 * cut.free() / cut.energised());
-  EXPECT_GT(cut.free(), cut.energised() / 2);
+  EXPECT_GT(cut.free(), 0.45 * cut.energised());
   // The wire is 1 mm across, and the slit as much longer than the way. What is vaporised beside it comes from the
   // film's reach and from heat that spreads.
   const double width = cut.Area() / (stroke.length_m + 1e-3);
