@@ -53,7 +53,8 @@ void MeasureWay(CutMap* map) {
       continue;
     }
     const Vec2d to = map->ToTexel(frame.centre);
-    const Vec2d from = last != nullptr && frame.time_s - last->time_s < kWayGap_s ? map->ToTexel(last->centre) : to;
+    const bool goes_on = last != nullptr && frame.goes_on && frame.time_s - last->time_s < kWayGap_s;
+    const Vec2d from = goes_on ? map->ToTexel(last->centre) : to;
     const double length = (to - from).norm();
     for (; next <= length; next += step) {
       const Vec2d at = length > 0 ? Vec2d(from + next / length * (to - from)) : to;
@@ -98,7 +99,7 @@ void MeasureSpotWay(CutMap* map) {
     }
     const bool both = sample.energised() && sample.touching && at < metal.size() && metal[at].in_contact &&
                       std::abs(metal[at].time_s - sample.time_s) < kWayGap_s;
-    if (both && last != nullptr && sample.time_s - last->time_s < kWayGap_s) {
+    if (both && last != nullptr && metal[at].goes_on && sample.time_s - last->time_s < kWayGap_s) {
       spot.GoTo(sample.material);
       centre.GoTo(metal[at].centre);
     } else if (both) {

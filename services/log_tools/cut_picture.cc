@@ -121,7 +121,7 @@ class Drawing {
   void DrawWays() {
     const MetalFrame* last = nullptr;
     for (const MetalFrame& frame : map_.recorded.metal) {
-      if (frame.in_contact && last != nullptr) {
+      if (frame.goes_on && last != nullptr) {
         const bool on = frame.mode != CauteryMode::kOff;
         canvas_.Line(ToPixel(map_.ToTexel(last->centre)), ToPixel(map_.ToTexel(frame.centre)), on ? 2.0 : 1.0,
                      on ? kMetal : kIdleMetal);

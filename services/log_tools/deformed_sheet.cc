@@ -12,6 +12,8 @@ namespace {
 constexpr int kStride = 4;
 /// A cell of it may be stretched by so much.
 constexpr float kStretch = 2;
+/// An edge is looked at in so many places for its lip.
+constexpr int kLooksAlongEdge = 20;
 
 /// Weights of the point of triangle abc that is nearest to p: Ericson, "Real-Time Collision Detection" (2005), 5.1.5.
 std::array<float, 3> NearestWeights(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
@@ -50,7 +52,9 @@ DeformedSheet::DeformedSheet(const SceneView& scene)
       rows_(static_cast<int>(scene.membrane.rows)),
       cols_(static_cast<int>(scene.membrane.cols)),
       dead_(scene.membrane.node_count()),
-      place_(scene.membrane.node_count(), Vec3f::Zero()) {
+      severed_(3 * scene.membrane.node_count()),
+      place_(scene.membrane.node_count(), Vec3f::Zero()),
+      cut_of_(scene.membrane.triangle_count(), -1) {
   // Farthest that a place of a coarse cell is from all of its corners.
   for (int row = 0; row < rows_; row += kStride) {
     for (int col = 0; col < cols_; col += kStride) {
@@ -62,19 +66,101 @@ DeformedSheet::DeformedSheet(const SceneView& scene)
   }
 }
 
-void DeformedSheet::SetDeadNodes(std::span<const std::uint8_t> bits) {
+void DeformedSheet::SetTopology(std::span<const std::uint8_t> dead_nodes, std::span<const std::uint8_t> dead_edges) {
+  const auto is_set = [](std::span<const std::uint8_t> bits, std::size_t i) {
+    return (i >> 3) < bits.size() && TestBit(bits, i) ? std::uint8_t{1} : std::uint8_t{0};
+  };
   dead_nodes_.clear();
   for (std::size_t i = 0; i < dead_.size(); ++i) {
-    dead_[i] = (i >> 3) < bits.size() && TestBit(bits, i) ? 1 : 0;
+    dead_[i] = is_set(dead_nodes, i);
     if (dead_[i] != 0) dead_nodes_.push_back(i);
+  }
+  for (std::size_t i = 0; i < severed_.size(); ++i) severed_[i] = is_set(dead_edges, i);
+  const Held held{*this};
+  const SlitSheet sheet(held);
+  cut_triangles_.clear();
+  for (Index triangle = 0; triangle < cut_of_.size(); ++triangle) {
+    const TriangleParts parts = sheet.Parts(TriangleAt(triangle));
+    const bool whole = parts.count == 1 && parts.owned[0] == kAllCorners;
+    cut_of_[triangle] = whole ? -1 : static_cast<std::int32_t>(cut_triangles_.size());
+    if (!whole) cut_triangles_.push_back(triangle);
   }
 }
 
-bool DeformedSheet::SetPositions(std::span<const float> xyz) {
+MembraneTriangle DeformedSheet::TriangleAt(Index triangle) const {
+  const Index cell = triangle / 2, cols = scene_.membrane.cols - 1;
+  return MembraneTriangleAt(scene_.membrane.cols, cell / cols, cell % cols, static_cast<int>(triangle % 2));
+}
+
+void DeformedSheet::CutIntoPieces(const Removed& removed) {
+  const Held held{*this};
+  const SlitSheet sheet(held);
+  const auto node = [&](Index n) { return Point{place_[n], held.Material(n)}; };
+  // The end of what hangs on `owner` along its edge to `other`.
+  const auto lip = [&](Index owner, Index other) {
+    const Vec2f from = held.Material(owner), way = held.Material(other) - from;
+    int first = 0;
+    while (first < kLooksAlongEdge && !removed(from + (static_cast<float>(first) + 0.5f) / kLooksAlongEdge * way)) {
+      ++first;
+    }
+    // Patches come later than the topology: an edge whose hole is not known yet has it in its middle.
+    const float share = first < kLooksAlongEdge ? static_cast<float>(first) / kLooksAlongEdge : 0.5f;
+    return Point{place_[owner] + share * (sheet.Ghost(owner, other) - place_[owner]), from + share * way};
+  };
+  const auto middle = [&](Index a, Index b) {
+    return Point{0.5f * (place_[a] + place_[b]), 0.5f * (held.Material(a) + held.Material(b))};
+  };
+  pieces_.clear();
+  first_piece_.clear();
+  for (const Index triangle : cut_triangles_) {
+    first_piece_.push_back(pieces_.size());
+    const MembraneTriangle t = TriangleAt(triangle);
+    const auto& n = t.nodes;
+    // Two points of each edge: the end of what hangs on its first corner, and on its second.
+    std::array<std::array<Point, 2>, 3> end;
+    std::size_t joined = 3;  // The edge that lives, if one does.
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Index a = n[k], b = n[(k + 1) % 3];
+      if (!held.Gone(a) && !held.Gone(b) && !held.Severed(t.edges[k])) {
+        joined = k;
+        end[k][0] = end[k][1] = middle(a, b);
+        continue;
+      }
+      end[k][0] = held.Gone(a) ? node(a) : lip(a, b);
+      end[k][1] = held.Gone(b) ? node(b) : lip(b, a);
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (!held.Gone(n[k])) pieces_.push_back({node(n[k]), end[k][0], end[(k + 2) % 3][1]});
+    }
+    if (joined < 3) {
+      const auto &left = end[(joined + 2) % 3], &right = end[(joined + 1) % 3];
+      pieces_.push_back({end[joined][0], right[0], left[1]});
+      pieces_.push_back({right[0], right[1], left[0]});
+      pieces_.push_back({right[0], left[0], left[1]});
+      continue;
+    }
+    // The gap is a hexagon.
+    Point centre{Vec3f::Zero(), Vec2f::Zero()};
+    for (const auto& edge : end) {
+      for (const Point& point : edge) {
+        centre.place += point.place / 6.0f;
+        centre.material += point.material / 6.0f;
+      }
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      pieces_.push_back({centre, end[k][0], end[k][1]});
+      pieces_.push_back({centre, end[k][1], end[(k + 1) % 3][0]});
+    }
+  }
+  first_piece_.push_back(pieces_.size());
+}
+
+bool DeformedSheet::SetPositions(std::span<const float> xyz, const Removed& removed) {
   const std::size_t first = scene_.membrane.first;
   if (xyz.size() < 3 * (first + place_.size())) return false;
   for (std::size_t i = 0; i < place_.size(); ++i) place_[i] = Eigen::Map<const Vec3f>(&xyz[3 * (first + i)]);
   FillDeadNodes();
+  CutIntoPieces(removed);
   return true;
 }
 
@@ -135,18 +221,30 @@ std::optional<DeformedSheet::Place> DeformedSheet::Nearest(const Vec3f& p_W, flo
     bool better = false;
     for (int r = row0; r < row1; ++r) {
       for (int c = col0; c < col1; ++c) {
-        const std::size_t n00 = Node(r, c), n01 = Node(r, c + 1), n10 = Node(r + 1, c), n11 = Node(r + 1, c + 1);
-        for (const std::array<std::size_t, 3>& t : {std::array{n00, n01, n11}, std::array{n00, n11, n10}}) {
-          const auto w = NearestWeights(p_W, place_[t[0]], place_[t[1]], place_[t[2]]);
-          const Vec3f nearest = w[0] * place_[t[0]] + w[1] * place_[t[1]] + w[2] * place_[t[2]];
-          const float squared = (nearest - p_W).squaredNorm();
-          if (!(squared < best)) continue;
-          best = squared;
-          better = true;
-          best_row = r;
-          best_col = c;
-          place.material = w[0] * scene_.membrane_material[t[0]] + w[1] * scene_.membrane_material[t[1]] +
-                           w[2] * scene_.membrane_material[t[2]];
+        for (Index triangle = 2 * static_cast<Index>(r * (cols_ - 1) + c), end = triangle + 2; triangle < end;
+             ++triangle) {
+          const auto offer = [&](const std::array<Vec3f, 3>& x, const std::array<Vec2f, 3>& material) {
+            const auto w = NearestWeights(p_W, x[0], x[1], x[2]);
+            const float squared = (w[0] * x[0] + w[1] * x[1] + w[2] * x[2] - p_W).squaredNorm();
+            if (!(squared < best)) return;
+            best = squared;
+            better = true;
+            best_row = r;
+            best_col = c;
+            place.material = w[0] * material[0] + w[1] * material[1] + w[2] * material[2];
+          };
+          if (const std::int32_t cut = cut_of_[triangle]; cut >= 0) {
+            const auto at = static_cast<std::size_t>(cut);
+            for (std::size_t i = first_piece_[at]; i < first_piece_[at + 1]; ++i) {
+              const Piece& piece = pieces_[i];
+              offer({piece[0].place, piece[1].place, piece[2].place},
+                    {piece[0].material, piece[1].material, piece[2].material});
+            }
+            continue;
+          }
+          const Triangle t = TriangleAt(triangle).nodes;
+          const auto& m = scene_.membrane_material;
+          offer({place_[t[0]], place_[t[1]], place_[t[2]]}, {m[t[0]], m[t[1]], m[t[2]]});
         }
       }
     }

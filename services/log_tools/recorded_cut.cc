@@ -33,17 +33,23 @@ struct Pose {
   Quatf q_WT = Quatf::Identity();
 };
 
-/// Samples of the bare metal's axis in frame T: the foot from the heel along +x, the neck from the heel along -z.
+/// Places of one contact that follow one another along the metal are no farther apart on the sheet [m].
+constexpr float kSameContact_m = 1e-3f;
+/// A contact goes on in the next frame where its centre has come no farther [m], and while it is not so much weaker
+/// than another one.
+constexpr float kContactStep_m = 2e-3f, kStillTouches = 0.2f;
+
+/// Samples of the bare metal's axis in frame T: from the end of the foot along -x to the heel, up the neck along -z.
 std::vector<Vec3f> MetalAxis(const ToolDescription& tool) {
   std::vector<Vec3f> axis;
-  const auto add = [&](const Vec3f& end, bool with_heel) {
-    const int steps = std::max(1, static_cast<int>(std::lround(end.norm() / kAxisStep_m)));
-    for (int i = with_heel ? 0 : 1; i <= steps; ++i) {
-      axis.push_back(end * static_cast<float>(i) / static_cast<float>(steps));
-    }
-  };
-  add(Vec3f(tool.tip_length_m, 0, 0), true);
-  add(Vec3f(0, 0, -kBareNeck_m), false);
+  const auto steps = [](float length) { return std::max(1, static_cast<int>(std::lround(length / kAxisStep_m))); };
+  const int foot = steps(tool.tip_length_m), neck = steps(kBareNeck_m);
+  for (int i = foot; i > 0; --i) {
+    axis.emplace_back(tool.tip_length_m * static_cast<float>(i) / static_cast<float>(foot), 0.0f, 0.0f);
+  }
+  for (int i = 0; i <= neck; ++i) {
+    axis.emplace_back(0.0f, 0.0f, -kBareNeck_m * static_cast<float>(i) / static_cast<float>(neck));
+  }
   return axis;
 }
 
@@ -108,7 +114,8 @@ class Reader {
 
   void Add(const TopologyState& topology) {
     dead_nodes_ = topology.dead_nodes;
-    dead_nodes_changed_ = true;
+    dead_edges_ = topology.dead_edges;
+    topology_changed_ = true;
     const double time_s = 1e-9 * static_cast<double>(topology.stamp.stamp_ns - start_ns_);
     cut_.lengths.push_back({time_s, static_cast<double>(topology.cut_length_m)});
   }
@@ -190,25 +197,60 @@ class Reader {
   }
 
   void Locate(const TissueFrame& frame, const Pose& pose) {
-    if (dead_nodes_changed_) sheet_.SetDeadNodes(dead_nodes_);
-    dead_nodes_changed_ = false;
-    if (!sheet_.SetPositions(frame.xyz)) return;
+    if (topology_changed_) sheet_.SetTopology(dead_nodes_, dead_edges_);
+    topology_changed_ = false;
+    const SheetTexels& texels = cut_.texels;
+    const auto removed = [&texels](const Vec2f& place) {
+      const Vec2d texel = place.cast<double>() / texels.texel_m;
+      const int x = static_cast<int>(std::floor(texel.x())) - texels.x0;
+      const int y = static_cast<int>(std::floor(texel.y())) - texels.y0;
+      return x >= 0 && y >= 0 && x < texels.width && y < texels.height && texels.removed[texels.Index(x, y)] != 0;
+    };
+    if (!sheet_.SetPositions(frame.xyz, removed)) return;
     MetalFrame metal;
     metal.time_s = frame.header.session_time_s;
     metal.nearest_m = std::numeric_limits<float>::infinity();
-    Vec2f sum = Vec2f::Zero();
-    float weight = 0;
+    std::vector<Contact> contacts;
+    bool follows = false;  // The sample before it along the metal touches too.
     for (const Vec3f& p_T : axis_) {
       const auto place = sheet_.Nearest(pose.p_WT + pose.q_WT * p_T, limit_m_);
-      if (!place) continue;
+      if (!place) {
+        follows = false;
+        continue;
+      }
+      if (!follows || (place->material - metal.touched.back()).norm() > kSameContact_m) contacts.emplace_back();
+      follows = true;
       metal.touched.push_back(place->material);
       metal.nearest_m = std::min(metal.nearest_m, place->distance_m);
-      sum += (limit_m_ - place->distance_m) * place->material;
-      weight += limit_m_ - place->distance_m;
+      contacts.back().sum += (limit_m_ - place->distance_m) * place->material;
+      contacts.back().weight += limit_m_ - place->distance_m;
     }
-    metal.in_contact = weight > 0;
-    if (metal.in_contact) metal.centre = sum / weight;
+    ChooseContact(contacts, &metal);
     cut_.metal.push_back(std::move(metal));
+  }
+
+  /// Places that follow one another along the metal.
+  struct Contact {
+    Vec2f sum = Vec2f::Zero();
+    float weight = 0;
+    [[nodiscard]] Vec2f centre() const { return sum / weight; }
+  };
+  void ChooseContact(const std::vector<Contact>& contacts, MetalFrame* metal) const {
+    const auto strongest = std::max_element(contacts.begin(), contacts.end(),
+                                            [](const Contact& a, const Contact& b) { return a.weight < b.weight; });
+    if (strongest == contacts.end() || !(strongest->weight > 0)) return;
+    metal->in_contact = true;
+    metal->centre = strongest->centre();
+    const MetalFrame* last = cut_.metal.empty() ? nullptr : &cut_.metal.back();
+    if (last == nullptr || !last->in_contact) return;
+    float nearest = kContactStep_m;
+    for (const Contact& contact : contacts) {
+      const float distance = (contact.centre() - last->centre).norm();
+      if (distance > nearest || contact.weight < kStillTouches * strongest->weight) continue;
+      nearest = distance;
+      metal->centre = contact.centre();
+      metal->goes_on = true;
+    }
   }
 
   std::size_t tool_ = 0;
@@ -216,8 +258,8 @@ class Reader {
   float limit_m_ = 0;
   std::int64_t start_ns_ = 0;
   DeformedSheet sheet_;
-  std::vector<std::uint8_t> dead_nodes_;
-  bool dead_nodes_changed_ = false;
+  std::vector<std::uint8_t> dead_nodes_, dead_edges_;
+  bool topology_changed_ = false;
   std::optional<double> first_removed_s_;
   std::vector<double> cut_events_s_;
   std::deque<Pose> poses_;

@@ -37,10 +37,13 @@ struct SheetTexels {
 
 /// Where the metal touched the sheet at the time of one TissueFrame.
 struct MetalFrame {
-  double time_s = 0;                     ///< Session time.
-  std::vector<Vec2f> touched;            ///< Places of the sheet [m].
-  bool in_contact = false;               ///< `touched` is not empty.
-  Vec2f centre = Vec2f::Zero();          ///< Of these, the nearer the heavier [m].
+  double time_s = 0;           ///< Session time.
+  std::vector<Vec2f> touched;  ///< Places of the sheet [m].
+  bool in_contact = false;     ///< `touched` is not empty.
+  /// Of one contact, the nearer places the heavier [m]. Long metal may touch a rim here and a fold there: it is the
+  /// contact of the frame before, or the closest one.
+  Vec2f centre = Vec2f::Zero();
+  bool goes_on = false;                  ///< The contact is that of the frame before.
   float nearest_m = 0;                   ///< Least distance of the metal's axis to the sheet.
   CauteryMode mode = CauteryMode::kOff;  ///< Of the CauteryContact of that time; off without power.
 };

@@ -170,6 +170,7 @@ void AddWay(RecordedCut* cut, const Vec2d& from, const Vec2d& to) {
     MetalFrame frame;
     frame.time_s = 1 + 0.01 * i;
     frame.in_contact = true;
+    frame.goes_on = i > 0;
     frame.mode = CauteryMode::kCut;
     frame.centre = (1e-3 * (from + i / 200.0 * (to - from))).cast<float>();
     frame.touched = {frame.centre};

@@ -168,6 +168,8 @@ TEST_F(CutRecording, LastPatchTellsTheHole) {
 
 TEST_F(CutRecording, OtherSceneIsRefused) { EXPECT_THROW((void)ReadCut(Record(12), scene_.view), MismatchError); }
 
+constexpr auto kNothingRemoved = [](const Vec2f&) { return false; };
+
 TEST(DeformedSheet, NearestPlaceIsThatOfAllTriangles) {
   FlatScene scene;
   std::mt19937 random(3);
@@ -177,7 +179,7 @@ TEST(DeformedSheet, NearestPlaceIsThatOfAllTriangles) {
     place.z() += 2e-3f * std::sin(400 * place.x()) + 0.1e-3f * unit(random);
   }
   DeformedSheet sheet(scene.view);
-  ASSERT_TRUE(sheet.SetPositions(Interleaved(places)));
+  ASSERT_TRUE(sheet.SetPositions(Interleaved(places), kNothingRemoved));
   for (int i = 0; i < 200; ++i) {
     const Vec3f p(0.02f * unit(random) - FlatScene::kShift, 0.03f * unit(random) - FlatScene::kShift,
                   2e-3f * unit(random));
@@ -204,20 +206,59 @@ TEST(DeformedSheet, NearestPlaceIsThatOfAllTriangles) {
   }
 }
 
-TEST(DeformedSheet, DeadNodesLieBetweenTheLiving) {
+// A slit along a row, opened: each lip keeps its shape, and what is removed spans the gap.
+TEST(DeformedSheet, LipsGoOnUnstretchedAndTheHoleSpansTheGap) {
+  FlatScene scene;
+  constexpr std::uint32_t kRow = 15;  // The edges from it to the next row are severed.
+  constexpr float kGap_m = 3e-3f;
+  std::vector<Vec3f> places = scene.places;
+  std::vector<std::uint8_t> dead_nodes((places.size() + 7) / 8), dead_edges((3 * places.size() + 7) / 8);
+  for (std::uint32_t row = 0; row < FlatScene::kRows; ++row) {
+    for (std::uint32_t col = 0; col < FlatScene::kCols; ++col) {
+      const std::size_t node = row * FlatScene::kCols + col;
+      if (row > kRow) places[node].y() += kGap_m;
+      if (row != kRow) continue;
+      SetBit(dead_edges, 3 * node + 1);
+      SetBit(dead_edges, 3 * node + 2);
+    }
+  }
+  // Of the millimetre between the two rows the removed part: from 0.3 to 0.5 mm.
+  const auto node_at = [&](std::uint32_t row) { return row * FlatScene::kCols + 10; };
+  const float t0 = scene.view.membrane_material[node_at(kRow)].y();
+  const auto removed = [&](const Vec2f& place) { return place.y() > t0 + 0.3e-3f && place.y() < t0 + 0.5e-3f; };
+  DeformedSheet sheet(scene.view);
+  sheet.SetTopology(dead_nodes, dead_edges);
+  ASSERT_TRUE(sheet.SetPositions(Interleaved(places), removed));
+  const auto at = [&](float beyond_row_m) {
+    const auto place = sheet.Nearest(places[node_at(kRow)] + Vec3f(0, beyond_row_m, 0), 1e-3f);
+    EXPECT_TRUE(place);
+    if (!place) return -1.0f;
+    EXPECT_NEAR(place->distance_m, 0, 1e-6f);
+    return place->material.y() - t0;
+  };
+  constexpr float kLook_m = 1e-3f / 20;
+  EXPECT_NEAR(at(0.1e-3f), 0.1e-3f, 1e-6f);
+  EXPECT_NEAR(at(0.2e-3f), 0.2e-3f, 1e-6f);
+  EXPECT_NEAR(at(kGap_m + 0.9e-3f), 0.9e-3f, 1e-6f);
+  EXPECT_NEAR(at(kGap_m + 0.6e-3f), 0.6e-3f, 1e-6f);
+  EXPECT_NEAR(at(0.5f * kGap_m + 0.4e-3f), 0.4e-3f, kLook_m);
+}
+
+// Where a piece of the sheet is gone, a place in the hole is one of what was there.
+TEST(DeformedSheet, AHoleIsSpannedByWhatWasThere) {
   FlatScene scene;
   std::vector<Vec3f> places = scene.places;
-  std::vector<std::uint8_t> dead((places.size() + 7) / 8);
+  std::vector<std::uint8_t> dead_nodes((places.size() + 7) / 8), dead_edges((3 * places.size() + 7) / 8);
   for (std::uint32_t row = 10; row < 14; ++row) {
     for (std::uint32_t col = 8; col < 12; ++col) {
       const std::size_t node = row * FlatScene::kCols + col;
-      SetBit(dead, node);
+      SetBit(dead_nodes, node);
       places[node] = Vec3f(1, 1, 1);  // Wherever it was left.
     }
   }
   DeformedSheet sheet(scene.view);
-  sheet.SetDeadNodes(dead);
-  ASSERT_TRUE(sheet.SetPositions(Interleaved(places)));
+  sheet.SetTopology(dead_nodes, dead_edges);
+  ASSERT_TRUE(sheet.SetPositions(Interleaved(places), kNothingRemoved));
   const auto place = sheet.Nearest(scene.places[11 * FlatScene::kCols + 9] + Vec3f(0, 0, 0.4e-3f), 1e-3f);
   ASSERT_TRUE(place);
   EXPECT_NEAR(place->distance_m, 0.4e-3f, 1e-6f);
