@@ -225,6 +225,7 @@ void ThermalSolver::UpdateTopology() {
     topology_.StageCut(field_, stats.low, stats.high);
     removed_.Add(RemovedBox{stats.low, stats.high});
   }
+  if (frame_ % kCommitFrames == kShrinkFrame) StageShrink();
   if (!at_commit_frame()) return;
   if (!removed_.empty() || !torn_.empty()) {
     RemovedBox changed = removed_;
@@ -238,11 +239,14 @@ void ThermalSolver::UpdateTopology() {
     torn_ = {};
     figures_.debris_m2 = static_cast<float>(crumbs_.area_m2());
   }
+  committed_ = topology_.Commit();
+}
+
+void ThermalSolver::StageShrink() {
   for (const Tile* tile : field_.awake()) {
     // Collagen does not change below this; see DamageModel.
     if (tile->theta_max > kDamageStart) topology_.StageShrink(field_, *tile);
   }
-  committed_ = topology_.Commit();
 }
 
 void ThermalSolver::AddWay(const TipPath& path, CauteryMode mode) {
@@ -264,7 +268,7 @@ void ThermalSolver::FollowLength(float dt_s) {
 
 void ThermalSolver::UpdateProtected(float dt_s) {
   protected_dt_s_ += dt_s;
-  if (frame_ % kProtectedFrames != 0) return;
+  if (frame_ % kProtectedFrames != kProtectedFrame) return;
   alarms_.clear();
   protected_.Update(field_, volume_.get(), damage_.cell_death(), std::exchange(protected_dt_s_, 0.0f), &alarms_);
   for (const ProtectedAlarm& alarm : alarms_) {

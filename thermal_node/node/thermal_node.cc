@@ -152,7 +152,11 @@ void ThermalNode::PublishEvents(const Tick& tick) {
 
 void ThermalNode::PublishPatch(const Tick& tick) {
   patch_note_due_ = patch_note_due_ || solver_.stepped();
-  if (ticks_ % kTicksPerPatch != 0) return;
+  patch_due_ = patch_due_ || ticks_ % kTicksPerPatch == 0;
+  history_due_ = history_due_ || ticks_ % kTicksPerHistoryPatch == 0;
+  // Frames that commit have enough to do.
+  if (!patch_due_ || (solver_.stepped() && solver_.at_commit_frame())) return;
+  patch_due_ = false;
   const bool readers = ports_.patch.has_readers();
   const bool came = readers && !patch_readers_;
   patch_readers_ = readers;
@@ -160,7 +164,8 @@ void ThermalNode::PublishPatch(const Tick& tick) {
   if (patch_note_due_ || came) planner_.Note(solver_.mutable_field(), came);
   patch_note_due_ = false;
   std::optional<PatchPlace> place = planner_.Next(solver_.field());
-  if (!place && ticks_ % kTicksPerHistoryPatch == 0) place = planner_.NextOfHistory();
+  if (!place && history_due_) place = planner_.NextOfHistory();
+  history_due_ = false;
   if (!place) return;
   ports_.patch.WriteInPlace([&](TemperaturePatch::View view) {
     view.header.stamp = patch_stamper_.Next(tick.stamp_ns);

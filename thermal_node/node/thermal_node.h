@@ -95,7 +95,8 @@ class ThermalNode {
   TearState tears_;
   TickManifest manifest_;
   std::uint64_t ticks_ = 0, refused_ = 0, frames_since_checkpoint_ = 0;
-  bool restored_ = false, topology_due_ = true, patch_readers_ = false, patch_note_due_ = false;
+  bool restored_ = false, topology_due_ = true, patch_readers_ = false, patch_due_ = false, history_due_ = false,
+       patch_note_due_ = false;
   double closure_ = 0;
   bool checkpoint_full_ = false;
   runtime::SeqLock<Figures> figures_;

@@ -9,9 +9,9 @@ namespace {
 /// A spur counts from where it protrudes from the hole's border by this part of the half width and this length [m]:
 /// more than the corner of a square end (0.41 of the half width), and than the bump that a tip beside the slit makes.
 constexpr float kSpurPart = 0.75f, kSpur_m = 2e-4f;
-/// From there on it counts as this times the excess, until that is its whole length: without a jump, and at 8 mm/s by
-/// 0.7 mm in a commit.
-constexpr float kSpurSlope = 1.75f;
+/// From there on it counts as this times the excess, until that is its whole length: without a jump of all of it, and
+/// in full soon.
+constexpr float kSpurSlope = 4.0f;
 /// To either side in the moving average, which is 1 mm long in all [m].
 constexpr float kSmooth_m = 5e-4f;
 /// The direction of the line at a free end is that of its last millimetre [m].

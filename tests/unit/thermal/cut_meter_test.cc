@@ -154,7 +154,8 @@ TEST(CutMeterTest, BranchesCountOnceAndComeWithoutAJump) {
     const Vec2f fork(0.02f, 0.02f), end = fork + 0.012f * Vec2f(std::cos(angle), std::sin(angle));
     cut.largest_rise_m = 0;
     cut.Line(fork, end);
-    EXPECT_LE(cut.largest_rise_m, kMostRise_m) << angle;
+    // What is published follows more slowly; a branch must not count all at once.
+    EXPECT_LE(cut.largest_rise_m, 2 * kMostRise_m) << angle;
     // At an acute fork the two centre lines are one for a while.
     const float shared_m = kHalf_m / std::tan(0.5f * angle);
     EXPECT_LE(cut.meter.length_m() - bar_m, 0.012f + 1.1f * kHalf_m) << angle;
