@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -147,6 +148,26 @@ TEST_F(CutRecording, MetalIsWhereItsPoseAndTheSheetSay) {
     EXPECT_LT(frame.centre.x(), 10.1e-3f);
     EXPECT_NEAR(static_cast<double>(frame.nearest_m), 0.3e-3, 1e-6);
     EXPECT_EQ(frame.mode != CauteryMode::kOff, frame.time_s > 0.2 - 1e-9) << frame.time_s;
+  }
+}
+
+TEST_F(CutRecording, OfTwoContactsThePlaceIsThatOfOne) {
+  // A furrow under the middle of the foot: it touches at its heel and at its end.
+  for (std::size_t node = 0; node < scene_.places.size(); ++node) {
+    const std::size_t col = node % FlatScene::kCols;
+    if (col >= 9 && col <= 11) scene_.places[node].z() -= 5e-3f;
+  }
+  const RecordedCut cut = ReadCut(Record(), scene_.view);
+  ASSERT_GT(cut.metal.size(), 90u);
+  bool first = true;
+  for (const MetalFrame& frame : cut.metal) {
+    ASSERT_TRUE(frame.in_contact) << frame.time_s;
+    const auto end = std::max_element(frame.touched.begin(), frame.touched.end(),
+                                      [](const Vec2f& a, const Vec2f& b) { return a.x() < b.x(); });
+    EXPECT_GT(end->x(), 11.5e-3f) << "the end of the foot touches too";
+    EXPECT_LT(frame.centre.x(), 8.5e-3f) << frame.time_s;
+    EXPECT_EQ(frame.goes_on, !first) << frame.time_s;
+    first = false;
   }
 }
 
