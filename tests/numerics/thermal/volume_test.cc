@@ -280,7 +280,8 @@ TEST(VolumeTest, StructuresAreAsWarmAsTheVolumeAtTheirDepth) {
     data.protected_structures = {{ProtectedKind::kNerve, 0.001f, depth, 0, 2}};
     data.protected_points = {{Vec3f::Zero(), Vec2f(0.002f, 0.0101f)}, {Vec3f::Zero(), Vec2f(0.018f, 0.0101f)}};
     ThermalSolver solver(data.View());
-    for (int n = 0; n < 200; ++n) solver.Step(Dwell(20), kDt);
+    // Up to a frame that looks at the structures.
+    for (int n = 0; n < 200 + kProtectedFrame; ++n) solver.Step(Dwell(20), kDt);
     float warmest = 0;
     for (const ProtectedSample& sample : solver.protected_structures().samples()) {
       warmest = std::max(warmest, sample.theta);
