@@ -204,9 +204,7 @@ bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) {
 
 /// A cell belongs to the part of its triangle whose own corners are nearest to it.
 void CauteryProbe::AddGaps(Index triangle, const MetalAxis& axis, float radius_m) {
-  const Index cols = scene_.membrane.cols - 1, cell = triangle / 2;
-  const MembraneTriangle t =
-      MembraneTriangleAt(scene_.membrane.cols, cell / cols, cell % cols, static_cast<int>(triangle % 2));
+  const MembraneTriangle t = MembraneTriangleAt(scene_.membrane.cols, triangle);
   const Held held{scene_, *model_, *particles_};
   const SlitSheet sheet(held);
   const TriangleParts parts = sheet.Parts(t);

@@ -19,13 +19,13 @@ class CauteryProbe {
   /// the caller's.
   ///
   /// The bare metal is the foot and the end of the neck. The footprint is its distance from each cell of the deformed
-  /// sheet around it; each side of a slit goes on unstretched up to its lip.
-  /// Stations along the metal's axis each follow the nearest place of the sheet from step to step, over slits as well,
-  /// so the contact's centre jumps only where the tool does. Their distances decide what touches, with hysteresis.
+  /// sheet around it; each side of a slit goes on unstretched up to its lip. Stations along the metal's axis each
+  /// follow the nearest place of the sheet from step to step, over slits as well, so the contact's centre jumps only
+  /// where the tool does. Their distances decide what touches, with hysteresis.
   [[nodiscard]] CauteryContact Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision);
 
  private:
-  /// The membrane as a SlitSheet holds it.
+  /// The membrane, for SlitSheet.
   struct Held {
     const SceneView& scene;
     const TissueModel& model;

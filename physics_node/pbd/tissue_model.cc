@@ -1,6 +1,7 @@
 #include "physics_node/pbd/tissue_model.h"
 
 #include "services/core/error.h"
+#include "services/core/slit_sheet.h"
 
 namespace fulcrum::physics {
 
@@ -38,11 +39,7 @@ TissueModel::TissueModel(const SceneView& scene, ParticleStore* particles)
 }
 
 std::array<Index, 3> TissueModel::TriangleNodes(Index triangle) const {
-  const Index cell = triangle / 2, cells = scene_.membrane.cols - 1;
-  const Index n00 = cell / cells * scene_.membrane.cols + cell % cells;
-  const Index n11 = n00 + scene_.membrane.cols + 1;
-  return triangle % 2 == 0 ? std::array<Index, 3>{n00, n00 + 1, n11}
-                           : std::array<Index, 3>{n00, n11, n00 + scene_.membrane.cols};
+  return MembraneTriangleAt(scene_.membrane.cols, triangle).nodes;
 }
 
 bool TissueModel::EdgeAlive(Index node, int direction) const {

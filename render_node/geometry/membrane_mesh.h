@@ -58,7 +58,7 @@ class MembraneMesh {
     Triangle nodes;  // Of the cut triangle.
     OwnedCorners owned;
   };
-  /// The mesh as a SlitSheet holds it.
+  /// This mesh, for SlitSheet.
   struct Held {
     const MembraneMesh& mesh;
     [[nodiscard]] std::uint32_t rows() const { return mesh.rows_; }

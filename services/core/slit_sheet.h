@@ -11,7 +11,7 @@
 //            \ /
 //             c
 //
-// Physics (where the metal is on the sheet), the picture and who measures a recording use the same parts.
+// Physics (the footprint of the metal), the picture and the map of a recording use the same parts.
 #pragma once
 
 #include <Eigen/Core>
@@ -38,6 +38,12 @@ struct MembraneTriangle {
     return {{n00, n01, n11}, {edge(n00, 0), edge(n01, 1), edge(n00, 2)}};
   }
   return {{n00, n11, n10}, {edge(n00, 2), edge(n10, 0), edge(n00, 1)}};
+}
+
+/// The same by the triangle's number.
+[[nodiscard]] inline MembraneTriangle MembraneTriangleAt(std::uint32_t cols, Index triangle) {
+  const Index cell = triangle / 2;
+  return MembraneTriangleAt(cols, cell / (cols - 1), cell % (cols - 1), static_cast<int>(triangle % 2));
 }
 
 /// What a cut has left of a triangle: a bit for each corner that is its own; the others are ghosts.
@@ -85,7 +91,7 @@ struct TriangleParts {
   return parts;
 }
 
-/// A sheet as somebody holds it. `Holder` has
+/// Parts and ghosts of a membrane that is stored in a `Holder`, which has
 ///   std::uint32_t rows() const, cols() const;
 ///   bool Gone(Index node) const;                 vaporised, or part of a crumb
 ///   bool Severed(std::size_t edge) const;        3 * node + direction
@@ -123,7 +129,7 @@ class SlitSheet {
     return PartsOf(alive, gone);
   }
 
-  /// Places of the corners of a part [m].
+  /// Places of the corners of a part, ghosts included [m].
   [[nodiscard]] std::array<Vec3f, 3> Corners(const Triangle& nodes, OwnedCorners owned) const {
     std::array<Vec3f, 3> place;
     for (std::size_t k = 0; k < 3; ++k) {

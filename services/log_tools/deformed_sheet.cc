@@ -80,16 +80,11 @@ void DeformedSheet::SetTopology(std::span<const std::uint8_t> dead_nodes, std::s
   const SlitSheet sheet(held);
   cut_triangles_.clear();
   for (Index triangle = 0; triangle < cut_of_.size(); ++triangle) {
-    const TriangleParts parts = sheet.Parts(TriangleAt(triangle));
+    const TriangleParts parts = sheet.Parts(MembraneTriangleAt(scene_.membrane.cols, triangle));
     const bool whole = parts.count == 1 && parts.owned[0] == kAllCorners;
     cut_of_[triangle] = whole ? -1 : static_cast<std::int32_t>(cut_triangles_.size());
     if (!whole) cut_triangles_.push_back(triangle);
   }
-}
-
-MembraneTriangle DeformedSheet::TriangleAt(Index triangle) const {
-  const Index cell = triangle / 2, cols = scene_.membrane.cols - 1;
-  return MembraneTriangleAt(scene_.membrane.cols, cell / cols, cell % cols, static_cast<int>(triangle % 2));
 }
 
 void DeformedSheet::CutIntoPieces(const Removed& removed) {
@@ -114,7 +109,7 @@ void DeformedSheet::CutIntoPieces(const Removed& removed) {
   first_piece_.clear();
   for (const Index triangle : cut_triangles_) {
     first_piece_.push_back(pieces_.size());
-    const MembraneTriangle t = TriangleAt(triangle);
+    const MembraneTriangle t = MembraneTriangleAt(scene_.membrane.cols, triangle);
     const auto& n = t.nodes;
     // Two points of each edge: the end of what hangs on its first corner, and on its second.
     std::array<std::array<Point, 2>, 3> end;
@@ -242,7 +237,7 @@ std::optional<DeformedSheet::Place> DeformedSheet::Nearest(const Vec3f& p_W, flo
             }
             continue;
           }
-          const Triangle t = TriangleAt(triangle).nodes;
+          const Triangle t = MembraneTriangleAt(scene_.membrane.cols, triangle).nodes;
           const auto& m = scene_.membrane_material;
           offer({place_[t[0]], place_[t[1]], place_[t[2]]}, {m[t[0]], m[t[1]], m[t[2]]});
         }

@@ -41,7 +41,7 @@ class DeformedSheet {
   };
   /// Of a cut triangle: of what a corner holds, or of the gap.
   using Piece = std::array<Point, 3>;
-  /// The sheet as a SlitSheet holds it.
+  /// This sheet, for SlitSheet.
   struct Held {
     const DeformedSheet& sheet;
     [[nodiscard]] std::uint32_t rows() const { return sheet.scene_.membrane.rows; }
@@ -57,7 +57,6 @@ class DeformedSheet {
   [[nodiscard]] std::size_t Node(int row, int col) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(col);
   }
-  [[nodiscard]] MembraneTriangle TriangleAt(Index triangle) const;
   void FillDeadNodes();
   void CutIntoPieces(const Removed& removed);
 
