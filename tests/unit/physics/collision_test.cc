@@ -207,10 +207,10 @@ class Still {
         model_(scene, &particles_),
         collision_(scene, &model_, &particles_),
         probe_(scene, &model_, &particles_) {}
-  /// The foot goes through the middle of the sheet, slanted to it, `along` further along x.
-  [[nodiscard]] CauteryContact Through(float slant_deg, float along = 0) {
+  /// The foot goes through the middle of the sheet, slanted to it, `along` further along x and `across` along y.
+  [[nodiscard]] CauteryContact Through(float slant_deg, float along = 0, float across = 0) {
     const float slant = slant_deg * static_cast<float>(M_PI) / 180;
-    ToolPose pose = Down(kMiddle + Vec3f(along, 0, 0) + 0.0025f * Vec3f(-std::cos(slant), 0, std::sin(slant)));
+    ToolPose pose = Down(kMiddle + Vec3f(along, across, 0) + 0.0025f * Vec3f(-std::cos(slant), 0, std::sin(slant)));
     pose.q_WT = Quatf(Eigen::AngleAxisf(slant, Vec3f::UnitY())) * pose.q_WT;
     std::array<ToolCollision::ToolMotion, kMaxTools> motion;
     motion[1] = {ShapeOf(scene_.tools[1], pose), ShapeOf(scene_.tools[1], pose)};
@@ -230,6 +230,25 @@ class Still {
     }));
   }
   void SetOpenCells(const OpenCells& open) { collision_.SetOpenCells(open); }
+  /// Severs the edges from `row` to the next one, which goes on `gap_m` farther in y with all beyond it.
+  void Open(Index row, float gap_m) {
+    TopologyState slit;
+    slit.scene_hash = scene_.hash;
+    slit.rows = kRows;
+    slit.cols = kCols;
+    slit.dead_nodes.assign((kRows * kCols + 7) / 8, 0);
+    slit.dead_edges.assign((3 * kRows * kCols + 7) / 8, 0);
+    slit.shrink.assign(3 * kRows * kCols, 0);
+    for (Index node = row * kCols; node < (row + 1) * kCols; ++node) {
+      SetBit(slit.dead_edges, 3 * node + 1);
+      SetBit(slit.dead_edges, 3 * node + 2);
+    }
+    EXPECT_GT(model_.Apply(slit, &particles_), 0);
+    std::vector<float> xyz(3 * std::size_t{particles_.particle_count()});
+    particles_.CopyPositions(xyz);
+    for (std::size_t node = (row + 1) * kCols; node < kRows * kCols; ++node) xyz[3 * node + 1] += gap_m;
+    particles_.SetAll(xyz, xyz);
+  }
 
  private:
   SceneView scene_;
@@ -267,6 +286,23 @@ TEST_F(OnSheet, AFootprintMovesOnEvenly) {
     }
     before = now;
   }
+}
+
+TEST_F(OnSheet, MetalInAnOpenGapIsAsFarFromBothLipsAsItIs) {
+  // The lips are in the middle of the severed edges; the metal stands in the middle of the gap.
+  constexpr Index kSevered = kRows / 2;
+  constexpr float kAir_m = 3e-4f;
+  const float gap_m = 2 * (scene_.tools[1].tip_radius_m + kAir_m);
+  Still still(scene_);
+  still.Open(kSevered, gap_m);
+  const Footprint print = still.Through(90, 0, 0.5f * (kH + gap_m)).footprint;
+  ASSERT_GT(print.width, 0u);
+  const float least_m = Footprint::Decode(*std::min_element(print.gap.begin(), print.gap.end()));
+  EXPECT_NEAR(least_m, kAir_m, scene_.thermal.cell_m);
+  // On the lip it covers half of itself.
+  const double radius = static_cast<double>(scene_.tools[1].tip_radius_m / scene_.thermal.cell_m),
+               half = 0.5 * M_PI * radius * radius;
+  EXPECT_NEAR(CoveredBy(still.Through(90, 0, 0.5f * kH).footprint).count, half, 0.15 * half);
 }
 
 TEST_F(OnSheet, MetalPushesOnlyWhatIsLeftOfATriangle) {
