@@ -295,7 +295,6 @@ class Bench {
     add("width_mm_p50_most", "mm", Quantile(values(usual, &CutFigures::width_mm_p50), 1));
     add("width_mm_p05", "mm", Quantile(values(all, &CutFigures::width_mm_p05), 0));
     add("width_mm_p95", "mm", Quantile(values(usual, &CutFigures::width_mm_p95), 1));
-    add("width_mm_p95_p50", "mm", Quantile(values(usual, &CutFigures::width_mm_p95), 0.5));
     largest("width_mm_p95_all", "mm", &CutFigures::width_mm_p95);
     largest("off_way_mm_p95", "mm", &CutFigures::off_way_mm_p95);
     largest("spot_way_ratio", "1", &CutFigures::spot_way_ratio);

@@ -25,6 +25,7 @@ struct Cost {
   double curvature = 3e38;  ///< Of all tools that are near a surface; 0: none is.
   double tissue = 3e38;     ///< Not per tool.
   double footprint = 3e38;  ///< Contact of the hook, its footprint included; 0: it does not touch.
+  double slits = 3e38;      ///< The same where every second row of triangles lies over a slit.
   void TakeLess(const Cost& other) {
     find = std::min(find, other.find);
     project = std::min(project, other.project);
@@ -32,6 +33,7 @@ struct Cost {
     curvature = std::min(curvature, other.curvature);
     tissue = std::min(tissue, other.tissue);
     footprint = std::min(footprint, other.footprint);
+    slits = std::min(slits, other.slits);
   }
 };
 
@@ -40,6 +42,22 @@ struct Counts {
 };
 
 /// One pass over the script: the simulation moves tissue and tools, a collision of our own is timed beside it.
+TopologyState EverySecondRowSevered(const MembraneGrid& grid) {
+  TopologyState topology;
+  topology.rows = grid.rows;
+  topology.cols = grid.cols;
+  topology.dead_nodes.assign((grid.node_count() + 7) / 8, 0);
+  topology.dead_edges.assign((3 * grid.node_count() + 7) / 8, 0);
+  topology.shrink.assign(3 * grid.node_count(), 0);
+  for (std::size_t row = 0; row < grid.rows; row += 2) {
+    for (std::size_t node = row * grid.cols; node < (row + 1) * grid.cols; ++node) {
+      SetBit(topology.dead_edges, 3 * node + 1);
+      SetBit(topology.dead_edges, 3 * node + 2);
+    }
+  }
+  return topology;
+}
+
 std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
   TissueSimulation simulation(scene);
   ParticleStore& particles = simulation.particles();
@@ -48,6 +66,10 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
   TissueCollision tissue(scene, &model, &particles);
   SurfaceCurvature curvature(scene, &model, &particles);
   CauteryProbe cautery(scene, &model, &particles);
+  ParticleStore cut_particles(scene);
+  TissueModel cut_model(scene, &cut_particles);
+  cut_model.Apply(EverySecondRowSevered(scene.membrane), &cut_particles);
+  CauteryProbe cut_cautery(scene, &cut_model, &cut_particles);
   std::vector<Cost> costs;
   std::vector<float> moved, xyz(3 * std::size_t{particles.particle_count()}), previous(xyz.size());
   std::vector<ContactRow> rows;
@@ -109,7 +131,8 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
       (void)curvature.At(point, false, (point.closest.on_segment - point.closest.on_triangle).stableNormalized());
     }
     const double t7 = NowUs();
-    double footprint = 0;
+    double footprint = 0, slits = 0;
+    cut_particles.SetAll(xyz, previous);
     for (std::uint32_t i = 0; i < kMaxTools; ++i) {
       if (!tools[i].present || scene.tools[i].kind != ToolKind::kHook) {
         continue;
@@ -117,12 +140,15 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
       const double begin = NowUs();
       const bool touches = cautery.Update(i, tools[i].pose, collision).touching;
       footprint = touches ? NowUs() - begin : 0;
+      const double begin_slits = NowUs();
+      const bool touches_lips = cut_cautery.Update(i, tools[i].pose, collision).touching;
+      slits = touches_lips ? NowUs() - begin_slits : 0;
     }
     most->tissue_rows = std::max(most->tissue_rows, rows.size());
     costs.push_back(
         {(t1 - t0) / count, (t3 - t2) / count, (t2 - t1) / count,
          std::any_of(nearest.begin(), nearest.end(), [](const SurfacePoint& p) { return p.found; }) ? t7 - t6 : 0,
-         t5 - t4, footprint});
+         t5 - t4, footprint, slits});
     most->pairs = std::max(most->pairs, collision.pairs().size());
   }
   return costs;
@@ -138,7 +164,7 @@ void Collide(const SceneView& scene, benchmark::Report* report) {
       costs[i].TakeLess(again[i]);
     }
   }
-  std::vector<double> find, with_rows, with_projection, curvature, tissue, footprint;
+  std::vector<double> find, with_rows, with_projection, curvature, tissue, footprint, slits;
   for (const Cost& cost : costs) {
     find.push_back(cost.find);
     tissue.push_back(cost.tissue);
@@ -147,6 +173,9 @@ void Collide(const SceneView& scene, benchmark::Report* report) {
     }
     if (cost.footprint > 0) {
       footprint.push_back(cost.footprint);
+    }
+    if (cost.slits > 0) {
+      slits.push_back(cost.slits);
     }
     with_rows.push_back(cost.find + cost.rows);
     with_projection.push_back(cost.find + cost.project);
@@ -158,9 +187,11 @@ void Collide(const SceneView& scene, benchmark::Report* report) {
   report->Add("physics.collide.find_us_per_tool_p50", Quantile(find, 0.5), "us");
   report->Add("physics.collide.find_us_per_tool_p99", Quantile(find, 0.99), "us");
   report->Add("physics.collide.curvature_us_p50", Quantile(curvature, 0.5), "us");
+  report->Add("physics.collide.curvature_us_p99", Quantile(curvature, 0.99), "us");
   report->Add("physics.collide.footprint_us_p50", Quantile(footprint, 0.5), "us");
   report->Add("physics.collide.footprint_us_p99", Quantile(footprint, 0.99), "us");
-  report->Add("physics.collide.curvature_us_p99", Quantile(curvature, 0.99), "us");
+  report->Add("physics.collide.footprint_slits_us_p50", Quantile(slits, 0.5), "us");
+  report->Add("physics.collide.footprint_slits_us_p99", Quantile(slits, 0.99), "us");
   report->Add("physics.collide.tissue_us_p50", Quantile(tissue, 0.5), "us");
   report->Add("physics.collide.tissue_us_p99", Quantile(tissue, 0.99), "us");
   report->Add("physics.collide.tissue_rows_max", static_cast<double>(most.tissue_rows), "1");
