@@ -43,7 +43,14 @@ bool IsOpen(const CutMap& map, const Vec2d& texel) {
 }
 
 void MeasureWay(CutMap* map) {
-  int samples = 0, open = 0;
+  struct Share {
+    int samples = 0, open = 0;
+    void Add(bool is_open) {
+      ++samples;
+      open += is_open ? 1 : 0;
+    }
+    [[nodiscard]] double pct() const { return samples > 0 ? 100.0 * open / samples : kNone; }
+  } at_cutting_power, all;
   double way = 0, next = 0;
   const MetalFrame* last = nullptr;
   const double step = kWayStep_m / map->recorded.texels.texel_m;
@@ -56,17 +63,21 @@ void MeasureWay(CutMap* map) {
     const bool goes_on = last != nullptr && frame.goes_on && frame.time_s - last->time_s < kWayGap_s;
     const Vec2d from = goes_on ? map->ToTexel(last->centre) : to;
     const double length = (to - from).norm();
+    const double speed_m_s = goes_on ? length * map->recorded.texels.texel_m / (frame.time_s - last->time_s) : 0;
+    const bool cuts = speed_m_s * map->recorded.vaporising_J_m <= static_cast<double>(frame.power_W);
     for (; next <= length; next += step) {
       const Vec2d at = length > 0 ? Vec2d(from + next / length * (to - from)) : to;
-      ++samples;
-      open += IsOpen(*map, at) ? 1 : 0;
+      const bool open = IsOpen(*map, at);
+      all.Add(open);
+      if (cuts) at_cutting_power.Add(open);
     }
     next -= length;
     way += length;
     last = &frame;
   }
   map->figures.way_mm = 1e3 * way * map->recorded.texels.texel_m;
-  map->figures.open_pct = samples > 0 ? 100.0 * open / samples : kNone;
+  map->figures.open_pct = at_cutting_power.pct();
+  map->figures.open_pct_all = all.pct();
 }
 
 /// Length of a way that samples show with noise.
@@ -183,7 +194,7 @@ void MeasureReported(CutMap* map) {
   figures.jump_mm_max = 1e3 * largest;
   figures.reported_length_mm = lengths.empty() ? 0 : 1e3 * lengths.back().length_m;
   figures.length_error_pct =
-      figures.length_mm > 0 ? 100 * (figures.reported_length_mm - figures.length_mm) / figures.length_mm : kNone;
+      figures.longest_mm > 0 ? 100 * (figures.reported_length_mm - figures.longest_mm) / figures.longest_mm : kNone;
 }
 
 }  // namespace

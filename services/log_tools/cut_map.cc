@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "services/log_tools/cut_figures.h"
 #include "services/log_tools/text.h"
@@ -55,34 +57,68 @@ void CropTo(const RecordedCut& cut, CutMap* map) {
   }
 }
 
-/// Returns the hole without the islands that are too small to go round.
-Mask FindIslands(CutMap* map) {
-  const double texel_m2 = map->recorded.texels.texel_m * map->recorded.texels.texel_m;
-  const Pieces living = FindPieces(map->removed, false, Neighbours::kFour);
-  Mask filled = map->removed;
-  map->islands = Mask(map->removed.width, map->removed.height);
-  int sheet = 0;
+/// Living pieces that do not reach the sheet around.
+struct Islands {
+  Mask texels;
+  Mask hole;  ///< What is removed, and the islands that are too small to go round.
+  int count = 0, pixels = 0;
+  int pieces = 0;  ///< Those that are large enough to be parts of the sheet, and the sheet.
+};
+
+Islands FindIslands(const Mask& removed, double texel_m) {
+  const double texel_m2 = texel_m * texel_m;
+  const Pieces living = FindPieces(removed, false, Neighbours::kFour);
+  Islands islands{Mask(removed.width, removed.height), removed};
   std::vector<std::uint8_t> is_island(living.pieces.size()), is_filled(living.pieces.size());
   for (std::size_t i = 0; i < living.pieces.size(); ++i) {
     const Piece& piece = living.pieces[i];
     const double area_m2 = piece.pixels * texel_m2;
     if (piece.at_border || area_m2 >= kSmallestPiece_m2) {
-      ++sheet;
+      ++islands.pieces;
       continue;
     }
     is_island[i] = 1;
     is_filled[i] = area_m2 < kSmallestRound_m2 ? 1 : 0;
-    ++map->figures.islands;
-    map->figures.islands_mm2 += 1e6 * area_m2;
+    ++islands.count;
+    islands.pixels += piece.pixels;
   }
-  map->figures.pieces = sheet;
   for (std::size_t i = 0; i < living.label.size(); ++i) {
     if (living.label[i] < 0) continue;
     const auto piece = static_cast<std::size_t>(living.label[i]);
-    map->islands.set[i] = is_island[piece];
-    if (is_filled[piece] != 0) filled.set[i] = 1;
+    islands.texels.set[i] = is_island[piece];
+    if (is_filled[piece] != 0) islands.hole.set[i] = 1;
   }
-  return filled;
+  return islands;
+}
+
+CentreLine LineOf(const Mask& hole, double texel_m) {
+  return FindCentreLine(hole, {.smooth = 1e-3 / texel_m, .spur = 0.2e-3 / texel_m});
+}
+
+/// Of the centre lines that the hole has had [texels], looked at every half second.
+double LongestLine(const CutMap& map) {
+  constexpr float kLook_s = 0.5f;
+  const SheetTexels& texels = map.recorded.texels;
+  double longest = map.centre_line.length();
+  if (texels.removed_s.empty()) return longest;
+  const auto shown_s = [&](int x, int y) { return texels.removed_s[texels.Index(x + map.x0, y + map.y0)]; };
+  float first = std::numeric_limits<float>::infinity(), last = 0;
+  for (int y = 0; y < map.removed.height; ++y) {
+    for (int x = 0; x < map.removed.width; ++x) {
+      if (!map.removed.At(x, y)) continue;
+      first = std::min(first, shown_s(x, y));
+      last = std::max(last, shown_s(x, y));
+    }
+  }
+  for (float time_s = first + kLook_s; time_s < last; time_s += kLook_s) {
+    Mask then(map.removed.width, map.removed.height);
+    for (int y = 0; y < then.height; ++y) {
+      for (int x = 0; x < then.width; ++x) then.Put(x, y, map.removed.At(x, y) && shown_s(x, y) <= time_s);
+    }
+    const double texel_m = texels.texel_m;
+    longest = std::max(longest, LineOf(FindIslands(then, texel_m).hole, texel_m).length());
+  }
+  return longest;
 }
 
 }  // namespace
@@ -95,8 +131,13 @@ CutMap MakeCutMap(RecordedCut recorded) {
   const auto removed = std::count(map.removed.set.begin(), map.removed.set.end(), std::uint8_t{1});
   map.figures.removed_mm2 = 1e6 * texel_m * texel_m * static_cast<double>(removed);
   map.figures.holes = static_cast<int>(FindPieces(map.removed, true, Neighbours::kEight).pieces.size());
-  const Mask hole = FindIslands(&map);
-  map.centre_line = FindCentreLine(hole, {.smooth = 1e-3 / texel_m, .spur = 0.2e-3 / texel_m});
+  Islands islands = FindIslands(map.removed, texel_m);
+  map.figures.islands = islands.count;
+  map.figures.islands_mm2 = 1e6 * texel_m * texel_m * islands.pixels;
+  map.figures.pieces = islands.pieces;
+  map.islands = std::move(islands.texels);
+  map.centre_line = LineOf(islands.hole, texel_m);
+  map.figures.longest_mm = 1e3 * texel_m * LongestLine(map);
   MeasureCut(&map);
   return map;
 }
@@ -113,6 +154,7 @@ std::vector<std::pair<std::string, double>> FigureList(const CutFigures& f) {
           {"holes", f.holes},
           {"revived", f.revived},
           {"open_pct", f.open_pct},
+          {"open_pct_all", f.open_pct_all},
           {"way_mm", f.way_mm},
           {"width_mm_p05", f.width_mm_p05},
           {"width_mm_p50", f.width_mm_p50},
@@ -120,6 +162,7 @@ std::vector<std::pair<std::string, double>> FigureList(const CutFigures& f) {
           {"off_way_mm_p95", f.off_way_mm_p95},
           {"spot_way_ratio", f.spot_way_ratio},
           {"length_mm", f.length_mm},
+          {"longest_mm", f.longest_mm},
           {"reported_length_mm", f.reported_length_mm},
           {"length_error_pct", f.length_error_pct},
           {"jump_mm_max", f.jump_mm_max},

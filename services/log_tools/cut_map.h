@@ -28,13 +28,16 @@ struct CutFigures {
   int pieces = 0;       ///< Living pieces of 4 mm^2 or more.
   int holes = 0;        ///< Removed pieces.
   int revived = 0;      ///< Texels that were removed and came back.
-  double open_pct = 0;  ///< Share of the metal's energised way that is open.
-  double way_mm = 0;    ///< Length of that way.
+  /// Share of the metal's energised way that is open: where it went no faster than its power can cut as wide as it is,
+  /// and everywhere. Tissue that slips off the metal is not cut by it.
+  double open_pct = 0, open_pct_all = 0;
+  double way_mm = 0;  ///< Length of the energised way, everywhere.
   double width_mm_p05 = 0, width_mm_p50 = 0, width_mm_p95 = 0;
   double off_way_mm_p95 = 0;  ///< From the centre line to the nearest place where energised metal touched.
   double spot_way_ratio = 0;  ///< Way of the reported place of the current per way of the metal.
   double length_mm = 0;       ///< Of the centre line, from end to end.
-  double reported_length_mm = 0, length_error_pct = 0;
+  double longest_mm = 0;      ///< The longest that it has been: cuts that meet become one that is shorter.
+  double reported_length_mm = 0, length_error_pct = 0;  ///< Of the longest, for the reported length never falls.
   double jump_mm_max = 0;      ///< Largest rise of the reported length within 50 ms.
   int falls = 0;               ///< How often it fell.
   double first_opening_s = 0;  ///< From the first energised touch to the first texel removed.

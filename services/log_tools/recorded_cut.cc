@@ -70,7 +70,16 @@ SheetTexels TexelsOf(const SceneView& scene) {
   texels.removed.assign(count, 0);
   texels.damage.assign(count, 0);
   texels.temperature.assign(count, 0);
+  texels.removed_s.assign(count, std::numeric_limits<float>::infinity());
   return texels;
+}
+
+/// Of the wet sheet from body temperature to steam, losses left out.
+double VaporisingHeat_J_m(const ThermalParams& thermal, float width_m) {
+  constexpr float kBoiling_C = 100.0f;
+  const float warm_J_m3 =
+      thermal.density_kg_m3 * thermal.heat_capacity_J_kgK * (kBoiling_C - thermal.body_temperature_C);
+  return static_cast<double>(width_m * thermal.thickness_m * (warm_J_m3 + thermal.latent_heat_J_m3));
 }
 
 /// Takes the messages of a session in the order of the recording.
@@ -87,6 +96,7 @@ class Reader {
     limit_m_ = tool.tip_radius_m + reach.beyond_m +
                (reach.with_collision_margin ? margin_m : std::min(margin_m, 0.5f * scene.thermal.thickness_m));
     cut_.texels = TexelsOf(scene);
+    cut_.vaporising_J_m = VaporisingHeat_J_m(scene.thermal, 2 * tool.tip_radius_m);
   }
 
   void Begin(const SceneManifest& session) {
@@ -123,6 +133,7 @@ class Reader {
   void Add(const TemperaturePatch& patch) {
     if (patch.texels.size() < std::size_t{4} * kPatchTexels * kPatchTexels) return;
     SheetTexels& texels = cut_.texels;
+    const double time_s = 1e-9 * static_cast<double>(patch.header.stamp.stamp_ns - start_ns_);
     for (int y = 0; y < kPatchTexels; ++y) {
       const int row = static_cast<int>(patch.header.origin_y) + y - texels.y0;
       if (row < 0 || row >= texels.height) continue;
@@ -132,9 +143,8 @@ class Reader {
         const std::uint8_t* texel = &patch.texels[4 * (static_cast<std::size_t>(y) * kPatchTexels + x)];
         const std::size_t i = texels.Index(column, row);
         const std::uint8_t removed = texel[3] == 0 ? 1 : 0;
-        if (removed != 0 && !first_removed_s_) {
-          first_removed_s_ = 1e-9 * static_cast<double>(patch.header.stamp.stamp_ns - start_ns_);
-        }
+        if (removed != 0 && !first_removed_s_) first_removed_s_ = time_s;
+        if (removed != 0) texels.removed_s[i] = std::min(texels.removed_s[i], static_cast<float>(time_s));
         texels.revived += texels.removed[i] > removed ? 1 : 0;
         texels.removed[i] = removed;
         texels.damage[i] = texel[1];
@@ -158,7 +168,9 @@ class Reader {
       while (at + 1 < cut_.current.size() && cut_.current[at + 1].time_s <= frame.time_s + 1e-6) ++at;
       if (at >= cut_.current.size()) break;
       const double age_s = frame.time_s - cut_.current[at].time_s;
-      if (age_s > -1e-6 && age_s <= kCurrentHolds_s) frame.mode = cut_.current[at].mode;
+      if (age_s <= -1e-6 || age_s > kCurrentHolds_s) continue;
+      frame.mode = cut_.current[at].mode;
+      frame.power_W = cut_.current[at].power_W;
     }
     const auto touch = std::find_if(cut_.current.begin(), cut_.current.end(),
                                     [](const CurrentSample& sample) { return sample.touching && sample.energised(); });

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <random>
 
@@ -254,6 +255,44 @@ TEST(CutMap, ClosedHalfOfTheWayIsTold) {
   AddWay(&cut, {10, 5}, {10, 25});
   const CutMap map = MakeCutMap(std::move(cut));
   EXPECT_NEAR(map.figures.open_pct, 100 * 10.6 / 20, 2);
+}
+
+TEST(CutMap, TissueThatSlipsOffTheMetalIsNotAtCuttingPower) {
+  Mask mask(200, 300);
+  Stroke(&mask, {{100, 50}, {100, 148}}, 6);
+  Stroke(&mask, {{100, 170}, {100, 250}}, 6);
+  RecordedCut cut = SheetOf(mask);
+  AddWay(&cut, {10, 5}, {10, 25});
+  cut.vaporising_J_m = 500;
+  for (MetalFrame& frame : cut.metal) frame.power_W = 35;
+  // From 15 to 17 mm in one period: 200 mm/s, at which 35 W vaporise nothing of this width.
+  std::erase_if(cut.metal, [](const MetalFrame& frame) {
+    return frame.centre.y() > 15.05e-3f && frame.centre.y() < 16.95e-3f;
+  });
+  for (std::size_t i = 0; i < cut.metal.size(); ++i) cut.metal[i].time_s = 1 + 0.01 * static_cast<double>(i);
+  RecordedCut slow = cut;
+  const CutFigures figures = MakeCutMap(std::move(cut)).figures;
+  EXPECT_DOUBLE_EQ(figures.open_pct, 100);
+  EXPECT_NEAR(figures.open_pct_all, 95, 1);
+  slow.vaporising_J_m = 100;
+  EXPECT_NEAR(MakeCutMap(std::move(slow)).figures.open_pct, 95, 1);
+}
+
+TEST(CutMap, LengthIsHeldAgainstTheLongestLine) {
+  // Two slits side by side; after two seconds the strip between them goes.
+  Mask slits(200, 300), all(200, 300);
+  for (const double x : {90.0, 110.0}) Stroke(&slits, {{x, 50}, {x, 250}}, 5);
+  Stroke(&all, {{100, 50}, {100, 250}}, 15);
+  RecordedCut cut = SheetOf(all);
+  cut.texels.removed_s.assign(cut.texels.removed.size(), std::numeric_limits<float>::infinity());
+  for (std::size_t i = 0; i < all.set.size(); ++i) {
+    if (all.set[i] != 0) cut.texels.removed_s[i] = slits.set[i] != 0 ? 1.0f : 3.0f;
+  }
+  cut.lengths = {{0.5, 0}, {1, 0.02}, {2, 0.042}, {3, 0.042}};
+  const CutFigures figures = MakeCutMap(std::move(cut)).figures;
+  EXPECT_LT(figures.length_mm, 24);
+  EXPECT_NEAR(figures.longest_mm, 2 * 21.0, 0.03 * 42);
+  EXPECT_NEAR(figures.length_error_pct, 0, 3);
 }
 
 TEST(CutMap, NothingCutIsDrawnToo) {
