@@ -225,8 +225,10 @@ void ThermalSolver::UpdateTopology() {
     topology_.StageCut(field_, stats.low, stats.high);
     removed_.Add(RemovedBox{stats.low, stats.high});
   }
-  if (frame_ % kCommitFrames == kShrinkFrame) StageShrink();
-  if (!at_commit_frame()) return;
+  if (!at_commit_frame()) {
+    StageShrink();
+    return;
+  }
   if (!removed_.empty() || !torn_.empty()) {
     RemovedBox changed = removed_;
     changed.Add(torn_);
@@ -242,10 +244,14 @@ void ThermalSolver::UpdateTopology() {
   committed_ = topology_.Commit();
 }
 
+/// Each frame between two commits looks at its share of the tiles, so that each tile is looked at once per commit.
 void ThermalSolver::StageShrink() {
+  constexpr int kShares = kCommitFrames - 1;
+  const int share = static_cast<int>(frame_ % kCommitFrames) - 1;
   for (const Tile* tile : field_.awake()) {
     // Collagen does not change below this; see DamageModel.
-    if (tile->theta_max > kDamageStart) topology_.StageShrink(field_, *tile);
+    const bool due = (tile->tx + 2 * tile->ty) % kShares == share;
+    if (due && tile->theta_max > kDamageStart) topology_.StageShrink(field_, *tile);
   }
 }
 

@@ -27,8 +27,8 @@ namespace fulcrum::thermal {
 inline constexpr int kCommitFrames = 5;
 /// Protected structures are looked at as often: their time constants are seconds.
 inline constexpr int kProtectedFrames = 5;
-/// Which of these frames looks at shrinking and at protected structures: the frame that commits has enough to do.
-inline constexpr int kShrinkFrame = 3, kProtectedFrame = 2;
+/// Which of these frames looks at them: the frame that commits has enough to do.
+inline constexpr int kProtectedFrame = 2;
 
 /// The cut length grows no faster than this: where the hook slips through tissue that it was pulling, or two holes
 /// meet, the slit itself grows by millimetres between two commits. A fifth above the fastest stroke [m/s].

@@ -28,11 +28,10 @@ inline float Harmonic(float a, float b) { return 2.0f * a * b / (a + b + std::nu
 [[gnu::always_inline]] inline float Main(float link) { return link > 0.0f ? link : 0.0f; }
 [[gnu::always_inline]] inline float Anti(float link) { return link < 0.0f ? -link : 0.0f; }
 
-/// Rows of the tile: enthalpy <- enthalpy + dt dH/dt, with `loss` = dt times the sink per kelvin. In the second stage
-/// of a substep the result is the mean of that and of the enthalpy before it: Heun's method, which keeps the maximum
-/// principle of its stages (Shu and Osher 1988).
-template <bool kSecond, bool kSheared>
-[[gnu::always_inline]] inline void Stage(Tile* tile, float dt_s, float gain, float loss) {
+/// Rows of the tile: enthalpy <- enthalpy + dt dH/dt, with `loss` = dt times the sink per kelvin. In the last stage the
+/// result is the mean of that and of the enthalpy before the step, which has the weight `first`; see DiffuseIsland.
+template <bool kLast, bool kSheared>
+[[gnu::always_inline]] inline void Stage(Tile* tile, float dt_s, float gain, float loss, float first) {
   // Each pass over the whole tile: what is read with a shift right after it was written waits for the store.
   alignas(64) float across_s[kTile * kFaceStride], across_t[(kTile + 3) * kTile], face_s[kTile * kFaceStride];
   for (int j = -1; j <= kTile + 1; ++j) {
@@ -63,9 +62,7 @@ template <bool kSecond, bool kSheared>
     const float* __restrict ft = &across_t[FaceT(0, j + 1)];
     const float* __restrict inverse_area = &tile->geometry.inverse_area[j * kTile];
     float* __restrict h = &tile->state.enthalpy[j * kTile];
-    float* __restrict before = &tile->before[j * kTile];
-    // In the loop below, a second array to write would keep some variants from vectors.
-    if constexpr (!kSecond) std::copy_n(h, kTile, before);
+    const float* __restrict before = &tile->before[j * kTile];
     for (int i = 0; i < kTile; ++i) above[i] = below[i];
     for (int i = 0; i < kTile; ++i) below[i] = FourthOrder(ft[i - kTile], ft[i], ft[i + kTile], gain);
     const float* __restrict l = kSheared ? &tile->links[Corner(0, j)] : nullptr;
@@ -78,19 +75,23 @@ template <bool kSecond, bool kSheared>
                 Anti(l[i + 1]) * (up[1] - t[i]) + Anti(l[i + kCornerStride]) * (down[-1] - t[i]);
       }
       const float after = h[i] + (dt_s * inverse_area[i] * flux - loss * t[i]);
-      h[i] = kSecond ? 0.5f * (before[i] + after) : after;
+      h[i] = kLast ? after + first * (before[i] - after) : after;
     }
   }
 }
 
 FULCRUM_WIDE
-void FirstStage(Tile* tile, float dt_s, float gain, float loss) { Stage<false, false>(tile, dt_s, gain, loss); }
+void AnyStage(Tile* tile, float dt_s, float gain, float loss) { Stage<false, false>(tile, dt_s, gain, loss, 0); }
 FULCRUM_WIDE
-void SecondStage(Tile* tile, float dt_s, float gain, float loss) { Stage<true, false>(tile, dt_s, gain, loss); }
+void LastStage(Tile* tile, float dt_s, float gain, float loss, float first) {
+  Stage<true, false>(tile, dt_s, gain, loss, first);
+}
 FULCRUM_WIDE
-void FirstStageSheared(Tile* tile, float dt_s, float gain, float loss) { Stage<false, true>(tile, dt_s, gain, loss); }
+void AnyStageSheared(Tile* tile, float dt_s, float gain, float loss) { Stage<false, true>(tile, dt_s, gain, loss, 0); }
 FULCRUM_WIDE
-void SecondStageSheared(Tile* tile, float dt_s, float gain, float loss) { Stage<true, true>(tile, dt_s, gain, loss); }
+void LastStageSheared(Tile* tile, float dt_s, float gain, float loss, float first) {
+  Stage<true, true>(tile, dt_s, gain, loss, first);
+}
 
 /// theta with its column sums and extremes; rc = rc_dry + water * rc_water.
 FULCRUM_WIDE
@@ -116,8 +117,8 @@ void ThetaOf(Tile* tile, float rc_dry, float rc_water) {
   tile->water_off = *std::max_element(odd, odd + kTile);
 }
 
-/// theta between the stages with its column sums. What is no number must not reach the neighbours in the second stage;
-/// it is taken out after it.
+/// theta between the stages with its column sums. What is no number must not reach the neighbours in the next stage; it
+/// is taken out after the last.
 FULCRUM_WIDE
 void MiddleThetaOf(Tile* tile, float rc_dry, float rc_water) {
   alignas(64) float sum[kTile] = {};
@@ -375,17 +376,19 @@ void HeatField::ExchangeHalos(Tile* tile) {
   }
 }
 
-void HeatField::RunStage(Tile* tile, bool second, float dt_s, float gain, bool sink, Ledger* ledger) {
-  const float loss = sink ? dt_s * SinkOf(*tile) : 0.0f;
+void HeatField::RunStage(Tile* tile, const StageOf& stage, Ledger* ledger) {
+  const float loss = stage.sink ? stage.dt_s * SinkOf(*tile) : 0.0f;
+  const float first = 1.0f / static_cast<float>(stage.count);
   const bool sheared = !tile->links.empty();
-  if (second) {
-    (sheared ? SecondStageSheared : SecondStage)(tile, dt_s, gain, loss);
+  if (stage.index == 0) tile->before = tile->state.enthalpy;
+  if (stage.last()) {
+    (sheared ? LastStageSheared : LastStage)(tile, stage.dt_s, stage.gain, loss, first);
   } else {
-    (sheared ? FirstStageSheared : FirstStage)(tile, dt_s, gain, loss);
+    (sheared ? AnyStageSheared : AnyStage)(tile, stage.dt_s, stage.gain, loss);
   }
   double sum = 0;
   for (const float s : tile->theta_sum) sum += s;
-  ledger->lost += 0.5 * sum * loss * tile->flat_volume;
+  ledger->lost += static_cast<double>(1.0f - first) * sum * loss * tile->flat_volume;
 }
 
 void HeatField::Cool(Tile* tile, float dt_s, Ledger* ledger) const {

@@ -51,7 +51,7 @@ class HeatField {
   /// One step of conduction and losses, of second order in time, with boiling, waking of neighbours and sleeping of
   /// cold tiles. Each island of awake tiles takes as many substeps as its fastest tile needs to be stable and wet
   /// tissue to be accurate. One that would need more than kMaxSubsteps is stiff: cells that are too fast for it conduct
-  /// as fast as it allows and the sink is taken exactly, after each substep. So it stays bounded by what was there and
+  /// as fast as it allows and the sink is taken exactly, after the step. So it stays bounded by what was there and
   /// conserves heat, whatever the step's length. Returns the largest number of substeps; that of a tile is in
   /// Tile::substeps.
   int Diffuse(float dt_s, Ledger* ledger);
@@ -91,7 +91,13 @@ class HeatField {
   int DiffuseIsland(float dt_s, Ledger* ledger);
   void ExchangeHalos(Tile* tile);
   void LimitFaces(Tile* tile, float rate);
-  void RunStage(Tile* tile, bool second, float dt_s, float gain, bool sink, Ledger* ledger);
+  struct StageOf {
+    int index, count;
+    float dt_s, gain;
+    bool sink;  ///< Losses are part of it.
+    [[nodiscard]] bool last() const { return index + 1 == count; }
+  };
+  void RunStage(Tile* tile, const StageOf& stage, Ledger* ledger);
   void Cool(Tile* tile, float dt_s, Ledger* ledger) const;
   void ComputeConductivity(Tile* tile);
   void ComputeMiddleTheta(Tile* tile) const;

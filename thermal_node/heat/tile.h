@@ -71,7 +71,7 @@ struct Tile {
   /// The same between cells that touch at a corner, at Corner; above 0 between (i-1, j-1) and (i, j), below 0, minus
   /// that between (i, j-1) and (i-1, j). Empty without shear.
   std::vector<float> links;
-  alignas(64) CellArray<float> before{};     ///< Enthalpy at the beginning of a substep [J/m^3].
+  alignas(64) CellArray<float> before{};     ///< Enthalpy at the beginning of the step [J/m^3].
   alignas(64) CellArray<float> cell_rate{};  ///< Rate of the explicit step with two-point fluxes in each cell [1/s].
   alignas(64) std::array<float, kTile> theta_sum{};  ///< Column sums of theta times area.
   float theta_max = 0, theta_min = 0;
