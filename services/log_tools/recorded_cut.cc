@@ -93,8 +93,11 @@ class Reader {
     const ToolDescription& tool = scene.tools[tool_];
     axis_ = MetalAxis(tool);
     const float margin_m = scene.physics.collision_margin_m;
-    limit_m_ = tool.tip_radius_m + reach.beyond_m +
-               (reach.with_collision_margin ? margin_m : std::min(margin_m, 0.5f * scene.thermal.thickness_m));
+    const float touch_m =
+        tool.tip_radius_m +
+        (reach.with_collision_margin ? margin_m : std::min(margin_m, 0.5f * scene.thermal.thickness_m));
+    strikes_m_ = touch_m + reach.strikes_m;
+    limit_m_ = touch_m + reach.holds_m;
     cut_.texels = TexelsOf(scene);
     cut_.vaporising_J_m = VaporisingHeat_J_m(scene.thermal, 2 * tool.tip_radius_m);
   }
@@ -237,7 +240,12 @@ class Reader {
       contacts.back().sum += (limit_m_ - place->distance_m) * place->material;
       contacts.back().weight += limit_m_ - place->distance_m;
     }
-    ChooseContact(contacts, &metal);
+    const bool holds = !cut_.metal.empty() && cut_.metal.back().in_contact;
+    if (metal.nearest_m < strikes_m_ || holds) {
+      ChooseContact(contacts, &metal);
+    } else {
+      metal.touched.clear();
+    }
     cut_.metal.push_back(std::move(metal));
   }
 
@@ -267,7 +275,7 @@ class Reader {
 
   std::size_t tool_ = 0;
   std::vector<Vec3f> axis_;
-  float limit_m_ = 0;
+  float strikes_m_ = 0, limit_m_ = 0;  ///< Of the axis from the sheet's middle.
   std::int64_t start_ns_ = 0;
   DeformedSheet sheet_;
   std::vector<std::uint8_t> dead_nodes_, dead_edges_;

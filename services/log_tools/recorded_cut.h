@@ -12,12 +12,13 @@
 namespace fulcrum::log_tools {
 
 /// Metal touches the sheet where its axis is nearer to the sheet's middle than its radius, what physics keeps between
-/// the two, and the gap across which an arc strikes: at the 500 V peak of a cutting generator 0.05 to 0.15 mm (Paschen).
+/// the two, and the gap across which an arc strikes; then until it is farther than the gap across which an arc holds.
+/// At the 500 V peak of a cutting generator air and steam break down across 0.05 to 0.15 mm (Paschen).
 struct ContactReach {
   /// False: physics keeps half the sheet's thickness from bare metal. True: all of PhysicsParams::collision_margin_m,
   /// as in recordings from before CauteryContact had points of the metal.
   bool with_collision_margin = false;
-  float beyond_m = 0.1e-3f;
+  float strikes_m = 0.1e-3f, holds_m = 0.15e-3f;
 };
 
 /// Texels of the atlas that cover the sheet, row by row; what they were in the last patch that showed them.
@@ -39,7 +40,7 @@ struct SheetTexels {
 /// Where the metal touched the sheet at the time of one TissueFrame.
 struct MetalFrame {
   double time_s = 0;           ///< Session time.
-  std::vector<Vec2f> touched;  ///< Places of the sheet [m].
+  std::vector<Vec2f> touched;  ///< Places of the sheet that an arc holds to [m].
   bool in_contact = false;     ///< `touched` is not empty.
   /// Of one contact, the nearer places the heavier [m]. Long metal may touch a rim here and a fold there: it is the
   /// contact of the frame before, or the closest one.
@@ -72,8 +73,8 @@ struct RecordedCut {
   std::vector<CurrentSample> current;
   std::vector<ReportedLength> lengths;
   TimingSummary thermal_step;  ///< As thermal_node last told.
-  /// Heat that warms and vaporises a strip of the sheet as wide as the metal, per length [J/m]: a power divided by it is
-  /// the speed at which that power can cut so wide at most.
+  /// Heat that warms and vaporises a strip of the sheet as wide as the metal, per length [J/m]: a power divided by it
+  /// is the speed at which that power can cut so wide at most.
   double vaporising_J_m = 0;
   /// From the first energised touch to the first cut that thermal_node tells of, or to the first patch with a removed
   /// texel where that is sooner [s]; NaN: no patch has one.

@@ -164,9 +164,9 @@ class Tracer {
 
 Vec2d CentreOf(const Pixel& at) { return {at.x + 0.5, at.y + 0.5}; }
 
-/// A branch reaches beyond the edge of the hole beside it by more than three quarters of the half width there: less is
-/// a rough edge. (From the middle of a square end to its corners it is 0.41.)
-constexpr double kRough = 1.75;
+/// A branch reaches beyond the edge of the hole beside it by more than the hole is wide there, which is three half
+/// widths from its middle: what is wider than long is a bay of the edge.
+constexpr double kRough = 3;
 
 }  // namespace
 

@@ -6,9 +6,9 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// A spur counts from where it protrudes from the hole's border by this part of the half width and this length [m]:
-/// more than the corner of a square end (0.41 of the half width), and than the bump that a tip beside the slit makes.
-constexpr float kSpurPart = 0.75f, kSpur_m = 2e-4f;
+/// A spur counts from where it protrudes from the hole's border by so many half widths and this length [m]: a branch
+/// protrudes by more than the hole beside it is wide; what is wider than long is a bay of the border.
+constexpr float kSpurPart = 2.0f, kSpur_m = 2e-4f;
 /// From there on it counts as this times the excess, until that is its whole length: without a jump of all of it, and
 /// in full soon.
 constexpr float kSpurSlope = 4.0f;

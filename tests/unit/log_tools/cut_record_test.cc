@@ -172,7 +172,8 @@ TEST_F(CutRecording, OfTwoContactsThePlaceIsThatOfOne) {
 }
 
 TEST_F(CutRecording, TouchGoesByTheReach) {
-  const RecordedCut far = ReadCut(Record(), scene_.view, {.with_collision_margin = false, .beyond_m = -0.4e-3f});
+  const RecordedCut far =
+      ReadCut(Record(), scene_.view, {.with_collision_margin = false, .strikes_m = -0.4e-3f, .holds_m = -0.4e-3f});
   for (const MetalFrame& frame : far.metal) EXPECT_FALSE(frame.in_contact);
 }
 
