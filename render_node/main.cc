@@ -67,7 +67,7 @@ fulcrum::ExitCode RunRender(fulcrum::app::NodeApp& app) {
       app.MakeInput<fulcrum::TissueFrame>(),      app.MakeInput<fulcrum::TopologyState>(),
       app.MakeInput<fulcrum::TemperaturePatch>(), app.MakeInput<fulcrum::ToolState>(),
       app.MakeInput<fulcrum::HandleState>(),      app.MakeInput<fulcrum::ThermalEvent>(),
-      app.MakeInput<fulcrum::CauteryContact>()};
+      app.MakeInput<fulcrum::CauteryContact>(),   app.MakeInput<fulcrum::GeneratorSetting>()};
   LowerPriority(drawing);
   fulcrum::render::RenderNode node(app.scene(), settings, ports, std::move(stage));
   fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, node.display_description());

@@ -13,13 +13,19 @@ ExitCode RunThermal(app::NodeApp& app) {
                                      thermal::kCheckpointLayout, thermal::ThermalNode::CheckpointCapacity(app.scene()));
   thermal::ThermalNode node(
       app.scene(),
-      {app.MakeInput<CauteryContact>(), app.MakeInput<TearState>(), app.MakeOutput<TopologyState>(),
-       app.MakeOutput<OpenCells>(), app.MakeOutput<TemperaturePatch>(), app.MakeOutput<ThermalEvent>(),
-       app.MakeOutput<TickManifest>()},
+      {app.MakeInput<CauteryContact>(), app.MakeInput<TearState>(), app.MakeInput<HandleState>(),
+       app.MakeInput<GeneratorSetting>(), app.MakeOutput<TopologyState>(), app.MakeOutput<OpenCells>(),
+       app.MakeOutput<TemperaturePatch>(), app.MakeOutput<ThermalEvent>(), app.MakeOutput<TickManifest>()},
       &checkpoint, runtime::MonotonicNs());
   app::LogCheckpoint(checkpoint, node.restored());
   return app.Run(
-      app.timing(), [&](const Tick& tick) { node.Step(tick); }, [&](Health* health) { node.FillHealth(health); });
+      app.timing(),
+      [&](const Tick& tick) {
+        node.Step(tick);
+        // Who turned the generator's knob sees it taken at once.
+        if (node.TakeSettingChanged()) app.PublishHealthNow();
+      },
+      [&](Health* health) { node.FillHealth(health); });
 }
 
 }  // namespace

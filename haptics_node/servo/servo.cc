@@ -16,22 +16,24 @@ constexpr double kVelocityFilter_s = 0.003;
 constexpr double kMinDt_s = 1e-4;
 constexpr double kMaxDt_s = 0.02;
 
-/// World X, or Y for a shaft that points along X: the roll of a tool is free, but must not jump in mid-motion.
-Vec3d RollReference(const ToolDescription& tool, std::span<const ScriptKey> script, std::size_t index) {
-  Vec3f towards = -tool.p_WP;
-  for (const ScriptKey& key : script) {
-    if (key.tool == index) {
-      towards = key.p_W - tool.p_WP;
-      break;
-    }
-  }
-  constexpr float kNearlyAlong = 0.9f;
-  return std::abs(towards.normalized().x()) > kNearlyAlong ? Vec3d::UnitY() : Vec3d::UnitX();
+/// Middle of the tissue at rest; the origin of W for a scene without any.
+Vec3f FieldCentre(const SceneView& scene) {
+  Vec3f sum = Vec3f::Zero();
+  for (const Vec3f& place : scene.rest_position) sum += place;
+  return scene.rest_position.empty() ? sum : Vec3f(sum / static_cast<float>(scene.rest_position.size()));
+}
+
+/// World X, or Y where the shaft points from its trocar to the tissue within 18 degrees of X: the roll of a tool is
+/// free, but must not jump in mid-motion, nor with a restart.
+Vec3d RollReference(const Vec3f& p_WP, const Vec3f& field_centre) {
+  constexpr float kNearlyAlong = 0.95f;
+  return std::abs((field_centre - p_WP).normalized().x()) > kNearlyAlong ? Vec3d::UnitY() : Vec3d::UnitX();
 }
 
 }  // namespace
 
 Servo::Servo(const SceneView& scene, const Devices& devices) : force_scale_(scene.haptics.force_scale) {
+  const Vec3f field_centre = FieldCentre(scene);
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     Channel& channel = channels_[i];
     const ToolDescription& tool = scene.tools[i];
@@ -43,7 +45,7 @@ Servo::Servo(const SceneView& scene, const Devices& devices) : force_scale_(scen
     channel.device = devices[i];
     channel.kind = tool.kind;
     channel.trocar = {tool.p_WP.cast<double>(), tool.shaft_length_m};
-    channel.x_reference = RollReference(tool, scene.script, i);
+    channel.x_reference = RollReference(tool.p_WP, field_centre);
     channel.output.limit_N = scene.haptics.force_limit_N;
     channel.output.slew_N_per_ms = scene.haptics.slew_N_per_ms;
   }

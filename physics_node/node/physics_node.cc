@@ -15,22 +15,18 @@ namespace {
 constexpr std::uint64_t kSlowTicks = 10;
 /// A tool that a live haptics node no longer knows is taken away after so long [ticks of ToolState].
 constexpr int kAbsentTicks = 100;
-/// A pedal that has not been heard of for so long is up: a dead handle bridge must not burn on [ns].
-constexpr std::int64_t kPedalTimeoutNs = 100'000'000;
 /// After so long in time a cheaper preset gives way to the next dearer one [ticks].
 constexpr int kRecoveryTicks = 200;
-/// A process that was started again waits for tools and pedals, but no longer than this [ns].
+/// A process that was started again waits for tools and handles, but no longer than this [ns].
 constexpr std::int64_t kWaitNs = 100'000'000;
 /// After a restart the tools go from where they last were for the tissue to where they are now in this time [s], and
-/// the current is dated accordingly: what happened during the outage happens faster, and no tool goes through tissue
+/// the contact is dated accordingly: what happened during the outage happens faster, and no tool goes through tissue
 /// that it was pushing. Not after a longer outage [s], nor farther than this [m].
 constexpr float kCatchUp_s = 0.4f, kLongestOutage_s = 0.8f, kCatchUpMost_m = 0.01f;
 /// A session time of k dt in double may be this much less than k dt: 0.29 / 0.01 < 29 [ticks].
 constexpr double kRoundingTicks = 1e-6;
 /// Health, which goes out ten times a second, warns of a limited force for so long [ticks].
 constexpr std::uint64_t kWarnTicks = 100;
-/// Of a generator that the script says nothing about [W].
-constexpr float kDefaultPower = 35.0f;
 
 std::uint32_t FindHook(const SceneView& scene) {
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
@@ -39,22 +35,6 @@ std::uint32_t FindHook(const SceneView& scene) {
     }
   }
   return kMaxTools;
-}
-
-/// The generator is set once for a session: to the most that the script asks for with this tool.
-float GeneratorPower(const SceneView& scene, std::uint32_t tool) {
-  float power = 0;
-  for (const ScriptKey& key : scene.script) {
-    power = key.tool == tool ? std::max(power, key.power_W) : power;
-  }
-  return power > 0.0f ? power : kDefaultPower;
-}
-
-CauteryMode ModeOf(std::uint8_t pedals) {
-  return (pedals & kPedalCut) != 0     ? CauteryMode::kCut
-         : (pedals & kPedalBlend) != 0 ? CauteryMode::kBlend
-         : (pedals & kPedalCoag) != 0  ? CauteryMode::kCoag
-                                       : CauteryMode::kOff;
 }
 
 }  // namespace
@@ -70,8 +50,7 @@ PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::Ch
       cautery_stamper_(epoch_ns),
       tear_stamper_(epoch_ns),
       manifest_stamper_(epoch_ns),
-      hook_(FindHook(scene)),
-      power_W_(GeneratorPower(scene, hook_)) {
+      hook_(FindHook(scene)) {
   for (ToolInput& input : inputs_) {
     // Until a handle speaks, jaws neither grasp nor let go.
     input.pose.jaw_rad = 0.5f * (scene.physics.grasp_close_rad + scene.physics.grasp_open_rad);
@@ -180,7 +159,6 @@ void PhysicsNode::TakeHandles(std::int64_t now_ns) {
   handle_states_.Forget(now_ns);
   const HandleState& state = handle_states_.before();
   handle_stamp_ = state.stamp;
-  pedals_ = state.pedals;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const HandleSample& handle = state.handles[i];
     if (handle.present && handle.quality > 0.0f) {
@@ -280,7 +258,7 @@ void PhysicsNode::PublishContacts(const Tick& tick) {
 }
 
 void PhysicsNode::PublishCautery(const Tick& tick) {
-  // While it waits it does not know the pedal; a sample without current would leave a bridge in the slit.
+  // While it waits it does not know the pose; a sample without contact would leave a bridge in the slit.
   if (hook_ == kMaxTools || waits_ || !ports_.cautery.has_readers()) {
     return;
   }
@@ -288,9 +266,6 @@ void PhysicsNode::PublishCautery(const Tick& tick) {
   contact.stamp = cautery_stamper_.Next(tick.stamp_ns);
   contact.session_time_s = contact_time_s_;
   contact.topology_revision = simulation_.model().revision();
-  const bool heard = tick.stamp_ns - handle_stamp_.stamp_ns <= kPedalTimeoutNs;
-  contact.mode = heard ? ModeOf(pedals_) : CauteryMode::kOff;
-  contact.power_W = contact.mode == CauteryMode::kOff ? 0.0f : power_W_;
   ports_.cautery.Write(contact);
 }
 

@@ -84,15 +84,13 @@ class PhysicsNode {
   TissueSimulation simulation_;
   bus::Stamper frame_stamper_, contact_stamper_, cautery_stamper_, tear_stamper_, manifest_stamper_;
   std::uint32_t hook_ = kMaxTools;  ///< The tool that cuts; kMaxTools: none.
-  float power_W_;
 
   InputHistory<ToolState> tool_states_;
   InputHistory<HandleState> handle_states_;
   Stamp tool_before_, tool_after_, handle_stamp_;  ///< Samples that the last step took.
   std::int64_t pose_ns_ = 0;                       ///< Time of the tools' poses in the last step.
-  std::uint8_t pedals_ = kPedalNone;
-  double step_time_s_ = 0;  ///< Session time that the last step stands for.
-  double step_ = 0;         ///< The same in periods.
+  double step_time_s_ = 0;                         ///< Session time that the last step stands for.
+  double step_ = 0;                                ///< The same in periods.
   TopologyState topology_state_;
   OpenCells open_cells_;
   std::array<ToolInput, kMaxTools> inputs_;
@@ -107,8 +105,8 @@ class PhysicsNode {
   std::uint64_t frame_version_ = 0, hash_version_ = 0, saved_version_ = 0, measured_version_ = 0;
   std::uint64_t state_hash_ = 0;
   bool restored_ = false;
-  bool waits_ = false;      ///< Started again, and has not heard tools and pedals yet: the tools stay where they were.
-  int catch_up_steps_ = 0;  ///< Until the tools are where their samples say, after a restart.
+  bool waits_ = false;  ///< Started again, and has not heard of tools and handles yet: the tools stay where they were.
+  int catch_up_steps_ = 0;     ///< Until the tools are where their samples say, after a restart.
   double contact_time_s_ = 0;  ///< Session time of the tools' poses; behind step_time_s_ while they catch up.
   float max_displacement_m_ = 0;
   TickManifest manifest_;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "services/core/generator_inputs.h"
+
 namespace fulcrum::render {
 namespace {
 
@@ -50,6 +52,7 @@ void RenderNode::Step(const Tick& tick) {
     TakeThermal();
     TakeEvents();
     TakeTools();
+    TakeGenerator();
     TakeContact();
     FindLate();
   }
@@ -168,16 +171,21 @@ void RenderNode::FindLate() {
   }
 }
 
+void RenderNode::TakeGenerator() {
+  (void)ports_.generator.TakeLatest(&generator_);
+  const float power_W = PowerOf(generator_, ModeOf(handles_.pedals));
+  if (power_W != hud_.power_W) {
+    hud_.power_W = power_W;
+    changed_on_screen_ = changed_in_file_ = true;
+  }
+}
+
 void RenderNode::TakeContact() {
   if (!ports_.contacts.TakeLatest(&contact_)) {
     return;
   }
-  if (contact_.power_W != hud_.power_W) {
-    hud_.power_W = contact_.power_W;
-    changed_on_screen_ = changed_in_file_ = true;
-  }
   // Events tell of the first steam at a place; as long as power goes into tissue that boils, there is more.
-  if (contact_.touching && contact_.power_W > 0 && temperature_C_ > kBoils_C && Recent(temperature_time_s_)) {
+  if (contact_.touching && hud_.power_W > 0 && temperature_C_ > kBoils_C && Recent(temperature_time_s_)) {
     view_.AddSmoke(contact_.material, session_time_s_);
     changed_on_screen_ = changed_in_file_ = true;
   }

@@ -27,6 +27,7 @@ struct RenderPorts {
   bus::Input<HandleState>& handles;
   bus::Input<ThermalEvent>& events;
   bus::Input<CauteryContact>& contacts;
+  bus::Input<GeneratorSetting>& generator;
 };
 
 struct RenderSettings {
@@ -70,6 +71,7 @@ class RenderNode {
   void TakeTools();
   [[nodiscard]] bool ready() const { return tissue_.header.stamp.sequence != 0; }
   void TakeEvents();
+  void TakeGenerator();
   void TakeContact();
   void TakeKeys();
   void FindLate();
@@ -94,6 +96,7 @@ class RenderNode {
   HandleState handles_, new_handles_;
   ThermalEvent event_;
   CauteryContact contact_;
+  GeneratorSetting generator_;
   Picture picture_;
   HudState hud_;
   CameraControl camera_;

@@ -10,6 +10,9 @@ namespace {
 // How long a prompt stays after its last cause [s]: what goes on, what has happened, what must not be missed.
 constexpr double kStays_s = 0.5, kHappened_s = 2, kGrave_s = 5;
 
+/// A contact waits no longer than this for the pedal of its time [s].
+constexpr double kPedalLate_s = 1;
+
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 std::size_t At(Measure measure) { return static_cast<std::size_t>(measure); }
@@ -53,13 +56,37 @@ void Assessor::Add(const ContactModel& model) {
 }
 
 void Assessor::Add(const CauteryContact& contact) {
-  const double time_s = contact.session_time_s;
-  if (!Counts(time_s)) return;
-  const LineMeter::Finding finding = line_.Add(contact);
-  if (finding.pedal_without_contact) Raise(Prompt::kPedalWithoutContact, time_s + kStays_s);
-  if (finding.off_line) Raise(Prompt::kOffLine, time_s + kStays_s);
-  if (finding.ureter_near) Raise(Prompt::kUreterNear, time_s + kStays_s);
-  if (finding.nerve_near) Raise(Prompt::kNerveNear, time_s + kStays_s);
+  if (!Counts(contact.session_time_s)) return;
+  contacts_.push_back({contact.session_time_s, contact.touching, contact.material, false});
+  MeasureContacts(false);
+}
+
+void Assessor::Add(const HandleState& state) {
+  generator_.Add(state);
+  MeasureContacts(false);
+}
+
+void Assessor::MeasureContacts(bool all) {
+  while (!contacts_.empty()) {
+    HookSample& contact = contacts_.front();
+    const double time_s = contact.time_s;
+    const std::int64_t ns = start_ns_ + std::llround(1e9 * time_s);
+    const bool known = generator_.newest_pedal_ns() >= ns || contacts_.back().time_s - time_s > kPedalLate_s;
+    if (!known && !all) return;
+    contact.energised = generator_.At(ns).mode != CauteryMode::kOff;
+    generator_.Forget(ns);
+    const LineMeter::Finding finding = line_.Add(contact);
+    if (finding.pedal_without_contact) Raise(Prompt::kPedalWithoutContact, time_s + kStays_s);
+    if (finding.off_line) Raise(Prompt::kOffLine, time_s + kStays_s);
+    if (finding.ureter_near) Raise(Prompt::kUreterNear, time_s + kStays_s);
+    if (finding.nerve_near) Raise(Prompt::kNerveNear, time_s + kStays_s);
+    contacts_.pop_front();
+  }
+}
+
+void Assessor::Finish() {
+  MeasureContacts(true);
+  motion_.Finish();
 }
 
 void Assessor::Add(const ThermalEvent& event) {

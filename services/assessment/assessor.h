@@ -6,11 +6,12 @@
 //   assessor.End(session_time_s);     // Then nothing later counts.
 //   Score score = Evaluate(scene.assessment, assessor.figures());
 //
-// Each measure comes from one topic alone, so the order between topics does not matter: live and from a recording the
-// same messages give the same figures.
+// The order between topics does not matter: a measure comes from one topic alone, and a contact waits for the pedal of
+// its time. Live and from a recording the same messages give the same figures.
 #pragma once
 
 #include <array>
+#include <deque>
 #include <limits>
 
 #include "services/assessment/damage_map.h"
@@ -18,6 +19,7 @@
 #include "services/assessment/line_meter.h"
 #include "services/assessment/motion_meter.h"
 #include "services/assessment/score.h"
+#include "services/core/generator_inputs.h"
 #include "services/core/scene_view.h"
 
 namespace fulcrum::assessment {
@@ -36,6 +38,7 @@ class Assessor {
 
   void Add(const ToolState& state);
   void Add(const ContactModel& model);
+  void Add(const HandleState& state);
   void Add(const CauteryContact& contact);
   void Add(const ThermalEvent& event);
   void Add(const TopologyState& topology);
@@ -44,9 +47,10 @@ class Assessor {
   /// Patches are large, and of use only where a line is planned.
   [[nodiscard]] bool needs_patches() const { return !line_.line().empty(); }
 
-  /// So far. The last movement counts when it has ended: after Finish() all have.
+  /// So far. The last movement counts when it has ended, the last contacts when their pedal is known: after Finish()
+  /// all do.
   [[nodiscard]] Figures figures() const;
-  void Finish() { motion_.Finish(); }
+  void Finish();
   /// Set of Prompt bits at a session time.
   [[nodiscard]] std::uint32_t PromptsAt(double session_time_s) const;
 
@@ -54,6 +58,8 @@ class Assessor {
   [[nodiscard]] double TimeOf(const Stamp& stamp) const;
   [[nodiscard]] bool Counts(double time_s) const { return begun_ && time_s >= 0 && time_s <= end_s_; }
   void Raise(Prompt prompt, double until_s);
+  /// Those whose pedal is known; all of them: whether or not.
+  void MeasureContacts(bool all);
   [[nodiscard]] MeasureValues ToolFigures(int i) const;
   void SetOfMotion(MeasureValues* session) const;
   void SetOfHook(MeasureValues* session) const;
@@ -65,6 +71,8 @@ class Assessor {
   MotionMeter motion_;
   ForceMeter force_;
   LineMeter line_;
+  GeneratorInputs generator_;
+  std::deque<HookSample> contacts_;  ///< Waiting for the pedal of their time.
   DamageMap damage_;
   double cut_length_m_ = 0, cut_width_m_ = 0, cut_off_way_m_ = 0;
   std::array<int, 4> alarms_{};  ///< Ureter warnings and injuries, nerve warnings and injuries.

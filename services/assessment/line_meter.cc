@@ -50,14 +50,14 @@ LineMeter::LineMeter(const SceneView& scene) : params_(scene.assessment), line_(
   done_.resize(static_cast<std::size_t>(std::ceil(line_.length_m() / kBin_m)), 0);
 }
 
-LineMeter::Finding LineMeter::Add(const CauteryContact& contact) {
+LineMeter::Finding LineMeter::Add(const HookSample& contact) {
   Finding finding;
-  const double time_s = contact.session_time_s;
+  const double time_s = contact.time_s;
   if (time_s <= last_s_) return finding;
   const bool continues = time_s - last_s_ <= kGap_s;
   const double dt_s = continues ? time_s - last_s_ : 0;
   last_s_ = time_s;
-  const bool energised = contact.mode != CauteryMode::kOff;
+  const bool energised = contact.energised;
   if (energised && !contact.touching) {
     pedal_without_contact_s_ += dt_s;
     dry_s_ += dt_s;

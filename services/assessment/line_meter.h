@@ -28,7 +28,15 @@ class SheetLine {
   std::vector<double> along_;  ///< Of each point.
 };
 
-/// Fed with each CauteryContact in order.
+/// Of a CauteryContact, and whether a pedal was down at its time.
+struct HookSample {
+  double time_s = 0;
+  bool touching = false;
+  Vec2f material = Vec2f::Zero();
+  bool energised = false;
+};
+
+/// Fed with each sample in order.
 class LineMeter {
  public:
   explicit LineMeter(const SceneView& scene);
@@ -36,7 +44,7 @@ class LineMeter {
   struct Finding {
     bool pedal_without_contact = false, off_line = false, ureter_near = false, nerve_near = false;
   };
-  Finding Add(const CauteryContact& contact);
+  Finding Add(const HookSample& contact);
 
   [[nodiscard]] const SheetLine& line() const { return line_; }
   [[nodiscard]] double pedal_without_contact_s() const { return pedal_without_contact_s_; }

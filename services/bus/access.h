@@ -49,9 +49,9 @@ inline constexpr TopicSet kNodeReads = SetOf(kSceneManifest, kCommand);
 
 /// The nodes first, by NodeId.
 inline constexpr std::array kRoles{
-    AccessRole{"supervisor", SetOf(kSceneManifest, kCommand, kCommandReply, kHealth),
-               SetOf(kCommand, kThermalEvent, kHealth, kToolState, kContactModel, kCauteryContact, kTopologyState,
-                     kTemperaturePatch)},
+    AccessRole{"supervisor", SetOf(kSceneManifest, kGeneratorSetting, kCommand, kCommandReply, kHealth),
+               SetOf(kCommand, kThermalEvent, kHealth, kToolState, kHandleState, kContactModel, kCauteryContact,
+                     kTopologyState, kTemperaturePatch)},
     AccessRole{"handle_bridge", kNodeWrites | SetOf(kHandleState), kNodeReads},
     AccessRole{"haptics_node", kNodeWrites | SetOf(kToolState, kTickManifest), kNodeReads | SetOf(kContactModel)},
     AccessRole{"physics_node",
@@ -59,10 +59,10 @@ inline constexpr std::array kRoles{
                kNodeReads | SetOf(kToolState, kHandleState, kTopologyState, kOpenCells, kTickManifest)},
     AccessRole{"thermal_node",
                kNodeWrites | SetOf(kTopologyState, kOpenCells, kTemperaturePatch, kThermalEvent, kTickManifest),
-               kNodeReads | SetOf(kCauteryContact, kTearState)},
+               kNodeReads | SetOf(kCauteryContact, kTearState, kHandleState, kGeneratorSetting)},
     AccessRole{"render_node", kNodeWrites,
                kNodeReads | SetOf(kTissueFrame, kTopologyState, kTemperaturePatch, kToolState, kHandleState,
-                                  kThermalEvent, kCauteryContact)},
+                                  kThermalEvent, kCauteryContact, kGeneratorSetting)},
     AccessRole{"recorder", kNodeWrites, kAll},
     AccessRole{kReplayerIdentity, kAll & ~SetOf(kCommand, kCommandReply), 0},
     AccessRole{kLinkIdentity, kAll, kAll},

@@ -82,6 +82,11 @@ bool PassesGate(const HandleState& m) noexcept {
          });
 }
 
+bool PassesGate(const GeneratorSetting& m) noexcept {
+  return IsStamp(m.stamp) && Within(m.cut_W, 0.0, kMaxSetPower_W) && Within(m.coag_W, 0.0, kMaxSetPower_W) &&
+         Within(m.blend_W, 0.0, kMaxSetPower_W);
+}
+
 bool PassesGate(const ToolState& m) noexcept {
   return IsStamp(m.stamp) && std::all_of(m.tools.begin(), m.tools.end(), IsTool);
 }
@@ -103,10 +108,9 @@ bool PassesGate(const CauteryContact& m) noexcept {
   const bool weights_in_range =
       std::all_of(b.begin(), b.end(), [](float w) { return Within(w, -kUnitTolerance, 1.0f + kUnitTolerance); });
   const bool place_is_known = m.triangle != kNoIndex && Magnitude(b[0] + b[1] + b[2] - 1.0f, kUnitTolerance);
-  return IsStamp(m.stamp) && IsSessionTime(m.session_time_s) && UpTo(m.mode, CauteryMode::kBlend) &&
-         m.tool < kMaxTools && weights_in_range && (!m.touching || place_is_known) &&
-         Magnitude(m.material, kMaxCoordinate_m) && Magnitude(m.material_rate, kMaxSpeed_m_s) &&
-         Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) && Within(m.power_W, 0.0, kMaxPower_W) &&
+  return IsStamp(m.stamp) && IsSessionTime(m.session_time_s) && m.tool < kMaxTools && weights_in_range &&
+         (!m.touching || place_is_known) && Magnitude(m.material, kMaxCoordinate_m) &&
+         Magnitude(m.material_rate, kMaxSpeed_m_s) && Within(m.contact_radius_m, 0.0, kMaxCoordinate_m) &&
          m.footprint.whole();
 }
 

@@ -26,7 +26,8 @@ inline constexpr float kMaxPower_W = 1000.0f;
 /// Room for rounding in unit normals, unit quaternions and barycentric sums held in single precision.
 inline constexpr float kUnitTolerance = 1e-2f;
 
-inline constexpr std::size_t kMaxConsumedInputs = 9;
+/// Thermal names most: eight contacts, and for each two HandleStates and a GeneratorSetting; a TearState.
+inline constexpr std::size_t kMaxConsumedInputs = 33;
 inline constexpr std::size_t kMaxInputHealths = 16;
 inline constexpr std::size_t kMaxMetrics = 24;
 inline constexpr std::size_t kMaxMetricName = 31;
@@ -39,6 +40,7 @@ inline constexpr std::size_t kMaxErrorText = 255;
 inline constexpr std::size_t kMaxReplyText = 1023;
 
 [[nodiscard]] bool PassesGate(const HandleState& m) noexcept;
+[[nodiscard]] bool PassesGate(const GeneratorSetting& m) noexcept;
 [[nodiscard]] bool PassesGate(const ToolState& m) noexcept;
 [[nodiscard]] bool PassesGate(const TissueFrame& m) noexcept;
 [[nodiscard]] bool PassesGate(const ContactModel& m) noexcept;

@@ -78,6 +78,8 @@ inline constexpr std::array<TopicRole, kTopicCount> kTopicRoles{{
     {TopicId::kHealth, "fulcrum/Health", Path::kLoopback, true, true, false, true, kLatestOnly, kAllWriters},
     {TopicId::kTearState, "fulcrum/TearState", Path::kLoopback, true, true, false, false, kLatestOnly, kFrameRing},
     {TopicId::kOpenCells, "fulcrum/OpenCells", Path::kLoopback, true, true, false, false, kLatestOnly, kFrameRing},
+    {TopicId::kGeneratorSetting, "fulcrum/GeneratorSetting", Path::kLoopback, true, true, false, false, kLatestOnly,
+     kOutage},
 }};
 
 [[nodiscard]] constexpr const TopicRole& RoleOf(TopicId id) { return kTopicRoles[static_cast<std::size_t>(id)]; }
@@ -113,6 +115,8 @@ template <>
 inline constexpr TopicId kTopicOf<TearState> = TopicId::kTearState;
 template <>
 inline constexpr TopicId kTopicOf<OpenCells> = TopicId::kOpenCells;
+template <>
+inline constexpr TopicId kTopicOf<GeneratorSetting> = TopicId::kGeneratorSetting;
 
 template <class T>
 [[nodiscard]] constexpr const TopicRole& RoleOf() {
@@ -151,6 +155,8 @@ decltype(auto) WithMessageOf(TopicId id, F&& f) {
       return f(std::type_identity<TearState>());
     case TopicId::kOpenCells:
       return f(std::type_identity<OpenCells>());
+    case TopicId::kGeneratorSetting:
+      return f(std::type_identity<GeneratorSetting>());
     case TopicId::kHealth:
       break;
   }

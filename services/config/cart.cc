@@ -110,6 +110,14 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   cart.pedal.kind = pedal.Choice("kind", cart.pedal.kind, kLinkKinds);
   ReadLink(pedal, &cart.pedal.link);
   ReadSimulated(pedal.MapOrDefaults("simulated"), false, &cart.pedal.simulated);
+  StrictMap generator = root.MapOrDefaults("generator");
+  const auto power = [&generator](const char* key, float* power_W) {
+    *power_W = static_cast<float>(
+        generator.NumberSi(key, static_cast<double>(*power_W), Range::Between(0, static_cast<double>(kMaxSetPower_W))));
+  };
+  power("cut_W", &cart.generator.cut_W);
+  power("coag_W", &cart.generator.coag_W);
+  power("blend_W", &cart.generator.blend_W);
   StrictMap devices = root.MapOrDefaults("devices");
   for (std::size_t tool = 0; tool < cart.devices.size(); ++tool) {
     ReadDevice(devices.MapOrDefaults(ToolKey(tool)), &cart.devices[tool]);

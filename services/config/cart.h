@@ -66,6 +66,13 @@ struct PedalConfig {
   SimulatedUnit simulated;  ///< For kSimulated.
 };
 
+/// What the generator's panel is set to when a session begins, by mode [W].
+struct GeneratorConfig {
+  float cut_W = 35;
+  float coag_W = 35;
+  float blend_W = 35;
+};
+
 enum class DeviceKind { kNone, kSimulated, kTouch };
 
 /// Who holds a simulated device: the hand that the scene describes, or one of three standard ones.
@@ -112,6 +119,7 @@ struct CartConfig {
   int domain = 7;  ///< DDS domain, 1 … 100.
   std::array<HandleConfig, kMaxTools> handles;
   PedalConfig pedal;
+  GeneratorConfig generator;
   std::array<DeviceConfig, kMaxTools> devices;  ///< By tool.
   std::array<NodeTiming, kNodeCount> nodes;     ///< By NodeId.
   SecurityConfig security;

@@ -151,6 +151,8 @@ struct Console::Impl {
         return Ask("restart", TextIn(routed.fields, "node"));
       case Wanted::kDump:
         return Ask("dump", "asked for on the console");
+      case Wanted::kGenerator:
+        return TurnGenerator(routed.fields);
       case Wanted::kReplay:
         return Replay(TextIn(routed.fields, "name"));
       case Wanted::kCalibrate:
@@ -219,6 +221,13 @@ struct Console::Impl {
     if (asking.valid()) return Refusal(409, "the supervisor has not answered the last request yet");
     asking = std::async(std::launch::async, supervisor::AskSupervisor, settings.domain, verb, argument);
     return Done("asked");
+  }
+
+  HttpResponse TurnGenerator(const Form& fields) {
+    std::string words;
+    for (const auto& [knob, power] : fields) words += (words.empty() ? "" : " ") + knob + "=" + power;
+    if (words.empty()) return Refusal(400, "cut, coag or blend: which knob, and how many watts?");
+    return Ask("generator", words);
   }
 
   void StartTask(std::string title, const char* program, const std::vector<std::string>& arguments) {

@@ -63,6 +63,9 @@ std::string FiguresJson(const SessionWatch& watch) {
     add("highest_C", NodeId::kThermal, "highest_temperature_C", 0.1);
     add("power_W", NodeId::kThermal, "power_W", 0.1);
     add("cut_mm", NodeId::kThermal, "cut_length_mm", 0.1);
+    add("set_cut_W", NodeId::kSupervisor, "generator_cut_W", 0.1);
+    add("set_coag_W", NodeId::kSupervisor, "generator_coag_W", 0.1);
+    add("set_blend_W", NodeId::kSupervisor, "generator_blend_W", 0.1);
   }
   add("force0_N", NodeId::kHaptics, "force0_N", 0.01);
   add("force1_N", NodeId::kHaptics, "force1_N", 0.01);

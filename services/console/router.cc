@@ -30,6 +30,7 @@ bool IsOnOff(std::string_view text) { return text == "on" || text == "off"; }
 bool IsTool(std::string_view text) { return text == "0" || text == "1"; }
 bool IsCalibration(std::string_view text) { return text == "handle" || text == "trocar"; }
 bool IsPower(std::string_view text) { return ParseNumber(text, 1, 300).has_value(); }
+bool IsKnob(std::string_view text) { return ParseNumber(text, 0, static_cast<double>(kMaxSetPower_W)).has_value(); }
 bool IsSeconds(std::string_view text) { return ParseNumber(text, 1, 7 * 24 * 3600.0).has_value(); }
 bool IsPictureRate(std::string_view text) { return ParseNumber(text, 0.1, 30).has_value(); }
 bool IsTicket(std::string_view text) { return text.size() == 64 && IsPlainName(text); }
@@ -44,6 +45,9 @@ constexpr std::array kStartFields{
     Field{"picture_rate", false, IsPictureRate, "0.1 to 30 per second"},
 };
 constexpr std::array kNodeFields{Field{"node", true, IsNode, "a node's name, for example physics_node"}};
+constexpr std::array kGeneratorFields{Field{"cut", false, IsKnob, "0 to 300 W"},
+                                      Field{"coag", false, IsKnob, "0 to 300 W"},
+                                      Field{"blend", false, IsKnob, "0 to 300 W"}};
 constexpr std::array kReplayFields{Field{"name", true, IsRecordingName, "a name that /api/recordings lists"}};
 constexpr std::array kCalibrateFields{Field{"what", true, IsCalibration, "handle, trocar"},
                                       Field{"tool", true, IsTool, "0, 1"}};
@@ -67,6 +71,7 @@ constexpr std::array kEntries{
     Entry{"/api/stop", true, Wanted::kStop, {}},
     Entry{"/api/restart", true, Wanted::kRestart, kNodeFields},
     Entry{"/api/dump", true, Wanted::kDump, {}},
+    Entry{"/api/generator", true, Wanted::kGenerator, kGeneratorFields},
     Entry{"/api/replay", true, Wanted::kReplay, kReplayFields},
     Entry{"/api/calibrate", true, Wanted::kCalibrate, kCalibrateFields},
     Entry{"/api/task/enter", true, Wanted::kEnter, {}},

@@ -25,6 +25,7 @@ enum class Wanted {
   kStop,
   kRestart,  ///< node
   kDump,
+  kGenerator,  ///< cut, coag, blend
   kReplay,     ///< name
   kCalibrate,  ///< what, tool
   kEnter,      ///< To the guided task.

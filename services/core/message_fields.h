@@ -46,6 +46,12 @@ struct FieldsOf<HandleState> {
                                           FULCRUM_FIELD(HandleState, pedals)};
 };
 template <>
+struct FieldsOf<GeneratorSetting> {
+  static constexpr auto list =
+      std::tuple{FULCRUM_FIELD(GeneratorSetting, stamp), FULCRUM_FIELD(GeneratorSetting, cut_W),
+                 FULCRUM_FIELD(GeneratorSetting, coag_W), FULCRUM_FIELD(GeneratorSetting, blend_W)};
+};
+template <>
 struct FieldsOf<ToolSample> {
   static constexpr auto list = std::tuple{FULCRUM_FIELD(ToolSample, kind), FULCRUM_FIELD(ToolSample, state),
                                           FULCRUM_FIELD(ToolSample, p_WT), FULCRUM_FIELD(ToolSample, q_WT),
@@ -108,15 +114,13 @@ struct FieldsOf<CauteryContact> {
                                           FULCRUM_FIELD(CauteryContact, topology_revision),
                                           FULCRUM_FIELD(CauteryContact, touching),
                                           FULCRUM_FIELD(CauteryContact, tented),
-                                          FULCRUM_FIELD(CauteryContact, mode),
                                           FULCRUM_FIELD(CauteryContact, tool),
                                           FULCRUM_FIELD(CauteryContact, triangle),
                                           FULCRUM_FIELD(CauteryContact, barycentric),
                                           FULCRUM_FIELD(CauteryContact, material),
                                           FULCRUM_FIELD(CauteryContact, material_rate),
                                           FULCRUM_FIELD(CauteryContact, contact_radius_m),
-                                          FULCRUM_FIELD(CauteryContact, footprint),
-                                          FULCRUM_FIELD(CauteryContact, power_W)};
+                                          FULCRUM_FIELD(CauteryContact, footprint)};
 };
 template <>
 struct FieldsOf<TopologyState> {

@@ -53,6 +53,20 @@ struct HandleState {
   std::uint8_t pedals = kPedalNone;  ///< PedalBits.
 };
 
+// ------------------------------------------------------------------------------------------ GeneratorSetting
+
+enum class CauteryMode : std::uint8_t { kOff, kCut, kCoag, kBlend };
+
+inline constexpr float kMaxSetPower_W = 300.0f;  ///< Of a GeneratorSetting.
+
+/// What the panel of the electrosurgical generator is set to, by mode [W].
+struct GeneratorSetting {
+  Stamp stamp;  ///< stamp_ns: from then on it holds.
+  float cut_W = 0;
+  float coag_W = 0;
+  float blend_W = 0;
+};
+
 // ------------------------------------------------------------------------------------------------ ToolState
 
 enum class ToolKind : std::uint8_t { kNone, kGrasper, kHook, kScissors };
@@ -144,15 +158,14 @@ struct ContactModel {
 
 // ------------------------------------------------------------------------------------------- CauteryContact
 
-enum class CauteryMode : std::uint8_t { kOff, kCut, kCoag, kBlend };
-
+/// Where the metal of the active electrode is. What current it carries: HandleState and GeneratorSetting say it
+/// (services/core/generator_inputs.h).
 struct CauteryContact {
   Stamp stamp;
   double session_time_s = 0;
   std::uint64_t topology_revision = 0;
-  bool touching = false;  ///< The metal touches the membrane, or an arc reaches it.
+  bool touching = false;  ///< The metal touches the membrane, or is near enough for an arc.
   bool tented = false;    ///< Membrane lifted off the tissue beneath.
-  CauteryMode mode = CauteryMode::kOff;
   std::uint8_t tool = 0;
   std::uint32_t triangle = kNoIndex;  ///< Membrane triangle: 2 * cell + half, cell = row * (cols-1) + col.
   std::array<float, 3> barycentric{0, 0, 0};
@@ -160,7 +173,6 @@ struct CauteryContact {
   Vec2f material_rate = Vec2f::Zero();  ///< [m/s].
   float contact_radius_m = 0;           ///< Of the metal around its axis.
   Footprint footprint;                  ///< Of the bare metal on the deformed sheet.
-  float power_W = 0;                    ///< Asked of the generator; 0 with the pedal up.
 };
 
 // -------------------------------------------------------------------------------------------- TopologyState
@@ -307,9 +319,10 @@ enum class TopicId : std::uint8_t {
   kTickManifest,
   kHealth,
   kTearState,
-  kOpenCells
+  kOpenCells,
+  kGeneratorSetting
 };
-inline constexpr int kTopicCount = 15;
+inline constexpr int kTopicCount = 16;
 
 struct ConsumedInput {
   TopicId topic = TopicId::kHandleState;
@@ -323,7 +336,7 @@ struct TickManifest {
   std::uint64_t tick = 0;
   double session_time_s = 0;
   std::uint64_t state_hash = 0;
-  std::vector<ConsumedInput> consumed;  ///< At most 8.
+  std::vector<ConsumedInput> consumed;  ///< At most kMaxConsumedInputs of services/bus/gate.h.
 };
 
 // --------------------------------------------------------------------------------------------------- Health

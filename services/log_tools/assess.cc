@@ -56,7 +56,8 @@ RecordedAssessment Assess(const std::filesystem::path& file, const SceneView& sc
   assessment::Assessor assessor(scene);
   assessor.Begin(session.manifest->session_start_ns);
   if (session.end_s) assessor.End(*session.end_s);
-  Filter filter{.topics = {"ToolState", "ContactModel", "CauteryContact", "ThermalEvent", "TopologyState"}};
+  Filter filter{
+      .topics = {"ToolState", "HandleState", "ContactModel", "CauteryContact", "ThermalEvent", "TopologyState"}};
   if (assessor.needs_patches()) filter.topics.insert("TemperaturePatch");
   Recording recording(file, filter);
   std::map<TopicId, bus::InputAccount> accounts;  // What a node would not have used is not used here.

@@ -11,6 +11,7 @@
 #include "services/bus/gate.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
+#include "services/core/generator_inputs.h"
 #include "services/log_tools/deformed_sheet.h"
 #include "services/log_tools/recording.h"
 #include "services/recording/recorded_scene.h"
@@ -121,9 +122,11 @@ class Reader {
 
   void Add(const CauteryContact& contact) {
     if (contact.tool != tool_) return;
-    const CauteryMode mode = contact.power_W > 0 ? contact.mode : CauteryMode::kOff;
-    cut_.current.push_back({contact.session_time_s, contact.touching, mode, contact.power_W, contact.material});
+    cut_.current.push_back({contact.session_time_s, contact.touching, CauteryMode::kOff, 0, contact.material});
   }
+
+  void Add(const HandleState& state) { generator_.Add(state); }
+  void Add(const GeneratorSetting& setting) { generator_.Add(setting); }
 
   void Add(const TopologyState& topology) {
     dead_nodes_ = topology.dead_nodes;
@@ -166,6 +169,13 @@ class Reader {
 
   RecordedCut Finish() {
     Settle(true);
+    for (CurrentSample& sample : cut_.current) {
+      const GeneratorDemand demand = generator_.At(start_ns_ + std::llround(1e9 * sample.time_s));
+      if (demand.power_W > 0) {
+        sample.mode = demand.mode;
+        sample.power_W = demand.power_W;
+      }
+    }
     std::size_t at = 0;
     for (MetalFrame& frame : cut_.metal) {
       while (at + 1 < cut_.current.size() && cut_.current[at + 1].time_s <= frame.time_s + 1e-6) ++at;
@@ -282,6 +292,7 @@ class Reader {
   bool topology_changed_ = false;
   std::optional<double> first_removed_s_;
   std::vector<double> cut_events_s_;
+  GeneratorInputs generator_{std::numeric_limits<std::size_t>::max()};
   std::deque<Pose> poses_;
   std::deque<TissueFrame> waiting_;
   RecordedCut cut_;
@@ -291,8 +302,9 @@ class Reader {
 
 RecordedCut ReadCut(const std::filesystem::path& file, const SceneView& scene, const ContactReach& reach) {
   Reader reader(scene, reach);
-  Recording recording(file, {.topics = {"SceneManifest", "ToolState", "TissueFrame", "CauteryContact", "TopologyState",
-                                        "TemperaturePatch", "ThermalEvent", "Health"}});
+  Recording recording(file,
+                      {.topics = {"SceneManifest", "ToolState", "HandleState", "GeneratorSetting", "TissueFrame",
+                                  "CauteryContact", "TopologyState", "TemperaturePatch", "ThermalEvent", "Health"}});
   std::map<std::pair<TopicId, std::string>, bus::InputAccount> accounts;  // Of nodes that were restarted the newest.
   std::optional<SceneManifest> session;
   Entry entry;
@@ -306,7 +318,9 @@ RecordedCut ReadCut(const std::filesystem::path& file, const SceneView& scene, c
         session = message;
         reader.Begin(message);
       } else if constexpr (requires { reader.Add(message); }) {
-        if (!session || !bus::PassesGate(message) || !account.IsOfOwner(bus::StampOf(message))) return;
+        // The generator is set before the session begins.
+        const bool counts = session || std::is_same_v<T, GeneratorSetting>;
+        if (!counts || !bus::PassesGate(message) || !account.IsOfOwner(bus::StampOf(message))) return;
         reader.Add(message);
       }
     });

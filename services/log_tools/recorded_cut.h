@@ -47,11 +47,11 @@ struct MetalFrame {
   Vec2f centre = Vec2f::Zero();
   bool goes_on = false;                  ///< The contact is that of the frame before.
   float nearest_m = 0;                   ///< Least distance of the metal's axis to the sheet.
-  CauteryMode mode = CauteryMode::kOff;  ///< Of the CauteryContact of that time; off without power.
-  float power_W = 0;                     ///< Set power, of the same.
+  CauteryMode mode = CauteryMode::kOff;  ///< Of the pedals; off without power.
+  float power_W = 0;                     ///< Set power of that mode.
 };
 
-/// One CauteryContact.
+/// One CauteryContact, with pedal and set power of its time.
 struct CurrentSample {
   double time_s = 0;
   bool touching = false;

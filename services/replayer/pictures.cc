@@ -53,13 +53,14 @@ PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView&
   Feed<HandleState> handles;
   Feed<ThermalEvent> events;
   Feed<CauteryContact> contacts;
+  Feed<GeneratorSetting> generator;
   render::RenderSettings render_settings;
   // Auto would follow the speed of this machine, and no run would be like another.
   render_settings.quality = render::Quality::kHigh;
   render_settings.frames = settings.frames;
   render::RenderNode node(scene, render_settings,
                           {tissue.input(), topology.input(), patches.input(), tools.input(), handles.input(),
-                           events.input(), contacts.input()});
+                           events.input(), contacts.input(), generator.input()});
 
   std::optional<SceneManifest> session;
   const double period_s = 1.0 / std::max(0.001f, scene.render.rate_Hz);
@@ -78,7 +79,8 @@ PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView&
     const bool known = tissue.Take(topic, message.data, &newest_ns) || topology.Take(topic, message.data, &newest_ns) ||
                        patches.Take(topic, message.data, &newest_ns) || tools.Take(topic, message.data, &newest_ns) ||
                        handles.Take(topic, message.data, &newest_ns) || events.Take(topic, message.data, &newest_ns) ||
-                       contacts.Take(topic, message.data, &newest_ns);
+                       contacts.Take(topic, message.data, &newest_ns) ||
+                       generator.Take(topic, message.data, &newest_ns);
     if (!known || !session) continue;
     const double time_s = 1e-9 * static_cast<double>(newest_ns - session->session_start_ns);
     if (settings.until_s >= 0 && time_s > settings.until_s) break;

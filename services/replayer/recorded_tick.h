@@ -20,6 +20,7 @@ struct RecordedTick {
   // What the node took in that it had not yet had, oldest first.
   std::vector<ToolState> tools;
   std::vector<HandleState> handles;
+  std::vector<GeneratorSetting> generator;
   std::vector<TopologyState> topology;
   std::vector<OpenCells> open_cells;
   std::vector<CauteryContact> cautery;

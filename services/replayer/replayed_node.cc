@@ -174,9 +174,11 @@ class ReplayedThermal final : public ReplayedNode {
     node_.reset();
     contacts_ = {};
     tears_ = {};
+    handles_ = {};
+    generator_ = {};
     node_.emplace(scene_,
-                  thermal::ThermalNode::Ports{*contacts_.in, *tears_.in, *topology_.out, *open_cells_.out,
-                                              *patches_.out, *events_.out, *manifests_.out},
+                  thermal::ThermalNode::Ports{*contacts_.in, *tears_.in, *handles_.in, *generator_.in, *topology_.out,
+                                              *open_cells_.out, *patches_.out, *events_.out, *manifests_.out},
                   checkpoint_.file(), epoch_ns);
   }
 
@@ -187,6 +189,8 @@ class ReplayedThermal final : public ReplayedNode {
     events_.Drop();
     contacts_.Give(tick.cautery);
     tears_.Give(tick.tears);
+    handles_.Give(tick.handles);
+    generator_.Give(tick.generator);
     node_->Step(tick.tick);
     (void)manifests_.in->TakeLatest(&manifests_.sample);
     return manifests_.sample.state_hash;
@@ -196,6 +200,8 @@ class ReplayedThermal final : public ReplayedNode {
   Keepsake checkpoint_;
   Inlet<CauteryContact> contacts_;
   Inlet<TearState> tears_;
+  Inlet<HandleState> handles_;
+  Inlet<GeneratorSetting> generator_;
   Outlet<TopologyState> topology_;
   Outlet<OpenCells> open_cells_;
   Outlet<TemperaturePatch> patches_;

@@ -70,6 +70,9 @@ bool TickSource::Next(RecordedTick* tick) {
       case TopicId::kHandleState:
         Fetch(*tick, consumed, handles_, &tick->handles, &tick->missing);
         break;
+      case TopicId::kGeneratorSetting:
+        Fetch(*tick, consumed, generator_, &tick->generator, &tick->missing);
+        break;
       case TopicId::kTopologyState:
         Fetch(*tick, consumed, topology_, &tick->topology, &tick->missing);
         break;
@@ -147,7 +150,12 @@ void TickSource::Take(const recording::McapMessage& message) {
       }
       break;
     case TopicId::kHandleState:
-      if (HandleState handles; wanted(NodeId::kPhysics) && Decode(message, &handles)) handles_.Put(handles);
+      if (HandleState handles; (wanted(NodeId::kPhysics) || wanted(NodeId::kThermal)) && Decode(message, &handles)) {
+        handles_.Put(handles);
+      }
+      break;
+    case TopicId::kGeneratorSetting:
+      if (GeneratorSetting setting; wanted(NodeId::kThermal) && Decode(message, &setting)) generator_.Put(setting);
       break;
     case TopicId::kTopologyState:
       if (TopologyState topology; wanted(NodeId::kPhysics) && Decode(message, &topology)) topology_.Put(topology);

@@ -102,6 +102,7 @@ class TickSource {
   std::optional<SceneManifest> session_;
   SampleShelf<ToolState> tools_{4096};
   SampleShelf<HandleState> handles_{4096};
+  SampleShelf<GeneratorSetting> generator_{512};
   SampleShelf<TopologyState> topology_{128};
   SampleShelf<OpenCells> open_cells_{512};
   SampleShelf<TearState> tears_{128};

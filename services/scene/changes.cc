@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::string_view kPower = "script.power_W";
 
-/// The physics node sets the generator once, to the most that the script asks for. Each key gets a value of its own:
-/// a shared one would be written as an anchor.
+/// The power to which the simulated operator sets the generator for each use. Each key gets a value of its own: a
+/// shared one would be written as an anchor.
 void SetPower(YAML::Node description, const YAML::Node& value) {
   for (auto entry : description["script"]) {
     if (!entry.second.IsSequence()) continue;

@@ -6,6 +6,7 @@ SessionAssessment::SessionAssessment(const SceneView& scene, bus::DdsParticipant
     : params_(scene.assessment),
       assessor_(scene),
       tools_(participant->MakeInput<ToolState>()),
+      handles_(participant->MakeInput<HandleState>()),
       contacts_(participant->MakeInput<ContactModel>()),
       cautery_(participant->MakeInput<CauteryContact>()),
       topology_(participant->MakeInput<TopologyState>()) {
@@ -17,9 +18,11 @@ void SessionAssessment::Take() {
     while (input != nullptr && input->TakeNext(sample)) assessor_.Add(*sample);
   };
   ToolState tool;
+  HandleState handles;
   ContactModel model;
   CauteryContact contact;
   take(tools_.get(), &tool);
+  take(handles_.get(), &handles);
   take(contacts_.get(), &model);
   take(cautery_.get(), &contact);
   take(topology_.get(), &topology_sample_);
@@ -46,6 +49,7 @@ ScoreSheet SessionAssessment::Finish() {
 
 void SessionAssessment::Close() {
   tools_.reset();
+  handles_.reset();
   contacts_.reset();
   cautery_.reset();
   topology_.reset();

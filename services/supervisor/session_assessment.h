@@ -35,6 +35,7 @@ class SessionAssessment {
   const AssessmentParams params_;
   assessment::Assessor assessor_;
   std::unique_ptr<bus::Input<ToolState>> tools_;
+  std::unique_ptr<bus::Input<HandleState>> handles_;
   std::unique_ptr<bus::Input<ContactModel>> contacts_;
   std::unique_ptr<bus::Input<CauteryContact>> cautery_;
   std::unique_ptr<bus::Input<TopologyState>> topology_;

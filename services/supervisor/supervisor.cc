@@ -33,6 +33,7 @@
 #include "services/supervisor/clip.h"
 #include "services/supervisor/cut_map_file.h"
 #include "services/supervisor/domain_guard.h"
+#include "services/supervisor/generator_panel.h"
 #include "services/supervisor/node_process.h"
 #include "services/supervisor/node_starter.h"
 #include "services/supervisor/outcome.h"
@@ -109,6 +110,11 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
          "\n";
 }
 
+/// With a real pedal nobody follows the script.
+std::span<const ScriptKey> OperatorScript(const UpSettings& settings, const SceneView& scene) {
+  return settings.cart.pedal.kind == config::LinkKind::kSimulated ? scene.script : std::span<const ScriptKey>();
+}
+
 bus::Security SecurityOf(const config::CartConfig& cart) {
   return app::SecurityOf(cart, NodeName(NodeId::kSupervisor));
 }
@@ -138,11 +144,14 @@ struct Supervisor::Impl {
         recording(RecordingFile(up, folder)),
         starter{settings, folder, recording},
         node_ids(NodesOf(scene.view(), up)),
-        remote_ids(RemoteNodesOf(scene.view(), up)) {
+        remote_ids(RemoteNodesOf(scene.view(), up)),
+        generator(up.cart.generator, OperatorScript(up, scene.view())) {
     if (!keys_warning.empty()) progress.Say("! " + keys_warning);
     participant.emplace(bus::DdsSettings{
         .domain = up.cart.domain, .node_name = "supervisor", .shared_memory = memory, .security = SecurityOf(up.cart)});
     manifests = participant->MakeOutput<SceneManifest>();
+    generator_out = participant->MakeOutput<GeneratorSetting>();
+    PublishGenerator(MonotonicNs());
     healths_in = participant->MakeInput<Health>();
     healths_out = participant->MakeOutput<Health>();
     events = participant->MakeInput<ThermalEvent>();
@@ -392,14 +401,43 @@ struct Supervisor::Impl {
         }
       } else if (command.verb == "swap") {
         reply.ok = Swap(command.argument, now, &reply.text);
+      } else if (command.verb == "generator") {
+        reply.ok = TurnGenerator(command.argument, now, &reply.text);
       } else {
         reply.ok = false;
-        reply.text = "unknown verb \"" + command.verb + "\"; the supervisor knows: restart, swap, dump, down";
+        reply.text =
+            "unknown verb \"" + command.verb + "\"; the supervisor knows: restart, swap, generator, dump, down";
       }
       replies->Write(reply);
       if (answered.size() == kAnswersKept) answered.pop_front();
       answered.push_back(reply);
     }
+  }
+
+  bool TurnGenerator(const std::string& words, std::int64_t now, std::string* text) {
+    try {
+      generator.Turn(words);
+    } catch (const InputError& error) {
+      *text = error.what();
+      return false;
+    }
+    if (!words.empty()) PublishGenerator(now);
+    *text = "generator: " + generator.Text();
+    return true;
+  }
+
+  /// @param from_ns since when the knobs are where they are.
+  void PublishGenerator(std::int64_t from_ns) {
+    // Readers take settings in the order of their stamps.
+    setting_ns = std::max(from_ns, setting_ns + 1);
+    GeneratorSetting setting = generator.setting();
+    setting.stamp = setting_stamper.Next(setting_ns);
+    generator_out->Write(setting);
+  }
+
+  void FollowScriptOfGenerator(std::int64_t now) {
+    if (start_ns == 0 || !generator.Follow(SessionTime(now))) return;
+    PublishGenerator(start_ns + static_cast<std::int64_t>(1e9 * generator.turned_s()));
   }
 
   /// @param argument the node, then the words of the command, a line each.
@@ -444,6 +482,9 @@ struct Supervisor::Impl {
     own.metrics.push_back({"session_time_s", SessionTime(now)});
     own.metrics.push_back({"session_end_s", end_s});
     own.metrics.push_back({"refused", static_cast<double>(refusals.count())});
+    own.metrics.push_back({"generator_cut_W", static_cast<double>(generator.setting().cut_W)});
+    own.metrics.push_back({"generator_coag_W", static_cast<double>(generator.setting().coag_W)});
+    own.metrics.push_back({"generator_blend_W", static_cast<double>(generator.setting().blend_W)});
     for (const NodeId id : node_ids) {
       own.metrics.push_back({std::string("restarts_") + NodeName(id), static_cast<double>(record.node(id).restarts)});
     }
@@ -484,6 +525,7 @@ struct Supervisor::Impl {
     TakeReports(now);
     WatchNodes(now);
     TakeCommands(now);
+    FollowScriptOfGenerator(now);
     PublishOwnHealth(now);
     ShowProgress(now);
     service.Update(now, {++turns}, service_status);
@@ -594,6 +636,7 @@ struct Supervisor::Impl {
     healths_in.reset();
     healths_out.reset();
     manifests.reset();
+    generator_out.reset();
     if (assessed) assessed->Close();
     participant.reset();
     bus::RemoveSharedMemory(memory);
@@ -660,6 +703,7 @@ struct Supervisor::Impl {
   std::optional<bus::DdsParticipant> link_bus;  ///< On a secured cart: where `link` stands in for remote_ids.
   std::optional<link::Link> link;               ///< To the host of remote_ids.
   std::unique_ptr<bus::Output<SceneManifest>> manifests;
+  std::unique_ptr<bus::Output<GeneratorSetting>> generator_out;
   std::unique_ptr<bus::Input<Health>> healths_in;
   std::unique_ptr<bus::Output<Health>> healths_out;
   std::unique_ptr<bus::Input<ThermalEvent>> events;
@@ -667,8 +711,11 @@ struct Supervisor::Impl {
   std::unique_ptr<bus::Output<CommandReply>> replies;
   std::unique_ptr<bus::Output<Command>> orders;  ///< To nodes.
   std::deque<CommandReply> answered;             ///< The newest, for those who ask again.
-  bus::Stamper health_stamper{MonotonicNs()}, reply_stamper{MonotonicNs()}, order_stamper{MonotonicNs()};
+  bus::Stamper health_stamper{MonotonicNs()}, reply_stamper{MonotonicNs()}, order_stamper{MonotonicNs()},
+      setting_stamper{MonotonicNs()};
+  std::int64_t setting_ns = 0;  ///< Stamp of the newest GeneratorSetting.
 
+  GeneratorPanel generator;
   std::optional<SessionAssessment> assessed;
 
   std::vector<std::unique_ptr<SupervisedNode>> nodes;

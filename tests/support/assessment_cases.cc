@@ -182,9 +182,8 @@ void Trace(const std::function<double(double)>& beside, double end_m, Assessor* 
   const int count = static_cast<int>(std::lround(end_m / kSpeed / kModelPeriod_s));
   for (int i = 0; i <= count; ++i) {
     const double along = end_m * i / count;
-    assessor->Add(TipAt(i * kModelPeriod_s,
-                        Vec2f(0.02f + static_cast<float>(beside(along)), 0.02f + static_cast<float>(along)), true,
-                        CauteryMode::kCut));
+    AddTip(i * kModelPeriod_s, Vec2f(0.02f + static_cast<float>(beside(along)), 0.02f + static_cast<float>(along)),
+           true, CauteryMode::kCut, assessor);
   }
 }
 
@@ -220,8 +219,8 @@ void AddLines(const SceneView& scene, std::vector<KnownAnswer>* answers) {
     assessor.Begin(kStart_ns);
     for (int i = 0; i < 1800; ++i) {
       const double phase_s = std::fmod((i + 0.5) * kModelPeriod_s, 6.0);
-      assessor.Add(TipAt(i * kModelPeriod_s, Vec2f(0.02f, 0.03f), phase_s < 2,
-                         phase_s < 5 ? CauteryMode::kCut : CauteryMode::kOff));
+      AddTip(i * kModelPeriod_s, Vec2f(0.02f, 0.03f), phase_s < 2, phase_s < 5 ? CauteryMode::kCut : CauteryMode::kOff,
+             &assessor);
     }
     answers->push_back({"pedal_without_contact.air", ValueOf(assessor, Measure::kPedalWithoutContact), 9});
   }
@@ -322,7 +321,22 @@ ContactModel PushAt(double time_s, double force_N) {
   return model;
 }
 
-CauteryContact TipAt(double time_s, const Vec2f& material, bool touching, CauteryMode mode) {
+HandleState PedalAt(double time_s, CauteryMode mode) {
+  HandleState state;
+  state.stamp = StampAt(time_s);
+  state.pedals = mode == CauteryMode::kCut     ? kPedalCut
+                 : mode == CauteryMode::kBlend ? kPedalBlend
+                 : mode == CauteryMode::kCoag  ? kPedalCoag
+                                               : kPedalNone;
+  return state;
+}
+
+void AddTip(double time_s, const Vec2f& material, bool touching, CauteryMode mode, Assessor* assessor) {
+  assessor->Add(PedalAt(time_s, mode));
+  assessor->Add(TipAt(time_s, material, touching));
+}
+
+CauteryContact TipAt(double time_s, const Vec2f& material, bool touching) {
   CauteryContact contact;
   contact.stamp = StampAt(time_s);
   contact.session_time_s = time_s;
@@ -330,8 +344,6 @@ CauteryContact TipAt(double time_s, const Vec2f& material, bool touching, Cauter
   contact.material = material;
   contact.triangle = 0;
   contact.barycentric = {1, 0, 0};
-  contact.mode = mode;
-  contact.power_W = mode == CauteryMode::kOff ? 0.0f : 35.0f;
   contact.tool = 1;
   return contact;
 }

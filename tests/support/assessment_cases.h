@@ -26,7 +26,11 @@ inline constexpr std::int64_t kStart_ns = 7'000'000'000;
 [[nodiscard]] ContactModel GraspAt(double time_s, const Vec3d& tip, double force_N, double slip_N);
 /// Tool 1 presses with a force [N].
 [[nodiscard]] ContactModel PushAt(double time_s, double force_N);
-[[nodiscard]] CauteryContact TipAt(double time_s, const Vec2f& material, bool touching, CauteryMode mode);
+[[nodiscard]] CauteryContact TipAt(double time_s, const Vec2f& material, bool touching);
+/// The pedal of a mode is down; of none for kOff.
+[[nodiscard]] HandleState PedalAt(double time_s, CauteryMode mode);
+/// The tip, with the pedal of its time.
+void AddTip(double time_s, const Vec2f& material, bool touching, CauteryMode mode, assessment::Assessor* assessor);
 /// Of 256 texels square at (x, y): `damage` at each texel's centre, in metres of the sheet.
 [[nodiscard]] TemperaturePatch PatchAt(double time_s, std::uint32_t x, std::uint32_t y,
                                        const std::function<bool(const Eigen::Vector2d&)>& damaged);

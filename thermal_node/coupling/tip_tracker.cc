@@ -9,13 +9,12 @@ namespace fulcrum::thermal {
 bool TipTracker::Accepts(const CauteryContact& sample) const {
   if (!std::isfinite(sample.session_time_s)) return false;
   if (!sample.touching) return true;
-  const bool numbers = sample.material.allFinite() && std::isfinite(sample.power_W) && sample.power_W >= 0 &&
-                       sample.power_W <= kPowerMax_W && std::isfinite(sample.contact_radius_m) &&
-                       sample.contact_radius_m >= 0 && sample.mode <= CauteryMode::kBlend;
+  const bool numbers =
+      sample.material.allFinite() && std::isfinite(sample.contact_radius_m) && sample.contact_radius_m >= 0;
   return numbers && sheet_.OnSheet(sample.material) && sample.footprint.whole();
 }
 
-TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
+TipInput TipTracker::Advance(const CauteryContact& sample, const GeneratorDemand& demand, double dt_s) {
   TipInput input;
   // The first sample, one after a gap and one from before the last stand for a frame.
   const double since_s = sample.session_time_s - last_s_;
@@ -39,8 +38,8 @@ TipInput TipTracker::Advance(const CauteryContact& sample, double dt_s) {
   const float radius = sample.contact_radius_m > 0 ? sample.contact_radius_m : default_radius_m_;
   input.path.radius_m = std::clamp(radius, kContactRadiusMin_m, kContactRadiusMax_m);
   input.path.tented = sample.tented;
-  input.mode = sample.mode;
-  input.power_W = sample.mode == CauteryMode::kOff ? 0.0f : sample.power_W;
+  input.mode = demand.mode;
+  input.power_W = demand.power_W;
   input.touching = true;
   input.active = input.power_W > 0;
   at_ = input.path.to;

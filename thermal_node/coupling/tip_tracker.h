@@ -1,6 +1,7 @@
 // Turns CauteryContact samples into the tip's path per frame.
 #pragma once
 
+#include "services/core/generator_inputs.h"
 #include "services/core/messages.h"
 #include "thermal_node/coupling/source_window.h"
 
@@ -11,7 +12,6 @@ namespace fulcrum::thermal {
 inline constexpr double kLongestGap_s = 1.0;
 inline constexpr float kTipSpeedMax_m_s = 0.3f;  ///< Farther between two samples is a jump, not a cut.
 inline constexpr float kContactRadiusMin_m = 1e-4f, kContactRadiusMax_m = 2e-3f;
-inline constexpr float kPowerMax_W = 400.0f;
 
 /// What the electrode does from one sample of its contact to the next.
 struct TipInput {
@@ -31,7 +31,8 @@ class TipTracker {
 
   /// The next sample. Its path runs from where the last one ended, for the session time between the two: what the
   /// tissue gets does not depend on when samples arrive.
-  [[nodiscard]] TipInput Advance(const CauteryContact& sample, double dt_s);
+  /// @param demand of the generator at the sample's time.
+  [[nodiscard]] TipInput Advance(const CauteryContact& sample, const GeneratorDemand& demand, double dt_s);
   /// False: out of range or off the sheet; such a sample must not reach Advance.
   [[nodiscard]] bool Accepts(const CauteryContact& sample) const;
   /// The way to this sample has been gone: a physics node that was started again repeats the last tenth of a second.

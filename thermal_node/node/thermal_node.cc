@@ -1,5 +1,7 @@
 #include "thermal_node/node/thermal_node.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <string>
@@ -7,6 +9,19 @@
 #include "services/runtime/realtime.h"
 
 namespace fulcrum::thermal {
+namespace {
+
+/// A process that was started again has contacts to work off that are older than the first pedal it hears of. It waits
+/// for that, but no longer than this [ns].
+constexpr std::int64_t kPedalWait_ns = 300'000'000;
+
+/// In front of the solver's part of a checkpoint.
+struct NodeState {
+  TipTracker::State tip;
+  GeneratorInputs::State generator;
+};
+
+}  // namespace
 
 ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint,
                          std::int64_t epoch_ns)
@@ -27,7 +42,7 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
   manifest_.node = NodeId::kThermal;
   contacts_.reserve(kMostSamples);
   tips_.reserve(kMostSamples);
-  manifest_.consumed.reserve(kMostSamples + 1);
+  manifest_.consumed.reserve(4 * kMostSamples + 1);
   if (checkpoint_ != nullptr) {
     if (const auto latest = checkpoint_->Latest()) restored_ = Restore(latest->payload);
   }
@@ -35,8 +50,13 @@ ThermalNode::ThermalNode(const SceneView& scene, const Ports& ports, runtime::Ch
 }
 
 void ThermalNode::Step(const Tick& tick) {
-  if (ticks_++ == 0) runtime::FlushDenormals();
-  const std::span<const TipInput> tips = TakeContacts(tick.dt_s);
+  if (ticks_ == 0) {
+    runtime::FlushDenormals();
+    wait_until_ns_ = tick.stamp_ns + kPedalWait_ns;
+  }
+  ++ticks_;
+  TakeGeneratorInputs(tick);
+  const std::span<const TipInput> tips = TakeContacts(tick);
   TakeTears();
   solver_.Step(tips, static_cast<float>(tick.dt_s));
   // The manifest first: a replay finds every tick that a checkpoint holds, and sees from the next process's first state
@@ -47,13 +67,25 @@ void ThermalNode::Step(const Tick& tick) {
   PublishOpenCells(tick);
   PublishEvents(tick);
   PublishPatch(tick);
-  if (solver_.stepped()) NoteHealth();
+  if (solver_.stepped() || no_setting_) NoteHealth();
 }
 
-std::span<const TipInput> ThermalNode::TakeContacts(double dt_s) {
+void ThermalNode::TakeGeneratorInputs(const Tick& tick) {
+  bool heard = false;
+  while (ports_.handles.TakeNext(&handles_)) {
+    generator_.Add(handles_);
+    heard = true;
+  }
+  while (ports_.generator.TakeNext(&setting_)) generator_.Add(setting_);
+  if (ticks_ == 1) waits_ = restored_;
+  waits_ = waits_ && !heard && tick.stamp_ns < wait_until_ns_;
+}
+
+std::span<const TipInput> ThermalNode::TakeContacts(const Tick& tick) {
   tips_.clear();
   contacts_.clear();
   manifest_.consumed.clear();
+  if (waits_) return tips_;
   CauteryContact next;
   while (contacts_.size() < kMostSamples && ports_.contact.TakeNext(&next)) {
     if (!tracker_.Accepts(next)) {
@@ -64,23 +96,31 @@ std::span<const TipInput> ThermalNode::TakeContacts(double dt_s) {
     contacts_.push_back(next);
   }
   for (const CauteryContact& contact : contacts_) {
-    tips_.push_back(tracker_.Advance(contact, dt_s));
+    const double ago_s = tick.session_time_s - contact.session_time_s;
+    const std::int64_t ns = tick.stamp_ns - std::llround(1e9 * std::clamp(ago_s, -1.0, 1e4));
+    const GeneratorDemand demand = generator_.At(ns, &manifest_.consumed);
+    generator_.Forget(ns);
+    no_setting_ = demand.mode != CauteryMode::kOff && !generator_.has_setting();
+    tips_.push_back(tracker_.Advance(contact, demand, tick.dt_s));
     manifest_.consumed.push_back({TopicId::kCauteryContact, contact.stamp.epoch, contact.stamp.sequence});
   }
   return tips_;
 }
 
 std::size_t ThermalNode::CheckpointCapacity(const SceneView& scene) {
-  return sizeof(TipTracker::State) + ThermalSolver::CheckpointCapacity(scene);
+  return sizeof(NodeState) + ThermalSolver::CheckpointCapacity(scene);
 }
 
 bool ThermalNode::Restore(std::span<const std::byte> checkpoint) {
-  TipTracker::State tip;
-  if (checkpoint.size() < sizeof(tip)) return false;
-  std::memcpy(&tip, checkpoint.data(), sizeof(tip));
-  // Both or neither: the tip's way goes on from what the solver has cut.
+  NodeState state;
+  if (checkpoint.size() < sizeof(state)) return false;
+  std::memcpy(&state, checkpoint.data(), sizeof(state));
+  // All or nothing: the tip's way goes on from what the solver has cut.
   TipTracker tracker = tracker_;
-  return tracker.Restore(tip) && solver_.Restore(checkpoint.subspan(sizeof(tip))) && tracker_.Restore(tip);
+  GeneratorInputs generator = generator_;
+  return tracker.Restore(state.tip) && generator.Restore(state.generator) &&
+         solver_.Restore(checkpoint.subspan(sizeof(state))) && tracker_.Restore(state.tip) &&
+         generator_.Restore(state.generator);
 }
 
 /// The whole state each time: one that was missed, or one that comes again after a restart, makes no difference.
@@ -101,12 +141,12 @@ void ThermalNode::SaveCheckpoint() {
   const bool due = solver_.committed() || frames_since_checkpoint_ >= kFramesPerCheckpoint;
   if (!due || !solver_.at_commit_frame()) return;
   const std::span<std::byte> slot = checkpoint_->Begin();
-  const std::size_t bytes = solver_.Save(slot.subspan(sizeof(TipTracker::State)));
+  const std::size_t bytes = solver_.Save(slot.subspan(sizeof(NodeState)));
   checkpoint_full_ = bytes == 0;
   if (bytes > 0) {
-    const TipTracker::State tip = tracker_.Save();
-    std::memcpy(slot.data(), &tip, sizeof(tip));
-    checkpoint_->Commit(sizeof(tip) + bytes);
+    const NodeState state{tracker_.Save(), generator_.Save()};
+    std::memcpy(slot.data(), &state, sizeof(state));
+    checkpoint_->Commit(sizeof(state) + bytes);
   }
   frames_since_checkpoint_ = 0;
 }
@@ -200,6 +240,9 @@ void ThermalNode::NoteHealth() {
   f.dead_nodes = solver_.topology().dead_node_count();
   f.awake_tiles = static_cast<std::uint32_t>(solver_.field().awake().size());
   f.checkpoint_full = checkpoint_full_ ? 1 : 0;
+  f.no_setting = no_setting_ ? 1 : 0;
+  setting_changed_ = setting_changed_ || f.solver.set_power_W != set_power_W_;
+  set_power_W_ = f.solver.set_power_W;
   f.cut_length_m = solver_.cut_length_m();
   figures_.Store(f);
 }
@@ -231,6 +274,9 @@ void ThermalNode::FillHealth(Health* health) const {
   if (f.solver.shortened > 0) {
     health->last_error =
         "metal longer than the window of the potential: shortened in " + std::to_string(f.solver.shortened) + " frames";
+  }
+  if (f.no_setting != 0) {
+    health->last_error = "a pedal is down, but no GeneratorSetting has come: no current. The supervisor sends it";
   }
   if (f.checkpoint_full != 0) health->last_error = "checkpoint has no room for the tissue that was heated";
 }

@@ -1,11 +1,13 @@
-// The thermal node on ports: contact in, topology, temperature patches and events out. The same class runs live, in a
-// test and in a replay.
+// The thermal node on ports: contact, pedals and the generator's setting in, topology, temperature patches and events
+// out. The same class runs live, in a test and in a replay.
 #pragma once
 
 #include <cstdint>
+#include <utility>
 
 #include "services/bus/input_account.h"
 #include "services/bus/port.h"
+#include "services/core/generator_inputs.h"
 #include "services/core/messages.h"
 #include "services/core/scene_view.h"
 #include "services/core/tick.h"
@@ -26,13 +28,15 @@ inline constexpr std::uint64_t kTicksPerHistoryPatch = 100;
 /// A checkpoint at each new revision, and this often while the tissue is warm [frames of the solver].
 inline constexpr std::uint64_t kFramesPerCheckpoint = 10;
 /// Changes with the layout of the checkpoint.
-inline constexpr std::uint32_t kCheckpointLayout = 6;
+inline constexpr std::uint32_t kCheckpointLayout = 7;
 
 class ThermalNode {
  public:
   struct Ports {
     bus::Input<CauteryContact>& contact;
     bus::Input<TearState>& tears;
+    bus::Input<HandleState>& handles;
+    bus::Input<GeneratorSetting>& generator;
     bus::Output<TopologyState>& topology;
     bus::Output<OpenCells>& open_cells;
     bus::LoanOutput<TemperaturePatch>& patch;
@@ -54,12 +58,15 @@ class ThermalNode {
   void FillHealth(Health* health) const;
 
   [[nodiscard]] const ThermalSolver& solver() const { return solver_; }
+  /// The set power that Health tells has changed since this was last asked. The thread of Step.
+  [[nodiscard]] bool TakeSettingChanged() { return std::exchange(setting_changed_, false); }
   /// It went on from a checkpoint.
   [[nodiscard]] bool restored() const { return restored_; }
 
  private:
+  void TakeGeneratorInputs(const Tick& tick);
   /// What the electrode did since the last tick.
-  [[nodiscard]] std::span<const TipInput> TakeContacts(double dt_s);
+  [[nodiscard]] std::span<const TipInput> TakeContacts(const Tick& tick);
   /// What has torn; only what is new.
   void TakeTears();
   void SaveCheckpoint();
@@ -76,7 +83,7 @@ class ThermalNode {
     SolverFigures solver;
     double delivered_J, closure;
     std::uint64_t revision, quarantined, refused;
-    std::uint32_t dead_edges, dead_nodes, awake_tiles, checkpoint_full;
+    std::uint32_t dead_edges, dead_nodes, awake_tiles, checkpoint_full, no_setting;
     float cut_length_m;
   };
 
@@ -84,6 +91,7 @@ class ThermalNode {
   Ports ports_;
   runtime::CheckpointFile* checkpoint_;
   ThermalSolver solver_;
+  GeneratorInputs generator_;
   TipTracker tracker_;
   PatchPlanner planner_;
   bus::Stamper topology_stamper_, open_stamper_, patch_stamper_, event_stamper_, manifest_stamper_;
@@ -93,8 +101,13 @@ class ThermalNode {
   TopologyState topology_;
   OpenCells open_cells_, open_now_;  ///< As published, and as they are.
   TearState tears_;
+  HandleState handles_;
+  GeneratorSetting setting_;
   TickManifest manifest_;
   std::uint64_t ticks_ = 0, refused_ = 0, frames_since_checkpoint_ = 0;
+  std::int64_t wait_until_ns_ = 0;  ///< For the first HandleState, of a process that was started again.
+  float set_power_W_ = 0;           ///< As Health tells it.
+  bool waits_ = false, setting_changed_ = false, no_setting_ = false;
   bool restored_ = false, topology_due_ = true, patch_readers_ = false, patch_due_ = false, history_due_ = false,
        patch_note_due_ = false;
   double closure_ = 0;

@@ -63,6 +63,7 @@ bool EncodeCdr(const T& message, std::vector<std::uint8_t>* bytes) {
   template bool DecodeCdr<T>(std::span<const std::uint8_t>, T*); \
   template bool EncodeCdr<T>(const T&, std::vector<std::uint8_t>*);
 FULCRUM_INSTANTIATE(HandleState)
+FULCRUM_INSTANTIATE(GeneratorSetting)
 FULCRUM_INSTANTIATE(ToolState)
 FULCRUM_INSTANTIATE(TissueFrame)
 FULCRUM_INSTANTIATE(ContactModel)

@@ -6,6 +6,7 @@
 
 #include "cautery.h"
 #include "contact.h"
+#include "generator.h"
 #include "handle.h"
 #include "health.h"
 #include "services/core/messages.h"
@@ -20,6 +21,7 @@ namespace fulcrum::bus {
 
 /// False when a list or a name is longer than the wire type holds; texts for people are cut instead.
 [[nodiscard]] bool ToWire(const HandleState& from, idl::HandleState* to);
+[[nodiscard]] bool ToWire(const GeneratorSetting& from, idl::GeneratorSetting* to);
 [[nodiscard]] bool ToWire(const ToolState& from, idl::ToolState* to);
 [[nodiscard]] bool ToWire(const ContactModel& from, idl::ContactModel* to);
 [[nodiscard]] bool ToWire(const CauteryContact& from, idl::CauteryContact* to);
@@ -35,6 +37,7 @@ namespace fulcrum::bus {
 
 /// `to` keeps its buffers.
 void FromWire(const idl::HandleState& from, HandleState* to);
+void FromWire(const idl::GeneratorSetting& from, GeneratorSetting* to);
 void FromWire(const idl::ToolState& from, ToolState* to);
 void FromWire(const idl::ContactModel& from, ContactModel* to);
 void FromWire(const idl::CauteryContact& from, CauteryContact* to);

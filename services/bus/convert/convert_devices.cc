@@ -1,4 +1,4 @@
-// HandleState, ToolState, ContactModel, CauteryContact.
+// HandleState, GeneratorSetting, ToolState, ContactModel, CauteryContact.
 #include "services/bus/convert/convert.h"
 #include "services/bus/convert/pieces.h"
 
@@ -13,7 +13,6 @@ static_assert(idl::TOOL_SCISSORS == static_cast<int>(ToolKind::kScissors));
 static_assert(idl::SERVO_RISE == static_cast<int>(ServoState::kRise));
 static_assert(idl::CONTACT_GRASP == static_cast<int>(ContactKind::kGrasp));
 static_assert(idl::MAX_FOOTPRINT == kFootprintCells * kFootprintCells);
-static_assert(idl::CAUTERY_BLEND == static_cast<int>(CauteryMode::kBlend));
 
 bool ToWire(const HandleState& from, idl::HandleState* to) {
   to->stamp(cv::ToWire(from.stamp));
@@ -41,6 +40,21 @@ void FromWire(const idl::HandleState& from, HandleState* to) {
                       .quality = w.quality(),
                       .raw_counts = w.raw_counts()};
   }
+}
+
+bool ToWire(const GeneratorSetting& from, idl::GeneratorSetting* to) {
+  to->stamp(cv::ToWire(from.stamp));
+  to->cut_W(from.cut_W);
+  to->coag_W(from.coag_W);
+  to->blend_W(from.blend_W);
+  return true;
+}
+
+void FromWire(const idl::GeneratorSetting& from, GeneratorSetting* to) {
+  to->stamp = cv::FromWire(from.stamp());
+  to->cut_W = from.cut_W();
+  to->coag_W = from.coag_W();
+  to->blend_W = from.blend_W();
 }
 
 bool ToWire(const ToolState& from, idl::ToolState* to) {
@@ -165,7 +179,6 @@ bool ToWire(const CauteryContact& from, idl::CauteryContact* to) {
   to->topology_revision(from.topology_revision);
   to->touching(from.touching);
   to->tented(from.tented);
-  to->mode(Octet(from.mode));
   to->tool(from.tool);
   to->triangle(from.triangle);
   to->barycentric(from.barycentric);
@@ -176,7 +189,6 @@ bool ToWire(const CauteryContact& from, idl::CauteryContact* to) {
   to->footprint().y(from.footprint.y);
   to->footprint().width(from.footprint.width);
   to->footprint().gap(from.footprint.gap);
-  to->power_W(from.power_W);
   return true;
 }
 
@@ -186,7 +198,6 @@ void FromWire(const idl::CauteryContact& from, CauteryContact* to) {
   to->topology_revision = from.topology_revision();
   to->touching = from.touching();
   to->tented = from.tented();
-  to->mode = static_cast<CauteryMode>(from.mode());
   to->tool = from.tool();
   to->triangle = from.triangle();
   to->barycentric = from.barycentric();
@@ -197,7 +208,6 @@ void FromWire(const idl::CauteryContact& from, CauteryContact* to) {
   to->footprint.y = from.footprint().y();
   to->footprint.width = from.footprint().width();
   to->footprint.gap = from.footprint().gap();
-  to->power_W = from.power_W();
 }
 
 }  // namespace fulcrum::bus

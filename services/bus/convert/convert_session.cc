@@ -12,7 +12,8 @@ using convert::Octet;
 namespace cv = convert;
 
 static_assert(idl::NODE_RECORDER == kNodeCount - 1 && idl::NODE_PHYSICS == static_cast<int>(NodeId::kPhysics));
-static_assert(idl::TOPIC_OPEN_CELLS == kTopicCount - 1 && idl::TOPIC_COMMAND == static_cast<int>(TopicId::kCommand));
+static_assert(idl::TOPIC_GENERATOR_SETTING == kTopicCount - 1 &&
+              idl::TOPIC_COMMAND == static_cast<int>(TopicId::kCommand));
 static_assert(idl::MODE_LOCK_STEP == static_cast<int>(SessionMode::kLockStep));
 static_assert(idl::HEALTH_STOPPING == static_cast<int>(HealthState::kStopping));
 static_assert(idl::MAX_CONSUMED == kMaxConsumedInputs && idl::MAX_INPUT_HEALTHS == kMaxInputHealths &&

@@ -3,6 +3,7 @@
 
 #include "cauteryPubSubTypes.h"
 #include "contactPubSubTypes.h"
+#include "generatorPubSubTypes.h"
 #include "handlePubSubTypes.h"
 #include "healthPubSubTypes.h"
 #include "services/core/messages.h"
@@ -20,6 +21,10 @@ struct TypeSupportOf;
 template <>
 struct TypeSupportOf<HandleState> {
   using type = idl::HandleStatePubSubType;
+};
+template <>
+struct TypeSupportOf<GeneratorSetting> {
+  using type = idl::GeneratorSettingPubSubType;
 };
 template <>
 struct TypeSupportOf<ToolState> {

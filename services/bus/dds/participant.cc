@@ -267,6 +267,7 @@ Peer DdsParticipant::PeerOf(const WriterGuid& writer) const {
   template std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput<T>();
 
 FULCRUM_INSTANTIATE_PORTS(HandleState)
+FULCRUM_INSTANTIATE_PORTS(GeneratorSetting)
 FULCRUM_INSTANTIATE_PORTS(ToolState)
 FULCRUM_INSTANTIATE_PORTS(TissueFrame)
 FULCRUM_INSTANTIATE_PORTS(ContactModel)

@@ -201,7 +201,37 @@ function showWarnings(warnings) {
   if (!warnings.length) $('warning-list').append(make('li', 'none', 'None'));
 }
 
+// The generator's knobs: what the supervisor says is set, and a step up or down.
+const knobs = new Map();
+function makeKnob(name, label) {
+  const term = make('dt', '', label), item = make('dd', 'stepper'), value = make('output');
+  const step = watts => {
+    const button = make('button', '', watts < 0 ? '\u2212' : '+');
+    Object.assign(button, {type: 'button', id: `${name}-${watts < 0 ? 'less' : 'more'}`});
+    button.setAttribute('aria-label', `${label}: 5 watts ${watts < 0 ? 'less' : 'more'}`);
+    button.addEventListener('click', () => {
+      const knob = knobs.get(name);
+      order('/api/generator', {[name]: Math.min(300, Math.max(0, knob.watts + watts))});
+    });
+    return button;
+  };
+  value.id = `set-${name}`;
+  item.append(step(-5), value, step(5));
+  $('knobs').append(term, item);
+  knobs.set(name, {value, watts: 0});
+}
+for (const [name, label] of [['cut', 'Cut'], ['coag', 'Coag'], ['blend', 'Blend']]) makeKnob(name, label);
+function showGenerator(figures) {
+  $('generator').hidden = !figures || figures.set_cut_W === undefined;
+  if ($('generator').hidden) return;
+  for (const [name, knob] of knobs) {
+    knob.watts = figures[`set_${name}_W`];
+    setText(knob.value, `${knob.watts.toFixed(0)} W`);
+  }
+}
+
 function showFigures(figures) {
+  showGenerator(figures);
   if (!figures) return;
   const heat = figures.temperature_C !== undefined;  // Not every exercise has it.
   setText($('temperature'), heat ? `${figures.temperature_C.toFixed(0)} °C` : '–');

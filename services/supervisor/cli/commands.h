@@ -23,6 +23,7 @@ ExitCode Restart(const Words& words);
 ExitCode Swap(const Words& words);
 ExitCode Down(const Words& words);
 ExitCode Dump(const Words& words);
+ExitCode Generator(const Words& words);
 ExitCode Log(const Words& words);
 ExitCode TestNode(const Words& words);
 ExitCode Keys(const Words& words);

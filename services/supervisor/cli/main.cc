@@ -24,6 +24,8 @@ std::span<const CommandEntry> Commands() {
       {"down", "down [--domain N]", "End the running session.", Down},
       {"dump", "dump [--domain N]",
        "Write the newest seconds of the running session into a file (fulcrum up --keep-last).", Dump},
+      {"generator", "generator [--cut W] [--coag W] [--blend W] [--domain N]",
+       "Set the power of the generator of the running session; without options: show it.", Generator},
       {"log", "log TOOL FILE...", "Read recordings: info, list, cat, export, verify, diff, recover.", Log},
       {"test-node", "test-node NODE --inputs LOG [--expect HASH] [--assert EXPR]... [--junit FILE]",
        "Run one node headless against a recording, for QA and CI.", TestNode},

@@ -59,7 +59,7 @@ int main(int argc, char** argv) {
       "cautery_contact", 5000,
       [](int i) {
         const float along = 0.02f + 0.04f * static_cast<float>(i) / 5000;
-        return test::TipAt(1e-2 * i, Vec2f(0.021f, along), true, CauteryMode::kCut);
+        return test::TipAt(1e-2 * i, Vec2f(0.021f, along), true);
       },
       &report);
   benchmark::MeasureCost(

@@ -36,7 +36,8 @@ class Session {
 
   /// Puts the tip where the input says; to be seen by the next Step.
   void Touch(const TipInput& tip) {
-    CauteryContact contact = TouchAt(tip.path.to, tip.mode, tip.power_W, tip.path.radius_m);
+    bus_.Demand(tip.mode, tip.power_W, tick_.stamp_ns);
+    CauteryContact contact = TouchAt(tip.path.to, tip.path.radius_m);
     contact.stamp = {++sequence_, 1, tick_.stamp_ns};
     contact.session_time_s = tick_.session_time_s;
     bus_.contact_out->Write(contact);

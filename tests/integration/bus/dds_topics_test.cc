@@ -36,9 +36,9 @@ struct Pair {
 
 template <class T>
 class EveryTopic : public ::testing::Test {};
-using Types = ::testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState,
-                               TearState, OpenCells, TemperaturePatch, ThermalEvent, SceneManifest, Command,
-                               CommandReply, TickManifest, Health>;
+using Types = ::testing::Types<HandleState, GeneratorSetting, ToolState, TissueFrame, ContactModel, CauteryContact,
+                               TopologyState, TearState, OpenCells, TemperaturePatch, ThermalEvent, SceneManifest,
+                               Command, CommandReply, TickManifest, Health>;
 TYPED_TEST_SUITE(EveryTopic, Types);
 
 TYPED_TEST(EveryTopic, ArrivesUnchanged) {

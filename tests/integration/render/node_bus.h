@@ -16,6 +16,7 @@ struct NodeBus {
   bus::InProcessTopic<HandleState> handles;
   bus::InProcessTopic<ThermalEvent> events;
   bus::InProcessTopic<CauteryContact> contacts;
+  bus::InProcessTopic<GeneratorSetting> generator;
   std::unique_ptr<bus::Input<TissueFrame>> tissue_in = tissue.MakeInput();
   std::unique_ptr<bus::Input<TopologyState>> topology_in = topology.MakeInput();
   std::unique_ptr<bus::Input<TemperaturePatch>> patches_in = patches.MakeInput();
@@ -23,6 +24,7 @@ struct NodeBus {
   std::unique_ptr<bus::Input<HandleState>> handles_in = handles.MakeInput();
   std::unique_ptr<bus::Input<ThermalEvent>> events_in = events.MakeInput();
   std::unique_ptr<bus::Input<CauteryContact>> contacts_in = contacts.MakeInput();
+  std::unique_ptr<bus::Input<GeneratorSetting>> generator_in = generator.MakeInput();
   std::unique_ptr<bus::LoanOutput<TissueFrame>> tissue_out = tissue.MakeOutput();
   std::unique_ptr<bus::Output<TopologyState>> topology_out = topology.MakeOutput();
   std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patches_out = patches.MakeOutput();
@@ -31,7 +33,7 @@ struct NodeBus {
 
   /// The node's.
   [[nodiscard]] RenderPorts ports() const {
-    return {*tissue_in, *topology_in, *patches_in, *tools_in, *handles_in, *events_in, *contacts_in};
+    return {*tissue_in, *topology_in, *patches_in, *tools_in, *handles_in, *events_in, *contacts_in, *generator_in};
   }
 };
 

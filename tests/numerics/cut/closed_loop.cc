@@ -23,10 +23,10 @@ const LoopStep& ClosedLoop::Step(const Moment& moment) {
   step_.time_s = static_cast<double>(dt_s) * static_cast<double>(++steps_);
   step_.contact = physics_.Cautery(1);
   step_.contact.session_time_s = step_.time_s;
-  step_.contact.mode = moment.mode;
-  step_.contact.power_W = moment.power_W;
+  step_.mode = moment.mode;
   if (const auto& tears = physics_.tears(); tears.torn_count() > 0) thermal_.Tear(tears.torn());
-  if (tracker_.Accepts(step_.contact)) thermal_.Step(tracker_.Advance(step_.contact, dt_s), dt_s);
+  if (tracker_.Accepts(step_.contact))
+    thermal_.Step(tracker_.Advance(step_.contact, {moment.mode, moment.power_W}, dt_s), dt_s);
   if (thermal_.committed()) {
     const thermal::MeshTopology& mesh = thermal_.topology();
     topology_.revision = mesh.revision();

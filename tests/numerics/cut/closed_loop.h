@@ -24,6 +24,7 @@ using Operator = std::function<Moment(double time_s)>;
 struct LoopStep {
   double time_s = 0;
   CauteryContact contact;
+  CauteryMode mode = CauteryMode::kOff;
   float length_m = 0;  ///< Of the cut, as published.
   float power_W = 0;
 };

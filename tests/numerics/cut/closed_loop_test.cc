@@ -196,7 +196,7 @@ class Cut {
     const LoopStep& step = loop_.Step(HandAt(time_s()));
     length_fell_ = length_fell_ || step.length_m < last_length_m_;
     last_length_m_ = step.length_m;
-    if (step.contact.mode == CauteryMode::kOff) return;
+    if (step.mode == CauteryMode::kOff) return;
     ++energised_;
     if (step.contact.touching) way_.push_back(MetalPlace(step.contact));
     free_ += loop_.physics().solver_force(1).norm() < kPresses_N ? 1 : 0;

@@ -59,7 +59,6 @@ class Fuzz {
     if (OneIn(60)) contact.material = Anywhere();
     if (OneIn(60)) contact.material.x() = Absurd();
     if (OneIn(60)) contact.material.y() = Absurd();
-    if (OneIn(60)) contact.power_W = Absurd();
     if (OneIn(60)) contact.contact_radius_m = Absurd();
     // Its metal lies about it as it did about the burn's first place.
     contact.footprint.x += static_cast<std::int32_t>(1e4f * at.x());
@@ -68,7 +67,6 @@ class Fuzz {
     if (OneIn(60)) contact.footprint.x = INT32_MAX - Below(99);
     if (OneIn(60)) contact.footprint.gap.resize(static_cast<std::size_t>(Below(8192)));
     if (OneIn(60)) contact.session_time_s = OneIn(2) ? NAN : static_cast<double>(Absurd());
-    if (OneIn(60)) contact.mode = static_cast<CauteryMode>(Below(256));
     if (OneIn(60)) contact.material_rate = Vec2f::Constant(Absurd());
     return contact;
   }
@@ -111,8 +109,8 @@ class Patient {
   /// A straight burn of a few frames at random speed, power, mode and place.
   void Burn(Fuzz* fuzz) {
     CauteryContact burn;
-    burn.mode = static_cast<CauteryMode>(1 + fuzz->Below(3));
-    burn.power_W = fuzz->OneIn(5) ? 400.0f : fuzz->Between(0, 80);
+    const GeneratorDemand demand{static_cast<CauteryMode>(1 + fuzz->Below(3)),
+                                 fuzz->OneIn(5) ? kMaxSetPower_W : fuzz->Between(0, 80)};
     burn.contact_radius_m = fuzz->OneIn(5) ? fuzz->Between(0, 5e-3f) : fuzz->Between(2e-4f, 1e-3f);
     if (fuzz->OneIn(2)) SetMetal(fuzz, &burn);
     burn.tented = fuzz->OneIn(3);
@@ -127,7 +125,7 @@ class Patient {
         time_s_ += fuzz->OneIn(50) ? static_cast<double>(fuzz->Between(-0.1f, 1.2f)) : static_cast<double>(dt);
         burn.session_time_s = time_s_;
         const CauteryContact contact = fuzz->Contact(at, burn);
-        if (tracker_->Accepts(contact)) tips.push_back(tracker_->Advance(contact, dt));
+        if (tracker_->Accepts(contact)) tips.push_back(tracker_->Advance(contact, demand, dt));
       }
       Step(tips, dt);
       if (::testing::Test::HasFatalFailure()) return;

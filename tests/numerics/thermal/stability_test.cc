@@ -311,15 +311,13 @@ TEST(StabilityTest, MessageOfNoNumbersIsRefused) {
   const TipTracker tip(sheet, 5e-4f);
   CauteryContact good;
   good.touching = true;
-  good.mode = CauteryMode::kCut;
-  good.power_W = 35;
   good.contact_radius_m = 5e-4f;
   good.material = {0.002f, 0.0015f};
   ASSERT_TRUE(tip.Accepts(good));
   for (const float bad : {kNan, kInf, -kInf, 1e30f, -1e30f}) {
     for (const auto& spoil : std::vector<std::function<void(CauteryContact*)>>{
              [&](CauteryContact* c) { c->material.x() = bad; }, [&](CauteryContact* c) { c->material.y() = bad; },
-             [&](CauteryContact* c) { c->power_W = bad; }}) {
+             [&](CauteryContact* c) { c->contact_radius_m = -std::abs(bad); }}) {
       CauteryContact contact = good;
       spoil(&contact);
       EXPECT_FALSE(tip.Accepts(contact)) << bad;

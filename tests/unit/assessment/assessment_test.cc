@@ -12,11 +12,11 @@
 namespace fulcrum::assessment {
 namespace {
 
+using test::AddTip;
 using test::KnownAnswer;
 using test::PatchAt;
 using test::PushAt;
 using test::StampAt;
-using test::TipAt;
 using test::ToolAt;
 
 double ValueOf(const Assessor& assessor, Measure measure) {
@@ -77,7 +77,7 @@ TEST(Assessment, ASilenceIsNotCounted) {
       const double time_s = from_s + 1e-3 * i;
       run.assessor.Add(ToolAt(time_s, Vec3d(from_s, 0, 0), Vec3d::Zero()));
       if (i % 10 == 0) run.assessor.Add(PushAt(time_s, 3));
-      if (i % 10 == 0) run.assessor.Add(TipAt(time_s, Vec2f::Zero(), false, CauteryMode::kCut));
+      if (i % 10 == 0) AddTip(time_s, Vec2f::Zero(), false, CauteryMode::kCut, &run.assessor);
     }
   }
   EXPECT_EQ(ValueOf(run.assessor, Measure::kPathLength), 0) << "the jump to where the tool was found again";
@@ -95,7 +95,7 @@ TEST(Assessment, TheOrderBetweenTopicsDoesNotMatter) {
     if (tools_first) tools();
     for (int i = 0; i < 300; ++i) run.assessor.Add(PushAt(0.01 * i, 0.01 * i));
     for (int i = 0; i < 300; ++i)
-      run.assessor.Add(TipAt(0.01 * i, Vec2f(0.021f, 0.02f + 1e-4f * static_cast<float>(i)), true, CauteryMode::kCut));
+      AddTip(0.01 * i, Vec2f(0.021f, 0.02f + 1e-4f * static_cast<float>(i)), true, CauteryMode::kCut, &run.assessor);
     if (!tools_first) tools();
     run.assessor.Finish();
     return run.assessor.figures();
@@ -136,7 +136,7 @@ TEST(Assessment, WithoutALineNothingIsSaidOfIt) {
   Assessor assessor(scene.view);
   EXPECT_FALSE(assessor.needs_patches());
   assessor.Begin(test::kStart_ns);
-  assessor.Add(TipAt(1, Vec2f(0.02f, 0.03f), true, CauteryMode::kCut));
+  AddTip(1, Vec2f(0.02f, 0.03f), true, CauteryMode::kCut, &assessor);
   EXPECT_TRUE(std::isnan(ValueOf(assessor, Measure::kLineDone)));
   const Score score = Evaluate(scene.view.assessment, assessor.figures());
   EXPECT_TRUE(std::none_of(score.items.begin(), score.items.end(),
@@ -151,11 +151,11 @@ TEST(Prompts, SayWhatIsWrongWhileItIs) {
   run.assessor.Add(PushAt(1, 12));
   EXPECT_EQ(run.assessor.PromptsAt(1.1), BitOf(Prompt::kForceTooHigh));
   EXPECT_EQ(run.assessor.PromptsAt(2), 0u);
-  for (int i = 0; i < 40; ++i) run.assessor.Add(TipAt(3 + 0.01 * i, Vec2f::Zero(), false, CauteryMode::kCoag));
+  for (int i = 0; i < 40; ++i) AddTip(3 + 0.01 * i, Vec2f::Zero(), false, CauteryMode::kCoag, &run.assessor);
   EXPECT_EQ(run.assessor.PromptsAt(3.4), BitOf(Prompt::kPedalWithoutContact));
-  run.assessor.Add(TipAt(5, Vec2f(0.03f, 0.04f), true, CauteryMode::kCut));
+  AddTip(5, Vec2f(0.03f, 0.04f), true, CauteryMode::kCut, &run.assessor);
   EXPECT_EQ(run.assessor.PromptsAt(5.1), BitOf(Prompt::kUreterNear) | BitOf(Prompt::kOffLine));
-  run.assessor.Add(TipAt(6, Vec2f(0.03f, 0.04f), true, CauteryMode::kOff));
+  AddTip(6, Vec2f(0.03f, 0.04f), true, CauteryMode::kOff, &run.assessor);
   EXPECT_EQ(run.assessor.PromptsAt(6.1), 0u) << "without current it may be touched";
   ThermalEvent event;
   event.session_time_s = 8;

@@ -38,9 +38,9 @@ bool OverTheWire(const T& from, T* to) {
 
 template <class T>
 class Convert : public testing::Test {};
-using Types = testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState,
-                             TearState, OpenCells, TemperaturePatch, ThermalEvent, SceneManifest, Command, CommandReply,
-                             TickManifest, Health>;
+using Types = testing::Types<HandleState, GeneratorSetting, ToolState, TissueFrame, ContactModel, CauteryContact,
+                             TopologyState, TearState, OpenCells, TemperaturePatch, ThermalEvent, SceneManifest,
+                             Command, CommandReply, TickManifest, Health>;
 TYPED_TEST_SUITE(Convert, Types);
 
 TYPED_TEST(Convert, RoundTripKeepsEveryField) {

@@ -30,6 +30,7 @@ struct Floats {
   void operator()(HandleState& m) const {
     for (HandleSample& h : m.handles) Each(h.jaw_angle_rad, h.jaw_rate_rad_s, h.quality);
   }
+  void operator()(GeneratorSetting& m) const { Each(m.cut_W, m.coag_W, m.blend_W); }
   void operator()(ToolState& m) const {
     for (ToolSample& t : m.tools) Each(t.p_WT, t.q_WT, t.v_WT, t.w_WT, t.f_W, t.model_age_s);
   }
@@ -46,7 +47,7 @@ struct Floats {
   }
   void operator()(CauteryContact& m) const {
     Each(m.session_time_s, m.barycentric[0], m.barycentric[1], m.barycentric[2], m.material, m.material_rate,
-         m.contact_radius_m, m.power_W);
+         m.contact_radius_m);
   }
   void operator()(TopologyState& m) const { Each(m.cut_length_m, m.cut_width_m, m.cut_off_way_m); }
   void operator()(TearState&) const {}
@@ -67,9 +68,9 @@ struct Floats {
 
 template <class T>
 class Gate : public testing::Test {};
-using Types = testing::Types<HandleState, ToolState, TissueFrame, ContactModel, CauteryContact, TopologyState,
-                             TearState, OpenCells, TemperaturePatch, ThermalEvent, SceneManifest, Command, CommandReply,
-                             TickManifest, Health>;
+using Types = testing::Types<HandleState, GeneratorSetting, ToolState, TissueFrame, ContactModel, CauteryContact,
+                             TopologyState, TearState, OpenCells, TemperaturePatch, ThermalEvent, SceneManifest,
+                             Command, CommandReply, TickManifest, Health>;
 TYPED_TEST_SUITE(Gate, Types);
 
 TYPED_TEST(Gate, PassesAGoodMessage) { EXPECT_TRUE(PassesGate(test::Sample<TypeParam>())); }
@@ -164,8 +165,7 @@ TEST(GateRanges, ContactModel) {
 
 TEST(GateRanges, CauteryContact) {
   ExpectRefused<CauteryContact>(
-      {{"unknown mode", [](auto& m) { m.mode = BeyondLast<CauteryMode>(); }},
-       {"third tool", [](auto& m) { m.tool = 2; }},
+      {{"third tool", [](auto& m) { m.tool = 2; }},
        {"weights beyond 1",
         [](auto& m) {
           m.barycentric = {2, -1, 0};
@@ -180,9 +180,12 @@ TEST(GateRanges, CauteryContact) {
        {"gaps without a footprint", [](auto& m) { m.footprint.width = 0; }},
        {"a footprint without gaps", [](auto& m) { m.footprint.gap.clear(); }},
        {"a footprint beyond all sheets", [](auto& m) { m.footprint.x = -200'000'000; }},
-       {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }},
-       {"negative power", [](auto& m) { m.power_W = -1; }},
-       {"power beyond any generator", [](auto& m) { m.power_W = 1001; }}});
+       {"touching nothing", [](auto& m) { m.triangle = kNoIndex; }}});
+}
+
+TEST(GateRanges, GeneratorSetting) {
+  ExpectRefused<GeneratorSetting>({{"negative power", [](auto& m) { m.cut_W = -1; }},
+                                   {"power beyond any generator", [](auto& m) { m.blend_W = 301; }}});
 }
 
 TEST(GateRanges, TopologyState) {
@@ -233,7 +236,7 @@ TEST(GateRanges, SessionMessages) {
   ExpectRefused<CommandReply>({{"unknown node", [](auto& m) { m.from = BeyondLast<NodeId>(); }}});
   ExpectRefused<TickManifest>({{"unknown node", [](auto& m) { m.node = BeyondLast<NodeId>(); }},
                                {"unknown topic", [](auto& m) { m.consumed[1].topic = BeyondLast<TopicId>(); }},
-                               {"too many inputs", [](auto& m) { m.consumed.resize(10); }}});
+                               {"too many inputs", [](auto& m) { m.consumed.resize(kMaxConsumedInputs + 1); }}});
 }
 
 TEST(GateRanges, Health) {

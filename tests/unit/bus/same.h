@@ -55,12 +55,14 @@ inline bool Same(const ContactModel& a, const ContactModel& b) {
 inline bool Same(const Footprint& a, const Footprint& b) {
   return a.x == b.x && a.y == b.y && a.width == b.width && a.gap == b.gap;
 }
+inline bool Same(const GeneratorSetting& a, const GeneratorSetting& b) {
+  return Same(a.stamp, b.stamp) && a.cut_W == b.cut_W && a.coag_W == b.coag_W && a.blend_W == b.blend_W;
+}
 inline bool Same(const CauteryContact& a, const CauteryContact& b) {
   return Same(a.stamp, b.stamp) && a.session_time_s == b.session_time_s && a.topology_revision == b.topology_revision &&
-         a.touching == b.touching && a.tented == b.tented && a.mode == b.mode && a.tool == b.tool &&
-         a.triangle == b.triangle && a.barycentric == b.barycentric && a.material == b.material &&
-         a.material_rate == b.material_rate && Same(a.footprint, b.footprint) &&
-         a.contact_radius_m == b.contact_radius_m && a.power_W == b.power_W;
+         a.touching == b.touching && a.tented == b.tented && a.tool == b.tool && a.triangle == b.triangle &&
+         a.barycentric == b.barycentric && a.material == b.material && a.material_rate == b.material_rate &&
+         Same(a.footprint, b.footprint) && a.contact_radius_m == b.contact_radius_m;
 }
 
 inline bool Same(const TopologyState& a, const TopologyState& b) {

@@ -79,6 +79,16 @@ inline ContactModel Sample(std::uint64_t sequence) {
 }
 
 template <>
+inline GeneratorSetting Sample(std::uint64_t sequence) {
+  GeneratorSetting m;
+  m.stamp = {sequence, 12, 4500};
+  m.cut_W = 40;
+  m.coag_W = 25;
+  m.blend_W = 30;
+  return m;
+}
+
+template <>
 inline CauteryContact Sample(std::uint64_t sequence) {
   CauteryContact m;
   m.stamp = {sequence, 15, 5000};
@@ -86,7 +96,6 @@ inline CauteryContact Sample(std::uint64_t sequence) {
   m.topology_revision = 6;
   m.touching = true;
   m.tented = true;
-  m.mode = CauteryMode::kCoag;
   m.tool = 1;
   m.triangle = 1234;
   m.barycentric = {0.25f, 0.125f, 0.625f};
@@ -97,7 +106,6 @@ inline CauteryContact Sample(std::uint64_t sequence) {
   for (std::uint32_t i = 0; i < kFootprintCells * kFootprintCells; ++i) {
     m.footprint.gap.push_back(static_cast<std::uint8_t>(i * 3));
   }
-  m.power_W = 35;
   return m;
 }
 

@@ -31,7 +31,8 @@ void Play(const Put& put) {
     if (i % 10 != 0) continue;
     put(i < 2000 ? test::GraspAt(time_s, Vec3d(0, 0, 5e-3 * time_s), 3 * time_s, 5) : test::PushAt(time_s, 2));
     const auto along = static_cast<float>(0.02 + 0.008 * time_s);
-    put(test::TipAt(time_s, Vec2f(0.0212f, along), i % 300 > 40, CauteryMode::kCut));
+    put(test::TipAt(time_s, Vec2f(0.0212f, along), i % 300 > 40));
+    put(test::PedalAt(time_s, CauteryMode::kCut));
     if (i % 500 != 0) continue;
     ThermalEvent event;
     event.stamp = test::StampAt(time_s);

@@ -86,6 +86,10 @@ class CutRecording : public testing::Test {
     manifest.session_id = "s-1";
     manifest.scene_hash = scene_hash;
     manifest.session_start_ns = test::kStart_ns;
+    GeneratorSetting setting;
+    setting.stamp = test::StampAt(-0.5);
+    setting.cut_W = 35;
+    put(setting, -0.5);
     put(manifest, -0.2);
     for (int ms = 0; ms <= 1000; ++ms) {
       const double time_s = 1e-3 * ms;
@@ -94,6 +98,7 @@ class CutRecording : public testing::Test {
       // The neck goes up: z of the tool points down.
       tool.tools[1].q_WT = Quatf(0, 1, 0, 0);
       put(tool, time_s);
+      put(test::PedalAt(time_s, ms >= 200 ? CauteryMode::kCut : CauteryMode::kOff), time_s);
       if (ms % 10 != 5) continue;
       TissueFrame frame;
       frame.header.stamp = test::StampAt(time_s);
@@ -103,10 +108,8 @@ class CutRecording : public testing::Test {
       frame.header.vertex_count = static_cast<std::uint32_t>(scene_.places.size());
       frame.xyz = Interleaved(scene_.places);
       put(frame, time_s + 1e-4);
-      CauteryContact contact = test::TipAt(time_s, Vec2f(8e-3f, static_cast<float>(10e-3 + 10e-3 * time_s)), true,
-                                           ms > 200 ? CauteryMode::kCut : CauteryMode::kOff);
+      CauteryContact contact = test::TipAt(time_s, Vec2f(8e-3f, static_cast<float>(10e-3 + 10e-3 * time_s)), true);
       contact.session_time_s = time_s - 0.0025;
-      contact.power_W = ms > 200 ? 35 : 0;
       put(contact, time_s + 2e-4);
     }
     put(Patch(1, 0), 0.7);

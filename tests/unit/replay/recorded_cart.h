@@ -76,6 +76,7 @@ struct CartStory {
   double kill_haptics_s = -1;
   double late_physics_s = -1;                            ///< One period is skipped.
   int threads = 1;                                       ///< Of physics.
+  float power_W = 35;                                    ///< Of the generator.
   std::function<bool(ToolState*)> tool_change{};         ///< Of what is recorded only.
   std::function<bool(TickManifest*)> manifest_change{};  ///< The same.
   bool record_frames = true;                             ///< TissueFrame is most of the bytes.
@@ -94,6 +95,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   recording::McapWriter writer(folder / "recording.mcap", "", "test");
   TappedTopic<ToolState> tools(&writer);
   TappedTopic<HandleState> handles(&writer);
+  TappedTopic<GeneratorSetting> generator(&writer);
   TappedTopic<TissueFrame> frames(&writer);
   TappedTopic<ContactModel> models(&writer);
   TappedTopic<CauteryContact> cautery(&writer);
@@ -170,15 +172,20 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
                                              thermal::ThermalNode::CheckpointCapacity(scene));
   auto thermal_in = cautery.MakeInput();
   auto tear_in = tears.MakeInput();
+  auto thermal_handles_in = handles.MakeInput();
+  auto setting_in = generator.MakeInput();
   auto topology_out = topology.MakeOutput();
   auto open_out = open_cells.MakeOutput();
   auto patch_out = patches.MakeOutput();
   auto event_out = events.MakeOutput();
   auto thermal_manifest_out = manifests.MakeOutput();
-  thermal::ThermalNode thermal(
-      scene, {*thermal_in, *tear_in, *topology_out, *open_out, *patch_out, *event_out, *thermal_manifest_out},
-      &thermal_checkpoint, kStart - 3);
+  thermal::ThermalNode thermal(scene,
+                               {*thermal_in, *tear_in, *thermal_handles_in, *setting_in, *topology_out, *open_out,
+                                *patch_out, *event_out, *thermal_manifest_out},
+                               &thermal_checkpoint, kStart - 3);
   auto handle_out = handles.MakeOutput();
+  auto setting_out = generator.MakeOutput();
+  setting_out->Write({{1, kStart - 1, kStart - 1}, story.power_W, story.power_W, story.power_W});
 
   const auto seconds_of = [](std::int64_t ns) { return 1e-9 * static_cast<double>(ns - kStart); };
   const auto milliseconds = static_cast<std::int64_t>(1e3 * story.seconds);
@@ -231,6 +238,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     manifests.Record(now, story.manifest_change);
     tools.Record(now, story.tool_change);
     handles.Record(now);
+    generator.Record(now);
     frames.Record(now, [&](TissueFrame*) { return story.record_frames; });
     models.Record(now);
     cautery.Record(now);

@@ -8,9 +8,26 @@
 
 namespace fulcrum::thermal {
 
+/// The pedal of a mode, down.
+inline std::uint8_t PedalOf(CauteryMode mode) {
+  switch (mode) {
+    case CauteryMode::kCut:
+      return kPedalCut;
+    case CauteryMode::kCoag:
+      return kPedalCoag;
+    case CauteryMode::kBlend:
+      return kPedalBlend;
+    case CauteryMode::kOff:
+      break;
+  }
+  return kPedalNone;
+}
+
 struct NodeBus {
   bus::InProcessTopic<CauteryContact> contacts;
   bus::InProcessTopic<TearState> tears;
+  bus::InProcessTopic<HandleState> handles;
+  bus::InProcessTopic<GeneratorSetting> generator;
   bus::InProcessTopic<TopologyState> topology;
   bus::InProcessTopic<OpenCells> open_cells;
   bus::InProcessTopic<TemperaturePatch> patches;
@@ -20,6 +37,10 @@ struct NodeBus {
   std::unique_ptr<bus::Input<CauteryContact>> contact_in = contacts.MakeInput();
   std::unique_ptr<bus::Output<TearState>> tear_out = tears.MakeOutput();
   std::unique_ptr<bus::Input<TearState>> tear_in = tears.MakeInput();
+  std::unique_ptr<bus::Output<HandleState>> handle_out = handles.MakeOutput();
+  std::unique_ptr<bus::Input<HandleState>> handle_in = handles.MakeInput();
+  std::unique_ptr<bus::Output<GeneratorSetting>> setting_out = generator.MakeOutput();
+  std::unique_ptr<bus::Input<GeneratorSetting>> setting_in = generator.MakeInput();
   std::unique_ptr<bus::Output<TopologyState>> topology_out = topology.MakeOutput();
   std::unique_ptr<bus::Output<OpenCells>> open_out = open_cells.MakeOutput();
   std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patch_out = patches.MakeOutput();
@@ -31,18 +52,27 @@ struct NodeBus {
   std::unique_ptr<bus::Input<ThermalEvent>> event_in = events.MakeInput(4096);
   std::unique_ptr<bus::Input<TickManifest>> manifest_in = manifests.MakeInput(4);
 
+  /// From `ns` on that pedal is down, and the generator is set to that power.
+  void Demand(CauteryMode mode, float power_W, std::int64_t ns) {
+    HandleState state;
+    state.stamp = {++demands, 1, ns};
+    state.pedals = PedalOf(mode);
+    handle_out->Write(state);
+    setting_out->Write({state.stamp, power_W, power_W, power_W});
+  }
+  std::uint64_t demands = 0;
+
   /// The node's.
   [[nodiscard]] ThermalNode::Ports ports() const {
-    return {*contact_in, *tear_in, *topology_out, *open_out, *patch_out, *event_out, *manifest_out};
+    return {*contact_in, *tear_in,   *handle_in, *setting_in,  *topology_out,
+            *open_out,   *patch_out, *event_out, *manifest_out};
   }
 };
 
-/// Metal on the membrane at a place, energised.
-inline CauteryContact TouchAt(const Vec2f& material, CauteryMode mode, float power_W, float radius_m) {
+/// Metal on the membrane at a place.
+inline CauteryContact TouchAt(const Vec2f& material, float radius_m) {
   CauteryContact contact;
   contact.touching = true;
-  contact.mode = mode;
-  contact.power_W = power_W;
   contact.contact_radius_m = radius_m;
   contact.material = material;
   contact.triangle = 0;

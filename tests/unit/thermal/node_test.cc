@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "tests/numerics/thermal/flat_scene.h"
 #include "tests/numerics/thermal/topology_validator.h"
@@ -36,7 +38,8 @@ class ThermalNodeTest : public ::testing::Test {
 
   /// The tip is at (s, 10.2 mm), energised, at a moment of the session.
   void Send(float s, double time_s) {
-    CauteryContact contact = TouchAt({s, 0.0102f}, CauteryMode::kCut, 35, 5e-4f);
+    if (demands_) bus_.Demand(CauteryMode::kCut, 35, std::max(std::llround(1e9 * time_s) - 1000, 0LL));
+    CauteryContact contact = TouchAt({s, 0.0102f}, 5e-4f);
     contact.session_time_s = time_s;
     contact.stamp = {++sequence_, 1, tick_.stamp_ns};
     ASSERT_TRUE(bus_.contact_out->Write(contact));
@@ -46,10 +49,20 @@ class ThermalNodeTest : public ::testing::Test {
     Send(s, tick_.session_time_s);
     Step(node);
   }
+  /// What a node gives into contacts of 0.2 s that it was away for, until it hears of the pedal again.
+  double EnergyAfterAnOutage(CauteryMode mode_after);
   [[nodiscard]] TickManifest NewestManifest() {
     TickManifest manifest;
     EXPECT_TRUE(bus_.manifest_in->TakeLatest(&manifest));
     return manifest;
+  }
+  /// Sequences of the samples of a topic that the newest tick consumed.
+  [[nodiscard]] std::vector<std::uint64_t> NewestConsumed(TopicId topic) {
+    std::vector<std::uint64_t> sequences;
+    for (const ConsumedInput& input : NewestManifest().consumed) {
+      if (input.topic == topic) sequences.push_back(input.sequence);
+    }
+    return sequences;
   }
   void Step(ThermalNode* node) {
     Advance(&tick_);
@@ -70,6 +83,7 @@ class ThermalNodeTest : public ::testing::Test {
   NodeBus bus_;
   std::unique_ptr<runtime::CheckpointFile> checkpoint_;
   Tick tick_;
+  bool demands_ = true;  ///< With each contact the pedal is down.
   std::uint64_t sequence_ = 0;
   std::int64_t epoch_ = 100;
 };
@@ -322,7 +336,8 @@ TEST_F(ThermalNodeTest, SameInputsGiveTheSameHashes) {
     Cut(node.get(), 0.010f, 0.014f);
     const TickManifest manifest = NewestManifest();
     EXPECT_EQ(manifest.node, NodeId::kThermal);
-    EXPECT_EQ(manifest.consumed.at(0).sequence, sequence_);
+    const auto contact = std::ranges::find(manifest.consumed, TopicId::kCauteryContact, &ConsumedInput::topic);
+    EXPECT_TRUE(contact != manifest.consumed.end() && contact->sequence == sequence_);
     return manifest.state_hash;
   };
   EXPECT_EQ(run(), run());
@@ -332,11 +347,13 @@ TEST_F(ThermalNodeTest, EveryContactIsConsumedAndNamedInTheManifest) {
   auto node = MakeNode();
   for (int n = 0; n < 3; ++n) Send(0.010f + 4e-5f * static_cast<float>(n), 0.01 * n);
   Step(node.get());
-  TickManifest manifest = NewestManifest();
-  ASSERT_EQ(manifest.consumed.size(), 3u);
-  for (std::uint64_t n = 0; n < 3; ++n) {
-    EXPECT_EQ(manifest.consumed[n].topic, TopicId::kCauteryContact);
-    EXPECT_EQ(manifest.consumed[n].sequence, n + 1);
+  const TickManifest manifest = NewestManifest();
+  for (const TopicId topic : {TopicId::kCauteryContact, TopicId::kHandleState, TopicId::kGeneratorSetting}) {
+    std::vector<std::uint64_t> sequences;
+    for (const ConsumedInput& input : manifest.consumed) {
+      if (input.topic == topic) sequences.push_back(input.sequence);
+    }
+    EXPECT_EQ(sequences, (std::vector<std::uint64_t>{1, 2, 3}));
   }
   EXPECT_GT(node->solver().ledger().joule, 0.0);
   Step(node.get());
@@ -347,14 +364,86 @@ TEST_F(ThermalNodeTest, OfManyContactsTheLaterOnesWaitForTheNextFrame) {
   auto node = MakeNode();
   for (int n = 0; n < 12; ++n) Send(0.010f + 4e-5f * static_cast<float>(n), 0.01 * n);
   Step(node.get());
-  const TickManifest first = NewestManifest();
-  ASSERT_EQ(first.consumed.size(), kMostSamples);
-  EXPECT_EQ(first.consumed.front().sequence, 1u);
+  const std::vector<std::uint64_t> first = NewestConsumed(TopicId::kCauteryContact);
+  ASSERT_EQ(first.size(), kMostSamples);
+  EXPECT_EQ(first.front(), 1u);
   Step(node.get());
-  const TickManifest second = NewestManifest();
-  ASSERT_EQ(second.consumed.size(), 12 - kMostSamples);
-  EXPECT_EQ(second.consumed.front().sequence, kMostSamples + 1);
-  EXPECT_EQ(second.consumed.back().sequence, 12u);
+  const std::vector<std::uint64_t> second = NewestConsumed(TopicId::kCauteryContact);
+  ASSERT_EQ(second.size(), 12 - kMostSamples);
+  EXPECT_EQ(second.front(), kMostSamples + 1);
+  EXPECT_EQ(second.back(), 12u);
+}
+
+TEST_F(ThermalNodeTest, WithoutAGeneratorSettingThereIsNoCurrentAndHealthSaysSo) {
+  auto node = MakeNode();
+  demands_ = false;
+  HandleState down;
+  down.stamp = {1, 1, 0};
+  down.pedals = kPedalCut;
+  ASSERT_TRUE(bus_.handle_out->Write(down));
+  for (int n = 0; n < 5; ++n) Touch(node.get(), 0.010f);
+  EXPECT_EQ(node->solver().ledger().joule, 0.0);
+  Health health;
+  node->FillHealth(&health);
+  EXPECT_NE(health.last_error.find("GeneratorSetting"), std::string::npos) << health.last_error;
+}
+
+TEST_F(ThermalNodeTest, APedalThatFallsSilentIsUp) {
+  auto node = MakeNode();
+  Touch(node.get(), 0.010f);
+  demands_ = false;
+  const double begun = node->solver().ledger().generator;
+  for (int n = 0; n < 10; ++n) Touch(node.get(), 0.010f);
+  const double heard = node->solver().ledger().generator;
+  EXPECT_GT(heard, begun);
+  for (int n = 0; n < 10; ++n) Touch(node.get(), 0.010f);
+  EXPECT_LT(node->solver().ledger().generator - heard, 0.02 * (heard - begun) + 0.4) << "a frame of 35 W at most";
+}
+
+TEST_F(ThermalNodeTest, ANewSettingIsTakenAtItsTime) {
+  auto node = MakeNode();
+  for (int n = 0; n < 5; ++n) Touch(node.get(), 0.010f);
+  EXPECT_TRUE(node->TakeSettingChanged());
+  EXPECT_FALSE(node->TakeSettingChanged());
+  EXPECT_EQ(node->solver().figures().set_power_W, 35);
+  demands_ = false;
+  bus_.Demand(CauteryMode::kCut, 50, std::llround(1e9 * (tick_.session_time_s + 0.015)));
+  Touch(node.get(), 0.010f);
+  EXPECT_EQ(node->solver().figures().set_power_W, 35) << "not yet";
+  for (int n = 0; n < 2; ++n) Touch(node.get(), 0.010f);
+  EXPECT_EQ(node->solver().figures().set_power_W, 50);
+  EXPECT_TRUE(node->TakeSettingChanged());
+}
+
+double ThermalNodeTest::EnergyAfterAnOutage(CauteryMode mode_after) {
+  std::filesystem::remove(folder_ / "thermal_node.checkpoint");
+  tick_ = {};
+  demands_ = true;
+  OpenCheckpoint();
+  auto node = MakeNode();
+  Cut(node.get(), 0.010f, 0.012f);
+  node.reset();
+  OpenCheckpoint();
+  // Twenty contacts without a word of the pedal, which is heard of only after that.
+  demands_ = false;
+  double time_s = tick_.session_time_s;
+  for (int n = 0; n < 20; ++n, time_s += 0.01) Send(0.012f + 8e-5f * static_cast<float>(n), time_s);
+  tick_.session_time_s = time_s;
+  tick_.stamp_ns = std::llround(1e9 * time_s);
+  node = MakeNode();
+  EXPECT_TRUE(node->restored());
+  Step(node.get());
+  EXPECT_TRUE(NewestConsumed(TopicId::kCauteryContact).empty());
+  bus_.Demand(mode_after, 35, tick_.stamp_ns);
+  const double before = node->solver().ledger().generator;
+  for (int n = 0; n < 4; ++n) Step(node.get());
+  return node->solver().ledger().generator - before;
+}
+
+TEST_F(ThermalNodeTest, OneThatComesBackWaitsForThePedalOfTheContactsItMissed) {
+  const double down = EnergyAfterAnOutage(CauteryMode::kCut), up = EnergyAfterAnOutage(CauteryMode::kOff);
+  EXPECT_GT(up, 0.5) << "for a tenth of a second after it was last heard of the pedal is down";
+  EXPECT_GT(down, 1.5 * up) << "both ends of the silence say down";
 }
 
 TEST_F(ThermalNodeTest, TellsPhysicsWhatIsGoneAroundTheHook) {

@@ -1,0 +1,23 @@
+#include "services/core/error.h"
+#include "services/supervisor/cli/commands.h"
+#include "services/supervisor/outcome.h"
+
+namespace fulcrum::supervisor::cli {
+
+ExitCode Generator(const Words& words) {
+  boost::program_options::options_description options;
+  const auto power = [] { return boost::program_options::value<double>()->value_name("W"); };
+  options.add_options()("cut", power(), "power with the pedal for cut down, 0 to 300 W")(
+      "coag", power(), "with the pedal for coagulation down")("blend", power(), "with the pedal for blended cut down");
+  AddDomain(&options);
+  const Arguments arguments = Parse("generator", words, options, {});
+  if (arguments.help) return ExitCode::kDone;
+  std::string turned;
+  for (const char* knob : {"cut", "coag", "blend"}) {
+    if (arguments.values.count(knob) == 0) continue;
+    turned += (turned.empty() ? "" : " ") + std::string(knob) + "=" + Fixed(arguments.values[knob].as<double>(), 2);
+  }
+  return Ask(DomainOf(arguments, kDefaultDomain), "generator", turned);
+}
+
+}  // namespace fulcrum::supervisor::cli

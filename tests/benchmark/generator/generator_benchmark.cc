@@ -1,0 +1,93 @@
+// How long a turn of the generator's knob takes, in a real cart that cuts: from the Command on the bus to the Health of
+// thermal_node that tells the new set power.
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "services/bus/dds/participant.h"
+#include "services/bus/input_account.h"
+#include "services/runtime/cyclic_thread.h"
+#include "tests/benchmark/report.h"
+#include "tests/support/cart.h"
+#include "tests/support/cart_watch.h"
+#include "tests/support/working_scene.h"
+
+namespace fulcrum {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::CartState;
+
+constexpr int kDomain = 93;
+constexpr int kTurns = 40, kTurnsQuick = 8;
+constexpr double kPatience_s = 30;
+
+bool Sets(const CartState& state, double power_W) { return state.Metric(NodeId::kThermal, "set_power_W") == power_W; }
+
+/// Empty, or what went wrong.
+std::string Measure(int turns, const fs::path& scene, std::vector<double>* set_ms) {
+  testing::Cart cart(scene, kDomain);
+  testing::CartWatch watch(kDomain, scene, cart.session());
+  if (!watch.WaitUntil(60, [](const CartState& state) { return Sets(state, 35); })) {
+    return "the cart did not come to cut\n" + cart.Said();
+  }
+  bus::DdsParticipant participant({.domain = kDomain, .node_name = "fulcrum", .shared_memory = {}});
+  const auto commands = participant.MakeOutput<Command>();
+  if (!testing::WaitFor(kPatience_s, [&] { return commands->has_readers(); })) return "no supervisor is heard";
+  bus::Stamper stamper(runtime::MonotonicNs());
+  for (int i = 0; i < turns; ++i) {
+    // Not in step with the period of anything.
+    std::this_thread::sleep_for(std::chrono::milliseconds(201 + 7 * (i % 13)));
+    const int power_W = i % 2 == 0 ? 50 : 35;
+    const std::int64_t turned_ns = runtime::MonotonicNs();
+    Command command;
+    command.stamp = stamper.Next(turned_ns);
+    command.request_id = static_cast<std::uint64_t>(turned_ns);
+    command.target = NodeId::kSupervisor;
+    command.verb = "generator";
+    command.argument = "cut=" + std::to_string(power_W);
+    commands->Write(command);
+    std::int64_t told_ns = 0;
+    const bool told = watch.WaitUntil(kPatience_s, [&](const CartState& state) {
+      told_ns = runtime::MonotonicNs();
+      return Sets(state, power_W);
+    });
+    if (!told) return "the setting was not taken\n" + cart.Said();
+    set_ms->push_back(1e-6 * static_cast<double>(told_ns - turned_ns));
+  }
+  cart.Signal(SIGINT);
+  return cart.WaitForEnd(kPatience_s) == 0 ? std::string() : "the session ended badly\n" + cart.Said();
+}
+
+int Run(benchmark::Report* report) {
+  if (!report->Wants("generator.")) return 0;
+  const fs::path folder = fs::temp_directory_path() / ("bench_generator." + std::to_string(::getpid()));
+  fs::create_directories(folder);
+  const fs::path scene = folder / "working.yaml";
+  std::ofstream(scene) << testing::WorkingScene("built-in", 120);
+  std::vector<double> set_ms;
+  const std::string wrong = Measure(report->quick() ? kTurnsQuick : kTurns, scene, &set_ms);
+  fs::remove_all(folder);
+  if (!wrong.empty()) {
+    std::fprintf(stderr, "bench_generator: %s\n", wrong.c_str());
+    return 1;
+  }
+  report->Add("generator.set_to_power_ms", benchmark::Quantile(set_ms, 0.5), "ms");
+  report->Add("generator.set_to_power_ms_max", benchmark::Quantile(set_ms, 1), "ms");
+  return 0;
+}
+
+}  // namespace
+}  // namespace fulcrum
+
+int main(int argc, char** argv) {
+  fulcrum::benchmark::Report report(argc, argv);
+  return fulcrum::Run(&report);
+}
