@@ -39,21 +39,9 @@ inline constexpr std::size_t kMaxArgument = 1023;
 inline constexpr std::size_t kMaxErrorText = 255;
 inline constexpr std::size_t kMaxReplyText = 1023;
 
-[[nodiscard]] bool PassesGate(const HandleState& m) noexcept;
-[[nodiscard]] bool PassesGate(const GeneratorSetting& m) noexcept;
-[[nodiscard]] bool PassesGate(const ToolState& m) noexcept;
-[[nodiscard]] bool PassesGate(const TissueFrame& m) noexcept;
-[[nodiscard]] bool PassesGate(const ContactModel& m) noexcept;
-[[nodiscard]] bool PassesGate(const CauteryContact& m) noexcept;
-[[nodiscard]] bool PassesGate(const TopologyState& m) noexcept;
-[[nodiscard]] bool PassesGate(const TearState& m) noexcept;
-[[nodiscard]] bool PassesGate(const OpenCells& m) noexcept;
-[[nodiscard]] bool PassesGate(const TemperaturePatch& m) noexcept;
-[[nodiscard]] bool PassesGate(const ThermalEvent& m) noexcept;
-[[nodiscard]] bool PassesGate(const SceneManifest& m) noexcept;
-[[nodiscard]] bool PassesGate(const Command& m) noexcept;
-[[nodiscard]] bool PassesGate(const CommandReply& m) noexcept;
-[[nodiscard]] bool PassesGate(const TickManifest& m) noexcept;
-[[nodiscard]] bool PassesGate(const Health& m) noexcept;
+// Of each message; a message without one does not link.
+#define FULCRUM_GATE(T) [[nodiscard]] bool PassesGate(const T& m) noexcept;
+FULCRUM_MESSAGES(FULCRUM_GATE)
+#undef FULCRUM_GATE
 
 }  // namespace fulcrum::bus

@@ -58,7 +58,7 @@ template <class T>
 class HubInput final : public Input<T> {
  public:
   HubInput(std::shared_ptr<Hub<T>> hub, std::size_t depth)
-      : hub_(std::move(hub)), unread_(depth), account_(RoleOf<T>().gap_is_loss, RoleOf<T>().one_owner()) {
+      : hub_(std::move(hub)), unread_(depth), account_(kQualityOf<T>.gap_is_loss, RoleOf<T>().one_owner()) {
     const std::lock_guard lock(hub_->mutex);
     for (Ring<T>* history : hub_->history) {
       for (std::size_t i = 0; i < history->size(); ++i) unread_.Push(history->At(i));
@@ -108,7 +108,7 @@ template <class T>
 class HubOutput : public OutputOf<T>::type {
  public:
   explicit HubOutput(std::shared_ptr<Hub<T>> hub)
-      : hub_(std::move(hub)), history_(static_cast<std::size_t>(RoleOf<T>().writer_depth)) {
+      : hub_(std::move(hub)), history_(static_cast<std::size_t>(kQualityOf<T>.writer_depth)) {
     const std::lock_guard lock(hub_->mutex);
     hub_->history.push_back(&history_);
   }
@@ -122,13 +122,13 @@ class HubOutput : public OutputOf<T>::type {
       const std::lock_guard lock(hub_->mutex);
       bool room = true;
       for (Ring<T>* input : hub_->inputs) {
-        if (RoleOf<T>().keep_all && input->full()) {
+        if (kQualityOf<T>.delivery == Delivery::kReliableKeepAll && input->full()) {
           room = false;
         } else {
           input->Push(sample);
         }
       }
-      if (RoleOf<T>().late_joiners_served) history_.Push(sample);
+      if (kQualityOf<T>.late_joiners_served) history_.Push(sample);
       ++(room ? stats_.written : stats_.failed);
       return room;
     } catch (...) {
@@ -204,7 +204,7 @@ class InProcessTopic {
   /// `depth`: unread samples kept; 0 takes the reader depth of the topic's role.
   [[nodiscard]] std::unique_ptr<Input<T>> MakeInput(std::size_t depth = 0) {
     return std::make_unique<in_process::HubInput<T>>(
-        hub_, depth != 0 ? depth : static_cast<std::size_t>(RoleOf<T>().reader_depth));
+        hub_, depth != 0 ? depth : static_cast<std::size_t>(kQualityOf<T>.reader_depth));
   }
   [[nodiscard]] std::unique_ptr<typename OutputOf<T>::type> MakeOutput() {
     if constexpr (requires { typename T::View; }) {

@@ -5,14 +5,6 @@
 namespace fulcrum::bus {
 namespace {
 
-constexpr bool TableIsInOrder() {
-  for (std::size_t i = 0; i < kTopicRoles.size(); ++i) {
-    if (static_cast<std::size_t>(kTopicRoles[i].id) != i) return false;
-  }
-  return true;
-}
-static_assert(TableIsInOrder(), "kTopicRoles is indexed by TopicId");
-
 constexpr std::string_view kPrefix = "fulcrum/";
 
 }  // namespace

@@ -4,6 +4,8 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <cstdlib>
 #include <string_view>
 #include <type_traits>
 
@@ -16,19 +18,28 @@ enum class Path : std::uint8_t {
   kSharedMemory,  ///< Data-sharing with loans: plain types, at most 100 Hz.
 };
 
+enum class Delivery : std::uint8_t {
+  kBestEffort,
+  kReliable,
+  kReliableKeepAll,  ///< No sample may be replaced by a newer one; a writer without room fails instead.
+};
+
+/// What is asked of the way of a topic.
+struct Quality {
+  Path path = Path::kLoopback;
+  Delivery delivery = Delivery::kBestEffort;
+  /// A late joiner is given the newest `writer_depth` samples of each live writer.
+  bool late_joiners_served = false;
+  /// A gap in the sequence is a loss. False where the ring is overwritten on purpose because only the newest counts.
+  bool gap_is_loss = true;
+  int writer_depth = 1;
+  int reader_depth = 1;
+};
+
 struct TopicRole {
   TopicId id;
   const char* name;
-  Path path;
-  bool reliable;
-  /// A late joiner is given the newest `writer_depth` samples of each live writer.
-  bool late_joiners_served;
-  /// No sample may be replaced by a newer one; a writer without room fails instead.
-  bool keep_all;
-  /// A gap in the sequence is a loss. False where the ring is overwritten on purpose because only the newest counts.
-  bool gap_is_loss;
-  int writer_depth;
-  int reader_depth;
+  Quality quality;
   /// One process at a time sends it: once a later epoch has been heard, what an earlier one still sends is refused.
   [[nodiscard]] constexpr bool one_owner() const {
     return id != TopicId::kCommand && id != TopicId::kCommandReply && id != TopicId::kTickManifest &&
@@ -51,116 +62,110 @@ inline constexpr int kEventBurst = 512;
 inline constexpr int kAllWriters = 64;
 inline constexpr int kCommandBacklog = 256;
 
-inline constexpr std::array<TopicRole, kTopicCount> kTopicRoles{{
-    {TopicId::kHandleState, "fulcrum/HandleState", Path::kLoopback, false, false, false, true, kLatestOnly,
-     kStreamAtSlowestReader},
-    {TopicId::kToolState, "fulcrum/ToolState", Path::kLoopback, false, false, false, true, kLatestOnly,
-     kStreamAtSlowestReader},
-    {TopicId::kTissueFrame, "fulcrum/TissueFrame", Path::kSharedMemory, false, true, false, false, kFrameRing,
-     kFrameRing},
-    {TopicId::kContactModel, "fulcrum/ContactModel", Path::kLoopback, false, false, false, true, kLatestOnly,
-     kStreamAtSlowestReader},
-    {TopicId::kCauteryContact, "fulcrum/CauteryContact", Path::kLoopback, true, true, false, true, kOutage,
-     kStreamAtSlowestReader},
-    {TopicId::kTopologyState, "fulcrum/TopologyState", Path::kLoopback, true, true, false, false, kLatestOnly,
-     kFrameRing},
-    {TopicId::kTemperaturePatch, "fulcrum/TemperaturePatch", Path::kSharedMemory, false, true, false, true, kPatchRing,
-     kPatchRing},
-    {TopicId::kThermalEvent, "fulcrum/ThermalEvent", Path::kLoopback, true, false, false, true, kEventBurst,
-     kEventBurst},
-    {TopicId::kSceneManifest, "fulcrum/SceneManifest", Path::kLoopback, true, true, false, false, kLatestOnly,
-     kFrameRing},
-    {TopicId::kCommand, "fulcrum/Command", Path::kLoopback, true, false, true, true, kCommandBacklog, kCommandBacklog},
-    {TopicId::kCommandReply, "fulcrum/CommandReply", Path::kLoopback, true, false, true, true, kCommandBacklog,
-     kCommandBacklog},
-    {TopicId::kTickManifest, "fulcrum/TickManifest", Path::kLoopback, true, false, false, true, kEventBurst,
-     kEventBurst},
-    {TopicId::kHealth, "fulcrum/Health", Path::kLoopback, true, true, false, true, kLatestOnly, kAllWriters},
-    {TopicId::kTearState, "fulcrum/TearState", Path::kLoopback, true, true, false, false, kLatestOnly, kFrameRing},
-    {TopicId::kOpenCells, "fulcrum/OpenCells", Path::kLoopback, true, true, false, false, kLatestOnly, kFrameRing},
-    {TopicId::kGeneratorSetting, "fulcrum/GeneratorSetting", Path::kLoopback, true, true, false, false, kLatestOnly,
-     kOutage},
-}};
-
-[[nodiscard]] constexpr const TopicRole& RoleOf(TopicId id) { return kTopicRoles[static_cast<std::size_t>(id)]; }
+/// By message type; a message without one does not compile.
+template <class T>
+extern const Quality kQualityOf;
+template <>
+inline constexpr Quality kQualityOf<HandleState>{.writer_depth = kLatestOnly, .reader_depth = kStreamAtSlowestReader};
+template <>
+inline constexpr Quality kQualityOf<ToolState>{.writer_depth = kLatestOnly, .reader_depth = kStreamAtSlowestReader};
+template <>
+inline constexpr Quality kQualityOf<TissueFrame>{.path = Path::kSharedMemory,
+                                                 .late_joiners_served = true,
+                                                 .gap_is_loss = false,
+                                                 .writer_depth = kFrameRing,
+                                                 .reader_depth = kFrameRing};
+template <>
+inline constexpr Quality kQualityOf<ContactModel>{.writer_depth = kLatestOnly, .reader_depth = kStreamAtSlowestReader};
+template <>
+inline constexpr Quality kQualityOf<CauteryContact>{.delivery = Delivery::kReliable,
+                                                    .late_joiners_served = true,
+                                                    .writer_depth = kOutage,
+                                                    .reader_depth = kStreamAtSlowestReader};
+template <>
+inline constexpr Quality kQualityOf<TopologyState>{.delivery = Delivery::kReliable,
+                                                   .late_joiners_served = true,
+                                                   .gap_is_loss = false,
+                                                   .writer_depth = kLatestOnly,
+                                                   .reader_depth = kFrameRing};
+template <>
+inline constexpr Quality kQualityOf<TemperaturePatch>{
+    .path = Path::kSharedMemory, .late_joiners_served = true, .writer_depth = kPatchRing, .reader_depth = kPatchRing};
+template <>
+inline constexpr Quality kQualityOf<ThermalEvent>{
+    .delivery = Delivery::kReliable, .writer_depth = kEventBurst, .reader_depth = kEventBurst};
+template <>
+inline constexpr Quality kQualityOf<SceneManifest>{.delivery = Delivery::kReliable,
+                                                   .late_joiners_served = true,
+                                                   .gap_is_loss = false,
+                                                   .writer_depth = kLatestOnly,
+                                                   .reader_depth = kFrameRing};
+template <>
+inline constexpr Quality kQualityOf<Command>{
+    .delivery = Delivery::kReliableKeepAll, .writer_depth = kCommandBacklog, .reader_depth = kCommandBacklog};
+template <>
+inline constexpr Quality kQualityOf<CommandReply>{
+    .delivery = Delivery::kReliableKeepAll, .writer_depth = kCommandBacklog, .reader_depth = kCommandBacklog};
+template <>
+inline constexpr Quality kQualityOf<TickManifest>{
+    .delivery = Delivery::kReliable, .writer_depth = kEventBurst, .reader_depth = kEventBurst};
+template <>
+inline constexpr Quality kQualityOf<Health>{.delivery = Delivery::kReliable,
+                                            .late_joiners_served = true,
+                                            .writer_depth = kLatestOnly,
+                                            .reader_depth = kAllWriters};
+template <>
+inline constexpr Quality kQualityOf<TearState>{.delivery = Delivery::kReliable,
+                                               .late_joiners_served = true,
+                                               .gap_is_loss = false,
+                                               .writer_depth = kLatestOnly,
+                                               .reader_depth = kFrameRing};
+template <>
+inline constexpr Quality kQualityOf<OpenCells>{.delivery = Delivery::kReliable,
+                                               .late_joiners_served = true,
+                                               .gap_is_loss = false,
+                                               .writer_depth = kLatestOnly,
+                                               .reader_depth = kFrameRing};
+template <>
+inline constexpr Quality kQualityOf<GeneratorSetting>{.delivery = Delivery::kReliable,
+                                                      .late_joiners_served = true,
+                                                      .gap_is_loss = false,
+                                                      .writer_depth = kLatestOnly,
+                                                      .reader_depth = kOutage};
 
 /// Message type to topic.
 template <class T>
-inline constexpr TopicId kTopicOf = TopicId::kHealth;
-template <>
-inline constexpr TopicId kTopicOf<HandleState> = TopicId::kHandleState;
-template <>
-inline constexpr TopicId kTopicOf<ToolState> = TopicId::kToolState;
-template <>
-inline constexpr TopicId kTopicOf<TissueFrame> = TopicId::kTissueFrame;
-template <>
-inline constexpr TopicId kTopicOf<ContactModel> = TopicId::kContactModel;
-template <>
-inline constexpr TopicId kTopicOf<CauteryContact> = TopicId::kCauteryContact;
-template <>
-inline constexpr TopicId kTopicOf<TopologyState> = TopicId::kTopologyState;
-template <>
-inline constexpr TopicId kTopicOf<TemperaturePatch> = TopicId::kTemperaturePatch;
-template <>
-inline constexpr TopicId kTopicOf<ThermalEvent> = TopicId::kThermalEvent;
-template <>
-inline constexpr TopicId kTopicOf<SceneManifest> = TopicId::kSceneManifest;
-template <>
-inline constexpr TopicId kTopicOf<Command> = TopicId::kCommand;
-template <>
-inline constexpr TopicId kTopicOf<CommandReply> = TopicId::kCommandReply;
-template <>
-inline constexpr TopicId kTopicOf<TickManifest> = TopicId::kTickManifest;
-template <>
-inline constexpr TopicId kTopicOf<TearState> = TopicId::kTearState;
-template <>
-inline constexpr TopicId kTopicOf<OpenCells> = TopicId::kOpenCells;
-template <>
-inline constexpr TopicId kTopicOf<GeneratorSetting> = TopicId::kGeneratorSetting;
+struct TopicOf;
+#define FULCRUM_TOPIC_OF(T)                      \
+  template <>                                    \
+  struct TopicOf<T> {                            \
+    static constexpr TopicId id = TopicId::k##T; \
+  };
+FULCRUM_MESSAGES(FULCRUM_TOPIC_OF)
+#undef FULCRUM_TOPIC_OF
+template <class T>
+inline constexpr TopicId kTopicOf = TopicOf<T>::id;
 
+#define FULCRUM_ROLE(T) TopicRole{TopicId::k##T, "fulcrum/" #T, kQualityOf<T>},
+inline constexpr std::array<TopicRole, kTopicCount> kTopicRoles{{FULCRUM_MESSAGES(FULCRUM_ROLE)}};
+#undef FULCRUM_ROLE
+
+[[nodiscard]] constexpr const TopicRole& RoleOf(TopicId id) { return kTopicRoles[static_cast<std::size_t>(id)]; }
 template <class T>
 [[nodiscard]] constexpr const TopicRole& RoleOf() {
   return RoleOf(kTopicOf<T>);
 }
+[[nodiscard]] constexpr const Quality& QualityOf(TopicId id) { return RoleOf(id).quality; }
 
 /// Calls `f(std::type_identity<T>())` with the message type of a topic that is only known at run time.
 template <class F>
 decltype(auto) WithMessageOf(TopicId id, F&& f) {
-  switch (id) {
-    case TopicId::kHandleState:
-      return f(std::type_identity<HandleState>());
-    case TopicId::kToolState:
-      return f(std::type_identity<ToolState>());
-    case TopicId::kTissueFrame:
-      return f(std::type_identity<TissueFrame>());
-    case TopicId::kContactModel:
-      return f(std::type_identity<ContactModel>());
-    case TopicId::kCauteryContact:
-      return f(std::type_identity<CauteryContact>());
-    case TopicId::kTopologyState:
-      return f(std::type_identity<TopologyState>());
-    case TopicId::kTemperaturePatch:
-      return f(std::type_identity<TemperaturePatch>());
-    case TopicId::kThermalEvent:
-      return f(std::type_identity<ThermalEvent>());
-    case TopicId::kSceneManifest:
-      return f(std::type_identity<SceneManifest>());
-    case TopicId::kCommand:
-      return f(std::type_identity<Command>());
-    case TopicId::kCommandReply:
-      return f(std::type_identity<CommandReply>());
-    case TopicId::kTickManifest:
-      return f(std::type_identity<TickManifest>());
-    case TopicId::kTearState:
-      return f(std::type_identity<TearState>());
-    case TopicId::kOpenCells:
-      return f(std::type_identity<OpenCells>());
-    case TopicId::kGeneratorSetting:
-      return f(std::type_identity<GeneratorSetting>());
-    case TopicId::kHealth:
-      break;
-  }
-  return f(std::type_identity<Health>());
+#define FULCRUM_CASE(T) \
+  case TopicId::k##T:   \
+    return f(std::type_identity<T>());
+  switch (id) { FULCRUM_MESSAGES(FULCRUM_CASE) }
+#undef FULCRUM_CASE
+  std::abort();  // No such id: what comes from outside passes the gate or RoleNamed first.
 }
 
 /// The role of the topic of that name on the bus, as "fulcrum/ToolState"; null: not one of ours.

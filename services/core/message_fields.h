@@ -1,17 +1,74 @@
-// The fields of each message by name, for whoever must treat all messages alike: printing, comparing, exporting.
+// The fields of each message and of what messages are made of, by name, in the order of the struct. This one list makes
+// the walks below, which print, compare and export messages, and the conversions to the wire (services/bus/convert).
 //
 //   ForEachField<Stamp>([&](const char* name, auto member) { std::cout << name << ' ' << stamp.*member << '\n'; });
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <tuple>
 #include <type_traits>
-#include <vector>
 
 #include "services/core/messages.h"
 
 namespace fulcrum {
+
+// F(field) for each field of a struct.
+#define FULCRUM_FIELDS_OF_Stamp(F) F(sequence) F(epoch) F(stamp_ns)
+#define FULCRUM_FIELDS_OF_HandleSample(F) F(present) F(jaw_angle_rad) F(jaw_rate_rad_s) F(quality) F(raw_counts)
+#define FULCRUM_FIELDS_OF_HandleState(F) F(stamp) F(handles) F(pedals)
+#define FULCRUM_FIELDS_OF_GeneratorSetting(F) F(stamp) F(cut_W) F(coag_W) F(blend_W)
+#define FULCRUM_FIELDS_OF_ToolSample(F) F(kind) F(state) F(p_WT) F(q_WT) F(v_WT) F(w_WT) F(f_W) F(model_age_s)
+#define FULCRUM_FIELDS_OF_ToolState(F) F(stamp) F(tools)
+#define FULCRUM_FIELDS_OF_TissueFrameHeader(F)                                                                 \
+  F(stamp)                                                                                                     \
+  F(scene_hash) F(topology_revision) F(tool_sequence) F(handle_sequence) F(session_time_s) F(simulated_time_s) \
+      F(vertex_count) F(grasping_tools)
+#define FULCRUM_FIELDS_OF_TissueFrame(F) F(header) F(xyz)
+#define FULCRUM_FIELDS_OF_Contact(F)                                                                           \
+  F(kind)                                                                                                      \
+  F(id) F(x_ref) F(f_ref) F(n) F(e1) F(p_s) F(v_s) F(u_c) F(du_c) F(gap) F(k1) F(k3) F(kt) F(k_body) F(b_body) \
+      F(friction) F(kappa1) F(kappa2) F(slip_force) F(radius)
+#define FULCRUM_FIELDS_OF_DeviceContacts(F) F(count) F(p_ext_W) F(force_cap_N) F(contacts)
+#define FULCRUM_FIELDS_OF_ContactModel(F) F(stamp) F(tool_sequence) F(tool_stamp_ns) F(physics_dt_s) F(devices)
+#define FULCRUM_FIELDS_OF_Footprint(F) F(x) F(y) F(width) F(gap)
+#define FULCRUM_FIELDS_OF_CauteryContact(F)                                                                   \
+  F(stamp)                                                                                                    \
+  F(session_time_s) F(topology_revision) F(touching) F(tented) F(tool) F(triangle) F(barycentric) F(material) \
+      F(material_rate) F(contact_radius_m) F(footprint)
+#define FULCRUM_FIELDS_OF_TopologyState(F)                                                                \
+  F(stamp)                                                                                                \
+  F(scene_hash) F(revision) F(rows) F(cols) F(cut_length_m) F(cut_width_m) F(cut_off_way_m) F(dead_nodes) \
+      F(dead_edges) F(shrink)
+#define FULCRUM_FIELDS_OF_TearState(F) F(stamp) F(scene_hash) F(rows) F(cols) F(torn_edges)
+#define FULCRUM_FIELDS_OF_OpenCells(F) F(stamp) F(scene_hash) F(x) F(y) F(rows)
+#define FULCRUM_FIELDS_OF_TemperaturePatchHeader(F) \
+  F(stamp) F(topology_revision) F(slot) F(origin_x) F(origin_y) F(max_temperature_C)
+#define FULCRUM_FIELDS_OF_TemperaturePatch(F) F(header) F(texels)
+#define FULCRUM_FIELDS_OF_ThermalEvent(F) \
+  F(stamp) F(session_time_s) F(kind) F(material) F(temperature_C) F(value) F(topology_revision)
+#define FULCRUM_FIELDS_OF_SceneManifest(F) \
+  F(stamp) F(scene_name) F(session_id) F(scene_hash) F(session_start_ns) F(mode) F(recorded)
+#define FULCRUM_FIELDS_OF_Command(F) F(stamp) F(request_id) F(target) F(verb) F(argument)
+#define FULCRUM_FIELDS_OF_CommandReply(F) F(stamp) F(request_id) F(from_node) F(ok) F(text)
+#define FULCRUM_FIELDS_OF_ConsumedInput(F) F(topic) F(epoch) F(sequence)
+#define FULCRUM_FIELDS_OF_TickManifest(F) F(stamp) F(node) F(tick) F(session_time_s) F(state_hash) F(consumed)
+#define FULCRUM_FIELDS_OF_TimingSummary(F) F(p50_us) F(p99_us) F(max_us)
+#define FULCRUM_FIELDS_OF_InputHealth(F) F(topic) F(matched) F(age_ms) F(received) F(lost) F(rejected)
+#define FULCRUM_FIELDS_OF_Metric(F) F(name) F(value)
+#define FULCRUM_FIELDS_OF_Health(F)                                                                              \
+  F(stamp)                                                                                                       \
+  F(node) F(state) F(pid) F(schema_hash) F(scene_hash) F(rate_asked_Hz) F(rate_achieved_Hz) F(ticks) F(overruns) \
+      F(write_failures) F(step) F(wake) F(last_error) F(inputs) F(metrics)
+
+/// S(T) for each struct whose fields have the same names in IDL, so that its conversion is made from its list.
+#define FULCRUM_STRUCTS_ALIKE_IN_IDL(S)                                                                           \
+  S(HandleSample)                                                                                                 \
+  S(HandleState) S(GeneratorSetting) S(ToolSample) S(ToolState) S(TissueFrameHeader) S(Contact) S(DeviceContacts) \
+      S(ContactModel) S(Footprint) S(CauteryContact) S(TopologyState) S(TearState) S(OpenCells)                   \
+          S(TemperaturePatchHeader) S(ThermalEvent) S(SceneManifest) S(Command) S(CommandReply) S(TickManifest)   \
+              S(TimingSummary) S(InputHealth) S(Metric) S(Health)
+/// The others: `sequence` is a keyword of IDL, and the two large messages travel in loans.
+#define FULCRUM_STRUCTS_WITH_A_CONVERSION_OF_THEIR_OWN(S) S(Stamp) S(ConsumedInput) S(TissueFrame) S(TemperaturePatch)
 
 template <class Message, class Value>
 struct Field {
@@ -21,212 +78,41 @@ struct Field {
 template <class Message, class Value>
 Field(const char*, Value Message::*) -> Field<Message, Value>;
 
-/// `list`: a tuple of Field, in the order of the struct. Specialised for each message and what it is made of.
+/// `list`: a tuple of Field, in the order of the struct.
 template <class T>
 struct FieldsOf;
 
-#define FULCRUM_FIELD(T, name) \
-  Field { #name, &T::name }
+namespace fields {
 
-template <>
-struct FieldsOf<Stamp> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(Stamp, sequence), FULCRUM_FIELD(Stamp, epoch), FULCRUM_FIELD(Stamp, stamp_ns)};
-};
-template <>
-struct FieldsOf<HandleSample> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(HandleSample, present), FULCRUM_FIELD(HandleSample, jaw_angle_rad),
-                 FULCRUM_FIELD(HandleSample, jaw_rate_rad_s), FULCRUM_FIELD(HandleSample, quality),
-                 FULCRUM_FIELD(HandleSample, raw_counts)};
-};
-template <>
-struct FieldsOf<HandleState> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(HandleState, stamp), FULCRUM_FIELD(HandleState, handles),
-                                          FULCRUM_FIELD(HandleState, pedals)};
-};
-template <>
-struct FieldsOf<GeneratorSetting> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(GeneratorSetting, stamp), FULCRUM_FIELD(GeneratorSetting, cut_W),
-                 FULCRUM_FIELD(GeneratorSetting, coag_W), FULCRUM_FIELD(GeneratorSetting, blend_W)};
-};
-template <>
-struct FieldsOf<ToolSample> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(ToolSample, kind), FULCRUM_FIELD(ToolSample, state),
-                                          FULCRUM_FIELD(ToolSample, p_WT), FULCRUM_FIELD(ToolSample, q_WT),
-                                          FULCRUM_FIELD(ToolSample, v_WT), FULCRUM_FIELD(ToolSample, w_WT),
-                                          FULCRUM_FIELD(ToolSample, f_W),  FULCRUM_FIELD(ToolSample, model_age_s)};
-};
-template <>
-struct FieldsOf<ToolState> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(ToolState, stamp), FULCRUM_FIELD(ToolState, tools)};
-};
-template <>
-struct FieldsOf<TissueFrameHeader> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(TissueFrameHeader, stamp),
-                                          FULCRUM_FIELD(TissueFrameHeader, scene_hash),
-                                          FULCRUM_FIELD(TissueFrameHeader, topology_revision),
-                                          FULCRUM_FIELD(TissueFrameHeader, tool_sequence),
-                                          FULCRUM_FIELD(TissueFrameHeader, handle_sequence),
-                                          FULCRUM_FIELD(TissueFrameHeader, session_time_s),
-                                          FULCRUM_FIELD(TissueFrameHeader, simulated_time_s),
-                                          FULCRUM_FIELD(TissueFrameHeader, vertex_count),
-                                          FULCRUM_FIELD(TissueFrameHeader, grasping_tools)};
-};
-template <>
-struct FieldsOf<TissueFrame> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(TissueFrame, header), FULCRUM_FIELD(TissueFrame, xyz)};
-};
-template <>
-struct FieldsOf<Contact> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(Contact, kind),   FULCRUM_FIELD(Contact, id),         FULCRUM_FIELD(Contact, x_ref),
-                 FULCRUM_FIELD(Contact, f_ref),  FULCRUM_FIELD(Contact, n),          FULCRUM_FIELD(Contact, e1),
-                 FULCRUM_FIELD(Contact, p_s),    FULCRUM_FIELD(Contact, v_s),        FULCRUM_FIELD(Contact, u_c),
-                 FULCRUM_FIELD(Contact, du_c),   FULCRUM_FIELD(Contact, gap),        FULCRUM_FIELD(Contact, k1),
-                 FULCRUM_FIELD(Contact, k3),     FULCRUM_FIELD(Contact, kt),         FULCRUM_FIELD(Contact, k_body),
-                 FULCRUM_FIELD(Contact, b_body), FULCRUM_FIELD(Contact, friction),   FULCRUM_FIELD(Contact, kappa1),
-                 FULCRUM_FIELD(Contact, kappa2), FULCRUM_FIELD(Contact, slip_force), FULCRUM_FIELD(Contact, radius)};
-};
-template <>
-struct FieldsOf<DeviceContacts> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(DeviceContacts, count), FULCRUM_FIELD(DeviceContacts, p_ext_W),
-                 FULCRUM_FIELD(DeviceContacts, force_cap_N), FULCRUM_FIELD(DeviceContacts, contacts)};
-};
-template <>
-struct FieldsOf<ContactModel> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(ContactModel, stamp), FULCRUM_FIELD(ContactModel, tool_sequence),
-                 FULCRUM_FIELD(ContactModel, tool_stamp_ns), FULCRUM_FIELD(ContactModel, physics_dt_s),
-                 FULCRUM_FIELD(ContactModel, devices)};
-};
-template <>
-struct FieldsOf<Footprint> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(Footprint, x), FULCRUM_FIELD(Footprint, y),
-                                          FULCRUM_FIELD(Footprint, width), FULCRUM_FIELD(Footprint, gap)};
-};
-template <>
-struct FieldsOf<CauteryContact> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(CauteryContact, stamp),
-                                          FULCRUM_FIELD(CauteryContact, session_time_s),
-                                          FULCRUM_FIELD(CauteryContact, topology_revision),
-                                          FULCRUM_FIELD(CauteryContact, touching),
-                                          FULCRUM_FIELD(CauteryContact, tented),
-                                          FULCRUM_FIELD(CauteryContact, tool),
-                                          FULCRUM_FIELD(CauteryContact, triangle),
-                                          FULCRUM_FIELD(CauteryContact, barycentric),
-                                          FULCRUM_FIELD(CauteryContact, material),
-                                          FULCRUM_FIELD(CauteryContact, material_rate),
-                                          FULCRUM_FIELD(CauteryContact, contact_radius_m),
-                                          FULCRUM_FIELD(CauteryContact, footprint)};
-};
-template <>
-struct FieldsOf<TopologyState> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(TopologyState, stamp),       FULCRUM_FIELD(TopologyState, scene_hash),
-                 FULCRUM_FIELD(TopologyState, revision),    FULCRUM_FIELD(TopologyState, rows),
-                 FULCRUM_FIELD(TopologyState, cols),        FULCRUM_FIELD(TopologyState, cut_length_m),
-                 FULCRUM_FIELD(TopologyState, cut_width_m), FULCRUM_FIELD(TopologyState, cut_off_way_m),
-                 FULCRUM_FIELD(TopologyState, dead_nodes),  FULCRUM_FIELD(TopologyState, dead_edges),
-                 FULCRUM_FIELD(TopologyState, shrink)};
-};
-template <>
-struct FieldsOf<TearState> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(TearState, stamp), FULCRUM_FIELD(TearState, scene_hash), FULCRUM_FIELD(TearState, rows),
-                 FULCRUM_FIELD(TearState, cols), FULCRUM_FIELD(TearState, torn_edges)};
-};
-template <>
-struct FieldsOf<OpenCells> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(OpenCells, stamp), FULCRUM_FIELD(OpenCells, scene_hash), FULCRUM_FIELD(OpenCells, x),
-                 FULCRUM_FIELD(OpenCells, y), FULCRUM_FIELD(OpenCells, rows)};
-};
-template <>
-struct FieldsOf<TemperaturePatchHeader> {
-  static constexpr auto list = std::tuple{
-      FULCRUM_FIELD(TemperaturePatchHeader, stamp),    FULCRUM_FIELD(TemperaturePatchHeader, topology_revision),
-      FULCRUM_FIELD(TemperaturePatchHeader, slot),     FULCRUM_FIELD(TemperaturePatchHeader, origin_x),
-      FULCRUM_FIELD(TemperaturePatchHeader, origin_y), FULCRUM_FIELD(TemperaturePatchHeader, max_temperature_C)};
-};
-template <>
-struct FieldsOf<TemperaturePatch> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(TemperaturePatch, header), FULCRUM_FIELD(TemperaturePatch, texels)};
-};
-template <>
-struct FieldsOf<ThermalEvent> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(ThermalEvent, stamp),
-                                          FULCRUM_FIELD(ThermalEvent, session_time_s),
-                                          FULCRUM_FIELD(ThermalEvent, kind),
-                                          FULCRUM_FIELD(ThermalEvent, material),
-                                          FULCRUM_FIELD(ThermalEvent, temperature_C),
-                                          FULCRUM_FIELD(ThermalEvent, value),
-                                          FULCRUM_FIELD(ThermalEvent, topology_revision)};
-};
-template <>
-struct FieldsOf<SceneManifest> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(SceneManifest, stamp),
-                                          FULCRUM_FIELD(SceneManifest, scene_name),
-                                          FULCRUM_FIELD(SceneManifest, session_id),
-                                          FULCRUM_FIELD(SceneManifest, scene_hash),
-                                          FULCRUM_FIELD(SceneManifest, session_start_ns),
-                                          FULCRUM_FIELD(SceneManifest, mode),
-                                          FULCRUM_FIELD(SceneManifest, recorded)};
-};
-template <>
-struct FieldsOf<Command> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(Command, stamp), FULCRUM_FIELD(Command, request_id), FULCRUM_FIELD(Command, target),
-                 FULCRUM_FIELD(Command, verb), FULCRUM_FIELD(Command, argument)};
-};
-template <>
-struct FieldsOf<CommandReply> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(CommandReply, stamp), FULCRUM_FIELD(CommandReply, request_id),
-                 FULCRUM_FIELD(CommandReply, from), FULCRUM_FIELD(CommandReply, ok), FULCRUM_FIELD(CommandReply, text)};
-};
-template <>
-struct FieldsOf<ConsumedInput> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(ConsumedInput, topic), FULCRUM_FIELD(ConsumedInput, epoch),
-                                          FULCRUM_FIELD(ConsumedInput, sequence)};
-};
-template <>
-struct FieldsOf<TickManifest> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(TickManifest, stamp),      FULCRUM_FIELD(TickManifest, node),
-                 FULCRUM_FIELD(TickManifest, tick),       FULCRUM_FIELD(TickManifest, session_time_s),
-                 FULCRUM_FIELD(TickManifest, state_hash), FULCRUM_FIELD(TickManifest, consumed)};
-};
-template <>
-struct FieldsOf<TimingSummary> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(TimingSummary, p50_us), FULCRUM_FIELD(TimingSummary, p99_us),
-                                          FULCRUM_FIELD(TimingSummary, max_us)};
-};
-template <>
-struct FieldsOf<InputHealth> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(InputHealth, topic),  FULCRUM_FIELD(InputHealth, matched),
-                                          FULCRUM_FIELD(InputHealth, age_ms), FULCRUM_FIELD(InputHealth, received),
-                                          FULCRUM_FIELD(InputHealth, lost),   FULCRUM_FIELD(InputHealth, rejected)};
-};
-template <>
-struct FieldsOf<Metric> {
-  static constexpr auto list = std::tuple{FULCRUM_FIELD(Metric, name), FULCRUM_FIELD(Metric, value)};
-};
-template <>
-struct FieldsOf<Health> {
-  static constexpr auto list =
-      std::tuple{FULCRUM_FIELD(Health, stamp),          FULCRUM_FIELD(Health, node),
-                 FULCRUM_FIELD(Health, state),          FULCRUM_FIELD(Health, pid),
-                 FULCRUM_FIELD(Health, schema_hash),    FULCRUM_FIELD(Health, scene_hash),
-                 FULCRUM_FIELD(Health, rate_asked_Hz),  FULCRUM_FIELD(Health, rate_achieved_Hz),
-                 FULCRUM_FIELD(Health, ticks),          FULCRUM_FIELD(Health, overruns),
-                 FULCRUM_FIELD(Health, write_failures), FULCRUM_FIELD(Health, step),
-                 FULCRUM_FIELD(Health, wake),           FULCRUM_FIELD(Health, last_error),
-                 FULCRUM_FIELD(Health, inputs),         FULCRUM_FIELD(Health, metrics)};
-};
+template <class... Fields>
+constexpr auto List(std::nullptr_t, Fields... fields) {
+  return std::tuple{fields...};
+}
+
+/// Size of a struct of these members.
+template <class Message, class... Values>
+constexpr std::size_t SizeOf(const std::tuple<Field<Message, Values>...>&) {
+  std::size_t size = 0;
+  const auto up_to = [&size](std::size_t alignment) { size = (size + alignment - 1) / alignment * alignment; };
+  ((up_to(alignof(Values)), size += sizeof(Values)), ...);
+  up_to(alignof(Message));
+  return size;
+}
+
+}  // namespace fields
+
+#define FULCRUM_FIELD(name) \
+  , Field { #name, &Struct::name }
+#define FULCRUM_DESCRIBE(T)                                                                  \
+  template <>                                                                                \
+  struct FieldsOf<T> {                                                                       \
+    using Struct = T;                                                                        \
+    static constexpr auto list = fields::List(nullptr FULCRUM_FIELDS_OF_##T(FULCRUM_FIELD)); \
+  };                                                                                         \
+  static_assert(fields::SizeOf(FieldsOf<T>::list) == sizeof(T), "a field of " #T " is missing in its list");
+FULCRUM_STRUCTS_ALIKE_IN_IDL(FULCRUM_DESCRIBE)
+FULCRUM_STRUCTS_WITH_A_CONVERSION_OF_THEIR_OWN(FULCRUM_DESCRIBE)
+#undef FULCRUM_DESCRIBE
 #undef FULCRUM_FIELD
 
 /// A struct of messages.h whose fields are known.

@@ -299,30 +299,25 @@ struct Command {
 struct CommandReply {
   Stamp stamp;
   std::uint64_t request_id = 0;
-  NodeId from = NodeId::kSupervisor;
+  NodeId from_node = NodeId::kSupervisor;
   bool ok = false;
   std::string text;
 };
 
-enum class TopicId : std::uint8_t {
-  kHandleState,
-  kToolState,
-  kTissueFrame,
-  kContactModel,
-  kCauteryContact,
-  kTopologyState,
-  kTemperaturePatch,
-  kThermalEvent,
-  kSceneManifest,
-  kCommand,
-  kCommandReply,
-  kTickManifest,
-  kHealth,
-  kTearState,
-  kOpenCells,
-  kGeneratorSetting
-};
-inline constexpr int kTopicCount = 16;
+/// Every message, M(T) each, in the order of the topics' numbers: a new one goes to the end. What treats all messages
+/// alike is made from this list: TopicId, the roles (services/bus/topics.h), the gate's declarations, the ports.
+#define FULCRUM_MESSAGES(M)                                                                                          \
+  M(HandleState)                                                                                                     \
+  M(ToolState) M(TissueFrame) M(ContactModel) M(CauteryContact) M(TopologyState) M(TemperaturePatch) M(ThermalEvent) \
+      M(SceneManifest) M(Command) M(CommandReply) M(TickManifest) M(Health) M(TearState) M(OpenCells)                \
+          M(GeneratorSetting)
+
+#define FULCRUM_TOPIC_ID(T) k##T,
+enum class TopicId : std::uint8_t { FULCRUM_MESSAGES(FULCRUM_TOPIC_ID) };
+#undef FULCRUM_TOPIC_ID
+#define FULCRUM_ONE_MORE(T) +1
+inline constexpr int kTopicCount = 0 FULCRUM_MESSAGES(FULCRUM_ONE_MORE);
+#undef FULCRUM_ONE_MORE
 
 struct ConsumedInput {
   TopicId topic = TopicId::kHandleState;

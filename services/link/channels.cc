@@ -28,7 +28,8 @@ static_assert(kChunk_B + 20 <= bus::kStreamPacket_B, "a chunk and the head of it
 /// Health is reliable on the bus so that a late joiner gets the newest; on its way between hosts the newest is enough,
 /// and ten a second of each node must not wait in a queue while a cable is out.
 constexpr FarLane LaneOf(TopicId topic) {
-  return bus::RoleOf(topic).reliable && topic != TopicId::kHealth ? FarLane::kOrdered : FarLane::kStream;
+  return bus::QualityOf(topic).delivery != bus::Delivery::kBestEffort && topic != TopicId::kHealth ? FarLane::kOrdered
+                                                                                                   : FarLane::kStream;
 }
 
 template <class T>
@@ -42,7 +43,7 @@ bool Leaves(const T& message, const LinkContext& link) {
   if constexpr (std::is_same_v<T, Command>) {
     return !link.IsNative(message.target);
   } else if constexpr (std::is_same_v<T, CommandReply>) {
-    return link.IsNative(message.from);
+    return link.IsNative(message.from_node);
   } else if constexpr (requires { message.node; }) {
     return link.IsNative(message.node);
   } else {
@@ -103,7 +104,7 @@ class OutgoingSamples final : public Outgoing {
     while (input_->TakeNext(&message_)) {
       if (!Leaves(message_, *link)) continue;
       NameAsThere(&message_, *link);
-      if constexpr (bus::RoleOf<T>().late_joiners_served) {
+      if constexpr (bus::kQualityOf<T>.late_joiners_served) {
         newest_[bus::StampOf(message_).epoch] = message_;
         if (newest_.size() > kMostWriters) newest_.erase(newest_.begin());
       }
@@ -286,7 +287,7 @@ class IncomingSamples final : public IncomingBase<T> {
     } else if (!TakeDelta({}, delta, kLargestSample_B, &next_)) {
       return false;
     }
-    if (bus::RoleOf<T>().gap_is_loss && number_ != 0 && head.number > number_ + 1) lost_ += head.number - number_ - 1;
+    if (bus::kQualityOf<T>.gap_is_loss && number_ != 0 && head.number > number_ + 1) lost_ += head.number - number_ - 1;
     number_ = head.number;
     std::swap(cdr_, next_);
     if (head.base == 0) all_ = false;

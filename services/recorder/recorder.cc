@@ -70,7 +70,7 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
   const std::int64_t written_ns = std::max(sample.written_ns, writer->last_ns);
   const bool room = filling_.used() + recording::kMessageHead + size <= settings_.queue_B;
   if (room) {
-    const bool is_large = bus::RoleOf(sample.topic).path == bus::Path::kSharedMemory;
+    const bool is_large = bus::QualityOf(sample.topic).path == bus::Path::kSharedMemory;
     Batch::Part& part = is_large ? filling_.large : filling_.small;
     std::uint8_t* at = part.bytes.get() + part.used;
     recording::PutMessageHead(static_cast<std::uint16_t>(writer - writers_.begin()),

@@ -118,7 +118,7 @@ LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>&
     const auto channel = role == nullptr ? channels.end() : channels.find(role->id);
     if (channel == channels.end()) continue;
     // Of the time before only what a late joiner would have been given.
-    if (then_ns < *first_ns && !role->late_joiners_served) continue;
+    if (then_ns < *first_ns && !role->quality.late_joiners_served) continue;
     if (!channel->second->Prepare(message.data, moved_ns, &result)) continue;
     const std::int64_t due_ns = std::max(begin_ns, then_ns + moved_ns);
     for (std::int64_t now = runtime::MonotonicNs(); now < due_ns && !stop(); now = runtime::MonotonicNs()) {

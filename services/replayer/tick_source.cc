@@ -22,7 +22,7 @@ TickSource::TickSource(const std::filesystem::path& file, const std::vector<Node
   // No node that is replayed reads frames or patches: they are most of a recording, and in chunks of their own.
   reader_.PassOver([](const recording::McapChannel& channel) {
     const bus::TopicRole* role = bus::RoleNamed(channel.topic);
-    return role != nullptr && role->path != bus::Path::kSharedMemory;
+    return role != nullptr && role->quality.path != bus::Path::kSharedMemory;
   });
 }
 

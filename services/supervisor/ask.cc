@@ -43,7 +43,7 @@ CommandReply AskSupervisor(int domain, const std::string& verb, const std::strin
     }
     CommandReply reply;
     while (replies->TakeNext(&reply)) {
-      if (reply.request_id == command.request_id && reply.from == NodeId::kSupervisor) {
+      if (reply.request_id == command.request_id && reply.from_node == NodeId::kSupervisor) {
         return reply;
       }
     }

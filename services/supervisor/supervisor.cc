@@ -370,7 +370,7 @@ struct Supervisor::Impl {
       CommandReply reply;
       reply.stamp = reply_stamper.Next(now);
       reply.request_id = command.request_id;
-      reply.from = NodeId::kSupervisor;
+      reply.from_node = NodeId::kSupervisor;
       reply.ok = true;
       if (command.verb == "down") {
         reply.text = "ending the session";

@@ -62,22 +62,7 @@ bool EncodeCdr(const T& message, std::vector<std::uint8_t>* bytes) {
 #define FULCRUM_INSTANTIATE(T)                                   \
   template bool DecodeCdr<T>(std::span<const std::uint8_t>, T*); \
   template bool EncodeCdr<T>(const T&, std::vector<std::uint8_t>*);
-FULCRUM_INSTANTIATE(HandleState)
-FULCRUM_INSTANTIATE(GeneratorSetting)
-FULCRUM_INSTANTIATE(ToolState)
-FULCRUM_INSTANTIATE(TissueFrame)
-FULCRUM_INSTANTIATE(ContactModel)
-FULCRUM_INSTANTIATE(CauteryContact)
-FULCRUM_INSTANTIATE(TopologyState)
-FULCRUM_INSTANTIATE(TearState)
-FULCRUM_INSTANTIATE(OpenCells)
-FULCRUM_INSTANTIATE(TemperaturePatch)
-FULCRUM_INSTANTIATE(ThermalEvent)
-FULCRUM_INSTANTIATE(SceneManifest)
-FULCRUM_INSTANTIATE(Command)
-FULCRUM_INSTANTIATE(CommandReply)
-FULCRUM_INSTANTIATE(TickManifest)
-FULCRUM_INSTANTIATE(Health)
+FULCRUM_MESSAGES(FULCRUM_INSTANTIATE)
 #undef FULCRUM_INSTANTIATE
 
 }  // namespace fulcrum::bus

@@ -67,16 +67,18 @@ fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint
 
 /// What a DataReaderQos and a DataWriterQos have in common. `shared_memory` empty: no data-sharing.
 template <class Qos>
-void ApplyRole(const TopicRole& role, int depth, const std::string& shared_memory, Qos* qos) {
-  qos->reliability().kind = role.reliable ? fast::RELIABLE_RELIABILITY_QOS : fast::BEST_EFFORT_RELIABILITY_QOS;
+void Apply(const Quality& quality, int depth, const std::string& shared_memory, Qos* qos) {
+  qos->reliability().kind =
+      quality.delivery == Delivery::kBestEffort ? fast::BEST_EFFORT_RELIABILITY_QOS : fast::RELIABLE_RELIABILITY_QOS;
   qos->reliability().max_blocking_time = kMaxBlocking;
   qos->durability().kind =
-      role.late_joiners_served ? fast::TRANSIENT_LOCAL_DURABILITY_QOS : fast::VOLATILE_DURABILITY_QOS;
-  qos->history().kind = role.keep_all ? fast::KEEP_ALL_HISTORY_QOS : fast::KEEP_LAST_HISTORY_QOS;
+      quality.late_joiners_served ? fast::TRANSIENT_LOCAL_DURABILITY_QOS : fast::VOLATILE_DURABILITY_QOS;
+  const bool keeps_all = quality.delivery == Delivery::kReliableKeepAll;
+  qos->history().kind = keeps_all ? fast::KEEP_ALL_HISTORY_QOS : fast::KEEP_LAST_HISTORY_QOS;
   qos->history().depth = depth;
   // The pool holds this many samples of the type's full size: one more than the history, for the sample being written.
   // The library's default of 5000 would ask for 1.5 GB per large topic.
-  const int samples = role.keep_all ? depth : depth + 1;
+  const int samples = keeps_all ? depth : depth + 1;
   qos->resource_limits().max_instances = 1;
   qos->resource_limits().max_samples = samples;
   qos->resource_limits().max_samples_per_instance = samples;
@@ -170,7 +172,7 @@ struct DdsParticipant::Impl {
 
   /// Where the samples of a topic are shared; empty: they travel by UDP.
   [[nodiscard]] std::string SharedMemoryFor(const TopicRole& role) const {
-    return role.path == Path::kSharedMemory && !security.encrypt ? shared_memory.string() : std::string();
+    return role.quality.path == Path::kSharedMemory && !security.encrypt ? shared_memory.string() : std::string();
   }
 
   /// Why the library made no endpoint.
@@ -205,12 +207,12 @@ template <class T>
 std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()> notify) {
   const TopicRole& role = RoleOf<T>();
   fast::DataReaderQos qos;
-  ApplyRole(role, role.reader_depth, impl_->SharedMemoryFor(role), &qos);
+  Apply(role.quality, role.quality.reader_depth, impl_->SharedMemoryFor(role), &qos);
   qos.reliable_reader_qos().times.initialAcknackDelay = kFirstAcknack;
   const WorkingIn here(impl_->shared_memory);
   auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos, std::move(notify));
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "reader"));
-  if (role.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
+  if (role.quality.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
   return port;
 }
 
@@ -219,14 +221,14 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   const TopicRole& role = RoleOf<T>();
   fast::Topic* topic = impl_->TopicFor<T>();
   fast::DataWriterQos qos;
-  ApplyRole(role, role.writer_depth, impl_->SharedMemoryFor(role), &qos);
+  Apply(role.quality, role.quality.writer_depth, impl_->SharedMemoryFor(role), &qos);
   const bool fragmented =
       impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
   qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
   const WorkingIn here(impl_->shared_memory);
   auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos, &impl_->audience);
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "writer"));
-  if (role.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
+  if (role.quality.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
   return port;
 }
 
@@ -234,11 +236,11 @@ std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink)
   const TopicRole& role = RoleOf(id);
   const std::uint32_t payload_B =
       WithMessageOf(id, []<class T>(std::type_identity<T>) { return typename TypeSupportOf<T>::type().m_typeSize; });
-  const bool plain = role.path == Path::kSharedMemory;
+  const bool plain = role.quality.path == Path::kSharedMemory;
   fast::Topic* topic =
       impl_->MakeTopic(role, fast::TypeSupport(new dds::RawType(impl_->TypeName(role), payload_B, plain)));
   fast::DataReaderQos qos;
-  ApplyRole(role, role.reader_depth, impl_->SharedMemoryFor(role), &qos);
+  Apply(role.quality, role.quality.reader_depth, impl_->SharedMemoryFor(role), &qos);
   qos.reliable_reader_qos().times.initialAcknackDelay = kFirstAcknack;
   const WorkingIn here(impl_->shared_memory);
   auto input =
@@ -266,22 +268,7 @@ Peer DdsParticipant::PeerOf(const WriterGuid& writer) const {
   template std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()>); \
   template std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput<T>();
 
-FULCRUM_INSTANTIATE_PORTS(HandleState)
-FULCRUM_INSTANTIATE_PORTS(GeneratorSetting)
-FULCRUM_INSTANTIATE_PORTS(ToolState)
-FULCRUM_INSTANTIATE_PORTS(TissueFrame)
-FULCRUM_INSTANTIATE_PORTS(ContactModel)
-FULCRUM_INSTANTIATE_PORTS(CauteryContact)
-FULCRUM_INSTANTIATE_PORTS(TopologyState)
-FULCRUM_INSTANTIATE_PORTS(TearState)
-FULCRUM_INSTANTIATE_PORTS(OpenCells)
-FULCRUM_INSTANTIATE_PORTS(TemperaturePatch)
-FULCRUM_INSTANTIATE_PORTS(ThermalEvent)
-FULCRUM_INSTANTIATE_PORTS(SceneManifest)
-FULCRUM_INSTANTIATE_PORTS(Command)
-FULCRUM_INSTANTIATE_PORTS(CommandReply)
-FULCRUM_INSTANTIATE_PORTS(TickManifest)
-FULCRUM_INSTANTIATE_PORTS(Health)
+FULCRUM_MESSAGES(FULCRUM_INSTANTIATE_PORTS)
 
 #undef FULCRUM_INSTANTIATE_PORTS
 

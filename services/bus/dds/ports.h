@@ -83,7 +83,7 @@ class InputBase : public Input<T> {
       : events_(std::move(notify)),
         subscriber_(subscriber),
         reader_(subscriber->create_datareader(topic, qos, &events_, events_.mask())),
-        account_(RoleOf<T>().gap_is_loss, RoleOf<T>().one_owner()) {}
+        account_(kQualityOf<T>.gap_is_loss, RoleOf<T>().one_owner()) {}
   ~InputBase() override {
     if (reader_ == nullptr) return;
     reader_->set_listener(nullptr);
@@ -157,7 +157,7 @@ class DdsInput<T> final : public InputBase<T> {
  public:
   using InputBase<T>::InputBase;
 
-  bool TakeLatest(T* sample) override { return Take(RoleOf<T>().reader_depth, sample); }
+  bool TakeLatest(T* sample) override { return Take(kQualityOf<T>.reader_depth, sample); }
   bool TakeNext(T* sample) override { return Take(1, sample); }
 
  private:

@@ -72,7 +72,7 @@ RawSample RawReader::Describe(const fast::SampleInfo& info) const {
 
 void RawReader::on_data_available(fast::DataReader* reader) {
   try {
-    role_.path == Path::kSharedMemory ? TakeLoans(reader) : TakeCopies(reader);
+    role_.quality.path == Path::kSharedMemory ? TakeLoans(reader) : TakeCopies(reader);
   } catch (...) {
     // A sample that cannot be taken is missing in its writer's sequence: it is counted there.
   }
@@ -93,7 +93,7 @@ void RawReader::TakeCopies(fast::DataReader* reader) {
 }
 
 void RawReader::TakeLoans(fast::DataReader* reader) {
-  while (reader->take(loans_, infos_, role_.reader_depth) == ReturnCode::RETCODE_OK) {
+  while (reader->take(loans_, infos_, role_.quality.reader_depth) == ReturnCode::RETCODE_OK) {
     for (int i = 0; i < static_cast<int>(infos_.length()); ++i) {
       if (!infos_[i].valid_data) continue;
       const auto* loan = static_cast<const std::byte*>(loans_.buffer()[i]);

@@ -11,6 +11,7 @@
 #include "tests/integration/bus/count_new.h"
 #include "tests/integration/bus/support.h"
 #include "tests/support/rogue.h"
+#include "tests/unit/bus/message_types.h"
 #include "tests/unit/bus/same.h"
 #include "tests/unit/bus/samples.h"
 
@@ -36,9 +37,7 @@ struct Pair {
 
 template <class T>
 class EveryTopic : public ::testing::Test {};
-using Types = ::testing::Types<HandleState, GeneratorSetting, ToolState, TissueFrame, ContactModel, CauteryContact,
-                               TopologyState, TearState, OpenCells, TemperaturePatch, ThermalEvent, SceneManifest,
-                               Command, CommandReply, TickManifest, Health>;
+using Types = test::MessageTypes;
 TYPED_TEST_SUITE(EveryTopic, Types);
 
 TYPED_TEST(EveryTopic, ArrivesUnchanged) {

@@ -202,7 +202,7 @@ TEST(Link, NothingLoopsAndCommandsFindTheirWay) {
   ASSERT_TRUE(Crosses(command_out.get(), command_in.get(), command, &heard));
   EXPECT_EQ(heard.verb, command.verb);
   CommandReply reply = Sample<CommandReply>(), answer;
-  reply.from = NodeId::kRender;
+  reply.from_node = NodeId::kRender;
   ASSERT_TRUE(Crosses(reply_out.get(), reply_in.get(), reply, &answer));
   EXPECT_EQ(answer.text, reply.text);
 }

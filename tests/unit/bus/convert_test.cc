@@ -4,10 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <regex>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "services/bus/convert/generated_types.h"
 #include "services/bus/gate.h"
+#include "services/bus/schema.h"
+#include "services/core/message_fields.h"
+#include "tests/unit/bus/message_types.h"
 #include "tests/unit/bus/same.h"
 #include "tests/unit/bus/samples.h"
 
@@ -38,9 +44,7 @@ bool OverTheWire(const T& from, T* to) {
 
 template <class T>
 class Convert : public testing::Test {};
-using Types = testing::Types<HandleState, GeneratorSetting, ToolState, TissueFrame, ContactModel, CauteryContact,
-                             TopologyState, TearState, OpenCells, TemperaturePatch, ThermalEvent, SceneManifest,
-                             Command, CommandReply, TickManifest, Health>;
+using Types = test::MessageTypes;
 TYPED_TEST_SUITE(Convert, Types);
 
 TYPED_TEST(Convert, RoundTripKeepsEveryField) {
@@ -48,6 +52,31 @@ TYPED_TEST(Convert, RoundTripKeepsEveryField) {
   TypeParam got;
   ASSERT_TRUE(OverTheWire(sent, &got));
   EXPECT_TRUE(Same(sent, got));
+}
+
+/// Members of a struct as its IDL file declares them.
+std::set<std::string> MembersInIdl(const std::string& type) {
+  const std::string text = std::regex_replace(SchemaText(type), std::regex("//[^\n]*"), "");
+  const std::string head = "struct " + type + " {";
+  const std::size_t begin = text.find(head) + head.size();
+  const std::string body = text.substr(begin, text.find('}', begin) - begin);
+  const std::regex member(R"((\w+)(\[[^\]]*\])?\s*;)");
+  std::set<std::string> names;
+  for (std::sregex_iterator at(body.begin(), body.end(), member), end; at != end; ++at) names.insert((*at)[1]);
+  return names;
+}
+
+template <class T>
+void ExpectTheSameMembers(const std::string& type) {
+  std::set<std::string> names;
+  ForEachField<T>([&](const char* name, auto) { names.insert(name); });
+  EXPECT_EQ(names, MembersInIdl(type)) << type;
+}
+
+TEST(ConvertFields, ListsNameEveryMemberThatIdlDeclares) {
+#define FULCRUM_EXPECT(T) ExpectTheSameMembers<T>(#T);
+  FULCRUM_STRUCTS_ALIKE_IN_IDL(FULCRUM_EXPECT)
+#undef FULCRUM_EXPECT
 }
 
 /// As a writer does, which keeps its wire object.

@@ -203,7 +203,7 @@ inline CommandReply Sample(std::uint64_t sequence) {
   CommandReply m;
   m.stamp = {sequence, 21, 11000};
   m.request_id = 77;
-  m.from = NodeId::kRender;
+  m.from_node = NodeId::kRender;
   m.ok = true;
   m.text = "stopping at 20 °C";
   return m;

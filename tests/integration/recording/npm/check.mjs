@@ -13,7 +13,7 @@ import { McapIndexedReader } from "@mcap/core";
 const [fulcrum, recording] = process.argv.slice(2);
 
 /** Names that IDL forbids or that differ for another reason: theirs to ours. */
-const kOurName = { number: "sequence", from_node: "from" };
+const kOurName = { number: "sequence" };
 
 /** What our tool says, by channel and sequence. */
 async function ourMessages() {
