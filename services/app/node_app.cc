@@ -15,6 +15,7 @@
 
 #include "services/app/cart_security.h"
 #include "services/app/health_report.h"
+#include "services/app/recorder_wait.h"
 #include "services/bus/input_account.h"
 #include "services/core/error.h"
 #include "services/runtime/realtime.h"
@@ -29,14 +30,6 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max();
 constexpr auto kPollPeriod = std::chrono::milliseconds(10);
-// The first samples must not pass the recorder by: a replay could not begin without them. In a session that is recorded
-// it is found within so many looks of the session's first, or is gone; each look proves that this process was given
-// time (with ten, one start in a hundred did not find it while others were killed) …
-constexpr int kLooksForRecorder = 30;
-// … its readers are seen within so many; a recorder that stands still holds nobody up for longer …
-constexpr int kLooksForReaders = 50;
-// … and have seen our writers so many later.
-constexpr int kLooksAfterReaders = 3;
 /// Phase of a node's steps against k periods of the session, in periods. Physics begins just after k dt, when the
 /// ToolState of that moment has arrived; thermal when the contact of that step has.
 constexpr double kPhysicsPhase = 0.12, kThermalPhase = 0.65;
@@ -116,7 +109,7 @@ struct NodeApp::Impl {
       }
       reply.stamp = joined->reply_stamper.Next(MonotonicNs());
       reply.request_id = command.request_id;
-      reply.from = node;
+      reply.from_node = node;
       joined->replies->Write(reply);
     }
     if (const std::string mismatch = joined->participant.schema_mismatch(); !mismatch.empty()) {
@@ -146,6 +139,89 @@ struct NodeApp::Impl {
 
   [[nodiscard]] bool ShouldEnd() const noexcept {
     return ended.load(std::memory_order_acquire) || runtime::ShouldStop();
+  }
+
+  [[nodiscard]] double SessionTime(std::int64_t stamp_ns) const noexcept {
+    const std::int64_t start = session_start_ns.load(std::memory_order_relaxed);
+    return start == kSessionUnknown ? -1.0 : 1e-9 * static_cast<double>(stamp_ns - start);
+  }
+
+  void RefuseUnknownOptions() const {
+    if (!options.extra.empty()) throw InputError("unknown option \"" + options.extra.front() + "\"; see --help");
+  }
+
+  /// On the cyclic thread. A step that throws ends the node.
+  void Step(const Tick& clock_tick, const std::function<void(const Tick&)>& step) {
+    if (ShouldEnd()) return;
+    Tick tick = clock_tick;
+    tick.session_time_s = SessionTime(tick.stamp_ns);
+    try {
+      step(tick);
+    } catch (const std::exception& error) {
+      End(ExitCode::kFailure, std::string("step failed: ") + error.what());
+    }
+  }
+
+  /// On the health thread.
+  void PublishHealthUntil(const std::stop_token& stop, HealthReport* report, const runtime::CyclicThread& steps,
+                          const HealthFill& fill) {
+    runtime::ServiceNotify service;
+    auto next = std::chrono::steady_clock::now();
+    for (bool first = true; !stop.stop_requested(); first = false) {
+      const Health now = PublishHealth(report, steps, fill);
+      if (first) service.Ready();
+      std::vector<std::uint64_t> counters{polls.load(std::memory_order_relaxed)};
+      if (stepping.load(std::memory_order_relaxed)) counters.push_back(now.ticks);
+      service.Update(now.stamp.stamp_ns, counters, StatusLine(now));
+      if (std::chrono::steady_clock::now() >= next) next += kHealthPeriod;
+      std::unique_lock lock(health_mutex);
+      health_wanted.wait_until(lock, stop, next, [this] { return std::exchange(health_now, false); });
+    }
+    service.Stopping();
+  }
+
+  void Poll() {
+    PollBus();
+    polls.fetch_add(1, std::memory_order_relaxed);
+  }
+
+  /// Until session time 0 has passed and, in a recorded session, the recorder reads what this node writes.
+  void WaitForSession() {
+    const bool replayable = node != NodeId::kRecorder && node != NodeId::kRender;
+    RecorderWait recorder;
+    for (; !ShouldEnd(); std::this_thread::sleep_for(kPollPeriod)) {
+      Poll();
+      const bool known = session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown;
+      const bool recorder_is_ready = replayable && recorder.Look(joined->participant, known);
+      const bool awaits = replayable && session_recorded;
+      if (!known || (awaits && !recorder_is_ready) || SessionTime(MonotonicNs()) < 0) continue;
+      if (awaits && !recorder.heard()) {
+        Log(LogLevel::kWarning, "begins though no recorder hears it: a replay will not have its first ticks");
+      }
+      return;
+    }
+  }
+
+  void Begin(runtime::CyclicThread* steps, std::int64_t period_ns) {
+    if (ShouldEnd()) return;
+    state = HealthState::kRunning;
+    const double phase = node == NodeId::kPhysics ? kPhysicsPhase : node == NodeId::kThermal ? kThermalPhase : -1;
+    const std::int64_t start_ns = session_start_ns.load(std::memory_order_relaxed);
+    steps->Start(phase < 0 ? 0 : start_ns + static_cast<std::int64_t>(phase * static_cast<double>(period_ns)));
+    stepping.store(true, std::memory_order_relaxed);
+  }
+
+  void ServeUntilEnd() {
+    for (; !ShouldEnd(); std::this_thread::sleep_for(kPollPeriod)) Poll();
+  }
+
+  void EndThreads(runtime::CyclicThread* steps, std::jthread* health) {
+    // SIGALRM's default action ends the process.
+    ::alarm(kLongestEndS);
+    state = HealthState::kStopping;
+    steps->Stop();
+    health->request_stop();
+    health->join();
   }
 
   Health PublishHealth(HealthReport* report, const runtime::CyclicThread& thread, const HealthFill& fill) {
@@ -227,10 +303,7 @@ void NodeApp::Watch(TopicId topic, std::function<bus::InputStats()> stats) {
 void NodeApp::Watch(std::function<bus::OutputStats()> stats) { impl_->outputs.push_back(std::move(stats)); }
 void NodeApp::Keep(std::shared_ptr<void> port) { impl_->ports.push_back(std::move(port)); }
 
-double NodeApp::SessionTime(std::int64_t stamp_ns) const noexcept {
-  const std::int64_t start = impl_->session_start_ns.load(std::memory_order_relaxed);
-  return start == kSessionUnknown ? -1.0 : 1e-9 * static_cast<double>(stamp_ns - start);
-}
+double NodeApp::SessionTime(std::int64_t stamp_ns) const noexcept { return impl_->SessionTime(stamp_ns); }
 
 void NodeApp::OnCommand(std::string verb, std::function<std::string(const std::string&)> handler) {
   impl_->handlers[std::move(verb)] = std::move(handler);
@@ -250,73 +323,17 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
                       const HealthFill& fill_health) {
   Impl& app = *impl_;
   app.Join();
-  if (!app.options.extra.empty()) {
-    throw InputError("unknown option \"" + app.options.extra.front() + "\"; see --help");
-  }
-  runtime::CyclicThread thread(settings, [&](const Tick& clock_tick) {
-    if (app.ShouldEnd()) return;
-    Tick tick = clock_tick;
-    tick.session_time_s = SessionTime(tick.stamp_ns);
-    try {
-      step(tick);
-    } catch (const std::exception& error) {
-      app.End(ExitCode::kFailure, std::string("step failed: ") + error.what());
-    }
-  });
+  app.RefuseUnknownOptions();
+  runtime::CyclicThread steps(settings, [&](const Tick& tick) { app.Step(tick, step); });
   HealthReport report(app.node, settings.period_ns, bus::SchemaHash(), app.scene.view().hash, ::getpid());
   app.state = HealthState::kWaiting;
-  std::jthread health([&](const std::stop_token& stop) {
-    runtime::ServiceNotify service;
-    auto next = std::chrono::steady_clock::now();
-    for (bool first = true; !stop.stop_requested(); first = false) {
-      const Health now = app.PublishHealth(&report, thread, fill_health);
-      if (first) service.Ready();
-      std::vector<std::uint64_t> counters{app.polls.load(std::memory_order_relaxed)};
-      if (app.stepping.load(std::memory_order_relaxed)) counters.push_back(now.ticks);
-      service.Update(now.stamp.stamp_ns, counters, StatusLine(now));
-      if (std::chrono::steady_clock::now() >= next) next += kHealthPeriod;
-      std::unique_lock lock(app.health_mutex);
-      app.health_wanted.wait_until(lock, stop, next, [&app] { return std::exchange(app.health_now, false); });
-    }
-    service.Stopping();
-  });
+  std::jthread health([&](const std::stop_token& stop) { app.PublishHealthUntil(stop, &report, steps, fill_health); });
 
-  const bool replayable = app.node != NodeId::kRecorder && app.node != NodeId::kRender;
-  int looks = 0, looks_read = 0;
-  while (!app.ShouldEnd()) {
-    app.PollBus();
-    app.polls.fetch_add(1, std::memory_order_relaxed);
-    const std::int64_t now = MonotonicNs();
-    const bool waits = !app.stepping.load(std::memory_order_relaxed);
-    if (waits && replayable) {
-      if (app.session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown) ++looks;
-      if (app.joined->participant.IsReadBy(bus::kRecorderPeer)) ++looks_read;
-    }
-    const bool begins = !replayable || !app.session_recorded || looks_read > kLooksAfterReaders ||
-                        looks > kLooksForReaders ||
-                        (looks > kLooksForRecorder && !app.joined->participant.Knows(bus::kRecorderPeer));
-    if (waits && begins && SessionTime(now) >= 0) {
-      if (replayable && app.session_recorded && looks_read <= kLooksAfterReaders) {
-        Log(LogLevel::kWarning, "begins though no recorder hears it: a replay will not have its first ticks");
-      }
-      app.state = HealthState::kRunning;
-      const double phase = app.node == NodeId::kPhysics   ? kPhysicsPhase
-                           : app.node == NodeId::kThermal ? kThermalPhase
-                                                          : -1;
-      const std::int64_t start_ns = app.session_start_ns.load(std::memory_order_relaxed);
-      thread.Start(phase < 0 ? 0
-                             : start_ns + static_cast<std::int64_t>(phase * static_cast<double>(settings.period_ns)));
-      app.stepping.store(true, std::memory_order_relaxed);
-    }
-    std::this_thread::sleep_for(kPollPeriod);
-  }
-  // SIGALRM's default action ends the process.
-  ::alarm(kLongestEndS);
-  app.state = HealthState::kStopping;
-  thread.Stop();
-  health.request_stop();
-  health.join();
-  app.PublishHealth(&report, thread, fill_health);
+  app.WaitForSession();
+  app.Begin(&steps, settings.period_ns);
+  app.ServeUntilEnd();
+  app.EndThreads(&steps, &health);
+  app.PublishHealth(&report, steps, fill_health);
   return app.exit_code;
 }
 
