@@ -10,7 +10,7 @@
 #include "haptics_node/device/haptic_device.h"
 #include "haptics_node/device/recorded_motion.h"
 #include "haptics_node/device/workspace_map.h"
-#include "haptics_node/servo/trocar.h"
+#include "haptics_node/kinematics/trocar.h"
 #include "services/core/scene_view.h"
 
 namespace fulcrum::haptics {

@@ -5,10 +5,10 @@
 #include <array>
 #include <cstdint>
 
+#include "haptics_node/kinematics/trocar.h"
 #include "haptics_node/servo/contact_law.h"
 #include "haptics_node/servo/pose_ring.h"
 #include "haptics_node/servo/stiffness_correction.h"
-#include "haptics_node/servo/trocar.h"
 #include "services/core/hash.h"
 #include "services/core/messages.h"
 

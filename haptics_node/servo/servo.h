@@ -6,13 +6,13 @@
 #include <cstdint>
 
 #include "haptics_node/device/haptic_device.h"
+#include "haptics_node/kinematics/trocar.h"
 #include "haptics_node/servo/age_machine.h"
 #include "haptics_node/servo/local_model.h"
 #include "haptics_node/servo/model_gate.h"
 #include "haptics_node/servo/output_chain.h"
 #include "haptics_node/servo/passivity.h"
 #include "haptics_node/servo/pose_ring.h"
-#include "haptics_node/servo/trocar.h"
 #include "services/core/messages.h"
 #include "services/core/scene_view.h"
 #include "services/core/tick.h"

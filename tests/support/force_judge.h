@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "haptics_node/servo/trocar.h"
+#include "haptics_node/kinematics/trocar.h"
 #include "services/core/messages.h"
 
 namespace fulcrum::testing {

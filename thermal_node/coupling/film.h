@@ -9,7 +9,7 @@
 // Sources. The discharge of electrosurgery in air, a contracted glow that goes out at each zero of the voltage and
 // strikes again above a threshold: "Electric discharge during electrosurgery", Sci. Rep. 5:9946 (2015). Some 200 V peak
 // as the least voltage for arcs between electrode and tissue: user manual of the Erbe VIO. Conductance of the
-// discharges and the shares of their heat are assumed; see DESIGN.md for what follows from them.
+// discharges and the shares of their heat are assumed; what follows from them: deploy/docs/measurements/thermal.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// The paper's own model of cautery (its eq. 10 to 15), to run beside the accurate one: see "The paper's model" in
-// thermal_node/DESIGN.md for each equation, what is corrected knowingly and what is not known of it.
+// The paper's own model of cautery (its eq. 10 to 15), to run beside the accurate one: see deploy/docs/measurements/
+// thermal for each equation, what is corrected knowingly and what is not known of it.
 //
 //   eq. 10, 14  conduction and sinks: HeatField with MakePaperMaterial
 //   eq. 12      q = sigma |grad V|^2: Joule heat of the sheet's current, over its thickness

@@ -6,7 +6,7 @@
 #include <functional>
 #include <numbers>
 
-#include "haptics_node/servo/trocar.h"
+#include "haptics_node/kinematics/trocar.h"
 #include "services/core/error.h"
 
 namespace fulcrum::benchmark {

@@ -1,4 +1,4 @@
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 

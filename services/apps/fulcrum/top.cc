@@ -6,7 +6,7 @@
 
 #include "services/core/error.h"
 #include "services/runtime/realtime.h"
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/domain_guard.h"
 #include "services/supervisor/session_view.h"
 

@@ -7,7 +7,7 @@
 #include "services/config/cart.h"
 #include "services/core/error.h"
 #include "services/scene/scene_yaml.h"
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

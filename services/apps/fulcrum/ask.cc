@@ -2,7 +2,7 @@
 
 #include <cstdio>
 
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 

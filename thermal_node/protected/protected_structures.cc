@@ -1,4 +1,4 @@
-#include "thermal_node/damage/protected_structures.h"
+#include "thermal_node/protected/protected_structures.h"
 
 #include <cmath>
 

@@ -11,7 +11,7 @@
 #include "services/log_tools/tools.h"
 #include "services/recording/recorded_scene.h"
 #include "services/scene/scene_file.h"
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/session_folder.h"
 
 namespace fulcrum::supervisor::cli {

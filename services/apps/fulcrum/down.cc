@@ -2,7 +2,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/domain_guard.h"
 
 namespace fulcrum::supervisor::cli {

@@ -3,7 +3,7 @@
 #include "services/core/error.h"
 #include "services/link/options.h"
 #include "services/runtime/install_places.h"
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 

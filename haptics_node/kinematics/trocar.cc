@@ -1,4 +1,4 @@
-#include "haptics_node/servo/trocar.h"
+#include "haptics_node/kinematics/trocar.h"
 
 #include <algorithm>
 #include <cmath>

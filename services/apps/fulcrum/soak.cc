@@ -3,7 +3,7 @@
 #include "services/core/error.h"
 #include "services/runtime/install_places.h"
 #include "services/runtime/realtime.h"
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/scene_cache.h"
 
 namespace fulcrum::supervisor::cli {

@@ -1,5 +1,5 @@
 #include "services/core/error.h"
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 

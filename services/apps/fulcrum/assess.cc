@@ -6,7 +6,7 @@
 #include "services/core/error.h"
 #include "services/recording/recorded_scene.h"
 #include "services/scene/scene_file.h"
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/score_sheet.h"
 #include "services/supervisor/session_folder.h"
 

@@ -5,7 +5,7 @@
 #include "services/core/error.h"
 #include "services/keys/authority.h"
 #include "services/keys/key_folder.h"
-#include "services/supervisor/cli/commands.h"
+#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {
