@@ -25,9 +25,9 @@ struct CutFigures {
   double removed_mm2 = 0;
   int islands = 0;  ///< Living pieces below 4 mm^2 that are cut off from the sheet.
   double islands_mm2 = 0;
-  int pieces = 0;       ///< Living pieces of 4 mm^2 or more.
-  int holes = 0;        ///< Removed pieces.
-  int revived = 0;      ///< Texels that were removed and came back.
+  int pieces = 0;   ///< Living pieces of 4 mm^2 or more.
+  int holes = 0;    ///< Removed pieces.
+  int revived = 0;  ///< Texels that were removed and came back.
   /// Share of the metal's energised way that is open: where it went no faster than its power can cut as wide as it is,
   /// and everywhere. Tissue that slips off the metal is not cut by it.
   double open_pct = 0, open_pct_all = 0;
@@ -38,9 +38,9 @@ struct CutFigures {
   double length_mm = 0;       ///< Of the centre line, from end to end.
   double longest_mm = 0;      ///< The longest that it has been: cuts that meet become one that is shorter.
   double reported_length_mm = 0, length_error_pct = 0;  ///< Of the longest, for the reported length never falls.
-  double jump_mm_max = 0;      ///< Largest rise of the reported length within 50 ms.
-  int falls = 0;               ///< How often it fell.
-  double first_opening_s = 0;  ///< From the first energised touch to the first texel removed.
+  double jump_mm_max = 0;                               ///< Largest rise of the reported length within 50 ms.
+  int falls = 0;                                        ///< How often it fell.
+  double first_opening_s = 0;                           ///< From the first energised touch to the first texel removed.
   double thermal_step_p50_ms = 0, thermal_step_p99_ms = 0;
 };
 

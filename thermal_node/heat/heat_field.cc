@@ -153,10 +153,10 @@ void HeatField::CollectIsland(Tile* seed) {
   }
 }
 
-/// A step of n times the stable length takes n + 1 stages of that length, u <- u + h F(u), the last of which is averaged
-/// with the state before the step: u <- u0 / (n + 1) + n / (n + 1) (u + h F(u)). It is of second order and keeps the
-/// maximum principle of its stages; with n = 1 it is Heun's method (SSPRK(s, 2); Spiteri and Ruuth, SIAM J. Numer. Anal.
-/// 40, 2002).
+/// A step of n times the stable length takes n + 1 stages of that length, u <- u + h F(u), the last of which is
+/// averaged with the state before the step: u <- u0 / (n + 1) + n / (n + 1) (u + h F(u)). It is of second order and
+/// keeps the maximum principle of its stages; with n = 1 it is Heun's method (SSPRK(s, 2); Spiteri and Ruuth, SIAM J.
+/// Numer. Anal. 40, 2002).
 int HeatField::DiffuseIsland(float dt_s, Ledger* ledger) {
   float rate = 0;
   for (const Tile* tile : island_) rate = std::max(rate, tile->rate);

@@ -4,9 +4,9 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/core/error.h"
 #include "services/runtime/install_places.h"
-#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 namespace po = boost::program_options;

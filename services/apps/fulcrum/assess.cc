@@ -2,11 +2,11 @@
 
 #include <cstdio>
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/assessment/score.h"
 #include "services/core/error.h"
 #include "services/recording/recorded_scene.h"
 #include "services/scene/scene_file.h"
-#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/score_sheet.h"
 #include "services/supervisor/session_folder.h"
 

@@ -2,10 +2,10 @@
 
 #include <cstdio>
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/config/cart.h"
 #include "services/core/error.h"
 #include "services/runtime/install_places.h"
-#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 

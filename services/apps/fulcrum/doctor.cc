@@ -16,13 +16,13 @@
 #include <sstream>
 #include <thread>
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/bus/dds/participant.h"
 #include "services/bus/dds/shared_memory.h"
 #include "services/config/cart.h"
 #include "services/core/error.h"
 #include "services/runtime/install_places.h"
 #include "services/runtime/realtime.h"
-#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/domain_guard.h"
 #include "services/supervisor/scene_cache.h"
 

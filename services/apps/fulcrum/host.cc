@@ -1,9 +1,9 @@
 #include "services/supervisor/host.h"
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/core/error.h"
 #include "services/link/options.h"
 #include "services/runtime/install_places.h"
-#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 

@@ -1,11 +1,11 @@
 #include <cstdio>
 #include <ctime>
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/bus/topics.h"
 #include "services/core/error.h"
 #include "services/keys/authority.h"
 #include "services/keys/key_folder.h"
-#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

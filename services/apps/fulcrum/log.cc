@@ -5,13 +5,13 @@
 #include <iostream>
 #include <limits>
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/core/error.h"
 #include "services/log_tools/cut_map.h"
 #include "services/log_tools/cut_picture.h"
 #include "services/log_tools/tools.h"
 #include "services/recording/recorded_scene.h"
 #include "services/scene/scene_file.h"
-#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/session_folder.h"
 
 namespace fulcrum::supervisor::cli {

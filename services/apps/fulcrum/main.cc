@@ -4,9 +4,9 @@
 #include <cstring>
 
 #include "services/app/version.h"
+#include "services/apps/fulcrum/commands.h"
 #include "services/core/error.h"
 #include "services/runtime/realtime.h"
-#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 

@@ -4,9 +4,9 @@
 #include <cerrno>
 #include <cstring>
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/core/error.h"
 #include "services/runtime/install_places.h"
-#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 

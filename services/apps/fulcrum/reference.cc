@@ -4,10 +4,10 @@
 #include <map>
 #include <sstream>
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/config/cart.h"
 #include "services/core/error.h"
 #include "services/scene/scene_yaml.h"
-#include "services/apps/fulcrum/commands.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

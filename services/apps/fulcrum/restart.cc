@@ -1,5 +1,5 @@
-#include "services/core/error.h"
 #include "services/apps/fulcrum/commands.h"
+#include "services/core/error.h"
 
 namespace fulcrum::supervisor::cli {
 

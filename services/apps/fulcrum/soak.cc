@@ -1,9 +1,9 @@
 #include "services/soak/soak.h"
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/core/error.h"
 #include "services/runtime/install_places.h"
 #include "services/runtime/realtime.h"
-#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/scene_cache.h"
 
 namespace fulcrum::supervisor::cli {

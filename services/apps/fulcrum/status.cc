@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <thread>
 
-#include "services/core/error.h"
 #include "services/apps/fulcrum/commands.h"
+#include "services/core/error.h"
 #include "services/supervisor/domain_guard.h"
 #include "services/supervisor/session_view.h"
 

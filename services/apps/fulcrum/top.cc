@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <thread>
 
+#include "services/apps/fulcrum/commands.h"
 #include "services/core/error.h"
 #include "services/runtime/realtime.h"
-#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/domain_guard.h"
 #include "services/supervisor/session_view.h"
 

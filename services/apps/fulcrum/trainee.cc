@@ -1,7 +1,7 @@
 #include <cstdio>
 
-#include "services/core/error.h"
 #include "services/apps/fulcrum/commands.h"
+#include "services/core/error.h"
 #include "services/supervisor/session_folder.h"
 #include "services/supervisor/trainee_view.h"
 #include "services/supervisor/training_log.h"

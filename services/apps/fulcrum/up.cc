@@ -1,7 +1,7 @@
+#include "services/apps/fulcrum/commands.h"
 #include "services/core/error.h"
 #include "services/link/options.h"
 #include "services/runtime/install_places.h"
-#include "services/apps/fulcrum/commands.h"
 #include "services/supervisor/scene_cache.h"
 #include "services/supervisor/supervisor.h"
 #include "services/supervisor/training_log.h"

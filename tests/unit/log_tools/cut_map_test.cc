@@ -266,9 +266,8 @@ TEST(CutMap, TissueThatSlipsOffTheMetalIsNotAtCuttingPower) {
   cut.vaporising_J_m = 500;
   for (MetalFrame& frame : cut.metal) frame.power_W = 35;
   // From 15 to 17 mm in one period: 200 mm/s, at which 35 W vaporise nothing of this width.
-  std::erase_if(cut.metal, [](const MetalFrame& frame) {
-    return frame.centre.y() > 15.05e-3f && frame.centre.y() < 16.95e-3f;
-  });
+  std::erase_if(cut.metal,
+                [](const MetalFrame& frame) { return frame.centre.y() > 15.05e-3f && frame.centre.y() < 16.95e-3f; });
   for (std::size_t i = 0; i < cut.metal.size(); ++i) cut.metal[i].time_s = 1 + 0.01 * static_cast<double>(i);
   RecordedCut slow = cut;
   const CutFigures figures = MakeCutMap(std::move(cut)).figures;
