@@ -306,12 +306,12 @@ struct CommandReply {
 
 /// Every message, M(T) each, in the order of the topics' numbers: a new one goes to the end. What treats all messages
 /// alike is made from this list: TopicId, the roles (services/bus/topics.h), the gate's declarations, the ports.
-#define FULCRUM_MESSAGES(M)                                                                             \
-  M(HandleState)                                                                                        \
-  M(ToolState)                                                                                          \
-  M(TissueFrame) M(ContactModel) M(CauteryContact) M(TopologyState) M(TemperaturePatch) M(ThermalEvent) \
-      M(SceneManifest) M(Command) M(CommandReply) M(TickManifest) M(Health) M(TearState) M(OpenCells)   \
-          M(GeneratorSetting)
+// clang-format off
+#define FULCRUM_MESSAGES(M) \
+  M(HandleState) M(ToolState) M(TissueFrame) M(ContactModel) M(CauteryContact) M(TopologyState) \
+  M(TemperaturePatch) M(ThermalEvent) M(SceneManifest) M(Command) M(CommandReply) M(TickManifest) \
+  M(Health) M(TearState) M(OpenCells) M(GeneratorSetting)
+// clang-format on
 
 #define FULCRUM_TOPIC_ID(T) k##T,
 enum class TopicId : std::uint8_t { FULCRUM_MESSAGES(FULCRUM_TOPIC_ID) };
