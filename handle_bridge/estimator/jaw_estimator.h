@@ -27,7 +27,7 @@ struct JawEstimate {
 };
 
 /// Blom and Bar-Shalom 1988 for the mixing; the interval update matches the first two moments of a Gaussian truncated
-/// to the interval (a form of the Tobit Kalman filter). Every call is noexcept, without allocation, about 0.5 us.
+/// to the interval (a form of the Tobit Kalman filter). Every call is noexcept, without allocation, about 0.24 us.
 class JawEstimator {
  public:
   JawEstimator(const JawEstimatorSettings& settings, const JawCalibration& calibration);

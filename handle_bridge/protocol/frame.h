@@ -6,7 +6,7 @@
 //   ss    sequence, 00 … FF and round again: what is missing was lost
 //   vvvv  the converter's code, 0000 … 1023, or the pedal bits, 0000 … 0007
 //   cc    CRC-8 of the eight characters between $ and *: polynomial 0x2F, start and final XOR 0xFF (AUTOSAR's): any two
-//         flipped bits of a frame are found, and all but a few in a million of three
+//         flipped bits of a frame are found, and all but one in 10^5 of three
 // Digits above 9 are capital letters. 14 bytes at 400 Hz are 49 % of 115200 8N1.
 #pragma once
 

@@ -1,7 +1,7 @@
-// Two-level linearised implicit small steps (TLI). Each substep is one backward Euler step of ElasticModel, linearised
-// once and solved by a few iterations of conjugate gradients. The preconditioner has two levels: 3 x 3 blocks of the
-// diagonal, and a few dozen coarse nodes (coarse_space.h) that carry what a sweep over neighbours cannot. See
-// DESIGN.md.
+// Linearised implicit small steps with a preconditioner of several levels (TLI). Each substep is one backward Euler
+// step of ElasticModel, linearised once and solved by a few iterations of conjugate gradients. The preconditioner is
+// the sum of three levels: 3 x 3 blocks of the diagonal, a middle level over the membrane, and a few dozen coarse
+// nodes (coarse_space.h), which carry what a sweep over neighbours cannot. See DESIGN.md.
 #pragma once
 
 #include <cstdint>

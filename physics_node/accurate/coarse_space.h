@@ -1,7 +1,7 @@
-// The levels above the particles: what carries in one product what neighbours would take hundreds of sweeps to tell one
-// another. Over the membrane a middle level of every fourth row and column, with blocks of its diagonal; over both
-// layers a coarse level of a few dozen nodes, bilinear in the membrane's rows and columns and trilinear on a lattice of
-// 30 mm over the organ, with its Galerkin matrix factored dense.
+// The levels above the particles: one product carries a correction over a distance for which sweeps over neighbours
+// would take hundreds of iterations. Over the membrane a middle level of every fourth row and column, with blocks of
+// its diagonal; over both layers a coarse level of a few dozen nodes, bilinear in the membrane's rows and columns and
+// trilinear on a lattice of 30 mm over the organ, with its Galerkin matrix factored (coarse_factor.h).
 #pragma once
 
 #include <Eigen/Core>
@@ -26,7 +26,7 @@ class CoarseSpace {
   /// A new matrix, in force at once.
   void Renew(const Sheet& sheet, const SheetMatrix& matrix, float inertia);
   /// The next part of the next matrix: rows of the membrane, and when it has them all columns of its factor, with the
-  /// last of which it is in force. So no step pays for all of it. A hundred steps old it serves as well as new.
+  /// last of which it is in force. So no step pays for all of it.
   void Refresh(const Sheet& sheet, const SheetMatrix& matrix, float inertia);
 
   /// The middle level as the kernels see it.

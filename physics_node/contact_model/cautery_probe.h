@@ -15,8 +15,8 @@ class CauteryProbe {
  public:
   CauteryProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
 
-  /// Contact of hook `tool` after a step: the metal's footprint, its centre, rate, tented. Mode, power and stamps are
-  /// the caller's.
+  /// Contact of hook `tool` after a step: the metal's footprint, its centre, rate, tented. The stamp is the
+  /// caller's.
   ///
   /// The bare metal is the foot and the end of the neck. The footprint is its distance from each cell of the deformed
   /// sheet around it; each side of a slit goes on unstretched up to its lip. Stations along the metal's axis each

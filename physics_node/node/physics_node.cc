@@ -201,8 +201,8 @@ void PhysicsNode::TakeInputs(const Tick& tick) {
 }
 
 /// A skipped period means that the step before ran late: go on with a cheaper preset, for a while. The first step looks
-/// at everything for the first time and says nothing about the next. In lock step no period is ever skipped, so replays
-/// do not depend on the machine.
+/// at everything for the first time and says nothing about the next. A replay skips the
+/// periods that were skipped then: it does not depend on its machine.
 void PhysicsNode::MindTheTime(const Tick& tick) {
   const bool late = ticks_ > 1 && tick.index > last_index_ + 1;
   periods_ = tick.index > last_index_ ? tick.index - last_index_ : 1;

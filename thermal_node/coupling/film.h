@@ -17,7 +17,7 @@
 
 namespace fulcrum::thermal {
 
-/// Conductance of a film in full discharge [S/m^2]. 350 V rms then put some 40 W on a square millimetre.
+/// Conductance of a film in full discharge [S/m^2]. 350 V rms then put 49 W on a square millimetre.
 inline constexpr float kDischarge_S_m2 = 400.0f;
 /// Discharges reach tissue this far from the metal, ever more rarely [m].
 inline constexpr float kFilmReach_m = 2.0e-4f;
