@@ -225,7 +225,9 @@ struct Console::Impl {
 
   HttpResponse TurnGenerator(const Form& fields) {
     std::string words;
-    for (const auto& [knob, power] : fields) words += (words.empty() ? "" : " ") + knob + "=" + power;
+    for (const auto& [knob, power] : fields) {
+      words.append(words.empty() ? "" : " ").append(knob).append("=").append(power);
+    }
     if (words.empty()) return Refusal(400, "cut, coag or blend: which knob, and how many watts?");
     return Ask("generator", words);
   }

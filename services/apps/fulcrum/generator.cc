@@ -15,7 +15,8 @@ ExitCode Generator(const Words& words) {
   std::string turned;
   for (const char* knob : {"cut", "coag", "blend"}) {
     if (arguments.values.count(knob) == 0) continue;
-    turned += (turned.empty() ? "" : " ") + std::string(knob) + "=" + Fixed(arguments.values[knob].as<double>(), 2);
+    turned.append(turned.empty() ? "" : " ").append(knob).append("=");
+    turned.append(Fixed(arguments.values[knob].as<double>(), 2));
   }
   return Ask(DomainOf(arguments, kDefaultDomain), "generator", turned);
 }
