@@ -22,7 +22,7 @@ ExitCode RunThermal(app::NodeApp& app) {
       app.timing(),
       [&](const Tick& tick) {
         node.Step(tick);
-        // Who turned the generator's knob sees it taken at once.
+        // A change of the set power is published at once, not with the next period of Health.
         if (node.TakeSettingChanged()) app.PublishHealthNow();
       },
       [&](Health* health) { node.FillHealth(health); });

@@ -1,4 +1,5 @@
-// The panel of the electrosurgical generator: what it is set to, by whoever turned a knob last.
+// The panel of the electrosurgical generator: the power of each mode. The last change of a knob counts, whether it
+// comes from a command or from the script.
 #pragma once
 
 #include <array>
@@ -14,14 +15,15 @@ namespace fulcrum::supervisor {
 class GeneratorPanel {
  public:
   /// @param start the cart's setting.
-  /// @param script of a simulated operator, who turns the knobs to the power of each key with a pedal down as soon as
-  /// the use before it is over, the first before the session begins. Empty: there is none. Must outlive the panel.
+  /// @param script of a simulated operator; must outlive the panel. Each key with a pedal down sets the power of that
+  /// pedal as soon as the use before it has ended; the first use sets it before the session begins. Empty: the script
+  /// sets nothing.
   GeneratorPanel(const config::GeneratorConfig& start, std::span<const ScriptKey> script);
 
-  /// The simulated operator at a session time; times must not go back. A knob that the script leaves where it is stays
-  /// where others have turned it. False: no knob was turned.
+  /// Sets what the script says at a session time; times must not go back. A knob that the script does not change keeps
+  /// what a command has set. False: no knob has changed.
   bool Follow(double session_time_s);
-  /// Session time of the key at which Follow turned a knob; negative: before all of them.
+  /// Session time of the key at which Follow changed a knob; negative: before all of them.
   [[nodiscard]] double turned_s() const { return turned_s_; }
 
   /// Turns knobs by words such as "cut=40 coag=25" [W]; no words: none. Throws InputError, and nothing is turned.

@@ -110,7 +110,7 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
          "\n";
 }
 
-/// With a real pedal nobody follows the script.
+/// The script that sets the generator: none on a cart with a real pedal, where a person operates it.
 std::span<const ScriptKey> OperatorScript(const UpSettings& settings, const SceneView& scene) {
   return settings.cart.pedal.kind == config::LinkKind::kSimulated ? scene.script : std::span<const ScriptKey>();
 }

@@ -1,4 +1,4 @@
-// Who includes whom: rooms stand in one order and include downwards only, so that no circle can arise.
+// The include graph: the rooms have one order, and each includes only rooms before it, so that no circle can arise.
 #include <gtest/gtest.h>
 
 #include <algorithm>

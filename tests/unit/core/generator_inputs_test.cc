@@ -67,7 +67,7 @@ TEST(GeneratorInputs, ASilentPedalIsUpUnlessBothEndsOfTheSilenceSayDown) {
   inputs.Add(Pedals(500, kPedalCut));
   EXPECT_EQ(inputs.At(300 * kMs).mode, CauteryMode::kCut) << "the reader was away";
   inputs.Add(Pedals(900, kPedalNone));
-  EXPECT_EQ(inputs.At(700 * kMs).mode, CauteryMode::kOff) << "nobody knows when it went up";
+  EXPECT_EQ(inputs.At(700 * kMs).mode, CauteryMode::kOff) << "when it went up is unknown";
   inputs.Add(Pedals(910, kPedalCut));
   inputs.Add(Pedals(2000, kPedalCut));
   EXPECT_EQ(inputs.At(1500 * kMs).mode, CauteryMode::kOff) << "more than a second";
