@@ -5,8 +5,8 @@
 #include "handle_bridge/node/calibrate_command.h"
 #include "handle_bridge/node/cart_links.h"
 #include "handle_bridge/node/handle_bridge_node.h"
-#include "services/app/node_app.h"
-#include "services/runtime/realtime.h"
+#include "services/base/runtime/realtime.h"
+#include "services/nodes/app/node_app.h"
 
 namespace {
 

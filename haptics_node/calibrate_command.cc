@@ -11,10 +11,10 @@
 #include "haptics_node/node/calibrate_trocar.h"
 #include "haptics_node/node/cart_devices.h"
 #include "haptics_node/node/trocar_store.h"
-#include "services/config/cart.h"
-#include "services/core/error.h"
-#include "services/core/exit_code.h"
-#include "services/runtime/realtime.h"
+#include "services/base/config/cart.h"
+#include "services/base/core/error.h"
+#include "services/base/core/exit_code.h"
+#include "services/base/runtime/realtime.h"
 
 namespace fulcrum::haptics {
 namespace {

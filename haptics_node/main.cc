@@ -7,9 +7,9 @@
 #include "haptics_node/node/cart_devices.h"
 #include "haptics_node/node/haptics_node.h"
 #include "haptics_node/node/trocar_store.h"
-#include "services/app/node_app.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/runtime/realtime.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/base/runtime/realtime.h"
+#include "services/nodes/app/node_app.h"
 
 namespace {
 

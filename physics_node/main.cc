@@ -3,9 +3,9 @@
 #include "physics_node/node/physics_checkpoint.h"
 #include "physics_node/node/physics_node.h"
 #include "physics_node/node/seat.h"
-#include "services/app/node_app.h"
-#include "services/runtime/checkpoint.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/checkpoint.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/nodes/app/node_app.h"
 
 namespace {
 

@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "render_node/node/render_node.h"
-#include "services/app/node_app.h"
-#include "services/app/spare.h"
-#include "services/runtime/realtime.h"
+#include "services/base/runtime/realtime.h"
+#include "services/nodes/app/node_app.h"
+#include "services/nodes/app/spare.h"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // thermal_node: electrocautery of the membrane.
-#include "services/app/node_app.h"
-#include "services/runtime/checkpoint.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/checkpoint.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/nodes/app/node_app.h"
 #include "thermal_node/node/thermal_node.h"
 
 namespace {

@@ -18,9 +18,9 @@
 #include "handle_bridge/node/cart_links.h"
 #include "handle_bridge/protocol/jaw_line.h"
 #include "handle_bridge/protocol/line_framer.h"
-#include "services/core/error.h"
-#include "services/core/exit_code.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/core/error.h"
+#include "services/base/core/exit_code.h"
+#include "services/base/runtime/cyclic_thread.h"
 
 namespace fulcrum::handle_bridge {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "handle_bridge/estimator/jaw_calibration.h"
 #include "handle_bridge/protocol/jaw_line.h"
-#include "services/config/strict_yaml.h"
+#include "services/base/config/strict_yaml.h"
 
 namespace fulcrum::handle_bridge {
 namespace {

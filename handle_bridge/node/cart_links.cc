@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "handle_bridge/serial/serial_port.h"
-#include "services/core/operator_script.h"
+#include "services/base/core/operator_script.h"
 
 namespace fulcrum::handle_bridge {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "handle_bridge/node/handle_bridge_node.h"
 #include "handle_bridge/serial/simulated_firmware.h"
-#include "services/config/cart.h"
-#include "services/core/scene_view.h"
+#include "services/base/config/cart.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::handle_bridge {
 

@@ -11,12 +11,12 @@
 #include "handle_bridge/node/jaw_channel.h"
 #include "handle_bridge/node/pedal_channel.h"
 #include "handle_bridge/node/watched_link.h"
-#include "services/bus/input_account.h"
-#include "services/bus/port.h"
-#include "services/config/cart.h"
-#include "services/core/messages.h"
-#include "services/core/tick.h"
-#include "services/runtime/seqlock.h"
+#include "services/base/config/cart.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/tick.h"
+#include "services/base/runtime/seqlock.h"
+#include "services/transport/bus/input_account.h"
+#include "services/transport/bus/port.h"
 
 namespace fulcrum::handle_bridge {
 

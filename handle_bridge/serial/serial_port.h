@@ -5,7 +5,7 @@
 #include <string>
 
 #include "handle_bridge/serial/byte_source.h"
-#include "services/config/cart.h"
+#include "services/base/config/cart.h"
 
 namespace fulcrum::handle_bridge {
 

@@ -12,8 +12,8 @@
 
 #include "handle_bridge/serial/pseudo_terminal.h"
 #include "handle_bridge/simulation/jaw_firmware.h"
-#include "services/core/messages.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/core/messages.h"
+#include "services/base/runtime/cyclic_thread.h"
 
 namespace fulcrum::handle_bridge {
 

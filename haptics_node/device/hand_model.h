@@ -1,7 +1,7 @@
 // How a hand holds the handle: mass, spring and damper between the wanted and the actual place of the attach point.
 #pragma once
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::haptics {
 

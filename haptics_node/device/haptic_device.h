@@ -5,9 +5,9 @@
 #include <memory>
 #include <string>
 
-#include "services/core/messages.h"
-#include "services/core/tick.h"
-#include "services/core/types.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/tick.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::haptics {
 

@@ -2,7 +2,7 @@
 
 #include <dlfcn.h>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::haptics::hd {
 namespace {

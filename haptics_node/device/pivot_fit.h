@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "haptics_node/device/recorded_motion.h"
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::haptics {
 

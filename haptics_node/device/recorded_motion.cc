@@ -9,7 +9,7 @@
 #include <sstream>
 #include <string_view>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::haptics {
 namespace {

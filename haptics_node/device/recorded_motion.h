@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::haptics {
 

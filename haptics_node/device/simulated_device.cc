@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "services/core/operator_script.h"
+#include "services/base/core/operator_script.h"
 
 namespace fulcrum::haptics {
 namespace {

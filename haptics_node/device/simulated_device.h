@@ -11,7 +11,7 @@
 #include "haptics_node/device/recorded_motion.h"
 #include "haptics_node/device/workspace_map.h"
 #include "haptics_node/kinematics/trocar.h"
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::haptics {
 

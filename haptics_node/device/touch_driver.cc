@@ -5,7 +5,7 @@
 #include <cmath>
 #include <condition_variable>
 
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/cyclic_thread.h"
 
 namespace fulcrum::haptics {
 namespace {

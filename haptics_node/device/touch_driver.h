@@ -20,9 +20,9 @@
 #include <vector>
 
 #include "haptics_node/device/hdapi.h"
-#include "services/core/messages.h"
-#include "services/core/types.h"
-#include "services/runtime/latest_value.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/types.h"
+#include "services/base/runtime/latest_value.h"
 
 namespace fulcrum::haptics {
 

@@ -4,7 +4,7 @@
 //     p_W = p_WP + scale R_WD (p_D - p_DP)        f_D = R_WD^T f_W
 #pragma once
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::haptics {
 

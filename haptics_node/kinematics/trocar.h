@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::haptics {
 

@@ -8,9 +8,9 @@
 #include <thread>
 
 #include "haptics_node/node/cart_devices.h"
-#include "services/core/error.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/runtime/realtime.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/base/runtime/realtime.h"
 
 namespace fulcrum::haptics {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "haptics_node/device/pivot_fit.h"
 #include "haptics_node/device/recorded_motion.h"
-#include "services/config/cart.h"
+#include "services/base/config/cart.h"
 
 namespace fulcrum::haptics {
 

@@ -10,8 +10,8 @@
 #include "haptics_node/device/haptic_device.h"
 #include "haptics_node/device/touch_driver.h"
 #include "haptics_node/device/workspace_map.h"
-#include "services/config/cart.h"
-#include "services/core/scene_view.h"
+#include "services/base/config/cart.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::haptics {
 

@@ -8,12 +8,12 @@
 
 #include "haptics_node/device/haptic_device.h"
 #include "haptics_node/servo/servo.h"
-#include "services/bus/port.h"
-#include "services/core/messages.h"
-#include "services/core/scene_view.h"
-#include "services/core/tick.h"
-#include "services/runtime/seqlock.h"
-#include "services/runtime/spsc_ring.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/scene_view.h"
+#include "services/base/core/tick.h"
+#include "services/base/runtime/seqlock.h"
+#include "services/base/runtime/spsc_ring.h"
+#include "services/transport/bus/port.h"
 
 namespace fulcrum::haptics {
 

@@ -9,8 +9,8 @@
 #include <numbers>
 #include <system_error>
 
-#include "services/config/strict_yaml.h"
-#include "services/core/error.h"
+#include "services/base/config/strict_yaml.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::haptics {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "haptics_node/device/pivot_fit.h"
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::haptics {
 

@@ -10,8 +10,8 @@
 
 #include <cstdint>
 
-#include "services/core/messages.h"
-#include "services/core/types.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::haptics {
 

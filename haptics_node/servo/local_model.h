@@ -9,8 +9,8 @@
 #include "haptics_node/servo/contact_law.h"
 #include "haptics_node/servo/pose_ring.h"
 #include "haptics_node/servo/stiffness_correction.h"
-#include "services/core/hash.h"
-#include "services/core/messages.h"
+#include "services/base/core/hash.h"
+#include "services/base/core/messages.h"
 
 namespace fulcrum::haptics {
 

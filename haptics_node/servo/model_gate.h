@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
 
 namespace fulcrum::haptics {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::haptics {
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::haptics {
 

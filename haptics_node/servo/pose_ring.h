@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::haptics {
 

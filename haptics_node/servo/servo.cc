@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string>
 
-#include "services/core/error.h"
-#include "services/core/hash.h"
+#include "services/base/core/error.h"
+#include "services/base/core/hash.h"
 
 namespace fulcrum::haptics {
 namespace {

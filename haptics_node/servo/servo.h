@@ -13,9 +13,9 @@
 #include "haptics_node/servo/output_chain.h"
 #include "haptics_node/servo/passivity.h"
 #include "haptics_node/servo/pose_ring.h"
-#include "services/core/messages.h"
-#include "services/core/scene_view.h"
-#include "services/core/tick.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/scene_view.h"
+#include "services/base/core/tick.h"
 
 namespace fulcrum::haptics {
 

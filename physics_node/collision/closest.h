@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::physics {
 

@@ -9,7 +9,7 @@
 #include <array>
 #include <cstdint>
 
-#include "physics_node/pbd/particle_store.h"
+#include "physics_node/tissue/particle_store.h"
 
 namespace fulcrum::physics {
 

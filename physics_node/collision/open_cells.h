@@ -11,7 +11,7 @@
 #include <cstdint>
 
 #include "physics_node/collision/closest.h"
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
 
 namespace fulcrum::physics {
 

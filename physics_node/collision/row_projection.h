@@ -4,7 +4,7 @@
 #include <span>
 
 #include "physics_node/collision/contact_row.h"
-#include "physics_node/pbd/particle_store.h"
+#include "physics_node/tissue/particle_store.h"
 
 namespace fulcrum::physics {
 

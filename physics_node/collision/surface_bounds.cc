@@ -23,7 +23,7 @@ constexpr float kForgotten = 1e3f;
 }  // namespace
 
 SurfaceBounds::SurfaceBounds(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
-                             const Kernels& kernels)
+                             const collision::Kernels& kernels)
     : scene_(scene),
       particles_(particles),
       model_(model),

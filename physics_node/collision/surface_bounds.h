@@ -11,16 +11,17 @@
 #include <vector>
 
 #include "physics_node/collision/closest.h"
+#include "physics_node/collision/kernels.h"
 #include "physics_node/collision/tool_shape.h"
-#include "physics_node/pbd/kernels.h"
-#include "physics_node/pbd/particle_store.h"
-#include "physics_node/pbd/tissue_model.h"
+#include "physics_node/tissue/particle_store.h"
+#include "physics_node/tissue/tissue_model.h"
 
 namespace fulcrum::physics {
 
 class SurfaceBounds {
  public:
-  SurfaceBounds(const SceneView& scene, const TissueModel* model, ParticleStore* particles, const Kernels& kernels);
+  SurfaceBounds(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
+                const collision::Kernels& kernels);
 
   /// Fits the bounds to the tissue within kReach of `tools`, once a step: tissue faster than kTissueStep a step may
   /// come near unseen.
@@ -66,7 +67,7 @@ class SurfaceBounds {
   SceneView scene_;
   ParticleStore* particles_;
   const TissueModel* model_;
-  const Kernels& kernels_;
+  const collision::Kernels& kernels_;
   std::uint32_t slot_blocks_, row_blocks_;
   std::array<std::vector<float>, 6> bound_storage_;
   BlockBounds bounds_{};

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "physics_node/collision/closest.h"
-#include "services/core/breathing.h"
+#include "services/base/core/breathing.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -35,7 +35,7 @@ constexpr std::size_t kAhead = 8;
 }  // namespace
 
 TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
-                                 const Kernels& kernels)
+                                 const collision::Kernels& kernels)
     : scene_(scene), model_(model), particles_(particles), kernels_(kernels) {
   WatchOrgan();
   for (const StaticSurface& surface : scene.static_surfaces) {

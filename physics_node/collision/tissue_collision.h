@@ -12,10 +12,11 @@
 #include <vector>
 
 #include "physics_node/collision/contact_row.h"
+#include "physics_node/collision/kernels.h"
 #include "physics_node/collision/triangle_tree.h"
-#include "physics_node/pbd/particle_store.h"
-#include "physics_node/pbd/tissue_model.h"
-#include "services/core/scene_view.h"
+#include "physics_node/tissue/particle_store.h"
+#include "physics_node/tissue/tissue_model.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::physics {
 
@@ -26,7 +27,7 @@ class TissueCollision {
   static constexpr std::size_t kMaxRows = 4096;
 
   TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
-                  const Kernels& kernels = BestKernels());
+                  const collision::Kernels& kernels = collision::KernelsFor());
 
   /// Once a step, before it. `moved`: at least how far any particle of each block of the ParticleStore has moved since
   /// the last call [m], [block_count()]; 0 for blocks at rest. Simulated time at the begin and the end of the step [s]:
@@ -191,7 +192,7 @@ class TissueCollision {
   SceneView scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
-  const Kernels& kernels_;
+  const collision::Kernels& kernels_;
 
   std::vector<Index> ring_start_, ring_;  ///< Organ triangles that share a corner with each.
   Watches organ_;

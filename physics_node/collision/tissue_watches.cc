@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "physics_node/collision/tissue_collision.h"
-#include "services/core/breathing.h"
+#include "services/base/core/breathing.h"
 
 namespace fulcrum::physics {
 

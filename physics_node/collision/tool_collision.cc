@@ -42,7 +42,7 @@ bool InOrder(const ContactPair& p, const ContactPair& q) {
 }  // namespace
 
 ToolCollision::ToolCollision(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
-                             const Kernels& kernels)
+                             const collision::Kernels& kernels)
     : scene_(scene),
       model_(model),
       particles_(particles),

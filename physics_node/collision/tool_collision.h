@@ -14,10 +14,10 @@
 
 #include "physics_node/collision/closest.h"
 #include "physics_node/collision/contact_row.h"
+#include "physics_node/collision/kernels.h"
 #include "physics_node/collision/open_cells.h"
 #include "physics_node/collision/surface_bounds.h"
 #include "physics_node/collision/tool_shape.h"
-#include "physics_node/pbd/pbd_solver.h"
 
 namespace fulcrum::physics {
 
@@ -56,9 +56,7 @@ class ToolCollision {
   static constexpr std::size_t kMaxRows = 1024;
 
   ToolCollision(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
-                const Kernels& kernels = BestKernels());
-  ToolCollision(const SceneView& scene, const TissueModel* model, ParticleStore* particles, const PbdSolver* solver)
-      : ToolCollision(scene, model, particles, solver->kernels()) {}
+                const collision::Kernels& kernels = collision::KernelsFor());
 
   struct ToolMotion {
     ToolShape from, to;
@@ -180,7 +178,7 @@ class ToolCollision {
   SceneView scene_;
   const TissueModel* model_;
   ParticleStore* particles_;
-  const Kernels& kernels_;
+  const collision::Kernels& kernels_;
   Index membrane_triangles_;
   SurfaceBounds bounds_;
   std::vector<ParticleRef> column_;  ///< Of the first row.

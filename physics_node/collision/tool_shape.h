@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::physics {
 

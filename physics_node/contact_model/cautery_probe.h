@@ -7,7 +7,7 @@
 #include "physics_node/collision/open_cells.h"
 #include "physics_node/collision/tool_collision.h"
 #include "physics_node/contact_model/sheet_place.h"
-#include "services/core/slit_sheet.h"
+#include "services/base/core/slit_sheet.h"
 
 namespace fulcrum::physics {
 

@@ -10,8 +10,8 @@
 #include <array>
 #include <span>
 
-#include "physics_node/pbd/particle_store.h"
-#include "services/core/messages.h"
+#include "physics_node/tissue/particle_store.h"
+#include "services/base/core/messages.h"
 
 namespace fulcrum::physics {
 

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "physics_node/pbd/particle_store.h"
-#include "physics_node/pbd/tissue_model.h"
+#include "physics_node/tissue/particle_store.h"
+#include "physics_node/tissue/tissue_model.h"
 
 namespace fulcrum::physics {
 

@@ -3,8 +3,8 @@
 
 #include <array>
 
-#include "physics_node/pbd/tissue_model.h"
-#include "services/core/scene_view.h"
+#include "physics_node/tissue/tissue_model.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::physics {
 

@@ -28,7 +28,7 @@
 #include <array>
 #include <vector>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::physics {
 

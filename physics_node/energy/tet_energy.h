@@ -8,7 +8,7 @@
 // lambda_Lame = lambda - mu, and the shear part 2 mu.
 #pragma once
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::physics {
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "physics_node/collision/tool_shape.h"
-#include "physics_node/pbd/particle_store.h"
-#include "physics_node/pbd/tissue_model.h"
+#include "physics_node/tissue/particle_store.h"
+#include "physics_node/tissue/tissue_model.h"
 
 namespace fulcrum::physics {
 

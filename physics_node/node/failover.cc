@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "physics_node/node/physics_checkpoint.h"
-#include "services/runtime/checkpoint.h"
-#include "services/runtime/realtime.h"
+#include "services/base/runtime/checkpoint.h"
+#include "services/base/runtime/realtime.h"
 
 namespace fulcrum::physics {
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <deque>
 
-#include "services/bus/port.h"
+#include "services/transport/bus/port.h"
 
 namespace fulcrum::physics {
 

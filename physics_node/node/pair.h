@@ -3,14 +3,14 @@
 
 #include <cstdint>
 
-#include "services/bus/port.h"
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
+#include "services/transport/bus/port.h"
 
 namespace fulcrum::physics {
 
 /// Who leads is told by the TickManifests on the bus. Each process that leads has an epoch of its own, and the higher
 /// one leads: of two that believe to lead, the one that began later goes on, and readers take nothing from the other
-/// any more (services/bus: an epoch that is past is refused).
+/// any more (services/transport/bus: an epoch that is past is refused).
 class Pair {
  public:
   enum class Role : std::uint8_t {

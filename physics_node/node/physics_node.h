@@ -10,12 +10,12 @@
 
 #include "physics_node/node/input_history.h"
 #include "physics_node/simulation/tissue_simulation.h"
-#include "services/bus/input_account.h"
-#include "services/bus/port.h"
-#include "services/core/messages.h"
-#include "services/core/scene_view.h"
-#include "services/core/tick.h"
-#include "services/runtime/checkpoint.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/scene_view.h"
+#include "services/base/core/tick.h"
+#include "services/base/runtime/checkpoint.h"
+#include "services/transport/bus/input_account.h"
+#include "services/transport/bus/port.h"
 
 namespace fulcrum::physics {
 

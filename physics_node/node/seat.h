@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::physics {
 

@@ -2,8 +2,8 @@
 // go: load, constraint value, gradient, masses, lambda, apply.
 #pragma once
 
-#include "physics_node/pbd/grid_sweep.h"
-#include "physics_node/pbd/touch_impl.h"
+#include "physics_node/pbd/kernels.h"
+#include "physics_node/tissue/grid_sweep.h"
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
@@ -107,7 +107,7 @@ FULCRUM_INLINE void ProjectBending(float* particles, const BendingBatch& batch, 
 }
 
 template <class F>
-FULCRUM_INLINE void ProjectBindings(float* pool, const BindingBatch& batch, const BindingStiffness& stiffness) {
+FULCRUM_INLINE void ProjectBindings(float* pool, const BindingBatch& batch, const pbd::BindingStiffness& stiffness) {
   constexpr std::size_t kStep = kNext<BindingBatch>;
   const F zero = F::All(0.0f);
   const Particles<F> node = GatherPool<F>(pool, batch.base[0], batch.step[0], kStep);
@@ -154,157 +154,14 @@ void Bending(float* particles, const BendingBatch* batches, std::size_t count, f
       count, [&](auto lanes, std::size_t i)
                  __attribute__((always_inline)) { ProjectBending<decltype(lanes)>(particles, batches[i], stiffness); });
 }
-void Bindings(float* pool, const BindingBatch* batches, std::size_t count, const BindingStiffness& stiffness) {
+void Bindings(float* pool, const BindingBatch* batches, std::size_t count, const pbd::BindingStiffness& stiffness) {
   ForBatches(
       count, [&](auto lanes, std::size_t i)
                  __attribute__((always_inline)) { ProjectBindings<decltype(lanes)>(pool, batches[i], stiffness); });
 }
 
-std::uint32_t Integrate(float* const now[3], float* const previous[3], const float* w, std::size_t count,
-                        const IntegrateSettings& settings) {
-  std::uint32_t resets = 0;
-  const F8 keep = F8::All(settings.keep);
-  const F8 limit = F8::All(settings.limit);
-  for (int axis = 0; axis < 3; ++axis) {
-    const F8 fall = F8::All(settings.gravity[axis]);
-    float* x = now[axis];
-    float* p = previous[axis];
-    for (std::size_t i = 0; i < count; i += 8) {
-      const F8 last = F8::Load(p + i);
-      F8 here = F8::Load(x + i);
-      const F8 good = Abs(here - last) < limit;  // False for a NaN.
-      if (Bits(good) != 0xffu) {
-        here = Select(good, here, last);
-        resets += static_cast<std::uint32_t>(__builtin_popcount(~Bits(good) & 0xffu));
-      }
-      const F8 step = (here - last) * keep + fall;
-      here.Store(p + i);
-      (here + (step & (F8::Load(w + i) > F8::All(0.0f)))).Store(x + i);
-    }
-  }
-  return resets;
-}
-
-inline float LargestLane(F8 v) {
-  alignas(32) float lanes[8];
-  v.Store(lanes);
-  float largest = lanes[0];
-  for (const float lane : lanes) {
-    largest = lane > largest ? lane : largest;
-  }
-  return largest;
-}
-
-FinishResult Finish(float* const now[3], const float* const previous[3], const float* w, std::size_t count,
-                    float limit_sq) {
-  FinishResult result{0, 0};
-  F8 largest = F8::All(0.0f);
-  const F8 limit = F8::All(limit_sq);
-  for (std::size_t i = 0; i < count; i += 8) {
-    const V8 x{F8::Load(now[0] + i), F8::Load(now[1] + i), F8::Load(now[2] + i)};
-    const V8 p{F8::Load(previous[0] + i), F8::Load(previous[1] + i), F8::Load(previous[2] + i)};
-    const V8 d = x - p;
-    const F8 moved = Dot(d, d);
-    const F8 good = moved < limit;  // False for a NaN.
-    if (Bits(good) != 0xffu) {
-      // Too far: only as far as allowed. Not finite: back to where it was.
-      const F8 finite = moved < F8::All(3e38f);
-      const F8 part = Sqrt(limit / Max(moved, limit)) & finite;
-      const V8 kept = p + V8{d.x & finite, d.y & finite, d.z & finite} * part;
-      Select(good, x.x, kept.x).Store(now[0] + i);
-      Select(good, x.y, kept.y).Store(now[1] + i);
-      Select(good, x.z, kept.z).Store(now[2] + i);
-      const F8 free = F8::Load(w + i) > F8::All(0.0f);
-      result.resets += static_cast<std::uint32_t>(__builtin_popcount(~Bits(good) & Bits(free) & 0xffu));
-    }
-    largest = Max(moved & good, largest);
-  }
-  result.max_step_sq = LargestLane(largest);
-  return result;
-}
-
-/// Lanes x, y, z of two xyzw particles.
-inline F8 XyzLanes() {
-  alignas(32) static constexpr float kXyz[8] = {1, 1, 1, 0, 1, 1, 1, 0};
-  return F8::Load(kXyz) > F8::All(0.0f);
-}
-
-std::uint32_t IntegrateXyzw(float* now, float* previous, std::size_t count, const IntegrateSettings& settings) {
-  std::uint32_t resets = 0;
-  const float* g = settings.gravity;
-  alignas(32) const float falls[8] = {g[0], g[1], g[2], 0, g[0], g[1], g[2], 0};
-  const F8 keep = F8::All(settings.keep), limit = F8::All(settings.limit), fall = F8::Load(falls), xyz = XyzLanes();
-  for (std::size_t i = 0; i < count; i += 8) {
-    const F8 last = F8::Load(previous + i), x = F8::Load(now + i);
-    F8 here = x;
-    const F8 good = Abs(here - last) < limit;  // False for a NaN.
-    if ((~Bits(good) & 0x77u) != 0) {
-      here = Select(good, here, last);
-      resets += static_cast<std::uint32_t>(__builtin_popcount(~Bits(good) & 0x77u));
-    }
-    const F8 step = (here - last) * keep + fall;
-    Select(xyz, here, last).Store(previous + i);
-    Select(xyz, here + (step & (Spread<3>(x) > F8::All(0.0f))), x).Store(now + i);
-  }
-  return resets;
-}
-
-FinishResult FinishXyzw(float* now, const float* previous, std::size_t count, float limit_sq) {
-  FinishResult result{0, 0};
-  const F8 limit = F8::All(limit_sq), xyz = XyzLanes();
-  F8 largest = F8::All(0.0f);
-  for (std::size_t i = 0; i < count; i += 8) {
-    const F8 x = F8::Load(now + i), p = F8::Load(previous + i);
-    const F8 d = x - p, squares = d * d;
-    const F8 moved = Spread<0>(squares) + Spread<1>(squares) + Spread<2>(squares);
-    const F8 good = moved < limit;  // False for a NaN.
-    if (Bits(good) != 0xffu) {
-      const F8 finite = moved < F8::All(3e38f);
-      const F8 part = Sqrt(limit / Max(moved, limit)) & finite;
-      const F8 kept = p + (d & finite) * part;
-      Select(xyz, Select(good, x, kept), x).Store(now + i);
-      const F8 free = Spread<3>(x) > F8::All(0.0f);
-      result.resets += static_cast<std::uint32_t>(__builtin_popcount(~Bits(good) & Bits(free) & 0x11u));
-    }
-    largest = Max(moved & good, largest);
-  }
-  result.max_step_sq = LargestLane(largest);
-  return result;
-}
-
-void ComputeBlockBounds(const GridArrays& g, const BlockBounds& bounds) {
-  const float* planes[3] = {g.x, g.y, g.z};
-  const int cell_rows = g.rows > 1 ? g.rows - 1 : 1;
-  std::size_t out = 0;
-  for (int r0 = 0; r0 < cell_rows; r0 += 8) {
-    const int r1 = r0 + 8 < g.rows ? r0 + 8 : g.rows - 1;
-    for (int s0 = 0; s0 < g.slots; s0 += 8, out += 8) {
-      const int s1 = s0 + 8 < g.slots ? s0 + 8 : g.slots;  // Inclusive when it is a slot, else the wrap.
-      for (int axis = 0; axis < 3; ++axis) {
-        F8 lo = F8::All(3e38f), hi = F8::All(-3e38f);
-        for (int r = r0; r <= r1; ++r) {
-          const float* row = planes[axis] + static_cast<std::size_t>(r) * 8 * static_cast<std::size_t>(g.slots);
-          for (int s = s0; s < s1; ++s) {
-            const F8 v = F8::Load(row + 8 * s);
-            lo = Min(lo, v);
-            hi = Max(hi, v);
-          }
-          const F8 edge = s1 < g.slots ? F8::Load(row + 8 * s1) : RotateDown(F8::Load(row));
-          lo = Min(lo, edge);
-          hi = Max(hi, edge);
-        }
-        lo.Store(bounds.lo[axis] + out);
-        hi.Store(bounds.hi[axis] + out);
-      }
-    }
-  }
-}
-
-const Kernels& Table(const char* name) {
-  static const Kernels kernels{
-      name,       GridStretch,        Springs,    Volumes, Bending, Bindings, Integrate, Finish, IntegrateXyzw,
-      FinishXyzw, ComputeBlockBounds, FirstTouch, Feet};
-  return kernels;
+constexpr pbd::Kernels MakeKernels(const char* name) {
+  return {name, GridStretch, Springs, Volumes, Bending, Bindings};
 }
 
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

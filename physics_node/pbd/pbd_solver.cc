@@ -14,11 +14,13 @@ constexpr float kLeastHeight = 0.3f;
 
 }  // namespace
 
-PbdSolver::PbdSolver(const PhysicsParams& params, TissueModel* model, ParticleStore* particles, const Kernels& kernels)
+PbdSolver::PbdSolver(const PhysicsParams& params, TissueModel* model, ParticleStore* particles,
+                     const pbd::Kernels& kernels, const tissue::Kernels& motion)
     : params_(params),
       model_(model),
       particles_(particles),
       kernels_(kernels),
+      motion_(motion),
       hinge_particles_(4 * model->hinge_particles().size()) {}
 
 GridArrays PbdSolver::Grid() const {
@@ -45,11 +47,11 @@ std::uint32_t PbdSolver::Predict() {
     settings.gravity[axis] = params_.gravity[axis] * params_.dt_s * params_.dt_s;
   }
   const std::uint32_t resets =
-      kernels_.integrate_xyzw(particles_->tube(), particles_->tube_previous(), particles_->tube_floats(), settings);
+      motion_.integrate_xyzw(particles_->tube(), particles_->tube_previous(), particles_->tube_floats(), settings);
   float* const now[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
   float* const previous[3] = {particles_->previous_plane(0), particles_->previous_plane(1),
                               particles_->previous_plane(2)};
-  return resets + kernels_.integrate(now, previous, particles_->plane(3), particles_->layout().plane(), settings);
+  return resets + motion_.integrate(now, previous, particles_->plane(3), particles_->layout().plane(), settings);
 }
 
 void PbdSolver::Iterate() {
@@ -59,8 +61,8 @@ void PbdSolver::Iterate() {
   if (!model_->bending().empty()) {
     Bend();
   }
-  const BindingStiffness binding{params_.k_binding, std::min(1.0f, kCompressionOverTension * params_.k_binding),
-                                 kLeastHeight};
+  const pbd::BindingStiffness binding{params_.k_binding, std::min(1.0f, kCompressionOverTension * params_.k_binding),
+                                      kLeastHeight};
   kernels_.bindings(particles_->pool(), model_->bindings().data(), model_->bindings().size(), binding);
 }
 
@@ -69,15 +71,12 @@ FinishResult PbdSolver::Finish() {
   float* const now[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
   const float* const previous[3] = {particles_->previous_plane(0), particles_->previous_plane(1),
                                     particles_->previous_plane(2)};
-  const FinishResult grid =
-      kernels_.finish(now, previous, particles_->plane(3), particles_->layout().plane(), kLimitSq);
+  const FinishResult grid = motion_.finish(now, previous, particles_->plane(3), particles_->layout().plane(), kLimitSq);
   const FinishResult tube =
-      kernels_.finish_xyzw(particles_->tube(), particles_->tube_previous(), particles_->tube_floats(), kLimitSq);
+      motion_.finish_xyzw(particles_->tube(), particles_->tube_previous(), particles_->tube_floats(), kLimitSq);
   return {std::max(grid.max_step_sq, tube.max_step_sq), grid.resets + tube.resets};
 }
 
 void PbdSolver::Stop() { particles_->StopAll(); }
-
-void PbdSolver::ComputeBlockBounds(const BlockBounds& bounds) const { kernels_.block_bounds(Grid(), bounds); }
 
 }  // namespace fulcrum::physics

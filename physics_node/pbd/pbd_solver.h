@@ -5,9 +5,10 @@
 #include <cstdint>
 
 #include "physics_node/pbd/kernels.h"
-#include "physics_node/pbd/particle_store.h"
-#include "physics_node/pbd/tissue_model.h"
-#include "services/core/scene_view.h"
+#include "physics_node/tissue/kernels.h"
+#include "physics_node/tissue/particle_store.h"
+#include "physics_node/tissue/tissue_model.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::physics {
 
@@ -18,7 +19,7 @@ class PbdSolver {
   static constexpr float kMaxStep = 0.03f;
 
   PbdSolver(const PhysicsParams& params, TissueModel* model, ParticleStore* particles,
-            const Kernels& kernels = BestKernels());
+            const pbd::Kernels& kernels = pbd::KernelsFor(), const tissue::Kernels& motion = tissue::KernelsFor());
 
   /// previous <- now; now <- now + damped velocity + gravity, for free particles.
   /// A coordinate damaged since the last step (not finite, far off) comes from the last step; returns how many.
@@ -32,17 +33,14 @@ class PbdSolver {
   /// Takes all velocities away.
   void Stop();
 
-  /// Bounds of the membrane's blocks of 8 x 8 cells in the present positions.
-  void ComputeBlockBounds(const BlockBounds& bounds) const;
-  [[nodiscard]] const Kernels& kernels() const { return kernels_; }
-
  private:
   [[nodiscard]] GridArrays Grid() const;
 
   PhysicsParams params_;
   TissueModel* model_;
   ParticleStore* particles_;
-  const Kernels& kernels_;
+  const pbd::Kernels& kernels_;
+  const tissue::Kernels& motion_;
   FloatArray hinge_particles_;  ///< xyzw copies of TissueModel::hinge_particles.
 };
 

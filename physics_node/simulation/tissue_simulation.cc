@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "physics_node/collision/row_projection.h"
-#include "services/core/hash.h"
+#include "services/base/core/hash.h"
 
 namespace fulcrum::physics {
 namespace {
@@ -45,13 +45,13 @@ bool TissueSimulation::ToolTrack::moved() const {
          now.jaw_rad != last.jaw_rad;
 }
 
-TissueSimulation::TissueSimulation(const SceneView& scene, int threads, const Kernels& kernels)
+TissueSimulation::TissueSimulation(const SceneView& scene, int threads, InstructionSet set)
     : scene_(scene),
       particles_(scene),
       model_(scene, &particles_),
-      solver_(scene.physics, &model_, &particles_, kernels),
-      collision_(scene, &model_, &particles_, &solver_),
-      tissue_collision_(scene, &model_, &particles_),
+      solver_(scene.physics, &model_, &particles_, pbd::KernelsFor(set), tissue::KernelsFor(set)),
+      collision_(scene, &model_, &particles_, collision::KernelsFor(set)),
+      tissue_collision_(scene, &model_, &particles_, collision::KernelsFor(set)),
       grasps_{Grasp(scene), Grasp(scene)},
       contacts_(scene, &model_, &particles_),
       cautery_(scene, &model_, &particles_),
@@ -59,10 +59,10 @@ TissueSimulation::TissueSimulation(const SceneView& scene, int threads, const Ke
   if (scene.physics.mode != PhysicsMode::kPaper) {
     const ElasticModel elastic = BuildElasticModel(scene);
     if (scene.physics.mode == PhysicsMode::kXpbd) {
-      xpbd_.emplace(elastic, &model_, &particles_);
+      xpbd_.emplace(elastic, &model_, &particles_, xpbd::KernelsFor(set), tissue::KernelsFor(set));
     } else {
-      accurate_.emplace(scene, elastic, model_, &particles_, threads);
-      effort_ = accurate::EffortOf(scene.physics.preset);
+      implicit_.emplace(scene, elastic, model_, &particles_, threads, implicit::KernelsFor(set));
+      effort_ = implicit::EffortOf(scene.physics.preset);
       most_substeps_ = std::max(kMostSubsteps, effort_.substeps);
       contacts_.AskSolver(&answers_);
     }
@@ -80,7 +80,7 @@ bool TissueSimulation::Answers::Stiffness(const Probe& probe, float horizon_s, f
     at_.push_back(simulation_->particles_.Ref(particle));
   }
   const std::size_t memory = 2 * probe.tool + (horizon_s > 0.0f ? 1 : 0);
-  return simulation_->accurate_->Stiffness({at_, probe.direction, horizon_s, memory}, newton_per_m);
+  return simulation_->implicit_->Stiffness({at_, probe.direction, horizon_s, memory}, newton_per_m);
 }
 
 void TissueSimulation::FollowTools(const std::array<ToolInput, kMaxTools>& tools) {
@@ -160,7 +160,7 @@ void TissueSimulation::PlaceHeld(float u) {
 
 /// Pairs of tools and tissue and of tissue with itself, for substeps of h.
 void TissueSimulation::FindAllContacts(float h) {
-  if (!accurate_) {
+  if (!implicit_) {
     FindContacts(true, largest_speed_ * h);
     FindTissueContacts();
     return;
@@ -168,7 +168,7 @@ void TissueSimulation::FindAllContacts(float h) {
   tissue_collision_.BeginPairs(moved_, step_begin_s(), simulated_time_s());
   // Those of the tools and of each part of a surface know nothing of one another.
   const int tasks = tissue_collision_.tasks();
-  accurate_->workers().Run(tasks + 1, 0, 1, [&](int task, int) {
+  implicit_->workers().Run(tasks + 1, 0, 1, [&](int task, int) {
     if (task < tasks) {
       tissue_collision_.FindPairsOf(task, moved_);
     } else {
@@ -191,7 +191,7 @@ StepReport TissueSimulation::StepXpbd() {
     tissue_collision_.Rows(u0, u1, &rows_);
     report.resets += xpbd_->Predict(h);
     PlaceHeld(u1);
-    for (const accurate::HeldPlace& held : held_places_) {
+    for (const implicit::HeldPlace& held : held_places_) {
       particles_.Set(held.at, held.place);
     }
     xpbd_->Iterate(h);
@@ -234,15 +234,15 @@ StepReport TissueSimulation::StepAccurate() {
       count > effort_.substeps ? std::min(effort_.iterations, kIterationsOfShort) : effort_.iterations;
   const auto substeps = static_cast<float>(count);
   const float h = scene_.physics.dt_s / substeps;
-  report.resets = accurate_->BeginStep();
-  const std::span<const float> moved = accurate_->moved();
+  report.resets = implicit_->BeginStep();
+  const std::span<const float> moved = implicit_->moved();
   moved_.assign(moved.begin(), moved.end());
   FindAllContacts(h);
   for (int i = 0; i < count; ++i) {
     const float u0 = static_cast<float>(i) / substeps, u1 = static_cast<float>(i + 1) / substeps;
     PlaceHeld(u1);
     constexpr int kParts = TissueCollision::kParts;
-    accurate_->workers().Run(kParts + 1, 0, 1, [&](int part, int) {
+    implicit_->workers().Run(kParts + 1, 0, 1, [&](int part, int) {
       if (part < kParts) {
         tissue_collision_.FindRows(part, u0, u1);
       } else {
@@ -250,7 +250,7 @@ StepReport TissueSimulation::StepAccurate() {
       }
     });
     tissue_collision_.JoinRows(&rows_);
-    const accurate::SubstepReport substep = accurate_->Substep(h, iterations, held_places_, rows_);
+    const implicit::SubstepReport substep = implicit_->Substep(h, iterations, held_places_, rows_);
     collision_.TakeForces(rows_);
     for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
       tool_force_[tool] += (collision_.force(tool) - tool_force_[tool]) / static_cast<float>(i + 1);
@@ -262,7 +262,7 @@ StepReport TissueSimulation::StepAccurate() {
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     Vec3f traction = Vec3f::Zero();
     for (const HeldParticle& held : grasps_[i].held()) {
-      traction += accurate_->ForceOn(particles_.Ref(held.particle));
+      traction += implicit_->ForceOn(particles_.Ref(held.particle));
     }
     if (grasps_[i].holding()) {
       tool_force_[i] = traction;
@@ -283,7 +283,7 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
     return {true, 0.0f, 0};
   }
   ++state_version_;
-  const StepReport report = accurate_ ? StepAccurate() : xpbd_ ? StepXpbd() : StepPaper();
+  const StepReport report = implicit_ ? StepAccurate() : xpbd_ ? StepXpbd() : StepPaper();
   quarantined_ += report.resets;
   WatchTears(report.max_step_m);
   MayFallAsleep(report, holds);
@@ -294,7 +294,7 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
 /// between near tearing and tearing.
 void TissueSimulation::WatchTears(float max_step_m) {
   const auto rows = scene_.membrane.rows;
-  if (accurate_) {
+  if (implicit_) {
     constexpr std::uint32_t kBlocks = ParticleStore::kBlocksPerRow;
     for (std::uint32_t row = 0; row < rows; ++row) {
       const float* of_row = moved_.data() + particles_.tube_blocks() + row * kBlocks;
@@ -307,15 +307,15 @@ void TissueSimulation::WatchTears(float max_step_m) {
 }
 
 void TissueSimulation::LetThreadsHelp(bool help) {
-  if (accurate_) {
-    accurate_->workers().LetHelp(help);
+  if (implicit_) {
+    implicit_->workers().LetHelp(help);
   }
 }
 
 std::uint32_t TissueSimulation::SetCheaper(std::uint32_t presets) {
-  const auto own = accurate_ ? static_cast<std::uint32_t>(scene_.physics.preset) : 0u;
+  const auto own = implicit_ ? static_cast<std::uint32_t>(scene_.physics.preset) : 0u;
   const std::uint32_t cheaper = std::min(presets, own);
-  effort_ = accurate::EffortOf(static_cast<PhysicsPreset>(own - cheaper));
+  effort_ = implicit::EffortOf(static_cast<PhysicsPreset>(own - cheaper));
   most_substeps_ = std::max(cheaper > 0 ? kLeastSubsteps : kMostSubsteps, effort_.substeps);
   return cheaper;
 }
@@ -323,8 +323,8 @@ std::uint32_t TissueSimulation::SetCheaper(std::uint32_t presets) {
 int TissueSimulation::ApplyTopology(const TopologyState& topology) {
   const int edits = model_.Apply(topology, &particles_);
   if (edits > 0) {
-    if (accurate_) {
-      accurate_->Follow(model_);
+    if (implicit_) {
+      implicit_->Follow(model_);
     }
     for (Grasp& grasp : grasps_) {
       grasp.DropDead(model_, &particles_);
@@ -354,7 +354,7 @@ DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
   if (std::exchange(contacts_step_[tool], steps_) + 1 < steps_) {
     contacts_.Forget(tool, tracks_[tool].now);
   }
-  return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool], accurate_ ? &tool_force_[tool] : nullptr);
+  return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool], implicit_ ? &tool_force_[tool] : nullptr);
 }
 
 CauteryContact TissueSimulation::Cautery(std::uint32_t tool) {
@@ -364,8 +364,8 @@ CauteryContact TissueSimulation::Cautery(std::uint32_t tool) {
 /// body(part, worker) for each of ParticleStore::kParts, shared by the threads that a solver has.
 template <class Body>
 void TissueSimulation::InParts(const Body& body) const {
-  if (accurate_) {
-    accurate_->workers().Run(ParticleStore::kParts, 0, body);
+  if (implicit_) {
+    implicit_->workers().Run(ParticleStore::kParts, 0, body);
     return;
   }
   for (int part = 0; part < ParticleStore::kParts; ++part) {
@@ -401,7 +401,7 @@ float TissueSimulation::MaxDisplacement() const {
 }
 
 float TissueSimulation::awake_part() const {
-  return asleep_ ? 0.0f : accurate_ ? accurate_->regions().awake_part() : 1.0f;
+  return asleep_ ? 0.0f : implicit_ ? implicit_->regions().awake_part() : 1.0f;
 }
 
 std::uint64_t TissueSimulation::StateHash() const {
@@ -462,10 +462,10 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
     }
   }
   particles_.SetAll(xyz, previous_xyz);
-  if (accurate_) {
+  if (implicit_) {
     for (Index p = 0; p < particles_.particle_count(); ++p) {
       const ParticleRef at = particles_.Ref(p);
-      accurate_->SetVelocity(at, (particles_.At(at) - particles_.Previous(at)) / scene_.physics.dt_s);
+      implicit_->SetVelocity(at, (particles_.At(at) - particles_.Previous(at)) / scene_.physics.dt_s);
     }
   }
   for (std::size_t i = 0; i < kMaxTools; ++i) {

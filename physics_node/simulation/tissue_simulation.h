@@ -7,12 +7,12 @@
 #include <span>
 #include <vector>
 
-#include "physics_node/accurate/accurate_solver.h"
 #include "physics_node/collision/tissue_collision.h"
 #include "physics_node/collision/tool_collision.h"
 #include "physics_node/contact_model/cautery_probe.h"
 #include "physics_node/contact_model/contact_probe.h"
 #include "physics_node/grasp/grasp.h"
+#include "physics_node/implicit/implicit_solver.h"
 #include "physics_node/pbd/pbd_solver.h"
 #include "physics_node/tear/tear_watch.h"
 #include "physics_node/xpbd/xpbd_solver.h"
@@ -48,7 +48,7 @@ class TissueSimulation {
   static constexpr float kMaxToolTurn = 6.0f;
 
   /// `threads` share a step of mode accurate; the state does not depend on it.
-  explicit TissueSimulation(const SceneView& scene, int threads = 1, const Kernels& kernels = BestKernels());
+  explicit TissueSimulation(const SceneView& scene, int threads = 1, InstructionSet set = BestInstructionSet());
 
   TissueSimulation(const TissueSimulation&) = delete;
   TissueSimulation& operator=(const TissueSimulation&) = delete;
@@ -149,11 +149,11 @@ class TissueSimulation {
   ParticleStore particles_;
   TissueModel model_;
   PbdSolver solver_;
-  std::optional<accurate::AccurateSolver> accurate_;  ///< In mode accurate.
+  std::optional<implicit::ImplicitSolver> implicit_;  ///< In mode accurate.
   std::optional<xpbd::XpbdSolver> xpbd_;              ///< In mode xpbd.
-  accurate::Effort effort_;
+  implicit::Effort effort_;
   int most_substeps_ = 1;  ///< While a tool that presses moves.
-  std::vector<accurate::HeldPlace> held_places_;
+  std::vector<implicit::HeldPlace> held_places_;
   std::vector<ContactRow> rows_;
   std::vector<float> moved_;  ///< Of each block of particles in the last step [m].
   std::array<Vec3f, kMaxTools> tool_force_{Vec3f::Zero(), Vec3f::Zero()};  ///< Of the tissue on a tool, mean over the

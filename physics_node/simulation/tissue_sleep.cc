@@ -33,7 +33,7 @@ bool TissueSimulation::BreathStirs() {
 /// Asleep: a tool comes to touch the tissue in this step. Where contacts are rows, one that is merely near does not: a
 /// jaw that closes around tissue, a tip that hovers over it.
 bool TissueSimulation::ToolsStir() {
-  if (!accurate_) {
+  if (!implicit_) {
     return !collision_.pairs().empty();
   }
   collision_.Rows(0.0f, 1.0f, &rows_);
@@ -58,14 +58,14 @@ bool TissueSimulation::MayRest() {
 
 /// After a step: nothing has moved for a while, and nothing works on it.
 void TissueSimulation::MayFallAsleep(const StepReport& report, bool holds) {
-  const bool worked_on = ToolsMove() && (accurate_ ? collision_.any_touching() : !collision_.pairs().empty());
+  const bool worked_on = ToolsMove() && (implicit_ ? collision_.any_touching() : !collision_.pairs().empty());
   still_steps_ = report.max_step_m < kStill && !holds && !worked_on && !tissue_collision_.breath_near()
                      ? still_steps_ + (report.max_step_m < kAtRest ? kStillSteps / kRestSteps : 1)
                      : 0;
   if (still_steps_ >= kStillSteps) {
     solver_.Stop();
-    if (accurate_) {
-      accurate_->Stop();
+    if (implicit_) {
+      implicit_->Stop();
     }
     if (xpbd_) {
       xpbd_->Stop();

@@ -21,9 +21,9 @@
 #include <span>
 #include <vector>
 
-#include "physics_node/pbd/particle_store.h"
-#include "physics_node/pbd/tissue_model.h"
-#include "services/core/scene_view.h"
+#include "physics_node/tissue/particle_store.h"
+#include "physics_node/tissue/tissue_model.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::physics {
 

@@ -8,7 +8,8 @@
 // 0.
 #pragma once
 
-#include "physics_node/pbd/kernels.h"
+#include "physics_node/simd/instruction_set.h"
+#include "physics_node/tissue/batches.h"
 
 namespace fulcrum::physics::xpbd {
 
@@ -42,7 +43,6 @@ struct Membrane {
 
 struct Kernels {
   const char* name;
-  physics::Kernels basic;  ///< Integration and the rest.
   void (*membrane)(const GridArrays& grid, const Membrane& membrane, float h_sq);
   void (*tets)(float* particles, const TetBatch* tets, const NeoHookeanBatch* material, std::size_t count, float h_sq);
   void (*hinges)(float* hinge_particles, const BendingBatch* hinges, const HingeBatch* material, std::size_t count,
@@ -50,10 +50,7 @@ struct Kernels {
   void (*bindings)(float* pool, const BindingBatch* bindings, const FatBatch* material, std::size_t count, float h_sq);
 };
 
-Kernels BaselineKernels();
-Kernels Avx2Kernels();
-Kernels Avx512Kernels();
-/// The widest kernels of this CPU.
-Kernels BestKernels();
+/// Those of an instruction set that this CPU has.
+const Kernels& KernelsFor(InstructionSet set = BestInstructionSet());
 
 }  // namespace fulcrum::physics::xpbd

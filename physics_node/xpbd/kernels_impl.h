@@ -1,7 +1,7 @@
 // Bodies of the XPBD kernels, compiled once per instruction set with FULCRUM_KERNEL_NAMESPACE set.
 #pragma once
 
-#include "physics_node/pbd/grid_sweep.h"
+#include "physics_node/tissue/grid_sweep.h"
 #include "physics_node/xpbd/kernels.h"
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
@@ -177,8 +177,8 @@ void BindingsXpbd(float* pool, const BindingBatch* bindings, const xpbd::FatBatc
                  __attribute__((always_inline)) { ProjectFat<decltype(lanes)>(pool, bindings[i], material[i], h_sq); });
 }
 
-xpbd::Kernels XpbdTable(const physics::Kernels& basic) {
-  return {basic.name, basic, MembraneXpbd, TetsXpbd, HingesXpbd, BindingsXpbd};
+constexpr xpbd::Kernels MakeKernels(const char* name) {
+  return {name, MembraneXpbd, TetsXpbd, HingesXpbd, BindingsXpbd};
 }
 
 }  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

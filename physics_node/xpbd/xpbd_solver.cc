@@ -13,10 +13,11 @@ constexpr double kFlattest = 1e4;
 }  // namespace
 
 XpbdSolver::XpbdSolver(const ElasticModel& model, const TissueModel* tissue, ParticleStore* particles,
-                       const Kernels& kernels)
+                       const Kernels& kernels, const tissue::Kernels& motion)
     : tissue_(tissue),
       particles_(particles),
       kernels_(kernels),
+      motion_(motion),
       damping_per_s_(static_cast<float>(model.damping_per_s)),
       gravity_(model.gravity.cast<float>()),
       tets_(tissue->tets().size(), NeoHookeanBatch{}),
@@ -108,9 +109,8 @@ std::uint32_t XpbdSolver::Predict(float h) {
   float* const previous[3] = {particles_->previous_plane(0), particles_->previous_plane(1),
                               particles_->previous_plane(2)};
   const std::uint32_t resets =
-      kernels_.basic.integrate_xyzw(particles_->tube(), particles_->tube_previous(), particles_->tube_floats(),
-                                    settings) +
-      kernels_.basic.integrate(now, previous, particles_->plane(3), particles_->layout().plane(), settings);
+      motion_.integrate_xyzw(particles_->tube(), particles_->tube_previous(), particles_->tube_floats(), settings) +
+      motion_.integrate(now, previous, particles_->plane(3), particles_->layout().plane(), settings);
   return resets;
 }
 
@@ -144,10 +144,9 @@ FinishResult XpbdSolver::Finish(float h) {
   float* const now[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
   const float* const previous[3] = {particles_->previous_plane(0), particles_->previous_plane(1),
                                     particles_->previous_plane(2)};
-  const FinishResult grid =
-      kernels_.basic.finish(now, previous, particles_->plane(3), particles_->layout().plane(), limit_sq);
+  const FinishResult grid = motion_.finish(now, previous, particles_->plane(3), particles_->layout().plane(), limit_sq);
   const FinishResult tube =
-      kernels_.basic.finish_xyzw(particles_->tube(), particles_->tube_previous(), particles_->tube_floats(), limit_sq);
+      motion_.finish_xyzw(particles_->tube(), particles_->tube_previous(), particles_->tube_floats(), limit_sq);
   return {std::max(grid.max_step_sq, tube.max_step_sq), grid.resets + tube.resets};
 }
 

@@ -9,8 +9,9 @@
 #include <vector>
 
 #include "physics_node/energy/elastic_model.h"
-#include "physics_node/pbd/particle_store.h"
-#include "physics_node/pbd/tissue_model.h"
+#include "physics_node/tissue/kernels.h"
+#include "physics_node/tissue/particle_store.h"
+#include "physics_node/tissue/tissue_model.h"
 #include "physics_node/xpbd/kernels.h"
 
 namespace fulcrum::physics::xpbd {
@@ -22,7 +23,7 @@ class XpbdSolver {
 
   /// Cuts and shrinking are read from `tissue` as they stand.
   XpbdSolver(const ElasticModel& model, const TissueModel* tissue, ParticleStore* particles,
-             const Kernels& kernels = BestKernels());
+             const Kernels& kernels = KernelsFor(), const tissue::Kernels& motion = tissue::KernelsFor());
 
   /// A substep of h seconds is Predict, Iterate, Finish; contacts and held particles are put right by the caller
   /// between them. Predict: previous <- now; now <- now + damped velocity + gravity, for free particles. The
@@ -41,7 +42,8 @@ class XpbdSolver {
 
   const TissueModel* tissue_;
   ParticleStore* particles_;
-  Kernels kernels_;
+  const Kernels& kernels_;
+  const tissue::Kernels& motion_;
   float damping_per_s_;
   Vec3f gravity_;
   std::array<FloatArray, 3> stiffness_;

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string_view>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "render_node/geometry/solid.h"
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
 

@@ -1,7 +1,7 @@
 // The laparoscope as a camera: where it looks, what its light does, how large its round picture is. Pure.
 #pragma once
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
 

@@ -1,6 +1,6 @@
 // The membrane as triangles to draw, with its cuts. Pure.
 //
-// Triangles over a slit fall into parts with ghost corners (services/core/slit_sheet.h); a part is drawn once.
+// Triangles over a slit fall into parts with ghost corners (services/base/core/slit_sheet.h); a part is drawn once.
 //
 // `side` is +1 at a part's own corners and -1 at its ghosts: the shader drops fragments where it is negative, and the
 // atlas decides texel by texel where the slit runs.
@@ -13,8 +13,8 @@
 #include <span>
 #include <vector>
 
-#include "services/core/scene_view.h"
-#include "services/core/slit_sheet.h"
+#include "services/base/core/scene_view.h"
+#include "services/base/core/slit_sheet.h"
 
 namespace fulcrum::render {
 

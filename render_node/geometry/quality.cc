@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::render {
 namespace {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::render {
 

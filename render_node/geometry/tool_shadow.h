@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "render_node/geometry/laparoscope.h"
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
 

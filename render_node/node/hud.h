@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "render_node/scene_graph/overlay.h"
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
 
 namespace fulcrum::render {
 

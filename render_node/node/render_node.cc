@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/core/generator_inputs.h"
+#include "services/base/core/generator_inputs.h"
 
 namespace fulcrum::render {
 namespace {

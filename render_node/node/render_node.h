@@ -14,8 +14,8 @@
 #include "render_node/node/hud.h"
 #include "render_node/node/stage.h"
 #include "render_node/offscreen/png_writer.h"
-#include "services/bus/port.h"
-#include "services/core/tick.h"
+#include "services/base/core/tick.h"
+#include "services/transport/bus/port.h"
 
 namespace fulcrum::render {
 

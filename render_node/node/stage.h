@@ -1,5 +1,5 @@
 // What is drawn and where: all of the render node's start that takes long, and nothing that needs the bus. A process
-// that waits in reserve has it ready (services/app/spare.h).
+// that waits in reserve has it ready (services/nodes/app/spare.h).
 #pragma once
 
 #include <memory>

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "render_node/offscreen/egl_context.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::render {
 namespace {

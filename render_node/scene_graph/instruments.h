@@ -6,7 +6,7 @@
 #include <osg/Group>
 #include <osg/MatrixTransform>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
 

@@ -18,7 +18,7 @@
 #include "render_node/scene_graph/smoke.h"
 #include "render_node/scene_graph/surroundings.h"
 #include "render_node/scene_graph/tissue_layers.h"
-#include "services/core/breathing.h"
+#include "services/base/core/breathing.h"
 
 namespace fulcrum::render {
 namespace {

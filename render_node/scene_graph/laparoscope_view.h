@@ -7,7 +7,7 @@
 
 #include "render_node/geometry/laparoscope.h"
 #include "render_node/scene_graph/overlay.h"
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::render {
 

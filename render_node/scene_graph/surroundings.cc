@@ -10,7 +10,7 @@
 #include "render_node/scene_graph/mesh.h"
 #include "render_node/scene_graph/order.h"
 #include "render_node/scene_graph/program.h"
-#include "services/core/breathing.h"
+#include "services/base/core/breathing.h"
 
 namespace fulcrum::render {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "services/assessment/assessor.h"
+#include "services/session/assessment/assessor.h"
 
 namespace fulcrum::test {
 

@@ -4,11 +4,11 @@
 #include <bit>
 #include <chrono>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/topics.h"
-#include "services/runtime/checkpoint.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/scene/scene_yaml.h"
+#include "services/base/runtime/checkpoint.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/scene/compiler/scene_yaml.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/topics.h"
 #include "tests/support/cart.h"
 
 namespace fulcrum::testing {

@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
 #include "tests/support/force_judge.h"
 
 namespace fulcrum::testing {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "haptics_node/kinematics/trocar.h"
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
 
 namespace fulcrum::testing {
 

@@ -14,10 +14,10 @@
 #include <stdexcept>
 #include <thread>
 
-#include "services/bus/access.h"
-#include "services/bus/dds/participant.h"
-#include "services/bus/input_account.h"
-#include "services/keys/key_folder.h"
+#include "services/transport/bus/access.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/input_account.h"
+#include "services/transport/keys/key_folder.h"
 #include "tests/support/cart.h"
 #include "tests/support/program.h"
 #include "tests/unit/bus/samples.h"

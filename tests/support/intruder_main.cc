@@ -10,10 +10,10 @@
 #include <cstdio>
 #include <thread>
 
-#include "services/bus/convert/cdr.h"
-#include "services/bus/dds/participant.h"
-#include "services/core/error.h"
-#include "services/core/exit_code.h"
+#include "services/base/core/error.h"
+#include "services/base/core/exit_code.h"
+#include "services/transport/bus/convert/cdr.h"
+#include "services/transport/bus/dds/participant.h"
 #include "tests/support/rogue.h"
 #include "tests/unit/bus/samples.h"
 

@@ -7,13 +7,13 @@
 #include <chrono>
 #include <thread>
 
-#include "services/bus/convert/cdr.h"
-#include "services/bus/dds/shared_memory.h"
-#include "services/bus/topics.h"
-#include "services/recording/mcap_reader.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/scene/build.h"
-#include "services/scene/scene_file.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/records/recording/mcap_reader.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/format/scene_file.h"
+#include "services/transport/bus/convert/cdr.h"
+#include "services/transport/bus/dds/shared_memory.h"
+#include "services/transport/bus/topics.h"
 #include "tests/support/cart.h"
 
 namespace fulcrum::testing {

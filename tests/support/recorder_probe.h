@@ -6,9 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/input_account.h"
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/input_account.h"
 #include "tests/support/program.h"
 
 namespace fulcrum::testing {

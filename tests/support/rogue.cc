@@ -21,11 +21,11 @@
 #include <thread>
 #include <vector>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/dds/security.h"
-#include "services/bus/input_account.h"
-#include "services/bus/topics.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/dds/security.h"
+#include "services/transport/bus/input_account.h"
+#include "services/transport/bus/topics.h"
 
 namespace fulcrum::testing {
 namespace {

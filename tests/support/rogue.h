@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "services/bus/security.h"
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
+#include "services/transport/bus/security.h"
 
 namespace fulcrum::testing {
 

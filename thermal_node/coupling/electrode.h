@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 #include "thermal_node/heat/sheet.h"
 
 namespace fulcrum::thermal {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/core/messages.h"
-#include "services/core/scene_view.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::thermal {
 

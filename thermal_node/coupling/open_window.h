@@ -1,7 +1,7 @@
 // The cells around the hook that are gone, for physics.
 #pragma once
 
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
 #include "thermal_node/heat/heat_field.h"
 
 namespace fulcrum::thermal {

@@ -8,7 +8,7 @@
 #include <array>
 #include <cstdint>
 
-#include "services/core/footprint.h"
+#include "services/base/core/footprint.h"
 #include "thermal_node/coupling/electrode.h"
 #include "thermal_node/coupling/film.h"
 #include "thermal_node/coupling/generator.h"

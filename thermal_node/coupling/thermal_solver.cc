@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "services/core/hash.h"
+#include "services/base/core/hash.h"
 
 namespace fulcrum::thermal {
 namespace {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 #include "thermal_node/coupling/cut_meter.h"
 #include "thermal_node/coupling/source_window.h"
 #include "thermal_node/coupling/tip_tracker.h"

@@ -1,8 +1,8 @@
 // Turns CauteryContact samples into the tip's path per frame.
 #pragma once
 
-#include "services/core/generator_inputs.h"
-#include "services/core/messages.h"
+#include "services/base/core/generator_inputs.h"
+#include "services/base/core/messages.h"
 #include "thermal_node/coupling/source_window.h"
 
 namespace fulcrum::thermal {

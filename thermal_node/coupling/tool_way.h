@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::thermal {
 

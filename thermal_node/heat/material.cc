@@ -3,7 +3,7 @@
 #include <cmath>
 #include <string>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::thermal {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::thermal {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::thermal {
 namespace {

@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::thermal {
 

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "services/runtime/realtime.h"
+#include "services/base/runtime/realtime.h"
 
 namespace fulcrum::thermal {
 namespace {

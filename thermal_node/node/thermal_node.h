@@ -5,14 +5,14 @@
 #include <cstdint>
 #include <utility>
 
-#include "services/bus/input_account.h"
-#include "services/bus/port.h"
-#include "services/core/generator_inputs.h"
-#include "services/core/messages.h"
-#include "services/core/scene_view.h"
-#include "services/core/tick.h"
-#include "services/runtime/checkpoint.h"
-#include "services/runtime/seqlock.h"
+#include "services/base/core/generator_inputs.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/scene_view.h"
+#include "services/base/core/tick.h"
+#include "services/base/runtime/checkpoint.h"
+#include "services/base/runtime/seqlock.h"
+#include "services/transport/bus/input_account.h"
+#include "services/transport/bus/port.h"
 #include "thermal_node/coupling/open_window.h"
 #include "thermal_node/coupling/patch.h"
 #include "thermal_node/coupling/thermal_solver.h"

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 #include "thermal_node/heat/heat_field.h"
 #include "thermal_node/paper/texture_potential.h"
 #include "thermal_node/topology/crumbs.h"

@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 #include "thermal_node/damage/arrhenius.h"
 #include "thermal_node/heat/heat_field.h"
 #include "thermal_node/volume/volume_field.h"

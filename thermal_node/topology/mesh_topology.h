@@ -16,7 +16,7 @@
 #include <span>
 #include <vector>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 #include "thermal_node/heat/heat_field.h"
 
 namespace fulcrum::thermal {

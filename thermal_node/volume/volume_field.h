@@ -12,7 +12,7 @@
 #include <span>
 #include <vector>
 
-#include "services/core/hash.h"
+#include "services/base/core/hash.h"
 #include "thermal_node/damage/arrhenius.h"
 #include "thermal_node/heat/sheet.h"
 #include "thermal_node/volume/brick.h"

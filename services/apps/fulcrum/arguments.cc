@@ -5,8 +5,8 @@
 #include <iostream>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
-#include "services/runtime/install_places.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/install_places.h"
 
 namespace fulcrum::supervisor::cli {
 namespace po = boost::program_options;

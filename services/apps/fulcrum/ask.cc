@@ -1,4 +1,4 @@
-#include "services/supervisor/ask.h"
+#include "services/session/supervisor/ask.h"
 
 #include <cstdio>
 

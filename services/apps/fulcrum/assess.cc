@@ -1,14 +1,13 @@
-#include "services/log_tools/assess.h"
-
 #include <cstdio>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/assessment/score.h"
-#include "services/core/error.h"
-#include "services/recording/recorded_scene.h"
-#include "services/scene/scene_file.h"
-#include "services/supervisor/score_sheet.h"
-#include "services/supervisor/session_folder.h"
+#include "services/base/core/error.h"
+#include "services/records/recording/recorded_scene.h"
+#include "services/scene/format/scene_file.h"
+#include "services/session/assessment/recorded_assessment.h"
+#include "services/session/assessment/score.h"
+#include "services/session/supervisor/score_sheet.h"
+#include "services/session/supervisor/session_folder.h"
 
 namespace fulcrum::supervisor::cli {
 namespace po = boost::program_options;
@@ -34,7 +33,7 @@ ExitCode Assess(const Words& words) {
                      ": give the compiled scene of that session with --scene");
   }
   const scene::SceneFile scene(file);
-  const log_tools::RecordedAssessment result = log_tools::Assess(recording, scene.view());
+  const assessment::RecordedAssessment result = assessment::AssessRecording(recording, scene.view());
   const ScoreSheet sheet{result.figures, assessment::Evaluate(scene.view().assessment, result.figures)};
   std::printf("session %s of \"%s\", %s s\n\n%s", result.session_id.c_str(), scene.view().name,
               Fixed(result.end_s, 1).c_str(), SheetTable(sheet).c_str());

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "services/core/exit_code.h"
+#include "services/base/core/exit_code.h"
 
 namespace fulcrum::supervisor::cli {
 

@@ -1,11 +1,11 @@
-#include "services/console/console.h"
+#include "services/session/console/console.h"
 
 #include <cstdio>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/config/cart.h"
-#include "services/core/error.h"
-#include "services/runtime/install_places.h"
+#include "services/base/config/cart.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/install_places.h"
 
 namespace fulcrum::supervisor::cli {
 

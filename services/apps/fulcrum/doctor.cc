@@ -17,14 +17,14 @@
 #include <thread>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/bus/dds/participant.h"
-#include "services/bus/dds/shared_memory.h"
-#include "services/config/cart.h"
-#include "services/core/error.h"
-#include "services/runtime/install_places.h"
-#include "services/runtime/realtime.h"
-#include "services/supervisor/domain_guard.h"
-#include "services/supervisor/scene_cache.h"
+#include "services/base/config/cart.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/install_places.h"
+#include "services/base/runtime/realtime.h"
+#include "services/session/supervisor/domain_guard.h"
+#include "services/session/supervisor/scene_cache.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/dds/shared_memory.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

@@ -3,7 +3,7 @@
 #include <thread>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/supervisor/domain_guard.h"
+#include "services/session/supervisor/domain_guard.h"
 
 namespace fulcrum::supervisor::cli {
 

@@ -1,6 +1,6 @@
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
-#include "services/supervisor/outcome.h"
+#include "services/base/core/error.h"
+#include "services/session/supervisor/outcome.h"
 
 namespace fulcrum::supervisor::cli {
 

@@ -1,9 +1,9 @@
-#include "services/supervisor/host.h"
+#include "services/session/supervisor/host.h"
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
-#include "services/link/options.h"
-#include "services/runtime/install_places.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/install_places.h"
+#include "services/transport/link/options.h"
 
 namespace fulcrum::supervisor::cli {
 

@@ -2,10 +2,10 @@
 #include <ctime>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/bus/topics.h"
-#include "services/core/error.h"
-#include "services/keys/authority.h"
-#include "services/keys/key_folder.h"
+#include "services/base/core/error.h"
+#include "services/transport/bus/topics.h"
+#include "services/transport/keys/authority.h"
+#include "services/transport/keys/key_folder.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

@@ -6,13 +6,13 @@
 #include <limits>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
-#include "services/log_tools/cut_map.h"
-#include "services/log_tools/cut_picture.h"
-#include "services/log_tools/tools.h"
-#include "services/recording/recorded_scene.h"
-#include "services/scene/scene_file.h"
-#include "services/supervisor/session_folder.h"
+#include "services/base/core/error.h"
+#include "services/records/log_tools/cut_map.h"
+#include "services/records/log_tools/cut_picture.h"
+#include "services/records/log_tools/tools.h"
+#include "services/records/recording/recorded_scene.h"
+#include "services/scene/format/scene_file.h"
+#include "services/session/supervisor/session_folder.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

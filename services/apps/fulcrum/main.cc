@@ -3,10 +3,10 @@
 #include <cstdio>
 #include <cstring>
 
-#include "services/app/version.h"
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
-#include "services/runtime/realtime.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/realtime.h"
+#include "services/nodes/app/version.h"
 
 namespace fulcrum::supervisor::cli {
 

@@ -5,9 +5,9 @@
 #include <sstream>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/config/cart.h"
-#include "services/core/error.h"
-#include "services/scene/scene_yaml.h"
+#include "services/base/config/cart.h"
+#include "services/base/core/error.h"
+#include "services/scene/compiler/scene_yaml.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

@@ -1,5 +1,5 @@
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::supervisor::cli {
 

@@ -1,10 +1,10 @@
-#include "services/soak/soak.h"
+#include "services/session/soak/soak.h"
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
-#include "services/runtime/install_places.h"
-#include "services/runtime/realtime.h"
-#include "services/supervisor/scene_cache.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/install_places.h"
+#include "services/base/runtime/realtime.h"
+#include "services/session/supervisor/scene_cache.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

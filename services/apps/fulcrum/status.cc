@@ -3,9 +3,9 @@
 #include <thread>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
-#include "services/supervisor/domain_guard.h"
-#include "services/supervisor/session_view.h"
+#include "services/base/core/error.h"
+#include "services/session/supervisor/domain_guard.h"
+#include "services/session/supervisor/session_view.h"
 
 namespace fulcrum::supervisor::cli {
 

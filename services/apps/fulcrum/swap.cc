@@ -1,8 +1,8 @@
 #include <boost/program_options/parsers.hpp>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
-#include "services/runtime/install_places.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/install_places.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

@@ -1,7 +1,7 @@
 // fulcrum test-node: one node, headless, against a recorded log. The program `replayer` holds the node classes, so it
 // makes the test.
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

@@ -1,10 +1,10 @@
 #include <cstdio>
 
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
-#include "services/supervisor/session_folder.h"
-#include "services/supervisor/trainee_view.h"
-#include "services/supervisor/training_log.h"
+#include "services/base/core/error.h"
+#include "services/session/supervisor/session_folder.h"
+#include "services/session/supervisor/trainee_view.h"
+#include "services/session/supervisor/training_log.h"
 
 namespace fulcrum::supervisor::cli {
 namespace po = boost::program_options;

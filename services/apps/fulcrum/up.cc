@@ -1,10 +1,10 @@
 #include "services/apps/fulcrum/commands.h"
-#include "services/core/error.h"
-#include "services/link/options.h"
-#include "services/runtime/install_places.h"
-#include "services/supervisor/scene_cache.h"
-#include "services/supervisor/supervisor.h"
-#include "services/supervisor/training_log.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/install_places.h"
+#include "services/session/supervisor/scene_cache.h"
+#include "services/session/supervisor/supervisor.h"
+#include "services/session/supervisor/training_log.h"
+#include "services/transport/link/options.h"
 
 namespace fulcrum::supervisor::cli {
 namespace {

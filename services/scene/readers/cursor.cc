@@ -1,7 +1,7 @@
 #include "services/scene/readers/cursor.h"
 
-#include "services/core/error.h"
-#include "services/scene/mesh_io.h"
+#include "services/base/core/error.h"
+#include "services/scene/readers/mesh_io.h"
 
 namespace fulcrum::scene {
 namespace {

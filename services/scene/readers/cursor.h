@@ -14,7 +14,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 
 namespace fulcrum::scene {
 

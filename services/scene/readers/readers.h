@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
-#include "services/scene/mesh_io.h"
 #include "services/scene/readers/cursor.h"
+#include "services/scene/readers/mesh_io.h"
 
 namespace fulcrum::scene {
 

@@ -2,8 +2,8 @@
 
 #include <zlib.h>
 
-#include "services/scene/mesh_io.h"
 #include "services/scene/readers/cursor.h"
+#include "services/scene/readers/mesh_io.h"
 
 namespace fulcrum::scene {
 namespace {

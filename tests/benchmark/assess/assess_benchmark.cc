@@ -3,7 +3,7 @@
 #include <cmath>
 #include <map>
 
-#include "services/assessment/assessor.h"
+#include "services/session/assessment/assessor.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/assessment_cases.h"
 

@@ -22,9 +22,9 @@
 #include <thread>
 #include <vector>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/dds/shared_memory.h"
-#include "services/bus/input_account.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/dds/shared_memory.h"
+#include "services/transport/bus/input_account.h"
 #include "tests/benchmark/report.h"
 
 namespace fulcrum::bus {

@@ -1,4 +1,4 @@
-// The cut of live sessions, measured from their recordings alone (services/log_tools/cut_map.h).
+// The cut of live sessions, measured from their recordings alone (services/records/log_tools/cut_map.h).
 //
 //   bench_cut [--quick] [--session N] [--keep DIR] [PREFIX]
 //

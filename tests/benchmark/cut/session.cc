@@ -13,12 +13,12 @@
 #include <sstream>
 #include <thread>
 
-#include "services/core/error.h"
-#include "services/log_tools/cut_picture.h"
-#include "services/log_tools/recording.h"
-#include "services/runtime/checkpoint.h"
-#include "services/scene/compile.h"
-#include "services/scene/scene_file.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/checkpoint.h"
+#include "services/records/log_tools/cut_picture.h"
+#include "services/records/log_tools/recording.h"
+#include "services/scene/compiler/compile.h"
+#include "services/scene/format/scene_file.h"
 #include "tests/support/cart.h"
 #include "tests/support/program.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "services/log_tools/cut_map.h"
+#include "services/records/log_tools/cut_map.h"
 #include "tests/benchmark/cut/stroke.h"
 
 namespace fulcrum::benchmark {

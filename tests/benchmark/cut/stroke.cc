@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "haptics_node/kinematics/trocar.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::benchmark {
 namespace {

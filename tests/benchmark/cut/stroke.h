@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "haptics_node/device/recorded_motion.h"
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::benchmark {
 

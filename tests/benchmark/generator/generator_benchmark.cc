@@ -11,9 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/input_account.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/input_account.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
 #include "tests/support/cart_watch.h"

@@ -15,8 +15,8 @@
 #include "handle_bridge/node/handle_bridge_node.h"
 #include "handle_bridge/node/jaw_channel.h"
 #include "handle_bridge/simulation/jaw_firmware.h"
-#include "services/bus/in_process.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/transport/bus/in_process.h"
 #include "tests/benchmark/handle/cases.h"
 #include "tests/unit/handle/jaw_truth.h"
 

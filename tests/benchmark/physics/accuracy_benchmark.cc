@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/benchmark/physics/baselines/mass_spring.h"
 #include "tests/benchmark/physics/baselines/projective_dynamics.h"
 #include "tests/benchmark/report.h"

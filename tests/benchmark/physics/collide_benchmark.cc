@@ -6,7 +6,7 @@
 #include "physics_node/collision/tissue_collision.h"
 #include "physics_node/contact_model/cautery_probe.h"
 #include "physics_node/contact_model/surface_curvature.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/benchmark/report.h"
 #include "tests/numerics/physics/script_player.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/benchmark/physics/baselines/textbook_pbd.h"
 #include "tests/benchmark/report.h"
 #include "tests/numerics/physics/script_player.h"
@@ -218,7 +218,7 @@ int main(int argc, char** argv) {
   scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
   data.fixed.physics.mode = PhysicsMode::kPaper;
   const SceneView scene = data.View();
-  std::fprintf(stderr, "physics: kernels %s, 1 thread\n", physics::BestKernels().name);
+  std::fprintf(stderr, "physics: kernels %s, 1 thread\n", physics::pbd::KernelsFor().name);
   if (report.Wants("physics.paper_mode.")) {
     physics::Step(scene, &report);
     physics::ScriptedStep(scene, &report);

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/benchmark/report.h"
 #include "tests/numerics/physics/script_player.h"
 

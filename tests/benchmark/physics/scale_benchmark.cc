@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "services/scene/colouring.h"
-#include "services/scene/scene_file.h"
+#include "services/scene/format/colouring.h"
+#include "services/scene/format/scene_file.h"
 #include "tests/benchmark/report.h"
 #include "tests/numerics/physics/accurate_under_test.h"
 

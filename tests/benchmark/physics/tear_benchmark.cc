@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "physics_node/tear/tear_watch.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/benchmark/report.h"
 #include "tests/numerics/cut/strip_pull.h"
 

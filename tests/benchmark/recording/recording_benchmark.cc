@@ -16,10 +16,10 @@
 #include <sstream>
 #include <thread>
 
-#include "services/log_tools/sequence_gaps.h"
-#include "services/log_tools/tools.h"
-#include "services/recorder/recorder.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/records/log_tools/sequence_gaps.h"
+#include "services/records/log_tools/tools.h"
+#include "services/records/recorder/recorder.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
 #include "tests/support/recorder_probe.h"

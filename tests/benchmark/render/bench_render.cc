@@ -18,7 +18,7 @@
 #include "render_node/offscreen/egl_context.h"
 #include "render_node/scene_graph/atlas_texture.h"
 #include "render_node/scene_graph/display.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/benchmark/report.h"
 #include "tests/integration/render/node_bus.h"
 #include "tests/integration/render/synthetic_scene.h"

@@ -15,8 +15,8 @@
 #include <thread>
 #include <vector>
 
-#include "services/bus/dds/shared_memory.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/transport/bus/dds/shared_memory.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
 #include "tests/support/cart_watch.h"

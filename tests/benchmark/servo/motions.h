@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "services/core/messages.h"
-#include "services/core/tick.h"
-#include "services/core/types.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/tick.h"
+#include "services/base/core/types.h"
 #include "tests/unit/haptics/test_tissue.h"
 
 namespace fulcrum::haptics {

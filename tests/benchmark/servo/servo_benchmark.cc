@@ -31,8 +31,8 @@
 
 #include "haptics_node/node/haptics_node.h"
 #include "haptics_node/servo/servo.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/runtime/realtime.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/base/runtime/realtime.h"
 #include "tests/benchmark/report.h"
 #include "tests/benchmark/servo/force_plot.h"
 #include "tests/benchmark/servo/motions.h"

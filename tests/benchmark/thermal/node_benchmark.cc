@@ -6,7 +6,7 @@
 #include <numeric>
 #include <vector>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/benchmark/thermal/thermal_cases.h"
 #include "tests/unit/thermal/node_bus.h"
 #include "thermal_node/coupling/patch.h"

@@ -2,7 +2,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "services/runtime/realtime.h"
+#include "services/base/runtime/realtime.h"
 #include "tests/benchmark/thermal/paper_cases.h"
 #include "tests/benchmark/thermal/picture.h"
 #include "tests/benchmark/thermal/thermal_cases.h"

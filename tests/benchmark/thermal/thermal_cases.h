@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 #include "tests/benchmark/report.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "thermal_node/coupling/thermal_solver.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "tests/numerics/thermal/volume_cases.h"
 

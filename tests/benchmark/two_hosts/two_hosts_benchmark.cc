@@ -16,7 +16,7 @@
 #include <thread>
 #include <vector>
 
-#include "services/link/codec/tissue_codec.h"
+#include "services/transport/link/codec/tissue_codec.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
 #include "tests/support/working_scene.h"

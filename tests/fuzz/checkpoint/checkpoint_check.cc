@@ -5,9 +5,9 @@
 #include <cstring>
 
 #include "physics_node/node/physics_checkpoint.h"
-#include "services/bus/gate.h"
-#include "services/scene/build.h"
-#include "services/scene/scene_yaml.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/compiler/scene_yaml.h"
+#include "services/transport/bus/gate.h"
 #include "tests/numerics/physics/script_player.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "thermal_node/coupling/thermal_solver.h"

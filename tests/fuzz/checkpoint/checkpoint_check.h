@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "services/scene/scene_file.h"
+#include "services/scene/format/scene_file.h"
 
 namespace fulcrum::testing {
 

@@ -11,7 +11,7 @@
 #include <random>
 #include <string>
 
-#include "services/core/sanitizers.h"
+#include "services/base/core/sanitizers.h"
 #include "tests/fuzz/checkpoint/checkpoint_check.h"
 
 namespace fulcrum {

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "services/console/router.h"
-#include "services/console/screen_text.h"
+#include "services/session/console/router.h"
+#include "services/session/console/screen_text.h"
 
 namespace fulcrum::console::testing {
 

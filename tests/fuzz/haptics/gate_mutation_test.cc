@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "haptics_node/servo/model_gate.h"
-#include "services/core/sanitizers.h"
+#include "services/base/core/sanitizers.h"
 #include "tests/fuzz/haptics/gate_check.h"
 
 namespace fulcrum::haptics {

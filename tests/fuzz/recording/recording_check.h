@@ -10,10 +10,10 @@
 #include <span>
 #include <string>
 
-#include "services/core/error.h"
-#include "services/log_tools/recording.h"
-#include "services/log_tools/tools.h"
-#include "services/recording/mcap_index.h"
+#include "services/base/core/error.h"
+#include "services/records/log_tools/recording.h"
+#include "services/records/log_tools/tools.h"
+#include "services/records/recording/mcap_index.h"
 
 namespace fulcrum::log_tools {
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 #include "tests/unit/scene/mesh_samples.h"
 
 namespace fulcrum::scene {

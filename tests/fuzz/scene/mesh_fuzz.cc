@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 #include "tests/fuzz/scene/mesh_check.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -6,14 +6,14 @@
 set -euo pipefail
 build=$1
 forbidden='eprosima|fastrtps|fastdds|fastcdr|osg::|YAML::|fulcrum::idl::|fulcrum::app::|boost::'
-nodes=(physics_node thermal_node haptics_node handle_bridge render_node services/assessment)
+nodes=(physics_node thermal_node haptics_node handle_bridge render_node services/session/assessment)
 checked=0
 failed=0
 for node in "${nodes[@]}"; do
   while IFS= read -r archive; do
     name=$(basename "$archive" .a)
     case "$name" in
-      libfulcrum_"$node" | libfulcrum_handle_bridge_serial | libfulcrum_render_node_*) continue ;;
+      libfulcrum_recorded_assessment | libfulcrum_"$node" | libfulcrum_handle_bridge_serial | libfulcrum_render_node_*) continue ;;
     esac
     checked=$((checked + 1))
     if hits=$(nm -C "$archive" 2>/dev/null | grep -E "$forbidden" | head -n 5) && [ -n "$hits" ]; then

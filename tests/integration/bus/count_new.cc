@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <new>
 
-#include "services/core/sanitizers.h"
+#include "services/base/core/sanitizers.h"
 
 namespace {
 constinit thread_local long new_calls = 0;

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <limits>
 
-#include "services/bus/dds/abandoned_mutex.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
+#include "services/transport/bus/dds/abandoned_mutex.h"
 #include "tests/integration/bus/count_new.h"
 #include "tests/integration/bus/support.h"
 #include "tests/support/rogue.h"
@@ -89,7 +89,7 @@ TEST(DdsInput, WhatWritersAndReadersShareIsLockedByUs) {
   ASSERT_TRUE(bus.out->Write(test::Sample<TissueFrame>(1)));
   TissueFrame got;
   ASSERT_TRUE(Eventually([&] { return bus.in->TakeNext(&got); }));
-  EXPECT_GT(dds::SharedLocks().locked, before) << "see services/bus/dds/abandoned_mutex.h";
+  EXPECT_GT(dds::SharedLocks().locked, before) << "see services/transport/bus/dds/abandoned_mutex.h";
 }
 
 TEST(DdsInput, BytesThatAreNoMessageAreRefusedAndHoldNothingUp) {

@@ -7,8 +7,8 @@
 #include <string>
 #include <thread>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/input_account.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/input_account.h"
 #include "tests/unit/bus/samples.h"
 
 namespace fulcrum::bus {

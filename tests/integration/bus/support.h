@@ -13,8 +13,8 @@
 #include <thread>
 #include <vector>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/dds/shared_memory.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/dds/shared_memory.h"
 
 namespace fulcrum::bus::test {
 

@@ -10,8 +10,8 @@
 #include <string>
 #include <thread>
 
-#include "services/console/http_server.h"
-#include "services/console/session_run.h"
+#include "services/session/console/http_server.h"
+#include "services/session/console/session_run.h"
 #include "tests/support/cart.h"
 #include "tests/support/http_client.h"
 

@@ -14,8 +14,8 @@
 #include "handle_bridge/node/handle_bridge_node.h"
 #include "handle_bridge/serial/serial_port.h"
 #include "handle_bridge/serial/simulated_firmware.h"
-#include "services/bus/in_process.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/transport/bus/in_process.h"
 
 namespace fulcrum::handle_bridge {
 namespace {

@@ -16,12 +16,12 @@
 #include <vector>
 
 #include "haptics_node/node/trocar_store.h"
-#include "services/bus/dds/participant.h"
-#include "services/bus/input_account.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/scene/build.h"
-#include "services/scene/scene_file.h"
-#include "services/scene/scene_settings.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/builder/scene_settings.h"
+#include "services/scene/format/scene_file.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/input_account.h"
 #include "tests/support/program.h"
 #include "tests/unit/haptics/swing.h"
 

@@ -7,13 +7,13 @@
 #include <fstream>
 #include <thread>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/dds/shared_memory.h"
-#include "services/bus/input_account.h"
-#include "services/bus/topics.h"
-#include "services/link/link.h"
-#include "services/link/scene_transfer.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/dds/shared_memory.h"
+#include "services/transport/bus/input_account.h"
+#include "services/transport/bus/topics.h"
+#include "services/transport/link/link.h"
+#include "services/transport/link/scene_transfer.h"
 #include "tests/integration/bus/support.h"
 #include "tests/unit/bus/samples.h"
 #include "tests/unit/link/wire.h"

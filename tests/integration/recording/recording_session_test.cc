@@ -3,8 +3,8 @@
 
 #include <map>
 
-#include "services/bus/gate.h"
-#include "services/log_tools/tools.h"
+#include "services/records/log_tools/tools.h"
+#include "services/transport/bus/gate.h"
 #include "tests/support/cart.h"
 #include "tests/support/recorder_probe.h"
 

@@ -15,8 +15,8 @@
 #include <filesystem>
 #include <string>
 
-#include "services/core/exit_code.h"
-#include "services/scene/build.h"
+#include "services/base/core/exit_code.h"
+#include "services/scene/builder/build.h"
 #include "tests/integration/render/synthetic_scene.h"
 
 namespace fulcrum::render {

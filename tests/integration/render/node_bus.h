@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "render_node/node/render_node.h"
-#include "services/bus/in_process.h"
+#include "services/transport/bus/in_process.h"
 
 namespace fulcrum::render {
 

@@ -10,7 +10,7 @@
 #include "render_node/geometry/solid.h"
 #include "render_node/offscreen/png_writer.h"
 #include "render_node/scene_graph/display.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/integration/render/synthetic_scene.h"
 
 namespace fulcrum::render {

@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/integration/render/node_bus.h"
 #include "tests/integration/render/synthetic_scene.h"
 

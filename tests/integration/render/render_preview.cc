@@ -8,8 +8,8 @@
 
 #include "render_node/offscreen/png_writer.h"
 #include "render_node/scene_graph/display.h"
-#include "services/scene/build.h"
-#include "services/scene/scene_file.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/format/scene_file.h"
 #include "tests/integration/render/synthetic_scene.h"
 
 int main(int argc, char** argv) {

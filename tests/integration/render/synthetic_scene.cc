@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "render_node/geometry/membrane_mesh.h"
-#include "services/core/operator_script.h"
+#include "services/base/core/operator_script.h"
 
 namespace fulcrum::render {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::render {
 

@@ -6,12 +6,12 @@
 #include <optional>
 #include <vector>
 
-#include "services/bus/convert/cdr.h"
-#include "services/bus/dds/participant.h"
-#include "services/bus/dds/shared_memory.h"
-#include "services/bus/topics.h"
-#include "services/recording/mcap_reader.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/records/recording/mcap_reader.h"
+#include "services/transport/bus/convert/cdr.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/dds/shared_memory.h"
+#include "services/transport/bus/topics.h"
 #include "tests/integration/replay/short_session.h"
 #include "tests/support/cart.h"
 #include "tests/support/program.h"

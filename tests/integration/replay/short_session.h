@@ -7,8 +7,8 @@
 #include <functional>
 #include <string>
 
-#include "services/scene/build.h"
-#include "services/scene/scene_file.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/format/scene_file.h"
 #include "tests/unit/replay/recorded_cart.h"
 
 namespace fulcrum::replay::testing {

@@ -21,11 +21,11 @@
 #include <string_view>
 #include <thread>
 
-#include "services/bus/access.h"
-#include "services/bus/dds/shared_memory.h"
-#include "services/bus/topics.h"
-#include "services/core/error.h"
-#include "services/keys/key_folder.h"
+#include "services/base/core/error.h"
+#include "services/transport/bus/access.h"
+#include "services/transport/bus/dds/shared_memory.h"
+#include "services/transport/bus/topics.h"
+#include "services/transport/keys/key_folder.h"
 #include "tests/support/cart.h"
 #include "tests/support/intruder.h"
 #include "tests/support/program.h"

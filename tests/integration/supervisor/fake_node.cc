@@ -10,10 +10,10 @@
 #include <string>
 #include <thread>
 
-#include "services/app/node_app.h"
-#include "services/app/spare.h"
-#include "services/core/error.h"
-#include "services/runtime/realtime.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/realtime.h"
+#include "services/nodes/app/node_app.h"
+#include "services/nodes/app/spare.h"
 
 namespace {
 

@@ -15,14 +15,14 @@
 #include <thread>
 #include <vector>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/input_account.h"
-#include "services/core/messages.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/scene/build.h"
-#include "services/scene/scene_file.h"
-#include "services/supervisor/child_process.h"
-#include "services/supervisor/node_process.h"
+#include "services/base/core/messages.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/format/scene_file.h"
+#include "services/session/supervisor/child_process.h"
+#include "services/session/supervisor/node_process.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/input_account.h"
 
 namespace fulcrum::supervisor {
 namespace {

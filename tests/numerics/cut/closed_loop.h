@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "physics_node/simulation/tissue_simulation.h"
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 #include "thermal_node/coupling/thermal_solver.h"
 #include "thermal_node/coupling/tip_tracker.h"
 

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "thermal_node/topology/crumbs.h"
 
 namespace fulcrum::cut {

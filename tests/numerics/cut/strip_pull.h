@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "services/scene/scene_file.h"
+#include "services/scene/format/scene_file.h"
 
 namespace fulcrum::cut {
 

@@ -1,7 +1,7 @@
 // The accurate mode as a thing to be measured: the preset of the scene, without tools.
 #pragma once
 
-#include "physics_node/accurate/accurate_solver.h"
+#include "physics_node/implicit/implicit_solver.h"
 #include "tests/numerics/physics/store_solver.h"
 
 namespace fulcrum::physics {
@@ -10,7 +10,7 @@ class AccurateUnderTest final : public StoreSolver {
  public:
   explicit AccurateUnderTest(const SceneView& scene, int threads = 1)
       : StoreSolver(scene),
-        effort_(accurate::EffortOf(scene.physics.preset)),
+        effort_(implicit::EffortOf(scene.physics.preset)),
         solver_(scene, BuildElasticModel(scene), tissue_, &particles_, threads) {}
 
   void Step() override {
@@ -39,9 +39,9 @@ class AccurateUnderTest final : public StoreSolver {
   }
   void TopologyChanged() override { solver_.Follow(tissue_); }
 
-  accurate::Effort effort_;
-  accurate::AccurateSolver solver_;
-  std::vector<accurate::HeldPlace> targets_;
+  implicit::Effort effort_;
+  implicit::ImplicitSolver solver_;
+  std::vector<implicit::HeldPlace> targets_;
   std::vector<Vec3f> begin_;  ///< Of the held particles at the start of the step.
 };
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "services/scene/scene_file.h"
+#include "services/scene/format/scene_file.h"
 #include "tests/numerics/physics/reference/static_solver.h"
 
 namespace fulcrum::physics {

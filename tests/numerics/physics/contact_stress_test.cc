@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "physics_node/collision/closest.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/physics/script_player.h"
 
 namespace fulcrum::physics {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/physics/script_player.h"
 #include "tests/numerics/physics/tissue_validator.h"
 

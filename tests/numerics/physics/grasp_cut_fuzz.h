@@ -8,7 +8,7 @@
 #include <string>
 
 #include "physics_node/simulation/tissue_simulation.h"
-#include "services/scene/scene_file.h"
+#include "services/scene/format/scene_file.h"
 
 namespace fulcrum::physics {
 

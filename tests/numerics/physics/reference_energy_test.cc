@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/physics/reference/explicit_dynamics.h"
 #include "tests/numerics/physics/reference/static_solver.h"
 

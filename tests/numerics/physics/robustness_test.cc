@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/physics/accurate_under_test.h"
 #include "tests/numerics/physics/paper_solver.h"
 #include "tests/numerics/physics/reference/elastic_energy.h"

@@ -4,8 +4,8 @@
 #include <array>
 
 #include "physics_node/simulation/tissue_simulation.h"
-#include "services/core/operator_script.h"
-#include "services/core/scene_view.h"
+#include "services/base/core/operator_script.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::physics {
 

@@ -1,7 +1,7 @@
 // The shipped scenes under their scripts: a tent that a person would believe, nothing that explodes, rest afterwards.
 #include <gtest/gtest.h>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/physics/script_player.h"
 
 namespace fulcrum::physics {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/physics/accurate_under_test.h"
 
 namespace fulcrum::physics {

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::physics {
 

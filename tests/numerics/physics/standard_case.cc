@@ -7,7 +7,7 @@
 #include <fstream>
 #include <future>
 
-#include "services/core/hash.h"
+#include "services/base/core/hash.h"
 #include "tests/numerics/physics/reference/explicit_dynamics.h"
 #include "tests/numerics/physics/reference/static_solver.h"
 

@@ -14,7 +14,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "services/scene/scene_file.h"
+#include "services/scene/format/scene_file.h"
 #include "tests/numerics/physics/reference/elastic_energy.h"
 #include "tests/numerics/physics/solver_under_test.h"
 

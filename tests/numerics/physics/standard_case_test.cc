@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/physics/paper_solver.h"
 #include "tests/numerics/physics/reference/explicit_dynamics.h"
 

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "physics_node/pbd/particle_store.h"
-#include "physics_node/pbd/tissue_model.h"
+#include "physics_node/tissue/particle_store.h"
+#include "physics_node/tissue/tissue_model.h"
 #include "tests/numerics/physics/solver_under_test.h"
 
 namespace fulcrum::physics {

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/physics/script_player.h"
 
 namespace fulcrum::physics {

@@ -1,7 +1,7 @@
 // Current of an electrode into a leaky sheet without borders, by other means than the solver's.
 #pragma once
 
-#include "services/core/types.h"
+#include "services/base/core/types.h"
 #include "thermal_node/heat/material.h"
 
 namespace fulcrum::thermal {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "services/scene/scene_file.h"
+#include "services/scene/format/scene_file.h"
 #include "thermal_node/coupling/thermal_solver.h"
 
 namespace fulcrum::thermal {

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "services/core/sanitizers.h"
+#include "services/base/core/sanitizers.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "tests/numerics/thermal/topology_validator.h"
 

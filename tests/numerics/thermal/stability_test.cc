@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "tests/numerics/thermal/heat_cases.h"
 #include "thermal_node/coupling/tip_tracker.h"

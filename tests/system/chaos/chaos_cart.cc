@@ -14,8 +14,8 @@
 #include <thread>
 #include <vector>
 
-#include "services/core/sanitizers.h"
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/core/sanitizers.h"
+#include "services/base/runtime/cyclic_thread.h"
 #include "tests/support/working_scene.h"
 
 namespace fulcrum::testing {

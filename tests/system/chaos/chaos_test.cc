@@ -9,8 +9,8 @@
 #include <numeric>
 #include <string>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/dds/shared_memory.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/dds/shared_memory.h"
 #include "tests/system/chaos/chaos_cart.h"
 #include "tests/system/chaos/small_room.h"
 

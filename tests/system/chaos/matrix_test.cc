@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-#include "services/bus/dds/shared_memory.h"
+#include "services/transport/bus/dds/shared_memory.h"
 #include "tests/system/chaos/chaos_cart.h"
 #include "tests/system/chaos/small_room.h"
 

@@ -17,10 +17,10 @@
 #include <string>
 #include <thread>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/input_account.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/scene/scene_yaml.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/scene/compiler/scene_yaml.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/input_account.h"
 #include "tests/support/cart.h"
 #include "tests/support/force_judge.h"
 

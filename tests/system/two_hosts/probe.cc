@@ -12,10 +12,10 @@
 #include <cstring>
 #include <thread>
 
-#include "services/bus/dds/participant.h"
-#include "services/bus/dds/shared_memory.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/runtime/realtime.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/base/runtime/realtime.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/dds/shared_memory.h"
 
 using namespace fulcrum;  // NOLINT(google-build-using-namespace): a program of one page.
 

@@ -10,8 +10,8 @@
 #include <fstream>
 #include <thread>
 
-#include "services/keys/key_folder.h"
-#include "services/link/codec/tissue_codec.h"
+#include "services/transport/keys/key_folder.h"
+#include "services/transport/link/codec/tissue_codec.h"
 #include "tests/support/cart.h"
 #include "tests/support/working_scene.h"
 

@@ -6,9 +6,9 @@
 #include <thread>
 
 #include "haptics_node/node/haptics_node.h"
-#include "services/bus/in_process.h"
-#include "services/runtime/cyclic_thread.h"
-#include "services/runtime/realtime.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/base/runtime/realtime.h"
+#include "services/transport/bus/in_process.h"
 #include "tests/unit/haptics/rig.h"
 
 namespace fulcrum::haptics {

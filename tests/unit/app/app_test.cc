@@ -2,9 +2,9 @@
 
 #include <limits>
 
-#include "services/app/health_report.h"
-#include "services/app/node_app.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
+#include "services/nodes/app/health_report.h"
+#include "services/nodes/app/node_app.h"
 
 namespace fulcrum::app {
 namespace {

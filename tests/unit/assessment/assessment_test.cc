@@ -5,8 +5,8 @@
 #include <cmath>
 #include <set>
 
-#include "services/assessment/assessor.h"
-#include "services/assessment/smoothness.h"
+#include "services/session/assessment/assessor.h"
+#include "services/session/assessment/smoothness.h"
 #include "tests/support/assessment_cases.h"
 
 namespace fulcrum::assessment {

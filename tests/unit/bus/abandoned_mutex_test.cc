@@ -1,5 +1,5 @@
 // Mutexes of dead and of sleeping owners, in memory that two processes share.
-#include "services/bus/dds/abandoned_mutex.h"
+#include "services/transport/bus/dds/abandoned_mutex.h"
 
 #include <gtest/gtest.h>
 #include <pthread.h>

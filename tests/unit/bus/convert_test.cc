@@ -1,5 +1,5 @@
 // Our types to bytes on the wire and back.
-#include "services/bus/convert/convert.h"
+#include "services/transport/bus/convert/convert.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "services/bus/convert/generated_types.h"
-#include "services/bus/gate.h"
-#include "services/bus/schema.h"
-#include "services/core/message_fields.h"
+#include "services/base/core/message_fields.h"
+#include "services/transport/bus/convert/generated_types.h"
+#include "services/transport/bus/gate.h"
+#include "services/transport/bus/schema.h"
 #include "tests/unit/bus/message_types.h"
 #include "tests/unit/bus/same.h"
 #include "tests/unit/bus/samples.h"

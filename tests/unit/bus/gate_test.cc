@@ -1,4 +1,4 @@
-#include "services/bus/gate.h"
+#include "services/transport/bus/gate.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "services/core/message_fields.h"
+#include "services/base/core/message_fields.h"
 #include "tests/unit/bus/message_types.h"
 #include "tests/unit/bus/samples.h"
 

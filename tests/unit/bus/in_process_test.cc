@@ -1,4 +1,4 @@
-#include "services/bus/in_process.h"
+#include "services/transport/bus/in_process.h"
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
 
 namespace fulcrum::bus::test {
 

@@ -1,7 +1,7 @@
 // Equality of messages in every field. Beside the messages, so that argument lookup finds it.
 #pragma once
 
-#include "services/core/message_difference.h"
+#include "services/base/core/message_difference.h"
 
 namespace fulcrum {
 

@@ -2,7 +2,7 @@
 // its way shows.
 #pragma once
 
-#include "services/core/messages.h"
+#include "services/base/core/messages.h"
 
 namespace fulcrum::bus::test {
 

@@ -1,4 +1,4 @@
-#include "services/bus/dds/shared_memory.h"
+#include "services/transport/bus/dds/shared_memory.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -8,8 +8,8 @@
 #include <cstdio>
 #include <fstream>
 
-#include "services/bus/security.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
+#include "services/transport/bus/security.h"
 
 namespace fulcrum::bus {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/runtime/checkpoint.h"
+#include "services/base/runtime/checkpoint.h"
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::runtime {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/config/cart.h"
+#include "services/base/config/cart.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::config {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/config/strict_yaml.h"
+#include "services/base/config/strict_yaml.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -8,7 +8,7 @@
 #include <fstream>
 #include <functional>
 
-#include "services/config/units.h"
+#include "services/base/config/units.h"
 
 namespace fulcrum::config {
 namespace {

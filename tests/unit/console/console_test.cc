@@ -8,15 +8,15 @@
 #include <fstream>
 #include <string>
 
-#include "services/console/access.h"
-#include "services/console/advice.h"
-#include "services/console/form.h"
-#include "services/console/library.h"
-#include "services/console/page.h"
-#include "services/console/router.h"
-#include "services/console/screen_text.h"
-#include "services/console/session_run.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
+#include "services/session/console/access.h"
+#include "services/session/console/advice.h"
+#include "services/session/console/form.h"
+#include "services/session/console/library.h"
+#include "services/session/console/page.h"
+#include "services/session/console/router.h"
+#include "services/session/console/screen_text.h"
+#include "services/session/console/session_run.h"
 
 namespace fulcrum::console {
 namespace {

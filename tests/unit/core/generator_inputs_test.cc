@@ -1,4 +1,4 @@
-#include "services/core/generator_inputs.h"
+#include "services/base/core/generator_inputs.h"
 
 #include <gtest/gtest.h>
 

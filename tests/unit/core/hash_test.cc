@@ -1,4 +1,4 @@
-#include "services/core/hash.h"
+#include "services/base/core/hash.h"
 
 #include <gtest/gtest.h>
 

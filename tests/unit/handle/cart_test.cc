@@ -11,7 +11,7 @@
 
 #include "handle_bridge/node/calibration_store.h"
 #include "handle_bridge/node/cart_links.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::handle_bridge {
 namespace {

@@ -10,7 +10,7 @@
 #include "handle_bridge/node/handle_bridge_node.h"
 #include "handle_bridge/protocol/pedal_line.h"
 #include "handle_bridge/simulation/jaw_firmware.h"
-#include "services/bus/in_process.h"
+#include "services/transport/bus/in_process.h"
 
 namespace fulcrum::handle_bridge {
 namespace {

@@ -14,7 +14,7 @@
 #include "haptics_node/node/calibrate_trocar.h"
 #include "haptics_node/node/haptics_node.h"
 #include "haptics_node/node/trocar_store.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 #include "tests/unit/haptics/node_bus.h"
 #include "tests/unit/haptics/rig.h"
 #include "tests/unit/haptics/swing.h"

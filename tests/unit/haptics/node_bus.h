@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "haptics_node/node/haptics_node.h"
-#include "services/bus/in_process.h"
+#include "services/transport/bus/in_process.h"
 
 namespace fulcrum::haptics::testing {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "haptics_node/device/recorded_motion.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 #include "tests/unit/haptics/swing.h"
 
 namespace fulcrum::haptics {

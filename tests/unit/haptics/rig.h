@@ -6,7 +6,7 @@
 
 #include "haptics_node/device/haptic_device.h"
 #include "haptics_node/servo/servo.h"
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::haptics::testing {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "haptics_node/device/simulated_device.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 #include "tests/unit/haptics/loop.h"
 #include "tests/unit/haptics/rig.h"
 #include "tests/unit/haptics/test_tissue.h"

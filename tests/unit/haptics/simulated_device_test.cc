@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "services/core/operator_script.h"
+#include "services/base/core/operator_script.h"
 #include "tests/unit/haptics/rig.h"
 
 namespace fulcrum::haptics {

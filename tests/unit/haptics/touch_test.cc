@@ -11,7 +11,7 @@
 
 #include "haptics_node/device/touch_device.h"
 #include "haptics_node/device/touch_driver.h"
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 #include "tests/unit/haptics/rig.h"
 #include "tests/unit/haptics/touch_rig.h"
 

@@ -1,10 +1,10 @@
-#include "services/link/codec/byte_delta.h"
+#include "services/transport/link/codec/byte_delta.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "services/link/codec/bits.h"
+#include "services/transport/link/codec/bits.h"
 
 namespace fulcrum::link {
 namespace {
@@ -62,7 +62,7 @@ TEST(Bits, OfAnyWidth) {
     Buffer bytes;
     PutBits(values, width, &bytes);
     std::vector<std::uint32_t> got(values.size());
-    recording::ByteReader reader(bytes);
+    ByteReader reader(bytes);
     ASSERT_TRUE(TakeBits(&reader, width, got));
     EXPECT_TRUE(reader.empty());
     EXPECT_EQ(got, values) << width;
@@ -74,12 +74,12 @@ TEST(Bits, VarintsAndZigzag) {
     EXPECT_EQ(Unzigzag(Zigzag(value)), value);
     Buffer bytes;
     PutVarint(Zigzag(value), &bytes);
-    recording::ByteReader reader(bytes);
+    ByteReader reader(bytes);
     EXPECT_EQ(TakeVarint(&reader), Zigzag(value));
     EXPECT_TRUE(reader.good() && reader.empty());
   }
   const Buffer too_long{0xff, 0xff, 0xff, 0xff, 0xff, 0x01};
-  recording::ByteReader reader(too_long);
+  ByteReader reader(too_long);
   EXPECT_EQ(TakeVarint(&reader), 0u);
   EXPECT_FALSE(reader.good());
 }

@@ -1,4 +1,4 @@
-#include "services/link/codec/clock_filter.h"
+#include "services/transport/link/codec/clock_filter.h"
 
 #include <gtest/gtest.h>
 

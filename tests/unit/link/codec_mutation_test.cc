@@ -4,9 +4,9 @@
 
 #include <random>
 
-#include "services/bus/gate.h"
-#include "services/link/codec/byte_delta.h"
-#include "services/link/codec/packet.h"
+#include "services/transport/bus/gate.h"
+#include "services/transport/link/codec/byte_delta.h"
+#include "services/transport/link/codec/packet.h"
 #include "tests/unit/link/wire.h"
 
 namespace fulcrum::link {

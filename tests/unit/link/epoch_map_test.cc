@@ -1,4 +1,4 @@
-#include "services/link/epoch_map.h"
+#include "services/transport/link/epoch_map.h"
 
 #include <gtest/gtest.h>
 

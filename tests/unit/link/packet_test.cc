@@ -1,8 +1,8 @@
-#include "services/link/codec/packet.h"
+#include "services/transport/link/codec/packet.h"
 
 #include <gtest/gtest.h>
 
-#include "services/link/codec/byte_delta.h"
+#include "services/transport/link/codec/byte_delta.h"
 
 namespace fulcrum::link {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/link/codec/tissue_codec.h"
+#include "services/transport/link/codec/tissue_codec.h"
 
 #include <gtest/gtest.h>
 

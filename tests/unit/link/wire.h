@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "services/link/codec/patch_codec.h"
-#include "services/link/codec/tissue_codec.h"
+#include "services/transport/link/codec/patch_codec.h"
+#include "services/transport/link/codec/tissue_codec.h"
 
 namespace fulcrum::link::test {
 

@@ -1,5 +1,5 @@
 // Holes whose course, length and width are known.
-#include "services/log_tools/cut_map.h"
+#include "services/records/log_tools/cut_map.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 #include <numbers>
 #include <random>
 
-#include "services/log_tools/centre_line.h"
-#include "services/log_tools/cut_picture.h"
-#include "services/log_tools/mask.h"
+#include "services/records/log_tools/centre_line.h"
+#include "services/records/log_tools/cut_picture.h"
+#include "services/records/log_tools/mask.h"
 
 namespace fulcrum::log_tools {
 namespace {

@@ -9,13 +9,13 @@
 #include <map>
 #include <random>
 
-#include "services/bus/convert/cdr.h"
-#include "services/bus/schema.h"
-#include "services/bus/topics.h"
-#include "services/core/error.h"
-#include "services/log_tools/cut_map.h"
-#include "services/log_tools/deformed_sheet.h"
-#include "services/recording/mcap_writer.h"
+#include "services/base/core/error.h"
+#include "services/records/log_tools/cut_map.h"
+#include "services/records/log_tools/deformed_sheet.h"
+#include "services/records/recording/mcap_writer.h"
+#include "services/transport/bus/convert/cdr.h"
+#include "services/transport/bus/schema.h"
+#include "services/transport/bus/topics.h"
 #include "tests/support/assessment_cases.h"
 
 namespace fulcrum::log_tools {

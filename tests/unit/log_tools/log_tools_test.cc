@@ -7,12 +7,12 @@
 #include <limits>
 #include <sstream>
 
-#include "services/bus/schema.h"
-#include "services/core/error.h"
-#include "services/log_tools/text.h"
-#include "services/log_tools/tools.h"
-#include "services/recording/mcap_index.h"
-#include "services/recording/mcap_writer.h"
+#include "services/base/core/error.h"
+#include "services/records/log_tools/text.h"
+#include "services/records/log_tools/tools.h"
+#include "services/records/recording/mcap_index.h"
+#include "services/records/recording/mcap_writer.h"
+#include "services/transport/bus/schema.h"
 #include "tests/unit/bus/same.h"
 #include "tests/unit/bus/samples.h"
 

@@ -6,16 +6,16 @@
 #include <limits>
 #include <vector>
 
-#include "physics_node/accurate/accurate_solver.h"
-#include "physics_node/accurate/workers.h"
-#include "services/scene/build.h"
+#include "physics_node/implicit/implicit_solver.h"
+#include "physics_node/implicit/workers.h"
+#include "services/scene/builder/build.h"
 
 namespace fulcrum::physics {
 namespace {
 
-using accurate::AccurateSolver;
-using accurate::HeldPlace;
-using accurate::SubstepReport;
+using implicit::HeldPlace;
+using implicit::ImplicitSolver;
+using implicit::SubstepReport;
 
 constexpr float kH = 0.005f;
 constexpr int kIterations = 2;
@@ -25,7 +25,7 @@ class Accurate : public testing::Test {
   Accurate() : data_(scene::BuildProcedural(scene::Small())), scene_(data_.View()) {}
 
   struct Run {
-    explicit Run(const SceneView& scene, const accurate::Kernels& kernels = accurate::BestKernels(), int threads = 1)
+    explicit Run(const SceneView& scene, const implicit::Kernels& kernels = implicit::KernelsFor(), int threads = 1)
         : particles(scene),
           tissue(scene, &particles),
           solver(scene, BuildElasticModel(scene), tissue, &particles, threads, kernels) {}
@@ -43,7 +43,7 @@ class Accurate : public testing::Test {
 
     ParticleStore particles;
     TissueModel tissue;
-    AccurateSolver solver;
+    ImplicitSolver solver;
   };
 
   /// A few nodes in the middle of the membrane, held and `up` metres above their place at rest.
@@ -89,28 +89,22 @@ class Accurate : public testing::Test {
 };
 
 TEST_F(Accurate, SameBitsOnEveryInstructionSet) {
-  std::vector<const accurate::Kernels*> sets{&accurate::BaselineKernels()};
-  if (__builtin_cpu_supports("avx2")) {
-    sets.push_back(&accurate::Avx2Kernels());
-  }
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq")) {
-    sets.push_back(&accurate::Avx512Kernels());
-  }
   std::vector<std::vector<float>> results;
-  for (const accurate::Kernels* kernels : sets) {
-    Run run(scene_, *kernels);
+  for (const InstructionSet set : kInstructionSets) {
+    if (!Has(set)) continue;
+    Run run(scene_, implicit::KernelsFor(set));
     for (int i = 0; i < 12; ++i) {
       run.Step(Patch(&run, 0.001f * static_cast<float>(i)));
     }
     results.push_back(run.Positions());
-    EXPECT_EQ(results.back(), results.front()) << kernels->name;
+    EXPECT_EQ(results.back(), results.front()) << implicit::KernelsFor(set).name;
   }
 }
 
 TEST_F(Accurate, SameBitsOnAnyNumberOfThreads) {
   std::vector<std::vector<float>> results;
   for (const int threads : {1, 2, 3, 2}) {
-    Run run(scene_, accurate::BestKernels(), threads);
+    Run run(scene_, implicit::KernelsFor(), threads);
     for (int i = 0; i < 30; ++i) {
       run.Step(Patch(&run, 0.0005f * static_cast<float>(i)));
     }
@@ -120,7 +114,7 @@ TEST_F(Accurate, SameBitsOnAnyNumberOfThreads) {
 }
 
 TEST(Workers, DoEachTaskOnce) {
-  accurate::Workers workers(3);
+  implicit::Workers workers(3);
   std::vector<std::atomic<int>> done(200);
   for (int phase = 0; phase < 2000; ++phase) {
     const int tasks = phase % 200;

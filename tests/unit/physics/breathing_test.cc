@@ -1,5 +1,5 @@
 // A wall that breathes down to the tissue and up again, in mode accurate.
-#include "services/core/breathing.h"
+#include "services/base/core/breathing.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "physics_node/node/physics_checkpoint.h"
 #include "physics_node/simulation/tissue_simulation.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 
 namespace fulcrum::physics {
 namespace {

@@ -1,5 +1,5 @@
 // The factor of the coarse matrix against a dense solve, on every instruction set, and what it leaves out.
-#include "physics_node/accurate/coarse_factor.h"
+#include "physics_node/implicit/coarse_factor.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <numeric>
 #include <vector>
 
-namespace fulcrum::physics::accurate {
+namespace fulcrum::physics::implicit {
 namespace {
 
 constexpr int kNodes = 37;  // 111 rows: the last block of sixteen is not full.
@@ -58,9 +58,9 @@ TEST(CoarseFactor, SolvesAsADenseOneInAnyOrder) {
   std::iota(as_numbered.begin(), as_numbered.end(), 0u);
   for (const auto& order : {as_numbered, AlongChain()}) {
     CoarseFactor factor(order);
-    ASSERT_TRUE(factor.Take(BaselineKernels(), matrix));
+    ASSERT_TRUE(factor.Take(KernelsFor(InstructionSet::kBaseline), matrix));
     FloatArray x = RightSide();
-    factor.Solve(BaselineKernels(), x.data());
+    factor.Solve(KernelsFor(InstructionSet::kBaseline), x.data());
     for (Eigen::Index i = 0; i < right.size(); ++i) {
       EXPECT_NEAR(x[static_cast<std::size_t>(4 * (i / 3) + i % 3)], exact[i], 1e-4 * exact.norm());
     }
@@ -70,52 +70,50 @@ TEST(CoarseFactor, SolvesAsADenseOneInAnyOrder) {
 
 TEST(CoarseFactor, IsTheSameOnEveryInstructionSet) {
   CoarseFactor baseline(AlongChain());
-  ASSERT_TRUE(baseline.Take(BaselineKernels(), Chain(4)));
+  ASSERT_TRUE(baseline.Take(KernelsFor(InstructionSet::kBaseline), Chain(4)));
   FloatArray narrow = RightSide();
-  baseline.Solve(BaselineKernels(), narrow.data());
-  std::vector<const Kernels*> sets{&BestKernels()};
-  if (__builtin_cpu_supports("avx2")) {
-    sets.push_back(&Avx2Kernels());
-  }
-  for (const Kernels* kernels : sets) {
+  baseline.Solve(KernelsFor(InstructionSet::kBaseline), narrow.data());
+  for (const InstructionSet set : kInstructionSets) {
+    if (!Has(set)) continue;
+    const Kernels& kernels = KernelsFor(set);
     CoarseFactor factor(AlongChain());
-    ASSERT_TRUE(factor.Take(*kernels, Chain(4)));
+    ASSERT_TRUE(factor.Take(kernels, Chain(4)));
     FloatArray wide = RightSide();
-    factor.Solve(*kernels, wide.data());
-    EXPECT_TRUE(std::equal(narrow.data(), narrow.data() + narrow.size(), wide.data())) << kernels->name;
+    factor.Solve(kernels, wide.data());
+    EXPECT_TRUE(std::equal(narrow.data(), narrow.data() + narrow.size(), wide.data())) << kernels.name;
   }
 }
 
 TEST(CoarseFactor, LeavesOutBlocksOfZeros) {
   CoarseFactor banded(AlongChain()), whole(AlongChain());
-  ASSERT_TRUE(banded.Take(BaselineKernels(), Chain(4)));
-  ASSERT_TRUE(whole.Take(BaselineKernels(), Chain(kNodes)));
+  ASSERT_TRUE(banded.Take(KernelsFor(InstructionSet::kBaseline), Chain(4)));
+  ASSERT_TRUE(whole.Take(KernelsFor(InstructionSet::kBaseline), Chain(kNodes)));
   EXPECT_EQ(whole.block_count(), 7u * 8u / 2u);
   EXPECT_EQ(banded.block_count(), 7u + 6u) << "a band within 15 rows reaches into the next block only";
 }
 
 TEST(CoarseFactor, KeepsTheLastFactorWhenTheMatrixIsNone) {
   CoarseFactor factor(AlongChain());
-  ASSERT_TRUE(factor.Take(BaselineKernels(), Chain(4)));
+  ASSERT_TRUE(factor.Take(KernelsFor(InstructionSet::kBaseline), Chain(4)));
   FloatArray before = RightSide(), after = RightSide();
-  factor.Solve(BaselineKernels(), before.data());
+  factor.Solve(KernelsFor(InstructionSet::kBaseline), before.data());
   Eigen::MatrixXf bad = Chain(4);
   bad(5, 5) = -1.0f;
-  EXPECT_FALSE(factor.Take(BaselineKernels(), bad));
+  EXPECT_FALSE(factor.Take(KernelsFor(InstructionSet::kBaseline), bad));
   bad(5, 5) = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_FALSE(factor.Take(BaselineKernels(), bad));
-  factor.Solve(BaselineKernels(), after.data());
+  EXPECT_FALSE(factor.Take(KernelsFor(InstructionSet::kBaseline), bad));
+  factor.Solve(KernelsFor(InstructionSet::kBaseline), after.data());
   EXPECT_TRUE(std::equal(before.data(), before.data() + before.size(), after.data()));
 }
 
 TEST(CoarseFactor, IsTheSameWhenItIsMadeAFewColumnsAtATime) {
   using Progress = CoarseFactor::Progress;
   CoarseFactor at_once(AlongChain()), by_parts(AlongChain());
-  ASSERT_TRUE(at_once.Take(BaselineKernels(), Chain(4)));
-  ASSERT_TRUE(by_parts.Take(BaselineKernels(), Chain(2)));
+  ASSERT_TRUE(at_once.Take(KernelsFor(InstructionSet::kBaseline), Chain(4)));
+  ASSERT_TRUE(by_parts.Take(KernelsFor(InstructionSet::kBaseline), Chain(2)));
   FloatArray wanted = RightSide(), old = RightSide();
-  at_once.Solve(BaselineKernels(), wanted.data());
-  by_parts.Solve(BaselineKernels(), old.data());
+  at_once.Solve(KernelsFor(InstructionSet::kBaseline), wanted.data());
+  by_parts.Solve(KernelsFor(InstructionSet::kBaseline), old.data());
   Eigen::MatrixXf bad = Chain(4);
   bad(5, 5) = -1.0f;
   for (const Eigen::MatrixXf& matrix : {bad, Chain(4)}) {
@@ -123,9 +121,9 @@ TEST(CoarseFactor, IsTheSameWhenItIsMadeAFewColumnsAtATime) {
     int parts = 0;
     for (; progress == Progress::kMore; ++parts) {
       FloatArray x = RightSide();
-      by_parts.Solve(BaselineKernels(), x.data());
+      by_parts.Solve(KernelsFor(InstructionSet::kBaseline), x.data());
       EXPECT_TRUE(std::equal(x.data(), x.data() + x.size(), old.data())) << "in force until the next one is whole";
-      progress = by_parts.Continue(BaselineKernels(), matrix, 2);
+      progress = by_parts.Continue(KernelsFor(InstructionSet::kBaseline), matrix, 2);
     }
     if (matrix(5, 5) < 0) {
       EXPECT_EQ(progress, Progress::kRefused);
@@ -135,9 +133,9 @@ TEST(CoarseFactor, IsTheSameWhenItIsMadeAFewColumnsAtATime) {
     EXPECT_EQ(parts, 4) << "of seven columns";
   }
   FloatArray x = RightSide();
-  by_parts.Solve(BaselineKernels(), x.data());
+  by_parts.Solve(KernelsFor(InstructionSet::kBaseline), x.data());
   EXPECT_TRUE(std::equal(x.data(), x.data() + x.size(), wanted.data()));
 }
 
 }  // namespace
-}  // namespace fulcrum::physics::accurate
+}  // namespace fulcrum::physics::implicit

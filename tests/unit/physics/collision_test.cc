@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "physics_node/simulation/tissue_simulation.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics {

@@ -1,5 +1,5 @@
 // Gradients against finite differences, and what one projection must satisfy.
-#include "physics_node/pbd/constraints.h"
+#include "physics_node/tissue/constraints.h"
 
 #include <gtest/gtest.h>
 
@@ -114,7 +114,7 @@ TEST(Bending, TellsUpFromDown) {
 }
 
 TEST(Bending, HasTheSignOfTheScene) {
-  // services/core/scene_view.h: from n1 = (x1-x0) x (x2-x0) to n2 = (x3-x0) x (x1-x0) about x1 - x0.
+  // services/base/core/scene_view.h: from n1 = (x1-x0) x (x2-x0) to n2 = (x3-x0) x (x1-x0) about x1 - x0.
   const Points<4> x = Hinge(0.4);
   const Vec n1 = (x[1] - x[0]).cross(x[2] - x[0]), n2 = (x[3] - x[0]).cross(x[1] - x[0]);
   const double angle = std::atan2(n1.cross(n2).dot((x[1] - x[0]).normalized()), n1.dot(n2));

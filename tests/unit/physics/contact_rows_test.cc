@@ -3,7 +3,7 @@
 
 #include <tuple>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/unit/physics/row_player.h"
 #include "tests/unit/physics/sheet_scene.h"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "services/bus/in_process.h"
+#include "services/transport/bus/in_process.h"
 
 namespace fulcrum::physics {
 namespace {

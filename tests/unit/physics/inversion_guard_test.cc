@@ -1,6 +1,6 @@
 // The guard against inverted tetrahedra: silent on sound tissue; its force is the gradient of its energy, its matrix
 // never below the second derivative.
-#include "physics_node/accurate/inversion_guard.h"
+#include "physics_node/implicit/inversion_guard.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 namespace fulcrum::physics {
 namespace {
 
-using accurate::InversionGuard;
+using implicit::InversionGuard;
 
 constexpr std::size_t kVertices = 5;
 /// Millimetres: the size of the organ's tetrahedra.

@@ -1,10 +1,14 @@
 // The kernels' source compiled with lanes that are plain loops: the oracle of the vector kernels.
 #pragma once
 
+#include "physics_node/collision/kernels.h"
 #include "physics_node/pbd/kernels.h"
+#include "physics_node/tissue/kernels.h"
 
-namespace fulcrum::physics {
+namespace fulcrum::physics::scalar {
 
-const Kernels& ScalarKernels();
+extern const tissue::Kernels kMotion;
+extern const pbd::Kernels kConstraints;
+extern const collision::Kernels kCollision;
 
-}  // namespace fulcrum::physics
+}  // namespace fulcrum::physics::scalar

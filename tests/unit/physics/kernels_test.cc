@@ -6,11 +6,11 @@
 #include <cstring>
 #include <random>
 
-#include "physics_node/pbd/constraints.h"
-#include "physics_node/pbd/particle_store.h"
 #include "physics_node/pbd/pbd_solver.h"
-#include "physics_node/pbd/tissue_model.h"
-#include "services/scene/build.h"
+#include "physics_node/tissue/constraints.h"
+#include "physics_node/tissue/particle_store.h"
+#include "physics_node/tissue/tissue_model.h"
+#include "services/scene/builder/build.h"
 #include "tests/unit/physics/kernels_scalar.h"
 #include "tests/unit/physics/sheet_scene.h"
 
@@ -166,7 +166,7 @@ TEST_P(GridStretch, IsTheGaussSeidelSweepThatItSays) {
                         {vector.model.rest(0), vector.model.rest(1), vector.model.rest(2)},
                         static_cast<int>(layout.rows),
                         static_cast<int>(layout.slots)};
-  BestKernels().grid_stretch(grid, 0.9f);
+  pbd::KernelsFor().grid_stretch(grid, 0.9f);
   EXPECT_LT(LargestDifference(Positions(plain.particles), Positions(vector.particles)), kTolerance);
 }
 
@@ -178,7 +178,7 @@ TEST(Kernels, SpringsVolumesBendingBindingsMatchThePlainConstraints) {
   const scene::SceneData data = scene::BuildProcedural(scene::Small());
   const SceneView view = data.View();
   constexpr float k = 0.6f;
-  const Kernels& kernels = BestKernels();
+  const pbd::Kernels& kernels = pbd::KernelsFor();
   {
     Body plain(view), vector(view);
     Shake(&plain.particles, 0.0004f, 6);
@@ -250,8 +250,8 @@ TEST(Bindings, DoNotLetTheOrganThroughTheMembrane) {
     }
   }
   for (int i = 0; i < 20; ++i) {
-    BestKernels().bindings(body.particles.pool(), body.model.bindings().data(), body.model.bindings().size(),
-                           {0.01f, 0.1f, 0.3f});
+    pbd::KernelsFor().bindings(body.particles.pool(), body.model.bindings().data(), body.model.bindings().size(),
+                               {0.01f, 0.1f, 0.3f});
   }
   for (const BindingBatch& batch : body.model.bindings()) {
     for (int lane = 0; lane < kLanes; ++lane) {
@@ -281,18 +281,9 @@ TEST(Kernels, AtRestNothingMoves) {
 }
 
 /// The kernels of each instruction set against the plain loops, on a step of everything.
-class SameBits : public testing::TestWithParam<const char*> {
+class SameBits : public testing::TestWithParam<InstructionSet> {
  protected:
-  [[nodiscard]] static const Kernels* Find(const std::string& name) {
-    if (name == "avx2") {
-      return HasAvx2() ? &Avx2Kernels() : nullptr;
-    }
-    if (name == "avx512") {
-      return HasAvx512() ? &Avx512Kernels() : nullptr;
-    }
-    return &BaselineKernels();
-  }
-  static void Compare(const SceneView& view, const Kernels& kernels) {
+  static void Compare(const SceneView& view, InstructionSet set) {
     Body a(view), b(view);
     Shake(&a.particles, 0.002f, 9);
     Shake(&b.particles, 0.002f, 9);
@@ -307,8 +298,8 @@ class SameBits : public testing::TestWithParam<const char*> {
     }
     PhysicsParams params = view.physics;
     params.gravity = Vec3f(0.3f, -0.2f, -9.81f);
-    PbdSolver oracle(params, &a.model, &a.particles, ScalarKernels());
-    PbdSolver vector(params, &b.model, &b.particles, kernels);
+    PbdSolver oracle(params, &a.model, &a.particles, scalar::kConstraints, scalar::kMotion);
+    PbdSolver vector(params, &b.model, &b.particles, pbd::KernelsFor(set), tissue::KernelsFor(set));
     for (int i = 0; i < 30; ++i) {
       EXPECT_EQ(oracle.Predict(), vector.Predict());
       for (int k = 0; k < 2; ++k) {
@@ -319,26 +310,23 @@ class SameBits : public testing::TestWithParam<const char*> {
       EXPECT_EQ(x.max_step_sq, y.max_step_sq);
       EXPECT_EQ(x.resets, y.resets);
       ASSERT_EQ(std::memcmp(a.particles.raw().data(), b.particles.raw().data(), a.particles.raw().size_bytes()), 0)
-          << kernels.name << ", step " << i;
+          << pbd::KernelsFor(set).name << ", step " << i;
     }
   }
 };
 
 TEST_P(SameBits, AsThePlainLoops) {
-  const Kernels* kernels = Find(GetParam());
-  if (kernels == nullptr) {
-    GTEST_SKIP() << "this CPU has no " << GetParam();
-  }
+  if (!Has(GetParam())) GTEST_SKIP() << "this CPU has no " << pbd::KernelsFor(GetParam()).name;
   const scene::SceneData organ = scene::BuildProcedural(scene::Small());
-  Compare(organ.View(), *kernels);
+  Compare(organ.View(), GetParam());
   // One slot a row; an odd and an even number of them.
   for (const std::uint32_t cols : {7u, 23u, 30u, 64u}) {
     const scene::SceneData sheet = SheetScene(9, cols);
-    Compare(sheet.View(), *kernels);
+    Compare(sheet.View(), GetParam());
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(InstructionSets, SameBits, testing::Values("baseline", "avx2", "avx512"));
+INSTANTIATE_TEST_SUITE_P(InstructionSets, SameBits, testing::ValuesIn(kInstructionSets));
 
 TEST(Quarantine, WhatIsNotFiniteGoesBackAndNothingSpreads) {
   const scene::SceneData data = scene::BuildProcedural(scene::Small());

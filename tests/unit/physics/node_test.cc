@@ -6,8 +6,8 @@
 
 #include "physics_node/node/physics_checkpoint.h"
 #include "physics_node/node/physics_node.h"
-#include "services/bus/in_process.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
+#include "services/transport/bus/in_process.h"
 #include "tests/numerics/physics/script_player.h"
 
 namespace fulcrum::physics {

@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "services/scene/scene_file.h"
+#include "services/scene/format/scene_file.h"
 
 namespace fulcrum::physics {
 

@@ -6,8 +6,8 @@
 #include "haptics_node/servo/model_gate.h"
 #include "physics_node/contact_model/elastic_force.h"
 #include "physics_node/simulation/tissue_simulation.h"
-#include "services/bus/gate.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
+#include "services/transport/bus/gate.h"
 #include "tests/numerics/physics/script_player.h"
 #include "tests/unit/physics/sheet_scene.h"
 
@@ -187,10 +187,8 @@ TEST_F(OnSmallScene, TheSameRunGivesTheSameHash) {
 }
 
 TEST_F(OnSmallScene, EveryInstructionSetGivesTheSameHash) {
-  if (!HasAvx2()) {
-    GTEST_SKIP() << "this CPU has no AVX2";
-  }
-  TissueSimulation narrow(scene_, 1, BaselineKernels()), wide(scene_, 1, Avx2Kernels());
+  if (!Has(InstructionSet::kAvx2)) GTEST_SKIP() << "this CPU has no AVX2";
+  TissueSimulation narrow(scene_, 1, InstructionSet::kBaseline), wide(scene_, 1);
   for (int i = 0; i < 300; ++i) {
     narrow.Step(ScriptedTools(scene_, 0.01 * i));
     wide.Step(ScriptedTools(scene_, 0.01 * i));

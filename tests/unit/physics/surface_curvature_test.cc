@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics {

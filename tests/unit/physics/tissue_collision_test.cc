@@ -10,8 +10,8 @@
 #include "physics_node/collision/closest.h"
 #include "physics_node/collision/row_projection.h"
 #include "physics_node/pbd/pbd_solver.h"
-#include "services/core/breathing.h"
-#include "services/scene/build.h"
+#include "services/base/core/breathing.h"
+#include "services/scene/builder/build.h"
 #include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics {

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "physics_node/simulation/tissue_simulation.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/numerics/physics/script_player.h"
 
 namespace fulcrum::physics {

@@ -3,9 +3,9 @@
 
 #include <random>
 
-#include "physics_node/pbd/tissue_model.h"
-#include "services/core/error.h"
-#include "services/scene/build.h"
+#include "physics_node/tissue/tissue_model.h"
+#include "services/base/core/error.h"
+#include "services/scene/builder/build.h"
 #include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics {

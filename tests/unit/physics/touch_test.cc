@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "physics_node/collision/closest.h"
-#include "physics_node/pbd/kernels.h"
+#include "physics_node/collision/kernels.h"
 #include "tests/unit/physics/kernels_scalar.h"
 
 namespace fulcrum::physics {
@@ -17,13 +17,10 @@ namespace {
 
 constexpr float kMm = 0.001f;
 
-std::vector<const Kernels*> VectorKernels() {
-  std::vector<const Kernels*> kernels{&BaselineKernels()};
-  if (HasAvx2()) {
-    kernels.push_back(&Avx2Kernels());
-  }
-  if (HasAvx512()) {
-    kernels.push_back(&Avx512Kernels());
+std::vector<const collision::Kernels*> VectorKernels() {
+  std::vector<const collision::Kernels*> kernels;
+  for (const InstructionSet set : kInstructionSets) {
+    if (Has(set)) kernels.push_back(&collision::KernelsFor(set));
   }
   return kernels;
 }
@@ -63,8 +60,8 @@ class Touch : public testing::Test {
   [[nodiscard]] TouchBatch Look(const SegmentMotion& motion, const TouchSearch& search) const {
     using Bits = std::array<std::uint32_t, sizeof(TouchBatch) / sizeof(std::uint32_t)>;
     TouchBatch oracle{};
-    ScalarKernels().first_touch(motion, search, triangles_, &oracle);
-    for (const Kernels* kernels : VectorKernels()) {
+    scalar::kCollision.first_touch(motion, search, triangles_, &oracle);
+    for (const collision::Kernels* kernels : VectorKernels()) {
       TouchBatch other{};
       kernels->first_touch(motion, search, triangles_, &other);
       EXPECT_EQ(std::bit_cast<Bits>(oracle), std::bit_cast<Bits>(other)) << kernels->name;
@@ -190,8 +187,8 @@ TEST_F(Touch, FeetAreTheClosestPointsOfTheTriangles) {
       }
     }
     FootBatch oracle{};
-    ScalarKernels().feet(particles.data(), points, &oracle);
-    for (const Kernels* kernels : VectorKernels()) {
+    scalar::kCollision.feet(particles.data(), points, &oracle);
+    for (const collision::Kernels* kernels : VectorKernels()) {
       FootBatch other{};
       kernels->feet(particles.data(), points, &other);
       ASSERT_EQ(std::bit_cast<Bits>(oracle), std::bit_cast<Bits>(other)) << kernels->name;

@@ -6,21 +6,21 @@
 #include <random>
 
 #include "physics_node/xpbd/xpbd_solver.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/unit/physics/sheet_scene.h"
 
 namespace fulcrum::physics::xpbd {
 namespace {
 
 struct Body {
-  explicit Body(const SceneView& view, const Kernels& kernels = BestKernels())
-      : Body(view, BuildElasticModel(view), kernels) {}
-  Body(const SceneView& view, const ElasticModel& model, const Kernels& kernels)
+  explicit Body(const SceneView& view, InstructionSet set = BestInstructionSet())
+      : Body(view, BuildElasticModel(view), set) {}
+  Body(const SceneView& view, const ElasticModel& model, InstructionSet set)
       : scene(view),
         particles(view),
         tissue(view, &particles),
         elastic(model),
-        solver(elastic, &tissue, &particles, kernels) {}
+        solver(elastic, &tissue, &particles, KernelsFor(set), physics::tissue::KernelsFor(set)) {}
   void Substep(float h) {
     resets += solver.Predict(h);
     solver.Iterate(h);
@@ -66,18 +66,12 @@ void Shake(ParticleStore* particles, float size) {
 TEST(Xpbd, AllInstructionSetsGiveTheSameBits) {
   const scene::SceneData data = scene::BuildProcedural(scene::Small());
   const SceneView scene = WithPrestrain(data.View());
-  Body narrow(scene, BaselineKernels());
+  Body narrow(scene, InstructionSet::kBaseline);
   Shake(&narrow.particles, 0.0005f);
-  std::vector<Kernels> others;
-  if (HasAvx2()) {
-    others.push_back(Avx2Kernels());
-  }
-  if (HasAvx512()) {
-    others.push_back(Avx512Kernels());
-  }
   std::vector<std::unique_ptr<Body>> bodies;
-  for (const Kernels& kernels : others) {
-    bodies.push_back(std::make_unique<Body>(scene, kernels));
+  for (const InstructionSet set : kInstructionSets) {
+    if (!Has(set)) continue;
+    bodies.push_back(std::make_unique<Body>(scene, set));
     Shake(&bodies.back()->particles, 0.0005f);
   }
   for (int i = 0; i < 40; ++i) {
@@ -189,7 +183,7 @@ TEST(Xpbd, HangingSheetConvergesWithSubsteps) {
   }
   std::vector<double> errors;
   for (const int substeps : {16, 64, 256}) {
-    Body body(scene, model, BestKernels());
+    Body body(scene, model, BestInstructionSet());
     for (int i = 0; i < 60 * substeps; ++i) {
       body.Substep(0.01f / static_cast<float>(substeps));
     }

@@ -1,5 +1,5 @@
 // The recorder without a bus: samples in, files out.
-#include "services/recorder/recorder.h"
+#include "services/records/recorder/recorder.h"
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -9,9 +9,9 @@
 #include <cstring>
 #include <thread>
 
-#include "services/bus/topics.h"
-#include "services/recording/free_name.h"
-#include "services/recording/mcap_reader.h"
+#include "services/records/recording/free_name.h"
+#include "services/records/recording/mcap_reader.h"
+#include "services/transport/bus/topics.h"
 
 namespace fulcrum::recorder {
 namespace {

@@ -8,11 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "services/core/error.h"
-#include "services/recording/byte_stream.h"
-#include "services/recording/mcap_reader.h"
-#include "services/recording/mcap_writer.h"
-#include "services/recording/time_order.h"
+#include "services/base/core/byte_stream.h"
+#include "services/base/core/error.h"
+#include "services/records/recording/mcap_format.h"
+#include "services/records/recording/mcap_reader.h"
+#include "services/records/recording/mcap_writer.h"
+#include "services/records/recording/time_order.h"
 
 namespace fulcrum::recording {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 
 namespace fulcrum::render {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 
 namespace fulcrum::render {
 namespace {

@@ -8,8 +8,8 @@
 #include "render_node/geometry/field_of_view.h"
 #include "render_node/geometry/quality.h"
 #include "render_node/geometry/sheet_detail.h"
-#include "services/core/error.h"
-#include "services/scene/build.h"
+#include "services/base/core/error.h"
+#include "services/scene/builder/build.h"
 
 namespace fulcrum::render {
 namespace {

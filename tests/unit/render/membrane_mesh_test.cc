@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "render_node/geometry/fat_layer.h"
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/unit/render/interleaved.h"
 
 namespace fulcrum::render {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-#include "services/scene/build.h"
+#include "services/scene/builder/build.h"
 #include "tests/unit/render/interleaved.h"
 
 namespace fulcrum::render {

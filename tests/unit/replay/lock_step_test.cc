@@ -1,4 +1,4 @@
-#include "services/replayer/lock_step.h"
+#include "services/apps/replayer/lock_step.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -7,11 +7,11 @@
 #include <set>
 #include <string>
 
-#include "services/core/error.h"
-#include "services/recording/mcap_reader.h"
-#include "services/replayer/lock_step_report.h"
-#include "services/scene/build.h"
-#include "services/scene/scene_settings.h"
+#include "services/apps/replayer/lock_step_report.h"
+#include "services/base/core/error.h"
+#include "services/records/recording/mcap_reader.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/builder/scene_settings.h"
 #include "tests/unit/replay/recorded_cart.h"
 
 namespace fulcrum::replay {

@@ -1,5 +1,5 @@
 // Tests of a node against a recording: the assertions, the judgement, what a CI system is given.
-#include "services/replayer/node_test.h"
+#include "services/apps/replayer/node_test.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -11,7 +11,7 @@
 #include <limits>
 #include <string>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::replay {
 namespace {

@@ -19,11 +19,11 @@
 #include "haptics_node/node/haptics_node.h"
 #include "physics_node/node/physics_checkpoint.h"
 #include "physics_node/node/physics_node.h"
-#include "services/bus/convert/cdr.h"
-#include "services/bus/in_process.h"
-#include "services/core/operator_script.h"
-#include "services/recording/mcap_writer.h"
-#include "services/runtime/checkpoint.h"
+#include "services/base/core/operator_script.h"
+#include "services/base/runtime/checkpoint.h"
+#include "services/records/recording/mcap_writer.h"
+#include "services/transport/bus/convert/cdr.h"
+#include "services/transport/bus/in_process.h"
 #include "thermal_node/node/thermal_node.h"
 
 namespace fulcrum::replay::testing {

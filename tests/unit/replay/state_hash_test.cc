@@ -14,9 +14,9 @@
 #include <map>
 #include <string>
 
-#include "physics_node/pbd/kernels.h"
-#include "services/scene/compile.h"
-#include "services/scene/scene_yaml.h"
+#include "physics_node/implicit/kernels.h"
+#include "services/scene/compiler/compile.h"
+#include "services/scene/compiler/scene_yaml.h"
 #include "tests/unit/replay/recorded_cart.h"
 
 namespace fulcrum::replay {
@@ -82,7 +82,7 @@ class StateHash : public ::testing::Test {
     EXPECT_GT(cut_length_m_, 2e-3f) << "nothing was cut: the hash says little";
     const Hashes committed{
         {"physics_node", expected.physics}, {"thermal_node", expected.thermal}, {"haptics_node", expected.haptics}};
-    EXPECT_EQ(hashes, committed) << threads << " threads, kernels " << physics::BestKernels().name
+    EXPECT_EQ(hashes, committed) << threads << " threads, kernels " << physics::implicit::KernelsFor().name
                                  << "; if the numerics were meant to change, its row is now:\n"
                                  << Row(expected, hashes);
   }

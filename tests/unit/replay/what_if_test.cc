@@ -1,4 +1,4 @@
-#include "services/replayer/what_if.h"
+#include "services/apps/replayer/what_if.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -7,12 +7,12 @@
 #include <fstream>
 #include <sstream>
 
-#include "services/core/error.h"
-#include "services/replayer/changed_scene.h"
-#include "services/replayer/what_if_report.h"
-#include "services/scene/compile.h"
-#include "services/scene/scene_file.h"
-#include "services/scene/scene_yaml.h"
+#include "services/apps/replayer/changed_scene.h"
+#include "services/apps/replayer/what_if_report.h"
+#include "services/base/core/error.h"
+#include "services/scene/compiler/compile.h"
+#include "services/scene/compiler/scene_yaml.h"
+#include "services/scene/format/scene_file.h"
 #include "tests/unit/replay/recorded_cart.h"
 
 namespace fulcrum::replay {

@@ -6,7 +6,7 @@
 #include <cerrno>
 #include <cstddef>
 
-#include "services/core/sanitizers.h"
+#include "services/base/core/sanitizers.h"
 
 namespace {
 

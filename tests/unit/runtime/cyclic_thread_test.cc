@@ -1,4 +1,4 @@
-#include "services/runtime/cyclic_thread.h"
+#include "services/base/runtime/cyclic_thread.h"
 
 #include <gtest/gtest.h>
 #include <pthread.h>
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "services/runtime/realtime.h"
+#include "services/base/runtime/realtime.h"
 
 namespace fulcrum::runtime {
 namespace {

@@ -1,4 +1,4 @@
-#include "services/runtime/histogram.h"
+#include "services/base/runtime/histogram.h"
 
 #include <gtest/gtest.h>
 

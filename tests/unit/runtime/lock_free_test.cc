@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <thread>
 
-#include "services/runtime/latest_value.h"
-#include "services/runtime/seqlock.h"
-#include "services/runtime/spsc_ring.h"
+#include "services/base/runtime/latest_value.h"
+#include "services/base/runtime/seqlock.h"
+#include "services/base/runtime/spsc_ring.h"
 
 namespace fulcrum::runtime {
 namespace {

@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <string>
 
-#include "services/runtime/install_places.h"
-#include "services/runtime/service_notify.h"
+#include "services/base/runtime/install_places.h"
+#include "services/base/runtime/service_notify.h"
 
 namespace fulcrum::runtime {
 namespace {

@@ -3,12 +3,12 @@
 
 #include <cmath>
 
-#include "services/core/error.h"
-#include "services/scene/drape.h"
-#include "services/scene/geometry.h"
-#include "services/scene/mesh_io.h"
-#include "services/scene/mesh_repair.h"
-#include "services/scene/tetrahedralise.h"
+#include "services/base/core/error.h"
+#include "services/scene/builder/geometry.h"
+#include "services/scene/compiler/drape.h"
+#include "services/scene/compiler/mesh_repair.h"
+#include "services/scene/compiler/tetrahedralise.h"
+#include "services/scene/readers/mesh_io.h"
 
 namespace fulcrum::scene {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "services/scene/mesh_io.h"
+#include "services/scene/readers/mesh_io.h"
 
 namespace fulcrum::scene::writers {
 

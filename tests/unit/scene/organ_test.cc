@@ -7,15 +7,15 @@
 #include <fstream>
 #include <sstream>
 
-#include "services/core/error.h"
-#include "services/scene/compile.h"
-#include "services/scene/geometry.h"
-#include "services/scene/mesh_repair.h"
-#include "services/scene/quality.h"
-#include "services/scene/scene_yaml.h"
-#include "services/scene/tet_repair.h"
-#include "services/scene/tetrahedralise.h"
-#include "services/scene/validate.h"
+#include "services/base/core/error.h"
+#include "services/scene/builder/geometry.h"
+#include "services/scene/builder/quality.h"
+#include "services/scene/compiler/compile.h"
+#include "services/scene/compiler/mesh_repair.h"
+#include "services/scene/compiler/scene_yaml.h"
+#include "services/scene/compiler/tet_repair.h"
+#include "services/scene/compiler/tetrahedralise.h"
+#include "services/scene/format/validate.h"
 
 namespace fulcrum::scene {
 namespace {

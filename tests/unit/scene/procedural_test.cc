@@ -5,12 +5,12 @@
 #include <cmath>
 #include <set>
 
-#include "services/core/error.h"
-#include "services/core/operator_script.h"
-#include "services/scene/build.h"
-#include "services/scene/colouring.h"
-#include "services/scene/geometry.h"
-#include "services/scene/quality.h"
+#include "services/base/core/error.h"
+#include "services/base/core/operator_script.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/builder/geometry.h"
+#include "services/scene/builder/quality.h"
+#include "services/scene/format/colouring.h"
 
 namespace fulcrum::scene {
 namespace {

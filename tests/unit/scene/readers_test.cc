@@ -6,8 +6,8 @@
 #include <cstring>
 #include <fstream>
 
-#include "services/core/error.h"
-#include "services/scene/geometry.h"
+#include "services/base/core/error.h"
+#include "services/scene/builder/geometry.h"
 #include "tests/unit/scene/mesh_samples.h"
 
 namespace fulcrum::scene {

@@ -1,5 +1,5 @@
 // The compiled scene file: round trip, and refusal of everything that is not whole.
-#include "services/scene/scene_file.h"
+#include "services/scene/format/scene_file.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,11 +10,11 @@
 #include <limits>
 #include <random>
 
-#include "services/core/error.h"
-#include "services/core/hash.h"
-#include "services/scene/build.h"
-#include "services/scene/sections.h"
-#include "services/scene/validate.h"
+#include "services/base/core/error.h"
+#include "services/base/core/hash.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/format/sections.h"
+#include "services/scene/format/validate.h"
 
 namespace fulcrum::scene {
 namespace {

@@ -6,11 +6,11 @@
 #include <fstream>
 #include <numbers>
 
-#include "services/core/error.h"
-#include "services/scene/build.h"
-#include "services/scene/compile.h"
-#include "services/scene/scene_file.h"
-#include "services/scene/scene_yaml.h"
+#include "services/base/core/error.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/compiler/compile.h"
+#include "services/scene/compiler/scene_yaml.h"
+#include "services/scene/format/scene_file.h"
 #include "tests/unit/scene/mesh_writers.h"
 
 namespace fulcrum::scene {

@@ -7,13 +7,13 @@
 #include <iterator>
 #include <set>
 
-#include "services/core/error.h"
-#include "services/scene/build.h"
-#include "services/scene/compile.h"
-#include "services/scene/quality.h"
-#include "services/scene/scene_file.h"
-#include "services/scene/scene_yaml.h"
-#include "services/scene/validate.h"
+#include "services/base/core/error.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/builder/quality.h"
+#include "services/scene/compiler/compile.h"
+#include "services/scene/compiler/scene_yaml.h"
+#include "services/scene/format/scene_file.h"
+#include "services/scene/format/validate.h"
 
 namespace fulcrum::scene {
 namespace {

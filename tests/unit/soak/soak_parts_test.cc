@@ -6,14 +6,14 @@
 #include <cmath>
 #include <set>
 
-#include "services/scene/build.h"
-#include "services/scene/scene_file.h"
-#include "services/soak/chaos_plan.h"
-#include "services/soak/process_table.h"
-#include "services/soak/script_rounds.h"
-#include "services/soak/soak_page.h"
-#include "services/soak/soak_record.h"
-#include "services/supervisor/child_process.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/format/scene_file.h"
+#include "services/session/soak/chaos_plan.h"
+#include "services/session/soak/process_table.h"
+#include "services/session/soak/script_rounds.h"
+#include "services/session/soak/soak_page.h"
+#include "services/session/soak/soak_record.h"
+#include "services/session/supervisor/child_process.h"
 
 namespace fulcrum::soak {
 namespace {

@@ -1,11 +1,11 @@
-#include "services/supervisor/generator_panel.h"
+#include "services/session/supervisor/generator_panel.h"
 
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 
 namespace fulcrum::supervisor {
 namespace {

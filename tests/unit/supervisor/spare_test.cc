@@ -9,8 +9,8 @@
 #include <iterator>
 #include <string>
 
-#include "services/core/tick.h"
-#include "services/supervisor/node_process.h"
+#include "services/base/core/tick.h"
+#include "services/session/supervisor/node_process.h"
 
 namespace fulcrum::supervisor {
 namespace {

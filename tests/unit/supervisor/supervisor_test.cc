@@ -7,19 +7,19 @@
 #include <fstream>
 #include <thread>
 
-#include "services/core/error.h"
-#include "services/supervisor/attached_node.h"
-#include "services/supervisor/child_process.h"
-#include "services/supervisor/clip.h"
-#include "services/supervisor/outcome.h"
-#include "services/supervisor/picture.h"
-#include "services/supervisor/progress.h"
-#include "services/supervisor/report.h"
-#include "services/supervisor/restart_policy.h"
-#include "services/supervisor/scene_cache.h"
-#include "services/supervisor/script_outlook.h"
-#include "services/supervisor/session_record.h"
-#include "services/supervisor/svg_plot.h"
+#include "services/base/core/error.h"
+#include "services/session/supervisor/attached_node.h"
+#include "services/session/supervisor/child_process.h"
+#include "services/session/supervisor/clip.h"
+#include "services/session/supervisor/outcome.h"
+#include "services/session/supervisor/picture.h"
+#include "services/session/supervisor/progress.h"
+#include "services/session/supervisor/report.h"
+#include "services/session/supervisor/restart_policy.h"
+#include "services/session/supervisor/scene_cache.h"
+#include "services/session/supervisor/script_outlook.h"
+#include "services/session/supervisor/session_record.h"
+#include "services/session/supervisor/svg_plot.h"
 
 namespace fulcrum::supervisor {
 namespace {

@@ -8,10 +8,10 @@
 #include <fstream>
 #include <iterator>
 
-#include "services/core/error.h"
-#include "services/supervisor/score_sheet.h"
-#include "services/supervisor/trainee_view.h"
-#include "services/supervisor/training_log.h"
+#include "services/base/core/error.h"
+#include "services/session/supervisor/score_sheet.h"
+#include "services/session/supervisor/trainee_view.h"
+#include "services/session/supervisor/training_log.h"
 
 namespace fulcrum::supervisor {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "services/bus/in_process.h"
+#include "services/transport/bus/in_process.h"
 #include "thermal_node/node/thermal_node.h"
 
 namespace fulcrum::thermal {

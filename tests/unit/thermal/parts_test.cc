@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "services/core/error.h"
+#include "services/base/core/error.h"
 #include "tests/numerics/thermal/flat_scene.h"
 #include "thermal_node/coupling/electrode.h"
 #include "thermal_node/coupling/film.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "physics_node/pbd/constraints.h"
+#include "physics_node/tissue/constraints.h"
 
 namespace fulcrum::physics::baselines {
 namespace {

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "services/core/scene_view.h"
+#include "services/base/core/scene_view.h"
 
 namespace fulcrum::physics::baselines {
 

@@ -1,0 +1,220 @@
+// Bodies of the membrane's kernels, compiled once per instruction set with FULCRUM_KERNEL_NAMESPACE set.
+#pragma once
+
+#include "physics_node/implicit/kernels.h"
+#include "physics_node/simd/lanes.h"
+
+#define FULCRUM_INLINE_LAMBDA __attribute__((always_inline))
+
+namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
+
+using implicit::Inertia;
+using implicit::Sheet;
+using implicit::SheetLinearise;
+using implicit::SheetMatrix;
+
+inline std::size_t RowStart(const Sheet& sheet, int row) {
+  return static_cast<std::size_t>(row) * 8 * static_cast<std::size_t>(sheet.slots);
+}
+inline V8 LoadV(const float* const plane[3], std::size_t at) {
+  return {F8::Load(plane[0] + at), F8::Load(plane[1] + at), F8::Load(plane[2] + at)};
+}
+inline void StoreV(V8 v, float* const plane[3], std::size_t at) {
+  v.x.Store(plane[0] + at);
+  v.y.Store(plane[1] + at);
+  v.z.Store(plane[2] + at);
+}
+inline V8 DownV(V8 a) { return {RotateDown(a.x), RotateDown(a.y), RotateDown(a.z)}; }
+inline V8 UpV(V8 a) { return {RotateUp(a.x), RotateUp(a.y), RotateUp(a.z)}; }
+inline V8 ZeroV() { return {F8::All(0), F8::All(0), F8::All(0)}; }
+inline double SumOf(F8 v) {
+  alignas(32) float f[8];
+  v.Store(f);
+  // Lanes in a fixed order, whatever the instruction set.
+  return static_cast<double>(((f[0] + f[1]) + (f[2] + f[3])) + ((f[4] + f[5]) + (f[6] + f[7])));
+}
+
+/// The other end of the three edges of slot `s` in row `row`: the node to the right, below, below right. In the last
+/// slot of a row the right neighbour is the first slot of the next lane.
+struct Ends {
+  V8 right, below, diagonal;
+};
+inline Ends LoadEnds(const Sheet& sheet, const float* const x[3], std::size_t at, int s, bool last_row) {
+  const std::size_t stride = 8 * static_cast<std::size_t>(sheet.slots), first = at - 8 * static_cast<std::size_t>(s);
+  const std::size_t below = last_row ? 0 : stride;  // The last row has no edge downwards: anything finite will do.
+  const bool wraps = s + 1 == sheet.slots;
+  Ends ends;
+  ends.right = wraps ? DownV(LoadV(x, first)) : LoadV(x, at + 8);
+  ends.below = LoadV(x, at + below);
+  ends.diagonal = wraps ? DownV(LoadV(x, first + below)) : LoadV(x, at + below + 8);
+  return ends;
+}
+
+inline void Clear(float* p, std::size_t count) {
+  for (std::size_t i = 0; i < count; i += 8) {
+    F8::All(0).Store(p + i);
+  }
+}
+
+inline float LargestOf(F8 v) {
+  alignas(32) float f[8];
+  v.Store(f);
+  float largest = 0;
+  for (const float lane : f) {
+    largest = lane > largest ? lane : largest;
+  }
+  return largest;
+}
+
+inline implicit::GuessCount SheetGuess(const Sheet& sheet, float h, float limit, const float* const start[3],
+                                       const float* const velocity[3], float* const place[3], int row0, int row1) {
+  const F8 zero = F8::All(0), step = F8::All(h), sound = F8::All(1e30f), one = F8::All(1.0f), most = F8::All(limit);
+  F8 largest = zero;
+  std::uint32_t resets = 0;
+  for (std::size_t at = RowStart(sheet, row0), end = RowStart(sheet, row1); at < end; at += 8) {
+    const F8 moves = F8::Load(sheet.w + at) > zero;
+    const V8 d = LoadV(velocity, at) * step;
+    const F8 square = Dot(d, d), finite = square < sound, keep = moves & finite;
+    resets += static_cast<std::uint32_t>(__builtin_popcount(Bits(moves) & ~Bits(finite) & 0xffu));
+    largest = Max(largest, square & keep);
+    const F8 part = Min(one, most / Sqrt(Max(square, F8::All(1e-24f))));
+    const V8 way = d * part;
+    StoreV(LoadV(start, at) + V8{way.x & keep, way.y & keep, way.z & keep}, place, at);
+  }
+  return {LargestOf(largest), resets};
+}
+
+/// Inverse of symmetric blocks xx yy zz xy xz yz, 0 where nothing moves.
+template <class F, class Mask>
+FULCRUM_INLINE void StoreInverseBlock(const F a[6], Mask moves, float* const block[6], std::size_t at) {
+  const F xx = a[0], yy = a[1], zz = a[2], xy = a[3], xz = a[4], yz = a[5];
+  const F c00 = yy * zz - yz * yz, c01 = xz * yz - xy * zz, c02 = xy * yz - xz * yy;
+  const F c11 = xx * zz - xz * xz, c12 = xy * xz - xx * yz, c22 = xx * yy - xy * xy;
+  const F scale = F::All(1.0f) / (xx * c00 + xy * c01 + xz * c02);
+  const F inverse[6] = {c00 * scale, c11 * scale, c22 * scale, c01 * scale, c02 * scale, c12 * scale};
+  for (int i = 0; i < 6; ++i) {
+    (inverse[i] & moves).Store(block[i] + at);
+  }
+}
+
+inline double SheetEnergy(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at, int row0, int row1) {
+  const F8 half = F8::All(0.5f), quarter = F8::All(0.25f), zero = F8::All(0), c = F8::All(sheet.stiffening);
+  const F8 k = F8::All(inertia.inertia), inverse_h = F8::All(1.0f / inertia.h);
+  const V8 gravity = {F8::All(inertia.gravity[0]), F8::All(inertia.gravity[1]), F8::All(inertia.gravity[2])};
+  double sum = 0;
+  for (int row = row0; row < row1; ++row) {
+    F8 energy = zero;
+    for (int s = 0; s < sheet.slots; ++s) {
+      const std::size_t node = RowStart(sheet, row) + 8 * static_cast<std::size_t>(s);
+      const V8 x = LoadV(at.place, node);
+      const Ends ends = LoadEnds(sheet, at.place, node, s, row + 1 == sheet.rows);
+      const V8 other[3] = {ends.right, ends.below, ends.diagonal};
+      for (int d = 0; d < 3; ++d) {
+        const F8 inverse_rest = F8::Load(sheet.inverse_rest[d] + node), axial = F8::Load(sheet.axial[d] + node);
+        const V8 edge = other[d] - x;
+        const F8 strain = Sqrt(Max(Dot(edge, edge), F8::All(1e-24f))) * inverse_rest - F8::All(1.0f);
+        const F8 e2 = strain * strain;
+        // inverse_rest is that of an edge that exists wherever axial is not 0.
+        energy = energy + (axial * (half * e2 + quarter * c * (e2 * e2))) / Max(inverse_rest, F8::All(1e-6f));
+      }
+      const F8 mass = F8::Load(sheet.mass + node) & (F8::Load(sheet.w + node) > zero);
+      const V8 moved = x - LoadV(at.start, node);
+      const V8 load = LoadV(at.load, node);
+      energy = energy - Dot(moved, load);
+      energy = energy + mass * (half * k * Dot(moved, moved) - inverse_h * Dot(moved, LoadV(at.velocity, node)) -
+                                Dot(moved, gravity));
+    }
+    sum += SumOf(energy);
+  }
+  return sum;
+}
+
+inline void Combine(const float* z, float beta, float* p, std::size_t count) {
+  const F8 b = F8::All(beta);
+  for (std::size_t i = 0; i < count; i += 8) {
+    (F8::Load(z + i) + F8::Load(p + i) * b).Store(p + i);
+  }
+}
+
+inline void StartFields(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count) {
+  const F8 a = F8::All(alpha);
+  for (std::size_t i = 0; i < count; i += 8) {
+    (F8::Load(p + i) * a).Store(d + i);
+    (F8::Load(r + i) - F8::Load(q + i) * a).Store(r + i);
+  }
+}
+
+inline void AdvanceFields(float alpha, const float* p, const float* q, float* d, float* r, std::size_t count) {
+  const F8 a = F8::All(alpha);
+  for (std::size_t i = 0; i < count; i += 8) {
+    (F8::Load(d + i) + F8::Load(p + i) * a).Store(d + i);
+    (F8::Load(r + i) - F8::Load(q + i) * a).Store(r + i);
+  }
+}
+
+inline void AddFields(float alpha, const float* p, float* d, std::size_t count) {
+  const F8 a = F8::All(alpha);
+  for (std::size_t i = 0; i < count; i += 8) {
+    (F8::Load(d + i) + F8::Load(p + i) * a).Store(d + i);
+  }
+}
+
+inline bool Within(const float* p, float limit, std::size_t count, bool xyzw) {
+  const F8 far = F8::All(limit);
+  F8 inside = far > F8::All(0);
+  for (std::size_t i = 0; i < count; i += 8) {
+    inside = inside & (Abs(F8::Load(p + i)) < far);
+  }
+  return (Bits(inside) | (xyzw ? 0x88u : 0u)) == 0xffu;
+}
+
+inline float SheetStep(const Sheet& sheet, float a, const float* const p[3], float b, const float* const z[3],
+                       bool adds, float* const d[3], int row0, int row1) {
+  const F8 of_p = F8::All(a), of_z = F8::All(b);
+  F8 largest = F8::All(0);
+  for (std::size_t i = RowStart(sheet, row0), end = RowStart(sheet, row1); i < end; i += 8) {
+    V8 v = LoadV(p, i) * of_p + LoadV(z, i) * of_z;
+    if (adds) {
+      v = LoadV(d, i) + v;
+    }
+    StoreV(v, d, i);
+    largest = Max(Dot(v, v), largest);
+  }
+  return LargestOf(largest);
+}
+
+inline float SheetLargest(const Sheet& sheet, const float* const d[3], int row0, int row1) {
+  F8 largest = F8::All(0);
+  for (std::size_t i = RowStart(sheet, row0), end = RowStart(sheet, row1); i < end; i += 8) {
+    const V8 v = LoadV(d, i);
+    largest = Max(Dot(v, v), largest);
+  }
+  return LargestOf(largest);
+}
+
+inline implicit::FinishCount SheetFinish(const Sheet& sheet, const float* const place[3], const float* const d[3],
+                                         float h, float speed, float* const x[3], float* const velocity[3], int row0,
+                                         int row1) {
+  const F8 zero = F8::All(0), step = F8::All(h), inverse_h = F8::All(1.0f / h);
+  const F8 limit = F8::All(speed), limit_sq = F8::All(speed * speed);
+  F8 largest = zero;
+  std::uint32_t resets = 0;
+  for (std::size_t i = RowStart(sheet, row0), end = RowStart(sheet, row1); i < end; i += 8) {
+    const V8 from = LoadV(x, i);
+    V8 v = ((LoadV(place, i) + LoadV(d, i)) - from) * inverse_h;
+    const F8 square = Dot(v, v), moves = F8::Load(sheet.w + i) > zero;
+    const F8 finite = square<F8::All(1e30f), fast = square> limit_sq;
+    resets += static_cast<std::uint32_t>(__builtin_popcount(Bits(moves) & ~Bits(finite) & 0xffu));
+    v = {v.x & finite, v.y & finite, v.z & finite};
+    if (Bits(fast & finite) != 0) {
+      const F8 part = Select(fast & finite, limit / Sqrt(square), F8::All(1.0f));
+      v = v * part;
+    }
+    largest = Max(Min(square & finite, limit_sq) & moves, largest);
+    StoreV(v, velocity, i);
+    StoreV(from + v * step, x, i);
+  }
+  return {LargestOf(largest), resets};
+}
+
+}  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

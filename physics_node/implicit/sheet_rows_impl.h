@@ -1,0 +1,354 @@
+// Bodies of the two kernels of the membrane that cost most: edges linearised, and the product with their matrix. A row
+// is swept slot by slot, or two slots at a time in AVX-512; each lane sees the same operations in the same order.
+// Compiled once per instruction set, after sheet_kernels_impl.h.
+#pragma once
+
+#include "physics_node/implicit/sheet_kernels_impl.h"
+
+namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
+
+/// Slots of a row that one register F holds.
+template <class F>
+struct Slots;
+
+template <>
+struct Slots<F8> {
+  /// What follows slot `at`: the last slot of a row is followed by `first`, one lane on.
+  static F8 After(const float* x, std::size_t at, bool wraps, std::size_t first) {
+    return wraps ? RotateDown(F8::Load(x + first)) : F8::Load(x + at + 8);
+  }
+  /// Of what slots hand on: those now hand on `now` and take what the ones before did.
+  static F8 Pass(F8* kept, F8 now) {
+    const F8 before = *kept;
+    *kept = now;
+    return before;
+  }
+  static void Begin(F8 last, F8* kept) { *kept = last; }
+#if defined(__AVX512F__)
+  static F8 Pass(F16* kept, F8 now) {
+    const F8 before = kept->hi();
+    *kept = F16::Halves(now, now);
+    return before;
+  }
+  static void Begin(F8 last, F16* kept) { *kept = F16::Halves(last, last); }
+#endif
+};
+
+#if defined(__AVX512F__)
+template <>
+struct Slots<F16> {
+  static F16 After(const float* x, std::size_t at, bool wraps, std::size_t first) {
+    return wraps ? F16::Halves(F8::Load(x + at + 8), RotateDown(F8::Load(x + first))) : F16::Load(x + at + 8);
+  }
+  static F16 Pass(F16* kept, F16 now) {
+    const __m512d before = _mm512_castps_pd(kept->v);
+    *kept = now;
+    return {_mm512_castpd_ps(_mm512_shuffle_f64x2(before, _mm512_castps_pd(now.v), _MM_SHUFFLE(1, 0, 3, 2)))};
+  }
+};
+#endif
+
+template <class F>
+FULCRUM_INLINE V<F> LoadSlots(const float* const plane[3], std::size_t at) {
+  return {F::Load(plane[0] + at), F::Load(plane[1] + at), F::Load(plane[2] + at)};
+}
+template <class F>
+FULCRUM_INLINE void StoreSlots(const V<F>& v, float* const plane[3], std::size_t at) {
+  v.x.Store(plane[0] + at);
+  v.y.Store(plane[1] + at);
+  v.z.Store(plane[2] + at);
+}
+template <class F>
+FULCRUM_INLINE V<F> LoadAfter(const float* const x[3], std::size_t at, bool wraps, std::size_t first) {
+  return {Slots<F>::After(x[0], at, wraps, first), Slots<F>::After(x[1], at, wraps, first),
+          Slots<F>::After(x[2], at, wraps, first)};
+}
+
+/// The other end of the edges of the slots at `s`: the node to the right, below, below right.
+template <class F>
+struct EndsOf {
+  V<F> right, below, diagonal;
+};
+template <class F>
+FULCRUM_INLINE EndsOf<F> LoadEndsOf(const Sheet& sheet, const float* const x[3], std::size_t start, int s,
+                                    std::size_t below) {
+  const std::size_t at = start + 8 * static_cast<std::size_t>(s);
+  const bool wraps = s + F::kBatches == sheet.slots;
+  return {LoadAfter<F>(x, at, wraps, start), LoadSlots<F>(x, at + below),
+          LoadAfter<F>(x, at + below, wraps, start + below)};
+}
+/// Floats from a row to the one below. The last row has no edge downwards: anything finite will do.
+inline std::size_t Below(const Sheet& sheet, int row) {
+  return row + 1 == sheet.rows ? 0 : 8 * static_cast<std::size_t>(sheet.slots);
+}
+
+/// body<F>(slot) over a row, with the widest F that fits.
+template <class Body>
+FULCRUM_INLINE void ForSlots(int slots, const Body& body) {
+  int s = 0;
+  for (; s + Widest::kBatches <= slots; s += Widest::kBatches) {
+    body.template operator()<Widest>(s);
+  }
+  if (Widest::kBatches > 1 && s < slots) {
+    body.template operator()<F8>(s);
+  }
+}
+
+/// Sums over a row: of its even slots and of its odd ones, whatever number is taken at a time.
+struct RowSum {
+  F8 even = F8::All(0), odd = F8::All(0);
+  FULCRUM_INLINE void Add(F8 v, int s) {
+    if (s % 2 == 0) {
+      even = even + v;
+    } else {
+      odd = odd + v;
+    }
+  }
+#if defined(__AVX512F__)
+  FULCRUM_INLINE void Add(F16 v, int) {
+    even = even + v.lo();
+    odd = odd + v.hi();
+  }
+#endif
+  [[nodiscard]] double Value() const { return SumOf(even + odd); }
+};
+
+/// What an edge does to its first node: force, and the six entries xx yy zz xy xz yz of its stiffness.
+template <class F>
+struct Edge9 {
+  F v[9];
+};
+/// Forces act on the other end the other way, stiffness alike.
+template <class F>
+FULCRUM_INLINE F AddOther(F sum, F other, int c) {
+  return c < 3 ? sum - other : sum + other;
+}
+
+/// Edges along `d`: their tension over their length, and their stiffness kt I + along d d^T.
+template <class F>
+struct Linear {
+  V<F> d;
+  F tension, kt, along;
+};
+template <class F>
+FULCRUM_INLINE Linear<F> LineariseEdge(const V<F>& d, F inverse_rest, F axial, F stiffening) {
+  const F zero = F::All(0), one = F::All(1.0f);
+  const F length = Sqrt(Max(Dot(d, d), F::All(1e-24f))), inverse = one / length;
+  const F strain = length * inverse_rest - one, j = stiffening * (strain * strain);
+  const F tension = axial * (strain * (one + j)) * inverse;
+  const F tangent = axial * inverse_rest * (one + F::All(3.0f) * j);
+  const F kt = Max(tension, zero);
+  return {d, tension, kt, Max(tangent - kt, zero) * (inverse * inverse)};
+}
+template <class F>
+FULCRUM_INLINE Edge9<F> ActingOnEnds(const Linear<F>& e) {
+  const V<F> f = e.d * e.tension, a = e.d * e.along;
+  return {{f.x, f.y, f.z, e.kt + a.x * e.d.x, e.kt + a.y * e.d.y, e.kt + a.z * e.d.z, a.x * e.d.y, a.x * e.d.z,
+           a.y * e.d.z}};
+}
+
+/// Handed on from slot to slot along a row: what edges to the right and along diagonals do at their other end. What
+/// leaves the last slot enters the first one, one lane on.
+template <int kCount>
+struct Carried {
+  Widest v[kCount];
+  FULCRUM_INLINE void Begin(F8 last, int c) { Slots<F8>::Begin(last, &v[c]); }
+  template <class F>
+  FULCRUM_INLINE F Pass(F now, int c) {
+    return Slots<F>::Pass(&v[c], now);
+  }
+};
+
+/// One row: `above` is what the row above hands down, 9 planes of a row; what belongs to the next row goes to `below`.
+/// With `only_below` nothing else is done.
+template <bool only_below>
+FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at,
+                                 const SheetMatrix& matrix, const float* above, float* below, int row) {
+  const std::size_t start = RowStart(sheet, row), stride = 8 * static_cast<std::size_t>(sheet.slots),
+                    down_by = Below(sheet, row);
+  const auto linearise = [&]<class F>(int d, const V<F>& vector, std::size_t node) FULCRUM_INLINE_LAMBDA {
+    return LineariseEdge<F>(vector, F::Load(sheet.inverse_rest[d] + node), F::Load(sheet.axial[d] + node),
+                            F::All(sheet.stiffening));
+  };
+  Carried<9> left, diagonal;
+  {
+    const std::size_t last = start + stride - 8;
+    const V8 x = LoadV(at.place, last);
+    const EndsOf<F8> ends = LoadEndsOf<F8>(sheet, at.place, start, sheet.slots - 1, down_by);
+    const Edge9<F8> to_right = ActingOnEnds(linearise(0, ends.right - x, last)),
+                    to_diagonal = ActingOnEnds(linearise(2, ends.diagonal - x, last));
+    for (int c = 0; c < 9; ++c) {
+      left.Begin(RotateUp(to_right.v[c]), c);
+      diagonal.Begin(RotateUp(to_diagonal.v[c]), c);
+    }
+  }
+  ForSlots(sheet.slots, [&]<class F>(int s) FULCRUM_INLINE_LAMBDA {
+    const std::size_t slot = 8 * static_cast<std::size_t>(s), node = start + slot;
+    const V<F> x = LoadSlots<F>(at.place, node);
+    const EndsOf<F> ends = LoadEndsOf<F>(sheet, at.place, start, s, down_by);
+    const auto edge = [&](int d, const V<F>& vector) FULCRUM_INLINE_LAMBDA {
+      const Linear<F> result = linearise(d, vector, node);
+      if (!only_below) {
+        result.kt.Store(matrix.kt[d] + node);
+        result.along.Store(matrix.along[d] + node);
+      }
+      return result;
+    };
+    const Linear<F> lines[3] = {edge(1, ends.below - x), edge(2, ends.diagonal - x),
+                                only_below ? Linear<F>{} : edge(0, ends.right - x)};
+    Edge9<F> sum;
+    {
+      const Edge9<F> down = ActingOnEnds(lines[0]), across = ActingOnEnds(lines[1]);
+      for (int c = 0; c < 9; ++c) {
+        const auto plane = static_cast<std::size_t>(c) * stride + slot;
+        if (!only_below) {
+          sum.v[c] = AddOther(down.v[c], F::Load(above + plane), c) + across.v[c];
+        }
+        (down.v[c] + diagonal.Pass(across.v[c], c)).Store(below + plane);
+      }
+    }
+    if (only_below) {
+      return;
+    }
+    {
+      const Edge9<F> right = ActingOnEnds(lines[2]);
+      for (int c = 0; c < 9; ++c) {
+        sum.v[c] = AddOther(sum.v[c], left.Pass(right.v[c], c), c) + right.v[c];
+      }
+    }
+    const F k = F::All(inertia.inertia), zero = F::All(0);
+    const auto moves = F::Load(sheet.w + node) > zero;
+    const F mass = F::Load(sheet.mass + node) & moves;
+    const V<F> moved = x - LoadSlots<F>(at.start, node);
+    const V<F> momentum = moved * k - LoadSlots<F>(at.velocity, node) * F::All(1.0f / inertia.h);
+    const V<F> gravity = {F::All(inertia.gravity[0]), F::All(inertia.gravity[1]), F::All(inertia.gravity[2])};
+    const V<F> elastic = {sum.v[0], sum.v[1], sum.v[2]};
+    StoreSlots(elastic + LoadSlots<F>(at.load, node) + (gravity - momentum) * mass, at.residual, node);
+    const F own = F::Load(at.extra + node) + mass * k;
+    const F block[6] = {sum.v[3] + own, sum.v[4] + own, sum.v[5] + own, sum.v[6], sum.v[7], sum.v[8]};
+    StoreInverseBlock<F>(block, moves, matrix.block, node);
+  });
+}
+
+inline void SheetLineariseRows(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at,
+                               const SheetMatrix& matrix, float* memory, int row0, int row1) {
+  const std::size_t stride = 8 * static_cast<std::size_t>(sheet.slots);
+  float *above = memory, *below = memory + 9 * stride;
+  if (row0 > 0) {
+    LineariseRow<true>(sheet, inertia, at, matrix, nullptr, above, row0 - 1);
+  } else {
+    Clear(above, 9 * stride);
+  }
+  for (int row = row0; row < row1; ++row) {
+    LineariseRow<false>(sheet, inertia, at, matrix, above, below, row);
+    float* const used = above;
+    above = below;
+    below = used;
+  }
+}
+
+/// K p of one row's edges and its inertia into `out`, what belongs to the next row into `below` [3]. Returns p . out.
+template <bool only_below>
+FULCRUM_INLINE double ApplyRow(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
+                               const float* above, float* below, float* const out[3], int row) {
+  const std::size_t start = RowStart(sheet, row), stride = 8 * static_cast<std::size_t>(sheet.slots),
+                    down_by = Below(sheet, row);
+  /// (kt I + along d d^T) dp.
+  const auto edge = [&]<class F>(int e, const V<F>& d, const V<F>& dp, std::size_t node) FULCRUM_INLINE_LAMBDA {
+    return V<F>(dp * F::Load(matrix.kt[e] + node) + d * (F::Load(matrix.along[e] + node) * Dot(d, dp)));
+  };
+  Carried<3> left, diagonal;
+  {
+    const std::size_t last = start + stride - 8;
+    const V8 x = LoadV(matrix.place, last), here = LoadV(p, last);
+    const EndsOf<F8> x_ends = LoadEndsOf<F8>(sheet, matrix.place, start, sheet.slots - 1, down_by),
+                     p_ends = LoadEndsOf<F8>(sheet, p, start, sheet.slots - 1, down_by);
+    const V8 to_right = UpV(edge(0, x_ends.right - x, p_ends.right - here, last)),
+             to_diagonal = UpV(edge(2, x_ends.diagonal - x, p_ends.diagonal - here, last));
+    const F8 rights[3] = {to_right.x, to_right.y, to_right.z};
+    const F8 diagonals[3] = {to_diagonal.x, to_diagonal.y, to_diagonal.z};
+    for (int c = 0; c < 3; ++c) {
+      left.Begin(rights[c], c);
+      diagonal.Begin(diagonals[c], c);
+    }
+  }
+  const auto pass = [&]<class F>(Carried<3>* from, const V<F>& now) FULCRUM_INLINE_LAMBDA {
+    return V<F>{from->Pass(now.x, 0), from->Pass(now.y, 1), from->Pass(now.z, 2)};
+  };
+  const float* const from[3] = {above, above + stride, above + 2 * stride};
+  float* const to[3] = {below, below + stride, below + 2 * stride};
+  RowSum sum;
+  ForSlots(sheet.slots, [&]<class F>(int s) FULCRUM_INLINE_LAMBDA {
+    const std::size_t slot = 8 * static_cast<std::size_t>(s), node = start + slot;
+    const V<F> x = LoadSlots<F>(matrix.place, node), here = LoadSlots<F>(p, node);
+    const EndsOf<F> x_ends = LoadEndsOf<F>(sheet, matrix.place, start, s, down_by),
+                    p_ends = LoadEndsOf<F>(sheet, p, start, s, down_by);
+    const V<F> down = edge(1, x_ends.below - x, p_ends.below - here, node),
+               across = edge(2, x_ends.diagonal - x, p_ends.diagonal - here, node);
+    const V<F> incoming = only_below ? V<F>{} : LoadSlots<F>(from, slot);
+    StoreSlots(down + pass(&diagonal, across), to, slot);
+    if (!only_below) {
+      const V<F> right = edge(0, x_ends.right - x, p_ends.right - here, node);
+      const F mass = (F::Load(sheet.mass + node) & (F::Load(sheet.w + node) > F::All(0))) * F::All(inertia);
+      const V<F> result = ((pass(&left, right) + incoming) - ((right + down) + across)) + here * mass;
+      StoreSlots(result, out, node);
+      sum.Add(Dot(here, result), s);
+    }
+  });
+  return sum.Value();
+}
+
+inline double SheetApply(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
+                         float* const out[3], float* memory, int row0, int row1) {
+  const std::size_t stride = 8 * static_cast<std::size_t>(sheet.slots);
+  float *above = memory, *below = memory + 3 * stride;
+  if (row0 > 0) {
+    (void)ApplyRow<true>(sheet, inertia, matrix, p, above, above, out, row0 - 1);
+  } else {
+    Clear(above, 3 * stride);
+  }
+  double sum = 0;
+  for (int row = row0; row < row1; ++row) {
+    sum += ApplyRow<false>(sheet, inertia, matrix, p, above, below, out, row);
+    float* const used = above;
+    above = below;
+    below = used;
+  }
+  return sum;
+}
+
+/// p . K p of the edges that begin in one row and of its inertia, or of those alone that lead down from it.
+template <bool only_below>
+FULCRUM_INLINE double RowCurvature(const Sheet& sheet, float inertia, const SheetMatrix& matrix,
+                                   const float* const p[3], int row) {
+  const std::size_t start = RowStart(sheet, row), down_by = Below(sheet, row);
+  RowSum sum;
+  ForSlots(sheet.slots, [&]<class F>(int s) FULCRUM_INLINE_LAMBDA {
+    const std::size_t node = start + 8 * static_cast<std::size_t>(s);
+    const V<F> x = LoadSlots<F>(matrix.place, node), here = LoadSlots<F>(p, node);
+    const EndsOf<F> x_ends = LoadEndsOf<F>(sheet, matrix.place, start, s, down_by),
+                    p_ends = LoadEndsOf<F>(sheet, p, start, s, down_by);
+    const auto edge = [&](int e, const V<F>& d, const V<F>& dp) FULCRUM_INLINE_LAMBDA {
+      const F along = Dot(d, dp);
+      return F(Dot(dp, dp) * F::Load(matrix.kt[e] + node) + along * along * F::Load(matrix.along[e] + node));
+    };
+    F of_node = edge(1, x_ends.below - x, p_ends.below - here) + edge(2, x_ends.diagonal - x, p_ends.diagonal - here);
+    if (!only_below) {
+      const F mass = (F::Load(sheet.mass + node) & (F::Load(sheet.w + node) > F::All(0))) * F::All(inertia);
+      of_node = of_node + edge(0, x_ends.right - x, p_ends.right - here) + Dot(here, here) * mass;
+    }
+    sum.Add(of_node, s);
+  });
+  return sum.Value();
+}
+
+inline double SheetCurvature(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
+                             bool above, int row0, int row1) {
+  double sum = above && row0 > 0 ? RowCurvature<true>(sheet, inertia, matrix, p, row0 - 1) : 0;
+  for (int row = row0; row < row1; ++row) {
+    sum += RowCurvature<false>(sheet, inertia, matrix, p, row);
+  }
+  return sum;
+}
+
+}  // namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE

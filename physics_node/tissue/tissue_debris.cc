@@ -1,0 +1,80 @@
+// Pieces of membrane that nothing holds any more.
+#include "physics_node/tissue/tissue_model.h"
+
+namespace fulcrum::physics {
+namespace {
+
+/// A piece of at most so many nodes (about 2 cm^2 of the built-in sheet) that nothing holds is debris. The search for
+/// an anchor looks no further, which keeps an edit cheap; larger pieces go on moving.
+constexpr std::size_t kLargestDebris = 250;
+
+}  // namespace
+
+/// Ends of the live edges of a node; kNoIndex where there is none.
+std::array<Index, 6> TissueModel::Neighbours(Index node) const {
+  const std::array<Index, 3> apart{1, cols(), cols() + 1};
+  std::array<Index, 6> ends;
+  ends.fill(kNoIndex);
+  const Index row = node / cols(), col = node % cols();
+  for (int d = 0; d < 3; ++d) {
+    const auto i = static_cast<std::size_t>(d);
+    if (EdgeAlive(node, d)) {
+      ends[i] = node + apart[i];
+    }
+    const bool inside = (d == 1 || col > 0) && (d == 0 || row > 0);
+    if (inside && EdgeAlive(node - apart[i], d)) {
+      ends[i + 3] = node - apart[i];
+    }
+  }
+  return ends;
+}
+
+/// Holds a piece of membrane in its place: the rim, or a binding to the organ.
+bool TissueModel::IsAnchor(Index node) const {
+  return scene_.inverse_mass[scene_.membrane.first + node] == 0.0f || binding_start_[node] < binding_start_[node + 1];
+}
+
+/// From each changed node, looks for an anchor among what it still hangs together with.
+void TissueModel::FindDebris(const std::vector<Index>& changed, ParticleStore* particles) {
+  for (const Index start : changed) {
+    if (!NodeAlive(start) || IsDebris(start)) {
+      continue;
+    }
+    ++search_;
+    piece_.assign(1, start);
+    visited_[start] = search_;
+    bool held = IsAnchor(start);
+    for (std::size_t i = 0; i < piece_.size() && !held; ++i) {
+      for (const Index next : Neighbours(piece_[i])) {
+        if (next != kNoIndex && visited_[next] != search_) {
+          visited_[next] = search_;
+          piece_.push_back(next);
+          held = held || IsAnchor(next) || piece_.size() > kLargestDebris;
+        }
+      }
+    }
+    if (held) {
+      continue;
+    }
+    for (const Index node : piece_) {
+      debris_[node] = 1;
+      particles->SetInverseMass(particles->Ref(scene_.membrane.first + node), 0.0f);
+    }
+    for (const Index node : piece_) {
+      RefreshTriangles(node);
+    }
+  }
+}
+
+void TissueModel::ForgetDebris(ParticleStore* particles) {
+  for (Index node = 0; node < debris_.size(); ++node) {
+    if (debris_[node] != 0) {
+      debris_[node] = 0;
+      particles->SetInverseMass(particles->Ref(scene_.membrane.first + node),
+                                BaseInverseMass(scene_.membrane.first + node));
+      RefreshTriangles(node);
+    }
+  }
+}
+
+}  // namespace fulcrum::physics

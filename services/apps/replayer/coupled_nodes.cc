@@ -1,0 +1,87 @@
+#include "services/apps/replayer/coupled_nodes.h"
+
+#include <filesystem>
+#include <string>
+#include <utility>
+
+#include "services/apps/replayer/what_if.h"
+#include "services/transport/bus/convert/cdr.h"
+#include "services/transport/bus/topics.h"
+
+namespace fulcrum::replay {
+namespace {
+
+constexpr std::size_t kKept = 2048;
+constexpr auto kDelay_ns = static_cast<std::int64_t>(1e9 * kCouplingDelay_s);
+
+template <class T>
+bool Decode(const Published& published, std::optional<T>* message) {
+  if (published.topic != bus::kTopicOf<T>) return false;
+  if (!bus::DecodeCdr(published.bytes, &message->emplace())) message->reset();
+  return message->has_value();
+}
+
+template <class T>
+void Keep(const std::optional<T>& sample, std::map<std::int64_t, T>* sent) {
+  if (!sample) return;
+  sent->insert_or_assign(sample->stamp.stamp_ns, *sample);
+  if (sent->size() > kKept) sent->erase(sent->begin());
+}
+
+}  // namespace
+
+CoupledNodes::CoupledNodes(const std::vector<NodeId>& nodes, const NodeMaking& making) {
+  std::filesystem::create_directories(making.folder);
+  for (const NodeId node : nodes) nodes_.emplace(node, MakeReplayedNode(node, making));
+}
+
+template <class T>
+void CoupledNodes::Replace(NodeId owner, std::vector<T>* inputs, const std::map<std::int64_t, T>& sent) const {
+  if (!Has(owner)) return;
+  std::vector<T> replaced;
+  for (const T& input : *inputs) {
+    // What the replayed node did not send at that moment does not come.
+    const auto found = sent.find(input.stamp.stamp_ns);
+    if (found != sent.end()) replaced.push_back(found->second);
+  }
+  *inputs = std::move(replaced);
+}
+
+Outcome CoupledNodes::Step(const RecordedTick& recorded) {
+  RecordedTick tick = recorded;
+  Replace(NodeId::kHaptics, &tick.tools, tools_);
+  Replace(NodeId::kPhysics, &tick.model, models_);
+  Replace(NodeId::kPhysics, &tick.cautery, cautery_);
+  const auto take_newest = [&tick]<class T>(std::deque<T>* sent, std::vector<T>* inputs) {
+    inputs->clear();
+    while (!sent->empty() && sent->front().stamp.stamp_ns + kDelay_ns <= tick.tick.stamp_ns) {
+      *inputs = {std::move(sent->front())};
+      sent->pop_front();
+    }
+  };
+  if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) take_newest(&topology_, &tick.topology);
+  if (tick.node == NodeId::kPhysics && Has(NodeId::kThermal)) take_newest(&open_cells_, &tick.open_cells);
+  if (tick.node == NodeId::kThermal && Has(NodeId::kPhysics)) take_newest(&tears_, &tick.tears);
+  ReplayedNode& node = *nodes_.at(tick.node);
+  Outcome outcome;
+  outcome.state_hash = node.Step(tick);
+  for (const Published& published : node.TakeOutputs()) {
+    if (std::optional<ThermalEvent> event; Decode(published, &event)) {
+      outcome.events.push_back(*event);
+    } else {
+      (void)(Decode(published, &outcome.tools) || Decode(published, &outcome.frame) ||
+             Decode(published, &outcome.model) || Decode(published, &outcome.cautery) ||
+             Decode(published, &outcome.topology) || Decode(published, &outcome.open_cells) ||
+             Decode(published, &outcome.tear) || Decode(published, &outcome.patch));
+    }
+  }
+  Keep(outcome.tools, &tools_);
+  Keep(outcome.model, &models_);
+  Keep(outcome.cautery, &cautery_);
+  if (outcome.topology && Has(NodeId::kPhysics)) topology_.push_back(*outcome.topology);
+  if (outcome.open_cells && Has(NodeId::kPhysics)) open_cells_.push_back(*outcome.open_cells);
+  if (outcome.tear && Has(NodeId::kThermal)) tears_.push_back(*outcome.tear);
+  return outcome;
+}
+
+}  // namespace fulcrum::replay

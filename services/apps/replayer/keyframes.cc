@@ -1,0 +1,166 @@
+#include "services/apps/replayer/keyframes.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace fulcrum::replay {
+namespace {
+
+struct Pipe {
+  int read = -1, write = -1;
+};
+
+Pipe MakePipe() {
+  std::array<int, 2> ends{};
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
+  return {ends[0], ends[1]};
+}
+
+pid_t Fork() {
+  // What stands in buffers would be written once by each.
+  std::fflush(nullptr);
+  const pid_t pid = ::fork();
+  if (pid < 0) throw std::runtime_error(std::string("fork: ") + std::strerror(errno));
+  return pid;
+}
+
+template <class T>
+bool ReadWhole(int file, T* value) {
+  ssize_t got = 0;
+  do {
+    got = ::read(file, value, sizeof(T));
+  } while (got < 0 && errno == EINTR);
+  return got == static_cast<ssize_t>(sizeof(T));
+}
+
+constexpr int kRunning = 0, kEnded = 1;
+struct News {
+  int kind;  ///< kRunning: of process `value`; kEnded: with exit code `value`.
+  int value;
+};
+// From the end of a process to the first word of the one that it has woken.
+constexpr int kHandover_ms = 2000;
+
+/// The exit code of the line; 1 when its running process died without a word. All that sleep hold the pipe open, so its
+/// end would not tell.
+int AwaitVerdict(int pipe) {
+  int running = -1;
+  int code = 1;
+  bool died = false;
+  for (;;) {
+    std::array<pollfd, 2> waits{{{pipe, POLLIN, 0}, {died ? -1 : running, POLLIN, 0}}};
+    const int ready = ::poll(waits.data(), waits.size(), died ? kHandover_ms : -1);
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) break;
+    if (waits[0].revents != 0) {
+      News news{};
+      if (!ReadWhole(pipe, &news)) break;
+      if (news.kind == kEnded) {
+        code = news.value;
+        break;
+      }
+      if (running >= 0) ::close(running);
+      running = static_cast<int>(::syscall(SYS_pidfd_open, news.value, 0));
+      died = running < 0;
+    } else {
+      died = true;
+    }
+  }
+  if (running >= 0) ::close(running);
+  return code;
+}
+
+}  // namespace
+
+int Keyframes::Run(const std::function<int(Keyframes*)>& body) {
+  const Pipe lifeline = MakePipe(), verdict = MakePipe();
+  const pid_t first = Fork();
+  if (first == 0) {
+    ::close(lifeline.write);
+    ::close(verdict.read);
+    // Keyframes that are let go, or have been woken, need nobody to wait for them.
+    ::signal(SIGCHLD, SIG_IGN);
+    ::signal(SIGPIPE, SIG_IGN);
+    Keyframes keyframes(lifeline.read, verdict.write);
+    keyframes.Tell(kRunning, ::getpid());
+    const int code = body(&keyframes);
+    std::fflush(nullptr);
+    keyframes.Tell(kEnded, code);
+    ::_exit(0);
+  }
+  ::close(lifeline.read);
+  ::close(verdict.write);
+  const int code = AwaitVerdict(verdict.read);
+  ::close(verdict.read);
+  ::close(lifeline.write);  // All that sleep end.
+  int status = 0;
+  while (::waitpid(first, &status, 0) < 0 && errno == EINTR) {
+  }
+  return code;
+}
+
+void Keyframes::Tell(int kind, int value) const {
+  const News news{kind, value};
+  (void)!::write(verdict_, &news, sizeof(news));
+}
+
+std::optional<double> Keyframes::Keep(double time_s) {
+  if (!kept_.empty() && time_s < kept_.back().time_s + spacing_s_) return std::nullopt;
+  if (kept_.size() == kMost) {
+    for (std::size_t i = 1; i < kept_.size(); i += 2) {
+      // Others that sleep hold this end, too: closing it would tell nothing.
+      const double end = std::numeric_limits<double>::quiet_NaN();
+      (void)!::write(kept_[i].wake, &end, sizeof(end));
+      ::close(kept_[i].wake);
+    }
+    std::vector<Keyframe> left;
+    for (std::size_t i = 0; i < kept_.size(); i += 2) left.push_back(kept_[i]);
+    kept_ = std::move(left);
+    spacing_s_ *= 2;
+  }
+  const Pipe wake = MakePipe();
+  pid_t pid = Fork();
+  if (pid != 0) {
+    ::close(wake.read);
+    kept_.push_back({time_s, wake.write});
+    return std::nullopt;
+  }
+  for (;;) {
+    std::array<pollfd, 2> waits{{{wake.read, POLLIN, 0}, {lifeline_, POLLIN, 0}}};
+    if (::poll(waits.data(), waits.size(), -1) < 0 && errno == EINTR) continue;
+    double wanted_s = 0;
+    if (waits[1].revents != 0 || !ReadWhole(wake.read, &wanted_s) || std::isnan(wanted_s)) ::_exit(0);
+    // One copy goes on, this one stays to be gone back to again.
+    pid = Fork();
+    if (pid == 0) {
+      ::close(wake.read);
+      kept_.push_back({time_s, wake.write});
+      Tell(kRunning, ::getpid());
+      return wanted_s;
+    }
+  }
+}
+
+void Keyframes::GoBack(double time_s) {
+  std::fflush(nullptr);
+  for (auto k = kept_.rbegin(); k != kept_.rend(); ++k) {
+    // One that was let go by a later process has closed its end.
+    if (k->time_s <= time_s && ::write(k->wake, &time_s, sizeof(time_s)) == sizeof(time_s)) ::_exit(0);
+  }
+}
+
+}  // namespace fulcrum::replay

@@ -1,0 +1,19 @@
+// The result of a lock-step replay, for people and for programs.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "services/apps/replayer/lock_step.h"
+
+namespace fulcrum::replay {
+
+/// A line a node, then what differed or was missing, then the verdict.
+[[nodiscard]] std::string ReportText(const LockStepResult& result);
+
+/// One flat object: `same`, `speed_x_realtime`, `session_s`, and for each node `<node>.ticks`, `.compared`,
+/// `.mismatches` (at most 1 when a node stops at its first), `.starts`, `.busy_s`, `.departure`, `.missing`. Throws
+/// InputError when the file cannot be written.
+void WriteReportJson(const LockStepResult& result, const std::filesystem::path& file);
+
+}  // namespace fulcrum::replay

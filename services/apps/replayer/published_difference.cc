@@ -1,0 +1,53 @@
+#include "services/apps/replayer/published_difference.h"
+
+#include <algorithm>
+#include <optional>
+#include <span>
+#include <type_traits>
+
+#include "services/base/core/message_difference.h"
+#include "services/records/recording/mcap_reader.h"
+#include "services/transport/bus/convert/cdr.h"
+#include "services/transport/bus/topics.h"
+
+namespace fulcrum::replay {
+namespace {
+
+/// Of one topic: `bytes` was recorded.
+template <class T>
+std::optional<std::string> Compare(std::span<const std::uint8_t> bytes, std::uint64_t epoch, std::int64_t stamp_ns,
+                                   const std::vector<Published>& now) {
+  T recorded;
+  if (!bus::DecodeCdr(bytes, &recorded)) return std::nullopt;
+  const Stamp& stamp = bus::StampOf(recorded);
+  if (stamp.epoch != epoch || stamp.stamp_ns != stamp_ns) return std::nullopt;
+  const auto found =
+      std::find_if(now.begin(), now.end(), [](const Published& p) { return p.topic == bus::kTopicOf<T>; });
+  const std::string label(bus::TopicLabel(bus::kTopicOf<T>));
+  if (found == now.end()) return label + " was published then and is not now";
+  T replayed;
+  if (!bus::DecodeCdr(found->bytes, &replayed)) return std::nullopt;
+  // Samples are numbered from the first reader on, which a replay has at once.
+  const auto difference = FirstDifference(recorded, replayed, "stamp");
+  if (!difference) return std::nullopt;
+  return label + "." + difference->field + ": recorded " + difference->first + ", replayed " + difference->second;
+}
+
+}  // namespace
+
+std::string DescribeDifference(const std::filesystem::path& recording, std::uint64_t epoch, std::int64_t stamp_ns,
+                               const std::vector<Published>& now) {
+  recording::McapReader reader(recording);
+  recording::McapMessage message{};
+  while (reader.Next(&message)) {
+    const bus::TopicRole* role = bus::RoleNamed(reader.channels().at(message.channel).topic);
+    // What a node says of itself is no result.
+    if (role == nullptr || !role->one_owner()) continue;
+    const auto found = bus::WithMessageOf(
+        role->id, [&]<class T>(std::type_identity<T>) { return Compare<T>(message.data, epoch, stamp_ns, now); });
+    if (found) return *found;
+  }
+  return "nothing that it published in this tick differs: the difference is inside";
+}
+
+}  // namespace fulcrum::replay

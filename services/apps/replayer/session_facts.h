@@ -1,0 +1,25 @@
+// What every way of replaying asks of cart and session.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "services/base/config/cart.h"
+#include "services/base/core/messages.h"
+#include "services/records/recording/recorded_scene.h"
+
+namespace fulcrum::replay {
+
+/// Nominal period by node [s], in whole nanoseconds, as the cyclic thread counts.
+[[nodiscard]] inline std::array<double, kNodeCount> NodePeriods(const config::CartConfig& cart) {
+  std::array<double, kNodeCount> period_s{};
+  for (const NodeId node : {NodeId::kHandleBridge, NodeId::kHaptics, NodeId::kPhysics, NodeId::kThermal}) {
+    period_s[static_cast<std::size_t>(node)] = 1e-9 * std::round(1e9 / cart.timing(node).rate_Hz);
+  }
+  return period_s;
+}
+
+using recording::RefuseOtherScene;
+
+}  // namespace fulcrum::replay

@@ -1,0 +1,119 @@
+// From a recording to the ticks of some nodes, each with the inputs that it consumed.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "services/apps/replayer/recorded_tick.h"
+#include "services/records/recording/mcap_reader.h"
+
+namespace fulcrum::replay {
+
+/// Sequence of one writer's sample: (epoch, sequence).
+using SampleKey = std::pair<std::uint64_t, std::uint64_t>;
+
+/// The newest samples of a topic by epoch and sequence.
+template <class T>
+class SampleShelf {
+ public:
+  explicit SampleShelf(std::size_t limit) : limit_(limit) {}
+  void Put(const T& sample) {
+    samples_.insert_or_assign(SampleKey{sample.stamp.epoch, sample.stamp.sequence}, sample);
+    if (samples_.size() > limit_) samples_.erase(samples_.begin());
+  }
+  [[nodiscard]] const T* Find(const SampleKey& key) const {
+    const auto found = samples_.find(key);
+    return found == samples_.end() ? nullptr : &found->second;
+  }
+  /// Whether all of that writer is there up to the one before, and nothing after.
+  [[nodiscard]] bool EndsBefore(const SampleKey& key) const {
+    const auto next = samples_.lower_bound(key);
+    const bool nothing_after = next == samples_.end() || next->first.first != key.first;
+    return nothing_after && Find({key.first, key.second - 1}) != nullptr;
+  }
+
+ private:
+  std::size_t limit_;
+  std::map<SampleKey, T> samples_;
+};
+
+/// Reads the recording once, from its beginning, and holds back each tick until its inputs must have come: a sample may
+/// stand after the manifest of the tick that consumed it, since topics reach a recorder on their own ways.
+///
+/// Physics and thermal tell of each tick by a TickManifest. Of haptics each ToolState is a tick, and the manifests say
+/// which of them took a contact model.
+class TickSource {
+ public:
+  /// @param nodes those of physics, thermal and haptics that are wanted.
+  /// @param period_s nominal period by node.
+  /// Throws InputError when the file cannot be read.
+  TickSource(const std::filesystem::path& file, const std::vector<NodeId>& nodes,
+             const std::array<double, kNodeCount>& period_s);
+
+  /// The next tick in the order of their times; false at the end of the recording.
+  bool Next(RecordedTick* tick);
+
+  /// See McapReader::Reopen().
+  void Reopen() { reader_.Reopen(); }
+
+  /// The session, once it was met.
+  [[nodiscard]] const std::optional<SceneManifest>& session() const { return session_; }
+  [[nodiscard]] const recording::McapReader& reader() const { return reader_; }
+  /// Messages that no type could make anything of.
+  [[nodiscard]] std::uint64_t undecodable() const { return undecodable_; }
+
+  /// A tick is complete when the recording has gone on for this long after it [ns].
+  static constexpr std::int64_t kSettle_ns = 1'000'000'000;
+
+ private:
+  void Take(const recording::McapMessage& message);
+  template <class T>
+  bool Decode(const recording::McapMessage& message, T* sample);
+  void TakeManifest(const TickManifest& manifest);
+  void TakeToolState(const ToolState& tools);
+  void Complete(RecordedTick* tick);
+  void CompleteHaptics(RecordedTick* tick);
+  template <class T>
+  void Fetch(const RecordedTick& tick, const ConsumedInput& consumed, const SampleShelf<T>& shelf,
+             std::vector<T>* samples, std::string* missing);
+  [[nodiscard]] bool wanted(NodeId node) const { return wanted_[static_cast<std::size_t>(node)]; }
+
+  struct Pending {
+    RecordedTick tick;
+    std::vector<ConsumedInput> consumed;
+    std::uint64_t sequence = 0;  ///< Of the message that told of it: a gap is a tick that the recording lost.
+  };
+  struct Progress {
+    std::uint64_t epoch = 0, sequence = 0, index = 0;
+    std::map<TopicId, SampleKey> consumed;
+  };
+
+  recording::McapReader reader_;
+  std::array<bool, kNodeCount> wanted_{};
+  std::array<double, kNodeCount> period_s_{};
+  std::map<std::uint16_t, TopicId> topic_of_;
+  std::optional<SceneManifest> session_;
+  SampleShelf<ToolState> tools_{4096};
+  SampleShelf<HandleState> handles_{4096};
+  SampleShelf<GeneratorSetting> generator_{512};
+  SampleShelf<TopologyState> topology_{128};
+  SampleShelf<OpenCells> open_cells_{512};
+  SampleShelf<TearState> tears_{128};
+  SampleShelf<CauteryContact> cautery_{1024};
+  SampleShelf<ContactModel> models_{1024};
+  std::map<std::int64_t, TickManifest> haptics_manifests_;  ///< By the stamp of their tick.
+  std::multimap<std::int64_t, Pending> pending_;            ///< By the stamp of the tick.
+  std::array<Progress, kNodeCount> progress_;
+  std::int64_t newest_ns_ = 0;
+  std::uint64_t undecodable_ = 0;
+  bool ended_ = false;
+};
+
+}  // namespace fulcrum::replay

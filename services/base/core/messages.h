@@ -1,0 +1,382 @@
+// Value types of the topics. Nodes see these and never a generated type: services/transport/bus/convert maps them to
+// IDL.
+//
+// Conventions: SI units; world frame W right-handed, z up, metres; a tool frame T has its origin at the tip and +z
+// along the shaft from the handle towards the tip; quaternions are unit, (w, x, y, z) in IDL. Each field is described
+// again, with rate, QoS and owner, in idl/README.md.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "services/base/core/footprint.h"
+#include "services/base/core/types.h"
+
+namespace fulcrum {
+
+inline constexpr int kMaxTools = 2;               ///< Devices, handles and tools on one cart.
+inline constexpr int kMaxContacts = 4;            ///< Contacts per tool in a ContactModel.
+inline constexpr int kMaxTissueVertices = 25600;  ///< Capacity of a TissueFrame: 25600 * 12 B = 300 KiB.
+inline constexpr int kMaxMembraneNodes = 24576;   ///< Capacity of a TopologyState.
+inline constexpr int kPatchTexels = 256;          ///< Edge of a TemperaturePatch.
+inline constexpr int kAtlasTexels = 4096;         ///< Edge of the atlas.
+
+/// Identifies one sample of one writer.
+struct Stamp {
+  std::uint64_t sequence = 0;  ///< Starts at 1 and grows by 1 per sample of this writer.
+  std::uint64_t epoch = 0;     ///< CLOCK_MONOTONIC [ns] when the writer started: grows with each restart.
+  std::int64_t stamp_ns = 0;   ///< CLOCK_MONOTONIC of the data [ns].
+};
+
+enum class NodeId : std::uint8_t { kSupervisor, kHandleBridge, kHaptics, kPhysics, kThermal, kRender, kRecorder };
+inline constexpr int kNodeCount = 7;
+/// "supervisor", "handle_bridge", "haptics_node", ...: the name of the executable.
+const char* NodeName(NodeId node);
+
+// ---------------------------------------------------------------------------------------------- HandleState
+
+enum PedalBits : std::uint8_t { kPedalNone = 0, kPedalCut = 1, kPedalCoag = 2, kPedalBlend = 4 };
+
+struct HandleSample {
+  bool present = false;
+  float jaw_angle_rad = 0;  ///< 0 closed … about 1.05 open.
+  float jaw_rate_rad_s = 0;
+  float quality = 0;  ///< 0 unusable … 1 every line of the last half second was valid.
+  std::uint16_t raw_counts = 0;
+};
+
+struct HandleState {
+  Stamp stamp;
+  std::array<HandleSample, kMaxTools> handles;
+  std::uint8_t pedals = kPedalNone;  ///< PedalBits.
+};
+
+// ------------------------------------------------------------------------------------------ GeneratorSetting
+
+enum class CauteryMode : std::uint8_t { kOff, kCut, kCoag, kBlend };
+
+inline constexpr float kMaxSetPower_W = 300.0f;  ///< Of a GeneratorSetting.
+
+/// What the panel of the electrosurgical generator is set to, by mode [W].
+struct GeneratorSetting {
+  Stamp stamp;  ///< stamp_ns: from then on it holds.
+  float cut_W = 0;
+  float coag_W = 0;
+  float blend_W = 0;
+};
+
+// ------------------------------------------------------------------------------------------------ ToolState
+
+enum class ToolKind : std::uint8_t { kNone, kGrasper, kHook, kScissors };
+enum class ServoState : std::uint8_t { kOff, kNormal, kHold, kFade, kRise };
+
+struct ToolSample {
+  ToolKind kind = ToolKind::kNone;
+  ServoState state = ServoState::kOff;
+  Vec3f p_WT = Vec3f::Zero();  ///< Tip (proxy of the virtual coupling) [m].
+  Quatf q_WT = Quatf::Identity();
+  Vec3f v_WT = Vec3f::Zero();  ///< Tip velocity [m/s].
+  Vec3f w_WT = Vec3f::Zero();  ///< Angular velocity [rad/s].
+  Vec3f f_W = Vec3f::Zero();   ///< Force sent to the hand, at the tip, after all limits [N].
+  float model_age_s = 0;       ///< Age of the contact model in use [s].
+};
+
+struct ToolState {
+  Stamp stamp;
+  std::array<ToolSample, kMaxTools> tools;
+};
+
+// ---------------------------------------------------------------------------------------------- TissueFrame
+
+struct TissueFrameHeader {
+  Stamp stamp;
+  std::uint64_t scene_hash = 0;
+  std::uint64_t topology_revision = 0;  ///< Revision that these positions respect.
+  std::uint64_t tool_sequence = 0;      ///< ToolState consumed.
+  std::uint64_t handle_sequence = 0;    ///< HandleState consumed.
+  double session_time_s = 0;
+  double simulated_time_s = 0;  ///< Of these positions: what breathes is where it is then.
+  std::uint32_t vertex_count = 0;
+  /// Bit per tool: the grasper holds tissue.
+  std::uint32_t grasping_tools = 0;
+};
+
+/// Positions of all simulated particles in scene order [m], x y z interleaved.
+struct TissueFrame {
+  TissueFrameHeader header;
+  std::vector<float> xyz;
+  struct View {
+    TissueFrameHeader& header;
+    std::span<float> xyz;  ///< Capacity 3 * kMaxTissueVertices; write the first 3 * vertex_count.
+  };
+};
+
+// --------------------------------------------------------------------------------------------- ContactModel
+
+enum class ContactKind : std::uint8_t { kNone, kSurface, kGrasp };
+
+/// Local model of one contact, evaluated by the servo at 1 kHz between two messages. All in frame W, SI.
+struct Contact {
+  ContactKind kind = ContactKind::kNone;
+  std::uint32_t id = 0;         ///< Stays the same while the contact lasts.
+  Vec3f x_ref = Vec3f::Zero();  ///< Tool tip at which f_ref was measured [m].
+  Vec3f f_ref = Vec3f::Zero();  ///< Force of the tissue on the tool at x_ref [N].
+  Vec3f n = Vec3f::UnitZ();     ///< Outward surface normal.
+  Vec3f e1 = Vec3f::UnitX();    ///< First principal tangent.
+  Vec3f p_s = Vec3f::Zero();    ///< Point of the undeformed-by-this-tool surface [m].
+  Vec3f v_s = Vec3f::Zero();    ///< Its velocity [m/s].
+  Vec3f u_c = Vec3f::Zero();    ///< Tissue displacement at the contact [m].
+  Vec3f du_c = Vec3f::Zero();   ///< Its rate [m/s].
+  float gap = 0;                ///< > 0 before touch [m].
+  float k1 = 0;                 ///< Linear skin stiffness [N/m].
+  float k3 = 0;                 ///< Cubic skin stiffness [N/m^3].
+  float kt = 0;                 ///< Tangential stiffness [N/m].
+  float k_body = 0;             ///< Elastic stiffness of the bulk, Kb [N/m].
+  float b_body = 0;             ///< Viscosity of the bulk, Bb [N s/m].
+  float friction = 0;
+  float kappa1 = 0, kappa2 = 0;  ///< Principal curvatures [1/m].
+  float slip_force = 0;          ///< A grasp lets go above this force [N].
+  float radius = 0;              ///< The model holds within this distance of x_ref [m].
+};
+
+struct DeviceContacts {
+  std::uint32_t count = 0;
+  float p_ext_W = 0;      ///< Power that the tissue may bring in from outside [W].
+  float force_cap_N = 0;  ///< No force above this.
+  std::array<Contact, kMaxContacts> contacts;
+};
+
+struct ContactModel {
+  Stamp stamp;
+  std::uint64_t tool_sequence = 0;  ///< ToolState that it was computed for.
+  std::int64_t tool_stamp_ns = 0;   ///< Stamp of that ToolState: t_s of the model [ns].
+  float physics_dt_s = 0;
+  std::array<DeviceContacts, kMaxTools> devices;
+};
+
+// ------------------------------------------------------------------------------------------- CauteryContact
+
+/// Where the metal of the active electrode is. What current it carries: HandleState and GeneratorSetting say it
+/// (services/base/core/generator_inputs.h).
+struct CauteryContact {
+  Stamp stamp;
+  double session_time_s = 0;
+  std::uint64_t topology_revision = 0;
+  bool touching = false;  ///< The metal touches the membrane, or is near enough for an arc.
+  bool tented = false;    ///< Membrane lifted off the tissue beneath.
+  std::uint8_t tool = 0;
+  std::uint32_t triangle = kNoIndex;  ///< Membrane triangle: 2 * cell + half, cell = row * (cols-1) + col.
+  std::array<float, 3> barycentric{0, 0, 0};
+  Vec2f material = Vec2f::Zero();       ///< (s, t) of the contact's centre on the rest sheet [m].
+  Vec2f material_rate = Vec2f::Zero();  ///< [m/s].
+  float contact_radius_m = 0;           ///< Of the metal around its axis.
+  Footprint footprint;                  ///< Of the bare metal on the deformed sheet.
+};
+
+// -------------------------------------------------------------------------------------------- TopologyState
+
+/// Whole state of what has been cut and shrunk. Membrane node = row * cols + col; edge = 3 * node + direction with
+/// direction 0 to (row, col+1), 1 to (row+1, col), 2 to (row+1, col+1).
+struct TopologyState {
+  Stamp stamp;
+  std::uint64_t scene_hash = 0;
+  std::uint64_t revision = 0;  ///< 0: nothing has happened yet.
+  std::uint32_t rows = 0;
+  std::uint32_t cols = 0;
+  float cut_length_m = 0;
+  float cut_width_m = 0;                 ///< Of the slit, 95th percentile along it.
+  float cut_off_way_m = 0;               ///< Of the slit's centre line from the metal's way, 95th percentile.
+  std::vector<std::uint8_t> dead_nodes;  ///< Bit field, rows * cols bits, least significant bit first.
+  std::vector<std::uint8_t> dead_edges;  ///< Bit field, 3 * rows * cols bits.
+  std::vector<std::uint8_t> shrink;      ///< Per edge: rest length is scaled by 1 - kShrinkUnit * value.
+};
+inline constexpr float kShrinkUnit = 0.002f;
+
+/// Whole state of what traction has torn since the start of the session. The owner of the topology severs these edges;
+/// until TopologyState says so, they hold.
+struct TearState {
+  Stamp stamp;
+  std::uint64_t scene_hash = 0;
+  std::uint32_t rows = 0;
+  std::uint32_t cols = 0;
+  std::vector<std::uint8_t> torn_edges;  ///< Bit field, 3 * rows * cols bits, as TopologyState::dead_edges.
+};
+
+inline constexpr int kOpenWindow = 64;  ///< Cells along the edge of OpenCells.
+
+/// Which cells of the sheet around the hook are gone. A cut opens cells long before it severs the edges of the mesh
+/// that they belong to.
+struct OpenCells {
+  Stamp stamp;
+  std::uint64_t scene_hash = 0;
+  std::int32_t x = 0, y = 0;                      ///< floor(s / cell_m), floor(t / cell_m) of the first cell.
+  std::array<std::uint64_t, kOpenWindow> rows{};  ///< Bit per cell.
+
+  [[nodiscard]] bool IsOpen(std::int32_t ix, std::int32_t iy) const {
+    const std::int64_t i = std::int64_t{ix} - x, j = std::int64_t{iy} - y;
+    return i >= 0 && j >= 0 && i < kOpenWindow && j < kOpenWindow &&
+           ((rows[static_cast<std::size_t>(j)] >> static_cast<unsigned>(i)) & 1u) != 0;
+  }
+};
+
+inline bool TestBit(std::span<const std::uint8_t> bits, std::size_t i) { return (bits[i >> 3] >> (i & 7u)) & 1u; }
+inline void SetBit(std::span<std::uint8_t> bits, std::size_t i) {
+  bits[i >> 3] = static_cast<std::uint8_t>(bits[i >> 3] | (1u << (i & 7u)));
+}
+
+// ----------------------------------------------------------------------------------------- TemperaturePatch
+
+struct TemperaturePatchHeader {
+  Stamp stamp;
+  std::uint64_t topology_revision = 0;
+  std::uint32_t slot = 0;      ///< Which hot spot; a slot is reused when its spot has gone cold.
+  std::uint32_t origin_x = 0;  ///< Texel of the atlas where the patch begins (s direction).
+  std::uint32_t origin_y = 0;  ///< (t direction).
+  float max_temperature_C = 0;
+};
+
+/// 256 x 256 texels of four bytes, row by row (t slow, s fast):
+/// temperature (20 °C + value * 0.5 K), damage (255 * (1 - exp(-Omega_collagen))), dryness and char (0 wet, 128 dry,
+/// 255 char), alive (255) or removed (0).
+struct TemperaturePatch {
+  TemperaturePatchHeader header;
+  std::vector<std::uint8_t> texels;
+  struct View {
+    TemperaturePatchHeader& header;
+    std::span<std::uint8_t> texels;  ///< 4 * 256 * 256.
+  };
+};
+
+// --------------------------------------------------------------------------------------------- ThermalEvent
+
+enum class ThermalEventKind : std::uint8_t {
+  kContact,
+  kBlanch,
+  kSteam,
+  kCut,
+  kChar,
+  kUreterWarning,
+  kUreterInjury,
+  kNerveWarning,
+  kNerveInjury,
+  kQuarantine
+};
+
+struct ThermalEvent {
+  Stamp stamp;
+  double session_time_s = 0;
+  ThermalEventKind kind = ThermalEventKind::kContact;
+  Vec2f material = Vec2f::Zero();  ///< Where on the sheet (s, t) [m].
+  float temperature_C = 0;
+  float value = 0;  ///< Kind-specific: cut length so far [m] for kCut, damage integral for injuries.
+  std::uint64_t topology_revision = 0;
+};
+
+// --------------------------------------------------------------------------- SceneManifest, Command, TickManifest
+
+enum class SessionMode : std::uint8_t { kLive, kLockStep };
+
+struct SceneManifest {
+  Stamp stamp;
+  std::string scene_name;
+  std::string session_id;
+  std::uint64_t scene_hash = 0;
+  std::int64_t session_start_ns = 0;  ///< CLOCK_MONOTONIC at session time 0 [ns].
+  SessionMode mode = SessionMode::kLive;
+  bool recorded = false;  ///< By a recorder of the session: who has just come lets it find him before he begins.
+};
+
+struct Command {
+  Stamp stamp;
+  std::uint64_t request_id = 0;
+  NodeId target = NodeId::kSupervisor;
+  std::string verb;
+  std::string argument;
+};
+
+struct CommandReply {
+  Stamp stamp;
+  std::uint64_t request_id = 0;
+  NodeId from_node = NodeId::kSupervisor;
+  bool ok = false;
+  std::string text;
+};
+
+/// Every message, M(T) each, in the order of the topics' numbers: a new one goes to the end. What treats all messages
+/// alike is made from this list: TopicId, the roles (services/transport/bus/topics.h), the gate's declarations, the
+/// ports.
+// clang-format off
+#define FULCRUM_MESSAGES(M) \
+  M(HandleState) M(ToolState) M(TissueFrame) M(ContactModel) M(CauteryContact) M(TopologyState) \
+  M(TemperaturePatch) M(ThermalEvent) M(SceneManifest) M(Command) M(CommandReply) M(TickManifest) \
+  M(Health) M(TearState) M(OpenCells) M(GeneratorSetting)
+// clang-format on
+
+#define FULCRUM_TOPIC_ID(T) k##T,
+enum class TopicId : std::uint8_t { FULCRUM_MESSAGES(FULCRUM_TOPIC_ID) };
+#undef FULCRUM_TOPIC_ID
+#define FULCRUM_ONE_MORE(T) +1
+inline constexpr int kTopicCount = 0 FULCRUM_MESSAGES(FULCRUM_ONE_MORE);
+#undef FULCRUM_ONE_MORE
+
+struct ConsumedInput {
+  TopicId topic = TopicId::kHandleState;
+  std::uint64_t epoch = 0;
+  std::uint64_t sequence = 0;  ///< 0: none yet.
+};
+
+struct TickManifest {
+  Stamp stamp;
+  NodeId node = NodeId::kPhysics;
+  std::uint64_t tick = 0;
+  double session_time_s = 0;
+  std::uint64_t state_hash = 0;
+  std::vector<ConsumedInput> consumed;  ///< At most kMaxConsumedInputs of services/transport/bus/gate.h.
+};
+
+// --------------------------------------------------------------------------------------------------- Health
+
+enum class HealthState : std::uint8_t { kStarting, kWaiting, kRunning, kDegraded, kStopping };
+
+struct TimingSummary {
+  float p50_us = 0, p99_us = 0, max_us = 0;
+};
+
+struct InputHealth {
+  TopicId topic = TopicId::kHandleState;
+  bool matched = false;  ///< A writer is alive.
+  float age_ms = 0;      ///< Of the newest sample; negative when there is none yet.
+  std::uint64_t received = 0;
+  std::uint64_t lost = 0;      ///< Gaps in the sequence.
+  std::uint64_t rejected = 0;  ///< Dropped at the gate (not finite, out of range, wrong scene).
+};
+
+/// A named figure of a node, for example "peak_force_N" or "cut_length_mm".
+struct Metric {
+  std::string name;  ///< At most 31 characters, unit as suffix.
+  double value = 0;
+};
+
+struct Health {
+  Stamp stamp;
+  NodeId node = NodeId::kSupervisor;
+  HealthState state = HealthState::kStarting;
+  std::int32_t pid = 0;
+  std::uint64_t schema_hash = 0;
+  std::uint64_t scene_hash = 0;
+  float rate_asked_Hz = 0;
+  float rate_achieved_Hz = 0;  ///< Over the last second.
+  std::uint64_t ticks = 0;
+  std::uint64_t overruns = 0;  ///< Periods skipped since the start.
+  std::uint64_t write_failures = 0;
+  TimingSummary step;               ///< Of the step itself, since the start.
+  TimingSummary wake;               ///< Lateness of the wake-up, since the start.
+  std::string last_error;           ///< At most 255 characters; empty when all is well.
+  std::vector<InputHealth> inputs;  ///< At most 16.
+  std::vector<Metric> metrics;      ///< At most 24.
+};
+
+}  // namespace fulcrum

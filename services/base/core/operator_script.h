@@ -1,0 +1,45 @@
+// The scripted operator: one interpolation for everybody who follows SceneView.script (simulated hand, simulated
+// handle).
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <span>
+
+#include "services/base/core/scene_view.h"
+
+namespace fulcrum {
+
+struct ScriptPoint {
+  bool present = false;  ///< The script has keys for this tool.
+  Vec3f p_W = Vec3f::Zero();
+  float jaw_rad = 0;
+  std::uint32_t pedals = 0;
+  float power_W = 0;
+};
+
+/// Script of one tool at session time `time_s`. Place and jaw go from key to key along a smoothstep, at rest at each
+/// key; pedals and power hold from their key to the next. Before the first key (also while no session is known) tool
+/// and jaw are at that key with pedals up; after the last key everything is as in the last key.
+/// @param script keys sorted by tool, then time.
+[[nodiscard]] inline ScriptPoint EvaluateScript(std::span<const ScriptKey> script, std::uint32_t tool, double time_s) {
+  const auto first = std::lower_bound(script.begin(), script.end(), tool,
+                                      [](const ScriptKey& key, std::uint32_t t) { return key.tool < t; });
+  const auto end = std::find_if(first, script.end(), [tool](const ScriptKey& key) { return key.tool != tool; });
+  if (first == end) {
+    return {};
+  }
+  const auto next = std::find_if(first, end, [time_s](const ScriptKey& key) { return key.time_s > time_s; });
+  if (next == first) {
+    return {true, first->p_W, first->jaw_rad, 0u, 0.0f};
+  }
+  const ScriptKey& a = *(next - 1);
+  if (next == end) {
+    return {true, a.p_W, a.jaw_rad, a.pedals, a.power_W};
+  }
+  const auto u = static_cast<float>((time_s - a.time_s) / (next->time_s - a.time_s));
+  const float w = u * u * (3.0f - 2.0f * u);
+  return {true, a.p_W + w * (next->p_W - a.p_W), a.jaw_rad + w * (next->jaw_rad - a.jaw_rad), a.pedals, a.power_W};
+}
+
+}  // namespace fulcrum

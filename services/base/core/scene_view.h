@@ -1,0 +1,264 @@
+// A compiled scene as plain data: what the solvers and nodes read. The arrays live in a memory-mapped scene file
+// (services/scene) or, in tests, in a SceneData on the heap. No I/O here.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "services/base/core/assessment.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/types.h"
+
+namespace fulcrum {
+
+// ------------------------------------------------------------------------------------------- parameters (POD)
+
+enum class PhysicsMode : std::uint32_t { kPaper = 0, kXpbd = 1, kAccurate = 2 };
+
+/// How much the accurate solver does in a step: substeps x iterations of the global solve.
+enum class PhysicsPreset : std::uint32_t { kFast = 0, kDefault = 1, kAccurate = 2, kReference = 3 };
+
+/// Section `physics` of a scene. Stiffnesses k are PBD's, in (0, 1] per iteration, and belong to the paper's mode; the
+/// moduli are SI, are what the other modes solve for, and give the forces of all.
+struct PhysicsParams {
+  PhysicsMode mode = PhysicsMode::kPaper;
+  PhysicsPreset preset = PhysicsPreset::kDefault;
+  std::uint32_t substeps = 20;  ///< Of mode xpbd.
+  std::uint32_t iterations = 3;
+  float dt_s = 0.01f;
+  float damping_per_s = 3.0f;
+  Vec3f gravity = Vec3f::Zero();  ///< [m/s^2]; zero in the paper preset: the rest shape is the shape under load.
+  float k_stretch_tube = 0.8f;
+  float k_stretch_membrane = 0.9f;
+  float k_volume = 0.8f;
+  float k_bending = 0.1f;
+  float k_binding = 0.01f;  ///< In tension; ten times as much in compression (capped at 1).
+  float tube_youngs_modulus_Pa = 1.0e5f;
+  float tube_poisson = 0.45f;
+  float membrane_Et_N_per_m = 150.0f;    ///< Young's modulus times thickness.
+  float membrane_stiffening = 0.0f;      ///< J-shape: tension is E t (e + c e^3) at engineering strain e.
+  float membrane_prestrain = 0.0f;       ///< Strain of the membrane in the rest shape.
+  float membrane_bending_Nm = 2.0e-6f;   ///< Flexural rigidity.
+  float fat_youngs_modulus_Pa = 3.0e3f;  ///< Of the fat between membrane and organ, which the bindings stand for.
+  float friction = 0.2f;
+  float collision_margin_m = 0.0005f;
+  float grasp_radius_m = 0.004f;  ///< Particles within this distance of the jaw's centre line are held.
+  float grasp_close_rad = 0.25f;  ///< The jaw grasps below this angle …
+  float grasp_open_rad = 0.45f;   ///< … and lets go above this one.
+  float grip_force_N = 8.0f;      ///< Slips above this traction.
+  /// Principal stretch at which the membrane tears; 0: never. Porcine mesentery and peritoneum fail at 1.77 to 3.18;
+  /// the built-in scene's script comes to 2.72 beside the jaws.
+  float tear_stretch = 3.1f;
+};
+
+/// What thermal_node computes; thermal_node/DESIGN.md.
+enum class ThermalModel : std::uint32_t { kAccurate = 0, kPaper = 1 };
+
+/// Section `thermal`. Defaults: peritoneum on fat, lab values.
+struct ThermalParams {
+  ThermalModel model = ThermalModel::kAccurate;
+  float cell_m = 1.0e-4f;
+  float thickness_m = 3.0e-4f;
+  float density_kg_m3 = 1050.0f;
+  float heat_capacity_J_kgK = 3400.0f;
+  float conductivity_W_mK = 0.45f;
+  float latent_heat_J_m3 = 1.6e9f;
+  float body_temperature_C = 37.0f;
+  float h_top_W_m2K = 25.0f;
+  float h_below_W_m2K = 350.0f;
+  float h_tented_W_m2K = 20.0f;
+  float perfusion_per_s = 0.002f;
+  float sigma_S_m = 0.35f;  ///< Electrical conductivity of the membrane at body temperature.
+  float sigma_per_K = 0.015f;
+  float sigma_fat_S_m = 0.035f;
+  float fat_depth_m = 0.005f;  ///< H of the leak g = sigma_fat / H.
+  float v_max_V = 350.0f;
+  float i_max_A = 2.0f;
+  float hook_radius_m = 0.0005f;
+  float shrink_max = 0.3f;   ///< Rest length lost at full collagen damage.
+  std::uint32_t volume = 0;  ///< 1: heat and damage are computed in depth, too; h_below_W_m2K is then not used.
+};
+
+/// Section `breathing`: to-and-fro of the abdominal wall and what else of the surroundings breathes;
+/// services/base/core/breathing.h.
+struct Breathing {
+  Vec3f direction = Vec3f::UnitZ();  ///< Unit, frame W: where they go from their place in the scene.
+  float amplitude_m = 0;             ///< Peak to peak; 0: none.
+  float period_s = 4;
+};
+
+/// Section `render`.
+struct RenderParams {
+  std::uint32_t width = 960, height = 540;
+  float rate_Hz = 15.0f;
+  float png_rate_Hz = 2.0f;
+  Vec3f scope_tip_W = Vec3f(0, 0, 0.2f);  ///< Laparoscope tip [m].
+  Vec3f scope_target_W = Vec3f::Zero();
+  float fov_deg = 60.0f;
+  float scope_angle_deg = 30.0f;  ///< 0 or 30 degree optics.
+  float roll_deg = 0.0f;          ///< Of the horizon, clockwise in the picture.
+  std::uint32_t hud = 1;          ///< 0: no figures in the picture; warnings stay.
+};
+
+/// Section `haptics`.
+struct HapticsParams {
+  float force_limit_N = 3.3f;
+  float slew_N_per_ms = 0.4f;
+  float hand_mass_kg = 0.15f;
+  float hand_stiffness_N_m = 400.0f;
+  float hand_damping_Ns_m = 8.0f;
+  float force_scale = 0.3f;  ///< Tissue force to hand force.
+};
+
+// ----------------------------------------------------------------------------------------------- elements (POD)
+
+struct StretchConstraint {
+  Index a, b;
+  float rest_length;  ///< [m]
+};
+
+/// Dihedral over the edge (v[0], v[1]) with the wings v[2], v[3].
+struct BendingConstraint {
+  std::array<Index, 4> v;
+  /// Signed angle from n1 = (x1-x0)x(x2-x0) to n2 = (x3-x0)x(x1-x0) about x1-x0 [rad], 0 when flat; at rest n1 and n2
+  /// point outward (away from the organ).
+  float rest_angle;
+};
+
+/// Eq. 9 of the paper: a spring from a membrane node to a point of a tube surface triangle.
+struct Binding {
+  Index membrane;
+  Triangle surface;
+  std::array<float, 3> barycentric;
+  float rest_length;  ///< [m]
+};
+
+/// A vertex of the high-resolution rectum surface, carried by one tetrahedron of the tube.
+struct EmbeddedVertex {
+  Index tetrahedron;
+  std::array<float, 4> barycentric;
+};
+
+/// The membrane's dynamic layer: node (row, col) is particle first + row * cols + col. Open sheet. Cell (r, c) has the
+/// triangles (n00, n01, n11) and (n00, n11, n10): its diagonal is n00-n11.
+struct MembraneGrid {
+  Index first = 0;
+  std::uint32_t rows = 0, cols = 0;
+  float texel_m = 1.0e-4f;  ///< Atlas texel x = s / texel_m, y = t / texel_m.
+  [[nodiscard]] Index node_count() const { return rows * cols; }
+  [[nodiscard]] Index triangle_count() const { return rows && cols ? 2 * (rows - 1) * (cols - 1) : 0; }
+};
+
+enum class SurfaceRole : std::uint32_t { kAbdominalWall, kRetroperitoneum, kPelvis, kBladder, kOther };
+
+/// A fixed surrounding surface: ranges of static_vertices and static_triangles (indices into static_vertices).
+struct StaticSurface {
+  char name[32];
+  SurfaceRole role;
+  Index first_vertex, vertex_count;
+  Index first_triangle, triangle_count;
+  std::uint32_t collides;
+};
+
+enum class ProtectedKind : std::uint32_t { kUreter, kNerve };
+
+/// A tube under the membrane: polyline of protected_points in frame W and its place on the sheet.
+struct ProtectedStructure {
+  ProtectedKind kind;
+  float radius_m;
+  float depth_m;  ///< Below the membrane.
+  Index first_point, point_count;
+};
+struct ProtectedPoint {
+  Vec3f p_W;
+  Vec2f material;  ///< (s, t) [m].
+};
+
+struct ToolDescription {
+  ToolKind kind;
+  Vec3f p_WP;  ///< Trocar pivot (the fulcrum) [m].
+  float shaft_radius_m;
+  float shaft_length_m;
+  float tip_radius_m;  ///< Of the capsule that touches tissue.
+  float tip_length_m;  ///< Length of jaws, or of the hook's foot.
+};
+
+/// What the mesh of an instrument stands for: all of it that does not turn, or the jaw that opens towards +x or -x.
+enum class ToolPart : std::uint32_t { kBody, kJawPlus, kJawMinus };
+
+/// A part of a tool's mesh: ranges of tool_vertices and tool_triangles (indices into tool_vertices). Vertices in frame
+/// T, jaws closed; a jaw turns about the y axis through (0, 0, -tip_length_m).
+struct ToolMesh {
+  std::uint32_t tool;
+  ToolPart part;
+  Index first_vertex, vertex_count;
+  Index first_triangle, triangle_count;
+};
+
+/// One key of the scripted operator; linear in time between keys with smooth ends.
+struct ScriptKey {
+  float time_s;
+  std::uint32_t tool;
+  Vec3f p_W;  ///< Wanted tip position [m].
+  float jaw_rad;
+  std::uint32_t pedals;  ///< PedalBits, valid from this key to the tool's next one.
+  float power_W;
+};
+
+// --------------------------------------------------------------------------------------------------- the scene
+
+/// Constraints are sorted by colour: colour k is [offset[k], offset[k+1]); no two constraints of a colour share a
+/// particle, so a colour can be solved in any order with the same result.
+struct SceneView {
+  char name[64] = {};
+  std::uint64_t hash = 0;
+
+  PhysicsParams physics;
+  ThermalParams thermal;
+  RenderParams render;
+  HapticsParams haptics;
+  Breathing breathing;
+  AssessmentParams assessment = UsualAssessment();
+
+  /// Particles: tube vertices [0, tube_vertex_count), then the membrane grid.
+  Index tube_vertex_count = 0;
+  MembraneGrid membrane;
+  std::span<const Vec3f> rest_position;  ///< [n] frame W, m.
+  std::span<const float> inverse_mass;   ///< [n] 1/kg; 0 = fixed.
+
+  std::span<const Tetrahedron> tets;  ///< Tube; positive volume.
+  std::span<const Index> tet_colours;
+  std::span<const StretchConstraint> tube_edges;
+  std::span<const Index> tube_edge_colours;
+  std::span<const float> membrane_rest_length;  ///< [3 * rows * cols]; 0 where the grid has no such edge.
+  std::span<const BendingConstraint> bending;
+  std::span<const Index> bending_colours;
+  std::span<const Binding> bindings;
+  std::span<const Index> binding_colours;
+
+  std::span<const Triangle> tube_surface;            ///< Outer surface of the tets, outward.
+  std::span<const EmbeddedVertex> surface_vertices;  ///< High-resolution rectum surface.
+  std::span<const Triangle> surface_triangles;
+  std::span<const Vec2f> membrane_material;  ///< [rows * cols] (s, t) of each node on the flattened sheet, m.
+
+  std::span<const StaticSurface> static_surfaces;
+  std::span<const Vec3f> static_vertices;
+  std::span<const Triangle> static_triangles;
+
+  std::span<const ProtectedStructure> protected_structures;
+  std::span<const ProtectedPoint> protected_points;
+
+  std::array<ToolDescription, kMaxTools> tools{};
+  std::span<const ToolMesh> tool_meshes;  ///< How tools look; one that has none is drawn by its dimensions.
+  std::span<const Vec3f> tool_vertices;
+  std::span<const Triangle> tool_triangles;
+  std::span<const ScriptKey> script;  ///< Sorted by tool, then time.
+  float script_duration_s = 0;
+  std::span<const Vec2f> planned_line;  ///< Of the assessment: (s, t) on the flattened sheet, m; empty: none.
+
+  /// Bit per NodeId: what the supervisor starts for this scene.
+  std::uint32_t node_mask = 0x3e;
+};
+
+}  // namespace fulcrum

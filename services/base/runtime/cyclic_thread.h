@@ -1,0 +1,63 @@
+// Runs a callback at a fixed rate on a thread of its own. A late cycle skips whole periods and keeps the phase of the
+// clock; it never "catches up" by running twice in a row.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "services/base/core/tick.h"
+#include "services/base/runtime/histogram.h"
+
+namespace fulcrum::runtime {
+
+struct CyclicThreadSettings {
+  std::string name = "cyclic";  ///< Thread name, at most 15 characters.
+  std::int64_t period_ns = 10'000'000;
+  int fifo_priority = 0;     ///< 0: normal scheduling; else SCHED_FIFO if permitted, with one plain warning if not.
+  std::int64_t spin_ns = 0;  ///< Sleep until this long before the period, then spin.
+  int cpu = -1;              ///< Pin to this CPU; -1: any.
+};
+
+/// Snapshot that another thread may read at any time.
+struct CyclicStats {
+  std::uint64_t ticks = 0;
+  std::uint64_t overruns = 0;  ///< Periods skipped.
+  HistogramSnapshot wake;      ///< Lateness [ns].
+  HistogramSnapshot step;      ///< Duration of the callback [ns].
+};
+
+class CyclicThread {
+ public:
+  /// Called with index, dt_s and stamp_ns set (session_time_s is the caller's to fill). Must not throw.
+  using Callback = std::function<void(const Tick&)>;
+
+  CyclicThread(const CyclicThreadSettings& settings, Callback callback);
+  ~CyclicThread();  ///< Stops and joins.
+  CyclicThread(const CyclicThread&) = delete;
+  CyclicThread& operator=(const CyclicThread&) = delete;
+
+  /// @param grid_ns wake-ups are at this time and whole periods from it (CLOCK_MONOTONIC); 0: a period from now on.
+  void Start(std::int64_t grid_ns = 0);
+  void Stop();
+  [[nodiscard]] CyclicStats stats() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// CLOCK_MONOTONIC [ns].
+[[nodiscard]] std::int64_t MonotonicNs();
+
+/// The pure sleeping policy, tested on its own: the start of the next period after `now`, on the grid
+/// `phase + k * period`, and how many whole periods were skipped.
+struct NextPeriod {
+  std::int64_t wake_ns;
+  std::uint64_t skipped;
+};
+[[nodiscard]] NextPeriod PlanNextPeriod(std::int64_t previous_wake_ns, std::int64_t period_ns, std::int64_t now_ns);
+
+}  // namespace fulcrum::runtime

@@ -1,0 +1,136 @@
+// What every node's main shares: options, scene, bus, session clock, health, exit codes. A main is then options →
+// node object → Run → finish, in under 60 lines:
+//
+//   int main(int argc, char** argv) {
+//     return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kThermal, "Heat in the membrane.",
+//                                   [](fulcrum::app::NodeApp& app) {
+//       ThermalNode node(app.scene(), {app.MakeInput<CauteryContact>(), app.MakeOutput<TopologyState>()});
+//       return app.Run(app.timing(), [&](const Tick& tick) { node.Step(tick); },
+//                      [&](Health* health) { node.FillHealth(health); });
+//     });
+//   }
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "services/base/config/cart.h"
+#include "services/base/core/exit_code.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/tick.h"
+#include "services/base/runtime/checkpoint.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/scene/format/scene_file.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/bus/port.h"
+#include "services/transport/bus/topics.h"
+
+namespace fulcrum::app {
+
+/// The common command line: --scene FILE (compiled), --session DIR, --domain N, --cart FILE, --help, --version.
+struct NodeOptions {
+  std::filesystem::path scene;
+  std::filesystem::path session;  ///< Logs, checkpoints and pictures go here.
+  std::filesystem::path cart;     ///< Effective cart configuration; may be empty.
+  int domain = 7;
+  std::vector<std::string> extra;  ///< What is left: options the node itself understands, for example --window.
+
+  /// Removes a flag such as "--window" from `extra`; true when it was there.
+  [[nodiscard]] bool TakeFlag(std::string_view flag);
+  /// Removes "NAME VALUE" or "NAME=VALUE" from `extra`; `missing` when it was not there. Throws InputError without a
+  /// value.
+  [[nodiscard]] std::string TakeValue(std::string_view name, std::string_view missing);
+};
+
+/// What a command line asks for.
+struct ParsedOptions {
+  NodeOptions options;
+  std::string answer;  ///< Not empty: print this (help or version) and end well.
+};
+/// Throws InputError that names the option when it is unusable. Options that are not common are left in `extra`.
+[[nodiscard]] ParsedOptions ParseNodeOptions(int argc, const char* const* argv, NodeId node, const char* description);
+
+/// Everything a node needs around its own object.
+class NodeApp {
+ public:
+  /// Opens the scene. The bus is joined when the first port is made. Throws InputError (exit 2) or MismatchError
+  /// (exit 3), both do.
+  NodeApp(NodeId node, const NodeOptions& options);
+  ~NodeApp();
+  NodeApp(const NodeApp&) = delete;
+  NodeApp& operator=(const NodeApp&) = delete;
+
+  [[nodiscard]] const SceneView& scene() const;
+  [[nodiscard]] NodeOptions& options();
+  /// The cart file, or the simulated cart when none was given.
+  [[nodiscard]] const config::CartConfig& cart() const;
+  /// Name, rate, priority and CPU of this node's thread, from the cart.
+  [[nodiscard]] runtime::CyclicThreadSettings timing() const;
+  [[nodiscard]] bus::DdsParticipant& bus();
+
+  /// Ports owned by the app: they live as long as it does and their statistics go into Health. Make them all before
+  /// Run().
+  template <class T>
+  [[nodiscard]] bus::Input<T>& MakeInput() {
+    auto port = bus().MakeInput<T>();
+    bus::Input<T>& input = *port;
+    Watch(bus::kTopicOf<T>, [&input] { return input.stats(); });
+    Keep(std::shared_ptr<void>(std::move(port)));
+    return input;
+  }
+  template <class T>
+  [[nodiscard]] typename bus::OutputOf<T>::type& MakeOutput() {
+    auto port = bus().MakeOutput<T>();
+    typename bus::OutputOf<T>::type& output = *port;
+    Watch([&output] { return output.stats(); });
+    Keep(std::shared_ptr<void>(std::move(port)));
+    return output;
+  }
+  /// For ports made elsewhere. The functions are called on the health thread.
+  void Watch(TopicId topic, std::function<bus::InputStats()> stats);
+  void Watch(std::function<bus::OutputStats()> stats);
+
+  /// Session time of a monotonic stamp, from SceneManifest; negative until the session is known. Real-time safe.
+  [[nodiscard]] double SessionTime(std::int64_t stamp_ns) const noexcept;
+
+  /// What the node does on a Command with this verb, beside "stop" and "restart": gets the argument and returns the
+  /// reply's text; an exception refuses. Called on the thread of Run(). Before Run().
+  void OnCommand(std::string verb, std::function<std::string(const std::string&)> handler);
+
+  /// What goes into Health beside rates and timing: metrics, state, last_error. Called at 10 Hz on the health thread,
+  /// so it must be thread-safe.
+  using HealthFill = std::function<void(Health*)>;
+  /// Waits for the session, then runs `step` at the given rate on a thread of its own until a stop signal, a Command
+  /// "stop", a schema or scene mismatch, or Finish(). Publishes Health at 10 Hz from the first moment. `step` sees
+  /// session_time_s filled in and is never called before the session is known. Call once.
+  ExitCode Run(const runtime::CyclicThreadSettings& settings, const std::function<void(const Tick&)>& step,
+               const HealthFill& fill_health);
+
+  /// Health goes out now instead of at its next turn: something that others wait for has happened. Any thread but a
+  /// real-time one.
+  void PublishHealthNow();
+
+  /// Ends Run() with this code, for example kDeviceLost; `reason` is logged. Any thread but a real-time one.
+  void Finish(ExitCode code, std::string_view reason);
+
+ private:
+  void Keep(std::shared_ptr<void> port);
+
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Tells the log what a node found in its checkpoint. @param restored it goes on from there.
+void LogCheckpoint(const runtime::CheckpointFile& checkpoint, bool restored);
+
+/// main() of a node: parses options, turns exceptions into one clear line and the right exit code. Options left in
+/// `extra` after `run` has taken its own are refused before Run() starts.
+int NodeMain(int argc, char** argv, NodeId node, const char* description, const std::function<ExitCode(NodeApp&)>& run);
+
+}  // namespace fulcrum::app

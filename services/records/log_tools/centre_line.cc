@@ -1,0 +1,129 @@
+#include "services/records/log_tools/centre_line.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/records/log_tools/thinning.h"
+
+namespace fulcrum::log_tools {
+namespace {
+
+/// Thinning halves the error of half a pixel that it makes in the middle of an even number of them.
+constexpr double kFine = 2;
+/// From a pixel's centre to the edge of what is clear it is this much less than to the next clear centre, in the mean
+/// over odd and even widths [pixels].
+constexpr double kToEdge = 0.25;
+
+struct Course {
+  std::vector<Vec2d> points;
+  std::vector<double> half_widths;
+  bool closed = false;
+};
+
+/// Mean over `window` of arc length about each point; ends stay where they are, for the window ends with the line.
+std::vector<Vec2d> Smoothed(const Course& course, double window) {
+  const auto n = static_cast<int>(course.points.size());
+  const auto at = [&](int i) { return course.points[static_cast<std::size_t>(((i % n) + n) % n)]; };
+  std::vector<Vec2d> smooth(course.points.size());
+  for (int i = 0; i < n; ++i) {
+    const int most = course.closed ? (n - 1) / 2 : std::min(i, n - 1 - i);
+    Vec2d sum = at(i);
+    int reach = 0;
+    for (double before = 0, after = 0; reach < most;) {
+      const int k = reach + 1;
+      before += (at(i - k) - at(i - k + 1)).norm();
+      after += (at(i + k) - at(i + k - 1)).norm();
+      if (0.5 * (before + after) > 0.5 * window) break;
+      sum += at(i - k) + at(i + k);
+      reach = k;
+    }
+    smooth[static_cast<std::size_t>(i)] = sum / (2 * reach + 1);
+  }
+  return smooth;
+}
+
+double LengthOf(const std::vector<Vec2d>& points, bool closed) {
+  double length = closed ? (points.front() - points.back()).norm() : 0;
+  for (std::size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
+  return length;
+}
+
+/// The direction in which a line leaves at its front, from what lies within `window`.
+Vec2d Outward(const std::vector<Vec2d>& points, double window) {
+  for (const Vec2d& point : points) {
+    const Vec2d out = points.front() - point;
+    if (out.norm() >= window) return out.normalized();
+  }
+  const Vec2d out = points.front() - points.back();
+  return out.norm() > 0 ? Vec2d(out.normalized()) : Vec2d::UnitX();
+}
+
+/// Distance to what is clear where the ridge is: thinning leaves a line up to a pixel beside it.
+double RidgeAt(const Pixel& at, const std::vector<float>& distance, const Mask& fine) {
+  float ridge = 0;
+  for (int y = at.y - 1; y <= at.y + 1; ++y) {
+    for (int x = at.x - 1; x <= at.x + 1; ++x) {
+      if (fine.Contains(x, y)) ridge = std::max(ridge, distance[fine.Index(x, y)]);
+    }
+  }
+  return static_cast<double>(ridge);
+}
+
+CentreLine::Stretch StretchOf(const Branch& branch, const Skeleton& skeleton, const std::vector<float>& distance,
+                              const Mask& fine, double window) {
+  Course course;
+  course.closed = branch.closed;
+  for (const Pixel& at : branch.pixels) {
+    course.points.emplace_back(at.x + 0.5, at.y + 0.5);
+    course.half_widths.push_back(RidgeAt(at, distance, fine) - kToEdge);
+  }
+  const auto junction = [&](int number) { return skeleton.junctions[static_cast<std::size_t>(number)]; };
+  if (branch.from >= 0) {
+    course.points.insert(course.points.begin(), junction(branch.from).centre);
+    course.half_widths.insert(course.half_widths.begin(),
+                              static_cast<double>(junction(branch.from).half_width) - kToEdge);
+  }
+  if (branch.to >= 0) {
+    course.points.push_back(junction(branch.to).centre);
+    course.half_widths.push_back(static_cast<double>(junction(branch.to).half_width) - kToEdge);
+  }
+  std::vector<Vec2d> points = Smoothed(course, window);
+  std::vector<double> half_widths = course.half_widths;
+  // A free end goes on to the end of the hole; a single pixel to both sides.
+  for (int side = 0; side < 2; ++side) {
+    if (!branch.closed && (side == 0 ? branch.from : branch.to) < 0) {
+      const Pixel& last = side == 0 ? branch.pixels.front() : branch.pixels.back();
+      const double reach = static_cast<double>(distance[fine.Index(last.x, last.y)]) - kToEdge;
+      const Vec2d out = points.size() > 1 ? Outward(points, 0.5 * window) : Vec2d(side == 0 ? -1 : 1, 0);
+      const Vec2d end = points.front() + reach * out;
+      points.insert(points.begin(), end);
+      half_widths.insert(half_widths.begin(), half_widths.front());
+    }
+    std::reverse(points.begin(), points.end());
+    std::reverse(half_widths.begin(), half_widths.end());
+  }
+  CentreLine::Stretch stretch;
+  stretch.closed = branch.closed;
+  stretch.length = LengthOf(points, branch.closed) / kFine;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    stretch.points.push_back({points[i] / kFine, 2 * half_widths[i] / kFine});
+  }
+  return stretch;
+}
+
+}  // namespace
+
+CentreLine FindCentreLine(const Mask& hole, const CentreLineSettings& settings) {
+  const Mask fine = Doubled(hole);
+  const std::vector<float> distance = DistanceToClear(fine);
+  Mask thin = Thinned(fine, distance);
+  PruneSpurs(&thin, distance, kFine * settings.spur);
+  const Skeleton skeleton = Trace(thin, distance);
+  CentreLine line;
+  for (const Branch& branch : skeleton.branches) {
+    line.stretches.push_back(StretchOf(branch, skeleton, distance, fine, kFine * settings.smooth));
+  }
+  return line;
+}
+
+}  // namespace fulcrum::log_tools

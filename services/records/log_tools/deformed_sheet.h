@@ -1,0 +1,75 @@
+// The membrane as it lies in the world, cut or not: which place of the sheet is nearest to a point.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "services/base/core/scene_view.h"
+#include "services/base/core/slit_sheet.h"
+
+namespace fulcrum::log_tools {
+
+/// Knows the scene's grid and the recorded positions, and nothing of the solvers: it is the outsider's measure of what
+/// they report.
+class DeformedSheet {
+ public:
+  /// @param scene must outlive this.
+  explicit DeformedSheet(const SceneView& scene);
+
+  /// TopologyState's bits. Each side of a slit goes on unstretched up to its lip; what is removed spans the gap.
+  void SetTopology(std::span<const std::uint8_t> dead_nodes, std::span<const std::uint8_t> dead_edges);
+  /// Whether a place (s, t) [m] of the sheet is removed: tells where on a severed edge the lips are.
+  using Removed = std::function<bool(const Vec2f& material)>;
+  /// Positions of all particles as in a TissueFrame; false when they do not fit the scene.
+  bool SetPositions(std::span<const float> xyz, const Removed& removed);
+
+  struct Place {
+    float distance_m = 0;
+    Vec2f material = Vec2f::Zero();  ///< (s, t) [m].
+  };
+  /// Nothing when all of the sheet is farther than `within_m`.
+  [[nodiscard]] std::optional<Place> Nearest(const Vec3f& p_W, float within_m) const;
+
+ private:
+  struct Point {
+    Vec3f place;
+    Vec2f material;
+  };
+  /// Of a cut triangle: of what a corner holds, or of the gap.
+  using Piece = std::array<Point, 3>;
+  /// This sheet, for SlitSheet.
+  struct Held {
+    const DeformedSheet& sheet;
+    [[nodiscard]] std::uint32_t rows() const { return sheet.scene_.membrane.rows; }
+    [[nodiscard]] std::uint32_t cols() const { return sheet.scene_.membrane.cols; }
+    [[nodiscard]] bool Gone(Index node) const { return sheet.dead_[node] != 0; }
+    [[nodiscard]] bool Severed(std::size_t edge) const { return sheet.severed_[edge] != 0; }
+    [[nodiscard]] Vec3f Place(Index node) const { return sheet.place_[node]; }
+    [[nodiscard]] Vec3f Rest(Index node) const {
+      return sheet.scene_.rest_position[sheet.scene_.membrane.first + node];
+    }
+    [[nodiscard]] Vec2f Material(Index node) const { return sheet.scene_.membrane_material[node]; }
+  };
+  [[nodiscard]] std::size_t Node(int row, int col) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(col);
+  }
+  void FillDeadNodes();
+  void CutIntoPieces(const Removed& removed);
+
+  const SceneView& scene_;
+  int rows_, cols_;
+  float coarse_reach_m_ = 0;
+  std::vector<std::uint8_t> dead_, severed_;
+  std::vector<std::size_t> dead_nodes_;
+  std::vector<Vec3f> place_;          ///< [rows * cols] frame W [m]; dead nodes: for the first search only.
+  std::vector<Index> cut_triangles_;  ///< Those with two dead edges or three, ascending.
+  std::vector<std::int32_t> cut_of_;  ///< By triangle: its place in cut_triangles_; -1: whole.
+  std::vector<Piece> pieces_;
+  std::vector<std::size_t> first_piece_;  ///< By place in cut_triangles_, and one more.
+};
+
+}  // namespace fulcrum::log_tools

@@ -1,0 +1,146 @@
+#include <ostream>
+#include <tuple>
+
+#include "services/base/core/error.h"
+#include "services/base/core/hash.h"
+#include "services/base/core/message_difference.h"
+#include "services/records/log_tools/tools.h"
+
+namespace fulcrum::log_tools {
+namespace {
+
+/// The bits of a message in the order of its fields, but for the one of this name wherever it is met.
+template <class T>
+void AddTo(Hash64* hash, const T& value, std::string_view without) {
+  if constexpr (HasFields<T>) {
+    ForEachField<T>([&](const char* name, auto member) {
+      if (without.empty() || without != name) AddTo(hash, value.*member, without);
+    });
+  } else if constexpr (std::is_arithmetic_v<T>) {
+    hash->AddValue(value);
+  } else if constexpr (std::is_enum_v<T>) {
+    hash->AddValue(static_cast<std::underlying_type_t<T>>(value));
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    hash->Add(std::string_view(value));
+  } else if constexpr (std::is_same_v<T, Quatf>) {
+    AddTo(hash, value.coeffs(), without);
+  } else {
+    hash->AddValue(static_cast<std::uint64_t>(value.size()));
+    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(value.size()); ++i) AddTo(hash, value[i], without);
+  }
+}
+
+/// One topic of one node in one process: the n-th of them, since a restarted node numbers its samples anew.
+struct Stream {
+  std::string topic, node;
+  int process = 1;
+  auto operator<=>(const Stream&) const = default;  // NOLINT(modernize-use-nullptr): a check older than the operator
+};
+
+std::ostream& operator<<(std::ostream& out, const Stream& stream) {
+  out << stream.topic << " of " << (stream.node.empty() ? "?" : stream.node);
+  return stream.process == 1 ? out : out << " (start " << stream.process << ")";
+}
+
+/// Goes through a file, each message with its stream. Messages of unknown topics are left out.
+template <class Use>
+void ForEachMessage(const std::filesystem::path& file, const Filter& filter, const Use& use) {
+  Recording recording(file, filter);
+  std::map<std::pair<std::string, std::string>, int> processes;
+  std::map<std::uint16_t, Stream> streams;
+  Entry entry;
+  while (recording.Next(&entry)) {
+    if (!entry.source->topic) continue;
+    auto stream = streams.find(entry.message.channel);
+    if (stream == streams.end()) {
+      const Source& source = *entry.source;
+      stream =
+          streams
+              .emplace(entry.message.channel, Stream{source.name, source.node, ++processes[{source.name, source.node}]})
+              .first;
+    }
+    use(stream->second, entry);
+  }
+}
+
+/// Hash of each message, by stream and sequence: recordings are larger than memory.
+using Digest = std::map<Stream, std::map<std::uint32_t, std::uint64_t>>;
+
+Digest MakeDigest(const std::filesystem::path& file, const Filter& filter, const std::string& without) {
+  Digest digest;
+  ForEachMessage(file, filter, [&](const Stream& stream, const Entry& entry) {
+    Hash64 hash;
+    (void)WithDecoded(*entry.source->topic, entry.message.data,
+                      [&](const auto& message) { AddTo(&hash, message, without); });
+    digest[stream].try_emplace(entry.message.sequence, hash.value());
+  });
+  return digest;
+}
+
+template <class T>
+T Fetch(const std::filesystem::path& file, const Filter& filter, const Stream& wanted, std::uint32_t sequence) {
+  T found;
+  ForEachMessage(file, filter, [&](const Stream& stream, const Entry& entry) {
+    if (stream == wanted && entry.message.sequence == sequence) (void)bus::DecodeCdr(entry.message.data, &found);
+  });
+  return found;
+}
+
+struct Count {
+  std::uint64_t common = 0, only_first = 0, only_second = 0, different = 0;
+  std::optional<std::uint32_t> first_different;
+};
+
+Count Compare(const std::map<std::uint32_t, std::uint64_t>& first,
+              const std::map<std::uint32_t, std::uint64_t>& second) {
+  Count count;
+  for (const auto& [sequence, hash] : first) {
+    const auto other = second.find(sequence);
+    if (other == second.end()) {
+      ++count.only_first;
+      continue;
+    }
+    ++count.common;
+    if (hash == other->second) continue;
+    ++count.different;
+    if (!count.first_different) count.first_different = sequence;
+  }
+  count.only_second = second.size() - count.common;
+  return count;
+}
+
+}  // namespace
+
+ExitCode Diff(const std::filesystem::path& first, const std::filesystem::path& second, const Filter& filter,
+              const std::string& without, std::ostream* out) {
+  CheckTopics(filter);
+  const Digest a = MakeDigest(first, filter, without);
+  Digest b = MakeDigest(second, filter, without);
+  bool same = true;
+  for (const auto& known : a) {
+    const Stream& stream = known.first;
+    const Count count = Compare(known.second, b[stream]);
+    *out << stream << ": " << count.common << " in both, " << count.different << " different, " << count.only_first
+         << " only in the first, " << count.only_second << " only in the second\n";
+    b.erase(stream);
+    if (!count.first_different) continue;
+    same = false;
+    Filter only = filter;
+    only.topics = {stream.topic};
+    for (const bus::TopicRole& role : bus::kTopicRoles) {
+      if (bus::TopicLabel(role.id) != stream.topic) continue;
+      bus::WithMessageOf(role.id, [&]<class T>(std::type_identity<T>) {
+        const auto difference = FirstDifference(Fetch<T>(first, only, stream, *count.first_different),
+                                                Fetch<T>(second, only, stream, *count.first_different), without);
+        if (!difference) return;
+        *out << "  first at sequence " << *count.first_different << ": " << difference->field << " = "
+             << difference->first << " | " << difference->second << '\n';
+      });
+    }
+  }
+  for (const auto& [stream, samples] : b) *out << stream << ": only in the second, " << samples.size() << '\n';
+  *out << (same ? "no difference in what both have\n" : "");
+  return same ? ExitCode::kDone : ExitCode::kFailure;
+}
+
+}  // namespace fulcrum::log_tools

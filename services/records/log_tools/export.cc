@@ -1,0 +1,61 @@
+#include <algorithm>
+#include <fstream>
+#include <limits>
+#include <memory>
+
+#include "services/base/core/error.h"
+#include "services/records/log_tools/text.h"
+#include "services/records/log_tools/tools.h"
+
+namespace fulcrum::log_tools {
+namespace {
+
+/// A cell as RFC 4180 has it.
+std::string Cell(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted += '"';
+}
+
+constexpr std::size_t kWhole = std::numeric_limits<std::size_t>::max();
+
+}  // namespace
+
+std::vector<std::filesystem::path> ExportTables(const std::filesystem::path& file, const Filter& filter,
+                                                const std::filesystem::path& folder) {
+  CheckTopics(filter);
+  Recording recording(file, filter);
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  std::map<TopicId, std::ofstream> tables;
+  std::vector<std::filesystem::path> files;
+  Entry entry;
+  while (recording.Next(&entry)) {
+    if (!entry.source->topic) continue;
+    std::ofstream& table = tables[*entry.source->topic];
+    const bool is_new = !table.is_open();
+    if (is_new) {
+      const std::filesystem::path name = folder / (entry.source->name + ".csv");
+      if (std::filesystem::exists(name)) throw InputError(name.string() + ": exists; choose another folder (--out)");
+      table.open(name);
+      files.push_back(name);
+    }
+    (void)WithDecoded(*entry.source->topic, entry.message.data, [&](const auto& message) {
+      std::string head = "time_s,node", row = std::to_string(entry.time_s) + "," + Cell(entry.source->node);
+      ForEachLeaf(message, "", kWhole, [&](const std::string& path, const std::string& text) {
+        if (is_new) head += "," + path;
+        row += "," + Cell(text);
+      });
+      if (is_new) table << head << '\n';
+      table << row << '\n';
+    });
+    if (!table) throw InputError(files.back().string() + ": cannot be written; is the disk full?");
+  }
+  return files;
+}
+
+}  // namespace fulcrum::log_tools

@@ -1,0 +1,226 @@
+#include "services/records/recorder/recorder.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+
+#include "services/base/core/error.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/transport/bus/schema.h"
+#include "services/transport/bus/topics.h"
+
+namespace fulcrum::recorder {
+namespace {
+
+constexpr std::string_view kProfile = "fulcrum";
+
+std::int64_t WallMinusMonotonic() {
+  timespec wall{};
+  ::clock_gettime(CLOCK_REALTIME, &wall);
+  return std::int64_t{1'000'000'000} * wall.tv_sec + wall.tv_nsec - runtime::MonotonicNs();
+}
+
+std::string Hex(const bus::WriterGuid& guid) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string text;
+  for (const std::uint8_t byte : guid) {
+    text += kDigits[byte >> 4];
+    text += kDigits[byte & 15];
+  }
+  return text;
+}
+
+}  // namespace
+
+Recorder::Recorder(const RecorderSettings& settings)
+    : settings_(settings), wall_minus_monotonic_ns_(WallMinusMonotonic()) {
+  for (Batch* batch : {&filling_, &writing_}) {
+    for (Batch::Part* part : {&batch->large, &batch->small}) {
+      part->bytes = std::make_unique_for_overwrite<std::uint8_t[]>(settings.queue_B);
+    }
+  }
+  if (settings.file.empty()) return;
+  file_.emplace(settings.file, kProfile, settings.library);
+  Introduce(&*file_);
+}
+
+Recorder::~Recorder() { Close(runtime::MonotonicNs()); }
+
+void Recorder::Introduce(recording::McapWriter* file) const {
+  for (const auto& [name, values] : settings_.metadata) file->AddMetadata(name, values);
+  // Log times are CLOCK_MONOTONIC, like all stamps of the topics, but told as wall clock.
+  file->AddMetadata("clock", {{"log_time_minus_monotonic_ns", std::to_string(wall_minus_monotonic_ns_)}});
+}
+
+void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole) {
+  const std::size_t size = sample.head.size() + sample.body.size();
+  const std::lock_guard lock(mutex_);
+  Counts& counts = counts_[static_cast<std::size_t>(sample.topic)];
+  auto writer = std::find_if(writers_.begin(), writers_.end(), [&](const Writer& known) {
+    return known.topic == sample.topic && known.guid == sample.writer;
+  });
+  if (writer == writers_.end()) {
+    // What it sent before is nobody's loss.
+    writer = writers_.insert(writers_.end(), {sample.topic, sample.writer, sample.sequence - 1, sample.written_ns});
+  }
+  if (sample.sequence <= writer->last_sequence) return;
+  // Readers go by this time: what one writer sent stays in its order though clocks were set between.
+  const std::int64_t written_ns = std::max(sample.written_ns, writer->last_ns);
+  const bool room = filling_.used() + recording::kMessageHead + size <= settings_.queue_B;
+  if (room) {
+    const bool is_large = bus::QualityOf(sample.topic).path == bus::Path::kSharedMemory;
+    Batch::Part& part = is_large ? filling_.large : filling_.small;
+    std::uint8_t* at = part.bytes.get() + part.used;
+    recording::PutMessageHead(static_cast<std::uint16_t>(writer - writers_.begin()),
+                              static_cast<std::uint32_t>(sample.sequence),
+                              static_cast<std::uint64_t>(written_ns + wall_minus_monotonic_ns_),
+                              static_cast<std::uint64_t>(sample.source_ns), size, at);
+    at += recording::kMessageHead;
+    std::memcpy(at, sample.head.data(), sample.head.size());
+    if (!sample.body.empty()) std::memcpy(at + sample.head.size(), sample.body.data(), sample.body.size());
+    if (!is_whole()) return;  // Missed: the next one's sequence tells.
+    if (filling_.used() == 0) filling_.begin_ns = written_ns;
+    part.used += recording::kMessageHead + size;
+    most_used_ = std::max(most_used_, filling_.used());
+  }
+  counts.missed += sample.sequence - writer->last_sequence - 1;
+  writer->last_sequence = sample.sequence;
+  writer->last_ns = written_ns;
+  counts.newest_ns = written_ns;
+  ++(room ? counts.received : counts.overflow);
+}
+
+void Recorder::AddNewChannels() {
+  const std::size_t first = channels_.size();
+  {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t i = first; i < writers_.size(); ++i) {
+      channels_.push_back({writers_[i].topic, writers_[i].guid, {}});
+    }
+  }
+  for (std::size_t i = first; i < channels_.size(); ++i) {
+    Channel& channel = channels_[i];
+    if (settings_.describe) channel.about = settings_.describe(channel.writer);
+    channel.about["writer"] = Hex(channel.writer);
+  }
+  if (file_) AddChannels(&*file_, first, &schemas_);
+}
+
+void Recorder::AddChannels(recording::McapWriter* file, std::size_t first,
+                           std::array<std::uint16_t, kTopicCount>* schemas) const {
+  for (std::size_t i = first; i < channels_.size(); ++i) {
+    const TopicId topic = channels_[i].topic;
+    const std::string type(bus::TopicLabel(topic));
+    std::uint16_t& schema = (*schemas)[static_cast<std::size_t>(topic)];
+    if (schema == 0) schema = file->AddSchema("fulcrum::idl::" + type, "omgidl", bus::SchemaText(type));
+    file->AddChannel(schema, bus::RoleOf(topic).name, "cdr", channels_[i].about);
+  }
+}
+
+void Recorder::Flush(std::int64_t now_ns) { Exchange(now_ns, false); }
+
+void Recorder::Exchange(std::int64_t now_ns, bool all) {
+  {
+    const std::lock_guard lock(mutex_);
+    const bool due =
+        filling_.used() >= recording::ChunkPacker::kChunkBytes || now_ns - filling_.begin_ns >= kLongestChunk_ns;
+    if (filling_.used() == 0 || !(due || all)) return;
+    std::swap(filling_, writing_);
+  }
+  AddNewChannels();
+  Pack(&writing_.large);
+  Pack(&writing_.small);
+}
+
+void Recorder::Pack(Batch::Part* part) {
+  constexpr std::size_t kChunk = recording::ChunkPacker::kChunkBytes;
+  std::span<const std::uint8_t> records(part->bytes.get(), part->used);
+  while (!records.empty()) {
+    // Up to twice a chunk is one: no crumb is left behind.
+    records = records.subspan(packer_.Pack(records, records.size() <= 2 * kChunk ? records.size() : kChunk, &packed_));
+    if (file_) Write();
+    if (settings_.keep_s > 0) Keep();
+  }
+  part->used = 0;
+}
+
+void Recorder::Write() {
+  file_->Append(packed_);
+  const std::lock_guard lock(mutex_);
+  error_ = file_->error();
+  file_B_ = file_->bytes_written();
+  if (error_.empty()) return;
+  for (const recording::PackedChunk::Part& part : packed_.parts) {
+    counts_[static_cast<std::size_t>(channels_[part.channel].topic)].unwritten += part.messages;
+  }
+}
+
+void Recorder::Keep() {
+  kept_B_ += packed_.bytes.size();
+  kept_.push_back(packed_);
+  const auto is_old = [&](const recording::PackedChunk& oldest) {
+    return kept_B_ > settings_.keep_B ||
+           1e-9 * static_cast<double>(packed_.last_ns - oldest.last_ns) > settings_.keep_s;
+  };
+  while (kept_.size() > 1 && is_old(kept_.front())) {
+    kept_B_ -= kept_.front().bytes.size();
+    kept_.pop_front();
+  }
+}
+
+void Recorder::Dump(const std::filesystem::path& path, std::string_view reason, std::int64_t now_ns) {
+  Exchange(now_ns, true);
+  recording::McapWriter file(path, kProfile, settings_.library);
+  Introduce(&file);
+  file.AddMetadata("dump", {{"reason", std::string(reason)}});
+  std::array<std::uint16_t, kTopicCount> schemas{};
+  AddChannels(&file, 0, &schemas);
+  for (const recording::PackedChunk& chunk : kept_) file.Append(chunk);
+  file.Close();
+  if (!file.error().empty()) throw InputError(path.string() + ": " + file.error());
+}
+
+void Recorder::Close(std::int64_t now_ns) {
+  if (!file_) return;
+  Exchange(now_ns, true);
+  const std::lock_guard lock(mutex_);
+  for (const auto& role : bus::kTopicRoles) {
+    const Counts& counts = counts_[static_cast<std::size_t>(role.id)];
+    if (counts.missed + counts.overflow + counts.unwritten == 0) continue;
+    file_->AddMetadata("lost " + std::string(bus::TopicLabel(role.id)),
+                       {{"not_received", std::to_string(counts.missed)},
+                        {"queue_full", std::to_string(counts.overflow)},
+                        {"not_written", std::to_string(counts.unwritten)}});
+  }
+  file_->Close();
+  file_.reset();
+}
+
+RecorderStats Recorder::stats() const {
+  const std::lock_guard lock(mutex_);
+  RecorderStats stats;
+  for (const Counts& counts : counts_) {
+    stats.received += counts.received;
+    stats.missed += counts.missed;
+    stats.overflow += counts.overflow;
+    stats.unwritten += counts.unwritten;
+  }
+  stats.file_B = file_B_;
+  stats.queue_pct = 100.0 * static_cast<double>(most_used_) / static_cast<double>(settings_.queue_B);
+  stats.error = error_;
+  return stats;
+}
+
+bus::InputStats Recorder::topic_stats(TopicId topic) const {
+  const std::lock_guard lock(mutex_);
+  const Counts& counts = counts_[static_cast<std::size_t>(topic)];
+  bus::InputStats stats;
+  stats.received = counts.received;
+  stats.lost = counts.missed + counts.overflow + counts.unwritten;
+  stats.newest_stamp_ns = counts.newest_ns;
+  return stats;
+}
+
+}  // namespace fulcrum::recorder

@@ -1,0 +1,30 @@
+// The scene that a recording needs to be understood.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "services/base/core/error.h"
+#include "services/base/core/messages.h"
+#include "services/base/core/scene_view.h"
+
+namespace fulcrum::recording {
+
+/// What stands beside the recording in its session's folder, unless it was given. Empty: nothing does.
+[[nodiscard]] inline std::filesystem::path BesideRecording(const std::string& given,
+                                                           const std::filesystem::path& recording, const char* name) {
+  if (!given.empty()) return given;
+  const std::filesystem::path beside = recording.parent_path() / name;
+  return std::filesystem::exists(beside) ? beside : std::filesystem::path();
+}
+
+/// Throws MismatchError when the session that was recorded is of another scene.
+inline void RefuseOtherScene(const std::filesystem::path& recording, const std::optional<SceneManifest>& session,
+                             const SceneView& scene) {
+  if (!session || session->scene_hash == scene.hash) return;
+  throw MismatchError(recording.string() + " was recorded with another scene (\"" + session->scene_name +
+                      "\"): give the compiled scene of that session with --scene");
+}
+
+}  // namespace fulcrum::recording

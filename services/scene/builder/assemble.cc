@@ -1,0 +1,373 @@
+// Constraints, masses, colours, bindings and the rest over an anatomy: the same for every kind of scene.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <sstream>
+
+#include "services/base/core/error.h"
+#include "services/scene/builder/build.h"
+#include "services/scene/builder/flatten.h"
+#include "services/scene/builder/geometry.h"
+#include "services/scene/format/colouring.h"
+
+namespace fulcrum::scene {
+namespace {
+
+constexpr double kAtlasMargin_m = 0.001;  ///< Sheet coordinates begin here, so that a patch has texels all round.
+constexpr float kLineStep =
+    0.01f;  ///< Of a planned line, in fractions of the sheet: the sheet is not straight between.
+constexpr int kStructurePoints = 33;  ///< Along each ureter or nerve: 6 mm apart on a 200 mm sheet.
+/// A tip may lie this far from the pivot at most: a laparoscopic shaft is about 330 mm long.
+constexpr double kLongestReach_m = 0.30;
+/// … and at least this far, also from the end of its shaft: the devices do not turn a shorter lever.
+constexpr double kLeastLever_m = 0.015;
+
+[[noreturn]] void Refuse(const SceneSettings& settings, const std::string& text) {
+  throw InputError("scene '" + settings.name + "': " + text);
+}
+
+/// Point and outward normal of the sheet at fractions (s, t), bilinear in its nodes.
+struct SheetPoint {
+  Vec3d p, normal;
+  Vec2f material;
+};
+
+class Sheet {
+ public:
+  Sheet(const MembraneSettings& settings, const std::vector<Vec3d>& nodes, const std::vector<Vec2f>& material)
+      : rows_(settings.rows), cols_(settings.cols), nodes_(nodes), material_(material) {}
+
+  [[nodiscard]] SheetPoint At(double s, double t) const {
+    const double x = std::clamp(s, 0.0, 1.0) * (cols_ - 1), y = std::clamp(t, 0.0, 1.0) * (rows_ - 1);
+    const int c = std::min(static_cast<int>(x), cols_ - 2), r = std::min(static_cast<int>(y), rows_ - 2);
+    const double u = x - c, v = y - r;
+    const auto node = [&](int dr, int dc) {
+      return static_cast<std::size_t>(r + dr) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(c + dc);
+    };
+    const Vec3d &p00 = nodes_[node(0, 0)], &p01 = nodes_[node(0, 1)], &p10 = nodes_[node(1, 0)],
+                &p11 = nodes_[node(1, 1)];
+    SheetPoint result;
+    result.p = (1 - v) * ((1 - u) * p00 + u * p01) + v * ((1 - u) * p10 + u * p11);
+    const Vec3d ds = (1 - v) * (p01 - p00) + v * (p11 - p10), dt = (1 - u) * (p10 - p00) + u * (p11 - p01);
+    result.normal = ds.cross(dt).normalized();
+    const auto fu = static_cast<float>(u), fv = static_cast<float>(v);
+    result.material = (1 - fv) * ((1 - fu) * material_[node(0, 0)] + fu * material_[node(0, 1)]) +
+                      fv * ((1 - fu) * material_[node(1, 0)] + fu * material_[node(1, 1)]);
+    return result;
+  }
+
+ private:
+  int rows_, cols_;
+  const std::vector<Vec3d>& nodes_;
+  const std::vector<Vec2f>& material_;
+};
+
+void CheckCounts(const SceneSettings& settings, const Anatomy& anatomy) {
+  const MembraneSettings& m = settings.membrane;
+  const std::size_t total = anatomy.organ_vertices.size() + anatomy.sheet.size();
+  if (m.rows < 3 || m.cols < 3 || anatomy.sheet.size() != static_cast<std::size_t>(m.rows) * m.cols) {
+    Refuse(settings, "the membrane needs at least 3 x 3 nodes");
+  }
+  if (total > kMaxTissueVertices || anatomy.sheet.size() > kMaxMembraneNodes) {
+    Refuse(settings, std::to_string(total) + " vertices (" + std::to_string(anatomy.sheet.size()) +
+                         " of them in the membrane); valid: at most " + std::to_string(kMaxTissueVertices) + " and " +
+                         std::to_string(kMaxMembraneNodes) +
+                         ". Lower membrane rows or columns, or the size of the organ");
+  }
+  if ((m.rows - 1) % m.bending_row_stride != 0 || (m.cols - 1) % m.bending_col_stride != 0) {
+    Refuse(settings, "the bending strides (" + std::to_string(m.bending_row_stride) + ", " +
+                         std::to_string(m.bending_col_stride) + ") must divide rows - 1 = " +
+                         std::to_string(m.rows - 1) + " and cols - 1 = " + std::to_string(m.cols - 1));
+  }
+}
+
+/// Material coordinates, moved in from the edge of the atlas.
+std::vector<Vec2f> MaterialOf(const SceneSettings& settings, const std::vector<Vec3d>& sheet) {
+  const std::vector<Eigen::Vector2d> flat = FlattenSheet(settings.membrane.rows, settings.membrane.cols, sheet);
+  Eigen::Vector2d extent = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& m : flat) {
+    if (!m.allFinite()) {
+      Refuse(settings, "the membrane cannot be flattened: it has degenerate triangles");
+    }
+    extent = extent.cwiseMax(m);
+  }
+  const double limit = kAtlasTexels * static_cast<double>(MembraneGrid().texel_m) - 2 * kAtlasMargin_m;
+  if (extent.maxCoeff() > limit) {
+    std::ostringstream text;
+    text << "the membrane is " << 1e3 * extent.x() << " x " << 1e3 * extent.y() << " mm when flattened; valid: at most "
+         << 1e3 * limit << " mm either way (the atlas)";
+    Refuse(settings, text.str());
+  }
+  std::vector<Vec2f> material;
+  material.reserve(flat.size());
+  for (const Eigen::Vector2d& m : flat) {
+    material.push_back((m + Eigen::Vector2d::Constant(kAtlasMargin_m)).cast<float>());
+  }
+  return material;
+}
+
+void AddParticles(const SceneSettings& settings, const Anatomy& anatomy, SceneData* scene) {
+  const int rows = settings.membrane.rows, cols = settings.membrane.cols;
+  const std::size_t organ_count = anatomy.organ_vertices.size();
+  std::vector<double> mass(organ_count + anatomy.sheet.size(), 0.0);
+  for (std::size_t i = 0; i < anatomy.tets.size(); ++i) {
+    const Tetrahedron& t = anatomy.tets[i];
+    const auto& x = anatomy.organ_vertices;
+    const double volume = SignedVolume(x[t[0]], x[t[1]], x[t[2]], x[t[3]]);
+    if (!(volume > 0)) {
+      Refuse(settings, "tetrahedron " + std::to_string(i) + " has no positive volume");
+    }
+    for (const Index v : t) {
+      mass[v] += settings.organ_density_kg_m3 * volume / 4;
+    }
+  }
+  for (int r = 0; r + 1 < rows; ++r) {
+    for (int c = 0; c + 1 < cols; ++c) {
+      const std::size_t n00 = static_cast<std::size_t>(r) * cols + c;
+      for (const auto& t : {std::array{n00, n00 + 1, n00 + cols + 1}, std::array{n00, n00 + cols + 1, n00 + cols}}) {
+        const Vec3d &a = anatomy.sheet[t[0]], &b = anatomy.sheet[t[1]], &d = anatomy.sheet[t[2]];
+        const double area = (b - a).cross(d - a).norm() / 2;
+        for (const std::size_t v : t) {
+          mass[organ_count + v] += settings.membrane.density_kg_m2 * area / 3;
+        }
+      }
+    }
+  }
+  scene->rest_position.reserve(mass.size());
+  for (const auto* points : {&anatomy.organ_vertices, &anatomy.sheet}) {
+    for (const Vec3d& p : *points) {
+      scene->rest_position.push_back(p.cast<float>());
+    }
+  }
+  scene->inverse_mass.resize(mass.size());
+  for (std::size_t i = 0; i < mass.size(); ++i) {
+    bool fixed = false;
+    if (i < organ_count) {
+      fixed = anatomy.organ_fixed[i];
+    } else {
+      const auto r = static_cast<int>((i - organ_count) / cols), c = static_cast<int>((i - organ_count) % cols);
+      fixed = r == 0 || r == rows - 1 || c == 0 || c == cols - 1;
+    }
+    if (!fixed && !(mass[i] > 0)) {
+      Refuse(settings, "particle " + std::to_string(i) + " has no mass: it belongs to no element");
+    }
+    scene->inverse_mass[i] = fixed ? 0.0f : static_cast<float>(1 / mass[i]);
+  }
+}
+
+double RestLength(const SceneData& scene, Index a, Index b) {
+  return (scene.rest_position[a].cast<double>() - scene.rest_position[b].cast<double>()).norm();
+}
+
+void AddOrgan(const Anatomy& anatomy, SceneData* scene) {
+  // Sorted first: surface vertices name their tetrahedron by its place.
+  scene->tets = anatomy.tets;
+  scene->tet_colours =
+      SortByColour(&scene->tets, anatomy.organ_vertices.size(), [](const Tetrahedron& t) { return ParticlesOf(t); });
+  scene->tube_surface = BoundaryOf(anatomy.tets);
+  for (const auto& [a, b] : EdgesOf(anatomy.tets)) {
+    scene->tube_edges.push_back({a, b, static_cast<float>(RestLength(*scene, a, b))});
+  }
+  scene->surface_triangles = anatomy.surface_triangles;
+  for (const Embedding& e : EmbedPoints(anatomy.organ_vertices, scene->tets, anatomy.surface_vertices)) {
+    EmbeddedVertex vertex{e.tetrahedron, {}};
+    for (int k = 0; k < 4; ++k) {
+      vertex.barycentric[k] = static_cast<float>(e.barycentric[k]);
+    }
+    scene->surface_vertices.push_back(vertex);
+  }
+}
+
+void AddMembrane(const SceneSettings& settings, SceneData* scene) {
+  const int rows = settings.membrane.rows, cols = settings.membrane.cols;
+  const Index first = scene->fixed.membrane.first;
+  const auto node = [&](int r, int c) { return first + static_cast<Index>(r) * cols + c; };
+  scene->membrane_rest_length.assign(3 * static_cast<std::size_t>(rows) * cols, 0.0f);
+  for (int r = 0; r < rows; ++r) {
+    for (int c = 0; c < cols; ++c) {
+      constexpr int kStep[3][2] = {{0, 1}, {1, 0}, {1, 1}};
+      for (int k = 0; k < 3; ++k) {
+        const int r2 = r + kStep[k][0], c2 = c + kStep[k][1];
+        if (r2 < rows && c2 < cols) {
+          scene->membrane_rest_length[3 * (static_cast<std::size_t>(r) * cols + c) + k] =
+              static_cast<float>(RestLength(*scene, node(r, c), node(r2, c2)));
+        }
+      }
+    }
+  }
+  const int dr = settings.membrane.bending_row_stride, dc = settings.membrane.bending_col_stride;
+  const auto add = [&](Index v0, Index v1, Index v2, Index v3) {
+    const auto x = [&](Index v) { return Vec3d(scene->rest_position[v].cast<double>()); };
+    scene->bending.push_back({{v0, v1, v2, v3}, static_cast<float>(DihedralAngle(x(v0), x(v1), x(v2), x(v3)))});
+  };
+  //   n10 --- n11      interior edges of the coarse sheet: each cell's diagonal n00-n11, the edge n00-n01 where a row
+  //   of
+  //    |   /   |       cells lies below it, and the edge n00-n10 where a column of cells lies to its left. The wings
+  //    are
+  //   n00 --- n01      chosen so that both normals point outward (s x t).
+  for (int r = 0; r + dr < rows; r += dr) {
+    for (int c = 0; c + dc < cols; c += dc) {
+      add(node(r, c), node(r + dr, c + dc), node(r + dr, c), node(r, c + dc));
+      if (r > 0) {
+        add(node(r, c), node(r, c + dc), node(r + dr, c + dc), node(r - dr, c));
+      }
+      if (c > 0) {
+        add(node(r, c), node(r + dr, c), node(r, c - dc), node(r + dr, c + dc));
+      }
+    }
+  }
+}
+
+void AddBindings(const SceneSettings& settings, const Anatomy& anatomy, SceneData* scene) {
+  const MembraneSettings& m = settings.membrane;
+  const TriangleLocator locator(anatomy.organ_vertices, scene->tube_surface);
+  for (int r = m.binding_row_stride / 2; r < m.rows; r += m.binding_row_stride) {
+    for (int c = m.binding_col_stride / 2 + 1; c < m.cols; c += m.binding_col_stride) {
+      const std::size_t i = static_cast<std::size_t>(r) * m.cols + c;
+      const Index particle = scene->fixed.membrane.first + static_cast<Index>(i);
+      const auto hit = locator.Closest(anatomy.sheet[i], m.binding_reach_m);
+      if (hit.triangle == kNoIndex || scene->inverse_mass[particle] == 0) {
+        continue;
+      }
+      Binding binding{particle, scene->tube_surface[hit.triangle], {}, static_cast<float>(hit.closest.distance)};
+      for (int k = 0; k < 3; ++k) {
+        binding.barycentric[k] = static_cast<float>(hit.closest.barycentric[k]);
+      }
+      scene->bindings.push_back(binding);
+    }
+  }
+  if (scene->bindings.empty()) {
+    std::ostringstream text;
+    text << "no membrane node lies within binding_reach = " << 1e3 * m.binding_reach_m << " mm of the organ";
+    Refuse(settings, text.str());
+  }
+}
+
+void AddSurroundings(const Anatomy& anatomy, SceneData* scene) {
+  for (const Anatomy::Surrounding& s : anatomy.surroundings) {
+    StaticSurface surface{};
+    std::strncpy(surface.name, s.name.c_str(), sizeof(surface.name) - 1);
+    surface.role = s.role;
+    surface.first_vertex = static_cast<Index>(scene->static_vertices.size());
+    surface.vertex_count = static_cast<Index>(s.vertices.size());
+    surface.first_triangle = static_cast<Index>(scene->static_triangles.size());
+    surface.triangle_count = static_cast<Index>(s.triangles.size());
+    surface.collides = s.collides ? 1 : 0;
+    for (const Vec3d& p : s.vertices) {
+      scene->static_vertices.push_back(p.cast<float>());
+    }
+    for (const Triangle& t : s.triangles) {
+      scene->static_triangles.push_back(
+          {t[0] + surface.first_vertex, t[1] + surface.first_vertex, t[2] + surface.first_vertex});
+    }
+    scene->static_surfaces.push_back(surface);
+  }
+}
+
+void AddStructures(const SceneSettings& settings, const Sheet& sheet, SceneData* scene) {
+  for (const StructureSettings& s : settings.structures) {
+    if (s.path.size() < 2) {
+      Refuse(settings, "a protected structure needs at least two points");
+    }
+    ProtectedStructure structure{s.kind, static_cast<float>(s.radius_m), static_cast<float>(s.depth_m),
+                                 static_cast<Index>(scene->protected_points.size()), kStructurePoints};
+    for (int i = 0; i < kStructurePoints; ++i) {
+      // Catmull-Rom through the points given, so that the course is smooth.
+      const double x = static_cast<double>(i) / (kStructurePoints - 1) * static_cast<double>(s.path.size() - 1);
+      const auto k = std::min(static_cast<std::size_t>(x), s.path.size() - 2);
+      const auto f = static_cast<float>(x - static_cast<double>(k));
+      const Vec2f &p1 = s.path[k], &p2 = s.path[k + 1];
+      const Vec2f p0 = k > 0 ? s.path[k - 1] : Vec2f(2 * p1 - p2);
+      const Vec2f p3 = k + 2 < s.path.size() ? s.path[k + 2] : Vec2f(2 * p2 - p1);
+      const Vec2f q = 0.5f * (2 * p1 + f * (p2 - p0) + f * f * (2 * p0 - 5 * p1 + 4 * p2 - p3) +
+                              f * f * f * (3 * p1 - p0 - 3 * p2 + p3));
+      const SheetPoint at = sheet.At(q.x(), q.y());
+      scene->protected_points.push_back({(at.p - s.depth_m * at.normal).cast<float>(), at.material});
+    }
+    scene->protected_structures.push_back(structure);
+  }
+}
+
+void AddScript(const SceneSettings& settings, const Sheet& sheet, SceneData* scene) {
+  for (const ScriptKeySettings& key : settings.script) {
+    if (key.tool < 0 || key.tool >= kMaxTools || settings.tools[key.tool].kind == ToolKind::kNone) {
+      Refuse(settings, "script key at " + std::to_string(key.time_s) + " s: no tool " + std::to_string(key.tool));
+    }
+    if (key.time_s < 0 || key.time_s > settings.script_duration_s) {
+      Refuse(settings, "script key at " + std::to_string(key.time_s) + " s lies outside the script of " +
+                           std::to_string(settings.script_duration_s) + " s");
+    }
+    Vec3f p = key.world_m.value_or(Vec3f::Zero());
+    if (!key.world_m) {
+      const SheetPoint at = sheet.At(key.sheet.x(), key.sheet.y());
+      p = (at.p + key.height_m * at.normal).cast<float>() + key.offset_m;
+    }
+    const double reach = (p - settings.tools[key.tool].p_WP).norm();
+    const double longest = std::min(kLongestReach_m, settings.tools[key.tool].shaft_length_m - kLeastLever_m);
+    if (!(reach >= kLeastLever_m && reach <= longest)) {
+      Refuse(settings, "script key at " + std::to_string(key.time_s) + " s: tip " + std::to_string(1e3 * reach) +
+                           " mm from the trocar of tool " + std::to_string(key.tool) + "; valid: " +
+                           std::to_string(1e3 * kLeastLever_m) + " to " + std::to_string(1e3 * longest) + " mm");
+    }
+    scene->script.push_back({static_cast<float>(key.time_s), static_cast<std::uint32_t>(key.tool), p,
+                             static_cast<float>(key.jaw_rad), key.pedals, static_cast<float>(key.power_W)});
+  }
+  std::stable_sort(scene->script.begin(), scene->script.end(), [](const ScriptKey& a, const ScriptKey& b) {
+    return a.tool != b.tool ? a.tool < b.tool : a.time_s < b.time_s;
+  });
+  scene->fixed.script_duration_s = static_cast<float>(settings.script_duration_s);
+}
+
+void AddPlannedLine(const SceneSettings& settings, const Sheet& sheet, SceneData* scene) {
+  for (std::size_t i = 0; i < settings.planned_line.size(); ++i) {
+    const Vec2f& to = settings.planned_line[i];
+    const Vec2f& from = settings.planned_line[i > 0 ? i - 1 : 0];
+    const int parts = i > 0 ? std::max(1, static_cast<int>(std::ceil((to - from).norm() / kLineStep))) : 1;
+    for (int k = 1; k <= parts; ++k) {
+      const Vec2f at = from + static_cast<float>(k) / static_cast<float>(parts) * (to - from);
+      scene->planned_line.push_back(sheet.At(at.x(), at.y()).material);
+    }
+  }
+}
+
+}  // namespace
+
+SceneData AssembleScene(const SceneSettings& settings, const Anatomy& anatomy) {
+  CheckCounts(settings, anatomy);
+  SceneData scene;
+  SceneView& fixed = scene.fixed;
+  std::strncpy(fixed.name, settings.name.c_str(), sizeof(fixed.name) - 1);
+  fixed.physics = settings.physics;
+  fixed.thermal = settings.thermal;
+  fixed.render = settings.render;
+  fixed.haptics = settings.haptics;
+  fixed.breathing = settings.breathing;
+  fixed.assessment = settings.assessment;
+  fixed.tools = settings.tools;
+  fixed.node_mask = settings.node_mask;
+  fixed.tube_vertex_count = static_cast<Index>(anatomy.organ_vertices.size());
+  fixed.membrane.first = fixed.tube_vertex_count;
+  fixed.membrane.rows = static_cast<std::uint32_t>(settings.membrane.rows);
+  fixed.membrane.cols = static_cast<std::uint32_t>(settings.membrane.cols);
+
+  AddParticles(settings, anatomy, &scene);
+  AddOrgan(anatomy, &scene);
+  AddMembrane(settings, &scene);
+  AddBindings(settings, anatomy, &scene);
+  scene.membrane_material = MaterialOf(settings, anatomy.sheet);
+  AddSurroundings(anatomy, &scene);
+  const Sheet sheet(settings.membrane, anatomy.sheet, scene.membrane_material);
+  AddStructures(settings, sheet, &scene);
+  AddScript(settings, sheet, &scene);
+  AddPlannedLine(settings, sheet, &scene);
+
+  const std::size_t n = scene.rest_position.size();
+  const auto particles = [](const auto& c) { return ParticlesOf(c); };
+  scene.tube_edge_colours = SortByColour(&scene.tube_edges, n, particles);
+  scene.bending_colours = SortByColour(&scene.bending, n, particles);
+  scene.binding_colours = SortByColour(&scene.bindings, n, particles);
+  fixed.hash = ContentHash(scene.View());
+  return scene;
+}
+
+}  // namespace fulcrum::scene

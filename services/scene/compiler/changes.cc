@@ -1,0 +1,63 @@
+#include "services/scene/compiler/changes.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+
+#include "services/base/core/error.h"
+
+namespace fulcrum::scene {
+namespace {
+
+constexpr std::string_view kPower = "script.power_W";
+
+/// The power to which the simulated operator sets the generator for each use. Each key gets a value of its own: a
+/// shared one would be written as an anchor.
+void SetPower(YAML::Node description, const YAML::Node& value) {
+  for (auto entry : description["script"]) {
+    if (!entry.second.IsSequence()) continue;
+    for (YAML::Node key : entry.second) {
+      if (key["power_W"] && key["power_W"].as<double>(0) > 0) key["power_W"] = YAML::Clone(value);
+    }
+  }
+}
+
+std::string Names(std::span<const std::string_view> sections) {
+  std::string names;
+  for (const std::string_view section : sections) names.append(names.empty() ? "" : ", ").append(section);
+  return names;
+}
+
+}  // namespace
+
+std::string ApplyChanges(const std::string& yaml, const std::vector<std::string>& changes,
+                         std::span<const std::string_view> sections, std::string_view option) {
+  std::string what = std::string(option) + ": the scene's description cannot be read";
+  try {
+    YAML::Node description = YAML::Load(yaml);
+    for (const std::string& change : changes) {
+      what = std::string(option) + " " + change;
+      const std::size_t dot = change.find('.'), equals = change.find('=');
+      const bool whole = dot != std::string::npos && equals != std::string::npos && dot > 0 && dot + 1 < equals &&
+                         equals + 1 < change.size();
+      const std::string section = whole ? change.substr(0, dot) : std::string();
+      if (std::find(sections.begin(), sections.end(), section) == sections.end()) {
+        throw InputError(what + ": must be section.key=value with a section of " + Names(sections) +
+                         "; for example physics.grip_force_N=5");
+      }
+      if (section == "script") {
+        if (change.substr(0, equals) != kPower) throw InputError(what + ": of the script only power_W can be changed");
+        SetPower(description, YAML::Load(change.substr(equals + 1)));
+        continue;
+      }
+      description[section][change.substr(dot + 1, equals - dot - 1)] = YAML::Load(change.substr(equals + 1));
+    }
+    YAML::Emitter text;
+    text << description;
+    return text.c_str();
+  } catch (const YAML::Exception& error) {
+    throw InputError(what + ": " + error.what());
+  }
+}
+
+}  // namespace fulcrum::scene

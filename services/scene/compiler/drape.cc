@@ -1,0 +1,363 @@
+#include "services/scene/compiler/drape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "services/base/core/error.h"
+#include "services/scene/builder/geometry.h"
+
+namespace fulcrum::scene {
+namespace {
+
+constexpr int kRadiusRows = 65, kRadiusAngles = 65;  ///< Samples of the organ's outer radius.
+constexpr double kRayLength_m = 0.08;                ///< No organ of interest is thicker.
+constexpr double kMissedRays = 0.10;                 ///< More than this part: the centre line is not inside the organ.
+constexpr int kRadiusSmoothing = 12, kSheetSmoothing = 40;
+constexpr double kTaper = 0.12;  ///< Of the length at either end, over which the gap closes to …
+constexpr double kEndGap = 0.3;  ///< … this part of it: there the membrane grows together with the organ.
+constexpr double kFlareTurn_rad = 0.7;
+constexpr double kLeastNormalAgreement = 0.05;  ///< Cosine between neighbouring normals: less is a fold.
+
+/// Rows of values on a regular grid.
+template <class T>
+struct Grid {
+  int rows, cols;
+  std::vector<T> values;
+
+  Grid(int r, int c, const T& value) : rows(r), cols(c), values(static_cast<std::size_t>(r) * c, value) {}
+  T& at(int r, int c) { return values[static_cast<std::size_t>(r) * cols + c]; }
+  const T& at(int r, int c) const { return values[static_cast<std::size_t>(r) * cols + c]; }
+
+  /// Bilinear at fractions in [0, 1].
+  [[nodiscard]] T Sample(double row, double col) const {
+    const double y = row * (rows - 1), x = col * (cols - 1);
+    const int r = std::clamp(static_cast<int>(y), 0, rows - 2), c = std::clamp(static_cast<int>(x), 0, cols - 2);
+    const double v = y - r, u = x - c;
+    return (1 - v) * ((1 - u) * at(r, c) + u * at(r, c + 1)) + v * ((1 - u) * at(r + 1, c) + u * at(r + 1, c + 1));
+  }
+
+  /// Each value half way to the mean of its neighbours, `times` times; the border sees fewer neighbours, or stays.
+  void Smooth(int times, bool keep_border) {
+    for (int k = 0; k < times; ++k) {
+      const Grid old = *this;
+      for (int r = 0; r < rows; ++r) {
+        for (int c = 0; c < cols; ++c) {
+          if (keep_border && (r == 0 || c == 0 || r == rows - 1 || c == cols - 1)) {
+            continue;
+          }
+          T sum = old.at(std::max(r - 1, 0), c);
+          sum += old.at(std::min(r + 1, rows - 1), c);
+          sum += old.at(r, std::max(c - 1, 0));
+          sum += old.at(r, std::min(c + 1, cols - 1));
+          at(r, c) = 0.5 * old.at(r, c) + 0.125 * sum;
+        }
+      }
+    }
+  }
+};
+
+struct CrossFrame {
+  Vec3d centre, right, up;
+  [[nodiscard]] Vec3d Direction(double angle) const { return std::cos(angle) * up + std::sin(angle) * right; }
+};
+
+CrossFrame FrameAt(const CentreLine& line, double fraction, const Vec3d& facing) {
+  CrossFrame frame;
+  frame.centre = line.At(fraction);
+  const Vec3d tangent = line.Tangent(fraction);
+  frame.right = tangent.cross(facing).normalized();
+  frame.up = frame.right.cross(tangent);
+  return frame;
+}
+
+/// Distance along the ray to the first triangle that it leaves through (the outer side: the ray may begin in the lumen,
+/// within the wall or in a filled organ). Negative when there is none. Moeller and Trumbore's intersection.
+double ExitDistance(const TriangleMesh& mesh, const Vec3d& origin, const Vec3d& direction) {
+  double nearest = kRayLength_m;
+  bool hit = false;
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3d &a = mesh.vertices[t[0]], e1 = mesh.vertices[t[1]] - a, e2 = mesh.vertices[t[2]] - a;
+    const Vec3d p = direction.cross(e2);
+    const double determinant = e1.dot(p);
+    if (determinant >= 0) {
+      continue;  // Seen from outside: the ray enters here.
+    }
+    const Vec3d s = origin - a;
+    const double u = s.dot(p) / determinant;
+    if (u < 0 || u > 1) {
+      continue;
+    }
+    const Vec3d q = s.cross(e1);
+    const double v = direction.dot(q) / determinant, distance = e2.dot(q) / determinant;
+    if (v >= 0 && u + v <= 1 && distance > 0 && distance < nearest) {
+      nearest = distance;
+      hit = true;
+    }
+  }
+  return hit ? nearest : -1;
+}
+
+Grid<double> OuterRadius(const ImportSettings& import, const CentreLine& line, const TriangleMesh& organ,
+                         const std::string& name) {
+  Grid<double> radius(kRadiusRows, kRadiusAngles, -1.0);
+  int missed = 0;
+  double mean = 0;
+  for (int r = 0; r < kRadiusRows; ++r) {
+    const double fraction = import.from + (import.to - import.from) * r / (kRadiusRows - 1);
+    const CrossFrame frame = FrameAt(line, fraction, import.facing.cast<double>());
+    for (int a = 0; a < kRadiusAngles; ++a) {
+      const double angle = (static_cast<double>(a) / (kRadiusAngles - 1) - 0.5) * import.sector_rad;
+      const double distance = ExitDistance(organ, frame.centre, frame.Direction(angle));
+      radius.at(r, a) = distance;
+      missed += distance < 0 ? 1 : 0;
+      mean += std::max(distance, 0.0);
+    }
+  }
+  if (missed > kMissedRays * kRadiusRows * kRadiusAngles) {
+    throw InputError(name + ": " + std::to_string(100 * missed / (kRadiusRows * kRadiusAngles)) +
+                     " % of the rays from the centre line do not leave the organ; valid: at most " +
+                     std::to_string(static_cast<int>(100 * kMissedRays)) + " %. The centre line must run inside it");
+  }
+  mean /= kRadiusRows * kRadiusAngles - missed;
+  for (double& value : radius.values) {
+    value = value < 0 ? mean : value;
+  }
+  radius.Smooth(kRadiusSmoothing, false);
+  return radius;
+}
+
+/// Equally spaced points along a polyline.
+std::vector<Vec3d> Resample(const std::vector<Vec3d>& line, int count) {
+  std::vector<double> length{0};
+  for (std::size_t i = 1; i < line.size(); ++i) {
+    length.push_back(length.back() + (line[i] - line[i - 1]).norm());
+  }
+  std::vector<Vec3d> result;
+  std::size_t k = 0;
+  for (int i = 0; i < count; ++i) {
+    const double wanted = length.back() * i / (count - 1);
+    while (k + 2 < length.size() && length[k + 1] < wanted) {
+      ++k;
+    }
+    const double f = std::clamp((wanted - length[k]) / (length[k + 1] - length[k]), 0.0, 1.0);
+    result.push_back((1 - f) * line[k] + f * line[k + 1]);
+  }
+  return result;
+}
+
+/// One row before resampling: flare, arc over the organ, flare.
+std::vector<Vec3d> RowLine(const CrossFrame& frame, const Grid<double>& radius, double row, double gap,
+                           const ImportSettings& import) {
+  constexpr int kArc = 200, kFlare = 30;
+  std::vector<Vec3d> arc;
+  for (int i = 0; i <= kArc; ++i) {
+    const double angle = (static_cast<double>(i) / kArc - 0.5) * import.sector_rad;
+    arc.push_back(frame.centre + (radius.Sample(row, static_cast<double>(i) / kArc) + gap) * frame.Direction(angle));
+  }
+  const auto flare = [&](const Vec3d& from, const Vec3d& along, double side) {
+    std::vector<Vec3d> points;
+    const Vec3d out = side * frame.right;
+    Vec3d at = from;
+    for (int i = 1; i <= kFlare; ++i) {
+      // Leaves along the arc and turns away from the organ.
+      const double turn = kFlareTurn_rad * i / kFlare;
+      at += import.flare_m / kFlare * (std::cos(turn) * along + std::sin(turn) * out).normalized();
+      points.push_back(at);
+    }
+    return points;
+  };
+  // Direction over the last tenth of the arc: a single segment would carry the surface's noise.
+  std::vector<Vec3d> line = flare(arc.front(), (arc.front() - arc[kArc / 10]).normalized(), -1);
+  std::reverse(line.begin(), line.end());
+  line.insert(line.end(), arc.begin(), arc.end());
+  const std::vector<Vec3d> right = flare(arc.back(), (arc.back() - arc[kArc - kArc / 10]).normalized(), 1);
+  line.insert(line.end(), right.begin(), right.end());
+  return line;
+}
+
+Vec3d NormalAt(const Grid<Vec3d>& sheet, int r, int c) {
+  const Vec3d across = sheet.at(r, std::min(c + 1, sheet.cols - 1)) - sheet.at(r, std::max(c - 1, 0));
+  const Vec3d along = sheet.at(std::min(r + 1, sheet.rows - 1), c) - sheet.at(std::max(r - 1, 0), c);
+  return across.cross(along).normalized();
+}
+
+/// Nodes nearer to the organ than `least_gap(row)` move out along the surface's normal there.
+template <class LeastGap>
+void PushOut(const TriangleMesh& organ, const TriangleLocator& locator, double reach, const LeastGap& least_gap,
+             Grid<Vec3d>* sheet) {
+  for (int r = 0; r < sheet->rows; ++r) {
+    for (int c = 0; c < sheet->cols; ++c) {
+      Vec3d& p = sheet->at(r, c);
+      const auto hit = locator.Closest(p, reach);
+      if (hit.triangle == kNoIndex) {
+        continue;
+      }
+      const Triangle& t = organ.triangles[hit.triangle];
+      const Vec3d &a = organ.vertices[t[0]], &b = organ.vertices[t[1]], &d = organ.vertices[t[2]];
+      const Vec3d normal = (b - a).cross(d - a).normalized();
+      const double height = normal.dot(p - hit.closest.point);
+      const double distance = std::copysign(hit.closest.distance, height);
+      if (distance < least_gap(r)) {
+        p += (least_gap(r) - distance) * normal;
+      }
+    }
+  }
+}
+
+/// Spreads the nodes evenly along each row, then along each column.
+void Spread(Grid<Vec3d>* sheet) {
+  std::vector<Vec3d> line;
+  for (int r = 0; r < sheet->rows; ++r) {
+    line.assign(sheet->values.begin() + static_cast<std::ptrdiff_t>(r) * sheet->cols,
+                sheet->values.begin() + static_cast<std::ptrdiff_t>(r + 1) * sheet->cols);
+    line = Resample(line, sheet->cols);
+    std::copy(line.begin(), line.end(), sheet->values.begin() + static_cast<std::ptrdiff_t>(r) * sheet->cols);
+  }
+  for (int c = 0; c < sheet->cols; ++c) {
+    line.clear();
+    for (int r = 0; r < sheet->rows; ++r) {
+      line.push_back(sheet->at(r, c));
+    }
+    line = Resample(line, sheet->rows);
+    for (int r = 0; r < sheet->rows; ++r) {
+      sheet->at(r, c) = line[r];
+    }
+  }
+}
+
+/// A fold shows as a crease of more than 90 degrees between neighbouring nodes.
+void CheckFolds(const Grid<Vec3d>& sheet, const std::vector<CrossFrame>& frames, const std::string& name) {
+  for (int r = 0; r < sheet.rows; ++r) {
+    for (int c = 0; c < sheet.cols; ++c) {
+      const Vec3d normal = NormalAt(sheet, r, c);
+      const bool outward = c != sheet.cols / 2 || normal.dot(frames[r].up) > kLeastNormalAgreement;
+      if (!outward || !(normal.dot(NormalAt(sheet, r, std::min(c + 1, sheet.cols - 1))) > kLeastNormalAgreement) ||
+          !(normal.dot(NormalAt(sheet, std::min(r + 1, sheet.rows - 1), c)) > kLeastNormalAgreement)) {
+        throw InputError(name + ": the membrane folds over at row " + std::to_string(r) + ", column " +
+                         std::to_string(c) +
+                         ". Choose a shorter stretch, another facing, or a smaller sector or flare");
+      }
+    }
+  }
+}
+
+}  // namespace
+
+// -------------------------------------------------------------------------------------------------- CentreLine
+
+CentreLine::CentreLine(const std::vector<Vec3d>& points) {
+  constexpr int kPerPiece = 40;
+  const auto count = static_cast<int>(points.size());
+  const auto at = [&](int i) {
+    return i < 0        ? Vec3d(2 * points[0] - points[1])
+           : i >= count ? Vec3d(2 * points[count - 1] - points[count - 2])
+                        : points[i];
+  };
+  for (int i = 0; i + 1 < count; ++i) {
+    for (int k = 0; k < kPerPiece + (i + 2 == count ? 1 : 0); ++k) {
+      const double f = static_cast<double>(k) / kPerPiece;
+      const Vec3d p0 = at(i - 1), p1 = at(i), p2 = at(i + 1), p3 = at(i + 2);
+      points_.push_back(0.5 * (2 * p1 + f * (p2 - p0) + f * f * (2 * p0 - 5 * p1 + 4 * p2 - p3) +
+                               f * f * f * (3 * p1 - p0 - 3 * p2 + p3)));
+      length_.push_back(points_.size() == 1 ? 0.0 : length_.back() + (points_.back() - *(points_.end() - 2)).norm());
+    }
+  }
+}
+
+Vec3d CentreLine::At(double fraction) const {
+  const double wanted = std::clamp(fraction, 0.0, 1.0) * length();
+  const auto next = std::upper_bound(length_.begin() + 1, length_.end() - 1, wanted);
+  const auto i = static_cast<std::size_t>(next - length_.begin());
+  const double step = length_[i] - length_[i - 1];
+  const double f = step > 0 ? (wanted - length_[i - 1]) / step : 0;
+  return (1 - f) * points_[i - 1] + f * points_[i];
+}
+
+Vec3d CentreLine::Tangent(double fraction) const {
+  constexpr double kHalfWindow = 0.05;
+  return (At(fraction + kHalfWindow) - At(fraction - kHalfWindow)).normalized();
+}
+
+double CentreLine::Project(const Vec3d& p) const {
+  double best = std::numeric_limits<double>::max(), fraction = 0;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const double distance = (points_[i] - p).squaredNorm();
+    if (distance < best) {
+      best = distance;
+      fraction = length_[i] / length();
+    }
+  }
+  return fraction;
+}
+
+// ------------------------------------------------------------------------------------------------------- drape
+
+std::vector<Vec3d> DrapeMembrane(const ImportSettings& import, const MembraneSettings& membrane,
+                                 const CentreLine& centre_line, const TriangleMesh& organ, const std::string& name) {
+  const Grid<double> radius = OuterRadius(import, centre_line, organ, name);
+  Grid<Vec3d> sheet(membrane.rows, membrane.cols, Vec3d::Zero());
+  std::vector<CrossFrame> frames;
+  const auto gap = [&](int r) {
+    const double t = static_cast<double>(r) / (membrane.rows - 1);
+    const double x = std::clamp(std::min(t, 1 - t) / kTaper, 0.0, 1.0);
+    return membrane.gap_m * (kEndGap + (1 - kEndGap) * x * x * (3 - 2 * x));
+  };
+  for (int r = 0; r < membrane.rows; ++r) {
+    const double t = static_cast<double>(r) / (membrane.rows - 1);
+    frames.push_back(FrameAt(centre_line, import.from + (import.to - import.from) * t, import.facing.cast<double>()));
+    const std::vector<Vec3d> row = Resample(RowLine(frames.back(), radius, t, gap(r), import), membrane.cols);
+    for (int c = 0; c < membrane.cols; ++c) {
+      sheet.at(r, c) = row[c];
+    }
+  }
+  const TriangleLocator locator(organ.vertices, organ.triangles);
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds; ++round) {
+    sheet.Smooth(kSheetSmoothing, false);
+    PushOut(organ, locator, 2 * membrane.gap_m, gap, &sheet);
+    Spread(&sheet);
+  }
+  CheckFolds(sheet, frames, name);
+  return sheet.values;
+}
+
+TriangleMesh ContinueSideways(int rows, int cols, const std::vector<Vec3d>& sheet, double width) {
+  constexpr int kSteps = 10, kRowStep = 4, kUnder = 2;
+  constexpr double kBelow_m = 0.0004;
+  TriangleMesh mesh;
+  for (const int side : {0, 1}) {
+    const auto first = static_cast<Index>(mesh.vertices.size());
+    int lines = 0;
+    for (int r = 0; r < rows; r = r + kRowStep < rows || r == rows - 1 ? r + kRowStep : rows - 1, ++lines) {
+      const auto node = [&](int from_rim) -> const Vec3d& {
+        return sheet[static_cast<std::size_t>(r) * cols + (side == 0 ? from_rim : cols - 1 - from_rim)];
+      };
+      const Vec3d& rim = node(0);
+      const Vec3d out = (rim - node(std::min(4, cols - 1))).normalized();
+      const int r0 = std::max(r - 1, 0), r1 = std::min(r + 1, rows - 1), c = side == 0 ? 1 : cols - 2;
+      const auto at = [&](int row, int col) { return sheet[static_cast<std::size_t>(row) * cols + col]; };
+      const Vec3d normal = (at(r, c + 1) - at(r, c - 1)).cross(at(r1, c) - at(r0, c)).normalized();
+      for (int k = 0; k <= kSteps; ++k) {
+        const Vec3d p = k == 0 ? node(kUnder) : Vec3d(rim + width * (k - 1) / (kSteps - 1) * out);
+        mesh.vertices.push_back(p - kBelow_m * normal);
+      }
+    }
+    for (int i = 0; i + 1 < lines; ++i) {
+      for (int k = 0; k < kSteps; ++k) {
+        const Index a = first + static_cast<Index>(i * (kSteps + 1) + k), b = a + kSteps + 1;
+        // Outward on both sides: k runs to the left on side 0, to the right on side 1.
+        if (side == 1) {
+          mesh.triangles.push_back({a, a + 1, b + 1});
+          mesh.triangles.push_back({a, b + 1, b});
+        } else {
+          mesh.triangles.push_back({a, b + 1, a + 1});
+          mesh.triangles.push_back({a, b, b + 1});
+        }
+      }
+    }
+  }
+  return mesh;
+}
+
+}  // namespace fulcrum::scene

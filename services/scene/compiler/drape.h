@@ -1,0 +1,40 @@
+// Drapes the membrane over an imported organ: offset from its surface, then regular resampling (as the paper generates
+// its membranes).
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "services/scene/builder/scene_settings.h"
+#include "services/scene/readers/mesh_io.h"
+
+namespace fulcrum::scene {
+
+/// A smooth curve through points, by arc length.
+class CentreLine {
+ public:
+  /// At least two different points [m].
+  explicit CentreLine(const std::vector<Vec3d>& points);
+
+  [[nodiscard]] double length() const { return length_.back(); }
+  [[nodiscard]] Vec3d At(double fraction) const;
+  /// Unit, towards growing fraction; averaged over a tenth of the curve, so that neighbouring cross planes agree.
+  [[nodiscard]] Vec3d Tangent(double fraction) const;
+  /// Fraction of the nearest point.
+  [[nodiscard]] double Project(const Vec3d& p) const;
+
+ private:
+  std::vector<Vec3d> points_;
+  std::vector<double> length_;
+};
+
+/// The membrane's nodes, row by row [m]: outside the organ everywhere, columns along +(tangent x facing), rows along
+/// the centre line. Throws InputError "name: reason" when rays from the centre line miss the organ or the sheet folds
+/// over.
+std::vector<Vec3d> DrapeMembrane(const ImportSettings& import, const MembraneSettings& membrane,
+                                 const CentreLine& centre_line, const TriangleMesh& organ, const std::string& name);
+
+/// The fixed surface that continues a membrane on both sides by `width`, and a little under its rims.
+TriangleMesh ContinueSideways(int rows, int cols, const std::vector<Vec3d>& sheet, double width);
+
+}  // namespace fulcrum::scene

@@ -1,0 +1,34 @@
+// Makes usable surfaces of real ones. CGAL lives behind these functions and those of tetrahedralise.h only.
+#pragma once
+
+#include <string>
+
+#include "services/scene/readers/mesh_io.h"
+
+namespace fulcrum::scene {
+
+struct SurfaceRepair {
+  double min_edge = 0;        ///< Shorter edges are collapsed.
+  bool cap_openings = false;  ///< Close an open surface.
+  double wall = 0;            ///< > 0: the result bounds a wall this thick below the surface; openings become its rims.
+};
+
+struct RepairReport {
+  std::size_t openings_capped = 0;
+  std::size_t pieces_dropped = 0;  ///< Separate pieces other than the largest.
+  std::size_t edges_collapsed = 0;
+  std::size_t caps_flipped = 0;        ///< Flat triangles removed by flipping their longest edge.
+  std::size_t self_intersections = 0;  ///< Pairs of triangles left that cross: tolerated by the mesher, reported.
+  double least_edge = 0, least_angle_deg = 0;  ///< After the repair.
+};
+
+/// The largest piece of `mesh` as a closed, oriented (outward) two-manifold without short edges and without needle or
+/// cap triangles where its topology allows. Throws InputError "name: reason" when it cannot be closed, or when the
+/// wall's inner side crosses itself.
+TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settings, const std::string& name,
+                           RepairReport* report);
+
+/// Edge collapse (Lindstrom, Turk 1998) down to `triangles_max`; pieces and holes stay. Orientation is made consistent.
+TriangleMesh Decimate(const TriangleMesh& mesh, int triangles_max);
+
+}  // namespace fulcrum::scene

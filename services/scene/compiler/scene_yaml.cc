@@ -1,0 +1,368 @@
+#include "services/scene/compiler/scene_yaml.h"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+#include "services/scene/compiler/changes.h"
+#include "services/scene/compiler/yaml_parameters.h"
+
+namespace fulcrum::scene {
+namespace {
+
+using config::Range;
+using config::StrictMap;
+using config::StrictYaml;
+
+/// Where mesh files are looked for, in this order.
+struct Folders : std::vector<std::filesystem::path> {
+  bool files_needed = true;  ///< False: the first place will do, whether or not a file is there.
+};
+
+constexpr std::size_t kMaxKeys = 2000;
+constexpr std::size_t kMaxStructures = 64;
+constexpr std::size_t kMaxPathPoints = 64;
+
+const StrictMap::Choices<ToolKind> kToolKinds = {{"none", ToolKind::kNone},
+                                                 {"grasper", ToolKind::kGrasper},
+                                                 {"hook", ToolKind::kHook},
+                                                 {"scissors", ToolKind::kScissors}};
+const StrictMap::Choices<ProtectedKind> kProtectedKinds = {{"ureter", ProtectedKind::kUreter},
+                                                           {"nerve", ProtectedKind::kNerve}};
+const StrictMap::Choices<SurfaceRole> kRoles = {{"abdominal_wall", SurfaceRole::kAbdominalWall},
+                                                {"retroperitoneum", SurfaceRole::kRetroperitoneum},
+                                                {"pelvis", SurfaceRole::kPelvis},
+                                                {"bladder", SurfaceRole::kBladder},
+                                                {"other", SurfaceRole::kOther}};
+const StrictMap::Choices<std::uint32_t> kPedals = {
+    {"up", kPedalNone}, {"cut", kPedalCut}, {"coag", kPedalCoag}, {"blend", kPedalBlend}};
+const StrictMap::Choices<BrickSplit> kSplits = {{"six", BrickSplit::kSix}, {"five", BrickSplit::kFive}};
+const StrictMap::Choices<double> kLengthUnits = {{"m", 1.0}, {"cm", 1e-2}, {"mm", 1e-3}};
+
+void ReadTube(StrictMap map, TubeSettings* t) {
+  ReadInteger(&map, "rings", 3, 1000, &t->rings);
+  ReadInteger(&map, "segments", 6, 200, &t->segments);
+  ReadSi(&map, "length_mm", Range::Between(10, 500), &t->length_m);
+  ReadSi(&map, "outer_radius_mm", Range::Between(2, 60), &t->outer_radius_m);
+  ReadSi(&map, "wall_mm", Range::Between(0.5, 20), &t->wall_m);
+  ReadSi(&map, "sagittal_bend_mm", Range::Between(-60, 60), &t->sagittal_bend_m);
+  ReadSi(&map, "lateral_bend_mm", Range::Between(-40, 40), &t->lateral_bend_m);
+  ReadInteger(&map, "fold_count", 0, 40, &t->fold_count);
+  ReadSi(&map, "fold_depth_mm", Range::Between(0, 5), &t->fold_depth_m);
+  t->split = map.Choice("split", t->split, kSplits);
+  if (t->split == BrickSplit::kFive && t->segments % 2 != 0) {
+    map.Fail("split", "five needs an even number of segments, not " + std::to_string(t->segments));
+  }
+  if (t->wall_m + t->fold_depth_m >= t->outer_radius_m) {
+    map.Fail("outer_radius_mm", "must be more than wall_mm + fold_depth_mm");
+  }
+}
+
+/// Finds a mesh file, or refuses in one line with every place that was looked at.
+std::filesystem::path FindFile(const StrictMap& map, const std::string& key, const std::string& name,
+                               const Folders& folders) {
+  std::string tried;
+  for (const auto& folder : folders) {
+    std::filesystem::path candidate = (folder / name).lexically_normal();
+    if (!folders.files_needed || std::filesystem::is_regular_file(candidate)) {
+      return candidate;
+    }
+    tried += tried.empty() ? "" : ", ";
+    tried += candidate.string();
+  }
+  std::string reason = "'";
+  reason += name;
+  reason += "' is not at ";
+  reason += tried;
+  reason += "; give its folder with --data DIR";
+  map.Fail(key, reason);
+}
+
+void ReadCentreline(StrictMap map, std::vector<Vec3f>* points) {
+  std::array<std::vector<double>, 3> axes;
+  const std::array keys = {"x_mm", "y_mm", "z_mm"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    axes[k] = map.NumbersSi(keys[k], 2, kMaxPathPoints, Range::Between(-5000, 5000));
+    if (axes[k].size() != axes[0].size()) {
+      map.Fail(keys[k], "must have as many entries as x_mm");
+    }
+  }
+  for (std::size_t i = 0; i < axes[0].size(); ++i) {
+    points->push_back(Eigen::Vector3d(axes[0][i], axes[1][i], axes[2][i]).cast<float>());
+  }
+}
+
+void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Folders* folders) {
+  for (const std::string& folder : map.Texts("folders", 0, 16)) {
+    for (const auto& base : bases) folders->push_back(base / folder);
+  }
+  folders->insert(folders->end(), bases.begin(), bases.end());
+  import->scale_m = map.Choice("unit", import->scale_m, kLengthUnits);
+  import->origin_m = map.Vector3Si("origin_mm", import->origin_m, Range::Between(-2000, 2000));
+  import->organ_file = FindFile(map, "organ", map.Text("organ"), *folders);
+  import->remesh = map.Flag("remesh", import->remesh);
+  import->cap_openings = map.Flag("cap_openings", import->cap_openings);
+  ReadSi(&map, "wall_mm", Range::Between(0, 30), &import->wall_m);
+  if (map.Has("tet_edge_mm") && map.Has("target_tets")) {
+    map.Fail("tet_edge_mm", "and target_tets say the same: give one of them");
+  }
+  ReadInteger(&map, "target_tets", 500, 60000, &import->target_tets);
+  ReadSi(&map, "tet_edge_mm", Range::Between(0, 50), &import->tet_edge_m);
+  ReadSi(&map, "min_edge_mm", Range::Between(0, 5), &import->min_edge_m);
+  ReadInteger(&map, "organ_triangles_max", 500, 200000, &import->organ_triangles_max);
+  ReadCentreline(map.Map("centreline"), &import->centreline_m);
+  ReadSi(&map, "from", Range::Between(0, 1), &import->from);
+  ReadSi(&map, "to", Range::Between(0, 1), &import->to);
+  if (!(import->to - import->from >= 0.1)) {
+    map.Fail("to", "must exceed `from` by at least 0.1");
+  }
+  import->facing = map.Vector3Si("facing", import->facing, Range::Between(-1, 1));
+  if (!(import->facing.norm() > 0.1)) {
+    map.Fail("facing", "must be a direction, not (nearly) zero");
+  }
+  ReadSi(&map, "sector_deg", Range::Between(30, 240), &import->sector_rad);
+  ReadSi(&map, "flare_mm", Range::Between(0, 60), &import->flare_m);
+  ReadSi(&map, "bed_mm", Range::Between(0, 150), &import->bed_m);
+  ReadSi(&map, "cavity_mm", Range::Between(0, 1000), &import->cavity_m);
+  for (StrictMap& entry : map.Maps("surroundings", 0, 16)) {
+    ImportSettings::Surrounding s;
+    s.name = entry.Text("name", 31);
+    s.role = entry.Choice("role", s.role, kRoles);
+    s.file = FindFile(entry, "file", entry.Text("file"), *folders);
+    s.offset_m = entry.Vector3Si("offset_mm", s.offset_m, Range::Between(-500, 500));
+    ReadInteger(&entry, "triangles_max", 100, 100000, &s.triangles_max);
+    s.collides = entry.Flag("collides", s.collides);
+    import->surroundings.push_back(s);
+  }
+}
+
+void ReadMembrane(StrictMap map, MembraneSettings* m) {
+  ReadInteger(&map, "rows", 3, 5000, &m->rows);
+  ReadInteger(&map, "cols", 3, 5000, &m->cols);
+  ReadSi(&map, "width_mm", Range::Between(5, 1000), &m->width_m);
+  ReadSi(&map, "gap_mm", Range::Between(0.5, 30), &m->gap_m);
+  ReadSi(&map, "density_kg_m2", Range::Between(0.01, 50), &m->density_kg_m2);
+  ReadInteger(&map, "bending_row_stride", 1, 1000, &m->bending_row_stride);
+  ReadInteger(&map, "bending_col_stride", 1, 1000, &m->bending_col_stride);
+  ReadInteger(&map, "binding_row_stride", 1, 1000, &m->binding_row_stride);
+  ReadInteger(&map, "binding_col_stride", 1, 1000, &m->binding_col_stride);
+  ReadSi(&map, "binding_reach_mm", Range::Between(0.5, 60), &m->binding_reach_m);
+  if ((m->rows - 1) % m->bending_row_stride != 0) {
+    map.Fail("bending_row_stride", "must divide rows - 1 = " + std::to_string(m->rows - 1));
+  }
+  if ((m->cols - 1) % m->bending_col_stride != 0) {
+    map.Fail("bending_col_stride", "must divide cols - 1 = " + std::to_string(m->cols - 1));
+  }
+}
+
+Vec2f ToVec2(const std::vector<double>& v) { return {static_cast<float>(v[0]), static_cast<float>(v[1])}; }
+
+StructureSettings ReadStructure(StrictMap map) {
+  StructureSettings s;
+  s.kind = map.Choice("kind", kProtectedKinds);
+  ReadSi(&map, "radius_mm", Range::Between(0.05, 20), &s.radius_m);
+  ReadSi(&map, "depth_mm", Range::Between(0, 30), &s.depth_m);
+  const auto across = map.Numbers("s", 2, kMaxPathPoints, Range::Between(0, 1));
+  const auto along = map.Numbers("t", 2, kMaxPathPoints, Range::Between(0, 1));
+  if (across.size() != along.size()) {
+    map.Fail("t", "must have as many entries as s");
+  }
+  for (std::size_t i = 0; i < across.size(); ++i) {
+    s.path.push_back(ToVec2({across[i], along[i]}));
+  }
+  return s;
+}
+
+void ReadToolMeshes(StrictMap map, const ToolDescription& tool, const Folders& folders, ToolMeshSettings* meshes) {
+  const bool has_jaws = tool.kind != ToolKind::kHook;
+  meshes->scale_m = map.Choice("unit", meshes->scale_m, kLengthUnits);
+  if (!has_jaws && map.Has("jaws")) {
+    map.Fail("jaws", "a hook has none");
+  }
+  meshes->body_file = FindFile(map, "body", map.Text("body"), folders);
+  if (has_jaws) {
+    for (const std::string& name : map.Texts("jaws", 2, 2)) {
+      meshes->jaw_files.push_back(FindFile(map, "jaws", name, folders));
+    }
+  }
+  ReadSi(&map, "turn_deg", Range::Between(-180, 180), &meshes->turn_rad);
+  meshes->origin_m = Vec3f(0, 0, has_jaws ? -tool.tip_length_m : 0);
+  meshes->origin_m = map.Vector3Si("origin_mm", meshes->origin_m, Range::Between(-500, 500));
+}
+
+void ReadTool(StrictMap map, const Folders& folders, ToolDescription* tool, ToolMeshSettings* meshes) {
+  tool->kind = map.Choice("kind", tool->kind, kToolKinds);
+  if (tool->kind == ToolKind::kNone) {
+    return;
+  }
+  *tool = DefaultTool(tool->kind, map.Vector3Si("trocar_mm", Range::Between(-1000, 1000)));
+  ReadSi(&map, "shaft_radius_mm", Range::Between(0.1, 20), &tool->shaft_radius_m);
+  ReadSi(&map, "shaft_length_mm", Range::Between(50, 1000), &tool->shaft_length_m);
+  ReadSi(&map, "tip_radius_mm", Range::Between(0.05, 20), &tool->tip_radius_m);
+  ReadSi(&map, "tip_length_mm", Range::Between(0.1, 100), &tool->tip_length_m);
+  if (auto entry = map.OptionalMap("meshes")) {
+    ReadToolMeshes(*entry, *tool, folders, meshes);
+  }
+}
+
+ScriptKeySettings ReadKey(StrictMap map, double duration_s) {
+  ScriptKeySettings key;
+  key.time_s = map.NumberSi("time_s", Range::Between(0, duration_s));
+  if (map.Has("world_mm")) {
+    key.world_m = map.Vector3Si("world_mm", Range::Between(-1000, 1000));
+  } else {
+    key.sheet = ToVec2(map.Numbers("sheet", 2, 2, Range::Between(0, 1)));
+    key.height_m = map.NumberSi("height_mm", Range::Between(-30, 500));
+    key.offset_m = map.Vector3Si("offset_mm", key.offset_m, Range::Between(-200, 200));
+  }
+  ReadSi(&map, "jaw_deg", Range::Between(0, 90), &key.jaw_rad);
+  key.pedals = map.Choice("pedal", key.pedals, kPedals);
+  ReadSi(&map, "power_W", Range::Between(0, 300), &key.power_W);
+  if (key.pedals != kPedalNone && !(key.power_W > 0)) {
+    map.Fail("pedal", "is down, but power_W is 0");
+  }
+  return key;
+}
+
+void ReadScript(StrictMap map, SceneSettings* scene) {
+  scene->script_duration_s = map.NumberSi("duration_s", scene->script_duration_s, Range::Between(0.1, 86400));
+  for (int tool = 0; tool < kMaxTools; ++tool) {
+    const std::string name = "tool" + std::to_string(tool);
+    double last_s = -1;
+    for (StrictMap& entry : map.Maps(name, 0, kMaxKeys)) {
+      ScriptKeySettings key = ReadKey(entry, scene->script_duration_s);
+      key.tool = tool;
+      if (scene->tools[tool].kind == ToolKind::kNone) {
+        entry.Fail("time_s", "the scene has no " + name);
+      }
+      if (!(key.time_s > last_s)) {
+        entry.Fail("time_s", "keys must follow one another in time");
+      }
+      last_s = key.time_s;
+      scene->script.push_back(key);
+    }
+  }
+}
+
+std::uint32_t ReadNodes(StrictMap* root, std::uint32_t all) {
+  const std::vector<std::string> names = root->Texts("nodes", 0, kNodeCount);
+  if (names.empty()) {
+    return all;
+  }
+  // The supervisor and the recorder are the session's and not the scene's.
+  constexpr int kSceneNodes = static_cast<int>(NodeId::kRecorder);
+  std::uint32_t mask = 0;
+  for (const std::string& name : names) {
+    int node = 1;
+    while (node < kSceneNodes && name != NodeName(static_cast<NodeId>(node))) {
+      ++node;
+    }
+    if (node == kSceneNodes) {
+      root->Fail("nodes",
+                 "no node '" + name + "'; valid: handle_bridge, haptics_node, physics_node, thermal_node, render_node");
+    }
+    mask |= 1u << static_cast<unsigned>(node);
+  }
+  return mask;
+}
+
+/// `bases`: where relative names of the description start from.
+SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesystem::path& data) {
+  SceneSettings scene;
+  StrictMap root = yaml->root();
+  scene.name = root.Text("name", 63);
+  scene.description = root.TextOr("description", "");
+  StrictMap organ = root.Map("organ");
+  ReadSi(&organ, "density_kg_m3", Range::Between(1, 1e5), &scene.organ_density_kg_m3);
+  if (organ.Has("import") == organ.Has("procedural")) {
+    root.Fail("organ", "needs either `procedural` or `import`");
+  }
+  Folders folders;
+  folders.files_needed = bases.files_needed;
+  if (!data.empty()) {
+    folders.push_back(data);
+  }
+  if (organ.Has("import")) {
+    ReadImport(organ.Map("import"), bases, &scene.import.emplace(), &folders);
+  } else {
+    ReadTube(organ.Map("procedural"), &scene.tube);
+    folders.insert(folders.end(), bases.begin(), bases.end());
+  }
+  ReadMembrane(root.MapOrDefaults("membrane"), &scene.membrane);
+  for (StrictMap& entry : root.Maps("structures", 0, kMaxStructures)) {
+    scene.structures.push_back(ReadStructure(entry));
+  }
+  StrictMap tools = root.MapOrDefaults("tools");
+  for (int i = 0; i < kMaxTools; ++i) {
+    const std::string key = "tool" + std::to_string(i);
+    ReadTool(tools.MapOrDefaults(key), folders, &scene.tools[i], &scene.tool_meshes[i]);
+  }
+  ReadPhysics(root.MapOrDefaults("physics"), &scene.physics);
+  ReadBreathing(root.MapOrDefaults("breathing"), scene.physics.mode, &scene.breathing);
+  ReadThermal(root.MapOrDefaults("thermal"), &scene.thermal);
+  ReadRender(root.MapOrDefaults("render"), &scene.render);
+  ReadHaptics(root.MapOrDefaults("haptics"), &scene.haptics);
+  ReadScript(root.MapOrDefaults("script"), &scene);
+  if (auto assessment = root.OptionalMap("assessment")) {
+    ReadAssessment(*assessment, &scene.assessment, &scene.planned_line);
+  }
+  scene.node_mask = ReadNodes(&root, scene.node_mask);
+  yaml->Finish();
+  return {scene, yaml->Effective(), yaml->Rules()};
+}
+
+SceneDescription ReadFile(const std::filesystem::path& file, const std::filesystem::path& data,
+                          const std::vector<std::string>& changes, bool files_needed) {
+  std::string changed;
+  if (!changes.empty()) {
+    std::ifstream stream(file, std::ios::binary);
+    const std::string text{std::istreambuf_iterator<char>(stream), {}};
+    changed = ApplyChanges(text, changes, kCompileSections);
+  }
+  // A scene of the same name as the one it stands on would be taken for that.
+  StrictYaml yaml = StrictYaml::FromFileOnBases(file, {"name", "description"}, changed);
+  Folders bases;
+  bases.files_needed = files_needed;
+  for (const auto& from : yaml.files()) {
+    if (std::find(bases.begin(), bases.end(), from.parent_path()) == bases.end()) bases.push_back(from.parent_path());
+  }
+  return Read(&yaml, bases, data);
+}
+
+}  // namespace
+
+SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
+                               const std::vector<std::string>& changes) {
+  return ReadFile(file, data, changes, true);
+}
+
+std::vector<config::KeyRule> SceneRules(const std::filesystem::path& file) {
+  return ReadFile(file, {}, {}, false).rules;
+}
+
+SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data) {
+  StrictYaml yaml = StrictYaml::FromText(text, name);
+  Folders here;
+  here.emplace_back();
+  return Read(&yaml, here, data);
+}
+
+std::vector<SceneSummary> ListScenes(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::directory_iterator entries(folder, error);
+  if (error) {
+    throw InputError(folder.string() + ": cannot be listed (" + error.message() + ")");
+  }
+  std::vector<SceneSummary> scenes;
+  for (const auto& entry : entries) {
+    if (entry.path().extension() == ".yaml") {
+      StrictYaml yaml = StrictYaml::FromFile(entry.path());
+      StrictMap root = yaml.root();
+      scenes.push_back({root.Text("name", 63), root.TextOr("description", ""), entry.path()});
+    }
+  }
+  std::sort(scenes.begin(), scenes.end(), [](const auto& a, const auto& b) { return a.file < b.file; });
+  return scenes;
+}
+
+}  // namespace fulcrum::scene

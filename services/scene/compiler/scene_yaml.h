@@ -1,0 +1,38 @@
+// The YAML description of a scene: every key is documented in services/scene/README.md.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "services/base/config/strict_yaml.h"
+#include "services/scene/builder/scene_settings.h"
+
+namespace fulcrum::scene {
+
+struct SceneDescription {
+  SceneSettings settings;
+  std::string effective_yaml;          ///< What was read, defaults included. Reads back to the same settings.
+  std::vector<config::KeyRule> rules;  ///< Every key that was asked for.
+};
+
+/// Reads and checks a scene description. Mesh files are looked up in `data` (when not empty), then in the folders that
+/// the description names. `changes`: see ApplyChanges. Throws InputError "file:line: key: reason; valid: range".
+SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
+                               const std::vector<std::string>& changes = {});
+
+/// The same for a text; `name` stands for the file in messages, relative folders start from the working directory.
+SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data);
+
+/// Every key that the description asks for. Its mesh files need not be there.
+std::vector<config::KeyRule> SceneRules(const std::filesystem::path& file);
+
+struct SceneSummary {
+  std::string name, description;
+  std::filesystem::path file;
+};
+/// Name and description of each *.yaml in a folder, sorted by file; nothing else of them is checked. Throws InputError.
+std::vector<SceneSummary> ListScenes(const std::filesystem::path& folder);
+
+}  // namespace fulcrum::scene

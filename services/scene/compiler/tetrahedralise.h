@@ -1,0 +1,18 @@
+// Fills a closed surface with tetrahedra.
+#pragma once
+
+#include <string>
+
+#include "services/scene/compiler/tet_repair.h"
+#include "services/scene/readers/mesh_io.h"
+
+namespace fulcrum::scene {
+
+/// Delaunay refinement with sliver removal (CGAL Mesh_3), its cell size adjusted until the count is within 10 % of
+/// `target_tets`. The same input gives the same mesh. Throws InputError "name: reason".
+TetrahedralMesh Tetrahedralise(const TriangleMesh& surface, int target_tets, const std::string& name);
+
+/// How many tetrahedra of this mean edge fill a closed surface, about.
+int TetsOfEdge(const TriangleMesh& surface, double edge);
+
+}  // namespace fulcrum::scene

@@ -1,0 +1,240 @@
+#include "services/scene/format/validate.h"
+
+#include <cstring>
+
+#include "services/scene/format/validate_checks.h"
+
+namespace fulcrum::scene {
+namespace {
+
+/// No triangle of the membrane is turned over in the atlas: two places of the sheet would share a texel.
+void CheckAtlas(const SceneView& s) {
+  const std::size_t rows = s.membrane.rows, cols = s.membrane.cols;
+  for (std::size_t r = 0; r + 1 < rows; ++r) {
+    for (std::size_t c = 0; c + 1 < cols; ++c) {
+      const std::size_t n = r * cols + c;
+      for (const auto& [b, d] : {std::pair{n + 1, n + cols + 1}, std::pair{n + cols + 1, n + cols}}) {
+        const Vec2f u = s.membrane_material[b] - s.membrane_material[n];
+        const Vec2f v = s.membrane_material[d] - s.membrane_material[n];
+        if (!(u.x() * v.y() - u.y() * v.x() > 0)) {
+          Fail("membrane_material", "row ", r, ", column ", c, ": the sheet is folded over in the atlas");
+        }
+      }
+    }
+  }
+}
+
+void CheckParticles(const SceneView& s) {
+  const std::uint64_t nodes = static_cast<std::uint64_t>(s.membrane.rows) * s.membrane.cols;
+  const std::uint64_t total = s.tube_vertex_count + nodes;
+  if (s.membrane.rows < 2 || s.membrane.cols < 2 || nodes > kMaxMembraneNodes || total > kMaxTissueVertices) {
+    Fail("scene", s.tube_vertex_count, " organ vertices and ", s.membrane.rows, " x ", s.membrane.cols,
+         " membrane nodes; valid: at least 2 x 2, at most ", kMaxMembraneNodes, " nodes and ", kMaxTissueVertices,
+         " vertices");
+  }
+  if (s.membrane.first != s.tube_vertex_count) {
+    Fail("scene", "the membrane begins at particle ", s.membrane.first, "; valid: ", s.tube_vertex_count);
+  }
+  CheckSize("rest_position", s.rest_position.size(), total);
+  CheckSize("inverse_mass", s.inverse_mass.size(), total);
+  for (std::size_t i = 0; i < total; ++i) {
+    CheckPoint("rest_position", i, s.rest_position[i]);
+    CheckRange("inverse_mass", "inverse mass", i, s.inverse_mass[i], 0, 1e12);
+  }
+  CheckSize("membrane_material", s.membrane_material.size(), nodes);
+  const double atlas = static_cast<double>(s.membrane.texel_m) * kAtlasTexels;
+  for (std::size_t i = 0; i < nodes; ++i) {
+    CheckRange("membrane_material", "s", i, s.membrane_material[i].x(), 0, atlas);
+    CheckRange("membrane_material", "t", i, s.membrane_material[i].y(), 0, atlas);
+  }
+  CheckAtlas(s);
+}
+
+void CheckConstraints(const SceneView& s) {
+  const std::uint64_t total = s.rest_position.size(), tube = s.tube_vertex_count;
+  for (std::size_t i = 0; i < s.tets.size(); ++i) {
+    const Tetrahedron& t = s.tets[i];
+    for (const Index v : t) {
+      CheckIndex("tets", i, v, 0, tube);
+    }
+    const Vec3d a = s.rest_position[t[0]].cast<double>();
+    const auto edge = [&](int k) { return Vec3d(s.rest_position[t[k]].cast<double>() - a); };
+    if (!(edge(1).cross(edge(2)).dot(edge(3)) > 0)) {
+      Fail("tets", "element ", i, ": no positive volume");
+    }
+  }
+  CheckColours("tet_colours", s.tet_colours, s.tets, total);
+  for (std::size_t i = 0; i < s.tube_edges.size(); ++i) {
+    const StretchConstraint& e = s.tube_edges[i];
+    CheckIndex("tube_edges", i, e.a, 0, tube);
+    CheckIndex("tube_edges", i, e.b, 0, tube);
+    CheckDistinct("tube_edges", i, ParticlesOf(e));
+    CheckRange("tube_edges", "rest length", i, e.rest_length, 1e-7, kFarthest_m);
+  }
+  CheckColours("tube_edge_colours", s.tube_edge_colours, s.tube_edges, total);
+  const std::size_t rows = s.membrane.rows, cols = s.membrane.cols;
+  CheckSize("membrane_rest_length", s.membrane_rest_length.size(), 3 * rows * cols);
+  for (std::size_t i = 0; i < s.membrane_rest_length.size(); ++i) {
+    const std::size_t r = i / 3 / cols, c = i / 3 % cols, k = i % 3;
+    const bool exists = (k == 0 || r + 1 < rows) && (k == 1 || c + 1 < cols);
+    CheckRange("membrane_rest_length", "rest length", i, s.membrane_rest_length[i], exists ? 1e-7 : 0,
+               exists ? kFarthest_m : 0);
+  }
+  for (std::size_t i = 0; i < s.bending.size(); ++i) {
+    for (const Index v : s.bending[i].v) {
+      CheckIndex("bending", i, v, tube, total);
+    }
+    CheckDistinct("bending", i, s.bending[i].v);
+    CheckRange("bending", "rest angle", i, s.bending[i].rest_angle, -3.15, 3.15);
+  }
+  CheckColours("bending_colours", s.bending_colours, s.bending, total);
+  for (std::size_t i = 0; i < s.bindings.size(); ++i) {
+    const Binding& b = s.bindings[i];
+    CheckIndex("bindings", i, b.membrane, tube, total);
+    for (const Index v : b.surface) {
+      CheckIndex("bindings", i, v, 0, tube);
+    }
+    CheckDistinct("bindings", i, b.surface);
+    CheckWeights("bindings", i, b.barycentric);
+    CheckRange("bindings", "rest length", i, b.rest_length, 0, kFarthest_m);
+  }
+  CheckColours("binding_colours", s.binding_colours, s.bindings, total);
+}
+
+/// A mesh that is a range of shared vertices and triangles.
+template <class Mesh>
+void CheckRanges(const char* section, std::size_t element, const Mesh& mesh, std::span<const Vec3f> vertices,
+                 const char* triangle_section, std::span<const Triangle> triangles) {
+  const std::uint64_t vertex_end = static_cast<std::uint64_t>(mesh.first_vertex) + mesh.vertex_count;
+  const std::uint64_t triangle_end = static_cast<std::uint64_t>(mesh.first_triangle) + mesh.triangle_count;
+  if (vertex_end > vertices.size() || triangle_end > triangles.size()) {
+    Fail(section, "element ", element, ": reaches beyond the vertices or triangles");
+  }
+  for (std::uint64_t k = mesh.first_triangle; k < triangle_end; ++k) {
+    for (const Index v : triangles[k]) {
+      CheckIndex(triangle_section, k, v, mesh.first_vertex, vertex_end);
+    }
+  }
+}
+
+void CheckSurfaces(const SceneView& s) {
+  for (std::size_t i = 0; i < s.tube_surface.size(); ++i) {
+    for (const Index v : s.tube_surface[i]) {
+      CheckIndex("tube_surface", i, v, 0, s.tube_vertex_count);
+    }
+    CheckDistinct("tube_surface", i, s.tube_surface[i]);
+  }
+  for (std::size_t i = 0; i < s.surface_vertices.size(); ++i) {
+    CheckIndex("surface_vertices", i, s.surface_vertices[i].tetrahedron, 0, s.tets.size());
+    CheckWeights("surface_vertices", i, s.surface_vertices[i].barycentric);
+  }
+  for (std::size_t i = 0; i < s.surface_triangles.size(); ++i) {
+    for (const Index v : s.surface_triangles[i]) {
+      CheckIndex("surface_triangles", i, v, 0, s.surface_vertices.size());
+    }
+  }
+  for (std::size_t i = 0; i < s.static_vertices.size(); ++i) {
+    CheckPoint("static_vertices", i, s.static_vertices[i]);
+  }
+  for (std::size_t i = 0; i < s.static_surfaces.size(); ++i) {
+    const StaticSurface& f = s.static_surfaces[i];
+    CheckRanges("static_surfaces", i, f, s.static_vertices, "static_triangles", s.static_triangles);
+    if (std::memchr(f.name, 0, sizeof(f.name)) == nullptr || f.role > SurfaceRole::kOther || f.collides > 1) {
+      Fail("static_surfaces", "element ", i, ": bad name, role or flag");
+    }
+  }
+  for (std::size_t i = 0; i < s.static_triangles.size(); ++i) {
+    for (const Index v : s.static_triangles[i]) {
+      CheckIndex("static_triangles", i, v, 0, s.static_vertices.size());
+    }
+  }
+}
+
+void CheckToolMeshes(const SceneView& s) {
+  for (std::size_t i = 0; i < s.tool_vertices.size(); ++i) {
+    CheckPoint("tool_vertices", i, s.tool_vertices[i]);
+  }
+  std::array<std::uint32_t, kMaxTools> parts{};  // Bit per part.
+  for (std::size_t i = 0; i < s.tool_meshes.size(); ++i) {
+    const ToolMesh& mesh = s.tool_meshes[i];
+    CheckIndex("tool_meshes", i, mesh.tool, 0, kMaxTools);
+    if (mesh.part > ToolPart::kJawMinus) {
+      Fail("tool_meshes", "element ", i, ": unknown part ", static_cast<std::uint32_t>(mesh.part));
+    }
+    const std::uint32_t part = 1u << static_cast<std::uint32_t>(mesh.part);
+    if ((parts[mesh.tool] & part) != 0) {
+      Fail("tool_meshes", "element ", i, ": a part of tool ", mesh.tool, " twice");
+    }
+    parts[mesh.tool] |= part;
+    CheckRanges("tool_meshes", i, mesh, s.tool_vertices, "tool_triangles", s.tool_triangles);
+  }
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    const ToolKind kind = s.tools[k].kind;
+    const std::uint32_t whole = kind == ToolKind::kNone ? 0 : kind == ToolKind::kHook ? 1 : 7;
+    if (parts[k] != 0 && parts[k] != whole) {
+      Fail("tool_meshes", "tool ", k, ": not the parts that its kind has");
+    }
+  }
+  for (std::size_t i = 0; i < s.tool_triangles.size(); ++i) {
+    for (const Index v : s.tool_triangles[i]) {
+      CheckIndex("tool_triangles", i, v, 0, s.tool_vertices.size());
+    }
+  }
+}
+
+void CheckStructuresAndScript(const SceneView& s) {
+  for (std::size_t i = 0; i < s.protected_structures.size(); ++i) {
+    const ProtectedStructure& p = s.protected_structures[i];
+    if (static_cast<std::uint64_t>(p.first_point) + p.point_count > s.protected_points.size() || p.point_count < 2) {
+      Fail("protected_structures", "element ", i, ": needs at least two points, all of them present");
+    }
+    if (p.kind > ProtectedKind::kNerve) {
+      Fail("protected_structures", "element ", i, ": unknown kind ", static_cast<std::uint32_t>(p.kind));
+    }
+    CheckRange("protected_structures", "radius", i, p.radius_m, 1e-5, 0.1);
+    CheckRange("protected_structures", "depth", i, p.depth_m, 0, 0.1);
+  }
+  for (std::size_t i = 0; i < s.protected_points.size(); ++i) {
+    CheckPoint("protected_points", i, s.protected_points[i].p_W);
+    CheckRange("protected_points", "s", i, s.protected_points[i].material.x(), -1, 1);
+    CheckRange("protected_points", "t", i, s.protected_points[i].material.y(), -1, 1);
+  }
+  if (s.planned_line.size() == 1) {
+    Fail("planned_line", "needs at least two points");
+  }
+  for (std::size_t i = 0; i < s.planned_line.size(); ++i) {
+    CheckRange("planned_line", "s", i, s.planned_line[i].x(), -1, 1);
+    CheckRange("planned_line", "t", i, s.planned_line[i].y(), -1, 1);
+  }
+  for (std::size_t i = 0; i < s.script.size(); ++i) {
+    const ScriptKey& key = s.script[i];
+    CheckIndex("script", i, key.tool, 0, kMaxTools);
+    CheckRange("script", "time", i, key.time_s, 0, s.script_duration_s);
+    CheckPoint("script", i, key.p_W);
+    CheckRange("script", "jaw", i, key.jaw_rad, 0, 1.6);
+    CheckRange("script", "pedals", i, key.pedals, 0, kPedalCut | kPedalCoag | kPedalBlend);
+    CheckRange("script", "power", i, key.power_W, 0, 300);
+    if (i > 0 && (key.tool < s.script[i - 1].tool ||
+                  (key.tool == s.script[i - 1].tool && key.time_s <= s.script[i - 1].time_s))) {
+      Fail("script", "element ", i, ": keys must be sorted by tool, then strictly by time");
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<SceneFault> FindFault(const SceneView& scene) {
+  try {
+    CheckParameters(scene);
+    CheckParticles(scene);
+    CheckConstraints(scene);
+    CheckSurfaces(scene);
+    CheckToolMeshes(scene);
+    CheckStructuresAndScript(scene);
+  } catch (const Fault& fault) {
+    return fault.what;
+  }
+  return std::nullopt;
+}
+
+}  // namespace fulcrum::scene

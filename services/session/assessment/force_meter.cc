@@ -1,0 +1,94 @@
+#include "services/session/assessment/force_meter.h"
+
+#include <algorithm>
+
+#include "services/session/assessment/gap.h"
+
+namespace fulcrum::assessment {
+namespace {
+
+/// A slip is over when the traction has fallen to this part of what the jaws hold.
+constexpr double kHeldAgain = 0.9;
+/// What jaws hold falls faster than that, per message, when they are opened: the noise of a handle is a third of it.
+constexpr float kSteadyGrip = 0.985f;
+
+const Contact* GraspOf(const DeviceContacts& contacts) {
+  const auto end = contacts.contacts.begin() + std::min<std::uint32_t>(contacts.count, kMaxContacts);
+  const auto* grasp = std::find_if(contacts.contacts.begin(), end,
+                                   [](const Contact& contact) { return contact.kind == ContactKind::kGrasp; });
+  return grasp == end ? nullptr : grasp;
+}
+
+double ForceOf(const DeviceContacts& contacts) {
+  Vec3d force = Vec3d::Zero();
+  for (std::uint32_t i = 0; i < std::min<std::uint32_t>(contacts.count, kMaxContacts); ++i) {
+    const Contact& contact = contacts.contacts[i];
+    const bool touches =
+        contact.kind == ContactKind::kGrasp || (contact.kind == ContactKind::kSurface && contact.gap <= 0);
+    if (touches) force += contact.f_ref.cast<double>();
+  }
+  return force.norm();
+}
+
+}  // namespace
+
+ForceMeter::ForceMeter(const AssessmentParams& params, const PhysicsParams& physics)
+    : params_(params),
+      // What jaws hold that are just closed: less means that they are being opened.
+      closed_grip_N_(physics.grip_force_N * (1 - physics.grasp_close_rad / physics.grasp_open_rad)) {}
+
+ForceMeter::Finding ForceMeter::Add(double time_s, const ContactModel& model) {
+  Finding finding;
+  if (time_s <= last_s_) return finding;
+  // A physics node that comes back finds its grasp in its checkpoint: that is no slip.
+  const bool continues = model.stamp.epoch == epoch_ && time_s - last_s_ <= kGap_s;
+  epoch_ = model.stamp.epoch;
+  const double dt_s = continues ? time_s - last_s_ : 0;
+  last_s_ = time_s;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    ToolForce& tool = tools_[i];
+    const double force_N = ForceOf(model.devices[i]);
+    tool.force_time_Ns += 0.5 * dt_s * (tool.force_N + force_N);
+    tool.force_N = force_N;
+    tool.peak_N = std::max(tool.peak_N, force_N);
+    finding.too_high |= force_N > static_cast<double>(params_.limit[static_cast<std::size_t>(Measure::kPeakForce)]);
+    if (!continues) holds_[i] = {};
+    finding.slips |= FollowHold(model.devices[i], force_N, dt_s, &holds_[i], &tool);
+  }
+  return finding;
+}
+
+bool ForceMeter::FollowHold(const DeviceContacts& contacts, double force_N, double dt_s, Hold* hold,
+                            ToolForce* tool) const {
+  const Contact* grasp = GraspOf(contacts);
+  if (grasp == nullptr) {
+    const bool lost = hold->holding && hold->closed && !hold->slipping;
+    *hold = {};
+    tool->slips += lost ? 1 : 0;
+    return lost;
+  }
+  if (!hold->holding) {
+    hold->holding = true;
+    hold->begin_z = grasp->x_ref.z();
+  }
+  // Jaws that are being opened let go because they are meant to.
+  const bool opens = grasp->slip_force < kSteadyGrip * hold->grip_N;
+  hold->grip_N = grasp->slip_force;
+  hold->closed = grasp->slip_force > closed_grip_N_ && !opens;
+  const bool was_slipping = hold->slipping;
+  const auto grip_N = static_cast<double>(grasp->slip_force);
+  hold->slipping = hold->closed && force_N > (was_slipping ? kHeldAgain * grip_N : grip_N);
+  const double lift_m = static_cast<double>(grasp->x_ref.z() - hold->begin_z);
+  tool->lift_m = std::max(tool->lift_m, lift_m);
+  const auto limit = [&](Measure measure) {
+    return static_cast<double>(params_.limit[static_cast<std::size_t>(measure)]);
+  };
+  const bool held = 1e3 * lift_m >= limit(Measure::kLift) && force_N <= limit(Measure::kPeakForce);
+  hold->held_s = held ? hold->held_s + dt_s : 0;
+  tool->lift_hold_s = std::max(tool->lift_hold_s, hold->held_s);
+  const bool begins = hold->slipping && !was_slipping;
+  tool->slips += begins ? 1 : 0;
+  return begins;
+}
+
+}  // namespace fulcrum::assessment

@@ -1,0 +1,78 @@
+// The hook on the membrane: along the planned line, near what must be spared, in the air with the pedal down.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "services/base/core/scene_view.h"
+
+namespace fulcrum::assessment {
+
+/// Foot of the perpendicular on a line of straight pieces.
+struct LinePlace {
+  double distance_m = 0;
+  double along_m = 0;  ///< From its beginning.
+};
+
+/// A line on the flattened sheet.
+class SheetLine {
+ public:
+  explicit SheetLine(std::span<const Vec2f> points);
+  [[nodiscard]] bool empty() const { return points_.size() < 2; }
+  [[nodiscard]] double length_m() const { return empty() ? 0 : along_.back(); }
+  /// @pre !empty()
+  [[nodiscard]] LinePlace Nearest(const Eigen::Vector2d& p) const;
+
+ private:
+  std::vector<Eigen::Vector2d> points_;
+  std::vector<double> along_;  ///< Of each point.
+};
+
+/// Of a CauteryContact, and whether a pedal was down at its time.
+struct HookSample {
+  double time_s = 0;
+  bool touching = false;
+  Vec2f material = Vec2f::Zero();
+  bool energised = false;
+};
+
+/// Fed with each sample in order.
+class LineMeter {
+ public:
+  explicit LineMeter(const SceneView& scene);
+
+  struct Finding {
+    bool pedal_without_contact = false, off_line = false, ureter_near = false, nerve_near = false;
+  };
+  Finding Add(const HookSample& contact);
+
+  [[nodiscard]] const SheetLine& line() const { return line_; }
+  [[nodiscard]] double pedal_without_contact_s() const { return pedal_without_contact_s_; }
+  [[nodiscard]] double traced_m() const { return traced_m_; }
+  /// Mean over the length of the trace.
+  [[nodiscard]] std::optional<double> deviation_mean_m() const;
+  [[nodiscard]] std::optional<double> deviation_max_m() const;
+  /// Part of the planned line that was traced, 0 … 1.
+  [[nodiscard]] double done() const;
+
+ private:
+  struct Spared {
+    ProtectedKind kind;
+    double reach_m;
+    SheetLine line;
+  };
+  bool Trace(const Eigen::Vector2d& at, bool continues);
+
+  AssessmentParams params_;
+  SheetLine line_;
+  std::vector<Spared> spared_;
+  std::vector<std::uint8_t> done_;  ///< Per kBin of the line.
+  std::optional<Eigen::Vector2d> last_;
+  LinePlace last_place_;
+  double last_s_ = -1;
+  double dry_s_ = 0;  ///< Pedal down in the air, without a break so far.
+  double pedal_without_contact_s_ = 0;
+  double traced_m_ = 0, deviation_m2_ = 0, deviation_max_m_ = 0;
+};
+
+}  // namespace fulcrum::assessment

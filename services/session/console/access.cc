@@ -1,0 +1,138 @@
+#include "services/session/console/access.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <optional>
+
+#include "services/base/core/error.h"
+
+namespace fulcrum::console {
+namespace {
+
+constexpr std::size_t kShortestToken = 16, kLongestToken = 256;
+
+bool IsTokenText(std::string_view text) {
+  const auto plain = [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' || c == '_';
+  };
+  return text.size() >= kShortestToken && text.size() <= kLongestToken && std::all_of(text.begin(), text.end(), plain);
+}
+
+/// Without its port; nothing when that is none.
+std::optional<std::string> HostName(std::string_view host) {
+  const std::size_t bracket = host.starts_with('[') ? host.find(']') : 0;
+  if (bracket == std::string_view::npos || host.size() > 256) return {};
+  const std::size_t colon = host.find(':', bracket);
+  if (colon != std::string_view::npos) {
+    const std::string_view port = host.substr(colon + 1);
+    const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+    if (port.empty() || port.size() > 5 || !std::all_of(port.begin(), port.end(), digit)) return {};
+  }
+  std::string name(host.substr(0, colon));
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  return name;
+}
+
+}  // namespace
+
+bool SameSecret(std::string_view given, std::string_view secret) {
+  // A length is no secret; every byte is looked at whatever the ones before were.
+  unsigned difference = given.size() == secret.size() ? 0u : 1u;
+  for (std::size_t i = 0; i < secret.size(); ++i) {
+    const char c = i < given.size() ? given[i] : '\0';
+    difference |= static_cast<unsigned char>(c) ^ static_cast<unsigned char>(secret[i]);
+  }
+  return difference == 0;
+}
+
+std::string MakeToken() {
+  std::array<unsigned char, 32> bytes{};
+  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
+    throw InputError(std::string("no random numbers for a token: ") + ::strerror(errno));
+  }
+  std::string token;
+  for (const unsigned char byte : bytes) {
+    token += "0123456789abcdef"[byte >> 4];
+    token += "0123456789abcdef"[byte & 15u];
+  }
+  return token;
+}
+
+std::string ReadToken(const std::filesystem::path& file) {
+  const auto fail = [&](const std::string& why) -> InputError {
+    return InputError("token file " + file.string() + ": " + why);
+  };
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+  if (fd < 0) throw fail(::strerror(errno));
+  struct stat status {};
+  std::array<char, kLongestToken + 2> bytes{};
+  const bool known = ::fstat(fd, &status) == 0;
+  const ssize_t size = known ? ::read(fd, bytes.data(), bytes.size()) : -1;
+  ::close(fd);
+  if (size < 0 || !S_ISREG(status.st_mode)) throw fail("cannot be read");
+  if (status.st_uid != ::geteuid() || (status.st_mode & 077u) != 0) {
+    throw fail("must be yours and readable by nobody else; chmod 600 it, or remove it for a new one");
+  }
+  std::string_view text(bytes.data(), static_cast<std::size_t>(size));
+  if (text.ends_with('\n')) text.remove_suffix(1);
+  if (!IsTokenText(text)) {
+    throw fail("must hold 16 to 256 letters, digits, '-' or '_' in one line; remove it for a new one");
+  }
+  return std::string(text);
+}
+
+void WriteToken(const std::filesystem::path& file, const std::string& token) {
+  std::filesystem::path part = file;
+  part += ".part";
+  std::error_code ignored;
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), ignored);
+  std::filesystem::remove(part, ignored);
+  // Never over what somebody else has put there, nor through a link.
+  const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
+  const std::string text = token + "\n";
+  const bool written = fd >= 0 && ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
+  const int error = errno;
+  if (fd >= 0) ::close(fd);
+  if (!written || std::rename(part.c_str(), file.c_str()) != 0) {
+    throw InputError("token file " + file.string() + ": cannot be written: " + ::strerror(written ? errno : error));
+  }
+}
+
+Access::Access(std::string token, std::vector<std::string> names)
+    : token_(std::move(token)), names_(std::move(names)) {}
+
+bool Access::IsOwnHost(std::string_view host) const {
+  const std::optional<std::string> name = HostName(host);
+  if (!name || name->empty()) return false;
+  std::array<unsigned char, sizeof(in6_addr)> address{};
+  if (*name == "localhost" || ::inet_pton(AF_INET, name->c_str(), address.data()) == 1) return true;
+  if (name->size() > 2 && name->front() == '[' && name->back() == ']' &&
+      ::inet_pton(AF_INET6, name->substr(1, name->size() - 2).c_str(), address.data()) == 1) {
+    return true;
+  }
+  return std::find(names_.begin(), names_.end(), *name) != names_.end();
+}
+
+bool Access::IsOwnSite(const HttpRequest& request) {
+  const bool same_origin = request.origin.empty() || request.origin == "http://" + request.host;
+  const bool same_site =
+      request.fetch_site.empty() || request.fetch_site == "same-origin" || request.fetch_site == "none";
+  return same_origin && same_site;
+}
+
+bool Access::HasToken(const HttpRequest& request) const {
+  constexpr std::string_view kScheme = "Bearer ";
+  const std::string_view given = request.authorization;
+  return given.starts_with(kScheme) && SameSecret(given.substr(kScheme.size()), token_);
+}
+
+}  // namespace fulcrum::console

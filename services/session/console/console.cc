@@ -1,0 +1,395 @@
+#include "services/session/console/console.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <chrono>
+#include <cstdlib>
+#include <fstream>
+#include <future>
+#include <optional>
+#include <utility>
+
+#include "services/base/core/error.h"
+#include "services/base/core/tick.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/base/runtime/realtime.h"
+#include "services/session/console/access.h"
+#include "services/session/console/guided_task.h"
+#include "services/session/console/http_server.h"
+#include "services/session/console/json.h"
+#include "services/session/console/library.h"
+#include "services/session/console/live_state.h"
+#include "services/session/console/page.h"
+#include "services/session/console/picture_watch.h"
+#include "services/session/console/router.h"
+#include "services/session/console/session_run.h"
+#include "services/session/console/session_watch.h"
+#include "services/session/supervisor/ask.h"
+
+namespace fulcrum::console {
+namespace {
+
+namespace fs = std::filesystem;
+using runtime::MonotonicNs;
+
+constexpr auto kTurn = std::chrono::milliseconds(200);
+constexpr std::int64_t kFeedPeriod = kSecond_ns / 5;
+constexpr std::int64_t kTicketLife = 60 * kSecond_ns;
+constexpr std::size_t kMostRecordings = 50;
+// A report carries its own style and pictures, and nothing that runs.
+constexpr const char* kReportPolicy =
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; media-src data:; frame-ancestors 'self'; sandbox";
+
+std::vector<std::string> OwnNames(std::vector<std::string> names) {
+  std::array<char, 256> own{};
+  if (::gethostname(own.data(), own.size() - 1) == 0) names.emplace_back(own.data());
+  for (std::string& name : names) {
+    std::transform(name.begin(), name.end(), name.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  }
+  return names;
+}
+
+fs::path DefaultTokenFile(int port) {
+  const std::string name = "console-" + std::to_string(port) + ".token";
+  if (const char* run = std::getenv("XDG_RUNTIME_DIR"); run != nullptr && *run != '\0') {
+    return fs::path(run) / "fulcrum" / name;
+  }
+  const char* home = std::getenv("HOME");
+  return (home != nullptr ? fs::path(home) / ".cache" : fs::path("/tmp") / std::to_string(::geteuid())) / "fulcrum" /
+         name;
+}
+
+std::optional<std::string> ReadAll(const fs::path& file) {
+  std::error_code error;
+  const auto size = fs::is_regular_file(file, error) ? fs::file_size(file, error) : 0;
+  if (error || size == 0) return {};
+  // In one piece: pictures come many times a minute.
+  std::string bytes(size, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, stream.gcount())));
+  return bytes;
+}
+
+double NumberIn(const Form& fields, std::string_view name) {
+  const auto found = fields.find(name);
+  return found == fields.end() ? 0 : ParseNumber(found->second, 0, 1e9).value_or(0);
+}
+std::optional<double> MaybeNumberIn(const Form& fields, std::string_view name) {
+  return fields.contains(name) ? std::optional(NumberIn(fields, name)) : std::nullopt;
+}
+const std::string& TextIn(const Form& fields, std::string_view name) { return fields.find(name)->second; }
+
+}  // namespace
+
+struct Console::Impl {
+  explicit Impl(const ConsoleSettings& given)
+      : settings(given),
+        run({.program = given.programs / "fulcrum",
+             .out = given.out,
+             .cart = given.cart,
+             .data = given.data,
+             .domain = given.domain}),
+        watch(given.domain),
+        server(given.bind, given.port, [this](const HttpRequest& request) { return Handle(request); }) {
+    token_file = settings.token_file.empty() ? DefaultTokenFile(server.port()) : settings.token_file;
+    std::error_code error;
+    if (!settings.token_file.empty() && fs::exists(token_file, error)) {
+      token = ReadToken(token_file);
+    } else {
+      token = MakeToken();
+      WriteToken(token_file, token);
+    }
+    access.emplace(token, OwnNames(settings.host_names));
+    // What there was before this console: its report can still be read.
+    ShowSession(fs::read_symlink(settings.out / "latest", error).filename());
+  }
+
+  // --------------------------------------------------------------------------------------------- requests
+
+  HttpResponse Handle(const HttpRequest& request) {
+    RouteResult result = Route(*access, request);
+    if (!result.routed) return std::move(result.refusal);
+    try {
+      return Answer(*result.routed);
+    } catch (const std::exception& error) {
+      return Refusal(409, error.what());
+    }
+  }
+
+  HttpResponse Answer(const Routed& routed) {
+    switch (routed.wanted) {
+      case Wanted::kPage:
+        return Page(routed.path);
+      case Wanted::kReport:
+        return Report(TextIn(routed.fields, "ticket"));
+      case Wanted::kState:
+        return {.body = StateJson(0)};
+      case Wanted::kEvents:
+        return {.type = "text/event-stream", .stream = true};
+      case Wanted::kChoices:
+        return {.body = ChoicesJson()};
+      case Wanted::kPicture:
+        return File(pictures.FileOf(TextIn(routed.fields, "name")), "image/png");
+      case Wanted::kRecordings:
+        return {.body = RecordingsJson()};
+      case Wanted::kSummary:
+        return File(SessionFile("summary.json"), "application/json");
+      case Wanted::kTicket:
+        ticket = MakeToken();
+        ticket_end_ns = MonotonicNs() + kTicketLife;
+        return Done(ticket);
+      case Wanted::kStart:
+        return Start(routed.fields);
+      case Wanted::kStop:
+        return Stop();
+      case Wanted::kRestart:
+        return Ask("restart", TextIn(routed.fields, "node"));
+      case Wanted::kDump:
+        return Ask("dump", "asked for on the console");
+      case Wanted::kGenerator:
+        return TurnGenerator(routed.fields);
+      case Wanted::kReplay:
+        return Replay(TextIn(routed.fields, "name"));
+      case Wanted::kCalibrate:
+        return Calibrate(TextIn(routed.fields, "what"), TextIn(routed.fields, "tool"));
+      case Wanted::kEnter:
+      case Wanted::kCancel:
+        return LeadTask(routed.wanted);
+      case Wanted::kClose:
+        if (task && task->running()) return Refusal(409, "it is not done");
+        task.reset();
+        return Done("closed");
+    }
+    return Refusal(404, "no such call");
+  }
+
+  static HttpResponse Page(const std::string& path) {
+    const PageFile* file = FindPageFile(path);
+    if (file == nullptr) return Refusal(404, "no such page");
+    return {.type = std::string(file->type), .body = std::string(file->text)};
+  }
+
+  static HttpResponse File(const fs::path& file, const char* type) {
+    std::optional<std::string> bytes = file.empty() ? std::nullopt : ReadAll(file);
+    if (!bytes) return Refusal(404, "it is not there (yet)");
+    return {.type = type, .body = *std::move(bytes)};
+  }
+
+  HttpResponse Report(const std::string& given) {
+    const bool valid = !ticket.empty() && SameSecret(given, ticket) && MonotonicNs() < ticket_end_ns;
+    ticket.clear();
+    if (!valid) return Refusal(401, "this address was good once and for a minute; open the report from the page");
+    HttpResponse response = File(SessionFile("report.html"), "text/html; charset=utf-8");
+    response.policy = kReportPolicy;
+    return response;
+  }
+
+  HttpResponse Start(const Form& fields) {
+    if (watch.alive() || run.running()) return Refusal(409, "a session runs already; stop it first");
+    if (task && task->running()) return Refusal(409, "\"" + task->title() + "\" is not done; wait for it or cancel it");
+    const std::string& scene = TextIn(fields, "scene");
+    const std::vector<SceneChoice> scenes = FindScenes(settings.scenes);
+    const auto known = [&](const SceneChoice& choice) { return choice.name == scene; };
+    if (std::none_of(scenes.begin(), scenes.end(), known)) return Refusal(404, "no scene \"" + scene + "\"");
+    SessionOrder order;
+    order.scene = settings.scenes / (scene + ".yaml");
+    order.power_W = MaybeNumberIn(fields, "power");
+    order.seconds = MaybeNumberIn(fields, "seconds");
+    order.picture_rate_Hz = MaybeNumberIn(fields, "picture_rate");
+    order.record = !fields.contains("record") || TextIn(fields, "record") == "on";
+    run.Start(order);
+    ShowSession({});
+    return Done("starting");
+  }
+
+  HttpResponse Stop() {
+    if (run.running()) {
+      run.Stop();
+      return Done("ending the session; its report is written");
+    }
+    return Ask("down", "");
+  }
+
+  /// Takes a while: the answer comes as a notice.
+  HttpResponse Ask(const std::string& verb, const std::string& argument) {
+    if (!watch.alive()) return Refusal(409, "no session runs");
+    if (asking.valid()) return Refusal(409, "the supervisor has not answered the last request yet");
+    asking = std::async(std::launch::async, supervisor::AskSupervisor, settings.domain, verb, argument);
+    return Done("asked");
+  }
+
+  HttpResponse TurnGenerator(const Form& fields) {
+    std::string words;
+    for (const auto& [knob, power] : fields) {
+      words.append(words.empty() ? "" : " ").append(knob).append("=").append(power);
+    }
+    if (words.empty()) return Refusal(400, "cut, coag or blend: which knob, and how many watts?");
+    return Ask("generator", words);
+  }
+
+  void StartTask(std::string title, const char* program, const std::vector<std::string>& arguments) {
+    task.reset();
+    task = std::make_unique<GuidedTask>(std::move(title), settings.programs / program, arguments);
+  }
+
+  /// Empty, or why no task can begin.
+  [[nodiscard]] std::string TaskObstacle(const char* why_no_session) const {
+    if (watch.alive() || run.running()) return std::string("stop the session first: ") + why_no_session;
+    if (task && task->running()) return "\"" + task->title() + "\" is not done; wait for it or cancel it";
+    return {};
+  }
+
+  HttpResponse Replay(const std::string& name) {
+    if (const std::string why = TaskObstacle("a replay would take its processor"); !why.empty())
+      return Refusal(409, why);
+    const fs::path file = settings.out / name;
+    std::error_code error;
+    if (!fs::is_regular_file(file, error)) return Refusal(404, "no recording " + name);
+    StartTask("Replay of " + name, "replayer", {file.string(), "--into", "physics", "thermal", "haptics"});
+    return Done("replaying");
+  }
+
+  HttpResponse Calibrate(const std::string& what, const std::string& tool) {
+    if (const std::string why = TaskObstacle("a port or device has one reader"); !why.empty()) return Refusal(409, why);
+    const bool handle = what == "handle";
+    if (!handle && settings.cart.empty()) {
+      return Refusal(409,
+                     "a simulated device has no trocar to measure; start the console with --cart FILE of a cart with "
+                     "Touch devices");
+    }
+    const std::string side = tool == "0" ? " of the first tool" : " of the second tool";
+    std::vector<std::string> arguments{handle ? "calibrate" : "calibrate-trocar", "--tool", tool};
+    if (!settings.cart.empty()) arguments.insert(arguments.end(), {"--cart", settings.cart.string()});
+    StartTask((handle ? "Calibrate the handle" : "Measure the trocar") + side,
+              handle ? "handle_bridge" : "haptics_node", arguments);
+    return Done("started");
+  }
+
+  HttpResponse LeadTask(Wanted wanted) {
+    if (!task || !task->running()) return Refusal(409, "nothing is to be led");
+    if (wanted == Wanted::kEnter) {
+      task->Enter();
+    } else {
+      task->Cancel(MonotonicNs());
+    }
+    return Done("passed on");
+  }
+
+  // ------------------------------------------------------------------------------------------------- what is shown
+
+  [[nodiscard]] std::string StateJson(std::uint64_t cursor) { return LiveJson(Live(), &cursor); }
+
+  [[nodiscard]] LiveState Live() {
+    LiveState state;
+    state.now_ns = MonotonicNs();
+    state.watch = &watch;
+    state.run = &run;
+    state.task = task.get();
+    state.session = session;
+    state.picture = pictures.Newest();
+    std::error_code error;
+    state.has_report = !watch.alive() && !session.empty() && fs::is_regular_file(SessionFile("report.html"), error);
+    state.notice = notice;
+    return state;
+  }
+
+  [[nodiscard]] std::string ChoicesJson() const {
+    Json scenes('[');
+    for (const SceneChoice& scene : FindScenes(settings.scenes)) {
+      Json one('{');
+      one.Text("name", scene.name).Text("description", scene.description).Number("duration", scene.duration_s, 0.1);
+      scenes.Item(one.Number("power", scene.power_W, 0.1).Number("picture_rate", scene.picture_rate_Hz, 0.1).Done());
+    }
+    Json json('{');
+    json.Raw("scenes", scenes.Done()).Flag("simulated", settings.cart.empty());
+    return json.Text("cart", settings.cart.empty() ? "simulated" : settings.cart.stem().string()).Done();
+  }
+
+  [[nodiscard]] std::string RecordingsJson() const {
+    Json recordings('[');
+    for (const RecordingChoice& one : FindRecordings(settings.out, kMostRecordings)) {
+      recordings.Item(Json('{').Text("name", one.name).Raw("bytes", std::to_string(one.bytes)).Done());
+    }
+    return Json('{').Raw("recordings", recordings.Done()).Done();
+  }
+
+  [[nodiscard]] fs::path SessionFile(const char* name) const {
+    return session.empty() ? fs::path() : settings.out / session / name;
+  }
+
+  /// From here on the picture and the report are those of that session; a name that is none shows none.
+  void ShowSession(const std::string& id) {
+    session = IsPlainName(id) ? id : std::string();
+    pictures = PictureWatch(session.empty() ? fs::path() : settings.out / session / "frames");
+  }
+
+  void Turn() {
+    const std::int64_t now = MonotonicNs();
+    watch.Turn(now);
+    run.Poll();
+    if (task) task->Poll(now);
+    if (watch.begun() && watch.manifest().session_id != session) ShowSession(watch.manifest().session_id);
+    if (asking.valid() && asking.wait_for(std::chrono::seconds(0)) == std::future_status::ready) TakeAnswer();
+    if (now < next_feed_ns || server.stream_count() == 0) return;
+    next_feed_ns = now + kFeedPeriod;
+    const LiveState state = Live();
+    server.Feed([&](std::uint64_t* cursor) { return "data: " + LiveJson(state, cursor) + "\n\n"; });
+  }
+
+  void TakeAnswer() {
+    ++notice.number;
+    try {
+      const CommandReply reply = asking.get();
+      notice.ok = reply.ok;
+      notice.text = reply.text;
+    } catch (const std::exception& error) {
+      notice.ok = false;
+      notice.text = error.what();
+    }
+  }
+
+  const ConsoleSettings settings;
+  std::string token;
+  fs::path token_file;
+  std::optional<Access> access;
+  SessionRun run;
+  SessionWatch watch;
+  std::unique_ptr<GuidedTask> task;
+  std::string session;  ///< Folder in `out`; empty: none.
+  PictureWatch pictures;
+  std::future<CommandReply> asking;
+  Notice notice;
+  std::string ticket;
+  std::int64_t ticket_end_ns = 0;
+  std::int64_t next_feed_ns = 0;
+  // Last: its handler uses the rest.
+  HttpServer server;
+};
+
+Console::Console(const ConsoleSettings& settings) : impl_(std::make_unique<Impl>(settings)) {}
+Console::~Console() = default;
+
+std::string Console::Address() const {
+  const std::string& bind = impl_->settings.bind;
+  const bool any = bind == "0.0.0.0" || bind == "::";
+  const std::string host = any ? "localhost" : bind.find(':') != std::string::npos ? "[" + bind + "]" : bind;
+  return "http://" + host + ":" + std::to_string(impl_->server.port()) + "/#" + impl_->token;
+}
+
+const std::filesystem::path& Console::token_file() const { return impl_->token_file; }
+
+void Console::Run() {
+  while (!runtime::ShouldStop()) {
+    impl_->server.Turn(kTurn);
+    impl_->Turn();
+  }
+}
+
+bool Console::session_runs() const { return impl_->run.running(); }
+
+}  // namespace fulcrum::console

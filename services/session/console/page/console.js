@@ -1,0 +1,445 @@
+'use strict';
+// The operator's page. State comes as a stream of JSON objects (services/session/console/DESIGN.md says what is in them); what
+// is pressed goes out as small POSTs. Elements are changed only where the state has changed: nothing jumps under a finger.
+
+const $ = id => document.getElementById(id);
+const kSpan = 60;
+const kMarks = {good: '●', busy: '▲', bad: '■', off: '○'};
+
+let token = location.hash.slice(1) || sessionStorage.getItem('token') || '';
+if (location.hash) {
+  sessionStorage.setItem('token', token);
+  history.replaceState(null, '', location.pathname);  // The token does not stay in the address line.
+}
+
+function setText(element, text) { if (element.textContent !== text) element.textContent = text; }
+function make(tag, className, text) {
+  const element = document.createElement(tag);
+  if (className) element.className = className;
+  if (text !== undefined) element.textContent = text;
+  return element;
+}
+
+// ------------------------------------------------------------------------------------------------ talking
+
+async function call(path, fields) {
+  const options = {headers: {Authorization: `Bearer ${token}`}};
+  if (fields) {
+    options.method = 'POST';
+    options.body = new URLSearchParams(fields);
+  }
+  const response = await fetch(path, options);
+  if (response.status === 401) askToken();
+  return response;
+}
+
+/** For buttons: says what the console answered when that is bad, or `well` when it is good. */
+async function order(path, fields, well) {
+  try {
+    const answer = await (await call(path, fields || {})).json();
+    if (!answer.ok) toast(answer.text, true); else if (well) toast(well);
+    return answer.ok ? answer : null;
+  } catch (error) {
+    toast('The console does not answer.', true);
+    return null;
+  }
+}
+
+let toastTimer = 0;
+function toast(text, bad) {
+  $('toast').textContent = text;
+  $('toast').className = bad ? 'bad' : '';
+  $('toast').hidden = false;
+  clearTimeout(toastTimer);
+  toastTimer = setTimeout(() => { $('toast').hidden = true; }, bad ? 9000 : 3500);
+}
+
+function askToken() { if (!$('ask-token').open) $('ask-token').showModal(); }
+$('token-form').addEventListener('submit', () => {
+  token = $('token').value.trim().replace(/^.*#/, '');
+  sessionStorage.setItem('token', token);
+  location.reload();
+});
+
+let points = [];
+async function listen() {
+  for (;;) {
+    try {
+      const response = await call('/api/events');
+      if (response.status === 401) return;
+      if (!response.ok) throw new Error((await response.json().catch(() => ({}))).text || `answer ${response.status}`);
+      $('banner').hidden = true;
+      points = [];
+      const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+      for (let text = '';;) {
+        const {value, done} = await reader.read();
+        if (done) break;
+        text += value;
+        const parts = text.split('\n\n');
+        text = parts.pop();
+        // Of several only the last is shown; all of their points are kept.
+        const states = parts.map(part => JSON.parse(part.replace(/^data: /, '')));
+        for (const state of states) takePoints(state);
+        if (states.length) show(states[states.length - 1]);
+      }
+    } catch (error) { /* told below */ }
+    $('banner').textContent = 'The console does not answer. If this stays, start it again: fulcrum console';
+    $('banner').hidden = false;
+    document.body.dataset.phase = 'unknown';
+    setStatus('off', 'No connection', '');
+    await new Promise(done => setTimeout(done, 1000));
+  }
+}
+
+// ------------------------------------------------------------------------------------------------ the session
+
+let state = {phase: 'unknown'};
+let noticed = -1;
+
+function takePoints(s) {
+  for (const p of s.points) {
+    if (points.length && p[0] < points[points.length - 1][0]) points = [];  // Another session.
+    points.push(p);
+  }
+  while (points.length && points[0][0] < points[points.length - 1][0] - kSpan) points.shift();
+}
+
+function setStatus(level, word, more) {
+  $('status-word').className = `level-${level}`;
+  setText($('status-word'), word);
+  setText($('status-more'), more);
+}
+
+function show(s) {
+  const before = state;
+  state = s;
+  if (s.phase !== before.phase) enterPhase(before.phase);
+  showStatus();
+  $('stop').disabled = s.phase !== 'running' && s.phase !== 'starting';
+  if (s.phase !== 'idle') {
+    showNodes(s.nodes || []);
+    showFigures(s.figures);
+    showPicture();
+  }
+  showWarnings(s.warnings || []);
+  showTask(s.task);
+  if (s.notice && s.notice.number > noticed) {
+    if (noticed >= 0) toast(s.notice.text, !s.notice.ok);
+    noticed = s.notice.number;
+  }
+  if (noticed < 0) noticed = 0;
+  showEnd(before);
+}
+
+function enterPhase(before) {
+  document.body.dataset.phase = state.phase;
+  if (state.phase === 'starting') {
+    points = [];
+    clearPicture();
+  }
+  if (state.phase === 'starting' && before !== 'unknown') goTo('session');
+  if (state.phase === 'idle') loadChoices();
+}
+
+function showStatus() {
+  const s = state;
+  const worst = (s.nodes || []).some(n => n.level === 'bad') ? 'bad' : (s.nodes || []).some(n => n.level === 'busy') ? 'busy' : 'good';
+  const clock = s.time === undefined ? '' : `${Math.max(0, s.time).toFixed(0)}${s.end > 0 ? ` / ${s.end.toFixed(0)}` : ''} s`;
+  if (s.phase === 'running') setStatus(worst, worst === 'bad' ? 'Trouble' : 'Running', `${clock} · ${s.scene}${s.recording ? ' · rec' : ''}`);
+  else if (s.phase === 'starting') setStatus('off', 'Starting', s.said || '');
+  else if (s.phase === 'stopping') setStatus('off', 'Ending', 'the report is being written');
+  else setStatus('good', 'Ready', '');
+}
+
+const rows = new Map();
+function makeRow(node) {
+  const row = make('li');
+  const parts = {row, mark: make('span', 'mark'), name: make('span', 'name', node.label), word: make('span', 'word'), more: make('span', 'more'),
+    button: make('button', '', 'Restart')};
+  parts.mark.setAttribute('aria-hidden', 'true');
+  parts.button.type = 'button';
+  parts.button.setAttribute('aria-label', `Restart ${node.label}`);
+  parts.button.addEventListener('click', () => order('/api/restart', {node: node.name}));
+  row.dataset.node = node.name;
+  row.append(parts.mark, parts.name, parts.word, parts.button, parts.more);
+  $('nodes').append(row);
+  return parts;
+}
+function showNodes(nodes) {
+  for (const [name, parts] of rows) {
+    if (!nodes.some(n => n.name === name)) { parts.row.remove(); rows.delete(name); }
+  }
+  for (const node of nodes) {
+    if (!rows.has(node.name)) rows.set(node.name, makeRow(node));
+    const parts = rows.get(node.name);
+    setText(parts.mark, kMarks[node.level]);
+    parts.mark.className = `mark level-${node.level}`;
+    setText(parts.word, node.word);
+    parts.word.className = `word level-${node.level}`;
+    const ms = v => v < 0.1 ? v.toFixed(2) : v < 10 ? v.toFixed(1) : v.toFixed(0);
+    const more = [`${node.rate.toFixed(0)} Hz`, `step ${ms(node.p99)} ms`];
+    if (node.input) more.push(`age ${node.age} ms`);
+    setText(parts.name, node.label + (node.restarts ? ` ↻${node.restarts}` : ''));
+    setText(parts.more, node.pid ? more.join(' · ') : 'not heard yet');
+    parts.row.title = `${node.name}: asked for ${node.asked} Hz; 99 of 100 steps were shorter than told, the median is ${ms(node.p50)} ms; age of the newest ${node.input || 'input'} when it was used; ` +
+      `${node.restarts} restarts, ${node.drops} samples lost or refused, ${node.overruns} periods skipped, pid ${node.pid}`;
+    parts.button.disabled = state.phase !== 'running';
+  }
+}
+
+let warned = '';
+function showWarnings(warnings) {
+  if (state.phase === 'idle') warnings = [];
+  const key = JSON.stringify(warnings);
+  if (key === warned) return;
+  warned = key;
+  $('warning-list').replaceChildren(...warnings.map(w => {
+    const item = make('li', w.level);
+    item.append(make('b', '', w.text), w.todo);
+    return item;
+  }));
+  if (!warnings.length) $('warning-list').append(make('li', 'none', 'None'));
+}
+
+// The generator's knobs: what the supervisor says is set, and a step up or down.
+const knobs = new Map();
+function makeKnob(name, label) {
+  const term = make('dt', '', label), item = make('dd', 'stepper'), value = make('output');
+  const step = watts => {
+    const button = make('button', '', watts < 0 ? '\u2212' : '+');
+    Object.assign(button, {type: 'button', id: `${name}-${watts < 0 ? 'less' : 'more'}`});
+    button.setAttribute('aria-label', `${label}: 5 watts ${watts < 0 ? 'less' : 'more'}`);
+    button.addEventListener('click', () => {
+      const knob = knobs.get(name);
+      order('/api/generator', {[name]: Math.min(300, Math.max(0, knob.watts + watts))});
+    });
+    return button;
+  };
+  value.id = `set-${name}`;
+  item.append(step(-5), value, step(5));
+  $('knobs').append(term, item);
+  knobs.set(name, {value, watts: 0});
+}
+for (const [name, label] of [['cut', 'Cut'], ['coag', 'Coag'], ['blend', 'Blend']]) makeKnob(name, label);
+function showGenerator(figures) {
+  $('generator').hidden = !figures || figures.set_cut_W === undefined;
+  if ($('generator').hidden) return;
+  for (const [name, knob] of knobs) {
+    knob.watts = figures[`set_${name}_W`];
+    setText(knob.value, `${knob.watts.toFixed(0)} W`);
+  }
+}
+
+function showFigures(figures) {
+  showGenerator(figures);
+  if (!figures) return;
+  const heat = figures.temperature_C !== undefined;  // Not every exercise has it.
+  setText($('temperature'), heat ? `${figures.temperature_C.toFixed(0)} °C` : '–');
+  setText($('temperature-more'), heat ? `${figures.power_W.toFixed(0)} W · cut ${figures.cut_mm.toFixed(1)} mm` : 'no heat in this scene');
+  setText($('force'), `${Math.max(figures.force0_N, figures.force1_N).toFixed(2)} N`);
+  setText($('force-more'), `highest ${figures.peak_N.toFixed(2)} N`);
+  drawPlot($('plot-temperature'), points, {span: kSpan, floor: 20, least: 60, unit: '°C', lines: heat ? [{at: 1, colour: '#ff8a5c'}] : []});
+  drawPlot($('plot-force'), points, {span: kSpan, floor: 0, least: 0.5, unit: 'N',
+    lines: [{at: 2, colour: '#58bcff'}, {at: 3, colour: '#ffd866'}]});
+}
+
+let pictureShown = '', pictureAsked = false;
+function clearPicture() {
+  pictureShown = '';
+  const g = $('picture').getContext('2d');
+  g.clearRect(0, 0, $('picture').width, $('picture').height);
+}
+async function showPicture() {
+  const said = pictureShown ? '' : state.phase === 'starting' ? (state.said || 'The nodes are starting.')
+    : state.own || state.picture ? 'Waiting for the first picture.' : 'The pictures of this session are in another folder: it was started elsewhere.';
+  setText($('scope-text'), said);
+  const name = `${state.session}/${state.picture}`;
+  if (!state.picture || pictureAsked || name === pictureShown) return;
+  pictureAsked = true;
+  try {
+    const response = await call(`/api/picture?name=${state.picture}`);
+    if (response.ok) {
+      const image = await createImageBitmap(await response.blob());
+      const canvas = $('picture');
+      if (canvas.width !== image.width || canvas.height !== image.height) {
+        canvas.width = image.width;
+        canvas.height = image.height;
+      }
+      canvas.getContext('2d').drawImage(image, 0, 0);
+      image.close();
+      pictureShown = name;
+      canvas.dataset.shown = name;
+    }
+  } catch (error) { /* the next one comes soon */ }
+  pictureAsked = false;
+}
+
+// ------------------------------------------------------------------------------------------------ before and after
+
+let choices = null, power = 0;
+async function loadChoices() {
+  const answer = await call('/api/choices').then(r => r.ok ? r.json() : null).catch(() => null);
+  // What was chosen before a session stays chosen after it.
+  if (!answer || JSON.stringify(answer) === JSON.stringify(choices)) return;
+  const chosen = choices ? $('start-form').scene.value : 'built-in';
+  choices = answer;
+  setText($('cart-name'), choices.simulated ? 'Simulated' : choices.cart);
+  setText($('cart-more'), choices.simulated ? 'Handles, pedal and devices are simulated: the scene\u2019s script moves them.'
+    : 'What its cart file does not name is simulated.');
+  $('scenes').replaceChildren(...choices.scenes.map(scene => chip('scene', scene.name, scene.name, scene.description)));
+  const first = choices.scenes.find(s => s.name === chosen) || choices.scenes[0];
+  if (first) {
+    for (const input of $('scenes').querySelectorAll('input')) input.checked = input.value === first.name;
+    chooseScene();
+  }
+  $('start').disabled = !first;
+}
+function chip(name, value, text, more) {
+  const label = make('label'), input = make('input'), span = make('span', '', text);
+  Object.assign(input, {type: 'radio', name, value});
+  if (more) span.append(make('small', '', more));
+  label.append(input, span);
+  return label;
+}
+function sceneChosen() { return choices && choices.scenes.find(s => s.name === $('start-form').scene.value); }
+function chooseScene() {
+  const scene = sceneChosen();
+  if (!scene) return;
+  power = scene.power;
+  showPower();
+  const chips = (id, name, values) => {
+    $(id).replaceChildren(...values.map(([value, text]) => chip(name, value, text)));
+    $(id).querySelector('input').checked = true;
+  };
+  chips('lengths', 'seconds', [['', scene.duration > 0 ? `As the scene: ${scene.duration} s` : 'Until stopped'],
+    ['60', '1 min'], ['300', '5 min'], ['1800', '30 min'], ['28800', '8 h']]);
+  chips('rates', 'picture_rate', [['', `${scene.picture_rate}`], ...[5, 10].filter(r => r !== scene.picture_rate).map(r => [`${r}`, `${r}`])]);
+}
+function showPower() {
+  $('power').textContent = power > 0 ? `${power} W` : 'none';
+  $('power-less').disabled = power <= 5;
+  $('power-more').disabled = power <= 0 || power >= 120;
+}
+for (const [id, step] of [['power-less', -5], ['power-more', 5]]) {
+  $(id).addEventListener('click', () => {
+    power = Math.min(120, Math.max(5, power + step));
+    showPower();
+  });
+}
+$('scenes').addEventListener('change', chooseScene);
+
+$('start-form').addEventListener('submit', event => {
+  event.preventDefault();
+  const form = $('start-form'), scene = sceneChosen();
+  if (!scene) return;
+  const fields = {scene: scene.name, record: form.record.value};
+  if (power !== scene.power) fields.power = power;
+  for (const name of ['seconds', 'picture_rate']) if (form[name].value) fields[name] = form[name].value;
+  order('/api/start', fields);
+});
+
+let ended = '';
+async function showEnd(before) {
+  const key = `${state.session} ${state.has_report} ${state.ended ? state.ended.text : ''}`;
+  if (state.phase !== 'idle' || key === ended) return;
+  ended = key;
+  $('result').hidden = !state.ended && !state.has_report;
+  $('report').hidden = !state.has_report;
+  const word = $('result-word');
+  word.className = !state.ended ? 'level-off' : state.ended.well ? 'level-good' : 'level-bad';
+  setText(word, state.ended ? state.ended.text : state.session);
+  $('result-figures').replaceChildren();
+  if (!state.has_report) return;
+  const f = await call('/api/summary').then(r => r.ok ? r.json() : null).catch(() => null);
+  if (!f) return;
+  if (!state.ended) {
+    word.className = f.ok ? 'level-good' : 'level-bad';
+    setText(word, f.ok ? 'All went well.' : f.verdict);
+  }
+  const figure = (label, value, digits, unit) => value === undefined ? [] : [make('dt', '', label), make('dd', '', `${value.toFixed(digits)}${unit}`)];
+  $('result-figures').replaceChildren(make('dt', '', 'Scene'), make('dd', '', f.scene), ...figure('Time', f.session_seconds, 1, ' s'),
+    ...figure('Highest force', f.peak_force_N, 2, ' N'), ...figure('Hottest tissue', f.highest_temperature_C, 0, ' °C'),
+    ...figure('Cut', f.cut_length_mm, 1, ' mm'), ...figure('Warnings of heat', f.warnings, 0, ''), ...figure('Injuries', f.injuries, 0, ''),
+    ...figure('Restarts of nodes', f.restarts, 0, ''));
+}
+
+$('stop').addEventListener('click', () => $('ask-stop').showModal());
+$('stop-no').addEventListener('click', () => $('ask-stop').close());
+$('stop-yes').addEventListener('click', () => {
+  $('ask-stop').close();
+  order('/api/stop');
+});
+$('dump').addEventListener('click', () => order('/api/dump'));
+$('report').addEventListener('click', async () => {
+  const answer = await order('/api/ticket');
+  if (!answer) return;
+  $('report-frame').src = `/report?ticket=${answer.text}`;
+  $('report-box').showModal();
+});
+$('report-close').addEventListener('click', () => {
+  $('report-box').close();
+  $('report-frame').removeAttribute('src');
+});
+
+// ------------------------------------------------------------------------------------------------ other views
+
+function goTo(view) {
+  document.body.dataset.view = view;
+  for (const button of document.querySelectorAll('nav button')) {
+    if (button.dataset.goto === view) button.setAttribute('aria-current', 'page'); else button.removeAttribute('aria-current');
+  }
+  if (view === 'recordings') loadRecordings();
+}
+for (const button of document.querySelectorAll('nav button')) button.addEventListener('click', () => goTo(button.dataset.goto));
+
+async function loadRecordings() {
+  const answer = await call('/api/recordings').then(r => r.json()).catch(() => ({recordings: []}));
+  $('recordings').replaceChildren(...answer.recordings.map(recording => {
+    const item = make('li'), what = make('span', 'what'), button = make('button', '', 'Replay');
+    const [session, file] = recording.name.split('/');
+    const at = session.match(/^(\d{4})(\d\d)(\d\d)-(\d\d)(\d\d)(\d\d)-(.*)$/);
+    what.textContent = at ? `${at[7]}, ${at[1]}-${at[2]}-${at[3]} ${at[4]}:${at[5]}:${at[6]} UTC` : session;
+    what.append(make('small', '', `${file}, ${(recording.bytes / 1e6).toFixed(1)} MB`));
+    button.type = 'button';
+    button.setAttribute('aria-label', `Replay ${recording.name}`);
+    button.addEventListener('click', () => order('/api/replay', {name: recording.name}));
+    item.append(what, button);
+    return item;
+  }));
+  if (!answer.recordings.length) $('recordings').append(make('li', '', 'None yet: run a session with Record on.'));
+}
+
+for (const button of document.querySelectorAll('.cards button')) {
+  button.addEventListener('click', () => order('/api/calibrate', {what: button.dataset.what, tool: button.dataset.tool}));
+}
+
+let taskText = '';
+function showTask(task) {
+  const hidden = !task;
+  if ($('task').hidden !== hidden) {
+    $('task').hidden = hidden;
+    if (!hidden) $('task-enter').focus();
+  }
+  if (hidden) return;
+  setText($('task-title'), task.title);
+  if (task.text !== taskText) {
+    taskText = task.text;
+    $('task-text').textContent = task.text;
+    $('task-text').scrollTop = $('task-text').scrollHeight;
+  }
+  $('task-enter').disabled = !task.wants_enter;
+  $('task-enter').hidden = !task.running;
+  $('task-cancel').hidden = !task.running;
+  $('task-close').hidden = task.running;
+  $('task-end').className = task.running ? '' : task.cancelled ? 'level-off' : task.ok ? 'level-good' : 'level-bad';
+  setText($('task-end'), task.running ? '' : task.cancelled ? 'Cancelled.' : task.ok ? 'Done.' : `It ${task.end}.`);
+}
+$('task-enter').addEventListener('click', () => order('/api/task/enter'));
+$('task-cancel').addEventListener('click', () => order('/api/task/cancel'));
+$('task-close').addEventListener('click', () => {
+  $('task').hidden = true;
+  order('/api/task/close');
+});
+
+window.addEventListener('resize', () => showFigures(state.figures));
+if (token) listen(); else askToken();

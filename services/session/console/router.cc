@@ -1,0 +1,143 @@
+#include "services/session/console/router.h"
+
+#include <algorithm>
+#include <array>
+#include <span>
+
+#include "services/base/core/json_text.h"
+#include "services/base/core/messages.h"
+
+namespace fulcrum::console {
+namespace {
+
+using Check = bool (*)(std::string_view);
+
+struct Field {
+  std::string_view name;
+  bool needed;
+  Check check;
+  std::string_view valid;
+};
+
+bool IsNode(std::string_view text) {
+  for (int i = 0; i < kNodeCount; ++i) {
+    const auto node = static_cast<NodeId>(i);
+    if (node != NodeId::kSupervisor && text == NodeName(node)) return true;
+  }
+  return false;
+}
+bool IsOnOff(std::string_view text) { return text == "on" || text == "off"; }
+bool IsTool(std::string_view text) { return text == "0" || text == "1"; }
+bool IsCalibration(std::string_view text) { return text == "handle" || text == "trocar"; }
+bool IsPower(std::string_view text) { return ParseNumber(text, 1, 300).has_value(); }
+bool IsKnob(std::string_view text) { return ParseNumber(text, 0, static_cast<double>(kMaxSetPower_W)).has_value(); }
+bool IsSeconds(std::string_view text) { return ParseNumber(text, 1, 7 * 24 * 3600.0).has_value(); }
+bool IsPictureRate(std::string_view text) { return ParseNumber(text, 0.1, 30).has_value(); }
+bool IsTicket(std::string_view text) { return text.size() == 64 && IsPlainName(text); }
+
+constexpr std::array kPictureFields{Field{"name", true, IsPictureName, "frame_<digits>.png"}};
+constexpr std::array kReportFields{Field{"ticket", true, IsTicket, "what /api/ticket gave"}};
+constexpr std::array kStartFields{
+    Field{"scene", true, IsPlainName, "a name that /api/choices lists"},
+    Field{"power", false, IsPower, "1 to 300 W"},
+    Field{"seconds", false, IsSeconds, "1 to 604800 s"},
+    Field{"record", false, IsOnOff, "on, off"},
+    Field{"picture_rate", false, IsPictureRate, "0.1 to 30 per second"},
+};
+constexpr std::array kNodeFields{Field{"node", true, IsNode, "a node's name, for example physics_node"}};
+constexpr std::array kGeneratorFields{Field{"cut", false, IsKnob, "0 to 300 W"},
+                                      Field{"coag", false, IsKnob, "0 to 300 W"},
+                                      Field{"blend", false, IsKnob, "0 to 300 W"}};
+constexpr std::array kReplayFields{Field{"name", true, IsRecordingName, "a name that /api/recordings lists"}};
+constexpr std::array kCalibrateFields{Field{"what", true, IsCalibration, "handle, trocar"},
+                                      Field{"tool", true, IsTool, "0, 1"}};
+
+struct Entry {
+  std::string_view path;
+  bool post;
+  Wanted wanted;
+  std::span<const Field> fields;
+};
+
+constexpr std::array kEntries{
+    Entry{"/api/state", false, Wanted::kState, {}},
+    Entry{"/api/events", false, Wanted::kEvents, {}},
+    Entry{"/api/choices", false, Wanted::kChoices, {}},
+    Entry{"/api/picture", false, Wanted::kPicture, kPictureFields},
+    Entry{"/api/recordings", false, Wanted::kRecordings, {}},
+    Entry{"/api/summary", false, Wanted::kSummary, {}},
+    Entry{"/api/ticket", true, Wanted::kTicket, {}},
+    Entry{"/api/start", true, Wanted::kStart, kStartFields},
+    Entry{"/api/stop", true, Wanted::kStop, {}},
+    Entry{"/api/restart", true, Wanted::kRestart, kNodeFields},
+    Entry{"/api/dump", true, Wanted::kDump, {}},
+    Entry{"/api/generator", true, Wanted::kGenerator, kGeneratorFields},
+    Entry{"/api/replay", true, Wanted::kReplay, kReplayFields},
+    Entry{"/api/calibrate", true, Wanted::kCalibrate, kCalibrateFields},
+    Entry{"/api/task/enter", true, Wanted::kEnter, {}},
+    Entry{"/api/task/cancel", true, Wanted::kCancel, {}},
+    Entry{"/api/task/close", true, Wanted::kClose, {}},
+};
+
+HttpResponse Answer(int status, bool ok, std::string_view text) {
+  HttpResponse response;
+  response.status = status;
+  response.body = std::string("{\"ok\":") + (ok ? "true" : "false") + ",\"text\":" + JsonString(text) + "}";
+  return response;
+}
+
+/// Empty, or what is wrong.
+std::string Wrong(const Form& form, std::span<const Field> fields) {
+  for (const auto& [name, value] : form) {
+    const auto known = [&name = name](const Field& field) { return field.name == name; };
+    if (std::none_of(fields.begin(), fields.end(), known)) return "no field \"" + name + "\" here";
+  }
+  for (const Field& field : fields) {
+    const auto found = form.find(field.name);
+    if (found == form.end() ? field.needed : !field.check(found->second)) {
+      return std::string(field.name) + ": valid: " + std::string(field.valid);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+HttpResponse Refusal(int status, std::string_view text) { return Answer(status, false, text); }
+HttpResponse Done(std::string_view text) { return Answer(200, true, text); }
+
+RouteResult Route(const Access& access, const HttpRequest& request) {
+  const auto refuse = [](int status, std::string_view text) { return RouteResult{{}, Refusal(status, text)}; };
+  if (!access.IsOwnHost(request.host)) {
+    return refuse(421, "this console is not of that host; use its address, or start it with --host-name");
+  }
+  const bool post = request.method == "POST";
+  if (!post && request.method != "GET") return refuse(405, "GET or POST");
+  const std::optional<Target> target = ParseTarget(request.target);
+  if (!target) return refuse(400, "malformed target");
+  const bool api = target->path.starts_with("/api/");
+  if (!api) {
+    if (post) return refuse(405, "GET");
+    if (target->path != "/report") return {Routed{Wanted::kPage, target->path, {}}, {}};
+    if (!Wrong(target->query, kReportFields).empty()) return refuse(400, Wrong(target->query, kReportFields));
+    return {Routed{Wanted::kReport, target->path, target->query}, {}};
+  }
+  if (!Access::IsOwnSite(request)) return refuse(403, "a page of another site may not use this console");
+  if (!access.HasToken(request))
+    return refuse(401, "the token is missing or wrong; open the address that `fulcrum console` printed");
+  const auto entry =
+      std::find_if(kEntries.begin(), kEntries.end(), [&](const Entry& e) { return e.path == target->path; });
+  if (entry == kEntries.end()) return refuse(404, "no such call");
+  if (entry->post != post) return refuse(405, entry->post ? "POST" : "GET");
+  if (post && !target->query.empty()) return refuse(400, "fields go into the body");
+  if (!post && !request.body.empty()) return refuse(400, "no body here");
+  if (!request.body.empty() && !request.content_type.starts_with("application/x-www-form-urlencoded")) {
+    return refuse(415, "application/x-www-form-urlencoded");
+  }
+  std::optional<Form> form = post ? ParseForm(request.body) : target->query;
+  if (!form) return refuse(400, "malformed form");
+  if (const std::string wrong = Wrong(*form, entry->fields); !wrong.empty()) return refuse(400, wrong);
+  return {Routed{entry->wanted, target->path, *std::move(form)}, {}};
+}
+
+}  // namespace fulcrum::console

@@ -1,0 +1,153 @@
+#include "services/session/supervisor/child_process.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "services/base/core/error.h"
+#include "services/base/core/exit_code.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+const char* Meaning(int exit_code) {
+  switch (static_cast<ExitCode>(exit_code)) {
+    case ExitCode::kDone:
+      return "done";
+    case ExitCode::kBadUsage:
+      return "bad use or configuration";
+    case ExitCode::kMismatch:
+      return "scene or schema mismatch";
+    case ExitCode::kDeviceLost:
+      return "device lost for good";
+    case ExitCode::kFailure:
+      break;
+  }
+  return "failure";
+}
+
+/// In the child, between fork and exec: other threads of the parent may have held any lock, so only
+/// async-signal-safe calls. Returns only when something failed, with errno set.
+void Become(const char* program, char* const* arguments, const ChildStreams& streams, WithParent with_parent,
+            pid_t parent) {
+  if (with_parent == WithParent::kDies) {
+    // SIGKILL, since a node that hangs must not outlive its supervisor either; checkpoints make it harmless.
+    if (::prctl(PR_SET_PDEATHSIG, SIGKILL) != 0) return;
+    if (::getppid() != parent) ::_exit(1);  // The parent died before prctl took effect.
+  }
+  sigset_t none;
+  sigemptyset(&none);
+  ::sigprocmask(SIG_SETMASK, &none, nullptr);
+  // A group of its own: Ctrl-C on the terminal reaches the supervisor alone, which ends its children in good order.
+  if (::setpgid(0, 0) != 0) return;
+  const int input = streams.input >= 0 ? streams.input : ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  if (input < 0 || ::dup2(input, STDIN_FILENO) < 0) return;
+  if (::dup2(streams.output, STDOUT_FILENO) < 0 || ::dup2(streams.output, STDERR_FILENO) < 0) return;
+  ::execv(program, arguments);
+}
+
+}  // namespace
+
+std::string ProcessEnd::Describe() const {
+  if (signal != 0) {
+    return "killed by signal " + std::to_string(signal) + " (" + ::strsignal(signal) + ")";
+  }
+  return "ended with exit code " + std::to_string(exit_code) + " (" + Meaning(exit_code) + ")";
+}
+
+ChildProcess::~ChildProcess() {
+  if (running() && with_parent_ == WithParent::kDies) {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+}
+
+ChildProcess::ChildProcess(ChildProcess&& other) noexcept
+    : pid_(std::exchange(other.pid_, -1)), with_parent_(other.with_parent_) {}
+
+ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
+  std::swap(pid_, other.pid_);
+  std::swap(with_parent_, other.with_parent_);
+  return *this;
+}
+
+ChildProcess ChildProcess::Start(const std::filesystem::path& program, const std::vector<std::string>& arguments,
+                                 const std::filesystem::path& log, WithParent with_parent, int input) {
+  const int log_fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  if (log_fd < 0) {
+    throw InputError("cannot write " + log.string() + ": " + ::strerror(errno));
+  }
+  try {
+    ChildProcess process = StartOn(program, arguments, {.input = input, .output = log_fd}, with_parent);
+    ::close(log_fd);
+    return process;
+  } catch (...) {
+    ::close(log_fd);
+    throw;
+  }
+}
+
+ChildProcess ChildProcess::StartOn(const std::filesystem::path& program, const std::vector<std::string>& arguments,
+                                   const ChildStreams& streams, WithParent with_parent) {
+  const auto fail = [&](int error) { throw InputError("cannot start " + program.string() + ": " + ::strerror(error)); };
+  std::vector<char*> pointers{const_cast<char*>(program.c_str())};
+  for (const std::string& argument : arguments) {
+    pointers.push_back(const_cast<char*>(argument.c_str()));
+  }
+  pointers.push_back(nullptr);
+  // The child reports a failed start through this pipe; a successful exec closes it.
+  int report[2];
+  if (::pipe2(report, O_CLOEXEC) != 0) {
+    fail(errno);
+  }
+  const pid_t parent = ::getpid();
+  const pid_t child = ::fork();
+  if (child == 0) {
+    Become(program.c_str(), pointers.data(), streams, with_parent, parent);
+    const int error = errno;
+    [[maybe_unused]] const ssize_t written = ::write(report[1], &error, sizeof(error));
+    ::_exit(127);
+  }
+  int error = child < 0 ? errno : 0;
+  ::close(report[1]);
+  ChildProcess process;
+  process.with_parent_ = with_parent;
+  if (child > 0) {
+    process.pid_ = child;
+    if (::read(report[0], &error, sizeof(error)) != static_cast<ssize_t>(sizeof(error))) {
+      error = 0;
+    }
+  }
+  ::close(report[0]);
+  if (error != 0) {
+    process.with_parent_ = WithParent::kDies;  // It never became what might stay.
+    fail(error);
+  }
+  return process;
+}
+
+std::optional<ProcessEnd> ChildProcess::Poll() {
+  int status = 0;
+  if (!running() || ::waitpid(pid_, &status, WNOHANG) != pid_) {
+    return std::nullopt;
+  }
+  pid_ = -1;
+  if (WIFSIGNALED(status)) {
+    return ProcessEnd{0, WTERMSIG(status)};
+  }
+  return ProcessEnd{WEXITSTATUS(status), 0};
+}
+
+void ChildProcess::Signal(int signal) const {
+  if (running()) {
+    ::kill(pid_, signal);
+  }
+}
+
+}  // namespace fulcrum::supervisor

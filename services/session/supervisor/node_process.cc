@@ -1,0 +1,195 @@
+#include "services/session/supervisor/node_process.h"
+
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <thread>
+#include <utility>
+
+#include "services/base/core/error.h"
+#include "services/base/core/exit_code.h"
+#include "services/base/core/tick.h"
+#include "services/base/runtime/cyclic_thread.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+// Health comes ten times a second from a thread of its own: a node that is silent this long hangs.
+constexpr std::int64_t kLongestSilence = 5 * kSecond_ns;
+// Until the first Health a node maps the scene and builds its solver.
+constexpr std::int64_t kLongestStart = 60 * kSecond_ns;
+constexpr std::int64_t kPatienceWithRestart = 3 * kSecond_ns;
+constexpr std::int64_t kLongestEnd = 4 * kSecond_ns;
+// When a node that has come back is no longer busy with it.
+constexpr std::int64_t kBeforeSpare = kSecond_ns;
+constexpr auto kLook = std::chrono::milliseconds(5);
+
+/// Starting again with the same arguments would end the same way.
+bool IsFinal(const ProcessEnd& end) {
+  const auto code = static_cast<ExitCode>(end.exit_code);
+  return end.signal == 0 &&
+         (code == ExitCode::kBadUsage || code == ExitCode::kMismatch || code == ExitCode::kDeviceLost);
+}
+
+}  // namespace
+
+void NodeProcess::Start(std::int64_t now_ns) {
+  process_ = spare_ && spare_->IsThere() ? spare_->Take()
+                                         : ChildProcess::Start(command_.program, command_.arguments, command_.log);
+  spare_.reset();
+  started_ns_ = now_ns;
+  last_health_ns_ = 0;
+  due_ns_ = 0;
+  kill_ns_ = 0;
+  silent_ = false;
+}
+
+void NodeProcess::WatchForSilence(std::int64_t now_ns) {
+  const bool too_long =
+      last_health_ns_ != 0 ? now_ns - last_health_ns_ > kLongestSilence : now_ns - started_ns_ > kLongestStart;
+  if (too_long && !silent_) {
+    silent_ = true;
+    process_.Signal(SIGKILL);
+  }
+  if (kill_ns_ != 0 && now_ns >= kill_ns_) {
+    process_.Signal(SIGKILL);
+  }
+}
+
+void NodeProcess::KeepSpare(std::int64_t now_ns) {
+  if (!command_.has_spare || spare_ || kill_ns_ != 0 || !has_reported() || now_ns - started_ns_ < kBeforeSpare) return;
+  try {
+    spare_ = std::make_unique<SpareProcess>(command_);
+  } catch (const InputError&) {
+    command_.has_spare = false;  // The node can do without.
+  }
+}
+
+std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
+  if (failed_) {
+    return std::nullopt;
+  }
+  if (due_ns_ != 0) {
+    if (now_ns >= due_ns_) {
+      command_.arguments.insert(command_.arguments.end(), command_.again.begin(), command_.again.end());
+      command_.again.clear();
+      try {
+        Start(now_ns);
+      } catch (const InputError& error) {
+        if (before_) return GiveBack(error.what(), {}, now_ns);
+        failed_ = true;
+        return Death{error.what(), true, {}, false, 0};
+      }
+    }
+    return std::nullopt;
+  }
+  const std::optional<ProcessEnd> end = process_.Poll();
+  if (!end) {
+    WatchForSilence(now_ns);
+    KeepSpare(now_ns);
+    return std::nullopt;
+  }
+  Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false, 0};
+  if (next_) {
+    before_ = std::exchange(command_, std::move(*next_));
+    next_.reset();
+    death.cause = "was replaced by command";
+    death.asked = true;
+    due_ns_ = now_ns;
+    return death;
+  }
+  if (before_ && !has_reported()) {
+    return GiveBack("was replaced by " + command_.program.string() + ", which " + death.cause, *end, now_ns);
+  }
+  if (kill_ns_ != 0) {
+    death.cause = "was restarted by command";
+    death.asked = true;
+    due_ns_ = now_ns;
+    return death;
+  }
+  const std::optional<std::int64_t> delay = IsFinal(*end) ? std::nullopt : policy_.OnDeath(now_ns - started_ns_);
+  death.for_good = failed_ = !delay.has_value();
+  due_ns_ = now_ns + delay.value_or(0);
+  return death;
+}
+
+SupervisedNode::Death NodeProcess::GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns) {
+  Death death{why + ": the one before comes back", false, end, false, 0};
+  command_ = std::move(*before_);
+  before_.reset();
+  due_ns_ = now_ns;
+  return death;
+}
+
+bool NodeProcess::OnHealth(const Health& health, std::int64_t now_ns) {
+  if (health.node != id() || (health.pid != pid() && !command_.foreign)) return false;
+  last_health_ns_ = now_ns;
+  before_.reset();
+  return true;
+}
+
+void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
+  if (last_health_ns_ != 0) {
+    last_health_ns_ = now_ns;
+  } else {
+    started_ns_ = now_ns;
+  }
+}
+
+void NodeProcess::AskRestart(std::int64_t now_ns) {
+  spare_.reset();  // Who asks may have built the program anew.
+  process_.Signal(SIGTERM);
+  kill_ns_ = now_ns + kPatienceWithRestart;
+}
+
+void NodeProcess::Swap(NodeCommand command, std::int64_t now_ns) {
+  next_ = std::move(command);
+  AskRestart(now_ns);
+}
+
+void NodeProcess::Stop() {
+  spare_.reset();
+  process_.Signal(SIGTERM);
+}
+
+const char* NodeProcess::GiveUp() {
+  process_.Signal(SIGKILL);
+  return "was killed";
+}
+
+bool NodeProcess::HasEnded() {
+  (void)process_.Poll();
+  return !process_.running();
+}
+
+void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(std::int64_t now_ns)>& turn,
+            const std::function<void(const SupervisedNode& node, const char* done)>& given_up) {
+  for (SupervisedNode* node : nodes) node->Stop();
+  const std::int64_t begin = runtime::MonotonicNs();
+  const auto is_gone = [](SupervisedNode* node) { return node->HasEnded(); };
+  while (!std::all_of(nodes.begin(), nodes.end(), is_gone)) {
+    const std::int64_t now = runtime::MonotonicNs();
+    if (now - begin > kLongestEnd) {
+      for (SupervisedNode* node : nodes) {
+        if (!node->HasEnded()) given_up(*node, node->GiveUp());
+      }
+    }
+    turn(now);
+    std::this_thread::sleep_for(kLook);
+  }
+}
+
+std::string LastLine(const std::filesystem::path& log) {
+  std::ifstream stream(log);
+  std::string line, last;
+  while (std::getline(stream, line)) {
+    if (!line.empty()) {
+      last = line;
+    }
+  }
+  return last;
+}
+
+}  // namespace fulcrum::supervisor

@@ -1,0 +1,171 @@
+#include "services/session/supervisor/scene_cache.h"
+
+#include <signal.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <thread>
+
+#include "services/base/core/error.h"
+#include "services/base/core/hash.h"
+#include "services/base/runtime/realtime.h"
+#include "services/session/supervisor/child_process.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string ReadText(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+void AddFile(Hash64* hash, const fs::path& file) {
+  std::error_code error;
+  hash->Add(std::string_view(file.native()));
+  hash->AddValue(static_cast<std::uint64_t>(fs::file_size(file, error)));
+  hash->AddValue(static_cast<std::int64_t>(fs::last_write_time(file, error).time_since_epoch().count()));
+}
+
+/// Words of the YAML that could name a file or folder.
+std::vector<std::string> PathWords(const std::string& yaml) {
+  constexpr std::string_view kSeparators = " \t\r\n\"',[]{}";
+  constexpr std::size_t kLongestName = 255;
+  std::vector<std::string> words;
+  for (std::size_t begin = 0; (begin = yaml.find_first_not_of(kSeparators, begin)) != std::string::npos;) {
+    const std::size_t end = std::min(yaml.find_first_of(kSeparators, begin), yaml.size());
+    const std::string word = yaml.substr(begin, end - begin);
+    begin = end;
+    if (word.find_first_of("./") != std::string::npos && word.size() <= kLongestName) {
+      words.push_back(word);
+    }
+  }
+  return words;
+}
+
+/// Any word that names an existing file, in the scene's folder, the data folder or a folder that the YAML names, is
+/// taken for an input: too many cost a compilation, too few would run yesterday's anatomy.
+void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::path& data, std::set<fs::path>* seen,
+                     Hash64* hash) {
+  const std::vector<std::string> words = PathWords(yaml);
+  std::vector<fs::path> bases{folder};
+  if (!data.empty()) {
+    bases.push_back(data);
+  }
+  std::error_code error;
+  for (const std::string& word : words) {
+    if (fs::is_directory(folder / word, error)) {
+      bases.push_back(folder / word);
+    }
+  }
+  for (const std::string& word : words) {
+    for (const fs::path& base : bases) {
+      if (fs::is_regular_file(base / word, error)) {
+        AddFile(hash, base / word);
+        // A scene that this one stands on may name others.
+        if (fs::path(word).extension() == ".yaml" && seen->insert(fs::canonical(base / word, error)).second) {
+          AddFilesNamedIn(ReadText(base / word), (base / word).parent_path(), data, seen, hash);
+        }
+      }
+    }
+  }
+}
+
+fs::path FindYaml(const SceneRequest& request) {
+  if (fs::is_regular_file(request.name)) {
+    return request.name;
+  }
+  fs::path shipped = request.library / (request.name + ".yaml");
+  if (request.name.find('/') == std::string::npos && fs::is_regular_file(shipped)) {
+    return shipped;
+  }
+  std::string known;
+  for (const std::string& name : ShippedScenes(request.library)) {
+    known += known.empty() ? name : ", " + name;
+  }
+  throw InputError("no scene \"" + request.name + "\": give a file, or one of " +
+                   (known.empty() ? "those in " + request.library.string() : known));
+}
+
+void Compile(const SceneRequest& request, const fs::path& yaml, const fs::path& target) {
+  fs::path log = target;
+  log += ".log";
+  fs::remove(log);
+  std::vector<std::string> arguments{yaml.string(), "--out", target.string()};
+  if (!request.data.empty()) {
+    arguments.insert(arguments.end(), {"--data", request.data.string()});
+  }
+  for (const std::string& change : request.changes) {
+    arguments.insert(arguments.end(), {"--set", change});
+  }
+  std::printf("compiling scene %s ...\n", yaml.filename().c_str());
+  std::fflush(stdout);
+  ChildProcess compiler = ChildProcess::Start(request.compiler, arguments, log);
+  for (;;) {
+    if (const auto end = compiler.Poll()) {
+      if (end->signal != 0 || end->exit_code != 0) {
+        throw InputError("scene " + yaml.string() + " does not compile: scene_compiler " + end->Describe() + "\n" +
+                         ReadText(log));
+      }
+      return;
+    }
+    if (runtime::ShouldStop()) {
+      throw InputError("stopped while compiling the scene");
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> ShippedScenes(const fs::path& library) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(library, error)) {
+    if (entry.path().extension() == ".yaml") {
+      names.push_back(entry.path().stem());
+    }
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+fs::path ResolveScene(const SceneRequest& request) {
+  fs::path source = FindYaml(request);
+  if (source.extension() != ".yaml") {
+    if (!request.changes.empty()) {
+      throw InputError("--set: " + source.string() + " is compiled already; give its description (.yaml)");
+    }
+    return source;
+  }
+  const std::string yaml = ReadText(source);
+  Hash64 hash;
+  hash.Add(std::string_view(yaml));
+  hash.Add(std::string_view(request.data.native()));
+  for (const std::string& change : request.changes) {
+    hash.Add(std::string_view(change + "\n"));
+  }
+  AddFile(&hash, request.compiler);
+  std::set<fs::path> seen;
+  AddFilesNamedIn(yaml, source.parent_path(), request.data, &seen, &hash);
+  std::array<char, 24> key{};
+  std::snprintf(key.data(), key.size(), "-%016llx", static_cast<unsigned long long>(hash.value()));
+  fs::path target = request.cache / (source.stem().string() + key.data() + ".fulcrum");
+  if (!fs::is_regular_file(target)) {
+    std::error_code error;
+    fs::create_directories(request.cache, error);
+    if (error) {
+      throw InputError("cannot make " + request.cache.string() + ": " + error.message());
+    }
+    Compile(request, source, target);
+  }
+  return target;
+}
+
+}  // namespace fulcrum::supervisor

@@ -1,0 +1,69 @@
+#include "services/session/supervisor/script_outlook.h"
+
+#include "services/base/core/operator_script.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+// A grasp shows as deformation after a second; a cut needs the hook to heat, dry and move on.
+constexpr double kTimeToDeform = 2.0;
+constexpr double kTimeToCut = 3.0;
+
+constexpr double kSpeedSpan = 0.1;       // Central difference for the tool's speed [s].
+constexpr double kMovingSpeed = 2.0e-3;  // Slower is holding [m/s].
+
+bool IsCutting(const ScriptPoint& point) { return point.pedals != kPedalNone && point.power_W > 0; }
+
+}  // namespace
+
+std::string PhaseAt(const SceneView& scene, double time) {
+  if (scene.script.empty()) {
+    return {};
+  }
+  std::string phase = "approach";
+  for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
+    const ScriptPoint now = EvaluateScript(scene.script, tool, time);
+    if (!now.present) {
+      continue;
+    }
+    if (IsCutting(now)) {
+      return (now.pedals & kPedalCoag) != 0 ? "coagulate" : "cut";
+    }
+    if (scene.tools[tool].kind != ToolKind::kGrasper) {
+      continue;
+    }
+    const float close = scene.physics.grasp_close_rad;
+    if (now.jaw_rad < close) {
+      const ScriptPoint before = EvaluateScript(scene.script, tool, time - kSpeedSpan);
+      const ScriptPoint after = EvaluateScript(scene.script, tool, time + kSpeedSpan);
+      const double speed = static_cast<double>((after.p_W - before.p_W).norm()) / (2 * kSpeedSpan);
+      phase = speed > kMovingSpeed ? "pull" : "hold";
+      continue;
+    }
+    for (const ScriptKey& key : scene.script) {
+      if (key.tool == tool && static_cast<double>(key.time_s) <= time && key.jaw_rad < close) {
+        phase = "release";
+      }
+    }
+    const ScriptPoint soon = EvaluateScript(scene.script, tool, time + 0.5);
+    if (phase == "approach" && soon.jaw_rad < now.jaw_rad) {
+      phase = "grasp";
+    }
+  }
+  return phase;
+}
+
+ScriptDemands DemandsUntil(const SceneView& scene, double end_s) {
+  ScriptDemands demands;
+  for (const ScriptKey& key : scene.script) {
+    const double left = end_s - static_cast<double>(key.time_s);
+    const bool cutting = key.pedals != kPedalNone && key.power_W > 0;
+    const bool grasping =
+        scene.tools[key.tool].kind == ToolKind::kGrasper && key.jaw_rad < scene.physics.grasp_close_rad;
+    demands.deformation |= (cutting || grasping) && left >= kTimeToDeform;
+    demands.cut |= cutting && left >= kTimeToCut;
+  }
+  return demands;
+}
+
+}  // namespace fulcrum::supervisor

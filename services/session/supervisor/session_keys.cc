@@ -1,0 +1,24 @@
+#include "services/session/supervisor/session_keys.h"
+
+#include "services/transport/keys/key_folder.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+constexpr std::time_t kExpiryWarning_s = 30 * 24 * 3600;
+
+}  // namespace
+
+std::string CheckSessionKeys(const config::CartConfig& cart, std::vector<NodeId> nodes, std::time_t now) {
+  if (cart.security.keys.empty()) return {};
+  nodes.push_back(NodeId::kSupervisor);
+  std::time_t until = 0;
+  for (const NodeId id : nodes) {
+    until = keys::CheckIdentity(cart.security.keys, NodeName(id), cart.security.encrypt, now).until;
+  }
+  if (until - now > kExpiryWarning_s) return {};
+  return "the keys of this cart hold until " + keys::DateOf(until) + " only: make new ones with fulcrum keys init " +
+         cart.security.keys + " --force";
+}
+
+}  // namespace fulcrum::supervisor

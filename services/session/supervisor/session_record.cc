@@ -1,0 +1,161 @@
+#include "services/session/supervisor/session_record.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace fulcrum::supervisor {
+
+void Curve::Add(double time_s, double value) {
+  if (!std::isfinite(value)) {
+    return;
+  }
+  max_ = std::max(max_, value);
+  if (++skipped_ < stride_) {
+    return;
+  }
+  skipped_ = 0;
+  points_.push_back({time_s, value});
+  if (points_.size() == kMostPoints) {
+    for (std::size_t i = 0; 2 * i < points_.size(); ++i) {
+      points_[i] = points_[2 * i];
+    }
+    points_.resize(points_.size() / 2);
+    stride_ *= 2;
+  }
+}
+
+const char* EventName(ThermalEventKind kind) {
+  switch (kind) {
+    case ThermalEventKind::kContact:
+      return "contact";
+    case ThermalEventKind::kBlanch:
+      return "blanching";
+    case ThermalEventKind::kSteam:
+      return "steam";
+    case ThermalEventKind::kCut:
+      return "cut";
+    case ThermalEventKind::kChar:
+      return "charring";
+    case ThermalEventKind::kUreterWarning:
+      return "ureter warning";
+    case ThermalEventKind::kUreterInjury:
+      return "ureter injury";
+    case ThermalEventKind::kNerveWarning:
+      return "nerve warning";
+    case ThermalEventKind::kNerveInjury:
+      return "nerve injury";
+    case ThermalEventKind::kQuarantine:
+      return "region reset";
+  }
+  return "unknown";
+}
+
+void SessionRecord::AddHealth(double time_s, const Health& health) {
+  NodeTrack& track = nodes_[static_cast<std::size_t>(health.node)];
+  NodeFigures& figures = track.figures;
+  if (health.stamp.epoch < track.epoch) {
+    return;  // A sample of the dead process, served late.
+  }
+  if (!figures.seen) {
+    figures.seen = true;
+    track.first_time_s = std::max(time_s, 0.0);
+  }
+  if (health.stamp.epoch > track.epoch) {
+    track.epoch = health.stamp.epoch;
+    track.base_ticks += track.live_ticks;
+    track.base_overruns += track.live_overruns;
+    track.base_drops += track.live_drops;
+  }
+  if (health.state == HealthState::kRunning && track.death_time_s >= 0) {
+    const double rejoin_s = time_s - track.death_time_s;
+    track.death_time_s = -1;
+    figures.longest_rejoin_s = std::max(figures.longest_rejoin_s, rejoin_s);
+    const auto last = std::find_if(restarts_.rbegin(), restarts_.rend(),
+                                   [&](const RestartRecord& record) { return record.node == health.node; });
+    if (last != restarts_.rend()) {
+      last->rejoin_s = rejoin_s;
+    }
+  }
+  track.live_ticks = health.ticks;
+  track.live_overruns = health.overruns;
+  track.live_drops = health.write_failures;
+  for (const InputHealth& input : health.inputs) {
+    track.live_drops += input.lost + input.rejected;
+  }
+  figures.pid = health.pid;
+  figures.state = health.state;
+  figures.rate_asked_Hz = static_cast<double>(health.rate_asked_Hz);
+  figures.rate_last_second_Hz = static_cast<double>(health.rate_achieved_Hz);
+  figures.ticks = track.base_ticks + track.live_ticks;
+  figures.overruns = track.base_overruns + track.live_overruns;
+  figures.drops = track.base_drops + track.live_drops;
+  const float step_max_us = std::max(figures.step.max_us, health.step.max_us);
+  const float wake_max_us = std::max(figures.wake.max_us, health.wake.max_us);
+  figures.step = health.step;
+  figures.wake = health.wake;
+  figures.step.max_us = step_max_us;
+  figures.wake.max_us = wake_max_us;
+  figures.last_error = health.last_error;
+  if (time_s > track.first_time_s) {
+    figures.rate_achieved_Hz = static_cast<double>(figures.ticks) / (time_s - track.first_time_s);
+  }
+  if (time_s >= 0) {
+    for (const Metric& metric : health.metrics) {
+      curves_[metric.name].Add(time_s, metric.value);
+    }
+  }
+}
+
+void SessionRecord::AddEvent(const ThermalEvent& event) {
+  ++event_counts_[event.kind];
+  if (events_.size() < kMostEvents) {
+    events_.push_back({event.session_time_s, event.kind, static_cast<double>(event.temperature_C)});
+  }
+}
+
+void SessionRecord::AddDeath(double time_s, NodeId node, const std::string& cause, bool for_good) {
+  NodeTrack& track = nodes_[static_cast<std::size_t>(node)];
+  if (track.death_time_s < 0) {
+    track.death_time_s = std::max(time_s, 0.0);
+  }
+  track.figures.failed = for_good;
+  if (!for_good) {
+    ++track.figures.restarts;
+  }
+  restarts_.push_back({time_s, node, cause, -1});
+}
+
+void SessionRecord::AddRefusals(double time_s, const bus::Refusals& refusals) {
+  for (std::size_t i = refused_.size(); i < refusals.texts.size(); ++i) {
+    refused_.push_back({std::max(time_s, 0.0), refusals.texts[i]});
+  }
+  refusals_ = refusals;
+}
+
+const Curve& SessionRecord::curve(const std::string& metric) const {
+  static const Curve kNone;
+  const auto found = curves_.find(metric);
+  return found == curves_.end() ? kNone : found->second;
+}
+
+std::string MissingFrom(const SessionRecord& record, const ScriptDemands& demands) {
+  const auto missing = [](const char* what, double value, double least) {
+    char text[160];
+    std::snprintf(text, sizeof(text),
+                  "%s, although the scene's script asks for it (%.2f mm; at least %.1f mm expected)", what, value,
+                  least);
+    return std::string(text);
+  };
+  const double displacement = record.peak("max_displacement_mm");
+  if (demands.deformation && displacement < kLeastDisplacement_mm) {
+    return missing("nothing was deformed", displacement, kLeastDisplacement_mm);
+  }
+  const double cut = record.peak("cut_length_mm");
+  if (demands.cut && cut < kLeastCut_mm) {
+    return missing("nothing was cut", cut, kLeastCut_mm);
+  }
+  return {};
+}
+
+}  // namespace fulcrum::supervisor

@@ -1,0 +1,129 @@
+// What a session was: figures of each node, curves over session time, events, restarts. Pure; fed by the supervisor,
+// read by summary, table and report.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "services/base/core/messages.h"
+#include "services/session/supervisor/script_outlook.h"
+#include "services/transport/bus/security.h"
+
+namespace fulcrum::supervisor {
+
+struct CurvePoint {
+  double time_s;
+  double value;
+};
+/// A figure over session time. Long sessions are thinned: every second point goes when the curve is full.
+class Curve {
+ public:
+  static constexpr std::size_t kMostPoints = 6000;
+  void Add(double time_s, double value);
+  [[nodiscard]] const std::vector<CurvePoint>& points() const { return points_; }
+  [[nodiscard]] double max() const { return max_; }
+
+ private:
+  std::vector<CurvePoint> points_;
+  double max_ = 0;
+  std::size_t stride_ = 1, skipped_ = 0;
+};
+
+/// One node over the whole session, restarts included.
+struct NodeFigures {
+  bool seen = false;
+  bool failed = false;  ///< For good.
+  std::int32_t pid = 0;
+  HealthState state = HealthState::kStarting;
+  double rate_asked_Hz = 0;
+  double rate_achieved_Hz = 0;  ///< Ticks per second of session time: a dead node's time counts.
+  double rate_last_second_Hz = 0;
+  TimingSummary step;  ///< p50, p99 since the last start; max of all.
+  TimingSummary wake;
+  std::uint64_t ticks = 0;
+  std::uint64_t overruns = 0;
+  std::uint64_t drops = 0;  ///< Samples lost, rejected or not written.
+  int restarts = 0;
+  double longest_rejoin_s = 0;  ///< From a death to the first Health "running".
+  std::string last_error;
+};
+
+struct RestartRecord {
+  double time_s = 0;
+  NodeId node = NodeId::kSupervisor;
+  std::string cause;
+  double rejoin_s = -1;  ///< Negative: did not rejoin.
+};
+
+struct EventRecord {
+  double time_s = 0;
+  ThermalEventKind kind = ThermalEventKind::kContact;
+  double temperature_C = 0;
+};
+/// Somebody who was kept off the bus.
+struct RefusalRecord {
+  double time_s = 0;
+  std::string what;
+};
+/// "cut", "steam", "ureter warning", …
+[[nodiscard]] const char* EventName(ThermalEventKind kind);
+
+class SessionRecord {
+ public:
+  void AddHealth(double time_s, const Health& health);
+  void AddEvent(const ThermalEvent& event);
+  void AddDeath(double time_s, NodeId node, const std::string& cause, bool for_good);
+  /// All since the start; those that are new are of now.
+  void AddRefusals(double time_s, const bus::Refusals& refusals);
+
+  [[nodiscard]] const NodeFigures& node(NodeId id) const { return nodes_[static_cast<std::size_t>(id)].figures; }
+  /// Curve of a metric of whichever node reports it; empty when none does.
+  [[nodiscard]] const Curve& curve(const std::string& metric) const;
+  /// Newest value reported; 0 when none was.
+  [[nodiscard]] double last(const std::string& metric) const {
+    const auto& points = curve(metric).points();
+    return points.empty() ? 0.0 : points.back().value;
+  }
+  /// Highest value ever reported; 0 when none was.
+  [[nodiscard]] double peak(const std::string& metric) const { return curve(metric).max(); }
+  [[nodiscard]] const std::vector<RestartRecord>& restarts() const { return restarts_; }
+  /// The first kMostEvents events.
+  [[nodiscard]] const std::vector<EventRecord>& events() const { return events_; }
+  [[nodiscard]] const std::map<ThermalEventKind, std::uint64_t>& event_counts() const { return event_counts_; }
+
+  [[nodiscard]] const bus::Refusals& refusals() const { return refusals_; }
+  [[nodiscard]] const std::vector<RefusalRecord>& refused() const { return refused_; }
+
+  static constexpr std::size_t kMostEvents = 500;
+
+ private:
+  struct NodeTrack {
+    NodeFigures figures;
+    std::uint64_t epoch = 0;
+    double first_time_s = 0;
+    double death_time_s = -1;  ///< >= 0 while dead.
+    // Counters start at 0 with each process: what earlier ones counted is kept apart.
+    std::uint64_t base_ticks = 0, base_overruns = 0, base_drops = 0;
+    std::uint64_t live_ticks = 0, live_overruns = 0, live_drops = 0;
+  };
+
+  std::array<NodeTrack, kNodeCount> nodes_{};
+  std::map<std::string, Curve> curves_;
+  std::vector<RestartRecord> restarts_;
+  std::vector<EventRecord> events_;
+  bus::Refusals refusals_;
+  std::vector<RefusalRecord> refused_;
+  std::map<ThermalEventKind, std::uint64_t> event_counts_;
+};
+
+/// Thresholds below which nothing has happened: above rounding and relaxation, far below any scripted action.
+inline constexpr double kLeastDisplacement_mm = 0.5;
+inline constexpr double kLeastCut_mm = 0.5;
+
+/// Empty when the session brought about what the script demands; else what is missing.
+[[nodiscard]] std::string MissingFrom(const SessionRecord& record, const ScriptDemands& demands);
+
+}  // namespace fulcrum::supervisor

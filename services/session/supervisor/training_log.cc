@@ -1,0 +1,239 @@
+#include "services/session/supervisor/training_log.h"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "services/base/core/error.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+constexpr int kApplication = 0x46554c43;  // "FULC", in the file's header.
+constexpr int kVersion = 1;
+constexpr int kBusy_ms = 5000;  // Another session of the same user writes its row.
+constexpr std::size_t kLongestName = 63;
+
+constexpr const char* kTables = R"sql(
+CREATE TABLE sessions (
+  id INTEGER PRIMARY KEY, trainee TEXT NOT NULL, session TEXT NOT NULL, scene TEXT NOT NULL, started_utc TEXT NOT NULL,
+  seconds REAL NOT NULL, well INTEGER NOT NULL, score_pct REAL NOT NULL);
+CREATE INDEX sessions_of_trainee ON sessions (trainee, scene);
+CREATE TABLE measures (
+  session_id INTEGER NOT NULL REFERENCES sessions (id) ON DELETE CASCADE, measure TEXT NOT NULL, value REAL NOT NULL,
+  PRIMARY KEY (session_id, measure)) WITHOUT ROWID;
+)sql";
+
+/// One prepared statement. Indices of parameters count from 1, of columns from 0, as the library has them.
+class Statement {
+ public:
+  Statement(sqlite3* database, const char* sql) {
+    good_ = sqlite3_prepare_v2(database, sql, -1, &statement_, nullptr) == SQLITE_OK;
+  }
+  ~Statement() { sqlite3_finalize(statement_); }
+  Statement(const Statement&) = delete;
+  Statement& operator=(const Statement&) = delete;
+
+  void Bind(int i, const std::string& text) {
+    good_ = good_ &&
+            sqlite3_bind_text(statement_, i, text.data(), static_cast<int>(text.size()), SQLITE_TRANSIENT) == SQLITE_OK;
+  }
+  void Bind(int i, double value) { good_ = good_ && sqlite3_bind_double(statement_, i, value) == SQLITE_OK; }
+  void Bind(int i, sqlite3_int64 value) { good_ = good_ && sqlite3_bind_int64(statement_, i, value) == SQLITE_OK; }
+  /// A further row is there. After the last, good() tells whether it was the end or a failure.
+  bool Next() {
+    const int code = good_ ? sqlite3_step(statement_) : SQLITE_ERROR;
+    good_ = code == SQLITE_ROW || code == SQLITE_DONE;
+    return code == SQLITE_ROW;
+  }
+  [[nodiscard]] bool good() const { return good_; }
+  [[nodiscard]] std::string Text(int i) const {
+    const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_, i));
+    return text == nullptr ? std::string()
+                           : std::string(text, static_cast<std::size_t>(sqlite3_column_bytes(statement_, i)));
+  }
+  [[nodiscard]] double Number(int i) const { return sqlite3_column_double(statement_, i); }
+  [[nodiscard]] sqlite3_int64 Integer(int i) const { return sqlite3_column_int64(statement_, i); }
+  void Again() {
+    sqlite3_reset(statement_);
+    sqlite3_clear_bindings(statement_);
+  }
+
+ private:
+  sqlite3_stmt* statement_ = nullptr;
+  bool good_ = false;
+};
+
+}  // namespace
+
+void CheckTraineeName(const std::string& name) {
+  const bool blank = std::all_of(name.begin(), name.end(), [](char c) { return c == ' '; });
+  const bool control =
+      std::any_of(name.begin(), name.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
+  if (blank || control || name.size() > kLongestName) {
+    throw InputError("trainee \"" + name + "\": must have 1 to 63 bytes, not all blank, no control characters");
+  }
+}
+
+std::optional<TrainingLog> OpenTrainingLog(const std::string& trainee, const std::filesystem::path& file,
+                                           const SceneView& scene) {
+  if (trainee.empty()) return std::nullopt;
+  if (scene.assessment.on == 0) {
+    throw InputError(std::string("--trainee: scene \"") + scene.name +
+                     "\" has no section `assessment`, so there is nothing to remember; take one that has");
+  }
+  return std::optional<TrainingLog>(std::in_place, file);
+}
+
+TrainingRow TrainingRowOf(const SessionOutcome& outcome) {
+  TrainingRow row{outcome.trainee,
+                  outcome.session_id,
+                  outcome.scene_name,
+                  outcome.started_utc,
+                  outcome.duration_s,
+                  outcome.exit_code == ExitCode::kDone,
+                  outcome.sheet->score.percent(),
+                  {}};
+  for (const assessment::ScoreItem& item : outcome.sheet->score.items) {
+    row.measures.emplace(InfoOf(item.measure).key, item.value);
+  }
+  return row;
+}
+
+void TrainingLog::Closer::operator()(sqlite3* database) const { sqlite3_close(database); }
+
+TrainingLog::~TrainingLog() = default;
+TrainingLog::TrainingLog(TrainingLog&&) noexcept = default;
+TrainingLog& TrainingLog::operator=(TrainingLog&&) noexcept = default;
+
+TrainingLog::TrainingLog(const std::filesystem::path& file, Access access) : file_(file) {
+  std::error_code error;
+  if (access == Access::kRead && !std::filesystem::exists(file, error)) {
+    throw InputError(file.string() + ": no such database; fulcrum up SCENE --trainee NAME makes it");
+  }
+  if (access == Access::kAdd && file.has_parent_path()) {
+    std::filesystem::create_directories(file.parent_path(), error);
+    if (error) throw InputError(file.parent_path().string() + ": cannot be made (" + error.message() + ")");
+  }
+  sqlite3* opened = nullptr;
+  const int flags = access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  const int code = sqlite3_open_v2(file.c_str(), &opened, flags, nullptr);
+  database_.reset(opened);
+  if (code != SQLITE_OK) Fail("cannot be opened");
+  // Opened for writing, a file that is not ours to write to is quietly opened for reading.
+  if (access == Access::kAdd && sqlite3_db_readonly(opened, "main") == 1) Fail("cannot be written to");
+  sqlite3_busy_timeout(opened, kBusy_ms);
+  CheckOrMake(access);
+}
+
+void TrainingLog::Fail(const std::string& what) const {
+  const std::string reason = database_ == nullptr ? "out of memory" : sqlite3_errmsg(database_.get());
+  throw InputError(file_.string() + ": " + what + (reason == "not an error" ? "" : " (" + reason + ")") +
+                   "; nothing was changed. Give another file with --database, or move this one away");
+}
+
+void TrainingLog::Execute(const char* sql) const {
+  if (sqlite3_exec(database_.get(), sql, nullptr, nullptr, nullptr) != SQLITE_OK) Fail("cannot be used");
+}
+
+int TrainingLog::Ask(const char* sql) const {
+  Statement statement(database_.get(), sql);
+  if (!statement.Next()) Fail("is not a database of trainees, or damaged");
+  return static_cast<int>(statement.Integer(0));
+}
+
+void TrainingLog::CheckOrMake(Access access) {
+  const int tables = Ask("SELECT count(*) FROM sqlite_master");
+  const int application = Ask("PRAGMA application_id"), version = Ask("PRAGMA user_version");
+  const bool empty = tables == 0 && application == 0 && version == 0;
+  if (empty && access == Access::kAdd) {
+    // Whole or not at all: two sessions may begin at once.
+    Execute("BEGIN IMMEDIATE");
+    if (Ask("SELECT count(*) FROM sqlite_master") == 0) {
+      Execute(kTables);
+      Execute(("PRAGMA application_id = " + std::to_string(kApplication)).c_str());
+      Execute(("PRAGMA user_version = " + std::to_string(kVersion)).c_str());
+    }
+    Execute("COMMIT");
+    return;
+  }
+  if (!empty && application != kApplication) Fail("is a database of another program");
+  if (version > kVersion) {
+    Fail("is of version " + std::to_string(version) + ", and this program knows " + std::to_string(kVersion) +
+         ": it was written by a newer one");
+  }
+  Statement check(database_.get(), "PRAGMA quick_check(1)");
+  if (!check.Next() || check.Text(0) != "ok") Fail("is damaged");
+}
+
+void TrainingLog::Add(const TrainingRow& row) {
+  const auto require = [&](bool good) {
+    if (good) return;
+    const std::string reason = sqlite3_errmsg(database_.get());
+    sqlite3_exec(database_.get(), "ROLLBACK", nullptr, nullptr, nullptr);
+    throw InputError(file_.string() + ": the session could not be added (" + reason +
+                     "); its figures are in assessment.json of its folder");
+  };
+  require(sqlite3_exec(database_.get(), "BEGIN IMMEDIATE", nullptr, nullptr, nullptr) == SQLITE_OK);
+  Statement session(database_.get(),
+                    "INSERT INTO sessions (trainee, session, scene, started_utc, seconds, well, score_pct) "
+                    "VALUES (?, ?, ?, ?, ?, ?, ?)");
+  session.Bind(1, row.trainee);
+  session.Bind(2, row.session);
+  session.Bind(3, row.scene);
+  session.Bind(4, row.started_utc);
+  session.Bind(5, row.seconds);
+  session.Bind(6, static_cast<sqlite3_int64>(row.well));
+  session.Bind(7, row.score_pct);
+  (void)session.Next();
+  require(session.good());
+  const sqlite3_int64 id = sqlite3_last_insert_rowid(database_.get());
+  Statement measure(database_.get(), "INSERT INTO measures (session_id, measure, value) VALUES (?, ?, ?)");
+  for (const auto& [key, value] : row.measures) {
+    measure.Bind(1, id);
+    measure.Bind(2, key);
+    measure.Bind(3, value);
+    (void)measure.Next();
+    require(measure.good());
+    measure.Again();
+  }
+  require(sqlite3_exec(database_.get(), "COMMIT", nullptr, nullptr, nullptr) == SQLITE_OK);
+}
+
+std::vector<TrainingRow> TrainingLog::SessionsOf(const std::string& trainee, const std::string& scene) const {
+  Statement sessions(database_.get(),
+                     "SELECT id, session, scene, started_utc, seconds, well, score_pct FROM sessions "
+                     "WHERE trainee = ?1 AND (?2 = '' OR scene = ?2) ORDER BY started_utc, id");
+  sessions.Bind(1, trainee);
+  sessions.Bind(2, scene);
+  Statement measures(database_.get(), "SELECT measure, value FROM measures WHERE session_id = ?");
+  std::vector<TrainingRow> rows;
+  while (sessions.Next()) {
+    TrainingRow row{trainee,
+                    sessions.Text(1),
+                    sessions.Text(2),
+                    sessions.Text(3),
+                    sessions.Number(4),
+                    sessions.Integer(5) != 0,
+                    sessions.Number(6),
+                    {}};
+    measures.Bind(1, sessions.Integer(0));
+    while (measures.Next()) row.measures.emplace(measures.Text(0), measures.Number(1));
+    if (!measures.good()) Fail("cannot be read");
+    measures.Again();
+    rows.push_back(std::move(row));
+  }
+  if (!sessions.good()) Fail("cannot be read");
+  return rows;
+}
+
+std::map<std::string, int> TrainingLog::Trainees() const {
+  Statement statement(database_.get(), "SELECT trainee, count(*) FROM sessions GROUP BY trainee");
+  std::map<std::string, int> trainees;
+  while (statement.Next()) trainees.emplace(statement.Text(0), static_cast<int>(statement.Integer(1)));
+  if (!statement.good()) Fail("cannot be read");
+  return trainees;
+}
+
+}  // namespace fulcrum::supervisor

@@ -1,0 +1,103 @@
+// Who may write and read what: the one table that the permissions of a secured cart are made from
+// (services/transport/keys). A port that is not here is refused on such a cart; the test of a whole session with
+// security on holds the two together (tests/integration/security).
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "services/base/core/messages.h"
+
+namespace fulcrum::bus {
+
+/// Bits of TopicId.
+using TopicSet = std::uint32_t;
+static_assert(kTopicCount <= 32);
+
+template <class... Ids>
+[[nodiscard]] constexpr TopicSet SetOf(Ids... ids) {
+  return (TopicSet{0} | ... | (TopicSet{1} << static_cast<unsigned>(ids)));
+}
+[[nodiscard]] constexpr bool Contains(TopicSet set, TopicId id) { return (set >> static_cast<unsigned>(id) & 1u) != 0; }
+
+struct AccessRole {
+  std::string_view identity;  ///< Subject of the certificate; for a node its name.
+  TopicSet writes;
+  TopicSet reads;
+};
+
+/// Participants that are no node.
+inline constexpr std::string_view kToolIdentity = "fulcrum";       ///< status, top, restart, swap, dump, down, console.
+inline constexpr std::string_view kReplayerIdentity = "replayer";  ///< Stands in for nodes: replayer --live.
+inline constexpr std::string_view kLinkIdentity = "link";          ///< Stands in for the nodes of another host.
+/// Domains of carts, and of what joins two hosts of one.
+inline constexpr int kFirstCartDomain = 1, kLastCartDomain = 100, kFirstLinkDomain = 101, kLastLinkDomain = 200;
+/// Between two hosts only, in a link domain: bytes, by lane and by who writes.
+inline constexpr std::array<std::string_view, 4> kLinkTopics{
+    "fulcrum/link/stream/from_cart", "fulcrum/link/stream/from_host", "fulcrum/link/ordered/from_cart",
+    "fulcrum/link/ordered/from_host"};
+
+namespace access {
+using enum TopicId;
+inline constexpr TopicSet kAll = (TopicSet{1} << kTopicCount) - 1;
+/// What services/nodes/app does for every node.
+inline constexpr TopicSet kNodeWrites = SetOf(kCommandReply, kHealth);
+inline constexpr TopicSet kNodeReads = SetOf(kSceneManifest, kCommand);
+
+/// The nodes first, by NodeId.
+inline constexpr std::array kRoles{
+    AccessRole{"supervisor", SetOf(kSceneManifest, kGeneratorSetting, kCommand, kCommandReply, kHealth),
+               SetOf(kCommand, kThermalEvent, kHealth, kToolState, kHandleState, kContactModel, kCauteryContact,
+                     kTopologyState, kTemperaturePatch)},
+    AccessRole{"handle_bridge", kNodeWrites | SetOf(kHandleState), kNodeReads},
+    AccessRole{"haptics_node", kNodeWrites | SetOf(kToolState, kTickManifest), kNodeReads | SetOf(kContactModel)},
+    AccessRole{"physics_node",
+               kNodeWrites | SetOf(kTissueFrame, kContactModel, kCauteryContact, kTearState, kTickManifest),
+               kNodeReads | SetOf(kToolState, kHandleState, kTopologyState, kOpenCells, kTickManifest)},
+    AccessRole{"thermal_node",
+               kNodeWrites | SetOf(kTopologyState, kOpenCells, kTemperaturePatch, kThermalEvent, kTickManifest),
+               kNodeReads | SetOf(kCauteryContact, kTearState, kHandleState, kGeneratorSetting)},
+    AccessRole{"render_node", kNodeWrites,
+               kNodeReads | SetOf(kTissueFrame, kTopologyState, kTemperaturePatch, kToolState, kHandleState,
+                                  kThermalEvent, kCauteryContact, kGeneratorSetting)},
+    AccessRole{"recorder", kNodeWrites, kAll},
+    AccessRole{kReplayerIdentity, kAll & ~SetOf(kCommand, kCommandReply), 0},
+    AccessRole{kLinkIdentity, kAll, kAll},
+    AccessRole{kToolIdentity, SetOf(kCommand), SetOf(kSceneManifest, kCommandReply, kThermalEvent, kHealth)},
+};
+}  // namespace access
+
+inline constexpr const auto& kAccessRoles = access::kRoles;
+
+/// nullptr: nobody of that name.
+[[nodiscard]] constexpr const AccessRole* AccessRoleOf(std::string_view identity) {
+  for (const AccessRole& role : kAccessRoles) {
+    if (role.identity == identity) return &role;
+  }
+  return nullptr;
+}
+
+/// Sends what is others' to send.
+[[nodiscard]] constexpr bool StandsIn(std::string_view identity) {
+  return identity == kReplayerIdentity || identity == kLinkIdentity;
+}
+
+/// The node that sends a topic; none for those that several participants send, those who stand in apart.
+[[nodiscard]] constexpr std::optional<NodeId> OwnerOf(TopicId topic) {
+  std::optional<NodeId> owner;
+  int writers = 0;
+  for (std::size_t i = 0; i < kAccessRoles.size(); ++i) {
+    if (StandsIn(kAccessRoles[i].identity) || !Contains(kAccessRoles[i].writes, topic)) continue;
+    ++writers;
+    if (i < kNodeCount) owner = static_cast<NodeId>(i);
+  }
+  return writers == 1 ? owner : std::nullopt;
+}
+static_assert(OwnerOf(TopicId::kSceneManifest) == NodeId::kSupervisor &&
+              OwnerOf(TopicId::kToolState) == NodeId::kHaptics && OwnerOf(TopicId::kThermalEvent) == NodeId::kThermal &&
+              !OwnerOf(TopicId::kCommand));
+
+}  // namespace fulcrum::bus

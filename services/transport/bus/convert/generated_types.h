@@ -1,0 +1,38 @@
+// Which generated type carries a message. Seen by services/transport/bus/convert and services/transport/bus/dds only.
+#pragma once
+
+#include "cauteryPubSubTypes.h"
+#include "contactPubSubTypes.h"
+#include "generatorPubSubTypes.h"
+#include "handlePubSubTypes.h"
+#include "healthPubSubTypes.h"
+#include "services/base/core/messages.h"
+#include "sessionPubSubTypes.h"
+#include "temperaturePubSubTypes.h"
+#include "thermal_eventPubSubTypes.h"
+#include "tissuePubSubTypes.h"
+#include "toolPubSubTypes.h"
+#include "topologyPubSubTypes.h"
+
+namespace fulcrum::bus {
+
+template <class T>
+struct TypeSupportOf;
+#define FULCRUM_TYPE_SUPPORT(T)      \
+  template <>                        \
+  struct TypeSupportOf<T> {          \
+    using type = idl::T##PubSubType; \
+  };
+FULCRUM_MESSAGES(FULCRUM_TYPE_SUPPORT)
+#undef FULCRUM_TYPE_SUPPORT
+
+template <class T>
+using WireOf = typename TypeSupportOf<T>::type::type;
+
+/// Travels by loan, as its memory: of a plain type that is its CDR, too.
+template <class T>
+concept Loanable = requires {
+  typename T::View;
+};
+
+}  // namespace fulcrum::bus

@@ -1,0 +1,101 @@
+// TissueFrame and TemperaturePatch in their loans.
+#include <algorithm>
+#include <cstring>
+
+#include "services/transport/bus/convert/convert.h"
+#include "services/transport/bus/convert/pieces.h"
+
+namespace fulcrum::bus {
+
+static_assert(idl::MAX_TISSUE_VERTICES == kMaxTissueVertices && idl::MAX_TISSUE_FLOATS == 3 * kMaxTissueVertices);
+static_assert(idl::PATCH_TEXELS == kPatchTexels && idl::ATLAS_TEXELS == kAtlasTexels);
+static_assert(idl::PATCH_BYTES == 4 * kPatchTexels * kPatchTexels);
+
+// A plain type is its header followed by its payload, without padding: so the payload begins at sizeof(header).
+static_assert(sizeof(idl::TissueFrame) == sizeof(idl::TissueFrameHeader) + idl::MAX_TISSUE_FLOATS * sizeof(float));
+static_assert(sizeof(idl::TemperaturePatch) == sizeof(idl::TemperaturePatchHeader) + idl::PATCH_BYTES);
+
+namespace {
+
+constexpr std::size_t kFrameOffset = sizeof(idl::TissueFrameHeader);
+constexpr std::size_t kPatchOffset = sizeof(idl::TemperaturePatchHeader);
+
+// Headers are copied byte by byte: a loan need not be aligned for their 8-byte members.
+template <class WireHeader, class Header>
+bool PutHeader(const Header& header, std::byte* loan) {
+  WireHeader wire;
+  if (!convert::Put(header, &wire)) return false;
+  std::memcpy(loan, static_cast<const void*>(&wire), sizeof wire);
+  return true;
+}
+template <class WireHeader, class Header>
+void GetHeader(const std::byte* loan, Header* header) {
+  WireHeader wire;
+  std::memcpy(static_cast<void*>(&wire), loan, sizeof wire);
+  convert::Get(wire, header);
+}
+template <class WireHeader>
+Stamp StampOfHeader(const std::byte* loan) {
+  WireHeader wire;
+  std::memcpy(static_cast<void*>(&wire), loan, sizeof wire);
+  Stamp stamp;
+  convert::Get(wire.stamp(), &stamp);
+  return stamp;
+}
+
+}  // namespace
+
+TissueFrame::View OpenLoan(std::byte* loan, TissueFrameHeader* header) {
+  *header = {};
+  return {*header, {reinterpret_cast<float*>(loan + kFrameOffset), idl::MAX_TISSUE_FLOATS}};
+}
+
+bool CloseLoan(const TissueFrameHeader& header, std::byte* loan) {
+  if (header.vertex_count > kMaxTissueVertices) return false;
+  return PutHeader<idl::TissueFrameHeader>(header, loan);
+}
+
+bool ToLoan(const TissueFrame& from, std::byte* loan) {
+  if (from.xyz.size() != std::size_t{3} * from.header.vertex_count) return false;
+  if (!CloseLoan(from.header, loan)) return false;
+  if (!from.xyz.empty()) std::memcpy(loan + kFrameOffset, from.xyz.data(), from.xyz.size() * sizeof(float));
+  return true;
+}
+
+bool FromLoan(const std::byte* loan, TissueFrame* to) {
+  GetHeader<idl::TissueFrameHeader>(loan, &to->header);
+  if (to->header.vertex_count > kMaxTissueVertices) return false;
+  const auto* xyz = reinterpret_cast<const float*>(loan + kFrameOffset);
+  to->xyz.assign(xyz, xyz + std::size_t{3} * to->header.vertex_count);
+  return true;
+}
+
+Stamp StampOfLoan(const std::byte* loan, const TissueFrame*) { return StampOfHeader<idl::TissueFrameHeader>(loan); }
+
+TemperaturePatch::View OpenLoan(std::byte* loan, TemperaturePatchHeader* header) {
+  *header = {};
+  return {*header, {reinterpret_cast<std::uint8_t*>(loan + kPatchOffset), idl::PATCH_BYTES}};
+}
+
+bool CloseLoan(const TemperaturePatchHeader& header, std::byte* loan) {
+  return PutHeader<idl::TemperaturePatchHeader>(header, loan);
+}
+
+bool ToLoan(const TemperaturePatch& from, std::byte* loan) {
+  if (from.texels.size() != idl::PATCH_BYTES || !CloseLoan(from.header, loan)) return false;
+  std::memcpy(loan + kPatchOffset, from.texels.data(), from.texels.size());
+  return true;
+}
+
+bool FromLoan(const std::byte* loan, TemperaturePatch* to) {
+  GetHeader<idl::TemperaturePatchHeader>(loan, &to->header);
+  const auto* texels = reinterpret_cast<const std::uint8_t*>(loan + kPatchOffset);
+  to->texels.assign(texels, texels + idl::PATCH_BYTES);
+  return true;
+}
+
+Stamp StampOfLoan(const std::byte* loan, const TemperaturePatch*) {
+  return StampOfHeader<idl::TemperaturePatchHeader>(loan);
+}
+
+}  // namespace fulcrum::bus

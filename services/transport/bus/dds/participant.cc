@@ -1,0 +1,275 @@
+#include "services/transport/bus/dds/participant.h"
+
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <mutex>
+#include <sstream>
+
+#include "services/base/core/error.h"
+#include "services/transport/bus/access.h"
+#include "services/transport/bus/dds/abandoned_mutex.h"
+#include "services/transport/bus/dds/audience.h"
+#include "services/transport/bus/dds/chained_transport.h"
+#include "services/transport/bus/dds/library.h"
+#include "services/transport/bus/dds/peer_watch.h"
+#include "services/transport/bus/dds/ports.h"
+#include "services/transport/bus/dds/raw_reader.h"
+#include "services/transport/bus/dds/security.h"
+#include "services/transport/bus/dds/shared_memory.h"
+#include "services/transport/bus/hex.h"
+
+namespace fulcrum::bus {
+namespace {
+
+namespace fast = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastrtps::rtps;
+using eprosima::fastrtps::Duration_t;
+
+/// A participant says often that it is there while it is new, and then only now and then: eight of them heard each
+/// other a thousand times a second.
+const Duration_t kAnnouncement{0, 200 * kMilli_ns}, kFirstAnnouncements{0, 20 * kMilli_ns};
+constexpr std::uint32_t kFirstAnnouncementCount = 25;
+/// With keys each announcement of somebody not yet authenticated is looked at by the handshake.
+const Duration_t kSecuredAnnouncement{0, 100 * kMilli_ns};
+/// A reader asks again for what a writer had before; the first heartbeat may have come before the two were matched.
+const Duration_t kFirstAcknack{0, 10 * kMilli_ns};
+/// A node's period is 10 ms or more wherever a reliable write may have to wait.
+const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
+/// Samples above this do not fit one UDP datagram and are sent in fragments.
+constexpr std::uint32_t kDatagram_B = 64'000;
+
+fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash,
+                                          const std::shared_ptr<dds::Gathering>& gathering) {
+  fast::DomainParticipantQos qos;
+  qos.name(settings.node_name);
+  const std::string user_data = dds::UserDataOf(settings.node_name, schema_hash);
+  qos.user_data().data_vec({user_data.begin(), user_data.end()});
+  auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
+  udp->interfaceWhiteList = {"127.0.0.1"};
+  udp->sendBufferSize = kSocketBuffer_B;
+  udp->receiveBufferSize = kSocketBuffer_B;
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports.push_back(udp);
+  if (gathering) qos.transport().user_transports.back() = dds::LetGather(udp, gathering);
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  discovery.leaseDuration = Duration_t(settings.lease_s, 0);
+  discovery.leaseDuration_announcementperiod = settings.security.on() ? kSecuredAnnouncement : kAnnouncement;
+  if (!settings.security.on()) discovery.initial_announcements = {kFirstAnnouncementCount, kFirstAnnouncements};
+  if (settings.security.on()) dds::ApplySecurity(settings.security, &qos);
+  return qos;
+}
+
+/// What a DataReaderQos and a DataWriterQos have in common. `shared_memory` empty: no data-sharing.
+template <class Qos>
+void Apply(const Quality& quality, int depth, const std::string& shared_memory, Qos* qos) {
+  qos->reliability().kind =
+      quality.delivery == Delivery::kBestEffort ? fast::BEST_EFFORT_RELIABILITY_QOS : fast::RELIABLE_RELIABILITY_QOS;
+  qos->reliability().max_blocking_time = kMaxBlocking;
+  qos->durability().kind =
+      quality.late_joiners_served ? fast::TRANSIENT_LOCAL_DURABILITY_QOS : fast::VOLATILE_DURABILITY_QOS;
+  const bool keeps_all = quality.delivery == Delivery::kReliableKeepAll;
+  qos->history().kind = keeps_all ? fast::KEEP_ALL_HISTORY_QOS : fast::KEEP_LAST_HISTORY_QOS;
+  qos->history().depth = depth;
+  // The pool holds this many samples of the type's full size: one more than the history, for the sample being written.
+  // The library's default of 5000 would ask for 1.5 GB per large topic.
+  const int samples = keeps_all ? depth : depth + 1;
+  qos->resource_limits().max_instances = 1;
+  qos->resource_limits().max_samples = samples;
+  qos->resource_limits().max_samples_per_instance = samples;
+  qos->resource_limits().allocated_samples = 0;
+  qos->endpoint().history_memory_policy = rtps::PREALLOCATED_MEMORY_MODE;
+  if (!shared_memory.empty()) {
+    qos->data_sharing().on(shared_memory);
+  } else {
+    qos->data_sharing().off();
+  }
+}
+
+}  // namespace
+
+DdsSettings ToolSettings(int domain) {
+  const std::filesystem::path memory = SharedMemoryDirectory(domain);
+  return {.domain = domain,
+          .node_name = std::string(kToolIdentity),
+          .shared_memory = memory,
+          .security = AnnouncedSecurity(memory, kToolIdentity)};
+}
+
+struct DdsParticipant::Impl {
+  Impl(const DdsSettings& settings, std::uint64_t hash)
+      : schema_hash(hash),
+        shared_memory(settings.shared_memory),
+        security(settings.security),
+        gathering(settings.gathers ? std::make_shared<dds::Gathering>() : nullptr),
+        watch(settings.node_name, hash, settings.security) {
+    if (settings.domain < kFirstCartDomain || settings.domain > kLastCartDomain) {
+      throw InputError("domain " + std::to_string(settings.domain) + " is out of range: 1 to 100");
+    }
+    if (shared_memory.empty()) shared_memory = SharedMemoryDirectory(settings.domain);
+    PrepareSharedMemory(shared_memory);
+    dds::PrepareLibrary();
+
+    participant = fast::DomainParticipantFactory::get_instance()->create_participant(
+        static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash, gathering), &watch,
+        fast::StatusMask::none());
+    if (participant == nullptr) {
+      throw InputError("domain " + std::to_string(settings.domain) +
+                       ": cannot open the bus; are its UDP ports on 127.0.0.1 free?");
+    }
+    if (security.on()) {
+      std::ostringstream address;
+      address << participant->guid().guidPrefix;
+      ClaimSharedMemory(shared_memory, address.str());
+    }
+    publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
+    subscriber = participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
+  }
+
+  ~Impl() {
+    if (participant == nullptr) return;
+    participant->set_listener(nullptr);
+    participant->delete_contained_entities();
+    fast::DomainParticipantFactory::get_instance()->delete_participant(participant);
+  }
+
+  /// The topic of T, its type registered under a name that carries the schema hash: endpoints of two schemas never
+  /// match.
+  template <class T>
+  fast::Topic* TopicFor() {
+    const TopicRole& role = RoleOf<T>();
+    const std::lock_guard lock(mutex);
+    fast::Topic*& topic = topics[static_cast<std::size_t>(role.id)];
+    if (topic != nullptr) return topic;
+    fast::TypeSupport type(new dds::CheckedType<T>());
+    if constexpr (Loanable<T>) {
+      // Both together say that memory and wire look the same, which is what a loan relies on.
+      if (!type->is_plain() || type->m_typeSize != sizeof(WireOf<T>) + 4) {
+        throw std::logic_error(std::string(role.name) + ": the generated type is not plain");
+      }
+    }
+    type->setName(TypeName(role).c_str());
+    return topic = MakeTopic(role, type);
+  }
+
+  fast::Topic* MakeTopic(const TopicRole& role, const fast::TypeSupport& type) {
+    fast::Topic* topic = nullptr;
+    if (type.register_type(participant) == dds::ReturnCode::RETCODE_OK) {
+      topic = participant->create_topic(role.name, type.get_type_name(), fast::TOPIC_QOS_DEFAULT);
+    }
+    if (topic == nullptr) throw InputError(std::string(role.name) + ": cannot make the topic");
+    return topic;
+  }
+
+  [[nodiscard]] std::string TypeName(const TopicRole& role) const {
+    return std::string(role.name) + "#" + Hex(schema_hash);
+  }
+
+  /// Where the samples of a topic are shared; empty: they travel by UDP.
+  [[nodiscard]] std::string SharedMemoryFor(const TopicRole& role) const {
+    return role.quality.path == Path::kSharedMemory && !security.encrypt ? shared_memory.string() : std::string();
+  }
+
+  /// Why the library made no endpoint.
+  [[nodiscard]] std::string CannotMake(const TopicRole& role, const char* what) const {
+    return std::string(role.name) + ": cannot make a " + what +
+           (security.on() ? ": access control refuses it to \"" + security.identity + "\" (keys of " +
+                                security.keys.string() + "; fulcrum keys show lists who may what)"
+                          : "");
+  }
+
+  const std::uint64_t schema_hash;
+  std::filesystem::path shared_memory;
+  const Security security;
+  const std::shared_ptr<dds::Gathering> gathering;
+  dds::PeerWatch watch;
+  dds::Audience audience;
+  fast::DomainParticipant* participant = nullptr;
+  fast::Publisher* publisher = nullptr;
+  fast::Subscriber* subscriber = nullptr;
+  std::mutex mutex;  ///< Guards topics.
+  std::array<fast::Topic*, kTopicCount> topics{};
+};
+
+DdsParticipant::DdsParticipant(const DdsSettings& settings)
+    : impl_(std::make_unique<Impl>(settings, settings.schema_hash)) {}
+DdsParticipant::~DdsParticipant() = default;
+
+std::string DdsParticipant::schema_mismatch() const { return impl_->watch.mismatch(); }
+Refusals DdsParticipant::refusals() const { return impl_->watch.refusals(); }
+
+template <class T>
+std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()> notify) {
+  const TopicRole& role = RoleOf<T>();
+  fast::DataReaderQos qos;
+  Apply(role.quality, role.quality.reader_depth, impl_->SharedMemoryFor(role), &qos);
+  qos.reliable_reader_qos().times.initialAcknackDelay = kFirstAcknack;
+  const WorkingIn here(impl_->shared_memory);
+  auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos, std::move(notify));
+  if (!port->ok()) throw InputError(impl_->CannotMake(role, "reader"));
+  if (role.quality.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
+  return port;
+}
+
+template <class T>
+std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
+  const TopicRole& role = RoleOf<T>();
+  fast::Topic* topic = impl_->TopicFor<T>();
+  fast::DataWriterQos qos;
+  Apply(role.quality, role.quality.writer_depth, impl_->SharedMemoryFor(role), &qos);
+  const bool fragmented =
+      impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
+  qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
+  const WorkingIn here(impl_->shared_memory);
+  auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos, &impl_->audience);
+  if (!port->ok()) throw InputError(impl_->CannotMake(role, "writer"));
+  if (role.quality.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
+  return port;
+}
+
+std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink) {
+  const TopicRole& role = RoleOf(id);
+  const std::uint32_t payload_B =
+      WithMessageOf(id, []<class T>(std::type_identity<T>) { return typename TypeSupportOf<T>::type().m_typeSize; });
+  const bool plain = role.quality.path == Path::kSharedMemory;
+  fast::Topic* topic =
+      impl_->MakeTopic(role, fast::TypeSupport(new dds::RawType(impl_->TypeName(role), payload_B, plain)));
+  fast::DataReaderQos qos;
+  Apply(role.quality, role.quality.reader_depth, impl_->SharedMemoryFor(role), &qos);
+  qos.reliable_reader_qos().times.initialAcknackDelay = kFirstAcknack;
+  const WorkingIn here(impl_->shared_memory);
+  auto input =
+      std::make_unique<dds::RawReader>(impl_->subscriber, topic, qos, id, payload_B, std::move(sink), impl_->gathering);
+  if (!input->ok()) throw InputError(impl_->CannotMake(role, "reader"));
+  return input;
+}
+
+std::uint64_t DdsParticipant::inherited_locks() { return dds::SharedLocks().inherited; }
+
+bool DdsParticipant::Knows(const std::string& name) const { return !impl_->watch.Named(name).empty(); }
+
+bool DdsParticipant::IsReadBy(const std::string& name) const {
+  return std::ranges::any_of(impl_->watch.Named(name),
+                             [&](const rtps::GuidPrefix_t& prefix) { return impl_->audience.Reaches(prefix); });
+}
+
+Peer DdsParticipant::PeerOf(const WriterGuid& writer) const {
+  rtps::GuidPrefix_t prefix;
+  std::copy_n(writer.begin(), rtps::GuidPrefix_t::size, prefix.value);
+  return impl_->watch.PeerOf(prefix);
+}
+
+#define FULCRUM_INSTANTIATE_PORTS(T)                                                   \
+  template std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()>); \
+  template std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput<T>();
+
+FULCRUM_MESSAGES(FULCRUM_INSTANTIATE_PORTS)
+
+#undef FULCRUM_INSTANTIATE_PORTS
+
+}  // namespace fulcrum::bus

@@ -1,0 +1,307 @@
+// The DDS backend of the ports. Internal to services/transport/bus/dds.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <fastdds/dds/core/LoanableSequence.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <functional>
+#include <thread>
+#include <utility>
+
+#include "services/transport/bus/convert/convert.h"
+#include "services/transport/bus/dds/abandoned_mutex.h"
+#include "services/transport/bus/dds/audience.h"
+#include "services/transport/bus/dds/type_support.h"
+#include "services/transport/bus/gate.h"
+#include "services/transport/bus/input_account.h"
+#include "services/transport/bus/port.h"
+#include "services/transport/bus/topics.h"
+
+namespace fulcrum::bus::dds {
+
+namespace fast = eprosima::fastdds::dds;
+using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
+
+/// A writer of a small topic leaves no sooner than this after its last sample: what rests in a raw input's socket
+/// (chained_transport.h, 8 ms) is nobody's once its writer has said that it leaves.
+constexpr std::chrono::milliseconds kLinger{40};
+
+/// Counts the live endpoints on the other side; asking the reader or writer itself would take its lock every tick.
+class ReaderEvents final : public fast::DataReaderListener {
+ public:
+  explicit ReaderEvents(std::function<void()> notify) : notify_(std::move(notify)) {}
+  void on_subscription_matched(fast::DataReader*, const fast::SubscriptionMatchedStatus& status) override {
+    count_.store(status.current_count, std::memory_order_relaxed);  // stands for itself, orders nothing
+  }
+  void on_data_available(fast::DataReader*) override { notify_(); }
+  [[nodiscard]] bool any() const noexcept { return count_.load(std::memory_order_relaxed) > 0; }
+  /// What to listen for: without anybody to notify, a sample costs no call.
+  [[nodiscard]] fast::StatusMask mask() const {
+    fast::StatusMask mask = fast::StatusMask::subscription_matched();
+    if (notify_) mask << fast::StatusMask::data_available();
+    return mask;
+  }
+
+ private:
+  const std::function<void()> notify_;
+  std::atomic<int> count_{0};
+};
+
+class WriterEvents final : public fast::DataWriterListener {
+ public:
+  explicit WriterEvents(Audience* audience) : audience_(audience) { audience_->Add(this); }
+  ~WriterEvents() override { audience_->Remove(this); }
+  WriterEvents(const WriterEvents&) = delete;
+  WriterEvents& operator=(const WriterEvents&) = delete;
+  void on_publication_matched(fast::DataWriter*, const fast::PublicationMatchedStatus& status) override {
+    count_.store(status.current_count, std::memory_order_relaxed);  // as above
+    const auto reader = eprosima::fastrtps::rtps::iHandle2GUID(status.last_subscription_handle);
+    audience_->Count(this, reader.guidPrefix, status.current_count_change);
+  }
+  [[nodiscard]] bool any() const noexcept { return count_.load(std::memory_order_relaxed) > 0; }
+
+ private:
+  Audience* audience_;
+  std::atomic<int> count_{0};
+};
+
+/// Owns a DataReader and the books.
+template <class T>
+class InputBase : public Input<T> {
+ public:
+  InputBase(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos,
+            std::function<void()> notify)
+      : events_(std::move(notify)),
+        subscriber_(subscriber),
+        reader_(subscriber->create_datareader(topic, qos, &events_, events_.mask())),
+        account_(kQualityOf<T>.gap_is_loss, RoleOf<T>().one_owner()) {}
+  ~InputBase() override {
+    if (reader_ == nullptr) return;
+    reader_->set_listener(nullptr);
+    subscriber_->delete_datareader(reader_);
+  }
+  InputBase(const InputBase&) = delete;
+  InputBase& operator=(const InputBase&) = delete;
+
+  [[nodiscard]] bool ok() const { return reader_ != nullptr; }
+  InputStats stats() const override { return account_.stats(events_.any()); }
+
+ protected:
+  /// steady_clock is CLOCK_MONOTONIC, the clock of all stamps.
+  [[nodiscard]] bool IsOfOwner(const T& sample) noexcept {
+    return account_.IsOfOwner(StampOf(sample), std::chrono::steady_clock::now().time_since_epoch().count());
+  }
+
+  ReaderEvents events_;
+  fast::Subscriber* subscriber_;
+  fast::DataReader* reader_;
+  InputAccount account_;
+};
+
+/// Small topics: deserialised into one object that is kept.
+template <class T>
+class DdsInput final : public InputBase<T> {
+ public:
+  using InputBase<T>::InputBase;
+
+  bool TakeLatest(T* sample) override {
+    bool found = false;
+    while (TakeNext(sample)) found = true;
+    return found;
+  }
+
+  bool TakeNext(T* sample) override {
+    while (TakeWire()) {
+      FromWire(wire_, &candidate_);
+      if (PassesGate(candidate_) && this->IsOfOwner(candidate_)) {
+        this->account_.Accept(StampOf(candidate_));
+        std::swap(*sample, candidate_);
+        return true;
+      }
+      this->account_.Reject(StampOf(candidate_));
+    }
+    return false;
+  }
+
+ private:
+  /// Next valid sample into wire_.
+  bool TakeWire() {
+    for (;;) {
+      try {
+        fast::SampleInfo info;
+        if (this->reader_->take_next_sample(&wire_, &info) != ReturnCode::RETCODE_OK) return false;
+        if (info.valid_data) return true;
+      } catch (...) {
+        this->account_.Reject();
+        return false;
+      }
+    }
+  }
+
+  WireOf<T> wire_;
+  T candidate_;
+};
+
+/// Large topics: read where the writer put them.
+template <Loanable T>
+class DdsInput<T> final : public InputBase<T> {
+ public:
+  using InputBase<T>::InputBase;
+
+  bool TakeLatest(T* sample) override { return Take(kQualityOf<T>.reader_depth, sample); }
+  bool TakeNext(T* sample) override { return Take(1, sample); }
+
+ private:
+  /// The newest good one of the `count` oldest; with 1, goes on until one is good or none is left.
+  bool Take(int count, T* sample) {
+    bool found = false;
+    try {
+      while (!found && this->reader_->take(loans_, infos_, count) == ReturnCode::RETCODE_OK) {
+        found = Choose(sample);
+        this->reader_->return_loan(loans_, infos_);
+      }
+    } catch (...) {
+      this->account_.Reject();
+    }
+    return found;
+  }
+
+  bool Choose(T* sample) {
+    // buffer() and not operator[]: a loan is not aligned enough to be spoken of as a WireOf<T>.
+    auto* const* data = loans_.buffer();
+    const auto loan = [data](int i) { return static_cast<const std::byte*>(data[i]); };
+    for (int i = static_cast<int>(infos_.length()) - 1; i >= 0; --i) {
+      if (!infos_[i].valid_data) continue;
+      const bool complete = FromLoan(loan(i), &candidate_);
+      // The writer may have taken the place back while we read: only now is it known whether what we have is whole.
+      if (!this->reader_->is_sample_valid(data[i], &infos_[i])) continue;
+      if (!complete || !PassesGate(candidate_) || !this->IsOfOwner(candidate_)) {
+        this->account_.Reject();
+        continue;
+      }
+      for (int older = 0; older < i; ++older) {
+        if (infos_[older].valid_data) this->account_.Supersede(StampOfLoan(loan(older), sample));
+      }
+      this->account_.Accept(StampOf(candidate_));
+      std::swap(*sample, candidate_);
+      return true;
+    }
+    return false;
+  }
+
+  fast::LoanableSequence<WireOf<T>> loans_;
+  fast::SampleInfoSeq infos_;
+  T candidate_;
+};
+
+/// Owns a DataWriter and the counters. Counters are written by the writing thread and read by the health thread.
+template <class T>
+class OutputBase : public OutputOf<T>::type {
+ public:
+  OutputBase(fast::Publisher* publisher, fast::Topic* topic, const fast::DataWriterQos& qos, Audience* audience)
+      : events_(audience),
+        publisher_(publisher),
+        writer_(publisher->create_datawriter(topic, qos, &events_, fast::StatusMask::publication_matched())) {}
+  ~OutputBase() override {
+    if (writer_ == nullptr) return;
+    writer_->set_listener(nullptr);
+    publisher_->delete_datawriter(writer_);
+  }
+  OutputBase(const OutputBase&) = delete;
+  OutputBase& operator=(const OutputBase&) = delete;
+
+  [[nodiscard]] bool ok() const { return writer_ != nullptr; }
+  bool has_readers() const noexcept override { return events_.any(); }
+  OutputStats stats() const override {
+    return {written_.load(std::memory_order_relaxed), failed_.load(std::memory_order_relaxed)};
+  }
+
+ protected:
+  bool Count(bool sent) noexcept {
+    (sent ? written_ : failed_).fetch_add(1, std::memory_order_relaxed);
+    return sent;
+  }
+
+  WriterEvents events_;
+  fast::Publisher* publisher_;
+  fast::DataWriter* writer_;
+
+ private:
+  std::atomic<std::uint64_t> written_{0};
+  std::atomic<std::uint64_t> failed_{0};
+};
+
+template <class T>
+class DdsOutput final : public OutputBase<T> {
+ public:
+  using OutputBase<T>::OutputBase;
+  ~DdsOutput() override {
+    if (this->has_readers()) std::this_thread::sleep_until(last_write_ + kLinger);
+  }
+  DdsOutput(const DdsOutput&) = delete;
+  DdsOutput& operator=(const DdsOutput&) = delete;
+
+  bool Write(const T& sample) noexcept override {
+    last_write_ = std::chrono::steady_clock::now();
+    try {
+      return this->Count(ToWire(sample, &wire_) && this->writer_->write(&wire_));
+    } catch (...) {
+      return this->Count(false);
+    }
+  }
+
+ private:
+  WireOf<T> wire_;
+  std::chrono::steady_clock::time_point last_write_{};
+};
+
+template <Loanable T>
+class DdsOutput<T> final : public OutputBase<T> {
+ public:
+  using OutputBase<T>::OutputBase;
+
+  bool Write(const T& sample) noexcept override {
+    return Lend([&sample](std::byte* loan) { return ToLoan(sample, loan); });
+  }
+
+  bool WriteInPlace(const typename LoanOutput<T>::Fill& fill) noexcept override {
+    return Lend([&fill](std::byte* loan) {
+      decltype(T::header) header;
+      fill(OpenLoan(loan, &header));
+      return CloseLoan(header, loan);
+    });
+  }
+
+ private:
+  template <class Fill>
+  bool Lend(const Fill& fill) noexcept {
+    const BoundedLocks patience;
+    void* loan = nullptr;
+    try {
+      using Init = fast::DataWriter::LoanInitializationKind;
+      if (this->writer_->loan_sample(loan, Init::NO_LOAN_INITIALIZATION) != ReturnCode::RETCODE_OK) {
+        return this->Count(false);
+      }
+      if (fill(static_cast<std::byte*>(loan)) && this->writer_->write(loan)) return this->Count(true);
+    } catch (...) {
+      // Counted below; the loan is given back.
+    }
+    try {
+      if (loan != nullptr) this->writer_->discard_loan(loan);
+    } catch (...) {
+      // The pool is one place short; the next loans will fail and be counted.
+    }
+    return this->Count(false);
+  }
+};
+
+}  // namespace fulcrum::bus::dds

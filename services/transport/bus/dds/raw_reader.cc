@@ -1,0 +1,114 @@
+#include "services/transport/bus/dds/raw_reader.h"
+
+#include <time.h>
+
+#include <cstring>
+#include <optional>
+
+namespace fulcrum::bus::dds {
+namespace {
+
+using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
+
+/// What stands before a loan on the wire: CDR, little endian.
+constexpr std::array<std::byte, 4> kEncapsulation{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
+
+/// A sample of at most this age was waited for; an older one was in the socket, and more may be [ns].
+constexpr std::int64_t kFresh_ns = 500'000;
+
+std::int64_t Now(clockid_t clock) {
+  timespec now{};
+  ::clock_gettime(clock, &now);
+  return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
+}
+
+/// Clocks read at most so far apart tell what one is when the other is.
+constexpr std::int64_t kClocksApart_ns = 20'000;
+
+/// Of a sample [ns]; empty: the wall clock was set while it was on its way.
+std::optional<std::int64_t> Age(std::int64_t source_ns) {
+  constexpr std::int64_t kOldest_ns = 1'000'000'000;
+  const std::int64_t age_ns = Now(CLOCK_REALTIME) - source_ns;
+  return age_ns >= 0 && age_ns <= kOldest_ns ? std::optional(age_ns) : std::nullopt;
+}
+
+}  // namespace
+
+RawReader::RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos, TopicId id,
+                     std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering)
+    : role_(RoleOf(id)),
+      payload_B_(payload_B),
+      sink_(std::move(sink)),
+      gathering_(std::move(gathering)),
+      subscriber_(subscriber) {
+  payload_.reserve(payload_B);
+  fast::StatusMask mask = fast::StatusMask::subscription_matched();
+  mask << fast::StatusMask::data_available();
+  reader_ = subscriber->create_datareader(topic, qos, this, mask);
+}
+
+RawReader::~RawReader() {
+  if (reader_ == nullptr) return;
+  reader_->set_listener(nullptr);
+  subscriber_->delete_datareader(reader_);
+}
+
+RawSample RawReader::Describe(const fast::SampleInfo& info) const {
+  RawSample sample;
+  sample.topic = role_.id;
+  const rtps::GUID_t& guid = info.sample_identity.writer_guid();
+  std::memcpy(sample.writer.data(), guid.guidPrefix.value, rtps::GuidPrefix_t::size);
+  std::memcpy(sample.writer.data() + rtps::GuidPrefix_t::size, guid.entityId.value, rtps::EntityId_t::size);
+  sample.sequence = info.sample_identity.sequence_number().to64long();
+  sample.source_ns = info.source_timestamp.to_ns();
+  // The thread may lose its processor between the two clocks: once more then.
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    const std::int64_t before_ns = Now(CLOCK_MONOTONIC);
+    sample.written_ns = before_ns - Age(sample.source_ns).value_or(0);
+    if (Now(CLOCK_MONOTONIC) - before_ns < kClocksApart_ns) break;
+  }
+  return sample;
+}
+
+void RawReader::on_data_available(fast::DataReader* reader) {
+  try {
+    role_.quality.path == Path::kSharedMemory ? TakeLoans(reader) : TakeCopies(reader);
+  } catch (...) {
+    // A sample that cannot be taken is missing in its writer's sequence: it is counted there.
+  }
+}
+
+void RawReader::TakeCopies(fast::DataReader* reader) {
+  fast::SampleInfo info;
+  std::optional<std::int64_t> age_ns;
+  while (reader->take_next_sample(&payload_, &info) == ReturnCode::RETCODE_OK) {
+    if (!info.valid_data || payload_.size() < kEncapsulation.size()) continue;
+    RawSample sample = Describe(info);
+    sample.head = std::span(payload_).first(kEncapsulation.size());
+    sample.body = std::span(payload_).subspan(kEncapsulation.size());
+    sink_(sample, [] { return true; });
+    age_ns = Age(sample.source_ns);
+  }
+  if (age_ns && gathering_) gathering_->caught_up = *age_ns <= kFresh_ns;
+}
+
+void RawReader::TakeLoans(fast::DataReader* reader) {
+  while (reader->take(loans_, infos_, role_.quality.reader_depth) == ReturnCode::RETCODE_OK) {
+    for (int i = 0; i < static_cast<int>(infos_.length()); ++i) {
+      if (!infos_[i].valid_data) continue;
+      const auto* loan = static_cast<const std::byte*>(loans_.buffer()[i]);
+      RawSample sample = Describe(infos_[i]);
+      sample.head = kEncapsulation;
+      sample.body = {loan, payload_B_ - kEncapsulation.size()};
+      struct {
+        fast::DataReader* reader;
+        const std::byte* loan;
+        const fast::SampleInfo* info;
+      } const at{reader, loan, &infos_[i]};
+      sink_(sample, [&at] { return at.reader->is_sample_valid(at.loan, at.info); });
+    }
+    reader->return_loan(loans_, infos_);
+  }
+}
+
+}  // namespace fulcrum::bus::dds

@@ -1,0 +1,87 @@
+// The DDS backend of RawInput. Internal to services/transport/bus/dds.
+#pragma once
+
+#include <atomic>
+#include <fastdds/dds/core/LoanableSequence.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <fastdds/dds/topic/TopicDataType.hpp>
+#include <memory>
+#include <vector>
+
+#include "services/transport/bus/dds/chained_transport.h"
+#include "services/transport/bus/raw_input.h"
+#include "services/transport/bus/topics.h"
+
+namespace fulcrum::bus::dds {
+
+namespace fast = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastrtps::rtps;
+
+/// Stands for any type by name and size: a sample is its payload. Only reads.
+class RawType final : public fast::TopicDataType {
+ public:
+  /// @param payload_B Largest payload, encapsulation included.
+  RawType(const std::string& name, std::uint32_t payload_B, bool plain) : plain_(plain) {
+    setName(name.c_str());
+    m_typeSize = payload_B;
+    auto_fill_type_object(false);
+    auto_fill_type_information(false);
+  }
+  bool serialize(void*, rtps::SerializedPayload_t*) override { return false; }
+  bool deserialize(rtps::SerializedPayload_t* payload, void* data) override {
+    static_cast<std::vector<std::byte>*>(data)->assign(
+        reinterpret_cast<const std::byte*>(payload->data),
+        reinterpret_cast<const std::byte*>(payload->data) + payload->length);
+    return true;
+  }
+  std::function<std::uint32_t()> getSerializedSizeProvider(void*) override {
+    return [] { return 0u; };
+  }
+  void* createData() override { return new std::vector<std::byte>(); }
+  void deleteData(void* data) override { delete static_cast<std::vector<std::byte>*>(data); }
+  bool getKey(void*, rtps::InstanceHandle_t*, bool) override { return false; }
+  [[nodiscard]] bool is_bounded() const override { return true; }
+  [[nodiscard]] bool is_plain() const override { return plain_; }
+
+ private:
+  const bool plain_;
+};
+
+/// Hands each sample on; tells its transport when it has caught up with a small topic's writers.
+class RawReader final : public RawInput, private fast::DataReaderListener {
+ public:
+  RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos, TopicId id,
+            std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering);
+  ~RawReader() override;
+  RawReader(const RawReader&) = delete;
+  RawReader& operator=(const RawReader&) = delete;
+
+  [[nodiscard]] bool ok() const { return reader_ != nullptr; }
+  [[nodiscard]] bool matched() const noexcept override { return writers_.load(std::memory_order_relaxed) > 0; }
+
+ private:
+  void on_subscription_matched(fast::DataReader*, const fast::SubscriptionMatchedStatus& status) override {
+    writers_.store(status.current_count, std::memory_order_relaxed);  // Stands for itself, orders nothing.
+  }
+  void on_data_available(fast::DataReader* reader) override;
+  void TakeCopies(fast::DataReader* reader);
+  void TakeLoans(fast::DataReader* reader);
+  [[nodiscard]] RawSample Describe(const fast::SampleInfo& info) const;
+
+  const TopicRole& role_;
+  const std::uint32_t payload_B_;
+  const RawSink sink_;
+  const std::shared_ptr<Gathering> gathering_;  ///< Null: nobody gathers.
+  fast::Subscriber* subscriber_;
+  fast::DataReader* reader_;
+  std::atomic<int> writers_{0};
+  std::vector<std::byte> payload_;
+  fast::LoanableSequence<std::byte> loans_;
+  fast::SampleInfoSeq infos_;
+};
+
+}  // namespace fulcrum::bus::dds

@@ -1,0 +1,189 @@
+#include "services/transport/bus/dds/security.h"
+
+#include <fastrtps/rtps/attributes/PropertyPolicy.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <fastdds/dds/log/Log.hpp>
+#include <fastdds/dds/log/StdoutConsumer.hpp>
+#include <fstream>
+#include <map>
+#include <mutex>
+#include <sstream>
+#include <utility>
+
+#include "services/base/core/error.h"
+#include "services/transport/bus/access.h"
+#include "services/transport/bus/dds/chained_transport.h"
+#include "services/transport/keys/authority.h"
+#include "services/transport/keys/key_folder.h"
+
+namespace fulcrum::bus {
+namespace {
+
+constexpr const char* kAnnouncementFile = "security";
+
+}  // namespace
+
+void AnnounceSecurity(const std::filesystem::path& shared_memory, const Security& security) {
+  const std::filesystem::path file = shared_memory / kAnnouncementFile;
+  std::error_code ignored;
+  std::filesystem::remove(file, ignored);
+  if (!security.on()) return;
+  std::ofstream out(file);
+  out << (security.encrypt ? "encrypt" : "plain") << '\n' << security.keys.string() << '\n';
+  if (!out.flush()) throw InputError(file.string() + ": cannot be written");
+}
+
+Security AnnouncedSecurity(const std::filesystem::path& shared_memory, std::string_view identity) {
+  std::ifstream in(shared_memory / kAnnouncementFile);
+  std::string mode, keys;
+  if (!std::getline(in, mode) || !std::getline(in, keys)) return {};
+  return {keys, std::string(identity), mode == "encrypt"};
+}
+
+}  // namespace fulcrum::bus
+
+namespace fulcrum::bus::dds {
+namespace {
+
+namespace fast = eprosima::fastdds::dds;
+namespace rtps = eprosima::fastrtps::rtps;
+
+/// What was said of security, until somebody asks. Bounded: strangers decide how much is said.
+class SecurityNotes {
+ public:
+  void Certificate(std::string text) {
+    const std::lock_guard lock(mutex_);
+    certificate_ = std::move(text);
+  }
+  void Permissions(const std::string& prefix, std::string text) {
+    const std::lock_guard lock(mutex_);
+    constexpr std::size_t kMost = 256;
+    if (permissions_.size() < kMost) permissions_[prefix] = std::move(text);
+  }
+  [[nodiscard]] std::string TakeCertificate() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(certificate_, {});
+  }
+  [[nodiscard]] std::string PermissionsOf(const std::string& prefix) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = permissions_.find(prefix);
+    return found == permissions_.end() ? std::string() : found->second;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::string certificate_;
+  std::map<std::string, std::string> permissions_;
+};
+
+/// As the library's log is one per process, so is this; never destroyed, because that log speaks until the very end.
+SecurityNotes& Notes() {
+  static SecurityNotes& notes = *new SecurityNotes;
+  return notes;
+}
+
+/// What stands between the first "(" and the last ")".
+std::string InBrackets(const std::string& text) {
+  const std::size_t from = text.find('('), to = text.rfind(')');
+  if (from == std::string::npos || to == std::string::npos || to <= from) return text;
+  const std::string inner = text.substr(from + 1, to - from - 1);
+  // Permissions that do not verify are quoted whole.
+  return inner.substr(0, inner.find('\n'));
+}
+
+class SecurityLog final : public fast::StdoutConsumer {
+ public:
+  void Consume(const fast::Log::Entry& entry) override {
+    const std::string_view category = entry.context.category;
+    const bool told_elsewhere = (category.starts_with("SECURITY") && Note(entry.message)) ||
+                                entry.message.starts_with("Problem creating associated ") ||
+                                entry.message.starts_with("Security manager returns an error for ");
+    if (!told_elsewhere && entry.kind == fast::Log::Kind::Error) {
+      fast::StdoutConsumer::Consume(entry);
+    }
+  }
+
+ private:
+  /// @return whether we tell of it ourselves, in words of ours.
+  static bool Note(const std::string& text) {
+    constexpr std::string_view kRemote = "Error validating remote permissions for ";
+    constexpr std::string_view kDomain = "Error checking remote participant  ";
+    if (text.starts_with("Invalidation error of certificate")) {
+      Notes().Certificate(InBrackets(text));
+      return true;
+    }
+    for (const std::string_view head : {kRemote, kDomain}) {
+      if (!text.starts_with(head)) continue;
+      // "…80.1f.….0c|0.0.1.c1 (reason)."
+      const std::string prefix = text.substr(head.size(), text.find('|') - head.size());
+      Notes().Permissions(prefix, InBrackets(text));
+      return true;
+    }
+    // An endpoint without a right to its topic: PeerWatch sees those of others, the port that cannot be made our own.
+    return text.starts_with("Error checking creat") || text.find("topic not found in allow rule") != std::string::npos;
+  }
+};
+
+std::string TextOf(const rtps::GuidPrefix_t& prefix) {
+  std::ostringstream text;
+  text << prefix;
+  return text.str();
+}
+
+}  // namespace
+
+void ApplySecurity(const Security& security, fast::DomainParticipantQos* qos) {
+  keys::CheckIdentity(security.keys, security.identity, security.encrypt, std::time(nullptr));
+  const keys::KeyFiles files =
+      keys::KeyFilesOf(std::filesystem::absolute(security.keys), security.identity, security.encrypt);
+  const auto add = [qos](const char* name, const std::string& value) {
+    qos->properties().properties().emplace_back(std::string("dds.sec.") + name, value);
+  };
+  const auto file = [](const std::filesystem::path& path) { return "file://" + path.string(); };
+  add("auth.plugin", "builtin.PKI-DH");
+  add("auth.builtin.PKI-DH.identity_ca", file(files.authority));
+  add("auth.builtin.PKI-DH.identity_certificate", file(files.certificate));
+  add("auth.builtin.PKI-DH.private_key", file(files.key));
+  add("access.plugin", "builtin.Access-Permissions");
+  add("access.builtin.Access-Permissions.permissions_ca", file(files.authority));
+  add("access.builtin.Access-Permissions.governance", file(files.governance));
+  add("access.builtin.Access-Permissions.permissions", file(files.permissions));
+  if (security.encrypt) add("crypto.plugin", "builtin.AES-GCM-GMAC");
+  for (auto& transport : qos->transport().user_transports) transport = OneDiscoveryAtATime(std::move(transport));
+  ListenToSecurityLog();
+}
+
+std::string IdentityBehind(const rtps::GuidPrefix_t& prefix) {
+  static const auto kHeads = [] {
+    std::array<keys::AddressHead, kAccessRoles.size()> heads{};
+    for (std::size_t i = 0; i < heads.size(); ++i)
+      heads[i] = keys::AddressHeadOf(std::string(kAccessRoles[i].identity));
+    return heads;
+  }();
+  for (std::size_t i = 0; i < kHeads.size(); ++i) {
+    if (std::equal(kHeads[i].begin(), kHeads[i].end(), prefix.value)) return std::string(kAccessRoles[i].identity);
+  }
+  return "?";
+}
+
+void ListenToSecurityLog() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    fast::Log::ClearConsumers();
+    fast::Log::RegisterConsumer(std::make_unique<SecurityLog>());
+    // Why a certificate is refused is but a warning to the library.
+    fast::Log::SetVerbosity(fast::Log::Kind::Warning);
+  });
+}
+
+std::string LastCertificateComplaint() {
+  fast::Log::Flush();
+  return Notes().TakeCertificate();
+}
+
+std::string PermissionsComplaint(const rtps::GuidPrefix_t& prefix) { return Notes().PermissionsOf(TextOf(prefix)); }
+
+}  // namespace fulcrum::bus::dds

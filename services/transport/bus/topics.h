@@ -1,0 +1,187 @@
+// The one place with all topic names and the roles that decide their quality of service. Depths are named by meaning:
+// what a reader that looks at its slowest rate must still find, and what a late joiner must be given.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+#include <type_traits>
+
+#include "services/base/core/messages.h"
+
+namespace fulcrum::bus {
+
+enum class Path : std::uint8_t {
+  kLoopback,      ///< UDP on 127.0.0.1, serialised.
+  kSharedMemory,  ///< Data-sharing with loans: plain types, at most 100 Hz.
+};
+
+enum class Delivery : std::uint8_t {
+  kBestEffort,
+  kReliable,
+  kReliableKeepAll,  ///< No sample may be replaced by a newer one; a writer without room fails instead.
+};
+
+/// What is asked of the way of a topic.
+struct Quality {
+  Path path = Path::kLoopback;
+  Delivery delivery = Delivery::kBestEffort;
+  /// A late joiner is given the newest `writer_depth` samples of each live writer.
+  bool late_joiners_served = false;
+  /// A gap in the sequence is a loss. False where the ring is overwritten on purpose because only the newest counts.
+  bool gap_is_loss = true;
+  int writer_depth = 1;
+  int reader_depth = 1;
+};
+
+struct TopicRole {
+  TopicId id;
+  const char* name;
+  Quality quality;
+  /// One process at a time sends it: once a later epoch has been heard, what an earlier one still sends is refused.
+  [[nodiscard]] constexpr bool one_owner() const {
+    return id != TopicId::kCommand && id != TopicId::kCommandReply && id != TopicId::kTickManifest &&
+           id != TopicId::kHealth;
+  }
+};
+
+// Reader depths cover the slowest reader of a topic between two looks: a software frame on a loaded machine takes up to
+// a second, 1000 ToolStates of 168 bytes, so a gap means a real loss and not a slow reader. Topics with several writers
+// have no keys (keys rule out data-sharing and cost a lookup): their readers are deep enough for the burst of all
+// writers at once.
+inline constexpr int kLatestOnly = 1;
+inline constexpr int kStreamAtSlowestReader = 1024;
+inline constexpr int kFrameRing = 4;
+/// What a reader that was started again has missed: more than half a second of a stream of 100 Hz.
+inline constexpr int kOutage = 64;
+/// Each patch belongs to one slot of the atlas, so a renderer at 15 Hz needs every one of the 60 Hz stream.
+inline constexpr int kPatchRing = 16;
+inline constexpr int kEventBurst = 512;
+inline constexpr int kAllWriters = 64;
+inline constexpr int kCommandBacklog = 256;
+
+/// By message type; a message without one does not compile.
+template <class T>
+extern const Quality kQualityOf;
+template <>
+inline constexpr Quality kQualityOf<HandleState>{.writer_depth = kLatestOnly, .reader_depth = kStreamAtSlowestReader};
+template <>
+inline constexpr Quality kQualityOf<ToolState>{.writer_depth = kLatestOnly, .reader_depth = kStreamAtSlowestReader};
+template <>
+inline constexpr Quality kQualityOf<TissueFrame>{.path = Path::kSharedMemory,
+                                                 .late_joiners_served = true,
+                                                 .gap_is_loss = false,
+                                                 .writer_depth = kFrameRing,
+                                                 .reader_depth = kFrameRing};
+template <>
+inline constexpr Quality kQualityOf<ContactModel>{.writer_depth = kLatestOnly, .reader_depth = kStreamAtSlowestReader};
+template <>
+inline constexpr Quality kQualityOf<CauteryContact>{.delivery = Delivery::kReliable,
+                                                    .late_joiners_served = true,
+                                                    .writer_depth = kOutage,
+                                                    .reader_depth = kStreamAtSlowestReader};
+template <>
+inline constexpr Quality kQualityOf<TopologyState>{.delivery = Delivery::kReliable,
+                                                   .late_joiners_served = true,
+                                                   .gap_is_loss = false,
+                                                   .writer_depth = kLatestOnly,
+                                                   .reader_depth = kFrameRing};
+template <>
+inline constexpr Quality kQualityOf<TemperaturePatch>{
+    .path = Path::kSharedMemory, .late_joiners_served = true, .writer_depth = kPatchRing, .reader_depth = kPatchRing};
+template <>
+inline constexpr Quality kQualityOf<ThermalEvent>{
+    .delivery = Delivery::kReliable, .writer_depth = kEventBurst, .reader_depth = kEventBurst};
+template <>
+inline constexpr Quality kQualityOf<SceneManifest>{.delivery = Delivery::kReliable,
+                                                   .late_joiners_served = true,
+                                                   .gap_is_loss = false,
+                                                   .writer_depth = kLatestOnly,
+                                                   .reader_depth = kFrameRing};
+template <>
+inline constexpr Quality kQualityOf<Command>{
+    .delivery = Delivery::kReliableKeepAll, .writer_depth = kCommandBacklog, .reader_depth = kCommandBacklog};
+template <>
+inline constexpr Quality kQualityOf<CommandReply>{
+    .delivery = Delivery::kReliableKeepAll, .writer_depth = kCommandBacklog, .reader_depth = kCommandBacklog};
+template <>
+inline constexpr Quality kQualityOf<TickManifest>{
+    .delivery = Delivery::kReliable, .writer_depth = kEventBurst, .reader_depth = kEventBurst};
+template <>
+inline constexpr Quality kQualityOf<Health>{.delivery = Delivery::kReliable,
+                                            .late_joiners_served = true,
+                                            .writer_depth = kLatestOnly,
+                                            .reader_depth = kAllWriters};
+template <>
+inline constexpr Quality kQualityOf<TearState>{.delivery = Delivery::kReliable,
+                                               .late_joiners_served = true,
+                                               .gap_is_loss = false,
+                                               .writer_depth = kLatestOnly,
+                                               .reader_depth = kFrameRing};
+template <>
+inline constexpr Quality kQualityOf<OpenCells>{.delivery = Delivery::kReliable,
+                                               .late_joiners_served = true,
+                                               .gap_is_loss = false,
+                                               .writer_depth = kLatestOnly,
+                                               .reader_depth = kFrameRing};
+template <>
+inline constexpr Quality kQualityOf<GeneratorSetting>{.delivery = Delivery::kReliable,
+                                                      .late_joiners_served = true,
+                                                      .gap_is_loss = false,
+                                                      .writer_depth = kLatestOnly,
+                                                      .reader_depth = kOutage};
+
+/// Message type to topic.
+template <class T>
+struct TopicOf;
+#define FULCRUM_TOPIC_OF(T)                      \
+  template <>                                    \
+  struct TopicOf<T> {                            \
+    static constexpr TopicId id = TopicId::k##T; \
+  };
+FULCRUM_MESSAGES(FULCRUM_TOPIC_OF)
+#undef FULCRUM_TOPIC_OF
+template <class T>
+inline constexpr TopicId kTopicOf = TopicOf<T>::id;
+
+#define FULCRUM_ROLE(T) TopicRole{TopicId::k##T, "fulcrum/" #T, kQualityOf<T>},
+inline constexpr std::array<TopicRole, kTopicCount> kTopicRoles{{FULCRUM_MESSAGES(FULCRUM_ROLE)}};
+#undef FULCRUM_ROLE
+
+[[nodiscard]] constexpr const TopicRole& RoleOf(TopicId id) { return kTopicRoles[static_cast<std::size_t>(id)]; }
+template <class T>
+[[nodiscard]] constexpr const TopicRole& RoleOf() {
+  return RoleOf(kTopicOf<T>);
+}
+[[nodiscard]] constexpr const Quality& QualityOf(TopicId id) { return RoleOf(id).quality; }
+
+/// Calls `f(std::type_identity<T>())` with the message type of a topic that is only known at run time.
+template <class F>
+decltype(auto) WithMessageOf(TopicId id, F&& f) {
+#define FULCRUM_CASE(T) \
+  case TopicId::k##T:   \
+    return f(std::type_identity<T>());
+  switch (id) { FULCRUM_MESSAGES(FULCRUM_CASE) }
+#undef FULCRUM_CASE
+  std::abort();  // No such id: what comes from outside passes the gate or RoleNamed first.
+}
+
+/// The role of the topic of that name on the bus, as "fulcrum/ToolState"; null: not one of ours.
+[[nodiscard]] const TopicRole* RoleNamed(std::string_view name);
+
+/// "ToolState": the topic's name for people.
+[[nodiscard]] std::string_view TopicLabel(TopicId id);
+
+/// The stamp of a message, wherever T keeps it.
+template <class T>
+[[nodiscard]] const Stamp& StampOf(const T& message) {
+  if constexpr (requires { message.header.stamp; }) {
+    return message.header.stamp;
+  } else {
+    return message.stamp;
+  }
+}
+
+}  // namespace fulcrum::bus

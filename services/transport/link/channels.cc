@@ -1,0 +1,380 @@
+#include "services/transport/link/channels.h"
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <type_traits>
+#include <utility>
+
+#include "services/base/core/message_time.h"
+#include "services/transport/bus/access.h"
+#include "services/transport/bus/convert/cdr.h"
+#include "services/transport/bus/gate.h"
+#include "services/transport/bus/topics.h"
+#include "services/transport/link/codec/byte_delta.h"
+
+namespace fulcrum::link {
+namespace {
+
+using bus::FarLane;
+
+/// Of a pose, a jaw angle, a contact on its way to a picture [ns].
+constexpr std::int64_t kThinned_ns = 10'000'000;
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
+/// No message of the bus is longer, but for those that travel in chunks.
+constexpr std::size_t kLargestSample_B = bus::kOrderedPacket_B;
+static_assert(kChunk_B + 20 <= bus::kStreamPacket_B, "a chunk and the head of its packet go as one");
+
+/// Health is reliable on the bus so that a late joiner gets the newest; on its way between hosts the newest is enough,
+/// and ten a second of each node must not wait in a queue while a cable is out.
+constexpr FarLane LaneOf(TopicId topic) {
+  return bus::QualityOf(topic).delivery != bus::Delivery::kBestEffort && topic != TopicId::kHealth ? FarLane::kOrdered
+                                                                                                   : FarLane::kStream;
+}
+
+template <class T>
+Stamp& MutableStampOf(T* message) {
+  return const_cast<Stamp&>(bus::StampOf(*message));
+}
+
+/// Whether a message starts on this host and is for the other one. What we republished ourselves never is.
+template <class T>
+bool Leaves(const T& message, const LinkContext& link) {
+  if constexpr (std::is_same_v<T, Command>) {
+    return !link.IsNative(message.target);
+  } else if constexpr (std::is_same_v<T, CommandReply>) {
+    return link.IsNative(message.from_node);
+  } else if constexpr (requires { message.node; }) {
+    return link.IsNative(message.node);
+  } else {
+    return true;  // One owner, and he is here: else there is no Outgoing.
+  }
+}
+
+/// A TickManifest names samples by their epochs: as they are where they come from.
+template <class T>
+void NameAsThere(T* message, const LinkContext& link) {
+  if constexpr (std::is_same_v<T, TickManifest>) {
+    for (ConsumedInput& input : message->consumed) input.epoch = link.epochs.ToTheirs(input.topic, input.epoch);
+  }
+}
+
+/// From the other host's clock and epochs to ours. False: of a process that has been replaced.
+template <class T>
+bool MoveHere(T* message, LinkContext* link) {
+  constexpr TopicId kTopic = bus::kTopicOf<T>;
+  Stamp& stamp = MutableStampOf(message);
+  const std::optional<std::uint64_t> epoch =
+      link->epochs.ToOurs(kTopic, stamp.epoch, bus::RoleOf(kTopic).one_owner(), link->now_ns);
+  if (!epoch) return false;
+  ForEachTime(message, [link](std::string_view name, auto& time) {
+    // Wrapping: the number came off the wire, and the gate judges what becomes of it.
+    if (name != "epoch") {
+      time = static_cast<std::remove_reference_t<decltype(time)>>(static_cast<std::uint64_t>(time) -
+                                                                  static_cast<std::uint64_t>(link->offset_ns));
+    }
+  });
+  stamp.epoch = *epoch;
+  if constexpr (std::is_same_v<T, TickManifest>) {
+    for (ConsumedInput& input : message->consumed) {
+      // Of a topic of this host the sender has named it as it is here.
+      const std::optional<NodeId> owner = bus::OwnerOf(input.topic);
+      if (input.sequence == 0 || !owner || link->IsNative(*owner)) continue;
+      input.epoch = link->epochs.ToOurs(input.topic, input.epoch, false, link->now_ns).value_or(input.epoch);
+    }
+  }
+  return true;
+}
+
+// ------------------------------------------------------------------------------------------------------- outgoing
+
+/// As it is, each sample.
+template <class T>
+class OutgoingSamples final : public Outgoing {
+ public:
+  explicit OutgoingSamples(std::unique_ptr<bus::Input<T>> input) : input_(std::move(input)) {}
+
+  std::int64_t Pump(LinkContext* link) override {
+    if (std::exchange(repeat_, false)) {
+      for (const auto& [epoch, message] : newest_) Send(message, link);
+    }
+    if constexpr (kThinnable) {
+      if (link->for_pictures) return PumpThinned(link);
+    }
+    while (input_->TakeNext(&message_)) {
+      if (!Leaves(message_, *link)) continue;
+      NameAsThere(&message_, *link);
+      if constexpr (bus::kQualityOf<T>.late_joiners_served) {
+        newest_[bus::StampOf(message_).epoch] = message_;
+        if (newest_.size() > kMostWriters) newest_.erase(newest_.begin());
+      }
+      Send(message_, link);
+    }
+    return kNever;
+  }
+  void Repeat() override { repeat_ = true; }
+
+ private:
+  static constexpr std::size_t kMostWriters = 16;
+  /// Where only the newest counts for a picture.
+  static constexpr bool kThinnable =
+      std::is_same_v<T, ToolState> || std::is_same_v<T, HandleState> || std::is_same_v<T, CauteryContact>;
+
+  std::int64_t PumpThinned(LinkContext* link) {
+    if (link->now_ns < due_ns_) return due_ns_;
+    due_ns_ = std::max(due_ns_ + kThinned_ns, link->now_ns);
+    if (input_->TakeLatest(&message_)) {
+      // What is left out on purpose is not lost.
+      message_.stamp.sequence = std::uint64_t{number_} + 1;
+      Send(message_, link);
+    }
+    return due_ns_;
+  }
+
+  void Send(const T& message, LinkContext* link) {
+    if (!bus::EncodeCdr(message, &cdr_)) return;
+    ++number_;
+    // What does not fit a datagram goes in fragments.
+    constexpr std::size_t kRoom = 64;
+    const FarLane lane = cdr_.size() + kRoom > bus::kStreamPacket_B ? FarLane::kOrdered : LaneOf(bus::kTopicOf<T>);
+    (void)link->send(lane, PacketKind::kSample, [&](std::vector<std::uint8_t>* out) {
+      PutSample({bus::kTopicOf<T>, number_, 0}, {}, cdr_, out);
+    });
+  }
+
+  std::unique_ptr<bus::Input<T>> input_;
+  T message_;
+  std::map<std::uint64_t, T> newest_;  ///< By epoch: what a late joiner gets.
+  std::uint32_t number_ = 0;
+  std::int64_t due_ns_ = 0;
+  bool repeat_ = false;
+  std::vector<std::uint8_t> cdr_;
+};
+
+/// The newest state, as what has changed since the one before.
+class OutgoingTopology final : public Outgoing {
+ public:
+  explicit OutgoingTopology(std::unique_ptr<bus::Input<TopologyState>> input) : input_(std::move(input)) {}
+
+  std::int64_t Pump(LinkContext* link) override {
+    const bool whole = std::exchange(repeat_, false);
+    if (input_->TakeLatest(&state_)) {
+      if (!bus::EncodeCdr(state_, &cdr_)) return kNever;
+      known_ = true;
+    } else if (!whole || !known_) {
+      return kNever;
+    }
+    const SampleHead head{TopicId::kTopologyState, number_ + 1, whole ? 0 : number_};
+    if (link->send(FarLane::kOrdered, PacketKind::kSample, [&](std::vector<std::uint8_t>* out) {
+          PutSample(head, whole ? std::span<const std::uint8_t>() : told_, cdr_, out);
+        })) {
+      ++number_;
+      told_ = cdr_;
+    }
+    return kNever;
+  }
+  void Repeat() override { repeat_ = true; }
+
+ private:
+  std::unique_ptr<bus::Input<TopologyState>> input_;
+  TopologyState state_;
+  bool known_ = false, repeat_ = true;
+  std::uint32_t number_ = 0;
+  std::vector<std::uint8_t> cdr_, told_;
+};
+
+SendChunk ChunkSender(LinkContext* link, PacketKind kind) {
+  return [link, kind](std::span<const std::uint8_t> chunk) {
+    (void)link->send(FarLane::kStream, kind,
+                     [&](std::vector<std::uint8_t>* out) { out->insert(out->end(), chunk.begin(), chunk.end()); });
+  };
+}
+
+/// At the rate of pictures, what moved.
+class OutgoingTissue final : public Outgoing {
+ public:
+  explicit OutgoingTissue(std::unique_ptr<bus::Input<TissueFrame>> input) : input_(std::move(input)) {}
+
+  std::int64_t Pump(LinkContext* link) override {
+    if (link->now_ns < due_ns_) return due_ns_;
+    const auto period = static_cast<std::int64_t>(1e9 / link->picture_rate_Hz);
+    const SendChunk send = ChunkSender(link, PacketKind::kTissue);
+    if (input_->TakeLatest(&frame_)) {
+      sender_.Encode(frame_, send);
+    } else {
+      sender_.Flush(send);
+    }
+    // On a grid, unless that is long past.
+    due_ns_ = std::max(due_ns_ + period, link->now_ns);
+    return due_ns_;
+  }
+  void Repeat() override { sender_.RepeatAll(); }
+  void Repeat(std::span<const std::uint32_t> chunks) override {
+    for (const std::uint32_t chunk : chunks) sender_.Repeat(chunk);
+  }
+
+ private:
+  std::unique_ptr<bus::Input<TissueFrame>> input_;
+  TissueFrame frame_;
+  TissueSender sender_;
+  std::int64_t due_ns_ = 0;
+};
+
+/// Each one, since each has a place of its own in the atlas; what changed in it.
+class OutgoingPatches final : public Outgoing {
+ public:
+  explicit OutgoingPatches(std::unique_ptr<bus::Input<TemperaturePatch>> input) : input_(std::move(input)) {}
+
+  std::int64_t Pump(LinkContext* link) override {
+    const SendChunk send = ChunkSender(link, PacketKind::kPatch);
+    while (input_->TakeNext(&patch_)) sender_.Encode(patch_, send);
+    if (std::exchange(repeat_, false)) sender_.Flush(send);
+    return kNever;
+  }
+  void Repeat() override {
+    sender_.RepeatAll();
+    repeat_ = true;
+  }
+  void Repeat(std::span<const std::uint32_t> chunks) override {
+    for (const std::uint32_t chunk : chunks) sender_.Repeat(chunk);
+    repeat_ = true;
+  }
+
+ private:
+  std::unique_ptr<bus::Input<TemperaturePatch>> input_;
+  TemperaturePatch patch_;
+  PatchSender sender_;
+  bool repeat_ = false;
+};
+
+// ------------------------------------------------------------------------------------------------------- incoming
+
+template <class T>
+class IncomingBase : public Incoming {
+ public:
+  explicit IncomingBase(std::unique_ptr<typename bus::OutputOf<T>::type> output) : output_(std::move(output)) {}
+  [[nodiscard]] bool wanted() const override { return output_->has_readers(); }
+
+ protected:
+  bool Publish(T* message, LinkContext* link) {
+    if (!MoveHere(message, link) || !bus::PassesGate(*message)) return false;
+    (void)output_->Write(*message);
+    return true;
+  }
+
+ private:
+  std::unique_ptr<typename bus::OutputOf<T>::type> output_;
+};
+
+template <class T>
+class IncomingSamples final : public IncomingBase<T> {
+ public:
+  using IncomingBase<T>::IncomingBase;
+
+  bool Take(std::span<const std::uint8_t> body, LinkContext* link) override {
+    SampleHead head;
+    std::span<const std::uint8_t> delta;
+    if (!TakeSample(body, &head, &delta) || head.topic != bus::kTopicOf<T>) return false;
+    // Overtaken on the way: the newest wins.
+    if (LaneOf(bus::kTopicOf<T>) == FarLane::kStream && head.number <= number_) return true;
+    if (head.base != 0) {
+      if (head.base != number_) {
+        if (!all_) ++lost_;
+        all_ = true;  // What it is told from has not come.
+        return true;
+      }
+      if (!TakeDelta(cdr_, delta, kLargestSample_B, &next_)) return false;
+    } else if (!TakeDelta({}, delta, kLargestSample_B, &next_)) {
+      return false;
+    }
+    if (bus::kQualityOf<T>.gap_is_loss && number_ != 0 && head.number > number_ + 1) lost_ += head.number - number_ - 1;
+    number_ = head.number;
+    std::swap(cdr_, next_);
+    if (head.base == 0) all_ = false;
+    return bus::DecodeCdr(std::span<const std::uint8_t>(cdr_), &message_) && this->Publish(&message_, link);
+  }
+  void Restart() override {
+    number_ = 0;
+    all_ = false;
+  }
+  bool TakeAll() override { return all_; }
+  [[nodiscard]] std::uint64_t lost() const override { return lost_; }
+
+ private:
+  T message_;
+  std::vector<std::uint8_t> cdr_, next_;
+  std::uint32_t number_ = 0;
+  bool all_ = false;
+  std::uint64_t lost_ = 0;
+};
+
+/// What travels in chunks.
+template <class T, class Receiver>
+class IncomingChunks final : public IncomingBase<T> {
+ public:
+  using IncomingBase<T>::IncomingBase;
+
+  bool Take(std::span<const std::uint8_t> body, LinkContext* link) override {
+    switch (receiver_.Take(body)) {
+      case TissueReceiver::Result::kBad:
+        return false;
+      case TissueReceiver::Result::kPart:
+        return true;
+      case TissueReceiver::Result::kFrame:
+        break;
+    }
+    if constexpr (std::is_same_v<T, TissueFrame>) {
+      message_ = receiver_.frame();
+    } else {
+      message_ = receiver_.patch();
+      // Those with holes are held back, which is not a loss of this host's bus.
+      message_.header.stamp.sequence = ++number_;
+    }
+    return this->Publish(&message_, link);
+  }
+  void Restart() override {
+    lost_before_ = lost();
+    receiver_ = Receiver();
+  }
+  bool TakeAll() override { return receiver_.missing().TakeAll(); }
+  std::vector<std::uint32_t> TakeQuestions() override { return receiver_.missing().TakeQuestions(kMostQuestions); }
+  [[nodiscard]] std::uint64_t lost() const override { return lost_before_ + receiver_.missing().lost(); }
+
+ private:
+  T message_;
+  Receiver receiver_;
+  std::uint64_t lost_before_ = 0;
+  std::uint64_t number_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Outgoing> MakeOutgoing(TopicId topic, bus::DdsParticipant* bus, std::function<void()> notify) {
+  return bus::WithMessageOf(topic, [&]<class T>(std::type_identity<T>) -> std::unique_ptr<Outgoing> {
+    auto input = bus->MakeInput<T>(std::move(notify));
+    if constexpr (std::is_same_v<T, TissueFrame>) {
+      return std::make_unique<OutgoingTissue>(std::move(input));
+    } else if constexpr (std::is_same_v<T, TemperaturePatch>) {
+      return std::make_unique<OutgoingPatches>(std::move(input));
+    } else if constexpr (std::is_same_v<T, TopologyState>) {
+      return std::make_unique<OutgoingTopology>(std::move(input));
+    } else {
+      return std::make_unique<OutgoingSamples<T>>(std::move(input));
+    }
+  });
+}
+
+std::unique_ptr<Incoming> MakeIncoming(TopicId topic, bus::DdsParticipant* bus) {
+  return bus::WithMessageOf(topic, [&]<class T>(std::type_identity<T>) -> std::unique_ptr<Incoming> {
+    auto output = bus->MakeOutput<T>();
+    if constexpr (std::is_same_v<T, TissueFrame>) {
+      return std::make_unique<IncomingChunks<T, TissueReceiver>>(std::move(output));
+    } else if constexpr (std::is_same_v<T, TemperaturePatch>) {
+      return std::make_unique<IncomingChunks<T, PatchReceiver>>(std::move(output));
+    } else {
+      return std::make_unique<IncomingSamples<T>>(std::move(output));
+    }
+  });
+}
+
+}  // namespace fulcrum::link

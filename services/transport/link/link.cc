@@ -1,0 +1,455 @@
+#include "services/transport/link/link.h"
+
+#include <algorithm>
+#include <chrono>
+#include <fstream>
+#include <utility>
+
+#include "services/base/core/error.h"
+#include "services/base/core/tick.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/transport/bus/access.h"
+#include "services/transport/bus/schema.h"
+#include "services/transport/bus/topics.h"
+
+namespace fulcrum::link {
+namespace {
+
+using bus::FarLane;
+using runtime::MonotonicNs;
+
+constexpr std::int64_t kMilli = 1'000'000;
+constexpr std::int64_t kPulsePeriod = 50 * kMilli;
+// A pulse that is missing for so long: the other side is not connected, and will have missed what was sent.
+constexpr std::int64_t kSilence = kSecond_ns;
+// Within the lease of the participants a cable that comes back finds all as it was; about the lease one side may have
+// dropped the other but not the other way round, which the library sorts out only after long. New ones find each other
+// at once.
+constexpr std::int64_t kPatience = 3 * kSecond_ns;
+// A topic is carried on for so long after its last reader has gone: he may be restarting.
+constexpr std::int64_t kUnwanted = 2 * kSecond_ns;
+constexpr std::int64_t kLongestSleep = 20 * kMilli;
+constexpr std::size_t kLongestInbox = 4096;
+constexpr std::uint32_t kAllNodes = (1u << kNodeCount) - 1;
+
+constexpr std::size_t At(TopicId topic) { return static_cast<std::size_t>(topic); }
+constexpr std::uint32_t BitOf(std::size_t topic) { return 1u << topic; }
+
+}  // namespace
+
+Link::Link(const LinkSettings& settings) : settings_(settings), epoch_(static_cast<std::uint64_t>(MonotonicNs())) {
+  context_.picture_rate_Hz = settings.picture_rate_Hz;
+  context_.send = [this](FarLane lane, PacketKind kind, const std::function<void(std::vector<std::uint8_t>*)>& put) {
+    return Send(lane, kind, put);
+  };
+  Connect();
+  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+}
+
+Link::~Link() {
+  thread_.request_stop();
+  Wake();
+  thread_.join();
+  far_.reset();
+}
+
+void Link::Connect() {
+  KeepRefusals();
+  far_.reset();
+  connected_ns_ = MonotonicNs();
+  far_ =
+      std::make_unique<bus::FarParticipant>(settings_.far, [this](FarLane lane, std::span<const std::uint8_t> bytes) {
+        const std::int64_t now = MonotonicNs();
+        const std::lock_guard lock(inbox_mutex_);
+        if (inbox_.size() >= kLongestInbox && lane == FarLane::kStream) {
+          ++overflow_;
+          return;
+        }
+        inbox_.push_back({lane, {bytes.begin(), bytes.end()}, now});
+        inbox_news_.notify_one();
+      });
+}
+
+void Link::Wake() {
+  const std::lock_guard lock(inbox_mutex_);
+  woken_ = true;
+  inbox_news_.notify_one();
+}
+
+void Link::Join(bus::DdsParticipant* local, std::uint32_t far_nodes) {
+  const std::lock_guard lock(mutex_);
+  local_ = local;
+  context_.native = kAllNodes & ~far_nodes;
+  context_.for_pictures = (far_nodes & kAllNodes) == 1u << static_cast<unsigned>(NodeId::kRender);
+  for (std::size_t topic = 0; topic < channels_.size(); ++topic) {
+    const std::optional<NodeId> owner = bus::OwnerOf(static_cast<TopicId>(topic));
+    if (owner && context_.IsNative(*owner)) continue;
+    channels_[topic].in = MakeIncoming(static_cast<TopicId>(topic), local);
+  }
+}
+
+void Link::Leave() {
+  const std::lock_guard lock(mutex_);
+  for (Channel& channel : channels_) channel = Channel();
+  local_ = nullptr;
+}
+
+void Link::SayBye() {
+  const std::lock_guard lock(mutex_);
+  bye_ = true;
+  next_pulse_ns_ = 0;
+  Wake();
+}
+
+LinkStatus Link::status() {
+  const std::lock_guard lock(mutex_);
+  const std::int64_t now = MonotonicNs();
+  LinkStatus status = rates_;
+  status.connected = heard_ns_ != 0 && now - heard_ns_ < kSilence;
+  status.silence_s = 1e-9 * static_cast<double>(now - (heard_ns_ != 0 ? heard_ns_ : connected_ns_));
+  status.known = clock_.known();
+  if (clock_.known()) {
+    status.offset_us = 1e-3 * static_cast<double>(clock_.OffsetAt(now));
+    status.round_trip_us = 1e-3 * static_cast<double>(clock_.delay_ns());
+    status.drift_ppm = clock_.drift_ppm();
+  }
+  for (const Channel& channel : channels_) status.lost += channel.in ? channel.in->lost() : 0;
+  status.refused = refused_;
+  status.rebuilt = rebuilt_;
+  status.error = !mismatch_.empty()  ? mismatch_
+                 : !error_.empty()   ? error_
+                 : heard_ns_ == 0    ? "the other host " + settings_.far.peer + " has not been heard yet"
+                 : !status.connected ? "the other host " + settings_.far.peer + " is silent: cable, or its link?"
+                                     : std::string();
+  return status;
+}
+
+Link::Session Link::session() {
+  const std::lock_guard lock(mutex_);
+  return session_;
+}
+
+std::string Link::mismatch() {
+  const std::lock_guard lock(mutex_);
+  return !mismatch_.empty() || !far_ ? mismatch_ : far_->mismatch();
+}
+
+bus::Refusals Link::refusals() {
+  const std::lock_guard lock(mutex_);
+  KeepRefusals();
+  return refusals_;
+}
+
+void Link::KeepRefusals() {
+  if (!far_) return;
+  for (std::string& text : far_->refusals().texts) {
+    if (refusals_.texts.size() == bus::Refusals::kMostTexts) return;
+    if (std::ranges::find(refusals_.texts, text) != refusals_.texts.end()) continue;
+    refusals_.texts.push_back(std::move(text));
+    ++refusals_.participants;
+  }
+}
+
+bool Link::FetchScene(const Offer& offer, const std::filesystem::path& cache, double* progress) {
+  if (IsScene(CachedScene(cache, offer.scene_hash), offer.scene_hash)) return true;
+  const std::lock_guard lock(mutex_);
+  if (!fetch_ || fetch_->scene_hash() != offer.scene_hash) fetch_.emplace(offer);
+  *progress = fetch_->progress();
+  if (!fetch_->complete()) return false;
+  const SceneFetch fetched = std::move(*fetch_);
+  fetch_.reset();
+  StoreScene(fetched, cache);
+  return true;
+}
+
+// ------------------------------------------------------------------------------------------------------- the thread
+
+void Link::Run(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    std::int64_t due = 0;
+    {
+      const std::lock_guard lock(mutex_);
+      TakePackets(MonotonicNs());
+      const std::int64_t now = MonotonicNs();
+      WatchSilence(now);
+      SendPulse(now);
+      CountRates(now);
+      due = std::min({PumpChannels(now), next_pulse_ns_, now + kLongestSleep});
+    }
+    std::unique_lock lock(inbox_mutex_);
+    const std::int64_t rest = due - MonotonicNs();
+    if (rest > 0) {
+      inbox_news_.wait_for(lock, std::chrono::nanoseconds(rest), [this] { return woken_ || !inbox_.empty(); });
+    }
+    woken_ = false;
+  }
+}
+
+void Link::TakePackets(std::int64_t now) {
+  std::deque<Packet> packets;
+  {
+    const std::lock_guard lock(inbox_mutex_);
+    packets.swap(inbox_);
+    refused_ += std::exchange(overflow_, 0);
+  }
+  context_.now_ns = now;
+  context_.offset_ns = clock_.OffsetAt(now);
+  for (const Packet& packet : packets) Take(packet);
+}
+
+bool Link::IsOfPeer(std::uint64_t epoch, std::int64_t now) {
+  if (epoch == their_epoch_) return true;
+  // What a link that was restarted still has on its way. But a host that was restarted counts its time from 0 again.
+  const bool back_in_time = epoch < their_epoch_;
+  if (back_in_time && now - heard_ns_ < kSilence) return false;
+  if (back_in_time) context_.epochs = EpochMap();
+  their_epoch_ = epoch;
+  clock_ = ClockFilter();
+  heard_sent_ns_ = heard_pulse_ns_ = 0;
+  wished_ = 0;
+  for (Channel& channel : channels_) {
+    if (channel.in) channel.in->Restart();
+  }
+  return true;
+}
+
+void Link::Take(const Packet& packet) {
+  traffic_.received_B += packet.bytes.size();
+  Envelope envelope;
+  std::span<const std::uint8_t> body;
+  std::uint8_t version = 0;
+  if (!TakeEnvelope(packet.bytes, &envelope, &body, &version)) {
+    ++refused_;
+    return;
+  }
+  if (version != kWireVersion) {
+    mismatch_ = "link mismatch: the other host speaks version " + std::to_string(version) + " of the link, this one " +
+                std::to_string(kWireVersion) + "; use the same release on both hosts";
+    return;
+  }
+  if (!IsOfPeer(envelope.epoch, packet.heard_ns)) return;
+  switch (envelope.kind) {
+    case PacketKind::kPulse:
+      return TakePulse(body, packet.heard_ns);
+    case PacketKind::kSample:
+    case PacketKind::kTissue:
+    case PacketKind::kPatch:
+      return TakeChannel(envelope.kind, body);
+    case PacketKind::kOffer:
+      return TakeOffer(body);
+    case PacketKind::kSceneAsk:
+      return ServeScene(body);
+    case PacketKind::kSceneChunk: {
+      SceneAsk where;
+      std::span<const std::uint8_t> bytes;
+      if (!TakeSceneChunk(body, &where, &bytes) || (fetch_ && !fetch_->Take(where, bytes))) ++refused_;
+      return;
+    }
+    case PacketKind::kBye:
+      session_.over = settings_.far.side == bus::FarSide::kHost && session_.number != 0;
+      return;
+  }
+}
+
+void Link::TakePulse(std::span<const std::uint8_t> body, std::int64_t heard_ns) {
+  Pulse pulse;
+  if (!link::TakePulse(body, &pulse)) {
+    ++refused_;
+    return;
+  }
+  if (pulse.schema_hash != bus::SchemaHash()) {
+    mismatch_ = "schema mismatch: the other host speaks other topics; use the same release on both hosts";
+    return;
+  }
+  const bool back = heard_ns_ != 0 && heard_ns - heard_ns_ > kSilence;
+  heard_ns_ = heard_pulse_ns_ = heard_ns;
+  heard_sent_ns_ = pulse.sent_ns;
+  if (pulse.heard_epoch == epoch_ && pulse.heard_sent_ns != 0) {
+    clock_.Add({pulse.heard_sent_ns, pulse.heard_ns, pulse.sent_ns, heard_ns});
+    context_.offset_ns = clock_.OffsetAt(context_.now_ns);
+  }
+  if (local_ != nullptr) FollowWishes(pulse.wanted, heard_ns);
+  for (std::size_t topic = 0; topic < channels_.size(); ++topic) {
+    Outgoing* out = channels_[topic].out.get();
+    if (out == nullptr) continue;
+    const auto id = static_cast<TopicId>(topic);
+    if (back || (id == TopicId::kTissueFrame && pulse.wants_all_tissue) ||
+        (id == TopicId::kTemperaturePatch && pulse.wants_all_patches) ||
+        (id == TopicId::kTopologyState && pulse.wants_all_topology)) {
+      out->Repeat();
+    }
+    if (id == TopicId::kTissueFrame) out->Repeat(pulse.missing_tissue);
+    if (id == TopicId::kTemperaturePatch) out->Repeat(pulse.missing_patches);
+  }
+  if (pulse.wants_offer && settings_.offer) {
+    (void)Send(FarLane::kOrdered, PacketKind::kOffer,
+               [this](std::vector<std::uint8_t>* out) { PutOffer(*settings_.offer, out); });
+  }
+}
+
+void Link::TakeChannel(PacketKind kind, std::span<const std::uint8_t> body) {
+  TopicId topic = kind == PacketKind::kTissue ? TopicId::kTissueFrame : TopicId::kTemperaturePatch;
+  if (kind == PacketKind::kTissue) traffic_.tissue_B += body.size();
+  if (kind == PacketKind::kSample) {
+    SampleHead head;
+    std::span<const std::uint8_t> ignored;
+    if (!TakeSample(body, &head, &ignored) || KindOf(head.topic) != PacketKind::kSample) {
+      ++refused_;
+      return;
+    }
+    topic = head.topic;
+  }
+  // Without the offset a stamp would be of another clock; nobody has asked for it yet either.
+  if (!clock_.known()) return;
+  Incoming* in = channels_[At(topic)].in.get();
+  if (in == nullptr || !in->Take(body, &context_)) ++refused_;
+}
+
+void Link::TakeOffer(std::span<const std::uint8_t> body) {
+  Offer offer;
+  if (settings_.far.side != bus::FarSide::kHost || !link::TakeOffer(body, &offer)) {
+    ++refused_;
+    return;
+  }
+  if (session_.number == 0 || offer.session_id != session_.offer.session_id) {
+    ++session_.number;
+    session_.over = false;
+  }
+  session_.offer = std::move(offer);
+}
+
+void Link::ServeScene(std::span<const std::uint8_t> body) {
+  SceneAsk ask;
+  if (!TakeSceneAsk(body, &ask) || !settings_.offer || ask.scene_hash != settings_.offer->scene_hash ||
+      ask.offset >= settings_.offer->scene_B) {
+    ++refused_;
+    return;
+  }
+  std::ifstream stream(settings_.scene, std::ios::binary);
+  std::vector<char> piece(std::min<std::uint64_t>(kSceneChunk_B, settings_.offer->scene_B - ask.offset));
+  stream.seekg(static_cast<std::streamoff>(ask.offset));
+  if (!stream.read(piece.data(), static_cast<std::streamsize>(piece.size()))) {
+    error_ = settings_.scene.string() + ": cannot be read any more";
+    return;
+  }
+  (void)Send(FarLane::kOrdered, PacketKind::kSceneChunk, [&](std::vector<std::uint8_t>* out) {
+    PutSceneChunk(ask, {reinterpret_cast<const std::uint8_t*>(piece.data()), piece.size()}, out);
+  });
+}
+
+void Link::FollowWishes(std::uint32_t wanted, std::int64_t now) {
+  for (std::size_t topic = 0; topic < channels_.size(); ++topic) {
+    Channel& channel = channels_[topic];
+    if ((wanted & BitOf(topic)) != 0) {
+      channel.unwanted_since_ns = 0;
+      // A reader who has just come there was not given what went before.
+      if (channel.out != nullptr && (wished_ & BitOf(topic)) == 0) channel.out->Repeat();
+      const std::optional<NodeId> owner = bus::OwnerOf(static_cast<TopicId>(topic));
+      if (channel.out == nullptr && (!owner || context_.IsNative(*owner))) {
+        channel.out = MakeOutgoing(static_cast<TopicId>(topic), local_, [this] { Wake(); });
+      }
+    } else if (channel.out != nullptr) {
+      if (channel.unwanted_since_ns == 0) channel.unwanted_since_ns = now;
+      if (now - channel.unwanted_since_ns > kUnwanted) channel.out.reset();
+    }
+  }
+  wished_ = wanted;
+}
+
+std::int64_t Link::PumpChannels(std::int64_t now) {
+  context_.now_ns = now;
+  std::int64_t due = now + kLongestSleep;
+  for (Channel& channel : channels_) {
+    if (channel.out != nullptr) due = std::min(due, channel.out->Pump(&context_));
+  }
+  return due;
+}
+
+bool Link::IsWanted(TopicId topic, const Incoming& in) const {
+  // Of topics that both sides send our own input reads our own output as well: that somebody reads them proves nothing.
+  switch (topic) {
+    case TopicId::kHealth:
+    case TopicId::kCommand:
+    case TopicId::kCommandReply:
+      return true;
+    case TopicId::kTickManifest:
+      // For the recorder, which is the cart's.
+      return settings_.far.side == bus::FarSide::kCart && in.wanted();
+    default:
+      return in.wanted();
+  }
+}
+
+void Link::SendPulse(std::int64_t now) {
+  if (now < next_pulse_ns_) return;
+  next_pulse_ns_ = now + kPulsePeriod;
+  Pulse pulse;
+  pulse.schema_hash = bus::SchemaHash();
+  pulse.heard_epoch = their_epoch_;
+  pulse.heard_sent_ns = heard_sent_ns_;
+  pulse.heard_ns = heard_pulse_ns_;
+  pulse.wants_offer = settings_.far.side == bus::FarSide::kHost && session_.number == 0;
+  for (std::size_t topic = 0; topic < channels_.size() && clock_.known(); ++topic) {
+    Channel& channel = channels_[topic];
+    const auto id = static_cast<TopicId>(topic);
+    if (channel.in == nullptr || !IsWanted(id, *channel.in)) continue;
+    pulse.wanted |= BitOf(topic);
+    if (id == TopicId::kTissueFrame) {
+      pulse.wants_all_tissue = channel.in->TakeAll();
+      pulse.missing_tissue = channel.in->TakeQuestions();
+    } else if (id == TopicId::kTemperaturePatch) {
+      pulse.wants_all_patches = channel.in->TakeAll();
+      pulse.missing_patches = channel.in->TakeQuestions();
+    } else if (id == TopicId::kTopologyState) {
+      pulse.wants_all_topology = channel.in->TakeAll();
+    }
+  }
+  (void)Send(FarLane::kStream, PacketKind::kPulse, [&](std::vector<std::uint8_t>* out) {
+    pulse.sent_ns = MonotonicNs();
+    PutPulse(pulse, out);
+  });
+  if (bye_) (void)Send(FarLane::kOrdered, PacketKind::kBye, [](std::vector<std::uint8_t>*) {});
+  if (!fetch_) return;
+  for (const SceneAsk& ask : fetch_->TakeAsks(now)) {
+    (void)Send(FarLane::kOrdered, PacketKind::kSceneAsk,
+               [&](std::vector<std::uint8_t>* out) { PutSceneAsk(ask, out); });
+  }
+}
+
+void Link::WatchSilence(std::int64_t now) {
+  // Whoever was never heard may be one that is being refused, which takes a while to show.
+  const std::int64_t patience = heard_ns_ == 0 ? 2 * kPatience : kPatience;
+  if (now - std::max(heard_ns_, connected_ns_) < patience) return;
+  try {
+    rebuilt_ += heard_ns_ != 0 ? 1 : 0;
+    Connect();
+    error_.clear();
+  } catch (const std::exception& error) {
+    error_ = error.what();  // The interface is down, perhaps: tried again.
+  }
+}
+
+void Link::CountRates(std::int64_t now) {
+  const double elapsed_s = 1e-9 * static_cast<double>(now - rates_ns_);
+  if (elapsed_s < 1) return;
+  const auto rate = [&](std::uint64_t Traffic::*bytes) {
+    return 1e-3 * static_cast<double>(traffic_.*bytes - traffic_before_.*bytes) / elapsed_s;
+  };
+  rates_.sent_kB_per_s = rate(&Traffic::sent_B);
+  rates_.received_kB_per_s = rate(&Traffic::received_B);
+  rates_.tissue_kB_per_s = rate(&Traffic::tissue_B);
+  traffic_before_ = traffic_;
+  rates_ns_ = now;
+}
+
+bool Link::Send(FarLane lane, PacketKind kind, const std::function<void(std::vector<std::uint8_t>*)>& put) {
+  if (far_ == nullptr) return false;
+  packet_.clear();
+  PutEnvelope({kind, epoch_}, &packet_);
+  put(&packet_);
+  traffic_.sent_B += packet_.size();
+  if (kind == PacketKind::kTissue) traffic_.tissue_B += packet_.size();
+  return far_->Send(lane, packet_);
+}
+
+}  // namespace fulcrum::link

@@ -1,0 +1,121 @@
+#include "services/transport/link/scene_transfer.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <system_error>
+
+#include "services/base/core/error.h"
+#include "services/base/core/hash.h"
+#include "services/scene/format/scene_file.h"
+
+namespace fulcrum::link {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kWindow = 8;                    ///< Pieces asked for at a time.
+constexpr std::int64_t kPatience_ns = 1'000'000'000;  ///< Then the question or its answer is lost.
+
+}  // namespace
+
+FileFacts FactsOf(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  Hash64 hash;
+  FileFacts facts;
+  // A multiple of eight: the hash does not tell where pieces began.
+  std::vector<char> piece(kSceneChunk_B);
+  while (stream.read(piece.data(), static_cast<std::streamsize>(piece.size())) || stream.gcount() > 0) {
+    hash.Add(std::as_bytes(std::span(piece).first(static_cast<std::size_t>(stream.gcount()))));
+    facts.size_B += static_cast<std::uint64_t>(stream.gcount());
+  }
+  if (facts.size_B == 0 || facts.size_B > kLargestScene_B) {
+    throw InputError(file.string() + ": " + std::to_string(facts.size_B) +
+                     " bytes; a scene that can go to another host has 1 to " + std::to_string(kLargestScene_B));
+  }
+  facts.checksum = hash.value();
+  return facts;
+}
+
+SceneFetch::SceneFetch(const Offer& offer)
+    : hash_(offer.scene_hash),
+      checksum_(offer.scene_checksum),
+      bytes_(offer.scene_B),
+      have_((offer.scene_B + kSceneChunk_B - 1) / kSceneChunk_B, false) {}
+
+std::vector<SceneAsk> SceneFetch::TakeAsks(std::int64_t now_ns) {
+  std::vector<SceneAsk> asks;
+  const auto ask = [&](std::size_t piece) {
+    asked_ns_[piece] = now_ns;
+    asks.push_back({hash_, piece * kSceneChunk_B});
+  };
+  for (const auto& [piece, asked_ns] : asked_ns_) {
+    if (now_ns - asked_ns > kPatience_ns) ask(piece);
+  }
+  while (asked_ns_.size() < kWindow && next_ < have_.size()) ask(next_++);
+  return asks;
+}
+
+bool SceneFetch::Take(const SceneAsk& where, std::span<const std::uint8_t> bytes) {
+  const std::size_t piece = where.offset / kSceneChunk_B;
+  if (where.scene_hash != hash_ || piece >= have_.size() ||
+      bytes.size() != std::min<std::uint64_t>(kSceneChunk_B, bytes_.size() - where.offset)) {
+    return false;
+  }
+  asked_ns_.erase(piece);
+  if (have_[piece]) return true;
+  std::copy(bytes.begin(), bytes.end(), bytes_.begin() + static_cast<std::ptrdiff_t>(where.offset));
+  have_[piece] = true;
+  ++have_count_;
+  return true;
+}
+
+bool SceneFetch::checksum_ok() const {
+  Hash64 hash;
+  for (std::size_t at = 0; at < bytes_.size(); at += kSceneChunk_B) {
+    hash.Add(std::as_bytes(std::span(bytes_).subspan(at, std::min(kSceneChunk_B, bytes_.size() - at))));
+  }
+  return complete() && hash.value() == checksum_;
+}
+
+fs::path CachedScene(const fs::path& cache, std::uint64_t hash) {
+  std::array<char, 17> name{};
+  std::snprintf(name.data(), name.size(), "%016llx", static_cast<unsigned long long>(hash));
+  return cache / (std::string(name.data()) + ".fulcrum");
+}
+
+bool IsScene(const fs::path& file, std::uint64_t hash) {
+  if (!fs::exists(file)) return false;
+  try {
+    return scene::SceneFile(file).view().hash == hash;
+  } catch (const std::exception&) {
+    return false;  // Not whole, or of another version: fetched anew.
+  }
+}
+
+void StoreScene(const SceneFetch& fetch, const fs::path& cache) {
+  if (!fetch.checksum_ok()) throw InputError("the scene came damaged; it is fetched again");
+  const fs::path file = CachedScene(cache, fetch.scene_hash());
+  const fs::path part = file.string() + "." + std::to_string(::getpid()) + ".part";
+  std::error_code error;
+  fs::create_directories(cache, error);
+  std::ofstream stream(part, std::ios::binary);
+  stream.write(reinterpret_cast<const char*>(fetch.bytes().data()), static_cast<std::streamsize>(fetch.bytes().size()));
+  stream.close();
+  if (!stream) {
+    fs::remove(part, error);
+    throw InputError("cannot write " + part.string() + "; is the disk full, or the folder not yours?");
+  }
+  if (!IsScene(part, fetch.scene_hash())) {
+    fs::remove(part, error);
+    throw MismatchError(
+        "the scene of the other host is none that this build reads; use the same release on both hosts");
+  }
+  fs::rename(part, file);
+}
+
+}  // namespace fulcrum::link
