@@ -1,0 +1,161 @@
+#include "services/apps/replayer/options.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "services/apps/replayer/assertion.h"
+#include "services/apps/replayer/command_line.h"
+#include "services/base/core/error.h"
+#include "services/nodes/app/cart_security.h"
+#include "services/nodes/app/version.h"
+#include "services/records/recording/recorded_scene.h"
+#include "services/transport/bus/access.h"
+
+namespace fulcrum::replay {
+namespace {
+
+/// All nodes of `option` by name, each once; `valid` says which there are.
+std::vector<NodeId> NodesNamed(const CommandLine& line, const char* option, const std::vector<NodeId>& valid) {
+  std::vector<NodeId> nodes;
+  for (const std::string& name : line.TextsOf(option)) {
+    const auto named = [&](NodeId node) {
+      const std::string full = NodeName(node);
+      return name == full || name + "_node" == full || name + "_bridge" == full;
+    };
+    const auto node = std::find_if(valid.begin(), valid.end(), named);
+    if (node == valid.end()) {
+      std::string problem = "--";
+      problem.append(option).append(" ").append(name).append(": no such node here; valid:");
+      for (const NodeId v : valid) problem.append(" ").append(NodeName(v));
+      throw InputError(problem);
+    }
+    if (std::find(nodes.begin(), nodes.end(), *node) == nodes.end()) nodes.push_back(*node);
+  }
+  return nodes;
+}
+
+/// All that publish.
+const std::vector<NodeId> kPublishers{NodeId::kSupervisor, NodeId::kHandleBridge, NodeId::kHaptics,
+                                      NodeId::kPhysics,    NodeId::kThermal,      NodeId::kRender};
+/// All whose classes replayer holds.
+const std::vector<NodeId> kReplayable{NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics, NodeId::kRender};
+
+std::filesystem::path RecordingOf(const CommandLine& line) {
+  if (!line.Has("recording")) throw InputError("which recording? See --help");
+  std::filesystem::path recording = line.TextOf("recording");
+  if (!std::filesystem::exists(recording)) throw InputError(recording.string() + ": no such file");
+  return recording;
+}
+
+void CheckKind(const CommandLine& line) {
+  int kinds = 0;
+  for (const char* kind : {"into", "live", "test"}) kinds += line.Has(kind) ? 1 : 0;
+  if (kinds != 1) throw InputError("give one of --into NODE..., --live and --test NODE; see --help");
+}
+
+LiveSettings LiveSettingsFrom(const CommandLine& line) {
+  LiveSettings settings;
+  settings.recording = line.TextOf("recording");
+  settings.domain = line.ValueOf<int>("domain");
+  settings.from_s = line.ValueOf<double>("from");
+  if (line.Has("only") && line.Has("except")) throw InputError("give --only or --except, not both");
+  settings.nodes = line.Has("only") ? NodesNamed(line, "only", kPublishers) : kPublishers;
+  for (const NodeId node : NodesNamed(line, "except", kPublishers)) std::erase(settings.nodes, node);
+  if (const std::string& cart = line.TextOf("cart"); !cart.empty()) {
+    settings.security = app::SecurityOf(config::LoadCart(cart), bus::kReplayerIdentity);
+  }
+  return settings;
+}
+
+/// What a test holds its node against.
+void ReadDemands(const CommandLine& line, Options* options) {
+  const bool asked = line.Has("expect") || line.Has("assert") || !line.TextOf("junit").empty();
+  if (!options->test && asked) throw InputError("--expect, --assert and --junit go with --test");
+  if (!options->test) return;
+  if (options->lock_step.nodes.size() != 1) throw InputError("--test: one node at a time");
+  if (line.Has("set") || line.Has("console")) throw InputError("--test goes with neither --set nor --console");
+  if (line.Has("expect")) options->demands.state_hash = ParseStateHash(line.TextOf("expect"));
+  for (const std::string& text : line.TextsOf("assert")) options->demands.assertions.push_back(ParseAssertion(text));
+  options->junit = line.TextOf("junit");
+}
+
+/// Render is not replayed in lock step: it has no state hash.
+void ReadPictures(const CommandLine& line, Options* options) {
+  options->pictures = std::erase(options->lock_step.nodes, NodeId::kRender) > 0;
+  options->frames = line.TextOf("frames");
+  if (options->frames.empty() && !options->test) {
+    options->frames = options->lock_step.recording.parent_path() / "replayed_frames";
+  }
+}
+
+/// How fast, with how many threads, how far.
+void ReadPace(const CommandLine& line, LockStepSettings* settings) {
+  settings->rate = line.ValueOf<double>("rate");
+  if (!(settings->rate >= 0)) throw InputError("--rate: must be 0 (as fast as it can) or more");
+  settings->physics_threads = line.ValueOf<int>("threads");
+  if (settings->physics_threads < 1 || settings->physics_threads > 64) {
+    throw InputError("--threads: must be 1 to 64");
+  }
+  settings->until_s = line.ValueOf<double>("until");
+}
+
+/// --set and --console, and what excludes them.
+void ReadVariant(const CommandLine& line, Options* options) {
+  options->changes = line.TextsOf("set");
+  if (!options->changes.empty() && options->lock_step.rate > 0) {
+    throw InputError("--rate says nothing with --set: both replays run as fast as they can");
+  }
+  options->console = line.Has("console");
+  if (options->console && !(options->changes.empty() && line.TextOf("json").empty())) {
+    throw InputError("--console goes with neither --set nor --json");
+  }
+}
+
+void ReadFiles(const CommandLine& line, Options* options) {
+  const std::filesystem::path& recording = options->lock_step.recording;
+  options->scene = recording::BesideRecording(line.TextOf("scene"), recording, "scene.fulcrum");
+  options->cart = recording::BesideRecording(line.TextOf("cart"), recording, "cart.yaml");
+  options->json = line.TextOf("json");
+  if (options->scene.empty()) {
+    throw InputError("no scene.fulcrum beside " + recording.string() +
+                     ": give the compiled scene of that session with --scene");
+  }
+}
+
+}  // namespace
+
+Options ParseOptions(int argc, char** argv) {
+  const CommandLine line(argc, argv);
+  Options options;
+  if (line.Has("help")) {
+    options.answer = line.Help();
+    return options;
+  }
+  if (line.Has("version")) {
+    options.answer = std::string("replayer ") + app::kVersion + "\n";
+    return options;
+  }
+  options.lock_step.recording = RecordingOf(line);
+  CheckKind(line);
+  options.live = line.Has("live");
+  options.test = line.Has("test");
+  if (options.live) {
+    options.live_settings = LiveSettingsFrom(line);
+    return options;
+  }
+  options.lock_step.nodes = NodesNamed(line, options.test ? "test" : "into", kReplayable);
+  ReadDemands(line, &options);
+  ReadPictures(line, &options);
+  ReadPace(line, &options.lock_step);
+  ReadVariant(line, &options);
+  ReadFiles(line, &options);
+  options.quiet = line.Has("quiet") || ::isatty(STDERR_FILENO) == 0;
+  return options;
+}
+
+config::CartConfig LoadCart(const Options& options) {
+  return options.cart.empty() ? config::CartConfig() : config::LoadCart(options.cart);
+}
+
+}  // namespace fulcrum::replay

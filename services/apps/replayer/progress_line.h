@@ -1,0 +1,27 @@
+// How far a replay is, on a terminal. Internal to services/apps/replayer.
+#pragma once
+
+#include <cstdio>
+#include <functional>
+
+namespace fulcrum::replay {
+
+/// One line on standard error that each call overwrites.
+class ProgressLine {
+ public:
+  /// @param quiet it prints nothing.
+  explicit ProgressLine(bool quiet) : quiet_(quiet) {}
+
+  /// What a replay calls with the session time [s]; empty when quiet.
+  [[nodiscard]] std::function<void(double)> callback() const {
+    if (quiet_) return {};
+    return [](double time_s) { std::fprintf(stderr, "\rsession time %.1f s ", time_s); };
+  }
+  /// Before the result is printed.
+  void Clear() const { std::fputs(quiet_ ? "" : "\r\033[K", stderr); }
+
+ private:
+  bool quiet_;
+};
+
+}  // namespace fulcrum::replay

@@ -1,0 +1,84 @@
+#include "services/apps/replayer/replay_run.h"
+
+#include <iostream>
+
+#include "services/apps/replayer/changed_scene.h"
+#include "services/apps/replayer/console.h"
+#include "services/apps/replayer/lock_step_report.h"
+#include "services/apps/replayer/pictures.h"
+#include "services/apps/replayer/progress_line.h"
+#include "services/apps/replayer/scratch_folder.h"
+#include "services/apps/replayer/what_if.h"
+#include "services/apps/replayer/what_if_report.h"
+#include "services/base/core/error.h"
+#include "services/base/core/exit_code.h"
+#include "services/scene/format/scene_file.h"
+
+namespace fulcrum::replay {
+namespace {
+
+/// Not every scene has each node (an exercise without heat): those are left out, with a line.
+void LeaveOutMissing(const SceneView& scene, bool pictures, std::vector<NodeId>* nodes) {
+  const auto missing = [&](NodeId node) { return (scene.node_mask >> static_cast<unsigned>(node) & 1u) == 0; };
+  std::string names;
+  std::erase_if(*nodes, [&](NodeId node) {
+    if (missing(node)) names += std::string(names.empty() ? "" : ", ") + NodeName(node);
+    return missing(node);
+  });
+  if (names.empty()) return;
+  if (nodes->empty() && !pictures) {
+    throw InputError("--into: scene \"" + std::string(scene.name) + "\" has no " + names);
+  }
+  std::cout << names << ": not in scene \"" << scene.name << "\", left out\n";
+}
+
+/// Returns how many pictures were written.
+std::uint64_t DrawPictures(const Options& options, const SceneView& scene, const ProgressLine& progress) {
+  const PicturesSettings settings{options.lock_step.recording, options.frames, options.lock_step.until_s};
+  const std::uint64_t written = ReplayPictures(settings, scene, progress.callback()).written;
+  progress.Clear();
+  std::cout << written << " pictures in " << options.frames.string() << '\n';
+  return written;
+}
+
+ExitCode CompareWithChanges(const Options& options, const LockStepSettings& settings, const scene::SceneFile& scene,
+                            const config::CartConfig& cart, const ProgressLine& progress) {
+  const SceneView changed = WithChanges(scene, options.changes);
+  const WhatIfResult result = ReplayWhatIf(settings, scene.view(), changed, cart, progress.callback());
+  progress.Clear();
+  std::cout << ReportText(result, settings.nodes);
+  if (!options.json.empty()) WriteReportJson(result, options.json);
+  return result.missing.empty() ? ExitCode::kDone : ExitCode::kFailure;
+}
+
+ExitCode CompareWithRecording(const Options& options, const LockStepSettings& settings, const SceneView& scene,
+                              const config::CartConfig& cart, const ProgressLine& progress) {
+  const LockStepResult result = ReplayInLockStep(settings, scene, cart, progress.callback());
+  progress.Clear();
+  std::cout << ReportText(result);
+  if (!options.json.empty()) WriteReportJson(result, options.json);
+  return result.good() ? ExitCode::kDone : ExitCode::kFailure;
+}
+
+}  // namespace
+
+int RunReplay(const Options& options) {
+  const scene::SceneFile scene(options.scene);
+  LockStepSettings settings = options.lock_step;
+  LeaveOutMissing(scene.view(), options.pictures, &settings.nodes);
+  const config::CartConfig cart = LoadCart(options);
+  const ScratchFolder scratch;
+  settings.folder = scratch.path();
+  // Before the first thread starts: the console keeps moments by forking the process, which copies one thread only.
+  if (options.console) return RunConsole(settings, scene.view(), cart);
+  const ProgressLine progress(options.quiet);
+  if (options.pictures) {
+    const std::uint64_t written = DrawPictures(options, scene.view(), progress);
+    if (settings.nodes.empty()) return static_cast<int>(written > 0 ? ExitCode::kDone : ExitCode::kFailure);
+  }
+  return static_cast<int>(options.changes.empty()
+                              ? CompareWithRecording(options, settings, scene.view(), cart, progress)
+                              : CompareWithChanges(options, settings, scene, cart, progress));
+}
+
+}  // namespace fulcrum::replay
