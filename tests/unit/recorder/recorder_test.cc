@@ -9,6 +9,8 @@
 #include <cstring>
 #include <thread>
 
+#include "services/records/recorder/dump_writer.h"
+#include "services/records/recorder/recorder_health.h"
 #include "services/records/recording/free_name.h"
 #include "services/records/recording/mcap_reader.h"
 #include "services/transport/bus/topics.h"
@@ -219,6 +221,60 @@ TEST_F(RecorderTest, WhatIsKeptForADumpIsBounded) {
   McapReader reader(folder_ / "dump.mcap");
   EXPECT_EQ(ReadAll(&reader).back().sequence, 200u);
   EXPECT_LT(fs::file_size(folder_ / "dump.mcap"), 60'000u) << "schema, index and what was kept";
+}
+
+TEST_F(RecorderTest, ADumpIsWrittenOnceForWhatWasAskedLast) {
+  RecorderSettings settings = Settings();
+  settings.file.clear();
+  settings.keep_s = 2;
+  Recorder recorder(settings);
+  DumpWriter dumps(&recorder, folder_);
+  dumps.WriteIfAsked(0);
+  EXPECT_TRUE(fs::is_empty(folder_)) << "nobody asked";
+  Send(&recorder, TopicId::kToolState, 1, 1);
+  EXPECT_EQ(dumps.Ask("first"), "writing the last seconds into " + folder_.string());
+  EXPECT_TRUE(fs::is_empty(folder_)) << "written by the other thread";
+  EXPECT_NE(dumps.Ask("second"), "");
+  dumps.WriteIfAsked(kMs);
+  dumps.WriteIfAsked(2 * kMs);
+  McapReader reader(folder_ / "dump.mcap");
+  EXPECT_EQ(ReadAll(&reader).size(), 1u);
+  EXPECT_EQ(reader.metadata().at("dump").at("reason"), "second");
+  EXPECT_FALSE(fs::exists(folder_ / "dump-2.mcap"));
+}
+
+TEST_F(RecorderTest, ADumpThatCannotBeWrittenDoesNotEndTheRecording) {
+  RecorderSettings settings = Settings();
+  settings.keep_s = 2;
+  Recorder recorder(settings);
+  DumpWriter dumps(&recorder, folder_ / "missing");
+  dumps.Ask("a node died");
+  EXPECT_NO_THROW(dumps.WriteIfAsked(0));
+  Send(&recorder, TopicId::kToolState, 1, 1);
+  recorder.Close(kMs);
+  McapReader reader(folder_ / "recording.mcap");
+  EXPECT_EQ(ReadAll(&reader).size(), 1u);
+}
+
+TEST(RecorderHealth, IsDegradedOnceWritingHasFailed) {
+  RecorderStats stats;
+  stats.received = 10;
+  stats.missed = 2;
+  stats.file_B = 3'000'000;
+  Health health;
+  FillHealth(stats, &health);
+  ASSERT_EQ(health.metrics.size(), 4u);
+  EXPECT_EQ(health.metrics[0].value, 10);
+  EXPECT_DOUBLE_EQ(health.metrics[1].value, 3);
+  EXPECT_EQ(health.metrics[2].value, 2);
+  EXPECT_NE(health.state, HealthState::kDegraded);
+  EXPECT_EQ(health.last_error, "");
+  stats.unwritten = 4;
+  stats.error = "File too large";
+  FillHealth(stats, &health);
+  EXPECT_EQ(health.metrics[0].value, 6);
+  EXPECT_EQ(health.state, HealthState::kDegraded);
+  EXPECT_EQ(health.last_error, "File too large: 4 samples are not in the file");
 }
 
 TEST_F(RecorderTest, AFullDiskIsToldAndCountedAndNeverThrows) {

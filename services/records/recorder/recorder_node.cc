@@ -1,0 +1,82 @@
+#include "services/records/recorder/recorder_node.h"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <utility>
+
+#include "services/base/runtime/cyclic_thread.h"
+#include "services/base/runtime/realtime.h"
+#include "services/nodes/app/cart_security.h"
+#include "services/records/recorder/recorder_health.h"
+#include "services/transport/bus/topics.h"
+
+namespace fulcrum::recorder {
+namespace {
+
+/// Arguments of a process; empty when it has ended.
+std::string CommandLine(int pid) {
+  std::ifstream in("/proc/" + std::to_string(pid) + "/cmdline", std::ios::binary);
+  std::string line{std::istreambuf_iterator<char>(in), {}};
+  while (!line.empty() && line.back() == '\0') line.pop_back();
+  std::replace(line.begin(), line.end(), '\0', ' ');
+  return line;
+}
+
+recording::TextMap Describe(const bus::Peer& peer) {
+  return {{"node", peer.name}, {"pid", std::to_string(peer.pid)}, {"command", CommandLine(peer.pid)}};
+}
+
+/// Of a participant beside that of the app: the app's has typed ports of some topics, and a participant registers a
+/// type in one way only.
+bus::DdsSettings BusSettings(app::NodeApp* app) {
+  return {.domain = app->options().domain,
+          .node_name = bus::kRecorderPeer,
+          .security = app::SecurityOf(app->cart(), NodeName(NodeId::kRecorder)),
+          .gathers = true};
+}
+
+RecorderSettings WithDescription(RecorderSettings settings, const bus::DdsParticipant& bus) {
+  settings.describe = [&bus](const bus::WriterGuid& writer) { return Describe(bus.PeerOf(writer)); };
+  return settings;
+}
+
+}  // namespace
+
+RecorderNode::RecorderNode(app::NodeApp* app, const RecorderSettings& settings)
+    : bus_(BusSettings(app)), recorder_(WithDescription(settings, bus_)), dumps_(&recorder_, app->options().session) {
+  ReceiveAllTopics(app);
+  if (settings.keep_s > 0) {
+    app->OnCommand("dump", [this](const std::string& reason) { return dumps_.Ask(reason); });
+  }
+  if (!settings.file.empty()) {
+    runtime::Log(runtime::LogLevel::kInfo, "recording into " + settings.file.string());
+  }
+}
+
+void RecorderNode::ReceiveAllTopics(app::NodeApp* app) {
+  for (const auto& role : bus::kTopicRoles) {
+    inputs_.push_back(bus_.MakeRawInput(
+        role.id, [this](const bus::RawSample& sample, const auto& is_whole) { recorder_.Receive(sample, is_whole); }));
+    app->Watch(role.id, [this, id = role.id, input = inputs_.back().get()] {
+      bus::InputStats stats = recorder_.topic_stats(id);
+      stats.matched = input->matched();
+      return stats;
+    });
+  }
+}
+
+void RecorderNode::Step(const Tick& tick) {
+  recorder_.Flush(tick.stamp_ns);
+  dumps_.WriteIfAsked(tick.stamp_ns);
+}
+
+void RecorderNode::FillHealth(Health* health) const { recorder::FillHealth(recorder_.stats(), health); }
+
+void RecorderNode::Close() {
+  inputs_.clear();
+  recorder_.Close(runtime::MonotonicNs());
+}
+
+}  // namespace fulcrum::recorder
