@@ -1,0 +1,65 @@
+#include "services/apps/scene_compiler/arguments.h"
+
+#include "services/base/core/error.h"
+
+namespace fulcrum::scene_compiler {
+namespace {
+
+constexpr const char* kUsage =
+    R"(scene_compiler: compiles a scene description into the file that the nodes map
+
+  scene_compiler SCENE.yaml --out FILE [--data DIR] [--set SECTION.KEY=VALUE]... [--quiet]
+                                                                compile, then report quality
+  scene_compiler --info FILE                                    what a compiled scene holds
+  scene_compiler --source FILE                                  the effective YAML it was compiled from
+  scene_compiler --list [DIR]                                   the scenes described in DIR (default: those shipped)
+
+  --data DIR   look here first for the mesh files that the description names
+  --set        a parameter of physics, thermal, haptics, breathing or render other than the description has it, or
+               script.power_W, the generator's setting; as often as needed
+  --quiet      no progress and no report
+
+Keys of a description: services/scene/README.md.
+Exit code: 0 done, 1 failure, 2 bad usage or input, 3 a compiled scene of another version.
+)";
+
+}  // namespace
+
+const char* Usage() { return kUsage; }
+
+Arguments ParseArguments(const std::vector<std::string>& words) {
+  Arguments arguments;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    const auto value = [&] {
+      if (i + 1 == words.size()) {
+        throw InputError(word + " needs a value; see --help");
+      }
+      return words[++i];
+    };
+    if (word == "--help" || word == "-h") {
+      arguments.help = true;
+    } else if (word == "--out") {
+      arguments.out = value();
+    } else if (word == "--set") {
+      arguments.changes.push_back(value());
+    } else if (word == "--data") {
+      arguments.data = value();
+    } else if (word == "--info") {
+      arguments.info = value();
+    } else if (word == "--source") {
+      arguments.source = value();
+    } else if (word == "--list") {
+      arguments.list = true;
+    } else if (word == "--quiet") {
+      arguments.quiet = true;
+    } else if (word.starts_with("-")) {
+      throw InputError("unknown option '" + word + "'; see --help");
+    } else {
+      arguments.plain.push_back(word);
+    }
+  }
+  return arguments;
+}
+
+}  // namespace fulcrum::scene_compiler
