@@ -41,6 +41,10 @@ struct CommandEntry {
 };
 [[nodiscard]] std::span<const CommandEntry> Commands();
 
+/// Runs what the first word names: a subcommand, help, version, or another program of the installation, which then
+/// takes the place of this process. Throws InputError when there is no such command, and what the subcommand throws.
+ExitCode Dispatch(Words words);
+
 /// Options of one subcommand; "--help" is added. Named positional words come last, for example {"scene"}.
 struct Arguments {
   boost::program_options::variables_map values;
