@@ -1,5 +1,11 @@
 #include "render_node/node/stage.h"
 
+#include <unistd.h>
+
+#include <array>
+#include <future>
+
+#include "render_node/node/drawing_threads.h"
 #include "render_node/node/hud.h"
 
 namespace fulcrum::render {
@@ -37,6 +43,14 @@ void WarmUp(const SceneView& scene, Stage* stage) {
 
 Stage::Stage(const SceneView& scene, bool window) : view(scene), display(OpenDisplay(view, scene.render, window)) {
   WarmUp(scene, this);
+}
+
+std::unique_ptr<Stage> MakeStage(const SceneView& scene, bool window, bool spare) {
+  const auto make = [&] {
+    if (spare) LowerPriority(std::array{gettid()});
+    return std::make_unique<Stage>(scene, window);
+  };
+  return std::async(spare ? std::launch::async : std::launch::deferred, make).get();
 }
 
 }  // namespace fulcrum::render

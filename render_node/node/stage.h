@@ -18,4 +18,9 @@ struct Stage {
   std::unique_ptr<Display> display;
 };
 
+/// Makes a stage; throws as its constructor. @param spare of a process that waits in reserve: it is made on a thread of
+/// lower priority, and so are the rasteriser's threads, which that one starts. A node that the session waits for makes
+/// it at full priority on the calling thread.
+[[nodiscard]] std::unique_ptr<Stage> MakeStage(const SceneView& scene, bool window, bool spare);
+
 }  // namespace fulcrum::render
