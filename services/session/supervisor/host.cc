@@ -1,13 +1,11 @@
 #include "services/session/supervisor/host.h"
 
 #include <algorithm>
-#include <chrono>
 #include <optional>
 #include <thread>
 #include <vector>
 
 #include "services/base/core/error.h"
-#include "services/base/core/tick.h"
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/base/runtime/realtime.h"
 #include "services/nodes/app/cart_security.h"
@@ -18,6 +16,7 @@
 #include "services/session/supervisor/outcome.h"
 #include "services/session/supervisor/progress.h"
 #include "services/session/supervisor/session_folder.h"
+#include "services/session/supervisor/watch_times.h"
 #include "services/transport/bus/access.h"
 #include "services/transport/bus/dds/participant.h"
 #include "services/transport/bus/dds/shared_memory.h"
@@ -28,10 +27,6 @@ namespace fulcrum::supervisor {
 namespace {
 
 using runtime::MonotonicNs;
-
-constexpr auto kLoopPeriod = std::chrono::milliseconds(5);
-constexpr std::int64_t kSweepAfter = 2 * kSecond_ns;  // As the supervisor does.
-constexpr std::int64_t kHeldUp = kSecond_ns;          // A gap in our own loop: silence proves nothing.
 
 class Host {
  public:
@@ -142,7 +137,7 @@ class Host {
   void Turn() {
     const std::int64_t now = MonotonicNs();
     TakeHealths(now);
-    if (now - last_turn_ns_ > kHeldUp) {
+    if (now - last_turn_ns_ > kHeldUp_ns) {
       for (NodeProcess& node : nodes_) node.ForgiveSilence(now);
     }
     last_turn_ns_ = now;
@@ -159,7 +154,7 @@ class Host {
   void WatchNode(NodeProcess* node, std::int64_t now) {
     const std::optional<NodeProcess::Death> death = node->Update(now);
     if (!death) return;
-    sweep_ns_ = now + kSweepAfter;
+    sweep_ns_ = now + kSweepAfter_ns;
     const std::string what = std::string(NodeName(node->id())) + " " + death->cause;
     if (!death->for_good) {
       progress_.Say("! " + what + ": starting it again");

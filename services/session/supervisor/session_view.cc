@@ -11,7 +11,7 @@
 namespace fulcrum::supervisor {
 namespace {
 
-std::string Ms(float us) { return Fixed(1e-3 * static_cast<double>(us), 2); }
+std::string Milliseconds(float us) { return Fixed(1e-3 * static_cast<double>(us), 2); }
 
 /// Oldest input that has a writer, as "ToolState 3 ms".
 std::string OldestInput(const Health& health) {
@@ -110,7 +110,8 @@ std::string SessionView::Text() const {
     const bool stale = now - health.stamp.stamp_ns > kSilence_ns;
     const std::string rate = Fixed(static_cast<double>(health.rate_achieved_Hz), 1) + " / " +
                              Fixed(static_cast<double>(health.rate_asked_Hz), 0);
-    const std::string step = Ms(health.step.p50_us) + "/" + Ms(health.step.p99_us) + "/" + Ms(health.step.max_us);
+    const std::string step = Milliseconds(health.step.p50_us) + "/" + Milliseconds(health.step.p99_us) + "/" +
+                             Milliseconds(health.step.max_us);
     const double restarts = MetricOf(supervisor, std::string("restarts_") + NodeName(health.node));
     std::snprintf(line.data(), line.size(), "%-14s %7d  %-9s %15s %24s %9llu %6llu %8.0f  %s\n", NodeName(health.node),
                   health.pid, stale ? "silent" : app::StateName(health.state), rate.c_str(), step.c_str(),

@@ -1,0 +1,41 @@
+// The nodes of a session that run on another host, and the link to that host, where `fulcrum host` starts, watches and
+// ends them.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "services/session/supervisor/command_desk.h"
+#include "services/session/supervisor/node_orders.h"
+#include "services/session/supervisor/session_setup.h"
+#include "services/transport/bus/dds/participant.h"
+#include "services/transport/link/link.h"
+
+namespace fulcrum::supervisor {
+
+class RemoteNodes {
+ public:
+  /// Opens the link with an offer of the session and joins it to the bus. Throws InputError.
+  /// @param setup must outlive this.
+  /// @param participant the supervisor's; must outlive this.
+  RemoteNodes(const SessionSetup& setup, bus::DdsParticipant* participant);
+
+  /// By command: the node gets the order to end, and its host starts it again. Nothing: no such node runs there.
+  [[nodiscard]] std::optional<CommandAnswer> Restart(const std::string& name, NodeOrders* orders) const;
+
+  /// One line when the two sides cannot work together; empty: all well.
+  [[nodiscard]] std::string mismatch() { return link_->mismatch(); }
+  [[nodiscard]] bus::Refusals refusals() { return link_->refusals(); }
+  /// Adds the link's metrics, and last_error where there is none yet.
+  void AddTo(Health* health);
+  void SayBye() { link_->SayBye(); }
+
+ private:
+  const SessionSetup& setup_;
+  /// On a secured cart the link publishes what the remote nodes own: the supervisor's participant has no right to that.
+  std::unique_ptr<bus::DdsParticipant> link_bus_;
+  std::optional<link::Link> link_;  ///< Ends before the bus that it has ports of.
+};
+
+}  // namespace fulcrum::supervisor

@@ -1,0 +1,96 @@
+#include "services/session/supervisor/session_setup.h"
+
+#include <ctime>
+
+#include "services/base/core/error.h"
+#include "services/nodes/app/cart_security.h"
+#include "services/records/recording/free_name.h"
+#include "services/session/supervisor/outcome.h"
+#include "services/session/supervisor/session_keys.h"
+#include "services/transport/bus/dds/shared_memory.h"
+#include "services/transport/link/options.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+bool HasRecorder(const UpSettings& settings) { return settings.record || settings.keep_s > 0; }
+
+std::vector<NodeId> NodesOf(const SceneView& scene, const UpSettings& settings) {
+  std::vector<NodeId> nodes;
+  for (int i = 0; i < kNodeCount; ++i) {
+    const auto id = static_cast<NodeId>(i);
+    if (id != NodeId::kSupervisor && (scene.node_mask >> i & 1u) != 0 && (settings.remote >> i & 1u) == 0) {
+      nodes.push_back(id);
+    }
+  }
+  if (nodes.empty()) {
+    throw InputError(settings.scene.string() + ": the scene names no node to start here");
+  }
+  if (HasRecorder(settings)) {
+    nodes.push_back(NodeId::kRecorder);
+  }
+  return nodes;
+}
+
+std::vector<NodeId> RemoteNodesOf(const SceneView& scene, const UpSettings& settings) {
+  std::vector<NodeId> nodes;
+  for (int i = 0; i < kNodeCount; ++i) {
+    if ((scene.node_mask & settings.remote) >> i & 1u) nodes.push_back(static_cast<NodeId>(i));
+  }
+  return nodes;
+}
+
+double EndOfSession(const UpSettings& settings, const SceneView& scene) {
+  return settings.seconds >= 0 ? settings.seconds : static_cast<double>(scene.script_duration_s);
+}
+
+std::string RunYaml(const UpSettings& settings, double end_s) {
+  const auto yes_no = [](bool value) { return value ? "true" : "false"; };
+  return "  seconds: " + (end_s > 0 ? Fixed(end_s, 3) : std::string("until stopped")) +
+         "\n  domain: " + std::to_string(settings.cart.domain) + "\n  window: " + yes_no(settings.window) +
+         "\n  keep_going: " + yes_no(settings.keep_going) + "\n  standby: " + yes_no(settings.standby) +
+         "\n  record: " + yes_no(settings.record.has_value()) +
+         (settings.remote != 0 ? "\n  peer: " + settings.peer + "\n  remote: " + link::NamesOfNodes(settings.remote)
+                               : "") +
+         "\n";
+}
+
+bus::Security OwnSecurity(const config::CartConfig& cart) {
+  return app::SecurityOf(cart, NodeName(NodeId::kSupervisor));
+}
+
+std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFolder& folder) {
+  if (!settings.record) {
+    return {};
+  }
+  const std::filesystem::path& wanted = *settings.record;
+  return recording::FreeName(wanted.empty()                          ? folder.path / "recording.mcap"
+                             : std::filesystem::is_directory(wanted) ? wanted / (folder.session_id + ".mcap")
+                                                                     : wanted);
+}
+
+}  // namespace
+
+SessionSetup::SessionSetup(const UpSettings& up)
+    : settings(up),
+      scene(up.scene),
+      end_s(EndOfSession(up, scene.view())),
+      keys_warning(CheckSessionKeys(up.cart, NodesOf(scene.view(), up), std::time(nullptr))),
+      guard(up.cart.domain),
+      memory(bus::OpenSharedMemory(up.cart.domain, OwnSecurity(up.cart))),
+      training(OpenTrainingLog(up.trainee, up.training_database, scene.view())),
+      folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
+      recording(RecordingFile(up, folder)),
+      starter{settings, folder, recording},
+      node_ids(NodesOf(scene.view(), up)),
+      remote_ids(RemoteNodesOf(scene.view(), up)) {}
+
+bus::Security SessionSetup::security() const { return OwnSecurity(settings.cart); }
+
+std::span<const ScriptKey> SessionSetup::operator_script() const {
+  return settings.cart.pedal.kind == config::LinkKind::kSimulated ? scene.view().script : std::span<const ScriptKey>();
+}
+
+bool SessionSetup::has_recorder() const { return HasRecorder(settings); }
+
+}  // namespace fulcrum::supervisor

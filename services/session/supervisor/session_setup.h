@@ -1,0 +1,49 @@
+// What is fixed before a session starts anything: settings, scene, session folder, nodes.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "services/base/core/scene_view.h"
+#include "services/scene/format/scene_file.h"
+#include "services/session/supervisor/domain_guard.h"
+#include "services/session/supervisor/node_starter.h"
+#include "services/session/supervisor/session_folder.h"
+#include "services/session/supervisor/supervisor.h"
+#include "services/session/supervisor/training_log.h"
+#include "services/transport/bus/security.h"
+
+namespace fulcrum::supervisor {
+
+struct SessionSetup {
+  /// Checks the keys, takes the domain, opens shared memory and the trainees' database, makes the session folder.
+  /// Throws InputError or MismatchError.
+  explicit SessionSetup(const UpSettings& up);
+  SessionSetup(const SessionSetup&) = delete;
+  SessionSetup& operator=(const SessionSetup&) = delete;
+
+  /// The supervisor's own.
+  [[nodiscard]] bus::Security security() const;
+  /// The script that sets the generator: empty on a cart with a real pedal, where a person operates it.
+  [[nodiscard]] std::span<const ScriptKey> operator_script() const;
+  [[nodiscard]] bool has_recorder() const;
+
+  const UpSettings settings;
+  const scene::SceneFile scene;
+  const double end_s;              ///< Session time of the end [s]; 0: until stopped.
+  const std::string keys_warning;  ///< One line on keys that expire soon; empty: none.
+  const DomainGuard guard;
+  /// Directory on /dev/shm. Opened right after the guard: tools that find a session read its security there.
+  const std::filesystem::path memory;
+  std::optional<TrainingLog> training;  ///< Empty: no trainee was named.
+  const SessionFolder folder;
+  const std::filesystem::path recording;  ///< The recorder's first file; empty: none.
+  const NodeStarter starter;
+  const std::vector<NodeId> node_ids;    ///< On this host, the recorder last.
+  const std::vector<NodeId> remote_ids;  ///< Of the scene, on another host.
+};
+
+}  // namespace fulcrum::supervisor

@@ -1,0 +1,27 @@
+#include "services/session/supervisor/session_status.h"
+
+#include <algorithm>
+
+#include "services/session/supervisor/outcome.h"
+#include "services/session/supervisor/script_outlook.h"
+
+namespace fulcrum::supervisor {
+
+void SessionStatus::Show(std::int64_t now_ns, const std::string& line) {
+  line_ = line;
+  progress_.Show(now_ns, line);
+}
+
+std::string FiguresLine(const SceneView& scene, const SessionRecord& record, double session_time_s, double end_s) {
+  const auto last = [&](const char* metric) { return record.last(metric); };
+  const std::string phase = PhaseAt(scene, session_time_s);
+  std::string line = "t " + Fixed(std::max(0.0, session_time_s), 1);
+  line += (end_s > 0 ? " / " + Fixed(end_s, 1) : std::string()) + " s";
+  line += phase.empty() ? "" : " · " + phase;
+  line += " · force " + Fixed(std::max(last("force0_N"), last("force1_N")), 2) + " N · displaced " +
+          Fixed(last("displacement_mm"), 1) + " mm · " + Fixed(last("temperature_C"), 0) + " °C · cut " +
+          Fixed(last("cut_length_mm"), 1) + " mm";
+  return line;
+}
+
+}  // namespace fulcrum::supervisor
