@@ -1,232 +1,33 @@
+// From what a session reports to its summary, table, pictures, clip and report.
+#include "services/session/supervisor/report.h"
+
 #include <gtest/gtest.h>
 #include <png.h>
-#include <signal.h>
 
-#include <chrono>
+#include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <thread>
+#include <iterator>
+#include <limits>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include "services/base/core/error.h"
-#include "services/session/supervisor/attached_node.h"
-#include "services/session/supervisor/child_process.h"
 #include "services/session/supervisor/clip.h"
 #include "services/session/supervisor/outcome.h"
 #include "services/session/supervisor/picture.h"
 #include "services/session/supervisor/progress.h"
-#include "services/session/supervisor/report.h"
-#include "services/session/supervisor/restart_policy.h"
-#include "services/session/supervisor/scene_cache.h"
 #include "services/session/supervisor/script_outlook.h"
 #include "services/session/supervisor/session_record.h"
 #include "services/session/supervisor/svg_plot.h"
+#include "tests/unit/supervisor/temporary_folder.h"
 
 namespace fulcrum::supervisor {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::int64_t kMs = 1'000'000;
-
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "fulcrum_supervisor_unit_XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~Folder() { fs::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  [[nodiscard]] const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
-// ------------------------------------------------------------------------------------------------- attached node
-
-/// A node that somebody else runs: here a process that only sleeps.
-class AttachedNodeTest : public ::testing::Test {
- protected:
-  AttachedNodeTest() : node_(Command(), folder_.path() / "nodes", [this](NodeId, const char* verb) { order_ = verb; }) {
-    node_.Start(kStart);
-  }
-  static NodeCommand Command() {
-    NodeCommand command;
-    command.id = NodeId::kPhysics;
-    command.arguments = {"--scene", "/run/scene.fulcrum"};
-    return command;
-  }
-  ChildProcess Sleeper() const { return ChildProcess::Start("/bin/sleep", {"600"}, folder_.path() / "log"); }
-  bool Report(pid_t pid, HealthState state = HealthState::kRunning) {
-    Health health;
-    health.node = NodeId::kPhysics;
-    health.pid = pid;
-    health.state = state;
-    return node_.OnHealth(health, kStart);
-  }
-  static void Kill(ChildProcess* process) {
-    process->Signal(SIGKILL);
-    while (!process->Poll()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-
-  static constexpr std::int64_t kStart = 1'000'000'000'000;
-  Folder folder_;
-  std::string order_;
-  AttachedNode node_;
-};
-
-TEST_F(AttachedNodeTest, WritesWhatItsServiceIsGiven) {
-  std::ifstream file(folder_.path() / "nodes" / "physics_node");
-  std::string line;
-  std::getline(file, line);
-  EXPECT_EQ(line, "FULCRUM_ARGUMENTS=\"--scene /run/scene.fulcrum\"");
-  EXPECT_THROW((void)AttachedNode::ArgumentsFile({"--file", "/my recordings/a.mcap"}), InputError);
-  EXPECT_THROW((void)AttachedNode::ArgumentsFile({"$HOME"}), InputError);
-  node_.Stop();
-  EXPECT_FALSE(fs::exists(folder_.path() / "nodes" / "physics_node")) << "it would be started after the session";
-}
-
-TEST_F(AttachedNodeTest, NoticesADeathAndTheReturn) {
-  ChildProcess first = Sleeper(), other = Sleeper();
-  EXPECT_TRUE(Report(first.pid()));
-  EXPECT_FALSE(Report(other.pid())) << "the first one lives";
-  EXPECT_FALSE(node_.Update(kStart).has_value());
-  const pid_t dead = first.pid();
-  Kill(&first);
-  EXPECT_FALSE(node_.Update(kStart).has_value()) << "it may have said that it ends";
-  const auto death = node_.Update(kStart + 300 * kMs);
-  ASSERT_TRUE(death.has_value());
-  EXPECT_FALSE(death->for_good);
-  EXPECT_FALSE(death->asked);
-  EXPECT_EQ(death->at_ns, kStart);
-  EXPECT_FALSE(node_.running());
-  EXPECT_FALSE(Report(dead)) << "a late sample of the dead one";
-  EXPECT_FALSE(node_.Update(kStart + 400 * kMs).has_value()) << "told once";
-  EXPECT_TRUE(Report(other.pid()));
-  EXPECT_TRUE(node_.running());
-}
-
-TEST_F(AttachedNodeTest, DoesNotWaitForLastWordsWhenTheNextOneSpeaks) {
-  ChildProcess first = Sleeper(), second = Sleeper();
-  ASSERT_TRUE(Report(first.pid()));
-  Kill(&first);
-  EXPECT_FALSE(node_.Update(kStart).has_value());
-  EXPECT_FALSE(Report(second.pid())) << "the death is told first";
-  EXPECT_TRUE(node_.Update(kStart).has_value());
-  EXPECT_TRUE(Report(second.pid()));
-}
-
-TEST_F(AttachedNodeTest, LastWordsMayComeAfterTheEnd) {
-  ChildProcess first = Sleeper();
-  ASSERT_TRUE(Report(first.pid()));
-  const pid_t dead = first.pid();
-  Kill(&first);
-  EXPECT_FALSE(node_.Update(kStart).has_value());
-  EXPECT_TRUE(Report(dead, HealthState::kStopping));
-  EXPECT_FALSE(node_.Update(kStart + 300 * kMs).has_value()) << "it was stopped, it did not die";
-}
-
-TEST_F(AttachedNodeTest, OneThatWasStoppedIsReportedWhenItIsBack) {
-  ChildProcess first = Sleeper(), second = Sleeper();
-  node_.AskRestart(kStart);
-  EXPECT_EQ(order_, "restart");
-  ASSERT_TRUE(Report(first.pid()));
-  ASSERT_TRUE(Report(first.pid(), HealthState::kStopping));
-  Kill(&first);
-  EXPECT_FALSE(node_.Update(kStart).has_value());
-  ASSERT_TRUE(Report(second.pid()));
-  const auto death = node_.Update(kStart + kMs);
-  ASSERT_TRUE(death.has_value());
-  EXPECT_TRUE(death->asked);
-  EXPECT_EQ(death->at_ns, kStart) << "how long it took to come back counts from its end";
-}
-
-TEST_F(AttachedNodeTest, HasFailedForGoodWhenItStaysAway) {
-  EXPECT_FALSE(node_.Update(kStart + 59'000 * kMs).has_value());
-  const auto death = node_.Update(kStart + 61'000 * kMs);
-  ASSERT_TRUE(death.has_value());
-  EXPECT_TRUE(death->for_good);
-  EXPECT_TRUE(node_.failed());
-}
-
-// ------------------------------------------------------------------------------------------------ restart policy
-
-TEST(RestartPolicyTest, FirstDeathIsRestartedAtOnce) {
-  RestartPolicy policy;
-  EXPECT_EQ(policy.OnDeath(10 * kMs), 0);
-}
-
-TEST(RestartPolicyTest, CrashLoopBacksOffAndThenGivesUp) {
-  RestartPolicy policy(
-      {.healthy_ns = 1000 * kMs, .first_delay_ns = 100 * kMs, .longest_delay_ns = 250 * kMs, .most_quick_deaths = 6});
-  EXPECT_EQ(policy.OnDeath(kMs), 0);
-  EXPECT_EQ(policy.OnDeath(kMs), 100 * kMs);
-  EXPECT_EQ(policy.OnDeath(kMs), 200 * kMs);
-  EXPECT_EQ(policy.OnDeath(kMs), 250 * kMs);
-  EXPECT_EQ(policy.OnDeath(kMs), 250 * kMs);
-  EXPECT_EQ(policy.OnDeath(kMs), std::nullopt);
-}
-
-TEST(RestartPolicyTest, LongLifeStartsTheCountAnew) {
-  const RestartSettings settings;
-  RestartPolicy policy(settings);
-  for (int i = 0; i < 100; ++i) {
-    EXPECT_EQ(policy.OnDeath(settings.healthy_ns), 0);
-  }
-}
-
-// ------------------------------------------------------------------------------------------------ child process
-
-ProcessEnd WaitFor(ChildProcess* child) {
-  for (;;) {
-    if (const auto end = child->Poll()) return *end;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-}
-
-TEST(ChildProcessTest, ReportsExitCodeAndKeepsTheOutput) {
-  const Folder folder;
-  ChildProcess child = ChildProcess::Start("/bin/sh", {"-c", "echo out; echo err >&2; exit 3"}, folder.path() / "log");
-  const ProcessEnd end = WaitFor(&child);
-  EXPECT_EQ(end.exit_code, 3);
-  EXPECT_EQ(end.Describe(), "ended with exit code 3 (scene or schema mismatch)");
-  EXPECT_FALSE(child.running());
-  std::ifstream log(folder.path() / "log");
-  std::string first, second;
-  EXPECT_TRUE(log >> first >> second);
-  EXPECT_EQ(first + second, "outerr");
-}
-
-TEST(ChildProcessTest, ReportsTheSignal) {
-  const Folder folder;
-  ChildProcess child = ChildProcess::Start("/bin/sleep", {"100"}, folder.path() / "log");
-  EXPECT_FALSE(child.Poll().has_value());
-  child.Signal(SIGKILL);
-  EXPECT_EQ(WaitFor(&child).Describe(), "killed by signal 9 (Killed)");
-}
-
-TEST(ChildProcessTest, MissingProgramIsRefusedByName) {
-  const Folder folder;
-  try {
-    (void)ChildProcess::Start(folder.path() / "nothing", {}, folder.path() / "log");
-    FAIL() << "a missing program was started";
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("nothing: No such file"), std::string::npos) << error.what();
-  }
-}
-
-TEST(ChildProcessTest, DestructionLeavesNoProcess) {
-  const Folder folder;
-  pid_t pid = 0;
-  {
-    const ChildProcess child = ChildProcess::Start("/bin/sleep", {"100"}, folder.path() / "log");
-    pid = child.pid();
-    EXPECT_EQ(::kill(pid, 0), 0);
-  }
-  EXPECT_NE(::kill(pid, 0), 0);
-}
 
 // ------------------------------------------------------------------------------------------------ session record
 
@@ -412,7 +213,7 @@ void WritePng(const fs::path& file, unsigned width, unsigned height) {
 }
 
 TEST(PictureTest, FramesAreFoundByTimeAndStrangersLeft) {
-  const Folder folder;
+  const TemporaryFolder folder;
   for (const char* name :
        {"frame_0012500.png", "frame_0000500.png", "frame_x.png", "frame_.png", "other.png", "frame_0000700.png.part"}) {
     std::ofstream(folder.path() / name) << "x";
@@ -440,7 +241,7 @@ TEST(PictureTest, SpreadTakesFirstLastAndEvenTimesOnceEach) {
 }
 
 TEST(PictureTest, EmbedsAndShrinks) {
-  const Folder folder;
+  const TemporaryFolder folder;
   WritePng(folder.path() / "frame_0000000.png", 64, 32);
   const std::string full = EmbedPng(folder.path() / "frame_0000000.png", 1);
   EXPECT_TRUE(full.starts_with("data:image/png;base64,iVBOR"));
@@ -462,7 +263,7 @@ class ClipTest : public ::testing::Test {
   }
   [[nodiscard]] bool Make() const { return MakeClip(folder_.path(), clip_, folder_.path() / "clip.log"); }
 
-  const Folder folder_;
+  const TemporaryFolder folder_;
   const fs::path clip_ = folder_.path() / "clip.mp4";
   const std::string path_;
 };
@@ -494,7 +295,7 @@ TEST_F(ClipTest, WithoutPicturesOrProgramOrAfterAFailureThereIsNone) {
 }
 
 TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
-  const Folder folder;
+  const TemporaryFolder folder;
   WritePng(folder.path() / "frame_0001000.png", 64, 32);
   SessionOutcome outcome;
   outcome.scene_name = "<tiny>";
@@ -517,76 +318,6 @@ TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   }
   for (const char* outside : {"http://", "https://", "src='/", "<script", "<link"}) {
     EXPECT_EQ(html.find(outside), std::string::npos) << outside;
-  }
-}
-
-// --------------------------------------------------------------------------------------------------- scene cache
-
-class SceneCacheTest : public ::testing::Test {
- protected:
-  SceneCacheTest() {
-    request_.library = folder_.path() / "scenes";
-    request_.compiler = folder_.path() / "compiler";
-    request_.cache = folder_.path() / "cache";
-    fs::create_directory(request_.library);
-    std::ofstream(request_.library / "one.yaml") << "name: one\nfolders: [../meshes]\nmesh: organ.stl\n";
-    fs::create_directory(folder_.path() / "meshes");
-    std::ofstream(folder_.path() / "meshes" / "organ.stl") << "solid";
-    Program("echo run >> \"$0.runs\"; cp \"$1\" \"$3\"");
-  }
-  void Program(const std::string& body) const {
-    std::ofstream(request_.compiler) << "#!/bin/sh\n" << body << "\n";
-    fs::permissions(request_.compiler, fs::perms::owner_all);
-  }
-  int Runs() const {
-    std::ifstream stream(request_.compiler.string() + ".runs");
-    int runs = 0;
-    for (std::string line; std::getline(stream, line);) ++runs;
-    return runs;
-  }
-  Folder folder_;
-  SceneRequest request_;
-};
-
-TEST_F(SceneCacheTest, CompilesOnceUntilAnInputChanges) {
-  request_.name = "one";
-  const fs::path first = ResolveScene(request_);
-  EXPECT_TRUE(fs::exists(first));
-  EXPECT_EQ(ResolveScene(request_), first);
-  EXPECT_EQ(Runs(), 1);
-  std::ofstream(folder_.path() / "meshes" / "organ.stl") << "solid changed";
-  EXPECT_NE(ResolveScene(request_), first);
-  EXPECT_EQ(Runs(), 2);
-  std::ofstream(request_.library / "one.yaml") << "name: two\n";
-  (void)ResolveScene(request_);
-  EXPECT_EQ(Runs(), 3);
-}
-
-TEST_F(SceneCacheTest, CompiledFileIsTakenAsItIs) {
-  std::ofstream(folder_.path() / "ready.fulcrum") << "x";
-  request_.name = (folder_.path() / "ready.fulcrum").string();
-  EXPECT_EQ(ResolveScene(request_), request_.name);
-  EXPECT_EQ(Runs(), 0);
-}
-
-TEST_F(SceneCacheTest, UnknownNameListsTheShippedOnes) {
-  request_.name = "three";
-  try {
-    (void)ResolveScene(request_);
-    FAIL() << "an unknown scene was found";
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("one"), std::string::npos) << error.what();
-  }
-}
-
-TEST_F(SceneCacheTest, CompilersComplaintIsPassedOn) {
-  Program("echo \"one.yaml: organ: missing\" >&2; exit 2");
-  request_.name = "one";
-  try {
-    (void)ResolveScene(request_);
-    FAIL() << "a scene that does not compile was found";
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("one.yaml: organ: missing"), std::string::npos) << error.what();
   }
 }
 

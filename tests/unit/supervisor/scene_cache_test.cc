@@ -1,0 +1,87 @@
+// Compiled scenes are kept until one of their inputs changes.
+#include "services/session/supervisor/scene_cache.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "services/base/core/error.h"
+#include "tests/unit/supervisor/temporary_folder.h"
+
+namespace fulcrum::supervisor {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SceneCacheTest : public ::testing::Test {
+ protected:
+  SceneCacheTest() {
+    request_.library = folder_.path() / "scenes";
+    request_.compiler = folder_.path() / "compiler";
+    request_.cache = folder_.path() / "cache";
+    fs::create_directory(request_.library);
+    std::ofstream(request_.library / "one.yaml") << "name: one\nfolders: [../meshes]\nmesh: organ.stl\n";
+    fs::create_directory(folder_.path() / "meshes");
+    std::ofstream(folder_.path() / "meshes" / "organ.stl") << "solid";
+    Program("echo run >> \"$0.runs\"; cp \"$1\" \"$3\"");
+  }
+  void Program(const std::string& body) const {
+    std::ofstream(request_.compiler) << "#!/bin/sh\n" << body << "\n";
+    fs::permissions(request_.compiler, fs::perms::owner_all);
+  }
+  int Runs() const {
+    std::ifstream stream(request_.compiler.string() + ".runs");
+    int runs = 0;
+    for (std::string line; std::getline(stream, line);) ++runs;
+    return runs;
+  }
+  TemporaryFolder folder_;
+  SceneRequest request_;
+};
+
+TEST_F(SceneCacheTest, CompilesOnceUntilAnInputChanges) {
+  request_.name = "one";
+  const fs::path first = ResolveScene(request_);
+  EXPECT_TRUE(fs::exists(first));
+  EXPECT_EQ(ResolveScene(request_), first);
+  EXPECT_EQ(Runs(), 1);
+  std::ofstream(folder_.path() / "meshes" / "organ.stl") << "solid changed";
+  EXPECT_NE(ResolveScene(request_), first);
+  EXPECT_EQ(Runs(), 2);
+  std::ofstream(request_.library / "one.yaml") << "name: two\n";
+  (void)ResolveScene(request_);
+  EXPECT_EQ(Runs(), 3);
+}
+
+TEST_F(SceneCacheTest, CompiledFileIsTakenAsItIs) {
+  std::ofstream(folder_.path() / "ready.fulcrum") << "x";
+  request_.name = (folder_.path() / "ready.fulcrum").string();
+  EXPECT_EQ(ResolveScene(request_), request_.name);
+  EXPECT_EQ(Runs(), 0);
+}
+
+TEST_F(SceneCacheTest, UnknownNameListsTheShippedOnes) {
+  request_.name = "three";
+  try {
+    (void)ResolveScene(request_);
+    FAIL() << "an unknown scene was found";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("one"), std::string::npos) << error.what();
+  }
+}
+
+TEST_F(SceneCacheTest, CompilersComplaintIsPassedOn) {
+  Program("echo \"one.yaml: organ: missing\" >&2; exit 2");
+  request_.name = "one";
+  try {
+    (void)ResolveScene(request_);
+    FAIL() << "a scene that does not compile was found";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("one.yaml: organ: missing"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace fulcrum::supervisor
