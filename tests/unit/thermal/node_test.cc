@@ -1,92 +1,16 @@
-// The thermal node on in-process ports.
+// What the thermal node publishes, keeps over a restart and severs, on in-process ports.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <memory>
-#include <optional>
-#include <utility>
+#include <string>
 #include <vector>
 
-#include "tests/numerics/thermal/flat_scene.h"
 #include "tests/numerics/thermal/topology_validator.h"
-#include "tests/unit/thermal/node_bus.h"
+#include "tests/unit/thermal/node_fixture.h"
 
 namespace fulcrum::thermal {
 namespace {
-
-class ThermalNodeTest : public ::testing::Test {
- protected:
-  ThermalNodeTest() : data_(FlatScene(31, 41, 1e-3f)), scene_(data_.View()) {
-    folder_ =
-        std::filesystem::temp_directory_path() / ("fulcrum_thermal_node_" + std::to_string(::getpid()) + "_" +
-                                                  ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    std::filesystem::create_directories(folder_);
-  }
-  ~ThermalNodeTest() override { std::filesystem::remove_all(folder_); }
-
-  void OpenCheckpoint() {
-    checkpoint_.reset();  // the file is locked by its owner
-    checkpoint_ = std::make_unique<runtime::CheckpointFile>(folder_ / "thermal_node.checkpoint", scene_.hash,
-                                                            kCheckpointLayout, ThermalNode::CheckpointCapacity(scene_));
-  }
-  std::unique_ptr<ThermalNode> MakeNode() {
-    return std::make_unique<ThermalNode>(scene_, bus_.ports(), checkpoint_.get(), ++epoch_);
-  }
-
-  /// The tip is at (s, 10.2 mm), energised, at a moment of the session.
-  void Send(float s, double time_s) {
-    if (demands_) bus_.Demand(CauteryMode::kCut, 35, std::max(std::llround(1e9 * time_s) - 1000, 0LL));
-    CauteryContact contact = TouchAt({s, 0.0102f}, 5e-4f);
-    contact.session_time_s = time_s;
-    contact.stamp = {++sequence_, 1, tick_.stamp_ns};
-    ASSERT_TRUE(bus_.contact_out->Write(contact));
-  }
-  /// One tick with the tip there.
-  void Touch(ThermalNode* node, float s) {
-    Send(s, tick_.session_time_s);
-    Step(node);
-  }
-  /// What a node gives into contacts of 0.2 s that it was away for, until it hears of the pedal again.
-  double EnergyAfterAnOutage(CauteryMode mode_after);
-  [[nodiscard]] TickManifest NewestManifest() {
-    TickManifest manifest;
-    EXPECT_TRUE(bus_.manifest_in->TakeLatest(&manifest));
-    return manifest;
-  }
-  /// Sequences of the samples of a topic that the newest tick consumed.
-  [[nodiscard]] std::vector<std::uint64_t> NewestConsumed(TopicId topic) {
-    std::vector<std::uint64_t> sequences;
-    for (const ConsumedInput& input : NewestManifest().consumed) {
-      if (input.topic == topic) sequences.push_back(input.sequence);
-    }
-    return sequences;
-  }
-  void Step(ThermalNode* node) {
-    Advance(&tick_);
-    node->Step(tick_);
-  }
-  /// Cuts from s0 to s1 at 8 mm/s.
-  void Cut(ThermalNode* node, float s0, float s1) {
-    for (float s = s0; s < s1; s += 8e-5f) Touch(node, s);
-  }
-  std::optional<TopologyState> NewestTopology() {
-    TopologyState state;
-    return bus_.topology_in->TakeLatest(&state) ? std::optional(state) : std::nullopt;
-  }
-
-  scene::SceneData data_;
-  SceneView scene_;
-  std::filesystem::path folder_;
-  NodeBus bus_;
-  std::unique_ptr<runtime::CheckpointFile> checkpoint_;
-  Tick tick_;
-  bool demands_ = true;  ///< With each contact the pedal is down.
-  std::uint64_t sequence_ = 0;
-  std::int64_t epoch_ = 100;
-};
 
 TEST_F(ThermalNodeTest, CutGivesTopologyEventsPatchesAndMetrics) {
   auto node = MakeNode();
@@ -190,19 +114,6 @@ TEST_F(ThermalNodeTest, MetalThatMovedOnDuringAnOutageLeavesNoBridge) {
     ASSERT_NE(tile, nullptr) << s;
     EXPECT_NE(tile->state.flags[(cell.iy % kTile) * kTile + cell.ix % kTile] & kRemoved, 0) << "living at s = " << s;
   }
-}
-
-TEST_F(ThermalNodeTest, SamplesOfATimeThatWasAppliedArePassedOver) {
-  auto node = MakeNode();
-  Cut(node.get(), 0.010f, 0.012f);
-  Step(node.get());
-  const double joule = node->solver().ledger().joule, now_s = tick_.session_time_s;
-  // A physics node that was started again repeats the last tenth of a second.
-  for (int back = 10; back > 1; --back) {
-    Send(0.011f, now_s - 0.01 * back - 0.01);
-    Step(node.get());
-  }
-  EXPECT_EQ(node->solver().ledger().joule, joule);
 }
 
 TEST_F(ThermalNodeTest, TornEdgesOfOneTriangleAreJoinedToOneCrack) {
@@ -343,109 +254,6 @@ TEST_F(ThermalNodeTest, SameInputsGiveTheSameHashes) {
   EXPECT_EQ(run(), run());
 }
 
-TEST_F(ThermalNodeTest, EveryContactIsConsumedAndNamedInTheManifest) {
-  auto node = MakeNode();
-  for (int n = 0; n < 3; ++n) Send(0.010f + 4e-5f * static_cast<float>(n), 0.01 * n);
-  Step(node.get());
-  const TickManifest manifest = NewestManifest();
-  for (const TopicId topic : {TopicId::kCauteryContact, TopicId::kHandleState, TopicId::kGeneratorSetting}) {
-    std::vector<std::uint64_t> sequences;
-    for (const ConsumedInput& input : manifest.consumed) {
-      if (input.topic == topic) sequences.push_back(input.sequence);
-    }
-    EXPECT_EQ(sequences, (std::vector<std::uint64_t>{1, 2, 3}));
-  }
-  EXPECT_GT(node->solver().ledger().joule, 0.0);
-  Step(node.get());
-  EXPECT_TRUE(NewestManifest().consumed.empty());
-}
-
-TEST_F(ThermalNodeTest, OfManyContactsTheLaterOnesWaitForTheNextFrame) {
-  auto node = MakeNode();
-  for (int n = 0; n < 12; ++n) Send(0.010f + 4e-5f * static_cast<float>(n), 0.01 * n);
-  Step(node.get());
-  const std::vector<std::uint64_t> first = NewestConsumed(TopicId::kCauteryContact);
-  ASSERT_EQ(first.size(), kMostSamples);
-  EXPECT_EQ(first.front(), 1u);
-  Step(node.get());
-  const std::vector<std::uint64_t> second = NewestConsumed(TopicId::kCauteryContact);
-  ASSERT_EQ(second.size(), 12 - kMostSamples);
-  EXPECT_EQ(second.front(), kMostSamples + 1);
-  EXPECT_EQ(second.back(), 12u);
-}
-
-TEST_F(ThermalNodeTest, WithoutAGeneratorSettingThereIsNoCurrentAndHealthSaysSo) {
-  auto node = MakeNode();
-  demands_ = false;
-  HandleState down;
-  down.stamp = {1, 1, 0};
-  down.pedals = kPedalCut;
-  ASSERT_TRUE(bus_.handle_out->Write(down));
-  for (int n = 0; n < 5; ++n) Touch(node.get(), 0.010f);
-  EXPECT_EQ(node->solver().ledger().joule, 0.0);
-  Health health;
-  node->FillHealth(&health);
-  EXPECT_NE(health.last_error.find("GeneratorSetting"), std::string::npos) << health.last_error;
-}
-
-TEST_F(ThermalNodeTest, APedalThatFallsSilentIsUp) {
-  auto node = MakeNode();
-  Touch(node.get(), 0.010f);
-  demands_ = false;
-  const double begun = node->solver().ledger().generator;
-  for (int n = 0; n < 10; ++n) Touch(node.get(), 0.010f);
-  const double heard = node->solver().ledger().generator;
-  EXPECT_GT(heard, begun);
-  for (int n = 0; n < 10; ++n) Touch(node.get(), 0.010f);
-  EXPECT_LT(node->solver().ledger().generator - heard, 0.02 * (heard - begun) + 0.4) << "a frame of 35 W at most";
-}
-
-TEST_F(ThermalNodeTest, ANewSettingIsTakenAtItsTime) {
-  auto node = MakeNode();
-  for (int n = 0; n < 5; ++n) Touch(node.get(), 0.010f);
-  EXPECT_TRUE(node->TakeSettingChanged());
-  EXPECT_FALSE(node->TakeSettingChanged());
-  EXPECT_EQ(node->solver().figures().set_power_W, 35);
-  demands_ = false;
-  bus_.Demand(CauteryMode::kCut, 50, std::llround(1e9 * (tick_.session_time_s + 0.015)));
-  Touch(node.get(), 0.010f);
-  EXPECT_EQ(node->solver().figures().set_power_W, 35) << "not yet";
-  for (int n = 0; n < 2; ++n) Touch(node.get(), 0.010f);
-  EXPECT_EQ(node->solver().figures().set_power_W, 50);
-  EXPECT_TRUE(node->TakeSettingChanged());
-}
-
-double ThermalNodeTest::EnergyAfterAnOutage(CauteryMode mode_after) {
-  std::filesystem::remove(folder_ / "thermal_node.checkpoint");
-  tick_ = {};
-  demands_ = true;
-  OpenCheckpoint();
-  auto node = MakeNode();
-  Cut(node.get(), 0.010f, 0.012f);
-  node.reset();
-  OpenCheckpoint();
-  // Twenty contacts without a word of the pedal, which is heard of only after that.
-  demands_ = false;
-  double time_s = tick_.session_time_s;
-  for (int n = 0; n < 20; ++n, time_s += 0.01) Send(0.012f + 8e-5f * static_cast<float>(n), time_s);
-  tick_.session_time_s = time_s;
-  tick_.stamp_ns = std::llround(1e9 * time_s);
-  node = MakeNode();
-  EXPECT_TRUE(node->restored());
-  Step(node.get());
-  EXPECT_TRUE(NewestConsumed(TopicId::kCauteryContact).empty());
-  bus_.Demand(mode_after, 35, tick_.stamp_ns);
-  const double before = node->solver().ledger().generator;
-  for (int n = 0; n < 4; ++n) Step(node.get());
-  return node->solver().ledger().generator - before;
-}
-
-TEST_F(ThermalNodeTest, OneThatComesBackWaitsForThePedalOfTheContactsItMissed) {
-  const double down = EnergyAfterAnOutage(CauteryMode::kCut), up = EnergyAfterAnOutage(CauteryMode::kOff);
-  EXPECT_GT(up, 0.5) << "for a tenth of a second after it was last heard of the pedal is down";
-  EXPECT_GT(down, 1.5 * up) << "both ends of the silence say down";
-}
-
 TEST_F(ThermalNodeTest, TellsPhysicsWhatIsGoneAroundTheHook) {
   auto node = MakeNode();
   const Sheet& sheet = node->solver().field().sheet();
@@ -474,47 +282,6 @@ TEST_F(ThermalNodeTest, TellsPhysicsWhatIsGoneAroundTheHook) {
   // Nothing changes: nothing is sent.
   for (int n = 60; n < 70; ++n) Step(node.get());
   EXPECT_FALSE(bus_.open_in->TakeLatest(&cells));
-}
-
-TEST_F(ThermalNodeTest, ContactsThatComeTwoByTwoCutWhatTheyCutOneByOne) {
-  // 12 mm at 8 mm/s; in the second run thermal is woken for every other contact, and as often in between.
-  const auto cut = [&](int at_once) {
-    tick_ = {};
-    auto node = MakeNode();
-    for (int n = 0; n < 150; ++n) {
-      Send(0.010f + 8e-5f * static_cast<float>(n), 0.01 * n);
-      if (n % at_once == at_once - 1) Step(node.get());
-    }
-    for (int n = 0; n < 20 * kCommitFrames; ++n) Step(node.get());  // The length follows the slit.
-    return std::pair(node->solver().cut_length_m(), node->solver().ledger().joule);
-  };
-  const auto [length_m, joule] = cut(1);
-  const auto [length2_m, joule2] = cut(2);
-  EXPECT_GT(length_m, 0.011f);
-  EXPECT_NEAR(length2_m, length_m, 0.0015f);
-  // Conduction and source alternate over steps of twice the length, and conduction has half the time.
-  EXPECT_NEAR(joule2, joule, 0.1 * joule);
-}
-
-TEST_F(ThermalNodeTest, ContactOfNoNumbersIsCountedAndChangesNothing) {
-  auto node = MakeNode();
-  Step(node.get());
-  const std::uint64_t before = node->solver().FullHash();
-  for (const float bad : {NAN, INFINITY, -INFINITY}) Touch(node.get(), bad);
-  EXPECT_EQ(bus_.contact_in->stats().rejected, 3u);
-  EXPECT_EQ(node->solver().FullHash(), before);
-  Touch(node.get(), 0.01f);  // and the next good one is used
-  EXPECT_TRUE(node->solver().stepped());
-}
-
-TEST_F(ThermalNodeTest, ContactOffTheSheetIsRefusedAndCounted) {
-  auto node = MakeNode();
-  Touch(node.get(), 0.5f);
-  Touch(node.get(), 0.01f);
-  Health health;
-  node->FillHealth(&health);
-  EXPECT_EQ(health.metrics.back().name, "contacts_refused");
-  EXPECT_EQ(health.metrics.back().value, 1);
 }
 
 }  // namespace
