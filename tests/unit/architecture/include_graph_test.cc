@@ -44,6 +44,7 @@ const std::set<std::string> kNodes = {"physics_node", "haptics_node", "handle_br
 const std::string kJoinsNodes = "services/apps/";
 /// What a node's folder may include of the services: up to the class that makes its ports.
 const std::string kHighestOfNodes = "services/nodes/app";
+constexpr std::size_t kLongestFile = 500, kLongestMain = 60;  ///< [lines]
 
 /// The room of a path from the root; empty: none of the product's.
 std::string RoomOf(const std::string& path) {
@@ -137,6 +138,20 @@ TEST(IncludeGraph, FoldersOfANodeDoNotIncludeEachOtherInACircle) {
     std::string text;
     for (const std::string& target : targets) text += " " + target;
     ADD_FAILURE() << folder << " is in a circle with, or above one of:" << text;
+  }
+}
+
+TEST(Sources, NoFileIsLongerThanFitsAReadersHead) {
+  std::vector<std::string> sources = SourcesOfTheProduct();
+  const std::vector<std::string> tests = Sources({"tests"});
+  sources.insert(sources.end(), tests.begin(), tests.end());
+  for (const std::string& source : sources) EXPECT_LE(LinesOf(source).size(), kLongestFile) << source;
+}
+
+TEST(Sources, AMainOnlyJoins) {
+  for (const std::string& source : SourcesOfTheProduct()) {
+    if (!source.ends_with("/main.cc")) continue;
+    EXPECT_LE(LinesOf(source).size(), kLongestMain) << source;
   }
 }
 
