@@ -9,10 +9,10 @@ fulcrum_fail() {
   exit "${2:-1}"
 }
 
-# Installs what deploy/packages.txt names and is not there.
+# fulcrum_packages [FILE]: installs what FILE (deploy/packages.txt) names and is not there.
 fulcrum_packages() {
   local wanted missing
-  mapfile -t wanted < <(sed -e 's/#.*//' -e 's/[[:space:]]//g' -e '/^$/d' "$fulcrum_root/deploy/packages.txt")
+  mapfile -t wanted < <(sed -e 's/#.*//' -e 's/[[:space:]]//g' -e '/^$/d' "${1:-$fulcrum_root/deploy/packages.txt}")
   # Node.js from elsewhere brings an npm of its own, which Debian's would conflict with.
   if command -v npm >/dev/null; then
     mapfile -t wanted < <(printf '%s\n' "${wanted[@]}" | grep -vx -e nodejs -e npm)

@@ -1,9 +1,8 @@
 // The levels above the particles at work: down to the coarse nodes, their solve, and up again.
-#include <xmmintrin.h>
-
 #include <algorithm>
 
 #include "physics_node/implicit/coarse_space.h"
+#include "physics_node/simd/sse.h"
 
 namespace fulcrum::physics::implicit {
 

@@ -1,11 +1,10 @@
 #include "physics_node/implicit/elements.h"
 
-#include <xmmintrin.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "physics_node/collision/tissue_collision.h"
+#include "physics_node/simd/sse.h"
 
 namespace fulcrum::physics::implicit {
 namespace {

@@ -1,9 +1,9 @@
 #include "physics_node/implicit/hinge_matrix.h"
 
-#include <xmmintrin.h>
-
 #include <algorithm>
 #include <map>
+
+#include "physics_node/simd/sse.h"
 
 namespace fulcrum::physics::implicit {
 

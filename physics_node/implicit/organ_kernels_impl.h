@@ -2,9 +2,8 @@
 // column of a 3 x 3 matrix is one register xyz_. Those that go over patches are in organ_patches_impl.h.
 #pragma once
 
-#include <immintrin.h>
-
 #include "physics_node/implicit/kernels.h"
+#include "physics_node/simd/sse.h"
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 

@@ -1,6 +1,5 @@
 #include "physics_node/implicit/workers.h"
 
-#include <immintrin.h>
 #include <sched.h>
 
 #include <algorithm>
@@ -15,6 +14,15 @@ constexpr std::chrono::microseconds kPatience{200};
 /// Pauses between two looks at the clock.
 constexpr int kPauses = 32;
 
+/// Leaves the processor's shared parts to the other thread of a core for a moment.
+void Pause() {
+#if defined(__x86_64__)
+  __builtin_ia32_pause();
+#elif defined(__aarch64__)
+  asm volatile("isb" ::: "memory");
+#endif
+}
+
 /// Spins until done() or out of patience, and returns whether done().
 template <class Done>
 bool SpinUntil(const Done& done) {
@@ -24,7 +32,7 @@ bool SpinUntil(const Done& done) {
       if (done()) {
         return true;
       }
-      _mm_pause();
+      Pause();
     }
   } while (std::chrono::steady_clock::now() - start < kPatience);
   return false;

@@ -2,9 +2,9 @@
 // one instruction set, so that no copy of it leaks into another.
 #pragma once
 
-#include <immintrin.h>
-
 #include <cstdint>
+
+#include "physics_node/simd/sse.h"
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 

@@ -2,6 +2,8 @@
 
 namespace fulcrum::physics {
 
+#if defined(__x86_64__)
+
 bool Has(InstructionSet set) {
   switch (set) {
     case InstructionSet::kBaseline:
@@ -14,6 +16,12 @@ bool Has(InstructionSet set) {
   }
   return false;
 }
+
+#else
+
+bool Has(InstructionSet set) { return set == InstructionSet::kBaseline; }
+
+#endif
 
 InstructionSet BestInstructionSet() {
   if (Has(InstructionSet::kAvx512)) return InstructionSet::kAvx512;

@@ -1,6 +1,5 @@
 #include "services/base/runtime/realtime.h"
 
-#include <immintrin.h>
 #include <linux/capability.h>
 #include <pthread.h>
 #include <sched.h>
@@ -61,9 +60,17 @@ std::string SetFifoPriority(int priority) {
 }
 
 void FlushDenormals() {
-  constexpr unsigned kFlushToZero = 0x8000;
-  constexpr unsigned kDenormalsAreZero = 0x0040;
-  _mm_setcsr(_mm_getcsr() | kFlushToZero | kDenormalsAreZero);
+#if defined(__x86_64__)
+  // MXCSR: results, and operands.
+  constexpr unsigned kFlushToZero = 0x8000, kDenormalsAreZero = 0x0040;
+  __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | kFlushToZero | kDenormalsAreZero);
+#elif defined(__aarch64__)
+  // FPCR.FZ: results and operands.
+  constexpr std::uint64_t kFlushToZero = std::uint64_t{1} << 24;
+  std::uint64_t control = 0;
+  asm volatile("mrs %0, fpcr" : "=r"(control));
+  asm volatile("msr fpcr, %0" : : "r"(control | kFlushToZero));
+#endif
 }
 
 void InstallStopSignals() {
