@@ -1,4 +1,4 @@
-// Sixteen floats in one AVX-512 register: two batches of eight at a time. The same operations on each lane as F8's.
+// Sixteen floats in one AVX-512 register: two batches of eight at a time, with the operations of F8 on each lane.
 #pragma once
 
 #include <immintrin.h>
@@ -18,7 +18,7 @@ struct F16 {
   static constexpr int kBatches = 2;
   __m512 v;
   static F16 All(float s) { return {_mm512_set1_ps(s)}; }
-  /// Sixteen in a row, aligned as F8's.
+  /// Sixteen successive floats, aligned to 32 bytes as for F8.
   static F16 Load(const float* p) { return {_mm512_loadu_ps(p)}; }
   void Store(float* p) const { _mm512_storeu_ps(p, v); }
   static F16 Halves(F8 lo, F8 hi) {
@@ -43,7 +43,7 @@ inline F16 Select(M16 mask, F16 yes, F16 no) { return {_mm512_mask_blend_ps(mask
 inline F16 Abs(F16 a) { return {_mm512_abs_ps(a.v)}; }
 inline F16 SignOf(F16 a) { return {_mm512_and_ps(a.v, _mm512_set1_ps(-0.0f))}; }
 
-/// As F8's, in each half.
+/// RotateDown and RotateUp of F8 in each half.
 inline F16 RotateDown(F16 a) {
   return {_mm512_permutexvar_ps(_mm512_setr_epi32(1, 2, 3, 4, 5, 6, 7, 0, 9, 10, 11, 12, 13, 14, 15, 8), a.v)};
 }

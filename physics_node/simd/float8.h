@@ -1,5 +1,5 @@
-// Eight floats, on AVX in one register and on the baseline in two. Included only by lanes.h, inside the namespace of
-// one instruction set, so that no copy of it leaks into another.
+// Eight floats: with AVX in one register, on the baseline in two. Included only by lanes.h, in the namespace of one
+// instruction set, so that the linker cannot replace a function of one set by that of another.
 #pragma once
 
 #include <cstdint>
@@ -95,7 +95,7 @@ inline F8 RotateUp(F8 a) {
   return F8::Halves(_mm_castsi128_ps(_mm_alignr_epi8(l, h, 12)), _mm_castsi128_ps(_mm_alignr_epi8(h, l, 12)));
 }
 
-/// Rows of four floats in each half to columns, and back: the transpose is its own inverse.
+/// Transposes the 4 x 4 floats in each half of four rows: xyzw particles to lanes of x, y, z and w, and back.
 inline void Transpose(F8* r0, F8* r1, F8* r2, F8* r3) {
 #if defined(__AVX__)
   const __m256 a = _mm256_unpacklo_ps(r0->v, r1->v), b = _mm256_unpackhi_ps(r0->v, r1->v);

@@ -1,4 +1,4 @@
-// Eight floats one after the other, in plain C++: the oracle that the vector kernels are held against, bit by bit.
+// Eight floats one after the other, in plain C++: the reference with which tests compare the vector kernels bit by bit.
 #pragma once
 
 #include <cstddef>
@@ -62,7 +62,7 @@ inline F8 operator<(F8 a, F8 b) {
 inline F8 Sqrt(F8 a) {
   return Each(a, a, [](float x, float) { return __builtin_sqrtf(x); });
 }
-/// Of the vector instructions: the second operand when one is not a number.
+/// As the vector instructions: the second operand where one is not a number.
 inline F8 Max(F8 a, F8 b) {
   return Each(a, b, [](float x, float y) { return x > y ? x : y; });
 }

@@ -1,6 +1,14 @@
-// What the kernels are written in: F lanes of floats, F = F8 for one batch of eight or F16 for two batches at a time.
+// The vector types of the kernels: F lanes of floats, F = F8 for one batch of eight, F16 for two batches at a time.
 // Included only by bodies of kernels.
+//
+// Layouts that it loads and stores:
+//   lanes    float[8], one value per constraint of a batch; the same array of the next batch is `next` floats further
+//   xyzw     float[4] per particle, aligned; a gather of eight is eight 16-byte loads and a transpose
+//   pool     coordinate k of a particle at pool[base + k * step] (ParticleRef): one float at a time
 #pragma once
+
+#include "physics_node/simd/instruction_set.h"
+#include "physics_node/simd/limits.h"
 
 #if defined(FULCRUM_KERNEL_SCALAR)
 #include "physics_node/simd/float8_scalar.h"
@@ -10,12 +18,15 @@
 #include "physics_node/simd/float8.h"
 #endif
 
-/// For what runs in the innermost loops: called instead, it would load its constants again each time.
+/// For the bodies of innermost loops: a called function would load its constants again in each iteration.
 #define FULCRUM_INLINE inline __attribute__((always_inline))
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
-/// Loads and stores lane arrays: those of a second batch stand `next` floats further.
+/// Bits of a mask over the eight lanes of F8, as Bits() returns them: all set.
+inline constexpr std::uint32_t kEveryLane = (1u << kLanes) - 1;
+
+/// Loads and stores arrays of lanes. Those of a second batch stand `next` floats further.
 template <class F>
 struct Batches;
 
@@ -48,7 +59,7 @@ struct Batches<F16> {
     return F16::Halves(FULCRUM_KERNEL_NAMESPACE::Gather(pool, index, step, plane),
                        FULCRUM_KERNEL_NAMESPACE::Gather(pool, index + next, step + next, plane));
   }
-  /// Straight between memory and quarters: no shuffle is spent.
+  /// Each particle goes from memory into a quarter of the register, so no shuffle is needed.
   static F16 LoadRow(const float* rows, const std::uint32_t* index, int i, std::size_t next) {
     const auto quarter = [&](std::size_t at) { return _mm_load_ps(rows + index[at]); };
     const auto first = static_cast<std::size_t>(i);
@@ -97,13 +108,13 @@ inline V<F> Cross(V<F> a, V<F> b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// Particles in lanes.
+/// One particle per lane.
 template <class F>
 struct Particles {
-  V<F> p;
-  F w;
+  V<F> p;  ///< Position [m].
+  F w;     ///< Inverse mass [1/kg], 0 = fixed.
 };
-/// Of xyzw particles; the one of lane i stands at rows + index[i].
+/// Loads xyzw particles: that of lane i stands at rows + index[i].
 template <class F>
 FULCRUM_INLINE Particles<F> GatherXyzw(const float* rows, const std::uint32_t* index, std::size_t next) {
   F x = Batches<F>::LoadRow(rows, index, 0, next);
@@ -122,7 +133,7 @@ FULCRUM_INLINE void ScatterXyzw(const Particles<F>& q, float* rows, const std::u
   }
 }
 
-/// Of particles anywhere in the pool.
+/// Loads particles from anywhere in the pool: coordinate k of lane i at pool[base[i] + k * step[i]].
 template <class F>
 inline Particles<F> GatherPool(const float* pool, const std::uint32_t* base, const std::uint32_t* step,
                                std::size_t next) {
@@ -133,37 +144,45 @@ inline Particles<F> GatherPool(const float* pool, const std::uint32_t* base, con
 template <class F>
 inline void ScatterPool(const V<F>& p, float* pool, const std::uint32_t* base, const std::uint32_t* step,
                         std::size_t next) {
-  constexpr int kCount = 8 * F::kBatches;
+  constexpr int kCount = kLanes * F::kBatches;
   alignas(64) float x[kCount], y[kCount], z[kCount];
-  Batches<F>::Store(p.x, x, 8);
-  Batches<F>::Store(p.y, y, 8);
-  Batches<F>::Store(p.z, z, 8);
+  Batches<F>::Store(p.x, x, kLanes);
+  Batches<F>::Store(p.y, y, kLanes);
+  Batches<F>::Store(p.z, z, kLanes);
   for (int batch = 0; batch < F::kBatches; ++batch, base += next, step += next) {
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < kLanes; ++i) {
       float* at = pool + base[i];
       const std::size_t s = step[i];
-      at[0] = x[8 * batch + i];
-      at[s] = y[8 * batch + i];
-      at[2 * s] = z[8 * batch + i];
+      at[0] = x[kLanes * batch + i];
+      at[s] = y[kLanes * batch + i];
+      at[2 * s] = z[kLanes * batch + i];
     }
   }
 }
 
-/// Angle of (cosine, sine) scaled by any positive factor, in (-pi, pi]; |error| < 3e-7 rad. The smaller over the larger
-/// is t in [0, 1]; above tan(pi/8) it is reduced by (t - 1)/(t + 1); then an odd polynomial. One division in all.
+/// Angle of (cosine, sine), both scaled by any positive factor, in (-pi, pi]; |error| < 3e-7 rad. With one division:
+///
+///   t = min(|s|, |c|) / max(|s|, |c|)                       in [0, 1]
+///   atan t = pi/4 + atan u,   u = (t - 1) / (t + 1)         where t > tan(pi/8), else u = t
+///   atan u = u + u^3 (((P3 u^2 - P2) u^2 + P1) u^2 - P0)    |u| <= tan(pi/8)
+///   angle  = pi/2 - atan t where |s| > |c|;   pi - that where c < 0;   the sign of s
+///
+/// Reduction and polynomial: atanf of the Cephes library (Moshier 1992).
 template <class F>
 inline F Atan2(F sine, F cosine) {
+  constexpr float kTanEighthPi = 0.41421356f, kQuarterPi = 0.78539816f, kHalfPi = 1.57079633f;
+  constexpr float kP0 = 0.333329491f, kP1 = 0.199777106f, kP2 = 0.138776856f, kP3 = 0.0805374449f;
+  constexpr float kLeastLarge = 1e-37f;  // Just above the smallest normal float: the angle of (0, 0) is 0, not NaN.
   const F as = Abs(sine), ac = Abs(cosine);
   const auto steep = as > ac;
-  const F small = Min(as, ac), large = Max(Max(as, ac), F::All(1e-37f));
-  const auto big = small > F::All(0.41421356f) * large;
+  const F small = Min(as, ac), large = Max(Max(as, ac), F::All(kLeastLarge));
+  const auto big = small > F::All(kTanEighthPi) * large;
   const F u = Select(big, small - large, small) / Select(big, small + large, large);
   const F s = u * u;
-  const F poly =
-      ((F::All(0.0805374449f) * s - F::All(0.138776856f)) * s + F::All(0.199777106f)) * s - F::All(0.333329491f);
-  F a = Select(big, F::All(0.78539816f), F::All(0.0f)) + (u + u * s * poly);
-  a = Select(steep, F::All(1.57079633f) - a, a);
-  a = Select(cosine < F::All(0.0f), F::All(3.14159265f) - a, a);
+  const F poly = ((F::All(kP3) * s - F::All(kP2)) * s + F::All(kP1)) * s - F::All(kP0);
+  F a = Select(big, F::All(kQuarterPi), F::All(0.0f)) + (u + u * s * poly);
+  a = Select(steep, F::All(kHalfPi) - a, a);
+  a = Select(cosine < F::All(0.0f), F::All(kPi) - a, a);
   return a ^ SignOf(sine);
 }
 

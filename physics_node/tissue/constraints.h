@@ -1,5 +1,5 @@
-// The constraints of the paper mode in plain form, for any scalar: value C(x) and gradient. The vector kernels do the
-// same on eight constraints at a time; tests hold them against these and these against finite differences.
+// The constraints of mode paper in scalar form, for any floating-point type: value C(x) and gradient. Reference for the
+// vector kernels: tests compare the kernels with these functions, and these with finite differences.
 //
 // A projection moves particle i by  dx_i = -k w_i C / (sum_j w_j |grad_j C|^2) * grad_i C,  which for k = 1 solves
 // the linearised constraint C(x) + grad C . dx = 0 (Mueller et al., Position Based Dynamics, 2007, eq. 4-6).

@@ -4,7 +4,7 @@ namespace fulcrum::physics {
 
 void ParticleStore::MeasureTube(Index first, Index end, float* moved) const {
   for (Index block = first / kBlockVertices; first < end; ++block, first += kBlockVertices) {
-    // By axis, which is no less than the distance; w has not moved.
+    // The largest change per axis: its norm is an upper bound of the distances. Lane 3 holds w, which is constant here.
     float largest[4] = {0, 0, 0, 0};
     const Index last = std::min(first + kBlockVertices, end);
     for (std::size_t i = 4 * std::size_t{first}; i < 4 * std::size_t{last}; i += 4) {

@@ -1,10 +1,10 @@
-// Where particles live. One pool of floats, so that a constraint may join any two particles:
+// Storage of the particles. One pool of floats, so that a constraint can join any two particles:
 //
 //   [ tube: x y z w of each vertex, one more as padding | membrane: plane x | plane y | plane z | plane w ]
 //
-// The tube is visited in the order of its constraints (gather), so each vertex is one 16-byte load. The membrane is a
-// grid and visited row by row, so its coordinates are planes with lane-blocked rows (kernels.h, GridArrays). A
-// ParticleRef reaches both in the same way. w is the inverse mass in effect: 0 for fixed, grasped and dead particles.
+// Constraints of the tube gather its vertices in any order, so each vertex is one 16-byte load. The membrane is a grid
+// that kernels sweep row by row, so its coordinates are planes of lane-blocked rows (GridArrays in batches.h). A
+// ParticleRef addresses both. w is the inverse mass in effect: 0 for fixed, grasped and dead particles.
 #pragma once
 
 #include <algorithm>
@@ -63,11 +63,18 @@ struct GridLayout {
   [[nodiscard]] std::uint32_t plane() const { return rows * stride; }
 };
 
-/// Zeroed floats on a cache line.
+/// Bytes of a cache line, which is also the widest vector.
+inline constexpr std::size_t kCacheLine = 64;
+/// Floats in a cache line.
+inline constexpr std::uint32_t kCacheLineFloats = 16;
+
+/// Zeroed floats that begin on a cache line.
 class FloatArray {
  public:
   explicit FloatArray(std::size_t count = 0)
-      : size_(count), data_(static_cast<float*>(std::aligned_alloc(64, ((count * sizeof(float) + 64) / 64) * 64))) {
+      : size_(count),
+        data_(static_cast<float*>(
+            std::aligned_alloc(kCacheLine, ((count * sizeof(float) + kCacheLine) / kCacheLine) * kCacheLine))) {
     std::fill_n(data_.get(), count, 0.0f);
   }
   [[nodiscard]] float* data() { return data_.get(); }
@@ -91,7 +98,7 @@ class ParticleStore {
         particle_count_(static_cast<Index>(scene.rest_position.size())),
         first_node_(scene.membrane.first),
         layout_(scene.membrane.rows, scene.membrane.cols),
-        tube_floats_((4 * (tube_count_ + 1) + 15) / 16 * 16),
+        tube_floats_((4 * (tube_count_ + 1) + kCacheLineFloats - 1) / kCacheLineFloats * kCacheLineFloats),
         now_(tube_floats_ + 4 * layout_.plane()),
         previous_(tube_floats_ + 4 * layout_.plane()) {
     for (Index p = 0; p < particle_count_; ++p) {
@@ -106,7 +113,7 @@ class ParticleStore {
   [[nodiscard]] Index tube_count() const { return tube_count_; }
   [[nodiscard]] Index particle_count() const { return particle_count_; }
   [[nodiscard]] const GridLayout& layout() const { return layout_; }
-  /// Tube vertex that no constraint moves: fills the unused lanes of a batch.
+  /// Tube vertex of no constraint: fills the unused lanes of a batch.
   [[nodiscard]] Index padding_vertex() const { return tube_count_; }
 
   [[nodiscard]] ParticleRef Ref(Index particle) const {
@@ -129,7 +136,7 @@ class ParticleStore {
 
   [[nodiscard]] float* pool() { return now_.data(); }
   [[nodiscard]] float* tube() { return now_.data(); }
-  /// Floats of the tube with its padding, a multiple of 16.
+  /// Floats of the tube with its padding: whole cache lines.
   [[nodiscard]] std::size_t tube_floats() const { return tube_floats_; }
   [[nodiscard]] float* tube_previous() { return previous_.data(); }
   /// Plane 0..2: x, y, z; 3: inverse mass.
@@ -151,8 +158,8 @@ class ParticleStore {
     std::copy_n(now_.data() + first, count, previous_.data() + first);
   }
 
-  /// Blocks of particles whose movement is told together: 8 vertices of the tube; then of each row of the membrane the
-  /// columns in each lane.
+  /// Blocks of particles whose largest movement is measured: of the tube 8 vertices; then of each row of the membrane
+  /// the columns of each lane.
   static constexpr Index kBlockVertices = 8;
   static constexpr std::uint32_t kBlocksPerRow = 8;
   [[nodiscard]] Index tube_blocks() const { return (tube_count_ + kBlockVertices - 1) / kBlockVertices; }
@@ -164,13 +171,14 @@ class ParticleStore {
     const Index node = particle - first_node_, lane = node % layout_.cols / layout_.slots;
     return tube_blocks() + node / layout_.cols * kBlocksPerRow + lane * kBlocksPerRow / kLanes;
   }
-  /// Raises moved[b], for each block of vertices [first, end) of the tube or of such rows of the membrane, to at least
-  /// how far any of its particles is from its previous place [m]. The first vertex begins a block.
+  /// Raises moved[b] to an upper bound of the distance of the block's particles from their previous positions [m], for
+  /// the blocks of tube vertices [first, end), where `first` begins a block, or of membrane rows [first, end).
   void MeasureTube(Index first, Index end, float* moved) const;
   void MeasureRows(std::uint32_t first, std::uint32_t end, float* moved) const;
-  /// Of all blocks, from 0.
+  /// The same for all blocks, starting from 0.
   void MeasureMoves(std::vector<float>* moved) const;
-  /// Coordinates that are not finite or farther than `limit` from 0 come from the previous ones; returns how many.
+  /// Restores coordinates that are not finite, or not below `limit` in size, from the previous ones; returns their
+  /// number.
   std::uint32_t RepairPlaces(float limit) {
     std::uint32_t repaired = 0;
     const std::size_t count = tube_floats_ + 3 * std::size_t{layout_.plane()};  // All but the masses of the membrane.
@@ -191,7 +199,7 @@ class ParticleStore {
     }
     PadGrid();
   }
-  /// Previous positions become the present ones: no velocity is left.
+  /// Sets the previous positions to the present ones, which makes all velocities zero.
   void StopAll() {
     for (Index p = 0; p < particle_count_; ++p) {
       const ParticleRef at = Ref(p);
@@ -199,10 +207,10 @@ class ParticleStore {
     }
     PadGrid();
   }
-  /// The pool as it lies in memory. The padding is constant.
+  /// The pool in memory order. The padding is constant.
   [[nodiscard]] std::span<const float> raw() const { return {now_.data(), now_.size()}; }
-  /// All of it in parts that threads may share: of each the stretches of the tube, of x, y and z and of the inverse
-  /// mass of the membrane. Neighbours in the tissue are mostly neighbours here.
+  /// The pool in parts for threads: ranges of the tube, of the planes x, y and z and of the inverse masses of the
+  /// membrane. Neighbours in the tissue are mostly in the same part.
   static constexpr int kParts = 8;
   [[nodiscard]] std::array<std::span<const float>, 5> Part(int part) const {
     const auto cut = [part](std::size_t first, std::size_t units, std::size_t unit) {
@@ -213,7 +221,7 @@ class ParticleStore {
     std::array<std::span<const float>, 5> stretches;
     for (std::size_t i = 0; i < stretches.size(); ++i) {
       const auto [first, count] =
-          i == 0 ? cut(0, tube_floats_ / 16, 16)
+          i == 0 ? cut(0, tube_floats_ / kCacheLineFloats, kCacheLineFloats)
                  : cut(tube_floats_ + (i - 1) * std::size_t{layout_.plane()}, layout_.rows, layout_.stride);
       stretches[i] = {now_.data() + first, count};
     }
@@ -242,7 +250,7 @@ class ParticleStore {
       }
     }
   }
-  /// Columns beyond the last one repeat it, so that bounds of blocks stay tight.
+  /// Columns beyond the last one repeat its position, so that bounds of blocks stay tight.
   void PadGrid() {
     for (std::uint32_t row = 0; row < layout_.rows; ++row) {
       const ParticleRef last = NodeRef(row, layout_.cols - 1);

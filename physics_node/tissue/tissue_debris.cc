@@ -1,11 +1,11 @@
-// Pieces of membrane that nothing holds any more.
+// Debris: pieces of membrane without connection to an anchor.
 #include "physics_node/tissue/tissue_model.h"
 
 namespace fulcrum::physics {
 namespace {
 
-/// A piece of at most so many nodes (about 2 cm^2 of the built-in sheet) that nothing holds is debris. The search for
-/// an anchor looks no further, which keeps an edit cheap; larger pieces go on moving.
+/// Most nodes of a piece of debris, about 2 cm^2 of the built-in sheet. It bounds the search for an anchor, and so the
+/// cost of an edit; larger pieces stay in the simulation.
 constexpr std::size_t kLargestDebris = 250;
 
 }  // namespace
@@ -29,12 +29,12 @@ std::array<Index, 6> TissueModel::Neighbours(Index node) const {
   return ends;
 }
 
-/// Holds a piece of membrane in its place: the rim, or a binding to the organ.
+/// An anchor holds a piece of membrane: a fixed node of the rim, or a node with a binding to the organ.
 bool TissueModel::IsAnchor(Index node) const {
   return scene_.inverse_mass[scene_.membrane.first + node] == 0.0f || binding_start_[node] < binding_start_[node + 1];
 }
 
-/// From each changed node, looks for an anchor among what it still hangs together with.
+/// Searches an anchor among the nodes that are connected to each changed node; a piece without one becomes debris.
 void TissueModel::FindDebris(const std::vector<Index>& changed, ParticleStore* particles) {
   for (const Index start : changed) {
     if (!NodeAlive(start) || IsDebris(start)) {
@@ -66,7 +66,7 @@ void TissueModel::FindDebris(const std::vector<Index>& changed, ParticleStore* p
   }
 }
 
-void TissueModel::ForgetDebris(ParticleStore* particles) {
+void TissueModel::ClearDebris(ParticleStore* particles) {
   for (Index node = 0; node < debris_.size(); ++node) {
     if (debris_[node] != 0) {
       debris_[node] = 0;

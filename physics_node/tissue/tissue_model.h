@@ -1,4 +1,4 @@
-// The constraints of a scene in the order and layout of the kernels, and what cutting and shrinking have done to them.
+// The constraints of a scene in the order and layout of the kernels, with the effects of cuts and shrinking.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace fulcrum::physics {
 
-/// A binding as others than the solver see it.
+/// A binding for code outside of the solvers.
 struct BindingView {
   std::array<ParticleRef, 3> surface;
   std::array<float, 3> barycentric;
@@ -26,15 +26,15 @@ struct ConstraintCounts {
 
 class TissueModel {
  public:
-  /// Throws InputError when the scene breaks the rules that the layout rests on (membrane directly after the tube,
-  /// no two constraints of a colour on one particle).
+  /// Throws InputError for a scene that violates the rules of the layout: membrane directly after the tube, no two
+  /// constraints of a colour on one particle.
   TissueModel(const SceneView& scene, ParticleStore* particles);
 
-  /// Applies the difference between `topology` and what is in force, in place: O(edits) beyond one comparison of the
-  /// bit fields. Returns the number of edges and nodes changed, or -1 when the sizes do not fit this scene.
+  /// Applies the difference between `topology` and the present state in place: O(edits) beyond one comparison of the
+  /// bit fields. Returns the number of changed edges and nodes, or -1 if the sizes do not fit this scene.
   int Apply(const TopologyState& topology, ParticleStore* particles);
 
-  /// Edges (3 * node + direction) that the last Apply has changed, some more than once.
+  /// Edges (3 * node + direction) that the last Apply has changed; an edge can occur more than once.
   [[nodiscard]] const std::vector<Index>& edited_edges() const { return edited_edges_; }
 
   [[nodiscard]] const std::vector<SpringBatch>& springs() const { return springs_; }
@@ -42,12 +42,12 @@ class TissueModel {
   [[nodiscard]] const std::vector<BendingBatch>& bending() const { return bending_; }
   /// The particles that BendingBatch::v indexes; the last one pads.
   [[nodiscard]] const std::vector<ParticleRef>& hinge_particles() const { return hinge_particles_; }
-  /// Of constraint `i` of the scene's bending: the sheet it spans is whole.
+  /// No edge or node of the patch of sheet under hinge `i` of the scene's bending is cut.
   [[nodiscard]] bool HingeWhole(Index i) const {
     return bending_[hinge_slot_[i] / kLanes].active[hinge_slot_[i] % kLanes] > 0.0f;
   }
   [[nodiscard]] const std::vector<BindingBatch>& bindings() const { return bindings_; }
-  /// Where a constraint of the scene stands in its batches: batch * 8 + lane.
+  /// By constraint of the scene, its slot in the batches: batch * 8 + lane.
   [[nodiscard]] const std::vector<Index>& tet_slots() const { return tet_slot_; }
   [[nodiscard]] const std::vector<Index>& hinge_slots() const { return hinge_slot_; }
   [[nodiscard]] const std::vector<Index>& binding_slots() const { return binding_slot_; }
@@ -58,17 +58,17 @@ class TissueModel {
   [[nodiscard]] std::uint32_t rows() const { return scene_.membrane.rows; }
   [[nodiscard]] std::uint32_t cols() const { return scene_.membrane.cols; }
   [[nodiscard]] bool NodeAlive(Index node) const { return !TestBit(dead_nodes_, node); }
-  /// Belongs to a small piece that hangs on nothing any more: it stays where it is and takes part in nothing.
+  /// Belongs to a small piece without an anchor, which is frozen in place and excluded from all computations.
   [[nodiscard]] bool IsDebris(Index node) const { return debris_[node] != 0; }
-  /// Exists in the grid, is not cut, and neither is an end of it.
+  /// The edge exists in the grid, and neither it nor one of its ends is cut.
   [[nodiscard]] bool EdgeAlive(Index node, int direction) const;
-  /// Triangle 2 * cell + half: all its nodes and edges are alive, and it is not debris.
+  /// Triangle 2 * cell + half: its nodes and edges are alive, and it is not debris.
   [[nodiscard]] bool TriangleAlive(Index triangle) const { return triangle_alive_[triangle] != 0; }
   /// Nodes of a membrane triangle (indices within the grid).
   [[nodiscard]] std::array<Index, 3> TriangleNodes(Index triangle) const;
   /// Inverse mass without grasps; 0 for a dead node and for debris.
   [[nodiscard]] float BaseInverseMass(Index particle) const;
-  /// The first binding of a grid node, if it has one and is alive.
+  /// The first binding of a grid node; none for a dead node.
   [[nodiscard]] std::optional<BindingView> BindingOf(Index node) const;
   [[nodiscard]] ConstraintCounts counts() const { return counts_; }
 
@@ -85,7 +85,7 @@ class TissueModel {
   [[nodiscard]] std::array<Index, 6> Neighbours(Index node) const;
   [[nodiscard]] bool IsAnchor(Index node) const;
   void FindDebris(const std::vector<Index>& changed, ParticleStore* particles);
-  void ForgetDebris(ParticleStore* particles);
+  void ClearDebris(ParticleStore* particles);
 
   SceneView scene_;
   GridLayout layout_;
@@ -97,8 +97,8 @@ class TissueModel {
   std::vector<BindingBatch> bindings_;
   std::array<FloatArray, 3> rest_;
 
-  // Who uses a node: compressed rows, entry = batch * 8 + lane. A hinge may span many
-  // cells; it uses all nodes of the patch it spans, so that a cut through the patch switches it off.
+  // Constraints of a node: compressed rows, entry = batch * 8 + lane. A hinge can span many cells; it belongs to all
+  // nodes of the patch under it, so that a cut through the patch disables it.
   std::vector<Index> bending_start_, bending_of_;
   std::vector<Index> binding_start_, binding_of_;
   struct Patch {
@@ -109,13 +109,13 @@ class TissueModel {
   std::vector<std::uint8_t> dead_nodes_, dead_edges_, shrink_, triangle_alive_, debris_;
   std::vector<Index> changed_nodes_, piece_;  ///< Scratch of Apply.
   std::vector<Index> edited_edges_;
-  std::vector<std::uint32_t> visited_;  ///< Scratch: by node, the search that saw it last.
+  std::vector<std::uint32_t> visited_;  ///< Scratch: by node, the last search that reached it.
   std::uint32_t search_ = 0;
   std::uint64_t revision_ = 0;
   ConstraintCounts counts_;
 };
 
-/// The hinge particles' xyzw from the pool into a compact copy, and their xyz back.
+/// Copies xyzw of the hinge particles from the pool into a compact array, and xyz back.
 inline void CopyHingeParticles(const std::vector<ParticleRef>& refs, const float* pool, float* copy) {
   for (const ParticleRef at : refs) {
     for (std::size_t axis = 0; axis < 4; ++axis) {

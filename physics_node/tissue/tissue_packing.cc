@@ -1,4 +1,4 @@
-// From a scene's constraints to the batches of the kernels.
+// Packs the constraints of a scene into the batches of the kernels.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -10,24 +10,25 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Part of a constraint's rest value of sum w |gradient|^2 below which it is not divided by. An element flattened to
-/// a few per cent would otherwise be blown up in one step.
+/// Least divisor of a volume constraint, as a share of sum w |gradient|^2 at rest. Without it an element flattened to a
+/// few per cent of its height, whose gradients vanish, would be blown up in one step.
 constexpr float kFloorPart = 1e-3f;
-/// Part of a hinge triangle's rest |normal|^2 below which its angle has no usable gradient.
+/// Least divisor of |normal|^2 of a hinge triangle, as a share of its rest value: with less than a hundredth of its
+/// area the angle has no usable gradient.
 constexpr float kNormalFloorPart = 1e-4f;
 
 [[noreturn]] void Refuse(const SceneView& scene, const std::string& what) {
   throw InputError(std::string("scene '") + scene.name + "': " + what);
 }
 
-/// Appends room for `count` constraints of one colour; lanes that stay free hold `inert`.
+/// Appends room for `count` constraints of one colour; unused lanes hold `inert`.
 template <class Batch>
 void AddBatches(std::size_t count, const Batch& inert, std::vector<Batch>* batches) {
   const std::size_t full = kLanes * kBatchesAtOnce;
   batches->resize(batches->size() + (count + full - 1) / full * kBatchesAtOnce, inert);
 }
 
-/// Batch and lane of constraint i of the colour [first, last), whose room is the end of `batches`.
+/// Batch and lane of constraint i of the colour [first, last), whose batches are the last ones of `batches`.
 template <class Batch>
 std::pair<std::size_t, std::size_t> SlotOf(Index i, Index first, Index last, const std::vector<Batch>& batches) {
   const std::size_t full = kLanes * kBatchesAtOnce;
@@ -35,7 +36,7 @@ std::pair<std::size_t, std::size_t> SlotOf(Index i, Index first, Index last, con
   return {start + (i - first) / kLanes, (i - first) % kLanes};
 }
 
-/// Calls add(first, last) for each colour and refuses offsets that do not cover the constraints.
+/// Calls add(first, last) for each colour; throws if the offsets do not cover the constraints.
 template <class Add>
 void ForEachColour(const SceneView& scene, std::span<const Index> offsets, std::size_t count, const char* what,
                    const Add& add) {
@@ -53,7 +54,7 @@ void ForEachColour(const SceneView& scene, std::span<const Index> offsets, std::
   }
 }
 
-/// Refuses two constraints of one colour on one particle: eight of them are solved at once.
+/// Detects two constraints of one colour on one particle, which the kernels would project at the same time.
 class ColourCheck {
  public:
   explicit ColourCheck(std::size_t particles) : last_(particles, kNoIndex) {}
@@ -71,7 +72,7 @@ class ColourCheck {
   Index colour_ = kNoIndex;
 };
 
-/// Compressed rows of "who uses a node" from (node, user) pairs.
+/// Compressed rows of the constraints of each node, from (node, constraint) pairs.
 void Compress(std::vector<std::pair<Index, Index>> pairs, std::size_t nodes, std::vector<Index>* start,
               std::vector<Index>* users) {
   std::sort(pairs.begin(), pairs.end());
@@ -139,7 +140,7 @@ void TissueModel::PackTube(const SceneView& scene, const ParticleStore& particle
         heaviest = std::max(heaviest, rest.gradient[j].squaredNorm());
       }
       batch.rest_volume[lane] = static_cast<float>(6 * rest.value);
-      // With all four vertices fixed there is nothing to move; any positive floor does.
+      // 36: the kernel uses six times the gradients. Four fixed vertices do not move; any positive floor will do.
       batch.floor[lane] = static_cast<float>(36 * kFloorPart * (sum > 0 ? sum : heaviest));
       ++counts_.volume;
     }
@@ -149,8 +150,7 @@ void TissueModel::PackTube(const SceneView& scene, const ParticleStore& particle
 void TissueModel::PackBending(const SceneView& scene, const ParticleStore& particles) {
   ColourCheck check(scene.rest_position.size());
   std::vector<std::pair<Index, Index>> users;
-  // Each particle that a hinge uses gets a place in the compact copy, in the order of memory; the last one is the
-  // padding.
+  // Places in the compact copy of the particles that hinges use, in memory order; the last one is the padding.
   std::vector<Index> place(scene.rest_position.size(), kNoIndex);
   for (const BendingConstraint& constraint : scene.bending) {
     for (const Index p : constraint.v) {

@@ -1,4 +1,4 @@
-// Cuts and shrinking, applied in place: what an edit touches, and nothing else.
+// Cuts and shrinking, applied in place to the constraints that an edit affects.
 #include <algorithm>
 
 #include "physics_node/tissue/tissue_model.h"
@@ -38,7 +38,7 @@ bool TissueModel::HingeAlive(Index slot) const {
   return true;
 }
 
-/// Triangles of the four cells around a node.
+/// Refreshes the triangles of the four cells around a node.
 void TissueModel::RefreshTriangles(Index node) {
   const Index row = node / cols(), col = node % cols();
   for (Index r = row > 0 ? row - 1 : 0; r < std::min(row + 1, rows() - 1); ++r) {
@@ -103,7 +103,7 @@ int TissueModel::Apply(const TopologyState& topology, ParticleStore* particles) 
          changed = static_cast<std::uint8_t>(changed & (changed - 1))) {
       const auto node = static_cast<Index>(8 * byte + static_cast<unsigned>(__builtin_ctz(changed)));
       if (node < nodes && NodeAlive(node)) {
-        mark(node);  // Its neighbours lose a hold.
+        mark(node);  // Its neighbours lose an edge each.
       }
       dead_nodes_[byte] = static_cast<std::uint8_t>(dead_nodes_[byte] ^ (1u << (node % 8)));
       if (node < nodes) {
@@ -135,7 +135,8 @@ int TissueModel::Apply(const TopologyState& topology, ParticleStore* particles) 
       refresh_edge(edge, true);
     }
   }
-  constexpr std::size_t kChunk = 256;  // Most chunks are equal: compare them whole.
+  // Bytes that are compared at a time: most of them have not changed, and std::equal compares whole vectors.
+  constexpr std::size_t kChunk = 256;
   for (std::size_t at = 0; at < shrink_.size(); at += kChunk) {
     const std::size_t end = std::min(at + kChunk, shrink_.size());
     if (std::equal(shrink_.begin() + static_cast<std::ptrdiff_t>(at),
@@ -151,8 +152,8 @@ int TissueModel::Apply(const TopologyState& topology, ParticleStore* particles) 
     }
   }
   if (revived) {
-    // What was debris may hang on something again. Rare: only when the heat has lost its state.
-    ForgetDebris(particles);
+    // A revived node or edge can connect debris to an anchor. Rare: thermal_node was restarted without its state.
+    ClearDebris(particles);
     changed_nodes_.clear();
     for (Index node = 0; node < nodes; ++node) {
       changed_nodes_.push_back(node);
