@@ -7,13 +7,17 @@ namespace fulcrum::physics {
 namespace {
 
 /// Shear modulus of the sheet over Young's: between that of an incompressible sheet (1/3) and of a woven one.
+/// Assumed.
 constexpr double kShearPart = 0.25;
-/// A cell's area over its diagonal squared is 1/2 for a square. Cells that are thinner than this would get a diagonal
-/// that is stiff beyond measure along itself for the little shear that it carries.
+/// Least area of a cell over its squared diagonal, 1/2 for a square. In a thinner cell the diagonal would be extremely
+/// stiff along itself for the little shear that it carries.
 constexpr double kLeastCell = 0.1;
-/// Edges shorter than this part of their direction's mean carry less tension in proportion: a node on its neighbour
-/// would be tied to it by a spring that no step resolves.
+/// An edge shorter than this share of the mean of its direction carries less tension, in proportion: a node on its
+/// neighbour would be tied to it by a spring whose frequency no time step resolves.
 constexpr double kLeastEdge = 0.05;
+/// Least mean length of a binding in the stiffness of the fat [m]: it bounds E A / length where membrane and organ
+/// touch. Below any layer of fat that a scene has.
+constexpr double kLeastBindingLength = 1e-3;
 
 Vec3d Rest(const SceneView& scene, Index particle) { return scene.rest_position[particle].cast<double>(); }
 
@@ -22,15 +26,22 @@ double Cotangent(const Vec3d& at, const Vec3d& p, const Vec3d& q) {
   return u.dot(v) / u.cross(v).norm();
 }
 
+/// Springs of the membrane, axial stiffness A [N]:
+///
+///   rows, columns   A = E t b                             b: width of the strip that the edge stands for [m]
+///   diagonals       A = kShearPart E t l^3 / (l_c l_r)    l: lengths of the diagonal, the row and the column edge [m]
+///
+/// with l_c l_r >= kLeastCell l^2, and less for edges below kLeastEdge of the mean length.
 void AddSprings(const SceneView& scene, ElasticModel* model) {
   const Index first = scene.membrane.first, rows = scene.membrane.rows, cols = scene.membrane.cols;
   const double Et = scene.physics.membrane_Et_N_per_m, shrink = 1.0 / (1.0 + scene.physics.membrane_prestrain);
   model->springs.assign(scene.membrane_rest_length.size(), {});
-  // Mean length of the edges that leave a node in a direction, and the share of sheet that belongs to an edge.
+  // Rest length of the edge of a node in a direction, and the width of the strip of sheet that an edge stands for.
   const auto length = [&](Index row, Index col, int direction) {
     return static_cast<double>(scene.membrane_rest_length[3 * (row * cols + col) + static_cast<Index>(direction)]);
   };
   const auto share = [&](Index row, Index col, int direction) {
+    // Mean over the two ends of half an edge to either side: a quarter of each of the four edges across.
     const int across = 1 - direction;
     double width = 0;
     for (int end = 0; end < 2; ++end) {
@@ -74,6 +85,12 @@ void AddSprings(const SceneView& scene, ElasticModel* model) {
   }
 }
 
+/// Hinge of quadratic bending (Bergou et al. 2006) over the edge x0 x1 of the triangles (x0, x1, x2) and (x1, x0, x3):
+///
+///   k = 3 B / (A0 + A1) [N/m],   c = (c12 + c13, c02 + c03, -c02 - c12, -c03 - c13)
+///
+/// with the flexural rigidity B [N m], the areas A [m^2] and c_ij the cotangent of the angle at x_i in the triangle of
+/// x_j.
 void AddHinges(const SceneView& scene, ElasticModel* model) {
   for (const BendingConstraint& bend : scene.bending) {
     std::array<Vec3d, 4> x;
@@ -87,7 +104,7 @@ void AddHinges(const SceneView& scene, ElasticModel* model) {
     const double c03 = Cotangent(x[0], x[1], x[3]), c13 = Cotangent(x[1], x[0], x[3]);
     hinge.c = {c12 + c13, c02 + c03, -c02 - c12, -c03 - c13};
     hinge.stiffness = 3.0 * scene.physics.membrane_bending_Nm / (a0 + a1);
-    // One hinge per constraint of the scene, even where its patch has no area.
+    // One hinge per constraint of the scene; it is inactive where its triangles have no area.
     const bool sound = std::isfinite(hinge.stiffness) &&
                        std::all_of(hinge.c.begin(), hinge.c.end(), [](double c) { return std::isfinite(c); });
     if (!sound) {
@@ -117,7 +134,7 @@ void AddBindings(const SceneView& scene, ElasticModel* model) {
   if (scene.bindings.empty()) {
     return;
   }
-  // Each binding is a column of fat: its share of the sheet, as long as the mean binding.
+  // Each binding is a column of fat with its share of the sheet as cross section and the mean length of all bindings.
   double area = 0, length = 0;
   const Index first = scene.membrane.first, cols = scene.membrane.cols;
   for (Index row = 0; row + 1 < scene.membrane.rows; ++row) {
@@ -132,7 +149,8 @@ void AddBindings(const SceneView& scene, ElasticModel* model) {
     length += binding.rest_length;
   }
   const auto count = static_cast<double>(scene.bindings.size());
-  const double stiffness = scene.physics.fat_youngs_modulus_Pa * (area / count) / std::max(length / count, 1e-3);
+  const double stiffness =
+      scene.physics.fat_youngs_modulus_Pa * (area / count) / std::max(length / count, kLeastBindingLength);
   for (const Binding& binding : scene.bindings) {
     ElasticBinding b;
     b.membrane = binding.membrane;
@@ -146,7 +164,7 @@ void AddBindings(const SceneView& scene, ElasticModel* model) {
   }
 }
 
-/// At rest only the springs pull: organ, hinges and bindings are free of force there.
+/// The load balances the springs in the rest shape; organ, hinges and bindings are free of force there.
 void AddLoad(ElasticModel* model) {
   model->load.assign(model->rest_position.size(), Vec3d::Zero());
   for (const ElasticSpring& spring : model->springs) {

@@ -1,19 +1,19 @@
-// The tissue as one elastic energy in SI units, in double, independent of any solver. The fast solver packs it into
-// vectors, the reference solver of the tests minimises it as it stands, so their difference is the solver's error.
+// The tissue as one elastic energy in SI units, in double, independent of any solver. The real-time solvers pack it
+// into vectors, the reference solver of the tests minimises it directly: their difference is the error of the solver.
 //
 //   E(x) = sum springs  A L (e^2 / 2 + c e^4 / 4),      e = |x_j - x_i| / L - 1        (membrane)
 //        + sum hinges   k / 2 |sum_i c_i (x_i - X_i)|^2                                  (membrane bending)
 //        + organ: nodal patches, see below                                              (tet_energy.h)
 //        + sum bindings k / 2 (|x_m - sum_i b_i x_i| - d)^2                              (eq. 9 of the paper)
 //
-// with inertia M, viscous drag -damping M v and a dead load. A prestrained membrane would leave its rest shape; what
-// holds it there (pressure, fat, neighbours) is not modelled, so the load is that which makes the rest shape an
-// equilibrium.
+// with inertia M, viscous drag -damping M v and a dead load. A prestrained membrane would leave its rest shape. The
+// forces that hold it there (pressure, fat, neighbouring tissue) are not modelled; the dead load replaces them and
+// makes the rest shape an equilibrium.
 //
 // The organ. Linear tetrahedra lock: a cantilever four elements thick bends 41 % too little at Poisson's ratio 0.45 and
 // 71 % at 0.49. So the constitutive law sits at the nodes, on the mean deformation gradient of the tets around each
-// (Dohrmann et al. 2000). That alone is a little soft and blind to some zigzags, so the scatter of the tets' gradients
-// about the nodes' mean is penalised, after Puso and Solberg (2006), here by a constant quadratic form:
+// (Dohrmann et al. 2000). That alone is slightly too soft and has zero-energy modes, so the variance of the tets'
+// gradients about the nodal mean is penalised, after Puso and Solberg (2006), here by a constant quadratic form:
 //
 //   F_n = sum_e (V_e / 4 V_n) F_e = sum_j x_j (x) g_nj,     V_n = sum_e V_e / 4     (e: tets at n, j: their vertices)
 //   E   = sum_n V_n Psi(F_n) + a mu/2 (sum_e V_e |F_e|^2 - sum_n V_n |F_n|^2)
@@ -35,12 +35,12 @@ namespace fulcrum::physics {
 /// Membrane edge 3 * node + direction, as in TopologyState.
 struct ElasticSpring {
   Index a = 0, b = 0;      ///< Particles.
-  double rest_length = 0;  ///< Without tension: shorter than in the rest shape where the membrane is prestrained [m].
+  double rest_length = 0;  ///< Without tension: with prestrain shorter than in the rest shape [m].
   double axial = 0;        ///< A: tension per engineering strain [N]; 0 where the grid has no such edge.
 };
 
-/// Quadratic bending (Bergou et al. 2006) about the rest shape: constant Hessian, no singular angles. That the rest
-/// curvature does not turn with the sheet costs a moment of rigidity x curvature, far below the tension's.
+/// Quadratic bending (Bergou et al. 2006) about the rest shape: constant Hessian, no singular angles. The rest
+/// curvature does not rotate with the sheet; the error, a moment of rigidity x curvature, is far below the tension's.
 struct ElasticHinge {
   std::array<Index, 4> v{};
   std::array<double, 4> c{};  ///< Dimensionless; they sum to 0 and vanish on any linear displacement.
@@ -69,7 +69,7 @@ struct ElasticPatchLink {
 /// Edge of the organ in the variance term: energy stiffness/2 |x_a - x_b|^2.
 struct ElasticShearLink {
   Index a = 0, b = 0;
-  double stiffness = 0;  ///< a mu w_ij [N/m]; negative at obtuse angles, where others outweigh it.
+  double stiffness = 0;  ///< a mu w_ij [N/m]; negative at obtuse angles, where the sum over the edges stays positive.
 };
 
 struct ElasticBinding {
@@ -80,13 +80,13 @@ struct ElasticBinding {
   double stiffness = 0;    ///< [N/m]
 };
 
-/// a of the variance term: between 0.2 and 0.3 the errors over Poisson's ratio, split and shape of elements are least.
+/// a of the variance term: the errors over Poisson's ratio, split and shape of elements are least from 0.2 to 0.3.
 inline constexpr double kPatchVariance = 0.25;
 
 struct ElasticModel {
   std::vector<Vec3d> rest_position;  ///< [n] frame W, m.
   std::vector<double> mass;          ///< [n] kg; 0 = fixed.
-  std::vector<Vec3d> load;           ///< [n] N: what keeps a prestrained membrane in its rest shape; energy -load . x.
+  std::vector<Vec3d> load;           ///< [n] N: balances the prestrain in the rest shape; energy -load . x.
   std::vector<ElasticSpring> springs;
   std::vector<ElasticHinge> hinges;
   std::vector<ElasticTet> tets;               ///< Volumes and inversions; the energy is in the patches.

@@ -1,3 +1,4 @@
+// Nodal patches of the organ and the variance term of its energy (elastic_model.h), summed over the tetrahedra.
 #include <algorithm>
 #include <cstdint>
 #include <utility>
@@ -7,21 +8,22 @@
 namespace fulcrum::physics {
 namespace {
 
-/// What one tet adds to the pair of its vertices n and v.
+/// Contribution of one tetrahedron to the pair of its vertices n and v.
 struct Share {
   Vec3d gradient;  ///< V_n g_nv.
   double weight;   ///< w_nv.
 };
 
 struct Shares {
-  std::vector<Share> all;                                       ///< As the tets follow each other.
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> sorted;  ///< (n, v) in one number, and the place in `all`.
+  std::vector<Share> all;                                       ///< In the order of the tetrahedra.
+  std::vector<std::pair<std::uint64_t, std::uint32_t>> sorted;  ///< (n, v) in one number, and the index in `all`.
 };
 
 Shares SharesOf(const std::vector<ElasticTet>& tets) {
   Shares shares;
-  shares.all.reserve(16 * tets.size());
-  shares.sorted.reserve(16 * tets.size());
+  constexpr std::size_t kPairs = 16;  // Of the four vertices of a tetrahedron, in order.
+  shares.all.reserve(kPairs * tets.size());
+  shares.sorted.reserve(kPairs * tets.size());
   for (const ElasticTet& tet : tets) {
     Eigen::Matrix<double, 3, 4> g;
     g.rightCols<3>() = tet.inverse_edges.transpose();
@@ -34,7 +36,7 @@ Shares SharesOf(const std::vector<ElasticTet>& tets) {
       }
     }
   }
-  // The place counts too: sums are taken in the order of the tets, the same in every run.
+  // The index is part of the key: sums are taken in the order of the tetrahedra, the same in every run.
   std::sort(shares.sorted.begin(), shares.sorted.end());
   return shares;
 }

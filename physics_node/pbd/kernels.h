@@ -1,7 +1,9 @@
-// The constraints of the paper's mode as plain functions on plain arrays (tissue/batches.h). A kernel moves the
-// particles of each constraint C(x) by
+// Projections of the constraints of mode paper as functions on plain arrays (tissue/batches.h):
+//
 //   dx_i = -k w_i grad_i C  C / sum_j w_j |grad_j C|^2        (Mueller et al., Position Based Dynamics, 2007)
+//
 // with the inverse masses w [1/kg] and a stiffness k in (0, 1] per iteration, one batch after the other (Gauss-Seidel).
+// The constraints C(x) and their gradients: kernels_impl.h.
 #pragma once
 
 #include "physics_node/simd/instruction_set.h"
@@ -9,11 +11,11 @@
 
 namespace fulcrum::physics::pbd {
 
-/// How a binding gives way, per iteration: drawn out, pressed in, and pressed in to less than `floor` of its height.
+/// Stiffness of bindings per iteration.
 struct BindingStiffness {
-  float tension;
-  float compression;
-  float floor;
+  float tension;      ///< k of the length beyond its rest value.
+  float compression;  ///< k of the height below its rest value.
+  float floor;        ///< Share of the rest height below which the height is not allowed to fall.
 };
 
 struct Kernels {
@@ -28,7 +30,7 @@ struct Kernels {
   void (*bindings)(float* pool, const BindingBatch* batches, std::size_t count, const BindingStiffness& stiffness);
 };
 
-/// Those of an instruction set that this CPU has.
+/// Kernels of an instruction set that this CPU has.
 const Kernels& KernelsFor(InstructionSet set = BestInstructionSet());
 
 }  // namespace fulcrum::physics::pbd

@@ -1,5 +1,37 @@
-// Bodies of the kernels, compiled once per instruction set with FULCRUM_KERNEL_NAMESPACE set. Constraint kernels all
-// go: load, constraint value, gradient, masses, lambda, apply.
+// Bodies of the constraint kernels of mode paper; compiled for each instruction set with FULCRUM_KERNEL_NAMESPACE set.
+//
+// Projection of a constraint C(x) = 0 (Mueller et al., Position Based Dynamics, 2007):
+//
+//   lambda = -k C / max(S, S_min),   S = sum_j w_j |g_j|^2,   x_i <- x_i + lambda w_i g_i,   g_i = dC/dx_i
+//
+//   x_i  position [m]      w_i  inverse mass [1/kg], 0 = fixed      k  stiffness per iteration, in (0, 1]
+//
+// Below, ^ marks a unit vector.
+//
+// Edge (springs of the tube, grid of the membrane)
+//   C     = |d| - L [m],   d = q - p
+//   g_q   = d^,   g_p = -d^                                      S_min: kLeastDivisor, of |d| S
+// Volume
+//   C     = 6 V - 6 V0 [m^3],   6 V = (b x c) . d,   b = x_1 - x_0,   c = x_2 - x_0,   d = x_3 - x_0
+//   g_1   = c x d,   g_2 = d x b,   g_3 = b x c,   g_0 = -(g_1 + g_2 + g_3)             S_min: TetBatch::floor
+// Bending, the angle between triangles (x_0, x_1, x_2) and (x_1, x_0, x_3) (Bridson et al. 2003, other sign)
+//   C     = theta - theta0, wrapped to [-pi, pi] [rad],   theta = atan2((n_1 x n_2) . e^, n_1 . n_2),   e = x_1 - x_0
+//   n_1   = (x_0 - x_2) x (x_1 - x_2),   n_2 = (x_1 - x_3) x (x_0 - x_3)
+//   m_i   = n_i / max(|n_i|^2, BendingBatch::floor)
+//   g_0   = ((x_1 - x_2) . e^) m_1 + ((x_1 - x_3) . e^) m_2,   g_2 = -|e| m_1
+//   g_1   = ((x_2 - x_0) . e^) m_1 + ((x_3 - x_0) . e^) m_2,   g_3 = -|e| m_2
+//   S_min = kLeastShareOfSum (max_j w_j) (max_j |g_j|^2)
+// Binding, tension of eq. 9 of the paper and pressure along the triangle's unit normal n^, in one correction
+//   C_t   = max(|d| - L, 0) [m],   d = x_m - sum_i b_i x_i
+//   C_c   = max(k_c (H - h), f H - h, 0) [m],   h = n^ . d
+//   u     = (-k_t C_t d^ + C_c n^) / max(S, S_min),   S = w_m + sum_i w_i b_i^2,   x_m += w_m u,   x_i -= w_i b_i u
+//   S_min = max(kLeastShareOfSum max_j w_j, kLeastBindingSum)
+//
+//   L, V0, theta0, H  values at rest: length [m], volume [m^3], angle [rad], height over the triangle [m]
+//   b_i               barycentric coordinates           k_t, k_c, f  BindingStiffness: tension, compression, floor
+//
+// Layout: batches of eight constraints of one colour, no two of which share a particle (tissue/batches.h); for the
+// edges of the membrane the stencil of tissue/grid_sweep.h.
 #pragma once
 
 #include "physics_node/pbd/kernels.h"
@@ -7,15 +39,19 @@
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
-/// With vertices that cannot move, the others must not make up for all of it however small their part in the constraint
-/// is: this part of the largest possible sum of w |gradient|^2 is divided by at least. A constraint between free
-/// vertices of like mass is above it.
+/// S_min as a share of the largest possible term max w max |g|^2. If the vertex with the largest gradient is fixed or
+/// held, S can become tiny and free vertices with small gradients would have to satisfy the whole constraint: the
+/// correction would be blown up. Between free vertices of equal mass S is above the bound, so it does not act.
+inline constexpr float kLeastShareOfSum = 0.2f;
 template <class F>
 inline F LeastSum(F largest_w, F largest_gradient_sq) {
-  return F::All(0.2f) * (largest_w * largest_gradient_sq);
+  return F::All(kLeastShareOfSum) * (largest_w * largest_gradient_sq);
 }
 
-/// Distance constraint |q - p| = rest.
+/// S_min of a binding without free particles [1/kg]: keeps the quotient finite, far below 1 / mass of any particle.
+inline constexpr float kLeastBindingSum = 1e-6f;
+
+/// Impulse of the distance constraint |q - p| = rest; 0 where rest is 0.
 template <class F>
 inline V<F> StretchImpulse(const Pair<F>& s, const V<F>& d, F rest, F k) {
   const F length = Sqrt(Dot(d, d));
@@ -54,7 +90,7 @@ FULCRUM_INLINE void ProjectVolumes(float* particles, const TetBatch& batch, floa
   for (int j = 0; j < 4; ++j) {
     q[j] = GatherXyzw<F>(particles, batch.v[j], kStep);
   }
-  // Six times the volume and its gradients; the first vertex's is minus the sum of the others'.
+  // ga is minus the gradient of the first vertex.
   const V<F> b = q[1].p - q[0].p, c = q[2].p - q[0].p, d = q[3].p - q[0].p;
   const V<F> gd = Cross(b, c), gb = Cross(c, d), gc = Cross(d, b);
   const V<F> ga = gb + gc + gd;
@@ -73,7 +109,7 @@ FULCRUM_INLINE void ProjectVolumes(float* particles, const TetBatch& batch, floa
 template <class F>
 FULCRUM_INLINE void ProjectBending(float* particles, const BendingBatch& batch, float stiffness) {
   constexpr std::size_t kStep = kNext<BendingBatch>;
-  const F pi = F::All(3.14159265f), two_pi = F::All(6.28318531f), zero = F::All(0.0f);
+  const F pi = F::All(kPi), two_pi = F::All(kTwoPi), zero = F::All(0.0f);
   Particles<F> q[4];
   for (int j = 0; j < 4; ++j) {
     q[j] = GatherXyzw<F>(particles, batch.v[j], kStep);
@@ -127,10 +163,10 @@ FULCRUM_INLINE void ProjectBindings(float* pool, const BindingBatch& batch, cons
       Max(F::All(stiffness.compression) * (rest_height - height), F::All(stiffness.floor) * rest_height - height);
   const F sum = node.w + q[0].w * b[0] * b[0] + q[1].w * b[1] * b[1] + q[2].w * b[2] * b[2];
   const F w_max = Max(Max(node.w, q[0].w), Max(q[1].w, q[2].w));
-  // 1 over the length and over the sum in one division.
+  // One division for 1 / |d| and 1 / S.
   const F some_length = Max(length, Tiny<F>());
   const F inverse = Batches<F>::Load(batch.active, kStep) /
-                    (some_length * Max(Max(sum, LeastSum(w_max, F::All(1.0f))), F::All(1e-6f)));
+                    (some_length * Max(Max(sum, LeastSum(w_max, F::All(1.0f))), F::All(kLeastBindingSum)));
   const V<F> move = d * (inverse * drawn) + n * (inverse * some_length * Max(pressed, zero));
   ScatterPool<F>(node.p + move * node.w, pool, batch.base[0], batch.step[0], kStep);
   for (int j = 0; j < 3; ++j) {

@@ -7,10 +7,15 @@
 namespace fulcrum::physics {
 namespace {
 
-/// The fat that a binding stands for gives way when the membrane is lifted off and carries it when it is pressed down;
-/// to less than this part of its height it cannot be pressed, so the organ does not come through the membrane.
+/// Stiffness of a binding under pressure over that under tension: the fat that it stands for yields when the membrane
+/// is lifted and carries the membrane when it is pressed down. Assumed.
 constexpr float kCompressionOverTension = 10.0f;
+/// Share of its rest height that a binding keeps under any pressure, so that the organ does not penetrate the membrane.
+/// Assumed.
 constexpr float kLeastHeight = 0.3f;
+/// A coordinate that differs from its previous value by more than this multiple of the largest movement was damaged
+/// between two steps: no step leaves such a difference.
+constexpr float kDamagedOverMaxStep = 2.0f;
 
 }  // namespace
 
@@ -42,7 +47,8 @@ void PbdSolver::Bend() {
 }
 
 std::uint32_t PbdSolver::Predict() {
-  IntegrateSettings settings{std::max(0.0f, 1.0f - params_.damping_per_s * params_.dt_s), {}, 2.0f * kMaxStep};
+  IntegrateSettings settings{
+      std::max(0.0f, 1.0f - params_.damping_per_s * params_.dt_s), {}, kDamagedOverMaxStep * kMaxStep};
   for (int axis = 0; axis < 3; ++axis) {
     settings.gravity[axis] = params_.gravity[axis] * params_.dt_s * params_.dt_s;
   }

@@ -1,5 +1,5 @@
-// One step of position-based dynamics in the paper's way: predict, a few Gauss-Seidel iterations over all layers,
-// velocities from positions (Verlet). Contacts and grasps are projected by the caller between the iterations.
+// Solver of mode paper, position-based dynamics: prediction, a few Gauss-Seidel iterations over all layers, velocities
+// from positions (Verlet). The caller projects contacts and grasps between the iterations.
 #pragma once
 
 #include <cstdint>
@@ -14,23 +14,23 @@ namespace fulcrum::physics {
 
 class PbdSolver {
  public:
-  /// No particle moves further in one step [m]: 3 m/s at 100 Hz, ten times a quick hand. What would is not tissue but
-  /// an explosion, and is cut short.
+  /// Largest movement of a particle in a step [m]: 3 m/s at 100 Hz, ten times a fast hand. A larger one is an
+  /// instability and is limited to this.
   static constexpr float kMaxStep = 0.03f;
 
   PbdSolver(const PhysicsParams& params, TissueModel* model, ParticleStore* particles,
             const pbd::Kernels& kernels = pbd::KernelsFor(), const tissue::Kernels& motion = tissue::KernelsFor());
 
-  /// previous <- now; now <- now + damped velocity + gravity, for free particles.
-  /// A coordinate damaged since the last step (not finite, far off) comes from the last step; returns how many.
+  /// previous <- now; now <- now + damped velocity + gravity, for free particles. A coordinate damaged since the last
+  /// step (not finite, or far from the previous one) is restored from the last step; returns their number.
   std::uint32_t Predict();
   /// One Gauss-Seidel iteration: tube springs, volumes, membrane stretch, bending, bindings.
   void Iterate();
-  /// The bending of Iterate, on a compact copy of the particles that hinges use.
+  /// Bending of Iterate, on a compact copy of the particles that hinges use.
   void Bend();
-  /// Quarantine: what is not finite goes back to where it was; nothing goes further than kMaxStep.
+  /// Quarantine: particles that are not finite return to their previous position, movements are limited to kMaxStep.
   FinishResult Finish();
-  /// Takes all velocities away.
+  /// Sets all velocities to zero.
   void Stop();
 
  private:

@@ -1,4 +1,37 @@
-// Bodies of the XPBD kernels, compiled once per instruction set with FULCRUM_KERNEL_NAMESPACE set.
+// Bodies of the XPBD kernels; compiled for each instruction set with FULCRUM_KERNEL_NAMESPACE set.
+//
+// Implicit step of an energy k C^2 / 2 by one linearised projection with lambda = 0 at its start (Macklin, Mueller and
+// Chentanez, XPBD, 2016, eq. 18; Macklin et al., Small Steps in Physics Simulation, 2019):
+//
+//   x_i <- x_i - w_i g_i  s C / (1 + s S),   s = k h^2 [kg],   S = sum_j w_j |g_j|^2 [1/kg],   g_i = dC/dx_i
+//
+//   x_i  position [m]      w_i  inverse mass [1/kg], 0 = fixed      h  substep [s]      k  stiffness [N/m]
+//
+// Below, ^ marks a unit vector.
+//
+// Membrane edge, tension A (e + c e^3) at strain e = (|d| - L) / L; secant stiffness k = A / L (1 + c e^2)
+//   C     = |d| - L [m],   d = q - p,   S = w_p + w_q
+//   p += w_p i,   q -= w_q i,   impulse i = (s C d^ - h^2 T) / (1 + s S) [kg m]          T = 0 without prestrain
+// Tetrahedron, stable neo-Hookean (Smith et al. 2018), as a block of two constraints (Macklin and Mueller 2021)
+//   Psi   = mu/2 I + (lambda + mu)/2 (J - 1 - mu / (lambda + mu))^2 [Pa],   I = tr(F^T F),   J = det F
+//   F     = E M,   E = (x_1 - x_0, x_2 - x_0, x_3 - x_0) [m],   M = E^-1 at rest [1/m]
+//   d_i   = d(I/2)/dx_i = column i of F M^T,   h_i = dJ/dx_i = column i of cof(F) M^T,   i = 1..3 [1/m]
+//   d_0   = -(d_1 + d_2 + d_3),   h_0 likewise
+//   s_d   = mu V h^2,   s_h = (lambda + mu) V h^2 [kg m^2],   p = s_h (J - 1) - s_d
+//   a     = s_d sum w d.d / I,   b = sum w d.h,   c = s_h sum w h.h
+//   det   = 1 + a + c + s_d s_h (sum w d.d sum w h.h - b^2) / I
+//   x_i  += w_i (u d_i + l h_i),   u = s_d (b p / I - 1 - c) / det,   l = (s_h s_d b - p (1 + a)) / det
+// Hinge, quadratic bending (Bergou et al. 2006), three equal axes at once
+//   C     = sum_i c_i x_i - o [m],   g_i = c_i,   S = sum_i w_i c_i^2
+// Binding (eq. 9 of the paper)
+//   C     = |d| - L [m],   d = x_m - sum_i b_i x_i,   g_m = d^,   g_i = -b_i d^,   S = w_m + sum_i w_i b_i^2
+//
+//   L              length without tension [m]                     T    tension in the rest shape, from p to q [N]
+//   mu, lambda, V  Lame parameters [Pa], volume at rest [m^3]     b_i  barycentric coordinates
+//   c_i, o         coefficients of a hinge, sum_i c_i x_i in the rest shape [m]
+//
+// Layout: batches of eight elements of one colour, no two of which share a particle (tissue/batches.h), with their
+// material beside them (xpbd/kernels.h); for the edges of the membrane the stencil of tissue/grid_sweep.h.
 #pragma once
 
 #include "physics_node/tissue/grid_sweep.h"
@@ -6,11 +39,11 @@
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
-/// Spring with tension A (e + c e^3): linear with the secant stiffness A / L (1 + c e^2) at its present length.
+/// Law of stretch of an edge.
 ///
-/// `prestrained`: less the tension in the rest shape, which a dead load on its ends carries (ElasticModel::load).
-/// Applied to the nodes before the sweep, the load would have to be caught by that one sweep, and a membrane at rest
-/// would be blown up; spring by spring both cancel. Where an edge has been cut the load is still there.
+/// `prestrained`: each edge also carries its share T of the dead load that balances the tension in the rest shape
+/// (ElasticModel::load). Added to the nodes before the sweep, one sweep could not carry the load across the sheet, and
+/// a membrane at rest would be blown up; edge by edge tension and load cancel exactly. A cut edge keeps its load.
 template <bool prestrained>
 struct XpbdStretch {
   const float* rest[3];
@@ -50,14 +83,12 @@ void MembraneXpbd(const GridArrays& g, const xpbd::Membrane& m, float h_sq) {
   }
 }
 
-/// Stable neo-Hookean (Smith et al. 2018; as constraints, Macklin and Mueller 2021):
-///   Psi = mu/2 tr(F^T F) + (lambda + mu)/2 (J - 1 - mu / (lambda + mu))^2
-/// is a deviatoric constraint sqrt(tr F^T F) and a hydrostatic one J - 1 - mu / (lambda + mu). At rest both pull, and
-/// only together they cancel, so the two are solved as one block: one after the other would shake a body at rest.
-/// With d_i, h_i the gradients of tr(F^T F) / 2 and of J, I = tr(F^T F), s_d = mu V h^2, s_h = (lambda + mu) V h^2,
-/// a = s_d sum w d.d / I, b = sum w d.h, c = s_h sum w h.h, p = s_h (J - 1) - s_d:
-///   u = (-s_d (1 + c) + s_d b p / I) / D,  l = (-p (1 + a) + s_h s_d b) / D,
-///   D = 1 + a + c + s_d s_h (sum w d.d sum w h.h - b^2) / I,      dx_i = w_i (u d_i + l h_i).
+/// Least I = |F|^2 to divide by; 3 at rest. A tetrahedron collapsed to a point has no direction of its deviatoric
+/// gradient; the bound keeps the quotient finite.
+inline constexpr float kLeastSquaredF = 1e-3f;
+
+/// The deviatoric constraint sqrt(I) and the hydrostatic one J - 1 - mu / (lambda + mu) have forces that cancel at
+/// rest, so they are solved together, as a 2 x 2 block: one after the other they would shake a body at rest.
 template <class F>
 FULCRUM_INLINE void ProjectTets(float* particles, const TetBatch& batch, const xpbd::NeoHookeanBatch& material,
                                 float h_sq) {
@@ -72,7 +103,7 @@ FULCRUM_INLINE void ProjectTets(float* particles, const TetBatch& batch, const x
     m[j] = Batches<F>::Load(material.inverse_edges[j], kMaterial);
   }
   const V<F> e0 = q[1].p - q[0].p, e1 = q[2].p - q[0].p, e2 = q[3].p - q[0].p;
-  // Columns of F = D M, of its cofactor, and the gradients F M^T, cof(F) M^T.
+  // Columns of F = E M and of its cofactor, then the gradients as columns of F M^T and cof(F) M^T.
   V<F> f[3], cof[3], d[4], h[4];
   for (int j = 0; j < 3; ++j) {
     f[j] = e0 * m[j] + e1 * m[3 + j] + e2 * m[6 + j];
@@ -96,8 +127,7 @@ FULCRUM_INLINE void ProjectTets(float* particles, const TetBatch& batch, const x
   }
   const F s_d = Batches<F>::Load(material.mu, kMaterial) * F::All(h_sq);
   const F s_h = Batches<F>::Load(material.lambda, kMaterial) * F::All(h_sq);
-  // A tet squeezed to nothing has no direction to be pulled in; this keeps the quotient finite.
-  const F inverse_i = one / Max(Dot(f[0], f[0]) + Dot(f[1], f[1]) + Dot(f[2], f[2]), F::All(1e-3f));
+  const F inverse_i = one / Max(Dot(f[0], f[0]) + Dot(f[1], f[1]) + Dot(f[2], f[2]), F::All(kLeastSquaredF));
   const F a = s_d * dd * inverse_i, c = s_h * hh;
   const F p = s_h * (Dot(f[0], cof[0]) - one) - s_d;
   const F det = one + a + c + (s_d * inverse_i) * (s_h * Max(dd * hh - dh * dh, zero));

@@ -7,8 +7,12 @@
 namespace fulcrum::physics::xpbd {
 namespace {
 
-/// A tet flatter than this in the rest shape (longest edge over height) has no usable inverse in float and is left out.
-constexpr double kFlattest = 1e4;
+/// Largest ratio of edge to height of a tetrahedron in the rest shape. The inverse edge matrix of a flatter one has too
+/// few correct digits in float, and the element is omitted.
+constexpr double kMaxAspect = 1e4;
+/// A coordinate that differs from its previous value by more than this multiple of the largest movement was damaged
+/// between two substeps: none leaves such a difference.
+constexpr float kDamagedOverMaxMove = 2.0f;
 
 }  // namespace
 
@@ -54,7 +58,7 @@ XpbdSolver::XpbdSolver(const ElasticModel& model, const TissueModel* tissue, Par
         }
       }
       const float scene_rest = tissue->rest(static_cast<int>(edge % 3))[at];
-      // The same for all edges; those that are cut or shrunk already do not tell.
+      // The same ratio for all edges. A shrunk edge has a larger one, hence the minimum; a cut edge has none.
       if (scene_rest > 0.0f) {
         membrane_.rest_scale = std::min(membrane_.rest_scale, static_cast<float>(spring.rest_length) / scene_rest);
       }
@@ -68,8 +72,8 @@ XpbdSolver::XpbdSolver(const ElasticModel& model, const TissueModel* tissue, Par
     NeoHookeanBatch& batch = tets_[tissue->tet_slots()[i] / kLanes];
     const Index lane = tissue->tet_slots()[i] % kLanes;
     const Mat3d inverse = tet.inverse_edges;
-    const double longest = (model.rest_position[tet.v[1]] - model.rest_position[tet.v[0]]).norm();
-    if (!(tet.volume > 0) || !inverse.allFinite() || inverse.norm() * longest > kFlattest) {
+    const double edge = (model.rest_position[tet.v[1]] - model.rest_position[tet.v[0]]).norm();
+    if (!(tet.volume > 0) || !inverse.allFinite() || inverse.norm() * edge > kMaxAspect) {
       continue;
     }
     for (int row = 0; row < 3; ++row) {
@@ -101,7 +105,7 @@ XpbdSolver::XpbdSolver(const ElasticModel& model, const TissueModel* tissue, Par
 }
 
 std::uint32_t XpbdSolver::Predict(float h) {
-  IntegrateSettings settings{1.0f / (1.0f + damping_per_s_ * h), {}, 2.0f * kMaxSpeed * h};
+  IntegrateSettings settings{1.0f / (1.0f + damping_per_s_ * h), {}, kDamagedOverMaxMove * kMaxSpeed * h};
   for (int axis = 0; axis < 3; ++axis) {
     settings.gravity[axis] = gravity_[axis] * h * h;
   }

@@ -1,9 +1,9 @@
-// Extended position-based dynamics with small steps (Macklin et al. 2016, 2019): a step is cut into substeps, each with
-// one Gauss-Seidel sweep over ElasticModel's energies in SI. On the arrays of the paper's mode: previous positions are
-// those a substep ago.
+// Extended position-based dynamics with small steps (Macklin et al. 2016, 2019): a step is divided into substeps, each
+// with one Gauss-Seidel sweep over the energies of ElasticModel in SI units. It uses the arrays of mode paper; previous
+// positions are those of the last substep.
 //
-// Beside ElasticModel: the organ is made of its linear tetrahedra, not of nodal patches (a patch of fifteen vertices is
-// too wide for a local projection), so it is as stiff in bending as such tets are.
+// Deviation from ElasticModel: the organ consists of linear tetrahedra instead of nodal patches, because a patch of
+// fifteen vertices is too wide for a local projection. It therefore locks in bending (elastic_model.h).
 #pragma once
 
 #include <vector>
@@ -18,23 +18,22 @@ namespace fulcrum::physics::xpbd {
 
 class XpbdSolver {
  public:
-  /// No particle moves faster [m/s]; as PbdSolver's kMaxStep.
+  /// Largest speed of a particle [m/s]; corresponds to PbdSolver::kMaxStep.
   static constexpr float kMaxSpeed = 3.0f;
 
-  /// Cuts and shrinking are read from `tissue` as they stand.
+  /// Cuts and shrinking are read from `tissue` in each substep.
   XpbdSolver(const ElasticModel& model, const TissueModel* tissue, ParticleStore* particles,
              const Kernels& kernels = KernelsFor(), const tissue::Kernels& motion = tissue::KernelsFor());
 
-  /// A substep of h seconds is Predict, Iterate, Finish; contacts and held particles are put right by the caller
-  /// between them. Predict: previous <- now; now <- now + damped velocity + gravity, for free particles. The
-  /// substep before had the same h. Returns how many coordinates had been damaged from outside and come from the
-  /// substep before.
+  /// A substep of h seconds is Predict, Iterate, Finish; the caller places held particles and projects contacts between
+  /// them. Predict: previous <- now; now <- now + damped velocity + gravity, for free particles. The last substep had
+  /// the same h. Returns the number of damaged coordinates, which are restored from the last substep.
   std::uint32_t Predict(float h);
   /// Organ, membrane, bending, bindings.
   void Iterate(float h);
-  /// What is not finite goes back to where it was; nothing goes further than kMaxSpeed * h.
+  /// Particles that are not finite return to their previous position, movements are limited to kMaxSpeed * h.
   FinishResult Finish(float h);
-  /// Takes all velocities away.
+  /// Sets all velocities to zero.
   void Stop();
 
  private:
