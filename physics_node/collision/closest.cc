@@ -1,12 +1,15 @@
+// Reference of the kernels in touch_impl.h, which lists the equations.
 #include "physics_node/collision/closest.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "physics_node/collision/kernels.h"
+
 namespace fulcrum::physics {
 namespace {
 
-/// Quotient of a projection onto an edge, 0 for an edge of no length.
+/// Quotient of a projection onto an edge; 0 for an edge without length.
 float Ratio(float numerator, float denominator) { return denominator > 0.0f ? numerator / denominator : 0.0f; }
 
 /// Four lanes: the three edges of a triangle at once; the fourth repeats the first.
@@ -40,8 +43,8 @@ EdgesClosest ClosestEdges(const Vec3f& p0, const Vec3f& u, const Vec3f& x0, cons
   const F4 e = vx * vx + vy * vy + vz * vz, f = vx * rx + vy * ry + vz * rz;
   const F4 c = u.x() * rx + u.y() * ry + u.z() * rz, b = u.x() * vx + u.y() * vy + u.z() * vz;
   const F4 denominator = a * e - b * b;
-  // Parallel within rounding: any s will do.
-  F4 s = denominator > 1e-6f * a * e ? Clamp01(Ratio(b * f - c * e, denominator)) : zero;
+  // Parallel: any s will do.
+  F4 s = denominator > kParallelSinSq * a * e ? Clamp01(Ratio(b * f - c * e, denominator)) : zero;
   F4 t = Ratio(b * s + f, e);
   const F4 inside = Clamp01(t);
   s = inside != t ? Clamp01(Ratio(inside * b - c, a)) : s;
@@ -106,7 +109,7 @@ ClosestPoints ClosestSegmentTriangle(const Vec3f& p0, const Vec3f& p1, const Vec
       return {0.0f, t, bary, at, at, true};
     }
   }
-  // The segment against the edges, which covers corners and ends; then an end over the inside.
+  // The segment against the edges, with corners and ends; then an end over the inside.
   const EdgesClosest edges = ClosestEdges(p0, u, a, b, c);
   std::size_t edge = edges.distance_sq[1] < edges.distance_sq[0] ? 1 : 0;
   edge = edges.distance_sq[2] < edges.distance_sq[edge] ? 2 : edge;

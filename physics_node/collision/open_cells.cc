@@ -7,11 +7,11 @@ bool IsOpenAt(const OpenCells& open, float cell_m, const Vec2f& material) {
                      static_cast<std::int32_t>(std::floor(material.y() / cell_m)));
 }
 
-bool NearestLeft(const OpenCells& open, float cell_m, const SheetTriangle& triangle, const Vec3f& a, const Vec3f& b,
-                 float range, ClosestPoints* closest) {
+bool NearestRemaining(const OpenCells& open, float cell_m, const SheetTriangle& triangle, const Vec3f& a,
+                      const Vec3f& b, float range, ClosestPoints* closest) {
   float nearest_sq = range * range;
   bool found = false;
-  constexpr std::int32_t kAll = 1 << 30;
+  constexpr std::int32_t kAll = 1 << 30;  // Beyond every cell of a sheet.
   ForCellsIn(triangle.material, cell_m, -kAll, -kAll, kAll, kAll,
              [&](std::int32_t ix, std::int32_t iy, const std::array<float, 3>& w) {
                if (open.IsOpen(ix, iy)) {

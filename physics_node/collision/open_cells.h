@@ -1,8 +1,11 @@
-// What a cut has left of a triangle that still lives in the mesh.
+// The part of a triangle of the mesh that remains after some of its thermal cells have been removed (open cells).
 //
-// The mesh severs an edge when its whole strand is open. Until then the triangle holds the sheet together, but metal
-// that stands where its cells are gone must not push it: the slit would open in jumps of an edge, and drag the sheet
-// along between two of them.
+// The mesh severs an edge when its whole strand is open. Until then the triangle transmits forces, but metal in its
+// open cells must not push it: the slit would open by a whole edge at a time and drag the sheet along in between.
+//
+//   centre of cell (i, j):   q = c (i + 1/2, j + 1/2) in material coordinates [m],   c: size of a cell
+//   in the triangle where    u, v >= 0,  u + v <= 1;   u = d x e2 / (e1 x e2),  v = e1 x d / (e1 x e2)
+//   d = q - m_0,  e1 = m_1 - m_0,  e2 = m_2 - m_0,   m_k: corners;   barycentric coordinates (1 - u - v, u, v)
 #pragma once
 
 #include <algorithm>
@@ -21,13 +24,13 @@ struct SheetTriangle {
   std::array<Vec3f, 3> place;     ///< In frame W.
 };
 
-/// The cell that a place of the sheet lies in is gone.
+/// The cell at a point of the sheet is open.
 [[nodiscard]] bool IsOpenAt(const OpenCells& open, float cell_m, const Vec2f& material);
 
-/// Replaces `closest` by the point of what is left of the triangle that is nearest to the axis from a to b, by centres
-/// of cells. False, and nothing is changed: nothing is left within `range` of the axis.
-[[nodiscard]] bool NearestLeft(const OpenCells& open, float cell_m, const SheetTriangle& triangle, const Vec3f& a,
-                               const Vec3f& b, float range, ClosestPoints* closest);
+/// Replaces `closest` by the centre of the remaining cell of the triangle that is nearest to the axis from a to b.
+/// False, with `closest` unchanged: no cell remains within `range` of the axis.
+[[nodiscard]] bool NearestRemaining(const OpenCells& open, float cell_m, const SheetTriangle& triangle, const Vec3f& a,
+                                    const Vec3f& b, float range, ClosestPoints* closest);
 
 /// Calls visit(ix, iy, barycentric) for the cells whose centres lie in the triangle, of those in the box from (x0, y0)
 /// to (x1, y1) inclusive.
@@ -44,7 +47,7 @@ void ForCellsIn(const std::array<Vec2f, 3>& material, float cell_m, std::int32_t
          ix <= std::min(x1, static_cast<std::int32_t>(std::floor(high.x()))); ++ix) {
       const Vec2f d = cell_m * Vec2f(static_cast<float>(ix) + 0.5f, static_cast<float>(iy) + 0.5f) - material[0];
       const float u = per_area * (d.x() * e2.y() - d.y() * e2.x()), v = per_area * (e1.x() * d.y() - e1.y() * d.x());
-      // A triangle without area has no cells: NaN is not >= 0.
+      // Of a triangle without area u and v are not finite, and no cell is visited.
       if (u >= 0.0f && v >= 0.0f && u + v <= 1.0f) {
         visit(ix, iy, std::array<float, 3>{1.0f - u - v, u, v});
       }

@@ -3,22 +3,27 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Triangles in a leaf, leaves in a cluster.
+/// Triangles in a leaf, leaves in a cluster: 64 triangles of the organ in a cluster. Assumed.
 constexpr std::size_t kLeafSize = 8, kClusterSize = 8;
+/// Bits of each coordinate in a Morton code: three of them fit 32 bits.
+constexpr int kMortonBits = 10;
+/// Added to the size of the tissue's box, which may be flat [m].
+constexpr float kLeastExtent = 1e-6f;
+/// Movement since the last fit above which bounds are fitted again wherever the tools are; Invalidate() sets more [m].
+constexpr float kInvalidAge = 1e3f;
 
-/// Interleaves ten bits of each coordinate: neighbours in space become neighbours in order.
+/// Interleaves the bits of the coordinates, each in [0, 1): the order of the codes keeps neighbours in space together
+/// (Morton 1966).
 std::uint32_t Morton(const Vec3f& unit) {
+  constexpr float kLargest = (1 << kMortonBits) - 1;
   std::uint32_t code = 0;
-  for (int bit = 9; bit >= 0; --bit) {
+  for (int bit = kMortonBits - 1; bit >= 0; --bit) {
     for (int axis = 0; axis < 3; ++axis) {
-      code = code << 1 | (static_cast<std::uint32_t>(unit[axis] * 1023.0f) >> bit & 1u);
+      code = code << 1 | (static_cast<std::uint32_t>(unit[axis] * kLargest) >> bit & 1u);
     }
   }
   return code;
 }
-
-/// Older bounds are fitted wherever the tools are [m].
-constexpr float kForgotten = 1e3f;
 
 }  // namespace
 
@@ -28,18 +33,18 @@ SurfaceBounds::SurfaceBounds(const SceneView& scene, const TissueModel* model, P
       particles_(particles),
       model_(model),
       kernels_(kernels),
-      slot_blocks_((particles->layout().slots + 7) / 8),
-      row_blocks_((std::max(particles->layout().rows, 2u) - 1 + 7) / 8) {
+      slot_blocks_((particles->layout().slots + kBlockCells - 1) / kBlockCells),
+      row_blocks_((std::max(particles->layout().rows, 2u) - 1 + kBlockCells - 1) / kBlockCells) {
   for (std::size_t i = 0; i < 6; ++i) {
     bound_storage_[i].assign(std::size_t{row_blocks_} * slot_blocks_ * kLanes + kLanes, 0.0f);
-    // The kernel stores whole vectors: start on a 32-byte boundary.
+    // The kernel stores whole vectors to aligned addresses.
     float* data = bound_storage_[i].data();
-    while (reinterpret_cast<std::uintptr_t>(data) % 32 != 0) {
+    while (reinterpret_cast<std::uintptr_t>(data) % (kLanes * sizeof(float)) != 0) {
       ++data;
     }
     (i < 3 ? bounds_.lo[i] : bounds_.hi[i - 3]) = data;
   }
-  Vec3f low = Vec3f::Constant(3e38f), high = Vec3f::Constant(-3e38f);
+  Vec3f low = Vec3f::Constant(kLargestFinite), high = Vec3f::Constant(-kLargestFinite);
   for (const Vec3f& p : scene.rest_position) {
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
@@ -48,7 +53,7 @@ SurfaceBounds::SurfaceBounds(const SceneView& scene, const TissueModel* model, P
   for (Index t = 0; t < scene.tube_surface.size(); ++t) {
     const Triangle& v = scene.tube_surface[t];
     const Vec3f centre = (scene.rest_position[v[0]] + scene.rest_position[v[1]] + scene.rest_position[v[2]]) / 3.0f;
-    order.emplace_back(Morton((centre - low).cwiseQuotient(high - low + Vec3f::Constant(1e-6f))), t);
+    order.emplace_back(Morton((centre - low).cwiseQuotient(high - low + Vec3f::Constant(kLeastExtent))), t);
   }
   std::sort(order.begin(), order.end());
   for (const auto& [code, t] : order) {
@@ -78,13 +83,14 @@ SurfaceBounds::SurfaceBounds(const SceneView& scene, const TissueModel* model, P
     FitCluster(&cluster);
   }
   strips_.resize(row_blocks_);
-  Forget();
+  Invalidate();
   Update({});
 }
 
 void SurfaceBounds::FitStrip(Strip* strip, std::uint32_t row_block) {
   const GridLayout& layout = particles_->layout();
-  const std::uint32_t row = 8 * row_block, rows = std::min(layout.rows - row, 9u);
+  // The nodes of kBlockCells rows of cells: one row more.
+  const std::uint32_t row = kBlockCells * row_block, rows = std::min(layout.rows - row, kBlockCells + 1);
   const std::size_t at = std::size_t{row} * layout.stride, first = std::size_t{row_block} * slot_blocks_ * kLanes;
   const GridArrays grid{particles_->plane(0) + at,
                         particles_->plane(1) + at,
@@ -107,7 +113,7 @@ void SurfaceBounds::FitStrip(Strip* strip, std::uint32_t row_block) {
 }
 
 void SurfaceBounds::FitLeaf(Index leaf) {
-  Vec3f lo = Vec3f::Constant(3e38f), hi = Vec3f::Constant(-3e38f);
+  Vec3f lo = Vec3f::Constant(kLargestFinite), hi = Vec3f::Constant(-kLargestFinite);
   for (Index i = leaf_start_[leaf]; i < leaf_start_[leaf + 1]; ++i) {
     const Vec3f p = particles_->At({4 * leaf_vertices_[i], 1});
     lo = lo.cwiseMin(p);
@@ -135,7 +141,7 @@ void SurfaceBounds::Update(std::span<const Capsule> tools) {
   for (std::uint32_t rb = 0; rb < row_blocks_; ++rb) {
     Strip& strip = strips_[rb];
     strip.age += kTissueStep;
-    if (strip.age > kForgotten || std::any_of(tools.begin(), tools.end(), [&](const Capsule& tool) {
+    if (strip.age > kInvalidAge || std::any_of(tools.begin(), tools.end(), [&](const Capsule& tool) {
           return strip.MayTouch(tool.a, tool.b, kReach + strip.age + tool.radius);
         })) {
       FitStrip(&strip, rb);
@@ -148,7 +154,7 @@ void SurfaceBounds::Update(std::span<const Capsule> tools) {
     Sphere& cluster = clusters_[i];
     age_[i] += kTissueStep;
     const float reach = kReach + age_[i] + cluster.radius;
-    if (age_[i] > kForgotten || std::any_of(tools.begin(), tools.end(), [&](const Capsule& tool) {
+    if (age_[i] > kInvalidAge || std::any_of(tools.begin(), tools.end(), [&](const Capsule& tool) {
           return !Beyond(cluster.centre, tool.a, tool.b, reach + tool.radius);
         })) {
       FitCluster(&cluster);

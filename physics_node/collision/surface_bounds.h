@@ -1,7 +1,16 @@
-// Broad phase over the tissue's surface: boxes around blocks of the membrane (one vector kernel for a strip of eight
-// rows of cells), two levels of spheres around pieces of the organ's surface. Both are fitted locally to the tools: a
-// strip or sphere counts as grown by what tissue may have moved since it was fitted, and is fitted anew when it then
-// comes near a tool.
+// Broad phase over the tissue's surface: boxes around blocks of the membrane (one vector kernel per strip of
+// kBlockCells rows of cells), two levels of spheres around parts of the organ's surface. Both are fitted only near the
+// tools: strips and spheres are enlarged by the possible movement of tissue since their last fit, and fitted again when
+// they then reach a tool.
+//
+//   strip      candidate if  lo - R <= hi_s  and  hi + R >= lo_s  per axis      lo_s, hi_s  box of segment ab
+//   sphere     candidate if  distance(centre, ab) <= R + radius
+//   R          range + possible movement since the last fit (Update), range (queries) [m]
+//   leaf       centre (lo + hi) / 2, radius |hi - lo| / 2 of the box of its vertices
+//   cluster    centre: mean of its leaves' centres;  radius: max over the leaves of |c_leaf - centre| + r_leaf
+//
+// Layout: blocks of the membrane as in BlockBounds, one per lane; leaves are runs of kLeafSize triangles in Morton
+// order, clusters runs of kClusterSize leaves.
 #pragma once
 
 #include <algorithm>
@@ -13,6 +22,7 @@
 #include "physics_node/collision/closest.h"
 #include "physics_node/collision/kernels.h"
 #include "physics_node/collision/tool_shape.h"
+#include "physics_node/simd/limits.h"
 #include "physics_node/tissue/particle_store.h"
 #include "physics_node/tissue/tissue_model.h"
 
@@ -23,38 +33,40 @@ class SurfaceBounds {
   SurfaceBounds(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
                 const collision::Kernels& kernels);
 
-  /// Fits the bounds to the tissue within kReach of `tools`, once a step: tissue faster than kTissueStep a step may
-  /// come near unseen.
+  /// Fits the bounds to the tissue within kReach of `tools`, once a step. Tissue that moves more than kTissueStep in a
+  /// step can be missed.
   void Update(std::span<const Capsule> tools);
-  /// Tissue moves while nobody looks: the next Update fits everything.
-  void Forget() {
-    std::fill(age_.begin(), age_.end(), 3e38f);
-    std::for_each(strips_.begin(), strips_.end(), [](Strip& strip) { strip.age = 3e38f; });
+  /// For steps without Update: the next Update fits all bounds.
+  void Invalidate() {
+    std::fill(age_.begin(), age_.end(), kLargestFinite);
+    std::for_each(strips_.begin(), strips_.end(), [](Strip& strip) { strip.age = kLargestFinite; });
   }
   /// False: no tissue within `range` of the segment's box.
   [[nodiscard]] bool MayTouch(const Vec3f& a, const Vec3f& b, float range) const { return all_.MayTouch(a, b, range); }
 
-  /// visit(row, column, corners, squared distance of the centre): cells of the membrane within `range` of segment ab,
-  /// perhaps some more. Corners (r, c), (r, c+1), (r+1, c), (r+1, c+1). The visitor may lower `range` as it goes.
+  /// visit(row, column, corners, squared distance of the centre): all cells of the membrane within `range` of segment
+  /// ab and some beyond. Corners (r, c), (r, c+1), (r+1, c), (r+1, c+1). The visitor may reduce `range`.
   template <class Visit>
   void ForEachCellNear(const Vec3f& a, const Vec3f& b, const float& range, const Visit& visit) const;
-  /// visit(index in SceneView.tube_surface): the same of the organ.
+  /// visit(index in SceneView.tube_surface): the same for the organ.
   template <class Visit>
   void ForEachTubeTriangleNear(const Vec3f& a, const Vec3f& b, float range, const Visit& visit) const;
 
  private:
-  static constexpr float kReach = 0.015f;       ///< Probes look 10 mm around a tool [m].
-  static constexpr float kTissueStep = 0.010f;  ///< 1 m/s at 100 Hz [m].
+  /// Bounds this near to a tool are fitted [m]: probes search 10 mm around a tool.
+  static constexpr float kReach = 0.015f;
+  /// Assumed largest movement of tissue in a step [m]: 1 m/s at 100 Hz.
+  static constexpr float kTissueStep = 0.010f;
 
   struct Sphere {
     Index first = 0, last = 0;  ///< Leaves: of tube_order_; clusters: of leaves_.
     Vec3f centre = Vec3f::Zero();
     float radius = 0;
   };
-  /// Bounds of eight rows of cells.
+  /// Bounds of kBlockCells rows of cells.
   struct Strip {
-    Vec3f low = Vec3f::Constant(3e38f), high = Vec3f::Constant(-3e38f);
-    float age = 0;  ///< How far tissue may have moved since it was fitted [m].
+    Vec3f low = Vec3f::Constant(kLargestFinite), high = Vec3f::Constant(-kLargestFinite);
+    float age = 0;  ///< Possible movement of tissue since the last fit [m].
     [[nodiscard]] bool MayTouch(const Vec3f& a, const Vec3f& b, float range) const;
   };
   static bool Beyond(const Vec3f& p, const Vec3f& a, const Vec3f& b, float range) {
@@ -74,7 +86,7 @@ class SurfaceBounds {
   std::vector<Index> tube_order_;
   std::vector<Index> leaf_start_, leaf_vertices_;  ///< Each vertex of a leaf once.
   std::vector<Sphere> leaves_, clusters_;
-  std::vector<float> age_;  ///< Of each cluster: how far tissue may have moved since it was fitted [m].
+  std::vector<float> age_;  ///< By cluster: possible movement of tissue since the last fit [m].
   std::vector<Strip> strips_;
   Strip all_;  ///< Bounds of everything.
 };
@@ -107,8 +119,10 @@ void SurfaceBounds::ForEachCellNear(const Vec3f& a, const Vec3f& b, const float&
         if (Beyond(0.5f * (lo + hi), a, b, range + 0.5f * (hi - lo).norm())) {
           continue;
         }
-        for (std::uint32_t row = 8 * rb; row < std::min(8 * rb + 8, layout.rows - 1); ++row) {
-          for (std::uint32_t slot = 8 * sb; slot < std::min(8 * sb + 8, layout.slots); ++slot) {
+        const std::uint32_t row0 = kBlockCells * rb, row1 = std::min(row0 + kBlockCells, layout.rows - 1);
+        const std::uint32_t slot0 = kBlockCells * sb, slot1 = std::min(slot0 + kBlockCells, layout.slots);
+        for (std::uint32_t row = row0; row < row1; ++row) {
+          for (std::uint32_t slot = slot0; slot < slot1; ++slot) {
             const std::uint32_t col = lane * layout.slots + slot;
             if (col + 1 >= layout.cols) {
               break;

@@ -1,4 +1,4 @@
-// What watches what, at the start: membrane the organ, membrane and organ the fixed surfaces of the scene.
+// Setup of TissueCollision: watches of the membrane against the organ, of both against the fixed surfaces.
 #include <algorithm>
 #include <utility>
 
@@ -6,6 +6,12 @@
 #include "services/base/core/breathing.h"
 
 namespace fulcrum::physics {
+namespace {
+
+/// Range of the search for the organ from the membrane at rest: contains every scene [m].
+constexpr float kRestRange = 1.0f;
+
+}  // namespace
 
 void TissueCollision::Watches::MakeGroups(const ParticleStore& particles) {
   for (Index i = 0; i < all.size(); ++i) {
@@ -47,27 +53,27 @@ void TissueCollision::WatchOrgan() {
   for (Index node = 0; node < scene_.membrane.node_count() && !tree.empty(); ++node) {
     const Index particle = scene_.membrane.first + node;
     const Vec3f& p = scene_.rest_position[particle];
-    const TriangleTree::Hit hit = tree.Nearest(p, 1.0f, guess);
+    const TriangleTree::Hit hit = tree.Nearest(p, kRestRange, guess);
     guess = hit.triangle;
     if (scene_.inverse_mass[particle] > 0.0f && hit.triangle != kNoIndex) {
       const float rest = SignedDistance(p, corners[hit.triangle]).distance;
       if (rest > 0.0f) {
-        const float clearance = std::min(scene_.physics.collision_margin_m, 0.5f * rest);
+        const float clearance = std::min(scene_.physics.collision_margin_m, kRestShare * rest);
         Watch watch;
         watch.particle = particle;
         watch.at = particles_->Ref(particle);
         watch.triangle = hit.triangle;
         watch.clearance = clearance;
-        watch.SetGap(rest - clearance, Standpoint(watch), 0.0f);
+        watch.SetGap(rest - clearance, RelativePlace(watch), 0.0f);
         organ_.all.push_back(watch);
       }
     }
   }
   organ_.MakeGroups(*particles_);
   organ_moved_of_.assign(std::size_t{particles_->tube_blocks()} + 1, 0.0f);
-  organ_.beside.resize(organ_.groups.size());
+  organ_.organ_blocks.resize(organ_.groups.size());
   for (Index group = 0; group < organ_.groups.size(); ++group) {
-    FindBeside(group);
+    FindOrganBlocks(group);
   }
 }
 
@@ -92,7 +98,7 @@ void TissueCollision::WatchFixed(const StaticSurface& surface) {
     watch.particle = particle;
     watch.at = particles_->Ref(particle);
     const Vec3f& rest = scene_.rest_position[particle];
-    watch.SetGap(See(fixed.tree, rest, &watch), rest, 0.0f);
+    watch.SetGap(EvaluateFixedGap(fixed.tree, rest, &watch), rest, 0.0f);
     if (!watch.behind) {
       fixed.watches.all.push_back(watch);
     }

@@ -1,3 +1,15 @@
+// Pairs of capsules and triangles of a step, their sides, and the correction of a pair.
+//
+//   a pair    distance of the triangle from the axis <= r + m + kSlack + min(tissue_step, kMaxReach) + travel
+//   push      where the axis crosses the triangle:       depth = r + m - min s n . (x - y),  direction -s n
+//             where s n . o < -kSideCosine |o|, behind:  depth = r + m + |o|,                direction -s n
+//             else                                       depth = r + m - |o|,                direction -o / |o|
+//
+//   r, m      radius of the capsule and ContactMargin [m]
+//   y, o      closest point of the triangle; closest point of the axis minus y [m]
+//   n, s      normal of the membrane around the triangle, or of the organ's triangle; side of the tool, +1 or -1
+//   x         the two ends of the axis [m]
+//   travel    path of the faster end in the step [m]
 #include "physics_node/collision/tool_collision.h"
 
 #include <algorithm>
@@ -6,29 +18,28 @@
 namespace fulcrum::physics {
 namespace {
 
-/// How far tissue may move in one step's iterations and still be among the pairs [m].
+/// Movement of tissue during the iterations of a step after which it is still among the pairs [m].
 constexpr float kSlack = 0.0015f;
-/// Rows are made for tissue this near to touch, and as much more as it moves in a substep up to kMaxReach [m].
+/// Rows are made for tissue this near to touch, plus its movement in a substep, of which at most kMaxReach counts [m].
 constexpr float kRowBand = 0.001f;
 constexpr float kMaxReach = 0.005f;
-/// Closest points are exact for pairs that come this near to touch [m].
+/// Distance from touch up to which the closest points of a new pair are exact; beyond, the centroid is used [m].
 constexpr float kNear = 0.001f;
-/// A tool deeper behind a triangle than this has gone through it for good: pushing would only tear [m].
-constexpr float kMostBehindTool = 0.004f;
-/// After closing or letting go, jaws collide again when nothing has been in their way for so many steps.
+/// Deeper behind a triangle than this a tool has passed through the tissue, and a push would only tear it [m].
+constexpr float kMaxBehindTool = 0.004f;
+/// Steps without tissue in the way after which jaws that closed or released tissue collide again.
 constexpr int kClearSteps = 5;
-/// Jaws that have closed on nothing are clear of what is further than this part of their radius from their axis.
-constexpr float kClearPart = 0.5f;
-/// Sides are told by the normal of a patch this many nodes each way, not by that of a triangle: a crumpled triangle
-/// turns over without the membrane doing so.
-constexpr Index kPatch = 3;
-/// On which side of a triangle the tool is, can be told only where its offset is this much along the normal, and not
-/// beside an edge.
-constexpr float kBesideToolCosine = 0.7f;
-/// Squared distances at least so large are of triangles that were left alone [m^2].
-constexpr float kLeftAlone = 1e38f;
-/// Room for the pairs of a step: a tool among crumpled membrane.
-constexpr std::size_t kPairs = 2048;
+/// Jaws that closed without a hold are clear of tissue further from their axis than this share of their radius.
+constexpr float kClearShare = 0.5f;
+/// Sides refer to the normal of a patch of this many nodes in each direction instead of that of a triangle: a triangle
+/// of crumpled membrane can turn over while the membrane does not.
+constexpr Index kPatchNodes = 3;
+/// The side of a tool is determined only if its offset has at least this share along the normal, not beside an edge.
+constexpr float kSideCosine = 0.7f;
+/// Squared distances from here on mark triangles that the kernel skipped (kLargestFinite) [m^2].
+constexpr float kSkippedSq = 1e38f;
+/// Pairs of a step for which memory is reserved: a tool among crumpled membrane.
+constexpr std::size_t kPairCapacity = 2048;
 
 SegmentMotion SegmentOf(const Capsule& from, const Capsule& to) {
   return {{{from.a.x(), from.a.y(), from.a.z()}, {from.b.x(), from.b.y(), from.b.z()}},
@@ -52,17 +63,19 @@ ToolCollision::ToolCollision(const SceneView& scene, const TissueModel* model, P
   for (std::uint32_t col = 0; col < scene.membrane.cols; ++col) {
     column_.push_back(particles->NodeRef(0, col));
   }
-  pairs_.reserve(kPairs);
-  last_pairs_.reserve(kPairs);
-  row_order_.reserve(kPairs);
+  pairs_.reserve(kPairCapacity);
+  last_pairs_.reserve(kPairCapacity);
+  row_order_.reserve(kPairCapacity);
 }
 
 Vec3f ToolCollision::PatchNormal(Index cell, bool previous) const {
   const GridLayout& layout = particles_->layout();
   const Index row = cell / (layout.cols - 1), col = cell % (layout.cols - 1);
-  const Index left = col > kPatch ? col - kPatch : 0, right = std::min(col + kPatch + 1, layout.cols - 1);
-  const Index top = row > kPatch ? row - kPatch : 0, bottom = std::min(row + kPatch + 1, layout.rows - 1);
-  // Beside a cut there is none: what lies beyond may be anywhere, and flaps turn over as they like.
+  const Index left = col > kPatchNodes ? col - kPatchNodes : 0,
+              right = std::min(col + kPatchNodes + 1, layout.cols - 1);
+  const Index top = row > kPatchNodes ? row - kPatchNodes : 0,
+              bottom = std::min(row + kPatchNodes + 1, layout.rows - 1);
+  // None beside a cut: the tissue beyond it moves independently, and flaps can turn over.
   const auto whole = [&](int direction, Index r, Index c) {
     return model_->rest(direction)[column_[c].base - column_[0].base + r * layout.stride] > 0.0f;
   };
@@ -117,36 +130,36 @@ void ToolCollision::TakeTouch(const Capsule& now, std::size_t lane, ClosestPoint
 }
 
 void ToolCollision::AddCandidate(const Candidate& candidate, std::uint32_t capsule, float range) {
-  LoadTriangle(candidate.at, waiting_count_);
-  waiting_[waiting_count_++] = candidate;
-  if (waiting_count_ == kLanes) {
+  LoadTriangle(candidate.at, batch_count_);
+  batch_[batch_count_++] = candidate;
+  if (batch_count_ == kLanes) {
     Flush(capsule, range);
   }
 }
 
 void ToolCollision::Flush(std::uint32_t capsule, float range) {
   const Motion& motion = motion_[capsule];
-  // Beyond `exact` only the side has to be told: the middle of the triangle will do.
+  // One sample at the end of the step. Beyond `exact` only the side is needed, for which the centroid is sufficient.
   const TouchSearch search{1.0f, 1.0f, 0.0f, 0.0f, 1.0f, range, motion.to.radius + kNear};
   kernels_.first_touch(motion.segment, search, triangles_, &touch_);
-  for (std::size_t lane = 0; lane < waiting_count_; ++lane) {
-    if (!(touch_.distance_sq[lane] < kLeftAlone)) {
+  for (std::size_t lane = 0; lane < batch_count_; ++lane) {
+    if (!(touch_.distance_sq[lane] < kSkippedSq)) {
       continue;
     }
     ContactPair& pair = pairs_.emplace_back();
     pair.capsule = capsule;
-    pair.triangle = waiting_[lane].triangle;
-    pair.particle = waiting_[lane].particle;
-    pair.at = waiting_[lane].at;
+    pair.triangle = batch_[lane].triangle;
+    pair.particle = batch_[lane].particle;
+    pair.at = batch_[lane].at;
     TakeTouch(motion.to, lane, &pair.closest);
     pair.normal = NormalOf(pair, false);
     FindSide(&pair);
-    // The organ is closed. What is seen from within without having been seen from outside is its other wall.
+    // The organ is closed: a triangle that the tool is behind without having been in front is the opposite wall.
     if (pair.triangle >= membrane_triangles_ && pair.side < 0) {
       pairs_.pop_back();
     }
   }
-  waiting_count_ = 0;
+  batch_count_ = 0;
 }
 
 Vec3f ToolCollision::NormalOf(const ContactPair& pair, bool previous) {
@@ -164,20 +177,20 @@ Vec3f ToolCollision::NormalOf(const ContactPair& pair, bool previous) {
   return (at(1) - at(0)).cross(at(2) - at(0)).normalized();
 }
 
-/// By where the two points that are closest now were before this step, when nothing overlapped.
+/// From the positions before this step, without overlap, of the two points that are closest now.
 void ToolCollision::FindSide(ContactPair* pair) {
   const auto last = std::lower_bound(last_pairs_.begin(), last_pairs_.end(), *pair, InOrder);
   const bool known = last != last_pairs_.end() && last->capsule == pair->capsule && last->triangle == pair->triangle;
   if (known && (last->touching || pair->triangle >= membrane_triangles_) && !OnRim(*pair)) {
     pair->side = last->side;
-    pair->remembers = last->touching;
+    pair->side_kept = last->touching;
     return;
   }
   const auto& b = pair->closest.barycentric;
   const Vec3f offset = motion_[pair->capsule].PointAt(pair->closest.t, 0.0f) -
                        (b[0] * particles_->Previous(pair->at[0]) + b[1] * particles_->Previous(pair->at[1]) +
                         b[2] * particles_->Previous(pair->at[2]));
-  const float height = NormalOf(*pair, true).dot(offset), steep = kBesideToolCosine * offset.norm();
+  const float height = NormalOf(*pair, true).dot(offset), steep = kSideCosine * offset.norm();
   if (std::abs(height) > steep && steep > 0.0f) {
     pair->side = height > 0.0f ? std::int8_t{1} : std::int8_t{-1};
   } else if (known) {
@@ -207,15 +220,15 @@ void ToolCollision::FindMembranePairs(std::uint32_t capsule, float range) {
   Flush(capsule, range);
 }
 
-/// A capsule is on one side of all the membrane around it, except at a hole or a rim: what touched in the last step
-/// decides when it agrees, else all pairs when they agree. A pair alone may be wrong: of a pit that the tool presses,
-/// the flat surroundings look as if the tool were beneath them.
-void ToolCollision::SettleSides(std::size_t first) {
-  for (const bool remembered : {true, false}) {
+/// A capsule is on one side of all the membrane around it, except at a hole or a rim: that of the pairs that touched in
+/// the last step if these agree, else that of all pairs if these agree. A single pair can be wrong: the tool is below
+/// the level of the flat membrane around the pit that it presses.
+void ToolCollision::UnifySides(std::size_t first) {
+  for (const bool touched : {true, false}) {
     bool above = false, below = false;
     for (std::size_t i = first; i < pairs_.size(); ++i) {
-      above |= pairs_[i].side > 0 && (pairs_[i].remembers || !remembered);
-      below |= pairs_[i].side < 0 && (pairs_[i].remembers || !remembered);
+      above |= pairs_[i].side > 0 && (pairs_[i].side_kept || !touched);
+      below |= pairs_[i].side < 0 && (pairs_[i].side_kept || !touched);
     }
     if (above != below) {
       for (std::size_t i = first; i < pairs_.size(); ++i) {
@@ -238,17 +251,17 @@ void ToolCollision::FindTubePairs(std::uint32_t capsule, float range) {
   Flush(capsule, range);
 }
 
-void ToolCollision::FollowYielding(std::uint32_t tool, const ToolMotion& moved, bool clear) {
-  Yielding& yielding = yielding_[tool];
-  yielding.held = moved.hold || (yielding.held && yielding.steps > 0);
+void ToolCollision::UpdateExclusion(std::uint32_t tool, const ToolMotion& moved, bool clear) {
+  Exclusion& exclusion = excluded_[tool];
+  exclusion.held = moved.hold || (exclusion.held && exclusion.steps > 0);
   if (moved.hold || moved.closing) {
-    yielding.steps = kClearSteps;
-  } else if (clear && yielding.steps > 0) {
-    --yielding.steps;
+    exclusion.steps = kClearSteps;
+  } else if (clear && exclusion.steps > 0) {
+    --exclusion.steps;
   }
 }
 
-/// By capsule and triangle. Sorts keys, for pairs are large; the last step's are needed no more.
+/// Sorts the pairs by capsule and triangle. Keys are sorted, because pairs are large; last_pairs_ serves as the buffer.
 void ToolCollision::SortPairs() {
   row_order_.clear();
   for (Index i = 0; i < pairs_.size(); ++i) {
@@ -277,7 +290,7 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
     if (count > 0) {
       bounds_.Update({near.data(), count});
     } else {
-      bounds_.Forget();
+      bounds_.Invalidate();
     }
   }
   for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
@@ -302,26 +315,26 @@ void ToolCollision::FindPairs(const std::array<ToolMotion, kMaxTools>& tools, bo
       }
       const std::size_t first = pairs_.size();
       FindMembranePairs(c, range);
-      SettleSides(first);
+      UnifySides(first);
       FindTubePairs(c, range);
       if (to.part == ToolPart::kJaw) {
-        const float least = yielding_[tool].held ? range : kClearPart * to.radius;
+        const float least = excluded_[tool].held ? range : kClearShare * to.radius;
         clear = clear && std::none_of(pairs_.begin() + static_cast<std::ptrdiff_t>(first), pairs_.end(),
                                       [least](const ContactPair& p) { return p.closest.distance_sq < least * least; });
       }
     }
-    FollowYielding(tool, moved, clear);
+    UpdateExclusion(tool, moved, clear);
   }
   SortPairs();
   for (std::uint32_t c = 0; c < motion_.size(); ++c) {
-    if (motion_[c].to.part == ToolPart::kJaw && yielding_[c / kMaxCapsules].steps > 0) {
+    if (motion_[c].to.part == ToolPart::kJaw && excluded_[c / kMaxCapsules].steps > 0) {
       motion_[c].enabled = false;
     }
   }
 }
 
 void ToolCollision::FitAtRest() {
-  bounds_.Forget();
+  bounds_.Invalidate();
   bounds_.Update({});
 }
 
@@ -337,10 +350,10 @@ bool ToolCollision::OnRim(const ContactPair& pair) const {
   };
   const auto& b = pair.closest.barycentric;
   const bool lower = pair.triangle % 2 != 0;
-  std::array<bool, 3> off;  // The closest point is not at that corner, nor between it and another.
+  std::array<bool, 3> off;  // By corner: it has no share in the closest point.
   std::transform(b.begin(), b.end(), off.begin(), [](float weight) { return weight <= 0.0f; });
   if (off[0] + off[1] + off[2] == 2) {
-    // At a corner: one of the six triangles around it is missing. Corners of the halves: 00 01 11 and 00 11 10.
+    // At a corner: a rim if one of the six triangles around it is missing. Corners of the halves: 00 01 11, 00 11 10.
     const std::size_t corner = !off[0] ? 0 : !off[1] ? 1 : 2;
     const int r = row + (lower ? corner != 0 : corner == 2), c = col + (lower ? corner == 1 : corner != 0);
     return dead(r - 1, c - 1, 0) || dead(r - 1, c - 1, 1) || dead(r - 1, c, 1) || dead(r, c - 1, 0) || dead(r, c, 0) ||
@@ -360,16 +373,16 @@ ToolCollision::Push ToolCollision::PushOf(const ContactPair& pair, const Capsule
   const float distance = std::sqrt(closest.distance_sq);
   if (closest.crosses) {
     if (pair.side == 0 || pair.normal.isZero(0.0f)) {
-      return {};  // It was through the membrane before we looked: there is no telling which side is right.
+      return {};  // The tool was through the membrane before the first evaluation: its side is unknown.
     }
     const float behind = std::min(side * pair.normal.dot(capsule.a - closest.on_triangle),
                                   side * pair.normal.dot(capsule.b - closest.on_triangle));
-    return behind > -kMostBehindTool ? Push{reach - behind, -side * pair.normal} : Push{};
+    return behind > -kMaxBehindTool ? Push{reach - behind, -side * pair.normal} : Push{};
   }
-  if (side * pair.normal.dot(offset) < -kBesideToolCosine * distance && !OnRim(pair)) {
-    // What did not touch it in the last step has come behind it in this one, or past a rim.
-    const float come = reach + motion_[pair.capsule].travel + band_;
-    return distance < (pair.remembers ? kMostBehindTool : std::min(kMostBehindTool, come))
+  if (side * pair.normal.dot(offset) < -kSideCosine * distance && !OnRim(pair)) {
+    // If the pair did not touch in the last step, the tool came behind it in this step or around a rim.
+    const float reachable = reach + motion_[pair.capsule].travel + band_;
+    return distance < (pair.side_kept ? kMaxBehindTool : std::min(kMaxBehindTool, reachable))
                ? Push{reach + distance, -side * pair.normal}
                : Push{};
   }
@@ -407,8 +420,8 @@ SurfacePoint ToolCollision::Nearest(const Capsule& capsule, float range) const {
   if (!bounds_.MayTouch(capsule.a, capsule.b, reach)) {
     return best;
   }
-  // The nearest cell by its centre, then exactly around it.
-  float nearest = 3e38f, search = reach;
+  // The cell with the nearest centre, then the triangles around it exactly.
+  float nearest = kLargestFinite, search = reach;
   Index row = 0, col = 0;
   bounds_.ForEachCellNear(
       capsule.a, capsule.b, search,
@@ -422,7 +435,7 @@ SurfacePoint ToolCollision::Nearest(const Capsule& capsule, float range) const {
           col = c;
         }
       });
-  if (nearest < 3e38f) {
+  if (nearest < kLargestFinite) {
     for (Index r = row > 0 ? row - 1 : 0; r < std::min(row + 2, model_->rows() - 1); ++r) {
       for (Index c = col > 0 ? col - 1 : 0; c < std::min(col + 2, model_->cols() - 1); ++c) {
         for (Index t = 2 * (r * (model_->cols() - 1) + c), end = t + 2; t < end; ++t) {

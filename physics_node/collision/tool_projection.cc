@@ -1,4 +1,12 @@
 // Contacts for solvers that project positions.
+//
+//   D    = min(depth, kMaxPush)                                        depth, unit direction n: ToolCollision::PushOf
+//   m    = D n - t min(1, mu D / |t|)                                  correction with Coulomb friction [m]
+//   t    = (dy - dz) - n (n . (dy - dz))                               slip of the tissue on the tool [m]
+//   x_i += w_i b_i m / S,   S = max(sum_i w_i b_i^2, kLeastShare max_i w_i)                                   [1/kg]
+//
+//   dy, dz  movement in this step of the closest points on triangle and tool [m]        b_i  barycentric coordinates
+//   w_i     inverse masses [1/kg], 0 = fixed          mu  PhysicsParams::friction
 #include <algorithm>
 #include <cmath>
 
@@ -8,9 +16,9 @@
 namespace fulcrum::physics {
 namespace {
 
-/// A sweep is cut into pieces of this part of the capsule's radius …
+/// Length of a piece of a sweep over the radius of the capsule: below 1, so that no tissue is skipped between pieces.
 constexpr float kSweepPiece = 0.8f;
-/// … but at most into this many.
+/// Most pieces of a sweep; bounds its cost.
 constexpr int kMaxPieces = 16;
 
 }  // namespace
@@ -39,7 +47,7 @@ void ToolCollision::Sweep() {
 void ToolCollision::ProjectPair(ContactPair* pair, const Capsule& capsule) {
   const std::array<Vec3f, 3> x{particles_->At(pair->at[0]), particles_->At(pair->at[1]), particles_->At(pair->at[2])};
   pair->touching = false;
-  if (IsFar(x, capsule, capsule.radius + ContactMargin(scene_, capsule.part) + Probed(capsule))) {
+  if (IsFar(x, capsule, capsule.radius + ContactMargin(scene_, capsule.part) + ProbeRange(capsule))) {
     pair->closest.distance_sq = kFarSq;
     pair->closest.crosses = false;
     return;
@@ -66,7 +74,7 @@ void ToolCollision::ProjectPair(ContactPair* pair, const Capsule& capsule) {
   }
   sum = std::max(sum, kLeastShare * lightest);
   pair->touching = true;
-  // Coulomb: the point of contact is carried along by at most friction times the push.
+  // Coulomb: the tool moves the point of contact along by at most friction times the push.
   const Motion& m = motion_[pair->capsule];
   const Vec3f tool_step = closest.on_segment - (m.from.a + closest.t * (m.from.b - m.from.a));
   const Vec3f tissue_step =

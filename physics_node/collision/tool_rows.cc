@@ -1,4 +1,12 @@
 // Contacts for solvers that take rows.
+//
+//   n . y >= n . y0 + D                  row of the point y = sum_i b_i x_i of a triangle, now at y0
+//   D  = min(depth - c + n . (z(u1) - z(u)), kMaxPush + max(0, n . (z(u1) - z(u0))))       required movement [m]
+//
+//   u         first touch in [u0, u1] (kernel first_touch)      depth, n  push at u (ToolCollision::PushOf)
+//   z         closest point on the tool [m]                     c         MarginReduction [m]
+//
+// A row exists from D > -band_ on, that is before touch.
 #include <algorithm>
 #include <cmath>
 
@@ -7,13 +15,14 @@
 namespace fulcrum::physics {
 namespace {
 
-/// A tool that moves less than this part of its radius is looked at in its last place only.
-constexpr float kSmallMove = 0.25f;
-/// On the way to the first touch a look is at least this part of the radius further, or kMaxLooks would not do.
+/// Travel of a tool in a substep over its radius below which it is evaluated only at the end of the substep.
+constexpr float kSampledTravel = 0.25f;
+/// Least advance from sample to sample in the search for the first touch, over the radius, so that samples overlap; it
+/// is larger if more than kMaxSamples would be needed, which bounds the cost.
 constexpr float kLeastAdvance = 0.5f;
-constexpr float kMaxLooks = 24.0f;
+constexpr float kMaxSamples = 24.0f;
 
-/// The corners that a row rests on when they are one or two: equal for all triangles that share them.
+/// Key of a row on one or two corners: the same for all triangles that share them.
 std::uint64_t SharedFeature(const ContactRow& row) {
   const std::uint64_t a = row.at[0].base, b = row.count == 2 ? row.at[1].base : a;
   return std::min(a, b) << 32 | std::max(a, b);
@@ -44,11 +53,11 @@ void ToolCollision::AddRow(Index index, const Push& push, const Vec3f& tool_step
   row.friction = scene_.physics.friction;
   row.drift = tool_step;
   row.source = index;
-  row.force_N = push.depth;  // Until the rows are complete: the deepest win.
+  row.force_N = push.depth;  // Until the rows are complete: key for keeping the deepest ones.
   rows->push_back(row);
 }
 
-bool ToolCollision::KeepOffOpenCells(const Capsule& capsule, float range, ContactPair* pair) const {
+bool ToolCollision::MoveOffOpenCells(const Capsule& capsule, float range, ContactPair* pair) const {
   if (pair->triangle >= membrane_triangles_) {
     return true;
   }
@@ -66,12 +75,12 @@ bool ToolCollision::KeepOffOpenCells(const Capsule& capsule, float range, Contac
   for (std::size_t i = 0; i < 3; ++i) {
     triangle.place[i] = particles_->At(pair->at[i]);
   }
-  return NearestLeft(open_, cell, triangle, capsule.a, capsule.b, range, &pair->closest);
+  return NearestRemaining(open_, cell, triangle, capsule.a, capsule.b, range, &pair->closest);
 }
 
-/// A margin is kept from the middle of the sheet, for half of its thickness; a rim is met along the sheet, where there
-/// is nothing of that.
-float ToolCollision::RimGives(const ContactPair& pair, ToolPart part, const Vec3f& direction) const {
+/// The margin is measured from the middle of the sheet, for half of its thickness. Along the sheet, at a rim, there is
+/// no such layer.
+float ToolCollision::MarginReduction(const ContactPair& pair, ToolPart part, const Vec3f& direction) const {
   if (pair.triangle >= membrane_triangles_ || part != ToolPart::kTip) {
     return 0.0f;
   }
@@ -80,14 +89,14 @@ float ToolCollision::RimGives(const ContactPair& pair, ToolPart part, const Vec3
   return ContactMargin(scene_, part) * (1.0f - std::abs(normal.dot(direction)));
 }
 
-/// Takes out rows marked by count 0.
+/// Removes the rows that are marked by count 0.
 void ToolCollision::DropMarked(std::size_t first, std::vector<ContactRow>* rows) {
   rows->erase(std::remove_if(rows->begin() + static_cast<std::ptrdiff_t>(first), rows->end(),
                              [](const ContactRow& row) { return row.count == 0; }),
               rows->end());
 }
 
-/// All triangles around a corner or an edge give the same row: one is enough.
+/// All triangles around a corner or an edge give the same row: the deepest of them is kept.
 void ToolCollision::DropRepeated(std::size_t first, std::vector<ContactRow>* rows) {
   row_order_.clear();
   for (std::size_t i = first; i < rows->size(); ++i) {
@@ -134,9 +143,9 @@ void ToolCollision::DropShallow(std::size_t first, std::vector<ContactRow>* rows
 void ToolCollision::AddRows(Index first, Index last, float u0, float u1, std::vector<ContactRow>* rows) {
   const Motion& m = motion_[pairs_[first].capsule];
   const float reach = m.to.radius + ContactMargin(scene_, m.to.part);
-  const float range = reach + (u1 < 1.0f ? band_ : std::max(band_, Probed(m.to))) + 0.5f * m.travel * (u1 - u0);
-  const bool moves = (u1 - u0) * m.travel > kSmallMove * m.to.radius;
-  const float least = moves ? std::max(kLeastAdvance * m.to.radius / m.travel, (u1 - u0) / kMaxLooks) : 1.0f;
+  const float range = reach + (u1 < 1.0f ? band_ : std::max(band_, ProbeRange(m.to))) + 0.5f * m.travel * (u1 - u0);
+  const bool moves = (u1 - u0) * m.travel > kSampledTravel * m.to.radius;
+  const float least = moves ? std::max(kLeastAdvance * m.to.radius / m.travel, (u1 - u0) / kMaxSamples) : 1.0f;
   const TouchSearch search{u0, u1, reach, moves ? m.travel : 0.0f, least, range, range};
   for (Index i = first; i < last; ++i) {
     LoadTriangle(pairs_[i].at, i - first);
@@ -153,13 +162,13 @@ void ToolCollision::AddRows(Index first, Index last, float u0, float u1, std::ve
     const float u = touch_.u[lane];
     const Capsule now = m.At(u);
     TakeTouch(now, lane, &pair.closest);
-    if (!KeepOffOpenCells(now, range, &pair)) {
+    if (!MoveOffOpenCells(now, range, &pair)) {
       pair.closest.distance_sq = kFarSq;
       pair.closest.crosses = false;
       continue;
     }
     Push push = PushOf(pair, now);
-    push.depth -= RimGives(pair, now.part, push.direction);
+    push.depth -= MarginReduction(pair, now.part, push.direction);
     const Vec3f end = m.PointAt(pair.closest.t, u1), tool_step = end - m.PointAt(pair.closest.t, u0);
     push.depth += push.direction.dot(end - m.PointAt(pair.closest.t, u));
     push.depth = std::min(push.depth, kMaxPush + std::max(0.0f, push.direction.dot(tool_step)));

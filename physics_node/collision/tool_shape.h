@@ -18,7 +18,7 @@ struct Capsule {
   ToolPart part = ToolPart::kShaft;
 };
 
-/// The slender distal part of a hook, before the shaft proper begins [m].
+/// Length of the thin neck between the foot of a hook and its shaft [m].
 inline constexpr float kHookNeck = 0.012f;
 inline constexpr int kMaxCapsules = 3;
 
@@ -42,8 +42,8 @@ struct ToolShape {
 /// scissors: two jaws about a hinge at -z * tip_length, opening in the x-z plane by jaw_rad / 2 each, and the shaft.
 [[nodiscard]] ToolShape ShapeOf(const ToolDescription& tool, const ToolPose& pose);
 
-/// Tissue is kept this far from a capsule's surface, measured to the middle of the sheet. Of a hook's bare metal that
-/// is half the sheet's thickness, so that what the solver holds in contact touches the metal electrically as well [m].
+/// Distance between the surface of a capsule and the middle of the sheet in contact [m]. For the bare metal of a hook
+/// it is half the thickness of the sheet, so that mechanical contact is electrical contact.
 [[nodiscard]] inline float ContactMargin(const SceneView& scene, ToolPart part) {
   const float margin = scene.physics.collision_margin_m;
   return part == ToolPart::kTip ? std::min(margin, 0.5f * scene.thermal.thickness_m) : margin;

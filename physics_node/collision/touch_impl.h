@@ -1,5 +1,33 @@
-// A moving segment against eight triangles at once, and eight points against one each; included only by bodies of
-// kernels. The steps are those of physics_node/collision/closest.h, which is the oracle of the tests.
+// A moving segment against eight triangles, and eight points against one triangle each. Included only by bodies of
+// kernels. Reference in the tests: physics_node/collision/closest.h.
+//
+// Closest points of segment p0 + s u, u = p1 - p0, and triangle x_0 x_1 x_2 with N = (x_1 - x_0) x (x_2 - x_0): the
+// least distance of the following candidates.
+//
+//   edges    edge i is x_i + t v, v = x_(i+1) - x_i; with r = p0 - x_i and a = u.u, b = u.v, c = u.r, e = v.v, f = v.r:
+//            s = clamp01((b f - c e) / (a e - b^2)),   t = (b s + f) / e
+//            where t is outside [0, 1]:  t = clamp01(t),  s = clamp01((t b - c) / a)          (Ericson 2005, 5.1.9)
+//            where a e - b^2 <= kParallelSinSq a e, parallel:  s = 0
+//   ends     p0, p1 over the inside:  |N . (p - x_0)| / |N|   where all w_i >= 0
+//   crossing N.(p0 - x_0) and N.(p1 - x_0) of opposite sign, all w_i >= 0 at s = h0 / (h0 - h1):  distance 0
+//   w_0 = N . (x_1 - p) x (x_2 - p),  w_1 = N . (x_2 - p) x (x_0 - p),  w_2 = N.N - w_0 - w_1;   barycentric: w_i / N.N
+//
+// First touch by conservative advancement (Mirtich 1996): no point of the segment covers more than travel * du, so
+//
+//   u <- min(u1, u + max((distance(u) - reach) / travel, least))   until distance(u) <= reach or u = u1
+//
+//   N, N.N   normal [m^2] and its square [m^4]      h0, h1  N.(p - x_0) at the two ends [m^3]
+//   u        part of the step's motion, in [0, 1]   reach, travel [m], least: TouchSearch
+//
+// Closest point of a triangle abc to a point p (Feet): the Voronoi regions of Ericson 2005, 5.1.5, evaluated in reverse
+// order, so that a later Select overrides an earlier one; with ab = b - a, ac = c - a:
+//
+//   d1 = ab.(p-a)  d2 = ac.(p-a)  d3 = ab.(p-b)  d4 = ac.(p-b)  d5 = ab.(p-c)  d6 = ac.(p-c) [m^2]
+//   va = d3 d6 - d5 d4,  vb = d5 d2 - d1 d6,  vc = d1 d4 - d3 d2 [m^4];   foot = a + v ab + w ac
+//   inside: (v, w) = (vb, vc) / (va + vb + vc)      edge bc: w = (d4 - d3) / ((d4 - d3) + (d5 - d6)), v = 1 - w
+//   edge ca: v = 0, w = d2 / (d2 - d6)              edge ab: v = d1 / (d1 - d3), w = 0              corners: 0 or 1
+//
+// Layout: one triangle per lane (TriangleBatch, PointBatch); the segment is the same in all lanes.
 #pragma once
 
 #include "physics_node/collision/kernels.h"
@@ -7,9 +35,10 @@
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 
+/// Mask: true in all lanes.
 inline F8 Everywhere() { return F8::All(0.0f) < F8::All(1.0f); }
 inline F8 Either(F8 mask, F8 other) { return Select(mask, mask, other); }
-/// 0, as a mask false, where `mask` is.
+/// `otherwise`, but 0 (as a mask: false) where `mask` is true.
 inline F8 Unless(F8 mask, F8 otherwise) { return Select(mask, F8::All(0.0f), otherwise); }
 inline F8 Clamp01(F8 v) { return Min(Max(v, F8::All(0.0f)), F8::All(1.0f)); }
 /// 0 where the denominator is not positive.
@@ -18,17 +47,19 @@ inline F8 Ratio(F8 numerator, F8 denominator) {
   return (numerator / Select(positive, denominator, F8::All(1.0f))) & positive;
 }
 
-/// Below, a triangle is its edges: the inverse of it must not overflow [m^4].
+/// A triangle with N.N below this, or equal to it, is treated as its three edges: 1 / N.N must not overflow [m^4].
 inline constexpr float kLeastAreaSq = 1e-30f;
 
+/// Triangle per lane.
 struct Triangles8 {
-  V8 x[3];
-  V8 normal;   ///< Not of unit length.
-  F8 area_sq;  ///< Its square.
-  V8 edge[3];  ///< From corner i to corner i + 1.
-  F8 edge_sq[3];
+  V8 x[3];        ///< Corners [m].
+  V8 normal;      ///< N, not of unit length [m^2].
+  F8 area_sq;     ///< N.N [m^4].
+  V8 edge[3];     ///< From corner i to corner i + 1 [m].
+  F8 edge_sq[3];  ///< Squared lengths [m^2].
 };
 
+/// TouchBatch in registers.
 struct Touch8 {
   F8 u, distance_sq, t, weight[3], crosses;
   void TakeWhere(F8 mask, const Touch8& other) {
@@ -42,7 +73,7 @@ struct Touch8 {
   }
 };
 
-/// Barycentric coordinates of p's foot in the plane; the mask tells where it is inside.
+/// Barycentric coordinates of the foot of p in the plane. Mask: the foot is inside the triangle.
 FULCRUM_INLINE F8 Inside(const Triangles8& tri, V8 p, F8 inverse_area_sq, F8* weight) {
   const V8 a = tri.x[0] - p, b = tri.x[1] - p, c = tri.x[2] - p;
   const F8 wa = Dot(tri.normal, Cross(b, c)), wb = Dot(tri.normal, Cross(c, a)), wc = tri.area_sq - wa - wb;
@@ -53,8 +84,7 @@ FULCRUM_INLINE F8 Inside(const Triangles8& tri, V8 p, F8 inverse_area_sq, F8* we
   return Unless(negative, Everywhere());
 }
 
-/// The segment against edge `i` (Ericson, Real-Time Collision Detection, 5.1.9): distance, along the segment, along the
-/// edge.
+/// Closest points of the segment and edge `i`: positions s on the segment and t on the edge.
 struct Edge8 {
   F8 distance_sq, s, t;
 };
@@ -62,8 +92,7 @@ FULCRUM_INLINE Edge8 ClosestOfEdge(const Triangles8& tri, int i, V8 p0, V8 along
   const V8 r = p0 - tri.x[i], v = tri.edge[i];
   const F8 e = tri.edge_sq[i], f = Dot(v, r), c = Dot(along, r), b = Dot(along, v);
   const F8 denominator = length_sq * e - b * b;
-  // Parallel within rounding: any s will do.
-  const F8 skew = denominator > F8::All(1e-6f) * length_sq * e;
+  const F8 skew = denominator > F8::All(kParallelSinSq) * length_sq * e;
   F8 s = Clamp01(Ratio(b * f - c * e, denominator)) & skew;
   const F8 t = Ratio(b * s + f, e), inside = Clamp01(t);
   const F8 clamped = Either(inside < t, t < inside);
@@ -79,7 +108,7 @@ FULCRUM_INLINE Touch8 ClosestOfSegment(const Triangles8& tri, V8 p0, V8 p1) {
   const F8 flat = tri.area_sq > F8::All(kLeastAreaSq);
   const F8 inverse_area_sq = (one / Select(flat, tri.area_sq, one)) & flat;
 
-  // Edges, which covers corners and ends.
+  // Edges, with the corners of the triangle and the ends of the segment.
   const F8 length_sq = Dot(along, along);
   Edge8 best = ClosestOfEdge(tri, 0, p0, along, length_sq);
   Touch8 touch;
@@ -111,7 +140,7 @@ FULCRUM_INLINE Touch8 ClosestOfSegment(const Triangles8& tri, V8 p0, V8 p1) {
     }
   }
 
-  // Through the triangle: the ends are on different sides.
+  // Crossing.
   const F8 through = ((h0 > zero) ^ (h1 > zero)) & flat;
   if (Bits(through) != 0) {
     const F8 t = h0 / Select(through, h0 - h1, one);
@@ -131,14 +160,14 @@ inline V8 AllOf(const float* p) { return {F8::All(p[0]), F8::All(p[1]), F8::All(
 
 void FirstTouch(const SegmentMotion& segment, const TouchSearch& search, const TriangleBatch& triangles,
                 TouchBatch* out) {
-  const F8 zero = F8::All(0.0f), far = F8::All(3e38f);
+  const F8 zero = F8::All(0.0f), far = F8::All(kLargestFinite);
   const V8 a = AllOf(segment.from[0]), b = AllOf(segment.from[1]);
   const V8 da = AllOf(segment.to[0]) - a, db = AllOf(segment.to[1]) - b;
   Triangles8 tri;
   for (int i = 0; i < 3; ++i) {
     tri.x[i] = {F8::Load(triangles.corner[i][0]), F8::Load(triangles.corner[i][1]), F8::Load(triangles.corner[i][2])};
   }
-  // Bounding spheres.
+  // Bounding spheres of the triangles around their centroids: skip the far ones.
   const F8 third = F8::All(1.0f / 3.0f);
   const V8 centre = (tri.x[0] + tri.x[1] + tri.x[2]) * third;
   F8 radius_sq = zero;
@@ -169,7 +198,7 @@ void FirstTouch(const SegmentMotion& segment, const TouchSearch& search, const T
     best.t = t;
   }
   F8 done = Either(is_far, is_rough);
-  if (Bits(done) != 0xffu) {
+  if (Bits(done) != kEveryLane) {
     for (int i = 0; i < 3; ++i) {
       tri.edge[i] = tri.x[(i + 1) % 3] - tri.x[i];
       tri.edge_sq[i] = Dot(tri.edge[i], tri.edge[i]);
@@ -179,15 +208,14 @@ void FirstTouch(const SegmentMotion& segment, const TouchSearch& search, const T
     const F8 reach = F8::All(search.reach), end = F8::All(search.u1);
     F8 u = search.travel > 0.0f ? F8::All(search.u0) : end;
     for (;;) {
-      // Conservative advancement: no point of the segment moves further than travel * du.
-      Touch8 look = ClosestOfSegment(tri, a + da * u, b + db * u);
-      look.u = u;
-      best.TakeWhere(Unless(done, look.distance_sq < best.distance_sq), look);
-      done = Either(done, Unless((u < end) & (look.distance_sq > reach * reach), Everywhere()));
-      if (Bits(done) == 0xffu) {
+      Touch8 sample = ClosestOfSegment(tri, a + da * u, b + db * u);
+      sample.u = u;
+      best.TakeWhere(Unless(done, sample.distance_sq < best.distance_sq), sample);
+      done = Either(done, Unless((u < end) & (sample.distance_sq > reach * reach), Everywhere()));
+      if (Bits(done) == kEveryLane) {
         break;
       }
-      const F8 advance = (Sqrt(look.distance_sq) - reach) / F8::All(search.travel);
+      const F8 advance = (Sqrt(sample.distance_sq) - reach) / F8::All(search.travel);
       u = Min(end, u + Max(advance, F8::All(search.least)));
     }
   }
@@ -200,7 +228,6 @@ void FirstTouch(const SegmentMotion& segment, const TouchSearch& search, const T
   best.crosses.Store(out->crosses);
 }
 
-/// Ericson, Real-Time Collision Detection, 5.1.5: the regions that come first there are chosen last here.
 void Feet(const float* particles, const PointBatch& points, FootBatch* out) {
   const F8 zero = F8::All(0.0f), one = F8::All(1.0f);
   const V8 p{F8::Load(points.point[0]), F8::Load(points.point[1]), F8::Load(points.point[2])};

@@ -6,12 +6,14 @@
 #include <utility>
 
 #include "physics_node/collision/closest.h"
+#include "physics_node/simd/limits.h"
 
 namespace fulcrum::physics {
 namespace {
 
-constexpr Index kLeafSize = 4;
-/// Deeper than any tree of 2^32 triangles halved at each node.
+/// Most triangles in a leaf: below it boxes cost as much as triangles. Assumed.
+constexpr Index kMaxInLeaf = 4;
+/// Entries of the stack: halving 2^32 triangles gives at most 32 levels with two open nodes each.
 constexpr std::size_t kMaxDepth = 64;
 
 }  // namespace
@@ -33,7 +35,7 @@ TriangleTree::TriangleTree(std::vector<std::array<Vec3f, 3>> triangles) : triang
 }
 
 void TriangleTree::Build(Index node, Index first, Index last) {
-  Vec3f low = Vec3f::Constant(3e38f), high = Vec3f::Constant(-3e38f);
+  Vec3f low = Vec3f::Constant(kLargestFinite), high = Vec3f::Constant(-kLargestFinite);
   for (Index i = first; i < last; ++i) {
     for (const Vec3f& p : triangles_[order_[i]]) {
       low = low.cwiseMin(p);
@@ -42,7 +44,7 @@ void TriangleTree::Build(Index node, Index first, Index last) {
   }
   nodes_[node].low = F4{low.x(), low.y(), low.z(), 0};
   nodes_[node].high = F4{high.x(), high.y(), high.z(), 0};
-  if (last - first <= kLeafSize) {
+  if (last - first <= kMaxInLeaf) {
     nodes_[node].first = first;
     nodes_[node].count = last - first;
     return;

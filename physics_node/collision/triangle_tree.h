@@ -1,4 +1,7 @@
-// Nearest triangle of a surface that does not deform: a tree of boxes, built once.
+// Nearest triangle of a surface that does not deform: a binary tree of boxes, built once by halving at the median of
+// the longest axis. The search visits a box, nearer child first, while
+//
+//   sum over the axes of max(lo - p, p - hi, 0)^2 <= squared distance of the best triangle so far [m^2]
 #pragma once
 
 #include <span>
@@ -21,8 +24,8 @@ class TriangleTree {
   explicit TriangleTree(std::vector<std::array<Vec3f, 3>> triangles);
 
   [[nodiscard]] bool empty() const { return nodes_.empty(); }
-  /// The nearest triangle to `p` within `range` [m]; of equally near ones that with the least index. Quicker with the
-  /// guess that some triangle is near, such as the one nearest to a point beside; kNoIndex: none.
+  /// The nearest triangle to `p` within `range` [m]; of equally near ones that with the least index. `guess`: a
+  /// triangle that is probably near, such as the last result, which shortens the search; kNoIndex: none.
   [[nodiscard]] Hit Nearest(const Vec3f& p, float range, Index guess = kNoIndex) const;
   /// Unit normal, counter-clockwise.
   [[nodiscard]] const Vec3f& normal(Index triangle) const { return normals_[triangle]; }
@@ -36,7 +39,7 @@ class TriangleTree {
   };
   void Build(Index node, Index first, Index last);
   [[nodiscard]] static float DistanceSq(const F4& p, const Node& box);
-  /// Takes the triangle if it is nearer.
+  /// Replaces `hit` by the triangle if that is nearer.
   void Try(Index triangle, const Vec3f& p, Hit* hit) const;
 
   std::vector<std::array<Vec3f, 3>> triangles_;

@@ -217,14 +217,14 @@ TEST(TissueCollision, RestCostsNothing) {
   World world(data.View());
   const std::vector<float> still(world.particles.block_count(), 0.0f);
   world.collision.FindPairs(still, 0, 0.01);
-  EXPECT_LE(world.collision.looked_at(), world.collision.near_count() + 20u) << "known from the start";
+  EXPECT_LE(world.collision.evaluated_count(), world.collision.near_count() + 20u) << "known from the start";
   world.collision.FindPairs(still, 0.01, 0.02);
-  EXPECT_LE(world.collision.looked_at(), world.collision.near_count() + 20u);
-  // One block moves a little: only its own particles that are near something are looked at.
+  EXPECT_LE(world.collision.evaluated_count(), world.collision.near_count() + 20u);
+  // One block moves a little: only its own particles that are near something are evaluated.
   std::vector<float> moved = still;
   moved.back() = 0.0001f;
   world.collision.FindPairs(moved, 0.02, 0.03);
-  EXPECT_LE(world.collision.looked_at(), world.collision.near_count() + ParticleStore::kBlockVertices + 20u);
+  EXPECT_LE(world.collision.evaluated_count(), world.collision.near_count() + ParticleStore::kBlockVertices + 20u);
 }
 
 TEST(TissueCollision, TheRestShapeHasNoForce) {
