@@ -303,7 +303,7 @@ void TissueSimulation::WatchTears(float max_step_m) {
   } else {
     tears_.RowsMoved(0, rows, max_step_m);
   }
-  (void)tears_.Look(steps_);
+  (void)tears_.Evaluate(steps_);
 }
 
 void TissueSimulation::LetThreadsHelp(bool help) {

@@ -49,7 +49,7 @@ void RunWatch(benchmark::Report* report) {
   std::uint64_t step = 0;
   const auto times = benchmark::TimeMs(10, 200, [&] {
     watch.RowsMoved(0, scene.membrane.rows, 1e-6f);
-    (void)watch.Look(step += physics::TearWatch::kEveryAll);
+    (void)watch.Evaluate(step += physics::TearWatch::kEveryAll);
   });
   report->Add("tear.look_all_us_p50", 1e3 * benchmark::Quantile(times, 0.5), "us");
 }
