@@ -1,3 +1,12 @@
+// Centre of the contact along the metal, in stations; it moves with the time constant kCentreTime:
+//
+//   centre  = sum_k w_k s_k / sum_k w_k,   w_k = max(0, r + t/2 + g - |h_k|)^2 max(l_k, r)
+//
+//   s_k     samples along the metal [stations]                       h_k  distance of the axis from the sheet there [m]
+//   r, t    radius of the metal, thickness of the sheet [m]          l_k  length of the piece on the sheet [m]
+//   g       kStrikeGap, in contact kHoldGap [m]
+//
+// Gap of a cell in the footprint: AddGaps.
 #include "physics_node/contact_model/cautery_probe.h"
 
 #include <algorithm>
@@ -6,36 +15,38 @@
 namespace fulcrum::physics {
 namespace {
 
-/// An arc strikes across a gap of this size between metal and sheet, and holds up to the second one [m]. At the 500 V
-/// peak of a cutting generator air and steam break down across 0.05 to 0.15 mm (Paschen).
+/// Gap between metal and sheet at which an arc strikes, and up to which it is sustained [m]. At the 500 V peak of a
+/// cutting generator air and steam break down across 0.05 to 0.15 mm (Paschen).
 constexpr float kStrikeGap = 1.0e-4f, kHoldGap = 2.5e-4f;
-/// Gaps are given up to this one: what discharges and sparks reach [m].
+/// Largest gap in the footprint [m]: the reach of discharges and sparks.
 constexpr float kFootprintReach = 7.0e-4f;
-/// Tissue gives under the metal, and its surface is wet: so much of a gap along the normal is none [m].
+/// Part of a gap along the normal that does not count [m]: tissue yields under the metal, and its surface is wet.
 constexpr float kContactSlack = 5.0e-5f;
-/// Edges of the mesh count as no shorter than this, so that few are looked at [m].
+/// Least length of an edge of the mesh in the count of cells near the metal; bounds it [m].
 constexpr float kShortestEdge = 1.0e-4f;
-/// Bare metal up the neck [m].
+/// Length of bare metal on the neck [m].
 constexpr float kBareNeck = 0.005f;
-/// Between two stations along the metal [m]; more where they would be too many.
+/// Distance of two stations along the metal [m]; larger where there would be more than kMaxStations.
 constexpr float kStationSpacing = 5.0e-4f;
-constexpr std::size_t kMostStations = 24;
-/// The metal between two stations is looked at in so many places for the centre of the contact.
-constexpr int kLooks = 4;
-/// Pieces of metal whose ends lie farther apart on the sheet lie on two folds of it [m].
-constexpr float kLongestPiece = 0.002f;
-/// A station that is so much nearer to another part of the sheet goes over to it [m].
+constexpr std::size_t kMaxStations = 24;
+/// Samples between two stations for the centre of the contact.
+constexpr int kCentreSamples = 4;
+/// Largest distance on the sheet between the ends of a piece of metal [m]: with more they lie on two folds.
+constexpr float kMaxPiece = 0.002f;
+/// A station changes to another part of the sheet if that is nearer by this [m]; avoids alternation between folds.
 constexpr float kNearerElsewhere = 3.0e-4f;
-/// Beyond this nothing is followed any more [m].
-constexpr float kLost = 0.008f;
-/// The membrane counts as lifted off what lies beneath from here on [m].
+/// Largest distance from the sheet at which stations follow it [m].
+constexpr float kMaxFollowed = 0.008f;
+/// Height over the organ from which on the membrane is tented [m].
 constexpr float kTentHeight = 0.002f;
-/// A binding this many rows and columns away still tells how the organ beneath has moved.
+/// Largest distance in rows and columns of a binding that represents the movement of the organ below a point.
 constexpr int kBindingWindow = 6;
-constexpr float kRateSmoothing = 0.03f;  ///< [s]
-/// The centre of the contact moves along the metal this slowly: where metal lies flat, which part of it touches most is
-/// noise [s].
-constexpr float kCentreFollows = 0.15f;
+/// Time constant of the rate of the contact in material coordinates [s].
+constexpr float kRateTime = 0.03f;
+/// Time constant of the movement of the contact's centre along the metal [s]: where flat metal touches most is noise.
+constexpr float kCentreTime = 0.15f;
+/// Squared distance of a station without living membrane near it [m^2]: 1 m, beyond kMaxFollowed.
+constexpr float kNoSheetSq = 1.0f;
 
 }  // namespace
 
@@ -80,8 +91,9 @@ bool CauteryProbe::Tented(Index triangle, const std::array<float, 3>& barycentri
 
 /// From the end of the foot to the heel and up the neck.
 void CauteryProbe::SetStations(const ToolDescription& tool) {
+  constexpr std::size_t kRounding = 3;  // Stations added by rounding up foot and neck, and the last one.
   const float length = tool.tip_length_m + kBareNeck;
-  const float spacing = std::max(kStationSpacing, length / static_cast<float>(kMostStations - 3));
+  const float spacing = std::max(kStationSpacing, length / static_cast<float>(kMaxStations - kRounding));
   const auto parts = [spacing](float part) { return std::max(1, static_cast<int>(std::ceil(part / spacing))); };
   const int foot = parts(tool.tip_length_m), neck = parts(kBareNeck);
   for (int i = 0; i < foot; ++i) {
@@ -94,10 +106,10 @@ void CauteryProbe::SetStations(const ToolDescription& tool) {
 }
 
 void CauteryProbe::FollowSheet(const ToolPose& pose, std::uint32_t tool, const ToolCollision& collision) {
-  // Of the tool's pairs with living membrane: the nearest, and how near each station is to any.
+  // Of the tool's pairs with living membrane: the nearest pair, and the least distance of each station.
   const ContactPair* nearest = nullptr;
-  std::array<float, kMostStations> alive_sq;
-  alive_sq.fill(1.0f);
+  std::array<float, kMaxStations> alive_sq;
+  alive_sq.fill(kNoSheetSq);
   for (std::size_t i = 0; i < stations_.size(); ++i) {
     stations_[i].p_W = pose.ToWorld(stations_[i].p_T);
   }
@@ -115,11 +127,11 @@ void CauteryProbe::FollowSheet(const ToolPose& pose, std::uint32_t tool, const T
     }
   }
   const Index seed = nearest != nullptr ? nearest->triangle / 2 : kNoIndex;
-  float least = kLost;
+  float least = kMaxFollowed;
   for (std::size_t i = 0; i < stations_.size(); ++i) {
     Station& station = stations_[i];
     SheetPlace place =
-        station.place.found() && known_ ? walk_.Nearest(station.p_W, station.place.cell()) : SheetPlace{};
+        station.place.found() && followed_ ? walk_.Nearest(station.p_W, station.place.cell()) : SheetPlace{};
     const auto offer = [&](Index cell) {
       const SheetPlace other = walk_.Nearest(station.p_W, cell);
       if (!place.found() || other.distance_m < place.distance_m - kNearerElsewhere) {
@@ -138,17 +150,17 @@ void CauteryProbe::FollowSheet(const ToolPose& pose, std::uint32_t tool, const T
     }
     station.height_m = place.distance_m;
     if (!model_->TriangleAlive(place.triangle)) {
-      // Cells that live beyond the last living triangle hang on it and reach no farther than one edge.
+      // Remaining cells beyond the last living triangle are connected to it and extend by at most one edge.
       const float living_m = walk_.DistanceToLiving(station.p_W, place.cell());
-      station.height_m = std::max(station.height_m, std::min(living_m - spacing_, kLost));
+      station.height_m = std::max(station.height_m, std::min(living_m - spacing_, kMaxFollowed));
     }
     least = std::min(least, place.distance_m);
   }
-  known_ = least < kLost;
+  followed_ = least < kMaxFollowed;
 }
 
-/// The sign of a height is that of the station before it, or the opposite where the metal between them goes through the
-/// sheet; over all, what agrees with the last step.
+/// The sign of a height is that of the station before it, or the opposite where the metal between them crosses the
+/// sheet. The common sign is that which agrees with the last step.
 void CauteryProbe::SignHeights() {
   float sign = 1.0f, agreement = 0;
   for (std::size_t i = 0; i < stations_.size(); ++i) {
@@ -169,21 +181,21 @@ void CauteryProbe::SignHeights() {
 }
 
 bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) {
-  // Where the sheet lies against the metal, its middle is half its thickness farther from the axis.
+  // In contact the middle of the sheet is further from the axis by half its thickness.
   const float touch = radius_m + 0.5f * scene_.thermal.thickness_m;
   const float limit = touch + (was_touching_ ? kHoldGap : kStrikeGap);
   float sum = 0, mean = 0;
   for (std::size_t i = 0; i + 1 < stations_.size(); ++i) {
     const Station &a = stations_[i], &b = stations_[i + 1];
     const float length = (b.place.material - a.place.material).norm();
-    if (length > kLongestPiece) {
+    if (length > kMaxPiece) {
       continue;
     }
-    for (int k = 0; k < kLooks; ++k) {
-      const float u = (static_cast<float>(k) + 0.5f) / kLooks;
+    for (int k = 0; k < kCentreSamples; ++k) {
+      const float u = (static_cast<float>(k) + 0.5f) / kCentreSamples;
       const float nearer = limit - std::abs(a.height_m + u * (b.height_m - a.height_m));
       if (nearer > 0.0f) {
-        // Metal that stands on the sheet covers it no less than metal that lies on it.
+        // Metal perpendicular to the sheet covers at least its own radius.
         const float weight = nearer * nearer * std::max(length, radius_m);
         sum += weight;
         mean += weight * (static_cast<float>(i) + u);
@@ -193,19 +205,20 @@ bool CauteryProbe::FindCentre(float radius_m, Vec2f* centre) {
   if (!(sum > 0.0f)) {
     return false;
   }
-  const float share = 1.0f - std::exp(-scene_.physics.dt_s / kCentreFollows);
+  const float share = 1.0f - std::exp(-scene_.physics.dt_s / kCentreTime);
   centre_ = was_touching_ ? centre_ + share * (mean / sum - centre_) : mean / sum;
   const auto i = std::min(static_cast<std::size_t>(centre_), stations_.size() - 2);
   const float u = centre_ - static_cast<float>(i);
   const Vec2f &a = stations_[i].place.material, &b = stations_[i + 1].place.material;
-  *centre = (b - a).norm() > kLongestPiece ? (u < 0.5f ? a : b) : Vec2f(a + u * (b - a));
+  *centre = (b - a).norm() > kMaxPiece ? (u < 0.5f ? a : b) : Vec2f(a + u * (b - a));
   return true;
 }
 
-/// A cell belongs to the part of its triangle whose own corners are nearest to it.
+/// A triangle is divided into the parts that its dead edges leave; a cell belongs to the part whose own corners are
+/// nearest to it.
 void CauteryProbe::AddGaps(Index triangle, const MetalAxis& axis, float radius_m) {
   const MembraneTriangle t = MembraneTriangleAt(scene_.membrane.cols, triangle);
-  const Held held{scene_, *model_, *particles_};
+  const SheetAccess held{scene_, *model_, *particles_};
   const SlitSheet sheet(held);
   const TriangleParts parts = sheet.Parts(t);
   SheetTriangle piece;
@@ -213,7 +226,7 @@ void CauteryProbe::AddGaps(Index triangle, const MetalAxis& axis, float radius_m
     piece.material[k] = scene_.membrane_material[t.nodes[k]];
   }
   if (parts.count == 0) {
-    // Nothing that lives holds it: it lies between the lips.
+    // No living edge holds the triangle: it lies between the lips.
     for (std::size_t k = 0; k < 3; ++k) {
       piece.place[k] = walk_.NodePlace(t.nodes[k]);
     }
@@ -226,7 +239,9 @@ void CauteryProbe::AddGaps(Index triangle, const MetalAxis& axis, float radius_m
   }
 }
 
-/// Of a gap along the sheet's normal the half of its thickness is none, and what soft, wet tissue gives.
+///   gap = sqrt(max(|o|^2 - h^2, 0) + max(|h| - t/2 - kContactSlack, 0)^2) - radius,   h = n . o
+///
+/// with the offset o from the cell to the axis, the normal n of the piece and the thickness t of the sheet [m].
 template <class Belongs>
 void CauteryProbe::AddGaps(const SheetTriangle& piece, const MetalAxis& axis, float radius_m, const Belongs& belongs) {
   const auto& x = piece.place;
@@ -249,8 +264,8 @@ void CauteryProbe::AddGaps(const SheetTriangle& piece, const MetalAxis& axis, fl
              });
 }
 
-/// Cells of the mesh that the metal may be near to: around the places of its stations, and those of its contacts, which
-/// find other folds, too.
+/// Cells of the mesh near the metal: those around the places of the stations, and those of the contact pairs, which
+/// also lie on other folds.
 void CauteryProbe::FindNearCells(float reach_m, const ToolCollision& collision) {
   near_cells_.clear();
   const Index cols = scene_.membrane.cols - 1, rows = scene_.membrane.rows - 1;
@@ -325,10 +340,10 @@ CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   }
   FollowSheet(pose, tool, collision);
   Vec2f centre = Vec2f::Zero();
-  if (known_) {
+  if (followed_) {
     SignHeights();
   }
-  if (!known_ || !FindCentre(description.tip_radius_m, &centre)) {
+  if (!followed_ || !FindCentre(description.tip_radius_m, &centre)) {
     was_touching_ = false;
     rate_.setZero();
     return contact;
@@ -346,7 +361,7 @@ CauteryContact CauteryProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   contact.contact_radius_m = description.tip_radius_m;
   if (was_touching_) {
     const float dt = scene_.physics.dt_s;
-    rate_ += dt / (dt + kRateSmoothing) * ((contact.material - last_material_) / dt - rate_);
+    rate_ += dt / (dt + kRateTime) * ((contact.material - last_material_) / dt - rate_);
   }
   contact.material_rate = rate_;
   was_touching_ = true;

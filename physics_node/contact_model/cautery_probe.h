@@ -1,4 +1,5 @@
-// The electrode on the membrane: where the hook's bare metal lies on the sheet, and whether there is tissue behind it.
+// Contact of the electrode with the membrane: footprint of the hook's bare metal on the sheet, and whether the sheet is
+// lifted off the tissue below.
 #pragma once
 
 #include <array>
@@ -15,18 +16,17 @@ class CauteryProbe {
  public:
   CauteryProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
 
-  /// Contact of hook `tool` after a step: the metal's footprint, its centre, rate, tented. The stamp is the
-  /// caller's.
+  /// Contact of hook `tool` after a step: footprint, centre, rate, tented; without stamp.
   ///
   /// The bare metal is the foot and the end of the neck. The footprint is its distance from each cell of the deformed
-  /// sheet around it; each side of a slit goes on unstretched up to its lip. Stations along the metal's axis each
-  /// follow the nearest place of the sheet from step to step, over slits as well, so the contact's centre jumps only
-  /// where the tool does. Their distances decide what touches, with hysteresis.
+  /// sheet near it; each side of a slit continues unstretched up to its lip. Stations along the axis of the metal
+  /// follow the nearest place of the sheet from step to step, also across slits, so the centre of the contact is
+  /// continuous for a continuous motion of the tool. Their distances determine touch, with hysteresis.
   [[nodiscard]] CauteryContact Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision);
 
  private:
-  /// The membrane, for SlitSheet.
-  struct Held {
+  /// Access of SlitSheet to the membrane (services/base/core/slit_sheet.h).
+  struct SheetAccess {
     const SceneView& scene;
     const TissueModel& model;
     const ParticleStore& particles;
@@ -47,13 +47,14 @@ class CauteryProbe {
     Vec3f p_T = Vec3f::Zero();
     Vec3f p_W = Vec3f::Zero();
     SheetPlace place;
-    /// Of the axis off the sheet; where that is cut, at least what its living border allows.
+    /// Signed distance of the axis from the sheet; at a cut at least that from its living border.
     float height_m = 0, last_height_m = 0;
   };
   void SetStations(const ToolDescription& tool);
   void FollowSheet(const ToolPose& pose, std::uint32_t tool, const ToolCollision& collision);
   void SignHeights();
-  /// Mean place of the metal that is near enough for a current, weighted by how much nearer. False: none is.
+  /// Mean place of the metal within the gap that conducts, weighted by (limit - distance)^2 and by the
+  /// length that it covers. False: there is none.
   bool FindCentre(float radius_m, Vec2f* centre);
   /// End of the foot, heel, end of the bare neck, in frame W.
   using MetalAxis = std::array<Vec3f, 3>;
@@ -75,9 +76,9 @@ class CauteryProbe {
   std::array<float, std::size_t{kGapCells} * kGapCells> gap_m_{};  ///< Row by row.
   std::int32_t gap_x_ = 0, gap_y_ = 0;                             ///< Cell of the first.
   std::vector<Index> near_cells_;
-  float spacing_ = 0;   ///< Longest edge of the membrane at rest [m].
-  bool known_ = false;  ///< The stations have places.
-  float centre_ = 0;    ///< Of the contact, along the metal [stations].
+  float spacing_ = 0;      ///< Longest edge of the membrane at rest [m].
+  bool followed_ = false;  ///< The stations have places on the sheet.
+  float centre_ = 0;       ///< Of the contact, along the metal [stations].
   bool was_touching_ = false;
   Vec2f last_material_ = Vec2f::Zero(), rate_ = Vec2f::Zero();
 };

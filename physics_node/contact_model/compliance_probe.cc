@@ -6,12 +6,12 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Share of a new answer in the low-passed one.
+/// Weight of a new answer in the low-pass filter. Assumed.
 constexpr float kShare = 0.3f;
-/// What the local model may carry [m/N]: 30 to 5000 N/m.
-constexpr float kLeast = 1.0f / 5000.0f, kMost = 1.0f / 30.0f;
-/// Of the displacement at rest, at most this is reached in one frame: the viscosity stays above zero.
-constexpr float kMostInFrame = 0.98f;
+/// Range of the local model [m/N]: 30 to 5000 N/m, as kMinBody and kMaxBody in contact_probe.cc.
+constexpr float kMinCompliance = 1.0f / 5000.0f, kMaxCompliance = 1.0f / 30.0f;
+/// Largest displacement in one frame as a share of that at rest: keeps the viscosity above zero.
+constexpr float kMaxFrameShare = 0.98f;
 
 }  // namespace
 
@@ -22,21 +22,21 @@ const Compliance& ComplianceProbe::Update(std::uint32_t tool, std::span<const In
   if (solver == nullptr || count == 0) {
     return memory.compliance;
   }
-  float* known = memory.ask_rest ? &memory.at_rest : &memory.after_frame;
+  float* known = memory.query_rest ? &memory.at_rest : &memory.after_frame;
   float stiffness = 0;
   if (!solver->Stiffness({particles.first(count), direction, tool},
-                         memory.ask_rest ? ComplianceSolver::kAtRest : frame_s_, &stiffness)) {
+                         memory.query_rest ? ComplianceSolver::kAtRest : frame_s_, &stiffness)) {
     return memory.compliance;
   }
-  memory.ask_rest = !memory.ask_rest;
+  memory.query_rest = !memory.query_rest;
   if (!(stiffness > 0.0f) || !std::isfinite(stiffness)) {
     return memory.compliance;
   }
   const float answer = 1.0f / stiffness;
   *known += (*known > 0.0f ? kShare : 1.0f) * (answer - *known);
   if (memory.after_frame > 0.0f && memory.at_rest > 0.0f) {
-    const float rest = std::clamp(memory.at_rest, kLeast, kMost);
-    const float part = std::min(memory.after_frame / std::max(memory.at_rest, memory.after_frame), kMostInFrame);
+    const float rest = std::clamp(memory.at_rest, kMinCompliance, kMaxCompliance);
+    const float part = std::min(memory.after_frame / std::max(memory.at_rest, memory.after_frame), kMaxFrameShare);
     memory.compliance.known = true;
     memory.compliance.fast = 1.0f / memory.after_frame;
     memory.compliance.stiffness = 1.0f / rest;

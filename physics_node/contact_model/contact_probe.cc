@@ -7,24 +7,45 @@
 namespace fulcrum::physics {
 namespace {
 
-constexpr float kReach = 0.010f;                       ///< Contacts are announced this far before touch [m].
-constexpr float kSmoothing = 0.03f;                    ///< Time constant of everything measured [s].
-constexpr float kRelaxation = 0.02f;                   ///< b_body / k_body [s].
-constexpr float kMinBody = 30.0f, kMaxBody = 5000.0f;  ///< [N/m]
-constexpr float kSkinOverEt = 2.0f;                    ///< k1 / (E t).
+/// Distance before touch from which on a contact is published [m].
+constexpr float kContactRange = 0.010f;
+/// Time constant of the low-pass filters of measured quantities [s].
+constexpr float kFilterTime = 0.03f;
+/// b_body / k_body [s], without a ComplianceSolver. Assumed.
+constexpr float kRelaxation = 0.02f;
+/// Range of k_body in the local model [N/m]. Assumed.
+constexpr float kMinBody = 30.0f, kMaxBody = 5000.0f;
+/// k_body of a new contact over E t, until a secant is measured. Assumed.
+constexpr float kFirstBodyOverEt = 0.3f;
+/// k1 / (E t), range of k1 [N/m], and kt / k1. Assumed.
+constexpr float kSkinOverEt = 2.0f, kMinSkin = 50.0f, kMaxSkin = 1e4f, kTangentialOverSkin = 0.5f;
+/// k_body over the secant f / u: the tangent of a sheet in tension lies above it.
 constexpr float kBodyOverSecant = 2.0f;
-constexpr float kJaws = 1e4f;  ///< What is held has no skin to give way [N/m].
-/// Of what breathing or the other tool does to the surroundings of a contact [W].
-constexpr float kMostExternal = 0.05f;
-constexpr float kSurfaceRadius = 0.012f, kGraspRadius = 0.03f;  ///< Where the model holds [m].
-constexpr float kLeastDent = 0.0005f;                           ///< Below this a secant is noise [m].
+/// k1 of a grasp [N/m]: between the jaws no skin yields.
+constexpr float kJaws = 1e4f;
+/// Largest p_ext, the power that breathing or the other tool may bring into a contact [W].
+constexpr float kMaxExternal = 0.05f;
+/// Radius of validity of the model around a surface contact and a grasp [m].
+constexpr float kSurfaceRadius = 0.012f, kGraspRadius = 0.03f;
+/// Least dent for which a secant is above the noise [m].
+constexpr float kMinDent = 0.0005f;
+/// Bounds of what is measured, beyond any use: displacement [m], its rate [m/s], velocity of the surroundings [m/s].
+constexpr float kMaxDisplacement = 0.2f, kMaxRate = 2.0f, kMaxSurroundings = 1.0f;
+/// Largest coefficient of friction in a Contact.
+constexpr float kMaxFriction = 2.0f;
+/// Least length of the averaged normal for it to have a direction.
+constexpr float kMinNormal = 0.1f;
+/// Radius of the ring of nodes that represents the surroundings of a contact [m], and the share of it in rows and
+/// columns for its diagonal nodes, about 1 / sqrt 2, as a fraction of integers.
+constexpr float kRingRadius = 0.007f;
+constexpr int kDiagonalShare = 7, kDiagonalWhole = 10;
 
 Vec3f Limited(const Vec3f& v, float limit) {
   const float norm = v.norm();
   return norm > limit ? Vec3f(v * (limit / norm)) : v;
 }
 
-/// The part of a tool that is held to touch.
+/// The part of a tool that touches tissue.
 ToolPart TipPart(const SceneView& scene, std::uint32_t tool) {
   return scene.tools[tool].kind == ToolKind::kHook ? ToolPart::kTip : ToolPart::kJaw;
 }
@@ -53,7 +74,6 @@ ContactProbe::Motion ContactProbe::MeanMotion(std::span<const Index> particles) 
 }
 
 ContactProbe::Motion ContactProbe::RingMotion(Index node) const {
-  constexpr float kRingRadius = 0.007f;
   const auto cols = static_cast<int>(model_->cols()), rows = static_cast<int>(model_->rows());
   const int row = static_cast<int>(node) / cols, col = static_cast<int>(node) % cols;
   const auto steps = [&](int direction) {
@@ -61,16 +81,17 @@ ContactProbe::Motion ContactProbe::RingMotion(Index node) const {
     return length > 0.0f ? std::max(1, static_cast<int>(std::lround(kRingRadius / length))) : 1;
   };
   const int dc = steps(0), dr = steps(1);
+  const int diagonal_dr = dr * kDiagonalShare / kDiagonalWhole, diagonal_dc = dc * kDiagonalShare / kDiagonalWhole;
   std::array<Index, 8> ring{};
   std::size_t count = 0;
   for (const auto& [r, c] : {std::pair{-dr, 0},
                              {dr, 0},
                              {0, -dc},
                              {0, dc},
-                             {-dr * 7 / 10, -dc * 7 / 10},
-                             {-dr * 7 / 10, dc * 7 / 10},
-                             {dr * 7 / 10, -dc * 7 / 10},
-                             {dr * 7 / 10, dc * 7 / 10}}) {
+                             {-diagonal_dr, -diagonal_dc},
+                             {-diagonal_dr, diagonal_dc},
+                             {diagonal_dr, -diagonal_dc},
+                             {diagonal_dr, diagonal_dc}}) {
     if (row + r >= 0 && row + r < rows && col + c >= 0 && col + c < cols) {
       const auto at = static_cast<Index>((row + r) * cols + col + c);
       if (model_->NodeAlive(at)) {
@@ -93,24 +114,24 @@ void ContactProbe::Enter(ToolMemory* memory, ContactKind kind) const {
   memory->touched = std::move(buffer);
   memory->kind = kind;
   memory->tip = memory->x_ref = tip;
-  memory->force = force;  // Closing the jaws on what they press does not make the force start anew.
-  memory->stiffness = std::clamp(0.3f * scene_.physics.membrane_Et_N_per_m, kMinBody, kMaxBody);
+  memory->force = force;  // When jaws close on tissue that they press, the force continues.
+  memory->stiffness = std::clamp(kFirstBodyOverEt * scene_.physics.membrane_Et_N_per_m, kMinBody, kMaxBody);
 }
 
-void ContactProbe::Follow(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const {
-  const float dt = scene_.physics.dt_s, share = dt / (dt + kSmoothing);
+void ContactProbe::LowPass(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const {
+  const float dt = scene_.physics.dt_s, share = dt / (dt + kFilterTime);
   memory->force += share * (Limited(force, ContactProbe::kForceCap_N) - memory->force);
   const Vec3f before = memory->u;
-  memory->u += share * (Limited(u, 0.2f) - memory->u);
-  memory->du += share * (Limited((memory->u - before) / dt, 2.0f) - memory->du);
+  memory->u += share * (Limited(u, kMaxDisplacement) - memory->u);
+  memory->du += share * (Limited((memory->u - before) / dt, kMaxRate) - memory->du);
   const float dent = memory->u.norm();
-  if (dent > kLeastDent && memory->force.norm() > 0.0f) {
+  if (dent > kMinDent && memory->force.norm() > 0.0f) {
     const float secant = std::clamp(kBodyOverSecant * memory->force.norm() / dent, kMinBody, kMaxBody);
     memory->stiffness += share * (secant - memory->stiffness);
   }
 }
 
-void ContactProbe::FollowSolver(ToolMemory* memory, const Vec3f& force) const {
+void ContactProbe::MedianFilter(ToolMemory* memory, const Vec3f& force) const {
   const Vec3f limited = Limited(force, ContactProbe::kForceCap_N);
   if (memory->kind == ContactKind::kGrasp) {
     memory->force = limited;
@@ -148,20 +169,20 @@ Contact ContactProbe::MakeContact(std::uint32_t tool) {
   contact.u_c = memory.u;
   contact.du_c = memory.du;
   contact.v_s = memory.v_s;
-  contact.k1 = std::clamp(kSkinOverEt * params.membrane_Et_N_per_m, 50.0f, 1e4f);
-  contact.kt = 0.5f * contact.k1;
+  contact.k1 = std::clamp(kSkinOverEt * params.membrane_Et_N_per_m, kMinSkin, kMaxSkin);
+  contact.kt = kTangentialOverSkin * contact.k1;
   contact.k_body = memory.stiffness;
   contact.b_body = kRelaxation * memory.stiffness;
-  const Compliance& asked = compliance_.Update(tool, memory.touched, memory.normal, solver_);
-  if (asked.known) {
-    contact.k_body = asked.stiffness;
-    contact.b_body = asked.viscosity;
+  const Compliance& measured = compliance_.Update(tool, memory.touched, memory.normal, solver_);
+  if (measured.known) {
+    contact.k_body = measured.stiffness;
+    contact.b_body = measured.viscosity;
   }
-  contact.friction = std::min(params.friction, 2.0f);
+  contact.friction = std::min(params.friction, kMaxFriction);
   return contact;
 }
 
-void ContactProbe::Forget(std::uint32_t tool, const ToolPose& pose) {
+void ContactProbe::Reset(std::uint32_t tool, const ToolPose& pose) {
   ToolMemory& memory = tools_[tool];
   memory.tip = pose.p_WT;
   if (memory.kind != ContactKind::kNone) {
@@ -169,7 +190,7 @@ void ContactProbe::Forget(std::uint32_t tool, const ToolPose& pose) {
     Enter(&memory, ContactKind::kNone);
     memory.id = id;
   }
-  compliance_.Forget(tool);
+  compliance_.Reset(tool);
 }
 
 DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision,
@@ -186,7 +207,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     if (memory.kind != kind) {
       const std::uint32_t id = memory.id;
       Enter(&memory, kind);
-      compliance_.Forget(tool);
+      compliance_.Reset(tool);
       memory.id = kind == ContactKind::kNone ? id : id + 1;
     }
   };
@@ -197,11 +218,11 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
       memory.touched.push_back(held.particle);
     }
     std::sort(memory.touched.begin(), memory.touched.end());
-    Follow(&memory, force(), MeanMotion(memory.touched).displacement);
+    LowPass(&memory, force(), MeanMotion(memory.touched).displacement);
     if (solver_force != nullptr) {
-      FollowSolver(&memory, *solver_force);
+      MedianFilter(&memory, *solver_force);
       memory.u = MeanMotion(memory.touched).displacement;
-      memory.du = Limited(tool_velocity, 2.0f);  // What is held moves with the tool.
+      memory.du = Limited(tool_velocity, kMaxRate);  // Held tissue moves with the tool.
     }
     memory.normal = pose.q_WT * -Vec3f::UnitZ();
     Contact contact = MakeContact(tool);
@@ -213,7 +234,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     return device;
   }
   const Capsule working = WorkingLine(scene_.tools[tool], pose);
-  const SurfacePoint nearest = collision.Nearest(working, kReach);
+  const SurfacePoint nearest = collision.Nearest(working, kContactRange);
   collision.TouchedParticles(tool, &memory.touched);
   const bool touching = !memory.touched.empty();
   if (!nearest.found && !touching) {
@@ -231,26 +252,26 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
     normal = nearest.closest.on_segment - nearest.closest.on_triangle;
   }
   if (normal.norm() > 0.0f) {
-    const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kSmoothing);
+    const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kFilterTime);
     memory.normal = memory.normal.isZero() ? normal.normalized()
                                            : Vec3f(memory.normal + share * (normal.normalized() - memory.normal));
   }
-  // Opposite normals may cancel on their way; any unit vector will do for one step then.
-  memory.normal = memory.normal.norm() > 0.1f ? memory.normal.normalized() : Vec3f::UnitZ();
+  // The average of opposite normals can vanish; any unit vector will do for that step.
+  memory.normal = memory.normal.norm() > kMinNormal ? memory.normal.normalized() : Vec3f::UnitZ();
 
   Motion around;
   if (nearest.found && nearest.on_membrane) {
     around = RingMotion(model_->TriangleNodes(nearest.triangle)[0]);
   }
-  const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kSmoothing);
-  memory.v_s += share * (Limited(around.velocity, 1.0f) - memory.v_s);
-  Follow(&memory, force(),
-         touching ? Vec3f(MeanMotion(memory.touched).displacement - around.displacement) : Vec3f(Vec3f::Zero()));
+  const float share = scene_.physics.dt_s / (scene_.physics.dt_s + kFilterTime);
+  memory.v_s += share * (Limited(around.velocity, kMaxSurroundings) - memory.v_s);
+  LowPass(&memory, force(),
+          touching ? Vec3f(MeanMotion(memory.touched).displacement - around.displacement) : Vec3f(Vec3f::Zero()));
 
   memory.steps = touching ? memory.steps : 0;
   if (solver_force != nullptr && touching) {
-    FollowSolver(&memory, *solver_force);
-    memory.du = Limited(memory.normal.dot(tool_velocity) * memory.normal, 2.0f);
+    MedianFilter(&memory, *solver_force);
+    memory.du = Limited(memory.normal.dot(tool_velocity) * memory.normal, kMaxRate);
   }
   Contact contact = MakeContact(tool);
   const float push = std::max(0.0f, memory.normal.dot(memory.force));
@@ -264,7 +285,7 @@ DeviceContacts ContactProbe::Update(std::uint32_t tool, const ToolPose& pose, co
   contact.kappa1 = surface.kappa1;
   contact.kappa2 = surface.kappa2;
   contact.radius = kSurfaceRadius;
-  device.p_ext_W = std::clamp(memory.force.dot(memory.v_s), 0.0f, kMostExternal);
+  device.p_ext_W = std::clamp(memory.force.dot(memory.v_s), 0.0f, kMaxExternal);
   device.contacts[device.count++] = contact;
   return device;
 }

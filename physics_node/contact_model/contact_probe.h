@@ -1,18 +1,21 @@
-// The local contact model that the servo evaluates between two steps of physics: where the surface is, how hard it
-// pushes now, and how that changes with the tool's place.
+// Local contact model that the servo evaluates between two steps of physics: position of the surface, its present
+// force, and the dependence of the force on the position of the tool.
 //
-//   f_ref   from a solver that knows it: of a grasp as it is, of a surface the median of the last kMedian steps, dated
-//           back to the middle one by x_ref; else the elastic force of the edges around what the tool touches or holds,
-//           with SI stiffness (elastic_force.h), low-passed over kSmoothing
-//   u_c     how far the tissue at the contact has been moved against its surroundings (a ring some 7 mm away), so that
-//           a tent raised by the other tool is not taken for a dent made by this one
-//   k1, kt  of the skin: E t of the membrane is what a small disc of it resists with, whatever its size
-//   k_body  twice the secant f / u (a sheet in tension stiffens with depth: its tangent lies above the secant; too
-//           soft a model would be active, too stiff only dissipates), within [kMinBody, kMaxBody]
-//   b_body  k_body * kRelaxation
-//   kappa   of the surface as it would be without this tool, as u_c and p_s mean it: before touch the present shape,
-//           from touch on the shape at rest (the present one is the dent), seen by the middle of a tip that rolls on it
-// Both are asked of the solver instead where it offers a ComplianceSolver.
+//   f_ref   force of the tissue on the tool [N]. With the force of the solver: of a grasp unfiltered; of a surface the
+//           median of the last kMedian steps, with x_ref the tip position of the middle step. Else the elastic force of
+//           the edges of the touched or held particles (elastic_force.h), low-passed over kFilterTime
+//   u_c     displacement of the tissue at the contact relative to its surroundings, a ring at kRingRadius [m]: a tent
+//           raised by the other tool is no dent of this one
+//   k1, kt  skin [N/m]: a small disc of the membrane resists with E t independent of its size
+//   k_body  kBodyOverSecant times the secant |f| / |u| [N/m], within [kMinBody, kMaxBody]. A sheet in tension stiffens
+//           with depth, so its tangent lies above the secant; too low a stiffness makes the model active, too high a
+//           stiffness only dissipates
+//   b_body  kRelaxation k_body [N s/m]
+//   kappa   curvatures [1/m] of the surface without this tool, as for u_c and p_s: before touch of the present shape,
+//           in contact of the shape at rest (the present one has the dent), for the middle of a tip that rolls on it
+//
+// k_body and b_body come from a ComplianceSolver where the solver has one. Low-pass filters: y += h / (h + T) (x - y)
+// with the step h and the time constant T = kFilterTime [s].
 #pragma once
 
 #include <array>
@@ -28,25 +31,25 @@ namespace fulcrum::physics {
 
 class ContactProbe {
  public:
-  /// Published forces on a tool are limited to this: rectal tissue is damaged by more [N].
+  /// Largest published force on a tool [N]; a larger one damages rectal tissue.
   static constexpr float kForceCap_N = 15.0f;
 
   ContactProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
 
-  /// Contacts of one tool after a step: a grasp, or the nearest surface within reach, or none. `solver_force`: of the
-  /// tissue on the tool [N], from a solver that knows; null: estimated from the edges.
+  /// Contacts of one tool after a step: a grasp, or the nearest surface within range, or none. `solver_force`: force of
+  /// the tissue on the tool from the solver [N]; null: estimated from the edges.
   DeviceContacts Update(std::uint32_t tool, const ToolPose& pose, const ToolCollision& collision, const Grasp& grasp,
                         const Vec3f* solver_force);
-  /// Before an Update that does not follow the last one: what it measured then is of another time.
-  void Forget(std::uint32_t tool, const ToolPose& pose);
-  /// Stiffness and viscosity come from `solver` from now on; nullptr: estimated from force and dent again.
-  void AskSolver(ComplianceSolver* solver) { solver_ = solver; }
+  /// Before an Update that does not directly follow the last one: discards the history of the filters.
+  void Reset(std::uint32_t tool, const ToolPose& pose);
+  /// Source of stiffness and viscosity; nullptr: estimated from force and dent.
+  void SetComplianceSolver(ComplianceSolver* solver) { solver_ = solver; }
   [[nodiscard]] const Compliance& compliance(std::uint32_t tool) const { return compliance_.compliance(tool); }
   /// Force on the tool as last computed, low-passed [N].
   [[nodiscard]] Vec3f force(std::uint32_t tool) const { return tools_[tool].force; }
 
  private:
-  static constexpr int kMedian = 5;
+  static constexpr int kMedian = 5;  ///< Steps of the median filter of a surface's force.
   struct ToolMemory {
     ContactKind kind = ContactKind::kNone;
     std::uint32_t id = 0;
@@ -56,9 +59,9 @@ class ContactProbe {
     float stiffness = 0;
     std::vector<Index> touched;
     Vec3f tip = Vec3f::Zero();                ///< Of the tool in the last step.
-    Vec3f x_ref = Vec3f::Zero();              ///< Where the tip was when `force` acted.
+    Vec3f x_ref = Vec3f::Zero();              ///< Tip position at which `force` acted.
     std::array<Vec3f, kMedian> forces, tips;  ///< Of the last steps, the newest last.
-    int steps = 0;                            ///< 0: nothing in these yet.
+    int steps = 0;                            ///< 0: both are empty.
   };
   /// Displacement from rest and velocity, averaged.
   struct Motion {
@@ -66,8 +69,8 @@ class ContactProbe {
   };
 
   void Enter(ToolMemory* memory, ContactKind kind) const;
-  void Follow(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const;
-  void FollowSolver(ToolMemory* memory, const Vec3f& force) const;
+  void LowPass(ToolMemory* memory, const Vec3f& force, const Vec3f& u) const;
+  void MedianFilter(ToolMemory* memory, const Vec3f& force) const;
   [[nodiscard]] Motion MeanMotion(std::span<const Index> particles) const;
   [[nodiscard]] Motion RingMotion(Index node) const;
   [[nodiscard]] Contact MakeContact(std::uint32_t tool);

@@ -6,14 +6,17 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Springs along the edges of a triangle or tetrahedron that store, averaged over directions, the energy of the
-/// continuum under uniaxial strain: mean cos^4 = 3/8 in the plane and 1/5 in space. Triangle: E t e^2 A / 2 =
-/// 3 * (k L^2 e^2 / 2) * 3/8. Tetrahedron: E e^2 V / 2 = 6 * (k L^2 e^2 / 2) / 5.
+/// Stiffness factors for which the springs along the edges of a triangle or tetrahedron store the energy of the
+/// continuum under uniaxial strain e, averaged over directions: mean cos^4 = 3/8 in the plane and 1/5 in space.
+/// Triangle: E t e^2 A / 2 = 3 (k L^2 e^2 / 2) 3/8. Tetrahedron: E e^2 V / 2 = 6 (k L^2 e^2 / 2) / 5.
 constexpr double kTriangleShare = 8.0 / 9.0;
 constexpr double kTetShare = 5.0 / 6.0;
 
-/// Young's modulus of the fat between membrane and organ, which the bindings stand for [Pa].
+/// Young's modulus of the fat between membrane and organ, which the bindings stand for [Pa]. Modes with ElasticModel
+/// use PhysicsParams::fat_youngs_modulus_Pa.
 constexpr double kFatModulus = 3.0e3;
+/// Least mean length of a binding in the stiffness of the fat [m]; as kLeastBindingLength of ElasticModel.
+constexpr double kLeastFatLength = 1e-3;
 
 }  // namespace
 
@@ -58,17 +61,18 @@ ElasticForce::ElasticForce(const SceneView& scene, const TissueModel* model, con
     tube_start_.push_back(static_cast<Index>(tube_edges_.size()));
   }
   if (!scene.bindings.empty()) {
-    // Each binding is a column of fat: its share of the bound sheet, as long as the binding.
+    // Each binding is a column of fat with its share of the sheet as cross section and the mean length of all bindings.
     double length = 0;
     for (const Binding& binding : scene.bindings) {
       length += binding.rest_length;
     }
     const auto count = static_cast<double>(scene.bindings.size());
-    binding_stiffness_ = static_cast<float>(kFatModulus * (sheet_area / count) / std::max(length / count, 1e-3));
+    binding_stiffness_ =
+        static_cast<float>(kFatModulus * (sheet_area / count) / std::max(length / count, kLeastFatLength));
   }
 }
 
-/// visit(other particle or its place, rest length, stiffness): live edges of a particle.
+/// visit(other particle, rest length, stiffness) for the live edges of a particle.
 template <class Visit>
 void ElasticForce::ForEachNeighbour(Index particle, const Visit& visit) const {
   if (particle < scene_.tube_vertex_count) {
@@ -106,7 +110,7 @@ Vec3f ElasticForce::OnParticle(Index particle) const {
   ForEachNeighbour(particle, [&](Index other, float rest, float stiffness) {
     const Vec3f d = particles_->At(particles_->Ref(other)) - here;
     const float length = d.norm();
-    // A sheet this thin buckles instead of pushing.
+    // A thin sheet buckles under pressure: its edges only pull.
     if (length > rest || (!membrane && length > 0.0f)) {
       force += (stiffness * (length - rest) / length) * d;
     }

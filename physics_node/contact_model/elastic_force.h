@@ -1,6 +1,14 @@
-// Forces in newtons out of positions. PBD's own corrections depend on masses, iterations and the time step; the force
-// that a hand should feel is that of the material. So each edge is given the stiffness of the continuum it stands for,
-// and the force on a particle is that of its stretched edges as PBD has left them.
+// Forces in newtons from the positions of a PBD solver. Its corrections depend on masses, iterations and the time step;
+// the force on the hand must be that of the material. So each edge has the stiffness of the continuum that it stands
+// for, and the force on a particle is that of its edges at the final positions of a step:
+//
+//   f_i = sum_j k_ij (l_ij - L_ij) (x_j - x_i) / l_ij,   l_ij = |x_j - x_i|       membrane: only where l_ij > L_ij
+//       + k_b (|d| - L_b) d / |d|,   d = sum_k b_k s_k - x_i                      binding to the organ
+//   k_ij = 8/9 E t A / l^2 per triangle of the membrane,   5/6 E V / l^2 per tetrahedron, at rest
+//   k_b  = E_fat (A_sheet / n) / mean length of the n bindings
+//
+//   k [N/m]     l, L  length now and at rest [m]     E t [N/m], E [Pa]  moduli     A [m^2], V [m^3]  of the element
+//   b_k, s_k    barycentric coordinates and corners of the bound triangle
 #pragma once
 
 #include <array>
@@ -16,10 +24,10 @@ class ElasticForce {
  public:
   ElasticForce(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
 
-  /// Force of the tissue on a set of particles together [N, frame W]: forces within the set cancel. At rest under a
-  /// tool this is what the set does to the tool. `set` ascending, each once.
+  /// Total force of the tissue on a set of particles [N, frame W]; forces within the set cancel. In equilibrium with a
+  /// tool it is the force of the set on the tool. `set` ascending, without repetition.
   [[nodiscard]] Vec3f OnSet(std::span<const Index> set) const;
-  /// Stiffness of the edges from inside the set to outside it [N/m]: the skin around a contact.
+  /// Sum of the stiffnesses of the edges between the set and other particles [N/m]: the skin around a contact.
   [[nodiscard]] float StiffnessAround(std::span<const Index> set) const;
   /// Force on one particle [N].
   [[nodiscard]] Vec3f OnParticle(Index particle) const;

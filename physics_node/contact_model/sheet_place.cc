@@ -6,15 +6,16 @@
 #include <utility>
 
 #include "physics_node/collision/closest.h"
+#include "physics_node/simd/limits.h"
 
 namespace fulcrum::physics {
 namespace {
 
-/// Cells that a descent crosses at most: a point cannot come farther than that from its last place in one step.
-constexpr int kMostSteps = 40;
-/// Lines of the grid through a node: steps along rows and columns.
+/// Most cells that a descent crosses: further than a point moves over the sheet in a step.
+constexpr int kMaxDescent = 40;
+/// Lines of the grid through a node, as (row, column) steps: along the row, the column and both diagonals.
 constexpr std::array<std::pair<int, int>, 4> kLines{{{0, 1}, {1, 0}, {1, 1}, {1, -1}}};
-/// A lip farther than so many steps from a dead node says nothing about its place.
+/// Largest distance of a lip from a dead node whose position is interpolated from it [steps].
 constexpr int kLipReach = 4;
 
 }  // namespace
@@ -35,7 +36,8 @@ Vec3f SheetWalk::NodePlace(Index node) const {
   if (lives(row, col)) {
     return at(row, col);
   }
-  // At its share of the way from lip to lip, on each line of the grid that has both within reach.
+  // Linear interpolation from lip to lip along each line of the grid on which both are within reach; the mean over the
+  // lines, weighted by 1 / distance of the lips.
   Vec3f sum = Vec3f::Zero();
   float weights = 0;
   for (const auto& [dr, dc] : kLines) {
@@ -82,29 +84,31 @@ void SheetWalk::ForTrianglesAround(Index cell, const Visit& visit) const {
   const Index row = cell / cells, col = cell % cells;
   const Index r0 = row > 0 ? row - 1 : 0, r1 = std::min(row + 1, cell_rows - 1);
   const Index c0 = col > 0 ? col - 1 : 0, c1 = std::min(col + 1, cells - 1);
-  std::array<Vec3f, 16> place;  // of the nodes of these cells
+  constexpr Index kSide = 4;  // Nodes along a side of the 3 x 3 cells.
+  std::array<Vec3f, kSide * kSide> place;
   for (Index r = r0; r <= r1 + 1; ++r) {
     for (Index c = c0; c <= c1 + 1; ++c) {
-      place[4 * (r - r0) + (c - c0)] = NodePlace(r * scene_.membrane.cols + c);
+      place[kSide * (r - r0) + (c - c0)] = NodePlace(r * scene_.membrane.cols + c);
     }
   }
   for (Index r = r0; r <= r1; ++r) {
     for (Index c = c0; c <= c1; ++c) {
-      const Index n00 = r * scene_.membrane.cols + c, n10 = n00 + scene_.membrane.cols, at = 4 * (r - r0) + (c - c0);
+      const Index n00 = r * scene_.membrane.cols + c, n10 = n00 + scene_.membrane.cols,
+                  at = kSide * (r - r0) + (c - c0);
       const Index triangle = 2 * (r * cells + c);
       visit(triangle, std::array<Index, 3>{n00, n00 + 1, n10 + 1},
-            std::array<Vec3f, 3>{place[at], place[at + 1], place[at + 5]});
+            std::array<Vec3f, 3>{place[at], place[at + 1], place[at + kSide + 1]});
       visit(triangle + 1, std::array<Index, 3>{n00, n10 + 1, n10},
-            std::array<Vec3f, 3>{place[at], place[at + 5], place[at + 4]});
+            std::array<Vec3f, 3>{place[at], place[at + kSide + 1], place[at + kSide]});
     }
   }
 }
 
 SheetPlace SheetWalk::Nearest(const Vec3f& p_W, Index start_cell) const {
   SheetPlace best;
-  float best_sq = 3e38f;
+  float best_sq = kLargestFinite;
   Index cell = start_cell;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxDescent; ++step) {
     std::array<Index, 3> best_nodes{};
     bool nearer = false;
     ForTrianglesAround(cell, [&](Index triangle, const std::array<Index, 3>& nodes, const std::array<Vec3f, 3>& x) {
@@ -169,7 +173,7 @@ SheetPlace SheetWalk::Crossing(const Vec3f& a_W, const Vec3f& b_W, Index cell) c
 SheetPlace SheetWalk::At(const Vec2f& material, Index cell) const {
   const auto lift = [](const Vec2f& v) { return Vec3f(v.x(), v.y(), 0.0f); };
   SheetPlace best;
-  float nearest = 3e38f;
+  float nearest = kLargestFinite;
   ForTrianglesAround(cell, [&](Index triangle, const std::array<Index, 3>& nodes, const std::array<Vec3f, 3>&) {
     const auto& m = scene_.membrane_material;
     const auto barycentric = ClosestOnTriangle(lift(material), lift(m[nodes[0]]), lift(m[nodes[1]]), lift(m[nodes[2]]));

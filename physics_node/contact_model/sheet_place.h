@@ -1,4 +1,12 @@
-// The nearest place of the deformed membrane to a point, followed from step to step.
+// The place of the deformed membrane nearest to a point, followed from step to step by descent over the grid.
+//
+//   place      argmin over the triangles of |p - sum_i b_i x_i|,   b_i >= 0,  sum_i b_i = 1
+//   dead node  x = sum_l w_l (b_l x_a + a_l x_b) / (a_l + b_l) / sum_l w_l,   w_l = 1 / (a_l + b_l)
+//
+//   l          lines of the grid through the node: row, column and both diagonals
+//   x_a, x_b   nearest living nodes to either side on a line, a_l and b_l steps away, both at most kLipReach
+//
+// Stencil of a step of the descent: the triangles of a cell and of the eight cells around it.
 #pragma once
 
 #include <array>
@@ -18,25 +26,24 @@ struct SheetPlace {
   [[nodiscard]] Index cell() const { return triangle / 2; }
 };
 
-/// Walks over the grid's triangles, those that a cut has switched off included: the sheet between the lips of a slit is
-/// then the straight line from lip to lip, so a tool that stands in its own slit has a place in material coordinates
-/// that moves on continuously. A node that is dead lies at its share of the way from
-/// lip to lip.
+/// Descent over the triangles of the grid, including those disabled by a cut: between the lips of a slit the sheet is
+/// the straight line from lip to lip, so the material coordinates of a tool in its own slit are continuous. A dead node
+/// is interpolated linearly between the lips.
 class SheetWalk {
  public:
   SheetWalk(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
       : scene_(scene), model_(model), particles_(particles) {}
 
-  /// Descends from a cell to the nearest place around it: a local minimum of the distance, not the global one.
+  /// Descends from a cell to a local minimum of the distance, which may not be the global one.
   [[nodiscard]] SheetPlace Nearest(const Vec3f& p_W, Index start_cell) const;
-  /// Distance of a point from the nearest living triangle within two cells of `cell`; infinity: there is none.
+  /// Distance of a point from the nearest living triangle within two cells of `cell`; infinite without one.
   [[nodiscard]] float DistanceToLiving(const Vec3f& p_W, Index cell) const;
-  /// Where segment ab goes through one of the triangles within one cell of `cell`; none: not found().
+  /// Intersection of segment ab with a triangle within one cell of `cell`; without one: not found().
   [[nodiscard]] SheetPlace Crossing(const Vec3f& a_W, const Vec3f& b_W, Index cell) const;
   /// The triangle around `material` within one cell of `cell`, or the nearest of these with the place clamped into it.
   [[nodiscard]] SheetPlace At(const Vec2f& material, Index cell) const;
-  /// World place of a node; of a dead one its share of the way between the living ones on opposite sides of it, else
-  /// the mean of its living neighbours, if it has any.
+  /// Position of a node in frame W. Of a dead node: interpolated between the living nodes on opposite sides of it, else
+  /// the mean of its living neighbours, else its last position.
   [[nodiscard]] Vec3f NodePlace(Index node) const;
 
  private:

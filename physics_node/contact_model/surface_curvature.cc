@@ -8,17 +8,20 @@
 namespace fulcrum::physics {
 namespace {
 
-/// The surface counts this far around the contact: three times the reach of a tip, so that folds finer than it do not
-/// [m], but at least and at most so many edges, where the mesh is coarse or fine.
+/// Radius of the fit [m]: three times the reach of a tip, so that finer folds are averaged; but at least and at most
+/// this many of the longest edges of the contact's triangle, where the mesh is coarse or fine.
 constexpr float kRadius = 0.006f;
-constexpr float kLeastEdges = 2.5f, kMostEdges = 6.0f;
-/// Least pivot of the normal equations, for coordinates over the radius and weights that add up to 1. A whole disc has
-/// 2e-3, a border half of that; on two lines through the middle, where twist is unknown, it is 0.
+constexpr float kMinEdges = 2.5f, kMaxEdges = 6.0f;
+/// Least pivot of the normal equations, for coordinates over the radius and weights with sum 1. A whole disc has 2e-3,
+/// a border half of that; with points on two lines through the middle only, the twist is undetermined and the pivot 0.
 constexpr double kLeastPivot = 1e-4;
-/// The contact's normal is not that of the surface when this far off: cosine.
+/// Least cosine between the contact's normal and that of the triangle; with less it is not a normal of the surface.
 constexpr float kLeastCosine = 0.3f;
-/// A ball in a pit of less than twice its radius touches on both sides.
-constexpr float kTightest = 0.5f;
+/// Least 1 + kappa r: a ball in a pit of less than twice its radius touches on both sides.
+constexpr float kLeastRolled = 0.5f;
+/// Fits of a quadric: the second one is in the frame of the first one's normal, because the Hessian is the shape
+/// operator only where the slope is small.
+constexpr int kFits = 2;
 
 using Vec6d = Eigen::Matrix<double, 6, 1>;
 using Mat6d = Eigen::Matrix<double, 6, 6>;
@@ -69,18 +72,17 @@ Mat3f FrameOf(const Vec3f& normal) {
 
 PrincipalCurvatures FitCurvatures(std::span<const Vec3f> points, float radius, const Vec3f& normal) {
   PrincipalCurvatures none{normal, normal.unitOrthogonal(), 0, 0};
-  // Twice: over a plane that is tilted, what is around is not around.
   Mat3f frame = FrameOf(normal);
   Vec6d q;
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < kFits; ++i) {
     if (!FitQuadric(points, radius, frame, &q)) {
       return none;
     }
-    if (i == 0) {
+    if (i + 1 < kFits) {
       frame = FrameOf((frame * Vec3f(static_cast<float>(-q[1]), static_cast<float>(-q[2]), 1.0f)).normalized());
     }
   }
-  // Next to no slope is left: the shape operator is the Hessian over the length of the normal.
+  // The remaining slope is small: shape operator = Hessian over the length of the normal.
   const double scale = -1.0 / (static_cast<double>(radius) * std::sqrt(1.0 + q[1] * q[1] + q[2] * q[2]));
   const double mean = 0.5 * scale * (q[3] + q[5]), half = 0.5 * scale * (q[3] - q[5]), twist = scale * q[4];
   const double apart = std::hypot(half, twist);
@@ -96,7 +98,7 @@ PrincipalCurvatures FitCurvatures(std::span<const Vec3f> points, float radius, c
 
 PrincipalCurvatures RolledOver(PrincipalCurvatures surface, float ball) {
   for (float* kappa : {&surface.kappa1, &surface.kappa2}) {
-    *kappa = std::clamp(*kappa / std::max(1.0f + *kappa * ball, kTightest), -kMaxCurvature, kMaxCurvature);
+    *kappa = std::clamp(*kappa / std::max(1.0f + *kappa * ball, kLeastRolled), -kMaxCurvature, kMaxCurvature);
   }
   return surface;
 }
@@ -107,7 +109,7 @@ SurfaceCurvature::SurfaceCurvature(const SceneView& scene, const TissueModel* mo
       particles_(particles),
       first_neighbour_(scene.tube_vertex_count + 1, 0),
       visited_(particles->particle_count(), 0) {
-  // Each edge of a closed surface is met twice, once each way.
+  // Each edge of a closed surface occurs in two triangles, once in each direction.
   for (const Triangle& triangle : scene.tube_surface) {
     for (const Index vertex : triangle) {
       ++first_neighbour_[vertex + 1];
@@ -123,8 +125,8 @@ SurfaceCurvature::SurfaceCurvature(const SceneView& scene, const TissueModel* mo
       neighbours_[next[triangle[i]]++] = triangle[(i + 1) % 3];
     }
   }
-  found_.reserve(kMostVertices);
-  points_.reserve(kMostVertices);
+  found_.reserve(kMaxVertices);
+  points_.reserve(kMaxVertices);
 }
 
 Vec3f SurfaceCurvature::Place(Index particle, bool at_rest) const {
@@ -132,7 +134,7 @@ Vec3f SurfaceCurvature::Place(Index particle, bool at_rest) const {
 }
 
 void SurfaceCurvature::Visit(Index particle) {
-  if (visited_[particle] != search_ && found_.size() < kMostVertices) {
+  if (visited_[particle] != search_ && found_.size() < kMaxVertices) {
     visited_[particle] = search_;
     found_.push_back(particle);
   }
@@ -182,16 +184,16 @@ PrincipalCurvatures SurfaceCurvature::At(const SurfacePoint& at, bool at_rest, c
     now[i] = Place(corner[i], false);
     middle += at.closest.barycentric[i] * x[i];
   }
-  // The side on which the tool is, is told by the triangle as it lies now.
+  // The side of the tool follows from the present shape of the triangle.
   const float cosine = n.dot((now[1] - now[0]).cross(now[2] - now[0]).stableNormalized());
   const Vec3f normal = (x[1] - x[0]).cross(x[2] - x[0]).stableNormalized();
   if (!(std::abs(cosine) > kLeastCosine) || normal.isZero()) {
     return none;
   }
   const float longest = std::max({(x[1] - x[0]).norm(), (x[2] - x[1]).norm(), (x[0] - x[2]).norm()});
-  const float radius = std::clamp(kRadius, kLeastEdges * longest, kMostEdges * longest);
+  const float radius = std::clamp(kRadius, kMinEdges * longest, kMaxEdges * longest);
 
-  if (++search_ == 0) {  // Once in 2^32: what was seen by search 0 is long forgotten.
+  if (++search_ == 0) {  // Overflow, once in 2^32 searches: clear the marks of the old ones.
     std::fill(visited_.begin(), visited_.end(), 0);
     search_ = 1;
   }

@@ -7,17 +7,19 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Tissue that creeps this many grasp radii from the jaws' line is out of them.
+/// Distance from the jaws' middle line at which tissue is no longer held, in grasp radii. Assumed.
 constexpr float kLostRadii = 1.5f;
-/// Creep at twice the grip force [m/s].
+/// Creep at twice the grip force and full hold [m/s]. Assumed.
 constexpr float kCreepSpeed = 0.05f;
-/// A jolt shorter than this does not tear tissue out of the jaws [s].
-constexpr float kSmoothing = 0.03f;
-/// The hold falls to this at grasp_radius, from 1 at kFirmPart of it.
+/// Largest excess of the traction over the grip force that counts for the creep, in grip forces; bounds its speed.
+constexpr float kMaxExcess = 2.0f;
+/// Time constant of the traction [s]: a shorter jolt does not pull tissue out of the jaws.
+constexpr float kTractionTime = 0.03f;
+/// Hold at grasp_radius from the middle line; it falls linearly from 1 at kFirmShare of that radius. Assumed.
 constexpr float kLeastHold = 0.3f;
-constexpr float kFirmPart = 0.5f;
+constexpr float kFirmShare = 0.5f;
 
-/// Distance from the surface between the axes of jaws so far open; 0: from their middle line.
+/// Distance from the surface between the axes of jaws at an opening angle; angle 0: from their middle line.
 float DistanceToJaws(const Vec3f& p_T, const ToolDescription& tool, float jaw_rad) {
   const float length = tool.tip_length_m, half = 0.5f * std::max(jaw_rad, 0.0f);
   const Vec3f hinge(0, 0, -length);
@@ -35,7 +37,7 @@ float Grasp::GripForce(const PhysicsParams& params, float jaw_rad) {
 float Grasp::HoldOf(const HeldParticle& held, const ToolDescription& tool) const {
   const float radius = scene_.physics.grasp_radius_m;
   const float out = DistanceToJaws(held.p_T, tool, 0.0f) / radius;
-  return std::clamp(1.0f - (1.0f - kLeastHold) * (out - kFirmPart) / (1.0f - kFirmPart), kLeastHold, 1.0f);
+  return std::clamp(1.0f - (1.0f - kLeastHold) * (out - kFirmShare) / (1.0f - kFirmShare), kLeastHold, 1.0f);
 }
 
 void Grasp::Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
@@ -56,7 +58,7 @@ void Grasp::TakeHold(const ToolDescription& tool, const ToolPose& pose, Particle
     for (Index p = first; p < last; ++p) {
       const ParticleRef at = particles->Ref(p);
       const Vec3f p_T = pose.ToTool(particles->At(at));
-      // Dead, loose and fixed tissue has no inverse mass, nor has what the other tool holds.
+      // The inverse mass is 0 for dead, loose and fixed tissue and for tissue that the other tool holds.
       if (particles->InverseMass(at) > 0.0f &&
           (DistanceToJaws(p_T, tool, pose.jaw_rad) < between || DistanceToJaws(p_T, tool, 0.0f) < around)) {
         held_.push_back({p, p_T});
@@ -82,9 +84,9 @@ void Grasp::Move(const ToolPose& pose, ParticleStore* particles) const {
 }
 
 template <class Predicate>
-void Grasp::DropIf(const TissueModel& model, ParticleStore* particles, const Predicate& gone) {
+void Grasp::DropIf(const TissueModel& model, ParticleStore* particles, const Predicate& released) {
   const auto last = std::remove_if(held_.begin(), held_.end(), [&](const HeldParticle& held) {
-    if (!gone(held)) {
+    if (!released(held)) {
       return false;
     }
     particles->SetInverseMass(particles->Ref(held.particle), model.BaseInverseMass(held.particle));
@@ -99,12 +101,12 @@ void Grasp::DropIf(const TissueModel& model, ParticleStore* particles, const Pre
 void Grasp::Slip(const Vec3f& traction_W, const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
                  ParticleStore* particles) {
   const float dt = scene_.physics.dt_s;
-  traction_ += dt / (dt + kSmoothing) * (traction_W - traction_);
+  traction_ += dt / (dt + kTractionTime) * (traction_W - traction_);
   const float traction = traction_.norm(), grip = GripForce(scene_.physics, pose.jaw_rad);
   if (!holding() || !(traction > grip)) {
     return;
   }
-  const float excess = grip > 0.0f ? std::min(traction / grip - 1.0f, 2.0f) : 2.0f;
+  const float excess = grip > 0.0f ? std::min(traction / grip - 1.0f, kMaxExcess) : kMaxExcess;
   const Vec3f creep_T = (kCreepSpeed * dt * excess / traction) * (pose.q_WT.conjugate() * traction_);
   for (HeldParticle& held : held_) {
     held.p_T += creep_T / HoldOf(held, tool);
@@ -116,7 +118,7 @@ void Grasp::Slip(const Vec3f& traction_W, const ToolDescription& tool, const Too
 void Grasp::DropDead(const TissueModel& model, ParticleStore* particles) {
   DropIf(model, particles, [&](const HeldParticle& held) { return model.BaseInverseMass(held.particle) == 0.0f; });
   for (const HeldParticle& held : held_) {
-    particles->SetInverseMass(particles->Ref(held.particle), 0.0f);  // A revived node takes its mass back.
+    particles->SetInverseMass(particles->Ref(held.particle), 0.0f);  // A revived node has got its mass again.
   }
 }
 

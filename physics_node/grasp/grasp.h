@@ -1,4 +1,12 @@
-// A grasper's hold on tissue: particles fixed in the tool's frame, with slip.
+// Grasp of a grasper: particles fixed in the tool's frame, with slip above the grip force.
+//
+//   G       = grip_force max(0, 1 - jaw / open)                              grip force [N]
+//   creep   = v_c h min(|T| / G - 1, kMaxExcess) T^ / hold_i  per step while |T| > G, in the tool's frame [m]
+//   hold_i  = 1 - (1 - l) (d_i / R - f) / (1 - f), within [l, 1]
+//
+//   T    traction, low-passed [N]; T^ its direction       R        grasp_radius [m]
+//   jaw  opening angle, open: grasp_open_rad [rad]        d_i      distance of particle i from the middle line [m]
+//   v_c  kCreepSpeed [m/s], h: step [s]                   l, f     kLeastHold, kFirmShare
 #pragma once
 
 #include <vector>
@@ -20,23 +28,23 @@ class Grasp {
 
   explicit Grasp(const SceneView& scene) : scene_(scene) {}
 
-  /// Follows the jaw: takes hold when it closes past grasp_close_rad, lets go past grasp_open_rad. Held is what lies
-  /// between the jaws: whatever is within a jaw's thickness of the surface that they span, all sheets of a fold and
-  /// both layers, and the membrane within grasp_radius of their middle line; with nothing there, organ within
-  /// grasp_radius.
+  /// Begins a grasp when the jaws close below grasp_close_rad and ends it when they open beyond grasp_open_rad. Held
+  /// are all particles within a jaw's thickness of the surface that the jaws span, in both layers and all sheets of a
+  /// fold, and the membrane within grasp_radius of their middle line; if there are none, the organ within grasp_radius.
   void Update(const ToolDescription& tool, const ToolPose& pose, const TissueModel& model, ParticleStore* particles);
-  /// Puts what is held where the tool has taken it.
+  /// Moves the held particles with the tool.
   void Move(const ToolPose& pose, ParticleStore* particles) const;
-  /// Largest traction that jaws so far open hold [N]: grip_force_N when closed, none from grasp_open_rad on, linear.
+  /// Largest traction without slip at an opening angle [N]: grip_force_N when closed, falling linearly to 0 at
+  /// grasp_open_rad.
   [[nodiscard]] static float GripForce(const PhysicsParams& params, float jaw_rad);
-  /// Part of the grip that a held particle has: 1 between the jaws, less towards grasp_radius.
+  /// Share of the grip that acts on a held particle: 1 between the jaws, less towards grasp_radius.
   [[nodiscard]] float HoldOf(const HeldParticle& held, const ToolDescription& tool) const;
-  /// Above GripForce the tissue creeps out of the jaws along the traction [N, frame W], which is what the tissue pulls
-  /// at the tool with: measured by the solver as the sum of forces on what is held, or estimated from edges. The less
-  /// hold the faster; what leaves the jaws is lost. Once a step.
+  /// Once a step: above GripForce the tissue creeps out of the jaws along the traction, the force of the tissue on the
+  /// tool [N, frame W]. The solver reports it as the sum of the forces on the held particles; otherwise it is estimated
+  /// from the edges. Particles that leave the jaws are released.
   void Slip(const Vec3f& traction_W, const ToolDescription& tool, const ToolPose& pose, const TissueModel& model,
             ParticleStore* particles);
-  /// Drops what has been cut away meanwhile.
+  /// Releases particles that have been cut off.
   void DropDead(const TissueModel& model, ParticleStore* particles);
   void Release(const TissueModel& model, ParticleStore* particles);
 
@@ -49,7 +57,7 @@ class Grasp {
  private:
   void TakeHold(const ToolDescription& tool, const ToolPose& pose, ParticleStore* particles);
   template <class Predicate>
-  void DropIf(const TissueModel& model, ParticleStore* particles, const Predicate& gone);
+  void DropIf(const TissueModel& model, ParticleStore* particles, const Predicate& released);
 
   SceneView scene_;
   State state_ = State::kOpen;

@@ -64,7 +64,7 @@ TissueSimulation::TissueSimulation(const SceneView& scene, int threads, Instruct
       implicit_.emplace(scene, elastic, model_, &particles_, threads, implicit::KernelsFor(set));
       effort_ = implicit::EffortOf(scene.physics.preset);
       most_substeps_ = std::max(kMostSubsteps, effort_.substeps);
-      contacts_.AskSolver(&answers_);
+      contacts_.SetComplianceSolver(&answers_);
     }
     held_places_.reserve(particles_.particle_count());
     rows_.reserve(kMaxTools * ToolCollision::kMaxRows + TissueCollision::kMaxRows);
@@ -352,7 +352,7 @@ DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
     return {};
   }
   if (std::exchange(contacts_step_[tool], steps_) + 1 < steps_) {
-    contacts_.Forget(tool, tracks_[tool].now);
+    contacts_.Reset(tool, tracks_[tool].now);
   }
   return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool], implicit_ ? &tool_force_[tool] : nullptr);
 }

@@ -57,7 +57,7 @@ TEST(ComplianceProbe, AsksOnceAStepAndBoundsItsLoad) {
   probe.Update(1, {}, Vec3f::UnitZ(), &element);
   EXPECT_EQ(element.questions, 10);  // Nothing touched, nothing asked.
   EXPECT_TRUE(probe.compliance(1).known);
-  probe.Forget(1);
+  probe.Reset(1);
   EXPECT_FALSE(probe.compliance(1).known);
 }
 
