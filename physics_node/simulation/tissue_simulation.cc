@@ -9,41 +9,20 @@
 namespace fulcrum::physics {
 namespace {
 
-/// A tool that moves less is standing still: the resolution of a haptic device is 9 um.
-constexpr float kToolStill = 1e-7f;
-/// How far a tool that presses may move in a substep of mode accurate [m], at the price of at most so many substeps:
-/// for good forces, and for forces at all.
-constexpr float kGoodWayPerSubstep = 2e-5f, kWayPerSubstep = 6e-5f;
-constexpr int kGoodSubsteps = 3, kMostSubsteps = 8;
-/// With one substep a step forces are wrong by half of themselves, however slow the tool.
+/// Path of a pressing tool in a substep of mode accurate [m]: the fine one is kept with up to kFineSubsteps substeps
+/// and gives accurate forces, the larger one with up to kMostSubsteps and keeps the forces usable.
+constexpr float kFinePathPerSubstep = 2e-5f, kMaxPathPerSubstep = 6e-5f;
+constexpr int kFineSubsteps = 3, kMostSubsteps = 8;
+/// Least substeps while a tool presses: with one per step the error of the force is half of it at any speed of the
+/// tool.
 constexpr int kLeastSubsteps = 2;
-/// Where tools ask for more substeps than the preset: these are shorter, and then as many are enough in all presets.
+/// Iterations where tools require more substeps than the preset: these are shorter, and two iterations suffice.
 constexpr int kIterationsOfShort = 2;
 
-/// A state beyond this is none that a step has left: places, and the way of a step, of which none is over 60 mm [m].
+/// Bounds of a state that a step can have left [m]: coordinates, and the movement in a step, which never exceeds 60 mm.
 constexpr float kMostCoordinate_m = 10.0f, kMostTravel_m = 0.1f;
 
-float AngleBetween(const Quatf& a, const Quatf& b) { return 2.0f * std::acos(std::min(1.0f, std::abs(a.dot(b)))); }
-
-/// From `from` towards `to`, at most `step` metres and `turn` radians.
-ToolPose Approach(const ToolPose& from, const ToolPose& to, float step, float turn) {
-  const float far = (to.p_WT - from.p_WT).norm() / step;
-  const float round = AngleBetween(from.q_WT, to.q_WT) / turn;
-  const float part = 1.0f / std::max({1.0f, far, round});
-  if (part == 1.0f) {
-    return to;
-  }
-  ToolPose pose = Interpolate(from, to, part);
-  pose.jaw_rad = to.jaw_rad;
-  return pose;
-}
-
 }  // namespace
-
-bool TissueSimulation::ToolTrack::moved() const {
-  return (now.p_WT - last.p_WT).norm() > kToolStill || now.q_WT.coeffs() != last.q_WT.coeffs() ||
-         now.jaw_rad != last.jaw_rad;
-}
 
 TissueSimulation::TissueSimulation(const SceneView& scene, int threads, InstructionSet set)
     : scene_(scene),
@@ -64,15 +43,15 @@ TissueSimulation::TissueSimulation(const SceneView& scene, int threads, Instruct
       implicit_.emplace(scene, elastic, model_, &particles_, threads, implicit::KernelsFor(set));
       effort_ = implicit::EffortOf(scene.physics.preset);
       most_substeps_ = std::max(kMostSubsteps, effort_.substeps);
-      contacts_.SetComplianceSolver(&answers_);
+      contacts_.SetComplianceSolver(&implicit_compliance_);
     }
     held_places_.reserve(particles_.particle_count());
     rows_.reserve(kMaxTools * ToolCollision::kMaxRows + TissueCollision::kMaxRows);
   }
 }
 
-bool TissueSimulation::Answers::Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) {
-  if ((simulation_->steps_ + probe.tool * kAskEvery / 2) % kAskEvery != 0) {
+bool TissueSimulation::ImplicitCompliance::Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) {
+  if ((simulation_->steps_ + probe.tool * kQueryEvery / 2) % kQueryEvery != 0) {
     return false;
   }
   at_.clear();
@@ -83,43 +62,7 @@ bool TissueSimulation::Answers::Stiffness(const Probe& probe, float horizon_s, f
   return simulation_->implicit_->Stiffness({at_, probe.direction, horizon_s, memory}, newton_per_m);
 }
 
-void TissueSimulation::FollowTools(const std::array<ToolInput, kMaxTools>& tools) {
-  const float dt = scene_.physics.dt_s;
-  for (std::size_t i = 0; i < kMaxTools; ++i) {
-    ToolTrack& track = tracks_[i];
-    const bool appears = tools[i].present && !track.present;
-    track.present = tools[i].present;
-    if (!track.present) {
-      continue;
-    }
-    track.last = appears ? tools[i].pose : track.now;
-    track.now = Approach(track.last, tools[i].pose, kMaxToolSpeed * dt, kMaxToolTurn * dt);
-  }
-}
-
-void TissueSimulation::UpdateGrasps() {
-  for (std::size_t i = 0; i < kMaxTools; ++i) {
-    const ToolTrack& track = tracks_[i];
-    if (track.present) {
-      grasps_[i].Update(scene_.tools[i], track.now, model_, &particles_);
-    } else if (grasps_[i].holding()) {
-      grasps_[i].Release(model_, &particles_);
-    }
-  }
-}
-
-void TissueSimulation::FindContacts(bool tissue_moved, float tissue_step) {
-  std::array<ToolCollision::ToolMotion, kMaxTools> motions;
-  for (std::size_t i = 0; i < kMaxTools; ++i) {
-    if (tracks_[i].present) {
-      motions[i] = {ShapeOf(scene_.tools[i], tracks_[i].last), ShapeOf(scene_.tools[i], tracks_[i].now),
-                    grasps_[i].holding(), tracks_[i].now.jaw_rad < tracks_[i].last.jaw_rad};
-    }
-  }
-  collision_.FindPairs(motions, tissue_moved, tissue_step);
-}
-
-/// Of tissue with itself and its surroundings, for the step that leads to the present time.
+/// Contacts of tissue with tissue and its surroundings, for the step that ends at the present time.
 void TissueSimulation::FindTissueContacts() { tissue_collision_.FindPairs(moved_, step_begin_s(), simulated_time_s()); }
 
 StepReport TissueSimulation::StepPaper() {
@@ -145,7 +88,7 @@ StepReport TissueSimulation::StepPaper() {
   return report;
 }
 
-/// Places of all that is held, at part u of the step.
+/// Positions of the held particles at part u of the step.
 void TissueSimulation::PlaceHeld(float u) {
   held_places_.clear();
   for (std::size_t i = 0; i < kMaxTools; ++i) {
@@ -158,7 +101,7 @@ void TissueSimulation::PlaceHeld(float u) {
   }
 }
 
-/// Pairs of tools and tissue and of tissue with itself, for substeps of h.
+/// Contacts of tools with tissue and of tissue with tissue, for substeps of h.
 void TissueSimulation::FindAllContacts(float h) {
   if (!implicit_) {
     FindContacts(true, largest_speed_ * h);
@@ -166,7 +109,7 @@ void TissueSimulation::FindAllContacts(float h) {
     return;
   }
   tissue_collision_.BeginPairs(moved_, step_begin_s(), simulated_time_s());
-  // Those of the tools and of each part of a surface know nothing of one another.
+  // The tasks are independent: one for the tools and one for each part of a surface.
   const int tasks = tissue_collision_.tasks();
   implicit_->workers().Run(tasks + 1, 0, 1, [&](int task, int) {
     if (task < tasks) {
@@ -181,7 +124,7 @@ StepReport TissueSimulation::StepXpbd() {
   StepReport report;
   const auto substeps = static_cast<float>(scene_.physics.substeps);
   const float h = scene_.physics.dt_s / substeps;
-  // Previous places are those a substep ago; movement is at most that of the fastest.
+  // Previous positions are those of the last substep, so the movement in a step is bounded by the largest speed.
   moved_.assign(particles_.block_count(), largest_speed_ * scene_.physics.dt_s);
   FindAllContacts(h);
   float largest_sq = 0;
@@ -210,20 +153,20 @@ StepReport TissueSimulation::StepXpbd() {
   return report;
 }
 
-/// The linearised solve of a substep is only good for a small part of a cell: a tool that presses and moves by more in
-/// one gets forces that jump about by more than the force itself.
+/// The linearised solve of a substep is valid for a movement by a small part of a cell. With a longer path of a
+/// pressing tool the force oscillates by more than its own size.
 int TissueSimulation::SubstepsForTools() const {
-  float way = 0;
+  float path = 0;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     if (tracks_[i].present && !grasps_[i].holding() && collision_.force(i) != Vec3f::Zero()) {
-      way = std::max(way, (tracks_[i].now.p_WT - tracks_[i].last.p_WT).norm());
+      path = std::max(path, (tracks_[i].now.p_WT - tracks_[i].last.p_WT).norm());
     }
   }
-  if (way == 0.0f) {
+  if (path == 0.0f) {
     return effort_.substeps;
   }
-  const int good = std::min(static_cast<int>(std::ceil(way / kGoodWayPerSubstep)), kGoodSubsteps);
-  const int needed = std::max(static_cast<int>(std::ceil(way / kWayPerSubstep)), good);
+  const int fine = std::min(static_cast<int>(std::ceil(path / kFinePathPerSubstep)), kFineSubsteps);
+  const int needed = std::max(static_cast<int>(std::ceil(path / kMaxPathPerSubstep)), fine);
   return std::clamp(needed, std::max(effort_.substeps, kLeastSubsteps), most_substeps_);
 }
 
@@ -279,19 +222,19 @@ StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools)
   UpdateGrasps();
   const bool holds = grasps_[0].holding() || grasps_[1].holding();
   asleep_ = asleep_ && !held && !holds;
-  if (MayRest()) {
+  if (StaysAsleep()) {
     return {true, 0.0f, 0};
   }
   ++state_version_;
   const StepReport report = implicit_ ? StepAccurate() : xpbd_ ? StepXpbd() : StepPaper();
   quarantined_ += report.resets;
   WatchTears(report.max_step_m);
-  MayFallAsleep(report, holds);
+  UpdateSleep(report, holds);
   return report;
 }
 
-/// Movements in mode accurate are those of the step before, by blocks of particles: a step late, far below what lies
-/// between near tearing and tearing.
+/// In mode accurate the movements by blocks of particles are those of the last step. The delay of a step is far below
+/// the time from near tearing (TearWatch::kNear) to tearing.
 void TissueSimulation::WatchTears(float max_step_m) {
   const auto rows = scene_.membrane.rows;
   if (implicit_) {
@@ -341,7 +284,7 @@ bool TissueSimulation::SetOpenCells(const OpenCells& cells) {
     return false;
   }
   collision_.SetOpenCells(cells);
-  // A tool that rests against what has gone is to move on.
+  // A tool that rests against removed cells can move on.
   asleep_ = false;
   still_steps_ = 0;
   return true;
@@ -361,7 +304,7 @@ CauteryContact TissueSimulation::Cautery(std::uint32_t tool) {
   return cautery_.Update(tool, tracks_[tool].now, collision_);
 }
 
-/// body(part, worker) for each of ParticleStore::kParts, shared by the threads that a solver has.
+/// body(part, worker) for each of ParticleStore::kParts, on the threads of the solver if it has any.
 template <class Body>
 void TissueSimulation::InParts(const Body& body) const {
   if (implicit_) {
@@ -381,17 +324,17 @@ float TissueSimulation::MaxDisplacement() const {
       return static_cast<Index>(std::uint64_t{count} * static_cast<unsigned>(at) / ParticleStore::kParts);
     };
     float largest = 0;
-    const auto look = [&](ParticleRef at, Index particle) {
+    const auto measure = [&](ParticleRef at, Index particle) {
       largest = std::max(largest, (particles_.At(at) - scene_.rest_position[particle]).squaredNorm());
     };
     for (Index v = cut(particles_.tube_count(), part); v < cut(particles_.tube_count(), part + 1); ++v) {
-      look({4 * v, 1}, v);
+      measure({4 * v, 1}, v);
     }
     for (Index row = cut(scene_.membrane.rows, part); row < cut(scene_.membrane.rows, part + 1); ++row) {
       for (Index col = 0; col < cols; ++col) {
         const Index node = row * cols + col;
         if (model_.NodeAlive(node) && !model_.IsDebris(node)) {
-          look(particles_.NodeRef(row, col), first + node);
+          measure(particles_.NodeRef(row, col), first + node);
         }
       }
     }
@@ -440,7 +383,7 @@ SimulationMemory TissueSimulation::Save() const {
 bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float> previous_xyz,
                                const SimulationMemory& memory) {
   const std::size_t floats = 3 * std::size_t{particles_.particle_count()};
-  // False for NaN. Not only what is not finite: squares of what is far away are not, and velocities come from
+  // False for NaN. Finite values are bounded too: squares of large coordinates overflow, and velocities are
   // differences.
   const auto near = [](float a, float b, float limit) { return std::abs(a - b) <= limit; };
   const auto within = [](std::span<const float> values) {

@@ -1,4 +1,4 @@
-// When all of the tissue falls asleep, and what wakes it.
+// Sleep of the whole tissue: conditions for falling asleep and for waking.
 #include <algorithm>
 
 #include "physics_node/simulation/tissue_simulation.h"
@@ -6,10 +6,11 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Tissue that moves less than this per step (0.1 mm/s at 100 Hz), for so many steps, is at rest.
+/// Movement in a step below which tissue is still [m], 0.1 mm/s at 100 Hz, and the number of such steps until it
+/// sleeps.
 constexpr float kStill = 1e-6f;
 constexpr int kStillSteps = 50;
-/// And so is what moves less than this, for fewer steps: tissue at rest moves by rounding alone [m].
+/// Movement below which fewer steps suffice [m]: tissue at rest moves only by rounding.
 constexpr float kAtRest = 1e-7f;
 constexpr int kRestSteps = 10;
 
@@ -20,8 +21,8 @@ bool TissueSimulation::ToolsMove() const {
                      [](const ToolTrack& track) { return track.present && track.moved(); });
 }
 
-/// Asleep: what breathes has come near the tissue.
-bool TissueSimulation::BreathStirs() {
+/// For sleeping tissue: a breathing surface has come near it.
+bool TissueSimulation::BreathingReachesTissue() {
   if (!(scene_.breathing.amplitude_m > 0.0f) || scene_.physics.mode == PhysicsMode::kPaper) {
     return false;
   }
@@ -30,9 +31,10 @@ bool TissueSimulation::BreathStirs() {
   return tissue_collision_.breath_near();
 }
 
-/// Asleep: a tool comes to touch the tissue in this step. Where contacts are rows, one that is merely near does not: a
-/// jaw that closes around tissue, a tip that hovers over it.
-bool TissueSimulation::ToolsStir() {
+/// For sleeping tissue: a tool touches it in this step. In mode accurate it must violate a contact row, so that a jaw
+/// that closes around tissue, or a tip that hovers over it, does not wake it; in the other modes a tool near it
+/// suffices.
+bool TissueSimulation::ToolsTouchTissue() {
   if (!implicit_) {
     return !collision_.pairs().empty();
   }
@@ -42,22 +44,22 @@ bool TissueSimulation::ToolsStir() {
   });
 }
 
-/// True while the tissue sleeps and nothing stirs it.
-bool TissueSimulation::MayRest() {
+/// Wakes the tissue if a tool or a breathing surface reaches it. True: it stays asleep.
+bool TissueSimulation::StaysAsleep() {
   if (!asleep_) {
     return false;
   }
   if (ToolsMove()) {
     const bool touched = collision_.any_touching();
     FindContacts(false);
-    asleep_ = !touched && !ToolsStir();
+    asleep_ = !touched && !ToolsTouchTissue();
   }
-  asleep_ = asleep_ && !BreathStirs();
+  asleep_ = asleep_ && !BreathingReachesTissue();
   return asleep_;
 }
 
-/// After a step: nothing has moved for a while, and nothing works on it.
-void TissueSimulation::MayFallAsleep(const StepReport& report, bool holds) {
+/// After a step: the tissue falls asleep after kStillSteps still steps without grasp or moving contact.
+void TissueSimulation::UpdateSleep(const StepReport& report, bool holds) {
   const bool worked_on = ToolsMove() && (implicit_ ? collision_.any_touching() : !collision_.pairs().empty());
   still_steps_ = report.max_step_m < kStill && !holds && !worked_on && !tissue_collision_.breath_near()
                      ? still_steps_ + (report.max_step_m < kAtRest ? kStillSteps / kRestSteps : 1)
