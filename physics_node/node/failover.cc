@@ -11,17 +11,17 @@
 namespace fulcrum::physics {
 
 Failover::Failover(const SceneView& scene, MakeNode make, bus::Input<TickManifest>& manifests,
-                   std::filesystem::path others_checkpoint, bool follows, std::int64_t epoch_ns)
+                   std::filesystem::path peer_checkpoint, bool follows, std::int64_t epoch_ns)
     : scene_(scene),
       make_(std::move(make)),
-      others_checkpoint_(std::move(others_checkpoint)),
+      peer_checkpoint_(std::move(peer_checkpoint)),
       pair_(manifests, NodeId::kPhysics, !follows, static_cast<std::uint64_t>(epoch_ns)),
       leads_(!follows) {
   make_(follows, &node_);
 }
 
 void Failover::Step(const Tick& tick) {
-  const bool other_holds = !leads_.load(std::memory_order_relaxed) && runtime::IsInUse(others_checkpoint_);
+  const bool other_holds = !leads_.load(std::memory_order_relaxed) && runtime::IsInUse(peer_checkpoint_);
   switch (pair_.Update(tick.stamp_ns, other_holds)) {
     case Pair::Role::kFollows:
       node_->Follow(tick);
@@ -39,7 +39,7 @@ void Failover::Step(const Tick& tick) {
 }
 
 void Failover::TakeOver(const Tick& tick) {
-  const auto left = runtime::CheckpointFile::Peek(others_checkpoint_, scene_.hash, kCheckpointLayout,
+  const auto left = runtime::CheckpointFile::Peek(peer_checkpoint_, scene_.hash, kCheckpointLayout,
                                                   CheckpointCapacity(static_cast<Index>(scene_.rest_position.size())));
   const bool restored = node_->TakeOver(left ? std::span<const std::byte>(*left) : std::span<const std::byte>(), tick);
   leads_.store(true, std::memory_order_relaxed);
@@ -49,8 +49,8 @@ void Failover::TakeOver(const Tick& tick) {
                    (restored ? "from the newest checkpoint" : "from the beginning: there is no checkpoint"));
 }
 
-/// Nothing of what this process has computed since the other one took over was read. To take over again its node must
-/// be as one that has just started.
+/// Nothing that this process computed since the other one took over was read. To take over again it needs a node in the
+/// state of a new process.
 void Failover::Retire() {
   const std::lock_guard lock(replacing_);
   leads_.store(false, std::memory_order_relaxed);

@@ -15,19 +15,19 @@ namespace fulcrum::physics {
 
 class Failover {
  public:
-  /// Makes a node that leads from its checkpoint, or one that follows.
+  /// Makes a node that leads, from its checkpoint, or one that follows.
   using MakeNode = std::function<void(bool follows, std::optional<PhysicsNode>* node)>;
 
-  /// @param others_checkpoint file of the other process, which holds it locked while it lives.
+  /// @param peer_checkpoint file of the other process, locked while that runs.
   /// @param epoch_ns of this process.
   Failover(const SceneView& scene, MakeNode make, bus::Input<TickManifest>& manifests,
-           std::filesystem::path others_checkpoint, bool follows, std::int64_t epoch_ns);
+           std::filesystem::path peer_checkpoint, bool follows, std::int64_t epoch_ns);
 
   /// One period. Always called by the same thread.
   void Step(const Tick& tick);
-  /// Any thread. A process that follows is waiting.
+  /// Any thread. The state of a following process is kWaiting.
   void FillHealth(Health* health);
-  /// It leads from a checkpoint.
+  /// The node continues from a checkpoint.
   [[nodiscard]] bool restored() const { return node_->restored(); }
 
  private:
@@ -36,10 +36,10 @@ class Failover {
 
   const SceneView& scene_;
   MakeNode make_;
-  const std::filesystem::path others_checkpoint_;
+  const std::filesystem::path peer_checkpoint_;
   Pair pair_;
   std::atomic<bool> leads_;
-  std::mutex replacing_;  ///< Of the node, against the thread of FillHealth.
+  std::mutex replacing_;  ///< Protects the replacement of the node against FillHealth.
   std::optional<PhysicsNode> node_;
 };
 

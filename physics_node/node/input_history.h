@@ -1,5 +1,5 @@
-// The samples of one input around a moment, so that a step takes what was true then and not what happened to arrive
-// last.
+// The samples of one input around a point in time, so that a step uses those that were valid then instead of those that
+// arrived last.
 #pragma once
 
 #include <cstddef>
@@ -19,22 +19,22 @@ class InputHistory {
   /// Reads everything that has arrived.
   void Take(bus::Input<T>* port) {
     while (port->TakeNext(&sample_)) {
-      // A writer that was started anew goes on with the clock; what is older than the newest came from its predecessor.
+      // A restarted writer continues with the clock; a sample older than the newest one is of its predecessor.
       if (!samples_.empty() && sample_.stamp.stamp_ns <= samples_.back().stamp.stamp_ns) continue;
       samples_.push_back(sample_);
       if (samples_.size() > kInputHistory) samples_.pop_front();
     }
   }
 
-  /// Forgets what no moment from `ns` on needs: all before the newest sample that is not later than it.
-  void Forget(std::int64_t ns) {
+  /// Drops the samples that are not needed from `ns` on: all before the newest one that is not later than `ns`.
+  void DropBefore(std::int64_t ns) {
     while (samples_.size() > 1 && samples_[1].stamp.stamp_ns <= ns) samples_.pop_front();
   }
 
   [[nodiscard]] bool empty() const { return samples_.empty(); }
-  /// After Forget(ns): the newest sample that is not later than ns, or the first one there is. @pre not empty.
+  /// After DropBefore(ns): the newest sample that is not later than ns, else the first sample. @pre not empty.
   [[nodiscard]] const T& before() const { return samples_.front(); }
-  /// The one after that; none: nullptr.
+  /// The sample after that; nullptr: none.
   [[nodiscard]] const T* after() const { return samples_.size() > 1 ? &samples_[1] : nullptr; }
 
  private:

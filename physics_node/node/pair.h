@@ -1,4 +1,4 @@
-// Two processes of one node: one leads, the other follows and takes over when the leader falls silent.
+// Two processes of one node: one leads, the other follows and takes over after a timeout of the leader's manifests.
 #pragma once
 
 #include <cstdint>
@@ -8,14 +8,14 @@
 
 namespace fulcrum::physics {
 
-/// Who leads is told by the TickManifests on the bus. Each process that leads has an epoch of its own, and the higher
-/// one leads: of two that believe to lead, the one that began later goes on, and readers take nothing from the other
-/// any more (services/transport/bus: an epoch that is past is refused).
+/// The TickManifests on the bus identify the leader. Each leading process has its own epoch, and the highest epoch
+/// leads: of two processes that both lead, the one that began later continues, and readers refuse the samples of the
+/// other (services/transport/bus: a past epoch is refused).
 class Pair {
  public:
   enum class Role : std::uint8_t {
     kFollows,
-    kTakesOver,  ///< The leader is gone, or has been silent for too long: from this tick on this process leads.
+    kTakesOver,  ///< The leader has exited or timed out: from this tick on this process leads.
     kLeads,
     kRetires  ///< Another process has taken over: from now on this one follows.
   };
@@ -24,16 +24,16 @@ class Pair {
   Pair(bus::Input<TickManifest>& manifests, NodeId node, bool leads, std::uint64_t own_epoch)
       : manifests_(manifests), node_(node), role_(leads ? Role::kLeads : Role::kFollows), own_epoch_(own_epoch) {}
 
-  /// Once in each tick, before anything else.
-  /// @param other_holds the other process holds its checkpoint. The kernel takes it from it when it dies, so one that
-  ///   held it and no longer does is gone, whatever the deadline.
+  /// Once in each tick, before all other stages.
+  /// @param other_holds the other process holds the lock of its checkpoint. The kernel releases the lock of a process
+  ///   that exits, so a leader that held it and no longer does has exited, independent of the deadline.
   [[nodiscard]] Role Update(std::int64_t now_ns, bool other_holds);
   /// Of the manifests since kTakesOver.
   [[nodiscard]] std::uint64_t own_epoch() const { return own_epoch_; }
 
-  /// A leader that has said nothing for so long is taken for dead: three and a half periods of 10 ms [ns].
+  /// Timeout of the leader's manifests [ns]: three and a half periods of 10 ms.
   static constexpr std::int64_t kDeadline_ns = 35'000'000;
-  /// So long a process that follows waits for the first word of a leader [ns].
+  /// Timeout of a following process for the first manifest of a leader [ns].
   static constexpr std::int64_t kLongestStart_ns = 500'000'000;
 
  private:
@@ -42,9 +42,10 @@ class Pair {
   Role role_;
   std::uint64_t own_epoch_;
   std::uint64_t leader_epoch_ = 0;
-  std::uint64_t holder_epoch_ = 0;  ///< Of the newest leader that was seen to hold its checkpoint.
-  std::int64_t heard_ns_ = 0;       ///< When the leader was last heard, or can have been; 0: not yet updated.
-  std::int64_t looked_ns_ = 0;      ///< Last Update().
+  std::uint64_t holder_epoch_ = 0;  ///< Of the newest leader that held its checkpoint.
+  std::int64_t received_ns_ =
+      0;                         ///< Last manifest of the leader, or end of an own pause; 0: before the first Update().
+  std::int64_t updated_ns_ = 0;  ///< Last Update().
   TickManifest manifest_;
 };
 

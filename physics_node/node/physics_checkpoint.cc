@@ -32,11 +32,11 @@ struct Header {
 // Followed by positions, previous positions (3 floats a particle each), then the held particles tool by tool,
 // then the bits of the torn edges.
 
-// Beyond what a tool does: no session sees them.
+// Bounds of plausible values, beyond those of any session.
 constexpr float kMostCoordinate_m = 10;
 constexpr float kMostJaw_rad = 3;
-constexpr float kUnitTolerance = 1e-3f;
-constexpr std::uint64_t kMostSteps = 1'000'000'000;  // Months.
+constexpr float kUnitTolerance = 1e-3f;              ///< Of the squared norm of a quaternion, far above rounding.
+constexpr std::uint64_t kMostSteps = 1'000'000'000;  ///< About four months at 100 Hz.
 
 bool IsPlausible(const ToolRecord& tool) {
   const auto within = [](float value, float limit) { return std::abs(value) <= limit; };  // false for NaN
@@ -53,7 +53,7 @@ std::size_t PositionsBytes(Index particles) { return 3 * sizeof(float) * std::si
 }  // namespace
 
 std::size_t CheckpointCapacity(Index particle_count) {
-  // No more edges than three a particle.
+  // At most three edges per particle.
   return sizeof(Header) + 2 * PositionsBytes(particle_count) + (3 * std::size_t{particle_count} + 7) / 8 +
          kMaxTools * sizeof(HeldRecord) * std::size_t{particle_count};
 }

@@ -10,23 +10,27 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Between two checkpoints, between two measurements of the displacement, and between two frames while nothing moves
-/// (a renderer that has just come must still get one) [ticks].
+/// Interval of checkpoints, of measurements of the displacement, and of frames without movement, which a renderer that
+/// starts late needs [ticks].
 constexpr std::uint64_t kSlowTicks = 10;
-/// A tool that a live haptics node no longer knows is taken away after so long [ticks of ToolState].
+/// Number of ToolStates without a tool after which the tool is removed.
 constexpr int kAbsentTicks = 100;
-/// After so long in time a cheaper preset gives way to the next dearer one [ticks].
+/// Time without skipped periods after which the next dearer preset is set again [ticks].
 constexpr int kRecoveryTicks = 200;
-/// A process that was started again waits for tools and handles, but no longer than this [ns].
+/// Longest wait of a restarted process for tools and handles [ns].
 constexpr std::int64_t kWaitNs = 100'000'000;
-/// After a restart the tools go from where they last were for the tissue to where they are now in this time [s], and
-/// the contact is dated accordingly: what happened during the outage happens faster, and no tool goes through tissue
-/// that it was pushing. Not after a longer outage [s], nor farther than this [m].
+/// After a restart the tools move from their last poses for the tissue to their present ones in this time [s], with the
+/// contact dated accordingly: the motion of the outage is repeated at a higher speed, and no tool passes through tissue
+/// that it was pushing. Not after a longer outage [s], nor over a longer distance [m].
 constexpr float kCatchUp_s = 0.4f, kLongestOutage_s = 0.8f, kCatchUpMost_m = 0.01f;
-/// A session time of k dt in double may be this much less than k dt: 0.29 / 0.01 < 29 [ticks].
+/// Rounding error of session time / dt in double [ticks]: 0.29 / 0.01 < 29.
 constexpr double kRoundingTicks = 1e-6;
-/// Health, which goes out ten times a second, warns of a limited force for so long [ticks].
+/// Duration of Health's warning of a limited force [ticks]; Health is published ten times a second.
 constexpr std::uint64_t kWarnTicks = 100;
+/// Largest jaw angle of an input [rad]: beyond the opening of any instrument.
+constexpr float kMaxJaw_rad = 1.6f;
+/// Share of the limit from which on a force counts as limited, where the low-pass filter only approaches it.
+constexpr float kFilteredCapShare = 0.99f;
 
 std::uint32_t FindHook(const SceneView& scene) {
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
@@ -52,7 +56,7 @@ PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::Ch
       manifest_stamper_(epoch_ns),
       hook_(FindHook(scene)) {
   for (ToolInput& input : inputs_) {
-    // Until a handle speaks, jaws neither grasp nor let go.
+    // Until the first HandleState, between the angles for closing and opening: jaws neither grasp nor release.
     input.pose.jaw_rad = 0.5f * (scene.physics.grasp_close_rad + scene.physics.grasp_open_rad);
   }
   if (checkpoint_ == nullptr || follows) {
@@ -83,7 +87,7 @@ bool PhysicsNode::Restore(std::span<const std::byte> checkpoint) {
 
 void PhysicsNode::Follow(const Tick& tick) {
   last_index_ = tick.index;
-  // What they say is not applied before this process leads: it then goes the way of one that has just started.
+  // Inputs are not applied before this process leads; from then on it behaves as a new process.
   tool_states_.Take(&ports_.tools);
   handle_states_.Take(&ports_.handles);
   topology_waits_ |= ports_.topology.TakeLatest(&topology_state_);
@@ -105,7 +109,7 @@ void PhysicsNode::TakeTools(std::int64_t now_ns) {
     contact_time_s_ = step_time_s_;
     return;
   }
-  tool_states_.Forget(now_ns);
+  tool_states_.DropBefore(now_ns);
   const ToolState& before = tool_states_.before();
   const ToolState& after = tool_states_.after() != nullptr ? *tool_states_.after() : before;
   const std::int64_t begin = before.stamp.stamp_ns, end = after.stamp.stamp_ns;
@@ -139,11 +143,11 @@ void PhysicsNode::CatchUp(const std::array<ToolInput, kMaxTools>& last) {
     contact_time_s_ = step_time_s_;
     return;
   }
-  // Evenly: what is behind now, and what is added to it until then.
+  // Equal parts of the present delay and of the time that passes until the last of these steps.
   const double dt = static_cast<double>(scene_.physics.dt_s), steps = catch_up_steps_--;
-  const double way_s = std::min(behind_s, (behind_s + (steps - 1) * dt) / steps);
-  const auto share = static_cast<float>(way_s / behind_s);
-  contact_time_s_ += way_s;
+  const double advance_s = std::min(behind_s, (behind_s + (steps - 1) * dt) / steps);
+  const auto share = static_cast<float>(advance_s / behind_s);
+  contact_time_s_ += advance_s;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolPose &from = last[i].pose, &to = inputs_[i].pose;
     if (inputs_[i].present && last[i].present && (to.p_WT - from.p_WT).norm() < kCatchUpMost_m) {
@@ -156,20 +160,20 @@ void PhysicsNode::TakeHandles(std::int64_t now_ns) {
   if (handle_states_.empty()) {
     return;
   }
-  handle_states_.Forget(now_ns);
+  handle_states_.DropBefore(now_ns);
   const HandleState& state = handle_states_.before();
   handle_stamp_ = state.stamp;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const HandleSample& handle = state.handles[i];
     if (handle.present && handle.quality > 0.0f) {
-      inputs_[i].pose.jaw_rad = std::clamp(handle.jaw_angle_rad, 0.0f, 1.6f);
+      inputs_[i].pose.jaw_rad = std::clamp(handle.jaw_angle_rad, 0.0f, kMaxJaw_rad);
     }
   }
 }
 
 void PhysicsNode::TakeInputs(const Tick& tick) {
-  // The step stands for session time k dt, whenever within its period the thread was woken: the same hand gives the
-  // same poses on a busy machine. One that is woken in the next period is still its own: k goes on by whole periods.
+  // The step stands for session time k dt, independent of the time within the period at which the thread woke: equal
+  // hands give equal poses on a busy machine. k advances by whole periods, also if the thread wakes in the next one.
   double step_s = tick.session_time_s;
   if (tick.dt_s > 0) {
     const double latest = std::floor(tick.session_time_s / tick.dt_s + kRoundingTicks);
@@ -200,10 +204,9 @@ void PhysicsNode::TakeInputs(const Tick& tick) {
   }
 }
 
-/// A skipped period means that the step before ran late: go on with a cheaper preset, for a while. The first step looks
-/// at everything for the first time and says nothing about the next. A replay skips the
-/// periods that were skipped then: it does not depend on its machine.
-void PhysicsNode::MindTheTime(const Tick& tick) {
+/// A skipped period means that the last step ran late: a cheaper preset is set for some time. The first step, which
+/// initialises the caches, does not count. A replay skips the recorded periods, so it does not depend on its machine.
+void PhysicsNode::AdaptPreset(const Tick& tick) {
   const bool late = ticks_ > 1 && tick.index > last_index_ + 1;
   periods_ = tick.index > last_index_ ? tick.index - last_index_ : 1;
   last_index_ = tick.index;
@@ -217,7 +220,7 @@ void PhysicsNode::MindTheTime(const Tick& tick) {
 }
 
 void PhysicsNode::Step(const Tick& tick) {
-  MindTheTime(tick);
+  AdaptPreset(tick);
   TakeInputs(tick);
   const StepReport report = simulation_.Step(inputs_);
   asleep_ticks_.fetch_add(report.asleep ? 1 : 0, std::memory_order_relaxed);
@@ -225,8 +228,8 @@ void PhysicsNode::Step(const Tick& tick) {
   PublishCautery(tick);
   PublishFrame(tick);
   Measure();
-  // The manifest first: a replay finds every tick that a checkpoint holds, and sees from the next process's first state
-  // whether the last one reached its checkpoint.
+  // The manifest before the checkpoint: a replay finds every tick that a checkpoint contains, and the first state of
+  // the next process shows whether the last one wrote its checkpoint.
   PublishManifest(tick);
   SaveCheckpoint();
   PublishTears(tick);
@@ -234,7 +237,7 @@ void PhysicsNode::Step(const Tick& tick) {
 }
 
 void PhysicsNode::PublishContacts(const Tick& tick) {
-  // Unless the solver tells the forces, slip needs them, too.
+  // Without readers only where the solver provides the forces: otherwise slip needs those of the contact probe.
   if (scene_.physics.mode == PhysicsMode::kAccurate && !ports_.contacts.has_readers()) {
     for (std::uint32_t i = 0; i < kMaxTools; ++i) {
       force_N_[i].store(simulation_.solver_force(i).norm(), std::memory_order_relaxed);
@@ -246,7 +249,7 @@ void PhysicsNode::PublishContacts(const Tick& tick) {
     model.devices[i] = simulation_.Contacts(i);
     force_N_[i].store(simulation_.force(i).norm(), std::memory_order_relaxed);
   }
-  // The servo dates the model by the tool sample: without one there is nothing to say.
+  // The servo dates the model by the tool sample, so there is no model without one.
   if (tool_before_.sequence == 0 || !ports_.contacts.has_readers()) {
     return;
   }
@@ -258,7 +261,7 @@ void PhysicsNode::PublishContacts(const Tick& tick) {
 }
 
 void PhysicsNode::PublishCautery(const Tick& tick) {
-  // While it waits it does not know the pose; a sample without contact would leave a bridge in the slit.
+  // While waiting after a restart the pose is unknown; a sample without contact would leave a bridge in the slit.
   if (hook_ == kMaxTools || waits_ || !ports_.cautery.has_readers()) {
     return;
   }
@@ -329,10 +332,10 @@ void PhysicsNode::Measure() {
   largest_stretch_.store(simulation_.tears().largest_stretch_ever(), std::memory_order_relaxed);
   std::uint32_t limited = 0;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
-    const bool asks = scene_.physics.mode == PhysicsMode::kAccurate;
-    const float force = (asks ? simulation_.solver_force(i) : simulation_.force(i)).norm();
-    // Forces that do not come from the solver have been limited and smoothed already.
-    if (force >= (asks ? ContactProbe::kForceCap_N : 0.99f * ContactProbe::kForceCap_N)) {
+    const bool from_solver = scene_.physics.mode == PhysicsMode::kAccurate;
+    const float force = (from_solver ? simulation_.solver_force(i) : simulation_.force(i)).norm();
+    // Forces of the contact probe are limited before its low-pass filter.
+    if (force >= (from_solver ? ContactProbe::kForceCap_N : kFilteredCapShare * ContactProbe::kForceCap_N)) {
       limited_until_[i] = ticks_ + kWarnTicks;
     }
     limited |= limited_until_[i] > ticks_ ? 1u << i : 0u;
@@ -359,10 +362,10 @@ void PhysicsNode::SaveCheckpoint() {
   checkpoint_->Commit(WriteCheckpoint(simulation_, {max_displacement_m_, contact_time_s_}, checkpoint_->Begin()));
 }
 
-/// After the checkpoint: who has read of a tear can rely on it to survive this process.
+/// After the checkpoint, so that a published tear survives this process.
 void PhysicsNode::PublishTears(const Tick& tick) {
   const TearWatch& tears = simulation_.tears();
-  if (tears.torn_count() == told_tears_) {
+  if (tears.torn_count() == published_tears_) {
     return;
   }
   tear_state_.stamp = tear_stamper_.Next(tick.stamp_ns);
@@ -370,9 +373,9 @@ void PhysicsNode::PublishTears(const Tick& tick) {
   tear_state_.rows = scene_.membrane.rows;
   tear_state_.cols = scene_.membrane.cols;
   tear_state_.torn_edges.assign(tears.torn().begin(), tears.torn().end());
-  // Tried again in the next tick when it could not be sent.
+  // Repeated in the next tick if it was not sent.
   if (ports_.tears.Write(tear_state_)) {
-    told_tears_ = tears.torn_count();
+    published_tears_ = tears.torn_count();
   }
 }
 

@@ -33,34 +33,34 @@ class PhysicsNode {
     bus::Output<TickManifest>& manifests;
   };
 
-  /// Scene, ports and checkpoint must outlive the node. Goes on from the checkpoint when it holds something.
-  /// @param checkpoint null: nothing is kept.
+  /// Scene, ports and checkpoint must outlive the node. Continues from the checkpoint if it has a state.
+  /// @param checkpoint null: no state is kept.
   /// @param epoch_ns CLOCK_MONOTONIC at the start of the process [ns].
-  /// @param threads that share a step; the state does not depend on it.
-  /// @param follows begins with Follow(), and looks at the checkpoint in TakeOver() only.
+  /// @param threads for a step; the state does not depend on their number.
+  /// @param follows begins with Follow(), and reads the checkpoint only in TakeOver().
   PhysicsNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint, std::int64_t epoch_ns,
               int threads = 1, bool follows = false);
 
   /// One period. @pre called by one thread.
   void Step(const Tick& tick);
 
-  /// Whether the threads beside the caller's help in the next steps; they do from the start.
+  /// Enables the threads beside the caller's for the next steps; they are enabled at the start.
   void LetThreadsHelp(bool help) { simulation_.LetThreadsHelp(help); }
 
-  /// In the place of Step() while another process leads: keeps the newest inputs and publishes nothing.
+  /// In place of Step() while another process leads: stores the newest inputs and publishes nothing.
   void Follow(const Tick& tick);
-  /// From now on this process leads: goes on from the other's checkpoint (may be empty) or its own, whichever is newer.
-  /// False: there is neither. Before the Step() of that tick, whose time is the epoch of what it publishes from now on.
+  /// From this tick on this process leads and continues from the newer one of the other's checkpoint, which can be
+  /// empty, and its own. False: there is none. Before the Step() of the tick, whose time is the epoch of its samples.
   bool TakeOver(std::span<const std::byte> other, const Tick& tick);
 
   /// Metrics and last error. Any thread.
   void FillHealth(Health* health) const;
 
-  /// Header and positions after the last Step, its own stamp apart: what a TissueFrame would tell.
+  /// Content of a TissueFrame after the last Step: header without stamp, and positions.
   void FillFrame(const Tick& tick, TissueFrame::View view) const;
 
   [[nodiscard]] const TissueSimulation& simulation() const { return simulation_; }
-  /// It went on from a checkpoint.
+  /// The node continues from a checkpoint.
   [[nodiscard]] bool restored() const { return restored_; }
 
  private:
@@ -69,7 +69,7 @@ class PhysicsNode {
   void TakeTools(std::int64_t now_ns);
   void TakeHandles(std::int64_t now_ns);
   void CatchUp(const std::array<ToolInput, kMaxTools>& last);
-  void MindTheTime(const Tick& tick);
+  void AdaptPreset(const Tick& tick);
   void PublishFrame(const Tick& tick);
   void PublishContacts(const Tick& tick);
   void PublishCautery(const Tick& tick);
@@ -87,15 +87,15 @@ class PhysicsNode {
 
   InputHistory<ToolState> tool_states_;
   InputHistory<HandleState> handle_states_;
-  Stamp tool_before_, tool_after_, handle_stamp_;  ///< Samples that the last step took.
+  Stamp tool_before_, tool_after_, handle_stamp_;  ///< Samples that the last step used.
   std::int64_t pose_ns_ = 0;                       ///< Time of the tools' poses in the last step.
-  double step_time_s_ = 0;                         ///< Session time that the last step stands for.
-  double step_ = 0;                                ///< The same in periods.
+  double step_time_s_ = 0;                         ///< Session time k dt of the last step.
+  double step_ = 0;                                ///< Its k.
   TopologyState topology_state_;
   OpenCells open_cells_;
   std::array<ToolInput, kMaxTools> inputs_;
   std::array<int, kMaxTools> absent_ticks_{};
-  bool topology_waits_ = false;  ///< Came while another process led.
+  bool topology_waits_ = false;  ///< A topology arrived while another process led.
   std::uint64_t ticks_ = 0;
   std::int64_t start_ns_ = 0;  ///< Of the first step.
   std::uint64_t last_index_ = 0;
@@ -105,16 +105,16 @@ class PhysicsNode {
   std::uint64_t frame_version_ = 0, hash_version_ = 0, saved_version_ = 0, measured_version_ = 0;
   std::uint64_t state_hash_ = 0;
   bool restored_ = false;
-  bool waits_ = false;  ///< Started again, and has not heard of tools and handles yet: the tools stay where they were.
-  int catch_up_steps_ = 0;     ///< Until the tools are where their samples say, after a restart.
-  double contact_time_s_ = 0;  ///< Session time of the tools' poses; behind step_time_s_ while they catch up.
+  bool waits_ = false;         ///< After a restart, until ToolState and HandleState arrive: the tools do not move.
+  int catch_up_steps_ = 0;     ///< After a restart: steps until the tools reach the poses of their samples.
+  double contact_time_s_ = 0;  ///< Session time of the tools' poses; less than step_time_s_ during catch-up.
   float max_displacement_m_ = 0;
   TickManifest manifest_;
   TearState tear_state_;
-  std::uint32_t told_tears_ = 0, saved_tears_ = 0;        ///< How many edges had torn then.
+  std::uint32_t published_tears_ = 0, saved_tears_ = 0;   ///< Number of torn edges then.
   std::array<std::uint64_t, kMaxTools> limited_until_{};  ///< Tick until which Health warns of a limited force.
 
-  // For the health thread. Relaxed: each figure stands for itself.
+  // For the health thread. Relaxed order: the figures are independent of each other.
   std::atomic<std::uint32_t> cheaper_{0};  ///< Presets below the scene's.
   std::atomic<float> displacement_mm_{0}, max_displacement_mm_{0}, force_N_[kMaxTools]{};
   std::atomic<std::uint32_t> grasped_{0};

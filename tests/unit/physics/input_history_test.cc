@@ -30,10 +30,10 @@ TEST_F(InputHistoryTest, GivesTheSamplesAroundAMoment) {
   EXPECT_TRUE(history_.empty());
   for (std::int64_t ns = 100; ns <= 1000; ns += 100) Send(ns);
   history_.Take(in_.get());
-  history_.Forget(450);
+  history_.DropBefore(450);
   EXPECT_EQ(Before(), 400);
   EXPECT_EQ(After(), 500);
-  history_.Forget(500);
+  history_.DropBefore(500);
   EXPECT_EQ(Before(), 500) << "one of that very moment is not later";
   EXPECT_EQ(After(), 600);
 }
@@ -41,14 +41,14 @@ TEST_F(InputHistoryTest, GivesTheSamplesAroundAMoment) {
 TEST_F(InputHistoryTest, WhatArrivesLateIsHeldUntilAnythingNewerHas) {
   Send(100);
   history_.Take(in_.get());
-  history_.Forget(250);
+  history_.DropBefore(250);
   EXPECT_EQ(Before(), 100);
   EXPECT_EQ(After(), -1);
   // The sample of 200 was on its way when the step began.
   Send(200);
   Send(300);
   history_.Take(in_.get());
-  history_.Forget(350);
+  history_.DropBefore(350);
   EXPECT_EQ(Before(), 300);
 }
 
@@ -56,7 +56,7 @@ TEST_F(InputHistoryTest, OfAMomentBeforeTheFirstSampleTheFirstIsGiven) {
   Send(500);
   Send(600);
   history_.Take(in_.get());
-  history_.Forget(450);
+  history_.DropBefore(450);
   EXPECT_EQ(Before(), 500);
   EXPECT_EQ(After(), 600);
 }
@@ -69,7 +69,7 @@ TEST_F(InputHistoryTest, AWriterThatIsStartedAnewGoesOnWithTheClock) {
   out_ = topic_.MakeOutput();
   Send(300, 2);
   history_.Take(in_.get());
-  history_.Forget(310);
+  history_.DropBefore(310);
   EXPECT_EQ(Before(), 300);
   EXPECT_EQ(history_.before().stamp.epoch, 2u);
 }
@@ -77,10 +77,10 @@ TEST_F(InputHistoryTest, AWriterThatIsStartedAnewGoesOnWithTheClock) {
 TEST_F(InputHistoryTest, TimeNeverRunsBackwards) {
   for (const std::int64_t ns : {100, 300, 200, 300, 400}) Send(ns);
   history_.Take(in_.get());
-  history_.Forget(250);
+  history_.DropBefore(250);
   EXPECT_EQ(Before(), 100);
   EXPECT_EQ(After(), 300);
-  history_.Forget(350);
+  history_.DropBefore(350);
   EXPECT_EQ(After(), 400);
 }
 
@@ -89,7 +89,7 @@ TEST_F(InputHistoryTest, KeepsTheNewestOfALongPause) {
   for (std::int64_t ns = 1; ns <= count; ++ns) Send(ns);
   history_.Take(in_.get());
   EXPECT_EQ(Before(), count - static_cast<std::int64_t>(kInputHistory) + 1);
-  history_.Forget(count - 2);
+  history_.DropBefore(count - 2);
   EXPECT_EQ(Before(), count - 2);
 }
 
