@@ -12,8 +12,7 @@ void CoarseFactor::Triangle::Clear() {
 }
 
 void CoarseFactor::Triangle::Put(int row, const Block& block_of_row) {
-  constexpr std::size_t kFloats = kFactorBlock * kFactorBlock;
-  std::copy_n(block_of_row.data(), kFloats, value.data() + kFloats * block.size());
+  std::copy_n(block_of_row.data(), kFactorBlockFloats, value.data() + kFactorBlockFloats * block.size());
   block.push_back(static_cast<std::uint32_t>(row));
 }
 
@@ -21,15 +20,15 @@ CoarseFactor::CoarseFactor(std::vector<std::uint32_t> order)
     : order_(std::move(order)), columns_((3 * static_cast<int>(order_.size()) + kFactorBlock - 1) / kFactorBlock) {
   const auto blocks = static_cast<std::size_t>(columns_);
   solution_ = FloatArray(kFactorBlock * blocks);
-  making_ = FloatArray(kFactorBlock * kFactorBlock * blocks * blocks);
+  making_ = FloatArray(kFactorBlockFloats * blocks * blocks);
   filled_.assign(blocks * blocks, 0);
   for (Triangle* triangle : {&down_, &up_, &next_down_, &next_up_}) {
     triangle->start.reserve(blocks + 1);
     triangle->block.reserve(blocks * (blocks + 1) / 2);
-    triangle->value = FloatArray(blocks * (blocks + 1) / 2 * kFactorBlock * kFactorBlock);
+    triangle->value = FloatArray(blocks * (blocks + 1) / 2 * kFactorBlockFloats);
   }
   const auto size = static_cast<Eigen::Index>(3 * order_.size());
-  (void)Take(KernelsFor(), Eigen::MatrixXf::Identity(size, size));  // Not left without one.
+  (void)Take(KernelsFor(), Eigen::MatrixXf::Identity(size, size));  // In force until the first matrix is factored.
 }
 
 /// The lower part of a column of blocks of P A P^T, with ones on the diagonal beyond its last row.
@@ -68,8 +67,8 @@ bool CoarseFactor::FactorColumn(const Kernels& kernels, int column) {
     }
     for (int row = column; row < columns_; ++row) {
       if (filled_[At(row, before)] != 0) {
-        kernels.block_product(BlockAt(row, before).data(), BlockAt(column, before).data(), true,
-                              BlockAt(row, column).data());
+        kernels.factor.block_product(BlockAt(row, before).data(), BlockAt(column, before).data(), true,
+                                     BlockAt(row, column).data());
         filled_[At(row, column)] = 1;
       }
     }
@@ -84,7 +83,7 @@ bool CoarseFactor::FactorColumn(const Kernels& kernels, int column) {
   for (int row = column + 1; row < columns_; ++row) {
     if (filled_[At(row, column)] != 0) {
       alignas(64) Block block;
-      kernels.block_product(BlockAt(row, column).data(), inverse.data(), false, block.data());
+      kernels.factor.block_product(BlockAt(row, column).data(), inverse.data(), false, block.data());
       BlockAt(row, column) = block;
       next_down_.Put(row, block);
     }
@@ -134,13 +133,13 @@ bool CoarseFactor::Take(const Kernels& kernels, const Eigen::MatrixXf& matrix) {
 void CoarseFactor::Solve(const Kernels& kernels, float* x) {
   float* to = solution_.data();
   for (const std::uint32_t node : order_) {
-    to = std::copy_n(x + 4 * std::size_t{node}, 3, to);
+    to = std::copy_n(x + kVertexFloats * node, 3, to);
   }
-  kernels.substitute(down_.order(), down_.value.data(), solution_.data());
-  kernels.substitute(up_.order(), up_.value.data(), solution_.data());
+  kernels.factor.substitute(down_.order(), down_.value.data(), solution_.data());
+  kernels.factor.substitute(up_.order(), up_.value.data(), solution_.data());
   const float* from = solution_.data();
   for (const std::uint32_t node : order_) {
-    std::copy_n(from, 3, x + 4 * std::size_t{node});
+    std::copy_n(from, 3, x + kVertexFloats * node);
     from += 3;
   }
 }

@@ -10,15 +10,20 @@
 
 namespace fulcrum::physics::implicit {
 
-/// P A P^T = L L^T for a matrix of 3 x 3 blocks, one pair of nodes each. L and L^T are kept in blocks of kFactorBlock
-/// rows, those of zeros left out, in the order in which their substitutions read them and with the blocks of the
-/// diagonal inverted: a solve is products of blocks and vectors, in one pass over the memory each way. A new factor is
-/// made beside the one in force, left-looking, so it may be made a few columns at a time; nothing is allocated for it.
+/// P A P^T = L L^T for a matrix A of 3 x 3 blocks, one per pair of nodes, and a permutation P of the nodes:
+///
+///   column k, left-looking:  S_ik = A_ik - sum_{j<k} L_ij L_kj^T for i >= k,  L_kk L_kk^T = S_kk,  L_ik = S_ik L_kk^-T
+///   solve:                   L y = P b,  L^T P x = y
+///
+/// with blocks of kFactorBlock rows. L and L^T are stored without blocks of zeros, in the order in which their
+/// substitutions read them and with the blocks of the diagonal inverted: a solve is products of blocks and vectors, in
+/// one pass over the memory each way. A new factor is made beside the one in force, so it may be made a few columns at
+/// a time; nothing is allocated for it.
 class CoarseFactor {
  public:
   enum class Progress { kMore, kTaken, kRefused };
 
-  /// `order`: the nodes in the order of elimination. Neighbours should stand close together, so that L is a band.
+  /// `order`: the nodes in the order of elimination. With neighbours close together L is a band.
   explicit CoarseFactor(std::vector<std::uint32_t> order = {});
   /// Factors the next `columns` columns of blocks of `matrix`, symmetric, 3 rows per node, which must stay as it is
   /// from the first of them to the last. Then the factor is in force, and what follows begins anew. Refused as soon as
@@ -49,7 +54,7 @@ class CoarseFactor {
     return static_cast<std::size_t>(column) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(row);
   }
   [[nodiscard]] Eigen::Map<Block, Eigen::Aligned64> BlockAt(int row, int column) {
-    return Eigen::Map<Block, Eigen::Aligned64>(making_.data() + kFactorBlock * kFactorBlock * At(row, column));
+    return Eigen::Map<Block, Eigen::Aligned64>(making_.data() + kFactorBlockFloats * At(row, column));
   }
   void LoadColumn(const Eigen::MatrixXf& matrix, int column);
   bool FactorColumn(const Kernels& kernels, int column);
@@ -60,7 +65,7 @@ class CoarseFactor {
   Triangle down_, up_;  ///< In force.
   FloatArray solution_;
 
-  // In the making.
+  // The next factor, as far as it is made.
   int next_column_ = 0;
   FloatArray making_;                 ///< Blocks of L by columns, with the inverses of those on the diagonal.
   std::vector<std::uint8_t> filled_;  ///< By block: not zero.

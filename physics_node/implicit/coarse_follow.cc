@@ -1,172 +1,183 @@
-// How the levels above the particles follow cuts, contacts and sleep.
+// How hats and coarse nodes follow cuts, sleep and contacts.
 #include <algorithm>
 
 #include "physics_node/implicit/coarse_space.h"
 
 namespace fulcrum::physics::implicit {
+namespace {
 
-/// Middle functions that a node of the sheet takes part in, by place in a row of them: its own, and the one after.
-std::array<std::uint32_t, 2> CoarseSpace::FunctionsOf(std::uint32_t col) const {
-  const std::uint32_t place = layout_.Offset(0, col), group = place / kLanes / 4, lane = place % kLanes;
+/// Least sums of (difference of a hat)^2 over the edges that a cut leaves, exactly (of 5.375 for a whole hat) and by
+/// the samples (of 5.5). With less the edges that are left may hold in other directions than the samples do, and the
+/// hat is switched off. Assumed.
+constexpr float kLeastEdgesLeft = 3.8f, kLeastSampledEdges = 3.3f;
+/// Hats from a contact to where the coarse nodes' part is whole again. Cut off sharply it would cost more energy than
+/// the coarse matrix contains, and corrections that overshoot grow. Assumed.
+constexpr int kFadeHats = 4;
+
+}  // namespace
+
+/// Hats that a node of the sheet belongs to, by place in a row of them: its own, and the one after.
+std::array<std::uint32_t, 2> CoarseSpace::HatsOf(std::uint32_t col) const {
+  const std::uint32_t place = layout_.Offset(0, col), group = place / kLanes / kHatSpacing, lane = place % kLanes;
   const std::uint32_t own = kLanes * group + lane;
-  return {own, group + 1 < static_cast<std::uint32_t>(middle_slots_) ? own + kLanes : (lane + 1) % kLanes};
+  return {own, group + 1 < static_cast<std::uint32_t>(hats_.slots) ? own + kLanes : (lane + 1) % kLanes};
 }
 
-/// Value of a middle function at a node; 0 outside the sheet.
-float CoarseSpace::Hat(std::uint32_t function, int row, int col) const {
-  if (row < 0 || row >= rows_ || col < 0 || col >= static_cast<int>(cols_)) {
+/// Value of a hat at a node; 0 outside the sheet.
+float CoarseSpace::HatAt(std::uint32_t hat, int row, int col) const {
+  if (row < 0 || row >= sheet_rows_ || col < 0 || col >= static_cast<int>(layout_.cols)) {
     return 0.0f;
   }
   const auto r = static_cast<std::size_t>(row);
-  const int above = static_cast<int>(function / width_) - cell_[r];
+  const int above = static_cast<int>(hat / hats_.width) - hats_.cell[r];
   const std::uint32_t place = layout_.Offset(0, static_cast<std::uint32_t>(col)),
-                      in_row = function % static_cast<std::uint32_t>(width_);
-  const auto [own, next] = FunctionsOf(static_cast<std::uint32_t>(col));
-  const float along = above == 0 ? 1.0f - fraction_[r] : above == 1 ? fraction_[r] : 0.0f;
-  return along * ((in_row == own ? own_[place] : 0.0f) + (in_row == next ? next_[place] : 0.0f));
+                      in_row = hat % static_cast<std::uint32_t>(hats_.width);
+  const auto [own, next] = HatsOf(static_cast<std::uint32_t>(col));
+  const float along = above == 0 ? 1.0f - hats_.fraction[r] : above == 1 ? hats_.fraction[r] : 0.0f;
+  return along * ((in_row == own ? hats_.own[place] : 0.0f) + (in_row == next ? hats_.next[place] : 0.0f));
 }
 
 void CoarseSpace::MarkEdit(std::uint32_t row, std::uint32_t col, std::size_t d) {
+  const auto width = static_cast<std::uint32_t>(hats_.width);
   const auto mark = [&](std::uint32_t r, std::uint32_t c) {
-    for (std::uint32_t i = 0; i < (fraction_[r] > 0.0f ? 2u : 1u); ++i) {
-      for (const std::uint32_t in_row : FunctionsOf(c)) {
-        edited_.push_back((static_cast<std::uint32_t>(cell_[r]) + i) * static_cast<std::uint32_t>(width_) + in_row);
+    for (std::uint32_t i = 0; i < (hats_.fraction[r] > 0.0f ? 2u : 1u); ++i) {
+      for (const std::uint32_t in_row : HatsOf(c)) {
+        blocks_.edited.push_back((static_cast<std::uint32_t>(hats_.cell[r]) + i) * width + in_row);
       }
     }
   };
   mark(row, col);
-  mark(std::min(row + (d != 0 ? 1 : 0), static_cast<std::uint32_t>(rows_) - 1),
-       std::min(col + (d != 1 ? 1 : 0), cols_ - 1));
+  mark(std::min(row + (d != 0 ? 1 : 0), layout_.rows - 1), std::min(col + (d != 1 ? 1 : 0), layout_.cols - 1));
 }
 
-void CoarseSpace::ScaleBlocks(const Sheet& sheet) {
-  std::sort(edited_.begin(), edited_.end());
-  edited_.erase(std::unique(edited_.begin(), edited_.end()), edited_.end());
+void CoarseSpace::ScaleHats(const Sheet& sheet) {
+  std::vector<std::uint32_t>& edited = blocks_.edited;
+  std::sort(edited.begin(), edited.end());
+  edited.erase(std::unique(edited.begin(), edited.end()), edited.end());
   const auto whole = [&](int row, int col, std::size_t d) {
-    const bool inside = row >= 0 && row < rows_ && col >= 0 && col < static_cast<int>(cols_);
+    const bool inside = row >= 0 && row < sheet_rows_ && col >= 0 && col < static_cast<int>(layout_.cols);
     return inside &&
            sheet.axial[d][layout_.Offset(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(col))] > 0;
   };
-  for (const std::uint32_t function : edited_) {
-    const auto r = static_cast<std::size_t>(function / width_);
-    const int centre_row = centre_[r], in_row = static_cast<int>(function % width_);
-    const int slot = 4 * (in_row / kLanes), first_col = in_row % kLanes * static_cast<int>(layout_.slots);
+  for (const std::uint32_t hat : edited) {
+    const auto r = static_cast<std::size_t>(hat / hats_.width);
+    const int centre_row = hats_.centre[r], in_row = static_cast<int>(hat % hats_.width);
+    const int slot = kHatSpacing * (in_row / kLanes), first_col = in_row % kLanes * static_cast<int>(layout_.slots);
     float exact = 0, sampled = 0;
-    for (int row = centre_row - 4; row < centre_row + 4; ++row) {
-      for (int col = first_col + slot - 4; col < first_col + slot + 4; ++col) {
+    for (int row = centre_row - kHatSpacing; row < centre_row + kHatSpacing; ++row) {
+      for (int col = first_col + slot - kHatSpacing; col < first_col + slot + kHatSpacing; ++col) {
         for (std::size_t d = 0; d < 3; ++d) {
           if (whole(row, col, d)) {
-            const float step = Hat(function, row + (d != 0 ? 1 : 0), col + (d != 1 ? 1 : 0)) - Hat(function, row, col);
+            const float step = HatAt(hat, row + (d != 0 ? 1 : 0), col + (d != 1 ? 1 : 0)) - HatAt(hat, row, col);
             exact += step * step;
           }
         }
       }
     }
-    for (int sample = 0; sample < 4; ++sample) {
-      const int row = std::clamp(centre_row + (sample < 2 ? -1 : 1), 0, rows_ - 1);
+    for (int sample = 0; sample < kHatSamples; ++sample) {
+      const int row = std::clamp(centre_row + (sample < 2 ? -1 : 1), 0, sheet_rows_ - 1);
       const int at = std::min(slot + (sample & 1), static_cast<int>(layout_.slots) - 1);
       for (std::size_t d = 0; d < 3; ++d) {
-        sampled += whole(row, first_col + at, d) ? (d == 2 ? 2.75f : 1.375f) / 4.0f : 0.0f;
+        const float edges = (d == 2 ? kHatDiagonalEdges : kHatStraightEdges) / float{kHatSamples};
+        sampled += whole(row, first_col + at, d) ? edges : 0.0f;
       }
     }
-    // Of 5.5. Where much is cut, what is left may hold in other directions than the samples do: no hat there.
-    scale_[function] = exact > 3.8f && sampled > 3.3f ? std::max(exact / sampled, 1.0f) : 0.0f;
+    const bool measurable = exact > kLeastEdgesLeft && sampled > kLeastSampledEdges;
+    blocks_.scale[hat] = measurable ? std::max(exact / sampled, 1.0f) : 0.0f;
   }
-  edited_.clear();
+  edited.clear();
 }
 
-void CoarseSpace::FollowRegions(const Regions& regions) {
-  coarse_rests_ = !regions.everything();
-  middle_rests_.assign(static_cast<std::size_t>(middle_rows_), 0);
-  for (int r = 0; r < middle_rows_; ++r) {
+void CoarseSpace::UpdateRegions(const Regions& regions) {
+  coarse_off_ = !regions.all_computed();
+  blocks_.off.assign(static_cast<std::size_t>(hats_.rows), 0);
+  for (int r = 0; r < hats_.rows; ++r) {
     const auto i = static_cast<std::size_t>(r);
-    const int first = r > 0 ? centre_[i - 1] + 1 : 0, end = r + 1 < middle_rows_ ? centre_[i + 1] : rows_;
+    const int first = r > 0 ? hats_.centre[i - 1] + 1 : 0, end = r + 1 < hats_.rows ? hats_.centre[i + 1] : sheet_rows_;
     for (int row = first; row < end; ++row) {
-      middle_rests_[i] |= regions.computed(regions.At(true, row)) ? 0 : 1;
+      blocks_.off[i] |= regions.computed(regions.partition().At(true, row)) ? 0 : 1;
     }
   }
-  std::fill_n(nodes4_.data(), nodes4_.size(), 0.0f);
-  std::fill_n(value_.data(), value_.size(), 0.0f);
+  std::fill_n(scratch_.nodes4.data(), scratch_.nodes4.size(), 0.0f);
+  std::fill_n(scratch_.value.data(), scratch_.value.size(), 0.0f);
 }
 
-void CoarseSpace::ForgetContacts() {
-  if (!held_.empty()) {
-    std::fill(yields_.begin(), yields_.end(), 1.0f);
+void CoarseSpace::ClearContacts() {
+  if (!contacts_.stiff.empty()) {
+    std::fill(contacts_.coarse_weight.begin(), contacts_.coarse_weight.end(), 1.0f);
   }
-  held_.clear();
+  contacts_.stiff.clear();
 }
 
-void CoarseSpace::Stiffen(const Element& contact) {
+void CoarseSpace::AddContact(const Element& contact) {
   struct Share {
-    std::size_t function;
+    std::size_t hat;
     float weight;
   };
-  std::array<Share, 16> shares;
+  std::array<Share, kHatsPerContact> shares;
   std::size_t count = 0;
-  const auto add = [&](std::size_t function, float weight) {
+  const auto add = [&](std::size_t hat, float weight) {
     if (!(weight != 0.0f)) {
       return;
     }
     for (std::size_t i = 0; i < count; ++i) {
-      if (shares[i].function == function) {
+      if (shares[i].hat == hat) {
         shares[i].weight += weight;
         return;
       }
     }
-    shares[count++] = {function, weight};
+    shares[count++] = {hat, weight};
   };
   for (std::size_t k = 0; k < static_cast<std::size_t>(contact.count); ++k) {
     if (contact.at[k].base < tube_floats_) {
       continue;
     }
-    const std::size_t at = contact.at[k].base - tube_floats_, row = at / static_cast<std::size_t>(stride_),
-                      place = at % static_cast<std::size_t>(stride_), slot = place / kLanes, lane = place % kLanes;
-    const std::size_t group = slot / 4, own = kLanes * group + lane;
-    const std::size_t next = group + 1 < static_cast<std::size_t>(middle_slots_) ? own + kLanes : (lane + 1) % kLanes;
+    const std::size_t at = contact.at[k].base - tube_floats_, row = at / layout_.stride, place = at % layout_.stride,
+                      slot = place / kLanes, lane = place % kLanes;
+    const std::size_t group = slot / kHatSpacing, own = kLanes * group + lane;
+    const std::size_t next = group + 1 < static_cast<std::size_t>(hats_.slots) ? own + kLanes : (lane + 1) % kLanes;
     for (std::size_t i = 0; i < 2; ++i) {
-      const float along = contact.weight[k] * (i == 0 ? 1 - fraction_[row] : fraction_[row]);
-      const std::size_t first = (static_cast<std::size_t>(cell_[row]) + i) * width_;
-      add(first + own, along * own_[place]);
-      add(first + next, along * next_[place]);
+      const float along = contact.weight[k] * (i == 0 ? 1 - hats_.fraction[row] : hats_.fraction[row]);
+      const std::size_t first = (static_cast<std::size_t>(hats_.cell[row]) + i) * hats_.width;
+      add(first + own, along * hats_.own[place]);
+      add(first + next, along * hats_.next[place]);
     }
   }
-  // (B + v v^T)^-1 by Sherman and Morrison.
+  // (B + v v^T)^-1 = B^-1 - (B^-1 v) (B^-1 v)^T / (1 + v . B^-1 v), by Sherman and Morrison (1950).
+  std::array<FloatArray, 6>& block = blocks_.inverse;
   for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t at = shares[i].function;
+    const std::size_t at = shares[i].hat;
     const Vec3f v = shares[i].weight * contact.m;
     Eigen::Matrix3f inverse;
-    inverse << block_[0][at], block_[3][at], block_[4][at], block_[3][at], block_[1][at], block_[5][at], block_[4][at],
-        block_[5][at], block_[2][at];
+    inverse << block[0][at], block[3][at], block[4][at], block[3][at], block[1][at], block[5][at], block[4][at],
+        block[5][at], block[2][at];
     const Vec3f bv = inverse * v;
-    held_.push_back({at, 0.0f});
-    yields_[at] /= 1.0f + v.dot(bv);
+    contacts_.stiff.push_back({at, 0.0f});
+    contacts_.coarse_weight[at] /= 1.0f + v.dot(bv);
     inverse -= bv * bv.transpose() / (1.0f + v.dot(bv));
-    block_[0][at] = inverse(0, 0);
-    block_[1][at] = inverse(1, 1);
-    block_[2][at] = inverse(2, 2);
-    block_[3][at] = inverse(0, 1);
-    block_[4][at] = inverse(0, 2);
-    block_[5][at] = inverse(1, 2);
+    block[0][at] = inverse(0, 0);
+    block[1][at] = inverse(1, 1);
+    block[2][at] = inverse(2, 2);
+    block[3][at] = inverse(0, 1);
+    block[4][at] = inverse(0, 2);
+    block[5][at] = inverse(1, 2);
   }
 }
 
-/// The coarse nodes' part fades out towards what contacts hold, over kFade functions: cut off sharply it would cost
-/// more energy than the coarse matrix says, and what it overestimates grows.
 void CoarseSpace::FadeAtContacts() {
-  constexpr int kFade = 4;
-  const int columns = middle_slots_ * kLanes;
-  for (auto& [function, part] : held_) {
-    part = 1.0f - yields_[function];
+  const int columns = hats_.slots * kLanes;
+  for (auto& [hat, taken] : contacts_.stiff) {
+    taken = 1.0f - contacts_.coarse_weight[hat];
   }
-  for (const auto& [function, part] : held_) {
-    const int row = static_cast<int>(function / width_), place = static_cast<int>(function % width_);
-    const int column = place % kLanes * middle_slots_ + place / kLanes;
-    for (int r = std::max(row - kFade + 1, 0); r < std::min(row + kFade, middle_rows_); ++r) {
-      for (int c = std::max(column - kFade + 1, 0); c < std::min(column + kFade, columns); ++c) {
-        const int away = std::max(std::abs(r - row), std::abs(c - column));
-        float& yields = yields_[static_cast<std::size_t>(r) * width_ +
-                                static_cast<std::size_t>(c % middle_slots_ * kLanes + c / middle_slots_)];
-        yields = std::min(yields, 1.0f - part * (1.0f - static_cast<float>(away) / kFade));
+  for (const auto& [hat, taken] : contacts_.stiff) {
+    const int row = static_cast<int>(hat / hats_.width), place = static_cast<int>(hat % hats_.width);
+    const int column = place % kLanes * hats_.slots + place / kLanes;
+    for (int r = std::max(row - kFadeHats + 1, 0); r < std::min(row + kFadeHats, hats_.rows); ++r) {
+      for (int c = std::max(column - kFadeHats + 1, 0); c < std::min(column + kFadeHats, columns); ++c) {
+        const int distance = std::max(std::abs(r - row), std::abs(c - column));
+        float& weight = contacts_.coarse_weight[static_cast<std::size_t>(r) * hats_.width +
+                                                static_cast<std::size_t>(c % hats_.slots * kLanes + c / hats_.slots)];
+        weight = std::min(weight, 1.0f - taken * (1.0f - static_cast<float>(distance) / kFadeHats));
       }
     }
   }

@@ -1,7 +1,14 @@
 // The levels above the particles: one product carries a correction over a distance for which sweeps over neighbours
-// would take hundreds of iterations. Over the membrane a middle level of every fourth row and column, with blocks of
-// its diagonal; over both layers a coarse level of a few dozen nodes, bilinear in the membrane's rows and columns and
-// trilinear on a lattice of 30 mm over the organ, with its Galerkin matrix factored (coarse_factor.h).
+// would take hundreds of iterations. The preconditioner is the sum
+//
+//   z = D^-1 r + H B^-1 H^T r + P (P^T A P)^-1 P^T r
+//
+//   D  blocks of the diagonal (kernels)
+//   H  hats: bilinear functions on every fourth row and column of the membrane, B blocks of H^T A H
+//   P  coarse nodes: bilinear in the rows and columns of the membrane, trilinear on a lattice over the organ. Over the
+//      membrane P = H P_hats, so the coarse nodes work on the hats' residual and correction
+//
+// The Galerkin matrix P^T A P is factored (coarse_factor.h). Hats and coarse nodes follow cuts, sleep and contacts.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,105 +30,132 @@ class CoarseSpace {
   CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles,
               const Kernels& kernels);
 
-  /// A new matrix, in force at once.
-  void Renew(const Sheet& sheet, const SheetMatrix& matrix, float inertia);
-  /// The next part of the next matrix: rows of the membrane, and when it has them all columns of its factor, with the
-  /// last of which it is in force. So no step pays for all of it.
-  void Refresh(const Sheet& sheet, const SheetMatrix& matrix, float inertia);
+  /// A new coarse matrix, in force at once.
+  void Assemble(const Sheet& sheet, const SheetMatrix& matrix, float inertia);
+  /// The next part of the next matrix: rows of the membrane, and when all of them are in it columns of its factor, with
+  /// the last of which it is in force. So no step pays for all of it.
+  void AssembleNextPart(const Sheet& sheet, const SheetMatrix& matrix, float inertia);
 
-  /// The middle level as the kernels see it.
-  [[nodiscard]] Middle middle();
-  /// Floats of one row in Kernels::sheet_restrict's sums.
-  [[nodiscard]] std::size_t row_width() const { return 3 * width_; }
+  /// The hats as the kernels read them.
+  [[nodiscard]] HatLevel hats();
+  /// Floats of a row in the sums of SheetKernels::restrict_rows.
+  [[nodiscard]] std::size_t row_width() const { return 3 * hats_.width; }
+  /// Rows of hats whose middle is one of the sheet's rows [first, end): first and end of them.
+  [[nodiscard]] std::pair<int, int> HatRows(int first, int end) const;
 
-  /// The edge from a node of the sheet in direction `d` is cut or whole again; in force after ScaleBlocks.
+  /// The edge from a node of the sheet in direction `d` is cut or whole again; in force after ScaleHats.
   void MarkEdit(std::uint32_t row, std::uint32_t col, std::size_t d);
-  /// Blocks are sampled at their centres. Where a cut goes through the samples they are scaled to the edges that are
-  /// left to the whole hat; too soft a block would overshoot.
-  void ScaleBlocks(const Sheet& sheet);
-  /// While not all is computed the coarse nodes rest, and so do middle functions that reach into what is not: cut off
-  /// there they would cost far more energy than their blocks say.
-  void FollowRegions(const Regions& regions);
-  /// While the organ is folded the coarse nodes leave it alone: their matrix knows it as it is at rest, and in folds it
-  /// is a hundred times as stiff.
-  void LeaveOrganAlone(bool alone) { organ_alone_ = alone; }
+  /// Blocks of hats are sampled at their middle. Where a cut goes through the samples they are scaled to the edges that
+  /// are left to the whole hat; too soft a block would overshoot.
+  void ScaleHats(const Sheet& sheet);
+  /// While not all is computed the coarse nodes are off, and so are hats that reach into what is not: cut off at the
+  /// border they would cost far more energy than their blocks contain.
+  void UpdateRegions(const Regions& regions);
+  /// While the organ is folded the coarse nodes leave it out: their matrix is that of the organ at rest, and in folds
+  /// the organ is a hundred times as stiff.
+  void ExcludeOrgan(bool exclude) { organ_excluded_ = exclude; }
 
-  /// Adds a contact's stiffness to the blocks of the middle functions that move it, for this substep: they would ask it
-  /// to yield as easily as the sheet.
-  void Stiffen(const Element& contact);
-  /// After the last of them.
+  /// Before the contacts of a substep: removes those of the last one.
+  void ClearContacts();
+  /// Adds the stiffness of a contact to the blocks of the hats that move it, for this substep: without it they would
+  /// move it as easily as the sheet.
+  void AddContact(const Element& contact);
+  /// After the last contact: lets the coarse nodes' part fade out around the contacts.
   void FadeAtContacts();
-  /// Before a substep's contacts: forgets those of the last one.
-  void ForgetContacts();
 
-  /// Middle rows whose centre is one of the sheet's rows [first, end): first and end of them.
-  [[nodiscard]] std::pair<int, int> MiddleRows(int first, int end) const;
-
-  /// From the residual of what is computed - `row_sums` [rows][row_width()] by Kernels::sheet_restrict, tube xyz_ - to
-  /// Middle::value and the coarse solution.
+  /// From the residual of what is computed - `row_sums` [rows][row_width()] by SheetKernels::restrict_rows, tube xyz_ -
+  /// to HatLevel::value and the correction of the coarse nodes.
   void Solve(std::span<const Task> tasks, const float* row_sums, const float* tube_residual, const float* tube,
              Workers* workers);
   /// tube_z += P y for vertices [first, end) that move (w of `tube` > 0). Returns tube_residual . tube_z.
   double Prolong(const float* tube, const float* tube_residual, float* tube_z, int first, int end) const;
 
  private:
-  static constexpr int kSheetColumns = 4;
-  /// Of a Refresh. Whole every 60 steps instead of every 30, the errors in a pull are two thirds larger.
-  static constexpr int kRefreshRows = 14, kRefreshColumns = 4;
-  [[nodiscard]] std::array<std::uint32_t, 2> FunctionsOf(std::uint32_t col) const;
-  [[nodiscard]] float Hat(std::uint32_t function, int row, int col) const;
-  struct alignas(16) Weights8 {
-    std::array<std::uint16_t, 8> node;
-    std::array<float, 8> weight;
-    bool new_cell = true;  ///< Not in the cell of the vertex before.
+  /// Particles of a contact times hats around a particle.
+  static constexpr std::size_t kHatsPerContact = 16;
+  /// Nodes around a cell of the lattice.
+  static constexpr std::size_t kCellCorners = 8;
+  /// Where the hats are. Built once.
+  struct HatGeometry {
+    int rows = 0, slots = 0;
+    std::size_t width = 0;          ///< Floats of a plane of a row of hats.
+    std::vector<int> centre, cell;  ///< As in HatLevel.
+    std::vector<float> fraction;
+    FloatArray own, next;
   };
-  struct RowPlace {
+  /// Blocks of the hats, and what cuts and sleep do to them. A hat is r * width + place in its row.
+  struct HatBlocks {
+    std::array<FloatArray, 6> inverse;  ///< [m/N]
+    FloatArray scale;
+    std::vector<std::uint32_t> edited;  ///< Hats around edits since the last ScaleHats.
+    std::vector<std::uint8_t> off;      ///< By row of hats.
+  };
+  /// Hats around stiff contacts.
+  struct HatContacts {
+    std::vector<float> coarse_weight;                  ///< By hat: part of the coarse nodes' correction, 0 to 1.
+    std::vector<std::pair<std::size_t, float>> stiff;  ///< Hats that move contacts, and 1 - weight there.
+  };
+  /// A place between coarse nodes: after node `cell`, by a fraction of the distance to the next one.
+  struct CellPlace {
     int cell;
     float fraction;
   };
-  void AddRows(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows);
-  void AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int row);
+  /// A vertex of the organ in its cell of the lattice.
+  struct alignas(16) LatticePlace {
+    std::array<std::uint16_t, kCellCorners> node;
+    std::array<float, kCellCorners> weight;
+    bool new_cell = true;  ///< Not in the cell of the vertex before.
+  };
+  /// Where the coarse nodes are: those of the membrane by rows, then those of the lattice. Built once.
+  struct CoarseGrid {
+    int columns = 0, rows = 0, nodes = 0;
+    std::vector<CellPlace> row_place, column_place;  ///< By row and by column of the membrane.
+    FloatArray column_share;  ///< [columns][width], part of a coarse column in a float of a row of hats.
+    std::vector<LatticePlace> tube_weights;
+
+    /// Nodes around a cell of the membrane, -1 where there is none.
+    [[nodiscard]] std::array<int, 4> NodesOf(int row_cell, int column_cell) const;
+  };
+  /// The Galerkin matrix in force and the next one.
+  struct CoarseMatrix {
+    Eigen::MatrixXf constant, tube_mass;  ///< Parts that do not change: organ and bindings at rest; mass of the organ.
+    Eigen::MatrixXf next;
+    CoarseFactor factor;
+    int next_row = 0;       ///< Of the membrane, to be added to `next`.
+    bool complete = false;  ///< `next` waits to be factored.
+  };
+  /// Memory of a solve.
+  struct Scratch {
+    FloatArray residual, value;  ///< Of the hats, [row][3][width].
+    FloatArray nodes4;           ///< Right side, then correction, xyz_ per coarse node.
+    FloatArray tube_nodes4;      ///< The organ's part of the right side.
+  };
+
+  void BuildHats();
+  void BuildLattice(const SceneView& scene, const ElasticModel& model);
+  void AddTubeMass(const ElasticModel& model);
   void AddTube(const ElasticModel& model);
   void AddBindings(const ElasticModel& model, const ParticleStore& particles);
-  void BuildMiddle();
+  void AddRows(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int rows);
+  void AddSheetRow(const Sheet& sheet, const SheetMatrix& matrix, float inertia, int row);
+  [[nodiscard]] std::array<std::uint32_t, 2> HatsOf(std::uint32_t col) const;
+  [[nodiscard]] float HatAt(std::uint32_t hat, int row, int col) const;
   void RestrictTube(int first, int end, const float* tube_residual, const float* tube);
   void SumRows(std::span<const Task> tasks, const float* row_sums);
-  void RestrictMiddle();
-  /// Of middle rows [first, end).
-  void ProlongMiddle(int first, int end);
+  void RestrictHats();
+  void ProlongToHats(int first, int end);
 
   const Kernels& kernels_;
-  int columns_ = 0, coarse_rows_ = 0, rows_ = 0, stride_ = 0;
-  std::size_t tube_floats_;
-  std::uint32_t cols_ = 0;
   GridLayout layout_;
-  std::vector<RowPlace> row_place_;
-  std::vector<RowPlace> column_place_;
-
-  // The middle level.
-  int middle_rows_ = 0, middle_slots_ = 0;
-  std::size_t width_ = 0;  ///< Floats of a plane of its row.
-  std::vector<int> centre_, cell_;
-  std::vector<std::uint8_t> middle_rests_;  ///< By middle row.
-  bool coarse_rests_ = false, organ_alone_ = false;
-  std::vector<float> yields_;                        ///< By middle function: 0 where a contact holds it, else 1.
-  std::vector<std::pair<std::size_t, float>> held_;  ///< Functions that do not yield.
-  std::vector<float> fraction_;
-  FloatArray own_, next_, scale_;
-  std::vector<std::uint32_t> edited_;  ///< Middle functions.
-  std::array<FloatArray, 6> block_;
-  FloatArray residual_, value_;
-  FloatArray column_share_;  ///< [columns_][width_], part of a coarse column in a float of the middle level's row.
-
-  std::vector<Weights8> tube_weights_;
-  int nodes_ = 0;
-  Eigen::MatrixXf constant_, tube_mass_;  ///< Parts that do not change: organ and bindings at rest; mass of the organ.
-  Eigen::MatrixXf building_;
-  CoarseFactor factor_;
-  FloatArray nodes4_;       ///< Right side, then solution, xyz_ per coarse node.
-  FloatArray tube_nodes4_;  ///< What the organ gives to the right side.
-  int next_row_ = 0;        ///< Of building_.
-  bool complete_ = false;   ///< building_ waits to be factored.
+  std::size_t tube_floats_;
+  int sheet_rows_;
+  HatGeometry hats_;
+  HatBlocks blocks_;
+  HatContacts contacts_;
+  CoarseGrid grid_;
+  CoarseMatrix matrix_;
+  Scratch scratch_;
+  bool coarse_off_ = false, organ_excluded_ = false;
 };
 
 }  // namespace fulcrum::physics::implicit

@@ -1,319 +1,346 @@
-// The linear solve of a substep: conjugate gradients with the three-level preconditioner, a phase at a time over what
-// is awake.
+#include "physics_node/implicit/conjugate_gradients.h"
+
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "physics_node/implicit/for_tasks.h"
-#include "physics_node/implicit/implicit_solver.h"
+#include "physics_node/implicit/phases.h"
+#include "physics_node/implicit/substep.h"
 
 namespace fulcrum::physics::implicit {
 namespace {
 
-/// No particle is corrected by more in one solve [m].
-constexpr float kLargestCorrection = 0.003f;
+/// Correction from which on it is compared in energy with the prediction [m]: up to here the linearisation holds.
+/// Assumed.
+constexpr float kDoubtfulCorrection_m = 0.0002f;
+/// No particle is corrected by more in one solve [m]. Assumed.
+constexpr float kLargestCorrection_m = 0.003f;
+/// Of a correction that raises the energy: down to a sixteenth. Assumed.
 constexpr int kHalvings = 4;
 
-}  // namespace
-
-/// z <- M^-1 residual, whose part for the middle level is in row_sums_ already; returns residual . z.
-double ImplicitSolver::Precondition() {
-  const Sheet sheet = MakeSheet();
-  const SheetMatrix matrix = MakeMatrix();
-  const OrganMatrix organ_matrix = MakeOrganMatrix();
-  const Middle middle = coarse_.middle();
-  const float* const r[3] = {residual_.data() + tube_floats_, residual_.data() + tube_floats_ + plane_,
-                             residual_.data() + tube_floats_ + 2 * plane_};
-  float* const z[3] = {z_.data() + tube_floats_, z_.data() + tube_floats_ + plane_,
-                       z_.data() + tube_floats_ + 2 * plane_};
-  coarse_.Solve(regions_.part().tasks, row_sums_.data(), residual_.data(), particles_->tube(), &workers_);
-  ForTasks([&](const Task& task, int index, int) {
-    double& partial = partial_[static_cast<std::size_t>(index)];
-    if (task.sheet) {
-      partial = kernels_.sheet_precondition(sheet, middle, matrix, r, z, task.first, task.end);
-    } else {
-      (void)kernels_.organ_block_solve(organ_matrix, residual_.data(), z_.data(), Vertex(task.first), Vertex(task.end));
-      partial = coarse_.Prolong(particles_->tube(), residual_.data(), z_.data(), task.first, task.end);
-    }
-  });
-  return SumOfPartials(regions_.part().tasks.size());
-}
-
-double ImplicitSolver::Apply(const FloatArray& direction, float inertia, const Part& part, const Selection& elements) {
-  const Sheet sheet = MakeSheet();
-  const SheetMatrix matrix = MakeMatrix();
-  const Organ organ = MakeOrgan();
-  const OrganMatrix organ_matrix = MakeOrganMatrix();
-  const float* const p[3] = {direction.data() + tube_floats_, direction.data() + tube_floats_ + plane_,
-                             direction.data() + tube_floats_ + 2 * plane_};
-  float* const q[3] = {q_.data() + tube_floats_, q_.data() + tube_floats_ + plane_,
-                       q_.data() + tube_floats_ + 2 * plane_};
-  double of_hinges = 0, of_others = 0;
-  ForTasksBeside(
-      0, static_cast<int>(part.patches.size()),
-      [&](int index, int) {
-        const Task& task = part.patches[static_cast<std::size_t>(index)];
-        kernels_.organ_stress(organ, organ_matrix, direction.data(), Vertex(task.first), Vertex(task.end));
-      },
-      [&] { of_hinges = elements_.MultiplyHinges(direction.data(), elements); },
-      [&] { of_others = elements_.MultiplyOthers(direction.data(), elements); });
-  ForTasks(part, [&](const Task& task, int index, int worker) {
-    partial_[static_cast<std::size_t>(index)] =
-        task.sheet ? kernels_.sheet_apply(sheet, inertia, matrix, p, q, carry_[static_cast<std::size_t>(worker)].data(),
-                                          task.first, task.end)
-                   : kernels_.organ_apply(organ, organ_matrix, inertia, direction.data(), q_.data(), Vertex(task.first),
-                                          Vertex(task.end));
-  });
-  return SumOfPartials(part.tasks.size()) + (of_hinges + of_others) +
-         elements_.AddContactProduct(direction.data(), 1.0f, q_.data());
-}
-
-double ImplicitSolver::Curvature(const FloatArray& direction, float inertia) {
-  const Sheet sheet = MakeSheet();
-  const SheetMatrix matrix = MakeMatrix();
-  const Organ organ = MakeOrgan();
-  const OrganMatrix organ_matrix = MakeOrganMatrix();
-  const float* const p[3] = {direction.data() + tube_floats_, direction.data() + tube_floats_ + plane_,
-                             direction.data() + tube_floats_ + 2 * plane_};
-  const std::span<const Task> tasks = regions_.part().tasks, patches = regions_.part().patches;
-  const auto sheet_tasks = static_cast<std::size_t>(regions_.part().sheet_tasks);
-  double of_hinges = 0, of_others = 0;
-  ForTasksBeside(
-      regions_.part().sheet_tasks, static_cast<int>(patches.size()),
-      [&](int index, int) {
-        const auto i = static_cast<std::size_t>(index);
-        const Task& task = i < sheet_tasks ? tasks[i] : patches[i - sheet_tasks];
-        if (task.sheet) {
-          // Edges from a row that is not computed are nobody else's.
-          const bool above = task.first > 0 && !regions_.computed(regions_.At(true, task.first - 1));
-          partial_[i] = kernels_.sheet_curvature(sheet, inertia, matrix, p, above, task.first, task.end);
-        } else {
-          partial_[i] = kernels_.organ_curvature(organ, organ_matrix, inertia, direction.data(), Vertex(task.first),
-                                                 Vertex(task.end));
-        }
-      },
-      [&] { of_hinges = elements_.MultiplyHinges(direction.data(), elements_.computed()); },
-      [&] { of_others = elements_.MultiplyOthers(direction.data(), elements_.computed()); });
-  return SumOfPartials(sheet_tasks + patches.size()) + (of_hinges + of_others) +
-         elements_.guard().Curvature(direction.data());
-}
-
-/// d, or its increment, <- before p + alpha (z + beta p); the residual, where it is wanted, goes on from that without
-/// the second part. After Curvature of z; q is that of p.
-void ImplicitSolver::LastStep(const Step& last, bool adds, float inertia) {
-  const Sheet sheet = MakeSheet();
-  const SheetMatrix matrix = MakeMatrix();
-  const Organ organ = MakeOrgan();
-  const OrganMatrix organ_matrix = MakeOrganMatrix();
-  const auto planes = [&](FloatArray& field) {
-    float* at = field.data() + tube_floats_;
-    return std::array<float*, 3>{at, at + plane_, at + 2 * plane_};
-  };
-  // Without a direction before it, p is anything, and need not be finite.
-  FloatArray& before = last.of_before == 0.0f ? z_ : p_;
-  const std::array<float*, 3> p = planes(before), z = planes(z_), q = planes(q_), d = planes(d_);
-  const std::span<const Task> tasks = regions_.part().tasks, wanted = wanted_.tasks;
-  std::fill(largest_sq_.begin(), largest_sq_.end(), 0.0f);
-  workers_.Turn();
-  workers_.Run(static_cast<int>(tasks.size() + wanted.size()), regions_.part().sheet_tasks, [&](int index, int worker) {
-    const auto i = static_cast<std::size_t>(index);
-    if (i < tasks.size()) {
-      ForRegions(tasks[i], [&](int region, int first, int end) {
-        largest_sq_[static_cast<std::size_t>(region)] =
-            tasks[i].sheet
-                ? kernels_.sheet_step(sheet, last.of_before, p.data(), last.alpha, z.data(), adds, d.data(), first, end)
-                : kernels_.organ_step(last.of_before, before.data(), last.alpha, z_.data(), adds, d_.data(),
-                                      Vertex(first), Vertex(end));
-      });
-      return;
-    }
-    const Task& task = wanted[i - tasks.size()];
-    if (last.beta != 0.0f) {
-      ForParts(task, [&](std::size_t first, std::size_t count) {
-        kernels_.add(-last.alpha * last.beta, q_.data() + first, residual_.data() + first, count);
-      });
-    }
-    if (task.sheet) {
-      kernels_.sheet_apply(sheet, inertia, matrix, z.data(), q.data(), carry_[static_cast<std::size_t>(worker)].data(),
-                           task.first, task.end);
-    } else {
-      kernels_.organ_apply(organ, organ_matrix, inertia, z_.data(), q_.data(), Vertex(task.first), Vertex(task.end));
-    }
-    AddElements(task, &q_);
-    ForParts(task, [&](std::size_t first, std::size_t count) {
-      kernels_.add(-last.alpha, q_.data() + first, residual_.data() + first, count);
-    });
-  });
-  elements_.AddContactProduct(z_.data(), -last.alpha, residual_.data());
-}
-
-/// Where Solve is to leave the residual: where it is somebody's force, or steepest descent goes on from it.
-void ImplicitSolver::WantResidual(std::span<const std::uint8_t> regions) {
-  if (std::equal(regions.begin(), regions.end(), wanted_.marked.begin())) {
-    return;
-  }
-  std::copy(regions.begin(), regions.end(), wanted_.marked.begin());
-  regions_.FindTasks(&wanted_);
-}
-
-void ImplicitSolver::AddElements(const Task& task, FloatArray* field) const {
-  ForRegions(task, [&](int region, int, int) { elements_.AddInRegion(region, field->data()); });
-}
-
-/// Preconditioned conjugate gradients from d = 0; the residual is then that of place + d where it is wanted.
-///
-/// Of the last direction z + beta p no more is needed than the curvature along it, and it is never stored: p and it are
-/// conjugate, so its curvature is that of z less beta^2 times that of p. Nor is the step along p before it: both are
-/// made at once.
-void ImplicitSolver::Solve(float inertia, int iterations) {
-  const Sheet sheet = MakeSheet();
-  const Middle middle = coarse_.middle();
-  const float* const r[3] = {residual_.data() + tube_floats_, residual_.data() + tube_floats_ + plane_,
-                             residual_.data() + tube_floats_ + 2 * plane_};
-  const auto restrict_rows = [&](const Task& task) {
-    if (task.sheet) {
-      kernels_.sheet_restrict(sheet, middle, r, row_sums_.data(), task.first, task.end);
-    }
-  };
-  ForTasks([&](const Task& task, int, int) {
-    if (forces_due_) {
-      AddElements(task, &residual_);
-    }
-    restrict_rows(task);
-  });
-  forces_due_ = false;
-  double rz = Precondition(), curvature = 0;
-  Step step;
-  for (int i = 0; i + 1 < iterations; ++i) {
-    const bool last_but_one = i + 2 == iterations;
-    FloatArray& direction = i == 0 ? z_ : p_;
-    curvature = Apply(direction, inertia);
-    // Nothing left to solve, or not finite: Finish counts what is not.
-    if (!(rz > 0.0) || !(curvature > 0.0)) {
-      LastStep({}, i > 0, inertia);
-      return;
-    }
-    const auto alpha = static_cast<float>(rz / curvature);
-    ForTasks([&](const Task& task, int, int) {
-      AddElements(task, &q_);
-      ForParts(task, [&](std::size_t first, std::size_t count) {
-        float *q = q_.data() + first, *residual = residual_.data() + first, *d = d_.data() + first;
-        if (last_but_one) {
-          kernels_.add(-alpha, q, residual, count);
-        } else if (i == 0) {
-          kernels_.start(alpha, direction.data() + first, q, d, residual, count);
-        } else {
-          kernels_.advance(alpha, direction.data() + first, q, d, residual, count);
-        }
-      });
-      restrict_rows(task);
-    });
-    if (i == 0) {
-      std::swap(z_, p_);
-    }
-    const double next = Precondition();
-    step.beta = static_cast<float>(next / rz);
-    rz = next;
-    if (last_but_one) {
-      step.of_before = alpha;
-      break;
-    }
-    ForTasks([&](const Task& task, int, int) {
-      ForParts(task, [&](std::size_t first, std::size_t count) {
-        kernels_.combine(z_.data() + first, step.beta, p_.data() + first, count);
-      });
-    });
-  }
-  const auto beta = static_cast<double>(step.beta);
-  curvature = Curvature(z_, inertia) - beta * beta * curvature;
-  if (rz > 0.0 && curvature > 0.0) {
-    step.alpha = static_cast<float>(rz / curvature);
-    step.of_before += step.alpha * step.beta;
-  }
-  LastStep(step, iterations > 2, inertia);
-}
-
-/// One step of steepest descent with the blocks of the diagonal, where stiff contacts press: with two iterations alone
-/// a pressed patch chatters. A third everywhere would do as well, at ten times the cost.
-void ImplicitSolver::SolveAtContacts(float inertia) {
-  const Sheet sheet = MakeSheet();
-  const SheetMatrix matrix = MakeMatrix();
-  const OrganMatrix organ_matrix = MakeOrganMatrix();
-  const float* const r[3] = {residual_.data() + tube_floats_, residual_.data() + tube_floats_ + plane_,
-                             residual_.data() + tube_floats_ + 2 * plane_};
-  float* const z[3] = {local_.data() + tube_floats_, local_.data() + tube_floats_ + plane_,
-                       local_.data() + tube_floats_ + 2 * plane_};
-  const float* const d[3] = {d_.data() + tube_floats_, d_.data() + tube_floats_ + plane_,
-                             d_.data() + tube_floats_ + 2 * plane_};
-  ForTasks(pressed_, [&](const Task& task, int index, int) {
-    partial_[static_cast<std::size_t>(index)] =
-        task.sheet ? kernels_.sheet_block_solve(sheet, matrix, r, z, task.first, task.end)
-                   : kernels_.organ_block_solve(organ_matrix, residual_.data(), local_.data(), Vertex(task.first),
-                                                Vertex(task.end));
-  });
-  const double rz = SumOfPartials(pressed_.tasks.size());
-  const double curvature = Apply(local_, inertia, around_, around_elements_);
-  elements_.Add(around_elements_, q_.data());
-  if (!(rz > 0.0) || !(curvature > 0.0)) {
-    return;
-  }
-  const auto alpha = static_cast<float>(rz / curvature);
-  ForTasks(around_, [&](const Task& task, int, int) {
-    ForParts(task, [&](std::size_t first, std::size_t count) {
-      kernels_.advance(alpha, local_.data() + first, q_.data() + first, d_.data() + first, residual_.data() + first,
-                       count);
-    });
-    ForRegions(task, [&](int region, int first, int end) {
-      largest_sq_[static_cast<std::size_t>(region)] =
-          task.sheet ? kernels_.sheet_largest(sheet, d, first, end)
-                     : kernels_.organ_largest(d_.data(), Vertex(first), Vertex(end));
-    });
-  });
-}
-
-float ImplicitSolver::LargestCorrection() const {
-  return std::sqrt(*std::max_element(largest_sq_.begin(), largest_sq_.end()));
-}
-
-void ImplicitSolver::LimitCorrection(float largest) {
-  if (largest <= kLargestCorrection) {
-    return;
-  }
-  const auto limit = [](float* x, float* y, float* z) {
+void ShortenCorrections(const FieldLayout& layout, FloatArray* d) {
+  const auto shorten = [](float* x, float* y, float* z) {
     const float length = std::sqrt(*x * *x + *y * *y + *z * *z);
-    if (length > kLargestCorrection) {
-      const float part = kLargestCorrection / length;
+    if (length > kLargestCorrection_m) {
+      const float part = kLargestCorrection_m / length;
       *x *= part;
       *y *= part;
       *z *= part;
     }
   };
-  for (std::size_t i = 0; i < 4 * std::size_t{tube_count_}; i += 4) {
-    limit(&d_[i], &d_[i + 1], &d_[i + 2]);
+  float* const tube = d->data();
+  for (std::size_t i = 0; i < kVertexFloats * layout.tube_count; i += kVertexFloats) {
+    shorten(tube + i, tube + i + 1, tube + i + 2);
   }
-  float* x = d_.data() + tube_floats_;
-  for (std::size_t i = 0; i < plane_; ++i) {
-    limit(x + i, x + plane_ + i, x + 2 * plane_ + i);
+  const auto [x, y, z] = layout.Planes(d);
+  for (std::size_t i = 0; i < layout.plane; ++i) {
+    shorten(x + i, y + i, z + i);
   }
 }
 
-/// Halves the correction until the energy is no larger than without it.
-void ImplicitSolver::SearchAlongCorrection(const Inertia& inertia, std::span<const ContactRow> contacts) {
-  const double before = EnergyAt(place_, inertia, contacts);
+/// Halves the correction until the energy is no larger than without it. The trial point is in Krylov q.
+void SearchAlongCorrection(const SolverContext& context, const Inertia& inertia, std::span<const ContactRow> contacts,
+                           SolverState* state, SolverScratch* scratch) {
+  const FieldLayout& layout = context.model.layout;
+  const FloatArray& point = state->linearisation.point;
+  FloatArray &d = scratch->krylov.d, &trial = scratch->krylov.q;
+  const double before = EnergyAt(context, point, inertia, contacts, state, scratch);
   for (int halving = 0; halving <= kHalvings; ++halving) {
-    ForTasks([&](const Task& task, int, int) {
-      ForParts(task, [&](std::size_t first, std::size_t floats) {
-        for (std::size_t i = first; i < first + floats; ++i) {
-          q_[i] = place_[i] + d_[i];
+    ForTasks(&context.workers, state->regions.computed(), [&](const Task& task, int, int) {
+      ForPieces(layout, task, [&](std::size_t first, std::size_t count) {
+        for (std::size_t i = first; i < first + count; ++i) {
+          trial[i] = point[i] + d[i];
         }
       });
     });
-    if (EnergyAt(q_, inertia, contacts) <= before || halving == kHalvings) {
+    if (EnergyAt(context, trial, inertia, contacts, state, scratch) <= before || halving == kHalvings) {
       break;
     }
-    for (std::size_t i = 0; i < tube_floats_ + 3 * plane_; ++i) {
-      d_[i] *= 0.5f;
+    for (std::size_t i = 0; i < layout.tube_floats + 3 * layout.plane; ++i) {
+      d[i] *= 0.5f;
     }
   }
+}
+
+}  // namespace
+
+/// Krylov z <- M r; the residual's part for the hats is in row_sums already. Returns r . z.
+double LinearSolver::Precondition() {
+  const auto r = context_.model.layout.Planes(std::as_const(state_.linearisation.residual));
+  const auto z = context_.model.layout.Planes(&scratch_.krylov.z);
+  const float* const residual = state_.linearisation.residual.data();
+  const RegionSet& computed = state_.regions.computed();
+  const float* const tube = context_.particles.tube();
+  state_.coarse.Solve(computed.tasks, scratch_.row_sums.data(), residual, tube, &context_.workers);
+  ForTasks(&context_.workers, computed, [&](const Task& task, int index, int) {
+    double& partial = scratch_.partial_sums[static_cast<std::size_t>(index)];
+    if (task.sheet) {
+      partial = context_.kernels.sheet.precondition(system_.sheet, system_.hats, system_.sheet_matrix, r.data(),
+                                                    z.data(), task.first, task.end);
+    } else {
+      float* const tube_z = scratch_.krylov.z.data();
+      (void)context_.kernels.organ.block_solve(system_.organ_matrix, residual, tube_z, Vertex(task.first),
+                                               Vertex(task.end));
+      partial = state_.coarse.Prolong(tube, residual, tube_z, task.first, task.end);
+    }
+  });
+  return SumInOrder(scratch_.partial_sums, computed.tasks.size());
+}
+
+double LinearSolver::Apply(const FloatArray& direction, const RegionSet& regions, const Selection& selection) {
+  const auto p = context_.model.layout.Planes(direction);
+  const auto q = context_.model.layout.Planes(&scratch_.krylov.q);
+  double of_hinges = 0, of_bindings = 0;
+  ForTasksBeside(
+      &context_.workers, 0, static_cast<int>(regions.patches.size()),
+      [&](int index, int) {
+        const Task& task = regions.patches[static_cast<std::size_t>(index)];
+        context_.kernels.organ.stress(system_.organ, system_.organ_matrix, direction.data(), Vertex(task.first),
+                                      Vertex(task.end));
+      },
+      [&] { of_hinges = state_.elements.MultiplyHinges(direction.data(), selection); },
+      [&] { of_bindings = state_.elements.MultiplyBindingsAndContacts(direction.data(), selection); });
+  ForTasks(&context_.workers, regions, [&](const Task& task, int index, int worker) {
+    float* const carry = scratch_.carry[static_cast<std::size_t>(worker)].data();
+    scratch_.partial_sums[static_cast<std::size_t>(index)] =
+        task.sheet
+            ? context_.kernels.sheet.apply(system_.sheet, system_.inertia, system_.sheet_matrix, p.data(), q.data(),
+                                           carry, task.first, task.end)
+            : context_.kernels.organ.apply(system_.organ, system_.organ_matrix, system_.inertia, direction.data(),
+                                           scratch_.krylov.q.data(), Vertex(task.first), Vertex(task.end));
+  });
+  return SumInOrder(scratch_.partial_sums, regions.tasks.size()) + (of_hinges + of_bindings) +
+         state_.elements.AddContactProduct(direction.data(), 1.0f, scratch_.krylov.q.data());
+}
+
+/// p . A p in one phase. Leaves the stress along p and the products of the elements with it.
+double LinearSolver::Curvature(const FloatArray& direction) {
+  const auto p = context_.model.layout.Planes(direction);
+  const Regions& regions = state_.regions;
+  const RegionSet& computed = regions.computed();
+  const auto sheet_tasks = static_cast<std::size_t>(computed.sheet_tasks);
+  double of_hinges = 0, of_bindings = 0;
+  ForTasksBeside(
+      &context_.workers, computed.sheet_tasks, static_cast<int>(computed.patches.size()),
+      [&](int index, int) {
+        const auto i = static_cast<std::size_t>(index);
+        const Task& task = i < sheet_tasks ? computed.tasks[i] : computed.patches[i - sheet_tasks];
+        double& partial = scratch_.partial_sums[i];
+        if (task.sheet) {
+          // Edges from a row that is not computed belong to no other task.
+          const bool above = task.first > 0 && !regions.computed(regions.partition().At(true, task.first - 1));
+          partial = context_.kernels.sheet.curvature(system_.sheet, system_.inertia, system_.sheet_matrix, p.data(),
+                                                     above, task.first, task.end);
+        } else {
+          partial = context_.kernels.organ.curvature(system_.organ, system_.organ_matrix, system_.inertia,
+                                                     direction.data(), Vertex(task.first), Vertex(task.end));
+        }
+      },
+      [&] { of_hinges = state_.elements.MultiplyHinges(direction.data(), state_.elements.computed()); },
+      [&] { of_bindings = state_.elements.MultiplyBindingsAndContacts(direction.data(), state_.elements.computed()); });
+  return SumInOrder(scratch_.partial_sums, sheet_tasks + computed.patches.size()) + (of_hinges + of_bindings) +
+         state_.elements.guard().Curvature(direction.data());
+}
+
+/// d, or its increment, from the last two directions; the residual, where it is wanted, is completed without the part
+/// of `before` that Solve has subtracted already. After Curvature of z; q is that of p.
+void LinearSolver::MakeLastStep(const LastStep& step, bool adds) {
+  const FieldLayout& layout = context_.model.layout;
+  const SheetKernels& sheet = context_.kernels.sheet;
+  const OrganKernels& organ = context_.kernels.organ;
+  KrylovVectors& v = scratch_.krylov;
+  FloatArray& residual = state_.linearisation.residual;
+  // Without a direction before it, p is undefined and may not be finite.
+  FloatArray& before = step.before == 0.0f ? v.z : v.p;
+  const auto p = layout.Planes(&before), z = layout.Planes(&v.z), q = layout.Planes(&v.q), d = layout.Planes(&v.d);
+  const RegionSet& computed = state_.regions.computed();
+  const std::span<const Task> tasks = computed.tasks, wanted = scratch_.residual_regions.tasks;
+  std::fill(scratch_.correction_sq.begin(), scratch_.correction_sq.end(), 0.0f);
+  const auto take_step = [&](const Task& task) {
+    ForRegions(context_.model.partition, task, [&](int region, int first, int end) {
+      scratch_.correction_sq[static_cast<std::size_t>(region)] =
+          task.sheet
+              ? sheet.step(system_.sheet, step.before, p.data(), step.alpha, z.data(), adds, d.data(), first, end)
+              : organ.step(step.before, before.data(), step.alpha, v.z.data(), adds, v.d.data(), Vertex(first),
+                           Vertex(end));
+    });
+  };
+  const auto complete_residual = [&](const Task& task, int worker) {
+    if (step.beta != 0.0f) {
+      ForPieces(layout, task, [&](std::size_t first, std::size_t count) {
+        context_.kernels.field.add(-step.alpha * step.beta, v.q.data() + first, residual.data() + first, count);
+      });
+    }
+    if (task.sheet) {
+      sheet.apply(system_.sheet, system_.inertia, system_.sheet_matrix, z.data(), q.data(),
+                  scratch_.carry[static_cast<std::size_t>(worker)].data(), task.first, task.end);
+    } else {
+      organ.apply(system_.organ, system_.organ_matrix, system_.inertia, v.z.data(), v.q.data(), Vertex(task.first),
+                  Vertex(task.end));
+    }
+    AddElements(task, &v.q);
+    ForPieces(layout, task, [&](std::size_t first, std::size_t count) {
+      context_.kernels.field.add(-step.alpha, v.q.data() + first, residual.data() + first, count);
+    });
+  };
+  context_.workers.AlternateOrder();
+  context_.workers.Run(static_cast<int>(tasks.size() + wanted.size()), computed.sheet_tasks,
+                       [&](int index, int worker) {
+                         const auto i = static_cast<std::size_t>(index);
+                         if (i < tasks.size()) {
+                           take_step(tasks[i]);
+                         } else {
+                           complete_residual(wanted[i - tasks.size()], worker);
+                         }
+                       });
+  state_.elements.AddContactProduct(v.z.data(), -step.alpha, residual.data());
+}
+
+void LinearSolver::SelectResidual(std::span<const std::uint8_t> regions) {
+  RegionSet& selected = scratch_.residual_regions;
+  if (std::equal(regions.begin(), regions.end(), selected.marked.begin())) {
+    return;
+  }
+  std::copy(regions.begin(), regions.end(), selected.marked.begin());
+  context_.model.partition.FindTasks(&selected);
+}
+
+void LinearSolver::AddElements(const Task& task, FloatArray* field) const {
+  ForRegions(context_.model.partition, task,
+             [&](int region, int, int) { state_.elements.AddInRegion(region, field->data()); });
+}
+
+/// The hats' part of the residual of a task.
+void LinearSolver::RestrictRows(const Task& task) {
+  if (task.sheet) {
+    const auto r = context_.model.layout.Planes(std::as_const(state_.linearisation.residual));
+    context_.kernels.sheet.restrict_rows(system_.sheet, system_.hats, r.data(), scratch_.row_sums.data(), task.first,
+                                         task.end);
+  }
+}
+
+/// Adds the forces of bindings and hinges that the linearisation has left out, and restricts the residual.
+void LinearSolver::StartResidual() {
+  Linearisation& at = state_.linearisation;
+  ForTasks(&context_.workers, state_.regions.computed(), [&](const Task& task, int, int) {
+    if (at.lacks_element_forces) {
+      AddElements(task, &at.residual);
+    }
+    RestrictRows(task);
+  });
+  at.lacks_element_forces = false;
+}
+
+/// The residual along a direction by alpha, and d too unless the last step includes it; restricts the residual.
+void LinearSolver::Advance(const FloatArray& direction, float alpha, bool first, bool step_follows) {
+  const FieldKernels& kernels = context_.kernels.field;
+  KrylovVectors& v = scratch_.krylov;
+  FloatArray& residual = state_.linearisation.residual;
+  ForTasks(&context_.workers, state_.regions.computed(), [&](const Task& task, int, int) {
+    AddElements(task, &v.q);
+    ForPieces(context_.model.layout, task, [&](std::size_t begin, std::size_t count) {
+      float *q = v.q.data() + begin, *r = residual.data() + begin, *d = v.d.data() + begin;
+      if (step_follows) {
+        kernels.add(-alpha, q, r, count);
+      } else if (first) {
+        kernels.start(alpha, direction.data() + begin, q, d, r, count);
+      } else {
+        kernels.advance(alpha, direction.data() + begin, q, d, r, count);
+      }
+    });
+    RestrictRows(task);
+  });
+}
+
+void LinearSolver::Solve(int iterations) {
+  KrylovVectors& v = scratch_.krylov;
+  StartResidual();
+  double rz = Precondition(), curvature = 0;
+  LastStep step;
+  for (int i = 0; i + 1 < iterations; ++i) {
+    const bool last_but_one = i + 2 == iterations;
+    const FloatArray& direction = i == 0 ? v.z : v.p;
+    curvature = Apply(direction);
+    // Nothing is left to solve, or it is not finite: Finish counts what is not.
+    if (!(rz > 0.0) || !(curvature > 0.0)) {
+      MakeLastStep({}, i > 0);
+      return;
+    }
+    const auto alpha = static_cast<float>(rz / curvature);
+    Advance(direction, alpha, i == 0, last_but_one);
+    if (i == 0) {
+      std::swap(v.z, v.p);
+    }
+    const double next = Precondition();
+    step.beta = static_cast<float>(next / rz);
+    rz = next;
+    if (last_but_one) {
+      step.before = alpha;
+      break;
+    }
+    ForTasks(&context_.workers, state_.regions.computed(), [&](const Task& task, int, int) {
+      ForPieces(context_.model.layout, task, [&](std::size_t first, std::size_t count) {
+        context_.kernels.field.combine(v.z.data() + first, step.beta, v.p.data() + first, count);
+      });
+    });
+  }
+  const auto beta = static_cast<double>(step.beta);
+  curvature = Curvature(v.z) - beta * beta * curvature;
+  if (rz > 0.0 && curvature > 0.0) {
+    step.alpha = static_cast<float>(rz / curvature);
+    step.before += step.alpha * step.beta;
+  }
+  MakeLastStep(step, iterations > 2);
+}
+
+void LinearSolver::DescendInContactZone() {
+  const FieldLayout& layout = context_.model.layout;
+  const Kernels& kernels = context_.kernels;
+  ContactZone& zone = state_.contact_zone;
+  KrylovVectors& v = scratch_.krylov;
+  FloatArray& residual = state_.linearisation.residual;
+  const auto r = layout.Planes(std::as_const(residual)), d = layout.Planes(std::as_const(v.d));
+  const auto z = layout.Planes(&zone.direction);
+  ForTasks(&context_.workers, zone.inner, [&](const Task& task, int index, int) {
+    scratch_.partial_sums[static_cast<std::size_t>(index)] =
+        task.sheet
+            ? kernels.sheet.block_solve(system_.sheet, system_.sheet_matrix, r.data(), z.data(), task.first, task.end)
+            : kernels.organ.block_solve(system_.organ_matrix, residual.data(), zone.direction.data(),
+                                        Vertex(task.first), Vertex(task.end));
+  });
+  const double rz = SumInOrder(scratch_.partial_sums, zone.inner.tasks.size());
+  const double curvature = Apply(zone.direction, zone.outer, zone.elements);
+  state_.elements.Add(zone.elements, v.q.data());
+  if (!(rz > 0.0) || !(curvature > 0.0)) {
+    return;
+  }
+  const auto alpha = static_cast<float>(rz / curvature);
+  ForTasks(&context_.workers, zone.outer, [&](const Task& task, int, int) {
+    ForPieces(layout, task, [&](std::size_t first, std::size_t count) {
+      kernels.field.advance(alpha, zone.direction.data() + first, v.q.data() + first, v.d.data() + first,
+                            residual.data() + first, count);
+    });
+    ForRegions(context_.model.partition, task, [&](int region, int first, int end) {
+      scratch_.correction_sq[static_cast<std::size_t>(region)] =
+          task.sheet ? kernels.sheet.largest(system_.sheet, d.data(), first, end)
+                     : kernels.organ.largest(v.d.data(), Vertex(first), Vertex(end));
+    });
+  });
+}
+
+Correction LimitCorrection(const SolverContext& context, const Inertia& inertia, std::span<const ContactRow> contacts,
+                           SolverState* state, SolverScratch* scratch) {
+  const std::vector<float>& by_region = scratch->correction_sq;
+  Correction correction;
+  correction.largest_m = std::sqrt(*std::max_element(by_region.begin(), by_region.end()));
+  if (correction.largest_m > kLargestCorrection_m) {
+    ShortenCorrections(context.model.layout, &scratch->krylov.d);
+  }
+  if (correction.largest_m > kDoubtfulCorrection_m) {
+    SearchAlongCorrection(context, inertia, contacts, state, scratch);
+    correction.line_searched = true;
+  }
+  return correction;
 }
 
 }  // namespace fulcrum::physics::implicit

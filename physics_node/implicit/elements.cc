@@ -4,26 +4,31 @@
 #include <cmath>
 
 #include "physics_node/collision/tissue_collision.h"
+#include "physics_node/implicit/kernels.h"
 #include "physics_node/simd/sse.h"
 
 namespace fulcrum::physics::implicit {
 namespace {
 
-/// Sliding slower than this within a step counts as sticking [m].
-constexpr float kStick = 1e-6f;
-/// Tools and tissue against tissue together; more make the list grow.
-constexpr std::size_t kMostContacts = 4608;
-/// A contact's resistance to movement along its normal within a substep, over its stiffness: what comes fast does not
-/// bounce.
+/// Normal stiffness of a contact with a tool and of tissue with tissue [N/m]. A tool's is ten times that of an edge of
+/// the membrane (some 200 N/m), so tissue yields and the contact hardly does; tissue rests on the fat around it, which
+/// is soft. Assumed.
+constexpr float kToolStiffness_N_per_m = 2000.0f, kTissueStiffness_N_per_m = 30.0f;
+/// Least movement along a surface that the Coulomb force is divided by [m]: less within a substep counts as sticking.
+/// Some hundred times the rounding of a position.
+constexpr float kStickDistance_m = 1e-6f;
+/// D over F': resistance to movement along the normal within a substep. With 1 what comes in fast does not bounce.
 constexpr float kContactDamping = 1.0f;
-/// A contact's viscosity against sliding over its normal stiffness, at most [s]. By time and not by substep: else what
-/// sticks creeps slowly in long substeps and at once in short ones.
-constexpr float kSlideTime = 3e-4f;
+/// Viscosity against sliding over normal stiffness, at most [s]: 0.6 N s/m at a tool. A time and not a share of the
+/// stiffness: with a stiffness per substep, what sticks creeps slowly in long substeps and at once in short ones.
+constexpr float kSlideTime_s = 3e-4f;
 /// Depth over which the contact of a tool gets stiff [m]: more than a tool moves in a substep (0.06 mm at most while it
-/// presses). Stiff at once, contacts come and go all together: in one substep some are missing from the linearisation,
-/// in the next they push back what fell in meanwhile, and the force of a tool that moves along a surface, be it by the
-/// rounding of its place, jumps by more than itself.
-constexpr float kOnset = 8e-5f;
+/// presses). Contacts that are stiff at once come and go all together: in one substep some are missing from the
+/// linearisation, in the next they push back what fell in meanwhile, and the force of a tool that moves along a
+/// surface, if only by the rounding of its position, jumps by more than itself.
+constexpr float kOnsetDepth_m = 8e-5f;
+/// Least length of a binding that is divided by [m].
+constexpr float kLeastBindingLength_m = 1e-9f;
 
 template <class Sum>
 Vec3f Combine(const Sum& e, const float* field) {
@@ -73,23 +78,25 @@ void AddShare(float weight, ParticleRef to, __m128 v, float* field) {
   }
 }
 template <class Sum>
-bool AnyMarked(const Sum& e, const Regions& regions, std::span<const std::uint8_t> marked) {
+bool AnyMarked(const Sum& e, const Partition& partition, std::span<const std::uint8_t> marked) {
   for (int k = 0; k < e.count; ++k) {
-    if (marked[static_cast<std::size_t>(regions.Of(e.at[static_cast<std::size_t>(k)]))] != 0) {
+    if (marked[static_cast<std::size_t>(partition.Of(e.at[static_cast<std::size_t>(k)]))] != 0) {
       return true;
     }
   }
   return false;
 }
 
-/// Of a contact `depth` deep, without damping.
+/// Of a contact `depth` deep, without damping. F' rises linearly to the full stiffness k over the onset depth o:
+///   depth < o:  F = k depth^2 / (2 o),  F' = k depth / o,  E = k depth^3 / (6 o)
+///   else:       F = k (depth - o/2),    F' = k,            E = k ((depth - o/2)^2 / 2 + o^2 / 24)
 struct Elastic {
-  float force;      ///< [N]
-  float stiffness;  ///< d force / d depth [N/m]
-  float energy;     ///< [J]
+  float force;      ///< F [N]
+  float stiffness;  ///< F' [N/m]
+  float energy;     ///< E [J]
 };
 Elastic ElasticOf(const ContactRow& row, float depth) {
-  const float full = Elements::ContactStiffness(row), onset = Elements::IsTissue(row) ? 0.0f : kOnset;
+  const float full = Elements::ContactStiffness(row), onset = Elements::IsTissue(row) ? 0.0f : kOnsetDepth_m;
   if (depth < onset) {
     const float stiffness = full * depth / onset;
     return {0.5f * stiffness * depth, stiffness, stiffness * depth * depth / 6.0f};
@@ -98,14 +105,14 @@ Elastic ElasticOf(const ContactRow& row, float depth) {
   return {full * past, full, full * (0.5f * past * past + onset * onset / 24.0f)};
 }
 
-/// What a contact does to its particles at `place`.
+/// What a contact does to its particles at `here`.
 struct ContactState {
-  float stiffness, damping;  ///< [N/m]; damping against the movement in this substep.
-  /// Normal [N]. Negative while what has penetrated leaves faster than the contact alone would drive it: cut off there,
-  /// the contact would be missing from the solve that should hold it in place, and chatter.
+  float stiffness, damping;  ///< F', D [N/m]; damping against the movement in this substep.
+  /// Normal [N]. Negative while tissue leaves faster than the contact alone would drive it: cut off at 0, the contact
+  /// would be missing from the solve that should hold it, and chatter.
   float force;
-  float tangential;  ///< Stiffness against sliding [N/m].
-  Vec3f slide;
+  float tangential;  ///< t: stiffness against sliding [N/m].
+  Vec3f slide;       ///< u_t [m].
 };
 ContactState StateOf(float h, const ContactRow& row, const Vec3f& here, const float* start) {
   ContactState state{};
@@ -119,22 +126,22 @@ ContactState StateOf(float h, const ContactRow& row, const Vec3f& here, const fl
   const Vec3f moved = here - Combine(row, start) - row.drift;
   const float approach = row.normal.dot(moved);
   state.force = elastic.force - state.damping * approach;
-  // Coulomb with the normal force at hand, viscous below it.
+  // Viscous up to Coulomb's limit for this normal force.
   state.slide = moved - approach * row.normal;
-  state.tangential = std::min(kSlideTime / h * state.stiffness,
-                              row.friction * std::max(state.force, 0.0f) / std::max(state.slide.norm(), kStick));
+  state.tangential = std::min(kSlideTime_s / h * state.stiffness, row.friction * std::max(state.force, 0.0f) /
+                                                                      std::max(state.slide.norm(), kStickDistance_m));
   return state;
 }
 
 }  // namespace
 
 float Elements::ContactStiffness(const ContactRow& row) {
-  constexpr float kTool = 2000.0f, kTissue = 30.0f;
-  return IsTissue(row) ? kTissue : kTool;
+  return IsTissue(row) ? kTissueStiffness_N_per_m : kToolStiffness_N_per_m;
 }
 bool Elements::IsTissue(const ContactRow& row) { return (row.source & TissueCollision::kSource) != 0; }
 
-Elements::Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
+Elements::Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles,
+                   const Partition& partition)
     : hinges_(model, particles), guard_(model) {
   for (const ElasticBinding& binding : model.bindings) {
     Element e;
@@ -148,66 +155,80 @@ Elements::Elements(const SceneView& scene, const ElasticModel& model, const Part
     binding_rest_.push_back({static_cast<float>(binding.rest_length), static_cast<float>(binding.stiffness),
                              binding.membrane - scene.membrane.first});
   }
-  computed_.bindings.reserve(bindings_.size());
-  binding_force_ = FloatArray(4 * bindings_.size() + 4);
-  contacts_.reserve(kMostContacts);
-  contact_force_.reserve(kMostContacts);
-  contact_product_.reserve(kMostContacts);
-}
-
-void Elements::Divide(const Regions& regions) {
-  shares_.assign(static_cast<std::size_t>(regions.count()), {});
+  computed_ = MakeSelection();
+  binding_force_ = FloatArray(kVertexFloats * (bindings_.size() + 1));
+  contacts_.reserve(kReservedContacts);
+  contact_force_.reserve(kReservedContacts);
+  contact_product_.reserve(kReservedContacts);
+  shares_.assign(static_cast<std::size_t>(partition.count()), {});
   for (std::uint32_t i = 0; i < bindings_.size(); ++i) {
     const Element& e = bindings_[i];
     for (std::size_t k = 0; k < 4; ++k) {
-      shares_[static_cast<std::size_t>(regions.Of(e.at[k]))].push_back({i, e.weight[k], e.at[k]});
+      shares_[static_cast<std::size_t>(partition.Of(e.at[k]))].push_back({i, e.weight[k], e.at[k]});
     }
   }
-  hinges_.Divide(regions);
+  hinges_.AssignRegions(partition);
 }
 
-void Elements::Follow(const TissueModel& tissue) {
+void Elements::UpdateTopology(const TissueModel& tissue) {
   for (std::size_t i = 0; i < bindings_.size(); ++i) {
     bindings_[i].active = tissue.NodeAlive(binding_rest_[i].node);
     if (!bindings_[i].active) {
-      std::fill_n(binding_force_.data() + 4 * i, 4, 0.0f);
+      std::fill_n(binding_force_.data() + kVertexFloats * i, kVertexFloats, 0.0f);
     }
   }
-  hinges_.Follow(tissue);
+  hinges_.UpdateTopology(tissue);
 }
 
-std::vector<std::pair<std::uint32_t, float>> Elements::Diagonal() const {
-  std::vector<std::pair<std::uint32_t, float>> diagonal = hinges_.Diagonal();
-  for (std::size_t i = 0; i < bindings_.size(); ++i) {
-    const Element& e = bindings_[i];
+std::vector<std::pair<std::uint32_t, float>> Elements::Diagonal(const ElasticModel& model,
+                                                                const ParticleStore& particles) {
+  std::vector<std::pair<std::uint32_t, float>> diagonal;
+  const auto add = [&](Index particle, double stiffness, double weight) {
+    const auto w = static_cast<float>(weight);
+    diagonal.emplace_back(particles.Ref(particle).base, static_cast<float>(stiffness) * w * w);
+  };
+  for (const ElasticHinge& hinge : model.hinges) {
     for (std::size_t k = 0; k < 4; ++k) {
-      diagonal.emplace_back(e.at[k].base, binding_rest_[i].stiffness * e.weight[k] * e.weight[k]);
+      add(hinge.v[k], hinge.stiffness, hinge.c[k]);
+    }
+  }
+  for (const ElasticBinding& binding : model.bindings) {
+    add(binding.membrane, binding.stiffness, 1.0);
+    for (std::size_t k = 0; k < 3; ++k) {
+      add(binding.surface[k], binding.stiffness, -binding.barycentric[k]);
     }
   }
   return diagonal;
 }
 
-void Elements::FollowRegions(const Regions& regions) {
-  Select(regions, regions.part().marked, regions.part().marked, &computed_);
+Selection Elements::MakeSelection() const {
+  Selection selection;
+  selection.bindings.reserve(bindings_.size());
+  selection.hinge_rows.reserve(hinges_.row_count());
+  return selection;
 }
 
-void Elements::Select(const Regions& regions, std::span<const std::uint8_t> moved, std::span<const std::uint8_t> felt,
-                      Selection* selection) const {
+void Elements::SelectComputed(const Regions& regions) {
+  Select(regions.partition(), regions.computed().marked, regions.computed().marked, &computed_);
+}
+
+void Elements::Select(const Partition& partition, std::span<const std::uint8_t> moved,
+                      std::span<const std::uint8_t> affected, Selection* selection) const {
   selection->bindings.clear();
   for (std::uint32_t i = 0; i < bindings_.size(); ++i) {
-    if (bindings_[i].active && AnyMarked(bindings_[i], regions, moved)) {
+    if (bindings_[i].active && AnyMarked(bindings_[i], partition, moved)) {
       selection->bindings.push_back(i);
     }
   }
-  hinges_.Select(regions, felt, &selection->hinge_rows);
+  hinges_.Select(partition, affected, &selection->hinge_rows);
 }
 
-void Elements::Touch(float h, const float* place, const float* start, const Regions& regions,
-                     std::span<const ContactRow> contacts) {
+void Elements::FindContacts(float h, const float* place, const float* start, const Regions& regions,
+                            std::span<const ContactRow> contacts) {
   contacts_.clear();
   contact_force_.clear();
   for (const ContactRow& row : contacts) {
-    if (!regions.everything() && !AnyMarked(row, regions, regions.part().marked)) {
+    if (!regions.all_computed() && !AnyMarked(row, regions.partition(), regions.computed().marked)) {
       continue;
     }
     const ContactState state = StateOf(h, row, Combine(row, place), start);
@@ -224,19 +245,18 @@ void Elements::Touch(float h, const float* place, const float* start, const Regi
   }
 }
 
-void Elements::LookForFolds(const float* place) { guard_.Linearise(place); }
-
-void Elements::LineariseOthers(const float* place) {
+void Elements::LineariseBindings(const float* place) {
   for (const std::uint32_t i : computed_.bindings) {
     Element& e = bindings_[i];
     const __m128 d = CombineBinding(e, place);
-    const float length = std::max(std::sqrt(_mm_cvtss_f32(Dot3(d, d))), 1e-9f), k = binding_rest_[i].stiffness;
+    const float length = std::max(std::sqrt(_mm_cvtss_f32(Dot3(d, d))), kLeastBindingLength_m),
+                k = binding_rest_[i].stiffness;
     const float tension = k * (length - binding_rest_[i].length);
     e.kt = std::max(tension / length, 0.0f);
     alignas(16) float m[4];
     _mm_store_ps(m, _mm_mul_ps(d, _mm_set1_ps(std::sqrt(std::max(k - e.kt, 0.0f)) / length)));
     e.m = Vec3f(m[0], m[1], m[2]);
-    _mm_store_ps(binding_force_.data() + 4 * std::size_t{i}, _mm_mul_ps(d, _mm_set1_ps(-tension / length)));
+    _mm_store_ps(binding_force_.data() + kVertexFloats * std::size_t{i}, _mm_mul_ps(d, _mm_set1_ps(-tension / length)));
   }
 }
 
@@ -247,14 +267,14 @@ void Elements::AddContactForces(float* residual) const {
   }
 }
 
-double Elements::MultiplyOthers(const float* p, const Selection& selection) {
+double Elements::MultiplyBindingsAndContacts(const float* p, const Selection& selection) {
   double sum = 0;
   for (const std::uint32_t i : selection.bindings) {
     const Element& e = bindings_[i];
     const __m128 d = CombineBinding(e, p), m = Xyz(e.m);
     const __m128 force = _mm_add_ps(_mm_mul_ps(_mm_set1_ps(e.kt), d), _mm_mul_ps(m, Dot3(m, d)));
     sum += static_cast<double>(_mm_cvtss_f32(Dot3(d, force)));
-    _mm_store_ps(binding_force_.data() + 4 * std::size_t{i}, force);
+    _mm_store_ps(binding_force_.data() + kVertexFloats * std::size_t{i}, force);
   }
   contact_product_.clear();
   for (const Element& e : contacts_in_product()) {
@@ -276,7 +296,8 @@ double Elements::AddContactProduct(const float* p, float scale, float* out) {
 
 void Elements::AddInRegion(int region, float* field) const {
   for (const Share& share : shares_[static_cast<std::size_t>(region)]) {
-    AddShare(share.weight, share.at, _mm_load_ps(binding_force_.data() + 4 * std::size_t{share.binding}), field);
+    AddShare(share.weight, share.at, _mm_load_ps(binding_force_.data() + kVertexFloats * std::size_t{share.binding}),
+             field);
   }
   hinges_.AddInRegion(region, field);
 }
@@ -285,13 +306,13 @@ void Elements::Add(const Selection& selection, float* field) const {
   for (const std::uint32_t i : selection.bindings) {
     const Element& e = bindings_[i];
     for (std::size_t k = 0; k < 4; ++k) {
-      AddShare(e.weight[k], e.at[k], _mm_load_ps(binding_force_.data() + 4 * std::size_t{i}), field);
+      AddShare(e.weight[k], e.at[k], _mm_load_ps(binding_force_.data() + kVertexFloats * std::size_t{i}), field);
     }
   }
   hinges_.Add(field, selection.hinge_rows);
 }
 
-double Elements::EnergyOfOthers(const float* place, std::span<const ContactRow> contacts) const {
+double Elements::EnergyOfBindingsAndContacts(const float* place, std::span<const ContactRow> contacts) const {
   double sum = guard_.Energy(place);
   for (const std::uint32_t i : computed_.bindings) {
     const __m128 d = CombineBinding(bindings_[i], place);
@@ -308,7 +329,7 @@ double Elements::EnergyOfOthers(const float* place, std::span<const ContactRow> 
 void Elements::WriteForces(float h, const float* place, const float* d, const float* start,
                            std::span<ContactRow> contacts) {
   for (ContactRow& row : contacts) {
-    if (!(ContactStiffness(row) > kStiffContact)) {
+    if (!(ContactStiffness(row) > kStiffContact_N_per_m)) {
       continue;
     }
     const ContactState state = StateOf(h, row, Combine(row, place) + Combine(row, d), start);

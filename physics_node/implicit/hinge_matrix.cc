@@ -3,9 +3,17 @@
 #include <algorithm>
 #include <map>
 
+#include "physics_node/implicit/kernels.h"
 #include "physics_node/simd/sse.h"
 
 namespace fulcrum::physics::implicit {
+namespace {
+
+/// Rows over particles from which on a copy of all particles next to one another costs less than gathering the columns
+/// of each row from the field: one in four. Assumed.
+constexpr std::size_t kGatherRatio = 4;
+
+}  // namespace
 
 HingeMatrix::HingeMatrix(const ElasticModel& model, const ParticleStore& particles) {
   std::map<Index, std::uint32_t> number;
@@ -14,13 +22,14 @@ HingeMatrix::HingeMatrix(const ElasticModel& model, const ParticleStore& particl
       number.try_emplace(v, 0);
     }
   }
-  rest_ = FloatArray(4 * number.size());
-  vector_ = FloatArray(4 * number.size());
-  product_ = FloatArray(4 * number.size());
+  rest_ = FloatArray(kVertexFloats * number.size());
+  vector_ = FloatArray(kVertexFloats * number.size());
+  product_ = FloatArray(kVertexFloats * number.size());
   for (auto& [v, n] : number) {
     n = static_cast<std::uint32_t>(particles_.size());
     for (int axis = 0; axis < 3; ++axis) {
-      rest_[4 * std::size_t{n} + static_cast<std::size_t>(axis)] = static_cast<float>(model.rest_position[v][axis]);
+      rest_[kVertexFloats * std::size_t{n} + static_cast<std::size_t>(axis)] =
+          static_cast<float>(model.rest_position[v][axis]);
     }
     particles_.push_back(particles.Ref(v));
   }
@@ -65,7 +74,7 @@ void HingeMatrix::Assemble() {
   }
 }
 
-void HingeMatrix::Follow(const TissueModel& tissue) {
+void HingeMatrix::UpdateTopology(const TissueModel& tissue) {
   bool changed = false;
   for (Index i = 0; i < hinges_.size(); ++i) {
     changed |= hinges_[i].whole != tissue.HingeWhole(i);
@@ -76,42 +85,32 @@ void HingeMatrix::Follow(const TissueModel& tissue) {
   }
 }
 
-void HingeMatrix::Divide(const Regions& regions) {
-  in_region_.assign(static_cast<std::size_t>(regions.count()), {});
+void HingeMatrix::AssignRegions(const Partition& partition) {
+  in_region_.assign(static_cast<std::size_t>(partition.count()), {});
   for (std::uint32_t i = 0; i < particles_.size(); ++i) {
-    in_region_[static_cast<std::size_t>(regions.Of(particles_[i]))].push_back(i);
+    in_region_[static_cast<std::size_t>(partition.Of(particles_[i]))].push_back(i);
   }
 }
 
-void HingeMatrix::Select(const Regions& regions, std::span<const std::uint8_t> marked,
+void HingeMatrix::Select(const Partition& partition, std::span<const std::uint8_t> marked,
                          std::vector<std::uint32_t>* rows) const {
   rows->clear();
   for (std::uint32_t i = 0; i < particles_.size(); ++i) {
-    if (marked[static_cast<std::size_t>(regions.Of(particles_[i]))] != 0) {
+    if (marked[static_cast<std::size_t>(partition.Of(particles_[i]))] != 0) {
       rows->push_back(i);
     }
   }
 }
 
-std::vector<std::pair<std::uint32_t, float>> HingeMatrix::Diagonal() const {
-  std::vector<std::pair<std::uint32_t, float>> diagonal;
-  for (const Hinge& hinge : hinges_) {
-    for (std::size_t k = 0; k < 4; ++k) {
-      diagonal.emplace_back(particles_[hinge.particle[k]].base, hinge.stiffness * hinge.weight[k] * hinge.weight[k]);
-    }
-  }
-  return diagonal;
-}
-
-void HingeMatrix::Take(const float* field, const float* minus) {
+void HingeMatrix::Gather(const float* field, const float* minus) {
   float* to = vector_.data();
   for (const ParticleRef at : particles_) {
     const std::size_t step = at.step;
     const float* from = field + at.base;
     _mm_store_ps(to, _mm_sub_ps(_mm_set_ps(0, from[2 * step], from[step], from[0]),
                                 minus ? _mm_load_ps(minus) : _mm_setzero_ps()));
-    to += 4;
-    minus = minus ? minus + 4 : nullptr;
+    to += kVertexFloats;
+    minus = minus ? minus + kVertexFloats : nullptr;
   }
 }
 
@@ -133,17 +132,18 @@ double HingeMatrix::ForRows(std::span<const std::uint32_t> rows, const Load& loa
 }
 
 void HingeMatrix::MakeForce(const float* place, std::span<const std::uint32_t> rows) {
-  Take(place, rest_.data());
-  const auto load = [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + 4 * std::size_t{k}); };
+  Gather(place, rest_.data());
+  const auto load = [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + kVertexFloats * std::size_t{k}); };
   (void)ForRows(rows, load, [&](std::uint32_t i, __m128 row) {
-    _mm_store_ps(product_.data() + 4 * std::size_t{i}, _mm_sub_ps(_mm_setzero_ps(), row));
+    _mm_store_ps(product_.data() + kVertexFloats * std::size_t{i}, _mm_sub_ps(_mm_setzero_ps(), row));
   });
 }
 
 double HingeMatrix::Multiply(const float* p, std::span<const std::uint32_t> rows) {
-  const auto keep = [&](std::uint32_t i, __m128 row) { _mm_store_ps(product_.data() + 4 * std::size_t{i}, row); };
-  // A few rows are quicker without a copy of all particles.
-  if (4 * rows.size() < particles_.size()) {
+  const auto keep = [&](std::uint32_t i, __m128 row) {
+    _mm_store_ps(product_.data() + kVertexFloats * std::size_t{i}, row);
+  };
+  if (kGatherRatio * rows.size() < particles_.size()) {
     const auto load = [&](std::uint32_t k) {
       const float* from = p + particles_[k].base;
       const std::size_t step = particles_[k].step;
@@ -151,14 +151,14 @@ double HingeMatrix::Multiply(const float* p, std::span<const std::uint32_t> rows
     };
     return ForRows(rows, load, keep);
   }
-  Take(p, nullptr);
+  Gather(p, nullptr);
   return ForRows(
-      rows, [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + 4 * std::size_t{k}); }, keep);
+      rows, [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + kVertexFloats * std::size_t{k}); }, keep);
 }
 
 void HingeMatrix::Add(float* field, std::span<const std::uint32_t> rows) const {
   for (const std::uint32_t i : rows) {
-    const float* row = product_.data() + 4 * std::size_t{i};
+    const float* row = product_.data() + kVertexFloats * std::size_t{i};
     const std::size_t step = particles_[i].step;
     float* at = field + particles_[i].base;
     at[0] += row[0];
@@ -168,8 +168,8 @@ void HingeMatrix::Add(float* field, std::span<const std::uint32_t> rows) const {
 }
 
 double HingeMatrix::Energy(const float* place, std::span<const std::uint32_t> rows) {
-  Take(place, rest_.data());
-  const auto load = [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + 4 * std::size_t{k}); };
+  Gather(place, rest_.data());
+  const auto load = [this](std::uint32_t k) { return _mm_load_ps(vector_.data() + kVertexFloats * std::size_t{k}); };
   return 0.5 * ForRows(rows, load, [](std::uint32_t, __m128) {});
 }
 

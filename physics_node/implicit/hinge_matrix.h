@@ -1,5 +1,9 @@
-// Quadratic bending of all hinges as one matrix. Each hinge's energy is k/2 |sum_k c_k (x_k - X_k)|^2, so the three
-// axes see the same constant scalar matrix over the few particles that hinges use.
+// Quadratic bending of all hinges as one matrix (Bergou et al. 2006). The energy of a hinge is
+//
+//   E = k/2 |sum_i c_i (x_i - X_i)|^2,      K_ij = sum over hinges k c_i c_j,
+//
+// with stiffness k [N/m], weights c, places x and X at rest [m]: one constant scalar matrix, the same for the three
+// axes, over the few hundred particles of hinges, in compressed rows.
 #pragma once
 
 #include <cstdint>
@@ -15,21 +19,21 @@ class HingeMatrix {
  public:
   HingeMatrix(const ElasticModel& model, const ParticleStore& particles);
 
-  /// Takes out hinges that a cut has severed, and puts back those that are whole again.
-  void Follow(const TissueModel& tissue);
-  /// Once, before AddInRegion: which region each particle is in.
-  void Divide(const Regions& regions);
+  /// Removes hinges that a cut has severed, and restores those that are whole again.
+  void UpdateTopology(const TissueModel& tissue);
+  /// Once, before AddInRegion: lists the rows of each region.
+  void AssignRegions(const Partition& partition);
   /// Rows of particles in marked regions.
-  void Select(const Regions& regions, std::span<const std::uint8_t> marked, std::vector<std::uint32_t>* rows) const;
+  void Select(const Partition& partition, std::span<const std::uint8_t> marked, std::vector<std::uint32_t>* rows) const;
+  [[nodiscard]] std::size_t row_count() const { return particles_.size(); }
 
-  /// Of each particle's diagonal: pool offset of x and what all hinges, severed or not, add to it [N/m].
-  [[nodiscard]] std::vector<std::pair<std::uint32_t, float>> Diagonal() const;
-  // A product is made in two halves, of which the first may run while others write fields: for Add.
+  // A product has two halves: the first reads fields and may run while kernels write other fields, the second (Add)
+  // writes one.
   /// -K (place - rest), in these rows.
   void MakeForce(const float* place, std::span<const std::uint32_t> rows);
   /// K p, in these rows; returns their share of p . K p.
   double Multiply(const float* p, std::span<const std::uint32_t> rows);
-  /// Adds what was made last to a field, in the same rows.
+  /// field += the last force or product, in the same rows.
   void Add(float* field, std::span<const std::uint32_t> rows) const;
   /// The same in all rows of a region.
   void AddInRegion(int region, float* field) const { Add(field, in_region_[static_cast<std::size_t>(region)]); }
@@ -44,8 +48,8 @@ class HingeMatrix {
     bool whole = true;
   };
   void Assemble();
-  /// vector_ <- the particles' xyz_ of a field, `minus` taken off.
-  void Take(const float* field, const float* minus);
+  /// vector_ <- the particles' xyz_ of a field, less `minus`.
+  void Gather(const float* field, const float* minus);
   /// use(i, xyz_ of row i of K x) for these rows; returns their share of x . K x. load(k): xyz_ of particle k in x.
   template <class Load, class Use>
   double ForRows(std::span<const std::uint32_t> rows, const Load& load, const Use& use) const;

@@ -3,30 +3,33 @@
 #include <Eigen/SVD>
 #include <algorithm>
 
+#include "physics_node/implicit/kernels.h"
+
 namespace fulcrum::physics::implicit {
 namespace {
 
-/// k over the shear modulus: a fold in the wall of a mirrored organ gives way from 5 on; at 20 single tetrahedra snap.
-constexpr double kPart = 10;
-/// |F - R| of a tetrahedron that is left alone again. So near rest that little energy is taken out: let go as soon as
-/// it is the right way round, it falls back, is found again, and so shakes the wall for good.
-constexpr float kSound = 0.1f;
+/// k over the shear modulus: a fold in the wall of a mirrored organ opens from 5 on; at 20 single tetrahedra snap.
+constexpr double kStiffnessOverShear = 10;
+/// |F - R| below which a tetrahedron is released. So near rest that little energy is released with it: released as soon
+/// as its orientation was right, it fell back and was found again, and the wall shook for ever.
+constexpr float kReleaseStrain = 0.1f;
 
 Vec3f At(const float* field, Index v) {
-  return {field[4 * std::size_t{v}], field[4 * std::size_t{v} + 1], field[4 * std::size_t{v} + 2]};
+  return {field[kVertexFloats * std::size_t{v}], field[kVertexFloats * std::size_t{v} + 1],
+          field[kVertexFloats * std::size_t{v} + 2]};
 }
 void Add(float* field, Index v, const Vec3f& value) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    field[4 * std::size_t{v} + axis] += value[static_cast<Eigen::Index>(axis)];
+    field[kVertexFloats * std::size_t{v} + axis] += value[static_cast<Eigen::Index>(axis)];
   }
 }
 
-/// f less the rotation nearest to it.
+/// F - R for the rotation R nearest to F, by singular values.
 Eigen::Matrix3f Strain(const Eigen::Matrix3f& f) {
   const Eigen::JacobiSVD<Eigen::Matrix3f> svd(f, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3f u = svd.matrixU();
   if (u.determinant() * svd.matrixV().determinant() < 0.0f) {
-    u.col(2) *= -1.0f;  // A mirror image goes back along its least stretch.
+    u.col(2) *= -1.0f;  // A mirror image is turned back along its least stretch.
   }
   return f - u * svd.matrixV().transpose();
 }
@@ -38,7 +41,7 @@ InversionGuard::InversionGuard(const ElasticModel& model) {
     Vertices& vertices = tets_.emplace_back();
     std::copy(tet.v.begin(), tet.v.end(), vertices.begin());
     Shape& shape = shapes_.emplace_back();
-    shape.stiffness = static_cast<float>(kPart * model.mu_Pa * tet.volume);
+    shape.stiffness = static_cast<float>(kStiffnessOverShear * model.mu_Pa * tet.volume);
     for (std::size_t k = 1; k < 4; ++k) {
       shape.gradient[k] = tet.inverse_edges.row(static_cast<Eigen::Index>(k) - 1).transpose().cast<float>();
       shape.gradient[0] -= shape.gradient[k];
@@ -55,8 +58,8 @@ Eigen::Matrix3f InversionGuard::Gradient(std::size_t tet, const float* place) co
   return f;
 }
 
-void InversionGuard::Look(const float* place) {
-  const std::size_t end = std::min(next_ + tets_.size() / kParts + 1, tets_.size());
+void InversionGuard::Scan(const float* place) {
+  const std::size_t end = std::min(next_ + tets_.size() / kScanSubsteps + 1, tets_.size());
   for (; next_ < end; ++next_) {
     const Vertices& v = tets_[next_];
     const Vec3f x0 = At(place, v[0]);
@@ -70,13 +73,14 @@ void InversionGuard::Look(const float* place) {
 }
 
 void InversionGuard::Linearise(const float* place) {
-  Look(place);
+  Scan(place);
   for (Found& found : found_) {
     const Eigen::Matrix3f f = Gradient(found.tet, place);
-    // What is not finite is put back elsewhere, and found again if need be.
+    // Particles that are not finite are reset at the end of the substep; the next scan examines them again.
     found.strain = f.allFinite() ? Strain(f) : Eigen::Matrix3f::Zero();
   }
-  std::erase_if(found_, [](const Found& found) { return found.strain.squaredNorm() < kSound * kSound; });
+  std::erase_if(found_,
+                [](const Found& found) { return found.strain.squaredNorm() < kReleaseStrain * kReleaseStrain; });
 }
 
 void InversionGuard::AddForce(float* residual) const {

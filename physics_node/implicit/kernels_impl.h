@@ -1,4 +1,11 @@
-// All kernels of one instruction set as a table. FULCRUM_KERNEL_NAMESPACE names it.
+// All kernels of one instruction set as a table. FULCRUM_KERNEL_NAMESPACE names it. The equations, symbols and layouts
+// stand at the head of the file of each group:
+//
+//   sheet_rows_impl.h      membrane: edges linearised, K p, p . K p             (stencil of three edges per node)
+//   sheet_kernels_impl.h   membrane: prediction, energy, update; vector operations on fields
+//   level_kernels_impl.h   membrane: diagonal blocks and hats; blocks of the coarse factor
+//   organ_patches_impl.h   organ by patch: law, V P and V dP, energy            (gather over the vertices of a patch)
+//   organ_kernels_impl.h   organ by vertex: residual, K p, diagonal blocks      (gather over the patches of a vertex)
 #pragma once
 
 #include "physics_node/implicit/level_kernels_impl.h"
@@ -12,37 +19,37 @@ namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
 constexpr implicit::Kernels MakeKernels(const char* name) {
   implicit::Kernels k{};
   k.name = name;
-  k.sheet_guess = SheetGuess;
-  k.sheet_linearise = SheetLineariseRows;
-  k.sheet_apply = SheetApply;
-  k.sheet_curvature = SheetCurvature;
-  k.sheet_energy = SheetEnergy;
-  k.middle_blocks = MiddleBlocks;
-  k.sheet_restrict = SheetRestrict;
-  k.sheet_precondition = SheetPrecondition;
-  k.sheet_block_solve = SheetBlockSolve;
-  k.sheet_finish = SheetFinish;
-  k.sheet_step = SheetStep;
-  k.sheet_largest = SheetLargest;
-  k.block_product = BlockProduct;
-  k.substitute = Substitute;
-  k.combine = Combine;
-  k.start = StartFields;
-  k.advance = AdvanceFields;
-  k.add = AddFields;
-  k.within = Within;
-  k.organ_guess = OrganGuess;
-  k.organ_linearise = OrganLinearise;
-  k.organ_residual = OrganResidual;
-  k.organ_blocks = OrganBlocks;
-  k.organ_stress = OrganStress;
-  k.organ_apply = OrganApply;
-  k.organ_curvature = OrganCurvature;
-  k.organ_block_solve = OrganBlockSolve;
-  k.organ_energy = OrganEnergy;
-  k.organ_finish = OrganFinish;
-  k.organ_step = OrganStep;
-  k.organ_largest = OrganLargest;
+  k.sheet.predict = SheetPredict;
+  k.sheet.linearise = SheetLineariseRows;
+  k.sheet.apply = SheetApply;
+  k.sheet.curvature = SheetCurvature;
+  k.sheet.energy = SheetEnergy;
+  k.sheet.hat_blocks = HatBlocks;
+  k.sheet.restrict_rows = SheetRestrict;
+  k.sheet.precondition = SheetPrecondition;
+  k.sheet.block_solve = SheetBlockSolve;
+  k.sheet.finish = SheetFinish;
+  k.sheet.step = SheetStep;
+  k.sheet.largest = SheetLargest;
+  k.organ.predict = OrganPredict;
+  k.organ.linearise = OrganLinearise;
+  k.organ.residual = OrganResidual;
+  k.organ.blocks = OrganBlocks;
+  k.organ.stress = OrganStress;
+  k.organ.apply = OrganApply;
+  k.organ.curvature = OrganCurvature;
+  k.organ.block_solve = OrganBlockSolve;
+  k.organ.energy = OrganEnergy;
+  k.organ.finish = OrganFinish;
+  k.organ.step = OrganStep;
+  k.organ.largest = OrganLargest;
+  k.field.combine = Combine;
+  k.field.start = StartFields;
+  k.field.advance = AdvanceFields;
+  k.field.add = AddFields;
+  k.field.within = Within;
+  k.factor.block_product = BlockProduct;
+  k.factor.substitute = Substitute;
   return k;
 }
 

@@ -1,82 +1,109 @@
-// How the solver's arrays come out of ElasticModel, and how they follow what cutting and shrinking do.
-#include "physics_node/implicit/implicit_solver.h"
+// The solver's memory: how the arrays of ImplicitModel are made of an ElasticModel, how SheetEdges follow cuts and
+// shrinking, what state and scratch allocate, and the views of them that kernels get.
+#include <algorithm>
+#include <utility>
+
+#include "physics_node/implicit/elements.h"
+#include "physics_node/implicit/implicit_model.h"
+#include "physics_node/implicit/implicit_state.h"
+#include "physics_node/implicit/sheet_edges.h"
 
 namespace fulcrum::physics::implicit {
 namespace {
 
-/// A node is frayed when cuts have left it at most half of its six edges: the border of a clean cut keeps four.
-constexpr int kFrayed = 3;
-/// Of what is left of a frayed node's edges: stiffness across them, in the solve only, over that along them.
+/// Lost edges from which on a node is frayed, of six: the border of a clean cut loses two.
+constexpr int kFrayedEdges = 3;
+/// Stiffness of a frayed node's edges in every direction, in the matrix only, over that along them. Of 0, 2, 5, 20 and
+/// 50 % this one evaluated the energy least often (deploy/docs/measurements/physics, Shreds).
 constexpr float kFrayedStiffness = 0.05f;
+
+/// Memory is reserved for so many entries of the diagonal that contacts raise, and for so many particles of a query;
+/// with more the lists grow.
+constexpr std::size_t kReservedRaised = 4 * Elements::kReservedContacts, kReservedQueried = 256;
+
+/// Pairs of particles that patches and bindings join.
+std::vector<std::pair<ParticleRef, ParticleRef>> JoinedParticles(const ElasticModel& model,
+                                                                 const ParticleStore& particles) {
+  std::vector<std::pair<ParticleRef, ParticleRef>> joined;
+  for (const ElasticPatch& patch : model.patches) {
+    for (Index i = patch.first_link; i < patch.first_link + patch.link_count; ++i) {
+      joined.emplace_back(particles.Ref(patch.vertex), particles.Ref(model.patch_links[i].v));
+    }
+  }
+  for (const ElasticBinding& binding : model.bindings) {
+    for (const Index v : binding.surface) {
+      joined.emplace_back(particles.Ref(binding.membrane), particles.Ref(v));
+    }
+  }
+  return joined;
+}
 
 }  // namespace
 
-void ImplicitSolver::PackSheet(const ElasticModel& model) {
-  const GridLayout& layout = particles_->layout();
-  sheet_mass_ = FloatArray(plane_);
-  for (int d = 0; d < 3; ++d) {
-    const auto i = static_cast<std::size_t>(d);
-    inverse_rest_[i] = FloatArray(plane_);
-    axial_[i] = FloatArray(plane_);
-    axial_uncut_[i] = FloatArray(plane_);
+SheetModel::SheetModel(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
+    : mass(particles.layout().plane()),
+      stiffening(static_cast<float>(model.stiffening)),
+      rest_scale(1.0f / (1.0f + scene.physics.membrane_prestrain)) {
+  const GridLayout& layout = particles.layout();
+  for (std::size_t d = 0; d < 3; ++d) {
+    inverse_rest[d] = FloatArray(layout.plane());
+    axial[d] = FloatArray(layout.plane());
   }
-  missing_edges_.assign(plane_, 0);
   for (std::uint32_t row = 0; row < layout.rows; ++row) {
     for (std::uint32_t col = 0; col < layout.cols; ++col) {
       const std::uint32_t node = row * layout.cols + col, at = layout.Offset(row, col);
-      sheet_mass_[at] = static_cast<float>(model.mass[tube_count_ + node]);
+      mass[at] = static_cast<float>(model.mass[particles.tube_count() + node]);
       for (std::size_t d = 0; d < 3; ++d) {
         const ElasticSpring& spring = model.springs[3 * node + d];
-        axial_uncut_[d][at] = static_cast<float>(spring.axial);
-        axial_[d][at] = axial_uncut_[d][at];
-        inverse_rest_[d][at] = spring.axial > 0 ? static_cast<float>(1.0 / spring.rest_length) : 1.0f;
+        axial[d][at] = static_cast<float>(spring.axial);
+        inverse_rest[d][at] = spring.axial > 0 ? static_cast<float>(1.0 / spring.rest_length) : 1.0f;
       }
     }
   }
 }
 
-void ImplicitSolver::PackOrgan(const ElasticModel& model, std::uint32_t tube_count) {
-  mu_ = static_cast<float>(model.mu_Pa);
-  lambda_ = static_cast<float>(model.lambda_Pa + model.mu_Pa);
-  volume_ = FloatArray(tube_count + kPatchGroup);
-  organ_mass_ = FloatArray(tube_count + kPatchGroup);
-  start_.assign(tube_count + 1, 0);
-  patch_start_.assign(tube_count + 1, 0);
-  for (const ElasticPatch& patch : model.patches) {
-    volume_[patch.vertex] = static_cast<float>(patch.volume);
-    start_[patch.vertex + 1] = patch.link_count;
+OrganModel::OrganModel(const ElasticModel& model, std::uint32_t vertices)
+    : start(vertices + 1, 0),
+      patch_start(vertices + 1, 0),
+      volume(vertices + kPatchGroup),
+      mass(vertices + kPatchGroup),
+      mu(static_cast<float>(model.mu_Pa)),
+      lambda(static_cast<float>(model.lambda_Pa + model.mu_Pa)) {
+  for (const ElasticPatch& of_vertex : model.patches) {
+    volume[of_vertex.vertex] = static_cast<float>(of_vertex.volume);
+    start[of_vertex.vertex + 1] = of_vertex.link_count;
   }
   for (const ElasticPatchLink& link : model.patch_links) {
-    ++patch_start_[link.v + 1];
+    ++patch_start[link.v + 1];
   }
-  for (std::uint32_t v = 0; v < tube_count; ++v) {
-    organ_mass_[v] = static_cast<float>(model.mass[v]);
-    start_[v + 1] += start_[v];
-    patch_start_[v + 1] += patch_start_[v];
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    mass[v] = static_cast<float>(model.mass[v]);
+    start[v + 1] += start[v];
+    patch_start[v + 1] += patch_start[v];
   }
   const std::size_t links = model.patch_links.size();
-  vertex_.resize(links);
-  patch_.resize(links);
-  gradient_ = FloatArray(4 * links);
-  patch_gradient_ = FloatArray(4 * links);
-  std::vector<std::uint32_t> next(patch_start_.begin(), patch_start_.end());
-  for (const ElasticPatch& patch : model.patches) {
-    for (Index i = 0; i < patch.link_count; ++i) {
-      const ElasticPatchLink& link = model.patch_links[patch.first_link + i];
-      const std::uint32_t to = start_[patch.vertex] + i, back = next[link.v]++;
-      vertex_[to] = link.v;
-      patch_[back] = patch.vertex;
+  vertex.resize(links);
+  patch.resize(links);
+  gradient = FloatArray(kVertexFloats * links);
+  patch_gradient = FloatArray(kVertexFloats * links);
+  std::vector<std::uint32_t> next(patch_start.begin(), patch_start.end());
+  for (const ElasticPatch& of_vertex : model.patches) {
+    for (Index i = 0; i < of_vertex.link_count; ++i) {
+      const ElasticPatchLink& link = model.patch_links[of_vertex.first_link + i];
+      const std::uint32_t to = start[of_vertex.vertex] + i, back = next[link.v]++;
+      vertex[to] = link.v;
+      patch[back] = of_vertex.vertex;
       for (int axis = 0; axis < 3; ++axis) {
         const auto g = static_cast<float>(link.gradient[axis]);
-        gradient_[4 * std::size_t{to} + static_cast<std::size_t>(axis)] = g;
-        patch_gradient_[4 * std::size_t{back} + static_cast<std::size_t>(axis)] = g;
+        gradient[kVertexFloats * to + static_cast<std::size_t>(axis)] = g;
+        patch_gradient[kVertexFloats * back + static_cast<std::size_t>(axis)] = g;
       }
     }
   }
   const auto edge = [&](Index from, Index to) -> float& {
-    for (std::uint32_t i = patch_start_[from];; ++i) {
-      if (patch_[i] == to) {
-        return patch_gradient_[4 * std::size_t{i} + 3];
+    for (std::uint32_t i = patch_start[from];; ++i) {
+      if (patch[i] == to) {
+        return patch_gradient[kVertexFloats * i + 3];
       }
     }
   };
@@ -85,90 +112,236 @@ void ImplicitSolver::PackOrgan(const ElasticModel& model, std::uint32_t tube_cou
     edge(link.a, link.b) = k;
     edge(link.b, link.a) = k;
   }
-  // The same by patch, for products that gather nothing.
-  next.assign(patch_start_.begin(), patch_start_.end());
-  for (const ElasticPatch& patch : model.patches) {
-    for (Index i = 0; i < patch.link_count; ++i) {
-      const std::uint32_t back = next[model.patch_links[patch.first_link + i].v]++;
-      gradient_[4 * std::size_t{start_[patch.vertex] + i} + 3] = patch_gradient_[4 * std::size_t{back} + 3];
+  // The same by patch: the curvature then gathers nothing by vertex.
+  next.assign(patch_start.begin(), patch_start.end());
+  for (const ElasticPatch& of_vertex : model.patches) {
+    for (Index i = 0; i < of_vertex.link_count; ++i) {
+      const std::uint32_t back = next[model.patch_links[of_vertex.first_link + i].v]++;
+      gradient[kVertexFloats * (start[of_vertex.vertex] + i) + 3] = patch_gradient[kVertexFloats * back + 3];
     }
   }
 }
 
-/// Regions, and which of them the organ's patches and the bindings join.
-Regions ImplicitSolver::MakeRegions(const ElasticModel& model) const {
-  std::vector<std::pair<ParticleRef, ParticleRef>> joined;
-  for (const ElasticPatch& patch : model.patches) {
-    for (Index i = patch.first_link; i < patch.first_link + patch.link_count; ++i) {
-      joined.emplace_back(particles_->Ref(patch.vertex), particles_->Ref(model.patch_links[i].v));
-    }
-  }
-  for (const ElasticBinding& binding : model.bindings) {
-    for (const Index v : binding.surface) {
-      joined.emplace_back(particles_->Ref(binding.membrane), particles_->Ref(v));
-    }
-  }
-  return Regions(*particles_, joined);
+Organ OrganModel::View() const {
+  return {static_cast<std::uint32_t>(start.size() - 1),
+          start.data(),
+          vertex.data(),
+          gradient.data(),
+          patch_start.data(),
+          patch.data(),
+          patch_gradient.data(),
+          volume.data(),
+          mu,
+          lambda,
+          static_cast<float>(kPatchVariance),
+          mass.data()};
 }
 
-void ImplicitSolver::FollowEdge(const TissueModel& tissue, Index row, Index col, std::size_t direction) {
-  const GridLayout& layout = particles_->layout();
-  const std::uint32_t at = layout.Offset(row, col);
+ImplicitModel::ImplicitModel(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
+    : layout(particles),
+      grid(particles.layout()),
+      partition(particles, JoinedParticles(model, particles)),
+      sheet(scene, model, particles),
+      organ(model, particles.tube_count()),
+      load(layout.floats),
+      element_diagonal(layout.scalar_count()),
+      damping_per_s(static_cast<float>(model.damping_per_s)),
+      gravity(model.gravity.cast<float>()) {
+  for (Index p = 0; p < model.load.size(); ++p) {
+    PutField(load.data(), particles.Ref(p), model.load[p].cast<float>());
+  }
+  for (const auto& [base, stiffness] : Elements::Diagonal(model, particles)) {
+    element_diagonal[layout.ScalarIndex({base})] += stiffness;
+  }
+}
+
+Inertia ImplicitModel::InertiaOf(float h) const {
+  return {h, (1.0f + damping_per_s * h) / (h * h), {gravity.x(), gravity.y(), gravity.z()}};
+}
+
+SheetEdges::SheetEdges(const ImplicitModel& model, const TissueModel& tissue) : model_(model) {
+  const std::size_t plane = model.layout.plane;
+  for (std::size_t d = 0; d < 3; ++d) {
+    axial_[d] = FloatArray(plane);
+    inverse_rest_[d] = FloatArray(plane);
+    std::copy_n(model.sheet.axial[d].data(), plane, axial_[d].data());
+    std::copy_n(model.sheet.inverse_rest[d].data(), plane, inverse_rest_[d].data());
+  }
+  missing_.assign(plane, 0);
+  frayed_nodes_.reserve(plane);
+  frayed_edges_.reserve(3 * plane);  // A frayed node has at most three edges left.
+  for (std::uint32_t row = 0; row < model.grid.rows; ++row) {
+    for (std::uint32_t col = 0; col < model.grid.cols; ++col) {
+      for (std::size_t d = 0; d < 3; ++d) {
+        Update(tissue, row, col, d);
+      }
+    }
+  }
+}
+
+Sheet SheetEdges::View(const float* inverse_mass) const {
+  return {model_.layout.rows,
+          model_.layout.slots,
+          {inverse_rest_[0].data(), inverse_rest_[1].data(), inverse_rest_[2].data()},
+          {axial_[0].data(), axial_[1].data(), axial_[2].data()},
+          model_.sheet.stiffening,
+          inverse_mass,
+          model_.sheet.mass.data()};
+}
+
+void SheetEdges::Update(const TissueModel& tissue, Index row, Index col, std::size_t direction) {
+  const GridLayout& grid = model_.grid;
+  const std::uint32_t at = grid.Offset(row, col);
   const float rest = tissue.rest(static_cast<int>(direction))[at], before = axial_[direction][at];
-  axial_[direction][at] = rest > 0.0f ? axial_uncut_[direction][at] : 0.0f;
+  axial_[direction][at] = rest > 0.0f ? model_.sheet.axial[direction][at] : 0.0f;
   if (rest > 0.0f) {
-    inverse_rest_[direction][at] = 1.0f / (rest * rest_scale_);
+    inverse_rest_[direction][at] = 1.0f / (rest * model_.sheet.rest_scale);
   }
   if ((before > 0.0f) != (axial_[direction][at] > 0.0f)) {
     const int missing = before > 0.0f ? 1 : -1;
-    missing_edges_[at] += missing;
-    missing_edges_[layout.Offset(row + (direction != 0 ? 1 : 0), col + (direction != 1 ? 1 : 0))] += missing;
+    missing_[at] += missing;
+    missing_[grid.Offset(row + (direction != 0 ? 1 : 0), col + (direction != 1 ? 1 : 0))] += missing;
   }
 }
 
-void ImplicitSolver::FindFrayed() {
-  const GridLayout& layout = particles_->layout();
-  frayed_.clear();
+void SheetEdges::FindFrayed() {
+  const GridLayout& grid = model_.grid;
+  frayed_nodes_.clear();
   frayed_edges_.clear();
-  const auto add = [&](std::size_t direction, std::uint32_t at, std::uint32_t other) {
+  const auto add = [&](std::size_t direction, std::uint32_t at, std::uint32_t far_end) {
     const float along = axial_[direction][at] * inverse_rest_[direction][at];
     if (along > 0.0f) {
-      frayed_edges_.push_back({direction, {at, other}, kFrayedStiffness * along});
+      frayed_edges_.push_back({direction, {at, far_end}, kFrayedStiffness * along});
     }
   };
-  for (std::uint32_t at = 0; at < missing_edges_.size(); ++at) {
-    if (missing_edges_[at] < kFrayed) {
+  for (std::uint32_t at = 0; at < missing_.size(); ++at) {
+    if (missing_[at] < kFrayedEdges) {
       continue;
     }
-    frayed_.push_back({static_cast<std::uint32_t>(tube_floats_) + at, static_cast<std::uint32_t>(plane_)});
-    const Index row = layout.RowAt(at), col = layout.ColAt(at);
+    frayed_nodes_.push_back({static_cast<std::uint32_t>(model_.layout.tube_floats) + at, grid.plane()});
+    const Index row = grid.RowAt(at), col = grid.ColAt(at);
     for (std::size_t d = 0; d < 3; ++d) {
       const Index down = d != 0 ? 1 : 0, right = d != 1 ? 1 : 0;
-      if (row + down < layout.rows && col + right < layout.cols) {
-        add(d, at, layout.Offset(row + down, col + right));
+      if (row + down < grid.rows && col + right < grid.cols) {
+        add(d, at, grid.Offset(row + down, col + right));
       }
-      // Of an edge between two frayed nodes the first one tells.
-      if (row >= down && col >= right && missing_edges_[layout.Offset(row - down, col - right)] < kFrayed) {
-        add(d, layout.Offset(row - down, col - right), at);
+      // An edge between two frayed nodes is added at the one that owns it.
+      if (row >= down && col >= right && missing_[grid.Offset(row - down, col - right)] < kFrayedEdges) {
+        add(d, grid.Offset(row - down, col - right), at);
       }
     }
   }
 }
 
-void ImplicitSolver::Follow(const TissueModel& tissue) {
-  const GridLayout& layout = particles_->layout();
-  for (const Index edge : tissue.edited_edges()) {
-    const Index row = edge / 3 / layout.cols, col = edge / 3 % layout.cols;
-    FollowEdge(tissue, row, col, edge % 3);
-    coarse_.MarkEdit(row, col, edge % 3);
-    regions_.Wake(regions_.Of(particles_->NodeRef(row, col)));
-    regions_.Wake(regions_.Of(particles_->NodeRef(std::min(row + 1, layout.rows - 1), col)));
+Linearisation::Linearisation(const ImplicitModel& model)
+    : point(model.layout.floats), residual(model.layout.floats), element_diagonal(model.layout.scalar_count()) {
+  const FieldLayout& layout = model.layout;
+  for (std::size_t d = 0; d < 3; ++d) {
+    kt[d] = FloatArray(layout.plane);
+    along[d] = FloatArray(layout.plane);
   }
-  FindFrayed();
-  coarse_.ScaleBlocks(MakeSheet());
-  elements_.Follow(tissue);
-  elements_.FollowRegions(regions_);
-  around_due_ = true;
+  for (FloatArray& block : sheet_blocks) {
+    block = FloatArray(layout.plane);
+  }
+  for (FloatArray* a : {&organ_c, &organ_f, &organ_blocks}) {
+    *a = FloatArray(kMatrixFloats * (layout.tube_count + kPatchGroup));
+  }
+  std::copy_n(model.element_diagonal.data(), element_diagonal.size(), element_diagonal.data());
+  raised.reserve(kReservedRaised);
+}
+
+ContactZone::ContactZone(const ImplicitModel& model, const Elements& all_elements)
+    : pressed(static_cast<std::size_t>(model.partition.count()), 0),
+      inner(model.partition.MakeSet()),
+      outer(model.partition.MakeSet()),
+      elements(all_elements.MakeSelection()),
+      direction(model.layout.floats) {}
+
+TouchedRegions::TouchedRegions(const ImplicitModel& model)
+    : held(static_cast<std::size_t>(model.partition.count()), 0), touched(held) {}
+
+Movement::Movement(const ParticleStore& particles)
+    : of_step(particles.block_count(), 0.0f), before_sleep(particles.block_count(), 0.0f) {}
+
+SolverState::SolverState(const SceneView& scene, const ElasticModel& elastic, const TissueModel& tissue,
+                         const SolverContext& context)
+    : velocity(context.model.layout.floats),
+      edges(context.model, tissue),
+      elements(scene, elastic, context.particles, context.model.partition),
+      regions(context.model.partition),
+      coarse(scene, elastic, context.particles, context.kernels),
+      linearisation(context.model),
+      contact_zone(context.model, elements),
+      touched(context.model),
+      movement(context.particles) {
+  organ_blocks.urgent.assign(static_cast<std::size_t>(context.model.partition.count()), 0);
+  for (FloatArray& displacement : query_displacement) {
+    displacement = FloatArray(context.model.layout.floats);
+  }
+  elements.UpdateTopology(tissue);
+}
+
+KrylovVectors::KrylovVectors(const FieldLayout& layout)
+    : z(layout.floats), p(layout.floats), q(layout.floats), d(layout.floats) {}
+
+SolverScratch::SolverScratch(const SolverContext& context, std::size_t hat_row_floats)
+    : krylov(context.model.layout),
+      kept_residual(context.model.layout.floats),
+      organ_stress(kStressFloats * (context.model.layout.tube_count + std::size_t{1})),
+      row_sums(static_cast<std::size_t>(context.model.layout.rows) * hat_row_floats),
+      touched(context.model),
+      residual_regions(context.model.partition.MakeSet()) {
+  for (int worker = 0; worker < context.workers.count(); ++worker) {
+    carry.emplace_back(kCarryPlanes * context.model.layout.stride + kCacheLineFloats);
+  }
+  const auto regions = static_cast<std::size_t>(context.model.partition.count());
+  partial_sums.assign(regions, 0.0);
+  predicted.assign(regions, {});
+  finished.assign(regions, {});
+  speed.assign(regions, 0.0f);
+  correction_sq.assign(regions, 0.0f);
+  wanted.assign(regions, 0);
+  queried.reserve(kReservedQueried);
+}
+
+LinearSystem::LinearSystem(const SolverContext& context, float mass_factor, SolverState* state, SolverScratch* scratch)
+    : sheet(state->edges.View(context.particles.plane(3))),
+      organ(context.model.organ.View()),
+      hats(state->coarse.hats()),
+      inertia(mass_factor) {
+  Linearisation& at = state->linearisation;
+  const auto point = context.model.layout.Planes(std::as_const(at.point));
+  for (std::size_t d = 0; d < 3; ++d) {
+    sheet_matrix.kt[d] = at.kt[d].data();
+    sheet_matrix.along[d] = at.along[d].data();
+    sheet_matrix.point[d] = point[d];
+  }
+  for (std::size_t i = 0; i < at.sheet_blocks.size(); ++i) {
+    sheet_matrix.block[i] = at.sheet_blocks[i].data();
+  }
+  organ_matrix = {at.organ_c.data(), at.organ_f.data(), scratch->organ_stress.data(), at.organ_blocks.data()};
+}
+
+SheetFields SheetFieldsAt(const SolverContext& context, const SolverState& state, const FloatArray& point,
+                          FloatArray* residual) {
+  const FieldLayout& layout = context.model.layout;
+  SheetFields fields;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::size_t plane = layout.tube_floats + axis * layout.plane;
+    fields.point[axis] = point.data() + plane;
+    fields.start[axis] = context.particles.plane(static_cast<int>(axis));
+    fields.velocity[axis] = state.velocity.data() + plane;
+    fields.load[axis] = context.model.load.data() + plane;
+    fields.residual[axis] = residual ? residual->data() + plane : nullptr;
+  }
+  fields.element_diagonal = state.linearisation.element_diagonal.data();
+  return fields;
+}
+
+OrganFields OrganFieldsAt(const SolverContext& context, const SolverState& state, const FloatArray& point,
+                          FloatArray* residual) {
+  return {point.data(), context.particles.tube(), state.velocity.data(), context.model.load.data(),
+          residual ? residual->data() : nullptr};
 }
 
 }  // namespace fulcrum::physics::implicit

@@ -2,14 +2,18 @@
 
 #include <algorithm>
 
+#include "physics_node/implicit/kernels.h"
+
 namespace fulcrum::physics::implicit {
 namespace {
 
+/// With four, two threads had a task more or less than each other in each phase and took a tenth longer
+/// (deploy/docs/measurements/physics).
 constexpr int kRegionsPerTask = 3;
 
 }  // namespace
 
-Regions::Regions(const ParticleStore& particles, std::span<const std::pair<ParticleRef, ParticleRef>> joined)
+Partition::Partition(const ParticleStore& particles, std::span<const std::pair<ParticleRef, ParticleRef>> joined)
     : tube_floats_(particles.tube_floats()),
       stride_(particles.layout().stride),
       tube_count_(particles.tube_count()),
@@ -17,8 +21,7 @@ Regions::Regions(const ParticleStore& particles, std::span<const std::pair<Parti
       cols_(particles.layout().cols) {
   const auto regions = [](std::uint32_t count, int of) { return (static_cast<int>(count) + of - 1) / of; };
   sheet_regions_ = regions(rows_, kRows);
-  const int all = sheet_regions_ + regions(tube_count_, kVertices);
-  neighbours_.resize(static_cast<std::size_t>(all));
+  neighbours_.resize(static_cast<std::size_t>(sheet_regions_ + regions(tube_count_, kVertices)));
   const auto join = [&](int a, int b) {
     if (a != b) {
       neighbours_[static_cast<std::size_t>(a)].push_back(b);
@@ -35,21 +38,14 @@ Regions::Regions(const ParticleStore& particles, std::span<const std::pair<Parti
     std::sort(list.begin(), list.end());
     list.erase(std::unique(list.begin(), list.end()), list.end());
   }
-  const auto size = static_cast<std::size_t>(all);
-  awake_.assign(size, 1);
-  near_.assign(size, 1);
-  still_s_.assign(size, 0.0f);
-  part_ = MakePart();
-  taken_out_.reserve(size);
-  (void)Rebuild();
 }
 
-int Regions::Of(ParticleRef at) const {
-  return at.base < tube_floats_ ? At(false, static_cast<int>(at.base / 4))
+int Partition::Of(ParticleRef at) const {
+  return at.base < tube_floats_ ? At(false, static_cast<int>(at.base / kVertexFloats))
                                 : At(true, static_cast<int>((at.base - tube_floats_) / stride_));
 }
 
-Task Regions::Extent(int region) const {
+Task Partition::Extent(int region) const {
   if (region < sheet_regions_) {
     return {true, region * kRows, std::min((region + 1) * kRows, static_cast<int>(rows_))};
   }
@@ -57,45 +53,35 @@ Task Regions::Extent(int region) const {
   return {false, first, std::min(first + kVertices, static_cast<int>(tube_count_))};
 }
 
-void Regions::Wake(int region) {
-  const auto i = static_cast<std::size_t>(region);
-  still_s_[i] = 0;
-  if (awake_[i] == 0) {
-    awake_[i] = 1;
-    changed_ = true;
-  }
+int Partition::ParticlesOf(int region) const {
+  const Task extent = Extent(region);
+  return (extent.end - extent.first) * (extent.sheet ? static_cast<int>(cols_) : 1);
 }
 
-void Regions::WakeAll() {
-  for (int region = 0; region < count(); ++region) {
-    Wake(region);
-  }
+RegionSet Partition::MakeSet() const {
+  const auto size = static_cast<std::size_t>(count());
+  RegionSet set;
+  set.marked.assign(size, 0);
+  set.near.assign(size, 0);
+  set.tasks.reserve(size);
+  set.patches.reserve(size);
+  return set;
 }
 
-void Regions::Settle(std::span<const float> speed, float h) {
-  for (std::size_t i = 0; i < awake_.size(); ++i) {
-    if (awake_[i] != 0) {
-      still_s_[i] += h;
-    }
-  }
-  for (std::size_t i = 0; i < awake_.size(); ++i) {
-    if (speed[i] >= kStillSpeed) {
-      Wake(static_cast<int>(i));
+void Partition::MarkNear(RegionSet* set) const {
+  std::fill(set->near.begin(), set->near.end(), std::uint8_t{0});
+  for (std::size_t i = 0; i < set->marked.size(); ++i) {
+    if (set->marked[i] != 0) {
+      set->near[i] = 1;
       for (const int neighbour : neighbours_[i]) {
-        Wake(neighbour);
+        set->near[static_cast<std::size_t>(neighbour)] = 1;
       }
     }
   }
-  for (std::size_t i = 0; i < awake_.size(); ++i) {
-    if (awake_[i] != 0 && still_s_[i] >= kStillTime) {
-      awake_[i] = 0;
-      changed_ = true;
-    }
-  }
 }
 
-void Regions::AddTasks(int first_region, int end_region, std::span<const std::uint8_t> wanted,
-                       std::vector<Task>* tasks) const {
+void Partition::AddTasks(int first_region, int end_region, std::span<const std::uint8_t> wanted,
+                         std::vector<Task>* tasks) const {
   int length = 0;
   for (int region = first_region; region < end_region; ++region) {
     if (wanted[static_cast<std::size_t>(region)] == 0) {
@@ -113,14 +99,67 @@ void Regions::AddTasks(int first_region, int end_region, std::span<const std::ui
   }
 }
 
+void Partition::FindTasks(RegionSet* set) const {
+  set->tasks.clear();
+  set->patches.clear();
+  AddTasks(0, sheet_regions_, set->marked, &set->tasks);
+  set->sheet_tasks = static_cast<int>(set->tasks.size());
+  AddTasks(sheet_regions_, count(), set->marked, &set->tasks);
+  MarkNear(set);
+  AddTasks(sheet_regions_, count(), set->near, &set->patches);
+}
+
+Regions::Regions(const Partition& partition) : partition_(partition), computed_(partition.MakeSet()) {
+  const auto size = static_cast<std::size_t>(partition.count());
+  awake_.assign(size, 1);
+  still_s_.assign(size, 0.0f);
+  removed_.reserve(size);
+  (void)Rebuild();
+}
+
+void Regions::Wake(int region) {
+  const auto i = static_cast<std::size_t>(region);
+  still_s_[i] = 0;
+  if (awake_[i] == 0) {
+    awake_[i] = 1;
+    changed_ = true;
+  }
+}
+
+void Regions::WakeAll() {
+  for (int region = 0; region < partition_.count(); ++region) {
+    Wake(region);
+  }
+}
+
+void Regions::UpdateSleep(std::span<const float> speed, float h) {
+  for (std::size_t i = 0; i < awake_.size(); ++i) {
+    if (awake_[i] != 0) {
+      still_s_[i] += h;
+    }
+  }
+  for (std::size_t i = 0; i < awake_.size(); ++i) {
+    if (speed[i] >= kStillSpeed_m_s) {
+      Wake(static_cast<int>(i));
+      for (const int neighbour : partition_.neighbours(static_cast<int>(i))) {
+        Wake(neighbour);
+      }
+    }
+  }
+  for (std::size_t i = 0; i < awake_.size(); ++i) {
+    if (awake_[i] != 0 && still_s_[i] >= kStillTime_s) {
+      awake_[i] = 0;
+      changed_ = true;
+    }
+  }
+}
+
 float Regions::awake_part() const {
   int particles = 0;
-  for (int region = 0; region < count(); ++region) {
-    const Task extent = Extent(region);
-    const int size = (extent.end - extent.first) * (extent.sheet ? static_cast<int>(cols_) : 1);
-    particles += awake_[static_cast<std::size_t>(region)] != 0 ? size : 0;
+  for (int region = 0; region < partition_.count(); ++region) {
+    particles += awake_[static_cast<std::size_t>(region)] != 0 ? partition_.ParticlesOf(region) : 0;
   }
-  return static_cast<float>(particles) / static_cast<float>(std::max(rows_ * cols_ + tube_count_, 1u));
+  return static_cast<float>(particles) / static_cast<float>(std::max(partition_.particle_count(), 1));
 }
 
 bool Regions::Rebuild() {
@@ -128,60 +167,29 @@ bool Regions::Rebuild() {
     return false;
   }
   changed_ = false;
-  const bool everything = awake_part() > kLargestPart;
-  if (everything && everything_) {
+  const bool all = awake_part() > kLargestAwakePart;
+  if (all && all_computed_) {
     return false;
   }
-  everything_ = everything;
-  taken_out_.clear();
-  for (int region = 0; region < count(); ++region) {
+  all_computed_ = all;
+  removed_.clear();
+  for (int region = 0; region < partition_.count(); ++region) {
     const auto i = static_cast<std::size_t>(region);
-    const bool now = everything || awake_[i] != 0;
-    if (part_.marked[i] != 0 && !now) {
-      taken_out_.push_back(region);
+    const bool now = all || awake_[i] != 0;
+    if (computed_.marked[i] != 0 && !now) {
+      removed_.push_back(region);
     }
-    part_.marked[i] = now ? 1 : 0;
+    computed_.marked[i] = now ? 1 : 0;
   }
-  FindTasks(&part_);
+  partition_.FindTasks(&computed_);
   return true;
 }
 
-Part Regions::MakePart() const {
-  const auto size = static_cast<std::size_t>(count());
-  Part part;
-  part.marked.assign(size, 0);
-  part.tasks.reserve(size);
-  part.patches.reserve(size);
-  return part;
-}
-
-void Regions::MarkNear(std::span<const std::uint8_t> marked) {
-  std::fill(near_.begin(), near_.end(), std::uint8_t{0});
-  for (std::size_t i = 0; i < marked.size(); ++i) {
-    if (marked[i] != 0) {
-      near_[i] = 1;
-      for (const int neighbour : neighbours_[i]) {
-        near_[static_cast<std::size_t>(neighbour)] = 1;
-      }
-    }
+void Regions::Widen(RegionSet* set) const {
+  partition_.MarkNear(set);
+  for (std::size_t i = 0; i < set->near.size(); ++i) {
+    set->marked[i] = set->near[i] != 0 && computed_.marked[i] != 0 ? 1 : 0;
   }
-}
-
-void Regions::Widen(Part* part) {
-  MarkNear(part->marked);
-  for (std::size_t i = 0; i < near_.size(); ++i) {
-    part->marked[i] = near_[i] != 0 && part_.marked[i] != 0 ? 1 : 0;
-  }
-}
-
-void Regions::FindTasks(Part* part) {
-  part->tasks.clear();
-  part->patches.clear();
-  AddTasks(0, sheet_regions_, part->marked, &part->tasks);
-  part->sheet_tasks = static_cast<int>(part->tasks.size());
-  AddTasks(sheet_regions_, count(), part->marked, &part->tasks);
-  MarkNear(part->marked);
-  AddTasks(sheet_regions_, count(), near_, &part->patches);
 }
 
 }  // namespace fulcrum::physics::implicit

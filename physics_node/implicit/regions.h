@@ -1,7 +1,8 @@
-// Which parts of the tissue are computed. The membrane is divided into bands of rows, the organ into runs of vertices.
-// A region that stays still for a while falls asleep; what moves keeps its neighbours awake, so movement spreads a
-// region a substep, and a sleeping region is to those awake a body that does not yield. Contact, grasp, cuts and heat
-// wake explicitly. Sleep pays only where little is awake: as long as more than kLargestPart is, all is computed.
+// Which regions of the tissue are computed. The membrane is divided into bands of rows, the organ into runs of vertices
+// (Partition, built once). A region that stays still for a while falls asleep; a moving one keeps its neighbours awake,
+// so movement spreads by one region a substep, and to the regions awake a sleeping one is a body that does not yield.
+// Contact, grasp, cuts and heat wake explicitly. Sleep saves time only where little is awake: while more than
+// kLargestAwakePart is, all regions are computed.
 #pragma once
 
 #include <cstdint>
@@ -13,34 +14,32 @@
 
 namespace fulcrum::physics::implicit {
 
-/// A stretch of work: rows of the membrane or vertices of the organ, at most three regions long.
+/// A unit of work: rows of the membrane or vertices of the organ, at most three regions long.
 struct Task {
   bool sheet = true;
   int first = 0, end = 0;
 };
 
-/// Regions in which something is computed.
-struct Part {
+/// A set of regions and the tasks that cover it.
+struct RegionSet {
   std::vector<std::uint8_t> marked;  ///< By region.
+  std::vector<std::uint8_t> near;    ///< By region: marked or next to one that is.
   std::vector<Task> tasks;           ///< In order: the membrane, then the organ.
   int sheet_tasks = 0;               ///< How many are of the membrane.
   std::vector<Task> patches;         ///< Vertices of the organ whose patches those need.
 };
 
-class Regions {
+/// The division of the tissue into regions, and which of them forces join. Does not change.
+class Partition {
  public:
-  static constexpr int kRows = 8;
-  static constexpr int kVertices = 64;
-  /// What moves slower than this for so long falls asleep [m/s], [s].
-  static constexpr float kStillSpeed = 1e-4f;
-  static constexpr float kStillTime = 0.5f;
-  /// Of all particles.
-  static constexpr float kLargestPart = 0.35f;
+  /// Rows of the membrane and vertices of the organ in a region. Assumed: small, so that local movement keeps little
+  /// tissue awake; large against the cost of claiming a task.
+  static constexpr int kRows = 8, kVertices = 64;
 
-  /// All awake. `joined`: pairs of particles that forces join beyond rows and vertices next to each other.
-  Regions(const ParticleStore& particles, std::span<const std::pair<ParticleRef, ParticleRef>> joined);
+  /// `joined`: pairs of particles that forces join beyond rows and vertices next to each other.
+  Partition(const ParticleStore& particles, std::span<const std::pair<ParticleRef, ParticleRef>> joined);
 
-  [[nodiscard]] int count() const { return static_cast<int>(awake_.size()); }
+  [[nodiscard]] int count() const { return static_cast<int>(neighbours_.size()); }
   [[nodiscard]] int Of(ParticleRef at) const;
   /// Of a row of the membrane or a vertex of the organ.
   [[nodiscard]] int At(bool sheet, int place) const {
@@ -48,43 +47,69 @@ class Regions {
   }
   /// Rows or vertices of a region.
   [[nodiscard]] Task Extent(int region) const;
-  [[nodiscard]] bool computed(int region) const { return part_.marked[static_cast<std::size_t>(region)] != 0; }
-  [[nodiscard]] bool nothing() const { return part_.tasks.empty(); }
-  [[nodiscard]] bool everything() const { return everything_; }
-  /// Part of all particles that is awake, whether or not the rest is computed too.
+  [[nodiscard]] std::span<const int> neighbours(int region) const {
+    return neighbours_[static_cast<std::size_t>(region)];
+  }
+  /// Particles of a region, places beyond the last column left out; of all regions.
+  [[nodiscard]] int ParticlesOf(int region) const;
+  [[nodiscard]] int particle_count() const { return static_cast<int>(rows_ * cols_ + tube_count_); }
+
+  /// An empty set with memory for all regions.
+  [[nodiscard]] RegionSet MakeSet() const;
+  /// set->near from set->marked.
+  void MarkNear(RegionSet* set) const;
+  /// near, tasks and patches of the marked regions.
+  void FindTasks(RegionSet* set) const;
+
+ private:
+  void AddTasks(int first_region, int end_region, std::span<const std::uint8_t> wanted, std::vector<Task>* tasks) const;
+
+  std::uint32_t tube_floats_, stride_, tube_count_, rows_, cols_;
+  int sheet_regions_ = 0;
+  std::vector<std::vector<int>> neighbours_;  ///< By region.
+};
+
+/// Which regions are awake, and which are computed.
+class Regions {
+ public:
+  /// A region that moves slower than this for so long falls asleep [m/s], [s]: 1 um in a step of 10 ms for 50 steps, as
+  /// for the tissue as a whole (simulation/tissue_sleep.cc).
+  static constexpr float kStillSpeed_m_s = 1e-4f, kStillTime_s = 0.5f;
+  /// Of all particles; with more awake all are computed. A large sheet is solved badly without coarse nodes, and these
+  /// need all regions. Assumed.
+  static constexpr float kLargestAwakePart = 0.35f;
+
+  /// All awake. `partition` must outlive this.
+  explicit Regions(const Partition& partition);
+
+  [[nodiscard]] const Partition& partition() const { return partition_; }
+  [[nodiscard]] bool computed(int region) const { return computed_.marked[static_cast<std::size_t>(region)] != 0; }
+  [[nodiscard]] bool none_computed() const { return computed_.tasks.empty(); }
+  [[nodiscard]] bool all_computed() const { return all_computed_; }
+  [[nodiscard]] const RegionSet& computed() const { return computed_; }
+  /// Part of all particles that is awake, also while all are computed.
   [[nodiscard]] float awake_part() const;
 
   /// Keeps awake, or wakes; in force after the next Rebuild.
   void Wake(int region);
   void WakeAll();
   /// At the end of a substep of h: puts to sleep and wakes by the largest speed of each region [m/s].
-  void Settle(std::span<const float> speed, float h);
-  /// True when what is computed has changed since the last call; then the tasks are new.
+  void UpdateSleep(std::span<const float> speed, float h);
+  /// True when the computed regions have changed since the last call; then the tasks are new.
   bool Rebuild();
+  /// Regions that the last Rebuild has removed.
+  [[nodiscard]] std::span<const int> removed() const { return removed_; }
 
-  /// What is computed.
-  [[nodiscard]] const Part& part() const { return part_; }
-  [[nodiscard]] Part MakePart() const;
-  /// Adds to part->marked all neighbours that are computed.
-  void Widen(Part* part);
-  /// Tasks and patches of what is marked.
-  void FindTasks(Part* part);
-  /// Regions that the last Rebuild has taken out.
-  [[nodiscard]] std::span<const int> taken_out() const { return taken_out_; }
+  /// Adds to set->marked all neighbours that are computed.
+  void Widen(RegionSet* set) const;
 
  private:
-  void AddTasks(int first_region, int end_region, std::span<const std::uint8_t> wanted, std::vector<Task>* tasks) const;
-  /// near_ <- `marked` and the neighbours of those.
-  void MarkNear(std::span<const std::uint8_t> marked);
-
-  std::uint32_t tube_floats_, stride_, tube_count_, rows_, cols_;
-  int sheet_regions_ = 0;
-  std::vector<std::vector<int>> neighbours_;
-  std::vector<std::uint8_t> awake_, near_;
-  std::vector<float> still_s_;
-  Part part_;
-  std::vector<int> taken_out_;
-  bool changed_ = true, everything_ = false;
+  const Partition& partition_;
+  std::vector<std::uint8_t> awake_;
+  std::vector<float> still_s_;  ///< By region: since when it has been still [s].
+  RegionSet computed_;
+  std::vector<int> removed_;
+  bool changed_ = true, all_computed_ = false;
 };
 
 }  // namespace fulcrum::physics::implicit

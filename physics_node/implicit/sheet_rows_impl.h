@@ -1,11 +1,37 @@
-// Bodies of the two kernels of the membrane that cost most: edges linearised, and the product with their matrix. A row
-// is swept slot by slot, or two slots at a time in AVX-512; each lane sees the same operations in the same order.
-// Compiled once per instruction set, after sheet_kernels_impl.h.
+// The kernels of the membrane that cost most: edges linearised, the product with their matrix, and the curvature along
+// a direction. Compiled once per instruction set, after sheet_kernels_impl.h.
+//
+//   edge        d = x_j - x_i,  e = |d| / L - 1,  T = A (e + c e^3),  T' = A (1 + 3 c e^2) / L
+//   force on i  f = T d / |d|, on j -f
+//   stiffness   K = kt I + along d d^T,  kt = max(T / |d|, 0),  along = max(T' - kt, 0) / |d|^2
+//   residual    r = f + load + m (g - s (x* - x_n) + v_n / h)
+//   block       D = K + (k_e + m s) I, summed over the edges of the node
+//   product     q_i = m s p_i + sum over edges K (p_i - p_j)
+//   curvature   p . q = sum over nodes m s |p_i|^2 + sum over edges (p_j - p_i) . K (p_j - p_i)
+//
+//   x*, x_n, v_n  linearisation point [m]; position [m] and velocity [m/s] at the beginning of a substep of h [s]
+//   L, A, c       rest length [m], tension per strain [N], stiffening
+//   T, T'         tension [N] and its derivative [N/m]; kt [N/m], along [N/m^3]: no negative transverse stiffness, so
+//                 K is never below the second derivative and a solve does not overshoot
+//   m, s, g       mass [kg], (1 + damping h) / h^2 [1/s^2], gravity [m/s^2]; k_e stiffness of other elements [N/m]
+//
+// Stencil. Each edge is computed once, at the node that owns it, and its effect on the far end is handed on:
+//
+//   (r, c) ──0── (r, c+1)       0 to the right: from slot to slot in registers (Carried); from the last slot to the
+//     │  ╲                        first of the next lane
+//     1    2                    1 below, 2 below right: to the row below in a carry row, kEdgeTerms planes of a row
+//     │      ╲                    (three for a product)
+//   (r+1, c) (r+1, c+1)
+//
+// A row is swept slot by slot, or two slots at a time in AVX-512; each lane has the same operations in the same order.
+// A task of rows computes the downward edges of the row above its first one again, so that tasks share nothing.
 #pragma once
 
 #include "physics_node/implicit/sheet_kernels_impl.h"
 
 namespace fulcrum::physics::FULCRUM_KERNEL_NAMESPACE {
+
+using implicit::kEdgeTerms;
 
 /// Slots of a row that one register F holds.
 template <class F>
@@ -15,9 +41,9 @@ template <>
 struct Slots<F8> {
   /// What follows slot `at`: the last slot of a row is followed by `first`, one lane on.
   static F8 After(const float* x, std::size_t at, bool wraps, std::size_t first) {
-    return wraps ? RotateDown(F8::Load(x + first)) : F8::Load(x + at + 8);
+    return wraps ? RotateDown(F8::Load(x + first)) : F8::Load(x + at + kLanes);
   }
-  /// Of what slots hand on: those now hand on `now` and take what the ones before did.
+  /// Replaces what the slots before have handed on by `now`, and returns it.
   static F8 Pass(F8* kept, F8 now) {
     const F8 before = *kept;
     *kept = now;
@@ -38,7 +64,7 @@ struct Slots<F8> {
 template <>
 struct Slots<F16> {
   static F16 After(const float* x, std::size_t at, bool wraps, std::size_t first) {
-    return wraps ? F16::Halves(F8::Load(x + at + 8), RotateDown(F8::Load(x + first))) : F16::Load(x + at + 8);
+    return wraps ? F16::Halves(F8::Load(x + at + kLanes), RotateDown(F8::Load(x + first))) : F16::Load(x + at + kLanes);
   }
   static F16 Pass(F16* kept, F16 now) {
     const __m512d before = _mm512_castps_pd(kept->v);
@@ -72,17 +98,17 @@ struct EndsOf {
 template <class F>
 FULCRUM_INLINE EndsOf<F> LoadEndsOf(const Sheet& sheet, const float* const x[3], std::size_t start, int s,
                                     std::size_t below) {
-  const std::size_t at = start + 8 * static_cast<std::size_t>(s);
+  const std::size_t at = start + kLanes * static_cast<std::size_t>(s);
   const bool wraps = s + F::kBatches == sheet.slots;
   return {LoadAfter<F>(x, at, wraps, start), LoadSlots<F>(x, at + below),
           LoadAfter<F>(x, at + below, wraps, start + below)};
 }
-/// Floats from a row to the one below. The last row has no edge downwards: anything finite will do.
+/// Floats from a row to the one below. The last row has no edge downwards: any finite value serves.
 inline std::size_t Below(const Sheet& sheet, int row) {
-  return row + 1 == sheet.rows ? 0 : 8 * static_cast<std::size_t>(sheet.slots);
+  return row + 1 == sheet.rows ? 0 : kLanes * static_cast<std::size_t>(sheet.slots);
 }
 
-/// body<F>(slot) over a row, with the widest F that fits.
+/// body<F>(slot) over a row, with the widest F that is left room for.
 template <class Body>
 FULCRUM_INLINE void ForSlots(int slots, const Body& body) {
   int s = 0;
@@ -94,7 +120,7 @@ FULCRUM_INLINE void ForSlots(int slots, const Body& body) {
   }
 }
 
-/// Sums over a row: of its even slots and of its odd ones, whatever number is taken at a time.
+/// Sums over a row, of its even slots and of its odd ones: the same with one slot or two at a time.
 struct RowSum {
   F8 even = F8::All(0), odd = F8::All(0);
   FULCRUM_INLINE void Add(F8 v, int s) {
@@ -115,13 +141,13 @@ struct RowSum {
 
 /// What an edge does to its first node: force, and the six entries xx yy zz xy xz yz of its stiffness.
 template <class F>
-struct Edge9 {
-  F v[9];
+struct EdgeTerms {
+  F v[kEdgeTerms];
 };
-/// Forces act on the other end the other way, stiffness alike.
+/// Adds the terms of an edge at its far end: the force with the opposite sign, the stiffness with the same.
 template <class F>
-FULCRUM_INLINE F AddOther(F sum, F other, int c) {
-  return c < 3 ? sum - other : sum + other;
+FULCRUM_INLINE F AddAtFarEnd(F sum, F term, int c) {
+  return c < 3 ? sum - term : sum + term;
 }
 
 /// Edges along `d`: their tension over their length, and their stiffness kt I + along d d^T.
@@ -133,7 +159,7 @@ struct Linear {
 template <class F>
 FULCRUM_INLINE Linear<F> LineariseEdge(const V<F>& d, F inverse_rest, F axial, F stiffening) {
   const F zero = F::All(0), one = F::All(1.0f);
-  const F length = Sqrt(Max(Dot(d, d), F::All(1e-24f))), inverse = one / length;
+  const F length = Sqrt(Max(Dot(d, d), F::All(kLeastSquare_m2))), inverse = one / length;
   const F strain = length * inverse_rest - one, j = stiffening * (strain * strain);
   const F tension = axial * (strain * (one + j)) * inverse;
   const F tangent = axial * inverse_rest * (one + F::All(3.0f) * j);
@@ -141,13 +167,13 @@ FULCRUM_INLINE Linear<F> LineariseEdge(const V<F>& d, F inverse_rest, F axial, F
   return {d, tension, kt, Max(tangent - kt, zero) * (inverse * inverse)};
 }
 template <class F>
-FULCRUM_INLINE Edge9<F> ActingOnEnds(const Linear<F>& e) {
+FULCRUM_INLINE EdgeTerms<F> ActingOnEnds(const Linear<F>& e) {
   const V<F> f = e.d * e.tension, a = e.d * e.along;
   return {{f.x, f.y, f.z, e.kt + a.x * e.d.x, e.kt + a.y * e.d.y, e.kt + a.z * e.d.z, a.x * e.d.y, a.x * e.d.z,
            a.y * e.d.z}};
 }
 
-/// Handed on from slot to slot along a row: what edges to the right and along diagonals do at their other end. What
+/// Handed on from slot to slot along a row: the terms of edges to the right and along diagonals at their far end. What
 /// leaves the last slot enters the first one, one lane on.
 template <int kCount>
 struct Carried {
@@ -159,33 +185,33 @@ struct Carried {
   }
 };
 
-/// One row: `above` is what the row above hands down, 9 planes of a row; what belongs to the next row goes to `below`.
-/// With `only_below` nothing else is done.
+/// One row: `above` are the terms that the row above hands down, kEdgeTerms planes of a row; those for the next row go
+/// to `below`. With `only_below` nothing else is done.
 template <bool only_below>
-FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at,
+FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, const SheetFields& fields,
                                  const SheetMatrix& matrix, const float* above, float* below, int row) {
-  const std::size_t start = RowStart(sheet, row), stride = 8 * static_cast<std::size_t>(sheet.slots),
+  const std::size_t start = RowStart(sheet, row), stride = kLanes * static_cast<std::size_t>(sheet.slots),
                     down_by = Below(sheet, row);
   const auto linearise = [&]<class F>(int d, const V<F>& vector, std::size_t node) FULCRUM_INLINE_LAMBDA {
     return LineariseEdge<F>(vector, F::Load(sheet.inverse_rest[d] + node), F::Load(sheet.axial[d] + node),
                             F::All(sheet.stiffening));
   };
-  Carried<9> left, diagonal;
+  Carried<kEdgeTerms> left, diagonal;
   {
-    const std::size_t last = start + stride - 8;
-    const V8 x = LoadV(at.place, last);
-    const EndsOf<F8> ends = LoadEndsOf<F8>(sheet, at.place, start, sheet.slots - 1, down_by);
-    const Edge9<F8> to_right = ActingOnEnds(linearise(0, ends.right - x, last)),
-                    to_diagonal = ActingOnEnds(linearise(2, ends.diagonal - x, last));
-    for (int c = 0; c < 9; ++c) {
+    const std::size_t last = start + stride - kLanes;
+    const V8 x = LoadV(fields.point, last);
+    const EndsOf<F8> ends = LoadEndsOf<F8>(sheet, fields.point, start, sheet.slots - 1, down_by);
+    const EdgeTerms<F8> to_right = ActingOnEnds(linearise(0, ends.right - x, last)),
+                        to_diagonal = ActingOnEnds(linearise(2, ends.diagonal - x, last));
+    for (int c = 0; c < kEdgeTerms; ++c) {
       left.Begin(RotateUp(to_right.v[c]), c);
       diagonal.Begin(RotateUp(to_diagonal.v[c]), c);
     }
   }
   ForSlots(sheet.slots, [&]<class F>(int s) FULCRUM_INLINE_LAMBDA {
-    const std::size_t slot = 8 * static_cast<std::size_t>(s), node = start + slot;
-    const V<F> x = LoadSlots<F>(at.place, node);
-    const EndsOf<F> ends = LoadEndsOf<F>(sheet, at.place, start, s, down_by);
+    const std::size_t slot = kLanes * static_cast<std::size_t>(s), node = start + slot;
+    const V<F> x = LoadSlots<F>(fields.point, node);
+    const EndsOf<F> ends = LoadEndsOf<F>(sheet, fields.point, start, s, down_by);
     const auto edge = [&](int d, const V<F>& vector) FULCRUM_INLINE_LAMBDA {
       const Linear<F> result = linearise(d, vector, node);
       if (!only_below) {
@@ -196,13 +222,13 @@ FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, con
     };
     const Linear<F> lines[3] = {edge(1, ends.below - x), edge(2, ends.diagonal - x),
                                 only_below ? Linear<F>{} : edge(0, ends.right - x)};
-    Edge9<F> sum;
+    EdgeTerms<F> sum;
     {
-      const Edge9<F> down = ActingOnEnds(lines[0]), across = ActingOnEnds(lines[1]);
-      for (int c = 0; c < 9; ++c) {
+      const EdgeTerms<F> down = ActingOnEnds(lines[0]), across = ActingOnEnds(lines[1]);
+      for (int c = 0; c < kEdgeTerms; ++c) {
         const auto plane = static_cast<std::size_t>(c) * stride + slot;
         if (!only_below) {
-          sum.v[c] = AddOther(down.v[c], F::Load(above + plane), c) + across.v[c];
+          sum.v[c] = AddAtFarEnd(down.v[c], F::Load(above + plane), c) + across.v[c];
         }
         (down.v[c] + diagonal.Pass(across.v[c], c)).Store(below + plane);
       }
@@ -211,47 +237,47 @@ FULCRUM_INLINE void LineariseRow(const Sheet& sheet, const Inertia& inertia, con
       return;
     }
     {
-      const Edge9<F> right = ActingOnEnds(lines[2]);
-      for (int c = 0; c < 9; ++c) {
-        sum.v[c] = AddOther(sum.v[c], left.Pass(right.v[c], c), c) + right.v[c];
+      const EdgeTerms<F> right = ActingOnEnds(lines[2]);
+      for (int c = 0; c < kEdgeTerms; ++c) {
+        sum.v[c] = AddAtFarEnd(sum.v[c], left.Pass(right.v[c], c), c) + right.v[c];
       }
     }
     const F k = F::All(inertia.inertia), zero = F::All(0);
     const auto moves = F::Load(sheet.w + node) > zero;
     const F mass = F::Load(sheet.mass + node) & moves;
-    const V<F> moved = x - LoadSlots<F>(at.start, node);
-    const V<F> momentum = moved * k - LoadSlots<F>(at.velocity, node) * F::All(1.0f / inertia.h);
+    const V<F> moved = x - LoadSlots<F>(fields.start, node);
+    const V<F> momentum = moved * k - LoadSlots<F>(fields.velocity, node) * F::All(1.0f / inertia.h);
     const V<F> gravity = {F::All(inertia.gravity[0]), F::All(inertia.gravity[1]), F::All(inertia.gravity[2])};
     const V<F> elastic = {sum.v[0], sum.v[1], sum.v[2]};
-    StoreSlots(elastic + LoadSlots<F>(at.load, node) + (gravity - momentum) * mass, at.residual, node);
-    const F own = F::Load(at.extra + node) + mass * k;
+    StoreSlots(elastic + LoadSlots<F>(fields.load, node) + (gravity - momentum) * mass, fields.residual, node);
+    const F own = F::Load(fields.element_diagonal + node) + mass * k;
     const F block[6] = {sum.v[3] + own, sum.v[4] + own, sum.v[5] + own, sum.v[6], sum.v[7], sum.v[8]};
     StoreInverseBlock<F>(block, moves, matrix.block, node);
   });
 }
 
-inline void SheetLineariseRows(const Sheet& sheet, const Inertia& inertia, const SheetLinearise& at,
+inline void SheetLineariseRows(const Sheet& sheet, const Inertia& inertia, const SheetFields& fields,
                                const SheetMatrix& matrix, float* memory, int row0, int row1) {
-  const std::size_t stride = 8 * static_cast<std::size_t>(sheet.slots);
-  float *above = memory, *below = memory + 9 * stride;
+  const std::size_t stride = kLanes * static_cast<std::size_t>(sheet.slots);
+  float *above = memory, *below = memory + kEdgeTerms * stride;
   if (row0 > 0) {
-    LineariseRow<true>(sheet, inertia, at, matrix, nullptr, above, row0 - 1);
+    LineariseRow<true>(sheet, inertia, fields, matrix, nullptr, above, row0 - 1);
   } else {
-    Clear(above, 9 * stride);
+    Clear(above, kEdgeTerms * stride);
   }
   for (int row = row0; row < row1; ++row) {
-    LineariseRow<false>(sheet, inertia, at, matrix, above, below, row);
+    LineariseRow<false>(sheet, inertia, fields, matrix, above, below, row);
     float* const used = above;
     above = below;
     below = used;
   }
 }
 
-/// K p of one row's edges and its inertia into `out`, what belongs to the next row into `below` [3]. Returns p . out.
+/// K p of one row's edges and its inertia into `out`, the terms for the next row into `below` [3]. Returns p . out.
 template <bool only_below>
 FULCRUM_INLINE double ApplyRow(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
                                const float* above, float* below, float* const out[3], int row) {
-  const std::size_t start = RowStart(sheet, row), stride = 8 * static_cast<std::size_t>(sheet.slots),
+  const std::size_t start = RowStart(sheet, row), stride = kLanes * static_cast<std::size_t>(sheet.slots),
                     down_by = Below(sheet, row);
   /// (kt I + along d d^T) dp.
   const auto edge = [&]<class F>(int e, const V<F>& d, const V<F>& dp, std::size_t node) FULCRUM_INLINE_LAMBDA {
@@ -259,9 +285,9 @@ FULCRUM_INLINE double ApplyRow(const Sheet& sheet, float inertia, const SheetMat
   };
   Carried<3> left, diagonal;
   {
-    const std::size_t last = start + stride - 8;
-    const V8 x = LoadV(matrix.place, last), here = LoadV(p, last);
-    const EndsOf<F8> x_ends = LoadEndsOf<F8>(sheet, matrix.place, start, sheet.slots - 1, down_by),
+    const std::size_t last = start + stride - kLanes;
+    const V8 x = LoadV(matrix.point, last), here = LoadV(p, last);
+    const EndsOf<F8> x_ends = LoadEndsOf<F8>(sheet, matrix.point, start, sheet.slots - 1, down_by),
                      p_ends = LoadEndsOf<F8>(sheet, p, start, sheet.slots - 1, down_by);
     const V8 to_right = UpV(edge(0, x_ends.right - x, p_ends.right - here, last)),
              to_diagonal = UpV(edge(2, x_ends.diagonal - x, p_ends.diagonal - here, last));
@@ -279,9 +305,9 @@ FULCRUM_INLINE double ApplyRow(const Sheet& sheet, float inertia, const SheetMat
   float* const to[3] = {below, below + stride, below + 2 * stride};
   RowSum sum;
   ForSlots(sheet.slots, [&]<class F>(int s) FULCRUM_INLINE_LAMBDA {
-    const std::size_t slot = 8 * static_cast<std::size_t>(s), node = start + slot;
-    const V<F> x = LoadSlots<F>(matrix.place, node), here = LoadSlots<F>(p, node);
-    const EndsOf<F> x_ends = LoadEndsOf<F>(sheet, matrix.place, start, s, down_by),
+    const std::size_t slot = kLanes * static_cast<std::size_t>(s), node = start + slot;
+    const V<F> x = LoadSlots<F>(matrix.point, node), here = LoadSlots<F>(p, node);
+    const EndsOf<F> x_ends = LoadEndsOf<F>(sheet, matrix.point, start, s, down_by),
                     p_ends = LoadEndsOf<F>(sheet, p, start, s, down_by);
     const V<F> down = edge(1, x_ends.below - x, p_ends.below - here, node),
                across = edge(2, x_ends.diagonal - x, p_ends.diagonal - here, node);
@@ -300,7 +326,7 @@ FULCRUM_INLINE double ApplyRow(const Sheet& sheet, float inertia, const SheetMat
 
 inline double SheetApply(const Sheet& sheet, float inertia, const SheetMatrix& matrix, const float* const p[3],
                          float* const out[3], float* memory, int row0, int row1) {
-  const std::size_t stride = 8 * static_cast<std::size_t>(sheet.slots);
+  const std::size_t stride = kLanes * static_cast<std::size_t>(sheet.slots);
   float *above = memory, *below = memory + 3 * stride;
   if (row0 > 0) {
     (void)ApplyRow<true>(sheet, inertia, matrix, p, above, above, out, row0 - 1);
@@ -324,9 +350,9 @@ FULCRUM_INLINE double RowCurvature(const Sheet& sheet, float inertia, const Shee
   const std::size_t start = RowStart(sheet, row), down_by = Below(sheet, row);
   RowSum sum;
   ForSlots(sheet.slots, [&]<class F>(int s) FULCRUM_INLINE_LAMBDA {
-    const std::size_t node = start + 8 * static_cast<std::size_t>(s);
-    const V<F> x = LoadSlots<F>(matrix.place, node), here = LoadSlots<F>(p, node);
-    const EndsOf<F> x_ends = LoadEndsOf<F>(sheet, matrix.place, start, s, down_by),
+    const std::size_t node = start + kLanes * static_cast<std::size_t>(s);
+    const V<F> x = LoadSlots<F>(matrix.point, node), here = LoadSlots<F>(p, node);
+    const EndsOf<F> x_ends = LoadEndsOf<F>(sheet, matrix.point, start, s, down_by),
                     p_ends = LoadEndsOf<F>(sheet, p, start, s, down_by);
     const auto edge = [&](int e, const V<F>& d, const V<F>& dp) FULCRUM_INLINE_LAMBDA {
       const F along = Dot(d, dp);

@@ -1,332 +1,357 @@
-// One substep: a guess from inertia, its linearisation, the solve and where that puts the particles.
+#include "physics_node/implicit/substep.h"
+
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "physics_node/implicit/for_tasks.h"
-#include "physics_node/implicit/implicit_solver.h"
+#include "physics_node/implicit/phases.h"
 
 namespace fulcrum::physics::implicit {
 namespace {
 
-/// The inertial guess goes no faster than this [m/s], or than the fastest tool by this factor: what a tool pulls comes
-/// along, what snaps back or flaps beside a cut does not go on from one truncated solve's error to the next. Where
-/// something would, the guess is also compared in energy with staying.
-constexpr float kGuessedSpeed = 0.08f, kFasterThanTools = 1.5f;
-/// Above this the solve is compared in energy with the guess [m].
-constexpr float kDoubtfulCorrection = 0.0002f;
-/// Nothing moves faster: ten times a quick hand [m/s].
-constexpr float kLargestSpeed = 5.0f;
+/// Speed limit of the prediction [m/s], and over that of the fastest tool: what a tool pulls follows it; what snaps
+/// back or flaps beside a cut does not carry the error of one truncated solve into the next. Where a velocity exceeds
+/// the limit, the prediction is compared in energy with the present position (deploy/docs/measurements/physics,
+/// Prediction).
+constexpr float kPredictedSpeed_m_s = 0.08f, kOverFastestTool = 1.5f;
+/// No particle is faster [m/s]: ten times a quick hand.
+constexpr float kLargestSpeed_m_s = 5.0f;
+/// Steps in which each region of the organ gets new diagonal blocks once: without contact the organ does not turn
+/// enough meanwhile to matter.
+constexpr std::uint32_t kOrganBlockPeriod = 2;
+/// OrganBlockSchedule::urgent: renew in this substep and in the next one, which then has the blocks without the
+/// contact.
+constexpr std::uint8_t kUrgentTwice = 2;
 
-bool IsStiff(const Element& contact) { return contact.m.squaredNorm() > Elements::kStiffContact; }
+// Prediction.
 
-}  // namespace
+/// How far a particle may be predicted from its position [m].
+float PredictionLimit(const ParticleStore& particles, float h, const BoundaryConditions& boundary) {
+  float farthest_sq = 0;
+  for (const HeldPlace& held : boundary.held) {
+    farthest_sq = std::max(farthest_sq, (held.place - particles.At(held.at)).squaredNorm());
+  }
+  for (const ContactRow& row : boundary.contacts) {
+    farthest_sq = std::max(farthest_sq, row.drift.squaredNorm());
+  }
+  return std::max(kPredictedSpeed_m_s * h, kOverFastestTool * std::sqrt(farthest_sq));
+}
 
-/// Free particles go on with their velocity; what has no sound velocity stays.
-GuessCount ImplicitSolver::Guess(float h, float limit) {
-  const Sheet sheet = MakeSheet();
-  const SheetLinearise at = At(place_, nullptr);
-  float* const place[3] = {place_.data() + tube_floats_, place_.data() + tube_floats_ + plane_,
-                           place_.data() + tube_floats_ + 2 * plane_};
-  ForTasks([&](const Task& task, int index, int) {
-    guess_[static_cast<std::size_t>(index)] =
-        task.sheet ? kernels_.sheet_guess(sheet, h, limit, at.start, at.velocity, place, task.first, task.end)
-                   : kernels_.organ_guess(h, limit, particles_->tube(), velocity_.data(), place_.data(),
-                                          Vertex(task.first), Vertex(task.end));
+/// point <- start + h velocity, at most `limit` away [m]; what has no finite velocity stays.
+PredictionCount PredictByVelocity(const SolverContext& context, float h, float limit, SolverState* state,
+                                  SolverScratch* scratch) {
+  const FieldLayout& layout = context.model.layout;
+  const Sheet sheet = state->edges.View(context.particles.plane(3));
+  const float* const start[3] = {context.particles.plane(0), context.particles.plane(1), context.particles.plane(2)};
+  const auto velocity = layout.Planes(std::as_const(state->velocity));
+  FloatArray& point = state->linearisation.point;
+  const auto planes = layout.Planes(&point);
+  const RegionSet& computed = state->regions.computed();
+  ForTasks(&context.workers, computed, [&](const Task& task, int index, int) {
+    scratch->predicted[static_cast<std::size_t>(index)] =
+        task.sheet ? context.kernels.sheet.predict(sheet, h, limit, start, velocity.data(), planes.data(), task.first,
+                                                   task.end)
+                   : context.kernels.organ.predict(h, limit, context.particles.tube(), state->velocity.data(),
+                                                   point.data(), Vertex(task.first), Vertex(task.end));
   });
-  GuessCount count{};
-  for (std::size_t i = 0; i < regions_.part().tasks.size(); ++i) {
-    count.largest_sq = std::max(count.largest_sq, guess_[i].largest_sq);
-    count.resets += guess_[i].resets;
+  PredictionCount count{};
+  for (std::size_t i = 0; i < computed.tasks.size(); ++i) {
+    count.largest_sq = std::max(count.largest_sq, scratch->predicted[i].largest_sq);
+    count.resets += scratch->predicted[i].resets;
   }
   return count;
 }
 
-float ImplicitSolver::GuessLimit(float h, std::span<const HeldPlace> held, std::span<const ContactRow> contacts) const {
-  float farthest_sq = 0;
-  for (const HeldPlace& place : held) {
-    farthest_sq = std::max(farthest_sq, (place.place - particles_->At(place.at)).squaredNorm());
-  }
-  for (const ContactRow& row : contacts) {
-    farthest_sq = std::max(farthest_sq, row.drift.squaredNorm());
-  }
-  return std::max(kGuessedSpeed * h, kFasterThanTools * std::sqrt(farthest_sq));
-}
-
-void ImplicitSolver::ForgetDamagedVelocities() {
-  for (std::size_t i = 0; i < velocity_.size(); ++i) {
-    velocity_[i] = std::isfinite(velocity_[i]) ? velocity_[i] : 0.0f;
+void ResetDamagedVelocities(FloatArray* velocity) {
+  for (std::size_t i = 0; i < velocity->size(); ++i) {
+    (*velocity)[i] = std::isfinite((*velocity)[i]) ? (*velocity)[i] : 0.0f;
   }
 }
 
-/// Where inertia does not tell where the guess is: held particles, along its normal what a tool presses, and what a cut
-/// has frayed. Guessed from its velocity, that would bounce: the error of one solve, seen as velocity, doubles in the
-/// next guess. Shreds that hang on little are light and turn far in a substep, and no few iterations solve them all.
-void ImplicitSolver::PutUnguessed(std::span<const HeldPlace> held, std::span<const ContactRow> contacts) {
-  for (const ParticleRef at : frayed_) {
-    PutField(place_.data(), at, particles_->At(at));
+/// Particles whose velocity is no prediction: held ones, those that a tool presses, along its normal, and frayed ones.
+/// Predicted from its velocity, pressed tissue would bounce: the error of one solve, taken for velocity, doubles in the
+/// next prediction. Shreds that hang on little are light and turn far in a substep, and a few iterations cannot solve
+/// each of many.
+void PredictConstrained(const SolverContext& context, const BoundaryConditions& boundary, SolverState* state) {
+  const ParticleStore& particles = context.particles;
+  float* const point = state->linearisation.point.data();
+  for (const ParticleRef at : state->edges.frayed_nodes()) {
+    PutField(point, at, particles.At(at));
   }
-  for (const ContactRow& row : contacts) {
-    if (!(Elements::ContactStiffness(row) > Elements::kStiffContact)) {
+  for (const ContactRow& row : boundary.contacts) {
+    if (!(Elements::ContactStiffness(row) > Elements::kStiffContact_N_per_m)) {
       continue;
     }
-    const float inside = row.offset - row.normal.dot(row.At(particles_->pool()));
+    const float inside = row.offset - row.normal.dot(row.At(context.particles.pool()));
     if (!(inside > 0.0f)) {
       continue;
     }
     // With the tool, but no farther than to its surface.
     const float along = std::min(row.normal.dot(row.drift), inside);
     for (std::size_t k = 0; k < static_cast<std::size_t>(row.count); ++k) {
-      const Vec3f place = FieldAt(place_.data(), row.at[k]), moved = place - particles_->At(row.at[k]);
-      if (particles_->InverseMass(row.at[k]) > 0.0f) {
-        PutField(place_.data(), row.at[k], place + row.normal * (along - row.normal.dot(moved)));
+      const Vec3f place = FieldAt(point, row.at[k]), moved = place - particles.At(row.at[k]);
+      if (particles.InverseMass(row.at[k]) > 0.0f) {
+        PutField(point, row.at[k], place + row.normal * (along - row.normal.dot(moved)));
       }
     }
   }
-  for (const HeldPlace& h : held) {
-    PutField(place_.data(), h.at, h.place);
+  for (const HeldPlace& held : boundary.held) {
+    PutField(point, held.at, held.place);
   }
 }
 
-double ImplicitSolver::EnergyAt(const FloatArray& place, const Inertia& inertia, std::span<const ContactRow> contacts) {
-  const Sheet sheet = MakeSheet();
-  const Organ organ = MakeOrgan();
-  const SheetLinearise at = At(place, nullptr);
-  const OrganLinearisation organ_at = OrganAt(place);
-  const std::span<const Task> tasks = regions_.part().tasks;
-  const int sheet_tasks = regions_.part().sheet_tasks;
-  double of_hinges = 0, of_others = 0;
-  ForTasksBeside(
-      sheet_tasks, static_cast<int>(tasks.size()) - sheet_tasks,
-      [&](int index, int) {
-        const auto i = static_cast<std::size_t>(index);
-        const Task& task = tasks[i];
-        partial_[i] = task.sheet
-                          ? kernels_.sheet_energy(sheet, inertia, at, task.first, task.end)
-                          : kernels_.organ_energy(organ, inertia, organ_at, Vertex(task.first), Vertex(task.end));
-      },
-      [&] { of_hinges = elements_.EnergyOfHinges(place.data()); },
-      [&] { of_others = elements_.EnergyOfOthers(place.data(), contacts); });
-  return SumOfPartials(tasks.size()) + (of_hinges + of_others);
-}
+// Linearisation.
 
-/// Contacts and folds stiffen the diagonal of what they touch.
-void ImplicitSolver::RefreshContactStiffness() {
-  const auto slot = [&](ParticleRef at) {
-    return static_cast<std::uint32_t>(at.base < tube_floats_ ? plane_ + at.base / 4 : at.base - tube_floats_);
-  };
-  for (const std::uint32_t i : extra_changed_) {
-    extra_[i] = base_extra_[i];
+/// Contacts, folds and frayed edges stiffen the diagonal of what they touch.
+void UpdateElementDiagonal(const ImplicitModel& model, SolverState* state) {
+  Linearisation& at = state->linearisation;
+  for (const std::size_t i : at.raised) {
+    at.element_diagonal[i] = model.element_diagonal[i];
   }
-  extra_changed_.clear();
-  // Blocks of the organ that only soft contacts touch wait for the next step. Once more after the last time, to be as
-  // without.
-  const auto stiffen = [&](ParticleRef at, float stiffness, bool at_once) {
-    extra_[slot(at)] += stiffness;
-    extra_changed_.push_back(slot(at));
-    if (at_once) {
-      stiffened_[static_cast<std::size_t>(regions_.Of(at))] = 2;
-    }
+  at.raised.clear();
+  const auto raise = [&](std::size_t i, float stiffness) {
+    at.element_diagonal[i] += stiffness;
+    at.raised.push_back(i);
   };
-  for (const Element& contact : elements_.touching()) {
+  const auto renew_blocks = [&](ParticleRef particle) {
+    state->organ_blocks.urgent[static_cast<std::size_t>(model.partition.Of(particle))] = kUrgentTwice;
+  };
+  // Blocks of the organ that only soft contacts touch are renewed when their region is due.
+  for (const Element& contact : state->elements.contacts()) {
     const float stiffness = contact.kt + contact.m.squaredNorm();
-    for (int k = 0; k < contact.count; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      stiffen(contact.at[i], stiffness * contact.weight[i] * contact.weight[i], IsStiff(contact));
+    for (std::size_t k = 0; k < static_cast<std::size_t>(contact.count); ++k) {
+      raise(model.layout.ScalarIndex(contact.at[k]), stiffness * contact.weight[k] * contact.weight[k]);
+      if (Elements::IsStiff(contact)) {
+        renew_blocks(contact.at[k]);
+      }
     }
   }
-  for (const FrayedEdge& edge : frayed_edges_) {
+  for (const FrayedEdge& edge : state->edges.frayed_edges()) {
     for (const std::uint32_t i : edge.at) {
-      extra_[i] += edge.stiffness;
-      extra_changed_.push_back(i);
+      raise(i, edge.stiffness);
     }
   }
-  elements_.guard().ForDiagonal(
-      [&](Index vertex, float stiffness) { stiffen(ParticleRef{4 * vertex}, stiffness, true); });
+  state->elements.guard().ForDiagonal([&](Index vertex, float stiffness) {
+    const ParticleRef particle{4 * vertex};
+    raise(model.layout.ScalarIndex(particle), stiffness);
+    renew_blocks(particle);
+  });
 }
 
-/// What hangs on little turns freely: nothing but its small mass then resists a correction across its edges.
-void ImplicitSolver::HoldFrayed() {
-  for (const FrayedEdge& edge : frayed_edges_) {
-    float& kt = kt_[edge.direction][edge.at[0]];
+/// First phase: edges and patches. Stresses act on the vertices around, so the residual of the organ needs a second
+/// one.
+void LineariseEdgesAndPatches(const SolverContext& context, const Inertia& inertia, const LinearSystem& system,
+                              SolverState* state, SolverScratch* scratch) {
+  const float* const point = state->linearisation.point.data();
+  const SheetFields fields = SheetFieldsAt(context, *state, state->linearisation.point, &state->linearisation.residual);
+  const RegionSet& computed = state->regions.computed();
+  const auto sheet_tasks = static_cast<std::size_t>(computed.sheet_tasks);
+  ForTasksBeside(
+      &context.workers, computed.sheet_tasks, static_cast<int>(computed.patches.size()),
+      [&](int index, int worker) {
+        const auto i = static_cast<std::size_t>(index);
+        const Task& task = i < sheet_tasks ? computed.tasks[i] : computed.patches[i - sheet_tasks];
+        if (task.sheet) {
+          context.kernels.sheet.linearise(system.sheet, inertia, fields, system.sheet_matrix,
+                                          scratch->carry[static_cast<std::size_t>(worker)].data(), task.first,
+                                          task.end);
+        } else {
+          context.kernels.organ.linearise(system.organ, system.organ_matrix, point, Vertex(task.first),
+                                          Vertex(task.end));
+        }
+      },
+      [&] { state->elements.LineariseHinges(point); }, [&] { state->elements.LineariseBindings(point); });
+}
+
+/// A node that hangs on few edges turns freely: without this only its small mass resists a correction across them.
+void StiffenFrayedEdges(const SheetEdges& edges, Linearisation* at) {
+  for (const FrayedEdge& edge : edges.frayed_edges()) {
+    float& kt = at->kt[edge.direction][edge.at[0]];
     kt = std::max(kt, edge.stiffness);
   }
 }
 
-/// Notes which regions stiff contacts press.
-void ImplicitSolver::FollowContacts() {
-  stiff_contacts_ = false;
-  std::fill(pressed_now_.begin(), pressed_now_.end(), std::uint8_t{0});
-  for (const Element& contact : elements_.touching()) {
-    for (std::size_t k = 0; IsStiff(contact) && k < static_cast<std::size_t>(contact.count); ++k) {
-      const int region = regions_.Of(contact.at[k]);
-      pressed_now_[static_cast<std::size_t>(region)] = regions_.computed(region) ? 1 : 0;
-      stiff_contacts_ = true;
-    }
-  }
-  if (!stiff_contacts_ || (!around_due_ && pressed_now_ == pressed_.marked)) {
-    return;
-  }
-  around_due_ = false;
-  for (const Task& task : pressed_.tasks) {
-    ForParts(task, [&](std::size_t first, std::size_t count) { std::fill_n(local_.data() + first, count, 0.0f); });
-  }
-  pressed_.marked = pressed_now_;
-  regions_.FindTasks(&pressed_);
-  around_.marked = pressed_now_;
-  regions_.Widen(&around_);
-  regions_.FindTasks(&around_);
-  elements_.Select(regions_, pressed_.marked, around_.marked, &around_elements_);
-}
-
-void ImplicitSolver::Linearise(const Inertia& inertia, std::span<const ContactRow> contacts) {
-  workers_.Run(2, 0, [&](int task, int) {
-    if (task == 0) {
-      elements_.Touch(inertia.h, place_.data(), particles_->pool(), regions_, contacts);
-    } else {
-      elements_.LookForFolds(place_.data());
-    }
-  });
-  RefreshContactStiffness();
-  const Sheet sheet = MakeSheet();
-  const SheetMatrix matrix = MakeMatrix();
-  const SheetLinearise at = At(place_, &residual_);
-  const Organ organ = MakeOrgan();
-  const OrganMatrix organ_matrix = MakeOrganMatrix();
-  const Middle middle = coarse_.middle();
-  // Stresses reach the vertices around, edges the row below: two phases.
-  const std::span<const Task> tasks = regions_.part().tasks, patches = regions_.part().patches;
-  const auto sheet_tasks = static_cast<std::size_t>(regions_.part().sheet_tasks);
-  ForTasksBeside(
-      regions_.part().sheet_tasks, static_cast<int>(patches.size()),
-      [&](int index, int worker) {
-        const auto i = static_cast<std::size_t>(index);
-        const Task& task = i < sheet_tasks ? tasks[i] : patches[i - sheet_tasks];
-        if (task.sheet) {
-          kernels_.sheet_linearise(sheet, inertia, at, matrix, carry_[static_cast<std::size_t>(worker)].data(),
-                                   task.first, task.end);
-        } else {
-          kernels_.organ_linearise(organ, organ_matrix, place_.data(), Vertex(task.first), Vertex(task.end));
-        }
-      },
-      [&] { elements_.LineariseHinges(place_.data()); }, [&] { elements_.LineariseOthers(place_.data()); });
-  HoldFrayed();
-  // What touches the organ changes its blocks there; left alone it does not turn enough in two steps to matter.
-  const bool all_blocks = inertia.inertia != blocks_inertia_, half_of_blocks = organ_blocks_due_;
-  blocks_inertia_ = inertia.inertia;
-  organ_blocks_due_ = false;
-  const auto second = [&](const Task& task, int, int) {
+/// Second phase: residual and diagonal blocks of the organ, hats, and beside them the next part of the coarse matrix.
+void LineariseVerticesAndLevels(const SolverContext& context, const Inertia& inertia, const LinearSystem& system,
+                                SolverState* state) {
+  OrganBlockSchedule& blocks = state->organ_blocks;
+  const bool all_due = inertia.inertia != blocks.inertia, step_due = blocks.step_due;
+  blocks.inertia = inertia.inertia;
+  blocks.step_due = false;
+  const OrganFields fields = OrganFieldsAt(context, *state, state->linearisation.point, &state->linearisation.residual);
+  const float* const diagonal = state->linearisation.element_diagonal.data() + context.model.layout.plane;
+  const auto body = [&](const Task& task, int, int) {
     if (task.sheet) {
-      const auto [first, end] = coarse_.MiddleRows(task.first, task.end);
-      kernels_.middle_blocks(sheet, middle, matrix, inertia.inertia, first, end);
+      const auto [first, end] = state->coarse.HatRows(task.first, task.end);
+      context.kernels.sheet.hat_blocks(system.sheet, system.hats, system.sheet_matrix, inertia.inertia, first, end);
       return;
     }
-    kernels_.organ_residual(organ, organ_matrix, inertia, OrganAt(place_), Vertex(task.first), Vertex(task.end));
-    for (int first = task.first; first < task.end; first += Regions::kVertices) {
-      const int region = regions_.At(false, first);
-      std::uint8_t& stiffened = stiffened_[static_cast<std::size_t>(region)];
-      const bool due = half_of_blocks && (static_cast<std::uint32_t>(region) + steps_) % 2 == 0;
-      if (all_blocks || due || stiffened != 0) {
-        kernels_.organ_blocks(organ, organ_matrix, particles_->tube(), extra_.data() + plane_, inertia.inertia,
-                              Vertex(first), Vertex(std::min(first + Regions::kVertices, task.end)));
+    context.kernels.organ.residual(system.organ, system.organ_matrix, inertia, fields, Vertex(task.first),
+                                   Vertex(task.end));
+    ForRegions(context.model.partition, task, [&](int region, int first, int end) {
+      std::uint8_t& urgent = blocks.urgent[static_cast<std::size_t>(region)];
+      const bool due = step_due && (static_cast<std::uint32_t>(region) + state->steps) % kOrganBlockPeriod == 0;
+      if (all_due || due || urgent != 0) {
+        context.kernels.organ.blocks(system.organ, system.organ_matrix, context.particles.tube(), diagonal,
+                                     inertia.inertia, Vertex(first), Vertex(end));
       }
-      stiffened = static_cast<std::uint8_t>(stiffened >> 1);
-    }
+      urgent = static_cast<std::uint8_t>(urgent >> 1);
+    });
   };
-  ForTasks(second, [&] {
-    if (refresh_due_ && regions_.everything()) {
-      coarse_.Refresh(sheet, matrix, inertia.inertia);
-      refresh_due_ = false;
+  ForTasksAndSideTask(&context.workers, state->regions.computed(), body, [&] {
+    if (state->coarse_due && state->regions.all_computed()) {
+      state->coarse.AssembleNextPart(system.sheet, system.sheet_matrix, inertia.inertia);
+      state->coarse_due = false;
     }
   });
-  coarse_.LeaveOrganAlone(elements_.guard().folded());
-  coarse_.ForgetContacts();
-  for (const Element& contact : elements_.touching()) {
-    if (IsStiff(contact)) {
-      coarse_.Stiffen(contact);
-    }
-  }
-  coarse_.FadeAtContacts();
-  FollowContacts();
-  elements_.AddContactForces(residual_.data());
-  forces_due_ = true;
 }
 
-/// Positions and velocities from place + d. What is not finite stays where it was, at rest.
-SubstepReport ImplicitSolver::Finish(float h) {
-  const auto planes = [&](FloatArray& field) {
-    float* at = field.data() + tube_floats_;
-    return std::array<float*, 3>{at, at + plane_, at + 2 * plane_};
-  };
-  const Sheet sheet = MakeSheet();
-  const std::array<float*, 3> place = planes(place_), d = planes(d_), velocity = planes(velocity_);
-  float* const x[3] = {particles_->plane(0), particles_->plane(1), particles_->plane(2)};
-  std::fill(speed_.begin(), speed_.end(), 0.0f);
-  ForTasks([&](const Task& task, int index, int) {
-    FinishCount& total = finish_[static_cast<std::size_t>(index)] = {};
-    ForRegions(task, [&](int region, int first, int end) {
-      const FinishCount part =
-          task.sheet
-              ? kernels_.sheet_finish(sheet, place.data(), d.data(), h, kLargestSpeed, x, velocity.data(), first, end)
-              : kernels_.organ_finish(place_.data(), d_.data(), h, kLargestSpeed, particles_->pool(), velocity_.data(),
-                                      Vertex(first), Vertex(end));
-      speed_[static_cast<std::size_t>(region)] = std::sqrt(part.largest_speed_sq);
-      total.largest_speed_sq = std::max(total.largest_speed_sq, part.largest_speed_sq);
-      total.resets += part.resets;
+void AddContactsToLevels(const Elements& elements, CoarseSpace* coarse) {
+  coarse->ExcludeOrgan(elements.guard().folded());
+  coarse->ClearContacts();
+  for (const Element& contact : elements.contacts()) {
+    if (Elements::IsStiff(contact)) {
+      coarse->AddContact(contact);
+    }
+  }
+  coarse->FadeAtContacts();
+}
+
+/// Finds the regions that stiff contacts press, and those that resist there.
+void UpdateContactZone(const SolverContext& context, SolverState* state) {
+  const Partition& partition = context.model.partition;
+  const Regions& regions = state->regions;
+  ContactZone& zone = state->contact_zone;
+  zone.active = false;
+  std::fill(zone.pressed.begin(), zone.pressed.end(), std::uint8_t{0});
+  for (const Element& contact : state->elements.contacts()) {
+    for (std::size_t k = 0; Elements::IsStiff(contact) && k < static_cast<std::size_t>(contact.count); ++k) {
+      const int region = partition.Of(contact.at[k]);
+      zone.pressed[static_cast<std::size_t>(region)] = regions.computed(region) ? 1 : 0;
+      zone.active = true;
+    }
+  }
+  if (!zone.active || (!zone.outdated && zone.pressed == zone.inner.marked)) {
+    return;
+  }
+  zone.outdated = false;
+  for (const Task& task : zone.inner.tasks) {
+    ForPieces(context.model.layout, task,
+              [&](std::size_t first, std::size_t count) { std::fill_n(zone.direction.data() + first, count, 0.0f); });
+  }
+  zone.inner.marked = zone.pressed;
+  partition.FindTasks(&zone.inner);
+  zone.outer.marked = zone.pressed;
+  regions.Widen(&zone.outer);
+  partition.FindTasks(&zone.outer);
+  state->elements.Select(partition, zone.inner.marked, zone.outer.marked, &zone.elements);
+}
+
+}  // namespace
+
+double EnergyAt(const SolverContext& context, const FloatArray& point, const Inertia& inertia,
+                std::span<const ContactRow> contacts, SolverState* state, SolverScratch* scratch) {
+  const Sheet sheet = state->edges.View(context.particles.plane(3));
+  const Organ organ = context.model.organ.View();
+  const SheetFields sheet_fields = SheetFieldsAt(context, *state, point, nullptr);
+  const OrganFields organ_fields = OrganFieldsAt(context, *state, point, nullptr);
+  const RegionSet& computed = state->regions.computed();
+  double of_hinges = 0, of_bindings = 0;
+  ForTasksBeside(
+      &context.workers, computed.sheet_tasks, static_cast<int>(computed.tasks.size()) - computed.sheet_tasks,
+      [&](int index, int) {
+        const auto i = static_cast<std::size_t>(index);
+        const Task& task = computed.tasks[i];
+        scratch->partial_sums[i] =
+            task.sheet
+                ? context.kernels.sheet.energy(sheet, inertia, sheet_fields, task.first, task.end)
+                : context.kernels.organ.energy(organ, inertia, organ_fields, Vertex(task.first), Vertex(task.end));
+      },
+      [&] { of_hinges = state->elements.EnergyOfHinges(point.data()); },
+      [&] { of_bindings = state->elements.EnergyOfBindingsAndContacts(point.data(), contacts); });
+  return SumInOrder(scratch->partial_sums, computed.tasks.size()) + (of_hinges + of_bindings);
+}
+
+void PredictAtRest(const SolverContext& context, SolverState* state, SolverScratch* scratch) {
+  (void)PredictByVelocity(context, 0.0f, 0.0f, state, scratch);
+}
+
+std::uint32_t Predict(const SolverContext& context, const Inertia& inertia, const BoundaryConditions& boundary,
+                      SolverState* state, SolverScratch* scratch) {
+  const float limit = PredictionLimit(context.particles, inertia.h, boundary);
+  const PredictionCount count = PredictByVelocity(context, inertia.h, limit, state, scratch);
+  if (count.resets > 0) {
+    ResetDamagedVelocities(&state->velocity);
+  }
+  PredictConstrained(context, boundary, state);
+  // Beyond the limit a prediction may have more energy than the present positions; the better of both is taken.
+  if (count.largest_sq > limit * limit) {
+    const auto energy = [&] {
+      return EnergyAt(context, state->linearisation.point, inertia, boundary.contacts, state, scratch);
+    };
+    const double moving = energy();
+    PredictAtRest(context, state, scratch);
+    PredictConstrained(context, boundary, state);
+    if (moving < energy()) {
+      (void)PredictByVelocity(context, inertia.h, limit, state, scratch);
+      PredictConstrained(context, boundary, state);
+    }
+  }
+  return count.resets;
+}
+
+void Linearise(const SolverContext& context, const Inertia& inertia, std::span<const ContactRow> contacts,
+               SolverState* state, SolverScratch* scratch) {
+  Linearisation& at = state->linearisation;
+  context.workers.Run(2, 0, [&](int task, int) {
+    if (task == 0) {
+      state->elements.FindContacts(inertia.h, at.point.data(), context.particles.pool(), state->regions, contacts);
+    } else {
+      state->elements.FindInversions(at.point.data());
+    }
+  });
+  UpdateElementDiagonal(context.model, state);
+  const LinearSystem system(context, inertia.inertia, state, scratch);
+  LineariseEdgesAndPatches(context, inertia, system, state, scratch);
+  StiffenFrayedEdges(state->edges, &at);
+  LineariseVerticesAndLevels(context, inertia, system, state);
+  AddContactsToLevels(state->elements, &state->coarse);
+  UpdateContactZone(context, state);
+  state->elements.AddContactForces(at.residual.data());
+  at.lacks_element_forces = true;
+}
+
+SubstepReport Finish(const SolverContext& context, float h, SolverState* state, SolverScratch* scratch) {
+  const FieldLayout& layout = context.model.layout;
+  const Kernels& kernels = context.kernels;
+  ParticleStore& particles = context.particles;
+  const Sheet sheet = state->edges.View(particles.plane(3));
+  const FloatArray &point = state->linearisation.point, &d = scratch->krylov.d;
+  const auto point_planes = layout.Planes(point), d_planes = layout.Planes(d);
+  const auto velocity = layout.Planes(&state->velocity);
+  float* const x[3] = {particles.plane(0), particles.plane(1), particles.plane(2)};
+  const RegionSet& computed = state->regions.computed();
+  std::fill(scratch->speed.begin(), scratch->speed.end(), 0.0f);
+  ForTasks(&context.workers, computed, [&](const Task& task, int index, int) {
+    FinishCount& total = scratch->finished[static_cast<std::size_t>(index)] = {};
+    ForRegions(context.model.partition, task, [&](int region, int first, int end) {
+      const FinishCount count =
+          task.sheet ? kernels.sheet.finish(sheet, point_planes.data(), d_planes.data(), h, kLargestSpeed_m_s, x,
+                                            velocity.data(), first, end)
+                     : kernels.organ.finish(point.data(), d.data(), h, kLargestSpeed_m_s, particles.pool(),
+                                            state->velocity.data(), Vertex(first), Vertex(end));
+      scratch->speed[static_cast<std::size_t>(region)] = std::sqrt(count.largest_speed_sq);
+      total.largest_speed_sq = std::max(total.largest_speed_sq, count.largest_speed_sq);
+      total.resets += count.resets;
     });
   });
   SubstepReport report;
   float largest = 0;
-  for (std::size_t i = 0; i < regions_.part().tasks.size(); ++i) {
-    largest = std::max(largest, finish_[i].largest_speed_sq);
-    report.resets += finish_[i].resets;
+  for (std::size_t i = 0; i < computed.tasks.size(); ++i) {
+    largest = std::max(largest, scratch->finished[i].largest_speed_sq);
+    report.resets += scratch->finished[i].resets;
   }
   report.largest_speed_m_s = std::sqrt(largest);
-  return report;
-}
-
-SubstepReport ImplicitSolver::Substep(float h, int iterations, std::span<const HeldPlace> held,
-                                      std::span<ContactRow> contacts) {
-  const Inertia inertia = MakeInertia(h);
-  WakeTouched(held, contacts);
-  if (regions_.Rebuild()) {
-    FollowRegions();
-  }
-  const float limit = GuessLimit(h, held, contacts);
-  const GuessCount guess = Guess(h, limit);
-  if (guess.resets > 0) {
-    ForgetDamagedVelocities();
-  }
-  PutUnguessed(held, contacts);
-  if (guess.largest_sq > limit * limit) {
-    const double moving = EnergyAt(place_, inertia, contacts);
-    (void)Guess(0.0f, 0.0f);
-    PutUnguessed(held, contacts);
-    if (moving < EnergyAt(place_, inertia, contacts)) {
-      (void)Guess(h, limit);
-      PutUnguessed(held, contacts);
-    }
-  }
-  Linearise(inertia, contacts);
-  for (std::size_t i = 0; i < wanted_now_.size(); ++i) {
-    wanted_now_[i] = pressed_now_[i] != 0 || (held_before_[i] != 0 && regions_.computed(static_cast<int>(i))) ? 1 : 0;
-  }
-  WantResidual(wanted_now_);
-  Solve(inertia.inertia, iterations);
-  if (stiff_contacts_) {
-    SolveAtContacts(inertia.inertia);
-  }
-  const float largest = LargestCorrection();
-  LimitCorrection(largest);
-  if (largest > kDoubtfulCorrection) {
-    SearchAlongCorrection(inertia, contacts);
-  }
-  // Before the particles move on: their start is still in the store.
-  Elements::WriteForces(h, place_.data(), d_.data(), particles_->pool(), contacts);
-  SubstepReport report = Finish(h);
-  regions_.Settle(speed_, h);
-  report.largest_correction_m = largest;
-  report.searched = largest > kDoubtfulCorrection;
-  report.resets += guess.resets;
   return report;
 }
 

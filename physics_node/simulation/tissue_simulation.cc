@@ -58,8 +58,8 @@ bool TissueSimulation::ImplicitCompliance::Stiffness(const Probe& probe, float h
   for (const Index particle : probe.particles) {
     at_.push_back(simulation_->particles_.Ref(particle));
   }
-  const std::size_t memory = 2 * probe.tool + (horizon_s > 0.0f ? 1 : 0);
-  return simulation_->implicit_->Stiffness({at_, probe.direction, horizon_s, memory}, newton_per_m);
+  const std::size_t number = 2 * probe.tool + (horizon_s > 0.0f ? 1 : 0);
+  return simulation_->implicit_->Stiffness({at_, probe.direction, horizon_s, number}, newton_per_m);
 }
 
 /// Contacts of tissue with tissue and its surroundings, for the step that ends at the present time.
@@ -251,7 +251,7 @@ void TissueSimulation::WatchTears(float max_step_m) {
 
 void TissueSimulation::LetThreadsHelp(bool help) {
   if (implicit_) {
-    implicit_->workers().LetHelp(help);
+    implicit_->workers().EnableHelpers(help);
   }
 }
 
@@ -267,7 +267,7 @@ int TissueSimulation::ApplyTopology(const TopologyState& topology) {
   const int edits = model_.Apply(topology, &particles_);
   if (edits > 0) {
     if (implicit_) {
-      implicit_->Follow(model_);
+      implicit_->UpdateTopology(model_);
     }
     for (Grasp& grasp : grasps_) {
       grasp.DropDead(model_, &particles_);

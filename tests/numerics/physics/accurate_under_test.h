@@ -37,7 +37,7 @@ class AccurateUnderTest final : public StoreSolver {
     }
     begin_ = places_;
   }
-  void TopologyChanged() override { solver_.Follow(tissue_); }
+  void TopologyChanged() override { solver_.UpdateTopology(tissue_); }
 
   implicit::Effort effort_;
   implicit::ImplicitSolver solver_;

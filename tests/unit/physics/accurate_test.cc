@@ -135,7 +135,7 @@ TEST_F(Accurate, SleepsWhereNothingMovesAndWakesWhereSomethingDoes) {
   for (int i = 0; i < 60; ++i) {
     run.Step();
   }
-  EXPECT_TRUE(run.solver.regions().nothing()) << "Nothing has ever moved.";
+  EXPECT_TRUE(run.solver.regions().none_computed()) << "Nothing has ever moved.";
 
   // A node near one end, lifted and let go: what is near wakes, what is far does not.
   const Index particle = scene.membrane.first + 3 * scene.membrane.cols + scene.membrane.cols / 2;
@@ -146,17 +146,17 @@ TEST_F(Accurate, SleepsWhereNothingMovesAndWakesWhereSomethingDoes) {
     const HeldPlace held{at, scene.rest_position[particle] + Vec3f(0, 0, 2e-6f * static_cast<float>(i))};
     run.Step({&held, 1});
   }
-  const int far = run.solver.regions().Of(run.particles.NodeRef(scene.membrane.rows - 1, 0));
-  EXPECT_TRUE(run.solver.regions().computed(run.solver.regions().Of(at)));
-  EXPECT_FALSE(run.solver.regions().everything());
+  const int far = run.solver.regions().partition().Of(run.particles.NodeRef(scene.membrane.rows - 1, 0));
+  EXPECT_TRUE(run.solver.regions().computed(run.solver.regions().partition().Of(at)));
+  EXPECT_FALSE(run.solver.regions().all_computed());
   EXPECT_FALSE(run.solver.regions().computed(far));
   run.particles.SetInverseMass(at, w);
   run.Step();
   EXPECT_GT(run.solver.Velocity(at).norm(), 1e-4f) << "Released, it moves.";
-  for (int i = 0; i < 300 && !run.solver.regions().nothing(); ++i) {
+  for (int i = 0; i < 300 && !run.solver.regions().none_computed(); ++i) {
     run.Step();
   }
-  EXPECT_TRUE(run.solver.regions().nothing());
+  EXPECT_TRUE(run.solver.regions().none_computed());
   EXPECT_LT((run.particles.At(at) - scene.rest_position[particle]).norm(), 1e-5f);
 }
 
@@ -165,7 +165,7 @@ TEST_F(Accurate, ContactAndCutsWake) {
   for (int i = 0; i < 60; ++i) {
     run.Step();
   }
-  ASSERT_TRUE(run.solver.regions().nothing());
+  ASSERT_TRUE(run.solver.regions().none_computed());
   const Index row_index = scene_.membrane.rows / 2, col = scene_.membrane.cols / 2;
   std::vector<ContactRow> contacts;
   for (Index r = row_index - 1; r <= row_index + 1; ++r) {
@@ -178,9 +178,9 @@ TEST_F(Accurate, ContactAndCutsWake) {
       contacts.push_back(row);
     }
   }
-  const int there = run.solver.regions().Of(run.particles.NodeRef(row_index, col));
+  const int there = run.solver.regions().partition().Of(run.particles.NodeRef(row_index, col));
   run.Step({}, contacts);
-  EXPECT_TRUE(run.solver.regions().nothing()) << "Near is not touching.";
+  EXPECT_TRUE(run.solver.regions().none_computed()) << "Near is not touching.";
   for (ContactRow& row : contacts) {
     row.offset += 0.0015f;
   }
@@ -189,18 +189,18 @@ TEST_F(Accurate, ContactAndCutsWake) {
   for (int i = 0; i < 600; ++i) {
     run.Step({}, contacts);
   }
-  ASSERT_TRUE(run.solver.regions().nothing()) << "It rests on what stands still.";
+  ASSERT_TRUE(run.solver.regions().none_computed()) << "It rests on what stands still.";
   run.Step();
   EXPECT_TRUE(run.solver.regions().computed(there)) << "The support has gone.";
   for (int i = 0; i < 300; ++i) {
     run.Step();
   }
-  ASSERT_TRUE(run.solver.regions().nothing());
+  ASSERT_TRUE(run.solver.regions().none_computed());
 
   TopologyState topology = WholeTopology();
   SetBit(topology.dead_edges, 3 * (row_index * scene_.membrane.cols + col));
   ASSERT_GT(run.tissue.Apply(topology, &run.particles), 0);
-  run.solver.Follow(run.tissue);
+  run.solver.UpdateTopology(run.tissue);
   run.Step();
   EXPECT_TRUE(run.solver.regions().computed(there));
 }
@@ -290,7 +290,7 @@ TEST_F(Accurate, CutEdgesCarryNothing) {
     }
   }
   ASSERT_GT(cut.tissue.Apply(topology, &cut.particles), 0);
-  cut.solver.Follow(cut.tissue);
+  cut.solver.UpdateTopology(cut.tissue);
   for (int i = 0; i < 40; ++i) {
     whole.Step(Patch(&whole, 0.0002f * static_cast<float>(i)));
     cut.Step(Patch(&cut, 0.0002f * static_cast<float>(i)));
