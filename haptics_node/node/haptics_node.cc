@@ -41,7 +41,7 @@ HapticsNode::HapticsNode(const SceneView& scene, const std::array<bool, kMaxTool
 HapticsNode::HapticsNode(const SceneView& scene, DeviceArray devices, const Ports& ports, std::int64_t epoch_ns)
     : ports_(ports),
       devices_(std::move(devices)),
-      servo_(scene, Pointers(devices_)),
+      servo_(ServoSettingsOf(scene), Pointers(devices_)),
       epoch_(static_cast<std::uint64_t>(epoch_ns)) {
   manifest_.node = NodeId::kHaptics;
   manifest_.consumed.resize(1);

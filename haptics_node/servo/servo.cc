@@ -32,11 +32,12 @@ Vec3d RollReference(const Vec3f& p_WP, const Vec3f& field_centre) {
 
 }  // namespace
 
-Servo::Servo(const SceneView& scene, const Devices& devices) : force_scale_(scene.haptics.force_scale) {
-  const Vec3f field_centre = FieldCentre(scene);
+ServoSettings ServoSettingsOf(const SceneView& scene) { return {scene.haptics, scene.tools, FieldCentre(scene)}; }
+
+Servo::Servo(const ServoSettings& settings, const Devices& devices) : force_scale_(settings.params.force_scale) {
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     Channel& channel = channels_[i];
-    const ToolDescription& tool = scene.tools[i];
+    const ToolDescription& tool = settings.tools[i];
     if (tool.kind == ToolKind::kNone) continue;
     if (!(tool.shaft_length_m > 2 * kMinShaftPart_m)) {
       throw InputError("scene: tool " + std::to_string(i) + ": shaft length " + std::to_string(tool.shaft_length_m) +
@@ -45,9 +46,9 @@ Servo::Servo(const SceneView& scene, const Devices& devices) : force_scale_(scen
     channel.device = devices[i];
     channel.kind = tool.kind;
     channel.trocar = {tool.p_WP.cast<double>(), tool.shaft_length_m};
-    channel.x_reference = RollReference(tool.p_WP, field_centre);
-    channel.output.limit_N = scene.haptics.force_limit_N;
-    channel.output.slew_N_per_ms = scene.haptics.slew_N_per_ms;
+    channel.x_reference = RollReference(tool.p_WP, settings.field_centre);
+    channel.output.limit_N = settings.params.force_limit_N;
+    channel.output.slew_N_per_ms = settings.params.slew_N_per_ms;
   }
 }
 

@@ -39,12 +39,21 @@ struct ServoFigures {
   std::uint64_t not_finite = 0;
 };
 
+/// What a servo is set up with: the slice of a scene that it needs.
+struct ServoSettings {
+  HapticsParams params;
+  std::array<ToolDescription, kMaxTools> tools{};
+  /// Middle of the tissue at rest, frame W [m]: the direction from a trocar to it decides a tool's roll reference.
+  Vec3f field_centre = Vec3f::Zero();
+};
+[[nodiscard]] ServoSettings ServoSettingsOf(const SceneView& scene);
+
 class Servo {
  public:
   using Devices = std::array<HapticDevice*, kMaxTools>;
 
   /// Devices may be null; the others must outlive the servo. Throws InputError for a shaft too short to turn about.
-  Servo(const SceneView& scene, const Devices& devices);
+  Servo(const ServoSettings& settings, const Devices& devices);
 
   /// A contact model that has come in; before Step() of the tick that shall know of it.
   void OfferModel(const ContactModel& model, std::int64_t now_ns) noexcept;

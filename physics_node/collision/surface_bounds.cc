@@ -27,7 +27,7 @@ std::uint32_t Morton(const Vec3f& unit) {
 
 }  // namespace
 
-SurfaceBounds::SurfaceBounds(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
+SurfaceBounds::SurfaceBounds(const TissueScene& scene, const TissueModel* model, ParticleStore* particles,
                              const collision::Kernels& kernels)
     : scene_(scene),
       particles_(particles),

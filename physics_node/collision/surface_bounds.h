@@ -30,7 +30,7 @@ namespace fulcrum::physics {
 
 class SurfaceBounds {
  public:
-  SurfaceBounds(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
+  SurfaceBounds(const TissueScene& scene, const TissueModel* model, ParticleStore* particles,
                 const collision::Kernels& kernels);
 
   /// Fits the bounds to the tissue within kReach of `tools`, once a step. Tissue that moves more than kTissueStep in a
@@ -48,7 +48,7 @@ class SurfaceBounds {
   /// ab and some beyond. Corners (r, c), (r, c+1), (r+1, c), (r+1, c+1). The visitor may reduce `range`.
   template <class Visit>
   void ForEachCellNear(const Vec3f& a, const Vec3f& b, const float& range, const Visit& visit) const;
-  /// visit(index in SceneView.tube_surface): the same for the organ.
+  /// visit(index in TissueScene.tube_surface): the same for the organ.
   template <class Visit>
   void ForEachTubeTriangleNear(const Vec3f& a, const Vec3f& b, float range, const Visit& visit) const;
 
@@ -76,7 +76,7 @@ class SurfaceBounds {
   void FitLeaf(Index leaf);
   void FitCluster(Sphere* cluster);
 
-  SceneView scene_;
+  TissueScene scene_;
   ParticleStore* particles_;
   const TissueModel* model_;
   const collision::Kernels& kernels_;

@@ -17,7 +17,7 @@
 
 namespace fulcrum::physics {
 
-TissueCollision::TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
+TissueCollision::TissueCollision(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles,
                                  const collision::Kernels& kernels)
     : scene_(scene), model_(model), particles_(particles), kernels_(kernels) {
   WatchOrgan();

@@ -28,7 +28,7 @@ class TissueCollision {
   /// Most rows in a substep; memory for them is reserved at the start. Assumed.
   static constexpr std::size_t kMaxRows = 4096;
 
-  TissueCollision(const SceneView& scene, const TissueModel* model, const ParticleStore* particles,
+  TissueCollision(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles,
                   const collision::Kernels& kernels = collision::KernelsFor());
 
   /// Once a step, before the solve. `moved`: upper bound of the movement of the particles of each block of the
@@ -206,7 +206,7 @@ class TissueCollision {
   template <class Body>
   void ForFound(const Body& body) const;
 
-  SceneView scene_;
+  TissueScene scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
   const collision::Kernels& kernels_;

@@ -52,7 +52,7 @@ bool InOrder(const ContactPair& p, const ContactPair& q) {
 
 }  // namespace
 
-ToolCollision::ToolCollision(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
+ToolCollision::ToolCollision(const TissueScene& scene, const TissueModel* model, ParticleStore* particles,
                              const collision::Kernels& kernels)
     : scene_(scene),
       model_(model),

@@ -28,7 +28,7 @@ inline constexpr float kFarSq = 1.0f;
 /// A capsule near a triangle in this step.
 struct ContactPair {
   std::uint32_t capsule = 0;     ///< tool * kMaxCapsules + capsule of the tool.
-  Index triangle = 0;            ///< Membrane triangle, or membrane triangle count + index in SceneView.tube_surface.
+  Index triangle = 0;            ///< Membrane triangle, or membrane triangle count + index in TissueScene.tube_surface.
   Vec3f normal = Vec3f::Zero();  ///< Of the membrane around the triangle, or of the organ's triangle.
   std::int8_t side = 0;          ///< Sign of the tool's height along the normal; 0 unknown.
   bool side_kept = false;        ///< The side is that of the last step, in which the pair touched.
@@ -56,7 +56,7 @@ class ToolCollision {
   /// whose row is dropped passes through the tool.
   static constexpr std::size_t kMaxRows = 1024;
 
-  ToolCollision(const SceneView& scene, const TissueModel* model, ParticleStore* particles,
+  ToolCollision(const TissueScene& scene, const TissueModel* model, ParticleStore* particles,
                 const collision::Kernels& kernels = collision::KernelsFor());
 
   struct ToolMotion {
@@ -179,7 +179,7 @@ class ToolCollision {
   void DropShallow(std::size_t first, std::vector<ContactRow>* rows);
   void DropMarked(std::size_t first, std::vector<ContactRow>* rows);
 
-  SceneView scene_;
+  TissueScene scene_;
   const TissueModel* model_;
   ParticleStore* particles_;
   const collision::Kernels& kernels_;

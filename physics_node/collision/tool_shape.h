@@ -44,7 +44,7 @@ struct ToolShape {
 
 /// Distance between the surface of a capsule and the middle of the sheet in contact [m]. For the bare metal of a hook
 /// it is half the thickness of the sheet, so that mechanical contact is electrical contact.
-[[nodiscard]] inline float ContactMargin(const SceneView& scene, ToolPart part) {
+[[nodiscard]] inline float ContactMargin(const TissueScene& scene, ToolPart part) {
   const float margin = scene.physics.collision_margin_m;
   return part == ToolPart::kTip ? std::min(margin, 0.5f * scene.thermal.thickness_m) : margin;
 }

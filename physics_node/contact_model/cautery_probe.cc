@@ -50,7 +50,7 @@ constexpr float kNoSheetSq = 1.0f;
 
 }  // namespace
 
-CauteryProbe::CauteryProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
+CauteryProbe::CauteryProbe(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles)
     : scene_(scene), model_(model), particles_(particles), walk_(scene, model, particles) {
   for (const float length : scene.membrane_rest_length) {
     spacing_ = std::max(spacing_, length);

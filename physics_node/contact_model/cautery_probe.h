@@ -14,7 +14,7 @@ namespace fulcrum::physics {
 
 class CauteryProbe {
  public:
-  CauteryProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
+  CauteryProbe(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles);
 
   /// Contact of hook `tool` after a step: footprint, centre, rate, tented; without stamp.
   ///
@@ -27,7 +27,7 @@ class CauteryProbe {
  private:
   /// Access of SlitSheet to the membrane (services/base/core/slit_sheet.h).
   struct SheetAccess {
-    const SceneView& scene;
+    const TissueScene& scene;
     const TissueModel& model;
     const ParticleStore& particles;
     [[nodiscard]] std::uint32_t rows() const { return scene.membrane.rows; }
@@ -67,7 +67,7 @@ class CauteryProbe {
   void AddGaps(const SheetTriangle& piece, const MetalAxis& axis, float radius_m, const Belongs& belongs);
   [[nodiscard]] bool Tented(Index triangle, const std::array<float, 3>& barycentric) const;
 
-  SceneView scene_;
+  TissueScene scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
   SheetWalk walk_;

@@ -46,13 +46,13 @@ Vec3f Limited(const Vec3f& v, float limit) {
 }
 
 /// The part of a tool that touches tissue.
-ToolPart TipPart(const SceneView& scene, std::uint32_t tool) {
+ToolPart TipPart(const TissueScene& scene, std::uint32_t tool) {
   return scene.tools[tool].kind == ToolKind::kHook ? ToolPart::kTip : ToolPart::kJaw;
 }
 
 }  // namespace
 
-ContactProbe::ContactProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
+ContactProbe::ContactProbe(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles)
     : scene_(scene),
       model_(model),
       particles_(particles),

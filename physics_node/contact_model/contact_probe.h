@@ -34,7 +34,7 @@ class ContactProbe {
   /// Largest published force on a tool [N]; a larger one damages rectal tissue.
   static constexpr float kForceCap_N = 15.0f;
 
-  ContactProbe(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
+  ContactProbe(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles);
 
   /// Contacts of one tool after a step: a grasp, or the nearest surface within range, or none. `solver_force`: force of
   /// the tissue on the tool from the solver [N]; null: estimated from the edges.
@@ -75,7 +75,7 @@ class ContactProbe {
   [[nodiscard]] Motion RingMotion(Index node) const;
   [[nodiscard]] Contact MakeContact(std::uint32_t tool);
 
-  SceneView scene_;
+  TissueScene scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
   ElasticForce elastic_;

@@ -20,7 +20,7 @@ constexpr double kLeastFatLength = 1e-3;
 
 }  // namespace
 
-ElasticForce::ElasticForce(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
+ElasticForce::ElasticForce(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles)
     : scene_(scene), model_(model), particles_(particles) {
   const auto x = [&](Index p) { return Vec3d(scene.rest_position[p].cast<double>()); };
   const Index first = scene.membrane.first, cols = scene.membrane.cols;

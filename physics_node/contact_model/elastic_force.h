@@ -22,7 +22,7 @@ namespace fulcrum::physics {
 
 class ElasticForce {
  public:
-  ElasticForce(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
+  ElasticForce(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles);
 
   /// Total force of the tissue on a set of particles [N, frame W]; forces within the set cancel. In equilibrium with a
   /// tool it is the force of the set on the tool. `set` ascending, without repetition.
@@ -40,7 +40,7 @@ class ElasticForce {
   template <class Visit>
   void ForEachNeighbour(Index particle, const Visit& visit) const;
 
-  SceneView scene_;
+  TissueScene scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
   std::vector<float> membrane_stiffness_;  ///< [3 * nodes], N/m.

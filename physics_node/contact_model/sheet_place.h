@@ -31,7 +31,7 @@ struct SheetPlace {
 /// is interpolated linearly between the lips.
 class SheetWalk {
  public:
-  SheetWalk(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
+  SheetWalk(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles)
       : scene_(scene), model_(model), particles_(particles) {}
 
   /// Descends from a cell to a local minimum of the distance, which may not be the global one.
@@ -51,7 +51,7 @@ class SheetWalk {
   void ForTrianglesAround(Index cell, const Visit& visit) const;
   [[nodiscard]] Vec2f MaterialAt(const std::array<Index, 3>& nodes, const std::array<float, 3>& barycentric) const;
 
-  SceneView scene_;
+  TissueScene scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
 };

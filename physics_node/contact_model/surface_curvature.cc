@@ -103,7 +103,7 @@ PrincipalCurvatures RolledOver(PrincipalCurvatures surface, float ball) {
   return surface;
 }
 
-SurfaceCurvature::SurfaceCurvature(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
+SurfaceCurvature::SurfaceCurvature(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles)
     : scene_(scene),
       model_(model),
       particles_(particles),

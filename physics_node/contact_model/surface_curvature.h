@@ -41,7 +41,7 @@ inline constexpr float kMaxCurvature = 2000.0f;
 /// Curvatures of membrane and organ.
 class SurfaceCurvature {
  public:
-  SurfaceCurvature(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
+  SurfaceCurvature(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles);
 
   /// Curvatures at a point of the surface, of the present shape or of the shape at rest, rotated so that its normal is
   /// `n` (unit, towards the tool). The fit does not extend across cuts. None where `n` is no normal of the surface, as
@@ -56,7 +56,7 @@ class SurfaceCurvature {
   void Visit(Index particle);
   void VisitNeighbours(Index particle);
 
-  SceneView scene_;
+  TissueScene scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
   std::vector<Index> first_neighbour_, neighbours_;  ///< Of the organ's vertices along its surface: compressed rows.

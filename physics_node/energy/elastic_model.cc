@@ -19,7 +19,7 @@ constexpr double kLeastEdge = 0.05;
 /// touch. Below any layer of fat that a scene has.
 constexpr double kLeastBindingLength = 1e-3;
 
-Vec3d Rest(const SceneView& scene, Index particle) { return scene.rest_position[particle].cast<double>(); }
+Vec3d Rest(const TissueScene& scene, Index particle) { return scene.rest_position[particle].cast<double>(); }
 
 double Cotangent(const Vec3d& at, const Vec3d& p, const Vec3d& q) {
   const Vec3d u = p - at, v = q - at;
@@ -32,7 +32,7 @@ double Cotangent(const Vec3d& at, const Vec3d& p, const Vec3d& q) {
 ///   diagonals       A = kShearPart E t l^3 / (l_c l_r)    l: lengths of the diagonal, the row and the column edge [m]
 ///
 /// with l_c l_r >= kLeastCell l^2, and less for edges below kLeastEdge of the mean length.
-void AddSprings(const SceneView& scene, ElasticModel* model) {
+void AddSprings(const TissueScene& scene, ElasticModel* model) {
   const Index first = scene.membrane.first, rows = scene.membrane.rows, cols = scene.membrane.cols;
   const double Et = scene.physics.membrane_Et_N_per_m, shrink = 1.0 / (1.0 + scene.physics.membrane_prestrain);
   model->springs.assign(scene.membrane_rest_length.size(), {});
@@ -91,7 +91,7 @@ void AddSprings(const SceneView& scene, ElasticModel* model) {
 ///
 /// with the flexural rigidity B [N m], the areas A [m^2] and c_ij the cotangent of the angle at x_i in the triangle of
 /// x_j.
-void AddHinges(const SceneView& scene, ElasticModel* model) {
+void AddHinges(const TissueScene& scene, ElasticModel* model) {
   for (const BendingConstraint& bend : scene.bending) {
     std::array<Vec3d, 4> x;
     for (std::size_t i = 0; i < 4; ++i) {
@@ -115,7 +115,7 @@ void AddHinges(const SceneView& scene, ElasticModel* model) {
   }
 }
 
-void AddTets(const SceneView& scene, ElasticModel* model) {
+void AddTets(const TissueScene& scene, ElasticModel* model) {
   const double E = scene.physics.tube_youngs_modulus_Pa, nu = scene.physics.tube_poisson;
   model->mu_Pa = E / (2 * (1 + nu));
   model->lambda_Pa = E * nu / ((1 + nu) * (1 - 2 * nu));
@@ -130,7 +130,7 @@ void AddTets(const SceneView& scene, ElasticModel* model) {
   AddOrganPatches(model);
 }
 
-void AddBindings(const SceneView& scene, ElasticModel* model) {
+void AddBindings(const TissueScene& scene, ElasticModel* model) {
   if (scene.bindings.empty()) {
     return;
   }
@@ -180,7 +180,7 @@ void AddLoad(ElasticModel* model) {
 
 }  // namespace
 
-ElasticModel BuildElasticModel(const SceneView& scene) {
+ElasticModel BuildElasticModel(const TissueScene& scene) {
   ElasticModel model;
   for (Index p = 0; p < scene.rest_position.size(); ++p) {
     model.rest_position.push_back(Rest(scene, p));

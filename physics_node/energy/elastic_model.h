@@ -104,7 +104,7 @@ struct ElasticModel {
 
 /// Moduli into elements. Springs: a row or column of the grid carries E t times its share of the width, so a strip in
 /// uniaxial tension along rows or columns is exact; diagonals give the sheet its shear stiffness.
-[[nodiscard]] ElasticModel BuildElasticModel(const SceneView& scene);
+[[nodiscard]] ElasticModel BuildElasticModel(const TissueScene& scene);
 
 /// Fills patches, patch_links and shear_links from rest_position, tets and mu_Pa; BuildElasticModel does so too.
 void AddOrganPatches(ElasticModel* model);

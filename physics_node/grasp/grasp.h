@@ -26,7 +26,7 @@ class Grasp {
  public:
   enum class State : std::uint32_t { kOpen, kHolding, kClosedEmpty };
 
-  explicit Grasp(const SceneView& scene) : scene_(scene) {}
+  explicit Grasp(const TissueScene& scene) : scene_(scene) {}
 
   /// Begins a grasp when the jaws close below grasp_close_rad and ends it when they open beyond grasp_open_rad. Held
   /// are all particles within a jaw's thickness of the surface that the jaws span, in both layers and all sheets of a
@@ -59,7 +59,7 @@ class Grasp {
   template <class Predicate>
   void DropIf(const TissueModel& model, ParticleStore* particles, const Predicate& released);
 
-  SceneView scene_;
+  TissueScene scene_;
   State state_ = State::kOpen;
   std::vector<HeldParticle> held_;
   Vec3f traction_ = Vec3f::Zero();  ///< Low-passed, frame W [N].

@@ -60,7 +60,7 @@ std::vector<std::uint32_t> AlongLongestSide(const std::vector<Vec3d>& place) {
 
 }  // namespace
 
-CoarseSpace::CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles,
+CoarseSpace::CoarseSpace(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles,
                          const Kernels& kernels)
     : kernels_(kernels),
       layout_(particles.layout()),
@@ -162,7 +162,7 @@ std::array<int, 4> CoarseSpace::CoarseGrid::NodesOf(int row_cell, int column_cel
 }
 
 /// The lattice over the organ; only nodes that carry something get a number.
-void CoarseSpace::BuildLattice(const SceneView& scene, const ElasticModel& model) {
+void CoarseSpace::BuildLattice(const TissueScene& scene, const ElasticModel& model) {
   grid_.nodes = grid_.columns * grid_.rows;
   std::map<std::array<int, 3>, std::uint16_t> lattice;
   for (Index v = 0; v < scene.tube_vertex_count; ++v) {

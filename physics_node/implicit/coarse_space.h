@@ -27,7 +27,7 @@ namespace fulcrum::physics::implicit {
 
 class CoarseSpace {
  public:
-  CoarseSpace(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles,
+  CoarseSpace(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles,
               const Kernels& kernels);
 
   /// A new coarse matrix, in force at once.
@@ -132,7 +132,7 @@ class CoarseSpace {
   };
 
   void BuildHats();
-  void BuildLattice(const SceneView& scene, const ElasticModel& model);
+  void BuildLattice(const TissueScene& scene, const ElasticModel& model);
   void AddTubeMass(const ElasticModel& model);
   void AddTube(const ElasticModel& model);
   void AddBindings(const ElasticModel& model, const ParticleStore& particles);

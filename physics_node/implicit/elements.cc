@@ -140,7 +140,7 @@ float Elements::ContactStiffness(const ContactRow& row) {
 }
 bool Elements::IsTissue(const ContactRow& row) { return (row.source & TissueCollision::kSource) != 0; }
 
-Elements::Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles,
+Elements::Elements(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles,
                    const Partition& partition)
     : hinges_(model, particles), guard_(model) {
   for (const ElasticBinding& binding : model.bindings) {

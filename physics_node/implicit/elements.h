@@ -48,7 +48,7 @@ class Elements {
   /// Contacts that memory is reserved for, of tools and of tissue against tissue together; with more the lists grow.
   static constexpr std::size_t kReservedContacts = 4608;
 
-  Elements(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles,
+  Elements(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles,
            const Partition& partition);
 
   /// Stiffness that bindings and hinges add to the diagonal, by pool offset of x [N/m].

@@ -14,7 +14,7 @@ namespace fulcrum::physics::implicit {
 
 /// The whole membrane; arrays are planes of it. What cuts and heat leave of its edges: SheetEdges.
 struct SheetModel {
-  SheetModel(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles);
+  SheetModel(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles);
 
   std::array<FloatArray, 3> axial;         ///< By direction: tension per strain [N]; 0 where the grid has no edge.
   std::array<FloatArray, 3> inverse_rest;  ///< By direction: 1 / L [1/m].
@@ -34,7 +34,7 @@ struct OrganModel {
 };
 
 struct ImplicitModel {
-  ImplicitModel(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles);
+  ImplicitModel(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles);
   /// Constants of a substep of h seconds.
   [[nodiscard]] Inertia InertiaOf(float h) const;
 

@@ -102,7 +102,7 @@ Effort EffortOf(PhysicsPreset preset) {
   return {2, 2};
 }
 
-ImplicitSolver::ImplicitSolver(const SceneView& scene, const ElasticModel& model, const TissueModel& tissue,
+ImplicitSolver::ImplicitSolver(const TissueScene& scene, const ElasticModel& model, const TissueModel& tissue,
                                ParticleStore* particles, int threads, const Kernels& kernels)
     : model_(scene, model, *particles),
       workers_(threads),

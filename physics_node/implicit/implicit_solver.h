@@ -40,8 +40,8 @@ struct Effort {
 class ImplicitSolver {
  public:
   /// `threads` with the caller's; results do not depend on it.
-  ImplicitSolver(const SceneView& scene, const ElasticModel& model, const TissueModel& tissue, ParticleStore* particles,
-                 int threads = 1, const Kernels& kernels = KernelsFor());
+  ImplicitSolver(const TissueScene& scene, const ElasticModel& model, const TissueModel& tissue,
+                 ParticleStore* particles, int threads = 1, const Kernels& kernels = KernelsFor());
 
   /// After each TissueModel::Apply that changed something: follows cuts and shrinking, and wakes the tissue there. The
   /// cost grows with the edits; nothing is factored again.

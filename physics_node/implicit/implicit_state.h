@@ -77,7 +77,7 @@ struct Movement {
 };
 
 struct SolverState {
-  SolverState(const SceneView& scene, const ElasticModel& elastic, const TissueModel& tissue,
+  SolverState(const TissueScene& scene, const ElasticModel& elastic, const TissueModel& tissue,
               const SolverContext& context);
 
   FloatArray velocity;  ///< A field [m/s]; 0 where nothing is computed.

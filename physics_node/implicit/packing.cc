@@ -40,7 +40,7 @@ std::vector<std::pair<ParticleRef, ParticleRef>> JoinedParticles(const ElasticMo
 
 }  // namespace
 
-SheetModel::SheetModel(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
+SheetModel::SheetModel(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles)
     : mass(particles.layout().plane()),
       stiffening(static_cast<float>(model.stiffening)),
       rest_scale(1.0f / (1.0f + scene.physics.membrane_prestrain)) {
@@ -137,7 +137,7 @@ Organ OrganModel::View() const {
           mass.data()};
 }
 
-ImplicitModel::ImplicitModel(const SceneView& scene, const ElasticModel& model, const ParticleStore& particles)
+ImplicitModel::ImplicitModel(const TissueScene& scene, const ElasticModel& model, const ParticleStore& particles)
     : layout(particles),
       grid(particles.layout()),
       partition(particles, JoinedParticles(model, particles)),
@@ -263,7 +263,7 @@ TouchedRegions::TouchedRegions(const ImplicitModel& model)
 Movement::Movement(const ParticleStore& particles)
     : of_step(particles.block_count(), 0.0f), before_sleep(particles.block_count(), 0.0f) {}
 
-SolverState::SolverState(const SceneView& scene, const ElasticModel& elastic, const TissueModel& tissue,
+SolverState::SolverState(const TissueScene& scene, const ElasticModel& elastic, const TissueModel& tissue,
                          const SolverContext& context)
     : velocity(context.model.layout.floats),
       edges(context.model, tissue),

@@ -24,7 +24,7 @@ constexpr float kMostCoordinate_m = 10.0f, kMostTravel_m = 0.1f;
 
 }  // namespace
 
-TissueSimulation::TissueSimulation(const SceneView& scene, int threads, InstructionSet set)
+TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, InstructionSet set)
     : scene_(scene),
       particles_(scene),
       model_(scene, &particles_),

@@ -48,7 +48,7 @@ class TissueSimulation {
   static constexpr float kMaxToolTurn = 6.0f;
 
   /// `threads` for a step of mode accurate; the state does not depend on their number.
-  explicit TissueSimulation(const SceneView& scene, int threads = 1, InstructionSet set = BestInstructionSet());
+  explicit TissueSimulation(const TissueScene& scene, int threads = 1, InstructionSet set = BestInstructionSet());
 
   TissueSimulation(const TissueSimulation&) = delete;
   TissueSimulation& operator=(const TissueSimulation&) = delete;
@@ -146,7 +146,7 @@ class TissueSimulation {
   void FindTissueContacts();
   void FindContacts(bool tissue_moved, float tissue_step = 0);
 
-  SceneView scene_;
+  TissueScene scene_;
   ParticleStore particles_;
   TissueModel model_;
   PbdSolver solver_;

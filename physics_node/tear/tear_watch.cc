@@ -40,7 +40,7 @@ std::vector<float> Window(float cells) {
 
 }  // namespace
 
-TearWatch::TearWatch(const SceneView& scene, const TissueModel* model, const ParticleStore* particles)
+TearWatch::TearWatch(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles)
     : scene_(scene),
       model_(model),
       particles_(particles),

@@ -49,7 +49,7 @@ class TearWatch {
   static constexpr std::uint64_t kMaxWait = 100;
 
   /// Model and particles must outlive this object.
-  TearWatch(const SceneView& scene, const TissueModel* model, const ParticleStore* particles);
+  TearWatch(const TissueScene& scene, const TissueModel* model, const ParticleStore* particles);
 
   /// After TissueModel::Apply: updates the triangles of the edited edges.
   void Follow();
@@ -109,7 +109,7 @@ class TearWatch {
   void TearAcross(const Place& from, const Place& to);
   void Tear(Index edge);
 
-  SceneView scene_;
+  TissueScene scene_;
   const TissueModel* model_;
   const ParticleStore* particles_;
   float limit_, to_rest_;  ///< to_rest_: 1 + prestrain, the stretch in the rest shape.

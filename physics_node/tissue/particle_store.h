@@ -93,7 +93,7 @@ class FloatArray {
 
 class ParticleStore {
  public:
-  explicit ParticleStore(const SceneView& scene)
+  explicit ParticleStore(const TissueScene& scene)
       : tube_count_(scene.tube_vertex_count),
         particle_count_(static_cast<Index>(scene.rest_position.size())),
         first_node_(scene.membrane.first),

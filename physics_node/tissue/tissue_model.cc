@@ -5,7 +5,7 @@
 
 namespace fulcrum::physics {
 
-TissueModel::TissueModel(const SceneView& scene, ParticleStore* particles)
+TissueModel::TissueModel(const TissueScene& scene, ParticleStore* particles)
     : scene_(scene), layout_(scene.membrane.rows, scene.membrane.cols) {
   const std::size_t nodes = scene.membrane.node_count();
   if (scene.membrane.first != scene.tube_vertex_count ||

@@ -28,7 +28,7 @@ class TissueModel {
  public:
   /// Throws InputError for a scene that violates the rules of the layout: membrane directly after the tube, no two
   /// constraints of a colour on one particle.
-  TissueModel(const SceneView& scene, ParticleStore* particles);
+  TissueModel(const TissueScene& scene, ParticleStore* particles);
 
   /// Applies the difference between `topology` and the present state in place: O(edits) beyond one comparison of the
   /// bit fields. Returns the number of changed edges and nodes, or -1 if the sizes do not fit this scene.
@@ -73,9 +73,9 @@ class TissueModel {
   [[nodiscard]] ConstraintCounts counts() const { return counts_; }
 
  private:
-  void PackTube(const SceneView& scene, const ParticleStore& particles);
-  void PackBending(const SceneView& scene, const ParticleStore& particles);
-  void PackBindings(const SceneView& scene, const ParticleStore& particles);
+  void PackTube(const TissueScene& scene, const ParticleStore& particles);
+  void PackBending(const TissueScene& scene, const ParticleStore& particles);
+  void PackBindings(const TissueScene& scene, const ParticleStore& particles);
   void RefreshEdge(Index node, int direction);
   void RefreshNode(Index node, ParticleStore* particles);
   void RefreshTriangles(Index node);
@@ -87,7 +87,7 @@ class TissueModel {
   void FindDebris(const std::vector<Index>& changed, ParticleStore* particles);
   void ClearDebris(ParticleStore* particles);
 
-  SceneView scene_;
+  TissueScene scene_;
   GridLayout layout_;
   std::vector<SpringBatch> springs_;
   std::vector<TetBatch> tets_;

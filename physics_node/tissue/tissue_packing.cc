@@ -17,7 +17,7 @@ constexpr float kFloorPart = 1e-3f;
 /// area the angle has no usable gradient.
 constexpr float kNormalFloorPart = 1e-4f;
 
-[[noreturn]] void Refuse(const SceneView& scene, const std::string& what) {
+[[noreturn]] void Refuse(const TissueScene& scene, const std::string& what) {
   throw InputError(std::string("scene '") + scene.name + "': " + what);
 }
 
@@ -38,7 +38,7 @@ std::pair<std::size_t, std::size_t> SlotOf(Index i, Index first, Index last, con
 
 /// Calls add(first, last) for each colour; throws if the offsets do not cover the constraints.
 template <class Add>
-void ForEachColour(const SceneView& scene, std::span<const Index> offsets, std::size_t count, const char* what,
+void ForEachColour(const TissueScene& scene, std::span<const Index> offsets, std::size_t count, const char* what,
                    const Add& add) {
   if (count == 0) {
     return;
@@ -89,7 +89,7 @@ void Compress(std::vector<std::pair<Index, Index>> pairs, std::size_t nodes, std
 
 }  // namespace
 
-void TissueModel::PackTube(const SceneView& scene, const ParticleStore& particles) {
+void TissueModel::PackTube(const TissueScene& scene, const ParticleStore& particles) {
   const Index padding = 4 * particles.padding_vertex();
   ColourCheck check(scene.tube_vertex_count);
   SpringBatch no_springs{};
@@ -147,7 +147,7 @@ void TissueModel::PackTube(const SceneView& scene, const ParticleStore& particle
   });
 }
 
-void TissueModel::PackBending(const SceneView& scene, const ParticleStore& particles) {
+void TissueModel::PackBending(const TissueScene& scene, const ParticleStore& particles) {
   ColourCheck check(scene.rest_position.size());
   std::vector<std::pair<Index, Index>> users;
   // Places in the compact copy of the particles that hinges use, in memory order; the last one is the padding.
@@ -218,7 +218,7 @@ void TissueModel::PackBending(const SceneView& scene, const ParticleStore& parti
   Compress(std::move(users), scene.membrane.node_count(), &bending_start_, &bending_of_);
 }
 
-void TissueModel::PackBindings(const SceneView& scene, const ParticleStore& particles) {
+void TissueModel::PackBindings(const TissueScene& scene, const ParticleStore& particles) {
   ColourCheck check(scene.rest_position.size());
   std::vector<std::pair<Index, Index>> users;
   BindingBatch no_bindings{};

@@ -198,7 +198,7 @@ struct ThermalSolver::Header {
   }
 };
 
-std::size_t ThermalSolver::CheckpointCapacity(const SceneView& scene) {
+std::size_t ThermalSolver::CheckpointCapacity(const SheetScene& scene) {
   const std::size_t nodes = scene.membrane.node_count();
   const std::size_t fixed = (std::size_t{1} << 18) + kCutCapacity + 64 * scene.protected_points.size() + 4 * nodes;
   const Sheet sheet = MakeSheet(scene);

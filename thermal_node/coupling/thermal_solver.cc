@@ -32,7 +32,7 @@ ThermalParams SheetParams(ThermalParams params) {
 
 }  // namespace
 
-ThermalSolver::ThermalSolver(const SceneView& scene)
+ThermalSolver::ThermalSolver(const SheetScene& scene)
     : params_(scene.thermal),
       material_(scene.thermal.model == ThermalModel::kPaper ? MakePaperMaterial(scene.thermal)
                                                             : MakeMaterial(SheetParams(scene.thermal))),

@@ -61,7 +61,7 @@ struct SolverFigures {
 class ThermalSolver {
  public:
   /// Throws InputError when the scene has no usable membrane or parameters.
-  explicit ThermalSolver(const SceneView& scene);
+  explicit ThermalSolver(const SheetScene& scene);
   ThermalSolver(const ThermalSolver&) = delete;  // parts refer to each other
   ThermalSolver& operator=(const ThermalSolver&) = delete;
 
@@ -103,7 +103,7 @@ class ThermalSolver {
   // Checkpoints (coupling/checkpoint_state.cc). They hold the committed topology only: nothing may be staged, which is
   // so after every Step that ended on a commit frame, and between commits while nothing was cut.
   [[nodiscard]] bool at_commit_frame() const { return frame_ % kCommitFrames == 0; }
-  [[nodiscard]] static std::size_t CheckpointCapacity(const SceneView& scene);
+  [[nodiscard]] static std::size_t CheckpointCapacity(const SheetScene& scene);
   /// Returns the bytes used; 0 when `out` is too small or changes of the topology are staged.
   [[nodiscard]] std::size_t Save(std::span<std::byte> out) const;
   /// False, and an untouched fresh state, when the bytes are not a checkpoint of this layout or hold values that the

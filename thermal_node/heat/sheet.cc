@@ -65,7 +65,7 @@ SurfaceMetric Bounded(const SurfaceMetric& g) {
 }
 
 /// g of each node of the grid: the mean of the quads around it.
-std::vector<SurfaceMetric> NodeMetric(const SceneView& scene) {
+std::vector<SurfaceMetric> NodeMetric(const SheetScene& scene) {
   const MembraneGrid& grid = scene.membrane;
   std::vector<SurfaceMetric> sum(grid.node_count(), SurfaceMetric{0, 0, 0});
   std::vector<int> count(grid.node_count(), 0);
@@ -131,7 +131,7 @@ void Spread(const Sheet& sheet, std::vector<std::uint8_t>* known, std::vector<Su
 }
 
 /// The metric of the grid at the places of the lattice, linear within each of its triangles.
-void MeasureMetric(const SceneView& scene, Sheet* sheet) {
+void MeasureMetric(const SheetScene& scene, Sheet* sheet) {
   const MembraneGrid& grid = scene.membrane;
   const std::vector<SurfaceMetric> at_node = NodeMetric(scene);
   MakeLattice(sheet);
@@ -210,7 +210,7 @@ bool Sheet::OnSheet(const Vec2f& material) const {
   return Contains(cell) && !IsOutside(cell.ix, cell.iy);
 }
 
-Sheet MakeSheet(const SceneView& scene) {
+Sheet MakeSheet(const SheetScene& scene) {
   const MembraneGrid& grid = scene.membrane;
   if (grid.rows < 2 || grid.cols < 2 || scene.membrane_material.size() != grid.node_count() ||
       scene.rest_position.size() < grid.first + grid.node_count()) {

@@ -55,7 +55,7 @@ struct Sheet {
 
 /// Throws InputError when the scene has no membrane, or its material coordinates are not finite or are larger than the
 /// atlas.
-[[nodiscard]] Sheet MakeSheet(const SceneView& scene);
+[[nodiscard]] Sheet MakeSheet(const SheetScene& scene);
 /// A flat rectangle with its corner at (0, 0) [m].
 [[nodiscard]] Sheet MakeFlatSheet(float width_m, float height_m, float cell_m);
 /// Sets the metric from a function of material coordinates [m]. What is not finite becomes isometric; stretches are

@@ -36,7 +36,7 @@ Material MakePaperMaterial(const ThermalParams& params) {
   return m;
 }
 
-PaperModel::PaperModel(const SceneView& scene, const Sheet& sheet)
+PaperModel::PaperModel(const SheetScene& scene, const Sheet& sheet)
     : rows_(scene.membrane.rows), cols_(scene.membrane.cols), nx_(sheet.nx), ny_(sheet.ny) {
   const Vec2f origin(static_cast<float>(sheet.origin_x), static_cast<float>(sheet.origin_y));
   node_.reserve(scene.membrane_material.size());

@@ -30,7 +30,7 @@ inline constexpr int kPaperSweeps = 32;  ///< Jacobi sweeps a frame; our choice,
 
 class PaperModel {
  public:
-  PaperModel(const SceneView& scene, const Sheet& sheet);
+  PaperModel(const SheetScene& scene, const Sheet& sheet);
 
   struct Electrode {
     Vec2f tip = Vec2f::Zero();  ///< Material coordinates [m].

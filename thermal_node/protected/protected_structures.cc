@@ -10,7 +10,7 @@ constexpr float kMinDepth_m = 3e-4f;
 
 }  // namespace
 
-ProtectedStructures::ProtectedStructures(const SceneView& scene, const HeatField& field)
+ProtectedStructures::ProtectedStructures(const SheetScene& scene, const HeatField& field)
     : body_C_(field.material().body_C) {
   for (const ProtectedStructure& structure : scene.protected_structures) {
     const auto index = static_cast<Index>(structures_.size());

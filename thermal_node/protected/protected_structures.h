@@ -42,7 +42,7 @@ struct ProtectedAlarm {
 
 class ProtectedStructures {
  public:
-  ProtectedStructures(const SceneView& scene, const HeatField& field);
+  ProtectedStructures(const SheetScene& scene, const HeatField& field);
 
   /// Advances by dt (any length) and appends alarms: each structure warns once and is injured once.
   /// @param volume the tissue beneath, or nullptr.

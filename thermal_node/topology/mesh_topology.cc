@@ -30,7 +30,7 @@ std::uint32_t CountBits(std::span<const std::uint8_t> bits) {
 
 }  // namespace
 
-MeshTopology::MeshTopology(const SceneView& scene, const Sheet& sheet)
+MeshTopology::MeshTopology(const SheetScene& scene, const Sheet& sheet)
     : rows_(scene.membrane.rows),
       cols_(scene.membrane.cols),
       shrink_max_(scene.thermal.shrink_max),

@@ -36,7 +36,7 @@ struct TopologyBits {
 
 class MeshTopology {
  public:
-  MeshTopology(const SceneView& scene, const Sheet& sheet);
+  MeshTopology(const SheetScene& scene, const Sheet& sheet);
 
   /// Looks again at every edge whose band touches the box of cells, after cells in it were removed.
   void StageCut(const HeatField& field, CellIndex low, CellIndex high);

@@ -208,48 +208,59 @@ struct ScriptKey {
 
 // --------------------------------------------------------------------------------------------------- the scene
 
-/// Constraints are sorted by colour: colour k is [offset[k], offset[k+1]); no two constraints of a colour share a
-/// particle, so a colour can be solved in any order with the same result.
-struct SceneView {
+/// The membrane as a sheet in its own coordinates, what lies beneath it, and what heats them: all that the solvers of
+/// heat, damage and topology read.
+struct SheetScene {
   char name[64] = {};
   std::uint64_t hash = 0;
-
-  PhysicsParams physics;
   ThermalParams thermal;
-  RenderParams render;
-  HapticsParams haptics;
-  Breathing breathing;
-  AssessmentParams assessment = UsualAssessment();
 
-  /// Particles: tube vertices [0, tube_vertex_count), then the membrane grid.
-  Index tube_vertex_count = 0;
   MembraneGrid membrane;
-  std::span<const Vec3f> rest_position;  ///< [n] frame W, m.
-  std::span<const float> inverse_mass;   ///< [n] 1/kg; 0 = fixed.
+  std::span<const Vec3f> rest_position;         ///< [n] of all particles, frame W, m; the membrane's from `first` on.
+  std::span<const float> membrane_rest_length;  ///< [3 * rows * cols]; 0 where the grid has no such edge.
+  std::span<const Vec2f> membrane_material;     ///< [rows * cols] (s, t) of each node on the flattened sheet, m.
 
-  std::span<const Tetrahedron> tets;  ///< Tube; positive volume.
+  std::span<const ProtectedStructure> protected_structures;
+  std::span<const ProtectedPoint> protected_points;
+};
+
+/// What deforms, what it meets and what works on it: all that the solvers of the tissue read. Particles: tube vertices
+/// [0, tube_vertex_count), then the membrane grid.
+///
+/// Constraints are sorted by colour: colour k is [offset[k], offset[k+1]); no two constraints of a colour share a
+/// particle, so a colour can be solved in any order with the same result.
+struct TissueScene : SheetScene {
+  PhysicsParams physics;
+  Breathing breathing;
+
+  Index tube_vertex_count = 0;
+  std::span<const float> inverse_mass;  ///< [n] 1/kg; 0 = fixed.
+  std::span<const Tetrahedron> tets;    ///< Tube; positive volume.
   std::span<const Index> tet_colours;
   std::span<const StretchConstraint> tube_edges;
   std::span<const Index> tube_edge_colours;
-  std::span<const float> membrane_rest_length;  ///< [3 * rows * cols]; 0 where the grid has no such edge.
   std::span<const BendingConstraint> bending;
   std::span<const Index> bending_colours;
   std::span<const Binding> bindings;
   std::span<const Index> binding_colours;
-
-  std::span<const Triangle> tube_surface;            ///< Outer surface of the tets, outward.
-  std::span<const EmbeddedVertex> surface_vertices;  ///< High-resolution rectum surface.
-  std::span<const Triangle> surface_triangles;
-  std::span<const Vec2f> membrane_material;  ///< [rows * cols] (s, t) of each node on the flattened sheet, m.
+  std::span<const Triangle> tube_surface;  ///< Outer surface of the tets, outward.
 
   std::span<const StaticSurface> static_surfaces;
   std::span<const Vec3f> static_vertices;
   std::span<const Triangle> static_triangles;
 
-  std::span<const ProtectedStructure> protected_structures;
-  std::span<const ProtectedPoint> protected_points;
-
   std::array<ToolDescription, kMaxTools> tools{};
+};
+
+/// The whole scene: what nodes read. A solver takes the slice that it needs.
+struct SceneView : TissueScene {
+  RenderParams render;
+  HapticsParams haptics;
+  AssessmentParams assessment = UsualAssessment();
+
+  std::span<const EmbeddedVertex> surface_vertices;  ///< High-resolution rectum surface.
+  std::span<const Triangle> surface_triangles;
+
   std::span<const ToolMesh> tool_meshes;  ///< How tools look; one that has none is drawn by its dimensions.
   std::span<const Vec3f> tool_vertices;
   std::span<const Triangle> tool_triangles;

@@ -167,7 +167,7 @@ void RunBusy(Report* report, int ticks) {
   SceneView scene = BenchScene(0.3);
   scene.tools[1] = scene.tools[0];
   GuidedDevice device(BenchTrocar(), [](double t) { return Vec3d(0.01 * std::sin(t), 0, -0.004); });
-  Servo servo(scene, {&device, &device});
+  Servo servo(ServoSettingsOf(scene), {&device, &device});
   const TestTissue tissue({});
   std::vector<double> times;
   for (int i = 0; i < ticks; ++i) {

@@ -23,7 +23,7 @@ class ServoStrategy final : public ForceStrategy {
  private:
   Vec3d tip_ = Vec3d::Zero();
   testing::GuidedDevice device_{testing::BenchTrocar(), [this](double) { return tip_; }};
-  Servo servo_{testing::BenchScene(1.0), {&device_, nullptr}};
+  Servo servo_{ServoSettingsOf(testing::BenchScene(1.0)), {&device_, nullptr}};
 };
 
 /// What the baselines share: the newest report, as doubles.

@@ -79,7 +79,8 @@ class GateCheck {
 
   TestTissue tissue_ = Pressed();
   GuidedDevice device_{BenchTrocar(), Tip}, twin_device_{BenchTrocar(), Tip};
-  Servo servo_{BenchScene(1.0), {&device_, nullptr}}, twin_{BenchScene(1.0), {&twin_device_, nullptr}};
+  Servo servo_{ServoSettingsOf(BenchScene(1.0)), {&device_, nullptr}},
+      twin_{ServoSettingsOf(BenchScene(1.0)), {&twin_device_, nullptr}};
   std::uint64_t millisecond_ = 100, epoch_ = 1, sequence_ = 1, offered_ = 0, refused_ = 0;
   Vec3d last_ = Vec3d::Zero();
   double peak_ = 0;

@@ -13,7 +13,7 @@ namespace fulcrum::haptics::testing {
 
 struct Loop {
   Loop(const SceneView& scene, HapticDevice* device, const TissueParameters& parameters)
-      : servo(scene, {device, nullptr}), tissue(parameters) {}
+      : servo(ServoSettingsOf(scene), {device, nullptr}), tissue(parameters) {}
 
   /// Gives each tick, when all of it is done, to `each`.
   template <class Each>

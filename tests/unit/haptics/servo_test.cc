@@ -35,7 +35,7 @@ TEST(Servo, RefusesAShaftTooShortToTurnAbout) {
   SceneView scene = BenchScene(1);
   scene.tools[0].shaft_length_m = 0.02f;
   GuidedDevice device(BenchTrocar(), [](double) { return Vec3d(0, 0, 0.01); });
-  EXPECT_THROW(Servo(scene, {&device, nullptr}), InputError);
+  EXPECT_THROW(Servo(ServoSettingsOf(scene), {&device, nullptr}), InputError);
 }
 
 TEST(Servo, WithoutModelsThereIsNoForceAndTheToolIsPublished) {
@@ -70,7 +70,8 @@ TEST(Servo, PressTheShaftSidewaysAndTheHandFeelsTheFulcrum) {
   // A wall x > 0.05 … seen by a shaft that hangs straight down: the tip presses towards -x, so the wall pushes +x and
   // the hand, on the other side of the pivot, is pushed towards -x by the inside part over the outside part.
   GuidedDevice device(BenchTrocar(), [](double) { return Vec3d(0, 0, -0.05); });
-  Servo servo(BenchScene(0.3), {&device, nullptr});  // Softly enough for no coupling: tip and proxy are one.
+  Servo servo(ServoSettingsOf(BenchScene(0.3)),
+              {&device, nullptr});  // Softly enough for no coupling: tip and proxy are one.
   for (std::uint64_t i = 0; i < 1000; ++i) {
     const Tick tick = TickAt(i);
     if (i % 10 == 0) {
@@ -170,7 +171,7 @@ TEST(Servo, TwoToolsPressTheirOwnTissue) {
   scene.tools[1] = scene.tools[0];
   GuidedDevice left(BenchTrocar(), [](double) { return Vec3d(0, 0, -0.004); });
   GuidedDevice right(BenchTrocar(), [](double t) { return Vec3d(0, 0, 0.004 - 0.004 * t); });
-  Servo servo(scene, {&left, &right});
+  Servo servo(ServoSettingsOf(scene), {&left, &right});
   TestTissue soft({}), stiff({.k1 = 900, .k_body = 900, .b_body = 10});
   std::uint64_t sequence = 0;
   for (std::uint64_t i = 0; i < 2000; ++i) {
@@ -258,7 +259,7 @@ TEST(Servo, AbsurdModelsNeverBreakLimitOrSlew) {
   };
   Vec3d tip(0, 0, 0.01);
   GuidedDevice device(BenchTrocar(), [&](double) { return tip; });
-  Servo servo(BenchScene(1), {&device, nullptr});
+  Servo servo(ServoSettingsOf(BenchScene(1)), {&device, nullptr});
   Vec3d last = Vec3d::Zero();
   double most = 0;
   for (std::uint64_t i = 0; i < 60000; ++i) {

@@ -43,7 +43,7 @@ TEST_P(StiffWall, RingsDownThroughTheDriver) {
   const auto driver = std::make_shared<TouchDriver>(left, FULCRUM_HD_STAND_IN);
   SceneView scene = BenchScene(1.0);
   TouchDevice touch(driver, 0, map, 1, AttachPointForTip(BenchTrocar(), Vec3d(0, 0, 0.01)));
-  Servo servo(scene, {&touch, nullptr});
+  Servo servo(ServoSettingsOf(scene), {&touch, nullptr});
   TestTissue tissue({.k1 = 8000, .k3 = 0, .kt = 500, .k_body = 6000, .b_body = 3});
   LatePhysics physics;
 

@@ -24,7 +24,7 @@ int main() {
   const SceneView view = scene.View();
   const Vec3d pivot = view.tools[0].p_WP.cast<double>();
   Hand hand(pivot + 0.5 * static_cast<double>(view.tools[0].shaft_length_m) * pivot.normalized());
-  haptics::Servo servo(view, {&hand, nullptr});
+  haptics::Servo servo(haptics::ServoSettingsOf(view), {&hand, nullptr});
 
   ContactModel model{.stamp = {.sequence = 0, .epoch = 1}, .physics_dt_s = 0.01f};
   Contact& contact = model.devices[0].contacts[0];
