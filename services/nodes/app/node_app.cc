@@ -188,15 +188,16 @@ struct NodeApp::Impl {
   /// Until session time 0 has passed and, in a recorded session, the recorder reads what this node writes.
   void WaitForSession() {
     const bool replayable = node != NodeId::kRecorder && node != NodeId::kRender;
-    RecorderWait recorder;
+    std::optional<RecorderWait> recorder;
+    if (replayable) recorder.emplace(&joined->participant);
     for (; !ShouldEnd(); std::this_thread::sleep_for(kPollPeriod)) {
       Poll();
       const bool known = session_start_ns.load(std::memory_order_relaxed) != kSessionUnknown;
-      const bool recorder_is_ready = replayable && recorder.Look(joined->participant, known);
-      const bool awaits = replayable && session_recorded;
-      if (!known || (awaits && !recorder_is_ready) || SessionTime(MonotonicNs()) < 0) continue;
-      if (awaits && !recorder.heard()) {
-        Log(LogLevel::kWarning, "begins though no recorder hears it: a replay will not have its first ticks");
+      if (recorder) recorder->Update(MonotonicNs(), known);
+      const bool awaits = recorder && session_recorded;
+      if (!known || (awaits && !recorder->is_over()) || SessionTime(MonotonicNs()) < 0) continue;
+      if (awaits && !recorder->is_read()) {
+        Log(LogLevel::kWarning, "begins, but no recorder reads its samples: a replay will lack its first ticks");
       }
       return;
     }

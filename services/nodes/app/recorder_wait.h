@@ -1,33 +1,53 @@
-// The first samples must not pass the recorder by: a replay could not begin without them.
+// The first samples of a node in a recorded session must be in the recording: a replay could not begin without them.
 #pragma once
 
+#include <cstdint>
+#include <memory>
+
+#include "services/base/core/tick.h"
 #include "services/transport/bus/dds/participant.h"
 
 namespace fulcrum::app {
 
-/// Waits until the recorder of a recorded session reads what this process writes. Counts looks instead of time: each
-/// look proves that this process was given time.
+/// Waits until the recorder reports that it reads all writers of this process.
 class RecorderWait {
  public:
-  /// One look. True: the node may begin in a recorded session.
-  [[nodiscard]] bool Look(const bus::DdsParticipant& participant, bool session_is_known) {
-    looks_ += session_is_known ? 1 : 0;
-    looks_read_ += participant.IsReadBy(bus::kRecorderPeer) ? 1 : 0;
-    return heard() || looks_ > kForReaders || (looks_ > kForRecorder && !participant.Knows(bus::kRecorderPeer));
+  /// All outputs of the process have been made.
+  explicit RecorderWait(bus::DdsParticipant* participant)
+      : participant_(participant),
+        metric_(bus::kReadsMetric + participant->address()),
+        healths_(participant->MakeInput<Health>()) {}
+
+  /// @param session_is_known the process has received a SceneManifest.
+  void Update(std::int64_t now_ns, bool session_is_known) {
+    if (session_is_known && known_ns_ == 0) known_ns_ = now_ns;
+    while (healths_->TakeNext(&health_)) {
+      if (health_.node != NodeId::kRecorder) continue;
+      for (const Metric& metric : health_.metrics) {
+        is_read_ |= metric.name == metric_ && metric.value >= participant_->writer_count();
+      }
+    }
+    const std::int64_t waited_ns = known_ns_ == 0 ? 0 : now_ns - known_ns_;
+    is_over_ = is_read_ || waited_ns > kLongestWait_ns ||
+               (waited_ns > kLongestDiscovery_ns && !participant_->Knows(bus::kRecorderPeer));
   }
-  /// Its readers have had time to see the writers of this process.
-  [[nodiscard]] bool heard() const { return looks_read_ > kAfterReaders; }
+  [[nodiscard]] bool is_read() const { return is_read_; }
+  /// The node may begin: it is read, or no recorder will read it.
+  [[nodiscard]] bool is_over() const { return is_over_; }
 
  private:
-  /// A recorder is found within so many looks of the session's first, or is gone. (With ten, one start in a hundred did
-  /// not find it while other nodes were killed.)
-  static constexpr int kForRecorder = 30;
-  /// A recorder that stands still holds up a node for so many looks at most.
-  static constexpr int kForReaders = 50;
-  /// Its readers have seen our writers so many looks after we have seen them.
-  static constexpr int kAfterReaders = 3;
+  /// A recorder on this bus is discovered within this time of the first SceneManifest, or there is none: it has ended,
+  /// or it records on the other side of a link.
+  static constexpr std::int64_t kLongestDiscovery_ns = kSecond_ns / 2;
+  /// A recorder that does not report holds up a node no longer than this.
+  static constexpr std::int64_t kLongestWait_ns = 3 * kSecond_ns;
 
-  int looks_ = 0, looks_read_ = 0;
+  bus::DdsParticipant* participant_;
+  const std::string metric_;
+  std::unique_ptr<bus::Input<Health>> healths_;
+  Health health_;  ///< Reused.
+  std::int64_t known_ns_ = 0;
+  bool is_read_ = false, is_over_ = false;
 };
 
 }  // namespace fulcrum::app

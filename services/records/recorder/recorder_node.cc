@@ -15,6 +15,9 @@
 namespace fulcrum::recorder {
 namespace {
 
+/// So long after its first match a participant's matches are in Health.
+constexpr std::int64_t kReportsMatches_ns = 10 * kSecond_ns;
+
 /// Arguments of a process; empty when it has ended.
 std::string CommandLine(int pid) {
   std::ifstream in("/proc/" + std::to_string(pid) + "/cmdline", std::ios::binary);
@@ -72,7 +75,14 @@ void RecorderNode::Step(const Tick& tick) {
   dumps_.WriteIfAsked(tick.stamp_ns);
 }
 
-void RecorderNode::FillHealth(Health* health) const { recorder::FillHealth(recorder_.stats(), health); }
+void RecorderNode::FillHealth(Health* health) const {
+  recorder::FillHealth(recorder_.stats(), health);
+  // Nodes begin when their writers are matched: only those that have just been discovered wait for it.
+  for (const bus::ReadPeer& peer : bus_.PeersRead()) {
+    if (runtime::MonotonicNs() - peer.since_ns > kReportsMatches_ns) continue;
+    health->metrics.push_back({bus::kReadsMetric + peer.address, static_cast<double>(peer.writers)});
+  }
+}
 
 void RecorderNode::Close() {
   inputs_.clear();

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "services/transport/bus/raw_input.h"
+
 namespace fulcrum::supervisor {
 
 void Curve::Add(double time_s, double value) {
@@ -102,7 +104,8 @@ void SessionRecord::AddHealth(double time_s, const Health& health) {
   }
   if (time_s >= 0) {
     for (const Metric& metric : health.metrics) {
-      curves_[metric.name].Add(time_s, metric.value);
+      // A message of the recorder to the nodes, no figure.
+      if (!metric.name.starts_with(bus::kReadsMetric)) curves_[metric.name].Add(time_s, metric.value);
     }
   }
 }

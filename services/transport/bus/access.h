@@ -45,7 +45,7 @@ using enum TopicId;
 inline constexpr TopicSet kAll = (TopicSet{1} << kTopicCount) - 1;
 /// What services/nodes/app does for every node.
 inline constexpr TopicSet kNodeWrites = SetOf(kCommandReply, kHealth);
-inline constexpr TopicSet kNodeReads = SetOf(kSceneManifest, kCommand);
+inline constexpr TopicSet kNodeReads = SetOf(kSceneManifest, kCommand, kHealth);
 
 /// The nodes first, by NodeId.
 inline constexpr std::array kRoles{

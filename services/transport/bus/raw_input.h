@@ -26,6 +26,9 @@ struct RawSample {
   std::span<const std::byte> head, body;
 };
 
+/// Metric of the recorder's Health, with the address of a participant behind it: how many of its writers are matched.
+inline constexpr const char* kReadsMetric = "reads_";
+
 /// The process behind a writer.
 struct Peer {
   std::string name;  ///< DdsSettings.node_name; empty: not heard of.

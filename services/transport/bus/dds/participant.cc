@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdio>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -14,7 +15,6 @@
 #include "services/base/core/error.h"
 #include "services/transport/bus/access.h"
 #include "services/transport/bus/dds/abandoned_mutex.h"
-#include "services/transport/bus/dds/audience.h"
 #include "services/transport/bus/dds/chained_transport.h"
 #include "services/transport/bus/dds/library.h"
 #include "services/transport/bus/dds/peer_watch.h"
@@ -22,6 +22,7 @@
 #include "services/transport/bus/dds/raw_reader.h"
 #include "services/transport/bus/dds/security.h"
 #include "services/transport/bus/dds/shared_memory.h"
+#include "services/transport/bus/dds/sources.h"
 #include "services/transport/bus/hex.h"
 
 namespace fulcrum::bus {
@@ -188,7 +189,8 @@ struct DdsParticipant::Impl {
   const Security security;
   const std::shared_ptr<dds::Gathering> gathering;
   dds::PeerWatch watch;
-  dds::Audience audience;
+  dds::Sources sources;         ///< Of the raw inputs.
+  std::atomic<int> writers{0};  ///< Made so far.
   fast::DomainParticipant* participant = nullptr;
   fast::Publisher* publisher = nullptr;
   fast::Subscriber* subscriber = nullptr;
@@ -226,8 +228,9 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
       impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
   qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
   const WorkingIn here(impl_->shared_memory);
-  auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos, &impl_->audience);
+  auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos);
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "writer"));
+  ++impl_->writers;
   if (role.quality.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
   return port;
 }
@@ -243,8 +246,8 @@ std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink)
   Apply(role.quality, role.quality.reader_depth, impl_->SharedMemoryFor(role), &qos);
   qos.reliable_reader_qos().times.initialAcknackDelay = kFirstAcknack;
   const WorkingIn here(impl_->shared_memory);
-  auto input =
-      std::make_unique<dds::RawReader>(impl_->subscriber, topic, qos, id, payload_B, std::move(sink), impl_->gathering);
+  auto input = std::make_unique<dds::RawReader>(impl_->subscriber, topic, qos, id, payload_B, std::move(sink),
+                                                impl_->gathering, &impl_->sources);
   if (!input->ok()) throw InputError(impl_->CannotMake(role, "reader"));
   return input;
 }
@@ -253,9 +256,30 @@ std::uint64_t DdsParticipant::inherited_locks() { return dds::SharedLocks().inhe
 
 bool DdsParticipant::Knows(const std::string& name) const { return !impl_->watch.Named(name).empty(); }
 
-bool DdsParticipant::IsReadBy(const std::string& name) const {
-  return std::ranges::any_of(impl_->watch.Named(name),
-                             [&](const rtps::GuidPrefix_t& prefix) { return impl_->audience.Reaches(prefix); });
+namespace {
+
+std::string AddressOf(const rtps::GuidPrefix_t& prefix) {
+  std::string text;
+  for (const rtps::octet byte : prefix.value) {
+    constexpr const char* kDigits = "0123456789abcdef";
+    text.push_back(kDigits[byte >> 4]);
+    text.push_back(kDigits[byte & 0xf]);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string DdsParticipant::address() const { return AddressOf(impl_->participant->guid().guidPrefix); }
+
+int DdsParticipant::writer_count() const { return impl_->writers; }
+
+std::vector<ReadPeer> DdsParticipant::PeersRead() const {
+  std::vector<ReadPeer> peers;
+  for (const auto& [prefix, match] : impl_->sources.matches()) {
+    peers.push_back({AddressOf(prefix), match.writers, match.since_ns});
+  }
+  return peers;
 }
 
 Peer DdsParticipant::PeerOf(const WriterGuid& writer) const {

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "services/transport/bus/port.h"
 #include "services/transport/bus/raw_input.h"
@@ -39,6 +40,12 @@ inline constexpr std::uint32_t kSocketBuffer_B = 4u << 20;
 /// Name of the participant that records: nodes wait for it before they begin.
 inline constexpr const char* kRecorderPeer = "recording";
 
+struct ReadPeer {
+  std::string address;        ///< DdsParticipant::address() there.
+  int writers = 0;            ///< Matched now.
+  std::int64_t since_ns = 0;  ///< CLOCK_MONOTONIC of the first match.
+};
+
 class DdsParticipant {
  public:
   /// Throws InputError when the domain is out of range, shared memory is short or the participant cannot be made.
@@ -62,9 +69,13 @@ class DdsParticipant {
 
   /// Whether a participant of that name is there.
   [[nodiscard]] bool Knows(const std::string& name) const;
-  /// Whether one of that name reads all that this participant writes, as far as our side knows: what is written within
-  /// some milliseconds may still come before it knows our writers.
-  [[nodiscard]] bool IsReadBy(const std::string& name) const;
+  /// Unlike that of any other participant, on any host: 24 hexadecimal digits.
+  [[nodiscard]] std::string address() const;
+  /// Outputs made so far.
+  [[nodiscard]] int writer_count() const;
+  /// Participants whose writers are matched with raw inputs of this one. A sample that is written after its writer is
+  /// listed here is received.
+  [[nodiscard]] std::vector<ReadPeer> PeersRead() const;
 
   /// Empty, or one line: a peer whose schema hash differs (both hashes, both names), or a supervisor that has other
   /// keys than this participant, or keys where this one has none.

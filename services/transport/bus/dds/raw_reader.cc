@@ -35,11 +35,12 @@ std::optional<std::int64_t> Age(std::int64_t source_ns) {
 }  // namespace
 
 RawReader::RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos, TopicId id,
-                     std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering)
+                     std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering, Sources* sources)
     : role_(RoleOf(id)),
       payload_B_(payload_B),
       sink_(std::move(sink)),
       gathering_(std::move(gathering)),
+      sources_(sources),
       subscriber_(subscriber) {
   payload_.reserve(payload_B);
   fast::StatusMask mask = fast::StatusMask::subscription_matched();

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "services/transport/bus/dds/chained_transport.h"
+#include "services/transport/bus/dds/sources.h"
 #include "services/transport/bus/raw_input.h"
 #include "services/transport/bus/topics.h"
 
@@ -55,7 +56,7 @@ class RawType final : public fast::TopicDataType {
 class RawReader final : public RawInput, private fast::DataReaderListener {
  public:
   RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos, TopicId id,
-            std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering);
+            std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering, Sources* sources);
   ~RawReader() override;
   RawReader(const RawReader&) = delete;
   RawReader& operator=(const RawReader&) = delete;
@@ -66,6 +67,7 @@ class RawReader final : public RawInput, private fast::DataReaderListener {
  private:
   void on_subscription_matched(fast::DataReader*, const fast::SubscriptionMatchedStatus& status) override {
     writers_.store(status.current_count, std::memory_order_relaxed);  // Stands for itself, orders nothing.
+    sources_->Count(rtps::iHandle2GUID(status.last_publication_handle).guidPrefix, status.current_count_change);
   }
   void on_data_available(fast::DataReader* reader) override;
   void TakeCopies(fast::DataReader* reader);
@@ -76,6 +78,7 @@ class RawReader final : public RawInput, private fast::DataReaderListener {
   const std::uint32_t payload_B_;
   const RawSink sink_;
   const std::shared_ptr<Gathering> gathering_;  ///< Null: nobody gathers.
+  Sources* const sources_;
   fast::Subscriber* subscriber_;
   fast::DataReader* reader_;
   std::atomic<int> writers_{0};
