@@ -24,9 +24,10 @@ class RecorderWait {
     while (healths_->TakeNext(&health_)) {
       if (health_.node != NodeId::kRecorder) continue;
       for (const Metric& metric : health_.metrics) {
-        is_read_ |= metric.name == metric_ && metric.value >= participant_->writer_count();
+        is_listed_ |= metric.name == metric_ && metric.value >= participant_->writer_count();
       }
     }
+    is_read_ = is_listed_ && participant_->IsReadBy(bus::kRecorderPeer);
     const std::int64_t waited_ns = known_ns_ == 0 ? 0 : now_ns - known_ns_;
     is_over_ = is_read_ || waited_ns > kLongestWait_ns ||
                (waited_ns > kLongestDiscovery_ns && !participant_->Knows(bus::kRecorderPeer));
@@ -47,7 +48,7 @@ class RecorderWait {
   std::unique_ptr<bus::Input<Health>> healths_;
   Health health_;  ///< Reused.
   std::int64_t known_ns_ = 0;
-  bool is_read_ = false, is_over_ = false;
+  bool is_listed_ = false, is_read_ = false, is_over_ = false;
 };
 
 }  // namespace fulcrum::app

@@ -161,6 +161,29 @@ TEST(RawInput, HearsAllThatAWriterSaidBeforeItLeft) {
   }
 }
 
+TEST(RawInput, ReadsTheFirstSampleOfAWriterThatBothSidesHaveMatched) {
+  DdsParticipant recorder({.domain = kDomain, .node_name = kRecorderPeer, .shared_memory = {}});
+  std::atomic<int> received{0};
+  const auto take = [&](const RawSample&, const auto&) { ++received; };
+  const auto tools = recorder.MakeRawInput(TopicId::kToolState, take);
+  const auto contacts = recorder.MakeRawInput(TopicId::kContactModel, take);
+  for (int run = 1; run <= 20; ++run) {
+    DdsParticipant node({.domain = kDomain, .node_name = "node", .shared_memory = {}});
+    const auto tool_out = node.MakeOutput<ToolState>();
+    const auto contact_out = node.MakeOutput<ContactModel>();
+    ASSERT_EQ(node.writer_count(), 2);
+    ASSERT_TRUE(Eventually([&] {
+      const std::vector<ReadPeer> peers = recorder.PeersRead();
+      return node.IsReadBy(kRecorderPeer) && std::any_of(peers.begin(), peers.end(), [&](const ReadPeer& peer) {
+               return peer.address == node.address() && peer.writers == node.writer_count();
+             });
+    }));
+    ASSERT_TRUE(tool_out->Write(test::Sample<ToolState>(1)));
+    ASSERT_TRUE(contact_out->Write(test::Sample<ContactModel>(1)));
+    ASSERT_TRUE(Eventually([&] { return received == 2 * run; })) << received << " of " << 2 * run;
+  }
+}
+
 TEST(DdsInput, GapsAreLosses) {
   Pair<ToolState> bus;
   ToolState got;

@@ -15,6 +15,7 @@
 #include "services/base/core/error.h"
 #include "services/transport/bus/access.h"
 #include "services/transport/bus/dds/abandoned_mutex.h"
+#include "services/transport/bus/dds/audience.h"
 #include "services/transport/bus/dds/chained_transport.h"
 #include "services/transport/bus/dds/library.h"
 #include "services/transport/bus/dds/peer_watch.h"
@@ -189,6 +190,7 @@ struct DdsParticipant::Impl {
   const Security security;
   const std::shared_ptr<dds::Gathering> gathering;
   dds::PeerWatch watch;
+  dds::Audience audience;
   dds::Sources sources;         ///< Of the raw inputs.
   std::atomic<int> writers{0};  ///< Made so far.
   fast::DomainParticipant* participant = nullptr;
@@ -228,7 +230,7 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
       impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
   qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
   const WorkingIn here(impl_->shared_memory);
-  auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos);
+  auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos, &impl_->audience);
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "writer"));
   ++impl_->writers;
   if (role.quality.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
@@ -273,6 +275,11 @@ std::string AddressOf(const rtps::GuidPrefix_t& prefix) {
 std::string DdsParticipant::address() const { return AddressOf(impl_->participant->guid().guidPrefix); }
 
 int DdsParticipant::writer_count() const { return impl_->writers; }
+
+bool DdsParticipant::IsReadBy(const std::string& name) const {
+  return std::ranges::any_of(impl_->watch.Named(name),
+                             [&](const rtps::GuidPrefix_t& prefix) { return impl_->audience.Reaches(prefix); });
+}
 
 std::vector<ReadPeer> DdsParticipant::PeersRead() const {
   std::vector<ReadPeer> peers;

@@ -69,12 +69,15 @@ class DdsParticipant {
 
   /// Whether a participant of that name is there.
   [[nodiscard]] bool Knows(const std::string& name) const;
+  /// Whether all outputs of this participant are matched with readers of one of that name. These match later than this
+  /// side does, or sooner: see PeersRead.
+  [[nodiscard]] bool IsReadBy(const std::string& name) const;
   /// Unlike that of any other participant, on any host: 24 hexadecimal digits.
   [[nodiscard]] std::string address() const;
   /// Outputs made so far.
   [[nodiscard]] int writer_count() const;
-  /// Participants whose writers are matched with raw inputs of this one. A sample that is written after its writer is
-  /// listed here is received.
+  /// Participants whose writers are matched with raw inputs of this one. A sample is received that is written after its
+  /// writer is listed here and IsReadBy() holds there.
   [[nodiscard]] std::vector<ReadPeer> PeersRead() const;
 
   /// Empty, or one line: a peer whose schema hash differs (both hashes, both names), or a supervisor that has other

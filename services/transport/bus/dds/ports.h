@@ -19,6 +19,7 @@
 
 #include "services/transport/bus/convert/convert.h"
 #include "services/transport/bus/dds/abandoned_mutex.h"
+#include "services/transport/bus/dds/audience.h"
 #include "services/transport/bus/dds/type_support.h"
 #include "services/transport/bus/gate.h"
 #include "services/transport/bus/input_account.h"
@@ -57,12 +58,19 @@ class ReaderEvents final : public fast::DataReaderListener {
 
 class WriterEvents final : public fast::DataWriterListener {
  public:
+  explicit WriterEvents(Audience* audience) : audience_(audience) { audience_->Add(this); }
+  ~WriterEvents() override { audience_->Remove(this); }
+  WriterEvents(const WriterEvents&) = delete;
+  WriterEvents& operator=(const WriterEvents&) = delete;
   void on_publication_matched(fast::DataWriter*, const fast::PublicationMatchedStatus& status) override {
     count_.store(status.current_count, std::memory_order_relaxed);  // as above
+    const auto reader = eprosima::fastrtps::rtps::iHandle2GUID(status.last_subscription_handle);
+    audience_->Count(this, reader.guidPrefix, status.current_count_change);
   }
   [[nodiscard]] bool any() const noexcept { return count_.load(std::memory_order_relaxed) > 0; }
 
  private:
+  Audience* audience_;
   std::atomic<int> count_{0};
 };
 
@@ -199,8 +207,9 @@ class DdsInput<T> final : public InputBase<T> {
 template <class T>
 class OutputBase : public OutputOf<T>::type {
  public:
-  OutputBase(fast::Publisher* publisher, fast::Topic* topic, const fast::DataWriterQos& qos)
-      : publisher_(publisher),
+  OutputBase(fast::Publisher* publisher, fast::Topic* topic, const fast::DataWriterQos& qos, Audience* audience)
+      : events_(audience),
+        publisher_(publisher),
         writer_(publisher->create_datawriter(topic, qos, &events_, fast::StatusMask::publication_matched())) {}
   ~OutputBase() override {
     if (writer_ == nullptr) return;
