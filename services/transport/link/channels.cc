@@ -18,15 +18,16 @@ namespace {
 
 using bus::FarLane;
 
-/// Of a pose, a jaw angle, a contact on its way to a picture [ns].
+/// Shortest interval between samples of poses, jaw angles and contacts that are sent to a host that only makes pictures
+/// [ns].
 constexpr std::int64_t kThinned_ns = 10'000'000;
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
-/// No message of the bus is longer, but for those that travel in chunks.
+/// Largest message of the bus, except for those that are divided into chunks.
 constexpr std::size_t kLargestSample_B = bus::kOrderedPacket_B;
 static_assert(kChunk_B + 20 <= bus::kStreamPacket_B, "a chunk and the head of its packet go as one");
 
-/// Health is reliable on the bus so that a late joiner gets the newest; on its way between hosts the newest is enough,
-/// and ten a second of each node must not wait in a queue while a cable is out.
+/// Health is reliable on the bus so that a late joiner gets the newest. Between hosts only the newest matters, and ten
+/// samples a second of each node must not queue while the cable is disconnected.
 constexpr FarLane LaneOf(TopicId topic) {
   return bus::QualityOf(topic).delivery != bus::Delivery::kBestEffort && topic != TopicId::kHealth ? FarLane::kOrdered
                                                                                                    : FarLane::kStream;
@@ -37,7 +38,7 @@ Stamp& MutableStampOf(T* message) {
   return const_cast<Stamp&>(bus::StampOf(*message));
 }
 
-/// Whether a message starts on this host and is for the other one. What we republished ourselves never is.
+/// Whether a message originates on this host and is meant for the other one. Never true for a republished message.
 template <class T>
 bool Leaves(const T& message, const LinkContext& link) {
   if constexpr (std::is_same_v<T, Command>) {
@@ -47,11 +48,11 @@ bool Leaves(const T& message, const LinkContext& link) {
   } else if constexpr (requires { message.node; }) {
     return link.IsNative(message.node);
   } else {
-    return true;  // One owner, and he is here: else there is no Outgoing.
+    return true;  // One owner, which runs on this host: otherwise there is no Outgoing.
   }
 }
 
-/// A TickManifest names samples by their epochs: as they are where they come from.
+/// Replaces the epochs by which a TickManifest names samples by those of the host that sent the samples.
 template <class T>
 void NameAsThere(T* message, const LinkContext& link) {
   if constexpr (std::is_same_v<T, TickManifest>) {
@@ -59,7 +60,7 @@ void NameAsThere(T* message, const LinkContext& link) {
   }
 }
 
-/// From the other host's clock and epochs to ours. False: of a process that has been replaced.
+/// Converts the other host's clock and epochs to ours. False if the sample is of a process that has been replaced.
 template <class T>
 bool MoveHere(T* message, LinkContext* link) {
   constexpr TopicId kTopic = bus::kTopicOf<T>;
@@ -68,7 +69,7 @@ bool MoveHere(T* message, LinkContext* link) {
       link->epochs.ToOurs(kTopic, stamp.epoch, bus::RoleOf(kTopic).one_owner(), link->now_ns);
   if (!epoch) return false;
   ForEachTime(message, [link](std::string_view name, auto& time) {
-    // Wrapping: the number came off the wire, and the gate judges what becomes of it.
+    // Wrapping arithmetic: the number was received and may have any value; the gate checks the result.
     if (name != "epoch") {
       time = static_cast<std::remove_reference_t<decltype(time)>>(static_cast<std::uint64_t>(time) -
                                                                   static_cast<std::uint64_t>(link->offset_ns));
@@ -77,7 +78,7 @@ bool MoveHere(T* message, LinkContext* link) {
   stamp.epoch = *epoch;
   if constexpr (std::is_same_v<T, TickManifest>) {
     for (ConsumedInput& input : message->consumed) {
-      // Of a topic of this host the sender has named it as it is here.
+      // The sender has already used the epoch of this host for a topic of this host.
       const std::optional<NodeId> owner = bus::OwnerOf(input.topic);
       if (input.sequence == 0 || !owner || link->IsNative(*owner)) continue;
       input.epoch = link->epochs.ToOurs(input.topic, input.epoch, false, link->now_ns).value_or(input.epoch);
@@ -88,7 +89,7 @@ bool MoveHere(T* message, LinkContext* link) {
 
 // ------------------------------------------------------------------------------------------------------- outgoing
 
-/// As it is, each sample.
+/// Sends each sample unchanged.
 template <class T>
 class OutgoingSamples final : public Outgoing {
  public:
@@ -116,7 +117,7 @@ class OutgoingSamples final : public Outgoing {
 
  private:
   static constexpr std::size_t kMostWriters = 16;
-  /// Where only the newest counts for a picture.
+  /// Topics of which a picture needs only the newest sample.
   static constexpr bool kThinnable =
       std::is_same_v<T, ToolState> || std::is_same_v<T, HandleState> || std::is_same_v<T, CauteryContact>;
 
@@ -124,7 +125,7 @@ class OutgoingSamples final : public Outgoing {
     if (link->now_ns < due_ns_) return due_ns_;
     due_ns_ = std::max(due_ns_ + kThinned_ns, link->now_ns);
     if (input_->TakeLatest(&message_)) {
-      // What is left out on purpose is not lost.
+      // A sample that is left out on purpose is not a loss.
       message_.stamp.sequence = std::uint64_t{number_} + 1;
       Send(message_, link);
     }
@@ -134,7 +135,7 @@ class OutgoingSamples final : public Outgoing {
   void Send(const T& message, LinkContext* link) {
     if (!bus::EncodeCdr(message, &cdr_)) return;
     ++number_;
-    // What does not fit a datagram goes in fragments.
+    // A sample that does not fit a datagram is sent in fragments.
     constexpr std::size_t kRoom = 64;
     const FarLane lane = cdr_.size() + kRoom > bus::kStreamPacket_B ? FarLane::kOrdered : LaneOf(bus::kTopicOf<T>);
     (void)link->send(lane, PacketKind::kSample, [&](std::vector<std::uint8_t>* out) {
@@ -151,7 +152,7 @@ class OutgoingSamples final : public Outgoing {
   std::vector<std::uint8_t> cdr_;
 };
 
-/// The newest state, as what has changed since the one before.
+/// Sends the newest state as the difference from the one before.
 class OutgoingTopology final : public Outgoing {
  public:
   explicit OutgoingTopology(std::unique_ptr<bus::Input<TopologyState>> input) : input_(std::move(input)) {}
@@ -190,7 +191,7 @@ SendChunk ChunkSender(LinkContext* link, PacketKind kind) {
   };
 }
 
-/// At the rate of pictures, what moved.
+/// Sends the blocks that moved, at the picture rate.
 class OutgoingTissue final : public Outgoing {
  public:
   explicit OutgoingTissue(std::unique_ptr<bus::Input<TissueFrame>> input) : input_(std::move(input)) {}
@@ -204,7 +205,7 @@ class OutgoingTissue final : public Outgoing {
     } else {
       sender_.Flush(send);
     }
-    // On a grid, unless that is long past.
+    // Keeps the time grid, unless the due time is long past.
     due_ns_ = std::max(due_ns_ + period, link->now_ns);
     return due_ns_;
   }
@@ -220,7 +221,7 @@ class OutgoingTissue final : public Outgoing {
   std::int64_t due_ns_ = 0;
 };
 
-/// Each one, since each has a place of its own in the atlas; what changed in it.
+/// Sends the changed tiles of every patch, since each patch has a place of its own in the atlas.
 class OutgoingPatches final : public Outgoing {
  public:
   explicit OutgoingPatches(std::unique_ptr<bus::Input<TemperaturePatch>> input) : input_(std::move(input)) {}
@@ -275,12 +276,12 @@ class IncomingSamples final : public IncomingBase<T> {
     SampleHead head;
     std::span<const std::uint8_t> delta;
     if (!TakeSample(body, &head, &delta) || head.topic != bus::kTopicOf<T>) return false;
-    // Overtaken on the way: the newest wins.
+    // A newer sample arrived first.
     if (LaneOf(bus::kTopicOf<T>) == FarLane::kStream && head.number <= number_) return true;
     if (head.base != 0) {
       if (head.base != number_) {
         if (!all_) ++lost_;
-        all_ = true;  // What it is told from has not come.
+        all_ = true;  // The base of the difference was not received.
         return true;
       }
       if (!TakeDelta(cdr_, delta, kLargestSample_B, &next_)) return false;
@@ -308,7 +309,7 @@ class IncomingSamples final : public IncomingBase<T> {
   std::uint64_t lost_ = 0;
 };
 
-/// What travels in chunks.
+/// Receives a topic that is sent in chunks.
 template <class T, class Receiver>
 class IncomingChunks final : public IncomingBase<T> {
  public:
@@ -327,7 +328,7 @@ class IncomingChunks final : public IncomingBase<T> {
       message_ = receiver_.frame();
     } else {
       message_ = receiver_.patch();
-      // Those with holes are held back, which is not a loss of this host's bus.
+      // Incomplete frames are held back, which is not a loss on this host's bus.
       message_.header.stamp.sequence = ++number_;
     }
     return this->Publish(&message_, link);

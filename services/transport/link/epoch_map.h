@@ -1,4 +1,4 @@
-// Epochs of processes on the other host, as they are on ours.
+// Maps the epochs of processes on the other host to epochs on this host.
 #pragma once
 
 #include <algorithm>
@@ -11,13 +11,14 @@
 
 namespace fulcrum::link {
 
-/// An epoch is the time at which a writer began, and readers take the later of two for the owner. Moved by the clock
-/// offset, the same writer would be another one whenever the estimate changes by a nanosecond, and older than itself
-/// when the link comes back with a lower estimate. So the epoch on our bus is the time at which we first heard of the
-/// process: it grows with each restart of the process and with each of ours.
+/// An epoch is the time at which a writer started; of two writers, readers accept the one with the later epoch. If the
+/// epoch were shifted by the clock offset, it would change with each change of the estimate, and would decrease when
+/// the link restarts with a lower estimate. Therefore the epoch on our bus is the time at which the first sample of the
+/// process was received: it grows with each restart of the process and of the link.
 class EpochMap {
  public:
-  /// @param one_owner an epoch below the newest is that of a process that has been replaced: nothing.
+  /// @param one_owner the topic has one owner: an epoch below the newest belongs to a replaced process and gives
+  /// nothing.
   [[nodiscard]] std::optional<std::uint64_t> ToOurs(TopicId topic, std::uint64_t theirs, bool one_owner,
                                                     std::int64_t now_ns) {
     std::vector<Known>& known = by_topic_[static_cast<std::size_t>(topic)];
@@ -30,7 +31,7 @@ class EpochMap {
     known.push_back({theirs, newest_});
     return newest_;
   }
-  /// The epoch on the other host of one that ToOurs gave; any other as it is.
+  /// Inverse of ToOurs; an epoch that ToOurs did not return is returned unchanged.
   [[nodiscard]] std::uint64_t ToTheirs(TopicId topic, std::uint64_t ours) const {
     for (const Known& k : by_topic_[static_cast<std::size_t>(topic)]) {
       if (k.ours == ours) return k.theirs;
@@ -39,7 +40,7 @@ class EpochMap {
   }
 
  private:
-  static constexpr std::size_t kMost = 16;  ///< As many writers as a reader tells apart.
+  static constexpr std::size_t kMost = 16;  ///< The number of writers that a reader distinguishes.
   struct Known {
     std::uint64_t theirs, ours;
   };

@@ -1,11 +1,11 @@
-// A link's figures in the Health of the supervisor that holds it.
+// Figures of a link in the Health of the supervisor that holds it.
 #pragma once
 
 #include "services/transport/link/link.h"
 
 namespace fulcrum::link {
 
-/// Metrics "link_…", and last_error where there is none yet.
+/// Adds the metrics "link_…", and sets last_error if it is still empty.
 void FillHealth(const LinkStatus& status, Health* health);
 
 }  // namespace fulcrum::link

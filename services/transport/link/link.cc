@@ -20,13 +20,12 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kMilli = 1'000'000;
 constexpr std::int64_t kPulsePeriod = 50 * kMilli;
-// A pulse that is missing for so long: the other side is not connected, and will have missed what was sent.
+// After this time without a pulse the other side counts as disconnected and has missed what was sent.
 constexpr std::int64_t kSilence = kSecond_ns;
-// Within the lease of the participants a cable that comes back finds all as it was; about the lease one side may have
-// dropped the other but not the other way round, which the library sorts out only after long. New ones find each other
-// at once.
+// A cable that is reconnected within the lease of the participants needs no action. After about the lease, one side may
+// have dropped the other but not vice versa, and the library takes long to repair that. New participants match at once.
 constexpr std::int64_t kPatience = 3 * kSecond_ns;
-// A topic is carried on for so long after its last reader has gone: he may be restarting.
+// A topic is carried on for this long after its last reader has left, because the reader may be restarting.
 constexpr std::int64_t kUnwanted = 2 * kSecond_ns;
 constexpr std::int64_t kLongestSleep = 20 * kMilli;
 constexpr std::size_t kLongestInbox = 4096;
@@ -118,8 +117,9 @@ LinkStatus Link::status() {
   status.rebuilt = rebuilt_;
   status.error = !mismatch_.empty()  ? mismatch_
                  : !error_.empty()   ? error_
-                 : heard_ns_ == 0    ? "the other host " + settings_.far.peer + " has not been heard yet"
-                 : !status.connected ? "the other host " + settings_.far.peer + " is silent: cable, or its link?"
+                 : heard_ns_ == 0    ? "the other host " + settings_.far.peer + " has not answered yet"
+                 : !status.connected ? "the other host " + settings_.far.peer +
+                                           " does not answer; check the cable and the link on that host"
                                      : std::string();
   return status;
 }
@@ -199,7 +199,8 @@ void Link::TakePackets(std::int64_t now) {
 
 bool Link::IsOfPeer(std::uint64_t epoch, std::int64_t now) {
   if (epoch == their_epoch_) return true;
-  // What a link that was restarted still has on its way. But a host that was restarted counts its time from 0 again.
+  // An older epoch belongs to a link that was restarted meanwhile. But after a reboot of the host its clock starts at 0
+  // again.
   const bool back_in_time = epoch < their_epoch_;
   if (back_in_time && now - heard_ns_ < kSilence) return false;
   if (back_in_time) context_.epochs = EpochMap();
@@ -223,7 +224,7 @@ void Link::Take(const Packet& packet) {
     return;
   }
   if (version != kWireVersion) {
-    mismatch_ = "link mismatch: the other host speaks version " + std::to_string(version) + " of the link, this one " +
+    mismatch_ = "link mismatch: the other host uses version " + std::to_string(version) + " of the link, this one " +
                 std::to_string(kWireVersion) + "; use the same release on both hosts";
     return;
   }
@@ -258,7 +259,7 @@ void Link::TakePulse(std::span<const std::uint8_t> body, std::int64_t heard_ns) 
     return;
   }
   if (pulse.schema_hash != bus::SchemaHash()) {
-    mismatch_ = "schema mismatch: the other host speaks other topics; use the same release on both hosts";
+    mismatch_ = "schema mismatch: the other host uses other topics; use the same release on both hosts";
     return;
   }
   const bool back = heard_ns_ != 0 && heard_ns - heard_ns_ > kSilence;
@@ -299,7 +300,7 @@ void Link::TakeChannel(PacketKind kind, std::span<const std::uint8_t> body) {
     }
     topic = head.topic;
   }
-  // Without the offset a stamp would be of another clock; nobody has asked for it yet either.
+  // Without the offset the stamp would be of another clock; no topic has been requested yet either.
   if (!clock_.known()) return;
   Incoming* in = channels_[At(topic)].in.get();
   if (in == nullptr || !in->Take(body, &context_)) ++refused_;
@@ -329,7 +330,7 @@ void Link::ServeScene(std::span<const std::uint8_t> body) {
   std::vector<char> piece(std::min<std::uint64_t>(kSceneChunk_B, settings_.offer->scene_B - ask.offset));
   stream.seekg(static_cast<std::streamoff>(ask.offset));
   if (!stream.read(piece.data(), static_cast<std::streamsize>(piece.size()))) {
-    error_ = settings_.scene.string() + ": cannot be read any more";
+    error_ = settings_.scene.string() + ": can no longer be read";
     return;
   }
   (void)Send(FarLane::kOrdered, PacketKind::kSceneChunk, [&](std::vector<std::uint8_t>* out) {
@@ -342,7 +343,7 @@ void Link::FollowWishes(std::uint32_t wanted, std::int64_t now) {
     Channel& channel = channels_[topic];
     if ((wanted & BitOf(topic)) != 0) {
       channel.unwanted_since_ns = 0;
-      // A reader who has just come there was not given what went before.
+      // A new reader on the other host has not received the earlier samples.
       if (channel.out != nullptr && (wished_ & BitOf(topic)) == 0) channel.out->Repeat();
       const std::optional<NodeId> owner = bus::OwnerOf(static_cast<TopicId>(topic));
       if (channel.out == nullptr && (!owner || context_.IsNative(*owner))) {
@@ -366,14 +367,14 @@ std::int64_t Link::PumpChannels(std::int64_t now) {
 }
 
 bool Link::IsWanted(TopicId topic, const Incoming& in) const {
-  // Of topics that both sides send our own input reads our own output as well: that somebody reads them proves nothing.
+  // For topics that both sides send, our own input reads our own output, so the existence of a reader proves nothing.
   switch (topic) {
     case TopicId::kHealth:
     case TopicId::kCommand:
     case TopicId::kCommandReply:
       return true;
     case TopicId::kTickManifest:
-      // For the recorder, which is the cart's.
+      // Read by the recorder, which runs on the cart's host.
       return settings_.far.side == bus::FarSide::kCart && in.wanted();
     default:
       return in.wanted();
@@ -417,7 +418,7 @@ void Link::SendPulse(std::int64_t now) {
 }
 
 void Link::WatchSilence(std::int64_t now) {
-  // Whoever was never heard may be one that is being refused, which takes a while to show.
+  // A side that never answered may be one that is being refused, which takes longer to detect.
   const std::int64_t patience = heard_ns_ == 0 ? 2 * kPatience : kPatience;
   if (now - std::max(heard_ns_, connected_ns_) < patience) return;
   try {
@@ -425,7 +426,7 @@ void Link::WatchSilence(std::int64_t now) {
     Connect();
     error_.clear();
   } catch (const std::exception& error) {
-    error_ = error.what();  // The interface is down, perhaps: tried again.
+    error_ = error.what();  // The interface may be down: retried.
   }
 }
 

@@ -1,5 +1,5 @@
-// Joins the buses of two hosts, so that no node knows that a host lies between: what nodes of the other host read goes
-// there, what they send is republished here in their name. See DESIGN.md.
+// Joins the buses of two hosts without any change to the nodes: topics that nodes of the other host read are sent
+// there, and what those nodes publish is republished here. See DESIGN.md.
 #pragma once
 
 #include <array>
@@ -25,58 +25,59 @@ namespace fulcrum::link {
 
 struct LinkSettings {
   bus::FarSettings far;
-  double picture_rate_Hz = 30;  ///< Of TissueFrame on its way to the other host.
-  std::optional<Offer> offer;   ///< The cart's side: what the other host is to do.
-  std::filesystem::path scene;  ///< The cart's side: the compiled file of the offer.
+  double picture_rate_Hz = 30;  ///< Rate of TissueFrame on its way to the other host.
+  std::optional<Offer> offer;   ///< Cart only: session and nodes for the other host.
+  std::filesystem::path scene;  ///< Cart only: the compiled scene of the offer.
 };
 
-/// Figures of a link, for Health and people.
+/// Figures of a link, for Health and log.
 struct LinkStatus {
-  bool connected = false;  ///< The other side was heard in the last second.
+  bool connected = false;  ///< A packet of the other side arrived within the last second.
   bool known = false;      ///< The clock offset is known.
   double offset_us = 0;    ///< Their CLOCK_MONOTONIC minus ours.
   double round_trip_us = 0;
   double drift_ppm = 0;
   double sent_kB_per_s = 0, received_kB_per_s = 0;
-  double tissue_kB_per_s = 0;  ///< Of it TissueFrame, either way.
+  double tissue_kB_per_s = 0;  ///< Share of TissueFrame in the traffic, both ways together.
   std::uint64_t lost = 0;      ///< Chunks and samples that did not arrive.
-  std::uint64_t refused = 0;   ///< Packets or messages that are none.
+  std::uint64_t refused = 0;   ///< Malformed packets or messages.
   std::uint64_t rebuilt = 0;   ///< How often the connection was made anew.
-  double silence_s = 0;        ///< Since the other side was heard.
-  std::string error;           ///< For people; empty when all is well.
+  double silence_s = 0;        ///< Time since the last packet of the other side.
+  std::string error;           ///< One line for the operator; empty if there is no error.
 };
 
 class Link {
  public:
-  /// Looks for the other side from now on. Throws InputError.
+  /// Starts to connect to the other side. Throws InputError.
   explicit Link(const LinkSettings& settings);
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
-  /// Carries topics between `local` and the other host. @param far_nodes bit per NodeId: they run there. Once.
+  /// Carries topics between `local` and the other host. Call once. @param far_nodes bit per NodeId: nodes of the other
+  /// host.
   void Join(bus::DdsParticipant* local, std::uint32_t far_nodes);
-  /// Gives up all ports of the bus that was joined: before its end, if that is before the link's.
+  /// Removes all ports from the bus that was joined. Call before that bus is destroyed if it ends before the link.
   void Leave();
-  /// Tells the other side that the session is over. The link goes on until its end.
+  /// Sends the message that the session has ended. The link itself runs until its destruction.
   void SayBye();
 
   [[nodiscard]] const LinkSettings& settings() const { return settings_; }
   [[nodiscard]] LinkStatus status();
-  /// The host's side: the newest offer, with a number that grows when another session begins.
+  /// Host only: the newest offer, with a number that grows when another session begins.
   struct Session {
     std::uint64_t number = 0;  ///< 0: none yet.
     bool over = false;
     Offer offer;
   };
   [[nodiscard]] Session session();
-  /// The other side speaks another schema or wire version, or the cart does not accept our keys: one line; empty: all
-  /// well.
+  /// One line if the other side uses another schema or wire version, or if the cart does not accept our keys; otherwise
+  /// empty.
   [[nodiscard]] std::string mismatch();
-  /// Who wanted to be the other side and has not its keys. Each once.
+  /// Participants that tried to connect without the keys of this link, each listed once.
   [[nodiscard]] bus::Refusals refusals();
 
-  /// The host's side: fetches the scene of the offer into the cache; once true it lies there. Call until then.
+  /// Host only: fetches the scene of the offer into the cache. Call until it returns true; the file is then complete.
   [[nodiscard]] bool FetchScene(const Offer& offer, const std::filesystem::path& cache, double* progress);
 
  private:
@@ -92,7 +93,7 @@ class Link {
   };
 
   void Run(const std::stop_token& stop);
-  // Stages of a turn; the mutex is held.
+  // Stages of a cycle, called with the mutex held.
   void TakePackets(std::int64_t now);
   void Take(const Packet& packet);
   void TakePulse(std::span<const std::uint8_t> body, std::int64_t heard_ns);
@@ -121,14 +122,14 @@ class Link {
   bool woken_ = false;
   std::uint64_t overflow_ = 0;
 
-  std::mutex mutex_;  ///< Guards all below but the thread.
+  std::mutex mutex_;  ///< Guards all members below except the thread.
   std::unique_ptr<bus::FarParticipant> far_;
   bus::DdsParticipant* local_ = nullptr;
   std::array<Channel, kTopicCount> channels_;
   LinkContext context_;
   ClockFilter clock_;
   std::uint64_t their_epoch_ = 0;
-  std::uint32_t wished_ = 0;  ///< Bit per TopicId: by the other side's last pulse.
+  std::uint32_t wished_ = 0;  ///< Bit per TopicId, from the last pulse of the other side.
   std::int64_t heard_ns_ = 0, heard_pulse_ns_ = 0, heard_sent_ns_ = 0;
   std::int64_t connected_ns_ = 0;  ///< When the present participant was made.
   std::int64_t next_pulse_ns_ = 0;
@@ -137,7 +138,7 @@ class Link {
   std::optional<SceneFetch> fetch_;
   std::string mismatch_, error_;
   std::uint64_t refused_ = 0, rebuilt_ = 0;
-  bus::Refusals refusals_;  ///< Of all connections.
+  bus::Refusals refusals_;  ///< Of all participants since the start.
   struct Traffic {
     std::uint64_t sent_B = 0, received_B = 0, tissue_B = 0;
   };

@@ -8,7 +8,7 @@
 namespace fulcrum::link {
 namespace {
 
-/// The session's own processes stay with the session.
+/// Nodes that can run on another host. Processes of the session itself stay on the cart's host.
 constexpr NodeId kMovable[] = {NodeId::kHandleBridge, NodeId::kHaptics, NodeId::kPhysics, NodeId::kThermal,
                                NodeId::kRender};
 constexpr int kBetweenDomains = 100;

@@ -1,4 +1,4 @@
-// How a user names the other host and its nodes.
+// Options by which a user names the other host and its nodes.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,15 @@
 
 namespace fulcrum::link {
 
-/// "render_node,thermal_node" as a bit per NodeId. Throws InputError for what is no node that can run on another host.
+/// Parses "render_node,thermal_node" into a bit per NodeId. Throws InputError for a name that is no node which can run
+/// on another host.
 [[nodiscard]] std::uint32_t NodesFromNames(const std::string& names);
-/// "thermal_node,render_node".
+/// Inverse of NodesFromNames: "thermal_node,render_node".
 [[nodiscard]] std::string NamesOfNodes(std::uint32_t nodes);
 
-/// @param peer address or name of the other host. @param address ours; empty: of the interface that leads there.
-/// @param link_domain 101 … 200; 0: 100 more than the cart's. Throws InputError.
+/// @param peer address or name of the other host. @param address address of this host; empty: that of the interface
+/// with the route to `peer`.
+/// @param link_domain 101 to 200; 0: 100 more than the cart's domain. Throws InputError.
 [[nodiscard]] bus::FarSettings FarSettingsFor(bus::FarSide side, const std::string& peer, const std::string& address,
                                               int cart_domain, int link_domain);
 

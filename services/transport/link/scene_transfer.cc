@@ -18,8 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kWindow = 8;                    ///< Pieces asked for at a time.
-constexpr std::int64_t kPatience_ns = 1'000'000'000;  ///< Then the question or its answer is lost.
+constexpr std::size_t kWindow = 8;                    ///< Pieces requested at a time.
+constexpr std::int64_t kPatience_ns = 1'000'000'000;  ///< After this the request or its answer counts as lost.
 
 }  // namespace
 
@@ -27,7 +27,7 @@ FileFacts FactsOf(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   Hash64 hash;
   FileFacts facts;
-  // A multiple of eight: the hash does not tell where pieces began.
+  // A multiple of eight, so that the hash does not depend on the boundaries of the pieces.
   std::vector<char> piece(kSceneChunk_B);
   while (stream.read(piece.data(), static_cast<std::streamsize>(piece.size())) || stream.gcount() > 0) {
     hash.Add(std::as_bytes(std::span(piece).first(static_cast<std::size_t>(stream.gcount()))));
@@ -93,12 +93,12 @@ bool IsScene(const fs::path& file, std::uint64_t hash) {
   try {
     return scene::SceneFile(file).view().hash == hash;
   } catch (const std::exception&) {
-    return false;  // Not whole, or of another version: fetched anew.
+    return false;  // Incomplete or of another version: fetched again.
   }
 }
 
 void StoreScene(const SceneFetch& fetch, const fs::path& cache) {
-  if (!fetch.checksum_ok()) throw InputError("the scene came damaged; it is fetched again");
+  if (!fetch.checksum_ok()) throw InputError("the received scene is damaged; it is fetched again");
   const fs::path file = CachedScene(cache, fetch.scene_hash());
   const fs::path part = file.string() + "." + std::to_string(::getpid()) + ".part";
   std::error_code error;
@@ -108,12 +108,12 @@ void StoreScene(const SceneFetch& fetch, const fs::path& cache) {
   stream.close();
   if (!stream) {
     fs::remove(part, error);
-    throw InputError("cannot write " + part.string() + "; is the disk full, or the folder not yours?");
+    throw InputError("cannot write " + part.string() +
+                     "; is the disk full, or does the folder belong to another user?");
   }
   if (!IsScene(part, fetch.scene_hash())) {
     fs::remove(part, error);
-    throw MismatchError(
-        "the scene of the other host is none that this build reads; use the same release on both hosts");
+    throw MismatchError("this build cannot read the scene of the other host; use the same release on both hosts");
   }
   fs::rename(part, file);
 }

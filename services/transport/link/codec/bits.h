@@ -11,7 +11,7 @@
 
 namespace fulcrum::link {
 
-/// 0, -1, 1, -2, … to 0, 1, 2, 3, …: what is small in magnitude becomes small.
+/// Maps 0, -1, 1, -2, … to 0, 1, 2, 3, …, so that values of small magnitude become small unsigned numbers.
 [[nodiscard]] constexpr std::uint32_t Zigzag(std::int32_t value) {
   return (static_cast<std::uint32_t>(value) << 1) ^ static_cast<std::uint32_t>(value >> 31);
 }
@@ -19,12 +19,12 @@ namespace fulcrum::link {
   return static_cast<std::int32_t>(value >> 1) ^ -static_cast<std::int32_t>(value & 1u);
 }
 
-/// Seven bits a byte, low ones first; the high bit says that more follow.
+/// Appends seven bits per byte, the low ones first; the high bit of a byte means that more bytes follow.
 inline void PutVarint(std::uint32_t value, std::vector<std::uint8_t>* out) {
   for (; value >= 0x80u; value >>= 7) out->push_back(static_cast<std::uint8_t>(value | 0x80u));
   out->push_back(static_cast<std::uint8_t>(value));
 }
-/// 0 and not good() any more when it is cut short or longer than 32 bits.
+/// Reads a number of PutVarint. Returns 0 and leaves `in` not good() if the number is cut short or longer than 32 bits.
 [[nodiscard]] inline std::uint32_t TakeVarint(ByteReader* in) {
   std::uint64_t value = 0;
   for (int shift = 0; shift < 35; shift += 7) {
@@ -36,11 +36,11 @@ inline void PutVarint(std::uint32_t value, std::vector<std::uint8_t>* out) {
       return static_cast<std::uint32_t>(value);
     }
   }
-  (void)in->Take(~std::uint64_t{0});  // No such number: the reader is not good from here on.
+  (void)in->Take(~std::uint64_t{0});  // More than any input contains, so this makes the reader not good().
   return 0;
 }
 
-/// Appends each value in `width` bits, 0 to 32; the last byte is filled up with zeros.
+/// Appends each value in `width` bits (0 to 32) and fills the last byte up with zeros.
 inline void PutBits(std::span<const std::uint32_t> values, int width, std::vector<std::uint8_t>* out) {
   std::uint64_t pending = 0;
   int bits = 0;
@@ -50,7 +50,7 @@ inline void PutBits(std::span<const std::uint32_t> values, int width, std::vecto
   }
   if (bits > 0) out->push_back(static_cast<std::uint8_t>(pending));
 }
-/// False when the bytes are not there.
+/// Reads `values.size()` numbers of `width` bits. False if the input contains too few bytes.
 [[nodiscard]] inline bool TakeBits(ByteReader* in, int width, std::span<std::uint32_t> values) {
   const std::span<const std::uint8_t> bytes = in->Take((values.size() * static_cast<std::size_t>(width) + 7) / 8);
   if (!in->good()) return false;
@@ -66,7 +66,7 @@ inline void PutBits(std::span<const std::uint32_t> values, int width, std::vecto
   }
   return true;
 }
-/// Bits that the largest of them needs.
+/// Number of bits that the largest value needs.
 [[nodiscard]] inline int WidthOf(std::span<const std::uint32_t> values) {
   std::uint32_t all = 0;
   for (const std::uint32_t value : values) all |= value;

@@ -7,7 +7,7 @@
 namespace fulcrum::link {
 namespace {
 
-/// A run that is the same costs two lengths to skip: shorter ones are told with the rest.
+/// Skipping a run of equal bytes costs two encoded lengths, so shorter runs are encoded with their neighbours.
 constexpr std::size_t kShortestSkip = 4;
 
 std::uint8_t At(std::span<const std::uint8_t> base, std::size_t i) { return i < base.size() ? base[i] : 0; }

@@ -1,4 +1,5 @@
-// Bytes told by what differs from others that the reader has already: runs that are the same are skipped.
+// Difference between two byte sequences: only the bytes that differ from a base are encoded, runs of equal bytes are
+// skipped.
 #pragma once
 
 #include <cstddef>
@@ -8,10 +9,11 @@
 
 namespace fulcrum::link {
 
-/// Appends `bytes`, told from `base`; beyond its end, and without one, the base is zeros.
+/// Appends `bytes` as the difference from `base`. Beyond the end of `base`, which may be empty, the base is zeros.
 void PutDelta(std::span<const std::uint8_t> base, std::span<const std::uint8_t> bytes, std::vector<std::uint8_t>* out);
 
-/// False when `delta` is none, or tells of more than `largest` bytes; `bytes` is then anything.
+/// Decodes `delta` against `base`. False if `delta` is malformed or decodes to more than `largest` bytes; the content
+/// of `bytes` is then unspecified.
 [[nodiscard]] bool TakeDelta(std::span<const std::uint8_t> base, std::span<const std::uint8_t> delta,
                              std::size_t largest, std::vector<std::uint8_t>* bytes);
 

@@ -1,5 +1,5 @@
-// What was sent in which chunk, and which chunks did not come. A lost chunk is never sent again as it was: what it told
-// of is told again as it is now.
+// Which blocks each chunk contained, and which chunks did not arrive. A lost chunk is not repeated with its old
+// content: its blocks are sent again with their present values.
 #pragma once
 
 #include <algorithm>
@@ -9,38 +9,38 @@
 
 namespace fulcrum::link {
 
-/// Block: the smallest part of a picture that is told by itself.
+/// Index of a block, the smallest part of a frame or patch that is encoded independently.
 using BlockId = std::uint32_t;
 
-/// The sender's side.
+/// Sender's record of the chunks.
 class SentChunks {
  public:
-  /// Number of the chunk that begins now; from 1.
+  /// Number of the chunk that begins now; the first is 1.
   [[nodiscard]] std::uint32_t Begin() {
     ++newest_;
     Of(newest_).clear();
     return newest_;
   }
   void Tell(BlockId block) { Of(newest_).push_back(block); }
-  /// The blocks of a chunk; nullptr: too long ago, or not yet.
+  /// Blocks of a chunk; nullptr if the chunk is too old to be recorded or was not sent yet.
   [[nodiscard]] const std::vector<BlockId>* Find(std::uint32_t chunk) const {
     if (chunk == 0 || chunk > newest_ || newest_ - chunk >= kKept) return nullptr;
     return &ring_[chunk % kKept];
   }
 
  private:
-  /// Over two seconds of tissue that moves as a whole.
+  /// Chunks kept: more than two seconds of tissue that moves as a whole.
   static constexpr std::uint32_t kKept = 4096;
   std::vector<BlockId>& Of(std::uint32_t chunk) { return ring_[chunk % kKept]; }
   std::vector<std::vector<BlockId>> ring_{kKept};
   std::uint32_t newest_ = 0;
 };
 
-/// The receiver's side.
+/// Receiver's record of the chunks.
 class MissingChunks {
  public:
   void Note(std::uint32_t chunk) {
-    if (newest_ == 0 && chunk > 1) all_ = true;  // What came before is not known one by one.
+    if (newest_ == 0 && chunk > 1) all_ = true;  // The missing chunks before the first received one are not listed.
     if (chunk > newest_) {
       const std::uint32_t gap = newest_ == 0 ? 0 : chunk - newest_ - 1;
       lost_ += gap;
@@ -55,10 +55,10 @@ class MissingChunks {
       lost_ -= static_cast<std::uint64_t>(std::erase_if(missing_, [&](const Missing& m) { return m.chunk == chunk; }));
     }
   }
-  /// Everything is missing: a reader that has just come, or whose gaps were too many.
+  /// Whether everything must be requested: the receiver is new, or its gaps were too many. Resets the flag.
   [[nodiscard]] bool TakeAll() { return std::exchange(all_, false); }
   void AskForAll() { all_ = true; }
-  /// The chunks to ask for now. Each is asked for twice, since the question may be lost as well.
+  /// Chunks to request now, at most `most`. Each is requested twice, since the request itself may be lost.
   [[nodiscard]] std::vector<std::uint32_t> TakeQuestions(std::size_t most) {
     std::vector<std::uint32_t> asked;
     for (Missing& m : missing_) {

@@ -9,18 +9,18 @@ namespace fulcrum::link {
 namespace {
 
 constexpr std::int64_t kMemory_ns = 30 * kSecond_ns;
-/// A trip that took longer than the quickest by more than this was held up on one of its ways.
+/// A trip slower than the quickest one by more than this was delayed on one of its ways.
 constexpr std::int64_t kHeldUp_ns = 200'000;
-/// Over less a line tells noise, not drift.
+/// Over a shorter time the slope of the line is noise and not drift.
 constexpr std::int64_t kShortestLine_ns = 8 * kSecond_ns;
 constexpr std::size_t kFewestForLine = 5;
-/// No round trip takes longer than this: the clock of one of the two went elsewhere.
+/// No round trip takes longer: beyond this one of the two clocks has jumped.
 constexpr std::int64_t kLongestTrip_ns = 10 * kSecond_ns;
 
 }  // namespace
 
 void ClockFilter::Add(const Trip& trip) {
-  // Wrapping arithmetic: the numbers come off the wire.
+  // Wrapping arithmetic: the numbers were received and may have any value.
   const auto minus = [](std::int64_t a, std::int64_t b) {
     return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
   };

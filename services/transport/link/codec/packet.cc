@@ -24,7 +24,7 @@ bool TakeQuestions(ByteReader* r, std::vector<std::uint32_t>* chunks) {
   return r->good();
 }
 
-/// A name of a file or folder on the other side: nothing that leads elsewhere.
+/// Whether the text is a plain name of a file or folder, without a path that leads elsewhere.
 bool IsName(const std::string& text, std::size_t longest) {
   return !text.empty() && text.size() <= longest && text[0] != '.' && std::all_of(text.begin(), text.end(), [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ||

@@ -1,5 +1,5 @@
-// What two links say to each other, as bytes. Numbers are little-endian; all decoding is bounded and says false to what
-// is no such packet.
+// Packets that two links exchange, as bytes. Numbers are little-endian. Decoding is bounded and returns false for bytes
+// that are no valid packet.
 #pragma once
 
 #include <cstdint>
@@ -12,29 +12,30 @@
 
 namespace fulcrum::link {
 
-/// Grows with any change of what follows and of the codecs.
+/// Increases with any change of the packets below and of the codecs.
 inline constexpr std::uint8_t kWireVersion = 1;
 
 enum class PacketKind : std::uint8_t {
-  kPulse,       ///< Both ways, 20 Hz: clock, wishes, questions.
-  kSample,      ///< A message of the bus.
+  kPulse,       ///< Both ways, 20 Hz: clock stamps, wanted topics, missing chunks.
+  kSample,      ///< One message of a topic.
   kTissue,      ///< A chunk of TissueSender.
   kPatch,       ///< A chunk of PatchSender.
   kOffer,       ///< Cart to host: the session and where its nodes run.
-  kSceneAsk,    ///< Host to cart.
-  kSceneChunk,  ///< Cart to host.
-  kBye,         ///< The session is over.
+  kSceneAsk,    ///< Host to cart: requests one piece of the scene.
+  kSceneChunk,  ///< Cart to host: one piece of the scene.
+  kBye,         ///< The session has ended.
 };
 inline constexpr int kPacketKinds = 8;
 
-/// In front of each packet.
+/// Header of each packet.
 struct Envelope {
   PacketKind kind = PacketKind::kPulse;
-  std::uint64_t epoch = 0;  ///< CLOCK_MONOTONIC of its host when the sending link began: grows with each restart [ns].
+  /// CLOCK_MONOTONIC of the sending host when its link started [ns]: grows with each restart.
+  std::uint64_t epoch = 0;
 };
-/// A packet begins with this; its body is put behind.
+/// Appends the header of a packet; the body is appended after it.
 void PutEnvelope(const Envelope& envelope, std::vector<std::uint8_t>* out);
-/// `body`: what is behind. `version`: what the sender speaks; with another one there is no body.
+/// `body`: the bytes after the header. `version`: the sender's wire version; if it differs from ours, `body` is empty.
 [[nodiscard]] bool TakeEnvelope(std::span<const std::uint8_t> packet, Envelope* envelope,
                                 std::span<const std::uint8_t>* body, std::uint8_t* version);
 
@@ -42,27 +43,27 @@ inline constexpr std::size_t kMostQuestions = 64;
 
 struct Pulse {
   std::uint64_t schema_hash = 0;
-  std::int64_t sent_ns = 0;        ///< By the sender's clock.
-  std::uint64_t heard_epoch = 0;   ///< Of the link that it heard last; 0: none.
-  std::int64_t heard_sent_ns = 0;  ///< `sent_ns` of its newest pulse.
-  std::int64_t heard_ns = 0;       ///< When that came, by the sender's clock.
-  std::uint32_t wanted = 0;        ///< Bit per TopicId: somebody reads it there.
+  std::int64_t sent_ns = 0;        ///< Sending time by the sender's clock.
+  std::uint64_t heard_epoch = 0;   ///< Epoch of the link from which the sender last received; 0: none.
+  std::int64_t heard_sent_ns = 0;  ///< `sent_ns` of the newest pulse that the sender received.
+  std::int64_t heard_ns = 0;       ///< When that pulse arrived, by the sender's clock.
+  std::uint32_t wanted = 0;        ///< Bit per TopicId: the sender's host has a reader.
   bool wants_offer = false;
   bool wants_all_tissue = false, wants_all_patches = false, wants_all_topology = false;
-  std::vector<std::uint32_t> missing_tissue, missing_patches;  ///< Chunks; at most kMostQuestions.
+  std::vector<std::uint32_t> missing_tissue, missing_patches;  ///< Missing chunks, at most kMostQuestions each.
 };
 void PutPulse(const Pulse& pulse, std::vector<std::uint8_t>* out);
 [[nodiscard]] bool TakePulse(std::span<const std::uint8_t> body, Pulse* pulse);
 
-/// A message as CDR, told from `base`: for TopologyState the one sent before, for all others nothing.
+/// Header of a message that is sent as CDR. A TopologyState is encoded as the difference from the one sent before.
 struct SampleHead {
   TopicId topic = TopicId::kHealth;
-  std::uint32_t number = 0;  ///< Of this topic, from 1.
-  std::uint32_t base = 0;    ///< Number of the sample that it is told from; 0: none.
+  std::uint32_t number = 0;  ///< Number of the sample in its topic, from 1.
+  std::uint32_t base = 0;    ///< Number of the sample that the difference refers to; 0: the message is complete.
 };
 void PutSample(const SampleHead& head, std::span<const std::uint8_t> base, std::span<const std::uint8_t> cdr,
                std::vector<std::uint8_t>* out);
-/// `delta`: for TakeDelta.
+/// `delta`: the difference to decode with TakeDelta.
 [[nodiscard]] bool TakeSample(std::span<const std::uint8_t> body, SampleHead* head,
                               std::span<const std::uint8_t>* delta);
 
@@ -74,8 +75,8 @@ struct Offer {
   std::string session_id, scene_name;
   std::uint64_t scene_hash = 0;
   std::uint64_t scene_B = 0;         ///< Size of the compiled file.
-  std::uint64_t scene_checksum = 0;  ///< Hash64 of its bytes.
-  std::uint32_t nodes = 0;           ///< Bit per NodeId: they run on the host.
+  std::uint64_t scene_checksum = 0;  ///< Hash64 of the bytes of that file.
+  std::uint32_t nodes = 0;           ///< Bit per NodeId: nodes that run on the host.
   std::string cart_yaml;
 };
 void PutOffer(const Offer& offer, std::vector<std::uint8_t>* out);

@@ -10,22 +10,23 @@
 namespace fulcrum::link {
 namespace {
 
-constexpr std::size_t kPlanes = 4;  ///< Bytes of a texel.
-constexpr std::size_t kEdge = 16;   ///< Of a tile [texels].
+constexpr std::size_t kPlanes = 4;  ///< Bytes per texel.
+constexpr std::size_t kEdge = 16;   ///< Edge length of a tile [texels].
 constexpr std::size_t kTilesAcross = kPatchTexels / kEdge;
 constexpr std::uint32_t kTiles = kTilesAcross * kTilesAcross;
 constexpr std::size_t kTexels = kEdge * kEdge;
 constexpr std::size_t kRow_B = kPlanes * kPatchTexels, kTileRow_B = kPlanes * kEdge, kTile_B = kPlanes * kTexels;
 constexpr std::size_t kPatch_B = kRow_B * kPatchTexels;
-constexpr std::uint32_t kPatchRefresh = 1;  ///< Tiles told again with each patch, so that what was lost twice heals.
-constexpr std::size_t kPatchLastAt = 8;     ///< Where `last` stands.
+/// Unchanged tiles sent with each patch, so that a tile whose repetition was lost too is restored.
+constexpr std::uint32_t kPatchRefresh = 1;
+constexpr std::size_t kPatchLastAt = 8;  ///< Position of `last` in a chunk [B].
 
 std::size_t PlaceOf(std::uint32_t tile) {
   return (tile / kTilesAcross) * kEdge * kRow_B + (tile % kTilesAcross) * kTileRow_B;
 }
 
-/// One tile, plane by plane: the first byte, then what each differs from the one before it (in the first column: from
-/// the one above), in as few bits as the plane needs. A plane of one value takes two bytes.
+/// Encodes one tile, plane by plane: the first byte, then the difference of each byte from the previous one (in the
+/// first column from the one above), in as few bits as the plane needs. A plane of one value takes two bytes.
 void PutTile(const std::uint8_t* from, std::vector<std::uint8_t>* out) {
   std::array<std::uint32_t, kTexels - 1> differences{};
   for (std::size_t plane = 0; plane < kPlanes; ++plane) {
@@ -179,7 +180,7 @@ PatchReceiver::Result PatchReceiver::Take(std::span<const std::uint8_t> chunk) {
   Slot& slot = slots_[header_.slot];
   TemperaturePatchHeader& known = slot.patch.header;
   if (slot.newest.empty() || known.origin_x != header_.origin_x || known.origin_y != header_.origin_y) {
-    if (frame_ <= slot.passed_on) return Result::kPart;  // Of where the patch was before.
+    if (frame_ <= slot.passed_on) return Result::kPart;  // The patch was at another place then.
     slot.patch.texels.assign(kPatch_B, 0);
     slot.newest.assign(kTiles, 0);
     slot.known = 0;
@@ -187,7 +188,7 @@ PatchReceiver::Result PatchReceiver::Take(std::span<const std::uint8_t> chunk) {
   }
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     std::uint32_t& newest = slot.newest[tiles_[t]];
-    if (frame_ < newest) continue;  // Overtaken on the way.
+    if (frame_ < newest) continue;  // A newer frame arrived first.
     slot.known += newest == 0 ? 1 : 0;
     newest = frame_;
     for (std::size_t row = 0; row < kEdge; ++row) {

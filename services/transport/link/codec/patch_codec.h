@@ -1,5 +1,5 @@
-// TemperaturePatch over a wire that is slow and loses: tiles of 16 x 16 texels told by themselves, only those that
-// changed, without loss of precision (a texel's four bytes are quantised by their owner).
+// TemperaturePatch over a slow connection that loses packets. Tiles of 16 × 16 texels are encoded independently, only
+// those that changed, without loss of precision (the owner has already quantised a texel to four bytes).
 #pragma once
 
 #include <array>
@@ -12,24 +12,24 @@
 
 namespace fulcrum::link {
 
-/// Hot spots that the wire carries at a time; a cart's thermal_node has fewer.
+/// Patch slots (hot spots) that the link carries at a time; a cart's thermal_node has fewer.
 inline constexpr std::uint32_t kMostSlots = 16;
 
 class PatchSender {
  public:
-  /// Tells what brings the receiver to `patch`: at least one chunk. A slot beyond kMostSlots is not sent.
+  /// Sends in at least one chunk what the receiver needs to reproduce `patch`. A slot beyond kMostSlots is not sent.
   void Encode(const TemperaturePatch& patch, const SendChunk& send);
-  /// This chunk did not arrive: what it told of is told again with the next patch of its slot, or by Flush.
+  /// Marks the tiles of a chunk that did not arrive: they are sent again with the next patch of their slot or by Flush.
   void Repeat(std::uint32_t chunk);
   void RepeatAll();
-  /// The newest patch of each slot of which something is to be told again.
+  /// Sends the newest patch of each slot that has tiles to send again.
   void Flush(const SendChunk& send);
 
  private:
   struct Slot {
     TemperaturePatchHeader header;
-    std::vector<std::uint8_t> told;  ///< Empty: never used.
-    std::vector<bool> dirty;         ///< By tile.
+    std::vector<std::uint8_t> told;  ///< Texels as sent; empty: slot never used.
+    std::vector<bool> dirty;         ///< Per tile.
     std::uint32_t next_refresh = 0;
   };
   void Emit(Slot* slot, const SendChunk& send);
@@ -43,7 +43,7 @@ class PatchSender {
 class PatchReceiver {
  public:
   using Result = TissueReceiver::Result;
-  /// kFrame: patch() is to be passed on.
+  /// Decodes a chunk. kFrame: patch() is complete and is to be passed on.
   Result Take(std::span<const std::uint8_t> chunk);
   [[nodiscard]] const TemperaturePatch& patch() const { return *newest_patch_; }
   [[nodiscard]] MissingChunks& missing() { return missing_; }
@@ -53,7 +53,7 @@ class PatchReceiver {
  private:
   struct Slot {
     TemperaturePatch patch;
-    std::vector<std::uint32_t> newest;  ///< By tile: the frame that told of it last; 0: none yet.
+    std::vector<std::uint32_t> newest;  ///< Per tile: the newest frame that contained it; 0: none yet.
     std::uint32_t known = 0;
     std::uint32_t passed_on = 0;
   };
@@ -63,12 +63,12 @@ class PatchReceiver {
   const TemperaturePatch* newest_patch_ = nullptr;
   MissingChunks missing_;
   std::uint64_t bad_ = 0;
-  // Of the chunk at hand.
+  // State of the chunk that is being decoded.
   std::uint32_t number_ = 0, frame_ = 0;
   bool last_ = false;
   TemperaturePatchHeader header_;
   std::vector<std::uint32_t> tiles_;
-  std::vector<std::uint8_t> texels_;  ///< kTile_B a tile, row by row.
+  std::vector<std::uint8_t> texels_;  ///< kTile_B per tile, row by row.
 };
 
 }  // namespace fulcrum::link

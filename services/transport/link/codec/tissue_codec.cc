@@ -10,13 +10,15 @@
 namespace fulcrum::link {
 namespace {
 
-/// |x| <= 10 m, as the gate has it [steps].
+/// Largest coordinate, 10 m as in the gate [steps].
 constexpr std::int32_t kFarthest = 2'000'000;
 constexpr double kStepsPerMetre = 1 / kTissueStep_m;
-/// What lies between neighbours, or between two such differences, of coordinates up to kFarthest.
+/// Largest width of a difference between neighbours, or of two such differences, for coordinates up to kFarthest
+/// [bits].
 constexpr int kWidest = 25;
 constexpr std::uint8_t kSecondDifferences = 0x80;
-/// Each frame tells so many blocks that did not move as well, so that what was lost twice heals in about 10 s.
+/// Unmoved blocks that are sent with each frame, so that a block whose repetition was lost too is restored within about
+/// 10 s.
 constexpr std::uint32_t kTissueRefresh = 2;
 
 std::uint32_t BlocksOf(std::uint32_t vertices) { return (vertices + kTissueBlock - 1) / kTissueBlock; }
@@ -42,7 +44,7 @@ void PutHeader(std::uint32_t chunk, std::uint32_t frame, const TissueFrameHeader
   w.Number(header.vertex_count);
   w.Number(static_cast<std::uint8_t>(header.grasping_tools));
 }
-constexpr std::size_t kTissueLastAt = 8;  ///< Where `last` stands.
+constexpr std::size_t kTissueLastAt = 8;  ///< Position of `last` in a chunk [B].
 
 TissueFrameHeader TakeHeader(ByteReader* r) {
   TissueFrameHeader header;
@@ -60,7 +62,7 @@ TissueFrameHeader TakeHeader(ByteReader* r) {
   return header;
 }
 
-/// One axis of one block: the first value, then first or second differences, whichever need fewer bits.
+/// Encodes one axis of one block: the first value, then first or second differences, whichever need fewer bits.
 void PutAxis(std::span<const std::int32_t> values, std::vector<std::uint8_t>* out) {
   std::array<std::uint32_t, kTissueBlock> first{}, second{};
   const std::size_t n = values.size() - 1;
@@ -214,7 +216,7 @@ void TissueReceiver::Apply() {
   }
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     const std::uint32_t block = blocks_[b];
-    if (number_of_frame_ < newest_[block]) continue;  // Overtaken on the way.
+    if (number_of_frame_ < newest_[block]) continue;  // A newer frame arrived first.
     known_ += newest_[block] == 0 ? 1 : 0;
     newest_[block] = number_of_frame_;
     const std::uint32_t size = SizeOf(block, header_.vertex_count);

@@ -1,8 +1,8 @@
-// TissueFrame over a wire that is slow and loses: positions in whole steps, blocks of neighbours told by themselves,
-// only those that moved, in chunks that fit one datagram.
+// TissueFrame over a slow connection that loses packets. Positions are rounded to whole steps; blocks of neighbouring
+// vertices are encoded independently, only those that moved, in chunks that fit one datagram.
 //
-// Nothing of a chunk needs another one to be understood, so a loss hurts only the blocks that it told of, and these are
-// told again as they are by then. Without losses a position is off by kTissueError_m at most.
+// Each chunk can be decoded without any other, so a loss affects only the blocks in that chunk. They are sent again
+// with their present positions. Without losses the error of a position is at most kTissueError_m.
 #pragma once
 
 #include <cstdint>
@@ -15,28 +15,30 @@
 
 namespace fulcrum::link {
 
-/// Of one message on the wire: what fits an Ethernet frame of 1500 with the headers of IP, UDP and RTPS, encrypted.
+/// Largest message on the wire [B]: fits an Ethernet frame of 1500 B with the headers of IP, UDP and RTPS, encrypted.
 inline constexpr std::size_t kChunk_B = 1280;
 
-/// Positions are told in steps of this [m].
+/// Resolution of the encoded positions [m].
 inline constexpr double kTissueStep_m = 5e-6;
-/// A vertex is told again when it is further than this from where it was told to be, in steps along any axis. More than
-/// a half, so that noise about the middle between two steps costs nothing.
+/// Distance along any axis between a vertex and its last sent position beyond which the vertex is sent again [steps].
+/// Larger than one half, so that noise about the middle between two steps causes no traffic.
 inline constexpr double kTissueSlack = 0.75;
-/// sqrt(3) * kTissueSlack * kTissueStep_m, and the rounding of a float at 10 m [m].
+/// Largest error of a position without losses: sqrt(3) * kTissueSlack * kTissueStep_m, and the rounding of a float at
+/// 10 m [m].
 inline constexpr double kTissueError_m = 7.5e-6;
-inline constexpr std::uint32_t kTissueBlock = 32;  ///< Vertices; neighbours in scene order lie near each other.
+/// Vertices per block; neighbours in scene order lie close together.
+inline constexpr std::uint32_t kTissueBlock = 32;
 
 using SendChunk = std::function<void(std::span<const std::uint8_t>)>;
 
 class TissueSender {
  public:
-  /// Tells what brings the receiver to `frame`: at least one chunk, with the header.
+  /// Sends in at least one chunk, with the header, what the receiver needs to reproduce `frame`.
   void Encode(const TissueFrame& frame, const SendChunk& send);
-  /// This chunk did not arrive: what it told of is told again with the next frame, or by Flush.
+  /// Marks the blocks of a chunk that did not arrive: they are sent again with the next frame or by Flush.
   void Repeat(std::uint32_t chunk);
   void RepeatAll() { dirty_.assign(dirty_.size(), true); }
-  /// The newest frame once more, if something of it is to be told again and no newer one has come.
+  /// Sends the newest frame again if some of its blocks are marked and no newer frame has come.
   void Flush(const SendChunk& send);
 
  private:
@@ -46,9 +48,9 @@ class TissueSender {
 
   TissueFrameHeader header_;
   std::uint32_t count_ = 0;         ///< Vertices.
-  std::vector<std::int32_t> told_;  ///< Three a vertex [steps].
-  std::vector<bool> dirty_;         ///< By block.
-  std::uint32_t next_refresh_ = 0;  ///< Block.
+  std::vector<std::int32_t> told_;  ///< Last sent positions, three per vertex [steps].
+  std::vector<bool> dirty_;         ///< Per block.
+  std::uint32_t next_refresh_ = 0;  ///< Index of a block.
   std::uint32_t frame_ = 0;
   SentChunks sent_;
   std::vector<std::uint8_t> chunk_, block_;
@@ -57,9 +59,9 @@ class TissueSender {
 class TissueReceiver {
  public:
   enum class Result : std::uint8_t {
-    kBad,    ///< No such chunk: nothing was taken from it.
-    kPart,   ///< Not yet a frame, or one with holes.
-    kFrame,  ///< frame() is to be passed on.
+    kBad,    ///< Malformed chunk: nothing was used.
+    kPart,   ///< The frame is not complete yet or has missing blocks.
+    kFrame,  ///< frame() is complete and is to be passed on.
   };
   Result Take(std::span<const std::uint8_t> chunk);
   [[nodiscard]] const TissueFrame& frame() const { return frame_; }
@@ -74,16 +76,16 @@ class TissueReceiver {
 
   TissueFrame frame_;
   MissingChunks missing_;
-  std::vector<std::uint32_t> newest_;  ///< By block: the frame that told of it last; 0: none yet.
-  std::uint32_t known_ = 0;            ///< Blocks told of.
-  std::uint32_t passed_on_ = 0;        ///< Newest frame that was kFrame.
+  std::vector<std::uint32_t> newest_;  ///< Per block: the newest frame that contained it; 0: none yet.
+  std::uint32_t known_ = 0;            ///< Number of blocks received so far.
+  std::uint32_t passed_on_ = 0;        ///< Number of the newest frame for which kFrame was returned.
   std::uint64_t bad_ = 0;
-  // Of the chunk at hand.
+  // State of the chunk that is being decoded.
   std::uint32_t number_ = 0, number_of_frame_ = 0;
   bool last_ = false;
   TissueFrameHeader header_;
   std::vector<std::uint32_t> blocks_;
-  std::vector<std::int32_t> values_;  ///< kTissueBlock * 3 a block, axis by axis.
+  std::vector<std::int32_t> values_;  ///< kTissueBlock * 3 per block, axis by axis.
 };
 
 }  // namespace fulcrum::link
