@@ -40,7 +40,7 @@ using Pkcs7 = std::unique_ptr<PKCS7, Free<PKCS7_free>>;
 constexpr int kSerialBits = 127;
 constexpr long kVersion3 = 2;
 
-/// What the library says went wrong last.
+/// Last error of OpenSSL.
 std::string Reason() {
   const unsigned long code = ERR_peek_last_error();
   const char* text = code == 0 ? nullptr : ERR_reason_error_string(code);
@@ -48,7 +48,7 @@ std::string Reason() {
   return text == nullptr ? "unknown reason" : text;
 }
 
-/// For what cannot fail but by a lack of memory or entropy.
+/// For calls that fail only for lack of memory or entropy.
 template <class T>
 T Must(T result, const char* what) {
   bool good = false;

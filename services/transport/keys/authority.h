@@ -1,4 +1,4 @@
-// An authority that vouches for the participants of a cart, and what it issues. OpenSSL does all of it.
+// The authority that certifies the participants of a cart, and what it issues. All cryptography is OpenSSL's.
 #pragma once
 
 #include <array>
@@ -15,10 +15,11 @@ struct Identity {
   std::string key;          ///< PEM, private.
 };
 
-/// Elliptic keys (P-256). Its private key is in memory only: who has none cannot issue in its name.
+/// Certificate authority with elliptic keys (P-256). Its private key exists in memory only, so nothing can be issued
+/// later.
 class Authority {
  public:
-  /// Named at random, so that two authorities are told apart by name.
+  /// The authority has a random name, so that two authorities differ by name.
   explicit Authority(const Validity& validity);
   ~Authority();
   Authority(const Authority&) = delete;
@@ -27,7 +28,7 @@ class Authority {
   [[nodiscard]] const std::string& certificate() const { return certificate_; }
   /// @param name common name of the subject.
   [[nodiscard]] Identity Issue(const std::string& name, const Validity& validity) const;
-  /// S/MIME, as DDS Security asks for.
+  /// @return the document signed as S/MIME, the format that DDS Security requires.
   [[nodiscard]] std::string Sign(const std::string& document) const;
 
  private:
@@ -41,20 +42,20 @@ class Authority {
 using AddressHead = std::array<std::uint8_t, 6>;
 [[nodiscard]] AddressHead AddressHeadOf(const std::string& name);
 
-/// What can be said of a certificate without trusting it.
+/// Content of a certificate, read without verifying it.
 struct CertificateFacts {
   std::string subject;  ///< Common name.
   std::string issuer;   ///< Common name.
   Validity validity;
 };
 
-/// The rest throws InputError with `what` (a file) and the reason.
+/// Reads a certificate. Throws InputError with `what` (the file) and the reason, as the functions below do.
 [[nodiscard]] CertificateFacts FactsOf(const std::string& certificate, const std::string& what);
-/// The authority's certificate vouches for it, at this time.
+/// Throws unless the certificate is signed by the authority and valid at the time `now`.
 void VerifyCertificate(const std::string& certificate, const std::string& authority, std::time_t now,
                        const std::string& what);
 void VerifyKey(const std::string& key, const std::string& certificate, const std::string& what);
-/// The document inside, if the authority has signed it.
+/// @return the signed document, if the authority has signed it; throws otherwise.
 [[nodiscard]] std::string VerifySigned(const std::string& signed_document, const std::string& authority,
                                        const std::string& what);
 

@@ -22,7 +22,7 @@ std::string Topics(const char* verb, bus::TopicSet set) {
   return text.empty() ? text : std::string("<") + verb + "><topics>" + text + "</topics></" + verb + ">\n";
 }
 
-/// What joins two hosts writes and reads between them as well, whichever of the two it is on.
+/// The participant that joins two hosts writes and reads the link's topics in both directions, on either host.
 std::string LinkRule() {
   std::string topics;
   for (const std::string_view topic : bus::kLinkTopics) topics += "<topic>" + std::string(topic) + "</topic>";
@@ -65,7 +65,7 @@ std::string GovernanceXml(bool encrypt) {
 }
 
 std::string PermissionsXml(const bus::AccessRole& role, const Validity& validity) {
-  // The library reads these times as local ones: a day more at both ends. The certificate's own are exact.
+  // The library reads these times as local ones: one more day at both ends. Those of the certificate are exact.
   constexpr std::time_t kDay = 24 * 3600;
   return std::string(kHead) + "<permissions><grant name=\"" + std::string(role.identity) + "\">\n<subject_name>" +
          SubjectOf(role) + "</subject_name>\n<validity><not_before>" + Moment(validity.from - kDay) +

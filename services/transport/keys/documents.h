@@ -1,4 +1,4 @@
-// The two documents of DDS Security 1.1 that our authority signs: what holds in a domain, and what one identity may do.
+// The two documents of DDS Security 1.1 that the authority signs: the rules of a domain and the rights of one identity.
 // Pure text, made from services/transport/bus/access.h.
 #pragma once
 
@@ -13,13 +13,13 @@ struct Validity {
   std::time_t from = 0, until = 0;  ///< Seconds since 1970, UTC.
 };
 
-/// Everybody must authenticate, each topic has access control. `encrypt`: every datagram after that is encrypted
-/// (AES-GCM), which rules out data-sharing.
+/// Rules of the domain: every participant must authenticate, and each topic has access control. With `encrypt` every
+/// datagram after the handshake is encrypted (AES-GCM), which rules out data-sharing.
 [[nodiscard]] std::string GovernanceXml(bool encrypt);
 
 [[nodiscard]] std::string PermissionsXml(const bus::AccessRole& role, const Validity& validity);
 
-/// "CN=physics_node".
+/// Subject of a role's certificate, "CN=physics_node".
 [[nodiscard]] std::string SubjectOf(const bus::AccessRole& role);
 
 }  // namespace fulcrum::keys

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kRemedy = "; make new ones with fulcrum keys init";
-// A certificate holds from a little before: the clocks of two hosts are never the same.
+// A certificate is valid from a little earlier, because the clocks of two hosts differ.
 constexpr std::time_t kClockSlack_s = 300;
 
 std::string Quoted(const fs::path& path) { return path.string(); }
@@ -34,7 +34,7 @@ std::string Read(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// Nobody else may read or change it.
+/// Throws if users other than the owner can read or change the file or folder.
 void CheckPrivate(const fs::path& path, bool folder) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) {
@@ -45,7 +45,7 @@ void CheckPrivate(const fs::path& path, bool folder) {
     std::array<char, 8> mode{};
     std::snprintf(mode.data(), mode.size(), "%04o", status.st_mode & 07777u);
     throw InputError(Quoted(path) + ": is open to others (mode " + mode.data() + "); chmod " +
-                     (folder ? "0700 " : "0600 ") + Quoted(path) + ", and if somebody may have read it, make new keys");
+                     (folder ? "0700 " : "0600 ") + Quoted(path) + "; if another user may have read it, make new keys");
   }
 }
 
@@ -68,12 +68,12 @@ void CheckGovernance(const fs::path& folder, bool encrypt, const std::string& au
   }
 }
 
-/// Replacing a folder must not take with it what is not ours.
+/// A folder is replaced only if it contains nothing but keys.
 void RefuseForeignFiles(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string extension = entry.path().extension();
     if (entry.is_regular_file() && (extension == ".pem" || extension == ".key" || extension == ".p7s")) continue;
-    throw InputError(Quoted(entry.path()) + ": is no key; move it away, for the folder is replaced whole");
+    throw InputError(Quoted(entry.path()) + ": is no key; move it elsewhere, because the whole folder is replaced");
   }
 }
 
@@ -125,7 +125,7 @@ void MakeKeyFolder(const fs::path& folder, const Validity& validity, bool force)
   }
   const fs::path parent = fs::absolute(folder).lexically_normal().parent_path();
   fs::create_directories(parent, error);
-  // Whole or not at all: filled under another name first.
+  // Filled under another name and renamed, so that the folder is complete or absent.
   std::string fresh = (parent / ".fulcrum-keys-XXXXXX").string();
   if (::mkdtemp(fresh.data()) == nullptr) {
     throw InputError(Quoted(parent) + ": cannot make a folder there: " + std::strerror(errno));
@@ -161,8 +161,8 @@ Validity CheckIdentity(const fs::path& folder, std::string_view identity, bool e
   const std::string what = Quoted(files.certificate);
   const CertificateFacts facts = FactsOf(certificate, what);
   if (now < facts.validity.from || now > facts.validity.until) {
-    throw InputError(what + ": holds from " + DateOf(facts.validity.from) + " until " + DateOf(facts.validity.until) +
-                     ", and today is " + DateOf(now) +
+    throw InputError(what + ": is valid from " + DateOf(facts.validity.from) + " until " +
+                     DateOf(facts.validity.until) + ", and today is " + DateOf(now) +
                      "; set the clock right, or make new keys with fulcrum keys "
                      "init --force");
   }
@@ -172,7 +172,7 @@ Validity CheckIdentity(const fs::path& folder, std::string_view identity, bool e
   }
   VerifyCertificate(certificate, authority, now, what);
   if (facts.subject != identity) {
-    throw InputError(what + ": is made out to \"" + facts.subject + "\", not to \"" + std::string(identity) + "\"");
+    throw InputError(what + ": was issued to \"" + facts.subject + "\", not to \"" + std::string(identity) + "\"");
   }
   CheckPrivate(files.key, false);
   VerifyKey(Read(files.key), certificate, Quoted(files.key));

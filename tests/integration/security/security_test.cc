@@ -293,7 +293,7 @@ TEST(KeyFolder, SaysWhatIsWrongWithAKeyAndWhatToDo) {
                fs::copy_file(files.key.parent_path() / "recorder.pem", files.certificate,
                              fs::copy_options::overwrite_existing);
              }),
-             {"render_node.pem", "made out to \"recorder\""});
+             {"render_node.pem", "issued to \"recorder\""});
   ExpectSaid(ProblemAfter([](const auto& files) {
                std::string text = ReadFile(files.permissions);
                text.replace(text.find("ThermalEvent"), 12, "ToolState");
