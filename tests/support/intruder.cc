@@ -166,7 +166,7 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
   start("tampered", scratch / "tampered", "thermal_node", 2, "");
   start("forged_other_topic", real, "thermal_node", 0, "may not write fulcrum/ToolState",
         {scratch / "both.pem", scratch / "pipe1"});
-  start("forged_tampered", real, "thermal_node", 0, "permissions of no use", {scratch / "both.pem", scratch / "pipe2"});
+  start("forged_tampered", real, "thermal_node", 0, "unusable permissions", {scratch / "both.pem", scratch / "pipe2"});
 
   std::vector<Attempt> attempts;
   (void)WaitFor(kPatience_s, [&] {

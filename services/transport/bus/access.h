@@ -1,6 +1,6 @@
-// Who may write and read what: the one table that the permissions of a secured cart are made from
-// (services/transport/keys). A port that is not here is refused on such a cart; the test of a whole session with
-// security on holds the two together (tests/integration/security).
+// Rights of the participants: the one table from which the permissions of a secured cart are made
+// (services/transport/keys). A port that is not listed here is refused on such a cart; the test of a whole session with
+// security on checks that the table is complete (tests/integration/security).
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@
 
 namespace fulcrum::bus {
 
-/// Bits of TopicId.
+/// Set of topics, one bit per TopicId.
 using TopicSet = std::uint32_t;
 static_assert(kTopicCount <= 32);
 
@@ -29,13 +29,13 @@ struct AccessRole {
   TopicSet reads;
 };
 
-/// Participants that are no node.
+/// Participants that are not nodes.
 inline constexpr std::string_view kToolIdentity = "fulcrum";       ///< status, top, restart, swap, dump, down, console.
-inline constexpr std::string_view kReplayerIdentity = "replayer";  ///< Stands in for nodes: replayer --live.
-inline constexpr std::string_view kLinkIdentity = "link";          ///< Stands in for the nodes of another host.
-/// Domains of carts, and of what joins two hosts of one.
+inline constexpr std::string_view kReplayerIdentity = "replayer";  ///< Writes topics of nodes: replayer --live.
+inline constexpr std::string_view kLinkIdentity = "link";          ///< Writes topics of the nodes of another host.
+/// Domains of carts, and of links between two hosts of one cart.
 inline constexpr int kFirstCartDomain = 1, kLastCartDomain = 100, kFirstLinkDomain = 101, kLastLinkDomain = 200;
-/// Between two hosts only, in a link domain: bytes, by lane and by who writes.
+/// Topics of the link domain, which carry bytes between two hosts: by lane and by writing side.
 inline constexpr std::array<std::string_view, 4> kLinkTopics{
     "fulcrum/link/stream/from_cart", "fulcrum/link/stream/from_host", "fulcrum/link/ordered/from_cart",
     "fulcrum/link/ordered/from_host"};
@@ -43,11 +43,11 @@ inline constexpr std::array<std::string_view, 4> kLinkTopics{
 namespace access {
 using enum TopicId;
 inline constexpr TopicSet kAll = (TopicSet{1} << kTopicCount) - 1;
-/// What services/nodes/app does for every node.
+/// Topics that services/nodes/app writes for every node.
 inline constexpr TopicSet kNodeWrites = SetOf(kCommandReply, kHealth);
 inline constexpr TopicSet kNodeReads = SetOf(kSceneManifest, kCommand, kHealth);
 
-/// The nodes first, by NodeId.
+/// Nodes first, in the order of NodeId.
 inline constexpr std::array kRoles{
     AccessRole{"supervisor", SetOf(kSceneManifest, kGeneratorSetting, kCommand, kCommandReply, kHealth),
                SetOf(kCommand, kThermalEvent, kHealth, kToolState, kHandleState, kContactModel, kCauteryContact,
@@ -72,7 +72,7 @@ inline constexpr std::array kRoles{
 
 inline constexpr const auto& kAccessRoles = access::kRoles;
 
-/// nullptr: nobody of that name.
+/// Role with that identity; nullptr: none.
 [[nodiscard]] constexpr const AccessRole* AccessRoleOf(std::string_view identity) {
   for (const AccessRole& role : kAccessRoles) {
     if (role.identity == identity) return &role;
@@ -80,12 +80,12 @@ inline constexpr const auto& kAccessRoles = access::kRoles;
   return nullptr;
 }
 
-/// Sends what is others' to send.
+/// Whether the participant may publish the topics of nodes.
 [[nodiscard]] constexpr bool StandsIn(std::string_view identity) {
   return identity == kReplayerIdentity || identity == kLinkIdentity;
 }
 
-/// The node that sends a topic; none for those that several participants send, those who stand in apart.
+/// The node that publishes a topic; none if several nodes publish it. Replayer and link are not considered.
 [[nodiscard]] constexpr std::optional<NodeId> OwnerOf(TopicId topic) {
   std::optional<NodeId> owner;
   int writers = 0;

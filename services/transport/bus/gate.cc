@@ -27,14 +27,15 @@ bool IsNode(NodeId id) { return static_cast<int>(id) < kNodeCount; }
 
 bool IsStamp(const Stamp& s) { return s.stamp_ns >= 0; }
 
-/// A name that people read. What other bytes decode to is empty or holds characters that nobody types.
+/// Whether the text is a name without control characters. Bytes that are no valid message decode to empty names or to
+/// names with such characters.
 bool IsName(const std::string& name, std::size_t longest) {
   return !name.empty() && name.size() <= longest && std::none_of(name.begin(), name.end(), [](char c) {
     return static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
   });
 }
 
-/// Session times are negative before the session is known.
+/// Accepts negative times, which occur before the start of the session is known.
 bool IsSessionTime(double t) { return Magnitude(t, 1e9); }
 
 /// Branch-free over the whole range so that it compiles to vector code: 77,000 floats pass in about 10 us.
@@ -61,7 +62,7 @@ bool IsContact(const Contact& c) {
          Within(c.slip_force, 0.0, kMaxForce_N) && Within(c.radius, 0.0, kMaxCoordinate_m);
 }
 
-/// Entries beyond `count` are never read by a node, but they must not smuggle a NaN into a copy either.
+/// Entries beyond `count` are checked as well: a node never reads them, but they are copied with the message.
 bool IsDevice(const DeviceContacts& d) {
   return d.count <= kMaxContacts && Magnitude(d.p_ext_W, kMaxPower_W) && Within(d.force_cap_N, 0.0, kMaxForce_N) &&
          std::all_of(d.contacts.begin(), d.contacts.end(), IsContact);
@@ -142,7 +143,7 @@ bool PassesGate(const ThermalEvent& m) noexcept {
          std::isfinite(m.value);
 }
 
-// A manifest of another scene ends a node: nothing that merely decodes to one may pass.
+// A manifest of another scene ends a node, so corrupt bytes that happen to decode to a manifest must not pass.
 bool PassesGate(const SceneManifest& m) noexcept {
   return IsStamp(m.stamp) && UpTo(m.mode, SessionMode::kLockStep) && m.session_start_ns >= 0 &&
          IsName(m.scene_name, kMaxSceneName) && IsName(m.session_id, kMaxSessionId);

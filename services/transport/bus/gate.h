@@ -1,5 +1,5 @@
-// The gate: what a message must satisfy before a node may see it. Every backend applies it on the reading side, so a
-// message with a NaN, a count beyond its array or an unknown enumerator is dropped and counted, never used.
+// The gate: conditions that a message must satisfy before a node receives it. Every backend applies it on the reading
+// side, so a message with a NaN, a count beyond its array or an unknown enumerator is dropped and counted, never used.
 #pragma once
 
 #include "services/base/core/messages.h"
@@ -26,7 +26,8 @@ inline constexpr float kMaxPower_W = 1000.0f;
 /// Room for rounding in unit normals, unit quaternions and barycentric sums held in single precision.
 inline constexpr float kUnitTolerance = 1e-2f;
 
-/// Thermal names most: eight contacts, and for each two HandleStates and a GeneratorSetting; a TearState.
+/// Largest number of inputs in a TickManifest. thermal_node has the most: eight contacts, for each two HandleStates and
+/// a GeneratorSetting; a TearState.
 inline constexpr std::size_t kMaxConsumedInputs = 33;
 inline constexpr std::size_t kMaxInputHealths = 16;
 inline constexpr std::size_t kMaxMetrics = 24;
@@ -35,11 +36,11 @@ inline constexpr std::size_t kMaxSceneName = 63;
 inline constexpr std::size_t kMaxSessionId = 63;
 inline constexpr std::size_t kMaxVerb = 31;
 inline constexpr std::size_t kMaxArgument = 1023;
-/// Texts for people (Health.last_error, CommandReply.text) are cut to these lengths when sent, not refused.
+/// Texts for people (Health.last_error, CommandReply.text) are cut to these lengths when sent, not refused [B].
 inline constexpr std::size_t kMaxErrorText = 255;
 inline constexpr std::size_t kMaxReplyText = 1023;
 
-// Of each message; a message without one does not link.
+// Defined for each message; a message without a definition does not link.
 #define FULCRUM_GATE(T) [[nodiscard]] bool PassesGate(const T& m) noexcept;
 FULCRUM_MESSAGES(FULCRUM_GATE)
 #undef FULCRUM_GATE

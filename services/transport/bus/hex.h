@@ -8,7 +8,7 @@
 
 namespace fulcrum::bus {
 
-/// Sixteen digits.
+/// The number as sixteen digits.
 [[nodiscard]] inline std::string Hex(std::uint64_t value) {
   std::array<char, 17> text{};
   std::snprintf(text.data(), text.size(), "%016llx", static_cast<unsigned long long>(value));

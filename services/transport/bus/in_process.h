@@ -1,5 +1,5 @@
-// In-process backend of the ports, for tests and for programs that hold several nodes. It behaves as the bus does:
-// same gate, same counters, same service to late joiners, and a live sample is copied, never shared.
+// In-process backend of the ports, for tests and for programs that contain several nodes. It behaves as the bus does:
+// same gate, same counters, same history for late joiners; a sample is copied, never shared.
 //
 //   bus::InProcessTopic<ToolState> topic;
 //   auto out = topic.MakeOutput();
@@ -30,7 +30,7 @@ class Ring {
   [[nodiscard]] bool full() const { return size_ == slots_.size(); }
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] T& At(std::size_t i) { return slots_[(first_ + i) % slots_.size()]; }
-  /// Copies in; the oldest makes room.
+  /// Copies the sample in; a full ring drops its oldest sample.
   void Push(const T& sample) {
     if (full()) Pop();
     At(size_) = sample;
@@ -46,12 +46,12 @@ class Ring {
   std::size_t first_ = 0, size_ = 0;
 };
 
-/// What the ports of one topic share; lives until the last of them goes.
+/// State shared by the ports of one topic; exists until the last of them is destroyed.
 template <class T>
 struct Hub {
   std::mutex mutex;
   std::vector<Ring<T>*> inputs;   ///< Unread samples of each live input.
-  std::vector<Ring<T>*> history;  ///< Of each live output, for late joiners.
+  std::vector<Ring<T>*> history;  ///< Newest samples of each live output, for late joiners.
 };
 
 template <class T>
@@ -164,7 +164,7 @@ inline TissueFrame::View MakeView(TissueFrame* frame) {
   frame->xyz.resize(std::size_t{3} * kMaxTissueVertices);
   return {frame->header, frame->xyz};
 }
-/// Cuts the payload to what the header says. False when it says more than there is.
+/// Cuts the payload to the counts of the header. False if the counts exceed the payload.
 inline bool Close(TissueFrame* frame) {
   if (frame->header.vertex_count > kMaxTissueVertices) return false;
   frame->xyz.resize(std::size_t{3} * frame->header.vertex_count);
@@ -177,7 +177,7 @@ inline TemperaturePatch::View MakeView(TemperaturePatch* patch) {
 }
 inline bool Close(TemperaturePatch*) { return true; }
 
-/// For the large topics; T must have a View.
+/// Output of the large topics; T must have a View.
 template <class T>
 class HubLoanOutput final : public HubOutput<T> {
  public:
@@ -201,7 +201,7 @@ class HubLoanOutput final : public HubOutput<T> {
 template <class T>
 class InProcessTopic {
  public:
-  /// `depth`: unread samples kept; 0 takes the reader depth of the topic's role.
+  /// @param depth unread samples kept; 0: the reader depth of the topic's role.
   [[nodiscard]] std::unique_ptr<Input<T>> MakeInput(std::size_t depth = 0) {
     return std::make_unique<in_process::HubInput<T>>(
         hub_, depth != 0 ? depth : static_cast<std::size_t>(kQualityOf<T>.reader_depth));

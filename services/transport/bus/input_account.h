@@ -1,5 +1,5 @@
-// The books of one input: what came, what was refused at the gate, what is missing. Shared by all backends, so that a
-// test in one process counts exactly as the cart does.
+// Counters of one input: received, refused and missing samples. Shared by all backends, so that a test in one process
+// counts exactly as the cart does.
 #pragma once
 
 #include <array>
@@ -12,14 +12,16 @@
 
 namespace fulcrum::bus {
 
-/// Written by the reading thread, read by any (the health thread asks for stats).
+/// Written by the reading thread, readable from any thread (the health thread reads the stats).
 class InputAccount {
  public:
-  /// @param one_owner of two epochs only the later one is taken from.
+  /// @param one_owner of several epochs only the latest is accepted.
   explicit InputAccount(bool gap_is_loss, bool one_owner = false) : gap_is_loss_(gap_is_loss), one_owner_(one_owner) {}
 
-  /// Of the owner, as far as is known: not of a process that another one has replaced. Reading thread only.
-  /// @param now_ns an epoch after it is no process's: one such sample would shut out all that come after it [ns].
+  /// Whether the sample is of the present owner, as far as is known, and not of a process that has been replaced.
+  /// Reading thread only.
+  /// @param now_ns present time; an epoch later than this belongs to no process and is refused, because one such sample
+  /// would shut out all later ones [ns].
   [[nodiscard]] bool IsOfOwner(const Stamp& stamp,
                                std::int64_t now_ns = std::numeric_limits<std::int64_t>::max()) noexcept {
     if (!one_owner_) return true;
@@ -28,7 +30,7 @@ class InputAccount {
     return true;
   }
 
-  /// A sample that passed the gate.
+  /// Counts a sample that passed the gate.
   void Accept(const Stamp& stamp) noexcept {
     received_.fetch_add(1, std::memory_order_relaxed);
     Follow(stamp);
@@ -36,16 +38,16 @@ class InputAccount {
     newest_stamp_ns_.store(stamp.stamp_ns, std::memory_order_relaxed);
   }
 
-  /// A sample that did not.
+  /// Counts a sample that did not pass the gate.
   void Reject() noexcept { rejected_.fetch_add(1, std::memory_order_relaxed); }
 
-  /// A sample that passed nothing but whose place in the sequence is known: refused, yet not lost.
+  /// Counts a refused sample whose place in the sequence is known: it is rejected, but not lost.
   void Reject(const Stamp& stamp) noexcept {
     Reject();
-    if (stamp.sequence != 0) Follow(stamp);  // 0: bytes that were no message.
+    if (stamp.sequence != 0) Follow(stamp);  // 0: the bytes could not be decoded.
   }
 
-  /// A sample put aside unread because a newer one was wanted.
+  /// Counts a sample that was skipped because a newer one was requested.
   void Supersede(const Stamp& stamp) noexcept {
     received_.fetch_add(1, std::memory_order_relaxed);
     Follow(stamp);
@@ -62,8 +64,8 @@ class InputAccount {
   }
 
  private:
-  /// Counts the gap to the previous sample of the same epoch. A new epoch is a restarted or another writer: what it
-  /// sent before this reader came is not a loss.
+  /// Counts the gap to the previous sample of the same epoch. A new epoch is a restarted or another writer: the samples
+  /// that it sent before this reader existed are not losses.
   void Follow(const Stamp& stamp) noexcept {
     Writer* writer = nullptr;
     for (Writer& w : writers_) {
@@ -88,9 +90,9 @@ class InputAccount {
 
   const bool gap_is_loss_, one_owner_;
   std::uint64_t owner_epoch_ = 0;
-  std::array<Writer, 16> writers_{};  ///< More than the nodes of a cart; the oldest entry makes room.
+  std::array<Writer, 16> writers_{};  ///< More entries than a cart has nodes; a new writer replaces the oldest entry.
   std::size_t next_victim_ = 0;
-  // Relaxed: each counter stands for itself and nothing is published through it.
+  // Relaxed: each counter is independent and publishes no other data.
   std::atomic<std::uint64_t> received_{0};
   std::atomic<std::uint64_t> lost_{0};
   std::atomic<std::uint64_t> rejected_{0};

@@ -1,4 +1,4 @@
-// What a recorder sees of the bus: the samples of a topic as they travel, undecoded and ungated.
+// The recorder's input: samples of a topic as they were sent, neither decoded nor checked by the gate.
 #pragma once
 
 #include <array>
@@ -12,15 +12,15 @@
 
 namespace fulcrum::bus {
 
-/// One writer of a topic: unlike any other, and unlike itself after a restart.
+/// Identity of one writer of a topic; a restarted writer has another one.
 using WriterGuid = std::array<std::uint8_t, 16>;
 
 struct RawSample {
   TopicId topic = TopicId::kHealth;
   WriterGuid writer{};
   std::uint64_t sequence = 0;  ///< Of this writer, from 1, without gaps.
-  std::int64_t source_ns = 0;  ///< CLOCK_REALTIME when it was written, as that clock stood then [ns].
-  /// CLOCK_MONOTONIC of this machine when it was written [ns]. When it arrived, if the wall clock was set on its way.
+  std::int64_t source_ns = 0;  ///< CLOCK_REALTIME when it was written, as that clock was set then [ns].
+  /// CLOCK_MONOTONIC of this machine when it was written [ns]. If the wall clock was set in between, time of arrival.
   std::int64_t written_ns = 0;
   /// CDR with its 4-byte encapsulation: `head`, then `body`.
   std::span<const std::byte> head, body;
@@ -31,16 +31,17 @@ inline constexpr const char* kReadsMetric = "reads_";
 
 /// The process behind a writer.
 struct Peer {
-  std::string name;  ///< DdsSettings.node_name; empty: not heard of.
+  std::string name;  ///< DdsSettings.node_name; empty: not discovered.
   int pid = 0;
 };
 
-/// Takes samples over; called on threads of the bus, must be short and must not throw. A sample of a large topic lies
-/// in memory that its writer takes back some time: after it has been copied, `is_whole` says whether that was in time.
+/// Receives samples; called on threads of the bus, must be short and must not throw. The memory of a sample of a large
+/// topic is reused by its writer after some time: `is_whole`, called after copying, returns whether the copy was
+/// complete before.
 using RawSink = std::function<void(const RawSample& sample, const std::function<bool()>& is_whole)>;
 
-/// Receives one topic from its making to its end. Where the participant lets them gather, small samples come up to 8 ms
-/// late, many at a time.
+/// Receives one topic from its construction to its destruction. Where the participant has `gathers` set, small samples
+/// arrive up to 8 ms late, many at a time.
 class RawInput {
  public:
   virtual ~RawInput() = default;

@@ -1,5 +1,5 @@
-// The one place with all topic names and the roles that decide their quality of service. Depths are named by meaning:
-// what a reader that looks at its slowest rate must still find, and what a late joiner must be given.
+// All topic names, and the roles that determine their quality of service. Depths are named by their purpose: how many
+// samples the slowest reader must find between two reads, and how many a late joiner receives.
 #pragma once
 
 #include <array>
@@ -21,14 +21,14 @@ enum class Path : std::uint8_t {
 enum class Delivery : std::uint8_t {
   kBestEffort,
   kReliable,
-  kReliableKeepAll,  ///< No sample may be replaced by a newer one; a writer without room fails instead.
+  kReliableKeepAll,  ///< No sample may be replaced by a newer one; a write without room fails instead.
 };
 
-/// What is asked of the way of a topic.
+/// Quality of service of a topic.
 struct Quality {
   Path path = Path::kLoopback;
   Delivery delivery = Delivery::kBestEffort;
-  /// A late joiner is given the newest `writer_depth` samples of each live writer.
+  /// A late joiner receives the newest `writer_depth` samples of each live writer.
   bool late_joiners_served = false;
   /// A gap in the sequence is a loss. False where the ring is overwritten on purpose because only the newest counts.
   bool gap_is_loss = true;
@@ -40,21 +40,21 @@ struct TopicRole {
   TopicId id;
   const char* name;
   Quality quality;
-  /// One process at a time sends it: once a later epoch has been heard, what an earlier one still sends is refused.
+  /// One process at a time publishes the topic: once a later epoch was received, samples of earlier ones are refused.
   [[nodiscard]] constexpr bool one_owner() const {
     return id != TopicId::kCommand && id != TopicId::kCommandReply && id != TopicId::kTickManifest &&
            id != TopicId::kHealth;
   }
 };
 
-// Reader depths cover the slowest reader of a topic between two looks: a software frame on a loaded machine takes up to
-// a second, 1000 ToolStates of 168 bytes, so a gap means a real loss and not a slow reader. Topics with several writers
-// have no keys (keys rule out data-sharing and cost a lookup): their readers are deep enough for the burst of all
-// writers at once.
+// Reader depths cover the slowest reader of a topic between two reads: a software frame on a loaded machine takes up to
+// a second, which is 1000 ToolStates of 168 bytes. A gap therefore means a real loss and not a slow reader. Topics with
+// several writers have no keys (keys rule out data-sharing and cost a lookup): their readers are deep enough for
+// simultaneous bursts of all writers.
 inline constexpr int kLatestOnly = 1;
 inline constexpr int kStreamAtSlowestReader = 1024;
 inline constexpr int kFrameRing = 4;
-/// What a reader that was started again has missed: more than half a second of a stream of 100 Hz.
+/// Samples that a restarted reader has missed: more than half a second of a stream of 100 Hz.
 inline constexpr int kOutage = 64;
 /// Each patch belongs to one slot of the atlas, so a renderer at 15 Hz needs every one of the 60 Hz stream.
 inline constexpr int kPatchRing = 16;
@@ -62,7 +62,7 @@ inline constexpr int kEventBurst = 512;
 inline constexpr int kAllWriters = 64;
 inline constexpr int kCommandBacklog = 256;
 
-/// By message type; a message without one does not compile.
+/// Role of the topic of a message type; a type without a role does not compile.
 template <class T>
 extern const Quality kQualityOf;
 template <>
@@ -133,7 +133,7 @@ inline constexpr Quality kQualityOf<GeneratorSetting>{.delivery = Delivery::kRel
                                                       .writer_depth = kLatestOnly,
                                                       .reader_depth = kOutage};
 
-/// Message type to topic.
+/// Topic of a message type.
 template <class T>
 struct TopicOf;
 #define FULCRUM_TOPIC_OF(T)                      \
@@ -157,7 +157,7 @@ template <class T>
 }
 [[nodiscard]] constexpr const Quality& QualityOf(TopicId id) { return RoleOf(id).quality; }
 
-/// Calls `f(std::type_identity<T>())` with the message type of a topic that is only known at run time.
+/// Calls `f(std::type_identity<T>())` with the message type of a topic that is known at run time only.
 template <class F>
 decltype(auto) WithMessageOf(TopicId id, F&& f) {
 #define FULCRUM_CASE(T) \
@@ -165,16 +165,16 @@ decltype(auto) WithMessageOf(TopicId id, F&& f) {
     return f(std::type_identity<T>());
   switch (id) { FULCRUM_MESSAGES(FULCRUM_CASE) }
 #undef FULCRUM_CASE
-  std::abort();  // No such id: what comes from outside passes the gate or RoleNamed first.
+  std::abort();  // No such id: ids from outside have passed the gate or RoleNamed before.
 }
 
-/// The role of the topic of that name on the bus, as "fulcrum/ToolState"; null: not one of ours.
+/// Role of the topic with this name on the bus, such as "fulcrum/ToolState"; nullptr: no topic of this project.
 [[nodiscard]] const TopicRole* RoleNamed(std::string_view name);
 
-/// "ToolState": the topic's name for people.
+/// The topic's name for people, such as "ToolState".
 [[nodiscard]] std::string_view TopicLabel(TopicId id);
 
-/// The stamp of a message, wherever T keeps it.
+/// The stamp of a message, wherever T stores it.
 template <class T>
 [[nodiscard]] const Stamp& StampOf(const T& message) {
   if constexpr (requires { message.header.stamp; }) {

@@ -15,8 +15,8 @@ struct Identity {
   std::string key;          ///< PEM, private.
 };
 
-/// Certificate authority with elliptic keys (P-256). Its private key exists in memory only, so nothing can be issued
-/// later.
+/// Certificate authority with elliptic keys (P-256). Its private key is kept in this object
+/// only.
 class Authority {
  public:
   /// The authority has a random name, so that two authorities differ by name.

@@ -24,7 +24,7 @@ bool DecodeCdr(std::span<const std::uint8_t> bytes, T* message) {
     return bytes.size() >= kEncapsulation + sizeof(Wire) &&
            FromLoan(reinterpret_cast<const std::byte*>(bytes.data() + kEncapsulation), message);
   } else {
-    // The library reads only, but asks for a pointer that it could write through.
+    // The library only reads, but takes a non-const pointer.
     FastBuffer buffer(reinterpret_cast<char*>(const_cast<std::uint8_t*>(bytes.data())), bytes.size());
     Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
     try {

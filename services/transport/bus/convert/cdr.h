@@ -1,4 +1,4 @@
-// Messages as the bytes that travel: CDR with its four bytes of encapsulation, as a recording holds them.
+// Messages as the bytes that are sent: CDR with its encapsulation of four bytes, as stored in a recording.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,12 @@
 
 namespace fulcrum::bus {
 
-/// False when the bytes are not such a message: too short, or a list longer than its type holds. Content is not
-/// judged: see PassesGate. `message` keeps its buffers.
+/// Decodes a message. False if the bytes are no such message: too short, or a list longer than its type allows. The
+/// content is not checked: see PassesGate. `message` keeps its buffers.
 template <class T>
 [[nodiscard]] bool DecodeCdr(std::span<const std::uint8_t> bytes, T* message);
 
-/// False when the message does not fit its type.
+/// Encodes a message. False if it does not fit its type.
 template <class T>
 [[nodiscard]] bool EncodeCdr(const T& message, std::vector<std::uint8_t>* bytes);
 

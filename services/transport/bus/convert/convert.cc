@@ -22,14 +22,14 @@ static_assert(idl::HEALTH_STOPPING == static_cast<int>(HealthState::kStopping));
 static_assert(idl::MAX_CONSUMED == kMaxConsumedInputs && idl::MAX_INPUT_HEALTHS == kMaxInputHealths &&
               idl::MAX_METRICS == kMaxMetrics);
 
-/// Bytes of a text that fit, up to a character boundary of UTF-8.
+/// Largest number of bytes of a text that fits, up to a character boundary of UTF-8.
 std::size_t FittingLength(const std::string& text, std::size_t most) {
   if (text.size() <= most) return text.size();
   while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xc0u) == 0x80u) --most;
   return most;
 }
 
-/// The text for people that is cut to what fits; most messages have none.
+/// The text for people that is cut if it is too long; most messages have none.
 template <class T>
 struct CutText {
   static constexpr std::size_t most = 0;

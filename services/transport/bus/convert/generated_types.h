@@ -1,4 +1,4 @@
-// Which generated type carries a message. Seen by services/transport/bus/convert and services/transport/bus/dds only.
+// The generated type of each message. Included by services/transport/bus/convert and services/transport/bus/dds only.
 #pragma once
 
 #include "cauteryPubSubTypes.h"
@@ -29,7 +29,7 @@ FULCRUM_MESSAGES(FULCRUM_TYPE_SUPPORT)
 template <class T>
 using WireOf = typename TypeSupportOf<T>::type::type;
 
-/// Travels by loan, as its memory: of a plain type that is its CDR, too.
+/// Whether T is sent as a loan, as its memory: for a plain type that is its CDR, too.
 template <class T>
 concept Loanable = requires {
   typename T::View;

@@ -1,4 +1,4 @@
-// TissueFrame and TemperaturePatch in their loans.
+// Conversion of TissueFrame and TemperaturePatch in loans.
 #include <algorithm>
 #include <cstring>
 
@@ -11,7 +11,7 @@ static_assert(idl::MAX_TISSUE_VERTICES == kMaxTissueVertices && idl::MAX_TISSUE_
 static_assert(idl::PATCH_TEXELS == kPatchTexels && idl::ATLAS_TEXELS == kAtlasTexels);
 static_assert(idl::PATCH_BYTES == 4 * kPatchTexels * kPatchTexels);
 
-// A plain type is its header followed by its payload, without padding: so the payload begins at sizeof(header).
+// A plain type is its header followed by its payload, without padding, so the payload begins at sizeof(header).
 static_assert(sizeof(idl::TissueFrame) == sizeof(idl::TissueFrameHeader) + idl::MAX_TISSUE_FLOATS * sizeof(float));
 static_assert(sizeof(idl::TemperaturePatch) == sizeof(idl::TemperaturePatchHeader) + idl::PATCH_BYTES);
 

@@ -1,4 +1,4 @@
-// A value to its wire type and back, by its type; of a struct field by field. Internal to
+// Conversion of a value to its wire type and back, selected by its type; of a struct field by field. Internal to
 // services/transport/bus/convert.
 #pragma once
 
@@ -15,7 +15,7 @@
 
 namespace fulcrum::bus::convert {
 
-/// The longest that a list may be, by member: the wire types do not tell. A list without one does not compile.
+/// Longest length of a list, by member: the wire types do not provide it. A list without a length does not compile.
 template <auto member>
 inline constexpr std::size_t kMost = 0;
 template <>
@@ -40,7 +40,7 @@ inline constexpr bool kIsList = false;
 template <class T>
 inline constexpr bool kIsList<std::vector<T>> = true;
 
-/// False when a list or a name does not fit.
+/// False if a list or a name does not fit.
 #define FULCRUM_DECLARE(T)                           \
   [[nodiscard]] bool Put(const T& from, idl::T* to); \
   void Get(const idl::T& from, T* to);
@@ -88,7 +88,7 @@ inline void Get(const std::array<float, 4>& from, Quatf* to) { *to = {from[0], f
 template <std::size_t size>
 bool Put(const std::string& from, eprosima::fastrtps::fixed_string<size>* to) {
   if (from.size() > size) return false;
-  *to = from;  // assign() would leave the end of a longer text that stood there.
+  *to = from;  // assign() would keep the end of a longer previous text.
   return true;
 }
 template <std::size_t size>
@@ -96,7 +96,7 @@ void Get(const eprosima::fastrtps::fixed_string<size>& from, std::string* to) {
   to->assign(from.c_str(), from.size());
 }
 
-/// Elements of an array or a list, of equal number.
+/// Converts the elements of an array or a list of equal length.
 template <class From, class To>
 bool PutEach(const From& from, To* to) {
   return std::equal(from.begin(), from.end(), to->begin(), [](const auto& a, auto& b) { return Put(a, &b); });
@@ -139,7 +139,7 @@ void Get(const std::vector<Wire>& from, std::vector<T>* to) {
 template <auto member, class T, class Wire>
 bool PutField(const T& from, Wire* to) {
   if constexpr (kIsList<T>) {
-    static_assert(kMost<member> > 0, "a list without a longest length");
+    static_assert(kMost<member> > 0, "a list without a maximum length");
     if (from.size() > kMost<member>) return false;
   }
   return Put(from, to);

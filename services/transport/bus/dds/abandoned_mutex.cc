@@ -14,9 +14,9 @@
 namespace fulcrum::bus::dds {
 namespace {
 
-constexpr std::int64_t kLook_ns = 5'000'000;  // How often the owner is looked at.
-// Between taking or leaving a mutex and saying so lie a few instructions. Whoever died in them is nobody by name;
-// whoever stands still in them for so long is taken for dead.
+constexpr std::int64_t kLook_ns = 5'000'000;  // Interval at which the owner is checked.
+// A few instructions separate the lock of a mutex from the entry of its owner, and vice versa. A thread that was killed
+// between them leaves no owner; one that stays there for this long is taken for dead.
 constexpr std::int64_t kNobody_ns = kSecond_ns;
 // glibc's mark of a mutex that several processes share, in __kind (nptl: PTHREAD_MUTEX_PSHARED_BIT).
 constexpr int kShared = 128;
@@ -32,10 +32,10 @@ std::int64_t NowNs(clockid_t clock) {
 
 timespec TimeOf(std::int64_t ns) { return {ns / kSecond_ns, ns % kSecond_ns}; }
 
-/// Of a thread of any process: kill(2) finds threads as well.
+/// @param owner a thread of any process: kill(2) finds threads as well.
 bool IsDead(int owner) { return owner > 0 && kill(owner, 0) != 0 && errno == ESRCH; }
 
-/// The mutex stays locked meanwhile; of several that wait one becomes its owner.
+/// The mutex stays locked; of several waiting threads one becomes its owner.
 bool Inherit(pthread_mutex_t* mutex, int dead) {
   std::atomic_ref<int> owner(mutex->__data.__owner);
   if (!owner.compare_exchange_strong(dead, gettid())) return false;

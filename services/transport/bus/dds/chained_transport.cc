@@ -16,15 +16,14 @@ namespace {
 namespace transport = eprosima::fastdds::rtps;
 namespace rtps = eprosima::fastrtps::rtps;
 
-/// RTPS 2.2, 9.6.1.1, with the default port parameters: the well-known ports of discovery are even (7400 + 250 domain
-/// + 0 by multicast, + 10 + 2 participant by unicast), those of user data odd.
+/// Whether the port is one of discovery. RTPS 2.2, 9.6.1.1, with the default port parameters: the well-known ports of
+/// discovery are even (7400 + 250 domain + 0 by multicast, + 10 + 2 participant by unicast), those of user data odd.
 bool IsDiscovery(const rtps::Locator_t& local) { return local.port % 2 == 0; }
 
-/// How long small samples gather in a socket. The smallest buffer that we meet (Debian's default) holds thirty times as
-/// much.
+/// How long small samples gather in a socket. The smallest buffer in use (Debian's default) holds thirty times as much.
 constexpr std::chrono::milliseconds kRest(8);
 
-/// Sends what it is given, to where it is told.
+/// Sends every datagram unchanged to its destination.
 class ChainedTransport : public transport::ChainingTransport {
  public:
   explicit ChainedTransport(const transport::ChainingTransportDescriptor& descriptor)

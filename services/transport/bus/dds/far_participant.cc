@@ -40,23 +40,23 @@ namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
-// A cable that is put back within the lease finds everything as it was. services/transport/link makes a new participant
+// A cable that is reconnected within the lease needs no new connection. services/transport/link makes a new participant
 // after a longer silence, so a longer lease would only keep dead ones.
 const Duration_t kFarLease{5, 0};
 const Duration_t kFarAnnouncement{0, 200 * kMilli_ns};
 const Duration_t kFarMaxBlocking{0, 5 * kMilli_ns};
-// The library's 3 s would be the price of each last packet that is lost.
+// With the library's period of 3 s, the loss of a last packet would be detected only after that time.
 const Duration_t kHeartbeat{0, 20 * kMilli_ns};
 const Duration_t kResponse{0, 1 * kMilli_ns};
 constexpr std::uint32_t kFarSocketBuffer_B = 4u << 20;
-/// The payload of UDP in an Ethernet frame: a lost frame then costs one fragment and not a datagram of forty.
+/// Payload of UDP in an Ethernet frame: a lost frame then costs one fragment and not a datagram of forty frames.
 constexpr std::uint32_t kLargestDatagram_B = 1472;
 /// A handshake carries certificate and signed permissions in one message, which the library cannot divide.
 constexpr std::uint32_t kLargestSecuredDatagram_B = 16 * 1024;
 constexpr int kStreamBurst = 1024;  ///< Packets that may wait for the reader.
 constexpr std::uint32_t kEncapsulation_B = 4, kMostPadding_B = 3;
 
-/// A packet on its way into the library.
+/// A packet that is being written.
 struct Packet {
   std::span<const std::uint8_t> bytes;
 };
@@ -66,7 +66,7 @@ std::uint32_t SizeOf(std::span<const std::uint8_t> bytes) {
   return kEncapsulation_B + static_cast<std::uint32_t>(bytes.size()) + PaddingOf(bytes);
 }
 
-/// Bytes as they are. Written from a Packet, read into a vector.
+/// Type of plain bytes, written from a Packet and read into a vector.
 class PacketType final : public fast::TopicDataType {
  public:
   PacketType(const char* name, std::uint32_t largest_B) {
@@ -78,8 +78,8 @@ class PacketType final : public fast::TopicDataType {
   }
   bool serialize(void* data, rtps::SerializedPayload_t* payload) override {
     const std::span<const std::uint8_t> bytes = static_cast<const Packet*>(data)->bytes;
-    // RTPS fills a sample up to a multiple of four, but not one in fragments: so we do, and by how much stands in the
-    // options (as in XTypes 1.2, 7.6.2.1.2).
+    // RTPS pads a sample to a multiple of four bytes, but not a sample in fragments. Therefore it is padded here, and
+    // the number of bytes is stored in the options (as in XTypes 1.2, 7.6.2.1.2).
     const std::uint32_t padding = PaddingOf(bytes);
     if (payload->max_size < SizeOf(bytes)) return false;
     const std::array<std::uint8_t, kEncapsulation_B> head{0, 1, 0, static_cast<std::uint8_t>(padding)};
@@ -116,7 +116,7 @@ constexpr const char* kCartEnd = "link of the cart";
 constexpr const char* kHostEnd = "link of the other host";
 const char* NameOf(FarSide side) { return side == FarSide::kCart ? kCartEnd : kHostEnd; }
 
-/// Between hosts there is no security without encryption.
+/// Between hosts security always includes encryption.
 Security SecurityOf(const FarSettings& settings) {
   return {settings.keys, std::string(kLinkIdentity), !settings.keys.empty()};
 }
@@ -135,8 +135,8 @@ fast::DomainParticipantQos QosOf(const FarSettings& settings) {
   qos.transport().user_transports.push_back(udp);
   qos.wire_protocol().builtin.discovery_config.leaseDuration = kFarLease;
   qos.wire_protocol().builtin.discovery_config.leaseDuration_announcementperiod = kFarAnnouncement;
-  // Known to the peer beforehand, so that it looks at one port only. Not automatic: those grow with each participant of
-  // a process, also with one that is made again, and begin at 0.
+  // Fixed, so that the peer knows them and announces itself to one port only. Automatic ids grow with each participant
+  // of a process, also with one that is made again, and begin at 0.
   constexpr int kCartId = 100, kHostId = 101;
   const bool cart = settings.side == FarSide::kCart;
   qos.wire_protocol().participant_id = cart ? kCartId : kHostId;
@@ -166,7 +166,7 @@ void ApplyLane(FarLane lane, int depth, Qos* qos) {
   qos->data_sharing().off();
 }
 
-/// One lane, both ways. The two sides write topics of their own, so that nobody hears himself.
+/// One lane, both ways. Each side writes topics of its own, so that no side receives its own packets.
 class Lane final : private fast::DataReaderListener, private fast::DataWriterListener {
  public:
   Lane(FarLane lane, FarSide side, fast::DomainParticipant* participant, fast::Publisher* publisher,
@@ -199,7 +199,7 @@ class Lane final : private fast::DataReaderListener, private fast::DataWriterLis
     if (writer_ == nullptr || reader_ == nullptr) throw InputError("cannot make the ports of the link");
   }
   ~Lane() override {
-    // Nothing is called any more from here on.
+    // The listeners are not called from here on.
     if (writer_ != nullptr) writer_->set_listener(nullptr);
     if (reader_ != nullptr) reader_->set_listener(nullptr);
     if (writer_ != nullptr) publisher_->delete_datawriter(writer_);
@@ -218,7 +218,7 @@ class Lane final : private fast::DataReaderListener, private fast::DataWriterLis
     }
   }
   [[nodiscard]] bool matched() const noexcept {
-    return readers_.load(std::memory_order_relaxed) > 0;  // Stands for itself, orders nothing.
+    return readers_.load(std::memory_order_relaxed) > 0;  // Relaxed: an independent value that orders nothing.
   }
 
  private:
@@ -232,7 +232,7 @@ class Lane final : private fast::DataReaderListener, private fast::DataWriterLis
         if (info.valid_data) sink_(lane_, received_);
       }
     } catch (...) {
-      // As good as lost.
+      // The packet counts as lost.
     }
   }
 
@@ -306,7 +306,7 @@ std::string ResolveAddress(const std::string& name) {
   addrinfo* found = nullptr;
   const int error = getaddrinfo(name.c_str(), nullptr, &hints, &found);
   if (error != 0) {
-    throw InputError("\"" + name + "\": no IPv4 address: " + gai_strerror(error) +
+    throw InputError("\"" + name + "\": has no IPv4 address: " + gai_strerror(error) +
                      "; valid: an address as in 192.168.1.20, or the name of a host");
   }
   std::array<char, INET_ADDRSTRLEN> text{};
@@ -318,7 +318,7 @@ std::string ResolveAddress(const std::string& name) {
 std::string AddressTowards(const std::string& peer) {
   sockaddr_in to{};
   to.sin_family = AF_INET;
-  to.sin_port = htons(9);  // Nothing is sent.
+  to.sin_port = htons(9);  // Any port: nothing is sent.
   inet_pton(AF_INET, peer.c_str(), &to.sin_addr);
   sockaddr_in from{};
   socklen_t length = sizeof from;
@@ -328,8 +328,8 @@ std::string AddressTowards(const std::string& peer) {
   const int why = errno;
   if (fd >= 0) close(fd);
   if (!found) {
-    throw InputError(peer + ": no way leads there: " + std::strerror(why) +
-                     "; is the cable in, and has this machine an address in that network?");
+    throw InputError(peer + ": no route to this address: " + std::strerror(why) +
+                     "; is the cable connected, and does this machine have an address in that network?");
   }
   std::array<char, INET_ADDRSTRLEN> text{};
   inet_ntop(AF_INET, &from.sin_addr, text.data(), text.size());

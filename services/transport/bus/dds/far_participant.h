@@ -1,5 +1,5 @@
-// The bus between two hosts: packets of bytes over UDP to one other participant, whose address is known. Used by
-// services/transport/link alone; all nodes stay on their own host's bus. No DDS type is visible here.
+// The bus between two hosts: packets of bytes over UDP to one other participant with a known address. Used by
+// services/transport/link only; all nodes stay on their own host's bus. No DDS type is visible here.
 #pragma once
 
 #include <cstddef>
@@ -14,27 +14,29 @@
 namespace fulcrum::bus {
 
 enum class FarSide : std::uint8_t {
-  kCart,  ///< Where the session is.
-  kHost,  ///< Where some of its nodes run.
+  kCart,  ///< The host of the session.
+  kHost,  ///< The host of some of its nodes.
 };
 
 enum class FarLane : std::uint8_t {
-  kStream,   ///< Best effort: what is lost is lost, nothing waits for it. At most kStreamPacket_B.
-  kOrdered,  ///< Reliable and in order while both are connected; the newest kOrderedBacklog wait for a slow way.
+  kStream,  ///< Best effort: a lost packet is not repeated and delays no other. At most kStreamPacket_B.
+  /// Reliable and in order while both are connected; the newest kOrderedBacklog packets wait for a slow connection.
+  kOrdered,
 };
 inline constexpr std::size_t kStreamPacket_B = 1300;  ///< One Ethernet frame, encrypted or not.
 inline constexpr std::size_t kOrderedPacket_B = 128 * 1024;
 inline constexpr int kOrderedBacklog = 256;
 
 struct FarSettings {
-  int domain = 107;     ///< 101 … 200: apart from all carts' own.
-  std::string address;  ///< IPv4 of the interface that leads to the other host: no other is used.
+  int domain = 107;     ///< 101 to 200: separate from the domains of all carts.
+  std::string address;  ///< IPv4 of the interface with the route to the other host: no other is used.
   std::string peer;     ///< IPv4 of the other host.
   FarSide side = FarSide::kCart;
-  std::filesystem::path keys = {};  ///< Of `fulcrum keys init`: only who has such keys is heard, and nobody overhears.
+  /// Folder of `fulcrum keys init`: packets are then encrypted, and only participants with such keys are accepted.
+  std::filesystem::path keys = {};
 };
 
-/// Takes a packet; called on threads of the bus, one at a time for each lane; must not throw.
+/// Receives a packet; called on threads of the bus, one at a time for each lane; must not throw.
 using FarSink = std::function<void(FarLane lane, std::span<const std::uint8_t> packet)>;
 
 class FarParticipant {
@@ -45,13 +47,13 @@ class FarParticipant {
   FarParticipant(const FarParticipant&) = delete;
   FarParticipant& operator=(const FarParticipant&) = delete;
 
-  /// False when it was not sent: too long, no room, or nobody there.
+  /// False if it was not sent: too long, no room, or no peer.
   bool Send(FarLane lane, std::span<const std::uint8_t> packet) noexcept;
-  /// The other side is there, as far as is known.
+  /// Whether the other side has been discovered and has not left.
   [[nodiscard]] bool matched() const noexcept;
-  /// The host's side: empty, or one line why the cart will never speak with it.
+  /// Host only: one line with the reason why the cart will never accept this side; otherwise empty.
   [[nodiscard]] std::string mismatch();
-  /// Who was refused since the start of this object.
+  /// Participants that were refused since the construction of this object.
   [[nodiscard]] Refusals refusals();
 
  private:
@@ -59,9 +61,9 @@ class FarParticipant {
   std::unique_ptr<Impl> impl_;
 };
 
-/// IPv4 of `name` (dotted or of a host). Throws InputError.
+/// IPv4 address of `name` (dotted or a host name). Throws InputError.
 [[nodiscard]] std::string ResolveAddress(const std::string& name);
-/// IPv4 of ours that a packet to `peer` leaves from. Throws InputError when no way leads there.
+/// IPv4 address of this machine from which a packet to `peer` is sent. Throws InputError if there is no route.
 [[nodiscard]] std::string AddressTowards(const std::string& peer);
 
 }  // namespace fulcrum::bus

@@ -1,17 +1,18 @@
-// What holds for the whole library in a process, before its first participant.
+// Settings of the library for the whole process, made before its first participant.
 #pragma once
 
 #include <cstdint>
 
 namespace fulcrum::bus {
 
-inline constexpr std::uint32_t kMilli_ns = 1'000'000;  ///< Of the library's Duration_t.
+inline constexpr std::uint32_t kMilli_ns = 1'000'000;  ///< Nanoseconds per millisecond, for the library's Duration_t.
 
 }  // namespace fulcrum::bus
 
 namespace fulcrum::bus::dds {
 
-/// Disregards settings from outside, which would silently replace the ones that were measured, and sets ours.
+/// Disregards settings from the environment and from profile files, which would silently replace ours, and applies
+/// ours.
 void PrepareLibrary();
 
 }  // namespace fulcrum::bus::dds

@@ -33,15 +33,16 @@ namespace fast = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 
-/// A participant says often that it is there while it is new, and then only now and then: eight of them heard each
-/// other a thousand times a second.
+/// A participant announces itself often while it is new and seldom afterwards: eight of them received a thousand
+/// announcements a second of each other.
 const Duration_t kAnnouncement{0, 200 * kMilli_ns}, kFirstAnnouncements{0, 20 * kMilli_ns};
 constexpr std::uint32_t kFirstAnnouncementCount = 25;
-/// With keys each announcement of somebody not yet authenticated is looked at by the handshake.
+/// With keys, each announcement of a participant that has not authenticated yet can start its handshake.
 const Duration_t kSecuredAnnouncement{0, 100 * kMilli_ns};
-/// A reader asks again for what a writer had before; the first heartbeat may have come before the two were matched.
+/// Delay after which a reader requests the samples for late joiners; the first heartbeat may have come before the
+/// match.
 const Duration_t kFirstAcknack{0, 10 * kMilli_ns};
-/// A node's period is 10 ms or more wherever a reliable write may have to wait.
+/// The period of a node is at least 10 ms wherever a reliable write can block.
 const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
 /// Samples above this do not fit one UDP datagram and are sent in fragments.
 constexpr std::uint32_t kDatagram_B = 64'000;
@@ -67,7 +68,7 @@ fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint
   return qos;
 }
 
-/// What a DataReaderQos and a DataWriterQos have in common. `shared_memory` empty: no data-sharing.
+/// Applies the settings that DataReaderQos and DataWriterQos have in common. `shared_memory` empty: no data-sharing.
 template <class Qos>
 void Apply(const Quality& quality, int depth, const std::string& shared_memory, Qos* qos) {
   qos->reliability().kind =
@@ -78,8 +79,8 @@ void Apply(const Quality& quality, int depth, const std::string& shared_memory, 
   const bool keeps_all = quality.delivery == Delivery::kReliableKeepAll;
   qos->history().kind = keeps_all ? fast::KEEP_ALL_HISTORY_QOS : fast::KEEP_LAST_HISTORY_QOS;
   qos->history().depth = depth;
-  // The pool holds this many samples of the type's full size: one more than the history, for the sample being written.
-  // The library's default of 5000 would ask for 1.5 GB per large topic.
+  // The pool has this many samples of the type's full size: one more than the history, for the sample being written.
+  // The library's default of 5000 would reserve 1.5 GB per large topic.
   const int samples = keeps_all ? depth : depth + 1;
   qos->resource_limits().max_instances = 1;
   qos->resource_limits().max_samples = samples;
@@ -140,7 +141,7 @@ struct DdsParticipant::Impl {
     fast::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 
-  /// The topic of T, its type registered under a name that carries the schema hash: endpoints of two schemas never
+  /// The topic of T. Its type is registered under a name that contains the schema hash: endpoints of two schemas never
   /// match.
   template <class T>
   fast::Topic* TopicFor() {
@@ -150,7 +151,7 @@ struct DdsParticipant::Impl {
     if (topic != nullptr) return topic;
     fast::TypeSupport type(new dds::CheckedType<T>());
     if constexpr (Loanable<T>) {
-      // Both together say that memory and wire look the same, which is what a loan relies on.
+      // Both conditions together mean that memory and wire layout are equal, which a loan requires.
       if (!type->is_plain() || type->m_typeSize != sizeof(WireOf<T>) + 4) {
         throw std::logic_error(std::string(role.name) + ": the generated type is not plain");
       }
@@ -172,16 +173,16 @@ struct DdsParticipant::Impl {
     return std::string(role.name) + "#" + Hex(schema_hash);
   }
 
-  /// Where the samples of a topic are shared; empty: they travel by UDP.
+  /// Directory in which the samples of a topic are shared; empty: they are sent by UDP.
   [[nodiscard]] std::string SharedMemoryFor(const TopicRole& role) const {
     return role.quality.path == Path::kSharedMemory && !security.encrypt ? shared_memory.string() : std::string();
   }
 
-  /// Why the library made no endpoint.
+  /// Error message for an endpoint that the library did not make.
   [[nodiscard]] std::string CannotMake(const TopicRole& role, const char* what) const {
     return std::string(role.name) + ": cannot make a " + what +
            (security.on() ? ": access control refuses it to \"" + security.identity + "\" (keys of " +
-                                security.keys.string() + "; fulcrum keys show lists who may what)"
+                                security.keys.string() + "; fulcrum keys show lists the rights)"
                           : "");
   }
 

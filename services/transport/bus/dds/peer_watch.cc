@@ -22,18 +22,18 @@ using DiscoveryStatus = rtps::ParticipantDiscoveryInfo::DISCOVERY_STATUS;
 
 constexpr std::string_view kUserDataTag = "fulcrum ";
 constexpr std::string_view kPidTag = " (pid ";
-// What shows at once, no keys or others, is believed after this: the true leader may come a little later.
+// A visible fault (no keys or other keys) is reported after this time: the true leader may appear a little later.
 constexpr std::int64_t kLatecomer_ns = 3'000'000'000;
 // A handshake takes milliseconds (0.3 s with thirty of them at once on two busy cores); one that lost a message is
-// tried again after 1 s.
+// retried after 1 s.
 constexpr std::int64_t kLongestHandshake_ns = 5'000'000'000;
-// What a stranger can make us remember.
+// Bounds the memory that unauthenticated participants can cause to be used.
 constexpr std::size_t kMostForbidden = 1024;
 constexpr std::size_t kLongestName = 80;
 
 std::int64_t NowNs() { return std::chrono::steady_clock::now().time_since_epoch().count(); }
 
-/// A stranger's words, fit for a log.
+/// Text of an unauthenticated participant, made printable for a log.
 std::string Printable(std::string text) {
   text.resize(std::min(text.size(), kLongestName));
   std::replace_if(
@@ -99,7 +99,7 @@ void PeerWatch::onParticipantAuthentication(eprosima::fastdds::dds::DomainPartic
                                             rtps::ParticipantAuthenticationInfo&& info) {
   const Prefix prefix = info.guid.guidPrefix;
   const bool authorized = info.status == rtps::ParticipantAuthenticationInfo::AUTHORIZED_PARTICIPANT;
-  // Waits for the library's log, so it must not hold what that log may need.
+  // This waits for the library's log, so no lock may be held that the log can need.
   const std::string complaint = authorized ? std::string() : LastCertificateComplaint();
   const std::lock_guard lock(mutex_);
   const auto found = strangers_.find(prefix);
@@ -110,7 +110,7 @@ void PeerWatch::onParticipantAuthentication(eprosima::fastdds::dds::DomainPartic
     Admit(prefix, stranger.text, stranger.name);
     return;
   }
-  Refuse(&found->second, complaint.empty() ? "does not authenticate" : "has a certificate of no use: " + complaint);
+  Refuse(&found->second, complaint.empty() ? "does not authenticate" : "has an unusable certificate: " + complaint);
 }
 
 void PeerWatch::on_publisher_discovery(eprosima::fastdds::dds::DomainParticipant*, rtps::WriterDiscoveryInfo&& info) {
@@ -123,7 +123,7 @@ void PeerWatch::on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipan
   CheckEndpoint(info.info.guid().guidPrefix, info.info.topicName().c_str(), false);
 }
 
-/// The library matches no endpoint without a right to it; it says so in its log at most.
+/// The library matches no endpoint without a right to it, and reports that in its log only.
 void PeerWatch::CheckEndpoint(const Prefix& prefix, const std::string& topic, bool writes) {
   if (!security_.on()) return;
   const std::string identity = IdentityBehind(prefix);
@@ -142,7 +142,7 @@ void PeerWatch::CheckEndpoint(const Prefix& prefix, const std::string& topic, bo
 
 void PeerWatch::Admit(const Prefix& prefix, const std::string& text, const std::string& name) {
   if (text.size() < kUserDataTag.size() + own_hash_.size() || !text.starts_with(kUserDataTag)) {
-    return;  // not one of ours: another program on this domain is none of our business
+    return;  // Another program on this domain.
   }
   const std::string hash = text.substr(kUserDataTag.size(), own_hash_.size());
   const std::size_t name_at = kUserDataTag.size() + hash.size();
@@ -152,8 +152,8 @@ void PeerWatch::Admit(const Prefix& prefix, const std::string& text, const std::
   peers_[prefix] = {name, pid};
   living_.insert(prefix);
   if (hash == own_hash_) return;
-  mismatches_[prefix] = "schema mismatch: peer" + text.substr(name_at) + " speaks schema " + hash + ", this " +
-                        own_name_ + " speaks " + own_hash_ + "; rebuild and restart both from the same sources";
+  mismatches_[prefix] = "schema mismatch: peer" + text.substr(name_at) + " uses schema " + hash + ", this " +
+                        own_name_ + " uses " + own_hash_ + "; rebuild and restart both from the same sources";
 }
 
 void PeerWatch::Forget(const Prefix& prefix) {
@@ -180,7 +180,7 @@ void PeerWatch::LookAtStrangers(std::int64_t now_ns) {
   for (auto& [prefix, stranger] : strangers_) {
     if (stranger.counted || !security_.on()) continue;
     if (const std::string complaint = PermissionsComplaint(prefix); !complaint.empty()) {
-      Refuse(&stranger, "has permissions of no use: " + complaint);
+      Refuse(&stranger, "has unusable permissions: " + complaint);
     } else if (now_ns - stranger.since_ns > kLongestHandshake_ns) {
       Refuse(&stranger, "does not authenticate");
     }
@@ -193,7 +193,7 @@ std::string PeerWatch::mismatch() {
   const std::int64_t now_ns = NowNs();
   LookAtStrangers(now_ns);
   if (own_name_ == leader_) return {};
-  // Whoever calls itself the leader and is none does no harm as long as the true one is there.
+  // A participant that only claims to be the leader has no effect while the true leader is present.
   const auto is_leader = [&](const auto& entry) { return entry.second.name == leader_; };
   const bool has_leader = std::any_of(living_.begin(), living_.end(), [&](const Prefix& prefix) {
     const auto peer = peers_.find(prefix);

@@ -1,4 +1,4 @@
-// Who else is on the bus: names, schemas, and on a secured cart who was refused. Internal to
+// The other participants on the bus: names, schemas, and on a secured cart which ones were refused. Internal to
 // services/transport/bus/dds.
 #pragma once
 
@@ -19,14 +19,14 @@
 
 namespace fulcrum::bus::dds {
 
-/// What a participant says of itself in USER_DATA: "fulcrum <hash> <node> (pid <pid>)".
+/// Text that a participant publishes in USER_DATA: "fulcrum <hash> <node> (pid <pid>)".
 [[nodiscard]] std::string UserDataOf(const std::string& name, std::uint64_t schema_hash);
 
-/// Compares the schema of each peer that appears. On a secured cart a peer counts once it has authenticated: what
-/// others say of themselves is believed only as far as to name them.
+/// Compares the schema of each peer that appears. On a secured cart a peer counts once it has authenticated; the text
+/// of an unauthenticated participant is used only to name it.
 class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
-  /// @param leader name of the participant without which nobody stays.
+  /// @param leader name of the participant without which no other stays.
   PeerWatch(std::string own_name, std::uint64_t own_hash, const Security& security, std::string leader = "supervisor");
 
   void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant*,
@@ -41,20 +41,20 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
   /// Empty, or one line naming a peer of another schema, or a leader that does not accept this participant.
   [[nodiscard]] std::string mismatch();
   [[nodiscard]] Refusals refusals();
-  /// Those of that name that live.
+  /// Live participants of that name.
   [[nodiscard]] std::vector<eprosima::fastrtps::rtps::GuidPrefix_t> Named(const std::string& name) const;
-  /// Also of one that is gone by now.
+  /// The process behind an address, also after it has left.
   [[nodiscard]] Peer PeerOf(const eprosima::fastrtps::rtps::GuidPrefix_t& prefix) const;
 
  private:
   using Prefix = eprosima::fastrtps::rtps::GuidPrefix_t;
-  /// Discovered, not (yet) one of us.
+  /// A participant that was discovered but has not been admitted (yet).
   struct Stranger {
-    std::string text;  ///< Says of itself.
-    std::string name;  ///< Of the participant, the same.
-    std::string has;   ///< Why it cannot be one of us, as far as its announcement shows; empty: it may be.
+    std::string text;  ///< Its USER_DATA.
+    std::string name;  ///< Its participant name, unverified.
+    std::string has;   ///< Reason for which its announcement rules it out; empty: it may be admitted.
     std::int64_t since_ns = 0;
-    bool is_ours = false;  ///< A Fulcrum program, by its own word.
+    bool is_ours = false;  ///< A Fulcrum program according to its own USER_DATA.
     bool counted = false;
   };
 
@@ -67,7 +67,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
 
   const std::string own_name_, own_hash_, leader_;
   const Security security_;
-  const std::string authority_;  ///< Name of our authority, as announcements carry it.
+  const std::string authority_;  ///< Name of our authority, as in announcements.
   mutable std::mutex mutex_;
   std::map<Prefix, Peer> peers_;
   std::set<Prefix> living_;

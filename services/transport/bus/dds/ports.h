@@ -31,20 +31,20 @@ namespace fulcrum::bus::dds {
 namespace fast = eprosima::fastdds::dds;
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
-/// A writer of a small topic leaves no sooner than this after its last sample: what rests in a raw input's socket
-/// (chained_transport.h, 8 ms) is nobody's once its writer has said that it leaves.
+/// A writer of a small topic leaves no sooner than this after its last sample: the library drops samples that are still
+/// in a raw input's socket (chained_transport.h, 8 ms) when it learns that their writer has left.
 constexpr std::chrono::milliseconds kLinger{40};
 
-/// Counts the live endpoints on the other side; asking the reader or writer itself would take its lock every tick.
+/// Counts the live endpoints on the other side; querying the reader or writer itself would take its lock on every tick.
 class ReaderEvents final : public fast::DataReaderListener {
  public:
   explicit ReaderEvents(std::function<void()> notify) : notify_(std::move(notify)) {}
   void on_subscription_matched(fast::DataReader*, const fast::SubscriptionMatchedStatus& status) override {
-    count_.store(status.current_count, std::memory_order_relaxed);  // stands for itself, orders nothing
+    count_.store(status.current_count, std::memory_order_relaxed);  // relaxed: an independent value that orders nothing
   }
   void on_data_available(fast::DataReader*) override { notify_(); }
   [[nodiscard]] bool any() const noexcept { return count_.load(std::memory_order_relaxed) > 0; }
-  /// What to listen for: without anybody to notify, a sample costs no call.
+  /// Events to receive: without `notify` a sample causes no call.
   [[nodiscard]] fast::StatusMask mask() const {
     fast::StatusMask mask = fast::StatusMask::subscription_matched();
     if (notify_) mask << fast::StatusMask::data_available();
@@ -74,7 +74,7 @@ class WriterEvents final : public fast::DataWriterListener {
   std::atomic<int> count_{0};
 };
 
-/// Owns a DataReader and the books.
+/// Owns a DataReader and its counters.
 template <class T>
 class InputBase : public Input<T> {
  public:
@@ -107,7 +107,7 @@ class InputBase : public Input<T> {
   InputAccount account_;
 };
 
-/// Small topics: deserialised into one object that is kept.
+/// Input of a small topic: deserialises into one object that it keeps.
 template <class T>
 class DdsInput final : public InputBase<T> {
  public:
@@ -133,7 +133,7 @@ class DdsInput final : public InputBase<T> {
   }
 
  private:
-  /// Next valid sample into wire_.
+  /// Takes the next valid sample into wire_.
   bool TakeWire() {
     for (;;) {
       try {
@@ -151,7 +151,7 @@ class DdsInput final : public InputBase<T> {
   T candidate_;
 };
 
-/// Large topics: read where the writer put them.
+/// Input of a large topic: reads the samples in the memory in which they were written.
 template <Loanable T>
 class DdsInput<T> final : public InputBase<T> {
  public:
@@ -161,7 +161,7 @@ class DdsInput<T> final : public InputBase<T> {
   bool TakeNext(T* sample) override { return Take(1, sample); }
 
  private:
-  /// The newest good one of the `count` oldest; with 1, goes on until one is good or none is left.
+  /// Takes the newest valid one of the `count` oldest samples; with 1, continues until one is valid or none is left.
   bool Take(int count, T* sample) {
     bool found = false;
     try {
@@ -176,13 +176,13 @@ class DdsInput<T> final : public InputBase<T> {
   }
 
   bool Choose(T* sample) {
-    // buffer() and not operator[]: a loan is not aligned enough to be spoken of as a WireOf<T>.
+    // buffer() and not operator[]: a loan is not aligned enough for a reference to WireOf<T>.
     auto* const* data = loans_.buffer();
     const auto loan = [data](int i) { return static_cast<const std::byte*>(data[i]); };
     for (int i = static_cast<int>(infos_.length()) - 1; i >= 0; --i) {
       if (!infos_[i].valid_data) continue;
       const bool complete = FromLoan(loan(i), &candidate_);
-      // The writer may have taken the place back while we read: only now is it known whether what we have is whole.
+      // The writer may have reused the memory during the copy: only now is it known whether the copy is complete.
       if (!this->reader_->is_sample_valid(data[i], &infos_[i])) continue;
       if (!complete || !PassesGate(candidate_) || !this->IsOfOwner(candidate_)) {
         this->account_.Reject();
@@ -203,7 +203,7 @@ class DdsInput<T> final : public InputBase<T> {
   T candidate_;
 };
 
-/// Owns a DataWriter and the counters. Counters are written by the writing thread and read by the health thread.
+/// Owns a DataWriter and its counters, which the writing thread writes and the health thread reads.
 template <class T>
 class OutputBase : public OutputOf<T>::type {
  public:
@@ -293,12 +293,12 @@ class DdsOutput<T> final : public OutputBase<T> {
       }
       if (fill(static_cast<std::byte*>(loan)) && this->writer_->write(loan)) return this->Count(true);
     } catch (...) {
-      // Counted below; the loan is given back.
+      // Counted below; the loan is returned.
     }
     try {
       if (loan != nullptr) this->writer_->discard_loan(loan);
     } catch (...) {
-      // The pool is one place short; the next loans will fail and be counted.
+      // The pool has lost one place; if it is empty, the next loans fail and are counted.
     }
     return this->Count(false);
   }

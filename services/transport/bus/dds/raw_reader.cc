@@ -10,10 +10,10 @@ namespace {
 
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
-/// What stands before a loan on the wire: CDR, little endian.
+/// Encapsulation in front of a loan's content on the wire: CDR, little endian.
 constexpr std::array<std::byte, 4> kEncapsulation{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
 
-/// A sample of at most this age was waited for; an older one was in the socket, and more may be [ns].
+/// A sample of at most this age was waited for; an older one was in the socket, which may contain more [ns].
 constexpr std::int64_t kFresh_ns = 500'000;
 
 std::int64_t Now(clockid_t clock) {
@@ -22,10 +22,10 @@ std::int64_t Now(clockid_t clock) {
   return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
 }
 
-/// Clocks read at most so far apart tell what one is when the other is.
+/// Two clocks that were read at most so far apart [ns] can be converted into each other.
 constexpr std::int64_t kClocksApart_ns = 20'000;
 
-/// Of a sample [ns]; empty: the wall clock was set while it was on its way.
+/// Age of a sample [ns]; empty: the wall clock was set after it was written.
 std::optional<std::int64_t> Age(std::int64_t source_ns) {
   constexpr std::int64_t kOldest_ns = 1'000'000'000;
   const std::int64_t age_ns = Now(CLOCK_REALTIME) - source_ns;
@@ -62,7 +62,7 @@ RawSample RawReader::Describe(const fast::SampleInfo& info) const {
   std::memcpy(sample.writer.data() + rtps::GuidPrefix_t::size, guid.entityId.value, rtps::EntityId_t::size);
   sample.sequence = info.sample_identity.sequence_number().to64long();
   sample.source_ns = info.source_timestamp.to_ns();
-  // The thread may lose its processor between the two clocks: once more then.
+  // The thread may be preempted between the two clocks: retried then.
   for (int attempt = 0; attempt < 3; ++attempt) {
     const std::int64_t before_ns = Now(CLOCK_MONOTONIC);
     sample.written_ns = before_ns - Age(sample.source_ns).value_or(0);
@@ -75,7 +75,7 @@ void RawReader::on_data_available(fast::DataReader* reader) {
   try {
     role_.quality.path == Path::kSharedMemory ? TakeLoans(reader) : TakeCopies(reader);
   } catch (...) {
-    // A sample that cannot be taken is missing in its writer's sequence: it is counted there.
+    // A sample that cannot be taken is missing in its writer's sequence, where it is counted.
   }
 }
 

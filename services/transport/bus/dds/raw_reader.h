@@ -22,10 +22,10 @@ namespace fulcrum::bus::dds {
 namespace fast = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 
-/// Stands for any type by name and size: a sample is its payload. Only reads.
+/// Stands for any type by name and size: a sample is its payload. For readers only.
 class RawType final : public fast::TopicDataType {
  public:
-  /// @param payload_B Largest payload, encapsulation included.
+  /// @param payload_B largest payload, encapsulation included.
   RawType(const std::string& name, std::uint32_t payload_B, bool plain) : plain_(plain) {
     setName(name.c_str());
     m_typeSize = payload_B;
@@ -52,7 +52,7 @@ class RawType final : public fast::TopicDataType {
   const bool plain_;
 };
 
-/// Hands each sample on; tells its transport when it has caught up with a small topic's writers.
+/// Passes each sample on, and sets `caught_up` for its transport when no small sample is left unread.
 class RawReader final : public RawInput, private fast::DataReaderListener {
  public:
   RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos, TopicId id,
@@ -66,7 +66,8 @@ class RawReader final : public RawInput, private fast::DataReaderListener {
 
  private:
   void on_subscription_matched(fast::DataReader*, const fast::SubscriptionMatchedStatus& status) override {
-    writers_.store(status.current_count, std::memory_order_relaxed);  // Stands for itself, orders nothing.
+    // Relaxed: an independent value that orders nothing.
+    writers_.store(status.current_count, std::memory_order_relaxed);
     sources_->Count(rtps::iHandle2GUID(status.last_publication_handle).guidPrefix, status.current_count_change);
   }
   void on_data_available(fast::DataReader* reader) override;
@@ -77,7 +78,7 @@ class RawReader final : public RawInput, private fast::DataReaderListener {
   const TopicRole& role_;
   const std::uint32_t payload_B_;
   const RawSink sink_;
-  const std::shared_ptr<Gathering> gathering_;  ///< Null: nobody gathers.
+  const std::shared_ptr<Gathering> gathering_;  ///< Null: samples do not gather.
   Sources* const sources_;
   fast::Subscriber* subscriber_;
   fast::DataReader* reader_;

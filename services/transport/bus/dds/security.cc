@@ -51,7 +51,7 @@ namespace {
 namespace fast = eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 
-/// What was said of security, until somebody asks. Bounded: strangers decide how much is said.
+/// Log texts about security, kept until they are read. Bounded, because unauthenticated participants cause them.
 class SecurityNotes {
  public:
   void Certificate(std::string text) {
@@ -79,18 +79,18 @@ class SecurityNotes {
   std::map<std::string, std::string> permissions_;
 };
 
-/// As the library's log is one per process, so is this; never destroyed, because that log speaks until the very end.
+/// One per process, as the library's log is; never destroyed, because that log is written until the process ends.
 SecurityNotes& Notes() {
   static SecurityNotes& notes = *new SecurityNotes;
   return notes;
 }
 
-/// What stands between the first "(" and the last ")".
+/// The text between the first "(" and the last ")".
 std::string InBrackets(const std::string& text) {
   const std::size_t from = text.find('('), to = text.rfind(')');
   if (from == std::string::npos || to == std::string::npos || to <= from) return text;
   const std::string inner = text.substr(from + 1, to - from - 1);
-  // Permissions that do not verify are quoted whole.
+  // Permissions that cannot be verified are quoted in full.
   return inner.substr(0, inner.find('\n'));
 }
 
@@ -107,7 +107,7 @@ class SecurityLog final : public fast::StdoutConsumer {
   }
 
  private:
-  /// @return whether we tell of it ourselves, in words of ours.
+  /// @return whether this program reports the text itself, in its own words.
   static bool Note(const std::string& text) {
     constexpr std::string_view kRemote = "Error validating remote permissions for ";
     constexpr std::string_view kDomain = "Error checking remote participant  ";
@@ -117,12 +117,12 @@ class SecurityLog final : public fast::StdoutConsumer {
     }
     for (const std::string_view head : {kRemote, kDomain}) {
       if (!text.starts_with(head)) continue;
-      // "…80.1f.….0c|0.0.1.c1 (reason)."
+      // Format: "…80.1f.….0c|0.0.1.c1 (reason)."
       const std::string prefix = text.substr(head.size(), text.find('|') - head.size());
       Notes().Permissions(prefix, InBrackets(text));
       return true;
     }
-    // An endpoint without a right to its topic: PeerWatch sees those of others, the port that cannot be made our own.
+    // An endpoint without a right to its topic: PeerWatch reports those of others, MakeInput and MakeOutput our own.
     return text.starts_with("Error checking creat") || text.find("topic not found in allow rule") != std::string::npos;
   }
 };
@@ -174,7 +174,7 @@ void ListenToSecurityLog() {
   std::call_once(once, [] {
     fast::Log::ClearConsumers();
     fast::Log::RegisterConsumer(std::make_unique<SecurityLog>());
-    // Why a certificate is refused is but a warning to the library.
+    // The library logs the reason for refusing a certificate as a warning only.
     fast::Log::SetVerbosity(fast::Log::Kind::Warning);
   });
 }

@@ -23,12 +23,12 @@ namespace fulcrum::bus {
 namespace fs = std::filesystem;
 namespace {
 
-/// Low 16 bits of a process id: all that a participant's GUID keeps of it.
+/// Low 16 bits of a process id: a participant's GUID contains no more of it.
 using ShortPid = std::uint16_t;
 
 constexpr std::string_view kClaim = "owner_";
 
-/// Of secured participants, whose addresses say nothing of their process: from "owner_<address>_<pid>".
+/// Addresses of secured participants, which do not contain the process id, with it: from files "owner_<address>_<pid>".
 using Claims = std::vector<std::pair<std::string, ShortPid>>;
 
 Claims ClaimsIn(const fs::path& directory) {
@@ -44,8 +44,8 @@ Claims ClaimsIn(const fs::path& directory) {
   return claims;
 }
 
-/// Files are named after the GUID of their endpoint, "..._01.0f.hh.hh.pp.pp.rr.rr.…", with the process id in bytes 4
-/// and 5, little endian; on a secured cart after an address that was claimed.
+/// Process of a file. Files are named after the GUID of their endpoint, "..._01.0f.hh.hh.pp.pp.rr.rr.…", with the
+/// process id in bytes 4 and 5, little endian; on a secured cart after a claimed address.
 std::optional<ShortPid> OwnerOf(const std::string& name, const Claims& claims) {
   for (const auto& [address, pid] : claims) {
     if (name.find(address) != std::string::npos) return pid;
@@ -60,7 +60,8 @@ std::optional<ShortPid> OwnerOf(const std::string& name, const Claims& claims) {
   return static_cast<ShortPid>(bytes[4] | bytes[5] << 8);
 }
 
-/// Short ids of all live processes. Two processes may share one; then a dead one's file stays until the end, no worse.
+/// Short ids of all live processes. If a live process has the short id of a dead one, the dead one's files stay until
+/// the end of the session; there is no other effect.
 std::bitset<65536> LiveProcesses() {
   std::bitset<65536> live;
   std::error_code error;
@@ -100,11 +101,11 @@ void PrepareSharedMemory(const fs::path& directory) {
   if (lstat(name.c_str(), &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != getuid() ||
       (status.st_mode & 077) != 0) {
     throw InputError("shared memory: " + name +
-                     " must be a directory of this user with mode 0700; remove it or take another domain");
+                     " must be a directory of this user with mode 0700; remove it or use another domain");
   }
   struct statvfs space {};
   if (statvfs(name.c_str(), &space) != 0) {
-    throw InputError("shared memory: cannot ask for the free space of " + name + ": " + std::strerror(errno));
+    throw InputError("shared memory: cannot determine the free space of " + name + ": " + std::strerror(errno));
   }
   const std::uint64_t free = std::uint64_t{space.f_bavail} * space.f_frsize;
   if (free < kNeededSharedMemory_B) {
@@ -140,8 +141,8 @@ void ReserveSharedMemory(const fs::path& directory) {
 }
 
 WorkingIn::WorkingIn(const fs::path& directory) : before_(open(".", O_PATH | O_DIRECTORY | O_CLOEXEC)) {
-  // From here on this thread has a current directory of its own. Where that is not permitted it is everybody's, for a
-  // moment.
+  // Gives this thread a current directory of its own. Where that is not permitted, the directory of the whole process
+  // changes for a moment.
   unshare(CLONE_FS);
   if (before_ >= 0 && chdir(directory.c_str()) != 0) {
     close(before_);
@@ -151,7 +152,7 @@ WorkingIn::WorkingIn(const fs::path& directory) : before_(open(".", O_PATH | O_D
 
 WorkingIn::~WorkingIn() {
   if (before_ < 0) return;
-  [[maybe_unused]] const int ignored = fchdir(before_);  // All paths of ours are absolute by now.
+  [[maybe_unused]] const int ignored = fchdir(before_);  // All our paths are absolute by now.
   close(before_);
 }
 

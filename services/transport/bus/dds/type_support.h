@@ -1,13 +1,13 @@
-// How the library is told of the generated types. Internal to services/transport/bus/dds.
+// Type support of the generated types. Internal to services/transport/bus/dds.
 #pragma once
 
 #include "services/transport/bus/convert/generated_types.h"
 
 namespace fulcrum::bus::dds {
 
-/// The generated type, but bytes that are no T become a T that no gate lets pass, so that they are refused and counted
-/// like any bad message. The library would drop silently what is cut short, and leave what cannot be decoded at all at
-/// the head of the queue, where it holds up everything behind it.
+/// The generated type, except that bytes that are no valid T become a T that no gate accepts, so that they are refused
+/// and counted like any bad message. The library alone would silently drop payloads that are cut short, and would leave
+/// undecodable ones at the head of the queue, where they block all later samples.
 template <class T>
 class CheckedType final : public TypeSupportOf<T>::type {
  public:
