@@ -91,7 +91,7 @@ void ReadTiming(StrictMap map, NodeId node, NodeTiming* timing) {
   }
 }
 
-/// Reads `file` over `cart`: what the file does not say stays.
+/// Reads `file` over `cart`: keys that the file does not contain keep their values.
 CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   StrictMap root = file->root();
   cart.name = root.TextOr("name", cart.name, 31);
@@ -144,7 +144,7 @@ void ValidateLink(const std::string& field, LinkKind kind, const SerialLink& lin
     return;
   }
   if (link.port.empty() && (link.usb_vendor_id == 0 || link.usb_product_id == 0)) {
-    Refuse(field, "kind is serial, but neither `port` nor `usb_vendor_id` and `usb_product_id` say which; give one");
+    Refuse(field, "kind is serial, but neither `port` nor `usb_vendor_id` with `usb_product_id` is given; give one");
   }
   if (std::find(kBauds.begin(), kBauds.end(), link.baud) == kBauds.end()) {
     std::string valid;
@@ -163,7 +163,7 @@ void ValidateCalibration(const std::string& field, const JawCalibration& calibra
     Refuse(field, "points_V has " + std::to_string(v.size()) + " entries and angles_deg " + std::to_string(a.size()) +
                       "; valid: the same number, 2 to 9");
   }
-  // Fewer than four counts between two points and the converter's own error would dominate the slope.
+  // With fewer than four counts between two points the converter's own error would dominate the slope.
   const double min_gap_V = 4 * calibration.adc_step_V;
   for (std::size_t i = 1; i < v.size(); ++i) {
     if (!(v[i] - v[i - 1] >= min_gap_V)) {
@@ -200,7 +200,7 @@ void ValidateDevices(const CartConfig& cart) {
   for (std::size_t tool = 0; tool < cart.devices.size(); ++tool) {
     const DeviceConfig& device = cart.devices[tool];
     const std::string field = "devices." + ToolKey(tool);
-    // The servo bounds the stiffness that the hand feels; what comes after it must not raise it.
+    // The servo bounds the stiffness that the hand feels; the scaling after it must not raise it.
     constexpr double kRounding = 1e-9;
     if (device.force_scale * device.workspace.scale > 1 + kRounding) {
       Refuse(field, "force_scale " + std::to_string(device.force_scale) + " times workspace.scale " +

@@ -15,17 +15,18 @@ namespace fulcrum::config {
 
 enum class LinkKind { kNone, kSimulated, kSerial };
 
-/// Where a serial line is found, and how it is spoken: 8N1, no flow control.
+/// Place and speed of a serial line; the format is 8N1 without flow control.
 struct SerialLink {
-  std::string port;       ///< "/dev/ttyUSB0", better "/dev/serial/by-path/…"; empty: found by USB identity.
-  int usb_vendor_id = 0;  ///< 0: not given. With vendor, product and serial number a replug on another socket is found.
+  std::string port;  ///< "/dev/ttyUSB0", better "/dev/serial/by-path/…"; empty: found by USB identity.
+  /// 0: not given. With vendor, product and serial number the device is found again on another socket.
+  int usb_vendor_id = 0;
   int usb_product_id = 0;
   std::string usb_serial;  ///< Empty: any.
   int baud = 115200;
 };
 
-/// Jaw angle as a function of the voltage that the handle's converter reports: through 2 … 9 points, monotone.
-/// Default: the paper's linear 2.37 … 2.54 V for 0 … 60 degrees.
+/// Jaw angle as a function of the voltage that the handle's converter reports: monotone, through 2 to 9 points.
+/// Default: the paper's linear relation, 2.37 to 2.54 V for 0 to 60 degrees.
 struct JawCalibration {
   /// Volt per count of the 10-bit converter: 5 V / 1024. The paper rounds it to 0.00488; its lines (2.4512 is count
   /// 502) show the exact step.
@@ -34,30 +35,30 @@ struct JawCalibration {
   std::vector<double> angles_rad = {0.0, 1.0471975511965976};
 };
 
-/// Line format of a handle or pedal: the bridge tells them apart by itself, simulated firmware is told which to speak.
+/// Line format of a handle or pedal. The bridge detects it; for simulated firmware it is configured.
 enum class LineProtocol { kPlain, kFramed };
 
-/// A simulated handle or pedal: how it is built, and what goes wrong with it. Windows are pairs [from, to, from, to, …)
-/// of session time [s]; the jaw's keys are for handles only.
+/// A simulated handle or pedal: its properties and its faults. Time windows are pairs (from, to, from, to, …) of
+/// session time [s]; the keys of the jaw are for handles only.
 struct SimulatedUnit {
   LineProtocol protocol = LineProtocol::kPlain;
   double closed_V = 2.37, open_V = 2.54;  ///< At 0 and 60 degrees.
-  double bow = 0;                         ///< Excess in the middle, as a share of the span.
+  double bow = 0;                         ///< Excess of the voltage in the middle, as a share of the span.
   double noise_V = 0.001;                 ///< Standard deviation.
   double tremor_rad = 0;                  ///< Amplitude.
-  double drop = 0, flip = 0;              ///< Probability that a byte is lost, or has a flipped bit.
+  double drop = 0, flip = 0;              ///< Probabilities that a byte is lost and that it has a flipped bit.
   std::vector<double> silent_s, garbage_s, wrong_baud_s, broken_wire_s, unplugged_s;
 };
 
 enum class Hand { kLeft, kRight };
 
-/// One handle; the index in CartConfig::handles is the tool it works.
+/// One handle; its index in CartConfig::handles is the tool that it operates.
 struct HandleConfig {
   LinkKind kind = LinkKind::kNone;
   SerialLink link;             ///< For kSerial.
   SimulatedUnit simulated;     ///< For kSimulated.
-  Hand hand = Hand::kLeft;     ///< Whose frames are taken; a plain line does not say. Tool 1: right.
-  JawCalibration calibration;  ///< Unless `handle_bridge calibrate` has stored one for the unit.
+  Hand hand = Hand::kLeft;     ///< Hand whose frames are accepted; a plain line does not contain it. Tool 1: right.
+  JawCalibration calibration;  ///< Used unless `handle_bridge calibrate` has stored a calibration for the unit.
 };
 
 struct PedalConfig {
@@ -66,7 +67,7 @@ struct PedalConfig {
   SimulatedUnit simulated;  ///< For kSimulated.
 };
 
-/// What the generator's panel is set to when a session begins, by mode [W].
+/// Power setting of the generator's panel at the start of a session, by mode [W].
 struct GeneratorConfig {
   float cut_W = 35;
   float coag_W = 35;
@@ -75,48 +76,49 @@ struct GeneratorConfig {
 
 enum class DeviceKind { kNone, kSimulated, kTouch };
 
-/// Who holds a simulated device: the hand that the scene describes, or one of three standard ones.
+/// The hand that holds a simulated device: the one of the scene, or one of three standard hands.
 enum class HandHold { kScene, kFingertip, kLightGrip, kFirmGrip };
 
-/// How the frame D of a device lies in the world: p_W = trocar_W + scale R_WD (p_D - trocar_D). For the Touch D has x
-/// to the right, y up and z towards the operator.
+/// Placement of the frame D of a device in the world: p_W = trocar_W + scale R_WD (p_D - trocar_D). For the Touch, D
+/// has x to the right, y up and z towards the operator.
 struct WorkspaceConfig {
-  /// Turns about the fixed axes x, y, z, in this order [rad]. Default: the device stands on a table, world z is up and
-  /// the operator looks along world y.
+  /// Rotations about the fixed axes x, y, z, in this order [rad]. Default: the device stands on a table, world z is up
+  /// and the operator looks along world y.
   Vec3d rotation_rad{std::numbers::pi / 2, 0, 0};
-  Vec3d trocar_D{0, -0.1, -0.1};  ///< Unless `haptics_node calibrate-trocar` has stored a better one [m].
-  double scale = 1;               ///< Motion of the tool per motion of the hand.
+  /// Trocar in D [m]; used unless `haptics_node calibrate-trocar` has stored a better one.
+  Vec3d trocar_D{0, -0.1, -0.1};
+  double scale = 1;  ///< Motion of the tool per motion of the hand.
 };
 
-/// One haptic device; the index in CartConfig::devices is the tool it works.
+/// One haptic device; its index in CartConfig::devices is the tool that it operates.
 struct DeviceConfig {
   DeviceKind kind = DeviceKind::kNone;
   std::string name = "Default Device";  ///< For kTouch: as in the Touch's setup program.
-  std::string serial;                   ///< For kTouch; empty: whatever device has that name.
-  double force_scale = 1;               ///< Share of the servo's force that goes to the hand, 0 … 1.
+  std::string serial;                   ///< For kTouch; empty: any device with that name.
+  double force_scale = 1;               ///< Share of the servo's force that the device applies, 0 to 1.
   WorkspaceConfig workspace;            ///< For kTouch and for recorded motion.
   HandHold hand = HandHold::kScene;     ///< For kSimulated.
   std::string motion;                   ///< For kSimulated: file of recorded poses; empty: the scene's script.
 };
 
-/// How a node's cyclic thread runs.
+/// Scheduling of a node's cyclic thread.
 struct NodeTiming {
   double rate_Hz = 100;
-  int fifo_priority = 0;  ///< 1 … 99: SCHED_FIFO when permitted; 0: normal scheduling.
-  int cpu = -1;           ///< Pin to this CPU; -1: any.
-  double spin_s = 0;      ///< Sleep until this long before each period, then spin.
-  int threads = 1;        ///< That share a period's work; physics_node only.
+  int fifo_priority = 0;  ///< 1 to 99: SCHED_FIFO when permitted; 0: normal scheduling.
+  int cpu = -1;           ///< CPU to which the thread is pinned; -1: any.
+  double spin_s = 0;      ///< The thread sleeps until this long before each period, then spins.
+  int threads = 1;        ///< Threads that share the work of a period; physics_node only.
 };
 
-/// Who may join the session's bus: services/transport/bus/DESIGN.md.
+/// Access to the session's bus: services/transport/bus/DESIGN.md.
 struct SecurityConfig {
-  std::string keys;      ///< Folder made by `fulcrum keys init`; empty: anybody may.
-  bool encrypt = false;  ///< Encrypt what travels, for traffic between hosts.
+  std::string keys;      ///< Folder made by `fulcrum keys init`; empty: no access control.
+  bool encrypt = false;  ///< Encrypts all datagrams, for traffic between hosts.
 };
 
 struct CartConfig {
   std::string name = "simulated";
-  int domain = 7;  ///< DDS domain, 1 … 100.
+  int domain = 7;  ///< DDS domain, 1 to 100.
   std::array<HandleConfig, kMaxTools> handles;
   PedalConfig pedal;
   GeneratorConfig generator;
@@ -129,12 +131,12 @@ struct CartConfig {
   [[nodiscard]] const NodeTiming& timing(NodeId node) const { return nodes[static_cast<std::size_t>(node)]; }
 };
 
-/// The rules that span several fields. Throws InputError naming field, value and valid range.
+/// Checks the rules that span several fields. Throws InputError naming field, value and valid range.
 void Validate(const CartConfig& cart);
 
 /// Reads and validates. Relative paths in the file are taken from its folder. Throws InputError.
 [[nodiscard]] CartConfig LoadCart(const std::filesystem::path& file);
-/// The same for text in memory; `name` stands for the file in messages.
+/// As LoadCart, for text in memory; `name` stands for the file in messages.
 [[nodiscard]] CartConfig LoadCartText(const std::string& text, const std::string& name);
 
 /// Every key that a cart file may have; comments are in the lines of `file`.

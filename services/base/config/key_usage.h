@@ -1,4 +1,5 @@
-// Which keys of a configuration file were asked for: refuses the others, lists the rules of those that were.
+// Unknown keys of a configuration file are those that no getter has read: finds them, and lists the rules of the
+// others.
 #pragma once
 
 #include <vector>
@@ -8,10 +9,10 @@
 
 namespace fulcrum::config::internal {
 
-/// Throws InputError for the first key that was not asked for, with the nearest one that was.
+/// Throws InputError for the first key that was not read; the message suggests the nearest known key.
 void CheckAllUsed(const Document& document, const Node& map);
 
-/// Every key that was asked for, in the order of asking; of the maps of a list the first stands for all.
+/// Every key that was read, in the order of reading; of the maps of a list the first stands for all.
 [[nodiscard]] std::vector<KeyRule> RulesOf(const Node& root);
 
 }  // namespace fulcrum::config::internal

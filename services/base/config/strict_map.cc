@@ -1,4 +1,4 @@
-// The maps of a strict configuration file: each getter reads one key and notes that it was asked for.
+// The maps of a strict configuration file: each getter reads one key and records that it was read.
 #include <algorithm>
 #include <string>
 

@@ -25,7 +25,7 @@ StrictYaml StrictYaml::FromText(std::string_view text, std::string_view name) {
 
 StrictYaml StrictYaml::FromFileOnBases(const std::filesystem::path& file, const std::vector<std::string_view>& own,
                                        std::string_view text) {
-  constexpr std::size_t kMostBases = 8;  // More is a circle.
+  constexpr std::size_t kMostBases = 8;  // More than eight are taken for a cycle.
   constexpr std::string_view kBase = "base";
   const auto parse = [](const std::filesystem::path& at) {
     return internal::ParseDocument(internal::ReadTextFile(at.string()), at.string());
@@ -45,7 +45,7 @@ StrictYaml StrictYaml::FromFileOnBases(const std::filesystem::path& file, const 
       document->Fail(next->line, kBase, std::string("expected the name of a file, found ") + KindName(*next));
     }
     if (document->bases.size() == kMostBases) {
-      document->Fail(next->line, kBase, "more than 8 files stand on one another: is there a circle?");
+      document->Fail(next->line, kBase, "more than 8 files are based on one another: is there a cycle?");
     }
     const std::filesystem::path at = (folder / next->text).lexically_normal();
     if (!std::filesystem::is_regular_file(at)) {

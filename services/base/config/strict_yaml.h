@@ -5,14 +5,14 @@
 //   p.mode = root.Choice("mode", p.mode, {{"paper", Mode::kPaper}});
 //   p.thickness_m = root.NumberSi("thickness_mm", p.thickness_m, Range::Between(0.05, 5));  // default [m], range [mm]
 //   StrictMap tool = root.MapOrDefaults("tool");
-//   file.Finish();                     // Refuses every key that nobody asked for.
+//   file.Finish();                     // Refuses every key that was not read.
 //   std::string effective = file.Effective();
 //
 // A key that stands for a physical quantity ends in its unit (units.h). Its value is a plain number in that unit or a
 // quantity such as "300 um" of the same dimension. Refused with InputError "file:line: key.path: ...": missing, huge
 // (> 1 MiB), binary or empty files, YAML syntax errors, duplicate keys, anchors, aliases and tags, more than one
 // document, nesting deeper than 32, unknown keys (the nearest known key is suggested), missing keys, wrong types, wrong
-// units, values that are not finite or out of range. Asking for one key twice is a bug of the caller: std::logic_error.
+// units, values that are not finite or out of range. Reading one key twice is a bug of the caller: std::logic_error.
 #pragma once
 
 #include <cstdint>
@@ -41,7 +41,7 @@ struct Range {
   static Range Between(double lo, double hi) { return {lo, hi, false}; }
   static Range AtLeast(double lo) { return {lo, std::numeric_limits<double>::infinity(), false}; }
   static Range Positive() { return {0.0, std::numeric_limits<double>::infinity(), true}; }
-  /// (lo, hi]
+  /// The half-open interval (lo, hi].
   static Range Above(double lo, double hi) { return {lo, hi, true}; }
   [[nodiscard]] bool Contains(double x) const { return (min_open ? x > min : x >= min) && x <= max; }
 };
@@ -51,7 +51,7 @@ struct Node;
 struct Document;
 }  // namespace internal
 
-/// One map of the file. A light handle, valid while its StrictYaml lives.
+/// One map of the file. A light handle, valid while its StrictYaml exists.
 class StrictMap {
  public:
   /// True when the file has this key. Does not count as use.
@@ -74,7 +74,7 @@ class StrictMap {
   std::string Text(std::string_view key, std::size_t max_length = 255);
   std::string TextOr(std::string_view key, std::string_view default_value, std::size_t max_length = 255);
 
-  /// One of a few words.
+  /// Value of one of a few words.
   template <class E>
   using Choices = std::vector<std::pair<std::string_view, E>>;
   template <class E>
@@ -102,7 +102,7 @@ class StrictMap {
   /// List of texts; absent: empty when min_count is 0.
   std::vector<std::string> Texts(std::string_view key, std::size_t min_count, std::size_t max_count);
 
-  /// Sub-map that must be there.
+  /// Sub-map that is required.
   StrictMap Map(std::string_view key);
   /// Sub-map whose keys all take their defaults when it is absent.
   StrictMap MapOrDefaults(std::string_view key);
@@ -110,8 +110,8 @@ class StrictMap {
   std::optional<StrictMap> OptionalMap(std::string_view key);
   /// List of maps; absent: empty when min_count is 0.
   std::vector<StrictMap> Maps(std::string_view key, std::size_t min_count, std::size_t max_count);
-  /// Names of the keys of this map, in file order: for maps whose keys are names the file chooses. Does not count as
-  /// use: ask for each of them.
+  /// Names of the keys of this map, in file order: for maps whose keys are names chosen in the file. Does not count as
+  /// use: each key must still be read.
   [[nodiscard]] std::vector<std::string> Keys() const;
 
   /// For rules that span several keys: throws InputError at this key's line: "file:line: path: `reason`".
@@ -132,7 +132,7 @@ class StrictMap {
 
   internal::Node* Use(std::string_view key);
   internal::Node* Require(std::string_view key, std::string_view what);
-  /// Of the key that was asked for last.
+  /// Records the rule of the key that was read last.
   void Rule(std::string valid, std::optional<std::string> standard);
   double ReadNumber(std::string_view key, const double* default_value, const Range& range);
   std::optional<std::vector<double>> ReadNumbers(std::string_view key, std::size_t min_count, std::size_t max_count,
@@ -147,12 +147,12 @@ class StrictMap {
   internal::Node* node_;
 };
 
-/// A key that was asked for, and what it may be.
+/// A key that was read, and its valid values.
 struct KeyRule {
   std::string path;                     ///< "handles.tool0.simulated.noise_mV"; of a list's maps "structures[].kind".
-  int line = 0;                         ///< Where the file has it; 0: it does not.
-  std::optional<std::string> standard;  ///< Its default; none: it must be given, or is a map.
-  std::string valid;                    ///< In words; empty for maps.
+  int line = 0;                         ///< Line in the file; 0: the file does not contain the key.
+  std::optional<std::string> standard;  ///< Default value; none: the key is required, or is a map.
+  std::string valid;                    ///< Description of the valid values; empty for maps.
 };
 
 /// One configuration file.
@@ -160,12 +160,12 @@ class StrictYaml {
  public:
   /// Reads and parses. Throws InputError.
   static StrictYaml FromFile(const std::filesystem::path& file);
-  /// The same for text in memory; `name` stands for the file in messages.
+  /// As FromFile, for text in memory; `name` stands for the file in messages.
   static StrictYaml FromText(std::string_view text, std::string_view name);
-  /// The same of a file that may stand on others: its key `base` names one, relative to its folder, and so on. Maps
-  /// join key by key, anything else replaces what the base says, lists as a whole; `own` keys are never taken from a
-  /// base.
-  /// @param text stands for the content of `file` when it is not empty.
+  /// As FromFile, for a file that may be based on others: its key `base` names one, relative to its folder, which may
+  /// have a base as well. Maps are merged key by key, anything else, lists included, replaces the value of the base;
+  /// `own` keys are never taken from a base.
+  /// @param text replaces the content of `file` when it is not empty.
   static StrictYaml FromFileOnBases(const std::filesystem::path& file, const std::vector<std::string_view>& own,
                                     std::string_view text = {});
   ~StrictYaml();
@@ -173,13 +173,13 @@ class StrictYaml {
   StrictYaml& operator=(StrictYaml&&) noexcept;
 
   [[nodiscard]] StrictMap root();
-  /// The files that it was read from: itself, then its bases.
+  /// The files that were read: the file itself, then its bases.
   [[nodiscard]] std::vector<std::filesystem::path> files() const;
-  /// Refuses keys that nobody asked for. Call when everything has been read.
+  /// Refuses keys that were not read. Call when everything has been read.
   void Finish() const;
-  /// What was read, defaults included, as YAML in the order of reading. Reads back to the same.
+  /// The values that were read, defaults included, as YAML in the order of reading. Reading it gives the same values.
   [[nodiscard]] std::string Effective() const;
-  /// Every key that was asked for, in the order of asking; of the maps of a list the first stands for all.
+  /// Every key that was read, in the order of reading; of the maps of a list the first stands for all.
   [[nodiscard]] std::vector<KeyRule> Rules() const;
 
  private:

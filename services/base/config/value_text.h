@@ -12,7 +12,7 @@
 
 namespace fulcrum::config::internal {
 
-/// Shortest text that reads back to the same number.
+/// Shortest text that is read back as the same number.
 [[nodiscard]] std::string Shortest(double value);
 
 /// Text of a default. Most are floats of the parameter structs in SI: 0.2f m is meant as 200 mm, not as
@@ -22,7 +22,7 @@ namespace fulcrum::config::internal {
 /// "0.05 to 5 mm", "above 0 up to 300 W", "at least 1". @param unit nullptr: none.
 [[nodiscard]] std::string RangeText(const Range& range, const Unit* unit);
 
-/// "3", "1 to 9": of a list's items.
+/// Number of items of a list: "3", "1 to 9".
 [[nodiscard]] std::string CountText(std::size_t min_count, std::size_t max_count);
 
 /// "cut, coag, blend".
@@ -31,7 +31,7 @@ namespace fulcrum::config::internal {
 /// "nothing", "a single value", "a list", "a map".
 [[nodiscard]] const char* KindName(const Node& node);
 
-/// In quotation marks; the first 60 bytes of a longer one.
+/// The text in quotation marks; of a longer text only the first 60 bytes.
 [[nodiscard]] std::string Quoted(std::string_view text);
 
 }  // namespace fulcrum::config::internal

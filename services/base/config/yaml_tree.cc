@@ -16,7 +16,8 @@
 namespace fulcrum::config::internal {
 namespace {
 
-constexpr std::size_t kMaxFileBytes = 1 << 20;  // The largest shipped file is 10 KB; anything near this is not ours.
+// The largest shipped file is 10 KB, so a file of this size is no configuration file.
+constexpr std::size_t kMaxFileBytes = 1 << 20;
 constexpr int kMaxDepth = 32;
 constexpr std::size_t kMaxKeyLength = 64;
 

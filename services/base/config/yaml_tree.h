@@ -1,4 +1,4 @@
-// What strict_yaml keeps of a file: a plain tree with line numbers, and beside each map what was asked of it.
+// Representation of a file in strict_yaml: a plain tree with line numbers, and for each map the keys that were read.
 #pragma once
 
 #include <memory>
@@ -14,13 +14,13 @@ enum class NodeKind { kNull, kScalar, kList, kMap };
 
 struct Node {
   NodeKind kind = NodeKind::kNull;
-  int line = 0;      ///< From 1; 0 for a map that stands for an absent one.
+  int line = 0;      ///< From 1; 0 for a map that is absent in the file.
   std::string path;  ///< "physics.layers[2].k".
-  std::string text;  ///< Of a scalar.
+  std::string text;  ///< Value of a scalar.
   std::vector<Node*> items;
   std::vector<std::pair<std::string, Node*>> entries;
 
-  /// What was read, in order of asking: exactly one of text, flow, map, maps is used, as `form` says.
+  /// Form of an entry that was read. Entries are in order of reading; of text, list and maps exactly one is used.
   enum class Form { kPlain, kQuoted, kFlow, kQuotedList, kMap, kMaps, kAbsent };
   struct Asked {
     std::string key;
@@ -28,7 +28,7 @@ struct Node {
     std::string text;
     std::vector<std::string> list;
     std::vector<Node*> maps;
-    std::string valid;                    ///< What would be, in words.
+    std::string valid;                    ///< Description of the valid values.
     std::optional<std::string> standard;  ///< The default.
   };
   std::vector<Asked> asked;
@@ -36,12 +36,12 @@ struct Node {
   [[nodiscard]] Node* Find(std::string_view key) const;
 };
 
-/// Lines of the k-th file that a document was laid over count from k times this: more than any file of ours has.
+/// Line numbers of the k-th base of a document are offset by k times this, which is more than any valid file has.
 inline constexpr int kLinesPerFile = 1 << 21;
 
 struct Document {
   std::string name;                ///< File, as given by the user.
-  std::vector<std::string> bases;  ///< The files beneath it, the nearest first.
+  std::vector<std::string> bases;  ///< Its base files, the nearest first.
   std::vector<std::unique_ptr<Node>> nodes;
   Node* root = nullptr;
 
@@ -50,7 +50,7 @@ struct Document {
   [[noreturn]] void Fail(int line, std::string_view path, std::string_view reason) const;
 };
 
-/// Lays `document` over `base`: maps join key by key, anything else replaces what is there. `base` is used up.
+/// Merges `document` over `base`: maps key by key, anything else replaces the value of the base. `base` is consumed.
 void LayOver(std::unique_ptr<Document> base, Document* document);
 
 /// Parses one YAML document whose root is a map. Throws InputError.
@@ -59,7 +59,7 @@ std::unique_ptr<Document> ParseDocument(std::string_view text, std::string_view 
 /// Reads a file of at most 1 MiB of text. Throws InputError.
 std::string ReadTextFile(const std::string& file);
 
-/// The tree of what was asked, as YAML.
+/// The entries that were read, as YAML.
 std::string EmitAsked(const Node& root);
 
 }  // namespace fulcrum::config::internal

@@ -1,5 +1,5 @@
-// What a session is judged by: the measures, their usual thresholds, and what a trainee is told while it lasts. Plain
-// data, shared by the scene description, the assessment and whoever shows it. No I/O here.
+// Measures by which a session is assessed, their usual thresholds, and the prompts that a trainee sees during the
+// session. Plain data, shared by scene description, assessment and displays. No I/O here.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@ namespace fulcrum {
 
 // ------------------------------------------------------------------------------------------------- measures
 
-/// In the order of the score sheet. How each is measured: services/session/assessment/DESIGN.md.
+/// Measures in the order of the score sheet. Definition of each: services/session/assessment/DESIGN.md.
 enum class Measure : std::uint32_t {
   kLift,
   kLiftHold,
@@ -38,23 +38,23 @@ enum class Measure : std::uint32_t {
 };
 inline constexpr std::size_t kMeasureCount = 22;
 
-/// What a measure is for.
+/// Part of a measure in the score.
 enum class MeasureRole : std::uint8_t {
-  kTask,   ///< What was to be done: at least the threshold, and the other points count in proportion to it.
-  kSkill,  ///< How it was done.
+  kTask,   ///< The result: at least the threshold; the other points count in proportion to it.
+  kSkill,  ///< The quality of execution.
 };
 
 struct MeasureInfo {
-  const char* name;   ///< In a scene's `points`.
-  const char* key;    ///< In a scene's `limits`, in JSON and in the trainees' database: the name and its unit.
+  const char* name;   ///< Key in a scene's `points`.
+  const char* key;    ///< Key in a scene's `limits`, in JSON and in the trainees' database: the name and its unit.
   const char* label;  ///< For people.
   const char* unit;
   int decimals;
   MeasureRole role;
-  bool at_least;    ///< Kept when the value is at least the threshold; else at most.
-  bool per_tool;    ///< Also known for each tool.
+  bool at_least;    ///< Whether the threshold is a lower limit of the value; otherwise it is an upper limit.
+  bool per_tool;    ///< Also measured for each tool.
   float limit;      ///< Usual threshold, in `unit`.
-  float low, high;  ///< Valid thresholds.
+  float low, high;  ///< Range of valid thresholds.
   float points;     ///< Usual points; 0: measured, not scored.
 };
 
@@ -98,24 +98,24 @@ inline constexpr std::array<MeasureInfo, kMeasureCount> kMeasures{{
 
 // ------------------------------------------------------------------------------------------- section assessment
 
-/// How the planned line is traced.
+/// Instrument action that traces the planned line.
 enum class LineTracing : std::uint32_t { kCut = 0, kTouch = 1 };
 
 /// Section `assessment` of a scene. The planned line itself is an array of the scene.
 struct AssessmentParams {
-  std::uint32_t on = 0;  ///< 1: the scene has the section. Else nothing is measured, nor subscribed.
+  std::uint32_t on = 0;  ///< 1: the scene has the section. Otherwise nothing is measured or subscribed.
   LineTracing tracing = LineTracing::kCut;
-  float line_reach_m = 0.002f;                ///< The line is done where it was passed at most this far away.
+  float line_reach_m = 0.002f;                ///< A point of the line is done if the trace passes within this distance.
   float margin_m = 0.002f;                    ///< Coagulated tissue farther than this from the planned line is damage.
   float near_m = 0.005f;                      ///< An energised tip this near a ureter or nerve is a prompt.
   float movement_speed_m_s = 0.005f;          ///< A movement is faster than this at some time …
-  float idle_speed_m_s = 0.001f;              ///< … and lasts while the tip is faster than this.
-  float idle_after_s = 0.5f;                  ///< Rest counts as idle when it lasts longer.
+  float idle_speed_m_s = 0.001f;              ///< … and lasts as long as the tip is faster than this.
+  float idle_after_s = 0.5f;                  ///< Rest counts as idle time if it lasts longer than this.
   std::array<float, kMeasureCount> limit{};   ///< In the unit of the measure.
   std::array<float, kMeasureCount> points{};  ///< 0: not scored.
 };
 
-/// With the usual thresholds and points.
+/// Parameters with the usual thresholds and points.
 [[nodiscard]] constexpr AssessmentParams UsualAssessment() {
   AssessmentParams params;
   for (std::size_t i = 0; i < kMeasureCount; ++i) {
@@ -127,8 +127,8 @@ struct AssessmentParams {
 
 // --------------------------------------------------------------------------------------------------- prompts
 
-/// What a trainee is told at once, most urgent first. The supervisor's Health carries the set as its metric `prompts`,
-/// the sum of 1 << prompt.
+/// Warnings shown to a trainee at once, most urgent first. The supervisor's Health carries the set as its metric
+/// `prompts`, the sum of 1 << prompt.
 enum class Prompt : std::uint32_t {
   kInjury,
   kUreterHot,
@@ -146,7 +146,7 @@ inline constexpr std::array<std::string_view, kPromptCount> kPromptTexts{
     "nerve near",   "pedal, no contact",     "grasp slips",          "off the line"};
 
 inline constexpr std::uint32_t BitOf(Prompt prompt) { return 1u << static_cast<std::uint32_t>(prompt); }
-/// Text of the most urgent of a set; empty for none.
+/// Text of the most urgent prompt of a set; empty if the set is empty.
 [[nodiscard]] constexpr std::string_view MostUrgent(std::uint32_t prompts) {
   for (std::size_t i = 0; i < kPromptCount; ++i) {
     if ((prompts >> i & 1u) != 0) return kPromptTexts[i];

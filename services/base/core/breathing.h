@@ -1,4 +1,4 @@
-// How what surrounds the tissue breathes: one motion for who collides with it and who draws it.
+// Breathing motion of the surroundings of the tissue: one definition for collision and picture.
 #pragma once
 
 #include <cmath>
@@ -8,8 +8,8 @@
 
 namespace fulcrum {
 
-/// Where the surroundings that breathe are at `time_s` of simulated time, against their place in the scene [m]:
-/// amplitude (1 - cos(2 pi t / period)) / 2 along the direction, so at rest at 0.
+/// Displacement of the breathing surroundings from their place in the scene at simulated time `time_s` [m]: amplitude
+/// (1 - cos(2 pi t / period)) / 2 along the direction, so at rest at 0.
 [[nodiscard]] inline Vec3f BreathingOffset(const Breathing& breathing, double time_s) {
   if (!(breathing.amplitude_m > 0.0f)) {
     return Vec3f::Zero();
@@ -19,8 +19,8 @@ namespace fulcrum {
          breathing.direction;
 }
 
-/// Wall, bladder and what else lies free; not the pelvis, nor the retroperitoneum, to which the membrane's rim is
-/// fixed.
+/// Whether a surface breathes: the abdominal wall, the bladder and other free surroundings; not the pelvis, nor the
+/// retroperitoneum, to which the membrane's rim is fixed.
 [[nodiscard]] inline bool Breathes(SurfaceRole role) {
   return role != SurfaceRole::kPelvis && role != SurfaceRole::kRetroperitoneum;
 }

@@ -15,7 +15,7 @@ namespace fulcrum {
 
 static_assert(std::endian::native == std::endian::little);
 
-/// Appends to a vector.
+/// Appends numbers and strings to a vector.
 class ByteWriter {
  public:
   explicit ByteWriter(std::vector<std::uint8_t>* out) : out_(out) {}
@@ -40,7 +40,7 @@ class ByteWriter {
     const auto* const begin = static_cast<const std::uint8_t*>(data);
     out_->insert(out_->end(), begin, begin + size);
   }
-  /// What `put` appends, with its length in bytes in front of it.
+  /// Appends the output of `put`, preceded by its length in bytes.
   template <std::integral Length, class Put>
   void Sized(const Put& put) {
     const std::size_t at = out_->size();
@@ -49,7 +49,7 @@ class ByteWriter {
     const auto length = static_cast<Length>(out_->size() - at - sizeof(Length));
     std::memcpy(out_->data() + at, &length, sizeof length);
   }
-  /// What `put` appends as a record: a byte that names its kind, its length as 64 bits, its content.
+  /// Appends the output of `put` as a record: a byte that names its kind, its length as 64 bits, its content.
   template <class Opcode, class Put>
   void Record(Opcode opcode, const Put& put) {
     Number(static_cast<std::uint8_t>(opcode));
@@ -60,7 +60,7 @@ class ByteWriter {
   std::vector<std::uint8_t>* out_;
 };
 
-/// Takes from a span. What is not there reads as 0 or empty, and good() is false from then on.
+/// Reads numbers and strings from a span. Reading beyond its end returns 0 or empty, and good() is false from then on.
 class ByteReader {
  public:
   explicit ByteReader(std::span<const std::uint8_t> bytes) : bytes_(bytes) {}

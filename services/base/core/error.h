@@ -6,13 +6,13 @@
 
 namespace fulcrum {
 
-/// A file or an option that cannot be used: says where, what, which values are valid and what to do.
+/// A file or an option that cannot be used. The message contains place, fault, valid values and what to do.
 class InputError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Two parts that do not belong together: another scene, another schema, another version.
+/// Two parts that do not match: different scenes, schemas or versions.
 class MismatchError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -1,11 +1,11 @@
-// Text within HTML, SVG and XML.
+// Escaping of text in HTML, SVG and XML.
 #pragma once
 
 #include <string>
 
 namespace fulcrum {
 
-/// Replaces the characters that they reserve, and by a blank the control characters that XML cannot hold.
+/// Replaces reserved characters by their entities, and control characters that XML does not allow by blanks.
 [[nodiscard]] inline std::string EscapeHtml(const std::string& text) {
   std::string escaped;
   for (const char c : text) {

@@ -1,4 +1,4 @@
-// How far the cells of the sheet around a contact are from the metal.
+// Distance between the metal and the cells of the membrane around a contact.
 #pragma once
 
 #include <algorithm>
@@ -8,20 +8,22 @@
 
 namespace fulcrum {
 
-/// Of a footprint at most, along either axis [cells].
+/// Largest size of a footprint along either axis [cells].
 inline constexpr std::uint32_t kFootprintCells = 64;
-/// What a byte of a footprint means: kLeastGap_m + value * kGapStep_m from the metal's surface; the last one: farther.
+/// Meaning of a byte of a footprint: distance kLeastGap_m + value * kGapStep_m from the metal's surface [m]; the
+/// largest value also stands for any larger distance.
 inline constexpr float kLeastGap_m = -5e-4f, kGapStep_m = 5e-6f;
 inline constexpr std::uint8_t kBeyond = 255;
 
-/// A box of cells of the sheet, row by row; cell (x, y) holds what has floor(s / cell_m) = x and floor(t / cell_m) = y.
+/// A box of cells of the membrane, row by row; cell (x, y) contains the points with floor(s / cell_m) = x and floor(t /
+/// cell_m) = y.
 struct Footprint {
-  std::int32_t x = 0, y = 0;  ///< Of its first cell.
-  std::uint32_t width = 0;    ///< Cells of a row; 0: no cell is near.
+  std::int32_t x = 0, y = 0;  ///< Position of its first cell.
+  std::uint32_t width = 0;    ///< Cells per row; 0: no cell is near.
   std::vector<std::uint8_t> gap;
 
   [[nodiscard]] std::uint32_t height() const { return width > 0 ? static_cast<std::uint32_t>(gap.size()) / width : 0; }
-  /// Its numbers agree, and it lies where a sheet can be: no sum of two of its cells overflows.
+  /// Whether its numbers are consistent and its position is possible: no sum of two of its cells overflows.
   [[nodiscard]] bool whole() const {
     constexpr std::int32_t kLastCell = 1 << 24;
     const auto near = [](std::int32_t cell) { return cell > -kLastCell && cell < kLastCell; };

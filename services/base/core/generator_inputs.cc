@@ -83,7 +83,7 @@ CauteryMode GeneratorInputs::ModeAt(std::int64_t ns, std::vector<ConsumedInput>*
 GeneratorDemand GeneratorInputs::At(std::int64_t ns, std::vector<ConsumedInput>* consumed) const {
   const CauteryMode mode = ModeAt(ns, consumed);
   if (settings_.empty()) return {mode, 0};
-  // The newest is all that a late joiner is given: it stands for what was before it, too.
+  // The newest setting is all that a late joiner gets, so it also applies to the time before it.
   const auto later = Later(settings_, ns);
   const GeneratorSetting& setting = later == settings_.begin() ? settings_.front() : *std::prev(later);
   Name(TopicId::kGeneratorSetting, setting.stamp, consumed);

@@ -12,8 +12,8 @@
 
 namespace fulcrum {
 
-/// Multiply-rotate over 8-byte words with SplitMix64's finaliser (Steele, Lea, Flood 2014). The bytes left over at the
-/// end are folded in with the length, so that {1} and {1, 0} differ.
+/// Multiply-rotate over 8-byte words with SplitMix64's finaliser (Steele, Lea, Flood 2014). The bytes left at the end
+/// are mixed in together with the length, so that {1} and {1, 0} differ.
 class Hash64 {
  public:
   void Add(std::span<const std::byte> bytes) noexcept {
@@ -35,8 +35,8 @@ class Hash64 {
   requires std::is_trivially_copyable_v<T>
   void Add(std::span<const T> values) noexcept { Add(std::as_bytes(values)); }
 
-  /// The same for a long array, eight words at a time: each word waits for the eighth before it and not for the last,
-  /// and costs one multiplication. Another value than Add's.
+  /// Adds a long array, eight words at a time: each word depends on the eighth before it and not on the previous one,
+  /// and costs one multiplication. The hash differs from that of Add.
   template <class T>
   requires std::is_trivially_copyable_v<T>
   void AddLong(std::span<const T> values) noexcept {
@@ -49,7 +49,7 @@ class Hash64 {
       for (std::size_t lane = 0; lane < kLanes; ++lane) {
         std::uint64_t word;
         std::memcpy(&word, bytes.data() + i + 8 * lane, 8);
-        // Invertible in both, as Mix is.
+        // Invertible in state and word, as Mix is.
         lanes[lane] = (std::rotl(lanes[lane], 27) ^ word) * kFirst;
       }
     }
@@ -77,7 +77,7 @@ class Hash64 {
 
  private:
   /// Invertible in the state for a given word and in the word for a given state: two inputs that differ in one word
-  /// never meet.
+  /// never have the same state.
   void Mix(std::uint64_t word) noexcept {
     state_ = std::rotl(state_ ^ (word * kFirst), 27) * kSecond + 0x94d049bb133111ebull;
   }

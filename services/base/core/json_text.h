@@ -1,4 +1,4 @@
-// A string as JSON has it.
+// Strings in JSON.
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 namespace fulcrum {
 
-/// Quoted and escaped.
+/// The text quoted and escaped.
 [[nodiscard]] inline std::string JsonString(std::string_view text) {
   constexpr const char* kDigits = "0123456789abcdef";
   std::string quoted = "\"";

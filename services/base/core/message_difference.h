@@ -1,4 +1,4 @@
-// Where two messages differ first: field, index and both values, as text.
+// First difference of two messages: field, index and both values, as text.
 #pragma once
 
 #include <Eigen/Core>
@@ -37,7 +37,7 @@ std::string TextOf(const T& value) {
   }
 }
 
-/// By their bits: what is not a number equals itself here.
+/// Compares by bits, so a NaN equals itself.
 template <class T>
 bool SameBits(T a, T b) {
   if constexpr (std::is_floating_point_v<T>) {
@@ -56,7 +56,7 @@ std::optional<Difference> FindInRange(const Range& a, const Range& b, const std:
   const auto size_a = static_cast<std::size_t>(a.size()), size_b = static_cast<std::size_t>(b.size());
   if (size_a != size_b) return Difference{path + ".size", std::to_string(size_a), std::to_string(size_b)};
   for (std::size_t i = 0; i < size_a; ++i) {
-    // Names are made for what differs only: a frame has tens of thousands of numbers.
+    // Names are built for differing elements only: a frame has tens of thousands of numbers.
     if constexpr (std::is_arithmetic_v<std::decay_t<decltype(a[i])>>) {
       if (SameBits(a[i], b[i])) continue;
     }
@@ -88,8 +88,8 @@ std::optional<Difference> Find(const T& a, const T& b, const std::string& path, 
 
 }  // namespace difference
 
-/// The first field, in the order of the struct, in which the bits differ. @param without a field to leave out wherever
-/// it is met, for example "stamp".
+/// The first field, in the order of the struct, in which the bits differ. @param without name of a field that is
+/// skipped at any depth, for example "stamp".
 template <HasFields T>
 [[nodiscard]] std::optional<Difference> FirstDifference(const T& a, const T& b, std::string_view without = {}) {
   return difference::Find(a, b, {}, without);

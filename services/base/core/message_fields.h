@@ -1,5 +1,5 @@
-// The fields of each message and of what messages are made of, by name, in the order of the struct. This one list makes
-// the walks below, which print, compare and export messages, and the conversions to the wire
+// The fields of each message and of its parts, by name, in the order of the struct. From this one list are made the
+// walks below, which print, compare and export messages, and the conversions to the wire
 // (services/transport/bus/convert).
 //
 //   ForEachField<Stamp>([&](const char* name, auto member) { std::cout << name << ' ' << stamp.*member << '\n'; });
@@ -52,12 +52,12 @@ namespace fulcrum {
 #define FULCRUM_FIELDS_OF_Health(F) F(stamp) F(node) F(state) F(pid) F(schema_hash) F(scene_hash) F(rate_asked_Hz) \
   F(rate_achieved_Hz) F(ticks) F(overruns) F(write_failures) F(step) F(wake) F(last_error) F(inputs) F(metrics)
 
-/// S(T) for each struct whose fields have the same names in IDL, so that its conversion is made from its list.
+/// S(T) for each struct whose fields have the same names in IDL: its conversion is generated from its list.
 #define FULCRUM_STRUCTS_ALIKE_IN_IDL(S) S(HandleSample) S(HandleState) S(GeneratorSetting) S(ToolSample) \
   S(ToolState) S(TissueFrameHeader) S(Contact) S(DeviceContacts) S(ContactModel) S(Footprint) S(CauteryContact) \
   S(TopologyState) S(TearState) S(OpenCells) S(TemperaturePatchHeader) S(ThermalEvent) S(SceneManifest) S(Command) \
   S(CommandReply) S(TickManifest) S(TimingSummary) S(InputHealth) S(Metric) S(Health)
-/// The others: `sequence` is a keyword of IDL, and the two large messages travel in loans.
+/// The others: `sequence` is a keyword of IDL, and the two large messages are sent in loans.
 #define FULCRUM_STRUCTS_WITH_A_CONVERSION_OF_THEIR_OWN(S) S(Stamp) S(ConsumedInput) S(TissueFrame) S(TemperaturePatch)
 // clang-format on
 
@@ -80,7 +80,7 @@ constexpr auto List(std::nullptr_t, Fields... fields) {
   return std::tuple{fields...};
 }
 
-/// Size of a struct of these members.
+/// Size of a struct with these members.
 template <class Message, class... Values>
 constexpr std::size_t SizeOf(const std::tuple<Field<Message, Values>...>&) {
   std::size_t size = 0;

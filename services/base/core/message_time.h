@@ -1,4 +1,4 @@
-// The times in a message, for whoever moves it to another clock.
+// The times in a message, for its conversion to another clock.
 #pragma once
 
 #include <string_view>
@@ -9,7 +9,7 @@
 namespace fulcrum {
 
 /// Calls visit(name, value) for each number in `message`, at any depth, that is a time of CLOCK_MONOTONIC by its name:
-/// "epoch" and what ends in "_ns". Not for 0, which stands for none.
+/// "epoch" and names that end in "_ns". Values of 0, which mean none, are skipped.
 template <class T, class Visit>
 void ForEachTime(T* message, const Visit& visit) {
   if constexpr (HasFields<T>) {

@@ -1,5 +1,5 @@
-// Value types of the topics. Nodes see these and never a generated type: services/transport/bus/convert maps them to
-// IDL.
+// Value types of the topics. Nodes use these and never a generated type: services/transport/bus/convert converts them
+// to IDL.
 //
 // Conventions: SI units; world frame W right-handed, z up, metres; a tool frame T has its origin at the tip and +z
 // along the shaft from the handle towards the tip; quaternions are unit, (w, x, y, z) in IDL. Each field is described
@@ -42,9 +42,9 @@ enum PedalBits : std::uint8_t { kPedalNone = 0, kPedalCut = 1, kPedalCoag = 2, k
 
 struct HandleSample {
   bool present = false;
-  float jaw_angle_rad = 0;  ///< 0 closed … about 1.05 open.
+  float jaw_angle_rad = 0;  ///< 0 closed to about 1.05 open.
   float jaw_rate_rad_s = 0;
-  float quality = 0;  ///< 0 unusable … 1 every line of the last half second was valid.
+  float quality = 0;  ///< 0 unusable to 1: every line of the last half second was valid.
   std::uint16_t raw_counts = 0;
 };
 
@@ -58,11 +58,11 @@ struct HandleState {
 
 enum class CauteryMode : std::uint8_t { kOff, kCut, kCoag, kBlend };
 
-inline constexpr float kMaxSetPower_W = 300.0f;  ///< Of a GeneratorSetting.
+inline constexpr float kMaxSetPower_W = 300.0f;  ///< Largest power of a GeneratorSetting.
 
-/// What the panel of the electrosurgical generator is set to, by mode [W].
+/// Settings of the electrosurgical generator's panel, by mode [W].
 struct GeneratorSetting {
-  Stamp stamp;  ///< stamp_ns: from then on it holds.
+  Stamp stamp;  ///< stamp_ns: time from which it applies.
   float cut_W = 0;
   float coag_W = 0;
   float blend_W = 0;
@@ -95,10 +95,10 @@ struct TissueFrameHeader {
   Stamp stamp;
   std::uint64_t scene_hash = 0;
   std::uint64_t topology_revision = 0;  ///< Revision that these positions respect.
-  std::uint64_t tool_sequence = 0;      ///< ToolState consumed.
-  std::uint64_t handle_sequence = 0;    ///< HandleState consumed.
+  std::uint64_t tool_sequence = 0;      ///< Sequence of the consumed ToolState.
+  std::uint64_t handle_sequence = 0;    ///< Sequence of the consumed HandleState.
   double session_time_s = 0;
-  double simulated_time_s = 0;  ///< Of these positions: what breathes is where it is then.
+  double simulated_time_s = 0;  ///< Simulated time of these positions; breathing surfaces are placed for this time.
   std::uint32_t vertex_count = 0;
   /// Bit per tool: the grasper holds tissue.
   std::uint32_t grasping_tools = 0;
@@ -126,7 +126,7 @@ struct Contact {
   Vec3f f_ref = Vec3f::Zero();  ///< Force of the tissue on the tool at x_ref [N].
   Vec3f n = Vec3f::UnitZ();     ///< Outward surface normal.
   Vec3f e1 = Vec3f::UnitX();    ///< First principal tangent.
-  Vec3f p_s = Vec3f::Zero();    ///< Point of the undeformed-by-this-tool surface [m].
+  Vec3f p_s = Vec3f::Zero();    ///< Point of the surface as it would be without this tool [m].
   Vec3f v_s = Vec3f::Zero();    ///< Its velocity [m/s].
   Vec3f u_c = Vec3f::Zero();    ///< Tissue displacement at the contact [m].
   Vec3f du_c = Vec3f::Zero();   ///< Its rate [m/s].
@@ -138,20 +138,20 @@ struct Contact {
   float b_body = 0;             ///< Viscosity of the bulk, Bb [N s/m].
   float friction = 0;
   float kappa1 = 0, kappa2 = 0;  ///< Principal curvatures [1/m].
-  float slip_force = 0;          ///< A grasp lets go above this force [N].
-  float radius = 0;              ///< The model holds within this distance of x_ref [m].
+  float slip_force = 0;          ///< Above this force the grasp slips off [N].
+  float radius = 0;              ///< The model is valid within this distance of x_ref [m].
 };
 
 struct DeviceContacts {
   std::uint32_t count = 0;
-  float p_ext_W = 0;      ///< Power that the tissue may bring in from outside [W].
-  float force_cap_N = 0;  ///< No force above this.
+  float p_ext_W = 0;      ///< Largest power that the tissue may supply from outside [W].
+  float force_cap_N = 0;  ///< Upper limit of the force.
   std::array<Contact, kMaxContacts> contacts;
 };
 
 struct ContactModel {
   Stamp stamp;
-  std::uint64_t tool_sequence = 0;  ///< ToolState that it was computed for.
+  std::uint64_t tool_sequence = 0;  ///< ToolState for which it was computed.
   std::int64_t tool_stamp_ns = 0;   ///< Stamp of that ToolState: t_s of the model [ns].
   float physics_dt_s = 0;
   std::array<DeviceContacts, kMaxTools> devices;
@@ -159,44 +159,44 @@ struct ContactModel {
 
 // ------------------------------------------------------------------------------------------- CauteryContact
 
-/// Where the metal of the active electrode is. What current it carries: HandleState and GeneratorSetting say it
+/// Position of the active electrode's metal. Its current follows from HandleState and GeneratorSetting
 /// (services/base/core/generator_inputs.h).
 struct CauteryContact {
   Stamp stamp;
   double session_time_s = 0;
   std::uint64_t topology_revision = 0;
-  bool touching = false;  ///< The metal touches the membrane, or is near enough for an arc.
+  bool touching = false;  ///< The metal touches the membrane, or is close enough for an arc.
   bool tented = false;    ///< Membrane lifted off the tissue beneath.
   std::uint8_t tool = 0;
   std::uint32_t triangle = kNoIndex;  ///< Membrane triangle: 2 * cell + half, cell = row * (cols-1) + col.
   std::array<float, 3> barycentric{0, 0, 0};
   Vec2f material = Vec2f::Zero();       ///< (s, t) of the contact's centre on the rest sheet [m].
-  Vec2f material_rate = Vec2f::Zero();  ///< [m/s].
-  float contact_radius_m = 0;           ///< Of the metal around its axis.
-  Footprint footprint;                  ///< Of the bare metal on the deformed sheet.
+  Vec2f material_rate = Vec2f::Zero();  ///< Its rate of change [m/s].
+  float contact_radius_m = 0;           ///< Radius of the metal about its axis.
+  Footprint footprint;                  ///< Footprint of the bare metal on the deformed membrane.
 };
 
 // -------------------------------------------------------------------------------------------- TopologyState
 
-/// Whole state of what has been cut and shrunk. Membrane node = row * cols + col; edge = 3 * node + direction with
-/// direction 0 to (row, col+1), 1 to (row+1, col), 2 to (row+1, col+1).
+/// Complete state of cuts and shrinkage. Membrane node = row * cols + col; edge = 3 * node + direction with direction 0
+/// to (row, col+1), 1 to (row+1, col), 2 to (row+1, col+1).
 struct TopologyState {
   Stamp stamp;
   std::uint64_t scene_hash = 0;
-  std::uint64_t revision = 0;  ///< 0: nothing has happened yet.
+  std::uint64_t revision = 0;  ///< 0: no change so far.
   std::uint32_t rows = 0;
   std::uint32_t cols = 0;
   float cut_length_m = 0;
-  float cut_width_m = 0;                 ///< Of the slit, 95th percentile along it.
-  float cut_off_way_m = 0;               ///< Of the slit's centre line from the metal's way, 95th percentile.
+  float cut_width_m = 0;    ///< Width of the slit, 95th percentile along it.
+  float cut_off_way_m = 0;  ///< Distance of the slit's centre line from the path of the metal, 95th percentile.
   std::vector<std::uint8_t> dead_nodes;  ///< Bit field, rows * cols bits, least significant bit first.
   std::vector<std::uint8_t> dead_edges;  ///< Bit field, 3 * rows * cols bits.
-  std::vector<std::uint8_t> shrink;      ///< Per edge: rest length is scaled by 1 - kShrinkUnit * value.
+  std::vector<std::uint8_t> shrink;      ///< Per edge: the rest length is multiplied by 1 - kShrinkUnit * value.
 };
 inline constexpr float kShrinkUnit = 0.002f;
 
-/// Whole state of what traction has torn since the start of the session. The owner of the topology severs these edges;
-/// until TopologyState says so, they hold.
+/// Complete state of what traction has torn since the start of the session. The owner of the topology severs these
+/// edges; they hold until TopologyState contains them.
 struct TearState {
   Stamp stamp;
   std::uint64_t scene_hash = 0;
@@ -205,10 +205,10 @@ struct TearState {
   std::vector<std::uint8_t> torn_edges;  ///< Bit field, 3 * rows * cols bits, as TopologyState::dead_edges.
 };
 
-inline constexpr int kOpenWindow = 64;  ///< Cells along the edge of OpenCells.
+inline constexpr int kOpenWindow = 64;  ///< Edge length of OpenCells [cells].
 
-/// Which cells of the sheet around the hook are gone. A cut opens cells long before it severs the edges of the mesh
-/// that they belong to.
+/// Cells of the membrane around the hook that are gone. A cut opens cells long before it severs the edges of the mesh
+/// to which they belong.
 struct OpenCells {
   Stamp stamp;
   std::uint64_t scene_hash = 0;
@@ -232,9 +232,9 @@ inline void SetBit(std::span<std::uint8_t> bits, std::size_t i) {
 struct TemperaturePatchHeader {
   Stamp stamp;
   std::uint64_t topology_revision = 0;
-  std::uint32_t slot = 0;      ///< Which hot spot; a slot is reused when its spot has gone cold.
+  std::uint32_t slot = 0;      ///< Index of the hot spot; a slot is reused when its spot has gone cold.
   std::uint32_t origin_x = 0;  ///< Texel of the atlas where the patch begins (s direction).
-  std::uint32_t origin_y = 0;  ///< (t direction).
+  std::uint32_t origin_y = 0;  ///< The same in the t direction.
   float max_temperature_C = 0;
 };
 
@@ -269,7 +269,7 @@ struct ThermalEvent {
   Stamp stamp;
   double session_time_s = 0;
   ThermalEventKind kind = ThermalEventKind::kContact;
-  Vec2f material = Vec2f::Zero();  ///< Where on the sheet (s, t) [m].
+  Vec2f material = Vec2f::Zero();  ///< Place on the membrane (s, t) [m].
   float temperature_C = 0;
   float value = 0;  ///< Kind-specific: cut length so far [m] for kCut, damage integral for injuries.
   std::uint64_t topology_revision = 0;
@@ -286,7 +286,8 @@ struct SceneManifest {
   std::uint64_t scene_hash = 0;
   std::int64_t session_start_ns = 0;  ///< CLOCK_MONOTONIC at session time 0 [ns].
   SessionMode mode = SessionMode::kLive;
-  bool recorded = false;  ///< By a recorder of the session: who has just come lets it find him before he begins.
+  /// The session has a recorder: a new process waits until the recorder has discovered it before it begins.
+  bool recorded = false;
 };
 
 struct Command {
@@ -305,9 +306,9 @@ struct CommandReply {
   std::string text;
 };
 
-/// Every message, M(T) each, in the order of the topics' numbers: a new one goes to the end. What treats all messages
-/// alike is made from this list: TopicId, the roles (services/transport/bus/topics.h), the gate's declarations, the
-/// ports.
+/// Every message, M(T) each, in the order of the topics' numbers: a new one is added at the end. Everything that treats
+/// all messages alike is made from this list: TopicId, the roles (services/transport/bus/topics.h), the gate's
+/// declarations, the ports.
 // clang-format off
 #define FULCRUM_MESSAGES(M) \
   M(HandleState) M(ToolState) M(TissueFrame) M(ContactModel) M(CauteryContact) M(TopologyState) \
@@ -348,7 +349,7 @@ struct TimingSummary {
 struct InputHealth {
   TopicId topic = TopicId::kHandleState;
   bool matched = false;  ///< A writer is alive.
-  float age_ms = 0;      ///< Of the newest sample; negative when there is none yet.
+  float age_ms = 0;      ///< Age of the newest sample; negative before the first.
   std::uint64_t received = 0;
   std::uint64_t lost = 0;      ///< Gaps in the sequence.
   std::uint64_t rejected = 0;  ///< Dropped at the gate (not finite, out of range, wrong scene).
@@ -368,13 +369,13 @@ struct Health {
   std::uint64_t schema_hash = 0;
   std::uint64_t scene_hash = 0;
   float rate_asked_Hz = 0;
-  float rate_achieved_Hz = 0;  ///< Over the last second.
+  float rate_achieved_Hz = 0;  ///< Mean over the last second.
   std::uint64_t ticks = 0;
   std::uint64_t overruns = 0;  ///< Periods skipped since the start.
   std::uint64_t write_failures = 0;
-  TimingSummary step;               ///< Of the step itself, since the start.
+  TimingSummary step;               ///< Duration of the step, since the start.
   TimingSummary wake;               ///< Lateness of the wake-up, since the start.
-  std::string last_error;           ///< At most 255 characters; empty when all is well.
+  std::string last_error;           ///< At most 255 characters; empty if there is no error.
   std::vector<InputHealth> inputs;  ///< At most 16.
   std::vector<Metric> metrics;      ///< At most 24.
 };

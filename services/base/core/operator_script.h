@@ -1,5 +1,4 @@
-// The scripted operator: one interpolation for everybody who follows SceneView.script (simulated hand, simulated
-// handle).
+// The scripted operator: one interpolation for all readers of SceneView.script (simulated hand, simulated handle).
 #pragma once
 
 #include <algorithm>
@@ -18,9 +17,9 @@ struct ScriptPoint {
   float power_W = 0;
 };
 
-/// Script of one tool at session time `time_s`. Place and jaw go from key to key along a smoothstep, at rest at each
-/// key; pedals and power hold from their key to the next. Before the first key (also while no session is known) tool
-/// and jaw are at that key with pedals up; after the last key everything is as in the last key.
+/// Script of one tool at session time `time_s`. Place and jaw follow a smoothstep from key to key, at rest at each key;
+/// pedals and power apply from their key to the next. Before the first key (also before a session is known) tool and
+/// jaw are at that key with pedals up; after the last key the state is that of the last key.
 /// @param script keys sorted by tool, then time.
 [[nodiscard]] inline ScriptPoint EvaluateScript(std::span<const ScriptKey> script, std::uint32_t tool, double time_s) {
   const auto first = std::lower_bound(script.begin(), script.end(), tool,

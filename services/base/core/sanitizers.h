@@ -1,5 +1,5 @@
-// Whether this build runs under a sanitizer, which owns malloc and takes many times as long. gcc and clang say it in
-// ways of their own.
+// Whether this build runs under a sanitizer, which replaces malloc and is many times slower. gcc and clang define it in
+// different ways.
 #pragma once
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)

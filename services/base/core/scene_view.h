@@ -1,4 +1,4 @@
-// A compiled scene as plain data: what the solvers and nodes read. The arrays live in a memory-mapped scene file
+// A compiled scene as plain data, read by solvers and nodes. The arrays are in a memory-mapped scene file
 // (services/scene) or, in tests, in a SceneData on the heap. No I/O here.
 #pragma once
 
@@ -16,15 +16,15 @@ namespace fulcrum {
 
 enum class PhysicsMode : std::uint32_t { kPaper = 0, kXpbd = 1, kAccurate = 2 };
 
-/// How much the accurate solver does in a step: substeps x iterations of the global solve.
+/// Work of the accurate solver per step: substeps x iterations of the global solve.
 enum class PhysicsPreset : std::uint32_t { kFast = 0, kDefault = 1, kAccurate = 2, kReference = 3 };
 
-/// Section `physics` of a scene. Stiffnesses k are PBD's, in (0, 1] per iteration, and belong to the paper's mode; the
-/// moduli are SI, are what the other modes solve for, and give the forces of all.
+/// Section `physics` of a scene. The stiffnesses k are those of PBD, in (0, 1] per iteration, and belong to mode paper;
+/// the moduli are SI, are used by the other modes, and determine the forces in all modes.
 struct PhysicsParams {
   PhysicsMode mode = PhysicsMode::kPaper;
   PhysicsPreset preset = PhysicsPreset::kDefault;
-  std::uint32_t substeps = 20;  ///< Of mode xpbd.
+  std::uint32_t substeps = 20;  ///< For mode xpbd.
   std::uint32_t iterations = 3;
   float dt_s = 0.01f;
   float damping_per_s = 3.0f;
@@ -36,23 +36,24 @@ struct PhysicsParams {
   float k_binding = 0.01f;  ///< In tension; ten times as much in compression (capped at 1).
   float tube_youngs_modulus_Pa = 1.0e5f;
   float tube_poisson = 0.45f;
-  float membrane_Et_N_per_m = 150.0f;    ///< Young's modulus times thickness.
-  float membrane_stiffening = 0.0f;      ///< J-shape: tension is E t (e + c e^3) at engineering strain e.
-  float membrane_prestrain = 0.0f;       ///< Strain of the membrane in the rest shape.
-  float membrane_bending_Nm = 2.0e-6f;   ///< Flexural rigidity.
-  float fat_youngs_modulus_Pa = 3.0e3f;  ///< Of the fat between membrane and organ, which the bindings stand for.
+  float membrane_Et_N_per_m = 150.0f;   ///< Young's modulus times thickness.
+  float membrane_stiffening = 0.0f;     ///< J-shape: tension is E t (e + c e^3) at engineering strain e.
+  float membrane_prestrain = 0.0f;      ///< Strain of the membrane in the rest shape.
+  float membrane_bending_Nm = 2.0e-6f;  ///< Flexural rigidity.
+  /// Young's modulus of the fat between membrane and organ, which the bindings represent.
+  float fat_youngs_modulus_Pa = 3.0e3f;
   float friction = 0.2f;
   float collision_margin_m = 0.0005f;
   float grasp_radius_m = 0.004f;  ///< Particles within this distance of the jaw's centre line are held.
   float grasp_close_rad = 0.25f;  ///< The jaw grasps below this angle …
-  float grasp_open_rad = 0.45f;   ///< … and lets go above this one.
-  float grip_force_N = 8.0f;      ///< Slips above this traction.
+  float grasp_open_rad = 0.45f;   ///< … and opens above this one.
+  float grip_force_N = 8.0f;      ///< The grasp slips above this traction.
   /// Principal stretch at which the membrane tears; 0: never. Porcine mesentery and peritoneum fail at 1.77 to 3.18;
-  /// the built-in scene's script comes to 2.72 beside the jaws.
+  /// the built-in scene's script reaches 2.72 beside the jaws.
   float tear_stretch = 3.1f;
 };
 
-/// What thermal_node computes; thermal_node/DESIGN.md.
+/// Model of thermal_node; thermal_node/DESIGN.md.
 enum class ThermalModel : std::uint32_t { kAccurate = 0, kPaper = 1 };
 
 /// Section `thermal`. Defaults: peritoneum on fat, lab values.
@@ -76,14 +77,14 @@ struct ThermalParams {
   float v_max_V = 350.0f;
   float i_max_A = 2.0f;
   float hook_radius_m = 0.0005f;
-  float shrink_max = 0.3f;   ///< Rest length lost at full collagen damage.
-  std::uint32_t volume = 0;  ///< 1: heat and damage are computed in depth, too; h_below_W_m2K is then not used.
+  float shrink_max = 0.3f;   ///< Share of the rest length lost at full collagen damage.
+  std::uint32_t volume = 0;  ///< 1: heat and damage are also computed in depth; h_below_W_m2K is then not used.
 };
 
-/// Section `breathing`: to-and-fro of the abdominal wall and what else of the surroundings breathes;
+/// Section `breathing`: periodic motion of the abdominal wall and other breathing surroundings;
 /// services/base/core/breathing.h.
 struct Breathing {
-  Vec3f direction = Vec3f::UnitZ();  ///< Unit, frame W: where they go from their place in the scene.
+  Vec3f direction = Vec3f::UnitZ();  ///< Unit vector in W along which they move from their place in the scene.
   float amplitude_m = 0;             ///< Peak to peak; 0: none.
   float period_s = 4;
 };
@@ -97,8 +98,8 @@ struct RenderParams {
   Vec3f scope_target_W = Vec3f::Zero();
   float fov_deg = 60.0f;
   float scope_angle_deg = 30.0f;  ///< 0 or 30 degree optics.
-  float roll_deg = 0.0f;          ///< Of the horizon, clockwise in the picture.
-  std::uint32_t hud = 1;          ///< 0: no figures in the picture; warnings stay.
+  float roll_deg = 0.0f;          ///< Roll of the horizon, clockwise in the picture.
+  std::uint32_t hud = 1;          ///< 0: no figures in the picture; warnings remain.
 };
 
 /// Section `haptics`.
@@ -108,7 +109,7 @@ struct HapticsParams {
   float hand_mass_kg = 0.15f;
   float hand_stiffness_N_m = 400.0f;
   float hand_damping_Ns_m = 8.0f;
-  float force_scale = 0.3f;  ///< Tissue force to hand force.
+  float force_scale = 0.3f;  ///< Ratio of hand force to tissue force.
 };
 
 // ----------------------------------------------------------------------------------------------- elements (POD)
@@ -118,7 +119,7 @@ struct StretchConstraint {
   float rest_length;  ///< [m]
 };
 
-/// Dihedral over the edge (v[0], v[1]) with the wings v[2], v[3].
+/// Dihedral angle at the edge (v[0], v[1]) between the wings v[2] and v[3].
 struct BendingConstraint {
   std::array<Index, 4> v;
   /// Signed angle from n1 = (x1-x0)x(x2-x0) to n2 = (x3-x0)x(x1-x0) about x1-x0 [rad], 0 when flat; at rest n1 and n2
@@ -163,11 +164,11 @@ struct StaticSurface {
 
 enum class ProtectedKind : std::uint32_t { kUreter, kNerve };
 
-/// A tube under the membrane: polyline of protected_points in frame W and its place on the sheet.
+/// A tube under the membrane: polyline of protected_points in frame W and its place on the membrane.
 struct ProtectedStructure {
   ProtectedKind kind;
   float radius_m;
-  float depth_m;  ///< Below the membrane.
+  float depth_m;  ///< Depth below the membrane.
   Index first_point, point_count;
 };
 struct ProtectedPoint {
@@ -180,11 +181,11 @@ struct ToolDescription {
   Vec3f p_WP;  ///< Trocar pivot (the fulcrum) [m].
   float shaft_radius_m;
   float shaft_length_m;
-  float tip_radius_m;  ///< Of the capsule that touches tissue.
-  float tip_length_m;  ///< Length of jaws, or of the hook's foot.
+  float tip_radius_m;  ///< Radius of the capsule that touches tissue.
+  float tip_length_m;  ///< Length of the jaws, or of the hook's foot.
 };
 
-/// What the mesh of an instrument stands for: all of it that does not turn, or the jaw that opens towards +x or -x.
+/// Part of an instrument that a mesh represents: everything that does not turn, or the jaw that opens towards +x or -x.
 enum class ToolPart : std::uint32_t { kBody, kJawPlus, kJawMinus };
 
 /// A part of a tool's mesh: ranges of tool_vertices and tool_triangles (indices into tool_vertices). Vertices in frame
@@ -200,7 +201,7 @@ struct ToolMesh {
 struct ScriptKey {
   float time_s;
   std::uint32_t tool;
-  Vec3f p_W;  ///< Wanted tip position [m].
+  Vec3f p_W;  ///< Target position of the tip [m].
   float jaw_rad;
   std::uint32_t pedals;  ///< PedalBits, valid from this key to the tool's next one.
   float power_W;
@@ -208,8 +209,8 @@ struct ScriptKey {
 
 // --------------------------------------------------------------------------------------------------- the scene
 
-/// The membrane as a sheet in its own coordinates, what lies beneath it, and what heats them: all that the solvers of
-/// heat, damage and topology read.
+/// The membrane in its own coordinates, the tissue below it and the heat sources: everything that the solvers of heat,
+/// damage and topology read.
 struct SheetScene {
   char name[64] = {};
   std::uint64_t hash = 0;
@@ -224,8 +225,8 @@ struct SheetScene {
   std::span<const ProtectedPoint> protected_points;
 };
 
-/// What deforms, what it meets and what works on it: all that the solvers of the tissue read. Particles: tube vertices
-/// [0, tube_vertex_count), then the membrane grid.
+/// The deformable tissue, its surroundings and the instruments: everything that the solvers of the tissue read.
+/// Particles: tube vertices [0, tube_vertex_count), then the membrane grid.
 ///
 /// Constraints are sorted by colour: colour k is [offset[k], offset[k+1]); no two constraints of a colour share a
 /// particle, so a colour can be solved in any order with the same result.
@@ -252,7 +253,7 @@ struct TissueScene : SheetScene {
   std::array<ToolDescription, kMaxTools> tools{};
 };
 
-/// The whole scene: what nodes read. A solver takes the slice that it needs.
+/// The whole scene, as nodes read it. A solver takes the slice that it needs.
 struct SceneView : TissueScene {
   RenderParams render;
   HapticsParams haptics;
@@ -261,14 +262,14 @@ struct SceneView : TissueScene {
   std::span<const EmbeddedVertex> surface_vertices;  ///< High-resolution rectum surface.
   std::span<const Triangle> surface_triangles;
 
-  std::span<const ToolMesh> tool_meshes;  ///< How tools look; one that has none is drawn by its dimensions.
+  std::span<const ToolMesh> tool_meshes;  ///< Meshes for the picture; a tool without one is drawn from its dimensions.
   std::span<const Vec3f> tool_vertices;
   std::span<const Triangle> tool_triangles;
   std::span<const ScriptKey> script;  ///< Sorted by tool, then time.
   float script_duration_s = 0;
-  std::span<const Vec2f> planned_line;  ///< Of the assessment: (s, t) on the flattened sheet, m; empty: none.
+  std::span<const Vec2f> planned_line;  ///< For the assessment: (s, t) on the flattened membrane, m; empty: none.
 
-  /// Bit per NodeId: what the supervisor starts for this scene.
+  /// Bit per NodeId: the nodes that the supervisor starts for this scene.
   std::uint32_t node_mask = 0x3e;
 };
 

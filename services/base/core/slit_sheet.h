@@ -1,9 +1,9 @@
 // The membrane's grid as it lies in space, with its slits.
 //
-// The simulation keeps one grid of nodes, also across a cut: only the edges over the slit are dead. Between them the
-// grid says nothing: a triangle over the slit would stretch like chewing gum while the slit opens. Therefore such a
-// triangle falls into one part for each piece that its dead edges leave. A part keeps its own corners and gets ghosts
-// for the others, put where the sheet would be if it went on unstretched:
+// The simulation keeps one grid of nodes, also across a cut: only the edges over the slit are dead. A triangle over the
+// slit has no defined shape in this grid; if it were drawn as it is, it would stretch over the opening slit. Therefore
+// such a triangle is divided into one part for each piece that its dead edges leave. A part keeps its own corners and
+// gets ghosts for the others, placed where the membrane would be if it continued unstretched:
 //
 //         a───────b        dead edges a-c, b-c:                 a───────b
 //          \     /         part {a, b} with ghost c'    and      \ {ab}/       c
@@ -40,23 +40,24 @@ struct MembraneTriangle {
   return {{n00, n11, n10}, {edge(n00, 2), edge(n10, 0), edge(n00, 1)}};
 }
 
-/// The same by the triangle's number.
+/// As above, by the triangle's number.
 [[nodiscard]] inline MembraneTriangle MembraneTriangleAt(std::uint32_t cols, Index triangle) {
   const Index cell = triangle / 2;
   return MembraneTriangleAt(cols, cell / (cols - 1), cell % (cols - 1), static_cast<int>(triangle % 2));
 }
 
-/// What a cut has left of a triangle: a bit for each corner that is its own; the others are ghosts.
+/// Corners of a part of a cut triangle: a bit for each corner that belongs to it; the others are ghosts.
 using OwnedCorners = std::uint8_t;
 inline constexpr OwnedCorners kAllCorners = 7;
 [[nodiscard]] inline bool Owns(OwnedCorners part, std::size_t corner) { return ((part >> corner) & 1) != 0; }
 
-/// The parts of a triangle, by which of its edges live and which of its corners are gone; at most three.
+/// The parts of a triangle, determined by its live edges and its missing corners; at most three.
 struct TriangleParts {
   std::array<OwnedCorners, 3> owned{};
   std::size_t count = 0;
 
-  /// A place belongs to the part whose own corners weigh most there; on the border of two to both.
+  /// Whether the point belongs to the part. A point belongs to the part whose own corners have the largest total
+  /// weight there; on a border to both parts.
   [[nodiscard]] bool IsOf(std::size_t part, const std::array<float, 3>& barycentric) const {
     const auto share = [&](OwnedCorners corners) {
       float sum = 0;
@@ -72,12 +73,12 @@ struct TriangleParts {
 };
 [[nodiscard]] inline TriangleParts PartsOf(const std::array<bool, 3>& edge_alive, const std::array<bool, 3>& gone) {
   TriangleParts parts;
-  // One dead edge leaves the corners joined: the slit ends inside.
+  // With one dead edge the corners stay connected: the slit ends inside.
   if (edge_alive[0] + edge_alive[1] + edge_alive[2] >= 2) {
     parts.owned[parts.count++] = kAllCorners;
     return parts;
   }
-  // Else a corner is joined to another one only through the edge that lives, if any.
+  // Otherwise a corner is connected to another one only by the live edge, if there is one.
   OwnedCorners taken = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     if (edge_alive[k]) {
@@ -149,12 +150,12 @@ class SlitSheet {
     return place;
   }
 
-  /// Where the sheet around `owner` would have its neighbour `ghost` if it went on unstretched [m].
+  /// Position of the neighbour `ghost` if the membrane around `owner` continued unstretched [m].
   [[nodiscard]] Vec3f Ghost(Index owner, Index ghost) const {
     const Frame frame = FrameAt(owner);
     if (!frame.valid) return holder_.Place(owner) + holder_.Rest(ghost) - holder_.Rest(owner);
     const Vec2f dm = holder_.Material(ghost) - holder_.Material(owner);
-    // Unstretched: the free edge of a slit has let go of its tension.
+    // Unstretched: the free edge of a slit carries no tension.
     const float ds = std::max(1.0f, frame.ds.norm()), dt = std::max(1.0f, frame.dt.norm());
     return holder_.Place(owner) + frame.ds * (dm.x() / ds) + frame.dt * (dm.y() / dt);
   }
@@ -175,7 +176,7 @@ class SlitSheet {
       normal_matrix += dm * dm.transpose();
       moment += (holder_.Place(other) - holder_.Place(node)) * dm.transpose();
     });
-    // Two edges in nearly one line say nothing about the other direction: below 1 % of a right angle's determinant.
+    // Two nearly collinear edges do not determine the other direction: limit at 1 % of a right angle's determinant.
     const float trace = normal_matrix.trace();
     if (normal_matrix.determinant() <= 0.01f * trace * trace / 4) return {Vec3f::Zero(), Vec3f::Zero(), false};
     const Eigen::Matrix<float, 3, 2> frame = moment * normal_matrix.inverse();

@@ -1,4 +1,4 @@
-// One step of a node's clock. Solvers and nodes take a Tick and never ask the operating system for the time, so that
+// One step of a node's clock. Solvers and nodes take a Tick and never read the clock of the operating system, so that
 // the same class runs live, in a test and in a replay.
 #pragma once
 

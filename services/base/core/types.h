@@ -23,7 +23,7 @@ using Triangle = std::array<Index, 3>;
 /// Vertices of one tetrahedron; positive volume means (b-a)x(c-a).(d-a) > 0.
 using Tetrahedron = std::array<Index, 4>;
 
-// Scene arrays are memory-mapped as they stand, so these must be packed.
+// Scene arrays are memory-mapped without conversion, so these types must be packed.
 static_assert(sizeof(Vec2f) == 8 && sizeof(Vec3f) == 12 && sizeof(Triangle) == 12);
 
 }  // namespace fulcrum

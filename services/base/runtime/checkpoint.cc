@@ -23,7 +23,7 @@ namespace {
 constexpr std::uint64_t kMagic = 0x31304b50434c5546ull;  // "FULCPK01" in memory order.
 constexpr std::size_t kPage = 4096;
 
-/// First page of the file: what the two slots belong to.
+/// First page of the file: identifies the scene and layout of the two slots.
 struct FileHeader {
   std::uint64_t magic;
   std::uint64_t scene_hash;
@@ -73,10 +73,10 @@ class FileDescriptor {
   throw InputError(file.string() + ": checkpoint cannot be " + what + ": " + std::strerror(errno));
 }
 
-/// One process at a time: two writers would seal each other's half-filled slots.
+/// One process at a time: two writers would seal each other's partly filled slots.
 void Lock(const std::filesystem::path& file, int fd) {
   int result = ::flock(fd, LOCK_EX | LOCK_NB);
-  // Whoever looks (IsInUse) has it for microseconds.
+  // A check by IsInUse holds the lock for microseconds.
   for (int i = 0; i < 5 && result != 0 && errno == EWOULDBLOCK; ++i) {
     ::usleep(1000);
     result = ::flock(fd, LOCK_EX | LOCK_NB);
@@ -99,7 +99,7 @@ std::string WhyUnusable(const FileHeader& found, const FileHeader& wanted) {
   return "has not the size that its scene asks for";
 }
 
-/// The existing file, locked, when its header and size are those wanted; otherwise says in `complaint` why not.
+/// The existing file, locked, if its header and size are as wanted; otherwise `complaint` receives the reason.
 FileDescriptor OpenExisting(const std::filesystem::path& file, const FileHeader& wanted, std::size_t file_bytes,
                             std::string* complaint) {
   FileDescriptor fd(::open(file.c_str(), O_RDWR | O_CLOEXEC));
@@ -119,7 +119,7 @@ FileDescriptor OpenExisting(const std::filesystem::path& file, const FileHeader&
   return usable ? std::move(fd) : FileDescriptor();
 }
 
-/// A new file appears under its name only when its header is whole, so a kill in here leaves the old state.
+/// A new file gets its name only when its header is complete, so a kill in this function leaves the old state.
 FileDescriptor Create(const std::filesystem::path& file, const FileHeader& header, std::size_t file_bytes) {
   std::filesystem::path fresh = file;
   fresh += ".new";
@@ -128,7 +128,7 @@ FileDescriptor Create(const std::filesystem::path& file, const FileHeader& heade
     Fail(file, "created");
   }
   Lock(file, fd.get());
-  // Blocks are reserved here: a store into a mapped page without room on the disk would be a SIGBUS later.
+  // Reserves the blocks here: a store into a mapped page on a full disk would be a SIGBUS later.
   if (const int error = ::posix_fallocate(fd.get(), 0, static_cast<off_t>(file_bytes)); error != 0) {
     errno = error;
     ::unlink(fresh.c_str());
@@ -151,7 +151,7 @@ struct CheckpointFile::Impl {
   std::size_t file_bytes = 0;
   std::size_t slot_stride = 0;
   std::size_t capacity = 0;
-  int newest = -1;  // Whole slot with the highest sequence.
+  int newest = -1;  // Complete slot with the highest sequence.
   int filling = -1;
   std::uint64_t last_sequence = 0;
   std::string complaint;
@@ -191,7 +191,7 @@ CheckpointFile::CheckpointFile(const std::filesystem::path& file, std::uint64_t 
   for (int i = 0; i < 2; ++i) {
     const std::uint64_t sequence = impl_->header(i)->sequence;
     if (!impl_->IsWhole(i)) {
-      altered = altered || sequence != 0;  // A kill leaves no seal on a torn slot.
+      altered = altered || sequence != 0;  // A kill leaves no seal on an incomplete slot.
     } else if (sequence > impl_->last_sequence) {
       impl_->newest = i;
       impl_->last_sequence = sequence;
@@ -223,7 +223,7 @@ std::optional<std::vector<std::byte>> CheckpointFile::Peek(const std::filesystem
         header.sequence <= newest_sequence || header.bytes > capacity_bytes) {
       continue;
     }
-    // The copy is judged, not the slot: whoever writes may go on meanwhile.
+    // The copy is checked, not the slot: the writer may continue meanwhile.
     std::vector<std::byte> payload(header.bytes);
     if (::pread(fd.get(), payload.data(), payload.size(), at + static_cast<off_t>(kPage)) ==
             static_cast<ssize_t>(payload.size()) &&
@@ -252,8 +252,8 @@ std::optional<CheckpointFile::Loaded> CheckpointFile::Previous() const {
 
 const std::string& CheckpointFile::complaint() const { return impl_->complaint; }
 
-// A kill ends the process between two instructions and the kernel keeps every store made so far, so the order of the
-// stores is all that matters: the fences keep the compiler from moving payload stores across the seal.
+// A kill ends the process between two instructions and the kernel keeps every store made so far, so only the order of
+// the stores matters: the fences keep the compiler from moving payload stores across the seal.
 std::span<std::byte> CheckpointFile::Begin() {
   impl_->filling = impl_->newest == 0 ? 1 : 0;
   impl_->header(impl_->filling)->sequence = 0;
@@ -278,7 +278,7 @@ void CheckpointFile::Commit(std::size_t bytes) {
 
 bool IsInUse(const std::filesystem::path& file) {
   const FileDescriptor fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
-  // Given back when the descriptor is closed.
+  // The lock is released when the descriptor is closed.
   return fd.get() >= 0 && ::flock(fd.get(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
 }
 

@@ -14,7 +14,7 @@
 namespace fulcrum::runtime {
 namespace {
 
-// The kernel may delay a timer of a normal thread by 50 us to batch wake-ups; a cyclic thread asks for none of it.
+// The kernel may delay a timer of a normal thread by 50 us to batch wake-ups; a cyclic thread requests no such delay.
 constexpr unsigned long kTimerSlackNs = 1;
 // A long period is slept in slices, so that Stop() need not wait for its end.
 constexpr std::int64_t kMaxSleepNs = 50'000'000;
@@ -42,11 +42,11 @@ NextPeriod PlanNextPeriod(std::int64_t previous_wake_ns, std::int64_t period_ns,
 
 struct CyclicThread::Impl {
   CyclicThreadSettings settings;
-  std::int64_t grid_ns = 0;  ///< Of Start().
+  std::int64_t grid_ns = 0;  ///< Argument of Start().
   Callback callback;
   std::thread thread;
   std::atomic<bool> stop{false};
-  // Written by the cyclic thread alone; relaxed, since a reader wants recent figures and no order between them.
+  // Written by the cyclic thread only; relaxed, since readers need recent figures and no order between them.
   std::atomic<std::uint64_t> ticks{0};
   std::atomic<std::uint64_t> overruns{0};
   Histogram wake;
@@ -66,7 +66,7 @@ struct CyclicThread::Impl {
     }
     if (settings.fifo_priority > 0) {
       const std::string warning = SetFifoPriority(settings.fifo_priority);
-      // Once per process: every further thread would only repeat it.
+      // Once per process: the message of every further thread would be the same.
       static std::atomic<bool> done{false};
       if (!done.exchange(true)) {
         for (const std::string& problem : {warning, LockMemory()}) {
@@ -80,7 +80,7 @@ struct CyclicThread::Impl {
     }
   }
 
-  /// False when asked to stop. `*begin_ns`: the time at which it went on, by the last look at the clock.
+  /// False if the thread must stop. `*begin_ns`: the last reading of the clock before the return.
   bool WaitFor(std::int64_t wake_ns, std::int64_t* begin_ns) const {
     const std::int64_t sleep_end = wake_ns - settings.spin_ns;
     for (std::int64_t now = MonotonicNs(); now < sleep_end; now = MonotonicNs()) {

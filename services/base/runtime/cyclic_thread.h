@@ -16,9 +16,9 @@ namespace fulcrum::runtime {
 struct CyclicThreadSettings {
   std::string name = "cyclic";  ///< Thread name, at most 15 characters.
   std::int64_t period_ns = 10'000'000;
-  int fifo_priority = 0;     ///< 0: normal scheduling; else SCHED_FIFO if permitted, with one plain warning if not.
-  std::int64_t spin_ns = 0;  ///< Sleep until this long before the period, then spin.
-  int cpu = -1;              ///< Pin to this CPU; -1: any.
+  int fifo_priority = 0;     ///< 0: normal scheduling; otherwise SCHED_FIFO if permitted, with one warning if not.
+  std::int64_t spin_ns = 0;  ///< The thread sleeps until this long before the period, then spins.
+  int cpu = -1;              ///< CPU to which the thread is pinned; -1: any.
 };
 
 /// Snapshot that another thread may read at any time.
@@ -31,7 +31,7 @@ struct CyclicStats {
 
 class CyclicThread {
  public:
-  /// Called with index, dt_s and stamp_ns set (session_time_s is the caller's to fill). Must not throw.
+  /// Called with index, dt_s and stamp_ns set; the callback fills in session_time_s. Must not throw.
   using Callback = std::function<void(const Tick&)>;
 
   CyclicThread(const CyclicThreadSettings& settings, Callback callback);
@@ -39,7 +39,8 @@ class CyclicThread {
   CyclicThread(const CyclicThread&) = delete;
   CyclicThread& operator=(const CyclicThread&) = delete;
 
-  /// @param grid_ns wake-ups are at this time and whole periods from it (CLOCK_MONOTONIC); 0: a period from now on.
+  /// @param grid_ns time grid of the wake-ups: this time plus whole periods (CLOCK_MONOTONIC); 0: begins one period
+  /// from now.
   void Start(std::int64_t grid_ns = 0);
   void Stop();
   [[nodiscard]] CyclicStats stats() const;
@@ -49,11 +50,11 @@ class CyclicThread {
   std::unique_ptr<Impl> impl_;
 };
 
-/// CLOCK_MONOTONIC [ns].
+/// Present time of CLOCK_MONOTONIC [ns].
 [[nodiscard]] std::int64_t MonotonicNs();
 
-/// The pure sleeping policy, tested on its own: the start of the next period after `now`, on the grid
-/// `phase + k * period`, and how many whole periods were skipped.
+/// The pure sleeping policy, tested on its own: start of the next period after `now` on the grid `phase + k * period`,
+/// and the number of whole periods skipped.
 struct NextPeriod {
   std::int64_t wake_ns;
   std::uint64_t skipped;

@@ -9,23 +9,24 @@
 
 namespace fulcrum::runtime {
 
-/// Three slots: one belongs to the producer, one to the consumer, and the third is exchanged. Unlike SeqLock's, the
-/// consumer never retries: it may run at a higher priority than a producer that it has interrupted in mid-write.
+/// Three slots: one belongs to the producer, one to the consumer, and the third is exchanged. Unlike the reader of a
+/// SeqLock, the consumer never retries: it may run at a higher priority than a producer that it has preempted during a
+/// write.
 template <class T>
 class LatestValue {
   static_assert(std::is_copy_assignable_v<T>, "values are copied through");
 
  public:
-  /// Producer.
+  /// For the producer.
   void Store(const T& value) noexcept {
     slots_[back_].value = value;
-    // Release publishes the slot; acquire: the consumer's copy out of the slot that comes back is over.
+    // Release publishes the slot; acquire: the consumer has finished copying from the slot that is returned.
     back_ = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel) & kIndex;
   }
 
-  /// Consumer. False when nothing was stored since the last time; `value` is then left alone.
+  /// For the consumer. False if nothing was stored since the last call; `value` is then unchanged.
   [[nodiscard]] bool TryTake(T* value) noexcept {
-    // Relaxed: the exchange below is what orders; a mark that is missed now is found the next time.
+    // Relaxed: the exchange below provides the order; a mark that is missed now is found by the next call.
     if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
     front_ = middle_.exchange(front_, std::memory_order_acq_rel) & kIndex;
     *value = slots_[front_].value;
@@ -39,8 +40,8 @@ class LatestValue {
     T value{};
   };
   std::array<Slot, 3> slots_{};
-  alignas(kCacheLine) std::uint32_t back_ = 0;   ///< Producer's.
-  alignas(kCacheLine) std::uint32_t front_ = 1;  ///< Consumer's.
+  alignas(kCacheLine) std::uint32_t back_ = 0;   ///< Slot of the producer.
+  alignas(kCacheLine) std::uint32_t front_ = 1;  ///< Slot of the consumer.
   alignas(kCacheLine) std::atomic<std::uint32_t> middle_{2};
 };
 

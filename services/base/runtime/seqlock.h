@@ -1,4 +1,4 @@
-// The latest value of something, written by one thread that must never wait and read by any number that may retry.
+// Latest value of a state, written by one thread that must never wait and read by any number of threads that may retry.
 #pragma once
 
 #include <array>
@@ -11,14 +11,14 @@
 namespace fulcrum::runtime {
 
 /// Sequence lock after Boehm, "Can seqlocks get along with programming language memory models?" (2012): the payload is
-/// atomic words, so that a torn read is no data race but merely retried. The order is carried by the words themselves
-/// and not by fences, which the thread sanitizer cannot follow; on x86 both cost nothing.
+/// atomic words, so a torn read is no data race and is retried. The words themselves provide the memory order, not
+/// fences, which the thread sanitizer cannot follow; on x86 both cost nothing.
 template <class T>
 class SeqLock {
   static_assert(std::is_trivially_copyable_v<T>, "the payload is copied as words");
 
  public:
-  /// The one writer. Wait-free.
+  /// For the single writer. Wait-free.
   void Store(const T& value) noexcept {
     std::array<std::uint64_t, kWords> words{};
     std::memcpy(words.data(), &value, sizeof(T));
@@ -26,15 +26,15 @@ class SeqLock {
     sequence_.store(sequence + 1, std::memory_order_relaxed);  // Odd: being written.
     // Release: a reader that sees a new word also sees the odd mark.
     for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_release);
-    sequence_.store(sequence + 2, std::memory_order_release);  // Even: the words above are whole.
+    sequence_.store(sequence + 2, std::memory_order_release);  // Even: the words above are complete.
   }
 
-  /// Any thread. Retries while the writer is at it; the initial value is T{}.
+  /// For any thread. Retries during a write; the initial value is T{}.
   [[nodiscard]] T Load() const noexcept {
     std::array<std::uint64_t, kWords> words;
     for (;;) {
       const std::uint64_t before = sequence_.load(std::memory_order_acquire);  // Words are read after this.
-      // Acquire: the second look at the sequence stays behind these.
+      // Acquire: the second read of the sequence stays after these.
       for (std::size_t i = 0; i < kWords; ++i) words[i] = words_[i].load(std::memory_order_acquire);
       if ((before & 1u) == 0 && sequence_.load(std::memory_order_relaxed) == before) break;
     }

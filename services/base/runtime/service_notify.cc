@@ -8,7 +8,7 @@ namespace fulcrum::runtime {
 namespace {
 
 constexpr std::int64_t kStatusPeriodNs = 1'000'000'000;
-// A beat that is missed because of one long step must not be the last one.
+// Several notifications per watchdog period, so that one missed because of a long step has no effect.
 constexpr std::int64_t kBeatsPerWatchdog = 4;
 
 std::optional<std::int64_t> BeatPeriod() {

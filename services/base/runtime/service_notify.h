@@ -1,5 +1,5 @@
-// What a service tells systemd: that it is ready, how it is, that it still advances. Whoever was started by something
-// else (no NOTIFY_SOCKET in the environment) tells nobody.
+// Notifications of a service to systemd: ready, status, and a watchdog. Without NOTIFY_SOCKET in the environment
+// nothing is sent.
 #pragma once
 
 #include <cstdint>
@@ -9,27 +9,29 @@
 
 namespace fulcrum::runtime {
 
-/// Whether a process still does its work, judged by counters of its threads. Pure.
+/// Whether a process still advances, judged by counters of its threads. Pure.
 class Progress {
  public:
-  /// True when every counter differs from the last time that this returned true, or when there are others to watch.
+  /// True if every counter differs from its value when this last returned true, or if the number of counters has
+  /// changed.
   [[nodiscard]] bool Advanced(const std::vector<std::uint64_t>& counters);
 
  private:
   std::vector<std::uint64_t> last_;
 };
 
-/// Not thread-safe: one thread speaks for the process.
+/// Not thread-safe: one thread sends the notifications of the process.
 class ServiceNotify {
  public:
   ServiceNotify();
 
-  /// READY=1.
+  /// Sends READY=1.
   void Ready();
-  /// Call several times a second. Tells the status when it has changed, at most once a second, and feeds the watchdog
-  /// (WatchdogSec= of the unit) while every counter advances: a hung thread ends the process, which is then restarted.
+  /// To be called several times a second. Sends the status when it has changed, at most once a second, and the watchdog
+  /// notification (WatchdogSec= of the unit) while every counter advances: if a thread hangs, systemd ends and restarts
+  /// the process.
   void Update(std::int64_t now_ns, const std::vector<std::uint64_t>& counters, const std::string& status);
-  /// STOPPING=1.
+  /// Sends STOPPING=1.
   void Stopping();
 
  private:
