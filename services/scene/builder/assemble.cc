@@ -1,4 +1,5 @@
-// Constraints, masses, colours, bindings and the rest over an anatomy: the same for every kind of scene.
+// Constraints, masses, colours, bindings, embedding, structures and script over an anatomy: the same for every kind of
+// scene.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -13,20 +14,21 @@
 namespace fulcrum::scene {
 namespace {
 
-constexpr double kAtlasMargin_m = 0.001;  ///< Sheet coordinates begin here, so that a patch has texels all round.
-constexpr float kLineStep =
-    0.01f;  ///< Of a planned line, in fractions of the sheet: the sheet is not straight between.
+constexpr double kAtlasMargin_m = 0.001;  ///< Smallest sheet coordinate, so that a patch has texels on all sides.
+/// Distance between points of the planned line, in fractions of the sheet: the sheet is curved between given points.
+constexpr float kLineStep = 0.01f;
 constexpr int kStructurePoints = 33;  ///< Along each ureter or nerve: 6 mm apart on a 200 mm sheet.
-/// A tip may lie this far from the pivot at most: a laparoscopic shaft is about 330 mm long.
+/// Largest distance of a tip from the pivot: a laparoscopic shaft is about 330 mm long.
 constexpr double kLongestReach_m = 0.30;
-/// … and at least this far, also from the end of its shaft: the devices do not turn a shorter lever.
+/// Smallest distance of a tip from the pivot, and of the pivot from the end of the shaft: the haptic devices cannot
+/// turn a shorter lever.
 constexpr double kLeastLever_m = 0.015;
 
 [[noreturn]] void Refuse(const SceneSettings& settings, const std::string& text) {
   throw InputError("scene '" + settings.name + "': " + text);
 }
 
-/// Point and outward normal of the sheet at fractions (s, t), bilinear in its nodes.
+/// Point and outward normal of the sheet at fractions (s, t), bilinear between its nodes.
 struct SheetPoint {
   Vec3d p, normal;
   Vec2f material;
@@ -81,7 +83,7 @@ void CheckCounts(const SceneSettings& settings, const Anatomy& anatomy) {
   }
 }
 
-/// Material coordinates, moved in from the edge of the atlas.
+/// Material coordinates, offset from the edge of the atlas.
 std::vector<Vec2f> MaterialOf(const SceneSettings& settings, const std::vector<Vec3d>& sheet) {
   const std::vector<Eigen::Vector2d> flat = FlattenSheet(settings.membrane.rows, settings.membrane.cols, sheet);
   Eigen::Vector2d extent = Eigen::Vector2d::Zero();
@@ -160,7 +162,7 @@ double RestLength(const SceneData& scene, Index a, Index b) {
 }
 
 void AddOrgan(const Anatomy& anatomy, SceneData* scene) {
-  // Sorted first: surface vertices name their tetrahedron by its place.
+  // Sorted before the embedding, because surface vertices refer to their tetrahedron by its index.
   scene->tets = anatomy.tets;
   scene->tet_colours =
       SortByColour(&scene->tets, anatomy.organ_vertices.size(), [](const Tetrahedron& t) { return ParticlesOf(t); });
@@ -200,11 +202,9 @@ void AddMembrane(const SceneSettings& settings, SceneData* scene) {
     const auto x = [&](Index v) { return Vec3d(scene->rest_position[v].cast<double>()); };
     scene->bending.push_back({{v0, v1, v2, v3}, static_cast<float>(DihedralAngle(x(v0), x(v1), x(v2), x(v3)))});
   };
-  //   n10 --- n11      interior edges of the coarse sheet: each cell's diagonal n00-n11, the edge n00-n01 where a row
-  //   of
-  //    |   /   |       cells lies below it, and the edge n00-n10 where a column of cells lies to its left. The wings
-  //    are
-  //   n00 --- n01      chosen so that both normals point outward (s x t).
+  //   n10 --- n11      interior edges of the coarse sheet: each cell's diagonal n00-n11; the edge n00-n01 where a
+  //    |   /   |       row of cells lies below it; the edge n00-n10 where a column of cells lies to its left. The
+  //   n00 --- n01      wings are chosen so that both normals point outward (s x t).
   for (int r = 0; r + dr < rows; r += dr) {
     for (int c = 0; c + dc < cols; c += dc) {
       add(node(r, c), node(r + dr, c + dc), node(r + dr, c), node(r, c + dc));
@@ -272,7 +272,7 @@ void AddStructures(const SceneSettings& settings, const Sheet& sheet, SceneData*
     ProtectedStructure structure{s.kind, static_cast<float>(s.radius_m), static_cast<float>(s.depth_m),
                                  static_cast<Index>(scene->protected_points.size()), kStructurePoints};
     for (int i = 0; i < kStructurePoints; ++i) {
-      // Catmull-Rom through the points given, so that the course is smooth.
+      // Catmull-Rom through the given points, so that the course is smooth.
       const double x = static_cast<double>(i) / (kStructurePoints - 1) * static_cast<double>(s.path.size() - 1);
       const auto k = std::min(static_cast<std::size_t>(x), s.path.size() - 2);
       const auto f = static_cast<float>(x - static_cast<double>(k));

@@ -10,7 +10,7 @@ namespace fulcrum::scene {
 /// give a scene: too many vertices, a sheet larger than the atlas, an inverted tetrahedron, a script out of reach.
 SceneData BuildProcedural(const SceneSettings& settings);
 
-/// The organ and what surrounds it, however it was obtained.
+/// The organ and its surroundings, procedural or imported.
 struct Anatomy {
   std::vector<Vec3d> organ_vertices;
   std::vector<Tetrahedron> tets;

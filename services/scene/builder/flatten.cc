@@ -9,9 +9,9 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr int kIterations = 30;  ///< Enough for the residual distortion to settle to 1e-4 on every shipped scene.
+constexpr int kIterations = 30;  ///< Sufficient for the residual distortion to settle to 1e-4 on every shipped scene.
 
-/// A triangle laid flat on its own: corners in a frame of its own, and the cotangent opposite to each edge (k, k+1).
+/// A triangle flattened on its own: corners in a frame of its own, and the cotangent opposite to each edge (k, k+1).
 struct FlatTriangle {
   std::array<int, 3> v;
   std::array<Vector2d, 3> x;
@@ -99,7 +99,7 @@ std::vector<Vector2d> FlattenSheet(int rows, int cols, const std::vector<Vec3d>&
       scale += std::abs(t.cot[k]);
     }
   }
-  // The Laplacian leaves a shift free: a spring of average strength holds the first node.
+  // The Laplacian does not determine a translation: a spring of average stiffness holds the first node.
   const double anchor = scale / n;
   entries.emplace_back(0, 0, anchor);
   Eigen::SparseMatrix<double> laplacian(n, n);

@@ -142,7 +142,7 @@ std::vector<std::array<Index, 2>> EdgesOf(const std::vector<Tetrahedron>& tets) 
 
 namespace {
 
-constexpr int kMaxCells = 64;  // Per axis: bounds the grid's memory for any mesh.
+constexpr int kMaxCells = 64;  // Per axis: bounds the memory of the grid for any mesh.
 
 }  // namespace
 
@@ -201,7 +201,7 @@ TriangleLocator::Hit TriangleLocator::Closest(const Vec3d& p, double reach) cons
     return best;
   }
   best.closest.distance = reach;
-  // Growing box around p: once it is as large as the best distance, nothing outside can be nearer.
+  // Growing box around p: once it is as large as the best distance, nothing outside it can be nearer.
   for (double radius = std::min(cell_, reach);; radius *= 2) {
     const bool last = radius >= reach;
     const double r = std::min(radius, reach);
@@ -247,7 +247,8 @@ std::vector<Embedding> EmbedPoints(const std::vector<Vec3d>& vertices, const std
     high = high.cwiseMax(b);
     largest = std::max(largest, (b - a).maxCoeff());
   }
-  // Cells as large as the largest tetrahedron; each tetrahedron is filed under every cell it may touch plus one.
+  // Cells as large as the largest tetrahedron; each tetrahedron is listed in every cell that it may touch and one
+  // beyond.
   const double cell = std::max(largest, (high - low).maxCoeff() / kMaxCells);
   std::map<std::array<int, 3>, std::vector<Index>> cells;
   const auto cell_of = [&](const Vec3d& p) {

@@ -37,7 +37,7 @@ std::vector<Triangle> BoundaryOf(const std::vector<Tetrahedron>& tets);
 /// Each edge once, smaller index first, in ascending order.
 std::vector<std::array<Index, 2>> EdgesOf(const std::vector<Tetrahedron>& tets);
 
-/// Closest triangle by a uniform grid; built once, asked often.
+/// Closest triangle by a uniform grid; built once for many queries.
 class TriangleLocator {
  public:
   TriangleLocator(const std::vector<Vec3d>& vertices, const std::vector<Triangle>& triangles);
@@ -61,8 +61,8 @@ class TriangleLocator {
   std::vector<std::vector<Index>> cells_;
 };
 
-/// Where each point lies in a tetrahedral mesh: the tetrahedron that holds it or, outside the mesh, the one that needs
-/// the least extrapolation (its most negative coordinate is the largest).
+/// Position of each point in a tetrahedral mesh: the tetrahedron that contains it or, outside the mesh, the one that
+/// needs the least extrapolation (its most negative coordinate is the largest).
 struct Embedding {
   Index tetrahedron;
   std::array<double, 4> barycentric;

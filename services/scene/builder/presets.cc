@@ -1,4 +1,4 @@
-// The shipped procedural scenes as settings. deploy/scenes/*.yaml say the same; a test compares the two.
+// The shipped procedural scenes as settings. deploy/scenes/*.yaml contain the same; a test compares them.
 #include <numbers>
 
 #include "services/scene/builder/scene_settings.h"
@@ -6,11 +6,11 @@
 namespace fulcrum::scene {
 namespace {
 
-// As the YAML reader converts, so that both give the same bits.
+// Converts as the YAML reader does, so that both give the same bits.
 double Millimetres(double mm) { return mm * 1e-3; }
 double Degrees(double deg) { return deg * (std::numbers::pi / 180.0); }
 
-/// Writes keys one after the other.
+/// Appends script keys one after the other.
 class ScriptWriter {
  public:
   explicit ScriptWriter(std::vector<ScriptKeySettings>* keys) : keys_(keys) {}
@@ -103,8 +103,8 @@ SceneSettings BuiltIn() {
   scene.render.scope_tip_W = Vec3f(0.004f, -0.060f, 0.082f);
   scene.render.scope_target_W = Vec3f(0.0f, 0.002f, 0.022f);
   ScriptWriter key(&scene.script);
-  // Left hand: comes down with the jaws open, presses a fold into them, closes, lifts the sheet up and to the left,
-  // holds it while the hook works, gives it back.
+  // Left hand: descends with the jaws open, presses a fold into them, closes them, lifts the sheet up and to the left,
+  // holds it while the hook works, lowers it again.
   key.Grasper(0.0, 0.36f, 0.50f, 55, 50);
   key.Grasper(1.2, 0.36f, 0.50f, 12, 50);
   key.Grasper(2.0, 0.36f, 0.50f, -2.5, 50);
@@ -118,8 +118,8 @@ SceneSettings BuiltIn() {
   key.Grasper(17.2, 0.36f, 0.50f, 5, 50, Vec3d(-1, 0, 0));
   key.Grasper(19.0, 0.36f, 0.50f, 50, 50);
   key.Grasper(20.0, 0.36f, 0.50f, 55, 50);
-  // Right hand: waits aside, pricks the end of its foot through the sheet beside the tent, cuts 30 mm along the organ
-  // at 4 mm/s, lifts off. From a low trocar at its side the foot points down into the sheet, the heel above it.
+  // Right hand: waits beside, pierces the sheet with the end of its foot beside the tent, cuts 30 mm along the organ at
+  // 4 mm/s, lifts off. From a low trocar at its side the foot points down into the sheet, the heel above it.
   key.Hook(0.0, 0.68f, 0.40f, 20, 0, Vec3d(0, -60, 0));
   key.Hook(4.0, 0.68f, 0.40f, 20, 0, Vec3d(0, -60, 0));
   key.Hook(6.3, 0.56f, 0.42f, 10);

@@ -11,17 +11,17 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// Profile of the sheet across the organ: it follows the organ for this angle from the top, then flares out until it
-// falls off at the last angle only, over this length. Chosen by eye for a mesorectum opened from the front.
+// Profile of the sheet across the organ: it follows the organ for this angle from the top, then flares out until its
+// slope reaches the last angle, over this length. Chosen by eye for a mesorectum opened from the front.
 constexpr double kOverOrgan_rad = 0.90;
 constexpr double kFlareSlope_rad = 0.14;
 constexpr double kFlareLength_m = 0.008;
-constexpr double kUndulation_m = 0.0003;  ///< Natural irregularity of sheet and surface.
+constexpr double kUndulation_m = 0.0003;  ///< Irregularity of sheet and surface, as in nature.
 
 constexpr int kSurfaceRefinement = 4;  ///< Surface vertices per tube vertex along each direction.
 
-/// Where everything is: the curved centre line and the surfaces around it, as functions of u in [0, 1] along the organ
-/// (beyond: its straight continuation).
+/// Geometry of the scene: the curved centre line and the surfaces around it, as functions of u in [0, 1] along the
+/// organ (beyond: its straight continuation).
 class Shape {
  public:
   Shape(const TubeSettings& tube, const MembraneSettings& membrane) : tube_(tube), membrane_(membrane) {}
@@ -53,13 +53,14 @@ class Shape {
                                  0.15 * std::cos(1.7 * w - theta));
   }
 
-  /// `depth` below the outer surface.
+  /// Point of the organ at `depth` below the outer surface.
   [[nodiscard]] Vec3d Organ(double u, double theta, double depth) const {
     const Frame f = At(u);
     return f.centre + (Radius(u, theta) - depth) * (std::cos(theta) * f.up + std::sin(theta) * f.right);
   }
 
-  /// The peritoneal sheet at arc length `w` across from the middle (right is positive), also beyond the membrane.
+  /// Point of the peritoneal sheet at arc length `w` across from the middle (right is positive), also beyond the
+  /// membrane.
   [[nodiscard]] Vec3d Peritoneum(double u, double w) const {
     const Frame f = At(u);
     const double radius = Radius(u, 0.15) + membrane_.gap_m, arc = std::abs(w);
@@ -101,9 +102,10 @@ void SplitInSix(const Add& add) {
   }
 }
 
-/// Four of the brick's corners, no two of them neighbours, make a tetrahedron in the middle; each other corner makes
-/// one with its three neighbours. Every face's diagonal joins two of the four. They are those whose coordinates add up
-/// to an even number over the whole tube, so that neighbours agree; `parity` is the sum at corner 000.
+/// Split into five: four corners of the brick, no two of them neighbours, form a tetrahedron in the middle; each other
+/// corner forms one with its three neighbours. The diagonal of every face joins two of the four. The four are those
+/// whose coordinates add up to an even number over the whole tube, so that neighbours agree; `parity` is the sum at
+/// corner 000.
 template <class Add>
 void SplitInFive(int parity, const Add& add) {
   std::array<std::array<int, 3>, 4> middle{};
@@ -167,7 +169,7 @@ void AddFineSurface(const TubeSettings& tube, const Shape& shape, Anatomy* out) 
   for (int ring = 0; ring + 1 < rings; ++ring) {
     for (int segment = 0; segment < n; ++segment) {
       const auto id = [&](int r, int s) { return static_cast<Index>(r * n + s % n); };
-      // Along +y and then round from the top to the right: the normal points outward.
+      // Along +y and then from the top to the right: the normal points outward.
       out->surface_triangles.push_back({id(ring, segment), id(ring, segment + 1), id(ring + 1, segment + 1)});
       out->surface_triangles.push_back({id(ring, segment), id(ring + 1, segment + 1), id(ring + 1, segment)});
     }
@@ -183,8 +185,8 @@ void AddSheet(const MembraneSettings& membrane, const Shape& shape, Anatomy* out
   }
 }
 
-/// The sheet's fixed continuation to the sides and beyond the ends. It begins a little inside the membrane's rim and a
-/// little below it, so that no gap shows between the fine rim and the coarse surface.
+/// The fixed continuation of the sheet to the sides and beyond the ends. It begins slightly inside the membrane's rim
+/// and slightly below it, so that no gap is visible between the fine rim and the coarse surface.
 Anatomy::Surrounding Retroperitoneum(const TubeSettings& tube, const MembraneSettings& membrane, const Shape& shape) {
   constexpr double kOverlap_m = 0.0015, kBelow_m = 0.0004, kReach_m = 0.150;
   constexpr int kInner = 32, kOuter = 12;
@@ -222,7 +224,7 @@ Anatomy::Surrounding Retroperitoneum(const TubeSettings& tube, const MembraneSet
   return result;
 }
 
-/// The bed beneath the organ: a trough from one rim of the membrane to the other.
+/// The bed below the organ: a trough from one rim of the membrane to the other.
 Anatomy::Surrounding PelvicFloor(const TubeSettings& tube, const MembraneSettings& membrane, const Shape& shape) {
   constexpr int kRows = 33, kCols = 25;
   constexpr double kClearance_m = 0.006;
@@ -250,7 +252,7 @@ Anatomy::Surrounding AbdominalWall() {
   const Vec3d radii(0.155, 0.185, 0.185);
   Anatomy::Surrounding result{"abdominal wall", SurfaceRole::kAbdominalWall, false, {}, {}};
   for (int r = 0; r < kRows; ++r) {
-    // Not quite to the pole: a degenerate row of triangles would have no normal.
+    // Ends before the pole: a degenerate row of triangles would have no normal.
     const double latitude = 0.5 * kPi * r / (kRows - 1) * 0.995;
     for (int c = 0; c < kCols; ++c) {
       const double longitude = -2 * kPi * c / (kCols - 1);

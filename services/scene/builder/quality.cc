@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Least and largest, 0 and 0 when nothing was added.
+/// Smallest and largest value, both 0 if no value was added.
 struct Extent {
   double least = kInfinity, largest = -kInfinity;
   void Add(double value) {
@@ -120,7 +120,7 @@ std::vector<AtlasMetric> MeasureAtlas(const SceneView& s) {
       const auto m = [&](std::size_t k) { return Eigen::Vector2d(s.membrane_material[k].cast<double>()); };
       Eigen::Matrix<double, 3, 2> place;
       Eigen::Matrix2d material;
-      // Sums of the cell's opposite edges: twice the derivative of the bilinear map in its middle.
+      // Sums of opposite edges of the cell: twice the derivative of the bilinear map at its middle.
       const std::size_t across = n + 1, along = n + cols, both = n + cols + 1;
       place << x(across) - x(n) + x(both) - x(along), x(along) - x(n) + x(both) - x(across);
       material << m(across) - m(n) + m(both) - m(along), m(along) - m(n) + m(both) - m(across);

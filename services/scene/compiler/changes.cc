@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::string_view kPower = "script.power_W";
 
-/// The power to which the simulated operator sets the generator for each use. Each key gets a value of its own: a
-/// shared one would be written as an anchor.
+/// Sets the generator's power in every script key with a power above 0. Each key gets a value of its own: a shared one
+/// would be written as an anchor.
 void SetPower(YAML::Node description, const YAML::Node& value) {
   for (auto entry : description["script"]) {
     if (!entry.second.IsSequence()) continue;

@@ -1,4 +1,4 @@
-// From a description file to a compiled scene: what the scene_compiler program does.
+// From a description file to a compiled scene: the work of the scene_compiler program.
 #pragma once
 
 #include <filesystem>
@@ -11,17 +11,17 @@
 
 namespace fulcrum::scene {
 
-/// Called with what begins now; may be empty.
+/// Called with a text at the start of each stage; may be empty.
 using Progress = std::function<void(const std::string&)>;
 
-/// Procedural or imported, as the settings say. Throws InputError.
+/// Builds a procedural or imported scene, depending on the settings. Throws InputError.
 SceneData BuildScene(const SceneSettings& settings, const Progress& progress);
 
 struct CompiledScene {
   SceneData data;
   std::string effective_yaml;
 };
-/// Reads the YAML, with `changes` made (ApplyChanges), and builds the scene. Throws InputError.
+/// Reads the YAML, with `changes` applied (ApplyChanges), and builds the scene. Throws InputError.
 CompiledScene CompileScene(const std::filesystem::path& yaml, const std::filesystem::path& data,
                            const Progress& progress, const std::vector<std::string>& changes = {});
 

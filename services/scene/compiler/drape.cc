@@ -11,13 +11,14 @@ namespace fulcrum::scene {
 namespace {
 
 constexpr int kRadiusRows = 65, kRadiusAngles = 65;  ///< Samples of the organ's outer radius.
-constexpr double kRayLength_m = 0.08;                ///< No organ of interest is thicker.
-constexpr double kMissedRays = 0.10;                 ///< More than this part: the centre line is not inside the organ.
+constexpr double kRayLength_m = 0.08;                ///< Longer than the thickness of any organ.
+/// If a larger share of the rays misses, the centre line is not inside the organ.
+constexpr double kMissedRays = 0.10;
 constexpr int kRadiusSmoothing = 12, kSheetSmoothing = 40;
-constexpr double kTaper = 0.12;  ///< Of the length at either end, over which the gap closes to …
-constexpr double kEndGap = 0.3;  ///< … this part of it: there the membrane grows together with the organ.
+constexpr double kTaper = 0.12;  ///< Share of the length at either end over which the gap decreases to …
+constexpr double kEndGap = 0.3;  ///< … this share of it: there the membrane is fused with the organ.
 constexpr double kFlareTurn_rad = 0.7;
-constexpr double kLeastNormalAgreement = 0.05;  ///< Cosine between neighbouring normals: less is a fold.
+constexpr double kLeastNormalAgreement = 0.05;  ///< Cosine between neighbouring normals: a smaller one means a fold.
 
 /// Rows of values on a regular grid.
 template <class T>
@@ -37,7 +38,8 @@ struct Grid {
     return (1 - v) * ((1 - u) * at(r, c) + u * at(r, c + 1)) + v * ((1 - u) * at(r + 1, c) + u * at(r + 1, c + 1));
   }
 
-  /// Each value half way to the mean of its neighbours, `times` times; the border sees fewer neighbours, or stays.
+  /// Moves each value half way to the mean of its neighbours, `times` times. Border values have fewer neighbours, or
+  /// are kept.
   void Smooth(int times, bool keep_border) {
     for (int k = 0; k < times; ++k) {
       const Grid old = *this;
@@ -71,8 +73,8 @@ CrossFrame FrameAt(const CentreLine& line, double fraction, const Vec3d& facing)
   return frame;
 }
 
-/// Distance along the ray to the first triangle that it leaves through (the outer side: the ray may begin in the lumen,
-/// within the wall or in a filled organ). Negative when there is none. Moeller and Trumbore's intersection.
+/// Distance along the ray to the first triangle through which it leaves the mesh (the outer side: the ray may begin in
+/// the lumen, within the wall or in a filled organ). Negative if there is none. Moeller and Trumbore's intersection.
 double ExitDistance(const TriangleMesh& mesh, const Vec3d& origin, const Vec3d& direction) {
   double nearest = kRayLength_m;
   bool hit = false;
@@ -127,7 +129,7 @@ Grid<double> OuterRadius(const ImportSettings& import, const CentreLine& line, c
   return radius;
 }
 
-/// Equally spaced points along a polyline.
+/// `count` equally spaced points along a polyline.
 std::vector<Vec3d> Resample(const std::vector<Vec3d>& line, int count) {
   std::vector<double> length{0};
   for (std::size_t i = 1; i < line.size(); ++i) {
@@ -167,7 +169,7 @@ std::vector<Vec3d> RowLine(const CrossFrame& frame, const Grid<double>& radius, 
     }
     return points;
   };
-  // Direction over the last tenth of the arc: a single segment would carry the surface's noise.
+  // Direction over the last tenth of the arc: a single segment would contain the noise of the surface.
   std::vector<Vec3d> line = flare(arc.front(), (arc.front() - arc[kArc / 10]).normalized(), -1);
   std::reverse(line.begin(), line.end());
   line.insert(line.end(), arc.begin(), arc.end());
@@ -182,7 +184,7 @@ Vec3d NormalAt(const Grid<Vec3d>& sheet, int r, int c) {
   return across.cross(along).normalized();
 }
 
-/// Nodes nearer to the organ than `least_gap(row)` move out along the surface's normal there.
+/// Moves nodes that are nearer to the organ than `least_gap(row)` outwards along the surface's normal.
 template <class LeastGap>
 void PushOut(const TriangleMesh& organ, const TriangleLocator& locator, double reach, const LeastGap& least_gap,
              Grid<Vec3d>* sheet) {
@@ -205,7 +207,7 @@ void PushOut(const TriangleMesh& organ, const TriangleLocator& locator, double r
   }
 }
 
-/// Spreads the nodes evenly along each row, then along each column.
+/// Spaces the nodes evenly along each row, then along each column.
 void Spread(Grid<Vec3d>* sheet) {
   std::vector<Vec3d> line;
   for (int r = 0; r < sheet->rows; ++r) {
@@ -226,7 +228,7 @@ void Spread(Grid<Vec3d>* sheet) {
   }
 }
 
-/// A fold shows as a crease of more than 90 degrees between neighbouring nodes.
+/// Throws at a fold, which is a crease of more than 90 degrees between neighbouring nodes.
 void CheckFolds(const Grid<Vec3d>& sheet, const std::vector<CrossFrame>& frames, const std::string& name) {
   for (int r = 0; r < sheet.rows; ++r) {
     for (int c = 0; c < sheet.cols; ++c) {

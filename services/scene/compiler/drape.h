@@ -18,9 +18,10 @@ class CentreLine {
 
   [[nodiscard]] double length() const { return length_.back(); }
   [[nodiscard]] Vec3d At(double fraction) const;
-  /// Unit, towards growing fraction; averaged over a tenth of the curve, so that neighbouring cross planes agree.
+  /// Unit tangent towards growing fraction; averaged over a tenth of the curve, so that neighbouring cross planes
+  /// agree.
   [[nodiscard]] Vec3d Tangent(double fraction) const;
-  /// Fraction of the nearest point.
+  /// Fraction of the curve's point nearest to `p`.
   [[nodiscard]] double Project(const Vec3d& p) const;
 
  private:
@@ -28,13 +29,12 @@ class CentreLine {
   std::vector<double> length_;
 };
 
-/// The membrane's nodes, row by row [m]: outside the organ everywhere, columns along +(tangent x facing), rows along
-/// the centre line. Throws InputError "name: reason" when rays from the centre line miss the organ or the sheet folds
-/// over.
+/// The membrane's nodes, row by row [m]: all outside the organ, columns along +(tangent x facing), rows along the
+/// centre line. Throws InputError "name: reason" when rays from the centre line miss the organ or the sheet folds over.
 std::vector<Vec3d> DrapeMembrane(const ImportSettings& import, const MembraneSettings& membrane,
                                  const CentreLine& centre_line, const TriangleMesh& organ, const std::string& name);
 
-/// The fixed surface that continues a membrane on both sides by `width`, and a little under its rims.
+/// The fixed surface that continues a membrane on both sides by `width`, beginning slightly below its rims.
 TriangleMesh ContinueSideways(int rows, int cols, const std::vector<Vec3d>& sheet, double width);
 
 }  // namespace fulcrum::scene

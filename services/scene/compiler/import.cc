@@ -14,9 +14,10 @@
 namespace fulcrum::scene {
 namespace {
 
-constexpr int kLeastTets = 100, kMostTets = 60000;  ///< Fewer are no organ, more are beyond the vertices of a scene.
+/// Fewer cannot represent an organ; more exceed the vertices of a scene.
+constexpr int kLeastTets = 100, kMostTets = 60000;
 
-/// From the files' unit and origin to frame W.
+/// Converts from the files' unit and origin to frame W.
 template <class Mesh>
 Mesh ToWorld(Mesh mesh, const ImportSettings& import, const Vec3f& offset_m) {
   for (Vec3d& p : mesh.vertices) {
@@ -25,12 +26,12 @@ Mesh ToWorld(Mesh mesh, const ImportSettings& import, const Vec3f& offset_m) {
   return mesh;
 }
 
-/// A sphere round the stretch under the membrane, its triangles facing inwards.
+/// A sphere around the stretch under the membrane, its triangles facing inwards.
 Anatomy::Surrounding Cavity(const Vec3d& centre, double radius) {
   constexpr int kRows = 25, kCols = 49;
   Anatomy::Surrounding result{"cavity", SurfaceRole::kRetroperitoneum, false, {}, {}};
   for (int r = 0; r < kRows; ++r) {
-    // Not quite to the poles, where triangles would have no area.
+    // Ends before the poles, where triangles would have no area.
     const double latitude = 0.998 * std::numbers::pi * (static_cast<double>(r) / (kRows - 1) - 0.5);
     for (int c = 0; c < kCols; ++c) {
       const double longitude = -2 * std::numbers::pi * c / (kCols - 1);
@@ -51,7 +52,7 @@ void Say(const Progress& progress, const char* format, Values... values) {
   }
 }
 
-/// The organ as a body and the surface that is seen of it.
+/// The organ as a body and its visible surface.
 struct Organ {
   TetrahedralMesh tets;
   TriangleMesh surface;
@@ -122,7 +123,7 @@ Anatomy ImportAnatomy(const SceneSettings& settings, const Progress& progress) {
     const double fraction = centre_line.Project(p);
     anatomy.organ_fixed.push_back(fraction < import.from || fraction > import.to);
   }
-  // Draped over the tetrahedra's own surface: that is what the bindings hold on to.
+  // Draped over the surface of the tetrahedra, to which the bindings are attached.
   const TriangleMesh coarse{body.tets.vertices, BoundaryOf(body.tets.tets)};
   anatomy.sheet = DrapeMembrane(import, settings.membrane, centre_line, coarse, name);
   Say(progress, "membrane draped over %.0f mm of the organ", 1e3 * (import.to - import.from) * centre_line.length());

@@ -1,4 +1,5 @@
-// A scene from real meshes: the organ's surface is repaired, filled with tetrahedra and draped with a membrane.
+// A scene from meshes of real anatomy: the organ's surface is repaired, filled with tetrahedra and draped with a
+// membrane.
 #pragma once
 
 #include "services/scene/builder/build.h"

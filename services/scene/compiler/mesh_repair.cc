@@ -32,7 +32,7 @@ namespace sms = CGAL::Surface_mesh_simplification;
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Surface = CGAL::Surface_mesh<Kernel::Point_3>;
 
-/// A triangle with a larger angle than this is a cap: nearly flat, its height far below its edges.
+/// A triangle with an angle larger than this is a cap: nearly flat, its height far below its edges.
 const double kCapCosine = std::cos(165 * std::numbers::pi / 180);
 
 Surface ToSurface(const TriangleMesh& mesh) {
@@ -46,8 +46,8 @@ Surface ToSurface(const TriangleMesh& mesh) {
       polygons.push_back({t[0], t[1], t[2]});
     }
   }
-  // Merges duplicate points and triangles, drops what has no area, makes neighbours agree on the side that is outside
-  // and splits the vertices where that is impossible.
+  // Merges duplicate points and triangles, drops triangles without area, makes the orientation of neighbours consistent
+  // and splits vertices where that is impossible.
   pmp::repair_polygon_soup(points, polygons);
   pmp::orient_polygon_soup(points, polygons);
   Surface surface;
@@ -111,7 +111,7 @@ bool Collapse(Surface::Edge_index e, Surface* surface) {
         before[k] = surface->point(w);
         after[k++] = moves ? middle : surface->point(w);
       }
-      // Not CGAL::normal, which asks for triangles with an area.
+      // CGAL::normal requires triangles with an area.
       const auto n0 = CGAL::cross_product(before[1] - before[0], before[2] - before[0]);
       const auto n1 = CGAL::cross_product(after[1] - after[0], after[2] - after[0]);
       const bool had_area = n0.squared_length() > 0;
@@ -139,7 +139,7 @@ bool FlipCap(Surface::Face_index f, Surface* surface) {
   return true;
 }
 
-/// Short edges are collapsed, shortest first; then caps are flipped; again until nothing changes.
+/// Collapses short edges, shortest first, then flips caps; repeats until nothing changes.
 void RemoveSlivers(double min_edge, Surface* surface, RepairReport* report) {
   constexpr int kRounds = 10;
   for (int round = 0; round < kRounds; ++round) {
@@ -170,7 +170,7 @@ void RemoveSlivers(double min_edge, Surface* surface, RepairReport* report) {
   }
 }
 
-/// Closes every hole with triangles between its own vertices. Returns how many.
+/// Closes every hole with triangles between its own vertices. Returns the number of holes closed.
 std::size_t CapOpenings(Surface* surface) {
   std::vector<Surface::Halfedge_index> holes;
   pmp::extract_boundary_cycles(*surface, std::back_inserter(holes));
@@ -183,7 +183,7 @@ std::size_t CapOpenings(Surface* surface) {
   return capped;
 }
 
-/// Outward also where the surface is open: as the body that caps would close.
+/// Orients the surface outward, also if it is open: as the body that caps would close.
 void OrientOutward(const std::string& name, Surface* surface) {
   Surface closed = *surface;
   CapOpenings(&closed);
@@ -197,9 +197,10 @@ void OrientOutward(const std::string& name, Surface* surface) {
 
 /// The outer surface, an inner one below it by `thickness`, and rims between the two where it is open.
 TriangleMesh WithWall(const TriangleMesh& outer, double thickness) {
-  constexpr int kSmoothing = 3;  // Of the normals: a surface's noise would make the inner side cross itself.
+  // Smoothing steps of the normals: with the noise of the surface the inner side would intersect itself.
+  constexpr int kSmoothing = 3;
   const std::size_t count = outer.vertices.size();
-  // Weighted by the angle at the vertex: how a surface is cut into triangles must not matter.
+  // Weighted by the angle at the vertex, so that the result does not depend on the triangulation.
   const auto angle = [&](const Triangle& t, std::size_t k) {
     const Vec3d &p = outer.vertices[t[k]], a = outer.vertices[t[(k + 1) % 3]] - p,
                 b = outer.vertices[t[(k + 2) % 3]] - p;

@@ -1,4 +1,4 @@
-// Makes usable surfaces of real ones. CGAL lives behind these functions and those of tetrahedralise.h only.
+// Repair of surface meshes from real data. CGAL is used in this source and in that of tetrahedralise.h only.
 #pragma once
 
 #include <string>
@@ -10,25 +10,27 @@ namespace fulcrum::scene {
 struct SurfaceRepair {
   double min_edge = 0;        ///< Shorter edges are collapsed.
   bool cap_openings = false;  ///< Close an open surface.
-  double wall = 0;            ///< > 0: the result bounds a wall this thick below the surface; openings become its rims.
+  double wall = 0;  ///< > 0: the result bounds a wall of this thickness below the surface; openings become its rims.
 };
 
 struct RepairReport {
   std::size_t openings_capped = 0;
   std::size_t pieces_dropped = 0;  ///< Separate pieces other than the largest.
   std::size_t edges_collapsed = 0;
-  std::size_t caps_flipped = 0;        ///< Flat triangles removed by flipping their longest edge.
-  std::size_t self_intersections = 0;  ///< Pairs of triangles left that cross: tolerated by the mesher, reported.
+  std::size_t caps_flipped = 0;  ///< Flat triangles removed by flipping their longest edge.
+  /// Remaining pairs of intersecting triangles: tolerated by the mesher, reported.
+  std::size_t self_intersections = 0;
   double least_edge = 0, least_angle_deg = 0;  ///< After the repair.
 };
 
-/// The largest piece of `mesh` as a closed, oriented (outward) two-manifold without short edges and without needle or
-/// cap triangles where its topology allows. Throws InputError "name: reason" when it cannot be closed, or when the
-/// wall's inner side crosses itself.
+/// The largest piece of `mesh` as a closed, outward-oriented two-manifold without short edges and without needle or cap
+/// triangles where its topology allows. Throws InputError "name: reason" if it cannot be closed, or if the inner side
+/// of the wall intersects itself.
 TriangleMesh RepairSurface(const TriangleMesh& mesh, const SurfaceRepair& settings, const std::string& name,
                            RepairReport* report);
 
-/// Edge collapse (Lindstrom, Turk 1998) down to `triangles_max`; pieces and holes stay. Orientation is made consistent.
+/// Edge collapse (Lindstrom, Turk 1998) down to `triangles_max`; pieces and holes remain. Orientation is made
+/// consistent.
 TriangleMesh Decimate(const TriangleMesh& mesh, int triangles_max);
 
 }  // namespace fulcrum::scene

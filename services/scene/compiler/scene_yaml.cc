@@ -14,9 +14,9 @@ using config::Range;
 using config::StrictMap;
 using config::StrictYaml;
 
-/// Where mesh files are looked for, in this order.
+/// Folders in which mesh files are searched, in this order.
 struct Folders : std::vector<std::filesystem::path> {
-  bool files_needed = true;  ///< False: the first place will do, whether or not a file is there.
+  bool files_needed = true;  ///< False: the first path is returned, whether or not the file exists.
 };
 
 constexpr std::size_t kMaxKeys = 2000;
@@ -58,7 +58,7 @@ void ReadTube(StrictMap map, TubeSettings* t) {
   }
 }
 
-/// Finds a mesh file, or refuses in one line with every place that was looked at.
+/// Finds a mesh file, or throws InputError in one line with every path that was tried.
 std::filesystem::path FindFile(const StrictMap& map, const std::string& key, const std::string& name,
                                const Folders& folders) {
   std::string tried;
@@ -104,7 +104,7 @@ void ReadImport(StrictMap map, const Folders& bases, ImportSettings* import, Fol
   import->cap_openings = map.Flag("cap_openings", import->cap_openings);
   ReadSi(&map, "wall_mm", Range::Between(0, 30), &import->wall_m);
   if (map.Has("tet_edge_mm") && map.Has("target_tets")) {
-    map.Fail("tet_edge_mm", "and target_tets say the same: give one of them");
+    map.Fail("tet_edge_mm", "and target_tets set the same quantity: give one of them");
   }
   ReadInteger(&map, "target_tets", 500, 60000, &import->target_tets);
   ReadSi(&map, "tet_edge_mm", Range::Between(0, 50), &import->tet_edge_m);
@@ -249,7 +249,7 @@ std::uint32_t ReadNodes(StrictMap* root, std::uint32_t all) {
   if (names.empty()) {
     return all;
   }
-  // The supervisor and the recorder are the session's and not the scene's.
+  // Supervisor and recorder belong to the session and not to the scene.
   constexpr int kSceneNodes = static_cast<int>(NodeId::kRecorder);
   std::uint32_t mask = 0;
   for (const std::string& name : names) {
@@ -266,7 +266,7 @@ std::uint32_t ReadNodes(StrictMap* root, std::uint32_t all) {
   return mask;
 }
 
-/// `bases`: where relative names of the description start from.
+/// @param bases folders to which relative names of the description refer.
 SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesystem::path& data) {
   SceneSettings scene;
   StrictMap root = yaml->root();
@@ -319,7 +319,7 @@ SceneDescription ReadFile(const std::filesystem::path& file, const std::filesyst
     const std::string text{std::istreambuf_iterator<char>(stream), {}};
     changed = ApplyChanges(text, changes, kCompileSections);
   }
-  // A scene of the same name as the one it stands on would be taken for that.
+  // A scene with the name of its base would be mistaken for it.
   StrictYaml yaml = StrictYaml::FromFileOnBases(file, {"name", "description"}, changed);
   Folders bases;
   bases.files_needed = files_needed;

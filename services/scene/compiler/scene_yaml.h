@@ -13,19 +13,20 @@ namespace fulcrum::scene {
 
 struct SceneDescription {
   SceneSettings settings;
-  std::string effective_yaml;          ///< What was read, defaults included. Reads back to the same settings.
-  std::vector<config::KeyRule> rules;  ///< Every key that was asked for.
+  std::string effective_yaml;          ///< The values read, defaults included. Reading it gives the same settings.
+  std::vector<config::KeyRule> rules;  ///< Every key that was read.
 };
 
-/// Reads and checks a scene description. Mesh files are looked up in `data` (when not empty), then in the folders that
+/// Reads and checks a scene description. Mesh files are searched in `data` (when not empty), then in the folders that
 /// the description names. `changes`: see ApplyChanges. Throws InputError "file:line: key: reason; valid: range".
 SceneDescription ReadSceneYaml(const std::filesystem::path& file, const std::filesystem::path& data,
                                const std::vector<std::string>& changes = {});
 
-/// The same for a text; `name` stands for the file in messages, relative folders start from the working directory.
+/// As ReadSceneYaml, for a text; `name` stands for the file in messages, relative folders refer to the working
+/// directory.
 SceneDescription ParseSceneYaml(std::string_view text, std::string_view name, const std::filesystem::path& data);
 
-/// Every key that the description asks for. Its mesh files need not be there.
+/// Every key that a description can have. Its mesh files need not exist.
 std::vector<config::KeyRule> SceneRules(const std::filesystem::path& file);
 
 struct SceneSummary {

@@ -12,10 +12,10 @@
 namespace fulcrum::scene {
 namespace {
 
-/// Flatter ones have no direction in which they resist, and a time step of no use.
+/// A flatter tetrahedron has no direction in which it resists, and would need an unusably small time step.
 constexpr double kFlat_deg = 1.0;
 
-/// A tetrahedron of the file with its number there.
+/// A tetrahedron with its number in the file.
 struct Numbered {
   Tetrahedron tet;
   std::size_t number;
@@ -48,7 +48,7 @@ class TetRepair {
 
   const Vec3d& X(Index v) const { return file_.vertices[v]; }
 
-  /// Parts of a mesh that were written apart meet again: vertices at one place become one.
+  /// Merges vertices at one place, so that parts of a mesh that were written separately are connected again.
   void Merge() {
     std::map<std::array<double, 3>, Index> ids;
     std::vector<Index> first(file_.vertices.size());
@@ -91,7 +91,7 @@ class TetRepair {
         ++report_->turned;
       }
     }
-    // A file that counts the other way round is no repair.
+    // A file in which all tetrahedra have the other orientation needs no repair.
     report_->turned = report_->turned == tets_.size() ? 0 : report_->turned;
   }
 
@@ -110,12 +110,12 @@ class TetRepair {
     }
   }
 
-  /// Pairs of places in `tets_` that share a face.
+  /// Pairs of indices in `tets_` that share a face.
   std::vector<std::array<std::size_t, 2>> Neighbours() const {
     struct Face {
       Triangle sorted;
       std::size_t tet;
-      bool is_odd;  ///< The sorted corners run the other way round, seen from outside.
+      bool is_odd;  ///< The sorted corners run clockwise, seen from outside.
     };
     // Corners of each face counter-clockwise from outside where the volume is positive.
     constexpr int kFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}};
@@ -185,7 +185,7 @@ class TetRepair {
     tets_ = std::move(kept);
   }
 
-  /// Vertices in order of place: neighbours in memory are neighbours in space, whatever order the file has.
+  /// Sorts the vertices by place: neighbours in memory are then neighbours in space, whatever the order of the file.
   TetrahedralMesh Compact() const {
     std::vector<Index> used;
     for (const Numbered& t : tets_) {

@@ -1,4 +1,4 @@
-// Makes a usable organ of tetrahedra that others made.
+// Repair of tetrahedral meshes from other programs.
 #pragma once
 
 #include <string>
@@ -14,16 +14,16 @@ struct TetrahedralMesh {
 };
 
 struct TetRepairReport {
-  std::size_t vertices_merged = 0;  ///< At the same place as another one.
-  std::size_t turned = 0;           ///< Of negative volume: two corners swapped.
-  std::size_t doubles_dropped = 0;  ///< The same corners as another one, or one corner twice.
+  std::size_t vertices_merged = 0;  ///< Vertices at the same place as another one.
+  std::size_t turned = 0;           ///< Tetrahedra of negative volume, of which two corners were swapped.
+  std::size_t doubles_dropped = 0;  ///< Tetrahedra with the same corners as another one, or with one corner twice.
   std::size_t pieces_dropped = 0;   ///< Parts that share no face with the largest.
   double least_dihedral_deg = 0, largest_dihedral_deg = 0;
 };
 
 /// The largest piece of the file's tetrahedra, turned to positive volume, as a mesh in which every face belongs to one
-/// or two tetrahedra on opposite sides of it; vertices and tetrahedra in order of place. Throws InputError
-/// "name: tetrahedron 12 ...: reason" for what cannot be put right: flat ones (a dihedral angle below 1 degree),
+/// or two tetrahedra on opposite sides of it; vertices and tetrahedra sorted by place. Throws InputError "name:
+/// tetrahedron 12 ...: reason" for faults that cannot be repaired: flat tetrahedra (a dihedral angle below 1 degree),
 /// overlapping ones, faces with three.
 TetrahedralMesh RepairTetrahedra(const MeshFile& file, const std::string& name, TetRepairReport* report);
 

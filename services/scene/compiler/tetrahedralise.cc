@@ -27,11 +27,12 @@ using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 
 constexpr int kAttempts = 6;
-constexpr double kLeastOrder = 1, kLargestOrder = 5;  ///< Bounds of a step where two attempts tell nothing of use.
+/// Bounds of the exponent when the last two attempts do not determine it.
+constexpr double kLeastOrder = 1, kLargestOrder = 5;
 constexpr double kCountTolerance = 0.1;
 constexpr double kSliverBound_deg = 15;
-/// Distance of the mesh from the surface, as a part of the cell size. The fine surface is embedded, so that what is
-/// seen does not suffer from this.
+/// Distance of the mesh from the surface, as a share of the cell size. The fine surface is embedded, so the picture
+/// does not depend on this.
 constexpr double kFacetDistance = 0.25;
 constexpr unsigned kSeed = 0;
 
@@ -47,7 +48,7 @@ TetrahedralMesh ToMesh(const Complex& complex) {
   TetrahedralMesh mesh;
   std::map<std::array<double, 3>, Index> ids;
   const auto key = [](const auto& p) { return std::array<double, 3>{p.x(), p.y(), p.z()}; };
-  // Vertices in order of place: neighbours in memory are neighbours in space, whatever order the mesher kept them in.
+  // Sorted by place: neighbours in memory are neighbours in space, whatever the order of the mesher.
   for (auto cell = complex.cells_in_complex_begin(); cell != complex.cells_in_complex_end(); ++cell) {
     for (int k = 0; k < 4; ++k) {
       ids.try_emplace(key(cell->vertex(k)->point().point()), 0);
@@ -81,7 +82,7 @@ TetrahedralMesh ToMesh(const Complex& complex) {
   return mesh;
 }
 
-/// Of a regular tetrahedron of edge 1.
+/// Volume of a regular tetrahedron of edge 1.
 const double kRegularVolume = 1 / (6 * std::numbers::sqrt2);
 
 }  // namespace
@@ -100,9 +101,9 @@ TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const 
   for (const Triangle& t : mesh.triangles) {
     surface.add_face(vertices[t[0]], vertices[t[1]], vertices[t[2]]);
   }
-  // The criterion bounds circumradii, so begin above the regular tetrahedron's edge.
+  // The criterion bounds circumradii, so the search begins above the edge of the regular tetrahedron.
   double size = 1.1 * std::cbrt(VolumeOf(mesh) / (kRegularVolume * target_tets));
-  // count ~ size^-order: 3 in a thick body; in a wall of one layer it is told by the last two attempts.
+  // count ~ size^-order: 3 in a thick body; in a wall of one layer the last two attempts determine it.
   double order = 3, last_size = 0;
   std::size_t last_count = 0;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
@@ -112,7 +113,7 @@ TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const 
     const Criteria criteria(params::facet_angle = 25, params::facet_size = size,
                             params::facet_distance = kFacetDistance * size, params::cell_radius_edge_ratio = 2.5,
                             params::cell_size = size);
-    // Without a time limit: the clock must not decide what the mesh looks like.
+    // Without a time limit: the mesh must not depend on the clock.
     const Complex complex =
         CGAL::make_mesh_3<Complex>(domain, criteria, params::no_odt(), params::no_lloyd(),
                                    params::perturb(params::time_limit = 0, params::sliver_bound = kSliverBound_deg),
@@ -135,7 +136,7 @@ TetrahedralMesh Tetrahedralise(const TriangleMesh& mesh, int target_tets, const 
     size *= std::pow(ratio, 1 / order);
   }
   throw InputError(name + ": gives " + std::to_string(last_count) + " tetrahedra after " + std::to_string(kAttempts) +
-                   " attempts; asked: " + std::to_string(target_tets) +
+                   " attempts; wanted: " + std::to_string(target_tets) +
                    ". A thin body needs more of them; try another number");
 }
 

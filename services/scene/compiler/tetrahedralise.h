@@ -12,7 +12,7 @@ namespace fulcrum::scene {
 /// `target_tets`. The same input gives the same mesh. Throws InputError "name: reason".
 TetrahedralMesh Tetrahedralise(const TriangleMesh& surface, int target_tets, const std::string& name);
 
-/// How many tetrahedra of this mean edge fill a closed surface, about.
+/// Approximate number of tetrahedra of this mean edge that fill a closed surface.
 int TetsOfEdge(const TriangleMesh& surface, double edge);
 
 }  // namespace fulcrum::scene

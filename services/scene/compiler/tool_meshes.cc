@@ -9,8 +9,8 @@
 namespace fulcrum::scene {
 namespace {
 
-constexpr std::size_t kMostTriangles = 20000;  ///< Of one part: more than the picture can show.
-constexpr double kFarthest_m = 1.0;            ///< From the tip: no instrument is longer.
+constexpr std::size_t kMostTriangles = 20000;  ///< Per part: more than the picture can show.
+constexpr double kFarthest_m = 1.0;            ///< Distance from the tip: no instrument is longer.
 
 void AddPart(const std::filesystem::path& file, const ToolMeshSettings& settings, std::uint32_t tool, ToolPart part,
              SceneData* scene) {

@@ -1,4 +1,4 @@
-// How the tools of a scene look: their mesh files, brought into frame T.
+// Meshes of the tools of a scene, transformed into frame T.
 #pragma once
 
 #include "services/scene/builder/scene_settings.h"
@@ -6,9 +6,9 @@
 
 namespace fulcrum::scene {
 
-/// Reads the meshes that `settings` names and adds them to `scene`, whose hash follows. Nothing happens where none is
-/// named. Throws InputError "file: reason" for a file that cannot be read, has too many triangles for an instrument or
-/// reaches farther than one does (the unit is wrong).
+/// Reads the meshes that `settings` names, adds them to `scene` and updates its hash. No effect if none is named.
+/// Throws InputError "file: reason" for a file that cannot be read, has too many triangles for an instrument or extends
+/// farther than an instrument does (wrong unit).
 void AddToolMeshes(const SceneSettings& settings, SceneData* scene);
 
 }  // namespace fulcrum::scene

@@ -9,18 +9,18 @@
 
 namespace fulcrum::scene {
 
-/// One key per field, default = the field's own.
+/// Reads one key per field; its default is the present value of the field.
 void ReadSi(config::StrictMap* map, const char* key, const config::Range& range, float* field);
 void ReadSi(config::StrictMap* map, const char* key, const config::Range& range, double* field);
 void ReadInteger(config::StrictMap* map, const char* key, int min, int max, int* field);
 void ReadInteger(config::StrictMap* map, const char* key, int min, int max, std::uint32_t* field);
 
-/// Each reads its section over the defaults in the last argument. Throws InputError.
+/// Each function reads its section; keys that are absent keep the values of the last argument. Throws InputError.
 void ReadPhysics(config::StrictMap map, PhysicsParams* p);
 void ReadThermal(config::StrictMap map, ThermalParams* t);
 void ReadRender(config::StrictMap map, RenderParams* r);
 void ReadHaptics(config::StrictMap map, HapticsParams* h);
-/// `mode`: of the physics that was read; in mode paper nothing breathes.
+/// `mode`: of the physics section; in mode paper there is no breathing.
 void ReadBreathing(config::StrictMap map, PhysicsMode mode, Breathing* b);
 
 /// `line`: the planned line, fractions of the sheet.

@@ -9,8 +9,8 @@
 
 namespace fulcrum::scene {
 
-/// Colours `count` constraints over `particle_count` particles; `particles(i)` gives a range of the particles of
-/// constraint i. Returns the colour of each: the lowest one free at its particles, in the order given.
+/// Colours `count` constraints over `particle_count` particles; `particles(i)` is a range of the particles of
+/// constraint i. Returns the colour of each: the lowest one that is free at its particles, in the order given.
 template <class Particles>
 std::vector<Index> GreedyColours(std::size_t count, std::size_t particle_count, const Particles& particles) {
   std::vector<std::vector<bool>> taken(particle_count);
@@ -35,8 +35,8 @@ std::vector<Index> GreedyColours(std::size_t count, std::size_t particle_count, 
   return colours;
 }
 
-/// Sorts `constraints` by colour (keeping their order within one) and returns the offsets: colour k is
-/// [offset[k], offset[k+1]). Empty in, {0} out.
+/// Sorts `constraints` by colour (keeping their order within a colour) and returns the offsets: colour k is [offset[k],
+/// offset[k+1]). For an empty list the result is {0}.
 template <class Constraint, class Particles>
 std::vector<Index> SortByColour(std::vector<Constraint>* constraints, std::size_t particle_count,
                                 const Particles& particles) {

@@ -18,8 +18,8 @@
 namespace fulcrum::scene {
 namespace {
 
-// Layout: header, section table, then the sections, each on a multiple of kAlignment. Little-endian, as written by the
-// x86-64 machines that read it. Bump kSceneFileVersion with every change of a structure in scene_view.h.
+// Layout: header, section table, then the sections, each on a multiple of kAlignment. Little-endian, in the byte order
+// of the x86-64 machines that read it. Increase kSceneFileVersion with every change of a structure in scene_view.h.
 constexpr std::size_t kAlignment = 64;
 constexpr char kMagic[8] = {'F', 'U', 'L', 'C', 'S', 'C', 'N', '\n'};
 constexpr const char* kFixedSection = "scene";
@@ -32,7 +32,7 @@ struct FileHeader {
   std::uint32_t section_count;
   std::uint64_t file_bytes;
   std::uint64_t content_hash;
-  std::uint64_t table_checksum;  ///< Of this header up to here, and of the section table.
+  std::uint64_t table_checksum;  ///< Of this header up to this field, and of the section table.
 };
 static_assert(sizeof(FileHeader) == 40);
 
@@ -45,7 +45,7 @@ struct SectionEntry {
 };
 static_assert(sizeof(SectionEntry) == 56);
 
-/// Everything of a SceneView that is not an array, without padding, so that equal scenes are equal bytes.
+/// All members of a SceneView that are no arrays, without padding, so that equal scenes have equal bytes.
 struct FixedTool {
   std::uint32_t kind;
   Vec3f p_WP;
@@ -102,7 +102,7 @@ void FromFixed(const FixedPart& fixed, SceneView* view) {
   view->tube_vertex_count = fixed.tube_vertex_count;
   for (int i = 0; i < kMaxTools; ++i) {
     const FixedTool& t = fixed.tools[i];
-    // A kind that does not fit is left to the validation to refuse.
+    // A kind that does not fit is refused by the validation.
     const auto kind = static_cast<ToolKind>(std::min<std::uint32_t>(t.kind, 255));
     view->tools[i] = {kind, t.p_WP, t.shaft_radius_m, t.shaft_length_m, t.tip_radius_m, t.tip_length_m};
   }
@@ -283,7 +283,7 @@ void SceneFile::Impl::Read() {
                         "; compile the scene again with scene_compiler");
   }
   if (header.file_bytes != size) {
-    Refuse("header", "the file has " + std::to_string(size) + " bytes, its header says " +
+    Refuse("header", "the file has " + std::to_string(size) + " bytes, but its header requires " +
                          std::to_string(header.file_bytes) + ": it was cut short or added to");
   }
   if (header.section_count > kMaxSections || size < sizeof(header) + header.section_count * sizeof(SectionEntry)) {

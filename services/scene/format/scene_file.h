@@ -13,7 +13,7 @@ namespace fulcrum::scene {
 
 inline constexpr std::uint32_t kSceneFileVersion = 8;
 
-/// Owns the arrays of a scene under construction or in a test; `View()` gives what the nodes read.
+/// Owns the arrays of a scene under construction or in a test; `View()` is what nodes read.
 struct SceneData {
   SceneView fixed;  ///< Name, parameters, counts, tools: everything that is not a span. Spans in it are ignored.
   std::vector<Vec3f> rest_position;
@@ -45,7 +45,7 @@ struct SceneData {
   [[nodiscard]] SceneView View() const;
 };
 
-/// Hash of everything but the source text: two scenes with the same hash are the same to every node.
+/// Hash of everything except the source text: for nodes, two scenes with the same hash are the same.
 [[nodiscard]] std::uint64_t ContentHash(const SceneView& view);
 
 /// Checks the scene and writes it atomically (temporary file, then rename). Returns the content hash.
@@ -55,15 +55,15 @@ std::uint64_t WriteSceneFile(const SceneData& scene, const std::string& source_y
 
 class SceneFile {
  public:
-  /// Maps and checks: magic, version, size, checksum of each section, every index in range, every number finite.
-  /// Throws InputError naming file, section and reason (MismatchError for another version).
+  /// Maps the file and checks magic, version, size, checksum of each section, range of every index, and that every
+  /// number is finite. Throws InputError naming file, section and reason (MismatchError for another version).
   explicit SceneFile(const std::filesystem::path& file);
   ~SceneFile();
   SceneFile(const SceneFile&) = delete;
   SceneFile& operator=(const SceneFile&) = delete;
 
   [[nodiscard]] const SceneView& view() const;
-  /// The effective YAML that it was compiled from.
+  /// The effective YAML from which the scene was compiled.
   [[nodiscard]] std::string source_yaml() const;
 
  private:

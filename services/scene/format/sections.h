@@ -1,4 +1,4 @@
-// The list of the arrays of a scene, in file order: one place for writer, reader, hash and validation.
+// The list of the arrays of a scene, in file order, used by writer, reader, hash and validation.
 #pragma once
 
 #include "services/base/core/scene_view.h"

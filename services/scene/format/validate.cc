@@ -7,7 +7,7 @@
 namespace fulcrum::scene {
 namespace {
 
-/// No triangle of the membrane is turned over in the atlas: two places of the sheet would share a texel.
+/// Refuses triangles of the membrane that are turned over in the atlas: two places of the sheet would share a texel.
 void CheckAtlas(const SceneView& s) {
   const std::size_t rows = s.membrane.rows, cols = s.membrane.cols;
   for (std::size_t r = 0; r + 1 < rows; ++r) {

@@ -1,4 +1,4 @@
-// Checks of a whole scene: what every reader may rely on.
+// Checks of a whole scene: the properties on which every reader may rely.
 #pragma once
 
 #include <optional>
@@ -8,14 +8,15 @@
 
 namespace fulcrum::scene {
 
-/// What is wrong and where.
+/// A fault of a scene and its place.
 struct SceneFault {
   std::string section;  ///< As in services/scene/format/sections.h; "scene" for names, parameters, counts and tools.
-  std::string reason;   ///< Names the element, its value and what is valid.
+  std::string reason;   ///< Names the element, its value and the valid values.
 };
 
-/// The first fault found, or nothing: every index in range, every number finite and in its range, sizes that belong
-/// together, tetrahedra of positive volume, colours without shared particles, weights that sum to one, sorted script.
+/// The first fault found, or nothing. Checks that every index is in range, every number finite and in its range, sizes
+/// are consistent, tetrahedra have positive volume, colours share no particle, weights sum to one, and the script is
+/// sorted.
 std::optional<SceneFault> FindFault(const SceneView& scene);
 
 }  // namespace fulcrum::scene

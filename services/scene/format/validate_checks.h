@@ -1,4 +1,4 @@
-// The single checks that validate.cc and validate_parameters.cc are made of: each throws Fault where it fails.
+// The single checks used in validate.cc and validate_parameters.cc: each throws Fault where it fails.
 #pragma once
 
 #include <array>
@@ -13,9 +13,9 @@
 
 namespace fulcrum::scene {
 
-inline constexpr float kFarthest_m = 10.0f;            ///< Nothing of a scene lies this far from the origin.
+inline constexpr float kFarthest_m = 10.0f;            ///< Largest distance of anything in a scene from the origin.
 inline constexpr float kWeightSumTolerance = 1.0e-4f;  ///< Float rounding of weights of magnitude up to kLargestWeight.
-inline constexpr float kLargestWeight = 20.0f;         ///< More is extrapolation far outside a tetrahedron.
+inline constexpr float kLargestWeight = 20.0f;         ///< Larger weights are extrapolation far outside a tetrahedron.
 
 /// Thrown by the checks only, caught by FindFault: leaves the nested loops at the first fault.
 struct Fault {
@@ -100,7 +100,7 @@ void CheckColours(const char* section, std::span<const Index> offsets, std::span
   }
 }
 
-/// Name, parameters, tools: what is no array.
+/// Checks name, parameters and tools: everything that is no array.
 void CheckParameters(const SceneView& scene);
 
 }  // namespace fulcrum::scene

@@ -6,7 +6,7 @@
 namespace fulcrum::scene {
 namespace {
 
-constexpr std::size_t kLeastTextBytes = 2;  ///< Of a value: a digit and what parts it from the next.
+constexpr std::size_t kLeastTextBytes = 2;  ///< Smallest size of a value in text: a digit and a separator.
 
 }  // namespace
 
@@ -54,7 +54,7 @@ std::string_view Cursor::WordOfLine() {
 std::string_view Cursor::Word() {
   std::string_view word = WordOfLine();
   while (word.empty() && at_ < bytes_.size()) {
-    ++at_;  // The line's end.
+    ++at_;  // Skips the end of the line.
     word = WordOfLine();
   }
   return word;
@@ -107,7 +107,7 @@ void Cursor::CheckCount(const char* what, std::uint64_t count, std::size_t value
   if (count > kMaxMeshElements) {
     Fail(std::to_string(count) + " " + what + "; valid: at most " + std::to_string(kMaxMeshElements));
   }
-  // The last value of a text needs nothing behind it.
+  // The last value of a text needs no separator after it.
   const std::size_t each = binary_ ? bytes_each : kLeastTextBytes * values_each;
   const std::size_t there = left() + (binary_ ? 0 : 1);
   if (count * each > there) {

@@ -1,6 +1,6 @@
-// Reads a mesh file's bytes, as words of text or as binary values. Nothing in a file is believed: every value is
-// checked where it is read, and a count against the bytes that are left before any memory is asked for. Every fault is
-// an InputError "file: line 12: ..." in text, "file: byte 345: ..." once there was binary data.
+// Reads the bytes of a mesh file, as words of text or as binary values. Files are untrusted: every value is checked
+// where it is read, and a count is compared with the remaining bytes before memory is allocated. Every fault is an
+// InputError "file: line 12: ..." in text, "file: byte 345: ..." after the first binary data.
 #pragma once
 
 #include <algorithm>
@@ -18,16 +18,17 @@
 
 namespace fulcrum::scene {
 
-inline constexpr double kLargestCoordinate = 1.0e6;  ///< Beyond: a broken file, in any unit.
+inline constexpr double kLargestCoordinate = 1.0e6;  ///< Larger coordinates mean a broken file, in any unit.
 
 [[noreturn]] void RefuseMesh(const std::string& name, const std::string& reason);
 
-/// At most 40 characters of a file's text, fit to be shown in one line.
+/// At most 40 characters of a file's text, printable in one line.
 std::string Quote(std::string_view text);
 
 class Cursor {
  public:
-  /// Reads `bytes` from `begin` up to `end`; places are told from the beginning of `bytes`. Both must outlive it.
+  /// Reads `bytes` from `begin` up to `end`; reported positions count from the beginning of `bytes`, which, like
+  /// `name`, must outlive the cursor.
   Cursor(std::string_view bytes, const std::string& name, std::size_t begin = 0,
          std::size_t end = std::string_view::npos)
       : bytes_(bytes.substr(0, std::min(end, bytes.size()))), name_(&name), at_(std::min(begin, bytes_.size())) {}
@@ -47,43 +48,43 @@ class Cursor {
 
   // ------------------------------------------------------------------------------------------------------- text
 
-  /// The rest of a line from this character on is a comment.
+  /// Makes this character begin a comment that extends to the end of the line.
   void set_comment(char c) { comment_ = c; }
   /// The next word; empty at the end.
   std::string_view Word();
   /// The next word of this line; empty at its end.
   std::string_view WordOfLine();
-  /// The next word, which must be this one.
+  /// Reads the next word, which must be this one.
   void Expect(std::string_view word);
-  /// What is left of the line, without its end; the cursor goes behind that.
+  /// Returns the rest of the line, without its end, and skips the end of the line.
   std::string_view Line();
-  /// Goes behind the next place where `mark` stands; fails when there is none.
+  /// Skips the text up to and including the next `mark`; fails if there is none.
   void SkipPast(std::string_view mark);
 
   // -------------------------------------------------------------------------------------------- text or binary
 
-  /// The next value: a word of text, or sizeof(T) bytes. `what` names it in a refusal.
+  /// The next value: a word of text, or sizeof(T) bytes. `what` names it in an error message.
   template <class T>
   T Take(const char* what) {
     return binary_ ? TakeBinary<T>(what) : TakeText<T>(what);
   }
-  /// The next value as a coordinate: finite and not absurd.
+  /// The next value as a coordinate: finite and within kLargestCoordinate.
   template <class T>
   double TakeCoordinate() {
     return CheckCoordinate(static_cast<double>(Take<T>("a coordinate")));
   }
-  /// The next value as a number of things of which each takes `values_each` (at least one) values of T.
+  /// The next value as a count of items that have `values_each` (at least one) values of T each.
   template <class T>
   std::size_t TakeCount(const char* what, std::size_t values_each, std::size_t bytes_each);
-  /// Refuses a count of things for which the bytes that are left cannot suffice, or above the limit of any mesh.
-  /// A thing has `values_each` values in text, `bytes_each` bytes in binary data.
+  /// Refuses a count of items that exceeds the remaining bytes or the limit of any mesh. An item has `values_each`
+  /// values in text, `bytes_each` bytes in binary data.
   void CheckCount(const char* what, std::uint64_t count, std::size_t values_each, std::size_t bytes_each) const;
   double CheckCoordinate(double value) const;
-  /// `number` counted from `first` as an index below `count`.
+  /// Checks that `number`, counted from `first`, is an index below `count`, and returns that index.
   Index CheckVertex(std::int64_t number, std::int64_t first, std::size_t count) const;
-  /// Refuses with the place of what was read last.
+  /// Throws with the position of the value that was read last.
   [[noreturn]] void Fail(const std::string& reason) const;
-  /// Goes `count` bytes on.
+  /// Skips `count` bytes.
   void Skip(std::size_t count, const char* what);
 
  private:
@@ -122,10 +123,10 @@ class Cursor {
   std::string_view bytes_;
   const std::string* name_;
   std::size_t at_;
-  std::size_t token_ = 0;  ///< Where what was read last begins.
+  std::size_t token_ = 0;  ///< Position of the value that was read last.
   char comment_ = '\0';
   bool binary_ = false, swap_ = false;
-  bool has_binary_ = false;  ///< From the first binary data on, lines mean nothing.
+  bool has_binary_ = false;  ///< After the first binary data, line numbers have no meaning.
 };
 
 template <class T>

@@ -65,9 +65,9 @@ class GmshReader {
     }
     in_.Line();
     in_.SetBinary(false);
-    const auto one = in_.Take<std::uint32_t>("the number 1 that tells the order of bytes");
+    const auto one = in_.Take<std::uint32_t>("the number 1 that shows the byte order");
     if (one != 1 && one != 0x01000000u) {
-      in_.Fail(std::to_string(one) + " where the number 1 should tell the order of bytes");
+      in_.Fail(std::to_string(one) + " where the number 1 should show the byte order");
     }
     swap_ = one != 1;
   }
@@ -80,7 +80,7 @@ class GmshReader {
     }
   }
 
-  /// The numbers that follow are binary in a binary file.
+  /// Switches to binary numbers if the file is binary.
   void BeginData() {
     if (binary_) {
       in_.SetBinary(swap_);
@@ -152,7 +152,7 @@ class GmshReader {
     }
   }
 
-  /// Elements stand in blocks of one kind.
+  /// Elements are stored in blocks of one kind.
   void ReadElements2Binary() {
     const auto count = in_.Take<std::uint64_t>("the number of elements");
     in_.Line();
@@ -181,7 +181,7 @@ class GmshReader {
     std::size_t blocks, items;
   };
 
-  /// "$Nodes" and "$Elements" begin alike.
+  /// Reads the head of a section; "$Nodes" and "$Elements" have the same one.
   Blocks BeginBlocks(const char* what, std::size_t values_each, std::size_t bytes_each) {
     if (binary_) {
       in_.Line();
@@ -206,7 +206,7 @@ class GmshReader {
 
   void EndBlocks(std::size_t left) {
     if (left != 0) {
-      in_.Fail("the section's blocks hold " + std::to_string(left) + " fewer than its own count says");
+      in_.Fail("the section's blocks contain " + std::to_string(left) + " fewer than its count");
     }
   }
 
@@ -297,7 +297,7 @@ class GmshReader {
   Cursor in_;
   int version_ = 0;
   bool binary_ = false, swap_ = false;
-  std::unordered_map<std::uint64_t, Index> ids_;  ///< Looked up only: its order is never seen.
+  std::unordered_map<std::uint64_t, Index> ids_;  ///< For look-ups only, so its order has no effect.
   MeshFile mesh_;
 };
 

@@ -62,7 +62,7 @@ MeshFile Choose(std::string_view bytes, const std::filesystem::path& name, const
   const std::string text = name.string(), extension = LowerExtension(name);
   const std::string_view head = bytes.substr(0, std::min<std::size_t>(bytes.size(), 512));
   if (extension == ".stl") {
-    return ReadStl(bytes, text);  // First: the 80 bytes before a binary one's count may say anything.
+    return ReadStl(bytes, text);  // First, because the 80 bytes before the count of a binary STL can have any content.
   }
   if (head.starts_with("$MeshFormat") || head.starts_with("$NOD") || head.starts_with("$Comments") ||
       extension == ".msh") {
@@ -123,7 +123,7 @@ TriangleMesh SurfaceOf(MeshFile mesh) {
   if (mesh.tets.empty()) {
     return {std::move(mesh.vertices), std::move(mesh.triangles)};
   }
-  // Files disagree about which way round a tetrahedron is.
+  // Files differ in the orientation of a tetrahedron.
   for (Tetrahedron& t : mesh.tets) {
     const auto& x = mesh.vertices;
     if (SignedVolume(x[t[0]], x[t[1]], x[t[2]], x[t[3]]) < 0) {

@@ -5,7 +5,7 @@
 namespace fulcrum::scene {
 namespace {
 
-/// "7", "7/1", "7//3" or "-1" (from the end) to a vertex.
+/// Converts "7", "7/1", "7//3" or "-1" (from the end) to a vertex index.
 Index ToVertex(const Cursor& in, std::string_view word, std::size_t vertex_count) {
   std::int64_t number = 0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);

@@ -8,14 +8,14 @@
 namespace fulcrum::scene {
 namespace {
 
-constexpr double kLargestIndex = 4294967296.0;  ///< A list of floating-point values could hold anything.
+constexpr double kLargestIndex = 4294967296.0;  ///< Larger values in a list of floating-point indices are refused.
 
 enum class Type { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
 
 struct Property {
   std::string name;
   Type type;
-  std::optional<Type> count;  ///< Of a list.
+  std::optional<Type> count;  ///< Type of the length, for a list.
 };
 
 struct Element {
@@ -84,7 +84,7 @@ class PlyReader {
       in_.Fail("a property before any element");
     }
     Property property;
-    // A list is "list COUNT_TYPE TYPE NAME"; the word is only looked at.
+    // A list is "list COUNT_TYPE TYPE NAME"; this cursor only reads ahead.
     Cursor ahead = in_;
     if (ahead.WordOfLine() == "list") {
       in_ = ahead;
@@ -125,7 +125,7 @@ class PlyReader {
     }
   }
 
-  /// Refuses what the bytes that are left cannot hold.
+  /// Refuses an element that needs more bytes than remain.
   void CheckElement(const Element& element) const {
     std::size_t bytes = 0;
     for (const Property& p : element.properties) {
@@ -159,13 +159,13 @@ class PlyReader {
     in_.Fail("no such type");
   }
 
-  /// As a text these are numbers too, not characters.
+  /// Reads a value; in text, one-byte types are numbers too, not characters.
   template <class T>
   double TakeSmall(const char* what) {
     return in_.binary() ? static_cast<double>(in_.Take<T>(what)) : static_cast<double>(in_.Take<int>(what));
   }
 
-  /// The list's values into `values_`.
+  /// Reads the list's values into `values_`.
   void TakeList(const Property& property, const char* what) {
     const double count = TakeValue(*property.count, "the length of a list");
     if (count < 0) {

@@ -1,5 +1,5 @@
-// One reader a family of mesh formats; ParseMesh() of mesh_io.h chooses. Each takes the file's bytes and its name for
-// messages and throws InputError "file: place: value; what was expected".
+// One reader for each family of mesh formats; ParseMesh() of mesh_io.h selects it. Each takes the file's bytes and its
+// name for messages and throws InputError "file: place: value; what was expected".
 #pragma once
 
 #include <cstdint>
@@ -12,11 +12,12 @@
 
 namespace fulcrum::scene {
 
-/// Binary or ASCII; equal corners become one vertex. The size decides which: some binary files begin with "solid" too.
+/// Binary or ASCII; equal corners become one vertex. The size decides which, because some binary files begin with
+/// "solid" too.
 MeshFile ReadStl(std::string_view bytes, const std::string& name);
-/// Vertices and faces; all else is left out.
+/// Vertices and faces; everything else is omitted.
 MeshFile ReadObj(std::string_view bytes, const std::string& name);
-/// ASCII, binary little- or big-endian: elements `vertex` and `face`; others and further properties are left out.
+/// ASCII, binary little- or big-endian: elements `vertex` and `face`; other elements and properties are omitted.
 MeshFile ReadPly(std::string_view bytes, const std::string& name);
 /// Versions 1, 2.0 to 2.2 and 4.1, ASCII and binary (of either byte order).
 MeshFile ReadGmsh(std::string_view bytes, const std::string& name);
@@ -28,7 +29,7 @@ MeshFile ReadVtu(std::string_view bytes, const std::string& name);
 MeshFile ReadTetgen(std::string_view nodes, const std::string& nodes_name, std::string_view elements,
                     const std::string& elements_name, bool faces);
 
-/// Adds a convex polygon as a fan of triangles; `cursor` is asked to refuse one with fewer than three corners.
+/// Adds a convex polygon as a fan of triangles; throws through `cursor` if it has fewer than three corners.
 void AddPolygon(std::span<const Index> corners, const Cursor& cursor, MeshFile* mesh);
 
 }  // namespace fulcrum::scene

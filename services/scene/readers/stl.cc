@@ -11,13 +11,13 @@ constexpr std::size_t kFacetBytes = 50;          ///< Normal and corners as 12 f
 constexpr std::size_t kFacetBeforeCorners = 12;  ///< The normal, which follows from the corners.
 constexpr std::size_t kFacetAfterCorners = 2;
 
-/// Gives equal corners one vertex. STL knows no shared vertices, but writers repeat the same bits.
+/// Merges equal corners into one vertex. STL has no shared vertices, but writers repeat the same bits.
 class Welder {
  public:
   explicit Welder(MeshFile* mesh) : mesh_(mesh) {}
 
   Index Add(const std::array<float, 3>& p) {
-    // -0 and 0 are one place.
+    // -0 and 0 are the same place.
     const std::array<float, 3> key{p[0] + 0.0f, p[1] + 0.0f, p[2] + 0.0f};
     const auto [entry, is_new] = ids_.try_emplace(key, static_cast<Index>(mesh_->vertices.size()));
     if (is_new) {
@@ -103,8 +103,8 @@ MeshFile ReadStl(std::string_view bytes, const std::string& name) {
       return ReadBinary(&in, count);
     }
     if (!bytes.starts_with("solid")) {
-      in.Fail("its count says " + std::to_string(count) + " triangles, its " + std::to_string(bytes.size()) +
-              " bytes hold " + std::to_string((bytes.size() - kHeaderBytes) / kFacetBytes) +
+      in.Fail("its count is " + std::to_string(count) + " triangles, but its " + std::to_string(bytes.size()) +
+              " bytes contain " + std::to_string((bytes.size() - kHeaderBytes) / kFacetBytes) +
               ": the file was cut short or is no STL");
     }
   }

@@ -3,7 +3,7 @@
 namespace fulcrum::scene {
 namespace {
 
-/// Vertices and the number of the first: files count from 0 or from 1.
+/// Reads the vertices and returns the number of the first: files count from 0 or from 1.
 std::int64_t ReadNodes(Cursor* in, MeshFile* mesh) {
   in->set_comment('#');
   const std::size_t count = in->TakeCount<std::int64_t>("vertices", 4, 1);
@@ -11,7 +11,7 @@ std::int64_t ReadNodes(Cursor* in, MeshFile* mesh) {
   if (dimension != 3) {
     in->Fail("dimension " + std::to_string(dimension) + "; valid: 3");
   }
-  // The numbers of attributes and markers on this line need not be believed: the rest of each line is left out.
+  // The numbers of attributes and markers on this line are not needed: the rest of each line is skipped.
   in->Line();
   mesh->vertices.reserve(count);
   std::int64_t first = 0;

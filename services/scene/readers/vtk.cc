@@ -7,8 +7,7 @@
 namespace fulcrum::scene {
 namespace {
 
-/// Bytes of a value in binary data, by VTK's name of its type; 0 where values are not whole bytes or have no fixed
-/// size.
+/// Bytes of a value in binary data, by VTK's type name; 0 if values are not whole bytes or have no fixed size.
 std::size_t SizeOf(std::string_view type) {
   static const std::map<std::string_view, std::size_t> kSizes = {
       {"char", 1},         {"unsigned_char", 1}, {"signed_char", 1}, {"short", 2},         {"unsigned_short", 2},
@@ -78,7 +77,7 @@ class VtkReader {
     grid_ = set == "UNSTRUCTURED_GRID";
   }
 
-  /// Numbers follow on the next line; binary ones with the most significant byte first.
+  /// Skips to the next line, on which numbers begin; binary ones have the most significant byte first.
   void BeginData() {
     if (binary_) {
       in_.Line();
@@ -120,7 +119,7 @@ class VtkReader {
     return has_offsets_ ? ReadCells5(first, size) : ReadCells1(first, size);
   }
 
-  /// Up to version 4: each cell is the number of its corners and the corners.
+  /// Up to version 4: each cell is the number of its corners, then the corners.
   VtkCells ReadCells1(std::uint64_t count, std::uint64_t size) {
     BeginData();
     in_.CheckCount("entries of cells", size, 1, sizeof(std::int32_t));

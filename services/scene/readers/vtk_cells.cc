@@ -8,7 +8,7 @@ namespace {
 
 enum Type : std::int64_t {
   kVertex = 1,
-  kPolyLine = 4,  ///< 1 to 4: points and lines.
+  kPolyLine = 4,  ///< Types 1 to 4 are points and lines.
   kTriangle = 5,
   kTriangleStrip = 6,
   kPolygon = 7,
@@ -23,7 +23,7 @@ void AddFan(std::span<const Index> corners, MeshFile* mesh) {
   }
 }
 
-/// Empty, or what is wrong.
+/// Adds a cell. Returns an empty text, or the fault.
 std::string AddCell(std::int64_t type, std::span<Index> corners, MeshFile* mesh) {
   const auto wants = [&](std::size_t least, std::size_t most) {
     return corners.size() < least || corners.size() > most
@@ -41,7 +41,7 @@ std::string AddCell(std::int64_t type, std::span<Index> corners, MeshFile* mesh)
   } else if (type == kPixel) {
     fault = wants(4, 4);
     if (fault.empty()) {
-      std::swap(corners[2], corners[3]);  // Its corners run row by row.
+      std::swap(corners[2], corners[3]);  // The corners of a pixel run row by row.
       AddFan(corners, mesh);
     }
   } else if (type == kTriangleStrip) {

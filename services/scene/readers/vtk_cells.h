@@ -1,4 +1,4 @@
-// Cells as both of VTK's families of files hold them.
+// Cells as in both families of VTK files.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,15 @@
 namespace fulcrum::scene {
 
 struct VtkCells {
-  std::vector<std::int64_t> offsets;       ///< Of each cell's first entry in `connectivity`; one more at the end.
+  std::vector<std::int64_t> offsets;       ///< Index of each cell's first entry in `connectivity`; one more at the end.
   std::vector<std::int64_t> connectivity;  ///< Vertices.
-  std::vector<std::int64_t> types;         ///< VTK's numbers, one a cell.
+  std::vector<std::int64_t> types;         ///< VTK's type numbers, one per cell.
 };
 
-/// Called with what is wrong with the cells; throws.
+/// Called with a fault of the cells; throws.
 using VtkFault = std::function<void(const std::string&)>;
 
-/// Appends to `mesh` cells over `vertex_count` of its vertices from `first_vertex` on. Checks everything.
+/// Appends cells to `mesh` over `vertex_count` of its vertices from `first_vertex` on. Checks everything.
 void AddVtkCells(const VtkCells& cells, Index first_vertex, std::size_t vertex_count, const VtkFault& fail,
                  MeshFile* mesh);
 

@@ -9,13 +9,13 @@
 namespace fulcrum::scene {
 namespace {
 
-/// Four corners a cell on average; only bounds what a file may announce.
+/// Four corners per cell on average; only bounds the counts in a file.
 constexpr std::uint64_t kMaxConnectivity = 4 * kMaxMeshElements;
 
 struct Tag {
   std::string_view name;
   std::map<std::string_view, std::string_view> attributes;
-  std::size_t begin = 0, end = 0;  ///< From '<' to behind '>'.
+  std::size_t begin = 0, end = 0;  ///< From '<' to the character after '>'.
   bool closes = false;             ///< </name>
   bool is_empty = false;           ///< <name/>
 };
@@ -40,7 +40,7 @@ class VtuReader {
 
  private:
   [[noreturn]] void Fail(std::size_t at, const std::string& reason) const {
-    // A cursor that ends where the fault is tells its line.
+    // A cursor that ends at the fault reports its line.
     Cursor place(bytes_, name_, at);
     (void)place.Word();
     place.Fail(reason);
@@ -63,7 +63,7 @@ class VtuReader {
     return bytes_.substr(begin, *at - begin);
   }
 
-  /// The next tag from `at_` on; false when there is none. Comments and declarations are left out.
+  /// Reads the next tag from `at_` on; false if there is none. Comments and declarations are skipped.
   bool NextTag(Tag* tag) {
     for (;;) {
       at_ = bytes_.find('<', at_);
@@ -158,7 +158,7 @@ class VtuReader {
     encoding_.compressed = !compressor.empty();
   }
 
-  /// The array of the piece that this one is; nullptr: not needed.
+  /// The array of the piece in which this data array is stored; nullptr: not needed.
   VtuArray* Wanted(std::string_view section, std::string_view array) {
     if (pieces_.empty()) {
       return nullptr;
@@ -189,7 +189,7 @@ class VtuReader {
     array->type = Attribute(tag, "type");
     const std::string_view format = Attribute(tag, "format");
     if (format == "appended") {
-      array->begin = Number(tag, "offset");  // From the underscore on, which comes later.
+      array->begin = Number(tag, "offset");  // Counted from the underscore, which comes later in the file.
       array->form = VtuForm::kRaw;
       appended_.push_back({array, tag.begin});
       return;
@@ -275,7 +275,7 @@ class VtuReader {
 
   void AddPiece(const Piece& piece) {
     if (piece.points == 0 && piece.cells == 0) {
-      return;  // Writers of many parts leave empty ones.
+      return;  // Writers of files with many parts write empty ones.
     }
     const std::pair<const VtuArray*, const char*> arrays[] = {{&piece.coordinates, "Points"},
                                                               {&piece.connectivity, "connectivity"},
@@ -319,7 +319,7 @@ class VtuReader {
         cells, first_vertex, piece.points, [&](const std::string& reason) { Fail(piece.begin, reason); }, &mesh_);
   }
 
-  /// An array whose place is known once the appended data are found.
+  /// An array whose position is known once the appended data are found.
   struct Appended {
     VtuArray* array;
     std::size_t tag;
@@ -330,8 +330,8 @@ class VtuReader {
   std::size_t at_ = 0;
   bool ended_ = false;
   VtuEncoding encoding_;
-  std::deque<Piece> pieces_;                    ///< Keeps its places: arrays are pointed at.
-  std::uint64_t cells_ = 0, connectivity_ = 0;  ///< Of all pieces: several may share the same data.
+  std::deque<Piece> pieces_;                    ///< A deque, because pointers to its arrays must stay valid.
+  std::uint64_t cells_ = 0, connectivity_ = 0;  ///< Total of all pieces: several may share the same data.
   std::vector<Appended> appended_;
   MeshFile mesh_;
 };

@@ -8,9 +8,9 @@
 namespace fulcrum::scene {
 namespace {
 
-constexpr std::uint64_t kDeflateRatio = 1032;  ///< The most that zlib's format can shrink data by.
+constexpr std::uint64_t kDeflateRatio = 1032;  ///< Largest compression ratio of zlib's format.
 
-/// -1: no digit of base64.
+/// Value of a base64 digit; -1 for any other character.
 int Base64Digit(char c) {
   if (c >= 'A' && c <= 'Z') {
     return c - 'A';
@@ -24,14 +24,14 @@ int Base64Digit(char c) {
   return c == '+' ? 62 : c == '/' ? 63 : -1;
 }
 
-/// The array's bytes one after another, out of raw or base64 text. Base64 may be padded in the middle: some writers
-/// encode header and data apart.
+/// The bytes of an array, from raw or base64 text. Base64 may contain padding in the middle: some writers encode header
+/// and data separately.
 class ByteStream {
  public:
   ByteStream(std::string_view bytes, const std::string& name, const VtuArray& array)
       : bytes_(bytes), name_(name), at_(array.begin), end_(array.end), raw_(array.form == VtuForm::kRaw) {}
 
-  /// At least so many bytes can still come.
+  /// Whether the remaining data can contain at least `count` bytes.
   [[nodiscard]] bool MayHold(std::uint64_t count) const {
     return count <= (raw_ ? end_ - at_ : (end_ - at_) / 4 * 3 + 3 + group_.size());
   }
@@ -69,7 +69,7 @@ class ByteStream {
          " should be: a size is wrong or the file was cut short");
   }
 
-  /// Four digits to one to three bytes; false at the end.
+  /// Decodes four digits to one to three bytes; false at the end.
   bool NextGroup() {
     std::uint32_t bits = 0;
     int digits = 0, padding = 0;
@@ -102,7 +102,7 @@ class ByteStream {
   const std::string& name_;
   std::size_t at_, end_;
   bool raw_;
-  std::string group_;  ///< Decoded, not taken yet.
+  std::string group_;  ///< Decoded, but not read yet.
 };
 
 std::uint64_t TakeSize(ByteStream* in, const VtuEncoding& encoding) {
@@ -120,14 +120,14 @@ std::uint64_t TakeSize(ByteStream* in, const VtuEncoding& encoding) {
   return value;
 }
 
-/// Blocks of equal size, the last of another one, each compressed on its own.
+/// Reads blocks of equal size, the last of another size, each compressed separately.
 std::string TakeCompressed(ByteStream* in, const VtuEncoding& encoding, const char* what, std::uint64_t wanted) {
   const std::uint64_t blocks = TakeSize(in, encoding), block = TakeSize(in, encoding), last = TakeSize(in, encoding);
   if (blocks > kMaxMeshBytes || !in->MayHold(blocks * (encoding.long_header ? 8 : 4))) {
     in->Fail(std::to_string(blocks) + " compressed blocks of " + what + ", more than the data can hold");
   }
-  // A last block of another size says so; a single one may be announced far larger than it is. No product here
-  // overflows: blocks is below 2^31 by now, and block below 2^32 where it counts.
+  // The header contains the size of a last block of another size; a single block may be announced far larger than it
+  // is. No product here overflows: blocks is below 2^31 here, and block below 2^32 where it is used.
   const std::uint64_t full = last > 0 && blocks > 0 ? blocks - 1 : blocks;
   if ((full > 0 && block > wanted) || last > wanted || full * block + last != wanted) {
     in->Fail(std::to_string(blocks) + " compressed blocks of " + std::to_string(block) + " bytes, the last of " +
@@ -192,7 +192,7 @@ void TakeAll(Cursor* in, const char* what, std::uint64_t count, std::vector<To>*
   }
 }
 
-/// In text one byte is a number too, not a character.
+/// Reads a value; in text a byte is a number too, not a character.
 template <class T>
 void TakeTyped(Cursor* in, const std::string& type, const char* what, std::uint64_t count, std::vector<T>* values) {
   if constexpr (std::is_floating_point_v<T>) {

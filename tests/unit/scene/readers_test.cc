@@ -297,7 +297,7 @@ TEST(MeshFiles, FaultsInBinaryDataNameTheByte) {
   };
   std::string stl = Sample("stl_binary").bytes;
   expect("stl_binary", stl.substr(0, 60), "a.stl: line 1");
-  expect("stl_binary", With(stl, "solid", "xolid").substr(0, stl.size() - 1), "a.stl: byte 80: its count says 6");
+  expect("stl_binary", With(stl, "solid", "xolid").substr(0, stl.size() - 1), "a.stl: byte 80: its count is 6");
   std::memset(stl.data() + 84 + 12, 0xff, 4);
   expect("stl_binary", stl, "a.stl: byte 96: coordinate");
   stl = With(Sample("stl_binary").bytes, "solid", "xolid");
@@ -309,7 +309,7 @@ TEST(MeshFiles, FaultsInBinaryDataNameTheByte) {
   expect("gmsh22_binary", msh, "a block of 100 elements; valid: 1 to 3");
   msh = Sample("gmsh22_binary").bytes;
   msh[msh.find("2.2 1 8\n") + 8] = 3;
-  expect("gmsh22_binary", msh, "3 where the number 1 should tell the order of bytes");
+  expect("gmsh22_binary", msh, "3 where the number 1 should show the byte order");
   std::string vtu = Sample("vtu_appended_raw_zlib").bytes;
   const std::size_t stream = vtu.find("\x78\x9c", vtu.find("encoding=\"raw\"") + 100);
   ASSERT_NE(stream, std::string::npos);
