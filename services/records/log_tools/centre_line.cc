@@ -8,10 +8,10 @@
 namespace fulcrum::log_tools {
 namespace {
 
-/// Thinning halves the error of half a pixel that it makes in the middle of an even number of them.
+/// Factor of magnification before thinning: halves the error of half a pixel that thinning causes at even widths.
 constexpr double kFine = 2;
-/// From a pixel's centre to the edge of what is clear it is this much less than to the next clear centre, in the mean
-/// over odd and even widths [pixels].
+/// Mean difference, over odd and even widths, between the distance to the next clear pixel's centre and the distance to
+/// the edge of the clear region [pixels].
 constexpr double kToEdge = 0.25;
 
 struct Course {
@@ -20,7 +20,7 @@ struct Course {
   bool closed = false;
 };
 
-/// Mean over `window` of arc length about each point; ends stay where they are, for the window ends with the line.
+/// Mean over `window` of arc length about each point. The ends stay in place, because the window shrinks to zero there.
 std::vector<Vec2d> Smoothed(const Course& course, double window) {
   const auto n = static_cast<int>(course.points.size());
   const auto at = [&](int i) { return course.points[static_cast<std::size_t>(((i % n) + n) % n)]; };
@@ -48,7 +48,7 @@ double LengthOf(const std::vector<Vec2d>& points, bool closed) {
   return length;
 }
 
-/// The direction in which a line leaves at its front, from what lies within `window`.
+/// Direction in which a line continues beyond its front, from the points within `window`.
 Vec2d Outward(const std::vector<Vec2d>& points, double window) {
   for (const Vec2d& point : points) {
     const Vec2d out = points.front() - point;
@@ -58,7 +58,7 @@ Vec2d Outward(const std::vector<Vec2d>& points, double window) {
   return out.norm() > 0 ? Vec2d(out.normalized()) : Vec2d::UnitX();
 }
 
-/// Distance to what is clear where the ridge is: thinning leaves a line up to a pixel beside it.
+/// Distance to the clear region at the ridge: thinning can leave a line up to one pixel beside it.
 double RidgeAt(const Pixel& at, const std::vector<float>& distance, const Mask& fine) {
   float ridge = 0;
   for (int y = at.y - 1; y <= at.y + 1; ++y) {
@@ -89,7 +89,7 @@ CentreLine::Stretch StretchOf(const Branch& branch, const Skeleton& skeleton, co
   }
   std::vector<Vec2d> points = Smoothed(course, window);
   std::vector<double> half_widths = course.half_widths;
-  // A free end goes on to the end of the hole; a single pixel to both sides.
+  // Extends a free end to the end of the hole; a single pixel is extended to both sides.
   for (int side = 0; side < 2; ++side) {
     if (!branch.closed && (side == 0 ? branch.from : branch.to) < 0) {
       const Pixel& last = side == 0 ? branch.pixels.front() : branch.pixels.back();

@@ -1,4 +1,4 @@
-// The centre line of a hole: where it runs, how long and how wide it is.
+// The centre line of a hole: its course, length and width.
 #pragma once
 
 #include <vector>
@@ -17,9 +17,9 @@ struct CentreLine {
   struct Stretch {
     std::vector<CentrePoint> points;
     bool closed = false;
-    double length = 0;  ///< To the end of the hole where it ends [texels].
+    double length = 0;  ///< Includes the extension to the end of the hole at a free end [texels].
   };
-  std::vector<Stretch> stretches;  ///< Between ends and junctions; each is there once.
+  std::vector<Stretch> stretches;  ///< Stretches between ends and junctions, each once.
 
   [[nodiscard]] double length() const {
     double sum = 0;
@@ -30,7 +30,7 @@ struct CentreLine {
 
 struct CentreLineSettings {
   double smooth = 10;  ///< Width of the moving average along the line [texels].
-  double spur = 3;     ///< What reaches no more than this beyond the edge is roughness of the edge [texels].
+  double spur = 3;  ///< A branch that extends no farther beyond the edge than this is roughness of the edge [texels].
 };
 
 [[nodiscard]] CentreLine FindCentreLine(const Mask& hole, const CentreLineSettings& settings = {});

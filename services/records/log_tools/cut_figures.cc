@@ -9,13 +9,14 @@ namespace fulcrum::log_tools {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-/// The way is sampled at this distance, and open where a texel no farther than this is removed [m].
+/// Sampling distance of the path; a sample is open if a texel within the second distance is removed [m].
 constexpr double kWayStep_m = 0.1e-3, kOpenWithin_m = 0.15e-3;
-/// Of a smooth length nothing more than what the metal goes in this time can be new [s].
+/// Time over which a rise of the reported length is measured. In this time a smooth length can grow only by the path of
+/// the metal [s].
 constexpr double kJumpWindow_s = 0.05;
-/// Samples of one way are no farther apart; they come at 100 Hz [s].
+/// Largest interval between samples of one path; samples come at 100 Hz [s].
 constexpr double kWayGap_s = 0.035;
-/// A way of samples goes on from one to the next that is so far away: what is nearer is noise and no way [m].
+/// Least distance between vertices of a path: smaller movements are noise and not part of the path [m].
 constexpr double kVertex_m = 0.2e-3;
 
 double Quantile(std::vector<double> values, double q) {
@@ -80,7 +81,7 @@ void MeasureWay(CutMap* map) {
   map->figures.open_pct_all = all.pct();
 }
 
-/// Length of a way that samples show with noise.
+/// Length of a path from noisy samples.
 class NoisyWay {
  public:
   void Begin(const Vec2f& at) { last_ = at; }
@@ -97,7 +98,7 @@ class NoisyWay {
   double length_m_ = 0;
 };
 
-/// The place where the current was reported and the metal's, over the same times.
+/// Measures the paths of the reported place of the current and of the metal, over the same times.
 void MeasureSpotWay(CutMap* map) {
   const auto& metal = map->recorded.metal;
   NoisyWay spot, centre;
@@ -122,7 +123,7 @@ void MeasureSpotWay(CutMap* map) {
   map->figures.spot_way_ratio = centre.length_m() > 0 ? spot.length_m() / centre.length_m() : kNone;
 }
 
-/// Places where energised metal touched, by cells of a millimetre.
+/// Places touched by energised metal, in cells of one millimetre.
 class TouchedPlaces {
  public:
   explicit TouchedPlaces(const CutMap& map) {
@@ -182,7 +183,7 @@ void MeasureReported(CutMap* map) {
   std::size_t before = 0;
   double largest = 0;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
-    // The last length published before the window began is the one in force at its beginning.
+    // The last length published before the window applies at its beginning.
     while (before + 1 < i && lengths[before + 1].time_s <= lengths[i].time_s - kJumpWindow_s) ++before;
     const bool known = lengths[before].time_s <= lengths[i].time_s - kJumpWindow_s;
     if (i > 0) {

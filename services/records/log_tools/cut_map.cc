@@ -11,10 +11,10 @@
 namespace fulcrum::log_tools {
 namespace {
 
-/// Shown around what has happened [m].
+/// Margin shown around the changed part of the sheet [m].
 constexpr double kMargin_m = 2e-3;
 
-/// The part of the sheet where anything has happened.
+/// Crops to the part of the sheet that has changed.
 void CropTo(const RecordedCut& cut, CutMap* map) {
   const SheetTexels& texels = cut.texels;
   Eigen::Vector2i low(texels.width, texels.height), high(-1, -1);
@@ -42,8 +42,8 @@ void CropTo(const RecordedCut& cut, CutMap* map) {
     low.setZero();
     high = low;
   }
-  // The border is living tissue all round, even where the hole reaches the end of the sheet: what is connected to it is
-  // the sheet.
+  // The border counts as living tissue on all sides, even where the hole reaches the end of the sheet: tissue connected
+  // to it belongs to the sheet.
   const int margin = static_cast<int>(std::lround(kMargin_m / texels.texel_m));
   map->x0 = low.x() - margin;
   map->y0 = low.y() - margin;
@@ -57,12 +57,12 @@ void CropTo(const RecordedCut& cut, CutMap* map) {
   }
 }
 
-/// Living pieces that do not reach the sheet around.
+/// Living pieces that are not connected to the surrounding sheet.
 struct Islands {
   Mask texels;
-  Mask hole;  ///< What is removed, and the islands that are too small to go round.
+  Mask hole;  ///< Removed texels, and islands that are too small to go around.
   int count = 0, pixels = 0;
-  int pieces = 0;  ///< Those that are large enough to be parts of the sheet, and the sheet.
+  int pieces = 0;  ///< Number of pieces that are large enough to be parts of the sheet, including the sheet.
 };
 
 Islands FindIslands(const Mask& removed, double texel_m) {
@@ -95,7 +95,7 @@ CentreLine LineOf(const Mask& hole, double texel_m) {
   return FindCentreLine(hole, {.smooth = 1e-3 / texel_m, .spur = 0.2e-3 / texel_m});
 }
 
-/// Of the centre lines that the hole has had [texels], looked at every half second.
+/// Length of the longest centre line that the hole has had, evaluated every half second [texels].
 double LongestLine(const CutMap& map) {
   constexpr float kLook_s = 0.5f;
   const SheetTexels& texels = map.recorded.texels;

@@ -1,6 +1,6 @@
-// What a session has cut, measured from its recording alone: the hole, its centre line, what was left standing in it,
-// and how it compares with the metal's way and with what was reported. No class of physics_node or thermal_node is
-// used: this is the outsider's measure of both.
+// The cut of a session, measured from its recording alone: the hole, its centre line, the islands in it, and a
+// comparison with the path of the metal and with the reported values. No class of physics_node or thermal_node is used,
+// so the result is independent of both.
 #pragma once
 
 #include <cstdint>
@@ -15,32 +15,33 @@
 
 namespace fulcrum::log_tools {
 
-/// Living pieces from this size on are parts of the sheet; smaller ones that nothing holds are islands [m^2].
+/// Living pieces of at least this size are parts of the sheet; smaller unconnected ones are islands [m^2].
 inline constexpr double kSmallestPiece_m2 = 4e-6;
-/// Smaller islands do not part the centre line: no metal can go round them [m^2].
+/// Smaller islands do not divide the centre line, because no metal can go around them [m^2].
 inline constexpr double kSmallestRound_m2 = 0.25e-6;
 
-/// NaN: there is nothing to measure it on.
+/// Figures of a cut. NaN: the recording contains nothing to measure the figure on.
 struct CutFigures {
   double removed_mm2 = 0;
   int islands = 0;  ///< Living pieces below 4 mm^2 that are cut off from the sheet.
   double islands_mm2 = 0;
   int pieces = 0;   ///< Living pieces of 4 mm^2 or more.
   int holes = 0;    ///< Removed pieces.
-  int revived = 0;  ///< Texels that were removed and came back.
-  /// Share of the metal's energised way that is open: where it went no faster than its power can cut as wide as it is,
-  /// and everywhere. Tissue that slips off the metal is not cut by it.
+  int revived = 0;  ///< Texels that were removed and later shown as tissue again.
+  /// Share of the energised path of the metal that is open: of the part on which the metal moved no faster than its
+  /// power can cut at its own width, and of the whole path. Tissue that slips off the metal is not cut by it.
   double open_pct = 0, open_pct_all = 0;
-  double way_mm = 0;  ///< Length of the energised way, everywhere.
+  double way_mm = 0;  ///< Length of the whole energised path.
   double width_mm_p05 = 0, width_mm_p50 = 0, width_mm_p95 = 0;
   double off_way_mm_p95 = 0;  ///< From the centre line to the nearest place where energised metal touched.
-  double spot_way_ratio = 0;  ///< Way of the reported place of the current per way of the metal.
-  double length_mm = 0;       ///< Of the centre line, from end to end.
-  double longest_mm = 0;      ///< The longest that it has been: cuts that meet become one that is shorter.
-  double reported_length_mm = 0, length_error_pct = 0;  ///< Of the longest, for the reported length never falls.
-  double jump_mm_max = 0;                               ///< Largest rise of the reported length within 50 ms.
-  int falls = 0;                                        ///< How often it fell.
-  double first_opening_s = 0;                           ///< From the first energised touch to the first texel removed.
+  double spot_way_ratio = 0;  ///< Path length of the reported place of the current divided by that of the metal.
+  double length_mm = 0;       ///< Length of the centre line, from end to end.
+  double longest_mm = 0;      ///< Largest value of that length: cuts that merge have a shorter common line.
+  /// The error refers to `longest_mm`, because the reported length never decreases.
+  double reported_length_mm = 0, length_error_pct = 0;
+  double jump_mm_max = 0;      ///< Largest rise of the reported length within 50 ms.
+  int falls = 0;               ///< Number of decreases of the reported length.
+  double first_opening_s = 0;  ///< Time from the first energised touch to the first texel removed.
   double thermal_step_p50_ms = 0, thermal_step_p99_ms = 0;
 };
 
@@ -54,7 +55,7 @@ struct CutMap {
   CutFigures figures;
 
   [[nodiscard]] bool has_cut() const { return figures.removed_mm2 > 0; }
-  /// Texels of `removed` to metres of the sheet, and back.
+  /// Converts texels of `removed` to metres of the sheet, and back.
   [[nodiscard]] Vec2d ToSheet(const Vec2d& texel) const {
     return recorded.texels.texel_m * (texel + Vec2d(x0 + recorded.texels.x0, y0 + recorded.texels.y0));
   }
@@ -65,14 +66,14 @@ struct CutMap {
 
 [[nodiscard]] CutMap MakeCutMap(RecordedCut recorded);
 
-/// Reads and makes it: see ReadCut.
+/// Reads a recording and makes its map: see ReadCut.
 [[nodiscard]] CutMap ReadCutMap(const std::filesystem::path& recording, const SceneView& scene,
                                 const ContactReach& reach = {});
 
-/// Figures by their names in JSON and in the picture, in this order.
+/// The figures with their names in JSON and in the picture, in this order.
 [[nodiscard]] std::vector<std::pair<std::string, double>> FigureList(const CutFigures& figures);
 
-/// Flat JSON object; null for what could not be measured.
+/// The figures as a flat JSON object; null for figures that could not be measured.
 [[nodiscard]] std::string FiguresJson(const CutMap& map);
 
 }  // namespace fulcrum::log_tools

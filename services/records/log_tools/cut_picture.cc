@@ -14,7 +14,7 @@ constexpr Rgb kPaper{255, 255, 255}, kInk{25, 32, 40}, kSoft{120, 130, 140}, kHo
     kMetal{30, 110, 255}, kIdleMetal{170, 190, 215}, kTouched{120, 190, 255}, kCurrent{255, 40, 160},
     kCentre{255, 225, 0}, kDamaged{120, 80, 60};
 
-/// Colour of living tissue by the highest temperature that it had [C].
+/// Colour of living tissue as a function of its highest temperature [C].
 struct Heat {
   double temperature_C;
   Rgb colour;
@@ -34,10 +34,10 @@ Rgb HeatColour(double temperature_C) {
   return kHeats.back().colour;
 }
 
-/// A texel is drawn with as many pixels as fit, but no fewer than the first of these.
+/// Pixels per texel: as many as fit, but at least the first of these.
 constexpr int kLeastScale = 4, kMostScale = 10, kWanted = 1100;
 constexpr int kLeft = 84, kTop = 44, kBottom = 56, kPanel = 400, kGap = 24, kRow = 22;
-/// Half damaged: 255 * (1 - exp(-Omega)) there.
+/// Damage value at which half of the collagen is damaged: 255 * (1 - exp(-Omega)).
 constexpr std::uint8_t kHalf = 128;
 
 std::string Number(double value, int decimals) {
@@ -73,7 +73,7 @@ class Drawing {
  private:
   static constexpr int kPanelHeight = 860;
 
-  /// Texels of the map to pixels; t goes up.
+  /// Converts texels of the map to pixels; t points upwards.
   [[nodiscard]] Vec2d ToPixel(const Vec2d& texel) const {
     return {kLeft + scale_ * texel.x(), kTop + height_ - scale_ * texel.y()};
   }
@@ -102,7 +102,7 @@ class Drawing {
         const int left = kLeft + scale_ * x;
         canvas_.Box(left, top, left + scale_, top + scale_, ColourOf(x, y));
         if (map_.removed.At(x, y) || !IsDamaged(x, y)) continue;
-        // The border of what is half damaged.
+        // Border of the region in which at least half of the collagen is damaged.
         if (!IsDamaged(x - 1, y)) canvas_.Box(left, top, left + 1, top + scale_, kDamaged);
         if (!IsDamaged(x + 1, y)) canvas_.Box(left + scale_ - 1, top, left + scale_, top + scale_, kDamaged);
         if (!IsDamaged(x, y + 1)) canvas_.Box(left, top, left + scale_, top + 1, kDamaged);
@@ -188,8 +188,8 @@ class Drawing {
     swatch(kHole, "hole", 14);
     swatch(kIsland, "island of living tissue", 14);
     swatch(kCentre, "centre line of the hole", 4);
-    swatch(kMetal, "way of the metal, energised", 3);
-    swatch(kIdleMetal, "way of the metal, idle", 3);
+    swatch(kMetal, "path of the metal, energised", 3);
+    swatch(kIdleMetal, "path of the metal, idle", 3);
     swatch(kTouched, "touched by energised metal", 8);
     swatch(kCurrent, "reported place of the current", 3);
     swatch(kDamaged, "half of the collagen damaged", 1);

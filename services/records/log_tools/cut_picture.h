@@ -7,8 +7,8 @@
 
 namespace fulcrum::log_tools {
 
-/// The sheet around the cut, s to the right and t upwards: hole, islands, heat and damage, the way of the metal and of
-/// the current, the centre line, and the figures beside it. The bytes of a PNG file.
+/// The sheet around the cut, s to the right and t upwards: hole, islands, heat and damage, the paths of the metal and
+/// of the current, the centre line, and the figures beside it. Returns the content of a PNG file.
 [[nodiscard]] std::string DrawCutMap(const CutMap& map, const std::string& title);
 
 }  // namespace fulcrum::log_tools

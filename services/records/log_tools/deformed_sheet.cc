@@ -8,11 +8,11 @@
 namespace fulcrum::log_tools {
 namespace {
 
-/// Nodes between two of the sub-grid that is searched first.
+/// Spacing of the sub-grid that is searched first [nodes].
 constexpr int kStride = 4;
-/// A cell of it may be stretched by so much.
+/// Largest stretch of a cell of that sub-grid.
 constexpr float kStretch = 2;
-/// An edge is looked at in so many places for its lip.
+/// Number of places along an edge at which its lip is searched.
 constexpr int kLooksAlongEdge = 20;
 
 /// Weights of the point of triangle abc that is nearest to p: Ericson, "Real-Time Collision Detection" (2005), 5.1.5.
@@ -55,7 +55,7 @@ DeformedSheet::DeformedSheet(const SceneView& scene)
       severed_(3 * scene.membrane.node_count()),
       place_(scene.membrane.node_count(), Vec3f::Zero()),
       cut_of_(scene.membrane.triangle_count(), -1) {
-  // Farthest that a place of a coarse cell is from all of its corners.
+  // Largest distance of a place in a coarse cell from all of its corners.
   for (int row = 0; row < rows_; row += kStride) {
     for (int col = 0; col < cols_; col += kStride) {
       const Vec2f a = scene.membrane_material[Node(row, col)];
@@ -91,14 +91,14 @@ void DeformedSheet::CutIntoPieces(const Removed& removed) {
   const Held held{*this};
   const SlitSheet sheet(held);
   const auto node = [&](Index n) { return Point{place_[n], held.Material(n)}; };
-  // The end of what hangs on `owner` along its edge to `other`.
+  // The lip: end of the tissue attached to `owner` along its edge to `other`.
   const auto lip = [&](Index owner, Index other) {
     const Vec2f from = held.Material(owner), way = held.Material(other) - from;
     int first = 0;
     while (first < kLooksAlongEdge && !removed(from + (static_cast<float>(first) + 0.5f) / kLooksAlongEdge * way)) {
       ++first;
     }
-    // Patches come later than the topology: an edge whose hole is not known yet has it in its middle.
+    // Patches come later than the topology: the lip of an edge without a known hole is placed at its middle.
     const float share = first < kLooksAlongEdge ? static_cast<float>(first) / kLooksAlongEdge : 0.5f;
     return Point{place_[owner] + share * (sheet.Ghost(owner, other) - place_[owner]), from + share * way};
   };
@@ -111,9 +111,9 @@ void DeformedSheet::CutIntoPieces(const Removed& removed) {
     first_piece_.push_back(pieces_.size());
     const MembraneTriangle t = MembraneTriangleAt(scene_.membrane.cols, triangle);
     const auto& n = t.nodes;
-    // Two points of each edge: the end of what hangs on its first corner, and on its second.
+    // Two points of each edge: the ends of the tissue attached to its first and to its second corner.
     std::array<std::array<Point, 2>, 3> end;
-    std::size_t joined = 3;  // The edge that lives, if one does.
+    std::size_t joined = 3;  // Index of the live edge, if there is one.
     for (std::size_t k = 0; k < 3; ++k) {
       const Index a = n[k], b = n[(k + 1) % 3];
       if (!held.Gone(a) && !held.Gone(b) && !held.Severed(t.edges[k])) {
@@ -160,7 +160,7 @@ bool DeformedSheet::SetPositions(std::span<const float> xyz, const Removed& remo
 }
 
 void DeformedSheet::FillDeadNodes() {
-  // From the edge of the hole inwards; a node whose neighbours are all dead waits for them.
+  // From the edge of the hole inwards; a node whose neighbours are all unknown is postponed.
   std::vector<std::uint8_t> unknown = dead_;
   std::vector<std::size_t> open = dead_nodes_, later, filled;
   while (!open.empty()) {
@@ -208,7 +208,7 @@ std::optional<DeformedSheet::Place> DeformedSheet::Nearest(const Vec3f& p_W, flo
   if (std::sqrt(coarse) > within_m + coarse_reach_m_) return std::nullopt;
   float best = std::numeric_limits<float>::infinity();
   Place place;
-  // A window of cells; where its nearest triangle lies at its border the window moves there.
+  // Searches a window of cells; if the nearest triangle lies at its border, the window moves there.
   for (int moves = 0; moves < 2 * (rows_ + cols_); ++moves) {
     const int row0 = std::max(0, row - kStride), row1 = std::min(rows_ - 1, row + kStride);
     const int col0 = std::max(0, col - kStride), col1 = std::min(cols_ - 1, col + kStride);

@@ -1,4 +1,4 @@
-// The membrane as it lies in the world, cut or not: which place of the sheet is nearest to a point.
+// The deformed membrane in the world, cut or not: finds the place of the sheet that is nearest to a point.
 #pragma once
 
 #include <array>
@@ -13,25 +13,26 @@
 
 namespace fulcrum::log_tools {
 
-/// Knows the scene's grid and the recorded positions, and nothing of the solvers: it is the outsider's measure of what
-/// they report.
+/// Uses the scene's grid and the recorded positions, but no solver, so that it is an independent check of what the
+/// solvers report.
 class DeformedSheet {
  public:
-  /// @param scene must outlive this.
+  /// @param scene must outlive the object.
   explicit DeformedSheet(const SceneView& scene);
 
-  /// TopologyState's bits. Each side of a slit goes on unstretched up to its lip; what is removed spans the gap.
+  /// Sets the bits of a TopologyState. Each side of a slit continues unstretched up to its lip; removed tissue spans
+  /// the gap.
   void SetTopology(std::span<const std::uint8_t> dead_nodes, std::span<const std::uint8_t> dead_edges);
-  /// Whether a place (s, t) [m] of the sheet is removed: tells where on a severed edge the lips are.
+  /// Whether the place (s, t) [m] of the sheet is removed: determines the lips on a severed edge.
   using Removed = std::function<bool(const Vec2f& material)>;
-  /// Positions of all particles as in a TissueFrame; false when they do not fit the scene.
+  /// Sets the positions of all particles as in a TissueFrame; false if they do not fit the scene.
   bool SetPositions(std::span<const float> xyz, const Removed& removed);
 
   struct Place {
     float distance_m = 0;
     Vec2f material = Vec2f::Zero();  ///< (s, t) [m].
   };
-  /// Nothing when all of the sheet is farther than `within_m`.
+  /// The nearest place; empty if the whole sheet is farther away than `within_m`.
   [[nodiscard]] std::optional<Place> Nearest(const Vec3f& p_W, float within_m) const;
 
  private:
@@ -39,9 +40,9 @@ class DeformedSheet {
     Vec3f place;
     Vec2f material;
   };
-  /// Of a cut triangle: of what a corner holds, or of the gap.
+  /// Piece of a cut triangle: tissue attached to a corner, or the gap.
   using Piece = std::array<Point, 3>;
-  /// This sheet, for SlitSheet.
+  /// Access to this sheet for SlitSheet.
   struct Held {
     const DeformedSheet& sheet;
     [[nodiscard]] std::uint32_t rows() const { return sheet.scene_.membrane.rows; }
@@ -66,10 +67,10 @@ class DeformedSheet {
   std::vector<std::uint8_t> dead_, severed_;
   std::vector<std::size_t> dead_nodes_;
   std::vector<Vec3f> place_;          ///< [rows * cols] frame W [m]; dead nodes: for the first search only.
-  std::vector<Index> cut_triangles_;  ///< Those with two dead edges or three, ascending.
-  std::vector<std::int32_t> cut_of_;  ///< By triangle: its place in cut_triangles_; -1: whole.
+  std::vector<Index> cut_triangles_;  ///< Triangles with two or three dead edges, ascending.
+  std::vector<std::int32_t> cut_of_;  ///< By triangle: its index in cut_triangles_; -1: not cut.
   std::vector<Piece> pieces_;
-  std::vector<std::size_t> first_piece_;  ///< By place in cut_triangles_, and one more.
+  std::vector<std::size_t> first_piece_;  ///< By index in cut_triangles_, with one more at the end.
 };
 
 }  // namespace fulcrum::log_tools

@@ -9,7 +9,7 @@
 namespace fulcrum::log_tools {
 namespace {
 
-/// The bits of a message in the order of its fields, but for the one of this name wherever it is met.
+/// Hash of the bits of a message in the order of its fields, without the fields of this name at any depth.
 template <class T>
 void AddTo(Hash64* hash, const T& value, std::string_view without) {
   if constexpr (HasFields<T>) {
@@ -30,7 +30,7 @@ void AddTo(Hash64* hash, const T& value, std::string_view without) {
   }
 }
 
-/// One topic of one node in one process: the n-th of them, since a restarted node numbers its samples anew.
+/// One topic of one node in one process: the n-th process, since a restarted node numbers its samples again from 1.
 struct Stream {
   std::string topic, node;
   int process = 1;
@@ -42,7 +42,7 @@ std::ostream& operator<<(std::ostream& out, const Stream& stream) {
   return stream.process == 1 ? out : out << " (start " << stream.process << ")";
 }
 
-/// Goes through a file, each message with its stream. Messages of unknown topics are left out.
+/// Reads a file and passes on each message with its stream. Messages of unknown topics are skipped.
 template <class Use>
 void ForEachMessage(const std::filesystem::path& file, const Filter& filter, const Use& use) {
   Recording recording(file, filter);
@@ -63,7 +63,7 @@ void ForEachMessage(const std::filesystem::path& file, const Filter& filter, con
   }
 }
 
-/// Hash of each message, by stream and sequence: recordings are larger than memory.
+/// Hash of each message, by stream and sequence: recordings can be larger than memory.
 using Digest = std::map<Stream, std::map<std::uint32_t, std::uint64_t>>;
 
 Digest MakeDigest(const std::filesystem::path& file, const Filter& filter, const std::string& without) {
@@ -139,7 +139,7 @@ ExitCode Diff(const std::filesystem::path& first, const std::filesystem::path& s
     }
   }
   for (const auto& [stream, samples] : b) *out << stream << ": only in the second, " << samples.size() << '\n';
-  *out << (same ? "no difference in what both have\n" : "");
+  *out << (same ? "no difference in the messages of both\n" : "");
   return same ? ExitCode::kDone : ExitCode::kFailure;
 }
 

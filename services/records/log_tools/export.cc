@@ -10,7 +10,7 @@
 namespace fulcrum::log_tools {
 namespace {
 
-/// A cell as RFC 4180 has it.
+/// A table cell, quoted as in RFC 4180.
 std::string Cell(const std::string& text) {
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string quoted = "\"";

@@ -18,7 +18,7 @@ std::string Print(const char* format, auto... values) {
   return text.data();
 }
 
-/// Wall clock in UTC.
+/// Wall-clock time in UTC.
 std::string TimeText(std::uint64_t ns) {
   const auto seconds = static_cast<std::time_t>(ns / 1'000'000'000);
   std::tm utc{};
@@ -37,7 +37,7 @@ std::string Told(const recording::McapReader& reader, const std::string& record,
   return value == found->second.end() ? "" : value->second;
 }
 
-/// One topic of one node: its writers together.
+/// One topic of one node, with all its writers.
 struct Row {
   std::uint64_t messages = 0, bytes = 0, lost = 0;
   std::uint64_t first_ns = 0, last_ns = 0;
@@ -66,7 +66,8 @@ void PrintInfo(const std::filesystem::path& file, std::ostream* out) {
   }
   const recording::McapReader& reader = recording.reader();
   *out << file.string() << " · " << Megabytes(std::filesystem::file_size(file)) << " · "
-       << (reader.closed() ? "whole" : "cut off: its recorder did not close it (fulcrum log recover mends it)") << '\n';
+       << (reader.closed() ? "complete" : "incomplete: its recorder did not close it (fulcrum log recover repairs it)")
+       << '\n';
   *out << "session    " << Told(reader, "session", "id") << " · scene \"" << Told(reader, "session", "scene") << "\" "
        << Told(reader, "session", "scene_hash") << '\n';
   *out << "written by " << reader.library() << " · schema " << Told(reader, "versions", "schema_hash") << '\n';
@@ -114,7 +115,7 @@ void PrintList(const std::filesystem::path& folder, std::ostream* out) {
       const double span_s = 1e-9 * static_cast<double>(reader.last_ns() - reader.first_ns());
       lines.emplace_back(reader.first_ns(),
                          Print("%s  %8.1f s  %10s  %-7s  %-12s  ", TimeText(reader.first_ns()).c_str(), span_s,
-                               Megabytes(fs::file_size(file)).c_str(), reader.closed() ? "whole" : "cut off",
+                               Megabytes(fs::file_size(file)).c_str(), reader.closed() ? "complete" : "incomplete",
                                Told(reader, "session", "scene").c_str()) +
                              file.string());
     } catch (const InputError& bad) {

@@ -49,7 +49,7 @@ class Envelope {
 }  // namespace
 
 std::vector<float> DistanceToClear(const Mask& mask) {
-  // With a clear border all round: what is outside is clear.
+  // Adds a clear border on all sides, because everything outside is clear.
   const std::size_t w = static_cast<std::size_t>(mask.width) + 2, h = static_cast<std::size_t>(mask.height) + 2;
   std::vector<double> squared(w * h, 0);
   for (int y = 0; y < mask.height; ++y) {

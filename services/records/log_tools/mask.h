@@ -1,4 +1,4 @@
-// Sets of pixels: distances, connected pieces.
+// Sets of pixels: distances and connected pieces.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,7 +9,7 @@ namespace fulcrum::log_tools {
 
 using Vec2d = Eigen::Vector2d;
 
-/// Row by row; everything outside is clear.
+/// Pixels row by row; everything outside is clear.
 struct Mask {
   int width = 0, height = 0;
   std::vector<std::uint8_t> set;  ///< 0 or 1.
@@ -36,18 +36,18 @@ enum class Neighbours { kFour, kEight };
 
 struct Piece {
   int pixels = 0;
-  bool at_border = false;  ///< Reaches the first or last row or column.
+  bool at_border = false;  ///< Contains a pixel of the first or last row or column.
 };
 
 struct Pieces {
-  std::vector<int> label;  ///< Of each pixel: index into `pieces`; -1 for those of the other value.
+  std::vector<int> label;  ///< Per pixel: index into `pieces`; -1 for pixels of the other value.
   std::vector<Piece> pieces;
 };
 
 /// Connected pieces of the pixels whose value is `value`.
 [[nodiscard]] Pieces FindPieces(const Mask& mask, bool value, Neighbours neighbours);
 
-/// Each pixel becomes 2 x 2.
+/// Mask of twice the size: each pixel becomes 2 x 2.
 [[nodiscard]] Mask Doubled(const Mask& mask);
 
 }  // namespace fulcrum::log_tools

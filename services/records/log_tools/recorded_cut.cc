@@ -21,11 +21,11 @@ namespace {
 
 /// Distance between two samples of the metal's axis [m].
 constexpr float kAxisStep_m = 0.25e-3f;
-/// Of the neck, from the heel upwards, so much is bare [m].
+/// Length of the bare part of the neck, from the heel upwards [m].
 constexpr float kBareNeck_m = 5e-3f;
-/// A CauteryContact tells of this time after its own and no more: five of its periods [s].
+/// Time for which a CauteryContact applies after its own time: five of its periods [s].
 constexpr double kCurrentHolds_s = 0.05;
-/// A pose is not interpolated over a longer gap [ns].
+/// Longest gap over which a pose is interpolated [ns].
 constexpr std::int64_t kPoseGap_ns = 50'000'000;
 
 struct Pose {
@@ -34,10 +34,10 @@ struct Pose {
   Quatf q_WT = Quatf::Identity();
 };
 
-/// Places of one contact that follow one another along the metal are no farther apart on the sheet [m].
+/// Largest distance on the sheet between successive places of one contact along the metal [m].
 constexpr float kSameContact_m = 1e-3f;
-/// A contact goes on in the next frame where its centre has come no farther [m], and while it is not so much weaker
-/// than another one.
+/// A contact continues in the next frame if its centre has moved no farther than this [m] and its weight is at least
+/// this share of the strongest contact's.
 constexpr float kContactStep_m = 2e-3f, kStillTouches = 0.2f;
 
 /// Samples of the bare metal's axis in frame T: from the end of the foot along -x to the heel, up the neck along -z.
@@ -75,7 +75,7 @@ SheetTexels TexelsOf(const SceneView& scene) {
   return texels;
 }
 
-/// Of the wet sheet from body temperature to steam, losses left out.
+/// Heat that warms the wet sheet from body temperature to steam, without losses.
 double VaporisingHeat_J_m(const ThermalParams& thermal, float width_m) {
   constexpr float kBoiling_C = 100.0f;
   const float warm_J_m3 =
@@ -83,7 +83,7 @@ double VaporisingHeat_J_m(const ThermalParams& thermal, float width_m) {
   return static_cast<double>(width_m * thermal.thickness_m * (warm_J_m3 + thermal.latent_heat_J_m3));
 }
 
-/// Takes the messages of a session in the order of the recording.
+/// Processes the messages of a session in the order of the recording.
 class Reader {
  public:
   Reader(const SceneView& scene, const ContactReach& reach) : sheet_(scene) {
@@ -189,7 +189,7 @@ class Reader {
                                     [](const CurrentSample& sample) { return sample.touching && sample.energised(); });
     cut_.first_opening_s = std::numeric_limits<double>::quiet_NaN();
     if (touch != cut_.current.end() && first_removed_s_) {
-      // A patch shows the hole up to a period late; the event dates it to a frame.
+      // A patch shows the hole up to one period late; the event gives its time to within a frame.
       const auto event = std::find_if(cut_events_s_.begin(), cut_events_s_.end(),
                                       [&](double time_s) { return time_s >= touch->time_s; });
       const bool sooner = event != cut_events_s_.end() && *event < *first_removed_s_;
@@ -199,13 +199,13 @@ class Reader {
   }
 
  private:
-  /// Frames whose tool pose is known by now; at the end those that are left are given up.
+  /// Processes the frames whose tool pose is known. At the end the remaining ones are discarded.
   void Settle(bool end) {
     while (!waiting_.empty()) {
       const TissueFrame& frame = waiting_.front();
       const std::int64_t stamp_ns = start_ns_ + std::llround(1e9 * frame.header.session_time_s);
       if (!end && (poses_.empty() || poses_.back().stamp_ns < stamp_ns)) return;
-      // Poses before it are of no use to later frames, but for one.
+      // Of the poses before the frame only the newest is needed by later frames.
       while (poses_.size() > 1 && poses_[1].stamp_ns <= stamp_ns) poses_.pop_front();
       if (const std::optional<Pose> pose = PoseAt(stamp_ns)) Locate(frame, *pose);
       waiting_.pop_front();
@@ -236,7 +236,7 @@ class Reader {
     metal.time_s = frame.header.session_time_s;
     metal.nearest_m = std::numeric_limits<float>::infinity();
     std::vector<Contact> contacts;
-    bool follows = false;  // The sample before it along the metal touches too.
+    bool follows = false;  // The previous sample along the metal touches too.
     for (const Vec3f& p_T : axis_) {
       const auto place = sheet_.Nearest(pose.p_WT + pose.q_WT * p_T, limit_m_);
       if (!place) {
@@ -259,7 +259,7 @@ class Reader {
     cut_.metal.push_back(std::move(metal));
   }
 
-  /// Places that follow one another along the metal.
+  /// Successive touched places along the metal.
   struct Contact {
     Vec2f sum = Vec2f::Zero();
     float weight = 0;
@@ -285,7 +285,7 @@ class Reader {
 
   std::size_t tool_ = 0;
   std::vector<Vec3f> axis_;
-  float strikes_m_ = 0, limit_m_ = 0;  ///< Of the axis from the sheet's middle.
+  float strikes_m_ = 0, limit_m_ = 0;  ///< Distances of the axis from the middle of the sheet.
   std::int64_t start_ns_ = 0;
   DeformedSheet sheet_;
   std::vector<std::uint8_t> dead_nodes_, dead_edges_;
@@ -305,7 +305,8 @@ RecordedCut ReadCut(const std::filesystem::path& file, const SceneView& scene, c
   Recording recording(file,
                       {.topics = {"SceneManifest", "ToolState", "HandleState", "GeneratorSetting", "TissueFrame",
                                   "CauteryContact", "TopologyState", "TemperaturePatch", "ThermalEvent", "Health"}});
-  std::map<std::pair<TopicId, std::string>, bus::InputAccount> accounts;  // Of nodes that were restarted the newest.
+  // One per node; for a restarted node that of the newest process.
+  std::map<std::pair<TopicId, std::string>, bus::InputAccount> accounts;
   std::optional<SceneManifest> session;
   Entry entry;
   while (recording.Next(&entry)) {
@@ -326,7 +327,8 @@ RecordedCut ReadCut(const std::filesystem::path& file, const SceneView& scene, c
     });
   }
   if (!session) {
-    throw InputError(file.string() + ": no session begins in it (no SceneManifest); is it a dump of the last seconds?");
+    throw InputError(file.string() +
+                     ": contains no start of a session (no SceneManifest); is it a dump of the last seconds?");
   }
   return reader.Finish();
 }

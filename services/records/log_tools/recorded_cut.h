@@ -1,5 +1,5 @@
-// What a recording tells of a cut: the sheet's texels at the end, where the metal was on the sheet, where the current
-// was put, and the length that was reported.
+// Data of a cut in a recording: the sheet's texels at the end, the positions of the metal on the sheet, the places of
+// the current, and the reported length.
 #pragma once
 
 #include <cstdint>
@@ -11,51 +11,52 @@
 
 namespace fulcrum::log_tools {
 
-/// Metal touches the sheet where its axis is nearer to the sheet's middle than its radius, what physics keeps between
-/// the two, and the gap across which an arc strikes; then until it is farther than the gap across which an arc holds.
-/// At the 500 V peak of a cutting generator air and steam break down across 0.05 to 0.15 mm (Paschen).
+/// Distances at which metal touches the sheet. Contact begins when the distance from its axis to the sheet's middle is
+/// below the sum of its radius, the distance that physics keeps between the two, and the gap across which an arc
+/// strikes; it ends beyond the gap across which an arc is sustained. At the 500 V peak of a cutting generator air and
+/// steam break down across 0.05 to 0.15 mm (Paschen).
 struct ContactReach {
-  /// False: physics keeps half the sheet's thickness from bare metal. True: all of PhysicsParams::collision_margin_m,
-  /// as in recordings from before CauteryContact had points of the metal.
+  /// False: physics keeps half the sheet's thickness from bare metal. True: it keeps the whole
+  /// PhysicsParams::collision_margin_m, as in recordings made before CauteryContact contained points of the metal.
   bool with_collision_margin = false;
   float strikes_m = 0.1e-3f, holds_m = 0.15e-3f;
 };
 
-/// Texels of the atlas that cover the sheet, row by row; what they were in the last patch that showed them.
+/// Texels of the atlas that cover the sheet, row by row, with the values of the last patch that contained them.
 struct SheetTexels {
   int x0 = 0, y0 = 0;  ///< Atlas texel of the first column and row.
   int width = 0, height = 0;
   double texel_m = 1e-4;
-  std::vector<std::uint8_t> removed;      ///< 1 where there is nothing any more.
+  std::vector<std::uint8_t> removed;      ///< 1 where the tissue is removed.
   std::vector<std::uint8_t> damage;       ///< 255 * (1 - exp(-Omega)).
-  std::vector<std::uint8_t> temperature;  ///< Highest of all patches: 20 C + value * 0.5 K; 0: never shown.
-  std::vector<float> removed_s;           ///< Session time of the first patch that shows it removed; else infinite.
-  int revived = 0;                        ///< Texels that were removed and were tissue again in a later patch.
+  std::vector<std::uint8_t> temperature;  ///< Highest value of all patches: 20 C + value * 0.5 K; 0: in no patch.
+  std::vector<float> removed_s;  ///< Session time of the first patch in which it is removed; otherwise infinite.
+  int revived = 0;               ///< Texels that were removed and were tissue again in a later patch.
 
   [[nodiscard]] std::size_t Index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
   }
 };
 
-/// Where the metal touched the sheet at the time of one TissueFrame.
+/// Places where the metal touched the sheet at the time of one TissueFrame.
 struct MetalFrame {
   double time_s = 0;           ///< Session time.
-  std::vector<Vec2f> touched;  ///< Places of the sheet that an arc holds to [m].
+  std::vector<Vec2f> touched;  ///< Places of the sheet within the reach of a sustained arc [m].
   bool in_contact = false;     ///< `touched` is not empty.
-  /// Of one contact, the nearer places the heavier [m]. Long metal may touch a rim here and a fold there: it is the
-  /// contact of the frame before, or the closest one.
+  /// Centre of one contact, weighted by proximity [m]. Long metal may touch a rim at one place and a fold at another:
+  /// this is the contact of the previous frame, or otherwise the closest one.
   Vec2f centre = Vec2f::Zero();
-  bool goes_on = false;                  ///< The contact is that of the frame before.
-  float nearest_m = 0;                   ///< Least distance of the metal's axis to the sheet.
-  CauteryMode mode = CauteryMode::kOff;  ///< Of the pedals; off without power.
+  bool goes_on = false;                  ///< The contact is that of the previous frame.
+  float nearest_m = 0;                   ///< Smallest distance of the metal's axis from the sheet.
+  CauteryMode mode = CauteryMode::kOff;  ///< Mode of the pedals; off without power.
   float power_W = 0;                     ///< Set power of that mode.
 };
 
-/// One CauteryContact, with pedal and set power of its time.
+/// One CauteryContact, with the mode and the set power at its time.
 struct CurrentSample {
   double time_s = 0;
   bool touching = false;
-  CauteryMode mode = CauteryMode::kOff;  ///< Off where there was no power.
+  CauteryMode mode = CauteryMode::kOff;  ///< Off if there was no power.
   float power_W = 0;
   Vec2f material = Vec2f::Zero();  ///< [m]
   [[nodiscard]] bool energised() const { return mode != CauteryMode::kOff; }
@@ -72,17 +73,17 @@ struct RecordedCut {
   std::vector<MetalFrame> metal;
   std::vector<CurrentSample> current;
   std::vector<ReportedLength> lengths;
-  TimingSummary thermal_step;  ///< As thermal_node last told.
-  /// Heat that warms and vaporises a strip of the sheet as wide as the metal, per length [J/m]: a power divided by it
-  /// is the speed at which that power can cut so wide at most.
+  TimingSummary thermal_step;  ///< Last value in the Health of thermal_node.
+  /// Heat that warms and vaporises a strip of the sheet of the metal's width, per length [J/m]: power divided by this
+  /// value is the highest speed at which that power can cut at this width.
   double vaporising_J_m = 0;
-  /// From the first energised touch to the first cut that thermal_node tells of, or to the first patch with a removed
-  /// texel where that is sooner [s]; NaN: no patch has one.
+  /// Time from the first energised touch to the first cut reported by thermal_node, or to the first patch with a
+  /// removed texel if that is earlier [s]; NaN: no patch has one.
   double first_opening_s = 0;
 };
 
-/// Of the hook of the scene. Throws InputError (no recording, no session in it, a scene without a hook) or
-/// MismatchError (a recording of another scene).
+/// Reads the cut made with the scene's hook. Throws InputError (no recording, no session in it, a scene without a hook)
+/// or MismatchError (a recording of another scene).
 [[nodiscard]] RecordedCut ReadCut(const std::filesystem::path& recording, const SceneView& scene,
                                   const ContactReach& reach = {});
 

@@ -1,4 +1,4 @@
-// A recording of a cart: the messages of an MCAP file with what its channels tell of them.
+// A recording of a cart: the messages of an MCAP file with the metadata of their channels.
 #pragma once
 
 #include <filesystem>
@@ -17,32 +17,32 @@ namespace fulcrum::log_tools {
 
 /// One writer of one topic.
 struct Source {
-  std::optional<TopicId> topic;  ///< None: not one of ours.
-  std::string name;              ///< Of the topic, for people: "ToolState".
-  std::string node;              ///< Who wrote; empty when the file does not tell.
+  std::optional<TopicId> topic;  ///< None: not a topic of this project.
+  std::string name;              ///< Name of the topic for people, such as "ToolState".
+  std::string node;              ///< Node that wrote it; empty if the file does not contain it.
 };
 
 struct Entry {
   recording::McapMessage message;
   const Source* source = nullptr;
-  double time_s = 0;  ///< Since the first message of the file.
+  double time_s = 0;  ///< Time since the first message of the file.
 };
 
-/// Which messages are wanted.
+/// Selection of messages.
 struct Filter {
-  std::set<std::string> topics;  ///< Names for people; empty: all.
+  std::set<std::string> topics;  ///< Topic names for people; empty: all.
   double from_s = 0;
   double to_s = 1e300;
 };
-/// Throws InputError when there is no such topic.
+/// Throws InputError if a topic of the filter does not exist.
 void CheckTopics(const Filter& filter);
 
 class Recording {
  public:
-  /// Throws InputError.
+  /// Opens a recording. Throws InputError.
   explicit Recording(const std::filesystem::path& file, Filter filter = {});
 
-  /// The next message that the filter lets through.
+  /// Reads the next message that the filter accepts; false at the end.
   bool Next(Entry* entry);
   [[nodiscard]] const recording::McapReader& reader() const { return messages_.reader(); }
 
@@ -55,7 +55,8 @@ class Recording {
   std::optional<std::uint64_t> first_ns_;
 };
 
-/// Decodes a message of a known topic and calls `use(message)`. False when it cannot be decoded; `use` is not called.
+/// Decodes a message of a known topic and calls `use(message)`. Returns false, without calling `use`, if it cannot be
+/// decoded.
 template <class Use>
 bool WithDecoded(TopicId topic, std::span<const std::uint8_t> bytes, const Use& use) {
   return bus::WithMessageOf(topic, [&]<class T>(std::type_identity<T>) {

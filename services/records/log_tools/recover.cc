@@ -5,7 +5,7 @@
 namespace fulcrum::log_tools {
 namespace {
 
-/// Copies what a reader meets; numbers of schemas and channels may become others.
+/// Copies the records that a reader returns; numbers of schemas and channels may change.
 class Copier {
  public:
   Copier(const recording::McapReader& reader, recording::McapWriter* writer) : reader_(reader), writer_(writer) {}

@@ -1,4 +1,4 @@
-// What is missing in a recording, by the numbers that its writers gave.
+// Messages missing in a recording, found by the sequence numbers of their writers.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,10 @@ namespace fulcrum::log_tools {
 
 class SequenceGaps {
  public:
-  /// Messages of the same writer that are missing between the last call and this one.
+  /// Number of messages of the same writer that are missing between the previous call and this one.
   std::uint64_t Before(const recording::McapMessage& message) {
     const auto [last, is_first] = last_.try_emplace(message.channel, message.sequence);
-    // Modulo 2^32: the numbers of a file are the low bits of the bus's.
+    // Modulo 2^32: the numbers in a file are the low bits of those on the bus.
     const std::uint32_t step = message.sequence - last->second;
     last->second = message.sequence;
     return is_first || step == 0 ? 0 : step - 1;

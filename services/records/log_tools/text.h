@@ -15,7 +15,7 @@
 
 namespace fulcrum::log_tools {
 
-/// `longest`: a list of more numbers is cut there and ends in a string that says how many are missing.
+/// `longest`: a longer list of numbers is cut to this length and ends in a string with the number of omitted ones.
 template <class T>
 void PutJson(const T& value, std::size_t longest, std::string* out);
 
@@ -29,7 +29,7 @@ inline constexpr bool kIsList<std::vector<T>> = true;
 /// A unit quaternion in the order of the topics: (w, x, y, z).
 inline std::array<float, 4> InOrder(const Quatf& q) { return {q.w(), q.x(), q.y(), q.z()}; }
 
-/// Shortest text that reads as the same number. JSON has no word for what is none.
+/// Shortest text that is read back as the same number. JSON has no representation of values that are not finite.
 template <class T>
 void PutNumber(T value, std::string* out) {
   if constexpr (std::is_same_v<T, bool>) {
@@ -87,8 +87,8 @@ void PutJson(const T& value, std::size_t longest, std::string* out) {
   }
 }
 
-/// Calls leaf(path, text) for each number or name, for example ("tools[0].p_WT[2]", "0.1"): the same paths for every
-/// message of a type. A list of any length is one leaf, in JSON.
+/// Calls leaf(path, text) for each number or name, for example ("tools[0].p_WT[2]", "0.1"), with the same paths for
+/// every message of a type. A list of variable length is one leaf, as JSON.
 template <class T, class Leaf>
 void ForEachLeaf(const T& value, const std::string& path, std::size_t longest, const Leaf& leaf) {
   const auto each = [&](const auto& range) {

@@ -7,7 +7,7 @@
 namespace fulcrum::log_tools {
 namespace {
 
-/// Clockwise from the upper one: P2 … P9 of Guo and Hall.
+/// Neighbours clockwise from the upper one: P2 to P9 of Guo and Hall.
 constexpr std::array<Pixel, 8> kRing{Pixel{0, -1}, {1, -1}, {1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}};
 
 std::array<bool, 8> RingOf(const Mask& mask, int x, int y) {
@@ -18,8 +18,8 @@ std::array<bool, 8> RingOf(const Mask& mask, int x, int y) {
 
 int CountOf(const std::array<bool, 8>& ring) { return static_cast<int>(std::count(ring.begin(), ring.end(), true)); }
 
-/// Whether the set pixels and the clear ones around stay connected as they are without this one: its 8-neighbours that
-/// are set are connected among themselves (Yokoi's number is 1).
+/// Whether the connectivity of the set and the clear pixels around is unchanged without this pixel: its set
+/// 8-neighbours are connected with each other (Yokoi's number is 1).
 bool IsSimple(const std::array<bool, 8>& p) {
   int number = 0;
   for (std::size_t i = 0; i < p.size(); i += 2) {
@@ -28,13 +28,13 @@ bool IsSimple(const std::array<bool, 8>& p) {
   return number == 1;
 }
 
-/// One of the two passes; the pixels that remain stay in `pixels`. True when any was removed.
+/// One of the two passes; the remaining pixels stay in `pixels`. True if any pixel was removed.
 bool Pass(Mask* mask, std::vector<Pixel>* pixels, bool first) {
   std::vector<Pixel> removed, kept;
   kept.reserve(pixels->size());
   for (const Pixel& at : *pixels) {
     const auto p = RingOf(*mask, at.x, at.y);
-    // Guo and Hall's N: pairs of neighbours of which one is set, from either beginning.
+    // N of Guo and Hall: pairs of neighbours of which at least one is set, counted from both starting points.
     int even = 0, odd = 0;
     for (std::size_t i = 0; i < p.size(); i += 2) {
       even += p[i] || p[i + 1] ? 1 : 0;
@@ -59,7 +59,7 @@ std::vector<Pixel> PixelsOf(const Mask& mask) {
   return pixels;
 }
 
-/// What is not needed to keep pieces connected and is no end of a line.
+/// Removes pixels that are not needed to keep pieces connected and are not ends of a line.
 void RemoveSteps(Mask* mask) {
   for (const Pixel& at : PixelsOf(*mask)) {
     const auto ring = RingOf(*mask, at.x, at.y);
@@ -67,7 +67,7 @@ void RemoveSteps(Mask* mask) {
   }
 }
 
-/// A piece may be gone that ends nowhere.
+/// Restores one pixel of each piece that was removed completely.
 void RestoreLostPieces(const Mask& mask, std::span<const float> distance, Mask* thin) {
   const Pieces found = FindPieces(mask, true, Neighbours::kEight);
   std::vector<bool> kept(found.pieces.size());
@@ -124,7 +124,7 @@ class Tracer {
  private:
   [[nodiscard]] int JunctionAt(const Pixel& at) const { return junction_[thin_.Index(at.x, at.y)]; }
 
-  /// The branch that goes on from pixel `at`; false when there is none that is new.
+  /// Adds the branch that starts at pixel `at`; false if that pixel belongs to a branch already.
   bool Follow(Pixel at, int from) {
     if (!IsNew(at)) return false;
     Branch branch;
@@ -138,7 +138,7 @@ class Tracer {
         const Pixel beside{at.x + step.x, at.y + step.y};
         if (!thin_.At(beside.x, beside.y)) continue;
         if (IsNew(beside)) next = &step;
-        // Beside its own junction a branch has only begun.
+        // Near its own junction a branch has only begun.
         const int junction = JunctionAt(beside);
         if (junction >= 0 && (junction != from || branch.pixels.size() > 2)) to = junction;
       }
@@ -164,8 +164,8 @@ class Tracer {
 
 Vec2d CentreOf(const Pixel& at) { return {at.x + 0.5, at.y + 0.5}; }
 
-/// A branch reaches beyond the edge of the hole beside it by more than the hole is wide there, which is three half
-/// widths from its middle: what is wider than long is a bay of the edge.
+/// A branch extends beyond the edge of the hole beside it by more than the width of the hole there, which is three half
+/// widths from its middle: a shorter extension is a bay of the edge.
 constexpr double kRough = 3;
 
 }  // namespace
@@ -220,7 +220,7 @@ void PruneSpurs(Mask* thin, std::span<const float> distance, double beyond) {
     for (std::size_t junction = 0; junction < spurs.size(); ++junction) {
       auto& here = spurs[junction];
       std::sort(here.begin(), here.end(), [](const Spur& a, const Spur& b) { return a.reach < b.reach; });
-      // Where there is nothing else, the two longest are the line.
+      // If there is no other branch, the two longest form the line.
       if (here.size() == degree[junction]) here.resize(here.size() - std::min<std::size_t>(2, here.size()));
       for (const Spur& spur : here) {
         for (const Pixel& at : spur.branch->pixels) thin->Put(at.x, at.y, false);

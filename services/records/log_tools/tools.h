@@ -1,5 +1,5 @@
-// The tools of `fulcrum log`. Each writes to `out` for people or programs and throws InputError for what the user can
-// put right.
+// The tools of `fulcrum log`. Each writes to `out` for people or programs and throws InputError for errors that the
+// user can correct.
 #pragma once
 
 #include <cstdint>
@@ -13,28 +13,28 @@
 
 namespace fulcrum::log_tools {
 
-/// What a file holds: session, span of time, and messages, rate, size and losses of each topic and node.
+/// Content of a file: session, span of time, and messages, rate, size and losses of each topic and node.
 void PrintInfo(const std::filesystem::path& file, std::ostream* out);
 
-/// The recordings in a folder and those below, oldest first.
+/// Lists the recordings in a folder and its subfolders, oldest first.
 void PrintList(const std::filesystem::path& folder, std::ostream* out);
 
-/// One JSON object a line. Lists longer than `longest` are cut.
+/// Prints one JSON object per line. Lists longer than `longest` are cut.
 void PrintMessages(const std::filesystem::path& file, const Filter& filter, std::size_t longest, std::ostream* out);
 
-/// One table a topic, `folder`/TOPIC.csv. Returns the files. Refuses to replace one.
+/// Writes one table per topic, `folder`/TOPIC.csv. Returns the files. Throws InputError rather than replace one.
 std::vector<std::filesystem::path> ExportTables(const std::filesystem::path& file, const Filter& filter,
                                                 const std::filesystem::path& folder);
 
-/// Reads everything there is to read and compares it with itself. kFailure when anything is wrong.
+/// Reads the whole file and checks its consistency. kFailure if a fault is found.
 ExitCode Verify(const std::filesystem::path& file, std::ostream* out);
 
-/// First difference of each topic and node. Messages are paired by their writer's sequence. @param without a field to
-/// leave out, for example "stamp". kFailure when there is any.
+/// Prints the first difference of each topic and node. Messages are paired by their writer's sequence. @param without a
+/// field that is skipped, for example "stamp". kFailure if there is a difference.
 ExitCode Diff(const std::filesystem::path& first, const std::filesystem::path& second, const Filter& filter,
               const std::string& without, std::ostream* out);
 
-/// Copies what can be read of `damaged` into a whole file. Returns what was wrong, for people.
+/// Copies the readable part of `damaged` into a complete file. Returns the faults, for people.
 std::vector<std::string> Recover(const std::filesystem::path& damaged, const std::filesystem::path& mended);
 
 }  // namespace fulcrum::log_tools

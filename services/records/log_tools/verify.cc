@@ -41,7 +41,7 @@ ExitCode Verify(const std::filesystem::path& file, std::ostream* out) {
   std::uint64_t indexed = 0;
   for (const std::string& what : recording::CheckIndex(file, &indexed)) problem(what);
   if (recording.reader().closed() && indexed != messages) {
-    problem("the indexes lead to " + std::to_string(indexed) + " messages, the chunks hold " +
+    problem("the indexes refer to " + std::to_string(indexed) + " messages, the chunks contain " +
             std::to_string(messages));
   }
   for (const auto& known : tallies) {

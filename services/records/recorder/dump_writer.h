@@ -1,4 +1,4 @@
-// The dumps of a recorder: asked for on one thread, written on another.
+// The dumps of a recorder: requested on one thread, written on another.
 #pragma once
 
 #include <cstdint>
@@ -13,15 +13,15 @@ namespace fulcrum::recorder {
 
 class DumpWriter {
  public:
-  /// `recorder` must outlive it. @param folder of the dumps: dump.mcap, dump-2.mcap …
+  /// `recorder` must outlive the object. @param folder folder of the dumps: dump.mcap, dump-2.mcap …
   DumpWriter(Recorder* recorder, std::filesystem::path folder);
 
-  /// The next WriteIfAsked writes one dump, with the last reason given before it. Returns the reply to the command. Any
-  /// thread.
+  /// Requests a dump: the next WriteIfAsked writes one, with the last reason given before it. Returns the reply to the
+  /// command. May be called on any thread.
   std::string Ask(std::string reason);
 
-  /// Logs what it wrote, or why it could not, and does not throw: recording goes on. The writing thread of the
-  /// recorder.
+  /// Writes a requested dump. The file, or the reason why it could not be written, is logged; nothing is thrown, so
+  /// that recording continues. To be called on the recorder's writing thread.
   void WriteIfAsked(std::int64_t now_ns);
 
  private:

@@ -50,7 +50,7 @@ Recorder::~Recorder() { Close(runtime::MonotonicNs()); }
 
 void Recorder::Introduce(recording::McapWriter* file) const {
   for (const auto& [name, values] : settings_.metadata) file->AddMetadata(name, values);
-  // Log times are CLOCK_MONOTONIC, like all stamps of the topics, but told as wall clock.
+  // Log times are CLOCK_MONOTONIC, like all stamps of the topics, shifted by one offset to the wall clock.
   file->AddMetadata("clock", {{"log_time_minus_monotonic_ns", std::to_string(wall_minus_monotonic_ns_)}});
 }
 
@@ -62,11 +62,11 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
     return known.topic == sample.topic && known.guid == sample.writer;
   });
   if (writer == writers_.end()) {
-    // What it sent before is nobody's loss.
+    // Samples that were sent before the first received one are not losses.
     writer = writers_.insert(writers_.end(), {sample.topic, sample.writer, sample.sequence - 1, sample.written_ns});
   }
   if (sample.sequence <= writer->last_sequence) return;
-  // Readers go by this time: what one writer sent stays in its order though clocks were set between.
+  // Readers sort by this time: samples of one writer stay in order even if a clock was set in between.
   const std::int64_t written_ns = std::max(sample.written_ns, writer->last_ns);
   const bool room = filling_.used() + recording::kMessageHead + size <= settings_.queue_B;
   if (room) {
@@ -80,7 +80,7 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
     at += recording::kMessageHead;
     std::memcpy(at, sample.head.data(), sample.head.size());
     if (!sample.body.empty()) std::memcpy(at + sample.head.size(), sample.body.data(), sample.body.size());
-    if (!is_whole()) return;  // Missed: the next one's sequence tells.
+    if (!is_whole()) return;  // Missed: the gap in the sequence is counted at the next sample.
     if (filling_.used() == 0) filling_.begin_ns = written_ns;
     part.used += recording::kMessageHead + size;
     most_used_ = std::max(most_used_, filling_.used());
@@ -138,7 +138,7 @@ void Recorder::Pack(Batch::Part* part) {
   constexpr std::size_t kChunk = recording::ChunkPacker::kChunkBytes;
   std::span<const std::uint8_t> records(part->bytes.get(), part->used);
   while (!records.empty()) {
-    // Up to twice a chunk is one: no crumb is left behind.
+    // A remainder of up to twice the size of a chunk is one chunk, so that no small one is left.
     records = records.subspan(packer_.Pack(records, records.size() <= 2 * kChunk ? records.size() : kChunk, &packed_));
     if (file_) Write();
     if (settings_.keep_s > 0) Keep();

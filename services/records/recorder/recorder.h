@@ -1,10 +1,10 @@
-// Samples of all topics into an MCAP file.
+// Writes the samples of all topics into an MCAP file.
 //
 //   threads of the bus ── Receive ──► batch being filled ─┐ exchanged by Flush
-//   writing thread ────── Flush ◄──── batch being written ┘──► chunks ──► file; the last seconds stay for Dump
+//   writing thread ────── Flush ◄──── batch being written ┘──► chunks ──► file; the last seconds are kept for Dump
 //
 // A thread of the bus copies a sample and returns; it never waits for the disk, since only the exchange of the batches
-// is under the lock.
+// holds the lock.
 #pragma once
 
 #include <array>
@@ -28,68 +28,69 @@
 namespace fulcrum::recorder {
 
 struct RecorderSettings {
-  std::filesystem::path file;                 ///< Empty: nothing is written but dumps.
-  double keep_s = 0;                          ///< For dumps: so much of the newest past is kept in memory [s].
-  std::size_t keep_B = std::size_t{1} << 30;  ///< But no more than this.
-  std::string library;                        ///< Who writes: "fulcrum 0.1.0".
-  /// What a file tells of the session, each a metadata record.
+  std::filesystem::path file;                 ///< Empty: only dumps are written.
+  double keep_s = 0;                          ///< For dumps: span of the newest samples that is kept in memory [s].
+  std::size_t keep_B = std::size_t{1} << 30;  ///< Upper limit of that memory.
+  std::string library;                        ///< Name of the writing program: "fulcrum 0.1.0".
+  /// Metadata of the session in the file, one record per entry.
   std::map<std::string, recording::TextMap> metadata;
-  /// What a file tells of a writer, beside its guid: called once for each, on the writing thread.
+  /// Metadata of a writer in the file, beside its guid: called once for each writer, on the writing thread.
   std::function<recording::TextMap(const bus::WriterGuid&)> describe;
-  /// Samples that wait for the writing thread. Twice this is set aside, and costs memory only once it is needed.
+  /// Largest size of the samples that wait for the writing thread. Twice this is reserved; memory is used only when
+  /// needed.
   std::size_t queue_B = std::size_t{96} << 20;
 };
 
-/// Since the start.
+/// Figures since the start.
 struct RecorderStats {
   std::uint64_t received = 0;   ///< Samples.
   std::uint64_t missed = 0;     ///< Samples that did not arrive: gaps in their writer's sequence.
   std::uint64_t overflow = 0;   ///< Samples for which the queue had no room.
   std::uint64_t unwritten = 0;  ///< Samples that came after writing had failed.
   std::uint64_t file_B = 0;
-  double queue_pct = 0;  ///< Fullest that a batch has been.
-  std::string error;     ///< Why writing failed; empty: it has not.
+  double queue_pct = 0;  ///< Highest filling level of a batch.
+  std::string error;     ///< Reason why writing failed; empty: no failure.
   [[nodiscard]] std::uint64_t lost() const { return missed + overflow + unwritten; }
 };
 
 class Recorder {
  public:
-  /// Throws InputError when the file cannot be made.
+  /// Throws InputError if the file cannot be created.
   explicit Recorder(const RecorderSettings& settings);
   ~Recorder();
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  /// Any thread.
+  /// Takes over a sample. May be called on any thread.
   void Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole);
 
-  // One thread, the writing one:
-  /// Writes what has come once it is ChunkPacker::kChunkBytes or kLongestChunk_ns old.
+  // The following functions are for the writing thread only.
+  /// Writes the received samples once they fill ChunkPacker::kChunkBytes or are kLongestChunk_ns old.
   void Flush(std::int64_t now_ns);
-  /// Writes what has come, and what is kept of the last seconds into a file of its own. Throws InputError when that
-  /// cannot be.
+  /// Writes all received samples, and writes the last seconds that were kept into a file of its own. Throws InputError
+  /// if that is not possible.
   void Dump(const std::filesystem::path& file, std::string_view reason, std::int64_t now_ns);
-  /// Writes what has come, what was lost, and the end of the file.
+  /// Writes all received samples, the losses and the end of the file.
   void Close(std::int64_t now_ns);
 
   [[nodiscard]] RecorderStats stats() const;
-  /// Of one topic, as Health shows it.
+  /// Figures of one topic for Health.
   [[nodiscard]] bus::InputStats topic_stats(TopicId topic) const;
 
-  /// With the period of Flush, no sample waits longer than a second for the file.
+  /// Together with the period of Flush this bounds the time until a sample is in the file to one second.
   static constexpr std::int64_t kLongestChunk_ns = 500'000'000;
 
  private:
-  /// Message records, as they stand in a chunk: a sample is copied once and packed from there.
+  /// Message records, in the format of a chunk: a sample is copied once and packed from there.
   struct Batch {
-    /// Large topics and small ones apart, and so in chunks of their own: most readers want only the small ones, which
-    /// are a thirtieth of the bytes.
+    /// Large and small topics are separated, so that they are in different chunks: most readers need only the small
+    /// ones, which are a thirtieth of the bytes.
     struct Part {
       std::unique_ptr<std::uint8_t[]> bytes;
       std::size_t used = 0;
     };
     Part large, small;
-    std::int64_t begin_ns = 0;  ///< When its first sample came.
+    std::int64_t begin_ns = 0;  ///< Arrival of its first sample.
     [[nodiscard]] std::size_t used() const { return large.used + small.used; }
   };
   struct Writer {
@@ -110,22 +111,23 @@ class Recorder {
 
   void AddNewChannels();
   void Pack(Batch::Part* part);
-  /// Takes over what has come when that is worth a chunk, or all.
+  /// Exchanges the batches if the filled one is large or old enough for a chunk, or if `all`.
   void Exchange(std::int64_t now_ns, bool all);
-  /// The packed chunk into the file.
+  /// Writes the packed chunk into the file.
   void Write();
-  /// The packed chunk to those that a dump holds.
+  /// Adds the packed chunk to those kept for a dump.
   void Keep();
-  /// Metadata into a new file.
+  /// Writes the metadata into a new file.
   void Introduce(recording::McapWriter* file) const;
-  /// Channels from number `first` on, with the schemas that the file does not have yet.
+  /// Adds the channels from number `first` on, with the schemas that the file does not contain yet.
   void AddChannels(recording::McapWriter* file, std::size_t first,
                    std::array<std::uint16_t, kTopicCount>* schemas) const;
 
   const RecorderSettings settings_;
-  const std::int64_t wall_minus_monotonic_ns_;  ///< Once: the times of a file never jump with the wall clock.
+  /// Determined once, so that the times of a file never jump with the wall clock.
+  const std::int64_t wall_minus_monotonic_ns_;
 
-  mutable std::mutex mutex_;  ///< Guards what follows up to the blank line.
+  mutable std::mutex mutex_;  ///< Guards the members up to the blank line.
   Batch filling_;
   std::vector<Writer> writers_;
   std::array<Counts, kTopicCount> counts_{};
@@ -135,7 +137,7 @@ class Recorder {
 
   Batch writing_;
   std::optional<recording::McapWriter> file_;
-  std::array<std::uint16_t, kTopicCount> schemas_{};  ///< In `file_`; 0: not yet.
+  std::array<std::uint16_t, kTopicCount> schemas_{};  ///< Numbers in `file_`; 0: not added yet.
   std::vector<Channel> channels_;                     ///< By writer.
   recording::ChunkPacker packer_;
   recording::PackedChunk packed_;

@@ -1,4 +1,4 @@
-// What a recorder tells of itself in Health.
+// The figures of a recorder in Health.
 #pragma once
 
 #include "services/base/core/messages.h"
@@ -6,7 +6,7 @@
 
 namespace fulcrum::recorder {
 
-/// Metrics; after writing has failed also the state and the last error.
+/// Sets the metrics, and after a failure of writing also the state and the last error.
 void FillHealth(const RecorderStats& stats, Health* health);
 
 }  // namespace fulcrum::recorder

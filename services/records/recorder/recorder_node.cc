@@ -15,10 +15,10 @@
 namespace fulcrum::recorder {
 namespace {
 
-/// So long after its first match a participant's matches are in Health.
+/// Time after its first match for which the number of a participant's matches is reported in Health.
 constexpr std::int64_t kReportsMatches_ns = 10 * kSecond_ns;
 
-/// Arguments of a process; empty when it has ended.
+/// Command line of a process; empty if it has ended.
 std::string CommandLine(int pid) {
   std::ifstream in("/proc/" + std::to_string(pid) + "/cmdline", std::ios::binary);
   std::string line{std::istreambuf_iterator<char>(in), {}};
@@ -31,7 +31,7 @@ recording::TextMap Describe(const bus::Peer& peer) {
   return {{"node", peer.name}, {"pid", std::to_string(peer.pid)}, {"command", CommandLine(peer.pid)}};
 }
 
-/// Of a participant beside that of the app: the app's has typed ports of some topics, and a participant registers a
+/// Settings of a second participant: that of the app has typed ports of some topics, and a participant can register a
 /// type in one way only.
 bus::DdsSettings BusSettings(app::NodeApp* app) {
   return {.domain = app->options().domain,

@@ -1,4 +1,4 @@
-// The recorder on the bus: every topic of the cart goes to a Recorder, a Command "dump" to its DumpWriter.
+// The recorder on the bus: passes every topic of the cart to a Recorder, and a Command "dump" to its DumpWriter.
 #pragma once
 
 #include <memory>
@@ -14,22 +14,22 @@ namespace fulcrum::recorder {
 
 class RecorderNode {
  public:
-  /// Joins the bus and receives from now on. `app` must outlive it. Before app->Run(). Throws InputError when the file
-  /// cannot be made or the bus cannot be joined.
+  /// Joins the bus and begins to receive. `app` must outlive the object. To be constructed before app->Run(). Throws
+  /// InputError if the file cannot be created or the bus cannot be joined.
   RecorderNode(app::NodeApp* app, const RecorderSettings& settings);
 
-  /// Writes what has come, and the dump that was asked for.
+  /// Writes the received samples, and a dump if one was requested.
   void Step(const Tick& tick);
-  /// Any thread.
+  /// May be called on any thread.
   void FillHealth(Health* health) const;
-  /// Leaves the topics, then ends the file. After the last Step.
+  /// Removes the inputs, then ends the file. To be called after the last Step.
   void Close();
 
  private:
   void ReceiveAllTopics(app::NodeApp* app);
 
-  // The order of declaration is that of use: the inputs call the recorder, which asks the participant for the process
-  // behind a writer.
+  // Declared in the order of dependence: the inputs call the recorder, which reads the process behind a writer from the
+  // participant.
   bus::DdsParticipant bus_;
   Recorder recorder_;
   DumpWriter dumps_;

@@ -1,4 +1,4 @@
-// What a recorder node is asked to do: its command line, checked, and what a file tells of the session.
+// Settings of a recorder node from its command line, checked, and the metadata of the session.
 #pragma once
 
 #include "services/nodes/app/node_app.h"
@@ -6,8 +6,8 @@
 
 namespace fulcrum::recorder {
 
-/// Takes --file and --keep from the options of `app`. `describe` is left to whoever knows the bus. Throws InputError
-/// when a value is unusable or neither option was given.
+/// Takes --file and --keep from the options of `app`; the caller sets `describe`. Throws InputError if a value is
+/// unusable or neither option was given.
 [[nodiscard]] RecorderSettings TakeSettings(app::NodeApp* app);
 
 }  // namespace fulcrum::recorder

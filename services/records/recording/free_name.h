@@ -6,7 +6,7 @@
 
 namespace fulcrum::recording {
 
-/// `file`, or with "-2", "-3" … before its extension when that exists: a recording is never replaced.
+/// `file`, or if it exists `file` with "-2", "-3" … before its extension: a recording is never replaced.
 [[nodiscard]] inline std::filesystem::path FreeName(const std::filesystem::path& file) {
   std::filesystem::path free = file;
   for (int number = 2; std::filesystem::exists(free); ++number) {

@@ -13,8 +13,8 @@
 namespace fulcrum::recording {
 namespace {
 
-/// A recorder runs beside solvers: of the built-in scene's bytes it leaves 0.67 where level -1 leaves 0.65 and level 1
-/// 0.60, in four tenths of the time and a tenth.
+/// A recorder shares the processor with solvers. This level compresses the built-in scene to 0.67 of its bytes; level
+/// -1 compresses to 0.65 and level 1 to 0.60, and this level needs 0.4 and 0.1 of their time.
 constexpr int kZstdLevel = -64;
 
 }  // namespace
@@ -63,7 +63,7 @@ std::size_t ChunkPacker::Pack(std::span<const std::uint8_t> records, std::size_t
   packed_.resize(std::max(packed_.size(), ZSTD_compressBound(length)));
   const std::size_t size =
       ZSTD_compressCCtx(zstd_, packed_.data(), packed_.size(), messages.data(), length, kZstdLevel);
-  // It fails only without memory; then as it is.
+  // Compression fails only for lack of memory; the chunk is then stored uncompressed.
   chunk->plain = ZSTD_isError(size) != 0;
   const std::span<const std::uint8_t> body = chunk->plain ? messages : std::span(packed_).first(size);
   chunk->packed = body.size();

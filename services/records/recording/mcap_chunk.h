@@ -1,4 +1,4 @@
-// Messages packed into a chunk, apart from any file.
+// Packing of messages into a chunk, independent of a file.
 #pragma once
 
 #include <cstddef>
@@ -11,28 +11,28 @@ struct ZSTD_CCtx_s;
 
 namespace fulcrum::recording {
 
-/// A chunk as it stands in a file, its message indexes behind it. Any file that has its channels can take it.
+/// A chunk in file format, followed by its message indexes. It can be appended to any file that has its channels.
 struct PackedChunk {
   std::vector<std::uint8_t> bytes;
   std::uint64_t first_ns = 0, last_ns = 0;  ///< Log times.
-  std::uint64_t length = 0;                 ///< Of the chunk without the indexes [B].
-  std::uint64_t packed = 0, unpacked = 0;   ///< Of its messages [B].
+  std::uint64_t length = 0;                 ///< Length of the chunk without the indexes [B].
+  std::uint64_t packed = 0, unpacked = 0;   ///< Size of its messages, compressed and uncompressed [B].
   bool plain = false;                       ///< Not compressed.
   struct Part {
     std::uint16_t channel;
-    std::uint64_t index_offset;  ///< In `bytes`.
+    std::uint64_t index_offset;  ///< Position in `bytes`.
     std::uint64_t messages;
   };
   std::vector<Part> parts;
 };
 
-/// A message as a record of a chunk is kMessageHead bytes, which PutMessageHead writes, and its data.
+/// Size of the head of a message record in a chunk [B], which PutMessageHead writes; the data follow.
 inline constexpr std::size_t kMessageHead = 31;
 void PutMessageHead(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns,
                     std::uint64_t publish_time_ns, std::size_t data_B, std::uint8_t* to);
 
-/// Allocates nothing once the buffers have grown: fresh megabytes several times a second would cost more than packing
-/// them.
+/// Packs messages into chunks. Allocates nothing once the buffers have grown: allocating megabytes several times a
+/// second would cost more than packing them.
 class ChunkPacker {
  public:
   ChunkPacker();
@@ -40,10 +40,11 @@ class ChunkPacker {
   ChunkPacker(const ChunkPacker&) = delete;
   ChunkPacker& operator=(const ChunkPacker&) = delete;
 
-  /// Packs the first of these message records, as many as fit into `most` bytes but at least one. Returns their length.
+  /// Packs the first of these message records, as many as fit into `most` bytes but at least one. Returns their length
+  /// [B].
   std::size_t Pack(std::span<const std::uint8_t> records, std::size_t most, PackedChunk* chunk);
 
-  /// A chunk of this size is worth ending.
+  /// Size at which a chunk is ended [B].
   static constexpr std::size_t kChunkBytes = std::size_t{1} << 20;
 
  private:

@@ -1,5 +1,6 @@
-// Names of the MCAP container format, version 0 (specification: mcap.dev/spec). All numbers are little endian; a string
-// is its length as 32 bits and its bytes; a record is an opcode, the length of its content as 64 bits and the content.
+// Constants of the MCAP container format, version 0 (specification: mcap.dev/spec). All numbers are little endian; a
+// string is its length as 32 bits and its bytes; a record is an opcode, the length of its content as 64 bits and the
+// content.
 #pragma once
 
 #include <array>
@@ -9,7 +10,7 @@
 namespace fulcrum::recording {
 
 inline constexpr std::array<std::uint8_t, 8> kMcapMagic{0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
-/// Opcode and length in front of the content.
+/// Size of opcode and length in front of the content [B].
 inline constexpr std::size_t kRecordHead = 9;
 
 enum class Opcode : std::uint8_t {

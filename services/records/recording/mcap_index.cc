@@ -14,7 +14,7 @@
 namespace fulcrum::recording {
 namespace {
 
-/// Start of the summary, start of its offsets, checksum.
+/// Size of a footer [B]: start of the summary, start of its offsets, checksum.
 constexpr std::uint64_t kFooterBytes = 20;
 constexpr std::uint64_t kTail = kRecordHead + kFooterBytes + kMcapMagic.size();
 constexpr std::uint64_t kMostSummaryBytes = std::uint64_t{1} << 30;
@@ -41,7 +41,7 @@ class IndexCheck {
     const std::vector<std::uint8_t> summary = Read(start, size_ - start);
     const std::size_t covered = summary.size() - kMcapMagic.size() - sizeof crc;
     if (crc != 0 && libdeflate_crc32(0, summary.data(), covered) != crc) {
-      Problem("the checksum of the summary does not fit it");
+      Problem("the checksum of the summary is wrong");
     }
     ByteReader records{std::span(summary).first(summary.size() - kTail)};
     while (!records.empty() && records.good()) {
@@ -50,12 +50,12 @@ class IndexCheck {
       if (kind == static_cast<std::uint8_t>(Opcode::kChunkIndex)) CheckChunk(content);
       if (kind == static_cast<std::uint8_t>(Opcode::kStatistics)) {
         ByteReader statistics(content);
-        told_ = statistics.Number<std::uint64_t>();
+        stated_ = statistics.Number<std::uint64_t>();
       }
     }
     if (!records.good()) Problem("the summary ends within a record");
-    if (told_ != messages_) {
-      Problem("the statistics tell of " + std::to_string(told_) + " messages, the indexes of " +
+    if (stated_ != messages_) {
+      Problem("the statistics count " + std::to_string(stated_) + " messages, the indexes " +
               std::to_string(messages_));
     }
   }
@@ -76,14 +76,14 @@ class IndexCheck {
     return bytes;
   }
 
-  /// Length of the record at `at`, its head not counted; told as a problem when it is not of this kind.
+  /// Length of the record at `at`, without its head; reports a problem if it is of another kind.
   std::uint64_t LengthAt(std::uint64_t at, Opcode kind) {
     const std::vector<std::uint8_t> head = Read(at, kRecordHead);
     ByteReader from(head);
     const auto opcode = from.Number<std::uint8_t>();
     const auto length = from.Number<std::uint64_t>();
     if (from.good() && opcode == static_cast<std::uint8_t>(kind) && length <= size_ - at) return length;
-    Problem("an index points at byte " + std::to_string(at) + ", where something else is");
+    Problem("an index points at byte " + std::to_string(at) + ", where there is no such record");
     return 0;
   }
 
@@ -114,7 +114,7 @@ class IndexCheck {
 
   std::ifstream in_;
   const std::uint64_t size_;
-  std::uint64_t messages_ = 0, told_ = 0;
+  std::uint64_t messages_ = 0, stated_ = 0;
   std::vector<std::string> problems_;
 };
 

@@ -15,7 +15,7 @@
 namespace fulcrum::recording {
 namespace {
 
-/// First and last time, at the beginning of a chunk.
+/// Size of the first and last time at the beginning of a chunk [B].
 constexpr std::uint64_t kChunkTimes = 2 * sizeof(std::uint64_t);
 
 }  // namespace
@@ -42,7 +42,7 @@ void McapReader::Reopen() {
   in_ = std::ifstream(file_, std::ios::binary);
   in_.seekg(static_cast<std::streamoff>(next_));
   if (!in_) {
-    throw InputError(file_.string() + ": cannot be read any more: " + std::strerror(errno));
+    throw InputError(file_.string() + ": can no longer be read: " + std::strerror(errno));
   }
 }
 
@@ -77,7 +77,7 @@ std::optional<McapReader::Record> McapReader::ReadFromFile() {
                            (depth_ == Depth::kChunkHeads || (wanted_ && !HoldsWanted(next_)));
   content_.resize(passed_over ? std::min<std::uint64_t>(length, kChunkTimes) : length);
   if (!read(content_.data(), content_.size())) {
-    Fault("the file cannot be read on");
+    Fault("reading the file failed");
     return std::nullopt;
   }
   if (passed_over) {
@@ -154,11 +154,11 @@ void McapReader::OpenChunk(const Record& record) {
       return;
     }
   } else {
-    Fault("a chunk is packed with \"" + packing.substr(0, 16) + "\"; this reader knows zstd and none");
+    Fault("a chunk is packed with \"" + packing.substr(0, 16) + "\"; valid: zstd or none");
     return;
   }
   if (chunk_.size() != size || (crc != 0 && libdeflate_crc32(0, chunk_.data(), chunk_.size()) != crc)) {
-    Fault("a chunk's checksum does not fit its content");
+    Fault("a chunk's checksum does not match its content");
     return;
   }
   left_ = chunk_;
@@ -191,7 +191,7 @@ bool McapReader::Take(const Record& record, McapMessage* message) {
       *message = {from.Number<std::uint16_t>(), from.Number<std::uint32_t>(), from.Number<std::uint64_t>(),
                   from.Number<std::uint64_t>(), from.Rest()};
       if (from.good() && !channels_.contains(message->channel)) {
-        Fault("a message of a channel that nothing has told of: " + std::to_string(message->channel));
+        Fault("a message of an undefined channel: " + std::to_string(message->channel));
         return false;
       }
       if (from.good()) {
@@ -217,7 +217,7 @@ bool McapReader::Next(McapMessage* message) {
   while (!done_) {
     if (!left_.empty()) {
       const std::optional<Record> record = TakeFromChunk();
-      // Chunks hold schemas, channels and messages only.
+      // Chunks contain schemas, channels and messages only.
       if (record && record->opcode >= static_cast<std::uint8_t>(Opcode::kSchema) &&
           record->opcode <= static_cast<std::uint8_t>(Opcode::kMessage) && Take(*record, message)) {
         return true;
@@ -233,14 +233,14 @@ bool McapReader::Next(McapMessage* message) {
       chunked_ = true;
       OpenChunk(*record);
     } else if (record->opcode == static_cast<std::uint8_t>(Opcode::kDataEnd)) {
-      // What follows repeats what has been met; only its end says more.
+      // The rest repeats records that were read already; only the magic at the end is new.
       std::array<std::uint8_t, kMcapMagic.size()> end{};
       in_.seekg(-static_cast<std::streamoff>(end.size()), std::ios::end);
       in_.read(reinterpret_cast<char*>(end.data()), end.size());
       closed_ = in_ && end == kMcapMagic;
       done_ = true;
     } else if (chunked_ && record->opcode == static_cast<std::uint8_t>(Opcode::kMessage)) {
-      // Nothing checks a record outside of chunks: a message index is one bit away from being a message.
+      // Records outside of chunks have no checksum, and a single wrong bit turns a message index into a message.
       Fault("a message outside of the chunks, where this file has its messages");
     } else if (Take(*record, message)) {
       return true;

@@ -1,4 +1,4 @@
-// Reads an MCAP file from its beginning, whole or not.
+// Reads an MCAP file from its beginning, complete or not.
 #pragma once
 
 #include <cstddef>
@@ -27,66 +27,66 @@ struct McapMessage {
   std::uint16_t channel;
   std::uint32_t sequence;
   std::uint64_t log_time_ns, publish_time_ns;
-  std::span<const std::uint8_t> data;  ///< Until the next call of Next().
+  std::span<const std::uint8_t> data;  ///< Valid until the next call of Next().
 };
-/// Something in the file that cannot be read.
+/// A part of the file that cannot be read.
 struct McapFault {
-  std::uint64_t offset;  ///< Of the record, in the file.
+  std::uint64_t offset;  ///< Position of the record in the file.
   std::string what;
 };
 
-/// Goes through the records in the order of the file and needs neither summary nor index, so a recording that was cut
-/// off by a kill reads up to its last whole chunk. A record that is damaged is left out and told in faults(). Chunks
-/// may be plain or packed with zstd. Records that it does not know are passed over, as the format asks.
+/// Reads the records in the order of the file and needs neither summary nor index, so a recording that was interrupted
+/// by a kill is readable up to its last complete chunk. A damaged record is skipped and listed in faults(). Chunks may
+/// be uncompressed or compressed with zstd. Records of unknown kind are skipped, as the format requires.
 class McapReader {
  public:
   enum class Depth {
     kMessages,
-    kChunkHeads,  ///< Passes chunks over and gives no message: fast, for first_ns, last_ns and metadata.
+    kChunkHeads,  ///< Skips the content of chunks and returns no message: fast, for first_ns, last_ns and metadata.
   };
-  /// Throws InputError when the file cannot be read or does not begin as an MCAP file.
+  /// Throws InputError if the file cannot be read or does not begin as an MCAP file.
   explicit McapReader(const std::filesystem::path& file, Depth depth = Depth::kMessages);
 
-  /// From now on chunks that hold only messages of channels for which this is false are passed over, unread where their
-  /// index tells. Such messages in other chunks come nevertheless.
+  /// From now on skips chunks that contain only messages of channels for which `wanted` is false, without reading them
+  /// if their index shows this. Such messages in other chunks are still returned.
   void PassOver(std::function<bool(const McapChannel&)> wanted) { wanted_ = std::move(wanted); }
 
-  /// The next message, in the order of the file; false at the end of what can be read.
+  /// Reads the next message, in the order of the file; false at the end of the readable part.
   bool Next(McapMessage* message);
 
-  /// Goes on where it was, with a file handle of its own: for a process that was forked, which shares the old one's
-  /// position. Throws InputError when the file is gone.
+  /// Continues at the same position with a new file handle: for a forked process, which shares the position of the old
+  /// one. Throws InputError if the file no longer exists.
   void Reopen();
 
-  // What has been met so far.
+  // Content of the records read so far.
   [[nodiscard]] const std::string& profile() const { return profile_; }
   [[nodiscard]] const std::string& library() const { return library_; }
   [[nodiscard]] const std::map<std::uint16_t, McapSchema>& schemas() const { return schemas_; }
   [[nodiscard]] const std::map<std::uint16_t, McapChannel>& channels() const { return channels_; }
   [[nodiscard]] const std::map<std::string, std::map<std::string, std::string>>& metadata() const { return metadata_; }
   [[nodiscard]] const std::vector<McapFault>& faults() const { return faults_; }
-  /// First and last log time of the chunks met so far; 0: none.
+  /// First and last log time of the chunks read so far; 0: none.
   [[nodiscard]] std::uint64_t first_ns() const { return first_ns_; }
   [[nodiscard]] std::uint64_t last_ns() const { return last_ns_; }
-  /// Its writer has closed it: it ends with a footer.
+  /// Whether the file ends with a footer, so that its writer has closed it.
   [[nodiscard]] bool closed() const { return closed_; }
 
-  /// A chunk that says it is longer is taken for damaged.
+  /// A chunk with a larger length counts as damaged.
   static constexpr std::uint64_t kMostChunkBytes = std::uint64_t{1} << 28;
-  /// So many faults are kept.
+  /// Largest number of faults that are kept.
   static constexpr std::size_t kMostFaults = 100;
 
  private:
   struct Record {
     std::uint8_t opcode;
     std::span<const std::uint8_t> content;
-    bool passed_over = false;  ///< Of a chunk only the times were read.
+    bool passed_over = false;  ///< Only the times of the chunk were read.
   };
   std::optional<Record> ReadFromFile();
   std::optional<Record> TakeFromChunk();
-  /// Looks into the message indexes behind a chunk, which begin there.
+  /// Whether the message indexes that begin at `indexes`, behind a chunk, contain a wanted channel.
   bool HoldsWanted(std::uint64_t indexes);
-  /// True when it is a message.
+  /// Processes a record. True if it is a message.
   bool Take(const Record& record, McapMessage* message);
   void OpenChunk(const Record& record);
   void Fault(std::string what);
@@ -96,9 +96,10 @@ class McapReader {
   const Depth depth_;
   std::ifstream in_;
   std::uint64_t first_ns_ = 0, last_ns_ = 0;
-  std::uint64_t size_ = 0, next_ = 0, at_ = 0;  ///< Of the file; of the next record; of the one at hand.
+  /// Size of the file, position of the next record, position of the present one.
+  std::uint64_t size_ = 0, next_ = 0, at_ = 0;
   std::vector<std::uint8_t> content_, chunk_;
-  std::span<const std::uint8_t> left_;  ///< Of the chunk.
+  std::span<const std::uint8_t> left_;  ///< Unread part of the chunk.
   std::string profile_, library_;
   std::map<std::uint16_t, McapSchema> schemas_;
   std::map<std::uint16_t, McapChannel> channels_;

@@ -28,7 +28,7 @@ McapWriter::McapWriter(const std::filesystem::path& file, std::string_view profi
     : file_(open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
   if (file_ < 0) {
     throw InputError(file.string() + ": cannot be written: " + std::strerror(errno) +
-                     "; choose a folder that exists and is yours");
+                     "; choose an existing folder in which you may write");
   }
   record_.assign(kMcapMagic.begin(), kMcapMagic.end());
   ByteWriter to(&record_);
@@ -142,7 +142,7 @@ std::vector<std::uint8_t> McapWriter::Statistics() const {
     to.Number(message_count_);
     to.Number(schema_count_);
     to.Number(static_cast<std::uint32_t>(counts_.size()));
-    to.Number(std::uint32_t{0});  // Attachments.
+    to.Number(std::uint32_t{0});  // Number of attachments.
     to.Number(static_cast<std::uint32_t>(metadata_.size()));
     to.Number(static_cast<std::uint32_t>(chunks_.size()));
     to.Number(first_ns_);
@@ -157,7 +157,7 @@ std::vector<std::uint8_t> McapWriter::Statistics() const {
   return record;
 }
 
-/// Groups of records, where each group begins, and the footer.
+/// Writes the groups of records, the position of each group, and the footer.
 void McapWriter::PutSummary() {
   const std::uint64_t start = offset_;
   std::vector<std::uint8_t> summary, offsets;
@@ -211,7 +211,7 @@ void McapWriter::PutSummary() {
   });
   const std::uint64_t offset_start = start + summary.size();
   summary.insert(summary.end(), offsets.begin(), offsets.end());
-  // The checksum covers the summary and the footer up to itself.
+  // The checksum covers the summary and the footer up to the checksum itself.
   to.Number(static_cast<std::uint8_t>(Opcode::kFooter));
   to.Number(std::uint64_t{20});
   to.Number(start);
@@ -228,7 +228,7 @@ void McapWriter::Close() {
   EndChunk();
   record_.clear();
   ByteWriter to(&record_);
-  to.Record(Opcode::kDataEnd, [&] { to.Number(std::uint32_t{0}); });  // 0: no checksum over all of it.
+  to.Record(Opcode::kDataEnd, [&] { to.Number(std::uint32_t{0}); });  // 0: no checksum over the whole file.
   Put(record_);
   PutSummary();
   close(file_);

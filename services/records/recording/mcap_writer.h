@@ -16,37 +16,37 @@ namespace fulcrum::recording {
 
 using TextMap = std::map<std::string, std::string>;
 
-/// What is written stays readable whatever happens later: each schema, channel and whole chunk is given to the
-/// operating system at once, so after a kill the file holds all chunks that were ended before it. Nothing throws once
-/// the file is open; the first failure (a full disk) is kept in error() and nothing more is written.
+/// What is written stays readable: each schema, channel and complete chunk is passed to the operating system at once,
+/// so after a kill the file contains all chunks that were ended before it. Nothing throws once the file is open; the
+/// first failure (a full disk) is kept in error() and nothing more is written.
 class McapWriter {
  public:
-  /// Creates or replaces `file`. Throws InputError when that cannot be.
+  /// Creates or replaces `file`. Throws InputError if that fails.
   McapWriter(const std::filesystem::path& file, std::string_view profile, std::string_view library);
   /// Closes the file, with its summary.
   ~McapWriter();
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
 
-  /// Returns the schema's number, from 1.
+  /// Adds a schema and returns its number, from 1.
   std::uint16_t AddSchema(std::string_view name, std::string_view encoding, std::string_view text);
-  /// Returns the channel's number. @param schema 0: none.
+  /// Adds a channel and returns its number. @param schema 0: none.
   std::uint16_t AddChannel(std::uint16_t schema, std::string_view topic, std::string_view message_encoding,
                            const TextMap& metadata);
   void AddMetadata(std::string_view name, const TextMap& values);
-  /// Adds a message to the open chunk, and ends that when it is ChunkPacker::kChunkBytes long. Times are nanoseconds
-  /// of one clock.
+  /// Adds a message to the open chunk, and ends the chunk when it is ChunkPacker::kChunkBytes long. Times are in
+  /// nanoseconds of one clock.
   void Write(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns, std::uint64_t publish_time_ns,
              std::span<const std::byte> data);
-  /// Adds a chunk that was packed elsewhere, of channels that this file has.
+  /// Adds a chunk that was packed elsewhere; its channels must be in this file.
   void Append(const PackedChunk& chunk);
-  /// Ends the open chunk, if it holds anything: all messages so far are then in the file.
+  /// Ends the open chunk unless it is empty: all messages so far are then in the file.
   void EndChunk();
   /// Ends the last chunk and adds the summary. Nothing can be written afterwards.
   void Close();
 
   [[nodiscard]] const std::string& error() const { return error_; }
-  /// In the chunks that were ended.
+  /// Number of messages in the chunks that were ended.
   [[nodiscard]] std::uint64_t message_count() const { return message_count_; }
   [[nodiscard]] std::uint64_t bytes_written() const { return offset_; }
 
@@ -54,7 +54,7 @@ class McapWriter {
   struct ChunkPlace {
     std::uint64_t start;
     std::uint64_t index_B;  ///< Length of the message indexes behind it.
-    PackedChunk chunk;      ///< Without its bytes.
+    PackedChunk chunk;      ///< Without its `bytes`.
   };
   struct MetadataPlace {
     std::uint64_t start, length;
@@ -68,14 +68,14 @@ class McapWriter {
   int file_ = -1;
   std::string error_;
   std::uint64_t offset_ = 0, message_count_ = 0;
-  std::uint64_t first_ns_ = 0, last_ns_ = 0;  ///< Of all messages.
-  std::vector<std::uint8_t> chunk_;           ///< Messages of the open one.
+  std::uint64_t first_ns_ = 0, last_ns_ = 0;  ///< Log times over all messages.
+  std::vector<std::uint8_t> chunk_;           ///< Messages of the open chunk.
   ChunkPacker packer_;
   PackedChunk packed_;
   std::vector<std::uint8_t> record_;
-  std::vector<std::uint8_t> schemas_, channels_;  ///< Their records, again for the summary.
+  std::vector<std::uint8_t> schemas_, channels_;  ///< Their records, which the summary repeats.
   std::uint16_t schema_count_ = 0;
-  std::vector<std::uint64_t> counts_;  ///< Messages, by channel.
+  std::vector<std::uint64_t> counts_;  ///< Number of messages, by channel.
   std::vector<ChunkPlace> chunks_;
   std::vector<MetadataPlace> metadata_;
 };

@@ -1,4 +1,4 @@
-// The scene that a recording needs to be understood.
+// The scene to which a recording belongs.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@
 
 namespace fulcrum::recording {
 
-/// What stands beside the recording in its session's folder, unless it was given. Empty: nothing does.
+/// The path `given`, or if it is empty the file beside the recording in its session's folder. Empty: there is none.
 [[nodiscard]] inline std::filesystem::path BesideRecording(const std::string& given,
                                                            const std::filesystem::path& recording, const char* name) {
   if (!given.empty()) return given;
@@ -19,7 +19,7 @@ namespace fulcrum::recording {
   return std::filesystem::exists(beside) ? beside : std::filesystem::path();
 }
 
-/// Throws MismatchError when the session that was recorded is of another scene.
+/// Throws MismatchError if the recorded session used another scene.
 inline void RefuseOtherScene(const std::filesystem::path& recording, const std::optional<SceneManifest>& session,
                              const SceneView& scene) {
   if (!session || session->scene_hash == scene.hash) return;

@@ -1,4 +1,4 @@
-// The messages of a recording by their log times.
+// The messages of a recording, sorted by log time.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,14 @@
 
 namespace fulcrum::recording {
 
-/// Chunks of a recording overlap in time: large topics and small ones have chunks of their own. What has been read is
-/// held until nothing that follows can be older: a recorder writes each message within kSettle_ns.
+/// Chunks of a recording overlap in time: large and small topics have separate chunks. A message is held until no later
+/// one in the file can be older: a recorder writes each message within kSettle_ns.
 class TimeOrder {
  public:
-  /// See McapReader.
+  /// Opens a recording as McapReader does.
   explicit TimeOrder(const std::filesystem::path& file) : reader_(file) {}
 
-  /// The next message by log time; those of one time in the order of the file. False at the end.
+  /// Reads the next message by log time; messages of equal time in the order of the file. False at the end.
   bool Next(McapMessage* message);
 
   [[nodiscard]] const McapReader& reader() const { return reader_; }

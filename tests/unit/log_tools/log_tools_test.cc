@@ -94,7 +94,8 @@ TEST_F(LogTools, InfoTellsSessionTopicsAndLosses) {
   std::ostringstream out;
   PrintInfo(Make("a.mcap"), &out);
   const std::string text = out.str();
-  for (const char* part : {"whole", "scene \"small\" 77", "2023-11-14 22:13:20 UTC · 0.18 s · 19 messages · 2 lost"}) {
+  for (const char* part :
+       {"complete", "scene \"small\" 77", "2023-11-14 22:13:20 UTC · 0.18 s · 19 messages · 2 lost"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " in\n" << text;
   }
   for (const bus::TopicRole& role : bus::kTopicRoles) {
