@@ -1,4 +1,4 @@
-// What the cart file says of security, as the bus takes it.
+// Converts the security section of the cart file into the settings of the bus.
 #pragma once
 
 #include <string>

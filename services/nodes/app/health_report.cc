@@ -13,7 +13,7 @@ constexpr std::int64_t kRateWindowNs = 1'000'000'000;
 }  // namespace
 
 double RateMeter::Observe(std::int64_t now_ns, std::uint64_t count) {
-  // One observation older than the window stays, so that the window is a full second.
+  // Keeps one observation older than the window, so that the window is a full second.
   while (recent_.size() >= 2 && now_ns - recent_[1].time_ns >= kRateWindowNs) {
     recent_.erase(recent_.begin());
   }

@@ -1,4 +1,4 @@
-// Health of a node from the figures of its thread and ports. Pure: the caller gives the time.
+// Health of a node from the figures of its thread and ports. Pure: the caller passes the time.
 #pragma once
 
 #include <array>
@@ -17,7 +17,8 @@ namespace fulcrum::app {
 /// Events per second over the last second of 10 Hz observations.
 class RateMeter {
  public:
-  /// Returns the rate [Hz] from the oldest observation that is at most a second old; 0 until there are two.
+  /// Adds an observation and returns the rate [Hz] since the oldest observation that is at most a second old; 0 until
+  /// there are two.
   [[nodiscard]] double Observe(std::int64_t now_ns, std::uint64_t count);
 
  private:
@@ -28,19 +29,19 @@ class RateMeter {
   std::vector<Observation> recent_;
 };
 
-/// p50, p99 and max in µs.
+/// p50, p99 and maximum in µs.
 [[nodiscard]] TimingSummary Summarise(const runtime::HistogramSnapshot& histogram);
 
 class HealthReport {
  public:
-  /// `period_ns`: what the node was asked to keep.
+  /// `period_ns`: nominal period of the node.
   HealthReport(NodeId node, std::int64_t period_ns, std::uint64_t schema_hash, std::uint64_t scene_hash,
                std::int32_t pid);
 
   using InputWatch = std::pair<TopicId, std::function<bus::InputStats()>>;
   using OutputWatch = std::function<bus::OutputStats()>;
 
-  /// All but stamp, metrics and last_error, which are the caller's.
+  /// All fields except stamp, metrics and last_error, which the caller sets.
   [[nodiscard]] Health Make(std::int64_t now_ns, HealthState state, const runtime::CyclicStats& thread,
                             const std::vector<InputWatch>& inputs, const std::vector<OutputWatch>& outputs);
 
@@ -49,10 +50,10 @@ class HealthReport {
   RateMeter rate_;
 };
 
-/// "starting", "running", …
+/// Name of a state: "starting", "running", …
 [[nodiscard]] const char* StateName(HealthState state);
 
-/// Cuts names, texts and lists to what the message holds, and metrics that are not finite to 0.
+/// Cuts names, texts and lists to the capacity of the message, and sets metrics that are not finite to 0.
 void FitToMessage(Health* health);
 
 }  // namespace fulcrum::app

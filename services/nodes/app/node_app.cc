@@ -30,14 +30,14 @@ using runtime::MonotonicNs;
 
 constexpr std::int64_t kSessionUnknown = std::numeric_limits<std::int64_t>::max();
 constexpr auto kPollPeriod = std::chrono::milliseconds(10);
-/// Phase of a node's steps against k periods of the session, in periods. Physics begins just after k dt, when the
-/// ToolState of that moment has arrived; thermal when the contact of that step has.
+/// Phase of a node's steps relative to multiples k of the session's period dt, in periods. Physics begins just after k
+/// dt, when the ToolState of that time has arrived; thermal begins when the contact of that physics step has arrived.
 constexpr double kPhysicsPhase = 0.12, kThermalPhase = 0.65;
 constexpr auto kHealthPeriod = std::chrono::milliseconds(100);
-// A node that cannot end within this time has hung; its checkpoint is safe against a kill.
+// A node that has not ended after this time hangs; killing it is safe for its checkpoint.
 constexpr unsigned kLongestEndS = 3;
 
-/// For people who ask `systemctl status`.
+/// Status text in `systemctl status`.
 std::string StatusLine(const Health& health) {
   if (health.state == HealthState::kWaiting) return "waits for a session";
   std::array<char, 64> rate{};
@@ -55,7 +55,7 @@ struct NodeApp::Impl {
         cart(node_options.cart.empty() ? config::CartConfig() : config::LoadCart(node_options.cart)),
         scene(node_options.scene) {}
 
-  /// What every node has on the bus.
+  /// Participant and ports that every node has.
   struct Joined {
     explicit Joined(const bus::DdsSettings& settings)
         : participant(settings),
@@ -79,7 +79,7 @@ struct NodeApp::Impl {
     return *joined;
   }
 
-  /// What the bus says to every node, looked at by the main thread.
+  /// Processes the messages for every node; called on the main thread.
   void PollBus() {
     SceneManifest manifest;
     while (joined->manifests->TakeNext(&manifest)) {
@@ -150,7 +150,7 @@ struct NodeApp::Impl {
     if (!options.extra.empty()) throw InputError("unknown option \"" + options.extra.front() + "\"; see --help");
   }
 
-  /// On the cyclic thread. A step that throws ends the node.
+  /// Runs one step on the cyclic thread. A step that throws ends the node.
   void Step(const Tick& clock_tick, const std::function<void(const Tick&)>& step) {
     if (ShouldEnd()) return;
     Tick tick = clock_tick;
@@ -162,7 +162,7 @@ struct NodeApp::Impl {
     }
   }
 
-  /// On the health thread.
+  /// Runs on the health thread.
   void PublishHealthUntil(const std::stop_token& stop, HealthReport* report, const runtime::CyclicThread& steps,
                           const HealthFill& fill) {
     runtime::ServiceNotify service;
@@ -185,7 +185,7 @@ struct NodeApp::Impl {
     polls.fetch_add(1, std::memory_order_relaxed);
   }
 
-  /// Until session time 0 has passed and, in a recorded session, the recorder reads what this node writes.
+  /// Waits until session time 0 has passed and, in a recorded session, the recorder reads the topics of this node.
   void WaitForSession() {
     const bool replayable = node != NodeId::kRecorder && node != NodeId::kRender;
     std::optional<RecorderWait> recorder;
@@ -253,20 +253,20 @@ struct NodeApp::Impl {
          return "stopping";
        }},
       {"restart", [this](const std::string&) {
-         // A failure to whoever started this node, who starts it again.
-         End(ExitCode::kFailure, "ends to be started again");
+         // The exit code of a failure makes the parent process restart the node.
+         End(ExitCode::kFailure, "exits to be restarted");
          return "restarting";
        }}};
 
   std::size_t refusals_told = 0;
   bool session_recorded = false;
-  // Relaxed: one number, nothing else is published through it.
+  // Relaxed: a single number that publishes no other data.
   std::atomic<std::int64_t> session_start_ns{kSessionUnknown};
   std::atomic<HealthState> state{HealthState::kStarting};
   std::mutex health_mutex;
   std::condition_variable_any health_wanted;
   bool health_now = false;
-  std::atomic<std::uint64_t> polls{0};  ///< Rounds of the main thread.
+  std::atomic<std::uint64_t> polls{0};  ///< Cycles of the main thread.
   std::atomic<bool> stepping{false};
   std::mutex end_mutex;
   std::atomic<bool> ended{false};
@@ -343,7 +343,7 @@ void LogCheckpoint(const runtime::CheckpointFile& checkpoint, bool restored) {
   if (restored) {
     Log(LogLevel::kInfo, "goes on from its checkpoint");
   } else if (checkpoint.Latest()) {
-    Log(LogLevel::kWarning, "its checkpoint holds what this node cannot have written: begins anew");
+    Log(LogLevel::kWarning, "its checkpoint contains values that this node cannot have written: begins anew");
   }
 }
 

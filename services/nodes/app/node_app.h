@@ -1,4 +1,4 @@
-// What every node's main shares: options, scene, bus, session clock, health, exit codes. A main is then options →
+// Common parts of every node's main: options, scene, bus, session clock, health, exit codes. A main is then options →
 // node object → Run → finish, in under 60 lines:
 //
 //   int main(int argc, char** argv) {
@@ -36,31 +36,31 @@ namespace fulcrum::app {
 /// The common command line: --scene FILE (compiled), --session DIR, --domain N, --cart FILE, --help, --version.
 struct NodeOptions {
   std::filesystem::path scene;
-  std::filesystem::path session;  ///< Logs, checkpoints and pictures go here.
+  std::filesystem::path session;  ///< Folder for logs, checkpoints and pictures.
   std::filesystem::path cart;     ///< Effective cart configuration; may be empty.
   int domain = 7;
-  std::vector<std::string> extra;  ///< What is left: options the node itself understands, for example --window.
+  std::vector<std::string> extra;  ///< Remaining options, which the node itself interprets, for example --window.
 
-  /// Removes a flag such as "--window" from `extra`; true when it was there.
+  /// Removes a flag such as "--window" from `extra`; true if it was there.
   [[nodiscard]] bool TakeFlag(std::string_view flag);
-  /// Removes "NAME VALUE" or "NAME=VALUE" from `extra`; `missing` when it was not there. Throws InputError without a
-  /// value.
+  /// Removes "NAME VALUE" or "NAME=VALUE" from `extra` and returns the value; returns `missing` if the name is not
+  /// there. Throws InputError if the value is missing.
   [[nodiscard]] std::string TakeValue(std::string_view name, std::string_view missing);
 };
 
-/// What a command line asks for.
+/// Result of reading a command line.
 struct ParsedOptions {
   NodeOptions options;
-  std::string answer;  ///< Not empty: print this (help or version) and end well.
+  std::string answer;  ///< Not empty: the program prints this (help or version) and exits with code 0.
 };
-/// Throws InputError that names the option when it is unusable. Options that are not common are left in `extra`.
+/// Reads the command line. Throws InputError naming an unusable option. Options that are not common remain in `extra`.
 [[nodiscard]] ParsedOptions ParseNodeOptions(int argc, const char* const* argv, NodeId node, const char* description);
 
-/// Everything a node needs around its own object.
+/// Resources of a node beside its own object.
 class NodeApp {
  public:
-  /// Opens the scene. The bus is joined when the first port is made. Throws InputError (exit 2) or MismatchError
-  /// (exit 3), both do.
+  /// Opens the scene. The bus is joined when the first port is made. Both throw InputError (exit 2) or MismatchError
+  /// (exit 3).
   NodeApp(NodeId node, const NodeOptions& options);
   ~NodeApp();
   NodeApp(const NodeApp&) = delete;
@@ -68,14 +68,14 @@ class NodeApp {
 
   [[nodiscard]] const SceneView& scene() const;
   [[nodiscard]] NodeOptions& options();
-  /// The cart file, or the simulated cart when none was given.
+  /// The configuration of the cart file, or the simulated cart if no file was given.
   [[nodiscard]] const config::CartConfig& cart() const;
   /// Name, rate, priority and CPU of this node's thread, from the cart.
   [[nodiscard]] runtime::CyclicThreadSettings timing() const;
   [[nodiscard]] bus::DdsParticipant& bus();
 
-  /// Ports owned by the app: they live as long as it does and their statistics go into Health. Make them all before
-  /// Run().
+  /// Makes ports that the app owns: they exist as long as the app, and their statistics are part of Health. Make all
+  /// ports before Run().
   template <class T>
   [[nodiscard]] bus::Input<T>& MakeInput() {
     auto port = bus().MakeInput<T>();
@@ -92,31 +92,31 @@ class NodeApp {
     Keep(std::shared_ptr<void>(std::move(port)));
     return output;
   }
-  /// For ports made elsewhere. The functions are called on the health thread.
+  /// Adds a port made elsewhere to Health. The functions are called on the health thread.
   void Watch(TopicId topic, std::function<bus::InputStats()> stats);
   void Watch(std::function<bus::OutputStats()> stats);
 
-  /// Session time of a monotonic stamp, from SceneManifest; negative until the session is known. Real-time safe.
+  /// Session time of a monotonic stamp, from SceneManifest [s]; negative until the session is known. Real-time safe.
   [[nodiscard]] double SessionTime(std::int64_t stamp_ns) const noexcept;
 
-  /// What the node does on a Command with this verb, beside "stop" and "restart": gets the argument and returns the
-  /// reply's text; an exception refuses. Called on the thread of Run(). Before Run().
+  /// Sets the handler of a Command with this verb, in addition to "stop" and "restart": it receives the argument and
+  /// returns the text of the reply; an exception refuses the command. Called on the thread of Run(). Set before Run().
   void OnCommand(std::string verb, std::function<std::string(const std::string&)> handler);
 
-  /// What goes into Health beside rates and timing: metrics, state, last_error. Called at 10 Hz on the health thread,
-  /// so it must be thread-safe.
+  /// Fills in the part of Health other than rates and timing: metrics, state, last_error. Called at 10 Hz on the health
+  /// thread, so it must be thread-safe.
   using HealthFill = std::function<void(Health*)>;
   /// Waits for the session, then runs `step` at the given rate on a thread of its own until a stop signal, a Command
-  /// "stop", a schema or scene mismatch, or Finish(). Publishes Health at 10 Hz from the first moment. `step` sees
-  /// session_time_s filled in and is never called before the session is known. Call once.
+  /// "stop", a schema or scene mismatch, or Finish(). Publishes Health at 10 Hz from the start. `step` receives a tick
+  /// with session_time_s and is never called before the session is known. Call once.
   ExitCode Run(const runtime::CyclicThreadSettings& settings, const std::function<void(const Tick&)>& step,
                const HealthFill& fill_health);
 
-  /// Health goes out now instead of at its next turn: something that others wait for has happened. Any thread but a
-  /// real-time one.
+  /// Publishes Health at once instead of after its period, because an event has occurred for which other processes
+  /// wait. Any thread except a real-time one.
   void PublishHealthNow();
 
-  /// Ends Run() with this code, for example kDeviceLost; `reason` is logged. Any thread but a real-time one.
+  /// Ends Run() with this code, for example kDeviceLost; `reason` is logged. Any thread except a real-time one.
   void Finish(ExitCode code, std::string_view reason);
 
  private:
@@ -126,10 +126,10 @@ class NodeApp {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Tells the log what a node found in its checkpoint. @param restored it goes on from there.
+/// Logs the state of a node's checkpoint. @param restored the node continues from it.
 void LogCheckpoint(const runtime::CheckpointFile& checkpoint, bool restored);
 
-/// main() of a node: parses options, turns exceptions into one clear line and the right exit code. Options left in
+/// main() of a node: parses options, and converts exceptions into one log line and the exit code. Options left in
 /// `extra` after `run` has taken its own are refused before Run() starts.
 int NodeMain(int argc, char** argv, NodeId node, const char* description, const std::function<ExitCode(NodeApp&)>& run);
 

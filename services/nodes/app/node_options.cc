@@ -42,7 +42,7 @@ ParsedOptions ParseNodeOptions(int argc, const char* const* argv, NodeId node, c
   ParsedOptions parsed;
   try {
     po::variables_map values;
-    // No guessing: "--dom" must not be taken for "--domain".
+    // Abbreviations are off: "--dom" must not be accepted as "--domain".
     const auto style = po::command_line_style::default_style & ~po::command_line_style::allow_guessing;
     const auto line = po::command_line_parser(argc, argv).options(known).style(style).allow_unregistered().run();
     po::store(line, values);

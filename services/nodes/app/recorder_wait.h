@@ -12,7 +12,7 @@ namespace fulcrum::app {
 /// Waits until the recorder reports that it reads all writers of this process.
 class RecorderWait {
  public:
-  /// All outputs of the process have been made.
+  /// To be constructed after all outputs of the process have been made.
   explicit RecorderWait(bus::DdsParticipant* participant)
       : participant_(participant),
         metric_(bus::kReadsMetric + participant->address()),

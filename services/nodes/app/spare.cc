@@ -11,7 +11,7 @@
 namespace fulcrum::app {
 namespace {
 
-constexpr int kLook_ms = 200;  // A stop signal that comes right before poll() does not end it.
+constexpr int kLook_ms = 200;  // A stop signal just before poll() does not interrupt it, so poll() has this timeout.
 
 void SetProcessName(const std::string& name) { ::prctl(PR_SET_NAME, name.c_str()); }
 
