@@ -26,7 +26,8 @@ struct RawSample {
   std::span<const std::byte> head, body;
 };
 
-/// Metric of the recorder's Health, with the address of a participant behind it: how many of its writers are matched.
+/// Prefix of a metric in the recorder's Health, followed by the address of a participant: number of its matched
+/// writers.
 inline constexpr const char* kReadsMetric = "reads_";
 
 /// The process behind a writer.

@@ -1,4 +1,4 @@
-// Whose writers the raw inputs of a participant are matched with. Internal to services/transport/bus/dds.
+// The participants whose writers are matched with the raw inputs of this one. Internal to services/transport/bus/dds.
 #pragma once
 
 #include <fastdds/rtps/common/Guid.h>
@@ -18,7 +18,7 @@ class Sources {
     std::int64_t since_ns = 0;  ///< CLOCK_MONOTONIC of the first match.
   };
 
-  /// A writer of that participant was matched (1), or is no longer (-1).
+  /// Counts a writer of that participant that was matched (1) or removed (-1).
   void Count(const Prefix& prefix, int change) {
     const std::lock_guard lock(mutex_);
     Match& match = matches_[prefix];
