@@ -3,7 +3,7 @@
 //
 // Conventions: SI units; world frame W right-handed, z up, metres; a tool frame T has its origin at the tip and +z
 // along the shaft from the handle towards the tip; quaternions are unit, (w, x, y, z) in IDL. Each field is described
-// again, with rate, QoS and owner, in idl/README.md.
+// again in its IDL file; rate, QoS and owner are in idl/README.md.
 #pragma once
 
 #include <array>
