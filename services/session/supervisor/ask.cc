@@ -34,8 +34,8 @@ CommandReply AskSupervisor(int domain, const std::string& verb, const std::strin
   auto next = begin + kDiscovery;
   std::uint64_t sent = 0;
   while (Clock::now() - begin < kPatience && !runtime::ShouldStop()) {
-    // Commands are not kept for late joiners: the answer's way and the command's way must both stand first. Whose ways
-    // stand cannot be seen, and on a busy machine those to the nodes may be first: asked again, as the same request.
+    // Late joiners get no commands, so command and reply topic must both be matched before the command is sent. The
+    // match may be with a node instead of the supervisor: the command is repeated with the same request id.
     if (commands->has_readers() && replies->stats().matched && Clock::now() > next) {
       command.stamp = {++sent, static_cast<std::uint64_t>(epoch), runtime::MonotonicNs()};
       commands->Write(command);
@@ -52,7 +52,8 @@ CommandReply AskSupervisor(int domain, const std::string& verb, const std::strin
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  throw std::runtime_error("the supervisor of domain " + std::to_string(domain) + " did not answer");
+  throw std::runtime_error("the supervisor of domain " + std::to_string(domain) +
+                           " sent no reply within 10 s; see fulcrum status");
 }
 
 }  // namespace fulcrum::supervisor

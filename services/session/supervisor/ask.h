@@ -1,4 +1,4 @@
-// Asking the supervisor of a running session.
+// A client's command to the supervisor of a running session.
 #pragma once
 
 #include <string>
@@ -7,8 +7,8 @@
 
 namespace fulcrum::supervisor {
 
-/// Sends a command to the supervisor of the domain and waits for its answer, at most 10 s. Throws InputError when none
-/// runs there, MismatchError when it speaks another schema.
+/// Sends a command to the supervisor of the domain and returns its reply. Throws InputError when no supervisor runs
+/// there, MismatchError when its schema differs, std::runtime_error when no reply arrives within 10 s.
 [[nodiscard]] CommandReply AskSupervisor(int domain, const std::string& verb, const std::string& argument);
 
 }  // namespace fulcrum::supervisor

@@ -14,9 +14,9 @@
 namespace fulcrum::supervisor {
 namespace {
 
-// Longer than a node takes to start; whoever starts it has then given up.
+// Longer than a node takes to start: systemd has stopped restarting it by then.
 constexpr std::int64_t kLongestAbsence = 60 * kSecond_ns;
-// The Health of one that ends in good order may come after its end is seen.
+// The last Health of a node that ends in good order may arrive after its process has ended.
 constexpr std::int64_t kLastWords = kSecond_ns / 4;
 
 }  // namespace
@@ -57,7 +57,7 @@ AttachedNode::AttachedNode(NodeCommand command, const std::filesystem::path& fol
 std::string AttachedNode::ArgumentsFile(const std::vector<std::string>& arguments) {
   std::string words;
   for (const std::string& argument : arguments) {
-    // Of these a unit's command line would make something else.
+    // systemd would split or substitute these characters in the command line of the unit.
     if (argument.empty() || argument.find_first_of("\"'\\$` \t\r\n") != std::string::npos) {
       throw InputError("\"" + argument +
                        "\" cannot be passed to a service: spaces, quotes, $ and \\ are not possible in the places of "
@@ -69,7 +69,7 @@ std::string AttachedNode::ArgumentsFile(const std::vector<std::string>& argument
 }
 
 void AttachedNode::Start(std::int64_t now_ns) {
-  std::error_code ignored;  // WriteFile tells.
+  std::error_code ignored;  // Without the folder, WriteFile throws.
   std::filesystem::create_directories(file_.parent_path(), ignored);
   WriteFile(file_, ArgumentsFile(command_.arguments));
   missing_since_ns_ = now_ns;
@@ -83,13 +83,14 @@ std::optional<SupervisedNode::Death> AttachedNode::Update(std::int64_t now_ns) {
     if (!ending_ && !replaced_ && now_ns - ended_ns_ < kLastWords) return std::nullopt;
     process_.Forget();
     missing_since_ns_ = now_ns;
-    // One that ended in good order is reported once it is back: when the whole cart is stopped it does not come back.
+    // An end in good order is reported as a restart only after the node has rejoined: when systemd stops the whole
+    // cart, the node does not start again.
     asked_ = ending_;
     if (!asked_) return Death{"has died", false, {}, false, ended_ns_};
   }
   if (!running() && now_ns - missing_since_ns_ > kLongestAbsence) {
     failed_ = true;
-    return Death{has_reported_ ? "did not come back" : "was not started", true, {}, false, 0};
+    return Death{has_reported_ ? "was not restarted within 60 s" : "was not started within 60 s", true, {}, false, 0};
   }
   return std::nullopt;
 }
@@ -97,7 +98,7 @@ std::optional<SupervisedNode::Death> AttachedNode::Update(std::int64_t now_ns) {
 bool AttachedNode::OnHealth(const Health& health, std::int64_t /*now_ns*/) {
   if (health.node != id()) return false;
   if (!running()) {
-    // A late sample of a dead process finds none to watch.
+    // A late sample may name a process that no longer exists.
     if (!process_.Watch(health.pid)) return false;
     back_ = std::exchange(asked_, false);
     if (!back_) ended_ns_ = 0;
@@ -121,7 +122,7 @@ void AttachedNode::Swap(NodeCommand /*command*/, std::int64_t /*now_ns*/) {
 
 void AttachedNode::Stop() {
   std::error_code ignored;
-  std::filesystem::remove(file_, ignored);  // So that nobody starts it again.
+  std::filesystem::remove(file_, ignored);  // Without this file systemd does not start the node again.
   if (running()) order_(id(), "stop");
 }
 
@@ -129,7 +130,7 @@ bool AttachedNode::HasEnded() { return !running() || process_.HasEnded(); }
 
 const char* AttachedNode::GiveUp() {
   process_.Forget();
-  return "was left to whoever started it";
+  return "was left running for systemd to stop";
 }
 
 std::string AttachedNode::log() const { return std::string("journalctl -t ") + NodeName(id()); }

@@ -1,5 +1,5 @@
-// A node that somebody else starts and restarts (systemd): `fulcrum up --attach`. The supervisor gives it a file with
-// its arguments, knows it by its Health, and notices its death; it neither forks nor kills.
+// A node that systemd starts and restarts: `fulcrum up --attach`. The supervisor writes a file with the node's
+// arguments, identifies its process by the pid in its Health, and detects its death; it neither forks nor kills.
 #pragma once
 
 #include <functional>
@@ -8,7 +8,7 @@
 
 namespace fulcrum::supervisor {
 
-/// A process that is not our child, watched until it ends (pidfd).
+/// A process that is not a child of the supervisor, watched through a pidfd until it ends.
 class WatchedProcess {
  public:
   WatchedProcess() = default;
@@ -16,11 +16,11 @@ class WatchedProcess {
   WatchedProcess(WatchedProcess&& other) noexcept;
   WatchedProcess& operator=(WatchedProcess&& other) noexcept;
 
-  /// False when there is no such process.
+  /// Starts to watch `pid`; false when there is no such process.
   [[nodiscard]] bool Watch(pid_t pid);
   [[nodiscard]] bool HasEnded() const;
   void Forget();
-  [[nodiscard]] pid_t pid() const { return pid_; }  ///< 0: none.
+  [[nodiscard]] pid_t pid() const { return pid_; }  ///< 0: no process is watched.
 
  private:
   pid_t pid_ = 0;
@@ -31,12 +31,13 @@ class AttachedNode final : public SupervisedNode {
  public:
   /// Sends a Command with this verb to a node.
   using Order = std::function<void(NodeId, const char* verb)>;
-  /// `folder`: the file of arguments is written here, under the node's name.
+  /// @param folder where the file of arguments is written, under the node's name.
   AttachedNode(NodeCommand command, const std::filesystem::path& folder, Order order);
 
-  /// The folder of the files, in the session's.
+  /// Name of the folder of these files in the session folder.
   static constexpr const char* kFolder = "nodes";
-  /// What a unit of systemd reads: `FULCRUM_ARGUMENTS="…"`. Throws InputError for what no unit could pass on.
+  /// Environment file of a systemd unit: `FULCRUM_ARGUMENTS="…"`. Throws InputError when an argument is empty or
+  /// contains a space, a quote, $, ` or \: a unit cannot pass these.
   [[nodiscard]] static std::string ArgumentsFile(const std::vector<std::string>& arguments);
 
   void Start(std::int64_t now_ns) override;
@@ -61,13 +62,13 @@ class AttachedNode final : public SupervisedNode {
   std::filesystem::path file_;
   Order order_;
   WatchedProcess process_;
-  std::int64_t missing_since_ns_ = 0;  ///< While no process is known.
-  std::int64_t ended_ns_ = 0;          ///< When the last one was seen to have ended.
-  bool replaced_ = false;              ///< Another one has reported since.
+  std::int64_t missing_since_ns_ = 0;  ///< Since when no process is known; valid while there is none.
+  std::int64_t ended_ns_ = 0;          ///< When the end of the last process was detected.
+  bool replaced_ = false;              ///< Another process has sent Health since that end.
   bool has_reported_ = false;
-  bool ending_ = false;  ///< Its last Health said so: it was asked to.
-  bool asked_ = false;   ///< Ended as it was asked to, and not back yet.
-  bool back_ = false;    ///< Came back from that; not told yet.
+  bool ending_ = false;  ///< Its last Health had the state "stopping": it ends on command.
+  bool asked_ = false;   ///< It has ended on command and has not rejoined.
+  bool back_ = false;    ///< It has rejoined after that, which Update has not reported yet.
   bool failed_ = false;
 };
 

@@ -32,19 +32,20 @@ const char* Meaning(int exit_code) {
   return "failure";
 }
 
-/// In the child, between fork and exec: other threads of the parent may have held any lock, so only
-/// async-signal-safe calls. Returns only when something failed, with errno set.
+/// Runs in the child between fork and exec, where other threads of the parent may have held any lock: only
+/// async-signal-safe calls are allowed. Returns only on failure, with errno set.
 void Become(const char* program, char* const* arguments, const ChildStreams& streams, WithParent with_parent,
             pid_t parent) {
   if (with_parent == WithParent::kDies) {
-    // SIGKILL, since a node that hangs must not outlive its supervisor either; checkpoints make it harmless.
+    // SIGKILL, because a hanging node must not outlive the supervisor either; checkpoints make the kill harmless.
     if (::prctl(PR_SET_PDEATHSIG, SIGKILL) != 0) return;
     if (::getppid() != parent) ::_exit(1);  // The parent died before prctl took effect.
   }
   sigset_t none;
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
-  // A group of its own: Ctrl-C on the terminal reaches the supervisor alone, which ends its children in good order.
+  // With a process group per child, Ctrl-C on the terminal reaches the supervisor alone, which then stops its children
+  // in good order.
   if (::setpgid(0, 0) != 0) return;
   const int input = streams.input >= 0 ? streams.input : ::open("/dev/null", O_RDONLY | O_CLOEXEC);
   if (input < 0 || ::dup2(input, STDIN_FILENO) < 0) return;
@@ -126,7 +127,7 @@ ChildProcess ChildProcess::StartOn(const std::filesystem::path& program, const s
   }
   ::close(report[0]);
   if (error != 0) {
-    process.with_parent_ = WithParent::kDies;  // It never became what might stay.
+    process.with_parent_ = WithParent::kDies;  // A program that did not start must not stay.
     fail(error);
   }
   return process;

@@ -10,18 +10,18 @@
 
 namespace fulcrum::supervisor {
 
-/// What a child has for a terminal.
+/// File descriptors of a child's standard streams.
 struct ChildStreams {
-  int input = -1;  ///< -1: nothing to read.
+  int input = -1;  ///< -1: empty input.
   int output = -1;
 };
 
-/// What becomes of a child whose parent ends, however that ends.
+/// Whether a child ends with its parent, also when the parent is killed.
 enum class WithParent { kDies, kStays };
 
 /// How a child ended.
 struct ProcessEnd {
-  int exit_code = 0;  ///< When signal is 0.
+  int exit_code = 0;  ///< Valid when signal is 0.
   int signal = 0;
   /// "killed by signal 9 (Killed)" or "ended with exit code 3 (scene or schema mismatch)".
   [[nodiscard]] std::string Describe() const;
@@ -47,7 +47,7 @@ class ChildProcess {
 
   [[nodiscard]] bool running() const { return pid_ > 0; }
   [[nodiscard]] pid_t pid() const { return pid_; }
-  /// How the child ended, once; nothing while it runs.
+  /// Reaps the child and returns how it ended, once; nullopt while it runs and after that.
   [[nodiscard]] std::optional<ProcessEnd> Poll();
   void Signal(int signal) const;
 

@@ -34,7 +34,7 @@ fs::path FindProgram(const std::string& name) {
   return {};
 }
 
-/// How long each picture stands, as ffmpeg's concat demuxer reads it.
+/// List of the pictures with the time for which each is shown, in the format of ffmpeg's concat demuxer.
 void WriteList(const std::vector<Frame>& frames, const fs::path& file) {
   std::ofstream list(file);
   list << "ffconcat version 1.0\n";

@@ -5,9 +5,9 @@
 
 namespace fulcrum::supervisor {
 
-/// Writes the pictures in `frames` to `clip` (MP4, in the session's own time) by the program `ffmpeg`, whose output
-/// goes to `log`. False when that is not installed or fails, takes longer than a minute, or when there are no two
-/// pictures: then there is no clip, and nothing else is lost.
+/// Encodes the pictures in `frames` as `clip` (MP4, at the speed of the session) with the program `ffmpeg`, whose
+/// output goes to `log`. False, and no clip, when `ffmpeg` is not installed, fails or takes longer than a minute, or
+/// when there are fewer than two pictures.
 [[nodiscard]] bool MakeClip(const std::filesystem::path& frames, const std::filesystem::path& clip,
                             const std::filesystem::path& log);
 

@@ -8,7 +8,7 @@
 namespace fulcrum::supervisor {
 namespace {
 
-// Replies that may still be asked for again: more than there are operators and tools on one cart (assumed).
+// Replies kept for repeated requests: more than there are operators and client programs on one cart (assumed).
 constexpr std::size_t kAnswersKept = 8;
 
 }  // namespace
@@ -54,7 +54,7 @@ CommandAnswer CommandDesk::Execute(const Command& command, std::int64_t now_ns) 
     if (verb.name == command.verb) return verb.handle(command.argument, now_ns);
     known += (known.empty() ? "" : ", ") + verb.name;
   }
-  return {false, "unknown verb \"" + command.verb + "\"; the supervisor knows: " + known};
+  return {false, "unknown verb \"" + command.verb + "\"; valid: " + known};
 }
 
 }  // namespace fulcrum::supervisor

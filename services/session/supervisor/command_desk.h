@@ -1,4 +1,5 @@
-// Commands to the supervisor: takes them from the bus, calls the handler of their verb, publishes the reply.
+// Execution of commands to the supervisor: reads them from the bus, calls the handler of their verb, publishes the
+// reply.
 //
 //   CommandDesk desk(std::move(commands), std::move(replies), {{"down", [&](auto&, auto) { return End(); }}});
 //   desk.Serve(MonotonicNs());  // Each turn of the loop.

@@ -10,7 +10,7 @@
 namespace fulcrum::supervisor {
 namespace {
 
-/// About two minutes of the built-in scene, which are read within some ten seconds.
+/// Largest recording that is read: about two minutes of the built-in scene, which takes some ten seconds.
 constexpr std::uintmax_t kLongest_B = 3'000'000'000;
 
 }  // namespace

@@ -7,8 +7,9 @@
 
 namespace fulcrum::supervisor {
 
-/// Writes cut.png and cut.json into `folder` and returns the picture. Empty, without a word: no recording that can be
-/// read, one so long that reading it would hold the report up, no hook, or nothing was cut.
+/// Writes cut.png and cut.json into `folder` and returns the path of the picture. Returns an empty path, without an
+/// error, when the recording cannot be read or is so long that reading would delay the report, when the scene has no
+/// hook, or when nothing was cut.
 [[nodiscard]] std::filesystem::path WriteCutMap(const std::filesystem::path& recording, const SceneView& scene,
                                                 const std::filesystem::path& folder);
 

@@ -14,17 +14,17 @@
 namespace fulcrum::supervisor {
 namespace {
 
-/// The domain's name as an address, and how long that is.
+/// Fills in the address of the domain's abstract socket and returns its length [bytes].
 socklen_t AddressOf(int domain, sockaddr_un* address) {
   const std::string name = "fulcrum-" + std::to_string(::getuid()) + "-" + std::to_string(domain);
   address->sun_family = AF_UNIX;
-  std::memcpy(address->sun_path + 1, name.data(), name.size());  // A leading zero byte: abstract.
+  std::memcpy(address->sun_path + 1, name.data(), name.size());  // The leading zero byte makes the name abstract.
   return static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
 }
 
 using Call = int (*)(int, const sockaddr*, socklen_t);
 
-/// Socket on which `call` with the domain's name went well, or -1 with errno set.
+/// Socket on which `call` with the address of the domain succeeded, or -1 with errno set.
 int SocketWith(Call call, int domain) {
   sockaddr_un address{};
   const socklen_t length = AddressOf(domain, &address);
@@ -53,7 +53,7 @@ DomainGuard::DomainGuard(int domain) : socket_(SocketWith(::bind, domain)) {
 DomainGuard::~DomainGuard() { ::close(socket_); }
 
 bool DomainGuard::IsHeld(int domain) {
-  // Connecting, not binding: who asks must not hold the name meanwhile, or a session that starts just then is refused.
+  // connect() instead of bind(): a query that held the name, however briefly, would block a session that starts then.
   const int fd = SocketWith(::connect, domain);
   if (fd >= 0) {
     ::close(fd);

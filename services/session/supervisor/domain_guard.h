@@ -3,8 +3,7 @@
 
 namespace fulcrum::supervisor {
 
-/// Holds a name in the abstract socket namespace: the kernel gives it back however the process ends, and nothing is
-/// left on a disk.
+/// Holds a name in the abstract socket namespace. The kernel releases it however the process ends, and no file remains.
 class DomainGuard {
  public:
   /// Throws InputError when another supervisor holds the domain.

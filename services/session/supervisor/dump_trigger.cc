@@ -14,7 +14,8 @@ void DumpTrigger::OnFault(const std::string& reason, std::int64_t now_ns) {
 }
 
 CommandAnswer DumpTrigger::OnCommand(const std::string& reason, std::int64_t now_ns) {
-  if (keep_s_ <= 0) return {false, "this session keeps no past: start it with fulcrum up --keep-last"};
+  if (keep_s_ <= 0)
+    return {false, "this session keeps no data for dumps; start it with fulcrum up --keep-last SECONDS"};
   next_ns_ = 0;
   OnFault(reason, now_ns);
   return {true, "writing the last seconds into " + folder_.string()};

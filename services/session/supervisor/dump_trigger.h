@@ -13,11 +13,11 @@ namespace fulcrum::supervisor {
 class DumpTrigger {
  public:
   /// @param keep_s time that a dump covers [s]; 0: the recorder keeps nothing, and no dump is written.
-  /// @param folder of the session, for the answer to a command.
+  /// @param folder of the session; the reply to a command names it.
   /// @param orders must outlive this.
   DumpTrigger(double keep_s, std::filesystem::path folder, NodeOrders* orders);
 
-  /// After a fault, unless a dump was asked for that shows it: at most one in the time that a dump covers.
+  /// Requests a dump after a fault, at most one in the time that a dump covers: an earlier dump contains the fault.
   void OnFault(const std::string& reason, std::int64_t now_ns);
   CommandAnswer OnCommand(const std::string& reason, std::int64_t now_ns);
 

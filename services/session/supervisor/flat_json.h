@@ -10,7 +10,7 @@ class FlatJson {
   void Add(const std::string& key, const std::string& value);
   void Add(const std::string& key, const char* value);
   void Add(const std::string& key, bool value);
-  /// What is not finite becomes null.
+  /// A value that is not finite is written as null.
   void Add(const std::string& key, double value);
   [[nodiscard]] std::string text() const { return "{" + body_ + "\n}\n"; }
 

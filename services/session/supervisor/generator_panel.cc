@@ -37,7 +37,7 @@ GeneratorPanel::GeneratorPanel(const config::GeneratorConfig& start, std::span<c
   Follow(-1);
 }
 
-/// Of each mode the power of the use that lasts at that time, or of the next one, or of the last one there was.
+/// Power of each mode at a session time: that of the current use of its pedal, else of the next use, else of the last.
 GeneratorPanel::Powers GeneratorPanel::Scripted(double session_time_s) const {
   Powers powers = scripted_;
   for (std::size_t knob = 0; knob < kKnobs.size(); ++knob) {

@@ -1,5 +1,5 @@
-// The panel of the electrosurgical generator: the power of each mode. The last change of a knob counts, whether it
-// comes from a command or from the script.
+// The panel of the electrosurgical generator: the set power of each mode. The latest change of a knob is valid, whether
+// a command or the script made it.
 #pragma once
 
 #include <array>
@@ -20,27 +20,28 @@ class GeneratorPanel {
   /// sets nothing.
   GeneratorPanel(const config::GeneratorConfig& start, std::span<const ScriptKey> script);
 
-  /// Sets what the script says at a session time; times must not go back. A knob that the script does not change keeps
-  /// what a command has set. False: no knob has changed.
+  /// Applies the script's changes up to a session time; times must not decrease. A knob that the script does not change
+  /// keeps the value that a command has set. Returns false when no knob has changed.
   bool Follow(double session_time_s);
-  /// Session time of the key at which Follow changed a knob; negative: before all of them.
+  /// Session time [s] of the script key at which Follow last changed a knob; negative: Follow has changed none.
   [[nodiscard]] double turned_s() const { return turned_s_; }
 
-  /// Turns knobs by words such as "cut=40 coag=25" [W]; no words: none. Throws InputError, and nothing is turned.
+  /// Sets knobs from words such as "cut=40 coag=25" [W]; no words change nothing. Throws InputError on an invalid word
+  /// and then changes no knob.
   void Turn(const std::string& words);
 
-  /// Without a stamp.
+  /// The present setting, without a stamp.
   [[nodiscard]] const GeneratorSetting& setting() const { return setting_; }
   /// "cut 40 W, coag 25 W, blend 35 W".
   [[nodiscard]] std::string Text() const;
 
  private:
-  using Powers = std::array<float, 3>;  ///< By kKnobs.
+  using Powers = std::array<float, 3>;  ///< [W], in the order of kKnobs.
   [[nodiscard]] Powers Scripted(double session_time_s) const;
 
   std::span<const ScriptKey> script_;
   GeneratorSetting setting_;
-  Powers scripted_{};  ///< Where the script has the knobs.
+  Powers scripted_{};  ///< Values of the knobs by the script.
   double turned_s_ = -1;
 };
 

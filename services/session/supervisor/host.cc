@@ -50,7 +50,7 @@ class Host {
     if (const std::string mismatch = link_.mismatch(); !mismatch.empty()) throw MismatchError(mismatch);
   }
 
-  /// False: stopped.
+  /// Returns false when a stop signal arrived.
   bool WaitForSession() {
     while (!runtime::ShouldStop()) {
       Check();
@@ -59,8 +59,8 @@ class Host {
         session_ = session;
         const std::uint32_t refused = session.offer.nodes & ~settings_.allowed;
         if (refused != 0) {
-          throw InputError("the cart wants " + link::NamesOfNodes(refused) + " here; this host runs " +
-                           link::NamesOfNodes(settings_.allowed) + " only: see --nodes");
+          throw InputError("the cart requests the nodes " + link::NamesOfNodes(refused) + "; this host allows only " +
+                           link::NamesOfNodes(settings_.allowed) + ": see --nodes");
         }
         return true;
       }
@@ -93,7 +93,7 @@ class Host {
     const std::filesystem::path file = link::CachedScene(settings_.cache, offer.scene_hash);
     config::CartConfig cart = config::LoadCartText(offer.cart_yaml, "the cart of " + settings_.far.peer);
     cart.domain = settings_.domain;
-    cart.security.keys = settings_.far.keys;  // Where they lie is each host's own affair.
+    cart.security.keys = settings_.far.keys;  // Each host has its own folder of keys.
     scene_.emplace(file);
     folder_ = MakeSessionFolder(settings_.out, file, *scene_, cart,
                                 "  session: " + offer.session_id + "\n  peer: " + settings_.far.peer +
@@ -120,7 +120,7 @@ class Host {
                   std::to_string(settings_.domain) + ", logs in " + folder_.logs.string());
   }
 
-  /// The cart said so, or begins another session. A cable that is out is no end.
+  /// True when the cart has ended the session or offers another one. A broken connection does not end the session.
   bool IsOver() {
     const link::Link::Session now = link_.session();
     return now.over || now.number != session_.number;

@@ -1,4 +1,5 @@
-// Nodes of a cart on a machine of their own: the cart's session says which, this host starts, watches and ends them.
+// The nodes of a cart that run on a second machine: the cart's session names them, this host starts, watches and ends
+// them.
 #pragma once
 
 #include <cstdint>
@@ -12,17 +13,18 @@ namespace fulcrum::supervisor {
 
 struct HostSettings {
   bus::FarSettings far;
-  int domain = 7;                  ///< Of this host's own bus.
-  std::uint32_t allowed = ~0u;     ///< Bit per NodeId: what a cart may have run here.
-  std::filesystem::path out;       ///< The session folder is made in here.
+  int domain = 7;                  ///< Domain of this host's own bus.
+  std::uint32_t allowed = ~0u;     ///< Nodes that a cart may start here, one bit per NodeId.
+  std::filesystem::path out;       ///< Folder in which the session folder is made.
   std::filesystem::path programs;  ///< Folder of the node programs.
-  std::filesystem::path cache;     ///< Scenes are kept here by their hash.
-  std::string quality = "auto";    ///< Of the picture.
+  std::filesystem::path cache;     ///< Folder of received scenes, named by their hash.
+  std::string quality = "auto";    ///< Quality of the picture: auto, low, high.
   bool window = false;
 };
 
-/// Waits for a session of the cart, gets its scene, runs its nodes until the session is over or a stop signal comes.
-/// Call from the main thread: children die with it. Throws InputError or MismatchError.
+/// Waits for a session of the cart, receives its scene, and runs its nodes until the session ends or a stop signal
+/// arrives. Call from the main thread: the children are killed when the calling thread ends. Throws InputError or
+/// MismatchError.
 ExitCode RunHost(const HostSettings& settings);
 
 }  // namespace fulcrum::supervisor

@@ -16,17 +16,17 @@
 namespace fulcrum::supervisor {
 namespace {
 
-// Health comes ten times a second from a thread of its own: a node that is silent this long hangs.
+// A separate thread of each node sends Health ten times a second: a node without Health for this long hangs.
 constexpr std::int64_t kLongestSilence = 5 * kSecond_ns;
-// Until the first Health a node maps the scene and builds its solver.
+// Longest time to the first Health, in which a node maps the scene and builds its solver.
 constexpr std::int64_t kLongestStart = 60 * kSecond_ns;
 constexpr std::int64_t kPatienceWithRestart = 3 * kSecond_ns;
 constexpr std::int64_t kLongestEnd = 4 * kSecond_ns;
-// When a node that has come back is no longer busy with it.
+// From the start of a node to the start of its spare: the spare must not compete with the node's own start.
 constexpr std::int64_t kBeforeSpare = kSecond_ns;
 constexpr auto kLook = std::chrono::milliseconds(5);
 
-/// Starting again with the same arguments would end the same way.
+/// True when another start with the same arguments would end the same way.
 bool IsFinal(const ProcessEnd& end) {
   const auto code = static_cast<ExitCode>(end.exit_code);
   return end.signal == 0 &&
@@ -63,7 +63,7 @@ void NodeProcess::KeepSpare(std::int64_t now_ns) {
   try {
     spare_ = std::make_unique<SpareProcess>(command_);
   } catch (const InputError&) {
-    command_.has_spare = false;  // The node can do without.
+    command_.has_spare = false;  // A spare only shortens a restart.
   }
 }
 
@@ -91,7 +91,7 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
     KeepSpare(now_ns);
     return std::nullopt;
   }
-  Death death{silent_ ? "gave no sign of life and was killed" : end->Describe(), false, *end, false, 0};
+  Death death{silent_ ? "sent no Health for too long and was killed" : end->Describe(), false, *end, false, 0};
   if (next_) {
     before_ = std::exchange(command_, std::move(*next_));
     next_.reset();
@@ -116,7 +116,7 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
 }
 
 SupervisedNode::Death NodeProcess::GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns) {
-  Death death{why + ": the one before comes back", false, end, false, 0};
+  Death death{why + ": the previous program is started again", false, end, false, 0};
   command_ = std::move(*before_);
   before_.reset();
   due_ns_ = now_ns;
@@ -139,7 +139,7 @@ void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
 }
 
 void NodeProcess::AskRestart(std::int64_t now_ns) {
-  spare_.reset();  // Who asks may have built the program anew.
+  spare_.reset();  // The program may have been rebuilt since the spare was started.
   process_.Signal(SIGTERM);
   kill_ns_ = now_ns + kPatienceWithRestart;
 }

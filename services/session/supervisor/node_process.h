@@ -39,30 +39,30 @@ class NodeProcess final : public SupervisedNode {
 
  private:
   void WatchForSilence(std::int64_t now_ns);
-  /// Starts a spare when the node runs; one that ends is not started again before the node is.
+  /// Starts a spare once the node runs. A spare that ends is replaced only after the next start of the node.
   void KeepSpare(std::int64_t now_ns);
-  /// In the place of a replacement that was never heard of.
+  /// Starts the previous program again after its replacement ended without a Health.
   Death GiveBack(const std::string& why, const ProcessEnd& end, std::int64_t now_ns);
 
   NodeCommand command_;
-  std::optional<NodeCommand> next_, before_;  ///< Of a swap; `before_` until the new one has reported.
+  std::optional<NodeCommand> next_, before_;  ///< Of a swap. `before_` is kept until the new program sends Health.
   ChildProcess process_;
   std::unique_ptr<SpareProcess> spare_;
   RestartPolicy policy_;
   std::int64_t started_ns_ = 0;
   std::int64_t last_health_ns_ = 0;  ///< 0: none since the start.
-  std::int64_t due_ns_ = 0;          ///< When to start again; 0: not dead.
-  std::int64_t kill_ns_ = 0;         ///< When patience with an asked restart ends; 0: none asked.
-  bool silent_ = false;              ///< Killed for silence.
+  std::int64_t due_ns_ = 0;          ///< Time of the next start; 0: the process runs.
+  std::int64_t kill_ns_ = 0;         ///< Time of SIGKILL in a restart by command; 0: no such restart.
+  bool silent_ = false;              ///< Killed because its Health was missing.
   bool failed_ = false;
 };
 
-/// Ends all of them: asks, and gives up who has not ended 4 s later; `given_up` is told who, and what was done. `turn`
-/// is called while they end.
+/// Ends all nodes: calls Stop on each, and GiveUp on those that still run 4 s later. `given_up` is called with such a
+/// node and what was done to it; `turn` is called repeatedly while the nodes end.
 void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(std::int64_t now_ns)>& turn,
             const std::function<void(const SupervisedNode& node, const char* done)>& given_up);
 
-/// Last line of a log, for people; empty when there is none.
+/// Last line of a log, for messages; empty when there is none.
 [[nodiscard]] std::string LastLine(const std::filesystem::path& log);
 
 }  // namespace fulcrum::supervisor

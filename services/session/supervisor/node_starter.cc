@@ -24,7 +24,7 @@ NodeCommand NodeStarter::Usual(NodeId id) const {
     if (settings.window) {
       command.arguments.emplace_back("--window");
     }
-    command.has_spare = !settings.window;  // It would open a second one.
+    command.has_spare = !settings.window;  // A spare would open a second window.
   }
   if (id == NodeId::kRecorder) {
     if (settings.record) {
@@ -46,9 +46,10 @@ NodeCommand NodeStarter::InPair(const std::string& seat, bool follows) const {
 
 NodeCommand NodeStarter::Replacement(const NodeCommand& now, const std::vector<std::string>& words) const {
   if (words.empty() || ::access(words.front().c_str(), X_OK) != 0) {
-    throw InputError((words.empty() ? "no command" : words.front()) + ": cannot be run; nothing was changed");
+    throw InputError((words.empty() ? "no command" : words.front()) +
+                     ": is not an executable program; nothing was changed. Give its path to --with");
   }
-  // What is no node has arguments of its own, which no build of the node would understand.
+  // A program that is not a build of the node gets its own arguments only, not those added at a restart.
   NodeCommand command = now.foreign ? Usual(now.id) : now;
   command.program = words.front();
   command.foreign = words.size() > 1;

@@ -1,4 +1,4 @@
-// How the nodes of a session are started.
+// Command lines of the nodes of a session.
 #pragma once
 
 #include <filesystem>
@@ -14,13 +14,13 @@ namespace fulcrum::supervisor {
 struct NodeStarter {
   const UpSettings& settings;
   const SessionFolder& folder;
-  const std::filesystem::path& recording;  ///< Empty: nothing is recorded.
+  const std::filesystem::path& recording;  ///< Empty: no recording.
 
   [[nodiscard]] NodeCommand Usual(NodeId id) const;
-  /// One of two physics nodes. Whoever comes back follows, for the other one leads by then.
+  /// Command of one of two physics nodes. After a restart it follows, because the other one leads by then.
   [[nodiscard]] NodeCommand InPair(const std::string& seat, bool follows) const;
-  /// What takes the place of a node that was started by `now`. One word: a build of the node, which gets the node's
-  /// arguments. More words: as they stand, with {scene}, {session}, {domain} and {cart} filled in. Throws InputError
+  /// Command that replaces a node that was started by `now`. One word is a build of the node and gets the node's
+  /// arguments. More words are used as given, with {scene}, {session}, {domain} and {cart} filled in. Throws InputError
   /// when the program cannot be run.
   [[nodiscard]] NodeCommand Replacement(const NodeCommand& now, const std::vector<std::string>& words) const;
 

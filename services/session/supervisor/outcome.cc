@@ -29,7 +29,7 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
     NodeId node;
     const char *key, *label, *unit;
     int decimals;
-    bool at_end = false;  ///< As last reported; else the highest. A short slit is as ragged as it is long.
+    bool at_end = false;  ///< The last value instead of the highest: a slit that is still short has larger deviations.
   };
   constexpr std::array kSources{Source{kHaptics, "peak_force_N", "peak force", "N", 2},
                                 Source{kThermal, "highest_temperature_C", "highest temperature", "°C", 0},
@@ -48,7 +48,7 @@ std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
                                 Source{kRender, "png_written", "pictures", "", 0}};
   std::vector<KeyFigure> figures;
   for (const Source& source : kSources) {
-    if (!record.node(source.node).seen) continue;  // An exercise without heat has no temperature, not one of 0.
+    if (!record.node(source.node).seen) continue;  // A scene without thermal_node has no temperature, rather than 0.
     figures.push_back({source.key, source.label, source.unit, source.decimals,
                        source.at_end ? record.last(source.key) : record.peak(source.key)});
   }
@@ -116,7 +116,7 @@ std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& reco
 
 namespace {
 
-/// One row per node.
+/// Table with one row per node.
 std::string NodeTable(const std::vector<NodeId>& nodes, const SessionRecord& record) {
   std::array<char, 256> line{};
   std::snprintf(line.data(), line.size(), "%-14s %-6s %15s %27s %9s %6s %8s\n", "node", "state", "rate / asked Hz",
@@ -152,8 +152,8 @@ std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& recor
   for (const RestartRecord& restart : record.restarts()) {
     text += std::string("restart at ") + Fixed(restart.time_s, 1) + " s: " + NodeName(restart.node) + " " +
             restart.cause +
-            (restart.rejoin_s >= 0 ? std::string(", back after ") + Fixed(restart.rejoin_s, 2) + " s"
-                                   : ", did not come back") +
+            (restart.rejoin_s >= 0 ? std::string(", rejoined after ") + Fixed(restart.rejoin_s, 2) + " s"
+                                   : ", did not rejoin") +
             "\n";
   }
   for (const RefusalRecord& refusal : record.refused()) {

@@ -12,7 +12,7 @@
 
 namespace fulcrum::supervisor {
 
-/// What an assessed session came to.
+/// Measures and score of an assessed session.
 struct ScoreSheet {
   assessment::Figures figures;
   assessment::Score score;
@@ -24,30 +24,30 @@ struct SessionOutcome {
   std::string started_utc;    ///< "2024-05-01 12:34:56 UTC".
   std::string machine;        ///< CPU model and count.
   std::string configuration;  ///< Effective configuration, YAML.
-  std::vector<NodeId> nodes;  ///< Those that were started, in order.
-  double duration_s = 0;      ///< Session time reached.
-  double wanted_s = 0;        ///< Session time asked for; 0: until stopped.
+  std::vector<NodeId> nodes;  ///< Nodes of the session, in the order of their start.
+  double duration_s = 0;      ///< Session time reached [s].
+  double wanted_s = 0;        ///< Session time requested [s]; 0: until stopped.
   ExitCode exit_code = ExitCode::kDone;
-  /// Of all topics; a recorder that was restarted has written another beside it, "-2" and so on. Empty: none.
+  /// First recording of all topics; each restart of the recorder adds a file beside it, "-2" and so on. Empty: none.
   std::filesystem::path recording;
   std::filesystem::path cut_map;    ///< Picture of what was cut; empty: no recording, or nothing cut.
   std::optional<ScoreSheet> sheet;  ///< None: the scene has no section `assessment`.
-  std::string trainee;              ///< Empty: not told.
-  std::string verdict;              ///< Empty when all is well; else one line that says what is not.
+  std::string trainee;              ///< Empty: not named.
+  std::string verdict;              ///< First failure of the session, one line; empty when all is well.
 };
 
-/// The figures of a session by name: the one list that table, JSON and report take theirs from.
+/// A named figure of a session. Table, JSON and report all use this list.
 struct KeyFigure {
-  const char* key;    ///< In summary.json.
-  const char* label;  ///< For people.
+  const char* key;    ///< Key in summary.json.
+  const char* label;  ///< Label in table and report.
   const char* unit;
   int decimals;
   double value;
 };
-/// Of the nodes that took part.
+/// Figures of the nodes that reported.
 [[nodiscard]] std::vector<KeyFigure> KeyFigures(const SessionRecord& record);
 
-/// "no sample lost" or how many, and whether the recorder was down.
+/// Text on the samples that are missing from the recording: "no sample lost" or a count, and the recorder's restarts.
 [[nodiscard]] std::string RecordingLosses(const SessionRecord& record);
 
 /// Flat JSON object; the keys are documented in services/session/supervisor/DESIGN.md.
@@ -56,7 +56,7 @@ struct KeyFigure {
 /// Node table, key figures, restarts and verdict.
 [[nodiscard]] std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& record);
 
-/// printf for one number: fixed, without "-0".
+/// `value` with a fixed number of decimals, and 0 instead of "-0".
 [[nodiscard]] std::string Fixed(double value, int decimals);
 
 }  // namespace fulcrum::supervisor

@@ -34,7 +34,7 @@ std::vector<Frame> Spread(const std::vector<Frame>& frames, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     const double u = static_cast<double>(i) / static_cast<double>(count - 1);
     const double wanted = frames.front().time_s + u * (frames.back().time_s - frames.front().time_s);
-    // Frames may be missing for a while (a restart), so by time, not by number; each frame once.
+    // Frames may be missing during a restart, so frames are chosen by time, not by number, and each at most once.
     const std::size_t last = frames.size() - (count - i);
     while (next < last && std::abs(frames[next + 1].time_s - wanted) <= std::abs(frames[next].time_s - wanted)) {
       ++next;

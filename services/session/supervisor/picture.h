@@ -1,4 +1,4 @@
-// PNG frames for the report: found, made smaller, encoded for embedding.
+// PNG frames for the report: search, scaling, encoding for embedding.
 #pragma once
 
 #include <cstdint>
@@ -11,13 +11,13 @@ namespace fulcrum::supervisor {
 
 struct Frame {
   std::filesystem::path file;
-  double time_s = 0;  ///< Session time.
+  double time_s = 0;  ///< Session time [s].
 };
 
-/// Frames of a session by time: files frame_<milliseconds>.png in `folder`. A missing folder has none.
+/// Frames of a session in the order of time: files frame_<milliseconds>.png in `folder`; empty without that folder.
 [[nodiscard]] std::vector<Frame> FindFrames(const std::filesystem::path& folder);
 
-/// At most `count` of them, evenly spread over the frames' time span, first and last included.
+/// At most `count` frames, evenly spread over the time span, with the first and the last.
 [[nodiscard]] std::vector<Frame> Spread(const std::vector<Frame>& frames, std::size_t count);
 
 /// "data:image/png;base64,…" of the picture, averaged over blocks of `shrink` x `shrink` pixels. Empty when the file is

@@ -8,23 +8,23 @@ namespace fulcrum::supervisor {
 
 class Progress {
  public:
-  /// `quiet`: shows nothing, for a service whose status says the same.
+  /// @param quiet shows no progress; for a service, whose status has the same content.
   explicit Progress(bool quiet);
-  /// True when it is time to show a new line; ask before building one.
+  /// True when a new line is due; check it before building a line.
   [[nodiscard]] bool IsDue(std::int64_t now_ns) const;
   void Show(std::int64_t now_ns, const std::string& line);
-  /// A line that stays, for example a restart.
+  /// Prints a permanent line, for example about a restart.
   void Say(const std::string& line);
 
  private:
   void ClearLive();
   bool quiet_;
   bool live_;          ///< Standard output is a terminal.
-  bool open_ = false;  ///< A live line stands on the terminal.
+  bool open_ = false;  ///< The terminal shows a live line.
   std::int64_t last_ns_ = 0;
 };
 
-/// `text` cut to `columns` display columns. UTF-8.
+/// UTF-8 `text` cut to `columns` display columns.
 [[nodiscard]] std::string CutToColumns(const std::string& text, std::size_t columns);
 
 }  // namespace fulcrum::supervisor

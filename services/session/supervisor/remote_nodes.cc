@@ -17,7 +17,7 @@ bus::FarSettings FarOf(const UpSettings& up) {
   return far;
 }
 
-/// What the other host needs to run its nodes.
+/// The data that the other host needs to run its nodes.
 link::Offer OfferOf(const SessionSetup& setup) {
   const link::FileFacts facts = link::FactsOf(setup.folder.scene);
   link::Offer offer;
@@ -52,7 +52,7 @@ std::optional<CommandAnswer> RemoteNodes::Restart(const std::string& name, NodeO
       std::find_if(setup_.remote_ids.begin(), setup_.remote_ids.end(), [&](NodeId id) { return name == NodeName(id); });
   if (node == setup_.remote_ids.end()) return std::nullopt;
   orders->Send(*node, "stop");
-  return CommandAnswer{true, "asking " + name + " on " + setup_.settings.peer + " to end: it is started again there"};
+  return CommandAnswer{true, "restarting " + name + " on " + setup_.settings.peer};
 }
 
 void RemoteNodes::AddTo(Health* health) { link::FillHealth(link_->status(), health); }

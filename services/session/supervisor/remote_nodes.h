@@ -21,10 +21,11 @@ class RemoteNodes {
   /// @param participant the supervisor's; must outlive this.
   RemoteNodes(const SessionSetup& setup, bus::DdsParticipant* participant);
 
-  /// By command: the node gets the order to end, and its host starts it again. Nothing: no such node runs there.
+  /// Restart by command: sends the node the order to end, and its host starts it again. nullopt: no such node runs
+  /// there.
   [[nodiscard]] std::optional<CommandAnswer> Restart(const std::string& name, NodeOrders* orders) const;
 
-  /// One line when the two sides cannot work together; empty: all well.
+  /// Reason, in one line, why the two sides cannot work together; empty: they can.
   [[nodiscard]] std::string mismatch() { return link_->mismatch(); }
   [[nodiscard]] bus::Refusals refusals() { return link_->refusals(); }
   /// Adds the link's metrics, and last_error where there is none yet.
@@ -33,9 +34,9 @@ class RemoteNodes {
 
  private:
   const SessionSetup& setup_;
-  /// On a secured cart the link publishes what the remote nodes own: the supervisor's participant has no right to that.
+  /// On a secured cart the link needs its own participant: the supervisor's may not publish the remote nodes' topics.
   std::unique_ptr<bus::DdsParticipant> link_bus_;
-  std::optional<link::Link> link_;  ///< Ends before the bus that it has ports of.
+  std::optional<link::Link> link_;  ///< Declared after the participants, so that its ports are destroyed first.
 };
 
 }  // namespace fulcrum::supervisor

@@ -80,7 +80,7 @@ std::string Picture(const Frame& frame, unsigned shrink) {
          "</figcaption></figure>\n";
 }
 
-/// Embedded like all else, so that the report stays one file.
+/// Section with the video, which is embedded so that the report stays one file.
 std::string Clip(const std::filesystem::path& clip) {
   std::ifstream in(clip, std::ios::binary);
   const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in), {}};
@@ -103,7 +103,7 @@ std::string Pictures(const std::filesystem::path& folder, const std::filesystem:
   return html + "</div>\n";
 }
 
-/// What the recording shows of the cut.
+/// Section with the map of the cut, drawn from the recording.
 std::string CutMap(const std::filesystem::path& picture) {
   const std::string data = picture.empty() ? std::string() : EmbedPng(picture, 1);
   return data.empty() ? std::string()
@@ -111,7 +111,7 @@ std::string CutMap(const std::filesystem::path& picture) {
                             "<div class='card'><figure><img style='width: auto; max-width: 100%; margin: 0 auto' "
                             "alt='map of the cut' src='" +
                             data +
-                            "'><figcaption>From the recording alone; fulcrum log map draws it again."
+                            "'><figcaption>Drawn from the recording; fulcrum log map draws it again."
                             "</figcaption></figure></div>\n";
 }
 
@@ -180,12 +180,11 @@ std::string Restarts(const SessionRecord& record) {
   }
   std::string html = Tag("h2", "Restarts") +
                      "<div class='card scroll'><table><tr><th class='text'>session time</th><th class='text'>node</th>"
-                     "<th class='text'>cause</th><th>back after s</th></tr>\n";
+                     "<th class='text'>cause</th><th>rejoined after s</th></tr>\n";
   for (const RestartRecord& restart : record.restarts()) {
     html += "<tr>" + Tag("td", Fixed(restart.time_s, 1) + " s") + Tag("td class='text'", NodeName(restart.node)) +
             Tag("td class='text'", restart.cause) +
-            Tag("td", restart.rejoin_s >= 0 ? Fixed(restart.rejoin_s, 2) : std::string("did not come back")) +
-            "</tr>\n";
+            Tag("td", restart.rejoin_s >= 0 ? Fixed(restart.rejoin_s, 2) : std::string("did not rejoin")) + "</tr>\n";
   }
   return html + "</table></div>\n";
 }
@@ -241,7 +240,7 @@ std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& recor
           Restarts(record) + Refusals(record) + Events(record);
   if (!outcome.recording.empty()) {
     html += Tag("h2", "Recording") + Tag("p", "All topics: " + outcome.recording.string() + ", " +
-                                                  RecordingLosses(record) + " (fulcrum log info says more).");
+                                                  RecordingLosses(record) + " (details: fulcrum log info).");
   }
   html += Tag("h2", "Configuration") + "<details><summary>Effective configuration of this session</summary><pre>" +
           EscapeHtml(outcome.configuration) + "</pre></details>\n</main></body></html>\n";

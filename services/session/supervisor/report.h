@@ -8,10 +8,12 @@
 
 namespace fulcrum::supervisor {
 
-/// CSS of our pages.
+/// CSS that all generated pages share.
 [[nodiscard]] const char* PageStyle();
 
-/// `frames`: folder of the pictures; `clip`: an MP4 of them, if it exists. Long: reads and encodes PNG files.
+/// The text of report.html. Takes long, because it reads and encodes PNG files.
+/// @param frames folder of the pictures.
+/// @param clip MP4 of the pictures; may be missing.
 [[nodiscard]] std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& record,
                                      const std::filesystem::path& frames, const std::filesystem::path& clip);
 

@@ -1,4 +1,4 @@
-// When a dead node is started again, and when no longer. Pure: the caller gives the time.
+// Delays and limits of the restarts of a dead node. Reads no clock: the caller passes the time.
 #pragma once
 
 #include <cstdint>
@@ -7,9 +7,10 @@
 namespace fulcrum::supervisor {
 
 struct RestartSettings {
-  /// A node that lived this long was healthy: its next death starts the count anew.
+  /// A node that ran for this long was healthy [ns]: its next death is the first of a new row.
   std::int64_t healthy_ns = 5'000'000'000;
-  std::int64_t first_delay_ns = 200'000'000;  ///< Before the second quick restart; doubles with each further one.
+  /// Delay of the second quick restart [ns]; doubles with each further one.
+  std::int64_t first_delay_ns = 200'000'000;
   std::int64_t longest_delay_ns = 2'000'000'000;
   int most_quick_deaths = 5;  ///< The node has failed for good with this many deaths in a row.
 };
@@ -18,7 +19,8 @@ class RestartPolicy {
  public:
   explicit RestartPolicy(const RestartSettings& settings = {}) : settings_(settings) {}
 
-  /// How long to wait before the next start: nothing after a long life, ever longer in a crash loop. nullopt: give up.
+  /// Delay of the next start [ns]: 0 after a long run, longer with each death of a crash loop. nullopt: no further
+  /// start.
   [[nodiscard]] std::optional<std::int64_t> OnDeath(std::int64_t lived_ns);
 
  private:

@@ -33,7 +33,7 @@ void AddFile(Hash64* hash, const fs::path& file) {
   hash->AddValue(static_cast<std::int64_t>(fs::last_write_time(file, error).time_since_epoch().count()));
 }
 
-/// Words of the YAML that could name a file or folder.
+/// Words of the YAML that may name a file or folder.
 std::vector<std::string> PathWords(const std::string& yaml) {
   constexpr std::string_view kSeparators = " \t\r\n\"',[]{}";
   constexpr std::size_t kLongestName = 255;
@@ -49,8 +49,8 @@ std::vector<std::string> PathWords(const std::string& yaml) {
   return words;
 }
 
-/// Any word that names an existing file, in the scene's folder, the data folder or a folder that the YAML names, is
-/// taken for an input: too many cost a compilation, too few would run yesterday's anatomy.
+/// Every word that names an existing file, in the scene's folder, the data folder or a folder that the YAML names,
+/// counts as an input: a superfluous input costs a compilation, a missing one would run an outdated anatomy.
 void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::path& data, std::set<fs::path>* seen,
                      Hash64* hash) {
   const std::vector<std::string> words = PathWords(yaml);
@@ -68,7 +68,7 @@ void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::
     for (const fs::path& base : bases) {
       if (fs::is_regular_file(base / word, error)) {
         AddFile(hash, base / word);
-        // A scene that this one stands on may name others.
+        // A base scene may name further files.
         if (fs::path(word).extension() == ".yaml" && seen->insert(fs::canonical(base / word, error)).second) {
           AddFilesNamedIn(ReadText(base / word), (base / word).parent_path(), data, seen, hash);
         }

@@ -1,4 +1,4 @@
-// From what the user calls a scene to a compiled file.
+// The compiled file of a scene that the user names, from a cache or compiled now.
 #pragma once
 
 #include <filesystem>
@@ -8,16 +8,16 @@
 namespace fulcrum::supervisor {
 
 struct SceneRequest {
-  std::string name;                  ///< A name of `library`, a .yaml file, or a compiled file.
-  std::filesystem::path data;        ///< Folder of the meshes that the scene imports; empty: the scene's own.
-  std::vector<std::string> changes;  ///< Parameters other than in the description: SECTION.KEY=VALUE.
+  std::string name;                  ///< A name in `library`, a .yaml file, or a compiled file.
+  std::filesystem::path data;        ///< Folder of the meshes that the scene imports; empty: the scene's own folder.
+  std::vector<std::string> changes;  ///< Parameters that replace those of the description: SECTION.KEY=VALUE.
   std::filesystem::path library;     ///< Folder of the shipped scenes.
   std::filesystem::path compiler;    ///< Program scene_compiler.
-  std::filesystem::path cache;       ///< Compiled scenes are kept here.
+  std::filesystem::path cache;       ///< Folder of compiled scenes.
 };
 
-/// The compiled file: what was asked for, when it is one; else from the cache; else compiled now, which may take
-/// minutes for real anatomy. Throws InputError when there is no such scene or it does not compile.
+/// The compiled file: the named file when it is compiled already, else the cached one, else one that is compiled now,
+/// which may take minutes for real anatomy. Throws InputError when there is no such scene or it does not compile.
 [[nodiscard]] std::filesystem::path ResolveScene(const SceneRequest& request);
 
 /// Names of the shipped scenes.

@@ -23,7 +23,7 @@ std::string LimitText(const MeasureInfo& info, double limit) {
 
 const char* Mark(const ScoreItem& item) { return item.passed ? "✓" : "✗"; }
 
-/// `text` filled up to `columns` characters on the left or right. printf counts bytes.
+/// `text` padded to `columns` characters on the left or right; printf would count bytes.
 std::string Pad(const std::string& text, int columns, bool right) {
   int seen = 0;
   for (const char c : text) seen += (static_cast<unsigned char>(c) & 0xc0u) != 0x80u;
@@ -70,10 +70,10 @@ std::string SheetHtml(const ScoreSheet& sheet, const std::string& trainee) {
             cell(scored ? Mark(item) : "", " class='text'") +
             cell(scored ? Fixed(item.points, 1) + " / " + Fixed(item.of, 0) : std::string("not scored")) + "</tr>\n";
   }
-  return html + "</table></div>\n<p class='sub'>A threshold that is kept gives all its points, otherwise fewer in " +
-         "proportion, and none at twice the threshold (half, where at least so much is wanted). Points for skill "
-         "count " +
-         "in proportion to what was done of the task.</p>\n";
+  return html +
+         "</table></div>\n<p class='sub'>A kept threshold (≤ or ≥) gives all points. Beyond it the points decrease " +
+         "in proportion, to none at twice a threshold with ≤ and at half a threshold with ≥. Points for skill are " +
+         "scaled by the completed share of the task.</p>\n";
 }
 
 std::string SheetJson(const ScoreSheet& sheet, const SheetFacts& facts) {

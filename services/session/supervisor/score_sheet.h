@@ -1,4 +1,4 @@
-// The score sheet of an assessed session: for people, for the report, for programs.
+// The score sheet of an assessed session: as a table for the terminal, a section of the report, and JSON.
 #pragma once
 
 #include <string>

@@ -5,12 +5,12 @@
 namespace fulcrum::supervisor {
 namespace {
 
-// A grasp shows as deformation after a second; a cut needs the hook to heat, dry and move on.
+// A grasp deforms the tissue within a second; before a cut appears, the hook must heat and dry tissue and move on.
 constexpr double kTimeToDeform = 2.0;
 constexpr double kTimeToCut = 3.0;
 
 constexpr double kSpeedSpan = 0.1;       // Central difference for the tool's speed [s].
-constexpr double kMovingSpeed = 2.0e-3;  // Slower is holding [m/s].
+constexpr double kMovingSpeed = 2.0e-3;  // A slower tool counts as holding [m/s].
 
 bool IsCutting(const ScriptPoint& point) { return point.pedals != kPedalNone && point.power_W > 0; }
 

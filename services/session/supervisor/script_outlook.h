@@ -1,4 +1,5 @@
-// What the scene's script will do: the phase at a time, and what a run of it must have brought about. Pure.
+// Predictions from the scene's script: the phase at a session time, and the effects that a run must show. Pure
+// functions.
 #pragma once
 
 #include <string>
@@ -7,15 +8,16 @@
 
 namespace fulcrum::supervisor {
 
-/// For people: "approach", "grasp", "pull", "hold", "cut", "coagulate", "release"; empty without a script.
+/// Name of the phase: "approach", "grasp", "pull", "hold", "cut", "coagulate", "release"; empty without a script.
 [[nodiscard]] std::string PhaseAt(const SceneView& scene, double session_time_s);
 
-/// What has to be seen in a run that ends at some session time.
+/// Effects that a run up to some session time must show.
 struct ScriptDemands {
   bool deformation = false;  ///< The script grasps, or works with the hook.
   bool cut = false;          ///< The script holds the pedal down with power.
 };
-/// Only what the script asks for early enough before `end_s` counts: tissue needs time to follow.
+/// Demands of the script up to session time `end_s` [s], without actions so shortly before it that the tissue cannot
+/// have followed.
 [[nodiscard]] ScriptDemands DemandsUntil(const SceneView& scene, double end_s);
 
 }  // namespace fulcrum::supervisor

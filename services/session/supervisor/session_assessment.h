@@ -1,4 +1,4 @@
-// The assessment of a running session: the topics it needs, and what is told of it while it lasts.
+// The assessment of a running session: subscription of its topics, prompts and score while the session lasts.
 #pragma once
 
 #include <memory>
@@ -13,22 +13,22 @@ namespace fulcrum::supervisor {
 
 class SessionAssessment {
  public:
-  /// Subscribes. `scene` must outlive this.
+  /// Subscribes the topics. `scene` must outlive this.
   SessionAssessment(const SceneView& scene, bus::DdsParticipant* participant);
 
   void Begin(std::int64_t session_start_ns) { assessor_.Begin(session_start_ns); }
   void End(double session_time_s) { assessor_.End(session_time_s); }
-  /// Takes what has come. Thermal events are the supervisor's own input: hand them in.
+  /// Reads all samples that have arrived. Thermal events are an input of the supervisor, which passes them here.
   void Take();
   void Add(const ThermalEvent& event) { assessor_.Add(event); }
-  /// The most urgent prompt, and the score so far.
+  /// Text with the most urgent prompt and the score so far.
   [[nodiscard]] std::string Line(double session_time_s) const;
-  /// Its metrics: the set of prompts and the score.
+  /// Metrics for the supervisor's Health: the set of prompts and the score.
   void AddTo(double session_time_s, Health* health) const;
   /// Closes the inputs; the figures stay.
   void Close();
 
-  /// The session is over: what it came to.
+  /// Measures and score at the end of the session.
   [[nodiscard]] ScoreSheet Finish();
 
  private:
@@ -40,7 +40,7 @@ class SessionAssessment {
   std::unique_ptr<bus::Input<CauteryContact>> cautery_;
   std::unique_ptr<bus::Input<TopologyState>> topology_;
   std::unique_ptr<bus::Input<TemperaturePatch>> patches_;
-  TopologyState topology_sample_;  ///< Reused: they keep their buffers.
+  TopologyState topology_sample_;  ///< The samples are members so that their buffers are reused.
   TemperaturePatch patch_;
 };
 

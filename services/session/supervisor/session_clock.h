@@ -1,4 +1,4 @@
-// Session time of a session that runs.
+// The clock of a running session.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@ class SessionClock {
  public:
   /// @param start_ns CLOCK_MONOTONIC at session time 0 [ns].
   void Begin(std::int64_t start_ns) { start_ns_ = start_ns; }
-  /// The session is over: its time stands still from here on.
+  /// Ends the session: its time does not advance after `now_ns`.
   void Stop(std::int64_t now_ns) {
     reached_s_ = std::max(0.0, At(now_ns));
     stopped_ = true;

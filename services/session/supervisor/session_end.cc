@@ -32,7 +32,7 @@ SessionOutcome OutcomeOf(const SessionSetup& setup, double reached_s, const Verd
   return outcome;
 }
 
-/// A row in the trainees' database. The figures of a row that cannot be added are in assessment.json all the same.
+/// Adds a row to the trainees' database. Without the row the figures are still in assessment.json.
 void AddRow(TrainingLog* training, SessionOutcome* outcome, Verdict* verdict) {
   try {
     training->Add(TrainingRowOf(*outcome));

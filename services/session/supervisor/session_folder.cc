@@ -45,7 +45,7 @@ void WriteFile(const fs::path& file, const std::string& text) {
   stream << text;
   stream.close();
   if (!stream) {
-    throw InputError("cannot write " + file.string() + "; is the disk full, or the folder not yours?");
+    throw InputError("cannot write " + file.string() + ": check free disk space and the permissions of the folder");
   }
 }
 
@@ -71,7 +71,8 @@ SessionFolder MakeSessionFolder(const fs::path& out, const fs::path& scene_file,
     folder.frames = folder.path / "frames";
     fs::create_directory(folder.logs);
     fs::create_directory(folder.frames);
-    // A name of its own for the scene: a node that is restarted must find the file it had, whatever is compiled later.
+    // The session has its own name for the scene file: a node that is restarted must map the same file, even after the
+    // scene was compiled again.
     folder.scene = folder.path / "scene.fulcrum";
     std::error_code no_link;
     fs::create_hard_link(scene_file, folder.scene, no_link);
@@ -79,7 +80,7 @@ SessionFolder MakeSessionFolder(const fs::path& out, const fs::path& scene_file,
       fs::copy_file(scene_file, folder.scene);
     }
     const fs::path latest = folder.path.parent_path() / "latest";
-    std::error_code ignored;  // A convenience: a file system without links is no reason to stop.
+    std::error_code ignored;  // The link is a convenience, and some file systems have no links.
     if (fs::is_symlink(latest) || !fs::exists(latest)) {
       fs::remove(latest, ignored);
       fs::create_symlink(folder.session_id, latest, ignored);

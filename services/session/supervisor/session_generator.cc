@@ -30,7 +30,7 @@ void SessionGenerator::Follow(const SessionClock& clock, std::int64_t now_ns) {
 }
 
 void SessionGenerator::Publish(std::int64_t from_ns) {
-  // Readers take settings in the order of their stamps.
+  // Readers apply settings in the order of their stamps, so stamps must increase.
   newest_ns_ = std::max(from_ns, newest_ns_ + 1);
   GeneratorSetting setting = panel_.setting();
   setting.stamp = stamper_.Next(newest_ns_);

@@ -20,16 +20,16 @@ class SessionGenerator {
   SessionGenerator(std::unique_ptr<bus::Output<GeneratorSetting>> out, const config::GeneratorConfig& start,
                    std::span<const ScriptKey> script);
 
-  /// @param words as for GeneratorPanel::Turn; none: the answer says the present setting.
+  /// @param words as for GeneratorPanel::Turn; without words the reply contains the present setting.
   CommandAnswer Turn(const std::string& words, std::int64_t now_ns);
-  /// Publishes what the script has changed, with the stamp of its key. Nothing before the session has begun.
+  /// Publishes changes by the script, with the stamp of the script's key. Does nothing before session time 0.
   void Follow(const SessionClock& clock, std::int64_t now_ns);
 
-  /// Without a stamp.
+  /// The present setting, without a stamp.
   [[nodiscard]] const GeneratorSetting& setting() const { return panel_.setting(); }
 
  private:
-  /// @param from_ns CLOCK_MONOTONIC from which the knobs are where they are [ns].
+  /// @param from_ns CLOCK_MONOTONIC from which the setting is valid [ns].
   void Publish(std::int64_t from_ns);
 
   std::unique_ptr<bus::Output<GeneratorSetting>> out_;

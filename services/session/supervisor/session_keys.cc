@@ -17,7 +17,7 @@ std::string CheckSessionKeys(const config::CartConfig& cart, std::vector<NodeId>
     until = keys::CheckIdentity(cart.security.keys, NodeName(id), cart.security.encrypt, now).until;
   }
   if (until - now > kExpiryWarning_s) return {};
-  return "the keys of this cart hold until " + keys::DateOf(until) + " only: make new ones with fulcrum keys init " +
+  return "the keys of this cart expire on " + keys::DateOf(until) + ": make new ones with fulcrum keys init " +
          cart.security.keys + " --force";
 }
 

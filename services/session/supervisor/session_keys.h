@@ -1,4 +1,4 @@
-// The keys of a secured session, looked at before anybody is started: a node's own refusal would stand in its log only.
+// Check of the keys of a secured session before any node is started: a node would report the problem in its log only.
 #pragma once
 
 #include <ctime>
@@ -10,8 +10,8 @@
 
 namespace fulcrum::supervisor {
 
-/// Throws InputError when the supervisor or one of the nodes could not join. @return what to tell of keys that are
-/// about to expire; empty: nothing, or no security.
+/// Throws InputError when the keys do not let the supervisor or one of the nodes join. @return one line on keys that
+/// expire soon; empty: none do, or the cart is not secured.
 [[nodiscard]] std::string CheckSessionKeys(const config::CartConfig& cart, std::vector<NodeId> nodes, std::time_t now);
 
 }  // namespace fulcrum::supervisor

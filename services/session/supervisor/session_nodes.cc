@@ -12,7 +12,7 @@
 namespace fulcrum::supervisor {
 namespace {
 
-// A restart and the reports of its absence are over after this (assumed) [ns].
+// From a restart by command until peers no longer report the node's absence (assumed) [ns].
 constexpr std::int64_t kExcuse_ns = 3 * kSecond_ns;
 
 }  // namespace

@@ -21,36 +21,37 @@ namespace fulcrum::supervisor {
 class SessionNodes {
  public:
   /// @param setup must outlive this.
-  /// @param order sends a verb to a node that systemd runs.
+  /// @param order sends a verb to a node that systemd runs as a service.
   SessionNodes(const SessionSetup& setup, const AttachedNode::Order& order);
 
   /// Throws InputError when a program cannot be started.
   void Start(std::int64_t now_ns);
 
   using OnDeath = std::function<void(const SupervisedNode& node, const SupervisedNode::Death& death)>;
-  /// Stage of the loop: calls `died` for each node that has died since the last call, and sweeps shared memory some
-  /// time after the last death.
+  /// Stage of the loop: calls `died` for each node that has died since the last call, and sweeps shared memory
+  /// kSweepAfter_ns after the last death.
   void Watch(std::int64_t now_ns, const OnDeath& died);
-  /// Ends all, the recorder last, so that its file holds how the others ended. `turn` and `given_up` as for EndAll.
+  /// Ends all nodes, the recorder last, so that its file contains the end of the others. `turn` and `given_up` as for
+  /// EndAll.
   void End(const std::function<void(std::int64_t now_ns)>& turn,
            const std::function<void(const SupervisedNode& node, const char* done)>& given_up);
 
-  /// By command. Nothing: no such node runs here.
+  /// Restart by command. nullopt: no such node runs here.
   [[nodiscard]] std::optional<CommandAnswer> Restart(const std::string& name, std::int64_t now_ns);
-  /// By command. @param argument the node, then the words of its new command, a line each.
+  /// Swap by command. @param argument the node, then the words of its new command, one per line.
   CommandAnswer Swap(const std::string& argument, std::int64_t now_ns);
-  /// Refusal of a command.
+  /// Reply to a command that names no running node.
   [[nodiscard]] static CommandAnswer NotRunning(const std::string& name);
 
-  /// Shortly after a restart or swap by command a node that reports degraded is no fault: it reports the absence of
-  /// its peer.
+  /// True shortly after a restart or swap by command: a node that is degraded then reports the absence of its peer,
+  /// which is no fault.
   [[nodiscard]] bool IsExcused(std::int64_t now_ns) const { return now_ns < excused_ns_; }
-  /// Each node has reported or has failed for good.
+  /// True when each node has reported or has failed for good.
   [[nodiscard]] bool AreReady() const;
   [[nodiscard]] std::size_t running() const;
   [[nodiscard]] std::span<const std::unique_ptr<SupervisedNode>> all() const { return nodes_; }
 
-  /// A node that failed for good, the last one.
+  /// The last node that failed for good.
   struct Failure {
     ExitCode code = ExitCode::kDone;  ///< kDone: none failed.
     std::string why;
@@ -63,8 +64,8 @@ class SessionNodes {
   const SessionSetup& setup_;
   std::vector<std::unique_ptr<SupervisedNode>> nodes_;
   std::int64_t last_watch_ns_ = 0;
-  std::int64_t sweep_ns_ = 0;    ///< When to sweep; 0: nothing to sweep.
-  std::int64_t excused_ns_ = 0;  ///< End of the excuse.
+  std::int64_t sweep_ns_ = 0;    ///< Time of the next sweep; 0: none is due.
+  std::int64_t excused_ns_ = 0;  ///< End of the time in which IsExcused is true.
   Failure failure_;
 };
 

@@ -57,7 +57,7 @@ void SessionRecord::AddHealth(double time_s, const Health& health) {
   NodeTrack& track = nodes_[static_cast<std::size_t>(health.node)];
   NodeFigures& figures = track.figures;
   if (health.stamp.epoch < track.epoch) {
-    return;  // A sample of the dead process, served late.
+    return;  // A sample of the previous process that was delivered late.
   }
   if (!figures.seen) {
     figures.seen = true;
@@ -145,9 +145,8 @@ const Curve& SessionRecord::curve(const std::string& metric) const {
 std::string MissingFrom(const SessionRecord& record, const ScriptDemands& demands) {
   const auto missing = [](const char* what, double value, double least) {
     char text[160];
-    std::snprintf(text, sizeof(text),
-                  "%s, although the scene's script asks for it (%.2f mm; at least %.1f mm expected)", what, value,
-                  least);
+    std::snprintf(text, sizeof(text), "%s, although the scene's script demands it (%.2f mm; at least %.1f mm expected)",
+                  what, value, least);
     return std::string(text);
   };
   const double displacement = record.peak("max_displacement_mm");

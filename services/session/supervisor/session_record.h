@@ -1,5 +1,5 @@
-// What a session was: figures of each node, curves over session time, events, restarts. Pure; fed by the supervisor,
-// read by summary, table and report.
+// The record of a session: figures of each node, curves over session time, events, restarts. The supervisor adds
+// samples; summary, table and report read it. It uses no clock and no bus.
 #pragma once
 
 #include <array>
@@ -18,7 +18,8 @@ struct CurvePoint {
   double time_s;
   double value;
 };
-/// A figure over session time. Long sessions are thinned: every second point goes when the curve is full.
+/// A figure over session time. When the curve is full, every second point is removed and every second sample skipped
+/// from then on.
 class Curve {
  public:
   static constexpr std::size_t kMostPoints = 6000;
@@ -39,9 +40,9 @@ struct NodeFigures {
   std::int32_t pid = 0;
   HealthState state = HealthState::kStarting;
   double rate_asked_Hz = 0;
-  double rate_achieved_Hz = 0;  ///< Ticks per second of session time: a dead node's time counts.
+  double rate_achieved_Hz = 0;  ///< Ticks per second of session time, time while the node was dead included.
   double rate_last_second_Hz = 0;
-  TimingSummary step;  ///< p50, p99 since the last start; max of all.
+  TimingSummary step;  ///< p50 and p99 since the last start, max since the first.
   TimingSummary wake;
   std::uint64_t ticks = 0;
   std::uint64_t overruns = 0;
@@ -63,7 +64,7 @@ struct EventRecord {
   ThermalEventKind kind = ThermalEventKind::kContact;
   double temperature_C = 0;
 };
-/// Somebody who was kept off the bus.
+/// A participant or endpoint that was refused on the bus.
 struct RefusalRecord {
   double time_s = 0;
   std::string what;
@@ -76,18 +77,18 @@ class SessionRecord {
   void AddHealth(double time_s, const Health& health);
   void AddEvent(const ThermalEvent& event);
   void AddDeath(double time_s, NodeId node, const std::string& cause, bool for_good);
-  /// All since the start; those that are new are of now.
+  /// @param refusals all since the start; those that are new get `time_s`.
   void AddRefusals(double time_s, const bus::Refusals& refusals);
 
   [[nodiscard]] const NodeFigures& node(NodeId id) const { return nodes_[static_cast<std::size_t>(id)].figures; }
-  /// Curve of a metric of whichever node reports it; empty when none does.
+  /// Curve of a metric, from the node that reports it; empty when none does.
   [[nodiscard]] const Curve& curve(const std::string& metric) const;
-  /// Newest value reported; 0 when none was.
+  /// Newest value of a metric; 0 when none was reported.
   [[nodiscard]] double last(const std::string& metric) const {
     const auto& points = curve(metric).points();
     return points.empty() ? 0.0 : points.back().value;
   }
-  /// Highest value ever reported; 0 when none was.
+  /// Highest value of a metric; 0 when none was reported.
   [[nodiscard]] double peak(const std::string& metric) const { return curve(metric).max(); }
   [[nodiscard]] const std::vector<RestartRecord>& restarts() const { return restarts_; }
   /// The first kMostEvents events.
@@ -105,7 +106,7 @@ class SessionRecord {
     std::uint64_t epoch = 0;
     double first_time_s = 0;
     double death_time_s = -1;  ///< >= 0 while dead.
-    // Counters start at 0 with each process: what earlier ones counted is kept apart.
+    // Counters of a node start at 0 with each process: `base_` has the sum of earlier processes.
     std::uint64_t base_ticks = 0, base_overruns = 0, base_drops = 0;
     std::uint64_t live_ticks = 0, live_overruns = 0, live_drops = 0;
   };
@@ -119,11 +120,11 @@ class SessionRecord {
   std::map<ThermalEventKind, std::uint64_t> event_counts_;
 };
 
-/// Thresholds below which nothing has happened: above rounding and relaxation, far below any scripted action.
+/// Thresholds below which an effect counts as missing: above rounding and relaxation, far below any scripted action.
 inline constexpr double kLeastDisplacement_mm = 0.5;
 inline constexpr double kLeastCut_mm = 0.5;
 
-/// Empty when the session brought about what the script demands; else what is missing.
+/// The first demanded effect that the session does not show, as text; empty when it shows all.
 [[nodiscard]] std::string MissingFrom(const SessionRecord& record, const ScriptDemands& demands);
 
 }  // namespace fulcrum::supervisor

@@ -1,4 +1,4 @@
-// What is fixed before a session starts anything: settings, scene, session folder, nodes.
+// The part of a session that is fixed before any node starts: settings, scene, session folder, nodes.
 #pragma once
 
 #include <filesystem>
@@ -25,9 +25,9 @@ struct SessionSetup {
   SessionSetup(const SessionSetup&) = delete;
   SessionSetup& operator=(const SessionSetup&) = delete;
 
-  /// The supervisor's own.
+  /// Settings of the supervisor's participant.
   [[nodiscard]] bus::Security security() const;
-  /// The script that sets the generator: empty on a cart with a real pedal, where a person operates it.
+  /// The script that sets the generator; empty on a cart with a real pedal, where a person operates it.
   [[nodiscard]] std::span<const ScriptKey> operator_script() const;
   [[nodiscard]] bool has_recorder() const;
 
@@ -36,7 +36,8 @@ struct SessionSetup {
   const double end_s;              ///< Session time of the end [s]; 0: until stopped.
   const std::string keys_warning;  ///< One line on keys that expire soon; empty: none.
   const DomainGuard guard;
-  /// Directory on /dev/shm. Opened right after the guard: tools that find a session read its security there.
+  /// Directory on /dev/shm. Opened right after the guard: commands that find a session read its security settings
+  /// there.
   const std::filesystem::path memory;
   std::optional<TrainingLog> training;  ///< Empty: no trainee was named.
   const SessionFolder folder;

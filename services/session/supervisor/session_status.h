@@ -1,4 +1,4 @@
-// How a running session is, for people: lines on standard output, the status of the service.
+// Display of a running session: lines on standard output, the status of the service.
 #pragma once
 
 #include <cstdint>
@@ -13,19 +13,19 @@ namespace fulcrum::supervisor {
 
 class SessionStatus {
  public:
-  /// @param is_service systemd shows the status: no live line on standard output.
+  /// @param is_service true: systemd shows the status, and there is no live line on standard output.
   explicit SessionStatus(bool is_service) : progress_(is_service) {}
 
-  /// A line that stays, for example a restart.
+  /// Prints a permanent line, for example about a restart.
   void Say(const std::string& line) { progress_.Say(line); }
-  /// True when it is time to show a new line; ask before building one.
+  /// True when a new line is due; check it before building a line.
   [[nodiscard]] bool IsDue(std::int64_t now_ns) const { return progress_.IsDue(now_ns); }
   void Show(std::int64_t now_ns, const std::string& line);
 
-  /// READY=1, STOPPING=1.
+  /// Send READY=1 and STOPPING=1 to systemd.
   void Ready() { service_.Ready(); }
   void Stopping() { service_.Stopping(); }
-  /// Once a turn of the loop: feeds the watchdog and passes the newest line on.
+  /// Call once per turn of the loop: notifies the watchdog and sends the newest line to systemd.
   void Update(std::int64_t now_ns) { service_.Update(now_ns, {++turns_}, line_); }
 
  private:

@@ -13,7 +13,7 @@ namespace {
 
 std::string Milliseconds(float us) { return Fixed(1e-3 * static_cast<double>(us), 2); }
 
-/// Oldest input that has a writer, as "ToolState 3 ms".
+/// Age of the oldest input that has a writer, as "ToolState 3 ms".
 std::string OldestInput(const Health& health) {
   const InputHealth* oldest = nullptr;
   for (const InputHealth& input : health.inputs) {
@@ -68,7 +68,7 @@ void SessionView::Update() {
   Health health;
   while (healths_->TakeNext(&health)) {
     Health& newest = newest_[static_cast<std::size_t>(health.node)];
-    // Of a pair of processes the one that leads is shown.
+    // Of a standby pair, the process that leads is shown.
     const bool follows = health.state == HealthState::kWaiting && newest.pid != health.pid &&
                          newest.state == HealthState::kRunning &&
                          health.stamp.stamp_ns - newest.stamp.stamp_ns < kSilence_ns;

@@ -1,4 +1,4 @@
-// What is seen of a running session from outside, gathered from Health alone: for `status`, `top` and the console.
+// A running session as seen from outside, collected from Health and SceneManifest: for `status`, `top` and the console.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@
 
 namespace fulcrum::supervisor {
 
-/// A node that has not been heard for so long is silent [ns].
+/// A node is silent after this time without Health [ns].
 inline constexpr std::int64_t kSilence_ns = 1'000'000'000;
 
 /// A metric by name; `missing` when the node does not report it.
@@ -22,21 +22,21 @@ class SessionView {
  public:
   explicit SessionView(int domain);
 
-  /// Takes what has come since the last call.
+  /// Reads all samples that have arrived since the last call.
   void Update();
-  /// Empty, or why this one and the supervisor do not speak with each other.
+  /// Reason why this program and the supervisor cannot exchange samples; empty: they can.
   [[nodiscard]] std::string mismatch() const { return participant_.schema_mismatch(); }
-  /// True when a supervisor has been heard.
+  /// True when a Health of a supervisor has arrived.
   [[nodiscard]] bool has_supervisor() const { return has_supervisor_; }
-  /// How many nodes have been heard.
+  /// Number of nodes whose Health has arrived.
   [[nodiscard]] int heard() const;
-  /// Scene, session time, node table, figures.
+  /// Text with scene, session time, node table and figures.
   [[nodiscard]] std::string Text() const;
 
-  /// Newest of a node; pid 0: never heard.
+  /// Newest Health of a node; pid 0: none has arrived.
   [[nodiscard]] const Health& health(NodeId node) const { return newest_[static_cast<std::size_t>(node)]; }
   [[nodiscard]] const SceneManifest& manifest() const { return manifest_; }
-  /// For a port of the caller's own.
+  /// The participant, for further ports of the caller.
   [[nodiscard]] bus::DdsParticipant& participant() { return participant_; }
 
  private:

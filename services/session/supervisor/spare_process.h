@@ -1,4 +1,5 @@
-// A second process of a node that waits to take the place of the first (services/nodes/app/spare.h).
+// A second process of a node that is started ahead of time and replaces the first after its death
+// (services/nodes/app/spare.h).
 #pragma once
 
 #include "services/session/supervisor/supervised_node.h"
@@ -9,14 +10,14 @@ class SpareProcess {
  public:
   /// Throws InputError when the program cannot be started.
   explicit SpareProcess(const NodeCommand& command);
-  ~SpareProcess();  ///< Kills one that still waits.
+  ~SpareProcess();  ///< Kills the process unless it was taken.
   SpareProcess(const SpareProcess&) = delete;
   SpareProcess& operator=(const SpareProcess&) = delete;
 
-  /// False when it has ended.
+  /// False when the process has ended.
   [[nodiscard]] bool IsThere();
-  /// Tells it that it is needed; it is the caller's from then on. Also while it is still getting ready: it then goes on
-  /// as soon as it is.
+  /// Signals the spare to become the node and hands its process to the caller. A spare that is still preparing its
+  /// start becomes the node as soon as it is ready.
   [[nodiscard]] ChildProcess Take();
 
  private:

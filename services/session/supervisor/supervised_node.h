@@ -13,48 +13,48 @@
 
 namespace fulcrum::supervisor {
 
-/// How to start it.
+/// Command line of a node.
 struct NodeCommand {
   NodeId id = NodeId::kSupervisor;
   std::filesystem::path program;
   std::vector<std::string> arguments;
   std::filesystem::path log;
-  std::vector<std::string> again;  ///< More arguments, from the second start on.
-  bool has_spare = false;  ///< Understands --spare (services/nodes/app/spare.h), and starts slowly enough to need one.
-  bool foreign = false;    ///< Not one of our nodes: its Health, if any, may name another process.
+  std::vector<std::string> again;  ///< Further arguments from the second start on.
+  bool has_spare = false;  ///< Accepts --spare (services/nodes/app/spare.h) and starts slowly enough to need a spare.
+  bool foreign = false;    ///< Not a node of this build: its Health, if any, may contain the pid of another process.
 };
 
 class SupervisedNode {
  public:
   virtual ~SupervisedNode() = default;
 
-  /// Throws InputError when the program cannot be started.
+  /// Starts the node. Throws InputError when the program cannot be started.
   virtual void Start(std::int64_t now_ns) = 0;
 
   struct Death {
     std::string cause;
     bool for_good = false;
     ProcessEnd end;
-    bool asked = false;      ///< By AskRestart.
-    std::int64_t at_ns = 0;  ///< When; 0: now.
+    bool asked = false;      ///< The node ended by command (AskRestart, Swap).
+    std::int64_t at_ns = 0;  ///< Time of the death; 0: now.
   };
-  /// Notices a death and sees to it that the node comes back.
+  /// Detects a death and, unless it is for good, restarts the node when its delay is over. Returns each death once.
   [[nodiscard]] virtual std::optional<Death> Update(std::int64_t now_ns) = 0;
 
-  /// False when it is not this node's, or that of another process.
+  /// Takes a Health. Returns false when it is of another node or another process.
   virtual bool OnHealth(const Health& health, std::int64_t now_ns) = 0;
-  /// Forgives silence up to now, because the supervisor itself was held up.
+  /// Restarts the measurement of silence at `now_ns`, because the supervisor itself was suspended.
   virtual void ForgiveSilence(std::int64_t now_ns) = 0;
   virtual void AskRestart(std::int64_t now_ns) = 0;
-  /// Restarts as another program. When that ends before its first Health, the one before is started again. Throws
-  /// InputError when this node cannot be replaced.
+  /// Restarts the node as another program. When that ends before its first Health, the previous program is started
+  /// again. Throws InputError when this node cannot be replaced.
   virtual void Swap(NodeCommand command, std::int64_t now_ns) = 0;
 
-  /// For the end of the session: asks it to end.
+  /// Requests the end of the node at the end of the session.
   virtual void Stop() = 0;
-  /// Without starting it again. True when no process is left.
+  /// True when no process is left. Starts none again.
   [[nodiscard]] virtual bool HasEnded() = 0;
-  /// For one that does not end; says what was done.
+  /// Handles a node that does not end after Stop; returns what was done, for messages.
   virtual const char* GiveUp() = 0;
 
   [[nodiscard]] virtual pid_t pid() const = 0;
@@ -62,7 +62,7 @@ class SupervisedNode {
   [[nodiscard]] virtual bool failed() const = 0;
   [[nodiscard]] virtual bool has_reported() const = 0;
   [[nodiscard]] virtual const NodeCommand& command() const = 0;
-  /// Where to read what it said, for people.
+  /// Where its output can be read: a file, or a command.
   [[nodiscard]] virtual std::string log() const = 0;
   [[nodiscard]] NodeId id() const { return command().id; }
 

@@ -38,9 +38,9 @@ namespace {
 
 using runtime::MonotonicNs;
 
-// A node that cannot start delays the session by this at most [ns]; it is then missing from the beginning.
+// Longest wait for the first Health of all nodes [ns]; the session then begins without the missing ones.
 constexpr std::int64_t kLongestDelay_ns = 30 * kSecond_ns;
-// Until session time 0 [ns]: the manifest reaches all nodes before.
+// From the publication of SceneManifest to session time 0 [ns], so that the manifest reaches all nodes before.
 constexpr std::int64_t kLeadTime_ns = kSecond_ns / 5;
 
 }  // namespace
@@ -108,23 +108,23 @@ struct Supervisor::Impl {
   void TakeHealth(std::int64_t now) {
     for (const auto& node : nodes->all()) {
       if (!node->OnHealth(health, now)) continue;
-      // Of a pair the leader's counts.
+      // Of a standby pair, only the leader's Health enters the record.
       const bool follows = setup.settings.standby && node->id() == NodeId::kPhysics &&
                            health.state != HealthState::kRunning && health.state != HealthState::kDegraded;
-      // The record closes with the session: what a node reports of peers that have just ended is no finding.
+      // The record ends with the session: nodes then report peers that have just ended, which is no fault.
       if (clock.stopped() || follows) continue;
       const bool was_well = record.node(health.node).state != HealthState::kDegraded;
       record.AddHealth(clock.At(now), health);
       if (was_well && health.state == HealthState::kDegraded && !nodes->IsExcused(now)) DumpFault(now);
     }
-    // Of the other host: watched and started again there.
+    // The other host watches and restarts its nodes; here their Health is only recorded.
     const std::vector<NodeId>& far = setup.remote_ids;
     if (!clock.stopped() && std::find(far.begin(), far.end(), health.node) != far.end()) {
       record.AddHealth(clock.At(now), health);
     }
   }
 
-  /// A node that goes on, but no longer well: what led to it is in the newest past.
+  /// Requests a dump when a running node turns degraded: the newest seconds contain the cause.
   void DumpFault(std::int64_t now) {
     dumps->OnFault(std::string(NodeName(health.node)) + " is degraded" +
                        (health.last_error.empty() ? std::string() : ": " + health.last_error),
@@ -154,7 +154,7 @@ struct Supervisor::Impl {
     }
     const std::string last = LastLine(node.command().log);
     status.Say("! " + what + ", for good; see " + node.log() + (last.empty() ? "" : "\n  " + last));
-    // A session that runs goes on without its recorder: it is then not well, but not lost.
+    // Without its recorder a running session goes on, and its verdict is a failure.
     if (!up.keep_going && (node.id() != NodeId::kRecorder || !clock.begun())) ending = true;
   }
 
@@ -208,7 +208,7 @@ struct Supervisor::Impl {
 
   // ---------------------------------------------------------------------------------------- phases of the session
 
-  /// Until every node has reported, so that session time 0 finds all of them ready.
+  /// Waits until every node has reported, so that all are ready at session time 0.
   void WaitForNodes() {
     const std::int64_t begin = MonotonicNs();
     nodes->Start(begin);
@@ -244,7 +244,7 @@ struct Supervisor::Impl {
     TakeReports(MonotonicNs());
     clock.Stop(MonotonicNs());
     if (assessed) assessed->End(clock.reached_s());
-    // At once: a recording tells by it when the session was over.
+    // Published at once: it marks the end of the session in a recording.
     own_health->MakeDue();
     PublishOwnHealth(MonotonicNs());
     if (remote) remote->SayBye();
@@ -259,7 +259,7 @@ struct Supervisor::Impl {
         });
   }
 
-  /// The link leaves the bus first, the participant goes last: ports live at most as long as it.
+  /// The link leaves the bus first and the participant is destroyed last, because ports must not outlive it.
   void CleanUp() {
     remote.reset();
     desk.reset();
@@ -295,7 +295,7 @@ struct Supervisor::Impl {
   std::optional<NodeOrders> orders;
   std::optional<DumpTrigger> dumps;
   std::optional<CommandDesk> desk;
-  std::optional<SessionAssessment> assessed;  ///< Only of a scene with the section `assessment`.
+  std::optional<SessionAssessment> assessed;  ///< Set when the scene has the section `assessment`.
   std::optional<SessionNodes> nodes;
 
   SessionRecord record;
@@ -303,8 +303,8 @@ struct Supervisor::Impl {
   SessionStatus status;
   RefusalJournal refusals;
   Verdict verdict;
-  Health health;        ///< Of TakeReports: keeps its buffers.
-  bool ending = false;  ///< No further turn.
+  Health health;        ///< Sample of TakeReports; a member so that its buffers are reused.
+  bool ending = false;  ///< True: the loop stops after this turn.
 };
 
 Supervisor::Supervisor(const UpSettings& settings) : impl_(std::make_unique<Impl>(settings)) {}

@@ -14,26 +14,26 @@ namespace fulcrum::supervisor {
 
 struct UpSettings {
   std::filesystem::path scene;     ///< Compiled scene file.
-  std::filesystem::path out;       ///< The session folder is made in here.
+  std::filesystem::path out;       ///< Folder in which the session folder is made.
   std::filesystem::path programs;  ///< Folder of the node programs.
-  config::CartConfig cart;         ///< Its domain is the session's.
-  double seconds = -1;             ///< Session time; negative: the script's duration, or until stopped without one.
+  config::CartConfig cart;         ///< The session runs in its domain.
+  double seconds = -1;  ///< Session time [s]; negative: the script's duration; without a script until stopped.
   bool window = false;
-  std::string quality = "auto";  ///< Of the picture: auto, low, high.
-  /// Recording of all topics; a folder: <session>.mcap in it; empty: recording.mcap in the session folder.
+  std::string quality = "auto";  ///< Quality of the picture: auto, low, high.
+  /// File of the recording of all topics. A folder: <session>.mcap in it. Empty: recording.mcap in the session folder.
   std::optional<std::filesystem::path> record;
-  /// The recorder keeps so much of the newest past in memory [s] and writes it into a file of its own when a node dies
-  /// or a dump is asked for. 0: it does not.
+  /// Time [s] that a dump covers: the recorder keeps the newest samples in memory and writes them into a separate file
+  /// when a node dies or a dump is requested. 0: no dumps.
   double keep_s = 0;
-  bool standby = false;  ///< A second physics_node follows the first and takes over when that falls silent.
-  /// Nodes that run on another host, bit per NodeId, and how to reach it; 0: all run here.
+  bool standby = false;  ///< A second physics_node follows the first and takes over when the first is silent.
+  /// Nodes that run on another host, one bit per NodeId; 0: all run here.
   std::uint32_t remote = 0;
   std::string peer, address;
-  int link_domain = 0;                      ///< 0: the usual one of the cart's domain.
-  std::string trainee;                      ///< The session's score is remembered under this name; empty: it is not.
-  std::filesystem::path training_database;  ///< Where; services/session/supervisor/training_log.h.
+  int link_domain = 0;                      ///< Domain of the link; 0: the default one of the cart's domain.
+  std::string trainee;                      ///< Name under which the score is stored; empty: it is not stored.
+  std::filesystem::path training_database;  ///< File of the scores; services/session/supervisor/training_log.h.
   bool keep_going = false;                  ///< A node that failed for good does not end the session.
-  /// Not empty: nodes are started by somebody else, systemd, who finds what they need below this folder's "session".
+  /// Not empty: systemd starts the nodes and reads their arguments below "session" in this folder.
   std::filesystem::path attach;
 };
 
@@ -45,7 +45,8 @@ class Supervisor {
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  /// Returns when the session has ended and its report is written. Call from the main thread: children die with it.
+  /// Returns when the session has ended and its report is written. Call from the main thread: the children are killed
+  /// when the calling thread ends.
   ExitCode Run();
 
   [[nodiscard]] const std::filesystem::path& session_folder() const;

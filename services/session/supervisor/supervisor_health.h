@@ -18,9 +18,9 @@ class SupervisorHealth {
   [[nodiscard]] bool IsDue(std::int64_t now_ns) const { return now_ns >= next_ns_; }
   /// Makes the next sample due at once.
   void MakeDue() { next_ns_ = 0; }
-  /// The next sample, without metrics and last_error. A period later the one after it is due.
+  /// The next sample, without metrics and last_error. The sample after it is due one period later.
   [[nodiscard]] Health Make(HealthState state, std::int64_t now_ns);
-  /// Cuts `health` to what the message holds and publishes it.
+  /// Truncates `health` to the capacity of the message and publishes it.
   void Write(Health* health);
 
  private:

@@ -9,12 +9,12 @@
 namespace fulcrum::supervisor {
 namespace {
 
-// Size of a plot in SVG units, with room for the labels of the axes.
+// Size and margins of a plot in SVG units; the margins have room for the labels of the axes.
 constexpr double kWidth = 640, kHeight = 330;
 constexpr double kLeft = 66, kRight = 18, kTop = 48, kBottom = 56;
 constexpr double kTitleY = 24, kTitleX = kLeft - 50;
 constexpr double kGlyph = 10.5, kTitleGlyph = 11.5, kLegendGap = 14, kLegendRow = 24;
-constexpr std::size_t kMostDrawn = 1200;  // More points than pixels only make the file large.
+constexpr std::size_t kMostDrawn = 1200;  // More points than pixels would only enlarge the file.
 
 struct Axis {
   double step, end;
@@ -33,14 +33,14 @@ std::string Text(double x, double y, const char* anchor, const std::string& text
          EscapeHtml(text) + "</text>\n";
 }
 
-/// Where a line's label begins.
+/// Place where a line's label begins.
 struct Place {
   double x, y;
 };
 
 double WidthOf(const std::string& label) { return kGlyph * static_cast<double>(label.size()); }
 
-/// Labels of the lines that have points: right of the title while they fit there, else in rows under it.
+/// Places of the labels of lines with points: right of the title while there is room, else in rows under it.
 std::vector<Place> LegendOf(const std::vector<PlotLine>& lines, const std::string& title) {
   double width = 0;
   for (const PlotLine& line : lines) width += line.curve->points().empty() ? 0 : WidthOf(line.label) + kLegendGap;
@@ -86,7 +86,7 @@ std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& l
   const auto x_of = [&](double t) { return kLeft + (kWidth - kLeft - kRight) * std::clamp(t / end_s, 0.0, 1.0); };
   const std::string title = settings.title + " [" + settings.unit + "]";
   const std::vector<Place> legend = lines.size() > 1 ? LegendOf(lines, title) : std::vector<Place>{};
-  // Rows of the legend make the picture higher, not the plot lower.
+  // Rows of the legend enlarge the picture and leave the height of the plot as it is.
   const double top = kTop + (legend.empty() ? 0 : legend.back().y - kTitleY);
   const double height = kHeight + top - kTop;
   const auto y_of = [&](double v) {

@@ -1,4 +1,4 @@
-// Line plots over session time, or over whole numbers, as inline SVG.
+// Line plots over session time or over integers as inline SVG.
 #pragma once
 
 #include <string>
@@ -17,16 +17,16 @@ struct PlotLine {
 struct PlotSettings {
   std::string title;
   std::string unit;
-  double end_s = 0;             ///< Right end of the time axis.
+  double end_s = 0;             ///< Right end of the time axis [s].
   std::vector<double> marks_s;  ///< Restarts: dashed vertical lines.
   std::string x_label = "session time [s]";
-  bool dots = false;  ///< Over whole numbers: a dot at each point.
+  bool dots = false;  ///< Draws a dot at each point, for plots over integers.
 };
 
-/// Empty when no line has a point.
+/// The plot as an <svg> element; empty when no line has a point.
 [[nodiscard]] std::string SvgPlot(const PlotSettings& settings, const std::vector<PlotLine>& lines);
 
-/// A step of 1, 2 or 5 times a power of ten that divides `span` into at most `most` parts. span > 0.
+/// Step of 1, 2 or 5 times a power of ten that divides `span` > 0 into at most `most` parts.
 [[nodiscard]] double NiceStep(double span, int most);
 
 }  // namespace fulcrum::supervisor

@@ -10,7 +10,7 @@
 namespace fulcrum::supervisor {
 namespace {
 
-/// Columns of the table and, but for the first two, plots.
+/// Measures that are columns of the table; all but the first two are also plots.
 constexpr std::array kShown{Measure::kTime,           Measure::kPathLength,    Measure::kMovements,
                             Measure::kPeakForce,      Measure::kDeviationMean, Measure::kDamageBeyondMargin,
                             Measure::kUreterInjuries, Measure::kNerveInjuries};
@@ -44,12 +44,12 @@ std::string TraineeTable(const std::vector<TrainingRow>& rows) {
     for (std::size_t k = 0; k < kShown.size(); ++k) {
       const double* value = Find(rows[i], kShown[k]);
       const std::string text = value == nullptr ? "-" : Fixed(*value, InfoOf(kShown[k]).decimals);
-      // "mm²" is a byte longer than it looks.
+      // "mm²" has one byte more than characters.
       const auto width = static_cast<int>(std::string_view(kHeads[k]).size()) - (k == 5 ? 1 : 0);
       std::snprintf(line.data(), line.size(), "  %*s", width, text.c_str());
       table += line.data();
     }
-    table += rows[i].well ? "\n" : "  (the cart was not well)\n";
+    table += rows[i].well ? "\n" : "  (the session ended with a failure)\n";
   }
   return table;
 }
@@ -84,7 +84,7 @@ std::string TraineeSvg(const std::string& trainee, const std::vector<TrainingRow
   for (std::size_t i = 0; i < plots.size(); ++i) {
     const int x = kPlotWidth * static_cast<int>(i % kPlotsAcross),
               y = kHead + kPlotHeight * static_cast<int>(i / kPlotsAcross);
-    // A picture within a picture: it needs its place and size.
+    // A nested <svg> element needs its own place and size.
     svg += "<svg x='" + std::to_string(x) + "' y='" + std::to_string(y) + "' width='" + std::to_string(kPlotWidth) +
            "' height='" + std::to_string(kPlotHeight) + "'" + plots[i].substr(std::string_view("<svg").size());
   }

@@ -1,4 +1,4 @@
-// A trainee's sessions, one after another: a table and plots.
+// A trainee's sessions in the order of their start: a table and plots.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace fulcrum::supervisor {
 
 [[nodiscard]] std::string TraineeTable(const std::vector<TrainingRow>& rows);
 
-/// One SVG file: score and the measures that tell most, over the number of the session. Empty without sessions.
+/// One SVG file: score and the most informative measures over the number of the session. Empty without sessions.
 [[nodiscard]] std::string TraineeSvg(const std::string& trainee, const std::vector<TrainingRow>& rows);
 
 }  // namespace fulcrum::supervisor

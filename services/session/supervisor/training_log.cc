@@ -10,9 +10,9 @@
 namespace fulcrum::supervisor {
 namespace {
 
-constexpr int kApplication = 0x46554c43;  // "FULC", in the file's header.
+constexpr int kApplication = 0x46554c43;  // "FULC": SQLite's application_id in the file's header.
 constexpr int kVersion = 1;
-constexpr int kBusy_ms = 5000;  // Another session of the same user writes its row.
+constexpr int kBusy_ms = 5000;  // Longest wait while another session of the same user writes its row.
 constexpr std::size_t kLongestName = 63;
 
 constexpr const char* kTables = R"sql(
@@ -25,7 +25,7 @@ CREATE TABLE measures (
   PRIMARY KEY (session_id, measure)) WITHOUT ROWID;
 )sql";
 
-/// One prepared statement. Indices of parameters count from 1, of columns from 0, as the library has them.
+/// One prepared statement. As in SQLite, indices of parameters begin at 1, those of columns at 0.
 class Statement {
  public:
   Statement(sqlite3* database, const char* sql) {
@@ -41,7 +41,7 @@ class Statement {
   }
   void Bind(int i, double value) { good_ = good_ && sqlite3_bind_double(statement_, i, value) == SQLITE_OK; }
   void Bind(int i, sqlite3_int64 value) { good_ = good_ && sqlite3_bind_int64(statement_, i, value) == SQLITE_OK; }
-  /// A further row is there. After the last, good() tells whether it was the end or a failure.
+  /// Steps to the next row; false when there is none. good() then distinguishes the end from a failure.
   bool Next() {
     const int code = good_ ? sqlite3_step(statement_) : SQLITE_ERROR;
     good_ = code == SQLITE_ROW || code == SQLITE_DONE;
@@ -81,7 +81,7 @@ std::optional<TrainingLog> OpenTrainingLog(const std::string& trainee, const std
   if (trainee.empty()) return std::nullopt;
   if (scene.assessment.on == 0) {
     throw InputError(std::string("--trainee: scene \"") + scene.name +
-                     "\" has no section `assessment`, so there is nothing to remember; take one that has");
+                     "\" has no section `assessment`, so there is no score to store; choose a scene that has one");
   }
   return std::optional<TrainingLog>(std::in_place, file);
 }
@@ -110,7 +110,7 @@ TrainingLog& TrainingLog::operator=(TrainingLog&&) noexcept = default;
 TrainingLog::TrainingLog(const std::filesystem::path& file, Access access) : file_(file) {
   std::error_code error;
   if (access == Access::kRead && !std::filesystem::exists(file, error)) {
-    throw InputError(file.string() + ": no such database; fulcrum up SCENE --trainee NAME makes it");
+    throw InputError(file.string() + ": no such database; make it with fulcrum up SCENE --trainee NAME");
   }
   if (access == Access::kAdd && file.has_parent_path()) {
     std::filesystem::create_directories(file.parent_path(), error);
@@ -121,7 +121,7 @@ TrainingLog::TrainingLog(const std::filesystem::path& file, Access access) : fil
   const int code = sqlite3_open_v2(file.c_str(), &opened, flags, nullptr);
   database_.reset(opened);
   if (code != SQLITE_OK) Fail("cannot be opened");
-  // Opened for writing, a file that is not ours to write to is quietly opened for reading.
+  // SQLite opens a file without write permission for reading only, without an error.
   if (access == Access::kAdd && sqlite3_db_readonly(opened, "main") == 1) Fail("cannot be written to");
   sqlite3_busy_timeout(opened, kBusy_ms);
   CheckOrMake(access);
@@ -148,7 +148,7 @@ void TrainingLog::CheckOrMake(Access access) {
   const int application = Ask("PRAGMA application_id"), version = Ask("PRAGMA user_version");
   const bool empty = tables == 0 && application == 0 && version == 0;
   if (empty && access == Access::kAdd) {
-    // Whole or not at all: two sessions may begin at once.
+    // The tables are made in one transaction, because two sessions may start at the same time.
     Execute("BEGIN IMMEDIATE");
     if (Ask("SELECT count(*) FROM sqlite_master") == 0) {
       Execute(kTables);
@@ -160,8 +160,8 @@ void TrainingLog::CheckOrMake(Access access) {
   }
   if (!empty && application != kApplication) Fail("is a database of another program");
   if (version > kVersion) {
-    Fail("is of version " + std::to_string(version) + ", and this program knows " + std::to_string(kVersion) +
-         ": it was written by a newer one");
+    Fail("has version " + std::to_string(version) + " of a newer program; this program reads version " +
+         std::to_string(kVersion));
   }
   Statement check(database_.get(), "PRAGMA quick_check(1)");
   if (!check.Next() || check.Text(0) != "ok") Fail("is damaged");

@@ -18,28 +18,28 @@ namespace fulcrum::supervisor {
 struct TrainingRow {
   std::string trainee, session, scene, started_utc;
   double seconds = 0;
-  bool well = false;  ///< The session itself ended well: a trainee's score says nothing of a cart that failed.
+  bool well = false;  ///< The session ended without failure; a score of a failed cart does not assess the trainee.
   double score_pct = 0;
-  std::map<std::string, double> measures;  ///< By key of kMeasures; those that mean something in the scene.
+  std::map<std::string, double> measures;  ///< By key of kMeasures; only those that apply to the scene.
 };
-/// @pre outcome.sheet
+/// Row of an assessed session. @pre outcome.sheet has a value.
 [[nodiscard]] TrainingRow TrainingRowOf(const SessionOutcome& outcome);
 
-/// Throws InputError that names the file and says what to do. A file that is damaged, another program's, or of a newer
-/// version is never written to.
+/// An open database. All functions throw an InputError that names the file and the remedy. A file that is damaged, of
+/// another program or of a newer version is never written to.
 class TrainingLog {
  public:
   enum class Access { kRead, kAdd };
-  /// kAdd makes file and folder where there are none; kRead refuses then.
+  /// kAdd makes a missing file and its folder; kRead throws when the file is missing.
   explicit TrainingLog(const std::filesystem::path& file, Access access = Access::kAdd);
   ~TrainingLog();
   TrainingLog(TrainingLog&&) noexcept;
   TrainingLog& operator=(TrainingLog&&) noexcept;
 
   void Add(const TrainingRow& row);
-  /// Oldest first. `scene` empty: of all.
+  /// Sessions of a trainee, oldest first. `scene` empty: of all scenes.
   [[nodiscard]] std::vector<TrainingRow> SessionsOf(const std::string& trainee, const std::string& scene) const;
-  /// Names and how many sessions each has.
+  /// Number of sessions by trainee.
   [[nodiscard]] std::map<std::string, int> Trainees() const;
 
  private:
@@ -55,8 +55,8 @@ class TrainingLog {
   std::unique_ptr<sqlite3, Closer> database_;
 };
 
-/// Of a session, before anything of it is started: one that cannot be remembered is better not begun. None without a
-/// trainee. Throws InputError, also when the scene is not assessed.
+/// Opens the database before a session starts any node, so that a session whose score cannot be stored does not begin.
+/// nullopt without a trainee. Throws InputError, also when the scene has no assessment.
 [[nodiscard]] std::optional<TrainingLog> OpenTrainingLog(const std::string& trainee, const std::filesystem::path& file,
                                                          const SceneView& scene);
 

@@ -349,7 +349,7 @@ TEST_F(SupervisorTest, SwapReplacesANodeAndABadReplacementGivesItBack) {
 
   ChildProcess nonsense = Fulcrum({"swap", "thermal_node", "--with", "/nonexistent"});
   EXPECT_EQ(Wait(&nonsense).exit_code, 1) << Log();
-  EXPECT_NE(Log().find("/nonexistent: cannot be run; nothing was changed"), std::string::npos) << Log();
+  EXPECT_NE(Log().find("/nonexistent: is not an executable program; nothing was changed"), std::string::npos) << Log();
   EXPECT_EQ(PidsOf(NodeId::kThermal), before);
 
   ChildProcess swap = Fulcrum({"swap", "thermal_node", "--with", other.string()});
@@ -363,7 +363,7 @@ TEST_F(SupervisorTest, SwapReplacesANodeAndABadReplacementGivesItBack) {
   ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 3); })) << Log();
   EXPECT_NE(Log().find("thermal_node was replaced by /bin/false, which ended with exit code 1"), std::string::npos)
       << Log();
-  EXPECT_NE(Log().find("the one before comes back"), std::string::npos) << Log();
+  EXPECT_NE(Log().find("the previous program is started again"), std::string::npos) << Log();
 
   const fs::path text = folder_ / "other" / "text";
   std::ofstream(text) << "not a program";
