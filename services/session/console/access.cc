@@ -26,7 +26,7 @@ bool IsTokenText(std::string_view text) {
   return text.size() >= kShortestToken && text.size() <= kLongestToken && std::all_of(text.begin(), text.end(), plain);
 }
 
-/// Without its port; nothing when that is none.
+/// Host name without its port; nullopt when the port is malformed.
 std::optional<std::string> HostName(std::string_view host) {
   const std::size_t bracket = host.starts_with('[') ? host.find(']') : 0;
   if (bracket == std::string_view::npos || host.size() > 256) return {};
@@ -45,7 +45,7 @@ std::optional<std::string> HostName(std::string_view host) {
 }  // namespace
 
 bool SameSecret(std::string_view given, std::string_view secret) {
-  // A length is no secret; every byte is looked at whatever the ones before were.
+  // The length is not secret. Every byte is compared, so that the time does not depend on the number of equal bytes.
   unsigned difference = given.size() == secret.size() ? 0u : 1u;
   for (std::size_t i = 0; i < secret.size(); ++i) {
     const char c = i < given.size() ? given[i] : '\0';
@@ -80,12 +80,12 @@ std::string ReadToken(const std::filesystem::path& file) {
   ::close(fd);
   if (size < 0 || !S_ISREG(status.st_mode)) throw fail("cannot be read");
   if (status.st_uid != ::geteuid() || (status.st_mode & 077u) != 0) {
-    throw fail("must be yours and readable by nobody else; chmod 600 it, or remove it for a new one");
+    throw fail("must belong to the user of the console and be readable by that user only; chmod 600 or remove it");
   }
   std::string_view text(bytes.data(), static_cast<std::size_t>(size));
   if (text.ends_with('\n')) text.remove_suffix(1);
   if (!IsTokenText(text)) {
-    throw fail("must hold 16 to 256 letters, digits, '-' or '_' in one line; remove it for a new one");
+    throw fail("must contain one line of 16 to 256 letters, digits, '-' or '_'; remove it to get a new token");
   }
   return std::string(text);
 }
@@ -96,7 +96,7 @@ void WriteToken(const std::filesystem::path& file, const std::string& token) {
   std::error_code ignored;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), ignored);
   std::filesystem::remove(part, ignored);
-  // Never over what somebody else has put there, nor through a link.
+  // O_EXCL and O_NOFOLLOW: an existing file is never written, and no symbolic link is followed.
   const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
   const std::string text = token + "\n";
   const bool written = fd >= 0 && ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());

@@ -1,4 +1,4 @@
-// Who may talk to the console. Pure but for the token's file.
+// Access control of the console. Pure except for the functions on the token file.
 #pragma once
 
 #include <filesystem>
@@ -10,28 +10,28 @@
 
 namespace fulcrum::console {
 
-/// Compares without telling by its time how much was right.
+/// Compares two secrets in constant time.
 [[nodiscard]] bool SameSecret(std::string_view given, std::string_view secret);
 
-/// 256 random bits in hexadecimal.
+/// A new token: 256 random bits in hexadecimal. Throws InputError when the system has no random numbers.
 [[nodiscard]] std::string MakeToken();
 
-/// The token of a file that only its owner can read; 16 to 256 letters, digits, '-', '_'. Throws InputError.
+/// Reads the token of a file that only its owner can read: 16 to 256 letters, digits, '-', '_'. Throws InputError.
 [[nodiscard]] std::string ReadToken(const std::filesystem::path& file);
-/// Writes the file anew, readable by its owner alone. Throws InputError.
+/// Replaces the file by one that only its owner can read. Throws InputError.
 void WriteToken(const std::filesystem::path& file, const std::string& token);
 
 class Access {
  public:
-  /// @param names host names under which this machine is reached, beside localhost and numeric addresses.
+  /// @param names host names of this machine, in addition to localhost and numeric addresses.
   Access(std::string token, std::vector<std::string> names);
 
-  /// True when the Host is a numeric address, localhost or one of the names: a page of another site that has its own
-  /// name lead here (DNS rebinding) always comes with that name.
+  /// True when the Host is a numeric address, localhost or one of the names. In DNS rebinding, a page of another site
+  /// resolves its own name to this machine, and its requests have that name as Host.
   [[nodiscard]] bool IsOwnHost(std::string_view host) const;
-  /// True unless the browser says that a page of another site asks.
+  /// True unless the browser marks the request as sent by a page of another site.
   [[nodiscard]] static bool IsOwnSite(const HttpRequest& request);
-  /// True when the request brings the token: `Authorization: Bearer TOKEN`.
+  /// True when the request contains the token: `Authorization: Bearer TOKEN`.
   [[nodiscard]] bool HasToken(const HttpRequest& request) const;
 
  private:

@@ -11,10 +11,10 @@
 namespace fulcrum::console {
 namespace {
 
-// A warning of heat stands as long as one has come lately; injuries stay.
+// A warning of heat is shown for this time after the last event; injuries stay.
 constexpr std::int64_t kWarningStands = 4 * kSecond_ns;
 constexpr std::int64_t kRestartTold = 10 * kSecond_ns;
-// Below this share of the rate asked for a node is slow: above the scatter of a second's count.
+// Below this share of the requested rate a node is slow; the margin covers the scatter of counts over one second.
 constexpr float kSlowShare = 0.8f;
 
 bool IsStale(const Health& health, std::int64_t now_ns) {
@@ -26,25 +26,25 @@ bool IsSlow(const Health& health) {
          health.rate_achieved_Hz < kSlowShare * health.rate_asked_Hz;
 }
 
-/// What the operator misses without it.
+/// Effect of a missing node for the operator.
 std::string_view Missing(NodeId node) {
   switch (node) {
     case NodeId::kHandleBridge:
-      return "Jaws and pedal do not answer.";
+      return "Jaws and pedal have no effect.";
     case NodeId::kHaptics:
-      return "Tools stand still and no force is felt.";
+      return "Tools do not move and no force is rendered.";
     case NodeId::kPhysics:
-      return "The tissue stands still; forces fade out.";
+      return "The tissue does not move; forces fade out.";
     case NodeId::kThermal:
       return "Nothing is heated or cut.";
     case NodeId::kRender:
-      return "The picture stands still.";
+      return "The picture does not change.";
     case NodeId::kRecorder:
       return "Nothing is recorded.";
     case NodeId::kSupervisor:
       break;
   }
-  return "Nobody restarts what fails.";
+  return "Failed nodes are not restarted.";
 }
 
 void WarnOfNode(const NodeReport& report, const SituationReport& situation, std::vector<Warning>* warnings) {
@@ -53,7 +53,7 @@ void WarnOfNode(const NodeReport& report, const SituationReport& situation, std:
   if (health.pid == 0) {
     if (situation.begun) {
       warnings->push_back({"fault", name + " has never reported. " + std::string(Missing(report.node)),
-                           "Press Restart at its row. If it stays: end the session and read its log."});
+                           "Press Restart in its row. If this warning stays, stop the session and read its log."});
     }
     return;
   }
@@ -61,11 +61,11 @@ void WarnOfNode(const NodeReport& report, const SituationReport& situation, std:
     const std::int64_t s = (situation.now_ns - health.stamp.stamp_ns) / kSecond_ns;
     warnings->push_back(
         {"fault", name + " has been silent for " + std::to_string(s) + " s. " + std::string(Missing(report.node)),
-         "It is restarted by itself after 5 s. To be faster, press Restart at its row."});
+         "It is restarted automatically after 5 s. To restart it now, press Restart in its row."});
     return;
   }
   if (report.restarted_ns != 0 && situation.now_ns - report.restarted_ns < kRestartTold) {
-    warnings->push_back({"note", name + " was restarted and goes on.",
+    warnings->push_back({"note", name + " was restarted and runs again.",
                          report.restarts < 3 ? "Nothing to do."
                                              : "It was restarted " + std::to_string(report.restarts) +
                                                    " times: read its log, and check cables and devices."});
@@ -73,15 +73,15 @@ void WarnOfNode(const NodeReport& report, const SituationReport& situation, std:
   if (!health.last_error.empty()) {
     warnings->push_back({"fault", name + ": " + health.last_error,
                          report.node == NodeId::kHandleBridge
-                             ? "Check plug and power of the handle or pedal that is named."
+                             ? "Check plug and power of the handle or pedal named here."
                          : report.node == NodeId::kRecorder ? "Free some disk space, or record to another disk."
-                                                            : "If it stays, press Restart at its row."});
+                                                            : "If this warning stays, press Restart in its row."});
   } else if (IsSlow(health)) {
     warnings->push_back({"fault",
                          name + " runs at " + supervisor::Fixed(static_cast<double>(health.rate_achieved_Hz), 0) +
                              " of " + supervisor::Fixed(static_cast<double>(health.rate_asked_Hz), 0) +
                              " Hz: the computer is too slow.",
-                         "Close other programs; choose fewer pictures per second or a smaller scene."});
+                         "Close other programs, or choose fewer pictures per second or a smaller scene."});
   }
 }
 
@@ -139,20 +139,20 @@ std::vector<Warning> WarningsOf(const SituationReport& situation) {
   for (const auto& [name, kinds] : structures) {
     if (at(kinds.second) != 0) {
       warnings.push_back({"danger", std::string("The ") + name + " is injured by heat.",
-                          "Pedal up. Talk the step over; replay the recording."});
+                          "Release the pedal. Discuss this step; replay the recording."});
     } else if (recent(kinds.first)) {
       warnings.push_back({"danger", std::string("Heat near the ") + name + ".",
-                          "Pedal up, move the hook away, or lift the tissue off."});
+                          "Release the pedal, move the hook away, or lift the tissue off."});
     }
   }
   if (!situation.bus_trouble.empty()) {
-    warnings.push_back({"fault", "The session cannot be watched: " + situation.bus_trouble,
+    warnings.push_back({"fault", "The console cannot join the session: " + situation.bus_trouble,
                         "Start console and session from the same installation."});
   }
   for (const NodeReport& report : situation.nodes) WarnOfNode(report, situation, &warnings);
   if (recent(ThermalEventKind::kQuarantine)) {
     warnings.push_back({"note", "A piece of tissue had to be reset.",
-                        "Nothing to do; if it comes again, end the session and keep the recording."});
+                        "Nothing to do. If this warning comes again, stop the session and keep the recording."});
   }
   const auto rank = [](const Warning& warning) {
     return std::string_view(warning.level) == "danger" ? 0 : std::string_view(warning.level) == "fault" ? 1 : 2;

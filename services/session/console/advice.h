@@ -1,4 +1,4 @@
-// What is wrong, in plain words, and what to do about it. Pure.
+// Conditions of the nodes and warnings for the operator, each with its remedy. Pure functions.
 #pragma once
 
 #include <array>
@@ -10,27 +10,27 @@
 
 namespace fulcrum::console {
 
-/// How a node is, for a glance from two metres.
+/// Condition of a node as one word, readable from two metres.
 struct NodeCondition {
   const char* level;  ///< "good", "busy", "bad", "off": the page has a colour for each.
   const char* word;   ///< "Healthy", "Slow", "Silent", …
 };
 
-/// What is known of one node.
+/// State of one node as reported by its Health and the supervisor's.
 struct NodeReport {
   NodeId node = NodeId::kSupervisor;
-  const Health* health = nullptr;  ///< pid 0: never heard.
+  const Health* health = nullptr;  ///< Newest Health; pid 0: none has arrived.
   int restarts = 0;
-  std::int64_t restarted_ns = 0;  ///< 0: never.
+  std::int64_t restarted_ns = 0;  ///< Time of the last restart [ns]; 0: none.
 };
 
 [[nodiscard]] NodeCondition ConditionOf(const NodeReport& report, std::int64_t now_ns);
 
-/// "Haptics", "Tissue", "Heat", …
+/// Name of a node for the operator: "Haptics", "Tissue", "Heat", …
 [[nodiscard]] const char* PlainName(NodeId node);
 
 struct Warning {
-  const char* level;  ///< "danger": the patient or a figure is at stake; "fault": something does not work; "note".
+  const char* level;  ///< "danger": an injury or its warning; "fault": a part does not work; "note": information.
   std::string text, todo;
 };
 
@@ -38,12 +38,12 @@ struct SituationReport {
   std::int64_t now_ns = 0;
   bool begun = false;
   std::vector<NodeReport> nodes;
-  /// When an event of each ThermalEventKind last came [ns]; 0: none.
+  /// Time of the last event of each ThermalEventKind [ns]; 0: none.
   std::array<std::int64_t, 10> events_ns{};
   std::string bus_trouble;
 };
 
-/// Most urgent first.
+/// All warnings, the most urgent first.
 [[nodiscard]] std::vector<Warning> WarningsOf(const SituationReport& situation);
 
 }  // namespace fulcrum::console

@@ -39,7 +39,7 @@ constexpr auto kTurn = std::chrono::milliseconds(200);
 constexpr std::int64_t kFeedPeriod = kSecond_ns / 5;
 constexpr std::int64_t kTicketLife = 60 * kSecond_ns;
 constexpr std::size_t kMostRecordings = 50;
-// A report carries its own style and pictures, and nothing that runs.
+// A report contains its own style and pictures, and no scripts.
 constexpr const char* kReportPolicy =
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; media-src data:; frame-ancestors 'self'; sandbox";
 
@@ -67,7 +67,7 @@ std::optional<std::string> ReadAll(const fs::path& file) {
   std::error_code error;
   const auto size = fs::is_regular_file(file, error) ? fs::file_size(file, error) : 0;
   if (error || size == 0) return {};
-  // In one piece: pictures come many times a minute.
+  // One read call for the whole file, because pictures are read many times a minute.
   std::string bytes(size, '\0');
   std::ifstream stream(file, std::ios::binary);
   stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
@@ -105,7 +105,7 @@ struct Console::Impl {
       WriteToken(token_file, token);
     }
     access.emplace(token, OwnNames(settings.host_names));
-    // What there was before this console: its report can still be read.
+    // The last session before this console was started, so that its report can be opened.
     ShowSession(fs::read_symlink(settings.out / "latest", error).filename());
   }
 
@@ -150,7 +150,7 @@ struct Console::Impl {
       case Wanted::kRestart:
         return Ask("restart", TextIn(routed.fields, "node"));
       case Wanted::kDump:
-        return Ask("dump", "asked for on the console");
+        return Ask("dump", "requested on the console");
       case Wanted::kGenerator:
         return TurnGenerator(routed.fields);
       case Wanted::kReplay:
@@ -161,11 +161,11 @@ struct Console::Impl {
       case Wanted::kCancel:
         return LeadTask(routed.wanted);
       case Wanted::kClose:
-        if (task && task->running()) return Refusal(409, "it is not done");
+        if (task && task->running()) return Refusal(409, "the task still runs; wait for its end or cancel it");
         task.reset();
         return Done("closed");
     }
-    return Refusal(404, "no such call");
+    return Refusal(404, "unknown call; valid calls: services/session/console/DESIGN.md");
   }
 
   static HttpResponse Page(const std::string& path) {
@@ -176,26 +176,28 @@ struct Console::Impl {
 
   static HttpResponse File(const fs::path& file, const char* type) {
     std::optional<std::string> bytes = file.empty() ? std::nullopt : ReadAll(file);
-    if (!bytes) return Refusal(404, "it is not there (yet)");
+    if (!bytes) return Refusal(404, "the file does not exist, or not yet");
     return {.type = type, .body = *std::move(bytes)};
   }
 
   HttpResponse Report(const std::string& given) {
     const bool valid = !ticket.empty() && SameSecret(given, ticket) && MonotonicNs() < ticket_end_ns;
     ticket.clear();
-    if (!valid) return Refusal(401, "this address was good once and for a minute; open the report from the page");
+    if (!valid) return Refusal(401, "this address is valid once and for one minute; open the report from the page");
     HttpResponse response = File(SessionFile("report.html"), "text/html; charset=utf-8");
     response.policy = kReportPolicy;
     return response;
   }
 
   HttpResponse Start(const Form& fields) {
-    if (watch.alive() || run.running()) return Refusal(409, "a session runs already; stop it first");
-    if (task && task->running()) return Refusal(409, "\"" + task->title() + "\" is not done; wait for it or cancel it");
+    if (watch.alive() || run.running()) return Refusal(409, "a session is running; stop it first");
+    if (task && task->running())
+      return Refusal(409, "\"" + task->title() + "\" still runs; wait for its end or cancel it");
     const std::string& scene = TextIn(fields, "scene");
     const std::vector<SceneChoice> scenes = FindScenes(settings.scenes);
     const auto known = [&](const SceneChoice& choice) { return choice.name == scene; };
-    if (std::none_of(scenes.begin(), scenes.end(), known)) return Refusal(404, "no scene \"" + scene + "\"");
+    if (std::none_of(scenes.begin(), scenes.end(), known))
+      return Refusal(404, "no scene \"" + scene + "\"; valid: those that /api/choices lists");
     SessionOrder order;
     order.scene = settings.scenes / (scene + ".yaml");
     order.power_W = MaybeNumberIn(fields, "power");
@@ -215,12 +217,12 @@ struct Console::Impl {
     return Ask("down", "");
   }
 
-  /// Takes a while: the answer comes as a notice.
+  /// Sends a command to the supervisor in another thread, because it may take seconds; the reply becomes a notice.
   HttpResponse Ask(const std::string& verb, const std::string& argument) {
     if (!watch.alive()) return Refusal(409, "no session runs");
-    if (asking.valid()) return Refusal(409, "the supervisor has not answered the last request yet");
+    if (asking.valid()) return Refusal(409, "the supervisor has not replied to the last request yet; try again");
     asking = std::async(std::launch::async, supervisor::AskSupervisor, settings.domain, verb, argument);
-    return Done("asked");
+    return Done("sent");
   }
 
   HttpResponse TurnGenerator(const Form& fields) {
@@ -228,7 +230,7 @@ struct Console::Impl {
     for (const auto& [knob, power] : fields) {
       words.append(words.empty() ? "" : " ").append(knob).append("=").append(power);
     }
-    if (words.empty()) return Refusal(400, "cut, coag or blend: which knob, and how many watts?");
+    if (words.empty()) return Refusal(400, "no knob is named; give cut, coag or blend with 0 to 300 W");
     return Ask("generator", words);
   }
 
@@ -237,16 +239,15 @@ struct Console::Impl {
     task = std::make_unique<GuidedTask>(std::move(title), settings.programs / program, arguments);
   }
 
-  /// Empty, or why no task can begin.
+  /// Reason why no task can begin; empty: one can.
   [[nodiscard]] std::string TaskObstacle(const char* why_no_session) const {
     if (watch.alive() || run.running()) return std::string("stop the session first: ") + why_no_session;
-    if (task && task->running()) return "\"" + task->title() + "\" is not done; wait for it or cancel it";
+    if (task && task->running()) return "\"" + task->title() + "\" still runs; wait for its end or cancel it";
     return {};
   }
 
   HttpResponse Replay(const std::string& name) {
-    if (const std::string why = TaskObstacle("a replay would take its processor"); !why.empty())
-      return Refusal(409, why);
+    if (const std::string why = TaskObstacle("a replay would slow it down"); !why.empty()) return Refusal(409, why);
     const fs::path file = settings.out / name;
     std::error_code error;
     if (!fs::is_regular_file(file, error)) return Refusal(404, "no recording " + name);
@@ -255,7 +256,7 @@ struct Console::Impl {
   }
 
   HttpResponse Calibrate(const std::string& what, const std::string& tool) {
-    if (const std::string why = TaskObstacle("a port or device has one reader"); !why.empty()) return Refusal(409, why);
+    if (const std::string why = TaskObstacle("it uses the port or device"); !why.empty()) return Refusal(409, why);
     const bool handle = what == "handle";
     if (!handle && settings.cart.empty()) {
       return Refusal(409,
@@ -271,13 +272,13 @@ struct Console::Impl {
   }
 
   HttpResponse LeadTask(Wanted wanted) {
-    if (!task || !task->running()) return Refusal(409, "nothing is to be led");
+    if (!task || !task->running()) return Refusal(409, "no calibration or replay is running");
     if (wanted == Wanted::kEnter) {
       task->Enter();
     } else {
       task->Cancel(MonotonicNs());
     }
-    return Done("passed on");
+    return Done("sent to the task");
   }
 
   // ------------------------------------------------------------------------------------------------- what is shown
@@ -322,7 +323,7 @@ struct Console::Impl {
     return session.empty() ? fs::path() : settings.out / session / name;
   }
 
-  /// From here on the picture and the report are those of that session; a name that is none shows none.
+  /// Selects the session whose picture and report are shown; an invalid name selects none.
   void ShowSession(const std::string& id) {
     session = IsPlainName(id) ? id : std::string();
     pictures = PictureWatch(session.empty() ? fs::path() : settings.out / session / "frames");
@@ -360,14 +361,14 @@ struct Console::Impl {
   SessionRun run;
   SessionWatch watch;
   std::unique_ptr<GuidedTask> task;
-  std::string session;  ///< Folder in `out`; empty: none.
+  std::string session;  ///< Name of the shown session's folder in `out`; empty: none.
   PictureWatch pictures;
   std::future<CommandReply> asking;
   Notice notice;
   std::string ticket;
   std::int64_t ticket_end_ns = 0;
   std::int64_t next_feed_ns = 0;
-  // Last: its handler uses the rest.
+  // Declared last, because its handler uses the other members.
   HttpServer server;
 };
 

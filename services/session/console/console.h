@@ -1,4 +1,5 @@
-// The operator's console: a page for the cart's touch screen, and what it asks for. Outlives the sessions it starts.
+// The operator's console: serves a page for the cart's touch screen and executes its requests. Sessions that it starts
+// go on when it ends.
 #pragma once
 
 #include <filesystem>
@@ -10,21 +11,22 @@ namespace fulcrum::console {
 
 struct ConsoleSettings {
   std::string bind = "127.0.0.1";
-  int port = 8480;                      ///< 0: any that is free.
-  std::vector<std::string> host_names;  ///< Under which the page may be asked for, beside localhost and addresses.
-  /// Holds the token: what is in it already, or a new one. Empty: a new one in a file of the user's own.
+  int port = 8480;                      ///< 0: any free port.
+  std::vector<std::string> host_names;  ///< Valid host names of the page, besides localhost and numeric addresses.
+  /// File of the token: an existing token is used, else a new one is written. Empty: a new token in a private file of
+  /// the user.
   std::filesystem::path token_file;
-  std::filesystem::path cart;      ///< Empty: everything simulated.
-  std::filesystem::path data;      ///< Meshes that scenes import; empty: the scenes' own.
-  std::filesystem::path out;       ///< Session folders.
-  std::filesystem::path scenes;    ///< Descriptions to choose from.
-  std::filesystem::path programs;  ///< fulcrum, replayer and the nodes.
+  std::filesystem::path cart;      ///< Cart file; empty: all hardware is simulated.
+  std::filesystem::path data;      ///< Folder of meshes that scenes import; empty: the folder of each scene.
+  std::filesystem::path out;       ///< Folder of the session folders.
+  std::filesystem::path scenes;    ///< Folder of the scene descriptions on offer.
+  std::filesystem::path programs;  ///< Folder of fulcrum, replayer and the nodes.
   int domain = 7;
 };
 
 class Console {
  public:
-  /// Listens. Throws InputError.
+  /// Binds the port and listens. Throws InputError.
   explicit Console(const ConsoleSettings& settings);
   ~Console();
   Console(const Console&) = delete;
@@ -34,9 +36,9 @@ class Console {
   [[nodiscard]] std::string Address() const;
   [[nodiscard]] const std::filesystem::path& token_file() const;
 
-  /// Serves until a stop signal. Call from the main thread: what it starts may die with the thread.
+  /// Serves until a stop signal. Call from the main thread: tasks are killed when the calling thread ends.
   void Run();
-  /// A session that was started here runs still.
+  /// True when a session that was started here still runs.
   [[nodiscard]] bool session_runs() const;
 
  private:

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::int64_t kPatience_ns = 3'000'000'000;
 
-/// Both sides of a pseudo-terminal that does not echo; closed at the end of the scope unless taken.
+/// Both sides of a pseudo-terminal without echo; closed at the end of the scope unless taken.
 class Terminal {
  public:
   Terminal() : ours_(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK)) {
@@ -79,7 +79,7 @@ bool GuidedTask::Read() {
 bool GuidedTask::Poll(std::int64_t now_ns) {
   if (!process_.running()) return false;
   bool changed = false;
-  // The end first: what was said before it is then there to be read.
+  // The end is polled before the output, so that all output of an ended program is read.
   if (const auto end = process_.Poll()) {
     end_ = end;
     changed = true;

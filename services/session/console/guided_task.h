@@ -1,4 +1,4 @@
-// A program that is led from the page: a calibration, a replay. It believes in a terminal.
+// A calibration or replay that the operator controls from the page. Its program runs on a pseudo-terminal.
 #pragma once
 
 #include <cstdint>
@@ -14,37 +14,37 @@ namespace fulcrum::console {
 
 class GuidedTask {
  public:
-  /// Starts it. Throws InputError. Call from the main thread.
+  /// Starts the program. Throws InputError. Call from the main thread.
   GuidedTask(std::string title, const std::filesystem::path& program, const std::vector<std::string>& arguments);
   ~GuidedTask();
   GuidedTask(const GuidedTask&) = delete;
   GuidedTask& operator=(const GuidedTask&) = delete;
 
-  /// Takes what the program has said, and its end. True when anything has changed.
+  /// Reads the program's output and detects its end. True when either has changed.
   bool Poll(std::int64_t now_ns);
-  /// Presses Enter.
+  /// Sends Enter to the program.
   void Enter();
-  /// As Ctrl-C does; a program that does not end within 3 s is killed.
+  /// Sends SIGINT; a program that does not end within 3 s is killed.
   void Cancel(std::int64_t now_ns);
 
   [[nodiscard]] const std::string& title() const { return title_; }
   [[nodiscard]] std::string text() const { return screen_.Text(); }
   [[nodiscard]] bool running() const { return process_.running(); }
-  /// It asks for Enter and waits.
+  /// True when the program waits for Enter.
   [[nodiscard]] bool wants_enter() const;
   [[nodiscard]] bool cancelled() const { return kill_ns_ != 0; }
-  /// Once it has ended.
+  /// How the program ended; nullopt while it runs.
   [[nodiscard]] const std::optional<supervisor::ProcessEnd>& end() const { return end_; }
 
  private:
   bool Read();
 
   std::string title_;
-  int terminal_ = -1;  ///< Our side.
+  int terminal_ = -1;  ///< The console's side of the pseudo-terminal.
   supervisor::ChildProcess process_;
   ScreenText screen_;
   std::optional<supervisor::ProcessEnd> end_;
-  std::int64_t kill_ns_ = 0;  ///< When patience with a cancelled one ends; 0: not cancelled.
+  std::int64_t kill_ns_ = 0;  ///< Time of SIGKILL after Cancel; 0: not cancelled.
 };
 
 }  // namespace fulcrum::console

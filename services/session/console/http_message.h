@@ -1,4 +1,4 @@
-// What the console's routes see of HTTP: plain texts, no library. Pure.
+// HTTP requests and responses as plain texts, so that the console's routes need no HTTP library.
 #pragma once
 
 #include <string>
@@ -7,7 +7,7 @@ namespace fulcrum::console {
 
 struct HttpRequest {
   std::string method, target;
-  std::string host, origin, fetch_site, authorization, content_type;  ///< Header fields; empty: not there.
+  std::string host, origin, fetch_site, authorization, content_type;  ///< Header fields; empty: missing.
   std::string body;
 };
 
@@ -15,8 +15,8 @@ struct HttpResponse {
   int status = 200;
   std::string type = "application/json";
   std::string body = {};
-  std::string policy = {};  ///< Content-Security-Policy; empty: the page's own.
-  bool stream = false;      ///< The body is the first of many parts, and the connection stays.
+  std::string policy = {};  ///< Content-Security-Policy; empty: that of the page.
+  bool stream = false;      ///< True: the body is the first of many parts, and the connection stays open.
 };
 
 }  // namespace fulcrum::console

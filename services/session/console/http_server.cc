@@ -22,12 +22,12 @@ namespace http = boost::beast::http;
 using tcp = asio::ip::tcp;
 using Clock = std::chrono::steady_clock;
 
-// Everything comes from here and goes nowhere else; nobody may frame the page.
+// The page loads from and sends to this server only, and no other page may embed it in a frame.
 constexpr const char* kPagePolicy = "default-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 std::string Field(const http::request<http::string_body>& message, http::field name) {
   const auto [first, last] = message.equal_range(name);
-  // A field twice is a trick: as if it were wrong.
+  // A repeated field may be an attack on the checks: this value passes none of them.
   if (first != last && std::next(first) != last) return "\x01";
   return first == last ? std::string() : std::string(first->value());
 }
@@ -69,7 +69,7 @@ int StatusOf(const beast::error_code& error) {
   return 400;
 }
 
-/// What all connections share.
+/// Data that all connections share.
 struct Shared {
   HttpServer::Handler handler;
   HttpLimits limits;
@@ -94,10 +94,10 @@ class Connection : public std::enable_shared_from_this<Connection> {
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](const beast::error_code& error, std::size_t) { self->OnRead(error); });
   }
-  /// Without reading.
+  /// Sends a refusal without reading a request.
   void Refuse(int status) { Send({.status = status, .type = "text/plain", .body = "refused\n"}, false); }
 
-  // As a stream:
+  // For a connection that has become a stream:
   [[nodiscard]] bool busy() const { return busy_; }
   [[nodiscard]] bool is_late(Clock::time_point now) const {
     return busy_ && now - busy_since_ > shared_->limits.response;
@@ -124,7 +124,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void OnRead(const beast::error_code& error) {
     if (error == http::error::end_of_stream || error == beast::error::timeout) return Close();
     if (error) {
-      // Only what is wrong with the request itself is answered.
+      // Only errors of the request itself get a response.
       if (error.category() == make_error_code(http::error::bad_target).category()) return Refuse(StatusOf(error));
       return Close();
     }
@@ -151,7 +151,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     auto response = std::make_shared<http::response<http::empty_body>>(Head<http::empty_body>(from, true));
     response->chunked(true);
     auto serializer = std::make_shared<http::response_serializer<http::empty_body>>(*response);
-    // Its own clock from here on: Feed closes who does not read.
+    // A stream has its own time limit: Feed closes a connection whose client does not read.
     stream_.expires_never();
     busy_ = true;
     busy_since_ = Clock::now();
@@ -165,7 +165,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
     WatchForEnd();
   }
 
-  /// The other side has nothing more to say: whatever comes is its end.
+  /// Closes the stream at the next event on the socket: the client ends it, or sends bytes that are not allowed here.
   void WatchForEnd() {
     stream_.socket().async_read_some(
         asio::buffer(&last_word_, 1),
@@ -178,7 +178,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::shared_ptr<Shared> shared_;
   std::list<std::weak_ptr<Connection>>* streams_;
   std::string part_;
-  bool busy_ = false;  ///< A part is on its way.
+  bool busy_ = false;  ///< A part is being sent.
   Clock::time_point busy_since_;
   std::uint64_t cursor_ = 0;
   char last_word_ = 0;
@@ -221,7 +221,7 @@ struct HttpServer::Impl {
 
   std::shared_ptr<Shared> shared;
   std::list<std::weak_ptr<Connection>> streams;
-  // Last, so that what waits in it goes first.
+  // Declared last, so that pending operations are destroyed before the members that they use.
   asio::io_context io{1};
   tcp::acceptor acceptor{io};
 };

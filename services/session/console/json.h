@@ -1,4 +1,4 @@
-// JSON for the page, built piece by piece.
+// JSON texts for the page.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@
 
 namespace fulcrum::console {
 
-/// Builds one object or list.
+/// Builder of one object or list.
 class Json {
  public:
   explicit Json(char open) : text_(1, open), close_(open == '{' ? '}' : ']') {}
@@ -22,7 +22,7 @@ class Json {
   }
   Json& Text(std::string_view key, std::string_view value) { return Raw(key, JsonString(ValidUtf8(value))); }
   Json& Flag(std::string_view key, bool value) { return Raw(key, value ? "true" : "false"); }
-  /// Rounded: what is shown needs no more, and a short text is a cheap one.
+  /// Adds a number rounded to a multiple of the step: the page shows no more digits, and short texts need less time.
   Json& Number(std::string_view key, double value, double step) { return Raw(key, Rounded(value, step)); }
   Json& Item(std::string_view value) {
     Next();

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostKeys = 2000;  // As in the scene's own reader.
+constexpr std::size_t kMostKeys = 2000;  // Same limit as in the reader of scenes.
 
 SceneChoice ReadScene(const fs::path& file) {
   using config::Range;
@@ -45,7 +45,7 @@ std::vector<SceneChoice> FindScenes(const fs::path& folder) {
     if (!IsPlainName(name)) continue;
     try {
       scenes.push_back(ReadScene(folder / (name + ".yaml")));
-    } catch (const InputError&) {  // `fulcrum up` says what is wrong with it.
+    } catch (const InputError&) {  // `fulcrum up` reports what is wrong with the file.
     }
   }
   return scenes;

@@ -1,4 +1,4 @@
-// What can be chosen on the page: the scenes of a folder, and the recordings of earlier sessions.
+// Choices on the page: the scenes of a folder and the recordings of earlier sessions.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@ namespace fulcrum::console {
 struct SceneChoice {
   std::string name, description;
   double duration_s = 0;
-  double power_W = 0;  ///< The generator's setting; 0: the scene asks for none.
+  double power_W = 0;  ///< Generator power of the script [W]; 0: the scene sets none.
   double picture_rate_Hz = 0;
 };
-/// Scenes described in a folder by file name; one that cannot be read is left out.
+/// Scene descriptions of a folder, sorted by file name; unreadable ones are left out.
 [[nodiscard]] std::vector<SceneChoice> FindScenes(const std::filesystem::path& folder);
 
 struct RecordingChoice {

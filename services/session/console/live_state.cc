@@ -9,7 +9,8 @@
 namespace fulcrum::console {
 namespace {
 
-/// What a node lives on: the age of its newest sample is the node's latency. Others come only when something changes.
+/// The input that drives a node's step: the age of its newest sample is the node's latency. Other inputs are published
+/// on changes only, so their age is no latency.
 const InputHealth* MainInput(const Health& health) {
   const auto is_main = [&](TopicId topic) {
     switch (health.node) {

@@ -1,4 +1,4 @@
-// What the page shows now, as JSON. The names of its fields are those of services/session/console/DESIGN.md.
+// The present state of the page as JSON. services/session/console/DESIGN.md lists the fields.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace fulcrum::console {
 
-/// The answer to the last request that took its time.
+/// Reply to the last request that was sent to the supervisor.
 struct Notice {
   std::uint64_t number = 0;  ///< 0: none yet.
   bool ok = true;
@@ -22,14 +22,14 @@ struct LiveState {
   std::int64_t now_ns = 0;
   const SessionWatch* watch = nullptr;
   const SessionRun* run = nullptr;
-  const GuidedTask* task = nullptr;  ///< nullptr: none yet.
-  std::string session;               ///< That runs or ran last; empty: none.
-  std::string picture;               ///< Newest; empty: none.
+  const GuidedTask* task = nullptr;  ///< nullptr: no task was started yet.
+  std::string session;               ///< Name of the running or last session; empty: none.
+  std::string picture;               ///< Name of the newest picture; empty: none.
   bool has_report = false;
   Notice notice;
 };
 
-/// One JSON object in one line. Plot points after number `*cursor` are in it, and `*cursor` is moved on.
+/// One JSON object in one line. It contains the plot points after number `*cursor`, which is set to the last of them.
 [[nodiscard]] std::string LiveJson(const LiveState& state, std::uint64_t* cursor);
 
 }  // namespace fulcrum::console

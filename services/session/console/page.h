@@ -1,4 +1,4 @@
-// The page: files that were put into the program when it was built.
+// The page: files that are compiled into the program.
 #pragma once
 
 #include <span>
@@ -7,13 +7,13 @@
 namespace fulcrum::console {
 
 struct PageFile {
-  std::string_view path;  ///< As it is asked for.
+  std::string_view path;  ///< Path in the request.
   std::string_view type;
   std::string_view text;
 };
 
 [[nodiscard]] std::span<const PageFile> PageFiles();
-/// nullptr: there is no such file.
+/// The file of a path; nullptr when there is none.
 [[nodiscard]] const PageFile* FindPageFile(std::string_view path);
 
 }  // namespace fulcrum::console

@@ -14,7 +14,7 @@ namespace fulcrum::console {
 
 PictureWatch::PictureWatch(const std::filesystem::path& frames)
     : frames_(frames), notify_(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC)) {
-  // Pictures are written under another name and then moved: what is seen is whole.
+  // Pictures are written under another name and then renamed, so a reported picture is complete.
   if (notify_ >= 0) ::inotify_add_watch(notify_, frames.c_str(), IN_MOVED_TO | IN_ONLYDIR);
   if (const auto all = supervisor::FindFrames(frames); !all.empty()) newest_ = all.back().file.filename();
 }

@@ -1,4 +1,4 @@
-// The newest picture of a session, told by the kernel instead of by reading the folder again and again.
+// The newest picture of a session, reported by inotify instead of by repeated reading of the folder.
 #pragma once
 
 #include <filesystem>
@@ -9,15 +9,15 @@ namespace fulcrum::console {
 class PictureWatch {
  public:
   PictureWatch() = default;
-  /// Watches `frames`, which need not be there: then there is never a picture.
+  /// Watches `frames`; when that folder does not exist, there is never a picture.
   explicit PictureWatch(const std::filesystem::path& frames);
   ~PictureWatch();
   PictureWatch(PictureWatch&& other) noexcept;
   PictureWatch& operator=(PictureWatch&& other) noexcept;
 
-  /// Name of the newest picture; empty: none yet.
+  /// Name of the newest picture; empty: there is none yet.
   [[nodiscard]] const std::string& Newest();
-  /// The file of a picture of this session; empty when `name` is not the name of one.
+  /// Path of a picture of this session; empty when `name` is no valid name of a picture.
   [[nodiscard]] std::filesystem::path FileOf(const std::string& name) const;
 
  private:

@@ -36,7 +36,7 @@ bool IsPictureRate(std::string_view text) { return ParseNumber(text, 0.1, 30).ha
 bool IsTicket(std::string_view text) { return text.size() == 64 && IsPlainName(text); }
 
 constexpr std::array kPictureFields{Field{"name", true, IsPictureName, "frame_<digits>.png"}};
-constexpr std::array kReportFields{Field{"ticket", true, IsTicket, "what /api/ticket gave"}};
+constexpr std::array kReportFields{Field{"ticket", true, IsTicket, "the text that /api/ticket returned"}};
 constexpr std::array kStartFields{
     Field{"scene", true, IsPlainName, "a name that /api/choices lists"},
     Field{"power", false, IsPower, "1 to 300 W"},
@@ -86,7 +86,7 @@ HttpResponse Answer(int status, bool ok, std::string_view text) {
   return response;
 }
 
-/// Empty, or what is wrong.
+/// First error in the fields; empty: they are valid.
 std::string Wrong(const Form& form, std::span<const Field> fields) {
   for (const auto& [name, value] : form) {
     const auto known = [&name = name](const Field& field) { return field.name == name; };
@@ -109,10 +109,10 @@ HttpResponse Done(std::string_view text) { return Answer(200, true, text); }
 RouteResult Route(const Access& access, const HttpRequest& request) {
   const auto refuse = [](int status, std::string_view text) { return RouteResult{{}, Refusal(status, text)}; };
   if (!access.IsOwnHost(request.host)) {
-    return refuse(421, "this console is not of that host; use its address, or start it with --host-name");
+    return refuse(421, "unknown host name; use the numeric address, or start the console with --host-name NAME");
   }
   const bool post = request.method == "POST";
-  if (!post && request.method != "GET") return refuse(405, "GET or POST");
+  if (!post && request.method != "GET") return refuse(405, "invalid method; valid: GET, POST");
   const std::optional<Target> target = ParseTarget(request.target);
   if (!target) return refuse(400, "malformed target");
   const bool api = target->path.starts_with("/api/");
@@ -127,10 +127,11 @@ RouteResult Route(const Access& access, const HttpRequest& request) {
     return refuse(401, "the token is missing or wrong; open the address that `fulcrum console` printed");
   const auto entry =
       std::find_if(kEntries.begin(), kEntries.end(), [&](const Entry& e) { return e.path == target->path; });
-  if (entry == kEntries.end()) return refuse(404, "no such call");
-  if (entry->post != post) return refuse(405, entry->post ? "POST" : "GET");
-  if (post && !target->query.empty()) return refuse(400, "fields go into the body");
-  if (!post && !request.body.empty()) return refuse(400, "no body here");
+  if (entry == kEntries.end()) return refuse(404, "unknown call");
+  if (entry->post != post)
+    return refuse(405, entry->post ? "invalid method; valid: POST" : "invalid method; valid: GET");
+  if (post && !target->query.empty()) return refuse(400, "a POST has its fields in the body, not in the address");
+  if (!post && !request.body.empty()) return refuse(400, "a GET must have no body");
   if (!request.body.empty() && !request.content_type.starts_with("application/x-www-form-urlencoded")) {
     return refuse(415, "application/x-www-form-urlencoded");
   }

@@ -1,4 +1,4 @@
-// From a request to what is wanted: access, method, path and fields are checked here, in one table. Pure.
+// Routing of requests: one table lists the calls, and access, method, path and fields are checked here. Pure functions.
 #pragma once
 
 #include <optional>
@@ -12,34 +12,34 @@
 namespace fulcrum::console {
 
 enum class Wanted {
-  kPage,        ///< A file of the page: path.
-  kReport,      ///< With a ticket of kTicket.
-  kState,       ///< What the page shows now.
-  kEvents,      ///< The same again and again.
-  kChoices,     ///< Scenes and what can be set.
-  kPicture,     ///< name
-  kRecordings,  ///< What can be replayed.
+  kPage,        ///< A file of the page; `path` is its path.
+  kReport,      ///< The report; needs a ticket of kTicket.
+  kState,       ///< The present state of the page.
+  kEvents,      ///< The state as a stream, repeatedly.
+  kChoices,     ///< The scenes and their settings.
+  kPicture,     ///< A picture. Field: name.
+  kRecordings,  ///< The recordings that can be replayed.
   kSummary,     ///< Figures of the last session.
-  kTicket,      ///< Opens the report of the last session once.
-  kStart,       ///< scene; power, seconds, record, picture_rate
+  kTicket,      ///< A ticket that opens the report of the last session once.
+  kStart,       ///< Starts a session. Fields: scene; optional power, seconds, record, picture_rate.
   kStop,
-  kRestart,  ///< node
+  kRestart,  ///< Restarts a node. Field: node.
   kDump,
-  kGenerator,  ///< cut, coag, blend
-  kReplay,     ///< name
-  kCalibrate,  ///< what, tool
-  kEnter,      ///< To the guided task.
+  kGenerator,  ///< Sets knobs. Optional fields: cut, coag, blend.
+  kReplay,     ///< Starts a replay. Field: name.
+  kCalibrate,  ///< Starts a calibration. Fields: what, tool.
+  kEnter,      ///< Sends Enter to the guided task.
   kCancel,
-  kClose,  ///< The task's result was read.
+  kClose,  ///< Removes the ended task from the page.
 };
 
 struct Routed {
   Wanted wanted = Wanted::kPage;
   std::string path;
-  Form fields;  ///< Those of the route alone, each checked.
+  Form fields;  ///< Fields of the route only, each checked.
 };
 
-/// Either what is wanted, or the refusal.
+/// Either a valid request, or the refusal.
 struct RouteResult {
   std::optional<Routed> routed;
   HttpResponse refusal;

@@ -7,7 +7,7 @@ void ScreenText::Add(std::string_view bytes) {
     if (escape_ == Escape::kBegun) {
       escape_ = c == '[' ? Escape::kSequence : Escape::kNone;
     } else if (escape_ == Escape::kSequence) {
-      // A sequence ends with a letter; K clears what is to the right, which is all of it after a carriage return.
+      // A sequence ends with a letter. K clears to the right of the cursor: the whole line after a carriage return.
       if (c >= '@' && c <= '~') escape_ = Escape::kNone;
     } else if (c == '\x1b') {
       escape_ = Escape::kBegun;
@@ -25,7 +25,7 @@ void ScreenText::Put(char c) {
   } else if (c == '\r') {
     rewind_ = true;
   } else if (static_cast<unsigned char>(c) >= 0x20 && c != 0x7f) {
-    // Programs that go back write the whole line again.
+    // After a carriage return, programs write the whole line again.
     if (rewind_) lines_.back().clear();
     rewind_ = false;
     if (lines_.back().size() < kLongestLine) lines_.back() += c;
@@ -57,7 +57,7 @@ std::string ValidUtf8(std::string_view text) {
       good = (next & 0xc0u) == 0x80;
       code = code << 6 | (next & 0x3fu);
     }
-    // Too long a form, half of a surrogate pair, beyond the last character.
+    // Invalid: overlong forms, halves of a surrogate pair, codes beyond the last character.
     good = good && !(length == 3 && (code < 0x800 || (code >= 0xd800 && code < 0xe000))) &&
            !(length == 4 && (code < 0x10000 || code > 0x10ffff));
     out.append(good ? text.substr(i, length) : "?");

@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::size_t kLongestReason = 1000;
 
-/// `fulcrum up` says at its end why: below its table, or as "fulcrum: reason" with all that follows.
+/// Reason of a failure from the output of `fulcrum up`: the line below its table, or "fulcrum: reason" with all lines
+/// after it.
 std::string Reason(const std::filesystem::path& log) {
   std::ifstream stream(log);
   std::string line, reason;

@@ -1,4 +1,4 @@
-// Sessions that this console starts: `fulcrum up` as a child, which goes on when the console ends.
+// A session that this console starts: `fulcrum up` as a child that goes on when the console ends.
 #pragma once
 
 #include <cstdint>
@@ -18,42 +18,42 @@ struct SessionOrder {
 };
 
 struct SessionRunSettings {
-  std::filesystem::path program;  ///< fulcrum
+  std::filesystem::path program;  ///< Path of the program fulcrum.
   std::filesystem::path out;
-  std::filesystem::path cart;  ///< Empty: everything simulated.
-  std::filesystem::path data;  ///< Empty: the scene's own.
+  std::filesystem::path cart;  ///< Cart file; empty: all hardware is simulated.
+  std::filesystem::path data;  ///< Folder of meshes; empty: the folder of the scene.
   int domain = 7;
 };
 
 /// How a session ended.
 struct SessionEnd {
   bool well = false;
-  std::string text;  ///< For people, one line.
+  std::string text;  ///< One line for the operator.
 };
 
-/// Words of `fulcrum up` for an order.
+/// Arguments of `fulcrum up` for an order.
 [[nodiscard]] std::vector<std::string> UpWords(const SessionRunSettings& settings, const SessionOrder& order);
 
 class SessionRun {
  public:
   explicit SessionRun(SessionRunSettings settings);
 
-  /// Throws InputError. Call from the main thread.
+  /// Starts a session. Throws InputError. Call from the main thread.
   void Start(const SessionOrder& order);
-  /// Ends a session that was started here; it writes its report first.
+  /// Requests the end of a session that was started here; the session writes its report before it ends.
   void Stop();
-  /// Sees whether it has ended.
+  /// Detects the end of the session.
   void Poll();
 
   [[nodiscard]] bool running() const { return up_.running(); }
   [[nodiscard]] bool stopping() const { return stopping_; }
   [[nodiscard]] bool recording() const { return running() && recording_; }
   [[nodiscard]] const SessionRunSettings& settings() const { return settings_; }
-  /// What `fulcrum up` says at the moment.
+  /// Newest line of the output of `fulcrum up`.
   [[nodiscard]] std::string LastWord() const;
-  /// Of the last one; nothing before and while one runs.
+  /// End of the last session; nullopt before the first one and while one runs.
   [[nodiscard]] const std::optional<SessionEnd>& end() const { return end_; }
-  /// What is kept of the past in memory for a dump [s].
+  /// Time that a dump covers [s].
   static constexpr int kKeep_s = 30;
 
  private:

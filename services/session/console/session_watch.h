@@ -1,4 +1,4 @@
-// The session of a domain as it is seen on its bus, whoever started it.
+// The session of a domain as seen on its bus, started by this console or elsewhere.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,10 @@
 
 namespace fulcrum::console {
 
-/// One moment of what is plotted.
+/// One sample of the plotted figures.
 struct PlotPoint {
-  std::uint64_t number = 0;  ///< Counts on over sessions.
-  double time_s = 0;         ///< Session time.
+  std::uint64_t number = 0;  ///< Grows over all sessions.
+  double time_s = 0;         ///< Session time [s].
   double temperature_C = 0;
   double force_N[kMaxTools] = {0, 0};
 };
@@ -26,28 +26,28 @@ class SessionWatch {
 
   explicit SessionWatch(int domain) : domain_(domain) {}
 
-  /// Joins the bus when a session begins, leaves it when that ends, takes what has come.
+  /// Joins the bus when a session begins, leaves it when the session ends, and reads the samples that have arrived.
   void Turn(std::int64_t now_ns);
 
-  /// A supervisor runs in the domain.
+  /// True when a supervisor runs in the domain.
   [[nodiscard]] bool alive() const { return seen_ != nullptr; }
-  /// The session has been announced: its nodes were ready.
+  /// True when SceneManifest was published: the nodes are ready.
   [[nodiscard]] bool begun() const { return alive() && seen_->view.manifest().session_start_ns != 0; }
-  /// Why the bus could not be joined; empty when it could.
+  /// Reason why the bus could not be joined; empty when it could.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
 
-  // While alive:
+  // Valid while alive():
   [[nodiscard]] const Health& health(NodeId node) const { return seen_->view.health(node); }
   [[nodiscard]] const SceneManifest& manifest() const { return seen_->view.manifest(); }
-  /// The supervisor said that this node belongs to the session.
+  /// True when the supervisor's Health lists this node as part of the session.
   [[nodiscard]] bool expects(NodeId node) const;
   [[nodiscard]] int restarts(NodeId node) const;
-  /// When the number of its restarts last grew; 0: it has not.
+  /// Time at which the count of its restarts last grew [ns]; 0: never.
   [[nodiscard]] std::int64_t restarted_ns(NodeId node) const;
-  /// When an event of that kind last came; 0: none.
+  /// Arrival of the last event of that kind [ns]; 0: none.
   [[nodiscard]] std::int64_t event_ns(ThermalEventKind kind) const;
 
-  /// Those of the last minute, of the session that runs or ended last.
+  /// Points of the last minute of the running or last session.
   [[nodiscard]] const std::deque<PlotPoint>& points() const { return points_; }
 
  private:
@@ -69,7 +69,7 @@ class SessionWatch {
   std::uint64_t last_number_ = 0;
 };
 
-/// "restarts_physics_node": what the supervisor calls a node's count in its Health.
+/// Name of a node's restart count in the supervisor's Health, for example "restarts_physics_node".
 [[nodiscard]] std::string RestartMetric(NodeId node);
 
 }  // namespace fulcrum::console

@@ -1,6 +1,6 @@
 'use strict';
-// The operator's page. State comes as a stream of JSON objects (services/session/console/DESIGN.md says what is in them); what
-// is pressed goes out as small POSTs. Elements are changed only where the state has changed: nothing jumps under a finger.
+// The operator's page. It receives the state as a stream of JSON objects (fields: services/session/console/DESIGN.md) and
+// sends a POST for each button. Elements change only where the state has changed, so that no button moves under a finger.
 
 const $ = id => document.getElementById(id);
 const kSpan = 60;
@@ -20,7 +20,7 @@ function make(tag, className, text) {
   return element;
 }
 
-// ------------------------------------------------------------------------------------------------ talking
+// ------------------------------------------------------------------------------------------------ requests
 
 async function call(path, fields) {
   const options = {headers: {Authorization: `Bearer ${token}`}};
@@ -33,14 +33,14 @@ async function call(path, fields) {
   return response;
 }
 
-/** For buttons: says what the console answered when that is bad, or `well` when it is good. */
+/** For buttons: sends a request and shows the reply when it is a refusal, or `well` when the request succeeded. */
 async function order(path, fields, well) {
   try {
     const answer = await (await call(path, fields || {})).json();
     if (!answer.ok) toast(answer.text, true); else if (well) toast(well);
     return answer.ok ? answer : null;
   } catch (error) {
-    toast('The console does not answer.', true);
+    toast('No response from the console.', true);
     return null;
   }
 }
@@ -77,13 +77,13 @@ async function listen() {
         text += value;
         const parts = text.split('\n\n');
         text = parts.pop();
-        // Of several only the last is shown; all of their points are kept.
+        // Of several states only the last is shown; the plot points of all are kept.
         const states = parts.map(part => JSON.parse(part.replace(/^data: /, '')));
         for (const state of states) takePoints(state);
         if (states.length) show(states[states.length - 1]);
       }
-    } catch (error) { /* told below */ }
-    $('banner').textContent = 'The console does not answer. If this stays, start it again: fulcrum console';
+    } catch (error) { /* The banner below reports it. */ }
+    $('banner').textContent = 'No response from the console. If this message stays, start it again: fulcrum console';
     $('banner').hidden = false;
     document.body.dataset.phase = 'unknown';
     setStatus('off', 'No connection', '');
@@ -98,7 +98,7 @@ let noticed = -1;
 
 function takePoints(s) {
   for (const p of s.points) {
-    if (points.length && p[0] < points[points.length - 1][0]) points = [];  // Another session.
+    if (points.length && p[0] < points[points.length - 1][0]) points = [];  // A new session has begun.
     points.push(p);
   }
   while (points.length && points[0][0] < points[points.length - 1][0] - kSpan) points.shift();
@@ -180,8 +180,8 @@ function showNodes(nodes) {
     const more = [`${node.rate.toFixed(0)} Hz`, `step ${ms(node.p99)} ms`];
     if (node.input) more.push(`age ${node.age} ms`);
     setText(parts.name, node.label + (node.restarts ? ` ↻${node.restarts}` : ''));
-    setText(parts.more, node.pid ? more.join(' · ') : 'not heard yet');
-    parts.row.title = `${node.name}: asked for ${node.asked} Hz; 99 of 100 steps were shorter than told, the median is ${ms(node.p50)} ms; age of the newest ${node.input || 'input'} when it was used; ` +
+    setText(parts.more, node.pid ? more.join(' · ') : 'no data yet');
+    parts.row.title = `${node.name}: requested rate ${node.asked} Hz; 99 % of the steps were shorter than the time shown, the median is ${ms(node.p50)} ms; age is that of the newest ${node.input || 'input'} when it was used; ` +
       `${node.restarts} restarts, ${node.drops} samples lost or refused, ${node.overruns} periods skipped, pid ${node.pid}`;
     parts.button.disabled = state.phase !== 'running';
   }
@@ -201,7 +201,7 @@ function showWarnings(warnings) {
   if (!warnings.length) $('warning-list').append(make('li', 'none', 'None'));
 }
 
-// The generator's knobs: what the supervisor says is set, and a step up or down.
+// The generator's knobs: the setting that the supervisor reports, and buttons for a step up or down.
 const knobs = new Map();
 function makeKnob(name, label) {
   const term = make('dt', '', label), item = make('dd', 'stepper'), value = make('output');
@@ -233,7 +233,7 @@ function showGenerator(figures) {
 function showFigures(figures) {
   showGenerator(figures);
   if (!figures) return;
-  const heat = figures.temperature_C !== undefined;  // Not every exercise has it.
+  const heat = figures.temperature_C !== undefined;  // Scenes without heat have no temperature.
   setText($('temperature'), heat ? `${figures.temperature_C.toFixed(0)} °C` : '–');
   setText($('temperature-more'), heat ? `${figures.power_W.toFixed(0)} W · cut ${figures.cut_mm.toFixed(1)} mm` : 'no heat in this scene');
   setText($('force'), `${Math.max(figures.force0_N, figures.force1_N).toFixed(2)} N`);
@@ -251,7 +251,7 @@ function clearPicture() {
 }
 async function showPicture() {
   const said = pictureShown ? '' : state.phase === 'starting' ? (state.said || 'The nodes are starting.')
-    : state.own || state.picture ? 'Waiting for the first picture.' : 'The pictures of this session are in another folder: it was started elsewhere.';
+    : state.own || state.picture ? 'Waiting for the first picture.' : 'The pictures of this session are in another folder, because it was not started here.';
   setText($('scope-text'), said);
   const name = `${state.session}/${state.picture}`;
   if (!state.picture || pictureAsked || name === pictureShown) return;
@@ -270,7 +270,7 @@ async function showPicture() {
       pictureShown = name;
       canvas.dataset.shown = name;
     }
-  } catch (error) { /* the next one comes soon */ }
+  } catch (error) { /* The next picture replaces it. */ }
   pictureAsked = false;
 }
 
@@ -279,13 +279,13 @@ async function showPicture() {
 let choices = null, power = 0;
 async function loadChoices() {
   const answer = await call('/api/choices').then(r => r.ok ? r.json() : null).catch(() => null);
-  // What was chosen before a session stays chosen after it.
+  // The choices made before a session are kept after it.
   if (!answer || JSON.stringify(answer) === JSON.stringify(choices)) return;
   const chosen = choices ? $('start-form').scene.value : 'built-in';
   choices = answer;
   setText($('cart-name'), choices.simulated ? 'Simulated' : choices.cart);
   setText($('cart-more'), choices.simulated ? 'Handles, pedal and devices are simulated: the scene\u2019s script moves them.'
-    : 'What its cart file does not name is simulated.');
+    : 'Hardware that its cart file does not name is simulated.');
   $('scenes').replaceChildren(...choices.scenes.map(scene => chip('scene', scene.name, scene.name, scene.description)));
   const first = choices.scenes.find(s => s.name === chosen) || choices.scenes[0];
   if (first) {

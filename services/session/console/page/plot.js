@@ -1,7 +1,7 @@
 'use strict';
-// A minute of one or two curves on a canvas.
+// Plot of one or two curves over the last minute on a canvas.
 
-/** 1, 2 or 5 times a power of ten that divides `span` into at most `most` parts. */
+/** Step of 1, 2 or 5 times a power of ten that divides `span` into at most `most` parts. */
 function niceStep(span, most) {
   const raw = span / most, ten = 10 ** Math.floor(Math.log10(raw));
   return ten * [1, 2, 5, 10].find(f => f * ten >= raw * 0.999);
@@ -56,7 +56,7 @@ function drawPlot(canvas, points, {span, floor, least, unit, lines}) {
     g.beginPath();
     let before = null;
     for (const p of points) {
-      // A gap in what was heard is a gap in the curve.
+      // A gap in the data is a gap in the curve.
       if (before === null || p[0] - before > 1.5) g.moveTo(x(p[0]), y(p[l.at])); else g.lineTo(x(p[0]), y(p[l.at]));
       before = p[0];
     }
