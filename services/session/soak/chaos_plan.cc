@@ -5,12 +5,12 @@
 namespace fulcrum::soak {
 namespace {
 
-// Of ten blows.
+// Number of kills and freezes in ten blows on average; the others are crowds.
 constexpr int kKills = 5, kFreezes = 4;
 constexpr double kShortestFreeze_s = 0.05, kLongestFreeze_s = 0.8;
 constexpr double kCrowd_s = 1;
 
-/// Even over [0, 1), the same on every platform.
+/// Uniform random number in [0, 1), the same on every platform, unlike std::uniform_real_distribution.
 double Even(std::mt19937* random) { return static_cast<double>((*random)()) / 4294967296.0; }
 
 }  // namespace

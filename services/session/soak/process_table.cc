@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The rest of a line that begins with `key` in a status file of the kernel.
+/// Value of the field `key` in a status file of the kernel.
 std::string FieldOf(const std::string& status, const std::string& key) {
   const std::size_t at = status.find("\n" + key + ":\t");
   if (at == std::string::npos) return {};
@@ -52,7 +52,7 @@ std::map<std::string, pid_t> ChildrenOf(pid_t parent) {
 }
 
 ProcessorTimes ReadProcessorTimes() {
-  // proc(5): user nice system idle iowait irq softirq steal; guests are in user and nice already.
+  // proc(5): user nice system idle iowait irq softirq steal. Time of guests is part of user and nice.
   constexpr int kColumns = 8;
   std::ifstream in("/proc/stat");
   std::string name;

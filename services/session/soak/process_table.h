@@ -1,4 +1,4 @@
-// The processes of a session as the kernel sees them.
+// The processes of a session as listed by the kernel.
 #pragma once
 
 #include <sys/types.h>
@@ -10,14 +10,14 @@
 
 namespace fulcrum::soak {
 
-/// Resident memory [bytes], shared memory included; nothing when there is no such process or it has ended.
+/// Resident memory [bytes], shared memory included; nullopt when there is no such process or it has ended.
 [[nodiscard]] std::optional<std::uint64_t> ResidentBytes(pid_t process);
 
 /// The living children of a process by the name of their program; the oldest of each name.
 [[nodiscard]] std::map<std::string, pid_t> ChildrenOf(pid_t parent);
 
-/// What the processors of this machine have done since it started, in ticks of the kernel. `stolen`: the host of a
-/// virtual machine gave them to others meanwhile. Zeros where the kernel does not tell.
+/// Times of this machine's processors since its start, in ticks of the kernel. `stolen` is the time in which the host
+/// of a virtual machine ran other guests. All zero where the kernel does not report them.
 struct ProcessorTimes {
   std::uint64_t all = 0, stolen = 0;
 };

@@ -21,7 +21,7 @@ std::vector<ScriptKey> ScriptRounds(std::span<const ScriptKey> script, double ro
           rounds.push_back(end);
         }
       }
-      // Whoever has burnt to the last key does not burn on its way back.
+      // A pedal that is down at the last key is released at the end of the round, so that the way back makes no cut.
       const double end_s = start_s + round_s;
       if (end.pedals != 0 && end_s <= total_s && rounds.back().time_s < static_cast<float>(end_s)) {
         end.time_s = static_cast<float>(end_s);
@@ -41,7 +41,8 @@ void WriteSceneOfRounds(const std::filesystem::path& from, double total_s, const
   const scene::SceneFile file(from);
   SceneView view = file.view();
   if (view.script.empty()) {
-    throw InputError("scene \"" + std::string(view.name) + "\" has no script: nobody would do anything in it");
+    throw InputError("scene \"" + std::string(view.name) +
+                     "\" has no script, so no tool would move; choose one with a script");
   }
   const std::vector<ScriptKey> rounds = ScriptRounds(view.script, static_cast<double>(view.script_duration_s), total_s);
   view.script = rounds;

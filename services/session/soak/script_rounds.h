@@ -1,4 +1,4 @@
-// A scene's script over and over, for sessions longer than it.
+// Repetition of a scene's script, for sessions that are longer than the script.
 #pragma once
 
 #include <filesystem>
@@ -9,15 +9,15 @@
 
 namespace fulcrum::soak {
 
-/// Between two rounds the tools go back to where they began, pedals up [s].
+/// Time between two rounds [s], in which the tools return to their first place with the pedals up.
 inline constexpr double kWayBack_s = 2;
 
-/// `script`, which takes `round_s`, again and again until `total_s`.
+/// `script`, whose duration is `round_s`, repeated until `total_s`.
 /// @param script keys sorted by tool, then time. @pre round_s > 0.
 [[nodiscard]] std::vector<ScriptKey> ScriptRounds(std::span<const ScriptKey> script, double round_s, double total_s);
 
 /// Writes the compiled scene `from` with its script repeated until `total_s` into `to`. Throws InputError, also when
-/// the scene has no script: nobody would do anything.
+/// the scene has no script, because no tool would move.
 void WriteSceneOfRounds(const std::filesystem::path& from, double total_s, const std::filesystem::path& to);
 
 }  // namespace fulcrum::soak

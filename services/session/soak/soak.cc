@@ -32,16 +32,16 @@ using supervisor::Fixed;
 
 constexpr std::array kWatched{"handle_bridge", "haptics_node", "physics_node",
                               "thermal_node",  "render_node",  "recorder"};
-/// Whom blows meet.
+/// The first kNodes of kWatched get blows.
 constexpr std::size_t kNodes = 5;
-constexpr double kStart_s = 60;    ///< For all nodes to be there, on a slow machine.
-constexpr double kPause_s = 8;     ///< Between blows, on the mean: each node dies about once in a minute and a half.
-constexpr double kQuiet = 1 / 3.;  ///< Of the session, at its end.
-constexpr double kEnd_s = 60;      ///< For report and farewells.
+constexpr double kStart_s = 60;    ///< Longest start of all nodes on a slow machine [s].
+constexpr double kPause_s = 8;     ///< Mean time between blows [s]: each node dies about once in a minute and a half.
+constexpr double kQuiet = 1 / 3.;  ///< Share of the session, at its end, without blows.
+constexpr double kEnd_s = 60;      ///< Longest time from the end of the session time to that of `fulcrum up` [s].
 constexpr std::int64_t kSample = kSecond_ns;
 constexpr auto kTurn = std::chrono::milliseconds(20);
 
-/// Reads every topic that carries physics and heat, only for its gate's count of what nobody may use.
+/// Reads every topic with physics and heat to count the samples that its gate refuses.
 class Listener {
  public:
   explicit Listener(bus::DdsParticipant* participant)
@@ -153,7 +153,7 @@ class Soak {
     throw InputError("no node is called " + program);
   }
 
-  /// Who lives, and what they say.
+  /// Reads the present processes, their Health, and whether the session has ended.
   void Look() {
     view_.Update();
     listener_.Listen();
@@ -168,7 +168,7 @@ class Soak {
   void Turn() {
     Look();
     const double now_s = NowS();
-    // The session ends its nodes by itself.
+    // At its end the session stops its nodes, which must not count as crashes.
     const bool over = ended_ || asked_to_end_ || now_s > total_s_ - 1;
     if (!over) {
       Judge(now_s);
@@ -213,7 +213,7 @@ class Soak {
     }
     const auto victim = children_.find(blow.node);
     if (victim == children_.end()) return;  // It is being started again.
-    // Before the signal: nobody may see it dead and not know why.
+    // Recorded before the signal, so that the end of the process never counts as a crash.
     record_.AddBlow(blow, victim->second);
     if (blow.kind == BlowKind::kKill) {
       ::kill(victim->second, SIGKILL);
@@ -243,8 +243,7 @@ class Soak {
 
   ExitCode Conclude() {
     const double duration_s = std::min(NowS(), total_s_);
-    if (well_ && duration_s < total_s_ - 2)
-      verdict_ = asked_to_end_ ? "ended before its time, as asked for" : "ended before its time";
+    if (well_ && duration_s < total_s_ - 2) verdict_ = asked_to_end_ ? "ended early by a stop signal" : "ended early";
     const ProcessorTimes now = ReadProcessorTimes();
     if (now.all > processors_.all) {
       record_.SetStolen(100.0 * static_cast<double>(now.stolen - processors_.stolen) /

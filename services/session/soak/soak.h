@@ -1,4 +1,5 @@
-// A long session under watch, and under blows if asked for: does anything grow, drift, end or say nonsense?
+// A soak: a long session, optionally with injected faults, that is checked for growth of memory, drift, crashes and
+// invalid samples.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +13,10 @@
 namespace fulcrum::soak {
 
 struct SoakSettings {
-  std::filesystem::path scene;    ///< Compiled.
-  std::filesystem::path program;  ///< fulcrum
-  std::filesystem::path out;      ///< A folder for this soak is made in here.
-  std::vector<std::string> up;    ///< Further words for `fulcrum up`.
+  std::filesystem::path scene;    ///< Compiled scene file.
+  std::filesystem::path program;  ///< Path of the program fulcrum.
+  std::filesystem::path out;      ///< Folder in which the folder of this soak is made.
+  std::vector<std::string> up;    ///< Further arguments of `fulcrum up`.
   int domain = 7;
   double minutes = 10;
   bool chaos = false;
@@ -23,9 +24,9 @@ struct SoakSettings {
   Limits limits;
 };
 
-/// Runs the session as a child, says each minute how it is, and writes soak.json, soak.html and samples.csv. The nodes'
-/// blows end a third before the end, so that what does not heal is seen. kFailure when a limit is passed. Throws
-/// InputError. Call from the main thread.
+/// Runs the session as a child, shows its progress, and writes soak.json, soak.html and samples.csv. The last third has
+/// no blows, so that lasting damage is detected. Returns kFailure when a limit is exceeded. Throws InputError. Call
+/// from the main thread.
 [[nodiscard]] ExitCode RunSoak(const SoakSettings& settings);
 
 }  // namespace fulcrum::soak

@@ -13,16 +13,16 @@ namespace {
 using supervisor::Curve;
 using supervisor::Fixed;
 
-// No red: the marks of the kills are.
+// Red is reserved for the marks of the kills.
 constexpr std::array kColours{"#1f6feb", "#bc4c00", "#1a7f37", "#8250df", "#57606a", "#0b7285", "#9a6700", "#bf3989"};
 
 std::string Cell(const std::string& text) { return "<td>" + EscapeHtml(text) + "</td>"; }
 
-/// A line a program; its lives follow each other in it.
+/// Plot with one line per program; its successive processes are parts of that line.
 std::string Plot(const SoakRecord& record, const char* title, const char* unit, Curve Life::*figure) {
   std::map<std::string, Curve> curves;
   for (const Life& life : record.lives()) {
-    curves[life.program];  // One without points keeps its colour: it is the same in all plots.
+    curves[life.program];  // A program without points gets an entry too, so that colours are equal in all plots.
     for (const auto& point : (life.*figure).points()) curves[life.program].Add(point.time_s / 60, point.value);
   }
   std::vector<supervisor::PlotLine> lines;
@@ -63,8 +63,8 @@ std::string SoakPage(const SoakRecord& record, const Limits& limits, const std::
           std::to_string(limits.not_finite) + " refused samples, " + std::to_string(limits.crashes) +
           " crashes. Dashed red lines: a node was killed.</p>\n<div class='plots'>\n";
   html += Plot(record, "Resident memory", "MB", &Life::memory_MB);
-  html += Plot(record, "Rate of what is asked for", "%", &Life::rate_pct);
-  html += Plot(record, "Distance of the period count from the clock", "ms", &Life::drift_ms);
+  html += Plot(record, "Share of the requested rate", "%", &Life::rate_pct);
+  html += Plot(record, "Deviation of the period count from the clock", "ms", &Life::drift_ms);
   html +=
       "</div>\n<h2>Processes</h2><div class='card scroll'><table><tr><th class='text'>program</th><th>process</th>"
       "<th>from s</th><th>to s</th><th>memory at the end MB</th><th>growth MB</th><th>ended</th></tr>\n";
@@ -88,7 +88,7 @@ std::string SoakPage(const SoakRecord& record, const Limits& limits, const std::
     html += "</table></div></details>\n";
   }
   html += "<h2>Session</h2><p><a href='" + EscapeHtml(session) + "/report.html'>report.html</a> of the session; " +
-          "what its nodes said is in " + EscapeHtml(session) + "/logs.</p>\n</main></body></html>\n";
+          "the output of its nodes is in " + EscapeHtml(session) + "/logs.</p>\n</main></body></html>\n";
   return html;
 }
 

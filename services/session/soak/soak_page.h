@@ -7,11 +7,11 @@
 
 namespace fulcrum::soak {
 
-/// One page with figures, plots and all blows. `title`: scene and time; `session`: what the page links to.
+/// Page with figures, plots and all blows. `title`: scene and time; `session`: folder of the session, for links.
 [[nodiscard]] std::string SoakPage(const SoakRecord& record, const Limits& limits, const std::string& title,
                                    const std::string& session);
 
-/// A line a sample: time_s, program, process, figure, value.
+/// CSV text with one line per sample: time_s, program, process, figure, value.
 [[nodiscard]] std::string SamplesCsv(const SoakRecord& record);
 
 }  // namespace fulcrum::soak

@@ -10,7 +10,7 @@ using supervisor::Curve;
 using supervisor::CurvePoint;
 
 constexpr double kSettle_s = 30, kWindow_s = 10;
-/// A session of this length and more has the times above.
+/// Sessions of at least this length use the times above; shorter ones use shorter times in proportion.
 constexpr double kWhole_s = 120;
 constexpr double kMega = 1e6;
 
@@ -32,7 +32,7 @@ double MedianBetween(const Curve& curve, double begin_s, double end_s) {
 }  // namespace
 
 Life* SoakRecord::Find(std::int32_t process) {
-  // A number may come again when its first owner is gone.
+  // The kernel may reuse a pid after its process has ended.
   const auto life = std::find_if(lives_.rbegin(), lives_.rend(), [&](const Life& l) { return l.process == process; });
   return life == lives_.rend() || life->has_ended ? nullptr : &*life;
 }

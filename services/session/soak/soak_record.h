@@ -1,4 +1,4 @@
-// What a soak saw: memory, rates and drift of each process over time, what was done to them, how it ended. Pure.
+// The record of a soak: memory, rate and drift of each process over time, the blows, the end of the session. Pure.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace fulcrum::soak {
 
-/// Most that a soak may show, else it has failed.
+/// Largest values with which a soak passes.
 struct Limits {
   double rss_growth_MB = 20;
   std::uint64_t not_finite = 0;
@@ -23,27 +23,27 @@ struct Limits {
 struct Life {
   std::string program;
   std::int32_t process = 0;
-  bool was_killed = false;  ///< By us.
+  bool was_killed = false;  ///< A blow killed it.
   bool has_ended = false;
-  supervisor::Curve memory_MB;  ///< Resident.
-  supervisor::Curve rate_pct;   ///< Of the rate asked for, over the last second.
-  supervisor::Curve drift_ms;   ///< How far its count of periods is from the clock since it was first heard.
+  supervisor::Curve memory_MB;  ///< Resident memory.
+  supervisor::Curve rate_pct;   ///< Share of the requested rate over the last second.
+  supervisor::Curve drift_ms;   ///< Deviation of its count of periods from the clock, since its first Health.
   std::uint64_t first_ticks = 0;
-  std::int64_t first_ns = 0;  ///< 0: not heard yet.
+  std::int64_t first_ns = 0;  ///< Time of its first Health [ns]; 0: none yet.
 };
 
 class SoakRecord {
  public:
-  /// A process is new when it has not been seen before.
+  /// Adds a sample of a process; an unknown process begins a new Life.
   void AddMemory(double time_s, const std::string& program, std::int32_t process, std::uint64_t resident_B);
-  /// For its rate and drift. Disregarded for a process whose memory has not been seen.
+  /// Adds rate and drift of a process. Ignored for a process without a sample of memory.
   void AddHealth(double time_s, const Health& health);
   void AddBlow(const Blow& blow, std::int32_t process);
-  /// These are the processes that live now: who is missing has ended.
+  /// Sets the processes that exist now; every other process has ended.
   void SetAlive(const std::vector<std::int32_t>& processes);
-  /// Samples that no reader may use: a number that is not finite, or beyond its range. A count since the start.
+  /// Sets the count, since the start, of samples that a gate refused: a number was not finite or out of range.
   void SetRefused(std::uint64_t samples) { refused_ = samples; }
-  /// The session is over, as it should be or not.
+  /// Ends the record. `well`: the session ended as it should.
   void End(double time_s, bool well, const std::string& verdict);
 
   [[nodiscard]] const std::vector<Life>& lives() const { return lives_; }
@@ -51,20 +51,21 @@ class SoakRecord {
   [[nodiscard]] double duration_s() const { return duration_s_; }
   [[nodiscard]] const std::string& verdict() const { return verdict_; }
   [[nodiscard]] std::uint64_t refused() const { return refused_; }
-  /// Processes that ended while nobody had hurt them, and a session that did not end well.
+  /// Number of processes that ended although no blow had killed them, plus one when the session did not end well.
   [[nodiscard]] int crashes() const { return crashes_; }
   [[nodiscard]] int Count(BlowKind kind) const;
-  /// Growth of one process [MB]: the median of its last ten seconds less the median of ten seconds from half a minute
-  /// after its start on. 0 for a shorter life: a start is no leak. Shorter sessions have shorter times, in proportion.
+  /// Growth of one process [MB]: median of its last ten seconds minus median of the ten seconds that begin half a
+  /// minute after its start. 0 for a process that ends before: memory taken at the start is no leak. In shorter
+  /// sessions these times are shorter in proportion.
   [[nodiscard]] double GrowthOf(const Life& life) const;
   [[nodiscard]] double LargestGrowth_MB() const;
-  /// The lowest median rate of a program [% of what is asked for].
+  /// Lowest median rate of a program [% of the requested rate].
   [[nodiscard]] double LowestRate_pct() const;
-  /// The farthest that a process is from the clock at its end [ms].
+  /// Largest deviation of a process from the clock at its end [ms].
   [[nodiscard]] double LargestDrift_ms() const;
   [[nodiscard]] bool Passes(const Limits& limits) const;
 
-  /// Of the processors' time, what the host of a virtual machine gave to others [%].
+  /// Share of the processors' time in which the host of a virtual machine ran other guests [%].
   void SetStolen(double stolen_pct) { stolen_pct_ = stolen_pct; }
   [[nodiscard]] double stolen_pct() const { return stolen_pct_; }
 
