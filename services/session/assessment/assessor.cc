@@ -7,10 +7,10 @@
 namespace fulcrum::assessment {
 namespace {
 
-// How long a prompt stays after its last cause [s]: what goes on, what has happened, what must not be missed.
+// Time for which a prompt stays after its last cause [s]: for a continuing state, for an event, for an injury.
 constexpr double kStays_s = 0.5, kHappened_s = 2, kGrave_s = 5;
 
-/// A contact waits no longer than this for the pedal of its time [s].
+/// Longest wait of a contact for the pedal state of its time [s].
 constexpr double kPedalLate_s = 1;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
@@ -112,7 +112,7 @@ void Assessor::Add(const ThermalEvent& event) {
 }
 
 void Assessor::Add(const TopologyState& topology) {
-  // A thermal node that comes back says first what it was told.
+  // The first topology after a restart of thermal_node may have a smaller cut length.
   if (Counts(TimeOf(topology.stamp))) {
     cut_length_m_ = std::max(cut_length_m_, static_cast<double>(topology.cut_length_m));
     cut_width_m_ = static_cast<double>(topology.cut_width_m);
@@ -195,7 +195,7 @@ Figures Assessor::figures() const {
       if (!std::isnan(own)) whole = std::isnan(whole) ? own : highest ? std::max(whole, own) : whole + own;
     }
   }
-  // These are no sums.
+  // The following measures are not sums over the tools.
   for (const Measure measure : {Measure::kTime, Measure::kIdle, Measure::kSmoothness}) {
     figures.session[At(measure)] = kNone;
   }

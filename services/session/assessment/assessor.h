@@ -1,13 +1,13 @@
-// A session, measured while it lasts or from a recording: messages in, figures out. No bus, no clock.
+// Measures of a session from its messages, live or from a recording. It uses no bus and no clock.
 //
 //   Assessor assessor(scene);
 //   assessor.Begin(manifest.session_start_ns);
 //   assessor.Add(message);            // Each message of the topics of kTopics, in the order of its writer.
-//   assessor.End(session_time_s);     // Then nothing later counts.
+//   assessor.End(session_time_s);     // Messages after this time do not count.
 //   Score score = Evaluate(scene.assessment, assessor.figures());
 //
-// The order between topics does not matter: a measure comes from one topic alone, and a contact waits for the pedal of
-// its time. Live and from a recording the same messages give the same figures.
+// The order between topics does not matter: each measure comes from one topic, and a contact waits for the pedal state
+// of its time. Live and from a recording the same messages give the same figures.
 #pragma once
 
 #include <array>
@@ -31,9 +31,9 @@ class Assessor {
   Assessor(const Assessor&) = delete;
   Assessor& operator=(const Assessor&) = delete;
 
-  /// Session time 0; before, nothing counts.
+  /// Sets the time of session time 0 [ns]; earlier messages do not count.
   void Begin(std::int64_t session_start_ns);
-  /// The session is over at this time.
+  /// Sets the session time of the end [s]; later messages do not count.
   void End(double session_time_s);
 
   void Add(const ToolState& state);
@@ -44,11 +44,11 @@ class Assessor {
   void Add(const TopologyState& topology);
   void Add(const TemperaturePatch& patch);
 
-  /// Patches are large, and of use only where a line is planned.
+  /// True when the scene has a planned line. Without one, the large patches need not be read.
   [[nodiscard]] bool needs_patches() const { return !line_.line().empty(); }
 
-  /// So far. The last movement counts when it has ended, the last contacts when their pedal is known: after Finish()
-  /// all do.
+  /// Figures so far. A movement counts when it has ended, a contact when its pedal state is known; after Finish() all
+  /// count.
   [[nodiscard]] Figures figures() const;
   void Finish();
   /// Set of Prompt bits at a session time.
@@ -58,7 +58,7 @@ class Assessor {
   [[nodiscard]] double TimeOf(const Stamp& stamp) const;
   [[nodiscard]] bool Counts(double time_s) const { return begun_ && time_s >= 0 && time_s <= end_s_; }
   void Raise(Prompt prompt, double until_s);
-  /// Those whose pedal is known; all of them: whether or not.
+  /// Measures the waiting contacts whose pedal state is known, or all of them.
   void MeasureContacts(bool all);
   [[nodiscard]] MeasureValues ToolFigures(int i) const;
   void SetOfMotion(MeasureValues* session) const;
@@ -72,10 +72,10 @@ class Assessor {
   ForceMeter force_;
   LineMeter line_;
   GeneratorInputs generator_;
-  std::deque<HookSample> contacts_;  ///< Waiting for the pedal of their time.
+  std::deque<HookSample> contacts_;  ///< Contacts that wait for the pedal state of their time.
   DamageMap damage_;
   double cut_length_m_ = 0, cut_width_m_ = 0, cut_off_way_m_ = 0;
-  std::array<int, 4> alarms_{};  ///< Ureter warnings and injuries, nerve warnings and injuries.
+  std::array<int, 4> alarms_{};  ///< Counts of ureter warnings, ureter injuries, nerve warnings, nerve injuries.
   std::array<double, kPromptCount> prompt_until_s_{};
 };
 

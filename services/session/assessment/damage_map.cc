@@ -6,14 +6,14 @@
 namespace fulcrum::assessment {
 namespace {
 
-/// Of the texel's damage, 255 (1 - exp(-Omega)): Omega of collagen is 1 or more. Blanched, for the eye.
+/// Value of a texel's damage, 255 (1 - exp(-Omega)), at which Omega of collagen is 1: the tissue is visibly blanched.
 constexpr std::uint8_t kCoagulated = 162;
 constexpr std::size_t kDamageByte = 1, kTexelBytes = 4;
 
-/// Texels that are looked at together: nearly all of a patch is sound.
+/// Texels that are tested together, because nearly all of a patch is undamaged.
 constexpr std::size_t kBlock = 8;
 
-/// No texel of the block has a damage of 128 or more.
+/// True when no texel of the block has a damage of 128 or more.
 bool IsSound(const std::uint8_t* texels) {
   std::array<std::uint64_t, kBlock * kTexelBytes / sizeof(std::uint64_t)> words;
   std::memcpy(words.data(), texels, sizeof(words));

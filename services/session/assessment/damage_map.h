@@ -1,4 +1,4 @@
-// Tissue that was coagulated where it should have been spared.
+// Area of coagulated tissue farther from the planned line than the margin.
 #pragma once
 
 #include <vector>
@@ -8,11 +8,11 @@
 
 namespace fulcrum::assessment {
 
-/// Fed with each TemperaturePatch: remembers which texels of the atlas have been damaged, since patches overlap and
-/// come again, and counts those that lie farther from the line than the margin.
+/// Takes each TemperaturePatch. It stores which texels of the atlas are damaged, because patches overlap and repeat,
+/// and counts those that lie farther from the line than the margin.
 class DamageMap {
  public:
-  /// `line` must live as long as this.
+  /// `line` must outlive this.
   DamageMap(const SheetLine& line, double margin_m, double texel_m);
 
   void Add(const TemperaturePatch& patch);
@@ -21,7 +21,7 @@ class DamageMap {
  private:
   const SheetLine& line_;
   double margin_m_, texel_m_;
-  std::vector<std::uint8_t> damaged_;  ///< Bit per texel of the atlas; empty until the first patch.
+  std::vector<std::uint8_t> damaged_;  ///< One bit per texel of the atlas; empty until the first patch.
   std::uint64_t beyond_ = 0;
 };
 

@@ -7,9 +7,10 @@
 namespace fulcrum::assessment {
 namespace {
 
-/// A slip is over when the traction has fallen to this part of what the jaws hold.
+/// A slip ends when the traction has fallen to this share of the grip force.
 constexpr double kHeldAgain = 0.9;
-/// What jaws hold falls faster than that, per message, when they are opened: the noise of a handle is a third of it.
+/// When jaws open, the grip force falls below this share of its previous value from one message to the next; the noise
+/// of a handle is a third of that step.
 constexpr float kSteadyGrip = 0.985f;
 
 const Contact* GraspOf(const DeviceContacts& contacts) {
@@ -34,13 +35,13 @@ double ForceOf(const DeviceContacts& contacts) {
 
 ForceMeter::ForceMeter(const AssessmentParams& params, const PhysicsParams& physics)
     : params_(params),
-      // What jaws hold that are just closed: less means that they are being opened.
+      // Grip force of jaws at the angle of closing; a smaller one means that they are opening.
       closed_grip_N_(physics.grip_force_N * (1 - physics.grasp_close_rad / physics.grasp_open_rad)) {}
 
 ForceMeter::Finding ForceMeter::Add(double time_s, const ContactModel& model) {
   Finding finding;
   if (time_s <= last_s_) return finding;
-  // A physics node that comes back finds its grasp in its checkpoint: that is no slip.
+  // A restarted physics_node restores its grasp from its checkpoint, which is no slip.
   const bool continues = model.stamp.epoch == epoch_ && time_s - last_s_ <= kGap_s;
   epoch_ = model.stamp.epoch;
   const double dt_s = continues ? time_s - last_s_ : 0;
@@ -71,7 +72,7 @@ bool ForceMeter::FollowHold(const DeviceContacts& contacts, double force_N, doub
     hold->holding = true;
     hold->begin_z = grasp->x_ref.z();
   }
-  // Jaws that are being opened let go because they are meant to.
+  // Opening jaws release the tissue on purpose, which is no slip.
   const bool opens = grasp->slip_force < kSteadyGrip * hold->grip_N;
   hold->grip_N = grasp->slip_force;
   hold->closed = grasp->slip_force > closed_grip_N_ && !opens;

@@ -1,4 +1,4 @@
-// What the tools do to the tissue: force over time, grasps that slip, what is lifted.
+// Mechanical load of the tissue by the tools: force over time, slips of the grasp, height of a lift.
 #pragma once
 
 #include <array>
@@ -12,14 +12,14 @@ namespace fulcrum::assessment {
 struct ToolForce {
   double force_time_Ns = 0;
   double peak_N = 0;
-  double force_N = 0;  ///< Now.
+  double force_N = 0;  ///< Present force.
   int slips = 0;
-  double lift_m = 0;       ///< Highest that a hold has been raised above where it began, along +z.
-  double lift_hold_s = 0;  ///< Longest time without a break at the lift asked for or above, within the force.
+  double lift_m = 0;       ///< Largest rise of a hold above its first place, along +z.
+  double lift_hold_s = 0;  ///< Longest uninterrupted time at the demanded lift or above, within the force limit.
 };
 
-/// Fed with each ContactModel in order: it tells the tissue's force on the tool, what a grasp can hold, and where it
-/// is.
+/// Takes each ContactModel in order, which contains the tissue's force on the tool, the grip force and the place of a
+/// grasp.
 class ForceMeter {
  public:
   ForceMeter(const AssessmentParams& params, const PhysicsParams& physics);
@@ -34,13 +34,13 @@ class ForceMeter {
  private:
   struct Hold {
     bool holding = false;
-    bool closed = false;    ///< The jaws, and not on their way to open, when last heard.
-    float grip_N = 0;       ///< What they held then.
-    bool slipping = false;  ///< The traction is more than they hold.
+    bool closed = false;    ///< In the last message the jaws were closed and not opening.
+    float grip_N = 0;       ///< Grip force in the last message.
+    bool slipping = false;  ///< The traction exceeds the grip force.
     float begin_z = 0;
-    double held_s = 0;  ///< At height, so far.
+    double held_s = 0;  ///< Present uninterrupted time at the demanded lift.
   };
-  /// True when a slip begins.
+  /// Updates a hold; true when a slip begins.
   bool FollowHold(const DeviceContacts& contacts, double force_N, double dt_s, Hold* hold, ToolForce* tool) const;
 
   AssessmentParams params_;

@@ -2,7 +2,7 @@
 
 namespace fulcrum::assessment {
 
-/// Longer silence of a topic is a gap: what happened in it is not known and not counted [s].
+/// A longer time between two messages of a topic is a gap [s]: the time in it is not counted.
 inline constexpr double kGap_s = 0.1;
 
 }  // namespace fulcrum::assessment

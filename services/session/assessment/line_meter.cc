@@ -10,11 +10,11 @@ namespace fulcrum::assessment {
 namespace {
 
 constexpr double kBin_m = 1e-4;
-/// The spot of contact does not jump farther from one message to the next while it stays on the membrane [m].
+/// Longest step of the place of contact between two messages while the hook stays on the membrane [m].
 constexpr double kJump_m = 0.005;
-/// The deviation is taken at least this often along the trace [m].
+/// Longest distance along the trace between two evaluations of the deviation [m].
 constexpr double kTraceStep_m = 2e-4;
-/// A prompt waits so long: whoever lifts off with the pedal down need not be told at once [s].
+/// Delay of the prompt "pedal without contact" [s], so that a short lift of the hook causes none.
 constexpr double kDryPrompt_s = 0.3;
 
 }  // namespace

@@ -1,4 +1,5 @@
-// The hook on the membrane: along the planned line, near what must be spared, in the air with the pedal down.
+// Measures of the hook on the membrane: trace along the planned line, distance to protected structures, time in the air
+// with the pedal down.
 #pragma once
 
 #include <optional>
@@ -8,27 +9,27 @@
 
 namespace fulcrum::assessment {
 
-/// Foot of the perpendicular on a line of straight pieces.
+/// Foot of the perpendicular on a polyline.
 struct LinePlace {
   double distance_m = 0;
-  double along_m = 0;  ///< From its beginning.
+  double along_m = 0;  ///< Arc length from the beginning of the line.
 };
 
-/// A line on the flattened sheet.
+/// A polyline on the flattened membrane.
 class SheetLine {
  public:
   explicit SheetLine(std::span<const Vec2f> points);
   [[nodiscard]] bool empty() const { return points_.size() < 2; }
   [[nodiscard]] double length_m() const { return empty() ? 0 : along_.back(); }
-  /// @pre !empty()
+  /// Nearest place on the line. @pre !empty()
   [[nodiscard]] LinePlace Nearest(const Eigen::Vector2d& p) const;
 
  private:
   std::vector<Eigen::Vector2d> points_;
-  std::vector<double> along_;  ///< Of each point.
+  std::vector<double> along_;  ///< Arc length at each point [m].
 };
 
-/// Of a CauteryContact, and whether a pedal was down at its time.
+/// Place of a CauteryContact, and whether a pedal was down at its time.
 struct HookSample {
   double time_s = 0;
   bool touching = false;
@@ -36,7 +37,7 @@ struct HookSample {
   bool energised = false;
 };
 
-/// Fed with each sample in order.
+/// Takes each sample in order.
 class LineMeter {
  public:
   explicit LineMeter(const SceneView& scene);
@@ -49,10 +50,10 @@ class LineMeter {
   [[nodiscard]] const SheetLine& line() const { return line_; }
   [[nodiscard]] double pedal_without_contact_s() const { return pedal_without_contact_s_; }
   [[nodiscard]] double traced_m() const { return traced_m_; }
-  /// Mean over the length of the trace.
+  /// Mean deviation over the length of the trace; nullopt without a trace.
   [[nodiscard]] std::optional<double> deviation_mean_m() const;
   [[nodiscard]] std::optional<double> deviation_max_m() const;
-  /// Part of the planned line that was traced, 0 … 1.
+  /// Share of the planned line that was traced, 0 … 1.
   [[nodiscard]] double done() const;
 
  private:
@@ -66,11 +67,11 @@ class LineMeter {
   AssessmentParams params_;
   SheetLine line_;
   std::vector<Spared> spared_;
-  std::vector<std::uint8_t> done_;  ///< Per kBin of the line.
+  std::vector<std::uint8_t> done_;  ///< Whether each piece of length kBin of the line was traced.
   std::optional<Eigen::Vector2d> last_;
   LinePlace last_place_;
   double last_s_ = -1;
-  double dry_s_ = 0;  ///< Pedal down in the air, without a break so far.
+  double dry_s_ = 0;  ///< Present uninterrupted time in the air with the pedal down.
   double pedal_without_contact_s_ = 0;
   double traced_m_ = 0, deviation_m2_ = 0, deviation_max_m_ = 0;
 };

@@ -10,9 +10,9 @@
 namespace fulcrum::assessment {
 namespace {
 
-/// A movement ends when the tip has been slow for so long: a turn stops it for a moment, too.
+/// A movement ends when the tip has been slow for this time; a change of direction stops it for a shorter time.
 constexpr int kSlowSamples = 10;
-/// A longer one is cut here, which bounds memory and the transform.
+/// A longer movement is split here, which bounds memory and the size of the transform.
 constexpr std::size_t kLongestMovement = 3000;
 constexpr std::size_t kShortestMovement = 10;
 
@@ -83,7 +83,7 @@ void MotionMeter::Step(double time_s, const std::array<Vec3d, kMaxTools>& tips) 
     tracks_[i].last = tip;
     const double speed = step_m * kGridRate_Hz;
     const bool rests = speed < static_cast<double>(params_.idle_speed_m_s);
-    // What is slower than half of that is tremor and the noise of the device, which never ends.
+    // Slower motion is tremor and noise of the device, which would add path without end.
     if (2 * speed > static_cast<double>(params_.idle_speed_m_s)) tools_[i].path_m += step_m;
     tools_[i].idle.Add(rests, 1 / kGridRate_Hz, static_cast<double>(params_.idle_after_s));
     Follow(time_s, speed, &tracks_[i], &tools_[i]);

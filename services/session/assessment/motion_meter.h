@@ -1,4 +1,4 @@
-// How tools move: time, path length, movements, idle time, smoothness.
+// Measures of the motion of tools: time, path length, movements, idle time, smoothness.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ inline constexpr double kLowPass_Hz = 10;
 /// Butterworth low-pass of second order by the bilinear transform, at the rate of the grid.
 class LowPass {
  public:
-  /// The first sample is taken for the state at rest.
+  /// The filter starts at rest at the first sample.
   [[nodiscard]] Vec3d Filter(const Vec3d& x);
   void Reset() { fresh_ = true; }
 
@@ -27,7 +27,7 @@ class LowPass {
   Vec3d x1_ = Vec3d::Zero(), x2_ = Vec3d::Zero(), y1_ = Vec3d::Zero(), y2_ = Vec3d::Zero();
 };
 
-/// Time at rest that lasts longer than the time after which it counts.
+/// Total of the rests that last longer than `after_s`.
 class IdleClock {
  public:
   void Add(bool rests, double dt_s, double after_s);
@@ -37,24 +37,24 @@ class IdleClock {
   double rest_s_ = 0, total_s_ = 0;
 };
 
-/// One tool.
+/// Measures of one tool.
 struct ToolMotion {
   bool present = false;
   double path_m = 0;
   int movements = 0;
   IdleClock idle;
-  double smoothness_sum = 0;  ///< Of the movements' spectral arc lengths.
+  double smoothness_sum = 0;  ///< Sum of the movements' spectral arc lengths.
   int smoothness_count = 0;
-  double first_s = -1, last_s = -1;  ///< Begin of the first movement, end of the last; negative: none.
+  double first_s = -1, last_s = -1;  ///< Beginning of the first movement, end of the last; negative: none.
 };
 
-/// Fed with each ToolState in order; looks at a grid of kGridRate_Hz between them.
+/// Takes each ToolState in order and interpolates between them on a grid of kGridRate_Hz.
 class MotionMeter {
  public:
   explicit MotionMeter(const AssessmentParams& params) : params_(params) {}
 
   void Add(double time_s, const ToolState& state);
-  /// The session is over: movements that still go on end here.
+  /// Ends the movements that are not complete at the end of the session.
   void Finish();
 
   [[nodiscard]] const ToolMotion& tool(int i) const { return tools_[static_cast<std::size_t>(i)]; }
@@ -64,10 +64,10 @@ class MotionMeter {
  private:
   struct Track {
     LowPass filter;
-    std::optional<Vec3d> last;    ///< Filtered, on the grid.
-    std::vector<double> profile;  ///< Speeds of the movement that goes on [m/s]; empty: none.
-    bool is_movement = false;     ///< It has been fast enough.
-    int slow = 0;                 ///< Slow samples at the profile's end.
+    std::optional<Vec3d> last;    ///< Last filtered place on the grid.
+    std::vector<double> profile;  ///< Speeds of the present movement [m/s]; empty: none.
+    bool is_movement = false;     ///< The profile has exceeded the movement speed.
+    int slow = 0;                 ///< Number of slow samples at the end of the profile.
   };
   void Step(double time_s, const std::array<Vec3d, kMaxTools>& tips);
   void Follow(double time_s, double speed, Track* track, ToolMotion* tool) const;
@@ -77,7 +77,7 @@ class MotionMeter {
   std::array<Track, kMaxTools> tracks_;
   std::array<ToolMotion, kMaxTools> tools_;
   IdleClock idle_;
-  std::optional<double> last_s_;  ///< Of the newest ToolState.
+  std::optional<double> last_s_;  ///< Session time of the newest ToolState.
   std::array<Vec3d, kMaxTools> last_tips_{};
 };
 

@@ -20,7 +20,7 @@ struct Session {
   std::optional<double> end_s;
 };
 
-/// The first session of the file, and when the supervisor stopped its clock.
+/// Start of the first session in the file, and the session time at which the supervisor stopped its clock.
 Session FindSession(const std::filesystem::path& file) {
   Session session;
   log_tools::Recording recording(file, {.topics = {"SceneManifest", "Health"}});
@@ -33,7 +33,7 @@ Session FindSession(const std::filesystem::path& file) {
         if (message.node != NodeId::kSupervisor || message.state != HealthState::kStopping) return;
         const auto time = std::find_if(message.metrics.begin(), message.metrics.end(),
                                        [](const Metric& metric) { return metric.name == "session_time_s"; });
-        // The last counts: one that was asked to end the session says so before its clock has stopped.
+        // The last Health is used: earlier ones with the state "stopping" were sent before the clock stopped.
         if (time != message.metrics.end()) session.end_s = time->value;
       }
     });
@@ -45,7 +45,8 @@ Session FindSession(const std::filesystem::path& file) {
 
 RecordedAssessment AssessRecording(const std::filesystem::path& file, const SceneView& scene) {
   if (scene.assessment.on == 0) {
-    throw InputError(std::string("scene \"") + scene.name + "\" has no section `assessment`: nothing says what counts");
+    throw InputError(std::string("scene \"") + scene.name +
+                     "\" has no section `assessment`, so there are no measures; give a scene that has one");
   }
   const Session session = FindSession(file);
   if (!session.manifest) {
@@ -60,7 +61,7 @@ RecordedAssessment AssessRecording(const std::filesystem::path& file, const Scen
       .topics = {"ToolState", "HandleState", "ContactModel", "CauteryContact", "ThermalEvent", "TopologyState"}};
   if (assessor.needs_patches()) filter.topics.insert("TemperaturePatch");
   log_tools::Recording recording(file, filter);
-  std::map<TopicId, bus::InputAccount> accounts;  // What a node would not have used is not used here.
+  std::map<TopicId, bus::InputAccount> accounts;  // Skips the samples that a node would have refused.
   log_tools::Entry entry;
   while (recording.Next(&entry)) {
     bus::InputAccount& account = accounts.try_emplace(*entry.source->topic, false, true).first->second;

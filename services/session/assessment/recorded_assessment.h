@@ -1,4 +1,4 @@
-// A recorded session, measured as it was when it was live.
+// Assessment of a recorded session, with the same figures as live.
 #pragma once
 
 #include <filesystem>
@@ -11,12 +11,12 @@ namespace fulcrum::assessment {
 
 struct RecordedAssessment {
   std::string session_id;
-  double end_s = 0;  ///< Session time at which the supervisor ended it; of the last message where it does not tell.
+  double end_s = 0;  ///< Session time of the end [s]; where the recording lacks it, that of the last message.
   Figures figures;
 };
 
-/// Throws InputError (no recording, no session in it, a scene without the section `assessment`) or MismatchError (a
-/// recording of another scene).
+/// Assesses the first session of a recording. Throws InputError (no recording, no session in it, a scene without the
+/// section `assessment`) or MismatchError (a recording of another scene).
 [[nodiscard]] RecordedAssessment AssessRecording(const std::filesystem::path& recording, const SceneView& scene);
 
 }  // namespace fulcrum::assessment

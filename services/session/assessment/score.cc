@@ -8,7 +8,7 @@ namespace fulcrum::assessment {
 double Kept(double value, double limit, bool at_least) {
   if (std::isnan(value)) return 0;
   if (at_least ? value >= limit : value <= limit) return 1;
-  // A threshold below 0 is kept from above, and twice as low is nothing.
+  // For a lower threshold below 0, twice the threshold gives no points.
   if (at_least)
     return limit > 0 ? std::clamp(2 * value / limit - 1, 0.0, 1.0) : std::clamp(2 - value / limit, 0.0, 1.0);
   return limit > 0 ? std::clamp(2 - value / limit, 0.0, 1.0) : 0;

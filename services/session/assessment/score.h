@@ -1,4 +1,4 @@
-// Figures of a session and what they are worth.
+// Figures of a session and their points.
 #pragma once
 
 #include <array>
@@ -9,7 +9,7 @@
 
 namespace fulcrum::assessment {
 
-/// In the units of kMeasures; NaN: not known, or of no meaning in this scene.
+/// Values in the units of kMeasures; NaN: not known, or not applicable to this scene.
 using MeasureValues = std::array<double, kMeasureCount>;
 
 struct Figures {
@@ -22,23 +22,23 @@ struct ScoreItem {
   double value;
   double limit;
   bool passed;
-  double points;  ///< Given …
-  double of;      ///< … of so many; 0: measured, not scored.
+  double points;  ///< Points reached.
+  double of;      ///< Points that can be reached; 0: measured, not scored.
 };
 
-/// All measures that mean something in the scene, in the order of kMeasures, and their sum.
+/// All measures that apply to the scene, in the order of kMeasures, and the sum of their points.
 struct Score {
   std::vector<ScoreItem> items;
   double points = 0, of = 0;
   [[nodiscard]] double percent() const { return of > 0 ? 100 * points / of : 0; }
 };
 
-/// A threshold that is kept gives all points, else fewer in proportion, none from twice the threshold on (half of it
-/// where at least so much is wanted). The points for skill count in proportion to what was done of the task, if the
-/// scene gives points for a task: whoever does nothing is given nothing.
+/// Points of each measure. A kept threshold gives all points. Beyond it the points decrease in proportion, to none at
+/// twice an upper threshold or half a lower one. In a scene with points for a task, the points for skill are scaled by
+/// the completed share of the task, so that an idle trainee gets none.
 [[nodiscard]] Score Evaluate(const AssessmentParams& params, const Figures& figures);
 
-/// How far a value keeps a threshold, 0 … 1.
+/// Share of the points for a value at a threshold, 0 … 1.
 [[nodiscard]] double Kept(double value, double limit, bool at_least);
 
 }  // namespace fulcrum::assessment

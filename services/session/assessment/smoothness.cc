@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kHighest_Hz = 10;
 constexpr double kLeastMagnitude = 0.05;
-/// The spectrum is sampled 2^4 times finer than the movement's length asks for, so that the curve is smooth.
+/// The spectrum is sampled 2^4 times finer than the length of the movement requires, so that the curve is smooth.
 constexpr int kPaddingLevel = 4;
 
 }  // namespace
