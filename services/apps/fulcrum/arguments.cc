@@ -15,7 +15,7 @@ Arguments Parse(const char* command, const Words& words, const po::options_descr
                 const std::vector<const char*>& positional) {
   po::options_description visible("Options");
   visible.add(options);
-  visible.add_options()("help", "print this");
+  visible.add_options()("help", "print this text");
   po::options_description all;
   all.add(visible);
   po::positional_options_description places;
@@ -35,6 +35,7 @@ Arguments Parse(const char* command, const Words& words, const po::options_descr
     for (const CommandEntry& entry : Commands()) {
       if (std::string_view(entry.name) == command) {
         std::cout << "usage: fulcrum " << entry.usage << "\n\n" << entry.purpose << "\n";
+        std::cout << "\nExample:\n  fulcrum " << entry.example << "\n";
       }
     }
     std::cout << "\n" << visible;
@@ -57,7 +58,7 @@ int DomainOf(const Arguments& arguments, int fallback) {
 void AddCart(po::options_description* options) {
   options->add_options()(
       "cart", po::value<std::string>()->value_name("FILE"),
-      "cart configuration (default: /etc/fulcrum/cart.yaml of an installation, else everything simulated)");
+      "cart file (default: /etc/fulcrum/cart.yaml of an installation, else all hardware is simulated)");
 }
 
 std::filesystem::path CartOf(const Arguments& arguments) {
@@ -81,7 +82,7 @@ std::filesystem::path UserFolder(const char* variable, const char* fallback) {
 void AddDatabase(po::options_description* options) {
   options->add_options()(
       "database", po::value<std::string>()->value_name("FILE"),
-      "the trainees' database (default: fulcrum/trainees.sqlite in $XDG_STATE_HOME or ~/.local/state)");
+      "database of the trainees' scores (default: fulcrum/trainees.sqlite in $XDG_STATE_HOME or ~/.local/state)");
 }
 
 std::filesystem::path DatabaseOf(const Arguments& arguments) {

@@ -16,14 +16,15 @@ ExitCode Assess(const Words& words) {
   po::options_description options;
   options.add_options()  //
       ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
-       "compiled scene; default: scene.fulcrum beside the recording")  //
-      ("json", po::value<std::string>()->value_name("FILE"), "write the sheet here, too, as assessment.json has it");
+       "compiled scene (default: scene.fulcrum beside the recording)")  //
+      ("json", po::value<std::string>()->value_name("FILE"),
+       "also write the score sheet to FILE, in the format of assessment.json");
   const Arguments arguments = Parse("assess", words, options, {"recording"});
   if (arguments.help) {
     return ExitCode::kDone;
   }
   if (arguments.values.count("recording") == 0) {
-    throw InputError("which recording? see fulcrum help assess");
+    throw InputError("RECORDING is missing, for example out/latest/recording.mcap; see fulcrum help assess");
   }
   const std::filesystem::path recording = arguments.values["recording"].as<std::string>();
   const std::filesystem::path file =

@@ -13,15 +13,17 @@ ExitCode Console(const Words& words) {
   namespace po = boost::program_options;
   namespace fs = std::filesystem;
   po::options_description options;
-  options.add_options()                                                                                               //
-      ("port", po::value<int>()->value_name("N")->default_value(8480), "of the page; 0: any that is free")            //
-      ("bind", po::value<std::string>()->value_name("ADDRESS")->default_value("127.0.0.1"),                           //
-       "numeric address to listen on; other than loopback, the page and its token cross the network in the clear")    //
-      ("host-name", po::value<Words>()->value_name("NAME")->composing(),                                              //
-       "a name under which the page may be asked for, beside localhost, this machine's and numeric addresses")        //
-      ("token-file", po::value<std::string>()->value_name("FILE"),                                                    //
-       "keep the token in this file, and use the one that is in it (default: a new one at each start)")               //
-      ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "session folders are made in here")  //
+  options.add_options()  //
+      ("port", po::value<int>()->value_name("N")->default_value(8480),
+       "port of the page, 1 to 65535; 0: any free port")                                               //
+      ("bind", po::value<std::string>()->value_name("ADDRESS")->default_value("127.0.0.1"),            //
+       "numeric address to listen on; with other than loopback, page and token are sent unencrypted")  //
+      ("host-name", po::value<Words>()->value_name("NAME")->composing(),                               //
+       "further valid host name of the page, besides localhost, this machine's name and numeric addresses; may be "
+       "repeated")                                                                                                  //
+      ("token-file", po::value<std::string>()->value_name("FILE"),                                                  //
+       "use the token in this file, or write a new one to it (default: a new token at each start)")                 //
+      ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder for the session folders")  //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that scenes import");
   AddCart(&options);
   AddDomain(&options);
@@ -52,15 +54,15 @@ ExitCode Console(const Words& words) {
       DomainOf(arguments, settings.cart.empty() ? kDefaultDomain : config::LoadCart(settings.cart).domain);
   console::Console console(settings);
   if (!settings.bind.starts_with("127.") && settings.bind != "::1") {
-    std::fprintf(stderr, "fulcrum: --bind %s: whoever sees this network's traffic sees the token\n",
+    std::fprintf(stderr, "fulcrum: --bind %s: the token is sent unencrypted over this network; prefer an SSH tunnel\n",
                  settings.bind.c_str());
   }
-  std::printf("open %s\ntoken in %s\nCtrl-C ends the console; a session goes on\n", console.Address().c_str(),
+  std::printf("open %s\ntoken in %s\nCtrl-C ends the console; a running session goes on\n", console.Address().c_str(),
               console.token_file().c_str());
   std::fflush(stdout);
   console.Run();
   if (console.session_runs()) {
-    std::printf("a session runs still in domain %d: fulcrum down ends it, fulcrum console watches it again\n",
+    std::printf("a session still runs in domain %d: end it with fulcrum down, or show it with fulcrum console\n",
                 settings.domain);
   }
   return ExitCode::kDone;

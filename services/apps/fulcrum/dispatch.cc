@@ -1,4 +1,4 @@
-// From the words of the command line to the subcommand or program that they name.
+// Selection of the subcommand or program that the command line names.
 #include <cstdio>
 
 #include "services/apps/fulcrum/commands.h"
@@ -9,12 +9,12 @@ namespace fulcrum::supervisor::cli {
 namespace {
 
 void PrintHelp() {
-  std::puts("usage: fulcrum COMMAND [options]\n\nRuns and watches a Fulcrum cart.\n");
+  std::puts("usage: fulcrum COMMAND [options]\n\nRuns and supervises a Fulcrum cart.\n");
   for (const CommandEntry& entry : Commands()) {
     std::printf("  %-9s %s\n", entry.name, entry.purpose);
   }
   std::puts(
-      "  help      help COMMAND: options of one command.\n"
+      "  help      help COMMAND: print the options of one command.\n"
       "  version   Print the version.\n\n"
       "fulcrum PROGRAM ... runs another program of the installation with its own options (--help):\n"
       "  handle_bridge calibrate, haptics_node calibrate-trocar, replayer, scene_compiler, or a node.\n\n"
@@ -43,7 +43,7 @@ ExitCode Dispatch(Words words) {
   if (IsProgram(words[0])) {
     Become(words);
   }
-  throw InputError("unknown command \"" + words[0] + "\"; see fulcrum --help");
+  throw InputError("unknown command \"" + words[0] + "\"; fulcrum --help lists the valid ones");
 }
 
 }  // namespace fulcrum::supervisor::cli

@@ -1,4 +1,4 @@
-// Each check prints ✓ or ✗ with what was found, and for ✗ the fix.
+// fulcrum doctor: each check of the machine prints ✓ or ✗ with its finding, and for ✗ a fix.
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 #include <dlfcn.h>
@@ -66,7 +66,7 @@ Finding SharedMemory(int domain) {
   return {true, found, ""};
 }
 
-/// A kernel that grants less than asked for says nothing.
+/// Reads the size back, because setsockopt reports no error when the kernel grants less.
 Finding SocketBuffers() {
   const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   const int wanted = static_cast<int>(bus::kSocketBuffer_B);
@@ -75,20 +75,20 @@ Finding SocketBuffers() {
   ::setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &wanted, sizeof(wanted));
   ::getsockopt(socket, SOL_SOCKET, SO_RCVBUF, &granted, &size);
   ::close(socket);
-  granted /= 2;  // The kernel doubles what it grants, for its own books.
+  granted /= 2;  // The kernel doubles the size for its own overhead.
   const std::string fix =
       "sysctl -w net.core.rmem_max=" + std::to_string(wanted) + " net.core.wmem_max=" + std::to_string(wanted) +
-      ", and the same in /etc/sysctl.d to keep it; without it a recorder that is kept waiting loses samples";
+      ", and the same in /etc/sysctl.d for the next boot; with smaller buffers a delayed recorder loses samples";
   return {granted >= wanted,
           std::to_string(granted >> 10) + " KiB granted of " + std::to_string(wanted >> 10) + " KiB wanted", fix};
 }
 
-/// How to be given a limit of /etc/security.
+/// Fix for a missing limit of /etc/security.
 std::string FixOfLimit(const std::string& entry, const std::string& capability) {
   const std::string how = runtime::MachineCart().empty()
                               ? "add \"@fulcrum - " + entry + "\" to /etc/security/limits.conf and join that group"
                               : "sudo adduser $USER fulcrum, then log in again";
-  return how + ", or run in a container with --cap-add=" + capability;
+  return how + ", or run the container with --cap-add=" + capability;
 }
 
 Finding RealTime() {
@@ -104,7 +104,7 @@ Finding LockedMemory() {
           FixOfLimit("memlock unlimited", "IPC_LOCK")};
 }
 
-// Loaded at run time: a machine without EGL must get a diagnosis, not a loader error.
+// EGL is loaded at run time, so that a machine without it gets a diagnosis instead of a loader error.
 Finding OffScreenGl() {
   const std::string fix = "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri";
   void* library = ::dlopen("libEGL.so.1", RTLD_NOW);
@@ -136,7 +136,7 @@ Finding Display() {
       return {true, std::string(name) + "=" + value, ""};
     }
   }
-  return {true, "none: pictures are drawn off screen, --window needs one (xvfb-run gives one without a monitor)", ""};
+  return {true, "none: pictures are drawn off screen; --window needs a display (without a monitor: xvfb-run)", ""};
 }
 
 Finding SerialPorts() {
@@ -160,7 +160,7 @@ Finding SerialPorts() {
   return {true, found.empty() ? "none: handles and pedal are simulated" : "usable:" + found, ""};
 }
 
-// The name that haptics_node loads; a cart with simulated devices does not need it.
+// haptics_node loads the library by this name. A cart with simulated devices does not need it.
 Finding TouchDriver() {
   if (::dlopen("libHD.so", RTLD_LAZY | RTLD_LOCAL) != nullptr) return {true, "libHD.so is installed", ""};
   return {true, "none: a cart with `kind: touch` needs libHD.so (3D Systems: Touch Device Driver, OpenHaptics)", ""};
@@ -168,7 +168,7 @@ Finding TouchDriver() {
 
 /// True when a UDP socket of this machine is bound to one of the ports that DDS derives from the domain.
 bool PortsInUse(int domain) {
-  // RTPS well-known ports: 7400 + 250 * domain, then 0, 1 and 10 + 2 * participant for the rest.
+  // RTPS well-known ports: 7400 + 250 * domain, plus 0, 1 and 10 + 2 * participant.
   const unsigned first = 7400u + 250u * static_cast<unsigned>(domain);
   std::ifstream table("/proc/net/udp");
   std::string line;
@@ -194,8 +194,8 @@ Finding DomainInUse(int domain) {
     return {true, name + ": a session is running (fulcrum status)", ""};
   }
   if (PortsInUse(domain)) {
-    return {false, name + ": no session, but some program is bound to its ports",
-            "end that program (ss -lunp shows it) or take another domain (--domain N)"};
+    return {false, name + ": no session, but another program is bound to its ports",
+            "end that program (ss -lunp lists it) or use another domain (--domain N)"};
   }
   return {true, name + " is free", ""};
 }
@@ -234,13 +234,13 @@ Finding Scenes() {
 Finding Cart() {
   const fs::path cart = runtime::MachineCart();
   if (cart.empty() || !fs::exists(cart)) {
-    return {true, "no cart file of this machine: everything is simulated, unless --cart says otherwise", ""};
+    return {true, "no cart file of this machine: without --cart all hardware is simulated", ""};
   }
   try {
     return {true, cart.string() + ", \"" + config::LoadCart(cart).name + "\"", ""};
   } catch (const InputError& error) {
     return {false, error.what(),
-            "correct it, or begin again with one of " + (runtime::ShareFolder() / "carts").string()};
+            "correct it, or replace it by a copy of a file in " + (runtime::ShareFolder() / "carts").string()};
   }
 }
 
@@ -250,7 +250,7 @@ ExitCode Doctor(const Words& words) {
   namespace po = boost::program_options;
   po::options_description options;
   options.add_options()("out", po::value<std::string>()->value_name("DIR")->default_value("out"),
-                        "folder of the sessions");
+                        "folder of the session folders; its disk is checked for 1 GiB of free space");
   AddDomain(&options);
   const Arguments arguments = Parse("doctor", words, options);
   if (arguments.help) {

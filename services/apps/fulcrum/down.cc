@@ -16,12 +16,12 @@ ExitCode Down(const Words& words) {
   }
   const int domain = DomainOf(arguments, kDefaultDomain);
   const ExitCode answer = Ask(domain, "down", "");
-  // Returns when the session has really ended, so that the next one can start at once.
+  // Waits until the session has ended, so that the next one can start at once.
   constexpr auto kPatience = std::chrono::seconds(30);
   const auto begin = std::chrono::steady_clock::now();
   while (DomainGuard::IsHeld(domain)) {
     if (std::chrono::steady_clock::now() - begin > kPatience) {
-      throw std::runtime_error("the session has not ended after 30 s");
+      throw std::runtime_error("the session has not ended within 30 s; see fulcrum status");
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }

@@ -9,7 +9,7 @@ ExitCode Dump(const Words& words) {
   if (arguments.help) {
     return ExitCode::kDone;
   }
-  return Ask(DomainOf(arguments, kDefaultDomain), "dump", "asked for");
+  return Ask(DomainOf(arguments, kDefaultDomain), "dump", "requested by fulcrum dump");
 }
 
 }  // namespace fulcrum::supervisor::cli

@@ -7,8 +7,8 @@ namespace fulcrum::supervisor::cli {
 ExitCode Generator(const Words& words) {
   boost::program_options::options_description options;
   const auto power = [] { return boost::program_options::value<double>()->value_name("W"); };
-  options.add_options()("cut", power(), "power with the pedal for cut down, 0 to 300 W")(
-      "coag", power(), "with the pedal for coagulation down")("blend", power(), "with the pedal for blended cut down");
+  options.add_options()("cut", power(), "power of mode cut, 0 to 300 W")(
+      "coag", power(), "power of mode coag, 0 to 300 W")("blend", power(), "power of mode blend, 0 to 300 W");
   AddDomain(&options);
   const Arguments arguments = Parse("generator", words, options, {});
   if (arguments.help) return ExitCode::kDone;

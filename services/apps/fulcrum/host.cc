@@ -10,21 +10,22 @@ namespace fulcrum::supervisor::cli {
 ExitCode Host(const Words& words) {
   namespace po = boost::program_options;
   po::options_description options;
-  options.add_options()("peer", po::value<std::string>()->value_name("ADDR"),
-                        "machine of the cart, which runs fulcrum up --peer (this machine) --remote NODE,...")  //
-      ("nodes", po::value<std::string>()->value_name("NODE,..."),
-       "the only nodes that a cart may run here (default: any)")(
+  options.add_options()(
+      "peer", po::value<std::string>()->value_name("ADDR"),
+      "numeric address of the cart's machine, which runs fulcrum up --peer (this machine) --remote NODE,...")  //
+      ("nodes", po::value<std::string>()->value_name("NODE,..."), "nodes that a cart may run here (default: all)")(
           "address", po::value<std::string>()->value_name("ADDR"),
-          "own address towards the cart (default: of the interface that leads there)")(
+          "own address on the network of the cart (default: that of the interface to --peer)")(
           "link-domain", po::value<int>()->value_name("N"),
           "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
-          "out", po::value<std::string>()->value_name("DIR")->default_value("out"), "session folders are made in here")(
-          "cache", po::value<std::string>()->value_name("DIR"), "scenes are kept here by their hash")(
+          "out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder for the session folders")(
+          "cache", po::value<std::string>()->value_name("DIR"),
+          "folder of received scenes, named by their hash (default: the cache of compiled scenes)")(
           "keys", po::value<std::string>()->value_name("DIR"),
-          "folder of a secured cart's keys, as fulcrum keys init made it (default: not secured)")(
-          "window", "show the picture in a window as well")(
+          "folder of a secured cart's keys, made by fulcrum keys init (default: not secured)")(
+          "window", "also show the picture in a window")(
           "quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),
-          "of the picture: auto, low, high");
+          "quality of the picture: auto, low, high");
   AddDomain(&options);
   const Arguments arguments = Parse("host", words, options);
   if (arguments.help) {
@@ -32,7 +33,7 @@ ExitCode Host(const Words& words) {
   }
   const auto& values = arguments.values;
   if (values.count("peer") == 0) {
-    throw InputError("--peer: on which machine is the cart? see fulcrum help host");
+    throw InputError("--peer is missing: give the address of the cart's machine; see fulcrum help host");
   }
   const auto text = [&](const char* name) { return values.count(name) != 0 ? values[name].as<std::string>() : ""; };
   HostSettings settings;

@@ -1,4 +1,4 @@
-// fulcrum log: recordings, read and compared.
+// fulcrum log: tools that read and compare recordings.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -23,7 +23,7 @@ using Files = std::vector<fs::path>;
 
 struct Tool {
   const char* name;
-  const char* usage;  ///< After "fulcrum log ".
+  const char* usage;  ///< Text after "fulcrum log ".
   const char* purpose;
   void (*add_options)(po::options_description*);
   ExitCode (*run)(const po::variables_map&, const Files&);
@@ -34,15 +34,16 @@ struct Tool {
 void NoOptions(po::options_description*) {}
 
 void AddFilter(po::options_description* options) {
-  options->add_options()                                                                                           //
-      ("topic", po::value<std::vector<std::string>>()->value_name("NAME"), "only this topic; may be given again")  //
-      ("from", po::value<double>()->value_name("SECONDS"), "from here on; 0 is the first message of the file")     //
-      ("to", po::value<double>()->value_name("SECONDS"), "up to here");
+  options->add_options()                                                                                        //
+      ("topic", po::value<std::vector<std::string>>()->value_name("NAME"), "only this topic; may be repeated")  //
+      ("from", po::value<double>()->value_name("SECONDS"),
+       "only messages from this time on [s]; 0 is the first message of the file (default: 0)")  //
+      ("to", po::value<double>()->value_name("SECONDS"), "only messages up to this time [s] (default: the end)");
 }
 
 void AddCatOptions(po::options_description* options) {
   AddFilter(options);
-  options->add_options()("full", "print long lists whole, too");
+  options->add_options()("full", "print all elements of long lists");
 }
 
 log_tools::Filter FilterOf(const po::variables_map& values) {
@@ -88,7 +89,7 @@ ExitCode Cat(const po::variables_map& values, const Files& files) {
 void AddExportOptions(po::options_description* options) {
   AddFilter(options);
   options->add_options()("out", po::value<std::string>()->value_name("DIR"),
-                         "folder of the tables (default: beside it)");
+                         "folder of the tables (default: FILE with -tables instead of its extension)");
 }
 
 ExitCode Export(const po::variables_map& values, const Files& files) {
@@ -113,24 +114,25 @@ ExitCode Verify(const po::variables_map&, const Files& files) {
 void AddDiffOptions(po::options_description* options) {
   AddFilter(options);
   options->add_options()("without", po::value<std::string>()->value_name("FIELD")->default_value(""),
-                         "leave this field out wherever it is, for example stamp");
+                         "ignore this field in all messages, for example stamp");
 }
 
 ExitCode Diff(const po::variables_map& values, const Files& files) {
   if (files.size() != 2) {
-    throw InputError("diff compares two files; see fulcrum log diff --help");
+    throw InputError("diff needs two files, got " + std::to_string(files.size()) + "; see fulcrum log diff --help");
   }
   return log_tools::Diff(files[0], files[1], FilterOf(values), values["without"].as<std::string>(), &std::cout);
 }
 
 void AddRecoverOptions(po::options_description* options) {
   options->add_options()("out", po::value<std::string>()->value_name("FILE"),
-                         "the whole file (default: FILE with -recovered in its name)");
+                         "recovered file (default: FILE with -recovered in its name)");
 }
 
 ExitCode Recover(const po::variables_map& values, const Files& files) {
   if (values.count("out") != 0 && files.size() != 1) {
-    throw InputError("--out names one file: give one to recover");
+    throw InputError("--out names one file, but " + std::to_string(files.size()) +
+                     " are to be recovered; give one FILE");
   }
   for (const fs::path& file : files) {
     fs::path mended = file;
@@ -147,16 +149,17 @@ ExitCode Recover(const po::variables_map& values, const Files& files) {
 }
 
 void AddMapOptions(po::options_description* options) {
-  options->add_options()                                                                                            //
-      ("out", po::value<std::string>()->value_name("FILE"), "the picture (default: cut.png beside the recording)")  //
-      ("json", po::value<std::string>()->value_name("FILE"), "write the figures here, too")                         //
+  options->add_options()  //
+      ("out", po::value<std::string>()->value_name("FILE"),
+       "picture to write (default: cut.png beside the recording)")                              //
+      ("json", po::value<std::string>()->value_name("FILE"), "also write the figures to FILE")  //
       ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
-       "compiled scene; default: scene.fulcrum beside the recording");
+       "compiled scene (default: scene.fulcrum beside the recording)");
 }
 
 ExitCode Map(const po::variables_map& values, const Files& files) {
   if (files.size() != 1) {
-    throw InputError("map draws one recording; see fulcrum log map --help");
+    throw InputError("map needs one file, got " + std::to_string(files.size()) + "; see fulcrum log map --help");
   }
   const fs::path scene_file = recording::BesideRecording(values["scene"].as<std::string>(), files[0], "scene.fulcrum");
   if (scene_file.empty()) {
@@ -179,31 +182,32 @@ ExitCode Map(const po::variables_map& values, const Files& files) {
 }
 
 constexpr std::array kTools{
-    Tool{"info", "info FILE...", "What a recording holds: session, topics, rates, losses.", NoOptions, Info},
-    Tool{"list", "list [FOLDER...]", "The recordings in a folder (default: out), oldest first.", NoOptions, List},
-    Tool{"cat", "cat FILE... [options]", "The messages as JSON, one a line.", AddCatOptions, Cat},
-    Tool{"export", "export FILE... [options]", "One CSV table a topic.", AddExportOptions, Export},
+    Tool{"info", "info FILE...", "Print the content of a recording: session, topics, rates, losses.", NoOptions, Info},
+    Tool{"list", "list [FOLDER...]", "List the recordings in a folder (default: out), oldest first.", NoOptions, List},
+    Tool{"cat", "cat FILE... [options]", "Print the messages as JSON, one per line.", AddCatOptions, Cat},
+    Tool{"export", "export FILE... [options]", "Write one CSV table per topic.", AddExportOptions, Export},
     Tool{"verify", "verify FILE...",
-         "Checksums, indexes, decoding, gate, sequences; exit code 1 when anything is wrong.", NoOptions, Verify},
-    Tool{"diff", "diff FILE FILE [options]", "First difference of each topic; exit code 1 when there is one.",
+         "Check checksums, indexes, decoding, gates and sequences; exit code 1 when a check fails.", NoOptions, Verify},
+    Tool{"diff", "diff FILE FILE [options]", "Print the first difference of each topic; exit code 1 when there is one.",
          AddDiffOptions, Diff},
-    Tool{"recover", "recover FILE... [options]", "What can be read of a cut or damaged file into a whole one.",
-         AddRecoverOptions, Recover},
-    Tool{"map", "map FILE [options]", "What was cut, as a picture, and its figures.", AddMapOptions, Map},
+    Tool{"recover", "recover FILE... [options]",
+         "Copy the readable part of a truncated or damaged file to a valid one.", AddRecoverOptions, Recover},
+    Tool{"map", "map FILE [options]", "Draw a map of the cut and print its figures.", AddMapOptions, Map},
 };
 
 void PrintTools() {
-  std::cout << "usage: fulcrum log TOOL FILE... [options]\n\nReads recordings.\n\n";
+  std::cout << "usage: fulcrum log TOOL FILE... [options]\n\nReads recordings of sessions.\n\n";
   for (const Tool& tool : kTools) {
     std::cout << "  " << tool.name << std::string(9 - std::string_view(tool.name).size(), ' ') << tool.purpose << '\n';
   }
-  std::cout << "\nfulcrum log TOOL --help: options of one tool.\n";
+  std::cout << "\nfulcrum log TOOL --help prints the options of one tool.\n\n"
+               "Example:\n  fulcrum log cat out/latest/recording.mcap --topic ThermalEvent --to 20\n";
 }
 
 ExitCode Run(const Tool& tool, const Words& words) {
   po::options_description visible("Options"), all;
   tool.add_options(&visible);
-  visible.add_options()("help", "print this");
+  visible.add_options()("help", "print this text");
   all.add(visible).add_options()("file", po::value<std::vector<std::string>>());
   po::positional_options_description places;
   places.add("file", -1);
@@ -225,7 +229,7 @@ ExitCode Run(const Tool& tool, const Words& words) {
     }
   }
   if (files.empty() && std::string_view(tool.usage).find("FILE") != std::string_view::npos) {
-    throw InputError(std::string("which file? see fulcrum log ") + tool.name + " --help");
+    throw InputError(std::string("FILE is missing; see fulcrum log ") + tool.name + " --help");
   }
   return tool.run(values, files);
 }
@@ -240,7 +244,7 @@ ExitCode Log(const Words& words) {
   const auto* tool =
       std::find_if(kTools.begin(), kTools.end(), [&](const Tool& known) { return words[0] == known.name; });
   if (tool == kTools.end()) {
-    throw InputError("no tool \"" + words[0] + "\"; see fulcrum log --help");
+    throw InputError("unknown tool \"" + words[0] + "\"; fulcrum log --help lists the valid ones");
   }
   return Run(*tool, {words.begin() + 1, words.end()});
 }

@@ -1,4 +1,4 @@
-// fulcrum: the operator's command.
+// fulcrum: the command with which an operator runs a cart.
 #include <cstdio>
 #include <exception>
 

@@ -14,7 +14,7 @@ namespace {
 
 using config::KeyRule;
 
-/// What stands behind a key in the file.
+/// Comment behind a key in the file.
 std::string CommentAt(const std::vector<std::string>& lines, int line) {
   if (line < 1 || static_cast<std::size_t>(line) > lines.size()) return {};
   const std::string& text = lines[static_cast<std::size_t>(line) - 1];
@@ -39,7 +39,7 @@ std::string Cell(std::string text) {
   return text;
 }
 
-/// One table a section, a section being what stands before the first dot.
+/// Prints one table per section; the section of a key is the part before its first dot.
 void PrintTables(const std::vector<Entry>& entries) {
   const auto section_of = [](const std::string& path) { return path.substr(0, path.find_first_of(".[")); };
   std::vector<std::string> sections;
@@ -72,10 +72,11 @@ ExitCode Reference(const Words& words) {
   if (help || words.size() < 2 || (words[0] != "cart" && words[0] != "scene")) {
     const char* usage =
         "usage: fulcrum reference cart|scene FILE...\n\n"
-        "Prints every key that the reader of such files knows, with default, valid values and\n"
-        "the comments of the files given, as Markdown. Keys of lists are known from files that\n"
-        "have them: give several.\n";
-    if (!help) throw InputError(std::string("reference needs what it is of, and files\n") + usage);
+        "Prints every valid key of cart or scene files with default, valid values and the\n"
+        "comments of the given files, as Markdown. Keys of list entries are printed only when\n"
+        "a given file contains them, so give several files.\n\n"
+        "Example:\n  fulcrum reference cart deploy/carts/simulated.yaml deploy/carts/touch.yaml\n";
+    if (!help) throw InputError(std::string("reference needs \"cart\" or \"scene\" and at least one FILE\n") + usage);
     std::cout << usage;
     return ExitCode::kDone;
   }
@@ -95,13 +96,12 @@ ExitCode Reference(const Words& words) {
       if (entry.about.empty()) entry.about = CommentAt(lines, rule.line);
     }
   }
-  std::cout
-      << (words[0] == "cart"
-              ? "# Cart reference\n\nA cart file says what hardware is attached and how each node runs. "
-              : "# Scene reference\n\nA scene file says what is operated on, with what, and how it behaves. ")
-      << "This page is printed by the reader of these files (`fulcrum reference " << words[0]
-      << "`): what it says is what is checked. Keys end in their unit; a value may repeat another unit of the same "
-         "dimension.\n";
+  std::cout << (words[0] == "cart"
+                    ? "# Cart reference\n\nA cart file describes the attached hardware and the settings of each node. "
+                    : "# Scene reference\n\nA scene file describes anatomy, tools, material parameters and script. ")
+            << "The reader of these files prints this page (`fulcrum reference " << words[0]
+            << "`), from the same rules with which it checks them. Keys end in their unit; a value may give another "
+               "unit of the same dimension.\n";
   PrintTables(entries);
   return ExitCode::kDone;
 }

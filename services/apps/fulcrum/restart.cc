@@ -11,7 +11,7 @@ ExitCode Restart(const Words& words) {
     return ExitCode::kDone;
   }
   if (arguments.values.count("node") == 0) {
-    throw InputError("which node? see fulcrum status");
+    throw InputError("NODE is missing, for example physics_node; fulcrum status lists the nodes");
   }
   return Ask(DomainOf(arguments, kDefaultDomain), "restart", arguments.values["node"].as<std::string>());
 }

@@ -22,10 +22,10 @@ ExitCode Status(const Words& words) {
     return ExitCode::kFailure;
   }
   SessionView view(domain);
-  // Health is for late joiners, too, and comes at 10 Hz: when nobody new has been heard for so long, all that live have
-  // been. With keys they prove themselves one after the other.
+  // Late joiners receive the newest Health at once, and each node sends one at 10 Hz: when no new node has reported for
+  // this time, all running nodes have. On a secured cart the nodes authenticate one after the other.
   constexpr auto kListen = std::chrono::milliseconds(700);
-  // Who is not accepted by the supervisor learns it from its silence.
+  // A participant that the supervisor refuses gets no reply, so the wait for the first Health is limited.
   constexpr auto kPatience = std::chrono::seconds(4);
   int heard = 0;
   auto newest = std::chrono::steady_clock::now();

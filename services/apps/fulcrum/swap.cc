@@ -9,7 +9,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// As a shell would find it, but beside this program first.
+/// Path of a program: as given when it contains '/', else beside this program.
 std::string Found(const std::string& program) {
   if (program.find('/') != std::string::npos) return fs::absolute(program);
   return runtime::ProgramFolder() / program;
@@ -20,7 +20,7 @@ std::string Found(const std::string& program) {
 ExitCode Swap(const Words& words) {
   boost::program_options::options_description options;
   options.add_options()("with", boost::program_options::value<std::string>()->value_name("COMMAND"),
-                        "one word: a build of the node, which gets the node's arguments; more words: as they stand, "
+                        "one word: a build of the node, which gets the node's arguments; more words: used as given, "
                         "with {scene}, {session}, {domain} and {cart} filled in");
   AddDomain(&options);
   const Arguments arguments = Parse("swap", words, options, {"node"});
@@ -29,7 +29,7 @@ ExitCode Swap(const Words& words) {
   }
   if (arguments.values.count("node") == 0 || arguments.values.count("with") == 0) {
     throw InputError(
-        "which node, and with which command? For example: fulcrum swap physics_node --with "
+        "NODE or --with COMMAND is missing. For example: fulcrum swap physics_node --with "
         "build/other/bin/physics_node");
   }
   std::vector<std::string> command = boost::program_options::split_unix(arguments.values["with"].as<std::string>());

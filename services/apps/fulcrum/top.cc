@@ -32,7 +32,7 @@ ExitCode Top(const Words& words) {
     if (const std::string mismatch = view.mismatch(); !mismatch.empty()) throw MismatchError(mismatch);
     if (std::chrono::steady_clock::now() >= next) {
       next += kRefresh;
-      // Home, text, then clear what an earlier longer text left below: no flicker.
+      // Clears the screen before each new text, so that no line of an earlier text stays.
       std::printf("%s%s%s\n", terminal ? "\x1b[H\x1b[2J" : "", view.Text().c_str(),
                   terminal ? "Ctrl-C ends this view" : "");
       std::fflush(stdout);

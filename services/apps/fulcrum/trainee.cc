@@ -15,7 +15,7 @@ std::string ListOf(const TrainingLog& log) {
   for (const auto& [name, sessions] : log.Trainees()) {
     list += name + ": " + std::to_string(sessions) + (sessions == 1 ? " session\n" : " sessions\n");
   }
-  return list.empty() ? "no session is remembered yet\n" : list;
+  return list.empty() ? "no session is stored yet; fulcrum up SCENE --trainee NAME stores one\n" : list;
 }
 
 }  // namespace
@@ -24,7 +24,7 @@ ExitCode Trainee(const Words& words) {
   po::options_description options;
   options.add_options()                                                                                          //
       ("scene", po::value<std::string>()->value_name("NAME")->default_value(""), "only sessions of this scene")  //
-      ("svg", po::value<std::string>()->value_name("FILE"), "write the plots here");
+      ("svg", po::value<std::string>()->value_name("FILE"), "also write plots to FILE");
   AddDatabase(&options);
   const Arguments arguments = Parse("trainee", words, options, {"name"});
   if (arguments.help) {
@@ -40,7 +40,7 @@ ExitCode Trainee(const Words& words) {
   const std::vector<TrainingRow> rows = log.SessionsOf(name, scene);
   if (rows.empty()) {
     throw InputError("no session of \"" + name + "\"" + (scene.empty() ? "" : " on \"" + scene + "\"") +
-                     " is remembered. There are:\n" + ListOf(log));
+                     " is stored. Stored sessions:\n" + ListOf(log));
   }
   std::fputs(TraineeTable(rows).c_str(), stdout);
   if (arguments.values.count("svg") != 0) {

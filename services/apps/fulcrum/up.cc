@@ -1,6 +1,7 @@
 #include "services/apps/fulcrum/commands.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
+#include "services/session/supervisor/outcome.h"
 #include "services/session/supervisor/scene_cache.h"
 #include "services/session/supervisor/supervisor.h"
 #include "services/session/supervisor/training_log.h"
@@ -21,54 +22,56 @@ fs::path SceneCache(const fs::path& programs) {
   return UserFolder("XDG_CACHE_HOME", ".cache") / "scenes";
 }
 
-/// Empty: the nodes are children.
+/// Folder of --attach; empty: the nodes are children of the supervisor.
 fs::path AttachTo(const po::variables_map& values) {
   if (values.count("attach") == 0) return {};
   if (values.count("standby") != 0) {
-    throw InputError("--attach: a standby is not possible, as each node is one service");
+    throw InputError("--attach cannot be combined with --standby, because each node is one service");
   }
   if (values.count("peer") != 0) {
-    throw InputError("--attach: nodes on another host are not possible with it");
+    throw InputError("--attach cannot be combined with --peer and --remote");
   }
   const char* folder = std::getenv("RUNTIME_DIRECTORY");
   if (folder == nullptr || !fs::is_directory(folder)) {
     throw InputError(
-        "--attach: RUNTIME_DIRECTORY names no folder; it is for services of systemd (fulcrum-supervisor.service), "
-        "which sets it");
+        "--attach: RUNTIME_DIRECTORY names no folder; the option is for fulcrum-supervisor.service, for which systemd "
+        "sets this variable");
   }
   return folder;
 }
 
 ExitCode Up(const Words& words) {
   po::options_description options;
-  options.add_options()                                                                                               //
-      ("seconds", po::value<double>()->value_name("N"),                                                               //
-       "session time (default: the script's duration; without a script until Ctrl-C)")                                //
-      ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "session folders are made in here")  //
-      ("window", "show the picture in a window as well")                                                              //
-      ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                                //
-       "of the picture: auto, low, high")                                                                             //
-      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")            //
+  options.add_options()                                                                                              //
+      ("seconds", po::value<double>()->value_name("N"),                                                              //
+       "session time [s], above 0, at most 604800 (default: the script's duration; without a script until Ctrl-C)")  //
+      ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder for the session folders")   //
+      ("window", "also show the picture in a window")                                                                //
+      ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                               //
+       "quality of the picture: auto, low, high")                                                                    //
+      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")           //
       ("set", po::value<Words>()->value_name("SECTION.KEY=VALUE")->composing(),
-       "a parameter of physics, thermal, haptics, breathing or render other than the scene has it, or script.power_W, "
-       "the generator's setting; as often as needed")  //
-      ("record", "record all topics into recording.mcap of the session folder")(
+       "replace a parameter of physics, thermal, haptics, breathing or render in the scene, or script.power_W, the "
+       "power of all uses of the generator; may be repeated")  //
+      ("record", "record all topics into recording.mcap in the session folder")(
           "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
           "keep-last", po::value<double>()->value_name("SECONDS"),
-          "keep the newest past in memory and write it into a file when a node dies, when its Health turns to "
-          "degraded, and at fulcrum dump")(
+          "keep the newest seconds in memory, above 0, at most 3600, and write them into a file when a node dies, when "
+          "its Health turns to degraded, and at fulcrum dump (default: off)")(
           "peer", po::value<std::string>()->value_name("ADDR"),
-          "host that runs the nodes of --remote; there: fulcrum host --peer (this machine)")(
+          "address of the host that runs the nodes of --remote; start fulcrum host --peer (this machine) there")(
           "remote", po::value<std::string>()->value_name("NODE,..."), "nodes that run on the host --peer")(
           "address", po::value<std::string>()->value_name("ADDR"),
-          "own address towards the peer (default: of the interface that leads there)")(
+          "own address on the network of the peer (default: that of the interface to --peer)")(
           "link-domain", po::value<int>()->value_name("N"),
           "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
-          "standby", "a second physics_node that takes over when the first falls silent")(
-          "keep-going", "go on without a node that failed for good")(
-          "attach", "the nodes are services: wait for them below $RUNTIME_DIRECTORY/session, start and kill none");
+          "standby", "run a second physics_node that takes over when the first is silent")(
+          "keep-going", "continue the session without a node that failed for good (default: end it)")(
+          "attach",
+          "for nodes that are systemd services: write their arguments below $RUNTIME_DIRECTORY/session; start and kill "
+          "none");
   options.add_options()("trainee", po::value<std::string>()->value_name("NAME"),
-                        "remember the score under this name: see fulcrum trainee");
+                        "store the score under this name, 1 to 63 bytes; see fulcrum trainee");
   AddDatabase(&options);
   AddCart(&options);
   AddDomain(&options);
@@ -78,7 +81,7 @@ ExitCode Up(const Words& words) {
   }
   const auto& values = arguments.values;
   if (values.count("scene") == 0) {
-    throw InputError("which scene? see fulcrum help up");
+    throw InputError("SCENE is missing, for example built-in; see fulcrum help up");
   }
   UpSettings settings;
   settings.programs = runtime::ProgramFolder();
@@ -94,18 +97,18 @@ ExitCode Up(const Words& words) {
   }
   settings.standby = values.count("standby") != 0;
   if (values.count("peer") != values.count("remote")) {
-    throw InputError("--peer and --remote belong together: which host, and which nodes run there");
+    throw InputError("--peer and --remote must be given together: the host, and the nodes that run there");
   }
   if (values.count("peer") != 0) {
     settings.peer = values["peer"].as<std::string>();
     settings.remote = link::NodesFromNames(values["remote"].as<std::string>());
     settings.address = values.count("address") != 0 ? values["address"].as<std::string>() : "";
     settings.link_domain = values.count("link-domain") != 0 ? values["link-domain"].as<int>() : 0;
-    // What cannot be reached is refused here and not by a node.
+    // Invalid addresses are refused here, before any node is started.
     (void)link::FarSettingsFor(bus::FarSide::kCart, settings.peer, settings.address, settings.cart.domain,
                                settings.link_domain);
     if (settings.standby && (settings.remote >> static_cast<unsigned>(NodeId::kPhysics) & 1u) != 0) {
-      throw InputError("--standby: not for a physics_node on another host");
+      throw InputError("--standby cannot be combined with --remote physics_node");
     }
   }
   settings.keep_going = values.count("keep-going") != 0;
@@ -114,7 +117,8 @@ ExitCode Up(const Words& words) {
     settings.seconds = values["seconds"].as<double>();
     constexpr double kLongest = 7 * 24 * 3600.0;
     if (!(settings.seconds > 0 && settings.seconds <= kLongest)) {
-      throw InputError("--seconds: must be above 0 and at most " + std::to_string(static_cast<int>(kLongest)));
+      throw InputError("--seconds " + Fixed(settings.seconds, 2) + ": must be above 0 and at most " +
+                       std::to_string(static_cast<int>(kLongest)));
     }
   }
   if (values.count("record-to") != 0) {
@@ -125,7 +129,7 @@ ExitCode Up(const Words& words) {
   if (values.count("keep-last") != 0) {
     settings.keep_s = values["keep-last"].as<double>();
     if (!(settings.keep_s > 0 && settings.keep_s <= 3600)) {
-      throw InputError("--keep-last: must be above 0 and at most 3600 seconds");
+      throw InputError("--keep-last " + Fixed(settings.keep_s, 2) + ": must be above 0 and at most 3600 seconds");
     }
   }
   if (values.count("trainee") != 0) {
@@ -133,7 +137,7 @@ ExitCode Up(const Words& words) {
     CheckTraineeName(settings.trainee);
     settings.training_database = DatabaseOf(arguments);
   } else if (values.count("database") != 0) {
-    throw InputError("--database goes with --trainee NAME: whose session is it?");
+    throw InputError("--database goes with --trainee NAME; give both");
   }
   SceneRequest request;
   request.name = values["scene"].as<std::string>();

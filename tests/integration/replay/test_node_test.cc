@@ -90,8 +90,8 @@ TEST_F(TestNodeTest, BadUseAndBadFilesAreToldApart) {
   };
   const std::string log = session_->recording();
   const Case cases[] = {
-      {{}, "which node"},
-      {{"physics"}, "which node"},
+      {{}, "--inputs LOG is missing"},
+      {{"physics"}, "--inputs LOG is missing"},
       {{"kitchen", "--inputs", log}, "--test kitchen: no such node here; valid: physics_node"},
       {{"physics", "--inputs", "/nonexistent.mcap"}, "/nonexistent.mcap: no such file"},
       {{"physics", "--inputs", log, "--assert", "max_displacement_mm"}, "a comparison is missing"},

@@ -438,12 +438,12 @@ TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
 
 TEST_F(SupervisorTest, BadUseSaysWhatIsWrong) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases{
-      {{"up"}, "which scene"},
+      {{"up"}, "SCENE is missing"},
       {{"up", "no-such-scene"}, "no scene \"no-such-scene\""},
       {{"up", scene_.string(), "--seconds", "-1"}, "--seconds"},
       {{"up", scene_.string(), "--sekonds", "1"}, "sekonds"},
       {{"up", scene_.string(), "--database", "x"}, "--database goes with --trainee"},
-      {{"restart"}, "which node"},
+      {{"restart"}, "NODE is missing"},
       {{"jump"}, "unknown command"},
   };
   for (const auto& [words, expected] : cases) {
