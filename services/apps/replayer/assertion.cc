@@ -17,7 +17,7 @@ struct Sign {
   const char* text;
   Relation relation;
 };
-// Longer ones first.
+// Longer signs come first, because "<" is a prefix of "<=".
 constexpr std::array<Sign, 6> kSigns{{{"<=", Relation::kAtMost},
                                       {">=", Relation::kAtLeast},
                                       {"==", Relation::kEqual},
@@ -31,7 +31,7 @@ const char* SignOf(Relation relation) {
 
 bool IsOfName(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '.'; }
 
-/// Goes through a text from its beginning.
+/// Scanner of the parts of an assertion.
 class Scan {
  public:
   explicit Scan(const std::string& text) : text_(text) {}
@@ -66,7 +66,7 @@ class Scan {
     if (plus && text_.compare(at_ + 1, 1, "-") != 0) ++at_;
     double number = 0;
     const auto [end, error] = std::from_chars(text_.data() + at_, text_.data() + text_.size(), number);
-    // Also what from_chars takes for one: "inf" and "nan" are no bounds.
+    // from_chars accepts "inf" and "nan", which are no valid bounds.
     if (error != std::errc() || !std::isfinite(number)) {
       at_ = begin;
       Fail(error == std::errc::result_out_of_range ? "the number is out of range" : "a number is missing");
@@ -77,7 +77,7 @@ class Scan {
 
   void End() {
     SkipBlanks();
-    if (at_ < text_.size()) Fail("the assertion is over here: give --assert once for each");
+    if (at_ < text_.size()) Fail("text after the number; give one --assert for each condition");
   }
 
  private:
@@ -107,7 +107,7 @@ Assertion ParseAssertion(const std::string& text) {
 }
 
 bool Holds(const Assertion& assertion, double value) {
-  // Nothing holds of what is no number.
+  // No relation holds for NaN, not even !=.
   if (std::isnan(value)) return false;
   switch (assertion.relation) {
     case Relation::kLess:

@@ -1,4 +1,4 @@
-// A condition on a figure, as a test of a node states it: "cut_length_mm > 30".
+// Conditions on figures in a test of a node, for example "cut_length_mm > 30".
 #pragma once
 
 #include <string>
@@ -13,12 +13,13 @@ struct Assertion {
   double bound = 0;
 };
 
-/// FIGURE < | <= | == | != | >= | > NUMBER, blanks as one likes. Throws InputError, which says what is wrong and where.
+/// Parses FIGURE < | <= | == | != | >= | > NUMBER with any blanks between. Throws InputError with the error and its
+/// place.
 [[nodiscard]] Assertion ParseAssertion(const std::string& text);
 
 [[nodiscard]] bool Holds(const Assertion& assertion, double value);
 
-/// In one spelling, for reports.
+/// Text of an assertion in a uniform spelling, for reports.
 [[nodiscard]] std::string TextOf(const Assertion& assertion);
 
 }  // namespace fulcrum::replay

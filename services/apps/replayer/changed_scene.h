@@ -1,4 +1,4 @@
-// A scene with some of its parameters changed, for asking what would have been.
+// A scene with changed parameters, for a what-if replay.
 #pragma once
 
 #include <string>
@@ -9,10 +9,10 @@
 
 namespace fulcrum::replay {
 
-/// The parameters of the sections that describe materials and methods, not shapes, can be changed: physics, thermal,
-/// haptics, breathing. Each change is "section.key=value" as in the scene's description, and checked like that.
-/// The result keeps the hash of the scene, for it stands in for it. It refers to the arrays of `scene`.
-/// Throws InputError that names the change and what is valid.
+/// Applies changes to a scene. Each is "section.key=value" as in the scene's description, and checked in the same way;
+/// valid sections describe materials and methods, not shapes: physics, thermal, haptics, breathing. The result keeps
+/// the hash of the scene, so that recordings of it are accepted, and refers to the arrays of `scene`. Throws InputError
+/// that names the change and the valid values.
 [[nodiscard]] SceneView WithChanges(const scene::SceneFile& scene, const std::vector<std::string>& changes);
 
 }  // namespace fulcrum::replay

@@ -15,78 +15,78 @@ constexpr const char* kUsage =
        replayer RECORDING --live [--only NODE... | --except NODE...] [options]
        replayer RECORDING --test NODE [--expect HASH] [--assert EXPR...] [options]
 
-Lets nodes make the ticks of a recorded session again, with exactly the inputs that they had then, and compares their
-state with the recorded one after each tick. Stops a node at its first difference and says which tick, topic, field and
-index. Needs no bus, no devices and no real time. Into render: the pictures are drawn again.
+Replays a recorded session: nodes compute its ticks again from exactly the recorded inputs, and after each tick their
+state hash is compared with the recorded one. A node stops at its first difference, which is reported with tick, topic,
+field and index. Needs no bus, no devices and no real time. With --into render the pictures are drawn again.
 
   replayer out/latest/recording.mcap --into physics thermal haptics
 
-With --set it replays them twice instead, as they were and with a parameter of the scene changed, each time feeding each
-other, and reports what the change does to positions, forces, temperature and the cut.
+With --set the nodes are replayed twice, with the original and with the changed parameters of the scene. In both replays
+they receive each other's outputs, and the differences in positions, forces, temperature and cut are reported.
 
   replayer out/latest/recording.mcap --into physics thermal --set physics.grip_force_N=4
 
-With --console it is led by hand: go, pause, step, seek forward and back.
+With --console the replay is controlled by commands: go, pause, step, seek forward and back.
 
-With --live the recorded topics are published on the bus in real time, as if the session took place: for a node under
-development, or in the place of one.
+With --live the recorded topics are published on the bus in real time, as in the live session: as input of a node under
+development, or in place of a node.
 
   replayer out/latest/recording.mcap --live --except physics
 
-With --test one node makes all ticks of the session headless, past states that differ, and its figures are held against
-what was asked for; --junit writes the result for a CI system. Without --expect and --assert each state must be the
-recorded one. fulcrum test-node is the same.
+With --test one node computes all ticks of the session, also after states that differ, and its figures are checked
+against --expect and --assert; --junit writes the result for a CI system. Without --expect and --assert each state must
+equal the recorded one. fulcrum test-node does the same.
 
   replayer out/latest/recording.mcap --test thermal --assert "cut_length_mm > 30" --junit thermal.xml
 
 )";
 
 constexpr const char* kExitCodes =
-    "\nExit code: 0 every state was the same, 1 a state differed or the recording lacks something, 2 bad usage or "
-    "file,\n"
+    "\nExit codes: 0 all states equal, 1 a state differs or the recording is incomplete, 2 bad usage or file,\n"
     "3 the recording is of another scene. With --test: 0 passed, 1 failed.\n";
 
 void AddOptions(po::options_description* options) {
   options->add_options()  //
       ("into", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
-       "physics, thermal, haptics, render: one or more")                                                          //
-      ("test", po::value<std::vector<std::string>>()->value_name("NODE"), "physics, thermal, haptics or render")  //
+       "nodes to replay, one or more of physics, thermal, haptics, render")  //
+      ("test", po::value<std::vector<std::string>>()->value_name("NODE"),
+       "node to test: physics, thermal, haptics or render")  //
       ("expect", po::value<std::string>()->value_name("HASH"),
-       "test: the state hash after the last tick, 16 hexadecimal digits")  //
+       "test: expected state hash after the last tick, 16 hexadecimal digits")  //
       ("assert", po::value<std::vector<std::string>>()->value_name("EXPR"),
-       "test: FIGURE < | <= | == | != | >= | > NUMBER, over the figures of the node's Health, each also as NAME.min "
-       "and "
-       "NAME.max of the session, and ticks, compared, hash_mismatches, starts, session_s, busy_s; as often as "
-       "needed")  //
+       "test: FIGURE < | <= | == | != | >= | > NUMBER, over the figures of the node's Health (also as NAME.min and "
+       "NAME.max of the session) and ticks, compared, hash_mismatches, starts, session_s, busy_s; may be repeated")  //
       ("junit", po::value<std::string>()->value_name("FILE")->default_value(""),
-       "test: write the result as JUnit XML, too")  //
+       "test: also write the result as JUnit XML")  //
       ("set", po::value<std::vector<std::string>>()->value_name("SECTION.KEY=VALUE"),
-       "a parameter to change, as in the scene's description; as often as needed")  //
-      ("console", "read commands from standard input; \"help\" lists them")         //
+       "into: change a parameter, as in the scene's description; may be repeated")  //
+      ("console", "into: read commands from standard input; \"help\" lists them")   //
       ("live", "publish the recorded topics on the bus in real time")               //
       ("only", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
-       "live: those of these nodes")  //
+       "live: publish only the topics of these nodes")  //
       ("except", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
-       "live: those of all but these nodes")                                                                         //
-      ("domain", po::value<int>()->value_name("N")->default_value(7), "live: DDS domain, 1 to 100")                  //
-      ("from", po::value<double>()->value_name("S")->default_value(0), "live: begin so far into the recording [s]")  //
+       "live: publish the topics of all nodes except these")                                         //
+      ("domain", po::value<int>()->value_name("N")->default_value(7), "live: DDS domain, 1 to 100")  //
+      ("from", po::value<double>()->value_name("S")->default_value(0),
+       "live: start at this time after the first message [s]")  //
       ("frames", po::value<std::string>()->value_name("DIR")->default_value(""),
-       "folder for the pictures of render; default: replayed_frames beside the recording; in a test they are not "
-       "kept")  //
+       "folder for the pictures of render (default: replayed_frames beside the recording; none in a test)")  //
       ("threads",
        po::value<int>()->value_name("N")->default_value(static_cast<int>(std::thread::hardware_concurrency())),
-       "that share a step of physics; the states do not depend on it")                                           //
-      ("rate", po::value<double>()->value_name("X")->default_value(0), "times real time; 0: as fast as it can")  //
-      ("until", po::value<double>()->value_name("S")->default_value(-1), "end at this session time [s]")         //
+       "threads per step of physics, 1 to 64; the states do not depend on it")  //
+      ("rate", po::value<double>()->value_name("X")->default_value(0),
+       "speed as a multiple of real time, 0 or more; 0: as fast as possible")  //
+      ("until", po::value<double>()->value_name("S")->default_value(-1),
+       "end at this session time [s]; negative: end of the recording")  //
       ("scene", po::value<std::string>()->value_name("FILE")->default_value(""),
-       "compiled scene; default: scene.fulcrum beside the recording")  //
+       "compiled scene (default: scene.fulcrum beside the recording)")  //
       ("cart", po::value<std::string>()->value_name("FILE")->default_value(""),
-       "cart configuration; default: cart.yaml beside the recording; live: its keys, by default those of the session "
-       "that runs")                                                                                             //
-      ("json", po::value<std::string>()->value_name("FILE")->default_value(""), "write the result there, too")  //
-      ("quiet", "no progress")                                                                                  //
-      ("version", "print the version")                                                                          //
-      ("help", "print this");
+       "cart file (default: cart.yaml beside the recording); live: only its keys are used (default: those of the "
+       "running session)")                                                                                        //
+      ("json", po::value<std::string>()->value_name("FILE")->default_value(""), "also write the result as JSON")  //
+      ("quiet", "print no progress")                                                                              //
+      ("version", "print the version")                                                                            //
+      ("help", "print this text");
 }
 
 }  // namespace

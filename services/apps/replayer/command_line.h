@@ -1,4 +1,4 @@
-// The command line of replayer as it was typed: options, values, help. What they mean together: options.h.
+// The command line of replayer: options, values, help. options.h checks their combinations.
 #pragma once
 
 #include <boost/program_options.hpp>
@@ -9,12 +9,12 @@ namespace fulcrum::replay {
 
 class CommandLine {
  public:
-  /// Throws InputError when there is no such option or a value cannot be read.
+  /// Parses the command line. Throws InputError on an unknown option or an invalid value.
   CommandLine(int argc, char** argv);
 
-  /// Whether the option was given; always true of one with a default value.
+  /// True when the option was given; always true for an option with a default value.
   [[nodiscard]] bool Has(const char* option) const { return values_.count(option) != 0; }
-  /// Of an option that was given or has a default value.
+  /// Value of an option that was given or has a default value.
   template <class T>
   [[nodiscard]] const T& ValueOf(const char* option) const {
     return values_[option].as<T>();
@@ -23,7 +23,7 @@ class CommandLine {
   /// All values of an option that may be repeated; empty when it was not given.
   [[nodiscard]] std::vector<std::string> TextsOf(const char* option) const;
 
-  /// What --help prints: usage, options, exit codes.
+  /// Text of --help: usage, options, exit codes.
   [[nodiscard]] std::string Help() const;
 
  private:

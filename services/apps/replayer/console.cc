@@ -32,7 +32,8 @@ bool LineWaits() {
   return ::poll(&wait, 1, 0) > 0;
 }
 
-/// A line of standard input, read without reading ahead: a process that is gone back to must find what comes next.
+/// Reads a line of standard input byte by byte: bytes in a buffer would be missing in the keyframe process that
+/// continues.
 bool ReadLine(std::string* line) {
   line->clear();
   char c = 0;
@@ -74,7 +75,7 @@ class Console {
     bool differs = false;
   };
 
-  /// False: the end.
+  /// Executes a command; false: end of the replay.
   bool Obey(const std::string& line) {
     std::istringstream words(line);
     std::string verb;
@@ -115,7 +116,7 @@ class Console {
     return true;
   }
 
-  /// One tick of whichever node is next; false at the end, or when it cannot be made.
+  /// Replays the next tick of any node; false at the end, or when the tick cannot be replayed.
   bool Advance() {
     if (!Peek()) {
       std::cout << "the recording ends here\n";
@@ -124,7 +125,7 @@ class Console {
     if (const auto wanted = keyframes_->Keep(time_s())) {
       source_.Reopen();
       Go(*wanted, 0);
-      // The command under way then is over; what it shows is where "seek" has led.
+      // This is the process that "seek" has woken: the command in which its keyframe was made ends here.
       return false;
     }
     if (!next_->missing.empty()) {
@@ -149,7 +150,7 @@ class Console {
     return false;
   }
 
-  /// Until a session time, a line on standard input, or what stops Advance().
+  /// Replays until a session time, a line on standard input, or until Advance() returns false.
   void Go(double until_s) { Go(until_s, rate_); }
   void Go(double until_s, double rate) {
     using Clock = std::chrono::steady_clock;
@@ -204,12 +205,12 @@ int RunConsole(const LockStepSettings& settings, const SceneView& scene, const c
 }
 
 void PrintConsoleHelp(std::ostream& out) {
-  out << "go [S]      on, to session time S; Enter pauses\n"
-         "step [N]    N ticks of whichever node is next\n"
-         "seek S      to session time S: forward as fast as it can, back by way of the nearest keyframe\n"
-         "rate X      of go, times real time; 0: as fast as it can\n"
-         "show        where each node is, and whether its state is the recorded one\n"
-         "quit\n";
+  out << "go [S]      replay to session time S [s] (default: the end); Enter pauses\n"
+         "step [N]    replay the next N ticks of all nodes in order (default: 1)\n"
+         "seek S      go to session time S [s], forward as fast as possible, back to the nearest keyframe and forward\n"
+         "rate X      speed of go as a multiple of real time; 0: as fast as possible\n"
+         "show        print tick and time of each node, and whether its state equals the recorded one\n"
+         "quit        end the replay\n";
 }
 
 }  // namespace fulcrum::replay

@@ -1,4 +1,4 @@
-// A replay that is led by hand: go, pause, step, seek.
+// A replay that is controlled by commands: go, pause, step, seek.
 #pragma once
 
 #include <iosfwd>
@@ -9,12 +9,12 @@
 
 namespace fulcrum::replay {
 
-/// Reads commands, a line each, from standard input and answers on standard output; a line that comes while it runs
-/// pauses it. `settings.rate` paces "go" (0: as fast as it can). Returns the exit code: 0 when every state was the same
-/// that was compared last, 1 when one differed. The process must have one thread.
+/// Reads commands, one per line, from standard input and writes replies to standard output. A line that arrives during
+/// "go" pauses it. `settings.rate` is the speed of "go" (0: as fast as possible). Returns the exit code: 0 when the
+/// last compared state of each node was equal, 1 when one differed. The process must have one thread.
 int RunConsole(const LockStepSettings& settings, const SceneView& scene, const config::CartConfig& cart);
 
-/// What the commands are.
+/// Prints the list of commands.
 void PrintConsoleHelp(std::ostream& out);
 
 }  // namespace fulcrum::replay

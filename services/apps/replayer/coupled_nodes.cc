@@ -40,7 +40,7 @@ void CoupledNodes::Replace(NodeId owner, std::vector<T>* inputs, const std::map<
   if (!Has(owner)) return;
   std::vector<T> replaced;
   for (const T& input : *inputs) {
-    // What the replayed node did not send at that moment does not come.
+    // An input that the replayed node did not send at that time is left out.
     const auto found = sent.find(input.stamp.stamp_ns);
     if (found != sent.end()) replaced.push_back(found->second);
   }

@@ -1,4 +1,4 @@
-// Replayed nodes that feed each other.
+// Replayed nodes that receive each other's outputs.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace fulcrum::replay {
 
-/// What some nodes published, decoded, as far as others of them or a comparison need it.
+/// Decoded outputs of a tick, as far as other nodes or a comparison need them.
 struct Outcome {
   std::uint64_t state_hash = 0;
   std::optional<ToolState> tools;
@@ -29,10 +29,10 @@ struct Outcome {
 
 class CoupledNodes {
  public:
-  /// Throws InputError when a node cannot be replayed.
+  /// Makes the nodes. Throws InputError when one cannot be replayed.
   CoupledNodes(const std::vector<NodeId>& nodes, const NodeMaking& making);
 
-  /// Makes the tick; inputs that come from one of the nodes are taken from it instead of from the recording.
+  /// Computes a tick. Inputs that one of the nodes publishes are taken from that node instead of from the recording.
   Outcome Step(const RecordedTick& tick);
 
  private:
@@ -41,13 +41,14 @@ class CoupledNodes {
   [[nodiscard]] bool Has(NodeId node) const { return nodes_.count(node) != 0; }
 
   std::map<NodeId, std::unique_ptr<ReplayedNode>> nodes_;
-  // By the stamp of the tick that sent them: the newest second or so.
+  // By the stamp of the sending tick; about the newest second is kept.
   std::map<std::int64_t, ToolState> tools_;
   std::map<std::int64_t, ContactModel> models_;
   std::map<std::int64_t, CauteryContact> cautery_;
-  std::deque<TopologyState> topology_;  ///< Not yet taken.
-  std::deque<OpenCells> open_cells_;    ///< The same.
-  std::deque<TearState> tears_;         ///< The same.
+  // Sent samples that no tick has consumed yet.
+  std::deque<TopologyState> topology_;
+  std::deque<OpenCells> open_cells_;
+  std::deque<TearState> tears_;
 };
 
 }  // namespace fulcrum::replay

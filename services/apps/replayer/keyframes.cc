@@ -31,7 +31,7 @@ Pipe MakePipe() {
 }
 
 pid_t Fork() {
-  // What stands in buffers would be written once by each.
+  // Parent and child would both write the content of the buffers.
   std::fflush(nullptr);
   const pid_t pid = ::fork();
   if (pid < 0) throw std::runtime_error(std::string("fork: ") + std::strerror(errno));
@@ -49,14 +49,14 @@ bool ReadWhole(int file, T* value) {
 
 constexpr int kRunning = 0, kEnded = 1;
 struct News {
-  int kind;  ///< kRunning: of process `value`; kEnded: with exit code `value`.
+  int kind;  ///< kRunning: process `value` continues the replay; kEnded: it has ended with exit code `value`.
   int value;
 };
-// From the end of a process to the first word of the one that it has woken.
+// Longest time from the end of a process to the first message of the process that it has woken [ms].
 constexpr int kHandover_ms = 2000;
 
-/// The exit code of the line; 1 when its running process died without a word. All that sleep hold the pipe open, so its
-/// end would not tell.
+/// Exit code of the replay; 1 when the running process died without sending one. The running process is watched through
+/// a pidfd, because the sleeping ones keep the pipe open after its death.
 int AwaitVerdict(int pipe) {
   int running = -1;
   int code = 1;
@@ -92,7 +92,7 @@ int Keyframes::Run(const std::function<int(Keyframes*)>& body) {
   if (first == 0) {
     ::close(lifeline.write);
     ::close(verdict.read);
-    // Keyframes that are let go, or have been woken, need nobody to wait for them.
+    // With SIGCHLD ignored, the kernel reaps ended keyframe processes.
     ::signal(SIGCHLD, SIG_IGN);
     ::signal(SIGPIPE, SIG_IGN);
     Keyframes keyframes(lifeline.read, verdict.write);
@@ -106,7 +106,7 @@ int Keyframes::Run(const std::function<int(Keyframes*)>& body) {
   ::close(verdict.write);
   const int code = AwaitVerdict(verdict.read);
   ::close(verdict.read);
-  ::close(lifeline.write);  // All that sleep end.
+  ::close(lifeline.write);  // All sleeping keyframes end.
   int status = 0;
   while (::waitpid(first, &status, 0) < 0 && errno == EINTR) {
   }
@@ -122,7 +122,7 @@ std::optional<double> Keyframes::Keep(double time_s) {
   if (!kept_.empty() && time_s < kept_.back().time_s + spacing_s_) return std::nullopt;
   if (kept_.size() == kMost) {
     for (std::size_t i = 1; i < kept_.size(); i += 2) {
-      // Others that sleep hold this end, too: closing it would tell nothing.
+      // Closing the pipe is not enough, because other sleeping processes also have its write end open.
       const double end = std::numeric_limits<double>::quiet_NaN();
       (void)!::write(kept_[i].wake, &end, sizeof(end));
       ::close(kept_[i].wake);
@@ -144,7 +144,7 @@ std::optional<double> Keyframes::Keep(double time_s) {
     if (::poll(waits.data(), waits.size(), -1) < 0 && errno == EINTR) continue;
     double wanted_s = 0;
     if (waits[1].revents != 0 || !ReadWhole(wake.read, &wanted_s) || std::isnan(wanted_s)) ::_exit(0);
-    // One copy goes on, this one stays to be gone back to again.
+    // The new copy continues the replay; this process stays as the keyframe.
     pid = Fork();
     if (pid == 0) {
       ::close(wake.read);
@@ -158,7 +158,7 @@ std::optional<double> Keyframes::Keep(double time_s) {
 void Keyframes::GoBack(double time_s) {
   std::fflush(nullptr);
   for (auto k = kept_.rbegin(); k != kept_.rend(); ++k) {
-    // One that was let go by a later process has closed its end.
+    // Writing fails when a later process has removed this keyframe.
     if (k->time_s <= time_s && ::write(k->wake, &time_s, sizeof(time_s)) == sizeof(time_s)) ::_exit(0);
   }
 }

@@ -1,4 +1,4 @@
-// Going back in a replay: a copy of the whole process, asleep, for each second of the session.
+// Seeking back in a replay: keyframes are sleeping copies of the whole process, one for each second of the session.
 #pragma once
 
 #include <sys/types.h>
@@ -10,38 +10,38 @@
 
 namespace fulcrum::replay {
 
-/// A keyframe is a forked process: whatever the nodes consist of, it is kept to the last bit, and memory is shared
-/// until it changes. To go back, the nearest keyframe before the wanted time is woken and goes on in the place of the
-/// process that woke it. Needs a process with one thread.
+/// A keyframe is a forked process: it contains the state of all nodes bit for bit, and shares memory until that
+/// changes. To seek back, the nearest keyframe before the requested time is woken and continues in place of the process
+/// that woke it. The process must have one thread.
 class Keyframes {
  public:
-  /// Runs `body` in a child, which may make keyframes, and returns the exit code of the line of processes that it
-  /// becomes. The caller stays behind and computes nothing.
+  /// Runs `body` in a child, which may make keyframes, and returns the exit code of the process that ends the replay.
+  /// The caller only waits.
   static int Run(const std::function<int(Keyframes*)>& body);
 
-  /// Keeps this moment. In the running process returns nothing; when the moment is gone back to, returns the time that
-  /// was wanted, in a new process.
+  /// Makes a keyframe. Returns nullopt in the running process, and after a seek back, in a new process, the requested
+  /// session time [s].
   std::optional<double> Keep(double time_s);
-  /// Wakes the newest keyframe at or before `time_s`, and this process ends. Returns only when there is none.
+  /// Wakes the newest keyframe at or before `time_s` and ends this process. Returns only when there is none.
   void GoBack(double time_s);
 
-  /// So many are kept; then every second one is let go.
+  /// Largest number of keyframes; when it is reached, every second one is removed.
   static constexpr std::size_t kMost = 32;
   [[nodiscard]] double spacing_s() const { return spacing_s_; }
 
  private:
   struct Keyframe {
     double time_s;
-    int wake;  ///< Write end of the pipe that it waits on.
+    int wake;  ///< Write end of the pipe on which it waits.
   };
   Keyframes(int lifeline, int verdict) : lifeline_(lifeline), verdict_(verdict) {}
 
   void Tell(int kind, int value) const;
 
-  std::vector<Keyframe> kept_;  ///< By time.
+  std::vector<Keyframe> kept_;  ///< Sorted by time.
   double spacing_s_ = 1;
-  int lifeline_;  ///< Ends when the caller of Run() does.
-  int verdict_;   ///< Where the exit code goes.
+  int lifeline_;  ///< Read end of a pipe that closes when the caller of Run() ends.
+  int verdict_;   ///< Write end of the pipe for the exit code.
 };
 
 }  // namespace fulcrum::replay

@@ -25,18 +25,18 @@
 namespace fulcrum::replay {
 namespace {
 
-// Readers find the writers before the first message: a round of discovery.
+// One round of discovery, so that readers match the writers before the first message.
 constexpr auto kDiscovery = std::chrono::milliseconds(300);
-// What was sent last reaches its readers before its writer is gone.
+// Time in which the last messages reach their readers before the writers are removed.
 constexpr auto kLeave = std::chrono::milliseconds(200);
-// A longer silence in the recording is waited for in pieces, so that a stop is heard.
+// Longest single sleep, so that a stop signal takes effect during gaps of the recording.
 constexpr std::int64_t kLongestSleep_ns = 50'000'000;
 
-/// A topic on its way out.
+/// Output of one topic.
 class Channel {
  public:
   virtual ~Channel() = default;
-  /// Decodes and moves it; false: not to be sent.
+  /// Decodes a message and shifts its times by `by_ns`; false: the message is not to be sent.
   virtual bool Prepare(std::span<const std::uint8_t> bytes, std::int64_t by_ns, LiveResult* result) = 0;
   virtual bool Send() = 0;
 };
@@ -74,7 +74,7 @@ bool IsSent(TopicId topic, const std::vector<NodeId>& nodes) {
   return !owner || std::find(nodes.begin(), nodes.end(), *owner) != nodes.end();
 }
 
-/// Log times are told as wall clock; the recorder says how far that was from the clock of the stamps.
+/// Log times are wall-clock times; the recorder has stored their offset from the clock of the stamps [ns].
 std::int64_t ClockOffset(const recording::McapReader& reader) {
   const auto clock = reader.metadata().find("clock");
   if (clock == reader.metadata().end()) return 0;
@@ -106,7 +106,7 @@ LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>&
   LiveResult result;
   recording::McapMessage message{};
   std::optional<std::int64_t> first_ns;
-  std::int64_t moved_ns = 0;  // From the recording's clock to now's.
+  std::int64_t moved_ns = 0;  // Offset from the clock of the recording to the present clock.
   const std::int64_t begin_ns = runtime::MonotonicNs();
   while (!stop() && messages.Next(&message)) {
     const std::int64_t then_ns = static_cast<std::int64_t>(message.log_time_ns) - ClockOffset(reader);
@@ -117,7 +117,7 @@ LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>&
     const bus::TopicRole* role = bus::RoleNamed(reader.channels().at(message.channel).topic);
     const auto channel = role == nullptr ? channels.end() : channels.find(role->id);
     if (channel == channels.end()) continue;
-    // Of the time before only what a late joiner would have been given.
+    // Before --from, only the topics that late joiners receive are sent.
     if (then_ns < *first_ns && !role->quality.late_joiners_served) continue;
     if (!channel->second->Prepare(message.data, moved_ns, &result)) continue;
     const std::int64_t due_ns = std::max(begin_ns, then_ns + moved_ns);

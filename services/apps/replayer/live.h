@@ -1,4 +1,4 @@
-// A recording on the bus again, at wall-clock rate: for a node under development, or in the place of one.
+// Publication of a recording on the bus in real time: as input of a node under development, or in place of a node.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +14,19 @@ namespace fulcrum::replay {
 struct LiveSettings {
   std::filesystem::path recording;
   int domain = 7;
-  bus::Security security = {};  ///< Off: as the session that runs in the domain says.
-  double from_s = 0;            ///< Of the recording, from its first message [s].
-  std::vector<NodeId> nodes;    ///< Whose messages are published.
+  bus::Security security = {};  ///< Off: the settings of the session that runs in the domain are used.
+  double from_s = 0;            ///< Start, as time after the first message of the recording [s].
+  std::vector<NodeId> nodes;    ///< Nodes whose messages are published.
 };
 
 struct LiveResult {
   std::uint64_t published = 0, failed = 0, undecodable = 0;
-  double latest_s = 0;  ///< How late a message was sent at most.
+  double latest_s = 0;  ///< Largest delay of a message [s].
 };
 
-/// Publishes what those nodes sent, each message when it is due, until the end of the recording or `stop`. Times and
-/// epochs in the messages are moved so that they are of now: to its readers the session takes place. Commands and their
-/// replies are not sent again. Throws InputError.
+/// Publishes the messages of those nodes, each when it is due, until the end of the recording or `stop`. Times and
+/// epochs in the messages are shifted to the present, so that readers accept them as live. Commands and their replies
+/// are not sent. Throws InputError.
 LiveResult ReplayLive(const LiveSettings& settings, const std::function<bool()>& stop);
 
 }  // namespace fulcrum::replay

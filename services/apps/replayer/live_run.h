@@ -5,7 +5,7 @@
 
 namespace fulcrum::replay {
 
-/// Prints what was published. Returns the exit code: 0 when something was, else 1. Throws InputError.
+/// Prints the counts of messages. Returns the exit code: 0 when at least one was published, else 1. Throws InputError.
 int RunLive(const LiveSettings& settings);
 
 }  // namespace fulcrum::replay

@@ -24,8 +24,8 @@ namespace {
 
 constexpr double kNsToS = 1e-9;
 
-/// A node that makes the ticks it is given, on its own thread. While so many nodes compute (`at_work`) that each core
-/// has one, none takes further threads for itself.
+/// A node that computes its ticks on its own thread. When at least as many nodes compute (`at_work`) as there are
+/// cores, no node uses further threads.
 class NodeRunner {
  public:
   NodeRunner(NodeId node, const NodeMaking& making, bool go_on, std::atomic<int>* at_work)
@@ -37,8 +37,8 @@ class NodeRunner {
   NodeRunner(const NodeRunner&) = delete;
   NodeRunner& operator=(const NodeRunner&) = delete;
 
-  /// Waits for room, once there is none for much of it: so the quicker ones of several nodes compute in long stretches,
-  /// with long ones between in which the slowest has all cores. False: the node has stopped and wants no more.
+  /// Adds a tick to the queue. A full queue blocks until it is half empty, so that faster nodes compute in long bursts
+  /// and leave all cores to the slowest in between. False: the node has stopped and takes no more ticks.
   bool Give(RecordedTick tick) {
     std::unique_lock lock(mutex_);
     if (queue_.size() >= kQueue) {
@@ -50,7 +50,7 @@ class NodeRunner {
     return true;
   }
 
-  /// After the last tick has been made. The result is then whole.
+  /// Waits until the last tick is computed; the result is then complete.
   void End() {
     {
       const std::lock_guard lock(mutex_);
@@ -61,7 +61,7 @@ class NodeRunner {
   }
 
   [[nodiscard]] NodeResult& result() { return result_; }
-  /// Of the tick of the departure.
+  /// Outputs of the tick of the departure.
   [[nodiscard]] const std::vector<Published>& outputs() const { return outputs_; }
 
  private:
@@ -159,8 +159,8 @@ class NodeRunner {
   std::thread thread_;
 };
 
-/// Nodes that more than one process was, or all, when the recording does not tell. Each process has a channel of its
-/// own.
+/// Nodes of which the recording contains more than one process, by their channels, since each process has its own. All
+/// nodes when the recording is damaged.
 std::vector<NodeId> ThoseThatStartAgain(const std::filesystem::path& recording, const std::vector<NodeId>& nodes) {
   recording::McapReader heads(recording, recording::McapReader::Depth::kChunkHeads);
   recording::McapMessage none;
@@ -229,7 +229,7 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
     }
   }
   for (const auto& runner : runners) runner->End();
-  // To look through the recording and to make the nodes is part of it.
+  // The time includes reading the recording and making the nodes.
   result.wall_s = kNsToS * static_cast<double>(runtime::MonotonicNs() - called);
 
   for (const auto& runner : runners) {
@@ -239,7 +239,7 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
           DescribeDifference(settings.recording, node.departure->epoch, node.departure->stamp_ns, runner->outputs());
     }
     if (node.ticks == 0 && node.missing.empty()) {
-      node.missing = std::string("the recording holds no tick of ") + NodeName(node.node);
+      node.missing = std::string("the recording contains no tick of ") + NodeName(node.node);
     }
     result.nodes.push_back(node);
   }

@@ -1,4 +1,4 @@
-// The result of a lock-step replay, for people and for programs.
+// The result of a lock-step replay as text and as JSON.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace fulcrum::replay {
 
-/// A line a node, then what differed or was missing, then the verdict.
+/// One line per node with its verdict, its first difference and missing data, then the speed.
 [[nodiscard]] std::string ReportText(const LockStepResult& result);
 
 /// One flat object: `same`, `speed_x_realtime`, `session_s`, and for each node `<node>.ticks`, `.compared`,

@@ -1,4 +1,4 @@
-// replayer: a recorded session again.
+// replayer: replays recorded sessions.
 #include <iostream>
 
 #include "services/apps/replayer/live_run.h"
@@ -10,7 +10,7 @@
 
 namespace {
 
-using namespace fulcrum;  // NOLINT: a main is nothing but names of other modules
+using namespace fulcrum;  // NOLINT: a main uses names of other modules only
 
 int Run(int argc, char** argv) {
   const replay::Options options = replay::ParseOptions(argc, argv);

@@ -31,7 +31,7 @@ void AddFigures(const NodeResult& node, double session_s, std::map<std::string, 
 std::string Names(const std::map<std::string, double>& figures) {
   std::string names;
   for (const auto& [name, value] : figures) {
-    // Each has its .min and .max.
+    // The figures NAME.min and NAME.max are not listed.
     if (name.find('.') == std::string::npos) names += (names.empty() ? "" : ", ") + name;
   }
   return names;
@@ -70,7 +70,7 @@ std::uint64_t ParseStateHash(const std::string& text) {
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), hash, 16);
   if (digits.size() != 16 || error != std::errc() || end != digits.data() + digits.size()) {
     throw InputError("--expect \"" + text +
-                     "\": a state hash is 16 hexadecimal digits, as a test prints it; run it once without --expect");
+                     "\": a state hash has 16 hexadecimal digits; a test without --expect prints it");
   }
   return hash;
 }

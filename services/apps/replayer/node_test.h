@@ -1,5 +1,5 @@
-// A node tested headless: it makes the ticks of a recording again, and what it comes to is held against what was asked
-// for. `replayer --test`, `fulcrum test-node`.
+// Test of one node without other processes: it computes the ticks of a recording again, and its figures are checked
+// against demands. Used by `replayer --test` and `fulcrum test-node`.
 #pragma once
 
 #include <cstdint>
@@ -17,49 +17,50 @@
 
 namespace fulcrum::replay {
 
-/// What is asked of the node. Neither hash nor assertion: each state as recorded.
+/// Demands on the node. Without hash and assertions, each state must equal the recorded one.
 struct Demands {
-  std::optional<std::uint64_t> state_hash;  ///< After the last tick.
+  std::optional<std::uint64_t> state_hash;  ///< Expected state hash after the last tick.
   std::vector<Assertion> assertions;
 };
 
-enum class Verdict { kPassed, kFailed, kError };  ///< Error: it could not be found out.
+enum class Verdict { kPassed, kFailed, kError };  ///< kError: the case could not be checked.
 
 struct TestCase {
   std::string name;
   Verdict verdict = Verdict::kPassed;
-  std::string message;  ///< Empty when it has passed.
+  std::string message;  ///< Empty when the case has passed.
 };
 
 struct NodeTestResult {
   NodeId node = NodeId::kPhysics;
   std::filesystem::path recording;
   std::vector<TestCase> cases;
-  std::map<std::string, double> figures;  ///< All that an assertion may name.
+  std::map<std::string, double> figures;  ///< All figures that an assertion may name.
   std::optional<std::uint64_t> state_hash;
   double wall_s = 0;
   [[nodiscard]] bool passed() const;
 };
 
-/// 16 hexadecimal digits, "0x" before them or not. Throws InputError.
+/// Parses 16 hexadecimal digits with or without "0x". Throws InputError.
 [[nodiscard]] std::uint64_t ParseStateHash(const std::string& text);
 
-/// Replays `settings.nodes`, one node, in lock step to the end, and judges. Figures are those of its Health (the last
-/// value; `.min` and `.max` of the whole session), and of the replay: ticks, compared, hash_mismatches, starts,
-/// session_s, busy_s. Throws as ReplayInLockStep, and InputError when an assertion names no figure of the node.
+/// Replays `settings.nodes`, which is one node, in lock step to the end and checks the demands. Figures are those of
+/// its Health (the last value; `.min` and `.max` of the whole session) and of the replay: ticks, compared,
+/// hash_mismatches, starts, session_s, busy_s. Throws like ReplayInLockStep, and InputError when an assertion names no
+/// figure of the node.
 [[nodiscard]] NodeTestResult TestNode(const LockStepSettings& settings, const Demands& demands, const SceneView& scene,
                                       const config::CartConfig& cart, const std::function<void(double)>& progress);
 
-/// Judges figures that were come by in another way, as render's are.
+/// Checks the demands on figures that are already in `result`, such as those of render.
 void Judge(const Demands& demands, NodeTestResult* result);
 
-/// A test that could not be made, as one case.
+/// Result of a test that could not be executed, as one case with an error.
 [[nodiscard]] NodeTestResult FailedTest(NodeId node, const std::filesystem::path& recording, const std::string& why);
 
-/// A line a case, the figures, the verdict.
+/// Text with the figures, one line per case, and the verdict.
 [[nodiscard]] std::string ReportText(const NodeTestResult& result);
 
-/// For a CI system: one suite, a case each. Throws InputError when the file cannot be written.
+/// Writes JUnit XML for a CI system: one suite with all cases. Throws InputError when the file cannot be written.
 void WriteJUnit(const NodeTestResult& result, const std::filesystem::path& file);
 
 }  // namespace fulcrum::replay

@@ -15,7 +15,7 @@
 namespace fulcrum::replay {
 namespace {
 
-/// All nodes of `option` by name, each once; `valid` says which there are.
+/// The nodes that `option` names, each once. Throws InputError for a name that is not in `valid`.
 std::vector<NodeId> NodesNamed(const CommandLine& line, const char* option, const std::vector<NodeId>& valid) {
   std::vector<NodeId> nodes;
   for (const std::string& name : line.TextsOf(option)) {
@@ -35,14 +35,15 @@ std::vector<NodeId> NodesNamed(const CommandLine& line, const char* option, cons
   return nodes;
 }
 
-/// All that publish.
+/// All nodes that publish.
 const std::vector<NodeId> kPublishers{NodeId::kSupervisor, NodeId::kHandleBridge, NodeId::kHaptics,
                                       NodeId::kPhysics,    NodeId::kThermal,      NodeId::kRender};
-/// All whose classes replayer holds.
+/// All nodes whose classes replayer contains.
 const std::vector<NodeId> kReplayable{NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics, NodeId::kRender};
 
 std::filesystem::path RecordingOf(const CommandLine& line) {
-  if (!line.Has("recording")) throw InputError("which recording? See --help");
+  if (!line.Has("recording"))
+    throw InputError("RECORDING is missing, for example out/latest/recording.mcap; see --help");
   std::filesystem::path recording = line.TextOf("recording");
   if (!std::filesystem::exists(recording)) throw InputError(recording.string() + ": no such file");
   return recording;
@@ -68,13 +69,13 @@ LiveSettings LiveSettingsFrom(const CommandLine& line) {
   return settings;
 }
 
-/// What a test holds its node against.
+/// Demands of a test.
 void ReadDemands(const CommandLine& line, Options* options) {
   const bool asked = line.Has("expect") || line.Has("assert") || !line.TextOf("junit").empty();
   if (!options->test && asked) throw InputError("--expect, --assert and --junit go with --test");
   if (!options->test) return;
-  if (options->lock_step.nodes.size() != 1) throw InputError("--test: one node at a time");
-  if (line.Has("set") || line.Has("console")) throw InputError("--test goes with neither --set nor --console");
+  if (options->lock_step.nodes.size() != 1) throw InputError("--test takes exactly one node");
+  if (line.Has("set") || line.Has("console")) throw InputError("--test cannot be combined with --set or --console");
   if (line.Has("expect")) options->demands.state_hash = ParseStateHash(line.TextOf("expect"));
   for (const std::string& text : line.TextsOf("assert")) options->demands.assertions.push_back(ParseAssertion(text));
   options->junit = line.TextOf("junit");
@@ -89,10 +90,10 @@ void ReadPictures(const CommandLine& line, Options* options) {
   }
 }
 
-/// How fast, with how many threads, how far.
+/// Reads --rate, --threads and --until.
 void ReadPace(const CommandLine& line, LockStepSettings* settings) {
   settings->rate = line.ValueOf<double>("rate");
-  if (!(settings->rate >= 0)) throw InputError("--rate: must be 0 (as fast as it can) or more");
+  if (!(settings->rate >= 0)) throw InputError("--rate: must be 0 (as fast as possible) or more");
   settings->physics_threads = line.ValueOf<int>("threads");
   if (settings->physics_threads < 1 || settings->physics_threads > 64) {
     throw InputError("--threads: must be 1 to 64");
@@ -100,15 +101,15 @@ void ReadPace(const CommandLine& line, LockStepSettings* settings) {
   settings->until_s = line.ValueOf<double>("until");
 }
 
-/// --set and --console, and what excludes them.
+/// Reads --set and --console and refuses options that exclude them.
 void ReadVariant(const CommandLine& line, Options* options) {
   options->changes = line.TextsOf("set");
   if (!options->changes.empty() && options->lock_step.rate > 0) {
-    throw InputError("--rate says nothing with --set: both replays run as fast as they can");
+    throw InputError("--rate cannot be combined with --set: both replays run as fast as possible");
   }
   options->console = line.Has("console");
   if (options->console && !(options->changes.empty() && line.TextOf("json").empty())) {
-    throw InputError("--console goes with neither --set nor --json");
+    throw InputError("--console cannot be combined with --set or --json");
   }
 }
 

@@ -1,4 +1,4 @@
-// What replayer is asked to do: its command line, checked, as settings of one kind of replay.
+// The checked command line of replayer as settings of one kind of replay.
 #pragma once
 
 #include <filesystem>
@@ -13,23 +13,23 @@
 namespace fulcrum::replay {
 
 struct Options {
-  std::string answer;    ///< Help or version. Not empty: it is printed, and nothing else is set.
-  bool live = false;     ///< --live: only `live_settings` counts.
-  bool test = false;     ///< --test: one node against `demands`. Neither --live nor --test: --into.
+  std::string answer;    ///< Text of help or version. Not empty: it is to be printed, and nothing else is set.
+  bool live = false;     ///< --live was given: only `live_settings` is used.
+  bool test = false;     ///< --test was given: one node is checked against `demands`. Neither of both: --into.
   bool console = false;  ///< --console.
   LiveSettings live_settings;
-  LockStepSettings lock_step;        ///< Without its folder, which a run makes.
-  bool pictures = false;             ///< Render was named, which `lock_step.nodes` does not hold.
-  std::filesystem::path frames;      ///< Folder for its pictures; empty: they are not kept.
-  std::vector<std::string> changes;  ///< --set.
+  LockStepSettings lock_step;        ///< Without `folder`, which a run makes.
+  bool pictures = false;             ///< Render was named; it is not in `lock_step.nodes`.
+  std::filesystem::path frames;      ///< Folder for its pictures; empty: they are not written.
+  std::vector<std::string> changes;  ///< Values of --set.
   Demands demands;
-  std::filesystem::path scene;        ///< Compiled.
-  std::filesystem::path cart;         ///< Empty: the simulated cart.
-  std::filesystem::path json, junit;  ///< Results for programs; empty: none.
-  bool quiet = false;                 ///< No progress.
+  std::filesystem::path scene;        ///< Compiled scene file.
+  std::filesystem::path cart;         ///< Cart file; empty: the simulated cart.
+  std::filesystem::path json, junit;  ///< Files for the result; empty: none.
+  bool quiet = false;                 ///< Print no progress.
 };
 
-/// Throws InputError that names the option and what is valid.
+/// Checks the command line. Throws InputError that names the option and the valid values.
 [[nodiscard]] Options ParseOptions(int argc, char** argv);
 
 /// Of a replay other than live. Throws InputError.

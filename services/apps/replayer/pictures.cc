@@ -18,7 +18,7 @@
 namespace fulcrum::replay {
 namespace {
 
-/// A topic on its way to the renderer.
+/// One topic from the recording to the renderer.
 template <class T>
 class Feed {
  public:
@@ -55,7 +55,7 @@ PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView&
   Feed<CauteryContact> contacts;
   Feed<GeneratorSetting> generator;
   render::RenderSettings render_settings;
-  // Auto would follow the speed of this machine, and no run would be like another.
+  // Quality auto depends on the speed of the machine, so that pictures would differ between runs.
   render_settings.quality = render::Quality::kHigh;
   render_settings.frames = settings.frames;
   render::RenderNode node(scene, render_settings,
@@ -89,7 +89,7 @@ PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView&
     tick.session_time_s = time_s;
     tick.stamp_ns = newest_ns;
     node.Step(tick);
-    // Faster than the disk, no picture is dropped.
+    // Without this wait, a replay faster than the disk would drop pictures.
     node.WaitForFiles();
     if (progress && time_s > told_s + 0.1) {
       told_s = time_s;

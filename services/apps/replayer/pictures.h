@@ -1,4 +1,4 @@
-// The pictures of a recorded session, drawn again.
+// Drawing of the pictures of a recorded session.
 #pragma once
 
 #include <cstdint>
@@ -14,17 +14,17 @@ namespace fulcrum::replay {
 struct PicturesSettings {
   std::filesystem::path recording;
   std::filesystem::path frames;  ///< Folder for the pictures.
-  double until_s = -1;           ///< Session time; negative: to the end.
+  double until_s = -1;           ///< Session time of the end [s]; negative: the end of the recording.
 };
 
 struct PicturesResult {
   std::uint64_t written = 0;
-  std::vector<Metric> health;  ///< As the node tells them at the end.
+  std::vector<Metric> health;  ///< Metrics of the node's Health at the end.
 };
 
-/// Lets the class of render_node draw the recorded topics at the scene's rate of pictures, on the clock of the
-/// recording, at high quality: the same pictures each time. Throws InputError,
-/// MismatchError, std::runtime_error when OpenGL is missing.
+/// Draws the recorded topics with the class of render_node at the scene's rate of pictures, on the clock of the
+/// recording and at high quality, so that all runs give the same pictures. Throws InputError, MismatchError, and
+/// std::runtime_error when OpenGL is missing.
 PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView& scene,
                               const std::function<void(double)>& progress);
 

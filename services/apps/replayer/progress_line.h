@@ -1,4 +1,4 @@
-// How far a replay is, on a terminal. Internal to services/apps/replayer.
+// Progress of a replay on a terminal. Internal to services/apps/replayer.
 #pragma once
 
 #include <cstdio>
@@ -9,15 +9,15 @@ namespace fulcrum::replay {
 /// One line on standard error that each call overwrites.
 class ProgressLine {
  public:
-  /// @param quiet it prints nothing.
+  /// @param quiet true: prints nothing.
   explicit ProgressLine(bool quiet) : quiet_(quiet) {}
 
-  /// What a replay calls with the session time [s]; empty when quiet.
+  /// Function that a replay calls with the session time [s]; empty when quiet.
   [[nodiscard]] std::function<void(double)> callback() const {
     if (quiet_) return {};
     return [](double time_s) { std::fprintf(stderr, "\rsession time %.1f s ", time_s); };
   }
-  /// Before the result is printed.
+  /// Clears the line; call before the result is printed.
   void Clear() const { std::fputs(quiet_ ? "" : "\r\033[K", stderr); }
 
  private:

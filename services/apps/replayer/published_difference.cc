@@ -13,7 +13,7 @@
 namespace fulcrum::replay {
 namespace {
 
-/// Of one topic: `bytes` was recorded.
+/// Difference in one topic; `bytes` is the recorded message.
 template <class T>
 std::optional<std::string> Compare(std::span<const std::uint8_t> bytes, std::uint64_t epoch, std::int64_t stamp_ns,
                                    const std::vector<Published>& now) {
@@ -24,10 +24,10 @@ std::optional<std::string> Compare(std::span<const std::uint8_t> bytes, std::uin
   const auto found =
       std::find_if(now.begin(), now.end(), [](const Published& p) { return p.topic == bus::kTopicOf<T>; });
   const std::string label(bus::TopicLabel(bus::kTopicOf<T>));
-  if (found == now.end()) return label + " was published then and is not now";
+  if (found == now.end()) return label + " is recorded, but the replay does not publish it";
   T replayed;
   if (!bus::DecodeCdr(found->bytes, &replayed)) return std::nullopt;
-  // Samples are numbered from the first reader on, which a replay has at once.
+  // Sequence numbers begin with the first reader, which a replay has from the start.
   const auto difference = FirstDifference(recorded, replayed, "stamp");
   if (!difference) return std::nullopt;
   return label + "." + difference->field + ": recorded " + difference->first + ", replayed " + difference->second;
@@ -41,13 +41,13 @@ std::string DescribeDifference(const std::filesystem::path& recording, std::uint
   recording::McapMessage message{};
   while (reader.Next(&message)) {
     const bus::TopicRole* role = bus::RoleNamed(reader.channels().at(message.channel).topic);
-    // What a node says of itself is no result.
+    // Topics without a single owner, such as Health, describe the process and are no result.
     if (role == nullptr || !role->one_owner()) continue;
     const auto found = bus::WithMessageOf(
         role->id, [&]<class T>(std::type_identity<T>) { return Compare<T>(message.data, epoch, stamp_ns, now); });
     if (found) return *found;
   }
-  return "nothing that it published in this tick differs: the difference is inside";
+  return "no published message of this tick differs, so the difference is in the internal state";
 }
 
 }  // namespace fulcrum::replay

@@ -1,4 +1,4 @@
-// What a node published in a tick, then and now.
+// Comparison of the recorded and the replayed messages of a tick.
 #pragma once
 
 #include <cstdint>
@@ -10,8 +10,8 @@
 
 namespace fulcrum::replay {
 
-/// Looks up in the recording what the process of that epoch published in the tick of that stamp and names the first
-/// field in which `now` differs: topic, field, index, both values.
+/// Reads from the recording the messages that the process of that epoch published in the tick of that stamp, and
+/// returns the first field in which `now` differs: topic, field, index, both values.
 [[nodiscard]] std::string DescribeDifference(const std::filesystem::path& recording, std::uint64_t epoch,
                                              std::int64_t stamp_ns, const std::vector<Published>& now);
 

@@ -1,4 +1,4 @@
-// One tick of a node as a recording has it.
+// One recorded tick of a node.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@ namespace fulcrum::replay {
 
 struct RecordedTick {
   NodeId node = NodeId::kPhysics;
-  std::uint64_t epoch = 0;  ///< Of the node's process: another one is a restart.
+  std::uint64_t epoch = 0;  ///< Epoch of the node's process; another one means a restart.
   Tick tick;
-  /// Of the node after the tick; none where it said nothing (haptics says it with each model and each tenth tick).
+  /// State hash after the tick; nullopt where none is recorded (haptics sends it with each model and each tenth tick).
   std::optional<std::uint64_t> state_hash;
-  // What the node took in that it had not yet had, oldest first.
+  // Samples that the node consumed for the first time in this tick, oldest first.
   std::vector<ToolState> tools;
   std::vector<HandleState> handles;
   std::vector<GeneratorSetting> generator;
@@ -26,7 +26,7 @@ struct RecordedTick {
   std::vector<CauteryContact> cautery;
   std::vector<TearState> tears;
   std::vector<ContactModel> model;
-  /// Why this tick cannot be made again; empty: it can.
+  /// Reason why this tick cannot be replayed; empty: it can.
   std::string missing;
 };
 

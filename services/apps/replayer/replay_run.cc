@@ -17,7 +17,7 @@
 namespace fulcrum::replay {
 namespace {
 
-/// Not every scene has each node (an exercise without heat): those are left out, with a line.
+/// Leaves out nodes that the scene does not have (for example thermal in a scene without heat) and prints their names.
 void LeaveOutMissing(const SceneView& scene, bool pictures, std::vector<NodeId>* nodes) {
   const auto missing = [&](NodeId node) { return (scene.node_mask >> static_cast<unsigned>(node) & 1u) == 0; };
   std::string names;
@@ -32,7 +32,7 @@ void LeaveOutMissing(const SceneView& scene, bool pictures, std::vector<NodeId>*
   std::cout << names << ": not in scene \"" << scene.name << "\", left out\n";
 }
 
-/// Returns how many pictures were written.
+/// Draws the pictures; returns how many were written.
 std::uint64_t DrawPictures(const Options& options, const SceneView& scene, const ProgressLine& progress) {
   const PicturesSettings settings{options.lock_step.recording, options.frames, options.lock_step.until_s};
   const std::uint64_t written = ReplayPictures(settings, scene, progress.callback()).written;
@@ -69,7 +69,8 @@ int RunReplay(const Options& options) {
   const config::CartConfig cart = LoadCart(options);
   const ScratchFolder scratch;
   settings.folder = scratch.path();
-  // Before the first thread starts: the console keeps moments by forking the process, which copies one thread only.
+  // The console must start before any other thread, because its keyframes fork the process, which copies one thread
+  // only.
   if (options.console) return RunConsole(settings, scene.view(), cart);
   const ProgressLine progress(options.quiet);
   if (options.pictures) {

@@ -1,12 +1,12 @@
-// replayer --into: nodes make the session again, as it was or with a parameter changed, at once or led by hand.
+// replayer --into: replay of nodes, unchanged or with changed parameters, in one run or controlled by commands.
 #pragma once
 
 #include "services/apps/replayer/options.h"
 
 namespace fulcrum::replay {
 
-/// Prints the result and writes it to `options.json`. Returns the exit code: 0 when every state was the same, 1 when
-/// one differed or the recording lacks something. Throws InputError, MismatchError, std::runtime_error.
+/// Prints the result and writes it to `options.json`. Returns the exit code: 0 when all states were equal, 1 when one
+/// differed or the recording is incomplete. Throws InputError, MismatchError, std::runtime_error.
 int RunReplay(const Options& options);
 
 }  // namespace fulcrum::replay

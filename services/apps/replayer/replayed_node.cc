@@ -40,7 +40,7 @@ struct Outlet {
   std::unique_ptr<typename bus::OutputOf<T>::type> out = topic.MakeOutput();
   std::unique_ptr<bus::Input<T>> in = topic.MakeInput();
   T sample;
-  /// Those of the last tick, oldest first.
+  /// Appends the messages of the last tick, oldest first.
   void TakeInto(std::vector<Published>* published) {
     if (!in) published->push_back({bus::kTopicOf<T>, {}});
     while (in && in->TakeNext(&sample)) {
@@ -53,10 +53,10 @@ struct Outlet {
   }
 };
 
-/// Where a node that may start again keeps what it goes on from.
+/// Checkpoint file of a node that may be restarted in the session.
 class Keepsake {
  public:
-  /// capacity() may take a while, and is asked only where there is something to keep.
+  /// @param capacity function, because the size takes time to compute and is needed for a checkpoint only.
   template <class Capacity>
   Keepsake(const NodeMaking& making, NodeId node, std::uint32_t layout, const Capacity& capacity) {
     if (!making.starts_again) return;
@@ -84,7 +84,7 @@ class ReplayedPhysics final : public ReplayedNode {
 
   std::vector<Published> TakeOutputs() override {
     std::vector<Published> published;
-    // Nobody reads the frames of a replay, so they are made only when one is asked for.
+    // A frame has no reader in a replay, so it is made on request only.
     TissueFrame frame;
     frame.xyz.resize(3 * scene_.rest_position.size());
     node_->FillFrame(tick_, {frame.header, frame.xyz});
@@ -104,7 +104,7 @@ class ReplayedPhysics final : public ReplayedNode {
   runtime::CheckpointFile* checkpoint() override { return checkpoint_.file(); }
   void Start(std::int64_t epoch_ns) override {
     node_.reset();
-    // Nothing of the process before is left, in its ports neither.
+    // A new process begins with empty ports.
     tools_ = {};
     handles_ = {};
     topology_ = {};
@@ -217,8 +217,8 @@ class ReplayedHaptics final : public ReplayedNode {
     for (std::size_t i = 0; i < kMaxTools; ++i) {
       if (cart_.devices[i].kind == config::DeviceKind::kTouch && scene_.tools[i].kind != ToolKind::kNone) {
         throw InputError("haptics_node cannot be replayed: tool " + std::to_string(i) +
-                         " was moved by a Touch, and what its motors and encoders did is on no topic. Replay physics "
-                         "and thermal; for haptics record with simulated devices");
+                         " was moved by a Touch, and no topic contains the states of its motors and encoders. Replay "
+                         "physics and thermal; for haptics record with simulated devices");
       }
     }
   }
@@ -278,7 +278,7 @@ std::uint64_t ReplayedNode::Step(const RecordedTick& tick) {
   return hash;
 }
 
-/// Leaves the thread with the node's floating-point state.
+/// Starts the node and computes the tick. Does not restore the floating-point state of the thread.
 std::uint64_t ReplayedNode::StartWith(const RecordedTick& tick) {
   Start(static_cast<std::int64_t>(tick.epoch));
   return Advance(tick);
@@ -290,7 +290,7 @@ std::uint64_t ReplayedNode::StartAgain(const RecordedTick& tick) {
   const auto copy = [](const auto& loaded) {
     return loaded ? Bytes(loaded->payload.begin(), loaded->payload.end()) : Bytes();
   };
-  // The first tick may write a checkpoint of its own.
+  // Both checkpoints are copied, because the first tick may write a new one.
   const Bytes newest = file != nullptr ? copy(file->Latest()) : Bytes();
   const Bytes previous = file != nullptr ? copy(file->Previous()) : Bytes();
   const unsigned outside = _mm_getcsr();

@@ -1,4 +1,4 @@
-// A node in lock step: the class that runs live, with the inputs of a recorded tick, on ports within this process.
+// A node in lock step: the class that runs live, with the inputs of recorded ticks, on in-process ports.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +13,10 @@
 
 namespace fulcrum::replay {
 
-/// A message as it would have travelled.
+/// A published message in its encoding on the bus.
 struct Published {
   TopicId topic;
-  std::vector<std::uint8_t> bytes;  ///< CDR with its encapsulation; empty: nobody reads the topic, so it was not made.
+  std::vector<std::uint8_t> bytes;  ///< CDR with its encapsulation; empty: the topic has no reader, so it was not made.
 };
 
 class ReplayedNode {
@@ -27,18 +27,18 @@ class ReplayedNode {
 
   [[nodiscard]] NodeId id() const { return id_; }
 
-  /// Makes the tick and returns the state hash after it. A tick of another epoch first starts the node anew, from the
-  /// checkpoint that it has written so far, as its process was: the newest, or the one before if the process died
-  /// between telling of a tick and sealing its checkpoint, which the first state shows. Any thread, one at a time.
+  /// Computes the tick and returns the state hash after it. A tick of another epoch first restarts the node from its
+  /// newest checkpoint, or from the previous one when the recorded state of this tick shows that the process died
+  /// between sending its last TickManifest and sealing the checkpoint. May be called from any thread, one at a time.
   std::uint64_t Step(const RecordedTick& tick);
 
-  /// Whether threads of its own, beside the caller's, help in the next ticks. The state does not depend on it.
+  /// Sets whether further threads of the node take part in the next ticks. The state does not depend on it.
   virtual void LetThreadsHelp(bool /*help*/) {}
 
-  /// What the node published in its last tick; once for each tick.
+  /// Messages that the node published in its last tick. Call at most once per tick.
   [[nodiscard]] virtual std::vector<Published> TakeOutputs() = 0;
 
-  /// Metrics and last error, as the node tells them after its last tick; at least one was made.
+  /// Fills in metrics and last error after the last tick. @pre At least one tick was computed.
   virtual void FillHealth(Health* health) const = 0;
 
  protected:
@@ -46,7 +46,7 @@ class ReplayedNode {
   [[nodiscard]] std::uint64_t epoch() const { return epoch_; }
   virtual void Start(std::int64_t epoch_ns) = 0;
   virtual std::uint64_t Advance(const RecordedTick& tick) = 0;
-  /// Null: the node keeps none.
+  /// Checkpoint of the node; nullptr: it has none.
   virtual runtime::CheckpointFile* checkpoint() { return nullptr; }
 
  private:
@@ -56,23 +56,23 @@ class ReplayedNode {
   NodeId id_;
   bool started_ = false;
   std::uint64_t epoch_ = 0;
-  unsigned float_state_;  ///< Thermal takes tiny numbers for zero on its own thread: kept for each node apart.
+  unsigned float_state_;  ///< Floating-point state, separate for each node: thermal flushes denormal numbers to zero.
 };
 
-/// What a replayed node is made of. Scene and cart must outlive it.
+/// Settings of a replayed node. Scene and cart must outlive it.
 struct NodeMaking {
   const SceneView& scene;
   const config::CartConfig& cart;
-  std::filesystem::path folder;  ///< For its checkpoint.
-  int threads = 1;               ///< That share a step of physics; its state does not depend on it.
-  /// Somebody reads ContactModel, CauteryContact and TemperaturePatch; otherwise their nodes, as live, do not make
-  /// them. No state depends on it.
+  std::filesystem::path folder;  ///< Folder for its checkpoint.
+  int threads = 1;               ///< Threads per step of physics; its state does not depend on it.
+  /// True: ContactModel, CauteryContact and TemperaturePatch have a reader. Otherwise the nodes do not make them, as in
+  /// a live session. No state depends on it.
   bool outputs_read = true;
-  /// It may be started again in the session, and needs a checkpoint to go on from.
+  /// True: the node may be restarted in the session and needs a checkpoint.
   bool starts_again = true;
 };
 
-/// For physics, thermal and haptics. Throws InputError when the node cannot be replayed.
+/// Makes physics, thermal or haptics. Throws InputError when the node cannot be replayed.
 [[nodiscard]] std::unique_ptr<ReplayedNode> MakeReplayedNode(NodeId node, const NodeMaking& making);
 
 }  // namespace fulcrum::replay

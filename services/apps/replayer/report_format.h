@@ -21,7 +21,7 @@ __attribute__((format(printf, 1, 2))) inline std::string Format(const char* form
   return text;
 }
 
-/// Throws InputError when it cannot be written.
+/// Writes `file`. Throws InputError when it cannot be written.
 inline void WriteText(const std::filesystem::path& file, const std::string& text) {
   std::ofstream out(file);
   out << text;

@@ -10,10 +10,10 @@
 
 namespace fulcrum::replay {
 
-/// A new, empty folder for temporary files; it and all in it are removed at the end of its scope.
+/// A new, empty folder for temporary files, which is removed with its content at the end of the scope.
 class ScratchFolder {
  public:
-  /// Throws InputError when it cannot be made.
+  /// Makes the folder. Throws InputError when that fails.
   ScratchFolder() {
     std::string name = (std::filesystem::temp_directory_path() / "fulcrum-replay-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) throw InputError("cannot make a folder " + name);

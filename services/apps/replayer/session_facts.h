@@ -1,4 +1,4 @@
-// What every way of replaying asks of cart and session.
+// Facts on cart and session that all kinds of replay need.
 #pragma once
 
 #include <array>

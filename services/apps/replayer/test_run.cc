@@ -13,11 +13,11 @@
 namespace fulcrum::replay {
 namespace {
 
-/// Render has no ticks to compare: the recording is drawn, and its figures are judged.
+/// Test of render, which has no ticks to compare: the recording is drawn, and the figures are checked.
 NodeTestResult TestRender(const PicturesSettings& settings, const Demands& demands, const SceneView& scene,
                           const std::function<void(double)>& progress) {
   if (demands.state_hash) {
-    throw InputError("--expect: render_node has no state hash, its pictures are its machine's; use --assert");
+    throw InputError("--expect: render_node has no state hash, because pictures depend on the machine; use --assert");
   }
   const std::int64_t begin = runtime::MonotonicNs();
   const PicturesResult pictures = ReplayPictures(settings, scene, progress);
@@ -28,7 +28,7 @@ NodeTestResult TestRender(const PicturesSettings& settings, const Demands& deman
   for (const Metric& metric : pictures.health) result.figures[metric.name] = metric.value;
   result.cases.push_back({"draws the recording", Verdict::kPassed, {}});
   if (pictures.written == 0) {
-    result.cases.back() = {"draws the recording", Verdict::kError, "the recording holds nothing to draw"};
+    result.cases.back() = {"draws the recording", Verdict::kError, "the recording contains nothing to draw"};
   }
   Judge(demands, &result);
   return result;
@@ -64,7 +64,7 @@ int RunTest(const Options& options) {
     report(result);
     return static_cast<int>(result.passed() ? ExitCode::kDone : ExitCode::kFailure);
   } catch (const std::exception& error) {
-    // A CI system reads the file, not the exit code.
+    // A CI system reads the error from the file, not from the exit code.
     report(FailedTest(node, options.lock_step.recording, error.what()));
     throw;
   }

@@ -19,7 +19,8 @@ TickSource::TickSource(const std::filesystem::path& file, const std::vector<Node
                        const std::array<double, kNodeCount>& period_s)
     : reader_(file), period_s_(period_s) {
   for (const NodeId node : nodes) wanted_[static_cast<std::size_t>(node)] = true;
-  // No node that is replayed reads frames or patches: they are most of a recording, and in chunks of their own.
+  // Frames and patches are most of a recording and in separate chunks. No replayed node reads them, so they are
+  // skipped.
   reader_.PassOver([](const recording::McapChannel& channel) {
     const bus::TopicRole* role = bus::RoleNamed(channel.topic);
     return role != nullptr && role->quality.path != bus::Path::kSharedMemory;
@@ -37,7 +38,7 @@ bool TickSource::Next(RecordedTick* tick) {
       }
     }
     if (pending_.empty()) return false;
-    // What a process still said after its successor led is nobody's: readers refuse it, too.
+    // Ticks of a process after its successor has taken over are ignored; live readers refuse them, too.
     const RecordedTick& next = pending_.begin()->second.tick;
     if (next.epoch >= progress_[static_cast<std::size_t>(next.node)].epoch) break;
     pending_.erase(pending_.begin());
@@ -92,13 +93,13 @@ bool TickSource::Next(RecordedTick* tick) {
   return true;
 }
 
-/// A ToolState says when; the manifest of the same moment, if there is one, says the rest.
+/// The time of a tick is that of its ToolState; the manifest with the same stamp, if any, contains the other fields.
 void TickSource::CompleteHaptics(RecordedTick* tick) {
   tick->tick.index = progress_[static_cast<std::size_t>(NodeId::kHaptics)].index + 1;
   if (session_) {
     tick->tick.session_time_s = 1e-9 * static_cast<double>(tick->tick.stamp_ns - session_->session_start_ns);
   } else if (tick->missing.empty()) {
-    tick->missing = "the recording does not say when the session began (no SceneManifest)";
+    tick->missing = "the recording lacks the start of the session (no SceneManifest)";
   }
   const auto manifest = haptics_manifests_.find(tick->tick.stamp_ns);
   if (manifest == haptics_manifests_.end() || manifest->second.stamp.epoch != tick->epoch) return;
@@ -121,10 +122,9 @@ void TickSource::Fetch(const RecordedTick& tick, const ConsumedInput& consumed, 
   if (const T* found = shelf.Find(key)) {
     samples->push_back(*found);
   } else if (missing->empty()) {
-    *missing =
-        std::string(NodeName(tick.node)) + " consumed " + Describe(consumed.topic, key) +
-        ", which the recording does not hold" +
-        (shelf.EndsBefore(key) ? ": the last of its process, which did not live to send it to the recorder" : "");
+    *missing = std::string(NodeName(tick.node)) + " consumed " + Describe(consumed.topic, key) +
+               ", which the recording lacks" +
+               (shelf.EndsBefore(key) ? ": the last of its process, which died before sending it to the recorder" : "");
   }
 }
 

@@ -1,4 +1,4 @@
-// From a recording to the ticks of some nodes, each with the inputs that it consumed.
+// Reader of a recording as ticks of nodes, each with the inputs that it consumed.
 #pragma once
 
 #include <array>
@@ -32,7 +32,7 @@ class SampleShelf {
     const auto found = samples_.find(key);
     return found == samples_.end() ? nullptr : &found->second;
   }
-  /// Whether all of that writer is there up to the one before, and nothing after.
+  /// True when the sample before `key` is the last one of its writer.
   [[nodiscard]] bool EndsBefore(const SampleKey& key) const {
     const auto next = samples_.lower_bound(key);
     const bool nothing_after = next == samples_.end() || next->first.first != key.first;
@@ -44,14 +44,14 @@ class SampleShelf {
   std::map<SampleKey, T> samples_;
 };
 
-/// Reads the recording once, from its beginning, and holds back each tick until its inputs must have come: a sample may
-/// stand after the manifest of the tick that consumed it, since topics reach a recorder on their own ways.
+/// Reads the recording once, from its beginning, and delays each tick until its inputs have been read: a sample may
+/// follow the manifest of the tick that consumed it, because the order between topics in a recording is arbitrary.
 ///
-/// Physics and thermal tell of each tick by a TickManifest. Of haptics each ToolState is a tick, and the manifests say
-/// which of them took a contact model.
+/// Physics and thermal send a TickManifest for each tick. For haptics each ToolState is a tick, and the manifests name
+/// the ticks that consumed a contact model.
 class TickSource {
  public:
-  /// @param nodes those of physics, thermal and haptics that are wanted.
+  /// @param nodes the requested ones of physics, thermal and haptics.
   /// @param period_s nominal period by node.
   /// Throws InputError when the file cannot be read.
   TickSource(const std::filesystem::path& file, const std::vector<NodeId>& nodes,
@@ -63,13 +63,13 @@ class TickSource {
   /// See McapReader::Reopen().
   void Reopen() { reader_.Reopen(); }
 
-  /// The session, once it was met.
+  /// The SceneManifest, once it was read.
   [[nodiscard]] const std::optional<SceneManifest>& session() const { return session_; }
   [[nodiscard]] const recording::McapReader& reader() const { return reader_; }
-  /// Messages that no type could make anything of.
+  /// Number of messages that could not be decoded.
   [[nodiscard]] std::uint64_t undecodable() const { return undecodable_; }
 
-  /// A tick is complete when the recording has gone on for this long after it [ns].
+  /// A tick is complete when messages that are later by this time have been read [ns].
   static constexpr std::int64_t kSettle_ns = 1'000'000'000;
 
  private:
@@ -88,7 +88,7 @@ class TickSource {
   struct Pending {
     RecordedTick tick;
     std::vector<ConsumedInput> consumed;
-    std::uint64_t sequence = 0;  ///< Of the message that told of it: a gap is a tick that the recording lost.
+    std::uint64_t sequence = 0;  ///< Sequence of its manifest or ToolState: a gap is a tick that the recording lacks.
   };
   struct Progress {
     std::uint64_t epoch = 0, sequence = 0, index = 0;
@@ -108,8 +108,8 @@ class TickSource {
   SampleShelf<TearState> tears_{128};
   SampleShelf<CauteryContact> cautery_{1024};
   SampleShelf<ContactModel> models_{1024};
-  std::map<std::int64_t, TickManifest> haptics_manifests_;  ///< By the stamp of their tick.
-  std::multimap<std::int64_t, Pending> pending_;            ///< By the stamp of the tick.
+  std::map<std::int64_t, TickManifest> haptics_manifests_;  ///< By the stamp of their tick [ns].
+  std::multimap<std::int64_t, Pending> pending_;            ///< By the stamp of the tick [ns].
   std::array<Progress, kNodeCount> progress_;
   std::int64_t newest_ns_ = 0;
   std::uint64_t undecodable_ = 0;

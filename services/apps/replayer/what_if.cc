@@ -14,7 +14,7 @@
 namespace fulcrum::replay {
 namespace {
 
-/// Sum of squares and how many.
+/// Sum of squares and number of values.
 struct Spread {
   double sum = 0;
   std::uint64_t count = 0;
@@ -49,7 +49,7 @@ void CompareForces(const std::array<Vec3f, kMaxTools>& before, const std::array<
   }
 }
 
-/// Goes through two outcomes of each tick and keeps what the result tells.
+/// Compares the two outcomes of each tick and collects the result.
 class Comparison {
  public:
   void Add(const RecordedTick& tick, const Outcome& before, const Outcome& after) {
@@ -139,7 +139,7 @@ WhatIfResult ReplayWhatIf(const LockStepSettings& settings, const SceneView& bef
   comparison.Finish();
   comparison.result.wall_s = 1e-9 * static_cast<double>(runtime::MonotonicNs() - begin);
   if (comparison.result.ticks == 0 && comparison.result.missing.empty()) {
-    comparison.result.missing = "the recording holds no tick of these nodes";
+    comparison.result.missing = "the recording contains no tick of these nodes";
   }
   return comparison.result;
 }

@@ -1,4 +1,4 @@
-// What a changed parameter does, for people and for programs.
+// The result of a what-if replay as text and as JSON.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@
 
 namespace fulcrum::replay {
 
-/// A line a quantity that the replayed nodes have.
+/// Text with one line per quantity of the replayed nodes.
 [[nodiscard]] std::string ReportText(const WhatIfResult& result, const std::vector<NodeId>& nodes);
 
 /// One flat object with the names of WhatIfResult, pairs as `<name>.before` and `<name>.after`. Throws InputError when

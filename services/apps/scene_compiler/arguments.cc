@@ -10,17 +10,21 @@ constexpr const char* kUsage =
 
   scene_compiler SCENE.yaml --out FILE [--data DIR] [--set SECTION.KEY=VALUE]... [--quiet]
                                                                 compile, then report quality
-  scene_compiler --info FILE                                    what a compiled scene holds
-  scene_compiler --source FILE                                  the effective YAML it was compiled from
-  scene_compiler --list [DIR]                                   the scenes described in DIR (default: those shipped)
+  scene_compiler --info FILE                                    print the content and quality of a compiled scene
+  scene_compiler --source FILE                                  print the effective YAML of a compiled scene
+  scene_compiler --list [DIR]                                   list the scenes described in DIR (default: those shipped)
 
-  --data DIR   look here first for the mesh files that the description names
-  --set        a parameter of physics, thermal, haptics, breathing or render other than the description has it, or
-               script.power_W, the generator's setting; as often as needed
-  --quiet      no progress and no report
+  --out FILE   compiled scene to write
+  --data DIR   folder that is searched first for the mesh files of the description (default: the description's folder)
+  --set        replace a parameter of physics, thermal, haptics, breathing or render in the description, or
+               script.power_W, the power of all uses of the generator; may be repeated
+  --quiet      print no progress and no report
+
+Example:
+  scene_compiler deploy/scenes/small.yaml --out small.fulcrum --set physics.grip_force_N=4
 
 Keys of a description: services/scene/README.md.
-Exit code: 0 done, 1 failure, 2 bad usage or input, 3 a compiled scene of another version.
+Exit codes: 0 done, 1 failure, 2 bad usage or input, 3 a compiled scene of another version.
 )";
 
 }  // namespace

@@ -7,16 +7,16 @@
 namespace fulcrum::scene_compiler {
 
 struct Arguments {
-  std::vector<std::string> plain;    ///< Without an option before them: the description; for --list a folder.
-  std::vector<std::string> changes;  ///< --set, "section.key=value" each.
+  std::vector<std::string> plain;    ///< Words without an option: the description; for --list a folder.
+  std::vector<std::string> changes;  ///< Values of --set, each "section.key=value".
   std::string out, data, info, source;
   bool list = false, quiet = false, help = false;
 };
 
-/// Throws InputError on an unknown option or a missing value.
+/// Parses the command line. Throws InputError on an unknown option or a missing value.
 [[nodiscard]] Arguments ParseArguments(const std::vector<std::string>& words);
 
-/// What --help prints.
+/// Text of --help.
 [[nodiscard]] const char* Usage();
 
 }  // namespace fulcrum::scene_compiler

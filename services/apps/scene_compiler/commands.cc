@@ -24,7 +24,7 @@ void List(const std::filesystem::path& folder) {
 
 void Compile(const Arguments& arguments) {
   if (arguments.plain.size() != 1 || arguments.out.empty()) {
-    throw InputError("needs one SCENE.yaml and --out FILE; see --help");
+    throw InputError("SCENE.yaml or --out FILE is missing, or there is more than one SCENE.yaml; see --help");
   }
   const auto start = std::chrono::steady_clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
@@ -37,7 +37,7 @@ void Compile(const Arguments& arguments) {
       scene::CompileScene(arguments.plain[0], arguments.data, progress, arguments.changes);
   progress("writing " + arguments.out);
   scene::WriteSceneFile(compiled.data, compiled.effective_yaml, arguments.out);
-  const scene::SceneFile written(arguments.out);  // Reads it back with every check a node makes.
+  const scene::SceneFile written(arguments.out);  // Reads the file back with all checks that a node makes.
   if (!arguments.quiet) {
     std::fprintf(stderr, "%6.2f s  done: scene '%s'\n", seconds(), written.view().name);
     std::cout << scene::Describe(written.view(), scene::Measure(written.view()));

@@ -1,4 +1,4 @@
-// scene_compiler: from a scene description to the file that the nodes map.
+// scene_compiler: compiles a scene description into the file that the nodes map.
 #include <iostream>
 
 #include "services/apps/scene_compiler/arguments.h"
@@ -8,7 +8,7 @@
 
 namespace {
 
-using namespace fulcrum;  // NOLINT: a main is nothing but names of other modules
+using namespace fulcrum;  // NOLINT: a main uses names of other modules only
 
 int Fail(const std::exception& error, ExitCode code) {
   std::cerr << "scene_compiler: " << error.what() << "\n";
