@@ -62,7 +62,7 @@ class Console {
     std::string line;
     for (;;) {
       if (::isatty(STDIN_FILENO) != 0) std::cout << "replay> " << std::flush;
-      if (!ReadLine(&line) || !Obey(line)) break;
+      if (!ReadLine(&line) || !Execute(line)) break;
       std::cout << std::flush;
     }
     return std::any_of(seen_.begin(), seen_.end(), [](const auto& node) { return node.second.differs; }) ? 1 : 0;
@@ -76,7 +76,7 @@ class Console {
   };
 
   /// Executes a command; false: end of the replay.
-  bool Obey(const std::string& line) {
+  bool Execute(const std::string& line) {
     std::istringstream words(line);
     std::string verb;
     double number = 0;

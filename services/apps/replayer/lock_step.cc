@@ -161,7 +161,7 @@ class NodeRunner {
 
 /// Nodes of which the recording contains more than one process, by their channels, since each process has its own. All
 /// nodes when the recording is damaged.
-std::vector<NodeId> ThoseThatStartAgain(const std::filesystem::path& recording, const std::vector<NodeId>& nodes) {
+std::vector<NodeId> RestartedNodes(const std::filesystem::path& recording, const std::vector<NodeId>& nodes) {
   recording::McapReader heads(recording, recording::McapReader::Depth::kChunkHeads);
   recording::McapMessage none;
   while (heads.Next(&none)) {
@@ -191,7 +191,7 @@ LockStepResult ReplayInLockStep(const LockStepSettings& settings, const SceneVie
   TickSource source(settings.recording, settings.nodes, NodePeriods(cart));
   std::atomic<int> at_work{0};
   std::vector<std::unique_ptr<NodeRunner>> runners;
-  const std::vector<NodeId> start_again = ThoseThatStartAgain(settings.recording, settings.nodes);
+  const std::vector<NodeId> start_again = RestartedNodes(settings.recording, settings.nodes);
   for (const NodeId node : settings.nodes) {
     const bool starts_again = std::find(start_again.begin(), start_again.end(), node) != start_again.end();
     const NodeMaking making{scene, cart, settings.folder, settings.physics_threads, settings.figures, starts_again};

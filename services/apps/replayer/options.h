@@ -32,7 +32,7 @@ struct Options {
 /// Checks the command line. Throws InputError that names the option and the valid values.
 [[nodiscard]] Options ParseOptions(int argc, char** argv);
 
-/// Of a replay other than live. Throws InputError.
+/// Loads the cart of a replay other than live. Throws InputError.
 [[nodiscard]] config::CartConfig LoadCart(const Options& options);
 
 }  // namespace fulcrum::replay

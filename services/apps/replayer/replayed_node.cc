@@ -54,11 +54,11 @@ struct Outlet {
 };
 
 /// Checkpoint file of a node that may be restarted in the session.
-class Keepsake {
+class OptionalCheckpoint {
  public:
   /// @param capacity function, because the size takes time to compute and is needed for a checkpoint only.
   template <class Capacity>
-  Keepsake(const NodeMaking& making, NodeId node, std::uint32_t layout, const Capacity& capacity) {
+  OptionalCheckpoint(const NodeMaking& making, NodeId node, std::uint32_t layout, const Capacity& capacity) {
     if (!making.starts_again) return;
     file_.emplace(making.folder / (std::string(NodeName(node)) + ".checkpoint"), making.scene.hash, layout, capacity());
   }
@@ -133,7 +133,7 @@ class ReplayedPhysics final : public ReplayedNode {
   const SceneView& scene_;
   const int threads_;
   bool help_ = true;
-  Keepsake checkpoint_;
+  OptionalCheckpoint checkpoint_;
   Inlet<ToolState> tools_;
   Inlet<HandleState> handles_;
   Inlet<TopologyState> topology_;
@@ -197,7 +197,7 @@ class ReplayedThermal final : public ReplayedNode {
   }
 
   const SceneView& scene_;
-  Keepsake checkpoint_;
+  OptionalCheckpoint checkpoint_;
   Inlet<CauteryContact> contacts_;
   Inlet<TearState> tears_;
   Inlet<HandleState> handles_;

@@ -17,7 +17,7 @@ namespace {
 // Longer than a node takes to start: systemd has stopped restarting it by then.
 constexpr std::int64_t kLongestAbsence = 60 * kSecond_ns;
 // The last Health of a node that ends in good order may arrive after its process has ended.
-constexpr std::int64_t kLastWords = kSecond_ns / 4;
+constexpr std::int64_t kLastHealthDelay = kSecond_ns / 4;
 
 }  // namespace
 
@@ -80,7 +80,7 @@ std::optional<SupervisedNode::Death> AttachedNode::Update(std::int64_t now_ns) {
   if (std::exchange(back_, false)) return Death{"was restarted", false, {}, true, std::exchange(ended_ns_, 0)};
   if (process_.HasEnded()) {
     if (ended_ns_ == 0) ended_ns_ = now_ns;
-    if (!ending_ && !replaced_ && now_ns - ended_ns_ < kLastWords) return std::nullopt;
+    if (!ending_ && !replaced_ && now_ns - ended_ns_ < kLastHealthDelay) return std::nullopt;
     process_.Forget();
     missing_since_ns_ = now_ns;
     // An end in good order is reported as a restart only after the node has rejoined: when systemd stops the whole

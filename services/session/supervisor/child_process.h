@@ -40,7 +40,7 @@ class ChildProcess {
   [[nodiscard]] static ChildProcess Start(const std::filesystem::path& program,
                                           const std::vector<std::string>& arguments, const std::filesystem::path& log,
                                           WithParent with_parent = WithParent::kDies, int input = -1);
-  /// The same on open files, which stay the caller's.
+  /// The same with open files, which the caller closes.
   [[nodiscard]] static ChildProcess StartOn(const std::filesystem::path& program,
                                             const std::vector<std::string>& arguments, const ChildStreams& streams,
                                             WithParent with_parent = WithParent::kDies);

@@ -24,7 +24,7 @@ constexpr std::int64_t kPatienceWithRestart = 3 * kSecond_ns;
 constexpr std::int64_t kLongestEnd = 4 * kSecond_ns;
 // From the start of a node to the start of its spare: the spare must not compete with the node's own start.
 constexpr std::int64_t kBeforeSpare = kSecond_ns;
-constexpr auto kLook = std::chrono::milliseconds(5);
+constexpr auto kPollPeriod = std::chrono::milliseconds(5);
 
 /// True when another start with the same arguments would end the same way.
 bool IsFinal(const ProcessEnd& end) {
@@ -177,7 +177,7 @@ void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(
       }
     }
     turn(now);
-    std::this_thread::sleep_for(kLook);
+    std::this_thread::sleep_for(kPollPeriod);
   }
 }
 

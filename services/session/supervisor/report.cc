@@ -194,8 +194,8 @@ std::string Refusals(const SessionRecord& record) {
     return {};
   }
   std::string html = Tag("h2", "Refused on the bus") +
-                     "<div class='card scroll'><table><tr><th class='text'>session time</th><th class='text'>who, and "
-                     "why</th></tr>\n";
+                     "<div class='card scroll'><table><tr><th class='text'>session time</th>"
+                     "<th class='text'>participant and reason</th></tr>\n";
   for (const RefusalRecord& refusal : record.refused()) {
     html += "<tr>" + Tag("td", Fixed(refusal.time_s, 1) + " s") + Tag("td class='text'", refusal.what) + "</tr>\n";
   }

@@ -1,4 +1,4 @@
-// One node of a session as the supervisor sees it: a child of its own (node_process) or a service that systemd runs
+// Interface of the supervisor to one node of a session: a child process (node_process) or a service that systemd runs
 // (attached_node).
 #pragma once
 
