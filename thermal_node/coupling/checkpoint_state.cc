@@ -1,6 +1,6 @@
-// Checkpoint layout of the thermal solver: a header, the potential's start value, the cut's centre line and
-// way, protected structures, topology, then every tile that is not blank, each with only those arrays that hold
-// anything, then the bricks of the volume with the rows that hold anything.
+// Checkpoint layout of the thermal solver: a header, the potential's start value, the cut's centre line and tool path,
+// protected structures, topology, then every tile that is not blank, each with only those arrays that differ from their
+// defaults, then the bricks of the volume with the rows that differ from 0.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -13,15 +13,17 @@ namespace fulcrum::thermal {
 
 namespace {
 
-/// Change it with the layout.
+/// Identifies the layout; must change with it.
 constexpr std::uint64_t kLayout = 0x7468726d'00000007ull;
-/// A checkpoint of one model is none of another.
+/// A checkpoint of one model cannot be restored by another, so the model is part of the layout.
 constexpr std::uint64_t LayoutOf(ThermalModel model) { return kLayout + (static_cast<std::uint64_t>(model) << 16); }
-/// Some hundred tiles with all their arrays; a session that cuts more than half a metre would need more.
+/// Bytes for tiles: about 1100 with all their arrays, enough for half a metre of cut; a checkpoint that needs
+/// more is not written and Health reports it.
 constexpr std::size_t kTileCapacity = std::size_t{24} << 20;
-/// The centre line of three metres of cut, and the contact's way.
-constexpr std::size_t kCutCapacity = (std::size_t{1} << 15) * sizeof(CellIndex) + kWayCapacity * sizeof(ToolWay::Point);
-/// Some thirty bricks burned to the bottom.
+/// Bytes for the centre line of three metres of cut and for the tool path.
+constexpr std::size_t kCutCapacity =
+    (std::size_t{1} << 15) * sizeof(CellIndex) + kPathCapacity * sizeof(ToolPath::Point);
+/// Bytes for bricks: about thirty that are damaged down to the bottom.
 constexpr std::size_t kVolumeCapacity = std::size_t{32} << 20;
 
 class Writer {
@@ -77,7 +79,7 @@ bool AllWithin(const Values& values, float low, float high) {
   return std::all_of(values.begin(), values.end(), [&](float v) { return v >= low && v <= high; });  // false for NaN
 }
 
-/// Only what the solver itself could have left in a tile.
+/// Accepts only values that the solver can have written into a tile.
 bool Plausible(const TileState& s, int index, const HeatField& field) {
   if (!AllWithin(s.water, 0.0f, 1.0f) || !AllWithin(s.omega_cell, 0.0f, kOmegaMax) ||
       !AllWithin(s.omega_collagen, 0.0f, kOmegaMax) || !AllWithin(s.charred, 0.0f, 1.0f)) {
@@ -94,7 +96,7 @@ bool Plausible(const TileState& s, int index, const HeatField& field) {
   return true;
 }
 
-/// What is stored of a brick: its warm box, and the box of the rows that hold damage.
+/// Stored record of a brick: its warm box, and the box of the rows that hold damage.
 struct BrickRecord {
   std::int32_t index, awake;
   WarmBox warm, damaged;
@@ -168,7 +170,7 @@ bool GetVolume(Reader* reader, VolumeField* volume) {
   return true;
 }
 
-/// Value of an array of FloatArrays that need not be stored.
+/// Default of an array of FloatArrays; an array that holds nothing else is not stored.
 float DefaultOf(std::size_t array) { return array == 1 ? 1.0f : 0.0f; }
 
 }  // namespace
@@ -180,9 +182,9 @@ struct ThermalSolver::Header {
   SolverFigures figures;
   EventMemory memory;
   RemovedBox removed;
-  ToolWay::End way_end;
+  ToolPath::End path_end;
   float measured_length_m, cut_length_m, clock_s, protected_dt_s;
-  std::uint32_t tile_count, line_count, way_count, sample_count, structure_count;
+  std::uint32_t tile_count, line_count, path_count, sample_count, structure_count;
   std::uint32_t node_bytes, edge_bytes, shrink_bytes, protected_warm, has_volume;
 
   [[nodiscard]] bool Finite() const {
@@ -228,13 +230,13 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
   header.tile_count = static_cast<std::uint32_t>(tiles.size() - std::count_if(tiles.begin(), tiles.end(), blank));
   std::vector<CellIndex> line;
   for (const LineCell& cell : cut_meter_.line()) line.push_back(cell.at);
-  const std::span<const ToolWay::Point> way = cut_meter_.way().points();
+  const std::span<const ToolPath::Point> path = cut_meter_.path().points();
   header.removed = removed_;
-  header.way_end = cut_meter_.way().end();
+  header.path_end = cut_meter_.path().end();
   header.measured_length_m = cut_meter_.length_m();
   header.cut_length_m = cut_length_m_;
   header.line_count = static_cast<std::uint32_t>(line.size());
-  header.way_count = static_cast<std::uint32_t>(way.size());
+  header.path_count = static_cast<std::uint32_t>(path.size());
   header.sample_count = static_cast<std::uint32_t>(protected_.samples().size());
   header.structure_count = static_cast<std::uint32_t>(protected_.alarm_state().size());
   const TopologyBits& bits = topology_.committed();
@@ -252,7 +254,7 @@ std::size_t ThermalSolver::Save(std::span<std::byte> out) const {
     writer.Put(std::as_const(*paper_).potential());
   }
   writer.Put(std::span<const CellIndex>(line));
-  writer.Put(way);
+  writer.Put(path);
   writer.Put(protected_.samples());
   writer.Put(protected_.alarm_state());
   for (const auto* field : {&bits.dead_nodes, &bits.dead_edges, &bits.shrink}) {
@@ -286,7 +288,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
       !reader.GetValue(&window)) {
     return false;
   }
-  // A start value, so any number will do; between 0 and 1 where the last solve converged.
+  // A start value: any finite number is valid. It lies between 0 and 1 where the last solve converged.
   if (!AllWithin(window.start, -1e3f, 1e3f) || std::abs(window.corner.ix) > -kNowhere.ix ||
       std::abs(window.corner.iy) > -kNowhere.iy || !(window.step_s >= 0.0f && std::isfinite(window.step_s)) ||
       !window.interface.IsPlausible()) {
@@ -299,7 +301,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   if (header.node_bytes != bits.dead_nodes.size() || header.edge_bytes != bits.dead_edges.size() ||
       header.shrink_bytes != bits.shrink.size() || header.sample_count != protected_.samples().size() ||
       header.has_volume != (volume_ != nullptr ? 1u : 0u) ||
-      header.structure_count != protected_.alarm_state().size() || header.way_count > kWayCapacity ||
+      header.structure_count != protected_.alarm_state().size() || header.path_count > kPathCapacity ||
       header.line_count > static_cast<std::uint32_t>(field_.sheet().tile_count()) * kTileCells ||
       !(header.removed.empty() ||
         (field_.sheet().Contains(header.removed.low) && field_.sheet().Contains(header.removed.high))) ||
@@ -307,8 +309,8 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
     return false;
   }
   std::vector<CellIndex> line(header.line_count);
-  std::vector<ToolWay::Point> way(header.way_count);
-  if (!reader.Get(std::span(line)) || !reader.Get(std::span(way))) return false;
+  std::vector<ToolPath::Point> path(header.path_count);
+  if (!reader.Get(std::span(line)) || !reader.Get(std::span(path))) return false;
   std::vector<ProtectedSample> samples(header.sample_count);
   std::vector<std::uint8_t> alarm_state(header.structure_count);
   if (!reader.Get(std::span(samples)) || !reader.Get(std::span(alarm_state)) ||
@@ -345,7 +347,7 @@ bool ThermalSolver::Restore(std::span<const std::byte> bytes) {
   const bool volume_good = volume_ == nullptr || GetVolume(&reader, volume_.get());
   const bool length_good = header.cut_length_m >= 0.0f && header.cut_length_m <= header.measured_length_m;
   if (!volume_good || !length_good ||
-      !cut_meter_.Restore(field_, header.measured_length_m, line, way, header.way_end)) {
+      !cut_meter_.Restore(field_, header.measured_length_m, line, path, header.path_end)) {
     field_.Clear();
     if (volume_ != nullptr) volume_->Clear();
     return false;

@@ -6,12 +6,13 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// Of the distances from the way [m].
+/// Bin width of the histogram of distances from the path [m]: a tenth of a cell.
 constexpr float kBin_m = 1e-5f;
-/// Longer than any slit in the largest sheet; a published length beyond it is damage [m].
+/// Longer than any slit in the largest sheet; a longer one in a checkpoint means that the file is damaged [m].
 constexpr float kLongest_m = 1e3f;
 
-/// Index of the bin in which the given part of the histogram's sum is reached; the last one if it is empty.
+/// Index of the first bin at which the cumulative sum reaches the given part of the total; the last bin if the
+/// histogram is empty.
 std::size_t Percentile(std::span<const float> histogram, float part) {
   double sum = 0;
   for (const float weight : histogram) sum += static_cast<double>(weight);
@@ -25,12 +26,12 @@ std::size_t Percentile(std::span<const float> histogram, float part) {
 
 }  // namespace
 
-void CutMeter::AddWay(const Vec2f& from, const Vec2f& to) {
-  const std::size_t before = way_.points().size();
-  way_.Add(from, to);
-  for (std::size_t n = before; n < way_.points().size(); ++n) {
+void CutMeter::AddPath(const Vec2f& from, const Vec2f& to) {
+  const std::size_t before = path_.points().size();
+  path_.Add(from, to);
+  for (std::size_t n = before; n < path_.points().size(); ++n) {
     for (std::size_t k = 0; k < known_at_.size(); ++k) {
-      off_way_m_[k] = std::min(off_way_m_[k], way_.DistanceToPiece(known_at_[k], n));
+      off_path_m_[k] = std::min(off_path_m_[k], path_.DistanceToPiece(known_at_[k], n));
     }
   }
 }
@@ -57,29 +58,29 @@ void CutMeter::Rebuild(const HeatField& field) {
 
 void CutMeter::Measure(const HeatField& field) {
   length_m_ = std::max(length_m_, graph_.Measure(field, line_.cells()));
-  KeepOffWay(field);
+  UpdatePathDistances(field);
   SetPercentiles(field.sheet().cell_m);
 }
 
-/// Both lines are in the same order: cells that stay keep their distance from the way.
-void CutMeter::KeepOffWay(const HeatField& field) {
+/// Both lines are sorted alike, so one merge pass carries over the distances of the cells that are in both.
+void CutMeter::UpdatePathDistances(const HeatField& field) {
   const auto behind = [](CellIndex a, CellIndex b) { return a.iy != b.iy ? a.iy < b.iy : a.ix < b.ix; };
   const std::span<const LineCell> cells = line_.cells();
-  off_way_next_.resize(cells.size());
+  off_path_next_.resize(cells.size());
   known_at_.resize(cells.size());
   std::size_t old = 0;
   for (std::size_t n = 0; n < cells.size(); ++n) {
     known_at_[n] = field.sheet().CentreOf(cells[n].at);
     while (old < known_.size() && behind(known_[old].at, cells[n].at)) ++old;
     const bool kept = old < known_.size() && known_[old].at == cells[n].at;
-    off_way_next_[n] = kept ? off_way_m_[old] : way_.Distance(known_at_[n]);
+    off_path_next_[n] = kept ? off_path_m_[old] : path_.Distance(known_at_[n]);
   }
-  off_way_m_.swap(off_way_next_);
+  off_path_m_.swap(off_path_next_);
   known_.assign(cells.begin(), cells.end());
 }
 
 void CutMeter::SetPercentiles(float cell_m) {
-  width_p50_m_ = width_p95_m_ = off_way_p95_m_ = 0;
+  width_p50_m_ = width_p95_m_ = off_path_p95_m_ = 0;
   if (known_.empty()) return;
   const std::span<const float> weights = graph_.weights();
   std::int32_t most = 0;
@@ -87,27 +88,28 @@ void CutMeter::SetPercentiles(float cell_m) {
   histogram_.assign(static_cast<std::size_t>(most) + 1, 0.0f);
   for (std::size_t n = 0; n < known_.size(); ++n)
     histogram_[static_cast<std::size_t>(known_[n].distance2)] += weights[n];
-  // From tissue cell to tissue cell less the two halves, for a line that is in the middle; it is up to half a cell off.
+  // Distance between the tissue cells on either side less half a cell each, if the line lies in the middle. The line is
+  // up to half a cell off the middle, hence 0.5 and not 1.
   const auto width = [&](float part) {
     return (2.0f * std::sqrt(static_cast<float>(Percentile(histogram_, part))) - 0.5f) * cell_m;
   };
   width_p50_m_ = width(0.5f);
   width_p95_m_ = width(0.95f);
-  histogram_.assign(static_cast<std::size_t>(std::lround(kWayReach_m / kBin_m)) + 1, 0.0f);
+  histogram_.assign(static_cast<std::size_t>(std::lround(kPathReach_m / kBin_m)) + 1, 0.0f);
   for (std::size_t n = 0; n < known_.size(); ++n) {
-    histogram_[static_cast<std::size_t>(std::lround(off_way_m_[n] / kBin_m))] += weights[n];
+    histogram_[static_cast<std::size_t>(std::lround(off_path_m_[n] / kBin_m))] += weights[n];
   }
-  off_way_p95_m_ = static_cast<float>(Percentile(histogram_, 0.95f)) * kBin_m;
+  off_path_p95_m_ = static_cast<float>(Percentile(histogram_, 0.95f)) * kBin_m;
 }
 
 bool CutMeter::Restore(const HeatField& field, float length_m, std::span<const CellIndex> line,
-                       std::span<const ToolWay::Point> way, const ToolWay::End& way_end) {
+                       std::span<const ToolPath::Point> path, const ToolPath::End& path_end) {
   *this = CutMeter();
-  if (!(length_m >= 0.0f && length_m <= kLongest_m) || !line_.Restore(field, line) || !way_.Restore(way, way_end)) {
+  if (!(length_m >= 0.0f && length_m <= kLongest_m) || !line_.Restore(field, line) || !path_.Restore(path, path_end)) {
     *this = CutMeter();
     return false;
   }
-  // Cells may have been removed since the update from which the published length is: they count at the next.
+  // Cells may have been removed since the update that gave the published length; they count in the next update.
   Measure(field);
   length_m_ = length_m;
   return true;

@@ -1,13 +1,13 @@
 // Length, width and straying of the slit, measured on the hole itself: on the centre line of the removed cells. Length
 // and width do not depend on the tip's path, so a spark that jumps ahead or a second pass over the same place does not
-// falsify them; how far the line lies from that path is a figure of its own.
+// falsify them. Straying is the distance of the line from that path.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "thermal_node/coupling/tool_way.h"
+#include "thermal_node/coupling/tool_path.h"
 #include "thermal_node/heat/heat_field.h"
 #include "thermal_node/topology/centre_line.h"
 #include "thermal_node/topology/line_graph.h"
@@ -16,42 +16,43 @@ namespace fulcrum::thermal {
 
 class CutMeter {
  public:
-  /// The contact's centre went straight from one place to the other with current on; material coordinates [m].
-  void AddWay(const Vec2f& from, const Vec2f& to);
-  /// Measures again after cells within a box (inclusive) were removed.
+  /// Adds a straight piece of the path that the contact's centre took with current on; material coordinates [m].
+  void AddPath(const Vec2f& from, const Vec2f& to);
+  /// Updates line and measures after cells within a box (both corners inclusive) were removed.
   void Update(const HeatField& field, CellIndex low, CellIndex high);
-  /// Finds the line anew, of the whole hole. It may differ from the one that grew with the hole by a cell here and
-  /// there.
+  /// Computes the line of the whole hole from scratch. It may differ in single cells from the line of repeated updates.
   void Rebuild(const HeatField& field);
 
-  /// Centre lines of all holes, from end to end of each hole, with branches; never falls [m].
+  /// Sum of the lengths of all holes' centre lines, each from end to end of its hole, with branches; never decreases
+  /// [m].
   [[nodiscard]] float length_m() const { return length_m_; }
   /// Width of the hole across the centre line: median and 95th percentile over its length [m].
   [[nodiscard]] float width_p50_m() const { return width_p50_m_; }
   [[nodiscard]] float width_p95_m() const { return width_p95_m_; }
-  /// Distance of the centre line from the contact's way, 95th percentile over its length, at most kWayReach_m [m].
-  [[nodiscard]] float off_way_p95_m() const { return off_way_p95_m_; }
+  /// Distance of the centre line from the contact's path, 95th percentile over its length, at most kPathReach_m [m].
+  [[nodiscard]] float off_path_p95_m() const { return off_path_p95_m_; }
 
-  // For checkpoints. What is measured follows from these and the hole, in the same bits.
+  // For checkpoints. All measures follow from these and the hole, bit for bit.
   [[nodiscard]] std::span<const LineCell> line() const { return line_.cells(); }
-  [[nodiscard]] const ToolWay& way() const { return way_; }
-  /// False, and a meter that has measured nothing, when the values cannot have come from a meter of this field.
+  [[nodiscard]] const ToolPath& path() const { return path_; }
+  /// Restores a checkpoint. Returns false, and leaves an empty meter, if no meter of this field can have had these
+  /// values.
   [[nodiscard]] bool Restore(const HeatField& field, float length_m, std::span<const CellIndex> line,
-                             std::span<const ToolWay::Point> way, const ToolWay::End& way_end);
+                             std::span<const ToolPath::Point> path, const ToolPath::End& path_end);
 
  private:
   void Measure(const HeatField& field);
-  void KeepOffWay(const HeatField& field);
+  void UpdatePathDistances(const HeatField& field);
   void SetPercentiles(float cell_m);
 
   CentreLine line_;
   LineGraph graph_;
-  ToolWay way_;
-  std::vector<LineCell> known_;   ///< The line of the last update, to which off_way_m_ belongs.
-  std::vector<Vec2f> known_at_;   ///< Its cells' centres [m].
-  std::vector<float> off_way_m_;  ///< Distance of each cell from the way.
-  std::vector<float> off_way_next_, histogram_;
-  float length_m_ = 0, width_p50_m_ = 0, width_p95_m_ = 0, off_way_p95_m_ = 0;
+  ToolPath path_;
+  std::vector<LineCell> known_;    ///< Line of the last update; off_path_m_ refers to its cells.
+  std::vector<Vec2f> known_at_;    ///< Centres of these cells [m].
+  std::vector<float> off_path_m_;  ///< Distance of each of these cells from the path [m].
+  std::vector<float> off_path_next_, histogram_;
+  float length_m_ = 0, width_p50_m_ = 0, width_p95_m_ = 0, off_path_p95_m_ = 0;
 };
 
 }  // namespace fulcrum::thermal

@@ -1,4 +1,4 @@
-// A capsule of metal on the grid of the source window: how far each cell of the sheet is from its surface.
+// A capsule of metal on the grid of the source window, and the distance of each cell of the sheet from its surface.
 #pragma once
 
 #include <algorithm>
@@ -9,10 +9,11 @@
 
 namespace fulcrum::thermal {
 
-/// Conductance of sparks across the gap beside dry contact, relative to metal on tissue; assumed.
+/// Conductance of sparks across the gap beside the contact, relative to that of metal on tissue; assumed.
 inline constexpr float kArcConductance = 0.15f;
 
-/// All points of the sheet nearer than `radius` to an axis in it. Lengths in cells, distances by the metric.
+/// All points of the sheet nearer than `radius` to an axis in the sheet. Lengths are in cells, distances are those of
+/// the rest shape by its metric.
 class Electrode {
  public:
   Electrode(const SurfaceMetric& metric, const Vec2f& a, const Vec2f& b, float radius) : radius_(radius) {
@@ -34,7 +35,7 @@ class Electrode {
     const Vec2f d = Map(centre) - a_;
     return (d - std::clamp(d.dot(ab_) * per_length2_, 0.0f, 1.0f) * ab_).norm() - radius_;
   }
-  /// Part of a cell that is under the metal, by its gap [cells].
+  /// Fraction of a cell that the metal covers, from its gap [cells].
   [[nodiscard]] static float Covered(float gap) { return std::clamp(0.5f - gap, 0.0f, 1.0f); }
 
   /// The box that holds every centre with a gap below `reach`.

@@ -1,4 +1,4 @@
-// What lies between metal and tissue: wet contact, a film of steam, discharges across it; and the metal's own heat.
+// Interface between metal and tissue: wet contact, a film of steam, discharges across it; and the heat of the metal.
 //
 // Wet tissue touches the metal, and the current crowds at the metal's rim. Once tissue beneath boils, steam lifts the
 // metal off it. Where the mode's waveform sustains discharges (cut, blend) these carry the current across the film,
@@ -17,18 +17,17 @@
 
 namespace fulcrum::thermal {
 
-/// Conductance of a film in full discharge [S/m^2]. 350 V rms then put 49 W on a square millimetre.
+/// Conductance of a film in full discharge [S/m^2], assumed; at 350 V rms the power is 49 W per square millimetre.
 inline constexpr float kDischarge_S_m2 = 400.0f;
-/// Discharges reach tissue this far from the metal, ever more rarely [m].
+/// Range of discharges from the metal; their frequency falls to 0 there [m].
 inline constexpr float kFilmReach_m = 2.0e-4f;
-/// They burn from this voltage across the film on [V rms while the current is on]: 200 V peak.
+/// Least voltage across the film at which discharges burn [V rms while the current is on]: 200 V peak.
 inline constexpr float kStrike_V = 141.0f;
-/// Of the heat of a discharge: what the tissue gets, what the metal gets. The rest leaves with the plume.
+/// Shares of a discharge's heat that enter the tissue and the metal; the rest leaves with the plume.
 inline constexpr float kTissueShare = 0.75f, kMetalShare = 0.15f;
-/// The film grows to its full extent in this time where tissue beneath boils, and collapses in the second one where
-/// none does [s].
+/// Time constants with which the film grows where the tissue beneath boils and collapses where it does not [s].
 inline constexpr float kFilmGrows_s = 1.0e-3f, kFilmCollapses_s = 5.0e-3f;
-/// So much of the footprint must boil for a film under all of it: steam spreads.
+/// Fraction of the footprint that must boil for a film under all of it, because steam spreads.
 inline constexpr float kBoilingForFilm = 0.1f;
 
 /// A hook of 1 mm steel wire, 10 mm of it bare: 0.03 J/K. It loses heat to its shaft and the air in 16 s.
@@ -38,22 +37,24 @@ inline constexpr float kHookContact_W_m2K = 2.0e4f, kHookFilm_W_m2K = 500.0f;
 
 /// State of the interface of one electrode.
 struct Interface {
-  float film = 0;        ///< Part of the footprint that the film lifts off, 0 ... 1.
-  float burning = 1;     ///< Part of the film in which discharges burn: as many as keep kStrike_V across it.
+  float film = 0;        ///< Fraction of the footprint under which there is a film, 0 ... 1.
+  float burning = 1;     ///< Fraction of the film in which discharges burn: as many as keep kStrike_V across it.
   float hook_theta = 0;  ///< Temperature of the metal above body temperature [K].
 
-  /// @param boiling part of the footprint that boils. @param sustains the waveform sustains discharges.
+  /// Advances the film. @param boiling fraction of the footprint that boils. @param sustains the waveform sustains
+  /// discharges.
   void Follow(float boiling, bool sustains, float dt_s) {
     const float target = sustains ? std::min(boiling / kBoilingForFilm, 1.0f) : 0.0f;
     film += (target - film) * (1.0f - std::exp(-dt_s / (target > film ? kFilmGrows_s : kFilmCollapses_s)));
     if (film < 0.05f) burning = 1.0f;
   }
-  /// After a solve. @param across_V across the film while the current is on.
+  /// Adjusts the burning fraction after a solve. @param across_V voltage across the film while the current is on [V
+  /// rms].
   void Regulate(float across_V) {
     const float ratio = across_V / kStrike_V;
     burning = std::clamp(burning * std::clamp(ratio * ratio, 0.5f, 2.0f), 0.02f, 1.0f);
   }
-  /// What the solver itself can have left.
+  /// True for a state that the solver can have written.
   [[nodiscard]] bool IsPlausible() const {
     return film >= 0.0f && film <= 1.0f && burning >= 0.0f && burning <= 1.0f && std::abs(hook_theta) <= 5000.0f;
   }

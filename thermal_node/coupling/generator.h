@@ -9,17 +9,17 @@
 
 namespace fulcrum::thermal {
 
-/// What a mode does to the voltage and when it removes tissue.
+/// Waveform of a mode and its rule for removing tissue.
 ///
-/// All modes regulate the mean power that was asked. Their waveforms differ: cut is continuous, blend and coag are
-/// interrupted, and the generator's limits hold while the current is on; over all, rms = sqrt(duty) times that. A cell
-/// is removed when its water is spent *and* it is hotter than `remove_C`: in cut at once (the steam bursts it), in
-/// blend after some superheating of dry tissue (a wider coagulated border), in coag only when it burns; coag therefore
-/// dries and browns. Duty cycles and temperatures assumed.
+/// All modes regulate the mean power to the set power. Their waveforms differ: cut is continuous, blend and coag are
+/// interrupted. The generator's limits of voltage and current hold while the current is on; the rms over the whole
+/// period is sqrt(duty) times as large. A cell is removed when its water is spent *and* it is hotter than `remove_C`:
+/// in cut at once (the steam bursts it), in blend after some superheating of dry tissue (a wider coagulated border), in
+/// coag only when it burns; coag therefore dries and browns. Duty cycles and temperatures are assumed.
 struct ModeRule {
-  float duty;  ///< Part of the time in which the current is on.
-  float remove_C;
-  float arc_m;  ///< Without a film, sparks reach tissue this far from the metal, ever more rarely.
+  float duty;      ///< Duty cycle: fraction of the time in which the current is on.
+  float remove_C;  ///< Dry tissue is removed above this temperature.
+  float arc_m;     ///< Range of sparks from the metal without a film [m]; their frequency falls to 0 there.
 };
 
 inline ModeRule RuleOf(CauteryMode mode) {
@@ -42,7 +42,7 @@ struct Drive {
   float v_max_V = 0;        ///< [V rms]
   float i_max_A = 0;        ///< [A rms]
   float remove_theta = 0;   ///< [K]
-  float duty = 1;           ///< Part of the time in which the current is on.
+  float duty = 1;           ///< Duty cycle: fraction of the time in which the current is on.
   bool discharges = false;  ///< The waveform sustains discharges across a film of steam.
   float arc_m = 0;
 };
@@ -59,7 +59,7 @@ inline Drive MakeDrive(const ThermalParams& params, CauteryMode mode, float powe
           .arc_m = rule.arc_m};
 }
 
-/// Electrode voltage into a conductance: the asked power, within the limits of voltage and current [V rms].
+/// Electrode voltage at which a conductance takes the set power, within the limits of voltage and current [V rms].
 inline float RegulatedVoltage(const Drive& drive, float conductance_S) {
   if (!(conductance_S > 0.0f)) return 0.0f;
   return std::min({drive.v_max_V, std::sqrt(drive.power_W / conductance_S), drive.i_max_A / conductance_S});

@@ -20,8 +20,8 @@ void FillOpenCells(const HeatField& field, const Vec2f& material, OpenCells* cel
       for (int iy = std::max(y0, ty * kTile); iy < std::min(y1, (ty + 1) * kTile); ++iy) {
         for (int ix = std::max(x0, tx * kTile); ix < std::min(x1, (tx + 1) * kTile); ++ix) {
           const int k = (iy - ty * kTile) * kTile + ix - tx * kTile;
-          const std::uint64_t gone = (tile->state.flags[k] & kRemoved) != 0 ? 1 : 0;
-          cells->rows[static_cast<std::size_t>(iy - y0)] |= gone << static_cast<unsigned>(ix - x0);
+          const std::uint64_t removed = (tile->state.flags[k] & kRemoved) != 0 ? 1 : 0;
+          cells->rows[static_cast<std::size_t>(iy - y0)] |= removed << static_cast<unsigned>(ix - x0);
         }
       }
     }

@@ -1,4 +1,4 @@
-// The cells around the hook that are gone, for physics.
+// Bit field of the removed cells around the hook, for physics_node.
 #pragma once
 
 #include "services/base/core/messages.h"
@@ -6,9 +6,9 @@
 
 namespace fulcrum::thermal {
 
-/// Fills the window around a place of the sheet. It moves in steps of kWindowStep cells, so that it seldom changes by
-/// moving alone.
+/// The window moves in steps of this many cells, so that motion alone seldom changes it.
 inline constexpr int kWindowStep = 8;
+/// Fills the window around a place of the sheet.
 void FillOpenCells(const HeatField& field, const Vec2f& material, OpenCells* cells);
 
 }  // namespace fulcrum::thermal

@@ -8,7 +8,7 @@ namespace {
 
 constexpr float kTexelZero_C = 20.0f, kTexelPerKelvin = 2.0f;
 
-/// Rounds into 0 … 255; a bad number gives 0.
+/// Rounds to 0 … 255; a value that is not finite gives 0 or 255.
 std::uint8_t ToByte(float value) {
   return value > 0.0f ? static_cast<std::uint8_t>(std::min(value + 0.5f, 255.0f)) : std::uint8_t{0};
 }

@@ -18,19 +18,20 @@ struct PatchPlace {
   bool operator==(const PatchPlace&) const = default;
 };
 
-/// Fills texels as TemperaturePatch describes; returns the highest temperature [C]. Each texel shows the cell under its
-/// centre.
+/// Fills texels in the format of TemperaturePatch and returns the highest temperature [C]. Each texel shows the cell
+/// under its centre.
 float DrawPatch(const HeatField& field, float texel_m, const PatchPlace& place, std::span<std::uint8_t> texels);
 
 /// Decides which patch to send next. The atlas is divided into places of one patch each; a place is due when its tissue
-/// has changed since it was last drawn. The hottest place gets every other turn, the rest go round.
+/// has changed since it was last drawn. Every other patch is the hottest place, the others are sent in round-robin
+/// order.
 class PatchPlanner {
  public:
   PatchPlanner(const HeatField& field, float texel_m);
 
-  /// Notes what has changed since the last call; or, when asked, every tile that was ever warm.
+  /// Notes what has changed since the last call; or, if `everything`, every tile that was ever warm.
   void Note(HeatField* field, bool everything);
-  /// The next place that is due, which then no longer is. Nothing when nothing changed.
+  /// Returns the next place that is due and marks it as sent; no value if nothing has changed.
   std::optional<PatchPlace> Next(const HeatField& field);
   /// The next place that was ever warm, in turn: for readers that came late.
   std::optional<PatchPlace> NextOfHistory();

@@ -1,4 +1,4 @@
-// Where the metal of a path lies on the cells of the source window.
+// Gaps between the metal of a path and the cells of the source window.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,11 +8,12 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// Footprints whose centres lie farther apart are shifted onto one another before they are mixed: metal that goes by
-/// more than its film reaches in one sample would else leave out what lies between [cells].
+/// Footprints whose centres lie farther apart than this are shifted onto one another before they are interpolated
+/// [cells]. Otherwise metal that moves by more than the range of its film between two samples would leave out the cells
+/// between.
 constexpr float kFarApart = 2.0f;
 
-/// Gaps of the cells (x, y) to (x + kWindow - 1, y) [m].
+/// Decodes the gaps of the cells (x, y) to (x + kWindow - 1, y) [m].
 void DecodeRow(const Footprint& print, std::int32_t x, std::int32_t y, float* row) {
   std::fill_n(row, kWindow, Footprint::Decode(kBeyond));
   const std::int32_t j = y - print.y, width = static_cast<std::int32_t>(print.width);
@@ -40,16 +41,16 @@ void SourceWindow::AddGap(int i, int j, float gap) {
   gap_high_ = {std::max(gap_high_.ix, i), std::max(gap_high_.iy, j)};
 }
 
-/// From sample to sample each cell's gap changes evenly.
+/// Interpolates each cell's gap linearly between the two samples.
 void SourceWindow::AddFootprint(const TipPath& path, float at, float reach) {
   const float u = path.part_from + at * (path.part_to - path.part_from), per_cell = 1.0f / material_.cell_m;
-  const Vec2f way = path.way * per_cell;
+  const Vec2f shift = path.displacement * per_cell;
   const auto cells = [](const Vec2f& v) {
     return CellIndex{static_cast<std::int32_t>(std::lround(v.x())), static_cast<std::int32_t>(std::lround(v.y()))};
   };
-  const bool far = way.norm() > kFarApart;
-  // What lies at x is taken from x - u way of the first and from x + (1 - u) way of the last.
-  const CellIndex back = far ? cells(u * way) : CellIndex{}, ahead = far ? cells((1 - u) * way) : CellIndex{};
+  const bool far = shift.norm() > kFarApart;
+  // The gap at x is read at x - u shift in the first footprint and at x + (1 - u) shift in the last one.
+  const CellIndex back = far ? cells(u * shift) : CellIndex{}, ahead = far ? cells((1 - u) * shift) : CellIndex{};
   const Footprint &a = path.begin, &b = path.end;
   const std::int32_t y0 = std::min(a.y + back.iy, b.y - ahead.iy);
   const std::int32_t y1 = std::max(a.y + static_cast<std::int32_t>(a.height()) + back.iy,

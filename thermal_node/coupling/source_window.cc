@@ -8,17 +8,16 @@
 namespace fulcrum::thermal {
 namespace {
 
-constexpr float kFarFieldSpacing = 0.1f;  ///< Of the table, in windows.
-/// Rows with less of the heat than this do not count as changing: there it is so thin that they hardly do.
+constexpr float kFarFieldSpacing = 0.1f;  ///< Spacing of the table of far_field_, in window widths.
+/// Rows with less than this share of the heat are left out of Change(): their heat density is too low to matter.
 constexpr float kFaintRow = 0.01f;
-/// Longest coupling step in a mode with discharges: what boils dry beneath a film is taken out at the end of it [s].
+/// Longest coupling step in a mode with discharges [s]: cells that boil dry beneath a film are removed only at its end.
 constexpr float kFilmStep_s = 1.6e-3f;
-/// Evaluations of Change() to find a step: one more than are needed where change goes with the step; from a step of
-/// seconds, which dries everything, each comes down by 1 / max_change at most.
+/// Maximum number of evaluations of Change() for one step: one more than needed where the change is proportional to the
+/// step. From a step of seconds, which dries everything, each evaluation shortens the step by up to 1 / max_change.
 constexpr int kStepTrials = 6;
 
-/// What a run of cells is apart from its heat: one over the volume, and the electrical conductivity wet at body
-/// temperature.
+/// Computes the inverse volume of a run of cells and their electrical conductivity, wet at body temperature.
 FULCRUM_WIDE
 void LoadTissue(const std::uint8_t* __restrict flags, const float* __restrict inverse_area, float flat_volume,
                 float sigma, int count, float* __restrict inverse_volume, float* __restrict tissue) {
@@ -32,7 +31,7 @@ void LoadTissue(const std::uint8_t* __restrict flags, const float* __restrict in
 
 SourceWindow::SourceWindow(const Material& material, const Sheet& sheet) : material_(material), sheet_(sheet) {
   gap_.fill(kFarGap);
-  // Beyond the window the sheet goes on: V ~ K0(r / lambda) with lambda = sqrt(sigma d / leak).
+  // Far field of the leaky sheet beyond the window: V ~ K0(r / lambda) with lambda = sqrt(sigma d / leak).
   const double lambda = std::sqrt(material.sigma * material.thickness_m / std::max(material.leak_S_m2, 1e-3f));
   for (std::size_t n = 0; n < far_field_.size(); ++n) {
     const double r = std::max<double>(n, 1) * kFarFieldSpacing * kWindow * material.cell_m;
@@ -58,7 +57,7 @@ void SourceWindow::Import(const State& state) {
 void SourceWindow::MoveTo(CellIndex corner) {
   if (corner == corner_) return;
   const int di = corner.ix - corner_.ix, dj = corner.iy - corner_.iy;
-  // A touch-down elsewhere shares nothing with the last potential.
+  // After a touch-down elsewhere the last potential is no useful start value.
   const bool near = std::abs(di) < kWindow / 4 && std::abs(dj) < kWindow / 4;
   near ? potential_.Shift(di, dj) : potential_.ImportStart({});
   if (!near) step_s_ = 0;
@@ -92,7 +91,8 @@ void SourceWindow::RefreshTiles(HeatField* field, Ledger* ledger) {
 }
 
 void SourceWindow::Load(HeatField* field, Ledger* ledger) {
-  // Bad cells must not reach the potential: there they would spoil the whole window.
+  // Cells with values that are not finite are quarantined first: one of them would ruin the potential of the whole
+  // window.
   RefreshTiles(field, ledger);
   ForTileRows(field, [&](const Tile* tile, int from, int to, int count) {
     if (tile == nullptr) {
@@ -130,8 +130,8 @@ void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
   const float cell = material_.cell_m;
   const float leak = tented ? 0.0f : material_.leak_S_m2 * cell * cell * metric_.area();
   for (int k = 0; k < kWindowCells; ++k) problem_.ground[k] = (flags_[k] & kNoTissue) != 0 ? 0.0f : leak;
-  // What flows on beyond the window, as the sheet's far field at each face of the border, in series with the half cell
-  // before it.
+  // Current that leaves the window: the conductance of the sheet's far field at each face of the border, in series with
+  // the half cell before it.
   const auto add = [&](int i, int j, float face, float stretch, const Vec2f& normal) {
     const Vec2f r_cells = Vec2f(static_cast<float>(corner_.ix + i + sheet_.origin_x) + 0.5f,
                                 static_cast<float>(corner_.iy + j + sheet_.origin_y) + 0.5f) +
@@ -143,7 +143,7 @@ void SourceWindow::SetGround(const Vec2f& middle, bool tented) {
     const float kappa = tented ? 1.0f / (r * cell * std::log(std::max(kTentRadius_m / (r * cell), 1.2f)))
                                : far_field_[n] + f * (far_field_[n + 1] - far_field_[n]);
     const float cosine = std::max(0.0f, r_cells.dot(normal) / r);
-    const float slope = cell * stretch * kappa * cosine;  // of the potential, per cell
+    const float slope = cell * stretch * kappa * cosine;  // relative slope of the potential per cell
     problem_.ground[j * kWindow + i] += face * problem_.sigma[j * kWindow + i] * slope / (1.0f + 0.5f * slope);
   };
   const float stretch_s = std::sqrt(metric_.ss), stretch_t = std::sqrt(metric_.tt);
@@ -171,7 +171,7 @@ void SourceWindow::SetContact(const Drive& drive) {
   problem_.contact.fill(0);
   problem_.lost.fill(0);
   const float cell = material_.cell_m, area = cell * cell * metric_.area();
-  // From the face that the metal touches to the middle of the sheet: sigma / (d / 2) per area.
+  // Conductance per area from the touched face to the middle of the sheet: sigma / (d / 2).
   const float per_sigma = (1.0f - interface_.film) * 2.0f * area / material_.thickness_m;
   const float burning = interface_.film * interface_.burning * kDischarge_S_m2 * area;
   const float per_arc = drive.arc_m > 0.0f ? cell / drive.arc_m : 1e6f, per_reach = cell / kFilmReach_m;
@@ -180,7 +180,8 @@ void SourceWindow::SetContact(const Drive& drive) {
       const int k = j * kWindow + i;
       if (!(gap_[k] < kFarGap) || !(tissue_[k] > 0.0f)) continue;
       const float covered = Electrode::Covered(gap_[k]);
-      const float beyond = std::max(gap_[k], 0.5f * (1.0f - covered));  // of the middle of what is not covered
+      const float beyond =
+          std::max(gap_[k], 0.5f * (1.0f - covered));  // distance of the middle of the part that is not covered
       const float rarer = std::max(1.0f - beyond * per_arc, 0.0f), fewer = std::max(1.0f - beyond * per_reach, 0.0f);
       const float wet = covered + (1.0f - covered) * kArcConductance * rarer * rarer;
       const float film = burning * (covered + (1.0f - covered) * fewer * fewer);
@@ -218,7 +219,7 @@ void SourceWindow::ExchangeWithHook(float dt_s, Ledger* ledger) {
       const int k = j * kWindow + i;
       if (!(gap_[k] < 0.5f) || !(tissue_[k] > 0.0f)) continue;
       const float rc = rc_dry + water_[k] * rc_water;
-      // Half the way to balance at most, whatever the time.
+      // At most half of the difference from equilibrium, for any time step: keeps the explicit exchange stable.
       const float rate = std::min(per_area * Electrode::Covered(gap_[k]), 0.5f * rc);
       const float heat = rate * (interface_.hook_theta - enthalpy_[k] / rc);
       enthalpy_[k] += heat;
@@ -229,7 +230,7 @@ void SourceWindow::ExchangeWithHook(float dt_s, Ledger* ledger) {
   interface_.hook_theta -= static_cast<float>(given) / kHookHeatCapacity_J_K;
 }
 
-/// Part of the electrode voltage across the film: root of the mean square, by conductance.
+/// Fraction of the electrode voltage that drops across the film: root of the mean square, weighted by conductance.
 float SourceWindow::FilmDrop() const {
   double conductance = 0;
   for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
@@ -239,7 +240,7 @@ float SourceWindow::FilmDrop() const {
   return conductance > 0.0 ? static_cast<float>(std::sqrt(static_cast<double>(solved_.lost_S) / conductance)) : 1.0f;
 }
 
-/// The heat of a film does not change with the tissue beneath it.
+/// Subtracts the film's heat from dissipated_, because it does not depend on the tissue beneath.
 void SourceWindow::LeaveOutFilm() {
   for (int j = gap_low_.iy; j <= gap_high_.iy; ++j) {
     for (int i = gap_low_.ix; i <= gap_high_.ix; ++i) {
@@ -291,7 +292,7 @@ float SourceWindow::StepByChange(float v2, float heat_S, float longest) const {
   float step = longest;
   for (int n = 0; n < kStepTrials; ++n) {
     const float change = Change(v2 * step, heat_S);
-    if (!(change > 1.1f * max_change)) break;  // nor where nothing is heated
+    if (!(change > 1.1f * max_change)) break;  // also false for NaN, where nothing is heated
     step *= max_change / change;
   }
   return step;
@@ -305,11 +306,11 @@ void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
   float* __restrict w = &water_[j * kWindow];
   const float* __restrict tissue = &tissue_[j * kWindow];
   alignas(64) float before[kWindow];
-  std::uint32_t gone = 0;
+  std::uint32_t removable = 0;
   for (int i = 0; i < kWindow; ++i) {
     const float enthalpy = h[i], water = w[i];
     const float excess = enthalpy - (rc_dry + water * rc_water) * boil;
-    // Nothing where nothing boils: no branch keeps this from vectors.
+    // Evaluated for every cell, with 0 where nothing boils: a branch would prevent vectorisation.
     const float some = (excess > 0.0f ? excess : 0.0f) / latent, there = tissue[i] > 0.0f ? water : 0.0f;
     const float boiled = some < there ? some : there, left = water - boiled;
     const float after = (rc_dry + left * rc_water) * boil + (excess - boiled * latent);
@@ -317,7 +318,7 @@ void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
     h[i] = boiled > 0.0f ? after : enthalpy;
     w[i] = left;
     const float dry = left > 0.0f ? 0.0f : h[i], hot = tissue[i] > 0.0f ? dry : 0.0f;
-    gone |= hot >= too_hot ? 1u : 0u;
+    removable |= hot >= too_hot ? 1u : 0u;
   }
   double steam = 0;
   for (int i = 0; i < kWindow; ++i) {
@@ -325,10 +326,10 @@ void SourceWindow::BoilRow(int j, float remove_theta, Ledger* ledger) {
     steam += (static_cast<double>(before[i]) - static_cast<double>(h[i])) / inverse_volume_[j * kWindow + i];
   }
   ledger->vapour += steam;
-  if (gone != 0) RemoveDry(j, too_hot, ledger);
+  if (removable != 0) RemoveDry(j, too_hot, ledger);
 }
 
-/// Takes out what is dry and has at least such an enthalpy [J/m^3].
+/// Removes dry cells whose enthalpy is at least `too_hot` [J/m^3].
 void SourceWindow::RemoveDry(int j, float too_hot, Ledger* ledger) {
   for (int i = 0; i < kWindow; ++i) {
     const int k = j * kWindow + i;
@@ -384,9 +385,9 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   SetSigma();
   SetGround(centre, path.tented);
   const float cells = (path.to - path.from).norm() / material_.cell_m;
-  const float by_way = duration_s / std::clamp(cells / kMaxWay, 1.0f, kMostByWay);
-  const float by_film = drive.discharges ? kFilmStep_s : by_way;
-  const float longest = std::max(std::min(by_way, by_film), std::min(min_step_s, duration_s));
+  const float by_travel = duration_s / std::clamp(cells / kMaxTravel, 1.0f, kMaxStepsByTravel);
+  const float by_film = drive.discharges ? kFilmStep_s : by_travel;
+  const float longest = std::max(std::min(by_travel, by_film), std::min(min_step_s, duration_s));
   const float reach_m = std::max(drive.arc_m, kFilmReach_m);
   leak_V2s_.fill(0);
   float t = 0;
@@ -395,7 +396,7 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
     SetGaps(path, (t + 0.5f * std::min(step_s_, rest)) / duration_s, reach_m);
     const float asked = drive.power_W > 0.0f ? SolveStep(drive, longest) : longest;
     const float step = std::max(asked, min_step_s);
-    // What is left goes into steps of one length: no sliver at the end.
+    // The rest is divided into steps of equal length, which avoids a very short last step.
     const float steps = std::ceil(rest / step);
     last = steps <= 1.0f;
     const float dt = last ? rest : rest / steps;
@@ -404,7 +405,9 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
     interface_.Follow(Boiling(), drive.power_W > 0.0f && drive.discharges, dt);
     SetSigma();
     if (!last)
-      ++(std::min(asked, by_way) < min_step_s ? stats_.by_floor : asked < longest ? stats_.by_change : stats_.by_way);
+      ++(std::min(asked, by_travel) < min_step_s ? stats_.by_floor
+         : asked < longest                       ? stats_.by_change
+                                                 : stats_.by_travel);
     t += dt;
     step_s_ = dt;
   }
@@ -412,7 +415,7 @@ void SourceWindow::Run(HeatField* field, const TipPath& path, const Drive& drive
   RefreshTiles(field, ledger);
 }
 
-/// Solves for the potential; returns how long it holds [s].
+/// Solves for the potential; returns the length of the coupling step for which it is valid [s].
 float SourceWindow::SolveStep(const Drive& drive, float longest) {
   SetContact(drive);
   solved_ = potential_.Solve(problem_, tolerance);

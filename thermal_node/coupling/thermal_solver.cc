@@ -12,10 +12,12 @@ namespace {
 
 /// Half width of the square around the tip that is searched for blanched and charred tissue [cells].
 constexpr int kSearchCells = 12;
+/// Shortest time between two events of one kind [s]: few enough for sounds and the report; assumed.
 constexpr float kSteamQuiet_s = 0.2f, kCutQuiet_s = 0.1f, kQuarantineQuiet_s = 1.0f;
 constexpr float kCutReport_m = 5e-4f;  ///< A cut event per half millimetre.
 
-constexpr float kHookWarm = 2.0f;  ///< Metal that is no warmer than this does nothing to tissue [K].
+/// Below this excess temperature the metal's heat exchange with tissue is neglected [K].
+constexpr float kHookWarm = 2.0f;
 
 float DurationOf(const TipInput& tip, float dt_s) { return tip.duration_s > 0.0f ? tip.duration_s : dt_s; }
 float Duration(std::span<const TipInput> tips, float dt_s) {
@@ -24,7 +26,7 @@ float Duration(std::span<const TipInput> tips, float dt_s) {
   return sum;
 }
 
-/// With the tissue beneath computed, the sheet's own sink to it goes.
+/// If the tissue beneath is computed, the sheet's sink to it is set to 0: the contact with the volume replaces it.
 ThermalParams SheetParams(ThermalParams params) {
   if (params.volume != 0) params.h_below_W_m2K = 0;
   return params;
@@ -54,7 +56,7 @@ ThermalSolver::ThermalSolver(const SheetScene& scene)
 
 bool ThermalSolver::Idle(std::span<const TipInput> tips) const {
   const bool below_idle = volume_ == nullptr || volume_->idle();
-  // Metal that is as warm as the tissue does nothing to it.
+  // Metal at the temperature of the tissue exchanges no heat with it.
   const bool hot_metal = std::abs(source_.interface().hook_theta) > kHookWarm;
   const bool acts = std::any_of(tips.begin(), tips.end(),
                                 [&](const TipInput& tip) { return tip.active || (tip.touching && hot_metal); });
@@ -108,8 +110,8 @@ void ThermalSolver::Tear(std::span<const std::uint8_t> torn_edges) {
   }
 }
 
-/// Cells and mesh agree, so an edge is torn by taking a line of cells out of its strand, and these lines are joined
-/// across the triangles between them: one crack, over which neither heat nor current goes.
+/// Cells and mesh must agree, so a torn edge is severed by removing a line of cells across its strand. These lines are
+/// joined across the triangles between them to one crack, which conducts neither heat nor current.
 void ThermalSolver::StageTears() {
   if (tears_.empty()) return;
   RemovedBox taken;
@@ -152,9 +154,9 @@ void ThermalSolver::AccurateFrame(std::span<const TipInput> tips, float dt_s) {
 
 void ThermalSolver::PaperFrame(std::span<const TipInput> tips, float dt_s) {
   const TipInput tip = tips.empty() ? TipInput{} : tips.back();
-  // The voltage is that of the mode, whatever power was asked.
+  // The paper's electrode has a fixed voltage, so the set power has no influence.
   const float voltage = tip.active ? MakeDrive(params_, tip.mode, tip.power_W).v_max_V : 0.0f;
-  if (tip.active) AddWay(tip.path, tip.mode);
+  if (tip.active) AddPath(tip.path, tip.mode);
   if (tip.active) paper_->Heat(&field_, {tip.path.from, tip.path.radius_m, voltage, tip.path.tented}, dt_s, &ledger_);
   figures_.substeps = field_.Diffuse(dt_s, &ledger_);
   StageTears();
@@ -179,7 +181,7 @@ void ThermalSolver::ApplySource(std::span<const TipInput> tips, float dt_s, floa
     if (!(b > a) || !(tip.active || (tip.touching && hot_metal))) continue;
     const TipPath part = PartOf(tip.path, a, b);
     const Drive drive = tip.active ? MakeDrive(params_, tip.mode, tip.power_W) : Drive{};
-    if (tip.active) AddWay(part, tip.mode);
+    if (tip.active) AddPath(part, tip.mode);
     source_.Run(&field_, part, drive, (b - a) * length_s, &ledger_);
     if (volume_ != nullptr && tip.active) AddLeakHeat((b - a) * length_s);
   }
@@ -214,7 +216,8 @@ void ThermalSolver::QuarantineBadDamage(Tile* tile) {
     if (std::isfinite(s.omega_cell[k] + s.omega_collagen[k] + s.charred[k])) continue;
     s.omega_cell[k] = s.omega_collagen[k] = s.charred[k] = 0;
     field_.TakeOut(tile, k, kQuarantined, &ledger_.quarantined);
-    s.enthalpy[k] = std::numeric_limits<float>::quiet_NaN();  // its heat is booked; this has the cell counted below
+    s.enthalpy[k] =
+        std::numeric_limits<float>::quiet_NaN();  // its heat is booked; NaN makes RefreshTheta() count the cell
   }
   field_.RefreshTheta(tile, &ledger_);
 }
@@ -244,19 +247,19 @@ void ThermalSolver::UpdateTopology() {
   committed_ = topology_.Commit();
 }
 
-/// Each frame between two commits looks at its share of the tiles, so that each tile is looked at once per commit.
+/// Each frame between two commits evaluates its share of the tiles, so that each tile is evaluated once per commit.
 void ThermalSolver::StageShrink() {
   constexpr int kShares = kCommitFrames - 1;
   const int share = static_cast<int>(frame_ % kCommitFrames) - 1;
   for (const Tile* tile : field_.awake()) {
-    // Collagen does not change below this; see DamageModel.
+    // Below kDamageStart collagen does not change; see DamageModel.
     const bool due = (tile->tx + 2 * tile->ty) % kShares == share;
     if (due && tile->theta_max > kDamageStart) topology_.StageShrink(field_, *tile);
   }
 }
 
-void ThermalSolver::AddWay(const TipPath& path, CauteryMode mode) {
-  if (mode == CauteryMode::kCut || mode == CauteryMode::kBlend) cut_meter_.AddWay(path.from, path.to);
+void ThermalSolver::AddPath(const TipPath& path, CauteryMode mode) {
+  if (mode == CauteryMode::kCut || mode == CauteryMode::kBlend) cut_meter_.AddPath(path.from, path.to);
 }
 
 void ThermalSolver::UpdateCutMeter(const RemovedBox& removed) {
@@ -264,7 +267,7 @@ void ThermalSolver::UpdateCutMeter(const RemovedBox& removed) {
   cut_meter_.Update(field_, removed.low, removed.high);
   figures_.cut_width_p50_m = cut_meter_.width_p50_m();
   figures_.cut_width_p95_m = cut_meter_.width_p95_m();
-  figures_.cut_off_way_m = cut_meter_.off_way_p95_m();
+  figures_.cut_off_way_m = cut_meter_.off_path_p95_m();
 }
 
 void ThermalSolver::FollowLength(float dt_s) {

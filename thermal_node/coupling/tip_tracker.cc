@@ -16,10 +16,10 @@ bool TipTracker::Accepts(const CauteryContact& sample) const {
 
 TipInput TipTracker::Advance(const CauteryContact& sample, const GeneratorDemand& demand, double dt_s) {
   TipInput input;
-  // The first sample, one after a gap and one from before the last stand for a frame.
+  // The duration of the first sample, of one after a gap and of one older than the last is a frame's time step.
   const double since_s = sample.session_time_s - last_s_;
   const bool follows = last_s_ >= 0 && since_s > 0 && since_s <= kLongestGap_s;
-  // After a sample without current the time at which the pedal went down is unknown.
+  // After a sample without current the time at which the pedal was pressed is unknown, so at most a frame is applied.
   input.duration_s = static_cast<float>(!follows ? dt_s : energised_ ? since_s : std::min(since_s, dt_s));
   on_path_ = on_path_ && follows;
   last_s_ = sample.session_time_s;
@@ -34,7 +34,7 @@ TipInput TipTracker::Advance(const CauteryContact& sample, const GeneratorDemand
       !on_path_ || (sample.footprint.width > 0) != (print_.width > 0) || (sample.material - at_).norm() > reach;
   input.path.from = jumped ? sample.material : at_;
   input.path.begin = jumped ? sample.footprint : print_;
-  input.path.way = input.path.to - input.path.from;
+  input.path.displacement = input.path.to - input.path.from;
   const float radius = sample.contact_radius_m > 0 ? sample.contact_radius_m : default_radius_m_;
   input.path.radius_m = std::clamp(radius, kContactRadiusMin_m, kContactRadiusMax_m);
   input.path.tented = sample.tented;

@@ -1,4 +1,4 @@
-// Turns CauteryContact samples into the tip's path per frame.
+// Converts CauteryContact samples into paths of the tip.
 #pragma once
 
 #include "services/base/core/generator_inputs.h"
@@ -7,40 +7,42 @@
 
 namespace fulcrum::thermal {
 
-/// Between two energised samples the electrode went straight and had its current, however late the second one comes.
-/// After a longer gap a new path begins.
+/// Two energised samples up to this far apart are joined by a straight path with current, however late the second one
+/// arrives; so lost samples leave no bridge in the slit. After a longer gap a new path begins [s].
 inline constexpr double kLongestGap_s = 1.0;
-inline constexpr float kTipSpeedMax_m_s = 0.3f;  ///< Farther between two samples is a jump, not a cut.
+/// Faster motion between two samples is a jump and cuts nothing [m/s].
+inline constexpr float kTipSpeedMax_m_s = 0.3f;
 inline constexpr float kContactRadiusMin_m = 1e-4f, kContactRadiusMax_m = 2e-3f;
 
-/// What the electrode does from one sample of its contact to the next.
+/// Motion and state of the electrode from one sample of its contact to the next.
 struct TipInput {
   bool active = false;    ///< Touching, energised, with power.
   bool touching = false;  ///< The metal is on the tissue, energised or not.
   TipPath path;
   CauteryMode mode = CauteryMode::kOff;
   float power_W = 0;
-  float duration_s = 0;  ///< 0: as long as the frame.
+  float duration_s = 0;  ///< [s]; 0: the frame's time step.
 };
-/// Samples of one frame at most; more wait for the next one.
+/// Maximum number of samples in one frame; further samples stay queued for the next one.
 inline constexpr std::size_t kMostSamples = 8;
 
 class TipTracker {
  public:
   TipTracker(const Sheet& sheet, float default_radius_m) : sheet_(sheet), default_radius_m_(default_radius_m) {}
 
-  /// The next sample. Its path runs from where the last one ended, for the session time between the two: what the
-  /// tissue gets does not depend on when samples arrive.
-  /// @param demand of the generator at the sample's time.
+  /// Converts the next sample. Its path starts at the end of the last one and lasts for the session time between the
+  /// two, so the heat does not depend on when samples arrive.
+  /// @param demand mode and set power at the sample's time.
   [[nodiscard]] TipInput Advance(const CauteryContact& sample, const GeneratorDemand& demand, double dt_s);
-  /// False: out of range or off the sheet; such a sample must not reach Advance.
+  /// Returns false for a sample that is out of range or off the sheet; it must not be passed to Advance.
   [[nodiscard]] bool Accepts(const CauteryContact& sample) const;
-  /// The way to this sample has been gone: a physics node that was started again repeats the last tenth of a second.
+  /// Returns true if the path to this sample has been applied already: a restarted physics node repeats the last tenth
+  /// of a second.
   [[nodiscard]] bool Repeats(const CauteryContact& sample) const {
     return sample.session_time_s < last_s_ && sample.session_time_s > last_s_ - kLongestGap_s;
   }
 
-  /// The last sample, for checkpoints: a process that was away goes on from where the metal was. Copied byte by byte.
+  /// Last sample, for checkpoints: a restarted process continues the path from there. Copied byte by byte.
   struct State {
     double last_s = -1;
     std::array<float, 2> at{};
@@ -51,7 +53,7 @@ class TipTracker {
     std::array<std::uint8_t, 6> unused{};
   };
   [[nodiscard]] State Save() const;
-  /// False, and nothing is changed, when no tracker can have been in this state.
+  /// Returns false, and changes nothing, if no tracker can have been in this state.
   [[nodiscard]] bool Restore(const State& state);
 
  private:

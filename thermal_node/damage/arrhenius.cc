@@ -17,7 +17,7 @@ struct TileRates {
   float theta_char;
 };
 
-/// Both integrals and charring of cells in a row.
+/// Advances both integrals and charring of the cells of a row.
 [[gnu::always_inline]] inline void DamageCells(const TileRates& rates, float dt_s, int count,
                                                const float* __restrict theta, float* __restrict cell,
                                                float* __restrict collagen, float* __restrict charred) {
@@ -46,7 +46,7 @@ bool DamageTile(Tile* tile, TileRates rates, float dt_s) {
     std::uint32_t warm = 0, odd = 0;
     for (int i = 0; i < kTile; ++i) warm |= theta[i] >= kDamageStart ? 1u : 0u;
     if (warm == 0) continue;
-    // 0 times a number is 0.
+    // 0 times a finite value is 0, 0 times NaN or infinity is NaN.
     for (int i = 0; i < kTile; ++i) odd |= 0.0f * (cell[i] + collagen[i] + charred[i]) == 0.0f ? 0u : 1u;
     if (odd == 0) {
       DamageCells(rates, dt_s, kTile, theta, cell, collagen, charred);

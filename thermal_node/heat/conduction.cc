@@ -1,4 +1,17 @@
-// The explicit step of HeatField: conductances, fluxes, temperatures.
+// Kernels of HeatField's explicit step: conductances, fluxes, temperatures.
+//
+//   dH_c/dt = 1/(sqrt(g) W) (sum over faces of F - sum over faces of F') - loss theta_c,   theta = H / rc(water)
+//   f = G (theta_a - theta_b),   F = clamp(f - f'' / 12, 0, gain f)
+//   G = d k_ab sqrt(g) g^nn,   k_ab = 2 k_a k_b / (k_a + k_b)
+//
+// H enthalpy of cell c [J/m^3], theta temperature above body temperature [K], rc heat capacity [J/(m^3 K)], k thermal
+// conductivity [W/(m K)], d thickness of the sheet [m], g metric of the rest shape over material space (n: s or t),
+// W = cell_m^2 d volume of a cell in material space [m^3], f two-point flux through the face from a to b, f'' its
+// second difference along the line of faces, F inflow, F' outflow, loss sink per kelvin [W/(m^3 K)]. The arrays hold
+// G / W, so fluxes are in W/m^3.
+//
+// Stencil: five cells along s and five along t; with shear also the two cells at the ends of one diagonal, the one
+// that the sign of g^st selects, with two-point fluxes.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,10 +25,10 @@ namespace {
 /// Harmonic mean; 0 when either side does not conduct. The guard only turns 0/0 into 0.
 inline float Harmonic(float a, float b) { return 2.0f * a * b / (a + b + std::numeric_limits<float>::min()); }
 
-/// Flux through a face from the two-point fluxes of it and of those before and behind it on its line. The divergence of
-/// f - f'' / 12 is of fourth order where f is smooth. Kept between 0 and `gain` times the two-point flux, as which
-/// it is never more than a conductance times the difference of its two cells: so the maximum principle holds, closed
-/// faces stay closed, and both sides of the face see the same.
+/// Flux through a face from its two-point flux and those of the faces before and after it on its line. The divergence
+/// of f - f'' / 12 is of fourth order where f is smooth. The result is limited to between 0 and `gain` times the
+/// two-point flux, so it remains a conductance times the difference of the two cells: the maximum principle holds,
+/// closed faces stay closed, and both cells of the face get the same flux.
 [[gnu::always_inline]] inline float FourthOrder(float before, float flux, float after, float gain) {
   const float f = (14.0f / 12.0f) * flux - (1.0f / 12.0f) * (before + after);
   const float most = gain * flux;
@@ -24,15 +37,16 @@ inline float Harmonic(float a, float b) { return 2.0f * a * b / (a + b + std::nu
   return above < high ? above : high;
 }
 
-/// The two directions of a diagonal link.
+/// Conductance of a diagonal link along the main diagonal (stored with positive sign) and the antidiagonal (negative).
 [[gnu::always_inline]] inline float Main(float link) { return link > 0.0f ? link : 0.0f; }
 [[gnu::always_inline]] inline float Anti(float link) { return link < 0.0f ? -link : 0.0f; }
 
-/// Rows of the tile: enthalpy <- enthalpy + dt dH/dt, with `loss` = dt times the sink per kelvin. In the last stage the
-/// result is the mean of that and of the enthalpy before the step, which has the weight `first`; see DiffuseIsland.
+/// One stage for the rows of the tile: enthalpy <- enthalpy + dt dH/dt, with `loss` = dt times the sink per kelvin. In
+/// the last stage the result is averaged with the enthalpy before the step, whose weight is `first`; see DiffuseIsland.
 template <bool kLast, bool kSheared>
 [[gnu::always_inline]] inline void Stage(Tile* tile, float dt_s, float gain, float loss, float first) {
-  // Each pass over the whole tile: what is read with a shift right after it was written waits for the store.
+  // Each pass covers the whole tile: a shifted read of values that were just written would stall until the store has
+  // completed.
   alignas(64) float across_s[kTile * kFaceStride], across_t[(kTile + 3) * kTile], face_s[kTile * kFaceStride];
   for (int j = -1; j <= kTile + 1; ++j) {
     const float* __restrict t = &tile->theta[ThetaIndex(0, j)];
@@ -93,7 +107,7 @@ void LastStageSheared(Tile* tile, float dt_s, float gain, float loss, float firs
   Stage<true, true>(tile, dt_s, gain, loss, first);
 }
 
-/// theta with its column sums and extremes; rc = rc_dry + water * rc_water.
+/// Computes theta, its column sums and extremes; rc = rc_dry + water * rc_water.
 FULCRUM_WIDE
 void ThetaOf(Tile* tile, float rc_dry, float rc_water) {
   alignas(64) float sum[kTile] = {}, high[kTile] = {}, low[kTile] = {}, odd[kTile] = {};
@@ -117,8 +131,8 @@ void ThetaOf(Tile* tile, float rc_dry, float rc_water) {
   tile->water_off = *std::max_element(odd, odd + kTile);
 }
 
-/// theta between the stages with its column sums. What is no number must not reach the neighbours in the next stage; it
-/// is taken out after the last.
+/// Computes theta and its column sums between the stages. Values that are not finite are replaced by 0, so that the
+/// next stage does not spread them to neighbours; the cells are quarantined after the last stage.
 FULCRUM_WIDE
 void MiddleThetaOf(Tile* tile, float rc_dry, float rc_water) {
   alignas(64) float sum[kTile] = {};
@@ -140,8 +154,8 @@ void MiddleThetaOf(Tile* tile, float rc_dry, float rc_water) {
 /// A field of cells with the halo of theta.
 using Padded = std::array<float, kThetaCount>;
 
-/// Copies what the eight neighbours have next to the tile into the halo of a padded field; value(tile, i, j). Where
-/// there is none the halo becomes 0, or stays as it was.
+/// Fills the halo of a padded field with value(tile, i, j) of the adjacent cells of the eight neighbours. Without a
+/// neighbour the halo is set to 0 (`clear`) or left unchanged.
 template <class Value>
 void FillHalo(const std::array<const Tile*, 9>& around, const Value& value, bool clear, float* field) {
   for (int n = 0; n < 9; ++n) {
@@ -158,7 +172,7 @@ void FillHalo(const std::array<const Tile*, 9>& around, const Value& value, bool
   }
 }
 
-/// Conductivity of each cell into `out`, 0 where there is no tissue; k = k_dry + water * k_water.
+/// Writes the thermal conductivity of each cell to `out`, 0 where there is no tissue; k = k_dry + water * k_water.
 FULCRUM_WIDE
 void ConductivityOf(const TileState& state, float k_dry, float k_water, float* out) {
   for (int j = 0; j < kTile; ++j) {
@@ -189,7 +203,8 @@ void FacesOf(Tile* tile, float scale) {
   }
 }
 
-/// Heat goes around a corner only through tissue: 0 where both other cells of the corner are gone.
+/// Heat is conducted across a corner only along tissue: the link is 0 if neither of the two other cells at the corner
+/// is tissue.
 FULCRUM_WIDE
 void LinksOf(Tile* tile, float scale) {
   for (int j = 0; j <= kTile; ++j) {
@@ -205,7 +220,7 @@ void LinksOf(Tile* tile, float scale) {
   }
 }
 
-/// Rate of the explicit step with two-point fluxes.
+/// Rate of the explicit step with two-point fluxes, in each cell [1/s].
 FULCRUM_WIDE
 void RatesOf(Tile* tile, float rc_dry, float rc_water, float sink) {
   for (int j = 0; j < kTile; ++j) {
@@ -240,7 +255,7 @@ void SetGeometry(const Sheet& sheet, Tile* tile) {
   const auto at = [&](float x, float y) {
     return sheet.MetricAt(static_cast<float>(tile->tx * kTile) + x, static_cast<float>(tile->ty * kTile) + y);
   };
-  // What diagonal links carry they take from the faces around them: both must not fall below 0.
+  // The conductance of diagonal links is subtracted from the faces around them; neither may become negative.
   const auto shear_at = [&](int i, int j) {
     const SurfaceMetric g = at(static_cast<float>(i), static_cast<float>(j));
     const float most = std::min(g.ss, g.tt) / g.area(), b = -g.st / g.area();
@@ -291,7 +306,7 @@ std::array<const Tile*, 9> HeatField::Around(const Tile& tile) const {
 void HeatField::ComputeConductivity(Tile* tile) {
   alignas(64) Padded now;
   ConductivityOf(tile->state, material_.k_dry, material_.k_wet - material_.k_dry, now.data());
-  // Neighbours look at two cells from the border.
+  // Faces of neighbours depend on the two cells next to the border.
   std::array<bool, 9> changed{};
   for (int j = 0; j < kTile; ++j) {
     const float* before = &tile->conductivity[ThetaIndex(0, j)];
@@ -352,8 +367,7 @@ void HeatField::LimitFaces(Tile* tile, float rate) {
 }
 
 void HeatField::ExchangeHalos(Tile* tile) {
-  // To an absent or sleeping neighbour every face is closed, so the old value there does no harm, as long as it is
-  // finite: it is.
+  // Every face to an absent or sleeping neighbour is closed, so the old value in its halo has no effect; it is finite.
   const std::array<const Tile*, 9> around = Around(*tile);
   float* theta = tile->theta.data();
   for (const auto& [other, to, from] : {std::tuple{around[3], -kHalo, kTile - kHalo}, {around[5], kTile, 0}}) {

@@ -7,7 +7,7 @@
 namespace fulcrum::thermal {
 
 bool IsBlank(const TileState& s) {
-  // Water only goes with heat, and heat that boils or takes out a cell also damages it.
+  // Water and charring need no check: heat that boils water or chars or removes a cell also damages it.
   const auto zero = [](float omega) { return omega == 0.0f; };
   const auto bad = [](std::uint8_t flags) { return (flags & (kRemoved | kQuarantined)) != 0; };
   return s.awake == 0 && std::all_of(s.omega_cell.begin(), s.omega_cell.end(), zero) &&
@@ -94,7 +94,7 @@ void HeatField::Quarantine(Tile* tile, Ledger* ledger) {
 
 void HeatField::TakeOut(Tile* tile, int cell, CellFlag why, double* account) {
   TileState& s = tile->state;
-  // What was not finite cannot be booked as heat; what was, must be.
+  // Finite heat is booked; a value that is not finite cannot be.
   if (std::isfinite(s.enthalpy[cell])) *account += static_cast<double>(s.enthalpy[cell]) * tile->Volume(cell);
   s.enthalpy[cell] = 0;
   s.water[cell] = 0;
@@ -140,7 +140,7 @@ int HeatField::Diffuse(float dt_s, Ledger* ledger) {
 }
 
 void HeatField::CollectIsland(Tile* seed) {
-  // From its lowest tile on, so that the order within an island does not depend on the other islands.
+  // The seed is the tile of lowest index, so the order within an island does not depend on other islands.
   island_.assign(1, seed);
   seed->substeps = 1;
   for (std::size_t n = 0; n < island_.size(); ++n) {
@@ -162,7 +162,7 @@ int HeatField::DiffuseIsland(float dt_s, Ledger* ledger) {
   for (const Tile* tile : island_) rate = std::max(rate, tile->rate);
   const float needed = std::ceil(dt_s * rate / kExplicitLimit);
   const bool stiff = !(needed <= kMaxSubsteps);
-  // In wet tissue waves of four cells and longer should keep their fourth-order fluxes whole.
+  // In wet tissue the limiter must not reduce the fourth-order fluxes of waves of four cells and longer.
   const float wet_rate = 4.0f * material_.k_wet / (material_.rc_wet * material_.cell_m * material_.cell_m);
   const float wanted = std::max(needed, std::ceil(dt_s * kResolvedGain * wet_rate / kExplicitLimit));
   const int substeps = stiff ? kMaxSubsteps : static_cast<int>(std::clamp<float>(wanted, 1, kMaxSubsteps));
@@ -173,7 +173,7 @@ int HeatField::DiffuseIsland(float dt_s, Ledger* ledger) {
   }
   const float gain = stiff ? 1.0f : std::min(kFluxGain, kExplicitLimit / (h * rate));
   for (StageOf stage{0, substeps + 1, h, gain, !stiff}; stage.index < stage.count; ++stage.index) {
-    // Halos first: a tile may then go through all of a stage while it is in the cache.
+    // All halos are exchanged first, so that each tile passes through the whole stage while it is in the cache.
     for (Tile* tile : island_) ExchangeHalos(tile);
     for (Tile* tile : island_) {
       RunStage(tile, stage, ledger);
@@ -195,7 +195,7 @@ int HeatField::DiffuseIsland(float dt_s, Ledger* ledger) {
 }
 
 void HeatField::WakeNeighbours() {
-  // Over a copy: tiles that wake here are cold and need not be asked.
+  // Iterates over a copy: tiles that wake here are cold and wake no neighbours.
   scratch_.assign(awake_.begin(), awake_.end());
   const auto hold = [&](int tx, int ty) {
     if (Tile* tile = Wake(tx, ty)) tile->held = true;
@@ -264,7 +264,7 @@ void HeatField::Restore(int index, const TileState& state) {
   tile->state = state;
   tile->state.awake = 0;
   if (state.awake != 0) Wake(tile->tx, tile->ty);
-  Ledger none;  // a checkpoint holds no bad cells
+  Ledger none;  // unused: a checkpoint holds no bad cells
   RefreshTheta(tile, &none);
 }
 

@@ -1,4 +1,4 @@
-// Where the energy went. Doubles: a run sums millions of small terms.
+// Energy balance of the sheet, in double because a run sums millions of small terms.
 #pragma once
 
 #include <algorithm>
@@ -11,17 +11,18 @@ struct Ledger {
   double joule = 0;        ///< Deposited in the sheet by current.
   double vapour = 0;       ///< Left with steam: latent and sensible heat of the water.
   double removed = 0;      ///< Sensible heat left in cells when they were removed.
-  double debris = 0;       ///< Taken out with crumbs that hung on nothing any more.
-  double hook = 0;         ///< From the hook's metal into the sheet by conduction; negative: the other way.
-  double film = 0;         ///< Of the discharges, what went into the metal and the plume; not in the sheet.
+  double debris = 0;       ///< Removed with crumbs.
+  double hook = 0;         ///< Conducted from the hook's metal into the sheet; negative: from the sheet into the metal.
+  double film = 0;         ///< Heat of the discharges that went into the metal and the plume, not into the sheet.
   double plume = 0;        ///< The part of `film` that left with the plume.
-  double lost = 0;         ///< Through both faces and by perfusion.
-  double dropped = 0;      ///< Given up when a tile fell asleep.
-  double quarantined = 0;  ///< Taken out with cells that went bad.
-  double generator = 0;    ///< Delivered by the generator: joule, film, and what heats the tissue beneath and beyond.
+  double lost = 0;         ///< Lost through both faces and by perfusion.
+  double dropped = 0;      ///< Discarded when a tile fell asleep.
+  double quarantined = 0;  ///< Removed with quarantined cells.
+  /// Delivered by the generator: joule, film, and the heat of the tissue beneath and beyond the window.
+  double generator = 0;
 
   [[nodiscard]] double Out() const { return vapour + removed + debris + lost + dropped + quarantined; }
-  /// |in - out - stored| relative to the input, of the sheet.
+  /// |in - out - stored| of the sheet relative to its input.
   [[nodiscard]] double ClosureError(double stored) const {
     return std::abs(joule + hook - Out() - stored) / std::max(joule + std::abs(hook), 1e-12);
   }

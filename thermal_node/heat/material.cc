@@ -48,7 +48,7 @@ Material MakeMaterial(const ThermalParams& p) {
   m.theta_boil = kBoiling_C - p.body_temperature_C;
   m.rc_wet = p.density_kg_m3 * p.heat_capacity_J_kgK;
   const float water_kg_m3 = p.latent_heat_J_m3 / kWaterHeat_J_kg;
-  // Little water left out of a light tissue must not leave a negative heat capacity behind.
+  // Keeps the heat capacity of dry tissue positive if the water fraction is high for the density.
   m.rc_dry = std::max(m.rc_wet - water_kg_m3 * kWaterHeatCapacity_J_kgK, 0.15f * m.rc_wet);
   m.k_wet = p.conductivity_W_mK;
   m.k_dry = std::min(kDryConductivity_W_mK, p.conductivity_W_mK);

@@ -1,4 +1,4 @@
-// Material of the sheet as the solvers use it, derived once from the scene's ThermalParams.
+// Material of the sheet, derived once from the scene's ThermalParams.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,8 @@ inline constexpr float kWaterHeat_J_kg = 2.257e6f;  ///< Latent heat of boiling 
 inline constexpr float kWaterHeatCapacity_J_kgK = 4180.0f;
 inline constexpr float kBloodHeatCapacity_J_m3K = 4.0e6f;  ///< 1060 kg/m^3 * 3770 J/kgK.
 inline constexpr float kDryConductivity_W_mK = 0.15f;      ///< Desiccated protein; assumed.
-inline constexpr float kDrySigmaFraction = 0.01f;          ///< Electrical conductivity left when dry.
+/// Electrical conductivity of dry tissue relative to wet tissue; assumed.
+inline constexpr float kDrySigmaFraction = 0.01f;
 inline constexpr float kBoiling_C = 100.0f;
 
 /// Constants of one sheet. Temperatures are differences theta = T - T_body [K]. `water` is the fraction of the tissue
@@ -23,16 +24,17 @@ struct Material {
   float theta_boil = 63.0f;      ///< [K]
   float rc_wet = 0, rc_dry = 0;  ///< Volumetric heat capacity [J/m^3K].
   float k_wet = 0, k_dry = 0;    ///< Thermal conductivity [W/mK].
-  float latent = 0;              ///< Of all the water in a volume of tissue [J/m^3].
-  float loss_resting = 0;        ///< Sink per kelvin lying on fat: faces and perfusion [W/m^3K].
-  float loss_tented = 0;         ///< The same lifted off it.
+  float latent = 0;              ///< Latent heat of all water in a volume of tissue [J/m^3].
+  float loss_resting = 0;        ///< Sink per kelvin of a sheet that lies on fat: faces and perfusion [W/m^3K].
+  float loss_tented = 0;         ///< Sink per kelvin of a sheet that is lifted off the fat [W/m^3K].
   float sigma = 0;               ///< Electrical conductivity, wet at body temperature [S/m].
-  float sigma_per_K = 0;
-  float leak_S_m2 = 0;  ///< sigma_fat / H: leak to the tissue beneath.
+  float sigma_per_K = 0;         ///< Relative rise of the electrical conductivity per kelvin [1/K].
+  float leak_S_m2 = 0;           ///< Leak conductance to the tissue beneath: sigma_fat / H, H depth of the fat.
 
   [[nodiscard]] float HeatCapacity(float water) const { return rc_dry + water * (rc_wet - rc_dry); }
   [[nodiscard]] float ThermalConductivity(float water) const { return k_dry + water * (k_wet - k_dry); }
-  /// sigma rises with temperature until boiling and falls by 1/kDrySigmaFraction as the water goes.
+  /// Electrical conductivity [S/m]: rises with temperature up to boiling and falls with the water to kDrySigmaFraction
+  /// of its wet value.
   [[nodiscard]] float ElectricalConductivity(float theta, float water) const {
     return sigma * (1.0f + sigma_per_K * std::clamp(theta, 0.0f, theta_boil)) * std::max(kDrySigmaFraction, water);
   }

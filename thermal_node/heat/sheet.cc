@@ -10,13 +10,13 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// Largest sheet: the atlas at 0.1 mm a texel is 0.41 m; twice that is a wrong unit.
+/// Largest extent of a sheet [m]. The atlas at 0.1 mm per texel is 0.41 m; twice that indicates a wrong unit.
 constexpr float kMaxExtent_m = 0.85f;
 
 Sheet MakeEmpty(const Vec2f& low, const Vec2f& high, float cell) {
   Sheet sheet;
   sheet.cell_m = cell;
-  // A border that falls on a cell face but for rounding must not add a row of slivers.
+  // The tolerance prevents an extra row of cells where a border lies on a cell face except for rounding.
   sheet.origin_x = static_cast<std::int32_t>(std::floor(low.x() / cell + 1e-3f));
   sheet.origin_y = static_cast<std::int32_t>(std::floor(low.y() / cell + 1e-3f));
   sheet.nx = static_cast<int>(std::ceil(high.x() / cell - 1e-3f)) - sheet.origin_x;
@@ -53,7 +53,7 @@ void FillTriangle(Sheet* sheet, const Vec2f& a, const Vec2f& b, const Vec2f& c) 
   }
 }
 
-/// Stretches within their bounds, by the eigenvalues of g.
+/// Limits the stretches, which are the roots of the eigenvalues of g.
 SurfaceMetric Bounded(const SurfaceMetric& g) {
   const float mean = 0.5f * (g.ss + g.tt), half = 0.5f * (g.ss - g.tt);
   const float radius = std::sqrt(half * half + g.st * g.st);
@@ -102,7 +102,7 @@ void MakeLattice(Sheet* sheet) {
   sheet->metric.assign(static_cast<std::size_t>(sheet->metric_x) * sheet->metric_y, SurfaceMetric{});
 }
 
-/// Gives places of the lattice without tissue what their nearest neighbours have.
+/// Gives lattice points without tissue the metric of their nearest neighbours.
 void Spread(const Sheet& sheet, std::vector<std::uint8_t>* known, std::vector<SurfaceMetric>* metric) {
   const int nx = sheet.metric_x, ny = sheet.metric_y;
   for (bool more = true; more;) {
@@ -130,7 +130,7 @@ void Spread(const Sheet& sheet, std::vector<std::uint8_t>* known, std::vector<Su
   }
 }
 
-/// The metric of the grid at the places of the lattice, linear within each of its triangles.
+/// Samples the metric of the mesh at the points of the lattice, linear within each triangle.
 void MeasureMetric(const SheetScene& scene, Sheet* sheet) {
   const MembraneGrid& grid = scene.membrane;
   const std::vector<SurfaceMetric> at_node = NodeMetric(scene);

@@ -1,5 +1,4 @@
-// The membrane as cells in material space: where its tiles lie, which cells carry tissue, and how long a cell is on
-// the rest shape.
+// The membrane as cells in material space: place of its tiles, cells that are tissue, and rest lengths of the cells.
 #pragma once
 
 #include <cmath>
@@ -27,15 +26,18 @@ struct SurfaceMetric {
 
   [[nodiscard]] float area() const { return std::sqrt(ss * tt - st * st); }  ///< Rest area over material area.
 };
-inline constexpr float kStretchMin = 0.5f, kStretchMax = 2.0f;  ///< Keeps the explicit step bounded on bad maps.
-inline constexpr int kMetricStep = 8;                           ///< Cells between the places where it is stored.
+inline constexpr float
+    kStretchMin = 0.5f,
+    kStretchMax = 2.0f;  ///< Limits of the stretch; they bound the rate of the explicit step on degenerate maps.
+inline constexpr int kMetricStep = 8;  ///< Spacing of the stored metric [cells].
 
 struct Sheet {
   float cell_m = 1e-4f;
   std::int32_t origin_x = 0, origin_y = 0;  ///< Global index floor(s / cell_m) of cell (0, 0).
   int nx = 0, ny = 0;                       ///< Cells.
   int tiles_x = 0, tiles_y = 0;
-  /// At the corners of blocks of kMetricStep cells, metric_x to a row; bilinear between. Empty: isometric.
+  /// Metric at the corners of blocks of kMetricStep cells, metric_x to a row; interpolated bilinearly. Empty:
+  /// isometric.
   std::vector<SurfaceMetric> metric;
   int metric_x = 0, metric_y = 0;
   std::vector<std::uint8_t> outside;  ///< Bit field over tiles_x*kTile by tiles_y*kTile: no tissue there.
@@ -47,7 +49,7 @@ struct Sheet {
   }
   [[nodiscard]] CellIndex CellOf(const Vec2f& material) const;
   [[nodiscard]] Vec2f CentreOf(CellIndex cell) const;
-  /// At a place in cells from the sheet's origin; beyond the border as at the border.
+  /// Metric at a place, in cells from the sheet's origin; beyond the border that of the border.
   [[nodiscard]] SurfaceMetric MetricAt(float x, float y) const;
   /// True when the point lies on tissue.
   [[nodiscard]] bool OnSheet(const Vec2f& material) const;
@@ -58,8 +60,8 @@ struct Sheet {
 [[nodiscard]] Sheet MakeSheet(const SheetScene& scene);
 /// A flat rectangle with its corner at (0, 0) [m].
 [[nodiscard]] Sheet MakeFlatSheet(float width_m, float height_m, float cell_m);
-/// Sets the metric from a function of material coordinates [m]. What is not finite becomes isometric; stretches are
-/// held within [kStretchMin, kStretchMax].
+/// Sets the metric from a function of material coordinates [m]. A metric that is not finite becomes isometric;
+/// stretches are limited to [kStretchMin, kStretchMax].
 void SetMetric(Sheet* sheet, const std::function<SurfaceMetric(const Vec2f&)>& metric_at);
 
 }  // namespace fulcrum::thermal

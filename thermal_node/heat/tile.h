@@ -1,4 +1,4 @@
-// A tile of 32 x 32 cells: the state that survives sleep and the scratch of the explicit step.
+// A tile of 32 x 32 cells: the state that is kept during sleep and the scratch of the explicit step.
 #pragma once
 
 #include <array>
@@ -12,11 +12,11 @@ namespace fulcrum::thermal {
 enum CellFlag : std::uint8_t {
   kRemoved = 1,      ///< Vaporised: a hole.
   kOutside = 2,      ///< Never was tissue.
-  kQuarantined = 4,  ///< Held a number that was not finite; taken out of the computation.
+  kQuarantined = 4,  ///< Held a value that was not finite or not plausible; excluded from the computation.
 };
 inline constexpr std::uint8_t kNoTissue = kRemoved | kOutside | kQuarantined;
 
-/// Cells of a neighbouring tile that a face's flux looks at.
+/// Cells of a neighbouring tile that a face's flux depends on.
 inline constexpr int kHalo = 2;
 /// Padded layout of theta: two halo rows above and below, eight floats left and right so that rows stay aligned.
 inline constexpr int kThetaStride = kTile + 16;
@@ -33,7 +33,7 @@ inline constexpr int Corner(int i, int j) { return j * kCornerStride + i; }
 template <class T>
 using CellArray = std::array<T, kTileCells>;
 
-/// What a sleeping tile keeps and a checkpoint holds, cell (i, j) at j * kTile + i.
+/// State that a sleeping tile keeps and a checkpoint holds, cell (i, j) at j * kTile + i.
 struct TileState {
   alignas(64) CellArray<float> enthalpy{};  ///< Sensible heat above body temperature [J/m^3].
   CellArray<float> water{};                 ///< Fraction of the tissue water left.
@@ -47,9 +47,10 @@ struct TileState {
 
 /// The map from material space to the rest shape, at the cells, faces and corners of a tile.
 struct TileGeometry {
-  alignas(64) CellArray<float> area{};                            ///< sqrt(g).
-  alignas(64) CellArray<float> inverse_area{};                    ///< 1 / sqrt(g).
-  alignas(64) std::array<float, kTile * kFaceStride> across_s{};  ///< sqrt(g) g^ss at FaceS, less what corners carry.
+  alignas(64) CellArray<float> area{};          ///< sqrt(g).
+  alignas(64) CellArray<float> inverse_area{};  ///< 1 / sqrt(g).
+  /// sqrt(g) g^ss at FaceS, less the share of diagonal links.
+  alignas(64) std::array<float, kTile * kFaceStride> across_s{};
   alignas(64) std::array<float, (kTile + 3) * kTile> across_t{};  ///< sqrt(g) g^tt at FaceT, likewise.
   std::vector<float> shear;                                       ///< sqrt(g) g^st at Corner; empty: none.
 };
@@ -57,12 +58,12 @@ struct TileGeometry {
 struct Tile {
   TileState state;
   int tx = 0, ty = 0, index = 0;
-  float flat_volume = 0;  ///< Of a cell in material space [m^3].
+  float flat_volume = 0;  ///< Volume of a cell in material space [m^3].
   TileGeometry geometry;
 
   /// theta [K] with a halo; equals enthalpy / heat capacity at all times between calls.
   alignas(64) std::array<float, kThetaCount> theta{};
-  /// [W/mK], likewise; 0 where there is no tissue.
+  /// Thermal conductivity with a halo [W/mK]; 0 where there is no tissue.
   alignas(64) std::array<float, kThetaCount> conductivity{};
   /// Conductance over flat_volume of the face between cells (i-1, j) and (i, j), at FaceS [W/(K m^3)].
   alignas(64) std::array<float, kTile * kFaceStride> face_s{};
@@ -75,21 +76,21 @@ struct Tile {
   alignas(64) CellArray<float> cell_rate{};  ///< Rate of the explicit step with two-point fluxes in each cell [1/s].
   alignas(64) std::array<float, kTile> theta_sum{};  ///< Column sums of theta times area.
   float theta_max = 0, theta_min = 0;
-  float water_off = 0;         ///< Largest distance of the water from 0.5; above that it is no fraction.
+  float water_off = 0;         ///< Largest |water - 0.5|; above 0.5 the water of a cell is not a fraction.
   float rate = 0;              ///< The largest of cell_rate.
-  int substeps = 0;            ///< Of its island in the last step.
-  bool material_stale = true;  ///< Its conductivity has changed.
-  bool faces_stale = true;     ///< Its faces have to be built again.
+  int substeps = 0;            ///< Substeps of the tile's island in the last step.
+  bool material_stale = true;  ///< Conductivities have changed.
+  bool faces_stale = true;     ///< Conductances of faces must be recomputed.
   bool patch_stale = true;     ///< Changed since it was last drawn into a patch.
-  bool held = false;           ///< A warm neighbour touches it: no sleep in this step.
+  bool held = false;           ///< A warm neighbour touches the tile: it must not sleep in this step.
 
-  /// Of a cell on the rest shape [m^3].
+  /// Volume of a cell on the rest shape [m^3].
   [[nodiscard]] float Volume(int cell) const { return flat_volume * geometry.area[cell]; }
   /// Heat of all cells [J].
   [[nodiscard]] double Heat() const;
 };
 
-/// True when the tile sleeps and nothing lasting ever happened in it, so that it need not be stored.
+/// True if the tile sleeps and has no damage or removed cells, so that it need not be stored.
 [[nodiscard]] bool IsBlank(const TileState& state);
 
 }  // namespace fulcrum::thermal

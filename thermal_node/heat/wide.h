@@ -1,8 +1,8 @@
-// Kernels compiled for AVX-512, for AVX2 and for the baseline CPU, chosen when the program is loaded. Element-wise code
-// without contraction gives the same bits in all.
+// FULCRUM_WIDE compiles a kernel for AVX-512, for AVX2 and for the baseline CPU; the loader chooses one. Element-wise
+// code without contraction gives the same bits in all of them.
 #pragma once
 
-// The sanitizers' start-up cannot run the resolvers of cloned functions. Another processor has its baseline only.
+// Resolvers of cloned functions cannot run while a sanitizer starts. Other processors have the baseline only.
 #if !defined(__x86_64__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define FULCRUM_WIDE
 #else

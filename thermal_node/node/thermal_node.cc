@@ -11,11 +11,11 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// A process that was started again has contacts to work off that are older than the first pedal it hears of. It waits
-/// for that, but no longer than this [ns].
+/// A restarted process receives contacts that are older than its first HandleState. It applies them only when the
+/// pedal's state is known, but waits at most this long [ns].
 constexpr std::int64_t kPedalWait_ns = 300'000'000;
 
-/// In front of the solver's part of a checkpoint.
+/// State of the node, stored before the solver's part of a checkpoint.
 struct NodeState {
   TipTracker::State tip;
   GeneratorInputs::State generator;
@@ -59,8 +59,9 @@ void ThermalNode::Step(const Tick& tick) {
   const std::span<const TipInput> tips = TakeContacts(tick);
   TakeTears();
   solver_.Step(tips, static_cast<float>(tick.dt_s));
-  // The manifest first: a replay finds every tick that a checkpoint holds, and sees from the next process's first state
-  // whether the last one reached its checkpoint.
+  // The manifest is published before the checkpoint is written: so a recording has the manifest of every tick that a
+  // checkpoint can hold, and a replay derives from the first state hash after a restart whether the last tick was in
+  // the checkpoint.
   PublishManifest(tick);
   SaveCheckpoint();
   PublishTopology(tick);
@@ -71,14 +72,14 @@ void ThermalNode::Step(const Tick& tick) {
 }
 
 void ThermalNode::TakeGeneratorInputs(const Tick& tick) {
-  bool heard = false;
+  bool received = false;
   while (ports_.handles.TakeNext(&handles_)) {
     generator_.Add(handles_);
-    heard = true;
+    received = true;
   }
   while (ports_.generator.TakeNext(&setting_)) generator_.Add(setting_);
   if (ticks_ == 1) waits_ = restored_;
-  waits_ = waits_ && !heard && tick.stamp_ns < wait_until_ns_;
+  waits_ = waits_ && !received && tick.stamp_ns < wait_until_ns_;
 }
 
 std::span<const TipInput> ThermalNode::TakeContacts(const Tick& tick) {
@@ -115,7 +116,7 @@ bool ThermalNode::Restore(std::span<const std::byte> checkpoint) {
   NodeState state;
   if (checkpoint.size() < sizeof(state)) return false;
   std::memcpy(&state, checkpoint.data(), sizeof(state));
-  // All or nothing: the tip's way goes on from what the solver has cut.
+  // Restored as a whole or not at all: the tip's path must continue where the solver's cut ends.
   TipTracker tracker = tracker_;
   GeneratorInputs generator = generator_;
   return tracker.Restore(state.tip) && generator.Restore(state.generator) &&
@@ -123,7 +124,7 @@ bool ThermalNode::Restore(std::span<const std::byte> checkpoint) {
          generator_.Restore(state.generator);
 }
 
-/// The whole state each time: one that was missed, or one that comes again after a restart, makes no difference.
+/// Each message holds the whole state, so a lost or a repeated one has no effect.
 void ThermalNode::TakeTears() {
   if (!ports_.tears.TakeLatest(&tears_)) return;
   manifest_.consumed.push_back({TopicId::kTearState, tears_.stamp.epoch, tears_.stamp.sequence});
@@ -134,7 +135,7 @@ void ThermalNode::TakeTears() {
   solver_.Tear(tears_.torn_edges);
 }
 
-/// Before anything of a new revision is published: whoever saw a revision can rely on it to survive this process.
+/// Called before a new revision is published, so every revision that a reader has seen survives a restart.
 void ThermalNode::SaveCheckpoint() {
   if (checkpoint_ == nullptr || !solver_.stepped()) return;
   ++frames_since_checkpoint_;
@@ -163,7 +164,7 @@ void ThermalNode::PublishTopology(const Tick& tick) {
   topology_.dead_nodes = mesh.committed().dead_nodes;
   topology_.dead_edges = mesh.committed().dead_edges;
   topology_.shrink = mesh.committed().shrink;
-  // Tried again next tick when it could not be sent.
+  // If the write fails it is repeated in the next tick.
   topology_due_ = !ports_.topology.Write(topology_);
 }
 
@@ -194,14 +195,14 @@ void ThermalNode::PublishPatch(const Tick& tick) {
   patch_note_due_ = patch_note_due_ || solver_.stepped();
   patch_due_ = patch_due_ || ticks_ % kTicksPerPatch == 0;
   history_due_ = history_due_ || ticks_ % kTicksPerHistoryPatch == 0;
-  // Frames that commit have enough to do.
+  // Frames that commit have the most work already.
   if (!patch_due_ || (solver_.stepped() && solver_.at_commit_frame())) return;
   patch_due_ = false;
   const bool readers = ports_.patch.has_readers();
-  const bool came = readers && !patch_readers_;
+  const bool new_reader = readers && !patch_readers_;
   patch_readers_ = readers;
   if (!readers) return;
-  if (patch_note_due_ || came) planner_.Note(solver_.mutable_field(), came);
+  if (patch_note_due_ || new_reader) planner_.Note(solver_.mutable_field(), new_reader);
   patch_note_due_ = false;
   std::optional<PatchPlace> place = planner_.Next(solver_.field());
   if (!place && history_due_) place = planner_.NextOfHistory();
@@ -230,7 +231,7 @@ void ThermalNode::NoteHealth() {
   Figures f{};
   f.solver = solver_.figures();
   f.delivered_J = solver_.ledger().generator;
-  // Summing up the heat takes as long as a substep of it.
+  // The sum over all cells takes as long as a substep of conduction, so it is not computed in every tick.
   if (ticks_ % kTicksPerClosure == 0) closure_ = solver_.ledger().ClosureError(solver_.field().Stored());
   f.closure = closure_;
   f.revision = solver_.topology().revision();

@@ -20,14 +20,14 @@
 
 namespace fulcrum::thermal {
 
-/// A patch is due every this many ticks: 25 Hz at 100 Hz, above what a monitor's eye follows in colour.
+/// A patch is due every this many ticks: 25 Hz at 100 Hz, faster than the eye resolves changes of colour.
 inline constexpr std::uint64_t kTicksPerPatch = 4;
-inline constexpr std::uint64_t kTicksPerClosure = 10;  ///< Of the energy for Health.
-/// When nothing changes, one old patch goes out this often, for readers that came late.
+inline constexpr std::uint64_t kTicksPerClosure = 10;  ///< Ticks between computations of the energy closure for Health.
+/// While nothing changes, one old patch is published every this many ticks, for late joiners.
 inline constexpr std::uint64_t kTicksPerHistoryPatch = 100;
-/// A checkpoint at each new revision, and this often while the tissue is warm [frames of the solver].
+/// A checkpoint is written at each new revision, and every this many frames of the solver while tissue is warm.
 inline constexpr std::uint64_t kFramesPerCheckpoint = 10;
-/// Changes with the layout of the checkpoint.
+/// Version of the checkpoint's layout; must change with it.
 inline constexpr std::uint32_t kCheckpointLayout = 7;
 
 class ThermalNode {
@@ -44,8 +44,8 @@ class ThermalNode {
     bus::Output<TickManifest>& manifest;
   };
 
-  /// Scene, ports and checkpoint must outlive the node. Goes on from the checkpoint when it holds something.
-  /// @param checkpoint null: nothing is kept.
+  /// Scene, ports and checkpoint must outlive the node. Continues from the checkpoint if it holds a valid state.
+  /// @param checkpoint null: no checkpoints are written or read.
   /// @param epoch_ns CLOCK_MONOTONIC at the start of the process [ns].
   ThermalNode(const SceneView& scene, const Ports& ports, runtime::CheckpointFile* checkpoint, std::int64_t epoch_ns);
 
@@ -54,25 +54,25 @@ class ThermalNode {
   /// One period. Always called by the same thread.
   void Step(const Tick& tick);
 
-  /// Metrics and last error. Any thread.
+  /// Fills metrics and last error. May be called from any thread.
   void FillHealth(Health* health) const;
 
   [[nodiscard]] const ThermalSolver& solver() const { return solver_; }
-  /// The set power that Health tells has changed since this was last asked. The thread of Step.
+  /// Returns true once after each change of the set power in Health. Call from the thread of Step.
   [[nodiscard]] bool TakeSettingChanged() { return std::exchange(setting_changed_, false); }
-  /// It went on from a checkpoint.
+  /// True if the node continued from a checkpoint.
   [[nodiscard]] bool restored() const { return restored_; }
 
  private:
   void TakeGeneratorInputs(const Tick& tick);
-  /// What the electrode did since the last tick.
+  /// Reads the contact samples since the last tick and converts them to motions of the tip.
   [[nodiscard]] std::span<const TipInput> TakeContacts(const Tick& tick);
-  /// What has torn; only what is new.
+  /// Reads the torn edges, if a new message arrived.
   void TakeTears();
   void SaveCheckpoint();
   [[nodiscard]] bool Restore(std::span<const std::byte> checkpoint);
   void PublishTopology(const Tick& tick);
-  /// While the hook touches: what has changed around it.
+  /// Publishes the removed cells around the hook while it touches tissue, if they have changed.
   void PublishOpenCells(const Tick& tick);
   void PublishEvents(const Tick& tick);
   void PublishPatch(const Tick& tick);
@@ -99,14 +99,14 @@ class ThermalNode {
   std::vector<CauteryContact> contacts_;
   std::vector<TipInput> tips_;
   TopologyState topology_;
-  OpenCells open_cells_, open_now_;  ///< As published, and as they are.
+  OpenCells open_cells_, open_now_;  ///< Last published, and current.
   TearState tears_;
   HandleState handles_;
   GeneratorSetting setting_;
   TickManifest manifest_;
   std::uint64_t ticks_ = 0, refused_ = 0, frames_since_checkpoint_ = 0;
-  std::int64_t wait_until_ns_ = 0;  ///< For the first HandleState, of a process that was started again.
-  float set_power_W_ = 0;           ///< As Health tells it.
+  std::int64_t wait_until_ns_ = 0;  ///< End of a restarted process's wait for the first HandleState.
+  float set_power_W_ = 0;           ///< Last value stored for Health.
   bool waits_ = false, setting_changed_ = false, no_setting_ = false;
   bool restored_ = false, topology_due_ = true, patch_readers_ = false, patch_due_ = false, history_due_ = false,
        patch_note_due_ = false;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kTextureTiles = kTexture / kTile;
 
-/// Adds scale * heat, as far as `limit` lets it.
+/// Adds scale * heat up to the value `limit`.
 FULCRUM_WIDE
 void AddHeat(float scale, float limit, const float* __restrict heat, float* __restrict enthalpy) {
   for (int i = 0; i < kTile; ++i) {
@@ -30,7 +30,7 @@ Material MakePaperMaterial(const ThermalParams& params) {
   Material m = MakeMaterial(params);
   m.rc_dry = m.rc_wet;
   m.k_wet = m.k_dry = kPaperDiffusivity_m2_s * m.rc_wet;
-  m.theta_boil = kThetaPlausible;  // out of reach: no latent heat
+  m.theta_boil = kThetaPlausible;  // never reached: no latent heat
   m.sigma_per_K = 0;
   m.leak_S_m2 = 0;
   return m;
@@ -62,7 +62,7 @@ CellIndex PaperModel::CellOfNode(Index node) const {
 void PaperModel::MoveTo(CellIndex corner) {
   if (corner == corner_) return;
   const int di = corner.ix - corner_.ix, dj = corner.iy - corner_.iy;
-  // A touch-down elsewhere shares nothing with the last potential.
+  // After a touch-down elsewhere the last potential is no useful start value.
   const bool near = std::abs(di) < kTexture / 4 && std::abs(dj) < kTexture / 4;
   near ? potential_.Shift(di, dj) : potential_.Clear();
   corner_ = corner;
@@ -106,7 +106,7 @@ void PaperModel::PlaceElectrode(const Sheet& sheet, const Electrode& electrode) 
 void PaperModel::Heat(HeatField* field, const Electrode& electrode, float dt_s, Ledger* ledger) {
   const Material& material = field->material();
   const Sheet& sheet = field->sheet();
-  // By whole tiles: the tip is then at least 3.5 of the 8 tiles from the texture's border.
+  // The texture moves by whole tiles; the tip is then at least 3.5 of the 8 tiles from its border.
   const CellIndex centre = sheet.CellOf(electrode.tip);
   const auto corner = [](int cell) {
     return (static_cast<int>(std::floor((static_cast<float>(cell) + 0.5f * kTile) / kTile)) - kTextureTiles / 2) *
@@ -118,7 +118,7 @@ void PaperModel::Heat(HeatField* field, const Electrode& electrode, float dt_s, 
   potential_.Relax(kPaperSweeps);
   const float sheet_S = material.sigma * material.thickness_m;
   const float limit = kPaperThetaMax * material.rc_wet;
-  const float watt = sheet_S * electrode.voltage_V * electrode.voltage_V;  // at a conductance of 1
+  const float watt = sheet_S * electrode.voltage_V * electrode.voltage_V;  // power at a relative conductance of 1
   ledger->generator += static_cast<double>(watt) * dt_s * potential_.TakeConductance();
   for (int ty = 0; ty < kTextureTiles; ++ty) {
     alignas(64) std::array<float, static_cast<std::size_t>(kTile) * kTexture> heat;
@@ -130,9 +130,9 @@ void PaperModel::Heat(HeatField* field, const Electrode& electrode, float dt_s, 
       Tile* tile = ix >= 0 && iy >= 0 ? field->Wake(ix / kTile, iy / kTile) : nullptr;
       if (tile == nullptr) continue;
       tile->state.tented = electrode.tented ? 1 : 0;
-      // The texture is flat, as in the paper; the ledger knows the sheet as it is.
+      // The texture is flat, as in the paper; the ledger counts the heat with the areas of the curved sheet.
       const float scale = watt * dt_s / tile->flat_volume;
-      field->RefreshTheta(tile, ledger);  // Bad cells must not reach the ledger.
+      field->RefreshTheta(tile, ledger);  // Quarantines bad cells before the ledger reads them.
       const double before = tile->Heat();
       for (int j = 0; j < kTile; ++j) {
         AddHeat(scale, limit, &heat[j * kTexture + tx * kTile], &tile->state.enthalpy[j * kTile]);
@@ -168,7 +168,7 @@ void PaperModel::TakeOutCellsOf(Index node, HeatField* field, Ledger* ledger, Re
       const bool is_own = CellIndex{ix, iy} == own;
       bool takes = true;
       ForNeighbours(node, [&](Index other) {
-        // The cell of another node is that node's own affair, wherever its centre lies.
+        // The cell that holds another node is removed with that node only, wherever its centre lies.
         const bool farther = distance2 > (p - node_[other]).squaredNorm();
         takes = takes && !farther && !(CellOfNode(other) == CellIndex{ix, iy});
       });
@@ -176,7 +176,8 @@ void PaperModel::TakeOutCellsOf(Index node, HeatField* field, Ledger* ledger, Re
       if (tile == nullptr) continue;
       const int cell = (iy % kTile) * kTile + ix % kTile;
       const std::uint8_t flags = tile->state.flags[cell];
-      // A removed own cell tells that the rule has been applied to a node, so a quarantined one is marked too.
+      // The removed flag of a node's own cell marks that the rule has been applied to the node, so a quarantined own
+      // cell gets the flag too.
       if ((flags & (kRemoved | kOutside)) != 0 || ((flags & kQuarantined) != 0 && !is_own)) continue;
       field->TakeOut(tile, cell, kRemoved, &ledger->removed);
       removed->low = {std::min(removed->low.ix, ix), std::min(removed->low.iy, iy)};

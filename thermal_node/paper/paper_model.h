@@ -1,5 +1,5 @@
-// The paper's own model of cautery (its eq. 10 to 15), to run beside the accurate one: see deploy/docs/measurements/
-// thermal for each equation, what is corrected knowingly and what is not known of it.
+// The paper's own model of cautery (its eq. 10 to 15), for comparison with the accurate one. Each equation, its
+// corrections and what the paper leaves open: deploy/docs/measurements/thermal.
 //
 //   eq. 10, 14  conduction and sinks: HeatField with MakePaperMaterial
 //   eq. 12      q = sigma |grad V|^2: Joule heat of the sheet's current, over its thickness
@@ -20,9 +20,10 @@ namespace fulcrum::thermal {
 
 /// Table 2's diffusivity read in mm^2/s. As printed, in SI, it is some 4.5 million times that of tissue.
 inline constexpr float kPaperDiffusivity_m2_s = 4.5f * 1.26e-7f;
-/// No texel is heated beyond this [K]: between nodes that live on nothing else would end it, and messages carry 3000 C.
+/// Limit of the temperature of a texel [K]: between nodes that stay alive no loss or phase change would bound it, and
+/// messages carry at most 3000 C.
 inline constexpr float kPaperThetaMax = 2500.0f;
-inline constexpr int kPaperSweeps = 32;  ///< Jacobi sweeps a frame; our choice, the paper's is not known.
+inline constexpr int kPaperSweeps = 32;  ///< Jacobi sweeps per frame; assumed, the paper does not state its number.
 
 /// Constant material without water: nothing boils, the conductivities follow neither temperature nor dryness, no leak.
 /// Throws InputError as MakeMaterial does.
@@ -38,12 +39,12 @@ class PaperModel {
     float voltage_V = 0;
     bool tented = false;
   };
-  /// Heats the texture around a tip that stands for the whole step.
+  /// Heats the texture around a tip that does not move during the step.
   void Heat(HeatField* field, const Electrode& electrode, float dt_s, Ledger* ledger);
-  /// The node rule. A node takes the cells with it that lie nearer to it than to its neighbours in the grid.
+  /// Applies the node rule. With a node all cells are removed that lie nearer to it than to its neighbours in the grid.
   [[nodiscard]] RemovedBox RemoveNodes(HeatField* field, MeshTopology* topology, Ledger* ledger);
 
-  /// For checkpoints: where the texture lies, and its potential.
+  /// For checkpoints: place of the texture, and its potential.
   [[nodiscard]] CellIndex corner() const { return corner_; }
   [[nodiscard]] std::span<const float> potential() const { return potential_.state(); }
   [[nodiscard]] std::span<float> potential() { return potential_.state(); }

@@ -1,7 +1,8 @@
 // Electric potential of the paper (eq. 13): div grad V = 0 on a square texture, by Jacobi sweeps.
 //
-// Tissue conducts equally everywhere; the electrode's texels are at 1 V and the texture's border at 0 V; holes
-// insulate. Nothing is converged: each frame goes on from the last one's potential by a fixed number of sweeps.
+// The electrical conductivity of tissue is uniform; the electrode's texels are at 1 V, the texture's border is at 0 V,
+// holes insulate. The solution is not iterated to convergence: each frame starts from the last potential and does a
+// fixed number of sweeps.
 #pragma once
 
 #include <cstddef>
@@ -18,17 +19,17 @@ class TexturePotential {
 
   /// One row of texels: 1 where there is tissue, 0 elsewhere.
   [[nodiscard]] std::span<float> tissue_row(int j) { return std::span(tissue_).subspan(At(0, j), kTexture); }
-  /// Puts tissue at (i, j) on the electrode. Call after the rows are set and before Relax.
+  /// Adds the tissue texel (i, j) to the electrode. Call after the rows are set and before Relax.
   void SetElectrode(int i, int j);
-  /// So many sweeps over the texture.
+  /// Does `count` Jacobi sweeps over the texture.
   void Relax(int count);
 
-  /// Electrode current at 1 V per sheet conductance sigma d [1], and the electrode is lifted again.
+  /// Electrode current at 1 V per sheet conductance sigma d [1]. Removes the electrode.
   [[nodiscard]] float TakeConductance();
   /// Sum over a texel's faces of half (V - V')^2: its Joule heat at 1 V per sheet conductance [1], for one row.
   void HeatOfRow(int j, std::span<float> out) const;
 
-  /// Moves the potential by whole texels: what was at (i, j) is then at (i - di, j - dj).
+  /// Moves the potential by whole texels: the value at (i, j) moves to (i - di, j - dj).
   void Shift(int di, int dj);
   void Clear();
   /// Potential with its halo, for checkpoints.

@@ -7,7 +7,7 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// Sweeps on the 2 x 2 level: enough that its error does not show.
+/// Sweeps on the 2 x 2 level: enough that its error is negligible beside that of the finer levels.
 constexpr int kCoarsestSweeps = 8;
 
 }  // namespace
@@ -27,8 +27,8 @@ void Level::Finish() {
     float* __restrict s = &smooth[o];
     for (int i = 0; i < n; ++i) {
       d[i] = fx[i] + fx[i + 1] + fy[i] + fy[i + stride] + m[i];
-      // Where nothing is tied to anything diag is 0: no tissue, or on a coarse level an island that floats. The sum of
-      // an island's residuals is its rounding error, which must not be divided by next to nothing.
+      // diag is 0 for a cell without any conductance: no tissue, or on a coarse level a floating island. The sum of an
+      // island's residuals is rounding error, which must not be divided by a tiny number.
       const float weight = kJacobiWeight / (d[i] + kTiny);
       s[i] = d[i] > 0.0f ? weight : 0.0f;
     }
@@ -100,7 +100,7 @@ void Level::SmoothFromZero() {
   for (int k = 0; k < count; ++k) out[k] = s[k] * rhs[k];
 }
 
-/// b of the coarse level: the sum of the fine residuals.
+/// Sets b of the coarse level to the sum of the fine residuals.
 FULCRUM_WIDE
 void Restrict(const Level& fine, Level* coarse) {
   const int s = fine.stride;
@@ -112,7 +112,7 @@ void Restrict(const Level& fine, Level* coarse) {
   }
 }
 
-/// Adds the coarse correction to the four cells below each coarse one.
+/// Adds the correction of each coarse cell to its four fine cells.
 FULCRUM_WIDE
 void Prolong(const Level& coarse, Level* fine) {
   for (int j = 0; j < coarse.n; ++j) {

@@ -1,4 +1,14 @@
 // One level of the cell-centred grid hierarchy and its kernels. Private to the potential solver.
+//
+//   (A v)_c = diag_c v_c - sum over the four faces of G_f v_n,   diag_c = sum of G_f + mass_c
+//
+// v potential at 1 V of the electrode [1], G_f conductance of the face between cell c and its neighbour n [S], mass
+// conductance of the cell to electrode and return electrode [S]; A v is a current per volt [S]. Stencil: five points.
+// The halo has conductance 0, so no current crosses the border of the grid.
+//
+// V-cycle: damped Jacobi, x <- x + w D^-1 (b - A x), once before and once after the coarse correction; restriction by
+// the sum over 2 x 2 cells, prolongation by a constant over them, its transpose. So the cycle is a symmetric operator,
+// as conjugate gradients require of a preconditioner.
 #pragma once
 
 #include <cstddef>
@@ -8,10 +18,12 @@
 
 namespace fulcrum::thermal {
 
-inline constexpr float kJacobiWeight = 0.8f;  ///< Best smoothing of the five-point operator (factor 0.6).
-inline constexpr float kTiny = std::numeric_limits<float>::min();  ///< Keeps 0/0 where nothing conducts at 0.
+/// Optimal damping of Jacobi for the five-point operator (smoothing factor 0.6).
+inline constexpr float kJacobiWeight = 0.8f;
+/// Added to denominators: 0/0, where nothing conducts, gives 0.
+inline constexpr float kTiny = std::numeric_limits<float>::min();
 
-/// Widest vector of any CPU; a load that straddles two of its kind costs twice.
+/// Width of the widest vector of any CPU; an unaligned load that crosses a cache line costs twice.
 inline constexpr std::size_t kVectorBytes = 64;
 inline constexpr int kPad = static_cast<int>(kVectorBytes / sizeof(float));
 
@@ -39,11 +51,11 @@ struct Level {
   Field face_x;   ///< Between (i-1, j) and (i, j), at At(i, j) [S].
   Field face_y;   ///< Between (i, j-1) and (i, j).
   Field mass;     ///< Contact plus ground [S].
-  Field diag;     ///< 0 where there is no tissue, and where an island floats that is one cell of this level.
+  Field diag;     ///< 0 where there is no tissue, and for a floating island that is one cell on this level.
   Field smooth;   ///< kJacobiWeight / diag, 0 where diag is 0.
-  Field x, b, r;  ///< Of the V-cycle.
+  Field x, b, r;  ///< Solution, right-hand side and residual of the V-cycle.
 
-  /// diag and smooth from faces and mass.
+  /// Computes diag and smooth from faces and mass.
   void Finish();
   /// out = A v.
   void Apply(const float* v, float* out) const;
@@ -55,8 +67,8 @@ struct Level {
   void Smooth();
 };
 
-/// Faces and mass of the next coarser level. A coarse face is twice as long and its cells twice as far apart, so its
-/// conductance is the mean of the two fine ones.
+/// Computes faces and mass of the next coarser level. A coarse face is twice as long and its cells are twice as far
+/// apart, so its conductance is the mean of the two fine ones.
 void Coarsen(const Level& fine, Level* coarse);
 /// One symmetric V-cycle from level `l` on: levels[l].x from levels[l].b.
 void VCycle(std::vector<Level>* levels, std::size_t l);

@@ -11,9 +11,9 @@
 namespace fulcrum::thermal {
 namespace {
 
-constexpr int kMaxIterations = 60;
+constexpr int kMaxIterations = 60;  ///< Bound of the run time.
 
-/// Running sums side by side, in a fixed order: the same bits on every CPU.
+/// Number of partial sums. Their order is fixed, so the result has the same bits on every CPU.
 constexpr int kLanes = 32;
 static_assert(kWindow % kLanes == 0);
 
@@ -62,8 +62,8 @@ void Add(float f, const Field& x, Field* y) {
   for (int k = 0; k < static_cast<int>(x.size()); ++k) py[k] += f * px[k];
 }
 
-/// Face conductances of the finest level. The halo of sigma is 0, which closes the window's border; what flows on
-/// beyond it is in `ground`.
+/// Face conductances of the finest level. The halo of sigma is 0, which closes the window's border; the current that
+/// leaves the window is part of `ground`.
 FULCRUM_WIDE
 void SetFaces(const Field& sigma, float face_s, float face_t, Level* fine) {
   const int up = fine->stride;
@@ -99,7 +99,7 @@ void RowHeat(const Level& fine, const Field& voltage, const Field& sigma, float 
   }
 }
 
-/// Power into the sheet, heat in it, what is lost at the contact and power into ground, at 1 V [W/V^2].
+/// Power into the sheet, heat in it, power lost at the contact and power into ground, at 1 V [W/V^2].
 struct Balance {
   double in = 0, heat = 0, lost = 0, grounded = 0;
 };
@@ -107,12 +107,12 @@ struct Balance {
 FULCRUM_WIDE
 void AddRow(const float* __restrict contact, const float* __restrict lost, const float* __restrict ground,
             const float* __restrict v, const float* __restrict q, Balance* balance) {
-  alignas(64) float in[kLanes] = {}, heat[kLanes] = {}, gone[kLanes] = {}, grounded[kLanes] = {};
+  alignas(64) float in[kLanes] = {}, heat[kLanes] = {}, lost_lane[kLanes] = {}, grounded[kLanes] = {};
   for (int i = 0; i < kWindow; i += kLanes) {
     for (int l = 0; l < kLanes; ++l) {
       in[l] += contact[i + l] * (1.0f - v[i + l]);
       heat[l] += q[i + l];
-      gone[l] += lost[i + l] * (1.0f - v[i + l]) * (1.0f - v[i + l]);
+      lost_lane[l] += lost[i + l] * (1.0f - v[i + l]) * (1.0f - v[i + l]);
       grounded[l] += ground[i + l] * v[i + l] * v[i + l];
     }
   }
@@ -120,13 +120,13 @@ void AddRow(const float* __restrict contact, const float* __restrict lost, const
     for (int l = 0; l < width; ++l) {
       in[l] += in[l + width];
       heat[l] += heat[l + width];
-      gone[l] += gone[l + width];
+      lost_lane[l] += lost_lane[l + width];
       grounded[l] += grounded[l + width];
     }
   }
   balance->in += in[0];
   balance->heat += heat[0];
-  balance->lost += gone[0];
+  balance->lost += lost_lane[0];
   balance->grounded += grounded[0];
 }
 
@@ -179,7 +179,7 @@ int PotentialSolver::Iterate(float tolerance) {
     std::fill(g.v.begin(), g.v.end(), 0.0f);
     return 0;
   }
-  // The residual lives in fine.b, where the V-cycle wants it; its answer z is fine.x.
+  // fine.b holds the residual r, the input of the V-cycle; fine.x holds its result z.
   fine.Apply(g.v.data(), g.ap.data());
   fine.b = g.contact;
   Add(-1.0f, g.ap, &fine.b);
@@ -196,7 +196,7 @@ int PotentialSolver::Iterate(float tolerance) {
     fine.Apply(g.p.data(), g.ap.data());
     const float alpha = rz / Dot(g.p, g.ap);
     Add(alpha, g.p, &g.v);
-    if (last) return k + 1;  // the V-cycle was paid for, so its step is taken
+    if (last) return k + 1;  // the V-cycle is computed already, so its step is taken
     Add(-alpha, g.ap, &fine.b);
   }
   return kMaxIterations;
@@ -218,7 +218,7 @@ PotentialResult PotentialSolver::Evaluate(const PotentialProblem& problem) {
   const auto& [in, heat, lost, grounded] = balance;
   PotentialResult result;
   if (!(in > 0.0) || !std::isfinite(in + heat + lost + grounded)) {
-    // No contact; or the matrix held a bad number: start afresh and deliver nothing this time.
+    // No contact, or a value that is not finite: the result is 0 and the next solve starts from 0.
     heat_.fill(0);
     row_heat_.fill(0);
     std::fill(g.v.begin(), g.v.end(), 0.0f);
@@ -254,7 +254,7 @@ void PotentialSolver::Shift(int di, int dj) {
   ExportStart(&before);
   for (int j = 0; j < kWindow; ++j) {
     for (int i = 0; i < kWindow; ++i) {
-      // Cells that come in at the border take the nearest known value.
+      // Cells that enter at the border take the value of the nearest old cell.
       const int from_i = std::clamp(i + di, 0, kWindow - 1);
       const int from_j = std::clamp(j + dj, 0, kWindow - 1);
       after[j * kWindow + i] = before[from_j * kWindow + from_i];

@@ -18,7 +18,7 @@ inline constexpr int kWindowCells = kWindow * kWindow;
 struct PotentialProblem {
   alignas(64) std::array<float, kWindowCells> sigma{};    ///< Electrical conductivity [S/m]; 0: no tissue.
   alignas(64) std::array<float, kWindowCells> contact{};  ///< Conductance to the electrode [S].
-  alignas(64) std::array<float, kWindowCells> lost{};  ///< Part of `contact` whose heat does not go into the cell [S].
+  alignas(64) std::array<float, kWindowCells> lost{};    ///< Share of `contact` whose heat does not enter the cell [S].
   alignas(64) std::array<float, kWindowCells> ground{};  ///< Conductance to the return electrode [S].
   float face_s = 0;  ///< d * lt / ls: conductance of a face across s is this times the harmonic sigma [m].
   float face_t = 0;
@@ -32,22 +32,23 @@ struct PotentialResult {
   int iterations = 0;
 };
 
-/// Of the potential in its energy norm, while cutting. A coupling step lets the tissue change it by five times that;
-/// 1e-4 instead changes the energy of a cut by less than 0.1 %.
+/// Relative error of the potential in its energy norm during cutting. A coupling step lets the tissue change the
+/// potential by five times as much; with 1e-4 instead the energy of a cut changes by less than 0.1 %.
 inline constexpr float kWorkingTolerance = 2e-2f;
-inline constexpr float kImbalanceLimit = 0.02f;  ///< Energy guard: iterate on above this.
+inline constexpr float kImbalanceLimit = 0.02f;  ///< Energy guard: the iteration continues above this imbalance.
 
 class PotentialSolver {
  public:
   PotentialSolver();
   ~PotentialSolver();
 
-  /// Iterates until the error is `tolerance` in the energy norm, relative to the solution; then, while the energy guard
-  /// is not met, ten times less, at most twice. The heat is rescaled so that power in equals heat plus what is lost
-  /// plus power into ground.
+  /// Iterates until the error in the energy norm, relative to the solution, is `tolerance`. While the energy guard is
+  /// not met, the tolerance is divided by ten and the iteration continues, at most twice. The heat is rescaled so that
+  /// power in equals heat plus lost power plus power into ground.
   PotentialResult Solve(const PotentialProblem& problem, float tolerance);
 
-  /// Joule heat per cell at 1 V [W/V^2] of the last solve; shared between two cells as their resistances.
+  /// Joule heat per cell at 1 V [W/V^2] of the last solve; the heat of a face is shared between its two cells in
+  /// proportion to their resistances.
   [[nodiscard]] const std::array<float, kWindowCells>& heat() const { return heat_; }
   /// The same summed over each row.
   [[nodiscard]] const std::array<float, kWindow>& row_heat() const { return row_heat_; }
@@ -56,7 +57,7 @@ class PotentialSolver {
 
   /// Moves the start value of the next solve with the window by whole cells.
   void Shift(int di, int dj);
-  /// Start value as plain cells, for checkpoints.
+  /// Start value without halo, for checkpoints.
   void ExportStart(std::array<float, kWindowCells>* start) const;
   void ImportStart(const std::array<float, kWindowCells>& start);
 

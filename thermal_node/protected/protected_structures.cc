@@ -5,8 +5,10 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// Structures that the scene puts right at the sheet still have a wall between them.
+/// Smallest depth [m]: a structure that the scene places at the sheet is still separated from it by its own wall.
 constexpr float kMinDepth_m = 3e-4f;
+/// Excess temperature that is treated as 0 [K]: far below kDamageStart, so the updates may end.
+constexpr float kNegligibleTheta = 0.01f;
 
 }  // namespace
 
@@ -59,7 +61,7 @@ float ProtectedStructures::Lumped(const HeatField& field, const Vec2f& at, float
   const float above = above_warm ? std::exp(-depth_m / kAttenuationDepth_m) * MeanTheta(field, at, depth_m) : 0.0f;
   const float tau = depth_m * depth_m / (2.0f * kFatDiffusivity_m2_s);
   const float theta = above + (before - above) * std::exp(-dt_s / tau);
-  return theta < 0.01f && !above_warm ? 0.0f : theta;
+  return theta < kNegligibleTheta && !above_warm ? 0.0f : theta;
 }
 
 void ProtectedStructures::Update(const HeatField& field, const VolumeField* volume, const DamageRate& cell_death,
@@ -73,7 +75,7 @@ void ProtectedStructures::Update(const HeatField& field, const VolumeField* volu
     sample.theta = inside ? volume->ThetaAt(place.material, structure.depth_m)
                           : Lumped(field, place.material, structure.depth_m, sample.theta, dt_s);
     if (sample.theta <= 0.0f) continue;
-    if (sample.theta > 0.01f) warm_ = true;
+    if (sample.theta > kNegligibleTheta) warm_ = true;
     if (sample.theta >= kDamageStart) sample.omega += dt_s * cell_death.At(sample.theta);
     std::uint8_t& state = alarm_state_[place.structure];
     const auto raise = [&](std::uint8_t bit, bool injury) {

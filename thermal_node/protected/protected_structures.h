@@ -1,12 +1,12 @@
-// Ureter and nerves under the membrane: how warm they get and when to warn.
+// Ureter and nerves under the membrane: their temperature, their damage, warnings and injuries.
 //
 // Each sample point of a structure's polyline is one lumped temperature theta_p below the sheet:
 //
 //   d theta_p / dt = (exp(-depth / delta) * <theta> - theta_p) / tau,   tau = depth^2 / (2 alpha_fat)
 //
-// <theta> is the mean over the sheet within one depth of the point (heat spreads as it goes down), delta the depth over
-// which perfusion eats a steady temperature, tau the time heat takes through the fat. A short pass over a deep
-// structure thus does not warm it, a long stay over a shallow one does.
+// <theta> is the mean over the sheet within one depth of the point (heat spreads laterally on its path down), delta the
+// attenuation length of a steady temperature by perfusion, tau the diffusion time through the fat. A short pass over a
+// deep structure thus does not warm it, a long stay over a shallow one does.
 //
 // Where the tissue beneath is computed and reaches down to a structure, its temperature is that of the volume there.
 #pragma once
@@ -21,7 +21,7 @@
 
 namespace fulcrum::thermal {
 
-inline constexpr float kFatDiffusivity_m2_s = 9.8e-8f;  ///< 0.21 / (911 * 2348).
+inline constexpr float kFatDiffusivity_m2_s = 9.8e-8f;  ///< k / (rho c) of fat: 0.21 / (911 * 2348).
 inline constexpr float kAttenuationDepth_m = 5.4e-3f;   ///< sqrt(k_fat / perfusion sink), 0.002/s.
 inline constexpr float kWarning_C = 45.0f;
 inline constexpr float kWarningOmega = 0.1f;
@@ -44,11 +44,11 @@ class ProtectedStructures {
  public:
   ProtectedStructures(const SheetScene& scene, const HeatField& field);
 
-  /// Advances by dt (any length) and appends alarms: each structure warns once and is injured once.
-  /// @param volume the tissue beneath, or nullptr.
+  /// Advances by dt (any length) and appends alarms: one warning and one injury per structure at most.
+  /// @param volume tissue beneath the sheet, or nullptr.
   void Update(const HeatField& field, const VolumeField* volume, const DamageRate& cell_death, float dt_s,
               std::vector<ProtectedAlarm>* alarms);
-  /// True while a point is warmer than the sheet can have made it by chance.
+  /// True while a point is still warm, so that updates must go on even if the sheet is cold.
   [[nodiscard]] bool warm() const { return warm_; }
 
   /// State for checkpoints.
@@ -59,7 +59,7 @@ class ProtectedStructures {
   void set_warm(bool warm) { warm_ = warm; }
 
  private:
-  /// Temperature of the sheet's lumped model after dt, from `before` [K].
+  /// Temperature of the lumped model after dt, from `before` [K].
   [[nodiscard]] float Lumped(const HeatField& field, const Vec2f& at, float depth_m, float before, float dt_s) const;
   [[nodiscard]] float MeanTheta(const HeatField& field, const Vec2f& at, float radius) const;
 

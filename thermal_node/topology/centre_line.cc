@@ -7,12 +7,11 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// Neighbours in turn, so that bits of neighbours that touch each other are next to each other: E, SE, S, SW, W, NW, N,
-/// NE.
+/// Neighbours in cyclic order, so that neighbours that touch each other have adjacent bits: E, SE, S, SW, W, NW, N, NE.
 constexpr std::array<CellIndex, 8> kOffsets{{{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
-/// Order of the sides from which cells go, as bits of the neighbour mask: N, S, E, W.
+/// Order of the sides from which cells are removed, as bits of the neighbour mask: N, S, E, W.
 constexpr std::array<std::uint8_t, 4> kSides{1u << 6, 1u << 2, 1u << 0, 1u << 4};
-/// A circle of three cells' radius.
+/// Cells on a circle with a radius of three cells.
 constexpr std::array<CellIndex, 16> kRing{{{3, 0},
                                            {3, 1},
                                            {2, 2},
@@ -33,8 +32,9 @@ constexpr std::array<CellIndex, 16> kRing{{{3, 0},
 /// right-angled corner, 0 on the ridge of a slit, the sine of half the angle in a tip.
 constexpr float kRidgeSlope = 0.6f;
 
-/// By the mask of neighbours: taking the cell away changes neither pieces nor islands. So it is where there is one way
-/// from the hole to the tissue and back around the cell: Hilditch's crossing number for an 8-connected object is 1.
+/// Table over the mask of neighbours: true if removing the cell changes neither the number of pieces nor of islands.
+/// This holds if there is exactly one change from hole to tissue and back around the cell: Hilditch's crossing number
+/// for an 8-connected object is 1.
 constexpr std::array<bool, 256> MakeSimple() {
   std::array<bool, 256> simple{};
   for (unsigned mask = 0; mask < 256; ++mask) {
@@ -51,7 +51,8 @@ constexpr std::array<bool, 256> kSimple = MakeSimple();
 
 bool Before(CellIndex a, CellIndex b) { return a.iy != b.iy ? a.iy < b.iy : a.ix < b.ix; }
 
-/// At least four cells, so that a slit of two cells has a ridge; `run_` holds it in eight bits.
+/// Reach of the distance transform [cells]: at least four, so that a slit of two cells has a ridge; at most 100,
+/// because `run_` has eight bits.
 int ReachOf(const Sheet& sheet) {
   return std::clamp(static_cast<int>(std::lround(kCentreReach_m / sheet.cell_m)), 4, 100);
 }
@@ -88,7 +89,7 @@ void CentreLine::SetBoxes(CellIndex low, CellIndex high, int reach) {
   const auto cells = static_cast<std::size_t>(stride_) * static_cast<std::size_t>(loaded_.high.iy - loaded_.low.iy);
   run_.assign(cells, 0);
   distance2_.assign(cells, 0);
-  role_.assign(cells, kGone);
+  role_.assign(cells, kBackground);
   around_.resize(cells);
 }
 
@@ -115,7 +116,7 @@ void CentreLine::RowDistances(int reach) {
   const int rows = loaded_.high.iy - loaded_.low.iy;
   for (int j = 0; j < rows; ++j) {
     std::uint8_t* row = &run_[static_cast<std::size_t>(j) * static_cast<std::size_t>(stride_)];
-    // What lies beyond the loaded box is a reach away from the margin and does not matter.
+    // Cells beyond the loaded box are farther than the reach from the margin and have no influence.
     int run = reach;
     for (int i = 0; i < stride_; ++i)
       row[i] = static_cast<std::uint8_t>(run = row[i] == 0 ? 0 : std::min(run + 1, reach));
@@ -159,14 +160,14 @@ void CentreLine::CollectObject() {
   for (const std::int32_t at : object_) {
     unsigned mask = 0;
     for (unsigned n = 0; n < 8; ++n) {
-      mask |= role_[static_cast<std::size_t>(at + offsets_[n])] != kGone ? 1u << n : 0u;
+      mask |= role_[static_cast<std::size_t>(at + offsets_[n])] != kBackground ? 1u << n : 0u;
     }
     around_[static_cast<std::size_t>(at)] = static_cast<std::uint8_t>(mask);
   }
 }
 
 void CentreLine::Thin() {
-  // Counting sort; equal distances stay in the order of rows.
+  // Stable counting sort: cells of equal distance keep the order of rows.
   starts_.assign(static_cast<std::size_t>(reach_ * reach_) + 2, 0);
   for (const std::int32_t at : object_)
     ++starts_[static_cast<std::size_t>(distance2_[static_cast<std::size_t>(at)]) + 1];
@@ -176,7 +177,7 @@ void CentreLine::Thin() {
     order_[static_cast<std::size_t>(starts_[static_cast<std::size_t>(distance2_[static_cast<std::size_t>(at)])]++)] =
         at;
   }
-  object_.clear();  // from here on: what stays
+  object_.clear();  // from here on: the remaining cells
   for (std::size_t begin = 0; begin < order_.size();) {
     const auto distance2 = [&](std::size_t n) { return distance2_[static_cast<std::size_t>(order_[n])]; };
     std::size_t end = begin + 1;
@@ -187,12 +188,13 @@ void CentreLine::Thin() {
     object_.insert(object_.end(), part_.begin(), part_.end());
     begin = end;
   }
-  // Cells that held the hole together when their turn came, and do not any more.
+  // A second pass over cells that were not removable when they were visited but may be by now.
   ThinPart(&object_);
 }
 
-/// Side by side, as a plateau of the distance transform would be eaten from one end otherwise (after Guo and Hall, CACM
-/// 32, 1989): who has tissue on that side is settled before any of them goes.
+/// Thins in subiterations, one per side (after Guo and Hall, CACM 32, 1989): the cells with tissue on that side are
+/// collected before any of them is removed. Otherwise a plateau of the distance transform would be removed from one
+/// end.
 void CentreLine::ThinPart(std::vector<std::int32_t>* part) {
   for (bool changed = true; changed;) {
     changed = false;
@@ -200,19 +202,19 @@ void CentreLine::ThinPart(std::vector<std::int32_t>* part) {
       going_.clear();
       for (const std::int32_t at : *part) {
         const auto k = static_cast<std::size_t>(at);
-        if ((around_[k] & side) == 0 && role_[k] != kGone && CanGo(at)) going_.push_back(at);
+        if ((around_[k] & side) == 0 && role_[k] != kBackground && IsRemovable(at)) going_.push_back(at);
       }
       for (const std::int32_t at : going_) {
-        if (!CanGo(at)) continue;
+        if (!IsRemovable(at)) continue;
         Remove(at);
         changed = true;
       }
     }
-    std::erase_if(*part, [&](std::int32_t at) { return role_[static_cast<std::size_t>(at)] == kGone; });
+    std::erase_if(*part, [&](std::int32_t at) { return role_[static_cast<std::size_t>(at)] == kBackground; });
   }
 }
 
-bool CentreLine::CanGo(std::int32_t at) const {
+bool CentreLine::IsRemovable(std::int32_t at) const {
   const auto k = static_cast<std::size_t>(at);
   if (role_[k] == kFixed || !kSimple[around_[k]]) return false;
   return role_[k] != kMayEnd || std::popcount(around_[k]) > 1 || !OnRidge(at);
@@ -229,15 +231,15 @@ bool CentreLine::OnRidge(std::int32_t at) const {
 }
 
 void CentreLine::Remove(std::int32_t at) {
-  role_[static_cast<std::size_t>(at)] = kGone;
+  role_[static_cast<std::size_t>(at)] = kBackground;
   for (unsigned n = 0; n < 8; ++n) {
     std::uint8_t& mask = around_[static_cast<std::size_t>(at + offsets_[n])];
     mask = static_cast<std::uint8_t>(mask & ~(1u << ((n + 4) % 8)));
   }
 }
 
-/// Outside the inner box the old line stays. Cells that join it to the new one lie close to that box; what else stayed
-/// at the margin's border belongs to a line beyond it.
+/// Outside the inner box the old line is kept. Cells that join it to the new one lie close to that box; other cells at
+/// the margin's border belong to a line beyond it and are dropped.
 void CentreLine::Merge() {
   std::sort(object_.begin(), object_.end());  // the order of cells in the box is that of the sheet
   merged_.clear();
@@ -268,7 +270,7 @@ bool CentreLine::Restore(const HeatField& field, std::span<const CellIndex> cell
       cells_.clear();
       return false;
     }
-    // As Distance2: along both ways of the row, row by row.
+    // As in Distance2: in both directions along the row, row by row.
     const auto run = [&](int j) {
       int i = 0;
       const auto hole = [&](int di) { return IsHole(field, {cells[n].ix + di, cells[n].iy + j}); };

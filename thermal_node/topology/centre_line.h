@@ -1,8 +1,8 @@
 // Centre line of the hole: a set of cells one cell wide, with the topology of the hole, on the ridge of its distance
 // transform. Found by distance-ordered homotopic thinning (C. Pudney, "Distance-ordered homotopic thinning: a
-// skeletonization algorithm for 3D digital images", Computer Vision and Image Understanding 72, 1998): cells go by
-// ascending distance from the tissue, each only where the hole stays in as many pieces with as many islands. The hole
-// is 8-connected, the tissue 4-connected.
+// skeletonization algorithm for 3D digital images", Computer Vision and Image Understanding 72, 1998): cells are
+// removed from the object by ascending distance from the tissue, each only if the number of pieces of the hole and of
+// islands in it stays the same. The hole is 8-connected, the tissue 4-connected.
 //
 // An update thins again only around the cells that were removed. Three nested boxes:
 //
@@ -26,7 +26,7 @@
 
 namespace fulcrum::thermal {
 
-/// Holes up to twice as wide as this have a distance transform that is exact; wider ones a plateau [m].
+/// The distance transform is exact in holes up to twice as wide as this; in wider ones it has a plateau [m].
 inline constexpr float kCentreReach_m = 2e-3f;
 
 struct LineCell {
@@ -37,16 +37,17 @@ struct LineCell {
   bool operator==(const LineCell&) const = default;
 };
 
-/// True where the sheet has gone: removed or quarantined cells. Beyond the sheet's border is no hole.
+/// True for removed and quarantined cells. Cells beyond the sheet's border are not part of a hole.
 [[nodiscard]] bool IsHole(const HeatField& field, CellIndex cell);
 
 class CentreLine {
  public:
-  /// After cells within a box (inclusive) were removed.
+  /// Updates the line after cells within a box (both corners inclusive) were removed.
   void Update(const HeatField& field, CellIndex low, CellIndex high);
-  /// By ascending row, then column.
+  /// Cells of the line by ascending row, then column.
   [[nodiscard]] std::span<const LineCell> cells() const { return cells_; }
-  /// Takes over the cells of a line. False, and an empty line, when they are not in order or not all in the hole.
+  /// Restores a line from its cells. Returns false, and leaves an empty line, if they are not sorted or not all in the
+  /// hole.
   [[nodiscard]] bool Restore(const HeatField& field, std::span<const CellIndex> cells);
   void Clear() { cells_.clear(); }
 
@@ -58,7 +59,8 @@ class CentreLine {
       return c.ix >= low.ix && c.iy >= low.iy && c.ix < high.ix && c.iy < high.iy;
     }
   };
-  enum Role : std::uint8_t { kGone, kFree, kMayEnd, kFixed };  ///< kMayEnd: free, and the line may end there.
+  /// kBackground: tissue, or thinned away. kMayEnd: free, and the line may end there.
+  enum Role : std::uint8_t { kBackground, kFree, kMayEnd, kFixed };
 
   void SetBoxes(CellIndex low, CellIndex high, int reach);
   void Load(const HeatField& field);
@@ -66,11 +68,12 @@ class CentreLine {
   [[nodiscard]] std::int32_t Distance2(int at) const;
   void CollectObject();
   void Thin();
-  /// Takes cells off `part` until none of it can go; `part` is what stays.
+  /// Removes cells of `part` until none can be removed; the remaining cells stay in `part`.
   void ThinPart(std::vector<std::int32_t>* part);
-  [[nodiscard]] bool CanGo(std::int32_t at) const;
-  /// True where the distance transform does not rise steeply in any direction: no cell of a side or a corner of the
-  /// hole, but one of its ridge.
+  /// True if removing the cell changes neither the topology nor a place where the line may end.
+  [[nodiscard]] bool IsRemovable(std::int32_t at) const;
+  /// True if the distance transform does not rise steeply in any direction, so that the cell lies on its ridge and not
+  /// on a side or in a corner of the hole.
   [[nodiscard]] bool OnRidge(std::int32_t at) const;
   void Remove(std::int32_t at);
   void Merge();
@@ -89,7 +92,7 @@ class CentreLine {
   std::vector<std::uint8_t> run_;        ///< Cells to the next tissue in the same row, at most the reach.
   std::vector<std::int32_t> distance2_;  ///< As LineCell's; 0 outside the margin.
   std::vector<std::uint8_t> role_;       ///< Role.
-  std::vector<std::uint8_t> around_;     ///< A bit per neighbour that is not kGone; see kOffsets.
+  std::vector<std::uint8_t> around_;     ///< A bit per neighbour that is not kBackground; see kOffsets.
   std::vector<std::int32_t> order_;      ///< Cells of the object by ascending distance.
   std::vector<std::int32_t> object_, part_, going_, starts_;
   std::array<std::int32_t, 8> offsets_{};

@@ -29,8 +29,8 @@ bool Crumbs::Collect(const HeatField& field, CellIndex start, std::size_t most) 
   mark_[At(sheet, start)] = kSeen;
   bool crumb = true;
   for (std::size_t next = 0; next < piece_.size() && crumb; ++next) {
-    for (const CellIndex& way : kFaces) {
-      const CellIndex cell{piece_[next].ix + way.ix, piece_[next].iy + way.iy};
+    for (const CellIndex& offset : kFaces) {
+      const CellIndex cell{piece_[next].ix + offset.ix, piece_[next].iy + offset.iy};
       if (!IsTissue(field, cell)) continue;
       std::uint8_t& mark = mark_[At(sheet, cell)];
       crumb = crumb && mark != kSheet;
@@ -55,8 +55,8 @@ RemovedBox Crumbs::TakeOut(HeatField* field, const RemovedBox& changed, Ledger* 
     for (int ix = changed.low.ix - 1; ix <= changed.high.ix + 1; ++ix) {
       const CellIndex start{ix, iy};
       if (!IsTissue(*field, start) || mark_[At(sheet, start)] != kUnseen) continue;
-      const bool at_border = std::any_of(kFaces.begin(), kFaces.end(), [&](const CellIndex& way) {
-        return !IsTissue(*field, {ix + way.ix, iy + way.iy});
+      const bool at_border = std::any_of(kFaces.begin(), kFaces.end(), [&](const CellIndex& offset) {
+        return !IsTissue(*field, {ix + offset.ix, iy + offset.iy});
       });
       if (!at_border || !Collect(*field, start, most)) continue;
       for (const CellIndex& cell : piece_) {

@@ -1,4 +1,4 @@
-// What a cut leaves that hangs on nothing: small pieces of sheet within a slit. They are not tissue any more.
+// Crumbs: small pieces of sheet that a cut has separated from the rest. They are removed as debris.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 
 namespace fulcrum::thermal {
 
-/// A piece of sheet that is cut free and smaller than this is debris; a larger one stays a piece of tissue [m^2].
+/// A separated piece of sheet below this area is debris; a larger one stays tissue [m^2].
 inline constexpr float kCrumb_m2 = 4.0e-6f;
 
 /// Cells that a call removed; `low` > `high` when none.
@@ -28,18 +28,18 @@ struct RemovedBox {
 
 class Crumbs {
  public:
-  /// Takes out the pieces, joined over cell faces, that touch a cell removed within `changed` and are smaller than
-  /// kCrumb_m2; their heat goes to ledger.debris. Costs a search of at most kCrumb_m2 of cells for each piece of
+  /// Removes the pieces, connected over cell faces, that touch a cell removed within `changed` and are smaller than
+  /// kCrumb_m2; their heat is added to ledger.debris. The search covers at most kCrumb_m2 of cells for each piece of
   /// border.
   RemovedBox TakeOut(HeatField* field, const RemovedBox& changed, Ledger* ledger);
-  /// Since the start, on the rest shape [m^2].
+  /// Area of all crumbs since the start, on the rest shape [m^2].
   [[nodiscard]] double area_m2() const { return area_m2_; }
   void Restore(double area_m2) { area_m2_ = area_m2; }
 
  private:
   enum Mark : std::uint8_t { kUnseen, kSeen, kSheet };
   [[nodiscard]] bool IsTissue(const HeatField& field, CellIndex cell) const;
-  /// Fills piece_ with what hangs together with `start`. True: it is a crumb.
+  /// Fills piece_ with the cells connected to `start`. Returns true if they are a crumb.
   bool Collect(const HeatField& field, CellIndex start, std::size_t most);
 
   std::vector<std::uint8_t> mark_;  ///< By cell of the sheet; kUnseen between calls.

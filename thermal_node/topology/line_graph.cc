@@ -6,18 +6,18 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// A spur counts from where it protrudes from the hole's border by so many half widths and this length [m]: a branch
-/// protrudes by more than the hole beside it is wide; what is wider than long is a bay of the border.
+/// Threshold of a spur's protrusion from the hole's border: so many half widths plus this length [m]. A branch
+/// protrudes by more than the width of the hole beside it; a protrusion wider than long is a bay of the border.
 constexpr float kSpurPart = 2.0f, kSpur_m = 2e-4f;
-/// From there on it counts as this times the excess, until that is its whole length: without a jump of all of it, and
-/// in full soon.
+/// A spur above the threshold counts with this factor times its excess, at most with its whole length. So its length
+/// enters the sum continuously, without a jump.
 constexpr float kSpurSlope = 4.0f;
-/// To either side in the moving average, which is 1 mm long in all [m].
+/// Half width of the moving average [m].
 constexpr float kSmooth_m = 5e-4f;
 /// The direction of the line at a free end is that of its last millimetre [m].
 constexpr float kDirection_m = 1e-3f;
-/// The hole goes on beyond a free end by its half width, at a square end's corner by 1.41 of it, and by what thinning
-/// took off the end.
+/// Bound of the extension at a free end: a factor of the half width (1 at a round end, 1.41 at the corner of a square
+/// one) plus the length that thinning removed [m].
 constexpr float kEndPart = 1.5f, kEnd_m = 3e-4f;
 /// Mean length of straight and diagonal steps of a digitised line (Vossepoel and Smeulders 1982, two parameters).
 constexpr float kStraight = 0.948f, kDiagonal = 1.343f;
@@ -25,11 +25,11 @@ constexpr float kMarch = 0.25f;  ///< Step along a ray through the hole [cells].
 
 Vec2f Centre(CellIndex c) { return {static_cast<float>(c.ix), static_cast<float>(c.iy)}; }
 
-/// Length of the hole from `from` along the unit vector `way`, at most `most` [cells].
-float March(const HeatField& field, const Vec2f& from, const Vec2f& way, float most) {
+/// Length of the hole from `from` along the unit vector `direction`, at most `most` [cells].
+float March(const HeatField& field, const Vec2f& from, const Vec2f& direction, float most) {
   float reached = 0;
   while (reached < most) {
-    const Vec2f at = from + (reached + kMarch) * way;
+    const Vec2f at = from + (reached + kMarch) * direction;
     if (!IsHole(field, {static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y()))})) break;
     reached += kMarch;
   }
@@ -47,7 +47,7 @@ float LineGraph::Measure(const HeatField& field, std::span<const LineCell> cells
     Trace();
   } while (Prune());
   for (Stretch& stretch : stretches_) stretch.length = LengthOf(field, stretch);
-  // Of a fork with n stretches, n - 2 are branches, the shortest ones; they count by their excess.
+  // Of the n stretches at a fork the n - 2 shortest are branches; they count by their excess.
   spurs_.clear();
   double length = 0;
   for (std::uint32_t s = 0; s < stretches_.size(); ++s) {
@@ -73,8 +73,8 @@ float LineGraph::Measure(const HeatField& field, std::span<const LineCell> cells
   return static_cast<float>(length) * cell_m_;
 }
 
-/// Cells that touch. Across a corner only where neither of the two cells beside that corner belongs to the line: the
-/// way over them is the line's.
+/// Links cells that touch. Cells that touch at a corner are linked only if neither of the two cells beside that corner
+/// belongs to the line: otherwise the line passes through that cell.
 void LineGraph::Link() {
   nodes_.assign(cells_.size(), Node{});
   const auto join = [&](std::size_t a, std::size_t b) {
@@ -115,21 +115,21 @@ void LineGraph::Trace() {
             {static_cast<std::uint32_t>(trail_.size()), static_cast<std::uint32_t>(trail_.size()) + 1, 0, 0});
         trail_.push_back(n);
       }
-      // Of a ring that has not been walked, one way round.
-      for (unsigned way = 0; way < nodes_[n].count && !(rings && nodes_[n].walked != 0); ++way) Walk(n, way);
+      // A ring is traced once, in one direction.
+      for (unsigned link = 0; link < nodes_[n].count && !(rings && nodes_[n].walked != 0); ++link) Walk(n, link);
     }
   }
 }
 
-void LineGraph::Walk(std::uint32_t from, unsigned way) {
-  if ((nodes_[from].walked >> way & 1u) != 0) return;
+void LineGraph::Walk(std::uint32_t from, unsigned link) {
+  if ((nodes_[from].walked >> link & 1u) != 0) return;
   const auto begin = static_cast<std::uint32_t>(trail_.size());
   float length = 0;
   trail_.push_back(from);
   for (std::uint32_t here = from;;) {
     Node& node = nodes_[here];
-    node.walked = static_cast<std::uint8_t>(node.walked | 1u << way);
-    const std::uint32_t next = node.to[way];
+    node.walked = static_cast<std::uint8_t>(node.walked | 1u << link);
+    const std::uint32_t next = node.to[link];
     Node& other = nodes_[next];
     const CellIndex a = cells_[here].at, b = cells_[next].at;
     length += a.ix != b.ix && a.iy != b.iy ? kDiagonal : kStraight;
@@ -139,7 +139,7 @@ void LineGraph::Walk(std::uint32_t from, unsigned way) {
     other.walked = static_cast<std::uint8_t>(other.walked | 1u << back);
     if (other.count != 2 || next == from) break;
     here = next;
-    way = 1 - back;
+    link = 1 - back;
   }
   const auto end = static_cast<std::uint32_t>(trail_.size());
   for (const std::uint32_t cell : {trail_[begin], trail_[end - 1]}) length += IsFree(cell) ? Radius(cell) : 0.0f;
@@ -158,7 +158,7 @@ bool LineGraph::Prune() {
   for (const std::uint32_t s : spurs_) {
     const Stretch& spur = stretches_[s];
     const std::uint32_t front = trail_[spur.begin], fork = IsFree(front) ? trail_[spur.end - 1] : front;
-    // A fork that has lost its branches has become a part of a longer stretch: on with it after the next Trace.
+    // A fork without branches has become part of a longer stretch, which is evaluated after the next Trace.
     if (nodes_[fork].count < 3 || Excess(spur, fork) > 0.0f) continue;
     CutOff(spur);
     any = true;
@@ -194,7 +194,7 @@ float LineGraph::Excess(const Stretch& spur, std::uint32_t fork) const {
   return spur.reach - (1.0f + kSpurPart) * Radius(fork) - kSpur_m / cell_m_;
 }
 
-/// Moving average; the window shrinks towards the ends of a stretch, which stay, and goes on around a ring.
+/// Moving average. The window shrinks towards the ends of a stretch, which stay fixed; on a ring it wraps around.
 void LineGraph::Smooth(const Stretch& stretch) {
   const auto count = static_cast<int>(stretch.end - stretch.begin);
   const auto at = [&](int n) { return Centre(cells_[trail_[stretch.begin + static_cast<std::uint32_t>(n)]].at); };
@@ -210,7 +210,7 @@ void LineGraph::Smooth(const Stretch& stretch) {
     }
     return;
   }
-  // Sums of small integers: exact, in whatever order.
+  // Sums of small integers are exact in any order.
   Vec2f sum = at(0);
   int half = 0;
   smooth_[0] = sum;
@@ -243,8 +243,8 @@ float LineGraph::LongestChord(const HeatField& field, std::uint32_t cell) const 
   float longest = 0;
   for (int n = 0; n < 8; ++n) {
     const float angle = 0.392699f * static_cast<float>(n);
-    const Vec2f way(std::cos(angle), std::sin(angle)), from = Centre(cells_[cell].at);
-    longest = std::max(longest, March(field, from, way, most) + March(field, from, -way, most));
+    const Vec2f direction(std::cos(angle), std::sin(angle)), from = Centre(cells_[cell].at);
+    longest = std::max(longest, March(field, from, direction, most) + March(field, from, -direction, most));
   }
   return longest;
 }

@@ -139,7 +139,7 @@ bool MeshTopology::HasPath(const HeatField& field, Index edge, const StrandRule&
   const int start_x = CellCoordinate(a.x(), sheet.nx) - box.x0, start_y = CellCoordinate(a.y(), sheet.ny) - box.y0;
   const int goal_x = CellCoordinate(b.x(), sheet.nx) - box.x0, goal_y = CellCoordinate(b.y(), sheet.ny) - box.y0;
 
-  // Which cells of the band are tissue. The nodes' own cells belong to it whatever the rounding.
+  // Marks the cells of the band that are tissue. The nodes' own cells belong to the band in spite of rounding.
   open_.assign(static_cast<std::size_t>(width) * height, 0);
   const Vec2f along = b - a;
   const float length2 = along.squaredNorm(), band2 = BandOf(a, b) * BandOf(a, b);
@@ -152,13 +152,13 @@ bool MeshTopology::HasPath(const HeatField& field, Index edge, const StrandRule&
       const int ix = box.x0 + x, iy = box.y0 + y;
       if (!end && !rule.outside && sheet.IsOutside(ix, iy)) continue;
       const Tile* tile = rule.holes ? field.Find(ix / kTile, iy / kTile) : nullptr;
-      const bool gone = tile != nullptr && (tile->state.flags[(iy % kTile) * kTile + ix % kTile] & kRemoved) != 0;
-      open_[y * width + x] = gone ? 0 : 1;
+      const bool removed = tile != nullptr && (tile->state.flags[(iy % kTile) * kTile + ix % kTile] & kRemoved) != 0;
+      open_[y * width + x] = removed ? 0 : 1;
     }
   }
   const int start = start_y * width + start_x, goal = goal_y * width + goal_x;
   if (open_[start] == 0 || open_[goal] == 0) return false;
-  // Breadth first over faces, as heat and current go.
+  // Breadth-first search over faces, the connections through which heat and current flow.
   queue_.clear();
   queue_.push_back(start);
   open_[start] = 0;
@@ -215,7 +215,7 @@ void MeshTopology::StageShrink(const HeatField& field, const Tile& tile) {
       const int ix = CellCoordinate(p.x(), sheet.nx), iy = CellCoordinate(p.y(), sheet.ny);
       const Tile* at = field.Find(ix / kTile, iy / kTile);
       const float omega = at != nullptr ? at->state.omega_collagen[(iy % kTile) * kTile + ix % kTile] : 0.0f;
-      if (omega > 0.0f) sum += 1.0f - std::exp(-omega);  // false for a bad number, which must not leave its cell
+      if (omega > 0.0f) sum += 1.0f - std::exp(-omega);  // false for NaN, which must stay within its cell
     }
     const float lost = shrink_max_ * sum / static_cast<float>(samples);
     const int value = std::min(255, static_cast<int>(lost / kShrinkUnit)) / kShrinkStep * kShrinkStep;

@@ -1,12 +1,12 @@
-// What has been cut and shrunk of the membrane's mesh, derived from the cells.
+// Dead edges, dead nodes and shrink of the membrane's mesh, derived from the cells.
 //
 // An edge of the mesh stands for a strand of tissue: the band of cells around its segment in material space. It is dead
 // when no connected path of tissue inside that band joins the cells of its two nodes. So a slit far narrower than the
-// mesh cuts an edge, and a pin hole in a strand does not. A node is dead when its own cell is gone or no edge is left
-// at it. Changes are staged and become visible, with a new revision, at Commit().
+// mesh cuts an edge, and a pin hole in a strand does not. A node is dead when its own cell is removed or it has no live
+// edge. Changes are staged and become visible, with a new revision, at Commit().
 //
-// Cells beyond the border of the sheet are no tissue and lead nowhere; except in a strand that has no path without them
-// at rest, because the cells do not resolve an acute corner.
+// Cells beyond the border of the sheet are not tissue, and no path leads through them. The exception is a strand that
+// has no path without them at rest, because the cells do not resolve an acute corner.
 #pragma once
 
 #include <algorithm>
@@ -21,9 +21,9 @@
 
 namespace fulcrum::thermal {
 
-inline constexpr float kBandHalfWidth = 0.25f;  ///< Of an edge's band, relative to its length.
-inline constexpr float kInvalidShrink = 0.7f;   ///< Of the paper: what is left of an edge's length per invalid end.
-inline constexpr int kShrinkStep = 4;           ///< Shrink moves in steps of 4 kShrinkUnit: 0.8 % of the rest length.
+inline constexpr float kBandHalfWidth = 0.25f;  ///< Half width of an edge's band, relative to its length.
+inline constexpr float kInvalidShrink = 0.7f;   ///< The paper's factor on an edge's rest length per invalid end.
+inline constexpr int kShrinkStep = 4;           ///< Shrink is quantised to 4 kShrinkUnit: 0.8 % of the rest length.
 
 /// Half the width of the strand of an edge from a to b, in cells: at least one to either side, so that a diagonal
 /// strand is connected.
@@ -38,32 +38,32 @@ class MeshTopology {
  public:
   MeshTopology(const SheetScene& scene, const Sheet& sheet);
 
-  /// Looks again at every edge whose band touches the box of cells, after cells in it were removed.
+  /// Re-evaluates every edge whose band touches the box of cells, after cells in it were removed.
   void StageCut(const HeatField& field, CellIndex low, CellIndex high);
   /// Calls take(cell) for each cell of tissue that lies across the middle of the edge's strand: a line of one cell over
-  /// the strand's width, through which no path over faces leads. Nothing for an edge that is dead or does not exist.
-  /// Take the cells out, then StageCut().
+  /// the strand's width, through which no path over faces leads. Does nothing for an edge that is dead or does not
+  /// exist. Remove the cells, then call StageCut().
   template <class Take>
   void ForCellsAcross(const Sheet& sheet, Index edge, const Take& take) const;
-  /// The same from the middle of an edge to that of another one.
+  /// The same along the line from the middle of one edge to that of another.
   template <class Take>
   void ForCellsBetween(const Sheet& sheet, Index edge, Index other, const Take& take) const;
   /// Calls visit(other) for the other edges of the two triangles beside an edge.
   template <class Visit>
   void ForEdgesBeside(Index edge, const Visit& visit) const;
   /// Shrink from collagen damage of the edges near the tile: L = L0 (1 - shrink_max (1 - exp(-Omega))), mean over the
-  /// cells of the segment, once from the rest length and never back.
+  /// cells of the segment. It is always relative to the rest length and never decreases.
   void StageShrink(const HeatField& field, const Tile& tile);
-  /// The paper's rule: the node dies, and the rest length of every edge at it is cut to kInvalidShrink of what it was,
-  /// so once per end that has become invalid. Call once per node.
+  /// Applies the paper's rule: the node dies, and the rest length of every edge at it is multiplied by kInvalidShrink,
+  /// once per end that has become invalid. Call once per node.
   void StageInvalidNode(Index node);
-  /// Makes what was staged visible. True when something changed: the revision is then one higher.
+  /// Makes staged changes visible. Returns true if there were any; the revision is then one higher.
   bool Commit();
 
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   [[nodiscard]] bool staged() const { return changed_; }
   [[nodiscard]] const TopologyBits& committed() const { return committed_; }
-  /// In what is staged.
+  /// True if the edge exists and is alive in the staged state.
   [[nodiscard]] bool EdgeLives(Index edge) const { return EdgeExists(edge) && !TestBit(staged_.dead_edges, edge); }
   [[nodiscard]] std::uint32_t rows() const { return rows_; }
   [[nodiscard]] std::uint32_t cols() const { return cols_; }
@@ -73,7 +73,7 @@ class MeshTopology {
   /// True when arrays of another session fit this mesh: their sizes, nothing set beyond them or where no edge exists,
   /// and no live edge at a dead node.
   [[nodiscard]] bool Fits(const TopologyBits& bits) const;
-  /// From a checkpoint.
+  /// Restores a checkpoint.
   void Restore(std::uint64_t revision, const TopologyBits& bits);
 
  private:
@@ -114,7 +114,7 @@ template <class Take>
 void ForCellsOnLine(const Sheet& sheet, const Vec2f& p, const Vec2f& q, const Take& take) {
   const float length = (q - p).norm();
   const Vec2f along = (q - p) / std::max(length, 1e-6f), across(-along.y(), along.x());
-  const float half = 0.5f * std::max(std::abs(along.x()), std::abs(along.y())) + 0.01f;  // The rest is for rounding.
+  const float half = 0.5f * std::max(std::abs(along.x()), std::abs(along.y())) + 0.01f;  // 0.01 allows for rounding.
   const Vec2f low = p.cwiseMin(q).array() - 1.0f, high = p.cwiseMax(q).array() + 1.0f;
   for (int iy = std::max(0, static_cast<int>(std::floor(low.y())));
        iy <= std::min(sheet.ny - 1, static_cast<int>(high.y())); ++iy) {
@@ -133,7 +133,8 @@ void MeshTopology::ForCellsAcross(const Sheet& sheet, Index edge, const Take& ta
   if (!EdgeLives(edge)) return;
   const Vec2f a = node_[edge / 3], b = node_[OtherEnd(edge)], middle = 0.5f * (a + b);
   const Vec2f along = (b - a) / std::max((b - a).norm(), 1e-6f);
-  // One more cell to either side: the cells of the nodes belong to a strand however far their centres lie.
+  // Half a cell more on either side: the cells of the nodes always belong to the strand, even if their centres lie
+  // outside.
   const Vec2f reach = (BandOf(a, b) + 0.5f) * Vec2f(-along.y(), along.x());
   ForCellsOnLine(sheet, middle - reach, middle + reach, take);
 }

@@ -10,7 +10,7 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// Sum and maximum of a row's cells by halves: a fixed order that vectors keep to.
+/// Sum and maximum of a row's cells by repeated halving: an order that is the same with any vector width.
 inline float SumRow(float* values) {
   for (int width = kBrick / 2; width > 0; width /= 2) {
     for (int i = 0; i < width; ++i) values[i] += values[i + width];
@@ -33,7 +33,8 @@ void ConductLayer(Brick* brick, int k, const LayerStep& step) {
   const float cs = step.along_s, ct = step.along_t, above = step.above, below = step.below, loss = step.loss;
   for (int j = box.row0; j < box.row1; ++j) {
     const float* __restrict t = &brick->theta[BrickThetaIndex(box.col0, j, k)];
-    // At the border of the box the row is its own neighbour: no heat crosses it. A halo row is there at the brick's.
+    // At the border of the box the row itself is used as its neighbour, so that no heat crosses. At the border of the
+    // brick there is a halo row.
     const float* __restrict before = j > box.row0 || j == 0 ? t - kBrickStride : t;
     const float* __restrict after = j + 1 < box.row1 || j + 1 == kBrick ? t + kBrickStride : t;
     const float* __restrict up = k > 0 ? t - kLayerStride : t;

@@ -13,7 +13,7 @@ struct alignas(64) SheetRows {
   float theta[3][kBrickSpan];
   float flow[3][kBrickSpan];   ///< Conductance of the cell to the volume [W/K].
   float decay[3][kBrickSpan];  ///< The same over the cell's volume [W/(K m^3)].
-  float below[3][kBrickSpan];  ///< Temperature of the columns, as the cell meets it [K].
+  float below[3][kBrickSpan];  ///< Temperature of the columns below a cell, averaged over the cell [K].
 };
 
 /// lid_flux = sum flow theta, lid_rate = sum flow of the cells above each column, times `scale`.
@@ -61,7 +61,7 @@ void Cool(float* enthalpy, const float* theta, const float* decay, const float* 
   for (int i = 0; i < kTile; ++i) enthalpy[i] -= dt_s * decay[i] * (theta[i] - below[i]);
 }
 
-/// A tile that takes part in the exchange.
+/// True if the tile takes part in the exchange.
 bool Touches(const Tile* tile) { return tile != nullptr && tile->state.awake != 0 && tile->state.tented == 0; }
 
 }  // namespace
@@ -146,7 +146,7 @@ void SheetContact::Exchange(float dt_s, HeatField* sheet, const VolumeMaterial& 
         }
       }
     }
-    // Beside the box there is no contact.
+    // Columns outside the box have no contact.
     const int first = brick->box.col0 / 2 * 3, last = brick->box.col1 / 2 * 3;
     for (int r = 0; r < 3; ++r) {
       for (float* row : {rows.flow[r], rows.decay[r]}) {

@@ -1,9 +1,9 @@
-// The fat lies against the sheet: heat goes between the sheet's cells and the columns of the volume beneath them.
+// Heat exchange between the sheet's cells and the columns of the volume beneath them.
 //
-// Two columns lie under three cells of the sheet, along s and along t. Each pair of a cell and a column exchanges
-// g A (theta_cell - theta_column), A the area they share, g the series of half the sheet and half a layer; so both stay
-// within the temperatures they had and what leaves one enters the other. No contact at holes and where the sheet is
-// tented.
+// Two columns lie under three cells of the sheet, along s and along t. Each pair of a cell and a column exchanges g A
+// (theta_cell - theta_column), A the area they share, g the conductance of half the sheet and half a layer in series
+// [W/m^2K]. So temperatures stay within their initial bounds and heat is conserved. There is no contact at holes and
+// where the sheet is tented.
 #pragma once
 
 #include "thermal_node/heat/heat_field.h"
@@ -15,8 +15,8 @@ class SheetContact {
  public:
   explicit SheetContact(const Material& sheet, const VolumeMaterial& volume);
 
-  /// One step of the volume with its contact to the sheet, substepped by the faster of both. What goes down is booked
-  /// as lost by the sheet. Returns the number of substeps; 0: all cold.
+  /// One step of the volume with its contact to the sheet, in substeps that the larger rate of both requires. The heat
+  /// conducted downward is booked as lost in the sheet's ledger. Returns the number of substeps; 0 if all is cold.
   int Step(float dt_s, HeatField* sheet, VolumeField* volume, Ledger* ledger) const;
 
  private:
@@ -30,7 +30,7 @@ class SheetContact {
 
   const Material& sheet_material_;
   float half_layer_ = 0;  ///< Resistance of half a layer of the volume [m^2K/W].
-  float rate_ = 0;        ///< Largest of the exchange, seen from the sheet [1/s].
+  float rate_ = 0;        ///< Largest rate of the exchange for a cell of the sheet [1/s].
 };
 
 }  // namespace fulcrum::thermal

@@ -1,4 +1,4 @@
-// Damage of the volume and what is asked of it: temperature and depth of burn at a place.
+// Damage of the volume; temperature and burn depth at a place.
 #include <algorithm>
 #include <cmath>
 
@@ -10,7 +10,7 @@ namespace fulcrum::thermal {
 void VolumeField::Damage(Brick* brick, float dt_s) {
   if (brick->theta_max < kDamageStart) return;
   const WarmBox& box = brick->box;
-  bool deepest = true;  // layers above the deepest dead one need not be asked
+  bool deepest = true;  // layers above the deepest dead one need not be checked
   for (int k = box.layers - 1; k >= 0; --k) {
     bool dead = false;
     for (int j = box.row0; j < box.row1; ++j) {
@@ -48,7 +48,7 @@ float VolumeField::BurnDepth(const Brick& brick, int column) const {
   while (k >= 0 && omega(k) < 1.0f) --k;
   if (k < 0) return 0;
   if (k == kLayers - 1) return material_.depth_m();
-  // Omega falls by decades from layer to layer, so its logarithm is what is linear.
+  // Omega falls by decades from layer to layer, so its logarithm is interpolated linearly.
   constexpr float kLeast = 1e-6f;
   const float here = std::log(omega(k)), next = std::log(std::max(omega(k + 1), kLeast));
   return (static_cast<float>(k) + 0.5f + here / (here - next)) * material_.pitch_m;

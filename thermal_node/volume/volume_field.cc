@@ -10,10 +10,10 @@
 namespace fulcrum::thermal {
 namespace {
 
-/// Less heat than this does not wake tissue [K/s]: what a tip that moves on leaves there is less than a sleeping brick
-/// may hold.
+/// Rate of heating below which sleeping tissue is not woken [K/s]: a moving tip deposits less heat there than a
+/// sleeping brick may discard.
 constexpr float kLeastSource_K_s = 1.0f;
-/// Fractions of one sheet cell over the columns 2n and 2n + 1 that lie below the cells 3n, 3n + 1, 3n + 2.
+/// Fractions of the sheet cells 3n, 3n + 1 and 3n + 2 (rows) that lie above the columns 2n and 2n + 1.
 constexpr float kOverlap[3][2] = {{1.0f, 0.0f}, {0.5f, 0.5f}, {0.0f, 1.0f}};
 
 /// Mean stretch of the sheet above a brick along s and t, and the largest rest area of a cell over its material area.
@@ -94,7 +94,7 @@ void VolumeField::Grow(Brick* brick, const WarmBox& need) {
   box.row1 = std::max(before.row1, up(need.row1, kBoxRows));
   box.layers = std::min(kLayers, std::max(before.layers, need.layers));
   if (before.empty() || (box.col0 == before.col0 && box.col1 == before.col1)) return;
-  // Beside the old box stood values for the halos.
+  // The cells beside the old box held halo values.
   for (int k = 0; k < before.layers; ++k) {
     for (int j = before.row0; j < before.row1; ++j) {
       if (box.col0 < before.col0) brick->theta[BrickThetaIndex(before.col0 - 1, j, k)] = 0;
@@ -108,7 +108,8 @@ void VolumeField::AddSource(CellIndex cell, float heat_J_m3, float duration_s) {
   const int x = cell.ix % kBrickSpan, y = cell.iy % kBrickSpan;
   const int i = x / 3 * 2, j = y / 3 * 2, deepest = material_.fat_layers - 1;
   Brick* brick = Find(bx, by);
-  if (brick == nullptr || !brick->box.Holds(i, j, deepest)) {  // boxes are even: it holds the next row and column, too
+  if (brick == nullptr ||
+      !brick->box.Holds(i, j, deepest)) {  // boxes have even borders, so the next row and column are inside as well
     if (heat_J_m3 < kLeastSource_K_s * duration_s * material_.rc[0]) return;
     brick = Wake(bx, by, {i, i + 2, j, j + 2, material_.fat_layers});
   }
@@ -266,7 +267,7 @@ void VolumeField::Quarantine(Brick* brick) {
     for (int j = box.row0; j < box.row1; j += kBoxRows) {
       high = std::max(high, brick->pair_max[k * kBrickPairs + j / kBoxRows]);
     }
-    bad = bad || !std::isfinite(brick->layer_sum[k]);  // a maximum does not see NaN
+    bad = bad || !std::isfinite(brick->layer_sum[k]);  // a maximum ignores NaN
   }
   brick->theta_max = high;
   if (!bad && high <= kThetaPlausible) return;

@@ -2,9 +2,9 @@
 //
 //   rc dtheta/dt = div(k grad theta) - perfusion theta + q        z down from the sheet, k and rc by layer
 //
-// Boiling holds theta at 100 C until its latent heat is spent. Unlike in the sheet it is given back on cooling: steam
-// cannot leave the depth and condenses there. No heat leaves below the volume or at its sides, which errs on the side
-// of too deep a burn; q is the leak current's heat in the fat.
+// Boiling holds theta at 100 C until its latent heat is spent. Unlike in the sheet it is released on cooling: steam
+// cannot escape from the depth and condenses there. Bottom and sides of the volume are insulated, so a burn is
+// overestimated in depth; q is the heat of the leak current in the fat.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +20,11 @@
 
 namespace fulcrum::thermal {
 
-/// Wider than the sheet's: a brick costs as much as many tiles, and no damage comes below kDamageStart.
-inline constexpr float kVolumeWakeTheta = 0.75f;  ///< A neighbour wakes, a box grows when this warm at its border [K].
-inline constexpr float kVolumeSleepTheta = 0.5f;  ///< A brick sleeps when nowhere warmer [K].
+/// Thresholds of waking and sleeping. They are higher than the sheet's, because a brick costs as much as many tiles and
+/// there is no damage below kDamageStart.
+/// Temperature at a border that wakes the neighbour or enlarges the box [K].
+inline constexpr float kVolumeWakeTheta = 0.75f;
+inline constexpr float kVolumeSleepTheta = 0.5f;  ///< A brick sleeps when its largest |theta| is below this [K].
 
 class VolumeField {
  public:
@@ -36,37 +38,37 @@ class VolumeField {
   [[nodiscard]] std::span<Brick* const> awake() const { return awake_; }
   [[nodiscard]] int bricks_x() const { return bricks_x_; }
   [[nodiscard]] int brick_count() const { return static_cast<int>(bricks_.size()); }
-  /// The brick, or nullptr when it never was awake or lies beyond the sheet.
+  /// Returns the brick, or nullptr if it was never awake or lies beyond the sheet.
   [[nodiscard]] Brick* Find(int bx, int by) const;
-  /// Wakes the brick with at least the cells of `need` in its box. nullptr beyond the sheet.
+  /// Wakes the brick and extends its box to the cells of `need`. Returns nullptr beyond the sheet.
   Brick* Wake(int bx, int by, const WarmBox& need);
 
-  /// Adds heat of the leak current beneath one cell of the sheet: q dt in the fat [J/m^3], come in duration_s. Too
-  /// little to wake sleeping tissue is left out.
+  /// Adds the heat that the leak current deposits in duration_s beneath one cell of the sheet: q dt in the fat [J/m^3].
+  /// Heat too small to wake sleeping tissue is left out.
   void AddSource(CellIndex cell, float heat_J_m3, float duration_s);
 
-  /// Largest rate of an explicit step that the lids may have, too [1/s]. 0 when all sleep.
+  /// Largest rate of an explicit step, lids included [1/s]; 0 if all bricks sleep.
   [[nodiscard]] float Rate() const;
-  /// Wakes neighbours and grows boxes where the front comes near.
+  /// Wakes neighbours and extends boxes where the heat front is near a border.
   void Spread();
-  /// One explicit step of all awake bricks with their lids and sources, dt * Rate() <= 1. Returns the heat that came in
-  /// through the lids [J].
+  /// One explicit step of all awake bricks with their lids and sources; requires dt * Rate() <= 1. Returns the heat
+  /// conducted in through the lids [J].
   double Advance(float dt_s);
-  /// Damage at the present temperature over dt; then cold bricks fall asleep.
+  /// Integrates damage at the present temperature over dt; then puts cold bricks to sleep.
   void Finish(float dt_s);
 
   /// Temperature above body at a depth below the sheet [K]; linear between layers.
   [[nodiscard]] float ThetaAt(const Vec2f& material, float depth_m) const;
-  /// How deep cells are dead (omega >= 1) below a place of the sheet [m]; 0: nowhere.
+  /// Depth down to which cells are dead (omega >= 1) below a place of the sheet [m]; 0 without dead cells.
   [[nodiscard]] float BurnDepth(const Vec2f& material) const;
-  /// The same at the worst place of all.
+  /// Largest burn depth of all places [m].
   [[nodiscard]] float deepest_burn_m() const { return deepest_burn_m_; }
   [[nodiscard]] float MaxTheta() const;
   /// Heat held by all awake bricks [J].
   [[nodiscard]] double Stored() const;
   [[nodiscard]] std::uint64_t quarantined() const { return quarantined_; }
 
-  /// Adds sums of the warm state and the ledger: a difference in any cell changes them.
+  /// Adds sums of the warm state and the ledger to a hash; a difference in any cell changes them.
   void AddSums(Hash64* hash) const;
 
   /// What a checkpoint holds beside the bricks.

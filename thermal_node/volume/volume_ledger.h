@@ -1,4 +1,4 @@
-// Where the energy of the volume came from and went, as Ledger does for the sheet.
+// Energy balance of the volume, as Ledger is that of the sheet.
 #pragma once
 
 #include <algorithm>
@@ -9,12 +9,12 @@ namespace fulcrum::thermal {
 /// All in joule since the start.
 struct VolumeLedger {
   double joule = 0;        ///< Deposited by the leak current.
-  double from_sheet = 0;   ///< Conducted from the sheet; what the sheet's ledger counts among its losses.
+  double from_sheet = 0;   ///< Conducted from the sheet; part of `lost` in the sheet's ledger.
   double perfused = 0;     ///< Carried away by blood.
-  double dropped = 0;      ///< Given up when a brick fell asleep.
-  double quarantined = 0;  ///< Taken out with cells that went bad.
+  double dropped = 0;      ///< Discarded when a brick fell asleep.
+  double quarantined = 0;  ///< Removed with quarantined cells.
 
-  /// |in - out - stored| relative to all that came in.
+  /// |in - out - stored| relative to the input.
   [[nodiscard]] double ClosureError(double stored) const {
     const double in = joule + from_sheet;
     return std::abs(in - perfused - dropped - quarantined - stored) /

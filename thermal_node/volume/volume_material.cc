@@ -19,8 +19,8 @@ VolumeMaterial MakeVolumeMaterial(const ThermalParams& p) {
   m.face[0] = 2.0f * m.k[0] / m.pitch_m;
   for (int k = 1; k < kLayers; ++k) m.face[k] = 2.0f * m.k[k - 1] * m.k[k] / ((m.k[k - 1] + m.k[k]) * m.pitch_m);
   m.perfusion = p.perfusion_per_s * kBloodHeatCapacity_J_m3K;
-  // The fat's resistance takes all the voltage. Where it ends within the volume, its depth is a whole number of layers,
-  // and the heat is that of the leak all the same.
+  // The whole voltage drops across the fat. If the fat ends within the volume, its depth is rounded to whole layers;
+  // the source is scaled so that its heat is still that of the leak.
   const bool ends_inside = p.fat_depth_m < m.depth_m();
   const float heated_m = ends_inside ? static_cast<float>(m.fat_layers) * m.pitch_m : p.fat_depth_m;
   m.source_per_V2 = p.sigma_fat_S_m / (p.fat_depth_m * heated_m);

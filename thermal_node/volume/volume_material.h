@@ -8,7 +8,7 @@
 namespace fulcrum::thermal {
 
 inline constexpr int kLayers = 32;  ///< Cells in depth.
-/// Edge of a cell over that of the sheet's cells: two cells lie under three.
+/// Ratio of the edges of the volume's and the sheet's cells: two cells lie under three.
 inline constexpr float kPitch = 1.5f;
 
 /// One tissue of the volume. Values of the lab; latent heats are assumed.

@@ -80,7 +80,7 @@ void NodeCutting(Report* report) {
       const SourceStats& stats = session.solver().source_stats();
       steps.solves += stats.solves;
       steps.by_change += stats.by_change;
-      steps.by_way += stats.by_way;
+      steps.by_travel += stats.by_travel;
       steps.by_floor += stats.by_floor;
     }
     if (repeat == 0) Picture(session.solver(), scene, drag.to - Vec2f(0, 0.004f), "scene");
@@ -97,7 +97,7 @@ void NodeCutting(Report* report) {
   const double frames = static_cast<double>(times.size());
   report->Add("thermal.node_cutting_5mm_s.coupling_steps_per_frame", steps.solves / frames, "1");
   report->Add("thermal.node_cutting_5mm_s.coupling_steps_by_change_pct", percent(steps.by_change), "%");
-  report->Add("thermal.node_cutting_5mm_s.coupling_steps_by_way_pct", percent(steps.by_way), "%");
+  report->Add("thermal.node_cutting_5mm_s.coupling_steps_by_way_pct", percent(steps.by_travel), "%");
   report->Add("thermal.node_cutting_5mm_s.coupling_steps_by_floor_pct", percent(steps.by_floor), "%");
 }
 

@@ -148,7 +148,7 @@ Footprint DiscAt(const Vec2f& at, float radius_m, float above_m) {
 TipInput Standing(TipInput input, float above_m = 0) {
   input.path.begin = DiscAt(input.path.from, input.path.radius_m, above_m);
   input.path.end = DiscAt(input.path.to, input.path.radius_m, above_m);
-  input.path.way = input.path.to - input.path.from;
+  input.path.displacement = input.path.to - input.path.from;
   return input;
 }
 

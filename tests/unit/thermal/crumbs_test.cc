@@ -57,11 +57,11 @@ TEST_F(CrumbsTest, APieceThatIsCutFreeGoesWithItsHeatBooked) {
   tile->state.enthalpy[Place(kMiddle)] = 20.0f * field_.material().HeatCapacity(1.0f);
   const double held = static_cast<double>(tile->state.enthalpy[Place(kMiddle)]) * tile->Volume(Place(kMiddle));
   const int before = CountRemoved();
-  const RemovedBox gone = crumbs_.TakeOut(&field_, changed_, &ledger_);
-  EXPECT_EQ(gone.low.ix, kMiddle.ix - 8);
-  EXPECT_EQ(gone.low.iy, kMiddle.iy - 8);
-  EXPECT_EQ(gone.high.ix, kMiddle.ix + 8);
-  EXPECT_EQ(gone.high.iy, kMiddle.iy + 8);
+  const RemovedBox removed = crumbs_.TakeOut(&field_, changed_, &ledger_);
+  EXPECT_EQ(removed.low.ix, kMiddle.ix - 8);
+  EXPECT_EQ(removed.low.iy, kMiddle.iy - 8);
+  EXPECT_EQ(removed.high.ix, kMiddle.ix + 8);
+  EXPECT_EQ(removed.high.iy, kMiddle.iy + 8);
   EXPECT_EQ(CountRemoved(), before + 17 * 17) << "its cells and no others";
   EXPECT_NEAR(ledger_.debris, held, 1e-6 * held);
   EXPECT_NEAR(crumbs_.area_m2(), 17 * 17 * kCell_m * kCell_m, 1e-9);

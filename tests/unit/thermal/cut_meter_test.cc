@@ -57,7 +57,7 @@ class Cut {
     for (int n = 0; n <= count; ++n) {
       const float at = length_m * static_cast<float>(n) / static_cast<float>(count);
       Disc(curve(at), half_m);
-      meter.AddWay(curve(std::max(at - kFine_m, 0.0f)), curve(at));
+      meter.AddPath(curve(std::max(at - kFine_m, 0.0f)), curve(at));
       if (n % between == between - 1 || n == count) Update();
     }
   }
@@ -76,9 +76,9 @@ class Cut {
 
 /// A round-ended slit grown from the middle of the sheet, `length_m` from end to end.
 void Straight(float angle, float length_m, float half_m, Cut* cut) {
-  const Vec2f way(std::cos(angle), std::sin(angle)), middle(0.0301f, 0.0252f);
+  const Vec2f direction(std::cos(angle), std::sin(angle)), middle(0.0301f, 0.0252f);
   const float inner = length_m - 2 * half_m;
-  cut->Line(middle - 0.5f * inner * way, middle + 0.5f * inner * way, half_m);
+  cut->Line(middle - 0.5f * inner * direction, middle + 0.5f * inner * direction, half_m);
 }
 
 std::function<Vec2f(float)> Circle(float radius_m) {
@@ -99,7 +99,7 @@ TEST(CutMeterTest, StraightSlitsOfAnyAngleAndWidthAreMeasured) {
       // The widths of one slit differ by a cell; beyond twice the reach they are not told.
       EXPECT_NEAR(cut.meter.width_p50_m(), 2 * half_m, 1e-4f);
       EXPECT_NEAR(cut.meter.width_p95_m(), 2 * half_m, 1e-4f);
-      EXPECT_LE(cut.meter.off_way_p95_m(), 1e-4f);
+      EXPECT_LE(cut.meter.off_path_p95_m(), 1e-4f);
     }
   }
 }
@@ -239,21 +239,21 @@ TEST(CutMeterTest, LengthNeverFalls) {
 
 TEST(CutMeterTest, StrayingIsTheDistanceFromTheWay) {
   Cut cut;
-  cut.meter.AddWay({0.01f, 0.0205f}, {0.02f, 0.0205f});
-  cut.meter.AddWay({0.02f, 0.0205f}, {0.03f, 0.0205f});
+  cut.meter.AddPath({0.01f, 0.0205f}, {0.02f, 0.0205f});
+  cut.meter.AddPath({0.02f, 0.0205f}, {0.03f, 0.0205f});
   for (int n = 0; n <= 50; ++n) {
     cut.Disc({0.01f + 4e-4f * static_cast<float>(n), 0.02f}, kHalf_m);
     cut.Update();
   }
-  EXPECT_NEAR(cut.meter.off_way_p95_m(), 5e-4f, 1e-4f);
+  EXPECT_NEAR(cut.meter.off_path_p95_m(), 5e-4f, 1e-4f);
   // Over the old way again, and where the line is: the points are few, and the distance is that of the nearest way.
-  const std::size_t points = cut.meter.way().points().size();
-  for (int n = 0; n < 20; ++n) cut.meter.AddWay({0.01f, 0.0205f}, {0.03f, 0.0205f});
-  EXPECT_LE(cut.meter.way().points().size(), points + 2);
-  cut.meter.AddWay({0.01f, 0.02f}, {0.03f, 0.02f});
+  const std::size_t points = cut.meter.path().points().size();
+  for (int n = 0; n < 20; ++n) cut.meter.AddPath({0.01f, 0.0205f}, {0.03f, 0.0205f});
+  EXPECT_LE(cut.meter.path().points().size(), points + 2);
+  cut.meter.AddPath({0.01f, 0.02f}, {0.03f, 0.02f});
   cut.Disc({0.0304f, 0.02f}, kHalf_m);
   cut.Update();
-  EXPECT_LE(cut.meter.off_way_p95_m(), 1e-4f);
+  EXPECT_LE(cut.meter.off_path_p95_m(), 1e-4f);
 }
 
 std::vector<CellIndex> LineOf(const CutMeter& meter) {
@@ -269,16 +269,17 @@ TEST(CutMeterTest, GoesOnInTheSameBitsFromItsStateAndTheHole) {
   CutMeter restored;
   const auto same = [&] {
     return restored.length_m() == cut.meter.length_m() && restored.width_p50_m() == cut.meter.width_p50_m() &&
-           restored.width_p95_m() == cut.meter.width_p95_m() && restored.off_way_p95_m() == cut.meter.off_way_p95_m() &&
+           restored.width_p95_m() == cut.meter.width_p95_m() &&
+           restored.off_path_p95_m() == cut.meter.off_path_p95_m() &&
            std::equal(restored.line().begin(), restored.line().end(), cut.meter.line().begin(), cut.meter.line().end());
   };
-  ASSERT_TRUE(restored.Restore(cut.field, cut.meter.length_m(), LineOf(cut.meter), cut.meter.way().points(),
-                               cut.meter.way().end()));
+  ASSERT_TRUE(restored.Restore(cut.field, cut.meter.length_m(), LineOf(cut.meter), cut.meter.path().points(),
+                               cut.meter.path().end()));
   EXPECT_TRUE(same());
   for (int n = 0; n <= 60; ++n) {
     const Vec2f from(0.05f - 2e-4f * static_cast<float>(n), 0.030f), to = from - Vec2f(2e-4f, 0);
-    cut.meter.AddWay(from, to);
-    restored.AddWay(from, to);
+    cut.meter.AddPath(from, to);
+    restored.AddPath(from, to);
     cut.Disc(to + Vec2f(0, 3e-4f), kHalf_m);
     const RemovedBox removed = cut.removed;
     cut.Update();
@@ -300,30 +301,30 @@ TEST(CutMeterTest, StateThatCannotBeOfThisHoleIsRefused) {
   Cut cut;
   cut.Line({0.01f, 0.02f}, {0.03f, 0.02f});
   const std::vector<CellIndex> line = LineOf(cut.meter);
-  const std::vector<ToolWay::Point> way(cut.meter.way().points().begin(), cut.meter.way().points().end());
-  const ToolWay::End end = cut.meter.way().end();
-  const auto accepts = [&](float length_m, const auto& cells, const auto& points, const ToolWay::End& last) {
+  const std::vector<ToolPath::Point> path(cut.meter.path().points().begin(), cut.meter.path().points().end());
+  const ToolPath::End end = cut.meter.path().end();
+  const auto accepts = [&](float length_m, const auto& cells, const auto& points, const ToolPath::End& last) {
     CutMeter meter;
     const bool good = meter.Restore(cut.field, length_m, cells, points, last);
     EXPECT_EQ(good, !meter.line().empty());
     return good;
   };
-  EXPECT_TRUE(accepts(0.02f, line, way, end));
-  EXPECT_FALSE(accepts(-1.0f, line, way, end));
-  EXPECT_FALSE(accepts(NAN, line, way, end));
+  EXPECT_TRUE(accepts(0.02f, line, path, end));
+  EXPECT_FALSE(accepts(-1.0f, line, path, end));
+  EXPECT_FALSE(accepts(NAN, line, path, end));
   std::vector<CellIndex> cells = line;
   std::swap(cells[3], cells[4]);
-  EXPECT_FALSE(accepts(0.02f, cells, way, end));
+  EXPECT_FALSE(accepts(0.02f, cells, path, end));
   cells = line;
   cells.back().iy += 40;
-  EXPECT_FALSE(accepts(0.02f, cells, way, end));
-  std::vector<ToolWay::Point> points = way;
+  EXPECT_FALSE(accepts(0.02f, cells, path, end));
+  std::vector<ToolPath::Point> points = path;
   points[5].previous = 6;
   EXPECT_FALSE(accepts(0.02f, line, points, end));
-  points = way;
+  points = path;
   points[5].s = NAN;
   EXPECT_FALSE(accepts(0.02f, line, points, end));
-  EXPECT_FALSE(accepts(0.02f, line, way, ToolWay::End{0, 0, static_cast<std::uint32_t>(way.size())}));
+  EXPECT_FALSE(accepts(0.02f, line, path, ToolPath::End{0, 0, static_cast<std::uint32_t>(path.size())}));
 }
 
 /// Pieces of a set of cells that touch over faces or corners.

@@ -135,11 +135,11 @@ TEST_F(ThermalNodeTest, TornEdgesOfOneTriangleAreJoinedToOneCrack) {
   const Vec2f from = 0.5f * (at(cell) + at(cell + 1)), to = 0.5f * (at(cell + cols) + at(cell + cols + 1));
   for (float u = 0.02f; u < 1.0f; u += 0.02f) {
     const CellIndex place = field.sheet().CellOf(from + u * (to - from));
-    const auto gone = [&](int dx) {
+    const auto removed = [&](int dx) {
       const Tile* tile = field.Find((place.ix + dx) / kTile, place.iy / kTile);
       return tile != nullptr && (tile->state.flags[place.iy % kTile * kTile + (place.ix + dx) % kTile] & kRemoved) != 0;
     };
-    EXPECT_TRUE(gone(0) || gone(-1) || gone(1)) << u;
+    EXPECT_TRUE(removed(0) || removed(-1) || removed(1)) << u;
   }
 }
 
@@ -270,9 +270,9 @@ TEST_F(ThermalNodeTest, TellsPhysicsWhatIsGoneAroundTheHook) {
         const CellIndex cell{cells.x + i - sheet.origin_x, cells.y + j - sheet.origin_y};
         const Tile* tile = node->solver().field().Find(cell.ix / kTile, cell.iy / kTile);
         const int k = (cell.iy % kTile) * kTile + cell.ix % kTile;
-        const bool gone = tile != nullptr && (tile->state.flags[k] & kRemoved) != 0;
-        ASSERT_EQ(cells.IsOpen(cells.x + i, cells.y + j), gone) << i << ", " << j;
-        count += gone ? 1 : 0;
+        const bool removed = tile != nullptr && (tile->state.flags[k] & kRemoved) != 0;
+        ASSERT_EQ(cells.IsOpen(cells.x + i, cells.y + j), removed) << i << ", " << j;
+        count += removed ? 1 : 0;
       }
     }
     EXPECT_GE(count, before);

@@ -120,11 +120,11 @@ TEST_F(TipTest, MetalIsSweptFromSampleToSample) {
   EXPECT_EQ(swept.path.begin.x, a.footprint.x);
   EXPECT_EQ(swept.path.end.x, b.footprint.x);
   EXPECT_EQ(swept.path.end.gap, b.footprint.gap);
-  EXPECT_EQ(swept.path.way, b.material - a.material);
+  EXPECT_EQ(swept.path.displacement, b.material - a.material);
   const TipPath half = PartOf(swept.path, 0.25f, 0.75f), quarter = PartOf(half, 0, 0.5f);
   EXPECT_FLOAT_EQ(quarter.part_from, 0.25f);
   EXPECT_FLOAT_EQ(quarter.part_to, 0.5f);
-  EXPECT_EQ(quarter.way, swept.path.way);
+  EXPECT_EQ(quarter.displacement, swept.path.displacement);
   EXPECT_NEAR(half.to.x(), 0.005225f, 1e-8f);
 }
 

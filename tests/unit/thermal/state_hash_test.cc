@@ -21,10 +21,10 @@ TEST(ThermalStateHash, IsTheSameOnEveryProcessor) {
   TipInput tip{.active = true, .touching = true, .path = {}, .mode = CauteryMode::kCut, .power_W = 40};
   tip.path.radius_m = view.thermal.hook_radius_m;
   tip.path.to = view.membrane_material[middle];
-  tip.path.way = Vec2f(kSpeed_m_s * kFrame_s, 0);
+  tip.path.displacement = Vec2f(kSpeed_m_s * kFrame_s, 0);
   for (int frame = 0; frame < 100; ++frame) {
     tip.path.from = tip.path.to;
-    tip.path.to += tip.path.way;
+    tip.path.to += tip.path.displacement;
     solver.Step(tip, kFrame_s);
   }
   EXPECT_GT(solver.cut_length_m(), 2e-3f) << "little was cut: the hash says little";

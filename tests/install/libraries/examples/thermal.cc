@@ -18,7 +18,7 @@ int main() {
     tip.path.radius_m = view.thermal.hook_radius_m;
     tip.path.from = begin + Vec2f(kSpeed_m_s * kFrame_s * static_cast<float>(frame), 0);
     tip.path.to = tip.path.from + Vec2f(kSpeed_m_s * kFrame_s, 0);
-    tip.path.way = tip.path.to - tip.path.from;
+    tip.path.displacement = tip.path.to - tip.path.from;
     heat.Step(tip, kFrame_s);
   }
   const float cut_mm = 1e3f * heat.cut_length_m();
