@@ -44,11 +44,12 @@ Options ParseOptions(int argc, const char* const* argv) {
     po::store(po::command_line_parser(argc - 1, argv + 1).options(known).style(style).run(), values);
     if (values.count("help") != 0) {
       std::ostringstream text;
-      text << "usage: haptics_node " << kName << " --cart FILE [--tool N] [options]\n\n"
-           << "Measures where a trocar is. With the tool in it, hold a button of the device down and swing the tool\n"
-           << "about the trocar, wide and in all directions, also in and out. The result is stored for the cart and\n"
-           << "loaded at each start of haptics_node.\n\n"
-           << known;
+      text
+          << "usage: haptics_node " << kName << " --cart FILE [--tool N] [options]\n\n"
+          << "Measures the position of a trocar. Insert the tool, hold a button of the device down and swing the tool\n"
+          << "about the trocar, widely and in all directions, also in and out. The result is stored for the cart and\n"
+          << "loaded at each start of haptics_node.\n\n"
+          << known;
       std::fputs(text.str().c_str(), stdout);
       options.help = true;
       return options;
@@ -67,7 +68,7 @@ Options ParseOptions(int argc, const char* const* argv) {
   return options;
 }
 
-/// One line that is written over, on a terminal only.
+/// Shows one line that each call overwrites, on a terminal only.
 void ShowProgress(double seconds, const std::string& trouble) {
   if (::isatty(STDERR_FILENO) == 0) return;
   std::fprintf(stderr, "\r\033[K%s", trouble.empty() ? "" : (trouble + "  ").c_str());

@@ -3,9 +3,9 @@
 
 namespace fulcrum::haptics {
 
-/// True when the command line asks for it.
+/// True if the command line calls the subcommand.
 [[nodiscard]] bool IsCalibrateCommand(int argc, const char* const* argv);
-/// main() of the subcommand: its exit code.
+/// main() of the subcommand; returns the exit code.
 [[nodiscard]] int CalibrateMain(int argc, const char* const* argv);
 
 }  // namespace fulcrum::haptics

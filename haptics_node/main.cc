@@ -47,6 +47,6 @@ int main(int argc, char** argv) {
   if (fulcrum::haptics::IsCalibrateCommand(argc, argv)) return fulcrum::haptics::CalibrateMain(argc, argv);
   return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kHaptics,
                                 "Reads the devices, renders the forces of the tissue, publishes ToolState at 1 kHz.\n"
-                                "`haptics_node calibrate-trocar --help`: measures where a trocar is.",
+                                "`haptics_node calibrate-trocar --help`: measures the position of a trocar.",
                                 RunHaptics);
 }

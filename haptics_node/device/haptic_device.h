@@ -1,4 +1,4 @@
-// What the servo sees of a haptic device.
+// Interface of a haptic device for the servo.
 #pragma once
 
 #include <array>
@@ -11,26 +11,26 @@
 
 namespace fulcrum::haptics {
 
-/// What Health says of a device.
+/// State of a device for Health.
 struct DeviceHealth {
-  double motor_heat = -1;  ///< Hottest motor, 0 cold … 1 the driver cuts the force; negative: not measured.
+  double motor_heat = -1;  ///< Heat of the hottest motor: 0 cold, 1 the driver cuts the force; negative: not measured.
   double gain = 1;         ///< Share of the force that reaches the hand, 0 … 1.
-  std::string trouble;     ///< What is wrong and what to check; empty when all is well.
+  std::string trouble;     ///< Fault and what to check; empty without a fault.
 };
 
 class HapticDevice {
  public:
   virtual ~HapticDevice() = default;
-  /// Where the attach point of the tool is now, in frame W [m]. Once per tick, on the servo thread: does not wait,
-  /// lock or allocate.
+  /// Position of the tool's attach point, in frame W [m]. Called once per tick on the servo thread: does not wait, lock
+  /// or allocate.
   [[nodiscard]] virtual Vec3d ReadPosition(const Tick& tick) noexcept = 0;
-  /// Force on the hand at the attach point, in frame W [N], held until the next call.
+  /// Sets the force on the hand at the attach point, in frame W [N]; it is held until the next call.
   virtual void WriteForce(const Vec3d& f_W) noexcept = 0;
-  /// Any thread but the servo's.
+  /// State for Health. Call from any thread except the servo's.
   [[nodiscard]] virtual DeviceHealth Describe() const { return {}; }
 };
 
-/// By tool; null for a tool without device.
+/// Devices by tool; null for a tool without device.
 using DeviceArray = std::array<std::unique_ptr<HapticDevice>, kMaxTools>;
 
 }  // namespace fulcrum::haptics

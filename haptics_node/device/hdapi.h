@@ -1,5 +1,5 @@
-// The driver of the Touch (HDAPI, libHD.so), loaded at run time: nothing of it is needed to build. Names and numbers
-// are the library's own; only what is used stands here.
+// Interface of the Touch's driver (HDAPI, libHD.so). The library is loaded at run time, so the build needs no file of
+// it. Names and values are those of the library, restricted to what is used.
 #pragma once
 
 #include <string>
@@ -26,13 +26,13 @@ inline constexpr Enum kCurrentButtons = 0x2000;    ///< Integer, bit per button.
 inline constexpr Enum kCurrentPosition = 0x2050;   ///< 3 doubles [mm].
 inline constexpr Enum kCurrentTransform = 0x2052;  ///< 16 doubles, column-major, translation in mm.
 inline constexpr Enum kSerialNumber = 0x2504;      ///< String.
-inline constexpr Enum kCalibrationStyle = 0x2555;  ///< Integer, bit per style that the device knows.
+inline constexpr Enum kCalibrationStyle = 0x2555;  ///< Integer, bit per style that the device supports.
 inline constexpr Enum kMaxForce = 0x2603;          ///< Double [N].
 inline constexpr Enum kMotorTemperature = 0x2605;  ///< 6 doubles, 0 cold … 1 hot.
 inline constexpr Enum kCurrentForce = 0x2700;      ///< 3 doubles [N].
-inline constexpr Enum kForceOutput = 0x4000;       ///< For enable and disable.
+inline constexpr Enum kForceOutput = 0x4000;       ///< Capability for Enable() and Disable().
 
-// Answers about the calibration, and its styles.
+// Results of CheckCalibration(), and calibration styles.
 inline constexpr Enum kCalibrationOk = 0x5000, kCalibrationNeedsUpdate = 0x5001;
 inline constexpr Enum kEncoderReset = 1, kAutomatic = 2, kInkwell = 4;
 
@@ -64,9 +64,9 @@ struct Api {
   void (*UpdateCalibration)(Enum);
 };
 
-/// Loads the library for the rest of the process: its threads would not survive that it is unloaded.
+/// Loads the library. It is never unloaded, because its threads keep running.
 /// @param library a path, or a name that the loader searches for.
-/// Throws InputError that says what is missing and what to install.
+/// Throws InputError that names what is missing and what to install.
 [[nodiscard]] Api Load(const std::string& library);
 
 }  // namespace fulcrum::haptics::hd

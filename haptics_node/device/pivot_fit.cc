@@ -52,7 +52,7 @@ PivotFit FitPivot(const std::vector<DevicePose>& poses) {
     right += across * pose.p_D;
   }
   const Eigen::SelfAdjointEigenSolver<Mat3d> eigen(normal);
-  // The smallest is the mean square of the sine between the shafts and their common axis.
+  // The smallest eigenvalue is the mean squared sine of the angle between the shafts and their common axis.
   const double smallest = std::max(0.0, eigen.eigenvalues()[0]), largest = eigen.eigenvalues()[2];
   fit.swing_rad = std::asin(std::sqrt(std::min(1.0, smallest)));
   if (smallest > 0) fit.condition = largest / smallest;

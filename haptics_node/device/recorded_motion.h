@@ -1,5 +1,5 @@
-// Poses of a hand over time, recorded with a device or made by hand: what a simulated device plays, and what a trocar
-// is calibrated from.
+// Poses of a hand over time, recorded with a device or written by hand. A simulated device plays them, and a trocar is
+// calibrated from them.
 //
 //   time_s,x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,buttons
 //   0.000,0.0,12.5,-3.0,0.0,-0.7071,-0.7071,1
@@ -24,14 +24,15 @@ struct DevicePose {
 
 class RecordedMotion {
  public:
-  /// Throws InputError naming file, line, value and valid range: no such file, another header, not eight finite numbers
-  /// a line, time that does not rise, a place beyond 2 m, an axis whose length is off 1 by more than 1 %, no poses or
-  /// more than a million.
+  /// Throws InputError naming file, line, value and valid range: no such file, another header, a line without exactly
+  /// eight finite numbers, time that does not increase, a place beyond 2 m, an axis whose length differs from 1 by more
+  /// than 1 %, no poses or more than a million.
   static RecordedMotion Load(const std::filesystem::path& file);
-  /// The same for text in memory; `name` stands for the file in messages.
+  /// The same for text in memory; `name` replaces the file name in messages.
   static RecordedMotion Parse(const std::string& text, const std::string& name);
 
-  /// Attach point at `time_s`, linear between poses; before the first and after the last pose at rest there [m].
+  /// Attach point at `time_s` [m], interpolated linearly between poses; constant before the first and after the last
+  /// pose.
   [[nodiscard]] Vec3d PositionAt(double time_s) const noexcept;
   [[nodiscard]] const std::vector<DevicePose>& poses() const noexcept { return poses_; }
 
@@ -39,7 +40,7 @@ class RecordedMotion {
   std::vector<DevicePose> poses_;
 };
 
-/// The text of a file that Parse() reads back.
+/// Text of a file with these poses, in the format of Parse().
 [[nodiscard]] std::string ToText(const std::vector<DevicePose>& poses);
 
 }  // namespace fulcrum::haptics

@@ -10,9 +10,9 @@ namespace fulcrum::haptics {
 namespace {
 
 constexpr double kStep_s = 1e-3;
-// After a longer gap than this the hand has long settled; it also bounds the work of one tick.
+// Longest simulated time of one tick: after a longer gap the hand has settled anyway; bounds the work of one tick.
 constexpr double kMaxCatchUp_s = 0.1;
-// Session time that runs apart from the clock by more than this is another session (or the first): begin anew.
+// If session time and clock differ by more than this, a new session has begun and the device restarts at rest.
 constexpr double kSessionJump_s = 0.05;
 
 }  // namespace

@@ -1,5 +1,5 @@
-// A device with an operator's hand on it: mass, spring and damper that follow a wanted place in session time, pushed by
-// the force sent. Stateless apart from session time: it begins at rest where the wanted place is.
+// A simulated device with a hand on it: mass, spring and damper that follow an intended place in session time, under
+// the force that is sent to the device. It starts at rest at the intended place, so a restart needs no stored state.
 #pragma once
 
 #include <cstdint>
@@ -18,15 +18,15 @@ namespace fulcrum::haptics {
 /// Moving mass of a desktop device such as the Touch, at the attach point [kg].
 inline constexpr double kDeviceMass_kg = 0.045;
 
-/// Where a tool that nothing moves rests: half of its shaft inside, pointing at the origin of W [m].
+/// Attach point of a tool at rest [m]: half of its shaft inside, pointing at the origin of W.
 [[nodiscard]] Vec3d RestingAttachPoint(const Trocar& trocar);
 
 class SimulatedDevice final : public HapticDevice {
  public:
-  /// The hand leads the tip along the scene's script.
+  /// The hand moves the tip along the scene's script.
   /// @param script keys of all tools; it must outlive the device. A tool without keys rests.
   SimulatedDevice(const HandModel& hand, const Trocar& trocar, std::span<const ScriptKey> script, std::uint32_t tool);
-  /// The hand plays a recorded motion of the attach point, which `map` brings into the world.
+  /// The hand plays a recorded motion of the attach point, transformed to the world by `map`.
   SimulatedDevice(const HandModel& hand, std::shared_ptr<const RecordedMotion> motion, const WorkspaceMap& map);
 
   /// Share of the force that reaches the hand, 0 … 1.
@@ -36,7 +36,7 @@ class SimulatedDevice final : public HapticDevice {
   void WriteForce(const Vec3d& f_W) noexcept override { force_ = force_scale_ * f_W; }
 
  private:
-  /// The attach point that the operator wants at this session time.
+  /// Intended attach point at this session time.
   [[nodiscard]] Vec3d Target(double session_time_s) const noexcept;
 
   HandModel hand_;

@@ -7,7 +7,7 @@
 namespace fulcrum::haptics {
 namespace {
 
-// A servo that was held up for longer must not fade or glide all at once.
+// Longest time step [s]: after a delay of the servo, fading and gliding must not jump.
 constexpr double kMaxDt_s = 0.02;
 
 }  // namespace
@@ -22,9 +22,9 @@ Vec3d TouchDevice::ReadPosition(const Tick& tick) noexcept {
   tick_ns_ = tick.stamp_ns;
   if (driver_->link(tool_).sample.TryTake(&sample_)) {
     sample_ns_ = tick.stamp_ns;
-    spoken_ = true;
+    has_reading_ = true;
   }
-  TrackPresence(spoken_ && 1e-9 * static_cast<double>(tick.stamp_ns - sample_ns_) <= kTouchStale_s, dt);
+  TrackPresence(has_reading_ && 1e-9 * static_cast<double>(tick.stamp_ns - sample_ns_) <= kTouchStale_s, dt);
   TrackHeat(dt);
   gain_.store(presence_ * coolness_, std::memory_order_relaxed);
   return position_W_;

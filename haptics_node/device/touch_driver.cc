@@ -11,20 +11,20 @@ namespace fulcrum::haptics {
 namespace {
 
 constexpr double kMetrePerMm = 1e-3;
-// No desktop device reaches further than this from its origin [m].
+// Upper limit of the reach of a desktop device from its origin [m].
 constexpr double kFarthest_m = 1.0;
-// Temperatures and calibration are asked for at a tenth of a second.
+// Temperatures and calibration are read every this many frames, ten times a second.
 constexpr std::uint64_t kSlowFrames = 100;
-// How long an error about forces is shown, and the motors count as warm.
+// Frames for which an error about forces is reported and the motors count as warm: one second.
 constexpr int kErrorFrames = 1000;
-// A servo that sends no force for 20 ms has stopped: the last force then goes down to nothing within 100 ms.
+// If the servo has sent no force for 20 ms it has stopped: the last force is reduced to 0 within 100 ms.
 constexpr int kHoldFrames = 20, kReleaseFrames = 100;
 constexpr int kMaxErrorsPerFrame = 8;
 constexpr unsigned long kSchedulerRate_Hz = 1000;
 constexpr std::size_t kMotors = 6;
 
 constexpr std::int64_t kRetry_ns = 2'000'000'000, kRetryBesideAnother_ns = 10'000'000'000;
-// A scheduler that has called nobody for this long has died with its device.
+// If the scheduler makes no callback for this long it has failed together with its device.
 constexpr std::int64_t kSchedulerDead_ns = 500'000'000;
 constexpr auto kMaintenancePeriod = std::chrono::milliseconds(100);
 
@@ -100,7 +100,7 @@ void TouchDriver::CheckCalibration(Device* device) noexcept {
   hd::Enum answer = api_.CheckCalibration();
   if (answer == hd::kCalibrationNeedsUpdate) {
     const auto styles = static_cast<unsigned>(device->calibration_style);
-    // The one that asks least of the operator.
+    // Selects the calibration style that requires the least action of the operator.
     api_.UpdateCalibration((styles & hd::kAutomatic) != 0u ? hd::kAutomatic
                            : (styles & hd::kInkwell) != 0u ? hd::kInkwell
                                                            : hd::kEncoderReset);
@@ -143,7 +143,7 @@ Vec3d TouchDriver::ForceToSend(Device* device) noexcept {
   if (!std::isfinite(size)) return Vec3d::Zero();
   const int late = std::max(0, device->frames_without_force - kHoldFrames);
   double share = 1.0 - static_cast<double>(late) / kReleaseFrames;
-  // Beyond its limit the driver would cut the force altogether.
+  // Above its limit the driver would switch the force off.
   if (size > device->max_force_N) share *= device->max_force_N / size;
   return share * device->force_D;
 }
@@ -191,7 +191,7 @@ void TouchDriver::Maintain(std::int64_t now_ns) {
   if (!waits || now_ns < retry_ns_) return;
   const bool first = retry_ns_ == 0 && losses() == 0;
   retry_ns_ = now_ns + (works ? kRetryBesideAnother_ns : kRetry_ns);
-  if (first) return;  // The constructor has only just tried.
+  if (first) return;  // The constructor has already tried to open the devices.
   StopScheduler();
   OpenDevices();
   StartScheduler();
@@ -210,10 +210,10 @@ void TouchDriver::OpenDevices() {
   Pair();
 }
 
-// The library may take seconds over a device that is not there: Health must not wait for it, so nothing of it is called
-// with the mutex held.
+// The library may take seconds for a device that is not connected. It is never called with the mutex held, so that
+// Health does not wait for it.
 void TouchDriver::Open(Device* device) {
-  // What an earlier device left behind is not this one's; a library that never runs dry is not waited for.
+  // Discards errors of an earlier device; their number is bounded in case the library reports errors without end.
   for (int i = 0; i < kMaxErrorsPerFrame && api_.GetError().code != 0; ++i) {
   }
   hd::Handle handle = api_.InitDevice(device->name.c_str());
@@ -309,24 +309,24 @@ std::string TouchDriver::Trouble(std::size_t tool) const {
     return "no Touch with serial number " + serial + "; found:" + (found.empty() ? " none" : found) +
            (failures.empty() ? "; check `serial` in the cart file" : "; " + failures);
   }
-  const std::string who = "Touch " + device->serial;
+  const std::string prefix = "Touch " + device->serial;
   switch (device->state.load(std::memory_order_relaxed)) {
     case State::kLost:
-      return who + " was lost (" + Describe(device->error.load(std::memory_order_relaxed)) +
-             "): check its cable and power; it is tried again on its own";
+      return prefix + " was lost (" + Describe(device->error.load(std::memory_order_relaxed)) +
+             "): check its cable and power; it is reopened automatically";
     case State::kUncalibrated:
-      return who + " is not calibrated: put the stylus into the inkwell until this is gone";
+      return prefix + " is not calibrated: put the stylus into the inkwell until this message disappears";
     default:
       break;
   }
   if (device->bad_position.load(std::memory_order_relaxed)) {
-    return who + " reports no valid position: restart it, then run its diagnostic program";
+    return prefix + " reports no valid position: restart it, then run its diagnostic program";
   }
   if (device->link->warm.load(std::memory_order_relaxed)) {
-    return who + " has hot motors: its force is off until they have cooled";
+    return prefix + " has hot motors: its force is off until they have cooled";
   }
   if (const unsigned refusal = device->refusal.load(std::memory_order_relaxed); refusal != 0) {
-    return who + " has refused a force (" + Describe(refusal) + "): move it more slowly, or lower force_scale";
+    return prefix + " has refused a force (" + Describe(refusal) + "): move it more slowly, or lower force_scale";
   }
   return {};
 }

@@ -1,13 +1,13 @@
-// One or two Touch devices behind HDAPI: opens and pairs them, exchanges positions and forces with the servo, watches
-// over motors and cables, and opens again what was lost.
+// Driver of one or two Touch devices through HDAPI: opens them and assigns them to tools, exchanges positions and
+// forces with the servo, monitors motors and cables, and reopens lost devices.
 //
 //     servo thread ──force──► TouchLink ──► scheduler callback of the library (1 kHz) ──► motors
 //                  ◄─sample──           ◄──
 //     any thread   ◄─Trouble()─ mutex ◄── Maintain(), ten times a second: calibrate, open again
 //
-// The library insists that devices are read and driven in its own scheduler. The servo keeps its own thread, which also
-// serves the bus's clock and the histograms, and exchanges the newest values with the callback without waiting: that
-// costs up to a period each way and leaves both running when the other one stops.
+// The library allows devices to be read and driven in its own scheduler only. The servo has its own thread, whose
+// period the bus and the histograms depend on, and exchanges the newest values with the callback without waiting. That
+// adds a delay of up to one period in each direction, and each thread keeps running if the other one stops.
 #pragma once
 
 #include <array>
@@ -30,52 +30,53 @@ namespace fulcrum::haptics {
 struct TouchSample {
   Vec3d p_D = Vec3d::Zero();    ///< Attach point [m].
   Vec3d d_D = -Vec3d::UnitZ();  ///< Unit vector along the tool, towards its tip: -z of the stylus.
-  int buttons = 0;              ///< Bit per button that is down.
+  int buttons = 0;              ///< Bit per pressed button.
 };
 
-/// What the servo and the scheduler's callback share of one tool.
+/// Data of one tool that the servo and the scheduler's callback share.
 struct TouchLink {
-  runtime::LatestValue<TouchSample> sample;  ///< Callback to servo; only while the device is calibrated and talks.
-  runtime::LatestValue<Vec3d> force_D;       ///< Servo to callback [N].
-  // Relaxed: figures of which only the newest matters.
+  runtime::LatestValue<TouchSample>
+      sample;  ///< Callback to servo; updated only while the device is calibrated and delivers readings.
+  runtime::LatestValue<Vec3d> force_D;  ///< Servo to callback [N].
+  // Relaxed order is enough: independent figures, only the newest value of each is used.
   std::atomic<double> motor_heat{-1};  ///< Hottest motor, 0 … 1; negative: not read yet.
   std::atomic<bool> warm{false};       ///< The driver has cut the force within the last second.
 };
 
 class TouchDriver {
  public:
-  /// Which device works a tool.
+  /// Device that is assigned to a tool.
   struct Wanted {
-    std::string name;    ///< As in the Touch's setup program.
-    std::string serial;  ///< Empty: whatever device has that name.
+    std::string name;    ///< Name in the Touch's setup program.
+    std::string serial;  ///< Empty: any device with that name.
   };
   using WantedByTool = std::array<std::optional<Wanted>, kMaxTools>;
 
-  /// Loads the library and opens the devices. Throws InputError when the library is missing; a missing device is no
-  /// error but trouble, since it may be plugged in later.
+  /// Loads the library and opens the devices. Throws InputError when the library is missing; a missing device is
+  /// reported by Trouble() only, because it may be connected later.
   explicit TouchDriver(const WantedByTool& wanted, const std::string& library = "libHD.so");
   ~TouchDriver();
   TouchDriver(const TouchDriver&) = delete;
   TouchDriver& operator=(const TouchDriver&) = delete;
 
-  /// Calls Maintain() from a thread of its own. Without it, call that yourself.
+  /// Starts a thread that calls Maintain(). Without it the caller must do so.
   void Start();
-  /// Opens again what is not open. That stops the scheduler for as long as the library takes, so another device that
-  /// works is disturbed only each ten seconds.
+  /// Opens devices that are not open. The scheduler is stopped meanwhile, which interrupts a working device, so that is
+  /// tried only every ten seconds.
   void Maintain(std::int64_t now_ns);
 
   [[nodiscard]] TouchLink& link(std::size_t tool) { return links_[tool]; }
-  /// What is wrong with the device of a tool and what to check; empty when all is well. Not for real-time threads.
+  /// Fault of a tool's device and what to check; empty without a fault. Not for real-time threads.
   [[nodiscard]] std::string Trouble(std::size_t tool) const;
-  /// Serial number of the device that works a tool; empty while there is none.
+  /// Serial number of a tool's device; empty while there is none.
   [[nodiscard]] std::string serial(std::size_t tool) const;
-  /// Times that a device that worked was lost.
+  /// Number of times that a working device was lost.
   [[nodiscard]] std::uint64_t losses() const { return losses_.load(std::memory_order_relaxed); }
 
  private:
   enum class State { kAbsent, kUncalibrated, kReady, kLost };
 
-  /// A device by its name. What the callback uses changes only while the scheduler stands still.
+  /// A device by its name. Members that the callback reads change only while the scheduler is stopped.
   struct Device {
     std::string name, serial, failure;
     hd::Handle handle = hd::kInvalidHandle;
@@ -83,9 +84,9 @@ class TouchDriver {
     int calibration_style = 0;
     TouchLink* link = nullptr;
     std::atomic<State> state{State::kAbsent};
-    std::atomic<unsigned> error{0};         ///< That it was lost with.
-    std::atomic<bool> bad_position{false};  ///< The last reading was no place that a device can be in.
-    std::atomic<unsigned> refusal{0};       ///< Of a force, within the last second; 0: none.
+    std::atomic<unsigned> error{0};         ///< Error code of the loss.
+    std::atomic<bool> bad_position{false};  ///< The last reading was outside the device's reach.
+    std::atomic<unsigned> refusal{0};       ///< Error code of a refused force within the last second; 0: none.
     // Callback only.
     std::uint64_t frames = 0;
     int frames_without_force = 0, warm_frames = 0, refusal_frames = 0;
@@ -117,7 +118,7 @@ class TouchDriver {
   std::atomic<std::uint64_t> ticks_{0}, losses_{0};
   std::uint64_t ticks_seen_ = 0;
   std::int64_t ticks_seen_ns_ = 0, retry_ns_ = 0;
-  mutable std::mutex mutex_;  ///< For handle, serial, failure and link of the devices.
+  mutable std::mutex mutex_;  ///< Guards handle, serial, failure and link of the devices.
   std::jthread maintenance_;
 };
 

@@ -1,5 +1,5 @@
-// From the frame of a haptic device to the world and back. The trocar ties the two together: its place in the device's
-// frame D is calibrated, its place in W is the scene's.
+// Transformation between the frame D of a haptic device and the world W. The trocar is the common point: its place in D
+// is calibrated, its place in W is given by the scene.
 //
 //     p_W = p_WP + scale R_WD (p_D - p_DP)        f_D = R_WD^T f_W
 #pragma once
@@ -18,7 +18,7 @@ struct WorkspaceMap {
   [[nodiscard]] Vec3d ForceToDevice(const Vec3d& f_W) const { return R_WD.transpose() * f_W; }
 };
 
-/// Turns about the fixed axes X, then Y, then Z [rad].
+/// Rotation about the fixed axes X, then Y, then Z [rad].
 [[nodiscard]] inline Mat3d RotationFromAngles(const Vec3d& angles_rad) {
   return (Eigen::AngleAxisd(angles_rad.z(), Vec3d::UnitZ()) * Eigen::AngleAxisd(angles_rad.y(), Vec3d::UnitY()) *
           Eigen::AngleAxisd(angles_rad.x(), Vec3d::UnitX()))

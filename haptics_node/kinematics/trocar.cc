@@ -47,7 +47,7 @@ Vec3d ForceAtTip(const TrocarPose& pose, const Vec3d& f_A) noexcept {
   const auto [along, across] = Levers(pose);
   const double f_along = pose.d_W.dot(f_A);
   Vec3d f_T = (f_A - f_along * pose.d_W) / across;
-  if (along > 0.5) f_T += f_along * pose.d_W;  // It is 1 or, clamped, 0.
+  if (along > 0.5) f_T += f_along * pose.d_W;  // `along` is 1, or 0 if a length is clamped.
   return f_T;
 }
 

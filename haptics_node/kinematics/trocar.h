@@ -13,8 +13,8 @@
 
 namespace fulcrum::haptics {
 
-/// Neither the part outside nor the part inside gets shorter than this: near the pivot a small motion of the hand would
-/// be a wild one of the shaft [m].
+/// Lower limit of the shaft's length outside and inside [m]: near the pivot a small motion of the hand would turn the
+/// shaft by a large angle.
 inline constexpr double kMinShaftPart_m = 0.015;
 
 struct Trocar {
@@ -28,27 +28,27 @@ struct TrocarPose {
   Eigen::Matrix3d J = Eigen::Matrix3d::Identity();  ///< d(tip)/d(attach point); symmetric.
 };
 
-/// Forward kinematics. J = -(l_t / l_h)(I - d d^T) + d d^T: sideways motion is inverted and scaled (the fulcrum
-/// effect), motion along the shaft passes. Where a part is clamped, J has no component along the shaft.
+/// Forward kinematics. J = -(l_t / l_h)(I - d d^T) + d d^T: lateral motion is inverted and scaled (the fulcrum effect),
+/// axial motion is transmitted unchanged. Where a part is clamped, J has no component along the shaft.
 [[nodiscard]] TrocarPose PoseFromAttachPoint(const Trocar& trocar, const Vec3d& p_WA) noexcept;
 
-/// The attach point that puts the tip at `p_WT`, clamped as above; a tip at the pivot itself points downwards.
+/// Attach point for a tip at `p_WT`, with the lengths clamped as above; for a tip at the pivot the shaft points down.
 [[nodiscard]] Vec3d AttachPointForTip(const Trocar& trocar, const Vec3d& p_WT) noexcept;
 
-/// Largest |J^T n| of any direction n: how much of a tip force the hand may feel.
+/// Largest |J^T n| over all unit vectors n: largest ratio of the force at the hand to that at the tip.
 [[nodiscard]] double LargestLever(const TrocarPose& pose) noexcept;
 
-/// Force at the attach point that does the work of `f_T` at the tip: J^T f_T, hence f_A . v_A = f_T . v_T.
+/// Force at the attach point that does the same work as `f_T` at the tip: J^T f_T, hence f_A . v_A = f_T . v_T.
 [[nodiscard]] inline Vec3d ForceAtAttachPoint(const TrocarPose& pose, const Vec3d& f_T) noexcept {
   return pose.J.transpose() * f_T;
 }
 
-/// The tip force that is felt as `f_A` at the attach point: the inverse of the above off the clamps. Along a clamped
-/// shaft, where the tip does not move, there is none.
+/// Tip force that is felt as `f_A` at the attach point: the inverse of the above where no length is clamped. If one is,
+/// the tip does not move along the shaft and the axial component is 0.
 [[nodiscard]] Vec3d ForceAtTip(const TrocarPose& pose, const Vec3d& f_A) noexcept;
 
 /// Orientation of the tool frame: z along the shaft, x the projection of `x_reference` on the plane normal to it.
-/// @pre x_reference is a unit vector; a shaft along it gets any x.
+/// @pre x_reference is a unit vector; for a shaft parallel to it x is arbitrary.
 [[nodiscard]] Eigen::Quaterniond ToolOrientation(const Vec3d& d_W, const Vec3d& x_reference) noexcept;
 
 }  // namespace fulcrum::haptics

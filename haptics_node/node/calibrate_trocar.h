@@ -1,4 +1,4 @@
-// The work behind `haptics_node calibrate-trocar`: poses of a tool that is moved about its trocar, and the fit.
+// Recording and result of `haptics_node calibrate-trocar`: poses of a tool that is moved about its trocar.
 #pragma once
 
 #include <functional>
@@ -12,16 +12,16 @@
 namespace fulcrum::haptics {
 
 struct TrocarMotion {
-  std::vector<DevicePose> poses;  ///< Those with a button down.
-  std::string serial;             ///< Of the device; empty for a simulated one.
+  std::vector<DevicePose> poses;  ///< Poses with a button pressed.
+  std::string serial;             ///< Serial number of the device; empty for a simulated one.
 };
 
-/// What the operator is told meanwhile; `seconds` of motion are there so far.
+/// Progress for the operator: `seconds` of motion recorded so far, and a problem of the device or an empty text.
 using TrocarProgress = std::function<void(double seconds, const std::string& trouble)>;
 
-/// Poses of the device of a tool while a button is held: a simulated device's whole recording at once; a Touch's in
-/// real time until `seconds` of motion are there. Throws InputError when the cart gives that tool no device that
-/// moves, and when a Touch gives no motion for a minute.
+/// Records poses of a tool's device while a button is held: the whole recording of a simulated device at once; a Touch
+/// in real time until there are `seconds` of motion. Throws InputError if the cart has no moving device for the tool,
+/// or a Touch delivers no motion for a minute.
 [[nodiscard]] TrocarMotion RecordTrocarMotion(const config::CartConfig& cart, std::size_t tool, double seconds,
                                               const std::string& touch_library, const TrocarProgress& progress);
 

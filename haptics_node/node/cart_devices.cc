@@ -28,19 +28,19 @@ HandModel HandOf(HandHold hold, const HapticsParams& scene) {
   return scene;
 }
 
-/// @param serial of the device at hand; empty: not known, or simulated.
+/// @param serial serial number of the connected device; empty if unknown or simulated.
 WorkspaceMap MapOf(const config::CartConfig& cart, std::size_t tool, const Vec3d& p_WP, const std::string& serial,
                    const std::filesystem::path& trocars, std::vector<std::string>* notes) {
   const config::WorkspaceConfig& workspace = cart.devices[tool].workspace;
   WorkspaceMap map{RotationFromAngles(workspace.rotation_rad), workspace.scale, workspace.trocar_D, p_WP};
   const std::filesystem::path file = TrocarFile(trocars, cart.name, tool);
-  const std::string who = "tool " + std::to_string(tool) + ": ";
+  const std::string prefix = "tool " + std::to_string(tool) + ": ";
   if (const auto stored = LoadTrocar(file)) {
     if (serial.empty() || stored->serial == serial) {
       map.p_DP = stored->p_DP;
-      notes->push_back(who + "trocar as measured, " + file.string());
+      notes->push_back(prefix + "trocar as measured, " + file.string());
     } else {
-      notes->push_back(who + "the trocar of the cart file is used: " + file.string() + " was measured with device " +
+      notes->push_back(prefix + "the trocar of the cart file is used: " + file.string() + " was measured with device " +
                        stored->serial + ", this is " + serial + "; calibrate the trocar again");
     }
   }

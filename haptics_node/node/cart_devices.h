@@ -1,4 +1,4 @@
-// From a cart's description to devices.
+// Creates the haptic devices that a cart describes.
 #pragma once
 
 #include <array>
@@ -20,12 +20,12 @@ inline constexpr const char* kTouchLibrary = "libHD.so";
 
 struct CartDevices {
   DeviceArray devices;
-  std::shared_ptr<TouchDriver> touch;  ///< Behind the Touch devices; null without. Start() its maintenance.
-  std::vector<std::string> notes;      ///< What was found and which trocars are in use, a line each, for the log.
+  std::shared_ptr<TouchDriver> touch;  ///< Driver of the Touch devices, null without any. The caller must Start() it.
+  std::vector<std::string> notes;      ///< Devices found and trocars in use, one line each, for the log.
 };
 
-/// Opens what the cart names for the tools of the scene; a trocar in `trocars` stands above the cart's own, unless
-/// another device measured it. Throws InputError.
+/// Opens the devices that the cart names for the tools of the scene. A trocar stored in `trocars` takes precedence over
+/// the cart's, unless it was measured with another device. Throws InputError.
 [[nodiscard]] CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& scene,
                                           const std::filesystem::path& trocars,
                                           const std::string& touch_library = kTouchLibrary);

@@ -48,7 +48,8 @@ HapticsNode::HapticsNode(const SceneView& scene, DeviceArray devices, const Port
 }
 
 void HapticsNode::ServoStep(const Tick& tick) noexcept {
-  // The newest one alone: a replay knows which model a tick took, not which ones a late tick passed over.
+  // Only the newest model is offered: the manifest records the model that a tick took, not the models that a late tick
+  // skipped, so a replay could not repeat those.
   bool arrived = false;
   while (to_servo_.TryPop(&arrived_)) arrived = true;
   if (arrived) servo_.OfferModel(arrived_, tick.stamp_ns);
@@ -92,10 +93,10 @@ void HapticsNode::FillHealth(Health* health) const {
   metric("records_lost", static_cast<double>(records_lost_.load(std::memory_order_relaxed)));
   metric("forces_not_finite", static_cast<double>(figures.not_finite));
   FillDeviceHealth(health);
-  // Before the first model there is nothing to miss.
+  // Before the first model there is no age to report.
   if (figures.model_age_s > 1e-9 * static_cast<double>(kHoldAge_ns)) {
     AddTrouble(health, "no contact model for " + std::to_string(static_cast<int>(1e3 * figures.model_age_s)) +
-                           " ms: forces are off until physics is back");
+                           " ms: forces are off until physics_node publishes again");
   }
 }
 

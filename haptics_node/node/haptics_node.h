@@ -1,4 +1,4 @@
-// The haptics node on ports. Two threads: the servo's, which touches no port, and the bus thread, which carries
+// The haptics node on ports. It has two threads: the servo thread, which uses no port, and the bus thread, which moves
 // messages between the ports and two lock-free rings.
 #pragma once
 
@@ -17,7 +17,7 @@
 
 namespace fulcrum::haptics {
 
-/// A manifest goes out at each tick that admits a contact model, and at least this often [ticks].
+/// A manifest is published for each tick that admits a contact model, and at least every this many ticks.
 inline constexpr std::uint64_t kTicksPerManifest = 10;
 
 class HapticsNode {
@@ -42,7 +42,7 @@ class HapticsNode {
   /// before and after ServoStep() on one thread.
   void BusStep();
 
-  /// Of the servo after the newest tick that BusStep() has published. Bus thread.
+  /// State hash of the servo after the newest tick that BusStep() has published. Bus thread.
   [[nodiscard]] std::uint64_t state_hash() const { return record_.state_hash; }
 
   /// Any thread.
@@ -57,7 +57,8 @@ class HapticsNode {
   Servo servo_;
   const std::uint64_t epoch_;
 
-  // A servo that is held up for long drops the newest models and records, and says so in Health.
+  // If the servo is delayed for longer than a ring holds, the newest models and records are dropped and counted in
+  // Health.
   runtime::SpscRing<ContactModel, 8> to_servo_;
   runtime::SpscRing<ServoRecord, 256> from_servo_;
   runtime::SeqLock<ServoFigures> figures_;

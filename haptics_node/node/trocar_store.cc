@@ -42,7 +42,7 @@ std::optional<StoredTrocar> LoadTrocar(const fs::path& file) {
   StoredTrocar stored;
   stored.serial = root.TextOr("serial", "");
   stored.p_DP = Vec3d(root.NumbersSi("trocar_mm", 3, 3, Range::Between(-1000, 1000)).data());
-  // How good it was, for who reads the file; what was not good enough was never stored.
+  // Quality of the fit, for persons who read the file; checked, not used. A fit that is not good enough is not stored.
   root.NumberSi("residual_mm", Range::Between(0, 1e3 * kMaxPivotResidual_m));
   root.Number("condition", Range::Between(1, kMaxPivotCondition));
   root.NumberSi("swing_deg", Range::Between(0, 90));

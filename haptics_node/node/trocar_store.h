@@ -1,5 +1,5 @@
-// Trocar pivots that `haptics_node calibrate-trocar` has measured: one file per cart and tool, in the user's state
-// folder, so that they outlive sessions and installations.
+// Trocar pivots measured by `haptics_node calibrate-trocar`: one file per cart and tool, in the user's state folder, so
+// that they survive sessions and reinstallations.
 #pragma once
 
 #include <filesystem>
@@ -19,10 +19,10 @@ namespace fulcrum::haptics {
                                                std::size_t tool);
 
 struct StoredTrocar {
-  std::string serial;          ///< Of the device that measured it; empty for a simulated one.
-  Vec3d p_DP = Vec3d::Zero();  ///< [m]
+  std::string serial;          ///< Serial number of the measuring device; empty for a simulated one.
+  Vec3d p_DP = Vec3d::Zero();  ///< Pivot in frame D [m].
 };
-/// Nothing when there is no such file. Throws InputError for one that cannot be used.
+/// Loads a pivot; no value if the file does not exist. Throws InputError for an invalid file.
 [[nodiscard]] std::optional<StoredTrocar> LoadTrocar(const std::filesystem::path& file);
 /// Replaces the file as a whole. Throws InputError when it cannot be written.
 void SaveTrocar(const std::filesystem::path& file, const std::string& serial, const PivotFit& fit);

@@ -17,7 +17,7 @@ void AgeMachine::Step(std::int64_t t_s_ns, std::int64_t now_ns, double dt) noexc
   old_ = !lost && age > kNormalAge_ns;
   if (lost && state_ != ServoState::kOff && state_ != ServoState::kFade) {
     state_ = ServoState::kFade;
-    fresh_ = 0;  // Those that came before count for nothing.
+    fresh_ = 0;  // Earlier models do not count.
   } else if (!lost && creeping() && state_ != ServoState::kRise && fresh_ >= kFreshForReturn) {
     state_ = ServoState::kRise;
   }

@@ -6,8 +6,9 @@
 namespace fulcrum::haptics {
 namespace {
 
-// Both terms alone bound the root from above. Newton from the right on a convex rising function converges without
-// overshoot, and from the smaller bound five iterations reach double precision whichever term rules.
+// Each term alone gives an upper bound of the root. Newton's method started above the root of a convex increasing
+// function converges without overshoot; from the smaller bound five iterations reach double precision for any ratio of
+// the terms.
 constexpr int kNewtonIterations = 5;
 
 double Smoothstep(double u) noexcept {
@@ -44,7 +45,7 @@ ContactForce StepGrasp(const ContactLaw& law, const Vec3d& x, const BodyStep& bo
   double stretch = SolveSkin(law.k1, law.k3, compliance, depth);
   double force = SkinForce(law, stretch);
   if (law.slip_force > 0.0 && force > law.slip_force) {
-    // The tissue runs through the jaws: the anchor follows until the force is the one at which it slips.
+    // The tissue slips in the jaws: the anchor moves until the force equals the slip force.
     force = law.slip_force;
     stretch = SkinStretch(law.k1, law.k3, force);
     state->anchor = x - q_free - (stretch + compliance * force) * direction;
@@ -72,7 +73,7 @@ ContactForce StepSurface(const ContactLaw& law, const Vec3d& x, const BodyStep& 
   state->q = q_free + body.compliance * normal_force;
 
   const Vec3d qt_free = body.keep * state->q_t + (1.0 - body.keep) * law.q0_t;
-  Vec3d drag = Vec3d::Zero();  // Of the tool on the tissue, along the surface.
+  Vec3d drag = Vec3d::Zero();  // Tangential force of the tool on the tissue.
   if (law.kt > 0.0 && normal_force > 0.0) {
     const Vec3d lag = x - state->anchor - qt_free;
     const Vec3d stick = lag - n.dot(lag) * n;
@@ -82,11 +83,12 @@ ContactForce StepSurface(const ContactLaw& law, const Vec3d& x, const BodyStep& 
     if (size > limit) drag *= limit / size;
   }
   state->q_t = qt_free + body.compliance * drag;
-  // Sticking leaves the anchor where it was; slipping, or out of contact, it follows the tool.
+  // In sticking friction the anchor stays; in sliding friction and out of contact it follows the tool.
   const double along = law.kt > 0.0 ? 1.0 / law.kt + law.coupling : 0.0;
   state->anchor = x - state->q_t - along * drag;
 
-  // Beyond the radius within which physics vouches for it the model must not stand as an endless wall.
+  // Beyond the radius of validity that physics states, the force fades, so that the tangent plane does not act as an
+  // infinite wall.
   const Vec3d away = x - law.x_ref;
   const double distance = (away - law.n.dot(away) * law.n).norm();
   const double trust = law.radius > 0.0 ? 1.0 - Smoothstep(distance / law.radius - 1.0) : 1.0;
@@ -152,8 +154,8 @@ ContactLaw MakeContactLaw(const Contact& contact, double coupling, ContactState*
   law.radius = contact.radius;
   law.coupling = coupling;
 
-  // The body spring's rest displacement follows from the force that displacement and rate are known to carry:
-  // Kb (q - q0) + Bb dq/dt = f.
+  // The body spring's rest displacement q0 follows from the known force, displacement and rate: Kb (q - q0) + Bb dq/dt
+  // = f.
   const Vec3d f = contact.f_ref.cast<double>();
   const Vec3d u = contact.u_c.cast<double>();
   const Vec3d du = contact.du_c.cast<double>();
@@ -170,7 +172,7 @@ ContactLaw MakeContactLaw(const Contact& contact, double coupling, ContactState*
   const double normal_force = std::max(0.0, law.n.dot(f));
   state->q = -law.n.dot(u);
   law.q0 = state->q + (law.b_body * -law.n.dot(du) - normal_force) / law.k_body;
-  // Depth at x_ref as the force says it is; before touch as the gap says.
+  // Depth at x_ref: from the reference force in contact, from the gap before contact.
   const double stretch = normal_force > 0.0 ? SkinStretch(law.k1, law.k3, normal_force) : -contact.gap;
   const Vec3d d = law.x_ref - law.p_s;
   const double d1 = law.e1.dot(d);
@@ -188,7 +190,7 @@ ContactLaw MakeContactLaw(const Contact& contact, double coupling, ContactState*
 ContactForce StepContact(const ContactLaw& law, const Vec3d& x, double t, double dt, ContactState* state) noexcept {
   if (law.kind == ContactKind::kNone) return {};
   const BodyStep body(law, dt);
-  const Vec3d x_still = x - t * law.v_s;  // Seen from the moving surface.
+  const Vec3d x_still = x - t * law.v_s;  // Tip relative to the moving surface.
   return law.kind == ContactKind::kGrasp ? StepGrasp(law, x_still, body, state)
                                          : StepSurface(law, x_still, body, state);
 }

@@ -32,24 +32,25 @@ struct ContactLaw {
   Vec3d q0_t = Vec3d::Zero();  ///< The same along the surface; of a grasp in all directions [m].
 };
 
-/// What changes from tick to tick.
+/// State of a contact, advanced in each tick.
 struct ContactState {
-  double q = 0;                  ///< Displacement of the body, inwards [m].
-  Vec3d q_t = Vec3d::Zero();     ///< The same along the surface; of a grasp in all directions [m].
-  Vec3d anchor = Vec3d::Zero();  ///< Where the tool holds the surface, less its motion v_s t [m].
+  double q = 0;               ///< Displacement of the body, inwards [m].
+  Vec3d q_t = Vec3d::Zero();  ///< The same along the surface; of a grasp in all directions [m].
+  /// Anchor of the friction spring on the surface, without the surface's motion v_s t [m].
+  Vec3d anchor = Vec3d::Zero();
 };
 
 struct ContactForce {
-  Vec3d f_W = Vec3d::Zero();  ///< Of the tissue on the tool [N].
-  double stored_J = 0;        ///< Elastic energy that the tool could get back.
+  Vec3d f_W = Vec3d::Zero();  ///< Force of the tissue on the tool [N].
+  double stored_J = 0;        ///< Elastic energy that the contact can return to the tool.
 };
 
-/// Law and initial state, at the message's own time t_s, of a contact that has passed the gate. The state continues
-/// what physics measured: displacement u_c at rate du_c under the force f_ref at the tip position x_ref.
+/// Law and initial state, at the message's own time t_s, of a contact that has passed the gate. The initial state is
+/// the one that physics computed: displacement u_c at rate du_c under the force f_ref at the tip position x_ref.
 [[nodiscard]] ContactLaw MakeContactLaw(const Contact& contact, double coupling, ContactState* state) noexcept;
 
 /// Advances the state by dt with the tip at `x`, `t` after the message's time, and returns the force. Implicit in the
-/// body and in the force, so stable for any stiffness; at most a few Newton iterations in one unknown.
+/// body and in the force, so stable for any stiffness; the cost is bounded by a few Newton iterations in one unknown.
 [[nodiscard]] ContactForce StepContact(const ContactLaw& law, const Vec3d& x, double t, double dt,
                                        ContactState* state) noexcept;
 

@@ -6,7 +6,8 @@
 namespace fulcrum::haptics {
 namespace {
 
-// Steps of a replay follow the stamps of the ring; a gap (the servo was held up) is bridged in one step of at most:
+// Bounds of a replay's step [s]. Steps follow the stamps of the ring; a gap (the servo was delayed) is bridged in one
+// step of at most kMaxReplayStep_s.
 constexpr double kMaxReplayStep_s = 0.02;
 constexpr double kMinReplayStep_s = 1e-5;
 
@@ -26,9 +27,9 @@ double Seconds(std::int64_t ns) noexcept { return 1e-9 * static_cast<double>(ns)
 }  // namespace
 
 double LocalModel::CouplingFor(const Contact& contact, std::uint32_t count, const HandMapping& hand) const noexcept {
-  // What the hand feels of a tip stiffness K is J^T K J: the skin along the normal where it was measured and, of a
-  // surface, kt across it; of a grasp the same in the worst direction. The contacts of a device act in parallel and
-  // share the cap.
+  // A tip stiffness K is felt at the hand as J^T K J. For a surface that is the skin stiffness along the measured
+  // normal and kt across it; for a grasp its stiffness in the least favourable direction. The contacts of a device act
+  // in parallel and share the stiffness limit.
   const auto needed = [&](double stiffness, double lever) {
     if (stiffness <= 0.0) return 0.0;
     const double compliance = hand.force_scale * lever * lever * count / kMaxHandStiffness_N_m;
@@ -40,7 +41,7 @@ double LocalModel::CouplingFor(const Contact& contact, std::uint32_t count, cons
   const bool grasp = contact.kind == ContactKind::kGrasp;
   const double straight = grasp ? worst : ForceAtAttachPoint(hand.pose, contact.n.cast<double>()).norm();
   double coupling = std::max(needed(skin, straight), grasp ? 0.0 : needed(contact.kt, worst));
-  // A coupling that gets stiffer in mid-contact would put energy in: it only ever gives more.
+  // A coupling that stiffens during contact would add energy, so its compliance never decreases in a contact.
   const ContactSet& set = sets_[current_];
   for (std::uint32_t i = 0; i < set.count; ++i) {
     if (set.laws[i].id == contact.id && set.laws[i].kind == contact.kind) {
@@ -67,11 +68,11 @@ void LocalModel::Learn(const DeviceContacts& contacts, std::int64_t t_s_ns) noex
   const auto* const then =
       std::find_if(std::as_const(predictions_).data(), end, [=](const Prediction& p) { return p.stamp_ns == t_s_ns; });
   if (same && then != end) {
-    // Of a surface only the pressure tells: sliding friction follows it whatever the stiffness.
+    // For a surface only the normal force is evaluated: sliding friction is proportional to it for any stiffness.
     const Vec3d direction = (grasp ? Vec3d(then->f_W - reference_f_W_) : pressure).stableNormalized();
     correction_.Learn(direction.dot(reference_f_W_), direction.dot(then->f_W), direction.dot(reported));
   } else if (!same) {
-    correction_.Doubt();
+    correction_.ResetVariance();
   }
   reference_f_W_ = reported;
   prediction_count_ = 0;
@@ -93,7 +94,7 @@ void LocalModel::Accept(const DeviceContacts& contacts, std::int64_t t_s_ns, std
     const double coupling = CouplingFor(contact, set.count, hand);
     set.laws[i] = MakeContactLaw(contact, coupling, &set.states[i]);
   }
-  // The newest entry of the ring is this tick's: Step() is about to take it.
+  // The newest entry of the ring belongs to this tick and is evaluated by Step().
   std::int64_t previous_ns = t_s_ns;
   for (std::size_t age = set.count > 0 ? ring.CountAfter(t_s_ns) : 0; age > 1; --age) {
     const TimedTip& tip = ring.Newest(age - 1);
@@ -114,7 +115,7 @@ ModelForce LocalModel::StepSet(ContactSet* set, const Vec3d& x, std::int64_t now
     const ContactForce force = StepContact(set->laws[i], x, t, dt, &set->states[i]);
     total.f_W += force.f_W;
     total.stored_J += force.stored_J;
-    // Each contact has a proxy of its own; the tool's is their mean by force.
+    // Each contact has its own proxy; the tool's proxy is their mean, weighted by force.
     const double size = force.f_W.norm();
     total.offset += size * set->laws[i].coupling * force.f_W;
     weight += size;

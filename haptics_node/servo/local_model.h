@@ -19,26 +19,27 @@ inline constexpr double kMaxHandStiffness_N_m = 1200.0;
 /// A new model takes over during this time [ns].
 inline constexpr std::int64_t kCrossFade_ns = 10'000'000;
 
-/// How tip stiffness becomes hand stiffness: k_hand = scale |J^T n|^2 k_tip.
+/// Mapping from tip stiffness to hand stiffness: k_hand = scale |J^T n|^2 k_tip.
 struct HandMapping {
   double force_scale = 1;
   TrocarPose pose;
 };
 
 struct ModelForce {
-  Vec3d f_W = Vec3d::Zero();     ///< Of the tissue on the tool, before force_scale [N].
-  Vec3d offset = Vec3d::Zero();  ///< Proxy minus tip: what the virtual coupling gives way [m].
+  Vec3d f_W = Vec3d::Zero();     ///< Force of the tissue on the tool, before force_scale [N].
+  Vec3d offset = Vec3d::Zero();  ///< Proxy minus tip: deflection of the virtual coupling [m].
   double stored_J = 0;
-  bool touching = false;  ///< The newest model has at least one contact, be it only near.
+  bool touching = false;  ///< The newest model has at least one contact, also one that is only near.
 };
 
 class LocalModel {
  public:
-  /// False while a cross-fade runs: the caller keeps the message and asks again. A cross-fade cut short would step.
+  /// False while a cross-fade runs; the caller then keeps the message and retries, because the force would jump if the
+  /// cross-fade were cut short.
   [[nodiscard]] bool ready(std::int64_t now_ns) const noexcept { return now_ns - fade_start_ns_ >= kCrossFade_ns; }
 
-  /// Takes over the contacts of a message for time `t_s_ns` and replays them over the ring. Learns first from what the
-  /// message before had predicted for that time.
+  /// Takes over the contacts of a message for time `t_s_ns` and replays them over the ring. First updates the stiffness
+  /// correction with the force that the previous message had predicted for that time.
   /// @pre ready(); the contacts have passed the gate.
   void Accept(const DeviceContacts& contacts, std::int64_t t_s_ns, std::int64_t now_ns, const HandMapping& hand,
               const PoseRing& ring) noexcept;
@@ -73,7 +74,7 @@ class LocalModel {
   std::int64_t fade_start_ns_ = -kCrossFade_ns;
   StiffnessCorrection correction_;
   Vec3d reference_f_W_ = Vec3d::Zero();                      ///< Sum of the reference forces of the current set.
-  std::array<Prediction, PoseRing::kCapacity> predictions_;  ///< Of the current set, by tick.
+  std::array<Prediction, PoseRing::kCapacity> predictions_;  ///< Predicted forces of the current set, by tick.
   std::size_t prediction_count_ = 0;
 };
 

@@ -5,7 +5,7 @@
 namespace fulcrum::haptics {
 namespace {
 
-// Written so that a NaN fails each of them.
+// The comparisons are written so that NaN fails.
 bool Within(float value, float low, float high) noexcept { return value >= low && value <= high; }
 bool Shorter(const Vec3f& v, float limit) noexcept { return v.squaredNorm() <= limit * limit; }
 bool IsUnit(const Vec3f& v) noexcept {
@@ -42,14 +42,14 @@ bool IsRenderable(const Contact& c) noexcept {
 }
 
 bool ModelGate::IsInOrder(const ContactModel& model, std::int64_t now_ns) const noexcept {
-  // Physics that has not seen a tool yet has nothing to say to the servo; a stamp ahead of now is not of this clock.
+  // Without a tool stamp physics has not received a tool sample yet; a stamp in the future belongs to another clock.
   if (model.tool_stamp_ns <= 0 || model.tool_stamp_ns > now_ns) return false;
-  // One such message would shut out all that come after it.
+  // A stamp or epoch in the future would make the gate reject all later messages.
   if (model.stamp.stamp_ns > now_ns + kClockSlack_ns || model.stamp.epoch > static_cast<std::uint64_t>(now_ns)) {
     return false;
   }
   if (model.stamp.epoch != epoch_) return model.stamp.epoch > epoch_;
-  // Two models may stand on the same tool sample, when physics was faster than the bus.
+  // Two models may be based on the same tool sample, if physics ran faster than the bus.
   return model.stamp.sequence > sequence_ && model.stamp.stamp_ns > stamp_ns_ && model.tool_stamp_ns >= tool_stamp_ns_;
 }
 

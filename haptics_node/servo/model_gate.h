@@ -1,5 +1,5 @@
-// What a contact model must satisfy before the servo may render it. The bus has already dropped what is not finite or
-// absurd; this gate holds the narrower ranges within which the servo is known to be stable.
+// Conditions that a contact model must satisfy before the servo renders it. The bus has already dropped values that are
+// not finite or far out of range; this gate checks the narrower ranges within which the servo is known to be stable.
 #pragma once
 
 #include <cstdint>
@@ -18,20 +18,20 @@ inline constexpr float kMaxFriction = 2.0f;
 inline constexpr float kMaxReferenceForce_N = 20.0f;
 inline constexpr float kUnitNormalTolerance = 0.01f;
 inline constexpr float kMaxCurvature_per_m = 2e3f;  ///< A radius of half a millimetre.
-inline constexpr float kMaxLength_m = 1.0f;         ///< Of gaps, displacements, radii.
+inline constexpr float kMaxLength_m = 1.0f;         ///< Limit of gaps, displacements and radii.
 inline constexpr float kMaxRate_m_s = 10.0f;
 inline constexpr float kMaxPlace_m = 10.0f;
 inline constexpr float kMaxExternalPower_W = 0.05f;
-/// A message may be stamped so much later than the tick that looks at it began [ns].
+/// A message may be stamped this much later than the start of the tick that reads it [ns].
 inline constexpr std::int64_t kClockSlack_ns = 10'000'000;
 
 /// Ranges of one contact, each number finite.
 [[nodiscard]] bool IsRenderable(const Contact& contact) noexcept;
 
-/// Follows the stream: sequence and time must grow within an epoch, and an epoch once left never comes back.
+/// Checks the order of the stream: sequence and time must increase within an epoch, and epochs must not decrease.
 class ModelGate {
  public:
-  /// True: render it. False: dropped and counted.
+  /// Returns true if the model may be rendered; otherwise it is dropped and counted.
   [[nodiscard]] bool Admit(const ContactModel& model, std::int64_t now_ns) noexcept;
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
 

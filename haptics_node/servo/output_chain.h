@@ -16,11 +16,11 @@ inline constexpr double kCreepSlew_N_per_ms = 0.02;
 struct OutputChain {
   double limit_N = 3.3;
   double slew_N_per_ms = 0.4;
-  Vec3d sent = Vec3d::Zero();    ///< What went to the motors last [N].
+  Vec3d sent = Vec3d::Zero();    ///< Last force sent to the motors [N].
   std::uint64_t not_finite = 0;  ///< Forces replaced by zero.
 
-  /// The force to send for the force `wanted`, both at the attach point. `dt` of the tick, nominal: a late tick may not
-  /// move the force further than a punctual one.
+  /// Returns the force to send for the force `wanted`, both at the attach point. `dt` is the nominal period, so that a
+  /// late tick does not change the force by more than a punctual one.
   [[nodiscard]] Vec3d Step(const Vec3d& wanted, bool creep, double dt) noexcept {
     Vec3d f = Finite(wanted);
     f = Limited(f);
@@ -31,7 +31,7 @@ struct OutputChain {
 
  private:
   [[nodiscard]] Vec3d Finite(const Vec3d& f) noexcept {
-    // Beyond 1e100 the square overflows; such a force is no more meant than an infinite one.
+    // For components beyond 1e154 the square overflows; such a force is treated like an infinite one.
     if (std::isfinite(f.squaredNorm())) return f;
     ++not_finite;
     return Vec3d::Zero();

@@ -1,4 +1,4 @@
-// The servo's own memory of where the tip was: what a new model is replayed over.
+// Recent tip positions of the servo, over which a new model is replayed.
 #pragma once
 
 #include <array>

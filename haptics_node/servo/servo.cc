@@ -10,9 +10,10 @@
 namespace fulcrum::haptics {
 namespace {
 
-// Velocities are differences of positions, smoothed with this time constant: a few ticks, well under a hand's motion.
+// Velocities are differences of positions, low-pass filtered with this time constant: a few ticks, well below the time
+// scale of hand motion.
 constexpr double kVelocityFilter_s = 0.003;
-// Bounds of the time between two ticks: below, a difference is all noise; above, the servo was held up.
+// Bounds of the time between two ticks [s]: below, a difference quotient is mostly noise; above, the servo was delayed.
 constexpr double kMinDt_s = 1e-4;
 constexpr double kMaxDt_s = 0.02;
 
@@ -23,8 +24,8 @@ Vec3f FieldCentre(const SceneView& scene) {
   return scene.rest_position.empty() ? sum : Vec3f(sum / static_cast<float>(scene.rest_position.size()));
 }
 
-/// World X, or Y where the shaft points from its trocar to the tissue within 18 degrees of X: the roll of a tool is
-/// free, but must not jump in mid-motion, nor with a restart.
+/// World X, or Y where the direction from trocar to tissue is within 18 degrees of X. The roll of a tool is arbitrary,
+/// but it must not jump during a motion or at a restart.
 Vec3d RollReference(const Vec3f& p_WP, const Vec3f& field_centre) {
   constexpr float kNearlyAlong = 0.95f;
   return std::abs((field_centre - p_WP).normalized().x()) > kNearlyAlong ? Vec3d::UnitY() : Vec3d::UnitX();
@@ -55,7 +56,7 @@ Servo::Servo(const ServoSettings& settings, const Devices& devices) : force_scal
 void Servo::OfferModel(const ContactModel& model, std::int64_t now_ns) noexcept {
   if (!gate_.Admit(model, now_ns)) return;
   age_.OnModel(model.tool_stamp_ns, now_ns);
-  pending_ = model;  // A newer one replaces one that still waits.
+  pending_ = model;  // Replaces an older model that is still pending.
   has_pending_ = true;
   record_.model_epoch = model.stamp.epoch;
   record_.model_sequence = model.stamp.sequence;
@@ -77,7 +78,7 @@ void Servo::Step(const Tick& tick) noexcept {
 void Servo::ReadDevice(Channel* channel, const Tick& tick) const noexcept {
   if (channel->device == nullptr) return;
   const Vec3d read = channel->device->ReadPosition(tick);
-  // A reading that is no number would stay in every filter for good: the last one stands in.
+  // A reading that is not finite would remain in every filter, so the last valid one is used instead.
   const Vec3d p_WA = read.allFinite() ? read : channel->p_WA;
   channel->moved = channel->started ? Vec3d(p_WA - channel->p_WA) : Vec3d(Vec3d::Zero());
   channel->p_WA = p_WA;
@@ -87,7 +88,7 @@ void Servo::ReadDevice(Channel* channel, const Tick& tick) const noexcept {
 }
 
 void Servo::TakePendingModel(std::int64_t now_ns) noexcept {
-  // The channels fade in step, so the first one speaks for all.
+  // All channels cross-fade at the same time, so checking the first one is enough.
   if (!has_pending_ || !channels_.front().model.ready(now_ns)) return;
   for (std::size_t i = 0; i < channels_.size(); ++i) {
     Channel& channel = channels_[i];
@@ -119,7 +120,7 @@ void Servo::TrackProxy(Channel* channel, const Vec3d& offset, bool first) const 
   if (!first) {
     const double blend = dt_ / (dt_ + kVelocityFilter_s);
     const Eigen::Quaterniond turn = q_WT * channel->q_WT.conjugate();
-    // Twice the vector part is the rotation vector of a small turn; the sign picks the short way round.
+    // Twice the vector part is the rotation vector of a small rotation; the sign selects the shorter direction.
     const Vec3d w = std::copysign(2.0, turn.w()) / dt_ * turn.vec();
     channel->v_WT += blend * ((p_WT - channel->p_WT) / dt_ - channel->v_WT);
     channel->w_WT += blend * (w - channel->w_WT);

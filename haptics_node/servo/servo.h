@@ -1,5 +1,5 @@
-// The 1 kHz servo as a pure object: devices and contact models in, forces to the devices and a record of the tick out.
-// Nothing here waits, locks, logs, allocates or throws.
+// The 1 kHz servo without ports, clock or thread: devices and contact models in, forces to the devices and a record of
+// the tick out. OfferModel() and Step() do not wait, lock, log, allocate or throw.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@
 
 namespace fulcrum::haptics {
 
-/// What one tick leaves behind for the bus. `tool.stamp` carries the time of the tick; its sequence is the writer's.
+/// Result of one tick for the bus. `tool.stamp` has the time of the tick; its sequence is set by the writer.
 struct ServoRecord {
   ToolState tool;
   std::uint64_t tick = 0;
@@ -29,17 +29,17 @@ struct ServoRecord {
   bool model_taken = false;                           ///< A model was offered and admitted since the last tick.
 };
 
-/// Figures for Health; plain, so that another thread can be given a copy.
+/// Figures for Health; trivially copyable, so that another thread can get a copy through a SeqLock.
 struct ServoFigures {
   ServoState state = ServoState::kOff;
-  double model_age_s = -1;  ///< Of the model in use; negative when there is none.
+  double model_age_s = -1;  ///< Age of the model in use; negative if there is none.
   double peak_force_N = 0;  ///< Largest force on a hand since the start.
   std::array<double, kMaxTools> force_N{};
   std::uint64_t models_dropped = 0;
   std::uint64_t not_finite = 0;
 };
 
-/// What a servo is set up with: the slice of a scene that it needs.
+/// Settings of a servo: the part of a scene that it needs.
 struct ServoSettings {
   HapticsParams params;
   std::array<ToolDescription, kMaxTools> tools{};
@@ -52,10 +52,10 @@ class Servo {
  public:
   using Devices = std::array<HapticDevice*, kMaxTools>;
 
-  /// Devices may be null; the others must outlive the servo. Throws InputError for a shaft too short to turn about.
+  /// Devices may be null; those that are not must outlive the servo. Throws InputError for a shaft that is too short.
   Servo(const ServoSettings& settings, const Devices& devices);
 
-  /// A contact model that has come in; before Step() of the tick that shall know of it.
+  /// Offers a received contact model; call before Step() of the tick that should use it.
   void OfferModel(const ContactModel& model, std::int64_t now_ns) noexcept;
   /// One tick of 1 ms nominal.
   void Step(const Tick& tick) noexcept;
@@ -77,7 +77,7 @@ class Servo {
     LocalModel model;
     PassivityController passivity;
     OutputChain output;
-    Vec3d p_WT = Vec3d::Zero(), v_WT = Vec3d::Zero(), w_WT = Vec3d::Zero();  ///< Of the proxy.
+    Vec3d p_WT = Vec3d::Zero(), v_WT = Vec3d::Zero(), w_WT = Vec3d::Zero();  ///< Position and velocities of the proxy.
     Eigen::Quaterniond q_WT = Eigen::Quaterniond::Identity();
     double external_W = 0;
   };

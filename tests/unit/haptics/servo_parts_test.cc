@@ -316,7 +316,7 @@ TEST(StiffnessCorrection, StaysWithinItsBoundsWhateverComes) {
   StiffnessCorrection correction;
   const auto wild = [&] { return normal(random) * std::pow(10.0, exponent(random)); };
   for (int i = 0; i < 100000; ++i) {
-    if (i % 97 == 0) correction.Doubt();
+    if (i % 97 == 0) correction.ResetVariance();
     const double start = wild();
     correction.Learn(start, start + wild(), start + wild());
     ASSERT_LE(correction.scale(), kMaxStiffnessCorrection);
