@@ -12,7 +12,8 @@ namespace {
 
 fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
   using namespace fulcrum::handle_bridge;
-  // Silent until the session is known: after a restart in mid-session the script's first key would be a false angle.
+  // Sends nothing until the session time is known: after a restart during a session the script's first key would be a
+  // wrong angle.
   const auto follow_script = [&app](std::int64_t now_ns) -> std::optional<OperatorInput> {
     const double time_s = app.SessionTime(now_ns);
     return time_s < 0 ? std::nullopt : std::optional(FollowScript(app.scene(), app.cart(), time_s));
@@ -37,6 +38,6 @@ int main(int argc, char** argv) {
   }
   return fulcrum::app::NodeMain(argc, argv, fulcrum::NodeId::kHandleBridge,
                                 "Jaw angles and foot pedal from serial lines.\n"
-                                "`handle_bridge calibrate --help`: calibrates a handle in the hand.",
+                                "`handle_bridge calibrate --help`: calibrates a handle.",
                                 RunBridge);
 }

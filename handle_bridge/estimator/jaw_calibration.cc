@@ -26,7 +26,8 @@ JawCalibration::JawCalibration(std::span<const double> codes, std::span<const do
     const double weight = (h0 + 2 * h1) / (3 * (h0 + h1));
     slopes_[i] = chord[i - 1] * chord[i] / (weight * chord[i] + (1 - weight) * chord[i - 1]);
   }
-  // Ends: one-sided three-point slope, held between nothing and three chords so that the end pieces stay monotone.
+  // Ends: one-sided three-point slope, limited to between 0 and three times the slope of the chord, so that the end
+  // pieces stay monotone.
   const auto end_slope = [](double h0, double h1, double d0, double d1) {
     const double slope = ((2 * h0 + h1) * d0 - h0 * d1) / (h0 + h1);
     return std::clamp(slope / d0, 0.1, 3.0) * d0;

@@ -8,13 +8,15 @@
 namespace fulcrum::handle_bridge {
 namespace {
 
-constexpr double kStep = 0.02;          ///< Counts between places that are weighed.
-constexpr double kReach = 1.0;          ///< Counts beyond the codes seen where the place may be.
-constexpr double kMinSigma = 0.05;      ///< Counts: below it a hold shows one code wherever it is.
-constexpr double kMaxSigma = 1.0;       ///< Counts: above JawCalibrator::kMaxSpread.
-constexpr double kSigmaFactor = 1.1;    ///< Between spreads that are weighed.
-constexpr double kGlitchShare = 1e-5;   ///< Readings that follow no normal distribution.
-constexpr double kExtremeCodes = 1022;  ///< 0 and 1023 are a converter at its stop, not an angle.
+constexpr double kStep = 0.02;  ///< Grid spacing of the position of a hold [counts].
+constexpr double kReach = 1.0;  ///< The grid extends this far beyond the received codes [counts].
+/// Smallest standard deviation [counts]: below it a hold has a single code in any position.
+constexpr double kMinSigma = 0.05;
+constexpr double kMaxSigma = 1.0;     ///< Largest standard deviation [counts]; above JawCalibrator::kMaxSpread.
+constexpr double kSigmaFactor = 1.1;  ///< Ratio of consecutive standard deviations of the grid.
+/// Share of outliers among the readings, uniformly distributed; keeps the likelihood above 0.
+constexpr double kGlitchShare = 1e-5;
+constexpr double kExtremeCodes = 1022;  ///< Codes 0 and 1023 mean a converter at its limit, not an angle.
 
 std::string Text(const char* format, double a, double b) {
   char text[160];
@@ -24,7 +26,7 @@ std::string Text(const char* format, double a, double b) {
 
 double NormalCdf(double x) { return 0.5 * std::erfc(-x / std::numbers::sqrt2); }
 
-/// Posterior of one hold's place for a spread: its mean, and the logarithm of its mass.
+/// Posterior of one hold's position for a given standard deviation: its mean, and the logarithm of its mass.
 struct Posterior {
   double mean = 0;
   double log_mass = 0;
@@ -84,7 +86,7 @@ std::string JawCalibrator::Add(double angle_deg, std::span<const int> codes) {
     }
   }
   if (holds_.size() >= 2) {
-    // All pairs must rise together, or all fall.
+    // The angle must increase with the code for all pairs, or decrease for all.
     const auto rises = [](const Hold& a, const Hold& b) {
       return (a.angle_deg < b.angle_deg) == (a.mean_code < b.mean_code);
     };

@@ -1,4 +1,4 @@
-// Finds the calibration of a handle from holds at known angles.
+// Computes the calibration of a handle from holds at known angles.
 #pragma once
 
 #include <cstddef>
@@ -8,26 +8,28 @@
 
 namespace fulcrum::handle_bridge {
 
-/// A calibration as it is stored: points of JawCalibration.
+/// Stored form of a calibration: the points of JawCalibration.
 struct CalibrationPoints {
   std::vector<double> codes;       ///< [counts], strictly rising.
   std::vector<double> angles_deg;  ///< Strictly monotone.
 };
 
-/// Takes one hold after the other. A mean of codes is wrong by up to 0.13 counts (0.23 deg) when noise and tremor move
-/// the voltage by only a fifth of a count: what counts is how often each code came. So the place of each hold is the
-/// mean of its posterior given the histogram of its codes, with one unknown spread (normal, standard deviation even in
-/// its logarithm) for all holds together, which are the same hand and the same converter.
+/// Collects holds, one per angle. If noise and tremor move the voltage by only a fifth of a count, the mean of the
+/// codes has an error of up to 0.13 counts (0.23 deg). So the position of each hold between the codes is estimated from
+/// the histogram of its codes, as the posterior mean. Model: normally distributed readings with one unknown standard
+/// deviation for all holds, which share hand and converter; its prior is uniform in the logarithm.
 class JawCalibrator {
  public:
-  static constexpr double kMaxSpread = 0.75;  ///< Counts, standard deviation of a hold: 1.3 deg of an unsteady hand.
-  static constexpr double kMinGap = 4;        ///< Counts between neighbours: closer, and the converter makes the slope.
-  static constexpr std::size_t kMinCodes = 100;
+  /// Largest standard deviation of a hold [counts]: 1.3 deg of an unsteady hand.
+  static constexpr double kMaxSpread = 0.75;
+  /// Smallest distance of neighbours [counts]: below it the converter's quantisation dominates the slope.
+  static constexpr double kMinGap = 4;
+  static constexpr std::size_t kMinCodes = 100;  ///< Smallest number of readings of a hold.
 
-  /// A hold at this angle. Returns an empty string when it was taken, else why not, in one line for people.
+  /// Adds a hold at this angle. Returns an empty text if it is accepted, otherwise the reason in one line for people.
   [[nodiscard]] std::string Add(double angle_deg, std::span<const int> codes);
   [[nodiscard]] std::size_t size() const { return holds_.size(); }
-  /// The points in the order of their codes. @pre size() >= 2
+  /// Points in ascending order of their codes. @pre size() >= 2
   [[nodiscard]] CalibrationPoints Solve() const;
 
  private:
@@ -35,7 +37,7 @@ class JawCalibrator {
     double angle_deg = 0;
     double mean_code = 0;
     int first_code = 0;
-    std::vector<int> counts;  ///< How often first_code, first_code + 1, … came.
+    std::vector<int> counts;  ///< Number of readings of first_code, first_code + 1, …
   };
   std::vector<Hold> holds_;
 };

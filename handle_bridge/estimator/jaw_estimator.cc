@@ -8,17 +8,18 @@
 namespace fulcrum::handle_bridge {
 namespace {
 
-/// Beyond six standard deviations on one side the truncated moments lose all their digits.
+/// Distance of an interval from the mean, in standard deviations, beyond which cancellation makes the truncated moments
+/// useless.
 constexpr double kFarSigmas = 6.0;
-/// Likelihood of such an interval, N(6) tail: keeps every mode alive.
+/// Likelihood of such an interval, the tail of the normal distribution at 6: keeps the weight of every mode above 0.
 constexpr double kFarLikelihood = 1e-9;
 constexpr double kMinWeight = 1e-6;
-/// Uncertainty of the rate at the first code [deg/s].
+/// Standard deviation of the rate at the first code [deg/s].
 constexpr double kStartRate = 100.0;
 
 double NormalPdf(double x) { return std::exp(-0.5 * x * x) * (std::numbers::inv_sqrtpi / std::numbers::sqrt2); }
 
-/// P(a < X < b), from the tail that keeps its digits.
+/// P(a < X < b) of the standard normal distribution, computed from the tail without cancellation.
 double NormalMass(double a, double b) {
   constexpr double kInvSqrt2 = 1.0 / std::numbers::sqrt2;
   if (a > 0) {
@@ -90,7 +91,7 @@ void JawEstimator::Propagate() noexcept {
     m.p_aa += dt * (2.0 * m.p_ar + dt * m.p_rr);
     m.p_ar = keep * (m.p_ar + dt * m.p_rr);
     m.p_rr *= keep * keep;
-    // A rate step q that builds up evenly over the period moves the angle by q dt / 2.
+    // A rate change q that is linear over the period moves the angle by q dt / 2.
     const double q = settings_.rate_noise_deg_s[j];
     m.p_aa += 0.25 * dt * dt * q * q;
     m.p_ar += 0.5 * dt * q * q;
@@ -107,10 +108,10 @@ void JawEstimator::Observe(double low_deg, double high_deg, double noise_deg) no
     const double alpha = (low_deg - m.angle) / root;
     const double beta = (high_deg - m.angle) / root;
     double likelihood = kFarLikelihood;
-    double mean = 0;    // Of the truncated standard normal, and
+    double mean = 0;    // Mean of the truncated standard normal, and
     double shrink = 0;  // its variance.
     if (alpha > kFarSigmas || beta < -kFarSigmas) {
-      mean = alpha > kFarSigmas ? alpha : beta;  // Snap to the nearer edge.
+      mean = alpha > kFarSigmas ? alpha : beta;  // The nearer edge of the interval.
     } else {
       likelihood = std::max(NormalMass(alpha, beta), kFarLikelihood);
       const double pdf_a = NormalPdf(alpha);

@@ -1,6 +1,6 @@
 // Jaw angle and rate from coarse codes: an interacting multiple model (IMM) filter whose measurement is not a number
 // but the interval of angles that a code stands for. 60 degrees are only 34.8 codes, 1.72 degrees each: the filter
-// finds the angle between the codes from when they change.
+// resolves angles between the codes from the times at which the code changes.
 #pragma once
 
 #include <array>
@@ -13,9 +13,9 @@ inline constexpr int kJawModes = 3;
 
 struct JawEstimatorSettings {
   double dt_s = 1.0 / 400.0;
-  double noise_V = 1.46e-3;  ///< Analogue noise and tremor before the converter, standard deviation.
+  double noise_V = 1.46e-3;  ///< Standard deviation of analogue noise and tremor before the converter.
   double adc_step_V = 5.0 / 1024;
-  double switch_probability = 0.018;  ///< A period, to each of the other modes together.
+  double switch_probability = 0.018;  ///< Probability per period of leaving a mode, shared by the other modes.
   double hold_leak_per_s = 2.0;       ///< Decay of velocity in the hold mode.
   /// Velocity noise of each mode per period [deg/s]: hold, move, snap.
   std::array<double, kJawModes> rate_noise_deg_s = {0.035, 1.0, 8.0};
@@ -32,16 +32,16 @@ class JawEstimator {
  public:
   JawEstimator(const JawEstimatorSettings& settings, const JawCalibration& calibration);
 
-  /// One period passes; the line for it was lost or bad.
+  /// Advances by one period whose line was lost or bad.
   void Predict() noexcept;
-  /// One period passes and its code is known.
+  /// Advances by one period with a received code.
   void Update(int code) noexcept;
-  /// The link is silent: keeps the angle and forgets the motion.
+  /// Keeps the angle and sets the rate to 0; for a silent link.
   void Hold() noexcept;
-  /// The next Update starts anew.
+  /// Resets the filter: the next Update starts it again.
   void Reset() noexcept;
 
-  /// Angle within the calibrated range.
+  /// Angle, limited to the calibrated range, and rate.
   [[nodiscard]] JawEstimate estimate() const noexcept;
   /// False until the first Update.
   [[nodiscard]] bool started() const noexcept { return started_; }

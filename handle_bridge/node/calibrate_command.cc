@@ -27,9 +27,9 @@ namespace {
 
 namespace po = boost::program_options;
 
-constexpr double kSettle_s = 0.3;   ///< After Enter: the hand moves when the other one types.
-constexpr double kHold_s = 1.0;     ///< What a point is taken from.
-constexpr double kSilence_s = 1.0;  ///< Without enough readings: the link is at fault.
+constexpr double kSettle_s = 0.3;   ///< Settling time after Enter: the hand moves while the other one presses the key.
+constexpr double kHold_s = 1.0;     ///< Duration of the readings for a point.
+constexpr double kSilence_s = 1.0;  ///< Timeout without enough readings: a fault of the link.
 constexpr auto kPoll = std::chrono::milliseconds(2);
 
 constexpr const char* kUsage =
@@ -72,7 +72,7 @@ std::vector<double> ParseAngles(const std::string& text) {
   return angles;
 }
 
-/// Nothing when help was asked for and printed.
+/// Parses the options; no value if help was requested and printed.
 std::optional<Options> Parse(const std::vector<std::string>& words, std::ostream& out) {
   po::options_description known("Options");
   known.add_options()                                                                                           //
@@ -106,13 +106,13 @@ std::optional<Options> Parse(const std::vector<std::string>& words, std::ostream
   return options;
 }
 
-/// The link of one handle, read without a node.
+/// Reads the link of one handle, without a node.
 class Reader {
  public:
   Reader(const config::HandleConfig& handle, std::unique_ptr<WatchedLink> link)
       : link_(std::move(link)), gate_(AllCodes(handle)) {}
 
-  /// Reads on; appends the codes that came.
+  /// Reads the link and appends the received codes.
   void Poll(std::vector<int>* codes) {
     const std::int64_t now_ns = runtime::MonotonicNs();
     const double dt_s = last_ns_ == 0 ? 0.0 : 1e-9 * static_cast<double>(now_ns - last_ns_);
@@ -146,7 +146,7 @@ class Reader {
       }
     }
     monitor_.Add(counts, dt_s);
-    link_->Judge(counts, dt_s);
+    link_->Evaluate(counts, dt_s);
   }
   [[nodiscard]] LinkState state() const { return link_->state(monitor_.state()); }
   /// Serial number; empty before the first connection.
@@ -165,7 +165,7 @@ class Reader {
   std::int64_t last_ns_ = 0;
 };
 
-/// Codes of the next `seconds` with readings; gives up after kSilence_s more.
+/// Codes of the next `seconds` with readings; returns after kSilence_s more at the latest.
 std::vector<int> ReadFor(Reader* reader, double seconds) {
   std::vector<int> codes;
   const auto enough = static_cast<std::size_t>(seconds * kLineRate_Hz);
@@ -177,7 +177,7 @@ std::vector<int> ReadFor(Reader* reader, double seconds) {
   return codes;
 }
 
-/// Waits for Enter, reading on so that no old codes pile up. False: the operator has left.
+/// Waits for Enter and discards codes meanwhile. Returns false if the operator has ended the input.
 bool WaitForEnter(Reader* reader, std::istream& in) {
   std::atomic<bool> answered{false};
   bool line = false;
@@ -195,7 +195,7 @@ bool WaitForEnter(Reader* reader, std::istream& in) {
   return line;
 }
 
-/// Why the hold gave nothing to calibrate with, the link's own trouble first; empty when the point was taken.
+/// Measures a point. Returns why it was rejected (a fault of the link first), or an empty text.
 std::string TakePoint(Reader* reader, double angle_deg, JawCalibrator* calibrator, std::size_t* readings) {
   static_cast<void>(ReadFor(reader, kSettle_s));
   const std::vector<int> codes = ReadFor(reader, kHold_s);

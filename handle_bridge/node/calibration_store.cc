@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using config::Range;
 
-/// A file name for any serial number.
+/// Valid file name for any serial number.
 std::string FileName(const std::string& unit) {
   std::string name = unit;
   std::replace_if(
@@ -86,7 +86,7 @@ fs::path CalibrationStore::Save(const fs::path& folder, const std::string& unit,
   const fs::path draft = path.string() + ".new";
   {
     std::ofstream out(draft);
-    out << "# Taken in the hand by `handle_bridge calibrate`: jaw angles at codes of the converter.\n"
+    out << "# Measured by `handle_bridge calibrate`: jaw angles at codes of the converter.\n"
         << "unit: " << Quoted(unit) << "\n"
         << "codes: " << List(points.codes) << "\n"
         << "angles_deg: " << List(points.angles_deg) << "\n";

@@ -1,4 +1,5 @@
-// Calibrations that `handle_bridge calibrate` took, one file per unit: <serial number>.yaml in a folder of the user.
+// Calibrations measured by `handle_bridge calibrate`, one file per unit: <serial number>.yaml in the user's state
+// folder.
 #pragma once
 
 #include <filesystem>
@@ -10,21 +11,21 @@
 
 namespace fulcrum::handle_bridge {
 
-/// $XDG_STATE_HOME/fulcrum/handles, by default ~/.local/state/fulcrum/handles: it outlives sessions, as the handles do.
+/// $XDG_STATE_HOME/fulcrum/handles, by default ~/.local/state/fulcrum/handles: it survives sessions.
 [[nodiscard]] std::filesystem::path CalibrationFolder();
 
 class CalibrationStore {
  public:
-  /// Reads every file of the folder; a folder that is not there has none. Throws InputError that names file, key, value
+  /// Reads every file of the folder; a missing folder counts as empty. Throws InputError that names file, key, value
   /// and valid range.
   static CalibrationStore Load(const std::filesystem::path& folder);
-  /// Writes or replaces the unit's file, whole or not at all. Returns its path; throws std::runtime_error.
+  /// Writes or replaces the unit's file atomically. Returns its path; throws std::runtime_error.
   static std::filesystem::path Save(const std::filesystem::path& folder, const std::string& unit,
                                     const CalibrationPoints& points);
 
-  /// Units and folder, in one line for the log.
+  /// Units and folder, as one line for the log.
   [[nodiscard]] std::string Describe() const;
-  /// Null when the unit has none. Without allocation.
+  /// Calibration of a unit; null if there is none. Does not allocate.
   [[nodiscard]] const CalibrationPoints* Find(std::string_view unit) const noexcept;
 
  private:

@@ -31,7 +31,7 @@ std::unique_ptr<WatchedLink> MakeLink(config::LinkKind kind, const config::Seria
 }
 
 bool Within(const std::vector<double>& ends_s, double time_s) {
-  // An odd number of ends lies behind.
+  // Within an interval an odd number of interval ends has passed.
   return (std::upper_bound(ends_s.begin(), ends_s.end(), time_s) - ends_s.begin()) % 2 != 0;
 }
 

@@ -1,4 +1,4 @@
-// From a cart's description to open links, and from a scene's script to the simulated operator.
+// Opens the links that a cart describes, and derives the simulated operator's input from a scene's script.
 #pragma once
 
 #include <array>
@@ -10,20 +10,21 @@
 
 namespace fulcrum::handle_bridge {
 
-/// True when something on the cart is simulated.
+/// True if any handle or pedal of the cart is simulated.
 [[nodiscard]] bool HasSimulatedLinks(const config::CartConfig& cart);
 
-/// `firmware` serves the simulated links and must outlive them; null when there are none.
+/// Opens all links. `firmware` serves the simulated links and must outlive them; null if there are none.
 [[nodiscard]] HandleBridgeNode::Links MakeCartLinks(const config::CartConfig& cart, SimulatedFirmware* firmware);
 
-/// The simulated handles and pedal as the cart describes them.
+/// Properties of the simulated handles and pedal in the cart.
 [[nodiscard]] std::array<SimulatedUnit, kLinks> MakeSimulatedUnits(const config::CartConfig& cart);
 
-/// What the cart lets befall a simulated link at a session time.
+/// Faults of a simulated link that the cart schedules for a session time.
 [[nodiscard]] LinkFaults FaultsAt(const config::SimulatedUnit& unit, double session_time_s);
 
-/// Jaws and pedals of the scripted operator and the faults of the cart's links; a pedal is down when any tool's key
-/// says so. Before the session is known (negative time) the jaws are at their first key and the pedals up.
+/// Jaws and pedals of the scripted operator and the faults of the cart's links; a pedal is pressed if it is in any
+/// tool's key. Before the session has started (negative time) the jaws have the angles of their first key and all
+/// pedals are released.
 [[nodiscard]] OperatorInput FollowScript(const SceneView& scene, const config::CartConfig& cart, double session_time_s);
 
 }  // namespace fulcrum::handle_bridge

@@ -9,7 +9,8 @@ namespace fulcrum::handle_bridge {
 namespace {
 
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
-/// One tick's bytes: 20 at 2.5 ms and 115200 baud carry 29; the rest is for the backlog of a late tick.
+/// Buffer for one tick's bytes. In 2.5 ms at 115200 baud at most 29 bytes arrive; the rest is for the backlog of a late
+/// tick.
 constexpr std::size_t kReadBytes = 512;
 
 }  // namespace
@@ -52,7 +53,7 @@ HandleBridgeNode::HandleBridgeNode(const config::CartConfig& cart, CalibrationSt
 }
 
 void HandleBridgeNode::Step(const Tick& tick) {
-  // A late thread skips whole periods: they have passed for the handles too.
+  // A late thread skips whole periods, so the elapsed time is a multiple of the period.
   const double periods = snapshot_.stepping ? static_cast<double>(tick.index - next_index_ + 1) : 1.0;
   next_index_ = tick.index + 1;
   if (!snapshot_.stepping) {
@@ -72,7 +73,7 @@ void HandleBridgeNode::Step(const Tick& tick) {
 }
 
 void HandleBridgeNode::DropBacklog() {
-  // While the node waited for its session, a second of old lines has piled up in the kernel.
+  // While the node waited for its session, the kernel has buffered about a second of old lines.
   constexpr int kMostReads = 64;  // 32 KiB: several times what a terminal holds.
   std::array<char, kReadBytes> buffer;
   const auto drain = [&buffer](WatchedLink* link) {
@@ -91,7 +92,7 @@ void HandleBridgeNode::DropBacklog() {
 void HandleBridgeNode::TakeCalibration(std::size_t tool) {
   const CalibrationPoints* stored = calibrations_.Find(links_.handles[tool]->unit());
   if (stored == in_use_[tool]) {
-    return;  // The same handle is back: its angle is held until it speaks.
+    return;  // The same handle is connected again: its angle is held until its first line.
   }
   in_use_[tool] = stored;
   jaws_[tool]->SetUnit(MakeJawChannelSettings(handles_[tool], stored));
@@ -113,7 +114,7 @@ HandleSample HandleBridgeNode::ReadHandle(std::size_t tool, double dt_s) {
   }
   if (read.phase == LinkPhase::kOpen) {
     jaw.Tick({buffer.data(), read.bytes}, dt_s);
-    link.Judge(jaw.tick_counts(), dt_s);
+    link.Evaluate(jaw.tick_counts(), dt_s);
   } else {
     jaw.Disconnected();
   }
@@ -144,7 +145,7 @@ std::uint8_t HandleBridgeNode::ReadPedals(double dt_s) {
   }
   if (read.phase == LinkPhase::kOpen) {
     pedal_.Tick({buffer.data(), read.bytes}, dt_s);
-    links_.pedal->Judge(pedal_.tick_counts(), dt_s);
+    links_.pedal->Evaluate(pedal_.tick_counts(), dt_s);
   } else {
     pedal_.Disconnected();
   }
@@ -167,7 +168,7 @@ void HandleBridgeNode::FillHealth(Health* health) const {
     sum += link.totals;
     reconnects += link.reconnects;
     if (s.stepping && link.state != LinkState::kOk) {
-      // What to do is said for the first; for the others there is room for what it is.
+      // The remedy is given for the first fault only; the others are named, because the text is limited in length.
       const bool first = health->last_error.empty();
       health->last_error += first ? "" : "; ";
       health->last_error += i < kMaxTools ? std::string("handle ") + std::to_string(i) : "pedal";

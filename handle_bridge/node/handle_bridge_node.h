@@ -1,4 +1,4 @@
-// handle_bridge: bytes of the handles and the foot pedal in, HandleState out, at 400 Hz.
+// The handle_bridge node: bytes of the handles and the foot pedal in, HandleState out, at 400 Hz.
 #pragma once
 
 #include <array>
@@ -20,30 +20,30 @@
 
 namespace fulcrum::handle_bridge {
 
-/// The letter of a hand's frames.
+/// Sender letter in the frames of a hand's handle.
 [[nodiscard]] char SenderOf(config::Hand hand);
 
-/// Settings of a handle's channel: calibration in codes (`stored`, or the cart's when null), and the range of codes
-/// that it covers.
+/// Settings of a handle's channel: calibration in codes (`stored`, or the cart's if null) and the range of codes that
+/// it covers.
 [[nodiscard]] JawChannelSettings MakeJawChannelSettings(const config::HandleConfig& handle,
                                                         const CalibrationPoints* stored);
 
 class HandleBridgeNode {
  public:
-  /// A link is null where the cart has none.
+  /// Serial links; null where the cart has none.
   struct Links {
     std::array<std::unique_ptr<WatchedLink>, kMaxTools> handles;
     std::unique_ptr<WatchedLink> pedal;
   };
 
-  /// @param calibrations of units that may be plugged in, now or later.
+  /// @param calibrations stored calibrations of all units that may be connected.
   /// @param epoch_ns CLOCK_MONOTONIC now [ns].
   HandleBridgeNode(const config::CartConfig& cart, CalibrationStore calibrations, Links links,
                    bus::Output<HandleState>* output, std::int64_t epoch_ns);
 
-  /// Reads, estimates, publishes.
+  /// One period: reads the links, estimates the jaw angles, publishes HandleState.
   void Step(const Tick& tick);
-  /// Any thread.
+  /// May be called from any thread.
   void FillHealth(Health* health) const;
 
  private:
@@ -53,13 +53,13 @@ class HandleBridgeNode {
     float quality = 0;
     float jaw_deg = 0;
     std::uint32_t reconnects = 0;
-    std::uint32_t calibration_points = 0;  // Of the stored calibration in use; 0: the cart's.
+    std::uint32_t calibration_points = 0;  // Points of the stored calibration in use; 0: the cart's is used.
     LinkCounts totals;
   };
   struct Snapshot {
-    std::array<LinkHealth, kMaxTools + 1> links;  // The last is the pedal.
+    std::array<LinkHealth, kMaxTools + 1> links;  // The last one is the pedal's.
     std::uint8_t pedals = 0;
-    bool stepping = false;  // Before the first step nothing is read, so nothing is known to be wrong.
+    bool stepping = false;  // Before the first step nothing is read, so no fault is reported.
   };
 
   void DropBacklog();
@@ -69,7 +69,7 @@ class HandleBridgeNode {
 
   std::array<config::HandleConfig, kMaxTools> handles_;
   CalibrationStore calibrations_;
-  std::array<const CalibrationPoints*, kMaxTools> in_use_{};  // Of calibrations_; null: the cart's.
+  std::array<const CalibrationPoints*, kMaxTools> in_use_{};  // Elements of calibrations_; null: the cart's.
   Links links_;
   std::array<std::optional<JawChannel>, kMaxTools> jaws_;
   PedalChannel pedal_;

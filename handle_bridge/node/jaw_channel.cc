@@ -5,9 +5,10 @@
 namespace fulcrum::handle_bridge {
 namespace {
 
-/// Lines come in bunches of the adapter's latency; only a deficit beyond this is a lost line.
+/// Lines arrive in bursts, because the adapter buffers them; only a deficit beyond this number counts as lost lines.
 constexpr double kLateLines = 8;
-/// The filter bridges lost lines this long; then its guess of the motion is worth less than standing still.
+/// Longest time over which the filter predicts through lost lines [s]; beyond it the angle is held, which has the
+/// smaller error.
 constexpr double kMaxBlind_s = 0.05;
 
 }  // namespace
@@ -67,7 +68,7 @@ void JawChannel::TakeLine(LineFramer::Event event) noexcept {
     wiring_.Add(reading.verdict);
   }
   if (wiring_.faulty()) {
-    HoldAngle();  // The codes of a floating wire lie within the calibration now and then; they are no angles.
+    HoldAngle();  // Codes of a broken wire are random: some lie within the calibrated range but are not angles.
     return;
   }
   if (good) {
@@ -77,7 +78,7 @@ void JawChannel::TakeLine(LineFramer::Event event) noexcept {
     estimator_.Update(reading.code);
     return;
   }
-  // A bad line stands for one sample period, but noise with many line ends must not run ahead of the clock.
+  // A bad line counts as one sample period, but noise with many line ends must not advance the filter beyond the clock.
   if (owed_lines_ > -1 && !holding_) {
     estimator_.Predict();
   }

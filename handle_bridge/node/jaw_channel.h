@@ -1,4 +1,4 @@
-// One handle: bytes in, jaw angle and the state of its link out. Knows neither ports nor clocks.
+// One handle: bytes in, jaw angle and the state of its link out. Independent of ports and clocks.
 #pragma once
 
 #include <span>
@@ -22,9 +22,10 @@ class JawChannel {
 
   /// One tick of the open link, `dt_s` after the last one.
   void Tick(std::span<const char> bytes, double dt_s) noexcept;
-  /// Another unit, or the first one that is known: from now on its calibration.
+  /// Sets the calibration of a newly connected unit.
   void SetUnit(const JawChannelSettings& settings) noexcept;
-  /// A new connection: the half line and the suspicions of the old one are void, the angle stays.
+  /// Call after a reconnection: discards the incomplete line and the fault counters of the old connection, keeps the
+  /// angle.
   void Reconnected() noexcept;
   /// One tick without connection: the angle is held.
   void Disconnected() noexcept;
@@ -34,9 +35,9 @@ class JawChannel {
   [[nodiscard]] int code() const noexcept { return code_; }
   [[nodiscard]] float quality() const noexcept { return connected_ ? monitor_.quality() : 0.0f; }
   [[nodiscard]] LinkState state() const noexcept;
-  /// Of the last tick.
+  /// Counts of the last tick.
   [[nodiscard]] const LinkCounts& tick_counts() const noexcept { return tick_counts_; }
-  /// Since the start.
+  /// Counts since the start.
   [[nodiscard]] const LinkCounts& totals() const noexcept { return totals_; }
 
  private:
@@ -51,8 +52,8 @@ class JawChannel {
   LinkCounts tick_counts_;
   LinkCounts totals_;
   int code_ = 0;
-  double owed_lines_ = 0;  ///< Sample periods that have passed without a line being seen for them.
-  double blind_s_ = 0;     ///< Since the last good line.
+  double owed_lines_ = 0;  ///< Sample periods for which no line has arrived yet.
+  double blind_s_ = 0;     ///< Time since the last good line [s].
   bool holding_ = false;
   bool connected_ = false;
 };

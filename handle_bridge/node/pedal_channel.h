@@ -18,12 +18,12 @@ class PedalChannel {
   /// One tick without connection: all pedals are up.
   void Disconnected() noexcept { pedals_ = 0; }
 
-  /// PedalBits; none when the last valid line is older than kPedalTimeout_s.
+  /// PedalBits; 0 if the last valid line is older than kPedalTimeout_s.
   [[nodiscard]] std::uint8_t pedals() const noexcept { return pedals_; }
   [[nodiscard]] LinkState state() const noexcept { return monitor_.state(); }
-  /// Of the last tick.
+  /// Counts of the last tick.
   [[nodiscard]] const LinkCounts& tick_counts() const noexcept { return tick_counts_; }
-  /// Since the start.
+  /// Counts since the start.
   [[nodiscard]] const LinkCounts& totals() const noexcept { return totals_; }
 
  private:
@@ -34,7 +34,7 @@ class PedalChannel {
   LinkMonitor monitor_;
   LinkCounts tick_counts_;
   LinkCounts totals_;
-  double age_s_ = 0;
+  double age_s_ = 0;  ///< Age of the last valid line [s].
   std::uint8_t pedals_ = 0;
 };
 

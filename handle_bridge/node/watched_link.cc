@@ -9,18 +9,18 @@ ByteLink::Result WatchedLink::Read(std::span<char> buffer) noexcept {
   const ByteLink::Result read = link_->Read(buffer);
   phase_ = read.phase;
   if (phase_ != LinkPhase::kOpen) {
-    away_ = was_open_;
+    hung_up_ = was_open_;
   }
   if (read.fresh) {
     search_.Reconnected();
-    reconnects_ += away_ ? 1 : 0;
+    reconnects_ += hung_up_ ? 1 : 0;
     was_open_ = true;
-    away_ = false;
+    hung_up_ = false;
   }
   return read;
 }
 
-void WatchedLink::Judge(const LinkCounts& counts, double dt_s) noexcept {
+void WatchedLink::Evaluate(const LinkCounts& counts, double dt_s) noexcept {
   baud_wanted_ = search_.Add(counts, dt_s) || baud_wanted_;
 }
 

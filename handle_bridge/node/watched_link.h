@@ -1,4 +1,4 @@
-// A link with what the node remembers of it: its speed, how often it came back, what is wrong with it.
+// A link together with its state for the node: baud rate, number of reconnections, fault.
 #pragma once
 
 #include <memory>
@@ -14,17 +14,17 @@ namespace fulcrum::handle_bridge {
 
 class WatchedLink {
  public:
-  /// @param baud the cart's.
+  /// @param baud baud rate of the cart file.
   WatchedLink(std::unique_ptr<ByteLink> link, int baud) : link_(std::move(link)), search_(baud) {}
 
   ByteLink::Result Read(std::span<char> buffer) noexcept;
-  /// After Read() of an open link: what its bytes were.
-  void Judge(const LinkCounts& counts, double dt_s) noexcept;
-  /// `channel` is what the bytes alone say while the link is open.
+  /// Evaluates the lines that Read() of an open link has returned.
+  void Evaluate(const LinkCounts& counts, double dt_s) noexcept;
+  /// State of the link. `channel` is the state that follows from the received lines alone while the link is open.
   [[nodiscard]] LinkState state(LinkState channel) const noexcept;
 
   [[nodiscard]] std::string_view unit() const noexcept { return link_->unit(); }
-  /// Returns from a hang-up.
+  /// Number of reconnections after a hang-up.
   [[nodiscard]] std::uint32_t reconnects() const noexcept { return reconnects_; }
 
  private:
@@ -32,8 +32,8 @@ class WatchedLink {
   BaudSearch search_;
   LinkPhase phase_ = LinkPhase::kReconnecting;
   bool was_open_ = false;
-  bool away_ = false;         ///< Hung up since it was open.
-  bool baud_wanted_ = false;  ///< The link is to be opened at search_.baud().
+  bool hung_up_ = false;      ///< Hung up since it was last open.
+  bool baud_wanted_ = false;  ///< The link must be reopened at search_.baud().
   std::uint32_t reconnects_ = 0;
 };
 

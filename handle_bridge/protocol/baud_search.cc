@@ -13,7 +13,7 @@ bool BaudSearch::Add(const LinkCounts& counts, double dt_s) noexcept {
     return false;
   }
   bytes_ += counts.bytes;
-  blind_s_ = bytes_ > 0 ? blind_s_ + dt_s : 0;  // Silence says nothing about the speed.
+  blind_s_ = bytes_ > 0 ? blind_s_ + dt_s : 0;  // Silence is no evidence about the speed.
   if (bytes_ < kMinBytes || blind_s_ < (settled_ ? kDisturbed_s : kTry_s)) {
     return false;
   }

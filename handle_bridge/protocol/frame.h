@@ -1,4 +1,4 @@
-// The framed line of handles and foot pedal: who sends, which line in a row, the value, a checksum.
+// The framed line of handles and foot pedal: sender, sequence number, value, checksum.
 //
 //   $ w ss , vvvv * cc CR LF        `$L1A,0503*29`: left handle, line 0x1A, code 503
 //
@@ -28,19 +28,19 @@ struct Frame {
   int value = 0;  ///< 0 … 9999.
 };
 
-/// True for a line that is meant as a frame; a plain line of a handle or pedal never begins so.
+/// True for a line that begins like a frame; a plain line of a handle or pedal never does.
 [[nodiscard]] inline bool IsFramed(std::string_view line) noexcept { return line.starts_with('$'); }
 
-/// A line without its CR LF, or nothing when it is anything but a whole frame of a known sender.
+/// Parses a line without its CR LF; no value unless it is a valid frame of a known sender.
 [[nodiscard]] std::optional<Frame> ParseFrame(std::string_view line) noexcept;
 
-/// The line with CR LF.
+/// Frame with CR LF.
 [[nodiscard]] std::array<char, 14> FormatFrame(const Frame& frame) noexcept;
 
-/// Frames lost, from the sequence.
+/// Counts lost frames by gaps in the sequence.
 class SequenceCounter {
  public:
-  /// Frames missing between the last one seen and this one, 0 … 255. Nothing is missing before the first.
+  /// Number of frames missing between the last one and this one, 0 … 255; 0 for the first frame.
   std::uint32_t Lost(std::uint8_t sequence) noexcept {
     const auto lost = seen_ ? static_cast<std::uint8_t>(sequence - last_ - 1) : std::uint8_t{0};
     seen_ = true;

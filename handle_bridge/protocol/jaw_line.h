@@ -1,5 +1,5 @@
 // The handle's lines: a 10-bit code of the jaw potentiometer, 400 lines a second, as `d.dddd` volts (the paper's line)
-// or in a frame (frame.h). Which of the two is told from each line by itself.
+// or in a frame (frame.h). Each line is recognised as one of the two by its first character.
 #pragma once
 
 #include <cstdint>
@@ -13,20 +13,20 @@ namespace fulcrum::handle_bridge {
 inline constexpr double kLineRate_Hz = 400.0;
 inline constexpr int kMaxCode = 1023;  ///< 10-bit converter.
 
-/// Exactly `d.dddd` as ten-thousandths of a volt; nothing else is accepted.
+/// Parses exactly `d.dddd`; returns ten-thousandths of a volt, or no value for any other text.
 [[nodiscard]] std::optional<int> ParseVoltage(std::string_view line) noexcept;
 
 enum class LineVerdict {
   kGood,
-  kMalformed,  ///< Neither `d.dddd` nor a whole frame.
-  kOffGrid,    ///< Well formed, but no multiple of the converter's step: a damaged digit, or another step.
-  kOutside,    ///< A true code, but beyond the calibrated ones: wiring.
-  kJump,       ///< Too far from the last good code to be a jaw.
-  kOther,      ///< A whole frame, but of the other handle or the pedal: plugs are swapped.
+  kMalformed,  ///< Neither `d.dddd` nor a valid frame.
+  kOffGrid,    ///< Well formed, but not a multiple of the converter's step: a damaged digit, or another step.
+  kOutside,    ///< Valid code beyond the calibrated range: a fault of the wiring.
+  kJump,       ///< Too far from the last good code for the motion of a jaw.
+  kOther,      ///< Valid frame of the other handle or the pedal: the plugs are swapped.
 };
 
 struct JawLineSettings {
-  char sender = kLeftHandle;  ///< Whose frames are taken.
+  char sender = kLeftHandle;  ///< Sender whose frames are accepted.
   double adc_step_V = 5.0 / 1024;
   int min_code = 485;  ///< Calibrated codes, closed interval.
   int max_code = 521;
@@ -34,15 +34,15 @@ struct JawLineSettings {
 
 struct JawReading {
   LineVerdict verdict = LineVerdict::kMalformed;
-  int code = 0;            ///< Set unless malformed, off grid or another's.
+  int code = 0;            ///< Set unless malformed, off grid or of another sender.
   std::uint32_t lost = 0;  ///< Frames missing just before this one.
 };
 
-/// Strict gate from lines to codes. A reading is used only if its verdict is kGood.
+/// Strict check that converts lines into codes. A reading is used only if its verdict is kGood.
 ///
-/// The grid test is what makes an unframed protocol safe: the codes are 4.88 mV apart and the line has a resolution
-/// of 0.0001 V, so 48 of 49 damaged values are not multiples of the step. No change of a single bit or digit that moves
-/// the value by a count or more lands on the grid.
+/// The grid test makes the unframed protocol safe: the codes are 4.88 mV apart and the line has a resolution of 0.0001
+/// V, so 48 of 49 damaged values are not multiples of the step. No change of a single bit or digit that moves the value
+/// by a count or more lands on the grid.
 class JawLineGate {
  public:
   explicit JawLineGate(const JawLineSettings& settings) : settings_(settings) {}
@@ -50,19 +50,20 @@ class JawLineGate {
   /// @param line without CR LF.
   JawReading Check(std::string_view line) noexcept;
 
-  /// A sample period passed without a usable line: the jaw may have moved further.
+  /// Registers a sample period without a usable line: the jaw may have moved further, so the allowed jump grows.
   void Miss() noexcept;
 
-  /// After a silence: any code may be next.
+  /// Call after a silence: any code is accepted next.
   void Reset() noexcept;
-  /// After a new connection: also any sequence number.
+  /// Call after a reconnection: any code and any sequence number are accepted next.
   void Reconnected() noexcept;
 
   /// Tolerances, public for the tests.
-  static constexpr double kGridTolerance = 0.0125;  ///< Counts; rounding to 0.0001 V is 0.0103 counts.
-  static constexpr int kMaxJump = 4;  ///< Counts a period: 2700 deg/s, twice what fingers do, over 0.5 counts of noise.
-  static constexpr int kOutsideMargin = 3;  ///< Counts beyond calibration that noise and play reach.
-  static constexpr int kAgreeing = 3;       ///< Jumped codes that agree with each other are the truth.
+  static constexpr double kGridTolerance = 0.0125;  ///< [counts]; rounding to 0.0001 V is 0.0103 counts.
+  /// [counts per period]: 2700 deg/s, twice the speed of fingers, above 0.5 counts of noise.
+  static constexpr int kMaxJump = 4;
+  static constexpr int kOutsideMargin = 3;  ///< Counts beyond the calibration that noise and mechanical play can reach.
+  static constexpr int kAgreeing = 3;       ///< Number of consecutive jumped codes that must agree to be accepted.
 
  private:
   [[nodiscard]] JawReading CheckCode(int code) noexcept;
@@ -75,8 +76,8 @@ class JawLineGate {
   int agreeing_ = 0;
 };
 
-/// Watches the codes for a broken wire or a bad contact: outside the calibrated codes, or jumping, in at least 4 of the
-/// last 8 readings. A code that does not change is no fault: a jaw is held still for many seconds.
+/// Detects a broken wire or a bad contact: at least 4 of the last 8 codes outside the calibration or jumping. A
+/// constant code is not a fault, because a jaw may be held still for many seconds.
 class WiringMonitor {
  public:
   void Add(LineVerdict verdict) noexcept {

@@ -1,4 +1,4 @@
-// Cuts a byte stream into lines ended by CR LF. Bounded: garbage without line ends costs 16 bytes of memory, no more.
+// Splits a byte stream into lines that end with CR LF. Memory is bounded: 16 bytes, also for garbage without line ends.
 #pragma once
 
 #include <array>
@@ -10,12 +10,12 @@ namespace fulcrum::handle_bridge {
 
 class LineFramer {
  public:
-  static constexpr std::size_t kMaxLineBytes = 16;  ///< The longest line of any handle or pedal has 8.
+  static constexpr std::size_t kMaxLineBytes = 16;  ///< The longest line, a frame, has 12 without CR LF.
 
   enum class Event {
-    kNone,  ///< Nothing complete yet.
-    kLine,  ///< line() holds a whole line, without CR LF, until the next Add.
-    kBad,   ///< A line without CR before its LF, or 16 bytes without any end.
+    kNone,  ///< The line is not complete yet.
+    kLine,  ///< line() holds a complete line, without CR LF, until the next Add.
+    kBad,   ///< A line without CR before its LF, or 16 bytes without a line end.
   };
 
   Event Add(char byte) noexcept {
@@ -31,7 +31,7 @@ class LineFramer {
       return ends_reported_line ? Event::kNone : Event::kBad;
     }
     if (size_ == kMaxLineBytes) {
-      // Each 16 bytes count as one bad line, so that an endless stream without line ends is seen as garbage too.
+      // Each 16 bytes count as one bad line, so that a stream without line ends is also recognised as garbage.
       size_ = 1;
       buffer_[0] = byte;
       overlong_ = true;
@@ -43,14 +43,14 @@ class LineFramer {
 
   [[nodiscard]] std::string_view line() const noexcept { return {buffer_.data(), line_size_}; }
 
-  /// After a reconnect: forgets the half line of the old connection.
+  /// Call after a reconnection: discards the incomplete line.
   void Reset() noexcept { *this = LineFramer(); }
 
  private:
   std::array<char, kMaxLineBytes> buffer_{};
   std::size_t size_ = 0;
   std::size_t line_size_ = 0;
-  bool overlong_ = false;  ///< The line under way has already been counted as bad.
+  bool overlong_ = false;  ///< The current line has already been counted as bad.
 };
 
 }  // namespace fulcrum::handle_bridge

@@ -37,7 +37,7 @@ const char* Explain(LinkState state) {
     case LinkState::kGarbage:
       return "under half of the lines are valid, at no usual speed: check cable, ground and what is plugged in";
     case LinkState::kWrongBaud:
-      return "it speaks at another speed than the cart says; used as found: correct `baud` in the cart";
+      return "its baud rate differs from the cart's; the one found is used: correct `baud` in the cart";
     case LinkState::kWrongStep:
       return "voltages are not multiples of adc_step_V: set the step of this handle's converter";
     case LinkState::kWiring:
@@ -45,9 +45,9 @@ const char* Explain(LinkState state) {
     case LinkState::kSwapped:
       return "another unit is plugged in here: swap the plugs, or correct `hand` in the cart";
     case LinkState::kLost:
-      return "unplugged or powered off: plug it in, it is found by itself";
+      return "unplugged or powered off: plug it in, it reconnects automatically";
     case LinkState::kReconnecting:
-      return "port not found: plug the adapter in; it is looked for four times a second";
+      return "port not found: plug the adapter in; the search repeats four times a second";
   }
   return "";
 }
@@ -68,7 +68,7 @@ void LinkMonitor::Add(const LinkCounts& counts, double dt_s) {
   seen_s_ = std::min(seen_s_ + dt_s, kWindow_s);
   silent_s_ = counts.bytes > 0 ? 0.0 : std::min(silent_s_ + dt_s, kWindow_s);
   slot_age_s_ += dt_s;
-  // After a stall of the whole window every slot is stale; going round once more changes nothing.
+  // After a stall longer than the window every slot is stale, so one round is enough.
   for (int turn = 0; slot_age_s_ >= kWindow_s / kSlots && turn < kSlots; ++turn) {
     slot_age_s_ -= kWindow_s / kSlots;
     slot_ = (slot_ + 1) % kSlots;
@@ -97,7 +97,7 @@ LinkState LinkMonitor::state() const {
   if (silent_s_ >= kSilence_s) {
     return LinkState::kNoData;
   }
-  // A tick's rounding must not keep the window from ever being full.
+  // Tolerance for rounding of the ticks, without which the window might never count as full.
   constexpr double kFull = 0.99 * kWindow_s;
   if (seen_s_ < kFull) {
     return LinkState::kOk;

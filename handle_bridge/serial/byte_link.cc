@@ -13,7 +13,7 @@ ReconnectingLink::~ReconnectingLink() = default;
 ByteLink::Result ReconnectingLink::Read(std::span<char> buffer) noexcept {
   Result result;
   if (!current_) {
-    // The connecting thread holds the lock only to swap pointers; if it does so right now, the next tick will do.
+    // The connecting thread holds the lock only to swap pointers. If it is held, the next tick retries.
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (lock.owns_lock()) {
       current_ = std::move(fresh_);
@@ -27,7 +27,7 @@ ByteLink::Result ReconnectingLink::Read(std::span<char> buffer) noexcept {
     if (read.hung_up) {
       const std::unique_lock lock(mutex_, std::try_to_lock);
       if (lock.owns_lock()) {
-        dead_ = std::move(current_);  // Closing may take time: the thread does it.
+        dead_ = std::move(current_);  // Closing may take time, so it is left to the connecting thread.
         wanted_ = true;
         searched_ = false;
         phase_ = LinkPhase::kLost;
@@ -64,11 +64,11 @@ void ReconnectingLink::Connect(const std::stop_token& stop) {
     std::unique_ptr<ByteSource> dead = std::move(dead_);
     const int baud = baud_;
     lock.unlock();
-    dead.reset();  // Before opening: some drivers give one name to one holder only.
+    dead.reset();  // Closed before the new one is opened: some drivers allow one open handle per port only.
     std::unique_ptr<ByteSource> opened = opener_->Open(baud);
     lock.lock();
     if (opened && baud != baud_) {
-      dead_ = std::move(opened);  // Another speed was asked for meanwhile.
+      dead_ = std::move(opened);  // Another speed was requested meanwhile.
     } else if (opened) {
       fresh_ = std::move(opened);
       wanted_ = false;

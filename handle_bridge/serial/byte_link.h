@@ -1,4 +1,4 @@
-// A link that comes back by itself: opening and closing happen on a thread of its own, reading never waits.
+// A link that reconnects automatically: a separate thread opens and closes it, reading never waits.
 #pragma once
 
 #include <condition_variable>
@@ -16,29 +16,30 @@ namespace fulcrum::handle_bridge {
 enum class LinkPhase : std::uint8_t {
   kReconnecting,  ///< The port has not been found (yet).
   kOpen,
-  kLost,  ///< Hung up just now.
+  kLost,  ///< The other end has hung up.
 };
 
-/// What the node reads.
+/// Interface of a link for the node.
 class ByteLink {
  public:
   virtual ~ByteLink() = default;
   struct Result {
     std::size_t bytes = 0;
     LinkPhase phase = LinkPhase::kReconnecting;
-    bool fresh = false;  ///< The connection was made since the last call: what was half read before is void.
+    /// The connection is new since the last call; incomplete data of the old one must be discarded.
+    bool fresh = false;
   };
   /// Cyclic thread; never waits.
   virtual Result Read(std::span<char> buffer) noexcept = 0;
-  /// Serial number of the unit that is connected; empty when none is. Cyclic thread.
+  /// Serial number of the connected unit; empty without a connection. Cyclic thread.
   [[nodiscard]] virtual std::string_view unit() const noexcept = 0;
-  /// Opens the link anew at another speed. Cyclic thread; false: not now, ask again.
+  /// Requests to reopen the link at another speed. Cyclic thread; returns false if it must be retried.
   virtual bool SetBaud(int baud) noexcept = 0;
 };
 
 class ReconnectingLink final : public ByteLink {
  public:
-  /// How often a missing port is looked for.
+  /// Period of the search for a missing port.
   static constexpr int kRetry_ms = 250;
 
   ReconnectingLink(std::unique_ptr<ByteSourceOpener> opener, int baud);
@@ -64,7 +65,7 @@ class ReconnectingLink final : public ByteLink {
   int baud_;                           // Guarded.
   bool wanted_ = true;                 // Guarded: the reader has no connection.
   bool searched_ = false;              // Guarded: at least one attempt has failed since the hang-up.
-  std::jthread thread_;                // Last: stopped and joined before the rest goes.
+  std::jthread thread_;                // Last member: stopped and joined before the others are destroyed.
 };
 
 }  // namespace fulcrum::handle_bridge

@@ -1,4 +1,4 @@
-// Where a link's bytes come from: a serial port, a pseudo-terminal, or memory in a test.
+// Source of a link's bytes: a serial port, a pseudo-terminal, or memory in a test.
 #pragma once
 
 #include <cstddef>
@@ -10,24 +10,25 @@ namespace fulcrum::handle_bridge {
 
 struct ReadResult {
   std::size_t bytes = 0;
-  bool hung_up = false;  ///< The other end is gone and nothing is left to read: close and open anew.
+  bool hung_up = false;  ///< The other end has closed and all bytes are read; the source must be reopened.
 };
 
 /// An open connection.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
-  /// Takes what has arrived, without waiting.
+  /// Reads the bytes that have arrived, without waiting.
   virtual ReadResult Read(std::span<char> buffer) noexcept = 0;
-  /// Serial number of the unit at the other end, or what comes closest; the same as long as it is open.
+  /// Serial number of the unit at the other end, or the port's name without one; constant while open.
   [[nodiscard]] virtual std::string_view unit() const noexcept = 0;
 };
 
-/// Finds and opens it, again after each hang-up.
+/// Finds and opens a source; used again after each hang-up.
 class ByteSourceOpener {
  public:
   virtual ~ByteSourceOpener() = default;
-  /// Null when it is not there (yet); may take milliseconds, so not for a cyclic thread. Bytes from before are dropped.
+  /// Opens the source; null if it does not exist (yet). May take milliseconds, so not for a cyclic thread. Bytes
+  /// received before are discarded.
   virtual std::unique_ptr<ByteSource> Open(int baud) = 0;
 };
 

@@ -29,9 +29,9 @@ class TerminalSource final : public ByteSource {
   TerminalSource(FileDescriptor fd, std::string unit) : fd_(std::move(fd)), unit_(std::move(unit)) {}
 
   ReadResult Read(std::span<char> buffer) noexcept override {
-    // poll(), and read() when nothing is there, wait for the kernel's worker that moves bytes into the terminal, and
-    // that worker has no real-time priority: on a busy machine this held the 400 Hz thread up for 70 ms. Asking for the
-    // count does not wait, and fails once the other end has hung up.
+    // poll(), and read() without data, wait for the kernel worker that moves bytes into the terminal. The worker has no
+    // real-time priority: on a loaded machine this delayed the 400 Hz thread by 70 ms. FIONREAD does not wait, and
+    // fails once the other end has hung up.
     int waiting = 0;
     if (::ioctl(fd_.get(), FIONREAD, &waiting) != 0) {
       return {0, true};
@@ -66,7 +66,7 @@ bool SetRaw(int fd, int baud) {
       ::cfsetspeed(&settings, speed);
     }
   }
-  return ::tcsetattr(fd, TCSAFLUSH, &settings) == 0;  // Drops what came before, as a closed port does.
+  return ::tcsetattr(fd, TCSAFLUSH, &settings) == 0;  // Discards bytes received before, as a closed port does.
 }
 
 }  // namespace

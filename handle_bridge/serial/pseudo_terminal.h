@@ -1,5 +1,5 @@
-// A pseudo-terminal as a serial cable between simulated firmware and the bridge. libserialport refuses one by name (it
-// looks in /sys/class/tty), so its near end is read through termios, with the same speed and framing.
+// A pseudo-terminal as a serial cable between simulated firmware and the bridge. libserialport cannot open one by name
+// (it searches /sys/class/tty), so the bridge's end is read through termios, with the same speed and framing.
 #pragma once
 
 #include <functional>
@@ -12,16 +12,17 @@
 
 namespace fulcrum::handle_bridge {
 
-/// The firmware's end. Destroying it is pulling the plug: the reader sees a hang-up.
+/// The firmware's end. Its destruction acts like unplugging: the reader gets a hang-up.
 class PseudoTerminal {
  public:
-  /// Throws std::system_error when the system has none left.
+  /// Throws std::system_error if the system has no pseudo-terminal left.
   PseudoTerminal();
-  /// Device that the reader opens, "/dev/pts/7".
+  /// Device that the reader opens, for example "/dev/pts/7".
   [[nodiscard]] const std::string& device() const { return device_; }
-  /// Sends without waiting; what does not fit is lost, as on a wire. Returns bytes sent.
+  /// Sends without waiting; bytes that do not fit into the buffer are lost, as on a wire. Returns the number of bytes
+  /// sent.
   std::size_t Send(std::string_view bytes) noexcept;
-  /// Speed that the reader has set [baud]; 0 when it cannot be told.
+  /// Speed that the reader has set [baud]; 0 if it cannot be determined.
   [[nodiscard]] int ReaderBaud() const noexcept;
 
  private:
@@ -29,10 +30,10 @@ class PseudoTerminal {
   std::string device_;
 };
 
-/// The bridge's end: opens raw 8N1 the device that `device` names at that moment (empty: unplugged).
+/// The bridge's end: opens the device whose name `device` returns (empty: unplugged), raw, 8N1.
 class TerminalOpener final : public ByteSourceOpener {
  public:
-  /// @param unit serial number of the unit behind it.
+  /// @param unit serial number of the simulated unit.
   TerminalOpener(std::function<std::string()> device, std::string unit)
       : device_(std::move(device)), unit_(std::move(unit)) {}
   std::unique_ptr<ByteSource> Open(int baud) override;

@@ -22,7 +22,7 @@ class SerialPortSource final : public ByteSource {
   SerialPortSource(Port port, std::string unit) : port_(std::move(port)), unit_(std::move(unit)) {}
 
   ReadResult Read(std::span<char> buffer) noexcept override {
-    // After a hang-up sp_nonblocking_read() returns 0 as if nothing had come; sp_input_waiting() fails with EIO.
+    // After a hang-up sp_nonblocking_read() returns 0, the same as without data; sp_input_waiting() fails with EIO.
     const int waiting = sp_input_waiting(port_.get());
     if (waiting < 0) {
       return {0, true};
@@ -69,7 +69,7 @@ Port FindByName(const config::SerialLink& link) {
   if (link.port.empty()) {
     return nullptr;
   }
-  // libserialport looks a name up in /sys/class/tty, which knows no by-path links.
+  // libserialport searches a name in /sys/class/tty, which contains no by-path links.
   std::error_code error;
   const std::filesystem::path device = std::filesystem::canonical(link.port, error);
   sp_port* port = nullptr;

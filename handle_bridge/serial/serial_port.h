@@ -9,8 +9,8 @@
 
 namespace fulcrum::handle_bridge {
 
-/// Opens 8N1 without flow control, for reading. The port is the one with the USB identity given, else the one given by
-/// name or by-path link. Its unit is the adapter's USB serial number, without one the name of the port.
+/// Opens a port for reading, 8N1 without flow control. The port is selected by USB identity if one is given, otherwise
+/// by name or by-path link. Its unit is the adapter's USB serial number, or the name of the port if there is none.
 class SerialPortOpener final : public ByteSourceOpener {
  public:
   explicit SerialPortOpener(config::SerialLink link) : link_(std::move(link)) {}

@@ -13,7 +13,8 @@ namespace {
 
 constexpr std::int64_t kPeriod_ns = static_cast<std::int64_t>(1e9 / kLineRate_Hz);
 constexpr auto kPedalPeriods = static_cast<std::uint64_t>(kPedalPeriod_s * kLineRate_Hz);
-/// The firmware never misses a line, however late this thread wakes: it catches up by at most a quarter of a second.
+/// Limit of the lines that are sent after a delay of this thread [lines]: a quarter of a second. Shorter delays lose no
+/// line.
 constexpr std::uint64_t kMaxCatchUp = 100;
 
 }  // namespace
@@ -68,7 +69,7 @@ void SimulatedFirmware::Plug(Link* link, bool plugged) {
     try {
       link->terminal.emplace();
     } catch (const std::system_error&) {
-      // The system has none left: tried again at the next sample, as a user would.
+      // The system has no pseudo-terminal left: retried at the next sample.
     }
   }
 }
@@ -113,12 +114,12 @@ void SimulatedFirmware::Transmit(Link* link, std::string_view bytes, const LinkF
   link->cable.Pass(bytes, faults.cable, &bytes_);
   const int unit_baud = faults.wrong_baud ? kOtherBaud : kBaud;
   if (const int baud = link->terminal->ReaderBaud(); baud != unit_baud) {
-    // A receiver at another speed samples the wrong moments: it sees about baud / unit_baud as many bytes, all
-    // nonsense.
-    const ByteDamage nonsense{std::max(0.0, 1.0 - static_cast<double>(baud) / unit_baud), 0.0, true};
-    std::string heard;
-    link->cable.Pass(bytes_, nonsense, &heard);
-    bytes_.swap(heard);
+    // A receiver at another speed samples the line at wrong times: it gets about baud / unit_baud as many bytes, all of
+    // them random.
+    const ByteDamage noise{std::max(0.0, 1.0 - static_cast<double>(baud) / unit_baud), 0.0, true};
+    std::string received;
+    link->cable.Pass(bytes_, noise, &received);
+    bytes_.swap(received);
   }
   link->terminal->Send(bytes_);
 }

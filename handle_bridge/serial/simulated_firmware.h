@@ -1,5 +1,5 @@
-// The simulated firmware of a cart: handles and foot pedal, each on a pseudo-terminal of its own, on one thread that
-// sends what the hardware sends, when it sends it, and fails as hardware fails.
+// The simulated firmware of a cart: handles and foot pedal, each on a pseudo-terminal of its own. One thread sends the
+// same lines as the hardware, at the same times, and reproduces its faults.
 #pragma once
 
 #include <array>
@@ -21,24 +21,24 @@ namespace fulcrum::handle_bridge {
 inline constexpr std::size_t kPedalLink = kMaxTools;
 inline constexpr std::size_t kLinks = kMaxTools + 1;
 
-/// What is built into a unit.
+/// Properties of a simulated unit.
 struct SimulatedUnit {
   std::string serial_number;
-  bool framed = false;      ///< Speaks frames (frame.h) instead of the plain lines.
-  char sender = 'L';        ///< Of its frames.
-  JawFirmwareSettings jaw;  ///< Of a handle.
+  bool framed = false;      ///< Sends frames (frame.h) instead of plain lines.
+  char sender = 'L';        ///< Sender letter of its frames.
+  JawFirmwareSettings jaw;  ///< Potentiometer and converter of a handle.
 };
 
-/// What befalls a link at a moment.
+/// Faults of a link at a given time.
 struct LinkFaults {
   ByteDamage cable{};
   bool silent = false;       ///< No power, or the transmit wire is broken.
-  bool wrong_baud = false;   ///< The unit speaks at SimulatedFirmware::kOtherBaud.
-  bool broken_wire = false;  ///< Of the potentiometer: the converter floats between its stops.
-  bool unplugged = false;    ///< The adapter is pulled: a hang-up, and a new port once it is over.
+  bool wrong_baud = false;   ///< The unit sends at SimulatedFirmware::kOtherBaud.
+  bool broken_wire = false;  ///< A wire of the potentiometer is broken: the converter's input floats.
+  bool unplugged = false;    ///< The adapter is unplugged: a hang-up, and a new port afterwards.
 };
 
-/// What the operator's hands and foot do at a moment, and what befalls the links.
+/// Input of the operator's hands and foot at a given time, and faults of the links.
 struct OperatorInput {
   std::array<double, kMaxTools> jaw_deg{};
   std::uint8_t pedals = kPedalNone;  ///< PedalBits.
@@ -50,7 +50,7 @@ class SimulatedFirmware {
   static constexpr int kBaud = 115200;
   static constexpr int kOtherBaud = 57600;
 
-  /// At a CLOCK_MONOTONIC time [ns]; nothing: not known yet, so nothing is sent.
+  /// Input at a CLOCK_MONOTONIC time [ns]; no value: not known yet, so nothing is sent.
   using InputAt = std::function<std::optional<OperatorInput>(std::int64_t)>;
 
   /// @param input called 400 times a second on the firmware's thread.
@@ -59,8 +59,8 @@ class SimulatedFirmware {
   /// Plain lines, the paper's potentiometers.
   static std::array<SimulatedUnit, kLinks> DefaultUnits();
 
-  /// Opens the near end of a link, again after each hang-up. A speed that is not the unit's reads garbage, as on a
-  /// wire.
+  /// Opener of the bridge's end of a link; may be used again after each hang-up. Reading at another speed than the
+  /// unit's gives garbage, as on a wire.
   [[nodiscard]] std::unique_ptr<ByteSourceOpener> MakeOpener(std::size_t link);
 
  private:
@@ -84,9 +84,9 @@ class SimulatedFirmware {
   std::uint64_t next_index_ = 0;
   std::uint8_t sent_pedals_ = kPedalNone;
   std::uint64_t pedal_index_ = 0;
-  std::uint64_t floating_ = 1;    // State of the broken wire's noise.
+  std::uint64_t floating_ = 1;    // State of the random generator for a broken wire.
   std::string bytes_;             // Scratch of Transmit.
-  runtime::CyclicThread thread_;  // Last: stopped before the rest goes.
+  runtime::CyclicThread thread_;  // Last member: stopped before the others are destroyed.
 };
 
 }  // namespace fulcrum::handle_bridge

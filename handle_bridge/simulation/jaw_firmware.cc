@@ -10,7 +10,7 @@ namespace fulcrum::handle_bridge {
 
 JawFirmware::JawFirmware(const JawFirmwareSettings& settings, std::uint64_t seed) : settings_(settings), random_(seed) {
   constexpr double kTwoPi = 2 * std::numbers::pi;
-  std::mt19937_64 tones(seed);  // Of its own, so that a handle without tremor draws the same noise.
+  std::mt19937_64 tones(seed);  // A separate generator, so that the noise is the same with and without tremor.
   std::uniform_real_distribution<double> frequency_Hz(8, 12), phase(0, kTwoPi);
   for (std::size_t i = 0; i < tone_step_.size(); ++i) {
     tone_step_[i] = kTwoPi * frequency_Hz(tones) / kLineRate_Hz;

@@ -1,5 +1,5 @@
-// What the handle's microcontroller does, as numbers in and bytes out: potentiometer, 10-bit converter, line format;
-// and what a bad cable does to the bytes.
+// Model of the handle's microcontroller: potentiometer, 10-bit converter and line format, from an angle to bytes; and
+// the damage that a bad cable does to the bytes.
 #pragma once
 
 #include <array>
@@ -14,9 +14,9 @@ struct JawFirmwareSettings {
   double closed_V = 2.37;  ///< At 0 degrees (paper).
   double open_V = 2.54;    ///< At open_deg.
   double open_deg = 60.0;
-  double bow = 0;                  ///< Excess of the voltage in the middle, as a share of the whole span.
+  double bow = 0;                  ///< Nonlinearity: excess voltage at mid-range, relative to the span.
   double adc_step_V = 5.0 / 1024;  ///< The paper rounds it to 0.00488.
-  double noise_V = 0.001;          ///< Standard deviation: the paper's +-0.002 V taken as two of it.
+  double noise_V = 0.001;          ///< Standard deviation; the paper's +-0.002 V is taken as two standard deviations.
   double tremor_deg = 0;           ///< Amplitude of the hand's tremor, two tones of 8 to 12 Hz.
 };
 
@@ -26,7 +26,7 @@ class JawFirmware {
 
   /// One sample: nearest code of the noisy voltage at this jaw angle.
   int Convert(double jaw_deg);
-  /// `d.dddd` CR LF of a code.
+  /// Plain line `d.dddd` CR LF of a code.
   [[nodiscard]] std::array<char, 8> Format(int code) const;
   std::array<char, 8> Line(double jaw_deg) { return Format(Convert(jaw_deg)); }
 
@@ -38,17 +38,17 @@ class JawFirmware {
   std::array<double, 2> tone_phase_{};  ///< [rad]
 };
 
-/// What a bad cable does.
+/// Damage by a bad cable.
 struct ByteDamage {
   double drop_probability = 0;
-  double flip_probability = 0;  ///< Of one bit of a byte.
-  bool garbage = false;         ///< Every byte is any byte.
+  double flip_probability = 0;  ///< Probability that one bit of a byte is flipped.
+  bool garbage = false;         ///< Every byte is replaced by a random one.
 };
 
 class DamagedLine {
  public:
   explicit DamagedLine(std::uint64_t seed) : random_(seed) {}
-  /// Appends what arrives of `sent` to `received`.
+  /// Appends the bytes of `sent` that arrive, damaged, to `received`.
   void Pass(std::string_view sent, const ByteDamage& damage, std::string* received);
 
  private:

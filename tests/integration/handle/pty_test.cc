@@ -167,7 +167,7 @@ TEST(HandlePty, WrongBaudOfTheCartIsFoundOutNamedAndMended) {
   config::CartConfig cart;
   cart.handles[0].link.baud = 38400;
   Chain chain(cart);
-  EXPECT_TRUE(chain.WaitForError("handle 0: wrong-baud: it speaks at another speed"));
+  EXPECT_TRUE(chain.WaitForError("handle 0: wrong-baud: its baud rate differs"));
   EXPECT_TRUE(chain.WaitFor([](const HandleState& s) { return s.handles[0].quality > 0.9f; }));
   EXPECT_LT(WorstError(&chain, 100), 2.5);
 }

@@ -362,7 +362,7 @@ TEST_F(NodeTest, WrongBaudIsToldFromGarbageAndMended) {
   }
   EXPECT_NEAR(jaw0_deg(), 25, 1.5);
   EXPECT_EQ(state_.handles[0].quality, 1.0f);
-  EXPECT_EQ(Error().rfind("handle 0: wrong-baud: it speaks at another speed", 0), 0u) << Error();
+  EXPECT_EQ(Error().rfind("handle 0: wrong-baud: its baud rate differs", 0), 0u) << Error();
   EXPECT_NE(Error().find("; pedal: garbage"), std::string::npos) << Error();
   EXPECT_EQ(MetricOf("reconnects"), 0);
 }
