@@ -1,4 +1,4 @@
-// render_node: draws what the laparoscope sees, into a window (--window) or off screen into PNG files.
+// render_node: draws the picture of the laparoscope, into a window (--window) or off screen into PNG files.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -24,7 +24,8 @@ ExitCode RunRender(app::NodeApp& app) {
   auto stage = render::MakeStage(app.scene(), settings.window, spare);
   if (spare && !app::WaitUntilNeeded(NodeId::kRender)) return ExitCode::kDone;
 
-  // Before the ports: this thread, which draws, and the rasteriser's, not those of the bus.
+  // Collected before the ports are created: the threads that draw, this one and the rasteriser's, without those of the
+  // bus.
   const std::vector<int> drawing = render::ThreadsOfProcess();
   const render::RenderPorts ports{app.MakeInput<TissueFrame>(),      app.MakeInput<TopologyState>(),
                                   app.MakeInput<TemperaturePatch>(), app.MakeInput<ToolState>(),
@@ -34,7 +35,7 @@ ExitCode RunRender(app::NodeApp& app) {
   render::RenderNode node(app.scene(), settings, ports, std::move(stage));
   runtime::Log(runtime::LogLevel::kInfo, node.display_description());
 
-  // The scene says how many pictures it wants, the cart how many the machine can give: the slower of the two.
+  // The scene sets the wanted rate of pictures, the cart the rate that the machine can reach; the lower one is used.
   runtime::CyclicThreadSettings timing = app.timing();
   timing.period_ns = std::max(timing.period_ns, std::int64_t{std::llround(1e9 / app.scene().render.rate_Hz)});
   bool seen = false;
@@ -42,7 +43,7 @@ ExitCode RunRender(app::NodeApp& app) {
     node.Step(tick);
     if (!seen && node.pictures_drawn() > 0) {
       seen = true;
-      app.PublishHealthNow();  // A node that came back is waited for.
+      app.PublishHealthNow();  // After a restart the session waits for this Health.
     }
     if (node.closed()) app.Finish(ExitCode::kDone, "the window was closed");
   };

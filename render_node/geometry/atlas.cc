@@ -12,9 +12,9 @@ namespace fulcrum::render {
 namespace {
 
 constexpr int kBlock = 16;
-constexpr std::uint8_t kDamaged = 20;  // Below this share of 255 damage cannot be seen.
-// A cut drawn from the topology alone: half width of the slit, then of the charred, the browned and the blanched rim.
-// Typical of an L-hook at 30 W on peritoneum (0.2-0.5 mm lateral damage).
+constexpr std::uint8_t kDamaged = 20;  // Damage below this value (of 255) is not visible.
+// Half widths of a cut that is drawn from the topology: slit, charred, browned and blanched rim. Typical of an L-hook
+// at 30 W on peritoneum (0.2-0.5 mm lateral damage).
 constexpr float kSlit = 0.00030f;     // [m]
 constexpr float kChar = 0.00045f;     // [m]
 constexpr float kBrown = 0.00070f;    // [m]

@@ -1,5 +1,5 @@
-// The atlas of the sheet's thermal state: one texel per 0.1 mm of material, four bytes as in a TemperaturePatch. Only
-// the part that the sheet uses is kept, of the 4096 x 4096 that a patch's origin can address. Pure.
+// The atlas of the sheet's thermal state: one texel per 0.1 mm of material, four bytes as in a TemperaturePatch. Of the
+// 4096 x 4096 texels that a patch's origin can address only the part that the sheet uses is stored. Pure.
 #pragma once
 
 #include <array>
@@ -25,26 +25,26 @@ class Atlas {
   /// Covers the material coordinates of `scene`; intact tissue at body temperature everywhere.
   explicit Atlas(const SceneView& scene);
 
-  /// Copies what lies within the atlas. Returns the texels that changed hands; empty when the patch has the wrong size
-  /// or lies outside.
+  /// Copies the part of the patch that lies within the atlas. Returns the changed rectangle; empty if the patch has the
+  /// wrong size or lies outside.
   AtlasRect Apply(const TemperaturePatch& patch);
 
-  /// Draws slits from the topology alone where no patch has ever been: what a restarted renderer can still know. Each
-  /// cut triangle gets a capsule between the middles of its dead edges, with a browned rim. Triangles that were
-  /// painted before are skipped. Returns the texels touched.
+  /// Draws slits from the topology where no patch has arrived yet, as after a restart of the renderer. Each cut
+  /// triangle gets a capsule between the middles of its dead edges, with a browned rim. Triangles that are already
+  /// painted are skipped. Returns the changed rectangle.
   AtlasRect PaintCuts(const SceneView& scene, const TopologyState& topology);
 
-  /// Blood over the disc of `radius_m` round (s, t) [m], `thickness` 0 … 1 in its middle; where there is more already
-  /// it stays. It is kept beneath the patches in the low seven bits of the fourth byte: 255 - blood of living texels,
-  /// blood of those that are gone. Returns the texels touched.
+  /// Adds blood on a disc of `radius_m` around (s, t) [m], with `thickness` 0 … 1 in its middle; thicker existing blood
+  /// is kept. Blood is stored in the low seven bits of the fourth byte and is independent of the patches: 255 - blood
+  /// for intact texels, blood for removed ones. Returns the changed rectangle.
   AtlasRect Stain(const Vec2f& material, float radius_m, float thickness);
 
-  /// The texel at (s, t) [m]; nothing outside the sheet.
+  /// Texel at (s, t) [m]; no value outside the sheet.
   [[nodiscard]] std::optional<std::array<std::uint8_t, 4>> At(const Vec2f& material) const;
 
-  /// In the block of 16 x 16 texels at (s, t) [m] tissue has been damaged or cut.
+  /// True if tissue has been damaged or cut in the block of 16 x 16 texels at (s, t) [m].
   [[nodiscard]] bool Touched(const Vec2f& material) const;
-  /// Counts the times that Touched() has become true somewhere.
+  /// Number of blocks for which Touched() has become true.
   [[nodiscard]] std::uint64_t touches() const { return touches_; }
 
   [[nodiscard]] int width() const { return width_; }
@@ -65,10 +65,10 @@ class Atlas {
   int blocks_x_;
   std::vector<std::uint8_t> texels_;
   std::vector<std::uint8_t> covered_;  // Per block of kBlock x kBlock texels.
-  std::vector<std::uint8_t> blood_;    // Per texel, 0 … 127; empty before the first drop.
+  std::vector<std::uint8_t> blood_;    // Per texel, 0 … 127; empty until the first call of Stain().
   std::vector<std::uint8_t> touched_;  // Per block.
   std::uint64_t touches_ = 0;
-  std::vector<std::uint8_t> painted_;  // Per membrane triangle: bits of its dead edges that are drawn.
+  std::vector<std::uint8_t> painted_;  // Per membrane triangle: bits of the dead edges that are already drawn.
 };
 
 }  // namespace fulcrum::render

@@ -10,15 +10,15 @@ namespace fulcrum::render {
 namespace {
 
 constexpr double kStep_s = 0.02;
-constexpr int kMostSteps = 50;                     // After a longer pause time is skipped, not caught up on.
-constexpr int kDropEvery = 14;                     // Steps.
-constexpr int kRim = 16;                           // Places looked at round a cut.
+constexpr int kMostSteps = 50;  // Maximum number of steps per update; the rest of a longer pause is skipped.
+constexpr int kDropEvery = 14;  // Steps between two drops.
+constexpr int kRim = 16;        // Number of points around a cut that are checked for vessels.
 constexpr float kRimRadii[] = {0.0005f, 0.0008f};  // [m]
 constexpr float kVessel = 0.5f;
 constexpr std::uint8_t kSealed = 128;
-constexpr float kWay_m = 0.032f;
-constexpr float kSpeed_m_s = 0.009f;  // Down a wall.
-constexpr float kLeastSlope = 0.15f;  // A film creeps on flat ground, too.
+constexpr float kRun_m = 0.032f;
+constexpr float kSpeed_m_s = 0.009f;  // On a vertical wall.
+constexpr float kLeastSlope = 0.15f;  // Lower limit of the slope: a film also creeps on a horizontal surface.
 constexpr float kSameVessel_m = 0.006f;
 constexpr float kPool_m = 0.0024f;  // Radius at the source.
 constexpr float kDrop_m = 0.0016f;  // Radius of a full drop.
@@ -110,7 +110,7 @@ AtlasRect Bleeding::Bleed(Source* source, Atlas* atlas) {
   if (source->steps++ % kDropEvery != 0) {
     return {};
   }
-  drops_[next_drop_] = {kWay_m, source->material, source->node, 2.39996f * static_cast<float>(next_drop_)};
+  drops_[next_drop_] = {kRun_m, source->material, source->node, 2.39996f * static_cast<float>(next_drop_)};
   next_drop_ = (next_drop_ + 1) % drops_.size();
   const float grown = std::min(1.0f, 0.5f + 0.004f * static_cast<float>(source->steps));
   return atlas->Stain(source->material, grown * kPool_m, kThick);
@@ -119,19 +119,20 @@ AtlasRect Bleeding::Bleed(Source* source, Atlas* atlas) {
 AtlasRect Bleeding::Run(Drop* drop, std::span<const Vec3f> positions, Atlas* atlas) {
   const Vec2f downhill = Downhill(drop->node, positions);
   const float slope = downhill.norm();
-  const float way = static_cast<float>(kStep_s) * kSpeed_m_s * std::max(slope, kLeastSlope);
+  const float travel = static_cast<float>(kStep_s) * kSpeed_m_s * std::max(slope, kLeastSlope);
   if (slope > 0) {
-    // Tissue is never even: drops from one source take slightly different ways.
+    // Tissue is uneven: drops from one source take slightly different paths.
     const float stray = kStray * std::sin(1400 * drop->material.x() + 900 * drop->material.y() + drop->phase);
-    drop->material += way / slope * (Eigen::Rotation2Df(stray) * downhill);
+    drop->material += travel / slope * (Eigen::Rotation2Df(stray) * downhill);
   }
-  drop->left_m -= way;
+  drop->left_m -= travel;
   drop->node = NearestNode(drop->material, drop->node);
-  const float full = std::max(0.0f, drop->left_m / kWay_m);
+  const float full = std::max(0.0f, drop->left_m / kRun_m);
   return atlas->Stain(drop->material, (0.5f + 0.5f * full) * kDrop_m, kThin + (kThick - kThin) * full);
 }
 
-// Steepest descent over the neighbours: the sheet's places grow with row and column.
+// Walks to the neighbour nearest to the target until none is nearer; this works because s and t increase monotonically
+// with row and column.
 Index Bleeding::NearestNode(const Vec2f& material, Index start) const {
   const std::uint32_t rows = scene_.membrane.rows, cols = scene_.membrane.cols;
   Index best = start;
@@ -153,7 +154,8 @@ Index Bleeding::NearestNode(const Vec2f& material, Index start) const {
   }
 }
 
-/// In (s, t), its length the sine of the slope: the gradient of the height, from the differences to the neighbours.
+/// Direction of steepest descent in (s, t), with the sine of the slope as its length, from the differences to the
+/// neighbours.
 Vec2f Bleeding::Downhill(Index node, std::span<const Vec3f> positions) const {
   const std::uint32_t rows = scene_.membrane.rows, cols = scene_.membrane.cols;
   const std::uint32_t row = node / cols, col = node % cols;

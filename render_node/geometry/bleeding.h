@@ -1,6 +1,6 @@
-// Blood: a vessel that is opened before heat has closed it lets drops go, which run down the sheet and leave a film.
-// Bounded: a few sources, a few dozen drops. What happens is a function of the events and of time in steps of 20 ms,
-// not of how many pictures are drawn. Pure.
+// Blood: a vessel that is opened before heat has sealed it releases drops, which run down the sheet and leave a film.
+// The numbers of sources and drops are bounded. The state is a function of the events and of time in steps of 20 ms,
+// independent of the number of pictures. Pure.
 #pragma once
 
 #include <array>
@@ -15,15 +15,15 @@ namespace fulcrum::render {
 
 class Bleeding {
  public:
-  /// `vessels`: a square pattern of four bytes a texel whose alpha is how much of a vessel there is, `per_m` of it to
-  /// the metre of (s, t). Keeps references to the pattern and the arrays of `scene`.
+  /// @param vessels square pattern of four bytes per texel; alpha is the density of vessels. @param per_m repetitions
+  /// of the pattern per metre of (s, t). Keeps references to the pattern and the arrays of `scene`.
   Bleeding(const SceneView& scene, std::span<const std::uint8_t> vessels, int texels, float per_m);
 
-  /// A cut was made at `material` [m]: whatever vessel ends at its rim in living tissue begins to bleed.
+  /// Registers a cut at `material` [m]: a vessel that ends at its rim in living tissue begins to bleed.
   void Cut(const Vec2f& material, const Atlas& atlas, double session_time_s);
 
-  /// Moves the drops on, stains the atlas, and stops the sources that heat has sealed since (damage above a half, or
-  /// nothing left). Returns the texels touched.
+  /// Moves the drops, stains the atlas, and closes sources that heat has sealed (damage above a half, or tissue
+  /// removed). Returns the changed rectangle.
   AtlasRect Update(double session_time_s, const MembraneMesh& membrane, Atlas* atlas);
 
   [[nodiscard]] int sources() const;
@@ -33,14 +33,14 @@ class Bleeding {
   struct Source {
     bool open = false;
     Vec2f material = Vec2f::Zero();
-    Index node = 0;  // Of the grid, nearest.
-    int steps = 0;   // Since it opened.
+    Index node = 0;  // Nearest node of the grid.
+    int steps = 0;   // Steps since it opened.
   };
   struct Drop {
-    float left_m = 0;  // Way until nothing of it is left; 0: none.
+    float left_m = 0;  // Remaining length of the run [m]; 0: no drop.
     Vec2f material = Vec2f::Zero();
     Index node = 0;
-    float phase = 0;  // Of its straying [rad].
+    float phase = 0;  // Phase of the lateral deviation [rad].
   };
   [[nodiscard]] float VesselAt(const Vec2f& material) const;
   [[nodiscard]] Index NearestNode(const Vec2f& material, Index start) const;
@@ -55,7 +55,7 @@ class Bleeding {
   std::array<Source, 8> sources_;
   std::array<Drop, 48> drops_;
   std::size_t next_source_ = 0, next_drop_ = 0;
-  double time_s_ = 0;  // Of the last step.
+  double time_s_ = 0;  // Session time of the last step [s].
 };
 
 }  // namespace fulcrum::render

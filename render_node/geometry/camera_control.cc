@@ -10,7 +10,7 @@ constexpr float kTurn = 3 * std::numbers::pi_v<float> / 180;
 constexpr float kStep = 0.95f;
 constexpr float kRoll_deg = 5;
 constexpr float kNearest_m = 0.02f, kFarthest_m = 0.3f;
-constexpr float kSteepest = 0.97f;  // Cosine to the vertical: the horizon is lost there.
+constexpr float kSteepest = 0.97f;  // Limit of the cosine to the vertical, where the horizon is undefined.
 
 }  // namespace
 

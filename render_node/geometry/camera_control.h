@@ -1,4 +1,4 @@
-// The laparoscope in the hand of an assistant at the keyboard. Pure.
+// Keyboard control of the laparoscope. Pure.
 #pragma once
 
 #include <optional>
@@ -14,10 +14,10 @@ class CameraControl {
  public:
   explicit CameraControl(const RenderParams& scene) : scene_(scene), now_(scene) {}
 
-  /// Turns the tip about the target by 3 degrees, moves it by a twentieth of the way, or rolls the horizon by 5
+  /// Turns the tip about the target by 3 degrees, moves it by a twentieth of the distance, or rolls the horizon by 5
   /// degrees.
   void Press(CameraKey key);
-  /// The picture's middle follows this point [m]; without one it stays.
+  /// Moves the camera's target to this point [m]; without a call the target stays.
   void Follow(const Vec3f& p_W);
   [[nodiscard]] const RenderParams& params() const { return now_; }
 

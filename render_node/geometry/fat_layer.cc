@@ -6,12 +6,12 @@
 namespace fulcrum::render {
 namespace {
 
-// Fat lies this deep under the membrane where the tube is far away, and no nearer to the membrane than kLeastDepth, so
-// that the two surfaces do not fight for the same pixel.
+// Depth of the fat under the membrane: kMostDepth where the tube is far away, never less than kLeastDepth, so that the
+// two surfaces do not interfere in the depth test.
 constexpr float kMostDepth = 0.0025f;   // [m]
 constexpr float kLeastDepth = 0.0006f;  // [m]
 constexpr float kThickFat = 0.004f;     // [m]
-// Share of the membrane's lift beyond rest that the loose fat follows; the rest is torn open areolar tissue.
+// Share of the membrane's lift beyond rest that the loose fat follows; the rest is opened areolar tissue.
 constexpr float kFollow = 0.45f;
 
 }  // namespace
@@ -38,7 +38,7 @@ FatLayer::FatLayer(const SceneView& scene, std::uint32_t stride) {
       const Vec3f& membrane = scene.rest_position[grid.first + node];
       Anchor anchor{node, nearest.Find(membrane), 0, 0};
       anchor.rest_gap = (membrane - anchor.foot.At(rest)).norm();
-      // Lobules: the depth below the membrane waves gently from place to place.
+      // Lobules: the depth below the membrane varies smoothly with the place.
       const Vec2f m = scene.membrane_material[node];
       const float wave =
           0.5f + 0.25f * std::sin(900 * m.x() + 300 * m.y()) + 0.25f * std::sin(700 * m.y() - 500 * m.x());
@@ -48,7 +48,8 @@ FatLayer::FatLayer(const SceneView& scene, std::uint32_t stride) {
       materials_.push_back(m);
     }
   }
-  // Against the tenth percentile instead of the least gap: single folds of the tube come close to the membrane.
+  // Relative to the tenth percentile instead of the smallest gap, because single folds of the tube are close to the
+  // membrane.
   std::vector<float> gaps;
   for (const Anchor& anchor : anchors_) {
     gaps.push_back(anchor.rest_gap);

@@ -1,5 +1,5 @@
-// An interpolative layer (fat): not simulated, it lies between a membrane node and the tube's surface beneath it, and
-// follows both (the binding of the paper's eq. 9, used here for a position instead of a force). Pure.
+// Fat as an interpolated layer: it is not simulated but placed between the membrane's nodes and the tube's surface
+// beneath, and follows both (the binding of the paper's eq. 9, used for a position instead of a force). Pure.
 #pragma once
 
 #include <functional>
@@ -16,24 +16,25 @@ class FatLayer {
   /// Every `stride`-th node of the membrane's grid carries a fat vertex. Keeps a reference to the scene's arrays.
   FatLayer(const SceneView& scene, std::uint32_t stride);
 
-  /// Positions and normals from the particles and the membrane as drawn (its dead nodes are in a quiet place there).
+  /// Computes positions and normals from the particles and the membrane as drawn, in which removed nodes have
+  /// well-defined places.
   void Update(std::span<const float> xyz, const MembraneMesh& membrane);
 
   [[nodiscard]] std::span<const Vec3f> positions() const { return positions_; }
   [[nodiscard]] std::span<const Vec3f> normals() const { return normals_; }
   [[nodiscard]] std::span<const Vec2f> materials() const { return materials_; }  ///< (s, t) [m].
-  /// 0 where membrane and tube lie as close as anywhere, 1 where there is room for 4 mm more fat. At rest.
+  /// Thickness at rest: 0 where membrane and tube are closest, 1 where their gap is 4 mm larger.
   [[nodiscard]] std::span<const float> thickness() const { return thickness_; }
   [[nodiscard]] std::span<const Triangle> triangles() const { return triangles_; }
-  /// How far each vertex has been laid bare, 0 … 1: 1 where `opened` says so of (s, t) [m] or the membrane above is
-  /// gone, half beside such a vertex, nothing farther away, so that it ends within triangles and not with them.
+  /// Bared share of each vertex: 1 where `opened` is true for (s, t) [m] or the membrane above is removed, 0.5 beside
+  /// such a vertex, otherwise 0, so that the border runs within triangles and not along their edges.
   void FindBared(const std::function<bool(const Vec2f& material)>& opened, const MembraneMesh& membrane,
                  std::vector<float>* bared) const;
 
  private:
   struct Anchor {
-    Index node;         // Of the membrane's grid.
-    SurfacePoint foot;  // On the tube.
+    Index node;         // Node of the membrane's grid.
+    SurfacePoint foot;  // Nearest point on the tube.
     float rest_gap;     // Membrane to foot at rest [m].
     float weight;       // 0 on the tube, 1 on the membrane, at rest.
   };

@@ -1,5 +1,5 @@
-// Which triangles can be seen at all: a software rasteriser spends more on a triangle's corners than on finding out
-// that it lies outside the field. Pure.
+// Culling of triangles outside the field of view: for a software rasteriser the processing of a triangle's vertices
+// costs more than this test. Pure.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +16,9 @@ class FieldOfView {
  public:
   explicit FieldOfView(const Laparoscope& scope);
 
-  /// Puts into `seen`, in their order, the triangles of `triangles` that are not wholly beyond one edge of the square
-  /// round the optics' circle and, with Sides::kFront, do not turn their back on the eye. True when `seen` is another
-  /// list than before. Positions in frame W [m].
+  /// Writes to `seen`, in their order, the triangles that are not completely beyond one edge of the square around the
+  /// optics' circle and, with Sides::kFront, are not back-facing. Returns true if `seen` has changed. Positions in
+  /// frame W [m].
   bool Find(std::span<const Vec3f> positions, std::span<const Triangle> triangles, Sides sides,
             std::vector<Triangle>* seen);
 

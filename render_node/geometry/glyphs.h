@@ -1,4 +1,4 @@
-// A bitmap font of five by seven dots for the line of figures in the picture: no font file, no font library. Pure.
+// A built-in bitmap font of five by seven dots for the text in the picture. Pure.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,8 @@ struct GlyphSheet {
 };
 [[nodiscard]] GlyphSheet MakeGlyphSheet();
 
-/// Place of the character's glyph on the sheet; small letters are drawn as capitals, unknown ones as a space.
+/// Index of the character's glyph on the sheet; lower-case letters are drawn as capitals, unknown characters as a
+/// space.
 [[nodiscard]] int GlyphIndex(char character);
 
 }  // namespace fulcrum::render

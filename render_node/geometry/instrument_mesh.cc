@@ -17,7 +17,7 @@ Solid InstrumentSolid(const SceneView& scene, const ToolMesh& mesh) {
   const ToolDescription& tool = scene.tools[mesh.tool];
   const float steel_from_z = tool.kind == ToolKind::kHook ? -kHookNeck : -tool.tip_length_m - kBehindHinge;
   const auto triangles = scene.tool_triangles.subspan(mesh.first_triangle, mesh.triangle_count);
-  std::vector<Vec3f> areas;  // Normals times twice the area: large faces count for more.
+  std::vector<Vec3f> areas;  // Normals times twice the area, so that vertex normals are weighted by area.
   std::vector<std::vector<Index>> faces(mesh.vertex_count);
   for (Index k = 0; k < mesh.triangle_count; ++k) {
     const auto& [a, b, c] = triangles[k];

@@ -1,4 +1,4 @@
-// Instruments whose meshes the scene gives, as solids to draw. Pure.
+// Solids of instruments whose meshes the scene contains. Pure.
 #pragma once
 
 #include "render_node/geometry/solid.h"

@@ -10,9 +10,9 @@ constexpr float kNear = 0.004f;  // [m]
 constexpr float kFar = 0.8f;     // [m]
 // A 10 mm scope: fibres in a crescent, 4 mm from the lens.
 constexpr float kFibreOffset = 0.004f;  // [m]
-// The slanted glass bends the beam back towards the sight: what is left of the optics' angle.
+// Share of the optics' angle that remains between light and line of sight, because the slanted glass refracts the beam.
 constexpr float kBeamTilt = 0.25f;
-// Of the picture's height: the circle cuts the corners, as with a camera head zoomed for the monitor.
+// Radius of the circle relative to the picture's height: it is cut by the edges, as with a zoomed camera head.
 constexpr float kCircle = 0.70f;
 
 constexpr float Radians(float degrees) { return degrees * std::numbers::pi_v<float> / 180; }
@@ -23,7 +23,7 @@ Laparoscope MakeLaparoscope(const RenderParams& params) {
   Laparoscope scope;
   const Vec3f sight = params.scope_target_W - params.scope_tip_W;
   const Vec3f back = -sight.normalized();
-  // Looking nearly straight down, "up" in the picture is cranial (+y).
+  // For a nearly vertical line of sight "up" in the picture is cranial (+y).
   const Vec3f up_hint = std::abs(back.z()) > 0.9f ? Vec3f::UnitY() : Vec3f::UnitZ();
   // The picture turns clockwise when the camera turns the other way.
   const Vec3f right = Eigen::AngleAxisf(Radians(params.roll_deg), back) * up_hint.cross(back).normalized();

@@ -1,4 +1,4 @@
-// The laparoscope as a camera: where it looks, what its light does, how large its round picture is. Pure.
+// The laparoscope as a camera: view and projection, its light, its round field. Pure.
 #pragma once
 
 #include "services/base/core/scene_view.h"
@@ -8,16 +8,17 @@ namespace fulcrum::render {
 struct Laparoscope {
   Eigen::Matrix4f view;        ///< Frame W to camera (x right, y up, looking along -z).
   Eigen::Matrix4f projection;  ///< OpenGL clip coordinates.
-  Vec3f light_position;        ///< Camera frame [m]: the fibres lie beside the lens.
+  Vec3f light_position;        ///< Position of the light fibres beside the lens, camera frame [m].
   Vec3f light_axis;            ///< Camera frame, unit.
   Vec3f wall_direction;        ///< Camera frame, unit: towards the lit wall above the field.
-  float light_power;           ///< Irradiance 1 at the target.
+  float light_power;           ///< Power for an irradiance of 1 at the target.
   Vec2f picture_centre;        ///< [pixels]
   float circle_radius;         ///< Of the round picture [pixels].
 };
 
 /// The line of sight goes from scope_tip_W to scope_target_W. With 30 degree optics the shaft lies 30 degrees above it
-/// and the light leaves between the two; with 0 degrees shaft, light and sight are one line. fov_deg spans the height.
+/// and the light's axis between the two; with 0 degrees shaft, light and line of sight coincide. fov_deg is the angle
+/// over the height.
 [[nodiscard]] Laparoscope MakeLaparoscope(const RenderParams& params);
 
 }  // namespace fulcrum::render

@@ -9,7 +9,7 @@
 namespace fulcrum::render {
 namespace {
 
-// Pieces below this size are crumbs: some 30 mm^2 of the built-in sheet.
+// Pieces with fewer nodes are crumbs: about 30 mm^2 of the built-in sheet.
 constexpr std::size_t kCrumbNodes = 40;
 
 }  // namespace
@@ -33,7 +33,7 @@ bool MembraneMesh::SetTopology(const TopologyState& topology) {
   return true;
 }
 
-// Flood fill over live edges; a piece is a crumb when it is small and none of its nodes is fixed.
+// Flood fill over live edges; a piece is a crumb if it is small and none of its nodes is fixed.
 void MembraneMesh::FindGone() {
   const Index nodes = scene_.membrane.node_count();
   const Held held{*this};
@@ -111,7 +111,7 @@ void MembraneMesh::BuildTriangles() {
   }
 }
 
-// True when both triangles of the cell are as they were made.
+// Returns true if both triangles of the cell are intact.
 bool MembraneMesh::AddTriangles(std::uint32_t row, std::uint32_t col) {
   const Held held{*this};
   const SlitSheet sheet(held);
@@ -154,7 +154,7 @@ void MembraneMesh::Update(std::span<const float> xyz) {
         mean += normals_[part.nodes[k]];
       }
     }
-    // A corner cut off on every side has no whole triangle to take a normal from.
+    // A corner that is cut off on all sides has no intact triangle for its normal.
     const Vec3f* corner = &positions_[nodes + 3 * p];
     const Vec3f normal =
         mean.squaredNorm() > 0 ? mean.normalized() : (corner[1] - corner[0]).cross(corner[2] - corner[0]).normalized();
@@ -164,7 +164,8 @@ void MembraneMesh::Update(std::span<const float> xyz) {
   }
 }
 
-// A vaporised node has no constraints left and may be anywhere: the fat beneath and the picture need a quiet place.
+// A vaporised node has no constraints and may be anywhere, so it is given a well-defined place for the fat beneath and
+// the picture.
 void MembraneMesh::PlaceGoneNodes() {
   const Index first = scene_.membrane.first;
   for (const Index node : gone_list_) {

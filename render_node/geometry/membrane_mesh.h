@@ -1,12 +1,13 @@
-// The membrane as triangles to draw, with its cuts. Pure.
+// Triangle mesh of the membrane with its cuts, for drawing. Pure.
 //
-// Triangles over a slit fall into parts with ghost corners (services/base/core/slit_sheet.h); a part is drawn once.
+// Triangles over a slit are split into parts with ghost corners (services/base/core/slit_sheet.h); each part is drawn
+// once.
 //
-// `side` is +1 at a part's own corners and -1 at its ghosts: the shader drops fragments where it is negative, and the
-// atlas decides texel by texel where the slit runs.
+// `side` is +1 at a part's own corners and -1 at its ghosts: the shader discards fragments where it is negative, and
+// the atlas defines the slit's border texel by texel.
 //
-// Crumbs (pieces cut off on every side, a few nodes large, held by nothing) are not drawn: they have shrivelled to less
-// than a texel of tissue, and the simulation leaves them wherever they were.
+// Crumbs (pieces of a few nodes that are cut off on all sides and have no fixed node) are not drawn: they have shrunk
+// to less than a texel of tissue, and their nodes have arbitrary positions in the simulation.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +24,8 @@ class MembraneMesh {
   /// Keeps a reference to the arrays of `scene`.
   explicit MembraneMesh(const SceneView& scene);
 
-  /// Takes over dead nodes and edges and rebuilds the triangles. False, and nothing changes, when the size of the grid
-  /// differs or the bit fields are short.
+  /// Sets dead nodes and edges and rebuilds the triangles. Returns false, and changes nothing, if the size of the grid
+  /// differs or the bit fields are too short.
   bool SetTopology(const TopologyState& topology);
 
   /// Positions and normals for these particles (3 * particle count floats, m).
@@ -36,29 +37,29 @@ class MembraneMesh {
   [[nodiscard]] std::span<const Vec2f> materials() const { return materials_; }  ///< (s, t) [m].
   [[nodiscard]] std::span<const float> sides() const { return sides_; }
   [[nodiscard]] std::span<const Triangle> triangles() const { return triangles_; }
-  /// Triangles that are whole; parts of cut ones follow them in triangles().
+  /// Number of intact triangles; parts of cut ones follow them in triangles().
   [[nodiscard]] std::size_t whole_triangles() const { return whole_triangles_; }
 
   /// The grid in blocks of kBlockRows x kBlockCols cells, row by row; the last ones may be smaller.
   static constexpr std::uint32_t kBlockRows = 8, kBlockCols = 4;
   [[nodiscard]] std::uint32_t block_rows() const { return rows_ > 0 ? (rows_ - 1 + kBlockRows - 1) / kBlockRows : 0; }
   [[nodiscard]] std::uint32_t block_cols() const { return cols_ > 0 ? (cols_ - 1 + kBlockCols - 1) / kBlockCols : 0; }
-  /// Whole triangles of a block.
+  /// Intact triangles of a block.
   [[nodiscard]] std::span<const Triangle> block_triangles(std::size_t block) const {
     return triangles().subspan(block_start_[block], block_start_[block + 1] - block_start_[block]);
   }
-  /// Nothing in the block is cut or gone.
+  /// True if no part of the block is cut or removed.
   [[nodiscard]] bool block_intact(std::size_t block) const { return block_intact_[block] != 0; }
 
-  /// Vaporised, or part of a crumb.
+  /// True if the node is vaporised or part of a crumb.
   [[nodiscard]] bool node_gone(Index node) const { return gone_[node] != 0; }
 
  private:
   struct Part {
-    Triangle nodes;  // Of the cut triangle.
+    Triangle nodes;  // Nodes of the cut triangle.
     OwnedCorners owned;
   };
-  /// This mesh, for SlitSheet.
+  /// Adapter of this mesh for SlitSheet.
   struct Held {
     const MembraneMesh& mesh;
     [[nodiscard]] std::uint32_t rows() const { return mesh.rows_; }

@@ -9,9 +9,9 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr double kBudget_ms = 28;  // Of the 33 ms that 30 pictures a second leave, with room for a busy moment.
+constexpr double kBudget_ms = 28;  // Of the 33 ms at 30 pictures a second, with a reserve for load peaks.
 constexpr double kStepCost = 1.5;  // A step finer costs up to this factor more.
-constexpr int kCalmWindows = 6;    // Some two seconds: no going to and fro.
+constexpr int kCalmWindows = 6;    // About two seconds, to prevent oscillation.
 constexpr float kFewestLines = 270;
 
 }  // namespace
@@ -44,7 +44,7 @@ void QualityControl::Add(double draw_ms) {
     return;
   }
   if (std::exchange(first_, false)) {
-    return;  // It was not drawn as the next ones will be.
+    return;  // Not representative: it was drawn at another scale.
   }
   cost_ms_[count_++] = draw_ms;
   if (count_ < kWindow) {

@@ -1,5 +1,4 @@
-// How finely the scene is drawn: the picture keeps its size and its text, the scene beneath may have fewer pixels.
-// Pure.
+// Resolution of the scene: the picture keeps its size and its text, the scene may be drawn with fewer pixels. Pure.
 #pragma once
 
 #include <array>
@@ -13,30 +12,30 @@ enum class Quality { kAuto, kLow, kHigh };
 /// "auto", "low" or "high". Throws InputError for anything else.
 [[nodiscard]] Quality QualityFromName(std::string_view name);
 
-/// Chooses the scene's share of the picture's width and height. With kAuto it goes by what pictures cost: down a step
-/// when the median of the last ones is above the budget, up when a step more would still stay below it. The very first
-/// picture is drawn coarsely: somebody waits for it, after a restart in mid-operation.
+/// Chooses the scene's share of the picture's width and height. With kAuto it depends on the drawing time: one step
+/// down if the median of the last pictures exceeds the budget, one step up if the finer step would still stay below it.
+/// The first picture is drawn coarsely, because a session waits for it after a restart.
 class QualityControl {
  public:
   /// `height` of the picture [pixels]: the scene never has fewer than 270 lines, or as many as the picture.
   QualityControl(Quality quality, int height);
 
-  /// Cost of one picture [ms].
+  /// Adds the drawing time of one picture [ms].
   void Add(double draw_ms);
   [[nodiscard]] float scale() const { return kScales[first_ ? last_step_ : step_]; }
 
  private:
-  // Each has about 0.7 of the pixels of the one before.
+  // Each step has about 0.7 of the pixels of the one before.
   static constexpr std::array<float, 5> kScales{1.0f, 0.85f, 0.72f, 0.61f, 0.52f};
   static constexpr std::size_t kWindow = 9;
 
   bool automatic_;
   bool first_;
   std::size_t step_ = 0;
-  std::size_t last_step_ = 0;  // The coarsest that is still legible.
+  std::size_t last_step_ = 0;  // Coarsest step with at least kFewestLines lines.
   std::array<double, kWindow> cost_ms_{};
   std::size_t count_ = 0;
-  int calm_ = 0;  // Windows in a row that would permit a finer step.
+  int calm_ = 0;  // Consecutive windows that would permit a finer step.
 };
 
 }  // namespace fulcrum::render

@@ -17,7 +17,7 @@ struct Steps {
 // Finest first. Each divides the next, and the last one the block.
 constexpr std::array<Steps, 4> kLevels{{{1, 1}, {2, 1}, {4, 2}, {8, 4}}};
 
-/// visit(first row, last row, first col, last col) of each quad of the division, until one says false.
+/// Calls visit(first row, last row, first col, last col) for each quad of the division until a call returns false.
 template <class Visit>
 bool AllQuads(const Block& block, const Steps& steps, const Visit& visit) {
   for (std::uint32_t r = block.row; r < block.row_end; r += steps.rows) {
@@ -96,7 +96,7 @@ void SheetDetail::ChooseLevels(const MembraneMesh& membrane, const Vec3f& eye_W,
   }
 }
 
-// A node on the rim of a block goes to the nearest one that the coarser of the two blocks has: no gap between them.
+// A node on the border of two blocks is snapped to the nearest node of the coarser block, so that there is no gap.
 void SheetDetail::AppendBlock(const MembraneMesh& membrane, std::uint32_t row, std::uint32_t col,
                               std::vector<Triangle>* out) const {
   const std::size_t width = membrane.block_cols(), index = row * width + col;

@@ -1,5 +1,5 @@
-// How finely each part of the membrane is drawn. A software rasteriser shades blocks of 4 x 4 pixels: where the sheet
-// is smooth and whole, triangles of a few pixels cost several times what large ones do and show the same. Pure.
+// Level of detail of the membrane. A software rasteriser shades blocks of 4 x 4 pixels: where the sheet is smooth and
+// intact, triangles of a few pixels cost several times as much as large ones and look the same. Pure.
 #pragma once
 
 #include <vector>
@@ -12,10 +12,10 @@ class SheetDetail {
  public:
   explicit SheetDetail(const MembraneGrid& grid);
 
-  /// Replaces `out` by the triangles to draw: per block of the grid the coarsest division that lies within half a pixel
-  /// of the fine one and keeps its normals within 0.15; cut blocks and those beside them as they are. Without gaps
-  /// between blocks. Rows far from the eye come first, so that in a fold the near layer is blended over the far one;
-  /// then the parts of cut triangles.
+  /// Replaces `out` by the triangles to draw: per block of the grid the coarsest division whose positions differ from
+  /// the fine one by less than half a pixel and whose normals differ by less than 0.15. Cut blocks and their neighbours
+  /// keep the finest division. There are no gaps between blocks. Rows far from the eye come first, so that in a fold
+  /// the near layer is blended over the far one; then the parts of cut triangles.
   ///
   /// @param eye_W           Place of the eye [m].
   /// @param pixels_per_rad  Of the picture, in its middle.
@@ -34,7 +34,7 @@ class SheetDetail {
                    std::vector<Triangle>* out) const;
 
   MembraneGrid grid_;
-  std::vector<std::uint8_t> levels_;  // Per block: how coarse.
+  std::vector<std::uint8_t> levels_;  // Per block: index of its division, 0 is the finest.
 };
 
 }  // namespace fulcrum::render

@@ -60,7 +60,7 @@ void AppendTube(std::span<const Vec3f> path, std::span<const float> radii, int s
     const Vec3f ahead = path[std::min(k + 1, path.size() - 1)] - path[k];
     const Vec3f behind = path[k] - path[k > 0 ? k - 1 : 0];
     const Vec3f along = (ahead.normalized() + behind.normalized()).normalized();
-    // Carried along the path instead of chosen anew, so that the rings do not twist against each other.
+    // Transported along the path, so that consecutive rings are not twisted against each other.
     across = (across - across.dot(along) * along).normalized();
     const Vec3f other = along.cross(across);
     for (Index s = 0; s < sides; ++s) {

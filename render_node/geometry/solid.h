@@ -13,7 +13,7 @@ namespace fulcrum::render {
 struct Solid {
   std::vector<Vec3f> positions;
   std::vector<Vec3f> normals;
-  std::vector<std::array<float, 4>> colours;  ///< Linear red, green, blue; alpha is how metallic, 0 … 1.
+  std::vector<std::array<float, 4>> colours;  ///< Linear red, green, blue; alpha: metallic share, 0 … 1.
   std::vector<Triangle> triangles;
 };
 
@@ -25,7 +25,8 @@ inline constexpr float kHookNeck = 0.012f;  ///< [m], as the collision shape of 
 void AppendTube(std::span<const Vec3f> path, std::span<const float> radii, int segments, const Colour& colour,
                 Solid* solid);
 
-/// Joins outlines of equal size, each counter-clockwise seen from the last one, with flat faces and caps.
+/// Joins outlines with equal numbers of points, each counter-clockwise as seen from the last one, by flat faces and
+/// caps.
 void AppendLoft(std::span<const std::vector<Vec3f>> outlines, const Colour& colour, Solid* solid);
 
 /// Shaft from z = -shaft_length to the hinge (grasper) or to the neck (hook), in frame T.

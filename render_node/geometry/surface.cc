@@ -86,7 +86,7 @@ NearestOnSurface::NearestOnSurface(std::span<const Vec3f> positions, std::span<c
   if (triangles.empty()) {
     low = high = Vec3f::Zero();
   }
-  // Two mean edges: a handful of triangles in a cell. At most 64 cells a side bounds the memory.
+  // Cells of two mean edge lengths hold a few triangles each. At most 64 cells per side bound the memory.
   const float extent = (high - low).maxCoeff();
   cell_ = std::max({static_cast<float>(2 * edge_sum / std::max<std::size_t>(1, triangles.size())), extent / 64, 1e-6f});
   origin_ = low;
@@ -150,7 +150,7 @@ SurfacePoint NearestOnSurface::Find(const Vec3f& point) const {
             const float d = (w[0] * a + w[1] * b + w[2] * c - point).squaredNorm();
             if (d < best_distance) {
               best_distance = d;
-              // A little more: roots and radii are rounded.
+              // The factor allows for rounding of roots and radii.
               best_root = 1.001f * std::sqrt(d);
               best = {t, w};
             }
@@ -158,7 +158,7 @@ SurfacePoint NearestOnSurface::Find(const Vec3f& point) const {
         }
       }
     }
-    // One ring more after the first hit: a nearer triangle may have its centre next door.
+    // One more ring after the first hit, because the centre of a nearer triangle may lie in the next ring.
     if (best_distance < std::numeric_limits<float>::max() && last_ring > ring + 1) {
       last_ring = ring + 1;
     }

@@ -37,8 +37,8 @@ class NearestOnSurface {
  public:
   /// Keeps references: positions and triangles must outlive it.
   NearestOnSurface(std::span<const Vec3f> positions, std::span<const Triangle> triangles);
-  /// Nearest among the triangles whose centres lie in the 3x3x3 cells round the nearest occupied cell: exact for
-  /// points close to the surface, within a cell otherwise. @pre at least one triangle.
+  /// Nearest point on the triangles whose centres lie in the 3x3x3 cells around the nearest occupied cell: exact for
+  /// points close to the surface, otherwise with an error of up to a cell. @pre at least one triangle.
   [[nodiscard]] SurfacePoint Find(const Vec3f& point) const;
 
  private:

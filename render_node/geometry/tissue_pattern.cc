@@ -12,7 +12,7 @@
 namespace fulcrum::render {
 namespace {
 
-// std::mt19937's sequence is fixed by the standard, the distributions' are not.
+// The standard fixes the sequence of std::mt19937 but not those of its distributions.
 class Uniform {
  public:
   explicit Uniform(std::uint32_t seed) : engine_(seed) {}
@@ -30,7 +30,7 @@ void AddValueNoise(int size, int cells, float amplitude, Uniform* uniform, std::
   for (float& value : lattice) {
     value = (*uniform)() - 0.5f;
   }
-  // Along x the same in each row: where in the lattice, and between which two of its columns.
+  // Lattice columns and weights of each x; the same for all rows.
   struct Column {
     std::size_t left, right;
     float share;
@@ -61,7 +61,7 @@ float Wrapped(float a, float b) {
   return std::min(d, 1 - d);
 }
 
-/// Nearest, halves up; std::lround would be a call for each texel.
+/// Rounds to nearest, halves up; std::lround would be a function call per texel.
 std::uint8_t ToByte(float value) {
   return static_cast<std::uint8_t>(static_cast<int>(2 * std::clamp(value, 0.0f, 255.0f) + 1) / 2);
 }
@@ -151,7 +151,7 @@ std::vector<std::uint8_t> MakeVesselPattern(int size) {
       walker.y += std::sin(walker.angle);
       walker.left -= 1;
       walker.radius *= 0.9985f;
-      // A branch leaves every thirtieth of the image or so, thinner (Murray: r0^3 = r1^3 + r2^3).
+      // A thinner branch starts about every thirtieth of the image (Murray's law: r0^3 = r1^3 + r2^3).
       if (uniform() < 30.0f / static_cast<float>(size) && walkers.size() < kMostWalkers) {
         const float turn = (uniform() < 0.5f ? -1.0f : 1.0f) * (0.5f + 0.6f * uniform());
         walkers.push_back({walker.x, walker.y, walker.angle + turn, 0.68f * walker.radius, 0.5f * walker.left});

@@ -1,5 +1,5 @@
 // Patterns of tissue, made once at start-up: sampling them costs a software rasteriser far less than computing noise
-// for each pixel of each picture. All tile without a seam and are the same in every run. Pure.
+// for each pixel of each picture. All are seamlessly tileable and the same in every run. Pure.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ namespace fulcrum::render {
 /// Square RGBA8 image of `size` texels: the three noises, and the vessels as alpha. One sample instead of two.
 [[nodiscard]] std::vector<std::uint8_t> MakeSerosaPattern(int size);
 
-/// Where ureter (red) and nerve (green) run under the sheet, as they shine through it: two bytes per texel, s fast,
-/// over the atlas' area. 255 on the centre line, 0 from twice the structure's radius outwards.
+/// Map of ureter (red) and nerve (green) under the sheet, as they shine through it: two bytes per texel, s fast, over
+/// the atlas' area. 255 on the centre line, 0 beyond twice the structure's radius.
 struct StructureMap {
   int width = 1, height = 1;
   std::vector<std::uint8_t> texels;

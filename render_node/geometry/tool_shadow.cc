@@ -9,15 +9,17 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr int kSamples = 28;               // Along an instrument …
-constexpr float kLength = 0.13f;           // … over so much of it, from the tip [m]; denser near the tip.
-constexpr float kTransition = 0.006f;      // From the tip's radius to the shaft's [m].
+constexpr int kSamples = 28;               // Number of sections along an instrument …
+constexpr float kLength = 0.13f;           // … over this length from the tip [m]; denser near the tip.
+constexpr float kTransition = 0.006f;      // Length of the transition from the tip's to the shaft's radius [m].
 constexpr float kLeastPenumbra = 0.6e-3f;  // [m]
-constexpr float kPenumbra = 0.05f;  // Half width of the soft edge per height: what the crescent of fibres subtends.
+// Half width of the soft edge per height: angle subtended by the crescent of fibres.
+constexpr float kPenumbra = 0.05f;
 constexpr float kDarkest = 0.62f;
-constexpr float kFade = 0.10f;     // At this height half of the darkness is left: light from the walls fills it [m].
+// Height at which the darkness has fallen to a half, because of light from the walls [m].
+constexpr float kFade = 0.10f;
 constexpr float kTipEnd = 0.005f;  // [m]
-constexpr int kFillRounds = 4;     // Vertices of what stands still lie several cells apart.
+constexpr int kFillRounds = 4;     // Rounds of filling gaps: vertices of the fixed surfaces are several cells apart.
 
 float SmoothStep(float low, float high, float x) {
   const float t = std::clamp((x - low) / (high - low), 0.0f, 1.0f);
@@ -50,7 +52,7 @@ void ToolShadow::Update(const Laparoscope& scope, std::span<const float> xyz,
 
 void ToolShadow::FindDepths(const Laparoscope& scope, std::span<const float> xyz) {
   constexpr std::size_t kCells = std::size_t{kCellsAcross} * kCellsUp;
-  // A little more than the camera sees: the light stands beside it.
+  // Larger than the camera's field, because the light is beside the camera.
   reach_ = 1.25f * Vec2f(1 / scope.projection(0, 0), 1 / scope.projection(1, 1));
   depth_.assign(kCells, 0.0f);
   const Mat3f turn = scope.view.block<3, 3>(0, 0);
@@ -96,7 +98,7 @@ void ToolShadow::FindDepths(const Laparoscope& scope, std::span<const float> xyz
   }
 }
 
-// Between the four cells round it; 0 outside the map and where nothing is.
+// Interpolates between the four cells around a direction; 0 outside the map and where there is no tissue.
 float ToolShadow::DepthAt(const Vec2f& direction) const {
   const float x = (0.5f + 0.5f * direction.x() / reach_.x()) * kCellsAcross - 0.5f;
   const float y = (0.5f + 0.5f * direction.y() / reach_.y()) * kCellsUp - 0.5f;
@@ -138,7 +140,7 @@ void ToolShadow::AppendRibbon(const Laparoscope& scope, const ToolDescription& t
   for (std::size_t k = 0; k < kSamples; ++k) {
     const Section& here = sections[k];
     const Section &before = sections[k > 0 ? k - 1 : 0], &after = sections[std::min<std::size_t>(k + 1, kSamples - 1)];
-    // The cells are coarse: the mean with the neighbours takes their steps out.
+    // Averaging with the neighbours smooths the steps of the coarse cells.
     const bool known = before.depth > 0 && here.depth > 0 && after.depth > 0;
     const float depth = known ? 0.25f * before.depth + 0.5f * here.depth + 0.25f * after.depth : -here.ray.z();
     const float magnified = depth / -here.ray.z();
@@ -150,7 +152,7 @@ void ToolShadow::AppendRibbon(const Laparoscope& scope, const ToolDescription& t
     const float core = magnified * here.radius * std::sqrt(end),
                 penumbra = kLeastPenumbra + kPenumbra * std::max(0.0f, height);
     const float share = static_cast<float>(k) / (kSamples - 1);
-    // Nothing where the tissue is unknown or the instrument dips into it; the ends fade out.
+    // The opacity is 0 where the depth of the tissue is unknown or the instrument penetrates it; the ends fade out.
     const float opacity = known && here.ray.z() < 0
                               ? kDarkest * std::min(1.0f, core / penumbra) * kFade / (kFade + std::max(0.0f, height)) *
                                     SmoothStep(-here.radius, 0.5f * here.radius, height) *

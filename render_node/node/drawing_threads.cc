@@ -10,7 +10,7 @@
 namespace fulcrum::render {
 namespace {
 
-// A software rasteriser takes every core it can get: below the servo and the solvers where they share cores.
+// A software rasteriser uses all cores, so it runs below servo and solvers where they share cores.
 constexpr int kNice = 5;
 
 }  // namespace

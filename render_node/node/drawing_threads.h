@@ -1,4 +1,4 @@
-// The threads that draw, and their priority against the solvers'.
+// Threads that draw, and their priority relative to the solvers.
 #pragma once
 
 #include <span>
@@ -6,11 +6,10 @@
 
 namespace fulcrum::render {
 
-/// Numbers of all threads of this process.
+/// Thread ids of all threads of this process.
 [[nodiscard]] std::vector<int> ThreadsOfProcess();
 
-/// Lowers the priority of these threads and of those that they start from now on. Logs a warning when that is not
-/// permitted.
+/// Lowers the priority of these threads and of threads that they start later. Logs a warning if that is not permitted.
 void LowerPriority(std::span<const int> threads);
 
 }  // namespace fulcrum::render

@@ -8,7 +8,7 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr int kBar = 10;  // Blocks.
+constexpr int kBar = 10;  // Length of the force bar [characters].
 
 std::string Number(const char* format, double value) {
   std::array<char, 32> text;

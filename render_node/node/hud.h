@@ -1,4 +1,4 @@
-// What the picture says in words: the figures in its corners.
+// Text of the picture: figures and warnings in its corners.
 #pragma once
 
 #include <array>
@@ -16,18 +16,18 @@ enum class Alarm { kNone, kHot, kInjured };
 struct HudState {
   double session_time_s = 0;
   std::uint8_t pedals = kPedalNone;
-  float power_W = 0;                                    ///< Asked of the generator.
-  std::array<std::optional<float>, kMaxTools> force_N;  ///< At each tool that is there.
-  float force_limit_N = 1;                              ///< A full bar.
-  std::optional<float> tip_C;                           ///< Hottest texel of the newest patch, while it is new.
+  float power_W = 0;                                    ///< Set power of the generator.
+  std::array<std::optional<float>, kMaxTools> force_N;  ///< Force at each tool; no value without the tool.
+  float force_limit_N = 1;                              ///< Force that fills the bar.
+  std::optional<float> tip_C;  ///< Hottest texel of the newest patch; no value once the patch is old.
   float slit_m = 0;
   Alarm ureter = Alarm::kNone, nerve = Alarm::kNone;
-  std::vector<std::string> late;  ///< What has not come for a while: "TISSUE HELD".
+  std::vector<std::string> late;  ///< Texts for inputs that are late, such as "TISSUE HELD".
   bool paused = false;
   bool help = false;
 };
 
-/// Figures, and at twice their size what must not be overlooked. With `figures` false only the latter.
+/// Texts to draw: figures, and warnings at twice their size. With `figures` false warnings only.
 [[nodiscard]] std::vector<OverlayText> HudTexts(const HudState& state, bool figures);
 
 }  // namespace fulcrum::render

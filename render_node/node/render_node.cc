@@ -14,13 +14,13 @@
 namespace fulcrum::render {
 namespace {
 
-// Below these a pose looks the same: a fifth of a pixel at 10 cm.
+// Changes of a pose below these limits are not visible: a fifth of a pixel at 10 cm.
 constexpr float kSamePlace = 2e-5f;   // [m]
 constexpr float kSameAngle = 0.002f;  // [rad]
-constexpr float kSameForce = 0.05f;   // [N]: half of what the bar's figure shows.
-constexpr float kBoils_C = 90;        // Somewhere in the patch.
-constexpr double kTextLife_s = 4.0;   // A temperature or a warning is shown for so long.
-constexpr double kLate_s = 0.3;       // What comes a hundred times a second is missed by then.
+constexpr float kSameForce = 0.05f;   // [N]: half of the resolution of the displayed figure.
+constexpr float kBoils_C = 90;        // Highest temperature of a patch above which there is steam.
+constexpr double kTextLife_s = 4.0;   // Duration for which a temperature or a warning is shown.
+constexpr double kLate_s = 0.3;       // Timeout of topics with a rate of 100 Hz.
 
 bool LooksTheSame(const ToolSample& a, const ToolSample& b) {
   return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle &&
@@ -157,7 +157,7 @@ void RenderNode::UpdateTexts() {
   view_.SetTexts(HudTexts(hud_, figures_));
 }
 
-// The picture goes on showing the last that came, and says so.
+// The picture keeps showing the last state and marks it as late.
 void RenderNode::FindLate() {
   std::vector<std::string> late;
   for (const Arrival& arrival : arrivals_) {
@@ -184,7 +184,7 @@ void RenderNode::TakeContact() {
   if (!ports_.contacts.TakeLatest(&contact_)) {
     return;
   }
-  // Events tell of the first steam at a place; as long as power goes into tissue that boils, there is more.
+  // Events report the first steam at a place only; steam continues while power is delivered to boiling tissue.
   if (contact_.touching && hud_.power_W > 0 && temperature_C_ > kBoils_C && Recent(temperature_time_s_)) {
     view_.AddSmoke(contact_.material, session_time_s_);
     changed_on_screen_ = changed_in_file_ = true;

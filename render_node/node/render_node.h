@@ -1,4 +1,4 @@
-// The render node: what the bus says becomes a picture, in a window or in PNG files.
+// The render node: draws pictures from the samples of its ports, in a window or in PNG files.
 #pragma once
 
 #include <array>
@@ -31,37 +31,39 @@ struct RenderPorts {
 };
 
 struct RenderSettings {
-  bool window = false;               ///< A real window instead of drawing into memory.
-  Quality quality = Quality::kAuto;  ///< How finely the scene is drawn.
+  bool window = false;               ///< Draw into a window instead of memory.
+  Quality quality = Quality::kAuto;  ///< Resolution of the scene.
   std::filesystem::path frames;      ///< Folder for the pictures.
 };
 
 class RenderNode {
  public:
-  /// @param stage of the same scene and settings; makes its own, and throws what that throws, when there is none. The
-  /// arrays of `scene` and the ports must outlive the node.
+  /// @param stage stage for the same scene and settings; null: the node makes it, with the exceptions of MakeStage().
+  /// The arrays of `scene` and the ports must outlive the node.
   RenderNode(const SceneView& scene, const RenderSettings& settings, const RenderPorts& ports,
              std::unique_ptr<Stage> stage = nullptr);
   ~RenderNode();
 
-  /// Takes what has come and draws when somebody will see it: in a window whenever something changed, off screen when
-  /// a PNG is due and something changed since the last one. Otherwise nothing is computed.
+  /// Reads the ports and draws if the picture will be used: in a window after each change, off screen if a PNG is due
+  /// and something has changed since the last one. Otherwise nothing is computed.
   void Step(const Tick& tick);
 
-  /// As a key of the window (an X key symbol), before the next Step; a key that means nothing does nothing.
+  /// Acts as a key of the window (an X key symbol), before the next Step. Keys without a function are ignored.
   void Press(int key);
 
-  /// The last picture of the session, when it differs from the last one written. After the last Step, any thread.
+  /// Writes the last picture of the session if it differs from the last one written. Call after the last Step, from any
+  /// thread.
   void Finish();
-  /// Until the pictures drawn so far are in their files; live nobody waits for a disk. Same thread as Step.
+  /// Waits until the pictures drawn so far are written; for tests, a live node never waits for the disk. Call from the
+  /// thread of Step.
   void WaitForFiles() { writer_.Wait(); }
   [[nodiscard]] std::uint64_t pictures_drawn() const { return frames_drawn_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t pictures_written() const { return writer_.written(); }
 
-  /// Metrics and last error. Any thread.
+  /// Fills metrics and last error. May be called from any thread.
   void FillHealth(Health* health) const;
 
-  /// The user closed the window.
+  /// True after the user has closed the window.
   [[nodiscard]] bool closed() const { return display_.closed(); }
   [[nodiscard]] std::string display_description() const { return display_.description(); }
 
@@ -100,10 +102,10 @@ class RenderNode {
   Picture picture_;
   HudState hud_;
   CameraControl camera_;
-  bool figures_;             // The HUD is on.
-  int followed_ = -1;        // Tool that the camera is locked on.
-  bool screenshot_ = false;  // One is wanted.
-  // Session time at which each topic last came: what has come once and then not for a while is late.
+  bool figures_;             // Figures are shown.
+  int followed_ = -1;        // Tool that the camera follows; -1: none.
+  bool screenshot_ = false;  // A screenshot is requested.
+  // Session time of the last sample of each topic. A topic is late if it has had samples but none for kLate_s.
   struct Arrival {
     const char* text;
     double time_s;
@@ -111,14 +113,14 @@ class RenderNode {
   std::array<Arrival, 3> arrivals_{{{"TISSUE HELD", -1}, {"TOOLS HELD", -1}, {"HANDLES LATE", -1}}};
   double session_time_s_ = 0;
   double next_png_s_ = 0;
-  double temperature_time_s_ = -1e9;            // When the newest patch came.
-  float temperature_C_ = 0;                     // Its hottest texel.
+  double temperature_time_s_ = -1e9;            // Session time of the newest patch.
+  float temperature_C_ = 0;                     // Hottest texel of that patch.
   std::array<double, 2> warned_s_{-1e9, -1e9};  // Ureter and nerve: session time of the last warning …
   std::array<bool, 2> injured_{};               // … and whether one was an injury.
   bool changed_on_screen_ = false;              // Since the last picture that was drawn.
   bool changed_in_file_ = false;                // Since the last picture that was written.
 
-  // Read by the health thread; each stands for itself, so relaxed order is enough.
+  // Read by the health thread; the values are independent, so relaxed order is enough.
   std::atomic<std::uint64_t> frames_drawn_{0};
   std::atomic<std::uint64_t> pictures_dropped_{0};
   std::atomic<std::uint64_t> patches_applied_{0};

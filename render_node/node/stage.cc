@@ -15,8 +15,8 @@ std::unique_ptr<Display> OpenDisplay(const LaparoscopeView& view, const RenderPa
   return window ? MakeWindowDisplay(view, params) : MakeOffscreenDisplay(view, params);
 }
 
-/// The first picture costs seconds on a busy machine, since the rasteriser translates each shader when it first meets
-/// it: better now than in the session.
+/// Draws a first picture. It takes seconds on a loaded machine, because the rasteriser compiles each shader at its
+/// first use; this must not happen during the session.
 void WarmUp(const SceneView& scene, Stage* stage) {
   LaparoscopeView& view = stage->view;
   for (int k = 0; k < kMaxTools; ++k) {
@@ -29,7 +29,7 @@ void WarmUp(const SceneView& scene, Stage* stage) {
   view.SetTexts(HudTexts(hud, scene.render.hud != 0));
   view.AddSmoke(Vec2f::Zero(), -10);
   static_cast<void>(view.UpdateEffects(-9.9));
-  // Few pixels: it is the shaders that must be met, and a node that comes back is waited for.
+  // Few pixels are enough to compile the shaders, and a session waits for a restarted node.
   constexpr float kFewPixels = 0.25f;
   view.SetScale(kFewPixels);
   Picture picture;

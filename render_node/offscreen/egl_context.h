@@ -15,10 +15,10 @@ class EglContext {
   EglContext(const EglContext&) = delete;
   EglContext& operator=(const EglContext&) = delete;
 
-  /// Makes the context current on the calling thread, without a surface. Throws std::runtime_error when another thread
-  /// still holds it.
+  /// Makes the context current on the calling thread, without a surface. Throws std::runtime_error if it is current on
+  /// another thread.
   void MakeCurrent();
-  /// Lets go of it, so that another thread can have it.
+  /// Releases the context, so that another thread can make it current.
   void Release() noexcept;
 
   /// GL_RENDERER and GL_VERSION, for the log.

@@ -1,5 +1,5 @@
-// The picture that an off-screen view draws into: a framebuffer object with colour and depth. One sample a
-// pixel: four cost a software rasteriser two and a half times as much (DESIGN.md).
+// Framebuffer object of an off-screen view, with colour and depth. One sample per pixel: with four a software
+// rasteriser takes two and a half times as long (DESIGN.md).
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ struct Picture {
 /// All calls need the OpenGL context current.
 class Framebuffer {
  public:
-  /// Throws std::runtime_error when GL refuses the size.
+  /// Throws std::runtime_error if OpenGL does not support the size.
   Framebuffer(int width, int height);
   ~Framebuffer();
   Framebuffer(const Framebuffer&) = delete;
@@ -25,7 +25,7 @@ class Framebuffer {
 
   /// GL name, to draw into.
   [[nodiscard]] unsigned id() const { return id_; }
-  /// Waits for the picture.
+  /// Waits for the end of drawing and reads the picture.
   void Read(Picture* picture);
 
  private:
@@ -36,10 +36,11 @@ class Framebuffer {
   unsigned depth_ = 0;
 };
 
-/// The first texels of one two-dimensional texture, by GL name, into another of the same format (OpenGL 4.3).
+/// Copies the first width x height texels of a two-dimensional texture, by GL name, to another of the same format
+/// (OpenGL 4.3).
 void CopyTexture(unsigned from, unsigned to, int width, int height);
 
-/// Reads the window or framebuffer bound for reading.
+/// Reads the picture of the window or framebuffer that is bound for reading.
 void ReadBoundFramebuffer(int width, int height, Picture* picture);
 
 }  // namespace fulcrum::render

@@ -12,7 +12,7 @@
 namespace fulcrum::render {
 namespace {
 
-// libpng's simplified interface counts rows from the top; a negative stride turns OpenGL's picture over.
+// libpng's simplified interface counts rows from the top; a negative stride flips OpenGL's picture.
 png_int_32 FlippedStride(int width) { return -3 * width; }
 
 }  // namespace
@@ -24,7 +24,7 @@ void WritePng(const Picture& picture, const std::filesystem::path& file) {
   image.width = static_cast<png_uint_32>(picture.width);
   image.height = static_cast<png_uint_32>(picture.height);
   image.format = PNG_FORMAT_RGB;
-  image.flags = PNG_IMAGE_FLAG_FAST;  // Half the time for a tenth more bytes.
+  image.flags = PNG_IMAGE_FLAG_FAST;  // Takes half the time for 10 % larger files.
   const std::filesystem::path part = file.string() + ".part";
   if (!png_image_write_to_file(&image, part.c_str(), 0, picture.rgb.data(), FlippedStride(picture.width), nullptr)) {
     throw std::runtime_error(file.string() + ": cannot write the picture: " + image.message);

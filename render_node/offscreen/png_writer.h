@@ -1,4 +1,5 @@
-// PNG files: one function, and a writer with a thread of its own so that drawing never waits for the disk.
+// PNG files: functions to write and read them, and a writer with its own thread, so that drawing never waits for the
+// disk.
 #pragma once
 
 #include <condition_variable>
@@ -13,8 +14,8 @@
 
 namespace fulcrum::render {
 
-/// Writes to a temporary name and renames, so that a kill leaves no half picture. Throws std::runtime_error naming the
-/// file.
+/// Writes to a temporary name and renames, so that no incomplete picture remains after a kill. Throws
+/// std::runtime_error naming the file.
 void WritePng(const Picture& picture, const std::filesystem::path& file);
 
 /// Reads an 8-bit RGB picture back (bottom row first, as in Picture). Throws std::runtime_error.
@@ -24,15 +25,15 @@ void WritePng(const Picture& picture, const std::filesystem::path& file);
 /// across a restart.
 class FrameWriter {
  public:
-  /// Throws std::runtime_error when the folder cannot be made.
+  /// Throws std::runtime_error if the folder cannot be created.
   explicit FrameWriter(const std::filesystem::path& folder);
-  ~FrameWriter();  ///< Writes what is queued, then ends.
+  ~FrameWriter();  ///< Writes all queued pictures, then ends the thread.
   FrameWriter(const FrameWriter&) = delete;
   FrameWriter& operator=(const FrameWriter&) = delete;
 
-  /// Queues a picture; false when the disk is more than kQueue pictures behind and this one was dropped.
+  /// Queues a picture. Returns false if the queue holds kQueue pictures already; this one is then dropped.
   bool Add(Picture picture, double session_time_s);
-  /// Until all that is queued has been written, or could not be.
+  /// Waits until all queued pictures have been written or have failed.
   void Wait();
   [[nodiscard]] std::uint64_t written() const;
   /// Empty, or why the last write failed.

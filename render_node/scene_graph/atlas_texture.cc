@@ -71,7 +71,7 @@ osg::ref_ptr<osg::Texture2D> MakeTexture(int width, int height, int channels, co
   const auto wrap = tile ? osg::Texture::REPEAT : osg::Texture::CLAMP_TO_EDGE;
   texture->setWrap(osg::Texture::WRAP_S, wrap);
   texture->setWrap(osg::Texture::WRAP_T, wrap);
-  // No mipmaps: finding their level costs more than they give at a few texels a pixel.
+  // No mipmaps: at a few texels per pixel the selection of the level costs more than it saves.
   texture->setFilter(osg::Texture::MIN_FILTER, osg::Texture::LINEAR);
   texture->setFilter(osg::Texture::MAG_FILTER, osg::Texture::LINEAR);
   texture->setResizeNonPowerOfTwoHint(false);

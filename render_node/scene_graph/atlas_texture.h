@@ -1,4 +1,4 @@
-// The atlas on the GPU: uploaded whole once, then only the texels that changed (glTexSubImage2D).
+// The atlas on the GPU: uploaded completely once, then only changed texels (glTexSubImage2D).
 #pragma once
 
 #include <osg/Texture2D>
@@ -16,7 +16,7 @@ class AtlasTexture {
   AtlasTexture(const AtlasTexture&) = delete;
   AtlasTexture& operator=(const AtlasTexture&) = delete;
 
-  /// Uploads these texels with the next picture.
+  /// Schedules these texels for upload with the next picture.
   void Update(const AtlasRect& rect);
   [[nodiscard]] osg::Texture2D* texture() const { return texture_; }
 

@@ -44,7 +44,7 @@ class OffscreenDisplay : public Display {
   }
 
   ~OffscreenDisplay() override {
-    // OSG gives back its OpenGL objects as it goes, which needs the context.
+    // OSG deletes its OpenGL objects in the destructor, which requires the context to be current.
     context_.MakeCurrent();
     viewer_ = nullptr;
     window_ = nullptr;
@@ -138,7 +138,7 @@ class WindowDisplay : public Display {
     if (!viewer_.isRealized()) {
       throw InputError("--window: the display refuses an OpenGL window");
     }
-    // The context goes from the thread that opens the window to the thread that draws.
+    // The context is passed from the thread that opens the window to the thread that draws.
     viewer_.setReleaseContextAtEndOfFrameHint(true);
   }
 

@@ -1,4 +1,4 @@
-// Where the view is drawn: into memory (EGL, no display needed) or into a window.
+// Target of the view: memory (EGL, no display needed) or a window.
 #pragma once
 
 #include <memory>
@@ -13,22 +13,23 @@ namespace fulcrum::render {
 class Display {
  public:
   virtual ~Display() = default;
-  /// Draws the view as it is now and waits until it is done. Any thread, one at a time.
+  /// Draws the present view and waits for completion. May be called from any thread, one at a time.
   virtual void Draw() = 0;
-  /// Draws, and reads the picture back.
+  /// Draws and reads the picture back.
   virtual void DrawAndRead(Picture* picture) = 0;
-  /// Keys pressed since the last call, as X key symbols; looks after the window also when nothing is drawn.
+  /// Keys pressed since the last call, as X key symbols. Also processes the window's events, so it must be called even
+  /// if nothing is drawn.
   [[nodiscard]] virtual std::vector<int> TakeKeys() = 0;
-  /// The user closed the window.
+  /// True after the user has closed the window.
   [[nodiscard]] virtual bool closed() const = 0;
   /// Renderer and version, for the log.
   [[nodiscard]] virtual std::string description() const = 0;
 };
 
-/// Throws std::runtime_error with one clear line when OpenGL is missing. Keeps a reference to `view`.
+/// Throws std::runtime_error with a one-line message if OpenGL is missing. Keeps a reference to `view`.
 [[nodiscard]] std::unique_ptr<Display> MakeOffscreenDisplay(const LaparoscopeView& view, const RenderParams& params);
 
-/// Throws InputError when no display can be opened.
+/// Throws InputError if no display can be opened.
 [[nodiscard]] std::unique_ptr<Display> MakeWindowDisplay(const LaparoscopeView& view, const RenderParams& params);
 
 }  // namespace fulcrum::render

@@ -1,4 +1,4 @@
-// The instruments: built once from the scene's tools, from their meshes where it has some, posed by ToolState and
+// The instruments: built once from the scene's tools (from meshes if the scene has them), posed by ToolState, with jaws
 // opened by HandleState.
 #pragma once
 
@@ -14,7 +14,7 @@ class Instruments {
  public:
   explicit Instruments(const SceneView& scene);
 
-  /// Tip and attitude in frame W; a tool of kind kNone is not drawn.
+  /// Sets position and orientation in frame W; a tool of kind kNone is not drawn.
   void SetPose(int tool, const ToolSample& sample);
   void SetJaw(int tool, float angle_rad);
   [[nodiscard]] osg::Group* node() const { return root_; }
@@ -23,7 +23,7 @@ class Instruments {
   struct Instrument {
     osg::ref_ptr<osg::MatrixTransform> body;
     std::array<osg::ref_ptr<osg::MatrixTransform>, 2> jaws;  // They open towards +x and -x.
-    // From a jaw's own frame to frame T, closed.
+    // Transformation of a closed jaw from its own frame to frame T.
     std::array<osg::Matrix, 2> closed;
     float hinge_m = 0;
   };

@@ -62,8 +62,9 @@ struct LaparoscopeView::Impl {
   osg::ref_ptr<osg::Group> root = new osg::Group;
   std::vector<std::uint8_t> noise;
   StructureMap structures;
-  Vec2f size = Vec2f::Ones();                     // Of the atlas [m].
-  std::uint64_t fat_touches = ~std::uint64_t{0};  // Of the atlas when the fat was last chosen.
+  Vec2f size = Vec2f::Ones();  // Of the atlas [m].
+  // Value of Atlas::touches() at the last choice of the fat's triangles.
+  std::uint64_t fat_touches = ~std::uint64_t{0};
   osg::ref_ptr<osg::Uniform> wall_direction = new osg::Uniform("wall_direction", osg::Vec3());
   osg::ref_ptr<osg::Uniform> light_power = new osg::Uniform("light_power", 1.0f);
   Vec3f breath = Vec3f::Zero();
@@ -142,7 +143,7 @@ void LaparoscopeView::Impl::ShineFrom(const Laparoscope& from) {
   light_power->set(from.light_power);
 }
 
-// What of the fat can be seen: the condition of fat.frag, a little wider, or where it has been bared.
+// Chooses the visible triangles of the fat: those that meet the condition of fat.frag with a margin, or are bared.
 void LaparoscopeView::Impl::ShowFat() {
   if (fat_touches == atlas.touches()) {
     return;
@@ -192,7 +193,7 @@ bool LaparoscopeView::SetTopology(const TopologyState& topology) {
     return false;
   }
   impl_->atlas_texture.Update(impl_->atlas.PaintCuts(impl_->scene, topology));
-  impl_->fat_touches = ~std::uint64_t{0};  // Pieces may be gone.
+  impl_->fat_touches = ~std::uint64_t{0};  // Pieces of the membrane may have been removed.
   return true;
 }
 

@@ -1,4 +1,4 @@
-// The whole picture as an OpenSceneGraph graph: what the surgeon sees. Knows no bus and no window.
+// The complete laparoscopic picture as an OpenSceneGraph graph, independent of bus and window.
 #pragma once
 
 #include <memory>
@@ -21,36 +21,37 @@ class LaparoscopeView {
 
   /// Particles in scene order, 3 * n floats [m]. @pre n is the scene's count.
   void SetTissue(std::span<const float> xyz);
-  /// Where what breathes is drawn: at this time of the simulation [s]. True when that is another place than before.
+  /// Sets the displacement of breathing surfaces for a time of the simulation [s]. Returns true if it has changed.
   bool SetBreath(double simulated_time_s);
-  /// False, and nothing changes, when it belongs to another grid.
+  /// Returns false, and changes nothing, if the topology belongs to another grid.
   bool SetTopology(const TopologyState& topology);
-  /// False when the patch lies outside the sheet or has the wrong size.
+  /// Returns false if the patch lies outside the sheet or has the wrong size.
   bool ApplyPatch(const TemperaturePatch& patch);
   void SetTool(int tool, const ToolSample& sample);
   void SetJaw(int tool, float angle_rad);
 
-  /// Text in the corners.
+  /// Sets the text in the corners.
   void SetTexts(std::span<const OverlayText> texts);
-  /// A puff of steam where (s, t) [m] of the sheet is drawn now.
+  /// Adds a puff of steam at the present position of the sheet's point (s, t) [m].
   void AddSmoke(const Vec2f& material, double session_time_s);
-  /// A cut at (s, t) [m]: the vessels that it opens bleed until heat closes them.
+  /// Opens the vessels at a cut at (s, t) [m]; they bleed until heat closes them.
   void OpenVessels(const Vec2f& material, double session_time_s);
-  /// Moves smoke and blood on. True when the picture changes by that, or is going to.
+  /// Advances smoke and blood. Returns true if the picture changes or will change by that.
   bool UpdateEffects(double session_time_s);
 
-  /// Looks from and to where `params` says; size and field of view stay.
+  /// Sets the camera's position and target from `params`; size and field of view do not change.
   void SetCamera(const RenderParams& params);
-  /// Share of the picture's width and height that the scene is drawn with, in (0, 1]; text always has all of it.
+  /// Resolution of the scene as a share of the picture's width and height, in (0, 1]; text is always drawn at full
+  /// resolution.
   void SetScale(float scale);
 
-  /// Carries the last SetTissue and SetTopology over to the meshes. Split off so that several changes cost one update.
-  /// Where nothing changed, the next picture shows the last one of the scene again.
+  /// Updates the meshes after SetTissue and SetTopology; separate, so that several changes need one update only.
+  /// Without a change the next picture reuses the last one of the scene.
   void Update();
 
   [[nodiscard]] osg::Group* root() const;
   [[nodiscard]] const Laparoscope& laparoscope() const;
-  /// Where the sheet's node nearest to (s, t) [m] is drawn now, frame W.
+  /// Present position, frame W, of the sheet's node nearest to (s, t) [m].
   [[nodiscard]] Vec3f OnMembrane(const Vec2f& material) const;
 
  private:

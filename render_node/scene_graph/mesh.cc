@@ -6,7 +6,7 @@
 namespace fulcrum::render {
 namespace {
 
-// The box never decides anything here (no culling by it, fixed near and far planes), so it is not computed each frame.
+// The bounding box is not used (no culling, fixed near and far planes), so it is not computed in each frame.
 class WholeScene : public osg::Drawable::ComputeBoundingBoxCallback {
  public:
   osg::BoundingBox computeBound(const osg::Drawable&) const override { return {-1, -1, -1, 1, 1, 1}; }

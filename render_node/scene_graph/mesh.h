@@ -1,4 +1,4 @@
-// One indexed triangle mesh in vertex buffers, fed from our own arrays.
+// One indexed triangle mesh in vertex buffers, filled from arrays of core types.
 #pragma once
 
 #include <osg/Geometry>
@@ -11,12 +11,12 @@ namespace fulcrum::render {
 
 class Mesh {
  public:
-  /// `name` for messages; `dynamic`: positions change from picture to picture.
+  /// @param name name for messages. @param dynamic positions change from picture to picture.
   Mesh(std::string_view name, bool dynamic);
 
   void SetPositions(std::span<const Vec3f> positions);
   void SetNormals(std::span<const Vec3f> normals);
-  /// Four floats a vertex; what they mean is up to the shader.
+  /// Four floats per vertex, defined by the shader.
   void SetCoordinates(std::span<const std::array<float, 4>> coordinates);
   void SetColours(std::span<const std::array<float, 4>> colours);
   void SetTriangles(std::span<const Triangle> triangles);

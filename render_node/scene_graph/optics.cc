@@ -27,7 +27,7 @@ osg::Matrix ToOsg(const Eigen::Matrix4f& m) {
   return out;
 }
 
-/// After a picture its camera rests until something has changed.
+/// Disables its camera after a picture, until something has changed.
 class DrawnOnce : public osg::Camera::DrawCallback {
  public:
   explicit DrawnOnce(osg::Camera* camera) : camera_(camera) {}
@@ -39,7 +39,7 @@ class DrawnOnce : public osg::Camera::DrawCallback {
 
 }  // namespace
 
-/// First in the scene's picture: the background, colour and depth.
+/// Copies the background, colour and depth, before the scene is drawn.
 class Optics::CopyTarget : public osg::Drawable {
  public:
   CopyTarget(const Target& from, const Target& to) : from_(from), to_(to) {
@@ -163,7 +163,7 @@ void Optics::SetScale(float scale) {
   circle_radius_->set(scope_.circle_radius * share.y());
   picture_centre_->set(osg::Vec2(scope_.picture_centre.x() * share.x(), scope_.picture_centre.y() * share.y()));
   texture_scale_->set(share);
-  // Beyond the last texel drawn lies an older picture.
+  // Texels beyond this hold an older picture of another resolution.
   texture_most_->set(share - osg::Vec2(0.5f / static_cast<float>(width_), 0.5f / static_cast<float>(height_)));
   BackgroundChanged();
 }

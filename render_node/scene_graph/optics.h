@@ -1,6 +1,6 @@
-// The way from the scene to the picture: the scene is drawn into a texture, as finely as the quality says, and the
-// round field of it is put into the picture at full size. What stands still is drawn once, into a texture of its own,
-// and copied with its depth beneath each new picture.
+// Drawing of the scene into the picture: the scene is drawn into a texture at the resolution of the quality setting,
+// and its round field is scaled into the picture. The static background is drawn once, into a texture of its own, and
+// copied with its depth before each picture of the scene.
 #pragma once
 
 #include <osg/Camera>
@@ -15,10 +15,10 @@ class Optics {
   /// Keeps both nodes. The textures have `width` x `height` pixels.
   Optics(const Laparoscope& scope, int width, int height, osg::Node* background, osg::Node* scene);
 
-  /// Share of the width and height that the scene is drawn with, in (0, 1].
+  /// Resolution of the scene as a share of width and height, in (0, 1].
   void SetScale(float scale);
   void SetScope(const Laparoscope& scope);
-  /// The scene is no longer as in its last picture.
+  /// Must be called when the scene has changed since its last picture.
   void SceneChanged();
   [[nodiscard]] osg::Group* node() const { return node_; }
 

@@ -1,4 +1,4 @@
-// Figures in the corners of the picture, outside the round field where there is room.
+// Text in the corners of the picture, outside the round field.
 #pragma once
 
 #include <array>
@@ -12,10 +12,10 @@ enum class Corner { kTopLeft, kTopRight, kBottomLeft, kBottomRight };
 
 struct OverlayText {
   Corner corner;
-  int line;  ///< 0 is nearest to the upper or lower rim.
+  int line;  ///< 0 is nearest to the upper or lower edge.
   std::string text;
   bool warning = false;  ///< Red instead of grey.
-  int size = 1;          ///< Height and pitch, in those of plain text.
+  int size = 1;          ///< Factor on height and line pitch of plain text.
 };
 
 class Overlay {
@@ -29,7 +29,7 @@ class Overlay {
  private:
   int width_;
   int height_;
-  int dot_;  // Pixels per dot of the font.
+  int dot_;  // Size of a dot of the font [pixels].
   int sheet_width_;
   Mesh mesh_;
 };

@@ -1,4 +1,4 @@
-// Shader programs from the sources in shaders/, which the build embeds: nothing is read at run time.
+// Shader programs from the sources in shaders/, which the build embeds, so that no file is read at run time.
 #pragma once
 
 #include <osg/Program>
@@ -6,10 +6,10 @@
 
 namespace fulcrum::render {
 
-/// Source of the file of this name. Throws std::logic_error for a name that the build did not embed.
+/// Source text of a file in shaders/. Throws std::logic_error for a name that is not embedded.
 [[nodiscard]] std::string_view ShaderSource(std::string_view file);
 
-/// Fragment shaders without a #version of their own get lighting.glsl in front.
+/// Makes a program. lighting.glsl is prepended to fragment shaders without a #version.
 [[nodiscard]] osg::ref_ptr<osg::Program> MakeProgram(std::string_view vertex_file, std::string_view fragment_file);
 
 }  // namespace fulcrum::render

@@ -29,7 +29,7 @@ void Smoke::Add(const Vec3f& p_W, double session_time_s) {
     return;
   }
   last_birth_s_ = session_time_s;
-  // The golden angle spreads the puffs without a random number.
+  // Multiples of the golden angle distribute the drift directions evenly, without a random number.
   puffs_[next_] = {p_W, session_time_s, 2.39996f * static_cast<float>(next_)};
   next_ = (next_ + 1) % puffs_.size();
 }

@@ -1,5 +1,5 @@
-// Steam and smoke of the cut: a bounded number of soft puffs that rise, grow and fade. What is drawn is a function of
-// the puffs' births and of the time, so a picture does not depend on how many were drawn before it.
+// Steam and smoke of the cut: a bounded number of soft puffs that rise, grow and fade. The drawing is a function of the
+// puffs' start times and of the present time, so it does not depend on the number of pictures drawn before.
 #pragma once
 
 #include <array>
@@ -11,9 +11,11 @@ namespace fulcrum::render {
 class Smoke {
  public:
   Smoke();
-  /// A puff is born at p_W [m]; the oldest makes room. Births within kLeastInterval of the last one are left out.
+  /// Starts a puff at p_W [m], which replaces the oldest one. Calls within kLeastInterval of the last start are
+  /// ignored.
   void Add(const Vec3f& p_W, double session_time_s);
-  /// Builds the squares for this time. True when there is something to see, or no longer is.
+  /// Builds the squares for this time. Returns true while puffs are visible, and once after the last one has
+  /// disappeared.
   bool Update(double session_time_s);
   [[nodiscard]] osg::Geometry* geometry() const { return mesh_.geometry(); }
   [[nodiscard]] osg::StateSet* state() const { return mesh_.state(); }
@@ -22,7 +24,7 @@ class Smoke {
   struct Puff {
     Vec3f p_W = Vec3f::Zero();
     double born_s = -1e9;
-    float drift = 0;  // Direction of its sideways drift [rad].
+    float drift = 0;  // Direction of the lateral drift [rad].
   };
   std::array<Puff, 28> puffs_;
   std::size_t next_ = 0;

@@ -18,7 +18,7 @@ namespace {
 using Float4 = std::array<float, 4>;
 
 Float4 SurroundingColour(SurfaceRole role) {
-  switch (role) {  // Linear colour; the last is how much fat shows.
+  switch (role) {  // Linear colour; the last value is the share of visible fat.
     case SurfaceRole::kAbdominalWall:
       return {0.66f, 0.20f, 0.15f, 0.25f};
     case SurfaceRole::kRetroperitoneum:
@@ -33,7 +33,7 @@ Float4 SurroundingColour(SurfaceRole role) {
   return {0.5f, 0.2f, 0.16f, 0.3f};
 }
 
-/// A sphere of tissue round everything, seen from inside: where the scene's surfaces end the picture does not.
+/// Adds a sphere of tissue around everything, seen from inside, as background where the scene's surfaces end.
 void AppendCavity(const SceneView& scene, std::vector<Vec3f>* positions, std::vector<Vec3f>* normals,
                   std::vector<Triangle>* triangles) {
   constexpr Index kMeridians = 48, kParallels = 24;
@@ -45,7 +45,7 @@ void AppendCavity(const SceneView& scene, std::vector<Vec3f>* positions, std::ve
     }
   }
   radius += scene.breathing.amplitude_m;
-  radius *= 1.02f;  // Just outside, also between the corners of its facets.
+  radius *= 1.02f;  // Slightly larger, so that its facets also lie outside.
   const auto first = static_cast<Index>(positions->size());
   for (Index i = 0; i <= kParallels; ++i) {
     const float polar = std::numbers::pi_v<float> * static_cast<float>(i) / kParallels;
@@ -97,7 +97,7 @@ void Surroundings::AddMask(const Laparoscope& scope) {
   fixed_->addDrawable(mask.geometry());
 }
 
-/// Those of the fixed surfaces that breathe, or the others and the cavity around everything.
+/// Adds the breathing surfaces, or all other fixed surfaces and the cavity.
 void Surroundings::AddSurfaces(const SceneView& scene, const char* name, bool breathing) {
   std::vector<Vec3f> positions, normals;
   std::vector<Float4> colours, coordinates;
@@ -136,7 +136,7 @@ void Surroundings::AddSurfaces(const SceneView& scene, const char* name, bool br
   if (breathing) {
     mesh.state()->addUniform(shift_);
   }
-  // Seen from behind a wall is not there: the scope may look in through it.
+  // Walls are culled from behind, because the scope may be outside of them.
   mesh.state()->setAttributeAndModes(new osg::CullFace(osg::CullFace::BACK));
   mesh.SetPositions(positions);
   mesh.SetNormals(normals);

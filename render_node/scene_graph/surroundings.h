@@ -1,4 +1,4 @@
-// What does not deform: the fixed surfaces of the scene, a cavity round everything, and the black rim of the optics.
+// Rigid surroundings: the fixed surfaces of the scene, a cavity around them, and the black rim of the optics.
 #pragma once
 
 #include <osg/Geode>
@@ -11,9 +11,9 @@ class Surroundings {
  public:
   Surroundings(const SceneView& scene, const Laparoscope& scope);
 
-  /// What breathes is drawn this far from its place [m].
+  /// Sets the displacement of the breathing surfaces [m].
   void SetShift(const Vec3f& shift) { shift_->set(osg::Vec3(shift.x(), shift.y(), shift.z())); }
-  /// What never moves.
+  /// Surfaces that never move.
   [[nodiscard]] osg::Geode* fixed() const { return fixed_; }
   [[nodiscard]] osg::Geode* breathing() const { return breathing_; }
 

@@ -15,12 +15,14 @@ namespace {
 using Float4 = std::array<float, 4>;
 
 constexpr std::uint32_t kFatStride = 2;
-// Layers of tissue that press on each other overlap by a millimetre in the simulation: the inner one gives way.
+// Layers of tissue in contact overlap by up to a millimetre in the simulation; in the depth test the inner one counts
+// as this much farther away.
 constexpr float kFatBehind = 0.0015f;        // [m]
 constexpr float kRectumBehind = 0.0025f;     // [m]
 constexpr std::size_t kMostLinePoints = 64;  // As in membrane.frag.
-constexpr float kInkReach = 0.001f;          // [m] The box around a planned line in which pixels look for it.
-constexpr float kFasciaDepth = 0.0006f;      // [m] Below the peritoneum: as near as the fat comes.
+// [m] Margin of the box around a planned line outside which the shader skips the line.
+constexpr float kInkReach = 0.001f;
+constexpr float kFasciaDepth = 0.0006f;  // [m] Below the peritoneum: the least depth of the fat.
 
 Vec3f EyeOf(const Laparoscope& scope) {
   return -scope.view.block<3, 3>(0, 0).transpose() * scope.view.block<3, 1>(0, 3);
@@ -58,7 +60,7 @@ void TissueLayers::AddRectum() {
   rectum_positions_.resize(count);
   rectum_normals_.resize(count);
   UpdateRectum();
-  // The pattern sticks to the tissue: coordinates at rest along the organ's three principal directions.
+  // The pattern is fixed to the tissue: its coordinates are those at rest along the organ's three principal directions.
   Vec3f mean = Vec3f::Zero();
   for (const Vec3f& p : rectum_positions_) {
     mean += p / static_cast<float>(count);

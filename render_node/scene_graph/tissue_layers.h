@@ -1,5 +1,5 @@
-// The layers of tissue that deform: organ, fat, membrane. Their meshes follow the particles; of each only the triangles
-// that can be seen are given to OpenGL.
+// The deformable layers of tissue: organ, fat, membrane. Their meshes follow the particles; only visible triangles are
+// passed to OpenGL.
 #pragma once
 
 #include <functional>
@@ -24,22 +24,22 @@ class TissueLayers {
 
   /// Particles in scene order, 3 * n floats [m]. @pre n is the scene's count.
   void SetTissue(std::span<const float> xyz);
-  /// False, and nothing changes, when it belongs to another grid.
+  /// Returns false, and changes nothing, if the topology belongs to another grid.
   bool SetTopology(const TopologyState& topology);
   void SetScope(const Laparoscope& scope);
-  /// Fat is drawn where some corner of a triangle is `visible`, from (s, t) [m] and thickness 0 … 1, or laid bare
-  /// because the sheet above is `opened`.
+  /// Draws a triangle of the fat if one of its corners is `visible`, as a function of (s, t) [m] and thickness 0 … 1,
+  /// or is bared because the sheet above is `opened`.
   void ShowFat(const std::function<bool(const Vec2f& material, float thickness)>& visible,
                const std::function<bool(const Vec2f& material)>& opened);
-  /// Carries what was set over to the meshes. False when there was nothing.
+  /// Updates the meshes. Returns false if nothing has changed.
   bool Update();
 
   [[nodiscard]] const MembraneMesh& membrane() const { return membrane_; }
-  [[nodiscard]] std::span<const float> particles() const { return xyz_; }  ///< As SetTissue.
+  [[nodiscard]] std::span<const float> particles() const { return xyz_; }  ///< Last argument of SetTissue.
   [[nodiscard]] osg::Geode* node() const { return geode_; }
 
  private:
-  /// One mesh and the list of its triangles that OpenGL has.
+  /// A mesh and the list of its triangles that were passed to OpenGL.
   struct Layer {
     std::unique_ptr<Mesh> mesh;
     std::vector<Triangle> seen;
@@ -48,7 +48,7 @@ class TissueLayers {
   void Show(Layer* layer, std::span<const Vec3f> positions, std::span<const Triangle> triangles, Sides sides);
   void AddRectum();
   void AddSheets();
-  /// The line that an exercise asks for, drawn on the membrane.
+  /// Adds the planned line of an exercise to the membrane.
   void AddPlannedLine();
   void UpdateRectum();
   void UpdateMembrane();
@@ -65,7 +65,7 @@ class TissueLayers {
   std::vector<Vec3f> rectum_positions_, rectum_normals_;
   std::vector<Triangle> fat_shown_;
   std::vector<float> fat_bared_;
-  std::vector<Triangle> chosen_;  // Scratch: the membrane's triangles, as finely as needed.
+  std::vector<Triangle> chosen_;  // Scratch: triangles of the membrane at the level of detail that is needed.
   bool tissue_changed_ = true, topology_changed_ = true, scope_changed_ = true;
   osg::ref_ptr<osg::Geode> geode_ = new osg::Geode;
   Layer rectum_, fat_layer_, sheet_;

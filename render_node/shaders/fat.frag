@@ -1,5 +1,5 @@
 // Loose fat between membrane and organ: yellow lobules, a thin veil over the organ's front and thick beside it, with
-// ureter and nerve shining through. coordinate: material (s, t) [m], thickness 0 … 1, how far laid bare 0 … 1.
+// ureter and nerve shining through. coordinate: material (s, t) [m], thickness 0 … 1, bared share 0 … 1.
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
@@ -12,7 +12,7 @@ out vec4 fragment;
 void main() {
   vec2 m = coordinate.xy;
   vec4 broad = texture(noise_pattern, m * 9.0);
-  // The coarse noise bends the fine one's coordinates, so that no two lobules are alike.
+  // The coarse noise distorts the coordinates of the fine one, so that no two lobules are alike.
   vec4 noise = texture(noise_pattern, m * 36.0 + 0.35 * broad.rg);
   vec4 heat = texture(atlas, m * atlas_per_metre);
   vec2 structure = texture(structures, m * atlas_per_metre).rg;
@@ -25,18 +25,18 @@ void main() {
   float nerve = smoothstep(0.40, 0.70, structure.g);
   albedo = mix(albedo, vec3(0.86, 0.46, 0.40) * (0.62 + 0.6 * structure.r), 0.85 * cord);
   albedo = mix(albedo, vec3(0.92, 0.82, 0.58), 0.80 * nerve);
-  // Islands where the layer is thin, closed where it is thick; in an opened slit it wells up.
+  // Islands where the layer is thin, continuous where it is thick; in an open slit it protrudes.
   float cover = smoothstep(0.51, 0.66, broad.r * 0.8 + 0.45 * coordinate.z);
-  // What is laid bare ends lobule by lobule, not along a line.
+  // The border of bared fat follows the lobules, not a straight line.
   float bared = smoothstep(0.30, 0.75, coordinate.w + 0.7 * (lobule - 0.5) + 1.2 * (broad.g - 0.5));
   float opened = max(heat.a < 0.5 ? 1.0 : 0.0, bared * smoothstep(0.0, 0.35, coordinate.w));
   float alpha = (0.45 + 0.45 * lobule) * cover;
   alpha = max(alpha, (0.62 + 0.30 * lobule) * opened);
   alpha = clamp(max(alpha, 0.9 * max(cord, nerve)), 0.0, 0.97);
-  // Under a burn the fat is seared too, least in the open middle of the slit.
+  // Under a burn the fat is seared as well, least in the open middle of the slit.
   float dry = clamp(2.0 * heat.b, 0.0, 1.0);
   albedo *= mix(vec3(1.0), vec3(0.46, 0.27, 0.16), (heat.a < 0.5 ? 0.25 : 0.7) * dry);
-  // Of the texel itself: half way from open to closed would look like blood.
+  // Read without interpolation: values between open and closed texels would look like blood.
   float own = heat.a < 0.5 ? texelFetch(atlas, ivec2(m * atlas_per_metre * vec2(textureSize(atlas, 0))), 0).a : 1.0;
   float blood = own < 0.5 ? smoothstep(0.12, 0.7, 2.0 * own) : 0.0;
   albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);

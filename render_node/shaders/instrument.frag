@@ -1,4 +1,4 @@
-// Instruments. colour: linear; alpha is how metallic.
+// Instruments. colour: linear; alpha: metallic share.
 in vec3 position;
 in vec3 normal;
 in vec4 colour;

@@ -1,10 +1,10 @@
-// Shared by every fragment shader; the build puts it in front of them. View frame: the camera at the origin, looking
-// along -z, metres. Colours are linear until ToneMap.
+// Lighting functions shared by all fragment shaders; MakeProgram() prepends this file. View frame: the camera at the
+// origin, looking along -z, metres. Colours are linear until ToneMap.
 #version 130
 
 uniform vec3 light_position;
 uniform vec3 light_axis;
-uniform vec3 wall_direction; // Towards the lit wall above, which wet tissue mirrors.
+uniform vec3 wall_direction; // Towards the lit wall above, which wet tissue reflects.
 uniform float light_power;   // Irradiance at 1 m; falls off with the square of the distance.
 uniform float circle_radius; // Of the round picture [pixels].
 uniform vec2 picture_centre; // [pixels]
@@ -18,29 +18,30 @@ float Irradiance(vec3 position, out vec3 to_light) {
   return light_power * inverse * inverse * (0.15 + 0.85 * cone);
 }
 
-// A highlight: broad lobe and, as its eighth power, a sharp one. exp2 costs a software rasteriser less than pow.
+// Specular highlight: a broad lobe and, as its eighth power, a sharp one. exp2 is cheaper than pow on a software
+// rasteriser.
 float Highlight(float cosine, float broad, float sharp) {
   float lobe = exp2(42.0 * (cosine - 1.0));
   float lobe2 = lobe * lobe, lobe4 = lobe2 * lobe2;
   return broad * lobe + sharp * lobe4 * lobe4;
 }
 
-// Tissue: light wraps round the terminator, red furthest (it scatters deepest). A film of fluid lies on top: `film` is
-// its normal, rougher than the tissue's, `wet` how much of it there is. `gloss` is the light that the film mirrors.
+// Tissue: light extends beyond the terminator by subsurface scattering, red farthest. A film of fluid lies on top:
+// `film` is its normal, rougher than the tissue's, `wet` its amount. `gloss` is the light that the film reflects.
 vec3 ShadeTissue(vec3 albedo, vec3 scatter, vec3 normal, vec3 film, vec3 position, float wet, out float gloss) {
   vec3 l;
   float e = Irradiance(position, l);
   vec3 v = normalize(-position);
   float side = sign(dot(normal, v));
   vec3 diffuse = clamp((side * dot(normal, l) + scatter) / (1.0 + scatter), 0.0, 1.0);
-  // Light and eye are 4 mm apart: the direction of the one stands for half way between them.
+  // Light and eye are only 4 mm apart, so the light's direction is used as the half vector.
   gloss = e * wet * (Highlight(side * dot(film, l), 0.20, 1.6) +
                      Highlight(side * dot(film, normalize(wall_direction + v)), 0.07, 0.45));
-  // Light that comes back from the rest of the cavity is red.
+  // Indirect light from the rest of the cavity is red.
   return e * (albedo * diffuse) + gloss * vec3(1.0, 0.96, 0.92) + albedo * vec3(0.030, 0.014, 0.012);
 }
 
-// Metal: what it mirrors is the lit cavity, red below and dark towards the scope.
+// Metal: it reflects the lit cavity, red below and dark towards the scope.
 vec3 ShadeMetal(vec3 tint, vec3 normal, vec3 position) {
   vec3 l;
   float e = Irradiance(position, l);
@@ -52,7 +53,7 @@ vec3 ShadeMetal(vec3 tint, vec3 normal, vec3 position) {
   return e * tint * (0.35 * nl + Highlight(nl, 0.4, 1.5)) + tint * cavity;
 }
 
-// Shoulder 1 - 1 / (1 + x)^2, gamma of two, and the darkening towards the rim of the optics.
+// Tone curve 1 - 1 / (1 + x)^2, gamma of 2, and vignetting towards the rim of the optics.
 vec3 ToneMap(vec3 colour) {
   vec2 r = (gl_FragCoord.xy - picture_centre) / circle_radius;
   float r2 = dot(r, r);

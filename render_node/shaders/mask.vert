@@ -1,4 +1,4 @@
-// The black rim round the picture, in clip coordinates, at the near plane: what lies behind is never shaded.
+// The black rim around the picture, in clip coordinates, at the near plane, so that fragments behind it are not shaded.
 #version 130
 
 in vec4 osg_Vertex;

@@ -1,27 +1,26 @@
 // The membrane, a double sheet through which fat and organ are seen: the peritoneum, thin and glossy with faint
-// vessels, and the fascia beneath it, of pale fibres. Colours follow the history of the tissue (damage, water, char)
-// more than the temperature of the moment: burns stay.
-// One triangle draws both: the fascia is looked up where the line of sight meets it, and the two are laid over each
-// other here, the nearer one on top. So their order is right for each pixel, whichever side is seen and in whatever
-// order the triangles come.
-// coordinate: material (s, t) [m], side (see geometry/membrane_mesh.h).
+// vessels, and the fascia beneath it, of pale fibres. Colours depend on the history of the tissue (damage, water, char)
+// more than on the present temperature, so burns persist. One triangle draws both layers: the fascia is sampled where
+// the line of sight meets it, and the two are blended here, the nearer one on top. So their order is correct for each
+// pixel, for either side of the sheet and any order of triangles. coordinate: material (s, t) [m], side (see
+// geometry/membrane_mesh.h).
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;
 uniform sampler2D atlas;
 uniform sampler2D serosa_pattern;
 uniform vec2 atlas_per_metre;
-uniform float colour_by_temperature; // 1: the paper's eq. 15, from the temperature of the moment.
+uniform float colour_by_temperature; // 1: the paper's eq. 15, a function of the present temperature.
 uniform float fascia_depth;          // Below the peritoneum, along the normal [m].
 uniform mat4 osg_ProjectionMatrix;
-uniform int planned_points;            // Of the line that an exercise asks for; 0: none.
+uniform int planned_points;            // Points of an exercise's planned line; 0: none.
 uniform vec2 planned_line[64];         // [m] of the sheet.
-uniform vec4 planned_box;              // Lowest and highest (s, t) where its ink can be.
+uniform vec4 planned_box;              // Bounding box of the line's ink: lowest and highest (s, t).
 out vec4 fragment;
 
 // Ink of the planned line: dashes half a millimetre wide.
 float PlannedInk(vec2 m) {
-  float edge = 0.5 * (fwidth(m.x) + fwidth(m.y)) + 5e-5; // Before any branch: derivatives need the neighbours.
+  float edge = 0.5 * (fwidth(m.x) + fwidth(m.y)) + 5e-5; // Before any branch: derivatives need the neighbouring fragments.
   if (planned_points < 2 || any(lessThan(m, planned_box.xy)) || any(greaterThan(m, planned_box.zw))) return 0.0;
   float nearest = 1.0, along = 0.0, passed = 0.0;
   for (int i = 0; i + 1 < planned_points; ++i) {
@@ -37,13 +36,13 @@ float PlannedInk(vec2 m) {
   return (1.0 - smoothstep(2.5e-4, 2.5e-4 + edge, nearest)) * step(fract(along / 0.002), 0.65);
 }
 
-// From a place of the sheet to the one over that place of the fascia which the same pixel shows [m]. The surface point
-// above the latter lies in the picture where `depth` along the normal leads from here.
+// Offset in (s, t) [m] from a point of the sheet to the point above the place of the fascia that the same pixel shows.
+// It follows from the displacement in the picture of a step of `fascia_depth` along the normal.
 vec2 ToFascia(vec2 m, vec3 n) {
   vec2 pixels = osg_ProjectionMatrix[1][1] * picture_centre.y * fascia_depth / -position.z *
                 (n.xy - n.z * position.xy / position.z);
   vec2 step = pixels.x * dFdx(m) + pixels.y * dFdy(m);
-  // Seen edge on it would go on and on.
+  // Limited, because it would become infinite for a sheet that is seen edge on.
   return step * min(1.0, 4.0 * fascia_depth * inversesqrt(dot(step, step) + 1e-12));
 }
 
@@ -79,7 +78,7 @@ void main() {
   alpha = mix(alpha, 0.80, pale);
   albedo = mix(albedo, vec3(0.06, 0.10, 0.42), 0.9 * ink);
   alpha = mix(alpha, 0.95, ink);
-  // Coagulated through and through it turns tan, dry it turns brown, charred it turns black.
+  // Fully coagulated tissue turns tan, dry tissue brown, charred tissue black.
   albedo = mix(albedo, vec3(0.46, 0.22, 0.08), 0.9 * smoothstep(0.3, 0.8, damage));
   float brown = smoothstep(0.02, 0.4, dry);
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022) * (0.5 + noise.b), brown);
@@ -89,8 +88,8 @@ void main() {
   float hot = colour_by_temperature * clamp((celsius - 45.0) / 55.0, 0.0, 1.0);
   albedo = mix(albedo, vec3(0.22, 0.075, 0.022), hot);
   alpha = mix(alpha, 0.95, hot);
-  // Blood lies on top: the low bits of the fourth channel (geometry/atlas.h).
-  // Where the atlas is neither whole nor clean, of the texel itself: half way to an open one would look like blood.
+  // Blood lies on top: the low bits of the fourth channel (geometry/atlas.h). Near slits and blood it is read without
+  // interpolation: values between closed and open texels would look like blood.
   float own = heat.a < 0.97 ? texelFetch(atlas, ivec2(m * atlas_per_metre * vec2(textureSize(atlas, 0))), 0).a : 1.0;
   float blood = own < 0.5 ? 0.0 : smoothstep(0.12, 0.7, 2.0 - 2.0 * own);
   albedo = mix(albedo, vec3(0.30, 0.006, 0.008), 0.95 * blood);
@@ -98,7 +97,8 @@ void main() {
 
   float wet = 1.6 * (1.0 - 0.92 * max(brown, 0.3 * pale));
 
-  // The fascia's fibres run askew across the organ, here denser and there; what burns the peritoneum burns them.
+  // The fascia's fibres run obliquely across the organ with varying density; burns of the peritoneum apply to them as
+  // well.
   vec4 fibres = texture(serosa_pattern, vec2(dot(m_fascia, vec2(22.0, 9.0)), dot(m_fascia, vec2(-65.0, 130.0))));
   float strand = smoothstep(0.44, 0.70, fibres.r) * (0.3 + 1.2 * fibres.g * noise.b);
   float seared = smoothstep(0.02, 0.4, 2.0 * heat_below.b);
@@ -112,7 +112,7 @@ void main() {
   albedo = (near.a * near.rgb + through * far.rgb) / both;
   wet *= from_above && heat.a >= 0.5 ? 1.0 : 0.4;
 
-  // What glitters is not see-through.
+  // Highlights are opaque.
   float gloss;
   vec3 shaded = ShadeTissue(albedo, vec3(0.30, 0.16, 0.10), n, film, position, wet, gloss);
   fragment = vec4(ToneMap(shaded), min(both + 0.8 * gloss, 1.0));

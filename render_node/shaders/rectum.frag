@@ -1,5 +1,5 @@
-// The organ's serosa: wet pink-red with longitudinal muscle and small vessels.
-// coordinate: place at rest along the organ's axis and across it both ways [m], and how much it faces the third axis.
+// The organ's serosa: wet pink-red with longitudinal muscle and small vessels. coordinate: place at rest along the
+// organ's axis and in both directions across it [m], and share of the normal along the third axis.
 in vec3 position;
 in vec3 normal;
 in vec4 coordinate;

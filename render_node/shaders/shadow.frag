@@ -1,4 +1,4 @@
-// Less light, and what is left is the red that tissue scatters.
+// Reduces the light; the remaining light is the red that tissue scatters.
 #version 130
 
 in vec4 coordinate;

@@ -9,7 +9,7 @@ out vec4 coordinate;
 
 void main() {
   vec3 position = (osg_ModelViewMatrix * osg_Vertex).xyz;
-  // Towards the eye: the place in the picture stays the same.
+  // Moved towards the eye; the position in the picture does not change.
   gl_Position = osg_ProjectionMatrix * vec4(position * (1.0 - osg_MultiTexCoord0.w / length(position)), 1.0);
   coordinate = osg_MultiTexCoord0;
 }

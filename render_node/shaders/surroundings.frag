@@ -8,7 +8,7 @@ uniform sampler2D serosa_pattern;
 out vec4 fragment;
 
 void main() {
-  // A slanted projection: no plane of the body is seen edge on by it for long.
+  // An oblique projection, so that no anatomical plane is seen edge on.
   vec2 place = vec2(coordinate.x + 0.41 * coordinate.z, coordinate.y - 0.57 * coordinate.z) * (1.0 - 0.65 * coordinate.w);
   vec4 noise = texture(serosa_pattern, place * 14.0);
   float vessel = noise.a;
