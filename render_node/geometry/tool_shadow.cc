@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render_node/geometry/solid.h"
 #include "render_node/geometry/surface.h"
 #include "render_node/geometry/texel.h"
 
