@@ -1,9 +1,9 @@
-// What every benchmark program shares: its command line and its lines `key value unit`.
+// Command line and output lines `key value unit` of all benchmark programs.
 //
 //   bench_NAME [--quick] [PREFIX]
 //
-// Keys are area.case.figure. A case whose keys all fall outside PREFIX should not run: ask Wants() first. Only result
-// lines go to stdout; everything for people goes to stderr.
+// Keys are area.case.figure. A case without a key below PREFIX should not run: check Wants() first. Only result lines
+// are written to stdout; everything else to stderr.
 #pragma once
 
 #include <cstdint>

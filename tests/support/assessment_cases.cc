@@ -11,13 +11,13 @@ using assessment::Assessor;
 using std::numbers::pi;
 
 constexpr double kToolPeriod_s = 1e-3, kModelPeriod_s = 1e-2;
-const Vec3d kAside(0.1, 0, 0);  // Where the other tool rests.
+const Vec3d kAside(0.1, 0, 0);  // Resting place of the other tool.
 
 double ValueOf(const Assessor& assessor, Measure measure) {
   return assessor.figures().session[static_cast<std::size_t>(measure)];
 }
 
-/// Feeds a motion of tool 0 at 1 kHz, as the devices say it: in steps of 9 um.
+/// Adds a motion of tool 0 at 1 kHz, quantised to 9 um like the devices.
 void Feed(const std::function<Vec3d(double)>& tip, double duration_s, Assessor* assessor) {
   constexpr double kStep_m = 9e-6;
   const int count = static_cast<int>(std::lround(duration_s / kToolPeriod_s));
@@ -158,20 +158,20 @@ void AddForces(const SceneView& scene, std::vector<KnownAnswer>* answers) {
   const auto gap = [&] {
     for (int i = 0; i < 20; ++i) holds.Add(PushAt(time_s += kModelPeriod_s, 0));
   };
-  const auto open = [&] {  // In 0.4 s, under the traction that is there.
+  const auto open = [&] {  // Opens within 0.4 s under the present traction.
     for (int i = 0; i < 40; ++i)
       holds.Add(GraspAt(time_s += kModelPeriod_s, Vec3d::Zero(), 5, std::max(0.0, 8 - 0.25 * i)));
     gap();
   };
   open();
   for (int i = 0; i < 100; ++i) holds.Add(GraspAt(time_s += kModelPeriod_s, Vec3d::Zero(), 5, 8));
-  gap();  // Gone with the jaws closed: lost.
+  gap();  // The grasp ends with closed jaws: tissue lost.
   for (int i = 0; i < 100; ++i)
     holds.Add(GraspAt(time_s += kModelPeriod_s, Vec3d::Zero(), 5, std::max(0.0, 8 - 0.2 * std::max(0, i - 50))));
   gap();  // Opened.
   answers->push_back({"grasp_slips.holds", ValueOf(holds, Measure::kGraspSlips), 3});
   answers->push_back({"lift.hold", ValueOf(holds, Measure::kLift), 12});
-  double low = 0, high = 1;  // When a reach has done 8 / 12.
+  double low = 0, high = 1;  // Time at which a reach has covered 8 / 12 of its length.
   for (int i = 0; i < 60; ++i) (MinimumJerk(0.5 * (low + high)) < 8.0 / 12 ? low : high) = 0.5 * (low + high);
   answers->push_back({"lift_hold.hold", ValueOf(holds, Measure::kLiftHold), 3 + 2 * (1 - low)});
 }
@@ -246,7 +246,7 @@ void AddHeat(const SceneView& scene, std::vector<KnownAnswer>* answers) {
   topology.cut_off_way_m = 0.0003f;
   assessor.Add(topology);
   topology.stamp = StampAt(3);
-  topology.cut_length_m = 0.004f;  // Of a thermal node that has just come back.
+  topology.cut_length_m = 0.004f;  // As from a thermal node just after a restart.
   assessor.Add(topology);
   answers->push_back({"cut_length.state", ValueOf(assessor, Measure::kCutLength), 12.3});
   answers->push_back({"cut_width.state", ValueOf(assessor, Measure::kCutWidth), 1.9});

@@ -1,4 +1,4 @@
-// The whole cart as a user starts it, watched from outside.
+// A complete cart, started like by a user and observed from outside.
 #pragma once
 
 #include <sys/types.h>
@@ -14,15 +14,15 @@
 
 namespace fulcrum::testing {
 
-/// Whether `done` came true within the limit.
+/// Waits until `done` returns true; returns false at the time limit.
 bool WaitFor(double limit_s, const std::function<bool()>& done);
 
 [[nodiscard]] std::string ReadFile(const std::filesystem::path& file);
 
-/// The processes that a process has started and that still run, by name.
+/// Running child processes of a process, by name.
 [[nodiscard]] std::map<std::string, pid_t> ChildrenOf(pid_t parent);
 
-/// One run of `fulcrum up SCENE`; everything is gone when the object is.
+/// One run of `fulcrum up SCENE`; the destructor ends all its processes.
 class Cart {
  public:
   Cart(const std::string& scene, int domain, const std::vector<std::string>& more_arguments = {});
@@ -30,15 +30,16 @@ class Cart {
   Cart(const Cart&) = delete;
   Cart& operator=(const Cart&) = delete;
 
-  /// The nodes that run now, by name.
+  /// Running nodes, by name.
   [[nodiscard]] std::map<std::string, pid_t> nodes() const;
   [[nodiscard]] std::string Said() const { return up_.Said(); }
   [[nodiscard]] std::filesystem::path session() const { return folder_ / "latest"; }
-  /// Session time of the newest picture [s]: how far the cart has come, seen from outside. Negative: none yet.
+  /// Session time of the newest picture [s], a measure of progress that is visible from outside; negative without a
+  /// picture.
   [[nodiscard]] double PictureTime() const;
-  /// To `fulcrum up`.
+  /// Sends a signal to `fulcrum up`.
   void Signal(int signal) const { up_.Signal(signal); }
-  /// Exit code of `fulcrum up`, minus a signal; nothing if it does not end within the limit.
+  /// Exit code of `fulcrum up`, or minus the signal; no value if it does not end within the limit.
   [[nodiscard]] std::optional<int> WaitForEnd(double limit_s);
 
  private:

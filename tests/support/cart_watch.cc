@@ -114,7 +114,7 @@ bool CartWatch::WaitForState(double limit_s, const std::function<bool()>& done) 
   return done();
 }
 
-/// Bytes that are no message may decode to one, of a writer that has not begun yet.
+/// Random bytes may decode to a message, with an epoch in the future.
 bool CartWatch::IsOfTheCart(const Stamp& stamp, std::int64_t now) const {
   return stamp.epoch != 0 && stamp.epoch <= static_cast<std::uint64_t>(now) && !ignored_.contains(stamp.epoch);
 }
@@ -143,7 +143,7 @@ void CartWatch::Take() {
   TakeTopology(now);
   while (p.healths->TakeNext(&p.health)) {
     if (!ours(p.health.stamp)) continue;
-    // Of a pair of processes the leader's; the one that follows waits.
+    // Of a pair of processes only the leader's Health counts; the follower waits.
     const Health& known = state_.healths[p.health.node];
     const bool follows =
         p.health.state == HealthState::kWaiting && known.state == HealthState::kRunning && known.pid != p.health.pid;
@@ -201,7 +201,7 @@ void CartWatch::LookAtCheckpoints() {
   for (const NodeId node : kKeepers) {
     CartState::Seal& seal = state_.seals[node];
     const std::uint64_t sequence = runtime::NewestSequence(session_ / (std::string(NodeName(node)) + ".checkpoint"));
-    // What lies between this look and the last one counts as lost.
+    // The time between this observation and the last one counts as lost.
     if (sequence != seal.sequence) seal = {sequence, last_look_ns_};
   }
   last_look_ns_ = runtime::MonotonicNs();

@@ -1,4 +1,4 @@
-// What a cart says on its bus: taken by a thread of its own, each millisecond, and judged as it comes.
+// Observation of a cart on its bus: a separate thread reads all topics each millisecond and checks the samples.
 #pragma once
 
 #include <array>
@@ -18,57 +18,57 @@
 
 namespace fulcrum::testing {
 
-/// All that is known of a cart. Times are CLOCK_MONOTONIC [ns].
+/// Observed state of a cart. Times are CLOCK_MONOTONIC [ns].
 struct CartState {
-  /// A node's newest process, as others first had use of it: by a jaw angle, a tool, a frame, the topology, a picture.
+  /// Newest process of a node, from its first useful sample on: a jaw angle, a tool, a frame, the topology, a picture.
   struct Voice {
     std::uint64_t epoch = 0;
     std::int64_t heard_ns = 0;
   };
   std::array<Voice, kNodeCount> voices;
   std::map<NodeId, Health> healths;
-  std::vector<ForceJudge> judges;  ///< One a tool.
+  std::vector<ForceJudge> judges;  ///< One per tool.
 
   TissueFrameHeader frame;
-  /// Simulated time that a new physics did not know of any more, at most [s]. A lost step counts.
+  /// Largest simulated time that was lost at a restart of physics [s]. A lost step counts.
   double tissue_lost_s = 0;
 
   TopologyState topology;
-  /// Revisions and dead edges that a later TopologyState did not know of any more.
+  /// Number of revisions and dead edges that are missing in a later TopologyState.
   std::uint64_t topology_lost = 0;
 
-  /// Newest checkpoint of a node that keeps one, and when it was not yet there.
+  /// Newest checkpoint of a node, and the last time at which it did not exist yet.
   struct Seal {
     std::uint64_t sequence = 0;
     std::int64_t before_ns = 0;
   };
   std::map<NodeId, Seal> seals;
 
-  std::array<std::uint64_t, kTopicCount> rejected{};  ///< At the gate, by topic.
+  std::array<std::uint64_t, kTopicCount> rejected{};  ///< Samples dropped by the gate, by topic.
   [[nodiscard]] double Metric(NodeId node, const std::string& name) const;
   [[nodiscard]] double peak_force_N() const;
   [[nodiscard]] double peak_step_N() const;
-  /// Empty, or the first thing that a hand should not have felt.
+  /// First violation of the force limits; empty if there is none.
   [[nodiscard]] std::string force_verdict() const;
 };
 
 class CartWatch {
  public:
-  /// @param scene YAML, for the tools' trocars. @param session folder with the checkpoints; it may come later.
+  /// @param scene YAML, for the tools' trocars. @param session folder with the checkpoints; it may be created later.
   CartWatch(int domain, const std::filesystem::path& scene, const std::filesystem::path& session);
   ~CartWatch();
   CartWatch(const CartWatch&) = delete;
   CartWatch& operator=(const CartWatch&) = delete;
 
-  /// From now on nothing of this epoch counts: it is not of the cart.
+  /// Ignores further samples with this epoch, which is not the cart's.
   void Ignore(std::uint64_t epoch);
-  /// What `look` returns of the state as it is now.
+  /// Calls `look` with the present state, under the lock, and returns its result.
   template <class Look>
   auto See(const Look& look) {
     const std::lock_guard lock(mutex_);
     return look(static_cast<const CartState&>(state_));
   }
-  /// Whether `done(state)` came true within the limit.
+  /// Waits until `done(state)` returns true; returns false at the time limit.
   template <class Done>
   [[nodiscard]] bool WaitUntil(double limit_s, const Done& done) {
     return WaitForState(limit_s, [this, &done] { return See(done); });
@@ -85,7 +85,7 @@ class CartWatch {
   void LookAtCheckpoints();
 
   std::filesystem::path session_;
-  std::mutex mutex_;  ///< Guards all below but the thread.
+  std::mutex mutex_;  ///< Guards all members below except the thread.
   CartState state_;
   std::set<std::uint64_t> ignored_;
   std::int64_t last_look_ns_ = 0;

@@ -9,13 +9,13 @@ namespace {
 
 constexpr double kLimit_N = 3.3;
 constexpr double kSlew_N_per_tick = 0.4;
-constexpr double kGone_s = 0.4;  // Without a model for so long …
-constexpr double kGone_N = 0.1;  // … no more than this.
-constexpr double kRise_N = 0.1;  // In five ticks of coming back.
-// ToolState tells the force at the proxy's tip; on its way back to the hand the lever is off by the proxy's distance
-// from the tip over the shaft, millimetres over a decimetre, and by float.
+constexpr double kGone_s = 0.4;  // After this time without a model …
+constexpr double kGone_N = 0.1;  // … the force is at most this.
+constexpr double kRise_N = 0.1;  // Largest rise within five ticks after a fade.
+// ToolState contains the force at the proxy's tip. Converted to the hand, the lever has an error of the distance
+// between proxy and tip relative to the shaft, millimetres to a decimetre, plus rounding.
 constexpr double kLever = 1.02;
-// The age machine counts no tick as longer than this.
+// Longest tick that the age machine takes into account.
 constexpr std::int64_t kLongestTick_ns = 20'000'000;
 constexpr std::int64_t kFadeAndSome_ns = 500'000'000;
 

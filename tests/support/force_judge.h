@@ -1,4 +1,4 @@
-// What the hand may feel, whatever happens to the rest of the cart: judged on every ToolState of a run.
+// Limits of the force on the hand under any fault of the cart, checked for every ToolState of a run.
 #pragma once
 
 #include <cstddef>
@@ -14,21 +14,21 @@ class ForceJudge {
  public:
   explicit ForceJudge(const haptics::Trocar& trocar, std::size_t tool = 0) : trocar_(trocar), tool_(tool) {}
 
-  /// Samples in order; some may be missing. A new servo begins without force: the devices let go when the old one
-  /// ended.
+  /// Adds a sample. Samples must be in order; some may be missing. After a restart of the servo the force starts from
+  /// 0, because the devices release it when the old process ends.
   void Add(const ToolState& state);
 
   [[nodiscard]] double force_N() const { return force_; }
   [[nodiscard]] ServoState state() const { return state_; }
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
-  /// Least and most force since the last ResetRange() [N].
+  /// Smallest and largest force since the last ResetRange() [N].
   [[nodiscard]] double least_N() const { return least_; }
   void ResetRange() { least_ = most_ = force_; }
   [[nodiscard]] double most_N() const { return most_; }
-  /// Over all samples: force [N], and the largest change from one millisecond to the next [N].
+  /// Largest force, and largest change from one millisecond to the next, over all samples [N].
   [[nodiscard]] double peak_N() const { return peak_; }
   [[nodiscard]] double peak_step_N() const { return peak_step_; }
-  /// Empty, or the first thing that the hand should not have felt.
+  /// First violation of the limits; empty if there is none.
   [[nodiscard]] const std::string& verdict() const { return verdict_; }
 
  private:
@@ -41,7 +41,7 @@ class ForceJudge {
   Vec3d f_A_ = Vec3d::Zero();
   double force_ = 0, least_ = 0, most_ = 0, peak_ = 0, peak_step_ = 0;
   ServoState state_ = ServoState::kOff;
-  // Where the present rise was a few ticks ago.
+  // History of the present rise over the last ticks.
   static constexpr std::uint64_t kWindow = 5;
   struct Past {
     std::uint64_t sequence = 0;
@@ -49,7 +49,7 @@ class ForceJudge {
     bool rising = false;
   };
   Past past_[kWindow];
-  std::int64_t held_up_ns_ = 0;  ///< When the servo last came late by more than it makes good.
+  std::int64_t held_up_ns_ = 0;  ///< Time of the last delay of the servo that exceeds kLongestTick_ns.
   std::string verdict_;
 };
 

@@ -1,4 +1,4 @@
-// A raw HTTP client for tests of the console: it sends what it is given, right or wrong.
+// A raw HTTP client for tests of the console: it sends any text, valid or not.
 #pragma once
 
 #include <functional>
@@ -11,7 +11,7 @@
 namespace fulcrum::testing {
 
 struct HttpReply {
-  int status = 0;                           ///< 0: none came.
+  int status = 0;                           ///< 0: no reply.
   std::map<std::string, std::string> head;  ///< Names in lower case.
   std::string body;
 };
@@ -25,16 +25,16 @@ class HttpConnection {
   HttpConnection& operator=(const HttpConnection&) = delete;
 
   void Send(const std::string& bytes) const;
-  /// What comes until `end` has come, the other side closes, or the limit is over.
+  /// Receives until `end` has arrived, the other side closes, or the time limit is reached.
   [[nodiscard]] std::string Receive(double limit_s, const std::string& end = "");
-  /// Of what was sent before.
+  /// Reply to the request sent before.
   [[nodiscard]] HttpReply Reply(double limit_s = 10);
-  /// The other side has closed, within the limit.
+  /// True if the other side closes the connection within the limit.
   [[nodiscard]] bool Closes(double limit_s);
 
  private:
   std::string ReceiveBytes(double limit_s, std::size_t size);
-  /// @param complete how much of rest_ is wanted; npos: there is more to come.
+  /// @param complete returns the number of bytes of rest_ that are complete; npos: more are needed.
   std::string ReceiveUntil(double limit_s, const std::function<std::size_t()>& complete);
 
   int socket_ = -1;
@@ -45,7 +45,7 @@ class HttpConnection {
 /// `fulcrum console` on a free port.
 class ConsoleProgram {
  public:
-  /// Waits until it listens.
+  /// Starts the program and waits until it listens.
   ConsoleProgram(int domain, const std::string& out, const std::vector<std::string>& more = {});
 
   [[nodiscard]] int port() const { return port_; }
@@ -54,7 +54,8 @@ class ConsoleProgram {
 
   [[nodiscard]] HttpReply Get(const std::string& target) const;
   [[nodiscard]] HttpReply Post(const std::string& target, const std::string& body = "") const;
-  /// A request with these header lines instead of the right ones; "\r\n" after each.
+  /// Sends a request with these header lines instead of valid ones; each ends with "\r
+  /// ".
   [[nodiscard]] HttpReply Ask(const std::string& method, const std::string& target, const std::string& head) const;
 
  private:

@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::time_t kDay_s = 24 * 3600;
-// Long enough to start a process, short enough to wait for.
+// Long enough to start a process, short enough for a test to wait for.
 constexpr std::time_t kShortLife_s = 2;
 constexpr double kPatience_s = 20;
 
@@ -50,7 +50,7 @@ std::string Tampered(const fs::path& keys) {
   return text.replace(text.find(was), was.size(), "fulcrum/ToolState");
 }
 
-/// Gives whoever opens the pipe one document, the next one another.
+/// A pipe that gives its first reader one document and the next reader another.
 class TwoFacedPipe {
  public:
   TwoFacedPipe(fs::path path, std::string first, std::string second) : path_(std::move(path)) {
@@ -61,13 +61,13 @@ class TwoFacedPipe {
         const int fd = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
         (void)!::write(fd, text.data(), text.size());
         ::close(fd);
-        // The first reader must have closed before the next text comes.
+        // The first reader must have closed before the next text is written.
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
       }
     });
   }
   ~TwoFacedPipe() {
-    // Frees the thread if nobody came.
+    // Unblocks the thread if there was no reader.
     const int fd = ::open(path_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
     thread_.join();
     ::close(fd);
@@ -80,7 +80,7 @@ class TwoFacedPipe {
   std::thread thread_;
 };
 
-/// As much of a cart as a stranger could reach: a supervisor that tells its scene, a physics node that takes ToolState.
+/// The reachable part of a cart: a supervisor that publishes its scene, a physics node that reads ToolState.
 class Target {
  public:
   Target(int domain, const fs::path& keys)
@@ -91,7 +91,7 @@ class Target {
     SceneManifest scene = bus::test::Sample<SceneManifest>();
     scene.stamp = stamper_.Next(std::chrono::steady_clock::now().time_since_epoch().count());
     scenes_->Write(scene);
-    // As every node does: who has left by the end has still been seen.
+    // As in every node; a participant that leaves before the end is then still recorded.
     (void)supervisor_.refusals();
     (void)physics_.refusals();
     ToolState tool;
@@ -117,7 +117,7 @@ class Target {
 struct Running {
   Attempt attempt;
   Program program;
-  std::optional<int> code = std::nullopt;  ///< Once it has ended.
+  std::optional<int> code = std::nullopt;  ///< Set once it has ended.
 
   bool HasEnded() {
     if (!code) code = program.Poll();
@@ -137,7 +137,8 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
   keys::FillKeyFolder(Folder(scratch / "expired"), ours, {now - 2 * kDay_s, now - kDay_s});
   keys::FillKeyFolder(Folder(scratch / "tampered"), ours, today);
   Write(scratch / "tampered" / "thermal_node.p7s", Tampered(real));
-  // What somebody could make true on his own side: his own authority beside ours, and all rights from it.
+  // State that an attacker can create on its own side: a second authority besides the cart's, and all rights signed by
+  // it.
   bus::AccessRole all = *bus::AccessRoleOf("thermal_node");
   all.writes = all.reads = bus::access::kAll;
   const std::string all_rights = theirs.Sign(keys::PermissionsXml(all, today));
@@ -148,8 +149,9 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
                          const std::string& wanted_of_cart, const std::vector<std::string>& more = {}) {
     std::vector<std::string> arguments{std::to_string(domain), name, folder.string(), identity};
     arguments.insert(arguments.end(), more.begin(), more.end());
-    running.push_back({{.name = name, .who = "", .wanted_exit_code = wanted_code, .wanted_of_cart = wanted_of_cart},
-                       Program("security_intruder", arguments)});
+    running.push_back(
+        {{.name = name, .last_line = "", .wanted_exit_code = wanted_code, .wanted_of_cart = wanted_of_cart},
+         Program("security_intruder", arguments)});
   };
   keys::FillKeyFolder(Folder(scratch / "short"), ours, {now - kDay_s, std::time(nullptr) + kShortLife_s});
   start("expires_meanwhile", scratch / "short", "haptics_node", 3, "expired");
@@ -178,10 +180,10 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
     attempt.exit_code = one.code ? *one.code : one.program.End(SIGKILL);
     const std::string said = one.program.Said();
     const std::size_t end = said.find_last_not_of('\n');
-    attempt.who = end == std::string::npos ? "" : said.substr(0, end + 1);
-    attempt.who = attempt.who.substr(attempt.who.rfind('\n') + 1);
+    attempt.last_line = end == std::string::npos ? "" : said.substr(0, end + 1);
+    attempt.last_line = attempt.last_line.substr(attempt.last_line.rfind('\n') + 1);
     attempt.came_through = target.came_through();
-    // An endpoint is named after the keys of its process, everybody else as he names himself.
+    // An endpoint is reported by the name in the keys of its process, any other participant by the name that it claims.
     const std::string name = attempt.name == "forged_other_topic" ? "thermal_node" : attempt.name;
     attempt.reported = !attempt.wanted_of_cart.empty() && target.Reports(name, attempt.wanted_of_cart);
     attempts.push_back(attempt);

@@ -3,7 +3,7 @@
 //   security_intruder DOMAIN NAME KEYS IDENTITY CA FIFO   one that has forged its own side: it holds the authorities in
 //                                                         CA for good and its permissions, read from FIFO, for whatever
 //                                                         is there at that moment
-// Writes ToolState and listens to SceneManifest. Exit codes as everywhere; 5: a sample of the cart came.
+// Writes ToolState and reads SceneManifest. Exit codes as in exit_code.h; 5: a sample of the cart arrived.
 #include <unistd.h>
 
 #include <chrono>

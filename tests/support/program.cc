@@ -52,7 +52,7 @@ Program& Program::operator=(Program&& other) noexcept {
 std::string Program::Said() const {
   std::string text;
   std::array<char, 4096> part;
-  // By place: the child's own is where it writes next.
+  // pread, because the file offset is shared with the child, which writes at it.
   for (ssize_t n = 0; (n = ::pread(output_, part.data(), part.size(), static_cast<off_t>(text.size()))) > 0;) {
     text.append(part.data(), static_cast<std::size_t>(n));
   }

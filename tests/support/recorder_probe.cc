@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 using runtime::MonotonicNs;
 
 constexpr double kPatience_s = 20;
-constexpr std::int64_t kPromise_ns = 1'000'000'000;  ///< What is older than this is in the file.
+constexpr std::int64_t kPromise_ns = 1'000'000'000;  ///< Samples older than this must be in the file.
 constexpr int kFrameEvery = 10;                      ///< ToolStates.
 constexpr std::uint32_t kVertices = 20'000;
 
@@ -60,7 +60,8 @@ RecorderProbe::~RecorderProbe() {
 }
 
 bool RecorderProbe::Connect(const Program& recorder) {
-  // The reader of a killed recorder counts until its lease is over: only the log says that the new one is there.
+  // The reader of a killed recorder is counted until its lease expires, so only the log shows that the new one has
+  // started.
   return WaitFor(kPatience_s, [&] {
     return recorder.Said().find("joined session") != std::string::npos && tools_->has_readers() &&
            frames_->has_readers();
@@ -95,7 +96,7 @@ void RecorderProbe::SendFor(double seconds) {
 
 void RecorderProbe::Count(const std::vector<Sent>& sent, const std::vector<std::uint64_t>& read, std::int64_t kill_ns,
                           Result* result) {
-  // What was sent before the two knew each other was not received.
+  // Samples sent before the two processes discovered each other are not received.
   const std::uint64_t first = read.empty() ? 0 : read.front();
   for (const Sent& sample : sent) {
     if (sample.sequence < first || sample.time_ns > kill_ns - kPromise_ns) continue;

@@ -1,4 +1,4 @@
-// The program recorder beside a source of samples that is known to the last one.
+// The program recorder together with a source whose samples are all known.
 #pragma once
 
 #include <cstdint>
@@ -22,12 +22,12 @@ class RecorderProbe {
   RecorderProbe& operator=(const RecorderProbe&) = delete;
 
   struct Result {
-    std::uint64_t due = 0;     ///< Samples that the file must have: those older than a second at the kill.
-    std::uint64_t read = 0;    ///< Of these, those up to the last that it has of their topic.
-    std::uint64_t missed = 0;  ///< Of those again, the ones that are missing: lost on their way and not by the kill.
+    std::uint64_t due = 0;     ///< Samples that the file must contain: those older than a second at the kill.
+    std::uint64_t read = 0;    ///< Of these, samples up to the last one of their topic in the file.
+    std::uint64_t missed = 0;  ///< Of those, missing samples: lost in transport and not by the kill.
     std::filesystem::path file;
   };
-  /// Records for so long [s], then kills the recorder and reads what is there. due is 0 when it did not come up.
+  /// Records for `seconds`, then kills the recorder and reads its file. `due` is 0 if the recorder did not start.
   Result RecordAndKill(double seconds);
 
  private:

@@ -11,10 +11,10 @@ namespace fulcrum::testing {
 struct ReplayRun {
   int exit_code = -1;
   std::string said;
-  std::map<std::string, double> figures;  ///< Of its --json, as far as they are numbers.
+  std::map<std::string, double> figures;  ///< Numeric values of its --json output.
 };
 
-/// Runs bin/replayer RECORDING with `arguments`. `limit_s`: then it is killed.
+/// Runs bin/replayer RECORDING with `arguments`; it is killed after `limit_s`.
 [[nodiscard]] ReplayRun Replay(const std::filesystem::path& recording, const std::vector<std::string>& arguments,
                                double limit_s);
 

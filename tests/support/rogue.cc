@@ -97,7 +97,7 @@ void Leave(fast::DomainParticipant* participant) {
   fast::DomainParticipantFactory::get_instance()->delete_participant(participant);
 }
 
-/// Bytes on any topic, whatever its readers ask for.
+/// Makes a writer of bytes that matches the QoS of any topic's readers.
 fast::DataWriter* MakeWriter(fast::DomainParticipant* participant, fast::Publisher* publisher,
                              const bus::TopicRole& role) {
   fast::TypeSupport type(new RawType(TypeName(role)));

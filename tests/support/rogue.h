@@ -1,4 +1,4 @@
-// A participant that does not belong to the cart and speaks on its topics.
+// A participant that does not belong to the cart and writes to its topics.
 #pragma once
 
 #include <chrono>
@@ -12,19 +12,18 @@
 
 namespace fulcrum::testing {
 
-/// Joins a secured domain with a side of its own that is forged: what it takes for true about permissions is signed by
-/// any of the authorities in `authorities` (PEM), and is read from the pipe `permissions` each time anew. Makes a
-/// writer of ToolState and writes `bytes` again and again for so long. Throws
-/// std::runtime_error when the library refuses it already.
+/// Joins a secured domain with forged local state: it accepts permissions signed by any of the authorities in
+/// `authorities` (PEM), and reads them from the pipe `permissions` at each use. Makes a writer of ToolState and writes
+/// `bytes` repeatedly for the given time. Throws std::runtime_error if the library refuses it.
 void WriteForgedTools(int domain, const std::string& name, const bus::Security& security,
                       const std::string& authorities, const std::string& permissions, std::vector<std::uint8_t> bytes,
                       std::chrono::seconds time);
 
-/// What a flood is to hold.
+/// Content of a flood.
 enum class Flood {
-  kToolState,     ///< Tools that are nowhere: not finite, outside of the world, turned by no rotation.
-  kContactModel,  ///< The same of models.
-  kCommand,       ///< Verbs that nobody knows, to everybody.
+  kToolState,     ///< Invalid tools: not finite, outside of the world, not a rotation.
+  kContactModel,  ///< Invalid contact models.
+  kCommand,       ///< Unknown verbs, addressed to all nodes.
 };
 
 class Rogue {
@@ -34,12 +33,13 @@ class Rogue {
   Rogue(const Rogue&) = delete;
   Rogue& operator=(const Rogue&) = delete;
 
-  /// Its stamps carry this.
+  /// Epoch of its stamps.
   [[nodiscard]] std::uint64_t epoch() const;
-  /// Waits until the cart listens, then writes 20 messages each millisecond for so long; how many were sent.
+  /// Waits for readers of the cart, then writes 20 messages each millisecond for `seconds`. Returns the number of
+  /// messages.
   std::uint64_t Pour(Flood what, double seconds, std::uint32_t seed);
-  /// On each topic, under the name of its type: bytes that are no message, some random, some cut short, some that
-  /// promise more than follows. How many were sent.
+  /// Writes invalid bytes to each topic under the name of its type: random, truncated, or with lengths beyond their
+  /// end. Returns the number of messages.
   std::uint64_t PourBytes(int per_topic, std::uint32_t seed);
 
  private:

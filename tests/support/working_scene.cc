@@ -8,7 +8,7 @@
 namespace fulcrum::testing {
 namespace {
 
-/// Where the tools work on a sheet [fractions of it, mm, s].
+/// Places and times of the tools' work on a sheet [fractions of the sheet, mm, s].
 struct Work {
   double grasp_s, pull_mm, depth_mm, cut_s, line_step, line_s;
 };
@@ -31,8 +31,7 @@ std::string WorkingScene(const std::string& base, double duration_s, const std::
   };
   grasper(0.0, 10, 50);
   grasper(0.4, -2.5, 50);
-  // Late enough for everybody to hear it on a machine with too much to do: who has not seen the jaws close holds
-  // nothing.
+  // Late enough that all nodes receive it on an overloaded machine: a node that misses the closing jaws has no grasp.
   grasper(1.2, -2.5, 50);
   grasper(1.6, -2.5, 0);
   double time_s = 2.2;

@@ -18,7 +18,7 @@ enum class Held { kFree, kSlack, kOrgan, kTaut, kTented };
 /// with the end up, or level.
 enum class Foot { kDown, kSlanted, kUp, kLevel };
 
-/// From one kill to the next: twice what a killed node may take to come back to its work, and more.
+/// Time between kills: more than twice the time that a killed node may take until it works again.
 inline constexpr double kKillPeriod_s = 1.1;
 
 struct SessionPlan {
@@ -39,7 +39,7 @@ struct SessionPlan {
 
 [[nodiscard]] std::string Describe(const SessionPlan& plan);
 
-/// Runs sessions. One that does not end well yields no figures; its reason goes to stderr.
+/// Runs sessions. A session that fails yields no figures; the reason is written to stderr.
 class SessionRunner {
  public:
   /// @param keep recordings and maps stay there; empty: nothing stays.
@@ -51,7 +51,8 @@ class SessionRunner {
   /// Again, and once more, when the pedal was not heard for most of the stroke: simulated firmware that gets no
   /// processor time sends nothing, and physics takes its pedal for up.
   [[nodiscard]] std::optional<log_tools::CutMap> Run(const SessionPlan& plan);
-  /// Runs that were given up for their pedal: what is left is no fair sample where there are many.
+  /// Number of runs rejected because the pedal signal was lost; if there are many, the remaining runs are not
+  /// representative.
   [[nodiscard]] int repeated() const { return repeated_; }
   /// Nodes that were killed and came back, in all sessions.
   [[nodiscard]] int killed() const { return killed_; }

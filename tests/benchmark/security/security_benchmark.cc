@@ -1,4 +1,4 @@
-// A secured cart: who gets in, and what it costs to join.
+// A secured cart: attempts that it refuses, and the time to join it.
 #include <unistd.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ void Attempts(benchmark::Report* report, const fs::path& scratch) {
     std::fprintf(stderr, "%s %s: exit code %d of %d, %s, %s: %s\n", attempt.refused() ? "refused" : "NOT REFUSED",
                  attempt.name.c_str(), attempt.exit_code, attempt.wanted_exit_code,
                  attempt.came_through ? "came through" : "nothing came through",
-                 attempt.reported ? "reported" : "not reported", attempt.who.c_str());
+                 attempt.reported ? "reported" : "not reported", attempt.last_line.c_str());
   }
   report->Add("security.refused", 100.0 * refused / all, "%");
   report->Add("security.attempts", all, "");

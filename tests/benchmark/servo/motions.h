@@ -1,4 +1,4 @@
-// The five motions that force strategies are measured on, and what follows them.
+// The five motions for the comparison of force strategies, and the loop that runs them.
 #pragma once
 
 #include <functional>
@@ -21,18 +21,18 @@ struct Motion {
 /// press, palpate, tap, slide, grasp. Press and tap begin and end contacts; the others last.
 [[nodiscard]] std::vector<Motion> Motions();
 
-/// A way to make the force of each millisecond out of the late reports of physics.
+/// A method to compute the force of each millisecond from the delayed reports of physics.
 class ForceStrategy {
  public:
   virtual ~ForceStrategy() = default;
-  /// A report comes in, before Step() of its tick.
+  /// Receives a report, before Step() of its tick.
   virtual void Offer(const ContactModel& model, const Tick& tick) = 0;
   /// Force of the tissue on the tool with its tip at `tip` [N]. `proxy`: what the tissue is to feel, set to `tip`
   /// unless the strategy has a coupling of its own.
   [[nodiscard]] virtual Vec3d Step(const Tick& tick, const Vec3d& tip, Vec3d* proxy) = 0;
 };
 
-/// What physics believes of the tissue, over what is true.
+/// Ratios of the parameters that physics assumes to the true ones.
 struct Mismatch {
   double stiffness = 1;  ///< k1, k3, kt, Kb.
   double viscosity = 1;  ///< Bb.

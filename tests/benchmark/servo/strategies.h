@@ -1,5 +1,5 @@
-// Ways to make 1 kHz force out of 100 Hz physics: this servo, and those it is measured against. The latter are linked
-// into the benchmark only.
+// Methods to compute a 1 kHz force from 100 Hz physics: this servo, and the methods it is compared with. The latter are
+// linked into the benchmark only.
 #pragma once
 
 #include <functional>
@@ -18,8 +18,8 @@ struct NamedStrategy {
 
 /// The whole Servo: Zener local model, replay, correction, coupling, age machine, passivity, output chain.
 [[nodiscard]] std::unique_ptr<ForceStrategy> MakeServo();
-/// The paper: depth x normal of each physics step, held until the next. Depth is given the stiffness at which it is
-/// the true pressure, so what is left is the delay, the steps and the missing friction.
+/// The paper: depth x normal of each physics step, held until the next. Depth is given the stiffness at which it is the
+/// true pressure, so the remaining errors are the delay, the steps and the missing friction.
 [[nodiscard]] std::unique_ptr<ForceStrategy> MakeHeldForce();
 
 /// Held force, ZOH mesh, god-object, extrapolated mesh, linear local model, this servo: in this order.

@@ -1,4 +1,4 @@
-// Pictures of the sheet for a person to look at.
+// Pictures of the sheet for visual inspection.
 #pragma once
 
 #include <filesystem>

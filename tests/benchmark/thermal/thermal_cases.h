@@ -1,4 +1,4 @@
-// The cases of the thermal benchmark, by subject; each runs only what the report wants.
+// The cases of the thermal benchmark, by subject; each runs only if the report wants its keys.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ void HeatCases(benchmark::Report* report);
 void PotentialCases(benchmark::Report* report);
 /// The whole node on ports in the built-in scene, its checkpoint and patch; and a frame with nothing to do.
 void NodeCases(benchmark::Report* report);
-/// What cuts look like by speed and mode, and the error of the coupling step.
+/// Shape of cuts by speed and mode, and the error of the coupling step.
 void CutCases(benchmark::Report* report);
 /// Published measurements and bounds by energy.
 void PublishedCases(benchmark::Report* report);

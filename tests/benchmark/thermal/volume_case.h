@@ -1,4 +1,4 @@
-// Time and error of the tissue beneath the sheet, and what it costs a frame.
+// Run time and error of the tissue beneath the sheet, and its share of a frame.
 #pragma once
 
 #include "tests/benchmark/report.h"

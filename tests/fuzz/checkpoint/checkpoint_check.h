@@ -1,5 +1,5 @@
-// What must hold whatever a checkpoint holds that passed its checksum: it is refused, and the solver is as it was, or
-// it is taken, and the solver goes on from there with numbers that its readers accept.
+// Properties that must hold for any checkpoint with a valid checksum: either it is refused and the solver is unchanged,
+// or it is accepted and the solver continues with values that its readers accept.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +15,8 @@ namespace fulcrum::testing {
 /// How a check ended.
 enum class Outcome { kRefused, kTaken, kBroken };
 
-/// Changes a payload as `input` says, a list of: place in four bytes (little endian, modulo the length), length in one,
-/// bytes. A length of 255 cuts the payload off there.
+/// Changes a payload according to `input`, a list of: place in four bytes (little endian, modulo the length), length in
+/// one, bytes. A length of 255 cuts the payload off there.
 void Patch(std::span<const std::uint8_t> input, std::vector<std::byte>* payload);
 
 class CheckpointCheck {

@@ -1,5 +1,5 @@
-// What must hold whatever is asked of the console: nobody gets in without the token, from another host's or another
-// site's page; what gets in can name no file outside its folder.
+// Properties that must hold for any request to the console: without the token, or from a page of another host or site,
+// it is refused; an accepted request cannot name a file outside its folder.
 #pragma once
 
 #include <filesystem>

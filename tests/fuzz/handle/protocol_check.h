@@ -1,4 +1,4 @@
-// What the serial parsers promise on any bytes, checked on one input: shared by libFuzzer's target and by the test.
+// Properties of the serial parsers for any bytes, checked on one input: shared by libFuzzer's target and the test.
 #pragma once
 
 #include <algorithm>
@@ -21,7 +21,7 @@ struct ProtocolVerdict {
   int good_pedals = 0;
 };
 
-/// A value that was accepted is exactly what its line says, in the one form that a sender writes.
+/// An accepted value must correspond exactly to its line, in the one form that a sender writes.
 inline const char* CheckLine(std::string_view line, JawLineGate* gate, ProtocolVerdict* verdict) {
   if (const std::optional<Frame> frame = ParseFrame(line)) {
     const auto written = FormatFrame(*frame);

@@ -1,5 +1,5 @@
-// What must hold whatever arrives as a contact model: a servo that presses tissue is offered anything between good
-// messages. The force stays finite, within its limit and its slew; a message that is refused leaves no trace.
+// Properties that must hold for any bytes as contact model: a servo in contact is offered arbitrary messages between
+// good ones. The force stays finite, within its limit and its rate limit; a refused message does not change the state.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ struct Patch {
 
 class GateCheck {
  public:
-  /// A good message for now: what the tissue says.
+  /// Valid message for the present time, from the tissue.
   [[nodiscard]] ContactModel Good() {
     ContactModel model;
     model.stamp = {sequence_, epoch_, TickAt(millisecond_).stamp_ns};
@@ -47,10 +47,10 @@ class GateCheck {
     servo_.OfferModel(model, tick.stamp_ns);
     servo_.Step(tick);
     const bool refused = servo_.figures().models_dropped > dropped;
-    // The twin never hears of what was refused.
+    // The twin does not receive refused messages.
     if (!refused) twin_.OfferModel(model, tick.stamp_ns);
     twin_.Step(tick);
-    // Physics goes on from wherever a message has led the gate.
+    // Physics continues after the epoch and sequence that the gate has accepted last.
     sequence_ = servo_.record().model_sequence + 1;
     epoch_ = std::max(epoch_, servo_.record().model_epoch);
     refused_ += refused ? 1 : 0;

@@ -1,5 +1,5 @@
-// What must hold for any bytes in a recording's file: reading, decoding and mending end without a crash, nothing is
-// read that the file has no room for, and what was mended reads as a whole file with the same messages.
+// Properties that must hold for any bytes in a recording: reading, decoding and repair end without a crash, no read
+// exceeds the file's size, and a repaired file is complete and has the same messages.
 #pragma once
 
 #include <unistd.h>
@@ -22,7 +22,7 @@ struct RecordingVerdict {
   std::uint64_t messages = 0, decoded = 0, faults = 0;
 };
 
-/// Files lie in `folder`, best one in memory: a file system on a disk would be what is tested.
+/// Files are created in `folder`, preferably in memory: on a disk the speed of the file system would dominate.
 inline RecordingVerdict CheckRecording(std::span<const std::uint8_t> bytes, const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "fuzzed.mcap", mended = folder / "mended.mcap";
   std::filesystem::remove(file);

@@ -1,4 +1,4 @@
-// What must hold of any bytes that are read as a mesh.
+// Properties that must hold for any bytes that are read as a mesh.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// How often this thread has called operator new. Always 0 where a sanitizer owns it.
+// Number of calls of operator new on this thread. Always 0 if a sanitizer replaces operator new.
 #pragma once
 
 namespace fulcrum::bus::test {

@@ -1,4 +1,4 @@
-// What the bus tests share: waiting for a condition, and a second process to talk to.
+// Helpers of the bus tests: waiting for a condition, and a second process as peer.
 #pragma once
 
 #include <fcntl.h>
@@ -18,7 +18,7 @@
 
 namespace fulcrum::bus::test {
 
-/// Waits for a condition that must come true; how long it takes is not what these tests judge.
+/// Waits for a condition that must come true; these tests do not check the time that it takes.
 template <class Condition>
 bool Eventually(const Condition& condition) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
@@ -66,7 +66,7 @@ class Peer {
     return line;
   }
 
-  /// kill -9, and waits until it is gone.
+  /// Kills the process with SIGKILL and waits for its end.
   void Kill() {
     if (pid_ <= 0) return;
     kill(pid_, SIGKILL);

@@ -1,5 +1,5 @@
-// A moment of an operation without physics or heat: what the renderer would be told at a time of the scene's script.
-// The grasper lifts a tent, the hook has cut along its path so far, the slit gapes and its edges are browned.
+// Synthetic state of an operation without physics and heat: the renderer's inputs at a time of the scene's script. The
+// grasper lifts a tent, the hook has cut along its path so far, the slit gapes and its edges are browned.
 #pragma once
 
 #include <vector>

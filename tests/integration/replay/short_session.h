@@ -13,7 +13,7 @@
 
 namespace fulcrum::replay::testing {
 
-/// Folder with recording.mcap and scene.fulcrum; it goes with the object.
+/// Folder with recording.mcap and scene.fulcrum; it is removed with the object.
 class ShortSession {
  public:
   /// Of the scene before it is compiled: touched, grasped and cut within two seconds.

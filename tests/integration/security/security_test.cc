@@ -78,13 +78,13 @@ TEST(SecuredBus, EveryAttemptIsRefusedAndReported) {
   bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kAttemptsDomain));
   const Scratch scratch("attempts");
   for (const testing::Attempt& attempt : testing::TryAllAttempts(kAttemptsDomain, scratch.path())) {
-    SCOPED_TRACE(attempt.name + ": " + attempt.who);
+    SCOPED_TRACE(attempt.name + ": " + attempt.last_line);
     EXPECT_FALSE(attempt.came_through);
     EXPECT_EQ(attempt.exit_code, attempt.wanted_exit_code);
     EXPECT_TRUE(attempt.reported || attempt.wanted_of_cart.empty())
         << "the cart says nothing of " << attempt.wanted_of_cart;
-    EXPECT_TRUE(attempt.wanted_exit_code == 0 || !attempt.who.empty());
-    RecordProperty(attempt.name, attempt.who);
+    EXPECT_TRUE(attempt.wanted_exit_code == 0 || !attempt.last_line.empty());
+    RecordProperty(attempt.name, attempt.last_line);
   }
   bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kAttemptsDomain));
 }

@@ -1,5 +1,5 @@
 // Physics and heat in closed loop, in lock step and without a bus: a hook that is moved along a path cuts the deforming
-// membrane, and the cut comes back to the membrane. What the tests of the cut share.
+// membrane, and the cut is returned to the membrane. Shared by the tests of the cut.
 #pragma once
 
 #include <functional>
@@ -32,7 +32,7 @@ struct LoopStep {
 class ClosedLoop {
  public:
   explicit ClosedLoop(const SceneView& scene);
-  /// Advances by the period of physics; thermal does with every sample what it does live.
+  /// Advances by the period of physics; thermal_node processes every sample as in a live session.
   const LoopStep& Step(const Moment& moment);
   /// Runs for `duration_s`; returns all steps.
   std::vector<LoopStep> Run(const Operator& hand, double duration_s);

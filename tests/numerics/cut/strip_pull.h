@@ -1,5 +1,5 @@
-// A strip of membrane clamped at two ends and pulled until it tears, with the owner of the topology in the loop. What
-// the test and the benchmark of tearing share.
+// A strip of membrane clamped at two ends and pulled until it tears, with the owner of the topology in the loop. Shared
+// by the test and the benchmark of tearing.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// The accurate mode as a thing to be measured: the preset of the scene, without tools.
+// Adapter of the accurate mode to the test interface: the preset of the scene, without tools.
 #pragma once
 
 #include "physics_node/implicit/implicit_solver.h"

@@ -1,5 +1,5 @@
-// Shapes whose deformation theory knows, as ElasticModels on regular meshes, solved by the reference solver: what the
-// discretisation itself gets wrong. Loads are small, so that linear elasticity holds.
+// Shapes with an analytic deformation, as ElasticModels on regular meshes, solved by the reference solver: they show
+// the error of the discretisation alone. Loads are small, so that linear elasticity holds.
 #pragma once
 
 namespace fulcrum::physics {

@@ -1,5 +1,5 @@
-// Random grasps, cuts and releases, one after the other, with FaultOf after each: the tissue of mode accurate under an
-// operator without any sense. The same seed does the same.
+// Random grasps, cuts and releases, one after the other, with FaultOf after each: the tissue of mode accurate under
+// random operations. The same seed gives the same sequence.
 #pragma once
 
 #include <array>
@@ -26,7 +26,8 @@ class GraspCutFuzz {
 
   /// The next operation and the steps that it takes. What is wrong afterwards; empty when all is well.
   [[nodiscard]] std::string Operate();
-  /// Everything let go and the tools away until the tissue sleeps, or for 15 s; then what is wrong, by closer bounds.
+  /// Releases all grasps, removes the tools and steps until the tissue sleeps, or for 15 s; then returns a violated
+  /// invariant, by stricter bounds.
   [[nodiscard]] std::string Rest();
 
   [[nodiscard]] const FuzzCounts& counts() const { return counts_; }

@@ -1,4 +1,4 @@
-// The paper's mode as a thing to be measured.
+// Adapter of the paper's mode to the test interface.
 #pragma once
 
 #include "physics_node/pbd/pbd_solver.h"

@@ -1,4 +1,4 @@
-// Moves the tools of a scene along its script, as a hand that never gives way would.
+// Moves the tools of a scene along its script, like a rigid hand.
 #pragma once
 
 #include <array>

@@ -1,5 +1,4 @@
-// What every tissue solver must offer to be measured: the accuracy benchmark and the robustness matrix see nothing
-// else.
+// Interface of a tissue solver for the accuracy benchmark and the robustness matrix.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// Solvers over a ParticleStore and a TissueModel, as things to be measured: all but the step itself.
+// Adapter of solvers over a ParticleStore and a TissueModel to the test interface: everything except the step itself.
 #pragma once
 
 #include <vector>
@@ -49,7 +49,7 @@ class StoreSolver : public SolverUnderTest {
   }
 
  protected:
-  /// Positions have been set: forget velocities and what else belongs to the past.
+  /// Resets velocities and other history after positions have been set.
   virtual void Stop() {}
   /// Inverse masses have changed.
   virtual void HeldChanged() {}

@@ -1,4 +1,4 @@
-// What must hold of a tissue after whatever was done to it.
+// Invariants of the tissue after any sequence of operations.
 #pragma once
 
 #include <string>
@@ -14,9 +14,9 @@ struct TissueBounds {
   bool no_inverted = false;  ///< No tetrahedron of the organ is inverted.
 };
 
-/// What is wrong after a Step, in words; empty when all is well. Asked of: places finite and within bounds; what is
-/// held alive, in range, held once and without inverse mass, what is not held with its own; contact pairs and rows on
-/// live tissue only; pieces of membrane without an anchor frozen as debris, and only those.
+/// Describes a violated invariant after a Step; empty if there is none. Checked are: places finite and within bounds;
+/// what is held alive, in range, held once and without inverse mass, what is not held with its own; contact pairs and
+/// rows on live tissue only; pieces of membrane without an anchor frozen as debris, and only those.
 [[nodiscard]] std::string FaultOf(TissueSimulation* simulation, const SceneView& scene, const StepReport& report,
                                   const TissueBounds& bounds);
 

@@ -1,4 +1,4 @@
-// Small-step XPBD as a thing to be measured: PhysicsParams.substeps, without tools.
+// Adapter of small-step XPBD to the test interface: PhysicsParams.substeps, without tools.
 #pragma once
 
 #include "physics_node/xpbd/xpbd_solver.h"

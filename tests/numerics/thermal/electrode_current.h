@@ -1,4 +1,4 @@
-// Current of an electrode into a leaky sheet without borders, by other means than the solver's.
+// Current of an electrode into an infinite leaky sheet, by methods independent of the solver.
 #pragma once
 
 #include "services/base/core/types.h"

@@ -1,4 +1,4 @@
-// A flat rectangular membrane without organ, and a tip dragged over it: what the thermal tests and benchmarks share.
+// A flat rectangular membrane without organ, and a tip dragged over it, for thermal tests and benchmarks.
 #pragma once
 
 #include <cmath>
@@ -63,7 +63,7 @@ inline void RunDrag(const Drag& drag, float dt_s, ThermalSolver* solver) {
   for (int frame = 0; frame < drag.frames(dt_s); ++frame) solver->Step(drag.At(frame, dt_s), dt_s);
 }
 
-/// Extents of what a straight drag did, measured across its path over the middle 80 % of its length.
+/// Extents of the effects of a straight drag, measured across its path over the middle 80 % of its length.
 struct SlitFigures {
   float width_min_m = 0, width_mean_m = 0, width_max_m = 0;  ///< Removed cells across.
   float brown_m = 0;                                         ///< Collagen damage >= 1, to one side of the slit, mean.

@@ -1,4 +1,4 @@
-// Conduction against exact solutions, at several cell sizes and steps: what the tests hold and the benchmark prints.
+// Conduction against exact solutions, at several cell sizes and steps, for tests and benchmark.
 #pragma once
 
 #include "thermal_node/heat/heat_field.h"

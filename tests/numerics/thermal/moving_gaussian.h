@@ -3,8 +3,8 @@
 
 namespace fulcrum::thermal {
 
-/// s = 0.25 mm, 4 mm of way in a window of 9.6 mm, frames of 10 ms, without losses. Coordinates [m] from the window's
-/// corner; the tip goes along x from `kStart` at time 0.
+/// s = 0.25 mm, a path of 4 mm in a window of 9.6 mm, frames of 10 ms, without losses. Coordinates [m] from the
+/// window's corner; the tip moves along x from `kStart` at time 0.
 struct MovingGaussian {
   static constexpr double kWidth = 2.5e-4, kWindow = 9.6e-3, kStart = 2.8e-3, kRow = 4.8e-3, kWay = 4e-3;
   static constexpr double kDt = 0.01;

@@ -1,4 +1,4 @@
-// Proves after each commit that the topology refers to nothing that is gone and says what the cells say.
+// Checks after each commit that the topology refers to no dead element and agrees with the cells.
 #pragma once
 
 #include <string>
@@ -15,7 +15,7 @@ namespace fulcrum::thermal {
 ///  - counts agree with the bits,
 ///  - no live edge ends at a dead node, and a node is dead if and only if its own cell is removed or no edge is left,
 ///  - an edge is dead if and only if its strand is severed, recomputed from the cells,
-///  - revisions and shrink never go back and nothing comes back to life.
+///  - revisions and shrink never decrease and no dead element becomes alive again.
 class TopologyValidator {
  public:
   TopologyValidator(const SceneView& scene, const Sheet& sheet);

@@ -1,4 +1,4 @@
-// A cart that works while it is hurt.
+// A cart at work during fault injection.
 #pragma once
 
 #include <atomic>
@@ -28,8 +28,8 @@ class ChaosCart {
   ChaosCart(const ChaosCart&) = delete;
   ChaosCart& operator=(const ChaosCart&) = delete;
 
-  /// Whether, from now on, every node reports that it runs, tissue moves, the hand feels it, heat hears of the hook
-  /// and pictures are drawn. If not, Trouble() tells what is missing.
+  /// Waits until every node reports that it runs, tissue moves, the servo renders it, thermal_node receives contacts of
+  /// the hook and pictures are drawn. Returns false at the limit; Trouble() then describes what is missing.
   [[nodiscard]] bool GoesOn();
   [[nodiscard]] std::string Trouble() const { return missing_ + "\n" + cart_.Said(); }
 

@@ -1,4 +1,4 @@
-// What a test and the clock shim in the programs share.
+// Memory that a test and the clock shim in the programs share.
 #pragma once
 
 #include <atomic>

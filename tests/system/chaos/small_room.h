@@ -1,5 +1,5 @@
 // A cart that is given a small /dev/shm, or a small or read-only folder for its sessions: in mount and user namespaces
-// of its own, so that nobody else runs short.
+// of its own, so that other processes are not affected.
 #pragma once
 
 #include <cstdint>

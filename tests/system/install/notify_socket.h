@@ -1,4 +1,4 @@
-// The end of sd_notify at which systemd listens.
+// The receiving end of sd_notify, in place of systemd.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// A unit of systemd as text: what it says, and what it would start.
+// A systemd unit as text: its settings, and the command that it starts.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,5 @@
-// Two hosts and a cable between them on one machine: network namespaces, each with its own /dev/shm, so that nothing
-// but the cable can carry anything, and the far host with a CLOCK_MONOTONIC of its own. Needs root.
+// Two hosts and a cable between them on one machine: network namespaces, each with its own /dev/shm, so that the cable
+// is their only connection, and the far host with a CLOCK_MONOTONIC of its own. Needs root.
 #pragma once
 
 #include <cstdint>
@@ -15,8 +15,8 @@ namespace fulcrum::testing {
 class TwoHosts {
  public:
   struct Settings {
-    double delay_ms = 0;           ///< Each way.
-    double loss_percent = 0;       ///< Each way.
+    double delay_ms = 0;           ///< In each direction.
+    double loss_percent = 0;       ///< In each direction.
     double far_clock_ahead_s = 0;  ///< Whole seconds.
     std::string word = "fulcrum";  ///< For Overheard.
   };
@@ -39,7 +39,7 @@ class TwoHosts {
   void Mend() const;
   /// Settings::word went over the cable in the clear.
   [[nodiscard]] bool Overheard() const { return !cable_.Said().empty(); }
-  /// A folder of this object's, gone with it.
+  /// Temporary folder, removed with the object.
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
 
  private:
@@ -52,7 +52,7 @@ class TwoHosts {
   std::string cart_pid_, host_pid_;  ///< Of processes that live in the namespaces.
 };
 
-// ------------------------------------------------------------------------ what the probes wrote down
+// ------------------------------------------------------------------------ records of the probes
 
 struct HeardFrame {
   std::uint64_t sequence = 0;

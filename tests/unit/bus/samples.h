@@ -1,5 +1,5 @@
-// One message of each type with every field set to a value of its own, so that a field that is lost, swapped or cut on
-// its way shows.
+// One message of each type with a different value in every field, so that lost, swapped or truncated fields are
+// detected.
 #pragma once
 
 #include "services/base/core/messages.h"

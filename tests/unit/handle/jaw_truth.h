@@ -1,4 +1,4 @@
-// True jaw motions for tests and benchmarks of the estimator: what a hand does on a handle.
+// True jaw motions of a hand on a handle, for tests and benchmarks of the estimator.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Servo, tissue and a physics that reports late, together in simulated time.
+// Servo, tissue and physics with delayed reports in closed loop, in simulated time.
 #pragma once
 
 #include <algorithm>
@@ -34,11 +34,11 @@ struct Loop {
   std::uint64_t millisecond = 0;
 };
 
-/// A hand that goes from 10 mm above the surface to 4 mm beneath it.
+/// A hand that moves from 10 mm above the surface to 4 mm beneath it.
 inline const std::array<ScriptKey, 2> kIntoTheWall{
     {{0.0f, 0, Vec3f(0, 0, 0.01f), 0, 0, 0}, {0.8f, 0, Vec3f(0, 0, -0.004f), 0, 0, 0}}};
 
-/// Runs three seconds of that; how far `height` of a tick still goes up and down in the last half.
+/// Runs three seconds of that; returns the peak-to-peak amplitude of `height` in the last half.
 template <class Height>
 double UnrestAtTheWall(Loop* loop, const Height& height) {
   double lowest = 1, highest = -1;

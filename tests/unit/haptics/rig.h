@@ -10,7 +10,7 @@
 
 namespace fulcrum::haptics::testing {
 
-/// A device that is where a function of session time says, whatever the force.
+/// A device whose position is a function of session time, independent of the force.
 class GuidedDevice final : public HapticDevice {
  public:
   GuidedDevice(const Trocar& trocar, std::function<Vec3d(double)> tip) : trocar_(trocar), tip_(std::move(tip)) {}

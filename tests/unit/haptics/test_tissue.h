@@ -1,5 +1,5 @@
 // Tissue for tests and benchmarks of the servo: the viscoelastic half-space z < 0 integrated finely and explicitly, by
-// code that shares nothing with the servo's own law; and a physics that reports it late, as the real one does.
+// code that is independent of the servo's law; and a model of physics that reports it with the delay of the real one.
 #pragma once
 
 #include <algorithm>

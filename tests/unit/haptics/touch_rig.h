@@ -1,4 +1,4 @@
-// The stand-in for the Touch's driver, loaded as the code under test loads it.
+// The stand-in for the Touch's driver, loaded in the same way as by the code under test.
 #pragma once
 
 #include <dlfcn.h>

@@ -1,4 +1,4 @@
-// What the tests of the codecs share: tissue that moves, and a wire that keeps, loses or reorders chunks.
+// Helpers of the codec tests: moving tissue, and a wire that keeps, loses or reorders chunks.
 #pragma once
 
 #include <cmath>

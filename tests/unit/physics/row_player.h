@@ -1,4 +1,4 @@
-// A small solver that takes contact rows, to test who makes them: position-based dynamics in substeps.
+// A small solver for contact rows, to test the code that generates them: position-based dynamics in substeps.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,8 @@ class RowPlayer {
     rows_.reserve(kMaxTools * ToolCollision::kMaxRows);
   }
 
-  /// A whole step: tool `tool` goes from its last pose to `pose`. `visit(rows)` sees the rows of each substep.
+  /// A whole step in which tool `tool` moves from its last pose to `pose`. Calls `visit(rows)` with the rows of each
+  /// substep.
   template <class Visit>
   void Step(std::size_t tool, const ToolPose& pose, const Visit& visit) {
     const ToolPose from = known_ ? last_ : pose;

@@ -35,7 +35,8 @@ class TappedTopic {
   explicit TappedTopic(recording::McapWriter* writer) : writer_(writer) {}
   [[nodiscard]] auto MakeInput() { return topic_.MakeInput(); }
   [[nodiscard]] auto MakeOutput() { return topic_.MakeOutput(); }
-  /// What has come since. `change` may spoil a sample on its way into the recording, or drop it (false).
+  /// Records the samples since the last call. `change` may spoil a sample on its way into the recording, or drop it
+  /// (false).
   void Record(std::int64_t now_ns, const std::function<bool(T*)>& change = {}) {
     while (tap_->TakeNext(&sample_)) {
       if (change && !change(&sample_)) continue;
@@ -48,7 +49,7 @@ class TappedTopic {
 
  private:
   using Process = std::pair<std::string, std::uint64_t>;
-  /// One for each process that tells of its ticks; of other topics one is enough here.
+  /// One writer for each process that publishes a TickManifest; for other topics one is enough here.
   std::uint16_t ChannelOf(const T& sample) {
     Process process;
     recording::TextMap about;
@@ -72,12 +73,12 @@ class TappedTopic {
 struct CartStory {
   double seconds = 3;
   double kill_physics_s = -1;     ///< Ended without notice, started again 30 ms later.
-  bool kill_before_seal = false;  ///< Physics: after it has told of its last tick, before that tick's checkpoint.
+  bool kill_before_seal = false;  ///< Physics: after the manifest of its last tick, before that tick's checkpoint.
   double kill_haptics_s = -1;
   double late_physics_s = -1;                            ///< One period is skipped.
   int threads = 1;                                       ///< Of physics.
   float power_W = 35;                                    ///< Of the generator.
-  std::function<bool(ToolState*)> tool_change{};         ///< Of what is recorded only.
+  std::function<bool(ToolState*)> tool_change{};         ///< Applied to the recorded samples only.
   std::function<bool(TickManifest*)> manifest_change{};  ///< The same.
   bool record_frames = true;                             ///< TissueFrame is most of the bytes.
 };
@@ -226,7 +227,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
       if (late) {
         ++physics_index;
       } else {
-        // It looks a little after the servo.
+        // Runs shortly after the servo.
         const std::int64_t then = now + kMillisecond / 5;
         physics->node->Step({physics_index++, seconds_of(then), 1e-2, then});
       }
@@ -234,7 +235,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
     if (ms % 10 == 3) thermal.Step({thermal_index++, time, 1e-2, now});
 
     sessions.Record(now);
-    // Manifests overtake what they speak of.
+    // Manifests may arrive before the samples that they refer to.
     manifests.Record(now, story.manifest_change);
     tools.Record(now, story.tool_change);
     handles.Record(now);

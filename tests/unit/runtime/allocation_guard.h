@@ -1,5 +1,6 @@
-// Counts what a real-time loop must not do. A program linked with fulcrum_allocation_guard has the malloc family and
-// pthread_mutex_lock replaced by versions that count, on the threads that ask for it, and then do their job.
+// Counts operations that a real-time loop must not do. A program linked with fulcrum_allocation_guard has the malloc
+// family and pthread_mutex_lock replaced by versions that count the calls on guarded threads and then call the
+// original.
 //
 //   AllocationGuard guard;
 //   servo.Step(tick);

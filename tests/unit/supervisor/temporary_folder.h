@@ -1,4 +1,4 @@
-// A folder of a test's own, removed with all it holds at the end.
+// A temporary folder of a test, removed with its content at the end.
 #pragma once
 
 #include <stdlib.h>

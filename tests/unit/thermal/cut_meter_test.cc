@@ -96,7 +96,7 @@ TEST(CutMeterTest, StraightSlitsOfAnyAngleAndWidthAreMeasured) {
       Straight(static_cast<float>(degrees) * kPi / 180, kLength_m, half_m, &cut);
       EXPECT_NEAR(cut.meter.length_m(), kLength_m, 0.015f * kLength_m);
       EXPECT_LE(cut.largest_rise_m, 0.7e-3f);
-      // The widths of one slit differ by a cell; beyond twice the reach they are not told.
+      // The widths of one slit differ by a cell; widths beyond twice the reach are not measured.
       EXPECT_NEAR(cut.meter.width_p50_m(), 2 * half_m, 1e-4f);
       EXPECT_NEAR(cut.meter.width_p95_m(), 2 * half_m, 1e-4f);
       EXPECT_LE(cut.meter.off_path_p95_m(), 1e-4f);
@@ -246,7 +246,7 @@ TEST(CutMeterTest, StrayingIsTheDistanceFromTheWay) {
     cut.Update();
   }
   EXPECT_NEAR(cut.meter.off_path_p95_m(), 5e-4f, 1e-4f);
-  // Over the old way again, and where the line is: the points are few, and the distance is that of the nearest way.
+  // A repeated path adds few points, and after a path on the line itself the distance is that of the nearest path.
   const std::size_t points = cut.meter.path().points().size();
   for (int n = 0; n < 20; ++n) cut.meter.AddPath({0.01f, 0.0205f}, {0.03f, 0.0205f});
   EXPECT_LE(cut.meter.path().points().size(), points + 2);

@@ -99,7 +99,7 @@ TEST_F(TipTest, PathsOfSuccessiveSamplesJoin) {
   const TipInput second = Advance(b);
   EXPECT_EQ(second.path.from, a.material);
   EXPECT_EQ(second.path.to, b.material);
-  // A sample is missing: the next one's way is as long as two.
+  // If a sample is missing, the path of the next one is twice as long.
   const TipInput third = Advance(c);
   EXPECT_EQ(third.path.from, b.material);
   EXPECT_EQ(third.path.to, c.material);
@@ -159,7 +159,7 @@ TEST_F(TipTest, AGapBetweenEnergisedSamplesIsBridged) {
   EXPECT_TRUE(bridged.active);
   EXPECT_EQ(bridged.path.from.x(), 0.005f);
   EXPECT_NEAR(bridged.duration_s, 0.4f, 1e-6);
-  // Longer gaps are not bridged: the way of the metal in them is unknown.
+  // Longer gaps are not bridged: the path of the metal in them is unknown.
   const TipInput anew = Advance(At(0.0074f, 0.01f, 1.4 + 1.01 * kLongestGap_s));
   EXPECT_EQ(anew.path.from.x(), 0.0074f);
   EXPECT_FLOAT_EQ(anew.duration_s, 0.01f);

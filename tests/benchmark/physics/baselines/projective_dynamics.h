@@ -1,6 +1,6 @@
 // Projective dynamics (Bouaziz et al. 2014), as Qian et al. used it for dissection: each iteration projects every
-// element by itself, then solves one linear system for all, whose sparse Cholesky factor is computed beforehand. Who is
-// held and what is cut changes the system, so each grasp and cut costs a factorisation.
+// element by itself, then solves one linear system for all, whose sparse Cholesky factor is computed beforehand. Grasps
+// and cuts change the matrix, so each requires a new factorisation.
 #pragma once
 
 #include <Eigen/SparseCholesky>

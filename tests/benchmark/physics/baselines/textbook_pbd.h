@@ -1,5 +1,5 @@
 // Position-based dynamics as textbooks write it: doubles, one object per constraint, a virtual call each, in the order
-// of the scene. The yardstick of the vector kernels: the same constraints, iterations and time step.
+// of the scene. The baseline of the vector kernels: the same constraints, iterations and time step.
 #pragma once
 
 #include <Eigen/Core>

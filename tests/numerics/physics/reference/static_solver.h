@@ -1,5 +1,5 @@
 // Static equilibrium by Newton's method: conjugate gradients on the true Hessian, preconditioned by a sparse Cholesky
-// factor that is kept while it serves.
+// factor that is reused while it is effective.
 #pragma once
 
 #include <vector>
@@ -14,10 +14,10 @@ struct StaticResult {
   int iterations = 0;
 };
 
-/// Minimises the energy plus -sum load . x from `start`, over the coordinates of particles with mass that
-/// are not `held` ([3 * particles], x y z of each; empty: none). Line
-/// search on the energy. Ends at `tolerance_N`, or where rounding allows no better. `load` may be empty.
-/// Throws std::runtime_error when it stands still above `tolerance_N` x 1e4.
+/// Minimises the energy plus -sum load . x from `start`, over the coordinates of particles with mass that are not
+/// `held` ([3 * particles], x y z of each; empty: none). Line search on the energy. Ends at `tolerance_N`, or where
+/// rounding allows no better. `load` may be empty. Throws std::runtime_error if the iteration stagnates above
+/// `tolerance_N` x 1e4.
 [[nodiscard]] StaticResult SolveStatic(const ElasticEnergy& energy, const Points& start, const std::vector<bool>& held,
                                        const Points& load, double tolerance_N = 1e-8);
 

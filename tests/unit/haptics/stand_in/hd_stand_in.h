@@ -1,5 +1,5 @@
 // Controls of the stand-in for libHD.so: a real shared library with the driver's symbols, devices in memory, errors on
-// demand. Not thread-safe but where said: set it up, then let it run.
+// demand. Not thread-safe unless stated: configure it before the scheduler runs.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ struct StandInDevice {
 struct StandIn {
   std::array<StandInDevice, 2> devices;
   std::atomic<bool> threaded{false};  ///< A thread calls at 1 kHz, as in the real library; else Tick() does.
-  std::atomic<bool> stalled{false};   ///< The scheduler calls nobody.
+  std::atomic<bool> stalled{false};   ///< The scheduler makes no callbacks.
   unsigned long rate_Hz = 0;
   int inits = 0;
   /// Calls that the manual forbids: outside of a frame, on a device that is not open, on a running scheduler.
