@@ -35,8 +35,8 @@ struct TouchSample {
 
 /// Data of one tool that the servo and the scheduler's callback share.
 struct TouchLink {
-  runtime::LatestValue<TouchSample>
-      sample;  ///< Callback to servo; updated only while the device is calibrated and delivers readings.
+  /// Callback to servo; updated only while the device is calibrated and delivers readings.
+  runtime::LatestValue<TouchSample> sample;
   runtime::LatestValue<Vec3d> force_D;  ///< Servo to callback [N].
   // Relaxed order is enough: independent figures, only the newest value of each is used.
   std::atomic<double> motor_heat{-1};  ///< Hottest motor, 0 … 1; negative: not read yet.

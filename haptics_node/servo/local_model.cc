@@ -78,7 +78,7 @@ void LocalModel::Learn(const DeviceContacts& contacts, std::int64_t t_s_ns) noex
   prediction_count_ = 0;
 }
 
-void LocalModel::Remember(std::int64_t stamp_ns, const Vec3d& f_W) noexcept {
+void LocalModel::AddPrediction(std::int64_t stamp_ns, const Vec3d& f_W) noexcept {
   if (prediction_count_ < predictions_.size()) predictions_[prediction_count_++] = {stamp_ns, f_W};
 }
 
@@ -99,7 +99,7 @@ void LocalModel::Accept(const DeviceContacts& contacts, std::int64_t t_s_ns, std
   for (std::size_t age = set.count > 0 ? ring.CountAfter(t_s_ns) : 0; age > 1; --age) {
     const TimedTip& tip = ring.Newest(age - 1);
     const double dt = std::clamp(Seconds(tip.stamp_ns - previous_ns), kMinReplayStep_s, kMaxReplayStep_s);
-    Remember(tip.stamp_ns, StepSet(&set, tip.x, tip.stamp_ns, dt).f_W);
+    AddPrediction(tip.stamp_ns, StepSet(&set, tip.x, tip.stamp_ns, dt).f_W);
     previous_ns = tip.stamp_ns;
   }
   current_ = 1 - current_;
@@ -128,7 +128,7 @@ ModelForce LocalModel::StepSet(ContactSet* set, const Vec3d& x, std::int64_t now
 
 ModelForce LocalModel::Step(const Vec3d& x, std::int64_t now_ns, double dt) noexcept {
   ModelForce force = StepSet(&sets_[current_], x, now_ns, dt);
-  Remember(now_ns, force.f_W);
+  AddPrediction(now_ns, force.f_W);
   if (ready(now_ns)) return force;
   const ModelForce old = StepSet(&sets_[1 - current_], x, now_ns, dt);
   const double w = Smootherstep(Seconds(now_ns - fade_start_ns_) / Seconds(kCrossFade_ns));

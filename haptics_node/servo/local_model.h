@@ -65,7 +65,7 @@ class LocalModel {
   };
 
   void Learn(const DeviceContacts& contacts, std::int64_t t_s_ns) noexcept;
-  void Remember(std::int64_t stamp_ns, const Vec3d& f_W) noexcept;
+  void AddPrediction(std::int64_t stamp_ns, const Vec3d& f_W) noexcept;
   [[nodiscard]] double CouplingFor(const Contact& contact, std::uint32_t count, const HandMapping& hand) const noexcept;
   [[nodiscard]] static ModelForce StepSet(ContactSet* set, const Vec3d& x, std::int64_t now_ns, double dt) noexcept;
 

@@ -46,8 +46,8 @@ class ToolShadow {
 
   SceneView scene_;
   Vec2f reach_ = Vec2f::Ones();  // Extent of the map: x / depth and y / depth at its borders, seen from the light.
-  std::vector<float> depth_,
-      filled_;  // Per cell: distance of tissue from the light along the line of sight [m]; 0: none.
+  // Per cell: distance of tissue from the light along the line of sight [m]; 0: none.
+  std::vector<float> depth_, filled_;
   std::vector<Vec3f> positions_;
   std::vector<std::array<float, 4>> coordinates_;
   std::vector<Triangle> triangles_;

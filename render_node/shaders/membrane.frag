@@ -20,7 +20,7 @@ out vec4 fragment;
 
 // Ink of the planned line: dashes half a millimetre wide.
 float PlannedInk(vec2 m) {
-  float edge = 0.5 * (fwidth(m.x) + fwidth(m.y)) + 5e-5; // Before any branch: derivatives need the neighbouring fragments.
+  float edge = 0.5 * (fwidth(m.x) + fwidth(m.y)) + 5e-5; // Before any branch, which derivatives require.
   if (planned_points < 2 || any(lessThan(m, planned_box.xy)) || any(greaterThan(m, planned_box.zw))) return 0.0;
   float nearest = 1.0, along = 0.0, passed = 0.0;
   for (int i = 0; i + 1 < planned_points; ++i) {

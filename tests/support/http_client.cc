@@ -20,7 +20,7 @@ HttpConnection::HttpConnection(int port) : socket_(::socket(AF_INET, SOCK_STREAM
   address.sin_port = htons(static_cast<std::uint16_t>(port));
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   if (::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
-    throw std::runtime_error("nobody listens on port " + std::to_string(port));
+    throw std::runtime_error("no listener on port " + std::to_string(port));
   }
 }
 

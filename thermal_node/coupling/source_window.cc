@@ -180,8 +180,8 @@ void SourceWindow::SetContact(const Drive& drive) {
       const int k = j * kWindow + i;
       if (!(gap_[k] < kFarGap) || !(tissue_[k] > 0.0f)) continue;
       const float covered = Electrode::Covered(gap_[k]);
-      const float beyond =
-          std::max(gap_[k], 0.5f * (1.0f - covered));  // distance of the middle of the part that is not covered
+      // Distance of the middle of the part that is not covered [cells].
+      const float beyond = std::max(gap_[k], 0.5f * (1.0f - covered));
       const float rarer = std::max(1.0f - beyond * per_arc, 0.0f), fewer = std::max(1.0f - beyond * per_reach, 0.0f);
       const float wet = covered + (1.0f - covered) * kArcConductance * rarer * rarer;
       const float film = burning * (covered + (1.0f - covered) * fewer * fewer);

@@ -216,8 +216,8 @@ void ThermalSolver::QuarantineBadDamage(Tile* tile) {
     if (std::isfinite(s.omega_cell[k] + s.omega_collagen[k] + s.charred[k])) continue;
     s.omega_cell[k] = s.omega_collagen[k] = s.charred[k] = 0;
     field_.TakeOut(tile, k, kQuarantined, &ledger_.quarantined);
-    s.enthalpy[k] =
-        std::numeric_limits<float>::quiet_NaN();  // its heat is booked; NaN makes RefreshTheta() count the cell
+    // Its heat is booked; NaN makes RefreshTheta() count the cell.
+    s.enthalpy[k] = std::numeric_limits<float>::quiet_NaN();
   }
   field_.RefreshTheta(tile, &ledger_);
 }

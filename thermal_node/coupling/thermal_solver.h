@@ -157,8 +157,8 @@ class ThermalSolver {
   RemovedBox removed_;        ///< Cells removed by heat since the last commit.
   RemovedBox torn_;           ///< Cells removed by traction since the last commit; they do not count in the cut length.
   std::vector<Index> tears_;  ///< Edges to be severed in the next Step.
-  std::vector<std::pair<Index, Index>>
-      crack_;  ///< Pairs of torn edges of one triangle; a line of removed cells will join them.
+  /// Pairs of torn edges of one triangle; a line of removed cells will join them.
+  std::vector<std::pair<Index, Index>> crack_;
   CutMeter cut_meter_;
   Ledger ledger_;
   SolverFigures figures_;

@@ -51,8 +51,8 @@ class ToolPath {
   void Enter(std::uint32_t n);
 
   std::vector<Point> points_;
-  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>>
-      buckets_;  ///< Points by square of a grid; see BucketOf.
+  /// Points by square of a grid; see BucketOf.
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> buckets_;
   End end_;
 };
 

@@ -26,9 +26,8 @@ struct SurfaceMetric {
 
   [[nodiscard]] float area() const { return std::sqrt(ss * tt - st * st); }  ///< Rest area over material area.
 };
-inline constexpr float
-    kStretchMin = 0.5f,
-    kStretchMax = 2.0f;  ///< Limits of the stretch; they bound the rate of the explicit step on degenerate maps.
+/// Limits of the stretch; they bound the rate of the explicit step on degenerate maps.
+inline constexpr float kStretchMin = 0.5f, kStretchMax = 2.0f;
 inline constexpr int kMetricStep = 8;  ///< Spacing of the stored metric [cells].
 
 struct Sheet {

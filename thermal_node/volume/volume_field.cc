@@ -108,8 +108,8 @@ void VolumeField::AddSource(CellIndex cell, float heat_J_m3, float duration_s) {
   const int x = cell.ix % kBrickSpan, y = cell.iy % kBrickSpan;
   const int i = x / 3 * 2, j = y / 3 * 2, deepest = material_.fat_layers - 1;
   Brick* brick = Find(bx, by);
-  if (brick == nullptr ||
-      !brick->box.Holds(i, j, deepest)) {  // boxes have even borders, so the next row and column are inside as well
+  // Boxes have even borders, so the next row and column are inside as well.
+  if (brick == nullptr || !brick->box.Holds(i, j, deepest)) {
     if (heat_J_m3 < kLeastSource_K_s * duration_s * material_.rc[0]) return;
     brick = Wake(bx, by, {i, i + 2, j, j + 2, material_.fat_layers});
   }
