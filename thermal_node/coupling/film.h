@@ -35,6 +35,15 @@ inline constexpr float kHookHeatCapacity_J_K = 0.03f, kHookCools_s = 16.0f;
 /// Heat transfer from metal to the tissue that it touches, and across the film [W/m^2K]; assumed.
 inline constexpr float kHookContact_W_m2K = 2.0e4f, kHookFilm_W_m2K = 500.0f;
 
+/// Share of the film below which the regulation of the discharges is reset: the film has practically collapsed.
+inline constexpr float kCollapsedFilm = 0.05f;
+/// Least share of the film in which discharges burn, so that the regulation can recover; assumed.
+inline constexpr float kLeastBurning = 0.02f;
+/// Largest factor by which the burning share changes after one solve; damps the regulation. Assumed.
+inline constexpr float kBurningStep = 2.0f;
+/// Largest plausible |theta| of the metal in a checkpoint [K].
+inline constexpr float kHookThetaPlausible = 5000.0f;
+
 /// State of the interface of one electrode.
 struct Interface {
   float film = 0;        ///< Fraction of the footprint under which there is a film, 0 ... 1.
@@ -46,17 +55,18 @@ struct Interface {
   void Follow(float boiling, bool sustains, float dt_s) {
     const float target = sustains ? std::min(boiling / kBoilingForFilm, 1.0f) : 0.0f;
     film += (target - film) * (1.0f - std::exp(-dt_s / (target > film ? kFilmGrows_s : kFilmCollapses_s)));
-    if (film < 0.05f) burning = 1.0f;
+    if (film < kCollapsedFilm) burning = 1.0f;
   }
   /// Adjusts the burning fraction after a solve. @param across_V voltage across the film while the current is on [V
   /// rms].
   void Regulate(float across_V) {
     const float ratio = across_V / kStrike_V;
-    burning = std::clamp(burning * std::clamp(ratio * ratio, 0.5f, 2.0f), 0.02f, 1.0f);
+    burning = std::clamp(burning * std::clamp(ratio * ratio, 1.0f / kBurningStep, kBurningStep), kLeastBurning, 1.0f);
   }
   /// True for a state that the solver can have written.
   [[nodiscard]] bool IsPlausible() const {
-    return film >= 0.0f && film <= 1.0f && burning >= 0.0f && burning <= 1.0f && std::abs(hook_theta) <= 5000.0f;
+    return film >= 0.0f && film <= 1.0f && burning >= 0.0f && burning <= 1.0f &&
+           std::abs(hook_theta) <= kHookThetaPlausible;
   }
   void Cool(float dt_s) { hook_theta *= std::exp(-dt_s / kHookCools_s); }
 };
