@@ -84,19 +84,26 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
   made.touch = driver;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     const DeviceConfig& device = cart.devices[i];
-    if (!used[i] || device.kind == DeviceKind::kNone) continue;
+    if (!used[i]) continue;
     const Trocar trocar{scene.tools[i].p_WP.cast<double>(), scene.tools[i].shaft_length_m};
-    if (device.kind == DeviceKind::kSimulated) {
-      const WorkspaceMap map =
-          device.motion.empty() ? WorkspaceMap() : MapOf(cart, i, trocar.p_WP, "", trocars, &made.notes);
-      made.devices[i] = MakeSimulated(device, scene, trocar, i, map);
-      continue;
+    switch (device.kind) {
+      case DeviceKind::kNone:
+        break;
+      case DeviceKind::kSimulated: {
+        const WorkspaceMap map =
+            device.motion.empty() ? WorkspaceMap() : MapOf(cart, i, trocar.p_WP, "", trocars, &made.notes);
+        made.devices[i] = MakeSimulated(device, scene, trocar, i, map);
+        break;
+      }
+      case DeviceKind::kTouch: {
+        const std::string found = driver->serial(i), trouble = driver->Trouble(i);
+        const std::string& serial = found.empty() ? device.serial : found;
+        const WorkspaceMap map = MapOf(cart, i, trocar.p_WP, serial, trocars, &made.notes);
+        made.notes.push_back("tool " + std::to_string(i) + ": " + (trouble.empty() ? "Touch " + serial : trouble));
+        made.devices[i] = std::make_unique<TouchDevice>(driver, i, map, device.force_scale, RestingAttachPoint(trocar));
+        break;
+      }
     }
-    const std::string found = driver->serial(i), trouble = driver->Trouble(i);
-    const std::string& serial = found.empty() ? device.serial : found;
-    const WorkspaceMap map = MapOf(cart, i, trocar.p_WP, serial, trocars, &made.notes);
-    made.notes.push_back("tool " + std::to_string(i) + ": " + (trouble.empty() ? "Touch " + serial : trouble));
-    made.devices[i] = std::make_unique<TouchDevice>(driver, i, map, device.force_scale, RestingAttachPoint(trocar));
   }
   return made;
 }

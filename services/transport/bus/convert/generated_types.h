@@ -1,18 +1,8 @@
 // The generated type of each message. Included by services/transport/bus/convert and services/transport/bus/dds only.
 #pragma once
 
-#include "cauteryPubSubTypes.h"
-#include "contactPubSubTypes.h"
-#include "generatorPubSubTypes.h"
-#include "handlePubSubTypes.h"
-#include "healthPubSubTypes.h"
+#include "all_topics.h"  // Made by idl/CMakeLists.txt.
 #include "services/base/core/messages.h"
-#include "sessionPubSubTypes.h"
-#include "temperaturePubSubTypes.h"
-#include "thermal_eventPubSubTypes.h"
-#include "tissuePubSubTypes.h"
-#include "toolPubSubTypes.h"
-#include "topologyPubSubTypes.h"
 
 namespace fulcrum::bus {
 
