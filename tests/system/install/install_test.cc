@@ -6,6 +6,8 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <boost/property_tree/json_parser.hpp>
+#include <boost/property_tree/ptree.hpp>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +15,8 @@
 #include <memory>
 #include <optional>
 #include <regex>
+#include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -87,6 +91,57 @@ TEST_F(InstallTest, PackageSaysWhatItNeedsAndKeepsTheConfigurationOfTheLab) {
   for (const auto& entry : fs::recursive_directory_iterator(root_)) {
     if (!entry.is_regular_file() || entry.path().extension() == ".gz") continue;
     EXPECT_EQ(ReadFile(entry.path()).find(FULCRUM_BUILD_DIR), std::string::npos) << entry.path();
+  }
+}
+
+TEST_F(InstallTest, BillOfMaterialsNamesWhatIsLinkedAndCompiledIn) {
+  boost::property_tree::ptree bill;
+  ASSERT_NO_THROW(boost::property_tree::read_json(root_ / "usr/share/doc/fulcrum/fulcrum.spdx.json", bill));
+  EXPECT_EQ(bill.get<std::string>("spdxVersion"), "SPDX-2.3");
+  EXPECT_EQ(bill.get<std::string>("dataLicense"), "CC0-1.0");
+
+  std::map<std::string, std::string> ids, licences;  // by name; a part of the package is named as its program
+  std::set<std::string> known{"SPDXRef-DOCUMENT"};
+  for (const auto& [key, package] : bill.get_child("packages")) {
+    const auto name = package.get<std::string>("name"), id = package.get<std::string>("SPDXID");
+    EXPECT_TRUE(known.insert(id).second) << id << " is there twice";
+    EXPECT_FALSE(package.get<std::string>("versionInfo", "").empty()) << name;
+    if (id == "SPDXRef-Package-fulcrum" || id.starts_with("SPDXRef-Part-")) {
+      EXPECT_EQ(package.get<std::string>("licenseDeclared"), "NONE") << id;
+    } else {
+      EXPECT_TRUE(package.get<std::string>("externalRefs..referenceLocator").starts_with("pkg:deb/debian/")) << name;
+    }
+    if (id == "SPDXRef-Package-fulcrum") continue;
+    ids[name] = id;
+    licences[name] = package.get<std::string>("licenseDeclared");
+  }
+  std::set<std::string> relations;  // FROM TYPE TO
+  for (const auto& [key, relation] : bill.get_child("relationships")) {
+    const auto from = relation.get<std::string>("spdxElementId"), to = relation.get<std::string>("relatedSpdxElement");
+    EXPECT_TRUE(known.contains(from) && known.contains(to)) << from << " " << to;
+    relations.insert(from + " " + relation.get<std::string>("relationshipType") + " " + to);
+  }
+
+  // What dpkg-shlibdeps has found in the programs is there, too.
+  const std::string depends = Output("/usr/bin/dpkg-deb", {"-f", package_, "Depends"});
+  for (const std::string& word : testing::SplitWords(std::regex_replace(depends, std::regex(R"(\([^)]*\)|,)"), ""))) {
+    if (word == "|" || word.starts_with("systemd")) continue;
+    EXPECT_TRUE(relations.contains("SPDXRef-Package-fulcrum DEPENDS_ON " + ids[word])) << word;
+  }
+  for (const char* program : {"fulcrum", "physics_node", "recorder"}) {
+    EXPECT_TRUE(relations.contains(ids[program] + " DYNAMIC_LINK " + ids["libfastrtps2.9"])) << program;
+  }
+  EXPECT_TRUE(relations.contains(ids["render_node"] + " DYNAMIC_LINK " + ids["libopenscenegraph161"]));
+  EXPECT_TRUE(relations.contains(ids["physics_node"] + " STATIC_LINK " + ids["libeigen3-dev"]));
+
+  // CGAL is GPL and in one program only: a second one is a matter for THIRD_PARTY.md and its reader.
+  EXPECT_TRUE(std::regex_search(licences["libcgal-dev"], std::regex(R"(\bGPL-3\.0-or-later)")))
+      << licences["libcgal-dev"];
+  EXPECT_TRUE(relations.contains(ids["fulcrum_scene_mesh"] + " STATIC_LINK " + ids["libcgal-dev"]));
+  for (const auto& [name, id] : ids) {
+    if (!id.starts_with("SPDXRef-Part-") || name == "fulcrum_scene_mesh") continue;
+    EXPECT_EQ(relations.contains(id + " STATIC_LINK " + ids["libcgal-dev"]), name == "scene_compiler") << name;
+    EXPECT_EQ(relations.contains(id + " STATIC_LINK " + ids["fulcrum_scene_mesh"]), name == "scene_compiler") << name;
   }
 }
 
