@@ -6,25 +6,26 @@ namespace fulcrum::scene_compiler {
 namespace {
 
 constexpr const char* kUsage =
-    R"(scene_compiler: compiles a scene description into the file that the nodes map
+    R"(usage: scene_compiler SCENE.yaml --out FILE [options]
+       scene_compiler --info FILE
+       scene_compiler --source FILE
+       scene_compiler --list [DIR]
 
-  scene_compiler SCENE.yaml --out FILE [--data DIR] [--set SECTION.KEY=VALUE]... [--quiet]
-                                                                compile, then report quality
-  scene_compiler --info FILE                                    print the content and quality of a compiled scene
-  scene_compiler --source FILE                                  print the effective YAML of a compiled scene
-  scene_compiler --list [DIR]                                   list the scenes described in DIR (default: those shipped)
+Compiles a scene description into the file that the nodes map, then reports its quality.
 
-  --out FILE   compiled scene to write
-  --data DIR   folder that is searched first for the mesh files of the description (default: the description's folder)
-  --set        replace a parameter of physics, thermal, haptics, breathing or render in the description, or
-               script.power_W, the power of all uses of the generator; may be repeated
-  --quiet      print no progress and no report
-
-Example:
-  scene_compiler deploy/scenes/small.yaml --out small.fulcrum --set physics.grip_force_N=4
+Options:
+  --out FILE               the compiled scene
+  --data DIR               look here first for the mesh files that the description names
+  --set SECTION.KEY=VALUE  a parameter of physics, thermal, haptics, breathing or render other than the description
+                           has it, or script.power_W, the generator's setting; as often as needed
+  --quiet                  no progress and no report
+  --info FILE              print what a compiled scene holds
+  --source FILE            print the effective YAML that it was compiled from
+  --list                   print the scenes described in DIR (default: those shipped)
+  --help                   print this
 
 Keys of a description: services/scene/README.md.
-Exit codes: 0 done, 1 failure, 2 bad usage or input, 3 a compiled scene of another version.
+Exit code: 0 done, 1 failure, 2 bad usage or input, 3 a compiled scene of another version.
 )";
 
 }  // namespace

@@ -145,6 +145,32 @@ TEST_F(InstallTest, BillOfMaterialsNamesWhatIsLinkedAndCompiledIn) {
   }
 }
 
+TEST_F(InstallTest, EveryCommandHasAPageOfTheManual) {
+  const fs::path pages = root_ / "usr/share/man/man1";
+  ASSERT_TRUE(fs::exists(pages / "fulcrum.1.gz")) << "is help2man installed?";
+  const std::string help = Output(root_ / "usr/bin/fulcrum", {"--help"});
+  const std::string page = Output("/bin/gzip", {"-dc", pages / "fulcrum.1.gz"});
+  const std::regex command("\n  ([a-z-]+) +[A-Z]");
+  int commands = 0;
+  for (std::sregex_iterator found(help.begin(), help.end(), command), end; found != end; ++found, ++commands) {
+    const std::string name = (*found)[1];
+    EXPECT_TRUE(fs::exists(pages / ("fulcrum-" + name + ".1.gz"))) << name;
+    // A paragraph of its own, not a word among others.
+    const std::string tag = "\n.TP\n.B " + std::regex_replace(name, std::regex("-"), "\\-") + "\n";
+    EXPECT_NE(page.find(tag), std::string::npos) << name << "\n" << page;
+  }
+  EXPECT_GE(commands, 20) << help;
+  // Folders in the home of whoever built it are nobody else's.
+  const char* home = std::getenv("HOME");
+  for (const auto& entry : fs::directory_iterator(pages)) {
+    const std::string text = Output("/bin/gzip", {"-dc", entry.path()});
+    EXPECT_EQ(text.find(FULCRUM_BUILD_DIR), std::string::npos) << entry.path();
+    if (home != nullptr) {
+      EXPECT_EQ(text.find(home + std::string("/.")), std::string::npos) << entry.path();
+    }
+  }
+}
+
 TEST_F(InstallTest, UnitsPassTheCheckOfSystemd) {
   if (::access("/usr/bin/systemd-analyze", X_OK) != 0) GTEST_SKIP() << "systemd-analyze is not installed";
   // The units with the paths of this tree; those of the system itself come from where they are.
