@@ -1,5 +1,5 @@
 // The subcommands of `fulcrum`, one file each. Each takes the words after its name and throws InputError or
-// MismatchError for what the user can put right.
+// MismatchError for errors that the user can correct.
 #pragma once
 
 #include <boost/program_options.hpp>
@@ -37,53 +37,57 @@ ExitCode Version(const Words& words);
 
 struct CommandEntry {
   const char* name;
-  const char* usage;    ///< After "fulcrum ".
-  const char* purpose;  ///< One line.
+  const char* usage;    ///< Text after "fulcrum ".
+  const char* purpose;  ///< One sentence.
+  const char* example;  ///< Text after "fulcrum ".
   ExitCode (*run)(const Words&);
 };
 [[nodiscard]] std::span<const CommandEntry> Commands();
 
-/// Runs what the first word names: a subcommand, or another program of the installation, which then takes the place of
-/// this process. Throws InputError when there is no such command, and what the subcommand throws.
+/// Runs the command that the first word names: a subcommand, help, version, or another program of the installation,
+/// which then replaces this process. Throws InputError when there is no such command, and what the subcommand throws.
 ExitCode Dispatch(const Words& words);
 
-/// Options of one subcommand; "--help" is added. Named positional words come last, for example {"scene"}.
+/// Parsed options of one subcommand.
 struct Arguments {
   boost::program_options::variables_map values;
-  bool help = false;  ///< Help was asked for and printed.
+  bool help = false;  ///< --help was given, and the help was printed.
 };
+/// Parses the words of a subcommand; "--help" is added to its options. `positional` names the words without an option,
+/// for example {"scene"}. Throws InputError.
 [[nodiscard]] Arguments Parse(const char* command, const Words& words,
                               const boost::program_options::options_description& options,
                               const std::vector<const char*>& positional = {});
 
 /// Adds --domain.
 void AddDomain(boost::program_options::options_description* options);
-/// Its value. Throws InputError when it is out of range.
+/// Value of --domain. Throws InputError when it is out of range.
 [[nodiscard]] int DomainOf(const Arguments& arguments, int fallback);
 
 inline constexpr int kDefaultDomain = 7;
 
 /// Adds --cart.
 void AddCart(boost::program_options::options_description* options);
-/// Its value, else the cart of this machine if it has one; empty: everything is simulated.
+/// Value of --cart, else the cart file of this machine if it has one; empty: all hardware is simulated.
 [[nodiscard]] std::filesystem::path CartOf(const Arguments& arguments);
 
 /// The other programs of the installation.
 [[nodiscard]] std::span<const char* const> Programs();
 [[nodiscard]] bool IsProgram(const std::string& name);
-/// Goes on as one of them: its name, then its arguments. Throws InputError when it cannot be started.
+/// Replaces this process by one of them. @param words its name, then its arguments. Throws InputError when it cannot be
+/// started.
 [[noreturn]] void Become(const Words& words);
 
-/// Compiled scenes are kept here: beside the programs in a build tree, else in the user's cache.
+/// Folder of compiled scenes: beside the programs in a build tree, else in the user's cache.
 [[nodiscard]] std::filesystem::path SceneCache(const std::filesystem::path& programs);
-/// The user's folder for what a program keeps, as the XDG base directories have it: `variable`, or `fallback` in the
-/// home folder, and "fulcrum" in that.
+/// Folder "fulcrum" in an XDG base directory of the user: in `variable`, or else in `fallback` in the home folder.
 [[nodiscard]] std::filesystem::path UserFolder(const char* variable, const char* fallback);
-/// --database, and where it is without.
+/// Adds --database.
 void AddDatabase(boost::program_options::options_description* options);
+/// Value of --database, else the default file.
 [[nodiscard]] std::filesystem::path DatabaseOf(const Arguments& arguments);
 
-/// Sends a command to the supervisor of the domain and prints its answer. Throws InputError when none runs there.
+/// Sends a command to the supervisor of the domain and prints its reply. Throws InputError when none runs there.
 ExitCode Ask(int domain, const std::string& verb, const std::string& argument);
 
 }  // namespace fulcrum::supervisor::cli

@@ -1,4 +1,4 @@
-// From the words of the command line to the subcommand or program that they name.
+// Selection of the subcommand or program that the command line names.
 #include "services/apps/fulcrum/commands.h"
 #include "services/base/core/error.h"
 
@@ -23,7 +23,7 @@ ExitCode Dispatch(const Words& words) {
   if (IsProgram(words[0])) {
     Become(words);
   }
-  throw InputError("unknown command \"" + words[0] + "\"; see fulcrum --help");
+  throw InputError("unknown command \"" + words[0] + "\"; fulcrum --help lists the valid ones");
 }
 
 }  // namespace fulcrum::supervisor::cli

@@ -8,17 +8,17 @@ namespace fulcrum::supervisor::cli {
 namespace {
 
 void PrintCommands() {
-  std::puts("usage: fulcrum COMMAND [options]\n\nRuns and watches a Fulcrum cart.\n");
+  std::puts("usage: fulcrum COMMAND [options]\n\nRuns and supervises a Fulcrum cart.\n");
   std::size_t width = 0;
   for (const CommandEntry& entry : Commands()) {
     width = std::max(width, std::string_view(entry.name).size());
   }
-  // Two spaces behind the longest: help2man takes the words for a list by them.
+  // help2man makes a list of lines that have two spaces behind the name.
   for (const CommandEntry& entry : Commands()) {
     std::printf("  %-*s  %s\n", static_cast<int>(width), entry.name, entry.purpose);
   }
   std::puts(
-      "\nfulcrum PROGRAM ... runs another program of the installation, with options of its own (--help):\n"
+      "\nfulcrum PROGRAM ... runs another program of the installation with its own options (--help):\n"
       "handle_bridge calibrate, haptics_node calibrate-trocar, replayer, scene_compiler, or a node.\n\n"
       "Exit codes: 0 done, 1 failure, 2 bad use or configuration, 3 scene or schema mismatch, 4 device lost.");
 }

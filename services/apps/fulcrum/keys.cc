@@ -33,10 +33,10 @@ ExitCode Init(const std::filesystem::path& folder, int days, bool force) {
   const std::time_t now = std::time(nullptr);
   keys::MakeKeyFolder(folder, {now, now + days * kDay_s}, force);
   std::printf(
-      "%s: new keys for %zu participants, until %s\n\n"
-      "Next: put this into the cart file, and copy the folder, as it is, to every other host of the cart:\n\n"
+      "%s: new keys for %zu participants, valid until %s\n\n"
+      "Next: add this line to the cart file, and copy the folder unchanged to every other host of the cart:\n\n"
       "  security: {keys: %s}\n\n"
-      "Whoever has the folder can join. The authority's own key was not kept: nobody can add to it.\n",
+      "Anyone who has the folder can join. The authority's private key was not stored: no further keys can be made.\n",
       folder.c_str(), bus::kAccessRoles.size(), keys::DateOf(now + days * kDay_s).c_str(),
       std::filesystem::absolute(folder).lexically_normal().c_str());
   return ExitCode::kDone;
@@ -48,7 +48,7 @@ ExitCode Show(const std::filesystem::path& folder) {
   std::printf("%s: %s\n\n", folder.c_str(), keys::AuthorityName(folder).c_str());
   for (const keys::IdentityState& state : states) {
     const std::string until = !state.present           ? "not in this folder"
-                              : !state.problem.empty() ? "of no use, see fulcrum keys check"
+                              : !state.problem.empty() ? "unusable, see fulcrum keys check"
                                                        : "until " + DaysLeft(state.validity.until, now);
     std::printf("%-14s %s\n               writes %s\n               reads  %s\n", state.role->identity.data(),
                 until.c_str(), Labels(state.role->writes).c_str(), Labels(state.role->reads).c_str());
@@ -64,7 +64,7 @@ ExitCode Check(const std::filesystem::path& folder) {
       good = false;
       std::printf("✗ %s: %s\n", state.role->identity.data(), state.problem.c_str());
     } else if (!state.present) {
-      std::printf("– %s: not in this folder: cannot join from here\n", state.role->identity.data());
+      std::printf("– %s: not in this folder, so it cannot join from this host\n", state.role->identity.data());
     } else {
       std::printf("✓ %s until %s\n", state.role->identity.data(), DaysLeft(state.validity.until, now).c_str());
     }
@@ -78,15 +78,15 @@ ExitCode Keys(const Words& words) {
   constexpr int kMostDays = 3650;
   po::options_description options;
   options.add_options()("days", po::value<int>()->value_name("N")->default_value(365),
-                        "init: how long they hold, 1 to 3650")(
-      "force", "init: replace the keys that are there; every host of the cart then needs the new ones");
+                        "init: validity of the keys [days], 1 to 3650")(
+      "force", "init: replace existing keys; every host of the cart then needs the new ones");
   const Arguments arguments = Parse("keys", words, options, {"action", "folder"});
   if (arguments.help) {
     std::printf(
-        "\nDIR is %s unless given.\n\n"
+        "\nDefault of DIR: %s\n\n"
         "  init   make an authority and a certificate, key and permissions for every participant of a cart\n"
-        "  show   who is in a folder, until when, with which rights\n"
-        "  check  whether everybody in it could join now; exit code 2 if not\n\n"
+        "  show   list the participants of a folder with validity and rights\n"
+        "  check  check whether every participant in it can join now; exit code 2 if not\n\n"
         "A cart is secured by one line of its cart file: security: {keys: DIR}\n",
         keys::DefaultKeyFolder().c_str());
     return ExitCode::kDone;
@@ -101,7 +101,7 @@ ExitCode Keys(const Words& words) {
   if (action == "init") return Init(folder, days, values.count("force") != 0);
   if (action == "show") return Show(folder);
   if (action == "check") return Check(folder);
-  throw InputError("keys: \"" + action + "\"; valid: init, show, check; see fulcrum help keys");
+  throw InputError("keys: invalid action \"" + action + "\"; valid: init, show, check; see fulcrum help keys");
 }
 
 }  // namespace fulcrum::supervisor::cli

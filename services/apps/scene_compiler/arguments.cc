@@ -14,15 +14,19 @@ constexpr const char* kUsage =
 Compiles a scene description into the file that the nodes map, then reports its quality.
 
 Options:
-  --out FILE               the compiled scene
-  --data DIR               look here first for the mesh files that the description names
-  --set SECTION.KEY=VALUE  a parameter of physics, thermal, haptics, breathing or render other than the description
-                           has it, or script.power_W, the generator's setting; as often as needed
-  --quiet                  no progress and no report
-  --info FILE              print what a compiled scene holds
-  --source FILE            print the effective YAML that it was compiled from
-  --list                   print the scenes described in DIR (default: those shipped)
+  --out FILE               compiled scene to write
+  --data DIR               folder that is searched first for the mesh files of the description (default: the
+                           description's folder)
+  --set SECTION.KEY=VALUE  replace a parameter of physics, thermal, haptics, breathing or render in the description, or
+                           script.power_W, the power of all uses of the generator; may be repeated
+  --quiet                  print no progress and no report
+  --info FILE              print the content and quality of a compiled scene
+  --source FILE            print the effective YAML of a compiled scene
+  --list                   list the scenes described in DIR (default: those shipped)
   --help                   print this
+
+Example:
+  scene_compiler deploy/scenes/small.yaml --out small.fulcrum --set physics.grip_force_N=4
 
 Keys of a description: services/scene/README.md.
 Exit code: 0 done, 1 failure, 2 bad usage or input, 3 a compiled scene of another version.
