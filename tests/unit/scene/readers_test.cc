@@ -206,7 +206,7 @@ const Fault kFaults[] = {
     {"gmsh22_ascii", "1 1 2 1 1", "1 1 2000000 1 1", {"2000000 tags"}},
     {"gmsh41_ascii", "2 5 7 19", "9 5 7 19", {"'$EndNodes' where the dimension of an entity should be"}},
     {"gmsh41_ascii", "2 5 7 19", "2 4 7 19", {"a block of 3; valid: at most the 2"}},
-    {"gmsh41_ascii", "2 5 7 19", "2 6 7 19", {"hold 1 fewer"}},
+    {"gmsh41_ascii", "2 5 7 19", "2 6 7 19", {"contain 1 fewer"}},
     {"gmsh41_ascii", "3 1 4 2", "3 1 5 2", {"kind 5", "Split hexahedra"}},
     {"gmsh41_ascii", "1 1 1 2", "7 1 1 2", {"dimension 7; valid: 0 to 3"}},
     {"vtk_grid_ascii", "3.0", "9.0", {"line 1", "valid: '# vtk DataFile Version 1.0' to 5.x"}},

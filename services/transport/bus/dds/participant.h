@@ -71,8 +71,8 @@ class DdsParticipant {
 
   /// Whether a participant of that name is on the bus.
   [[nodiscard]] bool Knows(const std::string& name) const;
-  /// Whether all outputs of this participant are matched with readers of a participant of that name. Those readers match
-  /// sooner or later than this side does: see PeersRead.
+  /// Whether all outputs of this participant are matched with readers of a participant of that name. Those readers
+  /// match sooner or later than this side does: see PeersRead.
   [[nodiscard]] bool IsReadBy(const std::string& name) const;
   /// Address of this participant, unique over all hosts: 24 hexadecimal digits.
   [[nodiscard]] std::string address() const;
