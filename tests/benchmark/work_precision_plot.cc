@@ -156,7 +156,9 @@ std::string WorkPrecisionSvg(const std::string& heading, const std::vector<std::
   Svg svg;
   const double height = kHeight + (legend ? kLegendLine * static_cast<double>(families.size()) + 4 : 0);
   const double width = kWidth * static_cast<double>(titles.size());
-  svg.Raw("<svg xmlns='http://www.w3.org/2000/svg' width='" + Number(width) + "' height='" + Number(height) +
+  const auto pixels = [](double value) { return std::to_string(std::lround(value)); };
+  svg.Raw("<svg xmlns='http://www.w3.org/2000/svg' width='" + pixels(width) + "' height='" + pixels(height) +
+          "' viewBox='0 0 " + pixels(width) + " " + pixels(height) +
           "' font-family='sans-serif'>\n<rect width='100%' height='100%' fill='white'/>\n");
   svg.Text(width / 2, 24, "middle", 16, "#111", heading);
   for (std::size_t panel = 0; panel < titles.size(); ++panel) {

@@ -106,8 +106,10 @@ class Labels {
 
 std::string LagSvg(const std::vector<LagPoint>& points) {
   std::string svg =
-      Format("<svg xmlns='http://www.w3.org/2000/svg' width='%.0f' height='%.0f' font-family='sans-serif'>\n",
-             2 * kWidth, kHeight) +
+      Format(
+          "<svg xmlns='http://www.w3.org/2000/svg' width='%.0f' height='%.0f' viewBox='0 0 %.0f %.0f' "
+          "font-family='sans-serif'>\n",
+          2 * kWidth, kHeight, 2 * kWidth, kHeight) +
       "<rect width='100%' height='100%' fill='white'/>\n" +
       Text(kWidth, 24, "middle", 16, "#111", "Jaw angle from counts of 1.72 deg: error against lag (shaded: target)");
   for (const Panel panel : {Panel{0}, Panel{1}}) {

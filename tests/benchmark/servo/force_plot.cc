@@ -115,8 +115,10 @@ std::string ForceErrorSvg(const std::vector<ForcePanel>& panels) {
   const auto rows = static_cast<int>((panels.size() + kColumns - 1) / kColumns);
   const double width = kColumns * kPanelWidth, height = kHead + rows * kPanelHeight;
   std::string out;
-  Append(&out, "<svg xmlns='http://www.w3.org/2000/svg' width='%.0f' height='%.0f' font-family='sans-serif'>\n", width,
-         height);
+  Append(&out,
+         "<svg xmlns='http://www.w3.org/2000/svg' width='%.0f' height='%.0f' viewBox='0 0 %.0f %.0f' "
+         "font-family='sans-serif'>\n",
+         width, height, width, height);
   out += "<rect width='100%' height='100%' fill='white'/>\n";
   Append(&out, "<text x='%.0f' y='26' text-anchor='middle' font-size='16' fill='#111'>%s</text>\n", width / 2,
          "Force error [% of the RMS force], 1 kHz servo. Lower row: physics is wrong about stiffness and viscosity");
