@@ -9,6 +9,7 @@ execute_process(
 
 # help2man knows a synopsis by its capital and further lines of it by "or:", and a term by the two spaces behind it.
 string(REGEX REPLACE "^usage:" "Usage:" help "${help}")
+string(REPLACE "\nExample:\n" "\nExamples:\n" help "${help}")
 string(REGEX REPLACE "\n       ([a-z_]+ [A-Z-])" "\n  or:  \\1" help "${help}")
 string(REGEX REPLACE "\n(  --[a-z-]+ [^ \n]+( \\(=[^)\n]*\\))?) ([^ (\n])" "\n\\1  \\3" help "${help}")
 file(MAKE_DIRECTORY ${FOLDER})
