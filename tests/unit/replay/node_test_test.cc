@@ -81,7 +81,7 @@ TEST(Assertions, BadOnesAreRefusedWithThePlaceAndTheGrammar) {
       {"cut_length_mm > 1e999", "character 17:", "out of range"},
       {"cut_length_mm > 0x10", "character 18:", "text after the number"},
       {"cut_length_mm > 30 mm", "character 20:", "text after the number"},
-      {"a > 1 && b < 2", "character 7:", "once for each"},
+      {"a > 1 && b < 2", "character 7:", "one --assert for each"},
       {"a < 1 < 2", "character 7:", "text after the number"},
   };
   for (const Case& c : cases) {
