@@ -12,9 +12,6 @@ namespace {
 constexpr double kTriangleShare = 8.0 / 9.0;
 constexpr double kTetShare = 5.0 / 6.0;
 
-/// Young's modulus of the fat between membrane and organ, which the bindings stand for [Pa]. Modes with ElasticModel
-/// use PhysicsParams::fat_youngs_modulus_Pa.
-constexpr double kFatModulus = 3.0e3;
 /// Least mean length of a binding in the stiffness of the fat [m]; as kLeastBindingLength of ElasticModel.
 constexpr double kLeastFatLength = 1e-3;
 
@@ -67,8 +64,8 @@ ElasticForce::ElasticForce(const TissueScene& scene, const TissueModel* model, c
       length += binding.rest_length;
     }
     const auto count = static_cast<double>(scene.bindings.size());
-    binding_stiffness_ =
-        static_cast<float>(kFatModulus * (sheet_area / count) / std::max(length / count, kLeastFatLength));
+    binding_stiffness_ = static_cast<float>(static_cast<double>(scene_.physics.fat_youngs_modulus_Pa) *
+                                            (sheet_area / count) / std::max(length / count, kLeastFatLength));
   }
 }
 

@@ -49,12 +49,8 @@ PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::Ch
       ports_(ports),
       checkpoint_(checkpoint),
       simulation_(scene, threads),
-      frame_stamper_(epoch_ns),
-      contact_stamper_(epoch_ns),
-      cautery_stamper_(epoch_ns),
-      tear_stamper_(epoch_ns),
-      manifest_stamper_(epoch_ns),
-      hook_(FindHook(scene)) {
+      hook_(FindHook(scene)),
+      stampers_(epoch_ns) {
   for (ToolInput& input : inputs_) {
     // Until the first HandleState, between the angles for closing and opening: jaws neither grasp nor release.
     input.pose.jaw_rad = 0.5f * (scene.physics.grasp_close_rad + scene.physics.grasp_open_rad);
@@ -63,7 +59,7 @@ PhysicsNode::PhysicsNode(const SceneView& scene, const Ports& ports, runtime::Ch
     return;
   }
   if (const auto latest = checkpoint_->Latest()) {
-    restored_ = Restore(latest->payload);
+    restart_.restored = Restore(latest->payload);
   }
 }
 
@@ -73,9 +69,9 @@ bool PhysicsNode::Restore(std::span<const std::byte> checkpoint) {
     return false;
   }
   max_displacement_m_ = state->max_displacement_m;
-  contact_time_s_ = state->contact_time_s;
-  catch_up_steps_ = std::max(1, static_cast<int>(std::lround(kCatchUp_s / scene_.physics.dt_s)));
-  saved_tears_ = simulation_.tears().torn_count();
+  time_.contact_s = state->contact_time_s;
+  restart_.catch_up_steps = std::max(1, static_cast<int>(std::lround(kCatchUp_s / scene_.physics.dt_s)));
+  tear_counts_.saved = simulation_.tears().torn_count();
   const SimulationMemory memory = simulation_.Save();
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     if (memory.known[i]) {
@@ -86,7 +82,7 @@ bool PhysicsNode::Restore(std::span<const std::byte> checkpoint) {
 }
 
 void PhysicsNode::Follow(const Tick& tick) {
-  last_index_ = tick.index;
+  ticks_.last_index = tick.index;
   // Inputs are not applied before this process leads; from then on it behaves as a new process.
   tool_states_.Take(&ports_.tools);
   handle_states_.Take(&ports_.handles);
@@ -94,19 +90,18 @@ void PhysicsNode::Follow(const Tick& tick) {
 }
 
 bool PhysicsNode::TakeOver(std::span<const std::byte> other, const Tick& tick) {
-  frame_stamper_ = contact_stamper_ = cautery_stamper_ = tear_stamper_ = manifest_stamper_ =
-      bus::Stamper(tick.stamp_ns);
-  first_index_ = tick.index;
+  stampers_ = Stampers(tick.stamp_ns);
+  ticks_.first_index = tick.index;
   const auto own = checkpoint_ == nullptr ? std::nullopt : checkpoint_->Latest();
   const bool own_is_newer = own && CheckpointSteps(own->payload) > CheckpointSteps(other);
-  restored_ = Restore(own_is_newer ? own->payload : other);
-  return restored_;
+  restart_.restored = Restore(own_is_newer ? own->payload : other);
+  return restart_.restored;
 }
 
 /// Poses at `now_ns`, between the two samples around it.
 void PhysicsNode::TakeTools(std::int64_t now_ns) {
   if (tool_states_.empty()) {
-    contact_time_s_ = step_time_s_;
+    time_.contact_s = time_.step_s;
     return;
   }
   tool_states_.DropBefore(now_ns);
@@ -115,10 +110,11 @@ void PhysicsNode::TakeTools(std::int64_t now_ns) {
   const std::int64_t begin = before.stamp.stamp_ns, end = after.stamp.stamp_ns;
   const float u =
       end > begin ? std::clamp(static_cast<float>(now_ns - begin) / static_cast<float>(end - begin), 0.0f, 1.0f) : 0.0f;
-  const bool is_new = before.stamp.sequence != tool_before_.sequence || before.stamp.epoch != tool_before_.epoch;
-  tool_before_ = before.stamp;
-  tool_after_ = after.stamp;
-  pose_ns_ = begin + static_cast<std::int64_t>(u * static_cast<float>(end - begin));
+  const bool is_new =
+      before.stamp.sequence != used_.tool_before.sequence || before.stamp.epoch != used_.tool_before.epoch;
+  used_.tool_before = before.stamp;
+  used_.tool_after = after.stamp;
+  used_.pose_ns = begin + static_cast<std::int64_t>(u * static_cast<float>(end - begin));
   const std::array<ToolInput, kMaxTools> last = inputs_;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolSample &a = before.tools[i], &b = after.tools[i];
@@ -137,17 +133,17 @@ void PhysicsNode::TakeTools(std::int64_t now_ns) {
 }
 
 void PhysicsNode::CatchUp(const std::array<ToolInput, kMaxTools>& last) {
-  const double behind_s = step_time_s_ - contact_time_s_;
-  if (catch_up_steps_ == 0 || !(behind_s > 0 && behind_s < kLongestOutage_s)) {
-    catch_up_steps_ = 0;
-    contact_time_s_ = step_time_s_;
+  const double behind_s = time_.step_s - time_.contact_s;
+  if (restart_.catch_up_steps == 0 || !(behind_s > 0 && behind_s < kLongestOutage_s)) {
+    restart_.catch_up_steps = 0;
+    time_.contact_s = time_.step_s;
     return;
   }
   // Equal parts of the present delay and of the time that passes until the last of these steps.
-  const double dt = static_cast<double>(scene_.physics.dt_s), steps = catch_up_steps_--;
+  const double dt = static_cast<double>(scene_.physics.dt_s), steps = restart_.catch_up_steps--;
   const double advance_s = std::min(behind_s, (behind_s + (steps - 1) * dt) / steps);
   const auto share = static_cast<float>(advance_s / behind_s);
-  contact_time_s_ += advance_s;
+  time_.contact_s += advance_s;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolPose &from = last[i].pose, &to = inputs_[i].pose;
     if (inputs_[i].present && last[i].present && (to.p_WT - from.p_WT).norm() < kCatchUpMost_m) {
@@ -162,7 +158,7 @@ void PhysicsNode::TakeHandles(std::int64_t now_ns) {
   }
   handle_states_.DropBefore(now_ns);
   const HandleState& state = handle_states_.before();
-  handle_stamp_ = state.stamp;
+  used_.handle = state.stamp;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const HandleSample& handle = state.handles[i];
     if (handle.present && handle.quality > 0.0f) {
@@ -177,45 +173,47 @@ void PhysicsNode::TakeInputs(const Tick& tick) {
   double step_s = tick.session_time_s;
   if (tick.dt_s > 0) {
     const double latest = std::floor(tick.session_time_s / tick.dt_s + kRoundingTicks);
-    step_ = ticks_ == 0 ? latest : std::clamp(step_ + static_cast<double>(periods_), latest - 1, latest);
-    step_s = step_ * tick.dt_s;
+    time_.k =
+        ticks_.count == 0 ? latest : std::clamp(time_.k + static_cast<double>(ticks_.periods), latest - 1, latest);
+    step_s = time_.k * tick.dt_s;
   }
   const auto now_ns = tick.stamp_ns - static_cast<std::int64_t>(1e9 * (tick.session_time_s - step_s));
-  step_time_s_ = std::max(step_s, 0.0);
+  time_.step_s = std::max(step_s, 0.0);
   tool_states_.Take(&ports_.tools);
   handle_states_.Take(&ports_.handles);
-  start_ns_ = ticks_ == 0 ? tick.stamp_ns : start_ns_;
-  waits_ = restored_ && (tool_states_.empty() || handle_states_.empty()) && tick.stamp_ns - start_ns_ < kWaitNs;
-  if (!waits_) {
+  ticks_.start_ns = ticks_.count == 0 ? tick.stamp_ns : ticks_.start_ns;
+  restart_.waits = restart_.restored && (tool_states_.empty() || handle_states_.empty()) &&
+                   tick.stamp_ns - ticks_.start_ns < kWaitNs;
+  if (!restart_.waits) {
     TakeTools(now_ns);
     TakeHandles(now_ns);
   }
   if (ports_.topology.TakeLatest(&topology_state_) || topology_waits_) {
     const int edits = topology_state_.scene_hash == scene_.hash ? simulation_.ApplyTopology(topology_state_) : -1;
     if (edits < 0) {
-      topology_refused_.fetch_add(1, std::memory_order_relaxed);
+      figures_.topology_refused.fetch_add(1, std::memory_order_relaxed);
     } else {
-      topology_edits_.fetch_add(static_cast<std::uint64_t>(edits), std::memory_order_relaxed);
+      figures_.topology_edits.fetch_add(static_cast<std::uint64_t>(edits), std::memory_order_relaxed);
     }
   }
   topology_waits_ = false;
   if (ports_.open_cells.TakeLatest(&open_cells_) && !simulation_.SetOpenCells(open_cells_)) {
-    topology_refused_.fetch_add(1, std::memory_order_relaxed);
+    figures_.topology_refused.fetch_add(1, std::memory_order_relaxed);
   }
 }
 
 /// A skipped period means that the last step ran late: a cheaper preset is set for some time. The first step, which
 /// initialises the caches, does not count. A replay skips the recorded periods, so it does not depend on its machine.
 void PhysicsNode::AdaptPreset(const Tick& tick) {
-  const bool late = ticks_ > 1 && tick.index > last_index_ + 1;
-  periods_ = tick.index > last_index_ ? tick.index - last_index_ : 1;
-  last_index_ = tick.index;
-  ticks_in_time_ = late ? 0 : ticks_in_time_ + 1;
-  const std::uint32_t cheaper = cheaper_.load(std::memory_order_relaxed);
+  const bool late = ticks_.count > 1 && tick.index > ticks_.last_index + 1;
+  ticks_.periods = tick.index > ticks_.last_index ? tick.index - ticks_.last_index : 1;
+  ticks_.last_index = tick.index;
+  ticks_.in_time = late ? 0 : ticks_.in_time + 1;
+  const std::uint32_t cheaper = figures_.cheaper.load(std::memory_order_relaxed);
   if (late) {
-    cheaper_.store(simulation_.SetCheaper(cheaper + 1), std::memory_order_relaxed);
-  } else if (cheaper > 0 && ticks_in_time_ % kRecoveryTicks == 0) {
-    cheaper_.store(simulation_.SetCheaper(cheaper - 1), std::memory_order_relaxed);
+    figures_.cheaper.store(simulation_.SetCheaper(cheaper + 1), std::memory_order_relaxed);
+  } else if (cheaper > 0 && ticks_.in_time % kRecoveryTicks == 0) {
+    figures_.cheaper.store(simulation_.SetCheaper(cheaper - 1), std::memory_order_relaxed);
   }
 }
 
@@ -223,7 +221,7 @@ void PhysicsNode::Step(const Tick& tick) {
   AdaptPreset(tick);
   TakeInputs(tick);
   const StepReport report = simulation_.Step(inputs_);
-  asleep_ticks_.fetch_add(report.asleep ? 1 : 0, std::memory_order_relaxed);
+  figures_.asleep_ticks.fetch_add(report.asleep ? 1 : 0, std::memory_order_relaxed);
   PublishContacts(tick);
   PublishCautery(tick);
   PublishFrame(tick);
@@ -233,54 +231,54 @@ void PhysicsNode::Step(const Tick& tick) {
   PublishManifest(tick);
   SaveCheckpoint();
   PublishTears(tick);
-  ++ticks_;
+  ++ticks_.count;
 }
 
 void PhysicsNode::PublishContacts(const Tick& tick) {
   // Without readers only where the solver provides the forces: otherwise slip needs those of the contact probe.
   if (scene_.physics.mode == PhysicsMode::kAccurate && !ports_.contacts.has_readers()) {
     for (std::uint32_t i = 0; i < kMaxTools; ++i) {
-      force_N_[i].store(simulation_.solver_force(i).norm(), std::memory_order_relaxed);
+      figures_.force_N[i].store(simulation_.solver_force(i).norm(), std::memory_order_relaxed);
     }
     return;
   }
   ContactModel model;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     model.devices[i] = simulation_.Contacts(i);
-    force_N_[i].store(simulation_.force(i).norm(), std::memory_order_relaxed);
+    figures_.force_N[i].store(simulation_.force(i).norm(), std::memory_order_relaxed);
   }
   // The servo dates the model by the tool sample, so there is no model without one.
-  if (tool_before_.sequence == 0 || !ports_.contacts.has_readers()) {
+  if (used_.tool_before.sequence == 0 || !ports_.contacts.has_readers()) {
     return;
   }
-  model.stamp = contact_stamper_.Next(tick.stamp_ns);
-  model.tool_sequence = tool_before_.sequence;
-  model.tool_stamp_ns = pose_ns_;
+  model.stamp = stampers_.contact.Next(tick.stamp_ns);
+  model.tool_sequence = used_.tool_before.sequence;
+  model.tool_stamp_ns = used_.pose_ns;
   model.physics_dt_s = scene_.physics.dt_s;
   ports_.contacts.Write(model);
 }
 
 void PhysicsNode::PublishCautery(const Tick& tick) {
   // While waiting after a restart the pose is unknown; a sample without contact would leave a bridge in the slit.
-  if (hook_ == kMaxTools || waits_ || !ports_.cautery.has_readers()) {
+  if (hook_ == kMaxTools || restart_.waits || !ports_.cautery.has_readers()) {
     return;
   }
   CauteryContact contact = simulation_.Cautery(hook_);
-  contact.stamp = cautery_stamper_.Next(tick.stamp_ns);
-  contact.session_time_s = contact_time_s_;
+  contact.stamp = stampers_.cautery.Next(tick.stamp_ns);
+  contact.session_time_s = time_.contact_s;
   contact.topology_revision = simulation_.model().revision();
   ports_.cautery.Write(contact);
 }
 
 void PhysicsNode::PublishFrame(const Tick& tick) {
-  const bool moved = frame_version_ != simulation_.state_version();
-  if (!ports_.frames.has_readers() || (!moved && ticks_ % kSlowTicks != 0)) {
+  const bool moved = versions_.frame != simulation_.state_version();
+  if (!ports_.frames.has_readers() || (!moved && ticks_.count % kSlowTicks != 0)) {
     return;
   }
-  frame_version_ = simulation_.state_version();
+  versions_.frame = simulation_.state_version();
   ports_.frames.WriteInPlace([&](TissueFrame::View view) {
     FillFrame(tick, view);
-    view.header.stamp = frame_stamper_.Next(tick.stamp_ns);
+    view.header.stamp = stampers_.frame.Next(tick.stamp_ns);
   });
 }
 
@@ -288,8 +286,8 @@ void PhysicsNode::FillFrame(const Tick& tick, TissueFrame::View view) const {
   TissueFrameHeader& header = view.header;
   header.scene_hash = scene_.hash;
   header.topology_revision = simulation_.model().revision();
-  header.tool_sequence = tool_before_.sequence;
-  header.handle_sequence = handle_stamp_.sequence;
+  header.tool_sequence = used_.tool_before.sequence;
+  header.handle_sequence = used_.handle.sequence;
   header.session_time_s = tick.session_time_s;
   header.simulated_time_s = simulation_.simulated_time_s();
   header.vertex_count = simulation_.particles().particle_count();
@@ -304,111 +302,113 @@ void PhysicsNode::PublishManifest(const Tick& tick) {
   if (!ports_.manifests.has_readers()) {
     return;
   }
-  if (hash_version_ != simulation_.state_version()) {
-    hash_version_ = simulation_.state_version();
+  if (versions_.hash != simulation_.state_version()) {
+    versions_.hash = simulation_.state_version();
     state_hash_ = simulation_.StateHash();
   }
-  manifest_.stamp = manifest_stamper_.Next(tick.stamp_ns);
+  manifest_.stamp = stampers_.manifest.Next(tick.stamp_ns);
   manifest_.node = NodeId::kPhysics;
-  manifest_.tick = tick.index - first_index_;
+  manifest_.tick = tick.index - ticks_.first_index;
   manifest_.session_time_s = tick.session_time_s;
   manifest_.state_hash = state_hash_;
   const auto consumed = [](TopicId topic, const Stamp& stamp) {
     return ConsumedInput{topic, stamp.epoch, stamp.sequence};
   };
-  manifest_.consumed = {consumed(TopicId::kToolState, tool_before_), consumed(TopicId::kToolState, tool_after_),
-                        consumed(TopicId::kHandleState, handle_stamp_),
+  manifest_.consumed = {consumed(TopicId::kToolState, used_.tool_before),
+                        consumed(TopicId::kToolState, used_.tool_after), consumed(TopicId::kHandleState, used_.handle),
                         consumed(TopicId::kTopologyState, topology_state_.stamp),
                         consumed(TopicId::kOpenCells, open_cells_.stamp)};
   ports_.manifests.Write(manifest_);
 }
 
 void PhysicsNode::Measure() {
-  quarantined_.store(simulation_.quarantined(), std::memory_order_relaxed);
-  grasped_.store(static_cast<std::uint32_t>(simulation_.grasp(0).held().size() + simulation_.grasp(1).held().size()),
-                 std::memory_order_relaxed);
-  torn_edges_.store(simulation_.tears().torn_count(), std::memory_order_relaxed);
-  stretch_.store(simulation_.tears().largest_stretch(), std::memory_order_relaxed);
-  largest_stretch_.store(simulation_.tears().largest_stretch_ever(), std::memory_order_relaxed);
+  figures_.quarantined.store(simulation_.quarantined(), std::memory_order_relaxed);
+  figures_.grasped.store(
+      static_cast<std::uint32_t>(simulation_.grasp(0).held().size() + simulation_.grasp(1).held().size()),
+      std::memory_order_relaxed);
+  figures_.torn_edges.store(simulation_.tears().torn_count(), std::memory_order_relaxed);
+  figures_.stretch.store(simulation_.tears().largest_stretch(), std::memory_order_relaxed);
+  figures_.largest_stretch.store(simulation_.tears().largest_stretch_ever(), std::memory_order_relaxed);
   std::uint32_t limited = 0;
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
     const bool from_solver = scene_.physics.mode == PhysicsMode::kAccurate;
     const float force = (from_solver ? simulation_.solver_force(i) : simulation_.force(i)).norm();
     // Forces of the contact probe are limited before its low-pass filter.
     if (force >= (from_solver ? ContactProbe::kForceCap_N : kFilteredCapShare * ContactProbe::kForceCap_N)) {
-      limited_until_[i] = ticks_ + kWarnTicks;
+      limited_until_[i] = ticks_.count + kWarnTicks;
     }
-    limited |= limited_until_[i] > ticks_ ? 1u << i : 0u;
+    limited |= limited_until_[i] > ticks_.count ? 1u << i : 0u;
   }
-  limited_.store(limited, std::memory_order_relaxed);
-  if (ticks_ % kSlowTicks != kSlowTicks / 2 || measured_version_ == simulation_.state_version()) {
+  figures_.limited.store(limited, std::memory_order_relaxed);
+  if (ticks_.count % kSlowTicks != kSlowTicks / 2 || versions_.measured == simulation_.state_version()) {
     return;
   }
-  measured_version_ = simulation_.state_version();
+  versions_.measured = simulation_.state_version();
   const float displacement = simulation_.MaxDisplacement();
   max_displacement_m_ = std::max(max_displacement_m_, displacement);
-  displacement_mm_.store(1e3f * displacement, std::memory_order_relaxed);
-  max_displacement_mm_.store(1e3f * max_displacement_m_, std::memory_order_relaxed);
+  figures_.displacement_mm.store(1e3f * displacement, std::memory_order_relaxed);
+  figures_.max_displacement_mm.store(1e3f * max_displacement_m_, std::memory_order_relaxed);
 }
 
 void PhysicsNode::SaveCheckpoint() {
   const std::uint32_t torn = simulation_.tears().torn_count();
-  const bool due = torn != saved_tears_ || (ticks_ % kSlowTicks == 0 && saved_version_ != simulation_.state_version());
+  const bool due =
+      torn != tear_counts_.saved || (ticks_.count % kSlowTicks == 0 && versions_.saved != simulation_.state_version());
   if (checkpoint_ == nullptr || !due) {
     return;
   }
-  saved_tears_ = torn;
-  saved_version_ = simulation_.state_version();
-  checkpoint_->Commit(WriteCheckpoint(simulation_, {max_displacement_m_, contact_time_s_}, checkpoint_->Begin()));
+  tear_counts_.saved = torn;
+  versions_.saved = simulation_.state_version();
+  checkpoint_->Commit(WriteCheckpoint(simulation_, {max_displacement_m_, time_.contact_s}, checkpoint_->Begin()));
 }
 
 /// After the checkpoint, so that a published tear survives this process.
 void PhysicsNode::PublishTears(const Tick& tick) {
   const TearWatch& tears = simulation_.tears();
-  if (tears.torn_count() == published_tears_) {
+  if (tears.torn_count() == tear_counts_.published) {
     return;
   }
-  tear_state_.stamp = tear_stamper_.Next(tick.stamp_ns);
+  tear_state_.stamp = stampers_.tear.Next(tick.stamp_ns);
   tear_state_.scene_hash = scene_.hash;
   tear_state_.rows = scene_.membrane.rows;
   tear_state_.cols = scene_.membrane.cols;
   tear_state_.torn_edges.assign(tears.torn().begin(), tears.torn().end());
   // Repeated in the next tick if it was not sent.
   if (ports_.tears.Write(tear_state_)) {
-    published_tears_ = tears.torn_count();
+    tear_counts_.published = tears.torn_count();
   }
 }
 
 void PhysicsNode::FillHealth(Health* health) const {
   const auto add = [health](const char* name, double value) { health->metrics.push_back({name, value}); };
-  add("displacement_mm", displacement_mm_.load(std::memory_order_relaxed));
-  add("max_displacement_mm", max_displacement_mm_.load(std::memory_order_relaxed));
-  add("grasped_particles", grasped_.load(std::memory_order_relaxed));
-  add("quarantined", static_cast<double>(quarantined_.load(std::memory_order_relaxed)));
-  add("tissue_force0_N", force_N_[0].load(std::memory_order_relaxed));
-  add("tissue_force1_N", force_N_[1].load(std::memory_order_relaxed));
-  add("asleep_ticks", static_cast<double>(asleep_ticks_.load(std::memory_order_relaxed)));
-  add("topology_edits", static_cast<double>(topology_edits_.load(std::memory_order_relaxed)));
-  add("torn_edges", torn_edges_.load(std::memory_order_relaxed));
-  add("largest_stretch", largest_stretch_.load(std::memory_order_relaxed));
+  add("displacement_mm", figures_.displacement_mm.load(std::memory_order_relaxed));
+  add("max_displacement_mm", figures_.max_displacement_mm.load(std::memory_order_relaxed));
+  add("grasped_particles", figures_.grasped.load(std::memory_order_relaxed));
+  add("quarantined", static_cast<double>(figures_.quarantined.load(std::memory_order_relaxed)));
+  add("tissue_force0_N", figures_.force_N[0].load(std::memory_order_relaxed));
+  add("tissue_force1_N", figures_.force_N[1].load(std::memory_order_relaxed));
+  add("asleep_ticks", static_cast<double>(figures_.asleep_ticks.load(std::memory_order_relaxed)));
+  add("topology_edits", static_cast<double>(figures_.topology_edits.load(std::memory_order_relaxed)));
+  add("torn_edges", figures_.torn_edges.load(std::memory_order_relaxed));
+  add("largest_stretch", figures_.largest_stretch.load(std::memory_order_relaxed));
   for (std::uint32_t i = 0; i < kMaxTools; ++i) {
-    if ((limited_.load(std::memory_order_relaxed) >> i & 1u) != 0) {
+    if ((figures_.limited.load(std::memory_order_relaxed) >> i & 1u) != 0) {
       health->last_error = "force on tool " + std::to_string(i) + " limited to " +
                            std::to_string(static_cast<int>(ContactProbe::kForceCap_N)) + " N";
     }
   }
-  const float limit = scene_.physics.tear_stretch, stretch = stretch_.load(std::memory_order_relaxed);
+  const float limit = scene_.physics.tear_stretch, stretch = figures_.stretch.load(std::memory_order_relaxed);
   if (limit > 0 && stretch > TearWatch::kNear * limit) {
     char text[64];
     std::snprintf(text, sizeof(text), "membrane near tearing: stretch %.2f of %.2f", static_cast<double>(stretch),
                   static_cast<double>(limit));
     health->last_error = text;
   }
-  if (const std::uint32_t cheaper = cheaper_.load(std::memory_order_relaxed); cheaper > 0) {
+  if (const std::uint32_t cheaper = figures_.cheaper.load(std::memory_order_relaxed); cheaper > 0) {
     add("cheaper_presets", cheaper);
     health->last_error = "steps ran late: a cheaper preset for the next seconds";
   }
-  if (const std::uint64_t refused = topology_refused_.load(std::memory_order_relaxed); refused > 0) {
+  if (const std::uint64_t refused = figures_.topology_refused.load(std::memory_order_relaxed); refused > 0) {
     add("topology_refused", static_cast<double>(refused));
     health->last_error = "TopologyState or OpenCells of another scene refused";
   }

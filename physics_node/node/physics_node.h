@@ -61,7 +61,7 @@ class PhysicsNode {
 
   [[nodiscard]] const TissueSimulation& simulation() const { return simulation_; }
   /// The node continues from a checkpoint.
-  [[nodiscard]] bool restored() const { return restored_; }
+  [[nodiscard]] bool restored() const { return restart_.restored; }
 
  private:
   bool Restore(std::span<const std::byte> checkpoint);
@@ -82,46 +82,77 @@ class PhysicsNode {
   Ports ports_;
   runtime::CheckpointFile* checkpoint_;
   TissueSimulation simulation_;
-  bus::Stamper frame_stamper_, contact_stamper_, cautery_stamper_, tear_stamper_, manifest_stamper_;
   std::uint32_t hook_ = kMaxTools;  ///< The tool that cuts; kMaxTools: none.
+
+  struct Stampers {
+    explicit Stampers(std::int64_t epoch_ns)
+        : frame(epoch_ns), contact(epoch_ns), cautery(epoch_ns), tear(epoch_ns), manifest(epoch_ns) {}
+    bus::Stamper frame, contact, cautery, tear, manifest;
+  };
+  Stampers stampers_;
 
   InputHistory<ToolState> tool_states_;
   InputHistory<HandleState> handle_states_;
-  Stamp tool_before_, tool_after_, handle_stamp_;  ///< Samples that the last step used.
-  std::int64_t pose_ns_ = 0;                       ///< Time of the tools' poses in the last step.
-  double step_time_s_ = 0;                         ///< Session time k dt of the last step.
-  double step_ = 0;                                ///< Its k.
+  /// Samples that the last step used.
+  struct UsedSamples {
+    Stamp tool_before, tool_after, handle;
+    std::int64_t pose_ns = 0;  ///< Time of the tools' poses.
+  };
+  UsedSamples used_;
+  /// Of the last step.
+  struct StepTime {
+    double k = 0;
+    double step_s = 0;     ///< Session time k dt.
+    double contact_s = 0;  ///< Session time of the tools' poses; less than step_s during catch-up.
+  };
+  StepTime time_;
   TopologyState topology_state_;
   OpenCells open_cells_;
   std::array<ToolInput, kMaxTools> inputs_;
   std::array<int, kMaxTools> absent_ticks_{};
   bool topology_waits_ = false;  ///< A topology arrived while another process led.
-  std::uint64_t ticks_ = 0;
-  std::int64_t start_ns_ = 0;  ///< Of the first step.
-  std::uint64_t last_index_ = 0;
-  std::uint64_t periods_ = 1;      ///< Since the last step.
-  std::uint64_t first_index_ = 0;  ///< Manifests count from the tick in which this process took over.
-  int ticks_in_time_ = 0;          ///< Since the last skipped period.
-  std::uint64_t frame_version_ = 0, hash_version_ = 0, saved_version_ = 0, measured_version_ = 0;
+  struct Ticks {
+    std::uint64_t count = 0;
+    std::int64_t start_ns = 0;  ///< Of the first step.
+    std::uint64_t last_index = 0;
+    std::uint64_t periods = 1;      ///< Since the last step.
+    std::uint64_t first_index = 0;  ///< Manifests count from the tick in which this process took over.
+    int in_time = 0;                ///< Since the last skipped period.
+  };
+  Ticks ticks_;
+  /// TissueSimulation::state_version() at the last frame, hash, checkpoint and measurement.
+  struct Versions {
+    std::uint64_t frame = 0, hash = 0, saved = 0, measured = 0;
+  };
+  Versions versions_;
   std::uint64_t state_hash_ = 0;
-  bool restored_ = false;
-  bool waits_ = false;         ///< After a restart, until ToolState and HandleState arrive: the tools do not move.
-  int catch_up_steps_ = 0;     ///< After a restart: steps until the tools reach the poses of their samples.
-  double contact_time_s_ = 0;  ///< Session time of the tools' poses; less than step_time_s_ during catch-up.
+  struct Restart {
+    bool restored = false;
+    bool waits = false;      ///< Until ToolState and HandleState arrive: the tools do not move.
+    int catch_up_steps = 0;  ///< Until the tools reach the poses of their samples.
+  };
+  Restart restart_;
   float max_displacement_m_ = 0;
   TickManifest manifest_;
   TearState tear_state_;
-  std::uint32_t published_tears_ = 0, saved_tears_ = 0;   ///< Number of torn edges then.
+  /// Number of torn edges in the last TearState and checkpoint.
+  struct TearCounts {
+    std::uint32_t published = 0, saved = 0;
+  };
+  TearCounts tear_counts_;
   std::array<std::uint64_t, kMaxTools> limited_until_{};  ///< Tick until which Health warns of a limited force.
 
-  // For the health thread. Relaxed order: the figures are independent of each other.
-  std::atomic<std::uint32_t> cheaper_{0};  ///< Presets below the scene's.
-  std::atomic<float> displacement_mm_{0}, max_displacement_mm_{0}, force_N_[kMaxTools]{};
-  std::atomic<std::uint32_t> grasped_{0};
-  std::atomic<std::uint64_t> quarantined_{0}, asleep_ticks_{0}, topology_refused_{0}, topology_edits_{0};
-  std::atomic<std::uint32_t> torn_edges_{0};
-  std::atomic<std::uint32_t> limited_{0};  ///< Bit per tool: the force on it was limited.
-  std::atomic<float> stretch_{0}, largest_stretch_{0};
+  /// For the health thread. Relaxed order: the figures are independent of each other.
+  struct Figures {
+    std::atomic<std::uint32_t> cheaper{0};  ///< Presets below the scene's.
+    std::atomic<float> displacement_mm{0}, max_displacement_mm{0}, force_N[kMaxTools]{};
+    std::atomic<std::uint32_t> grasped{0};
+    std::atomic<std::uint64_t> quarantined{0}, asleep_ticks{0}, topology_refused{0}, topology_edits{0};
+    std::atomic<std::uint32_t> torn_edges{0};
+    std::atomic<std::uint32_t> limited{0};  ///< Bit per tool: the force on it was limited.
+    std::atomic<float> stretch{0}, largest_stretch{0};
+  };
+  Figures figures_;
 };
 
 }  // namespace fulcrum::physics

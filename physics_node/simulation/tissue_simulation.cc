@@ -51,7 +51,7 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
 }
 
 bool TissueSimulation::ImplicitCompliance::Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) {
-  if ((simulation_->steps_ + probe.tool * kQueryEvery / 2) % kQueryEvery != 0) {
+  if ((simulation_->counters_.steps + probe.tool * kQueryEvery / 2) % kQueryEvery != 0) {
     return false;
   }
   at_.clear();
@@ -216,18 +216,18 @@ StepReport TissueSimulation::StepAccurate() {
 }
 
 StepReport TissueSimulation::Step(const std::array<ToolInput, kMaxTools>& tools) {
-  ++steps_;
+  ++counters_.steps;
   FollowTools(tools);
   const bool held = grasps_[0].holding() || grasps_[1].holding();
   UpdateGrasps();
   const bool holds = grasps_[0].holding() || grasps_[1].holding();
-  asleep_ = asleep_ && !held && !holds;
+  sleep_.asleep = sleep_.asleep && !held && !holds;
   if (StaysAsleep()) {
     return {true, 0.0f, 0};
   }
-  ++state_version_;
+  ++counters_.state_version;
   const StepReport report = implicit_ ? StepAccurate() : xpbd_ ? StepXpbd() : StepPaper();
-  quarantined_ += report.resets;
+  counters_.quarantined += report.resets;
   WatchTears(report.max_step_m);
   UpdateSleep(report, holds);
   return report;
@@ -246,7 +246,7 @@ void TissueSimulation::WatchTears(float max_step_m) {
   } else {
     tears_.RowsMoved(0, rows, max_step_m);
   }
-  (void)tears_.Evaluate(steps_);
+  (void)tears_.Evaluate(counters_.steps);
 }
 
 void TissueSimulation::LetThreadsHelp(bool help) {
@@ -273,8 +273,8 @@ int TissueSimulation::ApplyTopology(const TopologyState& topology) {
       grasp.DropDead(model_, &particles_);
     }
     tears_.Follow();
-    asleep_ = false;
-    still_steps_ = 0;
+    sleep_.asleep = false;
+    sleep_.still_steps = 0;
   }
   return edits;
 }
@@ -285,8 +285,8 @@ bool TissueSimulation::SetOpenCells(const OpenCells& cells) {
   }
   collision_.SetOpenCells(cells);
   // A tool that rests against removed cells can move on.
-  asleep_ = false;
-  still_steps_ = 0;
+  sleep_.asleep = false;
+  sleep_.still_steps = 0;
   return true;
 }
 
@@ -294,7 +294,7 @@ DeviceContacts TissueSimulation::Contacts(std::uint32_t tool) {
   if (!tracks_[tool].present) {
     return {};
   }
-  if (std::exchange(contacts_step_[tool], steps_) + 1 < steps_) {
+  if (std::exchange(contacts_step_[tool], counters_.steps) + 1 < counters_.steps) {
     contacts_.Reset(tool, tracks_[tool].now);
   }
   return contacts_.Update(tool, tracks_[tool].now, collision_, grasps_[tool], implicit_ ? &tool_force_[tool] : nullptr);
@@ -344,7 +344,7 @@ float TissueSimulation::MaxDisplacement() const {
 }
 
 float TissueSimulation::awake_part() const {
-  return asleep_ ? 0.0f : implicit_ ? implicit_->regions().awake_part() : 1.0f;
+  return sleep_.asleep ? 0.0f : implicit_ ? implicit_->regions().awake_part() : 1.0f;
 }
 
 std::uint64_t TissueSimulation::StateHash() const {
@@ -367,7 +367,7 @@ std::uint64_t TissueSimulation::StateHash() const {
 
 SimulationMemory TissueSimulation::Save() const {
   SimulationMemory memory;
-  memory.steps = steps_;
+  memory.steps = counters_.steps;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     memory.pose[i] = tracks_[i].now;
     memory.known[i] = tracks_[i].present;
@@ -416,10 +416,10 @@ bool TissueSimulation::Restore(std::span<const float> xyz, std::span<const float
     grasps_[i].Restore(memory.grasp_state[i], memory.held[i], &particles_);
   }
   tears_.Restore(memory.torn_edges);
-  steps_ = memory.steps;
-  asleep_ = false;
-  still_steps_ = 0;
-  ++state_version_;
+  counters_.steps = memory.steps;
+  sleep_.asleep = false;
+  sleep_.still_steps = 0;
+  ++counters_.state_version;
   return true;
 }
 

@@ -84,16 +84,16 @@ class TissueSimulation {
   [[nodiscard]] Vec3f solver_force(std::uint32_t tool) const { return tool_force_[tool]; }
   /// Tears by traction. Torn edges transmit forces until ApplyTopology severs them.
   [[nodiscard]] const TearWatch& tears() const { return tears_; }
-  [[nodiscard]] bool asleep() const { return asleep_; }
+  [[nodiscard]] bool asleep() const { return sleep_.asleep; }
   /// Share of the tissue that is awake.
   [[nodiscard]] float awake_part() const;
-  [[nodiscard]] std::uint64_t quarantined() const { return quarantined_; }
+  [[nodiscard]] std::uint64_t quarantined() const { return counters_.quarantined; }
   /// Number of steps times their length [s]: the time of breathing.
   [[nodiscard]] double simulated_time_s() const {
-    return static_cast<double>(steps_) * static_cast<double>(scene_.physics.dt_s);
+    return static_cast<double>(counters_.steps) * static_cast<double>(scene_.physics.dt_s);
   }
   /// Counter that changes whenever positions may have changed.
-  [[nodiscard]] std::uint64_t state_version() const { return state_version_; }
+  [[nodiscard]] std::uint64_t state_version() const { return counters_.state_version; }
 
   /// Largest distance of a particle of live, connected tissue from rest [m].
   [[nodiscard]] float MaxDisplacement() const;
@@ -168,11 +168,16 @@ class TissueSimulation {
   CauteryProbe cautery_;
   TearWatch tears_;
   std::array<ToolTrack, kMaxTools> tracks_;
-  bool asleep_ = false;
-  int still_steps_ = 0;
-  std::uint64_t steps_ = 0;
+  struct Sleep {
+    bool asleep = false;
+    int still_steps = 0;  ///< In a row.
+  };
+  Sleep sleep_;
   std::array<std::uint64_t, kMaxTools> contacts_step_{};  ///< Step of the last Contacts of a tool.
-  std::uint64_t quarantined_ = 0, state_version_ = 1;
+  struct Counters {
+    std::uint64_t steps = 0, quarantined = 0, state_version = 1;
+  };
+  Counters counters_;
 };
 
 }  // namespace fulcrum::physics

@@ -46,25 +46,25 @@ bool TissueSimulation::ToolsTouchTissue() {
 
 /// Wakes the tissue if a tool or a breathing surface reaches it. True: it stays asleep.
 bool TissueSimulation::StaysAsleep() {
-  if (!asleep_) {
+  if (!sleep_.asleep) {
     return false;
   }
   if (ToolsMove()) {
     const bool touched = collision_.any_touching();
     FindContacts(false);
-    asleep_ = !touched && !ToolsTouchTissue();
+    sleep_.asleep = !touched && !ToolsTouchTissue();
   }
-  asleep_ = asleep_ && !BreathingReachesTissue();
-  return asleep_;
+  sleep_.asleep = sleep_.asleep && !BreathingReachesTissue();
+  return sleep_.asleep;
 }
 
 /// After a step: the tissue falls asleep after kStillSteps still steps without grasp or moving contact.
 void TissueSimulation::UpdateSleep(const StepReport& report, bool holds) {
   const bool worked_on = ToolsMove() && (implicit_ ? collision_.any_touching() : !collision_.pairs().empty());
-  still_steps_ = report.max_step_m < kStill && !holds && !worked_on && !tissue_collision_.breath_near()
-                     ? still_steps_ + (report.max_step_m < kAtRest ? kStillSteps / kRestSteps : 1)
-                     : 0;
-  if (still_steps_ >= kStillSteps) {
+  sleep_.still_steps = report.max_step_m < kStill && !holds && !worked_on && !tissue_collision_.breath_near()
+                           ? sleep_.still_steps + (report.max_step_m < kAtRest ? kStillSteps / kRestSteps : 1)
+                           : 0;
+  if (sleep_.still_steps >= kStillSteps) {
     solver_.Stop();
     if (implicit_) {
       implicit_->Stop();
@@ -73,8 +73,8 @@ void TissueSimulation::UpdateSleep(const StepReport& report, bool holds) {
       xpbd_->Stop();
     }
     collision_.FitAtRest();
-    asleep_ = true;
-    still_steps_ = 0;
+    sleep_.asleep = true;
+    sleep_.still_steps = 0;
   }
 }
 

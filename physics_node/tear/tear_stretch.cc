@@ -89,9 +89,9 @@ TearWatch::Principal TearWatch::PrincipalOf(const Metric& g, const Metric& rest)
 }
 
 const float* TearWatch::RowPlaces(std::uint32_t row) {
-  float* out = &places_[3 * std::size_t{row} * cols_];
-  if (places_pass_[row] == pass_) return out;
-  places_pass_[row] = pass_;
+  float* out = &places_.values[3 * std::size_t{row} * cols_];
+  if (places_.pass[row] == pass_) return out;
+  places_.pass[row] = pass_;
   const GridLayout& layout = particles_->layout();
   for (int axis = 0; axis < 3; ++axis) {
     const float* at = particles_->plane(axis) + std::size_t{row} * layout.stride;
@@ -113,7 +113,7 @@ float TearWatch::LargestInRow(std::uint32_t row) {
   for (std::size_t half = 0; half < 2; ++half) {
     // Half 0: along the upper row and down the right side. Half 1: along the lower row and down the left side.
     const float *col_row = half == 0 ? a : b, *top = half == 0 ? a + 1 : a, *bottom = half == 0 ? b + 1 : b;
-    const float *icc = &inverse_cc_[half][first], *icr = &inverse_cr_[half][first], *irr = &inverse_rr_[half][first];
+    const float *icc = &inverse_.cc[half][first], *icr = &inverse_.cr[half][first], *irr = &inverse_.rr[half][first];
     PrincipalStretches({col_row, top, bottom, n}, icc, icr, irr, cells, stretch2);
     largest = std::max(largest, Largest(stretch2, cells));
   }
@@ -122,9 +122,9 @@ float TearWatch::LargestInRow(std::uint32_t row) {
 
 /// Weighted sums over the triangles of a row of cells for the nodes along it: g (cc, cr, rr), then G.
 const float* TearWatch::FilteredRow(std::uint32_t row) {
-  float* out = &filtered_[kSums * std::size_t{row} * cols_];
-  if (filtered_pass_[row] == pass_) return out;
-  filtered_pass_[row] = pass_;
+  float* out = &filtered_.values[kSums * std::size_t{row} * cols_];
+  if (filtered_.pass[row] == pass_) return out;
+  filtered_.pass[row] = pass_;
   const float *a = RowPlaces(row), *b = RowPlaces(row + 1);
   const std::size_t n = cols_, cells = cols_ - 1, first = std::size_t{row} * cols_;
   std::fill(line_.begin(), line_.end(), 0.0f);
@@ -135,13 +135,13 @@ const float* TearWatch::FilteredRow(std::uint32_t row) {
       const float ux = col_row[c + 1] - col_row[c], uy = col_row[n + c + 1] - col_row[n + c],
                   uz = col_row[2 * n + c + 1] - col_row[2 * n + c];
       const float vx = bottom[c] - top[c], vy = bottom[n + c] - top[n + c], vz = bottom[2 * n + c] - top[2 * n + c];
-      const float alive = rest_cc_[half][first + c] > 0.0f ? 1.0f : 0.0f;
+      const float alive = rest_.cc[half][first + c] > 0.0f ? 1.0f : 0.0f;
       line_[c] += alive * (ux * ux + uy * uy + uz * uz);
       line_[n + c] += alive * (ux * vx + uy * vy + uz * vz);
       line_[2 * n + c] += alive * (vx * vx + vy * vy + vz * vz);
-      line_[3 * n + c] += rest_cc_[half][first + c];
-      line_[4 * n + c] += rest_cr_[half][first + c];
-      line_[5 * n + c] += rest_rr_[half][first + c];
+      line_[3 * n + c] += rest_.cc[half][first + c];
+      line_[4 * n + c] += rest_.cr[half][first + c];
+      line_[5 * n + c] += rest_.rr[half][first + c];
     }
   }
   for (std::size_t k = 0; k < kSums; ++k) {
@@ -175,13 +175,13 @@ TearWatch::Principal TearWatch::At(std::uint32_t row, std::uint32_t col) {
 
 /// lambda of the nodes of a row; 0 for nodes without living triangles and in debris.
 void TearWatch::SmoothRow(std::uint32_t row) {
-  if (smooth_pass_[row] == pass_) return;
-  smooth_pass_[row] = pass_;
+  if (smooth_.pass[row] == pass_) return;
+  smooth_.pass[row] = pass_;
   for (std::uint32_t col = 0; col < cols_; ++col) {
     const Index node = row * cols_ + col;
     const bool tissue = model_->NodeAlive(node) && !model_->IsDebris(node);
     const float stretch = tissue ? to_rest_ * std::sqrt(At(row, col).stretch2) : 0.0f;
-    smooth_[node] = stretch > 0.0f ? stretch : 0.0f;  // 0 for NaN.
+    smooth_.values[node] = stretch > 0.0f ? stretch : 0.0f;  // 0 for NaN.
   }
 }
 
@@ -189,7 +189,7 @@ float TearWatch::StretchAt(const Place& place) const {
   const float col = std::round(place.col), row = std::round(place.row);
   if (!(col >= 0.0f && row >= 0.0f && col < static_cast<float>(cols_) && row < static_cast<float>(rows_))) return 0;
   const auto r = static_cast<std::uint32_t>(row), c = static_cast<std::uint32_t>(col);
-  return smooth_pass_[r] == pass_ ? smooth_[r * cols_ + c] : 0.0f;
+  return smooth_.pass[r] == pass_ ? smooth_.values[r * cols_ + c] : 0.0f;
 }
 
 float TearWatch::EdgeStretch2(Index edge) const {

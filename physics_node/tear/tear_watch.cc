@@ -55,7 +55,7 @@ TearWatch::TearWatch(const TissueScene& scene, const TissueModel* model, const P
   }
   const std::size_t cells = std::size_t{rows_ - 1} * cols_;  // With a padding cell at the end of each row.
   for (std::size_t half = 0; half < 2; ++half) {
-    for (auto* planes : {&inverse_cc_, &inverse_cr_, &inverse_rr_, &rest_cc_, &rest_cr_, &rest_rr_}) {
+    for (auto* planes : {&inverse_.cc, &inverse_.cr, &inverse_.rr, &rest_.cc, &rest_.cr, &rest_.rr}) {
       (*planes)[half].assign(cells, 0.0f);
     }
   }
@@ -74,15 +74,15 @@ TearWatch::TearWatch(const TissueScene& scene, const TissueModel* model, const P
   }
   weight_col_ = Window(kSmoothing_m * static_cast<float>(count[0] / length[0]));
   weight_row_ = Window(kSmoothing_m * static_cast<float>(count[1] / length[1]));
-  row_stretch2_.assign(rows_ - 1, 0.0f);
-  row_moved_.assign(rows_ - 1, kForceEvaluation);
-  row_gain_.assign(rows_ - 1, 0.0f);
-  places_.assign(3 * std::size_t{rows_} * cols_, 0.0f);
-  filtered_.assign(kSums * cells, 0.0f);
-  smooth_.assign(std::size_t{rows_} * cols_, 0.0f);
-  places_pass_.assign(rows_, 0);
-  filtered_pass_.assign(rows_, 0);
-  smooth_pass_.assign(rows_, 0);
+  cell_rows_.stretch2.assign(rows_ - 1, 0.0f);
+  cell_rows_.moved.assign(rows_ - 1, kForceEvaluation);
+  cell_rows_.gain.assign(rows_ - 1, 0.0f);
+  places_.values.assign(3 * std::size_t{rows_} * cols_, 0.0f);
+  filtered_.values.assign(kSums * cells, 0.0f);
+  smooth_.values.assign(std::size_t{rows_} * cols_, 0.0f);
+  places_.pass.assign(rows_, 0);
+  filtered_.pass.assign(rows_, 0);
+  smooth_.pass.assign(rows_, 0);
   line_.assign(kSums * cols_, 0.0f);
   for (Index t = 0; t < triangles; ++t) RefreshTriangle(t);
 }
@@ -100,19 +100,19 @@ void TearWatch::RefreshTriangle(Index triangle) {
       inverse = {g.rr / det, -g.cr / det, g.cc / det};
     }
   }
-  float& gain = row_gain_[cell / (cols_ - 1)];
+  float& gain = cell_rows_.gain[cell / (cols_ - 1)];
   gain = std::max(gain, std::sqrt(8.0f * (inverse.cc + inverse.rr)));
-  row_moved_[cell / (cols_ - 1)] = kForceEvaluation;
-  inverse_cc_[half][at] = inverse.cc;
-  inverse_cr_[half][at] = inverse.cr;
-  inverse_rr_[half][at] = inverse.rr;
-  rest_cc_[half][at] = rest.cc;
-  rest_cr_[half][at] = rest.cr;
-  rest_rr_[half][at] = rest.rr;
+  cell_rows_.moved[cell / (cols_ - 1)] = kForceEvaluation;
+  inverse_.cc[half][at] = inverse.cc;
+  inverse_.cr[half][at] = inverse.cr;
+  inverse_.rr[half][at] = inverse.rr;
+  rest_.cc[half][at] = rest.cc;
+  rest_.cr[half][at] = rest.cr;
+  rest_.rr[half][at] = rest.rr;
 }
 
 void TearWatch::Follow() {
-  topology_changed_ = true;
+  schedule_.topology_changed = true;
   if (limit_ == 0.0f) return;
   for (const Index edge : model_->edited_edges()) {
     if (!(scene_.membrane_rest_length[edge] > 0.0f)) continue;
@@ -153,34 +153,35 @@ void TearWatch::Follow() {
 
 /// True while torn edges are not yet severed, and shortly after a change of the topology.
 bool TearWatch::Paused() {
-  if (std::exchange(restored_, false)) quiet_until_ = step_ + kMaxWait;
-  if (std::exchange(topology_changed_, false)) quiet_until_ = step_ + kRelax;
+  if (std::exchange(schedule_.restored, false)) schedule_.quiet_until = schedule_.step + kMaxWait;
+  if (std::exchange(schedule_.topology_changed, false)) schedule_.quiet_until = schedule_.step + kRelax;
   std::erase_if(pending_, [this](Index edge) { return !model_->EdgeAlive(edge / 3, static_cast<int>(edge % 3)); });
-  if (!pending_.empty() && step_ > torn_step_ + kMaxWait) pending_.clear();
-  return step_ < quiet_until_ || !pending_.empty();
+  if (!pending_.empty() && schedule_.step > schedule_.torn_step + kMaxWait) pending_.clear();
+  return schedule_.step < schedule_.quiet_until || !pending_.empty();
 }
 
 void TearWatch::RowsMoved(std::uint32_t first, std::uint32_t end, float moved) {
   if (limit_ == 0.0f) return;
-  for (std::uint32_t row = first > 0 ? first - 1 : 0; row < std::min(end, rows_ - 1); ++row) row_moved_[row] += moved;
+  for (std::uint32_t row = first > 0 ? first - 1 : 0; row < std::min(end, rows_ - 1); ++row)
+    cell_rows_.moved[row] += moved;
 }
 
 bool TearWatch::Evaluate(std::uint64_t step) {
   if (limit_ == 0.0f || step % kEvery != 0) return false;
-  step_ = step;
+  schedule_.step = step;
   ++pass_;
   const float near = kNear * limit_ / to_rest_, near2 = near * near;
   const bool all = step % kEveryAll == 0;
   float largest2 = 0;
   std::uint32_t largest_row = 0;
   for (std::uint32_t row = 0; row + 1 < rows_; ++row) {
-    const bool may_be_near = std::sqrt(row_stretch2_[row]) + row_gain_[row] * row_moved_[row] >= near;
-    if (row_moved_[row] > 0.0f && (all || may_be_near)) {
-      row_stretch2_[row] = LargestInRow(row);
-      row_moved_[row] = 0;
+    const bool may_be_near = std::sqrt(cell_rows_.stretch2[row]) + cell_rows_.gain[row] * cell_rows_.moved[row] >= near;
+    if (cell_rows_.moved[row] > 0.0f && (all || may_be_near)) {
+      cell_rows_.stretch2[row] = LargestInRow(row);
+      cell_rows_.moved[row] = 0;
     }
-    if (row_stretch2_[row] > largest2) {
-      largest2 = row_stretch2_[row];
+    if (cell_rows_.stretch2[row] > largest2) {
+      largest2 = cell_rows_.stretch2[row];
       largest_row = row;
     }
   }
@@ -189,13 +190,13 @@ bool TearWatch::Evaluate(std::uint64_t step) {
   std::uint32_t worst_row = 0, worst_col = 0, done = 0;
   largest_ = 0;
   for (std::uint32_t row = 0; row + 1 < rows_; ++row) {
-    if (row != largest_row && !(row_stretch2_[row] >= near2)) continue;
+    if (row != largest_row && !(cell_rows_.stretch2[row] >= near2)) continue;
     const std::uint32_t end = std::min(row + reach + 1, rows_);
     for (std::uint32_t r = std::max(done, row + 1 > reach ? row + 1 - reach : 0); r < end; ++r) {
       SmoothRow(r);
       for (std::uint32_t c = 0; c < cols_; ++c) {
-        if (smooth_[r * cols_ + c] > largest_) {
-          largest_ = smooth_[r * cols_ + c];
+        if (smooth_.values[r * cols_ + c] > largest_) {
+          largest_ = smooth_.values[r * cols_ + c];
           worst_row = r;
           worst_col = c;
         }
@@ -204,12 +205,12 @@ bool TearWatch::Evaluate(std::uint64_t step) {
     done = std::max(done, end);
   }
   const bool paused = Paused();
-  if (step_ >= quiet_until_) largest_ever_ = std::max(largest_ever_, largest_);
+  if (schedule_.step >= schedule_.quiet_until) largest_ever_ = std::max(largest_ever_, largest_);
   if (paused) return false;
   const std::uint32_t before = torn_count_;
   TearBareEdges();
   if (largest_ >= limit_) Crack(worst_row, worst_col);
-  if (torn_count_ != before) torn_step_ = step_;
+  if (torn_count_ != before) schedule_.torn_step = schedule_.step;
   return torn_count_ != before;
 }
 
@@ -230,9 +231,9 @@ void TearWatch::Restore(std::span<const std::uint8_t> torn) {
   for (Index edge = 0; edge < 3 * rows_ * cols_; ++edge) {
     if (TestBit(torn_, edge)) pending_.push_back(edge);
   }
-  restored_ = true;
-  topology_changed_ = false;
-  std::fill(row_moved_.begin(), row_moved_.end(), kForceEvaluation);
+  schedule_.restored = true;
+  schedule_.topology_changed = false;
+  std::fill(cell_rows_.moved.begin(), cell_rows_.moved.end(), kForceEvaluation);
 }
 
 }  // namespace fulcrum::physics

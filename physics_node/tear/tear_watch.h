@@ -114,27 +114,41 @@ class TearWatch {
   const ParticleStore* particles_;
   float limit_, to_rest_;  ///< to_rest_: 1 + prestrain, the stretch in the rest shape.
   std::uint32_t rows_, cols_;
-  /// By half (0: n00 n01 n11, 1: n00 n11 n10) planes over the cells: inverse of the rest metric [1/m^2]; 0 where the
-  /// triangle is dead, debris, or below least_area_.
-  std::array<std::vector<float>, 2> inverse_cc_, inverse_cr_, inverse_rr_;
-  std::array<std::vector<float>, 2> rest_cc_, rest_cr_, rest_rr_;  ///< The rest metric [m^2]; 0 likewise.
-  float least_area_ = 0;                                           ///< Least area of a triangle at rest [m^2].
-  std::vector<float> weight_col_, weight_row_;                     ///< Weight of the n-th cell beside a node.
-  std::vector<Index> bare_edges_;                                  ///< Edges without a living triangle.
+  /// By half (0: n00 n01 n11, 1: n00 n11 n10) planes over the cells.
+  struct MetricPlanes {
+    std::array<std::vector<float>, 2> cc, cr, rr;
+  };
+  MetricPlanes inverse_;  ///< Inverse of the rest metric [1/m^2]; 0 where the triangle is dead, debris, or below
+                          ///< least_area_.
+  MetricPlanes rest_;     ///< The rest metric [m^2]; 0 likewise.
+  float least_area_ = 0;  ///< Least area of a triangle at rest [m^2].
+  std::vector<float> weight_col_, weight_row_;  ///< Weight of the n-th cell beside a node.
+  std::vector<Index> bare_edges_;               ///< Edges without a living triangle.
 
-  // By row of cells: the largest squared stretch of a triangle at the last examination, the movement of nodes since
-  // then [m], and the largest change of a stretch per movement [1/m].
-  std::vector<float> row_stretch2_, row_moved_, row_gain_;
-  std::vector<float> places_, filtered_, smooth_;  ///< Rows of positions, of sums, of lambda by node.
-  std::vector<std::uint64_t> places_pass_, filtered_pass_, smooth_pass_;  ///< Examination in which a row was computed.
-  std::vector<float> line_;                                               ///< Scratch of a row.
-  std::uint64_t pass_ = 0;                                                ///< Number of the examination.
+  /// By row of cells.
+  struct CellRows {
+    std::vector<float> stretch2;  ///< Largest squared stretch of a triangle at the last examination.
+    std::vector<float> moved;     ///< Movement of nodes since then [m].
+    std::vector<float> gain;      ///< Largest change of a stretch per movement [1/m].
+  };
+  CellRows cell_rows_;
+  /// Rows of values, each computed once in an examination at most.
+  struct CachedRows {
+    std::vector<float> values;
+    std::vector<std::uint64_t> pass;  ///< Examination in which a row was computed.
+  };
+  CachedRows places_, filtered_, smooth_;  ///< Positions, sums, lambda by node.
+  std::vector<float> line_;                ///< Scratch of a row.
+  std::uint64_t pass_ = 0;                 ///< Number of the examination.
 
   std::vector<std::uint8_t> torn_;
   std::uint32_t torn_count_ = 0;
   std::vector<Index> pending_;  ///< Torn edges that are not yet severed.
-  std::uint64_t step_ = 0, torn_step_ = 0, quiet_until_ = 0;
-  bool topology_changed_ = false, restored_ = false;  ///< Since the last examination.
+  struct Schedule {
+    std::uint64_t step = 0, torn_step = 0, quiet_until = 0;
+    bool topology_changed = false, restored = false;  ///< Since the last examination.
+  };
+  Schedule schedule_;
   float largest_ = 0, largest_ever_ = 0;
 };
 

@@ -31,7 +31,8 @@ std::array<Index, 6> TissueModel::Neighbours(Index node) const {
 
 /// An anchor holds a piece of membrane: a fixed node of the rim, or a node with a binding to the organ.
 bool TissueModel::IsAnchor(Index node) const {
-  return scene_.inverse_mass[scene_.membrane.first + node] == 0.0f || binding_start_[node] < binding_start_[node + 1];
+  return scene_.inverse_mass[scene_.membrane.first + node] == 0.0f ||
+         node_bindings_.start[node] < node_bindings_.start[node + 1];
 }
 
 /// Searches an anchor among the nodes that are connected to each changed node; a piece without one becomes debris.

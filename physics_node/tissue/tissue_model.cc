@@ -59,10 +59,10 @@ float TissueModel::BaseInverseMass(Index particle) const {
 }
 
 std::optional<BindingView> TissueModel::BindingOf(Index node) const {
-  if (binding_start_[node] == binding_start_[node + 1] || !NodeAlive(node)) {
+  if (node_bindings_.start[node] == node_bindings_.start[node + 1] || !NodeAlive(node)) {
     return std::nullopt;
   }
-  const Index slot = binding_of_[binding_start_[node]], lane = slot % kLanes;
+  const Index slot = node_bindings_.of[node_bindings_.start[node]], lane = slot % kLanes;
   const BindingBatch& batch = bindings_[slot / kLanes];
   BindingView view{{}, {}, batch.rest_length[lane]};
   for (std::size_t j = 0; j < 3; ++j) {

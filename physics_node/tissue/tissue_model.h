@@ -44,13 +44,13 @@ class TissueModel {
   [[nodiscard]] const std::vector<ParticleRef>& hinge_particles() const { return hinge_particles_; }
   /// No edge or node of the patch of sheet under hinge `i` of the scene's bending is cut.
   [[nodiscard]] bool HingeWhole(Index i) const {
-    return bending_[hinge_slot_[i] / kLanes].active[hinge_slot_[i] % kLanes] > 0.0f;
+    return bending_[slots_.hinge[i] / kLanes].active[slots_.hinge[i] % kLanes] > 0.0f;
   }
   [[nodiscard]] const std::vector<BindingBatch>& bindings() const { return bindings_; }
   /// By constraint of the scene, its slot in the batches: batch * 8 + lane.
-  [[nodiscard]] const std::vector<Index>& tet_slots() const { return tet_slot_; }
-  [[nodiscard]] const std::vector<Index>& hinge_slots() const { return hinge_slot_; }
-  [[nodiscard]] const std::vector<Index>& binding_slots() const { return binding_slot_; }
+  [[nodiscard]] const std::vector<Index>& tet_slots() const { return slots_.tet; }
+  [[nodiscard]] const std::vector<Index>& hinge_slots() const { return slots_.hinge; }
+  [[nodiscard]] const std::vector<Index>& binding_slots() const { return slots_.binding; }
   /// Plane of rest lengths, laid out as the membrane is.
   [[nodiscard]] const float* rest(int direction) const { return rest_[direction].data(); }
 
@@ -93,14 +93,20 @@ class TissueModel {
   std::vector<TetBatch> tets_;
   std::vector<BendingBatch> bending_;
   std::vector<ParticleRef> hinge_particles_;
-  std::vector<Index> tet_slot_, hinge_slot_, binding_slot_;  ///< By constraint of the scene: batch * 8 + lane.
+  /// By constraint of the scene: batch * 8 + lane.
+  struct Slots {
+    std::vector<Index> tet, hinge, binding;
+  };
+  Slots slots_;
   std::vector<BindingBatch> bindings_;
   std::array<FloatArray, 3> rest_;
 
   // Constraints of a node: compressed rows, entry = batch * 8 + lane. A hinge can span many cells; it belongs to all
   // nodes of the patch under it, so that a cut through the patch disables it.
-  std::vector<Index> bending_start_, bending_of_;
-  std::vector<Index> binding_start_, binding_of_;
+  struct ConstraintsOfNodes {
+    std::vector<Index> start, of;
+  };
+  ConstraintsOfNodes node_bending_, node_bindings_;
   struct Patch {
     Index row0 = 0, row1 = 0, col0 = 0, col1 = 0;  ///< Inclusive.
   };

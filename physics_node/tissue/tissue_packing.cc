@@ -122,7 +122,7 @@ void TissueModel::PackTube(const TissueScene& scene, const ParticleStore& partic
     for (Index i = first; i < last; ++i) {
       const auto [at, lane] = SlotOf(i, first, last, tets_);
       TetBatch& batch = tets_[at];
-      tet_slot_.push_back(static_cast<Index>(at * kLanes + lane));
+      slots_.tet.push_back(static_cast<Index>(at * kLanes + lane));
       std::array<V3<double>, 4> x;
       for (int j = 0; j < 4; ++j) {
         const Index v = scene.tets[i][j];
@@ -165,7 +165,7 @@ void TissueModel::PackBending(const TissueScene& scene, const ParticleStore& par
       hinge_particles_.push_back(particles.Ref(p));
     }
   }
-  hinge_slot_.assign(scene.bending.size(), 0);
+  slots_.hinge.assign(scene.bending.size(), 0);
   BendingBatch no_hinges{};
   for (auto& v : no_hinges.v) {
     std::fill_n(v, kLanes, static_cast<Index>(4 * hinge_particles_.size()));
@@ -181,7 +181,7 @@ void TissueModel::PackBending(const TissueScene& scene, const ParticleStore& par
       const BendingConstraint& constraint = scene.bending[i];
       BendingBatch& batch = bending_[at];
       const auto slot = static_cast<Index>(at * kLanes + lane);
-      hinge_slot_[i] = slot;
+      slots_.hinge[i] = slot;
       Patch patch{kNoIndex, 0, kNoIndex, 0};
       bool on_membrane = true;
       for (int j = 0; j < 4; ++j) {
@@ -215,7 +215,7 @@ void TissueModel::PackBending(const TissueScene& scene, const ParticleStore& par
       ++counts_.bending;
     }
   });
-  Compress(std::move(users), scene.membrane.node_count(), &bending_start_, &bending_of_);
+  Compress(std::move(users), scene.membrane.node_count(), &node_bending_.start, &node_bending_.of);
 }
 
 void TissueModel::PackBindings(const TissueScene& scene, const ParticleStore& particles) {
@@ -255,12 +255,12 @@ void TissueModel::PackBindings(const TissueScene& scene, const ParticleStore& pa
       batch.rest_length[lane] = binding.rest_length;
       batch.rest_height[lane] = std::max(0.0f, normal.dot(x[v[0]] - foot));
       batch.active[lane] = 1.0f;
-      binding_slot_.push_back(static_cast<Index>(at * kLanes + lane));
-      users.emplace_back(binding.membrane - scene.membrane.first, binding_slot_.back());
+      slots_.binding.push_back(static_cast<Index>(at * kLanes + lane));
+      users.emplace_back(binding.membrane - scene.membrane.first, slots_.binding.back());
       ++counts_.bindings;
     }
   });
-  Compress(std::move(users), scene.membrane.node_count(), &binding_start_, &binding_of_);
+  Compress(std::move(users), scene.membrane.node_count(), &node_bindings_.start, &node_bindings_.of);
 }
 
 }  // namespace fulcrum::physics

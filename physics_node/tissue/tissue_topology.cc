@@ -50,8 +50,8 @@ void TissueModel::RefreshTriangles(Index node) {
 }
 
 void TissueModel::RefreshHinges(Index node, bool died) {
-  for (Index i = bending_start_[node]; i < bending_start_[node + 1]; ++i) {
-    const Index slot = bending_of_[i];
+  for (Index i = node_bending_.start[node]; i < node_bending_.start[node + 1]; ++i) {
+    const Index slot = node_bending_.of[i];
     bending_[slot / kLanes].active[slot % kLanes] = !died && HingeAlive(slot) ? 1.0f : 0.0f;
   }
 }
@@ -72,8 +72,8 @@ void TissueModel::RefreshNode(Index node, ParticleStore* particles) {
   }
   RefreshTriangles(node);
   RefreshHinges(node, !NodeAlive(node));
-  for (Index i = binding_start_[node]; i < binding_start_[node + 1]; ++i) {
-    const Index slot = binding_of_[i];
+  for (Index i = node_bindings_.start[node]; i < node_bindings_.start[node + 1]; ++i) {
+    const Index slot = node_bindings_.of[i];
     bindings_[slot / kLanes].active[slot % kLanes] = NodeAlive(node) ? 1.0f : 0.0f;
   }
   const Index particle = scene_.membrane.first + node;
