@@ -13,6 +13,9 @@ constexpr const char* kUsage =
 
 Compiles a scene description into the file that the nodes map, then reports its quality.
 
+Example:
+  scene_compiler deploy/scenes/small.yaml --out small.fulcrum --set physics.grip_force_N=4
+
 Options:
   --out FILE               compiled scene to write
   --data DIR               folder that is searched first for the mesh files of the description (default: the
@@ -24,9 +27,6 @@ Options:
   --source FILE            print the effective YAML of a compiled scene
   --list                   list the scenes described in DIR (default: those shipped)
   --help                   print this
-
-Example:
-  scene_compiler deploy/scenes/small.yaml --out small.fulcrum --set physics.grip_force_N=4
 
 Keys of a description: services/scene/README.md.
 Exit code: 0 done, 1 failure, 2 bad usage or input, 3 a compiled scene of another version.
