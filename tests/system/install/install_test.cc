@@ -160,7 +160,7 @@ TEST_F(InstallTest, EveryCommandHasAPageOfTheManual) {
     EXPECT_NE(page.find(tag), std::string::npos) << name << "\n" << page;
   }
   EXPECT_GE(commands, 20) << help;
-  // Folders in the home of whoever built it are nobody else's.
+  // The pages name no folder of the machine on which they were built.
   const char* home = std::getenv("HOME");
   for (const auto& entry : fs::directory_iterator(pages)) {
     const std::string text = Output("/bin/gzip", {"-dc", entry.path()});

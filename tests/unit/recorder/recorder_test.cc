@@ -230,7 +230,7 @@ TEST_F(RecorderTest, ADumpIsWrittenOnceForWhatWasAskedLast) {
   Recorder recorder(settings);
   DumpWriter dumps(&recorder, folder_);
   dumps.WriteIfAsked(0);
-  EXPECT_TRUE(fs::is_empty(folder_)) << "nobody asked";
+  EXPECT_TRUE(fs::is_empty(folder_)) << "no dump was requested";
   Send(&recorder, TopicId::kToolState, 1, 1);
   EXPECT_EQ(dumps.Ask("first"), "writing the last seconds into " + folder_.string());
   EXPECT_TRUE(fs::is_empty(folder_)) << "written by the other thread";

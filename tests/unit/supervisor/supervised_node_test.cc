@@ -91,7 +91,7 @@ TEST_F(AttachedNodeTest, DoesNotWaitForLastWordsWhenTheNextOneSpeaks) {
   ASSERT_TRUE(Report(first.pid()));
   Kill(&first);
   EXPECT_FALSE(node_.Update(kStart).has_value());
-  EXPECT_FALSE(Report(second.pid())) << "the death is told first";
+  EXPECT_FALSE(Report(second.pid())) << "Update() reports the death before the new process counts";
   EXPECT_TRUE(node_.Update(kStart).has_value());
   EXPECT_TRUE(Report(second.pid()));
 }

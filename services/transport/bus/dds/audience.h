@@ -1,4 +1,4 @@
-// Whom the writers of a participant reach. Internal to services/transport/bus/dds.
+// Which participants read the writers of this one. Internal to services/transport/bus/dds.
 #pragma once
 
 #include <fastdds/rtps/common/Guid.h>
