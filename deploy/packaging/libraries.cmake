@@ -38,9 +38,7 @@ fulcrum_component(thermal
 fulcrum_component(servo
   TARGETS fulcrum_haptics_servo
   HEADERS haptics_node/device haptics_node/kinematics haptics_node/servo)
-if(TARGET fulcrum_recording)
-  fulcrum_component(recording TARGETS fulcrum_recording HEADERS services/records/recording)
-endif()
+fulcrum_component(recording TARGETS fulcrum_recording HEADERS services/records/recording)
 
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/FulcrumConfig.cmake.in FulcrumConfig.cmake
   INSTALL_DESTINATION ${package_folder})
