@@ -28,6 +28,11 @@ TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
   EXPECT_NE(cart.Said().find("recording.mcap"), std::string::npos) << "the report names it\n" << cart.Said();
   const fs::path file = cart.session() / "recording.mcap";
 
+  // No node began at a deadline, without the recorder's report that it reads the node's writers.
+  for (const auto& log : fs::directory_iterator(cart.session() / "logs")) {
+    EXPECT_EQ(testing::ReadFile(log.path()).find("no recorder reads"), std::string::npos) << log.path();
+  }
+
   log_tools::Recording recording(file);
   log_tools::Entry entry;
   std::map<std::string, int> decoded;
