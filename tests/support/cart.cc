@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <system_error>
@@ -29,6 +31,11 @@ std::string ReadFile(const fs::path& file) {
   std::ostringstream text;
   text << in.rdbuf();
   return text.str();
+}
+
+double FigureOf(const std::string& summary, const std::string& key) {
+  const std::size_t at = summary.find("\"" + key + "\": ");
+  return at == std::string::npos ? std::nan("") : std::atof(summary.c_str() + at + key.size() + 4);
 }
 
 Cart::Cart(const std::string& scene, int domain, const std::vector<std::string>& more_arguments)

@@ -19,6 +19,9 @@ bool WaitFor(double limit_s, const std::function<bool()>& done);
 
 [[nodiscard]] std::string ReadFile(const std::filesystem::path& file);
 
+/// Number under `key` in a summary.json; NaN: it is not there.
+[[nodiscard]] double FigureOf(const std::string& summary, const std::string& key);
+
 /// Running child processes of a process, by name.
 [[nodiscard]] std::map<std::string, pid_t> ChildrenOf(pid_t parent);
 

@@ -10,6 +10,7 @@
 #include "services/transport/bus/dds/participant.h"
 #include "services/transport/bus/topics.h"
 #include "tests/support/cart.h"
+#include "tests/support/session_bus.h"
 
 namespace fulcrum::testing {
 namespace {
@@ -56,7 +57,7 @@ std::string CartState::force_verdict() const {
 }
 
 struct CartWatch::Ports {
-  explicit Ports(int domain) : participant({.domain = domain, .node_name = "watch", .shared_memory = {}}) {}
+  explicit Ports(int domain) : participant(ReaderOf(domain, "watch")) {}
 
   bus::DdsParticipant participant;
   template <class T>

@@ -26,6 +26,7 @@
 #include "services/transport/bus/dds/security.h"
 #include "services/transport/bus/input_account.h"
 #include "services/transport/bus/topics.h"
+#include "tests/support/session_bus.h"
 
 namespace fulcrum::testing {
 namespace {
@@ -118,7 +119,7 @@ fast::DataWriter* MakeWriter(fast::DomainParticipant* participant, fast::Publish
 struct Rogue::Impl {
   explicit Impl(int domain_id)
       : domain(domain_id),
-        participant({.domain = domain_id, .node_name = "rogue", .shared_memory = {}}),
+        participant(WriterOf(domain_id, "rogue")),
         epoch(static_cast<std::uint64_t>(runtime::MonotonicNs())),
         stamper(static_cast<std::int64_t>(epoch)) {}
 
@@ -157,14 +158,6 @@ struct Rogue::Impl {
     }
     return model;
   }
-  Command AnyCommand(std::mt19937* random) {
-    Command command;
-    command.stamp = Next();
-    command.request_id = (*random)();
-    command.target = static_cast<NodeId>((*random)() % kNodeCount);
-    command.verb = "nonsense";
-    return command;
-  }
   template <class T>
   std::uint64_t Pour(double seconds, const std::function<T()>& make) {
     const auto output = participant.MakeOutput<T>();
@@ -197,15 +190,16 @@ std::uint64_t Rogue::Pour(Flood what, double seconds, std::uint32_t seed) {
       return impl_->Pour<ToolState>(seconds, [&] { return impl_->Tool(&random); });
     case Flood::kContactModel:
       return impl_->Pour<ContactModel>(seconds, [&] { return impl_->Model(&random); });
-    case Flood::kCommand:
-      return impl_->Pour<Command>(seconds, [&] { return impl_->AnyCommand(&random); });
   }
   return 0;
 }
 
 std::uint64_t Rogue::PourBytes(int per_topic, std::uint32_t seed) {
   std::mt19937 random(seed);
-  fast::DomainParticipant* participant = Join(impl_->domain, fast::DomainParticipantQos());
+  fast::DomainParticipantQos qos;
+  const bus::Security security = WriterOf(impl_->domain).security;
+  if (security.on()) bus::dds::ApplySecurity(security, &qos);
+  fast::DomainParticipant* participant = Join(impl_->domain, qos);
   if (participant == nullptr) return 0;
   fast::Publisher* publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
   std::vector<fast::DataWriter*> writers;

@@ -23,7 +23,6 @@ void WriteForgedTools(int domain, const std::string& name, const bus::Security& 
 enum class Flood {
   kToolState,     ///< Invalid tools: not finite, outside of the world, not a rotation.
   kContactModel,  ///< Invalid contact models.
-  kCommand,       ///< Unknown verbs, addressed to all nodes.
 };
 
 class Rogue {

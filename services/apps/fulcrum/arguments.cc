@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "services/apps/fulcrum/commands.h"
+#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
 
@@ -44,7 +45,10 @@ Arguments Parse(const char* command, const Words& words, const po::options_descr
 }
 
 void AddDomain(po::options_description* options) {
-  options->add_options()("domain", po::value<int>()->value_name("N"), "DDS domain of the cart, 1 to 100 (default 7)");
+  options->add_options()(
+      "domain", po::value<int>()->value_name("N"),
+      ("DDS domain of the cart, 1 to 100 (default: " + std::to_string(config::DefaultDomain()) + ", of this user)")
+          .c_str());
 }
 
 int DomainOf(const Arguments& arguments, int fallback) {

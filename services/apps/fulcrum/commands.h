@@ -64,8 +64,6 @@ void AddDomain(boost::program_options::options_description* options);
 /// Value of --domain. Throws InputError when it is out of range.
 [[nodiscard]] int DomainOf(const Arguments& arguments, int fallback);
 
-inline constexpr int kDefaultDomain = 7;
-
 /// Adds --cart.
 void AddCart(boost::program_options::options_description* options);
 /// Value of --cart, else the cart file of this machine if it has one; empty: all hardware is simulated.

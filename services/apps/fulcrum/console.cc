@@ -51,7 +51,7 @@ ExitCode Console(const Words& words) {
   settings.scenes = runtime::ShareFolder() / "scenes";
   settings.programs = runtime::ProgramFolder();
   settings.domain =
-      DomainOf(arguments, settings.cart.empty() ? kDefaultDomain : config::LoadCart(settings.cart).domain);
+      DomainOf(arguments, settings.cart.empty() ? config::DefaultDomain() : config::LoadCart(settings.cart).domain);
   console::Console console(settings);
   if (!settings.bind.starts_with("127.") && settings.bind != "::1") {
     std::fprintf(stderr, "fulcrum: --bind %s: the token is sent unencrypted over this network; prefer an SSH tunnel\n",

@@ -256,7 +256,7 @@ ExitCode Doctor(const Words& words) {
   if (arguments.help) {
     return ExitCode::kDone;
   }
-  const int domain = DomainOf(arguments, kDefaultDomain);
+  const int domain = DomainOf(arguments, config::DefaultDomain());
   const std::vector<std::pair<const char*, Finding>> findings{
       {"programs", NodePrograms()},
       {"scenes", Scenes()},

@@ -1,4 +1,5 @@
 #include "services/apps/fulcrum/commands.h"
+#include "services/base/config/cart.h"
 
 namespace fulcrum::supervisor::cli {
 
@@ -9,7 +10,7 @@ ExitCode Dump(const Words& words) {
   if (arguments.help) {
     return ExitCode::kDone;
   }
-  return Ask(DomainOf(arguments, kDefaultDomain), "dump", "requested by fulcrum dump");
+  return Ask(DomainOf(arguments, config::DefaultDomain()), "dump", "requested by fulcrum dump");
 }
 
 }  // namespace fulcrum::supervisor::cli

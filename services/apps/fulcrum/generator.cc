@@ -1,4 +1,5 @@
 #include "services/apps/fulcrum/commands.h"
+#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/session/supervisor/outcome.h"
 
@@ -18,7 +19,7 @@ ExitCode Generator(const Words& words) {
     turned.append(turned.empty() ? "" : " ").append(knob).append("=");
     turned.append(Fixed(arguments.values[knob].as<double>(), 2));
   }
-  return Ask(DomainOf(arguments, kDefaultDomain), "generator", turned);
+  return Ask(DomainOf(arguments, config::DefaultDomain()), "generator", turned);
 }
 
 }  // namespace fulcrum::supervisor::cli

@@ -1,6 +1,7 @@
 #include "services/session/supervisor/host.h"
 
 #include "services/apps/fulcrum/commands.h"
+#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
 #include "services/transport/link/options.h"
@@ -37,7 +38,7 @@ ExitCode Host(const Words& words) {
   }
   const auto text = [&](const char* name) { return values.count(name) != 0 ? values[name].as<std::string>() : ""; };
   HostSettings settings;
-  settings.domain = DomainOf(arguments, kDefaultDomain);
+  settings.domain = DomainOf(arguments, config::DefaultDomain());
   settings.far = link::FarSettingsFor(bus::FarSide::kHost, text("peer"), text("address"), settings.domain,
                                       values.count("link-domain") != 0 ? values["link-domain"].as<int>() : 0);
   if (values.count("nodes") != 0) {

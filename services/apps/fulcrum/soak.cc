@@ -1,6 +1,7 @@
 #include "services/session/soak/soak.h"
 
 #include "services/apps/fulcrum/commands.h"
+#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
 #include "services/base/runtime/realtime.h"
@@ -43,7 +44,7 @@ ExitCode Soak(const Words& words) {
     throw InputError("--minutes " + Fixed(settings.minutes, 2) + ": must be 0.2 to 10080");
   }
   settings.chaos = values.count("chaos") != 0;
-  settings.domain = DomainOf(arguments, kDefaultDomain);
+  settings.domain = DomainOf(arguments, config::DefaultDomain());
   settings.out = values["out"].as<std::string>();
   settings.program = runtime::ProgramFolder() / "fulcrum";
   if (values.count("record") != 0) settings.up.emplace_back("--record");

@@ -3,6 +3,7 @@
 #include <thread>
 
 #include "services/apps/fulcrum/commands.h"
+#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/session/supervisor/domain_guard.h"
 #include "services/session/supervisor/session_view.h"
@@ -16,10 +17,16 @@ ExitCode Status(const Words& words) {
   if (arguments.help) {
     return ExitCode::kDone;
   }
-  const int domain = DomainOf(arguments, kDefaultDomain);
+  const int domain = DomainOf(arguments, config::DefaultDomain());
   if (!DomainGuard::IsHeld(domain)) {
     std::printf("no session runs in domain %d\n", domain);
     return ExitCode::kFailure;
+  }
+  // A supervisor that has just started opens its bus a little after it has reserved its domain.
+  constexpr auto kStart = std::chrono::seconds(2);
+  const auto begin = std::chrono::steady_clock::now();
+  while (RunningSession(domain) == 0 && std::chrono::steady_clock::now() - begin < kStart) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   SessionView view(domain);
   // Late joiners receive the newest Health at once, and each node sends one at 10 Hz: when no new node has reported for

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "services/apps/fulcrum/commands.h"
+#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/realtime.h"
 #include "services/session/supervisor/domain_guard.h"
@@ -19,7 +20,7 @@ ExitCode Top(const Words& words) {
   if (arguments.help) {
     return ExitCode::kDone;
   }
-  const int domain = DomainOf(arguments, kDefaultDomain);
+  const int domain = DomainOf(arguments, config::DefaultDomain());
   if (!DomainGuard::IsHeld(domain)) {
     throw InputError("no session runs in domain " + std::to_string(domain) + "; start one with fulcrum up SCENE");
   }

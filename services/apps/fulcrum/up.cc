@@ -66,6 +66,10 @@ ExitCode Up(const Words& words) {
           "link-domain", po::value<int>()->value_name("N"),
           "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
           "standby", "run a second physics_node that takes over when the first is silent")(
+          "open-bus",
+          "make no keys for this session: every process of this machine can read and write its topics (default: the "
+          "keys that the cart file names, or new ones for this session)")(
+          "allow-swap-command", "let fulcrum swap --with start any command as this user (default: named builds only)")(
           "keep-going", "continue the session without a node that failed for good (default: end it)")(
           "attach",
           "for nodes that are systemd services: write their arguments below $RUNTIME_DIRECTORY/session; start and kill "
@@ -110,6 +114,11 @@ ExitCode Up(const Words& words) {
     if (settings.standby && (settings.remote >> static_cast<unsigned>(NodeId::kPhysics) & 1u) != 0) {
       throw InputError("--standby cannot be combined with --remote physics_node");
     }
+  }
+  settings.allow_swap_command = values.count("allow-swap-command") != 0;
+  settings.open_bus = values.count("open-bus") != 0;
+  if (settings.open_bus && !settings.cart.security.keys.empty()) {
+    throw InputError("--open-bus: the cart file names keys (security.keys); drop one of the two");
   }
   settings.keep_going = values.count("keep-going") != 0;
   settings.attach = AttachTo(values);

@@ -3,6 +3,7 @@
 #include <sstream>
 #include <thread>
 
+#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 
 namespace fulcrum::replay {
@@ -65,8 +66,9 @@ void AddOptions(po::options_description* options) {
       ("only", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
        "live: publish only the topics of these nodes")  //
       ("except", po::value<std::vector<std::string>>()->multitoken()->value_name("NODE"),
-       "live: publish the topics of all nodes except these")                                         //
-      ("domain", po::value<int>()->value_name("N")->default_value(7), "live: DDS domain, 1 to 100")  //
+       "live: publish the topics of all nodes except these")  //
+      ("domain", po::value<int>()->value_name("N")->default_value(config::DefaultDomain()),
+       "live: DDS domain, 1 to 100")  //
       ("from", po::value<double>()->value_name("S")->default_value(0),
        "live: start at this time after the first message [s]")  //
       ("frames", po::value<std::string>()->value_name("DIR")->default_value(""),

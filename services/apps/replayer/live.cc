@@ -69,7 +69,6 @@ class ChannelOf final : public Channel {
 };
 
 bool IsSent(TopicId topic, const std::vector<NodeId>& nodes) {
-  if (topic == TopicId::kCommand || topic == TopicId::kCommandReply) return false;
   const std::optional<NodeId> owner = bus::OwnerOf(topic);
   return !owner || std::find(nodes.begin(), nodes.end(), *owner) != nodes.end();
 }

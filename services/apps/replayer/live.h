@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "services/base/config/cart.h"
 #include "services/base/core/messages.h"
 #include "services/transport/bus/security.h"
 
@@ -13,7 +14,7 @@ namespace fulcrum::replay {
 
 struct LiveSettings {
   std::filesystem::path recording;
-  int domain = 7;
+  int domain = config::DefaultDomain();
   bus::Security security = {};  ///< Off: the settings of the session that runs in the domain are used.
   double from_s = 0;            ///< Start, as time after the first message of the recording [s].
   std::vector<NodeId> nodes;    ///< Nodes whose messages are published.

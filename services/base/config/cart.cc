@@ -1,5 +1,7 @@
 #include "services/base/config/cart.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 
 #include "services/base/config/strict_yaml.h"
@@ -96,6 +98,7 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   StrictMap root = file->root();
   cart.name = root.TextOr("name", cart.name, 31);
   cart.domain = static_cast<int>(root.Integer("domain", cart.domain, 1, 100));
+  cart.builds = root.TextOr("builds", cart.builds);
   StrictMap handles = root.MapOrDefaults("handles");
   for (std::size_t tool = 0; tool < cart.handles.size(); ++tool) {
     StrictMap map = handles.MapOrDefaults(ToolKey(tool));
@@ -130,6 +133,7 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   StrictMap security = root.MapOrDefaults("security");
   cart.security.keys = security.TextOr("keys", cart.security.keys);
   cart.security.encrypt = security.Flag("encrypt", cart.security.encrypt);
+  cart.security.group = security.TextOr("group", cart.security.group);
   file->Finish();
   return cart;
 }
@@ -270,9 +274,12 @@ void Validate(const CartConfig& cart) {
   ValidateLink("pedal", cart.pedal.kind, cart.pedal.link);
   ValidatePorts(cart);
   ValidateDevices(cart);
-  if (cart.security.encrypt && cart.security.keys.empty()) {
-    Refuse("security.encrypt", "is true, but `keys` names no folder; make one with fulcrum keys init");
-  }
+}
+
+int DefaultDomain() {
+  // Users with neighbouring ids get different domains; the highest ones stay free for tests.
+  constexpr unsigned kDomains = 97;
+  return 1 + static_cast<int>((::getuid() + 6u) % kDomains);
 }
 
 CartConfig LoadCart(const std::filesystem::path& file) {
@@ -283,6 +290,7 @@ CartConfig LoadCart(const std::filesystem::path& file) {
   };
   for (DeviceConfig& device : cart.devices) from_its_folder(&device.motion);
   from_its_folder(&cart.security.keys);
+  from_its_folder(&cart.builds);
   return cart;
 }
 

@@ -112,13 +112,18 @@ struct NodeTiming {
 
 /// Access to the session's bus: services/transport/bus/DESIGN.md.
 struct SecurityConfig {
-  std::string keys;      ///< Folder made by `fulcrum keys init`; empty: no access control.
-  bool encrypt = false;  ///< Encrypts all datagrams, for traffic between hosts.
+  std::string keys;      ///< Folder made by `fulcrum keys init`; empty: each session makes its own.
+  bool encrypt = false;  ///< Encrypts all datagrams.
+  std::string group;     ///< Group whose members may send commands to a session; empty: its user only.
 };
+
+/// Domain of a cart that names none: differs between users, so that two of them do not meet on one bus.
+[[nodiscard]] int DefaultDomain();
 
 struct CartConfig {
   std::string name = "simulated";
-  int domain = 7;  ///< DDS domain, 1 to 100.
+  int domain = DefaultDomain();  ///< DDS domain, 1 to 100.
+  std::string builds;  ///< Folder whose subfolders NAME/bin have builds for `fulcrum swap --build NAME`; empty: none.
   std::array<HandleConfig, kMaxTools> handles;
   PedalConfig pedal;
   GeneratorConfig generator;

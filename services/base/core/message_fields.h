@@ -42,8 +42,6 @@ namespace fulcrum {
   F(topology_revision)
 #define FULCRUM_FIELDS_OF_SceneManifest(F) F(stamp) F(scene_name) F(session_id) F(scene_hash) F(session_start_ns) \
   F(mode) F(recorded)
-#define FULCRUM_FIELDS_OF_Command(F) F(stamp) F(request_id) F(target) F(verb) F(argument)
-#define FULCRUM_FIELDS_OF_CommandReply(F) F(stamp) F(request_id) F(from_node) F(ok) F(text)
 #define FULCRUM_FIELDS_OF_ConsumedInput(F) F(topic) F(epoch) F(sequence)
 #define FULCRUM_FIELDS_OF_TickManifest(F) F(stamp) F(node) F(tick) F(session_time_s) F(state_hash) F(consumed)
 #define FULCRUM_FIELDS_OF_TimingSummary(F) F(p50_us) F(p99_us) F(max_us)
@@ -55,8 +53,8 @@ namespace fulcrum {
 /// S(T) for each struct whose fields have the same names in IDL: its conversion is generated from its list.
 #define FULCRUM_STRUCTS_ALIKE_IN_IDL(S) S(HandleSample) S(HandleState) S(GeneratorSetting) S(ToolSample) \
   S(ToolState) S(TissueFrameHeader) S(Contact) S(DeviceContacts) S(ContactModel) S(Footprint) S(CauteryContact) \
-  S(TopologyState) S(TearState) S(OpenCells) S(TemperaturePatchHeader) S(ThermalEvent) S(SceneManifest) S(Command) \
-  S(CommandReply) S(TickManifest) S(TimingSummary) S(InputHealth) S(Metric) S(Health)
+  S(TopologyState) S(TearState) S(OpenCells) S(TemperaturePatchHeader) S(ThermalEvent) S(SceneManifest) \
+  S(TickManifest) S(TimingSummary) S(InputHealth) S(Metric) S(Health)
 /// The others: `sequence` is a keyword of IDL, and the two large messages are sent in loans.
 #define FULCRUM_STRUCTS_WITH_A_CONVERSION_OF_THEIR_OWN(S) S(Stamp) S(ConsumedInput) S(TissueFrame) S(TemperaturePatch)
 // clang-format on

@@ -275,7 +275,7 @@ struct ThermalEvent {
   std::uint64_t topology_revision = 0;
 };
 
-// --------------------------------------------------------------------------- SceneManifest, Command, TickManifest
+// --------------------------------------------------------------------------- SceneManifest, TickManifest
 
 enum class SessionMode : std::uint8_t { kLive, kLockStep };
 
@@ -290,29 +290,13 @@ struct SceneManifest {
   bool recorded = false;
 };
 
-struct Command {
-  Stamp stamp;
-  std::uint64_t request_id = 0;
-  NodeId target = NodeId::kSupervisor;
-  std::string verb;
-  std::string argument;
-};
-
-struct CommandReply {
-  Stamp stamp;
-  std::uint64_t request_id = 0;
-  NodeId from_node = NodeId::kSupervisor;
-  bool ok = false;
-  std::string text;
-};
-
 /// Every message, M(T) each, in the order of the topics' numbers: a new one is added at the end. Everything that treats
 /// all messages alike is made from this list: TopicId, the roles (services/transport/bus/topics.h), the gate's
 /// declarations, the ports.
 // clang-format off
 #define FULCRUM_MESSAGES(M) \
   M(HandleState) M(ToolState) M(TissueFrame) M(ContactModel) M(CauteryContact) M(TopologyState) \
-  M(TemperaturePatch) M(ThermalEvent) M(SceneManifest) M(Command) M(CommandReply) M(TickManifest) \
+  M(TemperaturePatch) M(ThermalEvent) M(SceneManifest) M(TickManifest) \
   M(Health) M(TearState) M(OpenCells) M(GeneratorSetting)
 // clang-format on
 

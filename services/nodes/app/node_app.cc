@@ -19,7 +19,9 @@
 #include "services/nodes/app/cart_security.h"
 #include "services/nodes/app/health_report.h"
 #include "services/nodes/app/recorder_wait.h"
+#include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/input_account.h"
+#include "services/transport/control/control_socket.h"
 
 namespace fulcrum::app {
 namespace {
@@ -60,21 +62,17 @@ struct NodeApp::Impl {
     explicit Joined(const bus::DdsSettings& settings)
         : participant(settings),
           manifests(participant.MakeInput<SceneManifest>()),
-          commands(participant.MakeInput<Command>()),
-          replies(participant.MakeOutput<CommandReply>()),
           healths(participant.MakeOutput<Health>()) {}
 
     bus::DdsParticipant participant;
     std::unique_ptr<bus::Input<SceneManifest>> manifests;
-    std::unique_ptr<bus::Input<Command>> commands;
-    std::unique_ptr<bus::OutputOf<CommandReply>::type> replies;
     std::unique_ptr<bus::OutputOf<Health>::type> healths;
-    bus::Stamper reply_stamper{MonotonicNs()}, health_stamper{MonotonicNs()};
+    bus::Stamper health_stamper{MonotonicNs()};
   };
   Joined& Join() {
     if (!joined) {
       joined.emplace(bus::DdsSettings{
-          .domain = options.domain, .node_name = NodeName(node), .security = SecurityOf(cart, NodeName(node))});
+          .domain = options.domain, .node_name = NodeName(node), .security = SecurityOf(cart, memory, NodeName(node))});
     }
     return *joined;
   }
@@ -93,25 +91,6 @@ struct NodeApp::Impl {
         Log(LogLevel::kInfo, "joined session " + manifest.session_id);
       }
     }
-    Command command;
-    while (joined->commands->TakeNext(&command)) {
-      if (command.target != node) continue;
-      CommandReply reply;
-      try {
-        const auto handler = handlers.find(command.verb);
-        if (handler == handlers.end()) {
-          throw InputError("unknown verb \"" + command.verb + "\"; " + NodeName(node) + " knows: " + Verbs());
-        }
-        reply.text = handler->second(command.argument);
-        reply.ok = true;
-      } catch (const std::exception& error) {
-        reply.text = error.what();
-      }
-      reply.stamp = joined->reply_stamper.Next(MonotonicNs());
-      reply.request_id = command.request_id;
-      reply.from_node = node;
-      joined->replies->Write(reply);
-    }
     if (const std::string mismatch = joined->participant.schema_mismatch(); !mismatch.empty()) {
       End(ExitCode::kMismatch, mismatch);
     }
@@ -119,6 +98,15 @@ struct NodeApp::Impl {
     for (; refusals_told < refusals.texts.size(); ++refusals_told) {
       Log(LogLevel::kWarning, "refused: " + refusals.texts[refusals_told]);
     }
+  }
+
+  /// Executes an order of the supervisor. Throws InputError.
+  [[nodiscard]] control::Reply Execute(const control::Request& order) const {
+    const auto handler = handlers.find(order.verb);
+    if (handler == handlers.end()) {
+      throw InputError("unknown verb \"" + order.verb + "\"; " + NodeName(node) + " has: " + Verbs());
+    }
+    return {true, handler->second(order.argument)};
   }
 
   [[nodiscard]] std::string Verbs() const {
@@ -182,6 +170,7 @@ struct NodeApp::Impl {
 
   void Poll() {
     PollBus();
+    if (orders) orders->Serve([this](const control::Request& order) { return Execute(order); });
     polls.fetch_add(1, std::memory_order_relaxed);
   }
 
@@ -233,6 +222,9 @@ struct NodeApp::Impl {
     if (const std::uint64_t locks = bus::DdsParticipant::inherited_locks(); locks > 0) {
       health.metrics.push_back({"locks_inherited", static_cast<double>(locks)});
     }
+    if (const std::uint64_t foreign = joined->participant.foreign_samples(); foreign > 0) {
+      health.metrics.push_back({"foreign_samples", static_cast<double>(foreign)});
+    }
     FitToMessage(&health);
     joined->healths->Write(health);
     return health;
@@ -242,14 +234,16 @@ struct NodeApp::Impl {
   NodeOptions options;
   config::CartConfig cart;
   scene::SceneFile scene;
+  const std::filesystem::path memory = bus::SharedMemoryDirectory(options.domain);
   std::optional<Joined> joined;
+  std::optional<control::Server> orders;  ///< Of the supervisor.
   std::vector<HealthReport::InputWatch> inputs;
   std::vector<HealthReport::OutputWatch> outputs;
   std::vector<std::shared_ptr<void>> ports;
   std::map<std::string, std::function<std::string(const std::string&)>> handlers{
       {"stop",
        [this](const std::string&) {
-         End(ExitCode::kDone, "stopped by command");
+         End(ExitCode::kDone, "stopped by order");
          return "stopping";
        }},
       {"restart", [this](const std::string&) {
@@ -306,7 +300,7 @@ void NodeApp::Keep(std::shared_ptr<void> port) { impl_->ports.push_back(std::mov
 
 double NodeApp::SessionTime(std::int64_t stamp_ns) const noexcept { return impl_->SessionTime(stamp_ns); }
 
-void NodeApp::OnCommand(std::string verb, std::function<std::string(const std::string&)> handler) {
+void NodeApp::OnOrder(std::string verb, std::function<std::string(const std::string&)> handler) {
   impl_->handlers[std::move(verb)] = std::move(handler);
 }
 
@@ -325,6 +319,7 @@ ExitCode NodeApp::Run(const runtime::CyclicThreadSettings& settings, const std::
   Impl& app = *impl_;
   app.Join();
   app.RefuseUnknownOptions();
+  app.orders.emplace(control::SocketOf(app.memory, NodeName(app.node)));
   runtime::CyclicThread steps(settings, [&](const Tick& tick) { app.Step(tick, step); });
   HealthReport report(app.node, settings.period_ns, bus::SchemaHash(), app.scene.view().hash, ::getpid());
   app.state = HealthState::kWaiting;

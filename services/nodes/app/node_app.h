@@ -38,7 +38,7 @@ struct NodeOptions {
   std::filesystem::path scene;
   std::filesystem::path session;  ///< Folder for logs, checkpoints and pictures.
   std::filesystem::path cart;     ///< Effective cart configuration; may be empty.
-  int domain = 7;
+  int domain = config::DefaultDomain();
   std::vector<std::string> extra;  ///< Remaining options, which the node itself interprets, for example --window.
 
   /// Removes a flag such as "--window" from `extra`; true if it was there.
@@ -99,14 +99,15 @@ class NodeApp {
   /// Session time of a monotonic stamp, from SceneManifest [s]; negative until the session is known. Real-time safe.
   [[nodiscard]] double SessionTime(std::int64_t stamp_ns) const noexcept;
 
-  /// Sets the handler of a Command with this verb, in addition to "stop" and "restart": it receives the argument and
-  /// returns the text of the reply; an exception refuses the command. Called on the thread of Run(). Set before Run().
-  void OnCommand(std::string verb, std::function<std::string(const std::string&)> handler);
+  /// Sets the handler of an order of the supervisor with this verb, in addition to "stop" and "restart": it receives
+  /// the argument and returns the text of the reply; an exception refuses the order. Called on the thread of Run(). Set
+  /// before Run().
+  void OnOrder(std::string verb, std::function<std::string(const std::string&)> handler);
 
   /// Fills in the part of Health other than rates and timing: metrics, state, last_error. Called at 10 Hz on the health
   /// thread, so it must be thread-safe.
   using HealthFill = std::function<void(Health*)>;
-  /// Waits for the session, then runs `step` at the given rate on a thread of its own until a stop signal, a Command
+  /// Waits for the session, then runs `step` at the given rate on a thread of its own until a stop signal, the order
   /// "stop", a schema or scene mismatch, or Finish(). Publishes Health at 10 Hz from the start. `step` receives a tick
   /// with session_time_s and is never called before the session is known. Call once.
   ExitCode Run(const runtime::CyclicThreadSettings& settings, const std::function<void(const Tick&)>& step,

@@ -32,12 +32,13 @@ std::string NodeOptions::TakeValue(std::string_view name, std::string_view missi
 ParsedOptions ParseNodeOptions(int argc, const char* const* argv, NodeId node, const char* description) {
   namespace po = boost::program_options;
   po::options_description known("Options");
-  known.add_options()                                                                                        //
-      ("scene", po::value<std::string>()->value_name("FILE"), "compiled scene file (see scene_compiler)")    //
-      ("session", po::value<std::string>()->value_name("DIR"), "session folder: checkpoints and pictures")   //
-      ("domain", po::value<int>()->value_name("N")->default_value(7), "DDS domain, 1 to 100: one per cart")  //
-      ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration; default: all simulated")   //
-      ("version", "print the version")                                                                       //
+  known.add_options()                                                                                       //
+      ("scene", po::value<std::string>()->value_name("FILE"), "compiled scene file (see scene_compiler)")   //
+      ("session", po::value<std::string>()->value_name("DIR"), "session folder: checkpoints and pictures")  //
+      ("domain", po::value<int>()->value_name("N")->default_value(config::DefaultDomain()),
+       "DDS domain, 1 to 100: one per cart (default: one of this user)")                                    //
+      ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration; default: all simulated")  //
+      ("version", "print the version")                                                                      //
       ("help", "print this");
   ParsedOptions parsed;
   try {

@@ -10,6 +10,7 @@
 #include "services/base/runtime/realtime.h"
 #include "services/nodes/app/cart_security.h"
 #include "services/records/recorder/recorder_health.h"
+#include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/topics.h"
 
 namespace fulcrum::recorder {
@@ -36,7 +37,8 @@ recording::TextMap Describe(const bus::Peer& peer) {
 bus::DdsSettings BusSettings(app::NodeApp* app) {
   return {.domain = app->options().domain,
           .node_name = bus::kRecorderPeer,
-          .security = app::SecurityOf(app->cart(), NodeName(NodeId::kRecorder)),
+          .security = app::SecurityOf(app->cart(), bus::SharedMemoryDirectory(app->options().domain),
+                                      NodeName(NodeId::kRecorder)),
           .gathers = true};
 }
 
@@ -51,7 +53,7 @@ RecorderNode::RecorderNode(app::NodeApp* app, const RecorderSettings& settings)
     : bus_(BusSettings(app)), recorder_(WithDescription(settings, bus_)), dumps_(&recorder_, app->options().session) {
   ReceiveAllTopics(app);
   if (settings.keep_s > 0) {
-    app->OnCommand("dump", [this](const std::string& reason) { return dumps_.Ask(reason); });
+    app->OnOrder("dump", [this](const std::string& reason) { return dumps_.Ask(reason); });
   }
   if (!settings.file.empty()) {
     runtime::Log(runtime::LogLevel::kInfo, "recording into " + settings.file.string());

@@ -345,7 +345,7 @@ struct Console::Impl {
   void TakeAnswer() {
     ++notice.number;
     try {
-      const CommandReply reply = asking.get();
+      const control::Reply reply = asking.get();
       notice.ok = reply.ok;
       notice.text = reply.text;
     } catch (const std::exception& error) {
@@ -363,7 +363,7 @@ struct Console::Impl {
   std::unique_ptr<GuidedTask> task;
   std::string session;  ///< Name of the shown session's folder in `out`; empty: none.
   PictureWatch pictures;
-  std::future<CommandReply> asking;
+  std::future<control::Reply> asking;
   Notice notice;
   std::string ticket;
   std::int64_t ticket_end_ns = 0;

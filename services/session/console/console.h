@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "services/base/config/cart.h"
+
 namespace fulcrum::console {
 
 struct ConsoleSettings {
@@ -21,7 +23,7 @@ struct ConsoleSettings {
   std::filesystem::path out;       ///< Folder of the session folders.
   std::filesystem::path scenes;    ///< Folder of the scene descriptions on offer.
   std::filesystem::path programs;  ///< Folder of fulcrum, replayer and the nodes.
-  int domain = 7;
+  int domain = config::DefaultDomain();
 };
 
 class Console {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "services/base/config/cart.h"
 #include "services/session/supervisor/child_process.h"
 
 namespace fulcrum::console {
@@ -22,7 +23,7 @@ struct SessionRunSettings {
   std::filesystem::path out;
   std::filesystem::path cart;  ///< Cart file; empty: all hardware is simulated.
   std::filesystem::path data;  ///< Folder of meshes; empty: the folder of the scene.
-  int domain = 7;
+  int domain = config::DefaultDomain();
 };
 
 /// How a session ended.

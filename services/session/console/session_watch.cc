@@ -2,8 +2,6 @@
 
 #include <exception>
 
-#include "services/session/supervisor/domain_guard.h"
-
 namespace fulcrum::console {
 namespace {
 
@@ -14,13 +12,15 @@ constexpr std::int64_t kPointPeriod_ns = 200'000'000;
 std::string RestartMetric(NodeId node) { return std::string("restarts_") + NodeName(node); }
 
 void SessionWatch::Turn(std::int64_t now_ns) {
-  if (!supervisor::DomainGuard::IsHeld(domain_)) {
+  const std::uint64_t session = supervisor::RunningSession(domain_);
+  if (session == 0 || (seen_ && seen_->session != session)) {
     seen_.reset();
     return;
   }
   if (!seen_) {
     try {
       seen_ = std::make_unique<Seen>(domain_);
+      seen_->session = session;
       trouble_.clear();
       points_.clear();
     } catch (const std::exception& error) {

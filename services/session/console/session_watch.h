@@ -53,6 +53,7 @@ class SessionWatch {
  private:
   struct Seen {
     explicit Seen(int domain) : view(domain), events(view.participant().MakeInput<ThermalEvent>()) {}
+    std::uint64_t session = 0;  ///< Its secret number: another one is another session.
     supervisor::SessionView view;
     std::unique_ptr<bus::Input<ThermalEvent>> events;
     std::map<ThermalEventKind, std::int64_t> event_ns;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "services/base/config/cart.h"
 #include "services/base/core/exit_code.h"
 #include "services/session/soak/soak_record.h"
 
@@ -17,7 +18,7 @@ struct SoakSettings {
   std::filesystem::path program;  ///< Path of the program fulcrum.
   std::filesystem::path out;      ///< Folder in which the folder of this soak is made.
   std::vector<std::string> up;    ///< Further arguments of `fulcrum up`.
-  int domain = 7;
+  int domain = config::DefaultDomain();
   double minutes = 10;
   bool chaos = false;
   std::uint32_t seed = 1;

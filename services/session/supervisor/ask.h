@@ -3,12 +3,12 @@
 
 #include <string>
 
-#include "services/base/core/messages.h"
+#include "services/transport/control/control_socket.h"
 
 namespace fulcrum::supervisor {
 
 /// Sends a command to the supervisor of the domain and returns its reply. Throws InputError when no supervisor runs
-/// there, MismatchError when its schema differs, std::runtime_error when no reply arrives within 10 s.
-[[nodiscard]] CommandReply AskSupervisor(int domain, const std::string& verb, const std::string& argument);
+/// there, std::runtime_error when no reply arrives within 10 s.
+[[nodiscard]] control::Reply AskSupervisor(int domain, const std::string& verb, const std::string& argument);
 
 }  // namespace fulcrum::supervisor

@@ -1,60 +1,46 @@
 #include "services/session/supervisor/command_desk.h"
 
-#include <algorithm>
+#include <grp.h>
+
+#include <optional>
 #include <utility>
 
-#include "services/base/runtime/cyclic_thread.h"
+#include "services/base/core/error.h"
+#include "services/base/core/messages.h"
 
 namespace fulcrum::supervisor {
 namespace {
 
-// Replies kept for repeated requests: more than there are operators and client programs on one cart (assumed).
-constexpr std::size_t kAnswersKept = 8;
+std::optional<gid_t> GroupOf(const std::string& name) {
+  if (name.empty()) return std::nullopt;
+  const group* found = ::getgrnam(name.c_str());
+  if (found == nullptr) {
+    throw InputError("security.group: \"" + name + "\" is no group of this machine; see getent group");
+  }
+  return found->gr_gid;
+}
 
 }  // namespace
 
-CommandDesk::CommandDesk(std::unique_ptr<bus::Input<Command>> commands,
-                         std::unique_ptr<bus::Output<CommandReply>> replies, std::vector<Verb> verbs)
+CommandDesk::CommandDesk(const std::filesystem::path& memory, const DomainGuard& guard, const std::string& group,
+                         std::vector<Verb> verbs)
     : verbs_(std::move(verbs)),
-      stamper_(runtime::MonotonicNs()),
-      replies_(std::move(replies)),
-      commands_(std::move(commands)) {}
+      own_(control::SocketOf(memory, NodeName(NodeId::kSupervisor))),
+      others_(guard.listening(), GroupOf(group)) {}
 
 void CommandDesk::Serve(std::int64_t now_ns) {
-  Command command;
-  while (commands_->TakeNext(&command)) {
-    if (command.target != NodeId::kSupervisor || Repeat(command.request_id, now_ns)) {
-      continue;
-    }
-    CommandReply reply;
-    reply.stamp = stamper_.Next(now_ns);
-    reply.request_id = command.request_id;
-    reply.from_node = NodeId::kSupervisor;
-    const CommandAnswer answer = Execute(command, now_ns);
-    reply.ok = answer.ok;
-    reply.text = answer.text;
-    replies_->Write(reply);
-    if (answered_.size() == kAnswersKept) answered_.pop_front();
-    answered_.push_back(reply);
-  }
+  const auto execute = [&](const control::Request& request) { return Execute(request, now_ns); };
+  own_.Serve(execute);
+  others_.Serve(execute);
 }
 
-bool CommandDesk::Repeat(std::uint64_t request_id, std::int64_t now_ns) {
-  const auto past = std::find_if(answered_.begin(), answered_.end(),
-                                 [&](const CommandReply& reply) { return reply.request_id == request_id; });
-  if (past == answered_.end()) return false;
-  past->stamp = stamper_.Next(now_ns);
-  replies_->Write(*past);
-  return true;
-}
-
-CommandAnswer CommandDesk::Execute(const Command& command, std::int64_t now_ns) const {
+CommandAnswer CommandDesk::Execute(const control::Request& request, std::int64_t now_ns) const {
   std::string known;
   for (const Verb& verb : verbs_) {
-    if (verb.name == command.verb) return verb.handle(command.argument, now_ns);
+    if (verb.name == request.verb) return verb.handle(request.argument, now_ns);
     known += (known.empty() ? "" : ", ") + verb.name;
   }
-  return {false, "unknown verb \"" + command.verb + "\"; valid: " + known};
+  return {false, "unknown verb \"" + request.verb + "\"; valid: " + known};
 }
 
 }  // namespace fulcrum::supervisor

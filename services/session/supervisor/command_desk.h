@@ -1,28 +1,21 @@
-// Execution of commands to the supervisor: reads them from the bus, calls the handler of their verb, publishes the
-// reply.
+// Execution of commands to the supervisor: calls the handler of their verb.
 //
-//   CommandDesk desk(std::move(commands), std::move(replies), {{"down", [&](auto&, auto) { return End(); }}});
+//   CommandDesk desk(memory, guard, "lab", {{"down", [&](auto&, auto) { return End(); }}});
 //   desk.Serve(MonotonicNs());  // Each turn of the loop.
 #pragma once
 
 #include <cstdint>
-#include <deque>
+#include <filesystem>
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "services/base/core/messages.h"
-#include "services/transport/bus/input_account.h"
-#include "services/transport/bus/port.h"
+#include "services/session/supervisor/domain_guard.h"
+#include "services/transport/control/control_socket.h"
 
 namespace fulcrum::supervisor {
 
-/// Result of a command.
-struct CommandAnswer {
-  bool ok = true;    ///< False: refused, and nothing was changed.
-  std::string text;  ///< One line, for people.
-};
+using CommandAnswer = control::Reply;
 
 class CommandDesk {
  public:
@@ -32,24 +25,25 @@ class CommandDesk {
     Handler handle;
   };
 
+  /// @param memory the cart's private directory, for the socket of this user.
+  /// @param guard must outlive this.
+  /// @param group name of the group whose members may send commands; empty: this user only. Throws InputError if there
+  /// is no such group.
   /// @param verbs in the order in which the reply to an unknown verb lists them.
-  CommandDesk(std::unique_ptr<bus::Input<Command>> commands, std::unique_ptr<bus::Output<CommandReply>> replies,
+  CommandDesk(const std::filesystem::path& memory, const DomainGuard& guard, const std::string& group,
               std::vector<Verb> verbs);
 
-  /// Executes the commands that have arrived, in their order. A command with the request id of a recent one is a
-  /// repetition, sent because no reply has arrived yet: it gets the same reply again and is not executed.
+  /// Executes the commands that have arrived.
   void Serve(std::int64_t now_ns);
+  /// Callers that were refused: of another user and not of the group.
+  [[nodiscard]] std::uint64_t refused() const { return own_.refused() + others_.refused(); }
 
  private:
-  [[nodiscard]] bool Repeat(std::uint64_t request_id, std::int64_t now_ns);
-  [[nodiscard]] CommandAnswer Execute(const Command& command, std::int64_t now_ns) const;
+  [[nodiscard]] CommandAnswer Execute(const control::Request& request, std::int64_t now_ns) const;
 
   const std::vector<Verb> verbs_;
-  std::deque<CommandReply> answered_;  ///< The newest replies.
-  bus::Stamper stamper_;
-  // The input is closed before the output.
-  std::unique_ptr<bus::Output<CommandReply>> replies_;
-  std::unique_ptr<bus::Input<Command>> commands_;
+  control::Server own_;     ///< In the private directory.
+  control::Server others_;  ///< On the guard's socket.
 };
 
 }  // namespace fulcrum::supervisor

@@ -1,19 +1,31 @@
-// One supervisor per user and domain.
+// One supervisor per domain on this machine, whoever runs it: two sessions on one bus would mix their samples.
 #pragma once
+
+#include <optional>
+
+#include "services/transport/control/control_socket.h"
 
 namespace fulcrum::supervisor {
 
-/// Holds a name in the abstract socket namespace. The kernel releases it however the process ends, and no file remains.
+/// Listens on a name in the abstract socket namespace, which is that of the loopback. The kernel releases it however
+/// the process ends, and no file remains. The kernel names the process behind it to everyone who connects.
 class DomainGuard {
  public:
-  /// Throws InputError when another supervisor holds the domain.
+  /// Throws InputError when another supervisor holds the domain, with its pid, user and host.
   explicit DomainGuard(int domain);
   ~DomainGuard();
   DomainGuard(const DomainGuard&) = delete;
   DomainGuard& operator=(const DomainGuard&) = delete;
 
+  /// Socket on which members of the cart's group send commands; everyone else is refused there.
+  [[nodiscard]] int listening() const { return socket_; }
+
+  /// The process that holds the domain.
+  [[nodiscard]] static std::optional<control::Caller> Holder(int domain);
   /// True when a supervisor of this user runs in the domain.
   [[nodiscard]] static bool IsHeld(int domain);
+  /// Connection to the holder, to be closed by the caller; -1: none holds the domain.
+  [[nodiscard]] static int Connect(int domain);
 
  private:
   int socket_;

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <string>
 
+#include "services/base/config/cart.h"
 #include "services/base/core/exit_code.h"
 #include "services/transport/bus/dds/far_participant.h"
 
@@ -13,12 +14,12 @@ namespace fulcrum::supervisor {
 
 struct HostSettings {
   bus::FarSettings far;
-  int domain = 7;                  ///< Domain of this host's own bus.
-  std::uint32_t allowed = ~0u;     ///< Nodes that a cart may start here, one bit per NodeId.
-  std::filesystem::path out;       ///< Folder in which the session folder is made.
-  std::filesystem::path programs;  ///< Folder of the node programs.
-  std::filesystem::path cache;     ///< Folder of received scenes, named by their hash.
-  std::string quality = "auto";    ///< Quality of the picture: auto, low, high.
+  int domain = config::DefaultDomain();  ///< Domain of this host's own bus.
+  std::uint32_t allowed = ~0u;           ///< Nodes that a cart may start here, one bit per NodeId.
+  std::filesystem::path out;             ///< Folder in which the session folder is made.
+  std::filesystem::path programs;        ///< Folder of the node programs.
+  std::filesystem::path cache;           ///< Folder of received scenes, named by their hash.
+  std::string quality = "auto";          ///< Quality of the picture: auto, low, high.
   bool window = false;
 };
 

@@ -1,23 +1,11 @@
 #include "services/session/supervisor/node_orders.h"
 
-#include <utility>
-
-#include "services/base/runtime/cyclic_thread.h"
+#include "services/transport/control/control_socket.h"
 
 namespace fulcrum::supervisor {
 
-NodeOrders::NodeOrders(std::unique_ptr<bus::Output<Command>> out)
-    : out_(std::move(out)), stamper_(runtime::MonotonicNs()) {}
-
-void NodeOrders::Send(NodeId target, const std::string& verb, const std::string& argument) {
-  const std::int64_t now = runtime::MonotonicNs();
-  Command order;
-  order.stamp = stamper_.Next(now);
-  order.request_id = static_cast<std::uint64_t>(now);
-  order.target = target;
-  order.verb = verb;
-  order.argument = argument;
-  out_->Write(order);
+bool NodeOrders::Send(NodeId target, const std::string& verb, const std::string& argument) const {
+  return control::Tell(control::SocketOf(memory_, NodeName(target)), {verb, argument});
 }
 
 }  // namespace fulcrum::supervisor

@@ -1,23 +1,23 @@
-// Commands from the supervisor to nodes.
+// Orders from the supervisor to nodes of this host, through the socket of each node in the cart's private directory.
 #pragma once
 
-#include <memory>
+#include <filesystem>
 #include <string>
+#include <utility>
 
 #include "services/base/core/messages.h"
-#include "services/transport/bus/input_account.h"
-#include "services/transport/bus/port.h"
 
 namespace fulcrum::supervisor {
 
 class NodeOrders {
  public:
-  explicit NodeOrders(std::unique_ptr<bus::Output<Command>> out);
-  void Send(NodeId target, const std::string& verb, const std::string& argument = {});
+  /// @param memory the cart's private directory.
+  explicit NodeOrders(std::filesystem::path memory) : memory_(std::move(memory)) {}
+  /// Waits for no reply. False if the node does not run.
+  bool Send(NodeId target, const std::string& verb, const std::string& argument = {}) const;
 
  private:
-  std::unique_ptr<bus::Output<Command>> out_;
-  bus::Stamper stamper_;
+  std::filesystem::path memory_;
 };
 
 }  // namespace fulcrum::supervisor

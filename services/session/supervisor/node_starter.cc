@@ -10,6 +10,11 @@
 #include "services/session/supervisor/outcome.h"
 
 namespace fulcrum::supervisor {
+namespace {
+
+constexpr const char* kOwnBuild = "own";  // The programs with which the session was started.
+
+}  // namespace
 
 NodeCommand NodeStarter::Usual(NodeId id) const {
   NodeCommand command;
@@ -45,9 +50,49 @@ NodeCommand NodeStarter::InPair(const std::string& seat, bool follows) const {
 }
 
 NodeCommand NodeStarter::Replacement(const NodeCommand& now, const std::vector<std::string>& words) const {
-  if (words.empty() || ::access(words.front().c_str(), X_OK) != 0) {
-    throw InputError((words.empty() ? "no command" : words.front()) +
-                     ": is not an executable program; nothing was changed. Give its path to --with");
+  const std::string kind = words.empty() ? std::string() : words.front();
+  if (kind == "build" && words.size() == 2) return CommandFrom(now, {BuildOf(now.id, words[1]).string()});
+  if (kind == "recording" && words.size() == 2) {
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(words[1], ignored)) {
+      throw InputError(words[1] + ": is no recording; nothing was changed");
+    }
+    return CommandFrom(now, {(settings.programs / "replayer").string(), words[1], "--live", "--only", NodeName(now.id),
+                             "--domain", std::to_string(settings.cart.domain)});
+  }
+  if (kind == "command" && words.size() > 1) {
+    if (!settings.allow_swap_command) {
+      throw InputError(
+          "this session takes no command lines; nothing was changed. Start it with fulcrum up --allow-swap-command, or "
+          "name a build (--build NAME)");
+    }
+    return CommandFrom(now, {words.begin() + 1, words.end()});
+  }
+  throw InputError("swap: needs a build, a recording or a command; nothing was changed");
+}
+
+std::filesystem::path NodeStarter::BuildOf(NodeId id, const std::string& name) const {
+  if (name == kOwnBuild) return settings.programs / NodeName(id);
+  const std::filesystem::path builds = settings.cart.builds;
+  if (builds.empty()) {
+    throw InputError(
+        "the cart file names no folder of builds (`builds: DIR`); nothing was changed. Valid without it: " +
+        std::string(kOwnBuild));
+  }
+  // A name, never a path.
+  std::string found = kOwnBuild;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(builds, ignored)) {
+    const std::string build = entry.path().filename();
+    if (build == name) return entry.path() / "bin" / NodeName(id);
+    found += ", " + build;
+  }
+  throw InputError("no build \"" + name + "\" in " + builds.string() + "; nothing was changed. Valid: " + found);
+}
+
+NodeCommand NodeStarter::CommandFrom(const NodeCommand& now, const std::vector<std::string>& words) const {
+  if (::access(words.front().c_str(), X_OK) != 0) {
+    throw InputError(words.front() + ": is not an executable program; nothing was changed");
   }
   // A program that is not a build of the node gets its own arguments only, not those added at a restart.
   NodeCommand command = now.foreign ? Usual(now.id) : now;

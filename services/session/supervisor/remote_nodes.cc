@@ -47,12 +47,12 @@ RemoteNodes::RemoteNodes(const SessionSetup& setup, bus::DdsParticipant* partici
   link_->Join(participant, link_->settings().offer->nodes);
 }
 
-std::optional<CommandAnswer> RemoteNodes::Restart(const std::string& name, NodeOrders* orders) const {
+std::optional<CommandAnswer> RemoteNodes::Restart(const std::string& name) const {
   const auto node =
       std::find_if(setup_.remote_ids.begin(), setup_.remote_ids.end(), [&](NodeId id) { return name == NodeName(id); });
   if (node == setup_.remote_ids.end()) return std::nullopt;
-  orders->Send(*node, "stop");
-  return CommandAnswer{true, "restarting " + name + " on " + setup_.settings.peer};
+  return CommandAnswer{false, name + " runs on " + setup_.settings.peer + ": restart it there (fulcrum restart " +
+                                  name + "); no command travels to another host"};
 }
 
 void RemoteNodes::AddTo(Health* health) { link::FillHealth(link_->status(), health); }

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "services/session/supervisor/command_desk.h"
-#include "services/session/supervisor/node_orders.h"
 #include "services/session/supervisor/session_setup.h"
 #include "services/transport/bus/dds/participant.h"
 #include "services/transport/link/link.h"
@@ -21,9 +20,8 @@ class RemoteNodes {
   /// @param participant the supervisor's; must outlive this.
   RemoteNodes(const SessionSetup& setup, bus::DdsParticipant* participant);
 
-  /// Restart by command: sends the node the order to end, and its host starts it again. nullopt: no such node runs
-  /// there.
-  [[nodiscard]] std::optional<CommandAnswer> Restart(const std::string& name, NodeOrders* orders) const;
+  /// Reply to a command to restart a node that runs there, where the command must be given. nullopt: no such node.
+  [[nodiscard]] std::optional<CommandAnswer> Restart(const std::string& name) const;
 
   /// Reason, in one line, why the two sides cannot work together; empty: they can.
   [[nodiscard]] std::string mismatch() { return link_->mismatch(); }

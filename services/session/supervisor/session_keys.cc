@@ -1,5 +1,6 @@
 #include "services/session/supervisor/session_keys.h"
 
+#include "services/transport/keys/authority.h"
 #include "services/transport/keys/key_folder.h"
 
 namespace fulcrum::supervisor {
@@ -19,6 +20,20 @@ std::string CheckSessionKeys(const config::CartConfig& cart, std::vector<NodeId>
   if (until - now > kExpiryWarning_s) return {};
   return "the keys of this cart expire on " + keys::DateOf(until) + ": make new ones with fulcrum keys init " +
          cart.security.keys + " --force";
+}
+
+std::filesystem::path MakeKeysOfSession(const std::filesystem::path& memory, std::time_t now) {
+  // As long as the longest session (fulcrum up --seconds), and a day more for one without an end.
+  constexpr std::time_t kValid_s = 8 * 24 * 3600;
+  constexpr std::time_t kClockSlack_s = 300;
+  std::filesystem::path folder = memory / "keys";
+  std::error_code ignored;
+  std::filesystem::remove_all(folder, ignored);
+  std::filesystem::create_directory(folder);
+  std::filesystem::permissions(folder, std::filesystem::perms::owner_all);
+  const keys::Validity validity{now - kClockSlack_s, now + kValid_s};
+  keys::FillKeyFolder(folder, keys::Authority(validity), validity);
+  return folder;
 }
 
 }  // namespace fulcrum::supervisor

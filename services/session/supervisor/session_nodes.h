@@ -38,7 +38,7 @@ class SessionNodes {
 
   /// Restart by command. nullopt: no such node runs here.
   [[nodiscard]] std::optional<CommandAnswer> Restart(const std::string& name, std::int64_t now_ns);
-  /// Swap by command. @param argument the node, then the words of its new command, one per line.
+  /// Swap by command. @param argument the node, then the words of NodeStarter::Replacement, one per line.
   CommandAnswer Swap(const std::string& argument, std::int64_t now_ns);
   /// Reply to a command that names no running node.
   [[nodiscard]] static CommandAnswer NotRunning(const std::string& name);

@@ -55,8 +55,16 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
          "\n";
 }
 
-bus::Security OwnSecurity(const config::CartConfig& cart) {
-  return app::SecurityOf(cart, NodeName(NodeId::kSupervisor));
+/// Opens the cart's directory for a new session. Without keys of the cart file the session makes its own there.
+std::filesystem::path OpenMemory(const UpSettings& up) {
+  bus::Security security = app::SecurityOf(up.cart, NodeName(NodeId::kSupervisor));
+  std::filesystem::path memory = bus::SharedMemoryDirectory(up.cart.domain);
+  if (!security.on() && !up.open_bus) {
+    bus::PrepareSharedMemory(memory);
+    security.keys = MakeKeysOfSession(memory, std::time(nullptr));
+  }
+  bus::OpenSharedMemory(up.cart.domain, security);
+  return memory;
 }
 
 std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFolder& folder) {
@@ -77,7 +85,7 @@ SessionSetup::SessionSetup(const UpSettings& up)
       end_s(EndOfSession(up, scene.view())),
       keys_warning(CheckSessionKeys(up.cart, NodesOf(scene.view(), up), std::time(nullptr))),
       guard(up.cart.domain),
-      memory(bus::OpenSharedMemory(up.cart.domain, OwnSecurity(up.cart))),
+      memory(OpenMemory(up)),
       training(OpenTrainingLog(up.trainee, up.training_database, scene.view())),
       folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
       recording(RecordingFile(up, folder)),
@@ -85,7 +93,7 @@ SessionSetup::SessionSetup(const UpSettings& up)
       node_ids(NodesOf(scene.view(), up)),
       remote_ids(RemoteNodesOf(scene.view(), up)) {}
 
-bus::Security SessionSetup::security() const { return OwnSecurity(settings.cart); }
+bus::Security SessionSetup::security() const { return bus::AnnouncedSecurity(memory, NodeName(NodeId::kSupervisor)); }
 
 std::span<const ScriptKey> SessionSetup::operator_script() const {
   return settings.cart.pedal.kind == config::LinkKind::kSimulated ? scene.view().script : std::span<const ScriptKey>();

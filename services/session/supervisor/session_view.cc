@@ -5,7 +5,9 @@
 
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/nodes/app/health_report.h"
+#include "services/session/supervisor/domain_guard.h"
 #include "services/session/supervisor/outcome.h"
+#include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/topics.h"
 
 namespace fulcrum::supervisor {
@@ -41,6 +43,10 @@ std::string LinkFigures(const Health& supervisor) {
 }
 
 }  // namespace
+
+std::uint64_t RunningSession(int domain) {
+  return DomainGuard::IsHeld(domain) ? bus::AnnouncedSession(bus::SharedMemoryDirectory(domain)) : 0;
+}
 
 double MetricOf(const Health& health, std::string_view name, double missing) {
   for (const Metric& metric : health.metrics) {

@@ -18,6 +18,9 @@ inline constexpr std::int64_t kSilence_ns = 1'000'000'000;
 /// Samples lost, refused at the gate or not written.
 [[nodiscard]] std::uint64_t DropsOf(const Health& health);
 
+/// Secret number of the session of this user that runs in the domain; 0: none, or it has not opened its bus yet.
+[[nodiscard]] std::uint64_t RunningSession(int domain);
+
 class SessionView {
  public:
   explicit SessionView(int domain);

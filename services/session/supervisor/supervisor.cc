@@ -57,10 +57,9 @@ struct Supervisor::Impl {
     healths = participant->MakeInput<Health>();
     own_health.emplace(participant->MakeOutput<Health>(), setup.scene.view().hash);
     events = participant->MakeInput<ThermalEvent>();
-    auto commands = participant->MakeInput<Command>();
-    orders.emplace(participant->MakeOutput<Command>());
+    orders.emplace(setup.memory);
     dumps.emplace(up.keep_s, setup.folder.path, &*orders);
-    desk.emplace(std::move(commands), participant->MakeOutput<CommandReply>(), Verbs());
+    desk.emplace(setup.memory, setup.guard, up.cart.security.group, Verbs());
     if (!setup.remote_ids.empty()) remote.emplace(setup, &*participant);
     if (setup.scene.view().assessment.on != 0) assessed.emplace(setup.scene.view(), &*participant);
     nodes.emplace(setup, [this](NodeId to, const char* verb) { orders->Send(to, verb); });
@@ -81,7 +80,7 @@ struct Supervisor::Impl {
 
   CommandAnswer Restart(const std::string& name, std::int64_t now) {
     std::optional<CommandAnswer> answer = nodes->Restart(name, now);
-    if (!answer && remote) answer = remote->Restart(name, &*orders);
+    if (!answer && remote) answer = remote->Restart(name);
     return answer ? *answer : SessionNodes::NotRunning(name);
   }
 

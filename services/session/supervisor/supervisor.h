@@ -32,6 +32,8 @@ struct UpSettings {
   int link_domain = 0;                      ///< Domain of the link; 0: the default one of the cart's domain.
   std::string trainee;                      ///< Name under which the score is stored; empty: it is not stored.
   std::filesystem::path training_database;  ///< File of the scores; services/session/supervisor/training_log.h.
+  bool open_bus = false;                    ///< No keys: every process of this machine can join the bus.
+  bool allow_swap_command = false;          ///< `fulcrum swap --with` may name any command.
   bool keep_going = false;                  ///< A node that failed for good does not end the session.
   /// Not empty: systemd starts the nodes and reads their arguments below "session" in this folder.
   std::filesystem::path attach;

@@ -30,7 +30,7 @@ struct AccessRole {
 };
 
 /// Participants that are not nodes.
-inline constexpr std::string_view kToolIdentity = "fulcrum";       ///< status, top, restart, swap, dump, down, console.
+inline constexpr std::string_view kToolIdentity = "fulcrum";       ///< status, top, console: reads, writes nothing.
 inline constexpr std::string_view kReplayerIdentity = "replayer";  ///< Writes topics of nodes: replayer --live.
 inline constexpr std::string_view kLinkIdentity = "link";          ///< Writes topics of the nodes of another host.
 /// Domains of carts, and of links between two hosts of one cart.
@@ -44,14 +44,14 @@ namespace access {
 using enum TopicId;
 inline constexpr TopicSet kAll = (TopicSet{1} << kTopicCount) - 1;
 /// Topics that services/nodes/app writes for every node.
-inline constexpr TopicSet kNodeWrites = SetOf(kCommandReply, kHealth);
-inline constexpr TopicSet kNodeReads = SetOf(kSceneManifest, kCommand, kHealth);
+inline constexpr TopicSet kNodeWrites = SetOf(kHealth);
+inline constexpr TopicSet kNodeReads = SetOf(kSceneManifest, kHealth);
 
 /// Nodes first, in the order of NodeId.
 inline constexpr std::array kRoles{
-    AccessRole{"supervisor", SetOf(kSceneManifest, kGeneratorSetting, kCommand, kCommandReply, kHealth),
-               SetOf(kCommand, kThermalEvent, kHealth, kToolState, kHandleState, kContactModel, kCauteryContact,
-                     kTopologyState, kTemperaturePatch)},
+    AccessRole{"supervisor", SetOf(kSceneManifest, kGeneratorSetting, kHealth),
+               SetOf(kThermalEvent, kHealth, kToolState, kHandleState, kContactModel, kCauteryContact, kTopologyState,
+                     kTemperaturePatch)},
     AccessRole{"handle_bridge", kNodeWrites | SetOf(kHandleState), kNodeReads},
     AccessRole{"haptics_node", kNodeWrites | SetOf(kToolState, kTickManifest), kNodeReads | SetOf(kContactModel)},
     AccessRole{"physics_node",
@@ -64,9 +64,9 @@ inline constexpr std::array kRoles{
                kNodeReads | SetOf(kTissueFrame, kTopologyState, kTemperaturePatch, kToolState, kHandleState,
                                   kThermalEvent, kCauteryContact, kGeneratorSetting)},
     AccessRole{"recorder", kNodeWrites, kAll},
-    AccessRole{kReplayerIdentity, kAll & ~SetOf(kCommand, kCommandReply), 0},
+    AccessRole{kReplayerIdentity, kAll, 0},
     AccessRole{kLinkIdentity, kAll, kAll},
-    AccessRole{kToolIdentity, SetOf(kCommand), SetOf(kSceneManifest, kCommandReply, kThermalEvent, kHealth)},
+    AccessRole{kToolIdentity, 0, SetOf(kSceneManifest, kThermalEvent, kHealth)},
 };
 }  // namespace access
 
@@ -98,6 +98,6 @@ inline constexpr const auto& kAccessRoles = access::kRoles;
 }
 static_assert(OwnerOf(TopicId::kSceneManifest) == NodeId::kSupervisor &&
               OwnerOf(TopicId::kToolState) == NodeId::kHaptics && OwnerOf(TopicId::kThermalEvent) == NodeId::kThermal &&
-              !OwnerOf(TopicId::kCommand));
+              !OwnerOf(TopicId::kHealth));
 
 }  // namespace fulcrum::bus

@@ -149,12 +149,6 @@ bool PassesGate(const SceneManifest& m) noexcept {
          IsName(m.scene_name, kMaxSceneName) && IsName(m.session_id, kMaxSessionId);
 }
 
-bool PassesGate(const Command& m) noexcept {
-  return IsStamp(m.stamp) && IsNode(m.target) && m.verb.size() <= kMaxVerb && m.argument.size() <= kMaxArgument;
-}
-
-bool PassesGate(const CommandReply& m) noexcept { return IsStamp(m.stamp) && IsNode(m.from_node); }
-
 bool PassesGate(const TickManifest& m) noexcept {
   return IsStamp(m.stamp) && IsNode(m.node) && IsSessionTime(m.session_time_s) &&
          m.consumed.size() <= kMaxConsumedInputs &&

@@ -34,11 +34,8 @@ inline constexpr std::size_t kMaxMetrics = 24;
 inline constexpr std::size_t kMaxMetricName = 31;
 inline constexpr std::size_t kMaxSceneName = 63;
 inline constexpr std::size_t kMaxSessionId = 63;
-inline constexpr std::size_t kMaxVerb = 31;
-inline constexpr std::size_t kMaxArgument = 1023;
-/// Texts for people (Health.last_error, CommandReply.text) are cut to these lengths when sent, not refused [B].
+/// Health.last_error, a text for people, is cut to this length when sent, not refused [B].
 inline constexpr std::size_t kMaxErrorText = 255;
-inline constexpr std::size_t kMaxReplyText = 1023;
 
 // Defined for each message; a message without a definition does not link.
 #define FULCRUM_GATE(T) [[nodiscard]] bool PassesGate(const T& m) noexcept;

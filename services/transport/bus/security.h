@@ -21,16 +21,19 @@ struct Security {
   [[nodiscard]] bool on() const { return !keys.empty(); }
 };
 
-/// Writes the security settings of the session into the cart's directory on /dev/shm, so that `fulcrum status` and
-/// similar commands need no option; without security, removes the settings of an earlier session.
-void AnnounceSecurity(const std::filesystem::path& shared_memory, const Security& security);
-/// Security settings with which a participant joins the session that runs there.
+/// Begins a session in the cart's private directory on /dev/shm: writes a new secret number and the security settings,
+/// with which nodes and tools of this user join. Replaces those of an earlier session. @return the number, not 0.
+/// Throws InputError.
+std::uint64_t AnnounceSession(const std::filesystem::path& shared_memory, const Security& security);
+/// Number of the session that was announced there; 0: none.
+[[nodiscard]] std::uint64_t AnnouncedSession(const std::filesystem::path& shared_memory);
+/// Security settings with which a participant joins the session that was announced there; off: none, or an open bus.
 [[nodiscard]] Security AnnouncedSecurity(const std::filesystem::path& shared_memory, std::string_view identity);
 
-/// Refused participants and endpoints since the start.
+/// Refused participants and endpoints since the start; on an open bus only participants of other sessions.
 struct Refusals {
   static constexpr std::size_t kMostTexts = 256;
-  std::uint64_t participants = 0;  ///< Not authenticated, or with invalid permissions.
+  std::uint64_t participants = 0;  ///< Of another session, not authenticated, or with invalid permissions.
   std::uint64_t endpoints = 0;     ///< Of authenticated participants without the right to the topic.
   std::vector<std::string> texts;  ///< For the operator: participant, fault, reason; the first kMostTexts.
 

@@ -21,7 +21,6 @@ enum class Path : std::uint8_t {
 enum class Delivery : std::uint8_t {
   kBestEffort,
   kReliable,
-  kReliableKeepAll,  ///< No sample may be replaced by a newer one; a write without room fails instead.
 };
 
 /// Quality of service of a topic.
@@ -41,10 +40,7 @@ struct TopicRole {
   const char* name;
   Quality quality;
   /// One process at a time publishes the topic: once a later epoch was received, samples of earlier ones are refused.
-  [[nodiscard]] constexpr bool one_owner() const {
-    return id != TopicId::kCommand && id != TopicId::kCommandReply && id != TopicId::kTickManifest &&
-           id != TopicId::kHealth;
-  }
+  [[nodiscard]] constexpr bool one_owner() const { return id != TopicId::kTickManifest && id != TopicId::kHealth; }
 };
 
 // Reader depths cover the slowest reader of a topic between two reads: a software frame on a loaded machine takes up to
@@ -60,7 +56,6 @@ inline constexpr int kOutage = 64;
 inline constexpr int kPatchRing = 16;
 inline constexpr int kEventBurst = 512;
 inline constexpr int kAllWriters = 64;
-inline constexpr int kCommandBacklog = 256;
 
 /// Role of the topic of a message type; a type without a role does not compile.
 template <class T>
@@ -100,12 +95,6 @@ inline constexpr Quality kQualityOf<SceneManifest>{.delivery = Delivery::kReliab
                                                    .gap_is_loss = false,
                                                    .writer_depth = kLatestOnly,
                                                    .reader_depth = kFrameRing};
-template <>
-inline constexpr Quality kQualityOf<Command>{
-    .delivery = Delivery::kReliableKeepAll, .writer_depth = kCommandBacklog, .reader_depth = kCommandBacklog};
-template <>
-inline constexpr Quality kQualityOf<CommandReply>{
-    .delivery = Delivery::kReliableKeepAll, .writer_depth = kCommandBacklog, .reader_depth = kCommandBacklog};
 template <>
 inline constexpr Quality kQualityOf<TickManifest>{
     .delivery = Delivery::kReliable, .writer_depth = kEventBurst, .reader_depth = kEventBurst};
@@ -182,6 +171,10 @@ template <class T>
   } else {
     return message.stamp;
   }
+}
+template <class T>
+[[nodiscard]] Stamp& MutableStampOf(T* message) {
+  return const_cast<Stamp&>(StampOf(*message));
 }
 
 }  // namespace fulcrum::bus

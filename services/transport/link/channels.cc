@@ -33,19 +33,10 @@ constexpr FarLane LaneOf(TopicId topic) {
                                                                                                    : FarLane::kStream;
 }
 
-template <class T>
-Stamp& MutableStampOf(T* message) {
-  return const_cast<Stamp&>(bus::StampOf(*message));
-}
-
 /// Whether a message originates on this host and is meant for the other one. Never true for a republished message.
 template <class T>
 bool Leaves(const T& message, const LinkContext& link) {
-  if constexpr (std::is_same_v<T, Command>) {
-    return !link.IsNative(message.target);
-  } else if constexpr (std::is_same_v<T, CommandReply>) {
-    return link.IsNative(message.from_node);
-  } else if constexpr (requires { message.node; }) {
+  if constexpr (requires { message.node; }) {
     return link.IsNative(message.node);
   } else {
     return true;  // One owner, which runs on this host: otherwise there is no Outgoing.
@@ -64,7 +55,7 @@ void NameAsThere(T* message, const LinkContext& link) {
 template <class T>
 bool MoveHere(T* message, LinkContext* link) {
   constexpr TopicId kTopic = bus::kTopicOf<T>;
-  Stamp& stamp = MutableStampOf(message);
+  Stamp& stamp = bus::MutableStampOf(message);
   const std::optional<std::uint64_t> epoch =
       link->epochs.ToOurs(kTopic, stamp.epoch, bus::RoleOf(kTopic).one_owner(), link->now_ns);
   if (!epoch) return false;

@@ -370,8 +370,6 @@ bool Link::IsWanted(TopicId topic, const Incoming& in) const {
   // For topics that both sides send, our own input reads our own output, so the existence of a reader proves nothing.
   switch (topic) {
     case TopicId::kHealth:
-    case TopicId::kCommand:
-    case TopicId::kCommandReply:
       return true;
     case TopicId::kTickManifest:
       // Read by the recorder, which runs on the cart's host.

@@ -1,5 +1,5 @@
-// How long a turn of the generator's knob takes, in a real cart that cuts: from the Command on the bus to the Health of
-// thermal_node that tells the new set power.
+// How long a turn of the generator's knob takes, in a real cart that cuts: from the command on its socket to the Health
+// of thermal_node that tells the new set power.
 #include <signal.h>
 #include <unistd.h>
 
@@ -12,8 +12,7 @@
 #include <vector>
 
 #include "services/base/runtime/cyclic_thread.h"
-#include "services/transport/bus/dds/participant.h"
-#include "services/transport/bus/input_account.h"
+#include "services/session/supervisor/ask.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
 #include "tests/support/cart_watch.h"
@@ -38,22 +37,12 @@ std::string Measure(int turns, const fs::path& scene, std::vector<double>* set_m
   if (!watch.WaitUntil(60, [](const CartState& state) { return Sets(state, 35); })) {
     return "the cart did not come to cut\n" + cart.Said();
   }
-  bus::DdsParticipant participant({.domain = kDomain, .node_name = "fulcrum", .shared_memory = {}});
-  const auto commands = participant.MakeOutput<Command>();
-  if (!testing::WaitFor(kPatience_s, [&] { return commands->has_readers(); })) return "no supervisor is heard";
-  bus::Stamper stamper(runtime::MonotonicNs());
   for (int i = 0; i < turns; ++i) {
     // Not in step with the period of anything.
     std::this_thread::sleep_for(std::chrono::milliseconds(201 + 7 * (i % 13)));
     const int power_W = i % 2 == 0 ? 50 : 35;
     const std::int64_t turned_ns = runtime::MonotonicNs();
-    Command command;
-    command.stamp = stamper.Next(turned_ns);
-    command.request_id = static_cast<std::uint64_t>(turned_ns);
-    command.target = NodeId::kSupervisor;
-    command.verb = "generator";
-    command.argument = "cut=" + std::to_string(power_W);
-    commands->Write(command);
+    if (!supervisor::AskSupervisor(kDomain, "generator", "cut=" + std::to_string(power_W)).ok) return "was refused";
     std::int64_t told_ns = 0;
     const bool told = watch.WaitUntil(kPatience_s, [&](const CartState& state) {
       told_ns = runtime::MonotonicNs();

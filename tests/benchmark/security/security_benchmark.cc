@@ -15,6 +15,8 @@
 #include "services/transport/bus/input_account.h"
 #include "services/transport/keys/key_folder.h"
 #include "tests/benchmark/report.h"
+#include "tests/benchmark/security/foreign_session.h"
+#include "tests/benchmark/security/keys_cost.h"
 #include "tests/support/intruder.h"
 
 namespace fulcrum {
@@ -91,16 +93,20 @@ void Joining(benchmark::Report* report, const fs::path& keys) {
 int main(int argc, char** argv) {
   using namespace fulcrum;
   benchmark::Report report(argc, argv);
-  if (!report.Wants("security.")) return 0;
   const fs::path scratch = fs::temp_directory_path() / ("fulcrum-bench-security-" + std::to_string(::getpid()));
   fs::create_directories(scratch);
+  std::string wrong;
   if (report.Wants("security.join")) {
     const std::time_t now = std::time(nullptr);
     keys::MakeKeyFolder(scratch / "join", {now, now + 24 * 3600}, false);
     Joining(&report, scratch / "join");
   }
   if (report.Wants("security.refused") || report.Wants("security.attempts")) Attempts(&report, scratch);
+  if (report.Wants("security.foreign_session")) wrong = MeasureForeignSession(&report);
+  const bool keys = report.Wants("guard.keys_start") || report.Wants("guard.start") || report.Wants("guard.rate");
+  if (wrong.empty() && keys) wrong = MeasureKeysCost(&report);
   fs::remove_all(scratch);
   bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kDomain));
-  return 0;
+  if (!wrong.empty()) std::fprintf(stderr, "bench_security: %s\n", wrong.c_str());
+  return wrong.empty() ? 0 : 1;
 }

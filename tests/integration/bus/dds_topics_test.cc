@@ -8,6 +8,7 @@
 
 #include "services/base/core/error.h"
 #include "services/transport/bus/dds/abandoned_mutex.h"
+#include "services/transport/bus/gate.h"
 #include "tests/integration/bus/count_new.h"
 #include "tests/integration/bus/support.h"
 #include "tests/support/rogue.h"
@@ -251,25 +252,55 @@ TEST(DdsOutput, FillThatThrowsIsCountedAndItsLoanComesBack) {
   ASSERT_TRUE(Eventually([&] { return bus.in->TakeLatest(&got); }));
 }
 
-TEST(DdsOutput, WriteWithoutRoomFailsAndRecovers) {
-  Pair<Command> bus;
-  // Nobody takes: reader and writer fill up, and then each write is refused.
-  ASSERT_TRUE(Eventually([&] { return !bus.out->Write(test::Sample<Command>()); }));
-  EXPECT_GE(bus.out->stats().failed, 1u);
-  Command got;
-  ASSERT_TRUE(Eventually([&] {
-    while (bus.in->TakeNext(&got)) {
-    }
-    return bus.out->Write(test::Sample<Command>());
-  }));
+TEST(DdsOutput, WhatDoesNotFitIsCounted) {
+  Pair<TickManifest> bus;
+  TickManifest tick = test::Sample<TickManifest>();
+  tick.consumed.resize(kMaxConsumedInputs + 1);
+  EXPECT_FALSE(bus.out->Write(tick));
+  EXPECT_EQ(bus.out->stats().failed, 1u);
 }
 
-TEST(DdsOutput, WhatDoesNotFitIsCounted) {
-  Pair<Command> bus;
-  Command command = test::Sample<Command>();
-  command.argument.assign(5000, 'x');
-  EXPECT_FALSE(bus.out->Write(command));
-  EXPECT_EQ(bus.out->stats().failed, 1u);
+TEST(DdsInput, SamplesOfAnotherSessionAreDroppedAndCounted) {
+  DdsParticipant ours({.domain = kDomain, .node_name = "ours", .shared_memory = {}, .session = 11});
+  DdsParticipant theirs({.domain = kDomain, .node_name = "theirs", .shared_memory = {}, .session = 12});
+  const auto small_in = ours.MakeInput<ToolState>();
+  const auto large_in = ours.MakeInput<TissueFrame>();
+  const auto small_ours = ours.MakeOutput<ToolState>();
+  const auto small_theirs = theirs.MakeOutput<ToolState>();
+  const auto large_theirs = theirs.MakeOutput<TissueFrame>();
+  std::uint64_t sequence = 0;
+  ToolState small, got;
+  TissueFrame large;
+  bool heard = false;
+  ASSERT_TRUE(Eventually([&] {
+    ToolState mine = test::Sample<ToolState>(++sequence);
+    small_ours->Write(mine);
+    mine.tools[0].p_WT.x() = 0.5f;
+    small_theirs->Write(mine);
+    large_theirs->Write(test::Sample<TissueFrame>(sequence));
+    while (small_in->TakeNext(&got)) {
+      heard = true;
+      EXPECT_NE(got.tools[0].p_WT.x(), 0.5f);
+    }
+    EXPECT_FALSE(large_in->TakeLatest(&large));
+    return heard && ours.foreign_samples() > 20;
+  }));
+  EXPECT_EQ(small_in->stats().rejected, 0u) << "a foreign sample is no faulty one";
+  EXPECT_EQ(ours.refusals().participants, 1u);
+  ASSERT_EQ(ours.refusals().texts.size(), 1u);
+  EXPECT_NE(ours.refusals().texts[0].find("is of another session"), std::string::npos) << ours.refusals().texts[0];
+  EXPECT_NE(ours.refusals().texts[0].find("uid "), std::string::npos) << ours.refusals().texts[0];
+}
+
+TEST(DdsParticipant, OnlyAPeerOfThisSessionCanBeAMismatch) {
+  DdsParticipant ours({.domain = kDomain, .node_name = "ours", .shared_memory = {}, .session = 11});
+  const DdsParticipant stranger(
+      {.domain = kDomain, .node_name = "supervisor", .shared_memory = {}, .schema_hash = 1, .session = 12});
+  ASSERT_TRUE(Eventually([&] { return ours.refusals().participants == 1; }));
+  EXPECT_EQ(ours.schema_mismatch(), "");
+  const DdsParticipant peer(
+      {.domain = kDomain, .node_name = "peer", .shared_memory = {}, .schema_hash = 1, .session = 11});
+  EXPECT_TRUE(Eventually([&] { return ours.schema_mismatch().find("schema mismatch: peer peer") == 0; }));
 }
 
 TEST(DdsParticipant, DomainOutOfRangeIsRefused) {

@@ -23,6 +23,7 @@
 #include "services/session/supervisor/node_process.h"
 #include "services/transport/bus/dds/participant.h"
 #include "services/transport/bus/input_account.h"
+#include "tests/support/session_bus.h"
 
 namespace fulcrum::supervisor {
 namespace {
@@ -142,7 +143,7 @@ class SupervisorTest : public ::testing::Test {
 
   /// In the place of haptics and physics: tool 0 goes round at 40 mm/s, tool 1 presses with 12.5 N.
   static ProcessEnd PublishMotion(ChildProcess* until_end) {
-    bus::DdsParticipant bus(bus::DdsSettings{.domain = kDomain, .node_name = "hands"});
+    bus::DdsParticipant bus(testing::WriterOf(kDomain, "hands"));
     const auto tools = bus.MakeOutput<ToolState>();
     const auto models = bus.MakeOutput<ContactModel>();
     bus::Stamper tool_stamper(runtime::MonotonicNs()), model_stamper(runtime::MonotonicNs());
@@ -283,34 +284,6 @@ TEST_F(SupervisorTest, StatusRestartAndDownReachTheSupervisor) {
   EXPECT_EQ(Wait(&nothing).exit_code, 2) << Log();
 }
 
-TEST_F(SupervisorTest, ARequestThatIsAskedAgainIsDoneOnceAndAnsweredEachTime) {
-  ChildProcess up = Up();
-  ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
-  {
-    bus::DdsParticipant bus(bus::DdsSettings{.domain = kDomain, .node_name = "asker"});
-    const auto replies = bus.MakeInput<CommandReply>();
-    const auto commands = bus.MakeOutput<Command>();
-    bus::Stamper stamper(runtime::MonotonicNs());
-    int answers = 0;
-    EXPECT_TRUE(WaitUntil([&] {
-      Command command;
-      command.stamp = stamper.Next(runtime::MonotonicNs());
-      command.request_id = 12345;
-      command.target = NodeId::kSupervisor;
-      command.verb = "restart";
-      command.argument = "thermal_node";
-      commands->Write(command);
-      CommandReply reply;
-      while (replies->TakeNext(&reply)) answers += reply.request_id == 12345 && reply.ok ? 1 : 0;
-      return answers >= 5;
-    })) << Log();
-  }
-  EXPECT_TRUE(WaitUntil([&] { return Joined(NodeId::kThermal, 2); })) << Log();
-  up.Signal(SIGINT);
-  EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
-  EXPECT_EQ(Count(NodeLog(NodeId::kThermal), "joined session"), 2u) << NodeLog(NodeId::kThermal);
-}
-
 TEST_F(SupervisorTest, ADegradedNodeHasTheNewestPastDumpedOnce) {
   fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "recorder", folder_ / "bin" / "recorder");
   Order(NodeId::kThermal, "flicker");
@@ -342,7 +315,7 @@ TEST_F(SupervisorTest, SwapReplacesANodeAndABadReplacementGivesItBack) {
   const fs::path other = folder_ / "other" / NodeName(NodeId::kThermal);
   fs::create_directory(folder_ / "other");
   fs::create_symlink(fs::path(FULCRUM_BIN_DIR) / "supervisor_fake_node", other);
-  ChildProcess up = Up();
+  ChildProcess up = Up({"--allow-swap-command"});
   ASSERT_TRUE(WaitUntil([&] { return AllJoined(); })) << Log();
   const std::vector<pid_t> before = PidsOf(NodeId::kThermal);
   ASSERT_EQ(before.size(), 1u);

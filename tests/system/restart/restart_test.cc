@@ -82,7 +82,7 @@ TEST(Cart, EachKilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
 }
 
 TEST(Cart, GoesOnWithAnotherBuildOfANodeEndsWhenInterruptedAndLeavesNoProcess) {
-  Cart cart("small", 96);
+  Cart cart("small", 96, {"--allow-swap-command"});
   ASSERT_TRUE(WaitFor(kStartLimit_s, [&] { return cart.PictureTime() >= 0; })) << cart.Said();
   const fs::path other = cart.session() / "physics_node";
   fs::create_symlink(fs::path(FULCRUM_BIN_DIR) / "physics_node", other);

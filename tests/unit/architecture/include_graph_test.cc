@@ -24,7 +24,7 @@ struct Floor {
 const std::vector<Floor> kFloors = {
     {"base", {"core", "runtime", "config"}},
     {"scene", {"format", "builder", "readers", "compiler"}},
-    {"transport", {"bus", "bus/convert", "keys", "bus/dds", "link"}},
+    {"transport", {"control", "bus", "bus/convert", "keys", "bus/dds", "link"}},
     {"nodes", {"app"}},
     {"records", {"recording", "recorder", "log_tools"}},
     {"session", {"assessment", "supervisor", "console", "soak"}},

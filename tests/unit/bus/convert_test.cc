@@ -163,11 +163,6 @@ TEST(ConvertLoan, NaNInTheLoanIsRefusedAtTheGate) {
 }
 
 TEST(ConvertBounds, WhatDoesNotFitIsNotSent) {
-  Command command = test::Sample<Command>();
-  command.argument.assign(kMaxArgument + 1, 'x');
-  idl::Command wire_command;
-  EXPECT_FALSE(ToWire(command, &wire_command));
-
   TickManifest manifest = test::Sample<TickManifest>();
   manifest.consumed.resize(kMaxConsumedInputs + 1);
   idl::TickManifest wire_manifest;

@@ -195,10 +195,6 @@ TEST(GateRanges, SessionMessages) {
                                 {"no text", [](auto& m) { m.session_id[0] = '\x01'; }},
                                 {"session too long", [](auto& m) { m.session_id = std::string(64, 'x'); }},
                                 {"negative start", [](auto& m) { m.session_start_ns = -1; }}});
-  ExpectRefused<Command>({{"unknown node", [](auto& m) { m.target = BeyondLast<NodeId>(); }},
-                          {"verb too long", [](auto& m) { m.verb = std::string(32, 'x'); }},
-                          {"argument too long", [](auto& m) { m.argument = std::string(1024, 'x'); }}});
-  ExpectRefused<CommandReply>({{"unknown node", [](auto& m) { m.from_node = BeyondLast<NodeId>(); }}});
   ExpectRefused<TickManifest>({{"unknown node", [](auto& m) { m.node = BeyondLast<NodeId>(); }},
                                {"unknown topic", [](auto& m) { m.consumed[1].topic = BeyondLast<TopicId>(); }},
                                {"too many inputs", [](auto& m) { m.consumed.resize(kMaxConsumedInputs + 1); }}});

@@ -179,17 +179,6 @@ TEST(InProcess, MatchedAndHasReadersFollowTheOtherSide) {
   EXPECT_FALSE(out->has_readers());
 }
 
-TEST(InProcess, KeepAllTopicFailsTheWriteWhenFull) {
-  InProcessTopic<Command> topic;
-  auto out = topic.MakeOutput();
-  auto in = topic.MakeInput(2);
-  EXPECT_TRUE(out->Write({}));
-  EXPECT_TRUE(out->Write({}));
-  EXPECT_FALSE(out->Write({}));
-  EXPECT_EQ(out->stats().written, 2u);
-  EXPECT_EQ(out->stats().failed, 1u);
-}
-
 TEST(InProcess, LoanFillsHeaderAndCutsPayload) {
   InProcessTopic<TissueFrame> topic;
   auto out = topic.MakeOutput();

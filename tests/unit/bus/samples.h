@@ -188,28 +188,6 @@ inline SceneManifest Sample(std::uint64_t sequence) {
 }
 
 template <>
-inline Command Sample(std::uint64_t sequence) {
-  Command m;
-  m.stamp = {sequence, 20, 10000};
-  m.request_id = 77;
-  m.target = NodeId::kThermal;
-  m.verb = "stop";
-  m.argument = "now, please";
-  return m;
-}
-
-template <>
-inline CommandReply Sample(std::uint64_t sequence) {
-  CommandReply m;
-  m.stamp = {sequence, 21, 11000};
-  m.request_id = 77;
-  m.from_node = NodeId::kRender;
-  m.ok = true;
-  m.text = "stopping at 20 °C";
-  return m;
-}
-
-template <>
 inline TickManifest Sample(std::uint64_t sequence) {
   TickManifest m;
   m.stamp = {sequence, 22, 12000};

@@ -102,12 +102,14 @@ TEST_F(SharedMemory, SweepKnowsSecuredOwnersByTheirClaims) {
 TEST_F(SharedMemory, TellsHowTheSessionIsSecured) {
   PrepareSharedMemory(directory_);
   EXPECT_FALSE(AnnouncedSecurity(directory_, "fulcrum").on());
-  AnnounceSecurity(directory_, {"/some where/keys", "supervisor", true});
+  EXPECT_EQ(AnnouncedSession(directory_), 0u);
+  const std::uint64_t first = AnnounceSession(directory_, {"/some where/keys", "supervisor", true});
+  EXPECT_EQ(AnnouncedSession(directory_), first);
   const Security told = AnnouncedSecurity(directory_, "fulcrum");
   EXPECT_EQ(told.keys, "/some where/keys");
   EXPECT_EQ(told.identity, "fulcrum");
   EXPECT_TRUE(told.encrypt);
-  AnnounceSecurity(directory_, {});
+  EXPECT_NE(AnnounceSession(directory_, {}), first) << "each session has a number of its own";
   EXPECT_FALSE(AnnouncedSecurity(directory_, "fulcrum").on()) << "the word of an earlier session";
 }
 

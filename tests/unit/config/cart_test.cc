@@ -109,7 +109,6 @@ const BadCart kBadCarts[] = {
     {"UnknownLinkKind", "handles: {tool0: {kind: usb}}", "valid: none, simulated, serial"},
     {"UnknownDevice", "devices: {tool0: {kind: omega}}", "valid: none, simulated, touch"},
     {"UnknownHandHold", "devices: {tool0: {hand: fist}}", "valid: scene, fingertip, light_grip, firm_grip"},
-    {"EncryptsWithoutKeys", "security: {encrypt: true}", "security.encrypt: is true, but `keys` names no folder"},
     {"ForceScale", "devices: {tool0: {force_scale: 1.5}}", "valid: 0 to 1"},
     {"WorkspaceScale", "devices: {tool0: {workspace: {scale: 0}}}", "valid: 0.1 to 10"},
     {"WorkspaceUnit", "devices: {tool0: {workspace: {trocar_mm: [0, 10 deg, 0]}}}", "has the wrong unit"},

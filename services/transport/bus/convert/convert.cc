@@ -35,11 +35,6 @@ struct CutText {
   static constexpr std::size_t most = 0;
 };
 template <>
-struct CutText<CommandReply> {
-  static constexpr std::size_t most = kMaxReplyText;
-  static constexpr auto member = &CommandReply::text;
-};
-template <>
 struct CutText<Health> {
   static constexpr std::size_t most = kMaxErrorText;
   static constexpr auto member = &Health::last_error;

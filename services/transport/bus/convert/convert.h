@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <span>
 
 #include "services/base/core/messages.h"
 #include "services/transport/bus/convert/generated_types.h"
@@ -35,6 +37,10 @@ void FromWire(const WireOf<T>& from, T* to);
 /// Reads a complete message. False if the header's counts exceed the payload: then only the header is read.
 [[nodiscard]] bool FromLoan(const std::byte* loan, TissueFrame* to);
 [[nodiscard]] bool FromLoan(const std::byte* loan, TemperaturePatch* to);
+// The session of a stamp exists on the wire only: ports set and check it.
+void SetSessionOfLoan(std::uint64_t session, std::byte* loan);
+/// Session of a serialised message: CDR without encapsulation, or a loan; 0: the bytes are too few.
+[[nodiscard]] std::uint64_t SessionOf(std::span<const std::byte> message);
 /// Reads only the stamp, for samples that are skipped.
 [[nodiscard]] Stamp StampOfLoan(const std::byte* loan, const TissueFrame*);
 [[nodiscard]] Stamp StampOfLoan(const std::byte* loan, const TemperaturePatch*);

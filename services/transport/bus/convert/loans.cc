@@ -45,6 +45,20 @@ Stamp StampOfHeader(const std::byte* loan) {
 
 }  // namespace
 
+// Every message begins with its stamp, and the stamp ends with the session: its place is the same in all of them, in a
+// loan and in CDR (idl/common.idl; bus_convert_test).
+constexpr std::size_t kSessionOffset = sizeof(idl::Stamp) - sizeof(std::uint64_t);
+
+void SetSessionOfLoan(std::uint64_t session, std::byte* loan) {
+  std::memcpy(loan + kSessionOffset, &session, sizeof session);
+}
+
+std::uint64_t SessionOf(std::span<const std::byte> message) {
+  std::uint64_t session = 0;
+  if (message.size() >= sizeof(idl::Stamp)) std::memcpy(&session, message.data() + kSessionOffset, sizeof session);
+  return session;
+}
+
 TissueFrame::View OpenLoan(std::byte* loan, TissueFrameHeader* header) {
   *header = {};
   return {*header, {reinterpret_cast<float*>(loan + kFrameOffset), idl::MAX_TISSUE_FLOATS}};

@@ -162,6 +162,7 @@ inline bool Put(const Stamp& from, idl::Stamp* to) {
   to->number(from.sequence);
   to->epoch(from.epoch);
   to->stamp_ns(from.stamp_ns);
+  to->session(0);  // Set by the port that writes.
   return true;
 }
 inline void Get(const idl::Stamp& from, Stamp* to) { *to = {from.number(), from.epoch(), from.stamp_ns()}; }

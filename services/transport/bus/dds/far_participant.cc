@@ -124,7 +124,7 @@ Security SecurityOf(const FarSettings& settings) {
 fast::DomainParticipantQos QosOf(const FarSettings& settings) {
   fast::DomainParticipantQos qos;
   qos.name(NameOf(settings.side));
-  const std::string user_data = dds::UserDataOf(NameOf(settings.side), SchemaHash());
+  const std::string user_data = dds::UserDataOf(NameOf(settings.side), SchemaHash(), 0);
   qos.user_data().data_vec({user_data.begin(), user_data.end()});
   auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {settings.address};
@@ -251,7 +251,7 @@ class Lane final : private fast::DataReaderListener, private fast::DataWriterLis
 
 struct FarParticipant::Impl {
   Impl(const FarSettings& settings, FarSink far_sink)
-      : sink(std::move(far_sink)), watch(NameOf(settings.side), SchemaHash(), SecurityOf(settings), kCartEnd) {
+      : sink(std::move(far_sink)), watch(NameOf(settings.side), SchemaHash(), SecurityOf(settings), 0, kCartEnd) {
     if (settings.domain < kFirstLinkDomain || settings.domain > kLastLinkDomain) {
       throw InputError("link domain " + std::to_string(settings.domain) + " is out of range: 101 to 200");
     }

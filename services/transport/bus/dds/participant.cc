@@ -22,6 +22,7 @@
 #include "services/transport/bus/dds/ports.h"
 #include "services/transport/bus/dds/raw_reader.h"
 #include "services/transport/bus/dds/security.h"
+#include "services/transport/bus/dds/session_check.h"
 #include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/dds/sources.h"
 #include "services/transport/bus/hex.h"
@@ -47,11 +48,11 @@ const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
 /// Samples above this do not fit one UDP datagram and are sent in fragments.
 constexpr std::uint32_t kDatagram_B = 64'000;
 
-fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash,
+fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash, std::uint64_t session,
                                           const std::shared_ptr<dds::Gathering>& gathering) {
   fast::DomainParticipantQos qos;
   qos.name(settings.node_name);
-  const std::string user_data = dds::UserDataOf(settings.node_name, schema_hash);
+  const std::string user_data = dds::UserDataOf(settings.node_name, schema_hash, session);
   qos.user_data().data_vec({user_data.begin(), user_data.end()});
   auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {"127.0.0.1"};
@@ -76,12 +77,11 @@ void Apply(const Quality& quality, int depth, const std::string& shared_memory, 
   qos->reliability().max_blocking_time = kMaxBlocking;
   qos->durability().kind =
       quality.late_joiners_served ? fast::TRANSIENT_LOCAL_DURABILITY_QOS : fast::VOLATILE_DURABILITY_QOS;
-  const bool keeps_all = quality.delivery == Delivery::kReliableKeepAll;
-  qos->history().kind = keeps_all ? fast::KEEP_ALL_HISTORY_QOS : fast::KEEP_LAST_HISTORY_QOS;
+  qos->history().kind = fast::KEEP_LAST_HISTORY_QOS;
   qos->history().depth = depth;
   // The pool has this many samples of the type's full size: one more than the history, for the sample being written.
   // The library's default of 5000 would reserve 1.5 GB per large topic.
-  const int samples = keeps_all ? depth : depth + 1;
+  const int samples = depth + 1;
   qos->resource_limits().max_instances = 1;
   qos->resource_limits().max_samples = samples;
   qos->resource_limits().max_samples_per_instance = samples;
@@ -110,7 +110,9 @@ struct DdsParticipant::Impl {
         shared_memory(settings.shared_memory),
         security(settings.security),
         gathering(settings.gathers ? std::make_shared<dds::Gathering>() : nullptr),
-        watch(settings.node_name, hash, settings.security) {
+        session{settings.session.value_or(
+            AnnouncedSession(shared_memory.empty() ? SharedMemoryDirectory(settings.domain) : shared_memory))},
+        watch(settings.node_name, hash, settings.security, session.session) {
     if (settings.domain < kFirstCartDomain || settings.domain > kLastCartDomain) {
       throw InputError("domain " + std::to_string(settings.domain) + " is out of range: 1 to 100");
     }
@@ -119,7 +121,7 @@ struct DdsParticipant::Impl {
     dds::PrepareLibrary();
 
     participant = fast::DomainParticipantFactory::get_instance()->create_participant(
-        static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash, gathering), &watch,
+        static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash, session.session, gathering), &watch,
         fast::StatusMask::none());
     if (participant == nullptr) {
       throw InputError("domain " + std::to_string(settings.domain) +
@@ -190,6 +192,7 @@ struct DdsParticipant::Impl {
   std::filesystem::path shared_memory;
   const Security security;
   const std::shared_ptr<dds::Gathering> gathering;
+  dds::SessionCheck session;
   dds::PeerWatch watch;
   dds::Audience audience;
   dds::Sources sources;         ///< Of the raw inputs.
@@ -215,7 +218,8 @@ std::unique_ptr<Input<T>> DdsParticipant::MakeInput(std::function<void()> notify
   Apply(role.quality, role.quality.reader_depth, impl_->SharedMemoryFor(role), &qos);
   qos.reliable_reader_qos().times.initialAcknackDelay = kFirstAcknack;
   const WorkingIn here(impl_->shared_memory);
-  auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos, std::move(notify));
+  auto port = std::make_unique<dds::DdsInput<T>>(impl_->subscriber, impl_->TopicFor<T>(), qos, std::move(notify),
+                                                 &impl_->session);
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "reader"));
   if (role.quality.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
   return port;
@@ -231,7 +235,8 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
       impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
   qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
   const WorkingIn here(impl_->shared_memory);
-  auto port = std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos, &impl_->audience);
+  auto port =
+      std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos, &impl_->audience, impl_->session.session);
   if (!port->ok()) throw InputError(impl_->CannotMake(role, "writer"));
   ++impl_->writers;
   if (role.quality.path == Path::kSharedMemory) ReserveSharedMemory(impl_->shared_memory);
@@ -250,10 +255,12 @@ std::unique_ptr<RawInput> DdsParticipant::MakeRawInput(TopicId id, RawSink sink)
   qos.reliable_reader_qos().times.initialAcknackDelay = kFirstAcknack;
   const WorkingIn here(impl_->shared_memory);
   auto input = std::make_unique<dds::RawReader>(impl_->subscriber, topic, qos, id, payload_B, std::move(sink),
-                                                impl_->gathering, &impl_->sources);
+                                                impl_->gathering, &impl_->sources, &impl_->session);
   if (!input->ok()) throw InputError(impl_->CannotMake(role, "reader"));
   return input;
 }
+
+std::uint64_t DdsParticipant::foreign_samples() const { return impl_->session.foreign.load(std::memory_order_relaxed); }
 
 std::uint64_t DdsParticipant::inherited_locks() { return dds::SharedLocks().inherited; }
 

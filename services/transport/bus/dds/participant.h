@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,9 @@ struct DdsSettings {
       {};  ///< Private 0700 directory on /dev/shm for data-sharing; empty: one per domain.
   std::uint64_t schema_hash = SchemaHash();  ///< Schema that peers must use too; a test sets another one.
   Security security = {};                    ///< Off unless keys are named.
+  /// Number of the session, for the stamps of all samples; without a value, the one that is announced in
+  /// `shared_memory` (0 if there is none). Samples of other sessions are dropped and counted.
+  std::optional<std::uint64_t> session = {};
   /// Silence after which peers remove this participant [s]. Longer than the 5 s after which the supervisor restarts a
   /// silent node. A process that merely stood still for longer than its lease is removed by a peer without removing
   /// that peer itself; the peer then receives it again only after long, with keys never.
@@ -87,7 +91,9 @@ class DdsParticipant {
   [[nodiscard]] std::string schema_mismatch() const;
   /// Locks in shared memory that this process has taken over from dead processes since its start.
   [[nodiscard]] static std::uint64_t inherited_locks();
-  /// Refusals on a secured cart since the start.
+  /// Samples of other sessions that the inputs of this participant have dropped.
+  [[nodiscard]] std::uint64_t foreign_samples() const;
+  /// Participants of other sessions, and on a secured cart those that it refused, since the start.
   [[nodiscard]] Refusals refusals() const;
 
  private:

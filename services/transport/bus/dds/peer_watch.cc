@@ -1,10 +1,14 @@
 #include "services/transport/bus/dds/peer_watch.h"
 
+#include <openssl/evp.h>
+#include <openssl/hmac.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <iterator>
 #include <string_view>
 #include <utility>
@@ -41,6 +45,24 @@ std::string Printable(std::string text) {
   return text;
 }
 
+std::string ProofOf(const std::string& text, std::uint64_t session) {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> code{};
+  unsigned int size = 0;
+  HMAC(EVP_sha256(), &session, sizeof session, reinterpret_cast<const unsigned char*>(text.data()), text.size(),
+       code.data(), &size);
+  std::uint64_t head = 0;
+  std::memcpy(&head, code.data(), sizeof head);
+  return Hex(head);
+}
+
+/// USER_DATA without its proof.
+std::string WithoutProof(const std::string& text) { return text.substr(0, text.rfind(' ')); }
+
+bool HasProof(const std::string& text, std::uint64_t session) {
+  const std::string announced = WithoutProof(text);
+  return text.size() > announced.size() && text.substr(announced.size() + 1) == ProofOf(announced, session);
+}
+
 std::string ValueOf(const rtps::Token& token, std::string_view name) {
   for (const auto& property : token.properties()) {
     if (property.name() == name) return property.value();
@@ -50,16 +72,19 @@ std::string ValueOf(const rtps::Token& token, std::string_view name) {
 
 }  // namespace
 
-std::string UserDataOf(const std::string& name, std::uint64_t schema_hash) {
-  return std::string(kUserDataTag) + Hex(schema_hash) + " " + name + std::string(kPidTag) + std::to_string(getpid()) +
-         ")";
+std::string UserDataOf(const std::string& name, std::uint64_t schema_hash, std::uint64_t session) {
+  const std::string text = std::string(kUserDataTag) + Hex(schema_hash) + " " + name + std::string(kPidTag) +
+                           std::to_string(getpid()) + ", uid " + std::to_string(getuid()) + ")";
+  return text + " " + ProofOf(text, session);
 }
 
-PeerWatch::PeerWatch(std::string own_name, std::uint64_t own_hash, const Security& security, std::string leader)
+PeerWatch::PeerWatch(std::string own_name, std::uint64_t own_hash, const Security& security, std::uint64_t session,
+                     std::string leader)
     : own_name_(std::move(own_name)),
       own_hash_(Hex(own_hash)),
       leader_(std::move(leader)),
       security_(security),
+      session_(session),
       authority_(security.on() ? "/CN=" + keys::AuthorityName(security.keys) : "") {}
 
 void PeerWatch::on_participant_discovery(eprosima::fastdds::dds::DomainParticipant*,
@@ -149,11 +174,18 @@ void PeerWatch::Admit(const Prefix& prefix, const std::string& text, const std::
   int pid = 0;
   const std::size_t pid_at = text.rfind(kPidTag);
   if (pid_at != std::string::npos) std::sscanf(text.c_str() + pid_at + kPidTag.size(), "%d", &pid);
+  if (!HasProof(text, session_)) {
+    Stranger& stranger = strangers_[prefix];
+    if (stranger.since_ns == 0) stranger = {text, name, "", NowNs(), true, false, true};
+    Refuse(&stranger, "is of another session");
+    return;
+  }
   peers_[prefix] = {name, pid};
   living_.insert(prefix);
   if (hash == own_hash_) return;
-  mismatches_[prefix] = "schema mismatch: peer" + text.substr(name_at) + " uses schema " + hash + ", this " +
-                        own_name_ + " uses " + own_hash_ + "; rebuild and restart both from the same sources";
+  mismatches_[prefix] = "schema mismatch: peer" + WithoutProof(text).substr(name_at) + " uses schema " + hash +
+                        ", this " + own_name_ + " uses " + own_hash_ +
+                        "; rebuild and restart both from the same sources";
 }
 
 void PeerWatch::Forget(const Prefix& prefix) {
@@ -168,7 +200,7 @@ void PeerWatch::Refuse(Stranger* stranger, const std::string& why) {
   stranger->has = why;
   ++refusals_.participants;
   const std::size_t name_at = std::min(stranger->text.size(), kUserDataTag.size() + own_hash_.size() + 1);
-  const std::string name = stranger->is_ours ? stranger->text.substr(name_at) : stranger->name;
+  const std::string name = stranger->is_ours ? WithoutProof(stranger->text).substr(name_at) : stranger->name;
   Tell("a participant that calls itself \"" + Printable(name) + "\" " + why);
 }
 
@@ -200,7 +232,8 @@ std::string PeerWatch::mismatch() {
     return peer != peers_.end() && is_leader(*peer);
   });
   if (has_leader) return {};
-  const auto found = std::find_if(strangers_.begin(), strangers_.end(), is_leader);
+  const auto found = std::find_if(strangers_.begin(), strangers_.end(),
+                                  [&](const auto& entry) { return !entry.second.foreign && is_leader(entry); });
   if (found == strangers_.end()) return {};
   const bool shows = !security_.on() || !found->second.has.empty();
   if (now_ns - found->second.since_ns < (shows ? kLatecomer_ns : kLongestHandshake_ns)) return {};

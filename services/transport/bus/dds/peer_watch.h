@@ -19,15 +19,19 @@
 
 namespace fulcrum::bus::dds {
 
-/// Text that a participant publishes in USER_DATA: "fulcrum <hash> <node> (pid <pid>)".
-[[nodiscard]] std::string UserDataOf(const std::string& name, std::uint64_t schema_hash);
+/// Text that a participant publishes in USER_DATA: "fulcrum <hash> <node> (pid <pid>, uid <uid>) <proof>". The proof is
+/// a message authentication code of the text before it, with the number of the session as its key: only a process that
+/// can read the cart's private directory can make it.
+[[nodiscard]] std::string UserDataOf(const std::string& name, std::uint64_t schema_hash, std::uint64_t session);
 
-/// Compares the schema of each peer that appears. On a secured cart a peer counts once it has authenticated; the text
-/// of an unauthenticated participant is used only to name it.
+/// Compares session and schema of each peer that appears. A peer of another session is counted, named and otherwise
+/// disregarded; one of this session with another schema is a mismatch. On a secured cart a peer counts once it has
+/// authenticated; the text of an unauthenticated participant is used only to name it.
 class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
   /// @param leader name of the participant without which no other stays.
-  PeerWatch(std::string own_name, std::uint64_t own_hash, const Security& security, std::string leader = "supervisor");
+  PeerWatch(std::string own_name, std::uint64_t own_hash, const Security& security, std::uint64_t session = 0,
+            std::string leader = "supervisor");
 
   void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant*,
                                 eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
@@ -56,6 +60,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
     std::int64_t since_ns = 0;
     bool is_ours = false;  ///< A Fulcrum program according to its own USER_DATA.
     bool counted = false;
+    bool foreign = false;  ///< Of another session.
   };
 
   void Admit(const Prefix& prefix, const std::string& text, const std::string& name);
@@ -67,6 +72,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
 
   const std::string own_name_, own_hash_, leader_;
   const Security security_;
+  const std::uint64_t session_;
   const std::string authority_;  ///< Name of our authority, as in announcements.
   mutable std::mutex mutex_;
   std::map<Prefix, Peer> peers_;

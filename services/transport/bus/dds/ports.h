@@ -20,6 +20,7 @@
 #include "services/transport/bus/convert/convert.h"
 #include "services/transport/bus/dds/abandoned_mutex.h"
 #include "services/transport/bus/dds/audience.h"
+#include "services/transport/bus/dds/session_check.h"
 #include "services/transport/bus/dds/type_support.h"
 #include "services/transport/bus/gate.h"
 #include "services/transport/bus/input_account.h"
@@ -79,8 +80,9 @@ template <class T>
 class InputBase : public Input<T> {
  public:
   InputBase(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos,
-            std::function<void()> notify)
+            std::function<void()> notify, SessionCheck* check)
       : events_(std::move(notify)),
+        check_(check),
         subscriber_(subscriber),
         reader_(subscriber->create_datareader(topic, qos, &events_, events_.mask())),
         account_(kQualityOf<T>.gap_is_loss, RoleOf<T>().one_owner()) {}
@@ -102,6 +104,7 @@ class InputBase : public Input<T> {
   }
 
   ReaderEvents events_;
+  SessionCheck* check_;
   fast::Subscriber* subscriber_;
   fast::DataReader* reader_;
   InputAccount account_;
@@ -121,6 +124,8 @@ class DdsInput final : public InputBase<T> {
 
   bool TakeNext(T* sample) override {
     while (TakeWire()) {
+      // Bytes that could not be decoded leave no sequence number: they are rejected below.
+      if (wire_.stamp().number() != 0 && this->check_->IsForeign(wire_.stamp().session())) continue;
       FromWire(wire_, &candidate_);
       if (PassesGate(candidate_) && this->IsOfOwner(candidate_)) {
         this->account_.Accept(StampOf(candidate_));
@@ -181,15 +186,19 @@ class DdsInput<T> final : public InputBase<T> {
     const auto loan = [data](int i) { return static_cast<const std::byte*>(data[i]); };
     for (int i = static_cast<int>(infos_.length()) - 1; i >= 0; --i) {
       if (!infos_[i].valid_data) continue;
+      const std::uint64_t session = SessionOf({loan(i), sizeof(WireOf<T>)});
       const bool complete = FromLoan(loan(i), &candidate_);
       // The writer may have reused the memory during the copy: only now is it known whether the copy is complete.
       if (!this->reader_->is_sample_valid(data[i], &infos_[i])) continue;
+      if (this->check_->IsForeign(session)) continue;
       if (!complete || !PassesGate(candidate_) || !this->IsOfOwner(candidate_)) {
         this->account_.Reject();
         continue;
       }
       for (int older = 0; older < i; ++older) {
-        if (infos_[older].valid_data) this->account_.Supersede(StampOfLoan(loan(older), sample));
+        if (!infos_[older].valid_data) continue;
+        if (this->check_->IsForeign(SessionOf({loan(older), sizeof(WireOf<T>)}))) continue;
+        this->account_.Supersede(StampOfLoan(loan(older), sample));
       }
       this->account_.Accept(StampOf(candidate_));
       std::swap(*sample, candidate_);
@@ -207,8 +216,10 @@ class DdsInput<T> final : public InputBase<T> {
 template <class T>
 class OutputBase : public OutputOf<T>::type {
  public:
-  OutputBase(fast::Publisher* publisher, fast::Topic* topic, const fast::DataWriterQos& qos, Audience* audience)
-      : events_(audience),
+  OutputBase(fast::Publisher* publisher, fast::Topic* topic, const fast::DataWriterQos& qos, Audience* audience,
+             std::uint64_t session)
+      : session_(session),
+        events_(audience),
         publisher_(publisher),
         writer_(publisher->create_datawriter(topic, qos, &events_, fast::StatusMask::publication_matched())) {}
   ~OutputBase() override {
@@ -231,6 +242,7 @@ class OutputBase : public OutputOf<T>::type {
     return sent;
   }
 
+  const std::uint64_t session_;  ///< For the stamp of each sample.
   WriterEvents events_;
   fast::Publisher* publisher_;
   fast::DataWriter* writer_;
@@ -253,7 +265,9 @@ class DdsOutput final : public OutputBase<T> {
   bool Write(const T& sample) noexcept override {
     last_write_ = std::chrono::steady_clock::now();
     try {
-      return this->Count(ToWire(sample, &wire_) && this->writer_->write(&wire_));
+      if (!ToWire(sample, &wire_)) return this->Count(false);
+      wire_.stamp().session(this->session_);
+      return this->Count(this->writer_->write(&wire_));
     } catch (...) {
       return this->Count(false);
     }
@@ -291,7 +305,9 @@ class DdsOutput<T> final : public OutputBase<T> {
       if (this->writer_->loan_sample(loan, Init::NO_LOAN_INITIALIZATION) != ReturnCode::RETCODE_OK) {
         return this->Count(false);
       }
-      if (fill(static_cast<std::byte*>(loan)) && this->writer_->write(loan)) return this->Count(true);
+      const bool filled = fill(static_cast<std::byte*>(loan));
+      if (filled) SetSessionOfLoan(this->session_, static_cast<std::byte*>(loan));
+      if (filled && this->writer_->write(loan)) return this->Count(true);
     } catch (...) {
       // Counted below; the loan is returned.
     }

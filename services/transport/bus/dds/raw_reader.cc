@@ -5,6 +5,8 @@
 #include <cstring>
 #include <optional>
 
+#include "services/transport/bus/convert/convert.h"
+
 namespace fulcrum::bus::dds {
 namespace {
 
@@ -35,12 +37,14 @@ std::optional<std::int64_t> Age(std::int64_t source_ns) {
 }  // namespace
 
 RawReader::RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos, TopicId id,
-                     std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering, Sources* sources)
+                     std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering, Sources* sources,
+                     SessionCheck* check)
     : role_(RoleOf(id)),
       payload_B_(payload_B),
       sink_(std::move(sink)),
       gathering_(std::move(gathering)),
       sources_(sources),
+      check_(check),
       subscriber_(subscriber) {
   payload_.reserve(payload_B);
   fast::StatusMask mask = fast::StatusMask::subscription_matched();
@@ -87,6 +91,7 @@ void RawReader::TakeCopies(fast::DataReader* reader) {
     RawSample sample = Describe(info);
     sample.head = std::span(payload_).first(kEncapsulation.size());
     sample.body = std::span(payload_).subspan(kEncapsulation.size());
+    if (check_->IsForeign(SessionOf(sample.body))) continue;
     sink_(sample, [] { return true; });
     age_ns = Age(sample.source_ns);
   }
@@ -101,6 +106,7 @@ void RawReader::TakeLoans(fast::DataReader* reader) {
       RawSample sample = Describe(infos_[i]);
       sample.head = kEncapsulation;
       sample.body = {loan, payload_B_ - kEncapsulation.size()};
+      if (check_->IsForeign(SessionOf(sample.body))) continue;
       struct {
         fast::DataReader* reader;
         const std::byte* loan;

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "services/transport/bus/dds/chained_transport.h"
+#include "services/transport/bus/dds/session_check.h"
 #include "services/transport/bus/dds/sources.h"
 #include "services/transport/bus/raw_input.h"
 #include "services/transport/bus/topics.h"
@@ -56,7 +57,8 @@ class RawType final : public fast::TopicDataType {
 class RawReader final : public RawInput, private fast::DataReaderListener {
  public:
   RawReader(fast::Subscriber* subscriber, fast::Topic* topic, const fast::DataReaderQos& qos, TopicId id,
-            std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering, Sources* sources);
+            std::uint32_t payload_B, RawSink sink, std::shared_ptr<Gathering> gathering, Sources* sources,
+            SessionCheck* check);
   ~RawReader() override;
   RawReader(const RawReader&) = delete;
   RawReader& operator=(const RawReader&) = delete;
@@ -80,6 +82,7 @@ class RawReader final : public RawInput, private fast::DataReaderListener {
   const RawSink sink_;
   const std::shared_ptr<Gathering> gathering_;  ///< Null: samples do not gather.
   Sources* const sources_;
+  SessionCheck* const check_;
   fast::Subscriber* subscriber_;
   fast::DataReader* reader_;
   std::atomic<int> writers_{0};

@@ -1,10 +1,12 @@
 #include "services/transport/bus/dds/security.h"
 
 #include <fastrtps/rtps/attributes/PropertyPolicy.h>
+#include <sys/random.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cstdlib>
 #include <fastdds/dds/log/Log.hpp>
 #include <fastdds/dds/log/StdoutConsumer.hpp>
 #include <fstream>
@@ -16,31 +18,64 @@
 #include "services/base/core/error.h"
 #include "services/transport/bus/access.h"
 #include "services/transport/bus/dds/chained_transport.h"
+#include "services/transport/bus/hex.h"
 #include "services/transport/keys/authority.h"
 #include "services/transport/keys/key_folder.h"
 
 namespace fulcrum::bus {
 namespace {
 
-constexpr const char* kAnnouncementFile = "security";
+// Lines: number of the session (16 hexadecimal digits), "open", "sign" or "encrypt", folder of the keys.
+constexpr const char* kAnnouncementFile = "session";
+
+struct Announcement {
+  std::uint64_t number = 0;
+  std::string mode, keys;
+};
+
+Announcement ReadAnnouncement(const std::filesystem::path& shared_memory) {
+  std::ifstream in(shared_memory / kAnnouncementFile);
+  Announcement found;
+  std::string number;
+  if (std::getline(in, number) && std::getline(in, found.mode) && std::getline(in, found.keys)) {
+    found.number = std::strtoull(number.c_str(), nullptr, 16);
+  }
+  return found;
+}
 
 }  // namespace
 
-void AnnounceSecurity(const std::filesystem::path& shared_memory, const Security& security) {
-  const std::filesystem::path file = shared_memory / kAnnouncementFile;
-  std::error_code ignored;
-  std::filesystem::remove(file, ignored);
-  if (!security.on()) return;
-  std::ofstream out(file);
-  out << (security.encrypt ? "encrypt" : "plain") << '\n' << security.keys.string() << '\n';
-  if (!out.flush()) throw InputError(file.string() + ": cannot be written");
+std::uint64_t AnnounceSession(const std::filesystem::path& shared_memory, const Security& security) {
+  std::uint64_t number = 0;
+  while (number == 0) {
+    if (::getrandom(&number, sizeof number, 0) != sizeof number)
+      throw InputError("no random numbers: getrandom failed");
+  }
+  // Renamed, so that a reader finds this announcement, the earlier one or none.
+  const std::filesystem::path file = shared_memory / kAnnouncementFile, part = file.string() + ".part";
+  std::ofstream out(part, std::ios::trunc);
+  out << Hex(number) << '\n'
+      << (!security.on()     ? "open"
+          : security.encrypt ? "encrypt"
+                             : "sign")
+      << '\n'
+      << security.keys.string() << '\n';
+  out.close();
+  std::error_code error;
+  std::filesystem::permissions(part, std::filesystem::perms::owner_read | std::filesystem::perms::owner_write, error);
+  if (out && !error) std::filesystem::rename(part, file, error);
+  if (!out || error) throw InputError(file.string() + ": cannot be written");
+  return number;
+}
+
+std::uint64_t AnnouncedSession(const std::filesystem::path& shared_memory) {
+  return ReadAnnouncement(shared_memory).number;
 }
 
 Security AnnouncedSecurity(const std::filesystem::path& shared_memory, std::string_view identity) {
-  std::ifstream in(shared_memory / kAnnouncementFile);
-  std::string mode, keys;
-  if (!std::getline(in, mode) || !std::getline(in, keys)) return {};
-  return {keys, std::string(identity), mode == "encrypt"};
+  const Announcement found = ReadAnnouncement(shared_memory);
+  if (found.number == 0 || found.keys.empty()) return {};
+  return {found.keys, std::string(identity), found.mode == "encrypt"};
 }
 
 }  // namespace fulcrum::bus

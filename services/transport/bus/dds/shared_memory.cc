@@ -169,13 +169,14 @@ fs::path OpenSharedMemory(int domain, const Security& security) {
   fs::path directory = SharedMemoryDirectory(domain);
   PrepareSharedMemory(directory);
   SweepSharedMemory(directory);
-  AnnounceSecurity(directory, security);
+  AnnounceSession(directory, security);
   return directory;
 }
 
 SweepResult RemoveSharedMemory(const fs::path& directory) {
   const SweepResult result = RemoveFiles(directory, [](const std::string&) { return true; });
-  rmdir(directory.c_str());
+  std::error_code ignored;
+  fs::remove_all(directory, ignored);  // Also sockets and the keys of the session.
   return result;
 }
 
