@@ -59,6 +59,7 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
 std::filesystem::path OpenMemory(const UpSettings& up) {
   bus::Security security = app::SecurityOf(up.cart, NodeName(NodeId::kSupervisor));
   std::filesystem::path memory = bus::SharedMemoryDirectory(up.cart.domain);
+  bus::RemoveSharedMemory(memory);  // Of a session that was killed: the guard is ours.
   if (!security.on() && !up.open_bus) {
     bus::PrepareSharedMemory(memory);
     security.keys = MakeKeysOfSession(memory, std::time(nullptr));
@@ -79,13 +80,16 @@ std::filesystem::path RecordingFile(const UpSettings& settings, const SessionFol
 
 }  // namespace
 
+SessionMemory::~SessionMemory() { bus::RemoveSharedMemory(path); }
+
 SessionSetup::SessionSetup(const UpSettings& up)
     : settings(up),
       scene(up.scene),
       end_s(EndOfSession(up, scene.view())),
       keys_warning(CheckSessionKeys(up.cart, NodesOf(scene.view(), up), std::time(nullptr))),
       guard(up.cart.domain),
-      memory(OpenMemory(up)),
+      opened(OpenMemory(up)),
+      memory(opened.path),
       training(OpenTrainingLog(up.trainee, up.training_database, scene.view())),
       folder(MakeSessionFolder(up.out, up.scene, scene, up.cart, RunYaml(up, end_s))),
       recording(RecordingFile(up, folder)),

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "services/base/core/scene_view.h"
@@ -17,6 +18,16 @@
 #include "services/transport/bus/security.h"
 
 namespace fulcrum::supervisor {
+
+/// The cart's private directory, removed with all it holds: keys, sockets, announcement.
+struct SessionMemory {
+  std::filesystem::path path;
+
+  explicit SessionMemory(std::filesystem::path directory) : path(std::move(directory)) {}
+  ~SessionMemory();
+  SessionMemory(const SessionMemory&) = delete;
+  SessionMemory& operator=(const SessionMemory&) = delete;
+};
 
 struct SessionSetup {
   /// Checks the keys, takes the domain, opens shared memory and the trainees' database, makes the session folder.
@@ -38,7 +49,8 @@ struct SessionSetup {
   const DomainGuard guard;
   /// Directory on /dev/shm. Opened right after the guard: commands that find a session read its security settings
   /// there.
-  const std::filesystem::path memory;
+  const SessionMemory opened;
+  const std::filesystem::path& memory;
   std::optional<TrainingLog> training;  ///< Empty: no trainee was named.
   const SessionFolder folder;
   const std::filesystem::path recording;  ///< The recorder's first file; empty: none.

@@ -78,7 +78,8 @@ class SupervisorTest : public ::testing::Test {
     return ChildProcess::Start(folder_ / "bin" / "fulcrum", words, folder_ / "fulcrum.log");
   }
   ChildProcess Up(std::vector<std::string> more = {}) const {
-    std::vector<std::string> words{"up", scene_.string(), "--out", (folder_ / "out").string()};
+    // The fake node makes ports to which no identity of a keyed bus has the right.
+    std::vector<std::string> words{"up", scene_.string(), "--out", (folder_ / "out").string(), "--open-bus"};
     words.insert(words.end(), more.begin(), more.end());
     return Fulcrum(words);
   }

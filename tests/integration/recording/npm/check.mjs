@@ -51,7 +51,8 @@ function difference(ours, theirs, path) {
     return undefined;
   }
   if (typeof theirs === "object") {
-    const names = Object.keys(theirs);
+    // The session's number, a secret of the bus, is printed nowhere.
+    const names = Object.keys(theirs).filter((name) => !(name === "session" && path.endsWith(".stamp")));
     if (names.length !== Object.keys(ours).length) {
       return `${path}: number of fields`;
     }
