@@ -198,8 +198,9 @@ std::uint64_t Rogue::PourBytes(int per_topic, std::uint32_t seed) {
   std::mt19937 random(seed);
   fast::DomainParticipantQos qos;
   const bus::Security security = WriterOf(impl_->domain).security;
-  if (security.on()) bus::dds::ApplySecurity(security, &qos);
+  const auto gate = security.on() ? bus::dds::ApplySecurity(security, &qos) : nullptr;
   fast::DomainParticipant* participant = Join(impl_->domain, qos);
+  if (gate) gate->Open();
   if (participant == nullptr) return 0;
   fast::Publisher* publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
   std::vector<fast::DataWriter*> writers;
@@ -224,12 +225,13 @@ void WriteForgedTools(int domain, const std::string& name, const bus::Security& 
                       std::chrono::seconds time) {
   fast::DomainParticipantQos qos;
   qos.name(name);
-  bus::dds::ApplySecurity(security, &qos);
+  const auto gate = bus::dds::ApplySecurity(security, &qos);
   for (rtps::Property& property : qos.properties().properties()) {
     if (property.name().ends_with(".permissions_ca")) property.value("file://" + authorities);
     if (property.name().ends_with(".permissions")) property.value("file://" + permissions);
   }
   fast::DomainParticipant* participant = Join(domain, qos);
+  gate->Open();
   if (participant == nullptr) throw std::runtime_error("the library made no participant");
   fast::DataWriter* writer = MakeWriter(participant, participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT),
                                         bus::RoleOf(TopicId::kToolState));

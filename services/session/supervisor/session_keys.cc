@@ -22,16 +22,15 @@ std::string CheckSessionKeys(const config::CartConfig& cart, std::vector<NodeId>
          cart.security.keys + " --force";
 }
 
-std::filesystem::path MakeKeysOfSession(const std::filesystem::path& memory, std::time_t now) {
-  // As long as the longest session (fulcrum up --seconds), and a day more for one without an end.
-  constexpr std::time_t kValid_s = 8 * 24 * 3600;
-  constexpr std::time_t kClockSlack_s = 300;
+std::filesystem::path MakeKeysOfSession(const std::filesystem::path& memory) {
+  // The keys end with the session, whatever the wall clock says: they stay valid when it is set.
+  constexpr std::time_t kDay_s = 24 * 3600, kFrom_s = 10 * kDay_s, kUntil_s = 47'000 * kDay_s;  // 1970 to 2098.
   std::filesystem::path folder = memory / "keys";
   std::error_code ignored;
   std::filesystem::remove_all(folder, ignored);
   std::filesystem::create_directory(folder);
   std::filesystem::permissions(folder, std::filesystem::perms::owner_all);
-  const keys::Validity validity{now - kClockSlack_s, now + kValid_s};
+  const keys::Validity validity{kFrom_s, kUntil_s};
   keys::FillKeyFolder(folder, keys::Authority(validity), validity);
   return folder;
 }

@@ -19,6 +19,6 @@ namespace fulcrum::supervisor {
 /// Makes keys for one session in the cart's private directory, with the authority's key beside them, so that `fulcrum
 /// keys issue` can admit further participants while the session runs. Replaces those of an earlier session. @return the
 /// folder. Throws InputError.
-[[nodiscard]] std::filesystem::path MakeKeysOfSession(const std::filesystem::path& memory, std::time_t now);
+[[nodiscard]] std::filesystem::path MakeKeysOfSession(const std::filesystem::path& memory);
 
 }  // namespace fulcrum::supervisor

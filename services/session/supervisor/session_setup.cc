@@ -62,7 +62,7 @@ std::filesystem::path OpenMemory(const UpSettings& up) {
   bus::RemoveSharedMemory(memory);  // Of a session that was killed: the guard is ours.
   if (!security.on() && !up.open_bus) {
     bus::PrepareSharedMemory(memory);
-    security.keys = MakeKeysOfSession(memory, std::time(nullptr));
+    security.keys = MakeKeysOfSession(memory);
   }
   bus::OpenSharedMemory(up.cart.domain, security);
   return memory;

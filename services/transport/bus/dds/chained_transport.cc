@@ -6,7 +6,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -42,23 +41,32 @@ class ChainedTransport : public transport::ChainingTransport {
 
 class SerialTransport final : public ChainedTransport {
  public:
-  using ChainedTransport::ChainedTransport;
+  SerialTransport(const transport::ChainingTransportDescriptor& descriptor, std::shared_ptr<DiscoveryGate> gate)
+      : ChainedTransport(descriptor), gate_(std::move(gate)) {}
 
   void receive(transport::TransportReceiverInterface* above, const rtps::octet* data, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
-    std::unique_lock lock(discovery_, std::defer_lock);
-    if (IsDiscovery(local)) lock.lock();
-    above->OnDataReceived(data, size, local, remote);
+    if (IsDiscovery(local)) {
+      gate_->Pass(above, data, size, local, remote);
+    } else {
+      above->OnDataReceived(data, size, local, remote);
+    }
   }
 
  private:
-  std::mutex discovery_;
+  const std::shared_ptr<DiscoveryGate> gate_;
 };
 
 struct SerialTransportDescriptor final : transport::ChainingTransportDescriptor {
-  using ChainingTransportDescriptor::ChainingTransportDescriptor;
+  SerialTransportDescriptor(std::shared_ptr<transport::TransportDescriptorInterface> below,
+                            std::shared_ptr<DiscoveryGate> with)
+      : ChainingTransportDescriptor(std::move(below)), gate(std::move(with)) {}
 
-  [[nodiscard]] transport::TransportInterface* create_transport() const override { return new SerialTransport(*this); }
+  [[nodiscard]] transport::TransportInterface* create_transport() const override {
+    return new SerialTransport(*this, gate);
+  }
+
+  const std::shared_ptr<DiscoveryGate> gate;
 };
 
 class GatheringTransport final : public ChainedTransport {
@@ -90,9 +98,29 @@ struct GatheringTransportDescriptor final : transport::ChainingTransportDescript
 
 }  // namespace
 
+void DiscoveryGate::Pass(transport::TransportReceiverInterface* above, const rtps::octet* data, std::uint32_t size,
+                         const rtps::Locator_t& local, const rtps::Locator_t& remote) {
+  const std::lock_guard lock(mutex_);
+  if (open_) {
+    above->OnDataReceived(data, size, local, remote);
+  } else if (held_.size() < kMostHeld) {
+    held_.push_back({above, {data, data + size}, local, remote});
+  }
+}
+
+void DiscoveryGate::Open() {
+  const std::lock_guard lock(mutex_);
+  open_ = true;
+  for (const Held& held : held_) {
+    held.above->OnDataReceived(held.datagram.data(), static_cast<std::uint32_t>(held.datagram.size()), held.local,
+                               held.remote);
+  }
+  held_.clear();
+}
+
 std::shared_ptr<transport::TransportDescriptorInterface> OneDiscoveryAtATime(
-    std::shared_ptr<transport::TransportDescriptorInterface> transport) {
-  return std::make_shared<SerialTransportDescriptor>(std::move(transport));
+    std::shared_ptr<transport::TransportDescriptorInterface> transport, std::shared_ptr<DiscoveryGate> gate) {
+  return std::make_shared<SerialTransportDescriptor>(std::move(transport), std::move(gate));
 }
 
 std::shared_ptr<transport::TransportDescriptorInterface> LetGather(

@@ -1,14 +1,45 @@
 // Transports between the library and the sockets. Internal to services/transport/bus/dds.
 #pragma once
 
+#include <fastdds/rtps/common/Locator.h>
+#include <fastdds/rtps/common/Types.h>
 #include <fastdds/rtps/transport/TransportDescriptorInterface.h>
+#include <fastdds/rtps/transport/TransportReceiverInterface.h>
 
 #include <atomic>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <mutex>
+#include <vector>
 
 namespace fulcrum::bus::dds {
 
-/// Wraps `transport` so that its datagrams of discovery never enter the library on two threads at once.
+/// Passes datagrams of discovery to the library one at a time, from the opening of the gate on; those that arrive
+/// before are held. A participant announces itself while it is still being made and discards what arrives then: its
+/// peers would repeat their handshakes only after a second.
+class DiscoveryGate {
+ public:
+  void Pass(eprosima::fastdds::rtps::TransportReceiverInterface* above, const eprosima::fastrtps::rtps::octet* data,
+            std::uint32_t size, const eprosima::fastrtps::rtps::Locator_t& local,
+            const eprosima::fastrtps::rtps::Locator_t& remote);
+  /// To be called when the participant has been made.
+  void Open();
+
+ private:
+  struct Held {
+    eprosima::fastdds::rtps::TransportReceiverInterface* above;
+    std::vector<eprosima::fastrtps::rtps::octet> datagram;
+    eprosima::fastrtps::rtps::Locator_t local, remote;
+  };
+  static constexpr std::size_t kMostHeld = 256;  ///< Many times what a cart sends in the time that it takes.
+
+  std::mutex mutex_;
+  bool open_ = false;
+  std::vector<Held> held_;
+};
+
+/// Wraps `transport` so that its datagrams of discovery pass through `gate`.
 ///
 /// A participant receives discovery on two threads, multicast and unicast, and the library's security manager (2.9.1)
 /// prepares the endpoints of a peer's handshake in members that no lock guards
@@ -16,7 +47,8 @@ namespace fulcrum::bus::dds {
 /// same moment one can be left without these endpoints: neither side then receives the other's handshake.
 /// User data is passed on without a lock.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> OneDiscoveryAtATime(
-    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport);
+    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport,
+    std::shared_ptr<DiscoveryGate> gate);
 
 /// State shared by the raw inputs of a participant and its transport.
 struct Gathering {

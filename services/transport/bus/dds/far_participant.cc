@@ -121,7 +121,7 @@ Security SecurityOf(const FarSettings& settings) {
   return {settings.keys, std::string(kLinkIdentity), !settings.keys.empty()};
 }
 
-fast::DomainParticipantQos QosOf(const FarSettings& settings) {
+fast::DomainParticipantQos QosOf(const FarSettings& settings, std::shared_ptr<dds::DiscoveryGate>* gate) {
   fast::DomainParticipantQos qos;
   qos.name(NameOf(settings.side));
   const std::string user_data = dds::UserDataOf(NameOf(settings.side), SchemaHash(), 0);
@@ -146,7 +146,7 @@ fast::DomainParticipantQos QosOf(const FarSettings& settings) {
   // RTPS 2.3, 9.6.1.1: PB + DG * domain + d1 + PG * id.
   peer.port = static_cast<std::uint32_t>(7400 + 250 * settings.domain + 10 + 2 * (cart ? kHostId : kCartId));
   qos.wire_protocol().builtin.initialPeersList.push_back(peer);
-  if (!settings.keys.empty()) dds::ApplySecurity(SecurityOf(settings), &qos);
+  if (!settings.keys.empty()) *gate = dds::ApplySecurity(SecurityOf(settings), &qos);
   return qos;
 }
 
@@ -259,13 +259,15 @@ struct FarParticipant::Impl {
       if (!IsAddress(address)) throw InputError("\"" + address + "\" is no IPv4 address; valid: as in 192.168.1.20");
     }
     dds::PrepareLibrary();
+    std::shared_ptr<dds::DiscoveryGate> gate;
     participant = fast::DomainParticipantFactory::get_instance()->create_participant(
-        static_cast<std::uint32_t>(settings.domain), QosOf(settings), &watch, fast::StatusMask::none());
+        static_cast<std::uint32_t>(settings.domain), QosOf(settings, &gate), &watch, fast::StatusMask::none());
     if (participant == nullptr) {
       throw InputError("cannot open the link on " + settings.address +
                        ": is that an address of this machine, and are its UDP ports of link domain " +
                        std::to_string(settings.domain) + " free?");
     }
+    if (gate) gate->Open();
     fast::Publisher* publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
     fast::Subscriber* subscriber = participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
     stream = std::make_unique<Lane>(FarLane::kStream, settings.side, participant, publisher, subscriber, sink);

@@ -49,7 +49,8 @@ const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
 constexpr std::uint32_t kDatagram_B = 64'000;
 
 fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash, std::uint64_t session,
-                                          const std::shared_ptr<dds::Gathering>& gathering) {
+                                          const std::shared_ptr<dds::Gathering>& gathering,
+                                          std::shared_ptr<dds::DiscoveryGate>* gate) {
   fast::DomainParticipantQos qos;
   qos.name(settings.node_name);
   const std::string user_data = dds::UserDataOf(settings.node_name, schema_hash, session);
@@ -65,7 +66,7 @@ fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint
   discovery.leaseDuration = Duration_t(settings.lease_s, 0);
   discovery.leaseDuration_announcementperiod = settings.security.on() ? kSecuredAnnouncement : kAnnouncement;
   if (!settings.security.on()) discovery.initial_announcements = {kFirstAnnouncementCount, kFirstAnnouncements};
-  if (settings.security.on()) dds::ApplySecurity(settings.security, &qos);
+  if (settings.security.on()) *gate = dds::ApplySecurity(settings.security, &qos);
   return qos;
 }
 
@@ -120,13 +121,15 @@ struct DdsParticipant::Impl {
     PrepareSharedMemory(shared_memory);
     dds::PrepareLibrary();
 
+    std::shared_ptr<dds::DiscoveryGate> gate;
     participant = fast::DomainParticipantFactory::get_instance()->create_participant(
-        static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash, session.session, gathering), &watch,
-        fast::StatusMask::none());
+        static_cast<std::uint32_t>(settings.domain), ParticipantQos(settings, hash, session.session, gathering, &gate),
+        &watch, fast::StatusMask::none());
     if (participant == nullptr) {
       throw InputError("domain " + std::to_string(settings.domain) +
                        ": cannot open the bus; are its UDP ports on 127.0.0.1 free?");
     }
+    if (gate) gate->Open();
     if (security.on()) {
       std::ostringstream address;
       address << participant->guid().guidPrefix;

@@ -170,7 +170,7 @@ std::string TextOf(const rtps::GuidPrefix_t& prefix) {
 
 }  // namespace
 
-void ApplySecurity(const Security& security, fast::DomainParticipantQos* qos) {
+std::shared_ptr<DiscoveryGate> ApplySecurity(const Security& security, fast::DomainParticipantQos* qos) {
   keys::CheckIdentity(security.keys, security.identity, security.encrypt, std::time(nullptr));
   const keys::KeyFiles files =
       keys::KeyFilesOf(std::filesystem::absolute(security.keys), security.identity, security.encrypt);
@@ -187,8 +187,10 @@ void ApplySecurity(const Security& security, fast::DomainParticipantQos* qos) {
   add("access.builtin.Access-Permissions.governance", file(files.governance));
   add("access.builtin.Access-Permissions.permissions", file(files.permissions));
   if (security.encrypt) add("crypto.plugin", "builtin.AES-GCM-GMAC");
-  for (auto& transport : qos->transport().user_transports) transport = OneDiscoveryAtATime(std::move(transport));
+  auto gate = std::make_shared<DiscoveryGate>();
+  for (auto& transport : qos->transport().user_transports) transport = OneDiscoveryAtATime(std::move(transport), gate);
   ListenToSecurityLog();
+  return gate;
 }
 
 std::string IdentityBehind(const rtps::GuidPrefix_t& prefix) {

@@ -4,15 +4,19 @@
 
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 #include <fastdds/rtps/common/GuidPrefix_t.hpp>
+#include <memory>
 #include <string>
 
+#include "services/transport/bus/dds/chained_transport.h"
 #include "services/transport/bus/security.h"
 
 namespace fulcrum::bus::dds {
 
 /// Applies authentication (PKI-DH), access control, and with `encrypt` AES-GCM, over the transports that `qos` names
-/// already, each with OneDiscoveryAtATime. Throws InputError if the keys cannot be used.
-void ApplySecurity(const Security& security, eprosima::fastdds::dds::DomainParticipantQos* qos);
+/// already, each with OneDiscoveryAtATime. Throws InputError if the keys cannot be used. @return the gate of their
+/// discovery, to be opened when the participant has been made.
+[[nodiscard]] std::shared_ptr<DiscoveryGate> ApplySecurity(const Security& security,
+                                                           eprosima::fastdds::dds::DomainParticipantQos* qos);
 
 /// Identity with whose keys a participant has authenticated; "?" if it is not in the table. The library and all peers
 /// check its address against its certificate.
