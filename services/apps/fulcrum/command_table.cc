@@ -36,9 +36,10 @@ std::span<const CommandEntry> Commands() {
       {"soak", "soak SCENE [--minutes N] [--chaos]",
        "Run a long session, optionally with injected faults, and check memory growth, drift and crashes.",
        "soak small --minutes 30 --chaos", Soak},
-      {"keys", "keys init|show|check [DIR] [--days N] [--force]",
-       "Make and check the keys of a secured cart, which permit participants to join, write and read topics.",
-       "keys init --days 365", Keys},
+      {"keys", "keys init|show|check [DIR] | issue|revoke NAME [--read TOPICS] [--write TOPICS] [--out DIR]",
+       "Make and check the keys of a secured cart, which permit participants to join, write and read topics, and admit "
+       "tools of somebody else.",
+       "keys issue probe --read Health --out probe-keys", Keys},
       {"assess", "assess RECORDING [--scene FILE] [--json FILE]",
        "Score a recorded session with the same measures as live.", "assess out/latest/recording.mcap", Assess},
       {"trainee", "trainee [NAME] [--scene NAME] [--svg FILE] [--database FILE]",

@@ -32,6 +32,9 @@ using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
 using Certificate = std::unique_ptr<X509, Free<X509_free>>;
 using Name = std::unique_ptr<X509_NAME, Free<X509_NAME_free>>;
 using Number = std::unique_ptr<BIGNUM, Free<BN_free>>;
+using Revocations = std::unique_ptr<X509_CRL, Free<X509_CRL_free>>;
+using Revoked = std::unique_ptr<X509_REVOKED, Free<X509_REVOKED_free>>;
+using Time = std::unique_ptr<ASN1_TIME, Free<ASN1_TIME_free>>;
 using Extension = std::unique_ptr<X509_EXTENSION, Free<X509_EXTENSION_free>>;
 using Store = std::unique_ptr<X509_STORE, Free<X509_STORE_free>>;
 using StoreContext = std::unique_ptr<X509_STORE_CTX, Free<X509_STORE_CTX_free>>;
@@ -39,6 +42,7 @@ using Pkcs7 = std::unique_ptr<PKCS7, Free<PKCS7_free>>;
 
 constexpr int kSerialBits = 127;
 constexpr long kVersion3 = 2;
+constexpr long kListVersion2 = 1;
 
 /// Last error of OpenSSL.
 std::string Reason() {
@@ -89,6 +93,31 @@ Certificate ReadCertificate(const std::string& pem, const std::string& what) {
   Certificate certificate(PEM_read_bio_X509(ToRead(pem).get(), nullptr, nullptr, nullptr));
   if (!certificate) throw InputError(what + ": is no certificate (PEM): " + Reason());
   return certificate;
+}
+
+std::string Pem(X509_CRL* revocations) {
+  const Bio out = ToWrite();
+  Must(PEM_write_bio_X509_CRL(out.get(), revocations), "write a revocation list");
+  return TextOf(out);
+}
+
+Key ReadKey(const std::string& pem, const std::string& what) {
+  ERR_clear_error();
+  // A key with a password must not ask for it on the terminal.
+  const auto no_password = [](char*, int, int, void*) { return -1; };
+  Key key(PEM_read_bio_PrivateKey(ToRead(pem).get(), nullptr, no_password, nullptr));
+  if (!key) throw InputError(what + ": is no private key (PEM, without a password): " + Reason());
+  return key;
+}
+
+Revocations ReadRevocations(const std::string& pem, X509* authority, const std::string& what) {
+  ERR_clear_error();
+  Revocations list(PEM_read_bio_X509_CRL(ToRead(pem).get(), nullptr, nullptr, nullptr));
+  if (!list) throw InputError(what + ": is no revocation list (PEM): " + Reason());
+  if (X509_CRL_verify(list.get(), X509_get0_pubkey(authority)) != 1) {
+    throw InputError(what + ": was not signed by this authority, or was changed since: " + Reason());
+  }
+  return list;
 }
 
 Name NameOf(const std::string& common_name) {
@@ -150,21 +179,35 @@ Store StoreWith(const std::string& authority) {
 }  // namespace
 
 struct Authority::Impl {
-  Key key = NewKey();
+  Key key;
   Certificate certificate;
 };
 
 Authority::Authority(const Validity& validity) : impl_(std::make_unique<Impl>()) {
+  impl_->key = NewKey();
   X509* certificate =
       (impl_->certificate = NewCertificate("Fulcrum authority " + RandomHex(), impl_->key.get(), validity)).get();
   Must(X509_set_issuer_name(certificate, X509_get_subject_name(certificate)), "issuer");
   AddExtension(certificate, certificate, NID_basic_constraints, "critical,CA:TRUE,pathlen:0");
-  AddExtension(certificate, certificate, NID_key_usage, "critical,keyCertSign,digitalSignature");
+  AddExtension(certificate, certificate, NID_key_usage, "critical,keyCertSign,cRLSign,digitalSignature");
   Must(X509_sign(certificate, impl_->key.get(), EVP_sha256()), "sign a certificate");
   certificate_ = Pem(certificate);
 }
 
+Authority::Authority(const std::string& certificate, const std::string& key, const std::string& what)
+    : impl_(std::make_unique<Impl>()), certificate_(certificate) {
+  impl_->key = ReadKey(key, what);
+  impl_->certificate = ReadCertificate(certificate, "the authority's certificate");
+  if (X509_check_private_key(impl_->certificate.get(), impl_->key.get()) != 1) {
+    ERR_clear_error();
+    throw InputError(what + ": is not the key of the authority \"" +
+                     CommonName(X509_get_subject_name(impl_->certificate.get())) + "\"");
+  }
+}
+
 Authority::~Authority() = default;
+
+std::string Authority::private_key() const { return Pem(impl_->key.get()); }
 
 Identity Authority::Issue(const std::string& name, const Validity& validity) const {
   const Key key = NewKey();
@@ -186,6 +229,32 @@ std::string Authority::Sign(const std::string& document) const {
   const Bio out = ToWrite();
   Must(SMIME_write_PKCS7(out.get(), signature.get(), in.get(), kFlags), "write a signed document");
   return TextOf(out);
+}
+
+std::string Authority::NewRevocations() const {
+  const Revocations list(Must(X509_CRL_new(), "new revocation list"));
+  Must(X509_CRL_set_version(list.get(), kListVersion2), "version");
+  Must(X509_CRL_set_issuer_name(list.get(), X509_get_subject_name(impl_->certificate.get())), "issuer");
+  // Valid as long as the authority: a list that is not valid (yet) would keep everybody off the bus.
+  Must(X509_CRL_set1_lastUpdate(list.get(), X509_get0_notBefore(impl_->certificate.get())), "time");
+  Must(X509_CRL_set1_nextUpdate(list.get(), X509_get0_notAfter(impl_->certificate.get())), "time");
+  Must(X509_CRL_sign(list.get(), impl_->key.get(), EVP_sha256()), "sign a revocation list");
+  return Pem(list.get());
+}
+
+std::string Authority::Revoke(const std::string& revocations, const std::string& certificate,
+                              const std::string& what) const {
+  const Revocations list = ReadRevocations(revocations, impl_->certificate.get(), what);
+  const Certificate bad = ReadCertificate(certificate, "the certificate to revoke");
+  Revoked entry(Must(X509_REVOKED_new(), "new revocation"));
+  Must(X509_REVOKED_set_serialNumber(entry.get(), X509_get_serialNumber(bad.get())), "serial number");
+  const Time now(Must(ASN1_TIME_set(nullptr, std::time(nullptr)), "time"));
+  Must(X509_REVOKED_set_revocationDate(entry.get(), now.get()), "time");
+  Must(X509_CRL_add0_revoked(list.get(), entry.get()), "add a revocation");
+  (void)entry.release();
+  Must(X509_CRL_sort(list.get()), "sort");
+  Must(X509_CRL_sign(list.get(), impl_->key.get(), EVP_sha256()), "sign a revocation list");
+  return Pem(list.get());
 }
 
 AddressHead AddressHeadOf(const std::string& name) {
@@ -220,12 +289,17 @@ void VerifyCertificate(const std::string& pem, const std::string& authority, std
   throw InputError(what + ": " + X509_verify_cert_error_string(error));
 }
 
+bool IsRevoked(const std::string& certificate, const std::string& revocations, const std::string& authority,
+               const std::string& what) {
+  const Certificate issuer = ReadCertificate(authority, "the authority's certificate");
+  const Revocations list = ReadRevocations(revocations, issuer.get(), what);
+  X509_REVOKED* entry = nullptr;
+  const Certificate asked = ReadCertificate(certificate, "a certificate");
+  return X509_CRL_get0_by_serial(list.get(), &entry, X509_get_serialNumber(asked.get())) == 1;
+}
+
 void VerifyKey(const std::string& pem, const std::string& certificate, const std::string& what) {
-  ERR_clear_error();
-  // A key with a password must not ask for it on the terminal.
-  const auto no_password = [](char*, int, int, void*) { return -1; };
-  const Key key(PEM_read_bio_PrivateKey(ToRead(pem).get(), nullptr, no_password, nullptr));
-  if (!key) throw InputError(what + ": is no private key (PEM, without a password): " + Reason());
+  const Key key = ReadKey(pem, what);
   if (X509_check_private_key(ReadCertificate(certificate, what).get(), key.get()) != 1) {
     ERR_clear_error();
     throw InputError(what + ": is not the key of the certificate beside it");

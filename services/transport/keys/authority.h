@@ -15,21 +15,30 @@ struct Identity {
   std::string key;          ///< PEM, private.
 };
 
-/// Certificate authority with elliptic keys (P-256). Its private key is kept in this object
-/// only.
+/// Certificate authority with elliptic keys (P-256).
 class Authority {
  public:
-  /// The authority has a random name, so that two authorities differ by name.
+  /// A new authority. It has a random name, so that two authorities differ by name.
   explicit Authority(const Validity& validity);
+  /// The authority with this certificate and private key (PEM). Throws InputError with `what`, the file of the key, if
+  /// they do not belong together.
+  Authority(const std::string& certificate, const std::string& key, const std::string& what);
   ~Authority();
   Authority(const Authority&) = delete;
   Authority& operator=(const Authority&) = delete;
 
   [[nodiscard]] const std::string& certificate() const { return certificate_; }
+  /// PEM. Whoever has it can issue and revoke.
+  [[nodiscard]] std::string private_key() const;
   /// @param name common name of the subject.
   [[nodiscard]] Identity Issue(const std::string& name, const Validity& validity) const;
   /// @return the document signed as S/MIME, the format that DDS Security requires.
   [[nodiscard]] std::string Sign(const std::string& document) const;
+  /// A revocation list (PEM) without entries. It is valid as long as the authority.
+  [[nodiscard]] std::string NewRevocations() const;
+  /// @return `revocations`, a list of this authority, with `certificate` added.
+  [[nodiscard]] std::string Revoke(const std::string& revocations, const std::string& certificate,
+                                   const std::string& what) const;
 
  private:
   struct Impl;
@@ -54,6 +63,10 @@ struct CertificateFacts {
 /// Throws unless the certificate is signed by the authority and valid at the time `now`.
 void VerifyCertificate(const std::string& certificate, const std::string& authority, std::time_t now,
                        const std::string& what);
+/// @return whether the certificate is on the authority's revocation list. Throws InputError with `what`, the file of
+/// the list, unless the list is signed by the authority.
+[[nodiscard]] bool IsRevoked(const std::string& certificate, const std::string& revocations,
+                             const std::string& authority, const std::string& what);
 void VerifyKey(const std::string& key, const std::string& certificate, const std::string& what);
 /// @return the signed document, if the authority has signed it; throws otherwise.
 [[nodiscard]] std::string VerifySigned(const std::string& signed_document, const std::string& authority,

@@ -30,6 +30,20 @@ std::string LinkRule() {
          "</topics></publish>\n<subscribe><topics>" + topics + "</topics></subscribe>\n</allow_rule>\n";
 }
 
+/// Topics of this version that are named between the tags of a verb.
+bus::TopicSet TopicsIn(const std::string& document, const std::string& verb) {
+  const std::size_t from = document.find("<" + verb + ">");
+  const std::size_t to = document.find("</" + verb + ">");
+  if (from == std::string::npos || to == std::string::npos || to < from) return 0;
+  const std::string_view part = std::string_view(document).substr(from, to - from);
+  bus::TopicSet set = 0;
+  for (const bus::TopicRole& role : bus::kTopicRoles) {
+    if (part.find(std::string("<topic>") + role.name + "</topic>") != std::string_view::npos)
+      set |= bus::SetOf(role.id);
+  }
+  return set;
+}
+
 std::string Moment(std::time_t time) {
   std::tm parts{};
   gmtime_r(&time, &parts);
@@ -74,6 +88,13 @@ std::string PermissionsXml(const bus::AccessRole& role, const Validity& validity
          Topics("subscribe", role.reads) + "</allow_rule>\n" +
          (role.identity == bus::kLinkIdentity ? LinkRule() : std::string()) +
          "<default>DENY</default>\n</grant></permissions>\n</dds>\n";
+}
+
+std::optional<bus::AccessRole> RightsIn(const std::string& document, std::string_view identity,
+                                        const Validity& validity) {
+  const bus::AccessRole rights{identity, TopicsIn(document, "publish"), TopicsIn(document, "subscribe")};
+  if (PermissionsXml(rights, validity) != document) return std::nullopt;
+  return rights;
 }
 
 }  // namespace fulcrum::keys

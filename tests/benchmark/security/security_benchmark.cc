@@ -1,4 +1,4 @@
-// A secured cart: attempts that it refuses, and the time to join it.
+// A secured cart: attempts that it refuses, the time to make the keys of a session, and the time to join it.
 #include <unistd.h>
 
 #include <algorithm>
@@ -13,6 +13,7 @@
 #include "services/transport/bus/dds/participant.h"
 #include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/input_account.h"
+#include "services/transport/keys/issuing.h"
 #include "services/transport/keys/key_folder.h"
 #include "tests/benchmark/report.h"
 #include "tests/benchmark/security/foreign_session.h"
@@ -66,6 +67,22 @@ double JoinMs(int domain, const bus::Security& writer, const bus::Security& read
   return 1e-6 * static_cast<double>(now_ns() - begin_ns);
 }
 
+/// What each `fulcrum up` does for its session, where it does it.
+void SessionKeys(benchmark::Report* report) {
+  const fs::path folder = "/dev/shm/fulcrum-bench-keys-" + std::to_string(::getpid());
+  const std::time_t now = std::time(nullptr);
+  std::vector<double> times_ms;
+  for (int i = 0; i < (report->quick() ? 20 : 200); ++i) {
+    const auto begin = std::chrono::steady_clock::now();
+    keys::MakeSessionKeys(folder, {now, now + 24 * 3600});
+    const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
+    times_ms.push_back(time.count());
+  }
+  keys::RemoveSessionKeys(folder);
+  report->Add("security.session_keys.ms_p50", benchmark::Quantile(times_ms, 0.5), "ms");
+  report->Add("security.session_keys.ms_max", benchmark::Quantile(times_ms, 1), "ms");
+}
+
 void Joining(benchmark::Report* report, const fs::path& keys) {
   struct Mode {
     const char* name;
@@ -101,6 +118,7 @@ int main(int argc, char** argv) {
     keys::MakeKeyFolder(scratch / "join", {now, now + 24 * 3600}, false);
     Joining(&report, scratch / "join");
   }
+  if (report.Wants("security.session_keys")) SessionKeys(&report);
   if (report.Wants("security.refused") || report.Wants("security.attempts")) Attempts(&report, scratch);
   if (report.Wants("security.foreign_session")) wrong = MeasureForeignSession(&report);
   const bool keys = report.Wants("guard.keys_start") || report.Wants("guard.start") || report.Wants("guard.rate");
