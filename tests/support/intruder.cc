@@ -17,6 +17,7 @@
 #include "services/transport/bus/access.h"
 #include "services/transport/bus/dds/participant.h"
 #include "services/transport/bus/input_account.h"
+#include "services/transport/keys/issuing.h"
 #include "services/transport/keys/key_folder.h"
 #include "tests/support/cart.h"
 #include "tests/support/program.h"
@@ -133,6 +134,15 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
   const keys::Authority ours(today), theirs(today);
   const fs::path real = Folder(scratch / "real");
   keys::FillKeyFolder(real, ours, today);
+  Write(keys::AuthorityKeyFile(real), ours.private_key());
+  fs::permissions(keys::AuthorityKeyFile(real), fs::perms::owner_read | fs::perms::owner_write);
+  const auto admit = [&](const std::string& guest, bus::TopicSet writes, bus::TopicSet reads) {
+    keys::IssueGuest(real, {guest, writes, reads, today, scratch / guest});
+  };
+  // Its folder was handed over before it was revoked, so that its own side has the old list.
+  admit("revoked_guest", bus::SetOf(TopicId::kToolState), bus::SetOf(TopicId::kSceneManifest));
+  keys::Revoke(real, "revoked_guest");
+  admit("reading_guest", 0, bus::SetOf(TopicId::kHealth));
   keys::FillKeyFolder(Folder(scratch / "theirs"), theirs, today);
   keys::FillKeyFolder(Folder(scratch / "expired"), ours, {now - 2 * kDay_s, now - kDay_s});
   keys::FillKeyFolder(Folder(scratch / "tampered"), ours, today);
@@ -142,6 +152,8 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
   bus::AccessRole all = *bus::AccessRoleOf("thermal_node");
   all.writes = all.reads = bus::access::kAll;
   const std::string all_rights = theirs.Sign(keys::PermissionsXml(all, today));
+  const std::string all_rights_of_guest =
+      theirs.Sign(keys::PermissionsXml({"reading_guest", bus::access::kAll, bus::access::kAll}, today));
   Write(scratch / "both.pem", ours.certificate() + theirs.certificate());
 
   std::vector<Running> running;
@@ -160,6 +172,8 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
   Target target(domain, real);
   const TwoFacedPipe honest_outside(scratch / "pipe1", all_rights, ReadFile(real / "thermal_node.p7s"));
   const TwoFacedPipe tampered_outside(scratch / "pipe2", all_rights, Tampered(real));
+  const TwoFacedPipe guest_outside(scratch / "pipe3", all_rights_of_guest,
+                                   ReadFile(scratch / "reading_guest" / "reading_guest.p7s"));
   start("no_keys", "-", "-", 3, "has no keys");
   start("other_authority", scratch / "theirs", "haptics_node", 3, "another authority");
   start("encrypts", real, "haptics_node/encrypt", 3, "encrypts");
@@ -168,6 +182,11 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
   start("tampered", scratch / "tampered", "thermal_node", 2, "");
   start("forged_other_topic", real, "thermal_node", 0, "may not write fulcrum/ToolState",
         {scratch / "both.pem", scratch / "pipe1"});
+  start("revoked", scratch / "revoked_guest", "revoked_guest", 3, "certificate revoked");
+  start("revoked_here", real, "revoked_guest", 2, "");
+  start("guest_other_topic", scratch / "reading_guest", "reading_guest", 2, "");
+  start("forged_guest_other_topic", scratch / "reading_guest", "reading_guest", 0, "may not write fulcrum/ToolState",
+        {scratch / "both.pem", scratch / "pipe3"});
   start("forged_tampered", real, "thermal_node", 0, "unusable permissions", {scratch / "both.pem", scratch / "pipe2"});
 
   std::vector<Attempt> attempts;
@@ -184,7 +203,9 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
     attempt.last_line = attempt.last_line.substr(attempt.last_line.rfind('\n') + 1);
     attempt.came_through = target.came_through();
     // An endpoint is reported by the name in the keys of its process, any other participant by the name that it claims.
-    const std::string name = attempt.name == "forged_other_topic" ? "thermal_node" : attempt.name;
+    const std::string name = attempt.name == "forged_other_topic"         ? "thermal_node"
+                             : attempt.name == "forged_guest_other_topic" ? "the guest reading_guest"
+                                                                          : attempt.name;
     attempt.reported = !attempt.wanted_of_cart.empty() && target.Reports(name, attempt.wanted_of_cart);
     attempts.push_back(attempt);
   }

@@ -107,7 +107,9 @@ void PeerWatch::on_participant_discovery(eprosima::fastdds::dds::DomainParticipa
   if (peers_.contains(prefix)) return;
   Stranger& stranger = strangers_[prefix];
   if (stranger.since_ns != 0) return;
-  stranger = {text, name, "", NowNs(), text.starts_with(kUserDataTag), false};
+  stranger = {text, name,    IdentityBehind(prefix, ValueOf(info.info.identity_token_, "dds.cert.sn")),
+              "",   NowNs(), text.starts_with(kUserDataTag),
+              false};
   if (!security_.on()) return;
   const bool encrypts = (info.info.security_attributes_ & PARTICIPANT_SECURITY_ATTRIBUTES_FLAG_IS_RTPS_PROTECTED) != 0;
   if (!secured) {
@@ -132,7 +134,8 @@ void PeerWatch::onParticipantAuthentication(eprosima::fastdds::dds::DomainPartic
   if (authorized) {
     const Stranger stranger = std::move(found->second);
     strangers_.erase(found);
-    Admit(prefix, stranger.text, stranger.name);
+    const bool guest = AccessRoleOf(stranger.identity) == nullptr;
+    Admit(prefix, stranger.text, stranger.name, guest ? stranger.identity : std::string());
     return;
   }
   Refuse(&found->second, complaint.empty() ? "does not authenticate" : "has an unusable certificate: " + complaint);
@@ -155,9 +158,19 @@ void PeerWatch::CheckEndpoint(const Prefix& prefix, const std::string& topic, bo
   if (identity == kLinkIdentity && std::ranges::find(kLinkTopics, topic) != kLinkTopics.end()) return;
   const AccessRole* role = AccessRoleOf(identity);
   const TopicRole* known = RoleNamed(topic);
-  if (role != nullptr && known != nullptr && Contains(writes ? role->writes : role->reads, known->id)) return;
+  if (role == nullptr) return;  // A guest, see LookAtGuests.
+  if (known != nullptr && Contains(writes ? role->writes : role->reads, known->id)) return;
   const std::lock_guard lock(mutex_);
-  const std::string what = (writes ? "may not write " : "may not read ") + Printable(topic);
+  Forbid(prefix, identity, (writes ? "may not write " : "may not read ") + Printable(topic));
+}
+
+void PeerWatch::LookAtGuests() {
+  for (const auto& [prefix, guest] : guests_) {
+    for (const std::string& what : EndpointComplaints(prefix)) Forbid(prefix, "the guest " + guest, what);
+  }
+}
+
+void PeerWatch::Forbid(const Prefix& prefix, const std::string& identity, const std::string& what) {
   if (forbidden_.size() >= kMostForbidden || !forbidden_.emplace(prefix, what).second) return;
   ++refusals_.endpoints;
   const auto peer = peers_.find(prefix);
@@ -165,7 +178,9 @@ void PeerWatch::CheckEndpoint(const Prefix& prefix, const std::string& topic, bo
   Tell(identity + pid + " " + what);
 }
 
-void PeerWatch::Admit(const Prefix& prefix, const std::string& text, const std::string& name) {
+void PeerWatch::Admit(const Prefix& prefix, const std::string& text, const std::string& name,
+                      const std::string& guest) {
+  if (!guest.empty()) guests_[prefix] = guest;
   if (text.size() < kUserDataTag.size() + own_hash_.size() || !text.starts_with(kUserDataTag)) {
     return;  // Another program on this domain.
   }
@@ -174,15 +189,23 @@ void PeerWatch::Admit(const Prefix& prefix, const std::string& text, const std::
   int pid = 0;
   const std::size_t pid_at = text.rfind(kPidTag);
   if (pid_at != std::string::npos) std::sscanf(text.c_str() + pid_at + kPidTag.size(), "%d", &pid);
-  if (!HasProof(text, session_)) {
+  // A guest does not know the session's number: its certificate admits it.
+  if (guest.empty() && !HasProof(text, session_)) {
     Stranger& stranger = strangers_[prefix];
     if (stranger.since_ns == 0) stranger = {text, name, "", NowNs(), true, false, true};
     Refuse(&stranger, "is of another session");
     return;
   }
-  peers_[prefix] = {name, pid};
+  // A guest is known by the name in its keys: it must not pass for a node.
+  peers_[prefix] = {guest.empty() ? name : guest, pid};
   living_.insert(prefix);
   if (hash == own_hash_) return;
+  if (!guest.empty()) {  // It must not end a session.
+    ++refusals_.participants;
+    Tell("the guest " + guest + " uses schema " + hash + ", this " + own_name_ + " uses " + own_hash_ +
+         ": they exchange nothing");
+    return;
+  }
   mismatches_[prefix] = "schema mismatch: peer" + WithoutProof(text).substr(name_at) + " uses schema " + hash +
                         ", this " + own_name_ + " uses " + own_hash_ +
                         "; rebuild and restart both from the same sources";
@@ -243,12 +266,14 @@ std::string PeerWatch::mismatch() {
            "keys show)";
   }
   return "refused: the " + leader_ + " of this session " + found->second.has + ", as this " + own_name_ +
-         " sees it with the keys of " + security_.keys.string() + "; both need the same keys and settings";
+         " sees it with the keys of " + security_.keys.string() +
+         "; both need the same keys and settings, and no revoked identity";
 }
 
 Refusals PeerWatch::refusals() {
   const std::lock_guard lock(mutex_);
   LookAtStrangers(NowNs());
+  LookAtGuests();
   return refusals_;
 }
 

@@ -54,21 +54,26 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
   using Prefix = eprosima::fastrtps::rtps::GuidPrefix_t;
   /// A participant that was discovered but has not been admitted (yet).
   struct Stranger {
-    std::string text;  ///< Its USER_DATA.
-    std::string name;  ///< Its participant name, unverified.
-    std::string has;   ///< Reason for which its announcement rules it out; empty: it may be admitted.
+    std::string text;      ///< Its USER_DATA.
+    std::string name;      ///< Its participant name, unverified.
+    std::string identity;  ///< Of its keys, once it has authenticated.
+    std::string has;       ///< Reason for which its announcement rules it out; empty: it may be admitted.
     std::int64_t since_ns = 0;
     bool is_ours = false;  ///< A Fulcrum program according to its own USER_DATA.
     bool counted = false;
     bool foreign = false;  ///< Of another session.
   };
 
-  void Admit(const Prefix& prefix, const std::string& text, const std::string& name);
+  /// @param guest identity outside of the table; empty: a participant of the table, or a cart without keys.
+  void Admit(const Prefix& prefix, const std::string& text, const std::string& name, const std::string& guest = {});
   void Forget(const Prefix& prefix);
   void Refuse(Stranger* stranger, const std::string& why);
   void Tell(std::string text);
   void CheckEndpoint(const Prefix& prefix, const std::string& topic, bool writes);
+  void Forbid(const Prefix& prefix, const std::string& identity, const std::string& what);
   void LookAtStrangers(std::int64_t now_ns);
+  /// The library decides from the signed permissions what a guest may do; only its log tells what it has refused.
+  void LookAtGuests();
 
   const std::string own_name_, own_hash_, leader_;
   const Security security_;
@@ -79,6 +84,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
   std::set<Prefix> living_;
   std::map<Prefix, std::string> mismatches_;
   std::map<Prefix, Stranger> strangers_;
+  std::map<Prefix, std::string> guests_;  ///< Identities outside of the table, admitted, also after they have left.
   std::set<std::pair<Prefix, std::string>> forbidden_;  ///< Endpoints that were counted.
   Refusals refusals_;
 };

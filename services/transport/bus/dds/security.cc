@@ -12,6 +12,7 @@
 #include <fstream>
 #include <map>
 #include <mutex>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -98,6 +99,19 @@ class SecurityNotes {
     constexpr std::size_t kMost = 256;
     if (permissions_.size() < kMost) permissions_[prefix] = std::move(text);
   }
+  void Endpoint(const std::string& prefix, std::string text) {
+    const std::lock_guard lock(mutex_);
+    constexpr std::size_t kMost = 256;
+    if (endpoints_.size() < kMost) endpoints_.emplace(prefix, std::move(text));
+  }
+  [[nodiscard]] std::set<std::string> EndpointsOf(const std::string& prefix) const {
+    const std::lock_guard lock(mutex_);
+    std::set<std::string> texts;
+    for (auto it = endpoints_.lower_bound({prefix, ""}); it != endpoints_.end() && it->first == prefix; ++it) {
+      texts.insert(it->second);
+    }
+    return texts;
+  }
   [[nodiscard]] std::string TakeCertificate() {
     const std::lock_guard lock(mutex_);
     return std::exchange(certificate_, {});
@@ -112,6 +126,7 @@ class SecurityNotes {
   mutable std::mutex mutex_;
   std::string certificate_;
   std::map<std::string, std::string> permissions_;
+  std::set<std::pair<std::string, std::string>> endpoints_;  ///< Address and fault.
 };
 
 /// One per process, as the library's log is; never destroyed, because that log is written until the process ends.
@@ -157,6 +172,15 @@ class SecurityLog final : public fast::StdoutConsumer {
       Notes().Permissions(prefix, InBrackets(text));
       return true;
     }
+    for (const bool writes : {true, false}) {
+      const std::string head = std::string("Error checking create remote ") + (writes ? "writer " : "reader ");
+      if (!text.starts_with(head)) continue;
+      // Format: "…80.1f.….0c|0.0.1.3 (fulcrum/ToolState topic not found in allow rule.)".
+      const std::string inner = InBrackets(text);
+      Notes().Endpoint(text.substr(head.size(), text.find('|') - head.size()),
+                       (writes ? "may not write " : "may not read ") + inner.substr(0, inner.find(' ')));
+      return true;
+    }
     // An endpoint without a right to its topic: PeerWatch reports those of others, MakeInput and MakeOutput our own.
     return text.starts_with("Error checking creat") || text.find("topic not found in allow rule") != std::string::npos;
   }
@@ -182,6 +206,7 @@ std::shared_ptr<DiscoveryGate> ApplySecurity(const Security& security, fast::Dom
   add("auth.builtin.PKI-DH.identity_ca", file(files.authority));
   add("auth.builtin.PKI-DH.identity_certificate", file(files.certificate));
   add("auth.builtin.PKI-DH.private_key", file(files.key));
+  add("auth.builtin.PKI-DH.identity_crl", file(files.revocations));
   add("access.plugin", "builtin.Access-Permissions");
   add("access.builtin.Access-Permissions.permissions_ca", file(files.authority));
   add("access.builtin.Access-Permissions.governance", file(files.governance));
@@ -193,7 +218,7 @@ std::shared_ptr<DiscoveryGate> ApplySecurity(const Security& security, fast::Dom
   return gate;
 }
 
-std::string IdentityBehind(const rtps::GuidPrefix_t& prefix) {
+std::string IdentityBehind(const rtps::GuidPrefix_t& prefix, const std::string& claimed) {
   static const auto kHeads = [] {
     std::array<keys::AddressHead, kAccessRoles.size()> heads{};
     for (std::size_t i = 0; i < heads.size(); ++i)
@@ -203,7 +228,12 @@ std::string IdentityBehind(const rtps::GuidPrefix_t& prefix) {
   for (std::size_t i = 0; i < kHeads.size(); ++i) {
     if (std::equal(kHeads[i].begin(), kHeads[i].end(), prefix.value)) return std::string(kAccessRoles[i].identity);
   }
-  return "?";
+  constexpr std::string_view kSubject = "/CN=";
+  if (!claimed.starts_with(kSubject)) return "?";
+  const std::string guest = claimed.substr(kSubject.size());
+  if (!keys::IsGuestName(guest)) return "?";
+  const keys::AddressHead head = keys::AddressHeadOf(guest);
+  return std::equal(head.begin(), head.end(), prefix.value) ? guest : "?";
 }
 
 void ListenToSecurityLog() {
@@ -222,5 +252,9 @@ std::string LastCertificateComplaint() {
 }
 
 std::string PermissionsComplaint(const rtps::GuidPrefix_t& prefix) { return Notes().PermissionsOf(TextOf(prefix)); }
+
+std::set<std::string> EndpointComplaints(const rtps::GuidPrefix_t& prefix) {
+  return Notes().EndpointsOf(TextOf(prefix));
+}
 
 }  // namespace fulcrum::bus::dds

@@ -5,6 +5,7 @@
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 #include <fastdds/rtps/common/GuidPrefix_t.hpp>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "services/transport/bus/dds/chained_transport.h"
@@ -18,9 +19,12 @@ namespace fulcrum::bus::dds {
 [[nodiscard]] std::shared_ptr<DiscoveryGate> ApplySecurity(const Security& security,
                                                            eprosima::fastdds::dds::DomainParticipantQos* qos);
 
-/// Identity with whose keys a participant has authenticated; "?" if it is not in the table. The library and all peers
-/// check its address against its certificate.
-[[nodiscard]] std::string IdentityBehind(const eprosima::fastrtps::rtps::GuidPrefix_t& prefix);
+/// Identity with whose keys a participant has authenticated: of the table, or a guest, or "?". The library and all
+/// peers check its address against its certificate, and the address contains a hash of the name.
+/// @param claimed subject that the participant announces, such as "/CN=probe"; unverified, only checked against the
+/// hash.
+[[nodiscard]] std::string IdentityBehind(const eprosima::fastrtps::rtps::GuidPrefix_t& prefix,
+                                         const std::string& claimed = {});
 
 /// Receives what the library logs about security: its callbacks name the refused participant, only its log contains the
 /// reason. Once per process, as the log is one per process.
@@ -30,5 +34,8 @@ void ListenToSecurityLog();
 [[nodiscard]] std::string LastCertificateComplaint();
 /// Why the permissions of a participant that had authenticated were refused; empty: they were not.
 [[nodiscard]] std::string PermissionsComplaint(const eprosima::fastrtps::rtps::GuidPrefix_t& prefix);
+/// Endpoints that the library has refused to a participant by its signed permissions, such as "may not write
+/// fulcrum/ToolState". It checks those only that match one of this process.
+[[nodiscard]] std::set<std::string> EndpointComplaints(const eprosima::fastrtps::rtps::GuidPrefix_t& prefix);
 
 }  // namespace fulcrum::bus::dds
