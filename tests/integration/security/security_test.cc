@@ -325,6 +325,15 @@ TEST(KeysCommand, MakesShowsAndChecksAndOverwritesNothing) {
   ExpectSaid(RunProgram("fulcrum", {"keys", "show", folder}, 0),
              {"physics_node", "30 days", "writes TissueFrame, ContactModel, CauteryContact", "reads  everything"});
   ExpectSaid(RunProgram("fulcrum", {"keys", "check", folder}, 0), {"✓ physics_node"});
+  const std::string out = scratch.path() / "probe-keys";
+  ExpectSaid(RunProgram("fulcrum", {"keys", "issue", "probe", "--read", "Health", "--out", out, "--keys", folder}, 0),
+             {"write nothing", "read Health", out});
+  ExpectSaid(RunProgram("fulcrum", {"keys", "show", folder}, 0), {"probe", "guest, key handed over"});
+  ExpectSaid(RunProgram("fulcrum", {"keys", "issue", "x", "--read", "Pulse", "--keys", folder}, 2),
+             {"--read", "\"Pulse\"", "ToolState", "Health"});
+  RunProgram("fulcrum", {"keys", "revoke", "probe", "--keys", folder}, 0);
+  ExpectSaid(RunProgram("fulcrum", {"keys", "show", folder}, 0), {"guest, key handed over, revoked"});
+  ExpectSaid(RunProgram("fulcrum", {"keys", "check", folder}, 0), {"– probe: revoked", "✓ physics_node"});
   fs::permissions(fs::path(folder) / "physics_node.key", fs::perms(0644));
   ExpectSaid(RunProgram("fulcrum", {"keys", "check", folder}, 2), {"✗ physics_node", "open to others"});
   RunProgram("fulcrum", {"keys", "init", folder, "--force"}, 0);
