@@ -2,6 +2,7 @@
 #include <ctime>
 
 #include "services/apps/fulcrum/commands.h"
+#include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/topics.h"
@@ -106,7 +107,7 @@ ExitCode Check(const fs::path& folder) {
 /// The keys that --keys names, or those of the running session.
 bus::Security KeysOf(const Arguments& arguments) {
   if (arguments.values.count("keys") != 0) return {arguments.values["keys"].as<std::string>()};
-  const int domain = DomainOf(arguments, kDefaultDomain);
+  const int domain = DomainOf(arguments, config::DefaultDomain());
   const fs::path memory = bus::SharedMemoryDirectory(domain);
   bus::Security session = bus::AnnouncedSecurity(memory, {});
   if (!session.on()) session.keys = memory / "keys";
@@ -130,6 +131,11 @@ ExitCode Issue(const Arguments& arguments, const std::string& name, int days) {
   if (arguments.values.count("out") != 0) order.out = arguments.values["out"].as<std::string>();
   const bus::Security cart = KeysOf(arguments);
   const keys::Validity validity = keys::IssueGuest(cart.keys, order);
+  // The number of the running session, without which its samples would be dropped. A guest of a lasting folder needs it
+  // for each session: issued again, or as the user of the session.
+  if (!order.out.empty() && arguments.values.count("keys") == 0) {
+    bus::HandOverSession(bus::SharedMemoryDirectory(DomainOf(arguments, config::DefaultDomain())), order.out);
+  }
   const fs::path folder = fs::absolute(order.out.empty() ? cart.keys : order.out).lexically_normal();
   std::printf(
       "%s may write %s and read %s, until %s.\n\n"

@@ -1,6 +1,6 @@
 #include "services/session/supervisor/session_keys.h"
 
-#include "services/transport/keys/authority.h"
+#include "services/transport/keys/issuing.h"
 #include "services/transport/keys/key_folder.h"
 
 namespace fulcrum::supervisor {
@@ -26,12 +26,7 @@ std::filesystem::path MakeKeysOfSession(const std::filesystem::path& memory) {
   // The keys end with the session, whatever the wall clock says: they stay valid when it is set.
   constexpr std::time_t kDay_s = 24 * 3600, kFrom_s = 10 * kDay_s, kUntil_s = 47'000 * kDay_s;  // 1970 to 2098.
   std::filesystem::path folder = memory / "keys";
-  std::error_code ignored;
-  std::filesystem::remove_all(folder, ignored);
-  std::filesystem::create_directory(folder);
-  std::filesystem::permissions(folder, std::filesystem::perms::owner_all);
-  const keys::Validity validity{kFrom_s, kUntil_s};
-  keys::FillKeyFolder(folder, keys::Authority(validity), validity);
+  keys::MakeSessionKeys(folder, {kFrom_s, kUntil_s});
   return folder;
 }
 

@@ -27,6 +27,9 @@ struct Security {
 std::uint64_t AnnounceSession(const std::filesystem::path& shared_memory, const Security& security);
 /// Number of the session that was announced there; 0: none.
 [[nodiscard]] std::uint64_t AnnouncedSession(const std::filesystem::path& shared_memory);
+/// Copies the announcement to the key folder of a guest, who cannot read that directory: AnnouncedSession() finds it
+/// there. Throws InputError.
+void HandOverSession(const std::filesystem::path& shared_memory, const std::filesystem::path& folder);
 /// Security settings with which a participant joins the session that was announced there; off: none, or an open bus.
 [[nodiscard]] Security AnnouncedSecurity(const std::filesystem::path& shared_memory, std::string_view identity);
 

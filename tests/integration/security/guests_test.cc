@@ -38,7 +38,7 @@ class RunningSession : public ::testing::Test {
     bus::PrepareSharedMemory(memory_);
     const std::time_t now = std::time(nullptr);
     keys::MakeSessionKeys(folder_, {now, now + kDay_s});
-    bus::AnnounceSecurity(memory_, {folder_, {}});
+    bus::AnnounceSession(memory_, {folder_, {}});
     fs::remove_all(out_);
     supervisor_ = Join("supervisor");
     healths_ = supervisor_->MakeOutput<Health>();

@@ -105,14 +105,28 @@ DdsSettings ToolSettings(int domain) {
           .security = AnnouncedSecurity(memory, kToolIdentity)};
 }
 
+namespace {
+
+/// Number of the session: as set, else from the key folder of a guest, else as announced in the cart's directory.
+std::uint64_t SessionOf(const DdsSettings& settings) {
+  if (settings.session) return *settings.session;
+  if (settings.security.on()) {
+    if (const std::uint64_t handed_over = AnnouncedSession(settings.security.keys); handed_over != 0)
+      return handed_over;
+  }
+  return AnnouncedSession(settings.shared_memory.empty() ? SharedMemoryDirectory(settings.domain)
+                                                         : settings.shared_memory);
+}
+
+}  // namespace
+
 struct DdsParticipant::Impl {
   Impl(const DdsSettings& settings, std::uint64_t hash)
       : schema_hash(hash),
         shared_memory(settings.shared_memory),
         security(settings.security),
         gathering(settings.gathers ? std::make_shared<dds::Gathering>() : nullptr),
-        session{settings.session.value_or(
-            AnnouncedSession(shared_memory.empty() ? SharedMemoryDirectory(settings.domain) : shared_memory))},
+        session{SessionOf(settings)},
         watch(settings.node_name, hash, settings.security, session.session) {
     if (settings.domain < kFirstCartDomain || settings.domain > kLastCartDomain) {
       throw InputError("domain " + std::to_string(settings.domain) + " is out of range: 1 to 100");

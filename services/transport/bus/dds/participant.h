@@ -24,8 +24,9 @@ struct DdsSettings {
       {};  ///< Private 0700 directory on /dev/shm for data-sharing; empty: one per domain.
   std::uint64_t schema_hash = SchemaHash();  ///< Schema that peers must use too; a test sets another one.
   Security security = {};                    ///< Off unless keys are named.
-  /// Number of the session, for the stamps of all samples; without a value, the one that is announced in
-  /// `shared_memory` (0 if there is none). Samples of other sessions are dropped and counted.
+  /// Number of the session, for the stamps of all samples; without a value, the one that was handed over
+  /// with a guest's keys, else the one that is announced in `shared_memory` (0 if there is none). Samples of other
+  /// sessions are dropped and counted.
   std::optional<std::uint64_t> session = {};
   /// Silence after which peers remove this participant [s]. Longer than the 5 s after which the supervisor restarts a
   /// silent node. A process that merely stood still for longer than its lease is removed by a peer without removing

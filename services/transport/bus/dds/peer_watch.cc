@@ -189,10 +189,10 @@ void PeerWatch::Admit(const Prefix& prefix, const std::string& text, const std::
   int pid = 0;
   const std::size_t pid_at = text.rfind(kPidTag);
   if (pid_at != std::string::npos) std::sscanf(text.c_str() + pid_at + kPidTag.size(), "%d", &pid);
-  // A guest does not know the session's number: its certificate admits it.
+  // A guest's folder may have no number, or an earlier one: its certificate admits it, and its samples are foreign.
   if (guest.empty() && !HasProof(text, session_)) {
     Stranger& stranger = strangers_[prefix];
-    if (stranger.since_ns == 0) stranger = {text, name, "", NowNs(), true, false, true};
+    if (stranger.since_ns == 0) stranger = {text, name, "", "", NowNs(), true, false, true};
     Refuse(&stranger, "is of another session");
     return;
   }

@@ -73,6 +73,13 @@ std::uint64_t AnnouncedSession(const std::filesystem::path& shared_memory) {
   return ReadAnnouncement(shared_memory).number;
 }
 
+void HandOverSession(const std::filesystem::path& shared_memory, const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::copy_file(shared_memory / kAnnouncementFile, folder / kAnnouncementFile,
+                             std::filesystem::copy_options::overwrite_existing, error);
+  if (error) throw InputError((folder / kAnnouncementFile).string() + ": cannot be written: " + error.message());
+}
+
 Security AnnouncedSecurity(const std::filesystem::path& shared_memory, std::string_view identity) {
   const Announcement found = ReadAnnouncement(shared_memory);
   if (found.number == 0 || found.keys.empty()) return {};
