@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "services/base/core/error.h"
@@ -77,12 +78,7 @@ class Listener {
 
 class Soak {
  public:
-  explicit Soak(const SoakSettings& settings)
-      : settings_(settings),
-        total_s_(60 * settings.minutes),
-        progress_(false),
-        view_(settings.domain),
-        listener_(&view_.participant()) {
+  explicit Soak(const SoakSettings& settings) : settings_(settings), total_s_(60 * settings.minutes), progress_(false) {
     std::error_code error;
     folder_ = settings.out / "soak";
     fs::create_directories(folder_, error);
@@ -124,22 +120,26 @@ class Soak {
   void WaitForNodes() {
     const std::int64_t patience_ns = MonotonicNs() + static_cast<std::int64_t>(kStart_s * kSecond_ns);
     for (bool all = false; !all;) {
+      if (!view_ && supervisor::RunningSession(settings_.domain) != 0) {
+        // It reads every topic, as a recorder does.
+        listener_.emplace(&view_.emplace(settings_.domain, NodeName(NodeId::kRecorder)).participant());
+      }
       Look();
       if (ended_) throw InputError("the session did not start; see " + log_.string());
       if (runtime::ShouldStop() || MonotonicNs() > patience_ns) {
         up_.Signal(SIGINT);
         throw InputError("not every node of the session ran within " + Fixed(kStart_s, 0) + " s; see " + log_.string());
       }
-      all = view_.manifest().session_start_ns != 0 && !children_.empty();
+      all = view_ && view_->manifest().session_start_ns != 0 && !children_.empty();
       nodes_.clear();
       for (std::size_t i = 0; i < kNodes; ++i) {
         if (children_.count(kWatched[i]) == 0) continue;
         nodes_.emplace_back(kWatched[i]);
-        all = all && view_.health(NodeOf(kWatched[i])).state == HealthState::kRunning;
+        all = all && view_->health(NodeOf(kWatched[i])).state == HealthState::kRunning;
       }
       std::this_thread::sleep_for(kTurn);
     }
-    begin_ns_ = view_.manifest().session_start_ns;
+    begin_ns_ = view_->manifest().session_start_ns;
     processors_ = ReadProcessorTimes();
     progress_.Say("soak: " + std::to_string(nodes_.size()) + " nodes run, " + Fixed(settings_.minutes, 1) + " min" +
                   (settings_.chaos ? " with blows" : ""));
@@ -155,8 +155,8 @@ class Soak {
 
   /// Reads the present processes, their Health, and whether the session has ended.
   void Look() {
-    view_.Update();
-    listener_.Listen();
+    if (view_) view_->Update();
+    if (listener_) listener_->Listen();
     children_ = ChildrenOf(up_.pid());
     if (const auto end = up_.Poll()) {
       ended_ = true;
@@ -197,9 +197,9 @@ class Soak {
       if (std::find(kWatched.begin(), kWatched.end(), program) != kWatched.end()) look_at(program, process);
     }
     record_.SetAlive(alive);
-    record_.SetRefused(listener_.refused());
+    record_.SetRefused(listener_->refused());
     if (!sample) return;
-    for (const std::string& node : nodes_) record_.AddHealth(now_s, view_.health(NodeOf(node)));
+    for (const std::string& node : nodes_) record_.AddHealth(now_s, view_->health(NodeOf(node)));
   }
 
   void Strike(double now_s) {
@@ -260,7 +260,7 @@ class Soak {
     }
     supervisor::WriteFile(folder_ / "soak.json", json.text());
     supervisor::WriteFile(folder_ / "soak.html",
-                          SoakPage(record_, settings_.limits, view_.manifest().scene_name, session));
+                          SoakPage(record_, settings_.limits, view_->manifest().scene_name, session));
     supervisor::WriteFile(folder_ / "samples.csv", SamplesCsv(record_));
     if (!verdict_.empty()) std::printf("! %s\n", verdict_.c_str());
     std::printf("%s: %s\n", record_.Passes(settings_.limits) ? "passed" : "FAILED", (folder_ / "soak.html").c_str());
@@ -271,8 +271,8 @@ class Soak {
   double total_s_;
   fs::path folder_, log_;
   supervisor::Progress progress_;
-  supervisor::SessionView view_;
-  Listener listener_;
+  std::optional<supervisor::SessionView> view_;  ///< Set when the session has opened its bus.
+  std::optional<Listener> listener_;
   supervisor::ChildProcess up_;
   std::map<std::string, pid_t> children_;
   std::vector<std::string> nodes_;

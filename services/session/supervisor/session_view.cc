@@ -65,8 +65,8 @@ std::uint64_t DropsOf(const Health& health) {
   return drops;
 }
 
-SessionView::SessionView(int domain)
-    : participant_(bus::ToolSettings(domain)),
+SessionView::SessionView(int domain, std::string_view identity)
+    : participant_(bus::ToolSettings(domain, identity)),
       healths_(participant_.MakeInput<Health>()),
       manifests_(participant_.MakeInput<SceneManifest>()) {}
 

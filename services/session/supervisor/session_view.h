@@ -23,7 +23,8 @@ inline constexpr std::int64_t kSilence_ns = 1'000'000'000;
 
 class SessionView {
  public:
-  explicit SessionView(int domain);
+  /// @param identity whose rights the view has on a bus with keys.
+  explicit SessionView(int domain, std::string_view identity = bus::kToolIdentity);
 
   /// Reads all samples that have arrived since the last call.
   void Update();

@@ -97,12 +97,12 @@ void Apply(const Quality& quality, int depth, const std::string& shared_memory, 
 
 }  // namespace
 
-DdsSettings ToolSettings(int domain) {
+DdsSettings ToolSettings(int domain, std::string_view identity) {
   const std::filesystem::path memory = SharedMemoryDirectory(domain);
   return {.domain = domain,
           .node_name = std::string(kToolIdentity),
           .shared_memory = memory,
-          .security = AnnouncedSecurity(memory, kToolIdentity)};
+          .security = AnnouncedSecurity(memory, identity)};
 }
 
 namespace {

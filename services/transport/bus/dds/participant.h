@@ -8,8 +8,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "services/transport/bus/access.h"
 #include "services/transport/bus/port.h"
 #include "services/transport/bus/raw_input.h"
 #include "services/transport/bus/schema.h"
@@ -41,7 +43,8 @@ struct DdsSettings {
 inline constexpr std::uint32_t kSocketBuffer_B = 4u << 20;
 
 /// Settings for joining the session of a domain as an observer: `fulcrum status` and similar commands.
-[[nodiscard]] DdsSettings ToolSettings(int domain);
+/// @param identity in access.h, whose rights the observer needs.
+[[nodiscard]] DdsSettings ToolSettings(int domain, std::string_view identity = kToolIdentity);
 
 /// Name of the recorder's participant: nodes wait for it before they begin.
 inline constexpr const char* kRecorderPeer = "recording";
