@@ -10,6 +10,7 @@
 #include "services/base/runtime/realtime.h"
 #include "services/nodes/app/cart_security.h"
 #include "services/scene/format/scene_file.h"
+#include "services/session/supervisor/crash_watch.h"
 #include "services/session/supervisor/domain_guard.h"
 #include "services/session/supervisor/node_process.h"
 #include "services/session/supervisor/node_starter.h"
@@ -98,6 +99,7 @@ class Host {
     folder_ = MakeSessionFolder(settings_.out, file, *scene_, cart,
                                 "  session: " + offer.session_id + "\n  peer: " + settings_.far.peer +
                                     "\n  nodes: " + link::NamesOfNodes(offer.nodes) + "\n");
+    crash_watch_.emplace(settings_.domain, memory_, folder_);
     const bus::Security security = app::SecurityOf(cart, bus::kLinkIdentity);
     bus::OpenSharedMemory(settings_.domain, security);
     local_.emplace(bus::DdsSettings{
@@ -142,6 +144,7 @@ class Host {
     }
     last_turn_ns_ = now;
     for (NodeProcess& node : nodes_) WatchNode(&node, now);
+    for (std::size_t i = 0; i < nodes_.size(); ++i) crash_watch_->Note(i, nodes_[i].pid());
     if (sweep_ns_ != 0 && now >= sweep_ns_) {
       sweep_ns_ = 0;
       bus::SweepSharedMemory(memory_);
@@ -193,11 +196,13 @@ class Host {
     local_.reset();
     bus::RemoveSharedMemory(memory_);
     RemoveCheckpoints(folder_);
+    crash_watch_->Done();
   }
 
   const HostSettings settings_;
   DomainGuard guard_;
   const std::filesystem::path memory_;
+  std::optional<CrashWatch> crash_watch_;
   Progress progress_{false};
   std::optional<bus::DdsParticipant> local_;
   link::Link link_;  ///< Ends before the bus that it has ports of.

@@ -59,12 +59,11 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
 std::filesystem::path OpenMemory(const UpSettings& up) {
   bus::Security security = app::SecurityOf(up.cart, NodeName(NodeId::kSupervisor));
   std::filesystem::path memory = bus::SharedMemoryDirectory(up.cart.domain);
-  bus::RemoveSharedMemory(memory);  // Of a session that was killed: the guard is ours.
-  if (!security.on() && !up.open_bus) {
-    bus::PrepareSharedMemory(memory);
-    security.keys = MakeKeysOfSession(memory);
-  }
-  bus::OpenSharedMemory(up.cart.domain, security);
+  if (security.on() || up.open_bus) return bus::OpenSharedMemory(up.cart.domain, security);
+  bus::ClearSharedMemory(memory);
+  bus::PrepareSharedMemory(memory);
+  security.keys = MakeKeysOfSession(memory);
+  bus::AnnounceSession(memory, security);
   return memory;
 }
 

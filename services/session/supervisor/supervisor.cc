@@ -14,6 +14,7 @@
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/base/runtime/realtime.h"
 #include "services/session/supervisor/command_desk.h"
+#include "services/session/supervisor/crash_watch.h"
 #include "services/session/supervisor/dump_trigger.h"
 #include "services/session/supervisor/node_orders.h"
 #include "services/session/supervisor/node_process.h"
@@ -46,7 +47,9 @@ constexpr std::int64_t kLeadTime_ns = kSecond_ns / 5;
 }  // namespace
 
 struct Supervisor::Impl {
-  explicit Impl(const UpSettings& up) : setup(up), status(!up.attach.empty()) {
+  explicit Impl(const UpSettings& up)
+      : setup(up), crash_watch(up.cart.domain, setup.memory, setup.folder), status(!up.attach.empty()) {
+    SweepKilledSessions(up.cart.domain);
     if (!setup.keys_warning.empty()) status.Say("! " + setup.keys_warning);
     participant.emplace(bus::DdsSettings{.domain = up.cart.domain,
                                          .node_name = "supervisor",
@@ -196,6 +199,7 @@ struct Supervisor::Impl {
     const std::int64_t now = MonotonicNs();
     TakeReports(now);
     nodes->Watch(now, [&](const auto& node, const auto& death) { OnDeath(node, death, now); });
+    NoteChildren();
     desk->Serve(now);
     generator->Follow(clock, now);
     PublishOwnHealth(now);
@@ -203,6 +207,13 @@ struct Supervisor::Impl {
     status.Update(now);
     ending |= runtime::ShouldStop();
     std::this_thread::sleep_for(kLoopPeriod);
+  }
+
+  /// Services end with the unit of the supervisor; systemd would restart one that is killed.
+  void NoteChildren() {
+    if (!setup.settings.attach.empty()) return;
+    std::size_t place = 0;
+    for (const auto& node : nodes->all()) crash_watch.Note(place++, node->pid());
   }
 
   // ---------------------------------------------------------------------------------------- phases of the session
@@ -275,6 +286,7 @@ struct Supervisor::Impl {
     const UpSettings& up = setup.settings;
     if (!up.attach.empty()) std::filesystem::remove(up.attach / "session", no_link);
     RemoveCheckpoints(setup.folder);
+    crash_watch.Done();
   }
 
   void Report() {
@@ -283,6 +295,7 @@ struct Supervisor::Impl {
   }
 
   SessionSetup setup;
+  CrashWatch crash_watch;  ///< Begins before there are threads.
 
   std::optional<bus::DdsParticipant> participant;
   std::optional<RemoteNodes> remote;  ///< Empty: all nodes run here.

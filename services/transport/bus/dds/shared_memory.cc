@@ -4,6 +4,7 @@
 #include <sched.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <bitset>
@@ -27,6 +28,10 @@ namespace {
 using ShortPid = std::uint16_t;
 
 constexpr std::string_view kClaim = "owner_";
+
+/// A participant without a session (`replayer --live`) makes the directory first and its files this much later at most
+/// (assumed) [s]: a younger directory that is empty stays.
+constexpr std::int64_t kLongestJoin_s = 10;
 
 /// Addresses of secured participants, which do not contain the process id, with it: from files "owner_<address>_<pid>".
 using Claims = std::vector<std::pair<std::string, ShortPid>>;
@@ -72,15 +77,19 @@ std::bitset<65536> LiveProcesses() {
   return live;
 }
 
+/// Removes the entries whose name meets `condition`: files, sockets and folders with their content.
 template <class Condition>
-SweepResult RemoveFiles(const fs::path& directory, const Condition& condition) {
+SweepResult RemoveEntries(const fs::path& directory, const Condition& condition) {
   SweepResult result;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(directory, error)) {
+  std::vector<fs::path> entries;
+  for (const auto& entry : fs::directory_iterator(directory, error)) entries.push_back(entry.path());
+  for (const fs::path& entry : entries) {
     struct stat status {};
-    if (lstat(entry.path().c_str(), &status) != 0 || !S_ISREG(status.st_mode)) continue;
-    if (!condition(entry.path().filename().string()) || unlink(entry.path().c_str()) != 0) continue;
-    ++result.files;
+    if (lstat(entry.c_str(), &status) != 0 || !condition(entry.filename().string())) continue;
+    const auto removed = fs::remove_all(entry, error);
+    if (error || removed == 0) continue;
+    result.files += static_cast<int>(removed);
     result.bytes += static_cast<std::uint64_t>(status.st_blocks) * 512u;
   }
   return result;
@@ -159,24 +168,46 @@ WorkingIn::~WorkingIn() {
 SweepResult SweepSharedMemory(const fs::path& directory) {
   const auto live = LiveProcesses();
   const Claims claims = ClaimsIn(directory);
-  return RemoveFiles(directory, [&](const std::string& name) {
+  return RemoveEntries(directory, [&](const std::string& name) {
     const auto owner = OwnerOf(name, claims);
     return owner && !live.test(*owner);
   });
 }
 
+SweepResult ClearSharedMemory(const fs::path& directory) {
+  struct stat status {};
+  if (lstat(directory.c_str(), &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != getuid()) return {};
+  const auto live = LiveProcesses();
+  const Claims claims = ClaimsIn(directory);
+  // While a participant lives there (nodes without a supervisor, a host in another network namespace), what belongs to
+  // no single process stays: announcement, keys and sockets may be its.
+  std::error_code error;
+  bool inhabited = false;
+  for (const auto& entry : fs::directory_iterator(directory, error)) {
+    const auto owner = OwnerOf(entry.path().filename(), claims);
+    inhabited |= owner && live.test(*owner);
+  }
+  const SweepResult result = RemoveEntries(directory, [&](const std::string& name) {
+    const auto owner = OwnerOf(name, claims);
+    return owner ? !live.test(*owner) : !inhabited;
+  });
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  if (result.files > 0 || now.tv_sec - status.st_mtim.tv_sec > kLongestJoin_s) rmdir(directory.c_str());
+  return result;
+}
+
 fs::path OpenSharedMemory(int domain, const Security& security) {
   fs::path directory = SharedMemoryDirectory(domain);
+  ClearSharedMemory(directory);
   PrepareSharedMemory(directory);
-  SweepSharedMemory(directory);
   AnnounceSession(directory, security);
   return directory;
 }
 
 SweepResult RemoveSharedMemory(const fs::path& directory) {
-  const SweepResult result = RemoveFiles(directory, [](const std::string&) { return true; });
-  std::error_code ignored;
-  fs::remove_all(directory, ignored);  // Also sockets and the keys of the session.
+  const SweepResult result = RemoveEntries(directory, [](const std::string&) { return true; });
+  rmdir(directory.c_str());
   return result;
 }
 

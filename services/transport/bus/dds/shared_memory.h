@@ -21,8 +21,8 @@ inline constexpr std::uint64_t kNeededSharedMemory_B = 32u << 20;
 /// others or has less than kNeededSharedMemory_B free.
 void PrepareSharedMemory(const std::filesystem::path& directory);
 
-/// Prepares the directory for a new session in the domain: removes the files that a killed session has left there and
-/// announces the security of the new one. @return the directory.
+/// Prepares the directory for a new session in the domain: removes what a killed session has left there and announces
+/// the security of the new one. @return the directory.
 std::filesystem::path OpenSharedMemory(int domain, const Security& security);
 
 /// Records that the files named after this address ("xx.xx.….xx", 12 bytes) belong to this process: the address of an
@@ -55,7 +55,11 @@ struct SweepResult {
 /// and a process that still maps a removed file keeps its mapping. A missing directory counts as empty.
 SweepResult SweepSharedMemory(const std::filesystem::path& directory);
 
-/// Removes the directory with all its files, at the end of a session when no node runs.
+/// Removes what an ended session has left: everything but the files of live processes, and the directory when it is
+/// empty then. Only while the caller holds the domain, because a session that starts would lose its keys.
+SweepResult ClearSharedMemory(const std::filesystem::path& directory);
+
+/// Removes the directory with all its content, at the end of a session when no node runs.
 SweepResult RemoveSharedMemory(const std::filesystem::path& directory);
 
 }  // namespace fulcrum::bus
