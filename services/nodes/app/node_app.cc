@@ -18,6 +18,7 @@
 #include "services/base/runtime/service_notify.h"
 #include "services/nodes/app/cart_security.h"
 #include "services/nodes/app/health_report.h"
+#include "services/nodes/app/node_confinement.h"
 #include "services/nodes/app/recorder_wait.h"
 #include "services/transport/bus/dds/shared_memory.h"
 #include "services/transport/bus/input_account.h"
@@ -357,6 +358,7 @@ int NodeMain(int argc, char** argv, NodeId node, const char* description,
       return static_cast<int>(ExitCode::kDone);
     }
     NodeApp app(node, parsed.options);
+    ConfineNode(node, parsed.options, app.cart());
     return static_cast<int>(run(app));
   } catch (const InputError& error) {
     return fail(ExitCode::kBadUsage, error);
