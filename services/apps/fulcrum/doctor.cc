@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "services/apps/fulcrum/commands.h"
+#include "services/apps/fulcrum/security_report.h"
 #include "services/base/config/cart.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
@@ -251,12 +252,16 @@ ExitCode Doctor(const Words& words) {
   po::options_description options;
   options.add_options()("out", po::value<std::string>()->value_name("DIR")->default_value("out"),
                         "folder of the session folders; its disk is checked for 1 GiB of free space");
+  options.add_options()("security",
+                        "print what protects cart, session and machine, what does not, and what that means");
+  AddCart(&options);
   AddDomain(&options);
   const Arguments arguments = Parse("doctor", words, options);
   if (arguments.help) {
     return ExitCode::kDone;
   }
   const int domain = DomainOf(arguments, config::DefaultDomain());
+  if (arguments.values.count("security") != 0) return ReportSecurity(domain, CartOf(arguments));
   const std::vector<std::pair<const char*, Finding>> findings{
       {"programs", NodePrograms()},
       {"scenes", Scenes()},
