@@ -35,6 +35,8 @@ class Cart {
 
   /// Running nodes, by name.
   [[nodiscard]] std::map<std::string, pid_t> nodes() const;
+  /// Process of `fulcrum up`.
+  [[nodiscard]] pid_t pid() const { return up_.pid(); }
   [[nodiscard]] std::string Said() const { return up_.Said(); }
   [[nodiscard]] std::filesystem::path session() const { return folder_ / "latest"; }
   /// Session time of the newest picture [s], a measure of progress that is visible from outside; negative without a

@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   using fulcrum::ExitCode;
   fulcrum::runtime::SetLogName("fulcrum");
   fulcrum::runtime::InstallStopSignals();
+  fulcrum::runtime::InstallLastWords();
   const auto fail = [](ExitCode code, const std::exception& error) {
     std::fprintf(stderr, "fulcrum: %s\n", error.what());
     return static_cast<int>(code);

@@ -1,6 +1,7 @@
 #include "services/apps/fulcrum/commands.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
+#include "services/base/runtime/realtime.h"
 #include "services/session/supervisor/outcome.h"
 #include "services/session/supervisor/scene_cache.h"
 #include "services/session/supervisor/supervisor.h"
@@ -87,6 +88,9 @@ ExitCode Up(const Words& words) {
   if (values.count("scene") == 0) {
     throw InputError("SCENE is missing, for example built-in; see fulcrum help up");
   }
+  // Nodes inherit the limit. The recorder has 27 open, and each guest, device or thread of a driver adds some.
+  constexpr unsigned kNeededFiles = 128;
+  if (const std::string few = runtime::RaiseFileLimit(kNeededFiles); !few.empty()) throw InputError(few);
   UpSettings settings;
   settings.programs = runtime::ProgramFolder();
   if (const fs::path cart = CartOf(arguments); !cart.empty()) {

@@ -15,7 +15,10 @@
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <exception>
+#include <new>
 
 namespace fulcrum::runtime {
 namespace {
@@ -57,6 +60,50 @@ std::string SetFifoPriority(int priority) {
   return "real-time priority " + std::to_string(priority) + " is not permitted (" + std::strerror(error) +
          "), so cycles may start late under load; to permit it, set \"rtprio\" to 90 for this user in "
          "/etc/security/limits.conf, or give the program CAP_SYS_NICE";
+}
+
+std::string RaiseFileLimit(unsigned needed) {
+  constexpr rlim_t kUseful = 4096;
+  rlimit limit{};
+  if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return {};
+  const rlim_t wanted = std::min<rlim_t>(limit.rlim_max, kUseful);
+  if (limit.rlim_cur < wanted) {
+    limit.rlim_cur = wanted;
+    setrlimit(RLIMIT_NOFILE, &limit);
+  }
+  if (limit.rlim_cur >= needed) return {};
+  return "open files: a process of this user may have " + std::to_string(limit.rlim_cur) + ", at least " +
+         std::to_string(needed) +
+         " are needed; raise the limit: \"nofile\" in /etc/security/limits.conf, LimitNOFILE= of a service, or "
+         "ulimit -Hn of the shell that lowered it";
+}
+
+namespace {
+
+/// A library whose thread or memory was refused may report an error of another name.
+std::string AddressSpaceHint() {
+  rlimit limit{};
+  if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return {};
+  return "; its address space is limited to " + std::to_string(limit.rlim_cur >> 20) + " MiB (ulimit -v)";
+}
+
+}  // namespace
+
+void InstallLastWords() {
+  std::set_terminate([] {
+    try {
+      if (const std::exception_ptr exception = std::current_exception()) std::rethrow_exception(exception);
+      Log(LogLevel::kError, "terminated");
+    } catch (const std::bad_alloc&) {
+      constexpr std::string_view kText = "error: out of memory\n";  // A log line would need some.
+      if (write(STDERR_FILENO, kText.data(), kText.size()) < 0) std::abort();
+    } catch (const std::exception& error) {
+      Log(LogLevel::kError, std::string("uncaught: ") + error.what() + AddressSpaceHint());
+    } catch (...) {
+      Log(LogLevel::kError, "uncaught exception of an unknown kind");
+    }
+    std::abort();
+  });
 }
 
 void FlushDenormals() {

@@ -13,6 +13,13 @@ namespace fulcrum::runtime {
 /// Sets SCHED_FIFO on the calling thread. Same return as LockMemory.
 [[nodiscard]] std::string SetFifoPriority(int priority);
 
+/// Raises the limit of open files as far as permitted and useful. Returns an empty string, or one line when fewer than
+/// `needed` are permitted.
+[[nodiscard]] std::string RaiseFileLimit(unsigned needed);
+
+/// Makes an exception that no thread catches end the process with one line in its log, then abort.
+void InstallLastWords();
+
 /// Makes the calling thread flush denormals to zero (they cost up to 20 % in the heat solver).
 void FlushDenormals();
 

@@ -9,7 +9,9 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <new>
 #include <optional>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -146,6 +148,8 @@ struct NodeApp::Impl {
     tick.session_time_s = SessionTime(tick.stamp_ns);
     try {
       step(tick);
+    } catch (const std::bad_alloc&) {
+      End(ExitCode::kFailure, "step failed: out of memory");
     } catch (const std::exception& error) {
       End(ExitCode::kFailure, std::string("step failed: ") + error.what());
     }
@@ -347,6 +351,7 @@ int NodeMain(int argc, char** argv, NodeId node, const char* description,
              const std::function<ExitCode(NodeApp&)>& run) {
   runtime::SetLogName(NodeName(node));
   runtime::InstallStopSignals();
+  runtime::InstallLastWords();
   const auto fail = [](ExitCode code, const std::exception& error) {
     Log(LogLevel::kError, error.what());
     return static_cast<int>(code);
@@ -364,6 +369,8 @@ int NodeMain(int argc, char** argv, NodeId node, const char* description,
     return fail(ExitCode::kBadUsage, error);
   } catch (const MismatchError& error) {
     return fail(ExitCode::kMismatch, error);
+  } catch (const std::bad_alloc&) {
+    return fail(ExitCode::kFailure, std::runtime_error("out of memory"));
   } catch (const std::exception& error) {
     return fail(ExitCode::kFailure, error);
   }

@@ -10,7 +10,6 @@
 #include <cstring>
 #include <utility>
 
-#include "services/base/core/error.h"
 #include "services/base/core/exit_code.h"
 
 namespace fulcrum::supervisor {
@@ -30,6 +29,12 @@ const char* Meaning(int exit_code) {
       break;
   }
   return "failure";
+}
+
+[[noreturn]] void Fail(const std::string& what, int error) {
+  const std::string text = what + ": " + ::strerror(error);
+  if (error == EMFILE || error == ENFILE || error == EAGAIN || error == ENOMEM) throw ShortageError(text);
+  throw InputError(text);
 }
 
 /// Runs in the child between fork and exec, where other threads of the parent may have held any lock: only
@@ -81,9 +86,7 @@ ChildProcess& ChildProcess::operator=(ChildProcess&& other) noexcept {
 ChildProcess ChildProcess::Start(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                                  const std::filesystem::path& log, WithParent with_parent, int input) {
   const int log_fd = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (log_fd < 0) {
-    throw InputError("cannot write " + log.string() + ": " + ::strerror(errno));
-  }
+  if (log_fd < 0) Fail("cannot write " + log.string(), errno);
   try {
     ChildProcess process = StartOn(program, arguments, {.input = input, .output = log_fd}, with_parent);
     ::close(log_fd);
@@ -96,7 +99,7 @@ ChildProcess ChildProcess::Start(const std::filesystem::path& program, const std
 
 ChildProcess ChildProcess::StartOn(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                                    const ChildStreams& streams, WithParent with_parent) {
-  const auto fail = [&](int error) { throw InputError("cannot start " + program.string() + ": " + ::strerror(error)); };
+  const auto fail = [&](int error) { Fail("cannot start " + program.string(), error); };
   std::vector<char*> pointers{const_cast<char*>(program.c_str())};
   for (const std::string& argument : arguments) {
     pointers.push_back(const_cast<char*>(argument.c_str()));

@@ -8,7 +8,15 @@
 #include <string>
 #include <vector>
 
+#include "services/base/core/error.h"
+
 namespace fulcrum::supervisor {
+
+/// The system has no descriptor, process or memory left for a program. The same start may succeed later.
+class ShortageError : public InputError {
+ public:
+  using InputError::InputError;
+};
 
 /// File descriptors of a child's standard streams.
 struct ChildStreams {
@@ -36,7 +44,7 @@ class ChildProcess {
 
   /// Starts `program` with `arguments`; standard output and error are appended to `log`, `input` is an open file or -1.
   /// The child is killed when the calling thread ends, so start children from the main thread. Throws InputError when
-  /// the program cannot be started.
+  /// the program cannot be started, ShortageError when it cannot now.
   [[nodiscard]] static ChildProcess Start(const std::filesystem::path& program,
                                           const std::vector<std::string>& arguments, const std::filesystem::path& log,
                                           WithParent with_parent = WithParent::kDies, int input = -1);

@@ -24,6 +24,8 @@ constexpr std::int64_t kPatienceWithRestart = 3 * kSecond_ns;
 constexpr std::int64_t kLongestEnd = 4 * kSecond_ns;
 // From the start of a node to the start of its spare: the spare must not compete with the node's own start.
 constexpr std::int64_t kBeforeSpare = kSecond_ns;
+// From a start for which the system had no descriptor, process or memory to the next try.
+constexpr std::int64_t kAfterShortage = kSecond_ns;
 constexpr auto kPollPeriod = std::chrono::milliseconds(5);
 
 /// True when another start with the same arguments would end the same way.
@@ -44,6 +46,7 @@ void NodeProcess::Start(std::int64_t now_ns) {
   due_ns_ = 0;
   kill_ns_ = 0;
   silent_ = false;
+  lacks_ = false;
 }
 
 void NodeProcess::WatchForSilence(std::int64_t now_ns) {
@@ -77,6 +80,10 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
       command_.again.clear();
       try {
         Start(now_ns);
+      } catch (const ShortageError& error) {
+        due_ns_ = now_ns + kAfterShortage;
+        if (std::exchange(lacks_, true)) return std::nullopt;
+        return Death{std::string("could not be started (") + error.what() + ")", false, {}, false, 0};
       } catch (const InputError& error) {
         if (before_) return GiveBack(error.what(), {}, now_ns);
         failed_ = true;

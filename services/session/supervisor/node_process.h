@@ -54,6 +54,7 @@ class NodeProcess final : public SupervisedNode {
   std::int64_t due_ns_ = 0;          ///< Time of the next start; 0: the process runs.
   std::int64_t kill_ns_ = 0;         ///< Time of SIGKILL in a restart by command; 0: no such restart.
   bool silent_ = false;              ///< Killed because its Health was missing.
+  bool lacks_ = false;               ///< The system had no means for the last start.
   bool failed_ = false;
 };
 
