@@ -90,7 +90,7 @@ Line Bus(int domain) {
   }
   return {Mark::kOn, what, "keys in " + security.keys.string() + (security.encrypt ? ", encrypted" : ""),
           security.encrypt ? "strangers are refused, and cannot listen or forge datagrams"
-                           : "strangers are refused; who may send forged datagrams on loopback can still disturb"};
+                           : "strangers are refused; forged datagrams lack the number of the session and are dropped"};
 }
 
 Line Memory(int domain) {

@@ -11,6 +11,7 @@
 
 #include "services/transport/bus/dds/participant.h"
 #include "services/transport/bus/dds/shared_memory.h"
+#include "tests/support/datagram_flood.h"
 #include "tests/support/session_bus.h"
 #include "tests/system/chaos/chaos_cart.h"
 #include "tests/system/chaos/small_room.h"
@@ -51,6 +52,7 @@ class Chaos : public ::testing::Test {
   void KillEachNode();
   void StopEachNode();
   void Flooded();
+  void FloodedFromOutsideOfTheBus();
   void SpoilCheckpoints();
   void RefuseASecondCart();
 
@@ -90,6 +92,13 @@ void Chaos::Flooded() {
   EXPECT_EQ(chaos_.watch().See(rejected), before) << "the flood is over";
 }
 
+void Chaos::FloodedFromOutsideOfTheBus() {
+  const auto before = chaos_.cart().nodes();
+  EXPECT_EQ(testing::FloodDomain(kDomain, 20'000, 1, 7), 20'000u);
+  EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
+  EXPECT_EQ(chaos_.cart().nodes(), before) << "a datagram that is no message has ended a process";
+}
+
 TEST_F(Chaos, TheSessionOutlivesItsFaults) {
   ASSERT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
   {
@@ -115,6 +124,10 @@ TEST_F(Chaos, TheSessionOutlivesItsFaults) {
   {
     SCOPED_TRACE("flooded");
     Flooded();
+  }
+  {
+    SCOPED_TRACE("flooded with datagrams");
+    FloodedFromOutsideOfTheBus();
   }
   {
     SCOPED_TRACE("spoiled checkpoints");
