@@ -77,7 +77,8 @@ TEST_F(InstallTest, PackageSaysWhatItNeedsAndKeepsTheConfigurationOfTheLab) {
   const std::string control = Output("/usr/bin/dpkg-deb", {"-f", package_});
   EXPECT_NE(control.find("Package: fulcrum\n"), std::string::npos) << control;
   // Found in the programs by dpkg-shlibdeps; loaded at run time.
-  for (const char* needed : {"libfastrtps", "libopenscenegraph", "libserialport", "libsystemd0", "libegl-mesa0"}) {
+  for (const char* needed :
+       {"libfastrtps", "libopenscenegraph", "libserialport", "libsystemd0", "libseccomp2", "libegl-mesa0"}) {
     EXPECT_NE(control.find(needed), std::string::npos) << needed << "\n" << control;
   }
   EXPECT_EQ(control.find("googletest"), std::string::npos);
@@ -187,6 +188,35 @@ TEST_F(InstallTest, UnitsPassTheCheckOfSystemd) {
   }
   ASSERT_EQ(arguments.size(), 4u + 9u) << "a target, the supervisor, the console, six nodes";
   EXPECT_EQ(Output("/usr/bin/env", arguments), "") << "systemd found fault with the units";
+}
+
+TEST_F(InstallTest, UnitsLimitWhatEachNodeMayDo) {
+  const UnitFile all(root_ / "lib/systemd/system/fulcrum-.service.d/10-fulcrum.conf", root_);
+  std::string calls;
+  for (const std::string& value : all.Values("SystemCallFilter")) calls += " " + value;
+  // Without these a node could not confine itself, which would be one warning in its log.
+  for (const char* needed : {" seccomp", " landlock_create_ruleset", " landlock_add_rule", " landlock_restrict_self"}) {
+    EXPECT_NE(calls.find(needed), std::string::npos) << needed;
+  }
+  EXPECT_EQ(all.Value("RestrictAddressFamilies"), "AF_UNIX AF_INET AF_NETLINK");
+  EXPECT_EQ(all.Value("IPAddressDeny"), "any");
+  EXPECT_EQ(all.Value("IPAddressAllow"), "localhost multicast");
+  EXPECT_EQ(all.Value("CapabilityBoundingSet"), "");
+  EXPECT_EQ(all.Value("ProtectSystem"), "strict");
+  EXPECT_EQ(all.Value("LimitCORE"), "0");
+  const std::map<std::string, std::string> written{{"recorder", "sessions"}, {"physics", "sessions"},
+                                                   {"thermal", "sessions"},  {"render", "sessions"},
+                                                   {"handle-bridge", ""},    {"haptics", "all"}};
+  for (const auto& [node, below] : written) {
+    const UnitFile unit = Unit("fulcrum-" + node + ".service");
+    EXPECT_EQ(unit.Value("ReadOnlyPaths").empty(), below == "all") << node;
+    EXPECT_EQ(unit.Value("ReadWritePaths").empty(), below != "sessions") << node;
+    // No unit gives itself an address, a call or a capability beyond those of all.
+    for (const char* key : {"IPAddressAllow", "SystemCallFilter", "CapabilityBoundingSet", "AmbientCapabilities"}) {
+      EXPECT_TRUE(unit.Values(key).empty()) << node << " " << key;
+    }
+    EXPECT_EQ(unit.Values("DeviceAllow").empty(), unit.Value("PrivateDevices") == "yes") << node;
+  }
 }
 
 TEST_F(InstallTest, SessionRunsFromTheInstalledPlaces) {
