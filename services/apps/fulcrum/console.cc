@@ -1,5 +1,7 @@
 #include "services/session/console/console.h"
 
+#include <unistd.h>
+
 #include <cstdio>
 
 #include "services/apps/fulcrum/commands.h"
@@ -15,10 +17,11 @@ ExitCode Console(const Words& words) {
   po::options_description options;
   options.add_options()  //
       ("port", po::value<int>()->value_name("N")->default_value(8480),
-       "port of the page, 1 to 65535; 0: any free port")                                               //
-      ("bind", po::value<std::string>()->value_name("ADDRESS")->default_value("127.0.0.1"),            //
-       "numeric address to listen on; with other than loopback, page and token are sent unencrypted")  //
-      ("host-name", po::value<Words>()->value_name("NAME")->composing(),                               //
+       "port of the page, 1 to 65535; 0: any free port")                                     //
+      ("bind", po::value<std::string>()->value_name("ADDRESS")->default_value("127.0.0.1"),  //
+       "numeric address to listen on; with other than loopback, the page is served over TLS with a certificate of its "
+       "own")                                                             //
+      ("host-name", po::value<Words>()->value_name("NAME")->composing(),  //
        "further valid host name of the page, besides localhost, this machine's name and numeric addresses; may be "
        "repeated")                                                                                                  //
       ("token-file", po::value<std::string>()->value_name("FILE"),                                                  //
@@ -52,13 +55,9 @@ ExitCode Console(const Words& words) {
   settings.programs = runtime::ProgramFolder();
   settings.domain =
       DomainOf(arguments, settings.cart.empty() ? config::DefaultDomain() : config::LoadCart(settings.cart).domain);
+  settings.state = UserFolder("XDG_STATE_HOME", ".local/state");
   console::Console console(settings);
-  if (!settings.bind.starts_with("127.") && settings.bind != "::1") {
-    std::fprintf(stderr, "fulcrum: --bind %s: the token is sent unencrypted over this network; prefer an SSH tunnel\n",
-                 settings.bind.c_str());
-  }
-  std::printf("open %s\ntoken in %s\nCtrl-C ends the console; a running session goes on\n", console.Address().c_str(),
-              console.token_file().c_str());
+  std::fputs(console::Greeting(console.Facts(), ::isatty(STDOUT_FILENO) == 1).c_str(), stdout);
   std::fflush(stdout);
   console.Run();
   if (console.session_runs()) {

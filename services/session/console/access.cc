@@ -1,10 +1,7 @@
 #include "services/session/console/access.h"
 
 #include <arpa/inet.h>
-#include <fcntl.h>
 #include <sys/random.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -13,6 +10,7 @@
 #include <optional>
 
 #include "services/base/core/error.h"
+#include "services/base/runtime/private_file.h"
 
 namespace fulcrum::console {
 namespace {
@@ -68,43 +66,18 @@ std::string MakeToken() {
 }
 
 std::string ReadToken(const std::filesystem::path& file) {
-  const auto fail = [&](const std::string& why) -> InputError {
-    return InputError("token file " + file.string() + ": " + why);
-  };
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
-  if (fd < 0) throw fail(::strerror(errno));
-  struct stat status {};
-  std::array<char, kLongestToken + 2> bytes{};
-  const bool known = ::fstat(fd, &status) == 0;
-  const ssize_t size = known ? ::read(fd, bytes.data(), bytes.size()) : -1;
-  ::close(fd);
-  if (size < 0 || !S_ISREG(status.st_mode)) throw fail("cannot be read");
-  if (status.st_uid != ::geteuid() || (status.st_mode & 077u) != 0) {
-    throw fail("must belong to the user of the console and be readable by that user only; chmod 600 or remove it");
-  }
-  std::string_view text(bytes.data(), static_cast<std::size_t>(size));
+  const std::string line = runtime::ReadPrivateFile(file, kLongestToken + 2, "token file");
+  std::string_view text = line;
   if (text.ends_with('\n')) text.remove_suffix(1);
   if (!IsTokenText(text)) {
-    throw fail("must contain one line of 16 to 256 letters, digits, '-' or '_'; remove it to get a new token");
+    throw InputError("token file " + file.string() +
+                     ": must contain one line of 16 to 256 letters, digits, '-' or '_'; remove it to get a new token");
   }
   return std::string(text);
 }
 
 void WriteToken(const std::filesystem::path& file, const std::string& token) {
-  std::filesystem::path part = file;
-  part += ".part";
-  std::error_code ignored;
-  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path(), ignored);
-  std::filesystem::remove(part, ignored);
-  // O_EXCL and O_NOFOLLOW: an existing file is never written, and no symbolic link is followed.
-  const int fd = ::open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
-  const std::string text = token + "\n";
-  const bool written = fd >= 0 && ::write(fd, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-  const int error = errno;
-  if (fd >= 0) ::close(fd);
-  if (!written || std::rename(part.c_str(), file.c_str()) != 0) {
-    throw InputError("token file " + file.string() + ": cannot be written: " + ::strerror(written ? errno : error));
-  }
+  runtime::WritePrivateFile(file, token + "\n", "token file");
 }
 
 Access::Access(std::string token, std::vector<std::string> names)
@@ -123,7 +96,8 @@ bool Access::IsOwnHost(std::string_view host) const {
 }
 
 bool Access::IsOwnSite(const HttpRequest& request) {
-  const bool same_origin = request.origin.empty() || request.origin == "http://" + request.host;
+  const bool same_origin =
+      request.origin.empty() || request.origin == (request.secure ? "https://" : "http://") + request.host;
   const bool same_site =
       request.fetch_site.empty() || request.fetch_site == "same-origin" || request.fetch_site == "none";
   return same_origin && same_site;

@@ -7,6 +7,7 @@
 #include <cctype>
 #include <chrono>
 #include <cstdlib>
+#include <ctime>
 #include <fstream>
 #include <future>
 #include <optional>
@@ -43,6 +44,7 @@ constexpr std::size_t kMostRecordings = 50;
 constexpr const char* kReportPolicy =
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; media-src data:; frame-ancestors 'self'; sandbox";
 
+/// The names in lower case, and at the end that of this machine.
 std::vector<std::string> OwnNames(std::vector<std::string> names) {
   std::array<char, 256> own{};
   if (::gethostname(own.data(), own.size() - 1) == 0) names.emplace_back(own.data());
@@ -95,7 +97,9 @@ struct Console::Impl {
              .data = given.data,
              .domain = given.domain}),
         watch(given.domain),
-        server(given.bind, given.port, [this](const HttpRequest& request) { return Handle(request); }) {
+        server({.address = given.bind, .port = given.port, .tls = Identity()},
+               {.handle = [this](const HttpRequest& request) { return Handle(request); },
+                .knows = [this](const HttpRequest& request) { return access->HasToken(request); }}) {
     token_file = settings.token_file.empty() ? DefaultTokenFile(server.port()) : settings.token_file;
     std::error_code error;
     if (!settings.token_file.empty() && fs::exists(token_file, error)) {
@@ -107,6 +111,27 @@ struct Console::Impl {
     access.emplace(token, OwnNames(settings.host_names));
     // The last session before this console was started, so that its report can be opened.
     ShowSession(fs::read_symlink(settings.out / "latest", error).filename());
+  }
+
+  /// Certificate and key, unless only this machine can reach the page.
+  std::optional<TlsIdentity> Identity() {
+    if (IsLoopback(settings.bind)) return {};
+    std::vector<std::string> names = OwnNames(settings.host_names);
+    names.insert(names.end(), {"localhost", "127.0.0.1", "::1"});
+    if (!BindsAny()) names.push_back(settings.bind);
+    std::optional<TlsIdentity> identity = LoadTlsIdentity(settings.state, names, std::time(nullptr), &new_identity);
+    fingerprint = identity->fingerprint;
+    return identity;
+  }
+
+  [[nodiscard]] bool BindsAny() const { return settings.bind == "0.0.0.0" || settings.bind == "::"; }
+
+  [[nodiscard]] std::string Address() const {
+    const bool secure = !fingerprint.empty();
+    std::string host = settings.bind.find(':') != std::string::npos ? "[" + settings.bind + "]" : settings.bind;
+    if (BindsAny()) host = OwnNames({"localhost"}).back();
+    if (secure && !settings.host_names.empty()) host = settings.host_names.front();
+    return (secure ? "https://" : "http://") + host + ":" + std::to_string(server.port()) + "/";
   }
 
   // --------------------------------------------------------------------------------------------- requests
@@ -368,21 +393,18 @@ struct Console::Impl {
   std::string ticket;
   std::int64_t ticket_end_ns = 0;
   std::int64_t next_feed_ns = 0;
-  // Declared last, because its handler uses the other members.
+  std::string fingerprint;  ///< Empty: no TLS.
+  bool new_identity = false;
+  // Declared last, because its handlers and Identity() use the other members.
   HttpServer server;
 };
 
 Console::Console(const ConsoleSettings& settings) : impl_(std::make_unique<Impl>(settings)) {}
 Console::~Console() = default;
 
-std::string Console::Address() const {
-  const std::string& bind = impl_->settings.bind;
-  const bool any = bind == "0.0.0.0" || bind == "::";
-  const std::string host = any ? "localhost" : bind.find(':') != std::string::npos ? "[" + bind + "]" : bind;
-  return "http://" + host + ":" + std::to_string(impl_->server.port()) + "/#" + impl_->token;
+GreetingFacts Console::Facts() const {
+  return {impl_->Address(), impl_->token, impl_->token_file, impl_->fingerprint, impl_->new_identity};
 }
-
-const std::filesystem::path& Console::token_file() const { return impl_->token_file; }
 
 void Console::Run() {
   while (!runtime::ShouldStop()) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/base/config/cart.h"
+#include "services/session/console/greeting.h"
 
 namespace fulcrum::console {
 
@@ -23,20 +24,20 @@ struct ConsoleSettings {
   std::filesystem::path out;       ///< Folder of the session folders.
   std::filesystem::path scenes;    ///< Folder of the scene descriptions on offer.
   std::filesystem::path programs;  ///< Folder of fulcrum, replayer and the nodes.
+  std::filesystem::path state;     ///< Folder of what lasts: the certificate of a console that others can reach.
   int domain = config::DefaultDomain();
 };
 
 class Console {
  public:
-  /// Binds the port and listens. Throws InputError.
+  /// Binds the port and listens, over TLS unless only this machine can reach the address. Throws InputError.
   explicit Console(const ConsoleSettings& settings);
   ~Console();
   Console(const Console&) = delete;
   Console& operator=(const Console&) = delete;
 
-  /// Address of the page, with the token.
-  [[nodiscard]] std::string Address() const;
-  [[nodiscard]] const std::filesystem::path& token_file() const;
+  /// Address, token and fingerprint, for the operator.
+  [[nodiscard]] GreetingFacts Facts() const;
 
   /// Serves until a stop signal. Call from the main thread: tasks are killed when the calling thread ends.
   void Run();

@@ -9,6 +9,7 @@ struct HttpRequest {
   std::string method, target;
   std::string host, origin, fetch_site, authorization, content_type;  ///< Header fields; empty: missing.
   std::string body;
+  bool secure = false;  ///< Sent over TLS.
 };
 
 struct HttpResponse {

@@ -5,27 +5,44 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "services/session/console/admission.h"
 #include "services/session/console/http_message.h"
+#include "services/session/console/tls_identity.h"
 
 namespace fulcrum::console {
 
 struct HttpLimits {
-  std::size_t connections = 24;
+  Admission::Limits slots;
   std::size_t streams = 6;  ///< Connections that may be streams.
   std::uint32_t header_bytes = 8 * 1024;
   std::uint64_t body_bytes = 8 * 1024;
-  std::chrono::seconds request{10};  ///< From the first wait for a request to its last byte, also for a slow sender.
+  /// From the start of a guest's connection, or its last response, to the last byte of its request, TLS handshake
+  /// included, also for a slow sender.
+  std::chrono::seconds guest_request{2};
+  /// The same for a client with the token: from its last response, and from its header to the end of its body.
+  std::chrono::seconds request{10};
   std::chrono::seconds response{10};
+};
+
+struct HttpService {
+  std::function<HttpResponse(const HttpRequest&)> handle;
+  /// True when the header of this request, without its body, has the token.
+  std::function<bool(const HttpRequest&)> knows;
+};
+
+struct ListenAddress {
+  std::string address;             ///< Numeric.
+  int port = 0;                    ///< 0: any free port.
+  std::optional<TlsIdentity> tls;  ///< Empty: plain HTTP.
 };
 
 class HttpServer {
  public:
-  using Handler = std::function<HttpResponse(const HttpRequest&)>;
-
-  /// Binds and listens. @param address numeric. @param port 0: any free port. Throws InputError.
-  HttpServer(const std::string& address, int port, Handler handler, const HttpLimits& limits = {});
+  /// Binds and listens. Throws InputError.
+  HttpServer(const ListenAddress& where, HttpService service, const HttpLimits& limits = {});
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
@@ -46,5 +63,8 @@ class HttpServer {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// True when only this machine can reach the numeric address. Throws InputError when it is no address.
+[[nodiscard]] bool IsLoopback(const std::string& address);
 
 }  // namespace fulcrum::console

@@ -8,9 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
-#include <thread>
 
-#include "services/session/console/http_server.h"
 #include "services/session/console/session_run.h"
 #include "tests/support/cart.h"
 #include "tests/support/http_client.h"
@@ -106,43 +104,6 @@ TEST_F(ConsoleTest, StrangersGetThePageAndNothingElse) {
   EXPECT_EQ(console.Post("/api/restart", "node=physics_node").status, 409);
   EXPECT_EQ(console.Post("/api/start", "scene=nothing").status, 404);
   EXPECT_EQ(console.program().End(SIGTERM), 0);
-}
-
-TEST_F(ConsoleTest, SlowAndManyClientsHoldNobodyUp) {
-  HttpLimits limits;
-  limits.connections = 3;
-  limits.streams = 1;
-  limits.request = std::chrono::seconds(1);
-  HttpServer server(
-      "127.0.0.1", 0, [](const HttpRequest& request) { return HttpResponse{.stream = request.target == "/stream"}; },
-      limits);
-  std::jthread serving([&](const std::stop_token& stop) {
-    while (!stop.stop_requested()) {
-      server.Turn(std::chrono::milliseconds(20));
-      server.Feed([](std::uint64_t* cursor) { return "part " + std::to_string(++*cursor); });
-    }
-  });
-  HttpConnection slow(server.port()), stream(server.port());
-  slow.Send("GET / HT");
-  stream.Send("GET /stream HTTP/1.1\r\nHost: x\r\n\r\n");
-  EXPECT_NE(stream.Receive(5, "part 3").find("part 1"), std::string::npos);
-  {
-    HttpConnection second(server.port());
-    second.Send("GET /stream HTTP/1.1\r\nHost: x\r\n\r\n");
-    EXPECT_EQ(second.Reply().status, 503);
-  }
-  HttpConnection third(server.port());
-  EXPECT_TRUE(WaitFor(5, [&] {
-    HttpConnection fourth(server.port());
-    return fourth.Reply(0.2).status == 503;
-  }));
-  // Drops of a request, each well before the limit would be over, do not move it.
-  bool closed = false;
-  for (int i = 0; i < 50 && !closed; ++i) {
-    slow.Send("T");
-    closed = slow.Closes(0.1);
-  }
-  EXPECT_TRUE(closed);
 }
 
 TEST_F(ConsoleTest, ASessionFromStartToReport) {

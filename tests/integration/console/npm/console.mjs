@@ -22,8 +22,8 @@ export async function withConsole(fulcrum, browserPath, domain, use) {
     const address = await new Promise((found, failed) => {
       const hear = bytes => {
         said += bytes;
-        const match = said.match(/open (http:\S+)/);
-        if (match) found(match[1]);
+        const match = said.match(/open (http:\S+)#TOKEN\n/);
+        if (match) found(`${match[1]}#${readFileSync(join(out, 'token'), 'utf8').trim()}`);
       };
       program.stdout.on('data', hear);
       program.stderr.on('data', hear);

@@ -1,0 +1,149 @@
+// The HTTP server alone, under small limits: slots, time limits, streams, sizes.
+#include "services/session/console/http_server.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/support/cart.h"
+#include "tests/support/http_client.h"
+
+namespace fulcrum::console {
+namespace {
+
+using fulcrum::testing::HttpConnection;
+using fulcrum::testing::WaitFor;
+using std::chrono::seconds;
+
+constexpr const char* kPage = "GET / HTTP/1.1\r\nHost: x\r\n\r\n";
+constexpr const char* kKnown = "GET / HTTP/1.1\r\nHost: x\r\nAuthorization: yes\r\n\r\n";
+
+/// Serves in a thread. A client is known by the header "Authorization: yes".
+class Served {
+ public:
+  explicit Served(const HttpLimits& limits, std::optional<TlsIdentity> tls = {})
+      : server_({.address = "127.0.0.1", .port = 0, .tls = std::move(tls)},
+                {.handle =
+                     [](const HttpRequest& request) {
+                       return HttpResponse{.body = request.secure ? "secure" : "plain",
+                                           .stream = request.target == "/stream"};
+                     },
+                 .knows = [](const HttpRequest& request) { return request.authorization == "yes"; }},
+                limits),
+        thread_([this](const std::stop_token& stop) {
+          while (!stop.stop_requested()) {
+            server_.Turn(std::chrono::milliseconds(20));
+            server_.Feed([](std::uint64_t* cursor) { return "part " + std::to_string(++*cursor); });
+          }
+        }) {}
+  [[nodiscard]] int port() const { return server_.port(); }
+
+ private:
+  HttpServer server_;
+  std::jthread thread_;
+};
+
+HttpLimits Small() {
+  HttpLimits limits;
+  limits.slots = {.guests = 3, .guests_per_address = 2, .known = 2};
+  limits.streams = 1;
+  limits.guest_request = seconds(1);
+  return limits;
+}
+
+TEST(HttpServer, TheOldestGuestOfAnAddressGivesWay) {
+  HttpLimits limits = Small();
+  limits.guest_request = seconds(60);
+  Served served(limits);
+  HttpConnection first(served.port()), second(served.port()), third(served.port());
+  EXPECT_TRUE(first.Closes(5));
+  third.Send(kPage);
+  EXPECT_EQ(third.Reply().status, 200);
+  // Another address takes the third slot; the fourth connection closes the oldest of all.
+  HttpConnection other(served.port(), {.from = "127.0.0.2"}), another(served.port(), {.from = "127.0.0.3"});
+  EXPECT_TRUE(second.Closes(5));
+  other.Send(kPage);
+  EXPECT_EQ(other.Reply().status, 200);
+}
+
+TEST(HttpServer, NoGuestTakesAReservedSlot) {
+  Served served(Small());
+  HttpConnection known(served.port());
+  known.Send(kKnown);
+  EXPECT_EQ(known.Reply().status, 200);
+  std::vector<std::unique_ptr<HttpConnection>> guests;
+  for (int i = 0; i < 50; ++i) guests.push_back(std::make_unique<HttpConnection>(served.port()));
+  EXPECT_FALSE(known.Closes(0.2));
+  known.Send(kKnown);
+  EXPECT_EQ(known.Reply().status, 200);
+}
+
+TEST(HttpServer, AClientWithTheTokenIsAnsweredWhenItsSlotsAreTaken) {
+  Served served(Small());
+  HttpConnection one(served.port()), two(served.port());
+  for (HttpConnection* held : {&one, &two}) {
+    held->Send(kKnown);
+    EXPECT_EQ(held->Reply().status, 200);
+  }
+  HttpConnection more(served.port());
+  more.Send(kKnown);
+  EXPECT_EQ(more.Reply().status, 200);
+  EXPECT_TRUE(more.Closes(5));
+  one.Send(kKnown);
+  EXPECT_EQ(one.Reply().status, 200);
+}
+
+TEST(HttpServer, ASlowGuestHasOneLimitForItsWholeRequest) {
+  Served served(Small());
+  HttpConnection slow(served.port());
+  slow.Send("GET / HT");
+  // Drops of a request, each well before the limit would be over, do not move it.
+  int drops = 0;
+  while (drops < 50 && !slow.Closes(0.1)) {
+    slow.Send("T");
+    ++drops;
+  }
+  EXPECT_LT(drops, 50);
+  // The same for a body, and for a handshake that does not end.
+  HttpConnection body(served.port());
+  body.Send("POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n");
+  for (drops = 0; drops < 50 && !body.Closes(0.1); ++drops) body.Send("x");
+  EXPECT_LT(drops, 50);
+}
+
+TEST(HttpServer, StreamsAreFew) {
+  Served served(Small());
+  HttpConnection stream(served.port());
+  const std::string ask = "GET /stream HTTP/1.1\r\nHost: x\r\nAuthorization: yes\r\n\r\n";
+  stream.Send(ask);
+  EXPECT_NE(stream.Receive(5, "part 3").find("part 1"), std::string::npos);
+  HttpConnection second(served.port());
+  second.Send(ask);
+  EXPECT_EQ(second.Reply().status, 503);
+  EXPECT_NE(stream.Receive(5, "part 5").find("part 4"), std::string::npos);
+}
+
+TEST(HttpServer, ServesOverTlsAndNothingElseThere) {
+  const TlsIdentity identity = MakeTlsIdentity({"localhost"}, std::time(nullptr));
+  Served served(Small(), identity);
+  HttpConnection client(served.port(), {.tls = true});
+  EXPECT_EQ(client.fingerprint(), identity.fingerprint);
+  client.Send(kKnown);
+  EXPECT_EQ(client.Reply().body, "secure");
+  const std::string ask = "GET /stream HTTP/1.1\r\nHost: x\r\nAuthorization: yes\r\n\r\n";
+  client.Send(ask);
+  EXPECT_NE(client.Receive(5, "part 3").find("part 1"), std::string::npos);
+  HttpConnection plain(served.port());
+  plain.Send(kKnown);
+  EXPECT_EQ(plain.Reply().status, 0) << "no response without TLS";
+  EXPECT_TRUE(plain.Closes(5));
+  HttpConnection half(served.port());
+  half.Send(std::string("\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", 11));
+  EXPECT_TRUE(half.Closes(5)) << "a handshake that does not end has the limit of a request";
+}
+
+}  // namespace
+}  // namespace fulcrum::console
