@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "services/base/core/error.h"
+#include "services/base/runtime/private_file.h"
 #include "services/session/console/screen_text.h"
 #include "services/session/supervisor/node_process.h"
 #include "services/session/supervisor/outcome.h"
@@ -59,8 +60,7 @@ SessionRun::SessionRun(SessionRunSettings settings)
 }
 
 void SessionRun::Start(const SessionOrder& order) {
-  std::error_code ignored;
-  std::filesystem::remove(log_, ignored);
+  runtime::WritePrivateFile(log_, "", "log");
   up_ = supervisor::ChildProcess::Start(settings_.program, UpWords(settings_, order), log_,
                                         supervisor::WithParent::kStays);
   stopping_ = false;

@@ -1,10 +1,14 @@
 #include "services/session/supervisor/session_folder.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <fstream>
 #include <sstream>
 #include <thread>
 
 #include "services/base/core/error.h"
+#include "services/base/runtime/private_file.h"
 
 namespace fulcrum::supervisor {
 namespace {
@@ -32,7 +36,7 @@ std::string Indent(const std::string& text) {
 fs::path FreshFolder(const fs::path& out, const std::string& name) {
   for (int attempt = 1;; ++attempt) {
     fs::path folder = out / (attempt == 1 ? name : name + "-" + std::to_string(attempt));
-    if (fs::create_directory(folder)) {
+    if (runtime::MakePrivateFolder(folder)) {
       return folder;
     }
   }
@@ -41,6 +45,8 @@ fs::path FreshFolder(const fs::path& out, const std::string& name) {
 }  // namespace
 
 void WriteFile(const fs::path& file, const std::string& text) {
+  // Made with its mode, so that no other user can open it in between; an existing file keeps its own.
+  if (const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600); fd >= 0) ::close(fd);
   std::ofstream stream(file, std::ios::binary);
   stream << text;
   stream.close();

@@ -16,8 +16,8 @@ struct SessionFolder {
   std::string configuration;  ///< Effective configuration, YAML; also in configuration.yaml.
 };
 
-/// Makes the folder under `out`, named after time and scene, and points out/latest to it. `run_yaml` contains the
-/// options of the start as indented YAML. Throws InputError when something cannot be written.
+/// Makes the folder (mode 0700) under `out`, named after time and scene, and points out/latest to it. `run_yaml`
+/// contains the options of the start as indented YAML. Throws InputError when something cannot be written.
 [[nodiscard]] SessionFolder MakeSessionFolder(const std::filesystem::path& out, const std::filesystem::path& scene_file,
                                               const scene::SceneFile& scene, const config::CartConfig& cart,
                                               const std::string& run_yaml);
@@ -27,7 +27,7 @@ void RemoveCheckpoints(const SessionFolder& folder);
 /// Makes `link` point to `folder` atomically and replaces an earlier link. Throws InputError.
 void PointTo(const std::filesystem::path& link, const std::filesystem::path& folder);
 
-/// Writes `file`; throws an InputError that names it when that fails.
+/// Writes `file`, a new one with mode 0600; throws an InputError that names it when that fails.
 void WriteFile(const std::filesystem::path& file, const std::string& text);
 
 /// CPU model and number of hardware threads, for the report.

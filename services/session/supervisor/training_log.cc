@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdio>
 
 #include "services/base/core/error.h"
+#include "services/base/runtime/private_file.h"
 
 namespace fulcrum::supervisor {
 namespace {
@@ -109,22 +111,25 @@ TrainingLog& TrainingLog::operator=(TrainingLog&&) noexcept = default;
 
 TrainingLog::TrainingLog(const std::filesystem::path& file, Access access) : file_(file) {
   std::error_code error;
-  if (access == Access::kRead && !std::filesystem::exists(file, error)) {
+  const bool exists = std::filesystem::exists(file, error);
+  if (access != Access::kAdd && !exists) {
     throw InputError(file.string() + ": no such database; make it with fulcrum up SCENE --trainee NAME");
   }
-  if (access == Access::kAdd && file.has_parent_path()) {
-    std::filesystem::create_directories(file.parent_path(), error);
-    if (error) throw InputError(file.parent_path().string() + ": cannot be made (" + error.message() + ")");
-  }
+  // An empty file is an empty database; SQLite would make one that other users can read.
+  if (!exists) runtime::WritePrivateFile(file, "", "database");
   sqlite3* opened = nullptr;
-  const int flags = access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  const int flags = access == Access::kRead ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE;
   const int code = sqlite3_open_v2(file.c_str(), &opened, flags, nullptr);
   database_.reset(opened);
   if (code != SQLITE_OK) Fail("cannot be opened");
   // SQLite opens a file without write permission for reading only, without an error.
-  if (access == Access::kAdd && sqlite3_db_readonly(opened, "main") == 1) Fail("cannot be written to");
+  if (access != Access::kRead && sqlite3_db_readonly(opened, "main") == 1) Fail("cannot be written to");
   sqlite3_busy_timeout(opened, kBusy_ms);
   CheckOrMake(access);
+  if (runtime::NarrowToOwner(file)) {
+    std::fprintf(stderr, "fulcrum: %s: other users could read it; it is now readable by its owner only\n",
+                 file.c_str());
+  }
 }
 
 void TrainingLog::Fail(const std::string& what) const {
@@ -199,6 +204,24 @@ void TrainingLog::Add(const TrainingRow& row) {
     measure.Again();
   }
   require(sqlite3_exec(database_.get(), "COMMIT", nullptr, nullptr, nullptr) == SQLITE_OK);
+}
+
+int TrainingLog::Delete(const std::string& trainee) {
+  // Deleted content is overwritten, and then the file is built anew, because SQLite may have left copies of rows in
+  // unused space when it moved them.
+  Execute("PRAGMA secure_delete = ON");
+  Execute("BEGIN IMMEDIATE");
+  for (const char* sql : {"DELETE FROM measures WHERE session_id IN (SELECT id FROM sessions WHERE trainee = ?)",
+                          "DELETE FROM sessions WHERE trainee = ?"}) {
+    Statement statement(database_.get(), sql);
+    statement.Bind(1, trainee);
+    (void)statement.Next();
+    if (!statement.good()) Fail("the sessions cannot be deleted");
+  }
+  const int deleted = sqlite3_changes(database_.get());
+  Execute("COMMIT");
+  Execute("VACUUM");
+  return deleted;
 }
 
 std::vector<TrainingRow> TrainingLog::SessionsOf(const std::string& trainee, const std::string& scene) const {

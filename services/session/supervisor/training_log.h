@@ -29,14 +29,17 @@ struct TrainingRow {
 /// another program or of a newer version is never written to.
 class TrainingLog {
  public:
-  enum class Access { kRead, kAdd };
-  /// kAdd makes a missing file and its folder; kRead throws when the file is missing.
+  enum class Access { kRead, kAdd, kDelete };
+  /// kAdd makes a missing file (mode 0600) and its folder; the others throw when the file is missing. A database that
+  /// other users can read is narrowed to its owner, with a line to stderr, or refused if it is another user's.
   explicit TrainingLog(const std::filesystem::path& file, Access access = Access::kAdd);
   ~TrainingLog();
   TrainingLog(TrainingLog&&) noexcept;
   TrainingLog& operator=(TrainingLog&&) noexcept;
 
   void Add(const TrainingRow& row);
+  /// Deletes all sessions of a trainee; nothing of them remains in the file's bytes. @return their number.
+  int Delete(const std::string& trainee);
   /// Sessions of a trainee, oldest first. `scene` empty: of all scenes.
   [[nodiscard]] std::vector<TrainingRow> SessionsOf(const std::string& trainee, const std::string& scene) const;
   /// Number of sessions by trainee.

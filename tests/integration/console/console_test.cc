@@ -151,6 +151,13 @@ TEST_F(ConsoleTest, ASessionFromStartToReport) {
   EXPECT_EQ(configuration.find("power_W: 35"), std::string::npos);
   EXPECT_NE(configuration.find("png_rate_Hz: 5"), std::string::npos);
 
+  // Other users see nothing of it.
+  const fs::path session_folder = fs::canonical(fs::path(out()) / "latest");
+  EXPECT_EQ(fs::status(session_folder).permissions(), fs::perms::owner_all);
+  for (const fs::path& file : {session_folder / "report.html", fs::path(out()) / "console.log"}) {
+    EXPECT_EQ(fs::status(file).permissions(), fs::perms::owner_read | fs::perms::owner_write) << file;
+  }
+
   const std::string report = "/report?ticket=" + Between(console.Post("/api/ticket").body, "\"text\":\"", "\"");
   const std::string host = "Host: 127.0.0.1:" + std::to_string(console.port()) + "\r\n";
   const HttpReply first = console.Ask("GET", report, host);
