@@ -10,9 +10,10 @@
 //
 // A key that stands for a physical quantity ends in its unit (units.h). Its value is a plain number in that unit or a
 // quantity such as "300 um" of the same dimension. Refused with InputError "file:line: key.path: ...": missing, huge
-// (> 1 MiB), binary or empty files, YAML syntax errors, duplicate keys, anchors, aliases and tags, more than one
-// document, nesting deeper than 32, unknown keys (the nearest known key is suggested), missing keys, wrong types, wrong
-// units, values that are not finite or out of range. Reading one key twice is a bug of the caller: std::logic_error.
+// (> 1 MiB), binary, not UTF-8 or empty files, YAML syntax errors, duplicate keys, anchors, aliases and tags, more than
+// one document, nesting deeper than 32, unknown keys (the nearest known key is suggested), missing keys, wrong types,
+// wrong units, values that are not finite or out of range. Reading one key twice is a bug of the caller:
+// std::logic_error.
 #pragma once
 
 #include <cstdint>

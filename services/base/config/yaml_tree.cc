@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "services/base/core/error.h"
+#include "services/base/core/utf8.h"
 
 namespace fulcrum::config::internal {
 namespace {
@@ -122,12 +123,17 @@ class TreeBuilder : public YAML::EventHandler {
 
 void RefuseBinary(std::string_view text, std::string_view name) {
   int line = 1;
-  for (const char c : text) {
+  std::size_t length = 0;
+  for (std::size_t i = 0; i < text.size(); i += length) {
+    const char c = text[i];
     line += c == '\n';
     const auto byte = static_cast<unsigned char>(c);
-    if ((byte < 0x20 && c != '\n' && c != '\r' && c != '\t') || byte == 0x7f) {
-      throw InputError(std::string(name) + ":" + std::to_string(line) + ": is not a text file (control byte " +
-                       std::to_string(byte) + "); give a YAML file");
+    const bool control = (byte < 0x20 && c != '\n' && c != '\r' && c != '\t') || byte == 0x7f;
+    length = Utf8Length(text, i);
+    if (control || length == 0) {
+      throw InputError(std::string(name) + ":" + std::to_string(line) + ": is not a text file (" +
+                       (control ? "control byte " : "not UTF-8 at byte ") + std::to_string(byte) +
+                       "); give a YAML file");
     }
   }
 }

@@ -1,5 +1,7 @@
 #include "services/session/console/screen_text.h"
 
+#include "services/base/core/utf8.h"
+
 namespace fulcrum::console {
 
 void ScreenText::Add(std::string_view bytes) {
@@ -44,24 +46,9 @@ std::string ScreenText::Text() const {
 std::string ValidUtf8(std::string_view text) {
   std::string out;
   for (std::size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    const std::size_t length = lead < 0x80                   ? 1
-                               : lead >= 0xc2 && lead < 0xe0 ? 2
-                               : (lead & 0xf0u) == 0xe0      ? 3
-                               : lead >= 0xf0 && lead < 0xf5 ? 4
-                                                             : 0;
-    bool good = length > 0 && i + length <= text.size();
-    std::uint32_t code = length == 1 ? lead : lead & (0x7fu >> length);
-    for (std::size_t j = 1; good && j < length; ++j) {
-      const auto next = static_cast<unsigned char>(text[i + j]);
-      good = (next & 0xc0u) == 0x80;
-      code = code << 6 | (next & 0x3fu);
-    }
-    // Invalid: overlong forms, halves of a surrogate pair, codes beyond the last character.
-    good = good && !(length == 3 && (code < 0x800 || (code >= 0xd800 && code < 0xe000))) &&
-           !(length == 4 && (code < 0x10000 || code > 0x10ffff));
-    out.append(good ? text.substr(i, length) : "?");
-    i += good ? length : 1;
+    const std::size_t length = Utf8Length(text, i);
+    out.append(length > 0 ? text.substr(i, length) : "?");
+    i += length > 0 ? length : 1;
   }
   return out;
 }

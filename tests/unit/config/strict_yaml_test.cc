@@ -224,6 +224,19 @@ TEST_F(StrictYamlFile, BinaryFileIsRefusedWithItsLine) {
   EXPECT_NE(said.find("f.yaml:2: is not a text file"), std::string::npos) << said;
 }
 
+TEST(StrictYaml, TextsAreUtf8) {
+  const std::string good =
+      "d: 20 \xc2\xb0"
+      "C \xe2\x82\xac \xf0\x9f\x98\x80";
+  StrictYaml file = StrictYaml::FromText(good, "f.yaml");
+  EXPECT_EQ(file.root().Text("d"), good.substr(3));
+  // Alone, too short, overlong, half of a pair, beyond the last character.
+  for (const char* bad : {"\x92", "\xe2\x82", "\xc0\xaf", "\xe0\x80\xaf", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xff"}) {
+    const std::string said = Refusal([&] { StrictYaml::FromText(std::string("a: 1\nb: ") + bad + "\n", "f.yaml"); });
+    EXPECT_NE(said.find("f.yaml:2: is not a text file (not UTF-8 at byte "), std::string::npos) << said;
+  }
+}
+
 TEST(StrictYaml, AskingTwiceIsABugOfTheCaller) {
   StrictYaml file = StrictYaml::FromText("a: 1", "x");
   StrictMap root = file.root();
