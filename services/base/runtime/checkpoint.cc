@@ -39,6 +39,9 @@ struct SlotHeader {
   std::uint64_t checksum;
 };
 
+/// No writer counts as far. A node goes on only from below, so that its next sequence is always the newest.
+constexpr std::uint64_t kMostSequence = std::uint64_t{1} << 62;
+
 std::size_t RoundUpToPage(std::size_t bytes) { return (bytes + kPage - 1) / kPage * kPage; }
 
 std::size_t SlotStride(std::size_t capacity) { return kPage + RoundUpToPage(capacity); }
@@ -190,8 +193,9 @@ CheckpointFile::CheckpointFile(const std::filesystem::path& file, std::uint64_t 
   bool altered = false;
   for (int i = 0; i < 2; ++i) {
     const std::uint64_t sequence = impl_->header(i)->sequence;
-    if (!impl_->IsWhole(i)) {
+    if (!impl_->IsWhole(i) || sequence >= kMostSequence) {
       altered = altered || sequence != 0;  // A kill leaves no seal on an incomplete slot.
+      impl_->header(i)->sequence = 0;
     } else if (sequence > impl_->last_sequence) {
       impl_->newest = i;
       impl_->last_sequence = sequence;
@@ -220,7 +224,7 @@ std::optional<std::vector<std::byte>> CheckpointFile::Peek(const std::filesystem
     SlotHeader header{};
     const auto at = static_cast<off_t>(kPage + i * stride);
     if (::pread(fd.get(), &header, sizeof(header), at) != static_cast<ssize_t>(sizeof(header)) ||
-        header.sequence <= newest_sequence || header.bytes > capacity_bytes) {
+        header.sequence <= newest_sequence || header.sequence > kMostSequence || header.bytes > capacity_bytes) {
       continue;
     }
     // The copy is checked, not the slot: the writer may continue meanwhile.
