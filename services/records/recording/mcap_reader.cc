@@ -174,16 +174,16 @@ bool McapReader::Take(const Record& record, McapMessage* message) {
     case Opcode::kSchema: {
       const auto number = from.Number<std::uint16_t>();
       McapSchema schema{from.Text(), from.Text(), from.Text()};
-      if (from.good() && number != 0) {
-        schemas_.insert_or_assign(number, std::move(schema));
+      if (from.good() && number != 0 && schemas_.try_emplace(number, schema).first->second != schema) {
+        Fault("another schema " + std::to_string(number));
       }
       break;
     }
     case Opcode::kChannel: {
       const auto number = from.Number<std::uint16_t>();
       McapChannel channel{from.Number<std::uint16_t>(), from.Text(), from.Text(), from.Texts()};
-      if (from.good()) {
-        channels_.insert_or_assign(number, std::move(channel));
+      if (from.good() && channels_.try_emplace(number, channel).first->second != channel) {
+        Fault("another channel " + std::to_string(number));
       }
       break;
     }

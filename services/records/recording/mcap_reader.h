@@ -17,11 +17,13 @@ namespace fulcrum::recording {
 
 struct McapSchema {
   std::string name, encoding, text;
+  [[nodiscard]] bool operator==(const McapSchema&) const = default;
 };
 struct McapChannel {
   std::uint16_t schema;  ///< 0: none.
   std::string topic, message_encoding;
   std::map<std::string, std::string> metadata;
+  [[nodiscard]] bool operator==(const McapChannel&) const = default;
 };
 struct McapMessage {
   std::uint16_t channel;
@@ -36,8 +38,9 @@ struct McapFault {
 };
 
 /// Reads the records in the order of the file and needs neither summary nor index, so a recording that was interrupted
-/// by a kill is readable up to its last complete chunk. A damaged record is skipped and listed in faults(). Chunks may
-/// be uncompressed or compressed with zstd. Records of unknown kind are skipped, as the format requires.
+/// by a kill is readable up to its last complete chunk. A damaged record is skipped and listed in faults(), as is a
+/// schema or channel whose number stands for another one already. Chunks may be uncompressed or compressed with zstd.
+/// Records of unknown kind are skipped, as the format requires.
 class McapReader {
  public:
   enum class Depth {
