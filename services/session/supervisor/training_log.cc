@@ -168,6 +168,8 @@ void TrainingLog::CheckOrMake(Access access) {
     Fail("has version " + std::to_string(version) + " of a newer program; this program reads version " +
          std::to_string(kVersion));
   }
+  // This program makes none; one made by somebody else would run in place of a table, for ever if it likes.
+  if (Ask("SELECT count(*) FROM sqlite_master WHERE type IN ('view', 'trigger')") != 0) Fail("has views or triggers");
   // Not quick_check, which does not compare the indexes with the tables: a session would be there and not be found.
   Statement check(database_.get(), "PRAGMA integrity_check(1)");
   if (!check.Next() || check.Text(0) != "ok") Fail("is damaged");
