@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "physics_node/node/physics_checkpoint.h"
 #include "services/scene/builder/build.h"
-#include "services/scene/compiler/scene_yaml.h"
 #include "services/transport/bus/gate.h"
 #include "tests/numerics/physics/script_player.h"
 #include "tests/numerics/thermal/flat_scene.h"
@@ -15,26 +13,26 @@
 namespace fulcrum::testing {
 namespace {
 
-constexpr int kStepsAfter = 4;
-
 class PhysicsCheck final : public CheckpointCheck {
  public:
-  PhysicsCheck() {
+  explicit PhysicsCheck(const scene::SceneSettings& settings) : data_(scene::BuildProcedural(settings)) {
     constexpr int kSteps = 160;  // It holds the membrane and pulls.
     physics::TissueSimulation worker(scene_);
     for (int step = 0; step < kSteps; ++step) (void)worker.Step(physics::ScriptedTools(scene_, 0.01 * step));
     good_.resize(physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size())));
     good_.resize(physics::WriteCheckpoint(worker, {0.01f, 1.0}, good_));
   }
-  Outcome Offer(std::span<const std::byte> payload) override {
-    physics::TissueSimulation simulation(scene_);
+  Outcome Offer(std::span<const std::byte> payload, int steps) override {
+    // To make one takes longer than all the rest.
+    physics::TissueSimulation& simulation = *simulation_;
+    if (!physics::ReadCheckpoint(good_, &simulation)) return Outcome::kBroken;
     const std::uint64_t before = simulation.StateHash();
     if (!physics::ReadCheckpoint(payload, &simulation)) {
       return simulation.StateHash() == before ? Outcome::kRefused : Outcome::kBroken;
     }
     TissueFrame frame;
     ContactModel model;
-    for (int step = 0; step < kStepsAfter; ++step) {
+    for (int step = 0; step < steps; ++step) {
       (void)simulation.Step(physics::ScriptedTools(scene_, 1.6 + 0.01 * step));
       frame.header.simulated_time_s = simulation.simulated_time_s();
       frame.header.vertex_count = simulation.particles().particle_count();
@@ -47,24 +45,28 @@ class PhysicsCheck final : public CheckpointCheck {
   }
 
  private:
-  scene::SceneData data_ = scene::BuildProcedural(scene::Small());
+  const scene::SceneData data_;
   SceneView scene_ = data_.View();
+  const std::unique_ptr<physics::TissueSimulation> simulation_ = std::make_unique<physics::TissueSimulation>(scene_);
 };
 
 class ThermalCheck final : public CheckpointCheck {
  public:
-  ThermalCheck() {
+  explicit ThermalCheck(float cell_m) : data_(Scene(cell_m)) {
     thermal::ThermalSolver worker(scene_);
     thermal::RunDrag(drag_, kDt, &worker);
     while (!worker.at_commit_frame()) worker.Step(thermal::TipInput{}, kDt);
     good_.resize(thermal::ThermalSolver::CheckpointCapacity(scene_));
     good_.resize(worker.Save(good_));
   }
-  Outcome Offer(std::span<const std::byte> payload) override {
-    thermal::ThermalSolver solver(scene_);
-    const std::uint64_t before = solver.FullHash();
-    if (!solver.Restore(payload)) return solver.FullHash() == before ? Outcome::kRefused : Outcome::kBroken;
-    for (int step = 0; step < kStepsAfter; ++step) {
+  Outcome Offer(std::span<const std::byte> payload, int steps) override {
+    // One that has refused a payload is fresh, and is used again.
+    if (!fresh_) fresh_ = std::make_unique<thermal::ThermalSolver>(scene_);
+    const std::uint64_t before = fresh_->FullHash();
+    if (!fresh_->Restore(payload)) return fresh_->FullHash() == before ? Outcome::kRefused : Outcome::kBroken;
+    const std::unique_ptr<thermal::ThermalSolver> taken = std::move(fresh_);
+    thermal::ThermalSolver& solver = *taken;
+    for (int step = 0; step < steps; ++step) {
       solver.Step(drag_.At(step, kDt), kDt);
       const auto& figures = solver.figures();
       const double numbers[] = {solver.ledger().joule, solver.ledger().generator, solver.ledger().Out(),
@@ -80,12 +82,15 @@ class ThermalCheck final : public CheckpointCheck {
 
  private:
   static constexpr float kDt = 0.01f;
-  scene::SceneData data_ = [] {
+  static scene::SceneData Scene(float cell_m) {
     scene::SceneData data = thermal::FlatScene(16, 21, 1e-3f);
     data.fixed.thermal.volume = 1;
+    data.fixed.thermal.cell_m = cell_m;
     return data;
-  }();
+  }
+  const scene::SceneData data_;
   SceneView scene_ = data_.View();
+  std::unique_ptr<thermal::ThermalSolver> fresh_;
   thermal::Drag drag_ = [] {
     thermal::Drag drag;
     drag.from = {0.006f, 0.006f};
@@ -97,20 +102,9 @@ class ThermalCheck final : public CheckpointCheck {
 
 }  // namespace
 
-void Patch(std::span<const std::uint8_t> input, std::vector<std::byte>* payload) {
-  while (input.size() >= 5 && !payload->empty()) {
-    std::uint32_t place = 0;
-    std::memcpy(&place, input.data(), 4);
-    const std::size_t at = place % payload->size();
-    const bool cut = input[4] == 255;
-    const std::size_t length = cut ? 0 : std::min<std::size_t>(input[4], input.size() - 5);
-    if (cut) payload->resize(at);
-    for (std::size_t i = 0; i < length && at + i < payload->size(); ++i) (*payload)[at + i] = std::byte{input[5 + i]};
-    input = input.subspan(5 + length);
-  }
+std::unique_ptr<CheckpointCheck> MakePhysicsCheck(const scene::SceneSettings& scene) {
+  return std::make_unique<PhysicsCheck>(scene);
 }
-
-std::unique_ptr<CheckpointCheck> MakePhysicsCheck() { return std::make_unique<PhysicsCheck>(); }
-std::unique_ptr<CheckpointCheck> MakeThermalCheck() { return std::make_unique<ThermalCheck>(); }
+std::unique_ptr<CheckpointCheck> MakeThermalCheck(float cell_m) { return std::make_unique<ThermalCheck>(cell_m); }
 
 }  // namespace fulcrum::testing

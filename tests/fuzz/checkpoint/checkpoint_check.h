@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "services/scene/builder/scene_settings.h"
 #include "services/scene/format/scene_file.h"
 
 namespace fulcrum::testing {
@@ -15,24 +16,21 @@ namespace fulcrum::testing {
 /// How a check ended.
 enum class Outcome { kRefused, kTaken, kBroken };
 
-/// Changes a payload according to `input`, a list of: place in four bytes (little endian, modulo the length), length in
-/// one, bytes. A length of 255 cuts the payload off there.
-void Patch(std::span<const std::uint8_t> input, std::vector<std::byte>* payload);
-
 class CheckpointCheck {
  public:
   virtual ~CheckpointCheck() = default;
   /// Of a solver in the middle of its work.
   [[nodiscard]] const std::vector<std::byte>& good() const { return good_; }
-  [[nodiscard]] virtual Outcome Offer(std::span<const std::byte> payload) = 0;
+  /// @param steps steps of the solver from an accepted payload.
+  [[nodiscard]] virtual Outcome Offer(std::span<const std::byte> payload, int steps = 4) = 0;
 
  protected:
   std::vector<std::byte> good_;
 };
 
-/// A grasper pulls at the small scene.
-[[nodiscard]] std::unique_ptr<CheckpointCheck> MakePhysicsCheck();
+/// A grasper pulls at a procedural scene.
+[[nodiscard]] std::unique_ptr<CheckpointCheck> MakePhysicsCheck(const scene::SceneSettings& scene = scene::Small());
 /// A hook has cut a sheet above tissue that is warm in depth.
-[[nodiscard]] std::unique_ptr<CheckpointCheck> MakeThermalCheck();
+[[nodiscard]] std::unique_ptr<CheckpointCheck> MakeThermalCheck(float cell_m = 1e-4f);
 
 }  // namespace fulcrum::testing

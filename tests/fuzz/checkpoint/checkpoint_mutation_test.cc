@@ -13,6 +13,7 @@
 
 #include "services/base/core/sanitizers.h"
 #include "tests/fuzz/checkpoint/checkpoint_check.h"
+#include "tests/fuzz/target.h"
 
 namespace fulcrum {
 namespace {
@@ -71,14 +72,14 @@ void Hold(CheckpointCheck* check, const std::string& corpus) {
     std::ifstream file(entry.path(), std::ios::binary);
     const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), {}};
     std::vector<std::byte> payload = check->good();
-    testing::Patch(bytes, &payload);
+    fuzz::Patch(bytes, &payload);
     EXPECT_NE(check->Offer(payload), Outcome::kBroken) << entry.path();
     ++files;
   }
   EXPECT_GE(files, 4);
 }
 
-constexpr const char* kCorpus = FULCRUM_SOURCE_DIR "/tests/fuzz/checkpoint/corpus/";
+constexpr const char* kCorpus = FULCRUM_SOURCE_DIR "/tests/fuzz/corpus/checkpoint_";
 
 TEST(CheckpointMutation, PhysicsRefusesOrGoesOn) {
   Hold(testing::MakePhysicsCheck().get(), std::string(kCorpus) + "physics");

@@ -18,7 +18,7 @@ using testing::RequestFrom;
 
 std::vector<std::string> Corpus() {
   std::vector<std::string> texts;
-  for (const auto& entry : std::filesystem::directory_iterator(FULCRUM_SOURCE_DIR "/tests/fuzz/console/corpus")) {
+  for (const auto& entry : std::filesystem::directory_iterator(FULCRUM_SOURCE_DIR "/tests/fuzz/corpus/console_route")) {
     std::ifstream file(entry.path(), std::ios::binary);
     texts.emplace_back(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
   }

@@ -1,5 +1,5 @@
-// A million mutations of the corpus (tests/fuzz/handle/corpus: what senders write, and what broke something once), the
-// same ones in every run: no bytes break a promise of the parsers.
+// A million mutations of the corpus (tests/fuzz/corpus/handle_serial: what senders write, and what broke something
+// once), the same ones in every run: no bytes break a promise of the parsers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ constexpr int kInputs = 1'000'000;
 
 std::vector<std::string> Corpus() {
   std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(FULCRUM_SOURCE_DIR "/tests/fuzz/handle/corpus")) {
+  for (const auto& entry : std::filesystem::directory_iterator(FULCRUM_SOURCE_DIR "/tests/fuzz/corpus/handle_serial")) {
     files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());  // The same order everywhere.

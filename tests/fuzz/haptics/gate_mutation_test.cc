@@ -126,7 +126,7 @@ TEST(GateMutation, AMillionMessagesNeverBreakTheForce) {
 
 TEST(GateMutation, TheCorpusHolds) {
   int files = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(FULCRUM_SOURCE_DIR "/tests/fuzz/haptics/corpus")) {
+  for (const auto& entry : std::filesystem::directory_iterator(FULCRUM_SOURCE_DIR "/tests/fuzz/corpus/haptics_gate")) {
     std::ifstream file(entry.path(), std::ios::binary);
     const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), {}};
     EXPECT_FALSE(bytes.empty()) << entry.path();

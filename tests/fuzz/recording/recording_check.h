@@ -50,7 +50,9 @@ inline RecordingVerdict CheckRecording(std::span<const std::uint8_t> bytes, cons
     read(mended, &whole);
     if (whole.faults != 0) verdict.broken = "what was mended has faults";
     if (whole.messages != verdict.messages || whole.decoded != verdict.decoded) {
-      verdict.broken = "what was mended has other messages";
+      verdict.broken = "what was mended has other messages: " + std::to_string(whole.messages) + " of " +
+                       std::to_string(verdict.messages) + ", of them decoded " + std::to_string(whole.decoded) +
+                       " of " + std::to_string(verdict.decoded);
     }
     if (!recording::CheckIndex(mended, &indexed).empty()) verdict.broken = "what was mended has a wrong index";
   } catch (const InputError&) {

@@ -1,4 +1,4 @@
-// Mutations of the corpus (tests/fuzz/recording/corpus: small recordings, whole and cut, packed and plain), the same
+// Mutations of the corpus (tests/fuzz/corpus/recording: small recordings, whole and cut, packed and plain), the same
 // ones in every run: no bytes break a promise of the readers.
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ class RecordingFuzz : public testing::Test {
 
   static std::vector<Bytes> Corpus() {
     std::vector<fs::path> files;
-    for (const auto& entry : fs::directory_iterator(FULCRUM_SOURCE_DIR "/tests/fuzz/recording/corpus")) {
+    for (const auto& entry : fs::directory_iterator(FULCRUM_SOURCE_DIR "/tests/fuzz/corpus/recording")) {
       files.push_back(entry.path());
     }
     std::sort(files.begin(), files.end());  // The same order everywhere.

@@ -1,0 +1,137 @@
+// Any bytes sent to the console's server over a connection of its own: parsed by the server itself, routed as the
+// console does, and answered. An answer that is missing is a fault as well.
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <system_error>
+#include <thread>
+
+#include "services/session/console/http_server.h"
+#include "tests/fuzz/console/route_check.h"
+#include "tests/fuzz/target.h"
+
+namespace fulcrum::fuzz {
+namespace {
+
+/// Longer than any pause of a loaded machine.
+constexpr timeval kPatience{20, 0};
+
+class Socket {
+ public:
+  explicit Socket(int port) : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    // Closed without the wait for late packets, of which the ports would run out.
+    const linger at_once{1, 0};
+    (void)::setsockopt(fd_, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
+    (void)::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (fd_ < 0 || ::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+      throw std::system_error(errno, std::generic_category(), "connection to the console's server");
+    }
+  }
+  ~Socket() { ::close(fd_); }
+  Socket(const Socket&) = delete;
+  Socket& operator=(const Socket&) = delete;
+
+  /// Sends all and nothing more, and reads until the server closes.
+  std::string Ask(Input input) {
+    // The server may close before it has read everything.
+    while (!input.empty()) {
+      const ssize_t sent = ::send(fd_, input.data(), input.size(), MSG_NOSIGNAL);
+      if (sent <= 0) break;
+      input = input.subspan(static_cast<std::size_t>(sent));
+    }
+    (void)::shutdown(fd_, SHUT_WR);
+    std::string answer;
+    std::array<char, 4096> piece{};
+    ssize_t got = 0;
+    while ((got = ::recv(fd_, piece.data(), piece.size(), 0)) > 0)
+      answer.append(piece.data(), static_cast<size_t>(got));
+    Promise(got == 0 || errno != EAGAIN, "the server neither answers nor closes");
+    return answer;
+  }
+
+ private:
+  int fd_;
+};
+
+class ConsoleHttp final : public Target {
+ public:
+  ConsoleHttp() {
+    thread_ = std::thread([this] {
+      while (!stop_) server_.Turn(std::chrono::milliseconds(20));
+    });
+  }
+  ~ConsoleHttp() override {
+    stop_ = true;
+    thread_.join();
+  }
+  Outcome Offer(Input input) override {
+    const std::string answer = Socket(server_.port()).Ask(input);
+    Promise(answer.empty() || answer.starts_with("HTTP/1.1 "), "an answer that is not HTTP");
+    return answer.starts_with("HTTP/1.1 200 ") ? Outcome::kAccepted : Outcome::kRefused;
+  }
+  std::vector<std::string> Words() override {
+    return {"GET ",
+            "POST ",
+            " HTTP/1.1",
+            "Host: ",
+            "Origin: ",
+            "Sec-Fetch-Site: ",
+            "Authorization: Bearer ",
+            "Content-Length: ",
+            "Transfer-Encoding: chunked",
+            "Content-Type: application/x-www-form-urlencoded",
+            "Connection: keep-alive",
+            "Expect: 100-continue",
+            "Upgrade: ",
+            "/api/",
+            "/report?ticket=",
+            "localhost"};
+  }
+  std::vector<Seed> Seeds() override {
+    const std::string from = "Host: 127.0.0.1:8480\r\nAuthorization: Bearer " + console::testing::kToken + "\r\n";
+    const std::string form = "scene=built-in&power=35&seconds=60&record=on";
+    return {{"page", BytesOf("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")},
+            {"state", BytesOf("GET /api/state HTTP/1.1\r\n" + from + "\r\n")},
+            {"events", BytesOf("GET /api/events HTTP/1.1\r\n" + from + "Sec-Fetch-Site: same-origin\r\n\r\n")},
+            {"two", BytesOf("GET /api/choices HTTP/1.1\r\n" + from + "\r\nGET / HTTP/1.0\r\nHost: cart\r\n\r\n")},
+            {"start", BytesOf("POST /api/start HTTP/1.1\r\n" + from +
+                              "Origin: http://127.0.0.1:8480\r\nContent-Type: application/x-www-form-urlencoded\r\n"
+                              "Content-Length: " +
+                              std::to_string(form.size()) + "\r\n\r\n" + form)},
+            {"chunked", BytesOf("POST /api/restart HTTP/1.1\r\n" + from +
+                                "Content-Type: application/x-www-form-urlencoded\r\nTransfer-Encoding: chunked\r\n\r\n"
+                                "5\r\nnode=\r\nc\r\nphysics_node\r\n0\r\n\r\n")}};
+  }
+
+ private:
+  /// What is broken here ends the program: it is thrown on the server's thread.
+  console::HttpResponse Answer(const console::HttpRequest& request) const {
+    const std::string broken = console::testing::Broken(request);
+    Promise(broken.empty(), broken);
+    const console::RouteResult result = Route(access_, request);
+    if (!result.routed) return result.refusal;
+    console::HttpResponse response = console::Done("taken");
+    response.stream = result.routed->wanted == console::Wanted::kEvents;
+    return response;
+  }
+
+  const console::Access access_{console::testing::kToken, {"cart"}};
+  console::HttpServer server_{"127.0.0.1", 0, [this](const console::HttpRequest& request) { return Answer(request); }};
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace
+
+std::unique_ptr<Target> MakeConsoleHttp() { return std::make_unique<ConsoleHttp>(); }
+
+}  // namespace fulcrum::fuzz

@@ -1,0 +1,102 @@
+// Any bytes as a recording: read, mended, checked and printed as the tools of `fulcrum log` do. Checksums are removed
+// first (0 stands for none), or nothing beyond them would be reached.
+#include <cstring>
+#include <sstream>
+
+#include "services/records/recording/mcap_format.h"
+#include "services/records/recording/mcap_writer.h"
+#include "tests/fuzz/recording/recording_check.h"
+#include "tests/fuzz/target.h"
+#include "tests/unit/bus/samples.h"
+
+namespace fulcrum::fuzz {
+namespace {
+
+constexpr std::size_t kChunkSizeAt = 16, kChunkCrcAt = 24, kChunkHead = 32, kFooterCrcAt = 16, kFooter_B = 20;
+
+void RemoveChecksums(Bytes* file) {
+  const auto clear = [&](std::size_t at) { std::memset(file->data() + at, 0, 4); };
+  std::size_t at = recording::kMcapMagic.size();
+  while (at + recording::kRecordHead <= file->size()) {
+    const auto kind = static_cast<recording::Opcode>((*file)[at]);
+    std::uint64_t length = 0;
+    std::memcpy(&length, file->data() + at + 1, sizeof length);
+    const std::size_t content = at + recording::kRecordHead;
+    if (length > file->size() - content) return;
+    if (kind == recording::Opcode::kFooter && length == kFooter_B) clear(content + kFooterCrcAt);
+    if (kind == recording::Opcode::kDataEnd && length == 4) clear(content);
+    if (kind == recording::Opcode::kChunk && length >= kChunkHead + 8) {
+      clear(content + kChunkCrcAt);
+      std::uint32_t packing_B = 0;
+      std::memcpy(&packing_B, file->data() + content + kChunkCrcAt + 4, sizeof packing_B);
+      // The size of a chunk that is not packed is that of its body.
+      const std::uint64_t body = length - kChunkHead - 8;
+      if (packing_B == 0) std::memcpy(file->data() + content + kChunkSizeAt, &body, sizeof body);
+    }
+    at = content + length;
+  }
+}
+
+class Recording final : public Target {
+ public:
+  Outcome Offer(Input input) override {
+    Bytes file(input.begin(), input.end());
+    RemoveChecksums(&file);
+    const log_tools::RecordingVerdict verdict = log_tools::CheckRecording(file, folder_.path());
+    Promise(verdict.broken.empty(), verdict.broken);
+    Print(folder_.path() / "fuzzed.mcap");
+    return verdict.decoded > 0 ? Outcome::kAccepted : Outcome::kRefused;
+  }
+  std::vector<Seed> Seeds() override {
+    const std::filesystem::path file = folder_.path() / "seed.mcap";
+    std::vector<Seed> seeds;
+#define FULCRUM_SEED(T) \
+  if (std::optional<Seed> seed = SeedOf<T>(file, #T)) seeds.push_back(std::move(*seed));
+    FULCRUM_MESSAGES(FULCRUM_SEED)
+#undef FULCRUM_SEED
+    return seeds;
+  }
+
+ private:
+  /// A recording with one message. None of those whose size makes mutations rare.
+  template <class T>
+  static std::optional<Seed> SeedOf(const std::filesystem::path& file, const std::string& name) {
+    constexpr std::size_t kMost_B = 2000;
+    Bytes cdr;
+    if (!bus::EncodeCdr(bus::test::Sample<T>(), &cdr) || cdr.size() > kMost_B) return std::nullopt;
+    {
+      recording::McapWriter writer(file, "", "fuzz");
+      const auto channel =
+          writer.AddChannel(writer.AddSchema(name, "omgidl", ""), "fulcrum/" + name, "cdr", {{"node", "physics_node"}});
+      writer.AddMetadata("session", {{"id", "fuzz"}});
+      for (std::uint32_t i = 1; i <= 2; ++i) writer.Write(channel, i, i, i, std::as_bytes(std::span(cdr)));
+    }
+    return Seed{name, ReadFile(file)};
+  }
+  void Print(const std::filesystem::path& file) const {
+    constexpr std::size_t kLongestList = 8;
+    std::ostringstream out;
+    const std::filesystem::path tables = folder_.path() / "tables";
+    std::filesystem::remove_all(tables);
+    const auto tell = [](const auto& tool) {
+      try {
+        tool();
+      } catch (const InputError&) {
+        // Told to the user.
+      }
+    };
+    tell([&] { log_tools::PrintInfo(file, &out); });
+    tell([&] { (void)log_tools::Verify(file, &out); });
+    tell([&] { log_tools::PrintMessages(file, {}, kLongestList, &out); });
+    tell([&] { (void)log_tools::ExportTables(file, {}, tables); });
+    tell([&] { (void)log_tools::Diff(file, file, {}, "", &out); });
+  }
+
+  const ScratchFolder folder_;
+};
+
+}  // namespace
+
+std::unique_ptr<Target> MakeRecording() { return std::make_unique<Recording>(); }
+
+}  // namespace fulcrum::fuzz
