@@ -125,7 +125,12 @@ class ConsoleHttp final : public Target {
   }
 
   const console::Access access_{console::testing::kToken, {"cart"}};
-  console::HttpServer server_{"127.0.0.1", 0, [this](const console::HttpRequest& request) { return Answer(request); }};
+  console::HttpServer server_{{"127.0.0.1", 0, {}},
+                              {[this](const console::HttpRequest& request) { return Answer(request); },
+                               [](const console::HttpRequest& request) {
+                                 return request.authorization ==
+                                        std::string("Bearer ") + std::string(console::testing::kToken);
+                               }}};
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };
