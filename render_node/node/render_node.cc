@@ -305,6 +305,7 @@ void RenderNode::Report(const std::string& error) {
 void RenderNode::FillHealth(Health* health) const {
   health->metrics.push_back({"frames_drawn", static_cast<double>(frames_drawn_.load(std::memory_order_relaxed))});
   health->metrics.push_back({"png_written", static_cast<double>(writer_.written())});
+  health->metrics.push_back({"png_failed", static_cast<double>(writer_.failed())});
   health->metrics.push_back({"png_dropped", static_cast<double>(pictures_dropped_.load(std::memory_order_relaxed))});
   health->metrics.push_back({"draw_ms", draw_ms_.load(std::memory_order_relaxed)});
   health->metrics.push_back({"scale", scale_.load(std::memory_order_relaxed)});

@@ -84,6 +84,11 @@ std::uint64_t FrameWriter::written() const {
   return written_;
 }
 
+std::uint64_t FrameWriter::failed() const {
+  const std::lock_guard lock(mutex_);
+  return failed_;
+}
+
 std::string FrameWriter::last_error() const {
   const std::lock_guard lock(mutex_);
   return last_error_;
@@ -114,6 +119,7 @@ void FrameWriter::Work() {
     if (error.empty()) {
       ++written_;
     } else {
+      ++failed_;
       last_error_ = error;
     }
   }

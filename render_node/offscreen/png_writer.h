@@ -36,6 +36,7 @@ class FrameWriter {
   /// Waits until all queued pictures have been written or have failed.
   void Wait();
   [[nodiscard]] std::uint64_t written() const;
+  [[nodiscard]] std::uint64_t failed() const;
   /// Empty, or why the last write failed.
   [[nodiscard]] std::string last_error() const;
 
@@ -52,7 +53,7 @@ class FrameWriter {
   std::condition_variable wake_, idle_;
   std::deque<Job> jobs_;
   bool stop_ = false, writing_ = false;
-  std::uint64_t written_ = 0;
+  std::uint64_t written_ = 0, failed_ = 0;
   std::string last_error_;
   std::thread thread_;
 };
