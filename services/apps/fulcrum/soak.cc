@@ -49,7 +49,7 @@ ExitCode Soak(const Words& words) {
   settings.program = runtime::ProgramFolder() / "fulcrum";
   if (values.count("record") != 0) settings.up.emplace_back("--record");
   if (const fs::path cart = CartOf(arguments); !cart.empty()) {
-    settings.up.insert(settings.up.end(), {"--cart", cart.string()});
+    settings.cart = config::LoadCart(cart);
   }
   SceneRequest request;
   request.name = values["scene"].as<std::string>();

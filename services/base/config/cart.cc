@@ -134,6 +134,8 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   cart.security.keys = security.TextOr("keys", cart.security.keys);
   cart.security.encrypt = security.Flag("encrypt", cart.security.encrypt);
   cart.security.group = security.TextOr("group", cart.security.group);
+  StrictMap verdict = root.MapOrDefaults("verdict");
+  cart.verdict.restarts = static_cast<int>(verdict.Integer("restarts", cart.verdict.restarts, 0, kMostRestarts));
   file->Finish();
   return cart;
 }

@@ -120,6 +120,12 @@ struct SecurityConfig {
 /// Domain of a cart that names none: differs between users, so that two of them do not meet on one bus.
 [[nodiscard]] int DefaultDomain();
 
+/// What a session may suffer and still be called well.
+inline constexpr int kMostRestarts = 1'000'000;
+struct VerdictConfig {
+  int restarts = 3;  ///< Deaths of one node after which it was started again.
+};
+
 struct CartConfig {
   std::string name = "simulated";
   int domain = DefaultDomain();  ///< DDS domain, 1 to 100.
@@ -130,6 +136,7 @@ struct CartConfig {
   std::array<DeviceConfig, kMaxTools> devices;  ///< By tool.
   std::array<NodeTiming, kNodeCount> nodes;     ///< By NodeId.
   SecurityConfig security;
+  VerdictConfig verdict;
 
   /// Everything simulated, at the rates of the architecture page.
   CartConfig();

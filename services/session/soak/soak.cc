@@ -87,8 +87,11 @@ class Soak {
     fs::remove(log_, error);
     const fs::path scene = folder_ / "rounds.fulcrum";
     WriteSceneOfRounds(settings.scene, total_s_, scene);
+    const fs::path cart = folder_ / "cart.yaml";
+    supervisor::WriteFile(cart, config::CartToYaml(CartOf(settings)));
     std::vector<std::string> words{"up",        scene.string(),     "--out",    folder_.string(),
-                                   "--seconds", Fixed(total_s_, 1), "--domain", std::to_string(settings.domain)};
+                                   "--seconds", Fixed(total_s_, 1), "--domain", std::to_string(settings.domain),
+                                   "--cart",    cart.string()};
     words.insert(words.end(), settings.up.begin(), settings.up.end());
     up_ = supervisor::ChildProcess::Start(settings.program, words, log_);
   }
@@ -143,6 +146,13 @@ class Soak {
     processors_ = ReadProcessorTimes();
     progress_.Say("soak: " + std::to_string(nodes_.size()) + " nodes run, " + Fixed(settings_.minutes, 1) + " min" +
                   (settings_.chaos ? " with blows" : ""));
+  }
+
+  /// Kills are part of the chaos, and who comes back from them is well.
+  static config::CartConfig CartOf(const SoakSettings& settings) {
+    config::CartConfig cart = settings.cart;
+    if (settings.chaos) cart.verdict.restarts = config::kMostRestarts;
+    return cart;
   }
 
   static NodeId NodeOf(const std::string& program) {

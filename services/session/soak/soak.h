@@ -18,6 +18,7 @@ struct SoakSettings {
   std::filesystem::path program;  ///< Path of the program fulcrum.
   std::filesystem::path out;      ///< Folder in which the folder of this soak is made.
   std::vector<std::string> up;    ///< Further arguments of `fulcrum up`.
+  config::CartConfig cart;
   int domain = config::DefaultDomain();
   double minutes = 10;
   bool chaos = false;

@@ -16,10 +16,6 @@
 namespace fulcrum::supervisor {
 namespace {
 
-// A separate thread of each node sends Health ten times a second: a node without Health for this long hangs.
-constexpr std::int64_t kLongestSilence = 5 * kSecond_ns;
-// Longest time to the first Health, in which a node maps the scene and builds its solver.
-constexpr std::int64_t kLongestStart = 60 * kSecond_ns;
 constexpr std::int64_t kPatienceWithRestart = 3 * kSecond_ns;
 constexpr std::int64_t kLongestEnd = 4 * kSecond_ns;
 // From the start of a node to the start of its spare: the spare must not compete with the node's own start.
@@ -42,19 +38,17 @@ void NodeProcess::Start(std::int64_t now_ns) {
                                          : ChildProcess::Start(command_.program, command_.arguments, command_.log);
   spare_.reset();
   started_ns_ = now_ns;
-  last_health_ns_ = 0;
+  pulse_.Start(now_ns);
   due_ns_ = 0;
   kill_ns_ = 0;
-  silent_ = false;
   lacks_ = false;
+  complaint_ = nullptr;
 }
 
-void NodeProcess::WatchForSilence(std::int64_t now_ns) {
-  const bool too_long =
-      last_health_ns_ != 0 ? now_ns - last_health_ns_ > kLongestSilence : now_ns - started_ns_ > kLongestStart;
-  if (too_long && !silent_) {
-    silent_ = true;
-    process_.Signal(SIGKILL);
+void NodeProcess::WatchPulse(std::int64_t now_ns) {
+  if (complaint_ == nullptr) {
+    complaint_ = pulse_.Complaint(command_.has_spare, now_ns);
+    if (complaint_ != nullptr) process_.Signal(SIGKILL);
   }
   if (kill_ns_ != 0 && now_ns >= kill_ns_) {
     process_.Signal(SIGKILL);
@@ -94,11 +88,11 @@ std::optional<SupervisedNode::Death> NodeProcess::Update(std::int64_t now_ns) {
   }
   const std::optional<ProcessEnd> end = process_.Poll();
   if (!end) {
-    WatchForSilence(now_ns);
+    WatchPulse(now_ns);
     KeepSpare(now_ns);
     return std::nullopt;
   }
-  Death death{silent_ ? "sent no Health for too long and was killed" : end->Describe(), false, *end, false, 0};
+  Death death{complaint_ != nullptr ? complaint_ : end->Describe(), false, *end, false, 0};
   if (next_) {
     before_ = std::exchange(command_, std::move(*next_));
     next_.reset();
@@ -132,18 +126,12 @@ SupervisedNode::Death NodeProcess::GiveBack(const std::string& why, const Proces
 
 bool NodeProcess::OnHealth(const Health& health, std::int64_t now_ns) {
   if (health.node != id() || (health.pid != pid() && !command_.foreign)) return false;
-  last_health_ns_ = now_ns;
+  pulse_.Add(health, now_ns);
   before_.reset();
   return true;
 }
 
-void NodeProcess::ForgiveSilence(std::int64_t now_ns) {
-  if (last_health_ns_ != 0) {
-    last_health_ns_ = now_ns;
-  } else {
-    started_ns_ = now_ns;
-  }
-}
+void NodeProcess::ForgiveSilence(std::int64_t now_ns) { pulse_.Forgive(now_ns); }
 
 void NodeProcess::AskRestart(std::int64_t now_ns) {
   spare_.reset();  // The program may have been rebuilt since the spare was started.
@@ -176,9 +164,11 @@ void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(
   for (SupervisedNode* node : nodes) node->Stop();
   const std::int64_t begin = runtime::MonotonicNs();
   const auto is_gone = [](SupervisedNode* node) { return node->HasEnded(); };
+  bool gave_up = false;
   while (!std::all_of(nodes.begin(), nodes.end(), is_gone)) {
     const std::int64_t now = runtime::MonotonicNs();
-    if (now - begin > kLongestEnd) {
+    if (now - begin > kLongestEnd && !gave_up) {
+      gave_up = true;
       for (SupervisedNode* node : nodes) {
         if (!node->HasEnded()) given_up(*node, node->GiveUp());
       }

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 
+#include "services/session/supervisor/node_pulse.h"
 #include "services/session/supervisor/restart_policy.h"
 #include "services/session/supervisor/spare_process.h"
 #include "services/session/supervisor/supervised_node.h"
@@ -33,12 +34,12 @@ class NodeProcess final : public SupervisedNode {
   [[nodiscard]] pid_t pid() const override { return process_.pid(); }
   [[nodiscard]] bool running() const override { return process_.running(); }
   [[nodiscard]] bool failed() const override { return failed_; }
-  [[nodiscard]] bool has_reported() const override { return last_health_ns_ != 0; }
+  [[nodiscard]] bool has_reported() const override { return pulse_.has_reported(); }
   [[nodiscard]] const NodeCommand& command() const override { return command_; }
   [[nodiscard]] std::string log() const override { return command_.log.string(); }
 
  private:
-  void WatchForSilence(std::int64_t now_ns);
+  void WatchPulse(std::int64_t now_ns);
   /// Starts a spare once the node runs. A spare that ends is replaced only after the next start of the node.
   void KeepSpare(std::int64_t now_ns);
   /// Starts the previous program again after its replacement ended without a Health.
@@ -50,11 +51,11 @@ class NodeProcess final : public SupervisedNode {
   std::unique_ptr<SpareProcess> spare_;
   RestartPolicy policy_;
   std::int64_t started_ns_ = 0;
-  std::int64_t last_health_ns_ = 0;  ///< 0: none since the start.
+  NodePulse pulse_;
   std::int64_t due_ns_ = 0;          ///< Time of the next start; 0: the process runs.
   std::int64_t kill_ns_ = 0;         ///< Time of SIGKILL in a restart by command; 0: no such restart.
-  bool silent_ = false;              ///< Killed because its Health was missing.
   bool lacks_ = false;               ///< The system had no means for the last start.
+  const char* complaint_ = nullptr;  ///< Why it was killed; nullptr: it was not.
   bool failed_ = false;
 };
 

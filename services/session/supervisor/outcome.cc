@@ -1,5 +1,6 @@
 #include "services/session/supervisor/outcome.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 
@@ -21,6 +22,12 @@ std::string Fixed(double value, int decimals) {
     result.erase(0, 1);
   }
   return result;
+}
+
+std::string SessionOutcome::verdict() const {
+  std::string line;
+  for (const Fault& fault : faults) line += (line.empty() ? "" : "; ") + fault.text;
+  return line;
 }
 
 std::vector<KeyFigure> KeyFigures(const SessionRecord& record) {
@@ -72,7 +79,8 @@ std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& reco
   json.Add("machine", outcome.machine);
   json.Add("ok", outcome.exit_code == ExitCode::kDone);
   json.Add("exit_code", static_cast<double>(outcome.exit_code));
-  json.Add("verdict", outcome.verdict);
+  json.Add("verdict", outcome.verdict());
+  json.Add("faults", static_cast<double>(outcome.faults.size()));
   json.Add("session_seconds", outcome.duration_s);
   json.Add("wanted_seconds", outcome.wanted_s);
   for (const KeyFigure& figure : KeyFigures(record)) {
@@ -162,11 +170,14 @@ std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& recor
   if (!outcome.recording.empty()) {
     text += "recording: " + outcome.recording.string() + ", " + RecordingLosses(record) + "\n";
   }
+  for (const Fault& fault : outcome.faults) {
+    text += "fault at " + Fixed(std::max(0.0, fault.time_s), 1) + " s: " + fault.text + "\n";
+  }
   if (outcome.sheet) {
     text += "\n" + SheetTable(*outcome.sheet);
   }
   text += std::string("\n") + Fixed(outcome.duration_s, 1) + " s of \"" + outcome.scene_name + "\": ";
-  text += outcome.verdict.empty() ? "all well\n" : "NOT WELL: " + outcome.verdict + "\n";
+  text += outcome.faults.empty() ? "all well\n" : "NOT WELL: " + outcome.verdict() + "\n";
   return text;
 }
 

@@ -9,6 +9,7 @@
 #include "services/base/core/exit_code.h"
 #include "services/session/assessment/score.h"
 #include "services/session/supervisor/session_record.h"
+#include "services/session/supervisor/verdict.h"
 
 namespace fulcrum::supervisor {
 
@@ -33,7 +34,10 @@ struct SessionOutcome {
   std::filesystem::path cut_map;    ///< Picture of what was cut; empty: no recording, or nothing cut.
   std::optional<ScoreSheet> sheet;  ///< None: the scene has no section `assessment`.
   std::string trainee;              ///< Empty: not named.
-  std::string verdict;              ///< First failure of the session, one line; empty when all is well.
+  std::vector<Fault> faults;        ///< Empty: all well.
+
+  /// All faults in one line; empty: all well.
+  [[nodiscard]] std::string verdict() const;
 };
 
 /// A named figure of a session. Table, JSON and report all use this list.

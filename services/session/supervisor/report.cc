@@ -1,5 +1,6 @@
 #include "services/session/supervisor/report.h"
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <vector>
@@ -56,8 +57,8 @@ std::string Header(const SessionOutcome& outcome) {
   std::string html = Tag("h1", "Session on \"" + outcome.scene_name + "\"");
   html += Tag("p class='sub'", outcome.started_utc + " · " + Fixed(outcome.duration_s, 1) + " s of session time · " +
                                    std::to_string(outcome.nodes.size()) + " nodes · " + outcome.machine);
-  html +=
-      Tag(std::string("div class='verdict ") + (good ? "good'" : "bad'"), good ? "✓ all well" : "✗ " + outcome.verdict);
+  html += Tag(std::string("div class='verdict ") + (good ? "good'" : "bad'"),
+              good ? "✓ all well" : "✗ " + outcome.verdict());
   return html;
 }
 
@@ -189,6 +190,20 @@ std::string Restarts(const SessionRecord& record) {
   return html + "</table></div>\n";
 }
 
+std::string Faults(const SessionOutcome& outcome) {
+  if (outcome.faults.empty()) {
+    return {};
+  }
+  std::string html = Tag("h2", "Faults") +
+                     "<div class='card scroll'><table><tr><th class='text'>session time</th>"
+                     "<th class='text'>fault</th></tr>\n";
+  for (const Fault& fault : outcome.faults) {
+    html += "<tr class='bad'>" + Tag("td", Fixed(std::max(0.0, fault.time_s), 1) + " s") +
+            Tag("td class='text'", fault.text) + "</tr>\n";
+  }
+  return html + "</table></div>\n";
+}
+
 std::string Refusals(const SessionRecord& record) {
   if (record.refused().empty()) {
     return {};
@@ -237,7 +252,7 @@ std::string ReportHtml(const SessionOutcome& outcome, const SessionRecord& recor
   html += "</style></head><body><main>\n";
   html += Header(outcome) + Tiles(record) + (outcome.sheet ? SheetHtml(*outcome.sheet, outcome.trainee) : "") +
           Pictures(frames, clip) + CutMap(outcome.cut_map) + Plots(outcome, record) + Nodes(outcome, record) +
-          Restarts(record) + Refusals(record) + Events(record);
+          Faults(outcome) + Restarts(record) + Refusals(record) + Events(record);
   if (!outcome.recording.empty()) {
     html += Tag("h2", "Recording") + Tag("p", "All topics: " + outcome.recording.string() + ", " +
                                                   RecordingLosses(record) + " (details: fulcrum log info).");

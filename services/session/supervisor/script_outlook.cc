@@ -1,5 +1,7 @@
 #include "services/session/supervisor/script_outlook.h"
 
+#include <algorithm>
+
 #include "services/base/core/operator_script.h"
 
 namespace fulcrum::supervisor {
@@ -63,6 +65,26 @@ ScriptDemands DemandsUntil(const SceneView& scene, double end_s) {
     demands.deformation |= (cutting || grasping) && left >= kTimeToDeform;
     demands.cut |= cutting && left >= kTimeToCut;
   }
+  return demands;
+}
+
+ScriptDemands PossibleDemands(ScriptDemands demands, std::uint32_t node_mask, const config::CartConfig& cart) {
+  const auto all_run = [&](std::initializer_list<NodeId> nodes) {
+    return std::all_of(nodes.begin(), nodes.end(),
+                       [&](NodeId node) { return (node_mask >> static_cast<unsigned>(node) & 1u) != 0; });
+  };
+  using enum NodeId;
+  // Jaws and pedals come from handle_bridge, poses from haptics_node.
+  const bool tools_move =
+      all_run({kHandleBridge, kHaptics, kPhysics}) &&
+      std::all_of(cart.devices.begin(), cart.devices.end(),
+                  [](const config::DeviceConfig& device) {
+                    return device.kind == config::DeviceKind::kSimulated && device.motion.empty();
+                  }) &&
+      std::none_of(cart.handles.begin(), cart.handles.end(),
+                   [](const config::HandleConfig& handle) { return handle.kind == config::LinkKind::kSerial; });
+  demands.deformation = demands.deformation && tools_move;
+  demands.cut = demands.cut && tools_move && all_run({kThermal}) && cart.pedal.kind == config::LinkKind::kSimulated;
   return demands;
 }
 

@@ -2,8 +2,10 @@
 // functions.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
+#include "services/base/config/cart.h"
 #include "services/base/core/scene_view.h"
 
 namespace fulcrum::supervisor {
@@ -19,5 +21,9 @@ struct ScriptDemands {
 /// Demands of the script up to session time `end_s` [s], without actions so shortly before it that the tissue cannot
 /// have followed.
 [[nodiscard]] ScriptDemands DemandsUntil(const SceneView& scene, double end_s);
+/// Those that the nodes of the session can fulfil, on a cart whose operator is simulated: a person need not follow the
+/// script. @param node_mask nodes of the session, one bit per NodeId.
+[[nodiscard]] ScriptDemands PossibleDemands(ScriptDemands demands, std::uint32_t node_mask,
+                                            const config::CartConfig& cart);
 
 }  // namespace fulcrum::supervisor

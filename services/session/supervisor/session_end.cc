@@ -1,8 +1,8 @@
 #include "services/session/supervisor/session_end.h"
 
+#include <exception>
 #include <filesystem>
 
-#include "services/base/core/error.h"
 #include "services/session/supervisor/clip.h"
 #include "services/session/supervisor/cut_map_file.h"
 #include "services/session/supervisor/report.h"
@@ -14,7 +14,7 @@
 namespace fulcrum::supervisor {
 namespace {
 
-SessionOutcome OutcomeOf(const SessionSetup& setup, double reached_s, const Verdict& verdict) {
+SessionOutcome OutcomeOf(const SessionSetup& setup, double reached_s) {
   SessionOutcome outcome;
   outcome.scene_name = setup.scene.view().name;
   outcome.session_id = setup.folder.session_id;
@@ -25,64 +25,77 @@ SessionOutcome OutcomeOf(const SessionSetup& setup, double reached_s, const Verd
   outcome.nodes.insert(outcome.nodes.end(), setup.remote_ids.begin(), setup.remote_ids.end());
   outcome.duration_s = reached_s;
   outcome.wanted_s = setup.end_s;
-  outcome.exit_code = verdict.code;
-  outcome.verdict = verdict.why;
   outcome.recording = setup.recording;
   outcome.trainee = setup.settings.trainee;
   return outcome;
 }
 
-/// Adds a row to the trainees' database. Without the row the figures are still in assessment.json.
-void AddRow(TrainingLog* training, SessionOutcome* outcome, Verdict* verdict) {
+void SetVerdict(const Verdict& verdict, SessionOutcome* outcome) {
+  outcome->exit_code = verdict.code();
+  outcome->faults = verdict.faults();
+}
+
+/// Calls `write`; what cannot be written fails the verdict.
+template <class Write>
+void Try(double time_s, Verdict* verdict, const Write& write) {
   try {
-    training->Add(TrainingRowOf(*outcome));
-  } catch (const InputError& error) {
-    verdict->Fail(ExitCode::kFailure, error.what());
-    outcome->exit_code = verdict->code;
-    outcome->verdict = verdict->why;
+    write();
+  } catch (const std::exception& error) {
+    verdict->Fail(time_s, ExitCode::kFailure, error.what());
   }
 }
 
 }  // namespace
 
+Verdict::Session VerdictSession(const SessionSetup& setup) {
+  return {setup.node_ids, setup.remote_ids, setup.settings.cart.verdict.restarts};
+}
+
 void Judge(const SessionSetup& setup, const SessionNodes& nodes, const SessionRecord& record, double reached_s,
            Verdict* verdict) {
-  if (const SessionNodes::Failure& failure = nodes.failure(); failure.code != ExitCode::kDone) {
-    verdict->Fail(failure.code, failure.why);
-  }
+  verdict->Close(reached_s, record);
+  const auto fail = [&](const std::string& why) { verdict->Fail(reached_s, ExitCode::kFailure, why); };
   for (const auto& node : nodes.all()) {
-    if (!record.node(node->id()).seen) {
-      verdict->Fail(ExitCode::kFailure, std::string(NodeName(node->id())) + " never reported; see " + node->log());
-    }
+    if (!record.node(node->id()).seen) fail(std::string(NodeName(node->id())) + " never reported; see " + node->log());
   }
   for (const NodeId node : setup.remote_ids) {
     if (!record.node(node).seen) {
-      verdict->Fail(ExitCode::kFailure,
-                    std::string(NodeName(node)) + " on " + setup.settings.peer +
-                        " never reported; does `fulcrum host` run there, with this machine as its --peer?");
+      fail(std::string(NodeName(node)) + " on " + setup.settings.peer +
+           " never reported; does `fulcrum host` run there, with this machine as its --peer?");
     }
   }
-  if (const std::string missing = MissingFrom(record, DemandsUntil(setup.scene.view(), reached_s)); !missing.empty()) {
-    verdict->Fail(ExitCode::kFailure, missing);
-  }
+  const ScriptDemands demands =
+      PossibleDemands(DemandsUntil(setup.scene.view(), reached_s), setup.scene.view().node_mask, setup.settings.cart);
+  if (const std::string missing = MissingFrom(record, demands); !missing.empty()) fail(missing);
 }
 
 std::string WriteResults(SessionSetup* setup, const SessionRecord& record, double reached_s,
                          const std::optional<ScoreSheet>& sheet, Verdict* verdict) {
   const SessionFolder& folder = setup->folder;
-  SessionOutcome outcome = OutcomeOf(*setup, reached_s, *verdict);
+  SessionOutcome outcome = OutcomeOf(*setup, reached_s);
+  outcome.sheet = sheet;
+  const std::filesystem::path clip = folder.path / "clip.mp4", report = folder.path / "report.html";
   if (sheet) {
-    outcome.sheet = sheet;
-    WriteFile(folder.path / "assessment.json",
-              SheetJson(*sheet, {outcome.scene_name, outcome.session_id, outcome.trainee, outcome.started_utc}));
-    if (setup->training) AddRow(&*setup->training, &outcome, verdict);
+    Try(reached_s, verdict, [&] {
+      WriteFile(folder.path / "assessment.json",
+                SheetJson(*sheet, {outcome.scene_name, outcome.session_id, outcome.trainee, outcome.started_utc}));
+    });
   }
-  WriteFile(folder.path / "summary.json", SummaryJson(outcome, record));
-  outcome.cut_map = WriteCutMap(setup->recording, setup->scene.view(), folder.path);
-  const std::filesystem::path clip = folder.path / "clip.mp4";
-  (void)MakeClip(folder.frames, clip, folder.logs / "clip.log");
-  const std::filesystem::path report = folder.path / "report.html";
-  WriteFile(report, ReportHtml(outcome, record, folder.frames, clip));
+  if (sheet && setup->training) {
+    SetVerdict(*verdict, &outcome);
+    // Without the row the figures are still in assessment.json.
+    Try(reached_s, verdict, [&] { setup->training->Add(TrainingRowOf(outcome)); });
+  }
+  Try(reached_s, verdict, [&] { outcome.cut_map = WriteCutMap(setup->recording, setup->scene.view(), folder.path); });
+  Try(reached_s, verdict, [&] { (void)MakeClip(folder.frames, clip, folder.logs / "clip.log"); });
+  // Written again when one of them cannot be written, so that the other one says so.
+  std::size_t known = 0;
+  do {
+    known = verdict->faults().size();
+    SetVerdict(*verdict, &outcome);
+    Try(reached_s, verdict, [&] { WriteFile(report, ReportHtml(outcome, record, folder.frames, clip)); });
+    Try(reached_s, verdict, [&] { WriteFile(folder.path / "summary.json", SummaryJson(outcome, record)); });
+  } while (verdict->faults().size() != known);
   return "\n" + FinalTable(outcome, record) + "report: " + report.string();
 }
 

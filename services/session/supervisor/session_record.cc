@@ -63,15 +63,17 @@ void SessionRecord::AddHealth(double time_s, const Health& health) {
     figures.seen = true;
     track.first_time_s = std::max(time_s, 0.0);
   }
-  if (health.stamp.epoch > track.epoch) {
+  const bool is_new = health.stamp.epoch > track.epoch;
+  if (is_new) {
     track.epoch = health.stamp.epoch;
     track.base_ticks += track.live_ticks;
     track.base_overruns += track.live_overruns;
     track.base_drops += track.live_drops;
   }
-  if (health.state == HealthState::kRunning && track.death_time_s >= 0) {
-    const double rejoin_s = time_s - track.death_time_s;
-    track.death_time_s = -1;
+  const bool works = health.state == HealthState::kRunning || health.state == HealthState::kDegraded;
+  if (health.state == HealthState::kRunning && figures.dead_since_s >= 0) {
+    const double rejoin_s = time_s - figures.dead_since_s;
+    figures.dead_since_s = -1;
     figures.longest_rejoin_s = std::max(figures.longest_rejoin_s, rejoin_s);
     const auto last = std::find_if(restarts_.rbegin(), restarts_.rend(),
                                    [&](const RestartRecord& record) { return record.node == health.node; });
@@ -85,6 +87,10 @@ void SessionRecord::AddHealth(double time_s, const Health& health) {
   for (const InputHealth& input : health.inputs) {
     track.live_drops += input.lost + input.rejected;
   }
+  figures.heard_s = time_s;
+  const bool advanced = is_new || !figures.begun || figures.ticks != track.base_ticks + track.live_ticks;
+  if (works && advanced) figures.progress_s = time_s;
+  figures.begun |= works;
   figures.pid = health.pid;
   figures.state = health.state;
   figures.rate_asked_Hz = static_cast<double>(health.rate_asked_Hz);
@@ -117,16 +123,18 @@ void SessionRecord::AddEvent(const ThermalEvent& event) {
   }
 }
 
-void SessionRecord::AddDeath(double time_s, NodeId node, const std::string& cause, bool for_good) {
-  NodeTrack& track = nodes_[static_cast<std::size_t>(node)];
-  if (track.death_time_s < 0) {
-    track.death_time_s = std::max(time_s, 0.0);
+void SessionRecord::AddDeath(double time_s, NodeId node, const std::string& cause, bool for_good, bool asked) {
+  NodeFigures& figures = nodes_[static_cast<std::size_t>(node)].figures;
+  if (figures.dead_since_s < 0) {
+    figures.dead_since_s = std::max(time_s, 0.0);
   }
-  track.figures.failed = for_good;
+  figures.ended_by_command = asked;
+  figures.failed = for_good;
   if (!for_good) {
-    ++track.figures.restarts;
+    ++figures.restarts;
+    figures.crashes += asked ? 0 : 1;
   }
-  restarts_.push_back({time_s, node, cause, -1});
+  restarts_.push_back({time_s, node, cause, asked, -1});
 }
 
 void SessionRecord::AddRefusals(double time_s, const bus::Refusals& refusals) {

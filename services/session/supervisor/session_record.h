@@ -48,7 +48,14 @@ struct NodeFigures {
   std::uint64_t overruns = 0;
   std::uint64_t drops = 0;  ///< Samples lost, rejected or not written.
   int restarts = 0;
+  int crashes = 0;              ///< Restarts after a death that no command asked for.
   double longest_rejoin_s = 0;  ///< From a death to the first Health "running".
+  bool begun = false;           ///< It has run in this session.
+  double heard_s = 0;           ///< Session time of the newest Health.
+  double progress_s = 0;        ///< ... and of the newest one, running or degraded, with further ticks.
+  /// Session time of the death after which no process has run yet; negative: it lives.
+  double dead_since_s = -1;
+  bool ended_by_command = false;  ///< That death was asked for.
   std::string last_error;
 };
 
@@ -56,6 +63,7 @@ struct RestartRecord {
   double time_s = 0;
   NodeId node = NodeId::kSupervisor;
   std::string cause;
+  bool asked = false;    ///< By command.
   double rejoin_s = -1;  ///< Negative: did not rejoin.
 };
 
@@ -76,7 +84,8 @@ class SessionRecord {
  public:
   void AddHealth(double time_s, const Health& health);
   void AddEvent(const ThermalEvent& event);
-  void AddDeath(double time_s, NodeId node, const std::string& cause, bool for_good);
+  /// @param asked by a command of the operator.
+  void AddDeath(double time_s, NodeId node, const std::string& cause, bool for_good, bool asked = false);
   /// @param refusals all since the start; those that are new get `time_s`.
   void AddRefusals(double time_s, const bus::Refusals& refusals);
 
@@ -105,7 +114,6 @@ class SessionRecord {
     NodeFigures figures;
     std::uint64_t epoch = 0;
     double first_time_s = 0;
-    double death_time_s = -1;  ///< >= 0 while dead.
     // Counters of a node start at 0 with each process: `base_` has the sum of earlier processes.
     std::uint64_t base_ticks = 0, base_overruns = 0, base_drops = 0;
     std::uint64_t live_ticks = 0, live_overruns = 0, live_drops = 0;

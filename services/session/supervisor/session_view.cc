@@ -38,7 +38,8 @@ std::string LinkFigures(const Health& supervisor) {
     text += text.empty() ? "\nlink: " : " · ";
     text += metric.name.substr(kLink.size()) + " " + Fixed(metric.value, 2);
   }
-  if (!text.empty() && !supervisor.last_error.empty()) text += "\n      └ " + supervisor.last_error;
+  if (!text.empty() && !supervisor.last_error.empty() && MetricOf(supervisor, "faults") == 0)
+    text += "\n      └ " + supervisor.last_error;
   return text;
 }
 
@@ -134,8 +135,13 @@ std::string SessionView::Text() const {
     }
     figures += own;
   }
+  const double faults = MetricOf(supervisor, "faults");
+  if (faults > 0) {
+    text += "\nnot well: " + Fixed(faults, 0) + " faults; newest: " + supervisor.last_error + "\n";
+  }
   if (refused > 0) {
-    text += "\nrefused on the bus: " + Fixed(refused, 0) + "; newest: " + supervisor.last_error + "\n";
+    text += "\nrefused on the bus: " + Fixed(refused, 0) +
+            (faults > 0 ? std::string() : "; newest: " + supervisor.last_error) + "\n";
   }
   return text + figures + "\n";
 }

@@ -65,6 +65,7 @@ struct Supervisor::Impl {
     desk.emplace(setup.memory, setup.guard, up.cart.security.group, Verbs());
     if (!setup.remote_ids.empty()) remote.emplace(setup, &*participant);
     if (setup.scene.view().assessment.on != 0) assessed.emplace(setup.scene.view(), &*participant);
+    verdict.Begin(VerdictSession(setup));
     nodes.emplace(setup, [this](NodeId to, const char* verb) { orders->Send(to, verb); });
   }
 
@@ -113,8 +114,9 @@ struct Supervisor::Impl {
       // Of a standby pair, only the leader's Health enters the record.
       const bool follows = setup.settings.standby && node->id() == NodeId::kPhysics &&
                            health.state != HealthState::kRunning && health.state != HealthState::kDegraded;
-      // The record ends with the session: nodes then report peers that have just ended, which is no fault.
-      if (clock.stopped() || follows) continue;
+      // The record ends with the session: nodes then report peers that have just ended, which is no fault. What the
+      // recorder cannot write of the end is one.
+      if ((clock.stopped() && node->id() != NodeId::kRecorder) || follows) continue;
       const bool was_well = record.node(health.node).state != HealthState::kDegraded;
       record.AddHealth(clock.At(now), health);
       if (was_well && health.state == HealthState::kDegraded && !nodes->IsExcused(now)) DumpFault(now);
@@ -135,7 +137,7 @@ struct Supervisor::Impl {
 
   void EndOnMismatch(const std::string& mismatch) {
     if (mismatch.empty()) return;
-    verdict.Fail(ExitCode::kMismatch, mismatch);
+    verdict.Fail(clock.At(MonotonicNs()), ExitCode::kMismatch, mismatch);
     ending = true;
   }
 
@@ -146,7 +148,8 @@ struct Supervisor::Impl {
   }
 
   void OnDeath(const SupervisedNode& node, const SupervisedNode::Death& death, std::int64_t now) {
-    record.AddDeath(clock.At(death.at_ns != 0 ? death.at_ns : now), node.id(), death.cause, death.for_good);
+    record.AddDeath(clock.At(death.at_ns != 0 ? death.at_ns : now), node.id(), death.cause, death.for_good,
+                    death.asked);
     const UpSettings& up = setup.settings;
     const std::string what = std::string(NodeName(node.id())) + " " + death.cause;
     if (!death.asked) dumps->OnFault(what, now);
@@ -158,6 +161,21 @@ struct Supervisor::Impl {
     status.Say("! " + what + ", for good; see " + node.log() + (last.empty() ? "" : "\n  " + last));
     // Without its recorder a running session goes on, and its verdict is a failure.
     if (!up.keep_going && (node.id() != NodeId::kRecorder || !clock.begun())) ending = true;
+  }
+
+  void FindFaults(std::int64_t now) {
+    if (const SessionNodes::Failure& failure = nodes->failure(); failure.code != ExitCode::kDone) {
+      verdict.Fail(clock.At(now), failure.code, failure.why);
+    }
+    verdict.Watch(clock.At(now), record);
+    SayFaults();
+  }
+
+  /// Says each fault once.
+  void SayFaults() {
+    for (; faults_said < verdict.faults().size(); ++faults_said) {
+      status.Say("! not well: " + verdict.faults()[faults_said].text);
+    }
   }
 
   void PublishOwnHealth(std::int64_t now) {
@@ -177,7 +195,8 @@ struct Supervisor::Impl {
       own.metrics.push_back({std::string("restarts_") + NodeName(id), static_cast<double>(record.node(id).restarts)});
     }
     if (assessed && clock.begun()) assessed->AddTo(clock.At(now), &own);
-    own.last_error = nodes->failure().why;
+    own.metrics.push_back({"faults", static_cast<double>(verdict.faults().size())});
+    own.last_error = verdict.faults().empty() ? nodes->failure().why : verdict.faults().back().text;
     const std::vector<std::string>& refused = refusals.all().texts;
     if (own.last_error.empty() && !refused.empty()) own.last_error = "refused: " + refused.back();
     if (remote) remote->AddTo(&own);
@@ -200,6 +219,7 @@ struct Supervisor::Impl {
     TakeReports(now);
     nodes->Watch(now, [&](const auto& node, const auto& death) { OnDeath(node, death, now); });
     NoteChildren();
+    FindFaults(now);
     desk->Serve(now);
     generator->Follow(clock, now);
     PublishOwnHealth(now);
@@ -244,7 +264,7 @@ struct Supervisor::Impl {
     manifest.recorded = setup.has_recorder();
     if (assessed) assessed->Begin(clock.start_ns());
     if (!manifests->Write(manifest)) {
-      verdict.Fail(ExitCode::kFailure, "the session could not be announced on the bus");
+      verdict.Fail(0, ExitCode::kFailure, "the session could not be announced on the bus");
       ending = true;
     }
   }
@@ -290,8 +310,12 @@ struct Supervisor::Impl {
   }
 
   void Report() {
+    Judge(setup, *nodes, record, clock.reached_s(), &verdict);
+    SayFaults();
     const auto sheet = assessed ? std::optional(assessed->Finish()) : std::nullopt;
-    status.Say(WriteResults(&setup, record, clock.reached_s(), sheet, &verdict));
+    const std::string results = WriteResults(&setup, record, clock.reached_s(), sheet, &verdict);
+    SayFaults();  // Of files that could not be written.
+    status.Say(results);
   }
 
   SessionSetup setup;
@@ -315,6 +339,7 @@ struct Supervisor::Impl {
   SessionStatus status;
   RefusalJournal refusals;
   Verdict verdict;
+  std::size_t faults_said = 0;
   Health health;        ///< Sample of TakeReports; a member so that its buffers are reused.
   bool ending = false;  ///< True: the loop stops after this turn.
 };
@@ -334,10 +359,9 @@ ExitCode Supervisor::Run() {
   }
   while (!session.IsOver()) session.Turn();
   session.EndNodes();
-  Judge(setup, *session.nodes, session.record, session.clock.reached_s(), &session.verdict);
   session.CleanUp();
   session.Report();
-  return session.verdict.code;
+  return session.verdict.code();
 }
 
 }  // namespace fulcrum::supervisor

@@ -1,12 +1,14 @@
 // A node that computes nothing: the supervisor's tests start it under the names of the real ones. What it does besides
-// is told by a file <session>/../<node name>.do: "crash" (abort at once), "exit N", "hang" (in the step), "mismatch",
-// "flicker" (degraded every other 0.1 s of the session).
+// is told by a file <session>/../<node name>.do: "crash" (abort at once), "exit N", "hang" (in the step), "hang once"
+// (in the step after 1 s of the session, and not when it is started again), "mismatch", "flicker" (degraded every other
+// 0.1 s of the session), "step MS" (each step takes so long), "metric NAME VALUE" and "lost N" (samples) in Health.
 #include <unistd.h>
 
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <thread>
 
@@ -30,8 +32,17 @@ NodeId IdOf(const std::string& program) {
   return NodeId::kSupervisor;
 }
 
+std::filesystem::path OrderFile(const fulcrum::app::NodeOptions& options, NodeId node) {
+  return options.session.parent_path() / (std::string(fulcrum::NodeName(node)) + ".do");
+}
+
+void Hang() {
+  fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, "hanging");
+  std::this_thread::sleep_for(std::chrono::hours(1));
+}
+
 std::string OrderFor(const fulcrum::app::NodeOptions& options, NodeId node) {
-  std::ifstream stream(options.session.parent_path() / (std::string(fulcrum::NodeName(node)) + ".do"));
+  std::ifstream stream(OrderFile(options, node));
   std::string order;
   std::getline(stream, order);
   return order;
@@ -57,17 +68,26 @@ int main(int argc, char** argv) {
       throw fulcrum::MismatchError("the scene is another one");
     }
     (void)app.options().TakeFlag("--window");
-    (void)app.options().TakeValue("--quality", "auto");
+    for (const char* option : {"--quality", "--file", "--keep"}) (void)app.options().TakeValue(option, "");
+    const std::filesystem::path order_file = OrderFile(app.options(), node);
+    std::istringstream words(order);
+    std::string verb, metric;
+    double number = 0;
+    words >> verb;
+    if (verb == "metric") words >> metric;
+    words >> number;
     auto& frames = app.MakeOutput<fulcrum::TissueFrame>();
     (void)app.MakeInput<fulcrum::TissueFrame>();
     std::uint64_t sequence = 0, reports = 0;
     return app.Run(
         {.name = "fake", .period_ns = 10'000'000},
         [&](const fulcrum::Tick& tick) {
-          if (order == "hang") {
-            fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, "hanging");
-            std::this_thread::sleep_for(std::chrono::hours(1));
+          if (order == "hang") Hang();
+          if (order == "hang once" && tick.session_time_s > 1) {
+            std::filesystem::remove(order_file);
+            Hang();
           }
+          if (verb == "step") std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(number));
           if (node == NodeId::kPhysics) {
             frames.WriteInPlace([&](fulcrum::TissueFrame::View view) {
               view.header.stamp = {++sequence, 1, tick.stamp_ns};
@@ -79,6 +99,8 @@ int main(int argc, char** argv) {
           if (node == NodeId::kPhysics) {
             health->metrics.push_back({"max_displacement_mm", 12.5});
           }
+          if (verb == "metric") health->metrics.push_back({metric, number});
+          if (verb == "lost") health->write_failures += static_cast<std::uint64_t>(number);
           if (order == "flicker" && ++reports % 2 == 0 && health->state == HealthState::kRunning) {
             health->state = HealthState::kDegraded;
             health->last_error = "a plug is loose";

@@ -353,7 +353,13 @@ TEST_F(SupervisorTest, SwapReplacesANodeAndABadReplacementGivesItBack) {
 }
 
 TEST_F(SupervisorTest, ScriptThatAsksForACutWithoutOneIsAFailure) {
-  scene::SceneData data = TinyScene(1u << static_cast<unsigned>(NodeId::kPhysics));
+  std::uint32_t mask = 0;
+  for (const NodeId node : {NodeId::kHandleBridge, NodeId::kHaptics, NodeId::kPhysics, NodeId::kThermal}) {
+    fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "supervisor_fake_node", folder_ / "bin" / NodeName(node),
+                  fs::copy_options::skip_existing);
+    mask |= 1u << static_cast<unsigned>(node);
+  }
+  scene::SceneData data = TinyScene(mask);
   data.fixed.script_duration_s = 4;
   const Vec3f here = data.fixed.tools[1].p_WP - Vec3f(0, 0, 0.05f);
   data.script = {{0, 1, here, 0, kPedalCut, 35}, {4, 1, here, 0, kPedalNone, 0}};

@@ -150,14 +150,15 @@ TEST(OutcomeTest, SummaryIsFlatJsonWithTextEscaped) {
 TEST(OutcomeTest, TableShowsEachNodeAndTheVerdict) {
   SessionOutcome outcome;
   outcome.nodes = {NodeId::kPhysics, NodeId::kRender};
-  outcome.verdict = "nothing was cut";
+  outcome.faults = {{4.5, "nothing was cut"}, {5, "the recorder lost samples"}};
   SessionRecord record;
   record.AddHealth(1, PhysicsHealth(1, 1, 3.25));
   const std::string table = FinalTable(outcome, record);
   EXPECT_NE(table.find("physics_node"), std::string::npos);
   EXPECT_NE(table.find("1.00 / 2.00 / 5.00"), std::string::npos) << table;
   EXPECT_NE(table.find("silent"), std::string::npos) << table;
-  EXPECT_NE(table.find("NOT WELL: nothing was cut"), std::string::npos) << table;
+  EXPECT_NE(table.find("fault at 4.5 s: nothing was cut\n"), std::string::npos) << table;
+  EXPECT_NE(table.find("NOT WELL: nothing was cut; the recorder lost samples\n"), std::string::npos) << table;
 }
 
 TEST(OutcomeTest, FixedHasNoNegativeZero) {
@@ -302,6 +303,8 @@ TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   outcome.nodes = {NodeId::kPhysics};
   outcome.duration_s = 10;
   outcome.configuration = "a: <b>\n";
+  outcome.exit_code = ExitCode::kFailure;
+  outcome.faults = {{3.5, "a fault & its cause"}};
   SessionRecord record;
   Health health = PhysicsHealth(1, 1, 3.25);
   health.metrics.push_back({"displacement_mm", 2});
@@ -313,7 +316,8 @@ TEST(ReportTest, HoldsEverythingAndNothingFromElsewhere) {
   std::ofstream(folder.path() / "clip.mp4") << "a clip";
   const std::string html = ReportHtml(outcome, record, folder.path(), folder.path() / "clip.mp4");
   for (const char* part : {"&lt;tiny&gt;", "physics_node", "data:image/png;base64,", "data:video/mp4;base64,YSBjbGlw",
-                           "<svg", "class='mark'", "killed by signal 9", "cut × 1", "a: &lt;b&gt;"}) {
+                           "<svg", "class='mark'", "killed by signal 9", "cut × 1", "✗ a fault &amp; its cause",
+                           "<td>3.5 s</td>", "a: &lt;b&gt;"}) {
     EXPECT_NE(html.find(part), std::string::npos) << part;
   }
   for (const char* outside : {"http://", "https://", "src='/", "<script", "<link"}) {

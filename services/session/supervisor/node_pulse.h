@@ -1,0 +1,32 @@
+// Whether a node works, by its Health: one without Health is silent, one whose ticks stand still is stuck. Reads no
+// clock: the caller passes the time.
+#pragma once
+
+#include <cstdint>
+
+#include "services/base/core/messages.h"
+
+namespace fulcrum::supervisor {
+
+class NodePulse {
+ public:
+  /// A process was started.
+  void Start(std::int64_t now_ns);
+  void Add(const Health& health, std::int64_t now_ns);
+  /// Measures anew from `now_ns` on, because the supervisor itself was suspended.
+  void Forgive(std::int64_t now_ns);
+
+  /// Why the node must be killed, as text; nullptr: it works, or has time left.
+  /// @param has_spare another process can take its place at once.
+  [[nodiscard]] const char* Complaint(bool has_spare, std::int64_t now_ns) const;
+  [[nodiscard]] bool has_reported() const { return has_reported_; }
+
+ private:
+  std::int64_t started_ns_ = 0, health_ns_ = 0, progress_ns_ = 0;
+  std::int64_t period_ns_ = 0;
+  std::uint64_t ticks_ = 0;
+  bool has_reported_ = false;
+  bool steps_ = false;  ///< Its newest Health says that it runs.
+};
+
+}  // namespace fulcrum::supervisor
