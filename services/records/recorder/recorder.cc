@@ -8,6 +8,7 @@
 
 #include "services/base/core/error.h"
 #include "services/base/runtime/cyclic_thread.h"
+#include "services/records/recorder/priorities.h"
 #include "services/transport/bus/schema.h"
 #include "services/transport/bus/topics.h"
 
@@ -37,9 +38,8 @@ std::string Hex(const bus::WriterGuid& guid) {
 Recorder::Recorder(const RecorderSettings& settings)
     : settings_(settings), wall_minus_monotonic_ns_(WallMinusMonotonic()) {
   for (Batch* batch : {&filling_, &writing_}) {
-    for (Batch::Part* part : {&batch->large, &batch->small}) {
-      part->bytes = std::make_unique_for_overwrite<std::uint8_t[]>(settings.queue_B);
-    }
+    batch->large.bytes = std::make_unique_for_overwrite<std::uint8_t[]>(settings.large_queue_B);
+    batch->small.bytes = std::make_unique_for_overwrite<std::uint8_t[]>(settings.small_queue_B);
   }
   if (settings.file.empty()) return;
   file_.emplace(settings.file, kProfile, settings.library);
@@ -68,11 +68,8 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
   if (sample.sequence <= writer->last_sequence) return;
   // Readers sort by this time: samples of one writer stay in order even if a clock was set in between.
   const std::int64_t written_ns = std::max(sample.written_ns, writer->last_ns);
-  const bool room = filling_.used() + recording::kMessageHead + size <= settings_.queue_B;
-  if (room) {
-    const bool is_large = bus::QualityOf(sample.topic).path == bus::Path::kSharedMemory;
-    Batch::Part& part = is_large ? filling_.large : filling_.small;
-    std::uint8_t* at = part.bytes.get() + part.used;
+  std::uint8_t* at = PlaceFor(sample.topic, recording::kMessageHead + size);
+  if (at != nullptr) {
     recording::PutMessageHead(static_cast<std::uint16_t>(writer - writers_.begin()),
                               static_cast<std::uint32_t>(sample.sequence),
                               static_cast<std::uint64_t>(written_ns + wall_minus_monotonic_ns_),
@@ -82,14 +79,23 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
     if (!sample.body.empty()) std::memcpy(at + sample.head.size(), sample.body.data(), sample.body.size());
     if (!is_whole()) return;  // Missed: the gap in the sequence is counted at the next sample.
     if (filling_.used() == 0) filling_.begin_ns = written_ns;
-    part.used += recording::kMessageHead + size;
-    most_used_ = std::max(most_used_, filling_.used());
+    (IsLarge(sample.topic) ? filling_.large : filling_.small).used += recording::kMessageHead + size;
   }
   counts.missed += sample.sequence - writer->last_sequence - 1;
   writer->last_sequence = sample.sequence;
   writer->last_ns = written_ns;
   counts.newest_ns = written_ns;
-  ++(room ? counts.received : counts.overflow);
+  ++(at != nullptr ? counts.received : counts.overflow);
+}
+
+std::uint8_t* Recorder::PlaceFor(TopicId topic, std::size_t record_B) {
+  const bool is_large = IsLarge(topic);
+  const std::size_t queue_B = is_large ? settings_.large_queue_B : settings_.small_queue_B;
+  const Batch::Part& part = is_large ? filling_.large : filling_.small;
+  const std::size_t filled_B = part.used + record_B;
+  if (filled_B > (IsDroppedFirst(topic) && !is_large ? queue_B / 2 : queue_B)) return nullptr;
+  most_used_ = std::max(most_used_, static_cast<double>(filled_B) / static_cast<double>(queue_B));
+  return part.bytes.get() + part.used;
 }
 
 void Recorder::AddNewChannels() {
@@ -201,14 +207,16 @@ void Recorder::Close(std::int64_t now_ns) {
 RecorderStats Recorder::stats() const {
   const std::lock_guard lock(mutex_);
   RecorderStats stats;
-  for (const Counts& counts : counts_) {
+  for (const auto& role : bus::kTopicRoles) {
+    const Counts& counts = counts_[static_cast<std::size_t>(role.id)];
     stats.received += counts.received;
     stats.missed += counts.missed;
     stats.overflow += counts.overflow;
     stats.unwritten += counts.unwritten;
+    if (!IsDroppedFirst(role.id)) stats.needed_lost += counts.missed + counts.overflow + counts.unwritten;
   }
   stats.file_B = file_B_;
-  stats.queue_pct = 100.0 * static_cast<double>(most_used_) / static_cast<double>(settings_.queue_B);
+  stats.queue_pct = 100 * most_used_;
   stats.error = error_;
   return stats;
 }

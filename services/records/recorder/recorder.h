@@ -36,9 +36,11 @@ struct RecorderSettings {
   std::map<std::string, recording::TextMap> metadata;
   /// Metadata of a writer in the file, beside its guid: called once for each writer, on the writing thread.
   std::function<recording::TextMap(const bus::WriterGuid&)> describe;
-  /// Largest size of the samples that wait for the writing thread. Twice this is reserved; memory is used only when
-  /// needed.
-  std::size_t queue_B = std::size_t{96} << 20;
+  /// Largest size of the samples that wait for the writing thread: of large topics, four seconds of the built-in scene,
+  /// and of small ones, four minutes of it. Health may fill half of the latter, so that what a replay needs always has
+  /// room of its own. Twice this is reserved; memory is used only when needed.
+  std::size_t large_queue_B = std::size_t{96} << 20;
+  std::size_t small_queue_B = std::size_t{256} << 20;
 };
 
 /// Figures since the start.
@@ -48,8 +50,9 @@ struct RecorderStats {
   std::uint64_t overflow = 0;   ///< Samples for which the queue had no room.
   std::uint64_t unwritten = 0;  ///< Samples that came after writing had failed.
   std::uint64_t file_B = 0;
-  double queue_pct = 0;  ///< Highest filling level of a batch.
-  std::string error;     ///< Reason why writing failed; empty: no failure.
+  double queue_pct = 0;           ///< Highest filling level of the queue of large or of small topics.
+  std::uint64_t needed_lost = 0;  ///< Of the lost samples, those that a replay needs.
+  std::string error;              ///< Reason why writing failed; empty: no failure.
   [[nodiscard]] std::uint64_t lost() const { return missed + overflow + unwritten; }
 };
 
@@ -84,7 +87,7 @@ class Recorder {
   /// Message records, in the format of a chunk: a sample is copied once and packed from there.
   struct Batch {
     /// Large and small topics are separated, so that they are in different chunks: most readers need only the small
-    /// ones, which are a thirtieth of the bytes.
+    /// ones, which are a thirtieth of the bytes. Each part has room of its own.
     struct Part {
       std::unique_ptr<std::uint8_t[]> bytes;
       std::size_t used = 0;
@@ -93,6 +96,8 @@ class Recorder {
     std::int64_t begin_ns = 0;  ///< Arrival of its first sample.
     [[nodiscard]] std::size_t used() const { return large.used + small.used; }
   };
+  /// Place for a message record in the batch that is being filled; nullptr: its queue is full.
+  [[nodiscard]] std::uint8_t* PlaceFor(TopicId topic, std::size_t record_B);
   struct Writer {
     TopicId topic;
     bus::WriterGuid guid;
@@ -131,7 +136,7 @@ class Recorder {
   Batch filling_;
   std::vector<Writer> writers_;
   std::array<Counts, kTopicCount> counts_{};
-  std::size_t most_used_ = 0;
+  double most_used_ = 0;  ///< Share of a queue.
   std::string error_;
   std::uint64_t file_B_ = 0;
 

@@ -8,6 +8,7 @@ void FillHealth(const RecorderStats& stats, Health* health) {
   health->metrics = {{"recorded_samples", static_cast<double>(stats.received - stats.unwritten)},
                      {"recorded_MB", 1e-6 * static_cast<double>(stats.file_B)},
                      {"lost_samples", static_cast<double>(stats.lost())},
+                     {"lost_for_replay", static_cast<double>(stats.needed_lost)},
                      {"queue_pct", stats.queue_pct}};
   if (stats.error.empty()) return;
   health->state = HealthState::kDegraded;

@@ -28,6 +28,17 @@ std::string CommandLine(int pid) {
   return line;
 }
 
+/// Lowest real-time priority: a thread that reads the bus runs before all programs that are not real-time, so that
+/// neither a socket overflows nor a ring in shared memory is overwritten while they occupy the processor; and after the
+/// threads of servo and solvers.
+constexpr int kReadingPriority = 1;
+
+/// To be called on a thread of the bus. Where no real-time priority is permitted, only the buffers bridge a delay.
+void RunBeforeOtherPrograms() {
+  thread_local bool done = false;
+  if (!std::exchange(done, true)) (void)runtime::SetFifoPriority(kReadingPriority);
+}
+
 recording::TextMap Describe(const bus::Peer& peer) {
   return {{"node", peer.name}, {"pid", std::to_string(peer.pid)}, {"command", CommandLine(peer.pid)}};
 }
@@ -62,8 +73,10 @@ RecorderNode::RecorderNode(app::NodeApp* app, const RecorderSettings& settings)
 
 void RecorderNode::ReceiveAllTopics(app::NodeApp* app) {
   for (const auto& role : bus::kTopicRoles) {
-    inputs_.push_back(bus_.MakeRawInput(
-        role.id, [this](const bus::RawSample& sample, const auto& is_whole) { recorder_.Receive(sample, is_whole); }));
+    inputs_.push_back(bus_.MakeRawInput(role.id, [this](const bus::RawSample& sample, const auto& is_whole) {
+      RunBeforeOtherPrograms();
+      recorder_.Receive(sample, is_whole);
+    }));
     app->Watch(role.id, [this, id = role.id, input = inputs_.back().get()] {
       bus::InputStats stats = recorder_.topic_stats(id);
       stats.matched = input->matched();

@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "services/records/recorder/dump_writer.h"
+#include "services/records/recorder/priorities.h"
 #include "services/records/recorder/recorder_health.h"
 #include "services/records/recording/free_name.h"
 #include "services/records/recording/mcap_reader.h"
@@ -145,7 +146,7 @@ TEST_F(RecorderTest, EverySchemaIsThere) {
 
 TEST_F(RecorderTest, WhatIsMissingIsCountedByTopicAndWrittenIntoTheFile) {
   RecorderSettings settings = Settings();
-  settings.queue_B = 1000;
+  settings.small_queue_B = 1000;
   {
     Recorder recorder(settings);
     Send(&recorder, TopicId::kToolState, 1, 100);
@@ -165,6 +166,46 @@ TEST_F(RecorderTest, WhatIsMissingIsCountedByTopicAndWrittenIntoTheFile) {
   EXPECT_EQ(ReadAll(&reader).size(), 3u);
   EXPECT_EQ(reader.metadata().at("lost ToolState").at("not_received"), "3");
   EXPECT_EQ(reader.metadata().at("lost Health").at("queue_full"), "1");
+}
+
+TEST_F(RecorderTest, NeitherPicturesNorHealthTakeTheRoomOfWhatAReplayNeeds) {
+  RecorderSettings settings = Settings();
+  settings.large_queue_B = 1000;
+  settings.small_queue_B = 2000;
+  {
+    // The disk stands still: nothing is flushed.
+    Recorder recorder(settings);
+    for (std::uint64_t i = 1; i <= 10; ++i) {
+      Send(&recorder, TopicId::kTissueFrame, 1, i, 300);
+      Send(&recorder, TopicId::kTemperaturePatch, 1, i, 300);
+      Send(&recorder, TopicId::kHealth, 1, i, 300);
+    }
+    std::uint64_t sequence = 0;
+    for (const auto& role : bus::kTopicRoles) {
+      if (!IsDroppedFirst(role.id)) Send(&recorder, role.id, 2, ++sequence, 40);
+    }
+    EXPECT_EQ(recorder.stats().needed_lost, 0u);
+    EXPECT_EQ(recorder.topic_stats(TopicId::kTissueFrame).lost, 8u);
+    EXPECT_EQ(recorder.topic_stats(TopicId::kTemperaturePatch).lost, 9u);
+    EXPECT_EQ(recorder.topic_stats(TopicId::kHealth).lost, 7u);
+    EXPECT_EQ(recorder.topic_stats(TopicId::kTopologyState).received, 1u);
+    EXPECT_EQ(recorder.topic_stats(TopicId::kTickManifest).received, 1u);
+  }
+  McapReader reader(folder_ / "recording.mcap");
+  ReadAll(&reader);
+  EXPECT_EQ(reader.metadata().at("lost TissueFrame").at("queue_full"), "8");
+  EXPECT_FALSE(reader.metadata().contains("lost TopologyState"));
+}
+
+TEST_F(RecorderTest, ASampleThatAReplayNeedsIsCountedAsSuchWhenItIsLost) {
+  Recorder recorder(Settings());
+  Send(&recorder, TopicId::kTissueFrame, 1, 1);
+  Send(&recorder, TopicId::kTissueFrame, 1, 4);
+  EXPECT_EQ(recorder.stats().needed_lost, 0u);
+  Send(&recorder, TopicId::kTopologyState, 1, 1);
+  Send(&recorder, TopicId::kTopologyState, 1, 3);
+  EXPECT_EQ(recorder.stats().needed_lost, 1u);
+  EXPECT_EQ(recorder.stats().lost(), 3u);
 }
 
 TEST_F(RecorderTest, AfterAKillTheFileHoldsWhatIsOlderThanAChunkLasts) {
@@ -263,7 +304,7 @@ TEST(RecorderHealth, IsDegradedOnceWritingHasFailed) {
   stats.file_B = 3'000'000;
   Health health;
   FillHealth(stats, &health);
-  ASSERT_EQ(health.metrics.size(), 4u);
+  ASSERT_EQ(health.metrics.size(), 5u);
   EXPECT_EQ(health.metrics[0].value, 10);
   EXPECT_DOUBLE_EQ(health.metrics[1].value, 3);
   EXPECT_EQ(health.metrics[2].value, 2);

@@ -24,6 +24,7 @@
 #include "services/transport/bus/dds/security.h"
 #include "services/transport/bus/dds/session_check.h"
 #include "services/transport/bus/dds/shared_memory.h"
+#include "services/transport/bus/dds/socket_buffers.h"
 #include "services/transport/bus/dds/sources.h"
 #include "services/transport/bus/hex.h"
 
@@ -143,6 +144,7 @@ struct DdsParticipant::Impl {
       throw InputError("domain " + std::to_string(settings.domain) +
                        ": cannot open the bus; are its UDP ports on 127.0.0.1 free?");
     }
+    dds::EnlargeReceiveBuffers();
     if (gate) gate->Open();
     if (security.on()) {
       std::ostringstream address;
