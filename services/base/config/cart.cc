@@ -136,6 +136,8 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   cart.security.group = security.TextOr("group", cart.security.group);
   StrictMap verdict = root.MapOrDefaults("verdict");
   cart.verdict.restarts = static_cast<int>(verdict.Integer("restarts", cart.verdict.restarts, 0, kMostRestarts));
+  StrictMap recorder = root.MapOrDefaults("recorder");
+  cart.recorder.keep_free_MB = recorder.Number("keep_free_MB", cart.recorder.keep_free_MB, Range::Between(0, 1e6));
   file->Finish();
   return cart;
 }

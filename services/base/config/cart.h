@@ -126,6 +126,11 @@ struct VerdictConfig {
   int restarts = 3;  ///< Deaths of one node after which it was started again.
 };
 
+/// What a recording may take of its disk.
+struct RecorderConfig {
+  double keep_free_MB = 500;  ///< Free space that a recording leaves: it ends in order before [10^6 B].
+};
+
 struct CartConfig {
   std::string name = "simulated";
   int domain = DefaultDomain();  ///< DDS domain, 1 to 100.
@@ -137,6 +142,7 @@ struct CartConfig {
   std::array<NodeTiming, kNodeCount> nodes;     ///< By NodeId.
   SecurityConfig security;
   VerdictConfig verdict;
+  RecorderConfig recorder;
 
   /// Everything simulated, at the rates of the architecture page.
   CartConfig();

@@ -130,6 +130,7 @@ void InstallStopSignals() {
   ignore.sa_handler = SIG_IGN;
   sigemptyset(&ignore.sa_mask);
   sigaction(SIGPIPE, &ignore, nullptr);
+  sigaction(SIGXFSZ, &ignore, nullptr);
 }
 
 bool ShouldStop() noexcept { return stop_requested.load(std::memory_order_relaxed); }

@@ -23,7 +23,8 @@ void InstallLastWords();
 /// Makes the calling thread flush denormals to zero (they cost up to 20 % in the heat solver).
 void FlushDenormals();
 
-/// Makes SIGINT and SIGTERM set the flag that ShouldStop() reads, and ignores SIGPIPE. Call once, first in main.
+/// Makes SIGINT and SIGTERM set the flag that ShouldStop() reads. Ignores SIGPIPE, and SIGXFSZ, so that a write beyond
+/// the limit on the size of a file fails instead of ending the process. Call once, first in main.
 void InstallStopSignals();
 [[nodiscard]] bool ShouldStop() noexcept;
 void RequestStop() noexcept;

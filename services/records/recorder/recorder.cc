@@ -8,6 +8,7 @@
 
 #include "services/base/core/error.h"
 #include "services/base/runtime/cyclic_thread.h"
+#include "services/base/runtime/realtime.h"
 #include "services/records/recorder/priorities.h"
 #include "services/transport/bus/schema.h"
 #include "services/transport/bus/topics.h"
@@ -16,6 +17,8 @@ namespace fulcrum::recorder {
 namespace {
 
 constexpr std::string_view kProfile = "fulcrum";
+/// More than a chunk takes in the summary of a file [B].
+constexpr std::uint64_t kPerChunk_B = 1000;
 
 std::int64_t WallMinusMonotonic() {
   timespec wall{};
@@ -43,6 +46,7 @@ Recorder::Recorder(const RecorderSettings& settings)
   }
   if (settings.file.empty()) return;
   file_.emplace(settings.file, kProfile, settings.library);
+  room_.emplace(settings.file, settings.keep_free_B);
   Introduce(&*file_);
 }
 
@@ -68,7 +72,9 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
   if (sample.sequence <= writer->last_sequence) return;
   // Readers sort by this time: samples of one writer stay in order even if a clock was set in between.
   const std::int64_t written_ns = std::max(sample.written_ns, writer->last_ns);
-  std::uint8_t* at = PlaceFor(sample.topic, recording::kMessageHead + size);
+  const std::uint64_t gap = sample.sequence - writer->last_sequence - 1;
+  std::uint8_t* at =
+      ended_.empty() || settings_.keep_s > 0 ? PlaceFor(sample.topic, recording::kMessageHead + size) : nullptr;
   if (at != nullptr) {
     recording::PutMessageHead(static_cast<std::uint16_t>(writer - writers_.begin()),
                               static_cast<std::uint32_t>(sample.sequence),
@@ -81,10 +87,14 @@ void Recorder::Receive(const bus::RawSample& sample, const std::function<bool()>
     if (filling_.used() == 0) filling_.begin_ns = written_ns;
     (IsLarge(sample.topic) ? filling_.large : filling_.small).used += recording::kMessageHead + size;
   }
-  counts.missed += sample.sequence - writer->last_sequence - 1;
   writer->last_sequence = sample.sequence;
   writer->last_ns = written_ns;
   counts.newest_ns = written_ns;
+  if (!ended_.empty()) {
+    counts.not_recorded += gap + 1;
+    return;
+  }
+  counts.missed += gap;
   ++(at != nullptr ? counts.received : counts.overflow);
 }
 
@@ -125,11 +135,24 @@ void Recorder::AddChannels(recording::McapWriter* file, std::size_t first,
   }
 }
 
-void Recorder::Flush(std::int64_t now_ns) { Exchange(now_ns, false); }
+void Recorder::Flush(std::int64_t now_ns) {
+  const std::string end = file_ ? ReasonToEnd(now_ns) : std::string();
+  Exchange(now_ns, !end.empty(), end);
+  if (file_ && (!end.empty() || !file_->error().empty())) FinishFile();
+}
 
-void Recorder::Exchange(std::int64_t now_ns, bool all) {
+std::string Recorder::ReasonToEnd(std::int64_t now_ns) {
+  room_->Look(*file_, now_ns);
+  const std::lock_guard lock(mutex_);
+  left_s_ = room_->left_s();
+  if (room_->Holds(filling_.used())) return {};
+  return "the recording has ended, its file is complete: " + room_->Reason();
+}
+
+void Recorder::Exchange(std::int64_t now_ns, bool all, const std::string& end) {
   {
     const std::lock_guard lock(mutex_);
+    ended_ = ended_.empty() ? end : ended_;
     const bool due =
         filling_.used() >= recording::ChunkPacker::kChunkBytes || now_ns - filling_.begin_ns >= kLongestChunk_ns;
     if (filling_.used() == 0 || !(due || all)) return;
@@ -155,9 +178,9 @@ void Recorder::Pack(Batch::Part* part) {
 void Recorder::Write() {
   file_->Append(packed_);
   const std::lock_guard lock(mutex_);
-  error_ = file_->error();
   file_B_ = file_->bytes_written();
-  if (error_.empty()) return;
+  if (file_->error().empty()) return;
+  ended_ = file_->error() + ": the recording has ended; free space, or record elsewhere (--record)";
   for (const recording::PackedChunk::Part& part : packed_.parts) {
     counts_[static_cast<std::size_t>(channels_[part.channel].topic)].unwritten += part.messages;
   }
@@ -178,29 +201,61 @@ void Recorder::Keep() {
 
 void Recorder::Dump(const std::filesystem::path& path, std::string_view reason, std::int64_t now_ns) {
   Exchange(now_ns, true);
+  const std::uint64_t free_B = FreeSpace(std::filesystem::absolute(path).parent_path());
+  if (free_B < settings_.keep_free_B + kept_B_) {
+    throw InputError(path.string() + ": not written: " + std::to_string(kept_B_ / 1'000'000) + " MB, but only " +
+                     std::to_string(free_B / 1'000'000) + " MB are free on its disk and " +
+                     std::to_string(settings_.keep_free_B / 1'000'000) +
+                     " MB stay free (recorder.keep_free_MB of the cart file); delete old sessions");
+  }
   recording::McapWriter file(path, kProfile, settings_.library);
   Introduce(&file);
   file.AddMetadata("dump", {{"reason", std::string(reason)}});
   std::array<std::uint16_t, kTopicCount> schemas{};
   AddChannels(&file, 0, &schemas);
-  for (const recording::PackedChunk& chunk : kept_) file.Append(chunk);
+  // Where the size of files is limited, the newest chunks are those that count.
+  std::size_t first = kept_.size();
+  std::uint64_t B = 0;
+  while (first > 0 && B + kept_[first - 1].bytes.size() + kPerChunk_B <= file.BytesToLimit()) {
+    B += kept_[--first].bytes.size() + kPerChunk_B;
+  }
+  for (std::size_t i = first; i < kept_.size(); ++i) file.Append(kept_[i]);
   file.Close();
   if (!file.error().empty()) throw InputError(path.string() + ": " + file.error());
+  if (first > 0) {
+    runtime::Log(runtime::LogLevel::kWarning, path.string() + ": lacks the oldest " + std::to_string(first) + " of " +
+                                                  std::to_string(kept_.size()) +
+                                                  " chunks: the size of files is limited for this process (ulimit -f)");
+  }
 }
 
 void Recorder::Close(std::int64_t now_ns) {
   if (!file_) return;
   Exchange(now_ns, true);
-  const std::lock_guard lock(mutex_);
-  for (const auto& role : bus::kTopicRoles) {
-    const Counts& counts = counts_[static_cast<std::size_t>(role.id)];
-    if (counts.missed + counts.overflow + counts.unwritten == 0) continue;
-    file_->AddMetadata("lost " + std::string(bus::TopicLabel(role.id)),
-                       {{"not_received", std::to_string(counts.missed)},
-                        {"queue_full", std::to_string(counts.overflow)},
-                        {"not_written", std::to_string(counts.unwritten)}});
+  if (file_) FinishFile();
+}
+
+void Recorder::FinishFile() {
+  std::array<Counts, kTopicCount> counts;
+  {
+    const std::lock_guard lock(mutex_);
+    counts = counts_;
   }
+  for (const auto& role : bus::kTopicRoles) {
+    const Counts& of_topic = counts[static_cast<std::size_t>(role.id)];
+    if (of_topic.lost() == 0) continue;
+    file_->AddMetadata("lost " + std::string(bus::TopicLabel(role.id)),
+                       {{"not_received", std::to_string(of_topic.missed)},
+                        {"queue_full", std::to_string(of_topic.overflow)},
+                        {"not_written", std::to_string(of_topic.unwritten)}});
+  }
+  // Only this thread changes `ended_`.
+  if (!ended_.empty()) file_->AddMetadata("ended", {{"reason", ended_}});
+  const bool was_well = file_->error().empty();
   file_->Close();
+  const std::lock_guard lock(mutex_);
+  if (was_well && !file_->error().empty()) ended_ = file_->error() + ": the file has no index (fulcrum log recover)";
+  file_B_ = file_->bytes_written();
   file_.reset();
 }
 
@@ -213,11 +268,13 @@ RecorderStats Recorder::stats() const {
     stats.missed += counts.missed;
     stats.overflow += counts.overflow;
     stats.unwritten += counts.unwritten;
-    if (!IsDroppedFirst(role.id)) stats.needed_lost += counts.missed + counts.overflow + counts.unwritten;
+    stats.not_recorded += counts.not_recorded;
+    if (!IsDroppedFirst(role.id)) stats.needed_lost += counts.lost();
   }
   stats.file_B = file_B_;
   stats.queue_pct = 100 * most_used_;
-  stats.error = error_;
+  stats.ended = ended_;
+  stats.left_s = left_s_;
   return stats;
 }
 
@@ -226,7 +283,7 @@ bus::InputStats Recorder::topic_stats(TopicId topic) const {
   const Counts& counts = counts_[static_cast<std::size_t>(topic)];
   bus::InputStats stats;
   stats.received = counts.received;
-  stats.lost = counts.missed + counts.overflow + counts.unwritten;
+  stats.lost = counts.lost();
   stats.newest_stamp_ns = counts.newest_ns;
   return stats;
 }

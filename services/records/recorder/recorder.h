@@ -21,6 +21,7 @@
 #include <string_view>
 #include <vector>
 
+#include "services/records/recorder/room.h"
 #include "services/records/recording/mcap_writer.h"
 #include "services/transport/bus/port.h"
 #include "services/transport/bus/raw_input.h"
@@ -31,7 +32,9 @@ struct RecorderSettings {
   std::filesystem::path file;                 ///< Empty: only dumps are written.
   double keep_s = 0;                          ///< For dumps: span of the newest samples that is kept in memory [s].
   std::size_t keep_B = std::size_t{1} << 30;  ///< Upper limit of that memory.
-  std::string library;                        ///< Name of the writing program: "fulcrum 0.1.0".
+  /// Space that a recording leaves free on its disk [B]: it ends in order before.
+  std::uint64_t keep_free_B = 500'000'000;
+  std::string library;  ///< Name of the writing program: "fulcrum 0.1.0".
   /// Metadata of the session in the file, one record per entry.
   std::map<std::string, recording::TextMap> metadata;
   /// Metadata of a writer in the file, beside its guid: called once for each writer, on the writing thread.
@@ -48,11 +51,14 @@ struct RecorderStats {
   std::uint64_t received = 0;   ///< Samples.
   std::uint64_t missed = 0;     ///< Samples that did not arrive: gaps in their writer's sequence.
   std::uint64_t overflow = 0;   ///< Samples for which the queue had no room.
-  std::uint64_t unwritten = 0;  ///< Samples that came after writing had failed.
+  std::uint64_t unwritten = 0;  ///< Samples that could not be written.
+  /// Samples that came after the end of the recording. They are not losses: Health has told of the end.
+  std::uint64_t not_recorded = 0;
   std::uint64_t file_B = 0;
   double queue_pct = 0;           ///< Highest filling level of the queue of large or of small topics.
   std::uint64_t needed_lost = 0;  ///< Of the lost samples, those that a replay needs.
-  std::string error;              ///< Reason why writing failed; empty: no failure.
+  std::string ended;   ///< Why the recording has ended before the session, in order or not; empty: it has not.
+  double left_s = -1;  ///< Time until the recording will end for lack of room [s]; negative: not known.
   [[nodiscard]] std::uint64_t lost() const { return missed + overflow + unwritten; }
 };
 
@@ -68,7 +74,8 @@ class Recorder {
   void Receive(const bus::RawSample& sample, const std::function<bool()>& is_whole);
 
   // The following functions are for the writing thread only.
-  /// Writes the received samples once they fill ChunkPacker::kChunkBytes or are kLongestChunk_ns old.
+  /// Writes the received samples once they fill ChunkPacker::kChunkBytes or are kLongestChunk_ns old. Ends the
+  /// recording when its room is used up.
   void Flush(std::int64_t now_ns);
   /// Writes all received samples, and writes the last seconds that were kept into a file of its own. Throws InputError
   /// if that is not possible.
@@ -105,8 +112,9 @@ class Recorder {
     std::int64_t last_ns;
   };
   struct Counts {
-    std::uint64_t received = 0, missed = 0, overflow = 0, unwritten = 0;
+    std::uint64_t received = 0, missed = 0, overflow = 0, unwritten = 0, not_recorded = 0;
     std::int64_t newest_ns = 0;
+    [[nodiscard]] std::uint64_t lost() const { return missed + overflow + unwritten; }
   };
   struct Channel {
     TopicId topic;
@@ -116,10 +124,16 @@ class Recorder {
 
   void AddNewChannels();
   void Pack(Batch::Part* part);
-  /// Exchanges the batches if the filled one is large or old enough for a chunk, or if `all`.
-  void Exchange(std::int64_t now_ns, bool all);
+  /// Why the recording must end now; empty: it has room.
+  [[nodiscard]] std::string ReasonToEnd(std::int64_t now_ns);
+  /// Exchanges the batches if the filled one is large or old enough for a chunk, or if `all`, and writes the filled
+  /// one.
+  /// @param end not empty: no sample after these is recorded, and why.
+  void Exchange(std::int64_t now_ns, bool all, const std::string& end = {});
   /// Writes the packed chunk into the file.
   void Write();
+  /// Writes the losses and the end of the file.
+  void FinishFile();
   /// Adds the packed chunk to those kept for a dump.
   void Keep();
   /// Writes the metadata into a new file.
@@ -137,11 +151,13 @@ class Recorder {
   std::vector<Writer> writers_;
   std::array<Counts, kTopicCount> counts_{};
   double most_used_ = 0;  ///< Share of a queue.
-  std::string error_;
+  std::string ended_;     ///< Not empty: the recording has ended, and why.
   std::uint64_t file_B_ = 0;
+  double left_s_ = -1;
 
   Batch writing_;
   std::optional<recording::McapWriter> file_;
+  std::optional<Room> room_;
   std::array<std::uint16_t, kTopicCount> schemas_{};  ///< Numbers in `file_`; 0: not added yet.
   std::vector<Channel> channels_;                     ///< By writer.
   recording::ChunkPacker packer_;

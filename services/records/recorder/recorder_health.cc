@@ -3,6 +3,12 @@
 #include <string>
 
 namespace fulcrum::recorder {
+namespace {
+
+/// Time in which an operator can free space [s].
+constexpr double kFewSeconds = 60;
+
+}  // namespace
 
 void FillHealth(const RecorderStats& stats, Health* health) {
   health->metrics = {{"recorded_samples", static_cast<double>(stats.received - stats.unwritten)},
@@ -10,9 +16,18 @@ void FillHealth(const RecorderStats& stats, Health* health) {
                      {"lost_samples", static_cast<double>(stats.lost())},
                      {"lost_for_replay", static_cast<double>(stats.needed_lost)},
                      {"queue_pct", stats.queue_pct}};
-  if (stats.error.empty()) return;
-  health->state = HealthState::kDegraded;
-  health->last_error = stats.error + ": " + std::to_string(stats.unwritten) + " samples are not in the file";
+  health->metrics.push_back({"recording_ended", stats.ended.empty() ? 0.0 : 1.0});
+  health->metrics.push_back({"not_recorded", static_cast<double>(stats.not_recorded)});
+  if (!stats.ended.empty()) {
+    health->state = HealthState::kDegraded;
+    health->last_error = stats.ended;
+  } else if (stats.left_s >= 0) {
+    health->metrics.push_back({"room_left_s", stats.left_s});
+    if (stats.left_s < kFewSeconds) {
+      health->last_error = "there is room for " + std::to_string(static_cast<int>(stats.left_s)) +
+                           " s more of recording; delete old sessions";
+    }
+  }
 }
 
 }  // namespace fulcrum::recorder

@@ -49,6 +49,7 @@ RecorderSettings TakeSettings(app::NodeApp* app) {
   if (settings.file.empty() && settings.keep_s == 0) {
     throw InputError("nothing to do: give --file FILE, --keep SECONDS or both");
   }
+  settings.keep_free_B = static_cast<std::uint64_t>(1e6 * app->cart().recorder.keep_free_MB);
   settings.library = std::string("fulcrum ") + app::kVersion;
   settings.metadata = MetadataOf(app);
   return settings;

@@ -2,11 +2,13 @@
 
 #include <fcntl.h>
 #include <libdeflate.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <limits>
 
 #include "services/base/core/byte_stream.h"
 #include "services/base/core/error.h"
@@ -14,6 +16,11 @@
 
 namespace fulcrum::recording {
 namespace {
+
+/// Room for the fixed parts of the end of a file, and for metadata of some kilobytes that is added before it [B].
+constexpr std::uint64_t kEnd_B = 64 << 10;
+/// Lengths of records of the summary, names apart [B].
+constexpr std::uint64_t kChunkIndex_B = 96, kChunkPart_B = 10, kChannelCount_B = 10, kMetadataIndex_B = 32;
 
 void PutMetadata(ByteWriter* to, std::string_view name, const TextMap& values) {
   to->Record(Opcode::kMetadata, [&] {
@@ -25,7 +32,7 @@ void PutMetadata(ByteWriter* to, std::string_view name, const TextMap& values) {
 }  // namespace
 
 McapWriter::McapWriter(const std::filesystem::path& file, std::string_view profile, std::string_view library)
-    : file_(open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)) {
+    : file_(open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600)) {
   if (file_ < 0) {
     throw InputError(file.string() + ": cannot be written: " + std::strerror(errno) +
                      "; choose an existing folder in which you may write");
@@ -42,19 +49,31 @@ McapWriter::McapWriter(const std::filesystem::path& file, std::string_view profi
 McapWriter::~McapWriter() { Close(); }
 
 void McapWriter::Put(std::span<const std::uint8_t> bytes) {
-  while (!bytes.empty() && error_.empty()) {
-    const ssize_t written = write(file_, bytes.data(), bytes.size());
-    if (written < 0 && errno != EINTR) {
-      error_ = std::string("writing the recording failed: ") + std::strerror(errno);
-    }
-    if (written > 0) {
-      offset_ += static_cast<std::uint64_t>(written);
-      bytes = bytes.subspan(static_cast<std::size_t>(written));
-    }
+  if (is_torn_) return;
+  std::span<const std::uint8_t> rest = bytes;
+  while (!rest.empty()) {
+    const ssize_t written = write(file_, rest.data(), rest.size());
+    if (written > 0) rest = rest.subspan(static_cast<std::size_t>(written));
+    if (written >= 0 || errno == EINTR) continue;
+    if (error_.empty()) error_ = std::string("writing the recording failed: ") + std::strerror(errno);
+    // Half a record would hide everything behind it from a reader.
+    const auto end = static_cast<off_t>(offset_);
+    is_torn_ = rest.size() < bytes.size() && (ftruncate(file_, end) != 0 || lseek(file_, end, SEEK_SET) < 0);
+    return;
   }
+  offset_ += bytes.size();
+}
+
+std::uint64_t McapWriter::BytesToLimit() const {
+  rlimit limit{};
+  getrlimit(RLIMIT_FSIZE, &limit);
+  if (limit.rlim_cur == RLIM_INFINITY) return std::numeric_limits<std::uint64_t>::max();
+  const std::uint64_t used = offset_ + summary_B_ + kEnd_B;
+  return limit.rlim_cur > used ? limit.rlim_cur - used : 0;
 }
 
 std::uint16_t McapWriter::AddSchema(std::string_view name, std::string_view encoding, std::string_view text) {
+  if (!error_.empty()) return 0;
   record_.clear();
   ByteWriter to(&record_);
   to.Record(Opcode::kSchema, [&] {
@@ -64,6 +83,7 @@ std::uint16_t McapWriter::AddSchema(std::string_view name, std::string_view enco
     to.Text(text);
   });
   schemas_.insert(schemas_.end(), record_.begin(), record_.end());
+  summary_B_ += record_.size();
   Put(record_);
   return schema_count_;
 }
@@ -71,6 +91,7 @@ std::uint16_t McapWriter::AddSchema(std::string_view name, std::string_view enco
 std::uint16_t McapWriter::AddChannel(std::uint16_t schema, std::string_view topic, std::string_view message_encoding,
                                      const TextMap& metadata) {
   const auto number = static_cast<std::uint16_t>(counts_.size());
+  if (!error_.empty()) return number;
   counts_.push_back(0);
   record_.clear();
   ByteWriter to(&record_);
@@ -82,6 +103,7 @@ std::uint16_t McapWriter::AddChannel(std::uint16_t schema, std::string_view topi
     to.Texts(metadata);
   });
   channels_.insert(channels_.end(), record_.begin(), record_.end());
+  summary_B_ += record_.size() + kChannelCount_B;
   Put(record_);
   return number;
 }
@@ -91,8 +113,11 @@ void McapWriter::AddMetadata(std::string_view name, const TextMap& values) {
   record_.clear();
   ByteWriter to(&record_);
   PutMetadata(&to, name, values);
-  metadata_.push_back({offset_, record_.size(), std::string(name)});
+  const std::uint64_t start = offset_;
   Put(record_);
+  if (offset_ == start) return;  // There was no room.
+  metadata_.push_back({start, record_.size(), std::string(name)});
+  summary_B_ += kMetadataIndex_B + name.size();
 }
 
 void McapWriter::Write(std::uint16_t channel, std::uint32_t sequence, std::uint64_t log_time_ns,
@@ -118,11 +143,16 @@ void McapWriter::EndChunk() {
 }
 
 void McapWriter::Append(const PackedChunk& chunk) {
-  const std::uint64_t start = offset_;
-  Put(chunk.bytes);
-  if (!error_.empty()) {
+  if (!error_.empty()) return;
+  if (chunk.bytes.size() > BytesToLimit()) {
+    error_ = "writing the recording failed: the file has reached the limit of this process on the size of a file, " +
+             std::to_string((offset_ + BytesToLimit()) / 1'000'000) + " MB (ulimit -f)";
     return;
   }
+  const std::uint64_t start = offset_;
+  Put(chunk.bytes);
+  if (!error_.empty()) return;
+  summary_B_ += kChunkIndex_B + kChunkPart_B * chunk.parts.size();
   first_ns_ = chunks_.empty() ? chunk.first_ns : std::min(first_ns_, chunk.first_ns);
   last_ns_ = std::max(last_ns_, chunk.last_ns);
   for (const PackedChunk::Part& part : chunk.parts) {
@@ -157,9 +187,12 @@ std::vector<std::uint8_t> McapWriter::Statistics() const {
   return record;
 }
 
-/// Writes the groups of records, the position of each group, and the footer.
-void McapWriter::PutSummary() {
-  const std::uint64_t start = offset_;
+// The groups of records, the position of each group, and the footer.
+void McapWriter::PutEnd() {
+  record_.clear();
+  ByteWriter end(&record_);
+  end.Record(Opcode::kDataEnd, [&] { end.Number(std::uint32_t{0}); });  // 0: no checksum over the whole file.
+  const std::uint64_t start = offset_ + record_.size();
   std::vector<std::uint8_t> summary, offsets;
   ByteWriter to(&summary), to_offsets(&offsets);
   const auto group = [&](Opcode opcode, const auto& put) {
@@ -218,7 +251,8 @@ void McapWriter::PutSummary() {
   to.Number(offset_start);
   to.Number(libdeflate_crc32(0, summary.data(), summary.size()));
   to.Bytes(kMcapMagic.data(), kMcapMagic.size());
-  Put(summary);
+  end.Bytes(summary.data(), summary.size());
+  Put(record_);
 }
 
 void McapWriter::Close() {
@@ -226,11 +260,7 @@ void McapWriter::Close() {
     return;
   }
   EndChunk();
-  record_.clear();
-  ByteWriter to(&record_);
-  to.Record(Opcode::kDataEnd, [&] { to.Number(std::uint32_t{0}); });  // 0: no checksum over the whole file.
-  Put(record_);
-  PutSummary();
+  PutEnd();
   close(file_);
   file_ = -1;
 }

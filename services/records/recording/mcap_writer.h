@@ -18,10 +18,12 @@ using TextMap = std::map<std::string, std::string>;
 
 /// What is written stays readable: each schema, channel and complete chunk is passed to the operating system at once,
 /// so after a kill the file contains all chunks that were ended before it. Nothing throws once the file is open; the
-/// first failure (a full disk) is kept in error() and nothing more is written.
+/// first failure (a full disk, the process's limit on the size of a file) is kept in error(), and no message is added
+/// after it. The file then ends with its last complete record; Close() adds the summary if there is room for it.
 class McapWriter {
  public:
-  /// Creates or replaces `file`. Throws InputError if that fails.
+  /// Creates or replaces `file`, which only its owner may read: a recording is data of a trainee. Throws InputError if
+  /// that fails.
   McapWriter(const std::filesystem::path& file, std::string_view profile, std::string_view library);
   /// Closes the file, with its summary.
   ~McapWriter();
@@ -49,6 +51,10 @@ class McapWriter {
   /// Number of messages in the chunks that were ended.
   [[nodiscard]] std::uint64_t message_count() const { return message_count_; }
   [[nodiscard]] std::uint64_t bytes_written() const { return offset_; }
+  /// Number of bytes that can be added before the limit of the process on the size of a file (RLIMIT_FSIZE), with room
+  /// for the summary.
+  [[nodiscard]] std::uint64_t BytesToLimit() const;
+  [[nodiscard]] bool closed() const { return file_ < 0; }
 
  private:
   struct ChunkPlace {
@@ -61,13 +67,17 @@ class McapWriter {
     std::string name;
   };
 
+  /// Writes whole records. If that fails, the file is cut to what it was before.
   void Put(std::span<const std::uint8_t> bytes);
-  void PutSummary();
+  /// Writes the end of the data, the summary and the footer, all or nothing.
+  void PutEnd();
   [[nodiscard]] std::vector<std::uint8_t> Statistics() const;
 
   int file_ = -1;
   std::string error_;
+  bool is_torn_ = false;  ///< The file ends within a record, which could not be removed.
   std::uint64_t offset_ = 0, message_count_ = 0;
+  std::uint64_t summary_B_ = 0;               ///< Upper limit of the size of the summary so far.
   std::uint64_t first_ns_ = 0, last_ns_ = 0;  ///< Log times over all messages.
   std::vector<std::uint8_t> chunk_;           ///< Messages of the open chunk.
   ChunkPacker packer_;

@@ -2,68 +2,18 @@
 #include "services/records/recorder/recorder.h"
 
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <cstring>
 #include <thread>
 
 #include "services/records/recorder/dump_writer.h"
 #include "services/records/recorder/priorities.h"
-#include "services/records/recorder/recorder_health.h"
 #include "services/records/recording/free_name.h"
-#include "services/records/recording/mcap_reader.h"
 #include "services/transport/bus/topics.h"
+#include "tests/unit/recorder/recorder_fixture.h"
 
 namespace fulcrum::recorder {
 namespace {
-
-namespace fs = std::filesystem;
-using recording::McapMessage;
-using recording::McapReader;
-
-constexpr std::int64_t kMs = 1'000'000;
-constexpr std::array<std::byte, 4> kHead{std::byte{0}, std::byte{1}, std::byte{0}, std::byte{0}};
-
-struct Read {
-  std::uint16_t channel;
-  std::uint32_t sequence;
-  std::size_t size;
-  std::uint64_t log_time_ns, publish_time_ns;
-};
-
-class RecorderTest : public testing::Test {
- protected:
-  RecorderTest() { fs::create_directory(folder_); }
-  ~RecorderTest() override { fs::remove_all(folder_); }
-
-  RecorderSettings Settings() const {
-    RecorderSettings settings;
-    settings.file = folder_ / "recording.mcap";
-    settings.library = "test";
-    settings.metadata = {{"session", {{"scene", "small"}}}};
-    settings.describe = [](const bus::WriterGuid& writer) {
-      return recording::TextMap{{"node", "node " + std::to_string(writer[0])}};
-    };
-    return settings;
-  }
-  /// A sample of `size` bytes, encapsulation included, at `now_ns`.
-  static void Send(Recorder* recorder, TopicId topic, std::uint8_t writer, std::uint64_t sequence,
-                   std::size_t size = 40, std::int64_t now_ns = 0, bool whole = true) {
-    const std::vector<std::byte> body(size - kHead.size(), static_cast<std::byte>(sequence));
-    bus::RawSample sample{topic, {writer}, sequence, 1000 + now_ns, now_ns, kHead, body};
-    recorder->Receive(sample, [whole] { return whole; });
-  }
-  static std::vector<Read> ReadAll(McapReader* reader) {
-    std::vector<Read> all;
-    McapMessage m;
-    while (reader->Next(&m)) all.push_back({m.channel, m.sequence, m.data.size(), m.log_time_ns, m.publish_time_ns});
-    return all;
-  }
-
-  const fs::path folder_ = fs::path(testing::TempDir()) / ("recorder_" + std::to_string(getpid()));
-};
 
 TEST_F(RecorderTest, KeepsTopicsAndWritersApartAndTellsOfThem) {
   {
@@ -295,53 +245,6 @@ TEST_F(RecorderTest, ADumpThatCannotBeWrittenDoesNotEndTheRecording) {
   recorder.Close(kMs);
   McapReader reader(folder_ / "recording.mcap");
   EXPECT_EQ(ReadAll(&reader).size(), 1u);
-}
-
-TEST(RecorderHealth, IsDegradedOnceWritingHasFailed) {
-  RecorderStats stats;
-  stats.received = 10;
-  stats.missed = 2;
-  stats.file_B = 3'000'000;
-  Health health;
-  FillHealth(stats, &health);
-  ASSERT_EQ(health.metrics.size(), 5u);
-  EXPECT_EQ(health.metrics[0].value, 10);
-  EXPECT_DOUBLE_EQ(health.metrics[1].value, 3);
-  EXPECT_EQ(health.metrics[2].value, 2);
-  EXPECT_NE(health.state, HealthState::kDegraded);
-  EXPECT_EQ(health.last_error, "");
-  stats.unwritten = 4;
-  stats.error = "File too large";
-  FillHealth(stats, &health);
-  EXPECT_EQ(health.metrics[0].value, 6);
-  EXPECT_EQ(health.state, HealthState::kDegraded);
-  EXPECT_EQ(health.last_error, "File too large: 4 samples are not in the file");
-}
-
-TEST_F(RecorderTest, AFullDiskIsToldAndCountedAndNeverThrows) {
-  // A limit on the size of files is what an unprivileged test can have of a full disk.
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  signal(SIGXFSZ, SIG_IGN);
-  const rlimit limit{200'000, before.rlim_max};
-  Recorder recorder(Settings());
-  setrlimit(RLIMIT_FSIZE, &limit);
-  std::uint64_t noise = 1;
-  for (std::uint64_t i = 1; i <= 20; ++i) {
-    std::vector<std::byte> body(100'000);
-    for (std::byte& b : body)
-      b = static_cast<std::byte>((noise = noise * 6364136223846793005u + 1442695040888963407u) >> 56);
-    recorder.Receive({TopicId::kTissueFrame, {1}, i, 0, 0, kHead, body}, [] { return true; });
-    recorder.Flush(static_cast<std::int64_t>(i) * 1000 * kMs);
-  }
-  setrlimit(RLIMIT_FSIZE, &before);
-  EXPECT_NE(recorder.stats().error.find("File too large"), std::string::npos) << recorder.stats().error;
-  EXPECT_EQ(recorder.stats().received, 20u);
-  EXPECT_GE(recorder.stats().unwritten, 18u);
-  EXPECT_EQ(recorder.topic_stats(TopicId::kTissueFrame).lost, recorder.stats().unwritten);
-  recorder.Close(0);
-  McapReader reader(folder_ / "recording.mcap");
-  EXPECT_EQ(ReadAll(&reader).size(), 20 - recorder.stats().unwritten);
 }
 
 TEST_F(RecorderTest, ThreadsOfTheBusDoNotDisturbOneAnother) {
