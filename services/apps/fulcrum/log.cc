@@ -9,6 +9,7 @@
 #include "services/base/core/error.h"
 #include "services/records/log_tools/cut_map.h"
 #include "services/records/log_tools/cut_picture.h"
+#include "services/records/log_tools/merge.h"
 #include "services/records/log_tools/tools.h"
 #include "services/records/recording/recorded_scene.h"
 #include "services/scene/format/scene_file.h"
@@ -148,6 +149,18 @@ ExitCode Recover(const po::variables_map& values, const Files& files) {
   return ExitCode::kDone;
 }
 
+ExitCode Merge(const po::variables_map&, const Files& files) {
+  if (files.size() < 2) {
+    throw InputError("merge needs the file to write and at least one recording; see fulcrum log merge --help");
+  }
+  const log_tools::MergeResult result = log_tools::Merge({files.begin() + 1, files.end()}, files[0]);
+  for (const std::string& note : result.notes) {
+    std::cout << "! " << note << '\n';
+  }
+  std::cout << files[0].string() << ": " << result.messages << " messages\n";
+  return ExitCode::kDone;
+}
+
 void AddMapOptions(po::options_description* options) {
   options->add_options()  //
       ("out", po::value<std::string>()->value_name("FILE"),
@@ -192,6 +205,8 @@ constexpr std::array kTools{
          AddDiffOptions, Diff},
     Tool{"recover", "recover FILE... [options]",
          "Copy the readable part of a truncated or damaged file to a valid one.", AddRecoverOptions, Recover},
+    Tool{"merge", "merge OUT FILE...",
+         "Join the recordings of one session, after its recorder was restarted, into the file OUT.", NoOptions, Merge},
     Tool{"map", "map FILE [options]", "Draw a map of the cut and print its figures.", AddMapOptions, Map},
 };
 

@@ -1,8 +1,11 @@
 #include "services/session/supervisor/session_end.h"
 
+#include <cstdint>
 #include <exception>
 #include <filesystem>
 
+#include "services/base/core/error.h"
+#include "services/records/log_tools/merge.h"
 #include "services/session/supervisor/clip.h"
 #include "services/session/supervisor/cut_map_file.h"
 #include "services/session/supervisor/report.h"
@@ -43,6 +46,14 @@ void Try(double time_s, Verdict* verdict, const Write& write) {
   } catch (const std::exception& error) {
     verdict->Fail(time_s, ExitCode::kFailure, error.what());
   }
+}
+
+/// Joins the files of a recorder that was restarted. A line for the terminal; empty: there is one file.
+std::string JoinRecordings(const SessionSetup& setup) {
+  if (setup.recording.empty()) return {};
+  const auto keep_free_B = static_cast<std::uint64_t>(1e6 * setup.settings.cart.recorder.keep_free_MB);
+  const std::string done = log_tools::JoinSegments(setup.recording, keep_free_B);
+  return done.empty() ? done : done + "\n";
 }
 
 }  // namespace
@@ -86,6 +97,8 @@ std::string WriteResults(SessionSetup* setup, const SessionRecord& record, doubl
     // Without the row the figures are still in assessment.json.
     Try(reached_s, verdict, [&] { setup->training->Add(TrainingRowOf(outcome)); });
   }
+  std::string joined;
+  Try(reached_s, verdict, [&] { joined = JoinRecordings(*setup); });
   Try(reached_s, verdict, [&] { outcome.cut_map = WriteCutMap(setup->recording, setup->scene.view(), folder.path); });
   Try(reached_s, verdict, [&] { (void)MakeClip(folder.frames, clip, folder.logs / "clip.log"); });
   // Written again when one of them cannot be written, so that the other one says so.
@@ -96,7 +109,7 @@ std::string WriteResults(SessionSetup* setup, const SessionRecord& record, doubl
     Try(reached_s, verdict, [&] { WriteFile(report, ReportHtml(outcome, record, folder.frames, clip)); });
     Try(reached_s, verdict, [&] { WriteFile(folder.path / "summary.json", SummaryJson(outcome, record)); });
   } while (verdict->faults().size() != known);
-  return "\n" + FinalTable(outcome, record) + "report: " + report.string();
+  return "\n" + FinalTable(outcome, record) + joined + "report: " + report.string();
 }
 
 }  // namespace fulcrum::supervisor
