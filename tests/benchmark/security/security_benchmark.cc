@@ -18,6 +18,7 @@
 #include "tests/benchmark/report.h"
 #include "tests/benchmark/security/foreign_session.h"
 #include "tests/benchmark/security/keys_cost.h"
+#include "tests/benchmark/security/listed_attempts.h"
 #include "tests/support/intruder.h"
 
 namespace fulcrum {
@@ -36,6 +37,14 @@ void Attempts(benchmark::Report* report, const fs::path& scratch) {
                  attempt.name.c_str(), attempt.exit_code, attempt.wanted_exit_code,
                  attempt.came_through ? "came through" : "nothing came through",
                  attempt.reported ? "reported" : "not reported", attempt.last_line.c_str());
+  }
+  for (const ListedAttempt& attempt : ListedAttempts()) {
+    std::string said;
+    const bool held = IsRefused(attempt, &said);
+    ++all;
+    refused += held ? 1 : 0;
+    std::fprintf(stderr, "%s %s: %s in %s\n%s", held ? "refused" : "NOT REFUSED", attempt.name, attempt.test,
+                 attempt.program, held ? "" : said.c_str());
   }
   report->Add("security.refused", 100.0 * refused / all, "%");
   report->Add("security.attempts", all, "");
