@@ -151,6 +151,11 @@ void PutVolume(const VolumeField& volume, Writer* writer) {
 bool GetVolume(Reader* reader, VolumeField* volume) {
   VolumeField::Totals totals;
   if (!reader->GetValue(&totals)) return false;
+  const VolumeLedger& ledger = totals.ledger;
+  if (!std::isfinite(ledger.joule + ledger.from_sheet + ledger.perfused + ledger.dropped + ledger.quarantined) ||
+      !(totals.deepest_burn_m >= 0 && std::isfinite(totals.deepest_burn_m))) {
+    return false;
+  }
   const auto get = [&](std::span<float> rows) { return reader->Get(rows); };
   std::int32_t last = -1;
   for (std::uint32_t n = 0; n < totals.brick_count; ++n) {

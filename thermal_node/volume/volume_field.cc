@@ -370,6 +370,7 @@ void VolumeField::FinishRestore(Brick* brick) {
 void VolumeField::Clear() {
   awake_.clear();
   for (auto& brick : bricks_) brick.reset();
+  RestoreTotals({});
 }
 
 }  // namespace fulcrum::thermal
