@@ -21,12 +21,15 @@ ExitCode Host(const Words& words) {
           "DDS domain between the hosts, 101 to 200, the same on both (default: 100 more than --domain)")(
           "out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder for the session folders")(
           "cache", po::value<std::string>()->value_name("DIR"),
-          "folder of received scenes, named by their hash (default: the cache of compiled scenes)")(
+          "folder of received scenes, named by their hash (default: received, in the cache of compiled scenes)")(
           "keys", po::value<std::string>()->value_name("DIR"),
-          "folder of a secured cart's keys, made by fulcrum keys init (default: not secured)")(
+          "folder of the link's keys, made by fulcrum keys init on one machine and copied to the other (default: that "
+          "of the cart file, else the default folder of fulcrum keys)")(
+          "insecure-link", "no keys on the link to --peer, for a closed bench; also give it to fulcrum up")(
           "window", "also show the picture in a window")(
           "quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),
           "quality of the picture: auto, low, high");
+  AddCart(&options);
   AddDomain(&options);
   const Arguments arguments = Parse("host", words, options);
   if (arguments.help) {
@@ -44,12 +47,15 @@ ExitCode Host(const Words& words) {
   if (values.count("nodes") != 0) {
     settings.allowed = link::NodesFromNames(text("nodes"));
   }
-  if (values.count("keys") != 0) {
-    settings.far.keys = std::filesystem::absolute(text("keys"));
+  if (const std::filesystem::path cart = CartOf(arguments); !cart.empty()) {
+    settings.cart = config::LoadCart(cart);
   }
+  settings.far.keys = link::KeysOfLink(text("keys"), settings.cart ? settings.cart->security.keys : "",
+                                       values.count("insecure-link") != 0);
   settings.out = text("out");
   settings.programs = runtime::ProgramFolder();
-  settings.cache = values.count("cache") != 0 ? std::filesystem::path(text("cache")) : SceneCache(settings.programs);
+  settings.cache =
+      values.count("cache") != 0 ? std::filesystem::path(text("cache")) : SceneCache(settings.programs) / "received";
   settings.window = values.count("window") != 0;
   settings.quality = text("quality");
   if (settings.quality != "auto" && settings.quality != "low" && settings.quality != "high") {

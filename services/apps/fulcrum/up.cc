@@ -62,6 +62,11 @@ ExitCode Up(const Words& words) {
           "peer", po::value<std::string>()->value_name("ADDR"),
           "address of the host that runs the nodes of --remote; start fulcrum host --peer (this machine) there")(
           "remote", po::value<std::string>()->value_name("NODE,..."), "nodes that run on the host --peer")(
+          "keys", po::value<std::string>()->value_name("DIR"),
+          "folder of the link's keys, made by fulcrum keys init and copied to the host --peer (default: that of the "
+          "cart "
+          "file, else the default folder of fulcrum keys)")(
+          "insecure-link", "no keys on the link to --peer, for a closed bench; also give it to fulcrum host")(
           "address", po::value<std::string>()->value_name("ADDR"),
           "own address on the network of the peer (default: that of the interface to --peer)")(
           "link-domain", po::value<int>()->value_name("N"),
@@ -107,6 +112,11 @@ ExitCode Up(const Words& words) {
   if (values.count("peer") != values.count("remote")) {
     throw InputError("--peer and --remote must be given together: the host, and the nodes that run there");
   }
+  for (const char* option : {"keys", "insecure-link"}) {
+    if (values.count(option) != 0 && values.count("peer") == 0) {
+      throw InputError(std::string("--") + option + " is about the link to another host and goes with --peer");
+    }
+  }
   if (values.count("peer") != 0) {
     settings.peer = values["peer"].as<std::string>();
     settings.remote = link::NodesFromNames(values["remote"].as<std::string>());
@@ -115,6 +125,8 @@ ExitCode Up(const Words& words) {
     // Invalid addresses are refused here, before any node is started.
     (void)link::FarSettingsFor(bus::FarSide::kCart, settings.peer, settings.address, settings.cart.domain,
                                settings.link_domain);
+    settings.link_keys = link::KeysOfLink(values.count("keys") != 0 ? values["keys"].as<std::string>() : "",
+                                          settings.cart.security.keys, values.count("insecure-link") != 0);
     if (settings.standby && (settings.remote >> static_cast<unsigned>(NodeId::kPhysics) & 1u) != 0) {
       throw InputError("--standby cannot be combined with --remote physics_node");
     }

@@ -149,6 +149,10 @@ std::vector<Warning> WarningsOf(const SituationReport& situation) {
     warnings.push_back({"fault", "The console cannot join the session: " + situation.bus_trouble,
                         "Start console and session from the same installation."});
   }
+  if (situation.insecure_link) {
+    warnings.push_back({"fault", "The link to the other computer has no keys: every computer on its network can join.",
+                        "Start both with keys, without --insecure-link: fulcrum keys init."});
+  }
   for (const NodeReport& report : situation.nodes) WarnOfNode(report, situation, &warnings);
   if (recent(ThermalEventKind::kQuarantine)) {
     warnings.push_back({"note", "A piece of tissue had to be reset.",

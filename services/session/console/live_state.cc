@@ -83,6 +83,8 @@ std::string WarningsJson(const SessionWatch& watch, const std::vector<NodeReport
     situation.events_ns[i] = watch.event_ns(static_cast<ThermalEventKind>(i));
   }
   situation.bus_trouble = watch.trouble();
+  situation.insecure_link =
+      watch.alive() && supervisor::MetricOf(watch.health(NodeId::kSupervisor), "insecure_link") > 0;
   Json list('[');
   for (const Warning& warning : WarningsOf(situation)) {
     list.Item(Json('{').Text("level", warning.level).Text("text", warning.text).Text("todo", warning.todo).Done());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -10,12 +11,15 @@
 #include "services/base/runtime/realtime.h"
 #include "services/nodes/app/cart_security.h"
 #include "services/scene/format/scene_file.h"
+#include "services/session/supervisor/command_desk.h"
 #include "services/session/supervisor/crash_watch.h"
 #include "services/session/supervisor/domain_guard.h"
 #include "services/session/supervisor/node_process.h"
 #include "services/session/supervisor/node_starter.h"
+#include "services/session/supervisor/offered_cart.h"
 #include "services/session/supervisor/outcome.h"
 #include "services/session/supervisor/progress.h"
+#include "services/session/supervisor/refusal_journal.h"
 #include "services/session/supervisor/session_folder.h"
 #include "services/session/supervisor/watch_times.h"
 #include "services/transport/bus/access.h"
@@ -38,6 +42,7 @@ class Host {
         link_(link::LinkSettings{.far = settings.far, .offer = {}, .scene = {}}) {}
 
   ExitCode Run() {
+    if (settings_.far.keys.empty()) progress_.Say(std::string("! ") + link::kInsecureLink);
     progress_.Say("waiting for the cart at " + settings_.far.peer + ", as " + settings_.far.address);
     if (!WaitForSession() || !WaitForScene()) return ExitCode::kDone;
     Begin();
@@ -51,10 +56,16 @@ class Host {
     if (const std::string mismatch = link_.mismatch(); !mismatch.empty()) throw MismatchError(mismatch);
   }
 
+  void SayRefusals() {
+    refusals_.Take({link_.refusals(), local_ ? local_->refusals() : bus::Refusals()},
+                   [this](const std::string& text) { progress_.Say("! refused: " + text); });
+  }
+
   /// Returns false when a stop signal arrived.
   bool WaitForSession() {
     while (!runtime::ShouldStop()) {
       Check();
+      SayRefusals();
       const link::Link::Session session = link_.session();
       if (session.number != 0 && !session.over) {
         session_ = session;
@@ -92,10 +103,12 @@ class Host {
   void Begin() {
     const link::Offer& offer = session_.offer;
     const std::filesystem::path file = link::CachedScene(settings_.cache, offer.scene_hash);
-    config::CartConfig cart = config::LoadCartText(offer.cart_yaml, "the cart of " + settings_.far.peer);
+    config::CartConfig cart = CartOnHost(offer, settings_.far.peer, settings_.cart);
     cart.domain = settings_.domain;
     cart.security.keys = settings_.far.keys;  // Each host has its own folder of keys.
+    cart.security.encrypt = cart.security.encrypt && !settings_.far.keys.empty();
     scene_.emplace(file);
+    link::CheckReceivedScene(scene_->view(), offer);
     folder_ = MakeSessionFolder(settings_.out, file, *scene_, cart,
                                 "  session: " + offer.session_id + "\n  peer: " + settings_.far.peer +
                                     "\n  nodes: " + link::NamesOfNodes(offer.nodes) + "\n");
@@ -106,6 +119,13 @@ class Host {
         .domain = settings_.domain, .node_name = "host", .shared_memory = memory_, .security = security});
     healths_in_ = local_->MakeInput<Health>();
     link_.Join(&*local_, ~offer.nodes);
+    desk_.emplace(memory_, guard_, settings_.cart ? settings_.cart->security.group : std::string(),
+                  std::vector<CommandDesk::Verb>{
+                      {"restart", [this](const std::string& name, std::int64_t now) { return Restart(name, now); }},
+                      {"down", [](const std::string&, std::int64_t) {
+                         runtime::RequestStop();
+                         return CommandAnswer{true, "ending the nodes of this host"};
+                       }}});
     last_turn_ns_ = MonotonicNs();
     UpSettings as_there;
     as_there.programs = settings_.programs;
@@ -120,6 +140,16 @@ class Host {
     for (NodeProcess& node : nodes_) node.Start(MonotonicNs());
     progress_.Say("session " + offer.session_id + ": " + link::NamesOfNodes(offer.nodes) + " in domain " +
                   std::to_string(settings_.domain) + ", logs in " + folder_.logs.string());
+  }
+
+  CommandAnswer Restart(const std::string& name, std::int64_t now) {
+    for (NodeProcess& node : nodes_) {
+      if (name != NodeName(node.id()) || !node.running()) continue;
+      const CommandAnswer answer{true, "restarting " + name + " (pid " + std::to_string(node.pid()) + ")"};
+      node.AskRestart(now);
+      return answer;
+    }
+    return {false, "no running node \"" + name + "\" on this host"};
   }
 
   /// True when the cart has ended the session or offers another one. A broken connection does not end the session.
@@ -149,7 +179,9 @@ class Host {
       sweep_ns_ = 0;
       bus::SweepSharedMemory(memory_);
     }
+    desk_->Serve(now);
     Check();
+    SayRefusals();
     ShowProgress(now);
     std::this_thread::sleep_for(kLoopPeriod);
   }
@@ -178,7 +210,8 @@ class Host {
                             : "clock " + Fixed(status.offset_us, 0) + " us · round trip " +
                                   Fixed(1e-3 * status.round_trip_us, 2) + " ms · in " +
                                   Fixed(status.received_kB_per_s, 0) + " kB/s · out " + Fixed(status.sent_kB_per_s, 0) +
-                                  " kB/s · lost " + std::to_string(status.lost) + " · " + std::to_string(alive) + "/" +
+                                  " kB/s · lost " + std::to_string(status.lost) + " · refused " +
+                                  std::to_string(status.refused) + " · " + std::to_string(alive) + "/" +
                                   std::to_string(nodes_.size()) + " nodes");
   }
 
@@ -191,12 +224,16 @@ class Host {
         [this](const SupervisedNode& node, const char* done) {
           progress_.Say(std::string("! ") + NodeName(node.id()) + " did not end in time and " + done);
         });
+    desk_.reset();
     link_.Leave();
     healths_in_.reset();
     local_.reset();
     bus::RemoveSharedMemory(memory_);
     RemoveCheckpoints(folder_);
     crash_watch_->Done();
+    // The cache keeps a bounded number of scenes; this folder would keep each of them for good.
+    std::error_code ignored;
+    std::filesystem::remove(folder_.scene, ignored);
   }
 
   const HostSettings settings_;
@@ -204,6 +241,7 @@ class Host {
   const std::filesystem::path memory_;
   std::optional<CrashWatch> crash_watch_;
   Progress progress_{false};
+  std::optional<CommandDesk> desk_;
   std::optional<bus::DdsParticipant> local_;
   link::Link link_;  ///< Ends before the bus that it has ports of.
   link::Link::Session session_;
@@ -214,6 +252,7 @@ class Host {
   Health health_;
   std::int64_t last_turn_ns_ = 0, sweep_ns_ = 0;
   std::optional<ExitCode> failed_;
+  RefusalJournal refusals_;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "services/base/config/cart.h"
@@ -19,7 +20,9 @@ struct HostSettings {
   std::filesystem::path out;             ///< Folder in which the session folder is made.
   std::filesystem::path programs;        ///< Folder of the node programs.
   std::filesystem::path cache;           ///< Folder of received scenes, named by their hash.
-  std::string quality = "auto";          ///< Quality of the picture: auto, low, high.
+  /// Cart file of this host: its handles, pedal and devices replace those of the session's cart.
+  std::optional<config::CartConfig> cart;
+  std::string quality = "auto";  ///< Quality of the picture: auto, low, high.
   bool window = false;
 };
 

@@ -157,6 +157,7 @@ std::string FinalTable(const SessionOutcome& outcome, const SessionRecord& recor
                   Fixed(figure.value, figure.decimals).c_str(), figure.unit);
     text += line.data();
   }
+  for (const std::string& notice : outcome.notices) text += "! " + notice + "\n";
   for (const RestartRecord& restart : record.restarts()) {
     text += std::string("restart at ") + Fixed(restart.time_s, 1) + " s: " + NodeName(restart.node) + " " +
             restart.cause +

@@ -31,10 +31,11 @@ struct SessionOutcome {
   ExitCode exit_code = ExitCode::kDone;
   /// First recording of all topics; each restart of the recorder adds a file beside it, "-2" and so on. Empty: none.
   std::filesystem::path recording;
-  std::filesystem::path cut_map;    ///< Picture of what was cut; empty: no recording, or nothing cut.
-  std::optional<ScoreSheet> sheet;  ///< None: the scene has no section `assessment`.
-  std::string trainee;              ///< Empty: not named.
-  std::vector<Fault> faults;        ///< Empty: all well.
+  std::filesystem::path cut_map;     ///< Picture of what was cut; empty: no recording, or nothing cut.
+  std::optional<ScoreSheet> sheet;   ///< None: the scene has no section `assessment`.
+  std::string trainee;               ///< Empty: not named.
+  std::vector<std::string> notices;  ///< What the operator must know of this session, one line each.
+  std::vector<Fault> faults;         ///< Empty: all well.
 
   /// All faults in one line; empty: all well.
   [[nodiscard]] std::string verdict() const;

@@ -1,9 +1,12 @@
 #include "services/session/supervisor/remote_nodes.h"
 
 #include <algorithm>
+#include <utility>
 
-#include "services/nodes/app/cart_security.h"
+#include "services/base/core/error.h"
+#include "services/session/supervisor/offered_cart.h"
 #include "services/transport/bus/access.h"
+#include "services/transport/bus/gate.h"
 #include "services/transport/link/health.h"
 #include "services/transport/link/options.h"
 #include "services/transport/link/scene_transfer.h"
@@ -13,7 +16,7 @@ namespace {
 
 bus::FarSettings FarOf(const UpSettings& up) {
   bus::FarSettings far = link::FarSettingsFor(bus::FarSide::kCart, up.peer, up.address, up.cart.domain, up.link_domain);
-  far.keys = up.cart.security.keys;
+  far.keys = up.link_keys;
   return far;
 }
 
@@ -27,21 +30,26 @@ link::Offer OfferOf(const SessionSetup& setup) {
   offer.scene_B = facts.size_B;
   offer.scene_checksum = facts.checksum;
   for (const NodeId node : setup.remote_ids) offer.nodes |= 1u << static_cast<unsigned>(node);
-  offer.cart_yaml = config::CartToYaml(setup.settings.cart);
+  OfferedCart offered = CartForHost(setup.settings.cart, offer.nodes);
+  offer.cart_yaml = config::CartToYaml(offered.cart);
+  offer.withheld = std::move(offered.withheld);
+  if (!link::IsPlainName(offer.session_id, bus::kMaxSessionId) ||
+      !link::IsPlainName(offer.scene_name, bus::kMaxSceneName)) {
+    throw InputError("scene \"" + offer.scene_name +
+                     "\": a scene on two hosts needs a name of printable ASCII characters without \"/\"");
+  }
   return offer;
 }
 
 }  // namespace
 
 RemoteNodes::RemoteNodes(const SessionSetup& setup, bus::DdsParticipant* participant) : setup_(setup) {
-  const config::CartConfig& cart = setup.settings.cart;
   link_.emplace(link::LinkSettings{.far = FarOf(setup.settings), .offer = OfferOf(setup), .scene = setup.folder.scene});
-  if (!cart.security.keys.empty()) {
-    link_bus_ =
-        std::make_unique<bus::DdsParticipant>(bus::DdsSettings{.domain = cart.domain,
-                                                               .node_name = "link",
-                                                               .shared_memory = setup.memory,
-                                                               .security = app::SecurityOf(cart, bus::kLinkIdentity)});
+  if (const bus::Security security = bus::AnnouncedSecurity(setup.memory, bus::kLinkIdentity); security.on()) {
+    link_bus_ = std::make_unique<bus::DdsParticipant>(bus::DdsSettings{.domain = setup.settings.cart.domain,
+                                                                       .node_name = "link",
+                                                                       .shared_memory = setup.memory,
+                                                                       .security = security});
     participant = link_bus_.get();
   }
   link_->Join(participant, link_->settings().offer->nodes);
@@ -51,8 +59,8 @@ std::optional<CommandAnswer> RemoteNodes::Restart(const std::string& name) const
   const auto node =
       std::find_if(setup_.remote_ids.begin(), setup_.remote_ids.end(), [&](NodeId id) { return name == NodeName(id); });
   if (node == setup_.remote_ids.end()) return std::nullopt;
-  return CommandAnswer{false, name + " runs on " + setup_.settings.peer + ": restart it there (fulcrum restart " +
-                                  name + "); no command travels to another host"};
+  return CommandAnswer{false, name + " runs on the host " + setup_.settings.peer +
+                                  ", and no command crosses the link: run fulcrum restart " + name + " there"};
 }
 
 void RemoteNodes::AddTo(Health* health) { link::FillHealth(link_->status(), health); }

@@ -20,7 +20,7 @@ class RemoteNodes {
   /// @param participant the supervisor's; must outlive this.
   RemoteNodes(const SessionSetup& setup, bus::DdsParticipant* participant);
 
-  /// Reply to a command to restart a node that runs there, where the command must be given. nullopt: no such node.
+  /// Reply to the command to restart a node: no command crosses the link. nullopt: no such node runs there.
   [[nodiscard]] std::optional<CommandAnswer> Restart(const std::string& name) const;
 
   /// Reason, in one line, why the two sides cannot work together; empty: they can.

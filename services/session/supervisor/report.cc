@@ -59,6 +59,7 @@ std::string Header(const SessionOutcome& outcome) {
                                    std::to_string(outcome.nodes.size()) + " nodes · " + outcome.machine);
   html += Tag(std::string("div class='verdict ") + (good ? "good'" : "bad'"),
               good ? "✓ all well" : "✗ " + outcome.verdict());
+  for (const std::string& notice : outcome.notices) html += Tag("p class='sub'", "! " + notice);
   return html;
 }
 

@@ -30,6 +30,7 @@ SessionOutcome OutcomeOf(const SessionSetup& setup, double reached_s) {
   outcome.wanted_s = setup.end_s;
   outcome.recording = setup.recording;
   outcome.trainee = setup.settings.trainee;
+  outcome.notices = setup.notices;
   return outcome;
 }
 

@@ -55,6 +55,15 @@ std::string RunYaml(const UpSettings& settings, double end_s) {
          "\n";
 }
 
+std::vector<std::string> NoticesOf(const UpSettings& settings) {
+  std::vector<std::string> notices;
+  if (settings.remote != 0 && settings.link_keys.empty()) notices.emplace_back(link::kInsecureLink);
+  if (settings.open_bus) {
+    notices.emplace_back("open bus: every process of this machine can read and write the topics of this session");
+  }
+  return notices;
+}
+
 /// Opens the cart's directory for a new session. Without keys of the cart file the session makes its own there.
 std::filesystem::path OpenMemory(const UpSettings& up) {
   bus::Security security = app::SecurityOf(up.cart, NodeName(NodeId::kSupervisor));
@@ -86,6 +95,7 @@ SessionSetup::SessionSetup(const UpSettings& up)
       scene(up.scene),
       end_s(EndOfSession(up, scene.view())),
       keys_warning(CheckSessionKeys(up.cart, NodesOf(scene.view(), up), std::time(nullptr))),
+      notices(NoticesOf(up)),
       guard(up.cart.domain),
       opened(OpenMemory(up)),
       memory(opened.path),

@@ -51,6 +51,7 @@ struct Supervisor::Impl {
       : setup(up), crash_watch(up.cart.domain, setup.memory, setup.folder), status(!up.attach.empty()) {
     SweepKilledSessions(up.cart.domain);
     if (!setup.keys_warning.empty()) status.Say("! " + setup.keys_warning);
+    for (const std::string& notice : setup.notices) status.Say("! " + notice);
     participant.emplace(bus::DdsSettings{.domain = up.cart.domain,
                                          .node_name = "supervisor",
                                          .shared_memory = setup.memory,
@@ -188,6 +189,7 @@ struct Supervisor::Impl {
     own.metrics = {{"session_time_s", clock.At(now)},
                    {"session_end_s", setup.end_s},
                    {"refused", static_cast<double>(refusals.all().count())},
+                   {"open_bus", setup.settings.open_bus ? 1.0 : 0.0},
                    {"generator_cut_W", static_cast<double>(set.cut_W)},
                    {"generator_coag_W", static_cast<double>(set.coag_W)},
                    {"generator_blend_W", static_cast<double>(set.blend_W)}};

@@ -29,6 +29,7 @@ struct UpSettings {
   /// Nodes that run on another host, one bit per NodeId; 0: all run here.
   std::uint32_t remote = 0;
   std::string peer, address;
+  std::filesystem::path link_keys;          ///< Folder of the link's keys; empty: an insecure link.
   int link_domain = 0;                      ///< Domain of the link; 0: the default one of the cart's domain.
   std::string trainee;                      ///< Name under which the score is stored; empty: it is not stored.
   std::filesystem::path training_database;  ///< File of the scores; services/session/supervisor/training_log.h.

@@ -37,7 +37,7 @@ constexpr FarLane LaneOf(TopicId topic) {
 template <class T>
 bool Leaves(const T& message, const LinkContext& link) {
   if constexpr (requires { message.node; }) {
-    return link.IsNative(message.node);
+    return link.side.IsNative(message.node);
   } else {
     return true;  // One owner, which runs on this host: otherwise there is no Outgoing.
   }
@@ -71,7 +71,7 @@ bool MoveHere(T* message, LinkContext* link) {
     for (ConsumedInput& input : message->consumed) {
       // The sender has already used the epoch of this host for a topic of this host.
       const std::optional<NodeId> owner = bus::OwnerOf(input.topic);
-      if (input.sequence == 0 || !owner || link->IsNative(*owner)) continue;
+      if (input.sequence == 0 || !owner || link->side.IsNative(*owner)) continue;
       input.epoch = link->epochs.ToOurs(input.topic, input.epoch, false, link->now_ns).value_or(input.epoch);
     }
   }
@@ -246,15 +246,22 @@ class IncomingBase : public Incoming {
  public:
   explicit IncomingBase(std::unique_ptr<typename bus::OutputOf<T>::type> output) : output_(std::move(output)) {}
   [[nodiscard]] bool wanted() const override { return output_->has_readers(); }
+  [[nodiscard]] NodeId foreigner() const override { return foreigner_; }
 
  protected:
-  bool Publish(T* message, LinkContext* link) {
-    if (!MoveHere(message, link) || !bus::PassesGate(*message)) return false;
+  Taken Publish(T* message, LinkContext* link) {
+    if constexpr (requires { message->node; }) {
+      foreigner_ = message->node;
+      if (!link->side.MayArriveOf(message->node)) return Taken::kForeign;
+    }
+    // Before the conversion as well, which uses received enumerators as indices.
+    if (!bus::PassesGate(*message) || !MoveHere(message, link) || !bus::PassesGate(*message)) return Taken::kBad;
     (void)output_->Write(*message);
-    return true;
+    return Taken::kYes;
   }
 
  private:
+  NodeId foreigner_ = NodeId::kSupervisor;
   std::unique_ptr<typename bus::OutputOf<T>::type> output_;
 };
 
@@ -263,27 +270,28 @@ class IncomingSamples final : public IncomingBase<T> {
  public:
   using IncomingBase<T>::IncomingBase;
 
-  bool Take(std::span<const std::uint8_t> body, LinkContext* link) override {
+  Taken Take(std::span<const std::uint8_t> body, LinkContext* link) override {
     SampleHead head;
     std::span<const std::uint8_t> delta;
-    if (!TakeSample(body, &head, &delta) || head.topic != bus::kTopicOf<T>) return false;
+    if (!TakeSample(body, &head, &delta) || head.topic != bus::kTopicOf<T>) return Taken::kBad;
     // A newer sample arrived first.
-    if (LaneOf(bus::kTopicOf<T>) == FarLane::kStream && head.number <= number_) return true;
+    if (LaneOf(bus::kTopicOf<T>) == FarLane::kStream && head.number <= number_) return Taken::kYes;
     if (head.base != 0) {
       if (head.base != number_) {
         if (!all_) ++lost_;
         all_ = true;  // The base of the difference was not received.
-        return true;
+        return Taken::kYes;
       }
-      if (!TakeDelta(cdr_, delta, kLargestSample_B, &next_)) return false;
+      if (!TakeDelta(cdr_, delta, kLargestSample_B, &next_)) return Taken::kBad;
     } else if (!TakeDelta({}, delta, kLargestSample_B, &next_)) {
-      return false;
+      return Taken::kBad;
     }
     if (bus::kQualityOf<T>.gap_is_loss && number_ != 0 && head.number > number_ + 1) lost_ += head.number - number_ - 1;
     number_ = head.number;
     std::swap(cdr_, next_);
     if (head.base == 0) all_ = false;
-    return bus::DecodeCdr(std::span<const std::uint8_t>(cdr_), &message_) && this->Publish(&message_, link);
+    if (!bus::DecodeCdr(std::span<const std::uint8_t>(cdr_), &message_)) return Taken::kBad;
+    return this->Publish(&message_, link);
   }
   void Restart() override {
     number_ = 0;
@@ -306,12 +314,12 @@ class IncomingChunks final : public IncomingBase<T> {
  public:
   using IncomingBase<T>::IncomingBase;
 
-  bool Take(std::span<const std::uint8_t> body, LinkContext* link) override {
+  Taken Take(std::span<const std::uint8_t> body, LinkContext* link) override {
     switch (receiver_.Take(body)) {
       case TissueReceiver::Result::kBad:
-        return false;
+        return Taken::kBad;
       case TissueReceiver::Result::kPart:
-        return true;
+        return Taken::kYes;
       case TissueReceiver::Result::kFrame:
         break;
     }

@@ -9,6 +9,7 @@
 
 #include "services/transport/bus/dds/far_participant.h"
 #include "services/transport/bus/dds/participant.h"
+#include "services/transport/link/allow_list.h"
 #include "services/transport/link/codec/packet.h"
 #include "services/transport/link/codec/patch_codec.h"
 #include "services/transport/link/codec/tissue_codec.h"
@@ -20,15 +21,20 @@ namespace fulcrum::link {
 struct LinkContext {
   /// Sends a packet; `put` appends its body.
   std::function<bool(bus::FarLane, PacketKind, const std::function<void(std::vector<std::uint8_t>*)>& put)> send;
-  std::uint32_t native = 0;  ///< Bit per NodeId: nodes of this host.
+  Side side;  ///< Which nodes run here.
   /// The other host only makes pictures: streams of 1000 samples a second are thinned.
   bool for_pictures = false;
   double picture_rate_Hz = 30;
   EpochMap epochs;
   std::int64_t now_ns = 0;
   std::int64_t offset_ns = 0;  ///< Their clock minus ours.
+};
 
-  [[nodiscard]] bool IsNative(NodeId node) const { return (native >> static_cast<unsigned>(node) & 1u) != 0; }
+/// What became of a received sample.
+enum class Taken : std::uint8_t {
+  kYes,
+  kBad,      ///< Not a valid packet of this channel, or not a valid message.
+  kForeign,  ///< Of a node that does not run on the other host.
 };
 
 class Outgoing {
@@ -44,8 +50,10 @@ class Outgoing {
 class Incoming {
  public:
   virtual ~Incoming() = default;
-  /// Decodes a packet's body; false if it is not a valid packet of this channel.
-  virtual bool Take(std::span<const std::uint8_t> body, LinkContext* link) = 0;
+  /// Decodes a packet's body.
+  [[nodiscard]] virtual Taken Take(std::span<const std::uint8_t> body, LinkContext* link) = 0;
+  /// The node that the last foreign sample named.
+  [[nodiscard]] virtual NodeId foreigner() const { return NodeId::kSupervisor; }
   /// Resets the state: the link on the other side has restarted.
   virtual void Restart() = 0;
   /// Whether the topic has a reader on this host now.

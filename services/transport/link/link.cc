@@ -28,7 +28,8 @@ constexpr std::int64_t kPatience = 3 * kSecond_ns;
 // A topic is carried on for this long after its last reader has left, because the reader may be restarting.
 constexpr std::int64_t kUnwanted = 2 * kSecond_ns;
 constexpr std::int64_t kLongestSleep = 20 * kMilli;
-constexpr std::size_t kLongestInbox = 4096;
+// Pieces of the scene that are sent per pulse: twice what SceneFetch requests. A request without answer is repeated.
+constexpr int kMostPieces = 16;
 constexpr std::uint32_t kAllNodes = (1u << kNodeCount) - 1;
 
 constexpr std::size_t At(TopicId topic) { return static_cast<std::size_t>(topic); }
@@ -36,8 +37,11 @@ constexpr std::uint32_t BitOf(std::size_t topic) { return 1u << topic; }
 
 }  // namespace
 
-Link::Link(const LinkSettings& settings) : settings_(settings), epoch_(static_cast<std::uint64_t>(MonotonicNs())) {
+Link::Link(const LinkSettings& settings)
+    : settings_(settings), epoch_(static_cast<std::uint64_t>(MonotonicNs())), refused_(settings.far.peer) {
   context_.picture_rate_Hz = settings.picture_rate_Hz;
+  context_.side.here = settings.far.side;
+  if (settings.offer) session_key_ = SessionKeyOf(settings.offer->session_id);
   context_.send = [this](FarLane lane, PacketKind kind, const std::function<void(std::vector<std::uint8_t>*)>& put) {
     return Send(lane, kind, put);
   };
@@ -47,42 +51,31 @@ Link::Link(const LinkSettings& settings) : settings_(settings), epoch_(static_ca
 
 Link::~Link() {
   thread_.request_stop();
-  Wake();
+  inbox_.Wake();
   thread_.join();
   far_.reset();
 }
 
 void Link::Connect() {
-  KeepRefusals();
+  if (far_) {
+    refused_.Add(far_->refusals());
+    dropped_ += far_->dropped();
+  }
   far_.reset();
   connected_ns_ = MonotonicNs();
-  far_ =
-      std::make_unique<bus::FarParticipant>(settings_.far, [this](FarLane lane, std::span<const std::uint8_t> bytes) {
-        const std::int64_t now = MonotonicNs();
-        const std::lock_guard lock(inbox_mutex_);
-        if (inbox_.size() >= kLongestInbox && lane == FarLane::kStream) {
-          ++overflow_;
-          return;
-        }
-        inbox_.push_back({lane, {bytes.begin(), bytes.end()}, now});
-        inbox_news_.notify_one();
-      });
-}
-
-void Link::Wake() {
-  const std::lock_guard lock(inbox_mutex_);
-  woken_ = true;
-  inbox_news_.notify_one();
+  far_ = std::make_unique<bus::FarParticipant>(
+      settings_.far,
+      [this](FarLane lane, std::span<const std::uint8_t> bytes) { inbox_.Put(lane, bytes, MonotonicNs()); });
 }
 
 void Link::Join(bus::DdsParticipant* local, std::uint32_t far_nodes) {
   const std::lock_guard lock(mutex_);
   local_ = local;
-  context_.native = kAllNodes & ~far_nodes;
+  context_.side.native = kAllNodes & ~far_nodes;
+  joined_session_ = session_key_;
   context_.for_pictures = (far_nodes & kAllNodes) == 1u << static_cast<unsigned>(NodeId::kRender);
   for (std::size_t topic = 0; topic < channels_.size(); ++topic) {
-    const std::optional<NodeId> owner = bus::OwnerOf(static_cast<TopicId>(topic));
-    if (owner && context_.IsNative(*owner)) continue;
+    if (!context_.side.MayArrive(static_cast<TopicId>(topic))) continue;
     channels_[topic].in = MakeIncoming(static_cast<TopicId>(topic), local);
   }
 }
@@ -91,13 +84,14 @@ void Link::Leave() {
   const std::lock_guard lock(mutex_);
   for (Channel& channel : channels_) channel = Channel();
   local_ = nullptr;
+  joined_session_ = 0;
 }
 
 void Link::SayBye() {
   const std::lock_guard lock(mutex_);
   bye_ = true;
   next_pulse_ns_ = 0;
-  Wake();
+  inbox_.Wake();
 }
 
 LinkStatus Link::status() {
@@ -113,7 +107,9 @@ LinkStatus Link::status() {
     status.drift_ppm = clock_.drift_ppm();
   }
   for (const Channel& channel : channels_) status.lost += channel.in ? channel.in->lost() : 0;
-  status.refused = refused_;
+  status.lost += overflowed_;
+  status.insecure = settings_.far.keys.empty();
+  status.refused = refused_.count() + dropped_ + (far_ ? far_->dropped() : 0);
   status.rebuilt = rebuilt_;
   status.error = !mismatch_.empty()  ? mismatch_
                  : !error_.empty()   ? error_
@@ -136,18 +132,8 @@ std::string Link::mismatch() {
 
 bus::Refusals Link::refusals() {
   const std::lock_guard lock(mutex_);
-  KeepRefusals();
-  return refusals_;
-}
-
-void Link::KeepRefusals() {
-  if (!far_) return;
-  for (std::string& text : far_->refusals().texts) {
-    if (refusals_.texts.size() == bus::Refusals::kMostTexts) return;
-    if (std::ranges::find(refusals_.texts, text) != refusals_.texts.end()) continue;
-    refusals_.texts.push_back(std::move(text));
-    ++refusals_.participants;
-  }
+  if (far_) refused_.Add(far_->refusals());
+  return refused_.named();
 }
 
 bool Link::FetchScene(const Offer& offer, const std::filesystem::path& cache, double* progress) {
@@ -176,25 +162,28 @@ void Link::Run(const std::stop_token& stop) {
       CountRates(now);
       due = std::min({PumpChannels(now), next_pulse_ns_, now + kLongestSleep});
     }
-    std::unique_lock lock(inbox_mutex_);
-    const std::int64_t rest = due - MonotonicNs();
-    if (rest > 0) {
-      inbox_news_.wait_for(lock, std::chrono::nanoseconds(rest), [this] { return woken_ || !inbox_.empty(); });
-    }
-    woken_ = false;
+    inbox_.WaitUntil(due);
   }
 }
 
 void Link::TakePackets(std::int64_t now) {
-  std::deque<Packet> packets;
-  {
-    const std::lock_guard lock(inbox_mutex_);
-    packets.swap(inbox_);
-    refused_ += std::exchange(overflow_, 0);
-  }
+  const Inbox::Content inbox = inbox_.Take();
+  overflowed_ += inbox.overflowed;
   context_.now_ns = now;
   context_.offset_ns = clock_.OffsetAt(now);
-  for (const Packet& packet : packets) Take(packet);
+  for (const Inbox::Packet& packet : inbox.packets) Take(packet);
+}
+
+bool Link::IsOfSession(const Envelope& envelope) const {
+  switch (envelope.kind) {
+    case PacketKind::kOffer:
+      return true;  // Begins a session.
+    case PacketKind::kPulse:
+      // A host that has not joined a session has none yet.
+      return session_key_ == 0 || envelope.session == 0 || envelope.session == session_key_;
+    default:
+      return session_key_ == 0 || envelope.session == session_key_;
+  }
 }
 
 bool Link::IsOfPeer(std::uint64_t epoch, std::int64_t now) {
@@ -214,21 +203,32 @@ bool Link::IsOfPeer(std::uint64_t epoch, std::int64_t now) {
   return true;
 }
 
-void Link::Take(const Packet& packet) {
+void Link::Take(const Inbox::Packet& packet) {
   traffic_.received_B += packet.bytes.size();
   Envelope envelope;
   std::span<const std::uint8_t> body;
   std::uint8_t version = 0;
   if (!TakeEnvelope(packet.bytes, &envelope, &body, &version)) {
-    ++refused_;
+    refused_.Count();
     return;
   }
   if (version != kWireVersion) {
+    // Of a side that has already proved to be of this release it is no reason to end the session.
+    if (heard_pulse_ns_ != 0) return refused_.Foreign("packets of version " + std::to_string(version) + " of the link");
     mismatch_ = "link mismatch: the other host uses version " + std::to_string(version) + " of the link, this one " +
                 std::to_string(kWireVersion) + "; use the same release on both hosts";
     return;
   }
-  if (!IsOfPeer(envelope.epoch, packet.heard_ns)) return;
+  if (!IsOfPeer(envelope.epoch, packet.heard_ns)) {
+    refused_.Count();
+    return;
+  }
+  if (!IsOfSession(envelope)) {
+    refused_.Count();
+    // The cart may have begun another session, which its offer names.
+    asks_offer_ = settings_.far.side == bus::FarSide::kHost;
+    if (envelope.kind != PacketKind::kPulse) return;
+  }
   switch (envelope.kind) {
     case PacketKind::kPulse:
       return TakePulse(body, packet.heard_ns);
@@ -237,17 +237,20 @@ void Link::Take(const Packet& packet) {
     case PacketKind::kPatch:
       return TakeChannel(envelope.kind, body);
     case PacketKind::kOffer:
-      return TakeOffer(body);
+      return TakeOffer(envelope, body);
     case PacketKind::kSceneAsk:
       return ServeScene(body);
     case PacketKind::kSceneChunk: {
       SceneAsk where;
       std::span<const std::uint8_t> bytes;
-      if (!TakeSceneChunk(body, &where, &bytes) || (fetch_ && !fetch_->Take(where, bytes))) ++refused_;
+      const bool host = settings_.far.side == bus::FarSide::kHost;
+      // A piece that was requested twice can arrive when the scene is complete.
+      if (!host || !TakeSceneChunk(body, &where, &bytes) || (fetch_ && !fetch_->Take(where, bytes))) refused_.Count();
       return;
     }
     case PacketKind::kBye:
-      session_.over = settings_.far.side == bus::FarSide::kHost && session_.number != 0;
+      if (settings_.far.side != bus::FarSide::kHost) return refused_.Foreign("an end of the session");
+      session_.over = session_.number != 0;
       return;
   }
 }
@@ -255,10 +258,11 @@ void Link::Take(const Packet& packet) {
 void Link::TakePulse(std::span<const std::uint8_t> body, std::int64_t heard_ns) {
   Pulse pulse;
   if (!link::TakePulse(body, &pulse)) {
-    ++refused_;
+    refused_.Count();
     return;
   }
   if (pulse.schema_hash != bus::SchemaHash()) {
+    if (heard_pulse_ns_ != 0) return refused_.Foreign("pulses with another schema");
     mismatch_ = "schema mismatch: the other host uses other topics; use the same release on both hosts";
     return;
   }
@@ -282,7 +286,8 @@ void Link::TakePulse(std::span<const std::uint8_t> body, std::int64_t heard_ns) 
     if (id == TopicId::kTissueFrame) out->Repeat(pulse.missing_tissue);
     if (id == TopicId::kTemperaturePatch) out->Repeat(pulse.missing_patches);
   }
-  if (pulse.wants_offer && settings_.offer) {
+  if (pulse.wants_offer && settings_.offer && allowance_.offers > 0) {
+    --allowance_.offers;
     (void)Send(FarLane::kOrdered, PacketKind::kOffer,
                [this](std::vector<std::uint8_t>* out) { PutOffer(*settings_.offer, out); });
   }
@@ -295,35 +300,54 @@ void Link::TakeChannel(PacketKind kind, std::span<const std::uint8_t> body) {
     SampleHead head;
     std::span<const std::uint8_t> ignored;
     if (!TakeSample(body, &head, &ignored) || KindOf(head.topic) != PacketKind::kSample) {
-      ++refused_;
+      refused_.Count();
       return;
     }
     topic = head.topic;
   }
-  // Without the offset the stamp would be of another clock; no topic has been requested yet either.
-  if (!clock_.known()) return;
+  const std::string label(bus::TopicLabel(topic));
+  if (!context_.side.MayArrive(topic)) return refused_.Foreign(label);
+  // Without the offset the stamp would be of another clock; no topic has been requested yet either. Nor for a session
+  // that was not joined.
+  if (!clock_.known() || session_key_ != joined_session_) return;
   Incoming* in = channels_[At(topic)].in.get();
-  if (in == nullptr || !in->Take(body, &context_)) ++refused_;
+  switch (in == nullptr ? Taken::kBad : in->Take(body, &context_)) {
+    case Taken::kYes:
+      return;
+    case Taken::kBad:
+      refused_.Count();
+      return;
+    case Taken::kForeign: {
+      const NodeId node = in->foreigner();
+      const bool known = static_cast<unsigned>(node) < static_cast<unsigned>(kNodeCount);
+      return refused_.Foreign(label + " of " + (known ? NodeName(node) : "an unknown node"));
+    }
+  }
 }
 
-void Link::TakeOffer(std::span<const std::uint8_t> body) {
+void Link::TakeOffer(const Envelope& envelope, std::span<const std::uint8_t> body) {
+  if (settings_.far.side != bus::FarSide::kHost) return refused_.Foreign("an offer of a session");
   Offer offer;
-  if (settings_.far.side != bus::FarSide::kHost || !link::TakeOffer(body, &offer)) {
-    ++refused_;
+  if (!link::TakeOffer(body, &offer) || envelope.session != SessionKeyOf(offer.session_id)) {
+    refused_.Count();
     return;
   }
   if (session_.number == 0 || offer.session_id != session_.offer.session_id) {
     ++session_.number;
     session_.over = false;
   }
+  session_key_ = envelope.session;
+  asks_offer_ = false;
   session_.offer = std::move(offer);
 }
 
 void Link::ServeScene(std::span<const std::uint8_t> body) {
+  if (settings_.offer && allowance_.pieces <= 0) return;  // Requested again after a second.
+  --allowance_.pieces;
   SceneAsk ask;
   if (!TakeSceneAsk(body, &ask) || !settings_.offer || ask.scene_hash != settings_.offer->scene_hash ||
       ask.offset >= settings_.offer->scene_B) {
-    ++refused_;
+    refused_.Count();
     return;
   }
   std::ifstream stream(settings_.scene, std::ios::binary);
@@ -345,9 +369,8 @@ void Link::FollowWishes(std::uint32_t wanted, std::int64_t now) {
       channel.unwanted_since_ns = 0;
       // A new reader on the other host has not received the earlier samples.
       if (channel.out != nullptr && (wished_ & BitOf(topic)) == 0) channel.out->Repeat();
-      const std::optional<NodeId> owner = bus::OwnerOf(static_cast<TopicId>(topic));
-      if (channel.out == nullptr && (!owner || context_.IsNative(*owner))) {
-        channel.out = MakeOutgoing(static_cast<TopicId>(topic), local_, [this] { Wake(); });
+      if (channel.out == nullptr && context_.side.MayLeave(static_cast<TopicId>(topic))) {
+        channel.out = MakeOutgoing(static_cast<TopicId>(topic), local_, [this] { inbox_.Wake(); });
       }
     } else if (channel.out != nullptr) {
       if (channel.unwanted_since_ns == 0) channel.unwanted_since_ns = now;
@@ -367,27 +390,20 @@ std::int64_t Link::PumpChannels(std::int64_t now) {
 }
 
 bool Link::IsWanted(TopicId topic, const Incoming& in) const {
-  // For topics that both sides send, our own input reads our own output, so the existence of a reader proves nothing.
-  switch (topic) {
-    case TopicId::kHealth:
-      return true;
-    case TopicId::kTickManifest:
-      // Read by the recorder, which runs on the cart's host.
-      return settings_.far.side == bus::FarSide::kCart && in.wanted();
-    default:
-      return in.wanted();
-  }
+  // Both sides send Health, and our own input reads our own output, so the existence of a reader proves nothing.
+  return topic == TopicId::kHealth || in.wanted();
 }
 
 void Link::SendPulse(std::int64_t now) {
   if (now < next_pulse_ns_) return;
   next_pulse_ns_ = now + kPulsePeriod;
+  allowance_ = {.offers = 1, .pieces = kMostPieces};
   Pulse pulse;
   pulse.schema_hash = bus::SchemaHash();
   pulse.heard_epoch = their_epoch_;
   pulse.heard_sent_ns = heard_sent_ns_;
   pulse.heard_ns = heard_pulse_ns_;
-  pulse.wants_offer = settings_.far.side == bus::FarSide::kHost && session_.number == 0;
+  pulse.wants_offer = settings_.far.side == bus::FarSide::kHost && (session_.number == 0 || asks_offer_);
   for (std::size_t topic = 0; topic < channels_.size() && clock_.known(); ++topic) {
     Channel& channel = channels_[topic];
     const auto id = static_cast<TopicId>(topic);
@@ -444,7 +460,7 @@ void Link::CountRates(std::int64_t now) {
 bool Link::Send(FarLane lane, PacketKind kind, const std::function<void(std::vector<std::uint8_t>*)>& put) {
   if (far_ == nullptr) return false;
   packet_.clear();
-  PutEnvelope({kind, epoch_}, &packet_);
+  PutEnvelope({kind, epoch_, session_key_}, &packet_);
   put(&packet_);
   traffic_.sent_B += packet_.size();
   if (kind == PacketKind::kTissue) traffic_.tissue_B += packet_.size();

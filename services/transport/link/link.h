@@ -3,9 +3,7 @@
 #pragma once
 
 #include <array>
-#include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -19,6 +17,8 @@
 #include "services/transport/link/channels.h"
 #include "services/transport/link/codec/clock_filter.h"
 #include "services/transport/link/codec/packet.h"
+#include "services/transport/link/inbox.h"
+#include "services/transport/link/refusal_log.h"
 #include "services/transport/link/scene_transfer.h"
 
 namespace fulcrum::link {
@@ -33,6 +33,7 @@ struct LinkSettings {
 /// Figures of a link, for Health and log.
 struct LinkStatus {
   bool connected = false;  ///< A packet of the other side arrived within the last second.
+  bool insecure = false;   ///< The link has no keys.
   bool known = false;      ///< The clock offset is known.
   double offset_us = 0;    ///< Their CLOCK_MONOTONIC minus ours.
   double round_trip_us = 0;
@@ -40,10 +41,12 @@ struct LinkStatus {
   double sent_kB_per_s = 0, received_kB_per_s = 0;
   double tissue_kB_per_s = 0;  ///< Share of TissueFrame in the traffic, both ways together.
   std::uint64_t lost = 0;      ///< Chunks and samples that did not arrive.
-  std::uint64_t refused = 0;   ///< Malformed packets or messages.
-  std::uint64_t rebuilt = 0;   ///< How often the connection was made anew.
-  double silence_s = 0;        ///< Time since the last packet of the other side.
-  std::string error;           ///< One line for the operator; empty if there is no error.
+  /// Packets, samples and datagrams that were refused: malformed, of another session or of an earlier link, of topics
+  /// or nodes that the other side may not write, from another address.
+  std::uint64_t refused = 0;
+  std::uint64_t rebuilt = 0;  ///< How often the connection was made anew.
+  double silence_s = 0;       ///< Time since the last packet of the other side.
+  std::string error;          ///< One line for the operator; empty if there is no error.
 };
 
 class Link {
@@ -74,18 +77,14 @@ class Link {
   /// One line if the other side uses another schema or wire version, or if the cart does not accept our keys; otherwise
   /// empty.
   [[nodiscard]] std::string mismatch();
-  /// Participants that tried to connect without the keys of this link, each listed once.
+  /// Participants that tried to connect without the keys of this link, addresses other than the peer's, and what the
+  /// other side sent although it may not: each listed once.
   [[nodiscard]] bus::Refusals refusals();
 
   /// Host only: fetches the scene of the offer into the cache. Call until it returns true; the file is then complete.
   [[nodiscard]] bool FetchScene(const Offer& offer, const std::filesystem::path& cache, double* progress);
 
  private:
-  struct Packet {
-    bus::FarLane lane;
-    std::vector<std::uint8_t> bytes;
-    std::int64_t heard_ns;
-  };
   struct Channel {
     std::unique_ptr<Outgoing> out;
     std::unique_ptr<Incoming> in;
@@ -95,12 +94,13 @@ class Link {
   void Run(const std::stop_token& stop);
   // Stages of a cycle, called with the mutex held.
   void TakePackets(std::int64_t now);
-  void Take(const Packet& packet);
+  void Take(const Inbox::Packet& packet);
   void TakePulse(std::span<const std::uint8_t> body, std::int64_t heard_ns);
   void TakeChannel(PacketKind kind, std::span<const std::uint8_t> body);
-  void TakeOffer(std::span<const std::uint8_t> body);
+  void TakeOffer(const Envelope& envelope, std::span<const std::uint8_t> body);
   void ServeScene(std::span<const std::uint8_t> body);
   [[nodiscard]] bool IsOfPeer(std::uint64_t epoch, std::int64_t now);
+  [[nodiscard]] bool IsOfSession(const Envelope& envelope) const;
   void FollowWishes(std::uint32_t wanted, std::int64_t now);
   std::int64_t PumpChannels(std::int64_t now);
   void SendPulse(std::int64_t now);
@@ -110,17 +110,11 @@ class Link {
 
   bool Send(bus::FarLane lane, PacketKind kind, const std::function<void(std::vector<std::uint8_t>*)>& put);
   void Connect();
-  void KeepRefusals();
-  void Wake();
 
   const LinkSettings settings_;
   const std::uint64_t epoch_;
 
-  std::mutex inbox_mutex_;  ///< Guards inbox_ and woken_.
-  std::condition_variable_any inbox_news_;
-  std::deque<Packet> inbox_;
-  bool woken_ = false;
-  std::uint64_t overflow_ = 0;
+  Inbox inbox_;
 
   std::mutex mutex_;  ///< Guards all members below except the thread.
   std::unique_ptr<bus::FarParticipant> far_;
@@ -134,11 +128,21 @@ class Link {
   std::int64_t connected_ns_ = 0;  ///< When the present participant was made.
   std::int64_t next_pulse_ns_ = 0;
   Session session_;
+  std::uint64_t session_key_ = 0;     ///< Of our packets; 0: no session yet.
+  std::uint64_t joined_session_ = 0;  ///< Key of the session whose topics are carried; 0: none.
+  /// Answers that may still be given before the next pulse is sent: a peer cannot make this side read and send more.
+  struct Allowance {
+    int offers = 0, pieces = 0;
+  };
+  Allowance allowance_;
+  bool asks_offer_ = false;  ///< Host only: packets of another session arrive.
   bool bye_ = false;
   std::optional<SceneFetch> fetch_;
   std::string mismatch_, error_;
-  std::uint64_t refused_ = 0, rebuilt_ = 0;
-  bus::Refusals refusals_;  ///< Of all participants since the start.
+  std::uint64_t rebuilt_ = 0;
+  std::uint64_t overflowed_ = 0;  ///< Packets for which the inbox had no room.
+  std::uint64_t dropped_ = 0;     ///< Datagrams from other addresses, of the participants before the present one.
+  RefusalLog refused_;            ///< Since the start.
   struct Traffic {
     std::uint64_t sent_B = 0, received_B = 0, tissue_B = 0;
   };

@@ -1,9 +1,11 @@
 #include "services/transport/link/options.h"
 
+#include <ctime>
 #include <sstream>
 
 #include "services/base/core/error.h"
 #include "services/transport/bus/access.h"
+#include "services/transport/keys/key_folder.h"
 
 namespace fulcrum::link {
 namespace {
@@ -54,6 +56,22 @@ bus::FarSettings FarSettingsFor(bus::FarSide side, const std::string& peer, cons
     throw InputError("link domain " + std::to_string(far.domain) + ": must be 101 to 200, the same on both hosts");
   }
   return far;
+}
+
+std::filesystem::path KeysOfLink(const std::filesystem::path& given, const std::filesystem::path& of_cart,
+                                 bool insecure) {
+  if (insecure && !given.empty()) throw InputError("--insecure-link is a link without keys: give it or --keys");
+  if (insecure) return {};
+  const std::filesystem::path standard = keys::DefaultKeyFolder();
+  const std::filesystem::path folder = !given.empty() ? given : !of_cart.empty() ? of_cart : standard;
+  if (folder == standard && !std::filesystem::exists(folder)) {
+    throw InputError(
+        "two machines of a cart need keys, and " + folder.string() +
+        " does not exist: run `fulcrum keys init` on one machine, copy that folder to the same place on the other, and "
+        "start again (--keys DIR names another folder; --insecure-link works without keys, for a closed bench)");
+  }
+  (void)keys::CheckIdentity(folder, bus::kLinkIdentity, true, std::time(nullptr));
+  return std::filesystem::absolute(folder);
 }
 
 }  // namespace fulcrum::link

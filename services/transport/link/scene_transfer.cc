@@ -8,10 +8,12 @@
 #include <fstream>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "services/base/core/error.h"
 #include "services/base/core/hash.h"
 #include "services/scene/format/scene_file.h"
+#include "services/transport/bus/gate.h"
 
 namespace fulcrum::link {
 namespace {
@@ -97,6 +99,26 @@ bool IsScene(const fs::path& file, std::uint64_t hash) {
   }
 }
 
+void MakeRoomForScene(const fs::path& cache) {
+  constexpr std::size_t kDigits = 16;
+  std::vector<std::pair<fs::file_time_type, fs::path>> scenes;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(cache, ignored)) {
+    const std::string name = entry.path().filename();
+    if (name.find_first_not_of("0123456789abcdef") != kDigits || !name.ends_with(".fulcrum")) continue;
+    scenes.emplace_back(entry.last_write_time(ignored), entry.path());
+  }
+  std::ranges::sort(scenes);
+  for (std::size_t i = 0; i + kMostCachedScenes <= scenes.size(); ++i) fs::remove(scenes[i].second, ignored);
+}
+
+void CheckReceivedScene(const SceneView& scene, const Offer& offer) {
+  const std::string name = scene.name;
+  if (name == offer.scene_name && IsPlainName(name, bus::kMaxSceneName)) return;
+  throw InputError("the received scene does not have the offered name \"" + offer.scene_name +
+                   "\"; it is not used, because the name of a scene becomes a part of paths");
+}
+
 void StoreScene(const SceneFetch& fetch, const fs::path& cache) {
   if (!fetch.checksum_ok()) throw InputError("the received scene is damaged; it is fetched again");
   const fs::path file = CachedScene(cache, fetch.scene_hash());
@@ -115,6 +137,7 @@ void StoreScene(const SceneFetch& fetch, const fs::path& cache) {
     fs::remove(part, error);
     throw MismatchError("this build cannot read the scene of the other host; use the same release on both hosts");
   }
+  MakeRoomForScene(cache);
   fs::rename(part, file);
 }
 

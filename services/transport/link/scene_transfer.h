@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "services/base/core/scene_view.h"
 #include "services/transport/link/codec/packet.h"
 
 namespace fulcrum::link {
@@ -46,8 +47,15 @@ class SceneFetch {
 [[nodiscard]] std::filesystem::path CachedScene(const std::filesystem::path& cache, std::uint64_t hash);
 /// Whether the file is complete and is the scene with this hash.
 [[nodiscard]] bool IsScene(const std::filesystem::path& file, std::uint64_t hash);
-/// Writes the fetched scene into the cache, atomically. Throws InputError if it is not the offered scene or cannot be
-/// written.
+/// Scenes that the cache keeps: the newest. With kLargestScene_B this bounds the disk space.
+inline constexpr std::size_t kMostCachedScenes = 8;
+/// Throws InputError unless the received scene has the offered name, which is a plain name: the name becomes a part of
+/// paths.
+void CheckReceivedScene(const SceneView& scene, const Offer& offer);
+/// Removes the oldest received scenes, so that the cache keeps kMostCachedScenes after one more is added.
+void MakeRoomForScene(const std::filesystem::path& cache);
+/// Makes room in the cache and writes the fetched scene into it, atomically. Throws
+/// InputError if it is not the offered scene or cannot be written.
 void StoreScene(const SceneFetch& fetch, const std::filesystem::path& cache);
 
 }  // namespace fulcrum::link

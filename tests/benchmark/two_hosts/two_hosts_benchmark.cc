@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -16,6 +17,7 @@
 #include <thread>
 #include <vector>
 
+#include "services/transport/keys/key_folder.h"
 #include "services/transport/link/codec/tissue_codec.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
@@ -68,12 +70,14 @@ Run RunSession(const std::string& scene_yaml, double seconds, const std::string&
                               "low", "--out", file("out"), "--seconds", std::to_string(seconds)};
   std::optional<testing::Program> host;
   if (!remote.empty()) {
-    up.insert(up.end(), {"--peer", TwoHosts::kHostAddress, "--remote", remote});
+    const std::time_t now = std::time(nullptr);
+    keys::MakeKeyFolder(file("keys"), {now, now + 24 * 3600}, false);
+    up.insert(up.end(), {"--peer", TwoHosts::kHostAddress, "--remote", remote, "--keys", file("keys")});
     host = hosts.OnHost("fulcrum", {"host", "--peer", TwoHosts::kCartAddress, "--domain", kDomain, "--quality", "low",
-                                    "--out", file("host"), "--cache", file("cache")});
+                                    "--out", file("host"), "--cache", file("cache"), "--keys", file("keys")});
   }
   testing::Program cart = hosts.OnCart("fulcrum", up);
-  std::vector<std::string> near_words{kDomain, file("near")}, far_words{kDomain, file("far"), "tissue"};
+  std::vector<std::string> near_words{kDomain, file("near")}, far_words{kDomain, file("far"), "tissue", "secured"};
   if (with_tissue) near_words.emplace_back("tissue");
   testing::Program near = hosts.OnCart("two_hosts_probe", near_words);
   testing::Program far;

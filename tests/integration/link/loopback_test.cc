@@ -7,6 +7,7 @@
 #include <fstream>
 #include <thread>
 
+#include "services/base/core/error.h"
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/transport/bus/dds/participant.h"
 #include "services/transport/bus/dds/shared_memory.h"
@@ -192,6 +193,7 @@ TEST(Link, NothingLoops) {
   EXPECT_LE(physics_here, sent);
   EXPECT_LE(render_there, sent);
   EXPECT_LE(physics_there, sent);
+  EXPECT_EQ(hosts.cart_link.status().refused + hosts.host_link->status().refused, 0u);
 }
 
 TEST(Link, AManifestOfATickNamesSamplesAsTheyAreOnEachHost) {
@@ -253,6 +255,46 @@ TEST(SceneTransfer, ComesWholeWhateverGetsLostAndDamageShows) {
       EXPECT_ANY_THROW(StoreScene(fetch, fs::temp_directory_path()));
     }
   }
+}
+
+TEST(SceneTransfer, TheCacheKeepsTheNewestScenesAndNothingElseIsRemoved) {
+  const fs::path cache = fs::temp_directory_path() / ("link-cache-" + std::to_string(::getpid()));
+  fs::create_directories(cache);
+  const auto now = fs::file_time_type::clock::now();
+  const auto make = [&](const fs::path& file, int age_s) {
+    std::ofstream(file) << "x";
+    fs::last_write_time(file, now - std::chrono::seconds(age_s));
+  };
+  for (int i = 0; i < 12; ++i) make(CachedScene(cache, static_cast<std::uint64_t>(i + 1)), 100 + i);
+  const fs::path compiled = cache / "built-in-0123456789abcdef.fulcrum";
+  make(compiled, 1000);
+  MakeRoomForScene(cache);
+  for (int i = 0; i < 12; ++i) {
+    EXPECT_EQ(fs::exists(CachedScene(cache, static_cast<std::uint64_t>(i + 1))),
+              i + 1 < static_cast<int>(kMostCachedScenes))
+        << i;
+  }
+  EXPECT_TRUE(fs::exists(compiled));
+  fs::remove_all(cache);
+}
+
+TEST(SceneTransfer, AReceivedSceneHasTheOfferedNameAndThatIsNoPath) {
+  Offer offer = SomeOffer(1);
+  SceneView scene;
+  const auto accepted = [&](const std::string& name, const std::string& offered) {
+    std::snprintf(scene.name, sizeof scene.name, "%s", name.c_str());
+    offer.scene_name = offered;
+    try {
+      CheckReceivedScene(scene, offer);
+      return true;
+    } catch (const InputError&) {
+      return false;
+    }
+  };
+  EXPECT_TRUE(accepted("working scene", "working scene"));
+  EXPECT_FALSE(accepted("../../x", "working"));
+  EXPECT_FALSE(accepted("../../x", "../../x"));
+  EXPECT_FALSE(accepted("other", "working"));
 }
 
 }  // namespace

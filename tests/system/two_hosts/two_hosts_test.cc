@@ -33,32 +33,49 @@ std::string NamedScene() {
   return scene;
 }
 
+enum class LinkKeys {
+  kNone,       ///< --insecure-link.
+  kLinkOnly,   ///< --keys on both sides; the cart's own bus has none.
+  kOfTheCart,  ///< In the cart file: the cart's bus is secured as well.
+};
+
 /// One session with `remote` on the far host; its probes' files are near.txt and far.txt of the folder.
 struct Session {
-  explicit Session(const std::string& remote, bool secured = false)
+  explicit Session(const std::string& remote, LinkKeys keys)
       : hosts({.delay_ms = 5, .loss_percent = 1, .far_clock_ahead_s = kAhead_s, .word = kSceneName}) {
     const fs::path scene = hosts.folder() / "working.yaml";
     std::ofstream(scene) << NamedScene();
     std::vector<std::string> up{"up",       scene,  "--domain",  kDomain, "--peer", TwoHosts::kHostAddress,
                                 "--remote", remote, "--quality", "low",   "--out",  hosts.folder() / "cart"};
-    if (secured) {
-      const std::time_t now = std::time(nullptr);
-      keys::MakeKeyFolder(hosts.folder() / "keys", {now, now + 24 * 3600}, false);
+    const std::time_t now = std::time(nullptr);
+    for (const char* folder : {"keys", "other-keys"}) {
+      keys::MakeKeyFolder(hosts.folder() / folder, {now, now + 24 * 3600}, false);
+    }
+    if (keys == LinkKeys::kOfTheCart) {
       std::ofstream(hosts.folder() / "cart.yaml") << "security: {keys: keys}\n";
       up.insert(up.end(), {"--cart", hosts.folder() / "cart.yaml"});
       cart = hosts.OnCart("fulcrum", up);
-      // One without keys, which ends by itself.
-      Program stranger = Host({});
-      (void)WaitFor(30, [&] { return (stranger_code = stranger.Poll().value_or(-1000)) != -1000; });
-      stranger_said = stranger.Said();
+      // Those that have no keys or other keys end by themselves.
+      for (const std::vector<std::string>& words :
+           {std::vector<std::string>{"--insecure-link"}, {"--keys", hosts.folder() / "other-keys"}}) {
+        Program stranger = Host(words);
+        int code = -1000;
+        (void)WaitFor(30, [&] { return (code = stranger.Poll().value_or(-1000)) != -1000; });
+        strangers.emplace_back(code, stranger.Said());
+      }
       host = Host({"--keys", hosts.folder() / "keys"});
     } else {
-      host = Host({});
+      const std::vector<std::string> words = keys == LinkKeys::kNone
+                                                 ? std::vector<std::string>{"--insecure-link"}
+                                                 : std::vector<std::string>{"--keys", hosts.folder() / "keys"};
+      host = Host(words);
+      up.insert(up.end(), words.begin(), words.end());
       cart = hosts.OnCart("fulcrum", up);
     }
-    const char* bus = secured ? "secured" : "open";
-    near = hosts.OnCart("two_hosts_probe", {kDomain, File("near"), "tissue", bus});
-    far = hosts.OnHost("two_hosts_probe", {kDomain, File("far"), "tissue", bus});
+    near = hosts.OnCart("two_hosts_probe",
+                        {kDomain, File("near"), "tissue", keys == LinkKeys::kOfTheCart ? "secured" : "open"});
+    far =
+        hosts.OnHost("two_hosts_probe", {kDomain, File("far"), "tissue", keys != LinkKeys::kNone ? "secured" : "open"});
   }
   [[nodiscard]] Program Host(const std::vector<std::string>& more) const {
     std::vector<std::string> words{"host",
@@ -101,8 +118,7 @@ struct Session {
 
   TwoHosts hosts;
   Program host, cart, near, far;
-  int stranger_code = 0;
-  std::string stranger_said;
+  std::vector<std::pair<int, std::string>> strangers;  ///< Exit code and output.
 };
 
 void Sleep(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
@@ -120,7 +136,7 @@ double LargestStep(const std::vector<HeardTool>& tools) {
 
 TEST(TwoHosts, ThePictureIsDrawnOnAnotherHostAndACutCableIsNoEnd) {
   if (const std::string why = TwoHosts::WhyNot(); !why.empty()) GTEST_SKIP() << why;
-  Session session("render_node");
+  Session session("render_node", LinkKeys::kNone);
   ASSERT_TRUE(session.WaitForForce()) << session.Said();
   Sleep(1.5);
   auto children = ChildrenOf(session.host.pid());
@@ -149,14 +165,19 @@ TEST(TwoHosts, ThePictureIsDrawnOnAnotherHostAndACutCableIsNoEnd) {
   ASSERT_FALSE(offsets.empty());
   EXPECT_NEAR(offsets.back(), 1e6 * kAhead_s, 5e3);
   EXPECT_NE(session.host.Said().find("received"), std::string::npos) << "the scene was not transferred";
+  const std::string report = ReadFile(session.hosts.folder() / "cart" / "latest" / "report.html");
+  for (const std::string& text : {session.cart.Said(), session.host.Said(), report}) {
+    EXPECT_NE(text.find("! insecure link"), std::string::npos) << text.substr(0, 2000);
+  }
   EXPECT_TRUE(session.hosts.Overheard()) << "the secured cart's test hears nothing either";
 }
 
-TEST(TwoHosts, ASecuredCartCannotBeOverheardAndRefusesAHostWithoutKeys) {
+TEST(TwoHosts, ASecuredCartCannotBeOverheardAndRefusesAHostWithoutItsKeys) {
   if (const std::string why = TwoHosts::WhyNot(); !why.empty()) GTEST_SKIP() << why;
-  Session session("physics_node", true);
-  EXPECT_EQ(session.stranger_code, 3) << session.stranger_said;
-  EXPECT_NE(session.stranger_said.find("admits nobody without keys"), std::string::npos) << session.stranger_said;
+  Session session("physics_node", LinkKeys::kOfTheCart);
+  for (const auto& [code, said] : session.strangers) EXPECT_EQ(code, 3) << said;
+  EXPECT_NE(session.strangers.at(0).second.find("admits nobody without keys"), std::string::npos);
+  EXPECT_NE(session.strangers.at(1).second.find("both need the same keys"), std::string::npos);
   ASSERT_TRUE(session.WaitForForce()) << session.Said();
   Sleep(2);
   // As long as it takes to begin a connection anew, and to prove oneself again.
@@ -180,13 +201,13 @@ TEST(TwoHosts, ASecuredCartCannotBeOverheardAndRefusesAHostWithoutKeys) {
   EXPECT_FALSE(session.hosts.Overheard()) << "the scene's name went over the cable in the clear";
   EXPECT_GT(CompareFrames(session.Tissue("far"), session.Tissue("near")).compared, 40u);
   const std::string summary = ReadFile(session.hosts.folder() / "cart" / "latest" / "summary.json");
-  EXPECT_NE(summary.find("\"refused.participants\": 1"), std::string::npos) << summary << session.Said();
+  EXPECT_NE(summary.find("\"refused.participants\": 2"), std::string::npos) << summary << session.Said();
   EXPECT_NE(summary.find("\"refused.endpoints\": 0"), std::string::npos) << summary << session.Said();
 }
 
 TEST(TwoHosts, ForceComesFromAnotherHostAndNeverJumps) {
   if (const std::string why = TwoHosts::WhyNot(); !why.empty()) GTEST_SKIP() << why;
-  Session session("physics_node");
+  Session session("physics_node", LinkKeys::kLinkOnly);
   ASSERT_TRUE(session.WaitForForce()) << session.Said();
   Sleep(1);
   session.hosts.Cut();

@@ -18,12 +18,13 @@ Offer SomeOffer() {
   offer.scene_checksum = 7;
   offer.nodes = 1u << static_cast<unsigned>(NodeId::kRender);
   offer.cart_yaml = "name: simulated\n";
+  offer.withheld = "pedal, devices.tool0.motion";
   return offer;
 }
 
 TEST(Packet, EnvelopeComesBackAndAnotherVersionIsTold) {
   Buffer packet;
-  PutEnvelope({PacketKind::kTissue, 99}, &packet);
+  PutEnvelope({PacketKind::kTissue, 99, 7}, &packet);
   packet.push_back(5);
   Envelope envelope;
   std::span<const std::uint8_t> body;
@@ -31,6 +32,7 @@ TEST(Packet, EnvelopeComesBackAndAnotherVersionIsTold) {
   ASSERT_TRUE(TakeEnvelope(packet, &envelope, &body, &version));
   EXPECT_EQ(envelope.kind, PacketKind::kTissue);
   EXPECT_EQ(envelope.epoch, 99u);
+  EXPECT_EQ(envelope.session, 7u);
   EXPECT_EQ(body.size(), 1u);
   packet[2] = kWireVersion + 1;
   EXPECT_TRUE(TakeEnvelope(packet, &envelope, &body, &version));
@@ -73,6 +75,7 @@ TEST(Packet, OfferComesBackAndMustBeUsable) {
   ASSERT_TRUE(TakeOffer(body, &got));
   EXPECT_EQ(got.session_id, SomeOffer().session_id);
   EXPECT_EQ(got.cart_yaml, SomeOffer().cart_yaml);
+  EXPECT_EQ(got.withheld, SomeOffer().withheld);
   EXPECT_EQ(got.scene_checksum, 7u);
   const auto refused = [](auto change) {
     Offer offer = SomeOffer();
@@ -84,6 +87,16 @@ TEST(Packet, OfferComesBackAndMustBeUsable) {
   };
   EXPECT_TRUE(refused([](Offer* o) { o->session_id = "../../etc"; }));
   EXPECT_TRUE(refused([](Offer* o) { o->session_id = ""; }));
+  for (const char* bad : {"../x", "a/b", ".x", "a\x1b[2J",
+                          "\xc2\x9b"
+                          "2J"}) {
+    EXPECT_TRUE(refused([&](Offer* o) { o->session_id = bad; })) << bad;
+    EXPECT_TRUE(refused([&](Offer* o) { o->scene_name = bad; })) << bad;
+  }
+  EXPECT_FALSE(refused([](Offer* o) { o->scene_name = "a scene (2)"; }));
+  EXPECT_TRUE(refused([](Offer* o) { o->scene_name.assign(64, 'a'); }));
+  EXPECT_TRUE(refused([](Offer* o) { o->withheld = "a\nb"; }));
+  EXPECT_TRUE(refused([](Offer* o) { o->withheld.assign(kLongestWithheld_B + 1, 'a'); }));
   EXPECT_TRUE(refused([](Offer* o) { o->scene_B = kLargestScene_B + 1; }));
   EXPECT_TRUE(refused([](Offer* o) { o->scene_B = 0; }));
   EXPECT_TRUE(refused([](Offer* o) { o->nodes = 1u << kNodeCount; }));

@@ -1,11 +1,16 @@
 #include "services/transport/bus/dds/chained_transport.h"
 
+#include <arpa/inet.h>
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/ChainingTransportDescriptor.h>
+#include <fastrtps/utils/IPLocator.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <fastdds/rtps/common/LocatorList.hpp>
+#include <mutex>
 #include <thread>
 #include <utility>
 
@@ -96,6 +101,56 @@ struct GatheringTransportDescriptor final : transport::ChainingTransportDescript
   const std::shared_ptr<Gathering> gathering;
 };
 
+using Ipv4 = StrangeAddresses::Ipv4;
+
+Ipv4 AddressOf(const rtps::Locator_t& locator) {
+  Ipv4 address{};
+  std::copy_n(rtps::IPLocator::getIPv4(locator), address.size(), address.begin());
+  return address;
+}
+
+class OnlyWithTransport final : public ChainedTransport {
+ public:
+  OnlyWithTransport(const transport::ChainingTransportDescriptor& descriptor, const Ipv4& peer,
+                    std::shared_ptr<StrangeAddresses> strangers)
+      : ChainedTransport(descriptor), peer_(peer), strangers_(std::move(strangers)) {}
+
+  void receive(transport::TransportReceiverInterface* above, const rtps::octet* data, std::uint32_t size,
+               const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
+    const Ipv4 from = AddressOf(remote);
+    if (from != peer_) return strangers_->Add(from);
+    above->OnDataReceived(data, size, local, remote);
+  }
+
+  bool send(rtps::SenderResource* below, const rtps::octet* data, std::uint32_t size, rtps::LocatorsIterator* begin,
+            rtps::LocatorsIterator* end, const std::chrono::steady_clock::time_point& limit) override {
+    std::vector<rtps::Locator_t> to;
+    for (; *begin != *end; ++*begin) {
+      if (AddressOf(**begin) == peer_) to.push_back(**begin);
+    }
+    if (to.empty()) return true;
+    transport::Locators first(to.cbegin()), last(to.cend());
+    return below->send(data, size, &first, &last, limit);
+  }
+
+ private:
+  const Ipv4 peer_;
+  const std::shared_ptr<StrangeAddresses> strangers_;
+};
+
+struct OnlyWithTransportDescriptor final : transport::ChainingTransportDescriptor {
+  OnlyWithTransportDescriptor(std::shared_ptr<transport::TransportDescriptorInterface> below, const Ipv4& with,
+                              std::shared_ptr<StrangeAddresses> others)
+      : ChainingTransportDescriptor(std::move(below)), peer(with), strangers(std::move(others)) {}
+
+  [[nodiscard]] transport::TransportInterface* create_transport() const override {
+    return new OnlyWithTransport(*this, peer, strangers);
+  }
+
+  const Ipv4 peer;
+  const std::shared_ptr<StrangeAddresses> strangers;
+};
+
 }  // namespace
 
 void DiscoveryGate::Pass(transport::TransportReceiverInterface* above, const rtps::octet* data, std::uint32_t size,
@@ -116,6 +171,31 @@ void DiscoveryGate::Open() {
                                held.remote);
   }
   held_.clear();
+}
+
+void StrangeAddresses::Add(const Ipv4& ipv4) {
+  datagrams_.fetch_add(1, std::memory_order_relaxed);
+  const std::lock_guard lock(mutex_);
+  if (named_.size() < kMostNamed && std::ranges::find(named_, ipv4) == named_.end()) named_.push_back(ipv4);
+}
+
+std::vector<std::string> StrangeAddresses::named() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::string> texts;
+  for (const Ipv4& address : named_) {
+    std::array<char, INET_ADDRSTRLEN> text{};
+    inet_ntop(AF_INET, address.data(), text.data(), text.size());
+    texts.emplace_back(text.data());
+  }
+  return texts;
+}
+
+std::shared_ptr<transport::TransportDescriptorInterface> OnlyWith(
+    const std::string& peer, std::shared_ptr<transport::TransportDescriptorInterface> transport,
+    std::shared_ptr<StrangeAddresses> strangers) {
+  Ipv4 address{};
+  inet_pton(AF_INET, peer.c_str(), address.data());
+  return std::make_shared<OnlyWithTransportDescriptor>(std::move(transport), address, std::move(strangers));
 }
 
 std::shared_ptr<transport::TransportDescriptorInterface> OneDiscoveryAtATime(

@@ -6,11 +6,13 @@
 #include <fastdds/rtps/transport/TransportDescriptorInterface.h>
 #include <fastdds/rtps/transport/TransportReceiverInterface.h>
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <vector>
 
 namespace fulcrum::bus::dds {
@@ -64,5 +66,30 @@ struct Gathering {
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> LetGather(
     std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport,
     std::shared_ptr<Gathering> gathering);
+
+/// Datagrams from addresses other than that of the one peer, counted and named.
+class StrangeAddresses {
+ public:
+  using Ipv4 = std::array<std::uint8_t, 4>;
+  /// Bounds what forged addresses can make this host store.
+  static constexpr std::size_t kMostNamed = 16;
+
+  void Add(const Ipv4& ipv4);
+  [[nodiscard]] std::uint64_t datagrams() const { return datagrams_.load(std::memory_order_relaxed); }
+  /// The first kMostNamed of them, dotted.
+  [[nodiscard]] std::vector<std::string> named() const;
+
+ private:
+  std::atomic<std::uint64_t> datagrams_{0};  ///< Relaxed: an independent count that orders nothing.
+  mutable std::mutex mutex_;
+  std::vector<Ipv4> named_;
+};
+
+/// Wraps `transport` so that it exchanges datagrams with one address only: others are dropped before the library reads
+/// them, and nothing is sent to a place that an announcement names elsewhere.
+/// @param peer dotted IPv4.
+[[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> OnlyWith(
+    const std::string& peer, std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> transport,
+    std::shared_ptr<StrangeAddresses> strangers);
 
 }  // namespace fulcrum::bus::dds

@@ -30,7 +30,7 @@ inline constexpr int kOrderedBacklog = 256;
 struct FarSettings {
   int domain = 107;     ///< 101 to 200: separate from the domains of all carts.
   std::string address;  ///< IPv4 of the interface with the route to the other host: no other is used.
-  std::string peer;     ///< IPv4 of the other host.
+  std::string peer;     ///< IPv4 of the other host: datagrams are exchanged with no other address.
   FarSide side = FarSide::kCart;
   /// Folder of `fulcrum keys init`: packets are then encrypted, and only participants with such keys are accepted.
   std::filesystem::path keys = {};
@@ -53,7 +53,9 @@ class FarParticipant {
   [[nodiscard]] bool matched() const noexcept;
   /// Host only: one line with the reason why the cart will never accept this side; otherwise empty.
   [[nodiscard]] std::string mismatch();
-  /// Participants that were refused since the construction of this object.
+  /// Datagrams from addresses other than the peer's, which were dropped.
+  [[nodiscard]] std::uint64_t dropped() const noexcept;
+  /// Participants that were refused since the construction of this object, and the addresses of dropped datagrams.
   [[nodiscard]] Refusals refusals();
 
  private:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "services/base/core/hash.h"
 #include "services/transport/bus/gate.h"
 #include "services/transport/link/codec/bits.h"
 #include "services/transport/link/codec/byte_delta.h"
@@ -24,15 +25,22 @@ bool TakeQuestions(ByteReader* r, std::vector<std::uint32_t>* chunks) {
   return r->good();
 }
 
-/// Whether the text is a plain name of a file or folder, without a path that leads elsewhere.
-bool IsName(const std::string& text, std::size_t longest) {
-  return !text.empty() && text.size() <= longest && text[0] != '.' && std::all_of(text.begin(), text.end(), [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_' ||
-           c == '.';
-  });
+bool IsPrintable(const std::string& text) {
+  return std::all_of(text.begin(), text.end(), [](char c) { return c >= ' ' && c <= '~'; });
 }
 
 }  // namespace
+
+std::uint64_t SessionKeyOf(const std::string& session_id) {
+  Hash64 hash;
+  hash.Add(std::string_view(session_id));
+  return hash.value();
+}
+
+bool IsPlainName(const std::string& text, std::size_t longest) {
+  return !text.empty() && text.size() <= longest && text[0] != '.' && text.find('/') == std::string::npos &&
+         IsPrintable(text);
+}
 
 void PutEnvelope(const Envelope& envelope, std::vector<std::uint8_t>* out) {
   ByteWriter w(out);
@@ -40,6 +48,7 @@ void PutEnvelope(const Envelope& envelope, std::vector<std::uint8_t>* out) {
   w.Number(kWireVersion);
   w.Number(static_cast<std::uint8_t>(envelope.kind));
   w.Number(envelope.epoch);
+  w.Number(envelope.session);
 }
 
 bool TakeEnvelope(std::span<const std::uint8_t> packet, Envelope* envelope, std::span<const std::uint8_t>* body,
@@ -51,8 +60,9 @@ bool TakeEnvelope(std::span<const std::uint8_t> packet, Envelope* envelope, std:
   envelope->epoch = r.Number<std::uint64_t>();
   *body = {};
   if (!r.good() || !std::equal(magic.begin(), magic.end(), std::begin(kMagic))) return false;
-  if (*version != kWireVersion) return true;
-  if (kind >= kPacketKinds || envelope->epoch == 0) return false;
+  if (*version != kWireVersion) return true;  // Version 1 had no session here.
+  envelope->session = r.Number<std::uint64_t>();
+  if (!r.good() || kind >= kPacketKinds || envelope->epoch == 0) return false;
   envelope->kind = static_cast<PacketKind>(kind);
   *body = r.Rest();
   return true;
@@ -117,6 +127,7 @@ void PutOffer(const Offer& offer, std::vector<std::uint8_t>* out) {
   w.Number(offer.scene_checksum);
   w.Number(offer.nodes);
   w.Text(offer.cart_yaml);
+  w.Text(offer.withheld);
 }
 
 bool TakeOffer(std::span<const std::uint8_t> body, Offer* offer) {
@@ -128,10 +139,12 @@ bool TakeOffer(std::span<const std::uint8_t> body, Offer* offer) {
   offer->scene_checksum = r.Number<std::uint64_t>();
   offer->nodes = r.Number<std::uint32_t>();
   offer->cart_yaml = r.Text();
-  return r.good() && r.empty() && IsName(offer->session_id, bus::kMaxSessionId) &&
-         offer->scene_name.size() <= bus::kMaxSceneName && offer->scene_hash != 0 && offer->scene_B > 0 &&
+  offer->withheld = r.Text();
+  return r.good() && r.empty() && IsPlainName(offer->session_id, bus::kMaxSessionId) &&
+         IsPlainName(offer->scene_name, bus::kMaxSceneName) && offer->scene_hash != 0 && offer->scene_B > 0 &&
          offer->scene_B <= kLargestScene_B && offer->nodes >> kNodeCount == 0 && offer->nodes != 0 &&
-         offer->cart_yaml.size() <= kLargestCart_B;
+         offer->cart_yaml.size() <= kLargestCart_B && offer->withheld.size() <= kLongestWithheld_B &&
+         IsPrintable(offer->withheld);
 }
 
 void PutSceneAsk(const SceneAsk& ask, std::vector<std::uint8_t>* out) {

@@ -13,7 +13,7 @@
 namespace fulcrum::link {
 
 /// Increases with any change of the packets below and of the codecs.
-inline constexpr std::uint8_t kWireVersion = 1;
+inline constexpr std::uint8_t kWireVersion = 2;
 
 enum class PacketKind : std::uint8_t {
   kPulse,       ///< Both ways, 20 Hz: clock stamps, wanted topics, missing chunks.
@@ -32,7 +32,10 @@ struct Envelope {
   PacketKind kind = PacketKind::kPulse;
   /// CLOCK_MONOTONIC of the sending host when its link started [ns]: grows with each restart.
   std::uint64_t epoch = 0;
+  std::uint64_t session = 0;  ///< SessionKeyOf the session that the sender has joined; 0: none yet.
 };
+/// Names a session in each packet.
+[[nodiscard]] std::uint64_t SessionKeyOf(const std::string& session_id);
 /// Appends the header of a packet; the body is appended after it.
 void PutEnvelope(const Envelope& envelope, std::vector<std::uint8_t>* out);
 /// `body`: the bytes after the header. `version`: the sender's wire version; if it differs from ours, `body` is empty.
@@ -69,15 +72,23 @@ void PutSample(const SampleHead& head, std::span<const std::uint8_t> base, std::
 
 inline constexpr std::uint64_t kLargestScene_B = std::uint64_t{256} << 20;
 inline constexpr std::size_t kLargestCart_B = 48 * 1024;
+inline constexpr std::size_t kLongestWithheld_B = 512;
 inline constexpr std::size_t kSceneChunk_B = 32 * 1024;
 
+/// Whether the text can be the name of a file or folder, and be printed: 1 to `longest` printable ASCII characters
+/// without "/", the first of them no dot. Names that come from another host become parts of paths.
+[[nodiscard]] bool IsPlainName(const std::string& text, std::size_t longest);
+
 struct Offer {
-  std::string session_id, scene_name;
+  std::string session_id, scene_name;  ///< Plain names.
   std::uint64_t scene_hash = 0;
   std::uint64_t scene_B = 0;         ///< Size of the compiled file.
   std::uint64_t scene_checksum = 0;  ///< Hash64 of the bytes of that file.
   std::uint32_t nodes = 0;           ///< Bit per NodeId: nodes that run on the host.
-  std::string cart_yaml;
+  std::string cart_yaml;             ///< Without paths and devices of the cart's machine.
+  /// Keys of the cart that name a file or device of the cart's machine and concern `nodes`, with commas between: the
+  /// host must supply them.
+  std::string withheld;
 };
 void PutOffer(const Offer& offer, std::vector<std::uint8_t>* out);
 [[nodiscard]] bool TakeOffer(std::span<const std::uint8_t> body, Offer* offer);
