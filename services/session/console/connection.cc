@@ -1,5 +1,6 @@
 #include "services/session/console/connection.h"
 
+#include <array>
 #include <boost/asio/ssl/stream_base.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
@@ -74,19 +75,20 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
  public:
   static constexpr bool kSecure = std::is_same_v<Stream, TlsStream>;
 
-  template <class... Words>
-  ConnectionOver(Admission::Id id, std::shared_ptr<ServerState> state, Words&&... words)
-      : Connection(id, std::move(state)), stream_(std::forward<Words>(words)...) {}
+  ConnectionOver(Admission::Id id, std::shared_ptr<ServerState> state, tcp::socket socket, asio::ssl::context* tls)
+      : Connection(id, std::move(state)), tls_(tls) {
+    if constexpr (kSecure) {
+      silent_.emplace(std::move(socket));
+    } else {
+      stream_.emplace(std::move(socket));
+    }
+  }
 
   void Begin() override {
     // One time limit for handshake and request: bytes that trickle in do not move it.
     transport().expires_after(server().limits.guest_request);
     if constexpr (kSecure) {
-      stream_.async_handshake(asio::ssl::stream_base::server,
-                              [self = this->shared_from_this()](const beast::error_code& error) {
-                                if (error) return self->Close();
-                                self->ReadHead();
-                              });
+      AwaitHello();
     } else {
       ReadHead();
     }
@@ -95,7 +97,7 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
   void SendPart(std::string text) override {
     part_ = std::move(text);
     BeginPart();
-    asio::async_write(stream_, http::make_chunk(asio::const_buffer(part_.data(), part_.size())),
+    asio::async_write(*stream_, http::make_chunk(asio::const_buffer(part_.data(), part_.size())),
                       [self = this->shared_from_this()](const beast::error_code& error, std::size_t) {
                         self->EndPart();
                         if (error) self->Close();
@@ -110,13 +112,34 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
   }
 
  private:
-  beast::tcp_stream& transport() { return beast::get_lowest_layer(stream_); }
+  beast::tcp_stream& transport() { return stream_ ? beast::get_lowest_layer(*stream_) : *silent_; }
+
+  /// A silent connection costs a socket only: the state of TLS is made when the first bytes have arrived.
+  void AwaitHello() {
+    silent_->async_read_some(asio::buffer(hello_),
+                             [self = this->shared_from_this()](const beast::error_code& error, std::size_t size) {
+                               if (error || !self->open()) return self->Close();
+                               self->Handshake(size);
+                             });
+  }
+
+  void Handshake(std::size_t size) {
+    if constexpr (kSecure) {
+      stream_.emplace(std::move(*silent_), *tls_);
+      stream_->async_handshake(asio::ssl::stream_base::server, asio::buffer(hello_.data(), size),
+                               [self = this->shared_from_this(), size](const beast::error_code& error, std::size_t n) {
+                                 // Before the server's hello no client has more to say than its own.
+                                 if (error || n != size) return self->Close();
+                                 self->ReadHead();
+                               });
+    }
+  }
 
   void ReadHead() {
     parser_.emplace();
     parser_->header_limit(server().limits.header_bytes);
     parser_->body_limit(server().limits.body_bytes);
-    http::async_read_header(stream_, buffer_, *parser_,
+    http::async_read_header(*stream_, buffer_, *parser_,
                             [self = this->shared_from_this()](const beast::error_code& error, std::size_t) {
                               if (error) return self->Fail(error);
                               self->ReadBody();
@@ -131,7 +154,7 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
     // A client with the token gets its response even when all reserved slots are taken.
     last_ = has_token && !known_;
     if (has_token) transport().expires_after(server().limits.request);
-    http::async_read(stream_, buffer_, *parser_,
+    http::async_read(*stream_, buffer_, *parser_,
                      [self = this->shared_from_this()](const beast::error_code& error, std::size_t) {
                        if (error) return self->Fail(error);
                        self->Respond();
@@ -164,7 +187,7 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
     response->body() = std::move(from.body);
     response->prepare_payload();
     transport().expires_after(server().limits.response);
-    http::async_write(stream_, *response,
+    http::async_write(*stream_, *response,
                       [self = this->shared_from_this(), response](const beast::error_code& error, std::size_t) {
                         if (error || response->need_eof()) return self->Close();
                         self->AwaitNext();
@@ -185,7 +208,7 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
     transport().expires_never();
     BeginPart();
     http::async_write_header(
-        stream_, *serializer,
+        *stream_, *serializer,
         [self = this->shared_from_this(), response, serializer](const beast::error_code& error, std::size_t) {
           self->EndPart();
           if (error) return self->Close();
@@ -196,12 +219,15 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
 
   /// Closes the stream at the next event on the socket: the client ends it, or sends bytes that are not allowed here.
   void WatchForEnd() {
-    stream_.async_read_some(
+    stream_->async_read_some(
         asio::buffer(&last_word_, 1),
         [self = this->shared_from_this()](const beast::error_code&, std::size_t) { self->Close(); });
   }
 
-  Stream stream_;
+  asio::ssl::context* const tls_;            ///< Null: plain TCP.
+  std::optional<beast::tcp_stream> silent_;  ///< Until the first bytes of TLS.
+  std::array<char, 2048> hello_{};           ///< These bytes.
+  std::optional<Stream> stream_;
   beast::flat_buffer buffer_{32 * 1024};
   std::optional<http::request_parser<http::string_body>> parser_;
   bool known_ = false;  ///< Has a reserved slot.
@@ -229,9 +255,9 @@ void Connection::Close() {
 std::shared_ptr<Connection> MakeConnection(tcp::socket socket, Admission::Id id, std::shared_ptr<ServerState> server,
                                            asio::ssl::context* tls) {
   if (tls == nullptr) {
-    return std::make_shared<ConnectionOver<beast::tcp_stream>>(id, std::move(server), std::move(socket));
+    return std::make_shared<ConnectionOver<beast::tcp_stream>>(id, std::move(server), std::move(socket), tls);
   }
-  return std::make_shared<ConnectionOver<TlsStream>>(id, std::move(server), beast::tcp_stream(std::move(socket)), *tls);
+  return std::make_shared<ConnectionOver<TlsStream>>(id, std::move(server), std::move(socket), tls);
 }
 
 }  // namespace fulcrum::console
