@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <fstream>
 #include <thread>
 
 #include "services/base/runtime/cyclic_thread.h"
@@ -24,6 +25,7 @@ using runtime::MonotonicNs;
 
 constexpr double kPatience_s = 20;
 constexpr std::int64_t kPromise_ns = 1'000'000'000;  ///< Samples older than this must be in the file.
+constexpr std::int64_t kOnTheWay_ns = 50'000'000;    ///< Samples younger than this may not have been received yet.
 constexpr int kFrameEvery = 10;                      ///< ToolStates.
 constexpr std::uint32_t kVertices = 20'000;
 
@@ -94,24 +96,52 @@ void RecorderProbe::SendFor(double seconds) {
   }
 }
 
-void RecorderProbe::Count(const std::vector<Sent>& sent, const std::vector<std::uint64_t>& read, std::int64_t kill_ns,
-                          Result* result) {
+void RecorderProbe::Count(const std::vector<Sent>& sent, const Stamps& read, std::int64_t kill_ns, Result* result) {
   // Samples sent before the two processes discovered each other are not received.
-  const std::uint64_t first = read.empty() ? 0 : read.front();
+  const std::uint64_t first = read.empty() ? 0 : read.begin()->first;
   for (const Sent& sample : sent) {
     if (sample.sequence < first || sample.time_ns > kill_ns - kPromise_ns) continue;
     ++result->due;
-    if (read.empty() || sample.sequence > read.back()) continue;
+    if (read.empty() || sample.sequence > read.rbegin()->first) continue;
     ++result->read;
-    result->missed += std::binary_search(read.begin(), read.end(), sample.sequence) ? 0 : 1;
+    result->missed += read.contains(sample.sequence) ? 0 : 1;
   }
+}
+
+std::uint64_t RecorderProbe::Missing(const std::vector<Sent>& sent, const Stamps& read, std::int64_t end_ns) {
+  if (read.empty()) return sent.size();
+  return static_cast<std::uint64_t>(std::ranges::count_if(sent, [&](const Sent& sample) {
+    return sample.sequence >= read.begin()->first && sample.time_ns <= end_ns && !read.contains(sample.sequence);
+  }));
+}
+
+RecorderProbe::Content RecorderProbe::Read(const fs::path& file) {
+  Content content;
+  recording::McapReader reader(file);
+  recording::McapMessage message;
+  while (reader.Next(&message)) {
+    const std::string& topic = reader.channels().at(message.channel).topic;
+    ToolState tool;
+    TissueFrame frame;
+    if (topic == bus::RoleOf<ToolState>().name && bus::DecodeCdr(message.data, &tool)) {
+      content.tools[tool.stamp.sequence] = tool.stamp.stamp_ns;
+    } else if (topic == bus::RoleOf<TissueFrame>().name && bus::DecodeCdr(message.data, &frame)) {
+      content.frames[frame.header.stamp.sequence] = frame.header.stamp.stamp_ns;
+    }
+  }
+  content.closed = reader.closed() && reader.faults().empty();
+  if (reader.metadata().contains("ended")) content.ended = reader.metadata().at("ended").at("reason");
+  return content;
+}
+
+std::vector<std::string> RecorderProbe::Arguments(const fs::path& file) const {
+  return {"--scene", scene_, "--session", folder_, "--domain", std::to_string(domain_), "--file", file};
 }
 
 RecorderProbe::Result RecorderProbe::RecordAndKill(double seconds) {
   Result result;
   result.file = folder_ / ("recording" + std::to_string(++runs_) + ".mcap");
-  Program recorder("recorder", {"--scene", scene_, "--session", folder_, "--domain", std::to_string(domain_), "--file",
-                                result.file});
+  Program recorder("recorder", Arguments(result.file));
   if (!Connect(recorder)) return result;
   sent_tools_.clear();
   sent_frames_.clear();
@@ -119,21 +149,35 @@ RecorderProbe::Result RecorderProbe::RecordAndKill(double seconds) {
   const std::int64_t kill_ns = MonotonicNs();
   recorder.End(SIGKILL);
 
-  std::vector<std::uint64_t> tools, frames;
-  recording::McapReader reader(result.file);
-  recording::McapMessage message;
-  while (reader.Next(&message)) {
-    const std::string& topic = reader.channels().at(message.channel).topic;
-    ToolState tool;
-    TissueFrame frame;
-    if (topic == bus::RoleOf<ToolState>().name && bus::DecodeCdr(message.data, &tool)) {
-      tools.push_back(tool.stamp.sequence);
-    } else if (topic == bus::RoleOf<TissueFrame>().name && bus::DecodeCdr(message.data, &frame)) {
-      frames.push_back(frame.header.stamp.sequence);
-    }
-  }
-  Count(sent_tools_, tools, kill_ns, &result);
-  Count(sent_frames_, frames, kill_ns, &result);
+  const Content content = Read(result.file);
+  Count(sent_tools_, content.tools, kill_ns, &result);
+  Count(sent_frames_, content.frames, kill_ns, &result);
+  if (!content.tools.empty()) result.unread_ms = 1e-6 * static_cast<double>(kill_ns - content.tools.rbegin()->second);
+  return result;
+}
+
+RecorderProbe::FullDisk RecorderProbe::RecordUntilFull(std::uint64_t room_B, double seconds) {
+  FullDisk result;
+  result.file = folder_ / ("recording" + std::to_string(++runs_) + ".mcap");
+  // The reserve is all but this room of the disk that there is.
+  const fs::path cart = folder_ / "cart.yaml";
+  const std::uint64_t free_B = fs::space(folder_).available;
+  std::ofstream(cart) << "recorder: {keep_free_MB: " << (free_B > room_B ? (free_B - room_B) / 1'000'000 : 0) << "}\n";
+  std::vector<std::string> arguments = Arguments(result.file);
+  arguments.insert(arguments.end(), {"--cart", cart});
+  Program recorder("recorder", arguments);
+  if (!Connect(recorder)) return result;
+  sent_tools_.clear();
+  sent_frames_.clear();
+  SendFor(seconds);
+  if (recorder.End(SIGTERM) != 0) return result;
+
+  const Content content = Read(result.file);
+  result.has_ended = content.closed && !content.ended.empty();
+  result.recorded = content.tools.size() + content.frames.size();
+  if (content.tools.empty() || content.frames.empty()) return result;
+  const std::int64_t end_ns = std::max(content.tools.rbegin()->second, content.frames.rbegin()->second) - kOnTheWay_ns;
+  result.lost = Missing(sent_tools_, content.tools, end_ns) + Missing(sent_frames_, content.frames, end_ns);
   return result;
 }
 

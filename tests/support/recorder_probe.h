@@ -3,7 +3,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "services/base/core/messages.h"
@@ -25,20 +27,41 @@ class RecorderProbe {
     std::uint64_t due = 0;     ///< Samples that the file must contain: those older than a second at the kill.
     std::uint64_t read = 0;    ///< Of these, samples up to the last one of their topic in the file.
     std::uint64_t missed = 0;  ///< Of those, missing samples: lost in transport and not by the kill.
+    double unread_ms = 0;      ///< Age of the last ToolState in the file at the kill [ms]: what the kill has cost.
     std::filesystem::path file;
   };
   /// Records for `seconds`, then kills the recorder and reads its file. `due` is 0 if the recorder did not start.
   Result RecordAndKill(double seconds);
+
+  struct FullDisk {
+    bool has_ended = false;      ///< In order: the file is closed and tells of its end.
+    std::uint64_t recorded = 0;  ///< Samples in the file.
+    std::uint64_t lost = 0;      ///< Samples sent before the end of the recording that are not in the file.
+    std::filesystem::path file;
+  };
+  /// Records onto a disk that has room for `room_B` above the recorder's reserve, for `seconds`, then stops the
+  /// recorder.
+  FullDisk RecordUntilFull(std::uint64_t room_B, double seconds);
 
  private:
   struct Sent {
     std::uint64_t sequence;
     std::int64_t time_ns;
   };
+  /// Stamps of a topic's samples in a file, by sequence.
+  using Stamps = std::map<std::uint64_t, std::int64_t>;
+  struct Content {
+    Stamps tools, frames;
+    bool closed = false;
+    std::string ended;
+  };
+  [[nodiscard]] static Content Read(const std::filesystem::path& file);
+  [[nodiscard]] std::vector<std::string> Arguments(const std::filesystem::path& file) const;
   bool Connect(const Program& recorder);
   void SendFor(double seconds);
-  static void Count(const std::vector<Sent>& sent, const std::vector<std::uint64_t>& read, std::int64_t kill_ns,
-                    Result* result);
+  static void Count(const std::vector<Sent>& sent, const Stamps& read, std::int64_t kill_ns, Result* result);
+  /// Number of samples that were sent between the first recorded one and `end_ns` and are not in the file.
+  static std::uint64_t Missing(const std::vector<Sent>& sent, const Stamps& read, std::int64_t end_ns);
 
   const int domain_;
   std::filesystem::path folder_, scene_;

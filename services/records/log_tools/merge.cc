@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <memory>
 #include <system_error>
 
 #include "services/base/core/error.h"
 #include "services/records/log_tools/copier.h"
-#include "services/records/log_tools/sequence_gaps.h"
 #include "services/records/recording/time_order.h"
 
 namespace fulcrum::log_tools {
@@ -18,14 +18,6 @@ namespace {
 
 /// Larger recordings are not joined at the end of a session, which would take more than about ten seconds.
 constexpr std::uintmax_t kLongestJoin_B = 3'000'000'000;
-/// A break in all topics at once: tools and manifests are sent every millisecond, also while a node is slow.
-constexpr std::uint64_t kShortestBreak_ns = 50'000'000;
-
-std::string Text(const char* format, double a, double b, double c) {
-  std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), format, a, b, c);
-  return text.data();
-}
 
 std::string ValueOf(const recording::McapReader& reader, const char* record, const char* key) {
   const auto found = reader.metadata().find(record);
@@ -38,7 +30,6 @@ std::string ValueOf(const recording::McapReader& reader, const char* record, con
 struct Segment {
   explicit Segment(const fs::path& path) : file(path), messages(path) { Step(); }
   void Step() {
-    if (has_next) last_ns = time_ns();
     has_next = messages.Next(&next);
     if (has_next && first_ns == 0) first_ns = next.log_time_ns;
   }
@@ -51,7 +42,7 @@ struct Segment {
   recording::McapMessage next{};
   bool has_next = false;
   std::int64_t shift_ns = 0;
-  std::uint64_t first_ns = 0, last_ns = 0;  ///< `first_ns`: on the file's own clock.
+  std::uint64_t first_ns = 0;  ///< On the file's own clock.
 };
 
 std::int64_t ClockOf(const Segment& source) {
@@ -81,22 +72,31 @@ Segment* Earliest(std::vector<std::unique_ptr<Segment>>* sources) {
   return earliest;
 }
 
-/// Spans between the last message of a file and the first of the next one.
-std::vector<std::string> Breaks(const std::vector<std::unique_ptr<Segment>>& sources) {
-  std::vector<std::string> breaks;
-  const Segment& first = *sources.front();
-  for (std::size_t i = 1; i < sources.size(); ++i) {
-    const Segment& before = *sources[i - 1];
-    const Segment& after = *sources[i];
-    if (after.first_ns == 0) continue;
-    const auto since_begin_s = [&](std::uint64_t ns) { return 1e-9 * static_cast<double>(ns - first.first_ns); };
-    const std::uint64_t to_ns = after.first_ns + static_cast<std::uint64_t>(after.shift_ns);
-    const double from_s = since_begin_s(before.last_ns), to_s = since_begin_s(to_ns);
-    if (to_ns > before.last_ns + kShortestBreak_ns)
-      breaks.push_back(Text("no message from %.3f to %.3f s (%.3f s)", from_s, to_s, to_s - from_s));
+/// The last message of a writer, by which the next one is judged.
+struct Newest {
+  std::uint32_t sequence;
+  const Segment* segment;
+  std::uint64_t time_ns;
+};
+
+/// Where messages are missing between two files: what the recorder had not written when it was killed, and what was
+/// sent until the next one read.
+struct Break {
+  std::uint64_t from_ns = std::numeric_limits<std::uint64_t>::max(), to_ns = 0, missing = 0;
+
+  void Add(std::uint64_t gap, std::uint64_t before_ns, std::uint64_t after_ns) {
+    from_ns = std::min(from_ns, before_ns);
+    to_ns = std::max(to_ns, after_ns);
+    missing += gap;
   }
-  return breaks;
-}
+  [[nodiscard]] std::string Text(std::uint64_t begin_ns) const {
+    std::array<char, 160> text{};
+    std::snprintf(text.data(), text.size(), "%llu messages are missing from %.3f to %.3f s",
+                  static_cast<unsigned long long>(missing), 1e-9 * static_cast<double>(from_ns - begin_ns),
+                  1e-9 * static_cast<double>(to_ns - begin_ns));
+    return text.data();
+  }
+};
 
 using Metadata = std::map<std::string, std::map<std::string, std::string>>;
 
@@ -129,7 +129,6 @@ std::vector<std::unique_ptr<Segment>> Open(const std::vector<fs::path>& files) {
   std::ranges::stable_sort(sources, {}, begin_ns);
   for (const auto& source : sources) {
     source->shift_ns = ClockOf(*sources.front()) - ClockOf(*source);
-    source->last_ns = source->time_ns();
   }
   return sources;
 }
@@ -149,30 +148,36 @@ MergeResult Merge(const std::vector<fs::path>& files, const fs::path& out) {
   MergeResult result;
   recording::McapWriter writer(out, sources.front()->reader().profile(), sources.front()->reader().library());
   Copier copier(&writer);
-  SequenceGaps gaps;
-  std::map<std::uint16_t, std::uint32_t> last;  // Sequence, by channel of the copy.
+  std::map<std::uint16_t, Newest> newest;  // By channel of the copy.
+  std::map<const Segment*, Break> breaks;  // By the file after it.
   std::uint64_t missing = 0;
-  while (Segment* source = Earliest(&sources)) {
-    recording::McapMessage message = source->next;
-    const std::uint16_t channel = copier.ChannelOf(source->reader(), message.channel);
-    const auto [newest, is_first] = last.try_emplace(channel, message.sequence);
-    // Modulo 2^32. A recorder that has just begun receives again what late joiners get.
-    if (is_first || static_cast<std::int32_t>(message.sequence - newest->second) > 0) {
-      newest->second = message.sequence;
-      copier.Copy(source->reader(), message, source->shift_ns);
-      message.channel = channel;
-      missing += gaps.Before(message);
+  while (Segment* segment = Earliest(&sources)) {
+    const recording::McapMessage& message = segment->next;
+    const Newest now{message.sequence, segment, segment->time_ns()};
+    const auto [before, is_first] = newest.try_emplace(copier.ChannelOf(segment->reader(), message.channel), now);
+    // Modulo 2^32. Not positive: a recorder that has just begun receives again what late joiners get.
+    const auto step = static_cast<std::int32_t>(now.sequence - before->second.sequence);
+    if (is_first || step > 0) {
+      copier.Copy(segment->reader(), message, segment->shift_ns);
       ++result.messages;
+      const std::uint64_t gap = is_first ? 0 : static_cast<std::uint64_t>(step) - 1;
+      missing += gap;
+      if (gap > 0 && before->second.segment != segment) {
+        breaks[segment].Add(gap, before->second.time_ns, now.time_ns);
+      }
+      before->second = now;
     }
-    source->Step();
+    segment->Step();
   }
   copier.Finish();
   for (const auto& [name, values] : JoinedMetadata(sources)) writer.AddMetadata(name, values);
   std::string names, spans;
   for (const auto& source : sources) names += (names.empty() ? "" : " ") + source->file.filename().string();
-  for (const std::string& span : Breaks(sources)) {
-    spans += (spans.empty() ? "" : "; ") + span;
-    result.notes.push_back(span);
+  for (const auto& source : sources) {
+    const auto at = breaks.find(source.get());
+    if (at == breaks.end()) continue;
+    result.notes.push_back(at->second.Text(sources.front()->first_ns));
+    spans += (spans.empty() ? "" : "; ") + result.notes.back();
   }
   writer.AddMetadata("merged", {{"files", names}, {"breaks", spans}, {"missing", std::to_string(missing)}});
   writer.Close();

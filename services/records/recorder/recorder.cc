@@ -138,7 +138,9 @@ void Recorder::AddChannels(recording::McapWriter* file, std::size_t first,
 void Recorder::Flush(std::int64_t now_ns) {
   const std::string end = file_ ? ReasonToEnd(now_ns) : std::string();
   Exchange(now_ns, !end.empty(), end);
-  if (file_ && (!end.empty() || !file_->error().empty())) FinishFile();
+  if (!file_ || (end.empty() && file_->error().empty())) return;
+  FinishFile();
+  runtime::Log(runtime::LogLevel::kError, ended_);
 }
 
 std::string Recorder::ReasonToEnd(std::int64_t now_ns) {

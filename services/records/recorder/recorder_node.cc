@@ -61,7 +61,10 @@ RecorderSettings WithDescription(RecorderSettings settings, const bus::DdsPartic
 }  // namespace
 
 RecorderNode::RecorderNode(app::NodeApp* app, const RecorderSettings& settings)
-    : bus_(BusSettings(app)), recorder_(WithDescription(settings, bus_)), dumps_(&recorder_, app->options().session) {
+    : app_(app),
+      bus_(BusSettings(app)),
+      recorder_(WithDescription(settings, bus_)),
+      dumps_(&recorder_, app->options().session) {
   ReceiveAllTopics(app);
   if (settings.keep_s > 0) {
     app->OnOrder("dump", [this](const std::string& reason) { return dumps_.Ask(reason); });
@@ -87,6 +90,10 @@ void RecorderNode::ReceiveAllTopics(app::NodeApp* app) {
 
 void RecorderNode::Step(const Tick& tick) {
   recorder_.Flush(tick.stamp_ns);
+  if (!has_ended_ && !recorder_.stats().ended.empty()) {
+    has_ended_ = true;
+    app_->PublishHealthNow();
+  }
   dumps_.WriteIfAsked(tick.stamp_ns);
 }
 

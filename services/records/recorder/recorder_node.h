@@ -28,6 +28,8 @@ class RecorderNode {
  private:
   void ReceiveAllTopics(app::NodeApp* app);
 
+  app::NodeApp* app_;
+  bool has_ended_ = false;  ///< Health has told of the end of the recording.
   // Declared in the order of dependence: the inputs call the recorder, which reads the process behind a writer from the
   // participant.
   bus::DdsParticipant bus_;

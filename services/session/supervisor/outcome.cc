@@ -66,9 +66,7 @@ std::string RecordingLosses(const SessionRecord& record) {
   const std::uint64_t lost = record.node(NodeId::kRecorder).drops;
   const int restarts = record.node(NodeId::kRecorder).restarts;
   return (lost == 0 ? "no sample lost" : std::to_string(lost) + " samples lost") +
-         (restarts == 0 ? ""
-                        : " but for those of " + std::to_string(restarts) +
-                              " restarts of the recorder, each with a file of its own");
+         (restarts == 0 ? "" : " but for those of " + std::to_string(restarts) + " restarts of the recorder");
 }
 
 std::string SummaryJson(const SessionOutcome& outcome, const SessionRecord& record) {

@@ -4,6 +4,10 @@
 //   record.lost_samples             in that whole session, by the sequences in the file
 //   record.file_MB_per_s            what that session writes
 //   record.readable_after_kill_pct  samples older than a second at kill -9 of the recorder that its file gives back
+//   record.lost_at_kill_ms_max      at those kills, the age of the newest sample in the file
+//   record.busy.lost_samples        in a session beside two busy loops for each core, by the sequences in its file
+//   record.busy.lost_for_replay     of these, samples that a replay needs
+//   guard.disk_full_lost_samples    sent before the end of a recording that ends for lack of room, and not in its file
 //   record.write_MB_per_s           frames, patches and tool states as such a session has them, as fast as they are
 //                                   packed and written into a file in the folder for temporary files
 #include <signal.h>
@@ -14,11 +18,13 @@
 #include <cstdio>
 #include <fstream>
 #include <sstream>
+#include <stop_token>
 #include <thread>
 
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/records/log_tools/sequence_gaps.h"
 #include "services/records/log_tools/tools.h"
+#include "services/records/recorder/priorities.h"
 #include "services/records/recorder/recorder.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
@@ -49,6 +55,66 @@ double CpuTime(pid_t pid) {
   return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
 }
 
+/// Keeps all cores busy.
+class BusyLoops {
+ public:
+  explicit BusyLoops(unsigned count) {
+    for (unsigned i = 0; i < count; ++i) {
+      loops_.emplace_back([](const std::stop_token& stop) {
+        while (!stop.stop_requested()) {
+        }
+      });
+    }
+  }
+
+ private:
+  std::vector<std::jthread> loops_;
+};
+
+struct Losses {
+  std::uint64_t samples = 0, lost = 0, needed = 0;
+  double end_s = 0;
+};
+
+Losses LossesIn(const fs::path& file) {
+  log_tools::Recording recording(file);
+  log_tools::SequenceGaps gaps;
+  log_tools::Entry entry;
+  Losses losses;
+  while (recording.Next(&entry)) {
+    ++losses.samples;
+    const std::uint64_t gap = gaps.Before(entry.message);
+    losses.lost += gap;
+    if (entry.source->topic && !recorder::IsDroppedFirst(*entry.source->topic)) losses.needed += gap;
+    losses.end_s = std::max(losses.end_s, entry.time_s);
+  }
+  return losses;
+}
+
+/// False when the session did not come about.
+bool BusySession(benchmark::Report* report) {
+  const BusyLoops busy(2 * std::thread::hardware_concurrency());
+  testing::Cart cart("built-in", kCartDomain, {"--record", "--seconds", report->quick() ? "10" : "30"});
+  if (!cart.WaitForEnd(2 * kPatience_s)) return false;
+  const Losses losses = LossesIn(cart.session() / "recording.mcap");
+  if (losses.samples == 0) return false;
+  report->Add("record.busy.lost_samples", static_cast<double>(losses.lost), "samples");
+  report->Add("record.busy.lost_for_replay", static_cast<double>(losses.needed), "samples");
+  return true;
+}
+
+void FullDisk(benchmark::Report* report) {
+  testing::RecorderProbe probe(kProbeDomain);
+  // Room for a second or two of the probe's frames.
+  const auto result = probe.RecordUntilFull(60'000'000, 6);
+  if (!result.has_ended) {
+    std::fprintf(stderr, "bench_recording: the recording did not end in order for lack of room\n");
+    return;
+  }
+  report->Add("guard.disk_full_lost_samples", static_cast<double>(result.lost), "samples");
+  report->Add("guard.disk_full_recorded_samples", static_cast<double>(result.recorded), "samples");
+}
+
 /// False when the session did not come about.
 bool Session(benchmark::Report* report) {
   const double seconds = report->quick() ? 15 : 60;
@@ -70,33 +136,27 @@ bool Session(benchmark::Report* report) {
   report->Add("record.cpu_pct", 100 * used_s / Seconds(MonotonicNs() - begin_ns), "%");
   if (!cart.WaitForEnd(kPatience_s)) return false;
   const fs::path file = cart.session() / "recording.mcap";
-  log_tools::Recording recording(file);
-  log_tools::SequenceGaps gaps;
-  log_tools::Entry entry;
-  std::uint64_t lost = 0, samples = 0;
-  double end_s = 0;
-  while (recording.Next(&entry)) {
-    ++samples;
-    lost += gaps.Before(entry.message);
-    end_s = std::max(end_s, entry.time_s);
-  }
-  report->Add("record.lost_samples", static_cast<double>(lost), "samples");
-  report->Add("record.samples", static_cast<double>(samples), "samples");
-  report->Add("record.file_MB_per_s", 1e-6 * static_cast<double>(fs::file_size(file)) / end_s, "MB/s");
+  const Losses losses = LossesIn(file);
+  report->Add("record.lost_samples", static_cast<double>(losses.lost), "samples");
+  report->Add("record.samples", static_cast<double>(losses.samples), "samples");
+  report->Add("record.file_MB_per_s", 1e-6 * static_cast<double>(fs::file_size(file)) / losses.end_s, "MB/s");
   return true;
 }
 
 void Kills(benchmark::Report* report) {
   testing::RecorderProbe probe(kProbeDomain);
   std::uint64_t due = 0, read = 0, missed = 0;
+  double unread_ms = 0;
   for (int kill = 0; kill < (report->quick() ? 4 : 20); ++kill) {
     // Kills at all phases of a chunk.
     const auto result = probe.RecordAndKill(1.6 + 0.037 * kill);
     due += result.due;
     read += result.read;
     missed += result.missed;
+    unread_ms = std::max(unread_ms, result.unread_ms);
   }
   report->Add("record.readable_after_kill_pct", 100.0 * static_cast<double>(read) / static_cast<double>(due), "%");
+  report->Add("record.lost_at_kill_ms_max", unread_ms, "ms");
   report->Add("record.readable_after_kill_missed", static_cast<double>(missed), "samples");
 }
 
@@ -149,7 +209,7 @@ void Write(benchmark::Report* report) {
     for (int i = 0; i < 5; ++i) bytes += second.Receive(&recorder);
     recorder.Close(MonotonicNs());
     rates.push_back(1e-6 * static_cast<double>(bytes) / Seconds(MonotonicNs() - begin_ns));
-    if (!recorder.stats().error.empty()) std::fprintf(stderr, "bench_recording: %s\n", recorder.stats().error.c_str());
+    if (!recorder.stats().ended.empty()) std::fprintf(stderr, "bench_recording: %s\n", recorder.stats().ended.c_str());
   }
   report->Add("record.write_MB_per_s", benchmark::Quantile(rates, 0.5), "MB/s");
   std::error_code ignored;
@@ -158,7 +218,12 @@ void Write(benchmark::Report* report) {
 
 int Run(benchmark::Report* report) {
   if (report->Wants("record.write_MB_per_s")) Write(report);
-  if (report->Wants("record.readable_after_kill")) Kills(report);
+  if (report->Wants("record.readable_after_kill") || report->Wants("record.lost_at_kill_ms_max")) Kills(report);
+  if (report->Wants("guard.disk_full_lost_samples")) FullDisk(report);
+  if (report->Wants("record.busy.lost_samples") && !BusySession(report)) {
+    std::fprintf(stderr, "bench_recording: the session beside busy loops did not begin or end\n");
+    return 1;
+  }
   for (const char* key : {"record.cpu_pct", "record.lost_samples", "record.samples", "record.file_MB_per_s"}) {
     if (!report->Wants(key)) continue;
     if (Session(report)) break;

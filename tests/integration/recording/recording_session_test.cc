@@ -1,5 +1,6 @@
 // Recordings of real processes over the real bus.
 #include <gtest/gtest.h>
+#include <signal.h>
 
 #include <map>
 
@@ -77,6 +78,7 @@ TEST(KilledRecorder, LeavesAFileWithAllThatIsOlderThanASecond) {
     const RecorderProbe::Result result = probe.RecordAndKill(1.7 + 0.13 * kill);
     EXPECT_GT(result.due, 400u);
     EXPECT_EQ(result.read, result.due);
+    EXPECT_LT(result.unread_ms, 1000);
     const fs::path mended = result.file.parent_path() / ("mended" + std::to_string(kill) + ".mcap");
     EXPECT_FALSE(log_tools::Recover(result.file, mended).empty()) << "it was not closed";
     log_tools::Recording whole(mended);
@@ -86,6 +88,36 @@ TEST(KilledRecorder, LeavesAFileWithAllThatIsOlderThanASecond) {
     EXPECT_TRUE(whole.reader().closed());
     EXPECT_TRUE(whole.reader().faults().empty());
   }
+}
+
+TEST(FullDisk, EndsARecordingInOrderWithAllSamplesSentBefore) {
+  RecorderProbe probe(kProbeDomain);
+  const RecorderProbe::FullDisk result = probe.RecordUntilFull(40'000'000, 4);
+  EXPECT_TRUE(result.has_ended);
+  EXPECT_GT(result.recorded, 100u);
+  EXPECT_EQ(result.lost, 0u);
+}
+
+TEST(RestartedRecorder, LeavesOneRecordingThatNamesTheBreak) {
+  Cart cart("small", kCartDomain, {"--record", "--seconds", "5"});
+  ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.Said().find(" s · ") != std::string::npos; })) << cart.Said();
+  ::kill(cart.nodes().at("recorder"), SIGKILL);
+  EXPECT_TRUE(cart.WaitForEnd(60).has_value()) << cart.Said();
+  EXPECT_NE(cart.Said().find("2 files of the recording were joined; "), std::string::npos) << cart.Said();
+  EXPECT_FALSE(fs::exists(cart.session() / "recording-2.mcap"));
+  log_tools::Recording recording(cart.session() / "recording.mcap");
+  log_tools::Entry entry;
+  double last_s = 0;
+  std::map<std::uint16_t, std::uint32_t> last;
+  while (recording.Next(&entry)) {
+    const auto [newest, is_first] = last.try_emplace(entry.message.channel, entry.message.sequence);
+    EXPECT_TRUE(is_first || entry.message.sequence > newest->second) << entry.source->name << ": twice";
+    newest->second = entry.message.sequence;
+    last_s = entry.time_s;
+  }
+  EXPECT_GT(last_s, 4) << "to the end of the session";
+  EXPECT_TRUE(recording.reader().closed());
+  EXPECT_NE(recording.reader().metadata().at("merged").at("breaks"), "");
 }
 
 }  // namespace
