@@ -222,7 +222,7 @@ class Link final : public Target {
     Bytes all;
     const Bytes file(100, 7);
     AppendPacket(link::PacketKind::kOffer, &all, [&](Bytes* packet) {
-      link::PutOffer({"20260101-120000", "small", 9, file.size(), 1, 2, "name: lab\n"}, packet);
+      link::PutOffer({"20260101-120000", "small", 9, file.size(), 1, 2, "name: lab\n", {}}, packet);
     });
     AppendPacket(link::PacketKind::kSceneAsk, &all, [&](Bytes* packet) { link::PutSceneAsk({9, 0}, packet); });
     AppendPacket(link::PacketKind::kSceneChunk, &all, [&](Bytes* packet) {
