@@ -22,7 +22,7 @@ constexpr std::array kFaultMetrics{
     FaultMetric{"quarantined_cells", NodeId::kThermal, "thermal_node excluded ", " cells that were not plausible"},
     FaultMetric{"forces_not_finite", NodeId::kHaptics, "haptics_node computed ", " forces that were not finite"},
     FaultMetric{"png_failed", NodeId::kRender, "render_node could not write ", " pictures"},
-    FaultMetric{"png_dropped", NodeId::kRender, "render_node dropped ", " pictures, which the disk was too slow for"},
+    FaultMetric{"png_dropped", NodeId::kRender, "render_node dropped ", " pictures, because writing was too slow"},
     FaultMetric{"recording_ended", NodeId::kRecorder, nullptr, "the recording ended before the session"},
     FaultMetric{"foreign_samples", NodeId::kSupervisor, "nodes dropped ",
                 " samples of another session: somebody else writes on this bus"}};
@@ -47,7 +47,8 @@ NodeLimits LimitsOf(NodeId node) {
     case NodeId::kHandleBridge:
       return {0.6, 0.4};  // A skipped period delays a jaw angle by 2.5 ms.
     case NodeId::kRender:
-      return {0.3, 1};  // Software OpenGL draws as many pictures as the processor allows.
+      // Software OpenGL draws as many pictures as the processor allows: 25 % at a load of 20 on two cores.
+      return {0.2, 1};
     case NodeId::kRecorder:
       return {0.5, 1};  // A late write is no loss; losses are counted.
     case NodeId::kSupervisor:
