@@ -16,6 +16,7 @@ void Verdicts(benchmark::Report* report) {
   double back_s = 0;
   for (const testing::Scenario& scenario : testing::VerdictScenarios()) {
     if (report->quick() && scenario.is_real) continue;
+    if (!report->Wants("guard.verdict") && !scenario.name.starts_with("picture_")) continue;
     const testing::ScenarioResult result = testing::RunScenario(scenario, kDomain);
     ++run;
     back_s = std::max(back_s, result.picture_back_s);
