@@ -198,7 +198,7 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
   const auto handles = nodes.find("handle_bridge");
   ASSERT_NE(handles, nodes.end()) << cart.Said();
   ::kill(handles->second, SIGSTOP);
-  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  std::this_thread::sleep_for(std::chrono::milliseconds(800));  // A second would be a fault of the session.
   ::kill(handles->second, SIGCONT);
   // A killed node joins again with its keys; a node with keys of another cart does not.
   const auto thermal = nodes.find("thermal_node");
