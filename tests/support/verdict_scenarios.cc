@@ -83,7 +83,8 @@ class FakeCart {
   void Start(const Words& more = {}) {
     const fs::path scene = folder_.path() / "tiny.fulcrum";
     scene::WriteSceneFile(data_, "name: tiny\n", scene);
-    Words words{"up", scene, "--domain", std::to_string(domain_), "--out", out()};
+    // The fake node makes ports to which no identity of a keyed bus has the right, and is swapped by its path.
+    Words words{"up", scene, "--domain", std::to_string(domain_), "--out", out(), "--open-bus", "--allow-swap-command"};
     words.insert(words.end(), more.begin(), more.end());
     up_ = Program(fulcrum(), words);
   }

@@ -38,7 +38,7 @@ void AddFilter(po::options_description* options) {
   options->add_options()                                                                                        //
       ("topic", po::value<std::vector<std::string>>()->value_name("NAME"), "only this topic; may be repeated")  //
       ("from", po::value<double>()->value_name("SECONDS"),
-       "only messages from this time on [s]; 0 is the first message of the file (default: 0)")  //
+       "only messages from this time on [s]; 0 is the first message of the file (default: the beginning)")  //
       ("to", po::value<double>()->value_name("SECONDS"), "only messages up to this time [s] (default: the end)");
 }
 

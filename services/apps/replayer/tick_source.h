@@ -70,7 +70,7 @@ class TickSource {
   [[nodiscard]] std::uint64_t undecodable() const { return undecodable_; }
 
   /// A tick is complete when messages that are later by this time have been read [ns].
-  static constexpr std::int64_t kSettle_ns = 1'000'000'000;
+  static constexpr std::int64_t kSettle_ns = 2'000'000'000;
 
  private:
   void Take(const recording::McapMessage& message);

@@ -31,7 +31,7 @@ struct Entry {
 /// Selection of messages.
 struct Filter {
   std::set<std::string> topics;  ///< Topic names for people; empty: all.
-  double from_s = 0;
+  double from_s = -1e300;        ///< Times before 0 exist: a sample is received up to a second after it was sent.
   double to_s = 1e300;
 };
 /// Throws InputError if a topic of the filter does not exist.

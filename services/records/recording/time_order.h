@@ -11,7 +11,8 @@
 namespace fulcrum::recording {
 
 /// Chunks of a recording overlap in time: large and small topics have separate chunks. A message is held until no later
-/// one in the file can be older: a recorder writes each message within kSettle_ns.
+/// one in the file can be older: a recorder receives a message up to a second after its log time (a late joiner gets
+/// what was sent before it), and writes it within half a second, or somewhat more on a busy machine.
 class TimeOrder {
  public:
   /// Opens a recording as McapReader does.
@@ -23,7 +24,7 @@ class TimeOrder {
   [[nodiscard]] const McapReader& reader() const { return reader_; }
   [[nodiscard]] McapReader& reader() { return reader_; }
 
-  static constexpr std::uint64_t kSettle_ns = 1'000'000'000;
+  static constexpr std::uint64_t kSettle_ns = 2'000'000'000;
 
  private:
   struct Held {

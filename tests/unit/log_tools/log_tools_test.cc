@@ -214,6 +214,26 @@ TEST_F(LogTools, DiffNamesTheFirstFieldThatDiffers) {
   EXPECT_EQ(Diff(a, other, {{"Health"}}, "", &out), ExitCode::kDone) << "only what was asked for";
 }
 
+TEST_F(LogTools, AMessageThatWasReceivedLateIsNotPassedOver) {
+  const fs::path file = folder_ / "late.mcap";
+  {
+    // As after a start on a busy machine: the setting was sent first and received seconds later.
+    recording::McapWriter writer(file, "fulcrum", "fulcrum test");
+    const std::uint16_t tools = writer.AddChannel(0, bus::RoleOf<ToolState>().name, "cdr", {});
+    const std::uint16_t settings = writer.AddChannel(0, bus::RoleOf<GeneratorSetting>().name, "cdr", {});
+    std::uint64_t time = kBegin_ns;
+    for (std::uint32_t i = 1; i <= 500; ++i) Write(&writer, tools, i, &time, bus::test::Sample<ToolState>(i));
+    std::uint64_t before = kBegin_ns - 1'000'000'000;
+    Write(&writer, settings, 1, &before, bus::test::Sample<GeneratorSetting>());
+  }
+  Recording recording(file);
+  Entry entry;
+  std::map<std::string, int> count;
+  while (recording.Next(&entry)) ++count[entry.source->name];
+  EXPECT_EQ(count["GeneratorSetting"], 1);
+  EXPECT_EQ(count["ToolState"], 500);
+}
+
 TEST_F(LogTools, RecoverMendsWhatAKillHasLeft) {
   const fs::path cut = folder_ / "cut.mcap";
   {

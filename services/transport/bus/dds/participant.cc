@@ -44,10 +44,6 @@ const Duration_t kSecuredAnnouncement{0, 100 * kMilli_ns};
 /// Delay after which a reader requests the samples for late joiners; the first heartbeat may have come before the
 /// match.
 const Duration_t kFirstAcknack{0, 10 * kMilli_ns};
-/// Period at which a reliable writer asks readers for what they lack, while there is something. A sample that is not
-/// followed by another (SceneManifest, GeneratorSetting) and was sent before a late reader had matched, or was dropped
-/// by a full socket, arrives after this time; the library's default of 3 s is longer than some recorded sessions.
-const Duration_t kReliableHeartbeat{0, 100 * kMilli_ns};
 /// The period of a node is at least 10 ms wherever a reliable write can block.
 const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
 /// Samples above this do not fit one UDP datagram and are sent in fragments.
@@ -254,7 +250,6 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   fast::Topic* topic = impl_->TopicFor<T>();
   fast::DataWriterQos qos;
   Apply(role.quality, role.quality.writer_depth, impl_->SharedMemoryFor(role), &qos);
-  qos.reliable_writer_qos().times.heartbeatPeriod = kReliableHeartbeat;
   const bool fragmented =
       impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
   qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
