@@ -25,7 +25,6 @@ constexpr std::int64_t kSilence = kSecond_ns;
 // A cable that is reconnected within the lease of the participants needs no action. After about the lease, one side may
 // have dropped the other but not vice versa, and the library takes long to repair that. New participants match at once.
 constexpr std::int64_t kPatience = 3 * kSecond_ns;
-constexpr int kMostDelayed = 3;  ///< Attempts to connect after which the time of an attempt no longer grows.
 // A topic is carried on for this long after its last reader has left, because the reader may be restarting.
 constexpr std::int64_t kUnwanted = 2 * kSecond_ns;
 constexpr std::int64_t kLongestSleep = 20 * kMilli;
@@ -269,7 +268,6 @@ void Link::TakePulse(std::span<const std::uint8_t> body, std::int64_t heard_ns) 
   }
   const bool back = heard_ns_ != 0 && heard_ns - heard_ns_ > kSilence;
   heard_ns_ = heard_pulse_ns_ = heard_ns;
-  attempts_ = 0;
   heard_sent_ns_ = pulse.sent_ns;
   if (pulse.heard_epoch == epoch_ && pulse.heard_sent_ns != 0) {
     clock_.Add({pulse.heard_sent_ns, pulse.heard_ns, pulse.sent_ns, heard_ns});
@@ -434,15 +432,12 @@ void Link::SendPulse(std::int64_t now) {
 }
 
 void Link::WatchSilence(std::int64_t now) {
-  // A side that never answered may be one that is being refused, which takes longer to detect. Each attempt gets more
-  // time than the one before: on a busy machine a handshake can take longer than kPatience, and the two sides would end
-  // each other's handshakes for good.
-  const std::int64_t patience = (heard_ns_ == 0 ? 2 : 1) * kPatience * (1 + std::min(attempts_, kMostDelayed));
-  if (now - std::max(heard_ns_, connected_ns_) < (far_ ? patience : kSilence)) return;
+  // A side that never answered may be one that is being refused, which takes longer to detect.
+  const std::int64_t patience = heard_ns_ == 0 ? 2 * kPatience : kPatience;
+  if (now - std::max(heard_ns_, connected_ns_) < patience) return;
   try {
     rebuilt_ += heard_ns_ != 0 ? 1 : 0;
     Connect();
-    ++attempts_;
     error_.clear();
   } catch (const std::exception& error) {
     error_ = error.what();  // The interface may be down: retried.

@@ -69,7 +69,6 @@ int main(int argc, char** argv) {
     }
     (void)app.options().TakeFlag("--window");
     for (const char* option : {"--quality", "--file", "--keep"}) (void)app.options().TakeValue(option, "");
-    const std::filesystem::path order_file = OrderFile(app.options(), node);
     std::istringstream words(order);
     std::string verb, metric;
     double number = 0;
@@ -79,12 +78,15 @@ int main(int argc, char** argv) {
     auto& frames = app.MakeOutput<fulcrum::TissueFrame>();
     (void)app.MakeInput<fulcrum::TissueFrame>();
     std::uint64_t sequence = 0, reports = 0;
+    // In the one folder that pictures and checkpoints may both be written to: a node is confined.
+    const std::filesystem::path hung =
+        app.options().session / "frames" / (std::string(fulcrum::NodeName(node)) + ".hung");
     return app.Run(
         {.name = "fake", .period_ns = 10'000'000},
         [&](const fulcrum::Tick& tick) {
           if (order == "hang") Hang();
-          if (order == "hang once" && tick.session_time_s > 1) {
-            std::filesystem::remove(order_file);
+          if (order == "hang once" && tick.session_time_s > 1 && !std::filesystem::exists(hung)) {
+            std::ofstream(hung) << "once";
             Hang();
           }
           if (verb == "step") std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(number));
