@@ -134,8 +134,8 @@ TEST_F(Chaos, TheSessionOutlivesItsFaults) {
     SpoilCheckpoints();
   }
   RefuseASecondCart();
-  // Random bytes that happen to decode have not the number of the session: somebody else has written on its bus, which is
-  // the only fault.
+  // Random bytes that happen to decode have not the number of the session: somebody else has written on its bus, which
+  // is the only fault.
   EXPECT_EQ(End(), 1) << chaos_.Trouble();
   const std::string said = chaos_.cart().Said();
   EXPECT_NE(said.find("samples of another session"), std::string::npos) << said;

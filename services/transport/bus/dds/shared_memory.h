@@ -56,7 +56,8 @@ struct SweepResult {
 SweepResult SweepSharedMemory(const std::filesystem::path& directory);
 
 /// Removes what an ended session has left: the files of dead processes, everything if no live process has a file there,
-/// and the directory when it is empty then. Only while the caller holds the domain, because a session that starts would lose its keys.
+/// and the directory when it is empty then. Only while the caller holds the domain, because a session that starts would
+/// lose its keys.
 SweepResult ClearSharedMemory(const std::filesystem::path& directory);
 
 /// Removes the directory with all its content, at the end of a session when no node runs.
