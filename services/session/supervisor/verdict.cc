@@ -63,7 +63,9 @@ void Verdict::Add(const std::string& key, const Fault& fault) {
 
 void Verdict::Watch(double time_s, const SessionRecord& record) {
   // The machine or this process was suspended: nothing was received meanwhile.
-  if (time_s - last_s_ > kHeldUp_s) forgiven_s_ = time_s;
+  if (const double gap_s = time_s - last_s_; gap_s > kHeldUp_s) {
+    forgiven_s_ = time_s + (gap_s > 1e-9 * kForgotten_ns ? 1e-9 * kRematch_ns : 0);
+  }
   last_s_ = time_s;
   for (const NodeId node : session_.nodes) {
     WatchRestarts(node, time_s, record);
