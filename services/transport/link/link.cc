@@ -25,6 +25,7 @@ constexpr std::int64_t kSilence = kSecond_ns;
 // A cable that is reconnected within the lease of the participants needs no action. After about the lease, one side may
 // have dropped the other but not vice versa, and the library takes long to repair that. New participants match at once.
 constexpr std::int64_t kPatience = 3 * kSecond_ns;
+constexpr std::int64_t kUnplugged = 200 * kMilli;  ///< Between two looks at an interface without a cable.
 // A topic is carried on for this long after its last reader has left, because the reader may be restarting.
 constexpr std::int64_t kUnwanted = 2 * kSecond_ns;
 constexpr std::int64_t kLongestSleep = 20 * kMilli;
@@ -63,9 +64,15 @@ void Link::Connect() {
   }
   far_.reset();
   connected_ns_ = MonotonicNs();
+  if (bus::IsUnplugged(settings_.far.address)) {
+    error_ = "the interface with the address " + settings_.far.address + " is down or has no cable";
+    return;
+  }
+  error_.clear();
   far_ = std::make_unique<bus::FarParticipant>(
       settings_.far,
       [this](FarLane lane, std::span<const std::uint8_t> bytes) { inbox_.Put(lane, bytes, MonotonicNs()); });
+  connected_ns_ = MonotonicNs();  // Making a participant with keys can take a while.
 }
 
 void Link::Join(bus::DdsParticipant* local, std::uint32_t far_nodes) {
@@ -127,7 +134,8 @@ Link::Session Link::session() {
 
 std::string Link::mismatch() {
   const std::lock_guard lock(mutex_);
-  return !mismatch_.empty() || !far_ ? mismatch_ : far_->mismatch();
+  // A side that was heard before has the right keys: a handshake that does not finish is retried.
+  return !mismatch_.empty() || !far_ || heard_ns_ != 0 ? mismatch_ : far_->mismatch();
 }
 
 bus::Refusals Link::refusals() {
@@ -268,6 +276,7 @@ void Link::TakePulse(std::span<const std::uint8_t> body, std::int64_t heard_ns) 
   }
   const bool back = heard_ns_ != 0 && heard_ns - heard_ns_ > kSilence;
   heard_ns_ = heard_pulse_ns_ = heard_ns;
+  attempts_ = 0;
   heard_sent_ns_ = pulse.sent_ns;
   if (pulse.heard_epoch == epoch_ && pulse.heard_sent_ns != 0) {
     clock_.Add({pulse.heard_sent_ns, pulse.heard_ns, pulse.sent_ns, heard_ns});
@@ -432,13 +441,16 @@ void Link::SendPulse(std::int64_t now) {
 }
 
 void Link::WatchSilence(std::int64_t now) {
-  // A side that never answered may be one that is being refused, which takes longer to detect.
-  const std::int64_t patience = heard_ns_ == 0 ? 2 * kPatience : kPatience;
-  if (now - std::max(heard_ns_, connected_ns_) < patience) return;
+  // A side that never answered may be one that is being refused, which takes longer to detect. All attempts
+  // but the first get twice the time: on a busy machine a handshake can take longer than kPatience, and the two sides
+  // would end each other's handshakes for good.
+  const std::int64_t patience = heard_ns_ == 0 || attempts_ > 0 ? 2 * kPatience : kPatience;
+  if (now - std::max(heard_ns_, connected_ns_) < (far_ ? patience : kUnplugged)) return;
   try {
-    rebuilt_ += heard_ns_ != 0 ? 1 : 0;
     Connect();
-    error_.clear();
+    if (!far_) return;
+    ++attempts_;
+    rebuilt_ += heard_ns_ != 0 ? 1 : 0;
   } catch (const std::exception& error) {
     error_ = error.what();  // The interface may be down: retried.
   }

@@ -126,6 +126,7 @@ class Link {
   std::uint32_t wished_ = 0;  ///< Bit per TopicId, from the last pulse of the other side.
   std::int64_t heard_ns_ = 0, heard_pulse_ns_ = 0, heard_sent_ns_ = 0;
   std::int64_t connected_ns_ = 0;  ///< When the present participant was made.
+  int attempts_ = 0;               ///< Participants made since the last packet of the other side.
   std::int64_t next_pulse_ns_ = 0;
   Session session_;
   std::uint64_t session_key_ = 0;     ///< Of our packets; 0: no session yet.

@@ -77,7 +77,7 @@ Run RunSession(const std::string& scene_yaml, double seconds, const std::string&
                                     "--out", file("host"), "--cache", file("cache"), "--keys", file("keys")});
   }
   testing::Program cart = hosts.OnCart("fulcrum", up);
-  std::vector<std::string> near_words{kDomain, file("near")}, far_words{kDomain, file("far"), "tissue", "secured"};
+  std::vector<std::string> near_words{kDomain, file("near")}, far_words{kDomain, file("far"), "tissue"};
   if (with_tissue) near_words.emplace_back("tissue");
   testing::Program near = hosts.OnCart("two_hosts_probe", near_words);
   testing::Program far;

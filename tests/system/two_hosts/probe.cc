@@ -1,8 +1,8 @@
 // Listens on the bus of the host that it runs on and writes down what it hears, for a test on another host to compare.
 //
-//   two_hosts_probe DOMAIN FILE [tissue [secured]]
+//   two_hosts_probe DOMAIN FILE [tissue]
 //
-// With "secured" it waits for a secured session, and joins as the one who may read all.
+// It waits for a session, and joins with the rights of a recorder.
 // FILE gets a line per sample: "tool <session time s> <force 0 N> <force 1 N> <model age s>",
 // "health <node> <state> <pid> <ticks>", "link <name> <value>", "event ..."; FILE.tissue, with "tissue", binary:
 // sequence (u64), age when it came (f64, s), vertex count (u32), floats.
@@ -24,11 +24,11 @@ int main(int argc, char** argv) {
   runtime::InstallStopSignals();
   const int domain = std::atoi(argv[1]);
   const std::filesystem::path memory = bus::SharedMemoryDirectory(domain);
-  bus::Security security;
-  while (argc > 4 && std::strcmp(argv[4], "secured") == 0 && !security.on() && !runtime::ShouldStop()) {
+  // Each session announces how its bus is joined, with keys of its own or those of its cart file.
+  while (bus::AnnouncedSession(memory) == 0 && !runtime::ShouldStop()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    security = bus::AnnouncedSecurity(memory, NodeName(NodeId::kRecorder));
   }
+  const bus::Security security = bus::AnnouncedSecurity(memory, NodeName(NodeId::kRecorder));
   bus::DdsParticipant participant(
       {.domain = domain, .node_name = "probe", .shared_memory = memory, .security = security});
   const bool with_tissue = argc > 3 && std::strcmp(argv[3], "tissue") == 0;

@@ -3,6 +3,8 @@
 #include <arpa/inet.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
+#include <ifaddrs.h>
+#include <net/if.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -129,8 +131,7 @@ Security SecurityOf(const FarSettings& settings) {
   return {settings.keys, std::string(kLinkIdentity), !settings.keys.empty()};
 }
 
-fast::DomainParticipantQos QosOf(const FarSettings& settings, std::shared_ptr<dds::StrangeAddresses> strangers,
-                                 std::shared_ptr<dds::DiscoveryGate>* gate) {
+fast::DomainParticipantQos QosOf(const FarSettings& settings, std::shared_ptr<dds::StrangeAddresses> strangers) {
   fast::DomainParticipantQos qos;
   qos.name(NameOf(settings.side));
   const std::string user_data = dds::UserDataOf(NameOf(settings.side), SchemaHash(), 0);
@@ -160,7 +161,11 @@ fast::DomainParticipantQos QosOf(const FarSettings& settings, std::shared_ptr<dd
   packing->max_bytes_per_period = kMostPacked_B;
   packing->period_ms = kPackingPeriod_ms;
   qos.flow_controllers().push_back(packing);
-  if (!settings.keys.empty()) *gate = dds::ApplySecurity(SecurityOf(settings), &qos);
+  if (!settings.keys.empty()) {
+    // Open from the start: a participant that is made while the cable is cut would otherwise begin with what its peer
+    // has sent to its predecessor. With one peer, a handshake that is repeated costs a second.
+    dds::ApplySecurity(SecurityOf(settings), &qos)->Open();
+  }
   return qos;
 }
 
@@ -274,16 +279,13 @@ struct FarParticipant::Impl {
       if (!IsAddress(address)) throw InputError("\"" + address + "\" is no IPv4 address; valid: as in 192.168.1.20");
     }
     dds::PrepareLibrary();
-    std::shared_ptr<dds::DiscoveryGate> gate;
     participant = fast::DomainParticipantFactory::get_instance()->create_participant(
-        static_cast<std::uint32_t>(settings.domain), QosOf(settings, strangers, &gate), &watch,
-        fast::StatusMask::none());
+        static_cast<std::uint32_t>(settings.domain), QosOf(settings, strangers), &watch, fast::StatusMask::none());
     if (participant == nullptr) {
       throw InputError("cannot open the link on " + settings.address +
                        ": is that an address of this machine, and are its UDP ports of link domain " +
                        std::to_string(settings.domain) + " free?");
     }
-    if (gate) gate->Open();
     fast::Publisher* publisher = participant->create_publisher(fast::PUBLISHER_QOS_DEFAULT);
     fast::Subscriber* subscriber = participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
     stream = std::make_unique<Lane>(FarLane::kStream, settings.side, participant, publisher, subscriber, sink);
@@ -324,6 +326,21 @@ Refusals FarParticipant::refusals() {
     all.texts.push_back("datagrams of the link from " + address + ", which is not its peer");
   }
   return all;
+}
+
+bool IsUnplugged(const std::string& address) {
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return false;  // Not known.
+  bool unplugged = false;
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    if (one->ifa_addr == nullptr || one->ifa_addr->sa_family != AF_INET) continue;
+    std::array<char, INET_ADDRSTRLEN> text{};
+    inet_ntop(AF_INET, &reinterpret_cast<const sockaddr_in*>(one->ifa_addr)->sin_addr, text.data(), text.size());
+    constexpr unsigned kBoth = IFF_UP | IFF_RUNNING;
+    unplugged = unplugged || (address == text.data() && (one->ifa_flags & kBoth) != kBoth);
+  }
+  freeifaddrs(all);
+  return unplugged;
 }
 
 std::string ResolveAddress(const std::string& name) {

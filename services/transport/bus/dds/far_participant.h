@@ -63,6 +63,9 @@ class FarParticipant {
   std::unique_ptr<Impl> impl_;
 };
 
+/// Whether the interface with this address is down or has no cable. The library would make a participant without any
+/// socket on it.
+[[nodiscard]] bool IsUnplugged(const std::string& address);
 /// IPv4 address of `name` (dotted or a host name). Throws InputError.
 [[nodiscard]] std::string ResolveAddress(const std::string& name);
 /// IPv4 address of this machine from which a packet to `peer` is sent. Throws InputError if there is no route.
