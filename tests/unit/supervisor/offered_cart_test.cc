@@ -77,7 +77,7 @@ TEST(OfferedCart, APathInAReceivedCartIsRefusedWithItsKey) {
     const char* key;
     bool with_own;  ///< Also where the host has a cart file of its own.
   };
-  for (const Case& bad : {Case{"security: {keys: /root/.ssh}", "security.keys", true},
+  for (const Case& bad : {Case{"security: {keys: /etc/ssh}", "security.keys", true},
                           Case{"handles: {tool0: {kind: serial, port: /dev/mem}}", "handles.tool0", false},
                           Case{"handles: {tool1: {port: /etc/passwd}}", "handles.tool1", false},
                           Case{"pedal: {kind: serial, usb_vendor_id: 1, usb_product_id: 2}", "pedal", false},
