@@ -128,6 +128,7 @@ std::unique_ptr<Target> MakeCheckpointThermal();
 std::unique_ptr<Target> MakeKeys();
 std::unique_ptr<Target> MakeTrainee();
 std::unique_ptr<Target> MakeLink();
+std::unique_ptr<Target> MakeControl();
 std::unique_ptr<Target> MakeCdr();
 std::unique_ptr<Target> MakeConsoleRoute();
 std::unique_ptr<Target> MakeConsoleHttp();

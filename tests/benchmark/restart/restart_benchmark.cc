@@ -20,6 +20,7 @@
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
 #include "tests/support/cart_watch.h"
+#include "tests/support/kill_session.h"
 #include "tests/support/working_scene.h"
 
 namespace fulcrum {
@@ -35,6 +36,7 @@ constexpr int kSessions = 2;
 // waits for its restart as one that dies again and again does.
 constexpr double kBetweenKills_s = 1.03;
 constexpr double kPatience_s = 20;
+constexpr int kKillsOfASession = 20, kKillSessions = 10;
 
 struct Node {
   NodeId id;
@@ -193,6 +195,34 @@ int Standby(benchmark::Report* report) {
   return 0;
 }
 
+/// 200 kills of every program of a session, the supervisor included, over ten sessions.
+int Kills(benchmark::Report* report) {
+  const fs::path folder = fs::temp_directory_path() / ("bench_kills." + std::to_string(::getpid()));
+  fs::create_directories(folder);
+  const fs::path scene = folder / "working.yaml";
+  std::ofstream(scene) << testing::WorkingScene("built-in", 120);
+  const int sessions = report->quick() ? 2 : kKillSessions;
+  testing::KillFindings findings;
+  for (int session = 0; session < sessions && findings.wrong.empty(); ++session) {
+    const bool is_last = session + 1 == sessions;
+    testing::RunKillSession(scene, kDomain, kKillsOfASession, session,
+                            is_last ? testing::LastKill::kNone : testing::LastKill::kSupervisor, &findings);
+  }
+  fs::remove_all(folder);
+  if (!findings.wrong.empty()) return Fail(findings.wrong);
+  report->Add("guard.chaos.kills", findings.all(), "1");
+  for (const auto& [program, count] : findings.kills) report->Add("guard.chaos.kills." + program, count, "1");
+  report->Add("guard.chaos.lost_topology", static_cast<double>(findings.topology_lost), "1");
+  report->Add("guard.chaos.unrecorded_topology", static_cast<double>(findings.topology_unrecorded), "1");
+  report->Add("guard.chaos.recordings", findings.recordings, "1");
+  report->Add("guard.chaos.recordings_cut_short", findings.cut_short, "1");
+  report->Add("guard.chaos.damaged_recordings", findings.damaged, "1");
+  report->Add("guard.chaos.unrecorded_s_max", findings.unrecorded_s_max, "s");
+  report->Add("guard.chaos.shm_left_bytes", static_cast<double>(findings.shared_memory_left_B), "B");
+  report->Add("guard.chaos.processes_left", findings.processes_left, "1");
+  return 0;
+}
+
 int Run(benchmark::Report* report) {
   const fs::path folder = fs::temp_directory_path() / ("bench_restart." + std::to_string(::getpid()));
   fs::create_directories(folder);
@@ -230,5 +260,6 @@ int main(int argc, char** argv) {
   int code = 0;
   if (report.Wants("restart.")) code = fulcrum::Run(&report);
   if (report.Wants("standby.")) code = std::max(code, fulcrum::Standby(&report));
+  if (report.Wants("guard.chaos.")) code = std::max(code, fulcrum::Kills(&report));
   return code;
 }
