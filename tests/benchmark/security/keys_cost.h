@@ -1,13 +1,15 @@
-// What keys of its own cost a session, against an open bus.
+// What keys and encryption cost a session, against an open bus.
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "tests/benchmark/report.h"
 
 namespace fulcrum {
 
-/// Adds guard.keys_start_extra_ms_p50 and guard.rate_change_pct. @return empty, or what went wrong.
-[[nodiscard]] std::string MeasureKeysCost(benchmark::Report* report);
+/// Adds guard.keys_start_extra_ms_p50, guard.rate_change_pct and guard.encrypted_rate_change_pct.
+/// @param scratch folder for keys. @return empty, or what went wrong.
+[[nodiscard]] std::string MeasureKeysCost(const std::filesystem::path& scratch, benchmark::Report* report);
 
 }  // namespace fulcrum

@@ -130,8 +130,9 @@ int main(int argc, char** argv) {
   if (report.Wants("security.session_keys")) SessionKeys(&report);
   if (report.Wants("security.refused") || report.Wants("security.attempts")) Attempts(&report, scratch);
   if (report.Wants("security.foreign_session")) wrong = MeasureForeignSession(&report);
-  const bool keys = report.Wants("guard.keys_start") || report.Wants("guard.start") || report.Wants("guard.rate");
-  if (wrong.empty() && keys) wrong = MeasureKeysCost(&report);
+  const bool keys = report.Wants("guard.keys_start") || report.Wants("guard.start") || report.Wants("guard.rate") ||
+                    report.Wants("guard.encrypted");
+  if (wrong.empty() && keys) wrong = MeasureKeysCost(scratch, &report);
   fs::remove_all(scratch);
   bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kDomain));
   if (!wrong.empty()) std::fprintf(stderr, "bench_security: %s\n", wrong.c_str());

@@ -86,22 +86,31 @@ class GateCheck {
   double peak_ = 0;
 };
 
-/// Reads `input` as a list of patches (place in two bytes, length in one, bytes) over good messages, one each tick.
-[[nodiscard]] inline bool Survives(std::span<const std::uint8_t> input) {
-  GateCheck check;
+/// A check whose servo presses on the tissue; good messages alone broke nothing.
+[[nodiscard]] inline bool Press(GateCheck* check) {
   constexpr int kUntilForcesAreUp = 300;
   for (int i = 0; i < kUntilForcesAreUp; ++i) {
-    if (!check.Offer(check.Good())) return false;
+    if (!check->Offer(check->Good())) return false;
   }
+  return true;
+}
+
+/// Reads `input` as a list of patches (place in two bytes, length in one, bytes) over good messages, one each tick.
+[[nodiscard]] inline bool OfferPatches(std::span<const std::uint8_t> input, GateCheck* check) {
   while (input.size() >= 3) {
     const std::size_t at = input[0] + 256u * input[1];
     const std::size_t length = std::min<std::size_t>(input[2] % 32u, input.size() - 3);
-    ContactModel model = check.Good();
+    ContactModel model = check->Good();
     GateCheck::Apply({at, input.subspan(3, length)}, &model);
-    if (!check.Offer(model)) return false;
+    if (!check->Offer(model)) return false;
     input = input.subspan(3 + length);
   }
   return true;
+}
+
+[[nodiscard]] inline bool Survives(std::span<const std::uint8_t> input) {
+  GateCheck check;
+  return Press(&check) && OfferPatches(input, &check);
 }
 
 }  // namespace fulcrum::haptics::testing

@@ -26,7 +26,6 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
-#include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
 #include <vector>
 
 #include "services/base/core/error.h"
@@ -57,12 +56,9 @@ constexpr std::uint32_t kFarSocketBuffer_B = 4u << 20;
 constexpr std::uint32_t kLargestDatagram_B = 1472;
 /// A handshake carries certificate and signed permissions in one message, which the library cannot divide.
 constexpr std::uint32_t kLargestSecuredDatagram_B = 16 * 1024;
-/// Bounds what the library packs into one datagram of the ordered lane, as after a cut of the cable. It (2.9.1) keeps
-/// no room for what encryption adds to a datagram that several samples fill (RTPSMessageGroup, append_message), and
-/// then aborts the process. 12 MB/s are more than a scene is fetched with (kMostPieces in services/transport/link).
-constexpr std::int32_t kMostPacked_B = 12 * 1024;
-constexpr std::uint64_t kPackingPeriod_ms = 1;
-constexpr const char* kPacking = "ordered lane";
+/// Per millisecond and datagram. 12 MB/s are more than a scene is fetched with (kMostPieces in
+/// services/transport/link).
+constexpr std::int32_t kMostPackedFar_B = 12 * 1024;
 constexpr int kStreamBurst = 1024;  ///< Packets that may wait for the reader.
 constexpr std::uint32_t kEncapsulation_B = 4, kMostPadding_B = 3;
 
@@ -156,11 +152,7 @@ fast::DomainParticipantQos QosOf(const FarSettings& settings, std::shared_ptr<dd
   // RTPS 2.3, 9.6.1.1: PB + DG * domain + d1 + PG * id.
   peer.port = static_cast<std::uint32_t>(7400 + 250 * settings.domain + 10 + 2 * (cart ? kHostId : kCartId));
   qos.wire_protocol().builtin.initialPeersList.push_back(peer);
-  auto packing = std::make_shared<eprosima::fastdds::rtps::FlowControllerDescriptor>();
-  packing->name = kPacking;
-  packing->max_bytes_per_period = kMostPacked_B;
-  packing->period_ms = kPackingPeriod_ms;
-  qos.flow_controllers().push_back(packing);
+  dds::BoundPacking(kMostPackedFar_B, &qos);
   if (!settings.keys.empty()) {
     // Open from the start: a participant that is made while the cable is cut would otherwise begin with what its peer
     // has sent to its predecessor. With one peer, a handshake that is repeated costs a second.
@@ -208,7 +200,7 @@ class Lane final : private fast::DataReaderListener, private fast::DataWriterLis
     fast::DataWriterQos writer_qos;
     ApplyLane(lane, ordered ? kOrderedBacklog : 1, &writer_qos);
     writer_qos.publish_mode().kind = ordered ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
-    if (ordered) writer_qos.publish_mode().flow_controller_name = kPacking;
+    if (ordered) writer_qos.publish_mode().flow_controller_name = dds::kPacking;
     writer_qos.reliable_writer_qos().times.heartbeatPeriod = kHeartbeat;
     writer_qos.reliable_writer_qos().times.nackResponseDelay = kResponse;
     writer_ = publisher->create_datawriter(out, writer_qos, this, fast::StatusMask::publication_matched());

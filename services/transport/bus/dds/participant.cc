@@ -48,6 +48,9 @@ const Duration_t kFirstAcknack{0, 10 * kMilli_ns};
 const Duration_t kMaxBlocking{0, 5 * kMilli_ns};
 /// Samples above this do not fit one UDP datagram and are sent in fragments.
 constexpr std::uint32_t kDatagram_B = 64'000;
+/// Per millisecond and datagram on an encrypted bus: twice what physics sends, and 5 kB below the largest datagram for
+/// heartbeats and the codes of all receivers.
+constexpr std::int32_t kMostPacked_B = 60'000;
 
 fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint64_t schema_hash, std::uint64_t session,
                                           const std::shared_ptr<dds::Gathering>& gathering,
@@ -68,6 +71,7 @@ fast::DomainParticipantQos ParticipantQos(const DdsSettings& settings, std::uint
   discovery.leaseDuration_announcementperiod = settings.security.on() ? kSecuredAnnouncement : kAnnouncement;
   if (!settings.security.on()) discovery.initial_announcements = {kFirstAnnouncementCount, kFirstAnnouncements};
   if (settings.security.on()) *gate = dds::ApplySecurity(settings.security, &qos);
+  if (settings.security.encrypt) dds::BoundPacking(kMostPacked_B, &qos);
   return qos;
 }
 
@@ -252,7 +256,10 @@ std::unique_ptr<typename OutputOf<T>::type> DdsParticipant::MakeOutput() {
   Apply(role.quality, role.quality.writer_depth, impl_->SharedMemoryFor(role), &qos);
   const bool fragmented =
       impl_->SharedMemoryFor(role).empty() && typename TypeSupportOf<T>::type().m_typeSize > kDatagram_B;
-  qos.publish_mode().kind = fragmented ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
+  // A reliable writer sends several samples in one datagram when it repeats them.
+  const bool packed = impl_->security.encrypt && (fragmented || role.quality.delivery == Delivery::kReliable);
+  qos.publish_mode().kind = fragmented || packed ? fast::ASYNCHRONOUS_PUBLISH_MODE : fast::SYNCHRONOUS_PUBLISH_MODE;
+  if (packed) qos.publish_mode().flow_controller_name = dds::kPacking;
   const WorkingIn here(impl_->shared_memory);
   auto port =
       std::make_unique<dds::DdsOutput<T>>(impl_->publisher, topic, qos, &impl_->audience, impl_->session.session);

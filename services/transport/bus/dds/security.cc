@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <fastdds/dds/log/Log.hpp>
 #include <fastdds/dds/log/StdoutConsumer.hpp>
+#include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
 #include <fstream>
 #include <map>
 #include <mutex>
@@ -223,6 +224,14 @@ std::shared_ptr<DiscoveryGate> ApplySecurity(const Security& security, fast::Dom
   for (auto& transport : qos->transport().user_transports) transport = OneDiscoveryAtATime(std::move(transport), gate);
   ListenToSecurityLog();
   return gate;
+}
+
+void BoundPacking(std::int32_t most_B, fast::DomainParticipantQos* qos) {
+  auto packing = std::make_shared<eprosima::fastdds::rtps::FlowControllerDescriptor>();
+  packing->name = kPacking;
+  packing->max_bytes_per_period = most_B;
+  packing->period_ms = 1;
+  qos->flow_controllers().push_back(packing);
 }
 
 std::string IdentityBehind(const rtps::GuidPrefix_t& prefix, const std::string& claimed) {

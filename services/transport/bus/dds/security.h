@@ -19,6 +19,13 @@ namespace fulcrum::bus::dds {
 [[nodiscard]] std::shared_ptr<DiscoveryGate> ApplySecurity(const Security& security,
                                                            eprosima::fastdds::dds::DomainParticipantQos* qos);
 
+/// Adds the flow controller kPacking, for asynchronous writers: it bounds what the library packs into one datagram. The
+/// library (2.9.1) keeps no room for what encryption adds to a datagram that several samples fill
+/// (RTPSMessageGroup, append_message), and then aborts the process.
+/// @param most_B bytes in each period of a millisecond, and in a datagram.
+void BoundPacking(std::int32_t most_B, eprosima::fastdds::dds::DomainParticipantQos* qos);
+inline constexpr const char* kPacking = "packing";
+
 /// Identity with whose keys a participant has authenticated: of the table, or a guest, or "?". The library and all
 /// peers check its address against its certificate, and the address contains a hash of the name.
 /// @param claimed subject that the participant announces, such as "/CN=probe"; unverified, only checked against the
