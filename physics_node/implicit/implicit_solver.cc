@@ -63,7 +63,7 @@ void FollowComputedRegions(const SolverContext& context, SolverState* state, Kry
     const Task extent = context.model.partition.Extent(region);
     MeasureMovement(context.particles, extent, &state->movement.before_sleep);
     ForPieces(layout, extent, [&](std::size_t first, std::size_t count) {
-      context.particles.RememberPlaces(first, count);
+      context.particles.StorePositions(first, count);
       for (FloatArray* field : {&state->velocity, &krylov->z, &krylov->p, &krylov->q, &krylov->d}) {
         std::fill_n(field->data() + first, count, 0.0f);
       }
@@ -161,7 +161,7 @@ std::uint32_t ImplicitSolver::BeginStep() {
   ForTasks(&workers_, state_.regions.computed(), [&](const Task& task, int, int) {
     MeasureMovement(particles, task, &movement.of_step);
     ForPieces(model_.layout, task,
-              [&](std::size_t first, std::size_t count) { particles.RememberPlaces(first, count); });
+              [&](std::size_t first, std::size_t count) { particles.StorePositions(first, count); });
   });
   ++state_.steps;
   state_.organ_blocks.step_due = true;

@@ -152,9 +152,9 @@ class ParticleStore {
   void CopyPositions(std::span<float> xyz) const { Copy(now_.data(), xyz); }
   void CopyPrevious(std::span<float> xyz) const { Copy(previous_.data(), xyz); }
   /// previous <- now.
-  void RememberPlaces() { RememberPlaces(0, now_.size()); }
+  void StorePositions() { StorePositions(0, now_.size()); }
   /// The same for `count` floats of the pool.
-  void RememberPlaces(std::size_t first, std::size_t count) {
+  void StorePositions(std::size_t first, std::size_t count) {
     std::copy_n(now_.data() + first, count, previous_.data() + first);
   }
 

@@ -100,7 +100,7 @@ std::span<const TipInput> ThermalNode::TakeContacts(const Tick& tick) {
     const double ago_s = tick.session_time_s - contact.session_time_s;
     const std::int64_t ns = tick.stamp_ns - std::llround(1e9 * std::clamp(ago_s, -1.0, 1e4));
     const GeneratorDemand demand = generator_.At(ns, &manifest_.consumed);
-    generator_.Forget(ns);
+    generator_.DropBefore(ns);
     no_setting_ = demand.mode != CauteryMode::kOff && !generator_.has_setting();
     tips_.push_back(tracker_.Advance(contact, demand, tick.dt_s));
     manifest_.consumed.push_back({TopicId::kCauteryContact, contact.stamp.epoch, contact.stamp.sequence});

@@ -31,7 +31,7 @@ void Append(std::size_t capacity, const Sample& sample, Samples* samples) {
 }
 
 template <class Samples>
-void DropBefore(std::int64_t ns, Samples* samples) {
+void DropOlder(std::int64_t ns, Samples* samples) {
   while (samples->size() > 1 && (*samples)[1].stamp.stamp_ns <= ns) samples->pop_front();
 }
 
@@ -90,9 +90,9 @@ GeneratorDemand GeneratorInputs::At(std::int64_t ns, std::vector<ConsumedInput>*
   return {mode, PowerOf(setting, mode)};
 }
 
-void GeneratorInputs::Forget(std::int64_t ns) {
-  DropBefore(ns, &pedals_);
-  DropBefore(ns, &settings_);
+void GeneratorInputs::DropBefore(std::int64_t ns) {
+  DropOlder(ns, &pedals_);
+  DropOlder(ns, &settings_);
 }
 
 GeneratorInputs::State GeneratorInputs::Save() const {

@@ -44,7 +44,7 @@ class GeneratorInputs {
   /// @param consumed nullptr, or receives the samples that the result depends on, each once.
   [[nodiscard]] GeneratorDemand At(std::int64_t ns, std::vector<ConsumedInput>* consumed = nullptr) const;
   /// Drops the samples that no query for `ns` or later needs.
-  void Forget(std::int64_t ns);
+  void DropBefore(std::int64_t ns);
 
   /// Stamp of the newest HandleState; negative: none has come.
   [[nodiscard]] std::int64_t newest_pedal_ns() const { return pedals_.empty() ? -1 : pedals_.back().stamp.stamp_ns; }

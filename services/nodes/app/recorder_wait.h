@@ -30,7 +30,7 @@ class RecorderWait {
     is_read_ = is_listed_ && participant_->IsReadBy(bus::kRecorderPeer);
     const std::int64_t waited_ns = known_ns_ == 0 ? 0 : now_ns - known_ns_;
     is_over_ = is_read_ || waited_ns > kLongestWait_ns ||
-               (waited_ns > kLongestDiscovery_ns && !participant_->Knows(bus::kRecorderPeer));
+               (waited_ns > kLongestDiscovery_ns && !participant_->HasParticipant(bus::kRecorderPeer));
   }
   [[nodiscard]] bool is_read() const { return is_read_; }
   /// The node may begin: it is read, or no recorder will read it.

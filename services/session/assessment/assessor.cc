@@ -74,7 +74,7 @@ void Assessor::MeasureContacts(bool all) {
     const bool known = generator_.newest_pedal_ns() >= ns || contacts_.back().time_s - time_s > kPedalLate_s;
     if (!known && !all) return;
     contact.energised = generator_.At(ns).mode != CauteryMode::kOff;
-    generator_.Forget(ns);
+    generator_.DropBefore(ns);
     const LineMeter::Finding finding = line_.Add(contact);
     if (finding.pedal_without_contact) Raise(Prompt::kPedalWithoutContact, time_s + kStays_s);
     if (finding.off_line) Raise(Prompt::kOffLine, time_s + kStays_s);

@@ -21,7 +21,7 @@ constexpr std::int64_t kLastHealthDelay = kSecond_ns / 4;
 
 }  // namespace
 
-WatchedProcess::~WatchedProcess() { Forget(); }
+WatchedProcess::~WatchedProcess() { Close(); }
 
 WatchedProcess::WatchedProcess(WatchedProcess&& other) noexcept
     : pid_(std::exchange(other.pid_, 0)), fd_(std::exchange(other.fd_, -1)) {}
@@ -33,7 +33,7 @@ WatchedProcess& WatchedProcess::operator=(WatchedProcess&& other) noexcept {
 }
 
 bool WatchedProcess::Watch(pid_t pid) {
-  Forget();
+  Close();
   fd_ = static_cast<int>(::syscall(SYS_pidfd_open, pid, 0));
   if (fd_ < 0) return false;
   pid_ = pid;
@@ -45,7 +45,7 @@ bool WatchedProcess::HasEnded() const {
   return fd_ >= 0 && ::poll(&ended, 1, 0) == 1;
 }
 
-void WatchedProcess::Forget() {
+void WatchedProcess::Close() {
   if (fd_ >= 0) ::close(fd_);
   fd_ = -1;
   pid_ = 0;
@@ -81,7 +81,7 @@ std::optional<SupervisedNode::Death> AttachedNode::Update(std::int64_t now_ns) {
   if (process_.HasEnded()) {
     if (ended_ns_ == 0) ended_ns_ = now_ns;
     if (!ending_ && !replaced_ && now_ns - ended_ns_ < kLastHealthDelay) return std::nullopt;
-    process_.Forget();
+    process_.Close();
     missing_since_ns_ = now_ns;
     // An end in good order is reported as a restart only after the node has rejoined: when systemd stops the whole
     // cart, the node does not start again.
@@ -128,8 +128,8 @@ void AttachedNode::Stop() {
 
 bool AttachedNode::HasEnded() { return !running() || process_.HasEnded(); }
 
-const char* AttachedNode::GiveUp() {
-  process_.Forget();
+const char* AttachedNode::StopWaiting() {
+  process_.Close();
   return "was left running for systemd to stop";
 }
 

@@ -19,7 +19,7 @@ class WatchedProcess {
   /// Starts to watch `pid`; false when there is no such process.
   [[nodiscard]] bool Watch(pid_t pid);
   [[nodiscard]] bool HasEnded() const;
-  void Forget();
+  void Close();
   [[nodiscard]] pid_t pid() const { return pid_; }  ///< 0: no process is watched.
 
  private:
@@ -43,12 +43,12 @@ class AttachedNode final : public SupervisedNode {
   void Start(std::int64_t now_ns) override;
   [[nodiscard]] std::optional<Death> Update(std::int64_t now_ns) override;
   bool OnHealth(const Health& health, std::int64_t now_ns) override;
-  void ForgiveSilence(std::int64_t now_ns) override { missing_since_ns_ = now_ns; }
+  void ResetTimeouts(std::int64_t now_ns) override { missing_since_ns_ = now_ns; }
   void AskRestart(std::int64_t now_ns) override;
   void Swap(NodeCommand command, std::int64_t now_ns) override;
   void Stop() override;
   [[nodiscard]] bool HasEnded() override;
-  const char* GiveUp() override;
+  const char* StopWaiting() override;
 
   [[nodiscard]] pid_t pid() const override { return process_.pid(); }
   [[nodiscard]] bool running() const override { return process_.pid() != 0; }

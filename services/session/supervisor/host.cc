@@ -170,7 +170,7 @@ class Host {
     const std::int64_t now = MonotonicNs();
     TakeHealths(now);
     if (now - last_turn_ns_ > kHeldUp_ns) {
-      for (NodeProcess& node : nodes_) node.ForgiveSilence(ForgivenUntil(now, now - last_turn_ns_));
+      for (NodeProcess& node : nodes_) node.ResetTimeouts(TimeoutsFrom(now, now - last_turn_ns_));
     }
     last_turn_ns_ = now;
     for (NodeProcess& node : nodes_) WatchNode(&node, now);

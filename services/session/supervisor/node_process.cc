@@ -131,7 +131,7 @@ bool NodeProcess::OnHealth(const Health& health, std::int64_t now_ns) {
   return true;
 }
 
-void NodeProcess::ForgiveSilence(std::int64_t now_ns) { pulse_.Forgive(now_ns); }
+void NodeProcess::ResetTimeouts(std::int64_t now_ns) { pulse_.ResetTimeouts(now_ns); }
 
 void NodeProcess::AskRestart(std::int64_t now_ns) {
   spare_.reset();  // The program may have been rebuilt since the spare was started.
@@ -149,7 +149,7 @@ void NodeProcess::Stop() {
   process_.Signal(SIGTERM);
 }
 
-const char* NodeProcess::GiveUp() {
+const char* NodeProcess::StopWaiting() {
   process_.Signal(SIGKILL);
   return "was killed";
 }
@@ -170,7 +170,7 @@ void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(
     if (now - begin > kLongestEnd && !gave_up) {
       gave_up = true;
       for (SupervisedNode* node : nodes) {
-        if (!node->HasEnded()) given_up(*node, node->GiveUp());
+        if (!node->HasEnded()) given_up(*node, node->StopWaiting());
       }
     }
     turn(now);

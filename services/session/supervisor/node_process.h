@@ -24,12 +24,12 @@ class NodeProcess final : public SupervisedNode {
   [[nodiscard]] std::optional<Death> Update(std::int64_t now_ns) override;
 
   bool OnHealth(const Health& health, std::int64_t now_ns) override;
-  void ForgiveSilence(std::int64_t now_ns) override;
+  void ResetTimeouts(std::int64_t now_ns) override;
   void AskRestart(std::int64_t now_ns) override;
   void Swap(NodeCommand command, std::int64_t now_ns) override;
   void Stop() override;
   [[nodiscard]] bool HasEnded() override;
-  const char* GiveUp() override;
+  const char* StopWaiting() override;
 
   [[nodiscard]] pid_t pid() const override { return process_.pid(); }
   [[nodiscard]] bool running() const override { return process_.running(); }
@@ -59,8 +59,8 @@ class NodeProcess final : public SupervisedNode {
   bool failed_ = false;
 };
 
-/// Ends all nodes: calls Stop on each, and GiveUp on those that still run 4 s later. `given_up` is called with such a
-/// node and what was done to it; `turn` is called repeatedly while the nodes end.
+/// Ends all nodes: calls Stop on each, and StopWaiting on those that still run 4 s later. `given_up` is called with
+/// such a node and what was done to it; `turn` is called repeatedly while the nodes end.
 void EndAll(const std::vector<SupervisedNode*>& nodes, const std::function<void(std::int64_t now_ns)>& turn,
             const std::function<void(const SupervisedNode& node, const char* done)>& given_up);
 

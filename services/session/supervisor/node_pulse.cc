@@ -37,16 +37,18 @@ void NodePulse::Add(const Health& health, std::int64_t now_ns) {
   period_ns_ = health.rate_asked_Hz > 0 ? std::llround(1e9 / static_cast<double>(health.rate_asked_Hz)) : 0;
 }
 
-void NodePulse::Forgive(std::int64_t until_ns) { started_ns_ = health_ns_ = progress_ns_ = forgiven_ns_ = until_ns; }
+void NodePulse::ResetTimeouts(std::int64_t until_ns) {
+  started_ns_ = health_ns_ = progress_ns_ = timeouts_reset_ns_ = until_ns;
+}
 
 const char* NodePulse::Complaint(bool has_spare, std::int64_t now_ns) const {
   constexpr const char* kSilent = "sent no Health for too long and was killed";
-  if (now_ns < forgiven_ns_) return nullptr;  // Health that was waiting may have come meanwhile, and no more.
+  if (now_ns < timeouts_reset_ns_) return nullptr;  // Health that was waiting may have come meanwhile, and no more.
   if (!has_reported_) return now_ns - started_ns_ > kLongestStart_ns ? kSilent : nullptr;
   const std::int64_t longest =
       std::max(has_spare && steps_ ? kLongestStillWithSpare_ns : kLongestStill_ns, kLongestStill_periods * period_ns_);
-  if (now_ns - std::max(health_ns_, forgiven_ns_) > longest) return kSilent;
-  if (steps_ && now_ns - std::max(progress_ns_, forgiven_ns_) > longest)
+  if (now_ns - std::max(health_ns_, timeouts_reset_ns_) > longest) return kSilent;
+  if (steps_ && now_ns - std::max(progress_ns_, timeouts_reset_ns_) > longest)
     return "was stuck in a step for too long and was killed";
   return nullptr;
 }

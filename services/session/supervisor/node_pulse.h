@@ -14,7 +14,7 @@ class NodePulse {
   void Start(std::int64_t now_ns);
   void Add(const Health& health, std::int64_t now_ns);
   /// Finds nothing wrong before `until_ns`, because the supervisor itself was suspended.
-  void Forgive(std::int64_t until_ns);
+  void ResetTimeouts(std::int64_t until_ns);
 
   /// Why the node must be killed, as text; nullptr: it works, or has time left.
   /// @param has_spare another process can take its place at once.
@@ -22,7 +22,7 @@ class NodePulse {
   [[nodiscard]] bool has_reported() const { return has_reported_; }
 
  private:
-  std::int64_t forgiven_ns_ = 0;  ///< No complaint before this time.
+  std::int64_t timeouts_reset_ns_ = 0;  ///< No complaint before this time.
   std::int64_t started_ns_ = 0, health_ns_ = 0, progress_ns_ = 0;
   std::int64_t period_ns_ = 0;
   std::uint64_t ticks_ = 0;

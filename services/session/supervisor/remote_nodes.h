@@ -28,7 +28,7 @@ class RemoteNodes {
   [[nodiscard]] bus::Refusals refusals() { return link_->refusals(); }
   /// Adds the link's metrics, and last_error where there is none yet.
   void AddTo(Health* health);
-  void SayBye() { link_->SayBye(); }
+  void SendBye() { link_->SendBye(); }
 
  private:
   const SessionSetup& setup_;

@@ -39,7 +39,7 @@ void SessionNodes::Start(std::int64_t now_ns) {
 
 void SessionNodes::Watch(std::int64_t now_ns, const OnDeath& died) {
   if (now_ns - last_watch_ns_ > kHeldUp_ns) {
-    for (const auto& node : nodes_) node->ForgiveSilence(ForgivenUntil(now_ns, now_ns - last_watch_ns_));
+    for (const auto& node : nodes_) node->ResetTimeouts(TimeoutsFrom(now_ns, now_ns - last_watch_ns_));
   }
   last_watch_ns_ = now_ns;
   for (const auto& node : nodes_) {

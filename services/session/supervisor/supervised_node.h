@@ -44,7 +44,7 @@ class SupervisedNode {
   /// Takes a Health. Returns false when it is of another node or another process.
   virtual bool OnHealth(const Health& health, std::int64_t now_ns) = 0;
   /// Restarts the measurement of silence at `now_ns`, because the supervisor itself was suspended.
-  virtual void ForgiveSilence(std::int64_t now_ns) = 0;
+  virtual void ResetTimeouts(std::int64_t now_ns) = 0;
   virtual void AskRestart(std::int64_t now_ns) = 0;
   /// Restarts the node as another program. When that ends before its first Health, the previous program is started
   /// again. Throws InputError when this node cannot be replaced.
@@ -55,7 +55,7 @@ class SupervisedNode {
   /// True when no process is left. Starts none again.
   [[nodiscard]] virtual bool HasEnded() = 0;
   /// Handles a node that does not end after Stop; returns what was done, for messages.
-  virtual const char* GiveUp() = 0;
+  virtual const char* StopWaiting() = 0;
 
   [[nodiscard]] virtual pid_t pid() const = 0;
   [[nodiscard]] virtual bool running() const = 0;

@@ -279,7 +279,7 @@ struct Supervisor::Impl {
     // Published at once: it marks the end of the session in a recording.
     own_health->MakeDue();
     PublishOwnHealth(MonotonicNs());
-    if (remote) remote->SayBye();
+    if (remote) remote->SendBye();
     status.Stopping();
     nodes->End(
         [this](std::int64_t now) {

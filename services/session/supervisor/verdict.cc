@@ -64,7 +64,7 @@ void Verdict::Add(const std::string& key, const Fault& fault) {
 void Verdict::Watch(double time_s, const SessionRecord& record) {
   // The machine or this process was suspended: nothing was received meanwhile.
   if (const double gap_s = time_s - last_s_; gap_s > kHeldUp_s) {
-    forgiven_s_ = time_s + (gap_s > 1e-9 * kForgotten_ns ? 1e-9 * kRematch_ns : 0);
+    no_gap_before_s_ = time_s + (gap_s > 1e-9 * kNearLease_ns ? 1e-9 * kRematch_ns : 0);
   }
   last_s_ = time_s;
   for (const NodeId node : session_.nodes) {
@@ -86,7 +86,7 @@ void Verdict::WatchProgress(NodeId node, double longest_gap_s, double time_s, co
   if (figures.failed || figures.state == HealthState::kStopping) return;
   const bool is_dead = figures.dead_since_s >= 0 && figures.progress_s <= figures.dead_since_s;
   if (is_dead || !figures.begun) {
-    const double since_s = std::max({is_dead ? figures.dead_since_s : 0.0, forgiven_s_, 0.0});
+    const double since_s = std::max({is_dead ? figures.dead_since_s : 0.0, no_gap_before_s_, 0.0});
     // After a swap the program may be one that sends no Health.
     if (time_s - since_s > kLongestAbsence_s && !(is_dead && figures.ended_by_command)) {
       Add("absent " + Name(node), {time_s, Name(node) + (is_dead ? " did not run again" : " did not begin") +
@@ -95,8 +95,8 @@ void Verdict::WatchProgress(NodeId node, double longest_gap_s, double time_s, co
     return;
   }
   if (figures.rate_asked_Hz > 0) longest_gap_s = std::max(longest_gap_s, kLongestGap_periods / figures.rate_asked_Hz);
-  if (time_s - std::max(figures.progress_s, forgiven_s_) <= longest_gap_s) return;
-  const bool is_silent = time_s - std::max(figures.heard_s, forgiven_s_) > longest_gap_s;
+  if (time_s - std::max(figures.progress_s, no_gap_before_s_) <= longest_gap_s) return;
+  const bool is_silent = time_s - std::max(figures.heard_s, no_gap_before_s_) > longest_gap_s;
   Add("gap " + Name(node), {time_s, Name(node) + (is_silent ? " was silent" : " was stuck") + " for more than " +
                                         Fixed(longest_gap_s, 1) + " s"});
 }

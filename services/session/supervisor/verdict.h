@@ -75,8 +75,8 @@ class Verdict {
 
   Session session_;
   std::array<Window, kNodeCount> windows_{};
-  double last_s_ = 0;      ///< Session time of the last Watch.
-  double forgiven_s_ = 0;  ///< Until this session time no gap is the fault of a node.
+  double last_s_ = 0;           ///< Session time of the last Watch.
+  double no_gap_before_s_ = 0;  ///< Until this session time no gap is the fault of a node.
   std::set<std::string> known_;
   std::vector<Fault> faults_;
 };

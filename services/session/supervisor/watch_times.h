@@ -17,10 +17,10 @@ inline constexpr std::int64_t kSweepAfter_ns = 2 * kSecond_ns;
 inline constexpr std::int64_t kHeldUp_ns = kSecond_ns;
 /// After a gap near the lease of participants (8 s) the nodes have removed this process and find it again: no silence
 /// is attributed to a node for this long after it [ns].
-inline constexpr std::int64_t kForgotten_ns = 7 * kSecond_ns, kRematch_ns = 10 * kSecond_ns;
-/// Time up to which silence is forgiven after a gap in the loop.
-[[nodiscard]] constexpr std::int64_t ForgivenUntil(std::int64_t now_ns, std::int64_t gap_ns) {
-  return now_ns + (gap_ns > kForgotten_ns ? kRematch_ns : 0);
+inline constexpr std::int64_t kNearLease_ns = 7 * kSecond_ns, kRematch_ns = 10 * kSecond_ns;
+/// Time from which the timeouts of nodes are measured after a gap in the loop.
+[[nodiscard]] constexpr std::int64_t TimeoutsFrom(std::int64_t now_ns, std::int64_t gap_ns) {
+  return now_ns + (gap_ns > kNearLease_ns ? kRematch_ns : 0);
 }
 
 }  // namespace fulcrum::supervisor

@@ -158,10 +158,10 @@ class OutgoingTopology final : public Outgoing {
     }
     const SampleHead head{TopicId::kTopologyState, number_ + 1, whole ? 0 : number_};
     if (link->send(FarLane::kOrdered, PacketKind::kSample, [&](std::vector<std::uint8_t>* out) {
-          PutSample(head, whole ? std::span<const std::uint8_t>() : told_, cdr_, out);
+          PutSample(head, whole ? std::span<const std::uint8_t>() : sent_, cdr_, out);
         })) {
       ++number_;
-      told_ = cdr_;
+      sent_ = cdr_;
     }
     return kNever;
   }
@@ -172,7 +172,7 @@ class OutgoingTopology final : public Outgoing {
   TopologyState state_;
   bool known_ = false, repeat_ = true;
   std::uint32_t number_ = 0;
-  std::vector<std::uint8_t> cdr_, told_;
+  std::vector<std::uint8_t> cdr_, sent_;
 };
 
 SendChunk ChunkSender(LinkContext* link, PacketKind kind) {

@@ -94,7 +94,7 @@ void Link::Leave() {
   joined_session_ = 0;
 }
 
-void Link::SayBye() {
+void Link::SendBye() {
   const std::lock_guard lock(mutex_);
   bye_ = true;
   next_pulse_ns_ = 0;

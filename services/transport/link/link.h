@@ -63,7 +63,7 @@ class Link {
   /// Removes all ports from the bus that was joined. Call before that bus is destroyed if it ends before the link.
   void Leave();
   /// Sends the message that the session has ended. The link itself runs until its destruction.
-  void SayBye();
+  void SendBye();
 
   [[nodiscard]] const LinkSettings& settings() const { return settings_; }
   [[nodiscard]] LinkStatus status();

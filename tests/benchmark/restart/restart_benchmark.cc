@@ -71,6 +71,12 @@ std::uint64_t SharedMemoryLeft() {
   return bytes;
 }
 
+/// A cart file with which kills do not make a session end badly.
+fs::path CartThatAllowsKills(const fs::path& folder) {
+  std::ofstream(folder / "cart.yaml") << "verdict: {restarts: 1000}\n";
+  return folder / "cart.yaml";
+}
+
 /// Kills one node; false when nothing was heard of its successor.
 bool Kill(const Node& node, const testing::Cart& cart, testing::CartWatch* watch, Findings* findings) {
   const auto processes = cart.nodes();
@@ -99,7 +105,7 @@ bool Kill(const Node& node, const testing::Cart& cart, testing::CartWatch* watch
 
 /// One session in which each node is killed `rounds` times; what went wrong, or nothing.
 std::string RunSession(int rounds, const fs::path& scene, Findings* findings) {
-  testing::Cart cart(scene, kDomain);
+  testing::Cart cart(scene, kDomain, {"--cart", CartThatAllowsKills(scene.parent_path())});
   testing::CartWatch watch(kDomain, scene, cart.session());
   const bool works = watch.WaitUntil(60, [](const CartState& state) {
     return state.topology.revision > 0 && state.peak_force_N() > 0.1 &&
@@ -131,7 +137,7 @@ std::string RunSession(int rounds, const fs::path& scene, Findings* findings) {
 /// A session with a physics node in standby, whose leader is killed again and again; what went wrong, or nothing.
 std::string RunStandby(int kills, const fs::path& scene, std::vector<double>* gap_ms, Findings* findings) {
   constexpr auto kIndex = static_cast<std::size_t>(NodeId::kPhysics);
-  testing::Cart cart(scene, kDomain, {"--standby"});
+  testing::Cart cart(scene, kDomain, {"--standby", "--cart", CartThatAllowsKills(scene.parent_path())});
   testing::CartWatch watch(kDomain, scene, cart.session());
   // A process that has just been relieved may not have heard of it when it last told of itself.
   constexpr std::uint64_t kHearsay_ns = 200'000'000;

@@ -219,7 +219,7 @@ TEST(Link, AManifestOfATickNamesSamplesAsTheyAreOnEachHost) {
 TEST(Link, TheEndOfTheSessionIsHeard) {
   TwoHosts hosts(BitOf(NodeId::kRender));
   EXPECT_FALSE(hosts.host_link->session().over);
-  hosts.cart_link.SayBye();
+  hosts.cart_link.SendBye();
   EXPECT_TRUE(Eventually([&] { return hosts.host_link->session().over; }));
 }
 

@@ -116,8 +116,8 @@ TEST_F(RunningSession, AdmitsAGuestAtOnceAndGivesItItsRightsOnly) {
   bus::DdsParticipant guest(Guest());
   const auto healths = guest.MakeInput<Health>();
   EXPECT_TRUE(Receives(healths.get()));
-  EXPECT_TRUE(supervisor_->Knows("probe"));
-  EXPECT_FALSE(supervisor_->Knows("recorder")) << "a guest passes for a participant of the cart";
+  EXPECT_TRUE(supervisor_->HasParticipant("probe"));
+  EXPECT_FALSE(supervisor_->HasParticipant("recorder")) << "a guest passes for a participant of the cart";
   for (const std::string& text : {Problem([&] { (void)guest.MakeOutput<ToolState>(); }),
                                   Problem([&] { (void)guest.MakeInput<TissueFrame>(); })}) {
     EXPECT_NE(text.find("access control refuses it to \"probe\""), std::string::npos) << text;
@@ -149,8 +149,8 @@ TEST_F(RunningSession, RefusesARevokedGuestFromTheNextParticipantOn) {
                                           "more, and help and DESIGN say too little";
   const auto restarted = Join("haptics_node");
   EXPECT_TRUE(WaitFor(kPatience_s, [&] { return Tells(*restarted, "certificate revoked"); }));
-  EXPECT_TRUE(WaitFor(kPatience_s, [&] { return restarted->Knows("supervisor"); }));
-  EXPECT_FALSE(restarted->Knows("probe"));
+  EXPECT_TRUE(WaitFor(kPatience_s, [&] { return restarted->HasParticipant("supervisor"); }));
+  EXPECT_FALSE(restarted->HasParticipant("probe"));
   // As after the restart of every participant.
   tools_.reset();
   healths_.reset();

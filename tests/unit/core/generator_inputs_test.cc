@@ -114,8 +114,8 @@ TEST(GeneratorInputs, FromTheNamedSamplesAloneTheAnswersAreTheSame) {
     const GeneratorDemand second = again.At(ms * kMs);
     ASSERT_EQ(first.mode, second.mode) << ms;
     ASSERT_EQ(first.power_W, second.power_W) << ms;
-    live.Forget(ms * kMs);
-    again.Forget(ms * kMs);
+    live.DropBefore(ms * kMs);
+    again.DropBefore(ms * kMs);
   }
 }
 

@@ -327,7 +327,7 @@ TEST_F(PulseTest, ALowRateHasSeldomTicks) {
 
 TEST_F(PulseTest, WhileTheSupervisorWasSuspendedNothingCounts) {
   Say(10, 5);
-  pulse_.Forgive(20 * kSecond_ns);
+  pulse_.ResetTimeouts(20 * kSecond_ns);
   EXPECT_EQ(At(21, true), "");
 }
 

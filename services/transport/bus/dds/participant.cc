@@ -290,7 +290,7 @@ std::uint64_t DdsParticipant::foreign_samples() const { return impl_->session.fo
 
 std::uint64_t DdsParticipant::inherited_locks() { return dds::SharedLocks().inherited; }
 
-bool DdsParticipant::Knows(const std::string& name) const { return !impl_->watch.Named(name).empty(); }
+bool DdsParticipant::HasParticipant(const std::string& name) const { return !impl_->watch.Named(name).empty(); }
 
 namespace {
 

@@ -78,7 +78,7 @@ class DdsParticipant {
   [[nodiscard]] Peer PeerOf(const WriterGuid& writer) const;
 
   /// Whether a participant of that name is on the bus.
-  [[nodiscard]] bool Knows(const std::string& name) const;
+  [[nodiscard]] bool HasParticipant(const std::string& name) const;
   /// Whether all outputs of this participant are matched with readers of a participant of that name. Those readers
   /// match sooner or later than this side does: see PeersRead.
   [[nodiscard]] bool IsReadBy(const std::string& name) const;

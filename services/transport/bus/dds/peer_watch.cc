@@ -92,7 +92,7 @@ void PeerWatch::on_participant_discovery(eprosima::fastdds::dds::DomainParticipa
   const Prefix prefix = info.info.m_guid.guidPrefix;
   const std::lock_guard lock(mutex_);
   if (info.status == DiscoveryStatus::REMOVED_PARTICIPANT || info.status == DiscoveryStatus::DROPPED_PARTICIPANT) {
-    Forget(prefix);
+    Remove(prefix);
     return;
   }
   const auto& bytes = info.info.m_userData;
@@ -211,7 +211,7 @@ void PeerWatch::Admit(const Prefix& prefix, const std::string& text, const std::
                         "; rebuild and restart both from the same sources";
 }
 
-void PeerWatch::Forget(const Prefix& prefix) {
+void PeerWatch::Remove(const Prefix& prefix) {
   mismatches_.erase(prefix);
   living_.erase(prefix);
   strangers_.erase(prefix);

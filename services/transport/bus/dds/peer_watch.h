@@ -66,7 +66,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
 
   /// @param guest identity outside of the table; empty: a participant of the table, or a cart without keys.
   void Admit(const Prefix& prefix, const std::string& text, const std::string& name, const std::string& guest = {});
-  void Forget(const Prefix& prefix);
+  void Remove(const Prefix& prefix);
   void Refuse(Stranger* stranger, const std::string& why);
   void Tell(std::string text);
   void CheckEndpoint(const Prefix& prefix, const std::string& topic, bool writes);

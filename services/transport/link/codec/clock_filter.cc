@@ -66,15 +66,15 @@ void ClockFilter::Fit() {
 std::int64_t ClockFilter::OffsetAt(std::int64_t now_ns) {
   if (!known()) return 0;
   const std::int64_t wanted = fit_offset_ns_ + std::llround(drift_ * static_cast<double>(now_ns - fit_time_ns_));
-  if (told_time_ns_ == 0 || std::abs(wanted - told_ns_) > kLargestError_ns) {
-    told_ns_ = wanted;
+  if (result_time_ns_ == 0 || std::abs(wanted - result_ns_) > kLargestError_ns) {
+    result_ns_ = wanted;
   } else {
     const auto room =
-        std::llround(kLargestSlew * static_cast<double>(std::max<std::int64_t>(0, now_ns - told_time_ns_)));
-    told_ns_ += std::clamp<std::int64_t>(wanted - told_ns_, -room, room);
+        std::llround(kLargestSlew * static_cast<double>(std::max<std::int64_t>(0, now_ns - result_time_ns_)));
+    result_ns_ += std::clamp<std::int64_t>(wanted - result_ns_, -room, room);
   }
-  told_time_ns_ = now_ns;
-  return told_ns_;
+  result_time_ns_ = now_ns;
+  return result_ns_;
 }
 
 std::int64_t ClockFilter::delay_ns() const {

@@ -42,7 +42,7 @@ class ClockFilter {
   std::deque<Best> best_;  ///< One per second.
   std::int64_t fit_time_ns_ = 0, fit_offset_ns_ = 0;
   double drift_ = 0;
-  std::int64_t told_ns_ = 0, told_time_ns_ = 0;  ///< Last result of OffsetAt and its time; time 0: none yet.
+  std::int64_t result_ns_ = 0, result_time_ns_ = 0;  ///< Last result of OffsetAt and its time; time 0: none yet.
 };
 
 }  // namespace fulcrum::link

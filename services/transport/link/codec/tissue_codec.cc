@@ -104,13 +104,13 @@ void TissueSender::FindDirty(std::span<const float> xyz) {
     const std::size_t end = begin + std::size_t{3} * SizeOf(block, count_);
     bool moved = dirty_[block];
     for (std::size_t i = begin; i < end && !moved; ++i) {
-      moved = std::abs(kStepsPerMetre * static_cast<double>(xyz[i]) - told_[i]) > kTissueSlack;
+      moved = std::abs(kStepsPerMetre * static_cast<double>(xyz[i]) - sent_steps_[i]) > kTissueSlack;
     }
     dirty_[block] = moved;
     if (!moved) continue;
     for (std::size_t i = begin; i < end; ++i) {
-      told_[i] = std::clamp(static_cast<std::int32_t>(std::lround(kStepsPerMetre * static_cast<double>(xyz[i]))),
-                            -kFarthest, kFarthest);
+      sent_steps_[i] = std::clamp(static_cast<std::int32_t>(std::lround(kStepsPerMetre * static_cast<double>(xyz[i]))),
+                                  -kFarthest, kFarthest);
     }
   }
 }
@@ -120,7 +120,7 @@ void TissueSender::PutBlock(std::uint32_t block) {
   const std::uint32_t size = SizeOf(block, count_);
   ByteWriter(&block_).Number(static_cast<std::uint16_t>(block));
   for (std::size_t k = 0; k < 3; ++k) {
-    for (std::size_t i = 0; i < size; ++i) axis[i] = told_[3 * (std::size_t{block} * kTissueBlock + i) + k];
+    for (std::size_t i = 0; i < size; ++i) axis[i] = sent_steps_[3 * (std::size_t{block} * kTissueBlock + i) + k];
     PutAxis(std::span(axis).first(size), &block_);
   }
 }
@@ -130,7 +130,7 @@ void TissueSender::Encode(const TissueFrame& frame, const SendChunk& send) {
   if (count > kMaxTissueVertices || frame.xyz.size() < std::size_t{3} * count) return;
   if (count != count_) {
     count_ = count;
-    told_.assign(std::size_t{3} * count, 0);
+    sent_steps_.assign(std::size_t{3} * count, 0);
     dirty_.assign(BlocksOf(count), true);
   }
   for (std::uint32_t i = 0; i < kTissueRefresh && !dirty_.empty(); ++i) {

@@ -47,10 +47,10 @@ class TissueSender {
   void PutBlock(std::uint32_t block);
 
   TissueFrameHeader header_;
-  std::uint32_t count_ = 0;         ///< Vertices.
-  std::vector<std::int32_t> told_;  ///< Last sent positions, three per vertex [steps].
-  std::vector<bool> dirty_;         ///< Per block.
-  std::uint32_t next_refresh_ = 0;  ///< Index of a block.
+  std::uint32_t count_ = 0;               ///< Vertices.
+  std::vector<std::int32_t> sent_steps_;  ///< Last sent positions, three per vertex [steps].
+  std::vector<bool> dirty_;               ///< Per block.
+  std::uint32_t next_refresh_ = 0;        ///< Index of a block.
   std::uint32_t frame_ = 0;
   SentChunks sent_;
   std::vector<std::uint8_t> chunk_, block_;
