@@ -59,8 +59,10 @@ void RefuseOther(const Segment& first, const Segment& other) {
   for (const auto& [record, key] : kSame) {
     const std::string one = ValueOf(first.reader(), record, key), two = ValueOf(other.reader(), record, key);
     if (one == two && !one.empty()) continue;
-    throw InputError(other.file.string() + ": " + record + "." + key + " is \"" + two + "\", that of " +
-                     first.file.string() + " is \"" + one + "\"; give files of one session, which have the same");
+    std::string message = other.file.string();
+    message.append(": ").append(record).append(".").append(key).append(" is \"").append(two).append("\", that of ");
+    message.append(first.file.string()).append(" is \"").append(one);
+    throw InputError(message.append("\"; give files of one session, which have the same"));
   }
 }
 
@@ -121,6 +123,7 @@ Metadata JoinedMetadata(const std::vector<std::unique_ptr<Segment>>& sources) {
 /// In the order of their beginning.
 std::vector<std::unique_ptr<Segment>> Open(const std::vector<fs::path>& files) {
   std::vector<std::unique_ptr<Segment>> sources;
+  sources.reserve(files.size());
   for (const fs::path& file : files) sources.push_back(std::make_unique<Segment>(file));
   for (const auto& source : sources) RefuseOther(*sources.front(), *source);
   const auto begin_ns = [](const auto& source) {

@@ -27,7 +27,7 @@ constexpr int kGivenBack = 8;
 
 asio::ip::address AddressOf(const std::string& text) {
   error_code error;
-  const auto address = asio::ip::make_address(text, error);
+  auto address = asio::ip::make_address(text, error);
   if (error) throw InputError("--bind " + text + ": must be a numeric address, for example 127.0.0.1");
   return address;
 }

@@ -145,7 +145,7 @@ class Host {
   CommandAnswer Restart(const std::string& name, std::int64_t now) {
     for (NodeProcess& node : nodes_) {
       if (name != NodeName(node.id()) || !node.running()) continue;
-      const CommandAnswer answer{true, "restarting " + name + " (pid " + std::to_string(node.pid()) + ")"};
+      CommandAnswer answer{true, "restarting " + name + " (pid " + std::to_string(node.pid()) + ")"};
       node.AskRestart(now);
       return answer;
     }

@@ -86,8 +86,9 @@ bus::TopicSet TopicsNamed(const std::string& list, const std::string& option) {
     const std::string label = list.substr(from, to - from);
     const bus::TopicRole* topic = TopicLabelled(label);
     if (topic == nullptr) {
-      throw InputError(option + " " + list + ": no topic \"" + label +
-                       "\"; valid, separated by commas: " + ValidTopics());
+      std::string message = option;
+      message.append(" ").append(list).append(": no topic \"").append(label);
+      throw InputError(message.append("\"; valid, separated by commas: ").append(ValidTopics()));
     }
     set |= bus::SetOf(topic->id);
     from = to + 1;

@@ -54,7 +54,7 @@ bus::AccessRole RightsOf(std::string_view identity, const KeyFiles& files, const
 std::string CheckCertificate(const KeyFiles& files, std::string_view identity, std::time_t now) {
   const std::string authority = Read(files.authority);
   const CertificateFacts issuer = FactsOf(authority, Quoted(files.authority));
-  const std::string certificate = Read(files.certificate);
+  std::string certificate = Read(files.certificate);
   const std::string what = Quoted(files.certificate);
   const CertificateFacts facts = FactsOf(certificate, what);
   if (now < facts.validity.from || now > facts.validity.until) {
@@ -239,6 +239,7 @@ std::vector<IdentityState> InspectKeyFolder(const fs::path& folder, std::time_t 
   VerifyCertificate(authority, authority, now, Quoted(file));
   for (const bool encrypt : {false, true}) CheckGovernance(folder, encrypt, authority);
   std::vector<IdentityState> states;
+  states.reserve(bus::kAccessRoles.size());
   for (const bus::AccessRole& role : bus::kAccessRoles) {
     states.push_back(StateOf(folder, std::string(role.identity), now));
   }
