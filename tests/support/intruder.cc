@@ -1,7 +1,9 @@
 #include "tests/support/intruder.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <signal.h>
+#include <sys/inotify.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -31,7 +33,8 @@ namespace fs = std::filesystem;
 constexpr std::time_t kDay_s = 24 * 3600;
 // Long enough to start a process, short enough for a test to wait for.
 constexpr std::time_t kShortLife_s = 2;
-constexpr double kPatience_s = 20;
+constexpr double kPatience_s = 30;
+constexpr int kLongestRead_ms = 5000;
 
 void Write(const fs::path& file, const std::string& text) {
   std::ofstream out(file, std::ios::binary | std::ios::trunc);
@@ -58,13 +61,17 @@ class TwoFacedPipe {
     fs::remove(path_);
     if (::mkfifo(path_.c_str(), 0600) != 0) throw std::runtime_error("cannot make " + path_.string());
     thread_ = std::thread([this, texts = std::vector<std::string>{std::move(first), std::move(second)}] {
+      const int watch = ::inotify_init1(IN_CLOEXEC);
+      ::inotify_add_watch(watch, path_.c_str(), IN_CLOSE_NOWRITE);
       for (const std::string& text : texts) {
         const int fd = ::open(path_.c_str(), O_WRONLY | O_CLOEXEC);
         (void)!::write(fd, text.data(), text.size());
         ::close(fd);
         // The first reader must have closed before the next text is written.
-        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        pollfd closed{watch, POLLIN, 0};
+        (void)::poll(&closed, 1, kLongestRead_ms);
       }
+      ::close(watch);
     });
   }
   ~TwoFacedPipe() {

@@ -22,7 +22,7 @@ namespace {
 
 constexpr int kHeard = 5;
 constexpr auto kLongest = std::chrono::seconds(12);
-constexpr auto kForgedFor = std::chrono::seconds(4);
+constexpr auto kForgedFor = std::chrono::seconds(8);
 
 ToolState Forged() {
   ToolState state = bus::test::Sample<ToolState>();
