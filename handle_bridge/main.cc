@@ -5,6 +5,7 @@
 #include "handle_bridge/node/calibrate_command.h"
 #include "handle_bridge/node/cart_links.h"
 #include "handle_bridge/node/handle_bridge_node.h"
+#include "services/base/core/operator_choice.h"
 #include "services/base/runtime/realtime.h"
 #include "services/nodes/app/node_app.h"
 
@@ -12,14 +13,23 @@ namespace {
 
 fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
   using namespace fulcrum::handle_bridge;
-  // Sends nothing until the session time is known: after a restart during a session the script's first key would be a
-  // wrong angle.
-  const auto follow_script = [&app](std::int64_t now_ns) -> std::optional<OperatorInput> {
+  using fulcrum::config::LinkKind;
+  const bool operated = HasLinks(app.cart(), LinkKind::kOperator);
+  OperatedHands hands(app.cart());
+  fulcrum::OperatorChoice choice;
+  fulcrum::OperatorInput sample;
+  fulcrum::bus::Input<fulcrum::OperatorInput>* const inputs =
+      operated ? &app.MakeInput<fulcrum::OperatorInput>() : nullptr;
+  // Called on the firmware's thread. Sends nothing until the session time is known: after a restart during a session
+  // the script's first key would be a wrong angle.
+  const auto input_at = [&](std::int64_t now_ns) -> std::optional<SimulatedInput> {
+    while (inputs != nullptr && inputs->TakeNext(&sample)) (void)choice.Add(sample);
     const double time_s = app.SessionTime(now_ns);
-    return time_s < 0 ? std::nullopt : std::optional(FollowScript(app.scene(), app.cart(), time_s));
+    if (time_s < 0) return std::nullopt;
+    return hands.Replace(FollowScript(app.scene(), app.cart(), time_s), choice.At(now_ns));
   };
-  const auto firmware = HasSimulatedLinks(app.cart())
-                            ? std::make_unique<SimulatedFirmware>(follow_script, MakeSimulatedUnits(app.cart()))
+  const auto firmware = operated || HasLinks(app.cart(), LinkKind::kSimulated)
+                            ? std::make_unique<SimulatedFirmware>(input_at, MakeSimulatedUnits(app.cart()))
                             : nullptr;
   const CalibrationStore calibrations = CalibrationStore::Load(CalibrationFolder());
   fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, calibrations.Describe());

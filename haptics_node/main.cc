@@ -24,8 +24,8 @@ fulcrum::ExitCode RunHaptics(fulcrum::app::NodeApp& app) {
   for (const std::string& note : cart.notes) Log(fulcrum::runtime::LogLevel::kInfo, note);
   if (cart.touch) cart.touch->Start();
   fulcrum::haptics::HapticsNode node(app.scene(), std::move(cart.devices),
-                                     {app.MakeInput<fulcrum::ContactModel>(), app.MakeOutput<fulcrum::ToolState>(),
-                                      app.MakeOutput<fulcrum::TickManifest>()},
+                                     {app.MakeInput<fulcrum::ContactModel>(), app.MakeInput<fulcrum::OperatorInput>(),
+                                      app.MakeOutput<fulcrum::ToolState>(), app.MakeOutput<fulcrum::TickManifest>()},
                                      fulcrum::runtime::MonotonicNs());
 
   const fulcrum::runtime::CyclicThreadSettings servo = app.timing();

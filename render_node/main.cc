@@ -6,6 +6,8 @@
 
 #include "render_node/node/drawing_threads.h"
 #include "render_node/node/render_node.h"
+#include "services/base/core/error.h"
+#include "services/base/runtime/cyclic_thread.h"
 #include "services/base/runtime/realtime.h"
 #include "services/nodes/app/node_app.h"
 #include "services/nodes/app/spare.h"
@@ -19,6 +21,9 @@ ExitCode RunRender(app::NodeApp& app) {
   if (spare) app::BecomeSpare(NodeId::kRender);
   render::RenderSettings settings;
   settings.window = app.options().TakeFlag("--window");
+  const bool hands = app.options().TakeFlag("--hands");
+  if (hands && !settings.window) throw InputError("--hands goes with --window");
+  settings.epoch_ns = runtime::MonotonicNs();
   settings.quality = render::QualityFromName(app.options().TakeValue("--quality", "auto"));
   settings.frames = app.options().session / "frames";
   auto stage = render::MakeStage(app.scene(), settings.window, spare);
@@ -27,10 +32,15 @@ ExitCode RunRender(app::NodeApp& app) {
   // Collected before the ports are created: the threads that draw, this one and the rasteriser's, without those of the
   // bus.
   const std::vector<int> drawing = render::ThreadsOfProcess();
-  const render::RenderPorts ports{app.MakeInput<TissueFrame>(),      app.MakeInput<TopologyState>(),
-                                  app.MakeInput<TemperaturePatch>(), app.MakeInput<ToolState>(),
-                                  app.MakeInput<HandleState>(),      app.MakeInput<ThermalEvent>(),
-                                  app.MakeInput<CauteryContact>(),   app.MakeInput<GeneratorSetting>()};
+  const render::RenderPorts ports{app.MakeInput<TissueFrame>(),
+                                  app.MakeInput<TopologyState>(),
+                                  app.MakeInput<TemperaturePatch>(),
+                                  app.MakeInput<ToolState>(),
+                                  app.MakeInput<HandleState>(),
+                                  app.MakeInput<ThermalEvent>(),
+                                  app.MakeInput<CauteryContact>(),
+                                  app.MakeInput<GeneratorSetting>(),
+                                  hands ? &app.MakeOutput<OperatorInput>() : nullptr};
   render::LowerPriority(drawing);
   render::RenderNode node(app.scene(), settings, ports, std::move(stage));
   runtime::Log(runtime::LogLevel::kInfo, node.display_description());

@@ -211,7 +211,7 @@ ExitCode Calibrate(const Options& options, std::istream& in, std::ostream& out) 
   const config::HandleConfig& handle = options.cart.handles[options.tool];
   std::atomic<double> asked_deg{options.angles_deg.front()};
   const auto obey = [&](std::int64_t) {
-    OperatorInput input;
+    SimulatedInput input;
     input.jaw_deg.fill(asked_deg.load(std::memory_order_relaxed));
     input.faults[options.tool] = FaultsAt(handle.simulated, 0.0);
     return std::optional(input);

@@ -21,6 +21,7 @@ std::unique_ptr<WatchedLink> MakeLink(config::LinkKind kind, const config::Seria
     case config::LinkKind::kNone:
       return nullptr;
     case config::LinkKind::kSimulated:
+    case config::LinkKind::kOperator:
       opener = firmware->MakeOpener(firmware_link);
       break;
     case config::LinkKind::kSerial:
@@ -37,10 +38,10 @@ bool Within(const std::vector<double>& ends_s, double time_s) {
 
 }  // namespace
 
-bool HasSimulatedLinks(const config::CartConfig& cart) {
-  return cart.pedal.kind == config::LinkKind::kSimulated ||
+bool HasLinks(const config::CartConfig& cart, config::LinkKind kind) {
+  return cart.pedal.kind == kind ||
          std::any_of(cart.handles.begin(), cart.handles.end(),
-                     [](const config::HandleConfig& handle) { return handle.kind == config::LinkKind::kSimulated; });
+                     [=](const config::HandleConfig& handle) { return handle.kind == kind; });
 }
 
 HandleBridgeNode::Links MakeCartLinks(const config::CartConfig& cart, SimulatedFirmware* firmware) {
@@ -80,8 +81,8 @@ LinkFaults FaultsAt(const config::SimulatedUnit& unit, double session_time_s) {
   return faults;
 }
 
-OperatorInput FollowScript(const SceneView& scene, const config::CartConfig& cart, double session_time_s) {
-  OperatorInput input;
+SimulatedInput FollowScript(const SceneView& scene, const config::CartConfig& cart, double session_time_s) {
+  SimulatedInput input;
   for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
     const ScriptPoint point = EvaluateScript(scene.script, tool, session_time_s);
     input.jaw_deg[tool] = kDegPerRad * point.jaw_rad;
@@ -89,6 +90,20 @@ OperatorInput FollowScript(const SceneView& scene, const config::CartConfig& car
     input.faults[tool] = FaultsAt(cart.handles[tool].simulated, session_time_s);
   }
   input.faults[kPedalLink] = FaultsAt(cart.pedal.simulated, session_time_s);
+  return input;
+}
+
+SimulatedInput OperatedHands::Replace(SimulatedInput input, const OperatorInput* operated) {
+  for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
+    if (cart_.handles[tool].kind != config::LinkKind::kOperator) continue;
+    if (operated != nullptr && operated->tools[tool].moves) {
+      jaw_deg_[tool] = kDegPerRad * static_cast<double>(operated->tools[tool].jaw_angle_rad);
+    }
+    input.jaw_deg[tool] = jaw_deg_[tool];
+  }
+  if (cart_.pedal.kind == config::LinkKind::kOperator) {
+    input.pedals = operated != nullptr ? operated->pedals : std::uint8_t{kPedalNone};
+  }
   return input;
 }
 

@@ -10,10 +10,11 @@
 
 namespace fulcrum::handle_bridge {
 
-/// True if any handle or pedal of the cart is simulated.
-[[nodiscard]] bool HasSimulatedLinks(const config::CartConfig& cart);
+/// True if any handle or the pedal of the cart is of this kind.
+[[nodiscard]] bool HasLinks(const config::CartConfig& cart, config::LinkKind kind);
 
-/// Opens all links. `firmware` serves the simulated links and must outlive them; null if there are none.
+/// Opens all links. `firmware` serves the simulated links, and those that an operator's input moves, and must outlive
+/// them; null if there are none.
 [[nodiscard]] HandleBridgeNode::Links MakeCartLinks(const config::CartConfig& cart, SimulatedFirmware* firmware);
 
 /// Properties of the simulated handles and pedal in the cart.
@@ -25,6 +26,24 @@ namespace fulcrum::handle_bridge {
 /// Jaws and pedals of the scripted operator and the faults of the cart's links; a pedal is pressed if it is in any
 /// tool's key. Before the session has started (negative time) the jaws have the angles of their first key and all
 /// pedals are released.
-[[nodiscard]] OperatorInput FollowScript(const SceneView& scene, const config::CartConfig& cart, double session_time_s);
+[[nodiscard]] SimulatedInput FollowScript(const SceneView& scene, const config::CartConfig& cart,
+                                          double session_time_s);
+
+/// Handles and pedal of kind `operator`: simulated firmware whose jaws and pedals are an operator's instead of the
+/// script's.
+class OperatedHands {
+ public:
+  explicit OperatedHands(const config::CartConfig& cart) : cart_(cart) {}
+
+  /// @param operated newest input of the present operator; null: there is none. Jaws then keep their angles and the
+  /// pedal is released.
+  [[nodiscard]] SimulatedInput Replace(SimulatedInput input, const OperatorInput* operated);
+
+ private:
+  static constexpr double kStartJaw_deg = 30;
+
+  const config::CartConfig& cart_;
+  std::array<double, kMaxTools> jaw_deg_{kStartJaw_deg, kStartJaw_deg};
+};
 
 }  // namespace fulcrum::handle_bridge

@@ -48,7 +48,7 @@ void SimulatedFirmware::Step(const Tick& tick) {
   const std::uint64_t owed = std::min(tick.index - next_index_ + 1, kMaxCatchUp);
   next_index_ = tick.index + 1;
   for (std::uint64_t i = owed; i-- > 0;) {
-    const std::optional<OperatorInput> input = input_(tick.stamp_ns - static_cast<std::int64_t>(i) * kPeriod_ns);
+    const std::optional<SimulatedInput> input = input_(tick.stamp_ns - static_cast<std::int64_t>(i) * kPeriod_ns);
     if (!input) {
       continue;
     }

@@ -39,7 +39,7 @@ struct LinkFaults {
 };
 
 /// Input of the operator's hands and foot at a given time, and faults of the links.
-struct OperatorInput {
+struct SimulatedInput {
   std::array<double, kMaxTools> jaw_deg{};
   std::uint8_t pedals = kPedalNone;  ///< PedalBits.
   std::array<LinkFaults, kLinks> faults{};
@@ -51,7 +51,7 @@ class SimulatedFirmware {
   static constexpr int kOtherBaud = 57600;
 
   /// Input at a CLOCK_MONOTONIC time [ns]; no value: not known yet, so nothing is sent.
-  using InputAt = std::function<std::optional<OperatorInput>(std::int64_t)>;
+  using InputAt = std::function<std::optional<SimulatedInput>(std::int64_t)>;
 
   /// @param input called 400 times a second on the firmware's thread.
   explicit SimulatedFirmware(InputAt input, const std::array<SimulatedUnit, kLinks>& units = DefaultUnits());

@@ -9,9 +9,6 @@
 namespace fulcrum::haptics {
 namespace {
 
-constexpr double kStep_s = 1e-3;
-// Longest simulated time of one tick: after a longer gap the hand has settled anyway; bounds the work of one tick.
-constexpr double kMaxCatchUp_s = 0.1;
 // If session time and clock differ by more than this, a new session has begun and the device restarts at rest.
 constexpr double kSessionJump_s = 0.05;
 
@@ -43,28 +40,13 @@ Vec3d SimulatedDevice::ReadPosition(const Tick& tick) noexcept {
                             (tick.session_time_s < 0 && session_time_s_ < 0);
   if (!placed_ || !same_session) {
     placed_ = true;
-    position_ = target;
-    velocity_.setZero();
+    hand_.Place(target);
   } else if (elapsed > 0.0) {
-    // Implicit Euler on m a = k (target - x) + b (target' - v) + f: unconditionally stable for any hand.
-    const double span = std::min(elapsed, kMaxCatchUp_s);
-    const int steps = std::max(1, static_cast<int>(std::lround(span / kStep_s)));
-    const double h = span / steps;
-    const Vec3d target_velocity = (target - target_) / elapsed;
-    const double mass = hand_.mass_kg + kDeviceMass_kg;
-    const double inertia = mass + h * hand_.damping_Ns_m + h * h * hand_.stiffness_N_m;
-    for (int i = 1; i <= steps; ++i) {
-      const Vec3d wanted = target - (steps - i) * h * target_velocity;
-      velocity_ = (mass * velocity_ +
-                   h * (hand_.stiffness_N_m * (wanted - position_) + hand_.damping_Ns_m * target_velocity + force_)) /
-                  inertia;
-      position_ += h * velocity_;
-    }
+    hand_.Advance(target, force_, elapsed);
   }
-  target_ = target;
   session_time_s_ = tick.session_time_s;
   stamp_ns_ = tick.stamp_ns;
-  return position_;
+  return hand_.position();
 }
 
 }  // namespace fulcrum::haptics

@@ -15,9 +15,6 @@
 
 namespace fulcrum::haptics {
 
-/// Moving mass of a desktop device such as the Touch, at the attach point [kg].
-inline constexpr double kDeviceMass_kg = 0.045;
-
 /// Attach point of a tool at rest [m]: half of its shaft inside, pointing at the origin of W.
 [[nodiscard]] Vec3d RestingAttachPoint(const Trocar& trocar);
 
@@ -39,7 +36,7 @@ class SimulatedDevice final : public HapticDevice {
   /// Intended attach point at this session time.
   [[nodiscard]] Vec3d Target(double session_time_s) const noexcept;
 
-  HandModel hand_;
+  HandOnDevice hand_;
   Trocar trocar_;
   std::span<const ScriptKey> script_;
   std::uint32_t tool_ = 0;
@@ -50,7 +47,7 @@ class SimulatedDevice final : public HapticDevice {
   bool placed_ = false;
   double session_time_s_ = 0;
   std::int64_t stamp_ns_ = 0;
-  Vec3d position_ = Vec3d::Zero(), velocity_ = Vec3d::Zero(), target_ = Vec3d::Zero(), force_ = Vec3d::Zero();
+  Vec3d force_ = Vec3d::Zero();
 };
 
 }  // namespace fulcrum::haptics

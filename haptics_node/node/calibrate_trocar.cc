@@ -56,6 +56,9 @@ TrocarMotion RecordTrocarMotion(const config::CartConfig& cart, std::size_t tool
   const std::string field = "devices.tool" + std::to_string(tool);
   if (device.kind == config::DeviceKind::kTouch) return RecordTouch(cart, tool, seconds, touch_library, progress);
   if (device.kind == config::DeviceKind::kNone) throw InputError(field + " is none: there is nothing to move");
+  if (device.kind == config::DeviceKind::kOperator) {
+    throw InputError(field + " is operator: a mouse has no trocar to measure");
+  }
   if (device.motion.empty()) {
     throw InputError(field +
                      " is simulated without `motion`: it has no trocar of its own to measure; give a recorded "

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <utility>
 
+#include "haptics_node/device/operated_device.h"
 #include "haptics_node/device/simulated_device.h"
 #include "haptics_node/device/touch_device.h"
 #include "haptics_node/node/trocar_store.h"
+#include "services/base/core/operator_script.h"
 
 namespace fulcrum::haptics {
 namespace {
@@ -93,6 +95,17 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
         const WorkspaceMap map =
             device.motion.empty() ? WorkspaceMap() : MapOf(cart, i, trocar.p_WP, "", trocars, &made.notes);
         made.devices[i] = MakeSimulated(device, scene, trocar, i, map);
+        break;
+      }
+      case DeviceKind::kOperator: {
+        // The scene's first pose of the tool, above the tissue; the rest of the script is the simulated operator's.
+        const ScriptPoint first = EvaluateScript(scene.script, i, 0);
+        const Vec3d start =
+            first.present ? AttachPointForTip(trocar, first.p_W.cast<double>()) : RestingAttachPoint(trocar);
+        auto operated = std::make_unique<OperatedDevice>(HandOf(device.hand, scene.haptics), trocar, start);
+        operated->set_force_scale(device.force_scale);
+        made.notes.push_back("tool " + std::to_string(i) + ": moved by the operator's input");
+        made.devices[i] = std::move(operated);
         break;
       }
       case DeviceKind::kTouch: {

@@ -26,6 +26,13 @@ Servo::Devices Pointers(const DeviceArray& devices) {
   return pointers;
 }
 
+std::array<OperatedDevice*, kMaxTools> OperatedAmong(const DeviceArray& devices) {
+  std::array<OperatedDevice*, kMaxTools> operated{};
+  std::transform(devices.begin(), devices.end(), operated.begin(),
+                 [](const auto& device) { return dynamic_cast<OperatedDevice*>(device.get()); });
+  return operated;
+}
+
 void AddTrouble(Health* health, const std::string& trouble) {
   if (health->state == HealthState::kRunning) health->state = HealthState::kDegraded;
   if (!health->last_error.empty()) health->last_error += "; ";
@@ -41,10 +48,11 @@ HapticsNode::HapticsNode(const SceneView& scene, const std::array<bool, kMaxTool
 HapticsNode::HapticsNode(const SceneView& scene, DeviceArray devices, const Ports& ports, std::int64_t epoch_ns)
     : ports_(ports),
       devices_(std::move(devices)),
+      operated_(OperatedAmong(devices_)),
       servo_(ServoSettingsOf(scene), Pointers(devices_)),
       epoch_(static_cast<std::uint64_t>(epoch_ns)) {
   manifest_.node = NodeId::kHaptics;
-  manifest_.consumed.resize(1);
+  manifest_.consumed.resize(2);
 }
 
 void HapticsNode::ServoStep(const Tick& tick) noexcept {
@@ -53,24 +61,40 @@ void HapticsNode::ServoStep(const Tick& tick) noexcept {
   bool arrived = false;
   while (to_servo_.TryPop(&arrived_)) arrived = true;
   if (arrived) servo_.OfferModel(arrived_, tick.stamp_ns);
+  tick_.input_taken = false;
+  while (inputs_to_servo_.TryPop(&input_)) tick_.input_taken = true;
+  if (tick_.input_taken) {
+    tick_.input_epoch = input_.stamp.epoch;
+    tick_.input_sequence = input_.stamp.sequence;
+    for (std::size_t i = 0; i < operated_.size(); ++i) {
+      if (operated_[i] == nullptr) continue;
+      // Released controls move nothing.
+      operated_[i]->Follow(input_.claim_ns != 0 ? input_.tools[i] : OperatorTool(), input_.stamp.stamp_ns);
+    }
+  }
   servo_.Step(tick);
+  tick_.servo = servo_.record();
   figures_.Store(servo_.figures());
-  if (!from_servo_.TryPush(servo_.record())) records_lost_.fetch_add(1, std::memory_order_relaxed);
+  if (!from_servo_.TryPush(tick_)) records_lost_.fetch_add(1, std::memory_order_relaxed);
 }
 
 void HapticsNode::BusStep() {
   if (ports_.contact_model.TakeLatest(&received_) && !to_servo_.TryPush(received_)) {
     models_not_taken_.fetch_add(1, std::memory_order_relaxed);
   }
+  while (ports_.operator_input.TakeNext(&received_input_)) {
+    if (operator_.Add(received_input_)) (void)inputs_to_servo_.TryPush(received_input_);
+  }
   while (from_servo_.TryPop(&record_)) Publish(record_);
 }
 
-void HapticsNode::Publish(const ServoRecord& record) {
+void HapticsNode::Publish(const TickRecord& tick) {
+  const ServoRecord& record = tick.servo;
   ToolState tool = record.tool;
   tool.stamp = {++tool_sequence_, epoch_, record.tool.stamp.stamp_ns};
   ports_.tool_state.Write(tool);
 
-  if (!record.model_taken && record.tick < next_manifest_tick_) return;
+  if (!record.model_taken && !tick.input_taken && record.tick < next_manifest_tick_) return;
   next_manifest_tick_ = record.tick + kTicksPerManifest;
   if (!ports_.tick_manifest.has_readers()) return;
   manifest_.stamp = {++manifest_sequence_, epoch_, record.tool.stamp.stamp_ns};
@@ -78,6 +102,7 @@ void HapticsNode::Publish(const ServoRecord& record) {
   manifest_.session_time_s = record.session_time_s;
   manifest_.state_hash = record.state_hash;
   manifest_.consumed[0] = {TopicId::kContactModel, record.model_epoch, record.model_sequence};
+  manifest_.consumed[1] = {TopicId::kOperatorInput, tick.input_epoch, tick.input_sequence};
   ports_.tick_manifest.Write(manifest_);
 }
 

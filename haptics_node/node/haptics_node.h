@@ -7,8 +7,10 @@
 #include <cstdint>
 
 #include "haptics_node/device/haptic_device.h"
+#include "haptics_node/device/operated_device.h"
 #include "haptics_node/servo/servo.h"
 #include "services/base/core/messages.h"
+#include "services/base/core/operator_choice.h"
 #include "services/base/core/scene_view.h"
 #include "services/base/core/tick.h"
 #include "services/base/runtime/seqlock.h"
@@ -24,6 +26,7 @@ class HapticsNode {
  public:
   struct Ports {
     bus::Input<ContactModel>& contact_model;
+    bus::Input<OperatorInput>& operator_input;
     bus::Output<ToolState>& tool_state;
     bus::Output<TickManifest>& tick_manifest;
   };
@@ -43,32 +46,45 @@ class HapticsNode {
   void BusStep();
 
   /// State hash of the servo after the newest tick that BusStep() has published. Bus thread.
-  [[nodiscard]] std::uint64_t state_hash() const { return record_.state_hash; }
+  [[nodiscard]] std::uint64_t state_hash() const { return record_.servo.state_hash; }
 
   /// Any thread.
   void FillHealth(Health* health) const;
 
  private:
-  void Publish(const ServoRecord& record);
+  /// What a tick did, for the bus thread.
+  struct TickRecord {
+    ServoRecord servo;
+    std::uint64_t input_epoch = 0, input_sequence = 0;  ///< Newest OperatorInput followed; sequence 0: none yet.
+    bool input_taken = false;                           ///< Followed since the last tick.
+  };
+
+  void Publish(const TickRecord& record);
   void FillDeviceHealth(Health* health) const;
 
   Ports ports_;
   DeviceArray devices_;
+  std::array<OperatedDevice*, kMaxTools> operated_;  ///< Those of devices_; null: of another kind.
   Servo servo_;
   const std::uint64_t epoch_;
 
   // If the servo is delayed for longer than a ring holds, the newest models and records are dropped and counted in
   // Health.
   runtime::SpscRing<ContactModel, 8> to_servo_;
-  runtime::SpscRing<ServoRecord, 256> from_servo_;
+  runtime::SpscRing<OperatorInput, 8> inputs_to_servo_;
+  runtime::SpscRing<TickRecord, 256> from_servo_;
   runtime::SeqLock<ServoFigures> figures_;
   std::atomic<std::uint64_t> models_not_taken_{0}, records_lost_{0};
 
   // Servo thread only.
   ContactModel arrived_;
+  OperatorInput input_;
+  TickRecord tick_;
   // Bus thread only.
   ContactModel received_;
-  ServoRecord record_;
+  OperatorInput received_input_;
+  OperatorChoice operator_;
+  TickRecord record_;
   TickManifest manifest_;
   std::uint64_t tool_sequence_ = 0, manifest_sequence_ = 0;
   std::uint64_t next_manifest_tick_ = 0;

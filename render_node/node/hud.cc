@@ -41,6 +41,20 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
   if (state.paused) {
     texts.push_back({Corner::kTopLeft, ++line, "PAUSED", true});
   }
+  if (state.hands && !state.hands->active) {
+    texts.push_back({Corner::kTopLeft, ++line, "CLICK OR ENTER: TAKE THE TOOLS", true});
+  } else if (state.hands) {
+    texts.push_back({Corner::kTopLeft, ++line,
+                     std::string(state.hands->tool == 0 ? "LEFT TOOL" : "RIGHT TOOL") +
+                         (state.hands->locked ? ", JAW LOCKED" : "") + (state.hands->steady ? ", STEADY" : "")});
+  }
+  if (state.help && state.hands) {
+    for (const std::string_view key :
+         {"MOUSE MOVE", "WHEEL, CTRL DEPTH", "LEFT BUTTON, J JAW", "K LOCK JAW", "RIGHT BUTTON, F CUT",
+          "MIDDLE BUTTON, G COAG", "1 2 LEFT, RIGHT TOOL", "SPACE CLUTCH", "SHIFT FINE", "V STEADY", "ESC RELEASE"}) {
+      texts.push_back({Corner::kTopLeft, ++line, std::string(key)});
+    }
+  }
   if (state.help) {
     for (const std::string_view key : {"ARROWS TURN", "+ - NEARER, FARTHER", "R T ROLL", "0 RESET VIEW",
                                        "L LOCK ON TOOL", "S SCREENSHOT", "P PAUSE", "U FIGURES", "H HELP"}) {

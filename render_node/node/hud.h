@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "render_node/input/window_input.h"
 #include "render_node/scene_graph/overlay.h"
 #include "services/base/core/messages.h"
 
@@ -25,6 +26,7 @@ struct HudState {
   std::vector<std::string> late;  ///< Texts for inputs that are late, such as "TISSUE HELD".
   bool paused = false;
   bool help = false;
+  std::optional<HandsState> hands;  ///< No value: the window operates nothing.
 };
 
 /// Texts to draw: figures, and warnings at twice their size. With `figures` false warnings only.

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "render_node/geometry/laparoscope.h"
 #include "services/base/core/generator_inputs.h"
 
 namespace fulcrum::render {
@@ -39,8 +40,17 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       display_(*stage_->display),
       writer_(settings.frames),
       quality_(settings.quality, static_cast<int>(scene.render.height)),
+      operator_stamper_(settings.epoch_ns),
       camera_(scene.render),
-      figures_(scene.render.hud != 0) {}
+      figures_(scene.render.hud != 0) {
+  if (ports_.operator_input == nullptr) return;
+  hands_ = std::make_unique<WindowInput>("", display_.window(), [this](const OperatorInput& input) {
+    OperatorInput stamped = input;
+    stamped.stamp = operator_stamper_.Next(input.stamp.stamp_ns);
+    ports_.operator_input->Write(stamped);
+  });
+  hud_.hands = HandsState();
+}
 
 RenderNode::~RenderNode() = default;
 
@@ -56,6 +66,7 @@ void RenderNode::Step(const Tick& tick) {
     TakeContact();
     FindLate();
   }
+  UpdateHands();
   if (!ready()) {
     return;
   }
@@ -202,6 +213,30 @@ void RenderNode::TakeKeys() {
       camera_.Follow(tool.p_WT);
       view_.SetCamera(camera_.params());
     }
+  }
+}
+
+void RenderNode::UpdateHands() {
+  if (!hands_) return;
+  if (display_.clicked()) hands_->Take();
+  const RenderParams& camera = camera_.params();
+  const Eigen::Matrix4f view = MakeLaparoscope(camera).view;
+  constexpr float kRadPerDeg = 0.0174532925f;
+  HandsView hands;
+  hands.eye = camera.scope_tip_W;
+  hands.right = view.row(0).head<3>().transpose();
+  hands.up = view.row(1).head<3>().transpose();
+  hands.forward = -view.row(2).head<3>().transpose();
+  hands.pixel = 2.0f * std::tan(0.5f * kRadPerDeg * camera.fov_deg) / static_cast<float>(camera.height);
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    hands.present[i] = tools_.tools[i].kind != ToolKind::kNone;
+    hands.tip[i] = tools_.tools[i].p_WT;
+  }
+  hands_->SetView(hands);
+  const HandsState state = hands_->state();
+  if (state != *hud_.hands) {
+    hud_.hands = state;
+    changed_on_screen_ = true;
   }
 }
 

@@ -15,6 +15,7 @@
 #include "render_node/node/stage.h"
 #include "render_node/offscreen/png_writer.h"
 #include "services/base/core/tick.h"
+#include "services/transport/bus/input_account.h"
 #include "services/transport/bus/port.h"
 
 namespace fulcrum::render {
@@ -28,10 +29,12 @@ struct RenderPorts {
   bus::Input<ThermalEvent>& events;
   bus::Input<CauteryContact>& contacts;
   bus::Input<GeneratorSetting>& generator;
+  bus::Output<OperatorInput>* operator_input;  ///< Null: the window operates nothing.
 };
 
 struct RenderSettings {
   bool window = false;               ///< Draw into a window instead of memory.
+  std::int64_t epoch_ns = 0;         ///< CLOCK_MONOTONIC at the start of the process [ns].
   Quality quality = Quality::kAuto;  ///< Resolution of the scene.
   std::filesystem::path frames;      ///< Folder for the pictures.
 };
@@ -76,6 +79,7 @@ class RenderNode {
   void TakeGenerator();
   void TakeContact();
   void TakeKeys();
+  void UpdateHands();
   void FindLate();
   [[nodiscard]] bool Recent(double time_s) const;
   void UpdateTexts();
@@ -90,6 +94,8 @@ class RenderNode {
   Display& display_;
   FrameWriter writer_;
   QualityControl quality_;
+  bus::Stamper operator_stamper_;  ///< Of the thread of hands_.
+  std::unique_ptr<WindowInput> hands_;
 
   TissueFrame tissue_, new_tissue_;
   TopologyState topology_;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "render_node/offscreen/egl_context.h"
+#include "render_node/scene_graph/x11_window.h"
 #include "services/base/core/error.h"
 
 namespace fulcrum::render {
@@ -98,9 +99,11 @@ class Keyboard : public osgGA::GUIEventHandler {
     if (event.getEventType() == osgGA::GUIEventAdapter::KEYDOWN) {
       pressed.push_back(event.getKey());
     }
+    clicked = clicked || event.getEventType() == osgGA::GUIEventAdapter::PUSH;
     return false;
   }
   std::vector<int> pressed;
+  bool clicked = false;
 };
 
 class WindowDisplay : public Display {
@@ -151,11 +154,14 @@ class WindowDisplay : public Display {
   }
 
   [[nodiscard]] std::vector<int> TakeKeys() override {
+    keys_->clicked = false;
     viewer_.advance();
     viewer_.eventTraversal();
     return std::exchange(keys_->pressed, {});
   }
 
+  [[nodiscard]] bool clicked() const override { return keys_->clicked; }
+  [[nodiscard]] unsigned long window() const override { return X11WindowOf(context_.get()); }
   [[nodiscard]] bool closed() const override { return viewer_.done(); }
   [[nodiscard]] std::string description() const override { return "window"; }
 

@@ -20,6 +20,10 @@ class Display {
   /// Keys pressed since the last call, as X key symbols. Also processes the window's events, so it must be called even
   /// if nothing is drawn.
   [[nodiscard]] virtual std::vector<int> TakeKeys() = 0;
+  /// True if the window was clicked since the last call of TakeKeys().
+  [[nodiscard]] virtual bool clicked() const { return false; }
+  /// Number of the X11 window; 0: none.
+  [[nodiscard]] virtual unsigned long window() const { return 0; }
   /// True after the user has closed the window.
   [[nodiscard]] virtual bool closed() const = 0;
   /// Renderer and version, for the log.

@@ -14,6 +14,16 @@ namespace {
 namespace fs = std::filesystem;
 namespace po = boost::program_options;
 
+/// Tools, handles and pedal follow the operator's input, and no script sets the session's length.
+void GiveToOperator(UpSettings* settings) {
+  for (config::DeviceConfig& device : settings->cart.devices) device.kind = config::DeviceKind::kOperator;
+  for (config::DeviceConfig& device : settings->cart.devices) device.motion.clear();
+  for (config::HandleConfig& handle : settings->cart.handles) handle.kind = config::LinkKind::kOperator;
+  settings->cart.pedal.kind = config::LinkKind::kOperator;
+  settings->window = true;
+  settings->seconds = 0;
+}
+
 }  // namespace
 
 fs::path SceneCache(const fs::path& programs) {
@@ -48,9 +58,12 @@ ExitCode Up(const Words& words) {
        "session time [s], above 0, at most 604800 (default: the script's duration; without a script until Ctrl-C)")  //
       ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder for the session folders")   //
       ("window", "also show the picture in a window")                                                                //
-      ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                               //
-       "quality of the picture: auto, low, high")                                                                    //
-      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")           //
+      ("hands", po::value<std::string>()->value_name("INPUT"),
+       "operate the tools yourself, with INPUT: mouse (and keyboard, in the window). No script; until Ctrl-C or "
+       "--seconds")                                                                                         //
+      ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                      //
+       "quality of the picture: auto, low, high")                                                           //
+      ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")  //
       ("set", po::value<Words>()->value_name("SECTION.KEY=VALUE")->composing(),
        "replace a parameter of physics, thermal, haptics, breathing or render in the scene, or script.power_W, the "
        "power of all uses of the generator; may be repeated")  //
@@ -104,6 +117,11 @@ ExitCode Up(const Words& words) {
   settings.cart.domain = DomainOf(arguments, settings.cart.domain);
   settings.out = values["out"].as<std::string>();
   settings.window = values.count("window") != 0;
+  if (values.count("hands") != 0) {
+    const std::string input = values["hands"].as<std::string>();
+    if (input != "mouse") throw InputError("--hands: \"" + input + "\"; valid: mouse");
+    GiveToOperator(&settings);
+  }
   settings.quality = values["quality"].as<std::string>();
   if (settings.quality != "auto" && settings.quality != "low" && settings.quality != "high") {
     throw InputError("--quality: \"" + settings.quality + "\"; valid: auto, low, high");

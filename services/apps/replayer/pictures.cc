@@ -60,7 +60,7 @@ PicturesResult ReplayPictures(const PicturesSettings& settings, const SceneView&
   render_settings.frames = settings.frames;
   render::RenderNode node(scene, render_settings,
                           {tissue.input(), topology.input(), patches.input(), tools.input(), handles.input(),
-                           events.input(), contacts.input(), generator.input()});
+                           events.input(), contacts.input(), generator.input(), nullptr});
 
   std::optional<SceneManifest> session;
   const double period_s = 1.0 / std::max(0.001f, scene.render.rate_Hz);

@@ -26,6 +26,7 @@ struct RecordedTick {
   std::vector<CauteryContact> cautery;
   std::vector<TearState> tears;
   std::vector<ContactModel> model;
+  std::vector<OperatorInput> operators;
   /// Reason why this tick cannot be replayed; empty: it can.
   std::string missing;
 };

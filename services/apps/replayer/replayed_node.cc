@@ -234,14 +234,16 @@ class ReplayedHaptics final : public ReplayedNode {
   void Start(std::int64_t epoch_ns) override {
     node_.reset();
     models_ = {};
+    operators_ = {};
     haptics::CartDevices cart = haptics::MakeCartDevices(cart_, scene_, haptics::TrocarFolder());
     node_.emplace(scene_, std::move(cart.devices),
-                  haptics::HapticsNode::Ports{*models_.in, *tools_.out, *manifests_.out}, epoch_ns);
+                  haptics::HapticsNode::Ports{*models_.in, *operators_.in, *tools_.out, *manifests_.out}, epoch_ns);
   }
 
   std::uint64_t Advance(const RecordedTick& tick) override {
     tools_.Drop();
     models_.Give(tick.model);
+    operators_.Give(tick.operators);
     node_->BusStep();
     node_->ServoStep(tick.tick);
     node_->BusStep();
@@ -253,6 +255,7 @@ class ReplayedHaptics final : public ReplayedNode {
   const SceneView& scene_;
   const config::CartConfig& cart_;
   Inlet<ContactModel> models_;
+  Inlet<OperatorInput> operators_;
   Outlet<ToolState> tools_;
   Outlet<TickManifest> manifests_;
   std::optional<haptics::HapticsNode> node_;

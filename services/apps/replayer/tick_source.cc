@@ -108,6 +108,7 @@ void TickSource::CompleteHaptics(RecordedTick* tick) {
   tick->state_hash = manifest->second.state_hash;
   for (const ConsumedInput& consumed : manifest->second.consumed) {
     if (consumed.topic == TopicId::kContactModel) Fetch(*tick, consumed, models_, &tick->model, &tick->missing);
+    if (consumed.topic == TopicId::kOperatorInput) Fetch(*tick, consumed, operators_, &tick->operators, &tick->missing);
   }
   haptics_manifests_.erase(haptics_manifests_.begin(), std::next(manifest));
 }
@@ -171,6 +172,9 @@ void TickSource::Take(const recording::McapMessage& message) {
       break;
     case TopicId::kContactModel:
       if (ContactModel model; wanted(NodeId::kHaptics) && Decode(message, &model)) models_.Put(model);
+      break;
+    case TopicId::kOperatorInput:
+      if (OperatorInput input; wanted(NodeId::kHaptics) && Decode(message, &input)) operators_.Put(input);
       break;
     case TopicId::kSceneManifest:
       if (SceneManifest manifest; Decode(message, &manifest)) session_ = manifest;

@@ -108,6 +108,7 @@ class TickSource {
   SampleShelf<TearState> tears_{128};
   SampleShelf<CauteryContact> cautery_{1024};
   SampleShelf<ContactModel> models_{1024};
+  SampleShelf<OperatorInput> operators_{4096};
   std::map<std::int64_t, TickManifest> haptics_manifests_;  ///< By the stamp of their tick [ns].
   std::multimap<std::int64_t, Pending> pending_;            ///< By the stamp of the tick [ns].
   std::array<Progress, kNodeCount> progress_;

@@ -9,10 +9,14 @@
 namespace fulcrum::config {
 namespace {
 
-const StrictMap::Choices<LinkKind> kLinkKinds = {
-    {"none", LinkKind::kNone}, {"simulated", LinkKind::kSimulated}, {"serial", LinkKind::kSerial}};
-const StrictMap::Choices<DeviceKind> kDeviceKinds = {
-    {"none", DeviceKind::kNone}, {"simulated", DeviceKind::kSimulated}, {"touch", DeviceKind::kTouch}};
+const StrictMap::Choices<LinkKind> kLinkKinds = {{"none", LinkKind::kNone},
+                                                 {"simulated", LinkKind::kSimulated},
+                                                 {"serial", LinkKind::kSerial},
+                                                 {"operator", LinkKind::kOperator}};
+const StrictMap::Choices<DeviceKind> kDeviceKinds = {{"none", DeviceKind::kNone},
+                                                     {"simulated", DeviceKind::kSimulated},
+                                                     {"touch", DeviceKind::kTouch},
+                                                     {"operator", DeviceKind::kOperator}};
 const StrictMap::Choices<HandHold> kHandHolds = {{"scene", HandHold::kScene},
                                                  {"fingertip", HandHold::kFingertip},
                                                  {"light_grip", HandHold::kLightGrip},
@@ -246,6 +250,14 @@ CartConfig ReadAndValidate(StrictYaml* yaml, const std::string& name) {
 }
 
 }  // namespace
+
+bool IsOperated(const CartConfig& cart) {
+  return cart.pedal.kind == LinkKind::kOperator ||
+         std::any_of(cart.devices.begin(), cart.devices.end(),
+                     [](const DeviceConfig& device) { return device.kind == DeviceKind::kOperator; }) ||
+         std::any_of(cart.handles.begin(), cart.handles.end(),
+                     [](const HandleConfig& handle) { return handle.kind == LinkKind::kOperator; });
+}
 
 CartConfig::CartConfig() {
   for (HandleConfig& handle : handles) {

@@ -13,7 +13,7 @@
 
 namespace fulcrum::config {
 
-enum class LinkKind { kNone, kSimulated, kSerial };
+enum class LinkKind { kNone, kSimulated, kSerial, kOperator };
 
 /// Place and speed of a serial line; the format is 8N1 without flow control.
 struct SerialLink {
@@ -74,7 +74,7 @@ struct GeneratorConfig {
   float blend_W = 35;
 };
 
-enum class DeviceKind { kNone, kSimulated, kTouch };
+enum class DeviceKind { kNone, kSimulated, kTouch, kOperator };
 
 /// The hand that holds a simulated device: the one of the scene, or one of three standard hands.
 enum class HandHold { kScene, kFingertip, kLightGrip, kFirmGrip };
@@ -97,7 +97,7 @@ struct DeviceConfig {
   std::string serial;                   ///< For kTouch; empty: any device with that name.
   double force_scale = 1;               ///< Share of the servo's force that the device applies, 0 to 1.
   WorkspaceConfig workspace;            ///< For kTouch and for recorded motion.
-  HandHold hand = HandHold::kScene;     ///< For kSimulated.
+  HandHold hand = HandHold::kScene;     ///< For kSimulated and kOperator.
   std::string motion;                   ///< For kSimulated: file of recorded poses; empty: the scene's script.
 };
 
@@ -130,6 +130,10 @@ struct VerdictConfig {
 struct RecorderConfig {
   double keep_free_MB = 500;  ///< Free space that a recording leaves: it ends in order before [10^6 B].
 };
+
+struct CartConfig;
+/// True if an operator's input moves a tool of the cart, a handle or the pedal (kind: operator).
+[[nodiscard]] bool IsOperated(const CartConfig& cart);
 
 struct CartConfig {
   std::string name = "simulated";

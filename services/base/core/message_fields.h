@@ -19,6 +19,8 @@ namespace fulcrum {
 #define FULCRUM_FIELDS_OF_HandleSample(F) F(present) F(jaw_angle_rad) F(jaw_rate_rad_s) F(quality) F(raw_counts)
 #define FULCRUM_FIELDS_OF_HandleState(F) F(stamp) F(handles) F(pedals)
 #define FULCRUM_FIELDS_OF_GeneratorSetting(F) F(stamp) F(cut_W) F(coag_W) F(blend_W)
+#define FULCRUM_FIELDS_OF_OperatorTool(F) F(p_WT) F(jaw_angle_rad) F(moves)
+#define FULCRUM_FIELDS_OF_OperatorInput(F) F(stamp) F(claim_ns) F(tools) F(pedals) F(source)
 #define FULCRUM_FIELDS_OF_ToolSample(F) F(kind) F(state) F(p_WT) F(q_WT) F(v_WT) F(w_WT) F(f_W) F(model_age_s)
 #define FULCRUM_FIELDS_OF_ToolState(F) F(stamp) F(tools)
 #define FULCRUM_FIELDS_OF_TissueFrameHeader(F) F(stamp) F(scene_hash) F(topology_revision) F(tool_sequence) \
@@ -51,7 +53,8 @@ namespace fulcrum {
   F(rate_achieved_Hz) F(ticks) F(overruns) F(write_failures) F(step) F(wake) F(last_error) F(inputs) F(metrics)
 
 /// S(T) for each struct whose fields have the same names in IDL: its conversion is generated from its list.
-#define FULCRUM_STRUCTS_ALIKE_IN_IDL(S) S(HandleSample) S(HandleState) S(GeneratorSetting) S(ToolSample) \
+#define FULCRUM_STRUCTS_ALIKE_IN_IDL(S) S(HandleSample) S(HandleState) S(GeneratorSetting) S(OperatorTool) \
+  S(OperatorInput) S(ToolSample) \
   S(ToolState) S(TissueFrameHeader) S(Contact) S(DeviceContacts) S(ContactModel) S(Footprint) S(CauteryContact) \
   S(TopologyState) S(TearState) S(OpenCells) S(TemperaturePatchHeader) S(ThermalEvent) S(SceneManifest) \
   S(TickManifest) S(TimingSummary) S(InputHealth) S(Metric) S(Health)

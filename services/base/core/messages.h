@@ -68,6 +68,25 @@ struct GeneratorSetting {
   float blend_W = 0;
 };
 
+// -------------------------------------------------------------------------------------------- OperatorInput
+
+enum class OperatorSource : std::uint8_t { kNone, kWindow, kProgram };
+
+struct OperatorTool {
+  Vec3f p_WT = Vec3f::Zero();  ///< Intended place of the tip [m].
+  float jaw_angle_rad = 0;     ///< Intended angle, 0 closed to about 1.05 open.
+  bool moves = false;          ///< The source operates this tool.
+};
+
+/// Intention of an operator without a haptic device.
+struct OperatorInput {
+  Stamp stamp;
+  std::int64_t claim_ns = 0;  ///< CLOCK_MONOTONIC at which the source took the controls [ns]; 0: released.
+  std::array<OperatorTool, kMaxTools> tools;
+  std::uint8_t pedals = kPedalNone;  ///< PedalBits.
+  OperatorSource source = OperatorSource::kNone;
+};
+
 // ------------------------------------------------------------------------------------------------ ToolState
 
 enum class ToolKind : std::uint8_t { kNone, kGrasper, kHook, kScissors };
@@ -297,7 +316,7 @@ struct SceneManifest {
 #define FULCRUM_MESSAGES(M) \
   M(HandleState) M(ToolState) M(TissueFrame) M(ContactModel) M(CauteryContact) M(TopologyState) \
   M(TemperaturePatch) M(ThermalEvent) M(SceneManifest) M(TickManifest) \
-  M(Health) M(TearState) M(OpenCells) M(GeneratorSetting)
+  M(Health) M(TearState) M(OpenCells) M(GeneratorSetting) M(OperatorInput)
 // clang-format on
 
 #define FULCRUM_TOPIC_ID(T) k##T,

@@ -28,6 +28,7 @@ NodeCommand NodeStarter::Usual(NodeId id) const {
     command.arguments.insert(command.arguments.end(), {"--quality", settings.quality});
     if (settings.window) {
       command.arguments.emplace_back("--window");
+      if (config::IsOperated(settings.cart)) command.arguments.emplace_back("--hands");
     }
     command.has_spare = !settings.window;  // A spare would open a second window.
   }

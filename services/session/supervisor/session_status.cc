@@ -12,9 +12,8 @@ void SessionStatus::Show(std::int64_t now_ns, const std::string& line) {
   progress_.Show(now_ns, line);
 }
 
-std::string FiguresLine(const SceneView& scene, const SessionRecord& record, double session_time_s, double end_s) {
+std::string FiguresLine(const std::string& phase, const SessionRecord& record, double session_time_s, double end_s) {
   const auto last = [&](const char* metric) { return record.last(metric); };
-  const std::string phase = PhaseAt(scene, session_time_s);
   std::string line = "t " + Fixed(std::max(0.0, session_time_s), 1);
   line += (end_s > 0 ? " / " + Fixed(end_s, 1) : std::string()) + " s";
   line += phase.empty() ? "" : " · " + phase;

@@ -37,7 +37,7 @@ class SessionStatus {
 
 /// "t 3.2 / 20.0 s · cut · force 1.20 N · …" of a session that has begun.
 /// @param end_s session time of the end [s]; 0: until stopped.
-[[nodiscard]] std::string FiguresLine(const SceneView& scene, const SessionRecord& record, double session_time_s,
+[[nodiscard]] std::string FiguresLine(const std::string& phase, const SessionRecord& record, double session_time_s,
                                       double end_s);
 
 }  // namespace fulcrum::supervisor

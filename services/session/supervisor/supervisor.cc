@@ -209,7 +209,10 @@ struct Supervisor::Impl {
     if (!status.IsDue(now)) return;
     std::string line = "starting";
     if (clock.begun()) {
-      line = FiguresLine(setup.scene.view(), record, clock.At(now), setup.end_s);
+      // A person does not follow the script.
+      const std::string phase =
+          setup.operator_script().empty() ? std::string() : PhaseAt(setup.scene.view(), clock.At(now));
+      line = FiguresLine(phase, record, clock.At(now), setup.end_s);
       line += assessed ? assessed->Line(clock.At(now)) : "";
     }
     line += " · " + std::to_string(nodes->running()) + "/" + std::to_string(nodes->all().size()) + " nodes";

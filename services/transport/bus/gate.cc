@@ -72,11 +72,12 @@ bool IsTiming(const TimingSummary& t) {
   return Within(t.p50_us, 0.0, 1e12) && Within(t.p99_us, 0.0, 1e12) && Within(t.max_us, 0.0, 1e12);
 }
 
+bool ArePedals(std::uint8_t bits) { return (bits & ~unsigned{kPedalCut | kPedalCoag | kPedalBlend}) == 0; }
+
 }  // namespace
 
 bool PassesGate(const HandleState& m) noexcept {
-  constexpr unsigned kAllPedals = kPedalCut | kPedalCoag | kPedalBlend;
-  return IsStamp(m.stamp) && (m.pedals & ~kAllPedals) == 0 &&
+  return IsStamp(m.stamp) && ArePedals(m.pedals) &&
          std::all_of(m.handles.begin(), m.handles.end(), [](const HandleSample& h) {
            return Magnitude(h.jaw_angle_rad, kMaxJawAngle_rad) && Magnitude(h.jaw_rate_rad_s, kMaxTurnRate_rad_s) &&
                   Within(h.quality, 0.0, 1.0);
@@ -86,6 +87,14 @@ bool PassesGate(const HandleState& m) noexcept {
 bool PassesGate(const GeneratorSetting& m) noexcept {
   return IsStamp(m.stamp) && Within(m.cut_W, 0.0, kMaxSetPower_W) && Within(m.coag_W, 0.0, kMaxSetPower_W) &&
          Within(m.blend_W, 0.0, kMaxSetPower_W);
+}
+
+bool PassesGate(const OperatorInput& m) noexcept {
+  return IsStamp(m.stamp) && m.claim_ns >= 0 && m.claim_ns <= m.stamp.stamp_ns && ArePedals(m.pedals) &&
+         UpTo(m.source, OperatorSource::kProgram) &&
+         std::all_of(m.tools.begin(), m.tools.end(), [](const OperatorTool& t) {
+           return Magnitude(t.p_WT, kMaxCoordinate_m) && Magnitude(t.jaw_angle_rad, kMaxJawAngle_rad);
+         });
 }
 
 bool PassesGate(const ToolState& m) noexcept {

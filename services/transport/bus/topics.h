@@ -40,7 +40,9 @@ struct TopicRole {
   const char* name;
   Quality quality;
   /// One process at a time publishes the topic: once a later epoch was received, samples of earlier ones are refused.
-  [[nodiscard]] constexpr bool one_owner() const { return id != TopicId::kTickManifest && id != TopicId::kHealth; }
+  [[nodiscard]] constexpr bool one_owner() const {
+    return id != TopicId::kTickManifest && id != TopicId::kHealth && id != TopicId::kOperatorInput;
+  }
 };
 
 // Reader depths cover the slowest reader of a topic between two reads: a software frame on a loaded machine takes up to
@@ -121,6 +123,9 @@ inline constexpr Quality kQualityOf<GeneratorSetting>{.delivery = Delivery::kRel
                                                       .gap_is_loss = false,
                                                       .writer_depth = kLatestOnly,
                                                       .reader_depth = kOutage};
+/// Sent again at 50 Hz, so a lost sample is replaced.
+template <>
+inline constexpr Quality kQualityOf<OperatorInput>{.writer_depth = kLatestOnly, .reader_depth = kAllWriters};
 
 /// Topic of a message type.
 template <class T>

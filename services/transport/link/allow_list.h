@@ -15,7 +15,7 @@ inline constexpr bus::TopicSet kTravels =
     bus::SetOf(TopicId::kHandleState, TopicId::kToolState, TopicId::kTissueFrame, TopicId::kContactModel,
                TopicId::kCauteryContact, TopicId::kTearState, TopicId::kOpenCells, TopicId::kTopologyState,
                TopicId::kTemperaturePatch, TopicId::kThermalEvent, TopicId::kSceneManifest, TopicId::kGeneratorSetting,
-               TopicId::kTickManifest, TopicId::kHealth);
+               TopicId::kOperatorInput, TopicId::kTickManifest, TopicId::kHealth);
 
 /// The side of the link on which a rule is applied.
 struct Side {

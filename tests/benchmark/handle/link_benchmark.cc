@@ -156,7 +156,7 @@ void MeasureRecovery(benchmark::Report* report) {
   std::mutex mutex;
   LinkFaults faults;  // Guarded by mutex.
   SimulatedFirmware firmware([&](std::int64_t now_ns) {
-    OperatorInput input;
+    SimulatedInput input;
     input.jaw_deg = {jaw_deg(now_ns), 30};
     const std::lock_guard lock(mutex);
     input.faults[0] = faults;

@@ -92,7 +92,7 @@ class Chain {
   HandleState state;
 
  private:
-  OperatorInput InputAt(std::int64_t now_ns) {
+  SimulatedInput InputAt(std::int64_t now_ns) {
     const std::lock_guard lock(mutex_);
     return {{SlowJaw(now_ns), 30}, pedals_, faults_};
   }

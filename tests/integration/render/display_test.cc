@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -18,6 +16,7 @@
 #include "services/base/core/exit_code.h"
 #include "services/scene/builder/build.h"
 #include "tests/integration/render/synthetic_scene.h"
+#include "tests/support/virtual_screen.h"
 
 namespace fulcrum::render {
 namespace {
@@ -38,7 +37,7 @@ Outcome RunCommand(const std::string& command) {
   return outcome;
 }
 
-class NodeCommand : public testing::Test {
+class NodeCommand : public ::testing::Test {
  protected:
   NodeCommand() {
     std::filesystem::create_directories(folder_);
@@ -52,7 +51,7 @@ class NodeCommand : public testing::Test {
   }
 
   const std::filesystem::path folder_ =
-      std::filesystem::path(testing::TempDir()) / ("render_" + std::to_string(getpid()));
+      std::filesystem::path(::testing::TempDir()) / ("render_" + std::to_string(getpid()));
 };
 
 TEST_F(NodeCommand, WithoutOpenGlItSaysWhatToInstall) {
@@ -68,75 +67,8 @@ TEST_F(NodeCommand, AWindowWithoutADisplayIsRefused) {
   EXPECT_NE(outcome.text.find("--window: no display"), std::string::npos) << outcome.text;
 }
 
-/// An X server of our own, that has been seen to answer. Its number is far from those that others take: two servers
-/// that do not see each other's locks may still meet on an abstract socket.
-class VirtualScreen {
- public:
-  VirtualScreen() {
-    for (int attempt = 0; attempt < 5 && display_.empty(); ++attempt) {
-      const int number = 100 + (getpid() + 97 * attempt) % 800;
-      child_ = fork();
-      if (child_ == 0) {
-        const std::string name = ":" + std::to_string(number);
-        if (std::freopen("/dev/null", "w", stderr) == nullptr) {
-          _exit(kNoProgram);
-        }
-        execlp("Xvfb", "Xvfb", name.c_str(), "-screen", "0", "1280x800x24", "-nolisten", "tcp", "-noreset", nullptr);
-        _exit(kNoProgram);
-      }
-      Await(number);
-    }
-  }
-  ~VirtualScreen() {
-    if (child_ > 0) {
-      kill(child_, SIGTERM);
-      waitpid(child_, nullptr, 0);
-    }
-  }
-  VirtualScreen(const VirtualScreen&) = delete;
-  VirtualScreen& operator=(const VirtualScreen&) = delete;
-  [[nodiscard]] const std::string& display() const { return display_; }
-  [[nodiscard]] bool installed() const { return installed_; }
-
- private:
-  static constexpr int kNoProgram = 127;
-
-  /// Until the server answers or has ended.
-  void Await(int number) {
-    for (int wait = 0; wait < 1000; ++wait) {
-      int status = 0;
-      if (waitpid(child_, &status, WNOHANG) == child_) {
-        installed_ = !(WIFEXITED(status) && WEXITSTATUS(status) == kNoProgram);
-        child_ = -1;
-        return;
-      }
-      if (Answers(number)) {
-        display_ = ":" + std::to_string(number);
-        return;
-      }
-      usleep(10'000);
-    }
-    kill(child_, SIGKILL);
-    waitpid(child_, nullptr, 0);
-    child_ = -1;
-  }
-  static bool Answers(int number) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    std::snprintf(address.sun_path, sizeof(address.sun_path), "/tmp/.X11-unix/X%d", number);
-    const int server = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    const bool answers = connect(server, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0;
-    close(server);
-    return answers;
-  }
-
-  pid_t child_ = -1;
-  bool installed_ = true;
-  std::string display_;
-};
-
 TEST(WindowTest, ShowsWhatIsDrawnOffScreen) {
-  const VirtualScreen screen;
+  const fulcrum::testing::VirtualScreen screen;
   if (!screen.installed()) {
     GTEST_SKIP() << "Xvfb is not installed: the window is not tested";
   }

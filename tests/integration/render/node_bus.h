@@ -33,7 +33,8 @@ struct NodeBus {
 
   /// The node's.
   [[nodiscard]] RenderPorts ports() const {
-    return {*tissue_in, *topology_in, *patches_in, *tools_in, *handles_in, *events_in, *contacts_in, *generator_in};
+    return {*tissue_in, *topology_in, *patches_in,   *tools_in, *handles_in,
+            *events_in, *contacts_in, *generator_in, nullptr};
   }
 };
 

@@ -17,12 +17,14 @@ namespace {
 TEST(ServoTiming, StepTakesAtMost25MicrosecondsAndCyclesStartInTime) {
   const SceneView scene = testing::BenchScene(0.3);
   bus::InProcessTopic<ContactModel> models;
+  bus::InProcessTopic<OperatorInput> operators;
   bus::InProcessTopic<ToolState> tools;
   bus::InProcessTopic<TickManifest> manifests;
   const auto model_in = models.MakeInput();
+  const auto operator_in = operators.MakeInput();
   const auto tool_out = tools.MakeOutput();
   const auto manifest_out = manifests.MakeOutput();
-  HapticsNode node(scene, {true, true}, {*model_in, *tool_out, *manifest_out}, runtime::MonotonicNs());
+  HapticsNode node(scene, {true, true}, {*model_in, *operator_in, *tool_out, *manifest_out}, runtime::MonotonicNs());
   std::string refused;
   runtime::CyclicThread servo({.name = "servo", .period_ns = 1'000'000}, [&](const Tick& tick) {
     if (tick.index == 0) refused = runtime::SetFifoPriority(80);

@@ -153,6 +153,15 @@ TEST(GateRanges, GeneratorSetting) {
                                    {"power beyond any generator", [](auto& m) { m.blend_W = 301; }}});
 }
 
+TEST(GateRanges, OperatorInput) {
+  ExpectRefused<OperatorInput>({{"a place beyond the room", [](auto& m) { m.tools[1].p_WT.x() = 11; }},
+                                {"a jaw beyond its stop", [](auto& m) { m.tools[0].jaw_angle_rad = 4; }},
+                                {"unknown pedal", [](auto& m) { m.pedals = 8; }},
+                                {"unknown source", [](auto& m) { m.source = BeyondLast<OperatorSource>(); }},
+                                {"controls taken before the clock began", [](auto& m) { m.claim_ns = -1; }},
+                                {"controls taken later than now", [](auto& m) { m.claim_ns = m.stamp.stamp_ns + 1; }}});
+}
+
 TEST(GateRanges, TopologyState) {
   ExpectRefused<TopologyState>({{"grid beyond capacity", [](auto& m) { m.rows = 97; }},
                                 {"product overflows 32 bits", [](auto& m) { m.rows = m.cols = 0x10000; }},

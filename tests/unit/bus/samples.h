@@ -89,6 +89,18 @@ inline GeneratorSetting Sample(std::uint64_t sequence) {
 }
 
 template <>
+inline OperatorInput Sample(std::uint64_t sequence) {
+  OperatorInput m;
+  m.stamp = {sequence, 13, 4600};
+  m.claim_ns = 4000;
+  m.tools[0] = {{0.01f, -0.02f, 0.03f}, 0.5f, true};
+  m.tools[1] = {{-0.04f, 0.05f, 0.06f}, 0.25f, true};
+  m.pedals = kPedalCoag;
+  m.source = OperatorSource::kWindow;
+  return m;
+}
+
+template <>
 inline CauteryContact Sample(std::uint64_t sequence) {
   CauteryContact m;
   m.stamp = {sequence, 15, 5000};

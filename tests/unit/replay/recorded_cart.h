@@ -97,6 +97,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   TappedTopic<ToolState> tools(&writer);
   TappedTopic<HandleState> handles(&writer);
   TappedTopic<GeneratorSetting> generator(&writer);
+  TappedTopic<OperatorInput> operators(&writer);
   TappedTopic<TissueFrame> frames(&writer);
   TappedTopic<ContactModel> models(&writer);
   TappedTopic<CauteryContact> cautery(&writer);
@@ -156,15 +157,16 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   };
   struct HapticsProcess {
     std::unique_ptr<bus::Input<ContactModel>> models;
+    std::unique_ptr<bus::Input<OperatorInput>> operators;
     std::unique_ptr<bus::Output<ToolState>> tools;
     std::unique_ptr<bus::Output<TickManifest>> manifests;
     std::unique_ptr<haptics::HapticsNode> node;
   };
   const auto start_haptics = [&](std::int64_t epoch) {
-    HapticsProcess h{models.MakeInput(), tools.MakeOutput(), manifests.MakeOutput(), nullptr};
-    h.node =
-        std::make_unique<haptics::HapticsNode>(scene, std::array<bool, kMaxTools>{true, true},
-                                               haptics::HapticsNode::Ports{*h.models, *h.tools, *h.manifests}, epoch);
+    HapticsProcess h{models.MakeInput(), operators.MakeInput(), tools.MakeOutput(), manifests.MakeOutput(), nullptr};
+    h.node = std::make_unique<haptics::HapticsNode>(
+        scene, std::array<bool, kMaxTools>{true, true},
+        haptics::HapticsNode::Ports{*h.models, *h.operators, *h.tools, *h.manifests}, epoch);
     return h;
   };
   std::optional<PhysicsProcess> physics = start_physics(kStart - 5);

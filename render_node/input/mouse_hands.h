@@ -1,0 +1,61 @@
+// Mouse and keyboard as an operator's hands: motions of the pointer move the tip of one tool in the picture's plane,
+// the wheel moves it along the view, buttons and keys close the jaw and press the pedals. Pure; times are passed in.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "services/base/core/messages.h"
+
+namespace fulcrum::render {
+
+/// What the hands need of the picture, frame W.
+struct HandsView {
+  Vec3f eye = Vec3f::Zero();                                       ///< [m]
+  Vec3f right = Vec3f::UnitX(), up = Vec3f::UnitZ();               ///< Unit vectors of the picture.
+  Vec3f forward = Vec3f::UnitY();                                  ///< Unit vector of the view.
+  float pixel = 1e-3f;                                             ///< Size of a pixel at 1 m [m].
+  std::array<bool, kMaxTools> present{};                           ///< The session has this tool.
+  std::array<Vec3f, kMaxTools> tip{Vec3f::Zero(), Vec3f::Zero()};  ///< Newest places of the tips [m].
+};
+
+enum class HandsKey { kTool0, kTool1, kJaw, kJawLock, kCut, kCoag, kClutch, kDepth, kFine, kSteady };
+
+class MouseHands {
+ public:
+  void SetView(const HandsView& view) { view_ = view; }
+
+  /// Takes the controls: the tools begin where they are.
+  void Take(std::int64_t now_ns);
+  /// Releases them: pedals up, tools let go.
+  void Release();
+  [[nodiscard]] bool active() const { return claim_ns_ != 0; }
+  /// Tool that the pointer moves.
+  [[nodiscard]] int tool() const { return tool_; }
+  [[nodiscard]] bool steady() const { return steady_; }
+  [[nodiscard]] bool locked(int tool) const { return locked_[static_cast<std::size_t>(tool)]; }
+
+  // No effect while the controls are released.
+  /// Motion of the pointer [pixels], x to the right, y up.
+  void Move(float x, float y);
+  /// Steps of the wheel, positive away from the operator.
+  void Turn(int steps);
+  void Press(HandsKey key, bool down);
+
+  /// The present intention. @param now_ns CLOCK_MONOTONIC [ns].
+  [[nodiscard]] OperatorInput At(std::int64_t now_ns);
+
+ private:
+  void MoveTip(const Vec3f& by);
+
+  HandsView view_;
+  std::int64_t claim_ns_ = 0;
+  int tool_ = 1;
+  bool jaw_down_ = false, clutch_ = false, depth_ = false, fine_ = false, steady_ = false;
+  std::uint8_t pedals_ = kPedalNone;
+  std::array<bool, kMaxTools> locked_{};
+  std::array<Vec3f, kMaxTools> wanted_{Vec3f::Zero(), Vec3f::Zero()}, sent_{Vec3f::Zero(), Vec3f::Zero()};
+  std::int64_t sent_ns_ = 0;
+};
+
+}  // namespace fulcrum::render

@@ -1,0 +1,238 @@
+#include "render_node/input/window_input.h"
+
+#include <poll.h>
+// X11's headers define words such as None and Bool as macros: this file is compiled by itself.
+#include <X11/XKBlib.h>
+#include <X11/Xlib.h>
+#include <X11/keysym.h>
+
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "services/base/core/error.h"
+#include "services/base/runtime/cyclic_thread.h"
+
+namespace fulcrum::render {
+namespace {
+
+constexpr unsigned kPointerEvents = ButtonPressMask | ButtonReleaseMask | PointerMotionMask;
+
+std::optional<HandsKey> KeyOf(KeySym symbol) {
+  static const std::map<KeySym, HandsKey> kKeys{
+      {XK_1, HandsKey::kTool0},      {XK_2, HandsKey::kTool1},         {XK_j, HandsKey::kJaw},
+      {XK_k, HandsKey::kJawLock},    {XK_f, HandsKey::kCut},           {XK_g, HandsKey::kCoag},
+      {XK_space, HandsKey::kClutch}, {XK_Control_L, HandsKey::kDepth}, {XK_Control_R, HandsKey::kDepth},
+      {XK_Shift_L, HandsKey::kFine}, {XK_Shift_R, HandsKey::kFine},    {XK_v, HandsKey::kSteady}};
+  const auto found = kKeys.find(symbol);
+  return found == kKeys.end() ? std::nullopt : std::optional(found->second);
+}
+
+/// Errors of this connection end nothing: the window may be destroyed before the connection.
+int Ignore(::Display*, XErrorEvent*) { return 0; }
+
+}  // namespace
+
+/// Owned by the thread of the input, but for its construction.
+class WindowInput::Connection {
+ public:
+  Connection(const std::string& name, unsigned long window) : window_(window) {
+    XSetErrorHandler(&Ignore);
+    display_ = XOpenDisplay(name.empty() ? nullptr : name.c_str());
+    if (display_ == nullptr) throw InputError("--hands mouse: the display cannot be opened a second time");
+    Bool supported = False;
+    XkbSetDetectableAutoRepeat(display_, True, &supported);
+    XSelectInput(display_, window_, KeyPressMask | KeyReleaseMask | FocusChangeMask | StructureNotifyMask);
+    XFlush(display_);
+  }
+  ~Connection() { XCloseDisplay(display_); }
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  /// Waits for events, at most `limit_ms`.
+  void Wait(int limit_ms) {
+    if (XPending(display_) > 0) return;
+    pollfd readable{ConnectionNumber(display_), POLLIN, 0};
+    (void)::poll(&readable, 1, limit_ms);
+  }
+
+  /// Takes the controls once the pointer is free: a button that is still down belongs to the window's own connection.
+  bool Take(MouseHands* hands, std::int64_t now_ns) {
+    if (XGrabPointer(display_, window_, False, kPointerEvents, GrabModeAsync, GrabModeAsync, window_, Invisible(),
+                     CurrentTime) != GrabSuccess) {
+      return false;
+    }
+    FindPointer();
+    Centre();
+    hands->Take(now_ns);
+    return true;
+  }
+  void Release(MouseHands* hands) {
+    hands->Release();
+    XUngrabPointer(display_, CurrentTime);
+    XFlush(display_);
+  }
+
+  /// Handles all events that have arrived. True if one of them concerned the hands. `take` is set when the operator
+  /// asks for the controls.
+  bool Handle(MouseHands* hands, bool* take) {
+    bool any = false;
+    while (XPending(display_) > 0) {
+      XEvent event;
+      XNextEvent(display_, &event);
+      any = Handle(event, hands, take) || any;
+    }
+    return any;
+  }
+
+ private:
+  bool Handle(const XEvent& event, MouseHands* hands, bool* take) {
+    switch (event.type) {
+      case KeyPress:
+      case KeyRelease:
+        return HandleKey(event.xkey, event.type == KeyPress, hands, take);
+      case ButtonPress:
+      case ButtonRelease:
+        return HandleButton(event.xbutton.button, event.type == ButtonPress, hands);
+      case MotionNotify:
+        return HandleMotion(event.xmotion.x, event.xmotion.y, hands);
+      case FocusOut:
+        // A grab of the window manager, as for Alt+Tab, is no loss of the window.
+        if (!hands->active() || event.xfocus.mode == NotifyGrab) return false;
+        Release(hands);
+        return true;
+      default:
+        return false;
+    }
+  }
+
+  bool HandleKey(const XKeyEvent& event, bool down, MouseHands* hands, bool* take) {
+    const KeySym symbol = XkbKeycodeToKeysym(display_, static_cast<KeyCode>(event.keycode), 0, 0);
+    if (!hands->active()) {
+      if (symbol == XK_Return && down) *take = true;
+      return false;
+    }
+    if (symbol == XK_Escape && down) {
+      Release(hands);
+      return true;
+    }
+    const auto key = KeyOf(symbol);
+    if (key) hands->Press(*key, down);
+    return key.has_value();
+  }
+
+  static bool HandleButton(unsigned button, bool down, MouseHands* hands) {
+    switch (button) {
+      case Button1:
+        hands->Press(HandsKey::kJaw, down);
+        return true;
+      case Button2:
+        hands->Press(HandsKey::kCoag, down);
+        return true;
+      case Button3:
+        hands->Press(HandsKey::kCut, down);
+        return true;
+      case Button4:
+      case Button5:
+        if (down) hands->Turn(button == Button4 ? 1 : -1);
+        return down;
+      default:
+        return false;
+    }
+  }
+
+  /// The pointer goes back to the middle before it reaches the border, so that its motion has no end.
+  bool HandleMotion(int x, int y, MouseHands* hands) {
+    const bool by_warp = warped_ && x == width_ / 2 && y == height_ / 2;
+    const int by_x = by_warp ? 0 : x - x_, by_y = by_warp ? 0 : y - y_;
+    x_ = x;
+    y_ = y;
+    if (by_warp) warped_ = false;
+    if (by_x == 0 && by_y == 0) return false;
+    hands->Move(static_cast<float>(by_x), static_cast<float>(-by_y));
+    const bool near_border = x < width_ / 4 || x > 3 * width_ / 4 || y < height_ / 4 || y > 3 * height_ / 4;
+    if (near_border && !warped_) Centre();
+    return true;
+  }
+
+  void Centre() {
+    XWindowAttributes attributes;
+    if (XGetWindowAttributes(display_, window_, &attributes) == 0) return;
+    width_ = attributes.width;
+    height_ = attributes.height;
+    XWarpPointer(display_, 0, window_, 0, 0, 0, 0, width_ / 2, height_ / 2);
+    XFlush(display_);
+    warped_ = true;
+  }
+
+  void FindPointer() {
+    ::Window root = 0, child = 0;
+    int root_x = 0, root_y = 0;
+    unsigned mask = 0;
+    XQueryPointer(display_, window_, &root, &child, &root_x, &root_y, &x_, &y_, &mask);
+  }
+
+  Cursor Invisible() {
+    const char nothing = 0;
+    XColor black{};
+    const Pixmap pixel = XCreateBitmapFromData(display_, window_, &nothing, 1, 1);
+    const Cursor cursor = XCreatePixmapCursor(display_, pixel, pixel, &black, &black, 0, 0);
+    XFreePixmap(display_, pixel);
+    return cursor;
+  }
+
+  ::Display* display_;
+  const ::Window window_;
+  int width_ = 1, height_ = 1;
+  int x_ = 0, y_ = 0;    ///< Place of the pointer in the window.
+  bool warped_ = false;  ///< The motion to the middle has not arrived yet.
+};
+
+WindowInput::WindowInput(const std::string& display, unsigned long window, Sink sink)
+    : sink_(std::move(sink)), connection_(std::make_unique<Connection>(display, window)) {
+  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+}
+
+WindowInput::~WindowInput() = default;
+
+void WindowInput::SetView(const HandsView& view) {
+  const std::lock_guard lock(mutex_);
+  view_ = view;
+}
+
+HandsState WindowInput::state() const {
+  const std::lock_guard lock(mutex_);
+  return state_;
+}
+
+void WindowInput::Run(const std::stop_token& stop) {
+  MouseHands hands;
+  std::int64_t sent_ns = 0;
+  bool take = false;
+  while (!stop.stop_requested()) {
+    connection_->Wait(kRepeat_ms);
+    {
+      const std::lock_guard lock(mutex_);
+      hands.SetView(view_);
+    }
+    const bool was_active = hands.active();
+    bool changed = connection_->Handle(&hands, &take);
+    take = wants_take_.exchange(false, std::memory_order_relaxed) || take;
+    const std::int64_t now_ns = runtime::MonotonicNs();
+    if (take && !hands.active() && connection_->Take(&hands, now_ns)) changed = true;
+    take = take && !hands.active();
+    const bool due = hands.active() && now_ns - sent_ns >= kRepeat_ms * 1'000'000LL;
+    if (changed || due || was_active != hands.active()) {
+      sink_(hands.At(now_ns));
+      sent_ns = now_ns;
+    }
+    const std::lock_guard lock(mutex_);
+    state_ = {hands.active(), hands.tool(), hands.locked(hands.tool()), hands.steady()};
+  }
+  if (hands.active()) {
+    connection_->Release(&hands);
+    sink_(hands.At(runtime::MonotonicNs()));
+  }
+}
+
+}  // namespace fulcrum::render

@@ -1,0 +1,61 @@
+#include "tests/system/hands/xclient.h"
+
+// X11's headers define words such as None and Bool as macros: this file is compiled by itself.
+#include <X11/Xlib.h>
+#include <X11/keysym.h>
+
+#include <stdexcept>
+
+namespace fulcrum::testing {
+
+struct XClient::Impl {
+  ::Display* display = nullptr;
+  ::Window window = 0;
+
+  ::Window Find(::Window below, const std::string& name) const {
+    char* own = nullptr;
+    if (XFetchName(display, below, &own) != 0) {
+      const bool found = name == own;
+      XFree(own);
+      if (found) return below;
+    }
+    ::Window root = 0, parent = 0, *children = nullptr;
+    unsigned count = 0;
+    ::Window found = 0;
+    if (XQueryTree(display, below, &root, &parent, &children, &count) == 0) return 0;
+    for (unsigned i = 0; i < count && found == 0; ++i) found = Find(children[i], name);
+    if (children != nullptr) XFree(children);
+    return found;
+  }
+};
+
+XClient::XClient(const std::string& display) : impl_(std::make_unique<Impl>()) {
+  impl_->display = XOpenDisplay(display.c_str());
+  if (impl_->display == nullptr) throw std::runtime_error("display " + display + " does not answer");
+}
+XClient::~XClient() { XCloseDisplay(impl_->display); }
+
+bool XClient::FindWindow(const std::string& name) {
+  impl_->window = impl_->Find(DefaultRootWindow(impl_->display), name);
+  return impl_->window != 0;
+}
+
+void XClient::Move(int x, int y) {
+  XWarpPointer(impl_->display, 0, 0, 0, 0, 0, 0, x, y);
+  XFlush(impl_->display);
+}
+
+void XClient::Press(const std::string& key, bool down) {
+  XEvent event{};
+  event.xkey.type = down ? KeyPress : KeyRelease;
+  event.xkey.display = impl_->display;
+  event.xkey.window = impl_->window;
+  event.xkey.root = DefaultRootWindow(impl_->display);
+  event.xkey.time = CurrentTime;
+  event.xkey.same_screen = True;
+  event.xkey.keycode = XKeysymToKeycode(impl_->display, XStringToKeysym(key.c_str()));
+  XSendEvent(impl_->display, impl_->window, False, down ? KeyPressMask : KeyReleaseMask, &event);
+  XFlush(impl_->display);
+}
+
+}  // namespace fulcrum::testing

@@ -1,0 +1,115 @@
+#include "render_node/input/mouse_hands.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace fulcrum::render {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+
+HandsView View() {
+  HandsView view;
+  view.eye = {0, -0.1f, 0};
+  view.pixel = 1e-3f;
+  view.present = {true, true};
+  view.tip = {Vec3f(-0.02f, 0, 0), Vec3f(0.02f, 0, 0)};
+  return view;
+}
+
+class MouseHandsTest : public testing::Test {
+ protected:
+  MouseHandsTest() { hands_.SetView(View()); }
+  MouseHands hands_;
+};
+
+TEST_F(MouseHandsTest, DoesNothingUntilTaken) {
+  hands_.Move(10, 10);
+  hands_.Press(HandsKey::kCut, true);
+  const OperatorInput input = hands_.At(5 * kMs);
+  EXPECT_EQ(input.claim_ns, 0);
+  EXPECT_EQ(input.pedals, kPedalNone);
+  EXPECT_FALSE(input.tools[1].moves);
+}
+
+TEST_F(MouseHandsTest, BeginsWhereTheToolsAreAndStaysUnderThePointer) {
+  hands_.Take(5 * kMs);
+  OperatorInput input = hands_.At(6 * kMs);
+  EXPECT_EQ(input.claim_ns, 5 * kMs);
+  EXPECT_EQ(input.tools[0].p_WT, View().tip[0]);
+  EXPECT_EQ(input.tools[1].p_WT, View().tip[1]);
+  // The tip is 100 mm from the eye, where a pixel is 0.1 mm.
+  hands_.Move(30, -20);
+  input = hands_.At(7 * kMs);
+  EXPECT_LT((input.tools[1].p_WT - Vec3f(0.023f, 0, -0.002f)).norm(), 1e-6f);
+  EXPECT_EQ(input.tools[0].p_WT, View().tip[0]) << "the other tool keeps its place";
+  hands_.Turn(2);
+  EXPECT_LT((hands_.At(8 * kMs).tools[1].p_WT - Vec3f(0.023f, 0.002f, -0.002f)).norm(), 1e-6f);
+}
+
+TEST_F(MouseHandsTest, ModifiersChangeTheMotion) {
+  hands_.Take(5 * kMs);
+  hands_.Press(HandsKey::kFine, true);
+  hands_.Move(40, 0);
+  hands_.Press(HandsKey::kFine, false);
+  EXPECT_LT((hands_.At(6 * kMs).tools[1].p_WT - Vec3f(0.021f, 0, 0)).norm(), 1e-6f);
+  hands_.Press(HandsKey::kDepth, true);
+  hands_.Move(0, 30);
+  hands_.Press(HandsKey::kDepth, false);
+  EXPECT_LT((hands_.At(7 * kMs).tools[1].p_WT - Vec3f(0.021f, 0.003f, 0)).norm(), 1e-6f);
+  hands_.Press(HandsKey::kClutch, true);
+  hands_.Move(100, 100);
+  hands_.Press(HandsKey::kClutch, false);
+  EXPECT_LT((hands_.At(8 * kMs).tools[1].p_WT - Vec3f(0.021f, 0.003f, 0)).norm(), 1e-6f);
+}
+
+TEST_F(MouseHandsTest, TheIntentionLeadsTheToolByAtMostFourCentimetres) {
+  hands_.Take(5 * kMs);
+  for (int i = 0; i < 100; ++i) hands_.Move(100, 0);
+  EXPECT_NEAR((hands_.At(6 * kMs).tools[1].p_WT - View().tip[1]).norm(), 0.04f, 1e-6f);
+}
+
+TEST_F(MouseHandsTest, JawsPedalsAndTools) {
+  hands_.Take(5 * kMs);
+  hands_.Press(HandsKey::kTool0, true);
+  EXPECT_EQ(hands_.tool(), 0);
+  hands_.Press(HandsKey::kJaw, true);
+  EXPECT_EQ(hands_.At(6 * kMs).tools[0].jaw_angle_rad, 0);
+  EXPECT_GT(hands_.At(6 * kMs).tools[1].jaw_angle_rad, 0.5f);
+  hands_.Press(HandsKey::kTool1, true);
+  hands_.Press(HandsKey::kJaw, false);
+  EXPECT_EQ(hands_.At(7 * kMs).tools[0].jaw_angle_rad, 0) << "what it holds is kept";
+  hands_.Press(HandsKey::kCut, true);
+  EXPECT_EQ(hands_.At(8 * kMs).pedals, kPedalCut);
+  hands_.Press(HandsKey::kCoag, true);
+  hands_.Press(HandsKey::kCut, false);
+  EXPECT_EQ(hands_.At(9 * kMs).pedals, kPedalCoag);
+  hands_.Press(HandsKey::kTool0, true);
+  hands_.Press(HandsKey::kJawLock, true);
+  EXPECT_GT(hands_.At(10 * kMs).tools[0].jaw_angle_rad, 0.5f);
+  hands_.Release();
+  EXPECT_EQ(hands_.At(11 * kMs).pedals, kPedalNone);
+  EXPECT_EQ(hands_.At(11 * kMs).claim_ns, 0);
+}
+
+TEST_F(MouseHandsTest, SteadyFollowsSlowMotionAndDampsTremor) {
+  hands_.Take(1);
+  hands_.Press(HandsKey::kSteady, true);
+  float largest = 0;
+  // Tremor of 10 Hz and 1 mm, sampled each millisecond.
+  float before = 0;
+  for (int ms = 1; ms <= 1000; ++ms) {
+    const float now = 10.0f * std::sin(6.2831853f * 0.01f * static_cast<float>(ms));
+    hands_.Move(now - before, 0);
+    before = now;
+    const float x = hands_.At(ms * kMs).tools[1].p_WT.x() - 0.02f;
+    if (ms > 500) largest = std::max(largest, std::abs(x));
+  }
+  EXPECT_LT(largest, 0.3e-3f);
+  EXPECT_GT(largest, 0.1e-3f);
+}
+
+}  // namespace
+}  // namespace fulcrum::render
