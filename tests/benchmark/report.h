@@ -19,7 +19,7 @@ class Report {
   Report(int argc, char** argv);
 
   [[nodiscard]] bool quick() const { return quick_; }
-  /// True when a key that begins with `stem` can match the prefix asked for.
+  /// True when a key that begins with `stem` can match the requested prefix.
   [[nodiscard]] bool Wants(std::string_view stem) const;
   /// Prints `key value unit` when the key matches the prefix.
   void Add(std::string_view key, double value, std::string_view unit);
@@ -35,7 +35,7 @@ class Report {
 /// Wall time of `body` in ms, `repeats` times after `warmup` runs.
 [[nodiscard]] std::vector<double> TimeMs(int warmup, int repeats, const std::function<void()>& body);
 
-/// Keeps a result alive that nothing reads.
+/// Keeps the compiler from removing an unused result.
 template <class T>
 inline void DoNotOptimise(const T& value) {
   asm volatile("" : : "r,m"(value) : "memory");

@@ -101,13 +101,13 @@ void DrawAxes(const Axis& x, const Axis& y, Svg* svg) {
   svg->Line(x.from, y.from, x.from, y.to, "#444", 1);
 }
 
-/// Boxes that labels must keep off.
+/// Boxes that labels must not cover.
 struct Box {
   double x0, y0, x1, y1;
   [[nodiscard]] bool Meets(const Box& o) const { return x0 < o.x1 && o.x0 < x1 && y0 < o.y1 && o.y0 < y1; }
 };
 
-/// Writes a label beside its point: right, left, above or below, further off until it is free.
+/// Writes a label beside its point: right, left, above or below, farther away until the place is free.
 void DrawLabel(double px, double py, const std::string& label, const char* colour, const Axis& x,
                std::vector<Box>* taken, Svg* svg) {
   const double width = kCharacter * Length(label);

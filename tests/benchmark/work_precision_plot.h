@@ -14,8 +14,8 @@ struct WorkPrecisionPoint {
   std::vector<double> error_pct;  ///< One per panel; not positive or not finite: not drawn.
 };
 
-/// Panels stand side by side under `titles`. With a legend the families are named below; without, the labels must do
-/// that.
+/// Panels stand side by side under `titles`. With a legend the families are named below; without one, only the labels
+/// name them.
 [[nodiscard]] std::string WorkPrecisionSvg(const std::string& heading, const std::vector<std::string>& titles,
                                            std::vector<WorkPrecisionPoint> points, bool legend = false);
 

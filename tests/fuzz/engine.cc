@@ -16,7 +16,7 @@ using fulcrum::fuzz::Target;
 unsigned long long g_inputs = 0, g_accepted = 0;
 
 Target& TheTarget() {
-  // Never destroyed: libFuzzer ends the process in its own ways.
+  // Never destroyed: libFuzzer ends the process without destructors.
   static Target* const target = fulcrum::fuzz::FULCRUM_FUZZ_MAKE().release();
   return *target;
 }
@@ -30,13 +30,13 @@ extern "C" int LLVMFuzzerInitialize(int* count, char*** values) {
     for (const fulcrum::fuzz::Seed& seed : TheTarget().Seeds()) {
       fulcrum::fuzz::WriteFile(folder / seed.name, seed.bytes);
     }
-    // One word a line, in quotation marks; the words have none.
+    // One word per line, in quotation marks; the words contain none.
     std::string dictionary;
     for (const std::string& word : TheTarget().Words()) dictionary.append("\"").append(word).append("\"\n");
     fulcrum::fuzz::WriteFile((*values)[3], fulcrum::fuzz::BytesOf(dictionary));
     std::exit(0);
   }
-  // Made before the first input: its time must not count as that of a hang.
+  // Made before the first input, so that its time does not count for the detection of hangs.
   (void)TheTarget();
   std::atexit([] { std::fprintf(stderr, "fuzz: inputs %llu accepted %llu\n", g_inputs, g_accepted); });
   return 0;

@@ -40,7 +40,7 @@ inline std::vector<std::string> LinesOf(std::string_view text) {
       case 1:
         lines.insert(lines.begin() + at, std::string(line));
         break;
-      case 2: {  // To another place, with what is below it or not.
+      case 2: {  // To another place, with or without the lines below it.
         std::string moved = std::move(line);
         lines.erase(lines.begin() + at);
         lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(below(lines.size() + 1)), std::move(moved));

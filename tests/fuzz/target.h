@@ -21,7 +21,7 @@ using Input = std::span<const std::uint8_t>;
 
 enum class Outcome { kRefused, kAccepted };
 
-/// What the check of a target throws when something that must hold for all inputs does not.
+/// Thrown by the check of a target when a property that must hold for all inputs is violated.
 class BrokenPromise : public std::logic_error {
  public:
   using std::logic_error::logic_error;
@@ -43,13 +43,13 @@ class Target {
   Target(const Target&) = delete;
   Target& operator=(const Target&) = delete;
 
-  /// Throws BrokenPromise. Any other exception is a bug of the parser, too: callers of it do not expect one.
+  /// Throws BrokenPromise. Any other exception is a bug of the parser, because its callers do not expect one.
   virtual Outcome Offer(Input input) = 0;
-  /// Another input made of one, for formats that changes of bytes alone mostly destroy; empty: none.
+  /// A mutation of an input, for formats that byte changes mostly destroy; empty: none.
   [[nodiscard]] virtual Bytes Mutate(Input, unsigned /*seed*/) { return {}; }
-  /// What stands in inputs again and again, of letters, digits and plain signs.
+  /// Words that occur often in inputs, of letters, digits and plain signs.
   [[nodiscard]] virtual std::vector<std::string> Words() { return {}; }
-  /// The shipped files of this kind, and what this project's own writers make.
+  /// The shipped files of this kind, and the output of this project's own writers.
   [[nodiscard]] virtual std::vector<Seed> Seeds() { return {}; }
 };
 
@@ -58,10 +58,10 @@ class Target {
 }
 [[nodiscard]] inline Bytes BytesOf(std::string_view text) { return {text.begin(), text.end()}; }
 [[nodiscard]] Bytes ReadFile(const std::filesystem::path& file);
-/// The files of a folder of the source tree whose names end in `extension`, as seeds.
+/// The files in a folder of the source tree whose names end in `extension`, as seeds.
 [[nodiscard]] std::vector<Seed> FilesOf(const std::string& folder, const std::string& extension);
 
-/// A file without a place on any disk, for parsers that take a path.
+/// A file in memory with a path, for parsers that take a path.
 class MemoryFile {
  public:
   MemoryFile();

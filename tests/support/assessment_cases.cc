@@ -144,7 +144,7 @@ void AddForces(const SceneView& scene, std::vector<KnownAnswer>* answers) {
   answers->push_back({"peak_force.pulses", ValueOf(assessor, Measure::kPeakForce), peak_N});
 
   // Three holds: one slips twice and is kept, one is lost, one is opened. The first is raised by 12 mm in 1 s, held for
-  // 3 s and lowered again; 8 mm are asked for.
+  // 3 s and lowered again; the required lift is 8 mm.
   Assessor holds(scene);
   holds.Begin(kStart_ns);
   const auto height = [](double t) {
@@ -229,7 +229,7 @@ void AddLines(const SceneView& scene, std::vector<KnownAnswer>* answers) {
 void AddHeat(const SceneView& scene, std::vector<KnownAnswer>* answers) {
   Assessor assessor(scene);
   assessor.Begin(kStart_ns);
-  // A disc on the middle of the line; what lies within the margin of a line that is longer than the disc is a strip.
+  // A disc on the middle of the line; within the margin of a line longer than the disc lies a strip.
   const double radius_m = 0.006, margin_m = static_cast<double>(scene.assessment.margin_m);
   const Eigen::Vector2d centre(0.02, 0.04);
   const auto damaged = [&](const Eigen::Vector2d& at) { return (at - centre).norm() < radius_m; };
@@ -246,7 +246,7 @@ void AddHeat(const SceneView& scene, std::vector<KnownAnswer>* answers) {
   topology.cut_off_way_m = 0.0003f;
   assessor.Add(topology);
   topology.stamp = StampAt(3);
-  topology.cut_length_m = 0.004f;  // As from a thermal node just after a restart.
+  topology.cut_length_m = 0.004f;  // As sent by a thermal node just after a restart.
   assessor.Add(topology);
   answers->push_back({"cut_length.state", ValueOf(assessor, Measure::kCutLength), 12.3});
   answers->push_back({"cut_width.state", ValueOf(assessor, Measure::kCutWidth), 1.9});

@@ -1,4 +1,4 @@
-// A complete cart, started like by a user and observed from outside.
+// A complete cart, started as by a user and observed from outside.
 #pragma once
 
 #include <sys/types.h>
@@ -19,7 +19,7 @@ bool WaitFor(double limit_s, const std::function<bool()>& done);
 
 [[nodiscard]] std::string ReadFile(const std::filesystem::path& file);
 
-/// Number under `key` in a summary.json; NaN: it is not there.
+/// Number under `key` in a summary.json; NaN: it is missing.
 [[nodiscard]] double FigureOf(const std::string& summary, const std::string& key);
 
 /// Running child processes of a process, by name.

@@ -115,7 +115,7 @@ bool CartWatch::WaitForState(double limit_s, const std::function<bool()>& done) 
   return done();
 }
 
-/// Random bytes may decode to a message, with an epoch in the future.
+/// Rejects epochs in the future: random bytes may decode to a message with one.
 bool CartWatch::IsOfTheCart(const Stamp& stamp, std::int64_t now) const {
   return stamp.epoch != 0 && stamp.epoch <= static_cast<std::uint64_t>(now) && !ignored_.contains(stamp.epoch);
 }

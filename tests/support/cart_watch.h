@@ -54,7 +54,8 @@ struct CartState {
 
 class CartWatch {
  public:
-  /// @param scene YAML, for the tools' trocars. @param session folder with the checkpoints; it may be created later.
+  /// @param scene YAML, for the tools' trocars.
+  /// @param session folder with the checkpoints; it may be created later.
   CartWatch(int domain, const std::filesystem::path& scene, const std::filesystem::path& session);
   ~CartWatch();
   CartWatch(const CartWatch&) = delete;

@@ -85,7 +85,7 @@ class Maker {
     Bytes bytes = Header();
     Append(&bytes, {0x15, 0x05, 0, 0, 0, 0, 16, 0, 0, 0, 0, 0, 0, writer[0], writer[1], writer[2]});
     Append(&bytes, {0, 0, 0, 0, 1 + Below(3), 0, 0, 0, 0, 3, 0, 0});
-    // Names of parameters that exist, with lengths beyond the end, and values that are none.
+    // Ids of existing parameters, with lengths beyond the end and invalid values.
     constexpr std::array<unsigned, 12> kParameters{0x02, 0x05, 0x07, 0x0f, 0x15, 0x16,
                                                    0x1a, 0x2c, 0x31, 0x32, 0x50, 0x59};
     for (std::uint32_t i = 0, count = 1 + Below(8); i < count; ++i) {

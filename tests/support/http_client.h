@@ -25,7 +25,7 @@ struct HttpRoute {
 /// One connection to a port of this machine.
 class HttpConnection {
  public:
-  /// Throws std::runtime_error when nobody listens or the TLS handshake fails.
+  /// Throws std::runtime_error if no process listens or the TLS handshake fails.
   explicit HttpConnection(int port, const HttpRoute& route = {});
   ~HttpConnection();
   HttpConnection(const HttpConnection&) = delete;

@@ -146,7 +146,7 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
   const auto admit = [&](const std::string& guest, bus::TopicSet writes, bus::TopicSet reads) {
     keys::IssueGuest(real, {guest, writes, reads, today, scratch / guest});
   };
-  // Its folder was handed over before it was revoked, so that its own side has the old list.
+  // Its folder is copied before it is revoked, so that its own side has the old list.
   admit("revoked_guest", bus::SetOf(TopicId::kToolState), bus::SetOf(TopicId::kSceneManifest));
   keys::Revoke(real, "revoked_guest");
   admit("reading_guest", 0, bus::SetOf(TopicId::kHealth));
@@ -209,7 +209,7 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
     attempt.last_line = end == std::string::npos ? "" : said.substr(0, end + 1);
     attempt.last_line = attempt.last_line.substr(attempt.last_line.rfind('\n') + 1);
     attempt.came_through = target.came_through();
-    // An endpoint is reported by the name in the keys of its process, any other participant by the name that it claims.
+    // An endpoint is reported by the name in the keys of its process, any other participant by its claimed name.
     const std::string name = attempt.name == "forged_other_topic"         ? "thermal_node"
                              : attempt.name == "forged_guest_other_topic" ? "the guest reading_guest"
                                                                           : attempt.name;

@@ -1,8 +1,7 @@
 // The other process of an attempt (tests/support/intruder.h):
 //   security_intruder DOMAIN NAME KEYS IDENTITY           our own program with these keys; KEYS "-": without any
-//   security_intruder DOMAIN NAME KEYS IDENTITY CA FIFO   one that has forged its own side: it holds the authorities in
-//                                                         CA for good and its permissions, read from FIFO, for whatever
-//                                                         is there at that moment
+//   security_intruder DOMAIN NAME KEYS IDENTITY CA FIFO   one with a forged local state: it accepts the authorities in
+//                                                         CA, and reads its permissions from FIFO at each use
 // Writes ToolState and reads SceneManifest. Exit codes as in exit_code.h; 5: a sample of the cart arrived.
 #include <unistd.h>
 

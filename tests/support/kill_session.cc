@@ -31,13 +31,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Each victim lives a little longer than the 5 s after which the supervisor counts it as healthy, so none waits for its
-// restart as one that dies again and again does.
+// Each victim lives a little longer than the 5 s after which the supervisor counts it as healthy. The supervisor
+// therefore restarts it at once, without the delay for a node that fails repeatedly.
 constexpr std::array kVictims{"recorder",     "physics_node",  "thermal_node",
                               "haptics_node", "handle_bridge", "render_node"};
 constexpr double kBetweenKills_s = 0.9;
 constexpr double kPatience_s = 30, kStart_s = 60;
-// What a killed recorder may lose (services/records/recorder).
+// Time of samples that a killed recorder may lose [s] (services/records/recorder).
 constexpr double kRecorderGrace_s = 1;
 
 std::optional<NodeId> NodeOf(const std::string& program) {
@@ -56,7 +56,7 @@ std::uint64_t SharedMemoryLeft(int domain) {
   std::uint64_t bytes = 0;
   std::error_code none;
   const auto add = [&](const fs::directory_entry& entry) {
-    // A file that is empty is left as well.
+    // An empty file counts as left over, too.
     if (entry.is_regular_file(none)) bytes += std::max<std::uint64_t>(1, entry.file_size(none));
   };
   for (const auto& entry : fs::directory_iterator("/dev/shm", none)) {
@@ -69,8 +69,8 @@ std::uint64_t SharedMemoryLeft(int domain) {
   return bytes;
 }
 
-/// What `fulcrum log verify` finds wrong with a file, one line each, but for the samples that were sent while no
-/// recorder ran.
+/// Faults that `fulcrum log verify` finds in a file, one line each, except samples that were sent while no recorder
+/// ran.
 std::string FaultsOf(const fs::path& file) {
   Program program("fulcrum", {"log", "verify", file});
   const int code = program.End(0);
@@ -133,7 +133,7 @@ Recorded LookAtRecordings(const fs::path& session, KillFindings* findings) {
   return recorded;
 }
 
-/// Kills the process of a node and waits until its successor is of use; what went wrong, or nothing.
+/// Kills the process of a node and waits until its successor works; returns an error, or nothing.
 std::string KillNode(const std::string& program, const Cart& cart, CartWatch* watch) {
   const auto processes = cart.nodes();
   const auto victim = processes.find(program);
@@ -168,7 +168,7 @@ int KillFindings::all() const {
 void RunKillSession(const fs::path& scene, int domain, int kills, int turn, LastKill last, KillFindings* findings) {
   // Orphans become children of this process, which reaps them: a zombie would count as a process that is left.
   ::prctl(PR_SET_CHILD_SUBREAPER, 1);
-  // Kills are not the session's fault here.
+  // The verdict must not count the kills.
   const fs::path file = scene.parent_path() / "kills_cart.yaml";
   std::ofstream(file) << "verdict: {restarts: 1000}\n";
   Cart cart(scene, domain, {"--record", "--cart", file});
@@ -182,7 +182,7 @@ void RunKillSession(const fs::path& scene, int domain, int kills, int turn, Last
   }
   const fs::path session = fs::canonical(cart.session());
   const int nodes = last == LastKill::kSupervisor ? kills - 1 : kills;
-  std::uint64_t due_revision = 0;  // A second before the end of the recording.
+  std::uint64_t due_revision = 0;  // Revision a second before the end of the recording.
   for (int i = 0; i < nodes; ++i) {
     due_revision = watch.See([](const CartState& state) { return state.topology.revision; });
     std::this_thread::sleep_for(std::chrono::duration<double>(kBetweenKills_s));

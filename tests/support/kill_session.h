@@ -18,11 +18,11 @@ struct KillFindings {
   int recordings = 0;
   int cut_short = 0;   ///< Recordings without a footer: their recorder was killed.
   int damaged = 0;     ///< Recordings that `fulcrum log recover` does not make valid.
-  std::string damage;  ///< What the tools said of these.
+  std::string damage;  ///< Output of the tools for these.
   std::uint64_t shared_memory_left_B = 0;
   int processes_left = 0;
   double unrecorded_s_max = 0;  ///< Longest time from the last recorded ToolState to the supervisor's kill.
-  std::string wrong;            ///< Why the sessions could not go on; empty: they could.
+  std::string wrong;            ///< Why the sessions could not continue; empty: they could.
 
   [[nodiscard]] int all() const;
 };
@@ -31,8 +31,8 @@ struct KillFindings {
 enum class LastKill { kSupervisor, kNone };
 
 /// One session of a scene that cuts all the time. The five nodes and the recorder are killed in turn, so far apart that
-/// each counts as healthy again. With kSupervisor the last of `kills` is that of the supervisor, and nothing is asked
-/// to end; otherwise the session is then ended by SIGINT.
+/// each counts as healthy again. With kSupervisor the last of `kills` is that of the supervisor; otherwise SIGINT ends
+/// the session afterwards.
 /// @param turn index of the first victim, so that sessions differ.
 void RunKillSession(const std::filesystem::path& scene, int domain, int kills, int turn, LastKill last,
                     KillFindings* findings);

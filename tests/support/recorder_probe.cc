@@ -26,7 +26,7 @@ using runtime::MonotonicNs;
 constexpr double kPatience_s = 20;
 constexpr std::int64_t kPromise_ns = 1'000'000'000;  ///< Samples older than this must be in the file.
 constexpr std::int64_t kOnTheWay_ns = 50'000'000;    ///< Samples younger than this may not have been received yet.
-constexpr int kFrameEvery = 10;                      ///< ToolStates.
+constexpr int kFrameEvery = 10;                      ///< A TissueFrame is sent with every so many ToolStates.
 constexpr std::uint32_t kVertices = 20'000;
 
 }  // namespace
@@ -159,7 +159,7 @@ RecorderProbe::Result RecorderProbe::RecordAndKill(double seconds) {
 RecorderProbe::FullDisk RecorderProbe::RecordUntilFull(std::uint64_t room_B, double seconds) {
   FullDisk result;
   result.file = folder_ / ("recording" + std::to_string(++runs_) + ".mcap");
-  // The reserve is all but this room of the disk that there is.
+  // The reserve leaves only this room of the disk's free space.
   const fs::path cart = folder_ / "cart.yaml";
   const std::uint64_t free_B = fs::space(folder_).available;
   std::ofstream(cart) << "recorder: {keep_free_MB: " << (free_B > room_B ? (free_B - room_B) / 1'000'000 : 0) << "}\n";

@@ -1,4 +1,4 @@
-// The program recorder together with a source whose samples are all known.
+// The program recorder together with a source of known samples.
 #pragma once
 
 #include <cstdint>
@@ -27,19 +27,19 @@ class RecorderProbe {
     std::uint64_t due = 0;     ///< Samples that the file must contain: those older than a second at the kill.
     std::uint64_t read = 0;    ///< Of these, samples up to the last one of their topic in the file.
     std::uint64_t missed = 0;  ///< Of those, missing samples: lost in transport and not by the kill.
-    double unread_ms = 0;      ///< Age of the last ToolState in the file at the kill [ms]: what the kill has cost.
+    double unread_ms = 0;      ///< Age of the last ToolState in the file at the kill [ms]: the loss caused by the kill.
     std::filesystem::path file;
   };
   /// Records for `seconds`, then kills the recorder and reads its file. `due` is 0 if the recorder did not start.
   Result RecordAndKill(double seconds);
 
   struct FullDisk {
-    bool has_ended = false;      ///< In order: the file is closed and tells of its end.
+    bool has_ended = false;      ///< In order: the file is closed and contains the reason for its end.
     std::uint64_t recorded = 0;  ///< Samples in the file.
     std::uint64_t lost = 0;      ///< Samples sent before the end of the recording that are not in the file.
     std::filesystem::path file;
   };
-  /// Records onto a disk that has room for `room_B` above the recorder's reserve, for `seconds`, then stops the
+  /// Records onto a disk with `room_B` of free space above the recorder's reserve, for `seconds`, then stops the
   /// recorder.
   FullDisk RecordUntilFull(std::uint64_t room_B, double seconds);
 

@@ -42,7 +42,7 @@ constexpr std::array kBroken{std::numeric_limits<float>::quiet_NaN(), std::numer
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Bytes under the name of another type.
+/// Raw bytes under the type name of a topic.
 class RawType final : public fast::TopicDataType {
  public:
   explicit RawType(const std::string& name) {
@@ -74,7 +74,7 @@ std::string TypeName(const bus::TopicRole& role) {
 Bytes NoMessage(std::mt19937* random) {
   constexpr std::array<std::size_t, 9> kLengths{4, 5, 8, 17, 28, 60, 200, 1400, kLongestBytes};
   Bytes bytes(kLengths[(*random)() % kLengths.size()]);
-  // All ones are numbers that do not exist and lengths beyond everything; few zeros give lengths that almost fit.
+  // All ones give invalid numbers and lengths beyond any message; few zeros give lengths that almost fit.
   const unsigned kind = (*random)() % 4;
   for (std::uint8_t& byte : bytes) {
     const auto any = static_cast<std::uint8_t>((*random)());
@@ -98,7 +98,7 @@ void Leave(fast::DomainParticipant* participant) {
   fast::DomainParticipantFactory::get_instance()->delete_participant(participant);
 }
 
-/// Makes a writer of bytes that matches the QoS of any topic's readers.
+/// Makes a writer of raw bytes whose QoS matches the readers of any topic.
 fast::DataWriter* MakeWriter(fast::DomainParticipant* participant, fast::Publisher* publisher,
                              const bus::TopicRole& role) {
   fast::TypeSupport type(new RawType(TypeName(role)));

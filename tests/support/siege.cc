@@ -14,13 +14,13 @@
 namespace fulcrum::testing {
 namespace {
 
-/// Begins to connect; -1: the system refuses.
+/// Begins to connect; -1: the system refused.
 int Connect(int port, const std::string& from) {
   const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (socket < 0) return -1;
   const int on = 1;
   ::setsockopt(socket, IPPROTO_IP, IP_BIND_ADDRESS_NO_PORT, &on, sizeof(on));
-  // A reset instead of TIME_WAIT at the end, or the ports of an address are used up after seconds.
+  // A reset instead of TIME_WAIT at the end; otherwise the ports of an address are used up after seconds.
   const linger reset{1, 0};
   ::setsockopt(socket, SOL_SOCKET, SO_LINGER, &reset, sizeof(reset));
   sockaddr_in address{};
@@ -56,7 +56,7 @@ void Siege::Run(int port, const Attack& attack) {
     for (pollfd& one : sockets) {
       if (one.fd >= 0 && one.revents != 0) {
         std::array<char, 4096> ignored;
-        // What the server sends is read and dropped; its end, or an error, ends the connection.
+        // Data from the server is read and dropped; its end, or an error, ends the connection.
         if (::recv(one.fd, ignored.data(), ignored.size(), MSG_DONTWAIT) > 0) continue;
         ::close(one.fd);
         one.fd = -1;

@@ -1,5 +1,5 @@
-// Silent connections to a port of this machine, from one address or many: a client that connects and says nothing, or
-// less than a whole request, and connects again each time it is closed.
+// Silent connections to a port of this machine, from one address or many: a client connects, sends nothing or less than
+// a whole request, and connects again each time it is closed.
 #pragma once
 
 #include <atomic>

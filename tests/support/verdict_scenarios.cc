@@ -51,7 +51,7 @@ class Scratch {
 
 // ------------------------------------------------------------------------------------------------------ fake nodes
 
-/// The small scene with fake nodes in the places of the real ones.
+/// The small scene with fake nodes in place of the real ones.
 class FakeCart {
  public:
   FakeCart(int domain, const std::vector<NodeId>& nodes) : domain_(domain), folder_(domain) {
@@ -70,7 +70,7 @@ class FakeCart {
   void AddProgram(NodeId node) const {
     fs::copy_file(fs::path(FULCRUM_BIN_DIR) / "supervisor_fake_node", folder_.path() / "bin" / NodeName(node));
   }
-  /// What a node does, see fake_node.cc.
+  /// Sets the behaviour of a node, see fake_node.cc.
   void Order(NodeId node, const std::string& what) const {
     std::ofstream(out() / (std::string(NodeName(node)) + ".do")) << what << "\n";
   }
@@ -83,7 +83,7 @@ class FakeCart {
   void Start(const Words& more = {}) {
     const fs::path scene = folder_.path() / "tiny.fulcrum";
     scene::WriteSceneFile(data_, "name: tiny\n", scene);
-    // The fake node makes ports to which no identity of a keyed bus has the right, and is swapped by its path.
+    // No identity of a keyed bus has the rights for the ports of the fake node; the scenarios swap it by its path.
     Words words{"up", scene, "--domain", std::to_string(domain_), "--out", out(), "--open-bus", "--allow-swap-command"};
     words.insert(words.end(), more.begin(), more.end());
     up_ = Program(fulcrum(), words);
@@ -102,7 +102,7 @@ class FakeCart {
     const pid_t victim = Process(node);
     if (victim > 0) ::kill(victim, SIGKILL);
     (void)WaitFor(kPatience_s, [&] { return Process(node) > 0 && Process(node) != victim; });
-    Sleep(0.6);  // Until it reports.
+    Sleep(0.6);  // Until the node reports.
   }
   /// A subcommand for this session.
   void Command(Words words) const {
@@ -127,8 +127,8 @@ class FakeCart {
 
 using enum NodeId;
 
-/// A scenario with fake nodes: `prepare` before the start, `suffer` while the session runs. Without `suffer` it ends
-/// after `seconds`, otherwise after `suffer` by Ctrl-C.
+/// A scenario with fake nodes: `prepare` runs before the start, `suffer` during the session. Without `suffer` it ends
+/// after `seconds`, otherwise by Ctrl-C after `suffer`.
 Scenario Fake(const std::string& name, int exit_code, const std::string& fault, const std::vector<NodeId>& nodes,
               const Words& more, const std::function<void(FakeCart&)>& prepare,
               const std::function<void(FakeCart&)>& suffer) {
@@ -195,17 +195,17 @@ void AddFakes(std::vector<Scenario>* all) {
   add(Fake(
       "fake_no_heat_no_cut", 0, "", {kHandleBridge, kHaptics, kPhysics}, {}, [](FakeCart& cart) { cart.Cut(4); },
       none));
-  // The picture is the node with a spare: it hangs, is killed, and its spare goes on.
+  // The node with a spare: it hangs, is killed, and its spare continues.
   add(Fake("fake_picture_hangs", 1, "render_node was stuck", {kPhysics, kRender}, longer, order(kRender, "hang once"),
            none));
-  // A folder in the place of the file: root may write everywhere else.
+  // A folder in place of the file, because root may write everywhere else.
   add(Fake("fake_no_summary", 1, "summary.json", servo, {}, none,
            [](FakeCart& cart) { fs::create_directory(cart.out() / "latest" / "summary.json"); }));
 }
 
 // ------------------------------------------------------------------------------------------------------ real carts
 
-/// A whole cart at work, from 0.5 s after the first line of progress on.
+/// A whole cart at work, 0.5 s after the first line of progress.
 class RealCart {
  public:
   RealCart(int domain, const std::string& scene, const Words& more)
@@ -257,7 +257,7 @@ Scenario Real(const std::string& name, int exit_code, const std::string& fault, 
           }};
 }
 
-/// The thread that draws: only cyclic threads ask the kernel for wake-ups without slack.
+/// Thread that draws: only cyclic threads set the timer slack to the minimum.
 pid_t CyclicThreadOf(pid_t process) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator("/proc/" + std::to_string(process) + "/task", error)) {
@@ -269,8 +269,8 @@ pid_t CyclicThreadOf(pid_t process) {
   return -1;
 }
 
-/// Time until a picture newer than the newest one is there [s].
-/// @param held thread that this one traces: a killed process ends when its tracer has noticed; 0: none.
+/// Time until a new picture exists [s].
+/// @param held thread traced by this one: a killed process ends only after its tracer has been notified; 0: none.
 double UntilNextPicture(const Cart& cart, pid_t held = 0) {
   const auto begin = std::chrono::steady_clock::now();
   const double newest_s = cart.PictureTime();
@@ -281,15 +281,15 @@ double UntilNextPicture(const Cart& cart, pid_t held = 0) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-/// Holds the thread that draws, and nothing else of its process, as a fault of a graphics driver does.
+/// Stops only the thread that draws, like a fault of a graphics driver.
 void HangPicture(RealCart& cart, double* picture_back_s) {
-  // A spare takes the place; it is prepared in the first seconds.
+  // The spare that takes over is prepared in the first seconds.
   (void)WaitFor(kPatience_s, [&] { return cart.Process("render_spare") > 0; });
   Sleep(1);
   const pid_t thread = CyclicThreadOf(cart.Process("render_node"));
   if (thread <= 0 || ::ptrace(PTRACE_ATTACH, thread, nullptr, nullptr) != 0) return;
   (void)::waitpid(thread, nullptr, __WALL);
-  Sleep(0.1);  // A picture that was being written.
+  Sleep(0.1);  // For a picture that was being written.
   *picture_back_s = 0.1 + UntilNextPicture(cart.cart(), thread);
 }
 
@@ -351,7 +351,7 @@ void AddReals(std::vector<Scenario>* all) {
       Sleep(0.7);
     }
   }));
-  // A file in the place of the folder: root may write everywhere else.
+  // A file in place of the folder, because root may write everywhere else.
   add(Real("pictures_not_writable", 1, "render_node could not write", six, [](C& cart, double*) {
     fs::remove_all(cart.cart().session() / "frames");
     std::ofstream(cart.cart().session() / "frames") << "not a folder";

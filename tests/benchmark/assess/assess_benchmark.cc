@@ -1,4 +1,4 @@
-// The assessment: error of each measure on sessions whose answer is known, and what a message costs.
+// The assessment: error of each measure on sessions with known results, and the cost of a message.
 #include <algorithm>
 #include <cmath>
 #include <map>

@@ -3,9 +3,9 @@
 //   small_rtt              HandleState (56 B) there, CauteryContact (84 B) back, at 1 kHz over UDP loopback; both
 //                          sides take and write in the callback.
 //   frame_300k             TissueFrame filled to its capacity at 100 Hz, from the call of WriteInPlace to the callback
-//                          in the other process; frame_300k_take goes on until the checked copy is in the node's hands.
-//   take                   what a node's tick pays in its own thread: TakeLatest with nothing new, and with the ten
-//                          ToolStates that a 100 Hz node finds.
+//                          in the other process; frame_300k_take: until the node has the checked copy.
+//   take                   cost in the thread of a node's tick: TakeLatest without a new sample, and with the ten
+//                          ToolStates that arrive in a period of 100 Hz.
 //   start_to_first_sample  from fork to the first ToolState of a running publisher in the new process.
 #include <fcntl.h>
 #include <signal.h>
@@ -70,7 +70,7 @@ bool Eventually(const Condition& condition) {
   for (;;) pause();
 }
 
-/// Prints, for each frame, when its callback came and when its checked copy was there [ns since WriteInPlace].
+/// Prints, for each frame, the times of its callback and of its checked copy [ns since WriteInPlace].
 [[noreturn]] void Watch() {
   DdsParticipant bus = MakeBus("bench_watch");
   std::unique_ptr<Input<TissueFrame>> in;
@@ -86,7 +86,7 @@ bool Eventually(const Condition& condition) {
   for (;;) pause();
 }
 
-/// Prints when its first sample was there.
+/// Prints the time of its first sample.
 [[noreturn]] void First() {
   DdsParticipant bus = MakeBus("bench_first");
   auto in = bus.MakeInput<ToolState>();
@@ -150,7 +150,7 @@ void SmallRoundTrip(benchmark::Report* report) {
   made = true;
   Peer peer("echo");
   HandleState m;
-  // Each side learns of the other in its own time: only an echo says that both have. Sequence 0 is this warm-up.
+  // Discovery does not complete on both sides at once: only an echo shows that it has. Sequence 0 is this warm-up.
   if (!Eventually([&] { return out->Write(m) && back_ns[0] != 0; })) return;
   Stamper stamper(NowNs());
   auto next = Clock::now();
@@ -175,7 +175,7 @@ void Frames(benchmark::Report* report) {
   DdsParticipant bus = MakeBus("bench_frames");
   auto out = bus.MakeOutput<TissueFrame>();
   Peer peer("watch");
-  // Each side learns of the other in its own time, at the latest with its next announcement.
+  // Discovery does not complete on both sides at once; the reader has matched by its next announcement at the latest.
   if (!Eventually([&] { return out->has_readers(); })) return;
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   std::vector<float> xyz(std::size_t{3} * kMaxTissueVertices, 0.25f);

@@ -1,6 +1,6 @@
-// The operator's page in headless Chromium: until something is painted, what the console itself costs while a page
-// watches a session, and how old the picture on it is. tests/integration/console/npm/measure.mjs does both; without a
-// browser there are no lines.
+// The operator's page in headless Chromium: time to the first paint, cost of the console while a page shows a session,
+// and age of the picture on the page. tests/integration/console/npm/measure.mjs measures them; without a browser no
+// lines are printed.
 #include <cstdio>
 #include <sstream>
 #include <string>

@@ -1,6 +1,6 @@
-// How fast the operator's Stop is answered beside a thousand silent connections, half of them from the operator's own
-// address and half from a hundred others, each of which connects again as soon as it is closed. The first Stop ends a
-// running session; the others have the same route answer again.
+// Time until the operator's Stop is answered beside a thousand silent connections, half of them from the operator's own
+// address and half from a hundred others; each connects again as soon as it is closed. The first Stop ends a running
+// session; the others only request the same route.
 #include <signal.h>
 #include <stdlib.h>
 
@@ -92,7 +92,7 @@ void Measure(benchmark::Report* report, const std::string& stem, const std::vect
       from = Clock::now();
       kept.Send(StopRequest(console));
       page.Count(from, kept.Reply(kLimit_s).status);
-      // The phase of the console's turns at the request is random.
+      // Requests arrive at varying phases of the console's loop.
       std::this_thread::sleep_for(std::chrono::milliseconds(7 * (i % 11)));
     }
     std::fprintf(stderr, "%s: %zu connections made by the siege\n", stem.c_str(), siege.made());

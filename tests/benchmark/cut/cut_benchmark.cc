@@ -2,8 +2,8 @@
 //
 //   bench_cut [--quick] [--session N] [--keep DIR] [PREFIX]
 //
-// --session N: only this one of the matrix; 0: the script of the built-in scene. --keep DIR: recordings, maps and their
-// figures stay there, to be looked at.
+// --session N: only session N of the matrix; 0: the script of the built-in scene. --keep DIR: keeps recordings, maps
+// and their figures in DIR for inspection.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -33,9 +33,9 @@ struct Row {
   Foot foot;
   bool loaded;
 };
-/// The first six are the usual stroke in six shapes. Each value meets nearly each other value once; what is left out
-/// are shapes too long for 2 mm/s, and some of the 40 pairs of shape and hold. The slanted foot lies across its stroke,
-/// but for those across.
+/// Rows 1 to 6: the usual stroke in six shapes. Nearly every pair of values occurs in one row; left out are shapes too
+/// long for 2 mm/s and some of the 40 pairs of shape and hold. The slanted foot lies across the stroke, except in
+/// kAcross.
 constexpr std::array kMatrix{
     Row{Shape::kAlong, 4, 35, Held::kFree, Foot::kDown, false},
     Row{Shape::kCircle, 4, 35, Held::kFree, Foot::kUp, false},
@@ -62,8 +62,8 @@ constexpr std::array kMatrix{
     Row{Shape::kZigzag, 8, 60, Held::kSlack, Foot::kUp, true},
     Row{Shape::kSpiral, 4, 60, Held::kTented, Foot::kSlanted, true},
 };
-/// A level foot, 5 mm of metal on the sheet, across its stroke: it cuts as wide as it touches, so these have figures of
-/// their own and no part in the summary.
+/// A level foot, 5 mm of metal on the sheet, across its stroke cuts as wide as it touches. These rows have separate
+/// figures and are not part of the summary.
 constexpr std::array kLevel{
     Row{Shape::kAlong, 4, 35, Held::kFree, Foot::kLevel, false},
     Row{Shape::kAcross, 4, 35, Held::kFree, Foot::kLevel, false},
@@ -73,9 +73,9 @@ constexpr std::array kLevel{
 /// Sessions of --quick: along, across, circle.
 constexpr std::array<std::size_t, 3> kQuick{0, 3, 1};
 
-/// What a stroke of a few seconds is long [mm].
+/// Length of a stroke of a few seconds [mm].
 double LongestFor(double speed_mm_s) { return speed_mm_s < 3 ? 13 : speed_mm_s < 6 ? 22 : 30; }
-/// Of a smaller circle no disc is left [mm].
+/// A smaller circle leaves no disc [mm].
 constexpr double kShortestCircle_mm = 22;
 
 std::string Numbered(const char* series, std::size_t number) {
@@ -115,7 +115,7 @@ class Bench {
  public:
   Bench(Report* report, std::string keep) : report_(report), runner_(std::move(keep)) {}
 
-  /// Nothing when it did not run; told, and its figures too, under its name.
+  /// Reports the figures under the plan's name; no value if the session failed.
   std::optional<CutMap> Run(const SessionPlan& plan) {
     std::optional<CutMap> map = runner_.Run(plan);
     if (map) AddFigures(plan.name, map->figures, report_);
@@ -164,10 +164,10 @@ class Bench {
       const std::optional<CutMap> map = Run(plan);
       const double ms = map ? 1e3 * map->figures.first_opening_s : std::numeric_limits<double>::quiet_NaN();
       report_->Add(key, ms, "ms");
-      // What never opens is later than all else.
+      // A cut that never opens ranks behind all others.
       opening_ms.push_back(std::isfinite(ms) ? ms : std::numeric_limits<double>::infinity());
     }
-    // Frames are 10 ms apart and woken some hundredths of a millisecond off.
+    // Frames are 10 ms apart; the wake-up time jitters by some hundredths of a millisecond.
     constexpr double kWoken_ms = 1;
     const bool monotone = std::adjacent_find(opening_ms.begin(), opening_ms.end(), [](double weak, double strong) {
                             return strong > weak + kWoken_ms;
@@ -200,7 +200,7 @@ class Bench {
     report_->Add("cut.live.coag_open_mm2", largest, "mm2");
   }
 
-  /// thermal_node and physics_node are killed in mid-stroke, twenty times in all.
+  /// Kills thermal_node and physics_node during strokes, twenty times in all.
   void RunKills() {
     if (!report_->Wants("cut.live.killed")) return;
     constexpr int kSessions = 5, kKillsEach = 4;
@@ -227,7 +227,7 @@ class Bench {
     report_->Add("cut.live.killed.open_pct", open_pct, "%");
   }
 
-  /// The same script again and again.
+  /// Runs the same script repeatedly.
   void RunRepeats() {
     if (!report_->Wants("cut.live.same_script_spread_pct") && !report_->Wants("cut.live.hook_place_spread_mm_p95")) {
       return;
@@ -255,7 +255,7 @@ class Bench {
     report_->Add("cut.live.hook_place_spread_mm_p95", PlaceSpread(same), "mm");
   }
 
-  /// Sessions that were run again, as starved firmware did not send the pedal.
+  /// Sessions that were repeated because the firmware got no processor time and did not send the pedal.
   void TellRepeated() { report_->Add("cut.live.repeated_sessions", runner_.repeated(), "1"); }
   [[nodiscard]] int failed() const { return failed_; }
 
@@ -307,7 +307,7 @@ class Bench {
     largest("thermal_step_p99_ms", "ms", &CutFigures::thermal_step_p99_ms);
   }
 
-  /// Largest less least per mean, of length and of area: the larger [%].
+  /// (Largest - smallest) / mean, of length and of area: the larger of the two [%].
   static double SpreadPct(const std::vector<CutMap>& maps) {
     double spread = 0;
     for (const auto member : {&CutFigures::length_mm, &CutFigures::removed_mm2}) {
@@ -323,7 +323,7 @@ class Bench {
     return spread;
   }
 
-  /// Between all pairs of sessions at the same session time, where both touch with power [mm].
+  /// Distance of the hooks of all pairs of sessions at the same session time, where both touch with power [mm].
   static double PlaceSpread(const std::vector<CutMap>& maps) {
     constexpr double kPeriod_s = 0.01;
     std::map<int, std::vector<Vec2d>> places;

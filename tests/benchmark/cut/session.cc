@@ -27,12 +27,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of the trocar from the stroke's middle where the foot points 70 and 45 degrees down into the sheet [m].
+/// Offset of the trocar from the middle of the stroke where the foot points 70 and 45 degrees down into the sheet [m].
 const Vec3d kTipFirst_m(94e-3, 0, 34e-3), kSlanted_m(71e-3, 0, 71e-3);
 constexpr double kTouch_s = 1.0, kTouchBesideGrasper_s = 2.6, kTail_s = 0.4;
-/// A session takes its time and this to start, end and report.
+/// Time that a session takes beyond its script, to start, end and report [s].
 constexpr double kPatience_s = 40;
-/// Of the time for which the pedal is pressed, this much at least must have reached the generator.
+/// Least fraction of the time with pressed pedal in which the generator must have been on.
 constexpr double kLeastEnergised = 0.9;
 constexpr int kTries = 3;
 
@@ -41,7 +41,7 @@ struct Place {
 };
 Place MiddleOf(Held held) { return held == Held::kOrgan ? Place{0.5, 0.5} : Place{0.56, 0.5}; }
 
-/// @param middle_W place of the sheet at rest around which is cut [m].
+/// @param middle_W place of the sheet at rest around which the hook cuts [m].
 Vec3d TrocarOf(Foot foot, const Vec3d& middle_W) {
   switch (foot) {
     case Foot::kUp:
@@ -56,7 +56,7 @@ Vec3d TrocarOf(Foot foot, const Vec3d& middle_W) {
   return middle_W + kTipFirst_m;
 }
 
-/// Of the heel above the sheet at rest [m].
+/// Height of the heel above the sheet at rest [m].
 double HeelHeightOf(Foot foot) {
   switch (foot) {
     case Foot::kUp:
@@ -68,8 +68,7 @@ double HeelHeightOf(Foot foot) {
     case Foot::kDown:
       break;
   }
-  // The end of the foot is then 1.7 mm below the sheet, as it is where it is slanted: it stands in its slit like a
-  // needle.
+  // The end of the foot is then 1.7 mm below the sheet, as with the slanted foot: it stands in the slit like a needle.
   return 3.0e-3;
 }
 
@@ -102,9 +101,9 @@ std::string SceneYaml(const SessionPlan& plan, const StrokeTimes& times, const V
        << (plan.held == Held::kSlack ? ", membrane_prestrain: 0" : "") << "}\n"
        << "script:\n  duration_s: " << times.over_s + kTail_s << "\n  tool0:\n"
        << GrasperKeys(plan.held) << "  tool1:\n";
-  // Places are those of the recorded motion; of the script only pedal and power are played. But the first key tells the
-  // servo the tool's roll: the foot turns to world y where the way from the trocar to it is nearly along x. It lies far
-  // aside, so that the foot turns to x in every posture.
+  // Positions come from the recorded motion; only pedal and power of the script are used. But the servo derives the
+  // tool's roll from the first key: the foot turns to world y where the line from the trocar to that key is nearly
+  // along x. The key therefore lies far aside, so that the foot turns to x in every posture.
   const auto key = [&](double time_s, const std::string& pedal) {
     yaml << "    - {time_s: " << time_s << ", sheet: [" << middle.s << ", " << middle.t << "], height_mm: 25" << pedal
          << "}\n";
@@ -128,9 +127,9 @@ std::string CartYaml(const SessionPlan& plan, const std::string& motion) {
 
 void Write(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
 
-/// Two programs that do nothing but take processor time. In sessions of their own, as other people's programs are: in
-/// the cart's own session, whose processes share one part of the machine, the kernel's thread that moves a pseudo
-/// terminal's bytes is not run for seconds, and the pedal counts as up.
+/// Two programs that only use processor time. They run in sessions of their own, as programs of other users do. In the
+/// cart's own session, whose processes share one part of the machine, the kernel thread that moves the bytes of a
+/// pseudo-terminal does not run for seconds, and the pedal counts as up.
 class Load {
  public:
   explicit Load(bool on) {
@@ -161,9 +160,9 @@ class Load {
   std::vector<pid_t> children_;
 };
 
-/// Kills thermal_node and physics_node in turn, so many times in all; how many of them came back.
+/// Kills thermal_node and physics_node in turn, `kills` times in all; returns how many were started again.
 int KillNodes(const testing::Program& up, const fs::path& session, double limit_s, int kills) {
-  // Once tissue is warm there are checkpoints.
+  // Checkpoints exist once tissue is warm.
   if (!testing::WaitFor(limit_s, [&] { return runtime::NewestSequence(session / "thermal_node.checkpoint") > 0; })) {
     return 0;
   }
@@ -185,7 +184,7 @@ int KillNodes(const testing::Program& up, const fs::path& session, double limit_
   return back;
 }
 
-/// Positions of the last TissueFrame before the hook comes.
+/// Positions of the last TissueFrame before the hook touches.
 std::vector<Vec3f> LastNodes(const fs::path& recording, const SceneView& scene) {
   std::vector<Vec3f> nodes;
   log_tools::Recording file(recording, {.topics = {"TissueFrame"}});
@@ -236,7 +235,7 @@ std::string Describe(const SessionPlan& plan) {
 SessionRunner::SessionRunner(fs::path keep)
     : folder_(fs::temp_directory_path() / ("bench_cut." + std::to_string(::getpid()))),
       keep_(std::move(keep)),
-      // Of another cart on this machine nothing is to be heard.
+      // A domain that no other cart on this machine uses.
       domain_(20 + static_cast<int>(::getpid() % 75)) {
   fs::create_directories(folder_);
   if (!keep_.empty()) fs::create_directories(keep_);
@@ -251,7 +250,7 @@ std::optional<log_tools::CutMap> SessionRunner::Run(const SessionPlan& plan) {
   std::fprintf(stderr, "%s\n", Describe(plan).c_str());
   const fs::path yaml = folder_ / (plan.name + ".yaml"), cart = folder_ / (plan.name + "-cart.yaml"),
                  motion = folder_ / (plan.name + ".csv");
-  // Times do not matter to the sheet.
+  // The sheet does not depend on the times.
   Write(yaml, SceneYaml(plan, {1, 1.1, 2, 3}, TrocarOf(plan.foot, Vec3d::Zero())));
   const scene::CompiledScene compiled = scene::CompileScene(yaml, {}, {});
   const SceneView view = compiled.data.View();
@@ -323,7 +322,7 @@ std::optional<log_tools::CutMap> SessionRunner::RunFiles(const std::string& name
       }
     }
   }
-  // A node that ran late makes `fulcrum up` complain, not the recording useless.
+  // A node that ran late makes `fulcrum up` fail, but the recording stays usable.
   if (code != 0) std::fprintf(stderr, "%s: fulcrum up: %s\n", name.c_str(), said.c_str());
   if (name.ends_with("-probe")) return map;
   fs::remove_all(out);
@@ -331,7 +330,7 @@ std::optional<log_tools::CutMap> SessionRunner::RunFiles(const std::string& name
 }
 
 std::vector<Vec3f> SessionRunner::PulledNodes(const SessionPlan& plan, const Vec3d& trocar_W) {
-  // The hook stays away.
+  // The hook stays off the sheet.
   SessionPlan probe = plan;
   probe.name = plan.name + "-probe";
   const fs::path yaml = folder_ / (probe.name + ".yaml");

@@ -14,11 +14,11 @@ namespace fulcrum::benchmark {
 /// How the membrane is held: free, free and without prestrain, over the middle of the organ, pulled by the grasper
 /// beside the path, or lifted by it.
 enum class Held { kFree, kSlack, kOrgan, kTaut, kTented };
-/// How the foot lies, which goes by the trocar: pointing into the sheet at 70 degrees, at 45 degrees, its heel first
-/// with the end up, or level.
+/// How the foot lies, which depends on the trocar: pointing into the sheet at 70 degrees or at 45 degrees, heel first
+/// with its end up, or level.
 enum class Foot { kDown, kSlanted, kUp, kLevel };
 
-/// Time between kills: more than twice the time that a killed node may take until it works again.
+/// Time between kills: more than twice the time that a killed node needs until it works again.
 inline constexpr double kKillPeriod_s = 1.1;
 
 struct SessionPlan {
@@ -29,12 +29,12 @@ struct SessionPlan {
   std::string pedal = "cut";
   Held held = Held::kFree;
   Foot foot = Foot::kDown;
-  bool loaded = false;  ///< Two busy threads beside.
+  bool loaded = false;  ///< Two busy processes run beside the session.
   double dt_ms = 10;
   std::string preset = "default";
   double longest_mm = 22;
-  double stay_s = 0.1;  ///< Down before it sets out, pedal pressed already.
-  int kills = 0;  ///< Of thermal_node and physics_node in turn, kKillPeriod_s apart, from kKillPeriod_s into the cut.
+  double stay_s = 0.1;  ///< Time on the sheet before the hook moves, with the pedal pressed.
+  int kills = 0;  ///< Kills of thermal_node and physics_node in turn, one each kKillPeriod_s from the start of the cut.
 };
 
 [[nodiscard]] std::string Describe(const SessionPlan& plan);
@@ -42,28 +42,28 @@ struct SessionPlan {
 /// Runs sessions. A session that fails yields no figures; the reason is written to stderr.
 class SessionRunner {
  public:
-  /// @param keep recordings and maps stay there; empty: nothing stays.
+  /// @param keep folder for recordings and maps; empty: none are kept.
   explicit SessionRunner(std::filesystem::path keep);
   ~SessionRunner();
   SessionRunner(const SessionRunner&) = delete;
   SessionRunner& operator=(const SessionRunner&) = delete;
 
-  /// Again, and once more, when the pedal was not heard for most of the stroke: simulated firmware that gets no
-  /// processor time sends nothing, and physics takes its pedal for up.
+  /// Runs up to two times more if the pedal was not received for most of the stroke: simulated firmware that gets no
+  /// processor time sends nothing, and physics then treats the pedal as up.
   [[nodiscard]] std::optional<log_tools::CutMap> Run(const SessionPlan& plan);
   /// Number of runs rejected because the pedal signal was lost; if there are many, the remaining runs are not
   /// representative.
   [[nodiscard]] int repeated() const { return repeated_; }
-  /// Nodes that were killed and came back, in all sessions.
+  /// Number of nodes that were killed and started again, in all sessions.
   [[nodiscard]] int killed() const { return killed_; }
-  /// A scene as it is, with its own script.
+  /// Runs a scene unchanged, with its own script.
   [[nodiscard]] std::optional<log_tools::CutMap> RunScene(const std::string& name, const std::string& base);
 
  private:
   [[nodiscard]] std::optional<log_tools::CutMap> RunFiles(const std::string& name, const std::filesystem::path& scene,
                                                           const std::filesystem::path& cart, double seconds,
                                                           bool loaded, int kills = 0);
-  /// Where the nodes of the sheet are once the grasper has pulled it.
+  /// Positions of the sheet's nodes after the grasper has pulled it.
   [[nodiscard]] std::vector<Vec3f> PulledNodes(const SessionPlan& plan, const Vec3d& trocar_W);
 
   std::filesystem::path folder_, keep_;

@@ -13,7 +13,7 @@ namespace fulcrum::benchmark {
 namespace {
 
 constexpr double kStep_m = 0.25e-3;
-/// Between two poses of the motion [s].
+/// Time between two poses of the motion [s].
 constexpr double kPoseStep_s = 0.005;
 constexpr double kHigh_m = 0.025, kReady_m = 0.008, kDown_s = 0.8, kLift_s = 0.5;
 

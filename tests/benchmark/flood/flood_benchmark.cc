@@ -37,7 +37,7 @@ constexpr std::array<Node, 4> kNodes{{{NodeId::kPhysics, "physics"},
                                       {NodeId::kHaptics, "haptics"},
                                       {NodeId::kRender, "render"}}};
 
-/// What each node has done so far: steps, or pictures.
+/// Progress of each node so far: steps, or pictures.
 struct Work {
   std::array<double, kNodes.size()> count{};
   std::array<double, kNodes.size()> time_s{};

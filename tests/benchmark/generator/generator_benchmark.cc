@@ -1,5 +1,5 @@
-// How long a turn of the generator's knob takes, in a real cart that cuts: from the command on its socket to the Health
-// of thermal_node that tells the new set power.
+// Latency of a change of the generator's power in a real cart that cuts: from the command on its socket to the Health
+// of thermal_node that reports the new set power.
 #include <signal.h>
 #include <unistd.h>
 
@@ -38,7 +38,7 @@ std::string Measure(int turns, const fs::path& scene, std::vector<double>* set_m
     return "the cart did not come to cut\n" + cart.Said();
   }
   for (int i = 0; i < turns; ++i) {
-    // Not in step with the period of anything.
+    // An interval that is not a multiple of any period.
     std::this_thread::sleep_for(std::chrono::milliseconds(201 + 7 * (i % 13)));
     const int power_W = i % 2 == 0 ? 50 : 35;
     const std::int64_t turned_ns = runtime::MonotonicNs();

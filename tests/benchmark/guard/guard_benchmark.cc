@@ -1,5 +1,5 @@
-// Sessions with a known verdict, and what `fulcrum up` says of them. guard.verdict_wrong counts those with another one;
-// their names and reasons go to standard error.
+// Sessions with a known verdict, compared with the verdict of `fulcrum up`. guard.verdict_wrong counts the differences;
+// the names of these sessions and the reasons are written to standard error.
 #include <algorithm>
 #include <cstdio>
 

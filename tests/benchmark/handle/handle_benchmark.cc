@@ -1,5 +1,5 @@
-// Jaw angle: error against the true motion, calibration, what a bad cable gets past the parser, return after a replug,
-// cost of a sample.
+// Jaw angle: error against the true motion, calibration, wrong values behind a bad cable, return after a replug, cost
+// of a sample.
 #include "tests/benchmark/handle/cases.h"
 
 int main(int argc, char** argv) {

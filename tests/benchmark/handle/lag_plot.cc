@@ -12,7 +12,7 @@ namespace {
 // Panel geometry [px].
 constexpr double kWidth = 640, kHeight = 540, kLeft = 62, kRight = 20, kTop = 66, kBottom = 50;
 constexpr double kLabelHeight = 12, kLabelWidth = 84;
-// What lies beyond is not drawn.
+// Points beyond these limits are not drawn.
 constexpr double kMinLag_ms = -0.5, kMaxLag_ms = 24;
 constexpr std::array kMaxRms_deg = {1.1, 0.7};
 constexpr double kTargetLag_ms = 2;

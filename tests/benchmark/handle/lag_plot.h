@@ -14,7 +14,7 @@ struct LagPoint {
   double static_rms_deg = 0;
 };
 
-/// The lag's axis is a square root, for most of what matters lies below 2 ms; the targets are shaded.
+/// The lag's axis is a square root, because most lags of interest are below 2 ms; the targets are shaded.
 [[nodiscard]] std::string LagSvg(const std::vector<LagPoint>& points);
 
 }  // namespace fulcrum::handle_bridge

@@ -51,7 +51,7 @@ JawCalibration Calibrated(JawFirmware* firmware, const std::vector<double>& angl
   return {points.codes, points.angles_deg};
 }
 
-/// What a reader that only asks for a number would take: how the strict ones are judged.
+/// Accepts any line that begins with a number: the baseline for the strict parsers.
 bool NaiveVoltage(const std::string& line, double* volts) {
   char* end = nullptr;
   *volts = std::strtod(line.c_str(), &end);
@@ -151,7 +151,8 @@ void MeasureRecovery(benchmark::Report* report) {
     return;
   }
   constexpr double kDegPerRad = 180.0 / std::numbers::pi;
-  constexpr double kRight_deg = 2.0;  // The angle is back, not only the link: the jaw has moved meanwhile.
+  constexpr double kRight_deg =
+      2.0;  // The jaw has moved meanwhile, so this shows that the angle is right again, not only the link.
   const auto jaw_deg = [](std::int64_t now_ns) { return 30 + 25 * std::sin(1e-9 * static_cast<double>(now_ns)); };
   std::mutex mutex;
   LinkFaults faults;  // Guarded by mutex.
@@ -169,7 +170,7 @@ void MeasureRecovery(benchmark::Report* report) {
   HandleBridgeNode node(cart, {}, MakeCartLinks(cart, &firmware), output.get(), runtime::MonotonicNs());
   runtime::CyclicThread thread({.name = "handle", .period_ns = 2500000}, [&](const Tick& tick) { node.Step(tick); });
   thread.Start();
-  /// Waits until handle 0 is (or is not) there and right; ms.
+  /// Waits until handle 0 is (or is not) present with the right angle; returns the time [ms].
   const auto wait = [&](bool there) {
     const Clock::time_point start = Clock::now();
     HandleState state;
@@ -194,7 +195,7 @@ void MeasureRecovery(benchmark::Report* report) {
   for (int i = 0; i < (report->quick() ? 6 : 20); ++i) {
     set_unplugged(true);
     wait(false);
-    // Every place between two looks for the port.
+    // The replug happens at varying phases of the search for the port.
     std::this_thread::sleep_for(std::chrono::milliseconds(300 + 37 * i % 250));
     set_unplugged(false);
     recover_ms.push_back(wait(true));

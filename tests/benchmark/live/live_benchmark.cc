@@ -1,5 +1,5 @@
-// What the hand feels of the real physics_node over DDS, against the same physics run at 1 kHz in this process with the
-// tool poses that were really taken.
+// Force at the hand with the real physics_node over DDS, against the same physics run at 1 kHz in this process with the
+// tool poses that the session published.
 #include <unistd.h>
 
 #include <algorithm>
@@ -38,7 +38,7 @@ struct Part {
 constexpr double kGrasp_s = 6.2;
 constexpr Part kPress{"press", 0.8, 2.2}, kPalpate{"palpate", 2.2, 5.2}, kPull{"grasp", kGrasp_s + 0.9, 12.0};
 
-/// Tool 0 on the built-in scene: presses 6 mm, palpates once a second, takes the membrane, and pulls it up and down.
+/// Tool 0 on the built-in scene: presses 6 mm, palpates once a second, grasps the membrane, and pulls it up and down.
 scene::SceneSettings LiveScene() {
   scene::SceneSettings settings = scene::BuiltIn();
   constexpr double kOpen = 0.87, kNeither = 0.35;
@@ -71,10 +71,10 @@ scene::SceneSettings LiveScene() {
 struct Sample {
   double time_s;
   ToolSample tool;
-  bool cheaper;  ///< Physics says that it ran late and goes on with a cheaper preset.
+  bool cheaper;  ///< Physics reports that it ran late and uses a cheaper preset.
 };
 
-/// Runs the session and returns what the servo published of tool 0.
+/// Runs the session and returns the samples that the servo published for tool 0.
 std::vector<Sample> Record(const SceneView& scene, const std::filesystem::path& folder) {
   bus::DdsParticipant participant({.domain = kDomain, .node_name = "benchmark", .shared_memory = {}});
   const auto manifests = participant.MakeOutput<SceneManifest>();
@@ -128,7 +128,7 @@ std::vector<Sample> Record(const SceneView& scene, const std::filesystem::path& 
   return samples;
 }
 
-/// Force of the tissue on tool 0 at each millisecond, with the tool where it was.
+/// Force of the tissue on tool 0 at each millisecond, for the recorded tool poses.
 std::vector<Vec3f> Truth(SceneView scene, const std::vector<Sample>& samples) {
   scene.physics.dt_s = 1e-3f;
   scene.physics.preset = PhysicsPreset::kFast;  // one substep a millisecond
@@ -175,7 +175,7 @@ int Run(benchmark::Report* report) {
       if (sample.time_s < part.from_s || sample.time_s >= part.to_s || ms >= static_cast<int>(truth.size())) continue;
       unusual += sample.tool.state == ServoState::kNormal ? 0 : 1;
       cheaper += sample.cheaper ? 1 : 0;
-      // What is sent is scaled for the hand.
+      // The published force is scaled for the hand.
       const Vec3f felt = sample.tool.f_W / scene.haptics.force_scale;
       error += (felt - truth[ms]).squaredNorm();
       size += truth[ms].squaredNorm();

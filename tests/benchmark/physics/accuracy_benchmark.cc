@@ -55,7 +55,7 @@ std::vector<Entry> Entries(const SceneView& scene) {
   };
   xpbd("xpbd20", "XPBD 20x1", 20);
   xpbd("", "XPBD 80x1", 80);
-  // The paper's Tables 3 and 4 on one machine: its method by number of iterations, and the two that came before.
+  // The paper's Tables 3 and 4 on one machine: its method by number of iterations, and the two earlier methods.
   for (const std::uint32_t iterations : {1u, 2u, 5u, 10u}) {
     const std::string n = std::to_string(iterations);
     paper(("table3.pbd" + n).c_str(), ("PBD " + n).c_str(), iterations);
@@ -70,7 +70,7 @@ std::vector<Entry> Entries(const SceneView& scene) {
   return entries;
 }
 
-/// The accurate preset with its work shared by two threads: the same errors in less time.
+/// The accurate preset on two threads: the same errors in less time.
 void MeasureTwoThreads(const StandardCase& standard, const StandardCase::Reference& truth, benchmark::Report* report) {
   SceneView scene = standard.scene();
   scene.physics.preset = PhysicsPreset::kAccurate;
@@ -97,8 +97,8 @@ StandardErrors Median(const std::vector<StandardErrors>& all) {
   return median;
 }
 
-/// Measures one solver, prints its keys, returns its place in the plot. How the sheet folds hangs on the last bit, and
-/// the errors on the folds: told is the median of runs whose stiffness differs by some millionths.
+/// Measures one solver, prints its keys, returns its point in the plot. The folds of the sheet, and the errors on them,
+/// depend on the last bit; reported is the median of runs whose stiffness differs by some millionths.
 benchmark::WorkPrecisionPoint Measure(const StandardCase& standard, const StandardCase::Reference& truth,
                                       const Entry& entry, benchmark::Report* report) {
   constexpr int kRuns = 5;
@@ -165,7 +165,7 @@ void RunAll(benchmark::Report* report) {
     MeasureTwoThreads(standard, truth, report);
   }
   if (!all) {
-    return;  // A plot of some would pass for a plot of all.
+    return;  // A plot of some solvers could be mistaken for the complete one.
   }
   const char* folder = std::getenv("FULCRUM_BENCH_OUT");
   const std::filesystem::path file =

@@ -13,8 +13,8 @@ namespace {
 constexpr double kPoisson = 0.45;
 
 void RunAll(benchmark::Report* report) {
-  // Key, error on a mesh of n, the mesh whose error is told, and that of which the order is measured (against twice
-  // as fine).
+  // Key, error on a mesh of n, the mesh whose error is reported, and the mesh whose order is measured (against one
+  // twice as fine).
   const auto run = [&](const std::string& name, const std::function<double(int)>& error, int told, int base,
                        const std::function<double(int)>& for_order) {
     const std::string key = "physics.analytic." + name;
@@ -37,8 +37,8 @@ void RunAll(benchmark::Report* report) {
   run("uniaxial", stretch, 4, 4, stretch);
   run("poisson", contraction, 4, 4, contraction);
   run("hanging_sheet", HangingSheet, 16, 8, HangingSheet);
-  run("lame_tube", tube, 1, 2, tube);  // One layer, as the organ's wall.
-  // The clamp is not in the beam's theory, so the order is that of pure bending, for which theory is exact.
+  run("lame_tube", tube, 1, 2, tube);  // One layer, as in the wall of the organ.
+  // Beam theory does not include the clamp, so the order is measured in pure bending, for which the theory is exact.
   run(
       "cantilever", [](int n) { return Cantilever(n, kPoisson); }, 4, 4,
       [](int n) { return PureBending(n, kPoisson); });

@@ -1,4 +1,4 @@
-// What the tools' collision costs in each step of the built-in scene's script.
+// Cost of the tools' collision in each step of the built-in scene's script.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -19,13 +19,13 @@ double NowUs() {
   return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// Microseconds per tool of one step.
+/// Times of one step [us per tool].
 struct Cost {
   double find = 3e38, project = 3e38, rows = 3e38;
-  double curvature = 3e38;  ///< Of all tools that are near a surface; 0: none is.
-  double tissue = 3e38;     ///< Not per tool.
-  double footprint = 3e38;  ///< Contact of the hook, its footprint included; 0: it does not touch.
-  double slits = 3e38;      ///< The same where every second row of triangles lies over a slit.
+  double curvature = 3e38;  ///< Sum over the tools near a surface; 0: none is near.
+  double tissue = 3e38;     ///< Per step, not per tool.
+  double footprint = 3e38;  ///< Contact of the hook, footprint included; 0: no contact.
+  double slits = 3e38;      ///< As `footprint`, where every second row of triangles lies over a slit.
   void TakeLess(const Cost& other) {
     find = std::min(find, other.find);
     project = std::min(project, other.project);
@@ -41,7 +41,7 @@ struct Counts {
   std::size_t pairs = 0, rows = 0, tissue_rows = 0;
 };
 
-/// One pass over the script: the simulation moves tissue and tools, a collision of our own is timed beside it.
+/// Topology in which the edges of every second row are severed.
 TopologyState EverySecondRowSevered(const MembraneGrid& grid) {
   TopologyState topology;
   topology.rows = grid.rows;
@@ -58,6 +58,7 @@ TopologyState EverySecondRowSevered(const MembraneGrid& grid) {
   return topology;
 }
 
+/// One pass over the script: the simulation moves tissue and tools, a separate collision is timed beside it.
 std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
   TissueSimulation simulation(scene);
   ParticleStore& particles = simulation.particles();
@@ -155,7 +156,7 @@ std::vector<Cost> Pass(const SceneView& scene, Counts* most) {
 }
 
 void Collide(const SceneView& scene, benchmark::Report* report) {
-  // The least of some passes for each step: other programs' time is not the collision's.
+  // The minimum of some passes for each step excludes the time of other programs.
   Counts most;
   std::vector<Cost> costs = Pass(scene, &most);
   for (int pass = 1; pass < (report->quick() ? 2 : 5); ++pass) {
@@ -169,7 +170,7 @@ void Collide(const SceneView& scene, benchmark::Report* report) {
     find.push_back(cost.find);
     tissue.push_back(cost.tissue);
     if (cost.curvature > 0) {
-      curvature.push_back(cost.curvature);  // Of the tools that are near a surface.
+      curvature.push_back(cost.curvature);  // Mean over the tools near a surface.
     }
     if (cost.footprint > 0) {
       footprint.push_back(cost.footprint);

@@ -78,7 +78,7 @@ double DifferencePct(const std::vector<float>& a, const std::vector<float>& b, c
   return 100.0 * std::sqrt(difference / size);
 }
 
-/// The tissue let go from a pulled pose: everything awake and moving, no tools.
+/// Steps of tissue released from a pulled pose: everything awake and moving, no tools.
 void Step(const SceneView& scene, Report* report) {
   const int steps = report->quick() ? 40 : 200;
   Bare bare(scene);
@@ -88,7 +88,7 @@ void Step(const SceneView& scene, Report* report) {
     const ConstraintCounts counts = bare.model.counts();
     return static_cast<double>(counts.stretch + counts.volume + counts.bending + counts.bindings);
   };
-  // Textbook code from the same pose, a few steps every now and then, so that both see the same weather.
+  // A few steps of textbook code from the same pose at intervals, so that both run under the same load of the machine.
   const auto textbook_here = [&](baselines::TextbookPbd::Order order) {
     baselines::TextbookPbd textbook(scene, order);
     for (Index p = 0; p < scene.rest_position.size(); ++p) {
@@ -128,7 +128,7 @@ void Step(const SceneView& scene, Report* report) {
     }
   }
   const double step_ms = Quantile(ours, 0.5), textbook_ms = Quantile(theirs, 0.5);
-  // Of undisturbed steps: on a shared machine the longer ones are interrupted more often.
+  // Lower deciles: on a shared machine longer steps are interrupted more often.
   const double speedup = Quantile(theirs, 0.1) / Quantile(ours, 0.1);
   report->Add("physics.paper_mode.step_ms_p50", step_ms, "ms");
   report->Add("physics.paper_mode.step_ms_min", Quantile(ours, 0.0), "ms");
@@ -165,7 +165,7 @@ void ScriptedStep(const SceneView& scene, Report* report) {
   report->Add("physics.paper_mode.scripted_step_ms_p99", Quantile(awake, 0.99), "ms");
 }
 
-/// Against the converged shape of the same constraints, in the hold.
+/// Error in the hold, against the converged shape of the same constraints.
 void HoldError(SceneView scene, Report* report) {
   Bare few(scene);
   Hold(&few);

@@ -1,4 +1,4 @@
-// What doing nothing costs, and whether the same inputs give the same state.
+// Cost of steps in which nothing happens, and whether equal inputs give equal states.
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -28,7 +28,7 @@ void Hover(const SceneView& scene, Report* report) {
   report->Add("physics.hover.step_us_p50", 1e3 * Quantile(ms, 0.5), "us");
 }
 
-/// Tools that move as near to the tissue as they come in the script before they touch it, and then touch it.
+/// Tools as near to the tissue as in the script before they touch it, moving; then in contact.
 void HoverNear(const SceneView& scene, Report* report) {
   const auto at = [&](int i) { return ScriptedTools(scene, 0.01 * i); };
   const auto asleep_until = [&](TissueSimulation* simulation, int end) {
@@ -72,12 +72,12 @@ void Rest(const SceneView& scene, Report* report) {
 }
 
 struct IdleCosts {
-  double awake = 0;         ///< Part of all particles that stays awake.
-  double some_ms = 0;       ///< A whole step then.
-  double all_awake_ms = 0;  ///< A whole step of the same run before the others slept.
+  double awake = 0;         ///< Fraction of the particles that stays awake.
+  double some_ms = 0;       ///< A whole step with that fraction awake.
+  double all_awake_ms = 0;  ///< A whole step of the same run before regions fell asleep.
 };
 
-/// A grasper that holds and trembles so gently that most of the tissue comes to rest.
+/// A grasper that holds tissue and moves so little that most of the tissue comes to rest.
 IdleCosts Tremble(const SceneView& scene, float amplitude_m) {
   TissueSimulation simulation(scene);
   int i = 0;
@@ -101,8 +101,8 @@ IdleCosts Tremble(const SceneView& scene, float amplitude_m) {
   return {Quantile(awake, 0.5), Quantile(some, 0.5), Quantile(all, 0.5)};
 }
 
-/// Regions fall asleep as a whole, so two tremors stand on either side of a tenth awake; told is the ratio at a tenth,
-/// on the line between the two.
+/// Regions fall asleep as a whole, so the two amplitudes give fractions below and above a tenth awake; reported is the
+/// ratio at a tenth by linear interpolation.
 void Idle(const SceneView& scene, Report* report) {
   constexpr double kAwake = 0.1;
   const IdleCosts less = Tremble(scene, 0.9e-5f), more = Tremble(scene, 1.2e-5f);
@@ -118,7 +118,7 @@ void Idle(const SceneView& scene, Report* report) {
   report->Add("physics.idle.ratio", ratio(less) + along * (ratio(more) - ratio(less)), "1");
 }
 
-/// Grasp and pull of the script, three times over, then on two and three threads.
+/// Grasp and pull of the script, three times, then on two and three threads.
 void Determinism(const SceneView& scene, Report* report) {
   const int steps = report->quick() ? 300 : 600;
   std::vector<std::uint64_t> hashes;

@@ -1,4 +1,4 @@
-// Tearing: the stretch at which a strip tears against the one that the scene sets, and how far meshes differ.
+// Tearing: the stretch at which a strip tears against the limit of the scene, and the spread between meshes.
 #include <algorithm>
 #include <cmath>
 
@@ -38,7 +38,7 @@ void RunStrips(benchmark::Report* report) {
   report->Add("tear.apart_s", apart, "s");
 }
 
-/// Nothing is near tearing, but all has moved.
+/// All nodes have moved, but none is near tearing.
 void RunWatch(benchmark::Report* report) {
   if (!report->Wants("tear.look")) return;
   const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());

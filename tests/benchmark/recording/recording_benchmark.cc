@@ -2,14 +2,14 @@
 //
 //   record.cpu_pct                  of one core, of the process, in the middle of a session of the built-in scene
 //   record.lost_samples             in that whole session, by the sequences in the file
-//   record.file_MB_per_s            what that session writes
-//   record.readable_after_kill_pct  samples older than a second at kill -9 of the recorder that its file gives back
+//   record.file_MB_per_s            rate at which that session writes
+//   record.readable_after_kill_pct  of the samples older than a second at kill -9 of the recorder, those in its file
 //   record.lost_at_kill_ms_max      at those kills, the age of the newest sample in the file
 //   record.busy.lost_samples        in a session beside two busy loops for each core, by the sequences in its file
 //   record.busy.lost_for_replay     of these, samples that a replay needs
-//   guard.disk_full_lost_samples    sent before the end of a recording that ends for lack of room, and not in its file
-//   record.write_MB_per_s           frames, patches and tool states as such a session has them, as fast as they are
-//                                   packed and written into a file in the folder for temporary files
+//   guard.disk_full_lost_samples    sent before the end of a recording that ends for lack of room, missing in its file
+//   record.write_MB_per_s           largest rate at which frames, patches and tool states of such a session are packed
+//                                   and written into a file in the folder for temporary files
 #include <signal.h>
 #include <unistd.h>
 
@@ -41,7 +41,7 @@ constexpr double kPatience_s = 60;
 
 double Seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 
-/// CPU time that a process has used [s]; negative when it is gone.
+/// CPU time that a process has used [s]; negative if it has ended.
 double CpuTime(pid_t pid) {
   std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
   std::string line;
@@ -91,7 +91,7 @@ Losses LossesIn(const fs::path& file) {
   return losses;
 }
 
-/// False when the session did not come about.
+/// False if the session failed to run.
 bool BusySession(benchmark::Report* report) {
   const BusyLoops busy(2 * std::thread::hardware_concurrency());
   testing::Cart cart("built-in", kCartDomain, {"--record", "--seconds", report->quick() ? "10" : "30"});
@@ -115,7 +115,7 @@ void FullDisk(benchmark::Report* report) {
   report->Add("guard.disk_full_recorded_samples", static_cast<double>(result.recorded), "samples");
 }
 
-/// False when the session did not come about.
+/// False if the session failed to run.
 bool Session(benchmark::Report* report) {
   const double seconds = report->quick() ? 15 : 60;
   testing::Cart cart("built-in", kCartDomain, {"--record", "--seconds", std::to_string(seconds)});
@@ -123,7 +123,7 @@ bool Session(benchmark::Report* report) {
   const bool begun = testing::WaitFor(kPatience_s, [&] {
     const auto nodes = cart.nodes();
     if (nodes.contains("recorder")) recorder = nodes.at("recorder");
-    // Its progress comes every two seconds.
+    // `fulcrum up` prints progress every two seconds.
     return recorder > 0 && cart.Said().find(" s · ") != std::string::npos;
   });
   if (!begun) return false;
@@ -148,7 +148,7 @@ void Kills(benchmark::Report* report) {
   std::uint64_t due = 0, read = 0, missed = 0;
   double unread_ms = 0;
   for (int kill = 0; kill < (report->quick() ? 4 : 20); ++kill) {
-    // Kills at all phases of a chunk.
+    // Kill at varying phases of a chunk.
     const auto result = probe.RecordAndKill(1.6 + 0.037 * kill);
     due += result.due;
     read += result.read;
@@ -160,7 +160,7 @@ void Kills(benchmark::Report* report) {
   report->Add("record.readable_after_kill_missed", static_cast<double>(missed), "samples");
 }
 
-/// A second of the cart: bytes that pack about as the real ones do.
+/// A second of a cart's messages, as compressible as real ones.
 class Second {
  public:
   Second() {
@@ -168,7 +168,7 @@ class Second {
     frame_.resize(307'296);
     for (std::size_t i = 0; i < frame_.size(); ++i) {
       noise = noise * 6364136223846793005u + 1442695040888963407u;
-      // Two of three bytes of a position are noise; a fifth of the frame is room for more vertices.
+      // Two of three bytes of a position are noise; a fifth of the frame is unused capacity.
       if (i % 4 < 3 && i < frame_.size() * 4 / 5) frame_[i] = static_cast<std::byte>(noise >> 56);
     }
     patch_.resize(262'184);

@@ -1,5 +1,5 @@
-// What a picture costs, full and when nothing changes: the built-in scene in the middle of its cut, tissue moving, off
-// screen.
+// Cost of a picture, drawn in full and when nothing changes: the built-in scene in the middle of its cut, tissue
+// moving, off screen.
 #include <unistd.h>
 
 #include <algorithm>
@@ -49,7 +49,7 @@ void Show(const SyntheticMoment& moment, LaparoscopeView* view) {
   }
 }
 
-/// The tissue as it swings gently, so that no two pictures are alike.
+/// Moves the tissue slightly, so that no two pictures are equal.
 void Sway(const std::vector<float>& rest, int step, std::vector<float>* xyz) {
   const float lift = 0.001f * std::sin(0.4f * static_cast<float>(step));
   *xyz = rest;
@@ -157,14 +157,14 @@ void Embedding(const SceneView& view, benchmark::Report* report) {
   report->Add("render.embedding_error_um_max", 1e6 * worst_m, "um");
 }
 
-/// The node on ports of its own, as in a session.
+/// A node on ports of its own, as in a session.
 class NodeRun {
  public:
   explicit NodeRun(const SceneView& view)
       : folder_(std::filesystem::temp_directory_path() / ("fulcrum_bench_render_" + std::to_string(getpid()))),
         node_(std::make_unique<RenderNode>(view, RenderSettings{.frames = folder_}, bus_.ports())) {}
   ~NodeRun() {
-    node_.reset();  // It writes until its end.
+    node_.reset();  // The node writes until it is destroyed.
     std::filesystem::remove_all(folder_);
   }
   NodeRun(const NodeRun&) = delete;
@@ -187,7 +187,7 @@ class NodeRun {
   std::unique_ptr<RenderNode> node_;
 };
 
-/// Every frame comes in and says what the last one said: 30 steps a second, tissue at 100 Hz.
+/// Frames arrive with unchanged content: 30 steps a second, tissue at 100 Hz.
 void StaticScene(const SceneView& view, benchmark::Report* report) {
   if (!report->Wants("render.static_scene.")) {
     return;
@@ -214,7 +214,7 @@ void StaticScene(const SceneView& view, benchmark::Report* report) {
   report->Add("render.static_scene.cpu_pct", 100 * cpu_ms / (CpuMs(CLOCK_MONOTONIC) - began_ms), "%");
 }
 
-/// From the stamp of the newest pose to the end of the drawing that shows it, every step drawn.
+/// Time from the stamp of the newest pose to the end of the drawing that shows it; every step is drawn.
 void PoseToFrame(const SceneView& scene, benchmark::Report* report) {
   if (!report->Wants("render.pose_to_frame_ms")) {
     return;

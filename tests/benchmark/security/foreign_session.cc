@@ -97,7 +97,7 @@ std::string MeasureForeignSession(benchmark::Report* report) {
   report->Add("security.foreign_session.ticks_compared", compared, "");
   report->Add("security.foreign_session.sent",
               static_cast<double>(tools.written() + handles.written() + topology.written() + generator.written()), "");
-  // Without a dropped sample nothing was tried.
+  // If no sample was dropped, no foreign sample reached a node.
   const std::string said = cart.Said(), before = "nodes dropped ";
   const std::size_t at = said.rfind(before);
   if (at == std::string::npos) return "no sample of the stranger arrived";

@@ -1,4 +1,4 @@
-// What another session in the same domain does to a session on an open bus.
+// Effect of another session in the same domain on a session on an open bus.
 #pragma once
 
 #include <string>

@@ -64,7 +64,7 @@ std::string MeasureKeysCost(const fs::path& scratch, benchmark::Report* report) 
   std::ofstream(scratch / "encrypted.yaml") << "security: {keys: keys, encrypt: true}\n";
   std::array<std::vector<double>, kProtections> start_ms;
   std::array<std::array<std::vector<double>, kNodes.size()>, kProtections> rates_Hz;
-  // In turns, because the machine is not the same from one minute to the next. The first session compiles the scene.
+  // Alternate the kinds, because the load of the machine changes over minutes. The first session compiles the scene.
   for (int i = 0; i < (report->quick() ? 4 : 21); ++i) {
     for (const Protection protection : {kOpen, kKeys, kEncrypted}) {
       Run run;

@@ -1,4 +1,4 @@
-// What keys and encryption cost a session, against an open bus.
+// Cost of keys and encryption for a session, against an open bus.
 #pragma once
 
 #include <filesystem>

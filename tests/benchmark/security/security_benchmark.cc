@@ -50,7 +50,7 @@ void Attempts(benchmark::Report* report, const fs::path& scratch) {
   report->Add("security.attempts", all, "");
 }
 
-/// Who comes anew, from the making of his participant to the first sample of a writer that was there.
+/// Time from the creation of a new participant to its first sample of a running writer.
 double JoinMs(int domain, const bus::Security& writer, const bus::Security& reader) {
   const auto now_ns = [] { return std::chrono::steady_clock::now().time_since_epoch().count(); };
   bus::DdsParticipant there({.domain = domain, .node_name = "supervisor", .security = writer});
@@ -76,7 +76,7 @@ double JoinMs(int domain, const bus::Security& writer, const bus::Security& read
   return 1e-6 * static_cast<double>(now_ns() - begin_ns);
 }
 
-/// What each `fulcrum up` does for its session, where it does it.
+/// Time to make the keys of a session in shared memory, as each `fulcrum up` does.
 void SessionKeys(benchmark::Report* report) {
   const fs::path folder = "/dev/shm/fulcrum-bench-keys-" + std::to_string(::getpid());
   const std::time_t now = std::time(nullptr);

@@ -15,7 +15,7 @@ namespace {
 constexpr double kPanelWidth = 330, kPanelHeight = 330, kLeft = 52, kRight = 14, kTop = 34, kBottom = 44;
 constexpr double kHead = 78;
 constexpr int kColumns = 5;
-// Of all panels, so that they compare at a glance [%].
+// Limits of the error axis, equal in all panels [%].
 constexpr double kLowest = 0.003, kHighest = 300;
 
 /// A logarithmic axis.

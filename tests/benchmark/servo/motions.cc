@@ -15,8 +15,8 @@ using testing::TestTissue;
 using testing::TickAt;
 
 constexpr double kPi = std::numbers::pi;
-constexpr double kReady_s = 0.6;   ///< At the start: three reports and the rise to full force.
-constexpr double kSettle_s = 1.0;  ///< Then whole cycles up to here are not yet judged.
+constexpr double kReady_s = 0.6;   ///< Start: three reports and the rise to full force.
+constexpr double kSettle_s = 1.0;  ///< Whole cycles up to this time are not measured.
 constexpr double kMeasured_s = 4.0;
 
 void Misjudge(const Physics& physics, std::mt19937_64* random, Contact* contact) {

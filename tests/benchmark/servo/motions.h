@@ -14,7 +14,7 @@ namespace fulcrum::haptics {
 
 struct Motion {
   const char* name;
-  double cycle_s;  ///< After which it repeats.
+  double cycle_s;  ///< Period of the motion.
   std::function<Vec3d(double)> tip;
   testing::TissueParameters tissue;
 };
@@ -27,8 +27,8 @@ class ForceStrategy {
   virtual ~ForceStrategy() = default;
   /// Receives a report, before Step() of its tick.
   virtual void Offer(const ContactModel& model, const Tick& tick) = 0;
-  /// Force of the tissue on the tool with its tip at `tip` [N]. `proxy`: what the tissue is to feel, set to `tip`
-  /// unless the strategy has a coupling of its own.
+  /// Force of the tissue on the tool with its tip at `tip` [N]. `proxy`: position at which the tissue is touched, set
+  /// to `tip` unless the strategy has a coupling of its own.
   [[nodiscard]] virtual Vec3d Step(const Tick& tick, const Vec3d& tip, Vec3d* proxy) = 0;
 };
 

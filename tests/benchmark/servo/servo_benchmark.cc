@@ -10,7 +10,7 @@
 //   haptics.paper_force_error_pct.*  depth x normal held from one physics step to the next, on the same runs
 //   haptics.excess_step_N      largest step of a tick that the tissue did not make, worst motion
 //   haptics.z_width_N_per_mm.GRIP.*  stiffest wall on which the hand comes to rest; stiffness then rendered
-//   haptics.energy_per_cycle_mJ.*    what the hand loses in a cycle; leak: its negative over the energy stored
+//   haptics.energy_per_cycle_mJ.*    energy that the hand loses in a cycle; leak: its negative over the energy stored
 //   haptics.stall_1s.*         physics stops for a second
 #include <sys/prctl.h>
 #include <time.h>
@@ -58,7 +58,7 @@ constexpr std::int64_t kSpin_ns = 50'000;
 
 // ---------------------------------------------------------------------------------------------------- timing
 
-/// Both tools on the move, one contact each: what a session asks of the servo.
+/// Both tools move with one contact each: the load of a session on the servo.
 std::array<ScriptKey, 4> MovingScript() {
   return {{{0.0f, 0, Vec3f(0, 0, 0.0f), 0, 0, 0},
            {10.0f, 0, Vec3f(0.05f, 0, -0.005f), 0, 0, 0},
@@ -95,7 +95,7 @@ void Merge(const runtime::HistogramSnapshot& from, runtime::HistogramSnapshot* i
   into->max_ns = std::max(into->max_ns, from.max_ns);
 }
 
-/// The node's servo and a bare loop take turns, so that both see the same machine.
+/// The node's servo and a bare loop take turns, so that both run under the same load of the machine.
 void RunThread(Report* report, int rounds, double seconds) {
   const std::array<ScriptKey, 4> script = MovingScript();
   SceneView scene = BenchScene(0.3);

@@ -22,12 +22,12 @@ using testing::kNothing;
 using testing::Loop;
 using testing::TissueParameters;
 
-// The body of a wall: as stiff as the gate admits, so that the skin is what is felt.
+// Body of a wall: as stiff as the gate admits, so that the skin determines the force.
 constexpr double kWallBody_N_m = 2e5;
 constexpr double kCycle_s = 0.5;
 
 TissueParameters Wall(double stiffness_N_m) {
-  // Viscosity that relaxes within two substeps of the tissue: the explicit integration needs some.
+  // Viscosity that relaxes within two substeps of the tissue: the explicit integration needs some viscosity.
   const double relaxation_s = 1e-4;
   return {.k1 = stiffness_N_m,
           .k3 = 0,
@@ -43,7 +43,7 @@ CycleEnergy Cycle(const TissueParameters& parameters, double depth, double wall_
   const auto place = [=](double t) {
     return 0.001 - 0.5 * (depth + 0.001) * (1 - std::cos(2 * std::numbers::pi * t / kCycle_s));
   };
-  // Forces are up before the first cycle.
+  // The force has risen before the first cycle.
   constexpr double kUp_s = 0.6;
   GuidedDevice device(BenchTrocar(), [&](double t) { return Vec3d(0, 0, place(std::max(0.0, t - kUp_s))); });
   Loop loop(BenchScene(1.0), &device, parameters);
@@ -53,7 +53,7 @@ CycleEnergy Cycle(const TissueParameters& parameters, double depth, double wall_
   Vec3d last(0, 0, place(0));
   loop.Run(static_cast<int>(1e3 * kCycles * kCycle_s), [&](const Tick& tick) {
     const Vec3d now(0, 0, place(tick.session_time_s - kUp_s));
-    // What was sent at the last tick acted over the way since then; the lever of the bench is 1.
+    // The force sent at the last tick acted over the motion since then; the lever of the bench is 1.
     result.lost_mJ -= 1e3 / kCycles * force.dot(now - last);
     result.stored_mJ = std::max(result.stored_mJ, 1e3 * 0.5 * device.force.squaredNorm() / wall_N_m);
     force = device.force;

@@ -26,7 +26,7 @@ class ServoStrategy final : public ForceStrategy {
   Servo servo_{ServoSettingsOf(testing::BenchScene(1.0)), {&device_, nullptr}};
 };
 
-/// What the baselines share: the newest report, as doubles.
+/// Common part of the baselines: the newest report, as doubles.
 class Baseline : public ForceStrategy {
  public:
   void Offer(const ContactModel& model, const Tick& /*tick*/) override {
@@ -59,7 +59,7 @@ class Baseline : public ForceStrategy {
   /// @param age since the tool sample of the report [s].
   [[nodiscard]] virtual Vec3d Force(const Vec3d& tip, double age) = 0;
 
-  /// Skin law on a mesh that stands still: normal part of a surface; of a grasp the whole force.
+  /// Skin law on a mesh that stands still: for a surface the normal part, for a grasp the whole force.
   [[nodiscard]] Vec3d FrozenSkin(const Vec3d& tip) const {
     if (grasp_) {
       const double size = f_ref_.norm();
@@ -92,7 +92,8 @@ class HeldMesh final : public Baseline {
   Vec3d Force(const Vec3d& tip, double /*age*/) override { return FrozenSkin(tip); }
 };
 
-/// The same with a proxy that sticks to the mesh and slides in the friction cone; the mesh may go on as it went.
+/// As above, with a proxy that sticks to the mesh and slides in the friction cone; the mesh may be extrapolated at its
+/// last velocity.
 class GodObject final : public Baseline {
  public:
   explicit GodObject(bool extrapolates) : extrapolates_(extrapolates) {}
@@ -124,7 +125,7 @@ class LinearModel final : public Baseline {
     const double normal = 1 / (1 / skin + 1 / body_);
     const Vec3d moved = tip - x_ref_;
     if (grasp_) return f_ref_ - normal * moved;
-    // Before touch the line begins where the gap ends.
+    // Before contact the line begins at the end of the gap.
     const double pressure = std::max(0.0, pressure_ - normal * (n_.dot(moved) - std::min(0.0, depth_)));
     const double along = kt_ > 0.0 ? 1 / (1 / kt_ + 1 / body_) : 0.0;
     return pressure * n_ + WithinCone(drag_ - along * Tangent(moved), pressure);

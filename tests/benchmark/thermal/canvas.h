@@ -16,11 +16,11 @@ using Rgb = std::array<std::uint8_t, 3>;
 
 class Canvas {
  public:
-  static constexpr int kLetterWidth = 12, kLetterHeight = 14;  ///< Of a letter with the space behind it.
+  static constexpr int kLetterWidth = 12, kLetterHeight = 14;  ///< Size of a letter with the space behind it.
 
   Canvas(int width, int height, const Rgb& background);
 
-  /// Nothing happens beyond the borders.
+  /// Positions beyond the borders are ignored.
   void Put(int x, int y, const Rgb& colour);
   /// Filled, borders x0 … x1 - 1.
   void Box(int x0, int y0, int x1, int y1, const Rgb& colour);

@@ -10,7 +10,7 @@ namespace {
 
 using benchmark::Report;
 
-/// What a cut looks like, by speed and mode.
+/// Appearance of a cut, by speed and mode.
 void Looks(Report* report) {
   if (!report->Wants("thermal.cut.")) return;
   const scene::SceneData data = FlatScene(41, 61, 1e-3f);
@@ -41,8 +41,8 @@ void Looks(Report* report) {
   }
 }
 
-/// Length of the slit along a straight drag [m]: the stations, a quarter of a cell apart and up to 2 mm beyond its
-/// ends, where the cell on the path is gone.
+/// Length of the slit along a straight drag [m]: the part of the path, up to 2 mm beyond its ends, on which the cell is
+/// removed, sampled at a quarter of a cell.
 double SlitLength(const ThermalSolver& solver, const Drag& drag) {
   const HeatField& field = solver.field();
   const float step = 0.25f * field.material().cell_m;
@@ -57,8 +57,8 @@ double SlitLength(const ThermalSolver& solver, const Drag& drag) {
   return gone * static_cast<double>(step);
 }
 
-/// Energy and slit length against a run whose every coupling step is ten times shorter: those that the change of the
-/// tissue ends, and with the frame also those that end with it.
+/// Energy and slit length against a run with all coupling steps ten times shorter: those limited by the change of the
+/// tissue and, through a shorter frame, those limited by the frame.
 void CouplingStep(Report* report) {
   if (!report->Wants("thermal.coupling")) return;
   const scene::SceneData data = FlatScene(41, 61, 1e-3f);

@@ -29,7 +29,7 @@ void HeatFastTip(Report* report) {
   report->Add("thermal.heat_fast_tip.max_error_pct", 100 * result.max_error, "%");
 }
 
-/// Heats the tiles around `tip` as a Gaussian source does that passes in one frame, by about 5 K in its middle.
+/// Heats the tiles around `tip` like a Gaussian source that passes in one frame, by about 5 K in its middle.
 void AddSpot(HeatField* field, const Vec2f& tip) {
   constexpr float kWidth_m = 2.5e-4f, kPeak_K = 5, kReach_m = 5 * kWidth_m;
   const float cell = field->material().cell_m, tile_m = kTile * cell;

@@ -34,7 +34,7 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Puts the tip where the input says; to be seen by the next Step.
+  /// Sets the tip to the input; the next Step reads it.
   void Touch(const TipInput& tip) {
     bus_.Demand(tip.mode, tip.power_W, tick_.stamp_ns);
     CauteryContact contact = TouchAt(tip.path.to, tip.path.radius_m);
@@ -66,8 +66,7 @@ void NodeCutting(Report* report) {
   const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
   const SceneView scene = data.View();
   const Drag drag = BuiltInDrag(scene, 0.005f);
-  // The repeats are the same to the last bit, so the median over them is the time of that frame and not of whatever
-  // else the machine did meanwhile.
+  // The repeats are bitwise equal, so the median over them excludes the time of other work on the machine.
   std::vector<std::vector<double>> repeats(drag.frames(kFrame_s));
   SourceStats steps;
   for (int repeat = 0; repeat < (report->quick() ? 3 : 7); ++repeat) {
@@ -92,7 +91,7 @@ void NodeCutting(Report* report) {
   report->Add("thermal.node_cutting_5mm_s.frame_ms_mean", mean, "ms");
   report->Add("thermal.node_cutting_5mm_s.frame_ms_p50", Quantile(times, 0.5), "ms");
   report->Add("thermal.node_cutting_5mm_s.frame_ms_p99", Quantile(times, 0.99), "ms");
-  // What ended the coupling steps; the others ended with their half of the frame.
+  // Causes that ended the coupling steps; the remaining ones ended with their half of the frame.
   const auto percent = [&](int count) { return 100.0 * count / steps.solves; };
   const double frames = static_cast<double>(times.size());
   report->Add("thermal.node_cutting_5mm_s.coupling_steps_per_frame", steps.solves / frames, "1");
@@ -101,7 +100,7 @@ void NodeCutting(Report* report) {
   report->Add("thermal.node_cutting_5mm_s.coupling_steps_by_floor_pct", percent(steps.by_floor), "%");
 }
 
-/// Where the energy of a cut of ten seconds went, at its worst moment.
+/// Largest closure error of the energy during a cut of ten seconds.
 void EnergyClosure(Report* report) {
   if (!report->Wants("thermal.energy_closure_rel")) return;
   const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
@@ -116,7 +115,7 @@ void EnergyClosure(Report* report) {
   report->Add("thermal.energy_closure_rel", worst, "1");
 }
 
-/// What the node does at 20 and 25 Hz beside the solver.
+/// Work of the node at 20 and 25 Hz beside the solver.
 void CheckpointAndPatch(Report* report) {
   if (!report->Wants("thermal.checkpoint_") && !report->Wants("thermal.patch_ms")) return;
   const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());

@@ -24,14 +24,14 @@ constexpr std::uint32_t kRows = 41, kCols = 61;
 
 struct CutFigures {
   double frame_ms_p50 = 0, frame_ms_p99 = 0;
-  double watt = 0;       ///< Of the generator, mean.
-  double J_per_mm3 = 0;  ///< Put into the sheet, per volume removed.
-  double width_mm = 0;   ///< Of the slit, mean.
+  double watt = 0;       ///< Power of the generator, mean.
+  double J_per_mm3 = 0;  ///< Energy put into the sheet per volume removed.
+  double width_mm = 0;   ///< Width of the slit, mean.
   double length_mm = 0;
   double highest_C = 0;
 };
 
-/// The same 30 mm at 5 mm/s, along the middle between two rows of the mesh, by either model.
+/// The same cut of 30 mm at 5 mm/s, along the middle between two rows of the mesh, by either model.
 CutFigures Cut(ThermalModel model, const char* name) {
   scene::SceneData data = FlatScene(kRows, kCols, kSpacing_m);
   data.fixed.thermal.model = model;
@@ -80,7 +80,7 @@ void Cuts(Report* report) {
   }
 }
 
-/// Heat that a cell must get before it goes, without what flows on: to 100 C, and there all its water.
+/// Heat at which a cell is removed, without conduction: to 100 C, and at 100 C all its water.
 void RemovalEnergy(Report* report) {
   if (!report->Wants("thermal.paper.removal")) return;
   const ThermalParams params;
@@ -108,7 +108,7 @@ void Sweeps(Report* report) {
   const float first = solve();
   report->Add("thermal.paper.potential.ms", benchmark::Quantile(benchmark::TimeMs(2, 15, solve), 0.5), "ms");
   report->Add("thermal.paper.potential.sweeps", kPaperSweeps, "1");
-  // How far the sweeps of a frame are from the potential: the electrode's current at touch-down and a second later.
+  // Error of the sweeps of a frame: the electrode's current at touch-down and a second later.
   for (int n = 0; n < 80; ++n) (void)solve();
   const float second = solve();
   for (int n = 0; n < 6000; ++n) (void)solve();
@@ -131,7 +131,7 @@ float Side(const Vec2f& a, const Vec2f& b, const Vec2f& p) {
   return (b - a).x() * (p - a).y() - (b - a).y() * (p - a).x();
 }
 
-/// Edges that cross the slit, and how many of them still live after either rule has seen it.
+/// Edges that cross the slit, and those of them that each rule leaves alive.
 struct Crossings {
   int all = 0, paper = 0, accurate = 0;
 };
@@ -156,7 +156,7 @@ Crossings Cross(const SceneView& scene, const Slit& slit, float width_m) {
   by_node.Commit();
   by_path.Commit();
   Crossings count;
-  // A millimetre from its ends: there the slit itself ends within an edge's length.
+  // A millimetre from its ends, because near them the slit itself ends within an edge.
   const Vec2f c = slit.End(-0.9f), d = slit.End(0.9f);
   for (std::size_t e = 0; e < scene.membrane_rest_length.size(); ++e) {
     if (scene.membrane_rest_length[e] <= 0) continue;
@@ -170,7 +170,7 @@ Crossings Cross(const SceneView& scene, const Slit& slit, float width_m) {
   return count;
 }
 
-/// 200 slits of 0.45 mm on a mesh of 1 mm, along its rows and any way.
+/// 200 slits of 0.45 mm on a mesh of 1 mm, along its rows and in any direction.
 void Slits(Report* report) {
   if (!report->Wants("thermal.paper.slit")) return;
   const scene::SceneData data = FlatScene(kRows, kCols, kSpacing_m);

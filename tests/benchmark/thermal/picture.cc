@@ -16,7 +16,7 @@ namespace {
 constexpr int kPixels = 480, kGap = 12, kTop = 30, kBottom = 40;
 constexpr int kWidth = 3 * kPixels + 4 * kGap, kHeight = kTop + kPixels + kBottom;
 constexpr int kLegend = kTop + kPixels + 12;  ///< Upper border of the legends.
-constexpr float kThetaShown = 70;             ///< White of the temperature's scale [K].
+constexpr float kThetaShown = 70;             ///< Temperature shown as white [K].
 constexpr Rgb kPaper{250, 250, 250}, kInk{20, 20, 20}, kHole{0, 0, 0}, kOffSheet{110, 110, 110};
 constexpr Rgb kTissue{235, 170, 150}, kDead{250, 240, 225}, kBrown{150, 95, 45}, kDry{90, 50, 20}, kChar{60, 60, 70};
 constexpr Rgb kMeshGround{60, 60, 60}, kEdge{200, 200, 200}, kShrunk{255, 60, 30};

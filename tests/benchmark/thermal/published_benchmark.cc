@@ -20,8 +20,8 @@ float ThetaAt(const HeatField& field, const Vec2f& at) {
 /// A hook of 0.5 mm at 30 W on a tented sheet of the default tissue, 0.3 mm thick, with cooling afterwards.
 struct MesenteryCase {
   CauteryMode mode;
-  float speed_m_s;  ///< Of a stroke of 12 mm; 0: held still …
-  float dwell_s;    ///< … for so long.
+  float speed_m_s;  ///< Speed of a stroke of 12 mm; 0: held still …
+  float dwell_s;    ///< … for this time.
 };
 
 /// Largest rise of temperature 1 mm from the metal [K]: beside the middle of the stroke, or the mean of all sides.
@@ -58,10 +58,10 @@ double RiseAtOneMillimetre(const MesenteryCase& c) {
   return highest;
 }
 
-/// Published: 50.5 +- 8.0 K, 1 mm from a monopolar hook on mesentery. We know neither how long nor how the hook was
-/// moved, so the case is the one that depends least on it: held still with the usual setting of 30 W coag until the
-/// tissue around it has dried and takes no more current, which is within the first second. The others show how much
-/// the conditions matter.
+/// Published: 50.5 +- 8.0 K, 1 mm from a monopolar hook on mesentery. Duration and motion of the hook are not known, so
+/// the case is the one that depends least on them: held still with the usual setting of 30 W coag until the tissue
+/// around it has dried and takes no more current, which is within the first second. The others show the influence of
+/// the conditions.
 void Mesentery(Report* report) {
   if (!report->Wants("thermal.mesentery_")) return;
   using enum CauteryMode;
@@ -72,7 +72,7 @@ void Mesentery(Report* report) {
   report->Add("thermal.mesentery_1mm.cut_stroke_4_mm_s_dT_K", RiseAtOneMillimetre({kCut, 0.004f, 0}), "K");
 }
 
-/// Tissue that a cut at 30 W takes out per second, in its most productive tenth of a second [mm^3/s].
+/// Volume that a cut at 30 W removes per second, in its most productive tenth of a second [mm^3/s].
 double LargestRemoval(const SceneView& scene, float speed_m_s, float radius_m) {
   constexpr int kSpan = 10;
   ThermalSolver solver(scene);

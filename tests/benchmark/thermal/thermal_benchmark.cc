@@ -1,4 +1,4 @@
-// Time and error of the thermal solver and its node; pictures of what it does go where the figures go.
+// Time and error of the thermal solver and its node; pictures are written to the folder of the figures.
 #include <cstdlib>
 #include <filesystem>
 

@@ -1,4 +1,4 @@
-// The cases of the thermal benchmark, by subject; each runs only if the report wants its keys.
+// The cases of the thermal benchmark, by subject; each runs only if its keys are requested.
 #pragma once
 
 #include <string>
@@ -17,17 +17,17 @@ inline constexpr float kFrame_s = 0.01f;
 void HeatCases(benchmark::Report* report);
 /// Potential against the logarithm.
 void PotentialCases(benchmark::Report* report);
-/// The whole node on ports in the built-in scene, its checkpoint and patch; and a frame with nothing to do.
+/// The whole node on ports in the built-in scene, its checkpoint and patch; and an idle frame.
 void NodeCases(benchmark::Report* report);
 /// Shape of cuts by speed and mode, and the error of the coupling step.
 void CutCases(benchmark::Report* report);
 /// Published measurements and bounds by energy.
 void PublishedCases(benchmark::Report* report);
 
-/// 30 mm along the built-in membrane, where the scene's own script cuts.
+/// 30 mm along the built-in membrane, where the scene's script cuts.
 [[nodiscard]] Drag BuiltInDrag(const SceneView& scene, float speed_m_s);
 
-/// Leaves thermal_NAME.png, 12 mm wide around the centre, where the figures go.
+/// Writes thermal_NAME.png, 12 mm wide around the centre, to the folder of the figures.
 void Picture(const ThermalSolver& solver, const SceneView& scene, const Vec2f& centre, const std::string& name);
 
 }  // namespace fulcrum::thermal

@@ -24,7 +24,7 @@ void Block(benchmark::Report* report) {
   report->Add("thermal.volume_64x64x32.order", std::log2(HalfSpaceError(3e-4f) / fine), "1");
 }
 
-/// The built-in scene's cut with the tissue beneath: a frame, and both ledgers.
+/// The built-in scene's cut with the tissue beneath: time of a frame, and both ledgers.
 void BuiltInCut(benchmark::Report* report) {
   scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
   data.fixed.thermal.volume = 1;
@@ -50,7 +50,7 @@ void BuiltInCut(benchmark::Report* report) {
   report->Add("thermal.volume_cut.burn_depth_mm", 1e3 * solver.figures().burn_depth_m, "mm");
 }
 
-/// Depth of burn under a tip that stays.
+/// Depth of burn under a tip that does not move.
 void Dwells(benchmark::Report* report) {
   scene::SceneData data = FlatScene(21, 21, 1e-3f);
   data.fixed.thermal.volume = 1;

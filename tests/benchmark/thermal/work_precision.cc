@@ -24,10 +24,10 @@ using benchmark::WorkPrecisionPoint;
 
 struct Figures {
   double ms = 0, error = 0;
-  int tiles = 0;  ///< Awake; 0: one whole grid.
+  int tiles = 0;  ///< Tiles awake; 0: one whole grid.
 };
 
-/// The exact temperatures at the end, at the cell centres of a grid over the window; kept for the next method.
+/// The exact temperatures at the end, at the cell centres of a grid over the window; cached for the next method.
 const std::vector<float>& Exact(const MovingGaussian& problem, int n) {
   static std::map<int, std::vector<float>> kept;
   std::vector<float>& field = kept[n];
@@ -39,7 +39,8 @@ const std::vector<float>& Exact(const MovingGaussian& problem, int n) {
   return field;
 }
 
-/// Heating of one frame [K]: with the tip where it is at the frame's start, or swept, by three Gauss points in time.
+/// Heating of one frame [K]: with the tip at its position at the start of the frame, or swept, by three Gauss points in
+/// time.
 void Heat(const MovingGaussian& problem, int frame, bool swept, int n, double cell_m, std::vector<float>* heating) {
   constexpr double kNode = 0.7745966692414834, kDt = MovingGaussian::kDt;
   const double start = frame * kDt, middle = start + 0.5 * kDt;
@@ -53,7 +54,7 @@ void Heat(const MovingGaussian& problem, int frame, bool swept, int n, double ce
   }
 }
 
-/// A stepper on a grid of `texels` squared from the window's corner on, of which the window is compared.
+/// Runs a stepper on a grid of `texels` squared that begins at the window's corner; only the window is compared.
 Figures Run(const std::function<std::unique_ptr<GridStepper>(const UniformGrid&)>& make, int window_cells, int texels,
             double diffusivity_factor, bool swept) {
   const MovingGaussian problem;
@@ -86,8 +87,8 @@ std::vector<Method> Methods() {
     const MovingGaussianResult r = RunMovingGaussian(static_cast<float>(MovingGaussian::kWindow / n));
     return Figures{r.step_ms, r.max_error, r.tiles};
   };
-  // What the paper does: the tip where the frame begins, the whole texture once. Its diffusivity, read in mm^2/s, is
-  // 4.5 times that of tissue.
+  // The paper's method: the tip at the start of the frame, one step of the whole texture. Its diffusivity, read in
+  // mm^2/s, is 4.5 times that of tissue.
   const auto paper = [](double factor) {
     return [factor](int n) { return Run(MakeForwardEuler, n, kTexture, factor, false); };
   };
@@ -128,7 +129,7 @@ void WorkPrecision(benchmark::Report* report) {
       points.push_back({size + " µm", method.family, figures.ms, {100 * figures.error}});
     }
   }
-  if (!all) return;  // a plot of some would pass for a plot of all
+  if (!all) return;  // A plot of some methods could be mistaken for the complete one.
   const char* folder = std::getenv("FULCRUM_BENCH_OUT");
   const std::filesystem::path file =
       std::filesystem::path(folder != nullptr ? folder : FULCRUM_SOURCE_DIR "/out") / "thermal_work_precision.svg";

@@ -1,5 +1,5 @@
-// A cart on two hosts: what its tissue costs on the cable, what it costs the processors, and how far force and picture
-// are from a cart on one host. Two network namespaces with clocks 1000 s apart; needs root.
+// A cart on two hosts: traffic of its tissue on the cable, load of the processors, and differences of force and picture
+// from a cart on one host. Two network namespaces with clocks 1000 s apart; needs root.
 #include <signal.h>
 #include <unistd.h>
 
@@ -35,7 +35,7 @@ using testing::TwoHosts;
 const char* const kDomain = "62";
 constexpr double kAhead_s = 1000;
 
-/// Processor time of a process until now [s].
+/// Processor time that a process has used [s].
 double CpuOf(pid_t pid) {
   std::ifstream stream("/proc/" + std::to_string(pid) + "/stat");
   std::string line;
@@ -55,10 +55,11 @@ struct Run {
   std::vector<HeardTool> tools;
   testing::FrameComparison frames;
   std::vector<double> tissue_kB_per_s, offset_us, round_trip_us;
-  double supervisor_cpu_pct = 0;  ///< The link lives in it.
+  double supervisor_cpu_pct = 0;  ///< Its process contains the link.
 };
 
-/// `seconds` of session time of a scene. @param remote nodes on the far host; empty: all on the cart.
+/// `seconds` of session time of a scene.
+/// @param remote nodes on the far host; empty: all on the cart.
 Run RunSession(const std::string& scene_yaml, double seconds, const std::string& remote,
                const TwoHosts::Settings& settings, bool with_tissue) {
   Run run;
@@ -82,7 +83,7 @@ Run RunSession(const std::string& scene_yaml, double seconds, const std::string&
   testing::Program near = hosts.OnCart("two_hosts_probe", near_words);
   testing::Program far;
   if (with_tissue && !remote.empty()) far = hosts.OnHost("two_hosts_probe", far_words);
-  // While it runs: from its first second to its last.
+  // Load between the first and the last second of the session.
   const bool began = testing::WaitFor(90, [&] {
     const auto tools = testing::HeardTools(file("near"));
     return !tools.empty() && tools.back().time_s > 1;
@@ -107,7 +108,7 @@ Run RunSession(const std::string& scene_yaml, double seconds, const std::string&
   return run;
 }
 
-/// RMS of the difference over RMS of the first, both tools, millisecond by millisecond [%].
+/// RMS of the difference over RMS of the first, both tools, at equal milliseconds [%].
 double ForceError(const std::vector<HeardTool>& wanted, const std::vector<HeardTool>& got) {
   std::map<long, const HeardTool*> by_ms;
   for (const HeardTool& tool : wanted) by_ms[std::lround(1e3 * tool.time_s)] = &tool;
@@ -122,7 +123,7 @@ double ForceError(const std::vector<HeardTool>& wanted, const std::vector<HeardT
   return size > 0 ? 100 * std::sqrt(error / size) : -1;
 }
 
-/// Nobody touches anything.
+/// A scene in which no tool touches the tissue.
 std::string Still() {
   std::string scene = testing::ReadFile(FULCRUM_SOURCE_DIR "/deploy/scenes/built-in.yaml");
   scene.resize(scene.find("\nscript:"));
@@ -131,7 +132,7 @@ std::string Still() {
          "  tool1:\n    - {time_s: 0, sheet: [0.6, 0.5], height_mm: 40}\n";
 }
 
-/// The second half: the first holds the start.
+/// The second half of the values: the first half contains the start.
 std::vector<double> Late(std::vector<double> values) {
   values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
   return values;
@@ -147,7 +148,7 @@ int Measure(benchmark::Report* report) {
   const TwoHosts::Settings clean{.delay_ms = 0.1, .loss_percent = 0, .far_clock_ahead_s = kAhead_s};
   const TwoHosts::Settings bad{.delay_ms = 5, .loss_percent = 1, .far_clock_ahead_s = kAhead_s};
   if (report->Wants("two_hosts.frame_kB_per_s.static")) {
-    // The tissue comes to rest first: the last of it counts.
+    // The tissue must come to rest first: only the last values count.
     constexpr double kSettle_s = 20;
     const Run still = RunSession(Still(), kSettle_s, "render_node", clean, false);
     if (!still.wrong.empty()) return Fail(still.wrong);

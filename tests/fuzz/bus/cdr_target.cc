@@ -1,6 +1,6 @@
-// Any bytes as the CDR of a topic, which the first byte chooses: refused, or decoded to a message that, once it has
-// passed the gate, is encoded and decoded again unchanged. What is too short for a topic that is sent as its memory is
-// filled up with zeros, or inputs would have to be hundreds of kilobytes long.
+// Any bytes as the CDR of a topic, which the first byte selects: refused, or decoded to a message that, if it passes
+// the gate, is encoded and decoded again unchanged. Topics that are sent as their memory are padded with zeros;
+// otherwise inputs would have to be hundreds of kilobytes long.
 #include "services/base/core/message_difference.h"
 #include "services/transport/bus/convert/cdr.h"
 #include "services/transport/bus/gate.h"
@@ -16,7 +16,7 @@ constexpr bool kAsMemory = requires {
   typename T::View;
 };
 
-/// The sample, without the length that makes mutations rare.
+/// A sample with short lists: long ones make effective mutations rare.
 template <class T>
 T ShortSample() {
   T message = bus::test::Sample<T>();

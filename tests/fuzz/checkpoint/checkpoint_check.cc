@@ -16,14 +16,14 @@ namespace {
 class PhysicsCheck final : public CheckpointCheck {
  public:
   explicit PhysicsCheck(const scene::SceneSettings& settings) : data_(scene::BuildProcedural(settings)) {
-    constexpr int kSteps = 160;  // It holds the membrane and pulls.
+    constexpr int kSteps = 160;  // The grasper then holds the membrane and pulls.
     physics::TissueSimulation worker(scene_);
     for (int step = 0; step < kSteps; ++step) (void)worker.Step(physics::ScriptedTools(scene_, 0.01 * step));
     good_.resize(physics::CheckpointCapacity(static_cast<Index>(scene_.rest_position.size())));
     good_.resize(physics::WriteCheckpoint(worker, {0.01f, 1.0}, good_));
   }
   Outcome Offer(std::span<const std::byte> payload, int steps) override {
-    // To make one takes longer than all the rest.
+    // One simulation serves all inputs: its construction takes longer than all the rest.
     physics::TissueSimulation& simulation = *simulation_;
     if (!physics::ReadCheckpoint(good_, &simulation)) return Outcome::kBroken;
     const std::uint64_t before = simulation.StateHash();
@@ -60,7 +60,7 @@ class ThermalCheck final : public CheckpointCheck {
     good_.resize(worker.Save(good_));
   }
   Outcome Offer(std::span<const std::byte> payload, int steps) override {
-    // One that has refused a payload is fresh, and is used again.
+    // A solver that has refused a payload is unchanged and is used again.
     if (!fresh_) fresh_ = std::make_unique<thermal::ThermalSolver>(scene_);
     const std::uint64_t before = fresh_->FullHash();
     if (!fresh_->Restore(payload)) return fresh_->FullHash() == before ? Outcome::kRefused : Outcome::kBroken;

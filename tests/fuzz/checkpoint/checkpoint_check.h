@@ -13,15 +13,15 @@
 
 namespace fulcrum::testing {
 
-/// How a check ended.
+/// Result of a check.
 enum class Outcome { kRefused, kTaken, kBroken };
 
 class CheckpointCheck {
  public:
   virtual ~CheckpointCheck() = default;
-  /// Of a solver in the middle of its work.
+  /// A valid checkpoint of a solver during its work.
   [[nodiscard]] const std::vector<std::byte>& good() const { return good_; }
-  /// @param steps steps of the solver from an accepted payload.
+  /// @param steps steps of the solver after an accepted payload.
   [[nodiscard]] virtual Outcome Offer(std::span<const std::byte> payload, int steps = 4) = 0;
 
  protected:

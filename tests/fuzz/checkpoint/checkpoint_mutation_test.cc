@@ -1,4 +1,4 @@
-// Checkpoints mutated from good ones, the same ones in every run.
+// Mutations of valid checkpoints, equal in every run.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -33,7 +33,7 @@ constexpr std::array<std::uint32_t, 8> kAwkward{0,          1,          0x7fffff
 std::vector<std::byte> Mutate(std::vector<std::byte> payload, std::mt19937* random) {
   const unsigned count = 1 + (*random)() % 3;
   for (unsigned i = 0; i < count && payload.size() > 8; ++i) {
-    // Half of them in the header, where the counts stand.
+    // Half of them in the header, which contains the counts.
     const std::size_t reach = (*random)() % 2 == 0 ? std::min<std::size_t>(payload.size(), 400) : payload.size();
     const std::size_t word = ((*random)() % (reach - 4)) & ~std::size_t{3};
     const std::uint32_t value = (*random)() % 3 == 0 ? (*random)() : kAwkward[(*random)() % kAwkward.size()];
@@ -63,7 +63,7 @@ void Hold(CheckpointCheck* check, const std::string& corpus) {
     ++outcomes[static_cast<std::size_t>(outcome)];
     EXPECT_NE(outcome, Outcome::kBroken) << "input " << i;
   }
-  // Both happen, or the test tests nothing.
+  // Both outcomes must occur; otherwise the test checks nothing.
   EXPECT_GT(outcomes[0], kInputs / 10);
   EXPECT_GT(outcomes[1], kInputs / 10);
 

@@ -1,5 +1,6 @@
-// The file around a checkpoint's payload: two slots with sequence and checksum. Any bytes as patches over a good file
-// (Patch). The first byte says which slots get a right checksum afterwards, or nothing beyond it would be reached.
+// The file around a checkpoint's payload: two slots with sequence and checksum. Any bytes as patches over a valid file
+// (Patch). The first byte selects the slots whose checksums are then corrected; without that, checks beyond the
+// checksum would not be reached.
 #include <cstring>
 
 #include "services/base/core/error.h"
@@ -56,13 +57,13 @@ class CheckpointFileTarget final : public Target {
     Promise(!latest || latest->payload.size() <= kCapacity, "a payload larger than the capacity");
     Promise(!previous || (latest && previous->payload.size() <= kCapacity), "a payload before none");
     Promise(!latest || latest->sequence <= newest, "a slot newer than the newest");
-    // Peek reads what is there of a file that is cut short; the node then begins anew.
+    // Peek reads what remains of a truncated file; the node then begins anew.
     if (latest) {
       Promise(peeked.has_value() &&
                   std::equal(peeked->begin(), peeked->end(), latest->payload.begin(), latest->payload.end()),
               "Peek and the node read different slots");
     }
-    // Whatever was in the file, the node's next checkpoint is kept.
+    // The node's next checkpoint is kept for any content of the file.
     file.Begin()[0] = std::byte{42};
     file.Commit(1);
     const auto after = runtime::CheckpointFile::Peek(path_, kScene, kLayout, kCapacity);

@@ -7,7 +7,7 @@
 namespace fulcrum::fuzz {
 namespace {
 
-/// Five times as wide as a scene's, so that there are few.
+/// Five times as wide as in a scene, to have few cells.
 constexpr float kCell_m = 5e-4f;
 
 constexpr std::uint64_t kContinued = 16;
@@ -18,7 +18,7 @@ class Payload final : public Target {
   Outcome Offer(Input input) override {
     std::vector<std::byte> payload = check_->good();
     Patch(input, &payload);
-    // A step takes as long as some twenty payloads: only a part is continued, the same one each time.
+    // A step takes as long as some twenty payloads, so only a part of them, selected by a hash, is continued.
     Hash64 hash;
     hash.Add(std::span<const std::byte>(payload));
     const testing::Outcome outcome = check_->Offer(payload, hash.value() % kContinued == 0 ? 1 : 0);

@@ -1,5 +1,5 @@
-// Any bytes sent to the console's server over a connection of its own: parsed by the server itself, routed as the
-// console does, and answered. An answer that is missing is a fault as well.
+// Any bytes sent to the console's server over a connection of its own: parsed by the server, routed as the console
+// does, and answered. A missing answer is a fault, too.
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -24,7 +24,7 @@ constexpr timeval kPatience{20, 0};
 class Socket {
  public:
   explicit Socket(int port) : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    // Closed without the wait for late packets, of which the ports would run out.
+    // Closed without TIME_WAIT, which would use up the ports.
     const linger at_once{1, 0};
     (void)::setsockopt(fd_, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
     (void)::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
@@ -40,7 +40,7 @@ class Socket {
   Socket(const Socket&) = delete;
   Socket& operator=(const Socket&) = delete;
 
-  /// Sends all and nothing more, and reads until the server closes.
+  /// Sends all input and nothing more, and reads until the server closes.
   std::string Ask(Input input) {
     // The server may close before it has read everything.
     while (!input.empty()) {
@@ -113,7 +113,7 @@ class ConsoleHttp final : public Target {
   }
 
  private:
-  /// What is broken here ends the program: it is thrown on the server's thread.
+  /// A violation here ends the program: the exception is thrown on the server's thread.
   console::HttpResponse Answer(const console::HttpRequest& request) const {
     const std::string broken = console::testing::Broken(request);
     Promise(broken.empty(), broken);

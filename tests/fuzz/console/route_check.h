@@ -28,7 +28,7 @@ inline HttpRequest RequestFrom(std::string_view bytes) {
   return request;
 }
 
-/// Empty, or which promise was broken.
+/// Name of the violated property; empty: all hold.
 inline std::string Broken(const HttpRequest& request) {
   static const Access access(kToken, {"cart"});
   ScreenText screen;

@@ -56,7 +56,7 @@ TEST(ConsoleRoutes, MutatedRequestsBreakNoPromise) {
     ASSERT_EQ(Broken(request), "") << "input " << i << ":\n" << text;
     (Route(Access(testing::kToken, {}), request).routed ? accepted : refused) += 1;
   }
-  // Both happen, or the test tests nothing.
+  // Both outcomes must occur; otherwise the test checks nothing.
   EXPECT_GT(accepted, 20'000);
   EXPECT_GT(refused, 20'000);
 }

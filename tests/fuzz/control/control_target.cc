@@ -33,7 +33,7 @@ class Connection {
 
   /// False: longer than a packet can be.
   bool Send(Input input) { return ::send(fd_, input.data(), input.size(), MSG_NOSIGNAL) >= 0; }
-  /// What has arrived, up to the end; the server is done by then.
+  /// Bytes received up to the end of the connection; the server has finished by then.
   std::string Receive() {
     std::array<char, control::kMostText_B + 2> answer{};
     const ssize_t got = ::recv(fd_, answer.data(), answer.size(), MSG_DONTWAIT);
@@ -60,7 +60,7 @@ class Control final : public Target {
     const std::optional<Request> read = control::RequestFrom(TextOf(input));
     Promise(taken.has_value() == read.has_value(), "the server takes what the parser refuses, or the reverse");
     if (!taken) {
-      // An empty packet cannot be told from the end of the connection.
+      // An empty packet cannot be distinguished from the end of the connection.
       Promise(answer.empty() == input.empty() && (answer.empty() || answer[0] == '0'), "refused without a reply");
       return Outcome::kRefused;
     }

@@ -15,13 +15,13 @@
 namespace fulcrum::handle_bridge {
 
 struct ProtocolVerdict {
-  std::string broken;  ///< The promise that was broken; empty: none.
+  std::string broken;  ///< The violated property; empty: none.
   int good_lines = 0;
   int good_frames = 0;
   int good_pedals = 0;
 };
 
-/// An accepted value must correspond exactly to its line, in the one form that a sender writes.
+/// An accepted value must correspond exactly to its line, in the only form that senders write.
 inline const char* CheckLine(std::string_view line, JawLineGate* gate, ProtocolVerdict* verdict) {
   if (const std::optional<Frame> frame = ParseFrame(line)) {
     const auto written = FormatFrame(*frame);
@@ -90,7 +90,7 @@ inline ProtocolVerdict CheckProtocol(std::span<const char> bytes) {
       verdict.broken = "a pedal that there is not";
     }
   }
-  // The gate of a channel is told of lines that do not arrive, which the one above is not.
+  // The gate of a channel also counts missing lines; the gate above does not.
   constexpr std::size_t kBytesBeforeALineIsLate = 64;
   if (bytes.size() <= kBytesBeforeALineIsLate &&
       static_cast<int>(jaw.totals().good) != verdict.good_lines + verdict.good_frames) {

@@ -1,5 +1,5 @@
-// A million mutations of the corpus (tests/fuzz/corpus/handle_serial: what senders write, and what broke something
-// once), the same ones in every run: no bytes break a promise of the parsers.
+// A million mutations of the corpus (tests/fuzz/corpus/handle_serial: output of senders, and inputs that once caused a
+// fault), equal in every run: no bytes violate a property of the parsers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -76,7 +76,7 @@ void Mutate(const std::vector<std::string>& corpus, std::mt19937_64* random, std
       case 4:  // A piece twice.
         bytes->insert(at, bytes->substr(below(bytes->size()), below(12)));
         break;
-      case 5:  // A true line in the middle of it.
+      case 5:  // A valid line in the middle of it.
         bytes->insert(at, AnyLine(random));
         break;
       default:  // A piece of another input.
@@ -109,7 +109,7 @@ TEST(ProtocolFuzz, AMillionMutationsBreakNoPromise) {
     good_frames += verdict.good_frames;
     good_pedals += verdict.good_pedals;
   }
-  // Neither deaf nor gullible: each kind of line gets through often, and most inputs are damaged.
+  // Each kind of line is accepted often, and most inputs are damaged.
   EXPECT_GT(good_lines, kInputs / 20);
   EXPECT_GT(good_frames, kInputs / 20);
   EXPECT_GT(good_pedals, kInputs / 20);

@@ -40,17 +40,17 @@ class GateCheck {
     std::memcpy(bytes + at, patch.bytes.data(), std::min(patch.bytes.size(), sizeof(*model) - at));
   }
 
-  /// One millisecond with this message. False: something that must hold did not.
+  /// One millisecond with this message. False: a required property is violated.
   [[nodiscard]] bool Offer(const ContactModel& model) {
     const Tick tick = TickAt(millisecond_++);
     const std::uint64_t dropped = servo_.figures().models_dropped;
     servo_.OfferModel(model, tick.stamp_ns);
     servo_.Step(tick);
     const bool refused = servo_.figures().models_dropped > dropped;
-    // The twin does not receive refused messages.
+    // The reference servo does not receive refused messages.
     if (!refused) twin_.OfferModel(model, tick.stamp_ns);
     twin_.Step(tick);
-    // Physics continues after the epoch and sequence that the gate has accepted last.
+    // The next message follows the epoch and sequence that the gate has accepted last.
     sequence_ = servo_.record().model_sequence + 1;
     epoch_ = std::max(epoch_, servo_.record().model_epoch);
     refused_ += refused ? 1 : 0;
@@ -86,7 +86,7 @@ class GateCheck {
   double peak_ = 0;
 };
 
-/// A check whose servo presses on the tissue; good messages alone broke nothing.
+/// Brings the check's servo into contact with the tissue. False: valid messages alone violate a property.
 [[nodiscard]] inline bool Press(GateCheck* check) {
   constexpr int kUntilForcesAreUp = 300;
   for (int i = 0; i < kUntilForcesAreUp; ++i) {

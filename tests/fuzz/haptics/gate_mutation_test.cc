@@ -1,4 +1,4 @@
-// A million contact models, mutated from valid ones, the same ones in every run.
+// A million contact models, mutated from valid ones, equal in every run.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -21,11 +21,12 @@ namespace {
 using testing::GateCheck;
 
 #if FULCRUM_SANITIZED
-constexpr int kInputs = 20'000;  ///< Some thirty times as slow, and their finds do not need the same numbers.
+constexpr int kInputs = 20'000;  ///< A sanitizer makes the test some thirty times as slow and needs fewer inputs.
 #else
 constexpr int kInputs = 1'000'000;
 #endif
-constexpr int kInputsPerServo = 2000;  ///< Then a fresh one: what one message may have shut out comes in again.
+constexpr int kInputsPerServo =
+    2000;  ///< Then a fresh servo, which accepts again what an earlier message may have shut out.
 
 /// Numbers at which comparisons and conversions go wrong, and the gate's own limits.
 const std::array<float, 22> kAwkward{0.0f,
@@ -64,7 +65,7 @@ class Mutator {
     GateCheck::Apply({at, {static_cast<const std::uint8_t*>(data), size}}, model);
   }
   void MutateOnce(ContactModel* model) {
-    // Half of them in the part that is in use: the stamps and the first device's two contacts.
+    // Half of them in the used part: the stamps and the first device's two contacts.
     constexpr std::size_t kUsed = offsetof(ContactModel, devices) + 2 * sizeof(Contact);
     const std::size_t at = random_() % (random_() % 2 == 0 ? kUsed : sizeof(ContactModel));
     const std::size_t word = at & ~std::size_t{3};
@@ -110,7 +111,7 @@ TEST(GateMutation, AMillionMessagesNeverBreakTheForce) {
     GateCheck check;
     for (int i = 0; i < kInputsPerServo; ++i) {
       ContactModel model = check.Good();
-      // Every tenth is good, so that there is a force to break.
+      // Every tenth message is valid, so that the force is not zero.
       if (i % 10 != 0) mutator.Mutate(&model);
       ASSERT_TRUE(check.Offer(model)) << "input " << offered + check.offered();
     }
@@ -118,7 +119,7 @@ TEST(GateMutation, AMillionMessagesNeverBreakTheForce) {
     refused += check.refused();
     peak = std::max(peak, check.peak_N());
   }
-  // Both happen, or the test tests nothing.
+  // Both outcomes must occur; otherwise the test checks nothing.
   EXPECT_GT(refused, offered / 4);
   EXPECT_GT(offered - refused, offered / 4);
   EXPECT_GT(peak, 1.0);

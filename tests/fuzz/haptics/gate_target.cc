@@ -9,7 +9,7 @@ using haptics::testing::GateCheck;
 
 /// Bringing a servo into contact takes a hundred times as long as an input: one servo takes many inputs.
 constexpr int kInputsPerServo = 256;
-/// Where the inputs of a servo go when the last of them alone breaks nothing, as one input.
+/// File that receives all inputs of a servo as one input when the last of them alone shows no fault.
 constexpr const char* kHistory = "haptics_gate_history";
 
 class HapticsGate final : public Target {
@@ -33,7 +33,7 @@ class HapticsGate final : public Target {
   std::vector<Seed> Seeds() override { return {{"unchanged", {0, 0, 0}}}; }
 
  private:
-  /// Adds the patches of an input, without what its last one lacks.
+  /// Adds the patches of an input; a truncated last patch is shortened to its bytes.
   void Remember(Input input) {
     while (input.size() >= 3) {
       const std::size_t length = std::min<std::size_t>(input[2] % 32u, input.size() - 3);

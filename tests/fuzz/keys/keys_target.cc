@@ -1,7 +1,7 @@
-// Any bytes as a certificate, a private key or a signed document. An input that begins as one of these files is one. Of
-// any other the first byte chooses what the rest is the binary content of, which is packed into text as in the file: a
-// change of the text alone seldom gets as far as the content. Certificate and authority of the corpus, made for this
-// and used nowhere else, are the ones to which keys and documents must belong.
+// Any bytes as a certificate, a private key or a signed document. An input that begins as one of these files is used as
+// such a file. In any other input the first byte selects the kind of file whose binary content the rest is; the content
+// is packed into text as in the file, because changes of the text alone seldom reach the content. Keys and documents
+// must belong to the certificate and authority of the corpus, made for this and used nowhere else.
 #include <openssl/evp.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include "services/transport/keys/authority.h"
 #include "tests/fuzz/target.h"
 
-// Leaks are looked for by the address sanitizer alone; gcc and clang tell of it in different ways.
+// Only the address sanitizer looks for leaks; gcc and clang report it in different ways.
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer)
 #define FULCRUM_FINDS_LEAKS
@@ -112,8 +112,8 @@ class Keys final : public Target {
   }
   void CheckDocument(const std::string& text) const {
 #ifdef FULCRUM_FINDS_LEAKS
-    // PKCS7_verify of OpenSSL 3.0 does not free its copy of the document when the signature cannot be read: once a
-    // start.
+    // PKCS7_verify of OpenSSL 3.0 does not free its copy of the document when the signature cannot be read, which
+    // occurs once per start.
     const __lsan::ScopedDisabler leaks;
 #endif
     const std::string signed_text = keys::VerifySigned(text, authority_, "it");

@@ -1,5 +1,5 @@
-// Packets of the other host's link, one after another: each has its length in two bytes in front of it. What is taken
-// from a packet is written as the same bytes again, and what is passed on is finite and in range.
+// Packets of the other host's link in sequence, each preceded by its length in two bytes. An accepted packet is encoded
+// to the same bytes again, and values that are passed on are finite and in range.
 #include <cmath>
 #include <map>
 
@@ -24,10 +24,10 @@ constexpr std::size_t kLargestSample_B = 128 * 1024;
 /// An offer may announce up to 256 MiB, which the receiver provides at once.
 constexpr std::uint64_t kLargestFetch_B = 1 << 20;
 
-/// What one side keeps between packets.
+/// State that one side keeps between packets.
 class Receiver {
  public:
-  /// False: the packet is no good.
+  /// False: the packet is invalid.
   bool Take(Input packet) {
     link::Envelope envelope;
     Input body;
@@ -135,7 +135,7 @@ void Append(const Bytes& packet, Bytes* all) {
   all->insert(all->end(), packet.begin(), packet.end());
 }
 
-/// One packet: its head, then what `put` appends.
+/// One packet: its head, then the bytes that `put` appends.
 template <class Put>
 void AppendPacket(link::PacketKind kind, Bytes* all, const Put& put) {
   Bytes packet;

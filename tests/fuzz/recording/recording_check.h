@@ -56,7 +56,7 @@ inline RecordingVerdict CheckRecording(std::span<const std::uint8_t> bytes, cons
     }
     if (!recording::CheckIndex(mended, &indexed).empty()) verdict.broken = "what was mended has a wrong index";
   } catch (const InputError&) {
-    // Told to the user.
+    // Reported to the user.
   }
   return verdict;
 }

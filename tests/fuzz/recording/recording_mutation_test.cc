@@ -1,5 +1,5 @@
-// Mutations of the corpus (tests/fuzz/corpus/recording: small recordings, whole and cut, packed and plain), the same
-// ones in every run: no bytes break a promise of the readers.
+// Mutations of the corpus (tests/fuzz/corpus/recording: small recordings, whole and cut, packed and plain), equal in
+// every run: no bytes violate a property of the readers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -92,7 +92,7 @@ TEST_F(RecordingFuzz, MutationsBreakNoPromise) {
     messages += verdict.messages;
     faults += verdict.faults;
   }
-  // Neither deaf nor gullible.
+  // Messages are read and faults are found.
   EXPECT_GT(messages, static_cast<std::uint64_t>(kInputs));
   EXPECT_GT(faults, static_cast<std::uint64_t>(kInputs / 4));
 }

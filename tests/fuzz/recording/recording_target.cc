@@ -1,5 +1,5 @@
-// Any bytes as a recording: read, mended, checked and printed as the tools of `fulcrum log` do. Checksums are removed
-// first (0 stands for none), or nothing beyond them would be reached.
+// Any bytes as a recording: read, repaired, checked and printed as the tools of `fulcrum log` do. Checksums are removed
+// first (0 stands for none); otherwise checks beyond them would not be reached.
 #include <cstring>
 #include <sstream>
 
@@ -58,7 +58,7 @@ class Recording final : public Target {
   }
 
  private:
-  /// A recording with one message. None of those whose size makes mutations rare.
+  /// A recording with one message. None for types whose size makes effective mutations rare.
   template <class T>
   static std::optional<Seed> SeedOf(const std::filesystem::path& file, const std::string& name) {
     constexpr std::size_t kMost_B = 2000;
@@ -82,7 +82,7 @@ class Recording final : public Target {
       try {
         tool();
       } catch (const InputError&) {
-        // Told to the user.
+        // Reported to the user.
       }
     };
     tell([&] { log_tools::PrintInfo(file, &out); });

@@ -1,6 +1,6 @@
 // A compiled scene: refused, or mapped to a view that passes the validation again. An input that begins as such a file
-// is one; any other is a list of patches over a good one (Patch). Sizes and checksums are made right before the file is
-// opened, or nothing beyond them would be reached.
+// is used as one; any other is a list of patches over a valid one (Patch). Sizes and checksums are corrected before the
+// file is opened; otherwise checks beyond them would not be reached.
 #include <cstring>
 
 #include "services/base/core/error.h"
@@ -34,7 +34,7 @@ struct Section {
   std::span<const std::byte> bytes;
 };
 
-/// The sections that lie within the file, in its order.
+/// The sections that lie within the file, in file order.
 std::vector<Section> SectionsOf(const Bytes& file) {
   std::vector<Section> sections;
   std::uint32_t count = 0;

@@ -16,7 +16,7 @@ inline void Require(bool holds) {
   }
 }
 
-/// True when `bytes` are a mesh. Aborts when they are read to something unsound or refused without the file's name.
+/// True when `bytes` are a mesh. Aborts if they give an invalid mesh or are refused without the file's name.
 inline bool CheckBytes(const MeshSample& sample, const std::string& bytes) {
   try {
     const MeshFile mesh = ParseSample(sample, bytes);

@@ -1,5 +1,5 @@
-// Thousands of mutations of a valid file of every variant, the same ones in every run: each is read or refused, and no
-// announced count makes the reader ask for memory that the file's bytes do not account for.
+// Thousands of mutations of a valid file of every variant, equal in every run: each is read or refused, and no
+// announced count makes the reader allocate more than the file's bytes justify.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -37,9 +37,9 @@ namespace fulcrum::scene {
 namespace {
 
 constexpr int kMutations = 4000;
-/// The largest block a file of n bytes may ask for: 64 n and a little, for a byte of text or of a packed list becomes a
-/// few numbers of 8 bytes at most, in vectors that double. zlib packs up to 1032 bytes into one, so that a damaged size
-/// is believed up to there.
+/// Largest block that the reader of a file of n bytes may allocate: 64 n and a constant, because a byte of text or of a
+/// packed list becomes a few numbers of at most 8 bytes, in vectors that double. zlib packs up to 1032 bytes into one,
+/// so a damaged size is accepted up to that factor.
 std::size_t AllowedBytes(const MeshSample& sample, std::size_t file_bytes) {
   const bool is_packed = sample.label.find("zlib") != std::string::npos;
   return (is_packed ? 2 * 1032 : 64) * file_bytes + 65536;
@@ -112,12 +112,12 @@ TEST_P(MutatedMeshFile, IsReadOrRefusedWithinBounds) {
     read += CheckBytes(sample, bytes) ? 1 : 0;
     ASSERT_LE(g_largest_allocation.load(), AllowedBytes(sample, bytes.size())) << "mutation " << i;
   }
-  // Neither blind nor deaf.
+  // Some files are read and some are refused.
   EXPECT_GT(read, kMutations / 100);
   EXPECT_LT(read, kMutations * 9 / 10);
 }
 
-/// A companion that is damaged does no more harm than the file itself.
+/// A damaged companion file is handled as safely as the file itself.
 TEST_P(MutatedMeshFile, CompanionsToo) {
   if (GetParam().beside.empty()) {
     return;

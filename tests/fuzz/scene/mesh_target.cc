@@ -1,4 +1,4 @@
-// Any bytes as a mesh file of one format. They are read to a sound mesh or refused.
+// Any bytes as a mesh file of one format: read to a valid mesh or refused.
 #include "tests/fuzz/scene/mesh_check.h"
 #include "tests/fuzz/target.h"
 
@@ -9,7 +9,7 @@ class Mesh final : public Target {
  public:
   explicit Mesh(const std::string& format) {
     for (scene::MeshSample& sample : scene::MeshSamples()) {
-      // All with the same companions.
+      // All have the same companions.
       if (sample.name == "a." + format && (samples_.empty() || sample.beside == samples_.front().beside)) {
         samples_.push_back(std::move(sample));
       }

@@ -1,5 +1,5 @@
 // A scene's description, which may be based on the shipped ones: refused with a file's name, or read to settings that
-// are written and read again unchanged, and of which a scene is built that passes its validation, if it is a small one.
+// are written and read again unchanged. From small ones a scene is built, which passes its validation.
 #include "services/base/core/error.h"
 #include "services/scene/builder/build.h"
 #include "services/scene/compiler/scene_yaml.h"
@@ -11,7 +11,7 @@
 namespace fulcrum::fuzz {
 namespace {
 
-/// A scene is built in a few milliseconds up to here.
+/// Up to these sizes a scene is built in a few milliseconds.
 constexpr int kMostTubeVertices = 300, kMostMembraneNodes = 600;
 
 class SceneYaml final : public Target {
@@ -24,7 +24,7 @@ class SceneYaml final : public Target {
     WriteFile(file, input);
     std::optional<scene::SceneDescription> read;
     try {
-      // The meshes of an imported organ are not there.
+      // The meshes of an imported organ are not available here.
       if (!NeedsFiles(scene::SceneRules(file))) read = scene::ReadSceneYaml(file, {});
     } catch (const InputError& refusal) {
       Promise(std::string_view(refusal.what()).starts_with(folder_.path().string()), "a refusal that names no file");
@@ -67,7 +67,7 @@ class SceneYaml final : public Target {
       const auto fault = scene::FindFault(data.View());
       Promise(!fault, fault ? "a scene was built with a fault: " + fault->section + ": " + fault->reason : "");
     } catch (const InputError&) {
-      // Told to the user: settings that give no scene.
+      // Settings that give no scene are reported to the user.
     }
   }
 

@@ -1,4 +1,4 @@
-// The smallest procedural scene that is one.
+// The smallest valid procedural scene.
 #pragma once
 
 #include "services/scene/builder/scene_settings.h"

@@ -1,5 +1,5 @@
 // Any bytes as the trainees' database: refused as a whole, or read, and then a session can be added and read again, or
-// the file is refused without having been changed.
+// the file is refused and unchanged.
 #include <cmath>
 
 #include "services/base/core/error.h"
@@ -25,7 +25,8 @@ class Trainee final : public Target {
     }
     good_ = ReadFile(file_);
   }
-  /// A database is some pages of 4 KiB, so an input is patches over a good one unless it begins as a database does.
+  /// A database is some pages of 4 KiB, so an input that does not begin as a database is used as patches over a valid
+  /// one.
   Outcome Offer(Input input) override {
     Bytes content(input.begin(), input.end());
     if (!TextOf(input).starts_with("SQLite format 3")) {

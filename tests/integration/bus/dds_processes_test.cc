@@ -23,7 +23,7 @@ const auto* const kClean = testing::AddGlobalTestEnvironment(new test::CleanDoma
 
 DdsParticipant MakeBus() { return DdsParticipant({.domain = kDomain, .node_name = "test", .shared_memory = {}}); }
 
-/// Of endpoints: for a moment there is also the file on which the library tries out whether files can be mapped.
+/// Number of endpoint files. The library also creates a file for a moment to test whether files can be mapped.
 int FilesOf(const std::filesystem::path& directory) {
   const auto is_endpoint = [](const auto& entry) {
     return entry.path().filename().string().find("01.0f.") != std::string::npos;
@@ -173,7 +173,7 @@ TEST(DdsProcesses, FilesOfTheDeadAreSweptAndThoseOfTheLivingStay) {
   const SweepResult swept = SweepSharedMemory(directory);
   EXPECT_GE(swept.files, 1);
   EXPECT_EQ(FilesOf(directory), files_before);
-  ASSERT_TRUE(Eventually([&] { return frames->TakeLatest(&frame); }));  // the survivor goes on
+  ASSERT_TRUE(Eventually([&] { return frames->TakeLatest(&frame); }));  // The other writer continues.
 }
 
 TEST(DdsProcesses, AnotherSchemaIsNamedAndExchangesNothing) {
@@ -192,14 +192,14 @@ TEST(DdsProcesses, AnotherSchemaIsNamedAndExchangesNothing) {
     EXPECT_NE(text.find("00000000000a11e5"), std::string::npos) << text;
     EXPECT_EQ(text.find('\n'), std::string::npos) << text;
 
-    // One that speaks our schema is heard meanwhile, so silence from the other is not for want of time.
+    // A peer with this schema is received meanwhile, so the other peer was not silent for lack of time.
     Peer friendly({kDomainText, "tools"});
     ToolState got;
     ASSERT_TRUE(Eventually([&] { return tools->TakeLatest(&got); }));
     friendly.Kill();
     ASSERT_TRUE(Eventually([&] { return !tools->stats().matched; }));
   }
-  EXPECT_TRUE(Eventually([&] { return bus.schema_mismatch().empty(); })) << "gone with the peer";
+  EXPECT_TRUE(Eventually([&] { return bus.schema_mismatch().empty(); })) << "cleared after the peer has left";
 }
 
 }  // namespace

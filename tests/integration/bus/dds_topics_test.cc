@@ -102,14 +102,14 @@ TEST(DdsInput, BytesThatAreNoMessageAreRefusedAndHoldNothingUp) {
   ContactModel model;
   Health health;
   ASSERT_TRUE(Eventually([&] { return models.in->TakeNext(&model); }));
-  // Bytes with many zeros may decode to a node that has done nothing yet.
+  // Bytes with many zeros may decode to a valid Health of a node that has not started its work.
   ASSERT_TRUE(Eventually([&] { return healths.in->TakeNext(&health) && Same(health, test::Sample<Health>()); }));
   EXPECT_TRUE(Same(model, test::Sample<ContactModel>()));
   const std::uint64_t refused = models.in->stats().rejected;
-  EXPECT_GT(refused, 5u) << "some are longer than any message and do not get this far";
+  EXPECT_GT(refused, 5u) << "some are longer than any message and are dropped earlier";
   EXPECT_GT(healths.in->stats().rejected, 5u);
   EXPECT_FALSE(models.in->TakeNext(&model));
-  EXPECT_EQ(models.in->stats().rejected, refused) << "each one once";
+  EXPECT_EQ(models.in->stats().rejected, refused) << "each is counted once";
   EXPECT_EQ(models.in->stats().received, 1u);
 }
 
@@ -149,7 +149,7 @@ TEST(RawInput, HearsAllThatAWriterSaidBeforeItLeft) {
   const auto input = listener.MakeRawInput(TopicId::kToolState, [&](const RawSample&, const auto&) { ++heard; });
   constexpr int kSamples = 40;
   for (int writer = 1; writer <= 5; ++writer) {
-    ASSERT_TRUE(Eventually([&] { return !input->matched(); })) << "the one before has left";
+    ASSERT_TRUE(Eventually([&] { return !input->matched(); })) << "the previous writer has left";
     DdsParticipant teller({.domain = kDomain, .node_name = "teller", .shared_memory = {}});
     auto output = teller.MakeOutput<ToolState>();
     ASSERT_TRUE(Eventually([&] { return output->has_readers() && input->matched(); }));
@@ -242,7 +242,7 @@ TEST(DdsOutput, PayloadIsWrittenInTheSharedMemoryOfTheCart) {
 
 TEST(DdsOutput, FillThatThrowsIsCountedAndItsLoanComesBack) {
   Pair<TissueFrame> bus;
-  for (int i = 0; i < 20; ++i) {  // more often than there are places in the pool
+  for (int i = 0; i < 20; ++i) {  // More often than the pool has places.
     EXPECT_FALSE(bus.out->WriteInPlace([](TissueFrame::View) { throw 1; }));
     EXPECT_FALSE(bus.out->WriteInPlace([](TissueFrame::View v) { v.header.vertex_count = kMaxTissueVertices + 1; }));
   }
@@ -285,7 +285,7 @@ TEST(DdsInput, SamplesOfAnotherSessionAreDroppedAndCounted) {
     EXPECT_FALSE(large_in->TakeLatest(&large));
     return heard && ours.foreign_samples() > 20;
   }));
-  EXPECT_EQ(small_in->stats().rejected, 0u) << "a foreign sample is no faulty one";
+  EXPECT_EQ(small_in->stats().rejected, 0u) << "a foreign sample is not an invalid one";
   EXPECT_EQ(ours.refusals().participants, 1u);
   ASSERT_EQ(ours.refusals().texts.size(), 1u);
   EXPECT_NE(ours.refusals().texts[0].find("is of another session"), std::string::npos) << ours.refusals().texts[0];

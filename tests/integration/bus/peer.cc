@@ -46,7 +46,7 @@ std::int64_t NowNs() { return std::chrono::steady_clock::now().time_since_epoch(
   }
 }
 
-/// What late joiners are owed, once.
+/// Publishes once each topic that late joiners receive.
 [[noreturn]] void PublishState(DdsParticipant* bus, int node) {
   auto scene = bus->MakeOutput<SceneManifest>();
   auto topology = bus->MakeOutput<TopologyState>();
@@ -91,7 +91,7 @@ int Main(int argc, char** argv) {
   settings.domain = std::atoi(argv[1]);
   settings.node_name = "peer_" + role;
   if (role == "alien") settings.schema_hash = 0xa11e5ull;
-  settings.lease_s = 1;  // So that tests need not wait until it is forgotten.
+  settings.lease_s = 1;  // Short, so that tests need not wait until a killed peer is removed.
   DdsParticipant bus(settings);
   if (role == "tools") PublishTools(&bus);
   if (role == "frames") PublishFrames(&bus);

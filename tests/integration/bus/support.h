@@ -18,7 +18,7 @@
 
 namespace fulcrum::bus::test {
 
-/// Waits for a condition that must come true; these tests do not check the time that it takes.
+/// Waits for a condition that must become true; these tests do not check the time that it takes.
 template <class Condition>
 bool Eventually(const Condition& condition) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
@@ -79,7 +79,7 @@ class Peer {
   int output_ = -1;
 };
 
-/// Leaves nothing of a test's domain on /dev/shm.
+/// Removes all files of a test's domain from /dev/shm.
 class CleanDomain : public testing::Environment {
  public:
   explicit CleanDomain(int domain) : domain_(domain) {}

@@ -1,5 +1,5 @@
-// confined_node NODE SESSION DOMAIN: confines itself as that node does and tries what it must not and what it must be
-// able to do; prints a line "attempt: result" for each. The session folder has the folders frames and logs.
+// confined_node NODE SESSION DOMAIN: confines itself as that node does and attempts operations that are forbidden or
+// required; prints a line "attempt: result" for each. The session folder has the folders frames and logs.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <sched.h>
@@ -100,7 +100,7 @@ void TrySystemCalls() {
 
 int main(int argc, char** argv) {
   if (argc != 4) return 2;
-  using namespace fulcrum;  // NOLINT: a main is nothing but names of other modules
+  using namespace fulcrum;  // NOLINT: this main only uses names of other modules
   const std::string name = argv[1];
   app::NodeOptions options;
   options.session = argv[2];

@@ -1,4 +1,4 @@
-// What a confined node can still do: a process confines itself as a node does and tries.
+// Operations that a confined node can still do: a process confines itself as a node does and attempts them.
 #include "services/base/runtime/confinement.h"
 
 #include <gtest/gtest.h>
@@ -35,7 +35,7 @@ class Confinement : public ::testing::Test {
     bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kDomain));
     fs::remove("/dev/shm/confined_node.other");
   }
-  /// What the process says, by attempt.
+  /// Results that the process prints, by attempt.
   Results As(const std::string& node) {
     testing::Program program("/usr/bin/env", {"HOME=" + home_.string(), FULCRUM_BIN_DIR "/confined_node", node,
                                               session_, std::to_string(kDomain)});

@@ -1,4 +1,4 @@
-// fulcrum doctor --security: what it says of a machine, of keys and of a running session.
+// fulcrum doctor --security: its report on a machine, on keys and on a running session.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -27,7 +27,7 @@ class SecurityReport : public ::testing::Test {
     fs::remove_all(folder_);
     bus::RemoveSharedMemory(bus::SharedMemoryDirectory(kDomain));
   }
-  /// What is said of `what`: its mark and finding, and after "→" the meaning; empty: nothing.
+  /// Part of the report about `what`: mark and finding, and after "→" the meaning; empty: none.
   static std::string Of(const std::string& what, const std::string& report) {
     std::smatch found;
     const std::regex line("\n(\\S+ " + what + " [^\n]*\n +→ [^\n]+)");

@@ -1,4 +1,4 @@
-// `fulcrum console` as a stranger, a page and an operator meet it: a real server, real sessions, a raw client.
+// `fulcrum console` as used by a stranger, by its page and by an operator: a real server, real sessions, a raw client.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -36,13 +36,14 @@ class ConsoleTest : public ::testing::Test {
 
   [[nodiscard]] std::string out() const { return folder_ / "out"; }
   [[nodiscard]] std::vector<std::string> Token() const { return {"--token-file", (folder_ / "token").string()}; }
-  /// The state that the page would be shown says all of these.
+  /// True if the state for the page contains all of these.
   static bool Says(const ConsoleProgram& console, std::initializer_list<const char*> texts) {
     const std::string state = console.Get("/api/state").body;
     return std::all_of(texts.begin(), texts.end(),
                        [&](const char* text) { return state.find(text) != std::string::npos; });
   }
-  /// The supervisor did what was asked. It may be late with its answer on a busy machine: then it is asked again.
+  /// True if the supervisor executes the request. Its answer may be late on a busy machine; the request is then
+  /// repeated.
   static bool Obeys(const ConsoleProgram& console, const std::string& call, const std::string& body) {
     const auto number = [&] { return Between(console.Get("/api/state").body, "\"notice\":{\"number\":", ","); };
     for (int attempt = 0; attempt < 3; ++attempt) {
@@ -117,7 +118,7 @@ TEST_F(ConsoleTest, ASessionFromStartToReport) {
   EXPECT_EQ(console.Post("/api/start", "scene=small").status, 409);
   ASSERT_TRUE(WaitFor(60, [&] { return Says(console, {"\"phase\":\"running\""}); }))
       << ReadFile(out() + "/console.log");
-  // All run: five of the scene, and the recorder of what is kept. Slow is no failure of this test's.
+  // All processes run: five of the scene, and the recorder for dumps. Slowness is not a failure in this test.
   EXPECT_TRUE(WaitFor(20, [&] {
     const std::string state = console.Get("/api/state").body;
     std::size_t running = 0;
@@ -145,13 +146,13 @@ TEST_F(ConsoleTest, ASessionFromStartToReport) {
   ASSERT_TRUE(WaitFor(30, [&] { return Says(console, {"\"phase\":\"idle\"", "\"has_report\":true"}); }));
   EXPECT_TRUE(Says(console, {"\"ended\":{\"well\":true"})) << ReadFile(out() + "/console.log");
   EXPECT_NE(console.Get("/api/summary").body.find("\"scene\": \"small\""), std::string::npos);
-  // What was chosen on the page is what ran.
+  // The session ran with the settings chosen on the page.
   const std::string configuration = ReadFile(fs::path(out()) / "latest" / "configuration.yaml");
   EXPECT_NE(configuration.find("power_W: 30"), std::string::npos);
   EXPECT_EQ(configuration.find("power_W: 35"), std::string::npos);
   EXPECT_NE(configuration.find("png_rate_Hz: 5"), std::string::npos);
 
-  // Other users see nothing of it.
+  // Other users cannot read the session.
   const fs::path session_folder = fs::canonical(fs::path(out()) / "latest");
   EXPECT_EQ(fs::status(session_folder).permissions(), fs::perms::owner_all);
   for (const fs::path& file : {session_folder / "report.html", fs::path(out()) / "console.log"}) {
@@ -163,7 +164,7 @@ TEST_F(ConsoleTest, ASessionFromStartToReport) {
   const HttpReply first = console.Ask("GET", report, host);
   EXPECT_EQ(first.status, 200);
   EXPECT_NE(first.head.at("content-security-policy").find("sandbox"), std::string::npos);
-  EXPECT_EQ(console.Ask("GET", report, host).status, 401) << "a ticket is good once";
+  EXPECT_EQ(console.Ask("GET", report, host).status, 401) << "a ticket is valid once";
 
   const std::string recordings = console.Get("/api/recordings").body;
   EXPECT_NE(recordings.find("/dump.mcap"), std::string::npos) << recordings;

@@ -21,7 +21,7 @@ using std::chrono::seconds;
 constexpr const char* kPage = "GET / HTTP/1.1\r\nHost: x\r\n\r\n";
 constexpr const char* kKnown = "GET / HTTP/1.1\r\nHost: x\r\nAuthorization: yes\r\n\r\n";
 
-/// Serves in a thread. A client is known by the header "Authorization: yes".
+/// Serves in a thread. The header "Authorization: yes" authenticates a client.
 class Served {
  public:
   explicit Served(const HttpLimits& limits, std::optional<TlsIdentity> tls = {})
@@ -100,7 +100,7 @@ TEST(HttpServer, ASlowGuestHasOneLimitForItsWholeRequest) {
   Served served(Small());
   HttpConnection slow(served.port());
   slow.Send("GET / HT");
-  // Drops of a request, each well before the limit would be over, do not move it.
+  // Single bytes of a request, each sent well before the limit, do not extend the limit.
   int drops = 0;
   while (drops < 50 && !slow.Closes(0.1)) {
     slow.Send("T");

@@ -1,4 +1,5 @@
-// `fulcrum console` besieged: silent connections, floods of headers, garbage for TLS, and what it says of its token.
+// `fulcrum console` under attack: silent connections, floods of headers, garbage for TLS, and its output about the
+// token.
 #include "tests/support/siege.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +28,7 @@ using fulcrum::testing::Siege;
 using fulcrum::testing::WaitFor;
 
 constexpr int kDomain = 66;
-// Slots of guests and of clients with the token, and what may be open for a moment beside them.
+// Slots of guests and of clients with the token, and a few sockets that may be open for a moment.
 constexpr std::size_t kMostSockets = 256 + 32 + 8;
 
 class SiegeTest : public ::testing::Test {
@@ -108,7 +109,7 @@ TEST_F(SiegeTest, BeyondThisMachineEverythingIsOverTls) {
                      head + "Content-Length: 0\r\nOrigin: http://cart-3:" + std::to_string(console.port()) + "\r\n")
                 .status,
             403)
-      << "a page without TLS is another page";
+      << "without TLS it is another origin";
   EXPECT_EQ(console
                 .Ask("POST", "/api/stop",
                      head + "Content-Length: 0\r\nOrigin: https://cart-3:" + std::to_string(console.port()) + "\r\n")
@@ -141,14 +142,14 @@ TEST_F(SiegeTest, HandshakesThatDoNotEndAndGarbageHoldNobodyUp) {
       EXPECT_LE(OpenDescriptors(console.program().pid()), before + kMostSockets);
     }
   }
-  // All that was opened is closed again.
+  // All opened sockets are closed again.
   EXPECT_TRUE(WaitFor(10, [&] { return OpenDescriptors(console.program().pid()) <= before + 1; }))
       << OpenDescriptors(console.program().pid()) << " descriptors, " << before << " before";
   EXPECT_EQ(console.program().End(SIGTERM), 0);
 }
 
 TEST_F(SiegeTest, FewDescriptorsAreEnough) {
-  // The console must not spin or fall silent when the system gives it no descriptor for one more connection.
+  // The console must neither spin nor stop answering when the system has no descriptor for one more connection.
   Program console("/bin/sh",
                   {"-c", "ulimit -n 64; exec \"$@\"", "sh", FULCRUM_BIN_DIR "/fulcrum", "console", "--port", "0",
                    "--domain", std::to_string(kDomain), "--out", out(), "--token-file", (folder_ / "token").string()});

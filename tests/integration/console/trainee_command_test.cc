@@ -1,4 +1,4 @@
-// `fulcrum trainee NAME --delete` as an operator uses it.
+// `fulcrum trainee NAME --delete` as used by an operator.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
@@ -52,7 +52,7 @@ class TraineeCommandTest : public ::testing::Test {
 };
 
 TEST_F(TraineeCommandTest, DeletesRowsAndNameAfterAConfirmation) {
-  EXPECT_EQ(Trainee({"Ann", "--delete", "--out", out().string()}), 2) << "nobody has confirmed";
+  EXPECT_EQ(Trainee({"Ann", "--delete", "--out", out().string()}), 2) << "no confirmation was given";
   EXPECT_NE(said_.find("--yes"), std::string::npos) << said_;
   EXPECT_EQ(TrainingLog(database()).Trainees().at("Ann"), 2);
   EXPECT_EQ(Trainee({"Ann", "--delete", "--yes", "--out", out().string()}), 0) << said_;

@@ -1,4 +1,5 @@
-// The handle_bridge executable on the real bus: joins a session, survives kill -9, goes on where the script is.
+// The handle_bridge executable on the real bus: joins a session, survives kill -9, resumes at the script's current
+// position.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -86,7 +87,7 @@ class HandleProcess : public ::testing::Test {
     return -1;
   }
 
-  /// Session time 0 is `ago_s` in the past.
+  /// Starts a session `ago_s` in the past.
   void StartSession(double ago_s) {
     const std::int64_t now = runtime::MonotonicNs();
     manifest_.stamp = stamper_.Next(now);
@@ -131,7 +132,7 @@ TEST_F(HandleProcess, JoinsASessionIsKilledAndGoesOnWithTheScript) {
 
   Program second = Bridge(NodeWords());
   ASSERT_TRUE(WaitFor([&](const HandleState& s) { return s.stamp.epoch > epoch && present(s); }));
-  // From its first sample on the angle is the script's: no trace of the script's beginning.
+  // From the first sample on the angle is that of the script now, not that of its beginning.
   for (int i = 0; i < 100; ++i) {
     for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
       EXPECT_NEAR(state_.handles[tool].jaw_angle_rad, TruthAt(state_.stamp.stamp_ns, tool), 0.1);
@@ -152,7 +153,7 @@ TEST_F(HandleProcess, BadCartEndsWithTheUsageCode) {
 }
 
 TEST_F(HandleProcess, CalibrationInTheHandIsStoredAndUsedUnlessRefused) {
-  // The refused ones take their time beside the good one.
+  // The refused calibrations run beside the valid one, because they take long.
   ::setenv("XDG_STATE_HOME", (folder_ / "refused").c_str(), 1);
   const std::string silent = WriteCart("handles: {tool1: {simulated: {silent_s: [0, 99]}}}", "silent.yaml");
   const std::string noisy = WriteCart("handles: {tool0: {simulated: {noise_mV: 10}}}", "noisy.yaml");
@@ -172,11 +173,11 @@ TEST_F(HandleProcess, CalibrationInTheHandIsStoredAndUsedUnlessRefused) {
       {Bridge({"calibrate", "--help"}), 0, "For each angle, set the jaw to it"},
   }};
   ::setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
-  // A potentiometer 10 mV off, 9 % too long and bent by 3 %: 2 deg wrong at 50 deg with the cart's line.
+  // A potentiometer with an offset of 10 mV, 9 % too long and bent by 3 %: 2 deg wrong at 50 deg with the cart's line.
   const std::string cart = WriteCart(
       "handles: {tool0: {simulated: {protocol: framed, closed_V: 2.36, open_V: 2.545, bow_percent: 3, "
       "tremor_deg: 0.25}}}");
-  // More lines than points: a busy machine may have a point taken again.
+  // More lines than points: on a busy machine a point may have to be repeated.
   Program good = Bridge({"calibrate", "--cart", cart}, "\n\n\n\n\n\n\n\n");
   EXPECT_EQ(good.End(0), 0);
   EXPECT_NE(good.Said().find("stored for simulated-tool0"), std::string::npos) << good.Said();
@@ -187,7 +188,7 @@ TEST_F(HandleProcess, CalibrationInTheHandIsStoredAndUsedUnlessRefused) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "refused"));
 
   Program node = Bridge(NodeWords(cart));
-  StartSession(5.5);  // The jaw is open: at 0 deg the calibrated range hides the error.
+  StartSession(5.5);  // The jaw is open: at 0 deg clamping to the calibrated range hides the error.
   ASSERT_TRUE(WaitForHealth([](const Health& h) {
     return MetricOf(h, "calibration0_points") == 5 && MetricOf(h, "quality0") > 0.9;
   })) << health_.last_error;

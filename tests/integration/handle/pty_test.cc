@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
-/// A triangle of 6 deg/s: slow enough that a late thread of a busy machine is no error.
+/// A triangle of 6 deg/s: slow enough that a late thread on a busy machine causes no error.
 double SlowJaw(std::int64_t now_ns) {
   const double t = std::fmod(static_cast<double>(now_ns) * 1e-9, 10.0);
   return 15 + 6 * (t < 5 ? t : 10 - t);
@@ -83,7 +83,7 @@ class Chain {
     const std::lock_guard lock(mutex_);
     pedals_ = pedals;
   }
-  /// What befalls a link from now on.
+  /// Sets the faults of a link from now on.
   void SetFaults(std::size_t link, const LinkFaults& faults) {
     const std::lock_guard lock(mutex_);
     faults_[link] = faults;
@@ -188,7 +188,7 @@ TEST(HandlePty, GarbageIsNeitherWrongBaudNorMotion) {
   noise.cable.garbage = true;
   chain.SetFaults(1, noise);
   EXPECT_TRUE(chain.WaitForError("handle 1: garbage: under half of the lines are valid, at no usual speed"));
-  // Long enough for another speed.
+  // Longer than the search takes to change to another speed.
   for (int i = 0; i < 450; ++i) {
     ASSERT_TRUE(chain.WaitFor([](const HandleState&) { return true; }));
     ASSERT_NEAR(chain.state.handles[1].jaw_angle_rad * kDegPerRad, 30, 1.5);
@@ -268,7 +268,7 @@ TEST(HandlePty, UnpluggedHandleHoldsAndIsFoundAgainUnderAnotherName) {
     EXPECT_EQ(chain.state.handles[0].quality, 0.0f);
     EXPECT_TRUE(chain.WaitFor([](const HandleState& s) {
       return std::abs(s.handles[1].jaw_angle_rad * kDegPerRad - 30) < 1.5;
-    })) << "the other handle goes on";
+    })) << "the other handle continues";
     chain.SetFaults(0, {});
     EXPECT_TRUE(chain.WaitForHealthy());
     EXPECT_EQ(chain.metric("reconnects"), round);
@@ -344,7 +344,7 @@ TEST(PseudoTerminal, HangUpIsSeenWithinFiniteReads) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   EXPECT_TRUE(hung_up);
-  // The kernel may drop what was not read yet, but it adds nothing.
+  // The kernel may drop unread bytes, but adds none.
   EXPECT_TRUE(received.empty() || received == "2.4498\r\n") << received;
 }
 

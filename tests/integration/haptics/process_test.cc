@@ -1,5 +1,5 @@
 // The haptics_node executable with simulated devices and with the stand-in of the Touch's driver: its calibration
-// command, what it says when something is missing, and a session with a device that moves.
+// command, its messages when something is missing, and a session with a device that moves.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -44,7 +44,7 @@ class HapticsProcess : public ::testing::Test {
     fs::remove_all(folder);
   }
 
-  /// Starts haptics_node; with a driver, it is the stand-in.
+  /// Starts haptics_node; the driver, if any, is the stand-in.
   void Start(const std::vector<std::string>& arguments, bool with_driver) {
     ::setenv("XDG_STATE_HOME", folder.c_str(), 1);
     ::setenv("LD_LIBRARY_PATH", with_driver ? FULCRUM_HD_FOLDER : "/nonexistent", 1);
@@ -127,7 +127,7 @@ TEST_F(HapticsProcess, ATouchMovesItsToolInASession) {
   manifest.session_start_ns = now;
   manifests->Write(manifest);
 
-  // The hand swings by 0.4 rad to each side; the tool follows once it has glided to the hand.
+  // The hand swings by 0.4 rad to each side; the tool follows once it has reached the hand.
   ToolState tool;
   Vec3f least = Vec3f::Constant(1), most = Vec3f::Constant(-1);
   for (int i = 0; i < 8000 && !((most - least).x() > 0.05f); ++i) {

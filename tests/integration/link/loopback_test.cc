@@ -1,4 +1,5 @@
-// Two carts' buses in one process, joined by two links over 127.0.0.1: what crosses, what does not, and as whose.
+// Two carts' buses in one process, joined by two links over 127.0.0.1: which samples cross, which do not, and under
+// which writer.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -47,7 +48,7 @@ Offer SomeOffer(std::uint32_t nodes) {
   return offer;
 }
 
-/// Cart and host, with `far` on the host.
+/// A cart and a host; the nodes in `far_nodes` run on the host.
 struct TwoHosts {
   explicit TwoHosts(std::uint32_t far_nodes)
       : cart_link(LinkSettings{.far = Far(bus::FarSide::kCart), .offer = SomeOffer(far_nodes), .scene = {}}),
@@ -73,7 +74,7 @@ void Restamp(T* message, std::uint64_t sequence, std::int64_t epoch) {
   const_cast<Stamp&>(bus::StampOf(*message)) = {sequence, static_cast<std::uint64_t>(epoch), MonotonicNs()};
 }
 
-/// Sends `message` on `out` until it comes out of `in`, `is_it`.
+/// Sends `message` on `out` until `in` receives a message that satisfies `is_it`.
 template <class T, class IsIt>
 bool Crosses(typename bus::OutputOf<T>::type* out, bus::Input<T>* in, T message, T* got, const IsIt& is_it) {
   const std::int64_t epoch = MonotonicNs();
@@ -108,8 +109,8 @@ TEST(Link, CarriesWhatNodesOfTheOtherHostReadAndNothingElse) {
   ToolState tool;
   ASSERT_TRUE(Crosses(tools_out.get(), tools_in.get(), Sample<ToolState>(), &tool));
   EXPECT_EQ(tool.tools[0].p_WT, Sample<ToolState>().tools[0].p_WT);
-  // The same clock on both sides here: what is left is the error of the measurement, which becomes better with more
-  // round trips.
+  // Both sides use the same clock here: the difference is the error of the measurement, which decreases with the number
+  // of round trips.
   EXPECT_LT(std::abs(MonotonicNs() - tool.stamp.stamp_ns), 20'000'000'000);
   EXPECT_TRUE(Eventually([&] { return std::abs(hosts.host_link->status().offset_us) < 2000; }))
       << hosts.host_link->status().offset_us;
@@ -119,12 +120,12 @@ TEST(Link, CarriesWhatNodesOfTheOtherHostReadAndNothingElse) {
   ASSERT_TRUE(Crosses(tissue_out.get(), tissue_in.get(), sheet, &frame));
   EXPECT_LE(test::ErrorOf(frame, sheet), kTissueError_m);
 
-  // Reliable, and told as a difference from the second on.
+  // Reliable, and sent as a difference from the second message on.
   TopologyState state = Sample<TopologyState>(), got;
   ASSERT_TRUE(Crosses(topology_out.get(), topology_in.get(), state, &got));
   state.revision = got.revision + 1;
   SetBit(state.dead_edges, 17);
-  // One of the first may still be on its way.
+  // A copy of the first message may still be in transit.
   ASSERT_TRUE(Crosses(topology_out.get(), topology_in.get(), state, &got,
                       [&](const TopologyState& it) { return it.revision == state.revision; }));
   EXPECT_EQ(got.dead_edges, state.dead_edges);
@@ -136,7 +137,7 @@ TEST(Link, CarriesWhatNodesOfTheOtherHostReadAndNothingElse) {
   EXPECT_LT(std::abs(received.session_start_ns - manifest.session_start_ns), 5'000'000);
   EXPECT_EQ(received.session_id, manifest.session_id);
 
-  // Nobody on the host reads contact models, so nobody here does either.
+  // Without a reader of contact models on the host there is none here either.
   EXPECT_FALSE(contact_out->has_readers());
   EXPECT_TRUE(tools_out->has_readers());
 }
@@ -153,7 +154,7 @@ TEST(Link, ALateJoinerAndARestartedLinkAreGivenTheNewest) {
     ASSERT_TRUE(Eventually([&] { return late->TakeLatest(&got); }));
     EXPECT_EQ(got.revision, state.revision);
   }
-  // The far host's bus goes on while its link begins anew: the same process must be newer than before to its readers.
+  // The far host's bus keeps running while its link restarts: its readers must see a newer epoch of the same process.
   const auto reader = hosts->host.MakeInput<TopologyState>();
   TopologyState got;
   ASSERT_TRUE(Eventually([&] { return reader->TakeLatest(&got); }));
@@ -211,7 +212,7 @@ TEST(Link, AManifestOfATickNamesSamplesAsTheyAreOnEachHost) {
   ASSERT_TRUE(Crosses(ticks_out.get(), ticks_in.get(), tick, &got));
   ASSERT_EQ(got.consumed.size(), 1u);
   EXPECT_EQ(got.consumed[0].sequence, tool.stamp.sequence);
-  // The tools' own epoch, not the one under which the host knows them.
+  // The tools' own epoch, not the one that the link assigned on the host.
   EXPECT_NE(got.consumed[0].epoch, tool.stamp.epoch);
   EXPECT_LT(got.consumed[0].epoch, tool.stamp.epoch);
 }

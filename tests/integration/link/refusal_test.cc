@@ -1,4 +1,4 @@
-// What a link refuses: the other side is played by bytes, so that it can send what no link would.
+// What a link refuses: the test plays the other side with raw bytes, which can send what no link would.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -69,7 +69,7 @@ bool Names(Link* link, const std::string& what) {
   return std::ranges::any_of(texts, [&](const std::string& text) { return text.find(what) != std::string::npos; });
 }
 
-/// The other side of a link: answers pulses, so that its clock is known, and sends what it is told to.
+/// The other side of a link: answers pulses, so that its clock is known, and sends the test's packets.
 class Intruder {
  public:
   explicit Intruder(FarSide side)
@@ -153,7 +153,7 @@ struct Attacked {
   }
   ~Attacked() { link.Leave(); }
 
-  /// Sends `message` until it is refused and named.
+  /// Sends `message` until the link refuses it and names it in a report.
   template <class T>
   void ExpectNamed(const T& message, const std::string& what) {
     const std::uint64_t before = link.status().refused;
@@ -200,7 +200,7 @@ TEST(LinkRefusal, FromTheHostTheCartTakesSamplesOfTheHostsNodesOnly) {
   cart.ExpectNamed(Attacked::HealthOf(NodeId::kPhysics), "Health of physics_node");
   TickManifest tick = Sample<TickManifest>();
   tick.node = NodeId::kPhysics;
-  // TickManifest is only taken while it has a reader.
+  // The link accepts TickManifest only while it has a reader.
   const auto ticks = cart.local.MakeInput<TickManifest>();
   cart.ExpectNamed(tick, "TickManifest of physics_node");
   tick.node = NodeId::kThermal;
@@ -212,14 +212,14 @@ TEST(LinkRefusal, FromTheHostTheCartTakesSamplesOfTheHostsNodesOnly) {
   }));
   EXPECT_EQ(got.node, NodeId::kThermal);
 
-  // None of it was published.
+  // None of these samples was published.
   ToolState tool;
   SceneManifest manifest;
   Health health;
   EXPECT_FALSE(tools->TakeLatest(&tool));
   EXPECT_FALSE(manifests->TakeLatest(&manifest));
   while (cart.healths->TakeNext(&health)) EXPECT_EQ(health.node, NodeId::kRender);
-  EXPECT_EQ(cart.link.refusals().count(), 6u) << "each is named once";
+  EXPECT_EQ(cart.link.refusals().count(), 6u) << "each is reported once";
 }
 
 TEST(LinkRefusal, FromTheCartAHostTakesNothingOfItsOwnNodes) {
@@ -234,7 +234,7 @@ TEST(LinkRefusal, FromTheCartAHostTakesNothingOfItsOwnNodes) {
   EXPECT_FALSE(topologies->TakeLatest(&topology));
 }
 
-// No topic carries a command. What is left to try is a sample of a topic that does not exist, or another kind of
+// No topic carries a command. The remaining attempts are a sample of a topic that does not exist, and another kind of
 // packet.
 TEST(LinkRefusal, ACommandIsRefusedOnBothSides) {
   const std::string swap = "swap physics_node command /bin/sh";
@@ -256,7 +256,7 @@ TEST(LinkRefusal, ACommandIsRefusedOnBothSides) {
     }));
     EXPECT_LE(attacked.link.status().refused, before + sent);
     EXPECT_TRUE(attacked.HealthArrives(side == FarSide::kCart ? NodeId::kRender : NodeId::kPhysics))
-        << "the link lives";
+        << "the link still works";
   }
 }
 
@@ -384,7 +384,7 @@ TEST(LinkAddress, AHostAtAnotherAddressThanThePeerNeverConnects) {
   Link cart(settings);
   Link host(HostSettings());  // It sends from 127.0.0.1.
   EXPECT_TRUE(Eventually([&] { return Names(&cart, "from 127.0.0.1, which is not its peer"); }));
-  // As long as ten announcements take; two sides that accept each other need one.
+  // The time of ten announcements; two sides that accept each other need one.
   std::this_thread::sleep_for(std::chrono::seconds(2));
   EXPECT_EQ(host.session().number, 0u);
   EXPECT_FALSE(cart.status().connected);
@@ -423,7 +423,7 @@ TEST(LinkKeys, ABurstOfSmallEncryptedPacketsArrivesWhole) {
   bus::FarParticipant host(Far(FarSide::kHost, keys.ours), [&](FarLane, std::span<const std::uint8_t>) { ++arrived; });
   bus::FarParticipant cart(Far(FarSide::kCart, keys.ours), [](FarLane, std::span<const std::uint8_t>) {});
   ASSERT_TRUE(Eventually([&] { return cart.matched() && host.matched(); }));
-  // Fewer than kOrderedBacklog, so that none is replaced; more than one datagram holds.
+  // Fewer than kOrderedBacklog, so that none is replaced; more than fit into one datagram.
   constexpr int kBursts = 20, kBurst = 200;
   std::vector<std::uint8_t> packet(60);
   for (int burst = 1; burst <= kBursts; ++burst) {
@@ -444,7 +444,7 @@ TEST(LinkKeys, ComeFromTheOptionTheCartFileOrTheDefaultFolderOrTheLinkIsNamedIns
   EXPECT_THROW((void)KeysOfLink(keys.folder / "none", {}, false), InputError);
   try {
     (void)KeysOfLink({}, {}, false);
-    ADD_FAILURE() << "a link without keys";
+    ADD_FAILURE() << "a link was made without keys";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("run `fulcrum keys init`"), std::string::npos) << error.what();
   }

@@ -20,16 +20,16 @@ using testing::RecorderProbe;
 constexpr int kCartDomain = 57, kProbeDomain = 58;
 
 TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
-  // Long enough for the hook to have burnt something.
+  // Long enough for the hook to have cut something.
   Cart cart("small", kCartDomain, {"--record", "--seconds", "3.5"});
   ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.Said().find(" s · ") != std::string::npos; })) << cart.Said();
-  // A command and its reply: this session keeps nothing for a dump, so it is refused.
+  // A command and its reply: this session has no recorder for dumps, so the dump is refused.
   EXPECT_EQ(Program("fulcrum", {"dump", "--domain", std::to_string(kCartDomain)}).End(0), 1);
   EXPECT_EQ(cart.WaitForEnd(60), 0) << cart.Said();
   EXPECT_NE(cart.Said().find("recording.mcap"), std::string::npos) << "the report names it\n" << cart.Said();
   const fs::path file = cart.session() / "recording.mcap";
 
-  // No node began at a deadline, without the recorder's report that it reads the node's writers.
+  // Every node began after the recorder had reported that it reads the node's writers, and none at its deadline.
   for (const auto& log : fs::directory_iterator(cart.session() / "logs")) {
     EXPECT_EQ(testing::ReadFile(log.path()).find("no recorder reads"), std::string::npos) << log.path();
   }
@@ -54,7 +54,7 @@ TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
     if (role.id == TopicId::kTearState) continue;  // Nothing tears in this scene.
     EXPECT_GE(decoded[std::string(bus::TopicLabel(role.id))], 1) << role.name;
   }
-  // How many there are is a matter of the machine; that they are in the file is not.
+  // The number of samples depends on the machine; nearly all of them must be in the file.
   for (const std::string topic : {"ToolState", "TissueFrame"}) {
     const auto [first, last] = sequences[topic];
     EXPECT_GT(decoded[topic], 100) << topic;
@@ -67,7 +67,7 @@ TEST(RecordedCart, EveryTopicIsInTheFileAndDecodes) {
   EXPECT_EQ(metadata.at("session").at("scene"), "small");
   EXPECT_NE(metadata.at("cart").at("yaml").find("physics_node"), std::string::npos);
 
-  // For the readers of others.
+  // Input for tests of third-party readers.
   fs::copy_file(file, fs::path(FULCRUM_BIN_DIR).parent_path() / "recorded_session.mcap",
                 fs::copy_options::overwrite_existing);
 }
@@ -80,7 +80,7 @@ TEST(KilledRecorder, LeavesAFileWithAllThatIsOlderThanASecond) {
     EXPECT_EQ(result.read, result.due);
     EXPECT_LT(result.unread_ms, 1000);
     const fs::path mended = result.file.parent_path() / ("mended" + std::to_string(kill) + ".mcap");
-    EXPECT_FALSE(log_tools::Recover(result.file, mended).empty()) << "it was not closed";
+    EXPECT_FALSE(log_tools::Recover(result.file, mended).empty()) << "the file was not closed";
     log_tools::Recording whole(mended);
     log_tools::Entry entry;
     while (whole.Next(&entry)) {
@@ -111,11 +111,11 @@ TEST(RestartedRecorder, LeavesOneRecordingThatNamesTheBreak) {
   std::map<std::uint16_t, std::uint32_t> last;
   while (recording.Next(&entry)) {
     const auto [newest, is_first] = last.try_emplace(entry.message.channel, entry.message.sequence);
-    EXPECT_TRUE(is_first || entry.message.sequence > newest->second) << entry.source->name << ": twice";
+    EXPECT_TRUE(is_first || entry.message.sequence > newest->second) << entry.source->name << ": recorded twice";
     newest->second = entry.message.sequence;
     last_s = entry.time_s;
   }
-  EXPECT_GT(last_s, 4) << "to the end of the session";
+  EXPECT_GT(last_s, 4) << "recorded up to the end of the session";
   EXPECT_TRUE(recording.reader().closed());
   EXPECT_NE(recording.reader().metadata().at("merged").at("breaks"), "");
 }

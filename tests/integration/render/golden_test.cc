@@ -1,5 +1,5 @@
-// Pictures of the built-in scene against pictures that a person has looked at, and proof that the comparison sees what
-// must never go wrong: a slit that is gone, a membrane that hides everything, a cut drawn as missing triangles.
+// Pictures of the built-in scene against pictures approved by a person, and proof that the comparison detects severe
+// faults: a slit that is missing, an opaque membrane, a cut drawn as missing triangles.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,13 +23,13 @@
 namespace fulcrum::render {
 namespace {
 
-// Rasterisers round edges differently, by a pixel: in the mean over blocks of 6 x 6 pixels that is a few of 255. What
-// the eye sees at once (the mutations below) is more than three times the limit in some block.
-constexpr int kBlock = 3;           // Of the reduced picture.
+// Rasterisers round edges differently, by a pixel: this changes the mean over blocks of 6 x 6 pixels by a few of 255.
+// Faults that are obvious to the eye (the mutations below) exceed the limit in some block by more than three times.
+constexpr int kBlock = 3;           // Block size in the reduced picture.
 constexpr double kWorstBlock = 12;  // Of 255, per channel.
 constexpr double kMean = 1.5;
 
-/// Mean of each 2 x 2 pixels: what the files hold.
+/// Mean of each 2 x 2 pixels, as stored in the files.
 Picture Reduced(const Picture& full) {
   Picture half{full.width / 2, full.height / 2, {}};
   for (int y = 0; y < half.height; ++y) {
@@ -77,7 +77,7 @@ Difference Compare(const Picture& a, const Picture& b) {
   return difference;
 }
 
-/// Rewrites a line of the membrane's shader: what would be drawn with that fault.
+/// Replaces a line of the membrane's shader to draw with a fault.
 class Rewrite : public osg::NodeVisitor {
  public:
   Rewrite(std::string before, std::string after)
@@ -199,7 +199,7 @@ class GoldenTest : public testing::Test {
                                        << " of 255, the mean by " << difference.mean << "; look at " << now;
   }
 
-  /// As through a scope with a narrow field, at the middle of the cut: the triangles of the mesh are 30 pixels large.
+  /// View of a scope with a narrow field at the middle of the cut: triangles of the mesh are 30 pixels large.
   void LookClose() {
     const SyntheticMoment moment = MakeSyntheticMoment(view_, 14.0);
     LaparoscopeView laparoscope(view_);
@@ -316,7 +316,7 @@ TEST_F(GoldenTest, AMembraneOfOneLayerIsSeen) {
   }
 }
 
-// Both layers half opaque, the peritoneum red and the fascia green: of the nearer one twice as much is seen.
+// Both layers half opaque, the peritoneum red and the fascia green: the nearer layer contributes twice as much.
 TEST_F(GoldenTest, TheNearerLayerOfTheMembraneLiesOnTop) {
   SyntheticMoment above = MakeSyntheticMoment(view_, 0.5);
   above.tools = {};
@@ -348,7 +348,7 @@ TEST_F(GoldenTest, TheNearerLayerOfTheMembraneLiesOnTop) {
           green += picture.rgb[pixel + 1];
         }
       }
-      // What lies beneath the membrane is red in both cases: a quarter of it shines through.
+      // The tissue beneath the membrane is red in both cases: a quarter of it shines through.
       EXPECT_GT(green, 20 * 400) << "no fascia";
       if (from_above) {
         EXPECT_GT(red, 1.25 * green) << "reversed " << reversed;

@@ -31,7 +31,7 @@ struct NodeBus {
   std::unique_ptr<bus::Output<ToolState>> tools_out = tools.MakeOutput();
   std::unique_ptr<bus::Output<HandleState>> handles_out = handles.MakeOutput();
 
-  /// The node's.
+  /// Ports of the node.
   [[nodiscard]] RenderPorts ports() const {
     return {*tissue_in, *topology_in, *patches_in,   *tools_in, *handles_in,
             *events_in, *contacts_in, *generator_in, nullptr};

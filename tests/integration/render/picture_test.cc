@@ -1,4 +1,4 @@
-// Looks at pictures of the small scene as a person would, by colour at places that are known.
+// Colours of pictures of the small scene at known places.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -46,7 +46,7 @@ class PictureTest : public testing::Test {
     return picture;
   }
 
-  /// Mean colour of the square of 2 * reach + 1 pixels a side where p_W is seen.
+  /// Mean colour of a square of 2 * reach + 1 pixels a side around the image of p_W.
   Rgb At(const Picture& picture, const Vec3f& p_W, int reach = 2) const {
     const Laparoscope scope = MakeLaparoscope(view_.render);
     const Vec3f clip = (scope.projection * scope.view * p_W.homogeneous()).hnormalized();
@@ -76,7 +76,7 @@ class PictureTest : public testing::Test {
     return sum / static_cast<double>(a.rgb.size());
   }
 
-  /// Where the middle of the cut is drawn.
+  /// Position of the middle of the cut in the picture.
   static Vec3f MiddleOfCut(const LaparoscopeView& laparoscope, const SyntheticMoment& moment) {
     return laparoscope.OnMembrane(moment.cut_path[moment.cut_path.size() / 2]);
   }
@@ -105,13 +105,13 @@ TEST_F(PictureTest, IsTheSameEveryTime) {
   const SyntheticMoment moment = MakeSyntheticMoment(view_, 4.5);
   const auto draw = [&] { return Draw([&](LaparoscopeView* l) { Apply(moment, true, l); }); };
   const Picture first = draw(), second = draw();
-  // One rasteriser, one machine: not a single pixel differs. Between machines rounding may move an edge by a pixel.
+  // One rasteriser on one machine: all pixels are equal. Between machines rounding may move an edge by a pixel.
   EXPECT_EQ(first.rgb, second.rgb);
 }
 
 TEST_F(PictureTest, TheMembraneIsHalfTransparent) {
   const Picture with = Draw([](LaparoscopeView*) {});
-  // The same without the membrane: every texel of the atlas is gone.
+  // The same without the membrane: every texel of the atlas is removed.
   const Picture without = Draw([&](LaparoscopeView* l) {
     TemperaturePatch gone;
     gone.texels.assign(4u * kPatchTexels * kPatchTexels, 0);
@@ -157,7 +157,7 @@ TEST_F(PictureTest, InThePapersModelColourFollowsTheTemperatureOfTheMoment) {
   SyntheticMoment moment = MakeSyntheticMoment(view_, 4.8);
   for (TemperaturePatch& patch : moment.patches) {
     for (std::size_t k = 0; k < patch.texels.size(); k += 4) {
-      patch.texels[k] = 150;  // 95 degrees, and nothing else has happened.
+      patch.texels[k] = 150;  // 95 degrees, without damage or dryness.
       patch.texels[k + 1] = patch.texels[k + 2] = 0;
       patch.texels[k + 3] = 255;
     }
@@ -185,7 +185,8 @@ TEST_F(PictureTest, ARestartedRendererShowsTheCutFromTheTopologyAlone) {
   LaparoscopeView geometry(view_);
   Apply(moment, true, &geometry);
   const Vec3f middle = MiddleOfCut(geometry, moment);
-  // The strongest change within 3 mm of the cut's middle: the topology knows the place to half a cell of the grid only.
+  // The strongest change within 3 mm of the cut's middle: the topology resolves the place only to half a cell of the
+  // grid.
   const auto change = [&](const Picture& picture) {
     double most = 0;
     for (float beside = -0.003f; beside < 0.003f; beside += 0.0002f) {
@@ -215,7 +216,7 @@ TEST_F(PictureTest, InstrumentsAreDrawnWhereTheirTipsAreAndJawsOpen) {
   EXPECT_GT(MeanDifference(closed, open), 0.05);
 }
 
-// The grasper's own shape, given as meshes, is drawn like the grasper; jaws open by the same angle.
+// Meshes with the grasper's own shape are drawn like the grasper; jaws open by the same angle.
 TEST_F(PictureTest, MeshesOfTheSceneAreDrawnInPlaceOfAnInstrument) {
   const ToolDescription& tool = view_.tools[0];
   const ToolShape shape{tool.shaft_radius_m, tool.shaft_length_m, tool.tip_radius_m, tool.tip_length_m};
@@ -238,7 +239,7 @@ TEST_F(PictureTest, MeshesOfTheSceneAreDrawnInPlaceOfAnInstrument) {
   add(ToolPart::kJawMinus, GrasperJaw(shape), half_turn, -tool.tip_length_m);
   const SceneView mesh_view = with_meshes.View();
   const SyntheticMoment moment = MakeSyntheticMoment(view_, 0.0);
-  // Where the picture is grey, as nothing of the body is.
+  // The grey area of the picture: nothing of the body is grey.
   const auto outline = [&](const SceneView& scene, float angle) {
     LaparoscopeView laparoscope(scene);
     const auto display = MakeOffscreenDisplay(laparoscope, scene.render);

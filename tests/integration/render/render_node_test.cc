@@ -1,4 +1,4 @@
-// The node on in-process ports: what it draws and when, what it refuses, how it comes back.
+// The node on in-process ports: what it draws and when, what it refuses, its state after a restart.
 #include "render_node/node/render_node.h"
 
 #include <gtest/gtest.h>
@@ -128,7 +128,7 @@ TEST_F(RenderNodeTest, DropsTheTissueOfAnotherSceneAndSaysSo) {
 
 TEST_F(RenderNodeTest, ANewNodeShowsTheCutAfterOneTissueFrameAndOneTopology) {
   SyntheticMoment moment = MakeSyntheticMoment(view_, 4.8);
-  moment.patches.clear();  // Lost with the node before.
+  moment.patches.clear();  // Lost with the previous node.
   Publish(moment);
   {
     const auto node = MakeNode();
@@ -153,12 +153,12 @@ TEST_F(RenderNodeTest, HoldsTissueThatIsLateAndSaysSo) {
     Publish(moment);
     node->Step(At(1.0));
     node->Step(At(1.5));
-    EXPECT_EQ(Metric(*node, "frames_drawn"), 2) << "the picture says that tissue is late";
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 2) << "the picture shows that tissue is late";
     node->Step(At(2.1));
-    EXPECT_EQ(Metric(*node, "frames_drawn"), 2) << "it says so once";
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 2) << "it is drawn once";
     Publish(moment);
     node->Step(At(2.6));
-    EXPECT_EQ(Metric(*node, "frames_drawn"), 3) << "and takes it back";
+    EXPECT_EQ(Metric(*node, "frames_drawn"), 3) << "the notice is removed";
   }
   const Picture held = ReadPng(folder_ / "frame_0001500.png");
   const auto red_text = [](const Picture& picture) {
@@ -204,7 +204,7 @@ TEST_F(RenderNodeTest, KeysDoWhatTheHelpSays) {
   ASSERT_FALSE(plain.empty());
   EXPECT_NE(with_figures, plain);
   EXPECT_EQ(shot({}), plain) << "nothing pressed, nothing changed";
-  EXPECT_EQ(shot({'x'}), plain) << "a key that means nothing";
+  EXPECT_EQ(shot({'x'}), plain) << "a key without a function";
   for (const int key : {osgGA::GUIEventAdapter::KEY_Left, osgGA::GUIEventAdapter::KEY_Right,
                         osgGA::GUIEventAdapter::KEY_Up, osgGA::GUIEventAdapter::KEY_Down}) {
     EXPECT_NE(shot({key}), plain) << key;
@@ -216,9 +216,9 @@ TEST_F(RenderNodeTest, KeysDoWhatTheHelpSays) {
   }
   EXPECT_NE(shot({'h'}), plain);
   EXPECT_EQ(shot({'h'}), plain);
-  EXPECT_NE(shot({'l'}), plain) << "looks at the first tool";
+  EXPECT_NE(shot({'l'}), plain) << "the view turns to the first tool";
   EXPECT_EQ(shot({'l', 'l', '0'}), plain);
-  // While it pauses, what comes is not shown; afterwards it is.
+  // During a pause new states are not shown; afterwards they are.
   const std::string paused = shot({'p'});
   Publish(MakeSyntheticMoment(view_, 4.6));
   EXPECT_EQ(shot({}), paused);

@@ -1,4 +1,4 @@
-// A developer's look at the picture without the cart:
+// Draws a picture for a developer without the cart:
 //
 //   render_preview built-in|small|FILE.scene TIME_s OUT.png [TIP_x TIP_y TIP_z TARGET_x TARGET_y TARGET_z]
 #include <cstdlib>

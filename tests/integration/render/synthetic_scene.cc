@@ -142,7 +142,7 @@ void Deform(const SceneView& scene, const Vec3f& lift, SyntheticMoment* moment) 
     } else {
       const Vec2f m = scene.membrane_material[i - first];
       const float r = (m - moment->grasp_material).norm() / kTentReach;
-      // A tent is pointed at the grasp and hollow at the sides.
+      // A tent has its peak at the grasp and concave sides.
       x += lift * (0.6f * std::exp(-1.6f * r) + 0.4f * std::exp(-r * r));
       if (cut_length > 0) {
         const PathDistance to_path = DistanceToPath(moment->cut_path, m);
@@ -179,7 +179,8 @@ SyntheticMoment MakeSyntheticMoment(const SceneView& scene, double time_s) {
     axes << x, z.cross(x), z;
     sample.q_WT = Quatf(axes);
     moment.handles.handles[tool] = {true, now.jaw_rad, 0, 1, 0};
-    // Held from the first time the jaws are closed until they open again; cut while the pedal is down.
+    // The tissue is held from the first time the jaws are closed until they open again; it is cut while the pedal is
+    // down.
     Vec3f held_from = Vec3f::Zero();
     bool held = false;
     for (double t = 0; t <= time_s; t += 0.02) {
@@ -193,7 +194,7 @@ SyntheticMoment MakeSyntheticMoment(const SceneView& scene, double time_s) {
       } else if (then.pedals != 0) {
         const Vec2f m = NearestMaterial(scene, then.p_W);
         if (moment.cut_path.empty() || (m - moment.cut_path.back()).norm() > 0.002f) {
-          // Off the grid's lines, as a real path is: an edge is cut, never a node.
+          // Off the lines of the grid, as on a real path: edges are cut, nodes are not.
           moment.cut_path.push_back(m + Vec2f(0.00031f, 0.00017f));
         }
       }

@@ -15,7 +15,7 @@ namespace {
 class ConsoleTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    // Beyond 3 s it is not what it was.
+    // From 3 s on the recorded tools are altered.
     testing::CartStory story{.seconds = 3.2};
     story.tool_change = [](ToolState* tools) {
       if (tools->stamp.sequence > 3000) tools->tools[0].p_WT.x() += 1e-3f;

@@ -1,4 +1,4 @@
-// A scene that has not each node: the replayer makes those that it has.
+// A scene without some of the nodes: the replayer makes only the nodes of the scene.
 #include <gtest/gtest.h>
 
 #include <string>

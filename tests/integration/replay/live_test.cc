@@ -1,4 +1,4 @@
-// The replayer on the bus: what it publishes reaches a reader in another process, as if it took place now.
+// The replayer on the bus: its messages reach a reader in another process with stamps of the present time.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -23,7 +23,7 @@ namespace {
 constexpr int kDomain = 33;
 constexpr double kPatience_s = 30;
 
-/// Messages of one topic by sequence; of several senders, those of `node`.
+/// Messages of one topic by sequence; with several writers, those of `node`.
 template <class T>
 std::map<std::uint64_t, T> Recorded(const std::filesystem::path& file) {
   std::map<std::uint64_t, T> messages;
@@ -38,7 +38,7 @@ std::map<std::uint64_t, T> Recorded(const std::filesystem::path& file) {
   return messages;
 }
 
-/// What came of one topic, and when.
+/// Samples received of one topic.
 template <class T>
 struct Heard {
   explicit Heard(bus::DdsParticipant* participant) : input(participant->MakeInput<T>()) {}
@@ -79,7 +79,7 @@ TEST(Live, ReadersGetTheRecordedMessagesAsOfNow) {
     })) << replayer.Said();
     EXPECT_EQ(*code, 0) << replayer.Said();
 
-    // One shift for all of them, and it leads to now.
+    // One shift applies to all samples and moves them to the present time.
     ASSERT_FALSE(sessions.samples.empty());
     const auto manifests = Recorded<SceneManifest>(session.recording());
     const std::int64_t shift_ns = sessions.samples[0].session_start_ns - manifests.begin()->second.session_start_ns;
@@ -87,7 +87,7 @@ TEST(Live, ReadersGetTheRecordedMessagesAsOfNow) {
     EXPECT_EQ(sessions.samples[0].scene_hash, manifests.begin()->second.scene_hash);
 
     const auto then = Recorded<ToolState>(session.recording());
-    EXPECT_GT(tools.samples.size(), then.size() / 2) << "best effort, but over the loopback";
+    EXPECT_GT(tools.samples.size(), then.size() / 2) << "best effort loses few samples over the loopback";
     EXPECT_EQ(tools.of_the_future, 0);
     for (const ToolState& now : tools.samples) {
       ASSERT_TRUE(then.contains(now.stamp.sequence));
@@ -102,7 +102,7 @@ TEST(Live, ReadersGetTheRecordedMessagesAsOfNow) {
     EXPECT_EQ(topology.samples.back().dead_edges, last.dead_edges);
     EXPECT_EQ(topology.samples.back().stamp.stamp_ns, last.stamp.stamp_ns + shift_ns);
 
-    // Physics was left out, of the topics that it shares with others, too.
+    // Physics was left out, also on the topics that it shares with other nodes.
     EXPECT_TRUE(frames.samples.empty());
     std::map<NodeId, int> told;
     for (const TickManifest& tick : ticks.samples) ++told[tick.node];

@@ -1,4 +1,4 @@
-// `fulcrum test-node` as QA runs it: exit codes, what is said, the JUnit file.
+// `fulcrum test-node` as used by QA: exit codes, output, the JUnit file.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// Datagrams that a process without keys forges in the name of a participant of a keyed session: real sockets, real DDS.
+// Datagrams that a process without keys forges under the GUID of a writer of a keyed session: real sockets, real DDS.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -29,11 +29,10 @@ namespace fs = std::filesystem;
 
 constexpr int kDomain = 70;
 constexpr std::uint64_t kSession = 0x1122334455667788, kEarlierSession = 0x8877665544332211;
-constexpr float kForged_m = 0.123f;  // Where only forged tools stand.
+constexpr float kForged_m = 0.123f;  // Position that only forged tools have.
 constexpr double kPatience_s = 20;
 
-/// An RTPS message with one DATA submessage in the name of `writer`, to every reader of it
-/// (RTPS 2.3, 8.3.7.2, 9.4.5.3).
+/// An RTPS message with one DATA submessage from `writer` to all its readers (RTPS 2.3, 8.3.7.2, 9.4.5.3).
 std::vector<std::uint8_t> DataMessage(const bus::WriterGuid& writer, std::uint64_t number,
                                       const std::vector<std::uint8_t>& payload) {
   std::vector<std::uint8_t> message{'R', 'T', 'P', 'S', 2, 3, 1, 15};
@@ -88,7 +87,7 @@ class Forgery : public ::testing::Test {
       writer_ = sample.writer;
       ++recorded_;
     });
-    // Both readers have the true writer.
+    // Both readers have matched the true writer.
     ASSERT_TRUE(testing::WaitFor(kPatience_s, [this] {
       Write();
       const std::lock_guard lock(mutex_);
@@ -147,11 +146,11 @@ class Forgery : public ::testing::Test {
 };
 
 TEST_F(Forgery, ASampleWithoutTheSessionsNumberIsDroppedAndCounted) {
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // True samples on their way to the recorder.
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // True samples may still be in transit to the recorder.
   const std::uint64_t before = Recorded();
   EXPECT_FALSE(ForgedAreHeard(0));
   EXPECT_FALSE(ForgedAreHeard(kSession + 1));
-  EXPECT_GT(physics_->foreign_samples(), 100u) << "the datagrams did not arrive: nothing was tried";
+  EXPECT_GT(physics_->foreign_samples(), 100u) << "the datagrams did not arrive: the test checks nothing";
   EXPECT_GT(recorder_->foreign_samples(), 100u);
   EXPECT_EQ(Recorded(), before) << "a forged sample was recorded";
   EXPECT_EQ(heard_->stats().rejected, 0u);
@@ -159,10 +158,10 @@ TEST_F(Forgery, ASampleWithoutTheSessionsNumberIsDroppedAndCounted) {
 
 TEST_F(Forgery, PacketsOfAnEarlierSessionAreDroppedAndCounted) {
   EXPECT_FALSE(ForgedAreHeard(kEarlierSession));
-  EXPECT_GT(physics_->foreign_samples(), 100u) << "the datagrams did not arrive: nothing was tried";
+  EXPECT_GT(physics_->foreign_samples(), 100u) << "the datagrams did not arrive: the test checks nothing";
 }
 
-// What the number keeps out: with it the same datagram is a valid sample (only encryption keeps that out).
+// Effect of the number: with it the same datagram is a valid sample, which only encryption prevents.
 TEST_F(Forgery, WithTheNumberTheSameDatagramWouldBeHeard) { EXPECT_TRUE(ForgedAreHeard(kSession)); }
 
 }  // namespace

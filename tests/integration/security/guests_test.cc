@@ -1,6 +1,6 @@
-// A tool of somebody else on a secured bus: admitted while the session runs, limited to its rights, revoked. Real DDS,
-// real keys, the command as a user types it. That the bus holds also against a guest who has forged its own side is
-// tested with the other attempts (security_test.cc, tests/support/intruder.h).
+// A third-party tool on a secured bus: admitted while the session runs, limited to its rights, revoked. Real DDS, real
+// keys, the command as a user types it. The test of a guest with a forged local state is among the other attempts
+// (security_test.cc, tests/support/intruder.h).
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -30,7 +30,7 @@ constexpr std::time_t kDay_s = 24 * 3600;
 // A handshake takes 0.3 s on a busy machine; one that lost a message is retried after 1 s.
 constexpr double kPatience_s = 20;
 
-/// The keys of a session where `fulcrum up` puts them, and its supervisor, which publishes Health.
+/// The keys of a session where `fulcrum up` stores them, and its supervisor, which publishes Health.
 class RunningSession : public ::testing::Test {
  protected:
   RunningSession() {
@@ -61,7 +61,7 @@ class RunningSession : public ::testing::Test {
     return std::make_unique<bus::DdsParticipant>(
         bus::DdsSettings{.domain = kDomain, .node_name = identity, .security = {folder_, identity}});
   }
-  /// A tool that calls itself recorder, whatever its keys say.
+  /// A tool that names itself recorder, while its keys name it probe.
   [[nodiscard]] bus::DdsSettings Guest(std::uint64_t schema_hash = bus::SchemaHash()) const {
     return {.domain = kDomain, .node_name = "recorder", .schema_hash = schema_hash, .security = {out_, "probe"}};
   }
@@ -145,13 +145,13 @@ TEST_F(RunningSession, RefusesARevokedGuestFromTheNextParticipantOn) {
   EXPECT_NE(Keys({"revoke", "probe"}).find("Participants that start from now on refuse it"), std::string::npos);
   bus::DdsParticipant guest(Guest());
   const auto healths = guest.MakeInput<Health>();
-  EXPECT_TRUE(Receives(healths.get())) << "the library reads the list at the start only; if this fails, it has learnt "
-                                          "more, and help and DESIGN say too little";
+  EXPECT_TRUE(Receives(healths.get())) << "the library reads the list at the start only; if this fails, it reads it "
+                                          "later, too, and help and DESIGN must say so";
   const auto restarted = Join("haptics_node");
   EXPECT_TRUE(WaitFor(kPatience_s, [&] { return Tells(*restarted, "certificate revoked"); }));
   EXPECT_TRUE(WaitFor(kPatience_s, [&] { return restarted->HasParticipant("supervisor"); }));
   EXPECT_FALSE(restarted->HasParticipant("probe"));
-  // As after the restart of every participant.
+  // The state after the restart of every participant.
   tools_.reset();
   healths_.reset();
   supervisor_.reset();

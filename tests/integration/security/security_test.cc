@@ -45,7 +45,7 @@ constexpr std::time_t kDay_s = 24 * 3600;
 constexpr std::array kNodes = {"handle_bridge", "haptics_node", "physics_node",
                                "thermal_node",  "render_node",  "recorder"};
 
-/// A folder that goes with the test.
+/// A folder that is removed with the test.
 class Scratch {
  public:
   explicit Scratch(const std::string& name)
@@ -82,7 +82,7 @@ TEST(SecuredBus, EveryAttemptIsRefusedAndReported) {
     EXPECT_FALSE(attempt.came_through);
     EXPECT_EQ(attempt.exit_code, attempt.wanted_exit_code);
     EXPECT_TRUE(attempt.reported || attempt.wanted_of_cart.empty())
-        << "the cart says nothing of " << attempt.wanted_of_cart;
+        << "the cart does not report " << attempt.wanted_of_cart;
     EXPECT_TRUE(attempt.wanted_exit_code == 0 || !attempt.last_line.empty());
     RecordProperty(attempt.name, attempt.last_line);
   }
@@ -91,7 +91,7 @@ TEST(SecuredBus, EveryAttemptIsRefusedAndReported) {
 
 // -------------------------------------------------------------------------------------------------- whole sessions
 
-/// Everything that goes over the loopback interface; needs the right to (root).
+/// All packets on the loopback interface; needs the right to capture them (root).
 class Sniffer {
  public:
   Sniffer() : socket_(::socket(AF_PACKET, SOCK_DGRAM | SOCK_CLOEXEC, htons(ETH_P_IP))) {
@@ -127,7 +127,7 @@ class Sniffer {
   Sniffer& operator=(const Sniffer&) = delete;
 
   [[nodiscard]] const std::string& problem() const { return problem_; }
-  /// Packets of this cart (they tell their schema) and those of them in which its scene is named.
+  /// Packets of this cart (they contain its schema hash) and those of them that contain the name of its scene.
   [[nodiscard]] int packets() const { return packets_; }
   [[nodiscard]] int overheard() const { return overheard_; }
 
@@ -144,8 +144,8 @@ class Sniffer {
   std::jthread thread_;
 };
 
-/// The small scene under a name that an eavesdropper knows when he hears it: it travels in SceneManifest. Pulled and
-/// cut all the time, so that nodes which come together late come to work as well.
+/// The small scene under a name that a sniffer can recognise: SceneManifest contains it. Tissue is pulled and cut all
+/// the time, so that nodes that authenticate late also take part.
 fs::path NamedScene(const fs::path& folder) {
   std::string text = testing::WorkingScene("small", 60);
   const std::string was = "name: small\n";
@@ -166,7 +166,7 @@ std::string Logs(const fs::path& session) {
   return text;
 }
 
-/// What a program prints that must end by itself.
+/// Output of a program that must end by itself.
 std::string RunProgram(const std::string& program, const std::vector<std::string>& arguments, int wanted_code) {
   Program run(program, arguments);
   std::optional<int> code;
@@ -181,7 +181,7 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
   const std::string domain = std::to_string(kSessionDomain);
   const Sniffer sniffer;
   Cart cart(NamedScene(scratch.path()), kSessionDomain, {"--cart", cart_file, "--record"});
-  // The nodes prove themselves to each other one after the other: some are heard seconds before the last.
+  // The nodes authenticate one after the other: some are received seconds before the last.
   std::string status;
   EXPECT_TRUE(WaitFor(60,
                       [&] {
@@ -193,12 +193,13 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
                                });
                       }))
       << status << cart.Said();
-  // Who merely stands still for a while is heard again: the library authenticates nobody twice whom it has forgotten.
+  // A node that is only stopped for a while must stay matched: the library does not authenticate a participant again
+  // after it has removed it.
   const auto nodes = cart.nodes();
   const auto handles = nodes.find("handle_bridge");
   ASSERT_NE(handles, nodes.end()) << cart.Said();
   ::kill(handles->second, SIGSTOP);
-  std::this_thread::sleep_for(std::chrono::milliseconds(800));  // A second would be a fault of the session.
+  std::this_thread::sleep_for(std::chrono::milliseconds(800));  // A stop of a second would be a fault of the session.
   ::kill(handles->second, SIGCONT);
   // A killed node joins again with its keys; a node with keys of another cart does not.
   const auto thermal = nodes.find("thermal_node");
@@ -211,7 +212,8 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
                                           3);
   EXPECT_NE(stranger.find("has keys of another authority"), std::string::npos) << stranger;
 
-  // A stranger needs seconds to be sure that no leader with keys is there, so the session lasts until that is done.
+  // A node with foreign keys takes seconds to conclude that no leader with its keys is present; the session lasts until
+  // then.
   cart.Signal(SIGINT);
   ASSERT_EQ(cart.WaitForEnd(90), 0) << cart.Said();
   const std::string summary = ReadFile(cart.session() / "summary.json");
@@ -223,7 +225,8 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
   EXPECT_NE(cart.Said().find("has keys of another authority"), std::string::npos) << cart.Said();
   EXPECT_EQ(Logs(cart.session()).find("may not"), std::string::npos) << Logs(cart.session());
   if (sniffer.problem().empty()) {
-    EXPECT_GT(sniffer.overheard(), 0) << "the encrypted session's test hears nothing either";
+    EXPECT_GT(sniffer.overheard(), 0)
+        << "the name must be found here, or the test of the encrypted session checks nothing";
   }
 }
 
@@ -235,8 +238,8 @@ TEST(SecuredSession, EncryptedCannotBeOverheard) {
   ASSERT_EQ(cart.WaitForEnd(90), 0) << cart.Said();
   EXPECT_NE(ReadFile(cart.session() / "summary.json").find("\"refused.participants\": 0"), std::string::npos);
   if (!sniffer.problem().empty()) {
-    GTEST_SKIP() << "the session ended well, but nobody listened: no raw socket for this user (" << sniffer.problem()
-                 << "); run as root";
+    GTEST_SKIP() << "the session ended well, but its packets were not captured: no raw socket for this user ("
+                 << sniffer.problem() << "); run as root";
   }
   EXPECT_GT(sniffer.packets(), 1000);
   EXPECT_EQ(sniffer.overheard(), 0);
@@ -256,7 +259,7 @@ TEST(AccessTable, GivesEachTopicOfOneOwnerToOneNodeOnly) {
   }
 }
 
-/// What is said of a folder in which `change` was done to the keys of render_node.
+/// Refusal of a folder in which `change` was applied to the keys of render_node.
 std::string ProblemAfter(const std::function<void(const keys::KeyFiles& files)>& change, std::time_t later_s = 0) {
   const Scratch scratch("folder");
   const fs::path folder = scratch.path() / "keys";

@@ -1,7 +1,7 @@
-// A node that computes nothing: the supervisor's tests start it under the names of the real ones. What it does besides
-// is told by a file <session>/../<node name>.do: "crash" (abort at once), "exit N", "hang" (in the step), "hang once"
-// (in the step after 1 s of the session, and not when it is started again), "mismatch", "flicker" (degraded every other
-// 0.1 s of the session), "step MS" (each step takes so long), "metric NAME VALUE" and "lost N" (samples) in Health.
+// A node that computes nothing: the supervisor's tests start it under the names of the real ones. Its behaviour is set
+// by a file <session>/../<node name>.do: "crash" (abort at once), "exit N", "hang" (in the step), "hang once" (in the
+// step after 1 s of the session, but not after a restart), "mismatch", "flicker" (degraded every other 0.1 s of the
+// session), "step MS" (duration of each step), "metric NAME VALUE" and "lost N" (samples) in Health.
 #include <unistd.h>
 
 #include <chrono>
@@ -78,7 +78,7 @@ int main(int argc, char** argv) {
     auto& frames = app.MakeOutput<fulcrum::TissueFrame>();
     (void)app.MakeInput<fulcrum::TissueFrame>();
     std::uint64_t sequence = 0, reports = 0;
-    // In the one folder that pictures and checkpoints may both be written to: a node is confined.
+    // The one folder that both a node for pictures and one for checkpoints may write to: nodes are confined.
     const std::filesystem::path hung =
         app.options().session / "frames" / (std::string(fulcrum::NodeName(node)) + ".hung");
     return app.Run(

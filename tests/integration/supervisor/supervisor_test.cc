@@ -48,7 +48,7 @@ scene::SceneData TinyScene(std::uint32_t node_mask) {
   return data;
 }
 
-/// Session programs in a folder of their own: `fulcrum` finds its nodes beside itself.
+/// Session programs in a folder of their own: `fulcrum` looks for its nodes beside itself.
 class SupervisorTest : public ::testing::Test {
  protected:
   static constexpr NodeId kNodes[] = {NodeId::kPhysics, NodeId::kThermal};
@@ -78,7 +78,7 @@ class SupervisorTest : public ::testing::Test {
     return ChildProcess::Start(folder_ / "bin" / "fulcrum", words, folder_ / "fulcrum.log");
   }
   ChildProcess Up(std::vector<std::string> more = {}) const {
-    // The fake node makes ports to which no identity of a keyed bus has the right.
+    // No identity of a keyed bus has the rights for the ports of the fake node.
     std::vector<std::string> words{"up", scene_.string(), "--out", (folder_ / "out").string(), "--open-bus"};
     words.insert(words.end(), more.begin(), more.end());
     return Fulcrum(words);
@@ -91,7 +91,7 @@ class SupervisorTest : public ::testing::Test {
       std::this_thread::sleep_for(5ms);
     }
   }
-  /// False after a time that only a fault can take.
+  /// False after a time limit that only a fault can exceed.
   static bool WaitUntil(const std::function<bool()>& condition) {
     for (int i = 0; i < 6000; ++i) {
       if (condition()) {
@@ -142,7 +142,7 @@ class SupervisorTest : public ::testing::Test {
     return names;
   }
 
-  /// In the place of haptics and physics: tool 0 goes round at 40 mm/s, tool 1 presses with 12.5 N.
+  /// Publishes in place of haptics and physics: tool 0 moves in a circle at 40 mm/s, tool 1 presses with 12.5 N.
   static ProcessEnd PublishMotion(ChildProcess* until_end) {
     bus::DdsParticipant bus(testing::WriterOf(kDomain, "hands"));
     const auto tools = bus.MakeOutput<ToolState>();
@@ -196,7 +196,7 @@ TEST_F(SupervisorTest, KilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
   ASSERT_EQ(pids.size(), 1u);
   ::kill(pids[0], SIGKILL);
   ASSERT_TRUE(WaitUntil([&] { return Joined(NodeId::kPhysics, 2); })) << Log();
-  std::this_thread::sleep_for(300ms);  // A Health "running" on its way to the supervisor.
+  std::this_thread::sleep_for(300ms);  // A Health "running" may still be in transit to the supervisor.
   up.Signal(SIGINT);
   EXPECT_EQ(Wait(&up).exit_code, 0) << Log();
   EXPECT_NE(Log().find("physics_node killed by signal 9"), std::string::npos) << Log();
@@ -293,7 +293,8 @@ TEST_F(SupervisorTest, ADegradedNodeHasTheNewestPastDumpedOnce) {
   EXPECT_EQ(Count(NodeLog(NodeId::kRecorder), "dump.mcap: thermal_node is degraded: a plug is loose"), 1u)
       << NodeLog(NodeId::kRecorder);
   EXPECT_TRUE(fs::exists(Session() / "dump.mcap"));
-  EXPECT_FALSE(fs::exists(Session() / "dump-2.mcap")) << "it turned well and ill again within the 30 s of the first";
+  EXPECT_FALSE(fs::exists(Session() / "dump-2.mcap"))
+      << "it recovered and degraded again within the 30 s after the first dump";
 }
 
 TEST_F(SupervisorTest, ADegradedNodeAfterACommandIsNoFault) {
@@ -310,8 +311,8 @@ TEST_F(SupervisorTest, ADegradedNodeAfterACommandIsNoFault) {
   EXPECT_FALSE(fs::exists(Session() / "dump.mcap")) << NodeLog(NodeId::kRecorder);
 }
 
-// Another build of a node is run in its place; what cannot be run leaves everything as it is, and what ends before it
-// was ever heard of is replaced by what was there.
+// Another build of a node runs in its place. If it cannot be executed, nothing changes; if it ends before its first
+// Health, the previous build runs again.
 TEST_F(SupervisorTest, SwapReplacesANodeAndABadReplacementGivesItBack) {
   const fs::path other = folder_ / "other" / NodeName(NodeId::kThermal);
   fs::create_directory(folder_ / "other");
@@ -390,7 +391,7 @@ TEST_F(SupervisorTest, AssessedSessionIsScoredAndRemembered) {
   EXPECT_NE(json.find("\"peak_force_N.passed\": false"), std::string::npos) << json;
   const std::size_t path = json.find("\"path_length_mm\": ");
   ASSERT_NE(path, std::string::npos) << json;
-  // 40 mm a second, from when the bus has brought us together.
+  // 40 mm/s from the time at which discovery has completed.
   const double path_mm = std::stod(json.substr(path + 18));
   EXPECT_GT(path_mm, 60);
   EXPECT_LT(path_mm, 125);

@@ -12,7 +12,7 @@
 
 namespace fulcrum::cut {
 
-/// What a hand does at a moment of the session.
+/// Input at a moment of the session.
 struct Moment {
   std::array<physics::ToolInput, kMaxTools> tools;
   CauteryMode mode = CauteryMode::kOff;
@@ -20,12 +20,12 @@ struct Moment {
 };
 using Operator = std::function<Moment(double time_s)>;
 
-/// A step of the loop, after it.
+/// State after a step of the loop.
 struct LoopStep {
   double time_s = 0;
   CauteryContact contact;
   CauteryMode mode = CauteryMode::kOff;
-  float length_m = 0;  ///< Of the cut, as published.
+  float length_m = 0;  ///< Length of the cut, as published.
   float power_W = 0;
 };
 
@@ -52,9 +52,9 @@ class ClosedLoop {
   std::uint64_t steps_ = 0;
 };
 
-/// Tool frame at a tip position, as the servo makes it: z from the trocar to the tip, x the projection of world +x.
+/// Tool frame at a tip position, as in the servo: z from the trocar to the tip, x the projection of world +x.
 [[nodiscard]] physics::ToolPose PoseAtTip(const ToolDescription& tool, const Vec3f& p_WT);
-/// World place of the sheet at rest at fractions (s, t) of the grid, `height_m` above it.
+/// World position `height_m` above the sheet at rest, at fractions (s, t) of the grid.
 [[nodiscard]] Vec3f PlaceOnSheet(const SceneView& scene, const Vec2f& fractions, float height_m);
 
 }  // namespace fulcrum::cut

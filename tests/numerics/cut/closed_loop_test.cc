@@ -1,5 +1,5 @@
-// A hand cuts the membrane of the built-in scene: physics says where the metal is, heat what goes, and the cut comes
-// back to the membrane.
+// Cuts in the membrane of the built-in scene: physics computes the position of the metal, thermal the removed tissue,
+// and physics receives the cut.
 #include "tests/numerics/cut/closed_loop.h"
 
 #include <gtest/gtest.h>
@@ -21,20 +21,20 @@ namespace {
 
 using thermal::CellIndex;
 
-/// Where the strokes are, in fractions of the grid: free of the border and of the organ's edge.
+/// Place of the strokes, in fractions of the grid: away from the border and from the organ's edge.
 const Vec2f kPlace(0.58f, 0.45f);
-/// Of the trocar from there [m]. The shaft comes in flat, so the foot points down and stands in the sheet like a
-/// needle.
+/// Offset of the trocar from there [m]. The shaft is nearly parallel to the sheet, so the foot points down and stands
+/// in the sheet like a needle.
 const Vec3f kTrocar(0.094f, 0, 0.034f);
-/// Of the heel over the sheet: of the foot's 5 mm some 2 reach through it [m].
+/// Height of the heel above the sheet: of the foot's 5 mm some 2 mm reach through it [m].
 constexpr float kHeel_m = 0.003f;
 constexpr float kSpeed_m_s = 0.004f;
 constexpr float kPresses_N = 1e-3f;
-/// The hook comes down from kAbove_m until kDown_s, cuts from kBegin_s on, is lifted kRest_s after the end.
+/// The hook comes down from kAbove_m until kDown_s, cuts from kBegin_s on, and is lifted kRest_s after the end.
 constexpr float kAbove_m = 0.012f, kLift_m_s = 0.02f;
 constexpr double kDown_s = 0.8, kBegin_s = 1.0, kRest_s = 0.2, kAfter_s = 0.8;
 
-/// Offset on the rest sheet along (s, t), by the length of the way [m].
+/// Offset on the rest sheet along (s, t), as a function of the path length [m].
 using Way = std::function<Vec2f(float)>;
 
 Way Straight(float degrees) {
@@ -66,12 +66,12 @@ scene::SceneData SceneOf(float dt_s) {
   return scene::BuildProcedural(settings);
 }
 
-/// A stroke, carried out; and what it left.
+/// Carries out a stroke and measures the cut.
 class Cut {
  public:
   explicit Cut(const Stroke& stroke) : stroke_(stroke), data_(SceneOf(stroke.dt_s)), loop_(data_.View()) {
     const SceneView view = data_.View();
-    // Where the strokes are: over all of it the sheet is curved.
+    // Scale at the place of the strokes; the sheet as a whole is curved.
     constexpr float kPart = 0.05f;
     const auto per_m = [&](const Vec2f& part) {
       return 2 * kPart / (PlaceOnSheet(view, kPlace + part, 0) - PlaceOnSheet(view, kPlace - part, 0)).norm();
@@ -83,7 +83,8 @@ class Cut {
   void Run() {
     while (time_s() < end_s_ + kAfter_s) Step();
   }
-  /// At rest at the beginning of the way, until a cell goes. Time since the current [s]; infinity: none did.
+  /// Holds the hook at the start of the path until a cell is removed. Time since the current began [s]; infinity: none
+  /// was.
   [[nodiscard]] double TimeToOpen() {
     while (time_s() < end_s_) {
       Step();
@@ -92,7 +93,7 @@ class Cut {
     return std::numeric_limits<double>::infinity();
   }
 
-  /// Area of the rest shape that is open [m^2].
+  /// Removed area of the rest shape [m^2].
   [[nodiscard]] double Area() const {
     double area = 0;
     for (const thermal::Tile* tile : loop_.thermal().field().Existing()) {
@@ -102,7 +103,7 @@ class Cut {
     }
     return area / static_cast<double>(loop_.thermal().field().material().thickness_m);
   }
-  /// Part of the metal's way through the sheet that is open at the end.
+  /// Part of the metal's path through the sheet that is open at the end.
   [[nodiscard]] double OpenAlongTheWay() const {
     double open = 0, all = 0;
     for (std::size_t n = 1; n < way_.size(); ++n) {
@@ -112,14 +113,14 @@ class Cut {
     }
     return all > 0 ? open / all : 0;
   }
-  /// From where the way began to where it ended, on the rest shape [m].
+  /// Distance from the start of the path to its end, on the rest shape [m].
   [[nodiscard]] float Chord() const {
     const Vec2f chord = way_.back() - way_.front();
     const CellIndex cell = sheet().CellOf(0.5f * (way_.back() + way_.front()));
     const thermal::SurfaceMetric g = sheet().MetricAt(static_cast<float>(cell.ix), static_cast<float>(cell.iy));
     return std::sqrt(g.ss * chord.x() * chord.x() + 2 * g.st * chord.x() * chord.y() + g.tt * chord.y() * chord.y());
   }
-  /// Areas of the pieces of tissue within the hole that are too small to stay pieces [m^2].
+  /// Areas of the pieces of tissue within the hole that are too small to be kept [m^2].
   [[nodiscard]] std::vector<double> Islands() const {
     std::vector<std::uint8_t> seen(static_cast<std::size_t>(sheet().nx) * sheet().ny);
     const auto flood = [&](CellIndex from) {
@@ -132,7 +133,7 @@ class Cut {
         ++count;
         for (const CellIndex next : {CellIndex{c.ix + 1, c.iy}, CellIndex{c.ix - 1, c.iy}, CellIndex{c.ix, c.iy + 1},
                                      CellIndex{c.ix, c.iy - 1}}) {
-          // Cells beyond the sheet's border count as its outside, which all of it hangs on.
+          // Cells beyond the sheet's border count as its outside, to which the sheet is attached.
           if (!sheet().Contains(next) || seen[Number(next)] != 0 || Open(next)) continue;
           seen[Number(next)] = 1;
           stack.push_back(next);
@@ -155,10 +156,10 @@ class Cut {
     return {loop_.physics().StateHash(), loop_.thermal().FullHash()};
   }
   [[nodiscard]] const thermal::ThermalSolver& thermal() const { return loop_.thermal(); }
-  /// Steps with current, and of these those that touched.
+  /// Steps with current, and the number of these with contact.
   [[nodiscard]] int energised() const { return energised_; }
   [[nodiscard]] int touching() const { return static_cast<int>(way_.size()); }
-  /// Of the steps with current those in which tissue and hook did not press each other.
+  /// Number of steps with current in which tissue and hook exerted no force on each other.
   [[nodiscard]] int free() const { return free_; }
   [[nodiscard]] bool length_fell() const { return length_fell_; }
 
@@ -201,7 +202,7 @@ class Cut {
     if (step.contact.touching) way_.push_back(MetalPlace(step.contact));
     free_ += loop_.physics().solver_force(1).norm() < kPresses_N ? 1 : 0;
   }
-  /// Middle of the cells that the metal covers; of the nearest one where it covers none.
+  /// Middle of the cells that the metal covers; if it covers none, of the nearest cell.
   [[nodiscard]] Vec2f MetalPlace(const CauteryContact& contact) const {
     const Footprint& print = contact.footprint;
     const std::uint8_t covered = Footprint::Encode(0);
@@ -231,8 +232,8 @@ class Cut {
 struct NamedStroke {
   const char* name;
   Stroke stroke;
-  float gives_way_m = 0.002f;      ///< How far tissue follows the hand.
-  double lies_along_sheet = 0.05;  ///< Part of the time in which metal lies along more sheet than the window holds.
+  float gives_way_m = 0.002f;      ///< Largest displacement of tissue with the hook.
+  double lies_along_sheet = 0.05;  ///< Fraction of the time in which metal lies along more sheet than the window holds.
 };
 
 class StrokeTest : public ::testing::TestWithParam<NamedStroke> {};
@@ -241,17 +242,17 @@ TEST_P(StrokeTest, IsOneSlitAlongTheWholeWay) {
   const Stroke& stroke = GetParam().stroke;
   Cut cut(stroke);
   cut.Run();
-  // The metal never loses the tissue that it stands in. Tissue gives way, and what is freed springs back, so the way
-  // through it is not quite the hand's.
+  // The metal stays in contact with the tissue. Tissue gives way, and freed tissue springs back, so the path through
+  // the sheet differs slightly from that of the hook.
   EXPECT_EQ(cut.touching(), cut.energised());
   const Vec2f chord = stroke.way(stroke.length_m) - stroke.way(0);
   EXPECT_NEAR(cut.Chord(), chord.norm(), GetParam().gives_way_m);
   EXPECT_GE(cut.OpenAlongTheWay(), 0.98);
-  // Metal that cuts goes free of force: what it would push is gone before.
+  // Cutting metal is free of force: the tissue that it would push is removed before.
   RecordProperty("free_pct", 100 * cut.free() / cut.energised());
   EXPECT_GT(cut.free(), 0.45 * cut.energised());
-  // The wire is 1 mm across, and the slit as much longer than the way. What is vaporised beside it comes from the
-  // film's reach and from heat that spreads.
+  // The wire is 1 mm thick, and the slit is longer than the path by that. Tissue beside the wire is vaporised within
+  // the reach of the film and by heat that spreads.
   const double width = cut.Area() / (stroke.length_m + 1e-3);
   RecordProperty("width_um", static_cast<int>(1e6 * width));
   EXPECT_GE(width, 1.0e-3);
@@ -261,7 +262,7 @@ TEST_P(StrokeTest, IsOneSlitAlongTheWholeWay) {
   EXPECT_LE(cut.thermal().figures().shortened, GetParam().lies_along_sheet * cut.energised());
 }
 
-// A flap that a curve has freed folds aside: there the circle does not close, and the neck lies along it.
+// A flap that is freed by a curve folds aside: there the circle does not close, and the neck lies along the flap.
 INSTANTIATE_TEST_SUITE_P(
     Ways, StrokeTest,
     ::testing::Values(NamedStroke{"AlongT", {.way = Straight(90)}}, NamedStroke{"AcrossS", {.way = Straight(0)}},
@@ -280,11 +281,12 @@ TEST(ClosedLoopTest, CoagulationOpensNothing) {
 TEST(ClosedLoopTest, MorePowerOpensSooner) {
   double last_s = std::numeric_limits<double>::infinity();
   for (const float power_W : {10.0f, 15.0f, 20.0f, 30.0f, 45.0f, 60.0f}) {
-    // Two seconds at rest; in steps of 2 ms, which tell the times apart.
+    // Two seconds at rest, in steps of 2 ms, which resolve the differences in time.
     Cut cut({.length_m = 2e-6f, .speed_m_s = 1e-6f, .power_W = power_W, .dt_s = 0.002f});
     const double time_s = cut.TimeToOpen();
     RecordProperty("open_ms_at_" + std::to_string(static_cast<int>(power_W)) + "_W", static_cast<int>(1e3 * time_s));
-    // From some 20 W on a film under the end of the foot takes all that 350 V give, and more power makes no difference.
+    // From some 20 W on a film under the end of the foot takes all the power that 350 V give; a higher setting has no
+    // effect.
     const bool limited = cut.thermal().figures().voltage_V > 0.999f * ThermalParams{}.v_max_V && power_W > 20;
     EXPECT_TRUE(time_s < last_s || (limited && time_s == last_s)) << power_W << " W: " << time_s << " s";
     last_s = time_s;

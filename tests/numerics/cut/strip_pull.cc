@@ -13,9 +13,9 @@ namespace fulcrum::cut {
 namespace {
 
 constexpr float kStill_m_s = 1e-3f;
-constexpr double kPullOn_s = 1;  ///< Past the first tear, while it hangs together.
+constexpr double kPullOn_s = 1;  ///< Duration of the pull after the first tear, while the strip is connected.
 
-/// A way over live edges from the left clamp to the right one.
+/// True if a path of live edges leads from the left clamp to the right one.
 bool HangsTogether(const physics::TissueModel& model) {
   const Index rows = model.rows(), cols = model.cols();
   std::vector<std::uint8_t> seen(std::size_t{rows} * cols, 0);

@@ -25,7 +25,7 @@ class AccurateUnderTest final : public StoreSolver {
     begin_ = places_;
   }
 
-  /// Part of the tissue that is awake after the last step.
+  /// Fraction of the tissue that is awake after the last step.
   [[nodiscard]] float awake_part() const { return solver_.regions().awake_part(); }
 
  private:
@@ -42,7 +42,7 @@ class AccurateUnderTest final : public StoreSolver {
   implicit::Effort effort_;
   implicit::ImplicitSolver solver_;
   std::vector<implicit::HeldPlace> targets_;
-  std::vector<Vec3f> begin_;  ///< Of the held particles at the start of the step.
+  std::vector<Vec3f> begin_;  ///< Positions of the held particles at the start of the step.
 };
 
 }  // namespace fulcrum::physics

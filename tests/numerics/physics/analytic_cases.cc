@@ -17,7 +17,7 @@ using reference::ElasticEnergy;
 using reference::Points;
 
 constexpr double kYoungs_Pa = 1e5;
-/// Forces left over are far below the loads, which are chosen for displacements of about 1e-4 of the size.
+/// Residual forces are far below the loads, which are chosen for displacements of about 1e-4 of the size.
 constexpr double kTolerance_N = 1e-12;
 
 /// A block of bricks with nodes (i, j, k), each cut into six tetrahedra along the diagonal 000-111 (Kuhn), as the
@@ -25,7 +25,7 @@ constexpr double kTolerance_N = 1e-12;
 struct Mesh {
   ElasticModel model;
   std::array<int, 3> bricks{};
-  bool closed = false;  ///< The last node of the second direction is the first.
+  bool closed = false;  ///< The second direction is periodic: its last node is its first.
 
   [[nodiscard]] Index Node(int i, int j, int k) const {
     const int across = bricks[1] + (closed ? 0 : 1);
@@ -85,14 +85,14 @@ Mesh MakeMesh(std::array<int, 3> bricks, bool closed, double poisson,
   return mesh;
 }
 
-/// A bar from the origin along x, of square cross-section; y and z from 0 (a plane of symmetry where so used).
+/// A bar along x from the origin, of square cross-section; y and z start at 0 (a plane of symmetry where needed).
 Mesh MakeBar(int n, double length, double thickness, double poisson) {
   const double h = thickness / n;
   return MakeMesh({static_cast<int>(std::lround(length / h)), n, n}, false, poisson,
                   [h](int i, int j, int k) { return Vec3d(i * h, j * h, k * h); });
 }
 
-/// Adds the forces of a traction on the tets' faces all of whose corners are in the set: exact for tractions that are
+/// Adds the forces of a traction on those faces of tets whose corners are all in the set: exact for tractions that are
 /// linear over each face.
 void AddTraction(const Mesh& mesh, const std::function<bool(const Vec3d&)>& on_face,
                  const std::function<Vec3d(const Vec3d& place, const Vec3d& outward)>& traction, Points* load) {
@@ -122,7 +122,7 @@ void AddTraction(const Mesh& mesh, const std::function<bool(const Vec3d&)>& on_f
   }
 }
 
-/// Coordinates that are held: all for which `where(place, axis)`.
+/// Coordinates that are held: those for which `where(place, axis)` is true.
 std::vector<bool> HeldWhere(const Mesh& mesh, const std::function<bool(const Vec3d&, int)>& where) {
   std::vector<bool> held;
   for (const Vec3d& place : mesh.model.rest_position) {
@@ -197,7 +197,8 @@ double HangingSheet(int n) {
     }
   }
   ElasticModel model = BuildElasticModel(data.View());
-  // Strains are so small that the scene's floats would show, in lengths and in the load that keeps them.
+  // Strains are so small that the rounding of the scene's floats would matter, in lengths and in the load that balances
+  // them.
   model.load.clear();
   for (int p = 0; p < rows * cols; ++p) {
     model.rest_position[static_cast<std::size_t>(p)] = Vec3d((p % cols) * w, 0, -(p / cols) * h);
@@ -207,7 +208,7 @@ double HangingSheet(int n) {
       s.rest_length = (model.rest_position[s.b] - model.rest_position[s.a]).norm();
     }
   }
-  // The sheet stays in its plane: without tension across there is nothing else to keep it there.
+  // The sheet is held in its plane: it has no lateral tension that would do so.
   std::vector<bool> held;
   for (std::size_t p = 0; p < model.mass.size(); ++p) {
     held.insert(held.end(), {false, true, false});
@@ -219,7 +220,7 @@ double HangingSheet(int n) {
   for (int r = 1; r < rows; ++r) {
     for (int c = 0; c < cols; ++c) {
       const Eigen::Index here = r * cols + c;
-      // At the node and half way to the one above.
+      // At the node and half way to the node above.
       const double at = -u(2, here), between = -(u(2, here) + u(2, here - cols)) / 2;
       error += std::pow(at - drop(r * h), 2) + std::pow(between - drop((r - 0.5) * h), 2);
       size += std::pow(drop(r * h), 2) + std::pow(drop((r - 0.5) * h), 2);
@@ -241,7 +242,7 @@ double LameTube(int n, double poisson) {
   AddTraction(
       mesh, [](const Vec3d& p) { return std::hypot(p.y(), p.z()) < kInner * (1 + 1e-9); },
       [](const Vec3d&, const Vec3d& outward) { return Vec3d(-kPressure * outward); }, &load);
-  // Plane strain; two points keep it from floating away across.
+  // Plane strain; two points prevent rigid motion across the tube.
   const Index right = mesh.Node(0, 0, 0), top = mesh.Node(0, segments / 4, 0), left = mesh.Node(0, segments / 2, 0);
   const auto& rest = mesh.model.rest_position;
   const Points u = Displacement(
@@ -304,7 +305,7 @@ double PureBending(int n, double poisson) {
   AddTraction(
       mesh, AtEnd,
       [](const Vec3d& p, const Vec3d&) { return Vec3d(-kMoment * (p.z() - kMiddle) / kBeamInertia, 0, 0); }, &load);
-  // At the root cross-sections stay plane and change their shape freely; one edge keeps the rest from moving.
+  // At the root cross-sections stay plane and change their shape freely; one edge prevents rigid motion.
   const Points u = Displacement(mesh,
                                 HeldWhere(mesh,
                                           [](const Vec3d& p, int axis) {
@@ -315,7 +316,7 @@ double PureBending(int n, double poisson) {
                                             return axis == 0 ? root : axis == 1 ? centre || below : centre;
                                           }),
                                 load);
-  // u_z = M / 2EI (x^2 + nu ((z - m)^2 - (y - m)^2)), so the end's middle says it all.
+  // u_z = M / 2EI (x^2 + nu ((z - m)^2 - (y - m)^2)), so the middle of the end determines the error.
   const double exact = kMoment * kBeamLength * kBeamLength / (2 * kYoungs_Pa * kBeamInertia);
   return u(2, mesh.Node(mesh.bricks[0], n / 2, n / 2)) / exact - 1;
 }

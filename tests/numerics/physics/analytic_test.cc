@@ -1,4 +1,4 @@
-// The discretisation against theory, on meshes small enough for every day.
+// The discretisation against theory, on meshes small enough for the default run.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -1,4 +1,4 @@
-// Tools where no tool should go: deep in the organ, through it at full speed, across each other.
+// Tools at places that no operator intends: deep in the organ, through it at full speed, across each other.
 #include <gtest/gtest.h>
 
 #include "physics_node/collision/closest.h"
@@ -23,7 +23,7 @@ class DeepTools : public testing::TestWithParam<PhysicsMode> {
   /// The membrane's middle, over the organ's top.
   const Vec3f middle_ = scene_.rest_position[scene_.membrane.first + 36 * 25 + 12];
 
-  /// Shaft straight up, turned about it.
+  /// Shaft straight up, rotated about its axis.
   static ToolPose Upright(const Vec3f& tip, float jaw_rad, float about_z = 0) {
     return {tip,
             Quatf(Eigen::AngleAxisf(about_z, Vec3f::UnitZ())) *
@@ -80,7 +80,7 @@ class DeepTools : public testing::TestWithParam<PhysicsMode> {
     }
     return inverted;
   }
-  /// Tools gone: back near rest, nothing turned inside out, the membrane over the organ.
+  /// After the tools are removed: tissue near rest, no inverted tetrahedron, the membrane over the organ.
   void ExpectRecovery() {
     tools_ = {};
     for (int i = 0; i < 600; ++i) {

@@ -11,16 +11,16 @@ namespace fulcrum::physics {
 namespace {
 
 constexpr float kOpen = 0.9f, kClosed = 0.0f;
-/// After so many cuts the sheet is whole again, as when the heat has lost its state.
+/// Number of cuts after which the sheet is restored, as after a loss of the thermal state.
 constexpr int kCutsPerSheet = 60;
 constexpr int kRestSteps = 1500;
-/// While tools act: as far as a grasper may take tissue, as fast as the solver lets anything go.
+/// Bounds while tools act: the largest pull of a grasper and the speed limit of the solver.
 constexpr TissueBounds kActing{0.120f, 5.0f, 20.0f, false};
-/// Let alone: a cut sheet under tension draws back from the cut and its flaps lie where they have fallen. Some flaps go
-/// on moving: there the preconditioned matrix exceeds what two iterations bear.
+/// Bounds at rest: a cut sheet under tension retracts from the cut, and its flaps stay where they have fallen. Some
+/// flaps keep moving: there the preconditioned matrix exceeds what two iterations can handle.
 constexpr TissueBounds kResting{0.030f, 0.3f, 0.0f, true};
 
-/// Forty millimetres of the small scene: a step takes some tens of microseconds.
+/// Forty millimetres of the small scene, in which a step takes some tens of microseconds.
 scene::SceneData TinyScene(bool two_graspers) {
   scene::SceneSettings settings = scene::Small();
   settings.tube.rings = 6;
@@ -62,7 +62,7 @@ void GraspCutFuzz::Step() {
   counts_.fastest_m_s = std::max(counts_.fastest_m_s, report_.max_step_m / scene_.physics.dt_s);
 }
 
-/// Near where a random node, or now and then a vertex of the organ, is now; somewhat above or in it.
+/// Near the present position of a random node, sometimes of a vertex of the organ; somewhat above or in it.
 Vec3f GraspCutFuzz::PlaceOnTissue() {
   const Index first = scene_.membrane.first;
   const Index p = Unit() < 0.8f ? first + Below(scene_.membrane.node_count()) : Below(first);
@@ -89,7 +89,7 @@ void GraspCutFuzz::DoGrasp(std::size_t tool) {
   counts_.holds += simulation_->grasp(static_cast<std::uint32_t>(tool)).holding();
 }
 
-/// Away with the jaws as they are, upward more often than not.
+/// Moves the tool away, mostly without a change of the jaws, upward more often than not.
 void GraspCutFuzz::DoPull(std::size_t tool) {
   if (!tools_[tool].present) {
     return DoGrasp(tool);
@@ -100,7 +100,7 @@ void GraspCutFuzz::DoPull(std::size_t tool) {
   ++counts_.pulls;
 }
 
-/// Opens, or is taken away altogether.
+/// Opens the jaws, or removes the tool.
 void GraspCutFuzz::DoRelease(std::size_t tool) {
   if (Unit() < 0.2f) {
     tools_[tool].present = false;
@@ -123,7 +123,7 @@ void GraspCutFuzz::Publish() {
   counts_.debris = std::max(counts_.debris, static_cast<int>(debris));
 }
 
-/// Edges and nodes anywhere; heat shrinks some others.
+/// Cuts edges and nodes anywhere and shrinks some other edges.
 void GraspCutFuzz::DoCut() {
   const Index nodes = scene_.membrane.node_count();
   for (Index i = Below(8); i > 0; --i) {
@@ -138,7 +138,7 @@ void GraspCutFuzz::DoCut() {
   }
 }
 
-/// All around a rectangle of the sheet, or along a row: pieces come free.
+/// Cuts around a rectangle of the sheet, or along a row, so that pieces are freed.
 void GraspCutFuzz::DoSlit() {
   const Index rows = scene_.membrane.rows, cols = scene_.membrane.cols;
   const Index row0 = Below(rows), col0 = Below(cols), height = Below(6), width = 2 + Below(6);
@@ -151,7 +151,7 @@ void GraspCutFuzz::DoSlit() {
   }
 }
 
-/// The process dies and starts again from its checkpoint; the topology comes after some steps.
+/// Restarts the process from its checkpoint; the topology follows after some steps.
 void GraspCutFuzz::DoRestart() {
   const ParticleStore& particles = simulation_->particles();
   std::vector<float> xyz(3 * std::size_t{particles.particle_count()}), previous(xyz.size());

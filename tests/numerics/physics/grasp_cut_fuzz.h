@@ -14,17 +14,17 @@ namespace fulcrum::physics {
 
 struct FuzzCounts {
   int grasps = 0, holds = 0, pulls = 0, releases = 0, cuts = 0, debris = 0, restarts = 0, revivals = 0, rests = 0;
-  int restless = 0;  ///< Rests after which something still moved.
+  int restless = 0;  ///< Rests after which some tissue still moved.
   std::uint64_t steps = 0;
   float farthest_m = 0, fastest_m_s = 0, farthest_at_rest_m = 0, fastest_at_rest_m_s = 0;
 };
 
 class GraspCutFuzz {
  public:
-  /// An even seed has a grasper and a hook, an odd one two graspers.
+  /// An even seed has a grasper and a hook, an odd seed two graspers.
   explicit GraspCutFuzz(unsigned seed);
 
-  /// The next operation and the steps that it takes. What is wrong afterwards; empty when all is well.
+  /// Runs the next operation and its steps; returns a violated invariant, or nothing.
   [[nodiscard]] std::string Operate();
   /// Releases all grasps, removes the tools and steps until the tissue sleeps, or for 15 s; then returns a violated
   /// invariant, by stricter bounds.

@@ -18,7 +18,7 @@ TEST_P(GraspCut, NothingBreaks) {
       ASSERT_EQ(fuzz.Rest(), "") << "seed " << GetParam() << " operation " << i;
     }
   }
-  // It did what it says.
+  // All operations occurred.
   EXPECT_GT(fuzz.counts().holds, 10);
   EXPECT_GT(fuzz.counts().cuts, 15);
 }

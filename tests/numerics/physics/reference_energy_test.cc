@@ -1,4 +1,4 @@
-// The reference is truth only if its forces are the slopes of its energy.
+// Consistency of the reference: its forces are the derivatives of its energy.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -73,16 +73,16 @@ TEST_F(ReferenceEnergy, TheClampedHessianIsPositiveAndTheSameWhereNothingIsClamp
     EXPECT_GE(bend, 0);
     lowest = std::min(lowest, d.dot(plain.selfadjointView<Eigen::Lower>() * d) - bend);
   }
-  EXPECT_LT(lowest, 0);  // The clamp took something away somewhere.
+  EXPECT_LT(lowest, 0);  // Clamping removed negative curvature in some direction.
 }
 
 TEST_F(ReferenceEnergy, RotationsCostNothingAndRestIsFreeOfForce) {
   ElasticModel model = Model();
   model.gravity.setZero();
   model.load.clear();
-  model.hinges.clear();  // They hold the rest shape's orientation, as their comment says.
+  model.hinges.clear();  // They keep the orientation of the rest shape, see their comment.
   for (ElasticSpring& spring : model.springs) {
-    spring.rest_length *= 1.04f;  // Without prestrain.
+    spring.rest_length *= 1.04f;  // Removes the prestrain.
   }
   const ElasticEnergy energy(model);
   const Points x = RestPoints(model);

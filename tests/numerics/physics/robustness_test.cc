@@ -1,5 +1,5 @@
-// The robustness matrix: what no operator does on purpose, on every solver. All stay finite; the accurate mode also
-// comes back, leaves no tetrahedron inverted and makes no energy.
+// The robustness matrix: states and motions that no operator intends, on every solver. All solvers stay finite; the
+// accurate mode also returns to rest, leaves no tetrahedron inverted and creates no energy.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -19,13 +19,14 @@ using reference::ElasticEnergy;
 using reference::Points;
 
 constexpr double kReturnTime_s = 2.5, kLookTime_s = 0.5;
-/// Of the organ's length, RMS over all particles, where the membrane may stay folded over itself, and elsewhere.
+/// Largest RMS distance from rest over all particles, relative to the organ's length, where the membrane may stay
+/// folded over itself, and elsewhere.
 constexpr double kFoldedPart = 0.10, kReturnedPart = 0.02;
-/// Energy may seem to grow by so much, since velocities are told from positions a frame apart, and to exceed the work
-/// by so much, since that is a sum over frames.
+/// Apparent growth of energy, because velocities are differences of positions a frame apart, and apparent excess over
+/// the work, because the work is a sum over frames.
 constexpr double kEnergyMargin = 1.02, kWorkMargin = 1.05, kEnergyRounding_J = 1e-7;
 
-/// The small scene in the moduli of the standard case.
+/// The small scene with the moduli of the standard case.
 scene::SceneData MakeScene() {
   scene::SceneData data = scene::BuildProcedural(scene::Small());
   PhysicsParams& physics = data.fixed.physics;
@@ -37,7 +38,7 @@ scene::SceneData MakeScene() {
   return data;
 }
 
-/// One trial: a solver, what holds it, and what is known about its energy.
+/// One trial: a solver, its held particles, and its energy.
 class Trial {
  public:
   Trial(const SceneView& scene, const SolverFactory& make)
@@ -89,14 +90,14 @@ class Trial {
       work_ += (pull_before.col(p) + pull_.col(p)).dot(moved_.col(p)) / 2;
     }
   }
-  /// Done on the patch by what holds it, by the trapezoidal rule over frames [J].
+  /// Work done on the held patch, by the trapezoidal rule over frames [J].
   [[nodiscard]] double Work() const { return work_; }
   /// Elastic energy over that of the rest shape, and kinetic energy of the last frame's motion [J].
   [[nodiscard]] double Energy() const {
     return energy_.Energy(x_) - energy_.Energy(rest_) +
            reference::KineticEnergy(energy_.model(), moved_ / static_cast<double>(scene_.physics.dt_s));
   }
-  /// Lets go and waits; the largest energy on the way over the `given` one.
+  /// Releases the patch and waits; the largest energy meanwhile relative to `given`.
   double Return(double given, double seconds) {
     solver_->Hold({});
     double most = 0;
@@ -125,9 +126,9 @@ class Trial {
   bool finite_ = true;
 };
 
-// ------------------------------------------------------------------------------------------- what is done to tissue
+// -------------------------------------------------------------------------------------------- operations on the tissue
 
-/// Up by `height` in `seconds`; returns the energy there, with the work that a fast pull leaves as motion.
+/// Lifts the patch by `height` in `seconds`; returns the energy there, including the kinetic energy of a fast pull.
 double Pull(Trial* trial, double height, double seconds) {
   trial->HoldPatch();
   const int frames = trial->FramesIn(seconds);
@@ -140,14 +141,14 @@ double Pull(Trial* trial, double height, double seconds) {
   return most;
 }
 double PullLittle(Trial* trial) { return Pull(trial, 0.012, 0.5); }
-/// The sheet beside the patch is 20 mm wide: to three times its length.
+/// The sheet beside the patch is 20 mm wide: the pull triples its length.
 double PullToThreeTimes(Trial* trial) { return Pull(trial, 0.060, 1.0); }
 
 double Place(Trial* trial, const Points& x) {
   trial->Set(x);
   return trial->Energy();
 }
-/// What can move is multiplied by `signs`.
+/// Multiplies the free particles' coordinates by `signs`.
 double MirrorBy(Trial* trial, const Vec3d& signs) {
   Points x = trial->rest();
   for (Index p = 0; p < x.cols(); ++p) {
@@ -170,7 +171,7 @@ double Scramble(Trial* trial) {
   }
   return Place(trial, x);
 }
-/// Everything that can move into one plane: no volume anywhere.
+/// Moves all free particles into one plane: no volume anywhere.
 double Flatten(Trial* trial) {
   Points x = trial->rest();
   for (Index p = 0; p < x.cols(); ++p) {
@@ -178,7 +179,7 @@ double Flatten(Trial* trial) {
   }
   return Place(trial, x);
 }
-/// Blocks of nodes in one place: edges without a direction.
+/// Moves blocks of nodes to one place: edges without a direction.
 double Collapse(Trial* trial) {
   Points x = trial->rest();
   const Eigen::Index cols = 25, first = x.cols() - 73 * cols;
@@ -191,7 +192,7 @@ double Collapse(Trial* trial) {
   }
   return Place(trial, x);
 }
-/// From one side of the organ to the other and through it, 60 mm a frame.
+/// Moves the patch from one side of the organ to the other and through it, 60 mm per frame.
 double Teleport(Trial* trial) {
   trial->HoldPatch();
   double most = 0;
@@ -214,7 +215,7 @@ double NotANumber(Trial* trial) {
   return most;
 }
 
-// ------------------------------------------------------------------------------------------------- what scenes are
+// ----------------------------------------------------------------------------------------------- variants of the scene
 
 void AsItIs(scene::SceneData*) {}
 void LongSteps(scene::SceneData* data) { data->fixed.physics.dt_s *= 10; }
@@ -230,7 +231,7 @@ void UnequalStiffness(scene::SceneData* data) {
   data->fixed.physics.membrane_Et_N_per_m *= 100;
   data->fixed.physics.tube_youngs_modulus_Pa /= 100;
 }
-/// Nodes of the sheet almost on their neighbours: edges of a ten-thousandth of their length.
+/// Moves nodes of the sheet almost onto their neighbours: edges of a ten-thousandth of their length.
 void NoLength(scene::SceneData* data) {
   const Index rows = data->fixed.membrane.rows, cols = data->fixed.membrane.cols, first = data->fixed.membrane.first;
   for (Index r = 10; r < 60; r += 10) {
@@ -248,7 +249,8 @@ void NoLength(scene::SceneData* data) {
     }
   }
 }
-/// A free vertex of the organ almost in the plane of the opposite face: a tetrahedron of a thousandth of its height.
+/// Moves a free vertex of the organ almost into the plane of the opposite face: a tetrahedron of a thousandth of its
+/// height.
 void Sliver(scene::SceneData* data) {
   std::vector<Vec3f>& x = data->rest_position;
   const auto volume = [&](const Tetrahedron& t) {
@@ -277,8 +279,8 @@ void Sliver(scene::SceneData* data) {
 struct Abuse {
   const char* name;
   void (*scene)(scene::SceneData*);
-  double (*act)(Trial*);  ///< Returns the energy that it gave [J].
-  double allowed;         ///< Distance from rest at the end, as a part of the organ's length.
+  double (*act)(Trial*);  ///< Returns the energy that it added [J].
+  double allowed;         ///< Distance from rest at the end, relative to the organ's length.
 };
 constexpr Abuse kMatrix[] = {
     {"PullToThreeTimes", AsItIs, PullToThreeTimes, kReturnedPart},
@@ -299,7 +301,7 @@ constexpr Abuse kMatrix[] = {
 struct Mode {
   const char* name;
   SolverFactory make;
-  bool strict;  ///< Comes back, too.
+  bool strict;  ///< It must also return to rest.
 };
 const Mode kModes[] = {
     {"paper", [](const SceneView& s) { return std::make_unique<PaperSolver>(s); }, false},
@@ -330,7 +332,7 @@ TEST_P(Robustness, StaysFiniteAndComesBack) {
   }
 }
 
-/// Long after a pull nothing moves any more: what an unfinished solve leaves over must not feed on itself.
+/// Long after a pull nothing moves: the residual of an unfinished solve must not keep the motion alive.
 TEST(ComesToRest, AfterAPull) {
   const scene::SceneData data = MakeScene();
   const SceneView scene = data.View();
@@ -341,7 +343,7 @@ TEST(ComesToRest, AfterAPull) {
   EXPECT_LT(trial.DistanceFromRest(), 1e-6);
 }
 
-/// Whichever way an organ is turned inside out, its wall comes out of every fold; some need longer than others.
+/// For any mirrored axis the wall of the organ unfolds completely; some cases take longer than others.
 TEST(Folds, OpenWhicheverWayTheOrganIsMirrored) {
   const scene::SceneData data = MakeScene();
   const SceneView scene = data.View();

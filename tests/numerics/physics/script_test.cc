@@ -1,4 +1,4 @@
-// The shipped scenes under their scripts: a tent that a person would believe, nothing that explodes, rest afterwards.
+// The shipped scenes under their scripts: a plausible tent, no instability, rest afterwards.
 #include <gtest/gtest.h>
 
 #include "services/scene/builder/build.h"
@@ -24,7 +24,7 @@ int CountInverted(const SceneView& scene, const ParticleStore& particles) {
   return inverted;
 }
 
-/// Plays the script and `after_s` more.
+/// Plays the script and continues for `after_s`.
 Played Play(const SceneView& scene, double after_s) {
   TissueSimulation simulation(scene);
   Played played;
@@ -66,7 +66,7 @@ void ExpectBelievable(const Played& played, float pull_m) {
   EXPECT_EQ(played.inverted, 0);
   EXPECT_EQ(played.quarantined, 0u);
   EXPECT_GT(played.most_held, 10u);
-  // In the script the grasp holds; where the pull comes up to the grip, its rim slips a little.
+  // The grasp holds during the script; where the traction reaches the grip force, its rim slips a little.
   EXPECT_GE(played.held_at_pull, played.most_held * 4 / 5);
   EXPECT_GT(played.cutting_contacts, played.cutting_steps * 8 / 10);
   EXPECT_GT(played.max_force, 0.5f);

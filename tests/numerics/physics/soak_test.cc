@@ -1,5 +1,4 @@
-// A million computed substeps of the accurate mode on a scene so small that they take a minute: nothing drifts, nothing
-// grows.
+// A million computed substeps of the accurate mode on a scene so small that they take a minute: no drift and no growth.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -48,7 +47,7 @@ TEST(Soak, AMillionSubstepsLeaveTheTissueWhereItWas) {
     }
     return most;
   };
-  // Up by 5 mm, around a circle of 1.5 mm radius for 6 s, then let go.
+  // Lift by 5 mm, move around a circle of 1.5 mm radius for 6 s, then release.
   int computed = 0;
   for (int frame = 0; computed < kFrames; ++frame) {
     const int phase = frame % kRound;

@@ -14,22 +14,23 @@ class SolverUnderTest {
  public:
   virtual ~SolverUnderTest() = default;
 
-  /// Puts all particles in place and takes their velocities away. [3 * particles] x y z in the order of the scene.
+  /// Sets all positions and resets all velocities. [3 * particles] x y z in the order of the scene.
   virtual void SetPositions(std::span<const float> xyz) = 0;
   virtual void ReadPositions(std::span<float> xyz) const = 0;
 
-  /// These particles, and no others, are held from now on, where they are. Empty: all are released.
+  /// Holds these particles, and no others, at their present positions. Empty: releases all.
   virtual void Hold(std::span<const Index> particles) = 0;
-  /// Where the held particles are at the end of the next step, in the order of Hold; until then they go there straight.
+  /// Positions of the held particles at the end of the next step, in the order of Hold; they move there in a straight
+  /// line.
   virtual void MoveHeld(std::span<const Vec3f> places) = 0;
   /// Cuts membrane edges 3 * node + direction.
   virtual void CutEdges(std::span<const std::size_t> edges) = 0;
 
-  /// Goes on by the scene's dt_s.
+  /// Advances by the scene's dt_s.
   virtual void Step() = 0;
 };
 
-/// The scene outlives the solver.
+/// The scene must outlive the solver.
 using SolverFactory = std::function<std::unique_ptr<SolverUnderTest>(const SceneView&)>;
 
 }  // namespace fulcrum::physics

@@ -18,9 +18,10 @@ using reference::ElasticEnergy;
 using reference::ExplicitDynamics;
 using reference::Points;
 
-/// Steps a frame: this part of the largest stable step at rest. Stretching stiffens the sheet across by less.
+/// Step length relative to the largest stable step at rest. The margin covers the stiffening of the sheet by the
+/// stretch.
 constexpr double kPartOfStableStep = 0.75;
-/// Changes when the way the reference is computed does.
+/// Version of the computation of the reference; increment it with each change of that computation.
 constexpr std::uint64_t kGenerator = 1;
 
 std::vector<bool> Mask(const std::vector<Index>& particles, std::size_t count) {
@@ -44,7 +45,7 @@ Vec3d ForceOn(const ElasticEnergy& energy, const Points& x, const std::vector<In
 /// Sums of squares of differences from a reference and of its displacement, over any number of frames.
 class RmsError {
  public:
-  /// `displaced` is what the truth is displaced by, or stands for it.
+  /// @param displaced displacement of the truth, or a substitute for it.
   void Add(const Points& x, const Points& truth, const Points& displaced) {
     error_ += (x - truth).squaredNorm();
     displacement_ += displaced.squaredNorm();
@@ -175,7 +176,7 @@ StandardCase::StandardCase(scene::SceneData data, const StandardCaseSettings& se
   for (int r = slit_row; r < slit_row + settings.slit_rows; ++r) {
     const auto node = static_cast<std::size_t>(r * cols + slit_col);
     cut_edges_.push_back(3 * node);      // Along the row,
-    cut_edges_.push_back(3 * node + 2);  // and the diagonal: what crosses from this column to the next.
+    cut_edges_.push_back(3 * node + 2);  // and the diagonal: the edges from this column to the next.
   }
 }
 
@@ -202,7 +203,7 @@ StandardCase::Reference StandardCase::ComputeReference(int steps_per_frame) cons
     if (frame % kSampleFrames == 0) {
       result.frames.push_back(dynamics.x());
     }
-    // The branches go beside the main run: each has an energy of its own, so the result does not depend on it.
+    // The branches run beside the main run: each has its own energy, so the result does not depend on the order.
     if (frame == kCutFrame) {
       cut = std::async(std::launch::async, [this, dynamics, steps_per_frame]() mutable {
         ElasticEnergy slit(model_);

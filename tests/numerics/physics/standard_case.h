@@ -7,8 +7,9 @@
 //         0       0.5 s          0.8 s    1 s
 //
 // The case begins in equilibrium (with the model's dead load that is the scene's rest shape, to the rounding of the
-// scene's floats); displacements are from there. The reference moves by central differences (explicit_dynamics.h) and
-// stands still by Newton's method (static_solver.h); both are computed once per scene and kept in a file.
+// scene's floats); displacements are relative to it. The reference solves the dynamics by central differences
+// (explicit_dynamics.h) and the equilibria by Newton's method (static_solver.h); both are computed once per scene and
+// stored in a file.
 #pragma once
 
 #include <filesystem>
@@ -23,7 +24,7 @@ namespace fulcrum::physics {
 struct StandardCaseSettings {
   int patch_rows = 15, patch_cols = 5;  ///< 75 particles.
   double lift_m = 0.030;
-  int slit_rows = 150, slit_offset_cols = 6;  ///< The cut: 2 edges a row, so many columns from the middle.
+  int slit_rows = 150, slit_offset_cols = 6;  ///< The cut: 2 edges a row, this many columns from the middle.
 };
 inline constexpr StandardCaseSettings kBuiltInCase{};
 class StandardCase {
@@ -42,22 +43,23 @@ class StandardCase {
   [[nodiscard]] const std::vector<Index>& held() const { return held_; }
   [[nodiscard]] const std::vector<std::size_t>& cut_edges() const { return cut_edges_; }
   [[nodiscard]] double lift_m() const { return settings_.lift_m; }
-  /// How far the patch is up at the end of frame `frame` [m].
+  /// Height of the patch at the end of frame `frame` [m].
   [[nodiscard]] double Lift(double frame) const { return settings_.lift_m * std::min(1.0, frame / kPullFrames); }
 
   struct Reference {
-    reference::Points equilibrium;  ///< Where it begins.
+    reference::Points equilibrium;  ///< Initial state.
     reference::Points hold;         ///< Equilibrium with the patch up.
-    Vec3d force_N = Vec3d::Zero();  ///< On the patch in `hold`.
+    Vec3d force_N = Vec3d::Zero();  ///< Force on the patch in `hold`.
     double equilibrium_residual_N = 0, hold_residual_N = 0;
-    double step_s = 0;                      ///< Of the dynamics.
+    double step_s = 0;                      ///< Time step of the dynamics.
     std::vector<reference::Points> frames;  ///< After each kSampleFrames, up to kFrames.
     std::vector<reference::Points>
         cut_frames;  ///< The same with the edges cut at kCutFrame, from there to kPullFrames.
   };
-  /// Computes the reference with `steps_per_frame` steps a frame (0: as many as are stable with room to spare).
+  /// Computes the reference with `steps_per_frame` steps a frame (0: the least number that is stable with a margin).
   [[nodiscard]] Reference ComputeReference(int steps_per_frame = 0) const;
-  /// Reads it from `folder` where it was computed before for the same model and case, else computes and writes it.
+  /// Reads the reference from `folder` if it was computed before for the same model and case, else computes and writes
+  /// it.
   [[nodiscard]] Reference LoadReference(const std::filesystem::path& folder) const;
 
  private:
@@ -72,14 +74,15 @@ class StandardCase {
 };
 
 /// Errors are RMS over the particles and frames, over the RMS displacement from the equilibrium in the truth. After the
-/// release that displacement goes to 0, so the one in the hold stands for it. The sheet springs back into folds as fine
-/// as its mesh, which are chaotic: halving the step of the reference changes `release` by the figure that the benchmark
-/// gives as its floor. Just after the cut the same holds for a while, so `cut` looks at the end of the pull.
+/// release that displacement goes to 0, so the one in the hold is used instead. The sheet springs back into folds as
+/// fine as its mesh, which are chaotic: halving the step of the reference changes `release` by the figure that the
+/// benchmark gives as its floor. The same is true for a while after the cut, so `cut` is measured at the end of the
+/// pull.
 struct StandardErrors {
   double pull = 0;        ///< Frames of the pull.
   double release = 0;     ///< Frames after the release.
   double hold = 0;        ///< Last frame of the hold against the equilibrium.
-  double hold_max_m = 0;  ///< Largest distance of a particle there.
+  double hold_max_m = 0;  ///< Largest distance of a particle in that frame.
   double force = 0;       ///< |force on the patch - that of the equilibrium| over its size.
   double volume = 0;      ///< |volume of the organ - that of the equilibrium| over that of the equilibrium.
   double tet_volume = 0;  ///< RMS over the tets of the difference of their volumes, over their volume at rest.
@@ -89,12 +92,13 @@ struct StandardErrors {
 
 struct StandardRun {
   StandardErrors errors;
-  std::vector<double> frame_ms;      ///< Of the run without the cut.
-  std::vector<double> cut_frame_ms;  ///< Of the run with it: the frame of the cut, cutting included, and those after.
+  std::vector<double> frame_ms;  ///< Frames of the run without the cut.
+  std::vector<double>
+      cut_frame_ms;  ///< Frames of the run with it: the frame of the cut, cutting included, and those after.
 };
 
-/// Runs the case (without and, `with_cut`, once more with the cut) and measures. `scene` is the case's, or a copy with
-/// other settings of the solver.
+/// Runs the case (without and, `with_cut`, once more with the cut) and measures it. `scene` is that of the case, or a
+/// copy with other settings of the solver.
 [[nodiscard]] StandardRun RunStandardCase(const StandardCase& standard, const StandardCase::Reference& truth,
                                           const SolverFactory& make, const SceneView& scene, bool with_cut);
 

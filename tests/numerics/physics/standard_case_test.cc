@@ -1,4 +1,4 @@
-// The measure itself: the reference converges with its step, and a solver that is the reference has no error.
+// The measure itself: the reference converges with its step, and the reference used as a solver has no error.
 #include "tests/numerics/physics/standard_case.h"
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 
 using reference::Points;
 
-/// Folds of the released sheet, and of the lips of a cut, are chaotic: no step is small enough to tell where they go.
+/// Folds of the released sheet, and of the lips of a cut, are chaotic: no step is small enough to predict them.
 constexpr double kReleaseFloor = 0.2, kCutFloor = 0.03;
 
 /// The reference dynamics in the place of a solver.
@@ -87,7 +87,7 @@ TEST_F(StandardCaseTest, TheCaseIsAsDescribed) {
   EXPECT_LT(truth_->force_N.z(), -0.05);  // The tissue pulls back.
   const Index middle = standard_->held()[7];
   EXPECT_NEAR(truth_->hold(2, middle) - truth_->equilibrium(2, middle), standard_->lift_m(), 1e-12);
-  // The cut lets the tent go its own way.
+  // The cut changes the shape of the tent.
   EXPECT_GT((truth_->cut_frames[4] - truth_->frames[9]).cwiseAbs().maxCoeff(), 5e-4);
 }
 
@@ -104,7 +104,7 @@ TEST_F(StandardCaseTest, TheReferenceIsConvergedInItsStep) {
   EXPECT_LT(difference(truth_->frames[19], finer.frames[19]), kReleaseFloor);
 }
 
-/// Small and slow, so that nothing is chaotic: the order of central differences.
+/// Small and slow, so that no motion is chaotic: measures the order of central differences.
 TEST(ExplicitDynamics, IsOfSecondOrder) {
   ElasticModel model;
   model.rest_position = {Vec3d::Zero(), Vec3d(0.01, 0, 0), Vec3d(0.02, 0, 0)};
@@ -130,7 +130,7 @@ TEST_F(StandardCaseTest, TheTruthHasNoError) {
   EXPECT_LT(run.errors.pull, 1e-3);  // Positions are handed over as floats.
   EXPECT_LT(run.errors.release, kReleaseFloor);
   EXPECT_LT(run.errors.cut, kCutFloor);
-  EXPECT_LT(run.errors.hold, 0.05);  // It still swings.
+  EXPECT_LT(run.errors.hold, 0.05);  // The tissue still oscillates.
   EXPECT_EQ(run.frame_ms.size(), 100u);
   EXPECT_EQ(run.cut_frame_ms.size(), 25u);
 }

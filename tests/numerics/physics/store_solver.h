@@ -51,9 +51,9 @@ class StoreSolver : public SolverUnderTest {
  protected:
   /// Resets velocities and other history after positions have been set.
   virtual void Stop() {}
-  /// Inverse masses have changed.
+  /// Called when inverse masses have changed.
   virtual void HeldChanged() {}
-  /// tissue_ has changed.
+  /// Called when tissue_ has changed.
   virtual void TopologyChanged() {}
 
   SceneView scene_;
@@ -62,7 +62,7 @@ class StoreSolver : public SolverUnderTest {
   TopologyState topology_;
   std::vector<Index> held_particles_;
   std::vector<ParticleRef> held_;
-  std::vector<Vec3f> places_;  ///< Of the held particles at the end of the step.
+  std::vector<Vec3f> places_;  ///< Positions of the held particles at the end of the step.
 };
 
 }  // namespace fulcrum::physics

@@ -1,4 +1,4 @@
-// Abuse: what no operator does on purpose must stay finite, bounded and repairable.
+// Misuse: motions that no operator intends must leave the state finite, bounded and recoverable.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -31,7 +31,7 @@ class Stress : public testing::TestWithParam<unsigned> {
     ASSERT_TRUE(std::isfinite(displacement));
     ASSERT_LT(displacement, limit);
   }
-  /// Volume is bounded below: inverted tetrahedra of the organ at the end.
+  /// Inverted tetrahedra of the organ at the end.
   [[nodiscard]] int Inverted() const {
     int inverted = 0;
     for (const Tetrahedron& t : scene_.tets) {
@@ -77,7 +77,7 @@ TEST_P(Stress, WildToolsAndWildCuts) {
       ExpectBounded(0.15f);
     }
   }
-  // Hands off: what still hangs together comes back.
+  // Without tools, connected tissue returns to rest.
   for (int i = 0; i < 600; ++i) {
     simulation_.Step({});
   }
@@ -88,7 +88,7 @@ TEST_P(Stress, WildToolsAndWildCuts) {
 INSTANTIATE_TEST_SUITE_P(Seeds, Stress, testing::Values(1u, 2u, 3u));
 
 TEST_F(Stress, ThreeTimesTheLengthAndBack) {
-  // The middle of the membrane pulled far out and let go.
+  // The middle of the membrane is pulled far out and released.
   const Index first = scene_.membrane.first;
   ParticleStore& particles = simulation_.particles();
   for (Index r = 34; r < 40; ++r) {
@@ -129,7 +129,7 @@ TEST(Convergence, MoreIterationsComeCloserToTheConvergedShape) {
     scene.physics.mode = PhysicsMode::kPaper;
     scene.physics.iterations = iterations;
     TissueSimulation simulation(scene);
-    // A patch is held 6 mm up by hand: the same particles in the same places for every run.
+    // A patch is held 6 mm up: the same particles at the same places for every run.
     const Index first = scene.membrane.first;
     ParticleStore& particles = simulation.particles();
     for (int i = 0; i < 150; ++i) {

@@ -1,4 +1,4 @@
-// Traction tears the membrane at the stretch that the scene says, on any mesh, and what has torn comes apart.
+// Traction tears the membrane at the stretch limit of the scene, on any mesh, and torn tissue separates.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@ namespace {
 constexpr float kMeshes_m[] = {0.002f, 0.0013333f, 0.001f};
 constexpr float kMostError = 0.10f, kMostSpread = 0.05f;
 
-/// Onsets on the three meshes.
+/// Range of the onsets on the three meshes.
 struct Onsets {
   float least = 1e9f, most = 0;
   void Add(float stretch) {
@@ -52,7 +52,7 @@ TEST(Tear, AClampedStripTearsAtItsMostStretchedPlaceAndComesApart) {
     ASSERT_TRUE(result.torn);
     EXPECT_TRUE(result.finite);
     EXPECT_EQ(result.fault, "");
-    EXPECT_LE(result.stretch, 1.8f) << "somewhere it is stretched by more than on average";
+    EXPECT_LE(result.stretch, 1.8f) << "the largest stretch exceeds the average";
     EXPECT_GE(result.apart_s, 0);
     EXPECT_LE(result.apart_s, 1.0);
     EXPECT_GE(result.still_s, 0) << "the halves come to rest";

@@ -8,9 +8,9 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Of tissue_debris.cc: larger pieces go on moving.
+/// As in tissue_debris.cc: larger pieces keep moving.
 constexpr std::size_t kLargestDebris = 250;
-/// Of a direction between two points a micrometre apart, in float.
+/// Error of a direction between two points a micrometre apart, in float.
 constexpr float kUnitTolerance = 0.1f;
 
 class Check {
@@ -125,7 +125,7 @@ class Check {
     }
   }
 
-  /// Pieces of the sheet by a search of our own.
+  /// Pieces of the sheet by an independent search.
   void Debris() {
     const Index nodes = scene_.membrane.node_count(), cols = scene_.membrane.cols;
     std::vector<bool> bound(nodes, false), seen(nodes, false);

@@ -34,7 +34,7 @@ class XpbdUnderTest final : public StoreSolver {
   std::uint32_t substeps_;
   float h_;
   xpbd::XpbdSolver solver_;
-  std::vector<Vec3f> begin_;  ///< Of the held particles at the start of the step.
+  std::vector<Vec3f> begin_;  ///< Positions of the held particles at the start of the step.
 };
 
 }  // namespace fulcrum::physics

@@ -1,4 +1,4 @@
-// Dragging an energised tip over a sheet: what it cuts, and where the energy goes.
+// Drags of an energised tip over a sheet: the cut and the energy balance.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +23,7 @@ Drag Slanted(float speed_m_s, float length_m = 0.030f) {
   return drag;
 }
 
-/// Runs the whole drag; the topology is held to the cells after each commit.
+/// Runs the whole drag; after each commit the topology is checked against the cells.
 void RunChecked(const SceneView& scene, const Drag& drag, ThermalSolver* solver) {
   TopologyValidator validator(scene, solver->field().sheet());
   for (int frame = 0; frame < drag.frames(kDt); ++frame) {
@@ -54,11 +54,12 @@ TEST_P(CutTest, SlitIsContinuousAndEnergyCloses) {
   EXPECT_EQ(slit.surviving_crossings, 0);
   EXPECT_GE(slit.width_min_m, 5e-4f);
   EXPECT_LE(slit.width_max_m, 2e-3f);
-  // Browned … A film of steam heats evenly what is under the metal, and that goes. Beside it remains what conducts as
-  // fast as the slit advances, alpha / v = 0.065 mm at 2 mm/s, of which the hotter half browns.
+  // The rim is browned … A film of steam heats the tissue under the metal evenly, and that tissue is removed. Beside it
+  // remains tissue heated by conduction at the speed of the slit, alpha / v = 0.065 mm at 2 mm/s, of which the hotter
+  // half browns.
   EXPECT_GE(slit.brown_m, 3e-5f);
   EXPECT_GE(slit.dead_m, slit.brown_m);
-  EXPECT_LE(slit.dead_m, 1.5e-3f);  // … but not far
+  EXPECT_LE(slit.dead_m, 1.5e-3f);  // … but not far beyond
   EXPECT_LE(slit.warm_m, 3e-3f);
   // The hole reaches half its width beyond both ends of the path.
   const float hole_m = 0.030f + slit.width_mean_m;
@@ -67,7 +68,7 @@ TEST_P(CutTest, SlitIsContinuousAndEnergyCloses) {
   EXPECT_GE(solver.figures().cut_width_p95_m, solver.figures().cut_width_p50_m);
   EXPECT_LE(solver.figures().cut_off_way_m, 3e-4f);
   EXPECT_LE(solver.ledger().ClosureError(solver.field().Stored()), 1e-4);
-  // 37 to 100 C and all the water: no more tissue can go than the energy allows.
+  // 37 to 100 C and all the water: the energy limits the removed volume.
   const Material& m = solver.field().material();
   double removed_m3 = 0;
   for (const Tile* tile : solver.field().Existing()) {
@@ -127,7 +128,7 @@ TEST(CutPropertiesTest, ALineOfMetalWidensTheSlitAcrossTheCutAndNotAlongIt) {
   EXPECT_NEAR(width(0.0005f * across), point + 0.001f, 3e-4f);
 }
 
-/// Of a disc of `radius_m`, `above_m` off the sheet.
+/// Footprint of a disc of `radius_m`, `above_m` above the sheet.
 Footprint DiscAt(const Vec2f& at, float radius_m, float above_m) {
   constexpr float kCell_m = 1e-4f;
   constexpr int kHalf = 16;
@@ -144,7 +145,7 @@ Footprint DiscAt(const Vec2f& at, float radius_m, float above_m) {
   return print;
 }
 
-/// The drag of a capsule as one by footprints.
+/// The drag of a capsule, expressed by footprints.
 TipInput Standing(TipInput input, float above_m = 0) {
   input.path.begin = DiscAt(input.path.from, input.path.radius_m, above_m);
   input.path.end = DiscAt(input.path.to, input.path.radius_m, above_m);
@@ -166,7 +167,7 @@ TEST(CutPropertiesTest, MetalThatStandsInTheSheetCutsAsADiscDoes) {
 }
 
 TEST(CutPropertiesTest, MetalThatGoesFarInOneSampleLeavesNothingOut) {
-  // 1.2 mm between two footprints of 1 mm: samples of an outage that were lost.
+  // 1.2 mm between two footprints of 1 mm: the samples between them were lost.
   const scene::SceneData data = FlatScene(31, 51, 1e-3f);
   ThermalSolver often(data.View()), seldom(data.View());
   const Drag drag = Slanted(0.004f, 0.012f);
@@ -218,12 +219,12 @@ TEST(CutPropertiesTest, AFilmCarriesTheCurrentOfACutAndCollapsesAfterIt) {
   RunDrag(drag, kDt, &solver);
   EXPECT_GT(solver.source()->interface().film, 0.9f);
   const Ledger& ledger = solver.ledger();
-  // Of the heat of discharges a quarter does not reach the tissue; most of the current goes that way.
+  // A quarter of the heat of discharges does not reach the tissue; most of the current flows through discharges.
   EXPECT_GT(ledger.film, 0.15 * ledger.generator);
   EXPECT_LT(ledger.film, 0.25 * ledger.generator);
   EXPECT_NEAR(ledger.plume / ledger.film, 1 - kMetalShare / (1 - kTissueShare), 1e-5);
   EXPECT_LE(ledger.joule + ledger.film, 1.001 * ledger.generator);
-  // The metal has what it got of them, less what it lost to its shaft in these seconds.
+  // Heat of the metal: its share of the discharges less the loss to the shaft in these seconds.
   const double got_K = (ledger.film - ledger.plume - ledger.hook) / static_cast<double>(kHookHeatCapacity_J_K);
   EXPECT_LT(solver.source()->interface().hook_theta, got_K);
   EXPECT_GT(solver.source()->interface().hook_theta, std::exp(-2.5 / kHookCools_s) * got_K);
@@ -255,7 +256,7 @@ TEST(CutPropertiesTest, ACrumbBetweenTwoCutsGoes) {
   const SceneView scene = data.View();
   ThermalSolver solver(scene);
   TopologyValidator validator(scene, solver.field().sheet());
-  // Around a square of 2.5 mm, along its sides: what is left of it within the slit is some 1.2 mm wide.
+  // Around a square of 2.5 mm, along its sides: the rest of it within the slit is some 1.2 mm wide.
   const Vec2f corners[] = {{0.020f, 0.012f}, {0.0225f, 0.012f}, {0.0225f, 0.0145f}, {0.020f, 0.0145f}};
   for (int side = 0; side < 4; ++side) {
     const Drag drag{.from = corners[side], .to = corners[(side + 1) % 4], .speed_m_s = 0.005f};

@@ -6,9 +6,9 @@
 
 namespace fulcrum::thermal {
 
-/// A capsule that lies on the sheet and its sparks, as coupling/electrode.h describes them [m].
+/// A capsule that lies on the sheet and its sparks, as defined in coupling/electrode.h [m].
 struct CapsuleOnSheet {
-  double length_m = 0;  ///< Of its axis; 0: a disc.
+  double length_m = 0;  ///< Length of its axis; 0: a disc.
   double radius_m = 5e-4;
   double arc_m = 4e-4;
 };
@@ -20,8 +20,9 @@ struct CapsuleOnSheet {
 /// The same for a disc without sparks, exactly: I0 under the metal, K0 beside it.
 [[nodiscard]] double DiscConductance(const Material& material, double radius_m);
 
-/// What the source window draws from wet tissue at 1 V [S]. @param heading of the capsule's axis [rad]. @param
-/// from_node from a corner of cells in the middle of the sheet to the middle of the capsule [cells].
+/// Current that the source window draws from wet tissue at 1 V [S].
+/// @param heading direction of the capsule's axis [rad].
+/// @param from_node offset of the capsule's middle from a corner of cells in the middle of the sheet [cells].
 [[nodiscard]] double WindowConductance(const Material& material, const CapsuleOnSheet& capsule, float heading,
                                        const Vec2f& from_node);
 

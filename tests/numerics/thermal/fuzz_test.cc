@@ -1,5 +1,5 @@
-// Random burns: whatever a hand, a bus or a disk may send, nothing crashes, no number goes bad, and the topology says
-// what the cells say.
+// Random burns: for any input from a hand, a bus or a disk nothing crashes, all numbers stay finite, and the topology
+// agrees with the cells.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -51,7 +51,7 @@ class Fuzz {
     return kValues[Below(std::size(kValues))];
   }
 
-  /// A contact of a burn, now and then with something absurd in it.
+  /// A contact of a burn, occasionally with an absurd value.
   [[nodiscard]] CauteryContact Contact(const Vec2f& at, const CauteryContact& burn) {
     CauteryContact contact = burn;
     contact.touching = !OneIn(30);
@@ -60,7 +60,7 @@ class Fuzz {
     if (OneIn(60)) contact.material.x() = Absurd();
     if (OneIn(60)) contact.material.y() = Absurd();
     if (OneIn(60)) contact.contact_radius_m = Absurd();
-    // Its metal lies about it as it did about the burn's first place.
+    // The footprint moves with the contact.
     contact.footprint.x += static_cast<std::int32_t>(1e4f * at.x());
     contact.footprint.y += static_cast<std::int32_t>(1e4f * at.y());
     if (OneIn(60)) contact.footprint.width = static_cast<std::uint32_t>(Below(2 * static_cast<int>(kFootprintCells)));
@@ -75,7 +75,7 @@ class Fuzz {
   std::mt19937 random_;
 };
 
-/// What must hold after every step. Nothing but a ruined checkpoint makes tissue colder than the body.
+/// Properties that must hold after every step. Only a damaged checkpoint makes tissue colder than the body.
 void CheckState(const ThermalSolver& solver, float coldest = -1e-3f) {
   for (const Tile* tile : solver.field().awake()) {
     const TileState& s = tile->state;
@@ -95,7 +95,7 @@ void CheckState(const ThermalSolver& solver, float coldest = -1e-3f) {
   }
 }
 
-/// One sheet, its solver and what comes between: the tip's tracker and the checkpoint.
+/// One sheet with its solver, the tip's tracker and the checkpoint.
 class Patient {
  public:
   explicit Patient(const SceneView& scene) : scene_(scene), slot_(ThermalSolver::CheckpointCapacity(scene)) { Fresh(); }
@@ -119,7 +119,7 @@ class Patient {
     Vec2f at = fuzz->Anywhere();
     const float dt = fuzz->OneIn(10) ? fuzz->Between(1e-4f, 0.05f) : 0.01f;
     for (int frame = 1 + fuzz->Below(6); frame > 0; --frame) {
-      // Samples come one a frame, or none, or several at once.
+      // Each frame gets one sample, or none, or several at once.
       std::vector<TipInput> tips;
       for (int n = fuzz->OneIn(10) ? fuzz->Below(4) : 1; n > 0; --n, at += rate * dt) {
         time_s_ += fuzz->OneIn(50) ? static_cast<double>(fuzz->Between(-0.1f, 1.2f)) : static_cast<double>(dt);
@@ -132,7 +132,7 @@ class Patient {
     }
   }
 
-  /// A piece of straight metal at any slant, some of it through the sheet, about (0, 0); or gaps without any sense.
+  /// A piece of straight metal about (0, 0) at any slant, partly through the sheet; or random gaps.
   static void SetMetal(Fuzz* fuzz, CauteryContact* burn) {
     const int width = 1 + fuzz->Below(static_cast<int>(kFootprintCells)), height = 1 + fuzz->Below(width);
     const Vec2f along = Vec2f(fuzz->Between(-1, 1), fuzz->Between(-1, 1)).normalized();
@@ -155,7 +155,7 @@ class Patient {
     for (int n = 0; n < frames; ++n) Step({}, 0.01f);
   }
 
-  /// Saves and goes on from the checkpoint: with the same bits.
+  /// Saves and continues from the checkpoint, with equal bits.
   void Restart() {
     while (solver_->topology().staged()) Step({}, 0.01f);
     const std::size_t bytes = solver_->Save(slot_);
@@ -165,17 +165,17 @@ class Patient {
     ASSERT_TRUE(other->Restore(std::span(slot_).first(bytes)));
     ASSERT_EQ(other->FullHash(), before);
     solver_ = std::move(other);
-    // The sheet that the tracker looks at went with the old solver.
+    // The old tracker refers to the sheet of the old solver.
     tracker_ = std::make_unique<TipTracker>(solver_->field().sheet(), scene_.thermal.hook_radius_m);
   }
 
-  /// A checkpoint with flipped bits or torn off is refused, or what it holds can be gone on with.
+  /// A damaged or truncated checkpoint is refused, or the solver continues from it.
   void RestartFromRuins(Fuzz* fuzz) {
     while (solver_->topology().staged()) Step({}, 0.01f);
     std::size_t bytes = solver_->Save(slot_);
     ASSERT_GT(bytes, 0u);
     for (int n = 1 + fuzz->Below(8); n > 0; --n) {
-      // Half of them in the first part, where the counts and the topology are.
+      // Half of them in the first part, which contains the counts and the topology.
       const int reach = static_cast<int>(fuzz->OneIn(2) ? std::min<std::size_t>(bytes, 20'000) : bytes);
       slot_[fuzz->Below(reach)] ^= static_cast<std::byte>(1 << fuzz->Below(8));
     }
@@ -242,7 +242,7 @@ TEST(ThermalFuzzTest, RandomBurnsLeaveNothingBadBehind) {
     removed += patient.solver().topology().dead_edge_count();
     refused += patient.refused();
   }
-  // It did burn, cut, and meet ruins.
+  // Burns, cuts and damaged checkpoints did occur.
   EXPECT_GT(commits, kBurns / 10u);
   EXPECT_GT(removed, kBurns / 10u);
   EXPECT_GT(refused, kBurns / 200);

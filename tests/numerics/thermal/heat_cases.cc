@@ -78,7 +78,7 @@ class Variable {
     const double u = Exact(x, y, t);
     return -rc * u / kTau - (kx * ux + ky * uy + k * laplacian) + m.loss_resting * u;
   }
-  /// Half a step's, by its middle.
+  /// Adds the source of half a step, by its value in the middle.
   void AddSource(double t) {
     Ledger ledger;
     for (Tile* tile : field_.awake()) {
@@ -129,7 +129,7 @@ class Sphere {
     params.h_top_W_m2K = params.h_below_W_m2K = params.h_tented_W_m2K = params.perfusion_per_s = 0;
     return MakeMaterial(params);
   }
-  /// Point of the tangent plane [m] that material (x, y) stands for.
+  /// Point of the tangent plane [m] for material (x, y).
   static Vec3d Plane(double x, double y) {
     const double u = x - kLength, v = y - kLength;
     return {u + kSkew * v, v, kRadius};
@@ -151,7 +151,7 @@ class Sphere {
     return sheet;
   }
   static double Bump(double z, int power) { return std::pow(std::max(0.0, (z - kEdge) / (1 - kEdge)), power); }
-  /// The ground is warm, or tiles would fall asleep under the bump's foot.
+  /// The base temperature keeps tiles under the foot of the bump awake.
   static double Exact(double z, double t) { return 10 + 40 * std::exp(-t / kTau) * Bump(z, 5); }
   /// rc d theta/dt - k div grad theta.
   [[nodiscard]] double Source(double z, double t) const {
@@ -161,7 +161,7 @@ class Sphere {
     const double laplacian = ((1 - z * z) * second - 2 * z * first) / (kRadius * kRadius);
     return -m.rc_wet * (Exact(z, t) - 10) / kTau - m.k_wet * laplacian;
   }
-  /// Half a step's, by its middle.
+  /// Adds the source of half a step, by its value in the middle.
   void AddSource(double t) {
     Ledger ledger;
     for (Tile* tile : field_.awake()) {

@@ -1,4 +1,4 @@
-// Conduction against exact solutions, and what it must never do.
+// Conduction against exact solutions, and its bounds.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -66,7 +66,7 @@ TEST(HeatTest, ResultDoesNotDependOnWhereTheTilesLie) {
     }
     return around;
   };
-  // Which tiles sleep differs, and with it what is cut off below the waking threshold.
+  // Different tiles sleep, so different amounts below the waking threshold are cut off.
   constexpr float kTolerance = 0.3f * kWakeTheta;
   const std::vector<float> a = run(0), b = run(13);
   for (std::size_t k = 0; k < a.size(); ++k) EXPECT_NEAR(a[k], b[k], kTolerance);
@@ -121,7 +121,7 @@ TEST(HeatTest, MaximumPrincipleHoldsWithRandomHolesAndLongSteps) {
 }
 
 TEST(HeatTest, StiffStepsStayBoundedAndKeepTheHeat) {
-  // A sink of a million per second, and lossless tissue that would need a million substeps.
+  // A sink of a million per second, and lossless tissue that would require a million explicit substeps.
   ThermalParams params = Lossless();
   params.cell_m = 2.5e-5f;
   Material material = MakeMaterial(params);
@@ -169,8 +169,8 @@ TEST(HeatTest, HeatIsConservedAcrossTilesSleepAndLosses) {
     most = std::max(most, field.awake().size());
     ASSERT_NEAR(field.Stored() + ledger.Out(), start, 1e-5 * start);
   }
-  EXPECT_TRUE(field.idle());  // all went back to sleep
-  EXPECT_GT(most, 4u);        // and others had woken
+  EXPECT_TRUE(field.idle());  // all have fallen asleep again
+  EXPECT_GT(most, 4u);        // and further tiles had woken
   EXPECT_LT(ledger.dropped, 0.1 * start);
 }
 
@@ -187,7 +187,7 @@ void AddBlob(HeatField* field, int tx, int ty, float peak) {
   field->RefreshTheta(tile, &ledger);
 }
 
-/// The same, of tissue whose cells are dry by turns: at 0.1 mm it needs more substeps than wet tissue.
+/// The same, of tissue in which dry and wet cells alternate: at 0.1 mm it needs more substeps than wet tissue.
 void AddDryBlob(HeatField* field, int tx, int ty, float peak) {
   Tile* tile = field->Wake(tx, ty);
   for (int k = 0; k < kTileCells; k += 3) tile->state.water[k] = 0;
@@ -245,7 +245,7 @@ TEST(HeatTest, IslandsThatMeetBecomeOneAndKeepTheHeat) {
 }
 
 TEST(HeatTest, TilesThatTouchAtACornerOnlyAreTwoIslands) {
-  // On a sheared map, whose cells have links across corners: none leads past two sleeping tiles.
+  // On a sheared map, whose cells have links across corners: no link leads past two sleeping tiles.
   Sheet sheet = MakeFlatSheet(6.4e-3f, 6.4e-3f, 1e-4f);
   SetMetric(&sheet, [](const Vec2f& /*at*/) { return SurfaceMetric{1.0f, -0.4f, 1.0f}; });
   HeatField field(sheet, MakeMaterial(Lossless()));
@@ -291,7 +291,7 @@ TEST(HeatTest, BoilingHoldsAtHundredDegreesUntilTheWaterIsSpent) {
   Tile* tile = field.Find(0, 0);
   const float to_boil = material.BoilingEnthalpy(1.0f);
   EXPECT_NEAR(to_boil * 1e-9f, 0.225f, 0.01f);  // 0.23 J/mm^3 from 37 to 100 C
-  // Uniform heating by 1.2 times what warming and half the water cost.
+  // Uniform heating by 1.2 times the heat for warming and half the water.
   for (int n = 0; n < 100; ++n) {
     for (float& h : tile->state.enthalpy) h += (to_boil + 0.5f * material.latent) / 100;
     field.RefreshTheta(tile, &ledger);

@@ -1,5 +1,5 @@
-// Straight cuts at any angle, place and speed: the membrane opens wherever the tip went, and the mesh holds together
-// nowhere where the cells do not.
+// Straight cuts at any angle, place and speed: the membrane is open along the whole path of the tip, and the mesh
+// connects nothing that the cells do not.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,10 +17,10 @@ namespace {
 constexpr float kDt = 0.01f;
 constexpr int kNodes = 10;
 constexpr float kSpacing_m = 1e-3f;
-constexpr float kNear_m = 1e-4f, kFar_m = kSpacing_m * (kNodes - 1) - kNear_m;  ///< Ends of the way, at the borders.
+constexpr float kNear_m = 1e-4f, kFar_m = kSpacing_m * (kNodes - 1) - kNear_m;  ///< Ends of the path, at the borders.
 constexpr float kFastestCut_m_s = 0.008f;
 
-/// Pieces of tissue that hang together over the faces of cells: a number per cell, -1 where there is none.
+/// Pieces of tissue that are connected over faces of cells: a number per cell, -1 where there is no tissue.
 class Pieces {
  public:
   explicit Pieces(const HeatField& field) : sheet_(field.sheet()) {
@@ -80,9 +80,8 @@ int FalseBridges(const SceneView& scene, const ThermalSolver& solver) {
 
 class LineTest : public ::testing::Test {
  protected:
-  /// Cuts from `from` to `to` at 35 W, held still at both ends until the tissue there has gone. A tip that is moved
-  /// faster than kFastestCut_m_s is too fast for its power: then tissue stays, but the mesh must still say what the
-  /// cells say.
+  /// Cuts from `from` to `to` at 35 W, held still at both ends until the tissue there is removed. A tip faster than
+  /// kFastestCut_m_s leaves tissue at this power, but the mesh must still agree with the cells.
   void Cut(const Vec2f& from, const Vec2f& to, float speed_m_s) {
     SCOPED_TRACE("from " + std::to_string(1e3f * from.x()) + ", " + std::to_string(1e3f * from.y()) + " to " +
                  std::to_string(1e3f * to.x()) + ", " + std::to_string(1e3f * to.y()) + " mm at " +
@@ -100,7 +99,7 @@ class LineTest : public ::testing::Test {
     EXPECT_EQ(validator.Check(solver), "");
     EXPECT_EQ(FalseBridges(scene_, solver), 0);
     if (speed_m_s > kFastestCut_m_s) return;
-    // Open at every station of the way, for the mesh too; two sides with nothing between them.
+    // Open at every station of the path, in the mesh, too; two sides without a connection.
     const SlitFigures slit = MeasureSlit(solver, scene_, drag);
     EXPECT_GE(slit.width_min_m, 5e-4f);
     EXPECT_EQ(slit.surviving_crossings, 0);
@@ -136,11 +135,11 @@ TEST_F(LineTest, TwoHundredRandomLinesLeaveNoBridge) {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> uniform(0, 1);
   for (int line = 0; line < 200; ++line) {
-    // Between opposite borders, so that the chord is long and the pieces are two.
+    // Between opposite borders, so that the chord is long and two pieces result.
     const float a = std::lerp(kNear_m, kFar_m, 0.2f + 0.6f * uniform(random));
     const float b = std::lerp(kNear_m, kFar_m, 0.2f + 0.6f * uniform(random));
     const bool level = uniform(random) < 0.5f;
-    // 4 … 8 mm/s, and every fourth up to 60.
+    // 4 … 8 mm/s, every fourth line up to 60.
     const float speed =
         line % 4 == 3 ? 0.01f * std::pow(6.0f, uniform(random)) : std::lerp(0.004f, 0.008f, uniform(random));
     level ? Cut({kNear_m, a}, {kFar_m, b}, speed) : Cut({a, kNear_m}, {b, kFar_m}, speed);

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kWidth = MovingGaussian::kWidth, kStart = MovingGaussian::kStart, kRow = MovingGaussian::kRow;
 constexpr double kDt = MovingGaussian::kDt;
-constexpr double kPeak = 50;  ///< About the highest temperature [K]: below boiling, far above where tiles sleep.
+constexpr double kPeak = 50;  ///< About the highest temperature [K]: below boiling, far above the threshold of sleep.
 
 double Source(double x, double y, double tip, double variance) {
   const double dx = x - tip, dy = y - kRow;
@@ -44,7 +44,7 @@ void AddSource(HeatField* field, const MovingGaussian& problem, double t0, doubl
   }
 }
 
-/// Tiles that the source heats by more than 1e-5 of its peak.
+/// Wakes tiles that the source heats by more than 1e-5 of its peak.
 void WakeUnderSource(HeatField* field, double from, double to) {
   constexpr double kReach = 5 * kWidth;
   const double tile = kTile * static_cast<double>(field->material().cell_m);

@@ -40,7 +40,7 @@ std::unique_ptr<PotentialProblem> Random(unsigned seed, float holes) {
 }
 
 TEST(PotentialTest, StaysBetweenGroundAndElectrodeWithHolesAndJumps) {
-  // Islands of tissue that nothing ties to either electrode converge last: their energy is nil.
+  // Islands of tissue without a connection to either electrode converge last: their energy is zero.
   constexpr float kSlack = 0.01f;
   for (const float holes : {0.0f, 0.2f, 0.45f}) {
     const auto problem = Random(3, holes);
@@ -61,8 +61,8 @@ TEST(PotentialTest, StaysBetweenGroundAndElectrodeWithHolesAndJumps) {
 }
 
 TEST(PotentialTest, IslandsThatFloatStayWhereTheyAre) {
-  // A tented sheet with a hole, and in it pieces of tissue that are tied to nothing: single cells, and squares and bars
-  // that are single cells of a coarser level. Their start value is whatever they had when they came loose.
+  // A tented sheet with a hole that contains isolated pieces of tissue: single cells, and squares and bars that are
+  // single cells of a coarser level. They start from their value before they were cut off.
   auto problem = Random(7, 0.0f);
   for (int k = 0; k < kWindowCells; ++k) {
     const int i = k % kWindow, j = k / kWindow;
@@ -118,7 +118,7 @@ TEST(PotentialTest, NoContactOrBadNumbersDeliverNothing) {
   problem->sigma[100] = NAN;
   EXPECT_EQ(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);
   problem = Random(1, 0.0f);
-  EXPECT_GT(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);  // and the next solve is good again
+  EXPECT_GT(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);  // the next solve is valid again
   problem->contact.fill(0);
   EXPECT_EQ(solver.Solve(*problem, 1e-2f).conductance_S, 0.0f);
 }
@@ -129,7 +129,7 @@ Material WithCells(float cell_m) {
   return MakeMaterial(params);
 }
 
-/// Largest error of the window's current, over headings and over where between the cells' corners the capsule lies.
+/// Largest error of the window's current, over headings and offsets of the capsule from the cells' corners.
 double LargestError(float cell_m, const CapsuleOnSheet& capsule, double exact) {
   const Material material = WithCells(cell_m);
   double largest = 0;

@@ -1,4 +1,4 @@
-// A burn that is interrupted anywhere and goes on from its checkpoint ends in the same bits.
+// A burn that is interrupted anywhere and continues from its checkpoint ends with equal bits.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -30,7 +30,7 @@ class RestartTest : public ::testing::TestWithParam<Burn> {
     drag.tented = GetParam().tented;
     return drag;
   }
-  /// Frame by frame: 100 of burning, then cooling.
+  /// One frame: 100 of burning, then cooling.
   void Step(int frame, ThermalSolver* solver) const {
     const Drag drag = MakeDrag();
     solver->Step(frame < drag.frames(kDt) ? drag.At(frame, kDt) : TipInput{}, kDt);
@@ -52,7 +52,7 @@ TEST_P(RestartTest, AnyFrameWithNothingStagedGivesTheSameBits) {
     Step(frame, &whole);
     hashes.push_back(whole.FullHash());
     const std::size_t bytes = whole.Save(slot);
-    // Tissue was cut since the last commit and its edges are not in the committed topology: no checkpoint then.
+    // No checkpoint exists while tissue was cut since the last commit and its edges are not in the committed topology.
     EXPECT_EQ(bytes == 0, whole.topology().staged());
     EXPECT_FALSE(whole.at_commit_frame() && bytes == 0);
     refused += bytes == 0 ? 1 : 0;
@@ -91,7 +91,7 @@ TEST(RestartRefusalTest, ValuesThatTheSolverCannotHaveWrittenAreRefused) {
   RunDrag(drag, kDt, &solver);
   while (!solver.at_commit_frame()) solver.Step(TipInput{}, kDt);
   std::vector<std::byte> bytes(ThermalSolver::CheckpointCapacity(scene));
-  // Spoilt in memory and then saved: what a bit that flipped in a cell would leave.
+  // Altered in memory and then saved, like a flipped bit in a cell.
   const auto refuses = [&](auto* value, auto bad) {
     const auto good = std::exchange(*value, bad);
     const std::size_t used = solver.Save(bytes);

@@ -1,5 +1,5 @@
-// What the solver is given at its worst: steps from a millisecond to ten seconds, jumps of a million in conductivity,
-// riddled tissue, collapsed maps, fierce sources and sinks, sheets of one cell, and numbers that are none.
+// Extreme inputs of the solver: steps from a millisecond to ten seconds, jumps of a million in conductivity, riddled
+// tissue, collapsed maps, strong sources and sinks, sheets of one cell, and values that are not numbers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,8 +30,8 @@ const std::vector<float> kAllSteps = {1e-3f, 1e-2f, 1e-1f, 1.0f, 10.0f};
 /// Multiples of the default tissue's values.
 struct Tissue {
   float k_wet = 1, k_dry = 1;
-  float sink_per_s = 0;  ///< Instead of the default losses, in units of the heat capacity of wet tissue.
-  bool patchy = false;   ///< Each cell either wet or dry, by chance; wet otherwise.
+  float sink_per_s = 0;  ///< Replaces the default losses, in units of the heat capacity of wet tissue.
+  bool patchy = false;   ///< Each cell randomly wet or dry; otherwise wet.
   float holes = 0;       ///< Fraction of the cells.
 };
 
@@ -118,7 +118,7 @@ TEST(StabilityTest, StiffTissueAndLongSteps) {
 TEST(StabilityTest, SheetOfOneCell) {
   RunSteps(MakeFlatSheet(1e-4f, 1e-4f, 1e-4f), {}, kAllSteps);
   RunSteps(MakeFlatSheet(1e-4f, 3.3e-3f, 1e-4f), {.holes = 0.45f}, kAllSteps);
-  // And a burn on it, in all modes.
+  // A burn on it, in all modes.
   for (const CauteryMode mode : {CauteryMode::kCut, CauteryMode::kCoag, CauteryMode::kBlend}) {
     const scene::SceneData data = FlatScene(2, 2, 1e-4f);
     ThermalSolver solver(data.View());
@@ -138,7 +138,7 @@ TEST(StabilityTest, SheetOfOneCell) {
   }
 }
 
-/// A map between material and rest shape that nobody should make: refused with one clear line, or harmless.
+/// An invalid map between material and rest shape: refused with one clear line, or harmless.
 void RunMap(const std::string& what, const std::function<void(Vec3f*)>& spoil) {
   SCOPED_TRACE(what);
   scene::SceneData data = FlatScene(5, 5, 1e-3f);
@@ -166,8 +166,8 @@ TEST(StabilityTest, MapOfNoNumber) {
 }
 
 TEST(StabilityTest, HeatingByABillionKelvinPerSecond) {
-  // For a microsecond: everything boils, dries, and gets no hotter than the rest of the heat makes it.
-  // For a millisecond: a million kelvin is no temperature; the cells are taken out, and counted.
+  // For a microsecond: everything boils, dries, and is heated only by the remaining heat. For a millisecond: a million
+  // kelvin is not a valid temperature; the cells are quarantined and counted.
   for (const float dt : {1e-6f, 1e-3f}) {
     SCOPED_TRACE("dt " + std::to_string(dt) + " s");
     const Material material = MakeMaterial(ThermalParams{});
@@ -214,7 +214,7 @@ TEST(StabilityTest, LongFramesWithTheCurrentOn) {
         solver.Step(tip, dt);
         ASSERT_LE(solver.ledger().ClosureError(solver.field().Stored()), 1e-4);
         ASSERT_LE(solver.ledger().generator, 35.0 * dt * (n + 1) * 1.001);
-        // A cut leaves nothing hotter than boiling: what is dry goes at once.
+        // A cut leaves nothing hotter than boiling: dry tissue is removed at once.
         ASSERT_LE(solver.field().MaxTheta(), solver.field().material().theta_boil * 1.001f);
       }
       EXPECT_EQ(solver.field().quarantined(), 0u);
@@ -233,7 +233,7 @@ struct Fault {
 
 class BadCellTest : public ::testing::TestWithParam<Fault> {};
 
-/// Spoils a cell beside the way of a cut, within reach of its heat.
+/// Spoils a cell beside the path of a cut, within reach of its heat.
 TEST_P(BadCellTest, IsQuarantinedCountedAndAlone) {
   const Fault fault = GetParam();
   const scene::SceneData data = FlatScene(11, 16, 1e-3f);
@@ -254,7 +254,7 @@ TEST_P(BadCellTest, IsQuarantinedCountedAndAlone) {
   };
   const auto healthy = run(false), spoilt = run(true);
   EXPECT_EQ(spoilt->field().quarantined(), 1u);
-  // Everywhere else the values are numbers, and far from the cell nothing is different but by its absence.
+  // All other values are numbers, and far from the cell they differ only by the effect of its absence.
   const CellIndex cell = spoilt->field().sheet().CellOf({0.0072f, 0.0060f});
   for (const Tile* tile : spoilt->field().Existing()) {
     const Tile* other = healthy->field().Find(tile->tx, tile->ty);
@@ -287,7 +287,7 @@ INSTANTIATE_TEST_SUITE_P(Faults, BadCellTest,
                                            Fault{"CharNan", &TileState::charred, kNan}),
                          [](const ::testing::TestParamInfo<Fault>& fault) { return fault.param.name; });
 
-// theta = H / rc is 0 in such a cell.
+// theta = H / rc is 0 for infinite water.
 INSTANTIATE_TEST_SUITE_P(Water, BadCellTest, ::testing::Values(Fault{"WaterInf", &TileState::water, kInf}));
 
 TEST(StabilityTest, FieldOfNoNumbersIsTakenOutAndItsNeighboursLive) {

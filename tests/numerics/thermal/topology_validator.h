@@ -8,9 +8,9 @@
 
 namespace fulcrum::thermal {
 
-/// Follows one solver from commit to commit.
+/// Checks one solver from commit to commit.
 ///
-/// Holds that
+/// The rules:
 ///  - arrays have the mesh's sizes and nothing is set beyond them or where no edge exists,
 ///  - counts agree with the bits,
 ///  - no live edge ends at a dead node, and a node is dead if and only if its own cell is removed or no edge is left,
@@ -20,9 +20,9 @@ class TopologyValidator {
  public:
   TopologyValidator(const SceneView& scene, const Sheet& sheet);
 
-  /// Call when nothing is staged. Returns the first rule that is broken, for a person; empty when all hold.
+  /// Call when nothing is staged. Returns a readable description of the first violated rule; empty when all hold.
   [[nodiscard]] std::string Check(const MeshTopology& topology, const HeatField& field);
-  /// Check() after a Step that may have committed.
+  /// Check() after a Step, if nothing is staged.
   [[nodiscard]] std::string Check(const ThermalSolver& solver) {
     return solver.topology().staged() ? std::string() : Check(solver.topology(), solver.field());
   }
@@ -37,15 +37,15 @@ class TopologyValidator {
                                       const HeatField& field) const;
   [[nodiscard]] std::string CheckHistory(const MeshTopology& topology) const;
   void FindHoles(const HeatField& field);
-  /// False when no tile under the strand has a hole: then there is nothing to recompute.
+  /// False when no tile under the strand has a hole, so that nothing needs to be recomputed.
   [[nodiscard]] bool NearHole(const Edge& edge, const Sheet& sheet) const;
   /// True when tissue cells within the strand join the cells of its nodes.
   [[nodiscard]] bool Joined(const Edge& edge, const HeatField& field, bool holes, bool outside) const;
   [[nodiscard]] CellIndex CellOfNode(Index node, const Sheet& sheet) const;
 
   std::size_t nodes_;
-  std::vector<Edge> edges_;  ///< Those that exist.
-  std::vector<Vec2f> node_;  ///< In cells from the sheet's origin.
+  std::vector<Edge> edges_;  ///< Existing edges.
+  std::vector<Vec2f> node_;  ///< Positions in cells from the sheet's origin.
   std::vector<bool> hole_;   ///< Per tile, at the present Check().
   TopologyBits last_;
   std::uint64_t last_revision_ = 0;

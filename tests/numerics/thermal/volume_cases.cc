@@ -71,7 +71,7 @@ double SheetOnFatError(float cell_m) {
   constexpr float kStart_C = 40, kFrame_s = 0.01f;
   ThermalParams params = PlainFat(cell_m);
   params.h_top_W_m2K = params.h_below_W_m2K = 0;
-  params.conductivity_W_mK = 2;  // the formula's layer has no resistance of its own
+  params.conductivity_W_mK = 2;  // the layer of the formula has no thermal resistance
   const Material material = MakeMaterial(params);
   HeatField field(SheetOfBricks(1, 1, cell_m), material);
   VolumeField volume(field.sheet(), params);

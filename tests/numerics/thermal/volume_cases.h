@@ -5,7 +5,7 @@
 
 namespace fulcrum::thermal {
 
-/// Fat without perfusion: nothing but conduction.
+/// Fat without perfusion: only conduction.
 [[nodiscard]] ThermalParams PlainFat(float cell_m);
 /// Flat sheet above bricks_x x bricks_y whole bricks.
 [[nodiscard]] Sheet SheetOfBricks(int bricks_x, int bricks_y, float cell_m);

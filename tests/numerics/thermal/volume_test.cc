@@ -146,7 +146,7 @@ TEST(VolumeTest, BothLedgersCloseAcrossBricksAndSleep) {
     return SurfaceMetric{s * s, 0.1f * s * t, t * t};
   });
   ThermalParams params;
-  params.perfusion_per_s = 0.1f;  // cold again soon
+  params.perfusion_per_s = 0.1f;  // cools quickly
   Stack stack(std::move(sheet), params);
   // At the corner where the four bricks meet.
   for (const int tx : {2, 3}) {
@@ -234,7 +234,7 @@ TEST(VolumeTest, DepthOfBurnGrowsWithPowerAndTime) {
     EXPECT_EQ(solver.volume()->BurnDepth(kSpot + Vec2f(0.008f, 0)), 0.0f);
     EXPECT_LE(solver.ledger().ClosureError(solver.field().Stored()), 1e-5);
     EXPECT_LE(solver.volume()->ledger().ClosureError(solver.volume()->Stored()), 1e-5);
-    // Only a part of what the generator gives beyond the sheet's own heat is found again below.
+    // The Joule heat below is a part of the generator's energy beyond the sheet's own heat.
     EXPECT_LE(solver.volume()->ledger().joule, solver.ledger().generator - solver.ledger().joule);
     EXPECT_GE(solver.volume()->ledger().joule, 0.3 * (solver.ledger().generator - solver.ledger().joule));
     weaker = before;
@@ -280,7 +280,7 @@ TEST(VolumeTest, StructuresAreAsWarmAsTheVolumeAtTheirDepth) {
     data.protected_structures = {{ProtectedKind::kNerve, 0.001f, depth, 0, 2}};
     data.protected_points = {{Vec3f::Zero(), Vec2f(0.002f, 0.0101f)}, {Vec3f::Zero(), Vec2f(0.018f, 0.0101f)}};
     ThermalSolver solver(data.View());
-    // Up to a frame that looks at the structures.
+    // Up to a frame in which the structures are sampled.
     for (int n = 0; n < 200 + kProtectedFrame; ++n) solver.Step(Dwell(20), kDt);
     float warmest = 0;
     for (const ProtectedSample& sample : solver.protected_structures().samples()) {

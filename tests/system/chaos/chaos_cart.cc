@@ -59,7 +59,7 @@ ClockPage* MakeClock(const fs::path& file) {
   return new (map) ClockPage;
 }
 
-/// Only the cart is to see another clock.
+/// Removes the preload, so that only the cart gets the shifted clock.
 int DomainAfterStart(int domain) {
   ::unsetenv("LD_PRELOAD");
   ::unsetenv("FULCRUM_TEST_CLOCK");
@@ -204,7 +204,7 @@ std::uint64_t ChaosCart::PourBytes(int per_topic) { return Rogue(domain_).PourBy
 void ChaosCart::KillAndSpoil(NodeId node, Damage damage) {
   const pid_t victim = Process(node);
   if (victim <= 0) return;
-  cart_.Signal(SIGSTOP);  // The supervisor starts nothing meanwhile.
+  cart_.Signal(SIGSTOP);  // Keeps the supervisor from restarting the node meanwhile.
   ::kill(victim, SIGKILL);
   if (WaitFor(kPatience_s, [&] { return Process(node) <= 0; })) {
     Spoil(cart_.session() / (std::string(NodeName(node)) + ".checkpoint"), damage);

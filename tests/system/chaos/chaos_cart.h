@@ -1,4 +1,4 @@
-// A cart at work during fault injection.
+// A cart during fault injection.
 #pragma once
 
 #include <atomic>
@@ -18,7 +18,7 @@ namespace fulcrum::testing {
 inline constexpr std::array kNodes{NodeId::kPhysics, NodeId::kThermal, NodeId::kHaptics, NodeId::kHandleBridge,
                                    NodeId::kRender};
 
-/// What may be wrong with a checkpoint.
+/// Damage of a checkpoint.
 enum class Damage { kFlippedNewest, kFlippedAll, kCutShort, kOfTheFuture, kOfAnotherScene };
 
 class ChaosCart {
@@ -36,17 +36,17 @@ class ChaosCart {
   void Kill(NodeId node);
   /// SIGSTOP, then SIGCONT.
   void Stop(NodeId node, double seconds);
-  /// As many busy loops as take most of every core.
+  /// Runs enough busy loops to take most of every core.
   void Starve(double seconds);
-  /// The wall clock of all programs of the cart; nothing happens under a sanitizer.
+  /// Sets the wall clock of all programs of the cart; has no effect under a sanitizer.
   void SetWallClock(double offset_h);
-  /// A participant that is not of the cart floods a topic; how many messages it sent.
+  /// A participant outside the cart floods a topic; returns the number of messages.
   std::uint64_t Pour(Flood what, double seconds);
   std::uint64_t PourBytes(int per_topic);
-  /// Kills the node and spoils its checkpoint before anybody starts it again.
+  /// Kills the node and spoils its checkpoint before the supervisor restarts it.
   void KillAndSpoil(NodeId node, Damage damage);
 
-  /// Any moment up to `most_s`.
+  /// Waits for a random time up to `most_s`.
   void WaitAMoment(double most_s);
   [[nodiscard]] std::string Log(NodeId node) const;
   [[nodiscard]] Cart& cart() { return cart_; }

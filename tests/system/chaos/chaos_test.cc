@@ -1,6 +1,6 @@
-// One cart, as a user starts it, that suffers one fault after another while it pulls and cuts. After each it must go on
-// by itself; in the end the session ends well, nothing was lost that others had seen, no number was broken, no hand was
-// hurt, and nothing is left in shared memory.
+// One cart, as a user starts it, with one fault after another while it pulls and cuts. After each it must recover by
+// itself; at the end the session succeeds, no published state is lost, all numbers are valid, the force stays within
+// its limits, and nothing is left in shared memory.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -34,7 +34,7 @@ std::uint64_t Rejected(const CartState& state) {
   return std::accumulate(state.rejected.begin(), state.rejected.end(), std::uint64_t{0});
 }
 
-/// What a node says it refused on a topic.
+/// Number of samples of a topic that a node reports as refused.
 std::uint64_t RefusedBy(const CartState& state, NodeId node, TopicId topic) {
   for (const InputHealth& input : state.healths.at(node).inputs) {
     if (input.topic == topic) return input.rejected;
@@ -69,14 +69,14 @@ void Chaos::KillEachNode() {
 
 void Chaos::StopEachNode() {
   for (const NodeId node : testing::kNodes) {
-    chaos_.Stop(node, 0.2);  // Longer than the others' patience with its messages.
+    chaos_.Stop(node, 0.2);  // Longer than the other nodes wait for its messages.
     chaos_.WaitAMoment(0.1);
   }
   EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
 }
 
 void Chaos::Flooded() {
-  EXPECT_EQ(chaos_.watch().See(Rejected), 0u) << "the cart itself has sent a broken number";
+  EXPECT_EQ(chaos_.watch().See(Rejected), 0u) << "the cart itself has sent an invalid number";
   for (const Flood flood : {Flood::kToolState, Flood::kContactModel}) {
     EXPECT_GT(chaos_.Pour(flood, 0.4), 1000u);
   }
@@ -89,14 +89,14 @@ void Chaos::Flooded() {
   const auto rejected = [](const CartState& state) { return state.rejected; };
   const auto before = chaos_.watch().See(rejected);
   EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
-  EXPECT_EQ(chaos_.watch().See(rejected), before) << "the flood is over";
+  EXPECT_EQ(chaos_.watch().See(rejected), before) << "samples are refused after the flood";
 }
 
 void Chaos::FloodedFromOutsideOfTheBus() {
   const auto before = chaos_.cart().nodes();
   EXPECT_EQ(testing::FloodDomain(kDomain, 20'000, 1, 7), 20'000u);
   EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
-  EXPECT_EQ(chaos_.cart().nodes(), before) << "a datagram that is no message has ended a process";
+  EXPECT_EQ(chaos_.cart().nodes(), before) << "a malformed datagram has ended a process";
 }
 
 TEST_F(Chaos, TheSessionOutlivesItsFaults) {
@@ -111,14 +111,14 @@ TEST_F(Chaos, TheSessionOutlivesItsFaults) {
     StopEachNode();
   }
   {
-    SCOPED_TRACE("no time on the cores");
+    SCOPED_TRACE("no processor time");
     chaos_.Starve(1);
     EXPECT_TRUE(chaos_.GoesOn()) << chaos_.Trouble();
   }
   chaos_.watch().See([](const CartState& state) {
     EXPECT_EQ(state.topology_lost, 0u);
     EXPECT_LE(state.tissue_lost_s, 0.15);
-    EXPECT_GT(state.topology.cut_length_m, 0.005f) << "the cut has gone on meanwhile";
+    EXPECT_GT(state.topology.cut_length_m, 0.005f) << "the cut continued meanwhile";
   });
   chaos_.SetWallClock(-7);
   {
@@ -134,8 +134,8 @@ TEST_F(Chaos, TheSessionOutlivesItsFaults) {
     SpoilCheckpoints();
   }
   RefuseASecondCart();
-  // Random bytes that happen to decode have not the number of the session: somebody else has written on its bus, which
-  // is the only fault.
+  // Random bytes that happen to decode do not have the session's number: they count as samples of another session on
+  // its bus, which is the only fault.
   EXPECT_EQ(End(), 1) << chaos_.Trouble();
   const std::string said = chaos_.cart().Said();
   EXPECT_NE(said.find("samples of another session"), std::string::npos) << said;
@@ -145,7 +145,7 @@ TEST_F(Chaos, TheSessionOutlivesItsFaults) {
   EXPECT_LE(state.peak_force_N(), 3.3 + kRounding_N);
   EXPECT_LE(state.peak_step_N(), 0.4 + kRounding_N);
   EXPECT_FALSE(std::filesystem::exists(bus::SharedMemoryDirectory(kDomain)));
-  EXPECT_EQ(chaos_.clock().waits, 0u) << "somebody waits until a time of the wall clock";
+  EXPECT_EQ(chaos_.clock().waits, 0u) << "a program waits for a time of the wall clock";
 }
 
 void Chaos::SpoilCheckpoints() {
@@ -178,11 +178,12 @@ TEST(ChaosSchema, APeerOfAnotherSchemaEndsTheSessionAndBothSidesSaySo) {
 class ChaosRoom : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!testing::CanMakeRoom()) GTEST_SKIP() << "this user may make no namespaces: no small file systems here";
+    if (!testing::CanMakeRoom())
+      GTEST_SKIP() << "this user may not create namespaces, so there are no small file systems";
     std::filesystem::create_directories(out_);
   }
   void TearDown() override { std::filesystem::remove_all(out_); }
-  /// Exit code and last words of a cart with such a file system.
+  /// Expects the cart with such a file system to be refused with `words`.
   void ExpectRefused(const std::filesystem::path& place, const std::string& options, const std::string& words) {
     testing::SmallRoom room(place, options, "small", kDomain + 2, out_);
     EXPECT_EQ(room.up().End(0), 2) << room.up().Said();

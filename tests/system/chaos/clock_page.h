@@ -1,4 +1,4 @@
-// Memory that a test and the clock shim in the programs share.
+// Memory shared by a test and the clock shim in the programs.
 #pragma once
 
 #include <atomic>
@@ -7,7 +7,7 @@
 namespace fulcrum::testing {
 
 struct ClockPage {
-  std::atomic<std::int64_t> offset_s{0};  ///< The wall clock shows this much more than it should.
+  std::atomic<std::int64_t> offset_s{0};  ///< Offset of the shown wall clock from the real one.
   std::atomic<std::uint64_t> readings{0}, waits{0};
 };
 

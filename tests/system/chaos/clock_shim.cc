@@ -1,7 +1,7 @@
-// Preloaded into the programs of a cart: the wall clock (CLOCK_REALTIME) is off by what the test writes into a shared
-// page, as if somebody had set it. Steady clocks are left alone. Waits until a wall time are counted: a program that
-// waits so would hang or spin when the clock is set for real, which the shim cannot show. A mutex with a wall time as
-// its limit is no such wait: it is taken at once unless its holder is held up.
+// Preloaded into the programs of a cart: shifts the wall clock (CLOCK_REALTIME) by the offset in a page shared with the
+// test, as if the clock had been set. Steady clocks are unchanged. Waits for a wall time are counted: a program with
+// such a wait would hang or spin when the clock is really set, which the shim cannot show. A mutex with a wall time as
+// its limit does not count: it is locked at once unless its holder is delayed.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <pthread.h>
@@ -41,7 +41,7 @@ timespec Shifted(timespec t, std::int64_t seconds) {
   return t;
 }
 
-/// What the real clock shows when the shifted one shows `t`.
+/// Time of the real clock when the shifted one shows `t`.
 timespec Unshifted(const timespec* t) { return Shifted(*t, -Page()->offset_s.load()); }
 
 timespec NoteWait(const timespec* t) {

@@ -1,4 +1,4 @@
-// More of each fault, at random moments, than the default tests have time for. One seed a run; FULCRUM_CHAOS_SEED
+// More of each fault, at random moments, than the default tests have time for. One seed per run; FULCRUM_CHAOS_SEED
 // repeats one.
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -81,7 +81,7 @@ TEST(ChaosMatrix, FaultsInAnyOrder) {
 
 class EveryDamage : public ::testing::TestWithParam<Damage> {};
 
-// What was lost is lost: the tissue is whole again and nothing is in the jaws. The session goes on.
+// State in the checkpoint is lost: the tissue is whole again and the jaws are empty. The session continues.
 TEST_P(EveryDamage, OfACheckpointIsToldAndSurvived) {
   ChaosCart chaos(kSession_s, kDomain + 1, 1);
   ASSERT_TRUE(chaos.GoesOn()) << chaos.Trouble();
@@ -114,7 +114,8 @@ INSTANTIATE_TEST_SUITE_P(Checkpoint, EveryDamage,
 class Filled : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!testing::CanMakeRoom()) GTEST_SKIP() << "this user may make no namespaces: no small file systems here";
+    if (!testing::CanMakeRoom())
+      GTEST_SKIP() << "this user may not create namespaces, so there are no small file systems";
     std::filesystem::create_directories(out_);
   }
   void TearDown() override { std::filesystem::remove_all(out_); }
@@ -129,7 +130,7 @@ class Filled : public ::testing::Test {
       std::filesystem::temp_directory_path() / ("fulcrum-filled-" + std::to_string(::getpid()));
 };
 
-// Logs and pictures are lost, and the verdict says so; checkpoints have had their room from the beginning.
+// Logs and pictures are lost, and the verdict reports it; checkpoints have reserved their room at the start.
 TEST_F(Filled, DiskIsReportedAndTheSessionGoesOn) {
   SmallRoom room(out_, "size=64m", "small", kDomain + 2, out_);
   ASSERT_TRUE(SaysThatItCuts(room)) << room.up().Said();
@@ -139,7 +140,7 @@ TEST_F(Filled, DiskIsReportedAndTheSessionGoesOn) {
   EXPECT_NE(room.up().Said().find("cannot write the picture"), std::string::npos) << room.up().Said();
 }
 
-// Who runs has its memory and goes on; who would have to start anew is refused with one line.
+// Running processes have their memory and continue; a start that needs new memory is refused with one line.
 TEST_F(Filled, SharedMemoryHurtsNobodyWhoRuns) {
   SmallRoom room("/dev/shm", "size=80m", "small", kDomain + 2, out_);
   ASSERT_TRUE(SaysThatItCuts(room)) << room.up().Said();

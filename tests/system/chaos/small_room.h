@@ -10,7 +10,7 @@
 
 namespace fulcrum::testing {
 
-/// The system lets this user make namespaces.
+/// True if the system lets this user create namespaces.
 [[nodiscard]] bool CanMakeRoom();
 
 class SmallRoom {
@@ -22,9 +22,9 @@ class SmallRoom {
 
   [[nodiscard]] Program& up() { return up_; }
   [[nodiscard]] const std::filesystem::path& out() const { return out_; }
-  /// As its own processes see it.
+  /// Path as seen by its own processes.
   [[nodiscard]] std::filesystem::path Inside(const std::filesystem::path& path) const;
-  /// Fills that file system to its last byte; how much that was.
+  /// Fills that file system to its last byte; returns the number of bytes.
   std::uint64_t Fill() const;
 
  private:

@@ -1,4 +1,4 @@
-// The supervisor of a whole cart is killed: what remains of its session.
+// State after the supervisor of a whole cart is killed.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/prctl.h>
@@ -35,7 +35,7 @@ class Crash : public ::testing::Test {
     })) << cart_.Said();
     session_ = fs::canonical(cart_.session());
     processes_ = cart_.nodes();
-    // A private thing of the session as later versions may keep there: a folder with a key.
+    // A private folder with a key, which later versions may keep there for the session.
     fs::create_directory(memory_ / "private");
     std::ofstream(memory_ / "private" / "key.pem") << "secret";
   }
@@ -67,7 +67,7 @@ class Crash : public ::testing::Test {
 };
 
 TEST_F(Crash, NothingIsLeftOfASessionWhoseSupervisorWasKilled) {
-  // A child that hangs is not spared.
+  // A hanging child must be killed, too.
   ::kill(processes_.at("thermal_node"), SIGSTOP);
   cart_.Signal(SIGKILL);
   EXPECT_EQ(cart_.WaitForEnd(kPatience_s), -SIGKILL);
@@ -83,7 +83,7 @@ TEST_F(Crash, TheNextSessionInAnyDomainSweepsWhatNobodySwept) {
   cart_.Signal(SIGKILL);
   EXPECT_EQ(cart_.WaitForEnd(kPatience_s), -SIGKILL);
   EXPECT_TRUE(WaitFor(kPatience_s, [&] { return AllAreGone(); }));
-  EXPECT_TRUE(fs::exists(memory_ / "private" / "key.pem")) << "who removed it?";
+  EXPECT_TRUE(fs::exists(memory_ / "private" / "key.pem")) << "it was removed too early";
   Cart other("small", kOtherDomain, {"--seconds", "0.5"});
   EXPECT_TRUE(other.WaitForEnd(kPatience_s).has_value()) << other.Said();
   EXPECT_FALSE(fs::exists(memory_)) << other.Said();

@@ -1,4 +1,4 @@
-// Forty kills, of every program of a session in turn and of its supervisor. bench_restart guard.chaos. does 200.
+// Forty kills: each program of a session in turn, and its supervisor. bench_restart guard.chaos. does 200.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

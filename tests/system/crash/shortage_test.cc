@@ -25,7 +25,7 @@ class Shortage : public ::testing::Test {
   void SetUp() override {
     ASSERT_TRUE(WaitFor(kPatience_s, [&] { return cart_.PictureTime() > 0; })) << cart_.Said();
   }
-  /// A low limit of the supervisor, which the nodes inherit that it starts meanwhile.
+  /// A low limit of the supervisor, inherited by the nodes that it starts meanwhile.
   class Limit {
    public:
     Limit(pid_t pid, __rlimit_resource resource, rlim_t soft) : pid_(pid), resource_(resource) {
@@ -91,7 +91,7 @@ TEST_F(Shortage, ANodeWithoutMemoryEndsWithALineAndIsStartedAgain) {
     ::kill(victim, SIGKILL);
     EXPECT_TRUE(WaitFor(kPatience_s,
                         [&] {
-                          // Of a thread of the bus, or of the node itself.
+                          // From a thread of the bus, or from the node itself.
                           return log().find("address space is limited to 64 MiB") != std::string::npos ||
                                  log().find("out of memory") != std::string::npos ||
                                  // Fast DDS 2.9.1, when one of its threads cannot start while a participant is made.

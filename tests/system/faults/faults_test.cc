@@ -1,7 +1,6 @@
-// The force on the hand while the cart goes wrong: the built-in scene under the supervisor with all its nodes but the
-// one that draws, jaws through a pty. While the tool pulls at the tissue it holds, physics is stopped, killed and
-// started again by the supervisor, and the test speaks as a second, broken physics. Every ToolState of the servo's
-// 1 kHz is judged.
+// The force on the hand under faults of the cart: the built-in scene under the supervisor with all its nodes except
+// render_node, jaws through a pty. While the tool pulls at held tissue, physics is stopped, killed and restarted by the
+// supervisor, and the test publishes as a second, broken physics. Every ToolState of the servo's 1 kHz is checked.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -36,10 +35,10 @@ using testing::Cart;
 
 constexpr int kDomain = 97;
 constexpr double kPatience_s = 20;  // Starting and rejoining on a busy machine.
-constexpr double kFelt_N = 0.15;    // The pull is felt.
+constexpr double kFelt_N = 0.15;    // Least force of the pull.
 constexpr double kGone_N = 0.1;
 
-/// The built-in scene with a grasper that takes the membrane and then pulls up and down for good; nobody draws it.
+/// The built-in scene without render_node, with a grasper that takes the membrane and then pulls up and down for good.
 std::string PullingScene() {
   std::string scene = testing::ReadFile(FULCRUM_SOURCE_DIR "/deploy/scenes/built-in.yaml");
   scene.resize(scene.find("\nscript:"));
@@ -64,11 +63,12 @@ class Faults : public ::testing::Test {
   void SetUp() override {
     folder_ = std::filesystem::temp_directory_path() / ("faults_test." + std::to_string(::getpid()));
     std::filesystem::create_directories(folder_);
-    const std::filesystem::path file = folder_ / "pull.yaml";  // The cart keeps it compiled under this name.
+    const std::filesystem::path file = folder_ / "pull.yaml";  // The scene cache uses this name.
     std::ofstream(file) << PullingScene();
     const ToolDescription tool = scene::ReadSceneYaml(file, {}).settings.tools[0];
     judge_ = std::make_unique<testing::ForceJudge>(haptics::Trocar{tool.p_WP.cast<double>(), tool.shaft_length_m});
-    // A broken node of this session: it writes one topic and reads others, which no identity of a keyed bus may.
+    // The test acts as a broken node of this session: it writes one topic and reads others, for which no identity of a
+    // keyed bus has the rights.
     cart_ = std::make_unique<Cart>(file, kDomain, std::vector<std::string>{"--open-bus"});
     participant_ = std::make_unique<bus::DdsParticipant>(testing::ReaderOf(kDomain));
     models_ = participant_->MakeOutput<ContactModel>();
@@ -80,7 +80,7 @@ class Faults : public ::testing::Test {
     std::filesystem::remove_all(folder_);
   }
 
-  /// Judges what comes until `done` or for `limit_s`; whether it was done.
+  /// Checks samples until `done` or for `limit_s`; returns whether `done` was reached.
   bool Watch(double limit_s, const std::function<bool()>& done) {
     const auto start = steady_clock::now();
     while (duration<double>(steady_clock::now() - start).count() < limit_s) {
@@ -102,7 +102,7 @@ class Faults : public ::testing::Test {
     const auto physics = nodes.find("physics_node");
     return physics == nodes.end() ? -1 : physics->second;
   }
-  /// kill -9; the supervisor starts it again, and its models come back to the hand.
+  /// kill -9; the supervisor restarts physics, and its models reach the servo again.
   void KillPhysics() {
     const pid_t victim = Physics();
     ASSERT_GT(victim, 0);
@@ -126,11 +126,11 @@ class Faults : public ::testing::Test {
   std::unique_ptr<bus::Input<ToolState>> tools_;
   std::unique_ptr<bus::Input<Health>> healths_;
   ToolState tool_;
-  Health heard_, health_;  ///< The newest of anybody; of haptics_node.
+  Health heard_, health_;  ///< The newest of any node; the newest of haptics_node.
 };
 
-/// A spring that holds the tip where it is now, from a newer physics than the real one, which goes on speaking; its
-/// messages come twice, out of order, broken, or with forces from nowhere.
+/// A spring that holds the tip where it is now, from a newer physics than the real one, which keeps publishing; its
+/// messages arrive twice, out of order, invalid, or with arbitrary forces.
 void Faults::SpeakAsABrokenPhysics(double seconds) {
   bus::Stamper stamper(runtime::MonotonicNs());
   constexpr float kStiffness = 500;  // Of skin and of body.
@@ -154,7 +154,7 @@ void Faults::SpeakAsABrokenPhysics(double seconds) {
     if (i % 5 == 1) contact.f_ref.y() = std::numeric_limits<float>::quiet_NaN();
     if (i % 5 == 2) contact.k1 = 5e4f;
     if (i % 5 == 3 && i > messages / 2) contact.f_ref = Vec3f(i % 2 == 0 ? 15.0f : -15.0f, 0, 10);
-    const bool swaps = i % 3 == 2;  // This one and the one before change places.
+    const bool swaps = i % 3 == 2;  // This message and the previous one are swapped.
     if (i % 3 != 1) models_->Write(model);
     if (i % 4 == 0) models_->Write(model);
     WatchFor(0.003);
@@ -192,9 +192,9 @@ TEST_F(Faults, TheHandIsNeverHurt) {
   SpeakAsABrokenPhysics(1.5);
   EXPECT_GT(judge_->most_N(), kFelt_N);
   WatchFor(0.6);
-  EXPECT_LE(judge_->force_N(), kGone_N) << "the broken physics is gone, and the older one stays out";
+  EXPECT_LE(judge_->force_N(), kGone_N) << "the broken physics has ended, and the older one stays excluded";
   ASSERT_NO_FATAL_FAILURE(KillPhysics());
-  EXPECT_EQ(judge_->verdict(), "") << "a broken physics spoke";
+  EXPECT_EQ(judge_->verdict(), "") << "a broken physics published";
 
   WatchFor(0.3);  // Health comes ten times a second.
   EXPECT_LE(Metric("peak_force_N"), 3.3);
@@ -204,7 +204,7 @@ TEST_F(Faults, TheHandIsNeverHurt) {
                                   [](const InputHealth& i) { return i.topic == TopicId::kContactModel; });
   ASSERT_NE(input, health_.inputs.end());
   EXPECT_GT(input->rejected, 0u);
-  // The histograms of the servo's cycles are there.
+  // The histograms of the servo's cycles are published.
   EXPECT_GT(health_.step.p50_us, 0);
   EXPECT_GE(health_.step.p99_us, health_.step.p50_us);
   EXPECT_GE(health_.step.max_us, 0.9f * health_.step.p99_us);  // Bins are 6 % wide.
@@ -213,7 +213,7 @@ TEST_F(Faults, TheHandIsNeverHurt) {
 
   cart_->Signal(SIGINT);
   const std::optional<int> code = cart_->WaitForEnd(kPatience_s);
-  // Physics was stopped for 1.25 s: in a short session more of its periods than may be missed.
+  // Physics was stopped for 1.25 s, which in a short session exceeds the allowed part of missed periods.
   const bool missed = cart_->Said().find("NOT WELL: physics_node missed") != std::string::npos;
   EXPECT_EQ(code, missed ? 1 : 0) << cart_->Said();
 }

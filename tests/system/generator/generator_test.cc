@@ -1,5 +1,5 @@
-// The generator is turned while the cart cuts: by the command that an operator types, in Health, in the recording and
-// in its replay.
+// The generator's power is changed while the cart cuts: effect of the operator's command in Health, in the recording
+// and in its replay.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -50,14 +50,14 @@ TEST(GeneratorOfTheCart, IsTurnedDuringACutAndTheReplayComesToTheSameStates) {
   {
     testing::Cart cart(scene, kDomain, {"--record"});
     testing::CartWatch watch(kDomain, scene, cart.session());
-    // The script's power.
+    // The power of the script.
     ASSERT_TRUE(watch.WaitUntil(60, [](const CartState& state) { return Sets(state, 35); })) << cart.Said();
 
     const Said turned = Generator({"--cut", "50", "--coag", "25"});
     EXPECT_EQ(turned.exit_code, 0) << turned.text;
     EXPECT_NE(turned.text.find("cut 50 W, coag 25 W"), std::string::npos) << turned.text;
     EXPECT_TRUE(watch.WaitUntil(5, [](const CartState& state) { return Sets(state, 50); }))
-        << "still in the first line";
+        << "the command takes effect during the first line";
     EXPECT_TRUE(watch.WaitUntil(
         5, [](const CartState& state) { return state.Metric(NodeId::kSupervisor, "generator_coag_W") == 25; }));
 
@@ -68,7 +68,7 @@ TEST(GeneratorOfTheCart, IsTurnedDuringACutAndTheReplayComesToTheSameStates) {
     EXPECT_EQ(shown.exit_code, 0);
     EXPECT_NE(shown.text.find("cut 50 W, coag 25 W"), std::string::npos) << shown.text;
 
-    // One that comes back is given the setting again.
+    // A restarted node receives the setting again.
     const auto nodes = cart.nodes();
     ASSERT_TRUE(nodes.contains("thermal_node")) << cart.Said();
     const auto epoch = watch.See(

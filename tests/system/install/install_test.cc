@@ -1,6 +1,5 @@
-// The Debian package, unpacked into a folder: what is in it, whether its units stand up to systemd's own check, a
-// session as a user starts it, and a session whose nodes are started as their units say, by the test in the place of
-// systemd.
+// The Debian package, unpacked into a folder: its content, systemd's own check of its units, a session as a user starts
+// it, and a session whose nodes the test starts as their units define, in place of systemd.
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -38,7 +37,7 @@ using testing::WaitFor;
 constexpr double kStartLimit_s = 60.0;  // compiling the scene and six starts, on a busy machine
 constexpr double kEndLimit_s = 60.0;
 
-/// Runs a program to its end; returns what it said, and fails the test when it does not end well.
+/// Runs a program to its end and returns its output; a failure of the program fails the test.
 std::string Output(const std::string& program, const std::vector<std::string>& arguments) {
   Program run(program, arguments);
   const int code = run.End(0);
@@ -46,14 +45,14 @@ std::string Output(const std::string& program, const std::vector<std::string>& a
   return run.Said();
 }
 
-/// The package is made and unpacked once for all tests.
+/// Makes and unpacks the package once for all tests.
 class InstallTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     std::string name = (fs::temp_directory_path() / "fulcrum_install_XXXXXX").string();
     ASSERT_NE(::mkdtemp(name.data()), nullptr);
     folder_ = name;
-    // No test of compression: that of a package for others takes most of the time.
+    // Compression is not tested, because that of a release takes most of the time.
     Output("/usr/bin/env", {FULCRUM_CPACK, "--config", FULCRUM_BUILD_DIR "/CPackConfig.cmake", "-G", "DEB", "-B",
                             folder_ / "package", "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip"});
     for (const auto& entry : fs::directory_iterator(folder_ / "package")) {
@@ -76,7 +75,7 @@ fs::path InstallTest::folder_, InstallTest::package_, InstallTest::root_;
 TEST_F(InstallTest, PackageSaysWhatItNeedsAndKeepsTheConfigurationOfTheLab) {
   const std::string control = Output("/usr/bin/dpkg-deb", {"-f", package_});
   EXPECT_NE(control.find("Package: fulcrum\n"), std::string::npos) << control;
-  // Found in the programs by dpkg-shlibdeps; loaded at run time.
+  // Libraries found in the programs by dpkg-shlibdeps, and those loaded at run time.
   for (const char* needed :
        {"libfastrtps", "libopenscenegraph", "libserialport", "libsystemd0", "libseccomp2", "libegl-mesa0"}) {
     EXPECT_NE(control.find(needed), std::string::npos) << needed << "\n" << control;
@@ -88,7 +87,7 @@ TEST_F(InstallTest, PackageSaysWhatItNeedsAndKeepsTheConfigurationOfTheLab) {
   EXPECT_EQ(fs::read_symlink(root_ / "usr/bin/fulcrum"), "../libexec/fulcrum/fulcrum");
   EXPECT_EQ(fs::read_symlink(root_ / "usr/bin/replayer"), "../libexec/fulcrum/replayer");
   EXPECT_TRUE(fs::exists(root_ / "usr/share/man/man1/fulcrum-up.1.gz"));
-  // Nothing may point back to where it was built.
+  // No file may contain paths of the build.
   for (const auto& entry : fs::recursive_directory_iterator(root_)) {
     if (!entry.is_regular_file() || entry.path().extension() == ".gz") continue;
     EXPECT_EQ(ReadFile(entry.path()).find(FULCRUM_BUILD_DIR), std::string::npos) << entry.path();
@@ -101,11 +100,11 @@ TEST_F(InstallTest, BillOfMaterialsNamesWhatIsLinkedAndCompiledIn) {
   EXPECT_EQ(bill.get<std::string>("spdxVersion"), "SPDX-2.3");
   EXPECT_EQ(bill.get<std::string>("dataLicense"), "CC0-1.0");
 
-  std::map<std::string, std::string> ids, licences;  // by name; a part of the package is named as its program
+  std::map<std::string, std::string> ids, licences;  // by name; a part of the package has the name of its program
   std::set<std::string> known{"SPDXRef-DOCUMENT"};
   for (const auto& [key, package] : bill.get_child("packages")) {
     const auto name = package.get<std::string>("name"), id = package.get<std::string>("SPDXID");
-    EXPECT_TRUE(known.insert(id).second) << id << " is there twice";
+    EXPECT_TRUE(known.insert(id).second) << id << " occurs twice";
     EXPECT_FALSE(package.get<std::string>("versionInfo", "").empty()) << name;
     if (id == "SPDXRef-Package-fulcrum" || id.starts_with("SPDXRef-Part-")) {
       EXPECT_EQ(package.get<std::string>("licenseDeclared"), "NONE") << id;
@@ -123,7 +122,7 @@ TEST_F(InstallTest, BillOfMaterialsNamesWhatIsLinkedAndCompiledIn) {
     relations.insert(from + " " + relation.get<std::string>("relationshipType") + " " + to);
   }
 
-  // What dpkg-shlibdeps has found in the programs is there, too.
+  // The libraries that dpkg-shlibdeps has found in the programs are listed, too.
   const std::string depends = Output("/usr/bin/dpkg-deb", {"-f", package_, "Depends"});
   for (const std::string& word : testing::SplitWords(std::regex_replace(depends, std::regex(R"(\([^)]*\)|,)"), ""))) {
     if (word == "|" || word.starts_with("systemd")) continue;
@@ -135,7 +134,7 @@ TEST_F(InstallTest, BillOfMaterialsNamesWhatIsLinkedAndCompiledIn) {
   EXPECT_TRUE(relations.contains(ids["render_node"] + " DYNAMIC_LINK " + ids["libopenscenegraph161"]));
   EXPECT_TRUE(relations.contains(ids["physics_node"] + " STATIC_LINK " + ids["libeigen3-dev"]));
 
-  // CGAL is GPL and in one program only: a second one is a matter for THIRD_PARTY.md and its reader.
+  // CGAL is GPL and only in one program: a second one would require a change of THIRD_PARTY.md.
   EXPECT_TRUE(std::regex_search(licences["libcgal-dev"], std::regex(R"(\bGPL-3\.0-or-later)")))
       << licences["libcgal-dev"];
   EXPECT_TRUE(relations.contains(ids["fulcrum_scene_mesh"] + " STATIC_LINK " + ids["libcgal-dev"]));
@@ -156,7 +155,7 @@ TEST_F(InstallTest, EveryCommandHasAPageOfTheManual) {
   for (std::sregex_iterator found(help.begin(), help.end(), command), end; found != end; ++found, ++commands) {
     const std::string name = (*found)[1];
     EXPECT_TRUE(fs::exists(pages / ("fulcrum-" + name + ".1.gz"))) << name;
-    // A paragraph of its own, not a word among others.
+    // A paragraph for the command, not only its name.
     const std::string tag = "\n.TP\n.B " + std::regex_replace(name, std::regex("-"), "\\-") + "\n";
     EXPECT_NE(page.find(tag), std::string::npos) << name << "\n" << page;
   }
@@ -174,7 +173,7 @@ TEST_F(InstallTest, EveryCommandHasAPageOfTheManual) {
 
 TEST_F(InstallTest, UnitsPassTheCheckOfSystemd) {
   if (::access("/usr/bin/systemd-analyze", X_OK) != 0) GTEST_SKIP() << "systemd-analyze is not installed";
-  // The units with the paths of this tree; those of the system itself come from where they are.
+  // The units with the paths of this tree; those of the system itself come from their usual place.
   const fs::path units = folder_ / "units";
   fs::create_directories(units / "fulcrum-.service.d");
   std::vector<std::string> arguments{"SYSTEMD_UNIT_PATH=" + units.string() + ":/lib/systemd/system", "systemd-analyze",
@@ -187,14 +186,14 @@ TEST_F(InstallTest, UnitsPassTheCheckOfSystemd) {
     if (copy.parent_path() == units) arguments.push_back(copy);
   }
   ASSERT_EQ(arguments.size(), 4u + 9u) << "a target, the supervisor, the console, six nodes";
-  EXPECT_EQ(Output("/usr/bin/env", arguments), "") << "systemd found fault with the units";
+  EXPECT_EQ(Output("/usr/bin/env", arguments), "") << "systemd reports errors in the units";
 }
 
 TEST_F(InstallTest, UnitsLimitWhatEachNodeMayDo) {
   const UnitFile all(root_ / "lib/systemd/system/fulcrum-.service.d/10-fulcrum.conf", root_);
   std::string calls;
   for (const std::string& value : all.Values("SystemCallFilter")) calls += " " + value;
-  // Without these a node could not confine itself, which would be one warning in its log.
+  // Without these calls a node could not confine itself and would only log a warning.
   for (const char* needed : {" seccomp", " landlock_create_ruleset", " landlock_add_rule", " landlock_restrict_self"}) {
     EXPECT_NE(calls.find(needed), std::string::npos) << needed;
   }
@@ -211,7 +210,7 @@ TEST_F(InstallTest, UnitsLimitWhatEachNodeMayDo) {
     const UnitFile unit = Unit("fulcrum-" + node + ".service");
     EXPECT_EQ(unit.Value("ReadOnlyPaths").empty(), below == "all") << node;
     EXPECT_EQ(unit.Value("ReadWritePaths").empty(), below != "sessions") << node;
-    // No unit gives itself an address, a call or a capability beyond those of all.
+    // No unit adds an address, a call or a capability to those of all units.
     for (const char* key : {"IPAddressAllow", "SystemCallFilter", "CapabilityBoundingSet", "AmbientCapabilities"}) {
       EXPECT_TRUE(unit.Values(key).empty()) << node << " " << key;
     }
@@ -222,13 +221,13 @@ TEST_F(InstallTest, UnitsLimitWhatEachNodeMayDo) {
 TEST_F(InstallTest, SessionRunsFromTheInstalledPlaces) {
   const fs::path elsewhere = folder_ / "elsewhere";
   fs::create_directory(elsewhere);
-  // Called where nobody may write, not even root.
+  // The working directory is not writable, not even for root.
   const std::string fulcrum = root_ / "usr/bin/fulcrum";
   const std::string said =
       Output("/usr/bin/env", {"-C", "/proc", "XDG_CACHE_HOME=" + (folder_ / "cache").string(), fulcrum, "up", "small",
                               "--domain", "83", "--seconds", "1", "--out", elsewhere});
   EXPECT_TRUE(fs::exists(elsewhere / "latest/report.html")) << said;
-  // What else it finds is a matter of this machine.
+  // Other findings depend on this machine.
   Program program(fulcrum, {"doctor", "--domain", "83"});
   program.End(0);
   const std::string doctor = program.Said();
@@ -236,7 +235,7 @@ TEST_F(InstallTest, SessionRunsFromTheInstalledPlaces) {
   EXPECT_NE(doctor.find((root_ / "etc/fulcrum/cart.yaml").string()), std::string::npos) << doctor;
 }
 
-/// One unit, started.
+/// One started unit.
 class Service {
  public:
   Service(const std::string& name, const UnitFile& unit, const fs::path& folder, const fs::path& runtime)
@@ -275,7 +274,7 @@ TEST_F(InstallTest, SessionOfServicesRunsAsTheUnitsSay) {
 
   Service supervisor("supervisor", Unit("fulcrum-supervisor.service"), folder_, runtime);
   supervisor.Start();
-  // Type=notify: what comes After= is started then.
+  // Type=notify: READY starts the units that have this one in After=.
   ASSERT_TRUE(WaitFor(kStartLimit_s, [&] { return supervisor.Heard("READY=1"); })) << supervisor.All();
 
   std::map<std::string, std::unique_ptr<Service>> nodes;
@@ -311,7 +310,7 @@ TEST_F(InstallTest, SessionOfServicesRunsAsTheUnitsSay) {
   for (auto& [name, node] : nodes) {
     ASSERT_TRUE(
         WaitFor(kEndLimit_s, [&code, node = node.get()] { return (code = node->program().Poll()).has_value(); }))
-        << name << " was not told to end\n"
+        << name << " did not end\n"
         << node->All();
     EXPECT_EQ(*code, 0) << name << "\n" << node->All();
     EXPECT_FALSE(fs::exists(Unit(name).Value("ConditionPathExists"))) << name << " would start once more";

@@ -13,9 +13,9 @@ class NotifySocket {
   NotifySocket(const NotifySocket&) = delete;
   NotifySocket& operator=(const NotifySocket&) = delete;
 
-  /// All that has come so far, a line each.
+  /// All messages received so far, one per line.
   [[nodiscard]] const std::string& Heard();
-  /// True when one of the lines begins so.
+  /// True if one of the lines begins with `beginning`.
   [[nodiscard]] bool HasHeard(const std::string& beginning);
   void Forget() { heard_ = "\n"; }
 

@@ -10,10 +10,10 @@ namespace fulcrum::testing {
 
 class UnitFile {
  public:
-  /// In all that it reads, `/usr/…`, `/etc/…`, `/var/…` and `/run/…` are those below `root`.
+  /// In the values, `/usr/…`, `/etc/…`, `/var/…` and `/run/…` are replaced by those below `root`.
   UnitFile(const std::filesystem::path& file, const std::filesystem::path& root);
 
-  /// All values of a key, in their order; repeated keys add up.
+  /// All values of a key, in their order; repeated keys accumulate.
   [[nodiscard]] std::vector<std::string> Values(const std::string& key) const;
   /// The only value, empty when there is none.
   [[nodiscard]] std::string Value(const std::string& key) const;

@@ -1,4 +1,4 @@
-// What the README promises: record, kill, replay, the same states.
+// The replay described in the README: record, kill, replay, equal states.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -13,7 +13,7 @@
 namespace fulcrum {
 namespace {
 
-/// The process of the cart that was started with these arguments, one after the other; 0: none.
+/// The process of the cart that was started with these two arguments in sequence; 0: none.
 pid_t ProcessWith(const testing::Cart& cart, const std::string& option, const std::string& value) {
   const std::string session = std::filesystem::canonical(cart.session()).filename();
   const std::string wanted = option + '\0' + value + '\0';
@@ -28,7 +28,7 @@ pid_t ProcessWith(const testing::Cart& cart, const std::string& option, const st
 
 TEST(ReplayOfTheCart, ComesToTheSameStatesThroughKillsAndATakeover) {
   testing::Cart cart("small", 57, {"--record", "--standby"});
-  // While it pulls and cuts.
+  // While the cart pulls and cuts.
   ASSERT_TRUE(testing::WaitFor(60, [&] { return cart.PictureTime() >= 2.4; })) << cart.Said();
   for (const char* node : {"haptics_node", "thermal_node", "physics_node"}) {
     const auto nodes = cart.nodes();
@@ -38,14 +38,14 @@ TEST(ReplayOfTheCart, ComesToTheSameStatesThroughKillsAndATakeover) {
   }
   EXPECT_EQ(cart.WaitForEnd(60), 0) << cart.Said();
   const auto run = testing::Replay(cart.session() / "recording.mcap", {"--into", "physics", "thermal", "haptics"}, 60);
-  // A sample goes to each reader by itself. Killed between two of these, a process has told a node what it has not told
-  // the recorder; no recording can hold that. Any other sample that is missing is a failure.
+  // A sample is sent to each reader separately. A process that is killed between two of these sends may have reached a
+  // node but not the recorder; no recording can contain such a sample. Any other missing sample is a failure.
   if (run.said.find("the last of its process") != std::string::npos) GTEST_SKIP() << run.said;
   EXPECT_EQ(run.exit_code, 0) << run.said;
   EXPECT_GT(run.figures.at("physics_node.compared"), 200) << run.said;
   EXPECT_GT(run.figures.at("thermal_node.compared"), 200) << run.said;
-  // Each death is in the recording: physics went over to the one that followed, the others were started again.
-  // On a machine that holds a leader up for longer than its deadline it goes over once more.
+  // Each death is in the recording: the standby took over physics, the other nodes were restarted. If the machine
+  // delays a leader beyond its deadline, physics changes once more.
   EXPECT_GE(run.figures.at("physics_node.starts"), 2) << run.said;
   EXPECT_EQ(run.figures.at("thermal_node.starts"), 2) << run.said;
   EXPECT_EQ(run.figures.at("haptics_node.starts"), 2) << run.said;
@@ -61,7 +61,7 @@ TEST(ReplayOfTheCart, ALeaderThatWasHeldUpFollowsAndTakesOverAgain) {
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   ::kill(first, SIGCONT);
   std::this_thread::sleep_for(std::chrono::milliseconds(1000));
-  EXPECT_EQ(ProcessWith(cart, "--pair", "a"), first) << "it goes on, following";
+  EXPECT_EQ(ProcessWith(cart, "--pair", "a"), first) << "it continues as the follower";
   ::kill(second, SIGKILL);
   EXPECT_EQ(cart.WaitForEnd(60), 0) << cart.Said();
   const auto run = testing::Replay(cart.session() / "recording.mcap", {"--into", "physics"}, 60);

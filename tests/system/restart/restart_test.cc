@@ -1,5 +1,5 @@
-// The whole cart, as a user starts it: five processes over DDS with the small scene. Each node is killed in mid-run,
-// while the hook cuts; the session must go on and end well.
+// The whole cart, as a user starts it: five processes over DDS with the small scene. Each node is killed while the hook
+// cuts; the session must continue and succeed.
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -26,10 +26,10 @@ using testing::WaitFor;
 
 constexpr double kStartLimit_s = 60.0;  // compiling the scene and five starts, on a busy machine
 constexpr double kEndLimit_s = 60.0;    // the script's 6 s, closing and the report, on a busy machine
-constexpr double kRejoinLimit_s = 2.0;  // what the cart promises for a killed node
+constexpr double kRejoinLimit_s = 2.0;  // limit of the cart for a killed node
 constexpr const char* kNodes[] = {"handle_bridge", "haptics_node", "physics_node", "thermal_node", "render_node"};
 
-/// Number of a key in the flat summary.json.
+/// Number under a key in the flat summary.json.
 std::optional<double> Figure(const std::string& json, const std::string& key) {
   const auto at = json.find("\"" + key + "\":");
   if (at == std::string::npos) return std::nullopt;
@@ -38,7 +38,7 @@ std::optional<double> Figure(const std::string& json, const std::string& key) {
 
 TEST(Cart, EachKilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
   Cart cart("small", 91, {"--seconds", "8"});
-  // The hook is at work: the heat has cut something.
+  // The hook has cut something.
   ASSERT_TRUE(WaitFor(kStartLimit_s, [&] { return cart.PictureTime() >= 2.9; })) << cart.Said();
   std::map<std::string, pid_t> nodes = cart.nodes();
   std::set<pid_t> pids;
@@ -48,7 +48,7 @@ TEST(Cart, EachKilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
   }
   ASSERT_EQ(pids.size(), std::size(kNodes)) << "each node is a process of its own";
 
-  // The picture first: it takes the longest to come back, and another process waits to take its place.
+  // The picture first: its start takes longest, and a spare process takes its place.
   ASSERT_TRUE(WaitFor(kStartLimit_s, [&] { return cart.nodes().contains("render_spare"); })) << cart.Said();
   const pid_t spare = cart.nodes()["render_spare"];
   for (auto node = std::rbegin(kNodes); node != std::rend(kNodes); ++node) {
@@ -63,7 +63,7 @@ TEST(Cart, EachKilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
     if (node == std::rbegin(kNodes)) {
       EXPECT_EQ(cart.nodes()[victim], spare);
     }
-    // Until it is of use again, as the next one's peer.
+    // Until it works again, as a peer of the next node.
     std::this_thread::sleep_for(std::chrono::milliseconds(400));
   }
 
@@ -76,7 +76,7 @@ TEST(Cart, EachKilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
     EXPECT_GT(Figure(summary, victim + ".longest_rejoin_s").value_or(0), 0.0) << victim << summary;
     EXPECT_LE(Figure(summary, victim + ".longest_rejoin_s").value_or(1e9), kRejoinLimit_s) << victim << summary;
   }
-  EXPECT_GT(Figure(summary, "cut_length_mm").value_or(0), 5.0) << "the cut went on";
+  EXPECT_GT(Figure(summary, "cut_length_mm").value_or(0), 5.0) << "the cut continued";
   EXPECT_GT(Figure(summary, "max_displacement_mm").value_or(0), 5.0) << "the tissue was deformed";
   EXPECT_LE(Figure(summary, "peak_force_N").value_or(1e9), 3.3);
 }
@@ -100,7 +100,7 @@ TEST(Cart, GoesOnWithAnotherBuildOfANodeEndsWhenInterruptedAndLeavesNoProcess) {
   for (const char* node : kNodes) EXPECT_TRUE(nodes.contains(node)) << node << cart.Said();
   cart.Signal(SIGINT);
   ASSERT_TRUE(cart.WaitForEnd(kEndLimit_s).has_value()) << cart.Said();
-  for (const auto& [name, pid] : nodes) EXPECT_NE(kill(pid, 0), 0) << name << " is still there";
+  for (const auto& [name, pid] : nodes) EXPECT_NE(kill(pid, 0), 0) << name << " is still running";
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A short soak with everything of a long one.
+// A short soak with all parts of a long one.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -32,7 +32,7 @@ TEST(Soak, ANodeThatEndsByItselfIsACrash) {
   fs::remove_all(Out());
   fulcrum::testing::Program soak("fulcrum", {"soak", "small", "--minutes", "0.2", "--domain", "58", "--out", Out()});
   pid_t thermal = 0;
-  // Of the session that the soak has started.
+  // thermal_node of the session that the soak has started.
   ASSERT_TRUE(fulcrum::testing::WaitFor(90, [&] {
     const auto up = fulcrum::testing::ChildrenOf(soak.pid());
     if (!up.contains("fulcrum") || soak.Said().find("nodes run") == std::string::npos) return false;
@@ -41,7 +41,7 @@ TEST(Soak, ANodeThatEndsByItselfIsACrash) {
     thermal = nodes.at("thermal_node");
     return true;
   })) << soak.Said();
-  // Once it is known.
+  // Time for the soak to register the process.
   (void)fulcrum::testing::WaitFor(1.5, [] { return false; });
   ::kill(thermal, SIGKILL);
   std::optional<int> code;

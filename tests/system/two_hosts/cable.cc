@@ -3,8 +3,8 @@
 //
 //   two_hosts_cable INTERFACE INTERFACE DELAY_MS LOSS_PERCENT WORD
 //
-// It says so, once, when a frame has WORD in the clear.
-// It stands for tc's netem, which not every kernel has.
+// Prints one line when a frame contains WORD in the clear.
+// Used instead of tc's netem, which not every kernel has.
 #include <arpa/inet.h>
 #include <linux/if_packet.h>
 #include <net/ethernet.h>
@@ -36,7 +36,7 @@ int OpenEnd(const char* interface) {
   address.sll_family = AF_PACKET;
   address.sll_protocol = htons(ETH_P_ALL);
   address.sll_ifindex = static_cast<int>(if_nametoindex(interface));
-  // With the header that says which checksums are still to be made: the interfaces leave them to each other.
+  // With the header that lists the missing checksums, which the interfaces leave to each other.
   if (fd < 0 || setsockopt(fd, SOL_PACKET, PACKET_VNET_HDR, &on, sizeof on) != 0 ||
       setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &buffer_B, sizeof buffer_B) != 0 ||
       bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
@@ -67,12 +67,12 @@ int main(int argc, char** argv) {
   std::bernoulli_distribution lost(std::strtod(argv[4], nullptr) / 100);
   const std::string_view word = argv[5];
   bool overheard = false;
-  std::deque<Waiting> wire;  // In order: all wait equally long.
+  std::deque<Waiting> wire;  // In order: all frames have the same delay.
   std::array<char, 70'000> buffer{};
   for (;;) {
     const auto now = Clock::now();
     while (!wire.empty() && wire.front().due <= now) {
-      // An interface that is down takes nothing: the cable is cut.
+      // Writing to an interface that is down has no effect: the cable is cut.
       (void)!write(wire.front().to, wire.front().frame.data(), wire.front().frame.size());
       wire.pop_front();
     }

@@ -1,11 +1,11 @@
-// Listens on the bus of the host that it runs on and writes down what it hears, for a test on another host to compare.
+// Reads the bus of the host that it runs on and writes the samples to a file, for comparison with another host.
 //
 //   two_hosts_probe DOMAIN FILE [tissue]
 //
 // It waits for a session, and joins with the rights of a recorder.
 // FILE gets a line per sample: "tool <session time s> <force 0 N> <force 1 N> <model age s>",
 // "health <node> <state> <pid> <ticks>", "link <name> <value>", "event ..."; FILE.tissue, with "tissue", binary:
-// sequence (u64), age when it came (f64, s), vertex count (u32), floats.
+// sequence (u64), age at arrival (f64, s), vertex count (u32), floats.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
   runtime::InstallStopSignals();
   const int domain = std::atoi(argv[1]);
   const std::filesystem::path memory = bus::SharedMemoryDirectory(domain);
-  // Each session announces how its bus is joined, with keys of its own or those of its cart file.
+  // Each session announces whether its bus uses keys of its own or those of its cart file.
   while (bus::AnnouncedSession(memory) == 0 && !runtime::ShouldStop()) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

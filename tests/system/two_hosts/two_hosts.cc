@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of iproute2 and util-linux; in /usr/sbin and /usr/bin on Debian.
+/// Programs of iproute2 and util-linux; in /usr/sbin and /usr/bin on Debian.
 const char* const kIp = "/usr/sbin/ip";
 const char* const kNsenter = "/usr/bin/nsenter";
 

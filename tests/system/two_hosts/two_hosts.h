@@ -23,7 +23,7 @@ class TwoHosts {
   static constexpr const char* kCartAddress = "10.77.0.1";
   static constexpr const char* kHostAddress = "10.77.0.2";
 
-  /// Empty, or why this machine cannot do it.
+  /// Empty, or why this machine cannot run it.
   [[nodiscard]] static std::string WhyNot();
 
   explicit TwoHosts(const Settings& settings);
@@ -34,10 +34,10 @@ class TwoHosts {
   /// A program of this build.
   [[nodiscard]] Program OnCart(const std::string& program, const std::vector<std::string>& arguments) const;
   [[nodiscard]] Program OnHost(const std::string& program, const std::vector<std::string>& arguments) const;
-  /// Pulls the plug, and puts it back.
+  /// Disconnects the cable, and connects it again.
   void Cut() const;
   void Mend() const;
-  /// Settings::word went over the cable in the clear.
+  /// True if Settings::word was transmitted over the cable in the clear.
   [[nodiscard]] bool Overheard() const { return !cable_.Said().empty(); }
   /// Temporary folder, removed with the object.
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
@@ -69,11 +69,11 @@ struct HeardTool {
 /// Values of a figure of the link, in order.
 [[nodiscard]] std::vector<double> HeardLinkFigure(const std::filesystem::path& file, const std::string& name);
 
-/// Frames that both heard, compared vertex by vertex.
+/// Frames received by both probes, compared vertex by vertex.
 struct FrameComparison {
   std::size_t compared = 0;
   double largest_error_m = 0;
-  double median_age_s = 0, largest_gap = 0;  ///< Of the second; gap in frames of the first.
+  double median_age_s = 0, largest_gap = 0;  ///< Age in the second file; gap in frames of the first.
 };
 [[nodiscard]] FrameComparison CompareFrames(const std::filesystem::path& near, const std::filesystem::path& far);
 

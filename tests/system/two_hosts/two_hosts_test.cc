@@ -23,13 +23,13 @@ namespace fs = std::filesystem;
 const char* const kDomain = "61";
 constexpr double kAhead_s = 1000;
 
-/// A force that has come back. Below that of WaitForForce: the tools have cut on while nobody felt them, and the tissue
-/// gives way more easily from then on.
+/// Least force after the link has been restored. It is lower than in WaitForForce: the tools have kept cutting
+/// meanwhile, so the tissue is softer.
 constexpr double kBack_N = 0.02;
 
 constexpr const char* kSceneName = "overheard_scene";
 
-/// The working scene under a name that an eavesdropper knows when he hears it.
+/// The working scene under a name that can be recognised on the cable.
 std::string NamedScene() {
   std::string scene = WorkingScene("small", 120);
   const std::string was = "name: small\n";
@@ -59,7 +59,7 @@ struct Session {
       std::ofstream(hosts.folder() / "cart.yaml") << "security: {keys: keys}\n";
       up.insert(up.end(), {"--cart", hosts.folder() / "cart.yaml"});
       cart = hosts.OnCart("fulcrum", up);
-      // Those that have no keys or other keys end by themselves.
+      // Hosts without keys or with other keys end by themselves.
       for (const std::vector<std::string>& words :
            {std::vector<std::string>{"--insecure-link"}, {"--keys", hosts.folder() / "other-keys"}}) {
         Program stranger = Host(words);
@@ -103,7 +103,7 @@ struct Session {
       return std::any_of(tools.begin(), tools.end(), [](const HeardTool& t) { return t.force0_N > 0.1; });
     });
   }
-  /// Exit codes of cart and host when the cart is told to end.
+  /// Exit codes of cart and host after the cart is signalled to end.
   std::pair<int, int> End() {
     near.End(SIGTERM);
     far.End(SIGTERM);
@@ -125,7 +125,7 @@ struct Session {
 
 void Sleep(double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }
 
-/// From one millisecond to the next [N]: what the hand feels as a blow.
+/// Largest change from one millisecond to the next [N], which the hand would feel as a blow.
 double LargestStep(const std::vector<HeardTool>& tools) {
   double largest = 0;
   for (std::size_t i = 1; i < tools.size(); ++i) {
@@ -156,12 +156,12 @@ TEST(TwoHosts, ThePictureIsDrawnOnAnotherHostAndACutCableIsNoEnd) {
 
   const FrameComparison frames = CompareFrames(session.Tissue("near"), session.Tissue("far"));
   EXPECT_GT(frames.compared, 40u);
-  // A block that was lost is where it was until it is told again: some hundredths of a second.
+  // A lost block keeps its old position until it is sent again, some hundredths of a second later.
   EXPECT_LT(frames.largest_error_m, 0.01);
-  // As it is on the other host's clock, which is far from ours.
+  // Age on the other host's clock, which has a large offset from this one.
   EXPECT_GT(frames.median_age_s, 0);
   EXPECT_LT(frames.median_age_s, 0.5);
-  // The cut, and not for good.
+  // The gap is the cut of the cable, and ends.
   EXPECT_GT(frames.largest_gap, 20);
   EXPECT_LT(frames.largest_gap, 400);
   ASSERT_FALSE(offsets.empty());
@@ -171,7 +171,8 @@ TEST(TwoHosts, ThePictureIsDrawnOnAnotherHostAndACutCableIsNoEnd) {
   for (const std::string& text : {session.cart.Said(), session.host.Said(), report}) {
     EXPECT_NE(text.find("! insecure link"), std::string::npos) << text.substr(0, 2000);
   }
-  EXPECT_TRUE(session.hosts.Overheard()) << "the secured cart's test hears nothing either";
+  EXPECT_TRUE(session.hosts.Overheard())
+      << "the name must be found here, or the test of the secured cart checks nothing";
 }
 
 TEST(TwoHosts, ASecuredCartCannotBeOverheardAndRefusesAHostWithoutItsKeys) {
@@ -182,7 +183,7 @@ TEST(TwoHosts, ASecuredCartCannotBeOverheardAndRefusesAHostWithoutItsKeys) {
   EXPECT_NE(session.strangers.at(1).second.find("both need the same keys"), std::string::npos);
   ASSERT_TRUE(session.WaitForForce()) << session.Said();
   Sleep(2);
-  // As long as it takes to begin a connection anew, and to prove oneself again.
+  // Long enough that the connection must be restarted and authenticated again.
   session.hosts.Cut();
   Sleep(4);
   session.hosts.Mend();
@@ -199,11 +200,11 @@ TEST(TwoHosts, ASecuredCartCannotBeOverheardAndRefusesAHostWithoutItsKeys) {
       << session.Said();
   Sleep(2);
   const auto [code, there] = session.End();
-  // Cut for 4 s and authenticated again: far physics may have been silent for longer than a session may be called well.
+  // After a cut of 4 s and a new authentication, physics may have been silent for longer than the verdict allows.
   const bool silent = session.cart.Said().find("not well: physics_node was silent") != std::string::npos;
   EXPECT_EQ(code, silent ? 1 : 0) << session.Said();
   EXPECT_EQ(there, 0) << session.Said();
-  EXPECT_FALSE(session.hosts.Overheard()) << "the scene's name went over the cable in the clear";
+  EXPECT_FALSE(session.hosts.Overheard()) << "the scene's name was transmitted over the cable in the clear";
   EXPECT_GT(CompareFrames(session.Tissue("far"), session.Tissue("near")).compared, 40u);
   const std::string summary = ReadFile(session.hosts.folder() / "cart" / "latest" / "summary.json");
   EXPECT_NE(summary.find("\"refused.participants\": 2"), std::string::npos) << summary << session.Said();
@@ -219,7 +220,7 @@ TEST(TwoHosts, ForceComesFromAnotherHostAndNeverJumps) {
   Sleep(1);
   session.hosts.Mend();
   const double mended_s = HeardTools(session.File("near")).back().time_s;
-  // The scene's tools press in turns.
+  // The scene's tools press alternately.
   EXPECT_TRUE(WaitFor(20,
                       [&] {
                         const std::vector<HeardTool> heard = HeardTools(session.File("near"));
@@ -235,7 +236,7 @@ TEST(TwoHosts, ForceComesFromAnotherHostAndNeverJumps) {
   EXPECT_EQ(code, 0) << session.Said();
   EXPECT_EQ(there, 0) << session.Said();
   const std::vector<HeardTool> tools = HeardTools(session.File("near"));
-  // haptics_node lets no force change faster at the motors; sideways the tip's differs from it by the lever.
+  // haptics_node limits the change of force at the motors to this; lateral forces at the tip differ by the lever.
   EXPECT_LT(LargestStep(tools), 1.2);
   const auto aged = std::max_element(
       tools.begin(), tools.end(), [](const HeardTool& a, const HeardTool& b) { return a.model_age_s < b.model_age_s; });

@@ -1,4 +1,4 @@
-// Wall-clock promises of the servo on the machine at hand. Kept out of the default run; see label "timing".
+// Wall-clock limits of the servo on this machine. Not in the default run; see label "timing".
 #include <gtest/gtest.h>
 
 #include <chrono>

@@ -20,7 +20,7 @@ ParsedOptions Parse(const std::vector<const char*>& words) {
 void ExpectRefused(const std::vector<const char*>& words, const std::string& expected) {
   try {
     (void)Parse(words);
-    FAIL() << "taken, though " << expected;
+    FAIL() << "accepted, expected: " << expected;
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
   }

@@ -40,9 +40,9 @@ std::vector<std::string> Rooms() {
 }
 const std::vector<std::string> kRooms = Rooms();
 const std::set<std::string> kNodes = {"physics_node", "haptics_node", "handle_bridge", "render_node", "thermal_node"};
-/// The floor whose executables join others: only it may include a node's folder.
+/// The floor whose executables combine others: only it may include a node's folder.
 const std::string kJoinsNodes = "services/apps/";
-/// What a node's folder may include of the services: up to the class that makes its ports.
+/// Limit of what a node's folder may include of the services: up to the class that makes its ports.
 const std::string kHighestOfNodes = "services/nodes/app";
 constexpr std::size_t kLongestFile = 500, kLongestMain = 60;  ///< [lines]
 
@@ -87,7 +87,7 @@ std::vector<std::string> LinesOf(const std::string& source) {
 }
 
 struct Include {
-  std::string from, to;  ///< Files, from the root.
+  std::string from, to;  ///< Paths relative to the root.
 };
 
 std::vector<Include> Includes() {
@@ -126,7 +126,7 @@ TEST(IncludeGraph, FoldersOfANodeDoNotIncludeEachOtherInACircle) {
     if (!kNodes.contains(RoomOf(include.from)) || RoomOf(include.from) != RoomOf(include.to) || from == to) continue;
     graph[from].insert(to);
   }
-  // Folders from which nothing leads on are taken away, again and again: what is left is in a circle, or above one.
+  // Folders without edges to others are removed repeatedly: the rest is in a circle, or above one.
   for (bool taken = true; taken;) {
     taken = false;
     for (auto& [folder, targets] : graph) {

@@ -1,4 +1,4 @@
-// The assessment: known answers, what does not count, prompts, points.
+// The assessment: known results, exclusions, prompts, points.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -80,7 +80,7 @@ TEST(Assessment, ASilenceIsNotCounted) {
       if (i % 10 == 0) AddTip(time_s, Vec2f::Zero(), false, CauteryMode::kCut, &run.assessor);
     }
   }
-  EXPECT_EQ(ValueOf(run.assessor, Measure::kPathLength), 0) << "the jump to where the tool was found again";
+  EXPECT_EQ(ValueOf(run.assessor, Measure::kPathLength), 0) << "the jump after a loss of the tool does not count";
   EXPECT_NEAR(ValueOf(run.assessor, Measure::kForceTime), 6, 1e-6);
   EXPECT_NEAR(ValueOf(run.assessor, Measure::kPedalWithoutContact), 2, 1e-6);
 }
@@ -112,7 +112,7 @@ TEST(Assessment, APhysicsNodeThatComesBackIsNoSlip) {
   for (int i = 0; i < 300; ++i) {
     ContactModel model = test::GraspAt(0.01 * i, Vec3d::Zero(), 3, 8);
     if (i >= 150) model.stamp.epoch = 2;
-    if (i >= 150 && i < 155) model.devices[0].count = 0;  // Not restored yet.
+    if (i >= 150 && i < 155) model.devices[0].count = 0;  // The grasp is not restored yet.
     run.assessor.Add(model);
   }
   EXPECT_EQ(ValueOf(run.assessor, Measure::kGraspSlips), 0);

@@ -1,4 +1,4 @@
-// A recorded session is measured as it was when it was live.
+// A recorded session gives the same measures as the live one.
 #include "services/session/assessment/recorded_assessment.h"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Hands each message of a made-up session to `put`, in the order in which a recorder would get them.
+/// Passes each message of an artificial session to `put`, in the order in which a recorder would receive them.
 template <class Put>
 void Play(const Put& put) {
   for (int i = -50; i < 4200; ++i) {

@@ -1,4 +1,4 @@
-// Mutexes of dead and of sleeping owners, in memory that two processes share.
+// Mutexes of dead and of stopped owners, in memory that two processes share.
 #include "services/transport/bus/dds/abandoned_mutex.h"
 
 #include <gtest/gtest.h>
@@ -55,14 +55,14 @@ class AbandonedMutex : public ::testing::Test {
     waitpid(holder_, nullptr, 0);
     holder_ = 0;
   }
-  /// After more than the shortest limit.
+  /// Releases the mutex after more than the shortest limit.
   [[nodiscard]] std::jthread ReleaseLater() {
     return std::jthread([this] {
       usleep(100'000);
       shared_->release = 1;
     });
   }
-  /// As the library does: with a limit of the wall clock.
+  /// Locks as the library does: with a limit on the wall clock.
   int Lock(std::int64_t limit_ns) {
     timespec until{};
     clock_gettime(CLOCK_REALTIME, &until);
@@ -89,7 +89,7 @@ TEST_F(AbandonedMutex, OfADeadOwnerPassesOnAndIsAMutexAgain) {
     EXPECT_EQ(pthread_mutex_unlock(&shared_->mutex), 0);
     ASSERT_EQ(Lock(kLimit_ns), 0);
     EXPECT_EQ(pthread_mutex_unlock(&shared_->mutex), 0);
-    EXPECT_EQ(SharedLocks().inherited, before.inherited + 1) << "nobody had died";
+    EXPECT_EQ(SharedLocks().inherited, before.inherited + 1) << "no owner had died";
   }
 }
 

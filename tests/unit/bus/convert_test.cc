@@ -1,4 +1,4 @@
-// Our types to bytes on the wire and back.
+// Conversion of messages to wire bytes and back.
 #include "services/transport/bus/convert/convert.h"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ bool OverTheWire(const T& from, T* to) {
   return true;
 }
 
-/// Through a loan at the worst alignment the library gives.
+/// Through a loan at the worst alignment that the library allows.
 template <Loanable T>
 bool OverTheWire(const T& from, T* to) {
   std::vector<std::uint64_t> memory(sizeof(WireOf<T>) / 8 + 2);
@@ -54,7 +54,7 @@ TYPED_TEST(Convert, RoundTripKeepsEveryField) {
   EXPECT_TRUE(Same(sent, got));
 }
 
-/// Members of a struct as its IDL file declares them.
+/// Members of a struct according to its IDL file.
 std::set<std::string> MembersInIdl(const std::string& type) {
   const std::string text = std::regex_replace(SchemaText(type), std::regex("//[^\n]*"), "");
   const std::string head = "struct " + type + " {";
@@ -79,7 +79,7 @@ TEST(ConvertFields, ListsNameEveryMemberThatIdlDeclares) {
 #undef FULCRUM_EXPECT
 }
 
-/// As a writer does, which keeps its wire object.
+/// A writer reuses its wire object.
 TEST(ConvertHealth, ShorterErrorLeavesNothingOfTheLongerOneBefore) {
   TypeSupportOf<Health>::type type;
   WireOf<Health> wire, received;

@@ -15,7 +15,7 @@
 namespace fulcrum::bus {
 namespace {
 
-/// Calls back for every floating-point number of a message; of long lists of numbers for three.
+/// Calls `visit` for every floating-point number of a message; in long lists only for three.
 template <class T, class Visit>
 void ForEachFloat(T& value, const Visit& visit) {
   if constexpr (std::is_floating_point_v<T>) {

@@ -57,7 +57,7 @@ TEST(InProcess, OverflowCountsAsLostWithinOneEpochOnly) {
   for (std::uint64_t i = 2; i <= 6; ++i) out->Write(MakeTool(i));  // 2, 3, 4 are overwritten
   ASSERT_TRUE(in->TakeLatest(&got));
   EXPECT_EQ(in->stats().lost, 3u);
-  out->Write(MakeTool(100, 2));  // a restarted writer: what it sent before is not a loss
+  out->Write(MakeTool(100, 2));  // a restarted writer: its earlier samples are not a loss
   ASSERT_TRUE(in->TakeLatest(&got));
   EXPECT_EQ(in->stats().lost, 3u);
 }
@@ -80,7 +80,7 @@ TEST(InProcess, TwoWritersOfOneTopicAreFollowedApart) {
   EXPECT_EQ(in->stats().lost, 3u);
 }
 
-// Of a process that was replaced nothing is taken any more, whether it was stopped and goes on or is served late.
+// Samples of a replaced process are rejected, both from a stopped process that continues and from late delivery.
 TEST(InProcess, ALaterProcessShutsOutTheEarlierOne) {
   InProcessTopic<ToolState> topic;
   auto before = topic.MakeOutput();
@@ -101,7 +101,7 @@ TEST(InProcess, ALaterProcessShutsOutTheEarlierOne) {
   after->Write(MakeTool(2, 20));
   before->Write(MakeTool(4, 10));
   ASSERT_TRUE(in->TakeLatest(&got));
-  EXPECT_EQ(got.stamp.epoch, 20u) << "not the newest that came, but the newest of the owner";
+  EXPECT_EQ(got.stamp.epoch, 20u) << "the newest sample of the owner, not the newest received";
   EXPECT_EQ(in->stats().rejected, 3u);
 }
 
@@ -111,14 +111,14 @@ TEST(InputAccount, OfOneOwnerOnlyTheLatestEpochCounts) {
   EXPECT_TRUE(account.IsOfOwner({2, 10, 0}));
   EXPECT_TRUE(account.IsOfOwner({1, 11, 0}));
   EXPECT_FALSE(account.IsOfOwner({3, 10, 0}));
-  EXPECT_TRUE(account.IsOfOwner({2, 11, 0})) << "the refused one is forgotten";
+  EXPECT_TRUE(account.IsOfOwner({2, 11, 0})) << "the refused sample has no effect";
 }
 
 TEST(InputAccount, OfSeveralOwnersEachEpochCounts) {
   InputAccount account(true, false);
   EXPECT_TRUE(account.IsOfOwner({1, 20, 0}, 30));
   EXPECT_TRUE(account.IsOfOwner({1, 10, 0}, 30));
-  EXPECT_TRUE(account.IsOfOwner({1, 40, 0}, 30)) << "nobody can be shut out";
+  EXPECT_TRUE(account.IsOfOwner({1, 40, 0}, 30)) << "no epoch is excluded";
 }
 
 TEST(InputAccount, AnEpochOfTheFutureIsNobodysAndShutsNobodyOut) {
@@ -128,8 +128,8 @@ TEST(InputAccount, AnEpochOfTheFutureIsNobodysAndShutsNobodyOut) {
   EXPECT_FALSE(account.IsOfOwner({1, kNow + 1, 0}, kNow));
   EXPECT_FALSE(account.IsOfOwner({1, std::numeric_limits<std::uint64_t>::max(), 0}, kNow));
   EXPECT_TRUE(account.IsOfOwner({2, 10, 0}, kNow));
-  EXPECT_TRUE(account.IsOfOwner({1, kNow, 0}, kNow)) << "begun just now";
-  EXPECT_FALSE(account.IsOfOwner({1, std::numeric_limits<std::uint64_t>::max(), 0})) << "no clock is so late";
+  EXPECT_TRUE(account.IsOfOwner({1, kNow, 0}, kNow)) << "started at this moment";
+  EXPECT_FALSE(account.IsOfOwner({1, std::numeric_limits<std::uint64_t>::max(), 0})) << "no clock reaches this value";
 }
 
 TEST(InProcess, GateDropsAndCounts) {
@@ -142,7 +142,7 @@ TEST(InProcess, GateDropsAndCounts) {
   out->Write(bad);
   ToolState got;
   ASSERT_TRUE(in->TakeLatest(&got));
-  EXPECT_EQ(got.stamp.sequence, 1u);  // the newest that passes
+  EXPECT_EQ(got.stamp.sequence, 1u);  // the newest sample that passes
   EXPECT_EQ(in->stats().rejected, 1u);
   out->Write(MakeTool(3));
   ASSERT_TRUE(in->TakeLatest(&got));
@@ -165,7 +165,7 @@ TEST(InProcess, LateJoinerGetsStateOfLiveWritersOnly) {
   auto tool_out = tool.MakeOutput();
   tool_out->Write(MakeTool(1));
   ToolState t;
-  EXPECT_FALSE(tool.MakeInput()->TakeLatest(&t));  // a stream has no past
+  EXPECT_FALSE(tool.MakeInput()->TakeLatest(&t));  // a late reader gets no old samples of a stream
 }
 
 TEST(InProcess, MatchedAndHasReadersFollowTheOtherSide) {

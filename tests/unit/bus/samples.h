@@ -121,7 +121,7 @@ inline CauteryContact Sample(std::uint64_t sequence) {
   return m;
 }
 
-/// The largest there is.
+/// A message of the largest size.
 template <>
 inline TopologyState Sample(std::uint64_t sequence) {
   TopologyState m;
@@ -141,7 +141,7 @@ inline TopologyState Sample(std::uint64_t sequence) {
   return m;
 }
 
-/// The largest there is.
+/// A message of the largest size.
 template <>
 inline TearState Sample(std::uint64_t sequence) {
   TearState m;

@@ -20,7 +20,7 @@ class SharedMemory : public testing::Test {
  protected:
   void SetUp() override { fs::remove_all(directory_); }
   void TearDown() override { fs::remove_all(directory_); }
-  /// A file named as the library names those of process `pid`.
+  /// Creates a file with a name as the library gives those of process `pid`.
   fs::path Touch(int pid) {
     char name[120];
     std::snprintf(name, sizeof name, "fast_datasharing_01.0f.12.34.%02x.%02x.56.78.0.0.0.0|0.0.1.3", pid & 0xff,
@@ -36,7 +36,7 @@ TEST_F(SharedMemory, DirectoryIsPrivate) {
   struct stat status {};
   ASSERT_EQ(stat(directory_.c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777u, 0700u);
-  PrepareSharedMemory(directory_);  // a second process of the cart finds it
+  PrepareSharedMemory(directory_);  // for a second process of the cart
 }
 
 TEST_F(SharedMemory, DirectoryOpenToOthersIsRefused) {
@@ -94,7 +94,7 @@ TEST_F(SharedMemory, SweepKnowsSecuredOwnersByTheirClaims) {
   ClaimSharedMemory(directory_, ours);
   touch(ours);
   touch(theirs);
-  EXPECT_EQ(SweepSharedMemory(directory_).files, 2) << "of the dead process its file and its claim";
+  EXPECT_EQ(SweepSharedMemory(directory_).files, 2) << "the file and the claim of the dead process";
   EXPECT_TRUE(fs::exists(directory_ / ("fast_datasharing_" + ours + "|0.0.1.3")));
   EXPECT_FALSE(fs::exists(directory_ / ("fast_datasharing_" + theirs + "|0.0.1.3")));
 }
@@ -110,7 +110,7 @@ TEST_F(SharedMemory, TellsHowTheSessionIsSecured) {
   EXPECT_EQ(told.identity, "fulcrum");
   EXPECT_TRUE(told.encrypt);
   EXPECT_NE(AnnounceSession(directory_, {}), first) << "each session has a number of its own";
-  EXPECT_FALSE(AnnouncedSecurity(directory_, "fulcrum").on()) << "the word of an earlier session";
+  EXPECT_FALSE(AnnouncedSecurity(directory_, "fulcrum").on()) << "the keys of the earlier session are withdrawn";
 }
 
 TEST_F(SharedMemory, RemoveTakesAllAndTheDirectory) {

@@ -30,7 +30,7 @@ class CheckpointTest : public ::testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
-  /// Every byte of the payload is a function of `value`, so that a mixture of two payloads shows.
+  /// Every byte of the payload is a function of `value`, so that a mixture of two payloads is detected.
   static void Write(CheckpointFile* checkpoint, std::uint64_t value, std::size_t words) {
     const auto slot = checkpoint->Begin();
     for (std::size_t i = 0; i < words; ++i) {
@@ -115,13 +115,13 @@ TEST_F(CheckpointTest, WhetherAProcessHasItIsSeenFromOutside) {
   }
   EXPECT_FALSE(IsInUse(file_));
   const CheckpointFile again(file_, kScene, kLayout, 800);
-  EXPECT_TRUE(IsInUse(file_)) << "looking leaves nothing behind";
+  EXPECT_TRUE(IsInUse(file_)) << "the query does not change the file";
 }
 
 TEST_F(CheckpointTest, PeekReadsTheNewestWholeSlotOfAFileThatIsInUse) {
   EXPECT_FALSE(CheckpointFile::Peek(file_, kScene, kLayout, 800)) << "no file";
   CheckpointFile checkpoint(file_, kScene, kLayout, 800);
-  EXPECT_FALSE(CheckpointFile::Peek(file_, kScene, kLayout, 800)) << "nothing in it";
+  EXPECT_FALSE(CheckpointFile::Peek(file_, kScene, kLayout, 800)) << "it is empty";
   // Either slot may be the newest.
   for (const std::uint64_t value : {1, 2, 3}) {
     Write(&checkpoint, value, 20 * value);
@@ -130,14 +130,14 @@ TEST_F(CheckpointTest, PeekReadsTheNewestWholeSlotOfAFileThatIsInUse) {
     EXPECT_EQ(peeked->size(), 160 * value);
     EXPECT_TRUE(Matches(*peeked, value));
   }
-  // Its process is stopped in the middle of the next.
+  // The process is stopped while it fills the next slot.
   const auto slot = checkpoint.Begin();
   std::memset(slot.data(), 0xff, 400);
   const auto peeked = CheckpointFile::Peek(file_, kScene, kLayout, 800);
   ASSERT_TRUE(peeked);
   EXPECT_TRUE(Matches(*peeked, 3));
   checkpoint.Commit(400);
-  EXPECT_EQ(checkpoint.Latest()->sequence, 4u) << "whoever looked has left nothing";
+  EXPECT_EQ(checkpoint.Latest()->sequence, 4u) << "Peek does not change the file";
 }
 
 TEST_F(CheckpointTest, PeekTakesNothingThatIsAlteredOrOfAnother) {
@@ -229,7 +229,7 @@ TEST_F(CheckpointTest, SecondProcessIsRefusedWithTheFileName) {
   const CheckpointFile checkpoint(file_, kScene, kLayout, 800);
   try {
     const CheckpointFile second(file_, kScene, kLayout, 800);
-    FAIL() << "a second writer was let in";
+    FAIL() << "a second writer was accepted";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("node.checkpoint"), std::string::npos) << error.what();
     EXPECT_NE(std::string(error.what()).find("in use"), std::string::npos) << error.what();
@@ -247,8 +247,8 @@ TEST_F(CheckpointTest, CommitWithoutBeginOrBeyondCapacityIsABug) {
   EXPECT_THROW(checkpoint.Commit(801), std::logic_error);
 }
 
-// The promise itself: whatever the moment of the kill, the file opens and holds one whole payload, never a mixture,
-// and never one older than the last but one that the writer reported.
+// The guarantee: for a kill at any moment the file opens and holds one whole payload, never a mixture, and never one
+// older than the last but one that the writer reported.
 TEST_F(CheckpointTest, SurvivesKillAtAnyMoment) {
   constexpr int kKills = 150;
   constexpr std::size_t kWords = 4000;

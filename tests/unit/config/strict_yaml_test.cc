@@ -15,7 +15,7 @@ namespace {
 
 enum class Mode { kPaper, kAccurate };
 
-/// What one schema reads, for the tests below.
+/// Values that one schema reads, for the tests below.
 struct Example {
   double thickness_m = 3e-4f;
   double stiffness = 0.8;
@@ -72,7 +72,7 @@ TEST(StrictYaml, TellsTheRulesOfEveryKeyThatWasAskedFor) {
     return found == rules.end() ? KeyRule{"none", 0, std::nullopt, ""} : *found;
   };
   EXPECT_EQ(rule("stiffness").line, 2);
-  EXPECT_EQ(rule("stiffness").standard, "0.8") << "its default, whatever the file says";
+  EXPECT_EQ(rule("stiffness").standard, "0.8") << "the default, independent of the file";
   EXPECT_EQ(rule("stiffness").valid, "above 0 up to 1");
   EXPECT_EQ(rule("thickness_mm").line, 0);
   EXPECT_EQ(rule("thickness_mm").standard, "0.3");
@@ -127,7 +127,7 @@ TEST(StrictYaml, EffectiveConfigurationShowsDefaultsAndReadsBackToItself) {
 struct BadCase {
   const char* rule;
   const char* text;
-  std::vector<const char*> said;  ///< Parts that the message must have.
+  std::vector<const char*> said;  ///< Parts that the message must contain.
 };
 
 class RefusedText : public ::testing::TestWithParam<BadCase> {};
@@ -230,7 +230,7 @@ TEST(StrictYaml, TextsAreUtf8) {
       "C \xe2\x82\xac \xf0\x9f\x98\x80";
   StrictYaml file = StrictYaml::FromText(good, "f.yaml");
   EXPECT_EQ(file.root().Text("d"), good.substr(3));
-  // Alone, too short, overlong, half of a pair, beyond the last character.
+  // Lone byte, too short, overlong, half of a surrogate pair, beyond the last character.
   for (const char* bad : {"\x92", "\xe2\x82", "\xc0\xaf", "\xe0\x80\xaf", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xff"}) {
     const std::string said = Refusal([&] { StrictYaml::FromText(std::string("a: 1\nb: ") + bad + "\n", "f.yaml"); });
     EXPECT_NE(said.find("f.yaml:2: is not a text file (not UTF-8 at byte "), std::string::npos) << said;

@@ -1,4 +1,4 @@
-// The console's parts: who may talk to it, what a request means, what a terminal shows, what the operator is told.
+// The console's parts: access, the meaning of requests, the display of terminals, advice to the operator.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -292,7 +292,7 @@ TEST(Advice, ThePatientComesFirstAndEachHasSomethingToDo) {
   EXPECT_NE(warnings[1].text.find("silent for 3 s"), std::string::npos);
   EXPECT_NE(warnings[2].text.find("restarted"), std::string::npos);
   for (const Warning& warning : warnings) EXPECT_FALSE(warning.todo.empty()) << warning.text;
-  // A warning of heat is over when none comes any more; an injury stays.
+  // A warning of heat ends without further events; an injury stays.
   situation.now_ns += 60'000'000'000;
   EXPECT_STRNE(WarningsOf(situation)[0].level, "danger");
   situation.events_ns[static_cast<std::size_t>(ThermalEventKind::kNerveInjury)] = kNow;

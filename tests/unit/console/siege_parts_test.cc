@@ -1,4 +1,4 @@
-// What stands between the console and strangers: who keeps a connection, the certificate, what is printed of the token.
+// Protection of the console against strangers: admission of connections, the certificate, the printed token.
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 

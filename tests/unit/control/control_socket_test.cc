@@ -128,7 +128,7 @@ TEST_F(ControlSocket, WithoutAServerTheClientSaysWhere) {
 TEST_F(ControlSocket, ReplacesTheSocketOfADeadProcess) {
   { Server first(socket_); }
   const Server second(socket_);
-  const Server third(socket_);  // A file that is left over looks the same.
+  const Server third(socket_);  // A socket file left over from a killed server looks the same.
   EXPECT_TRUE(fs::is_socket(socket_));
 }
 

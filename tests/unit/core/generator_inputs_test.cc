@@ -39,7 +39,7 @@ TEST(GeneratorInputs, TellWhatWasTrueThenAndNotWhatCameLast) {
   inputs.Add(Pedals(12, kPedalCut));
   inputs.Add(Pedals(14, kPedalCoag));
   inputs.Add(Setting(13, 50));
-  EXPECT_EQ(inputs.At(9 * kMs).mode, CauteryMode::kOff) << "before anything was heard";
+  EXPECT_EQ(inputs.At(9 * kMs).mode, CauteryMode::kOff) << "before the first sample";
   EXPECT_EQ(inputs.At(11 * kMs).mode, CauteryMode::kOff);
   EXPECT_EQ(inputs.At(12 * kMs).mode, CauteryMode::kCut);
   EXPECT_EQ(inputs.At(12 * kMs).power_W, 30);
@@ -53,7 +53,7 @@ TEST(GeneratorInputs, WithoutASettingThereIsNoPower) {
   inputs.Add(Pedals(10, kPedalCut));
   EXPECT_EQ(inputs.At(11 * kMs).mode, CauteryMode::kCut);
   EXPECT_EQ(inputs.At(11 * kMs).power_W, 0);
-  // A late joiner is given the newest setting only: it stands for what was before.
+  // A late joiner receives only the newest setting; it is then used for earlier times, too.
   inputs.Add(Setting(20, 40));
   EXPECT_EQ(inputs.At(11 * kMs).power_W, 40);
 }
@@ -65,7 +65,7 @@ TEST(GeneratorInputs, ASilentPedalIsUpUnlessBothEndsOfTheSilenceSayDown) {
   EXPECT_EQ(inputs.At(110 * kMs).mode, CauteryMode::kCut);
   EXPECT_EQ(inputs.At(111 * kMs).mode, CauteryMode::kOff);
   inputs.Add(Pedals(500, kPedalCut));
-  EXPECT_EQ(inputs.At(300 * kMs).mode, CauteryMode::kCut) << "the reader was away";
+  EXPECT_EQ(inputs.At(300 * kMs).mode, CauteryMode::kCut) << "the reader missed samples";
   inputs.Add(Pedals(900, kPedalNone));
   EXPECT_EQ(inputs.At(700 * kMs).mode, CauteryMode::kOff) << "when it went up is unknown";
   inputs.Add(Pedals(910, kPedalCut));

@@ -82,7 +82,7 @@ TEST(Hash64, OrderCounts) {
 }
 
 TEST(Hash64, NegativeZeroIsAnotherState) {
-  // A state hash compares bits, so that a replay that differs in the sign of zero is found.
+  // A state hash compares bits, so that a difference in the sign of zero is detected in a replay.
   Hash64 positive;
   positive.AddValue(0.0f);
   Hash64 negative;

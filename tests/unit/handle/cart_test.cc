@@ -1,4 +1,4 @@
-// What the bridge takes from files: stored calibrations, the cart's faults, the scene's script.
+// Inputs of the bridge from files: stored calibrations, the cart's faults, the scene's script.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -21,7 +21,7 @@ constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 TEST(CalibrationStore, RefusesADamagedFileWithItsName) {
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("handle_store_test." + std::to_string(::getpid()));
-  EXPECT_EQ(CalibrationStore::Load(folder).Find("A"), nullptr);  // No folder, no calibrations.
+  EXPECT_EQ(CalibrationStore::Load(folder).Find("A"), nullptr);  // Without a folder there are no calibrations.
   CalibrationStore::Save(folder, "/dev/\"a\" b's", {{480, 490, 500}, {60, 30, 0}});
   const CalibrationStore store = CalibrationStore::Load(folder);
   ASSERT_NE(store.Find("/dev/\"a\" b's"), nullptr);

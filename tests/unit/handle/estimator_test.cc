@@ -79,7 +79,7 @@ TEST(JawCalibration, FivePointsRemoveBowSpreadAndOffset) {
   EXPECT_LT(std::sqrt(sum5 / n), 0.08);
 }
 
-/// Codes of a hold, `seconds` of a handle.
+/// Codes of a handle that is held still.
 std::vector<int> Hold(JawFirmware* firmware, double angle_deg, int samples = 400) {
   std::vector<int> codes;
   for (int i = 0; i < samples; ++i) {
@@ -94,7 +94,7 @@ TEST(JawCalibrator, FindsTheVoltageBetweenTheCodes) {
   double squares = 0;
   int n = 0;
   for (std::uint64_t part = 0; part < 40; ++part) {
-    settings.closed_V = 2.37 + 0.0001 * static_cast<double>(part);  // Every place between two codes.
+    settings.closed_V = 2.37 + 0.0001 * static_cast<double>(part);  // All positions between two codes.
     settings.open_V = settings.closed_V + 0.17;
     JawFirmware firmware(settings, part);
     JawCalibrator calibrator;
@@ -108,7 +108,7 @@ TEST(JawCalibrator, FindsTheVoltageBetweenTheCodes) {
       ++n;
     }
   }
-  EXPECT_LT(std::sqrt(squares / n), 0.04);  // Counts. The mean of the codes: 0.09.
+  EXPECT_LT(std::sqrt(squares / n), 0.04);  // Counts. The mean of the codes has 0.09.
 }
 
 TEST(JawCalibrator, TakesFallingHandlesInAnyOrder) {
@@ -150,7 +150,7 @@ struct Errors {
   double lag_ms = 0;
 };
 
-/// RMS error and lag over motions that the filter's settings were not chosen on.
+/// RMS error and lag over motions that were not used to choose the filter's settings.
 Errors Measure(bool moves, int runs) {
   double sum = 0, lag = 0;
   std::size_t n = 0;

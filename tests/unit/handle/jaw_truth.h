@@ -50,7 +50,7 @@ inline JawTruth MakeJawTruth(double seconds, bool moves, std::uint64_t seed) {
   return truth;
 }
 
-/// Delay of `estimate` behind `truth` [samples, fractions by parabola]: where their RMS difference is least.
+/// Delay of `estimate` behind `truth` [samples, fractions by parabola]: the shift with the least RMS difference.
 inline double LagSamples(const std::vector<double>& truth, const std::vector<double>& estimate) {
   constexpr int kMaxLag = 40;
   std::vector<double> error;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
-/// A link in memory: what the test puts in is read at the next tick.
+/// A link in memory: bytes that the test adds are read at the next tick.
 class MemoryLink final : public ByteLink {
  public:
   Result Read(std::span<char> buffer) noexcept override {
@@ -61,7 +61,7 @@ class NodeTest : public ::testing::Test {
     node_ = std::make_unique<HandleBridgeNode>(config::CartConfig(), calibrations_, std::move(links), output_.get(),
                                                epoch_ns);
     EXPECT_EQ(Error(), "");  // Nothing has been read yet.
-    TickSilently();          // The first step drops what has piled up.
+    TickSilently();          // The first step discards old bytes.
   }
 
   /// One tick; handle 0 sends its angle, the pedal its bits.
@@ -224,7 +224,7 @@ TEST_F(NodeTest, FloatingWireMovesNothing) {
   for (int i = 0; i < 40; ++i) {
     Tick(45);
   }
-  EXPECT_NEAR(jaw0_deg(), 45, 1.5);  // Mended: it follows again.
+  EXPECT_NEAR(jaw0_deg(), 45, 1.5);  // After the repair it follows again.
 }
 
 TEST_F(NodeTest, StillJawForManySecondsIsHealthy) {
@@ -255,7 +255,7 @@ TEST_F(NodeTest, HangUpHoldsAndTheReturnGoesOn) {
   EXPECT_EQ(state_.handles[0].quality, 0.0f);
   handle_[0]->phase = pedal_->phase = LinkPhase::kOpen;
   handle_[0]->fresh = pedal_->fresh = true;
-  handle_[0]->bytes = "12\r\n";  // The end of a line whose beginning went to nobody.
+  handle_[0]->bytes = "12\r\n";  // The end of a line whose beginning was discarded.
   for (int i = 0; i < 40; ++i) {
     Tick(45, kPedalCut);
   }
@@ -326,7 +326,7 @@ TEST_F(NodeTest, FramesAreTakenAndTheirLossCounted) {
   }
   EXPECT_NEAR(jaw0_deg(), 25, 1.5);
   EXPECT_EQ(state_.pedals, kPedalCoag);
-  EXPECT_EQ(MetricOf("lost_frames"), 39 + 39);  // The last one of each is not missed yet.
+  EXPECT_EQ(MetricOf("lost_frames"), 39 + 39);  // The last loss of each is not detected yet.
   EXPECT_EQ(Error(), "");
 }
 
@@ -347,7 +347,7 @@ TEST_F(NodeTest, AnotherUnitsFramesAreRefusedAndNamed) {
 
 TEST_F(NodeTest, WrongBaudIsToldFromGarbageAndMended) {
   std::mt19937_64 random(4);
-  // Handle 0 speaks at 38400: at any other speed its bytes are noise. The pedal's line is noise at every speed.
+  // Handle 0 sends at 38400: at any other speed its bytes are noise. The pedal's line is noise at every speed.
   for (int i = 0; i < 1200; ++i) {
     if (handle_[0]->baud == 38400) {
       const auto line = firmware_.Line(25);
@@ -370,7 +370,7 @@ TEST_F(NodeTest, WrongBaudIsToldFromGarbageAndMended) {
 TEST_F(NodeTest, EachUnitHasItsOwnCalibration) {
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("handle_node_test." + std::to_string(::getpid()));
-  // The same codes mean half the angle on unit B.
+  // On unit B the same codes stand for half the angle.
   const CalibrationPoints half{{485.376, 520.192}, {0, 30}};
   EXPECT_EQ(CalibrationStore::Save(folder, "B", half), folder / "B.yaml");
   calibrations_ = CalibrationStore::Load(folder);

@@ -119,7 +119,7 @@ TEST(JawLineGate, AnotherConvertersStepIsToldFromGarbage) {
   const JawReading reading = gate.Check("2.4512");
   EXPECT_EQ(reading.verdict, LineVerdict::kGood);
   EXPECT_EQ(reading.code, 502);
-  // The same count of a handle that computes with the rounded 0.00488 V.
+  // The same count sent by a handle that computes with the rounded 0.00488 V.
   EXPECT_EQ(gate.Check("2.4498").verdict, LineVerdict::kOffGrid);
   JawLineSettings rounded;
   rounded.adc_step_V = 0.00488;
@@ -264,7 +264,7 @@ TEST(Frame, EveryCodeAndSequenceRoundTrips) {
 }
 
 TEST(Frame, IsWhatItsDescriptionSays) {
-  // CRC-8/AUTOSAR of "123456789" is 0xDF; here of the frame of the description.
+  // CRC-8/AUTOSAR of "123456789" is 0xDF; here the frame of the description.
   EXPECT_EQ(FrameLine({kLeftHandle, 0x1A, 503}), "$L1A,0503*29");
   EXPECT_TRUE(ParseFrame("$L1A,0503*29"));
   for (const char* bad : {"", "$", "$L1A,0503*2A", "$l1A,0503*29", "$L1a,0503*29", "$L1A,503*91", "$L1A,0503*29 ",
@@ -293,7 +293,7 @@ TEST(Frame, NoDamageOfTwoBitsIsBelievedAndOfThreeHardlyAny) {
       }
     }
   }
-  // 142,880 ways. The CRC itself would find them all; one flip can change three bits of a hexadecimal letter.
+  // 142,880 cases. The CRC itself would detect all of them, but one flip can change three bits of a hexadecimal letter.
   EXPECT_LE(believed, 3);
 }
 
@@ -322,7 +322,7 @@ TEST(JawLineGate, TakesFramesOfItsHandAndPlainLines) {
 
 constexpr LinkCounts kNothing{};
 
-/// Ticks until the search wants another speed, or 0 after 10 s.
+/// Ticks until the search changes the speed, or 0 after 10 s.
 int TicksUntilChange(BaudSearch* search, const LinkCounts& counts) {
   for (int tick = 1; tick <= 4000; ++tick) {
     if (search->Add(counts, 0.0025)) {

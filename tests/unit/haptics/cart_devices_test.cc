@@ -103,7 +103,7 @@ TEST_F(CartDevicesTest, ServoWithATouchNeitherAllocatesNorLocks) {
   }
   EXPECT_EQ(servo_violations, 0);
   EXPECT_EQ(driver_violations, 0);
-  EXPECT_GT(Vec3d(rig.hd->devices[0].force_N.data()).norm(), 0.1);  // Forces did flow.
+  EXPECT_GT(Vec3d(rig.hd->devices[0].force_N.data()).norm(), 0.1);  // Forces did reach the device.
   EXPECT_TRUE(rig.hd->misuse.empty());
 
   rig.hd->devices[0].heat[1] = 0.8;
@@ -136,7 +136,7 @@ TEST_F(CartDevicesTest, NotesTellWhatWasFound) {
   EXPECT_NE(none.notes[0].find("cannot open the Touch 'Third Device'"), std::string::npos);
 }
 
-// The same push moves a lighter hand further: the three of them, and the scene's own, are what they are called.
+// The same push moves a lighter hand farther: checks the three hands and the scene's own.
 TEST_F(CartDevicesTest, HandsDifferByTheirStiffness) {
   const auto yield = [&](config::HandHold hold) {
     cart.devices[0].hand = hold;
@@ -174,7 +174,7 @@ TEST_F(CartDevicesTest, RecordedMotionIsFollowedThroughTheWorkspaceMap) {
 
 TEST_F(CartDevicesTest, TrocarOfASimulatedDeviceIsMeasuredStoredAndLoaded) {
   auto poses = Swing(kPivot, 0.3, 0.001);
-  poses[10].p_D += Vec3d(0.2, 0, 0);  // On the way to the trocar, without the button.
+  poses[10].p_D += Vec3d(0.2, 0, 0);  // On the way to the trocar, with the button released.
   poses[10].buttons = 0;
   UseMotion(poses);
   const TrocarMotion motion = RecordTrocarMotion(cart, 0, 10, "unused", [](double, const std::string&) {});

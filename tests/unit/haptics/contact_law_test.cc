@@ -14,7 +14,7 @@ using testing::TissueParameters;
 
 constexpr double kDt = 1e-3;
 
-/// A contact at rest in touch with the plane z = 0.
+/// A contact at rest that touches the plane z = 0.
 Contact TouchingPlane() {
   Contact contact;
   contact.kind = ContactKind::kSurface;
@@ -72,7 +72,7 @@ TEST(ContactLaw, OutsideTheSurfaceThereIsNoForce) {
 TEST(ContactLaw, GapIsTheDistanceStillToGo) {
   Contact contact = TouchingPlane();
   contact.gap = 0.004f;
-  contact.x_ref = Vec3f(0, 0, 0.02f);  // Whatever p_s says, 4 mm further down it touches.
+  contact.x_ref = Vec3f(0, 0, 0.02f);  // Contact begins 4 mm further down, independent of p_s.
   ContactState state;
   const ContactLaw law = MakeContactLaw(contact, 0.0, &state);
   EXPECT_EQ(StepContact(law, Vec3d(0, 0, 0.0161), kDt, kDt, &state).f_W.norm(), 0.0);
@@ -97,7 +97,8 @@ TEST(ContactLaw, StickingPullsBackToTheAnchor) {
   EXPECT_NEAR(force.f_W.x(), -2e-4 / (1.0 / 400 + 1.0 / 1000), 1e-6);
 }
 
-// A convex sphere of radius 20 mm touched at its top: sideways the depth falls as the sphere does and the normal leans.
+// A convex sphere of radius 20 mm touched at its top: sideways the depth decreases with the sphere and the normal
+// tilts.
 TEST(ContactLaw, CurvatureFollowsASphere) {
   const double R = 0.02;
   Contact contact = TouchingPlane();
@@ -129,10 +130,10 @@ TEST(ContactLaw, ForceAtTheReferenceIsTheReferenceForce) {
     contact.du_c = 0.01f * Vec3f(u(random), u(random), u(random));
     contact.kappa1 = 20 * u(random);
     contact.f_ref = 2 * contact.n + 0.1f * contact.e1;
-    if (i % 2 == 0) contact.kappa1 = 0;  // The normal at x_ref is then the message's own.
+    if (i % 2 == 0) contact.kappa1 = 0;  // The normal at x_ref is then that of the message.
     ContactState state;
     const ContactLaw law = MakeContactLaw(contact, 0.0, &state);
-    // A step much shorter than the body's time constant: the force has had no time to change.
+    // A step much shorter than the body's time constant: the force has not changed yet.
     const Vec3d f = StepContact(law, contact.x_ref.cast<double>(), 0, 1e-9, &state).f_W;
     EXPECT_LT((f - contact.f_ref.cast<double>()).norm(), 1e-3) << i;
   }
@@ -152,9 +153,9 @@ TEST(ContactLaw, GraspHoldsOnAllSidesAndSlipsAtItsForce) {
   EXPECT_NEAR(force.f_W.norm(), 1.5, 1e-9);
   for (int i = 1; i < 100; ++i) {
     force = StepContact(law, 10 * pull, 1.0 + i * kDt, kDt, &state);
-    EXPECT_LE(force.f_W.norm(), 1.5 + 1e-9);  // Held again, the body gives way.
+    EXPECT_LE(force.f_W.norm(), 1.5 + 1e-9);  // While it is held, the body relaxes.
   }
-  // It has slipped: going back by less than was lost does not pull it the other way at once.
+  // The grasp has slipped: a return by less than the slip does not reverse the force at once.
   force = StepContact(law, 9.9 * pull, 1.1, kDt, &state);
   EXPECT_LT(force.f_W.norm(), 1.5);
   EXPECT_LT(force.f_W.dot(pull), 0.0);
@@ -167,7 +168,7 @@ TEST(ContactLaw, MovingSurfaceCarriesItsContact) {
   const ContactLaw law = MakeContactLaw(contact, 0.0, &state);
   ContactForce force;
   for (int i = 1; i <= 100; ++i) force = StepContact(law, Vec3d(1e-5 * i, 0, 2e-5 * i), i * kDt, kDt, &state);
-  EXPECT_NEAR(force.f_W.norm(), 0.0, 1e-9);  // The tool rides along.
+  EXPECT_NEAR(force.f_W.norm(), 0.0, 1e-9);  // The contact moves with the tool.
 }
 
 TEST(ContactLaw, CouplingLimitsTheStiffnessFelt) {
@@ -216,12 +217,12 @@ TEST(ContactLaw, FollowsTheFinelyIntegratedTissue) {
   }
 }
 
-// A closed path through the law, slowly and fast, takes energy and never gives any.
+// A closed path through the law, slow or fast, dissipates energy.
 TEST(ContactLaw, ClosedCyclesDissipate) {
   for (const double frequency : {0.5, 2.0, 8.0, 30.0}) {
     ContactState state;
     const ContactLaw law = MakeContactLaw(TouchingPlane(), 2e-4, &state);
-    double work = 0;  // By the tissue on the tool.
+    double work = 0;  // Work of the tissue on the tool.
     Vec3d x = Vec3d::Zero();
     Vec3d f = Vec3d::Zero();
     const int ticks = static_cast<int>(2000 / frequency);

@@ -1,4 +1,4 @@
-// The node on in-process ports, and the promise of its servo: no allocation, no lock.
+// The node on in-process ports, and the real-time property of its servo: no allocation, no lock.
 #include "haptics_node/node/haptics_node.h"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ class HapticsNodeTest : public ::testing::Test {
   std::unique_ptr<HapticsNode> Make(std::int64_t epoch) {
     return std::make_unique<HapticsNode>(scene, std::array<bool, kMaxTools>{true, true}, bus.ports(), epoch);
   }
-  /// One millisecond of everything; the servo's part alone is watched.
+  /// One millisecond of all parts; only the servo's part is guarded.
   void Step() {
     const Tick tick = TickAt(millisecond++);
     ContactModel model;
@@ -65,7 +65,7 @@ TEST_F(HapticsNodeTest, ServoNeitherAllocatesNorLocks) {
   if (!AllocationGuard::active()) GTEST_SKIP() << "a sanitizer owns malloc in this build";
   for (int i = 0; i < 4000; ++i) Step();
   EXPECT_EQ(violations, 0);
-  EXPECT_GT(tool.tools[0].f_W.z(), 0.1f);  // Models did arrive and forces did flow.
+  EXPECT_GT(tool.tools[0].f_W.z(), 0.1f);  // Models did arrive and cause forces.
 }
 
 TEST_F(HapticsNodeTest, EachTickIsPublishedInOrderAndPassesTheBusGate) {
@@ -102,7 +102,7 @@ TEST_F(HapticsNodeTest, AfterARestartTheHandIsWhereTheScriptIsAndForceRisesSoftl
   for (int i = 0; i < 1500; ++i) Step();
   const ToolState before = tool;
   ASSERT_GT(before.tools[0].f_W.norm(), 0.1f);
-  node = Make(2000);  // As after kill -9: nothing but session time is left.
+  node = Make(2000);  // As after kill -9: only session time is left.
   millisecond += 300;
   Step();
   EXPECT_EQ(tool.stamp.epoch, 2000u);
@@ -155,7 +155,7 @@ TEST_F(HapticsNodeTest, WhatDoesNotPassTheGateIsCounted) {
   model.tool_stamp_ns = TickAt(millisecond).stamp_ns - 1'000'000;
   model.devices[0].count = 1;
   model.devices[0].contacts[0] = tissue.Report();
-  model.devices[0].contacts[0].k1 = 5e4f;  // Finite, so the bus lets it through; too stiff for the servo.
+  model.devices[0].contacts[0].k1 = 5e4f;  // Finite, so the bus accepts it; too stiff for the servo.
   bus.model_out->Write(model);
   Step();
   Step();

@@ -1,4 +1,4 @@
-// What becomes of a message that is already old when it comes: replay over the ring and cross-fade.
+// Treatment of messages that are old on arrival: replay over the ring and cross-fade.
 #include "haptics_node/servo/local_model.h"
 
 #include <gtest/gtest.h>
@@ -42,12 +42,12 @@ class LocalModelTest : public ::testing::Test {
   }
   ModelForce Step(LocalModel* model, std::uint64_t now) { return model->Step(Tip(now), TickAt(now).stamp_ns, kDt); }
 
-  static constexpr std::uint64_t kMessage = 40;  ///< The tick that the message is about.
+  static constexpr std::uint64_t kMessage = 40;  ///< The tick of the message's tool sample.
   TestTissue tissue{{}};
   PoseRing ring;
 };
 
-// However late a message comes, after its replay and the cross-fade the force is what it would be had it come at once.
+// For any delay of a message the force after replay and cross-fade equals that of an immediate message.
 TEST_F(LocalModelTest, ALateMessageEndsWhereAPunctualOneDoes) {
   for (const std::uint64_t late : {1u, 5u, 20u, 60u, 120u}) {
     LocalModel punctual, tardy;
@@ -70,10 +70,10 @@ TEST_F(LocalModelTest, ANewModelTakesOverWithoutAStep) {
   Vec3d last = Vec3d::Zero();
   double largest = 0;
   for (std::uint64_t now = kMessage; now < kMessage + 60; ++now) {
-    ring.Push(TickAt(now).stamp_ns, Tip(kMessage));  // It holds still: what changes is the model's doing.
+    ring.Push(TickAt(now).stamp_ns, Tip(kMessage));  // The tip holds still, so that only the model changes the force.
     if (now == kMessage + 1 || now == kMessage + 30) {
       Contact contact = tissue.Report();
-      if (now == kMessage + 30) contact.f_ref *= 1.5f;  // The new one disagrees by half.
+      if (now == kMessage + 30) contact.f_ref *= 1.5f;  // The new reference force is larger by half.
       ASSERT_TRUE(model.ready(TickAt(now).stamp_ns));
       Take(&model, One(contact), now - 1, now);
     }
@@ -91,7 +91,7 @@ TEST_F(LocalModelTest, ANewModelTakesOverWithoutAStep) {
   EXPECT_NEAR(last.z(), 1.5 * tissue.force().z(), 0.1 * tissue.force().z());
 }
 
-// Physics believes the tissue 30 % stiffer than it is; its own messages tell.
+// Physics assumes tissue 30 % too stiff; its own messages show it.
 TEST_F(LocalModelTest, LearnsTheStiffnessThatMessagesImply) {
   const auto worst_after = [&](std::uint64_t begin) {
     LocalModel model;

@@ -15,7 +15,7 @@ struct Loop {
   Loop(const SceneView& scene, HapticDevice* device, const TissueParameters& parameters)
       : servo(ServoSettingsOf(scene), {device, nullptr}), tissue(parameters) {}
 
-  /// Gives each tick, when all of it is done, to `each`.
+  /// Calls `each` at the end of each tick.
   template <class Each>
   void Run(int ticks, const Each& each) {
     for (int i = 0; i < ticks; ++i) {
@@ -38,7 +38,7 @@ struct Loop {
 inline const std::array<ScriptKey, 2> kIntoTheWall{
     {{0.0f, 0, Vec3f(0, 0, 0.01f), 0, 0, 0}, {0.8f, 0, Vec3f(0, 0, -0.004f), 0, 0, 0}}};
 
-/// Runs three seconds of that; returns the peak-to-peak amplitude of `height` in the last half.
+/// Runs this motion for three seconds; returns the peak-to-peak amplitude of `height` in the last half.
 template <class Height>
 double UnrestAtTheWall(Loop* loop, const Height& height) {
   double lowest = 1, highest = -1;

@@ -1,4 +1,4 @@
-// A servo on a bench: one tool straight down through its trocar, time in exact milliseconds.
+// A servo without a device: one tool straight down through its trocar, time in exact milliseconds.
 #pragma once
 
 #include <functional>
@@ -50,7 +50,7 @@ inline Tick TickAt(std::uint64_t millisecond) {
   return tick;
 }
 
-/// Force of the record on tool 0, at the tip [N].
+/// Published force on tool 0, at the tip [N].
 inline Vec3d SentForce(const Servo& servo) { return servo.record().tool.tools[0].f_W.cast<double>(); }
 
 }  // namespace fulcrum::haptics::testing

@@ -1,4 +1,4 @@
-// Gate, age machine, output chain and passivity controller, each on its own.
+// Gate, age machine, output chain and passivity controller, each separately.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -87,16 +87,16 @@ TEST(ModelGate, SequenceAndTimeMustGrowWithinAnEpochAndOldEpochsStayOut) {
     return gate.Admit(model, 5000 * kMs);
   };
   EXPECT_TRUE(admit(100, 5, 1000, 900));
-  EXPECT_FALSE(admit(100, 5, 1010, 910));   // The same again.
-  EXPECT_FALSE(admit(100, 6, 1000, 910));   // Time stands still.
-  EXPECT_FALSE(admit(100, 6, 1010, 890));   // An older tool.
-  EXPECT_TRUE(admit(100, 9, 1010, 900));    // Lost ones are no reason to refuse; nor is the same tool sample.
+  EXPECT_FALSE(admit(100, 5, 1010, 910));   // A repeated message.
+  EXPECT_FALSE(admit(100, 6, 1000, 910));   // No progress of time.
+  EXPECT_FALSE(admit(100, 6, 1010, 890));   // An older tool sample.
+  EXPECT_TRUE(admit(100, 9, 1010, 900));    // Lost messages are no reason to refuse; nor is the same tool sample.
   EXPECT_TRUE(admit(200, 1, 1020, 910));    // Physics was restarted.
-  EXPECT_FALSE(admit(100, 10, 1030, 920));  // A last word from the old one.
+  EXPECT_FALSE(admit(100, 10, 1030, 920));  // A late message of the old process.
   EXPECT_TRUE(admit(200, 2, 1030, 920));
 }
 
-/// Feeds a model every 10 ms, 15 ms old, while `fed`; returns the state after each tick.
+/// Sends a model every 10 ms, 15 ms old, while `fed`; returns the state after each tick.
 class AgeRun {
  public:
   void Run(int ticks, bool fed) {
@@ -130,7 +130,7 @@ TEST(AgeMachine, StartsOffAndRisesAfterThreeModelsIn250Ms) {
   run.Run(12, true);
   EXPECT_EQ(run.machine.state(), ServoState::kNormal);
   EXPECT_EQ(run.machine.gain(), 1.0);
-  EXPECT_LT(run.largest_gain_step, 0.007);  // 1.5 / 250: no corner anywhere.
+  EXPECT_LT(run.largest_gain_step, 0.007);  // 1.5 / 250: the gain has no corner.
 }
 
 TEST(AgeMachine, HoldsAfter40MsFadesAfter100MsIn300Ms) {
@@ -220,7 +220,7 @@ TEST(OutputChain, NeverExceedsLimitOrSlewWhateverComes) {
   EXPECT_GT(chain.not_finite, 0u);
 }
 
-// An active source (a force that helps the motion) may give no more than the tank.
+// An active source (a force that assists the motion) can give no more energy than the tank.
 TEST(Passivity, AnActiveSourceIsDampedOnceTheTankIsEmpty) {
   PassivityController controller;
   Vec3d sent = Vec3d::Zero();
@@ -237,7 +237,7 @@ TEST(Passivity, AnActiveSourceIsDampedOnceTheTankIsEmpty) {
   EXPECT_LE(given, kTank_J + 1e-3);
 }
 
-// Tissue that breathes against a hand that gives way does work on it, which physics declares.
+// Breathing tissue does work on a hand that gives way; physics declares this power.
 TEST(Passivity, PowerThatComesFromOutsideIsNotTheServosDebt) {
   PassivityController declared, undeclared;
   const Vec3d moved(1e-5, 0, 0), push(0.8, 0, 0);  // 8 mW.
@@ -263,7 +263,7 @@ TEST(Passivity, ASpringIsLeftAlone) {
   }
 }
 
-/// Forces that rise and fall; the model's share of each change is 1 / too_stiff of what it predicts.
+/// A force that rises and falls; the model predicts too_stiff times each change.
 void Teach(double too_stiff, double noise, int messages, StiffnessCorrection* correction) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
@@ -305,7 +305,7 @@ TEST(StiffnessCorrection, ATouchThatWasPredictedTooEarlyTeachesNothing) {
 
 TEST(StiffnessCorrection, AJumpThatNoStiffnessExplainsIsNotLearnt) {
   StiffnessCorrection correction;
-  correction.Learn(2.0, 2.1, 0.3);  // It slipped, or was cut.
+  correction.Learn(2.0, 2.1, 0.3);  // A slip or a cut.
   EXPECT_EQ(correction.scale(), 1.0);
 }
 

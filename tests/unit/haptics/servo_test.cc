@@ -49,7 +49,7 @@ TEST(Servo, WithoutModelsThereIsNoForceAndTheToolIsPublished) {
   EXPECT_NEAR(tool.p_WT.z(), 0.05 - 0.01 * 0.199, 1e-6);
   EXPECT_NEAR(tool.v_WT.z(), -0.01, 1e-4);
   EXPECT_LT((tool.q_WT * Vec3f::UnitZ() + Vec3f::UnitZ()).norm(), 1e-6);  // z of the tool points down its shaft.
-  EXPECT_EQ(tool.model_age_s, 0.0f);                                      // The bus refuses negative ages.
+  EXPECT_EQ(tool.model_age_s, 0.0f);                                      // The gate of the bus refuses negative ages.
   EXPECT_LT(loop.servo.figures().model_age_s, 0.0);
   EXPECT_EQ(loop.servo.record().tool.tools[1].kind, ToolKind::kNone);
 }
@@ -67,11 +67,12 @@ TEST(Servo, PressingAPlaneGivesItsSeriesStiffnessStraightOut) {
 }
 
 TEST(Servo, PressTheShaftSidewaysAndTheHandFeelsTheFulcrum) {
-  // A wall x > 0.05 … seen by a shaft that hangs straight down: the tip presses towards -x, so the wall pushes +x and
-  // the hand, on the other side of the pivot, is pushed towards -x by the inside part over the outside part.
+  // A wall x > 0.05 … touched by a shaft that hangs straight down: the tip presses towards -x, so the wall pushes
+  // towards +x. The hand, on the other side of the pivot, is pushed towards -x, scaled by the inside part over the
+  // outside part.
   GuidedDevice device(BenchTrocar(), [](double) { return Vec3d(0, 0, -0.05); });
   Servo servo(ServoSettingsOf(BenchScene(0.3)),
-              {&device, nullptr});  // Softly enough for no coupling: tip and proxy are one.
+              {&device, nullptr});  // Below the limit of the coupling: tip and proxy are equal.
   for (std::uint64_t i = 0; i < 1000; ++i) {
     const Tick tick = TickAt(i);
     if (i % 10 == 0) {
@@ -94,7 +95,7 @@ TEST(Servo, PressTheShaftSidewaysAndTheHandFeelsTheFulcrum) {
   EXPECT_NEAR(device.force.x(), -0.3 * 0.25 / 0.15, 1e-3);
 }
 
-// The hand's spring against the tissue: where it comes to rest is known.
+// The hand's spring against the tissue, with a known equilibrium.
 TEST(Servo, HandSettlesInBalanceWithTheTissue) {
   const std::array<ScriptKey, 2> script{
       {{0.0f, 0, Vec3f(0, 0, 0.01f), 0, 0, 0}, {1.0f, 0, Vec3f(0, 0, -0.005f), 0, 0, 0}}};
@@ -113,7 +114,7 @@ TEST(Servo, HandSettlesInBalanceWithTheTissue) {
   EXPECT_LT(loop.servo.record().tool.tools[0].v_WT.norm(), 1e-4);
 }
 
-// A wall far stiffer than may be rendered, hit by a light grip: it rings down instead of up.
+// A light grip hits a wall far stiffer than the servo may render: the oscillation decays.
 TEST(Servo, AStiffWallStaysStable) {
   SceneView scene = BenchScene(1.0);
   scene.script = kIntoTheWall;
@@ -134,7 +135,7 @@ TEST(Servo, ProxyStandsOutOfAWallStifferThanTheCap) {
   EXPECT_LT(SentForce(loop.servo).z(), 0.002 * kMaxHandStiffness_N_m);
 }
 
-/// A device that is where it is put.
+/// A device at a given position.
 class PlacedDevice final : public HapticDevice {
  public:
   [[nodiscard]] Vec3d ReadPosition(const Tick& /*tick*/) noexcept override { return p_WA; }
@@ -142,7 +143,7 @@ class PlacedDevice final : public HapticDevice {
   Vec3d p_WA = Vec3d::Zero(), force = Vec3d::Zero();
 };
 
-// The stiffest wall there is, under levers of 0.5 to 3 and from all sides: the hand feels at most the cap.
+// The stiffest possible wall, with levers of 0.5 to 3 and from all sides: the stiffness at the hand is at most the cap.
 TEST(Servo, CouplingIsCappedWhereTheHandFeelsIt) {
   const Vec3f pivots[] = {{0, 0, 0.2f}, {0, 0, 0.3f}, {0.13f, 0, 0.02f}, {0.27f, 0, 0.03f}, {0.1f, 0.1f, 0.15f}};
   for (const Vec3f& pivot : pivots) {
@@ -234,7 +235,7 @@ TEST(Servo, RestartOfPhysicsIsTakenUp) {
   EXPECT_EQ(loop.servo.figures().models_dropped, 0u);
 }
 
-// A tenth of all fields at random: whatever of it passes the gate, the hand is never hurt.
+// A tenth of all fields are random: for messages that pass the gate the force keeps its limits.
 TEST(Servo, AbsurdModelsNeverBreakLimitOrSlew) {
   std::mt19937_64 random(3);
   std::normal_distribution<float> normal;
@@ -301,7 +302,7 @@ TEST(Servo, AbsurdModelsNeverBreakLimitOrSlew) {
     most = std::max(most, last.norm());
   }
   EXPECT_GT(servo.figures().models_dropped, 1000u);
-  EXPECT_LT(servo.figures().models_dropped, 8500u);  // Some did pass: the test tests something.
+  EXPECT_LT(servo.figures().models_dropped, 8500u);  // Some models did pass the gate.
   EXPECT_GT(most, 1.0);
 }
 
@@ -321,7 +322,7 @@ TEST(Servo, ADeviceThatReadsNonsenseIsRiddenOver) {
   EXPECT_TRUE(loop.servo.record().tool.tools[0].p_WT.allFinite());
 }
 
-// The force is continuous at each message: what the arrival of a model adds stays below 0.03 N per tick.
+// The force is continuous at each message: the arrival of a model adds less than 0.03 N per tick.
 TEST(Servo, MessagesDoNotKick) {
   GuidedDevice device(BenchTrocar(), [](double t) { return Vec3d(0, 0, -0.003 + 0.002 * std::cos(2 * M_PI * 2 * t)); });
   Loop loop(BenchScene(1), &device, {});
@@ -330,7 +331,7 @@ TEST(Servo, MessagesDoNotKick) {
   Vec3d before = last;
   double worst = 0;
   loop.Run(2000, [&](const Tick&) {
-    // Second difference: what is left when the motion's own rate is taken out.
+    // The second difference removes the rate of the motion itself.
     worst = std::max(worst, (device.force - 2 * last + before).norm());
     before = last;
     last = device.force;

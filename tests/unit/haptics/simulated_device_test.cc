@@ -66,7 +66,7 @@ TEST(SimulatedDevice, AConstantForceMovesItByForceOverStiffness) {
   EXPECT_LT((after - before - Vec3d(1, -2, 0.5) / hand.hand_stiffness_N_m).norm(), 1e-7);
 }
 
-// The same motion at ticks that were skipped: the hand goes on in time, not in ticks.
+// The same motion with skipped ticks: the hand moves with time, not with ticks.
 TEST(SimulatedDevice, SkippedTicksDoNotSlowTheHand) {
   SimulatedDevice steady({}, BenchTrocar(), kScript, 0);
   SimulatedDevice halting({}, BenchTrocar(), kScript, 0);

@@ -1,4 +1,4 @@
-// A tool that a hand swings about a trocar: wide, in both directions, in and out.
+// A tool that is swung about a trocar: wide, in both directions, in and out.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@
 namespace fulcrum::haptics::testing {
 
 /// @param width_rad largest swing to each side.
-/// @param noise_m of the place, uniform on each axis, for the play of the trocar.
+/// @param noise_m play of the trocar: noise of the position, uniform on each axis.
 inline std::vector<DevicePose> Swing(const Vec3d& p_DP, double width_rad, double noise_m, int count = 1000) {
   std::vector<DevicePose> poses;
   std::uint64_t state = 1;

@@ -19,12 +19,12 @@ struct TissueParameters {
   bool grasp = false;
 };
 
-/// Skin (k1, k3) on a body (Kb, Bb) with Coulomb friction, or all of it bilateral about the origin for a grasp.
+/// Skin (k1, k3) on a body (Kb, Bb) with Coulomb friction; for a grasp bilateral about the origin.
 class TestTissue {
  public:
   explicit TestTissue(const TissueParameters& parameters) : p_(parameters) {}
 
-  /// Moves the tip from where it was to `x` during `dt` and returns the force on the tool.
+  /// Moves the tip from its last position to `x` during `dt` and returns the force on the tool.
   Vec3d Step(const Vec3d& x, double dt) {
     constexpr int kSubsteps = 50;
     for (int i = 1; i <= kSubsteps; ++i) {
@@ -44,7 +44,7 @@ class TestTissue {
   [[nodiscard]] const Vec3d& force() const { return force_; }
   [[nodiscard]] const TissueParameters& parameters() const { return p_; }
 
-  /// The contact that an ideal physics would report now.
+  /// The contact that ideal physics would report now.
   [[nodiscard]] Contact Report() const {
     Contact contact;
     contact.kind = p_.grasp ? ContactKind::kGrasp : ContactKind::kSurface;
@@ -92,7 +92,7 @@ class TestTissue {
 /// Reports every 10 ms, 10 ms after the tool sample that it used: models are 10 to 20 ms old in use.
 class LatePhysics {
  public:
-  /// Once per millisecond with the tissue as it is now. True when `model` has been filled with one that arrives now.
+  /// Call once per millisecond with the present tissue. True if `model` has been set to a report that arrives now.
   [[nodiscard]] bool Step(const TestTissue& tissue, std::int64_t now_ns, ContactModel* model) {
     if (!stalled && now_ns >= next_ns_) {
       next_ns_ = now_ns + period_ns;

@@ -1,4 +1,4 @@
-// Servo, Touch and a hand in a closed loop against a stiff wall, with the delays that the driver's own thread brings.
+// Servo, Touch and a hand in a closed loop against a stiff wall, with the delays of the driver's own thread.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,12 +27,12 @@ using testing::TouchRig;
 struct Case {
   const char* name;
   HandModel hand;
-  int delay_ms;  ///< In the whole loop, beyond that of a device which the servo reads and drives itself.
+  int delay_ms;  ///< Delay of the whole loop beyond that of a device which the servo reads and drives itself.
 };
 
 class StiffWall : public ::testing::TestWithParam<Case> {};
 
-// The wall of Servo.AStiffWallStaysStable, felt through the driver.
+// The wall of Servo.AStiffWallStaysStable, rendered through the driver.
 TEST_P(StiffWall, RingsDownThroughTheDriver) {
   TouchRig rig;
   WorkspaceMap map;
@@ -61,7 +61,7 @@ TEST_P(StiffWall, RingsDownThroughTheDriver) {
     std::copy(p_mm.data(), p_mm.data() + 3, rig.hd->devices[0].position_mm.begin());
     ContactModel model;
     if (physics.Step(tissue, tick.stamp_ns - 1'000'000, &model)) servo.OfferModel(model, tick.stamp_ns);
-    // Position in, force out at the same tick: without further delay, as with a simulated device.
+    // Position in and force out at the same tick: no further delay, as with a simulated device.
     rig.Tick();
     servo.Step(tick);
     rig.Tick();

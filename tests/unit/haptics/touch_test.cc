@@ -1,4 +1,4 @@
-// The Touch through a stand-in of its driver, which is a real shared library that is really loaded.
+// The Touch through a stand-in of its driver, a shared library that is loaded like the driver.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -26,8 +26,8 @@ constexpr std::int64_t kSecond_ns = 1'000'000'000;
 const TouchDriver::WantedByTool kBoth{TouchDriver::Wanted{"Left Device", ""}, TouchDriver::Wanted{"Right Device", ""}};
 const TouchDriver::WantedByTool kLeft{TouchDriver::Wanted{"Left Device", ""}, std::nullopt};
 
-/// x to the right, y up, z towards the operator, turned into a world with z up; trocar 100 mm below and before the
-/// hand.
+/// x to the right, y up, z towards the operator, rotated into a world with z up; trocar 100 mm below and in front of
+/// the hand.
 WorkspaceMap Map() {
   WorkspaceMap map;
   map.R_WD = RotationFromAngles(Vec3d(std::numbers::pi / 2, 0, 0));
@@ -44,7 +44,7 @@ class Touch : public ::testing::Test {
       if (wanted[tool]) devices[tool] = std::make_unique<TouchDevice>(driver, tool, Map(), force_scale, kParked);
     }
   }
-  /// Milliseconds of driver and servo; the servo sends `force_W` to each tool.
+  /// Runs driver and servo for so many milliseconds; the servo sends `force_W` to each tool.
   void Run(int count, const Vec3d& force_W = Vec3d::Zero()) {
     for (int i = 0; i < count; ++i) {
       rig.Tick();
@@ -61,8 +61,7 @@ class Touch : public ::testing::Test {
   }
   [[nodiscard]] Vec3d Force(int device) const { return Vec3d(rig.hd->devices[device].force_N.data()); }
   [[nodiscard]] std::string Misuse() const { return rig.hd->misuse.empty() ? "" : rig.hd->misuse.front(); }
-  /// Maintenance two seconds after the last one and again long after that, when the wait beside a working device is
-  /// over.
+  /// Maintenance two seconds after the last one and again much later, after the retry interval beside a working device.
   void MaintainLater() {
     now_ns += 20 * kSecond_ns;
     driver->Maintain(now_ns);
@@ -141,7 +140,7 @@ TEST_F(Touch, StylusAxisAndButtonsAreRead) {
 TEST_F(Touch, ToolsArePairedBySerialNumberWhateverTheNamesSay) {
   Move(0, {10, 0, 0});
   Move(1, {20, 0, 0});
-  // The setup program has the names the other way round than the cart.
+  // The names in the setup program are swapped against those in the cart.
   Open({TouchDriver::Wanted{"Left Device", "B200"}, TouchDriver::Wanted{"Right Device", "A100"}});
   Run(1000);
   EXPECT_EQ(driver->serial(0), "B200");
@@ -186,7 +185,7 @@ TEST_F(Touch, ToolGlidesToTheHandAndForceRisesSoftlyAfterwards) {
   EXPECT_LT((last - kParked).norm(), 1e-12);
   for (int i = 0; i < 1000; ++i) {
     Run(1, Vec3d(1, 0, 0));
-    EXPECT_LT((position[0] - last).norm(), 0.001) << i;  // Under 1 m/s over the 130 mm to the hand.
+    EXPECT_LT((position[0] - last).norm(), 0.001) << i;  // Below 1 m/s over the 130 mm to the hand.
     EXPECT_LT(std::abs(Force(0).norm() - last_force), 0.005) << i;
     if (i < 400) {
       EXPECT_EQ(Force(0).norm(), 0) << i;
@@ -235,7 +234,7 @@ TEST_F(Touch, OneUnpluggedDeviceLeavesTheOtherAtWork) {
   EXPECT_EQ(Force(1).norm(), 0);
   EXPECT_EQ(driver->Trouble(0), "");
   EXPECT_NE(driver->Trouble(1), "");
-  // Tried again at once, then each ten seconds only: that stops the other hand for a moment.
+  // Retried at once, then only every ten seconds, because each retry interrupts the other device.
   const int inits = rig.hd->inits;
   for (int i = 0; i < 100; ++i) driver->Maintain(now_ns += kSecond_ns / 10);
   EXPECT_EQ(rig.hd->inits, inits + 1);
@@ -274,7 +273,7 @@ TEST_F(Touch, HeatFadesTheForceBeforeTheDriverCutsIt) {
   Open(kLeft);
   Run(1500, Vec3d(1, 0, 0));
   double last = 1;
-  // Motors that warm up from 0.6 to 0.94 within 10 s.
+  // Motors warm up from 0.6 to 0.94 within 10 s.
   for (int i = 0; i < 10'000; ++i) {
     rig.hd->devices[0].heat[2] = 0.6 + 0.34e-4 * i;
     Run(1, Vec3d(1, 0, 0));
@@ -282,7 +281,7 @@ TEST_F(Touch, HeatFadesTheForceBeforeTheDriverCutsIt) {
     EXPECT_LT(last - Force(0).norm(), 0.002);
     last = Force(0).norm();
   }
-  // The heat is read each 100 ms.
+  // The heat is read every 100 ms.
   EXPECT_NEAR(last, (kMotorHot - 0.94) / (kMotorHot - kMotorWarm), 0.34e-4 * 100 / (kMotorHot - kMotorWarm) + 1e-9);
   const DeviceHealth hot = devices[0]->Describe();
   EXPECT_NEAR(hot.motor_heat, 0.94, 0.01);
@@ -332,7 +331,7 @@ TEST_F(Touch, UncalibratedDeviceIsSilentUntilTheStylusWasInTheInkwell) {
   EXPECT_EQ(position[0], kParked);
   EXPECT_EQ(Force(0).norm(), 0);
   EXPECT_NE(driver->Trouble(0).find("not calibrated: put the stylus into the inkwell"), std::string::npos);
-  rig.hd->devices[0].calibration = 0x5001;  // It is in the inkwell.
+  rig.hd->devices[0].calibration = 0x5001;  // The stylus is in the inkwell.
   Run(1500, Vec3d(1, 0, 0));
   EXPECT_EQ(rig.hd->devices[0].calibration_updates, 1);
   EXPECT_EQ(driver->Trouble(0), "");
@@ -352,19 +351,19 @@ TEST_F(Touch, PositionsThatAreNoPlaceAreNeverUsed) {
   }
   EXPECT_NE(driver->Trouble(0).find("no valid position"), std::string::npos);
   Run(400, Vec3d(1, 0, 0));
-  EXPECT_EQ(Force(0).norm(), 0);  // One that does not end is as good as an unplugged device.
+  EXPECT_EQ(Force(0).norm(), 0);  // An error that persists is treated like an unplugged device.
   Move(0, Vec3d::Zero());
   Run(1000, Vec3d(1, 0, 0));
   EXPECT_NEAR(Force(0).norm(), 1, 1e-9);
 }
 
-// The library's own thread against the servo's: for the thread sanitizer, and for what only two threads show.
+// The library's thread against the servo's: for the thread sanitizer, and for faults that require two threads.
 TEST_F(Touch, WorksWithASchedulerOnAThreadOfItsOwn) {
   rig.hd->threaded = true;
   Move(0, {10, 0, 0});
   Open(kLeft);
   driver->Start();
-  // However late either thread is, the tool ends up at the hand.
+  // For any delay of either thread the tool reaches the hand.
   for (std::uint64_t i = 0; std::abs(position[0].x() - 0.010) > 1e-12; ++i) {
     position[0] = devices[0]->ReadPosition(TickAt(5 * i));
     devices[0]->WriteForce(Vec3d(1, 0, 0));

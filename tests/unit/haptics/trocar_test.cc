@@ -16,7 +16,7 @@ Vec3d Random(std::mt19937* random, double scale) {
   return {x, y, uniform(*random)};
 }
 
-/// Attach points off the clamps.
+/// Attach points outside the clamped range.
 Vec3d RandomAttachPoint(std::mt19937* random) {
   for (;;) {
     const Vec3d p = kTrocar.p_WP + Random(random, 0.2);

@@ -1,4 +1,4 @@
-// What the authority of a key folder does after the folder was made.
+// Operations of a key folder's authority after the folder was made.
 #include "services/transport/keys/issuing.h"
 
 #include <gtest/gtest.h>
@@ -218,7 +218,7 @@ TEST_F(Issuing, SessionKeysAreCompleteReplaceOldOnesAndGoWithoutTrace) {
   }
   IssueGuest(folder, {.name = "probe", .reads = bus::SetOf(kHealth), .validity = For(365)});
   EXPECT_EQ(CheckNow(folder, "probe"), "");
-  MakeSessionKeys(folder, For(2));  // A session that was killed has removed nothing.
+  MakeSessionKeys(folder, For(2));  // A killed session has left its keys.
   EXPECT_NE(Content(folder / "authority.pem"), first);
   EXPECT_FALSE(fs::exists(folder / "probe.pem"));
   RemoveSessionKeys(folder);

@@ -68,7 +68,7 @@ TEST(ClockFilter, QuickTripsCountAndHeldUpOnesDoNot) {
 
 TEST(ClockFilter, FollowsDrift) {
   World world;
-  world.drift = 60e-6;  // 1.8 ms in the memory of the filter.
+  world.drift = 60e-6;  // 1.8 ms within the memory of the filter.
   world.jitter_ns = 20e3;
   ClockFilter filter;
   EXPECT_LT(Follow(&world, &filter, 0.1, 60, 15), 40e3);

@@ -1,5 +1,5 @@
-// Whatever bytes come, nothing crashes, nothing is read or written where it must not be (the sanitizer builds run this
-// too), and what is passed on is finite and in range.
+// For any bytes: no crash, no access outside of buffers (the sanitizer builds run this, too), and values that are
+// passed on are finite and in range.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -16,7 +16,7 @@ using test::Chunk;
 using test::Encode;
 using test::Sheet;
 
-/// Cut, with flipped bits, with a number of ones or zeros, longer.
+/// Truncates the chunk, flips bits, sets bytes to ones or zeros, or extends it.
 Chunk Hurt(Chunk chunk, std::mt19937* random) {
   const auto upto = [&](std::size_t n) { return n == 0 ? 0 : (*random)() % n; };
   switch (upto(5)) {

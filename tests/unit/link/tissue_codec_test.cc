@@ -37,7 +37,7 @@ TEST(TissueCodec, PositionsArriveWithinTheStatedError) {
 }
 
 TEST(TissueCodec, TheStatedErrorIsReachedAndNotMuchMore) {
-  // A vertex that creeps stays where it was told to be until it is kTissueSlack steps away.
+  // A vertex that creeps keeps its sent position until it is kTissueSlack steps away.
   TissueSender sender;
   TissueReceiver receiver;
   double worst = 0;
@@ -93,7 +93,7 @@ TEST(TissueCodec, FlushTellsAgainWhenNoFrameComes) {
   TissueSender sender;
   TissueReceiver receiver;
   const TissueFrame frame = Sheet(20, 20, 0.001, 1);
-  (void)Encode(&sender, frame);  // All lost.
+  (void)Encode(&sender, frame);  // All chunks are lost.
   sender.RepeatAll();
   Result last = Result::kBad;
   sender.Flush([&](std::span<const std::uint8_t> chunk) { last = receiver.Take(chunk); });
@@ -110,7 +110,7 @@ TEST(TissueCodec, HealsFromLossAndReorderWhenAskedForWhatIsMissing) {
   std::mt19937 random(7);
   std::bernoulli_distribution lost(0.05);
   for (std::uint64_t i = 1; i <= 120; ++i) {
-    // It moves for a while and then stays.
+    // The tissue moves for a while and then stays.
     const double depth = 1e-4 * static_cast<double>(std::min<std::uint64_t>(i, 80));
     std::vector<Chunk> chunks = Encode(&sender, Sheet(40, 50, depth, i));
     if (chunks.size() > 1) std::swap(chunks[0], chunks[1]);

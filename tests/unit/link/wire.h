@@ -23,7 +23,7 @@ inline TissueFrame Sheet(int rows, int cols, double depth_m, std::uint64_t seque
     for (int c = 0; c < cols; ++c) {
       const double x = 0.0025 * (c - cols / 2), y = 0.0025 * (r - rows / 2);
       const double d2 = (x * x + y * y) / (0.02 * 0.02);
-      // Far from the middle it does not move at all.
+      // Far from the middle there is no motion.
       const double z = d2 < 4 ? -depth_m * (1 - d2 / 4) * (1 - d2 / 4) : 0.0;
       for (const double value : {x, y, 0.1 + z}) frame.xyz.push_back(static_cast<float>(value));
     }
@@ -45,7 +45,7 @@ inline std::size_t Bytes(const std::vector<Chunk>& chunks) {
   return bytes;
 }
 
-/// Largest distance of a vertex from where it is [m].
+/// Largest distance of a vertex from its true position [m].
 inline double ErrorOf(const TissueFrame& got, const TissueFrame& wanted) {
   double worst = got.xyz.size() == wanted.xyz.size() ? 0 : 1;
   for (std::size_t i = 0; i + 2 < wanted.xyz.size() && worst < 1; i += 3) {

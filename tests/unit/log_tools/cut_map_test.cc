@@ -1,4 +1,4 @@
-// Holes whose course, length and width are known.
+// Holes with known course, length and width.
 #include "services/records/log_tools/cut_map.h"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@
 namespace fulcrum::log_tools {
 namespace {
 
-/// Texels are 0.1 mm: what is pruned and averaged is made for that. Thinning knows a line to a fraction of a texel.
+/// Pruning and averaging are designed for texels of 0.1 mm. Thinning resolves a line to a fraction of a texel.
 constexpr double kLengthTolerance = 0.03;
 constexpr double kWidthTolerance = 1.0;  // [texels]
 
@@ -141,7 +141,7 @@ TEST(CentreLine, ZigzagKeepsItsLength) {
   Mask mask(560, 150);
   Stroke(&mask, line, 4);
   const double length = LengthOf(line) + 8;
-  // The average rounds corners: 0.2 mm less at each.
+  // The average rounds corners, which costs 0.2 mm at each.
   EXPECT_NEAR(FindCentreLine(mask).length(), length, 2 * kLengthTolerance * length);
 }
 
@@ -165,7 +165,7 @@ RecordedCut SheetOf(const Mask& removed) {
   return cut;
 }
 
-/// A metal that goes from `from` to `to` in 2 s [mm].
+/// Metal that moves from `from` to `to` in 2 s [mm].
 void AddWay(RecordedCut* cut, const Vec2d& from, const Vec2d& to) {
   for (int i = 0; i <= 200; ++i) {
     MetalFrame frame;
@@ -199,7 +199,8 @@ TEST(CutMap, RingAroundALivingIslandIsTold) {
   EXPECT_NEAR(map.figures.islands_mm2, 1.01, 1e-9);
   EXPECT_EQ(map.figures.pieces, 1);
   EXPECT_EQ(map.figures.holes, 1);
-  // Twice around the large one, past the small one: 5.8 + 5.8 mm of bars and the ring's second half.
+  // The line passes the large island on both sides and the small one on one: 5.8 + 5.8 mm of bars and the ring's second
+  // half.
   EXPECT_GT(map.figures.length_mm, 11.6);
   EXPECT_LT(map.figures.length_mm, 15);
 }
@@ -265,7 +266,7 @@ TEST(CutMap, TissueThatSlipsOffTheMetalIsNotAtCuttingPower) {
   AddWay(&cut, {10, 5}, {10, 25});
   cut.vaporising_J_m = 500;
   for (MetalFrame& frame : cut.metal) frame.power_W = 35;
-  // From 15 to 17 mm in one period: 200 mm/s, at which 35 W vaporise nothing of this width.
+  // From 15 to 17 mm in one period: 200 mm/s, at which 35 W vaporise no slit of this width.
   std::erase_if(cut.metal,
                 [](const MetalFrame& frame) { return frame.centre.y() > 15.05e-3f && frame.centre.y() < 16.95e-3f; });
   for (std::size_t i = 0; i < cut.metal.size(); ++i) cut.metal[i].time_s = 1 + 0.01 * static_cast<double>(i);
@@ -278,7 +279,7 @@ TEST(CutMap, TissueThatSlipsOffTheMetalIsNotAtCuttingPower) {
 }
 
 TEST(CutMap, LengthIsHeldAgainstTheLongestLine) {
-  // Two slits side by side; after two seconds the strip between them goes.
+  // Two slits side by side; after two seconds the strip between them is removed.
   Mask slits(200, 300), all(200, 300);
   for (const double x : {90.0, 110.0}) Stroke(&slits, {{x, 50}, {x, 250}}, 5);
   Stroke(&all, {{100, 50}, {100, 250}}, 15);

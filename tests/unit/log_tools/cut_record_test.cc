@@ -1,4 +1,4 @@
-// A made-up session whose metal and hole are known: on a flat sheet, then on one that was lifted and cut.
+// An artificial session with known metal and hole: on a flat sheet, then on one that was lifted and cut.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -62,7 +62,7 @@ class CutRecording : public testing::Test {
   CutRecording() { fs::create_directory(folder_); }
   ~CutRecording() override { fs::remove_all(folder_); }
 
-  /// The heel goes from t = 10 to 20 mm in 1 s at s = 8 mm, 0.3 mm above the sheet, current from 0.2 s on.
+  /// The heel moves from t = 10 to 20 mm in 1 s at s = 8 mm, 0.3 mm above the sheet, with current from 0.2 s on.
   fs::path Record(std::uint64_t scene_hash = 11) {
     fs::path file = folder_ / "session.mcap";
     recording::McapWriter writer(file, "fulcrum", "fulcrum test");
@@ -95,7 +95,7 @@ class CutRecording : public testing::Test {
       const double time_s = 1e-3 * ms;
       ToolState tool = test::ToolAt(time_s, Vec3d::Zero(), Vec3d(8e-3, 10e-3 + 10e-3 * time_s, 0));
       tool.tools[1].p_WT -= Vec3f(FlatScene::kShift, FlatScene::kShift, -0.3e-3f);
-      // The neck goes up: z of the tool points down.
+      // The neck points up: z of the tool points down.
       tool.tools[1].q_WT = Quatf(0, 1, 0, 0);
       put(tool, time_s);
       put(test::PedalAt(time_s, ms >= 200 ? CauteryMode::kCut : CauteryMode::kOff), time_s);
@@ -103,7 +103,7 @@ class CutRecording : public testing::Test {
       TissueFrame frame;
       frame.header.stamp = test::StampAt(time_s);
       frame.header.scene_hash = scene_hash;
-      // Of positions some milliseconds ago: between two poses.
+      // The frame's positions are some milliseconds old: between two poses.
       frame.header.session_time_s = time_s - 0.0025;
       frame.header.vertex_count = static_cast<std::uint32_t>(scene_.places.size());
       frame.xyz = Interleaved(scene_.places);
@@ -145,7 +145,8 @@ TEST_F(CutRecording, MetalIsWhereItsPoseAndTheSheetSay) {
   ASSERT_GT(cut.metal.size(), 90u);
   for (const MetalFrame& frame : cut.metal) {
     ASSERT_TRUE(frame.in_contact) << frame.time_s;
-    // The whole foot is 0.3 mm above the sheet, of the neck the first 0.5 mm: the mean lies near the foot's middle.
+    // The whole foot is 0.3 mm above the sheet; of the neck the first 0.5 mm counts: the mean is near the foot's
+    // middle.
     EXPECT_NEAR(static_cast<double>(frame.centre.y()), 10e-3 + 10e-3 * frame.time_s, 2e-6) << frame.time_s;
     EXPECT_GT(frame.centre.x(), 9.0e-3f);
     EXPECT_LT(frame.centre.x(), 10.1e-3f);
@@ -155,7 +156,7 @@ TEST_F(CutRecording, MetalIsWhereItsPoseAndTheSheetSay) {
 }
 
 TEST_F(CutRecording, OfTwoContactsThePlaceIsThatOfOne) {
-  // A furrow under the middle of the foot: it touches at its heel and at its end.
+  // A furrow under the middle of the foot: heel and end touch.
   for (std::size_t node = 0; node < scene_.places.size(); ++node) {
     const std::size_t col = node % FlatScene::kCols;
     if (col >= 9 && col <= 11) scene_.places[node].z() -= 5e-3f;
@@ -185,7 +186,7 @@ TEST_F(CutRecording, LastPatchTellsTheHole) {
   EXPECT_NEAR(map.figures.removed_mm2, 2.0, 1e-5);
   EXPECT_EQ(map.recorded.texels.revived, 0);
   EXPECT_NEAR(map.figures.length_mm, 2.0, 0.15);
-  // Each way has a vertex every 0.2 mm, so what is left over at its end, less than that of 8 mm, is not counted.
+  // Each path has a vertex every 0.2 mm; the rest at its end, shorter than that of 8 mm, is not counted.
   constexpr double kLeftOver = 0.2 / (8 - 0.2);
   EXPECT_NEAR(map.figures.spot_way_ratio, 1, kLeftOver);
   EXPECT_NEAR(map.figures.first_opening_s, 0.9 - 0.2, 0.02);
@@ -210,7 +211,7 @@ TEST(DeformedSheet, NearestPlaceIsThatOfAllTriangles) {
                   2e-3f * unit(random));
     const auto found = sheet.Nearest(p, 1);
     ASSERT_TRUE(found);
-    // Of a fine sampling of all cells nothing is nearer.
+    // No point of a fine sampling of all cells is nearer.
     float nearest = std::numeric_limits<float>::infinity();
     for (std::uint32_t row = 0; row + 1 < FlatScene::kRows; ++row) {
       for (std::uint32_t col = 0; col + 1 < FlatScene::kCols; ++col) {
@@ -231,7 +232,7 @@ TEST(DeformedSheet, NearestPlaceIsThatOfAllTriangles) {
   }
 }
 
-// A slit along a row, opened: each lip keeps its shape, and what is removed spans the gap.
+// A slit along a row, opened: each lip keeps its shape, and the removed part spans the gap.
 TEST(DeformedSheet, LipsGoOnUnstretchedAndTheHoleSpansTheGap) {
   FlatScene scene;
   constexpr std::uint32_t kRow = 15;  // The edges from it to the next row are severed.
@@ -247,7 +248,7 @@ TEST(DeformedSheet, LipsGoOnUnstretchedAndTheHoleSpansTheGap) {
       SetBit(dead_edges, 3 * node + 2);
     }
   }
-  // Of the millimetre between the two rows the removed part: from 0.3 to 0.5 mm.
+  // The removed part of the millimetre between the two rows: from 0.3 to 0.5 mm.
   const auto node_at = [&](std::uint32_t row) { return row * FlatScene::kCols + 10; };
   const float t0 = scene.view.membrane_material[node_at(kRow)].y();
   const auto removed = [&](const Vec2f& place) { return place.y() > t0 + 0.3e-3f && place.y() < t0 + 0.5e-3f; };
@@ -269,7 +270,7 @@ TEST(DeformedSheet, LipsGoOnUnstretchedAndTheHoleSpansTheGap) {
   EXPECT_NEAR(at(0.5f * kGap_m + 0.4e-3f), 0.4e-3f, kLook_m);
 }
 
-// Where a piece of the sheet is gone, a place in the hole is one of what was there.
+// Where a piece of the sheet is missing, a point in the hole has the material coordinates of the missing piece.
 TEST(DeformedSheet, AHoleIsSpannedByWhatWasThere) {
   FlatScene scene;
   std::vector<Vec3f> places = scene.places;
@@ -278,7 +279,7 @@ TEST(DeformedSheet, AHoleIsSpannedByWhatWasThere) {
     for (std::uint32_t col = 8; col < 12; ++col) {
       const std::size_t node = row * FlatScene::kCols + col;
       SetBit(dead_nodes, node);
-      places[node] = Vec3f(1, 1, 1);  // Wherever it was left.
+      places[node] = Vec3f(1, 1, 1);  // An arbitrary position.
     }
   }
   DeformedSheet sheet(scene.view);

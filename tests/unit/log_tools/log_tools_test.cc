@@ -1,4 +1,4 @@
-// The tools of `fulcrum log` on recordings whose content is known.
+// The tools of `fulcrum log` on recordings with known content.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -82,7 +82,7 @@ TEST_F(LogTools, EveryMessageComesBackFromItsBytes) {
       ASSERT_TRUE(bus::EncodeCdr(bus::test::Sample<T>(), &bytes));
       ASSERT_TRUE(bus::DecodeCdr(bytes, &back));
       EXPECT_TRUE(Same(back, bus::test::Sample<T>())) << role.name;
-      // Cut anywhere, it is no message.
+      // Truncated at any length, it is refused.
       for (std::size_t size = 0; size < bytes.size(); size += 1 + bytes.size() / 50) {
         EXPECT_FALSE(bus::DecodeCdr(std::span(bytes).first(size), &back)) << role.name << " of " << size;
       }
@@ -119,7 +119,7 @@ TEST_F(LogTools, CatPrintsOneObjectALineAndFilters) {
   std::ostringstream all, some;
   PrintMessages(file, {}, 4, &all);
   EXPECT_EQ(Lines(all.str()).size(), kTopicCount + 3u);
-  EXPECT_NE(all.str().find("61664 more\"]"), std::string::npos) << "long lists are cut";
+  EXPECT_NE(all.str().find("61664 more\"]"), std::string::npos) << "long lists are truncated";
   PrintMessages(file, {{"ToolState"}, 0.025, 0.045}, 100, &some);
   ASSERT_EQ(Lines(some.str()).size(), 2u) << some.str();
   const std::string line = Lines(some.str())[0];
@@ -154,14 +154,14 @@ TEST_F(LogTools, ExportWritesATableATopic) {
   EXPECT_TRUE(lines[2].starts_with("0.020000,some_node,10,12,2000,1,1,0.1,")) << lines[2];
   const auto columns = [](const std::string& line) { return std::count(line.begin(), line.end(), ','); };
   for (const std::string& line : lines) EXPECT_EQ(columns(line), columns(lines[0]));
-  EXPECT_THROW((void)ExportTables(file, {}, folder_ / "tables"), InputError) << "nothing is replaced";
+  EXPECT_THROW((void)ExportTables(file, {}, folder_ / "tables"), InputError) << "existing files are not replaced";
 }
 
 TEST_F(LogTools, VerifyFindsGapsDamageAndWhatNoNodeWouldUse) {
   std::ostringstream out;
   EXPECT_EQ(Verify(Make("gap.mcap"), &out), ExitCode::kFailure);
   EXPECT_NE(out.str().find("ToolState: 2 messages are missing"), std::string::npos) << out.str();
-  EXPECT_NE(out.str().find("1 problems"), std::string::npos) << "and nothing else\n" << out.str();
+  EXPECT_NE(out.str().find("1 problems"), std::string::npos) << "no further problems\n" << out.str();
 
   const fs::path nan = Make("nan.mcap", [](ToolState* m) { m->tools[0].f_W.x() = NAN; });
   out.str("");
@@ -183,11 +183,11 @@ TEST_F(LogTools, ADamagedIndexIsFound) {
   EXPECT_TRUE(recording::CheckIndex(file, &messages).empty());
   EXPECT_EQ(messages, kTopicCount + 3u);
   int found = 0, tried = 0;
-  // The summary is behind the data's end.
+  // The summary follows the end of the data.
   for (std::size_t at = bytes.size() - 1500; at < bytes.size() - 8; at += 7, ++tried) {
     std::string damaged = bytes;
     damaged[at] = static_cast<char>(damaged[at] ^ 0x20);
-    // A new file each time: some file systems write one that is replaced to the disk at once.
+    // A new file each time: some file systems write a replaced file to the disk at once.
     fs::remove(folder_ / "damaged.mcap");
     std::ofstream(folder_ / "damaged.mcap", std::ios::binary) << damaged;
     found += recording::CheckIndex(folder_ / "damaged.mcap", &messages).empty() ? 0 : 1;
@@ -211,13 +211,13 @@ TEST_F(LogTools, DiffNamesTheFirstFieldThatDiffers) {
   EXPECT_NE(out.str().find("first at sequence 11: tools[1].f_W[1] = "), std::string::npos) << out.str();
   EXPECT_NE(out.str().find(" | 0.5"), std::string::npos) << out.str();
   out.str("");
-  EXPECT_EQ(Diff(a, other, {{"Health"}}, "", &out), ExitCode::kDone) << "only what was asked for";
+  EXPECT_EQ(Diff(a, other, {{"Health"}}, "", &out), ExitCode::kDone) << "only the requested topics are compared";
 }
 
 TEST_F(LogTools, AMessageThatWasReceivedLateIsNotPassedOver) {
   const fs::path file = folder_ / "late.mcap";
   {
-    // As after a start on a busy machine: the setting was sent first and received seconds later.
+    // As after a start on a busy machine: the setting was sent first but received seconds later.
     recording::McapWriter writer(file, "fulcrum", "fulcrum test");
     const std::uint16_t tools = writer.AddChannel(0, bus::RoleOf<ToolState>().name, "cdr", {});
     const std::uint16_t settings = writer.AddChannel(0, bus::RoleOf<GeneratorSetting>().name, "cdr", {});
@@ -247,7 +247,7 @@ TEST_F(LogTools, RecoverMendsWhatAKillHasLeft) {
     writer.EndChunk();
     fs::copy_file(cut, folder_ / "killed.mcap");
   }
-  EXPECT_EQ(Recover(folder_ / "killed.mcap", folder_ / "mended.mcap").size(), 1u) << "it was not closed";
+  EXPECT_EQ(Recover(folder_ / "killed.mcap", folder_ / "mended.mcap").size(), 1u) << "the file was not closed";
   std::ostringstream out;
   EXPECT_EQ(Verify(folder_ / "mended.mcap", &out), ExitCode::kDone) << out.str();
   EXPECT_NE(out.str().find("5 messages, all well"), std::string::npos) << out.str();
@@ -258,7 +258,8 @@ TEST_F(LogTools, RecoverMendsWhatAKillHasLeft) {
   EXPECT_EQ(reader.schemas().at(1).text, "struct Health {};");
   EXPECT_EQ(reader.channels().at(0).metadata.at("node"), "n");
   EXPECT_EQ(reader.metadata().at("session").at("scene"), "small");
-  EXPECT_THROW((void)Recover(folder_ / "killed.mcap", folder_ / "mended.mcap"), InputError) << "nothing is replaced";
+  EXPECT_THROW((void)Recover(folder_ / "killed.mcap", folder_ / "mended.mcap"), InputError)
+      << "existing files are not replaced";
 }
 
 TEST_F(LogTools, WhatIsNoRecordingIsRefused) {

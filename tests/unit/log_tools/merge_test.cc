@@ -1,4 +1,4 @@
-// Recordings of one session, written by a recorder that was restarted, become one.
+// Merging recordings of one session that were written by a restarted recorder.
 #include "services/records/log_tools/merge.h"
 
 #include <gtest/gtest.h>
@@ -49,7 +49,7 @@ class Merging : public testing::Test {
     recorder.Close(0);
     return settings.file;
   }
-  /// Cuts a file as a kill does: within its last record.
+  /// Truncates a file as a kill does: within its last record.
   static void Kill(const fs::path& file) {
     recording::McapReader reader(file);
     fs::resize_file(file, fs::file_size(file) * 9 / 10);
@@ -87,7 +87,7 @@ class Merging : public testing::Test {
 
 TEST_F(Merging, KeepsEveryMessageOnceAndInOrder) {
   const fs::path one = Record("a.mcap", 1, 2000);
-  // Received again, as what late joiners are served: 1901 to 2000.
+  // Samples 1901 to 2000 are received again, as by a late joiner.
   const fs::path two = Record("b.mcap", 1901, 4000);
   const MergeResult result = Merge({two, one}, folder_ / "out.mcap");
   EXPECT_EQ(result.messages, 4400u);

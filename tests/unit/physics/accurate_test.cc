@@ -1,4 +1,4 @@
-// The accurate solver: same bits on every instruction set, rest, pull and return, cuts, damaged input.
+// The accurate solver: equal bits on every instruction set, rest, pull and return, cuts, damaged input.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -46,7 +46,7 @@ class Accurate : public testing::Test {
     ImplicitSolver solver;
   };
 
-  /// A few nodes in the middle of the membrane, held and `up` metres above their place at rest.
+  /// A few nodes in the middle of the membrane, held `up` metres above their rest positions.
   std::vector<HeldPlace> Patch(Run* run, float up) const {
     std::vector<HeldPlace> held;
     const Index rows = scene_.membrane.rows, cols = scene_.membrane.cols;
@@ -137,7 +137,7 @@ TEST_F(Accurate, SleepsWhereNothingMovesAndWakesWhereSomethingDoes) {
   }
   EXPECT_TRUE(run.solver.regions().none_computed()) << "Nothing has ever moved.";
 
-  // A node near one end, lifted and let go: what is near wakes, what is far does not.
+  // A node near one end is lifted and released: near regions wake, far regions do not.
   const Index particle = scene.membrane.first + 3 * scene.membrane.cols + scene.membrane.cols / 2;
   const ParticleRef at = run.particles.Ref(particle);
   const float w = run.particles.InverseMass(at);
@@ -189,7 +189,7 @@ TEST_F(Accurate, ContactAndCutsWake) {
   for (int i = 0; i < 600; ++i) {
     run.Step({}, contacts);
   }
-  ASSERT_TRUE(run.solver.regions().none_computed()) << "It rests on what stands still.";
+  ASSERT_TRUE(run.solver.regions().none_computed()) << "It rests on a support that does not move.";
   run.Step();
   EXPECT_TRUE(run.solver.regions().computed(there)) << "The support has gone.";
   for (int i = 0; i < 300; ++i) {
@@ -233,7 +233,7 @@ TEST_F(Accurate, AnswersQuestionsAsItThenBehaves) {
   };
   const float at_rest = stiffness(0, 0, 10), in_a_frame = stiffness(0.01f, 1, 3);
   EXPECT_EQ(run.Positions(), places);
-  EXPECT_EQ(force(), before) << "Asking changes nothing.";
+  EXPECT_EQ(force(), before) << "The query does not change the state.";
   EXPECT_GT(in_a_frame, at_rest);
   for (int i = 0; i < 300; ++i) {
     run.Step(Patch(&run, kStep));
@@ -241,7 +241,7 @@ TEST_F(Accurate, AnswersQuestionsAsItThenBehaves) {
   const float measured = (before - force()).z() / kStep;
   EXPECT_NEAR(at_rest, measured, 0.05f * measured);
 
-  // The same patch, free before.
+  // The same patch, released before.
   Release(&run);
   for (int i = 0; i < 20; ++i) {
     run.Step();
@@ -268,7 +268,7 @@ TEST_F(Accurate, PulledAndReleasedItComesBack) {
     EXPECT_LT((run.particles.At(held.at) - held.place).norm(), 1e-6f);
     force += run.solver.ForceOn(held.at);
   }
-  EXPECT_LT(force.z(), -0.05f) << "The tissue pulls down at what holds it up.";
+  EXPECT_LT(force.z(), -0.05f) << "The tissue pulls the held patch down.";
   Release(&run);
   for (int i = 0; i < 200; ++i) {
     run.Step();
@@ -279,7 +279,7 @@ TEST_F(Accurate, PulledAndReleasedItComesBack) {
 TEST_F(Accurate, CutEdgesCarryNothing) {
   Run whole(scene_), cut(scene_);
   TopologyState topology = WholeTopology();
-  // All around the patch that is held.
+  // Cuts around the held patch.
   const Index rows = scene_.membrane.rows, cols = scene_.membrane.cols;
   for (Index r = rows / 2 - 3; r <= rows / 2 + 3; ++r) {
     for (Index c = cols / 2 - 3; c <= cols / 2 + 3; ++c) {
@@ -312,7 +312,7 @@ TEST_F(Accurate, DamageIsQuarantinedAndDoesNotSpread) {
   std::uint32_t resets = 0;
   run.solver.BeginStep();
   resets += run.solver.Substep(kH, kIterations, {}, {}).resets;
-  EXPECT_EQ(resets, 1u) << "One particle was damaged, and its neighbours do not notice.";
+  EXPECT_EQ(resets, 1u) << "One particle was damaged, and its neighbours are not affected.";
   run.particles.Set(at, Vec3f::Constant(std::numeric_limits<float>::infinity()));
   EXPECT_EQ(run.solver.BeginStep(), 3u);
   for (int i = 0; i < 100; ++i) {

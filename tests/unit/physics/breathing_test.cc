@@ -15,7 +15,7 @@ namespace {
 constexpr float kAbove = 0.005f, kAmplitude = 0.008f, kPeriod = 4.0f;
 constexpr int kPeriodSteps = 400;
 
-/// The small scene and a flat wall 5 mm over the top of its membrane, facing down, which comes 8 mm down.
+/// The small scene and a flat wall 5 mm above the top of its membrane, facing down, which moves 8 mm down.
 scene::SceneData UnderAWall(float amplitude_m = kAmplitude) {
   scene::SceneData data = scene::BuildProcedural(scene::Small());
   float top = -1;
@@ -36,7 +36,7 @@ scene::SceneData UnderAWall(float amplitude_m = kAmplitude) {
   }
   data.static_triangles.push_back({a, a + 1, a + 2});
   data.static_triangles.push_back({a, a + 2, a + 3});
-  data.static_surfaces = {wall};  // Alone: nothing else breathes.
+  data.static_surfaces = {wall};  // The only surface that breathes.
   data.fixed.breathing = {-Vec3f::UnitZ(), amplitude_m, kPeriod};
   return data;
 }
@@ -49,7 +49,7 @@ TEST(Breathing, TheWallPushesTheTissueAndLetsItComeBackAndSleep) {
   for (int step = 1; step <= 2 * kPeriodSteps; ++step) {
     simulation.Step({});
     const float displacement = simulation.MaxDisplacement();
-    const float lowest = kAmplitude - kAbove;  // Where the wall pushes to, under the top of the membrane at rest.
+    const float lowest = kAmplitude - kAbove;  // Depth of the pushed membrane below its top at rest.
     ASSERT_LT(displacement, 2.0f * lowest) << step;
     most = std::max(most, displacement);
     asleep += simulation.asleep();
@@ -63,7 +63,7 @@ TEST(Breathing, TheWallPushesTheTissueAndLetsItComeBackAndSleep) {
       most = 0;
     }
   }
-  EXPECT_GT(asleep, 50);  // While the wall is away.
+  EXPECT_GT(asleep, 50);  // While the wall is up.
   EXPECT_NEAR(simulation.simulated_time_s(), 2.0 * kPeriod, 1e-5);
 }
 

@@ -1,4 +1,4 @@
-// The factor of the coarse matrix against a dense solve, on every instruction set, and what it leaves out.
+// The factor of the coarse matrix against a dense solve, on every instruction set, and the blocks that it omits.
 #include "physics_node/implicit/coarse_factor.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kNodes = 37;  // 111 rows: the last block of sixteen is not full.
 
-/// A chain in which each node holds its neighbours up to `reach` away, numbered 0, 2, 4, ..., 5, 3, 1.
+/// A chain in which each node is coupled to its neighbours up to `reach` away, numbered 0, 2, 4, ..., 5, 3, 1.
 Eigen::MatrixXf Chain(int reach) {
   Eigen::MatrixXf matrix = Eigen::MatrixXf::Zero(3 * kNodes, 3 * kNodes);
   const auto number = [](int place) { return 2 * place < kNodes ? 2 * place : 2 * (kNodes - place) - 1; };
@@ -64,7 +64,7 @@ TEST(CoarseFactor, SolvesAsADenseOneInAnyOrder) {
     for (Eigen::Index i = 0; i < right.size(); ++i) {
       EXPECT_NEAR(x[static_cast<std::size_t>(4 * (i / 3) + i % 3)], exact[i], 1e-4 * exact.norm());
     }
-    EXPECT_EQ(x[3], 77.0f) << "the fourth of a node is not its own";
+    EXPECT_EQ(x[3], 77.0f) << "the fourth value of a node is unchanged";
   }
 }
 
@@ -122,7 +122,8 @@ TEST(CoarseFactor, IsTheSameWhenItIsMadeAFewColumnsAtATime) {
     for (; progress == Progress::kMore; ++parts) {
       FloatArray x = RightSide();
       by_parts.Solve(KernelsFor(InstructionSet::kBaseline), x.data());
-      EXPECT_TRUE(std::equal(x.data(), x.data() + x.size(), old.data())) << "in force until the next one is whole";
+      EXPECT_TRUE(std::equal(x.data(), x.data() + x.size(), old.data()))
+          << "the old factor is used until the next one is complete";
       progress = by_parts.Continue(KernelsFor(InstructionSet::kBaseline), matrix, 2);
     }
     if (matrix(5, 5) < 0) {

@@ -1,4 +1,4 @@
-// Tools against tissue, and what a grasper holds.
+// Tools against tissue, and the tissue held by a grasper.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -110,7 +110,7 @@ TEST_F(OnSheet, BoundsFittedAtRestHoldFarFromWhereTheToolsWere) {
     const ToolShape shape = ShapeOf(scene_.tools[1], Down(tip));
     return std::array<ToolCollision::ToolMotion, kMaxTools>{ToolCollision::ToolMotion{}, {shape, shape}};
   };
-  // While a tool is far away the sheet rises, more than it is taken to in so few steps.
+  // The sheet rises while the tool is far away, by more than the bounds assume for so few steps.
   const Vec3f away = kMiddle + Vec3f(0, 0, 0.3f), above = kMiddle + Vec3f(0, 0, 0.051f);
   for (int step = 0; step < 3; ++step) {
     for (Index p = 0; p < kRows * kCols; ++p) {
@@ -140,13 +140,13 @@ TEST_F(OnSheet, HookDentsTheMembraneAndStaysInFront) {
   EXPECT_LT(Lowest(), -0.003f);
   EXPECT_GT(Lowest(), -0.006f);
   EXPECT_EQ(simulation_.quarantined(), 0u);
-  // Tool away: flat again.
+  // After the tool is removed the sheet is flat again.
   Drive(1, pressed, above, 30);
   Run(1, above, 400);
   EXPECT_GT(Lowest(), -3e-4f);
 }
 
-/// Cells of a footprint that the metal covers: their number, their middle and their extent, in cells.
+/// Cells of a footprint covered by the metal: their number, their middle and their extent, in cells.
 struct Covered {
   double count = 0;
   Vec2f middle = Vec2f::Zero(), extent = Vec2f::Zero();
@@ -194,7 +194,7 @@ TEST_F(OnSheet, TheFootprintOfPressedMetalLiesAlongIt) {
   const Covered across = pressed(turned(static_cast<float>(M_PI / 2), Vec3f::UnitZ()));
   EXPECT_GT(across.extent.y(), 8);
   EXPECT_LT(across.extent.x(), 0.6f * across.extent.y());
-  // The foot points up: its heel alone touches.
+  // The foot points up: only its heel touches.
   EXPECT_LT(pressed(turned(static_cast<float>(-M_PI / 3), Vec3f::UnitY())).count, 0.5 * lying.count);
 }
 
@@ -207,7 +207,7 @@ class Still {
         model_(scene, &particles_),
         collision_(scene, &model_, &particles_),
         probe_(scene, &model_, &particles_) {}
-  /// The foot goes through the middle of the sheet, slanted to it, `along` further along x and `across` along y.
+  /// The foot passes through the middle of the sheet, slanted, `along` further along x and `across` along y.
   [[nodiscard]] CauteryContact Through(float slant_deg, float along = 0, float across = 0) {
     const float slant = slant_deg * static_cast<float>(M_PI) / 180;
     ToolPose pose = Down(kMiddle + Vec3f(along, across, 0) + 0.0025f * Vec3f(-std::cos(slant), 0, std::sin(slant)));
@@ -217,7 +217,7 @@ class Still {
     collision_.FindPairs(motion, true);
     return probe_.Update(1, pose, collision_);
   }
-  /// Places of the sheet that the foot of the last Through() would push.
+  /// Number of places of the sheet that the foot of the last Through() would push.
   [[nodiscard]] int Pushed() {
     std::vector<ContactRow> rows;
     collision_.Rows(0, 1, &rows);
@@ -230,7 +230,7 @@ class Still {
     }));
   }
   void SetOpenCells(const OpenCells& open) { collision_.SetOpenCells(open); }
-  /// Severs the edges from `row` to the next one, which goes on `gap_m` farther in y with all beyond it.
+  /// Severs the edges from `row` to the next row and moves all rows beyond by `gap_m` in y.
   void Open(Index row, float gap_m) {
     TopologyState slit;
     slit.scene_hash = scene_.hash;
@@ -259,8 +259,8 @@ class Still {
 };
 
 TEST_F(OnSheet, MetalThroughTheSheetCoversItsSection) {
-  // Upright a disc; at 30 degrees to the sheet an ellipse, twice as long. A gap along the normal counts less by half
-  // the sheet's thickness and a twentieth of a millimetre: so much farther the slanted one reaches along itself.
+  // Upright a disc; at 30 degrees to the sheet an ellipse, twice as long. A gap along the normal is reduced by half the
+  // sheet's thickness and a twentieth of a millimetre, which lengthens the section of the slanted foot.
   const double radius = static_cast<double>(scene_.tools[1].tip_radius_m / scene_.thermal.cell_m),
                disc = M_PI * radius * radius;
   Still still(scene_);
@@ -299,14 +299,14 @@ TEST_F(OnSheet, MetalInAnOpenGapIsAsFarFromBothLipsAsItIs) {
   ASSERT_GT(print.width, 0u);
   const float least_m = Footprint::Decode(*std::min_element(print.gap.begin(), print.gap.end()));
   EXPECT_NEAR(least_m, kAir_m, scene_.thermal.cell_m);
-  // On the lip it covers half of itself.
+  // On the lip it covers half of its section.
   const double radius = static_cast<double>(scene_.tools[1].tip_radius_m / scene_.thermal.cell_m),
                half = 0.5 * M_PI * radius * radius;
   EXPECT_NEAR(CoveredBy(still.Through(90, 0, 0.5f * kH).footprint).count, half, 0.15 * half);
 }
 
 TEST_F(OnSheet, MetalPushesOnlyWhatIsLeftOfATriangle) {
-  // The cells in a box of 4 mm about the middle are gone, and no edge of the mesh is severed.
+  // The cells in a box of 4 mm about the middle are removed, and no edge of the mesh is severed.
   OpenCells open;
   open.scene_hash = scene_.hash;
   open.x = static_cast<std::int32_t>(std::floor(kMiddle.x() / scene_.thermal.cell_m)) - kOpenWindow / 2;
@@ -320,7 +320,7 @@ TEST_F(OnSheet, MetalPushesOnlyWhatIsLeftOfATriangle) {
   };
   EXPECT_GT(pushed(false, 0), 0);
   EXPECT_EQ(pushed(true, 0), 0);
-  // It is 1.2 mm across, and 2 mm away is the rim.
+  // The foot is 1.2 mm wide, and the rim is 2 mm away.
   EXPECT_EQ(pushed(true, 0.0013f), 0);
   EXPECT_GT(pushed(true, 0.0016f), 0);
   EXPECT_TRUE(simulation_.SetOpenCells(open));
@@ -335,7 +335,7 @@ TEST_F(OnSheet, AThinToolAtFullSpeedDoesNotTunnel) {
   Run(1, above, 3);
   Drive(1, above, below, 3);
   Run(1, below, 20);
-  EXPECT_LT(Lowest(), -0.0095f);  // The membrane hangs in front of the foot.
+  EXPECT_LT(Lowest(), -0.0095f);  // The membrane is stretched in front of the foot.
 }
 
 TEST_F(OnSheet, HookFromBelowLifts) {

@@ -1,4 +1,4 @@
-// The haptic probe against tissue whose answer is known.
+// The haptic probe against tissue with a known response.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -55,7 +55,7 @@ TEST(ComplianceProbe, AsksOnceAStepAndBoundsItsLoad) {
   }
   EXPECT_EQ(element.particles, ComplianceProbe::kMaxParticles);
   probe.Update(1, {}, Vec3f::UnitZ(), &element);
-  EXPECT_EQ(element.questions, 10);  // Nothing touched, nothing asked.
+  EXPECT_EQ(element.questions, 10);  // Without contact no solve is requested.
   EXPECT_TRUE(probe.compliance(1).known);
   probe.Reset(1);
   EXPECT_FALSE(probe.compliance(1).known);

@@ -1,4 +1,4 @@
-// Gradients against finite differences, and what one projection must satisfy.
+// Gradients against finite differences, and properties of one projection.
 #include "physics_node/tissue/constraints.h"
 
 #include <gtest/gtest.h>
@@ -51,14 +51,14 @@ void ExpectSound(const std::function<Evaluated<double, N>(const Points<N>&)>& co
     const auto before = constraint(x);
     EXPECT_LT(GradientError<N>(constraint, x), 1e-5) << "trial " << trial;
 
-    // No constraint depends on where the whole stands, so the gradients cancel.
+    // No constraint depends on a common translation, so the gradients cancel.
     Vec sum = Vec::Zero();
     for (const Vec& g : before.gradient) {
       sum += g;
     }
     EXPECT_LT(sum.norm(), 1e-9 * (1.0 + before.gradient[0].norm()));
 
-    // One projection with k = 1 solves C + grad C . dx = 0 and keeps the centre of mass where it is.
+    // One projection with k = 1 solves C + grad C . dx = 0 and preserves the centre of mass.
     std::array<double, N> w;
     for (double& wi : w) {
       wi = mass(random);
@@ -85,7 +85,7 @@ TEST(Constraints, VolumeIsSound) {
 }
 
 TEST(Constraints, BendingIsSound) {
-  // Near an angle of pi from rest the wrapped value jumps; a rest angle of 0 keeps random hinges off it.
+  // The wrapped value jumps at an angle of pi from rest; a rest angle of 0 keeps random hinges away from the jump.
   ExpectSound<4>([](const Points<4>& x) { return Bending<double>(x, 0.0); }, 3);
 }
 
@@ -102,7 +102,7 @@ TEST(Bending, IsZeroOnAFlatHingeAndSmoothThroughIt) {
   const std::function<Evaluated<double, 4>(const Points<4>&)> bending = [](const Points<4>& x) {
     return Bending<double>(x, 0.0);
   };
-  // Where acos(n1 . n2) has no derivative.
+  // At these angles acos(n1 . n2) has no derivative.
   EXPECT_LT(GradientError<4>(bending, Hinge(0.0)), 1e-6);
   EXPECT_LT(GradientError<4>(bending, Hinge(1e-6)), 1e-6);
 }

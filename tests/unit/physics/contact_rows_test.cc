@@ -1,4 +1,4 @@
-// Contact rows of the tools: what they keep apart, how strongly, and how many there are.
+// Contact rows of the tools: separation, strength and number.
 #include <gtest/gtest.h>
 
 #include <tuple>
@@ -21,7 +21,8 @@ ToolPose Down(const Vec3f& tip, float about_z = 0, float tilt = 0) {
           0.9f};
 }
 
-/// Height of the membrane over the tool's capsule axis that is furthest below it: negative where all of it is in front.
+/// Height of the membrane above the tool's capsule axis that is furthest below it: negative if the whole membrane is in
+/// front.
 float HighestOver(const SceneView& scene, const ParticleStore& particles, const Capsule& capsule) {
   float over = -1;
   for (Index p = 0; p < scene.membrane.node_count(); ++p) {
@@ -38,7 +39,7 @@ TEST(ContactRows, NothingTunnelsAtOneMetrePerSecond) {
   const scene::SceneData data = SheetScene(kRows, kCols, kH);
   const SceneView scene = data.View();
   for (int trial = 0; trial < 24; ++trial) {
-    // Many places within a cell, and the foot in many directions, tilted as well.
+    // Various places within a cell, and the foot in various directions, also tilted.
     const float a = static_cast<float>(trial);
     const Vec3f shift(0.0021f * std::sin(3.7f * a), 0.0021f * std::cos(5.1f * a), 0.003f * std::sin(2.3f * a));
     const float about_z = 0.9f * a, tilt = 0.5f * std::sin(1.3f * a);
@@ -129,7 +130,7 @@ TEST(ContactRows, AreCompleteFewAndCalm) {
         }
         ASSERT_NEAR(sum, 1.0f, 1e-5f);
         ASSERT_NEAR(row.normal.norm(), 1.0f, 1e-4f);
-        // Never more than the tool's own way and the limit of a push.
+        // At most the tool's own motion and the limit of a push.
         ASSERT_LE(depth, ToolCollision::kMaxPush + std::max(0.0f, row.normal.dot(row.drift)) + 1e-6f);
         ASSERT_EQ(row.force_N, 0.0f);
         ASSERT_LT(row.source, player.tools().pairs().size());
@@ -145,7 +146,7 @@ TEST(ContactRows, ATeleportingToolAsksForLittle) {
   const SceneView scene = data.View();
   RowPlayer player(scene);
   player.Step(0, Down(kMiddle + Vec3f(0, 0, 0.1f)));
-  // The whole tool through the sheet in one step.
+  // The whole tool passes through the sheet in one step.
   player.Step(0, Down(kMiddle - Vec3f(0, 0, 0.02f)), [&](const std::vector<ContactRow>& rows) {
     EXPECT_LE(rows.size(), kMaxTools * ToolCollision::kMaxRows);
     for (const ContactRow& row : rows) {
@@ -260,12 +261,12 @@ TEST(ContactRows, AHookGoesThroughASlitAndComesBack) {
     }
     return most;
   };
-  // The foot along the slit: in and out.
+  // The foot along the slit moves in and out.
   move(0.006f, -0.004f, along, along);
   EXPECT_LT(lifted(), 0.001f);
   move(-0.004f, 0.008f, along, along);
   EXPECT_LT(lifted(), 0.001f);
-  // Turned across it beneath the sheet, it hooks; turned back, it lets go.
+  // Turned across the slit beneath the sheet, the foot hooks the sheet; turned back, it releases it.
   move(0.008f, -0.004f, along, along);
   move(-0.004f, -0.004f, along, 0);
   move(-0.004f, 0.004f, 0, 0);

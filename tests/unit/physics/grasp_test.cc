@@ -1,4 +1,4 @@
-// What graspers take hold of, keep, and lose.
+// Tissue that graspers take, hold and lose.
 #include "physics_node/grasp/grasp.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ class Grasps : public testing::Test {
     grasp_.Update(scene_.tools[0], Down(tip, 0.9f), model_, &particles_);
     grasp_.Update(scene_.tools[0], Down(tip, jaw_rad), model_, &particles_);
   }
-  /// Folds the sheet over the middle column: two sheets 1 mm apart that stand up from the plane.
+  /// Folds the sheet along the middle column: two sheets 1 mm apart that stand up from the plane.
   void Fold() {
     for (Index r = 0; r < kRows; ++r) {
       for (Index c = 7; c <= 17; ++c) {
@@ -55,7 +55,7 @@ TEST_F(Grasps, AFoldIsHeldWithAllItsSheets) {
   for (const HeldParticle& held : grasp_.held()) {
     columns.insert(held.particle % kCols);
   }
-  // The ridge and both flanks.
+  // Columns of the ridge and both flanks.
   for (const Index c : {10u, 11u, 12u, 13u, 14u}) {
     EXPECT_TRUE(columns.contains(c)) << c;
   }
@@ -67,7 +67,7 @@ TEST_F(Grasps, AFoldIsHeldWithAllItsSheets) {
 }
 
 TEST_F(Grasps, WhatLiesBetweenOpenJawsIsTakenAsTheyClose) {
-  // Just closed past the limit: the jaws still span 3 mm at their tips, and what is between them is held.
+  // Just closed past the limit: the jaws still span 3 mm at their tips, and the tissue between them is held.
   Fold();
   Close(kMiddle + Vec3f(0, 0, 0.004f), 0.24f);
   const std::size_t at_limit = grasp_.held().size();
@@ -123,12 +123,12 @@ TEST_F(Grasps, SlipsAboveTheGripOfItsJawAngleOnly) {
       grasp_.Slip(Vec3f(1.2f * grip, 0, 0), scene_.tools[0], pose, model_, &particles_);
     }
     const Vec3f crept = grasp_.held().front().p_T - before;
-    EXPECT_GT(crept.x(), 0.0f);  // Along the traction, which is x of the tool as well.
+    EXPECT_GT(crept.x(), 0.0f);  // Along the traction, which is x of the tool, too.
     EXPECT_LT(crept.norm(), 0.003f);
     for (int i = 0; i < 400; ++i) {
       grasp_.Slip(Vec3f(2.0f * grip, 0, 0), scene_.tools[0], pose, model_, &particles_);
     }
-    EXPECT_FALSE(grasp_.holding());  // All of it is out of the jaws.
+    EXPECT_FALSE(grasp_.holding());  // All tissue is out of the jaws.
     for (Index p = 0; p < particles_.particle_count(); ++p) {
       ASSERT_EQ(particles_.InverseMass(particles_.Ref(p)), scene_.inverse_mass[p]);
     }
@@ -180,7 +180,7 @@ TEST(GraspLayers, OrganAndMembraneBetweenTheJawsAreHeldTogether) {
   const SceneView scene = data.View();
   ParticleStore particles(scene);
   const TissueModel model(scene, &particles);
-  // Down along a vertex of the organ's top, the tip well below it.
+  // A grasp along a vertex of the organ's top, with the tip well below it.
   Index top = kNoIndex;
   for (Index v = 0; v < scene.tube_vertex_count; ++v) {
     const bool middle = std::abs(scene.rest_position[v].y()) < 0.02f && scene.inverse_mass[v] > 0.0f;

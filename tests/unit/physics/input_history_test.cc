@@ -34,7 +34,7 @@ TEST_F(InputHistoryTest, GivesTheSamplesAroundAMoment) {
   EXPECT_EQ(Before(), 400);
   EXPECT_EQ(After(), 500);
   history_.DropBefore(500);
-  EXPECT_EQ(Before(), 500) << "one of that very moment is not later";
+  EXPECT_EQ(Before(), 500) << "a sample of exactly that time is not later";
   EXPECT_EQ(After(), 600);
 }
 
@@ -44,7 +44,7 @@ TEST_F(InputHistoryTest, WhatArrivesLateIsHeldUntilAnythingNewerHas) {
   history_.DropBefore(250);
   EXPECT_EQ(Before(), 100);
   EXPECT_EQ(After(), -1);
-  // The sample of 200 was on its way when the step began.
+  // The sample of 200 was in transit when the step began.
   Send(200);
   Send(300);
   history_.Take(in_.get());

@@ -1,5 +1,5 @@
-// The guard against inverted tetrahedra: silent on sound tissue; its force is the gradient of its energy, its matrix
-// never below the second derivative.
+// The guard against inverted tetrahedra: it has no effect on sound tissue; its force is the gradient of its energy, its
+// matrix never below the second derivative.
 #include "physics_node/implicit/inversion_guard.h"
 
 #include <gtest/gtest.h>
@@ -58,7 +58,7 @@ TEST(InversionGuard, LeavesSoundTissueAlone) {
   InversionGuard guard(model);
   Field place = Places(model);
   for (std::size_t v = 0; v < kVertices; ++v) {
-    place[4 * v] *= 3;  // Stretched and pressed flat, but the right way round.
+    place[4 * v] *= 3;  // Stretched and flattened, but not inverted.
     place[4 * v + 2] *= 0.1f;
   }
   guard.Linearise(place.data());
@@ -93,7 +93,8 @@ TEST(InversionGuard, ForceIsTheGradientAndTheMatrixNeverTooSmall) {
       power += static_cast<double>(product[i] * direction[i]);
     }
     EXPECT_NEAR(power, curvature, 1e-4 * curvature);
-    // Large against rounding, small against what turns the nearest rotation where two are almost equally near.
+    // Large against rounding, small against the change that flips the nearest rotation where two are almost equally
+    // near.
     constexpr double kStep_m = 3e-6;
     const double back = guard.Energy(Along(place, direction, -kStep_m).data()),
                  ahead = guard.Energy(Along(place, direction, kStep_m).data()), here = guard.Energy(place.data());
@@ -106,7 +107,7 @@ TEST(InversionGuard, LetsGoOfWhatIsBackInShape) {
   const ElasticModel model = TwoTets();
   InversionGuard guard(model);
   Field place = Places(model);
-  place[4 * 0 + 1] = place[4 * 0 + 2] = place[4 * 0] = static_cast<float>(kSize_m);  // Through the opposite face.
+  place[4 * 0 + 1] = place[4 * 0 + 2] = place[4 * 0] = static_cast<float>(kSize_m);  // Moved through the opposite face.
   for (int look = 0; look < 2; ++look) {
     guard.Linearise(place.data());
   }

@@ -1,4 +1,4 @@
-// The kernels' source compiled with lanes that are plain loops: the oracle of the vector kernels.
+// The kernels' source compiled with plain loops as lanes: the reference of the vector kernels.
 #pragma once
 
 #include "physics_node/collision/kernels.h"

@@ -1,4 +1,4 @@
-// The vector kernels do what the plain constraints do, on all instruction sets with the same bits.
+// The vector kernels give the results of the plain constraints, with equal bits on all instruction sets.
 #include "physics_node/pbd/kernels.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@
 namespace fulcrum::physics {
 namespace {
 
-/// Coordinates are millimetres to centimetres: float rounding of one projection is far below this [m].
+/// Error of one projection [m]: coordinates are millimetres to centimetres, so float rounding is far below this.
 constexpr float kTolerance = 2e-7f;
 
 void Shake(ParticleStore* particles, float size, unsigned seed) {
@@ -219,7 +219,7 @@ TEST(Kernels, SpringsVolumesBendingBindingsMatchThePlainConstraints) {
     EXPECT_LT(LargestDifference(Positions(plain.particles), Positions(vector.particles)), 10 * kTolerance);
   }
   {
-    // Drawn out only: the membrane well above the organ.
+    // Only the stretched side: the membrane is well above the organ.
     Body plain(view), vector(view);
     for (Body* body : {&plain, &vector}) {
       for (Index p = view.membrane.first; p < body->particles.particle_count(); ++p) {
@@ -280,14 +280,14 @@ TEST(Kernels, AtRestNothingMoves) {
   EXPECT_LT(LargestDifference(Positions(rest.particles), Positions(body.particles)), 2e-6f);
 }
 
-/// The kernels of each instruction set against the plain loops, on a step of everything.
+/// The kernels of each instruction set against the plain loops, on a step with all constraints.
 class SameBits : public testing::TestWithParam<InstructionSet> {
  protected:
   static void Compare(const SceneView& view, InstructionSet set) {
     Body a(view), b(view);
     Shake(&a.particles, 0.002f, 9);
     Shake(&b.particles, 0.002f, 9);
-    // A thrown and a damaged particle, so that the rare branches run too.
+    // A particle that is too fast and a damaged one exercise the rare branches.
     for (Body* body : {&a, &b}) {
       const ParticleRef thrown = body->particles.Ref(view.membrane.first + view.membrane.cols * 2 + 2);
       body->particles.Set(thrown, Vec3f(0.5f, 0, 0));

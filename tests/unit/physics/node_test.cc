@@ -27,7 +27,7 @@ struct Bus {
   bus::InProcessTopic<TickManifest> manifests;
 };
 
-/// A node with its ports, and the senders of its inputs.
+/// A node with its ports, and the writers of its inputs.
 class Bench {
  public:
   Bench(const SceneView& scene, runtime::CheckpointFile* checkpoint, std::int64_t epoch = 1)
@@ -65,7 +65,7 @@ class Bench {
     tool_out_->Write(tools);
     handle_out_->Write(handles);
   }
-  /// A tool at a place at a moment of the session.
+  /// Sends the pose of a tool at a session time.
   void SendTool(std::uint32_t tool, const Vec3f& p_WT, std::int64_t stamp_ns, std::uint64_t epoch = 1,
                 const Quatf& q_WT = Quatf::Identity()) {
     ToolState tools;
@@ -80,7 +80,7 @@ class Bench {
     handles.stamp = {++sequence_, 1, stamp_ns};
     handle_out_->Write(handles);
   }
-  /// Step `index`, woken `late_ns` after its time.
+  /// Step `index`, with a delay of `late_ns`.
   void StepAt(std::uint64_t index, std::int64_t late_ns) {
     const std::int64_t ns = static_cast<std::int64_t>(index) * kPeriod + late_ns;
     node_.Step({index, 1e-9 * static_cast<double>(ns), 0.01, 1 + ns});
@@ -158,7 +158,7 @@ TEST_F(PhysicsNodeTest, LateStepsMakeItCheaperForAWhile) {
   EXPECT_EQ(bench.Figure("cheaper_presets"), 1) << "default -> fast";
   bench.tick_.index += 3;
   bench.Step();
-  EXPECT_EQ(bench.Figure("cheaper_presets"), 1) << "There is nothing below fast.";
+  EXPECT_EQ(bench.Figure("cheaper_presets"), 1) << "There is no preset below fast.";
   for (int i = 0; i < 201; ++i) {
     bench.Step();
   }
@@ -197,7 +197,7 @@ TEST_F(PhysicsNodeTest, TellsEachReaderWhatItNeeds) {
   EXPECT_EQ(manifest.consumed[0].topic, TopicId::kToolState);
   EXPECT_EQ(manifest.consumed[0].sequence, 300u);
   EXPECT_EQ(manifest.consumed[1].topic, TopicId::kToolState);
-  EXPECT_EQ(manifest.consumed[1].sequence, 300u) << "nothing later had come";
+  EXPECT_EQ(manifest.consumed[1].sequence, 300u) << "no later sample had arrived";
   EXPECT_EQ(manifest.consumed[2].topic, TopicId::kHandleState);
   EXPECT_EQ(manifest.consumed[2].sequence, 300u);
   EXPECT_EQ(manifest.consumed[3].topic, TopicId::kTopologyState);
@@ -212,7 +212,7 @@ TEST_F(PhysicsNodeTest, PosesAreThoseOfItsOwnMomentHoweverLateItIsWoken) {
   const auto run = [&](std::int64_t late_ns, std::uint64_t* hash) {
     Bench bench(scene_, nullptr);
     auto manifests = bench.bus_.manifests.MakeInput();
-    // A sample every millisecond, half a millisecond off the steps.
+    // A sample every millisecond, offset from the steps by half a millisecond.
     std::int64_t ms = 1;
     for (std::uint64_t k = 0; k < 20; ++k) {
       const std::int64_t woken_ns = static_cast<std::int64_t>(k) * kPeriod + late_ns;
@@ -255,7 +255,7 @@ TEST_F(PhysicsNodeTest, AStepThatIsWokenInTheNextPeriodIsStillItsOwn) {
     EXPECT_TRUE(cautery->TakeLatest(&contact));
     return contact.session_time_s;
   };
-  // The first step runs late and has nothing to compare with; the next one corrects it.
+  // The first step runs late and has no reference; the next one corrects it.
   EXPECT_NEAR(moment(0, 10'300'000), 0.01, 1e-9);
   EXPECT_NEAR(moment(1, 1'200'000), 0.01, 1e-9);
   EXPECT_NEAR(moment(2, 1'200'000), 0.02, 1e-9);
@@ -301,7 +301,7 @@ TEST_F(PhysicsNodeTest, HoldsItsToolsWhenTheInputGoesStale) {
   }
   EXPECT_TRUE(bench.node_.simulation().grasp(0).holding());
   EXPECT_EQ(bench.node_.simulation().Save().pose[0].p_WT, tip);
-  bench.Play(4.0, 4.5);  // And goes on when it comes back elsewhere.
+  bench.Play(4.0, 4.5);  // It continues after the tool has reappeared elsewhere.
   EXPECT_TRUE(bench.node_.simulation().grasp(0).holding());
 }
 
@@ -358,7 +358,7 @@ TEST_F(PhysicsRestart, GoesOnWhereItWasKilled) {
   EXPECT_TRUE(bench.node_.restored());
   EXPECT_EQ(bench.node_.simulation().grasp(0).held().size(), held);
   for (int i = 0; i < 5; ++i) {
-    bench.Step();  // Inputs have not come back yet.
+    bench.Step();  // Inputs are not available again yet.
   }
   bench.Play(2.8, 3.0);
   bench.node_.simulation().particles().CopyPositions(after);
@@ -370,7 +370,7 @@ TEST_F(PhysicsRestart, GoesOnWhereItWasKilled) {
   EXPECT_TRUE(bench.node_.simulation().grasp(0).holding());
 }
 
-/// The script stretches the small scene's membrane to 2.2.
+/// The script stretches the membrane of the small scene to 2.2.
 TEST_F(PhysicsRestart, NeitherForgetsNorRepeatsWhatHasTorn) {
   scene_.physics.tear_stretch = 1.8f;
   TearState before, after;
@@ -379,8 +379,8 @@ TEST_F(PhysicsRestart, NeitherForgetsNorRepeatsWhatHasTorn) {
     Bench bench(scene_, checkpoint.get());
     auto tears = bench.bus_.tears.MakeInput();
     bench.Play(0, 1.0);
-    EXPECT_FALSE(tears->TakeLatest(&before)) << "nothing has torn, nothing is said";
-    // Ended in the tick in which something tears.
+    EXPECT_FALSE(tears->TakeLatest(&before)) << "without a tear nothing is published";
+    // Stops in the tick of the first tear.
     while (bench.node_.simulation().tears().torn_count() == 0 && bench.tick_.index < 500) {
       const double now_s = 0.01 * static_cast<double>(bench.tick_.index);
       bench.Play(now_s, now_s + 0.01);
@@ -435,8 +435,8 @@ TEST_F(PhysicsRestart, GoesTheWayOfTheOutageAndDatesItsContactsByIt) {
   bench.tick_.index = 310;
   bench.SendTool(1, before + Vec3f(0, 0.002f, 0), 1 + 309 * kPeriod, 1, turn);
   bench.Step();
-  EXPECT_FALSE(cautery->TakeLatest(&contact)) << "the handles have not been heard of";
-  EXPECT_EQ(bench.ToolPlace(1), before) << "nor is the way to be gone without it";
+  EXPECT_FALSE(cautery->TakeLatest(&contact)) << "no handle sample has arrived";
+  EXPECT_EQ(bench.ToolPlace(1), before) << "without it the tool must not move";
   float longest = 0;
   double last_s = 2.8;
   for (int i = 0; i < 40; ++i) {
@@ -445,7 +445,7 @@ TEST_F(PhysicsRestart, GoesTheWayOfTheOutageAndDatesItsContactsByIt) {
     bench.Step();
     longest = std::max(longest, (bench.ToolPlace(1) - place).norm());
     ASSERT_TRUE(cautery->TakeLatest(&contact)) << i;
-    EXPECT_GT(contact.session_time_s, last_s) << "time goes on from the checkpoint";
+    EXPECT_GT(contact.session_time_s, last_s) << "time continues from the checkpoint";
     EXPECT_NEAR(contact.session_time_s - last_s, 0.0175, i == 0 ? 0.01 : 1e-6) << "evenly";
     last_s = contact.session_time_s;
   }

@@ -1,4 +1,4 @@
-// Who of two processes leads.
+// Which of two processes leads.
 #include "physics_node/node/pair.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ class PairTest : public ::testing::Test {
     manifest.node = node;
     out_->Write(manifest);
   }
-  /// A period later.
+  /// Role after a further period.
   Pair::Role Next(Pair* pair, std::int64_t later = kPeriod) {
     now_ += later;
     return pair->Update(now_, other_holds_);
@@ -47,25 +47,25 @@ TEST_F(PairTest, TakesOverFromASilentLeaderWithinFourPeriods) {
   ASSERT_EQ(Next(&pair), Pair::Role::kFollows);
   int periods = 0;
   while (Next(&pair) == Pair::Role::kFollows) {
-    // Another node's word is not the leader's.
+    // Samples of another node do not count as the leader's.
     LeaderSpeaks(9, NodeId::kThermal);
     ++periods;
   }
   EXPECT_EQ(periods, 3);
   EXPECT_EQ(pair.own_epoch(), static_cast<std::uint64_t>(now_)) << "later than the leader's";
   LeaderSpeaks(pair.own_epoch());
-  EXPECT_EQ(Next(&pair), Pair::Role::kLeads) << "its own word is no other leader's";
+  EXPECT_EQ(Next(&pair), Pair::Role::kLeads) << "its own sample does not count as another leader's";
 }
 
 TEST_F(PairTest, TakesOverAtOnceFromALeaderThatHasLostItsCheckpoint) {
   Pair pair(*in_, NodeId::kPhysics, false, 5);
   other_holds_ = true;
-  ASSERT_EQ(Next(&pair), Pair::Role::kFollows) << "not heard yet";
+  ASSERT_EQ(Next(&pair), Pair::Role::kFollows) << "the leader has not been received yet";
   LeaderSpeaks(1);
   ASSERT_EQ(Next(&pair), Pair::Role::kFollows);
   other_holds_ = false;
   LeaderSpeaks(1);
-  EXPECT_EQ(Next(&pair), Pair::Role::kTakesOver) << "its last word";
+  EXPECT_EQ(Next(&pair), Pair::Role::kTakesOver) << "its last sample has arrived";
 }
 
 TEST_F(PairTest, ALeaderWithoutACheckpointIsJudgedByItsSilenceOnly) {
@@ -99,10 +99,10 @@ TEST_F(PairTest, AReplacedLeaderRetiresAndFollows) {
   LeaderSpeaks(5);
   ASSERT_EQ(Next(&pair), Pair::Role::kLeads);
   LeaderSpeaks(3);
-  ASSERT_EQ(Next(&pair), Pair::Role::kLeads) << "one that was replaced earlier means nothing";
+  ASSERT_EQ(Next(&pair), Pair::Role::kLeads) << "a process that was replaced earlier has no effect";
   LeaderSpeaks(static_cast<std::uint64_t>(now_));
   EXPECT_EQ(Next(&pair, 100 * kPeriod), Pair::Role::kRetires);
-  // It was away for so long as it takes to become one that follows.
+  // The process was away for as long as a follower waits.
   EXPECT_EQ(Next(&pair, 15 * kPeriod), Pair::Role::kFollows);
   const auto other = static_cast<std::uint64_t>(now_);
   for (int i = 0; i < 10; ++i) {

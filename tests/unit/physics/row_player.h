@@ -62,7 +62,7 @@ class RowPlayer {
     return scene;
   }
 
-  /// In the last substep [m].
+  /// Largest move of a particle in the last substep [m].
   [[nodiscard]] float LargestMove() const {
     float largest = 0;
     for (Index p = 0; p < particles_.particle_count(); ++p) {

@@ -1,4 +1,4 @@
-// A flat membrane without an organ, small enough to reason about: node (r, c) at (c * h, r * h, 0), rim fixed.
+// A flat membrane without an organ, small enough to check by hand: node (r, c) at (c * h, r * h, 0), rim fixed.
 #pragma once
 
 #include <cstring>

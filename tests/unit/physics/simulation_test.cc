@@ -1,4 +1,4 @@
-// The whole tissue: rest, sleep, determinism, restart; and what it tells the servo and the heat.
+// The whole tissue: rest, sleep, determinism, restart, and its outputs to servo and heat.
 #include <gtest/gtest.h>
 
 #include <random>
@@ -36,7 +36,7 @@ TEST_F(OnSmallScene, FallsAsleepAndIsWokenByATouchOnly) {
   }
   EXPECT_EQ(simulation.state_version(), version);
   EXPECT_EQ(simulation.StateHash(), hash);
-  // The scripted touch wakes it.
+  // The scripted touch wakes the tissue.
   bool awake = false;
   for (int i = 0; i < 250 && !awake; ++i) {
     awake = !simulation.Step(ScriptedTools(scene_, 0.01 * i)).asleep;
@@ -55,7 +55,7 @@ TEST_F(OnSmallScene, AToolThatHoversLeavesItAsleep) {
     ASSERT_LT(++touch, 1000);
   }
   ASSERT_GT(touch, 1);
-  // The script from its begin, this time with a halt just before it touches.
+  // The script from its start, with a stop just before the touch.
   TissueSimulation again(scene_);
   for (int i = 0; i < 100; ++i) {
     again.Step(at(0));
@@ -73,7 +73,7 @@ TEST_F(OnSmallScene, AToolThatHoversLeavesItAsleep) {
     EXPECT_TRUE(again.Step(tools).asleep) << i;
     near |= !again.collision().pairs().empty();
   }
-  EXPECT_TRUE(near) << "near enough to be looked at";
+  EXPECT_TRUE(near) << "near enough for a contact pair";
   EXPECT_EQ(again.state_version(), version);
   EXPECT_FALSE(again.Step(at(touch)).asleep);
 }
@@ -124,8 +124,8 @@ TEST_F(OnSmallScene, ASheetCutInManyPlacesComesToRest) {
       late = i >= 350 ? std::max(late, step) : late;
     }
     EXPECT_GT(early, 0.0005f) << seed;  // The slits gape …
-    EXPECT_LT(early, 0.0015f) << seed;  // … no shred is flung about …
-    EXPECT_LT(late, 1e-5f) << seed;     // … and that is that: none goes on swinging.
+    EXPECT_LT(early, 0.0015f) << seed;  // … no shred is thrown about …
+    EXPECT_LT(late, 1e-5f) << seed;     // … and later no shred swings.
   }
 }
 
@@ -220,7 +220,7 @@ TEST_F(OnSmallScene, ContinuesFromASavedStateWithoutAJump) {
     apart = std::max(
         apart, (one.particles().At(one.particles().Ref(p)) - other.particles().At(other.particles().Ref(p))).norm());
   }
-  // The velocity is that over a whole step, and contacts have forgotten their sides.
+  // The restored velocity is the mean of a whole step, and the sides of contacts are not restored.
   constexpr float kWithoutAJump = 0.001f;
   EXPECT_LT(apart, kWithoutAJump);
 }
@@ -279,7 +279,7 @@ TEST_F(OnSmallScene, ContactModelsPassTheGatesAndPushBack) {
         } else {
           grasped = true;
         }
-        // The reference force of a step must not jump: the servo would pass the jump on.
+        // The reference force must not jump between steps, because the servo would pass the jump on.
         EXPECT_LT((contact.f_ref - last[tool]).norm(), 1.0f) << "step " << i;
         last[tool] = contact.f_ref;
       }
@@ -339,7 +339,7 @@ TEST_F(OnSmallScene, CauteryContactFollowsTheHook) {
     }
     first = touching++ == 0 ? contact.material.y() : first;
     last = contact.material.y();
-    // The place in the triangle and the place on the sheet are one.
+    // The place in the triangle and the material coordinates agree.
     const auto nodes = simulation.model().TriangleNodes(contact.triangle);
     Vec2f place = Vec2f::Zero();
     for (std::size_t k = 0; k < 3; ++k) {
@@ -349,7 +349,7 @@ TEST_F(OnSmallScene, CauteryContactFollowsTheHook) {
     EXPECT_LT(contact.material_rate.norm(), 0.1f);
   }
   EXPECT_GT(touching, 200);
-  EXPECT_GT(last - first, 0.006f);  // The script goes 10 mm along the sheet.
+  EXPECT_GT(last - first, 0.006f);  // The script moves 10 mm along the sheet.
 }
 
 TEST(ElasticForce, IsZeroAtRestAndThatOfTheContinuumWhenStretched) {
@@ -365,8 +365,8 @@ TEST(ElasticForce, IsZeroAtRestAndThatOfTheContinuumWhenStretched) {
       half.push_back(p);
     }
   }
-  // One per cent along x: a strip carries E t * strain per width, here across 40 mm, with the springs' Poisson ratio
-  // of 1/3 held back at the sides: E t / (1 - 1/9).
+  // One per cent along x: a strip carries E t * strain per width, here across 40 mm. The springs' Poisson ratio is 1/3
+  // and the sides are held: E t / (1 - 1/9).
   constexpr float kStrain = 0.01f;
   for (Index p = 0; p < particles.particle_count(); ++p) {
     const Vec3f x = scene.rest_position[p];

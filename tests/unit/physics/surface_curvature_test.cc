@@ -1,5 +1,5 @@
-// Principal curvatures at a contact: on shapes that have known ones, with noise, with a border, with triangles that are
-// none.
+// Principal curvatures at a contact: on shapes with known curvatures, with noise, with a border, with invalid
+// triangles.
 #include "physics_node/contact_model/surface_curvature.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ namespace {
 constexpr std::uint32_t kRows = 25, kCols = 25;
 constexpr float kH = 0.001f;
 
-/// A sheet of another shape: height over (x, y), both from the middle [m].
+/// A sheet bent to a height over (x, y), both relative to the middle [m].
 struct Bent {
   explicit Bent(const std::function<float(float, float)>& height, float noise = 0, float tilt = 0)
       : data(SheetScene(kRows, kCols, kH)) {
@@ -34,7 +34,7 @@ struct Bent {
     normal = turn * Vec3f::UnitZ();
     along_x = turn * Vec3f::UnitX();
   }
-  /// At a triangle of cell (row, col).
+  /// Curvatures at a triangle of cell (row, col).
   [[nodiscard]] PrincipalCurvatures At(Index row, Index col, bool from_above = true) const {
     const SceneView scene = data.View();
     ParticleStore particles(scene);
@@ -93,7 +93,7 @@ TEST(SurfaceCurvature, OfASaddleHasBothSigns) {
 }
 
 TEST(SurfaceCurvature, LooksThroughNoise) {
-  // Noise of 0.05 mm either way, on a mesh of 1 mm.
+  // Noise of ± 0.05 mm, on a mesh of 1 mm.
   const Bent bent([](float x, float) { return Sphere(x, 0, 0.02f); }, 5e-5f);
   double error = 0;
   int count = 0;
@@ -108,7 +108,7 @@ TEST(SurfaceCurvature, LooksThroughNoise) {
 TEST(SurfaceCurvature, OfABorderIsThatOfTheSideThatIsThere) {
   const Bent bent([](float x, float y) { return Sphere(x, y, 0.03f); });
   for (const auto& [row, col] : {std::pair{0u, 12u}, {12u, 0u}, {23u, 12u}}) {
-    // The normal of the sheet as a whole, not that of the border: turned by the fit.
+    // The mean normal of the sheet, not that of the border; the fit corrects it.
     const PrincipalCurvatures found = bent.At(row, col);
     EXPECT_NEAR(found.kappa1, 33.3f, 5.0f) << row << ' ' << col;
     EXPECT_NEAR(found.kappa2, 33.3f, 5.0f) << row << ' ' << col;
@@ -116,7 +116,7 @@ TEST(SurfaceCurvature, OfABorderIsThatOfTheSideThatIsThere) {
 }
 
 TEST(SurfaceCurvature, ACutPartsWhatLiesBesideIt) {
-  // A fold of a right angle along column 12, and the sheet cut there: each side is flat.
+  // A right-angled fold along column 12, at which the sheet is cut: each side is flat.
   const Bent bent([](float x, float) { return x > 0.0005f ? 0.004f : 0.0f; });
   const SceneView scene = bent.data.View();
   ParticleStore particles(scene);
@@ -149,7 +149,7 @@ TEST(SurfaceCurvature, OfWhatIsNoSurfaceIsZero) {
     EXPECT_NEAR(found.kappa1, 0.0f, 1e-3f);
     EXPECT_NEAR(found.kappa2, 0.0f, 1e-3f);
   }
-  // Points that are none, too few, all on a line, all on a cross.
+  // Invalid points, too few points, all points on a line, all points on a cross.
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<Vec3f> broken(20, Vec3f(nan, 0, 0));
   EXPECT_EQ(FitCurvatures(broken, 0.006f, Vec3f::UnitZ()).kappa1, 0.0f);
@@ -163,7 +163,7 @@ TEST(SurfaceCurvature, OfWhatIsNoSurfaceIsZero) {
   }
   EXPECT_EQ(FitCurvatures(line, 0.006f, Vec3f::UnitZ()).kappa1, 0.0f);
   EXPECT_EQ(FitCurvatures(cross, 0.006f, Vec3f::UnitZ()).kappa1, 0.0f);
-  // A normal that is none of the surface's.
+  // A normal that does not belong to the surface.
   const Bent bent([](float x, float y) { return Sphere(x, y, 0.03f); });
   const SceneView scene = bent.data.View();
   ParticleStore particles(scene);
@@ -191,7 +191,7 @@ TEST(SurfaceCurvature, IsBounded) {
 }
 
 TEST(SurfaceCurvature, OfTheOrganIsThatOfATube) {
-  // A straight tube without folds: convex outside, concave within.
+  // A straight tube without folds: convex outside, concave inside.
   scene::SceneSettings settings = scene::Small();
   settings.tube.fold_depth_m = 0;
   const scene::SceneData data = scene::BuildProcedural(settings);
@@ -220,7 +220,7 @@ TEST(SurfaceCurvature, OfTheOrganIsThatOfATube) {
     std::nth_element(values->begin(), middle, values->end());
     return static_cast<double>(*middle);
   };
-  // Of ten or so segments: the quadric through their corners is a little rounder.
+  // About ten segments: the quadric through their corners is curved slightly more.
   const double outer = 1 / settings.tube.outer_radius_m,
                inner = 1 / (settings.tube.outer_radius_m - settings.tube.wall_m);
   EXPECT_NEAR(median(&convex), outer, 0.15 * outer);

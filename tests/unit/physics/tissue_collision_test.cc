@@ -17,7 +17,7 @@
 namespace fulcrum::physics {
 namespace {
 
-/// A sheet 2 mm over a fixed floor that reaches beyond it and faces up.
+/// A sheet 2 mm above a fixed floor that extends beyond it and faces up.
 scene::SceneData SheetOverFloor(float below = 0.002f) {
   scene::SceneData data = SheetScene(17, 17);
   StaticSurface floor{};
@@ -86,7 +86,7 @@ TEST(TriangleTree, FindsTheNearestLikeASearch) {
     EXPECT_NEAR(tree.Nearest(p, 10).distance_sq, best, 1e-6f);
     EXPECT_EQ(tree.Nearest(p, 0.5f * std::sqrt(best)).triangle, kNoIndex);
     EXPECT_EQ(tree.Nearest(p, 10, static_cast<Index>(i)).triangle, tree.Nearest(p, 10).triangle)
-        << "whatever is guessed";
+        << "for any initial guess";
   }
   EXPECT_EQ(TriangleTree().Nearest(point(), 1).triangle, kNoIndex);
 }
@@ -95,7 +95,7 @@ TEST(TissueCollision, AFallingSheetComesToRestOnTheFloor) {
   const scene::SceneData data = SheetOverFloor();
   SceneView scene = data.View();
   scene.physics.gravity = Vec3f(0, 0, -9.81f);
-  scene.physics.k_stretch_membrane = 0.05f;  // A cloth that would hang far below the floor.
+  scene.physics.k_stretch_membrane = 0.05f;  // A soft membrane that would sag far below the floor.
   World world(scene);
   for (int i = 0; i < 200; ++i) {
     world.Step();
@@ -110,7 +110,7 @@ TEST(TissueCollision, AFallingSheetComesToRestOnTheFloor) {
 }
 
 TEST(TissueCollision, SeenFromBehindAFixedSurfaceIsNoContact) {
-  const scene::SceneData data = SheetOverFloor(-0.002f);  // The floor lies over the sheet and faces away from it.
+  const scene::SceneData data = SheetOverFloor(-0.002f);  // The floor is above the sheet and faces away from it.
   World world(data.View());
   for (int i = 0; i < 20; ++i) {
     world.Step();
@@ -118,7 +118,7 @@ TEST(TissueCollision, SeenFromBehindAFixedSurfaceIsNoContact) {
   }
 }
 
-/// Fast tissue is looked for far off; what it does not see from there has no direction to push it in.
+/// The search for fast tissue reaches farther; a surface out of that reach gives no direction of contact.
 TEST(TissueCollision, FastTissueOutOfSightOfTheFloorIsNoContact) {
   const scene::SceneData data = SheetOverFloor(0.05f);
   World world(data.View());
@@ -128,7 +128,7 @@ TEST(TissueCollision, FastTissueOutOfSightOfTheFloorIsNoContact) {
   EXPECT_TRUE(world.rows.empty());
 }
 
-/// At rest the floor is out of sight: on which side of it a node belongs is found out when it comes near.
+/// At rest the floor is out of reach: the side of a node is determined when it comes near.
 TEST(TissueCollision, WhatComesFromAfarIsHeldInFrontAndLeftAloneBehind) {
   for (const float below : {0.03f, -0.03f}) {
     const scene::SceneData data = SheetOverFloor(below);
@@ -151,7 +151,7 @@ TEST(TissueCollision, WhatComesFromAfarIsHeldInFrontAndLeftAloneBehind) {
     }
     move_to(-below + side * 0.0001f);
     if (below < 0) {
-      EXPECT_TRUE(world.rows.empty()) << "it lies behind";
+      EXPECT_TRUE(world.rows.empty()) << "the node is behind the floor";
       continue;
     }
     ASSERT_EQ(world.rows.size(), 1u);
@@ -160,7 +160,7 @@ TEST(TissueCollision, WhatComesFromAfarIsHeldInFrontAndLeftAloneBehind) {
   }
 }
 
-/// A floor under one half of the sheet; a node of the other half is taken down beside it and then beneath it.
+/// A floor under one half of the sheet; a node of the other half is moved down beside it and then beneath it.
 TEST(TissueCollision, WhatGoesRoundTheRimIsNotThrownUpFromBeneath) {
   scene::SceneData data = SheetOverFloor();
   for (Vec3f& p : data.static_vertices) {
@@ -190,7 +190,7 @@ TEST(TissueCollision, WhatGoesRoundTheRimIsNotThrownUpFromBeneath) {
     (void)move_to(Vec3f(x, y, z));
   }
   EXPECT_FALSE(move_to(Vec3f(0.0150f, y, -0.0030f))) << "beneath it";
-  EXPECT_FALSE(move_to(Vec3f(0.0150f, y, -0.0022f))) << "and close";
+  EXPECT_FALSE(move_to(Vec3f(0.0150f, y, -0.0022f))) << "beneath it and close";
 }
 
 TEST(TissueCollision, TheOrganUnderThePeritoneumIsFreeToRise) {
@@ -217,10 +217,11 @@ TEST(TissueCollision, RestCostsNothing) {
   World world(data.View());
   const std::vector<float> still(world.particles.block_count(), 0.0f);
   world.collision.FindPairs(still, 0, 0.01);
-  EXPECT_LE(world.collision.evaluated_count(), world.collision.near_count() + 20u) << "known from the start";
+  EXPECT_LE(world.collision.evaluated_count(), world.collision.near_count() + 20u)
+      << "near particles are known from the start";
   world.collision.FindPairs(still, 0.01, 0.02);
   EXPECT_LE(world.collision.evaluated_count(), world.collision.near_count() + 20u);
-  // One block moves a little: only its own particles that are near something are evaluated.
+  // One block moves a little: only those of its particles that are near a surface are evaluated.
   std::vector<float> moved = still;
   moved.back() = 0.0001f;
   world.collision.FindPairs(moved, 0.02, 0.03);
@@ -268,7 +269,7 @@ int CountInside(const World& world) {
 
 TEST(TissueCollision, TheMembraneStaysOutsideTheOrgan) {
   scene::SceneData data = scene::BuildProcedural(scene::Small());
-  data.bindings.clear();  // They would keep it away as well.
+  data.bindings.clear();  // They would keep the membrane away, too.
   data.binding_colours = {0};
   World world(data.View());
   // The middle of the membrane is thrown down onto the organ.
@@ -292,7 +293,7 @@ TEST(TissueCollision, TheMembraneStaysOutsideTheOrgan) {
   EXPECT_GT(near, 20);
 }
 
-/// Not looked at once before: of what moves it is known from the start what may come near.
+/// No previous search is needed: for moving tissue the possible partners are known from the start.
 TEST(TissueCollision, AnOrganThatComesToAMembraneAtRestIsSeen) {
   const scene::SceneData data = scene::BuildProcedural(scene::Small());
   World world(data.View());
@@ -312,8 +313,8 @@ TEST(TissueCollision, AnOrganThatComesToAMembraneAtRestIsSeen) {
     }
   }
   const int inside = CountInside(world);
-  EXPECT_GT(inside, 50) << "the organ has gone through";
-  EXPECT_GE(static_cast<int>(touched.size()), inside) << "each of them was seen on its way";
+  EXPECT_GT(inside, 50) << "the organ has passed through";
+  EXPECT_GE(static_cast<int>(touched.size()), inside) << "each of them had a contact on the way";
 }
 
 TEST(TissueCollision, BreathingIsSmoothAndCarriesTheTissue) {
@@ -336,7 +337,7 @@ TEST(TissueCollision, BreathingIsSmoothAndCarriesTheTissue) {
     world.Step();
     highest = std::max(highest, world.Node(middle).z());
   }
-  // The floor comes up to 2 mm over the sheet's rest and goes down again.
+  // The floor rises to 2 mm above the sheet's rest position and sinks again.
   EXPECT_GT(highest, 0.0018f);
   EXPECT_LT(highest, 0.0035f);
   EXPECT_LT(world.Node(middle).z(), 0.001f);

@@ -1,5 +1,5 @@
-// The force of the tissue on a tool that presses and moves: as calm as the motion, also where the tool's place comes
-// rounded to what a device resolves.
+// The force of the tissue on a tool that presses and moves: as smooth as the motion, also where the tool's position is
+// rounded to the resolution of a device.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,9 +16,9 @@ constexpr float kPi = std::numbers::pi_v<float>;
 
 class ToolForce : public testing::Test {
  protected:
-  /// RMS of the force's second differences over the RMS of the force, while the tip goes to and fro by `way` once a
-  /// second (frame: x across the organ, y along it, z outwards), pressed `depth` deep. The tip's place is rounded to
-  /// `resolution` metres; 0: as it is.
+  /// RMS of the force's second differences over the RMS of the force, while the tip moves to and fro by `way` once a
+  /// second (frame: x across the organ, y along it, z outwards), pressed `depth` deep. The tip's position is rounded to
+  /// `resolution` metres; 0: not rounded.
   [[nodiscard]] double Roughness(const Vec3f& way, float depth, float resolution) const {
     TissueSimulation simulation(scene_);
     const auto node = [&](Index row, Index col) {
@@ -57,7 +57,8 @@ class ToolForce : public testing::Test {
   SceneView scene_ = data_.View();
 };
 
-/// Well above what is measured (0.13 at most), far below what contacts gave that are stiff at once (0.9 to 1.4).
+/// Well above the measured values (0.13 at most), far below those of contacts without a gradual onset of stiffness (0.9
+/// to 1.4).
 constexpr double kCalm = 0.3;
 
 TEST_F(ToolForce, IsCalmWhereThePlaceIsRounded) {

@@ -81,7 +81,7 @@ TEST_F(Topology, ShrinkingShortensTheRestLength) {
 }
 
 TEST_F(Topology, EverythingCanBeUndone) {
-  // A thermal node that has lost its checkpoint starts from nothing: physics follows.
+  // A thermal node that has lost its checkpoint starts from an uncut sheet, and physics adopts that topology.
   std::mt19937 random(11);
   TopologyState wild = state_;
   for (auto* bytes : {&wild.dead_nodes, &wild.dead_edges, &wild.shrink}) {
@@ -138,7 +138,7 @@ TEST_F(Topology, PiecewiseOrAtOnceIsTheSame) {
   }
 }
 
-/// All edges across the outline of rows [r0, r1] x columns [c0, c1].
+/// Cuts all edges across the outline of rows [r0, r1] x columns [c0, c1].
 void CutOut(Index r0, Index r1, Index c0, Index c1, const SceneView& scene, TopologyState* state) {
   const Index cols = scene.membrane.cols;
   const auto inside = [&](Index node) {
@@ -170,7 +170,7 @@ TEST_F(Topology, OneEdgeLeftHoldsAPiece) {
   state_.dead_edges[bridge / 8] = static_cast<std::uint8_t>(state_.dead_edges[bridge / 8] & ~(1u << (bridge % 8)));
   (void)model_.Apply(state_, &particles_);
   EXPECT_FALSE(model_.IsDebris(5 * 17 + 6));
-  SetBit(state_.dead_nodes, 3 * 17 + 7);  // The bridge burns through.
+  SetBit(state_.dead_nodes, 3 * 17 + 7);  // The bridge is burnt through.
   (void)model_.Apply(state_, &particles_);
   EXPECT_TRUE(model_.IsDebris(5 * 17 + 6));
 }

@@ -1,5 +1,5 @@
-// The narrow phase, eight triangles at a time: against the closest points of one, against a fine search in time, and
-// the same bits on every instruction set.
+// The narrow phase, eight triangles at a time: against the closest points of one triangle, against a fine search in
+// time, and equal bits on every instruction set.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -27,7 +27,7 @@ std::vector<const collision::Kernels*> VectorKernels() {
 
 class Touch : public testing::Test {
  protected:
-  /// Somewhere in a cube of 10 mm.
+  /// A random point in a cube of 10 mm.
   Vec3f Point() { return Vec3f(coordinate_(random_), coordinate_(random_), coordinate_(random_)); }
   void MakeTriangles(float size) {
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
@@ -47,7 +47,7 @@ class Touch : public testing::Test {
     return {x[0][lane], x[1][lane], x[2][lane]};
   }
   static void Put(const Vec3f& p, float* out) { std::copy_n(p.data(), 3, out); }
-  /// From p0-p1 to q0-q1.
+  /// A segment that moves from p0-p1 to q0-q1.
   static SegmentMotion Moving(const Vec3f& p0, const Vec3f& p1, const Vec3f& q0, const Vec3f& q1) {
     SegmentMotion motion;
     Put(p0, motion.from[0]);
@@ -56,7 +56,7 @@ class Touch : public testing::Test {
     Put(q1, motion.to[1]);
     return motion;
   }
-  /// The same on every instruction set.
+  /// Runs the search on every instruction set and requires equal bits.
   [[nodiscard]] TouchBatch Look(const SegmentMotion& motion, const TouchSearch& search) const {
     using Bits = std::array<std::uint32_t, sizeof(TouchBatch) / sizeof(std::uint32_t)>;
     TouchBatch oracle{};
@@ -86,7 +86,7 @@ TEST_F(Touch, AtRestTheyAreTheClosestPointsOfEachTriangle) {
       ASSERT_NEAR(std::sqrt(touch.distance_sq[lane]), std::sqrt(one.distance_sq), 1e-6f);
       ASSERT_EQ(touch.crosses[lane] > 0, one.crosses);
       crossings += one.crosses;
-      // Where two places are equally near either will do: told by their distance.
+      // Where two places are equally near, either is right; therefore only distances are compared.
       const Vec3f on_triangle = touch.weight[0][lane] * a + touch.weight[1][lane] * b + touch.weight[2][lane] * c;
       const Vec3f on_segment = p0 + touch.t[lane] * (p1 - p0);
       ASSERT_NEAR((on_triangle - on_segment).norm(), std::sqrt(one.distance_sq), 2e-6f);
@@ -123,7 +123,7 @@ TEST_F(Touch, OnTheWayTheFirstOneCounts) {
         ASSERT_NEAR(touch.u[lane], first, 4e-3f);
         ++touched;
       } else {
-        ASSERT_GE(found, nearest - way.norm() * 2e-3f);  // The nearest of those looks that it took.
+        ASSERT_GE(found, nearest - way.norm() * 2e-3f);  // The nearest of the evaluated times.
       }
     }
   }

@@ -1,5 +1,5 @@
-// Small-step XPBD: same bits on all instruction sets, rest is rest, forces are the energy's, it converges with
-// substeps.
+// Small-step XPBD: equal bits on all instruction sets, equilibrium at rest, forces equal to the gradient of the energy,
+// convergence with substeps.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -99,7 +99,7 @@ TEST(Xpbd, RestIsAtRestAlsoUnderPrestrain) {
   }
 }
 
-/// Elastic energy of the organ as XPBD takes it: stable neo-Hookean on each tet.
+/// Elastic energy of the organ as defined in XPBD: stable neo-Hookean on each tet.
 double TetEnergy(const ElasticModel& model, const std::vector<Vec3d>& x) {
   double energy = 0;
   for (const ElasticTet& tet : model.tets) {
@@ -115,14 +115,14 @@ double TetEnergy(const ElasticModel& model, const std::vector<Vec3d>& x) {
   return energy;
 }
 
-/// A substep so short that it is explicit: what it moves each particle by is h^2 w times the force. Each constraint by
-/// itself is then exact, so this holds signs, stiffnesses and gradients against finite differences of the energy.
+/// A substep so short that it is explicit: it moves each particle by h^2 w times the force. Each constraint separately
+/// is then exact, so this checks signs, stiffnesses and gradients against finite differences of the energy.
 TEST(Xpbd, ForcesAreThoseOfTheEnergy) {
   scene::SceneData data = scene::BuildProcedural(scene::Small());
   data.fixed.physics.membrane_Et_N_per_m = 0;  // The organ alone: no membrane, no bindings.
   data.fixed.physics.fat_youngs_modulus_Pa = 0;
   data.fixed.physics.membrane_bending_Nm = 0;
-  // So light a force that it adds up in float: masses as they are, h chosen for moves of about 1e-6 m.
+  // The force is small enough to add up in float: masses unchanged, h chosen for moves of about 1e-6 m.
   Body body(data.View());
   Shake(&body.particles, 0.0003f);
   body.solver.Stop();
@@ -153,8 +153,8 @@ TEST(Xpbd, ForcesAreThoseOfTheEnergy) {
   EXPECT_LT(std::sqrt(error / size), 0.03);  // Float rounding of positions and the implicit part of the step.
 }
 
-/// A hanging strip of one column: under its weight the top edge carries all, so its end comes down by
-/// sum over edges of (weight below) / (A / L). XPBD gets there with substeps.
+/// A hanging strip of one column: the top edge carries the whole weight, so the end sinks by sum over edges of (weight
+/// below) / (A / L). XPBD converges to that with substeps.
 TEST(Xpbd, HangingSheetConvergesWithSubsteps) {
   scene::SceneData data = SheetScene(9, 9);
   data.bending.clear();
@@ -217,8 +217,8 @@ TEST(Xpbd, CutsTakeEffectAtOnce) {
   topology.dead_nodes.assign(11, 0);
   topology.dead_edges.assign((3 * 81 + 7) / 8, 0);
   topology.shrink.assign(3 * 81, 0);
-  // The edge from the middle to the right is cut, all others of the pair's row are not: pulling the middle no longer
-  // pulls its neighbour along the row.
+  // The edge from the middle to the right is cut, all others of the row pair are not: a pull at the middle no longer
+  // moves its neighbour in the row.
   SetBit(topology.dead_edges, 3 * (4 * 9 + 4));
   body.tissue.Apply(topology, &body.particles);
   Body whole(data.View());

@@ -1,4 +1,4 @@
-// Samples into a recorder, and what its files contain.
+// Sends samples to a recorder and reads its files.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -43,7 +43,7 @@ class RecorderTest : public testing::Test {
     };
     return settings;
   }
-  /// A sample of `size` bytes, encapsulation included, at `now_ns`.
+  /// Sends a sample of `size` bytes, encapsulation included, at `now_ns`.
   static void Send(Recorder* recorder, TopicId topic, std::uint8_t writer, std::uint64_t sequence,
                    std::size_t size = 40, std::int64_t now_ns = 0, bool whole = true) {
     const std::vector<std::byte> body(size - kHead.size(), static_cast<std::byte>(sequence));

@@ -42,9 +42,9 @@ TEST_F(RecorderTest, KeepsTopicsAndWritersApartAndTellsOfThem) {
   EXPECT_EQ(channel.metadata.at("writer").substr(0, 4), "0200");
   const auto& schema = reader.schemas().at(channel.schema);
   EXPECT_EQ(schema.name, "fulcrum::idl::Health");
-  EXPECT_NE(schema.text.find("struct Stamp"), std::string::npos) << "what it needs is in it";
+  EXPECT_NE(schema.text.find("struct Stamp"), std::string::npos) << "it contains the types that it uses";
   EXPECT_EQ(reader.metadata().at("session").at("scene"), "small");
-  // Stamps and log times are of one clock.
+  // Stamps and log times use the same clock.
   const auto offset = std::stoll(reader.metadata().at("clock").at("log_time_minus_monotonic_ns"));
   EXPECT_EQ(read[0].log_time_ns, static_cast<std::uint64_t>(offset + 5 * kMs));
 }
@@ -77,7 +77,7 @@ TEST_F(RecorderTest, LargeTopicsHaveChunksOfTheirOwn) {
   }
   McapReader reader(folder_ / "recording.mcap");
   reader.PassOver([](const recording::McapChannel& channel) { return channel.topic != "fulcrum/TissueFrame"; });
-  EXPECT_EQ(ReadAll(&reader).size(), 20u) << "no frame came with the tools";
+  EXPECT_EQ(ReadAll(&reader).size(), 20u) << "no frame was read with the tools";
 }
 
 TEST_F(RecorderTest, EverySchemaIsThere) {
@@ -100,11 +100,11 @@ TEST_F(RecorderTest, WhatIsMissingIsCountedByTopicAndWrittenIntoTheFile) {
   {
     Recorder recorder(settings);
     Send(&recorder, TopicId::kToolState, 1, 100);
-    Send(&recorder, TopicId::kToolState, 1, 104);                // three did not arrive
+    Send(&recorder, TopicId::kToolState, 1, 104);                // three are missing
     Send(&recorder, TopicId::kTissueFrame, 1, 1, 40, 0, false);  // overwritten while it was copied
     Send(&recorder, TopicId::kTissueFrame, 1, 2);
     Send(&recorder, TopicId::kHealth, 1, 1, 2000);  // no room
-    Send(&recorder, TopicId::kHealth, 1, 1);        // a late copy is no news
+    Send(&recorder, TopicId::kHealth, 1, 1);        // a late copy is ignored
     EXPECT_EQ(recorder.stats().missed, 4u);
     EXPECT_EQ(recorder.stats().overflow, 1u);
     EXPECT_EQ(recorder.topic_stats(TopicId::kToolState).lost, 3u);
@@ -123,7 +123,7 @@ TEST_F(RecorderTest, NeitherPicturesNorHealthTakeTheRoomOfWhatAReplayNeeds) {
   settings.large_queue_B = 1000;
   settings.small_queue_B = 2000;
   {
-    // The disk stands still: nothing is flushed.
+    // The disk is stalled: nothing is flushed.
     Recorder recorder(settings);
     for (std::uint64_t i = 1; i <= 10; ++i) {
       Send(&recorder, TopicId::kTissueFrame, 1, i, 300);
@@ -166,7 +166,7 @@ TEST_F(RecorderTest, AfterAKillTheFileHoldsWhatIsOlderThanAChunkLasts) {
   recorder.Flush(Recorder::kLongestChunk_ns);
   Send(&recorder, TopicId::kToolState, 1, 3, 40, 600 * kMs);
   recorder.Flush(650 * kMs);
-  // As the operating system would keep it: nothing closes the recorder.
+  // The file as the operating system would keep it: nothing closes the recorder.
   fs::copy_file(folder_ / "recording.mcap", folder_ / "killed.mcap");
   McapReader reader(folder_ / "killed.mcap");
   EXPECT_EQ(ReadAll(&reader).size(), 2u);
@@ -190,7 +190,7 @@ TEST_F(RecorderTest, ADumpHoldsTheNewestPast) {
   EXPECT_TRUE(reader.closed());
   ASSERT_FALSE(read.empty());
   EXPECT_EQ(read.back().sequence, 100u);
-  // The oldest chunk reaches back beyond the two seconds by what it holds.
+  // The oldest chunk may begin before the two seconds, by its duration.
   EXPECT_LE(read.front().sequence, 80u);
   EXPECT_GE(read.front().sequence, 72u);
   EXPECT_EQ(reader.metadata().at("dump").at("reason"), "a node died");
@@ -211,7 +211,7 @@ TEST_F(RecorderTest, WhatIsKeptForADumpIsBounded) {
   recorder.Dump(folder_ / "dump.mcap", "", 0);
   McapReader reader(folder_ / "dump.mcap");
   EXPECT_EQ(ReadAll(&reader).back().sequence, 200u);
-  EXPECT_LT(fs::file_size(folder_ / "dump.mcap"), 60'000u) << "schema, index and what was kept";
+  EXPECT_LT(fs::file_size(folder_ / "dump.mcap"), 60'000u) << "schema, index and the kept samples";
 }
 
 TEST_F(RecorderTest, ADumpIsWrittenOnceForWhatWasAskedLast) {

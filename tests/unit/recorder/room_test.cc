@@ -1,4 +1,4 @@
-// A recorder whose room is limited: by the disk, by the limit on the size of files, by others who fill the disk.
+// A recorder with limited room: by the disk, by the limit on the size of files, by other programs that fill the disk.
 #include "services/records/recorder/room.h"
 
 #include <gtest/gtest.h>
@@ -112,7 +112,7 @@ TEST_F(RecorderTest, EndsInOrderBelowTheLimitOnTheSizeOfFiles) {
     recorder.Close(0);
   }
   EXPECT_NE(stats.ended.find("ulimit -f"), std::string::npos) << stats.ended;
-  EXPECT_EQ(stats.lost(), 0u) << "what comes after the announced end is not lost";
+  EXPECT_EQ(stats.lost(), 0u) << "samples after the announced end do not count as lost";
   EXPECT_GT(stats.not_recorded, 40u);
   EXPECT_LT(fs::file_size(folder_ / "recording.mcap"), kLimit_B);
   McapReader reader(folder_ / "recording.mcap");
@@ -141,7 +141,7 @@ TEST_F(RecorderTest, EndsInOrderBeforeTheDiskIsFull) {
   EXPECT_EQ(stats.lost(), 0u);
   McapReader reader(folder_ / "recording.mcap");
   const std::vector<Read> read = ReadAll(&reader);
-  EXPECT_TRUE(reader.closed()) << "before the recorder ends";
+  EXPECT_TRUE(reader.closed()) << "closed before the recorder ends";
   EXPECT_EQ(read.size() + stats.not_recorded, frames.sent());
   ASSERT_FALSE(read.empty());
   EXPECT_EQ(read.back().sequence, read.size());
@@ -218,7 +218,7 @@ TEST_F(RecorderTest, ADiskThatOthersFillLeavesAReadableFile) {
       recorder.Flush(i * 500 * kMs);
     }
     if (!recorder.stats().ended.empty()) return 2;
-    // Between two looks at the free space.
+    // Between two checks of the free space.
     for (int i = 1; i <= 10; ++i) frames.Send(&recorder, 10'500 * kMs);
     std::ofstream filler(folder_ / "filler");
     for (int i = 0; i < 100 && filler; ++i) filler << std::string(100'000, 'x') << std::flush;

@@ -1,4 +1,4 @@
-// What is written is read again; what is cut off, damaged or foreign is read as far as it goes.
+// Written files are read back; truncated, damaged or foreign files are read as far as possible.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -60,12 +60,12 @@ class McapTest : public testing::Test {
     return {std::istreambuf_iterator<char>(in), {}};
   }
   void Put(std::span<const std::uint8_t> bytes) const {
-    // A new file each time: some file systems write one that is replaced to the disk at once.
+    // A new file each time: some file systems write a replaced file to the disk at once.
     std::filesystem::remove(file_);
     std::ofstream out(file_, std::ios::binary | std::ios::trunc);
     out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
-  /// True when `read` is the first of what was written.
+  /// True when `read` is a prefix of the written samples.
   bool IsBeginning(const std::vector<Sample>& read) const {
     return read.size() <= written_.size() && std::equal(read.begin(), read.end(), written_.begin());
   }
@@ -153,7 +153,7 @@ TEST_F(McapTest, ChunksThatNobodyWantsAreNotUnpacked) {
     McapWriter writer(file_, "", "");
     FillApart(&writer);
   }
-  // Whoever unpacks the first chunk finds it damaged.
+  // Marks the first chunk as damaged, which is detected when it is unpacked.
   Bytes bytes = FileBytes();
   const Bytes zstd{0x28, 0xb5, 0x2f, 0xfd};
   const auto packed = std::search(bytes.begin(), bytes.end(), zstd.begin(), zstd.end());
@@ -169,7 +169,7 @@ TEST_F(McapTest, ChunksThatNobodyWantsAreNotUnpacked) {
   const std::vector<Sample> read = Read(&reader);
   ASSERT_EQ(read.size(), 20u);
   for (const Sample& sample : read) EXPECT_EQ(sample.topic, "tool");
-  EXPECT_EQ(reader.last_ns(), 25'000'000u) << "what was passed over counts all the same";
+  EXPECT_EQ(reader.last_ns(), 25'000'000u) << "skipped chunks count, too";
   EXPECT_TRUE(reader.closed());
   EXPECT_TRUE(reader.faults().empty());
 }
@@ -180,7 +180,7 @@ TEST_F(McapTest, AfterAKillItReadsUpToTheLastChunk) {
     McapWriter writer(file_, "", "");
     Fill(&writer, 100);
     writer.EndChunk();
-    // As the operating system would keep it: nothing closes the writer.
+    // The file as the operating system would keep it: nothing closes the writer.
     std::filesystem::copy_file(file_, killed, std::filesystem::copy_options::overwrite_existing);
   }
   McapReader reader(killed);
@@ -254,7 +254,7 @@ TEST_F(McapTest, ADamagedChunkCostsItsOwnMessagesOnly) {
       ends.push_back(writer.bytes_written());
     }
   }
-  // Within the packed body of the second chunk.
+  // A byte within the packed body of the second chunk.
   Bytes damaged = FileBytes();
   damaged[(ends[0] + ends[1]) / 2] ^= 0x40;
   Put(damaged);
@@ -302,7 +302,7 @@ TEST_F(McapTest, RecordsOfALaterVersionArePassedOver) {
     to.Text("health");
     to.Text("cdr");
     to.Texts({});
-    to.Number(std::uint64_t{99});  // A field that this reader does not know.
+    to.Number(std::uint64_t{99});  // A field unknown to this reader.
   });
   to.Record(Opcode::kMessage, [&] {
     to.Number(std::uint16_t{4});

@@ -1,4 +1,4 @@
-// Blood: where it comes from, where it runs, when it stops, what it may cost.
+// Blood: sources, flow, end of bleeding, limits of cost.
 #include "render_node/geometry/bleeding.h"
 
 #include <gtest/gtest.h>
@@ -97,10 +97,10 @@ TEST_F(BleedingTest, HeatSealsIt) {
   for (double t = 1.7; t < 30; t += 0.2) {
     bleeding.Update(t, membrane_, &atlas_);
   }
-  EXPECT_EQ(bleeding.drops(), 0) << "what has left runs out";
+  EXPECT_EQ(bleeding.drops(), 0) << "drops that have left run out";
   const int stained = Stained();
   EXPECT_TRUE(bleeding.Update(31, membrane_, &atlas_).empty());
-  EXPECT_EQ(Stained(), stained) << "what lies there stays";
+  EXPECT_EQ(Stained(), stained) << "the stains remain";
 }
 
 TEST_F(BleedingTest, ACoagulatedOrBloodlessPlaceDoesNotBleed) {

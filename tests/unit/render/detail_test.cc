@@ -1,4 +1,4 @@
-// What is left out of a picture is not missed: field of view, coarse divisions of the sheet, quality.
+// Omissions that do not change the picture: field of view, coarse divisions of the sheet, quality.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -72,7 +72,7 @@ TEST_F(DetailTest, ASmoothSheetTakesFewTrianglesAndHasNoGaps) {
   mesh.Update(xyz_);
   const std::vector<Triangle> chosen = Choose(mesh);
   EXPECT_LT(chosen.size(), mesh.triangles().size() / 2);
-  // Watertight: in a sheet an edge inside has two triangles; with one it is on the rim of the grid.
+  // Watertight: an inner edge of a sheet has two triangles; an edge with one is on the rim of the grid.
   std::map<std::pair<Index, Index>, int> edges;
   for (const Triangle& t : chosen) {
     for (int k = 0; k < 3; ++k) {
@@ -138,7 +138,7 @@ TEST_F(DetailTest, ACutIsDrawnAsFinelyAsItIs) {
 
 TEST(QualityTest, StepsDownWhenPicturesAreDearAndUpWhenTheyAreCheap) {
   QualityControl quality(Quality::kAuto, 720);
-  EXPECT_LT(quality.scale(), 0.6f) << "the first picture is waited for";
+  EXPECT_LT(quality.scale(), 0.6f) << "low until the first picture has been timed";
   quality.Add(60);
   EXPECT_EQ(quality.scale(), 1.0f);
   for (int k = 0; k < 1000; ++k) {
@@ -148,7 +148,7 @@ TEST(QualityTest, StepsDownWhenPicturesAreDearAndUpWhenTheyAreCheap) {
   EXPECT_LT(60 * settled * settled, 33);
   for (int k = 0; k < 1000; ++k) {
     quality.Add(60 * quality.scale() * quality.scale());
-    EXPECT_EQ(quality.scale(), settled) << "no going to and fro";
+    EXPECT_EQ(quality.scale(), settled) << "no oscillation";
   }
   for (int k = 0; k < 1000; ++k) {
     quality.Add(5);

@@ -11,8 +11,8 @@ namespace {
 
 constexpr Index kSides = 24;
 
-/// A closed tube of 2 mm radius from z = -100 mm to z = 0 in two lengths, as a hook's mesh, after a vertex and a
-/// triangle of something else.
+/// A closed tube of 2 mm radius from z = -100 mm to z = 0 in two sections, as a hook's mesh, preceded by a vertex and a
+/// triangle of another mesh.
 class InstrumentMeshTest : public testing::Test {
  protected:
   InstrumentMeshTest() {
@@ -34,7 +34,7 @@ class InstrumentMeshTest : public testing::Test {
     for (Index k = 1; k + 1 < kSides; ++k) {  // The cap at z = 0.
       triangles_.push_back({1 + 2 * kSides, 1 + 2 * kSides + k, 2 + 2 * kSides + k});
     }
-    triangles_.push_back({1, 1, 2});  // Of no area.
+    triangles_.push_back({1, 1, 2});  // Without area.
     scene_.tool_vertices = vertices_;
     scene_.tool_triangles = triangles_;
     scene_.tools[1].kind = ToolKind::kHook;

@@ -7,7 +7,7 @@
 
 namespace fulcrum::render {
 
-/// x, y, z of one after the other, as a Tissue message holds them.
+/// x, y, z of each point in sequence, as in a Tissue message.
 inline std::vector<float> Interleaved(std::span<const Vec3f> positions) {
   std::vector<float> xyz;
   for (const Vec3f& p : positions) xyz.insert(xyz.end(), {p.x(), p.y(), p.z()});

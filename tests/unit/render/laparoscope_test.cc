@@ -47,7 +47,7 @@ TEST(LaparoscopeTest, TheHorizonRollsClockwise) {
   params.scope_tip_W = Vec3f(0, -0.08f, 0.09f);
   params.roll_deg = 90;
   const Laparoscope scope = MakeLaparoscope(params);
-  EXPECT_GT(ToClip(scope, Vec3f(0, 0, 0.01f)).x(), 0.01f) << "what was up is on the right";
+  EXPECT_GT(ToClip(scope, Vec3f(0, 0, 0.01f)).x(), 0.01f) << "the former up is on the right";
   EXPECT_NEAR(ToClip(scope, Vec3f(0, 0, 0.01f)).y(), 0, 1e-5f);
 }
 
@@ -62,7 +62,7 @@ TEST(CameraControlTest, TurnsAboutTheTargetAndComesBack) {
       camera.Press(key);
       const Vec3f out = camera.params().scope_tip_W - camera.params().scope_target_W;
       EXPECT_NEAR(out.norm(), distance, 1e-4f);
-      EXPECT_LT(std::abs(out.normalized().z()), 0.98f) << "never straight down, where up is lost";
+      EXPECT_LT(std::abs(out.normalized().z()), 0.98f) << "never straight down, where up is undefined";
     }
   }
   for (int k = 0; k < 100; ++k) {

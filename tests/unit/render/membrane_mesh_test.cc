@@ -22,7 +22,7 @@ class MembraneMeshTest : public testing::Test {
 
   Index Node(std::uint32_t row, std::uint32_t col) const { return row * view_.membrane.cols + col; }
 
-  /// Kills all edges between column `col` and `col + 1` from row `first` to row `last`: a straight slit along t.
+  /// Cuts all edges between column `col` and `col + 1` from row `first` to row `last`: a straight slit along t.
   void CutBetweenColumns(std::uint32_t col, std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t row = first; row <= last; ++row) {
       SetBit(topology_.dead_edges, 3 * std::size_t{Node(row, col)} + 0);
@@ -64,7 +64,7 @@ TEST_F(MembraneMeshTest, AClosedSlitLeavesTheSheetWhereItWas) {
     for (const Index k : t) {
       const auto same = std::find(view_.membrane_material.begin(), view_.membrane_material.end(), mesh_.materials()[k]);
       const auto node = static_cast<std::size_t>(same - view_.membrane_material.begin());
-      // A ghost continues the sheet along its tangent: what is left is its curvature over one cell of 2 mm.
+      // A ghost vertex continues the sheet along its tangent: the difference is the curvature over one cell of 2 mm.
       EXPECT_LT((mesh_.positions()[k] - view_.rest_position[view_.membrane.first + node]).norm(), 5e-4f);
     }
   }
@@ -107,7 +107,7 @@ TEST_F(MembraneMeshTest, ADeadNodeIsNeverDrawnAndAWildOneDoesNoHarm) {
 }
 
 TEST_F(MembraneMeshTest, ACrumbIsNotDrawnButAFlapIs) {
-  // A square of nine nodes cut off all round, by killing every edge that leaves it.
+  // A square of nine nodes is separated by cutting every edge that leaves it.
   const auto inside = [](std::uint32_t row, std::uint32_t col) {
     return row >= 20 && row < 23 && col >= 8 && col < 11;
   };
@@ -182,7 +182,7 @@ TEST_F(MembraneMeshTest, FatLaidBareEndsWithinTrianglesNotWithThem) {
     const auto [least, most] = std::minmax({bared[t[0]], bared[t[1]], bared[t[2]]});
     EXPECT_LE(most - least, 0.5f);
   }
-  // Where the sheet is gone, too.
+  // Also where the sheet is removed.
   SetBit(topology_.dead_nodes, 0);
   ASSERT_TRUE(mesh_.SetTopology(topology_));
   fat.FindBared([](const Vec2f&) { return false; }, mesh_, &bared);

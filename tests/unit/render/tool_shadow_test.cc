@@ -46,7 +46,7 @@ class ToolShadowTest : public testing::Test {
     }
     return darkest;
   }
-  /// Of the pair of vertices in the middle of the ribbon.
+  /// Middle of the pair of vertices in the middle of the ribbon.
   static Vec3f Middle(const ToolShadow& shadow) {
     const std::size_t k = shadow.positions().size() / 4 * 2;
     return 0.5f * (shadow.positions()[k] + shadow.positions()[k + 1]);
@@ -77,7 +77,7 @@ TEST_F(ToolShadowTest, LiesOnTheTissueBesideWhatCastsIt) {
       EXPECT_NEAR(shadow.positions()[k].z(), 0, 5e-4f);
     }
   }
-  // By the height's share of the light's distance away from the light.
+  // The shadow is displaced away from the light in proportion to the height.
   EXPECT_NEAR(Middle(shadow).y(), -light.y() * 0.015f / (light.z() - 0.015f), 3e-4f);
 }
 

@@ -19,7 +19,7 @@ namespace {
 
 using testing::CartStory;
 
-/// The small scene, in a hurry: touched, grasped, pulled and cut within two seconds.
+/// The small scene with a short script: touched, grasped, pulled and cut within two seconds.
 scene::SceneData HurriedScene() {
   scene::SceneData data = scene::BuildProcedural(scene::Small());
   for (ScriptKey& key : data.script) key.time_s *= 0.4f;
@@ -48,7 +48,7 @@ class LockStepTest : public ::testing::Test {
     return ReplayInLockStep(settings, view_, SimulatedCart(), {});
   }
 
-  /// Nodes of the last replay that kept a checkpoint.
+  /// Nodes of the last replay that wrote a checkpoint.
   [[nodiscard]] std::set<std::string> Keepers() const {
     std::set<std::string> keepers;
     for (const auto& file : std::filesystem::directory_iterator(folder_ / "again")) {
@@ -75,7 +75,7 @@ TEST_F(LockStepTest, ComesToTheSameStates) {
   EXPECT_EQ(result.nodes[1].compared, 200u);
   EXPECT_EQ(result.nodes[2].ticks, 2000u);
   EXPECT_GE(result.nodes[2].compared, 199u);
-  EXPECT_EQ(Keepers(), std::set<std::string>{}) << "nobody is started again";
+  EXPECT_EQ(Keepers(), std::set<std::string>{}) << "no node is restarted";
 }
 
 TEST_F(LockStepTest, GoesOnAcrossRestarts) {
@@ -94,7 +94,7 @@ TEST_F(LockStepTest, FindsTheCheckpointOfAProcessThatDiedBeforeItSealedItsLast) 
   EXPECT_EQ(result.nodes[0].starts, 2u);
 }
 
-/// What tears, and a physics that is killed while it tears, is replayed from what the manifests name.
+/// Tears, and a physics node that is killed during them, are replayed from the samples named in the manifests.
 TEST_F(LockStepTest, ReplaysWhatTractionTears) {
   data_.fixed.physics.tear_stretch = 1.8f;
   data_.fixed.hash = scene::ContentHash(data_.View());
@@ -106,7 +106,7 @@ TEST_F(LockStepTest, ReplaysWhatTractionTears) {
   recording::McapMessage message{};
   int tears = 0;
   while (reader.Next(&message)) tears += reader.channels().at(message.channel).topic == "fulcrum/TearState" ? 1 : 0;
-  EXPECT_GE(tears, 2) << "a tear, and again after the restart";
+  EXPECT_GE(tears, 2) << "a tear, and its repetition after the restart";
 }
 
 TEST_F(LockStepTest, NamesWhatDiffersFirst) {

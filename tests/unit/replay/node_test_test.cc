@@ -1,4 +1,4 @@
-// Tests of a node against a recording: the assertions, the judgement, what a CI system is given.
+// Tests of a node against a recording: the assertions, the result, the report for a CI system.
 #include "services/apps/replayer/node_test.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ TEST(Assertions, AreReadHoweverTheyAreSpaced) {
 TEST(Assertions, HoldOrNot) {
   struct Case {
     const char* text;
-    bool below, at, above;  ///< Of 2, for 1, 2 and 3.
+    bool below, at, above;  ///< Results of the comparison of 1, 2 and 3 with 2.
   };
   for (const Case& c :
        {Case{"x < 2", true, false, false}, Case{"x <= 2", true, true, false}, Case{"x == 2", false, true, false},
@@ -45,7 +45,7 @@ TEST(Assertions, HoldOrNot) {
   }
 }
 
-/// What InputError says of `text`, or nothing.
+/// Message of the InputError for `text`, or nothing.
 std::string Refusal(const std::string& text) {
   try {
     (void)ParseAssertion(text);
@@ -131,7 +131,7 @@ TEST(Judgement, AnUnknownFigureIsRefusedWithThoseThereAre) {
   NodeTestResult result = SomeResult();
   try {
     Judge({{}, {ParseAssertion("cut_lenght_mm > 10")}}, &result);
-    FAIL() << "a figure that nobody tells was judged";
+    FAIL() << "a missing figure was accepted";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("thermal_node has no figure \"cut_lenght_mm\""), std::string::npos)
         << error.what();

@@ -1,4 +1,4 @@
-// Physics, thermal and haptics in one process on a clock of their own, recorded as a recorder would.
+// Physics, thermal and haptics in one process with a clock of their own, recorded like by the recorder.
 #pragma once
 
 #include <algorithm>
@@ -35,7 +35,7 @@ class TappedTopic {
   explicit TappedTopic(recording::McapWriter* writer) : writer_(writer) {}
   [[nodiscard]] auto MakeInput() { return topic_.MakeInput(); }
   [[nodiscard]] auto MakeOutput() { return topic_.MakeOutput(); }
-  /// Records the samples since the last call. `change` may spoil a sample on its way into the recording, or drop it
+  /// Records the samples since the last call. `change` may alter a sample before it is recorded, or drop it
   /// (false).
   void Record(std::int64_t now_ns, const std::function<bool(T*)>& change = {}) {
     while (tap_->TakeNext(&sample_)) {
@@ -49,7 +49,7 @@ class TappedTopic {
 
  private:
   using Process = std::pair<std::string, std::uint64_t>;
-  /// One writer for each process that publishes a TickManifest; for other topics one is enough here.
+  /// One writer for each process that publishes a TickManifest; the other topics need only one here.
   std::uint16_t ChannelOf(const T& sample) {
     Process process;
     recording::TextMap about;
@@ -72,18 +72,19 @@ class TappedTopic {
 
 struct CartStory {
   double seconds = 3;
-  double kill_physics_s = -1;     ///< Ended without notice, started again 30 ms later.
-  bool kill_before_seal = false;  ///< Physics: after the manifest of its last tick, before that tick's checkpoint.
+  double kill_physics_s = -1;  ///< Killed without notice, restarted 30 ms later.
+  bool kill_before_seal =
+      false;  ///< Kills physics after the manifest of its last tick and before that tick's checkpoint.
   double kill_haptics_s = -1;
-  double late_physics_s = -1;                            ///< One period is skipped.
-  int threads = 1;                                       ///< Of physics.
-  float power_W = 35;                                    ///< Of the generator.
+  double late_physics_s = -1;                            ///< Time at which one period is skipped.
+  int threads = 1;                                       ///< Threads of physics.
+  float power_W = 35;                                    ///< Power of the generator.
   std::function<bool(ToolState*)> tool_change{};         ///< Applied to the recorded samples only.
   std::function<bool(TickManifest*)> manifest_change{};  ///< The same.
   bool record_frames = true;                             ///< TissueFrame is most of the bytes.
 };
 
-/// As if the newest slot had not been sealed.
+/// Restores the state before the newest slot was sealed.
 inline void Unseal(runtime::CheckpointFile* file) {
   const auto previous = file->Previous();
   const std::vector<std::byte> bytes(previous->payload.begin(), previous->payload.end());
@@ -91,7 +92,7 @@ inline void Unseal(runtime::CheckpointFile* file) {
   file->Commit(bytes.size());
 }
 
-/// Runs and records it into `folder`/recording.mcap. Returns the length that was cut [m].
+/// Runs the cart and records it into `folder`/recording.mcap. Returns the cut length [m].
 inline float RecordCart(const SceneView& scene, const std::filesystem::path& folder, const CartStory& story) {
   recording::McapWriter writer(folder / "recording.mcap", "", "test");
   TappedTopic<ToolState> tools(&writer);
@@ -195,7 +196,7 @@ inline float RecordCart(const SceneView& scene, const std::filesystem::path& fol
   const auto at = [](double time_s) { return static_cast<std::int64_t>(1e3 * time_s); };
   std::uint64_t physics_index = 0, thermal_index = 0, haptics_index = 0, handle_sequence = 0;
   for (std::int64_t ms = 0; ms < milliseconds; ++ms) {
-    // Wakes are a little late, each time by another amount.
+    // Each tick is woken with a different small delay.
     const std::int64_t now = kStart + ms * kMillisecond + (ms * 7919) % 30011;
     const double time = seconds_of(now);
     if (ms == at(story.kill_physics_s)) {

@@ -1,10 +1,10 @@
-// One hash a scene: the states that physics, thermal and haptics come to after a while of the scene's own script, over
-// ports as on the cart. They are the same on each number of threads, on a CPU with AVX-512 and on one with neither it
-// nor AVX2 nor FMA (tried under an emulator: baseline kernels, the C library's other mathematics), so one committed
-// number stands for all of them. It is that of gcc's release build.
+// One hash per scene: the states of physics, thermal and haptics after a part of the scene's own script, over ports as
+// on the cart. They are equal for each number of threads, on a CPU with AVX-512 and on one without it, AVX2 and FMA
+// (tested under an emulator: baseline kernels, the C library's other mathematics), so one committed number stands for
+// all of them. It is that of gcc's release build.
 //
-// A change of the numerics changes them, and is allowed to: the failed test says what to write here then. A change that
-// was to leave the numerics alone is found out.
+// An intended change of the numerics changes the hashes: the failed test then prints the row to be written here. An
+// unintended change is detected.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -26,14 +26,14 @@ using Hashes = std::map<std::string, std::uint64_t>;
 
 struct Expected {
   const char* scene;
-  double seconds;  ///< Of the script: the hook has cut for a while.
+  double seconds;  ///< Session time of the script at which the hook has cut for a while.
   std::uint64_t physics, thermal, haptics;
 };
 
 constexpr Expected kSmall{"small", 3.2, 0x16ee1db890b7ac48, 0x56a5c9fd753517a6, 0xb8d46b896677babe};
 constexpr Expected kBuiltIn{"built-in", 9.0, 0x19d699a4ebd10b59, 0xdac2fe60b09a6e94, 0x93fc54571bab4519};
 
-// Nobody has compared what clang and the sanitizers come to, and under these it takes minutes.
+// The states of clang's and the sanitizers' builds have not been compared, and under sanitizers this takes minutes.
 #if defined(__clang__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool kOtherBuild = true;
 #else
@@ -58,7 +58,7 @@ class StateHash : public ::testing::Test {
   }
   ~StateHash() override { std::filesystem::remove_all(folder_); }
 
-  /// Of the last tick of each node.
+  /// Hashes of the last tick of each node.
   [[nodiscard]] Hashes Play(const SceneView& scene, double seconds, int threads) const {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
@@ -79,11 +79,11 @@ class StateHash : public ::testing::Test {
     const auto description = scene::ReadSceneYaml(yaml, {});
     scene::SceneData data = scene::BuildScene(description.settings, {});
     const Hashes hashes = Play(data.View(), expected.seconds, threads);
-    EXPECT_GT(cut_length_m_, 2e-3f) << "nothing was cut: the hash says little";
+    EXPECT_GT(cut_length_m_, 2e-3f) << "nothing was cut: the hash proves little";
     const Hashes committed{
         {"physics_node", expected.physics}, {"thermal_node", expected.thermal}, {"haptics_node", expected.haptics}};
     EXPECT_EQ(hashes, committed) << threads << " threads, kernels " << physics::implicit::KernelsFor().name
-                                 << "; if the numerics were meant to change, its row is now:\n"
+                                 << "; if the change of the numerics is intended, its row is now:\n"
                                  << Row(expected, hashes);
   }
 

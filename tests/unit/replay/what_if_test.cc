@@ -70,12 +70,12 @@ TEST_F(WhatIfTest, AWeakGeneratorCutsLess) {
   const WhatIfResult result = WhatIf({"thermal.v_max_V=100"}, {NodeId::kPhysics, NodeId::kThermal});
   EXPECT_EQ(result.first_node, NodeId::kThermal);
   EXPECT_LT(result.cut_length_mm.after, result.cut_length_mm.before);
-  EXPECT_GT(result.max_position_mm, 0) << "what is not cut moves otherwise: physics is fed by thermal";
+  EXPECT_GT(result.max_position_mm, 0) << "uncut tissue moves differently: physics uses the output of thermal";
   EXPECT_NE(ReportText(result, {NodeId::kPhysics, NodeId::kThermal}).find("cut length"), std::string::npos);
 }
 
-// Open loop: the hook goes where it went, and no discharge burns across the steam beneath it. (Tissue that boils at
-// once is no such change: it is opened wider, and the centre line of a wide hole is not longer.)
+// Open loop: the hook keeps its recorded path, and no discharge burns across the steam beneath it. (Immediate boiling
+// would not be such a change: it widens the hole, and the centre line of a wide hole is not longer.)
 TEST_F(WhatIfTest, BelowTheVoltageOfDischargesHardlyAnythingIsCut) {
   const WhatIfResult result = WhatIf({"thermal.v_max_V=60"}, {NodeId::kThermal});
   EXPECT_EQ(result.missing, "");

@@ -11,7 +11,7 @@
 
 namespace fulcrum::testing {
 
-/// While alive, the calling thread is watched. Guards do not nest.
+/// The calling thread is guarded during the lifetime of this object. Guards do not nest.
 class AllocationGuard {
  public:
   AllocationGuard();

@@ -29,7 +29,7 @@ TEST(AllocationGuard, SeesAllocationsReleasesAndLocksOfItsThreadOnly) {
   EXPECT_EQ(lock, 2);
   std::thread other([&] { *kept = *std::make_unique<int>(4); });
   const AllocationGuard guard;
-  // The other thread allocates while this one is watched; join itself needs no memory.
+  // The other thread allocates while this one is guarded; join itself needs no memory.
   other.join();
   EXPECT_EQ(guard.violations(), 0);
 }

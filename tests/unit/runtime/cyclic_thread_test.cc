@@ -33,7 +33,7 @@ TEST(PlanNextPeriod, OneNanosecondLateSkipsOnePeriod) {
   EXPECT_EQ(plan.skipped, 1u);
 }
 
-// Whatever the lateness: the plan is on the grid, not before now, less than a period ahead once late, and the skipped
+// For any lateness: the plan is on the grid, not before now, after a delay less than a period ahead, and the skipped
 // periods account for the whole distance.
 TEST(PlanNextPeriod, KeepsThePhaseForAnyLateness) {
   const std::int64_t previous = 123'456'789;
@@ -71,7 +71,7 @@ TEST(CyclicThread, IndexCountsSkippedPeriodsAndStampsGrow) {
     EXPECT_GT(seen[i].index, seen[i - 1].index);
     EXPECT_GT(seen[i].stamp_ns, seen[i - 1].stamp_ns);
   }
-  EXPECT_GE(seen[5].index, seen[4].index + 4);  // The stall cannot be shorter than it was made.
+  EXPECT_GE(seen[5].index, seen[4].index + 4);  // The stall lasts at least as long as the busy loop.
   EXPECT_GE(stats.overruns, 3u);
   EXPECT_EQ(stats.step.count, stats.ticks);
   EXPECT_EQ(stats.wake.count, stats.ticks);
@@ -106,7 +106,7 @@ TEST(CyclicThread, CarriesItsName) {
   EXPECT_EQ(std::string(name.data()), "a_name_longer_t");
 }
 
-// Whether it is permitted depends on the machine; that it says what to do when it is not must not.
+// Permission depends on the machine; the advice in a refusal must not.
 TEST(RealTime, ARefusalSaysHowToPermitIt) {
   std::string fifo;
   CyclicThread thread({.name = "test", .period_ns = kPeriod}, [&](const Tick& tick) {

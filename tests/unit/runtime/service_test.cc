@@ -1,4 +1,4 @@
-// What a process tells systemd, and where it looks for what was installed with it.
+// Notifications of a process to systemd, and the folders in which it looks for installed files.
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -24,11 +24,11 @@ TEST(ProgressTest, NeedsEveryCounterToAdvance) {
   EXPECT_FALSE(progress.Advanced({1, 1}));
   EXPECT_FALSE(progress.Advanced({2, 1})) << "the second thread hangs";
   EXPECT_TRUE(progress.Advanced({2, 2})) << "compared with the last time that all had advanced";
-  EXPECT_TRUE(progress.Advanced({2, 2, 0})) << "one more to watch";
+  EXPECT_TRUE(progress.Advanced({2, 2, 0})) << "one more thread";
   EXPECT_FALSE(progress.Advanced({3, 3, 0}));
 }
 
-/// The end at which systemd listens, in the environment of this process.
+/// A socket in place of systemd's, in the environment of this process.
 class ServiceNotifyTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -83,7 +83,7 @@ TEST_F(ServiceNotifyTest, DoesNotFeedTheWatchdogOfAThreadThatHangs) {
   for (int i = 1; i < 60; ++i) service.Update((100 + i) * kSecond, {1u + static_cast<unsigned>(i), 7}, "");
   EXPECT_EQ(Heard(), "");
   service.Update(161 * kSecond, {99, 8}, "");
-  EXPECT_EQ(Heard(), "WATCHDOG=1|") << "at once when it goes on";
+  EXPECT_EQ(Heard(), "WATCHDOG=1|") << "at once when the thread continues";
 }
 
 TEST_F(ServiceNotifyTest, BeatsFourTimesInTheTimeOfTheWatchdog) {

@@ -12,17 +12,17 @@ namespace fulcrum::scene {
 struct MeshSample {
   std::string label;                          ///< "gmsh22_binary" …
   std::string name;                           ///< "a.msh" …
-  std::string bytes;                          ///< Of the file `name`.
+  std::string bytes;                          ///< Content of the file `name`.
   std::map<std::string, std::string> beside;  ///< Its companions.
   bool has_tets = false;                      ///< Else: the triangles of SampleSurface().
 };
 
 /// Two tetrahedra of opposite orientation that share a face; coordinates that text and float hold exactly.
 MeshFile SampleTets();
-/// A closed surface of triangles: the boundary of a cube's half, say.
+/// A closed surface of triangles: for example the boundary of half a cube.
 TriangleMesh SampleSurface();
 
-/// Every variant. Those with tetrahedra also hold what readers must leave out: points, lines, values.
+/// Every variant. Those with tetrahedra also contain elements that readers must ignore: points, lines, values.
 std::vector<MeshSample> MeshSamples();
 
 /// Parses `bytes` as the sample's file, with its companions.

@@ -56,7 +56,7 @@ TEST(Repair, TurnsFlippedFacesAndDropsSlivers) {
   for (std::size_t i = 0; i < mesh.triangles.size(); i += 5) {
     std::swap(mesh.triangles[i][0], mesh.triangles[i][1]);
   }
-  // A sliver: an edge split a hair from its end, in both of its triangles.
+  // A sliver: an edge split very near its end, in both of its triangles.
   const Triangle t = mesh.triangles[40];
   const auto middle = static_cast<Index>(mesh.vertices.size());
   mesh.vertices.emplace_back(mesh.vertices[t[0]] + 0.001 * (mesh.vertices[t[1]] - mesh.vertices[t[0]]));
@@ -170,7 +170,7 @@ TEST(Draping, KeepsTheGapAndTheDirections) {
   EXPECT_GT(at(20, 16).x(), at(20, 15).x());
   EXPECT_GT(at(21, 15).y(), at(20, 15).y());
   EXPECT_GT(at(20, 15).z(), 0.012);
-  // Regular: neighbours in a row stand equally far apart.
+  // Regular: neighbours in a row have nearly equal distances.
   for (int c = 1; c < d.membrane.cols; ++c) {
     EXPECT_NEAR((at(20, c) - at(20, c - 1)).norm() / (at(20, 1) - at(20, 0)).norm(), 1, 0.15);
   }

@@ -47,7 +47,7 @@ class Out {
   Out& FloatPoint(const Vec3d& p) {
     return Put(static_cast<float>(p.x())).Put(static_cast<float>(p.y())).Put(static_cast<float>(p.z()));
   }
-  /// A line's end in text, nothing in binary data.
+  /// End of a line in text, nothing in binary data.
   Out& End() { return form_ == kText ? *this << "\n" : *this; }
   [[nodiscard]] bool text() const { return form_ == kText; }
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
@@ -70,7 +70,7 @@ struct VtuVariant {
 
 std::string Vtu(const MeshFile& m, const VtuVariant& v);
 
-/// `first`: number of the first node; `head`: what follows the count in the first line.
+/// @param first number of the first node. @param head text after the count in the first line.
 std::string TetgenNodes(const std::vector<Vec3d>& points, int first);
 std::string TetgenElements(const std::vector<Tetrahedron>& elements, int first, const char* head);
 std::string TetgenElements(const std::vector<Triangle>& elements, int first, const char* head);

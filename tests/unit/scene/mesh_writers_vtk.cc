@@ -74,8 +74,8 @@ std::string VtuSize(std::uint64_t size, const VtuVariant& v) {
   return out.bytes();
 }
 
-/// Appended: two blocks, the second one shorter. Inline: one, announced as large as writers usually make them, which
-/// is more than there is. Header and data are padded apart as VTK's own writer does.
+/// Appended: two blocks, the second one shorter. Inline: one block, announced with the usual size, which exceeds the
+/// data. Header and data are padded separately, as in VTK's own writer.
 std::string VtuCompressed(const std::string& data, const VtuVariant& v) {
   const std::size_t block = v.appended ? data.size() / 2 + 1 : 32768;
   const std::vector<std::string> parts =

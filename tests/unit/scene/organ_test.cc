@@ -1,4 +1,4 @@
-// Organs from files: tetrahedra that others made, open surfaces, walls, a wanted size; each up to a sound scene.
+// Organs from files: given tetrahedra, open surfaces, walls, a target size; each up to a valid scene.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -108,7 +108,7 @@ TEST(OpenSurface, WallKeepsTheOpeningsOpenAndPointsOutward) {
 }
 
 TEST(ClosedSurface, WallMakesItHollow) {
-  // An ellipsoid: the open tube's ends drawn together.
+  // An ellipsoid: the ends of the open tube are contracted to points.
   TriangleMesh ellipsoid = CappedTube();
   for (Vec3d& p : ellipsoid.vertices) {
     const double latitude = 0.48 * M_PI * p.y() / kHalfLength;
@@ -172,7 +172,7 @@ TEST(TetrahedraOfAFile, AreTurnedMergedAndFreedOfCrumbs) {
     file.vertices.push_back(p);
   }
   file.tets.push_back({crumb, crumb + 1, crumb + 2, crumb + 3});
-  // One tetrahedron has corners of its own at the same places, as where two parts were written apart.
+  // One tetrahedron has separate corners at the same places, as where two parts were written separately.
   for (Index& v : file.tets[40]) {
     file.vertices.push_back(Vec3d(file.vertices[v]));
     v = static_cast<Index>(file.vertices.size() - 1);
@@ -282,7 +282,7 @@ void ExpectSound(const SceneData& data) {
   EXPECT_LT(q.largest_dihedral_deg, 170);
   EXPECT_GT(q.bindings, 20u);
   EXPECT_LT(q.rms_flat_error, 0.05);
-  EXPECT_GT(q.least_binding_m, 0.0005) << "the membrane stays clear of the organ";
+  EXPECT_GT(q.least_binding_m, 0.0005) << "the membrane does not touch the organ";
 }
 
 TEST_F(OrganScene, TetrahedraOfAFileAreTakenAsTheyAre) {

@@ -1,4 +1,4 @@
-// The built scenes: counts of the paper, sound elements, valid colours, bindings, embedding, rest lengths, script.
+// The built scenes: counts of the paper, valid elements, valid colours, bindings, embedding, rest lengths, script.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -102,11 +102,11 @@ TEST_P(ProceduralScene, AtlasMetricGivesTheLengthsOfTheSheet) {
       worst = std::max(worst, std::abs(told / length - 1));
     }
   }
-  EXPECT_LT(worst, 1e-4) << "positions are floats";
+  EXPECT_LT(worst, 1e-4) << "rounding of the float positions";
 }
 
 TEST(AtlasMetric, TellsStretchesAndArea) {
-  const AtlasMetric shear{1, 0.5, 1.25};  // Of the map (s + t/2, t).
+  const AtlasMetric shear{1, 0.5, 1.25};  // Metric of the map (s + t/2, t).
   EXPECT_NEAR(shear.area(), 1, 1e-12);
   EXPECT_NEAR(shear.stretches()[0] * shear.stretches()[1], 1, 1e-12);
   const AtlasMetric stretched{4, 0, 0.25};
@@ -122,8 +122,8 @@ TEST(SplitInFive, FillsTheWallWithFacesThatMatchAlsoRoundTheRing) {
   EXPECT_EQ(q.tets, 42u * 24u * 5u);
   EXPECT_EQ(q.organ_vertices, six.organ_vertices);
   EXPECT_GT(q.least_tet_volume_m3, 0);
-  EXPECT_NEAR(q.organ_volume_m3 / six.organ_volume_m3, 1, 0.005) << "bricks are not quite flat-sided";
-  // Two triangles for every outer face of a brick: faces that did not match would show as more.
+  EXPECT_NEAR(q.organ_volume_m3 / six.organ_volume_m3, 1, 0.005) << "the sides of bricks are not exactly flat";
+  // Two triangles for every outer face of a brick: faces that do not match would give more.
   EXPECT_EQ(five.View().tube_surface.size(), 2u * (2 * 42 * 24 + 2 * 24));
   std::multiset<std::pair<Index, Index>> edges;
   for (const Triangle& t : five.View().tube_surface) {
@@ -213,7 +213,7 @@ TEST_P(ProceduralScene, MembraneLiesOutsideTheOrganWithFatBetween) {
 }
 
 TEST_P(ProceduralScene, EmbeddedSurfaceFollowsTheTetrahedra) {
-  // Weights reproduce positions: under any affine map of the particles the surface goes along exactly.
+  // Weights reproduce positions: the surface follows any affine map of the particles exactly.
   const Eigen::Matrix3d map = (Eigen::Matrix3d() << 1.1, 0.2, 0, -0.1, 0.9, 0.3, 0.2, 0, 1.2).finished();
   for (std::size_t i = 0; i < view_.surface_vertices.size(); i += 37) {
     const EmbeddedVertex& v = view_.surface_vertices[i];
@@ -281,7 +281,7 @@ TEST_P(ProceduralScene, ScriptGraspsThenCutsWithinTheWorkspace) {
   EXPECT_GT(closed_s, 0);
   EXPECT_GT(cut_s, closed_s);
   EXPECT_GT((cut_to - cut_from).norm(), std::string(GetParam()) == "small" ? 0.008f : 0.028f);
-  // No tool moves faster than a hand.
+  // No tool is faster than a hand.
   for (std::uint32_t tool = 0; tool < kMaxTools; ++tool) {
     for (double t = 0; t < view_.script_duration_s; t += 0.01) {
       const Vec3f a = EvaluateScript(view_.script, tool, t).p_W, b = EvaluateScript(view_.script, tool, t + 0.01).p_W;

@@ -1,5 +1,5 @@
-// Readers of mesh files: every variant of every format gives the same mesh; what is altered, cut short or absurd is
-// refused with file, place, value and what was expected.
+// Readers of mesh files: every variant of every format gives the same mesh; altered, truncated or absurd files are
+// refused with file, place, value and valid values.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 namespace fulcrum::scene {
 namespace {
 
-/// Elements by the places of their corners: files may order and weld vertices their own way.
+/// Elements by the positions of their corners: files may order and weld vertices differently.
 template <std::size_t N>
 std::vector<std::array<Vec3d, N>> Corners(const std::vector<Vec3d>& vertices,
                                           const std::vector<std::array<Index, N>>& elements) {
@@ -43,7 +43,7 @@ std::string Refusal(const MeshSample& sample, const std::string& bytes) {
   }
 }
 
-/// `text` with the first `from` replaced, which must be there.
+/// `text` with the first `from` replaced, which must exist.
 std::string With(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
@@ -73,10 +73,10 @@ TEST_P(EveryVariant, CutShortAnywhereIsRefusedOrStillGivesAllOfIt) {
     const std::string bytes = sample.bytes.substr(0, size);
     try {
       const MeshFile read = ParseSample(sample, bytes);
-      // Formats without a mark at their end: what was cut is behind the mesh, or digits of its last number.
+      // Formats without an end mark: the truncated part is behind the mesh, or consists of digits of its last number.
       EXPECT_LE(read.triangles.size(), whole.triangles.size());
       EXPECT_LE(read.tets.size(), whole.tets.size());
-      // OBJ announces no count: a shorter one is another valid file.
+      // OBJ has no count: a truncated file is another valid file.
       const bool is_obj = sample.name == "a.obj";
       const bool within_number = size > 0 && std::isdigit(static_cast<unsigned char>(sample.bytes[size - 1])) != 0 &&
                                  std::isdigit(static_cast<unsigned char>(sample.bytes[size])) != 0;
@@ -325,7 +325,7 @@ TEST(MeshFiles, CompanionsThatAreMissingAreNamed) {
   sample.beside.clear();
   EXPECT_EQ(Refusal(sample, sample.bytes), "a.node: needs a.ele or a.face beside it; neither is there");
   sample.beside["a.ele"] = "2 4 0\n0 0 1 2 9\n1 0 1 2 3\n";
-  EXPECT_EQ(Refusal(sample, sample.bytes).find("a.ele: line 2: vertex 9"), 0u) << "the file at fault is named";
+  EXPECT_EQ(Refusal(sample, sample.bytes).find("a.ele: line 2: vertex 9"), 0u) << "the message names the faulty file";
 }
 
 TEST(MeshFiles, NothingAndTheUnknownAreRefused) {

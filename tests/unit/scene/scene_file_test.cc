@@ -1,4 +1,4 @@
-// The compiled scene file: round trip, and refusal of everything that is not whole.
+// The compiled scene file: round trip, and refusal of every damaged file.
 #include "services/scene/format/scene_file.h"
 
 #include <gtest/gtest.h>
@@ -166,7 +166,7 @@ TEST_F(SceneFileTest, AnotherVersionIsAMismatch) {
 }
 
 TEST_F(SceneFileTest, AnAlteredByteInAnySectionIsNamed) {
-  // Middle of the file lies in one of the arrays.
+  // The middle of the file lies in one of the arrays.
   std::string altered = bytes_;
   altered[altered.size() / 2] = static_cast<char>(altered[altered.size() / 2] ^ 0x10);
   Write(altered);
@@ -190,7 +190,7 @@ TEST_F(SceneFileTest, RandomMutationsAreRefusedOrHarmless) {
     if (!Refusal().empty()) {
       ++refused;
     } else {
-      // Only padding between sections is not covered by a checksum; nobody reads it.
+      // Only padding between sections is not covered by a checksum, and it is never read.
       const SceneFile file(file_);
       EXPECT_EQ(ContentHash(file.view()), hash_);
     }

@@ -1,4 +1,4 @@
-// How tools look: meshes named in the description, in the compiled scene.
+// Appearance of tools: meshes named in the description, in the compiled scene.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

@@ -25,7 +25,7 @@ std::string TextOf(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-/// `text` with the first `from` replaced, which must be there.
+/// `text` with the first `from` replaced, which must exist.
 std::string With(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
@@ -60,7 +60,8 @@ TEST(ShippedScenes, EffectiveYamlReadsBackToTheSameScene) {
   const CompiledScene scene = CompileScene(kScenes / "small.yaml", {}, {});
   const SceneDescription again = ParseSceneYaml(scene.effective_yaml, "effective.yaml", {});
   EXPECT_EQ(BuildProcedural(again.settings).fixed.hash, scene.data.fixed.hash);
-  EXPECT_NE(scene.effective_yaml.find("shrink_max: 0.3"), std::string::npos) << "defaults are written out, plainly";
+  EXPECT_NE(scene.effective_yaml.find("shrink_max: 0.3"), std::string::npos)
+      << "defaults are written, without rounding errors";
 }
 
 TEST(ShippedScenes, ExercisesCompileAndAreAssessed) {
@@ -73,7 +74,7 @@ TEST(ShippedScenes, ExercisesCompileAndAreAssessed) {
     for (std::size_t i = 0; i < kMeasureCount; ++i) {
       task += kMeasures[i].role == MeasureRole::kTask ? static_cast<double>(view.assessment.points[i]) : 0;
     }
-    EXPECT_GT(task, 0) << name << ": whoever does nothing is given nothing";
+    EXPECT_GT(task, 0) << name << ": a session without any action gets no points";
   }
 }
 
@@ -94,13 +95,14 @@ TEST(ShippedScenes, OpenHelpGivesASoundSceneOrSaysWhatIsMissing) {
   EXPECT_GE(q.tets, 6000u);
   EXPECT_LE(q.tets, 10000u);
   EXPECT_LE(q.vertices, static_cast<std::size_t>(kMaxTissueVertices));
-  EXPECT_NEAR(1e6 * q.organ_volume_m3, 205, 10) << "the volume the surface encloses";
+  EXPECT_NEAR(1e6 * q.organ_volume_m3, 205, 10) << "the volume enclosed by the surface";
   EXPECT_GT(q.least_dihedral_deg, 5);
   EXPECT_GT(q.least_binding_m, 0.0005);
   EXPECT_LT(q.rms_flat_error, 0.05);
   EXPECT_GT(q.bindings, 500u);
   EXPECT_GE(view.static_surfaces.size(), 3u);
-  EXPECT_EQ(CompileScene(kScenes / "openhelp.yaml", {}, {}).data.fixed.hash, view.hash) << "meshing must repeat itself";
+  EXPECT_EQ(CompileScene(kScenes / "openhelp.yaml", {}, {}).data.fixed.hash, view.hash)
+      << "meshing must be reproducible";
 }
 
 // ---------------------------------------------------------------------------------------------------- refusals
@@ -293,7 +295,7 @@ TEST(SceneYaml, AssessmentIsOptionalAndCompiled) {
   EXPECT_EQ(a.limit[static_cast<std::size_t>(Measure::kPathLength)], InfoOf(Measure::kPathLength).limit);
   const SceneData scene = BuildProcedural(read.settings);
   EXPECT_EQ(FindFault(scene.View()), std::nullopt);
-  // Straight along the sheet: 0.6 of its length, within what flattening and its bend change.
+  // Straight along the sheet: 0.6 of its length, apart from the effects of flattening and of its bend.
   double length = 0;
   for (std::size_t i = 1; i < scene.planned_line.size(); ++i) {
     length += static_cast<double>((scene.planned_line[i] - scene.planned_line[i - 1]).norm());
@@ -352,7 +354,7 @@ TEST_F(SceneOnBase, SaysOnlyWhatIsDifferent) {
   key.height_m = 0.02;
   wanted.script.push_back(key);
   EXPECT_EQ(BuildProcedural(read.settings).fixed.hash, BuildProcedural(wanted).fixed.hash);
-  EXPECT_EQ(read.settings.description, "") << "a description is the scene's own";
+  EXPECT_EQ(read.settings.description, "") << "the description of the base is not inherited";
   const SceneDescription again = ParseSceneYaml(read.effective_yaml, "effective.yaml", {});
   EXPECT_EQ(BuildProcedural(again.settings).fixed.hash, BuildProcedural(wanted).fixed.hash);
 }

@@ -90,7 +90,7 @@ TEST(ProcessTable, KnowsChildrenAndWhatTheyHold) {
   auto child = supervisor::ChildProcess::Start("/bin/sleep", {"20"}, "/dev/null");
   EXPECT_GT(ResidentBytes(::getpid()).value_or(0), 1'000'000u);
   std::map<std::string, pid_t> children;
-  // Until it is a shell no longer.
+  // Until the shell has become `sleep`.
   for (int i = 0; i < 1000 && !children.contains("sleep"); ++i) {
     children = ChildrenOf(::getpid());
     ::usleep(1000);
@@ -116,7 +116,7 @@ TEST(ProcessTable, ProcessorsGoOnCounting) {
 SoakRecord Grown(double minutes, double leak_MB_per_min) {
   SoakRecord record;
   for (int s = 0; s < 60 * minutes; ++s) {
-    // A start takes memory, which is no leak.
+    // The memory of the start is no leak.
     const double MB = 100 * std::min(1.0, (s + 1) / 10.0) + leak_MB_per_min * s / 60.0;
     record.AddMemory(s, "physics_node", 10, static_cast<std::uint64_t>(1e6 * MB));
     record.SetAlive({10});
@@ -127,7 +127,7 @@ SoakRecord Grown(double minutes, double leak_MB_per_min) {
 
 TEST(SoakRecord, GrowthIsWhatComesAfterTheStart) {
   EXPECT_NEAR(Grown(10, 0).LargestGrowth_MB(), 0, 1e-9);
-  // From 30 … 40 s to the last 10 s.
+  // From the period 30 … 40 s to the last 10 s.
   EXPECT_NEAR(Grown(10, 3).LargestGrowth_MB(), 3 * (595 - 35) / 60.0, 0.1);
   EXPECT_TRUE(Grown(10, 1).Passes({}));
   EXPECT_FALSE(Grown(10, 3).Passes({}));
@@ -142,8 +142,8 @@ TEST(SoakRecord, WhoIsKilledHasNotCrashed) {
   record.SetAlive({2, 3});
   EXPECT_EQ(record.crashes(), 0);
   record.SetAlive({3});
-  EXPECT_EQ(record.crashes(), 1) << "a freeze is no reason to end";
-  record.AddMemory(2, "node", 1, 1);  // The number of the first comes again.
+  EXPECT_EQ(record.crashes(), 1) << "a node that freezes and ends is a crash";
+  record.AddMemory(2, "node", 1, 1);  // The process id of the first is reused.
   record.SetAlive({3});
   EXPECT_EQ(record.crashes(), 2);
   EXPECT_FALSE(record.Passes({})) << "it has not ended";
@@ -163,7 +163,7 @@ TEST(SoakRecord, DriftIsTheDistanceOfPeriodsFromTheClock) {
     health.stamp.stamp_ns = 1'000'000'000 + i * std::int64_t{100'000'000};
     health.ticks = 7 + 9 * static_cast<std::uint64_t>(i);  // A tenth of the periods is skipped …
     health.overruns = static_cast<std::uint64_t>(i);       // … and counted,
-    if (i > 50) health.ticks -= 2;                         // but for two.
+    if (i > 50) health.ticks -= 2;                         // except for two.
     health.rate_achieved_Hz = 90;
     record.AddHealth(0.1 * i, health);
   }
@@ -180,7 +180,7 @@ TEST(SoakPage, ShowsFiguresCurvesAndWhatWasDone) {
                            "latest/report.html"}) {
     EXPECT_NE(page.find(part), std::string::npos) << part;
   }
-  EXPECT_EQ(page.find("Rate of what"), std::string::npos) << "nothing was heard of it";
+  EXPECT_EQ(page.find("Rate of what"), std::string::npos) << "no Health of it was received";
   EXPECT_TRUE(
       SamplesCsv(record).starts_with("time_s,program,process,figure,value\n0.0,physics_node,10,memory_MB,10.0"));
 }

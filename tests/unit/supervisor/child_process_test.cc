@@ -18,7 +18,7 @@ namespace {
 TEST(ChildProcess, InheritsNoOpenFileOfItsParent) {
   const TemporaryFolder folder;
   const std::filesystem::path log = folder.path() / "log", secret = folder.path() / "open-in-the-parent";
-  // As the bus opens its sockets: without O_CLOEXEC.
+  // Opened like the sockets of the bus: without O_CLOEXEC.
   const int fd = ::open(secret.c_str(), O_RDWR | O_CREAT, 0600);
   ASSERT_GE(fd, 0);
   ChildProcess child = ChildProcess::Start("/bin/ls", {"-l", "/proc/self/fd"}, log);

@@ -40,7 +40,7 @@ TEST_F(Panel, ASimulatedOperatorSetsItAheadOfEachUse) {
   GeneratorPanel panel(cart_, script_);
   EXPECT_EQ(panel.setting().cut_W, 30) << "before the session begins";
   EXPECT_EQ(panel.setting().coag_W, 20);
-  EXPECT_EQ(panel.setting().blend_W, 37) << "the script says nothing about it";
+  EXPECT_EQ(panel.setting().blend_W, 37) << "the script does not set it";
   EXPECT_FALSE(panel.Follow(3.9));
   EXPECT_TRUE(panel.Follow(4.02));
   EXPECT_EQ(panel.turned_s(), 4);

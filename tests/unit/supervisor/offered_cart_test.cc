@@ -11,7 +11,7 @@ constexpr std::uint32_t BitOf(NodeId node) { return 1u << static_cast<unsigned>(
 constexpr std::uint32_t kDevices = BitOf(NodeId::kHaptics) | BitOf(NodeId::kHandleBridge);
 const char* const kFrom = "10.0.0.1";
 
-/// A cart that names a path or a device wherever it can.
+/// A cart with a path or a device in every possible place.
 config::CartConfig FullOfPaths() {
   config::CartConfig cart;
   cart.handles[0].kind = config::LinkKind::kSerial;
@@ -49,7 +49,7 @@ TEST(OfferedCart, HasNoPathAndSaysWhatItWithholdsFromTheNodesThere) {
   EXPECT_EQ(yaml.find("/dev"), std::string::npos) << yaml;
   EXPECT_EQ(yaml.find("/home"), std::string::npos) << yaml;
   EXPECT_EQ(offered.withheld, "handles.tool0, handles.tool1, pedal, devices.tool0, devices.tool1.motion");
-  // A picture needs none of them.
+  // A node for pictures needs none of them.
   const OfferedCart picture = CartForHost(FullOfPaths(), BitOf(NodeId::kRender));
   EXPECT_EQ(picture.withheld, "");
   EXPECT_EQ(config::CartToYaml(picture.cart), yaml);
@@ -68,14 +68,14 @@ TEST(OfferedCart, AHostNeedsItsOwnCartForWhatIsWithheld) {
   const config::CartConfig cart = CartOnHost(OfferOf(offered), kFrom, own);
   EXPECT_EQ(cart.handles[0].link.port, "/dev/ttyACM3");
   EXPECT_EQ(cart.devices[1].motion, "/srv/motion.csv");
-  EXPECT_EQ(cart.timing(NodeId::kPhysics).rate_Hz, 50) << "the rates are those of the session's cart";
+  EXPECT_EQ(cart.timing(NodeId::kPhysics).rate_Hz, 50) << "the rates come from the session's cart";
 }
 
 TEST(OfferedCart, APathInAReceivedCartIsRefusedWithItsKey) {
   struct Case {
     const char* yaml;
     const char* key;
-    bool with_own;  ///< Also where the host has a cart file of its own.
+    bool with_own;  ///< True if it also holds for a host with a cart file of its own.
   };
   for (const Case& bad : {Case{"security: {keys: /etc/ssh}", "security.keys", true},
                           Case{"handles: {tool0: {kind: serial, port: /dev/mem}}", "handles.tool0", false},

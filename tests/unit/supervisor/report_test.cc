@@ -1,4 +1,4 @@
-// From what a session reports to its summary, table, pictures, clip and report.
+// Summary, table, pictures, clip and report from the data of a session.
 #include "services/session/supervisor/report.h"
 
 #include <gtest/gtest.h>
@@ -142,7 +142,7 @@ TEST(OutcomeTest, SummaryIsFlatJsonWithTextEscaped) {
   EXPECT_NE(json.find(R"("scene": "a \"b\"\u000a\\")"), std::string::npos) << json;
   EXPECT_NE(json.find("\"max_displacement_mm\": 3.25"), std::string::npos) << json;
   EXPECT_NE(json.find("\"physics_node.step_p99_ms\": 2"), std::string::npos) << json;
-  // Without heat there is no temperature, not one of 0.
+  // Without heat no temperature is reported.
   EXPECT_EQ(json.find("highest_temperature_C"), std::string::npos) << json;
   EXPECT_EQ(std::count(json.begin(), json.end(), '{'), 1);
 }
@@ -229,7 +229,7 @@ TEST(PictureTest, FramesAreFoundByTimeAndStrangersLeft) {
 TEST(PictureTest, SpreadTakesFirstLastAndEvenTimesOnceEach) {
   std::vector<Frame> frames;
   for (int i = 0; i <= 40; ++i) {
-    if (i < 10 || i > 20) frames.push_back({"", 0.5 * i});  // A gap, as while the renderer was dead.
+    if (i < 10 || i > 20) frames.push_back({"", 0.5 * i});  // A gap, as while the renderer did not run.
   }
   const std::vector<Frame> chosen = Spread(frames, 9);
   ASSERT_EQ(chosen.size(), 9u);
@@ -252,7 +252,7 @@ TEST(PictureTest, EmbedsAndShrinks) {
   EXPECT_TRUE(EmbedPng(folder.path() / "bad.png", 1).empty());
 }
 
-/// A program `ffmpeg` of the test's own, alone on the path.
+/// A substitute for `ffmpeg`, alone in PATH.
 class ClipTest : public ::testing::Test {
  protected:
   ClipTest() : path_(std::getenv("PATH")) { setenv("PATH", folder_.path().c_str(), 1); }

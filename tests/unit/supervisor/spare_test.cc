@@ -1,4 +1,4 @@
-// A spare takes the place of a node that has died, and of no other. The node is a shell that says what becomes of it.
+// A spare replaces a node that has died, and no other. The node is a shell that writes its events to a file.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
@@ -49,7 +49,7 @@ class SpareTest : public ::testing::Test {
     std::ifstream stream(folder_ / "log");
     return {std::istreambuf_iterator<char>(stream), {}};
   }
-  /// False after a time that only a fault can take.
+  /// False after a time limit that only a fault can exceed.
   bool SaysUntil(const std::string& what) const {
     for (int i = 0; i < 10'000; ++i) {
       if (Log().find(what) != std::string::npos) return true;
@@ -63,7 +63,7 @@ class SpareTest : public ::testing::Test {
     health.pid = node_.pid();
     node_.OnHealth(health, now_ns_);
   }
-  /// Until it has died and runs again.
+  /// Waits until the node has died and runs again.
   void WaitForRestart() {
     for (int i = 0; i < 10'000 && !node_.Update(now_ns_); ++i) ::usleep(1000);
     (void)node_.Update(now_ns_);
@@ -110,7 +110,7 @@ TEST_F(SpareTest, OfTheProgramAsItWasIsNotUsedForARestartByCommand) {
 TEST_F(SpareTest, ThatDiedIsReplacedByAStartAsUsual) {
   ASSERT_TRUE(SaysUntil("runs\n"));
   StartSpare();
-  // Its own group, as every child's: the shell and what it has begun.
+  // A process group of its own, as for every child: the shell and its children.
   for (const auto& entry : fs::directory_iterator("/proc/self/task/" + std::to_string(::getpid()))) {
     if (entry.path().filename() != "children") continue;
     std::ifstream children(entry.path());

@@ -1,4 +1,4 @@
-// One node as the supervisor sees it: its process, when it is started again, one that systemd runs.
+// One node under the supervisor: its process, its restarts, and a node that systemd runs.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -24,7 +24,7 @@ constexpr std::int64_t kMs = 1'000'000;
 
 // ------------------------------------------------------------------------------------------------- attached node
 
-/// Stands for a node that systemd runs: a process that only sleeps.
+/// A sleeping process in place of a node that systemd runs.
 class AttachedNodeTest : public ::testing::Test {
  protected:
   AttachedNodeTest() : node_(Command(), folder_.path() / "nodes", [this](NodeId, const char* verb) { order_ = verb; }) {
@@ -63,25 +63,26 @@ TEST_F(AttachedNodeTest, WritesWhatItsServiceIsGiven) {
   EXPECT_THROW((void)AttachedNode::ArgumentsFile({"--file", "/my recordings/a.mcap"}), InputError);
   EXPECT_THROW((void)AttachedNode::ArgumentsFile({"$HOME"}), InputError);
   node_.Stop();
-  EXPECT_FALSE(fs::exists(folder_.path() / "nodes" / "physics_node")) << "it would be started after the session";
+  EXPECT_FALSE(fs::exists(folder_.path() / "nodes" / "physics_node"))
+      << "otherwise it would be started after the session";
 }
 
 TEST_F(AttachedNodeTest, NoticesADeathAndTheReturn) {
   ChildProcess first = Sleeper(), other = Sleeper();
   EXPECT_TRUE(Report(first.pid()));
-  EXPECT_FALSE(Report(other.pid())) << "the first one lives";
+  EXPECT_FALSE(Report(other.pid())) << "the first process runs";
   EXPECT_FALSE(node_.Update(kStart).has_value());
   const pid_t dead = first.pid();
   Kill(&first);
-  EXPECT_FALSE(node_.Update(kStart).has_value()) << "it may have said that it ends";
+  EXPECT_FALSE(node_.Update(kStart).has_value()) << "its last Health may still arrive";
   const auto death = node_.Update(kStart + 300 * kMs);
   ASSERT_TRUE(death.has_value());
   EXPECT_FALSE(death->for_good);
   EXPECT_FALSE(death->asked);
   EXPECT_EQ(death->at_ns, kStart);
   EXPECT_FALSE(node_.running());
-  EXPECT_FALSE(Report(dead)) << "a late sample of the dead one";
-  EXPECT_FALSE(node_.Update(kStart + 400 * kMs).has_value()) << "told once";
+  EXPECT_FALSE(Report(dead)) << "a late sample of the dead process";
+  EXPECT_FALSE(node_.Update(kStart + 400 * kMs).has_value()) << "reported once";
   EXPECT_TRUE(Report(other.pid()));
   EXPECT_TRUE(node_.running());
 }
@@ -103,7 +104,7 @@ TEST_F(AttachedNodeTest, LastWordsMayComeAfterTheEnd) {
   Kill(&first);
   EXPECT_FALSE(node_.Update(kStart).has_value());
   EXPECT_TRUE(Report(dead, HealthState::kStopping));
-  EXPECT_FALSE(node_.Update(kStart + 300 * kMs).has_value()) << "it was stopped, it did not die";
+  EXPECT_FALSE(node_.Update(kStart + 300 * kMs).has_value()) << "it was stopped and did not die";
 }
 
 TEST_F(AttachedNodeTest, OneThatWasStoppedIsReportedWhenItIsBack) {
@@ -118,7 +119,7 @@ TEST_F(AttachedNodeTest, OneThatWasStoppedIsReportedWhenItIsBack) {
   const auto death = node_.Update(kStart + kMs);
   ASSERT_TRUE(death.has_value());
   EXPECT_TRUE(death->asked);
-  EXPECT_EQ(death->at_ns, kStart) << "how long it took to come back counts from its end";
+  EXPECT_EQ(death->at_ns, kStart) << "the time of the restart counts from its end";
 }
 
 TEST_F(AttachedNodeTest, HasFailedForGoodWhenItStaysAway) {

@@ -1,4 +1,4 @@
-// What `fulcrum swap` may start.
+// Programs that `fulcrum swap` may start.
 #include <gtest/gtest.h>
 #include <unistd.h>
 

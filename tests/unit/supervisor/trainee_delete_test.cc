@@ -1,4 +1,4 @@
-// What is left of a trainee: nothing in the bytes of the database, no name in the session folders, and no file of a
+// Removal of a trainee: nothing remains in the bytes of the database, no name in the session folders, and no file of a
 // session that other users can read.
 #include <gtest/gtest.h>
 #include <sqlite3.h>
@@ -126,7 +126,7 @@ TEST_F(TraineeDeleteTest, TheNameGoesFromTheSessionFoldersAndNothingElse) {
   const std::string other = Bytes(folder_ / "2" / "assessment.json");
   for (const fs::path& file : traces) RemoveName(file, "Ann");
   EXPECT_TRUE(FindTraces(folder_, "Ann").empty());
-  // What is left is what a session without a trainee's name has.
+  // The rest equals that of a session without a trainee's name.
   EXPECT_EQ(Bytes(folder_ / "1" / "assessment.json"), SheetJson(sheet, {"line", "1", "", ""}));
   EXPECT_EQ(Bytes(folder_ / "1" / "report.html"), Bytes(folder_ / "4" / "report.html"));
   EXPECT_EQ(Bytes(folder_ / "2" / "assessment.json"), other);

@@ -164,7 +164,7 @@ TEST_F(TrainingLogTest, ARowThatCannotBeWrittenIsSaidSo) {
   const std::string refusal = Refusal([&] { log.Add(Row("Ann", 1, 50)); });
   EXPECT_NE(refusal.find("could not be added (no room)"), std::string::npos) << refusal;
   EXPECT_NE(refusal.find("assessment.json"), std::string::npos);
-  EXPECT_TRUE(log.SessionsOf("Ann", "").empty()) << "whole or not at all";
+  EXPECT_TRUE(log.SessionsOf("Ann", "").empty()) << "added as a whole or not at all";
 }
 
 TEST(TraineeNameTest, IsChecked) {

@@ -1,4 +1,4 @@
-// What a session suffers, told by Health and deaths, and what its verdict makes of it.
+// Faults of a session, detected from Health and deaths, and the verdict.
 #include "services/session/supervisor/verdict.h"
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kTurn_s = 0.1;
 
-/// A session of one servo and one picture, with a Health of each in every turn unless a test says otherwise.
+/// A session of one servo and one picture; each sends a Health in every turn unless a test changes it.
 class VerdictTest : public ::testing::Test {
  protected:
   VerdictTest() { verdict_.Begin({.nodes = {NodeId::kHaptics, NodeId::kRender}, .remote = {}, .restarts = 3}); }
@@ -102,7 +102,7 @@ TEST_F(VerdictTest, AServoThatStopsIsNamedWhileItIsStopped) {
   EXPECT_NEAR(verdict_.faults()[0].time_s, time_s_, 0.25);
   servo_.speaks = true;
   RunFor(3);
-  EXPECT_EQ(End(), "haptics_node was silent for more than 1.2 s\n") << "told once";
+  EXPECT_EQ(End(), "haptics_node was silent for more than 1.2 s\n") << "reported once";
   EXPECT_EQ(verdict_.code(), ExitCode::kFailure);
 }
 
@@ -130,7 +130,7 @@ TEST_F(VerdictTest, ARateFarBelowTheOneAskedFor) {
   RunFor(11);
   servo_.achieved_Hz = 600;
   EXPECT_EQ(Faults(), "");
-  RunFor(20);  // The second window begins 0.7 s before.
+  RunFor(20);  // The second window begins 0.7 s earlier.
   EXPECT_EQ(Faults(), "haptics_node ran at 627.8 of 1000 Hz over 10 s; at least 75 % are needed\n");
 }
 

@@ -1,4 +1,4 @@
-// Pieces of sheet that a cut leaves hanging on nothing.
+// Pieces of sheet that a cut has separated.
 #include "thermal_node/topology/crumbs.h"
 
 #include <gtest/gtest.h>
@@ -86,7 +86,7 @@ TEST_F(CrumbsTest, WhatHangsOnByOneFaceStaysAndByACornerGoes) {
   }
   EXPECT_TRUE(crumbs_.TakeOut(&field_, changed_, &ledger_).empty());
   Remove(outer);
-  // The rest of the bridge belongs to the piece, and touches the sheet nowhere.
+  // The rest of the bridge belongs to the piece and does not touch the sheet.
   EXPECT_FALSE(crumbs_.TakeOut(&field_, changed_, &ledger_).empty());
   EXPECT_TRUE(Removed(kMiddle));
   EXPECT_TRUE(Removed(inner));
@@ -104,7 +104,7 @@ TEST_F(CrumbsTest, EachOfSeveralIsJudgedForItself) {
 
 TEST_F(CrumbsTest, NothingIsTakenWhereNothingWasCut) {
   EXPECT_TRUE(crumbs_.TakeOut(&field_, changed_, &ledger_).empty());
-  // A piece that was cut free elsewhere waits until something changes there.
+  // A piece that was separated elsewhere remains until something changes there.
   CutAround(kMiddle, 4);
   RemovedBox elsewhere;
   elsewhere.Add(CellIndex{20, 20});

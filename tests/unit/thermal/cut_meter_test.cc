@@ -1,4 +1,4 @@
-// The centre line's length, width and straying on holes whose shape is known.
+// Length, width and deviation of the centre line on holes of known shape.
 #include "thermal_node/coupling/cut_meter.h"
 
 #include <gtest/gtest.h>
@@ -16,14 +16,15 @@ namespace fulcrum::thermal {
 namespace {
 
 constexpr float kHalf_m = 6.5e-4f;      ///< Half the width of a usual slit.
-constexpr float kStep_m = 4e-4f;        ///< Way between two updates: 8 mm/s at 20 Hz.
-constexpr float kMostRise_m = 1.0e-3f;  ///< Of the length in such a step.
+constexpr float kStep_m = 4e-4f;        ///< Distance between two updates: 8 mm/s at 20 Hz.
+constexpr float kMostRise_m = 1.0e-3f;  ///< Largest increase of the length in such a step.
 constexpr float kPi = std::numbers::pi_v<float>;
 
-/// A sheet, what has been cut out of it, and its meter.
+/// A sheet, its removed cells, and its meter.
 class Cut {
  public:
-  /// Takes out what `inside` says within a square of half side `reach_m` about a place; noted for the next Update.
+  /// Removes the cells for which `inside` is true within a square of half side `reach_m` about a place; noted for the
+  /// next Update.
   void Take(const Vec2f& at, float reach_m, const std::function<bool(const Vec2f&)>& inside) {
     const CellIndex low = field.sheet().CellOf(at - Vec2f::Constant(reach_m));
     const CellIndex high = field.sheet().CellOf(at + Vec2f::Constant(reach_m));
@@ -49,7 +50,7 @@ class Cut {
     EXPECT_GE(meter.length_m(), before);
     if (before > 0.0f) largest_rise_m = std::max(largest_rise_m, meter.length_m() - before);
   }
-  /// A tip that goes along a curve, from parameter 0 to `length_m`, with an update each kStep_m.
+  /// Moves a tip along a curve, from parameter 0 to `length_m`, with an update each kStep_m.
   void Along(const std::function<Vec2f(float)>& curve, float length_m, float half_m = kHalf_m) {
     constexpr float kFine_m = 5e-5f;
     const auto count = static_cast<int>(std::lround(length_m / kFine_m));
@@ -122,7 +123,7 @@ TEST(CutMeterTest, CircleGrowsWithoutJumpsAndARingCountsOnce) {
     const float round_m = 2 * kPi * radius_m;
     cut.Along(Circle(radius_m), 0.75f * round_m);
     EXPECT_NEAR(cut.meter.length_m(), 0.75f * round_m + 2 * kHalf_m, 0.02f * round_m);
-    // The last piece: the crumb within the smallest ring is too large to be debris, so the ring stays one.
+    // Closes the ring: the crumb within the smallest ring is too large to be debris, so the ring is kept.
     cut.Along(Circle(radius_m), round_m);
     EXPECT_NEAR(cut.meter.length_m(), round_m, 0.02f * round_m);
     EXPECT_LE(cut.largest_rise_m, 0.7e-3f);
@@ -154,9 +155,9 @@ TEST(CutMeterTest, BranchesCountOnceAndComeWithoutAJump) {
     const Vec2f fork(0.02f, 0.02f), end = fork + 0.012f * Vec2f(std::cos(angle), std::sin(angle));
     cut.largest_rise_m = 0;
     cut.Line(fork, end);
-    // What is published follows more slowly; a branch must not count all at once.
+    // The published length follows more slowly; a branch must not be added at once.
     EXPECT_LE(cut.largest_rise_m, 2 * kMostRise_m) << angle;
-    // At an acute fork the two centre lines are one for a while.
+    // At an acute fork the two centre lines coincide for a while.
     const float shared_m = kHalf_m / std::tan(0.5f * angle);
     EXPECT_LE(cut.meter.length_m() - bar_m, 0.012f + 1.1f * kHalf_m) << angle;
     EXPECT_GE(cut.meter.length_m() - bar_m, 0.012f + 0.5f * kHalf_m - 0.8f * shared_m) << angle;
@@ -231,7 +232,7 @@ TEST(CutMeterTest, LengthNeverFalls) {
   Cut cut;
   cut.Line({0.01f, 0.01f}, {0.03f, 0.01f});
   const float slit_m = cut.meter.length_m();
-  // The slit becomes a part of a large hole, whose centre line is much shorter. Update() expects no fall.
+  // The slit becomes a part of a large hole, whose centre line is much shorter. Update() must not reduce the length.
   cut.Take({0.02f, 0.01f}, 0.012f, [](const Vec2f&) { return true; });
   cut.Update();
   EXPECT_GE(cut.meter.length_m(), slit_m);
@@ -374,7 +375,8 @@ TEST(CutMeterTest, TheLineOfRandomStrokesHasThePiecesOfTheHole) {
       };
       ASSERT_EQ(PieceCount(in_line, cut.field.sheet()), PieceCount(in_hole, cut.field.sheet()))
           << round << ' ' << stroke;
-      // What has grown with the hole is what is found in the whole of it; the published length alone may be longer.
+      // The line that grew with the hole equals the line found in the whole hole; only the published length may be
+      // longer.
       CutMeter anew;
       anew.Rebuild(cut.field);
       ASSERT_NEAR(anew.length_m(), cut.meter.length_m(), 0.03f * cut.meter.length_m() + 1e-3f)

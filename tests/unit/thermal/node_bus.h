@@ -46,13 +46,13 @@ struct NodeBus {
   std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patch_out = patches.MakeOutput();
   std::unique_ptr<bus::Output<ThermalEvent>> event_out = events.MakeOutput();
   std::unique_ptr<bus::Output<TickManifest>> manifest_out = manifests.MakeOutput();
-  // Of patches a test makes its own reader: without one the node draws none.
+  // A test makes its own reader of patches, because without a reader the node draws none.
   std::unique_ptr<bus::Input<TopologyState>> topology_in = topology.MakeInput(64);
   std::unique_ptr<bus::Input<OpenCells>> open_in = open_cells.MakeInput(64);
   std::unique_ptr<bus::Input<ThermalEvent>> event_in = events.MakeInput(4096);
   std::unique_ptr<bus::Input<TickManifest>> manifest_in = manifests.MakeInput(4);
 
-  /// From `ns` on that pedal is down, and the generator is set to that power.
+  /// Sends a pressed pedal of this mode and this setting of the generator, from `ns` on.
   void Demand(CauteryMode mode, float power_W, std::int64_t ns) {
     HandleState state;
     state.stamp = {++demands, 1, ns};
@@ -62,14 +62,14 @@ struct NodeBus {
   }
   std::uint64_t demands = 0;
 
-  /// The node's.
+  /// Ports of the node.
   [[nodiscard]] ThermalNode::Ports ports() const {
     return {*contact_in, *tear_in,   *handle_in, *setting_in,  *topology_out,
             *open_out,   *patch_out, *event_out, *manifest_out};
   }
 };
 
-/// Metal on the membrane at a place.
+/// Contact of metal with the membrane at a place.
 inline CauteryContact TouchAt(const Vec2f& material, float radius_m) {
   CauteryContact contact;
   contact.touching = true;
@@ -80,7 +80,7 @@ inline CauteryContact TouchAt(const Vec2f& material, float radius_m) {
   return contact;
 }
 
-/// The next frame of 10 ms.
+/// Advances to the next frame of 10 ms.
 inline void Advance(Tick* tick) {
   ++tick->index;
   tick->dt_s = 0.01;

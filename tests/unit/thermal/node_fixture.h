@@ -38,7 +38,7 @@ class ThermalNodeTest : public ::testing::Test {
     return std::make_unique<ThermalNode>(scene_, bus_.ports(), checkpoint_.get(), ++epoch_);
   }
 
-  /// The tip is at (s, 10.2 mm), energised, at a moment of the session.
+  /// Sends a contact of the energised tip at (s, 10.2 mm) for a session time.
   void Send(float s, double time_s) {
     if (demands_) bus_.Demand(CauteryMode::kCut, 35, std::max(std::llround(1e9 * time_s) - 1000, 0LL));
     CauteryContact contact = TouchAt({s, 0.0102f}, 5e-4f);
@@ -46,7 +46,7 @@ class ThermalNodeTest : public ::testing::Test {
     contact.stamp = {++sequence_, 1, tick_.stamp_ns};
     ASSERT_TRUE(bus_.contact_out->Write(contact));
   }
-  /// One tick with the tip there.
+  /// One tick with the tip at s.
   void Touch(ThermalNode* node, float s) {
     Send(s, tick_.session_time_s);
     Step(node);
@@ -83,7 +83,7 @@ class ThermalNodeTest : public ::testing::Test {
   NodeBus bus_;
   std::unique_ptr<runtime::CheckpointFile> checkpoint_;
   Tick tick_;
-  bool demands_ = true;  ///< With each contact the pedal is down.
+  bool demands_ = true;  ///< Send a pressed pedal with each contact.
   std::uint64_t sequence_ = 0;
   std::int64_t epoch_ = 100;
 };

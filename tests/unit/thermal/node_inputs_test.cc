@@ -1,4 +1,4 @@
-// Contacts, pedals and generator settings as the thermal node takes them, on in-process ports.
+// Use of contacts, pedals and generator settings in the thermal node, on in-process ports.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -16,7 +16,7 @@ TEST_F(ThermalNodeTest, SamplesOfATimeThatWasAppliedArePassedOver) {
   Cut(node.get(), 0.010f, 0.012f);
   Step(node.get());
   const double joule = node->solver().ledger().joule, now_s = tick_.session_time_s;
-  // A physics node that was started again repeats the last tenth of a second.
+  // A restarted physics node repeats the last tenth of a second.
   for (int back = 10; back > 1; --back) {
     Send(0.011f, now_s - 0.01 * back - 0.01);
     Step(node.get());
@@ -78,7 +78,7 @@ TEST_F(ThermalNodeTest, APedalThatFallsSilentIsUp) {
   const double heard = node->solver().ledger().generator;
   EXPECT_GT(heard, begun);
   for (int n = 0; n < 10; ++n) Touch(node.get(), 0.010f);
-  EXPECT_LT(node->solver().ledger().generator - heard, 0.02 * (heard - begun) + 0.4) << "a frame of 35 W at most";
+  EXPECT_LT(node->solver().ledger().generator - heard, 0.02 * (heard - begun) + 0.4) << "at most a frame of 35 W";
 }
 
 TEST_F(ThermalNodeTest, ANewSettingIsTakenAtItsTime) {
@@ -97,7 +97,7 @@ TEST_F(ThermalNodeTest, ANewSettingIsTakenAtItsTime) {
 }
 
 TEST_F(ThermalNodeTest, OneThatComesBackWaitsForThePedalOfTheContactsItMissed) {
-  // Energy [J] that a node which was away for 0.2 s puts into the contacts of that time, once it has the next
+  // Energy [J] that a node applies to the contacts of 0.2 s in which it did not run, once it has received the next
   // HandleState.
   const auto energy = [&](CauteryMode mode_after) {
     std::filesystem::remove(folder_ / "thermal_node.checkpoint");
@@ -108,7 +108,7 @@ TEST_F(ThermalNodeTest, OneThatComesBackWaitsForThePedalOfTheContactsItMissed) {
     Cut(node.get(), 0.010f, 0.012f);
     node.reset();
     OpenCheckpoint();
-    // Twenty contacts without a HandleState; the next one comes after them.
+    // Twenty contacts without a HandleState, which follows them.
     demands_ = false;
     double time_s = tick_.session_time_s;
     for (int n = 0; n < 20; ++n, time_s += 0.01) Send(0.012f + 8e-5f * static_cast<float>(n), time_s);
@@ -124,12 +124,12 @@ TEST_F(ThermalNodeTest, OneThatComesBackWaitsForThePedalOfTheContactsItMissed) {
     return node->solver().ledger().generator - before;
   };
   const double down = energy(CauteryMode::kCut), up = energy(CauteryMode::kOff);
-  EXPECT_GT(up, 0.5) << "for a tenth of a second after it was last heard of the pedal is down";
-  EXPECT_GT(down, 1.5 * up) << "both ends of the silence say down";
+  EXPECT_GT(up, 0.5) << "the pedal counts as down for a tenth of a second after its last sample";
+  EXPECT_GT(down, 1.5 * up) << "the pedal is down at both ends of the gap";
 }
 
 TEST_F(ThermalNodeTest, ContactsThatComeTwoByTwoCutWhatTheyCutOneByOne) {
-  // 12 mm at 8 mm/s; in the second run thermal is woken for every other contact, and as often in between.
+  // 12 mm at 8 mm/s; in the second run thermal steps at every other contact.
   const auto cut = [&](int at_once) {
     tick_ = {};
     auto node = MakeNode();
@@ -155,7 +155,7 @@ TEST_F(ThermalNodeTest, ContactOfNoNumbersIsCountedAndChangesNothing) {
   for (const float bad : {NAN, INFINITY, -INFINITY}) Touch(node.get(), bad);
   EXPECT_EQ(bus_.contact_in->stats().rejected, 3u);
   EXPECT_EQ(node->solver().FullHash(), before);
-  Touch(node.get(), 0.01f);  // and the next good one is used
+  Touch(node.get(), 0.01f);  // the next valid contact is used
   EXPECT_TRUE(node->solver().stepped());
 }
 

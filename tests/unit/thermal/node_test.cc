@@ -1,4 +1,4 @@
-// What the thermal node publishes, keeps over a restart and severs, on in-process ports.
+// Outputs of the thermal node, its state over a restart, and the edges that it severs, on in-process ports.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@ TEST_F(ThermalNodeTest, CutGivesTopologyEventsPatchesAndMetrics) {
   auto patches = bus_.patches.MakeInput(64);
   Step(node.get());
   const auto first = NewestTopology();
-  ASSERT_TRUE(first);  // late joiners always find one
+  ASSERT_TRUE(first);  // late joiners always receive one
   EXPECT_EQ(first->revision, 0u);
   EXPECT_EQ(first->scene_hash, scene_.hash);
   Cut(node.get(), 0.010f, 0.020f);
@@ -75,7 +75,7 @@ TEST_F(ThermalNodeTest, RestartGoesOnWithTheSameTopologyAndHeat) {
   const auto before = NewestTopology();
   ASSERT_TRUE(before);
   const double stored = node->solver().field().Stored();
-  node.reset();  // as kill -9 would leave it: nothing is written on the way out
+  node.reset();  // as after kill -9: nothing is written at the end
   OpenCheckpoint();
   node = MakeNode();
   EXPECT_TRUE(node->restored());
@@ -99,7 +99,7 @@ TEST_F(ThermalNodeTest, MetalThatMovedOnDuringAnOutageLeavesNoBridge) {
   auto node = MakeNode();
   Cut(node.get(), 0.010f, 0.0147f);
   node.reset();
-  // Back after 0.3 s; the hook went on at 8 mm/s.
+  // Restarted after 0.3 s, in which the hook continued at 8 mm/s.
   tick_.index += 30;
   tick_.session_time_s += 0.3;
   tick_.stamp_ns += 300'000'000;
@@ -112,7 +112,8 @@ TEST_F(ThermalNodeTest, MetalThatMovedOnDuringAnOutageLeavesNoBridge) {
     const CellIndex cell = field.sheet().CellOf({s, 0.0102f});
     const Tile* tile = field.Find(cell.ix / kTile, cell.iy / kTile);
     ASSERT_NE(tile, nullptr) << s;
-    EXPECT_NE(tile->state.flags[(cell.iy % kTile) * kTile + cell.ix % kTile] & kRemoved, 0) << "living at s = " << s;
+    EXPECT_NE(tile->state.flags[(cell.iy % kTile) * kTile + cell.ix % kTile] & kRemoved, 0)
+        << "not removed at s = " << s;
   }
 }
 
@@ -209,7 +210,7 @@ TEST_F(ThermalNodeTest, SeversWhatHasTornWhereAllIsIdle) {
   of_another.scene_hash ^= 1;
   ASSERT_TRUE(bus_.tear_out->Write(of_another));
   for (int n = 0; n < kCommitFrames; ++n) Step(node.get());
-  EXPECT_FALSE(NewestTopology()) << "of another scene";
+  EXPECT_FALSE(NewestTopology()) << "tears of another scene have no effect";
   ASSERT_TRUE(bus_.tear_out->Write(tears));
   Step(node.get());
   TickManifest manifest;
@@ -221,12 +222,12 @@ TEST_F(ThermalNodeTest, SeversWhatHasTornWhereAllIsIdle) {
   const auto topology = NewestTopology();
   ASSERT_TRUE(topology) << "at the next commit";
   for (const Index edge : torn) EXPECT_TRUE(TestBit(topology->dead_edges, edge)) << edge;
-  EXPECT_EQ(node->solver().topology().dead_edge_count(), 3u) << "and nothing beside";
+  EXPECT_EQ(node->solver().topology().dead_edge_count(), 3u) << "and no others";
   EXPECT_EQ(node->solver().topology().dead_node_count(), 0u);
   EXPECT_EQ(validator.Check(node->solver()), "");
-  EXPECT_EQ(node->solver().cut_length_m(), 0.0f) << "a tear is no cut";
+  EXPECT_EQ(node->solver().cut_length_m(), 0.0f) << "a tear does not count as a cut";
 
-  // The same again, and after a restart: no difference.
+  // The same message again, also after a restart, changes nothing.
   node.reset();
   OpenCheckpoint();
   node = MakeNode();
@@ -279,7 +280,7 @@ TEST_F(ThermalNodeTest, TellsPhysicsWhatIsGoneAroundTheHook) {
     before = count;
   }
   EXPECT_GT(before, 50);
-  // Nothing changes: nothing is sent.
+  // Without changes nothing is sent.
   for (int n = 60; n < 70; ++n) Step(node.get());
   EXPECT_FALSE(bus_.open_in->TakeLatest(&cells));
 }

@@ -1,4 +1,4 @@
-// The paper's model: what its rules do to the mesh, and that it holds together under what no one should ask of it.
+// The paper's model: effects of its rules on the mesh, and robustness against extreme inputs.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -20,7 +20,7 @@ scene::SceneData PaperScene() {
   return data;
 }
 
-/// Along the middle between two rows, or on a row.
+/// A drag along the middle between two rows, or on a row.
 Drag Along(float t_m) {
   Drag drag;
   drag.from = {0.0103f, t_m};
@@ -33,7 +33,7 @@ float Left(const TopologyBits& bits, std::size_t edge) {
   return 1.0f - kShrinkUnit * static_cast<float>(bits.shrink[edge]);
 }
 
-/// Every number that the state holds.
+/// Checks all numbers of the state.
 void ExpectFinite(const ThermalSolver& solver) {
   for (const Tile* tile : solver.field().Existing()) {
     for (const float h : tile->state.enthalpy) ASSERT_TRUE(std::isfinite(h));
@@ -53,7 +53,7 @@ TEST(PaperModelTest, CutKillsNodesAndShrinksEdgesOncePerInvalidEnd) {
   const TopologyBits& bits = solver.topology().committed();
   EXPECT_GE(solver.topology().dead_node_count(), 9u);
   EXPECT_GT(solver.cut_length_m(), 0.008f);
-  EXPECT_GT(solver.figures().highest_C, kBoiling_C);  // nothing boils, so nothing holds it there
+  EXPECT_GT(solver.figures().highest_C, kBoiling_C);  // without boiling the temperature has no such limit
   constexpr std::array kLeft{1.0f, 0.7f, 0.49f};
   int once = 0, twice = 0;
   for (std::size_t e = 0; e < scene.membrane_rest_length.size(); ++e) {
@@ -94,7 +94,7 @@ TEST(PaperModelTest, SlitBetweenTwoRowsIsMissedByTheNodeRule) {
   const scene::SceneData data = PaperScene();
   ThermalSolver solver(data.View());
   Tile* tile = solver.mutable_field()->Wake(4, 3);
-  // 0.3 mm of hot tissue midway between the rows at cells 100 and 110; it cools before its heat reaches them.
+  // 0.3 mm of hot tissue midway between the rows at cells 100 and 110; it cools before the heat reaches the rows.
   for (int j = 8; j <= 10; ++j) {
     for (int i = 0; i < kTile; ++i) {
       tile->state.enthalpy[j * kTile + i] = 80.0f * solver.field().material().rc_wet;
@@ -120,7 +120,7 @@ TEST(PaperModelTest, StaysFiniteUnderAbsurdInput) {
   tip.power_W = 400;
   for (int frame = 0; frame < 60; ++frame) {
     tip.path.from = tip.path.to;
-    // Leaps over the whole sheet, dwells, and its very corner.
+    // Jumps over the whole sheet, pauses, and the extreme corner.
     if (frame % 3 == 0) tip.path.to = {0.04f * uniform(), 0.02f * uniform()};
     if (frame % 10 == 0) tip.path.to = {0.04f - 1e-6f, 0.02f - 1e-6f};
     tip.path.radius_m = frame % 2 == 0 ? kContactRadiusMin_m : kContactRadiusMax_m;
@@ -132,7 +132,7 @@ TEST(PaperModelTest, StaysFiniteUnderAbsurdInput) {
     }
     solver.Step(tip, frame % 7 == 0 ? 0.1f : kDt);
     ExpectFinite(solver);
-    ASSERT_LE(solver.figures().present_C, 3000.0f);  // what the messages let through
+    ASSERT_LE(solver.figures().present_C, 3000.0f);  // the limit of the gate
   }
   EXPECT_EQ(solver.field().quarantined(), 2u);
   EXPECT_GT(solver.topology().dead_node_count(), 50u);

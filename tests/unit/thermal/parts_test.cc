@@ -62,7 +62,7 @@ TEST(SheetTest, SceneWithoutMembraneIsRefused) {
   data = FlatScene(5, 5, 1e-3f);
   data.membrane_material[3].x() = NAN;
   EXPECT_THROW((void)MakeSheet(data.View()), InputError);
-  data = FlatScene(5, 5, 1.0f);  // a sheet of four metres
+  data = FlatScene(5, 5, 1.0f);  // a sheet of 4 m
   EXPECT_THROW((void)MakeSheet(data.View()), InputError);
 }
 
@@ -106,11 +106,11 @@ TEST_F(TipTest, PathsOfSuccessiveSamplesJoin) {
 }
 
 TEST_F(TipTest, ASampleStandsForTheSessionTimeSinceTheLast) {
-  EXPECT_FLOAT_EQ(Advance(At(0.005f, 0.01f, 1.00)).duration_s, 0.01f) << "the first stands for a frame";
+  EXPECT_FLOAT_EQ(Advance(At(0.005f, 0.01f, 1.00)).duration_s, 0.01f) << "the first sample stands for a frame";
   EXPECT_NEAR(Advance(At(0.005f, 0.01f, 1.02)).duration_s, 0.02f, 1e-6);
   EXPECT_NEAR(Advance(At(0.005f, 0.01f, 1.025)).duration_s, 0.005f, 1e-6);
-  EXPECT_FLOAT_EQ(Advance(At(0.005f, 0.01f, 1.025)).duration_s, 0.01f) << "nor can one that is no later";
-  EXPECT_FLOAT_EQ(Advance(At(0.005f, 0.01f, 0.5)).duration_s, 0.01f) << "the session began anew";
+  EXPECT_FLOAT_EQ(Advance(At(0.005f, 0.01f, 1.025)).duration_s, 0.01f) << "so does a sample that is not later";
+  EXPECT_FLOAT_EQ(Advance(At(0.005f, 0.01f, 0.5)).duration_s, 0.01f) << "the session was restarted";
 }
 
 TEST_F(TipTest, MetalIsSweptFromSampleToSample) {
@@ -153,7 +153,7 @@ TEST_F(TipTest, LiftedMetalStartsANewPath) {
 }
 
 TEST_F(TipTest, AGapBetweenEnergisedSamplesIsBridged) {
-  // Physics was away for 0.4 s while the hand went on at 4 mm/s.
+  // Physics was stopped for 0.4 s while the hand moved on at 4 mm/s.
   (void)Advance(At(0.005f, 0.01f, 1.0));
   const TipInput bridged = Advance(At(0.0066f, 0.01f, 1.4));
   EXPECT_TRUE(bridged.active);
@@ -192,7 +192,7 @@ TEST_F(TipTest, ARestoredTrackerGoesOnWhereTheMetalWas) {
   EXPECT_EQ(there.path.begin.x, a.footprint.x);
   EXPECT_EQ(there.path.begin.gap, a.footprint.gap);
   EXPECT_EQ(there.duration_s, here.duration_s);
-  // What no tracker can have been in changes nothing.
+  // A state that no tracker can have had is refused.
   const TipTracker::State good = tip_.Save();
   const auto refused = [&](const auto& change) {
     TipTracker::State state = good;
@@ -240,7 +240,7 @@ TEST(ElectrodeTest, CoverageIsTheAreaOfTheCapsuleAnyWay) {
   for (const float length : {0.0f, 0.5f, 3.0f}) {
     const double exact = std::numbers::pi + 2.0 * length;
     for (float heading = 0; heading < 3.1f; heading += 0.23f) {
-      for (const float fine : {5.0f, 40.0f}) {  // 0.5 mm in 0.1 mm; an eighth of that
+      for (const float fine : {5.0f, 40.0f}) {  // 0.5 mm at cells of 0.1 mm; at cells of an eighth of that
         const Vec2f half = 0.5f * length * fine * Vec2f(std::cos(heading), std::sin(heading));
         EXPECT_NEAR(CoveredArea(middle - half, middle + half, fine) / exact, 1, fine < 10 ? 0.02 : 1e-3)
             << length << " " << heading;
@@ -250,7 +250,7 @@ TEST(ElectrodeTest, CoverageIsTheAreaOfTheCapsuleAnyWay) {
 }
 
 TEST(ElectrodeTest, DistanceIsThatOnTheStretchedSheet) {
-  // The same capsule in material coordinates that are stretched 2 : 1 and sheared covers what the map leaves of it.
+  // The same capsule in material coordinates that are stretched 2 : 1 and sheared covers the area that the map gives.
   const SurfaceMetric metric{4.0f, 0.6f, 1.5f};
   const Electrode electrode(metric, {-4, -1.5f}, {4, 1.5f}, 12);
   const double length = std::sqrt(metric.ss * 64 + 2 * metric.st * 24 + metric.tt * 9);
@@ -278,7 +278,7 @@ TEST(FilmTest, GrowsWhereTissueBoilsAndOnlyWhereTheWaveformSustainsIt) {
   EXPECT_NEAR(film.film, 1, 1e-5f);
   Interface partial;
   partial.Follow(0.5f * kBoilingForFilm, true, 1);
-  EXPECT_NEAR(partial.film, 0.5f, 1e-5f) << "too little boils for all of it";
+  EXPECT_NEAR(partial.film, 0.5f, 1e-5f) << "too little tissue boils for a complete film";
   Interface coag;
   coag.Follow(1, false, 1);
   EXPECT_EQ(coag.film, 0.0f);
@@ -288,14 +288,14 @@ TEST(FilmTest, CollapsesOnceNothingBoilsAndThenBeginsAnew) {
   Interface film{.film = 1, .burning = 0.3f};
   film.Follow(0, true, kFilmCollapses_s);
   EXPECT_NEAR(film.film, std::exp(-1.0f), 1e-5f);
-  EXPECT_EQ(film.burning, 0.3f) << "there is still a film";
+  EXPECT_EQ(film.burning, 0.3f) << "a film still exists";
   film.Follow(0, true, 10 * kFilmCollapses_s);
   EXPECT_LT(film.film, 1e-3f);
   EXPECT_EQ(film.burning, 1.0f);
   Interface split{.film = 1}, whole{.film = 1};
   for (int n = 0; n < 8; ++n) split.Follow(0, true, kMillisecond);
   whole.Follow(0, true, 8 * kMillisecond);
-  EXPECT_NEAR(split.film, whole.film, 1e-5f) << "whatever the steps";
+  EXPECT_NEAR(split.film, whole.film, 1e-5f) << "for any steps";
 }
 
 TEST(FilmTest, AsManyDischargesBurnAsKeepTheStrikeVoltage) {
@@ -315,7 +315,8 @@ TEST(FilmTest, AsManyDischargesBurnAsKeepTheStrikeVoltage) {
   const auto [voltage, burning] = settled(20);
   EXPECT_NEAR(voltage, kStrike_V, 1e-3f * kStrike_V);
   EXPECT_NEAR(burning, 20 / (kStrike_V * kStrike_V * kDischarge_S_m2 * kFootprint_m2), 1e-3f);
-  // More power than the whole footprint takes at that voltage raises it; next to none lets a few burn on.
+  // More power than the whole footprint takes at that voltage raises the voltage; at very low power a few discharges
+  // remain.
   EXPECT_GT(settled(60).first, 1.2f * kStrike_V);
   EXPECT_EQ(settled(60).second, 1.0f);
   EXPECT_LT(settled(0.01f).first, kStrike_V);
@@ -334,7 +335,7 @@ TEST(GeneratorTest, PowerThenVoltageThenCurrentLimits) {
   EXPECT_FLOAT_EQ(RegulatedVoltage(drive, 1e-6f), 350.0f);
   EXPECT_FLOAT_EQ(RegulatedVoltage(drive, 10.0f), 0.2f);
   EXPECT_EQ(RegulatedVoltage(drive, 0.0f), 0.0f);
-  const Drive coag = MakeDrive(ThermalParams{}, CauteryMode::kCoag, 35);  // on for a quarter of the time
+  const Drive coag = MakeDrive(ThermalParams{}, CauteryMode::kCoag, 35);  // on during a quarter of the time
   EXPECT_FLOAT_EQ(coag.v_max_V, 0.5f * drive.v_max_V);
   EXPECT_FLOAT_EQ(coag.i_max_A, 0.5f * drive.i_max_A);
   EXPECT_GT(MakeDrive(ThermalParams{}, CauteryMode::kBlend, 35).remove_theta, drive.remove_theta);

@@ -1,6 +1,6 @@
-// One committed state stands for every processor: the heat, the damage and the topology after a cut have the same bits
-// on x86-64 and on AArch64. A change of the numerics changes them, and is allowed to: the failed test says what to
-// write here then.
+// One committed state for every processor: the heat, the damage and the topology after a cut have the same bits on
+// x86-64 and on AArch64. An intended change of the numerics changes it: the failed test then prints the value to be
+// written here.
 #include <gtest/gtest.h>
 
 #include "services/scene/builder/build.h"
@@ -27,7 +27,7 @@ TEST(ThermalStateHash, IsTheSameOnEveryProcessor) {
     tip.path.to += tip.path.displacement;
     solver.Step(tip, kFrame_s);
   }
-  EXPECT_GT(solver.cut_length_m(), 2e-3f) << "little was cut: the hash says little";
+  EXPECT_GT(solver.cut_length_m(), 2e-3f) << "little was cut: the hash proves little";
   EXPECT_EQ(solver.FullHash(), 0x436cdf66d7d1483aull);
 }
 

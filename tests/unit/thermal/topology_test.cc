@@ -20,7 +20,7 @@ class TopologyTest : public ::testing::Test {
         field_(MakeSheet(scene_), MakeMaterial(scene_.thermal)),
         topology_(scene_, field_.sheet()) {}
 
-  /// Removes the cells [x0, x1] x [y0, y1] and lets the topology look.
+  /// Removes the cells [x0, x1] x [y0, y1] and updates the topology.
   void Remove(int x0, int y0, int x1, int y1) {
     double heat = 0;
     for (int y = y0; y <= y1; ++y) {
@@ -66,8 +66,8 @@ TEST_F(TopologyTest, DiagonalSlitOfTouchingCornersCutsToo) {
   }
   topology_.StageCut(field_, {40, 40}, {159, 159});
   topology_.Commit();
-  // Direction 1 from (r, c) with c = r goes away from the diagonal; from (r, r+1) it crosses it at (r+1, r+1): both
-  // ends of those lie on the slit. The edge from (r, c+1) down to (r+1, c+1) ends on it.
+  // Direction 1 from (r, c) with c = r leads away from the diagonal; from (r, r+1) it crosses it at (r+1, r+1): both
+  // ends of these edges lie on the slit. The edge from (r, c+1) down to (r+1, c+1) ends on it.
   for (std::uint32_t r = 5; r < 15; ++r) {
     EXPECT_TRUE(NodeDead(r, r));
     EXPECT_TRUE(EdgeDead(r, r, 0));
@@ -90,7 +90,7 @@ TEST_F(TopologyTest, NodeDiesWithItsCellOrWithItsLastEdge) {
   EXPECT_TRUE(EdgeDead(5, 5, 0) && EdgeDead(5, 5, 1) && EdgeDead(5, 5, 2));
   EXPECT_TRUE(EdgeDead(5, 4, 0) && EdgeDead(4, 5, 1) && EdgeDead(4, 4, 2));
   EXPECT_FALSE(NodeDead(5, 6));
-  // A moat around node (10, 10), whose own cell stays.
+  // A ring of removed cells around node (10, 10), whose own cell stays.
   Remove(96, 96, 104, 97);
   Remove(96, 103, 104, 104);
   Remove(96, 98, 97, 102);
@@ -115,7 +115,7 @@ TEST_F(TopologyTest, ShrinkIsTakenOnceFromTheRestLength) {
   for (int ty = 2; ty <= 4; ++ty) {
     for (int tx = 2; tx <= 4; ++tx) field_.Wake(tx, ty)->state.omega_collagen.fill(1.0f);
   }
-  // Node (11, 11) is inside tile (3, 3); both ends of its edge are damaged, which must not count twice.
+  // Node (11, 11) is inside tile (3, 3); both ends of its edge are damaged, which must count once.
   const std::size_t edge = 3 * (11 * kCols + 11);
   const float expected = scene_.thermal.shrink_max * (1 - std::exp(-1.0f));
   for (int n = 0; n < 3; ++n) {
@@ -129,7 +129,7 @@ TEST_F(TopologyTest, ShrinkIsTakenOnceFromTheRestLength) {
 }
 
 TEST_F(TopologyTest, CellsBeyondTheBorderAreNoBridge) {
-  // A sheared sheet, whose left border runs through the bands of its edges. All tissue of one row of cells goes.
+  // A sheared sheet, whose left border crosses the bands of its edges. All tissue of one row of cells is removed.
   scene::SceneData data = FlatScene(kRows, kCols, 1e-3f);
   for (Vec2f& p : data.membrane_material) p.x() += 0.5f * p.y();
   const SceneView scene = data.View();
@@ -149,7 +149,7 @@ TEST_F(TopologyTest, CellsBeyondTheBorderAreNoBridge) {
 }
 
 TEST_F(TopologyTest, StrandsThatTheCellsDoNotResolveAreNotSeveredByWhatHappensBesideThem) {
-  // At an acute corner the border strands run over cells whose centres lie beyond the sheet.
+  // At an acute corner the border strands cross cells whose centres lie beyond the sheet.
   scene::SceneData data = FlatScene(6, 6, 1e-3f);
   for (Vec2f& p : data.membrane_material) p.x() += 8.0f * p.y();
   const SceneView scene = data.View();

@@ -55,10 +55,11 @@ class OneEuro final : public AngleFilter {
   bool started_ = false;
 };
 
-/// Constant velocity, the code's middle as the measurement with the variance of its interval and the noise.
+/// Constant velocity; the measurement is the middle of the code's interval, with the variance of the interval and
+/// noise.
 class Kalman final : public AngleFilter {
  public:
-  /// @param rate_noise_deg_s of the velocity, per period.
+  /// @param rate_noise_deg_s standard deviation of the velocity noise per period.
   Kalman(const JawCalibration& calibration, double rate_noise_deg_s)
       : calibration_(calibration), q_(rate_noise_deg_s * rate_noise_deg_s) {}
   double Update(int code) override;
@@ -70,7 +71,7 @@ class Kalman final : public AngleFilter {
   bool started_ = false;
 };
 
-/// The estimator itself with any settings. Two of its modes with the same noise are one mode: that is the IMM with two.
+/// The estimator itself with any settings. Two modes with the same noise act as one: this gives the IMM with two modes.
 class IntervalImm final : public AngleFilter {
  public:
   IntervalImm(const JawCalibration& calibration, const JawEstimatorSettings& settings)
@@ -84,8 +85,8 @@ class IntervalImm final : public AngleFilter {
   JawEstimator estimator_;
 };
 
-/// The reference: the same three modes without the Gaussian approximation, as particles that are drawn anew whenever
-/// half of them carry nothing (systematic resampling).
+/// The reference: the same three modes without the Gaussian approximation, as particles. They are resampled whenever
+/// half of them have negligible weight (systematic resampling).
 class ParticleFilter final : public AngleFilter {
  public:
   ParticleFilter(const JawCalibration& calibration, std::size_t particles, std::uint64_t seed);

@@ -41,7 +41,8 @@ void MassSpring::AddOrgan(const ElasticModel& model) {
 }
 
 /// Central differences are stable below a frequency of 2 / h; by Gershgorin w * 2 * (sum of stiffnesses) bounds its
-/// square. Each spring is cut down to what both its ends allow; the dead load with it, so that rest stays rest.
+/// square. Each spring's stiffness is limited to what both its ends allow; the dead load is reduced with it, so that
+/// the rest shape stays in equilibrium.
 void MassSpring::LimitStiffness(double h) {
   std::vector<double> sum(x_.size(), 0);
   for (const Spring& s : springs_) {

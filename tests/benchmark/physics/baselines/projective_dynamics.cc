@@ -6,7 +6,7 @@ namespace fulcrum::physics::baselines {
 namespace {
 
 /// Calls add(particles, coefficients, weight) for each quadratic weight/2 |sum_i c_i x_i - target|^2 of the system. The
-/// organ: mu V |F - R|^2, three rows a tet.
+/// organ has mu V |F - R|^2, three rows per tet.
 template <class Add>
 void ForTerms(const ElasticModel& model, const Add& add) {
   for (const ElasticSpring& s : model.springs) {
@@ -33,7 +33,7 @@ void ForTerms(const ElasticModel& model, const Add& add) {
   }
 }
 
-/// The rotation nearest to `a`, from a guess (Mueller et al. 2016).
+/// The rotation nearest to `a`, iterated from an initial guess (Mueller et al. 2016).
 void Turn(const Mat3d& a, Eigen::Quaterniond* q) {
   for (int i = 0; i < 4; ++i) {
     const Mat3d r = q->toRotationMatrix();

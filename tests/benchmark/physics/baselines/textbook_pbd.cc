@@ -13,8 +13,8 @@ namespace {
 using Vec = Eigen::Vector3d;
 using Particles = std::vector<PbdParticle>;
 
-/// Apart from masses of zero: a vertex that cannot move leaves at least this part of the correction's largest
-/// denominator (DESIGN.md, "Vertices that cannot move").
+/// Least denominator of a correction, relative to its largest term, where a vertex cannot move; masses of zero excepted
+/// (DESIGN.md, "Vertices that cannot move").
 constexpr double kLeastPart = 0.2;
 
 template <int N>
@@ -100,7 +100,7 @@ class BendingObject : public PbdConstraint {
   double rest_, k_;
 };
 
-/// Draws along the distance when stretched, carries along the organ's normal when pressed in.
+/// Pulls along the line between the two points when stretched, pushes along the organ's normal when pressed in.
 class BindingObject : public PbdConstraint {
  public:
   BindingObject(const Binding& c, const Particles& particles, double k)

@@ -25,7 +25,7 @@ class PbdConstraint {
 class TextbookPbd {
  public:
   /// The order of the membrane's edges. Gauss-Seidel results depend on it: in the kernels' order the two codes must
-  /// agree to rounding, in the scene's only to what three iterations leave.
+  /// agree to rounding, in the scene's order only to the residual of three iterations.
   enum class Order { kScene, kKernels };
 
   explicit TextbookPbd(const SceneView& scene, Order order = Order::kScene);

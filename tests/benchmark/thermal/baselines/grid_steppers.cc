@@ -11,9 +11,9 @@ namespace {
 
 using Field = std::vector<float>;
 
-constexpr int kBlock = 16;  ///< Of the transposition.
+constexpr int kBlock = 16;  ///< Block size of the transposition.
 
-/// out = u + r (sum of the neighbours' differences along rows and columns, as the flags say).
+/// out = u + r (sum of the neighbours' differences along rows and columns, as selected by the flags).
 template <bool kAlongRow, bool kAcrossRows>
 inline void Explicit(int n, float r, const float* __restrict u, float* __restrict out) {
   for (int j = 0; j < n; ++j) {

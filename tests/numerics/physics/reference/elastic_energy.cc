@@ -39,7 +39,8 @@ Mat3d PatchGradient(const ElasticModel& model, const ElasticPatch& patch, const 
   return F;
 }
 
-/// Forces of springs from particles i to i + offset, on the latter: plain planes, so that the compiler uses vectors.
+/// Forces of springs from particles i to i + offset, on the latter. Separate arrays of x, y and z let the compiler use
+/// vectors.
 void SpringForces(const double* __restrict__ x, const double* __restrict__ y, const double* __restrict__ z,
                   std::size_t offset, const double* __restrict__ rest, const double* __restrict__ axial,
                   double stiffening, std::size_t count, double* __restrict__ fx, double* __restrict__ fy,
@@ -48,7 +49,7 @@ void SpringForces(const double* __restrict__ x, const double* __restrict__ y, co
     const double dx = x[i + offset] - x[i], dy = y[i + offset] - y[i], dz = z[i + offset] - z[i];
     const double length = std::sqrt(dx * dx + dy * dy + dz * dz);
     const double e = length / rest[i] - 1;
-    // An edge of no length has no direction, and pulls nowhere.
+    // An edge without length has no direction and exerts no force.
     const double scale = axial[i] * e * (1 + stiffening * e * e) / (length + 1e-100);
     fx[i] = scale * dx;
     fy[i] = scale * dy;
@@ -56,7 +57,7 @@ void SpringForces(const double* __restrict__ x, const double* __restrict__ y, co
   }
 }
 
-/// d2 Psi / dF2 on F's columns one below the other.
+/// d2 Psi / dF2, with the columns of F stacked.
 Matrix9d PatchHessian(const Mat3d& F, double mu, double lambda_lame, bool positive) {
   const double pressure = (lambda_lame + mu) * (F.determinant() - 1) - mu;
   const Mat3d cofactor = Cofactor(F);
@@ -148,7 +149,7 @@ double ElasticEnergy::Energy(const Points& x) const {
   double organ = 0;
   for (const ElasticPatch& patch : model_.patches) {
     const Mat3d F = PatchGradient(model_, patch, x);
-    // The shear links hold a mu/2 |F|^2 at rest, 3 a mu/2 a volume, which the patches take back.
+    // The shear links contribute a mu/2 |F|^2, which is 3 a mu/2 per volume at rest; the patches subtract it.
     organ += patch.volume *
              (TetEnergy(F, model_.mu_Pa, model_.lambda_Pa) - kPatchVariance * model_.mu_Pa / 2 * F.squaredNorm());
   }

@@ -1,4 +1,4 @@
-// The energy of an ElasticModel as it stands in physics_node/energy/elastic_model.h, with gradient and Hessian, in
+// The energy of an ElasticModel as defined in physics_node/energy/elastic_model.h, with gradient and Hessian, in
 // double. Truth for the solvers: linked into tests and benchmarks only.
 #pragma once
 
@@ -20,7 +20,7 @@ class ElasticEnergy {
 
   [[nodiscard]] const ElasticModel& model() const { return model_; }
   [[nodiscard]] Eigen::Index particle_count() const { return static_cast<Eigen::Index>(model_.mass.size()); }
-  /// Takes the spring of membrane edge 3 * node + direction away.
+  /// Removes the spring of membrane edge 3 * node + direction.
   void CutEdge(std::size_t edge);
 
   /// Elastic energy, and potential of gravity and of the dead load [J].
@@ -46,7 +46,7 @@ class ElasticEnergy {
   ElasticModel model_;
   std::vector<SpringRun> runs_;
   std::vector<double> rest_length_, axial_;           ///< In the order of the runs.
-  std::vector<std::size_t> place_;                    ///< Of each spring of the model in that order.
+  std::vector<std::size_t> place_;                    ///< Index of each spring of the model in that order.
   mutable std::vector<double> plane_, spring_force_;  ///< Scratch.
 };
 

@@ -49,7 +49,7 @@ double HighestFrequency(const ElasticEnergy& energy, const Points& x) {
   for (Eigen::Index i = 0; i < v.size(); ++i) {
     const double m = mass[static_cast<std::size_t>(i / 3)];
     inverse_mass[i] = m > 0 ? 1 / m : 0;
-    v[i] = std::sin(static_cast<double>(i * i % 1009));  // Nothing in particular, the same in every run.
+    v[i] = std::sin(static_cast<double>(i * i % 1009));  // An arbitrary start, the same in every run.
   }
   double eigenvalue = 0;
   for (int i = 0; i < 100; ++i) {

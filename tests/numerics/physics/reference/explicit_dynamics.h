@@ -13,14 +13,14 @@ class ExplicitDynamics {
   /// Starts at rest at `start`; steps of `step_s`.
   ExplicitDynamics(const ElasticEnergy* energy, const Points& start, double step_s);
 
-  /// Position at a time [s] of a particle whose motion is given; replaces what was given before. Empty: all free.
+  /// Position at a time [s] of a particle with prescribed motion; replaces the previous prescription. Empty: all free.
   using Motion = std::function<Vec3d(Index particle, double time_s)>;
   void Hold(const std::vector<Index>& particles, Motion motion);
 
-  /// Goes on with another energy of as many particles.
+  /// Continues with another energy of as many particles.
   void ChangeEnergy(const ElasticEnergy* energy) { energy_ = energy; }
 
-  /// Goes on for `count` steps.
+  /// Advances by `count` steps.
   void Run(int count);
 
   [[nodiscard]] double time_s() const { return static_cast<double>(steps_) * step_s_; }
@@ -33,7 +33,8 @@ class ExplicitDynamics {
   double step_s_;
   long steps_ = 0;
   Points x_, v_, gradient_;
-  std::vector<bool> starts_;  ///< [particles] At rest now: the next kick is half, as velocities are half a step behind.
+  std::vector<bool>
+      starts_;  ///< [particles] Starts from rest: the next kick is half, as velocities are half a step behind.
   std::vector<Index> held_;
   Motion motion_;
 };

@@ -10,17 +10,17 @@ namespace fulcrum::physics::reference {
 namespace {
 
 constexpr int kMaxIterations = 200;
-/// Steps are cut to this length: one that is longer comes from a nearly singular Hessian [m].
+/// Limit on the length of a step: longer ones come from a nearly singular Hessian [m].
 constexpr double kMaxStep = 0.01;
 
-/// The factor of an earlier iterate's Hessian preconditions the next ones as long as it does in so many iterations.
+/// A factor is reused as preconditioner of later iterates up to this number of CG iterations.
 constexpr int kRefactorAfter = 40;
 constexpr int kMaxCgIterations = 200;
-/// Far from the end a rough step is as good as an exact one.
+/// Far from the solution an inexact step is as good as an exact one.
 constexpr double kCgTolerance = 0.03;
 
-/// Solves H step = b by conjugate gradients. Where H bends down along a direction, the step so far is the answer: it
-/// goes downhill.
+/// Solves H step = b by conjugate gradients. At a direction of negative curvature the present step is returned, which
+/// is a descent direction.
 template <class Factor>
 Eigen::VectorXd NewtonStep(const SparseMatrix& H, const Factor& factor, const Eigen::VectorXd& b, int* iterations) {
   Eigen::VectorXd step = Eigen::VectorXd::Zero(b.size()), r = b, z = factor.solve(r), p = z;
@@ -42,7 +42,7 @@ Eigen::VectorXd NewtonStep(const SparseMatrix& H, const Factor& factor, const Ei
   return step;
 }
 
-/// Rows and columns of the free coordinates.
+/// Submatrix of the free coordinates.
 SparseMatrix Restrict(const SparseMatrix& H, const std::vector<int>& free_of, int free_count) {
   std::vector<Eigen::Triplet<double>> entries;
   entries.reserve(static_cast<std::size_t>(H.nonZeros()));
@@ -120,7 +120,7 @@ StaticResult SolveStatic(const ElasticEnergy& energy, const Points& start, const
     for (int halvings = 0; halvings < 30 && !moved; ++halvings, t /= 2) {
       const Points candidate = result.x + t * direction;
       const double residual = slope(candidate, &candidate_gradient);
-      // Near the end the energy no longer tells one point from the other; the force does.
+      // Near the solution rounding hides differences of the energy; the force still resolves them.
       const double noise = 1e-12 * std::abs(before);
       if (value(candidate) <= before - 1e-4 * t * downhill || (t * downhill < noise && residual < result.residual_N)) {
         result.x = candidate;

@@ -1,4 +1,4 @@
-// The stand-in itself. HD_STAND_IN_INCOMPLETE builds one that lacks a function.
+// The stand-in itself. HD_STAND_IN_INCOMPLETE builds one without one of the functions.
 #include "tests/unit/haptics/stand_in/hd_stand_in.h"
 
 #include <algorithm>
@@ -56,7 +56,8 @@ StandInDevice* Current(const char* what, bool in_frame) {
   if (in_frame && frame != current) Misuse(what);
   return &controls->devices[current];
 }
-/// With HD_STAND_IN_SWING in the environment the devices move by themselves, as a tool that is swung about its trocar.
+/// With HD_STAND_IN_SWING in the environment the devices move without a test, like a tool that is swung about its
+/// trocar.
 const bool swings = std::getenv("HD_STAND_IN_SWING") != nullptr;
 
 void SwingTo(double time_s) {

@@ -12,7 +12,8 @@ namespace fulcrum::haptics::testing {
 struct StandInDevice {
   std::string name;  ///< As in the driver's setup program.
   std::string serial;
-  std::atomic<bool> plugged{true};  ///< Any thread. Unplugged: init fails, a frame reports a communication error.
+  std::atomic<bool> plugged{
+      true};  ///< May be set by any thread. Unplugged: init fails, a frame reports a communication error.
   std::array<double, 3> position_mm{};
   std::array<double, 16> transform{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
   int buttons = 0;
@@ -24,21 +25,23 @@ struct StandInDevice {
 
   bool open = false;
   bool force_enabled = false;
-  std::array<double, 3> force_N{};            ///< In effect on the motors.
-  std::vector<std::array<double, 3>> forces;  ///< Of each frame; the newest at the end; capacity is never exceeded.
+  std::array<double, 3> force_N{};  ///< Present force of the motors.
+  std::vector<std::array<double, 3>>
+      forces;  ///< Force of each frame; the newest at the end; capacity is never exceeded.
 };
 
 struct StandIn {
   std::array<StandInDevice, 2> devices;
-  std::atomic<bool> threaded{false};  ///< A thread calls at 1 kHz, as in the real library; else Tick() does.
-  std::atomic<bool> stalled{false};   ///< The scheduler makes no callbacks.
+  std::atomic<bool> threaded{
+      false};  ///< A thread makes the callbacks at 1 kHz, as in the real library; else Tick() does.
+  std::atomic<bool> stalled{false};  ///< The scheduler makes no callbacks.
   unsigned long rate_Hz = 0;
   int inits = 0;
   /// Calls that the manual forbids: outside of a frame, on a device that is not open, on a running scheduler.
   std::vector<std::string> misuse;
 };
 
-/// Symbols of the library beside the driver's: `hd_stand_in_reset` returns the controls, all as new;
+/// Symbols of the library in addition to the driver's: `hd_stand_in_reset` returns the controls in their initial state;
 /// `hd_stand_in_tick` is one period of the scheduler.
 using StandInReset = StandIn* (*)();
 using StandInTick = void (*)();
