@@ -149,6 +149,10 @@ ExitCode Up(const Words& words) {
       throw InputError("--standby cannot be combined with --remote physics_node");
     }
   }
+  const bool renders_here = (settings.remote >> static_cast<unsigned>(NodeId::kRender) & 1u) == 0;
+  if (settings.window && renders_here && std::getenv("DISPLAY") == nullptr) {
+    throw InputError("the window needs a display, and DISPLAY is not set; log in on a desktop or start an X server");
+  }
   settings.allow_swap_command = values.count("allow-swap-command") != 0;
   settings.open_bus = values.count("open-bus") != 0;
   if (settings.open_bus && !settings.cart.security.keys.empty()) {

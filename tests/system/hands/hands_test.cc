@@ -20,7 +20,7 @@
 #include "tests/support/cart.h"
 #include "tests/support/session_bus.h"
 #include "tests/support/virtual_screen.h"
-#include "tests/system/hands/xclient.h"
+#include "tests/support/xclient.h"
 
 namespace fulcrum {
 namespace {
@@ -101,6 +101,16 @@ class Operator {
   float pixel_;
   Vec3f rest_ = Vec3f::Zero();
 };
+
+TEST(Hands, AreRefusedBeforeAnyNodeStarts) {
+  ::unsetenv("DISPLAY");
+  testing::Program no_display("fulcrum", {"up", "small", "--hands", "mouse"});
+  EXPECT_EQ(no_display.End(0), 2);
+  EXPECT_NE(no_display.Said().find("DISPLAY is not set"), std::string::npos) << no_display.Said();
+  testing::Program no_input("fulcrum", {"up", "small", "--hands", "claw"});
+  EXPECT_EQ(no_input.End(0), 2);
+  EXPECT_NE(no_input.Said().find("valid: mouse"), std::string::npos) << no_input.Said();
+}
 
 TEST(Hands, AMouseAndAKeyboardGraspPullCutAndReleaseAndTheSessionReplays) {
   const testing::VirtualScreen screen;

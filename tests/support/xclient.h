@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace fulcrum::testing {
 
@@ -18,6 +19,8 @@ class XClient {
   bool FindWindow(const std::string& name);
   /// Moves the pointer by pixels, y down.
   void Move(int x, int y);
+  /// Pixels of a square of the window, which must be visible and contain it; in the format of the display.
+  [[nodiscard]] std::vector<unsigned char> Pixels(int x, int y, int size);
   /// @param key name of an X key symbol, such as "Return" or "f".
   void Press(const std::string& key, bool down);
   void Click(const std::string& key) {

@@ -1,4 +1,4 @@
-#include "tests/system/hands/xclient.h"
+#include "tests/support/xclient.h"
 
 // X11's headers define words such as None and Bool as macros: this file is compiled by itself.
 #include <X11/Xlib.h>
@@ -43,6 +43,16 @@ bool XClient::FindWindow(const std::string& name) {
 void XClient::Move(int x, int y) {
   XWarpPointer(impl_->display, 0, 0, 0, 0, 0, 0, x, y);
   XFlush(impl_->display);
+}
+
+std::vector<unsigned char> XClient::Pixels(int x, int y, int size) {
+  XImage* const image = XGetImage(impl_->display, impl_->window, x, y, static_cast<unsigned>(size),
+                                  static_cast<unsigned>(size), AllPlanes, ZPixmap);
+  if (image == nullptr) return {};
+  const auto bytes = static_cast<std::size_t>(image->bytes_per_line) * static_cast<std::size_t>(size);
+  std::vector<unsigned char> pixels(image->data, image->data + bytes);
+  XDestroyImage(image);
+  return pixels;
 }
 
 void XClient::Press(const std::string& key, bool down) {
