@@ -2,6 +2,7 @@
 
 // X11's headers define words such as None and Bool as macros: this file is compiled by itself.
 #include <X11/Xlib.h>
+#include <X11/Xutil.h>
 #include <X11/keysym.h>
 
 #include <stdexcept>
