@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <condition_variable>
@@ -228,7 +229,13 @@ struct NodeApp::Impl {
       health.metrics.push_back({"locks_inherited", static_cast<double>(locks)});
     }
     if (const std::uint64_t foreign = joined->participant.foreign_samples(); foreign > 0) {
-      health.metrics.push_back({"foreign_samples", static_cast<double>(foreign)});
+      // A node may have counted those of a participant of its own.
+      const auto counted = std::ranges::find(health.metrics, bus::kForeignMetric, &Metric::name);
+      if (counted == health.metrics.end()) {
+        health.metrics.push_back({bus::kForeignMetric, static_cast<double>(foreign)});
+      } else {
+        counted->value += static_cast<double>(foreign);
+      }
     }
     FitToMessage(&health);
     joined->healths->Write(health);

@@ -99,6 +99,9 @@ void RecorderNode::Step(const Tick& tick) {
 
 void RecorderNode::FillHealth(Health* health) const {
   recorder::FillHealth(recorder_.stats(), health);
+  if (const std::uint64_t foreign = bus_.foreign_samples(); foreign > 0) {
+    health->metrics.push_back({bus::kForeignMetric, static_cast<double>(foreign)});
+  }
   // Nodes begin when their writers are matched: only those that have just been discovered wait for it.
   for (const bus::ReadPeer& peer : bus_.PeersRead()) {
     if (runtime::MonotonicNs() - peer.since_ns > kReportsMatches_ns) continue;

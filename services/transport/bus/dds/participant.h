@@ -55,6 +55,9 @@ struct ReadPeer {
   std::int64_t since_ns = 0;  ///< CLOCK_MONOTONIC of the first match.
 };
 
+/// Name of the metric with foreign_samples() in a node's Health.
+inline constexpr const char* kForeignMetric = "foreign_samples";
+
 class DdsParticipant {
  public:
   /// Throws InputError when the domain is out of range, shared memory is short or the participant cannot be made.
