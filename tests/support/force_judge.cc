@@ -9,8 +9,8 @@ namespace {
 
 constexpr double kLimit_N = 3.3;
 constexpr double kSlew_N_per_tick = 0.4;
-constexpr double kGone_s = 0.4;  // After this time without a model …
-constexpr double kGone_N = 0.1;  // … the force is at most this.
+constexpr double kGone_s = 0.4;  // Time without a model after which the limit kGone_N applies.
+constexpr double kGone_N = 0.1;  // Limit of the force without a model.
 constexpr double kRise_N = 0.1;  // Largest rise within five ticks after a fade.
 // ToolState contains the force at the proxy's tip. Converted to the hand, the lever has an error of the distance
 // between proxy and tip relative to the shaft, millimetres to a decimetre, plus rounding.

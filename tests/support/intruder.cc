@@ -146,7 +146,7 @@ std::vector<Attempt> TryAllAttempts(int domain, const fs::path& scratch) {
   const auto admit = [&](const std::string& guest, bus::TopicSet writes, bus::TopicSet reads) {
     keys::IssueGuest(real, {guest, writes, reads, today, scratch / guest});
   };
-  // Its folder is copied before it is revoked, so that its own side has the old list.
+  // The folder is copied before the revocation, so that the guest has the old revocation list.
   admit("revoked_guest", bus::SetOf(TopicId::kToolState), bus::SetOf(TopicId::kSceneManifest));
   keys::Revoke(real, "revoked_guest");
   admit("reading_guest", 0, bus::SetOf(TopicId::kHealth));

@@ -31,7 +31,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Each victim lives a little longer than the 5 s after which the supervisor counts it as healthy. The supervisor
+// Each process runs a little longer than the 5 s after which the supervisor counts it as healthy. The supervisor
 // therefore restarts it at once, without the delay for a node that fails repeatedly.
 constexpr std::array kVictims{"recorder",     "physics_node",  "thermal_node",
                               "haptics_node", "handle_bridge", "render_node"};

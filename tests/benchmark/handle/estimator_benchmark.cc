@@ -34,7 +34,7 @@ struct Errors {
 double Rms(double sum, std::size_t n) { return std::sqrt(sum / static_cast<double>(n)); }
 
 Errors Measure(const MakeFilter& make, int runs) {
-  constexpr std::size_t kSettled = 400;  // The first second is the start, not the state.
+  constexpr std::size_t kSettled = 400;  // The first second, in which the estimate settles, is excluded.
   Errors errors;
   std::vector<double> sample_us;
   for (const bool moves : {false, true}) {

@@ -45,7 +45,7 @@ class Stranger {
 }  // namespace
 
 std::string MeasureForeignSession(benchmark::Report* report) {
-  // Without keys: only the number of the session tells the two apart.
+  // Without keys: only the number of the session distinguishes the two.
   testing::Cart cart("small", kForeignDomain, {"--open-bus", "--record", "--seconds", report->quick() ? "4" : "8"});
   bus::DdsSettings settings = testing::ReaderOf(kForeignDomain, "supervisor");
   const std::uint64_t session = bus::AnnouncedSession(settings.shared_memory);

@@ -26,7 +26,7 @@ constexpr int kInputs = 20'000;  ///< A sanitizer makes the test some thirty tim
 constexpr int kInputs = 1'000'000;
 #endif
 constexpr int kInputsPerServo =
-    2000;  ///< Then a fresh servo, which accepts again what an earlier message may have shut out.
+    2000;  ///< Then a new servo: an earlier message may have made the old one refuse valid messages.
 
 /// Numbers at which comparisons and conversions go wrong, and the gate's own limits.
 const std::array<float, 22> kAwkward{0.0f,

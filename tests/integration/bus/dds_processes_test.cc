@@ -68,10 +68,10 @@ TEST(DdsProcesses, KilledPublisherIsForgottenAndItsSuccessorHeard) {
     Peer frame_peer({kDomainText, "frames"});
     Peer tool_peer({kDomainText, "tools"});
     for (int i = 0; i < 5; ++i) {
-      ASSERT_TRUE(Eventually([&] { return frames->TakeLatest(&frame); })) << "life " << life;
+      ASSERT_TRUE(Eventually([&] { return frames->TakeLatest(&frame); })) << "process " << life;
       EXPECT_EQ(frame.xyz.front(), static_cast<float>(frame.header.stamp.sequence % 8));
       EXPECT_EQ(frame.xyz.back(), frame.xyz.front());
-      ASSERT_TRUE(Eventually([&] { return tools->TakeLatest(&tool); })) << "life " << life;
+      ASSERT_TRUE(Eventually([&] { return tools->TakeLatest(&tool); })) << "process " << life;
     }
     epochs.insert(frame.header.stamp.epoch);
     frame_peer.Kill();
@@ -144,10 +144,10 @@ TEST(DdsProcesses, KilledSubscriberDoesNotStopTheWriter) {
       listener.join();
       heard = true;
     });
-    EXPECT_TRUE(Eventually([&] { return publish() || heard; })) << "life " << life;
+    EXPECT_TRUE(Eventually([&] { return publish() || heard; })) << "process " << life;
     peer.Kill();
     waiter.join();
-    EXPECT_TRUE(frame_seen && tool_seen) << "life " << life;
+    EXPECT_TRUE(frame_seen && tool_seen) << "process " << life;
     ASSERT_TRUE(Eventually([&] { return publish() || !(frames->has_readers() || tools->has_readers()); }));
   }
   RecordProperty("longest_write_us", static_cast<int>(std::chrono::floor<std::chrono::microseconds>(longest).count()));

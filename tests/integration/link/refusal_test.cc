@@ -1,4 +1,4 @@
-// What a link refuses: the test plays the other side with raw bytes, which can send what no link would.
+// What a link refuses: the test acts as the other side and sends raw bytes, including those that no link sends.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>

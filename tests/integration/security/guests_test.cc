@@ -61,7 +61,7 @@ class RunningSession : public ::testing::Test {
     return std::make_unique<bus::DdsParticipant>(
         bus::DdsSettings{.domain = kDomain, .node_name = identity, .security = {folder_, identity}});
   }
-  /// A tool that names itself recorder, while its keys name it probe.
+  /// A tool that joins under the name recorder with the keys of probe.
   [[nodiscard]] bus::DdsSettings Guest(std::uint64_t schema_hash = bus::SchemaHash()) const {
     return {.domain = kDomain, .node_name = "recorder", .schema_hash = schema_hash, .security = {out_, "probe"}};
   }

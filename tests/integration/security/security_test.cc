@@ -212,8 +212,8 @@ TEST(SecuredSession, EndsWellWithAllNodesAndTellsWhoWasRefused) {
                                           3);
   EXPECT_NE(stranger.find("has keys of another authority"), std::string::npos) << stranger;
 
-  // A node with foreign keys takes seconds to conclude that no leader with its keys is present; the session lasts until
-  // then.
+  // A node with foreign keys detects only after seconds that no leader with its keys is present; the session lasts
+  // until then.
   cart.Signal(SIGINT);
   ASSERT_EQ(cart.WaitForEnd(90), 0) << cart.Said();
   const std::string summary = ReadFile(cart.session() / "summary.json");

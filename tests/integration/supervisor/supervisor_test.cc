@@ -48,7 +48,7 @@ scene::SceneData TinyScene(std::uint32_t node_mask) {
   return data;
 }
 
-/// Session programs in a folder of their own: `fulcrum` looks for its nodes beside itself.
+/// Session programs in a folder of their own: `fulcrum` starts the nodes in its own folder.
 class SupervisorTest : public ::testing::Test {
  protected:
   static constexpr NodeId kNodes[] = {NodeId::kPhysics, NodeId::kThermal};

@@ -332,7 +332,7 @@ TEST_P(Robustness, StaysFiniteAndComesBack) {
   }
 }
 
-/// Long after a pull nothing moves: the residual of an unfinished solve must not keep the motion alive.
+/// Long after a pull nothing moves: the residual of an unfinished solve must not sustain the motion.
 TEST(ComesToRest, AfterAPull) {
   const scene::SceneData data = MakeScene();
   const SceneView scene = data.View();

@@ -37,7 +37,7 @@ class Check {
       fault_ << "a step of " << 1e3f * report.max_step_m << " mm; ";
     }
     if (report.resets != 0) {
-      fault_ << report.resets << " particles put back; ";
+      fault_ << report.resets << " particles reset; ";
     }
     for (std::size_t i = 0; bounds.no_inverted && i < scene_.tets.size(); ++i) {
       const Tetrahedron& t = scene_.tets[i];
@@ -56,7 +56,7 @@ class Check {
       }
       for (const HeldParticle& held : grasp.held()) {
         if (held.particle >= particles_.particle_count()) {
-          fault_ << "tool " << tool << " holds particle " << held.particle << ", which is none; ";
+          fault_ << "tool " << tool << " holds particle " << held.particle << ", which does not exist; ";
           continue;
         }
         if (!Live(held.particle) || scene_.inverse_mass[held.particle] == 0.0f) {
@@ -66,7 +66,7 @@ class Check {
           fault_ << "particle " << held.particle << " is held twice; ";
         }
         if (!held.p_T.allFinite()) {
-          fault_ << "particle " << held.particle << " is held nowhere; ";
+          fault_ << "particle " << held.particle << " is held at a position that is not finite; ";
         }
         held_by_[held.particle] = static_cast<int>(tool);
       }
@@ -85,13 +85,13 @@ class Check {
     for (const ContactPair& pair : collision.pairs()) {
       const bool on_membrane = pair.triangle < collision.membrane_triangle_count();
       if (pair.triangle >= collision.membrane_triangle_count() + scene_.tube_surface.size()) {
-        fault_ << "a contact on triangle " << pair.triangle << ", which is none; ";
+        fault_ << "a contact on triangle " << pair.triangle << ", which does not exist; ";
       } else if (on_membrane && !model_.TriangleAlive(pair.triangle)) {
         fault_ << "a contact on triangle " << pair.triangle << ", which is cut; ";
       }
       for (const Index p : pair.particle) {
         if (p >= particles_.particle_count() || !Live(p)) {
-          fault_ << "a contact with particle " << p << ", which is dead or none; ";
+          fault_ << "a contact with particle " << p << ", which is dead or does not exist; ";
         }
       }
     }
@@ -111,7 +111,7 @@ class Check {
         const auto i = static_cast<std::size_t>(k);
         const Index p = row.at[i].base < by_base.size() ? by_base[row.at[i].base] : kNoIndex;
         if (p == kNoIndex || !Live(p) || !std::isfinite(row.weight[i])) {
-          fault_ << "a row on particle " << p << ", which is dead or none; ";
+          fault_ << "a row on particle " << p << ", which is dead or does not exist; ";
         }
       }
     }
@@ -119,7 +119,7 @@ class Check {
       const DeviceContacts device = simulation_.Contacts(tool);
       for (std::uint32_t c = 0; c < device.count; ++c) {
         if (!(device.contacts[c].f_ref.norm() <= force_N)) {
-          fault_ << "tool " << tool << " feels " << device.contacts[c].f_ref.norm() << " N; ";
+          fault_ << "tool " << tool << " has a contact force of " << device.contacts[c].f_ref.norm() << " N; ";
         }
       }
     }

@@ -43,7 +43,7 @@ class ChaosCart {
   /// A participant outside the cart floods a topic; returns the number of messages.
   std::uint64_t Pour(Flood what, double seconds);
   std::uint64_t PourBytes(int per_topic);
-  /// Kills the node and spoils its checkpoint before the supervisor restarts it.
+  /// Kills the node and damages its checkpoint before the supervisor restarts it.
   void KillAndSpoil(NodeId node, Damage damage);
 
   /// Waits for a random time up to `most_s`.

@@ -1,5 +1,5 @@
-// More of each fault, at random moments, than the default tests have time for. One seed per run; FULCRUM_CHAOS_SEED
-// repeats one.
+// Each fault more often than in the default tests, at random moments. A failure names its seed; FULCRUM_CHAOS_SEED
+// sets it.
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>

@@ -38,7 +38,7 @@ constexpr double kPatience_s = 20;  // Starting and rejoining on a busy machine.
 constexpr double kFelt_N = 0.15;    // Least force of the pull.
 constexpr double kGone_N = 0.1;
 
-/// The built-in scene without render_node, with a grasper that takes the membrane and then pulls up and down for good.
+/// The built-in scene without render_node, with a grasper that takes the membrane, then pulls up and down to the end.
 std::string PullingScene() {
   std::string scene = testing::ReadFile(FULCRUM_SOURCE_DIR "/deploy/scenes/built-in.yaml");
   scene.resize(scene.find("\nscript:"));

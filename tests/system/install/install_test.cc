@@ -41,7 +41,7 @@ constexpr double kEndLimit_s = 60.0;
 std::string Output(const std::string& program, const std::vector<std::string>& arguments) {
   Program run(program, arguments);
   const int code = run.End(0);
-  EXPECT_EQ(code, 0) << program << " said:\n" << run.Said();
+  EXPECT_EQ(code, 0) << program << " printed:\n" << run.Said();
   return run.Said();
 }
 

@@ -43,7 +43,7 @@ TEST(Cart, EachKilledNodeIsRestartedRejoinsAndTheRunEndsWell) {
   std::map<std::string, pid_t> nodes = cart.nodes();
   std::set<pid_t> pids;
   for (const char* node : kNodes) {
-    ASSERT_TRUE(nodes.contains(node)) << node << " is not alive\n" << cart.Said();
+    ASSERT_TRUE(nodes.contains(node)) << node << " does not run\n" << cart.Said();
     pids.insert(nodes[node]);
   }
   ASSERT_EQ(pids.size(), std::size(kNodes)) << "each node is a process of its own";

@@ -36,7 +36,7 @@ int OpenEnd(const char* interface) {
   address.sll_family = AF_PACKET;
   address.sll_protocol = htons(ETH_P_ALL);
   address.sll_ifindex = static_cast<int>(if_nametoindex(interface));
-  // With the header that lists the missing checksums, which the interfaces leave to each other.
+  // The header of each frame marks a missing checksum: virtual interfaces do not compute it.
   if (fd < 0 || setsockopt(fd, SOL_PACKET, PACKET_VNET_HDR, &on, sizeof on) != 0 ||
       setsockopt(fd, SOL_SOCKET, SO_RCVBUFFORCE, &buffer_B, sizeof buffer_B) != 0 ||
       bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {

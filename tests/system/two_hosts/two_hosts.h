@@ -49,7 +49,7 @@ class TwoHosts {
 
   std::filesystem::path folder_;
   Program cart_holder_, host_holder_, cable_;
-  std::string cart_pid_, host_pid_;  ///< Of processes that live in the namespaces.
+  std::string cart_pid_, host_pid_;  ///< Of processes that run in the namespaces.
 };
 
 // ------------------------------------------------------------------------ records of the probes

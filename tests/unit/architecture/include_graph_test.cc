@@ -1,4 +1,4 @@
-// The include graph: the rooms have one order, and each includes only rooms before it, so that no circle can arise.
+// The include graph: the rooms have one order, and each includes only rooms before it, so that no cycle can arise.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Floors of the services with their rooms, from the ground up. A room may include those before it, whatever their
-/// floor, so that no circle can arise.
+/// floor, so that no cycle can arise.
 struct Floor {
   const char* name;
   std::vector<std::string> rooms;
@@ -126,7 +126,7 @@ TEST(IncludeGraph, FoldersOfANodeDoNotIncludeEachOtherInACircle) {
     if (!kNodes.contains(RoomOf(include.from)) || RoomOf(include.from) != RoomOf(include.to) || from == to) continue;
     graph[from].insert(to);
   }
-  // Folders without edges to others are removed repeatedly: the rest is in a circle, or above one.
+  // Folders without edges to others are removed repeatedly: the rest is in a cycle or includes one.
   for (bool taken = true; taken;) {
     taken = false;
     for (auto& [folder, targets] : graph) {
@@ -137,7 +137,7 @@ TEST(IncludeGraph, FoldersOfANodeDoNotIncludeEachOtherInACircle) {
   for (const auto& [folder, targets] : graph) {
     std::string text;
     for (const std::string& target : targets) text += " " + target;
-    ADD_FAILURE() << folder << " is in a circle with, or above one of:" << text;
+    ADD_FAILURE() << folder << " is in an include cycle, or leads to one through:" << text;
   }
 }
 

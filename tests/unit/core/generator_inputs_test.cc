@@ -70,7 +70,7 @@ TEST(GeneratorInputs, ASilentPedalIsUpUnlessBothEndsOfTheSilenceSayDown) {
   EXPECT_EQ(inputs.At(700 * kMs).mode, CauteryMode::kOff) << "when it went up is unknown";
   inputs.Add(Pedals(910, kPedalCut));
   inputs.Add(Pedals(2000, kPedalCut));
-  EXPECT_EQ(inputs.At(1500 * kMs).mode, CauteryMode::kOff) << "more than a second";
+  EXPECT_EQ(inputs.At(1500 * kMs).mode, CauteryMode::kOff) << "the gap exceeds a second";
 }
 
 TEST(GeneratorInputs, NameEachSampleThatTheAnswerDependsOnOnce) {

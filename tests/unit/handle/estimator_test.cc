@@ -108,7 +108,7 @@ TEST(JawCalibrator, FindsTheVoltageBetweenTheCodes) {
       ++n;
     }
   }
-  EXPECT_LT(std::sqrt(squares / n), 0.04);  // Counts. The mean of the codes has 0.09.
+  EXPECT_LT(std::sqrt(squares / n), 0.04);  // In counts; the mean of the codes has an error of 0.09.
 }
 
 TEST(JawCalibrator, TakesFallingHandlesInAnyOrder) {

@@ -72,7 +72,7 @@ class CartDevicesTest : public ::testing::Test {
 };
 
 TEST_F(CartDevicesTest, ServoWithATouchNeitherAllocatesNorLocks) {
-  if (!AllocationGuard::active()) GTEST_SKIP() << "a sanitizer owns malloc in this build";
+  if (!AllocationGuard::active()) GTEST_SKIP() << "a sanitizer replaces malloc in this build";
   TouchRig rig;
   UseTouch("Left Device");
   // Straight up from the trocar, so that the tip is 7 mm below the tissue's surface.

@@ -62,7 +62,7 @@ class HapticsNodeTest : public ::testing::Test {
 };
 
 TEST_F(HapticsNodeTest, ServoNeitherAllocatesNorLocks) {
-  if (!AllocationGuard::active()) GTEST_SKIP() << "a sanitizer owns malloc in this build";
+  if (!AllocationGuard::active()) GTEST_SKIP() << "a sanitizer replaces malloc in this build";
   for (int i = 0; i < 4000; ++i) Step();
   EXPECT_EQ(violations, 0);
   EXPECT_GT(tool.tools[0].f_W.z(), 0.1f);  // Models did arrive and cause forces.

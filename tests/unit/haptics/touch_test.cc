@@ -61,7 +61,7 @@ class Touch : public ::testing::Test {
   }
   [[nodiscard]] Vec3d Force(int device) const { return Vec3d(rig.hd->devices[device].force_N.data()); }
   [[nodiscard]] std::string Misuse() const { return rig.hd->misuse.empty() ? "" : rig.hd->misuse.front(); }
-  /// Maintenance two seconds after the last one and again much later, after the retry interval beside a working device.
+  /// Maintenance 20 s after the last one: longer than the interval between retries beside a working device.
   void MaintainLater() {
     now_ns += 20 * kSecond_ns;
     driver->Maintain(now_ns);

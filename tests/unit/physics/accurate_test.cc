@@ -180,7 +180,7 @@ TEST_F(Accurate, ContactAndCutsWake) {
   }
   const int there = run.solver.regions().partition().Of(run.particles.NodeRef(row_index, col));
   run.Step({}, contacts);
-  EXPECT_TRUE(run.solver.regions().none_computed()) << "Near is not touching.";
+  EXPECT_TRUE(run.solver.regions().none_computed()) << "The contacts are near but do not touch.";
   for (ContactRow& row : contacts) {
     row.offset += 0.0015f;
   }
@@ -191,7 +191,7 @@ TEST_F(Accurate, ContactAndCutsWake) {
   }
   ASSERT_TRUE(run.solver.regions().none_computed()) << "It rests on a support that does not move.";
   run.Step();
-  EXPECT_TRUE(run.solver.regions().computed(there)) << "The support has gone.";
+  EXPECT_TRUE(run.solver.regions().computed(there)) << "The support was removed.";
   for (int i = 0; i < 300; ++i) {
     run.Step();
   }

@@ -123,9 +123,9 @@ TEST_F(OnSmallScene, ASheetCutInManyPlacesComesToRest) {
       early = i < 50 ? std::max(early, step) : early;
       late = i >= 350 ? std::max(late, step) : late;
     }
-    EXPECT_GT(early, 0.0005f) << seed;  // The slits gape …
-    EXPECT_LT(early, 0.0015f) << seed;  // … no shred is thrown about …
-    EXPECT_LT(late, 1e-5f) << seed;     // … and later no shred swings.
+    EXPECT_GT(early, 0.0005f) << seed;  // The slits gape.
+    EXPECT_LT(early, 0.0015f) << seed;  // No shred is thrown about.
+    EXPECT_LT(late, 1e-5f) << seed;     // Later no shred swings.
   }
 }
 

@@ -22,7 +22,7 @@ class AllocationGuard {
   /// Allocations, releases and mutex locks of this thread since the guard was made.
   [[nodiscard]] std::int64_t violations() const;
 
-  /// False where a sanitizer owns malloc: nothing is counted there.
+  /// False where a sanitizer replaces malloc: nothing is counted there.
   [[nodiscard]] static bool active();
 };
 

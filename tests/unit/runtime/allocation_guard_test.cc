@@ -10,7 +10,7 @@ namespace fulcrum::testing {
 namespace {
 
 TEST(AllocationGuard, SeesAllocationsReleasesAndLocksOfItsThreadOnly) {
-  if (!AllocationGuard::active()) GTEST_SKIP() << "a sanitizer owns malloc in this build";
+  if (!AllocationGuard::active()) GTEST_SKIP() << "a sanitizer replaces malloc in this build";
   std::mutex mutex;
   std::int64_t nothing = 0;
   std::int64_t allocation = 0;

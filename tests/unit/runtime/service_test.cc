@@ -108,7 +108,7 @@ TEST(InstallPlacesTest, AreFoundFromTheProgramsOfAnyTree) {
   EXPECT_EQ(MachineCartOf("/tmp/x/usr/libexec/fulcrum"), "/tmp/x/etc/fulcrum/cart.yaml");
   EXPECT_EQ(MachineCartOf("/opt/fulcrum/libexec/fulcrum"), "/opt/fulcrum/etc/fulcrum/cart.yaml");
   EXPECT_EQ(ShareFolderOf("/home/a/build/release/bin"), "/home/a/build/release/share/fulcrum");
-  EXPECT_EQ(MachineCartOf("/home/a/build/release/bin"), "") << "a build tree does not look into /etc";
+  EXPECT_EQ(MachineCartOf("/home/a/build/release/bin"), "") << "a program of a build tree does not read /etc";
 }
 
 }  // namespace
