@@ -11,6 +11,7 @@
 
 #include "render_node/geometry/laparoscope.h"
 #include "services/base/core/generator_inputs.h"
+#include "services/base/runtime/cyclic_thread.h"
 
 namespace fulcrum::render {
 namespace {
@@ -40,7 +41,7 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       display_(*stage_->display),
       writer_(settings.frames),
       quality_(settings.quality, static_cast<int>(scene.render.height)),
-      operator_stamper_(settings.epoch_ns),
+      operator_stamper_(runtime::MonotonicNs()),
       camera_(scene.render),
       figures_(scene.render.hud != 0) {
   if (ports_.operator_input == nullptr) return;
@@ -53,6 +54,11 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
 }
 
 RenderNode::~RenderNode() = default;
+
+std::int64_t RenderNode::PeriodNs(std::int64_t cart_ns) const {
+  const auto scene_ns = static_cast<std::int64_t>(std::llround(1e9 / static_cast<double>(scene_.render.rate_Hz)));
+  return hands_ ? cart_ns : std::max(cart_ns, scene_ns);
+}
 
 void RenderNode::Step(const Tick& tick) {
   session_time_s_ = tick.session_time_s;

@@ -34,7 +34,6 @@ struct RenderPorts {
 
 struct RenderSettings {
   bool window = false;               ///< Draw into a window instead of memory.
-  std::int64_t epoch_ns = 0;         ///< CLOCK_MONOTONIC at the start of the process [ns].
   Quality quality = Quality::kAuto;  ///< Resolution of the scene.
   std::filesystem::path frames;      ///< Folder for the pictures.
 };
@@ -50,6 +49,10 @@ class RenderNode {
   /// Reads the ports and draws if the picture will be used: in a window after each change, off screen if a PNG is due
   /// and something has changed since the last one. Otherwise nothing is computed.
   void Step(const Tick& tick);
+
+  /// Time between two steps: the scene sets the wanted rate of pictures, the cart (`cart_ns`) the rate that the machine
+  /// can reach, and the lower one is used. An operator's hand waits for its picture: then the cart's is used [ns].
+  [[nodiscard]] std::int64_t PeriodNs(std::int64_t cart_ns) const;
 
   /// Acts as a key of the window (an X key symbol), before the next Step. Keys without a function are ignored.
   void Press(int key);

@@ -135,10 +135,11 @@ TEST_F(Chaos, TheSessionOutlivesItsFaults) {
   }
   RefuseASecondCart();
   // Random bytes that happen to decode do not have the session's number: they count as samples of another session on
-  // its bus, which is the only fault.
-  EXPECT_EQ(End(), 1) << chaos_.Trouble();
+  // its bus, which is the only fault. Whether some decode depends on the time at which they arrive.
+  const int code = End();
   const std::string said = chaos_.cart().Said();
-  EXPECT_NE(said.find("samples of another session"), std::string::npos) << said;
+  const bool foreign = said.find("samples of another session") != std::string::npos;
+  EXPECT_EQ(code, foreign ? 1 : 0) << chaos_.Trouble() << said;
   EXPECT_EQ(said.find("! not well"), said.rfind("! not well")) << said;
   const CartState state = chaos_.watch().See([](const CartState& s) { return s; });
   EXPECT_EQ(state.force_verdict(), "");

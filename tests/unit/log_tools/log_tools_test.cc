@@ -95,8 +95,10 @@ TEST_F(LogTools, InfoTellsSessionTopicsAndLosses) {
   PrintInfo(Make("a.mcap"), &out);
   const std::string text = out.str();
   const std::string figures = std::to_string(kTopicCount + 3) + " messages · 2 lost";
-  for (const std::string& part :
-       {std::string("complete"), std::string("scene \"small\" 77"), "2023-11-14 22:13:20 UTC · 0.16 s · " + figures}) {
+  // A message each hundredth of a second.
+  const std::string length = "0." + std::to_string(kTopicCount + 2) + " s";
+  for (const std::string& part : {std::string("complete"), std::string("scene \"small\" 77"),
+                                  "2023-11-14 22:13:20 UTC · " + length + " · " + figures}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << " in\n" << text;
   }
   for (const bus::TopicRole& role : bus::kTopicRoles) {
