@@ -132,7 +132,7 @@ TEST(Hands, AMouseAndAKeyboardGraspPullCutAndReleaseAndTheSessionReplays) {
   // The places of the scripted operator, who does the same.
   const auto place = [&](std::uint32_t tool, double time_s) { return EvaluateScript(view.script, tool, time_s).p_W; };
 
-  // Nobody has taken the controls: the tools rest, whatever the pointer does.
+  // Before the controls are taken, the tools rest although the pointer moves.
   const Vec3f rest = eyes.tools.tools[1].p_WT;
   client.Move(50, 50);
   std::this_thread::sleep_for(Seconds(0.5));
@@ -191,9 +191,6 @@ TEST(Hands, AMouseAndAKeyboardGraspPullCutAndReleaseAndTheSessionReplays) {
       << eyes.tools.tools[0].f_W.norm() << " N";
   std::printf("hands.release_to_safe_ms %.0f ms\n", 1e3 * Seconds(std::chrono::steady_clock::now() - released).count());
 
-  if (const char* keep = std::getenv("FULCRUM_KEEP")) {
-    fs::copy(cart.session() / "frames", keep, fs::copy_options::recursive);
-  }
   cart.Signal(SIGINT);
   ASSERT_EQ(cart.WaitForEnd(kPatience_s), 0) << cart.Said();
   testing::Program replay("replayer", {cart.session() / "recording.mcap", "--into", "physics", "thermal", "haptics"});
