@@ -52,23 +52,6 @@ bool IsGone(pid_t process) {
   return ::kill(process, 0) != 0 && errno == ESRCH;
 }
 
-std::uint64_t SharedMemoryLeft(int domain) {
-  std::uint64_t bytes = 0;
-  std::error_code none;
-  const auto add = [&](const fs::directory_entry& entry) {
-    // An empty file counts as left over, too.
-    if (entry.is_regular_file(none)) bytes += std::max<std::uint64_t>(1, entry.file_size(none));
-  };
-  for (const auto& entry : fs::directory_iterator("/dev/shm", none)) {
-    const std::string name = entry.path().filename();
-    if (name.starts_with("fastrtps_") || name.starts_with("fast_datasharing") || name.starts_with("sem.fastrtps")) {
-      add(entry);
-    }
-  }
-  for (const auto& entry : fs::recursive_directory_iterator(bus::SharedMemoryDirectory(domain), none)) add(entry);
-  return bytes;
-}
-
 /// Faults that `fulcrum log verify` finds in a file, one line each, except samples that were sent while no recorder
 /// ran.
 std::string FaultsOf(const fs::path& file) {
@@ -158,6 +141,23 @@ std::string KillNode(const std::string& program, const Cart& cart, CartWatch* wa
 }
 
 }  // namespace
+
+std::uint64_t SharedMemoryLeft(int domain) {
+  std::uint64_t bytes = 0;
+  std::error_code none;
+  const auto add = [&](const fs::directory_entry& entry) {
+    // An empty file counts as left over, too.
+    if (entry.is_regular_file(none)) bytes += std::max<std::uint64_t>(1, entry.file_size(none));
+  };
+  for (const auto& entry : fs::directory_iterator("/dev/shm", none)) {
+    const std::string name = entry.path().filename();
+    if (name.starts_with("fastrtps_") || name.starts_with("fast_datasharing") || name.starts_with("sem.fastrtps")) {
+      add(entry);
+    }
+  }
+  for (const auto& entry : fs::recursive_directory_iterator(bus::SharedMemoryDirectory(domain), none)) add(entry);
+  return bytes;
+}
 
 int KillFindings::all() const {
   int sum = 0;

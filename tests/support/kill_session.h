@@ -27,6 +27,10 @@ struct KillFindings {
   [[nodiscard]] int all() const;
 };
 
+/// Size of the files of an ended session that are left in shared memory, at least 1 for each: in the cart's directory,
+/// and what the library would put beside it.
+[[nodiscard]] std::uint64_t SharedMemoryLeft(int domain);
+
 /// How a session ends.
 enum class LastKill { kSupervisor, kNone };
 

@@ -54,23 +54,6 @@ struct Findings {
   std::uint64_t topology_lost = 0, shared_memory_left_B = 0;
 };
 
-/// In the cart's directory, and what the library would put beside it.
-std::uint64_t SharedMemoryLeft() {
-  std::uint64_t bytes = 0;
-  std::error_code none;
-  const auto add = [&](const fs::directory_entry& entry) {
-    if (entry.is_regular_file(none)) bytes += entry.file_size(none);
-  };
-  for (const auto& entry : fs::directory_iterator("/dev/shm", none)) {
-    const std::string name = entry.path().filename();
-    if (name.starts_with("fastrtps_") || name.starts_with("fast_datasharing") || name.starts_with("sem.fastrtps")) {
-      add(entry);
-    }
-  }
-  for (const auto& entry : fs::directory_iterator(bus::SharedMemoryDirectory(kDomain), none)) add(entry);
-  return bytes;
-}
-
 /// A cart file with which kills do not make a session end badly.
 fs::path CartThatAllowsKills(const fs::path& folder) {
   std::ofstream(folder / "cart.yaml") << "verdict: {restarts: 1000}\n";
@@ -240,7 +223,7 @@ int Run(benchmark::Report* report) {
   std::string wrong;
   for (int session = 0; session < sessions && wrong.empty(); ++session) {
     wrong = RunSession(rounds, scene, &findings);
-    findings.shared_memory_left_B += SharedMemoryLeft();
+    findings.shared_memory_left_B += testing::SharedMemoryLeft(kDomain);
   }
   fs::remove_all(folder);
   if (!wrong.empty()) return Fail(wrong);
