@@ -83,7 +83,9 @@ void HapticsNode::BusStep() {
     models_not_taken_.fetch_add(1, std::memory_order_relaxed);
   }
   while (ports_.operator_input.TakeNext(&received_input_)) {
-    if (operator_.Add(received_input_)) (void)inputs_to_servo_.TryPush(received_input_);
+    if (operator_.Add(received_input_) && !inputs_to_servo_.TryPush(received_input_)) {
+      inputs_not_taken_.fetch_add(1, std::memory_order_relaxed);
+    }
   }
   while (from_servo_.TryPop(&record_)) Publish(record_);
 }
@@ -115,6 +117,7 @@ void HapticsNode::FillHealth(Health* health) const {
   metric("model_age_ms", 1e3 * figures.model_age_s);
   metric("models_dropped", static_cast<double>(figures.models_dropped));
   metric("models_not_taken", static_cast<double>(models_not_taken_.load(std::memory_order_relaxed)));
+  metric("inputs_not_taken", static_cast<double>(inputs_not_taken_.load(std::memory_order_relaxed)));
   metric("records_lost", static_cast<double>(records_lost_.load(std::memory_order_relaxed)));
   metric("forces_not_finite", static_cast<double>(figures.not_finite));
   FillDeviceHealth(health);

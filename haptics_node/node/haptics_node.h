@@ -68,13 +68,13 @@ class HapticsNode {
   Servo servo_;
   const std::uint64_t epoch_;
 
-  // If the servo is delayed for longer than a ring holds, the newest models and records are dropped and counted in
-  // Health.
+  // If the servo is delayed for longer than a ring holds, the newest models, inputs and records are dropped and counted
+  // in Health.
   runtime::SpscRing<ContactModel, 8> to_servo_;
   runtime::SpscRing<OperatorInput, 8> inputs_to_servo_;
   runtime::SpscRing<TickRecord, 256> from_servo_;
   runtime::SeqLock<ServoFigures> figures_;
-  std::atomic<std::uint64_t> models_not_taken_{0}, records_lost_{0};
+  std::atomic<std::uint64_t> models_not_taken_{0}, inputs_not_taken_{0}, records_lost_{0};
 
   // Servo thread only.
   ContactModel arrived_;
