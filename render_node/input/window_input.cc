@@ -28,8 +28,14 @@ std::optional<HandsKey> KeyOf(KeySym symbol) {
   return found == kKeys.end() ? std::nullopt : std::optional(found->second);
 }
 
-/// Errors of this connection end nothing: the window may be destroyed before the connection.
-int Ignore(::Display*, XErrorEvent*) { return 0; }
+// Xlib has one handler of errors for all connections of a process.
+::Display* g_own = nullptr;
+XErrorHandler g_before = nullptr;
+
+/// Errors of this connection end nothing, because the window may be destroyed before the connection.
+int HandleError(::Display* display, XErrorEvent* event) {
+  return display == g_own || g_before == nullptr ? 0 : g_before(display, event);
+}
 
 }  // namespace
 
@@ -37,9 +43,11 @@ int Ignore(::Display*, XErrorEvent*) { return 0; }
 class WindowInput::Connection {
  public:
   Connection(const std::string& name, unsigned long window) : window_(window) {
-    XSetErrorHandler(&Ignore);
     display_ = XOpenDisplay(name.empty() ? nullptr : name.c_str());
     if (display_ == nullptr) throw InputError("--hands mouse: the display cannot be opened a second time");
+    g_own = display_;
+    const XErrorHandler before = XSetErrorHandler(&HandleError);
+    if (before != &HandleError) g_before = before;
     Bool supported = False;
     XkbSetDetectableAutoRepeat(display_, True, &supported);
     XSelectInput(display_, window_, KeyPressMask | KeyReleaseMask | FocusChangeMask | StructureNotifyMask);
@@ -58,10 +66,11 @@ class WindowInput::Connection {
 
   /// Takes the controls once the pointer is free: a button that is still down belongs to the window's own connection.
   bool Take(MouseHands* hands, std::int64_t now_ns) {
-    if (XGrabPointer(display_, window_, False, kPointerEvents, GrabModeAsync, GrabModeAsync, window_, Invisible(),
-                     CurrentTime) != GrabSuccess) {
-      return false;
-    }
+    const Cursor cursor = Invisible();
+    const int grabbed = XGrabPointer(display_, window_, False, kPointerEvents, GrabModeAsync, GrabModeAsync, window_,
+                                     cursor, CurrentTime);
+    XFreeCursor(display_, cursor);  // The grab keeps it.
+    if (grabbed != GrabSuccess) return false;
     FindPointer();
     Centre();
     hands->Take(now_ns);
