@@ -2,6 +2,7 @@
 // does, and answered. A missing answer is a fault, too.
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -21,6 +22,14 @@ namespace {
 /// Longer than any pause of a loaded machine.
 constexpr timeval kPatience{20, 0};
 
+/// Result of `call`, which is repeated while a signal interrupts it: the engine's own clock sends one each few seconds.
+template <class Call>
+auto Uninterrupted(const Call& call) {
+  auto result = call();
+  while (result < 0 && errno == EINTR) result = call();
+  return result;
+}
+
 class Socket {
  public:
   explicit Socket(int port) : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -32,7 +41,7 @@ class Socket {
     address.sin_family = AF_INET;
     address.sin_port = htons(static_cast<std::uint16_t>(port));
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    if (fd_ < 0 || ::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    if (fd_ < 0 || !Connect(address)) {
       throw std::system_error(errno, std::generic_category(), "connection to the console's server");
     }
   }
@@ -44,7 +53,7 @@ class Socket {
   std::string Ask(Input input) {
     // The server may close before it has read everything.
     while (!input.empty()) {
-      const ssize_t sent = ::send(fd_, input.data(), input.size(), MSG_NOSIGNAL);
+      const ssize_t sent = Uninterrupted([&] { return ::send(fd_, input.data(), input.size(), MSG_NOSIGNAL); });
       if (sent <= 0) break;
       input = input.subspan(static_cast<std::size_t>(sent));
     }
@@ -52,13 +61,26 @@ class Socket {
     std::string answer;
     std::array<char, 4096> piece{};
     ssize_t got = 0;
-    while ((got = ::recv(fd_, piece.data(), piece.size(), 0)) > 0)
-      answer.append(piece.data(), static_cast<size_t>(got));
+    while ((got = Uninterrupted([&] { return ::recv(fd_, piece.data(), piece.size(), 0); })) > 0)
+      answer.append(piece.data(), static_cast<std::size_t>(got));
     Promise(got == 0 || errno != EAGAIN, "the server neither answers nor closes");
     return answer;
   }
 
  private:
+  /// False with errno. A connect that a signal interrupts goes on, and a second call would be refused.
+  bool Connect(const sockaddr_in& address) {
+    if (::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return true;
+    if (errno != EINTR) return false;
+    pollfd ready{fd_, POLLOUT, 0};
+    Uninterrupted([&] { return ::poll(&ready, 1, -1); });
+    int error = 0;
+    socklen_t size = sizeof error;
+    if (::getsockopt(fd_, SOL_SOCKET, SO_ERROR, &error, &size) != 0) return false;
+    errno = error;
+    return error == 0;
+  }
+
   int fd_;
 };
 
