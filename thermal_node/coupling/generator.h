@@ -15,7 +15,9 @@ namespace fulcrum::thermal {
 /// interrupted. The generator's limits of voltage and current hold while the current is on; the rms over the whole
 /// period is sqrt(duty) times as large. A cell is removed when its water is spent *and* it is hotter than `remove_C`:
 /// in cut at once (the steam bursts it), in blend after some superheating of dry tissue (a wider coagulated border), in
-/// coag only when it burns; coag therefore dries and browns. Duty cycles and temperatures are assumed.
+/// coag only when the char itself goes; coag therefore dries, browns and chars. An abdomen is filled with carbon
+/// dioxide, in which char does not burn but reacts to carbon monoxide (Boudouard), above some 700 °C. Duty cycles and
+/// the temperature of blend are assumed.
 struct ModeRule {
   float duty;      ///< Duty cycle: fraction of the time in which the current is on.
   float remove_C;  ///< Dry tissue is removed above this temperature.
@@ -29,7 +31,7 @@ inline ModeRule RuleOf(CauteryMode mode) {
     case CauteryMode::kBlend:
       return {0.64f, 130.0f, 0.0f};
     case CauteryMode::kCoag:
-      return {0.25f, 400.0f, 4.0e-4f};
+      return {0.25f, 700.0f, 4.0e-4f};
     case CauteryMode::kOff:
       break;
   }

@@ -14,6 +14,9 @@ constexpr double kFine = 2;
 /// the edge of the clear region [pixels].
 constexpr double kToEdge = 0.25;
 
+/// A branch counts with this factor times its excess (CentreLine::length).
+constexpr double kBranchSlope = 4;
+
 struct Course {
   std::vector<Vec2d> points;
   std::vector<double> half_widths;
@@ -104,11 +107,36 @@ CentreLine::Stretch StretchOf(const Branch& branch, const Skeleton& skeleton, co
   }
   CentreLine::Stretch stretch;
   stretch.closed = branch.closed;
-  stretch.length = LengthOf(points, branch.closed) / kFine;
+  stretch.counted = stretch.length = LengthOf(points, branch.closed) / kFine;
   for (std::size_t i = 0; i < points.size(); ++i) {
     stretch.points.push_back({points[i] / kFine, 2 * half_widths[i] / kFine});
   }
   return stretch;
+}
+
+/// Limits `counted` of branches.
+void CountBranches(const Skeleton& skeleton, const std::vector<float>& distance, const Mask& thin, double beyond,
+                   std::vector<CentreLine::Stretch>* stretches) {
+  std::vector<std::vector<std::size_t>> spurs(skeleton.junctions.size());
+  std::vector<std::size_t> degree(skeleton.junctions.size());
+  for (std::size_t n = 0; n < skeleton.branches.size(); ++n) {
+    const Branch& branch = skeleton.branches[n];
+    for (const int junction : {branch.from, branch.to}) {
+      if (junction >= 0) ++degree[static_cast<std::size_t>(junction)];
+    }
+    if (branch.from >= 0 && branch.to < 0) spurs[static_cast<std::size_t>(branch.from)].push_back(n);
+  }
+  for (std::size_t junction = 0; junction < spurs.size(); ++junction) {
+    auto& here = spurs[junction];
+    std::sort(here.begin(), here.end(),
+              [&](std::size_t a, std::size_t b) { return (*stretches)[a].length < (*stretches)[b].length; });
+    here.resize(std::min(here.size(), std::max<std::size_t>(degree[junction], 2) - 2));
+    for (const std::size_t n : here) {
+      const double excess = std::max(ExcessOf(skeleton.branches[n], skeleton, distance, thin, beyond), 0.0);
+      CentreLine::Stretch& stretch = (*stretches)[n];
+      stretch.counted = std::min(stretch.length, kBranchSlope * excess / kFine);
+    }
+  }
 }
 
 }  // namespace
@@ -117,12 +145,14 @@ CentreLine FindCentreLine(const Mask& hole, const CentreLineSettings& settings) 
   const Mask fine = Doubled(hole);
   const std::vector<float> distance = DistanceToClear(fine);
   Mask thin = Thinned(fine, distance);
-  PruneSpurs(&thin, distance, kFine * settings.spur);
+  const double beyond = kFine * settings.spur;
+  PruneSpurs(&thin, distance, beyond);
   const Skeleton skeleton = Trace(thin, distance);
   CentreLine line;
   for (const Branch& branch : skeleton.branches) {
     line.stretches.push_back(StretchOf(branch, skeleton, distance, fine, kFine * settings.smooth));
   }
+  CountBranches(skeleton, distance, thin, beyond, &line.stretches);
   return line;
 }
 

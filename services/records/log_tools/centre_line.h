@@ -17,13 +17,17 @@ struct CentreLine {
   struct Stretch {
     std::vector<CentrePoint> points;
     bool closed = false;
-    double length = 0;  ///< Includes the extension to the end of the hole at a free end [texels].
+    double length = 0;   ///< Includes the extension to the end of the hole at a free end [texels].
+    double counted = 0;  ///< Its part of the cut length [texels].
   };
   std::vector<Stretch> stretches;  ///< Stretches between ends and junctions, each once.
 
+  /// Cut length [texels]. Of the n stretches at a junction the n - 2 shortest with a free end are branches. A branch
+  /// counts with four times its excess over the width of the hole, at most with its length: whether it counts does not
+  /// turn on a texel.
   [[nodiscard]] double length() const {
     double sum = 0;
-    for (const Stretch& stretch : stretches) sum += stretch.length;
+    for (const Stretch& stretch : stretches) sum += stretch.counted;
     return sum;
   }
 };

@@ -196,12 +196,20 @@ double LengthOf(const Branch& branch, const Skeleton& skeleton) {
   return length;
 }
 
+double ExcessOf(const Branch& branch, const Skeleton& skeleton, std::span<const float> distance, const Mask& thin,
+                double beyond) {
+  const Pixel end = branch.pixels.back();
+  const double reach = LengthOf(branch, skeleton) + static_cast<double>(distance[thin.Index(end.x, end.y)]);
+  const double edge = static_cast<double>(skeleton.junctions[static_cast<std::size_t>(branch.from)].half_width);
+  return reach - kRough * edge - beyond;
+}
+
 void PruneSpurs(Mask* thin, std::span<const float> distance, double beyond) {
   for (bool changed = true; changed;) {
     changed = false;
     const Skeleton skeleton = Trace(*thin, distance);
     struct Spur {
-      double reach;
+      double excess;
       const Branch* branch;
     };
     std::vector<std::vector<Spur>> spurs(skeleton.junctions.size());
@@ -212,16 +220,14 @@ void PruneSpurs(Mask* thin, std::span<const float> distance, double beyond) {
       }
       if (branch.from < 0 || branch.to >= 0) continue;
       const auto junction = static_cast<std::size_t>(branch.from);
-      const Pixel end = branch.pixels.back();
-      const double reach = LengthOf(branch, skeleton) + static_cast<double>(distance[thin->Index(end.x, end.y)]);
-      const double edge = static_cast<double>(skeleton.junctions[junction].half_width);
-      if (reach < kRough * edge + beyond) spurs[junction].push_back({reach, &branch});
+      const double excess = ExcessOf(branch, skeleton, distance, *thin, beyond);
+      if (excess < 0) spurs[junction].push_back({excess, &branch});
     }
     for (std::size_t junction = 0; junction < spurs.size(); ++junction) {
       auto& here = spurs[junction];
-      std::sort(here.begin(), here.end(), [](const Spur& a, const Spur& b) { return a.reach < b.reach; });
-      // If there is no other branch, the two longest form the line.
-      if (here.size() == degree[junction]) here.resize(here.size() - std::min<std::size_t>(2, here.size()));
+      std::sort(here.begin(), here.end(), [](const Spur& a, const Spur& b) { return a.excess < b.excess; });
+      // Two stay at each junction: they form the line.
+      here.resize(std::min(here.size(), std::max<std::size_t>(degree[junction], 2) - 2));
       for (const Spur& spur : here) {
         for (const Pixel& at : spur.branch->pixels) thin->Put(at.x, at.y, false);
         changed = true;

@@ -41,8 +41,13 @@ struct Skeleton {
 
 [[nodiscard]] Skeleton Trace(const Mask& thin, std::span<const float> distance);
 
-/// Removes branches with a free end that extend beyond the hole's edge at their junction by less than three quarters of
-/// the half width there plus `beyond` pixels, until there are none.
+/// Length by which a branch with one free end extends beyond the hole's edge at its junction, less the width of the
+/// hole there and `beyond` pixels: what extends less is a bay of the edge [pixels].
+[[nodiscard]] double ExcessOf(const Branch& branch, const Skeleton& skeleton, std::span<const float> distance,
+                              const Mask& thin, double beyond);
+
+/// Removes branches with one free end and a negative excess, the shortest first, until there are none or only two meet
+/// at their junction.
 void PruneSpurs(Mask* thin, std::span<const float> distance, double beyond);
 
 /// Length of a branch from junction to junction or end [pixels].

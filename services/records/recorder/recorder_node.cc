@@ -76,6 +76,7 @@ RecorderNode::RecorderNode(app::NodeApp* app, const RecorderSettings& settings)
 
 void RecorderNode::ReceiveAllTopics(app::NodeApp* app) {
   for (const auto& role : bus::kTopicRoles) {
+    if (!role.recorded()) continue;
     inputs_.push_back(bus_.MakeRawInput(role.id, [this](const bus::RawSample& sample, const auto& is_whole) {
       RunBeforeOtherPrograms();
       recorder_.Receive(sample, is_whole);

@@ -217,7 +217,7 @@ TEST(VolumeTest, DepthOfBurnGrowsWithPowerAndTime) {
   const scene::SceneData data = SceneWithVolume();
   const SceneView scene = data.View();
   float weaker = 0;
-  for (const float power : {3.0f, 6.0f, 10.0f}) {
+  for (const float power : {1.0f, 2.0f, 4.0f}) {
     ThermalSolver solver(scene);
     float before = 0;
     for (int second = 1; second <= 3; ++second) {
@@ -228,7 +228,7 @@ TEST(VolumeTest, DepthOfBurnGrowsWithPowerAndTime) {
     }
     EXPECT_GT(before, weaker) << power;
     EXPECT_GE(before, 1e-4f);
-    EXPECT_LE(before, 4.8e-3f);
+    EXPECT_LT(before, 4.8e-3f) << "the whole depth";
     // Deepest below the tip, none far away.
     EXPECT_NEAR(solver.volume()->BurnDepth(kSpot), before, 3e-4f);
     EXPECT_EQ(solver.volume()->BurnDepth(kSpot + Vec2f(0.008f, 0)), 0.0f);
