@@ -30,7 +30,8 @@ ExitCode RunRender(app::NodeApp& app) {
   const render::RenderPorts ports{
       app.MakeInput<TissueFrame>(),    app.MakeInput<TopologyState>(),    app.MakeInput<TemperaturePatch>(),
       app.MakeInput<ToolState>(),      app.MakeInput<HandleState>(),      app.MakeInput<ThermalEvent>(),
-      app.MakeInput<CauteryContact>(), app.MakeInput<GeneratorSetting>(), operated};
+      app.MakeInput<CauteryContact>(), app.MakeInput<GeneratorSetting>(), operated,
+      &app.MakeOutput<Picture>()};
   render::LowerPriority(drawing);
   render::RenderNode node(app.scene(), settings, ports, std::move(stage));
   runtime::Log(runtime::LogLevel::kInfo, node.display_description());

@@ -1,6 +1,7 @@
 #include "haptics_node/node/cart_devices.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "haptics_node/device/operated_device.h"
@@ -63,6 +64,25 @@ std::unique_ptr<HapticDevice> MakeSimulated(const DeviceConfig& device, const Sc
   return made;
 }
 
+/// First pose of the tool in the scene's script whose tip the laparoscope sees, well inside the picture; without one
+/// the first pose. An operator who cannot see the tool cannot find it.
+ScriptPoint FirstInView(const SceneView& scene, std::uint32_t tool) {
+  constexpr double kStep_s = 0.05;
+  constexpr float kInside = 0.7f, kRadPerDeg = 0.0174532925f;
+  const RenderParams& scope = scene.render;
+  const float widest = std::cos(0.5f * kInside * kRadPerDeg * scope.fov_deg);
+  const Vec3f sight = (scope.scope_target_W - scope.scope_tip_W).normalized();
+  double end_s = 0;
+  for (const ScriptKey& key : scene.script) end_s = std::max(end_s, static_cast<double>(key.time_s));
+  const ScriptPoint first = EvaluateScript(scene.script, tool, 0);
+  if (!first.present) return first;
+  for (double time_s = 0; time_s <= end_s; time_s += kStep_s) {
+    const ScriptPoint point = EvaluateScript(scene.script, tool, time_s);
+    if (sight.dot((point.p_W - scope.scope_tip_W).normalized()) > widest) return point;
+  }
+  return first;
+}
+
 }  // namespace
 
 std::shared_ptr<TouchDriver> MakeTouchDriver(const config::CartConfig& cart, const std::array<bool, kMaxTools>& used,
@@ -98,8 +118,8 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
         break;
       }
       case DeviceKind::kOperator: {
-        // The scene's first pose of the tool, above the tissue; the rest of the script is the simulated operator's.
-        const ScriptPoint first = EvaluateScript(scene.script, i, 0);
+        // The rest of the script is the simulated operator's.
+        const ScriptPoint first = FirstInView(scene, i);
         const Vec3d start =
             first.present ? AttachPointForTip(trocar, first.p_W.cast<double>()) : RestingAttachPoint(trocar);
         auto operated = std::make_unique<OperatedDevice>(HandOf(device.hand, scene.haptics), trocar, start);

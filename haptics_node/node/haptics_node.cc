@@ -118,6 +118,8 @@ void HapticsNode::FillHealth(Health* health) const {
   metric("models_dropped", static_cast<double>(figures.models_dropped));
   metric("models_not_taken", static_cast<double>(models_not_taken_.load(std::memory_order_relaxed)));
   metric("inputs_not_taken", static_cast<double>(inputs_not_taken_.load(std::memory_order_relaxed)));
+  metric("operated_tools", static_cast<double>(operated_.size() - static_cast<std::size_t>(std::count(
+                                                                      operated_.begin(), operated_.end(), nullptr))));
   metric("records_lost", static_cast<double>(records_lost_.load(std::memory_order_relaxed)));
   metric("forces_not_finite", static_cast<double>(figures.not_finite));
   FillDeviceHealth(health);

@@ -215,7 +215,7 @@ HandsState WindowInput::state() const {
 }
 
 void WindowInput::Run(const std::stop_token& stop) {
-  MouseHands hands;
+  MouseHands hands(OperatorSource::kWindow);
   std::int64_t sent_ns = 0;
   bool take = false;
   while (!stop.stop_requested()) {

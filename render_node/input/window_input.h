@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "render_node/input/mouse_hands.h"
+#include "services/base/core/mouse_hands.h"
 
 namespace fulcrum::render {
 

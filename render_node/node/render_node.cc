@@ -42,8 +42,10 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       writer_(settings.frames),
       quality_(settings.quality, static_cast<int>(scene.render.height)),
       operator_stamper_(runtime::MonotonicNs()),
+      picture_stamper_(runtime::MonotonicNs()),
       camera_(scene.render),
       figures_(scene.render.hud != 0) {
+  if (ports_.pictures != nullptr) stream_ = std::make_unique<PictureStream>(ports_.pictures);
   if (ports_.operator_input == nullptr) return;
   hands_ = std::make_unique<WindowInput>("", display_.window(), [this](const OperatorInput& input) {
     OperatorInput stamped = input;
@@ -57,7 +59,7 @@ RenderNode::~RenderNode() = default;
 
 std::int64_t RenderNode::PeriodNs(std::int64_t cart_ns) const {
   const auto scene_ns = static_cast<std::int64_t>(std::llround(1e9 / static_cast<double>(scene_.render.rate_Hz)));
-  return hands_ ? cart_ns : std::max(cart_ns, scene_ns);
+  return hands_ || !window_ ? cart_ns : std::max(cart_ns, scene_ns);
 }
 
 void RenderNode::Step(const Tick& tick) {
@@ -76,9 +78,12 @@ void RenderNode::Step(const Tick& tick) {
   if (!ready()) {
     return;
   }
+  // A new reader receives a picture even if nothing moves.
+  const bool streamed = std::exchange(streams_, stream_ && stream_->has_readers());
+  if (streams_ && !streamed) changed_on_screen_ = true;
   const bool write = screenshot_ || (changed_in_file_ && session_time_s_ >= next_png_s_);
   screenshot_ = false;
-  if (write || (window_ && changed_on_screen_)) {
+  if (write || ((window_ || streams_) && changed_on_screen_)) {
     Draw(session_time_s_, write);
   }
 }
@@ -222,9 +227,7 @@ void RenderNode::TakeKeys() {
   }
 }
 
-void RenderNode::UpdateHands() {
-  if (!hands_) return;
-  if (display_.clicked()) hands_->Take();
+HandsView RenderNode::ViewNow() const {
   const RenderParams& camera = camera_.params();
   const Eigen::Matrix4f view = MakeLaparoscope(camera).view;
   constexpr float kRadPerDeg = 0.0174532925f;
@@ -238,7 +241,32 @@ void RenderNode::UpdateHands() {
     hands.present[i] = tools_.tools[i].kind != ToolKind::kNone;
     hands.tip[i] = tools_.tools[i].p_WT;
   }
-  hands_->SetView(hands);
+  return hands;
+}
+
+PictureHeader RenderNode::HeaderNow() {
+  const HandsView view = ViewNow();
+  PictureHeader header;
+  header.stamp =
+      picture_stamper_.Next(tools_.stamp.stamp_ns != 0 ? tools_.stamp.stamp_ns : tissue_.header.stamp.stamp_ns);
+  header.session_time_s = session_time_s_;
+  header.tool_sequence = tools_.stamp.sequence;
+  header.tissue_sequence = tissue_.header.stamp.sequence;
+  header.eye_W = view.eye;
+  header.right_W = view.right;
+  header.up_W = view.up;
+  header.forward_W = view.forward;
+  header.pixel_rad = view.pixel;
+  header.tip_W = view.tip;
+  for (std::size_t i = 0; i < kMaxTools; ++i) header.present |= view.present[i] ? 1u << i : 0u;
+  header.scale = static_cast<float>(quality_.scale());
+  return header;
+}
+
+void RenderNode::UpdateHands() {
+  if (!hands_) return;
+  if (display_.clicked()) hands_->Take();
+  hands_->SetView(ViewNow());
   const HandsState state = hands_->state();
   if (state != *hud_.hands) {
     hud_.hands = state;
@@ -285,6 +313,7 @@ void RenderNode::Press(int key) {
 void RenderNode::TakeTools() {
   if (ports_.tools.TakeLatest(&new_tools_)) {
     arrivals_[1].time_s = session_time_s_;
+    tools_.stamp = new_tools_.stamp;
     for (int k = 0; k < kMaxTools; ++k) {
       const auto i = static_cast<std::size_t>(k);
       if (!LooksTheSame(tools_.tools[i], new_tools_.tools[i])) {
@@ -319,16 +348,19 @@ void RenderNode::Draw(double session_time_s, bool write_png) {
   view_.SetScale(quality_.scale());
   view_.Update();
   UpdateTexts();
-  if (write_png) {
+  if (write_png || streams_) {
     display_.DrawAndRead(&picture_);
+  } else {
+    display_.Draw();
+  }
+  if (streams_) stream_->Add(picture_, HeaderNow());
+  if (write_png) {
     if (!writer_.Add(picture_, session_time_s)) {
       pictures_dropped_.fetch_add(1, std::memory_order_relaxed);
     }
     const double period = 1.0 / std::max(0.001f, scene_.render.png_rate_Hz);
     next_png_s_ = period * (std::floor(session_time_s / period) + 1);
     changed_in_file_ = moving;
-  } else {
-    display_.Draw();
   }
   changed_on_screen_ = moving;
   frames_drawn_.fetch_add(1, std::memory_order_relaxed);
@@ -351,8 +383,15 @@ void RenderNode::FillHealth(Health* health) const {
   health->metrics.push_back({"draw_ms", draw_ms_.load(std::memory_order_relaxed)});
   health->metrics.push_back({"scale", scale_.load(std::memory_order_relaxed)});
   health->metrics.push_back({"patches", static_cast<double>(patches_applied_.load(std::memory_order_relaxed))});
+  std::string error = writer_.last_error();
+  if (stream_) {
+    health->metrics.push_back({"pictures_sent", static_cast<double>(stream_->sent())});
+    health->metrics.push_back({"pictures_late", static_cast<double>(stream_->dropped())});
+    health->metrics.push_back({"jpeg_ms", stream_->encode_ms()});
+    if (error.empty()) error = stream_->last_error();
+  }
   const std::lock_guard lock(error_mutex_);
-  health->last_error = error_.empty() ? writer_.last_error() : error_;
+  health->last_error = error_.empty() ? error : error_;
 }
 
 }  // namespace fulcrum::render

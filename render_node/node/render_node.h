@@ -12,6 +12,7 @@
 #include "render_node/geometry/camera_control.h"
 #include "render_node/geometry/quality.h"
 #include "render_node/node/hud.h"
+#include "render_node/node/picture_stream.h"
 #include "render_node/node/stage.h"
 #include "render_node/offscreen/png_writer.h"
 #include "services/base/core/tick.h"
@@ -29,7 +30,8 @@ struct RenderPorts {
   bus::Input<ThermalEvent>& events;
   bus::Input<CauteryContact>& contacts;
   bus::Input<GeneratorSetting>& generator;
-  bus::Output<OperatorInput>* operator_input;  ///< Null: the window operates nothing.
+  bus::Output<OperatorInput>* operator_input;    ///< Null: the window operates nothing.
+  bus::LoanOutput<Picture>* pictures = nullptr;  ///< Null: no live pictures.
 };
 
 struct RenderSettings {
@@ -46,12 +48,13 @@ class RenderNode {
              std::unique_ptr<Stage> stage = nullptr);
   ~RenderNode();
 
-  /// Reads the ports and draws if the picture will be used: in a window after each change, off screen if a PNG is due
-  /// and something has changed since the last one. Otherwise nothing is computed.
+  /// Reads the ports and draws if the picture will be used: in a window, or while the topic Picture has a reader, after
+  /// each change; otherwise if a PNG is due and something has changed since the last one. Else nothing is computed.
   void Step(const Tick& tick);
 
-  /// Time between two steps: the scene sets the wanted rate of pictures, the cart (`cart_ns`) the rate that the machine
-  /// can reach, and the lower one is used. An operator's hand waits for its picture: then the cart's is used [ns].
+  /// Time between two steps. In a window the scene sets the wanted rate of pictures, the cart (`cart_ns`) the rate that
+  /// the machine can reach, and the lower one is used. An operator's hand and readers of live pictures wait for theirs:
+  /// then, and off screen, the cart's is used [ns].
   [[nodiscard]] std::int64_t PeriodNs(std::int64_t cart_ns) const;
 
   /// Acts as a key of the window (an X key symbol), before the next Step. Keys without a function are ignored.
@@ -83,6 +86,9 @@ class RenderNode {
   void TakeContact();
   void TakeKeys();
   void UpdateHands();
+  /// Where the pixels of the picture lie, and the tools.
+  [[nodiscard]] HandsView ViewNow() const;
+  [[nodiscard]] PictureHeader HeaderNow();
   void FindLate();
   [[nodiscard]] bool Recent(double time_s) const;
   void UpdateTexts();
@@ -99,6 +105,9 @@ class RenderNode {
   QualityControl quality_;
   bus::Stamper operator_stamper_;  ///< Of the thread of hands_.
   std::unique_ptr<WindowInput> hands_;
+  bus::Stamper picture_stamper_;
+  std::unique_ptr<PictureStream> stream_;
+  bool streams_ = false;  // The topic Picture has a reader.
 
   TissueFrame tissue_, new_tissue_;
   TopologyState topology_;
@@ -108,7 +117,7 @@ class RenderNode {
   ThermalEvent event_;
   CauteryContact contact_;
   GeneratorSetting generator_;
-  Picture picture_;
+  Bitmap picture_;
   HudState hud_;
   CameraControl camera_;
   bool figures_;             // Figures are shown.

@@ -32,7 +32,7 @@ void WarmUp(const SceneView& scene, Stage* stage) {
   // Few pixels are enough to compile the shaders, and a session waits for a restarted node.
   constexpr float kFewPixels = 0.25f;
   view.SetScale(kFewPixels);
-  Picture picture;
+  Bitmap picture;
   stage->display->DrawAndRead(&picture);
   for (int k = 0; k < kMaxTools; ++k) {
     view.SetTool(k, ToolSample());

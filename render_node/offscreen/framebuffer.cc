@@ -30,7 +30,7 @@ Framebuffer::~Framebuffer() {
   glDeleteRenderbuffers(1, &depth_);
 }
 
-void Framebuffer::Read(Picture* picture) {
+void Framebuffer::Read(Bitmap* picture) {
   glBindFramebuffer(GL_FRAMEBUFFER, id_);
   ReadBoundFramebuffer(width_, height_, picture);
 }
@@ -39,7 +39,7 @@ void CopyTexture(unsigned from, unsigned to, int width, int height) {
   glCopyImageSubData(from, GL_TEXTURE_2D, 0, 0, 0, 0, to, GL_TEXTURE_2D, 0, 0, 0, 0, width, height, 1);
 }
 
-void ReadBoundFramebuffer(int width, int height, Picture* picture) {
+void ReadBoundFramebuffer(int width, int height, Bitmap* picture) {
   picture->width = width;
   picture->height = height;
   picture->rgb.resize(3u * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));

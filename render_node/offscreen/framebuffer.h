@@ -8,7 +8,7 @@
 namespace fulcrum::render {
 
 /// Pixels, three bytes (sRGB) each, row by row from the BOTTOM row up, as OpenGL gives them.
-struct Picture {
+struct Bitmap {
   int width = 0;
   int height = 0;
   std::vector<std::uint8_t> rgb;
@@ -26,7 +26,7 @@ class Framebuffer {
   /// GL name, to draw into.
   [[nodiscard]] unsigned id() const { return id_; }
   /// Waits for the end of drawing and reads the picture.
-  void Read(Picture* picture);
+  void Read(Bitmap* picture);
 
  private:
   int width_;
@@ -41,6 +41,6 @@ class Framebuffer {
 void CopyTexture(unsigned from, unsigned to, int width, int height);
 
 /// Reads the picture of the window or framebuffer that is bound for reading.
-void ReadBoundFramebuffer(int width, int height, Picture* picture);
+void ReadBoundFramebuffer(int width, int height, Bitmap* picture);
 
 }  // namespace fulcrum::render

@@ -17,7 +17,7 @@ png_int_32 FlippedStride(int width) { return -3 * width; }
 
 }  // namespace
 
-void WritePng(const Picture& picture, const std::filesystem::path& file) {
+void WritePng(const Bitmap& picture, const std::filesystem::path& file) {
   png_image image;
   std::memset(&image, 0, sizeof image);
   image.version = PNG_IMAGE_VERSION;
@@ -32,7 +32,7 @@ void WritePng(const Picture& picture, const std::filesystem::path& file) {
   std::filesystem::rename(part, file);
 }
 
-Picture ReadPng(const std::filesystem::path& file) {
+Bitmap ReadPng(const std::filesystem::path& file) {
   png_image image;
   std::memset(&image, 0, sizeof image);
   image.version = PNG_IMAGE_VERSION;
@@ -40,7 +40,7 @@ Picture ReadPng(const std::filesystem::path& file) {
     throw std::runtime_error(file.string() + ": " + image.message);
   }
   image.format = PNG_FORMAT_RGB;
-  Picture picture{static_cast<int>(image.width), static_cast<int>(image.height), {}};
+  Bitmap picture{static_cast<int>(image.width), static_cast<int>(image.height), {}};
   picture.rgb.resize(PNG_IMAGE_SIZE(image));
   if (!png_image_finish_read(&image, nullptr, picture.rgb.data(), FlippedStride(picture.width), nullptr)) {
     throw std::runtime_error(file.string() + ": " + image.message);
@@ -62,7 +62,7 @@ FrameWriter::~FrameWriter() {
   thread_.join();
 }
 
-bool FrameWriter::Add(Picture picture, double session_time_s) {
+bool FrameWriter::Add(Bitmap picture, double session_time_s) {
   {
     const std::lock_guard lock(mutex_);
     if (jobs_.size() >= kQueue) {

@@ -16,10 +16,10 @@ namespace fulcrum::render {
 
 /// Writes to a temporary name and renames, so that no incomplete picture remains after a kill. Throws
 /// std::runtime_error naming the file.
-void WritePng(const Picture& picture, const std::filesystem::path& file);
+void WritePng(const Bitmap& picture, const std::filesystem::path& file);
 
-/// Reads an 8-bit RGB picture back (bottom row first, as in Picture). Throws std::runtime_error.
-[[nodiscard]] Picture ReadPng(const std::filesystem::path& file);
+/// Reads an 8-bit RGB picture back (bottom row first, as in Bitmap). Throws std::runtime_error.
+[[nodiscard]] Bitmap ReadPng(const std::filesystem::path& file);
 
 /// Writes the pictures of a session: <folder>/frame_<session time in ms, 7 digits>.png. The names sort by time, also
 /// across a restart.
@@ -32,7 +32,7 @@ class FrameWriter {
   FrameWriter& operator=(const FrameWriter&) = delete;
 
   /// Queues a picture. Returns false if the queue holds kQueue pictures already; this one is then dropped.
-  bool Add(Picture picture, double session_time_s);
+  bool Add(Bitmap picture, double session_time_s);
   /// Waits until all queued pictures have been written or have failed.
   void Wait();
   [[nodiscard]] std::uint64_t written() const;
@@ -43,7 +43,7 @@ class FrameWriter {
  private:
   static constexpr std::size_t kQueue = 4;
   struct Job {
-    Picture picture;
+    Bitmap picture;
     double session_time_s;
   };
   void Work();

@@ -60,7 +60,7 @@ class OffscreenDisplay : public Display {
     context_.Release();
   }
 
-  void DrawAndRead(Picture* picture) override {
+  void DrawAndRead(Bitmap* picture) override {
     context_.MakeCurrent();
     viewer_->frame();
     framebuffer_->Read(picture);
@@ -86,7 +86,7 @@ class ReadAfterDraw : public osg::Camera::DrawCallback {
       ReadBoundFramebuffer(width_, height_, picture);
     }
   }
-  Picture* picture = nullptr;
+  Bitmap* picture = nullptr;
 
  private:
   int width_;
@@ -147,7 +147,7 @@ class WindowDisplay : public Display {
 
   void Draw() override { viewer_.frame(); }
 
-  void DrawAndRead(Picture* picture) override {
+  void DrawAndRead(Bitmap* picture) override {
     read_->picture = picture;
     viewer_.frame();
     read_->picture = nullptr;

@@ -16,7 +16,7 @@ class Display {
   /// Draws the present view and waits for completion. May be called from any thread, one at a time.
   virtual void Draw() = 0;
   /// Draws and reads the picture back.
-  virtual void DrawAndRead(Picture* picture) = 0;
+  virtual void DrawAndRead(Bitmap* picture) = 0;
   /// Keys pressed since the last call, as X key symbols. Also processes the window's events, so it must be called even
   /// if nothing is drawn.
   [[nodiscard]] virtual std::vector<int> TakeKeys() = 0;

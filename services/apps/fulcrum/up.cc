@@ -20,7 +20,6 @@ void GiveToOperator(UpSettings* settings) {
   for (config::DeviceConfig& device : settings->cart.devices) device.motion.clear();
   for (config::HandleConfig& handle : settings->cart.handles) handle.kind = config::LinkKind::kOperator;
   settings->cart.pedal.kind = config::LinkKind::kOperator;
-  settings->window = true;
   settings->seconds = 0;
 }
 
@@ -59,8 +58,8 @@ ExitCode Up(const Words& words) {
       ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder for the session folders")   //
       ("window", "also show the picture in a window")                                                                //
       ("hands", po::value<std::string>()->value_name("INPUT"),
-       "operate the tools yourself, with INPUT: mouse (and keyboard, in the window). No script; until Ctrl-C or "
-       "--seconds")                                                                                         //
+       "operate the tools yourself, with INPUT: mouse (and keyboard, in the window), browser (the page of fulcrum "
+       "console). No script; until Ctrl-C or --seconds")                                                    //
       ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                      //
        "quality of the picture: auto, low, high")                                                           //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")  //
@@ -119,8 +118,11 @@ ExitCode Up(const Words& words) {
   settings.window = values.count("window") != 0;
   if (values.count("hands") != 0) {
     const std::string input = values["hands"].as<std::string>();
-    if (input != "mouse") throw InputError("--hands: \"" + input + "\"; valid: mouse");
+    if (input != "mouse" && input != "browser") {
+      throw InputError("--hands: \"" + input + "\"; valid: mouse, browser");
+    }
     GiveToOperator(&settings);
+    settings.window = settings.window || input == "mouse";
   }
   settings.quality = values["quality"].as<std::string>();
   if (settings.quality != "auto" && settings.quality != "low" && settings.quality != "high") {

@@ -40,6 +40,9 @@ namespace fulcrum {
 #define FULCRUM_FIELDS_OF_TemperaturePatchHeader(F) F(stamp) F(topology_revision) F(slot) F(origin_x) F(origin_y) \
   F(max_temperature_C)
 #define FULCRUM_FIELDS_OF_TemperaturePatch(F) F(header) F(texels)
+#define FULCRUM_FIELDS_OF_PictureHeader(F) F(stamp) F(session_time_s) F(tool_sequence) F(tissue_sequence) F(width) \
+  F(height) F(size) F(present) F(eye_W) F(right_W) F(up_W) F(forward_W) F(pixel_rad) F(tip_W) F(scale)
+#define FULCRUM_FIELDS_OF_Picture(F) F(header) F(jpeg)
 #define FULCRUM_FIELDS_OF_ThermalEvent(F) F(stamp) F(session_time_s) F(kind) F(material) F(temperature_C) F(value) \
   F(topology_revision)
 #define FULCRUM_FIELDS_OF_SceneManifest(F) F(stamp) F(scene_name) F(session_id) F(scene_hash) F(session_start_ns) \
@@ -56,10 +59,11 @@ namespace fulcrum {
 #define FULCRUM_STRUCTS_ALIKE_IN_IDL(S) S(HandleSample) S(HandleState) S(GeneratorSetting) S(OperatorTool) \
   S(OperatorInput) S(ToolSample) \
   S(ToolState) S(TissueFrameHeader) S(Contact) S(DeviceContacts) S(ContactModel) S(Footprint) S(CauteryContact) \
-  S(TopologyState) S(TearState) S(OpenCells) S(TemperaturePatchHeader) S(ThermalEvent) S(SceneManifest) \
+  S(TopologyState) S(TearState) S(OpenCells) S(TemperaturePatchHeader) S(PictureHeader) S(ThermalEvent) S(SceneManifest) \
   S(TickManifest) S(TimingSummary) S(InputHealth) S(Metric) S(Health)
-/// The others: `sequence` is a keyword of IDL, and the two large messages are sent in loans.
-#define FULCRUM_STRUCTS_WITH_A_CONVERSION_OF_THEIR_OWN(S) S(Stamp) S(ConsumedInput) S(TissueFrame) S(TemperaturePatch)
+/// The others: `sequence` is a keyword of IDL, and the three large messages are sent in loans.
+#define FULCRUM_STRUCTS_WITH_A_CONVERSION_OF_THEIR_OWN(S) S(Stamp) S(ConsumedInput) S(TissueFrame) \
+  S(TemperaturePatch) S(Picture)
 // clang-format on
 
 template <class Message, class Value>

@@ -70,7 +70,7 @@ struct GeneratorSetting {
 
 // -------------------------------------------------------------------------------------------- OperatorInput
 
-enum class OperatorSource : std::uint8_t { kNone, kWindow, kProgram };
+enum class OperatorSource : std::uint8_t { kNone, kWindow, kProgram, kBrowser };
 
 struct OperatorTool {
   Vec3f p_WT = Vec3f::Zero();  ///< Intended place of the tip [m].
@@ -269,6 +269,37 @@ struct TemperaturePatch {
   };
 };
 
+// -------------------------------------------------------------------------------------------------- Picture
+
+inline constexpr std::size_t kMaxPictureBytes = 512 * 1024;
+
+/// A picture of the laparoscope with what shows where a pixel lies in W.
+struct PictureHeader {
+  Stamp stamp;                                                       ///< Time of the shown ToolState.
+  double session_time_s = 0;                                         ///< Session time at which it was drawn.
+  std::uint64_t tool_sequence = 0;                                   ///< Sequence of the shown ToolState; 0: none yet.
+  std::uint64_t tissue_sequence = 0;                                 ///< Sequence of the shown TissueFrame.
+  std::uint32_t width = 0;                                           ///< [pixels]
+  std::uint32_t height = 0;                                          ///< [pixels]
+  std::uint32_t size = 0;                                            ///< Used bytes of `jpeg`.
+  std::uint32_t present = 0;                                         ///< Bit per tool: the session has it.
+  Vec3f eye_W = Vec3f::Zero();                                       ///< Place of the eye [m].
+  Vec3f right_W = Vec3f::UnitX(), up_W = Vec3f::UnitZ();             ///< Unit vectors of the picture.
+  Vec3f forward_W = Vec3f::UnitY();                                  ///< Unit vector of the view.
+  float pixel_rad = 1e-3f;                                           ///< Angle of a pixel in the middle [rad].
+  std::array<Vec3f, kMaxTools> tip_W{Vec3f::Zero(), Vec3f::Zero()};  ///< Tips of the shown tools [m].
+  float scale = 1;                                                   ///< Drawn size over that of the picture.
+};
+
+struct Picture {
+  PictureHeader header;
+  std::vector<std::uint8_t> jpeg;
+  struct View {
+    PictureHeader& header;
+    std::span<std::uint8_t> jpeg;  ///< kMaxPictureBytes.
+  };
+};
+
 // --------------------------------------------------------------------------------------------- ThermalEvent
 
 enum class ThermalEventKind : std::uint8_t {
@@ -316,7 +347,7 @@ struct SceneManifest {
 #define FULCRUM_MESSAGES(M) \
   M(HandleState) M(ToolState) M(TissueFrame) M(ContactModel) M(CauteryContact) M(TopologyState) \
   M(TemperaturePatch) M(ThermalEvent) M(SceneManifest) M(TickManifest) \
-  M(Health) M(TearState) M(OpenCells) M(GeneratorSetting) M(OperatorInput)
+  M(Health) M(TearState) M(OpenCells) M(GeneratorSetting) M(OperatorInput) M(Picture)
 // clang-format on
 
 #define FULCRUM_TOPIC_ID(T) k##T,

@@ -1,9 +1,9 @@
-#include "render_node/input/mouse_hands.h"
+#include "services/base/core/mouse_hands.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace fulcrum::render {
+namespace fulcrum {
 namespace {
 
 constexpr float kOpenJaw_rad = 0.7f;     ///< Without a button.
@@ -17,11 +17,20 @@ constexpr float kSteady_s = 0.06f;
 
 }  // namespace
 
+void MouseHands::SetView(const HandsView& view) {
+  for (std::size_t i = 0; i < view.present.size(); ++i) {
+    if (view.present[i] && !view_.present[i]) wanted_[i] = sent_[i] = view.tip[i];
+  }
+  view_ = view;
+  if (!view_.present[static_cast<std::size_t>(tool_)] && view_.present[static_cast<std::size_t>(1 - tool_)]) {
+    tool_ = 1 - tool_;
+  }
+}
+
 void MouseHands::Take(std::int64_t now_ns) {
   claim_ns_ = sent_ns_ = now_ns;
   wanted_ = sent_ = view_.tip;
   locked_ = {};
-  if (!view_.present[static_cast<std::size_t>(tool_)]) tool_ = view_.present[0] ? 0 : 1;
 }
 
 void MouseHands::Release() {
@@ -94,7 +103,7 @@ void MouseHands::Press(HandsKey key, bool down) {
 
 OperatorInput MouseHands::At(std::int64_t now_ns) {
   OperatorInput input;
-  input.source = OperatorSource::kWindow;
+  input.source = source_;
   input.claim_ns = claim_ns_;
   input.stamp.stamp_ns = now_ns;
   if (!active()) return input;
@@ -110,4 +119,4 @@ OperatorInput MouseHands::At(std::int64_t now_ns) {
   return input;
 }
 
-}  // namespace fulcrum::render
+}  // namespace fulcrum

@@ -1,5 +1,6 @@
-// Mouse and keyboard as an operator's hands: motions of the pointer move the tip of one tool in the picture's plane,
-// the wheel moves it along the view, buttons and keys close the jaw and press the pedals. Pure; times are passed in.
+// Mouse and keyboard, or a touch screen, as an operator's hands: motions of the pointer move the tip of one tool in the
+// picture's plane, the wheel moves it along the view, buttons and keys close the jaw and press the pedals. Used by the
+// window (render_node) and by the page (services/session/console). Pure; times are passed in.
 #pragma once
 
 #include <array>
@@ -7,7 +8,7 @@
 
 #include "services/base/core/messages.h"
 
-namespace fulcrum::render {
+namespace fulcrum {
 
 /// What the hands need of the picture, frame W.
 struct HandsView {
@@ -23,7 +24,10 @@ enum class HandsKey { kTool0, kTool1, kJaw, kJawLock, kCut, kCoag, kClutch, kDep
 
 class MouseHands {
  public:
-  void SetView(const HandsView& view) { view_ = view; }
+  explicit MouseHands(OperatorSource source) : source_(source) {}
+
+  /// A tool that was not there before begins where it is.
+  void SetView(const HandsView& view);
 
   /// Takes the controls: the tools begin where they are.
   void Take(std::int64_t now_ns);
@@ -48,6 +52,7 @@ class MouseHands {
  private:
   void MoveTip(const Vec3f& by);
 
+  const OperatorSource source_;
   HandsView view_;
   std::int64_t claim_ns_ = 0;
   int tool_ = 1;
@@ -58,4 +63,4 @@ class MouseHands {
   std::int64_t sent_ns_ = 0;
 };
 
-}  // namespace fulcrum::render
+}  // namespace fulcrum

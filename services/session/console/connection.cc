@@ -1,12 +1,17 @@
 #include "services/session/console/connection.h"
 
+#include <algorithm>
 #include <array>
+#include <boost/asio/post.hpp>
 #include <boost/asio/ssl/stream_base.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/ssl/ssl_stream.hpp>
+#include <boost/beast/websocket.hpp>
+#include <boost/beast/websocket/ssl.hpp>
+#include <deque>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -17,6 +22,7 @@ namespace {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = boost::beast::http;
+namespace websocket = boost::beast::websocket;
 using tcp = asio::ip::tcp;
 using Clock = std::chrono::steady_clock;
 using TlsStream = beast::ssl_stream<beast::tcp_stream>;
@@ -71,7 +77,9 @@ int StatusOf(const beast::error_code& error) {
 }
 
 template <class Stream>
-class ConnectionOver final : public Connection, public std::enable_shared_from_this<ConnectionOver<Stream>> {
+class ConnectionOver final : public Connection,
+                             public Socket,
+                             public std::enable_shared_from_this<ConnectionOver<Stream>> {
  public:
   static constexpr bool kSecure = std::is_same_v<Stream, TlsStream>;
 
@@ -104,14 +112,41 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
                       });
   }
 
+  void SendText(std::string text) override {
+    if (out_.size() >= kMostUnread) {
+      // Not at once: the caller may be about to send to others.
+      asio::post(transport().get_executor(), [self = this->shared_from_this()] { self->Close(); });
+      return;
+    }
+    Push({std::make_shared<const std::string>(std::move(text)), false});
+  }
+  bool SendBytes(std::shared_ptr<const std::string> bytes) override {
+    const auto binary = [](const Message& message) { return message.binary; };
+    if (std::any_of(out_.begin(), out_.end(), binary)) return false;
+    Push({std::move(bytes), true});
+    return true;
+  }
+
  protected:
   void CloseSocket() override {
+    if (web_) {
+      --server().sockets;
+      server().service.sockets.closed(this);
+    }
     beast::error_code ignored;
     transport().socket().shutdown(tcp::socket::shutdown_both, ignored);
     transport().socket().close(ignored);
   }
 
  private:
+  struct Message {
+    std::shared_ptr<const std::string> bytes;
+    bool binary;
+  };
+  /// Messages that may wait for a client.
+  static constexpr std::size_t kMostUnread = 64;
+  static constexpr std::chrono::seconds kOpening{5}, kSilence{10};
+
   beast::tcp_stream& transport() { return stream_ ? beast::get_lowest_layer(*stream_) : *silent_; }
 
   /// A silent connection costs a socket only: the state of TLS is made when the first bytes have arrived.
@@ -177,6 +212,7 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
     HttpRequest request = Plain(message, kSecure);
     request.body = std::move(message.body());
     HttpResponse response = server().service.handle(request);
+    if (response.socket) return BeginSocket(message);
     if (!response.stream) return Send(std::move(response), keep_alive);
     if (last_ || server().streams.size() >= server().limits.streams) return Refuse(503);
     BeginStream(response);
@@ -217,6 +253,55 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
     WatchForEnd();
   }
 
+  /// @param message the request, whose header asks for the change of protocol.
+  void BeginSocket(const http::request<http::string_body>& message) {
+    if (!websocket::is_upgrade(message)) return Refuse(426);
+    // A WebSocket is of a client with a ticket: it gives way to no guest.
+    if (!known_) known_ = server().sockets < server().limits.sockets && server().admission.Recognise(id());
+    if (!known_ || server().sockets >= server().limits.sockets) return Refuse(503);
+    // From here on the protocol's own pings find a client that is gone.
+    transport().expires_never();
+    web_.emplace(*stream_);
+    web_->set_option(websocket::stream_base::timeout{kOpening, kSilence, true});
+    web_->read_message_max(server().limits.message);
+    ++server().sockets;
+    accepting_ = true;  // What `opened` sends waits for the end of the handshake.
+    server().service.sockets.opened(this);
+    auto request = std::make_shared<http::request<http::string_body>>(message);
+    web_->async_accept(*request, [self = this->shared_from_this(), request](const beast::error_code& error) {
+      if (error || !self->open()) return self->Close();
+      self->accepting_ = false;
+      self->WriteNext();
+      self->ReadMessage();
+    });
+  }
+
+  void ReadMessage() {
+    buffer_.clear();
+    web_->async_read(buffer_, [self = this->shared_from_this()](const beast::error_code& error, std::size_t) {
+      if (error || !self->open()) return self->Close();
+      const auto bytes = self->buffer_.data();
+      self->server().service.sockets.received(self.get(), {static_cast<const char*>(bytes.data()), bytes.size()});
+      if (self->open()) self->ReadMessage();
+    });
+  }
+
+  void Push(Message message) {
+    out_.push_back(std::move(message));
+    if (out_.size() == 1) WriteNext();
+  }
+
+  void WriteNext() {
+    if (accepting_ || out_.empty() || !open()) return;
+    web_->binary(out_.front().binary);
+    web_->async_write(asio::buffer(*out_.front().bytes),
+                      [self = this->shared_from_this()](const beast::error_code& error, std::size_t) {
+                        if (error) return self->Close();
+                        self->out_.pop_front();
+                        self->WriteNext();
+                      });
+  }
+
   /// Closes the stream at the next event on the socket: the client ends it, or sends bytes that are not allowed here.
   void WatchForEnd() {
     stream_->async_read_some(
@@ -234,6 +319,9 @@ class ConnectionOver final : public Connection, public std::enable_shared_from_t
   bool last_ = false;   ///< The connection is closed after this response.
   std::string part_;
   char last_word_ = 0;
+  std::optional<websocket::stream<Stream&>> web_;
+  bool accepting_ = false;
+  std::deque<Message> out_;  ///< The first is being sent.
 };
 
 }  // namespace

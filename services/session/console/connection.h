@@ -28,6 +28,7 @@ struct ServerState {
   Admission admission;
   std::map<Admission::Id, std::weak_ptr<Connection>> open;
   std::list<std::weak_ptr<Connection>> streams;
+  std::size_t sockets = 0;  ///< Connections that are WebSockets.
 
   void Close(Admission::Id connection);
 };

@@ -23,6 +23,7 @@
 #include "services/session/console/json.h"
 #include "services/session/console/library.h"
 #include "services/session/console/live_state.h"
+#include "services/session/console/live_view.h"
 #include "services/session/console/page.h"
 #include "services/session/console/picture_watch.h"
 #include "services/session/console/router.h"
@@ -40,6 +41,7 @@ constexpr auto kTurn = std::chrono::milliseconds(200);
 constexpr std::int64_t kFeedPeriod = kSecond_ns / 5;
 constexpr std::int64_t kTicketLife = 60 * kSecond_ns;
 constexpr std::size_t kMostRecordings = 50;
+constexpr const char* kTicketIsOld = "this address is valid once and for one minute; open it from the page";
 // A report contains its own style and pictures, and no scripts.
 constexpr const char* kReportPolicy =
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; media-src data:; frame-ancestors 'self'; sandbox";
@@ -99,7 +101,12 @@ struct Console::Impl {
         watch(given.domain),
         server({.address = given.bind, .port = given.port, .tls = Identity()},
                {.handle = [this](const HttpRequest& request) { return Handle(request); },
-                .knows = [this](const HttpRequest& request) { return access->HasToken(request); }}) {
+                .knows = [this](const HttpRequest& request) { return access->HasToken(request); },
+                .sockets = {.opened = [this](Socket* socket) { live.Open(socket); },
+                            .received = [this](Socket* socket,
+                                               std::string_view text) { live.Receive(socket, text, MonotonicNs()); },
+                            .closed = [this](Socket* socket) { live.Close(socket); }}}) {
+    watch.OnLeave([this] { live.SetSession({}); });
     token_file = settings.token_file.empty() ? DefaultTokenFile(server.port()) : settings.token_file;
     std::error_code error;
     if (!settings.token_file.empty() && fs::exists(token_file, error)) {
@@ -112,6 +119,11 @@ struct Console::Impl {
     // The last session before this console was started, so that its report can be opened.
     ShowSession(fs::read_symlink(settings.out / "latest", error).filename());
   }
+
+  // The bus calls the server for each picture: its ports end first.
+  ~Impl() { live.SetSession({}); }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
 
   /// Certificate and key, unless only this machine can reach the page.
   std::optional<TlsIdentity> Identity() {
@@ -152,6 +164,9 @@ struct Console::Impl {
         return Page(routed.path);
       case Wanted::kReport:
         return Report(TextIn(routed.fields, "ticket"));
+      case Wanted::kLive:
+        if (!UseTicket(TextIn(routed.fields, "ticket"))) return Refusal(401, kTicketIsOld);
+        return {.socket = true};
       case Wanted::kState:
         return {.body = StateJson(0)};
       case Wanted::kEvents:
@@ -205,10 +220,15 @@ struct Console::Impl {
     return {.type = type, .body = *std::move(bytes)};
   }
 
-  HttpResponse Report(const std::string& given) {
+  /// True when the ticket is valid; it is valid once.
+  bool UseTicket(const std::string& given) {
     const bool valid = !ticket.empty() && SameSecret(given, ticket) && MonotonicNs() < ticket_end_ns;
     ticket.clear();
-    if (!valid) return Refusal(401, "this address is valid once and for one minute; open the report from the page");
+    return valid;
+  }
+
+  HttpResponse Report(const std::string& given) {
+    if (!UseTicket(given)) return Refusal(401, kTicketIsOld);
     HttpResponse response = File(SessionFile("report.html"), "text/html; charset=utf-8");
     response.policy = kReportPolicy;
     return response;
@@ -228,6 +248,7 @@ struct Console::Impl {
     order.power_W = MaybeNumberIn(fields, "power");
     order.seconds = MaybeNumberIn(fields, "seconds");
     order.picture_rate_Hz = MaybeNumberIn(fields, "picture_rate");
+    order.hands = fields.contains("hands") && TextIn(fields, "hands") == "on";
     order.record = !fields.contains("record") || TextIn(fields, "record") == "on";
     run.Start(order);
     ShowSession({});
@@ -358,6 +379,7 @@ struct Console::Impl {
     const std::int64_t now = MonotonicNs();
     watch.Turn(now);
     run.Poll();
+    ShowLive(now);
     if (task) task->Poll(now);
     if (watch.begun() && watch.manifest().session_id != session) ShowSession(watch.manifest().session_id);
     if (asking.valid() && asking.wait_for(std::chrono::seconds(0)) == std::future_status::ready) TakeAnswer();
@@ -365,6 +387,20 @@ struct Console::Impl {
     next_feed_ns = now + kFeedPeriod;
     const LiveState state = Live();
     server.Feed([&](std::uint64_t* cursor) { return "data: " + LiveJson(state, cursor) + "\n\n"; });
+  }
+
+  /// Live pictures and hands of the running session.
+  void ShowLive(std::int64_t now) {
+    if (watch.begun() && live_session != watch.session()) {
+      live_session = watch.session();
+      live.SetSession([this] {
+        bus::DdsParticipant& bus = watch.participant();
+        // The server's thread waits for clients: a picture wakes it.
+        return LiveView::Ports{bus.MakeInput<Picture>([this] { server.Post([this] { live.Turn(MonotonicNs()); }); }),
+                               bus.MakeInput<OperatorInput>(), bus.MakeOutput<OperatorInput>()};
+      });
+    }
+    live.Turn(now);
   }
 
   void TakeAnswer() {
@@ -385,6 +421,8 @@ struct Console::Impl {
   std::optional<Access> access;
   SessionRun run;
   SessionWatch watch;
+  LiveView live;  ///< Its ports are those of `watch`.
+  std::uint64_t live_session = 0;
   std::unique_ptr<GuidedTask> task;
   std::string session;  ///< Name of the shown session's folder in `out`; empty: none.
   PictureWatch pictures;

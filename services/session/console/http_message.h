@@ -18,6 +18,7 @@ struct HttpResponse {
   std::string body = {};
   std::string policy = {};  ///< Content-Security-Policy; empty: that of the page.
   bool stream = false;      ///< True: the body is the first of many parts, and the connection stays open.
+  bool socket = false;      ///< True: the connection becomes a WebSocket.
 };
 
 }  // namespace fulcrum::console

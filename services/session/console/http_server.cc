@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <utility>
@@ -128,6 +129,8 @@ HttpServer::~HttpServer() = default;
 int HttpServer::port() const { return impl_->acceptor.local_endpoint().port(); }
 
 void HttpServer::Turn(std::chrono::milliseconds time) { impl_->io.run_for(time); }
+
+void HttpServer::Post(std::function<void()> work) { asio::post(impl_->io, std::move(work)); }
 
 std::size_t HttpServer::stream_count() const { return impl_->state->streams.size(); }
 

@@ -10,13 +10,16 @@
 
 #include "services/session/console/admission.h"
 #include "services/session/console/http_message.h"
+#include "services/session/console/socket.h"
 #include "services/session/console/tls_identity.h"
 
 namespace fulcrum::console {
 
 struct HttpLimits {
   Admission::Limits slots;
-  std::size_t streams = 6;  ///< Connections that may be streams.
+  std::size_t streams = 6;    ///< Connections that may be streams.
+  std::size_t sockets = 4;    ///< Connections that may be WebSockets.
+  std::size_t message = 256;  ///< Longest message of a WebSocket's client [B].
   std::uint32_t header_bytes = 8 * 1024;
   std::uint64_t body_bytes = 8 * 1024;
   /// From the start of a guest's connection, or its last response, to the last byte of its request, TLS handshake
@@ -31,6 +34,7 @@ struct HttpService {
   std::function<HttpResponse(const HttpRequest&)> handle;
   /// True when the header of this request, without its body, has the token.
   std::function<bool(const HttpRequest&)> knows;
+  SocketService sockets = {};
 };
 
 struct ListenAddress {
@@ -51,6 +55,9 @@ class HttpServer {
 
   /// Serves for `time`.
   void Turn(std::chrono::milliseconds time);
+
+  /// Calls `work` on the server's thread. From any thread.
+  void Post(std::function<void()> work);
 
   /// Number of open streams.
   [[nodiscard]] std::size_t stream_count() const;

@@ -71,6 +71,7 @@ std::string FiguresJson(const SessionWatch& watch) {
   add("force0_N", NodeId::kHaptics, "force0_N", 0.01);
   add("force1_N", NodeId::kHaptics, "force1_N", 0.01);
   add("peak_N", NodeId::kHaptics, "peak_force_N", 0.01);
+  add("operated_tools", NodeId::kHaptics, "operated_tools", 1);
   return json.Done();
 }
 

@@ -36,13 +36,14 @@ bool IsPictureRate(std::string_view text) { return ParseNumber(text, 0.1, 30).ha
 bool IsTicket(std::string_view text) { return text.size() == 64 && IsPlainName(text); }
 
 constexpr std::array kPictureFields{Field{"name", true, IsPictureName, "frame_<digits>.png"}};
-constexpr std::array kReportFields{Field{"ticket", true, IsTicket, "the text that /api/ticket returned"}};
+constexpr std::array kTicketFields{Field{"ticket", true, IsTicket, "the text that /api/ticket returned"}};
 constexpr std::array kStartFields{
     Field{"scene", true, IsPlainName, "a name that /api/choices lists"},
     Field{"power", false, IsPower, "1 to 300 W"},
     Field{"seconds", false, IsSeconds, "1 to 604800 s"},
     Field{"record", false, IsOnOff, "on, off"},
     Field{"picture_rate", false, IsPictureRate, "0.1 to 30 per second"},
+    Field{"hands", false, IsOnOff, "on, off"},
 };
 constexpr std::array kNodeFields{Field{"node", true, IsNode, "a node's name, for example physics_node"}};
 constexpr std::array kGeneratorFields{Field{"cut", false, IsKnob, "0 to 300 W"},
@@ -118,9 +119,12 @@ RouteResult Route(const Access& access, const HttpRequest& request) {
   const bool api = target->path.starts_with("/api/");
   if (!api) {
     if (post) return refuse(405, "GET");
-    if (target->path != "/report") return {Routed{Wanted::kPage, target->path, {}}, {}};
-    if (!Wrong(target->query, kReportFields).empty()) return refuse(400, Wrong(target->query, kReportFields));
-    return {Routed{Wanted::kReport, target->path, target->query}, {}};
+    // Browsers send no token with these two.
+    const bool live = target->path == "/live";
+    if (!live && target->path != "/report") return {Routed{Wanted::kPage, target->path, {}}, {}};
+    if (const std::string wrong = Wrong(target->query, kTicketFields); !wrong.empty()) return refuse(400, wrong);
+    if (live && !Access::IsOwnSite(request)) return refuse(403, "a page of another site may not use this console");
+    return {Routed{live ? Wanted::kLive : Wanted::kReport, target->path, target->query}, {}};
   }
   if (!Access::IsOwnSite(request)) return refuse(403, "a page of another site may not use this console");
   if (!access.HasToken(request))

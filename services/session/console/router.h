@@ -14,14 +14,15 @@ namespace fulcrum::console {
 enum class Wanted {
   kPage,        ///< A file of the page; `path` is its path.
   kReport,      ///< The report; needs a ticket of kTicket.
+  kLive,        ///< The live picture and the controls, as a WebSocket; needs a ticket of kTicket.
   kState,       ///< The present state of the page.
   kEvents,      ///< The state as a stream, repeatedly.
   kChoices,     ///< The scenes and their settings.
   kPicture,     ///< A picture. Field: name.
   kRecordings,  ///< The recordings that can be replayed.
   kSummary,     ///< Figures of the last session.
-  kTicket,      ///< A ticket that opens the report of the last session once.
-  kStart,       ///< Starts a session. Fields: scene; optional power, seconds, record, picture_rate.
+  kTicket,      ///< A ticket that opens the report of the last session, or the live picture, once.
+  kStart,       ///< Starts a session. Fields: scene; optional power, seconds, record, picture_rate, hands.
   kStop,
   kRestart,  ///< Restarts a node. Field: node.
   kDump,

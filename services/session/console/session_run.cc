@@ -49,6 +49,7 @@ std::vector<std::string> UpWords(const SessionRunSettings& settings, const Sessi
   if (order.power_W) add("--set", "script.power_W=" + supervisor::Fixed(*order.power_W, 1));
   if (order.picture_rate_Hz) add("--set", "render.png_rate_Hz=" + supervisor::Fixed(*order.picture_rate_Hz, 1));
   if (order.record) words.emplace_back("--record");
+  if (order.hands) add("--hands", "browser");
   return words;
 }
 

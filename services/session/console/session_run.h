@@ -16,6 +16,7 @@ struct SessionOrder {
   std::string scene;
   std::optional<double> power_W, seconds, picture_rate_Hz;
   bool record = true;
+  bool hands = false;  ///< The tools follow the operator on the page; no script.
 };
 
 struct SessionRunSettings {

@@ -14,7 +14,7 @@ std::string RestartMetric(NodeId node) { return std::string("restarts_") + NodeN
 void SessionWatch::Turn(std::int64_t now_ns) {
   const std::uint64_t session = supervisor::RunningSession(domain_);
   if (session == 0 || (seen_ && seen_->session != session)) {
-    seen_.reset();
+    Leave();
     return;
   }
   if (!seen_) {
@@ -42,6 +42,12 @@ void SessionWatch::Turn(std::int64_t now_ns) {
     seen_->restarts[at] = count;
   }
   if (begun() && now_ns >= seen_->next_point_ns) TakePoint(now_ns);
+}
+
+void SessionWatch::Leave() {
+  if (!seen_) return;
+  leave_();
+  seen_.reset();
 }
 
 void SessionWatch::TakePoint(std::int64_t now_ns) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -29,6 +30,13 @@ class SessionWatch {
   /// Joins the bus when a session begins, leaves it when the session ends, and reads the samples that have arrived.
   void Turn(std::int64_t now_ns);
 
+  /// Secret number of the running session; 0: none.
+  [[nodiscard]] std::uint64_t session() const { return seen_ ? seen_->session : 0; }
+  /// Its participant, while alive(), for further ports.
+  [[nodiscard]] bus::DdsParticipant& participant() { return seen_->view.participant(); }
+  /// Called before the bus of a session is left: its ports must be gone after that.
+  void OnLeave(std::function<void()> leave) { leave_ = std::move(leave); }
+
   /// True when a supervisor runs in the domain.
   [[nodiscard]] bool alive() const { return seen_ != nullptr; }
   /// True when SceneManifest was published: the nodes are ready.
@@ -52,7 +60,8 @@ class SessionWatch {
 
  private:
   struct Seen {
-    explicit Seen(int domain) : view(domain), events(view.participant().MakeInput<ThermalEvent>()) {}
+    explicit Seen(int domain)
+        : view(domain, bus::kConsoleIdentity), events(view.participant().MakeInput<ThermalEvent>()) {}
     std::uint64_t session = 0;  ///< Its secret number: another one is another session.
     supervisor::SessionView view;
     std::unique_ptr<bus::Input<ThermalEvent>> events;
@@ -62,7 +71,9 @@ class SessionWatch {
     std::int64_t next_point_ns = 0;
   };
   void TakePoint(std::int64_t now_ns);
+  void Leave();
 
+  std::function<void()> leave_ = [] {};
   int domain_;
   std::unique_ptr<Seen> seen_;
   std::string trouble_;

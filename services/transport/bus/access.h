@@ -30,7 +30,8 @@ struct AccessRole {
 };
 
 /// Participants that are not nodes.
-inline constexpr std::string_view kToolIdentity = "fulcrum";       ///< status, top, console: reads, writes nothing.
+inline constexpr std::string_view kToolIdentity = "fulcrum";       ///< status, top: reads, writes nothing.
+inline constexpr std::string_view kConsoleIdentity = "console";    ///< Also shows the picture and operates.
 inline constexpr std::string_view kReplayerIdentity = "replayer";  ///< Writes topics of nodes: replayer --live.
 inline constexpr std::string_view kLinkIdentity = "link";          ///< Writes topics of the nodes of another host.
 /// Domains of carts, and of links between two hosts of one cart.
@@ -61,13 +62,15 @@ inline constexpr std::array kRoles{
     AccessRole{"thermal_node",
                kNodeWrites | SetOf(kTopologyState, kOpenCells, kTemperaturePatch, kThermalEvent, kTickManifest),
                kNodeReads | SetOf(kCauteryContact, kTearState, kHandleState, kGeneratorSetting)},
-    AccessRole{"render_node", kNodeWrites | SetOf(kOperatorInput),
+    AccessRole{"render_node", kNodeWrites | SetOf(kOperatorInput, kPicture),
                kNodeReads | SetOf(kTissueFrame, kTopologyState, kTemperaturePatch, kToolState, kHandleState,
                                   kThermalEvent, kCauteryContact, kGeneratorSetting)},
     AccessRole{"recorder", kNodeWrites, kAll},
     AccessRole{kReplayerIdentity, kAll, 0},
     AccessRole{kLinkIdentity, kAll, kAll},
     AccessRole{kToolIdentity, 0, SetOf(kSceneManifest, kThermalEvent, kHealth)},
+    AccessRole{kConsoleIdentity, SetOf(kOperatorInput),
+               SetOf(kSceneManifest, kThermalEvent, kHealth, kPicture, kOperatorInput)},
 };
 }  // namespace access
 

@@ -91,7 +91,7 @@ bool PassesGate(const GeneratorSetting& m) noexcept {
 
 bool PassesGate(const OperatorInput& m) noexcept {
   return IsStamp(m.stamp) && m.claim_ns >= 0 && m.claim_ns <= m.stamp.stamp_ns && ArePedals(m.pedals) &&
-         UpTo(m.source, OperatorSource::kProgram) &&
+         UpTo(m.source, OperatorSource::kBrowser) &&
          std::all_of(m.tools.begin(), m.tools.end(), [](const OperatorTool& t) {
            return Magnitude(t.p_WT, kMaxCoordinate_m) && Magnitude(t.jaw_angle_rad, kMaxJawAngle_rad);
          });
@@ -144,6 +144,19 @@ bool PassesGate(const TemperaturePatch& m) noexcept {
   return IsStamp(h.stamp) && h.origin_x <= kLastOrigin && h.origin_y <= kLastOrigin &&
          Within(h.max_temperature_C, kMinTemperature_C, kMaxTemperature_C) &&
          m.texels.size() == std::size_t{4} * kPatchTexels * kPatchTexels;
+}
+
+bool PassesGate(const Picture& m) noexcept {
+  constexpr std::uint32_t kMaxEdge_px = 16384;
+  constexpr std::size_t kShortestJpeg = 4;  // Its first and its last mark.
+  const PictureHeader& h = m.header;
+  const auto unit = [](const Vec3f& v) { return Within(v.norm(), 1.0f - kUnitTolerance, 1.0f + kUnitTolerance); };
+  return IsStamp(h.stamp) && IsSessionTime(h.session_time_s) && h.width >= 1 && h.width <= kMaxEdge_px &&
+         h.height >= 1 && h.height <= kMaxEdge_px && h.size <= kMaxPictureBytes && m.jpeg.size() == h.size &&
+         h.size >= kShortestJpeg && m.jpeg[0] == 0xff && m.jpeg[1] == 0xd8 && h.present >> kMaxTools == 0 &&
+         Magnitude(h.eye_W, kMaxCoordinate_m) && unit(h.right_W) && unit(h.up_W) && unit(h.forward_W) &&
+         Within(h.pixel_rad, 1e-6f, 1.0f) && Within(h.scale, 1e-3f, 1.0f) &&
+         std::all_of(h.tip_W.begin(), h.tip_W.end(), [](const Vec3f& p) { return Magnitude(p, kMaxCoordinate_m); });
 }
 
 bool PassesGate(const ThermalEvent& m) noexcept {

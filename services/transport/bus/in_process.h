@@ -169,6 +169,16 @@ inline TemperaturePatch::View MakeView(TemperaturePatch* patch) {
   return {patch->header, patch->texels};
 }
 inline bool Close(TemperaturePatch*) { return true; }
+inline Picture::View MakeView(Picture* picture) {
+  picture->header = {};
+  picture->jpeg.resize(kMaxPictureBytes);
+  return {picture->header, picture->jpeg};
+}
+inline bool Close(Picture* picture) {
+  if (picture->header.size > kMaxPictureBytes) return false;
+  picture->jpeg.resize(picture->header.size);
+  return true;
+}
 
 /// Output of the large topics; T must have a View.
 template <class T>

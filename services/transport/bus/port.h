@@ -47,7 +47,7 @@ class Output {
   [[nodiscard]] virtual OutputStats stats() const = 0;
 };
 
-/// Publishes a large topic (TissueFrame, TemperaturePatch) by writing it in the memory from which it is read.
+/// Publishes a large topic (TissueFrame, TemperaturePatch, Picture) by writing it in the memory from which it is read.
 template <class T>
 class LoanOutput : public Output<T> {
  public:

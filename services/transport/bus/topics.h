@@ -43,6 +43,8 @@ struct TopicRole {
   [[nodiscard]] constexpr bool one_owner() const {
     return id != TopicId::kTickManifest && id != TopicId::kHealth && id != TopicId::kOperatorInput;
   }
+  /// In a recording. A picture is not: a replay draws it again, and a reader would make render_node compress.
+  [[nodiscard]] constexpr bool recorded() const { return id != TopicId::kPicture; }
 };
 
 // Reader depths cover the slowest reader of a topic between two reads: a software frame on a loaded machine takes up to
@@ -126,6 +128,13 @@ inline constexpr Quality kQualityOf<GeneratorSetting>{.delivery = Delivery::kRel
 /// Sent again at 50 Hz, so a lost sample is replaced.
 template <>
 inline constexpr Quality kQualityOf<OperatorInput>{.writer_depth = kLatestOnly, .reader_depth = kAllWriters};
+
+template <>
+inline constexpr Quality kQualityOf<Picture>{.path = Path::kSharedMemory,
+                                             .late_joiners_served = true,
+                                             .gap_is_loss = false,
+                                             .writer_depth = kFrameRing,
+                                             .reader_depth = kFrameRing};
 
 /// Topic of a message type.
 template <class T>

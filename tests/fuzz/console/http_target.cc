@@ -113,7 +113,9 @@ class ConsoleHttp final : public Target {
             "Content-Type: application/x-www-form-urlencoded",
             "Connection: keep-alive",
             "Expect: 100-continue",
-            "Upgrade: ",
+            "Upgrade: websocket",
+            "Sec-WebSocket-Key: ",
+            "/live?ticket=",
             "/api/",
             "/report?ticket=",
             "localhost"};
@@ -125,6 +127,10 @@ class ConsoleHttp final : public Target {
             {"state", BytesOf("GET /api/state HTTP/1.1\r\n" + from + "\r\n")},
             {"events", BytesOf("GET /api/events HTTP/1.1\r\n" + from + "Sec-Fetch-Site: same-origin\r\n\r\n")},
             {"two", BytesOf("GET /api/choices HTTP/1.1\r\n" + from + "\r\nGET / HTTP/1.0\r\nHost: cart\r\n\r\n")},
+            {"live", BytesOf("GET /live?ticket=" + std::string(64, 'a') +
+                             " HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+                             "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+                             "\x81\x86....x=1234")},
             {"start", BytesOf("POST /api/start HTTP/1.1\r\n" + from +
                               "Origin: http://127.0.0.1:8480\r\nContent-Type: application/x-www-form-urlencoded\r\n"
                               "Content-Length: " +
@@ -143,6 +149,7 @@ class ConsoleHttp final : public Target {
     if (!result.routed) return result.refusal;
     console::HttpResponse response = console::Done("taken");
     response.stream = result.routed->wanted == console::Wanted::kEvents;
+    response.socket = result.routed->wanted == console::Wanted::kLive;
     return response;
   }
 

@@ -3,7 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/websocket.hpp>
 #include <chrono>
+#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -29,9 +35,17 @@ class Served {
                 {.handle =
                      [](const HttpRequest& request) {
                        return HttpResponse{.body = request.secure ? "secure" : "plain",
-                                           .stream = request.target == "/stream"};
+                                           .stream = request.target == "/stream",
+                                           .socket = request.target == "/socket"};
                      },
-                 .knows = [](const HttpRequest& request) { return request.authorization == "yes"; }},
+                 .knows = [](const HttpRequest& request) { return request.authorization == "yes"; },
+                 .sockets = {.opened =
+                                 [this](Socket* socket) {
+                                   ++sockets_;
+                                   socket->SendText("welcome");
+                                 },
+                             .received = [](Socket* socket, std::string_view text) { Answer(socket, text); },
+                             .closed = [this](Socket*) { --sockets_; }}},
                 limits),
         thread_([this](const std::stop_token& stop) {
           while (!stop.stop_requested()) {
@@ -40,8 +54,17 @@ class Served {
           }
         }) {}
   [[nodiscard]] int port() const { return server_.port(); }
+  [[nodiscard]] int sockets() const { return sockets_; }
 
  private:
+  static void Answer(Socket* socket, std::string_view text) {
+    socket->SendText("received " + std::string(text));
+    const auto bytes = std::make_shared<const std::string>(100'000, 'x');
+    EXPECT_TRUE(socket->SendBytes(bytes));
+    EXPECT_FALSE(socket->SendBytes(bytes)) << "the first are still on their way";
+  }
+
+  std::atomic<int> sockets_{0};
   HttpServer server_;
   std::jthread thread_;
 };
@@ -112,6 +135,71 @@ TEST(HttpServer, ASlowGuestHasOneLimitForItsWholeRequest) {
   body.Send("POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 100\r\n\r\n");
   for (drops = 0; drops < 50 && !body.Closes(0.1); ++drops) body.Send("x");
   EXPECT_LT(drops, 50);
+}
+
+/// A WebSocket to the server, with calls that wait.
+class Client {
+ public:
+  /// Throws boost::system::system_error if the server refuses.
+  explicit Client(int port) {
+    namespace ip = boost::asio::ip;
+    web_.next_layer().connect({ip::make_address("127.0.0.1"), static_cast<unsigned short>(port)});
+    web_.handshake("127.0.0.1", "/socket");
+  }
+  void Send(const std::string& text) { web_.write(boost::asio::buffer(text)); }
+  std::string Read() {
+    boost::beast::flat_buffer buffer;
+    web_.read(buffer);
+    return boost::beast::buffers_to_string(buffer.data());
+  }
+  [[nodiscard]] bool binary() const { return web_.got_binary(); }
+
+ private:
+  boost::asio::io_context io_;
+  boost::beast::websocket::stream<boost::asio::ip::tcp::socket> web_{io_};
+};
+
+TEST(HttpServer, WebSocketsCarryTextAndBytes) {
+  Served served({});
+  {
+    Client client(served.port());
+    EXPECT_EQ(client.Read(), "welcome");
+    EXPECT_TRUE(WaitFor(5, [&] { return served.sockets() == 1; }));
+    for (const char* text : {"one", "two"}) {
+      client.Send(text);
+      EXPECT_EQ(client.Read(), std::string("received ") + text);
+      EXPECT_FALSE(client.binary());
+      EXPECT_EQ(client.Read(), std::string(100'000, 'x'));
+      EXPECT_TRUE(client.binary());
+    }
+  }
+  EXPECT_TRUE(WaitFor(5, [&] { return served.sockets() == 0; })) << "a client that is gone";
+}
+
+TEST(HttpServer, WebSocketsAreFewAndTheirMessagesShort) {
+  HttpLimits limits;
+  limits.sockets = 2;
+  Served served(limits);
+  Client first(served.port()), second(served.port());
+  EXPECT_THROW(Client(served.port()), boost::system::system_error);
+  EXPECT_EQ(second.Read(), "welcome");
+  second.Send(std::string(limits.message + 1, 'x'));
+  EXPECT_THROW(second.Read(), boost::system::system_error);
+  EXPECT_TRUE(WaitFor(5, [&] { return served.sockets() == 1; }));
+  Client third(served.port());
+  EXPECT_EQ(third.Read(), "welcome");
+  third.Send("here");
+  EXPECT_EQ(third.Read(), "received here");
+  // No guest takes its slot.
+  std::vector<std::unique_ptr<HttpConnection>> guests;
+  for (int i = 0; i < 300; ++i) guests.push_back(std::make_unique<HttpConnection>(served.port()));
+  third.Send("still here");
+  EXPECT_EQ(third.Read(), std::string(100'000, 'x'));
+  EXPECT_EQ(third.Read(), "received still here");
+  // A request that asks for no change of protocol.
+  HttpConnection plain(served.port());
+  plain.Send("GET /socket HTTP/1.1\r\nHost: x\r\n\r\n");
+  EXPECT_EQ(plain.Reply().status, 426);
 }
 
 TEST(HttpServer, StreamsAreFew) {

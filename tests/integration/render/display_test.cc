@@ -88,12 +88,12 @@ TEST(WindowTest, ShowsWhatIsDrawnOffScreen) {
     laparoscope.SetTool(0, moment.tools.tools[0]);
     laparoscope.Update();
     display->Draw();
-    Picture picture;
+    Bitmap picture;
     display->DrawAndRead(&picture);
     EXPECT_FALSE(display->closed());
     return picture;
   };
-  const Picture in_window = draw(true), off_screen = draw(false);
+  const Bitmap in_window = draw(true), off_screen = draw(false);
   ASSERT_EQ(in_window.rgb.size(), off_screen.rgb.size());
   double sum = 0;
   for (std::size_t i = 0; i < in_window.rgb.size(); ++i) {

@@ -30,8 +30,8 @@ constexpr double kWorstBlock = 12;  // Of 255, per channel.
 constexpr double kMean = 1.5;
 
 /// Mean of each 2 x 2 pixels, as stored in the files.
-Picture Reduced(const Picture& full) {
-  Picture half{full.width / 2, full.height / 2, {}};
+Bitmap Reduced(const Bitmap& full) {
+  Bitmap half{full.width / 2, full.height / 2, {}};
   for (int y = 0; y < half.height; ++y) {
     for (int x = 0; x < half.width; ++x) {
       for (std::size_t channel = 0; channel < 3; ++channel) {
@@ -51,7 +51,7 @@ struct Difference {
   [[nodiscard]] bool visible() const { return worst_block > kWorstBlock || mean > kMean; }
 };
 
-Difference Compare(const Picture& a, const Picture& b) {
+Difference Compare(const Bitmap& a, const Bitmap& b) {
   Difference difference;
   if (a.width != b.width || a.height != b.height) {
     return {255, 255};
@@ -162,7 +162,7 @@ class GoldenTest : public testing::Test {
     view_.render.height = 270;
   }
 
-  Picture Draw(const SyntheticMoment& moment, const std::function<void(LaparoscopeView*)>& change = {}) const {
+  Bitmap Draw(const SyntheticMoment& moment, const std::function<void(LaparoscopeView*)>& change = {}) const {
     LaparoscopeView laparoscope(view_);
     const auto display = MakeOffscreenDisplay(laparoscope, view_.render);
     laparoscope.SetTissue(moment.tissue.xyz);
@@ -184,12 +184,12 @@ class GoldenTest : public testing::Test {
       change(&laparoscope);
       laparoscope.Update();
     }
-    Picture picture;
+    Bitmap picture;
     display->DrawAndRead(&picture);
     return Reduced(picture);
   }
 
-  static void ExpectAsBefore(const char* name, const Picture& picture) {
+  static void ExpectAsBefore(const char* name, const Bitmap& picture) {
     const std::filesystem::path file = std::filesystem::path(FULCRUM_GOLDEN_DIR) / (std::string(name) + ".png");
     const std::filesystem::path now = std::filesystem::path(testing::TempDir()) / (std::string(name) + ".png");
     WritePng(picture, now);
@@ -209,7 +209,7 @@ class GoldenTest : public testing::Test {
     view_.render.fov_deg = 10;
   }
 
-  static Picture Golden(const char* name) {
+  static Bitmap Golden(const char* name) {
     return ReadPng(std::filesystem::path(FULCRUM_GOLDEN_DIR) / (std::string(name) + ".png"));
   }
 
@@ -284,7 +284,7 @@ TEST_F(GoldenTest, ASlitThatDisappearsIsSeen) {
 }
 
 TEST_F(GoldenTest, AnOpaqueMembraneIsSeen) {
-  const Picture picture = Draw(MakeSyntheticMoment(view_, 0.5), [](LaparoscopeView* view) {
+  const Bitmap picture = Draw(MakeSyntheticMoment(view_, 0.5), [](LaparoscopeView* view) {
     Opaque opaque;
     view->root()->accept(opaque);
     EXPECT_EQ(opaque.found, 1);
@@ -295,7 +295,7 @@ TEST_F(GoldenTest, AnOpaqueMembraneIsSeen) {
 
 TEST_F(GoldenTest, AShadowThatIsMissingIsSeen) {
   const SyntheticMoment moment = MakeSyntheticMoment(view_, 6.0);
-  const Picture picture = Draw(moment, [](LaparoscopeView* view) {
+  const Bitmap picture = Draw(moment, [](LaparoscopeView* view) {
     Remove shadow("shadow");
     view->root()->accept(shadow);
     EXPECT_EQ(shadow.found, 1);
@@ -307,7 +307,7 @@ TEST_F(GoldenTest, AMembraneOfOneLayerIsSeen) {
   const SyntheticMoment moment = MakeSyntheticMoment(view_, 0.5);
   for (const char* layer : {"upper", "lower"}) {
     const std::string name(layer);
-    const Picture picture = Draw(moment, [&](LaparoscopeView* view) {
+    const Bitmap picture = Draw(moment, [&](LaparoscopeView* view) {
       Rewrite gone("bool from_above", name + ".a = 0.0;\n  bool from_above");
       view->root()->accept(gone);
       EXPECT_EQ(gone.found, 1);
@@ -328,7 +328,7 @@ TEST_F(GoldenTest, TheNearerLayerOfTheMembraneLiesOnTop) {
   }
   for (const bool reversed : {false, true}) {
     for (const bool from_above : {true, false}) {
-      const Picture picture = Draw(from_above ? above : beneath, [&](LaparoscopeView* view) {
+      const Bitmap picture = Draw(from_above ? above : beneath, [&](LaparoscopeView* view) {
         Rewrite paint("bool from_above",
                       "wet = 0.0;\n  upper = vec4(1.0, 0.0, 0.0, 0.5);\n  lower = vec4(0.0, 1.0, 0.0, 0.5);\n"
                       "  bool from_above");

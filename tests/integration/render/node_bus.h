@@ -17,6 +17,7 @@ struct NodeBus {
   bus::InProcessTopic<ThermalEvent> events;
   bus::InProcessTopic<CauteryContact> contacts;
   bus::InProcessTopic<GeneratorSetting> generator;
+  bus::InProcessTopic<Picture> pictures;
   std::unique_ptr<bus::Input<TissueFrame>> tissue_in = tissue.MakeInput();
   std::unique_ptr<bus::Input<TopologyState>> topology_in = topology.MakeInput();
   std::unique_ptr<bus::Input<TemperaturePatch>> patches_in = patches.MakeInput();
@@ -30,11 +31,12 @@ struct NodeBus {
   std::unique_ptr<bus::LoanOutput<TemperaturePatch>> patches_out = patches.MakeOutput();
   std::unique_ptr<bus::Output<ToolState>> tools_out = tools.MakeOutput();
   std::unique_ptr<bus::Output<HandleState>> handles_out = handles.MakeOutput();
+  std::unique_ptr<bus::LoanOutput<Picture>> pictures_out = pictures.MakeOutput();
 
   /// Ports of the node.
   [[nodiscard]] RenderPorts ports() const {
     return {*tissue_in, *topology_in, *patches_in,   *tools_in, *handles_in,
-            *events_in, *contacts_in, *generator_in, nullptr};
+            *events_in, *contacts_in, *generator_in, nullptr,   pictures_out.get()};
   }
 };
 

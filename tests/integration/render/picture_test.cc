@@ -36,18 +36,18 @@ class PictureTest : public testing::Test {
   }
 
   /// Draws the tissue alone, without instruments in front of it.
-  Picture Draw(const std::function<void(LaparoscopeView*)>& change) const {
+  Bitmap Draw(const std::function<void(LaparoscopeView*)>& change) const {
     LaparoscopeView laparoscope(view_);
     const auto display = MakeOffscreenDisplay(laparoscope, view_.render);
     change(&laparoscope);
     laparoscope.Update();
-    Picture picture;
+    Bitmap picture;
     display->DrawAndRead(&picture);
     return picture;
   }
 
   /// Mean colour of a square of 2 * reach + 1 pixels a side around the image of p_W.
-  Rgb At(const Picture& picture, const Vec3f& p_W, int reach = 2) const {
+  Rgb At(const Bitmap& picture, const Vec3f& p_W, int reach = 2) const {
     const Laparoscope scope = MakeLaparoscope(view_.render);
     const Vec3f clip = (scope.projection * scope.view * p_W.homogeneous()).hnormalized();
     const int x = static_cast<int>((0.5f + 0.5f * clip.x()) * static_cast<float>(picture.width));
@@ -68,7 +68,7 @@ class PictureTest : public testing::Test {
     return mean;
   }
 
-  static double MeanDifference(const Picture& a, const Picture& b) {
+  static double MeanDifference(const Bitmap& a, const Bitmap& b) {
     double sum = 0;
     for (std::size_t i = 0; i < a.rgb.size(); ++i) {
       sum += std::abs(int{a.rgb[i]} - int{b.rgb[i]});
@@ -86,7 +86,7 @@ class PictureTest : public testing::Test {
 };
 
 TEST_F(PictureTest, ShowsPinkTissueInARoundField) {
-  const Picture picture = Draw([](LaparoscopeView*) {});
+  const Bitmap picture = Draw([](LaparoscopeView*) {});
   const auto pixel = [&](int x, int y) {
     return picture.rgb.data() + 3 * static_cast<std::size_t>(y * picture.width + x);
   };
@@ -104,15 +104,15 @@ TEST_F(PictureTest, ShowsPinkTissueInARoundField) {
 TEST_F(PictureTest, IsTheSameEveryTime) {
   const SyntheticMoment moment = MakeSyntheticMoment(view_, 4.5);
   const auto draw = [&] { return Draw([&](LaparoscopeView* l) { Apply(moment, true, l); }); };
-  const Picture first = draw(), second = draw();
+  const Bitmap first = draw(), second = draw();
   // One rasteriser on one machine: all pixels are equal. Between machines rounding may move an edge by a pixel.
   EXPECT_EQ(first.rgb, second.rgb);
 }
 
 TEST_F(PictureTest, TheMembraneIsHalfTransparent) {
-  const Picture with = Draw([](LaparoscopeView*) {});
+  const Bitmap with = Draw([](LaparoscopeView*) {});
   // The same without the membrane: every texel of the atlas is removed.
-  const Picture without = Draw([&](LaparoscopeView* l) {
+  const Bitmap without = Draw([&](LaparoscopeView* l) {
     TemperaturePatch gone;
     gone.texels.assign(4u * kPatchTexels * kPatchTexels, 0);
     for (std::uint32_t y = 0; y < 8; ++y) {
@@ -137,8 +137,8 @@ TEST_F(PictureTest, ASlitShowsFatBetweenBrownedEdges) {
   LaparoscopeView geometry(view_);
   Apply(moment, true, &geometry);
   const Vec3f middle = MiddleOfCut(geometry, moment);
-  const Picture cut = Draw([&](LaparoscopeView* l) { Apply(moment, true, l); });
-  const Picture intact = Draw([&](LaparoscopeView* l) { Apply(uncut, false, l); });
+  const Bitmap cut = Draw([&](LaparoscopeView* l) { Apply(moment, true, l); });
+  const Bitmap intact = Draw([&](LaparoscopeView* l) { Apply(uncut, false, l); });
   // Fat is yellow: less blue against red than the membrane over it.
   const Rgb slit = At(cut, middle), sheet = At(intact, middle);
   EXPECT_LT(slit.b / slit.r, 0.85 * sheet.b / sheet.r);
@@ -168,7 +168,7 @@ TEST_F(PictureTest, InThePapersModelColourFollowsTheTemperatureOfTheMoment) {
     LaparoscopeView laparoscope(scene);
     const auto display = MakeOffscreenDisplay(laparoscope, scene.render);
     Apply(moment, true, &laparoscope);
-    Picture picture;
+    Bitmap picture;
     display->DrawAndRead(&picture);
     middles.push_back(At(picture, MiddleOfCut(laparoscope, moment)));
   }
@@ -177,17 +177,17 @@ TEST_F(PictureTest, InThePapersModelColourFollowsTheTemperatureOfTheMoment) {
 
 TEST_F(PictureTest, ARestartedRendererShowsTheCutFromTheTopologyAlone) {
   const SyntheticMoment moment = MakeSyntheticMoment(view_, 4.8);
-  const Picture known = Draw([&](LaparoscopeView* l) { Apply(moment, true, l); });
-  const Picture rebuilt = Draw([&](LaparoscopeView* l) { Apply(moment, false, l); });
+  const Bitmap known = Draw([&](LaparoscopeView* l) { Apply(moment, true, l); });
+  const Bitmap rebuilt = Draw([&](LaparoscopeView* l) { Apply(moment, false, l); });
   SyntheticMoment uncut = moment;
   std::fill(uncut.topology.dead_edges.begin(), uncut.topology.dead_edges.end(), std::uint8_t{0});
-  const Picture intact = Draw([&](LaparoscopeView* l) { Apply(uncut, false, l); });
+  const Bitmap intact = Draw([&](LaparoscopeView* l) { Apply(uncut, false, l); });
   LaparoscopeView geometry(view_);
   Apply(moment, true, &geometry);
   const Vec3f middle = MiddleOfCut(geometry, moment);
   // The strongest change within 3 mm of the cut's middle: the topology resolves the place only to half a cell of the
   // grid.
-  const auto change = [&](const Picture& picture) {
+  const auto change = [&](const Bitmap& picture) {
     double most = 0;
     for (float beside = -0.003f; beside < 0.003f; beside += 0.0002f) {
       const Rgb a = At(picture, middle + Vec3f(beside, 0, 0)), b = At(intact, middle + Vec3f(beside, 0, 0));
@@ -201,7 +201,7 @@ TEST_F(PictureTest, ARestartedRendererShowsTheCutFromTheTopologyAlone) {
 
 TEST_F(PictureTest, InstrumentsAreDrawnWhereTheirTipsAreAndJawsOpen) {
   const SyntheticMoment moment = MakeSyntheticMoment(view_, 0.0);
-  const Picture none = Draw([&](LaparoscopeView* l) { Apply(moment, false, l); });
+  const Bitmap none = Draw([&](LaparoscopeView* l) { Apply(moment, false, l); });
   const auto with_jaw = [&](float angle) {
     return Draw([&](LaparoscopeView* l) {
       Apply(moment, false, l);
@@ -211,7 +211,7 @@ TEST_F(PictureTest, InstrumentsAreDrawnWhereTheirTipsAreAndJawsOpen) {
       l->SetJaw(0, angle);
     });
   };
-  const Picture closed = with_jaw(0), open = with_jaw(0.9f);
+  const Bitmap closed = with_jaw(0), open = with_jaw(0.9f);
   EXPECT_GT(MeanDifference(none, closed), 0.2);
   EXPECT_GT(MeanDifference(closed, open), 0.05);
 }
@@ -248,7 +248,7 @@ TEST_F(PictureTest, MeshesOfTheSceneAreDrawnInPlaceOfAnInstrument) {
     laparoscope.SetTool(0, sample);
     laparoscope.SetJaw(0, angle);
     laparoscope.Update();
-    Picture picture;
+    Bitmap picture;
     display->DrawAndRead(&picture);
     std::vector<bool> covered;
     for (std::size_t i = 0; i < picture.rgb.size(); i += 3) {
@@ -266,13 +266,13 @@ TEST_F(PictureTest, MeshesOfTheSceneAreDrawnInPlaceOfAnInstrument) {
 
 TEST_F(PictureTest, TheTentMovesThePicture) {
   const SyntheticMoment rest = MakeSyntheticMoment(view_, 0.0), lifted = MakeSyntheticMoment(view_, 2.2);
-  const Picture before = Draw([&](LaparoscopeView* l) { Apply(rest, false, l); });
-  const Picture after = Draw([&](LaparoscopeView* l) { Apply(lifted, false, l); });
+  const Bitmap before = Draw([&](LaparoscopeView* l) { Apply(rest, false, l); });
+  const Bitmap after = Draw([&](LaparoscopeView* l) { Apply(lifted, false, l); });
   EXPECT_GT(MeanDifference(before, after), 0.5);
 }
 
 TEST(PngTest, RoundTripsAndNamesTheFileThatCannotBeWritten) {
-  Picture picture{3, 2, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18}};
+  Bitmap picture{3, 2, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18}};
   const std::filesystem::path file = std::filesystem::path(testing::TempDir()) / "round_trip.png";
   WritePng(picture, file);
   EXPECT_EQ(ReadPng(file).rgb, picture.rgb);

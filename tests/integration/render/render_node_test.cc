@@ -2,6 +2,7 @@
 #include "render_node/node/render_node.h"
 
 #include <gtest/gtest.h>
+#include <turbojpeg.h>
 
 #include <chrono>
 #include <filesystem>
@@ -102,6 +103,62 @@ TEST_F(RenderNodeTest, WritesAPictureWhenOneIsDueAndNoneWhileNothingChanges) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "frame_0001510.png"));
 }
 
+TEST_F(RenderNodeTest, SendsEachChangeWhilePicturesAreReadAndNoneOtherwise) {
+  const auto node = MakeNode();
+  Publish(MakeSyntheticMoment(view_, 1.0));
+  node->Step(At(1.0));
+  EXPECT_EQ(Metric(*node, "pictures_sent"), 0);
+  Picture picture;
+  {
+    const auto reader = bus_.pictures.MakeInput();
+    const auto received = [&] {
+      for (int i = 0; i < 500 && !reader->TakeLatest(&picture); ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      }
+      return picture.header.stamp.sequence;
+    };
+    node->Step(At(1.1));
+    EXPECT_EQ(received(), 1u) << "a new reader gets the present picture";
+    EXPECT_EQ(picture.header.width, view_.render.width);
+    EXPECT_EQ(picture.header.height, view_.render.height);
+    EXPECT_EQ(picture.header.present, 3u);
+    const SyntheticMoment moment = MakeSyntheticMoment(view_, 1.2);
+    Publish(moment);
+    node->Step(At(1.2));
+    EXPECT_EQ(received(), 2u);
+    EXPECT_EQ(picture.header.tip_W[1], moment.tools.tools[1].p_WT);
+    EXPECT_EQ(picture.header.session_time_s, 1.2);
+    node->Step(At(1.25));
+    EXPECT_EQ(Metric(*node, "pictures_sent"), 2) << "nothing has changed";
+  }
+  Publish(MakeSyntheticMoment(view_, 1.3));
+  node->Step(At(1.3));
+  EXPECT_EQ(Metric(*node, "pictures_sent"), 2) << "nobody reads";
+}
+
+TEST(JpegEncoder, KeepsThePictureAndTheLimit) {
+  Bitmap picture{64, 48, std::vector<std::uint8_t>(3 * 64 * 48)};
+  // Red above, blue beneath; the first row is the bottom one.
+  for (std::size_t i = 0; i < picture.rgb.size(); i += 3) picture.rgb[i + (i < picture.rgb.size() / 2 ? 2 : 0)] = 250;
+  JpegEncoder encoder;
+  const std::span<const std::uint8_t> file = encoder.Encode(picture, 4096);
+  std::vector<std::uint8_t> top_first(picture.rgb.size());
+  tjhandle reader = tjInitDecompress();
+  ASSERT_EQ(tjDecompress2(reader, file.data(), file.size(), top_first.data(), 64, 0, 48, TJPF_RGB, 0), 0);
+  tjDestroy(reader);
+  EXPECT_GT(top_first[0], 200);
+  EXPECT_LT(top_first[2], 50);
+  EXPECT_LT(top_first[top_first.size() - 3], 50);
+  EXPECT_GT(top_first[top_first.size() - 1], 200);
+
+  std::uint32_t noise = 1;
+  for (std::uint8_t& value : picture.rgb)
+    value = static_cast<std::uint8_t>((noise = noise * 1664525u + 1013904223u) >> 24);
+  const std::size_t full = encoder.Encode(picture, 1 << 20).size();
+  EXPECT_LE(encoder.Encode(picture, full - 1).size(), full - 1) << "more detail than fits is compressed more";
+  EXPECT_THROW((void)encoder.Encode(picture, 10), std::runtime_error);
+}
+
 TEST_F(RenderNodeTest, FinishWritesTheLastStateOfTheSession) {
   {
     const auto node = MakeNode();
@@ -135,7 +192,7 @@ TEST_F(RenderNodeTest, ANewNodeShowsTheCutAfterOneTissueFrameAndOneTopology) {
     node->Step(At(4.8));
     EXPECT_EQ(Metric(*node, "frames_drawn"), 1);
   }
-  const Picture with_cut = ReadPng(folder_ / "frame_0004800.png");
+  const Bitmap with_cut = ReadPng(folder_ / "frame_0004800.png");
   std::fill(moment.topology.dead_edges.begin(), moment.topology.dead_edges.end(), std::uint8_t{0});
   moment.topology.revision += 1;
   Publish(moment);
@@ -160,8 +217,8 @@ TEST_F(RenderNodeTest, HoldsTissueThatIsLateAndSaysSo) {
     node->Step(At(2.6));
     EXPECT_EQ(Metric(*node, "frames_drawn"), 3) << "the notice is removed";
   }
-  const Picture held = ReadPng(folder_ / "frame_0001500.png");
-  const auto red_text = [](const Picture& picture) {
+  const Bitmap held = ReadPng(folder_ / "frame_0001500.png");
+  const auto red_text = [](const Bitmap& picture) {
     int count = 0;
     for (std::size_t k = 0; k < picture.rgb.size(); k += 3) {
       count += picture.rgb[k] > 250 && picture.rgb[k + 2] < 60 ? 1 : 0;

@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
       laparoscope.SetJaw(tool, moment.handles.handles[static_cast<std::size_t>(tool)].jaw_angle_rad);
     }
     laparoscope.Update();
-    render::Picture picture;
+    render::Bitmap picture;
     display->DrawAndRead(&picture);
     render::WritePng(picture, argv[3]);
     std::cerr << display->description() << '\n';

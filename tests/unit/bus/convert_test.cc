@@ -60,7 +60,7 @@ std::set<std::string> MembersInIdl(const std::string& type) {
   const std::string head = "struct " + type + " {";
   const std::size_t begin = text.find(head) + head.size();
   const std::string body = text.substr(begin, text.find('}', begin) - begin);
-  const std::regex member(R"((\w+)(\[[^\]]*\])?\s*;)");
+  const std::regex member(R"((\w+)(\[[^\]]*\])*\s*;)");
   std::set<std::string> names;
   for (std::sregex_iterator at(body.begin(), body.end(), member), end; at != end; ++at) names.insert((*at)[1]);
   return names;
@@ -119,6 +119,9 @@ TEST(ConvertLoan, LargeTypesArePlain) {
   idl::TemperaturePatchPubSubType patch;
   EXPECT_TRUE(patch.is_plain());
   EXPECT_EQ(patch.m_typeSize, sizeof(idl::TemperaturePatch) + 4);
+  idl::PicturePubSubType picture;
+  EXPECT_TRUE(picture.is_plain());
+  EXPECT_EQ(picture.m_typeSize, sizeof(idl::Picture) + 4);
 }
 
 TEST(ConvertLoan, LoanHasTheLayoutOfTheGeneratedType) {
@@ -134,6 +137,12 @@ TEST(ConvertLoan, LoanHasTheLayoutOfTheGeneratedType) {
   ASSERT_TRUE(ToLoan(patch, reinterpret_cast<std::byte*>(wire_patch.get())));
   EXPECT_EQ(wire_patch->header().origin_y(), patch.header.origin_y);
   EXPECT_EQ(wire_patch->texels()[4711], patch.texels[4711]);
+
+  const auto picture = test::Sample<Picture>();
+  auto wire_picture = std::make_unique<idl::Picture>();
+  ASSERT_TRUE(ToLoan(picture, reinterpret_cast<std::byte*>(wire_picture.get())));
+  EXPECT_EQ(wire_picture->header().scale(), picture.header.scale);
+  EXPECT_EQ(wire_picture->jpeg()[4], picture.jpeg[4]);
 }
 
 TEST(ConvertLoan, CountBeyondTheArrayIsRefusedBothWays) {

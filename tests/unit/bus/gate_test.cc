@@ -162,6 +162,23 @@ TEST(GateRanges, OperatorInput) {
                                 {"controls taken later than now", [](auto& m) { m.claim_ns = m.stamp.stamp_ns + 1; }}});
 }
 
+TEST(GateRanges, Picture) {
+  ExpectRefused<Picture>({{"no pixel", [](auto& m) { m.header.width = 0; }},
+                          {"more pixels than any display", [](auto& m) { m.header.height = 16385; }},
+                          {"another length than the header's", [](auto& m) { m.jpeg.push_back(0); }},
+                          {"no JPEG", [](auto& m) { m.jpeg[1] = 0xd9; }},
+                          {"less than two marks",
+                           [](auto& m) {
+                             m.jpeg.resize(3);
+                             m.header.size = 3;
+                           }},
+                          {"a tool too many", [](auto& m) { m.header.present = 4; }},
+                          {"an eye beyond the room", [](auto& m) { m.header.eye_W.z() = 11; }},
+                          {"a view of no direction", [](auto& m) { m.header.forward_W.setZero(); }},
+                          {"pixels of no size", [](auto& m) { m.header.pixel_rad = 0; }},
+                          {"larger than drawn", [](auto& m) { m.header.scale = 1.5f; }}});
+}
+
 TEST(GateRanges, TopologyState) {
   ExpectRefused<TopologyState>({{"grid beyond capacity", [](auto& m) { m.rows = 97; }},
                                 {"product overflows 32 bits", [](auto& m) { m.rows = m.cols = 0x10000; }},

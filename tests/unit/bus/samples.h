@@ -101,6 +101,28 @@ inline OperatorInput Sample(std::uint64_t sequence) {
 }
 
 template <>
+inline Picture Sample(std::uint64_t sequence) {
+  Picture m;
+  m.header.stamp = {sequence, 14, 4700};
+  m.header.session_time_s = 2.25;
+  m.header.tool_sequence = 31;
+  m.header.tissue_sequence = 32;
+  m.header.width = 960;
+  m.header.height = 540;
+  m.header.present = 3;
+  m.header.eye_W = Vec(0.11f);
+  m.header.right_W = Vec3f::UnitY();
+  m.header.up_W = Vec3f::UnitX();
+  m.header.forward_W = -Vec3f::UnitZ();
+  m.header.pixel_rad = 0.002f;
+  m.header.tip_W = {Vec(0.21f), Vec(0.31f)};
+  m.header.scale = 0.75f;
+  m.jpeg = {0xff, 0xd8, 1, 2, 3, 0xff, 0xd9};
+  m.header.size = static_cast<std::uint32_t>(m.jpeg.size());
+  return m;
+}
+
+template <>
 inline CauteryContact Sample(std::uint64_t sequence) {
   CauteryContact m;
   m.stamp = {sequence, 15, 5000};

@@ -182,6 +182,21 @@ TEST(Router, FieldsAreCheckedByTheTable) {
   EXPECT_EQ(StatusOf(Post("/api/calibrate", "what=handle&tool=2")), 400);
   EXPECT_EQ(StatusOf(Get("/api/picture?name=..%2F..%2Fetc%2Fpasswd")), 400);
   EXPECT_EQ(StatusOf(Get("/report?ticket=1")), 400);
+  EXPECT_EQ(StatusOf(Post("/api/start", "scene=small&hands=on")), 200);
+  EXPECT_EQ(StatusOf(Post("/api/start", "scene=small&hands=mouse")), 400);
+}
+
+TEST(Router, TheLivePictureNeedsATicketAndThisPage) {
+  EXPECT_EQ(StatusOf(Get("/live")), 400);
+  EXPECT_EQ(StatusOf(Get("/live?ticket=1")), 400);
+  HttpRequest request = Get("/live?ticket=" + std::string(64, 'a'));
+  request.authorization.clear();  // A browser sends none with a WebSocket.
+  EXPECT_EQ(StatusOf(request), 200);
+  request.origin = "http://evil.example";
+  EXPECT_EQ(StatusOf(request), 403);
+  request.origin.clear();
+  request.fetch_site = "cross-site";
+  EXPECT_EQ(StatusOf(request), 403);
 }
 
 TEST(Router, MethodsAndBodies) {

@@ -1,11 +1,11 @@
-#include "render_node/input/mouse_hands.h"
+#include "services/base/core/mouse_hands.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-namespace fulcrum::render {
+namespace fulcrum {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -22,7 +22,7 @@ HandsView View() {
 class MouseHandsTest : public testing::Test {
  protected:
   MouseHandsTest() { hands_.SetView(View()); }
-  MouseHands hands_;
+  MouseHands hands_{OperatorSource::kWindow};
 };
 
 TEST_F(MouseHandsTest, DoesNothingUntilTaken) {
@@ -111,5 +111,14 @@ TEST_F(MouseHandsTest, SteadyFollowsSlowMotionAndDampsTremor) {
   EXPECT_GT(largest, 0.1e-3f);
 }
 
+TEST_F(MouseHandsTest, ControlsTakenBeforeTheToolsAreKnownMoveNothing) {
+  MouseHands hands(OperatorSource::kWindow);
+  hands.Take(5 * kMs);
+  EXPECT_FALSE(hands.At(6 * kMs).tools[1].moves);
+  hands.SetView(View());
+  const OperatorInput input = hands.At(7 * kMs);
+  for (std::size_t i = 0; i < kMaxTools; ++i) EXPECT_EQ(input.tools[i].p_WT, View().tip[i]) << "not the origin of W";
+}
+
 }  // namespace
-}  // namespace fulcrum::render
+}  // namespace fulcrum

@@ -219,5 +219,27 @@ TEST_F(CartDevicesTest, CalibrationNeedsADeviceThatMoves) {
   EXPECT_NE(Refusal().find("devices.tool0 is none"), std::string::npos) << Refusal();
 }
 
+TEST_F(CartDevicesTest, AnOperatorsToolStartsWhereTheLaparoscopeSeesIt) {
+  scene.render.scope_tip_W = {0, -0.1f, 0.1f};
+  scene.render.scope_target_W = Vec3f::Zero();
+  std::array<ScriptKey, 2> keys{};
+  keys[0].p_W = {0.3f, 0, 0.02f};
+  keys[1].p_W = {0, 0, 0.02f};
+  keys[1].time_s = 2;
+  scene.script = keys;
+  cart.devices[0].kind = DeviceKind::kOperator;
+  const Trocar trocar{scene.tools[0].p_WP.cast<double>(), scene.tools[0].shaft_length_m};
+  const auto start = [&] {
+    const CartDevices made = Make();
+    return made.devices[0]->ReadPosition(TickAt(0));
+  };
+  const Vec3d inside = start();
+  EXPECT_GT((inside - AttachPointForTip(trocar, keys[0].p_W.cast<double>())).norm(), 0.1);
+  EXPECT_LT((inside - AttachPointForTip(trocar, keys[1].p_W.cast<double>())).norm(), 0.06);
+  // Nothing of the script is in view.
+  keys[1].p_W = keys[0].p_W;
+  EXPECT_LT((start() - AttachPointForTip(trocar, keys[0].p_W.cast<double>())).norm(), 1e-6);
+}
+
 }  // namespace
 }  // namespace fulcrum::haptics

@@ -121,6 +121,7 @@ function show(s) {
     showFigures(s.figures);
     showPicture();
   }
+  live.show(s);
   showWarnings(s.warnings || []);
   showTask(s.task);
   if (s.notice && s.notice.number > noticed) {
@@ -250,9 +251,10 @@ function clearPicture() {
   g.clearRect(0, 0, $('picture').width, $('picture').height);
 }
 async function showPicture() {
-  const said = pictureShown ? '' : state.phase === 'starting' ? (state.said || 'The nodes are starting.')
+  const said = pictureShown || live.shows() ? '' : state.phase === 'starting' ? (state.said || 'The nodes are starting.')
     : state.own || state.picture ? 'Waiting for the first picture.' : 'The pictures of this session are in another folder, because it was not started here.';
   setText($('scope-text'), said);
+  if (live.shows()) return;  // Live pictures come by themselves.
   const name = `${state.session}/${state.picture}`;
   if (!state.picture || pictureAsked || name === pictureShown) return;
   pictureAsked = true;
@@ -332,7 +334,7 @@ $('start-form').addEventListener('submit', event => {
   event.preventDefault();
   const form = $('start-form'), scene = sceneChosen();
   if (!scene) return;
-  const fields = {scene: scene.name, record: form.record.value};
+  const fields = {scene: scene.name, record: form.record.value, hands: form.hands.value};
   if (power !== scene.power) fields.power = power;
   for (const name of ['seconds', 'picture_rate']) if (form[name].value) fields[name] = form[name].value;
   order('/api/start', fields);
@@ -442,4 +444,4 @@ $('task-close').addEventListener('click', () => {
 });
 
 window.addEventListener('resize', () => showFigures(state.figures));
-if (token) listen(); else askToken();
+document.addEventListener('DOMContentLoaded', () => { if (token) listen(); else askToken(); });

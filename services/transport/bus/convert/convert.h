@@ -28,15 +28,19 @@ void FromWire(const WireOf<T>& from, T* to);
 /// loan.
 [[nodiscard]] TissueFrame::View OpenLoan(std::byte* loan, TissueFrameHeader* header);
 [[nodiscard]] TemperaturePatch::View OpenLoan(std::byte* loan, TemperaturePatchHeader* header);
+[[nodiscard]] Picture::View OpenLoan(std::byte* loan, PictureHeader* header);
 /// False if the header's counts exceed the payload.
 [[nodiscard]] bool CloseLoan(const TissueFrameHeader& header, std::byte* loan);
 [[nodiscard]] bool CloseLoan(const TemperaturePatchHeader& header, std::byte* loan);
+[[nodiscard]] bool CloseLoan(const PictureHeader& header, std::byte* loan);
 /// Writes a complete message. False if it does not fit.
 [[nodiscard]] bool ToLoan(const TissueFrame& from, std::byte* loan);
 [[nodiscard]] bool ToLoan(const TemperaturePatch& from, std::byte* loan);
+[[nodiscard]] bool ToLoan(const Picture& from, std::byte* loan);
 /// Reads a complete message. False if the header's counts exceed the payload: then only the header is read.
 [[nodiscard]] bool FromLoan(const std::byte* loan, TissueFrame* to);
 [[nodiscard]] bool FromLoan(const std::byte* loan, TemperaturePatch* to);
+[[nodiscard]] bool FromLoan(const std::byte* loan, Picture* to);
 // The session of a stamp exists on the wire only: ports set and check it.
 void SetSessionOfLoan(std::uint64_t session, std::byte* loan);
 /// Session of a serialised message: CDR without encapsulation, or a loan; 0: the bytes are too few.
@@ -44,5 +48,6 @@ void SetSessionOfLoan(std::uint64_t session, std::byte* loan);
 /// Reads only the stamp, for samples that are skipped.
 [[nodiscard]] Stamp StampOfLoan(const std::byte* loan, const TissueFrame*);
 [[nodiscard]] Stamp StampOfLoan(const std::byte* loan, const TemperaturePatch*);
+[[nodiscard]] Stamp StampOfLoan(const std::byte* loan, const Picture*);
 
 }  // namespace fulcrum::bus

@@ -1,4 +1,4 @@
-// Conversion of TissueFrame and TemperaturePatch in loans.
+// Conversion of TissueFrame, TemperaturePatch and Picture in loans.
 #include <algorithm>
 #include <cstring>
 
@@ -10,15 +10,18 @@ namespace fulcrum::bus {
 static_assert(idl::MAX_TISSUE_VERTICES == kMaxTissueVertices && idl::MAX_TISSUE_FLOATS == 3 * kMaxTissueVertices);
 static_assert(idl::PATCH_TEXELS == kPatchTexels && idl::ATLAS_TEXELS == kAtlasTexels);
 static_assert(idl::PATCH_BYTES == 4 * kPatchTexels * kPatchTexels);
+static_assert(idl::MAX_PICTURE_BYTES == kMaxPictureBytes);
 
 // A plain type is its header followed by its payload, without padding, so the payload begins at sizeof(header).
 static_assert(sizeof(idl::TissueFrame) == sizeof(idl::TissueFrameHeader) + idl::MAX_TISSUE_FLOATS * sizeof(float));
 static_assert(sizeof(idl::TemperaturePatch) == sizeof(idl::TemperaturePatchHeader) + idl::PATCH_BYTES);
+static_assert(sizeof(idl::Picture) == sizeof(idl::PictureHeader) + idl::MAX_PICTURE_BYTES);
 
 namespace {
 
 constexpr std::size_t kFrameOffset = sizeof(idl::TissueFrameHeader);
 constexpr std::size_t kPatchOffset = sizeof(idl::TemperaturePatchHeader);
+constexpr std::size_t kPictureOffset = sizeof(idl::PictureHeader);
 
 // Headers are copied byte by byte: a loan need not be aligned for their 8-byte members.
 template <class WireHeader, class Header>
@@ -111,5 +114,30 @@ bool FromLoan(const std::byte* loan, TemperaturePatch* to) {
 Stamp StampOfLoan(const std::byte* loan, const TemperaturePatch*) {
   return StampOfHeader<idl::TemperaturePatchHeader>(loan);
 }
+
+Picture::View OpenLoan(std::byte* loan, PictureHeader* header) {
+  *header = {};
+  return {*header, {reinterpret_cast<std::uint8_t*>(loan + kPictureOffset), idl::MAX_PICTURE_BYTES}};
+}
+
+bool CloseLoan(const PictureHeader& header, std::byte* loan) {
+  return header.size <= kMaxPictureBytes && PutHeader<idl::PictureHeader>(header, loan);
+}
+
+bool ToLoan(const Picture& from, std::byte* loan) {
+  if (from.jpeg.size() != from.header.size || !CloseLoan(from.header, loan)) return false;
+  if (!from.jpeg.empty()) std::memcpy(loan + kPictureOffset, from.jpeg.data(), from.jpeg.size());
+  return true;
+}
+
+bool FromLoan(const std::byte* loan, Picture* to) {
+  GetHeader<idl::PictureHeader>(loan, &to->header);
+  if (to->header.size > kMaxPictureBytes) return false;
+  const auto* jpeg = reinterpret_cast<const std::uint8_t*>(loan + kPictureOffset);
+  to->jpeg.assign(jpeg, jpeg + to->header.size);
+  return true;
+}
+
+Stamp StampOfLoan(const std::byte* loan, const Picture*) { return StampOfHeader<idl::PictureHeader>(loan); }
 
 }  // namespace fulcrum::bus

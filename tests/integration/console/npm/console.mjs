@@ -80,4 +80,4 @@ export async function until(page, limit_s, done, argument) {
 
 /** All nodes run; slow ones, on a busy machine, too. */
 export const allRun = count => document.querySelectorAll('#nodes .word.level-good, #nodes .word.level-busy').length === count;
-export const pictureShown = () => !!document.getElementById('picture').dataset.shown;
+export const pictureShown = () => !!document.getElementById('picture').dataset.shown || !!document.getElementById('picture').dataset.live;

@@ -1,0 +1,247 @@
+'use strict';
+// The live picture and the operator's controls, over one WebSocket: pictures come as JPEG files, the state of the controls
+// as JSON; motions and keys go as forms (services/session/console/live_view.h).
+
+const live = (() => {
+  const kBeat = 20;      // ms between two messages while the controls are taken; without one for 250 ms the tools stop.
+  const kStick = 9;      // Pixels of the picture per beat at the end of a stick's way, or while an arrow key is held.
+  const kKeys = {j: 'jaw', k: 'lock', f: 'cut', g: 'coag', 1: 'tool0', 2: 'tool1', v: 'steady', ' ': 'clutch', Shift: 'fine', Control: 'depth'};
+  const kButtons = ['jaw', 'coag', 'cut'];  // Of the mouse: left, middle, right.
+  const kPadButtons = {0: 'jaw', 1: 'lock', 4: 'tool0', 5: 'tool1', 6: 'coag', 7: 'cut'};
+
+  let socket = null, connecting = false, seen = 0, hands = {controls: 'none'}, operated = false, running = false;
+  let x = 0, y = 0, turn = 0;
+  const down = new Set(), arrows = new Set();
+  let padDown = new Set();
+
+  const mine = () => hands.controls === 'you';
+
+  function send(fields) {
+    if (socket && socket.readyState === WebSocket.OPEN) socket.send(new URLSearchParams(fields));
+  }
+  function press(key, pressed) {
+    if (!mine() || down.has(key) === pressed) return;
+    if (pressed) down.add(key); else down.delete(key);
+    send({[pressed ? 'down' : 'up']: key});
+    showKeys();
+  }
+  function letGo() {
+    for (const key of [...down]) press(key, false);
+    arrows.clear();
+  }
+  function release() {
+    letGo();
+    send({release: 1});
+    if (document.pointerLockElement) document.exitPointerLock();
+  }
+
+  // ---------------------------------------------------------------------------------------------- the connection
+
+  async function connect() {
+    if (socket || connecting || !running) return;
+    connecting = true;
+    try {
+      const answer = await call('/api/ticket', {}).then(r => r.json());
+      if (!answer.ok) throw new Error(answer.text);
+      const opened = new WebSocket(`${location.origin.replace(/^http/, 'ws')}/live?ticket=${answer.text}`);
+      opened.binaryType = 'arraybuffer';
+      opened.onmessage = take;
+      opened.onclose = () => {
+        socket = null;
+        seen = 0;
+        takeState({controls: 'none'});
+        if (running) setTimeout(connect, 1000);
+      };
+      socket = opened;
+    } catch (error) { setTimeout(connect, 2000); }
+    connecting = false;
+  }
+
+  async function take(message) {
+    if (typeof message.data === 'string') return takeState(JSON.parse(message.data));
+    try {
+      const image = await createImageBitmap(new Blob([message.data], {type: 'image/jpeg'}));
+      const canvas = $('picture');
+      if (canvas.width !== image.width || canvas.height !== image.height) {
+        canvas.width = image.width;
+        canvas.height = image.height;
+      }
+      canvas.getContext('2d').drawImage(image, 0, 0);
+      image.close();
+    } catch (error) { /* The next picture replaces it. */ }
+    ++seen;
+    $('picture').dataset.live = seen;
+    send({seen});
+  }
+
+  function takeState(state) {
+    const had = mine();
+    hands = state;
+    document.body.dataset.controls = hands.controls;
+    if (had && !mine()) {
+      down.clear();
+      arrows.clear();
+      if (document.pointerLockElement) document.exitPointerLock();
+    }
+    showKeys();
+  }
+
+  function showKeys() {
+    $('hands').hidden = !operated || !socket;
+    if ($('hands').hidden) return;
+    const tool = hands.tool === 0 ? 'left' : 'right';
+    const text = {you: `You operate the ${tool} tool${hands.locked ? ', jaw locked' : ''}${hands.steady ? ', tremor filter on' : ''}.`,
+      browser: 'Another page has the controls.', window: 'The window has the controls.', program: 'A program has the controls.',
+      none: 'Nobody has the controls; the tools stand still.'}[hands.controls];
+    setText($('hands-state'), text);
+    $('take').hidden = mine();
+    $('take').disabled = !hands.ready;
+    $('release').hidden = !mine();
+    for (const button of document.querySelectorAll('#hands .held')) {
+      button.hidden = !mine();
+      const key = button.dataset.key;
+      const on = key === 'lock' ? hands.locked : key === 'tool0' ? hands.tool === 0 : key === 'tool1' ? hands.tool === 1 : down.has(key);
+      if (key) button.setAttribute('aria-pressed', on ? 'true' : 'false');
+    }
+  }
+
+  // ------------------------------------------------------------------------------------------------- the inputs
+
+  /** Pixels of the picture per CSS pixel: the canvas shows the whole picture in a box of another shape. */
+  function scale() {
+    const canvas = $('picture'), box = canvas.getBoundingClientRect();
+    return Math.max(canvas.width / Math.max(1, box.width), canvas.height / Math.max(1, box.height));
+  }
+  function move(dx, dy) {
+    x += dx * scale();
+    y -= dy * scale();
+  }
+
+  function start() {
+    send({take: 1});
+    $('picture').focus();
+  }
+  $('take').addEventListener('click', start);
+  $('release').addEventListener('click', release);
+
+  const canvas = $('picture');
+  canvas.tabIndex = 0;
+  canvas.addEventListener('pointerdown', event => {
+    if (!mine()) return;
+    canvas.focus();
+    if (event.pointerType === 'touch') return;
+    event.preventDefault();
+    // The first click takes the pointer, so that the hand never reaches the screen's edge.
+    if (document.pointerLockElement !== canvas && canvas.requestPointerLock) {
+      const locked = canvas.requestPointerLock();
+      if (locked && locked.catch) locked.catch(() => {});  // Without a lock the pointer works inside the picture.
+      return;
+    }
+    press(kButtons[event.button], true);
+  });
+  window.addEventListener('pointerup', event => {
+    if (event.pointerType !== 'touch') press(kButtons[event.button], false);
+  });
+  // A button beside one that is held arrives as a move.
+  window.addEventListener('mousedown', event => { if (document.pointerLockElement === canvas) press(kButtons[event.button], true); });
+  window.addEventListener('mouseup', event => press(kButtons[event.button], false));
+  canvas.addEventListener('contextmenu', event => { if (mine()) event.preventDefault(); });
+  canvas.addEventListener('pointermove', event => {
+    if (mine() && event.pointerType !== 'touch') move(event.movementX, event.movementY);
+  });
+  canvas.addEventListener('wheel', event => {
+    if (!mine()) return;
+    event.preventDefault();
+    turn -= Math.sign(event.deltaY);
+  }, {passive: false});
+  document.addEventListener('pointerlockchange', () => { if (!document.pointerLockElement && mine()) release(); });
+
+  let fingers = [];
+  const spread = touches => touches.length < 2 ? 0 : Math.hypot(touches[0].clientX - touches[1].clientX, touches[0].clientY - touches[1].clientY);
+  const places = touches => [...touches].map(t => ({clientX: t.clientX, clientY: t.clientY}));
+  for (const kind of ['touchstart', 'touchend', 'touchcancel']) canvas.addEventListener(kind, event => { fingers = places(event.targetTouches); });
+  canvas.addEventListener('touchmove', event => {
+    if (!mine()) return;
+    event.preventDefault();
+    const now = places(event.targetTouches);
+    if (now.length === 1 && fingers.length === 1) move(now[0].clientX - fingers[0].clientX, now[0].clientY - fingers[0].clientY);
+    if (now.length === 2 && fingers.length === 2) {
+      const steps = Math.trunc((spread(now) - spread(fingers)) / 12);
+      if (!steps) return;  // Small changes add up.
+      turn += steps;
+    }
+    fingers = now;
+  }, {passive: false});
+
+  const typing = () => ['INPUT', 'TEXTAREA', 'SELECT'].includes(document.activeElement.tagName) || document.querySelector('dialog[open]');
+  const keyOf = event => kKeys[event.key] || kKeys[event.key.toLowerCase()];
+  window.addEventListener('keydown', event => {
+    if (!mine() || typing()) return;
+    if (event.key === 'Escape') return release();
+    // A button that has the focus is pressed by the space bar.
+    if (event.key === ' ' && document.activeElement.tagName === 'BUTTON') return;
+    if (event.key.startsWith('Arrow') || event.key.startsWith('Page')) arrows.add(event.key);
+    else if (!keyOf(event) || event.repeat) return;
+    else press(keyOf(event), true);
+    event.preventDefault();
+  });
+  window.addEventListener('keyup', event => {
+    arrows.delete(event.key);
+    if (keyOf(event)) press(keyOf(event), false);
+  });
+  window.addEventListener('blur', () => { if (mine()) release(); });
+
+  for (const button of document.querySelectorAll('#hands .held')) {
+    const set = pressed => {
+      if (button.dataset.key) return press(button.dataset.key, pressed);
+      button.dataset.down = pressed ? '1' : '';
+    };
+    button.addEventListener('pointerdown', event => {
+      event.preventDefault();
+      button.setPointerCapture(event.pointerId);
+      set(true);
+    });
+    for (const kind of ['pointerup', 'pointercancel', 'lostpointercapture']) button.addEventListener(kind, () => set(false));
+    button.addEventListener('keydown', event => { if (event.key === 'Enter' || event.key === ' ') set(true); });
+    button.addEventListener('keyup', event => { if (event.key === 'Enter' || event.key === ' ') set(false); });
+  }
+
+  function readPad() {
+    const pad = [...(navigator.getGamepads ? navigator.getGamepads() : [])].find(p => p && p.connected);
+    if (!pad) return;
+    const way = v => Math.abs(v) < 0.12 ? 0 : v;
+    x += kStick * way(pad.axes[0] || 0);
+    y -= kStick * way(pad.axes[1] || 0);
+    turn -= 0.5 * way(pad.axes[3] || 0);
+    const pressed = new Set(Object.keys(kPadButtons).filter(i => pad.buttons[i] && pad.buttons[i].pressed));
+    for (const i of pressed) if (!padDown.has(i)) press(kPadButtons[i], true);
+    for (const i of padDown) if (!pressed.has(i)) press(kPadButtons[i], false);
+    padDown = pressed;
+  }
+
+  let steps = 0;
+  setInterval(() => {
+    if (!mine()) return;
+    readPad();
+    x += kStick * ((arrows.has('ArrowRight') ? 1 : 0) - (arrows.has('ArrowLeft') ? 1 : 0));
+    y += kStick * ((arrows.has('ArrowUp') ? 1 : 0) - (arrows.has('ArrowDown') ? 1 : 0));
+    for (const button of document.querySelectorAll('#hands [data-step]')) if (button.dataset.down) steps += 0.2 * Number(button.dataset.step);
+    steps += 0.2 * ((arrows.has('PageDown') ? 1 : 0) - (arrows.has('PageUp') ? 1 : 0)) + turn;
+    const whole = Math.trunc(steps);
+    steps -= whole;
+    send({x: x.toFixed(2), y: y.toFixed(2), turn: whole});
+    x = y = turn = 0;
+  }, kBeat);
+
+  return {
+    /** Called with each state of the session. */
+    show(s) {
+      running = s.phase === 'running';
+      operated = running && !!s.figures && s.figures.operated_tools > 0;
+      if (!running && socket) socket.close();
+      connect();
+      showKeys();
+    },
+    shows: () => socket !== null && seen > 0,
+  };
+})();
