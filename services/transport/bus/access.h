@@ -89,14 +89,14 @@ inline constexpr const auto& kAccessRoles = access::kRoles;
   return identity == kReplayerIdentity || identity == kLinkIdentity;
 }
 
-/// The node that publishes a topic; none if several nodes publish it. Replayer and link are not considered.
+/// The node that publishes a topic; none if several nodes publish it. Participants that are not nodes do not count.
 [[nodiscard]] constexpr std::optional<NodeId> OwnerOf(TopicId topic) {
   std::optional<NodeId> owner;
   int writers = 0;
-  for (std::size_t i = 0; i < kAccessRoles.size(); ++i) {
-    if (StandsIn(kAccessRoles[i].identity) || !Contains(kAccessRoles[i].writes, topic)) continue;
+  for (std::size_t i = 0; i < kNodeCount; ++i) {
+    if (!Contains(kAccessRoles[i].writes, topic)) continue;
     ++writers;
-    if (i < kNodeCount) owner = static_cast<NodeId>(i);
+    owner = static_cast<NodeId>(i);
   }
   return writers == 1 ? owner : std::nullopt;
 }

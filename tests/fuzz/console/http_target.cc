@@ -98,7 +98,8 @@ class ConsoleHttp final : public Target {
   Outcome Offer(Input input) override {
     const std::string answer = Socket(server_.port()).Ask(input);
     Promise(answer.empty() || answer.starts_with("HTTP/1.1 "), "an answer that is not HTTP");
-    return answer.starts_with("HTTP/1.1 200 ") ? Outcome::kAccepted : Outcome::kRefused;
+    const bool well = answer.starts_with("HTTP/1.1 200 ") || answer.starts_with("HTTP/1.1 101 ");
+    return well ? Outcome::kAccepted : Outcome::kRefused;
   }
   std::vector<std::string> Words() override {
     return {"GET ",

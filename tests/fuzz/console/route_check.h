@@ -38,9 +38,13 @@ inline std::string Broken(const HttpRequest& request) {
   if (!result.routed)
     return result.refusal.status >= 400 && !result.refusal.body.empty() ? "" : "a refusal says nothing";
   const Routed& routed = *result.routed;
-  const bool open = routed.wanted == Wanted::kPage || routed.wanted == Wanted::kReport;
+  const bool by_ticket = routed.wanted == Wanted::kReport || routed.wanted == Wanted::kLive;
+  const bool open = routed.wanted == Wanted::kPage || by_ticket;
+  if (by_ticket && !routed.fields.contains("ticket")) return "no ticket";
   if (!open && request.authorization != "Bearer " + kToken) return "a call without the token";
-  if (!open && !request.origin.empty() && request.origin != "http://" + request.host) return "a call from another site";
+  if (routed.wanted != Wanted::kPage && routed.wanted != Wanted::kReport && !request.origin.empty() &&
+      request.origin != "http://" + request.host)
+    return "a call from another site";
   if (request.host.find("evil") != std::string::npos) return "a call to another host";
   if (request.method != "GET" && request.method != "POST") return "another method";
   const std::filesystem::path folder = "/out";

@@ -23,9 +23,8 @@ namespace fs = std::filesystem;
 const char* const kDomain = "61";
 constexpr double kAhead_s = 1000;
 
-/// Least force after the link has been restored. It is lower than in WaitForForce: the tools have kept cutting
-/// meanwhile, so the tissue is softer.
-constexpr double kBack_N = 0.02;
+/// Least force that shows contact, before the link is cut and after it was restored.
+constexpr double kForce_N = 0.1;
 
 constexpr const char* kSceneName = "overheard_scene";
 
@@ -100,7 +99,7 @@ struct Session {
   [[nodiscard]] bool WaitForForce() const {
     return WaitFor(60, [&] {
       const std::vector<HeardTool> tools = HeardTools(File("near"));
-      return std::any_of(tools.begin(), tools.end(), [](const HeardTool& t) { return t.force0_N > 0.1; });
+      return std::any_of(tools.begin(), tools.end(), [](const HeardTool& t) { return t.force0_N > kForce_N; });
     });
   }
   /// Exit codes of cart and host after the cart is signalled to end.
@@ -192,7 +191,7 @@ TEST(TwoHosts, ASecuredCartCannotBeOverheardAndRefusesAHostWithoutItsKeys) {
                       [&] {
                         const std::vector<HeardTool> tools = HeardTools(session.File("near"));
                         return std::any_of(tools.begin(), tools.end(), [&](const HeardTool& tool) {
-                          return tool.time_s > mended_s && std::max(tool.force0_N, tool.force1_N) > kBack_N &&
+                          return tool.time_s > mended_s && std::max(tool.force0_N, tool.force1_N) > kForce_N &&
                                  tool.model_age_s < 0.1;
                         });
                       }))
@@ -225,7 +224,7 @@ TEST(TwoHosts, ForceComesFromAnotherHostAndNeverJumps) {
                       [&] {
                         const std::vector<HeardTool> heard = HeardTools(session.File("near"));
                         return std::any_of(heard.begin(), heard.end(), [&](const HeardTool& tool) {
-                          return tool.time_s > mended_s + 0.5 && std::max(tool.force0_N, tool.force1_N) > kBack_N &&
+                          return tool.time_s > mended_s + 0.5 && std::max(tool.force0_N, tool.force1_N) > kForce_N &&
                                  tool.model_age_s < 0.1;
                         });
                       }))
