@@ -65,7 +65,9 @@ std::int64_t RenderNode::PeriodNs(std::int64_t cart_ns) const {
 void RenderNode::Step(const Tick& tick) {
   session_time_s_ = tick.session_time_s;
   TakeKeys();
-  if (!hud_.paused) {
+  if (hud_.paused) {
+    PassOver();
+  } else {
     TakeTissue();
     TakeThermal();
     TakeEvents();
@@ -113,6 +115,15 @@ void RenderNode::TakeTissue() {
   }
 }
 
+// Samples that wait too long unread would count as lost. Of the streams the newest is read after the pause, but each
+// patch shows another place.
+void RenderNode::PassOver() {
+  (void)ports_.tools.TakeLatest(&new_tools_);
+  (void)ports_.handles.TakeLatest(&new_handles_);
+  (void)ports_.contacts.TakeLatest(&contact_);
+  while (ports_.patches.TakeNext(&patch_)) held_patches_[{patch_.header.origin_x, patch_.header.origin_y}] = patch_;
+}
+
 void RenderNode::TakeThermal() {
   const std::uint64_t known = topology_.revision;
   if (ports_.topology.TakeLatest(&topology_) && topology_.revision != known) {
@@ -122,14 +133,17 @@ void RenderNode::TakeThermal() {
       changed_on_screen_ = changed_in_file_ = true;
     }
   }
-  while (ports_.patches.TakeNext(&patch_)) {
-    if (view_.ApplyPatch(patch_)) {
-      temperature_C_ = patch_.header.max_temperature_C;
-      temperature_time_s_ = session_time_s_;
-      patches_applied_.fetch_add(1, std::memory_order_relaxed);
-      changed_on_screen_ = changed_in_file_ = true;
-    }
-  }
+  for (const auto& [place, patch] : held_patches_) Apply(patch);
+  held_patches_.clear();
+  while (ports_.patches.TakeNext(&patch_)) Apply(patch_);
+}
+
+void RenderNode::Apply(const TemperaturePatch& patch) {
+  if (!view_.ApplyPatch(patch)) return;
+  temperature_C_ = patch.header.max_temperature_C;
+  temperature_time_s_ = session_time_s_;
+  patches_applied_.fetch_add(1, std::memory_order_relaxed);
+  changed_on_screen_ = changed_in_file_ = true;
 }
 
 void RenderNode::TakeEvents() {

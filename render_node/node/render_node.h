@@ -5,9 +5,11 @@
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include "render_node/geometry/camera_control.h"
 #include "render_node/geometry/quality.h"
@@ -78,6 +80,9 @@ class RenderNode {
 
  private:
   void TakeTissue();
+  /// Instead of what follows while the picture is paused.
+  void PassOver();
+  void Apply(const TemperaturePatch& patch);
   void TakeThermal();
   void TakeTools();
   [[nodiscard]] bool ready() const { return tissue_.header.stamp.sequence != 0; }
@@ -112,6 +117,7 @@ class RenderNode {
   TissueFrame tissue_, new_tissue_;
   TopologyState topology_;
   TemperaturePatch patch_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, TemperaturePatch> held_patches_;  // During a pause, by origin.
   ToolState tools_, new_tools_;
   HandleState handles_, new_handles_;
   ThermalEvent event_;

@@ -1,3 +1,5 @@
+#include <cstdio>
+
 #include "services/apps/fulcrum/commands.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/install_places.h"
@@ -116,13 +118,15 @@ ExitCode Up(const Words& words) {
   settings.cart.domain = DomainOf(arguments, settings.cart.domain);
   settings.out = values["out"].as<std::string>();
   settings.window = values.count("window") != 0;
+  bool on_page = false;
   if (values.count("hands") != 0) {
     const std::string input = values["hands"].as<std::string>();
     if (input != "mouse" && input != "browser") {
       throw InputError("--hands: \"" + input + "\"; valid: mouse, browser");
     }
     GiveToOperator(&settings);
-    settings.window = settings.window || input == "mouse";
+    on_page = input == "browser";
+    settings.window = settings.window || !on_page;
   }
   settings.quality = values["quality"].as<std::string>();
   if (settings.quality != "auto" && settings.quality != "low" && settings.quality != "high") {
@@ -200,6 +204,11 @@ ExitCode Up(const Words& words) {
   request.compiler = settings.programs / "scene_compiler";
   request.cache = SceneCache(settings.programs);
   settings.scene = ResolveScene(request);
+  if (on_page) {
+    std::printf("the tools wait for you: open the page of fulcrum console --domain %d and take the controls\n",
+                settings.cart.domain);
+    std::fflush(stdout);
+  }
   return Supervisor(settings).Run();
 }
 

@@ -224,7 +224,7 @@ std::optional<std::vector<std::byte>> CheckpointFile::Peek(const std::filesystem
     SlotHeader header{};
     const auto at = static_cast<off_t>(kPage + i * stride);
     if (::pread(fd.get(), &header, sizeof(header), at) != static_cast<ssize_t>(sizeof(header)) ||
-        header.sequence <= newest_sequence || header.sequence > kMostSequence || header.bytes > capacity_bytes) {
+        header.sequence <= newest_sequence || header.sequence >= kMostSequence || header.bytes > capacity_bytes) {
       continue;
     }
     // The copy is checked, not the slot: the writer may continue meanwhile.

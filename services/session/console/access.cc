@@ -24,10 +24,12 @@ bool IsTokenText(std::string_view text) {
   return text.size() >= kShortestToken && text.size() <= kLongestToken && std::all_of(text.begin(), text.end(), plain);
 }
 
-/// Host name without its port; nullopt when the port is malformed.
+/// Host name without its port; nullopt when it has other than printable characters or the port is malformed.
 std::optional<std::string> HostName(std::string_view host) {
   const std::size_t bracket = host.starts_with('[') ? host.find(']') : 0;
   if (bracket == std::string_view::npos || host.size() > 256) return {};
+  // The system's parser of addresses would read up to a NUL only.
+  if (std::any_of(host.begin(), host.end(), [](char c) { return c <= ' ' || c > '~'; })) return {};
   const std::size_t colon = host.find(':', bracket);
   if (colon != std::string_view::npos) {
     const std::string_view port = host.substr(colon + 1);

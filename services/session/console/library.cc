@@ -17,7 +17,7 @@ constexpr std::size_t kMostKeys = 2000;  // Same limit as in the reader of scene
 
 SceneChoice ReadScene(const fs::path& file) {
   using config::Range;
-  config::StrictYaml yaml = config::StrictYaml::FromFile(file);
+  config::StrictYaml yaml = config::StrictYaml::FromFileOnBases(file, {"name", "description"});
   config::StrictMap root = yaml.root();
   SceneChoice scene;
   scene.name = file.stem();

@@ -214,6 +214,17 @@ TEST(HttpServer, StreamsAreFew) {
   EXPECT_NE(stream.Receive(5, "part 5").find("part 4"), std::string::npos);
 }
 
+TEST(HttpServer, WebSocketsWorkOverTls) {
+  Served served({}, MakeTlsIdentity({"localhost"}, std::time(nullptr)));
+  HttpConnection client(served.port(), {.tls = true});
+  client.Send(
+      "GET /socket HTTP/1.1\r\nHost: x\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n");
+  EXPECT_NE(client.Receive(5, "welcome").find("HTTP/1.1 101"), std::string::npos);
+  client.Send(std::string("\x81\x84\0\0\0\0here", 10));  // A text of four bytes, masked with 0.
+  EXPECT_NE(client.Receive(5, "received here").find("received here"), std::string::npos);
+}
+
 TEST(HttpServer, ServesOverTlsAndNothingElseThere) {
   const TlsIdentity identity = MakeTlsIdentity({"localhost"}, std::time(nullptr));
   Served served(Small(), identity);

@@ -9,8 +9,10 @@
 #include <fstream>
 #include <iterator>
 #include <osgGA/GUIEventAdapter>
+#include <set>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "services/scene/builder/build.h"
 #include "tests/integration/render/node_bus.h"
@@ -277,9 +279,25 @@ TEST_F(RenderNodeTest, KeysDoWhatTheHelpSays) {
   EXPECT_EQ(shot({'l', 'l', '0'}), plain);
   // During a pause new states are not shown; afterwards they are.
   const std::string paused = shot({'p'});
-  Publish(MakeSyntheticMoment(view_, 4.6));
+  std::set<std::pair<std::uint32_t, std::uint32_t>> places;
+  const auto publish = [&](const SyntheticMoment& moment) {
+    for (const TemperaturePatch& patch : moment.patches) places.emplace(patch.header.origin_x, patch.header.origin_y);
+    Publish(moment);
+  };
+  publish(MakeSyntheticMoment(view_, 4.6));
   EXPECT_EQ(shot({}), paused);
+  // More patches than the port holds: the newest of each place is shown after the pause.
+  SyntheticMoment later = MakeSyntheticMoment(view_, 4.8);
+  ASSERT_FALSE(later.patches.empty());
+  later.patches.resize(1);
+  for (int i = 0; i < 40; ++i) {
+    publish(later);
+    if (i == 0) later.patches[0].header.origin_x += 8;
+    EXPECT_EQ(shot({}), paused);
+  }
+  const double applied = Metric(*node, "patches");
   EXPECT_NE(shot({'p'}), plain);
+  EXPECT_EQ(Metric(*node, "patches"), applied + static_cast<double>(places.size()));
 }
 
 }  // namespace

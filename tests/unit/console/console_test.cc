@@ -104,6 +104,8 @@ TEST(Access, HostsOfOthersAreRefused) {
                           "localhost:x", "[::1", "localhost.evil", "cart-3.evil", "127.0.0.1:8480:1", "127.0.0.1 "}) {
     EXPECT_FALSE(access.IsOwnHost(bad)) << bad;
   }
+  using std::string_literals::operator""s;
+  EXPECT_FALSE(access.IsOwnHost("127.0.0.1\0.evil.example"s)) << "an address up to the NUL";
 }
 
 class TokenFile : public ::testing::Test {
@@ -323,6 +325,13 @@ TEST(Library, ListsTheShippedScenesWithTheirPower) {
   EXPECT_EQ(small->power_W, 35);
   EXPECT_EQ(small->duration_s, 6);
   EXPECT_EQ(small->picture_rate_Hz, 2);
+  // An exercise has the script of the scene that it is based on.
+  const auto exercise =
+      std::find_if(scenes.begin(), scenes.end(), [](const SceneChoice& s) { return s.name == "dissection"; });
+  ASSERT_NE(exercise, scenes.end());
+  EXPECT_EQ(exercise->power_W, 35);
+  EXPECT_EQ(exercise->duration_s, 20);
+  EXPECT_EQ(exercise->description.find("Exercise: "), 0u);
   EXPECT_TRUE(FindScenes("/nonexistent").empty());
 }
 

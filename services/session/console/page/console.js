@@ -315,8 +315,26 @@ function chooseScene() {
   };
   chips('lengths', 'seconds', [['', scene.duration > 0 ? `As the scene: ${scene.duration} s` : 'Until stopped'],
     ['60', '1 min'], ['300', '5 min'], ['1800', '30 min'], ['28800', '8 h']]);
+  showRecord();
   chips('rates', 'picture_rate', [['', `${scene.picture_rate}`], ...[5, 10].filter(r => r !== scene.picture_rate).map(r => [`${r}`, `${r}`])]);
 }
+// A recording of built-in; smaller scenes need less.
+const kRecordMB = 22.5;
+let recordChosen = false;
+function showRecord() {
+  const form = $('start-form'), scene = sceneChosen();
+  if (!scene) return;
+  const seconds = Number(form.seconds.value) || (form.hands.value === 'on' ? 0 : scene.duration);
+  // Without a choice long sessions keep their last seconds only: a full disk would end the recording anyway.
+  if (!recordChosen) form.record.value = seconds > 600 ? 'off' : 'on';
+  const size = gigabytes => gigabytes < 10 ? `${gigabytes.toFixed(1)} GB` : `${Math.round(gigabytes)} GB`;
+  setText($('record-hint'), form.record.value === 'off' ? 'The last 30 s are kept when a node fails, or on request.'
+    : seconds > 0 ? `Up to ${size(1e-3 * kRecordMB * seconds)}.` : `Up to ${size(3.6 * kRecordMB)} an hour.`);
+}
+$('start-form').addEventListener('change', event => {
+  if (event.target.name === 'record') recordChosen = true;
+  showRecord();
+});
 function showPower() {
   $('power').textContent = power > 0 ? `${power} W` : 'none';
   $('power-less').disabled = power <= 5;
@@ -401,7 +419,8 @@ async function loadRecordings() {
     const [session, file] = recording.name.split('/');
     const at = session.match(/^(\d{4})(\d\d)(\d\d)-(\d\d)(\d\d)(\d\d)-(.*)$/);
     what.textContent = at ? `${at[7]}, ${at[1]}-${at[2]}-${at[3]} ${at[4]}:${at[5]}:${at[6]} UTC` : session;
-    what.append(make('small', '', `${file}, ${(recording.bytes / 1e6).toFixed(1)} MB`));
+    const dump = file.startsWith('dump') ? 'the last seconds, kept when a node failed or on request, ' : '';
+    what.append(make('small', '', `${file}, ${dump}${(recording.bytes / 1e6).toFixed(1)} MB`));
     button.type = 'button';
     button.setAttribute('aria-label', `Replay ${recording.name}`);
     button.addEventListener('click', () => order('/api/replay', {name: recording.name}));

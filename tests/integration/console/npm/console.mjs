@@ -5,7 +5,7 @@ import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {chromium} from 'playwright-core';
 
-export const sizes = [{width: 1280, height: 800}, {width: 1920, height: 1080}];
+export const sizes = [{width: 1280, height: 800}, {width: 1920, height: 1080}, {width: 360, height: 740}];
 
 export function expect(condition, what) {
   if (!condition) throw new Error(`expected: ${what}`);
