@@ -74,10 +74,10 @@ ScriptPoint FirstInView(const SceneView& scene, std::uint32_t tool) {
   const Vec3f sight = (scope.scope_target_W - scope.scope_tip_W).normalized();
   double end_s = 0;
   for (const ScriptKey& key : scene.script) end_s = std::max(end_s, static_cast<double>(key.time_s));
-  const ScriptPoint first = EvaluateScript(scene.script, tool, 0);
+  ScriptPoint first = EvaluateScript(scene.script, tool, 0);
   if (!first.present) return first;
   for (double time_s = 0; time_s <= end_s; time_s += kStep_s) {
-    const ScriptPoint point = EvaluateScript(scene.script, tool, time_s);
+    ScriptPoint point = EvaluateScript(scene.script, tool, time_s);
     if (sight.dot((point.p_W - scope.scope_tip_W).normalized()) > widest) return point;
   }
   return first;
