@@ -104,7 +104,7 @@ void LiveView::Receive(Socket* viewer, std::string_view text, std::int64_t now_n
     SendPicture(viewer, &found->second);
   }
   if (form->contains("take") && ports_.hands && picture_.header.stamp.sequence != 0) {
-    hands_.Release();  // Whoever had the controls: keys that are held there do not pass on.
+    hands_.Release();  // Keys that another page holds end with its controls.
     hands_.SetView(ViewOf(picture_.header));
     hands_.Take(now_ns);
     holder_ = viewer;

@@ -11,7 +11,7 @@
 namespace fulcrum::link {
 
 /// Topics that may cross in one direction or the other. A topic that is not listed here never does. Pictures do not: a
-/// link that reads them would make render_node compress for nobody, and they would fill a slow cable.
+/// link that reads them would make render_node compress all the time, and they would fill a slow cable.
 inline constexpr bus::TopicSet kTravels =
     bus::SetOf(TopicId::kHandleState, TopicId::kToolState, TopicId::kTissueFrame, TopicId::kContactModel,
                TopicId::kCauteryContact, TopicId::kTearState, TopicId::kOpenCells, TopicId::kTopologyState,

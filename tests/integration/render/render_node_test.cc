@@ -135,7 +135,7 @@ TEST_F(RenderNodeTest, SendsEachChangeWhilePicturesAreReadAndNoneOtherwise) {
   }
   Publish(MakeSyntheticMoment(view_, 1.3));
   node->Step(At(1.3));
-  EXPECT_EQ(Metric(*node, "pictures_sent"), 2) << "nobody reads";
+  EXPECT_EQ(Metric(*node, "pictures_sent"), 2) << "the topic has no reader";
 }
 
 TEST(JpegEncoder, KeepsThePictureAndTheLimit) {

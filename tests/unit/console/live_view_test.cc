@@ -55,7 +55,7 @@ class LiveViewTest : public testing::Test {
   }
   void Turn() { live_.Turn(now_ += kMs); }
   void Say(Page* page, const std::string& text) { live_.Receive(page, text, now_ += kMs); }
-  /// What the devices would follow now; a sample without a claim if nobody operates.
+  /// Newest sample that the devices have not read; without a claim if there is none.
   OperatorInput Newest() {
     OperatorInput input;
     while (devices_->TakeNext(&input)) {
@@ -76,7 +76,7 @@ class LiveViewTest : public testing::Test {
 TEST_F(LiveViewTest, JoinsTheBusForViewersOnly) {
   Draw();
   EXPECT_EQ(joined_, 0);
-  EXPECT_FALSE(picture_out_->has_readers()) << "a picture would be compressed for nobody";
+  EXPECT_FALSE(picture_out_->has_readers()) << "render_node would compress pictures without a viewer";
   Page page;
   live_.Open(&page);
   Turn();
@@ -113,7 +113,7 @@ TEST_F(LiveViewTest, OnePageOperatesAndAnotherTakesOver) {
   live_.Open(&two);
   Turn();
   Say(&one, "take=1");
-  EXPECT_TRUE(one.Shows("\"controls\":\"none\"")) << "before the first picture nobody knows where the tools are";
+  EXPECT_TRUE(one.Shows("\"controls\":\"none\"")) << "before the first picture the places of the tools are unknown";
   Draw();
   Say(&one, "x=100&y=0");
   EXPECT_EQ(Newest().claim_ns, 0) << "the controls were not taken";
@@ -129,7 +129,7 @@ TEST_F(LiveViewTest, OnePageOperatesAndAnotherTakesOver) {
   EXPECT_NEAR(input.tools[1].p_WT.x(), 0.02f + 10 * 1e-3f * 0.1f, 1e-6f) << "a pixel at the tip's depth";
 
   Say(&two, "x=500&down=coag");
-  EXPECT_EQ(Newest().claim_ns, 0) << "nothing new: this page has no controls";
+  EXPECT_EQ(Newest().claim_ns, 0) << "no new sample: this page has no controls";
   Say(&two, "take=1");
   input = Newest();
   EXPECT_EQ(input.pedals, kPedalNone) << "the pedal that the first page held";
