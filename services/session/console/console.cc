@@ -105,7 +105,7 @@ struct Console::Impl {
                 .sockets = {.opened = [this](Socket* socket) { live.Open(socket); },
                             .received = [this](Socket* socket,
                                                std::string_view text) { live.Receive(socket, text, MonotonicNs()); },
-                            .closed = [this](Socket* socket) { live.Close(socket); }}}) {
+                            .closed = [this](Socket* socket) { live.Close(socket, MonotonicNs()); }}}) {
     watch.OnLeave([this] { live.SetSession({}); });
     token_file = settings.token_file.empty() ? DefaultTokenFile(server.port()) : settings.token_file;
     std::error_code error;

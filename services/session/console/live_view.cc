@@ -1,6 +1,7 @@
 #include "services/session/console/live_view.h"
 
 #include <array>
+#include <exception>
 #include <utility>
 
 #include "services/session/console/json.h"
@@ -65,6 +66,7 @@ const char* NameOf(OperatorSource source) {
 void LiveView::SetSession(MakePorts make) {
   make_ = std::move(make);
   ports_ = {};
+  trouble_.clear();
   holder_ = nullptr;
   other_ = OperatorSource::kNone;
   hands_.Release();
@@ -80,8 +82,8 @@ void LiveView::Open(Socket* viewer) {
   SendStates();
 }
 
-void LiveView::Close(Socket* viewer) {
-  if (holder_ == viewer) Release(input_.stamp.stamp_ns);
+void LiveView::Close(Socket* viewer, std::int64_t now_ns) {
+  if (holder_ == viewer) Release(now_ns);
   viewers_.erase(viewer);
   // Without a viewer render_node compresses no pictures.
   if (viewers_.empty()) ports_ = {};
@@ -136,7 +138,13 @@ void LiveView::Write(std::int64_t now_ns) {
 
 void LiveView::Turn(std::int64_t now_ns) {
   if (make_ && !viewers_.empty() && !ports_.pictures) {
-    ports_ = make_();
+    try {
+      ports_ = make_();
+    } catch (const std::exception& error) {
+      trouble_ = error.what();
+      make_ = {};
+      return SendStates();
+    }
     stamper_ = std::make_unique<bus::Stamper>(now_ns);
   }
   if (!ports_.pictures) return;
@@ -185,6 +193,7 @@ std::string LiveView::StateFor(const Socket* viewer) const {
   Json json('{');
   json.Text("controls", controls).Flag("ready", ports_.hands && picture_.header.stamp.sequence != 0);
   json.Number("tool", hands_.tool(), 1).Flag("locked", hands_.locked(hands_.tool())).Flag("steady", hands_.steady());
+  if (!trouble_.empty()) json.Text("trouble", trouble_);
   return json.Done();
 }
 

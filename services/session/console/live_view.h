@@ -32,14 +32,15 @@ class LiveView {
     std::unique_ptr<bus::Output<OperatorInput>> hands;
   };
 
-  /// Makes the ports of the running session; called when the first viewer is there.
+  /// Makes the ports of the running session; called when the first viewer is there. What it throws is shown to the
+  /// viewers, and the session has no live picture.
   using MakePorts = std::function<Ports()>;
 
   /// A session has begun, or ended (empty).
   void SetSession(MakePorts make);
 
   void Open(Socket* viewer);
-  void Close(Socket* viewer);
+  void Close(Socket* viewer, std::int64_t now_ns);
   /// A message of a viewer that is malformed has no effect.
   void Receive(Socket* viewer, std::string_view text, std::int64_t now_ns);
 
@@ -63,6 +64,7 @@ class LiveView {
   void Release(std::int64_t now_ns);
 
   MakePorts make_;
+  std::string trouble_;  ///< Why the ports could not be made.
   Ports ports_;
   std::map<Socket*, Viewer> viewers_;
   Socket* holder_ = nullptr;  ///< The viewer with the controls.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -81,7 +82,7 @@ TEST_F(LiveViewTest, JoinsTheBusForViewersOnly) {
   live_.Open(&page);
   Turn();
   EXPECT_TRUE(picture_out_->has_readers());
-  live_.Close(&page);
+  live_.Close(&page, now_ += kMs);
   EXPECT_FALSE(picture_out_->has_readers());
 }
 
@@ -145,7 +146,7 @@ TEST_F(LiveViewTest, APageThatIsClosedReleases) {
   Draw();
   Say(&page, "take=1&down=coag");
   EXPECT_EQ(Newest().pedals, kPedalCoag);
-  live_.Close(&page);
+  live_.Close(&page, now_ += kMs);
   OperatorInput last;
   bool any = false;
   while (devices_->TakeNext(&last)) any = true;
@@ -204,6 +205,22 @@ TEST_F(LiveViewTest, NothingOfASessionStaysAfterItsEnd) {
   Say(&page, "take=1&down=cut");
   Turn();
   EXPECT_TRUE(page.Shows("\"controls\":\"none\""));
+}
+
+TEST_F(LiveViewTest, ABusThatCannotBeJoinedIsReportedAndTriedAgainInTheNextSession) {
+  int tries = 0;
+  live_.SetSession([&]() -> LiveView::Ports {
+    ++tries;
+    throw std::runtime_error("shared memory is full");
+  });
+  Page page;
+  live_.Open(&page);
+  Turn();
+  Turn();
+  EXPECT_EQ(tries, 1);
+  EXPECT_TRUE(page.Shows("\"trouble\":\"shared memory is full\""));
+  live_.SetSession({});
+  EXPECT_FALSE(page.Shows("trouble"));
 }
 
 }  // namespace

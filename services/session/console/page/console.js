@@ -250,6 +250,16 @@ function clearPicture() {
   const g = $('picture').getContext('2d');
   g.clearRect(0, 0, $('picture').width, $('picture').height);
 }
+/** Draws a picture's file at its own size. */
+async function drawPicture(file) {
+  const image = await createImageBitmap(file), canvas = $('picture');
+  if (canvas.width !== image.width || canvas.height !== image.height) {
+    canvas.width = image.width;
+    canvas.height = image.height;
+  }
+  canvas.getContext('2d').drawImage(image, 0, 0);
+  image.close();
+}
 async function showPicture() {
   const said = pictureShown || live.shows() ? '' : state.phase === 'starting' ? (state.said || 'The nodes are starting.')
     : state.own || state.picture ? 'Waiting for the first picture.' : 'The pictures of this session are in another folder, because it was not started here.';
@@ -261,16 +271,9 @@ async function showPicture() {
   try {
     const response = await call(`/api/picture?name=${state.picture}`);
     if (response.ok) {
-      const image = await createImageBitmap(await response.blob());
-      const canvas = $('picture');
-      if (canvas.width !== image.width || canvas.height !== image.height) {
-        canvas.width = image.width;
-        canvas.height = image.height;
-      }
-      canvas.getContext('2d').drawImage(image, 0, 0);
-      image.close();
+      await drawPicture(await response.blob());
       pictureShown = name;
-      canvas.dataset.shown = name;
+      $('picture').dataset.shown = name;
     }
   } catch (error) { /* The next picture replaces it. */ }
   pictureAsked = false;

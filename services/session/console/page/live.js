@@ -60,14 +60,7 @@ const live = (() => {
   async function take(message) {
     if (typeof message.data === 'string') return takeState(JSON.parse(message.data));
     try {
-      const image = await createImageBitmap(new Blob([message.data], {type: 'image/jpeg'}));
-      const canvas = $('picture');
-      if (canvas.width !== image.width || canvas.height !== image.height) {
-        canvas.width = image.width;
-        canvas.height = image.height;
-      }
-      canvas.getContext('2d').drawImage(image, 0, 0);
-      image.close();
+      await drawPicture(new Blob([message.data], {type: 'image/jpeg'}));
     } catch (error) { /* The next picture replaces it. */ }
     ++seen;
     $('picture').dataset.live = seen;
@@ -76,6 +69,7 @@ const live = (() => {
 
   function takeState(state) {
     const had = mine();
+    if (state.trouble && state.trouble !== hands.trouble) toast(`No live picture: ${state.trouble}`, true);
     hands = state;
     document.body.dataset.controls = hands.controls;
     if (had && !mine()) {
