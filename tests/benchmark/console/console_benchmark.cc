@@ -45,6 +45,7 @@ int main(int argc, char** argv) {
   fulcrum::benchmark::Report report(argc, argv);
   bool well = true;
   if (report.Wants("console.")) well &= Measure("measure", "console.", &report);
-  if (report.Wants("hands.browser_")) well &= Measure("measure_hands", "hands.", &report);
+  if (report.Wants("hands.browser_") || report.Wants("hands.stream_"))
+    well &= Measure("measure_hands", "hands.", &report);
   return well ? 0 : 1;
 }

@@ -50,8 +50,7 @@ double Ms(std::int64_t ns) { return 1e-6 * static_cast<double>(ns); }
 class LiveSession {
  public:
   explicit LiveSession(const std::string& display)
-      : cart_("built-in", kDomain, {"--hands", "mouse", "--quality", "low", "--set", "breathing.amplitude_mm=0"}),
-        client_(display) {}
+      : cart_("built-in", kDomain, {"--hands", "mouse", "--set", "breathing.amplitude_mm=0"}), client_(display) {}
 
   /// What went wrong; empty: the right tool is operated.
   std::string Begin() {

@@ -26,9 +26,6 @@ await withConsole(fulcrum, browser, 65, async ({address, newPage}) => {
   await until(page, 20, drawn);
   expect(await page.textContent('#hands-state') === 'Nobody has the controls; the tools stand still.', 'nobody operates yet');
 
-  // Keys have no effect before the controls are taken.
-  await page.focus('#picture');
-  await page.keyboard.press('f');
   await page.focus('#take');
   await page.keyboard.press('Enter');
   await until(page, 5, () => document.body.dataset.controls === 'you');
