@@ -39,8 +39,12 @@ struct SlotHeader {
   std::uint64_t checksum;
 };
 
-/// No writer counts as far. A node goes on only from below, so that its next sequence is always the newest.
-constexpr std::uint64_t kMostSequence = std::uint64_t{1} << 62;
+/// Serial number arithmetic (RFC 1982): whatever sequence a file holds, the next one is newer. 0 marks an empty slot.
+bool IsNewer(std::uint64_t sequence, std::uint64_t than) {
+  return sequence != 0 && (than == 0 || static_cast<std::int64_t>(sequence - than) > 0);
+}
+
+std::uint64_t Next(std::uint64_t sequence) { return sequence + 1 == 0 ? 1 : sequence + 1; }
 
 std::size_t RoundUpToPage(std::size_t bytes) { return (bytes + kPage - 1) / kPage * kPage; }
 
@@ -193,10 +197,10 @@ CheckpointFile::CheckpointFile(const std::filesystem::path& file, std::uint64_t 
   bool altered = false;
   for (int i = 0; i < 2; ++i) {
     const std::uint64_t sequence = impl_->header(i)->sequence;
-    if (!impl_->IsWhole(i) || sequence >= kMostSequence) {
+    if (!impl_->IsWhole(i)) {
       altered = altered || sequence != 0;  // A kill leaves no seal on an incomplete slot.
       impl_->header(i)->sequence = 0;
-    } else if (sequence > impl_->last_sequence) {
+    } else if (IsNewer(sequence, impl_->last_sequence)) {
       impl_->newest = i;
       impl_->last_sequence = sequence;
     }
@@ -224,7 +228,7 @@ std::optional<std::vector<std::byte>> CheckpointFile::Peek(const std::filesystem
     SlotHeader header{};
     const auto at = static_cast<off_t>(kPage + i * stride);
     if (::pread(fd.get(), &header, sizeof(header), at) != static_cast<ssize_t>(sizeof(header)) ||
-        header.sequence <= newest_sequence || header.sequence >= kMostSequence || header.bytes > capacity_bytes) {
+        !IsNewer(header.sequence, newest_sequence) || header.bytes > capacity_bytes) {
       continue;
     }
     // The copy is checked, not the slot: the writer may continue meanwhile.
@@ -271,7 +275,7 @@ void CheckpointFile::Commit(std::size_t bytes) {
   }
   const int slot = std::exchange(impl_->filling, -1);
   SlotHeader* header = impl_->header(slot);
-  const std::uint64_t sequence = impl_->last_sequence + 1;
+  const std::uint64_t sequence = Next(impl_->last_sequence);
   header->bytes = bytes;
   header->checksum = Checksum(sequence, impl_->payload(slot).first(bytes));
   std::atomic_signal_fence(std::memory_order_seq_cst);
@@ -297,8 +301,9 @@ std::uint64_t NewestSequence(const std::filesystem::path& file) {
   for (std::size_t i = 0; i < 2; ++i) {
     SlotHeader slot{};
     const auto at = static_cast<off_t>(kPage + i * SlotStride(header.capacity));
-    if (::pread(fd.get(), &slot, sizeof(slot), at) == static_cast<ssize_t>(sizeof(slot))) {
-      newest = std::max(newest, slot.sequence);
+    if (::pread(fd.get(), &slot, sizeof(slot), at) == static_cast<ssize_t>(sizeof(slot)) &&
+        IsNewer(slot.sequence, newest)) {
+      newest = slot.sequence;
     }
   }
   return newest;

@@ -56,7 +56,7 @@ class CheckpointFileTarget final : public Target {
     const auto previous = file.Previous();
     Promise(!latest || latest->payload.size() <= kCapacity, "a payload larger than the capacity");
     Promise(!previous || (latest && previous->payload.size() <= kCapacity), "a payload before none");
-    Promise(!latest || latest->sequence <= newest, "a slot newer than the newest");
+    Promise(!latest || static_cast<std::int64_t>(latest->sequence - newest) <= 0, "a slot newer than the newest");
     // Peek reads what remains of a truncated file; the node then begins anew.
     if (latest) {
       Promise(peeked.has_value() &&
