@@ -1,5 +1,5 @@
-// An OpenGL context without a window system: EGL on Mesa's surfaceless platform. Works on software GL, in a container,
-// with no X server and no GPU.
+// An OpenGL context without a window system: EGL on a GPU (EGL_EXT_platform_device), else on Mesa's surfaceless
+// platform. Works on software GL, in a container, with no X server and no GPU.
 #pragma once
 
 #include <string>
@@ -25,9 +25,14 @@ class EglContext {
   [[nodiscard]] const std::string& description() const { return description_; }
 
  private:
+  /// Makes the context; nullptr, or the step that failed.
+  const char* Open(void* display);
+  void Close() noexcept;
+
   void* display_ = nullptr;
   void* context_ = nullptr;
   std::string description_;
+  bool is_recent_ = false;  ///< OpenGL 4.3.
 };
 
 }  // namespace fulcrum::render

@@ -264,6 +264,7 @@ class ConnectionOver final : public Connection,
     web_.emplace(*stream_);
     web_->set_option(websocket::stream_base::timeout{kOpening, kSilence, true});
     web_->read_message_max(server().limits.message);
+    web_->auto_fragment(false);
     ++server().sockets;
     accepting_ = true;  // What `opened` sends waits for the end of the handshake.
     server().service.sockets.opened(this);

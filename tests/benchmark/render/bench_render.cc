@@ -58,15 +58,17 @@ void Sway(const std::vector<float>& rest, int step, std::vector<float>* xyz) {
   }
 }
 
-void FullScene(const SceneView& scene, benchmark::Report* report) {
-  if (!report->Wants("render.full_scene_720p.")) {
+void FullScene(const SceneView& scene, std::uint32_t width, std::uint32_t height, benchmark::Report* report) {
+  const std::string prefix = "render.full_scene_" + std::to_string(height) + "p.";
+  if (!report->Wants(prefix)) {
     return;
   }
   SceneView view = scene;
-  view.render.width = 1280;
-  view.render.height = 720;
+  view.render.width = width;
+  view.render.height = height;
   LaparoscopeView laparoscope(view);
   const auto display = MakeOffscreenDisplay(laparoscope, view.render);
+  std::printf("# %s\n", display->description().c_str());
   const SyntheticMoment moment = MakeSyntheticMoment(view, 12.0);
   Show(moment, &laparoscope);
   QualityControl quality(Quality::kAuto, static_cast<int>(view.render.height));
@@ -88,10 +90,10 @@ void FullScene(const SceneView& scene, benchmark::Report* report) {
       cpu_side_ms.push_back(updated - start);
     }
   }
-  report->Add("render.full_scene_720p.frame_ms_p50", benchmark::Quantile(frame_ms, 0.5), "ms");
-  report->Add("render.full_scene_720p.frame_ms_p95", benchmark::Quantile(frame_ms, 0.95), "ms");
-  report->Add("render.full_scene_720p.cpu_side_ms_p50", benchmark::Quantile(cpu_side_ms, 0.5), "ms");
-  report->Add("render.full_scene_720p.scale", quality.scale(), "1");
+  report->Add(prefix + "frame_ms_p50", benchmark::Quantile(frame_ms, 0.5), "ms");
+  report->Add(prefix + "frame_ms_p95", benchmark::Quantile(frame_ms, 0.95), "ms");
+  report->Add(prefix + "cpu_side_ms_p50", benchmark::Quantile(cpu_side_ms, 0.5), "ms");
+  report->Add(prefix + "scale", quality.scale(), "1");
   for (const auto& [name, scale] : {std::pair{"high", 1.0f}, {"low", 0.52f}}) {
     laparoscope.SetScale(scale);
     int step = 0;
@@ -101,7 +103,7 @@ void FullScene(const SceneView& scene, benchmark::Report* report) {
       laparoscope.Update();
       display->Draw();
     });
-    report->Add(std::string("render.full_scene_720p.") + name + "_frame_ms_p50", benchmark::Quantile(times, 0.5), "ms");
+    report->Add(prefix + name + "_frame_ms_p50", benchmark::Quantile(times, 0.5), "ms");
   }
 }
 
@@ -254,7 +256,8 @@ int main(int argc, char** argv) {
   try {
     const scene::SceneData data = scene::BuildProcedural(scene::BuiltIn());
     const SceneView view = data.View();
-    render::FullScene(view, &report);
+    render::FullScene(view, 1280, 720, &report);
+    render::FullScene(view, 1920, 1080, &report);
     render::Uploads(view, &report);
     render::Embedding(view, &report);
     render::StaticScene(view, &report);
