@@ -22,11 +22,14 @@ constexpr double kWidthTolerance = 1.0;  // [texels]
 
 /// All texels whose centre is within `radius` of a polyline.
 void Stroke(Mask* mask, const std::vector<Vec2d>& line, double radius) {
-  for (int y = 0; y < mask->height; ++y) {
-    for (int x = 0; x < mask->width; ++x) {
-      const Vec2d at(x + 0.5, y + 0.5);
-      for (std::size_t i = 1; i < line.size(); ++i) {
-        const Vec2d along = line[i] - line[i - 1];
+  for (std::size_t i = 1; i < line.size(); ++i) {
+    const Vec2d along = line[i] - line[i - 1];
+    // Pixels near the stretch alone: all of them would take minutes under sanitizers.
+    const Vec2d low = line[i - 1].cwiseMin(line[i]).array() - radius - 1;
+    const Vec2d high = line[i - 1].cwiseMax(line[i]).array() + radius + 1;
+    for (int y = std::max(0, static_cast<int>(low.y())); y < std::min<double>(mask->height, high.y()); ++y) {
+      for (int x = std::max(0, static_cast<int>(low.x())); x < std::min<double>(mask->width, high.x()); ++x) {
+        const Vec2d at(x + 0.5, y + 0.5);
         const double u = std::clamp((at - line[i - 1]).dot(along) / along.squaredNorm(), 0.0, 1.0);
         if ((line[i - 1] + u * along - at).norm() <= radius) mask->Put(x, y);
       }

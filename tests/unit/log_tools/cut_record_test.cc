@@ -206,7 +206,7 @@ TEST(DeformedSheet, NearestPlaceIsThatOfAllTriangles) {
   }
   DeformedSheet sheet(scene.view);
   ASSERT_TRUE(sheet.SetPositions(Interleaved(places), kNothingRemoved));
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 50; ++i) {
     const Vec3f p(0.02f * unit(random) - FlatScene::kShift, 0.03f * unit(random) - FlatScene::kShift,
                   2e-3f * unit(random));
     const auto found = sheet.Nearest(p, 1);
