@@ -5,28 +5,24 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/mouse_and_keyboard.h"
+
 namespace fulcrum::testing {
 
-class XClient {
+class XClient final : public MouseAndKeyboard {
  public:
   /// Throws std::runtime_error if the display does not answer.
   explicit XClient(const std::string& display);
-  ~XClient();
+  ~XClient() override;
   XClient(const XClient&) = delete;
   XClient& operator=(const XClient&) = delete;
 
   /// Looks for the window of that name; false: there is none yet.
   bool FindWindow(const std::string& name);
-  /// Moves the pointer by pixels, y down.
-  void Move(int x, int y);
+  void Move(int x, int y) override;
   /// Pixels of a square of the window, which must be visible and contain it; in the format of the display.
   [[nodiscard]] std::vector<unsigned char> Pixels(int x, int y, int size);
-  /// @param key name of an X key symbol, such as "Return" or "f".
-  void Press(const std::string& key, bool down);
-  void Click(const std::string& key) {
-    Press(key, true);
-    Press(key, false);
-  }
+  void Press(const std::string& key, bool down) override;
 
  private:
   struct Impl;

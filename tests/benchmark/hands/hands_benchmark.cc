@@ -20,6 +20,7 @@
 #include "services/transport/bus/dds/participant.h"
 #include "tests/benchmark/report.h"
 #include "tests/support/cart.h"
+#include "tests/support/operated_session.h"
 #include "tests/support/session_bus.h"
 #include "tests/support/virtual_screen.h"
 #include "tests/support/xclient.h"
@@ -204,7 +205,39 @@ std::vector<double> Repeat(int count, const char* what, const Measure& measure) 
   return values;
 }
 
+/// The task of system_hands_test, each time in a session of its own: runs in which every step succeeded, of all.
+template <class Start>
+void MouseTasks(const std::string& key, const Start& start, benchmark::Report* report) {
+  if (!report->Wants(key)) return;
+  const int runs = report->quick() ? 1 : 20;
+  int succeeded = 0;
+  std::vector<double> cut_mm;
+  for (int i = 0; i < runs; ++i) {
+    const std::unique_ptr<testing::OperatedSession> session = start();
+    std::string fault = session->Begin();
+    if (!session->missing().empty()) return void(std::fprintf(stderr, "%s\n", session->missing().c_str()));
+    if (fault.empty()) {
+      const auto done = testing::DissectByMouse(session->scene(), &session->hand(), &session->eyes());
+      fault = done.fault;
+      cut_mm.push_back(done.cut_mm);
+      if (!session->End() && fault.empty()) fault = "the session did not end well: " + session->Said();
+    }
+    succeeded += fault.empty() ? 1 : 0;
+    if (!fault.empty()) std::fprintf(stderr, "%s: run %d: %s\n", key.c_str(), i + 1, fault.c_str());
+  }
+  report->Add(key + "success", succeeded, "count");
+  report->Add(key + "runs", runs, "count");
+  report->Add(key + "cut_mm_min", benchmark::Quantile(cut_mm, 0), "mm");
+  report->Add(key + "cut_mm_max", benchmark::Quantile(cut_mm, 1), "mm");
+}
+
 int Run(benchmark::Report* report) {
+  MouseTasks(
+      "hands.mouse_task_window.", [] { return testing::WindowSession("built-in", kDomain); }, report);
+  MouseTasks(
+      "hands.mouse_task_page.", [] { return testing::BrowserSession("built-in", kDomain, FULCRUM_CONSOLE_NPM); },
+      report);
+  if (!report->Wants("hands.input_to_") && !report->Wants("hands.silence_")) return 0;
   const testing::VirtualScreen screen;
   if (screen.display().empty()) {
     std::fprintf(stderr, "bench_hands: Xvfb is needed; apt install xvfb\n");

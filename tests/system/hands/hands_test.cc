@@ -11,14 +11,13 @@
 #include <fstream>
 #include <thread>
 
-#include "render_node/geometry/laparoscope.h"
 #include "services/base/core/operator_script.h"
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/scene/compiler/scene_yaml.h"
 #include "services/scene/format/scene_file.h"
-#include "services/transport/bus/dds/participant.h"
 #include "tests/support/cart.h"
-#include "tests/support/session_bus.h"
+#include "tests/support/mouse_operator.h"
+#include "tests/support/operated_session.h"
 #include "tests/support/virtual_screen.h"
 #include "tests/support/xclient.h"
 
@@ -26,81 +25,12 @@ namespace fulcrum {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::Eyes;
 using testing::WaitFor;
 using Seconds = std::chrono::duration<double>;
 
-constexpr int kDomain = 73;
+constexpr int kDomain = 73, kBrowserDomain = 68;
 constexpr double kPatience_s = 60;
-
-/// Reads the tools and the pedals of the session.
-class Eyes {
- public:
-  explicit Eyes(int domain) : participant_(testing::ReaderOf(domain, "watch")) {}
-  void Look() {
-    (void)tools_->TakeLatest(&tools);
-    (void)handles_->TakeLatest(&handles);
-    (void)topology_->TakeLatest(&topology);
-  }
-  ToolState tools;
-  HandleState handles;
-  TopologyState topology;
-
- private:
-  bus::DdsParticipant participant_;
-  std::unique_ptr<bus::Input<ToolState>> tools_ = participant_.MakeInput<ToolState>();
-  std::unique_ptr<bus::Input<HandleState>> handles_ = participant_.MakeInput<HandleState>();
-  std::unique_ptr<bus::Input<TopologyState>> topology_ = participant_.MakeInput<TopologyState>();
-};
-
-class Operator {
- public:
-  Operator(const RenderParams& camera, testing::XClient* client, Eyes* eyes) : client_(client), eyes_(eyes) {
-    const Eigen::Matrix4f view = render::MakeLaparoscope(camera).view;
-    right_ = view.row(0).head<3>().transpose();
-    up_ = view.row(1).head<3>().transpose();
-    forward_ = -view.row(2).head<3>().transpose();
-    eye_ = camera.scope_tip_W;
-    pixel_ = 2 * std::tan(0.5f * 0.0174533f * camera.fov_deg) / static_cast<float>(camera.height);
-  }
-
-  /// Moves the tip of a tool to `target` at `speed_m_s`, straight, by the pointer, with Control along the view. False:
-  /// it did not arrive.
-  bool Go(std::size_t tool, const Vec3f& target, float speed_m_s, float near_m = 1.5e-3f) {
-    constexpr float kPeriod_s = 0.02f;
-    const auto limit = std::chrono::steady_clock::now() + std::chrono::seconds(12);
-    for (auto next = std::chrono::steady_clock::now(); next < limit; next += std::chrono::milliseconds(20)) {
-      std::this_thread::sleep_until(next);
-      eyes_->Look();
-      const Vec3f tip = eyes_->tools.tools[tool].p_WT, left = target - tip;
-      if (left.norm() < near_m) return true;
-      // The tool follows the pointer with a lag of some periods: near the target it goes slower.
-      const Vec3f step = left * std::min(0.15f, speed_m_s * kPeriod_s / left.norm());
-      const float metres = pixel_ * forward_.dot(tip - eye_);
-      Send(step.dot(right_) / metres, -step.dot(up_) / metres, step.dot(forward_) / metres);
-    }
-    return false;
-  }
-
- private:
-  /// Whole pixels; the rest is kept for the next time.
-  void Send(float x, float y, float deep) {
-    rest_ += Vec3f(x, y, deep);
-    const Eigen::Vector3i whole = rest_.array().round().matrix().cast<int>();
-    rest_ -= whole.cast<float>();
-    if (whole.x() != 0 || whole.y() != 0) client_->Move(whole.x(), whole.y());
-    if (whole.z() != 0) {
-      client_->Press("Control_L", true);
-      client_->Move(0, -whole.z());
-      client_->Press("Control_L", false);
-    }
-  }
-
-  testing::XClient* client_;
-  Eyes* eyes_;
-  Vec3f right_, up_, forward_, eye_;
-  float pixel_;
-  Vec3f rest_ = Vec3f::Zero();
-};
 
 TEST(Hands, AreRefusedBeforeAnyNodeStarts) {
   ::unsetenv("DISPLAY");
@@ -124,7 +54,7 @@ TEST(Hands, AMouseAndAKeyboardGraspPullCutAndReleaseAndTheSessionReplays) {
   Eyes eyes(kDomain);
   const auto running = [&] {
     eyes.Look();
-    return eyes.tools.tools[1].kind == ToolKind::kHook && eyes.handles.handles[0].present;
+    return eyes.Ready();
   };
   ASSERT_TRUE(WaitFor(kPatience_s, running)) << cart.Said();
   const scene::SceneFile scene(fs::canonical(cart.session() / "scene.fulcrum"));
@@ -139,7 +69,7 @@ TEST(Hands, AMouseAndAKeyboardGraspPullCutAndReleaseAndTheSessionReplays) {
   eyes.Look();
   EXPECT_LT((eyes.tools.tools[1].p_WT - rest).norm(), 1e-5f);
 
-  Operator hand(view.render, &client, &eyes);
+  testing::MouseOperator hand(view.render, &client, &eyes);
   client.Click("Return");
   std::this_thread::sleep_for(Seconds(0.3));
   // The grasper opens over the place of the script's grasp, comes down and closes.
@@ -196,6 +126,34 @@ TEST(Hands, AMouseAndAKeyboardGraspPullCutAndReleaseAndTheSessionReplays) {
   testing::Program replay("replayer", {cart.session() / "recording.mcap", "--into", "physics", "thermal", "haptics"});
   EXPECT_EQ(replay.End(0), 0) << replay.Said();
   EXPECT_EQ(replay.Said().find("differs"), std::string::npos) << replay.Said();
+}
+
+void ExpectAll(const testing::DissectionByMouse& done) {
+  EXPECT_EQ(done.fault, "");
+  EXPECT_GT(done.grasped, 0);
+  EXPECT_GT(done.lifted_mm, 10);
+  EXPECT_GT(done.pull_N, 0.3);
+  EXPECT_GE(done.cut_mm, 20);
+  EXPECT_EQ(done.released, 0);
+  EXPECT_LT(done.released_N, 0.1);
+  std::printf("hands.mouse_task: %.0f particles, %.1f mm, %.2f N, cut %.1f mm, released %.0f, %.3f N\n", done.grasped,
+              done.lifted_mm, done.pull_N, done.cut_mm, done.released, done.released_N);
+}
+
+void DissectIn(testing::OperatedSession* session) {
+  const std::string fault = session->Begin();
+  if (!session->missing().empty()) GTEST_SKIP() << session->missing();
+  ASSERT_EQ(fault, "");
+  ExpectAll(testing::DissectByMouse(session->scene(), &session->hand(), &session->eyes()));
+  EXPECT_TRUE(session->End()) << session->Said();
+}
+
+TEST(Hands, TheWindowsMouseGraspsTentsCuts20MmAndReleasesInBuiltIn) {
+  DissectIn(testing::WindowSession("built-in", kDomain).get());
+}
+
+TEST(Hands, ThePagesMouseGraspsTentsCuts20MmAndReleasesInBuiltIn) {
+  DissectIn(testing::BrowserSession("built-in", kBrowserDomain, FULCRUM_CONSOLE_NPM).get());
 }
 
 }  // namespace

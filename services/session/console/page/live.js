@@ -19,9 +19,17 @@ const live = (() => {
   function send(fields) {
     if (socket && socket.readyState === WebSocket.OPEN) socket.send(new URLSearchParams(fields));
   }
+  /** Sends what the pointer and the wheel have done since the last time; less than a step of depth waits. */
+  function sendMotion() {
+    const whole = Math.trunc(turn);
+    send({x: x.toFixed(2), y: y.toFixed(2), turn: whole});
+    x = y = 0;
+    turn -= whole;
+  }
   function press(key, pressed) {
     if (!mine() || down.has(key) === pressed) return;
     if (pressed) down.add(key); else down.delete(key);
+    sendMotion();  // What the pointer did before the key counts without the key.
     send({[pressed ? 'down' : 'up']: key});
     showKeys();
   }
@@ -213,18 +221,14 @@ const live = (() => {
     padDown = pressed;
   }
 
-  let steps = 0;
   setInterval(() => {
     if (!mine()) return;
     readPad();
     x += kStick * ((arrows.has('ArrowRight') ? 1 : 0) - (arrows.has('ArrowLeft') ? 1 : 0));
     y += kStick * ((arrows.has('ArrowUp') ? 1 : 0) - (arrows.has('ArrowDown') ? 1 : 0));
-    for (const button of document.querySelectorAll('#hands [data-step]')) if (button.dataset.down) steps += 0.2 * Number(button.dataset.step);
-    steps += 0.2 * ((arrows.has('PageDown') ? 1 : 0) - (arrows.has('PageUp') ? 1 : 0)) + turn;
-    const whole = Math.trunc(steps);
-    steps -= whole;
-    send({x: x.toFixed(2), y: y.toFixed(2), turn: whole});
-    x = y = turn = 0;
+    for (const button of document.querySelectorAll('#hands [data-step]')) if (button.dataset.down) turn += 0.2 * Number(button.dataset.step);
+    turn += 0.2 * ((arrows.has('PageDown') ? 1 : 0) - (arrows.has('PageUp') ? 1 : 0));
+    sendMotion();
   }, kBeat);
 
   return {

@@ -51,8 +51,7 @@ export async function withConsole(fulcrum, browserPath, domain, use) {
   } finally {
     await browser?.close();
     const gone = new Promise(done => program.once('exit', done));
-    program.kill('SIGTERM');
-    await gone;
+    if (program.exitCode === null && program.kill('SIGTERM')) await gone;
     rmSync(out, {recursive: true, force: true});
   }
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# run.sh FULCRUM FOLDER MODE: installs what drives the browser (package-lock.json) into FOLDER and runs MODE.mjs, for
-# example check. Exit 77: browser or driver cannot be had here.
+# run.sh FULCRUM FOLDER MODE [ARGUMENT...]: installs what drives the browser (package-lock.json) into FOLDER and runs
+# MODE.mjs, for example check. Exit 77: browser or driver cannot be had here.
 set -euo pipefail
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 fulcrum=$1 folder=$2 mode=$3
@@ -25,4 +25,4 @@ if ! cmp -s "$here/package-lock.json" "$folder/package-lock.json" || [[ ! -e $fo
 fi
 # Modules are looked for beside the script.
 cp "$here"/*.mjs "$folder/"
-exec node "$folder/$mode.mjs" "$fulcrum" "$browser" "$folder"
+exec node "$folder/$mode.mjs" "$fulcrum" "$browser" "$folder" "${@:4}"
