@@ -48,7 +48,8 @@ StrictYaml StrictYaml::FromFileOnBases(const std::filesystem::path& file, const 
       document->Fail(next->line, kBase, "more than 8 files are based on one another: is there a cycle?");
     }
     const std::filesystem::path at = (folder / next->text).lexically_normal();
-    if (!std::filesystem::is_regular_file(at)) {
+    std::error_code error;  // A name that is too long is no file either.
+    if (!std::filesystem::is_regular_file(at, error)) {
       document->Fail(next->line, kBase,
                      Quoted(next->text) + " is not at " + at.string() + "; give a file beside this one");
     }

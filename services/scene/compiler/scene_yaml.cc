@@ -64,7 +64,8 @@ std::filesystem::path FindFile(const StrictMap& map, const std::string& key, con
   std::string tried;
   for (const auto& folder : folders) {
     std::filesystem::path candidate = (folder / name).lexically_normal();
-    if (!folders.files_needed || std::filesystem::is_regular_file(candidate)) {
+    std::error_code error;  // A name that is too long is no file either.
+    if (!folders.files_needed || std::filesystem::is_regular_file(candidate, error)) {
       return candidate;
     }
     tried += tried.empty() ? "" : ", ";

@@ -112,7 +112,8 @@ MeshFile ParseMesh(std::string_view bytes, const std::filesystem::path& name, co
 
 MeshFile ReadMesh(const std::filesystem::path& file) {
   return ParseMesh(BytesOf(file), file, [](const std::filesystem::path& other) -> std::optional<std::string> {
-    if (!std::filesystem::is_regular_file(other)) {
+    std::error_code error;  // A name that is too long is no file either.
+    if (!std::filesystem::is_regular_file(other, error)) {
       return std::nullopt;
     }
     return BytesOf(other);

@@ -78,11 +78,12 @@ void AddFilesNamedIn(const std::string& yaml, const fs::path& folder, const fs::
 }
 
 fs::path FindYaml(const SceneRequest& request) {
-  if (fs::is_regular_file(request.name)) {
+  std::error_code error;  // A name that is too long is no file either.
+  if (fs::is_regular_file(request.name, error)) {
     return request.name;
   }
   fs::path shipped = request.library / (request.name + ".yaml");
-  if (request.name.find('/') == std::string::npos && fs::is_regular_file(shipped)) {
+  if (request.name.find('/') == std::string::npos && fs::is_regular_file(shipped, error)) {
     return shipped;
   }
   std::string known;
