@@ -66,8 +66,9 @@ ExitCode Up(const Words& words) {
        "quality of the picture: auto, low, high")                                                           //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")  //
       ("set", po::value<Words>()->value_name("SECTION.KEY=VALUE")->composing(),
-       "replace a parameter of physics, thermal, haptics, breathing or render in the scene, or script.power_W, the "
-       "power of all uses of the generator; may be repeated")  //
+       "replace a parameter of physics, thermal, haptics, breathing or render in the scene, script.power_W (the "
+       "power of all uses of the generator), or script.hand (expert, novice) and script.seed: performs the script; "
+       "may be repeated")  //
       ("record", "record all topics into recording.mcap in the session folder")(
           "record-to", po::value<std::string>()->value_name("FILE|DIR"), "record all topics into this file or folder")(
           "keep-last", po::value<double>()->value_name("SECONDS"),

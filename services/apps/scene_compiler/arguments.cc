@@ -20,8 +20,9 @@ Options:
   --out FILE               compiled scene to write
   --data DIR               folder that is searched first for the mesh files of the description (default: the
                            description's folder)
-  --set SECTION.KEY=VALUE  replace a parameter of physics, thermal, haptics, breathing or render in the description, or
-                           script.power_W, the power of all uses of the generator; may be repeated
+  --set SECTION.KEY=VALUE  replace a parameter of physics, thermal, haptics, breathing or render in the description,
+                           script.power_W (the power of all uses of the generator), or script.hand (expert, novice) and
+                           script.seed: performs the script; may be repeated
   --quiet                  print no progress and no report
   --info FILE              print the content and quality of a compiled scene
   --source FILE            print the effective YAML of a compiled scene

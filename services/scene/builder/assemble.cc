@@ -315,6 +315,7 @@ void AddScript(const SceneSettings& settings, const Sheet& sheet, SceneData* sce
   std::stable_sort(scene->script.begin(), scene->script.end(), [](const ScriptKey& a, const ScriptKey& b) {
     return a.tool != b.tool ? a.tool < b.tool : a.time_s < b.time_s;
   });
+  if (settings.hand) scene->script = Perform(scene->script, *settings.hand, settings.script_duration_s);
   scene->fixed.script_duration_s = static_cast<float>(settings.script_duration_s);
 }
 

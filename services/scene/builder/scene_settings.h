@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/base/core/scene_view.h"
+#include "services/scene/builder/operator_hand.h"
 
 namespace fulcrum::scene {
 
@@ -128,6 +129,7 @@ struct SceneSettings {
   std::array<ToolMeshSettings, kMaxTools> tool_meshes;
   std::vector<ScriptKeySettings> script;
   double script_duration_s = 20;
+  std::optional<OperatorHand> hand;  ///< Performs the script; none: exactly.
   AssessmentParams assessment = UsualAssessment();
   std::vector<Vec2f> planned_line;  ///< For the assessment: (s, t) fractions in [0, 1], straight from point to point.
   std::uint32_t node_mask = 0x3e;   ///< Bit per NodeId.

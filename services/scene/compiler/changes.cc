@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 
 #include "services/base/core/error.h"
 
@@ -10,6 +11,8 @@ namespace fulcrum::scene {
 namespace {
 
 constexpr std::string_view kPower = "script.power_W";
+/// Keys of the script itself that can be changed.
+constexpr std::array<std::string_view, 2> kOfTheScript{"script.hand", "script.seed"};
 
 /// Sets the generator's power in every script key with a power above 0. Each key gets a value of its own: a shared one
 /// would be written as an anchor.
@@ -45,8 +48,9 @@ std::string ApplyChanges(const std::string& yaml, const std::vector<std::string>
         throw InputError(what + ": must be section.key=value with a section of " + Names(sections) +
                          "; for example physics.grip_force_N=5");
       }
-      if (section == "script") {
-        if (change.substr(0, equals) != kPower) throw InputError(what + ": of the script only power_W can be changed");
+      const std::string key = change.substr(0, equals);
+      if (section == "script" && std::ranges::find(kOfTheScript, key) == kOfTheScript.end()) {
+        if (key != kPower) throw InputError(what + ": of the script only power_W, hand and seed can be changed");
         SetPower(description, YAML::Load(change.substr(equals + 1)));
         continue;
       }

@@ -8,8 +8,8 @@
 
 namespace fulcrum::scene {
 
-/// Sections whose keys can be changed before a scene is compiled. Of the script only `script.power_W=VALUE` can be
-/// changed, the generator's setting: it applies to every key with a power above 0.
+/// Sections whose keys can be changed before a scene is compiled. Of the script only these can be
+/// changed: `power_W`, the generator's setting, which applies to every key with a power above 0; `hand` and `seed`.
 inline constexpr std::string_view kCompileSections[] = {"physics",   "thermal", "haptics",
                                                         "breathing", "render",  "script"};
 

@@ -227,6 +227,12 @@ ScriptKeySettings ReadKey(StrictMap map, double duration_s) {
 
 void ReadScript(StrictMap map, SceneSettings* scene) {
   scene->script_duration_s = map.NumberSi("duration_s", scene->script_duration_s, Range::Between(0.1, 86400));
+  if (const std::string hand = map.TextOr("hand", ""); !hand.empty()) {
+    scene->hand = HandNamed(hand);
+    if (!scene->hand) map.Fail("hand", "'" + hand + "' is not one of " + std::string(kHandNames));
+  }
+  const double seed = map.Number("seed", 0, Range::Between(0, 1e9));
+  if (scene->hand) scene->hand->seed = static_cast<std::uint32_t>(seed);
   for (int tool = 0; tool < kMaxTools; ++tool) {
     const std::string name = "tool" + std::to_string(tool);
     double last_s = -1;

@@ -1,0 +1,106 @@
+#include "services/scene/builder/operator_hand.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "services/base/core/operator_script.h"
+
+namespace fulcrum::scene {
+namespace {
+
+constexpr double kStep_s = 0.02;
+constexpr int kTones = 3;
+constexpr double kTau = 2 * std::numbers::pi;
+
+/// Sum of tones of random frequencies and phases, with an RMS of 1.
+class Wander {
+ public:
+  Wander(double low_Hz, double high_Hz, std::mt19937* random) {
+    std::uniform_real_distribution<double> frequency(low_Hz, high_Hz), phase(0, kTau);
+    for (Tone& tone : tones_) tone = {frequency(*random), phase(*random)};
+  }
+  [[nodiscard]] double At(double time_s) const {
+    double sum = 0;
+    for (const Tone& tone : tones_) sum += std::sin(kTau * tone.frequency_Hz * time_s + tone.phase);
+    return sum * std::sqrt(2.0 / kTones);
+  }
+
+ private:
+  struct Tone {
+    double frequency_Hz = 0, phase = 0;
+  };
+  std::array<Tone, kTones> tones_;
+};
+
+OperatorHand Varied(OperatorHand hand, std::mt19937* random) {
+  std::uniform_real_distribution<double> share(0.75, 1.25);
+  for (double* value :
+       {&hand.tremor_m, &hand.drift_m, &hand.hesitation, &hand.lag_s, &hand.pedal_lag_s, &hand.jaw_lag_s}) {
+    *value *= share(*random);
+  }
+  return hand;
+}
+
+}  // namespace
+
+std::optional<OperatorHand> HandNamed(std::string_view name) {
+  OperatorHand hand;
+  if (name == "expert") {
+    hand.tremor_m = 0.08e-3;
+    hand.drift_m = 0.15e-3;
+    hand.hesitation = 0.1;
+    hand.lag_s = 0.05;
+    hand.pedal_lag_s = 0.05;
+    hand.jaw_lag_s = 0.05;
+    return hand;
+  }
+  if (name == "novice") {
+    hand.tremor_m = 0.4e-3;
+    hand.drift_m = 1.5e-3;
+    hand.hesitation = 0.7;
+    hand.lag_s = 0.2;
+    hand.pedal_lag_s = 0.5;
+    hand.jaw_lag_s = 0.3;
+    return hand;
+  }
+  return std::nullopt;
+}
+
+std::vector<ScriptKey> Perform(std::span<const ScriptKey> script, const OperatorHand& usual, double duration_s) {
+  std::mt19937 random(usual.seed);
+  const OperatorHand hand = Varied(usual, &random);
+  const double varied = std::clamp(hand.hesitation, 0.0, 0.9);
+  std::vector<ScriptKey> performed;
+  for (std::uint32_t tool = 0; tool < static_cast<std::uint32_t>(kMaxTools); ++tool) {
+    if (!EvaluateScript(script, tool, 0).present) continue;
+    const std::array<Wander, 3> tremor{Wander(8, 12, &random), Wander(8, 12, &random), Wander(8, 12, &random)};
+    const std::array<Wander, 3> drift{Wander(0.2, 0.8, &random), Wander(0.2, 0.8, &random), Wander(0.2, 0.8, &random)};
+    const double pace_Hz = std::uniform_real_distribution<double>(0.5, 0.9)(random);
+    const double pace_phase = std::uniform_real_distribution<double>(0, kTau)(random);
+    // Time in the script: its rate is 1 + varied · cos(…), never negative.
+    const auto meant_s = [&](double time_s) {
+      const double turn = kTau * pace_Hz;
+      return time_s - hand.lag_s + varied / turn * (std::sin(turn * time_s + pace_phase) - std::sin(pace_phase));
+    };
+    const auto steps = static_cast<int>(duration_s / kStep_s);
+    for (int i = 0; i <= steps; ++i) {
+      const double time_s = i * kStep_s, now_s = meant_s(time_s);
+      ScriptPoint point = EvaluateScript(script, tool, now_s);
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto n = static_cast<std::size_t>(axis);
+        point.p_W[axis] +=
+            static_cast<float>(hand.tremor_m * tremor[n].At(time_s) + hand.drift_m * drift[n].At(time_s));
+      }
+      const ScriptPoint pedals = EvaluateScript(script, tool, now_s - hand.pedal_lag_s);
+      performed.push_back({static_cast<float>(time_s), tool, point.p_W,
+                           EvaluateScript(script, tool, now_s - hand.jaw_lag_s).jaw_rad, pedals.pedals,
+                           pedals.power_W});
+    }
+  }
+  return performed;
+}
+
+}  // namespace fulcrum::scene
