@@ -28,6 +28,7 @@ ExitCode Console(const Words& words) {
        "use the token in this file, or write a new one to it (default: a new token at each start)")                 //
       ("out", po::value<std::string>()->value_name("DIR")->default_value("out"), "folder for the session folders")  //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that scenes import");
+  AddDatabase(&options);
   AddCart(&options);
   AddDomain(&options);
   const Arguments arguments = Parse("console", words, options);
@@ -52,6 +53,8 @@ ExitCode Console(const Words& words) {
   settings.data = path("data");
   settings.out = path("out");
   settings.scenes = runtime::ShareFolder() / "scenes";
+  settings.courses = runtime::ShareFolder() / "courses";
+  settings.database = DatabaseOf(arguments);
   settings.programs = runtime::ProgramFolder();
   settings.domain =
       DomainOf(arguments, settings.cart.empty() ? config::DefaultDomain() : config::LoadCart(settings.cart).domain);

@@ -29,6 +29,7 @@
 #include "services/session/console/router.h"
 #include "services/session/console/session_run.h"
 #include "services/session/console/session_watch.h"
+#include "services/session/console/training_desk.h"
 #include "services/session/supervisor/ask.h"
 
 namespace fulcrum::console {
@@ -97,8 +98,10 @@ struct Console::Impl {
              .out = given.out,
              .cart = given.cart,
              .data = given.data,
+             .database = given.database,
              .domain = given.domain}),
         watch(given.domain),
+        desk(given.database, given.courses, given.out),
         server({.address = given.bind, .port = given.port, .tls = Identity()},
                {.handle = [this](const HttpRequest& request) { return Handle(request); },
                 .knows = [this](const HttpRequest& request) { return access->HasToken(request); },
@@ -197,6 +200,14 @@ struct Console::Impl {
         return Replay(TextIn(routed.fields, "name"));
       case Wanted::kCalibrate:
         return Calibrate(TextIn(routed.fields, "what"), TextIn(routed.fields, "tool"));
+      case Wanted::kTraining:
+      case Wanted::kTrainingCsv:
+      case Wanted::kTrainingEnter:
+      case Wanted::kTrainingNew:
+      case Wanted::kTrainingLeave:
+      case Wanted::kAttempt:
+      case Wanted::kAttemptPicture:
+        return Train(routed);
       case Wanted::kEnter:
       case Wanted::kCancel:
         return LeadTask(routed.wanted);
@@ -206,6 +217,32 @@ struct Console::Impl {
         return Done("closed");
     }
     return Refusal(404, "unknown call; valid calls: services/session/console/DESIGN.md");
+  }
+
+  HttpResponse Train(const Routed& routed) {
+    const Form& fields = routed.fields;
+    switch (routed.wanted) {
+      case Wanted::kTraining:
+        return {.body = desk.OverviewJson(FindScenes(settings.scenes))};
+      case Wanted::kTrainingCsv:
+        return {.type = "text/csv; charset=utf-8", .body = desk.Csv()};
+      case Wanted::kTrainingEnter:
+        desk.Enter(TextIn(fields, "name"), TextIn(fields, "pin"), MonotonicNs());
+        return Done("entered");
+      case Wanted::kTrainingNew:
+        desk.Create(TextIn(fields, "name"), TextIn(fields, "pin"),
+                    fields.contains("instructor") && TextIn(fields, "instructor") == "on");
+        return Done("the account is made");
+      case Wanted::kAttempt:
+        return {.body = desk.AttemptJson(TextIn(fields, "session"))};
+      case Wanted::kAttemptPicture: {
+        const fs::path folder = desk.FolderOf(TextIn(fields, "session"));
+        return File(folder.empty() ? folder : folder / "frames" / TextIn(fields, "name"), "image/png");
+      }
+      default:
+        desk.Leave();
+        return Done("left");
+    }
   }
 
   static HttpResponse Page(const std::string& path) {
@@ -249,6 +286,10 @@ struct Console::Impl {
     order.seconds = MaybeNumberIn(fields, "seconds");
     order.picture_rate_Hz = MaybeNumberIn(fields, "picture_rate");
     order.hands = fields.contains("hands") && TextIn(fields, "hands") == "on";
+    if (fields.contains("trainee")) {
+      order.trainee = TextIn(fields, "trainee") == "expert" ? kExpert : desk.person();
+      if (order.trainee.empty()) return Refusal(409, "nobody has entered; enter with name and PIN first");
+    }
     order.record = !fields.contains("record") || TextIn(fields, "record") == "on";
     run.Start(order);
     ShowSession({});
@@ -421,6 +462,7 @@ struct Console::Impl {
   std::optional<Access> access;
   SessionRun run;
   SessionWatch watch;
+  TrainingDesk desk;
   LiveView live;  ///< Its ports are those of `watch`.
   std::uint64_t live_session = 0;
   std::unique_ptr<GuidedTask> task;

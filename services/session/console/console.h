@@ -23,6 +23,8 @@ struct ConsoleSettings {
   std::filesystem::path data;      ///< Folder of meshes that scenes import; empty: the folder of each scene.
   std::filesystem::path out;       ///< Folder of the session folders.
   std::filesystem::path scenes;    ///< Folder of the scene descriptions on offer.
+  std::filesystem::path courses;   ///< Folder of the courses.
+  std::filesystem::path database;  ///< Of the trainees; it may be missing.
   std::filesystem::path programs;  ///< Folder of fulcrum, replayer and the nodes.
   std::filesystem::path state;     ///< Folder of what lasts: the certificate of a console that others can reach.
   int domain = config::DefaultDomain();

@@ -33,6 +33,15 @@ bool IsPower(std::string_view text) { return ParseNumber(text, 1, 300).has_value
 bool IsKnob(std::string_view text) { return ParseNumber(text, 0, static_cast<double>(kMaxSetPower_W)).has_value(); }
 bool IsSeconds(std::string_view text) { return ParseNumber(text, 1, 7 * 24 * 3600.0).has_value(); }
 bool IsPictureRate(std::string_view text) { return ParseNumber(text, 0.1, 30).has_value(); }
+bool IsTrainee(std::string_view text) { return text == "me" || text == "expert"; }
+bool IsPersonName(std::string_view text) {
+  const auto control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
+  return !text.empty() && text.size() <= 63 && std::none_of(text.begin(), text.end(), control);
+}
+bool IsPinText(std::string_view text) {
+  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
+  return text.size() >= 4 && text.size() <= 12 && std::all_of(text.begin(), text.end(), digit);
+}
 bool IsTicket(std::string_view text) { return text.size() == 64 && IsPlainName(text); }
 
 constexpr std::array kPictureFields{Field{"name", true, IsPictureName, "frame_<digits>.png"}};
@@ -44,7 +53,16 @@ constexpr std::array kStartFields{
     Field{"record", false, IsOnOff, "on, off"},
     Field{"picture_rate", false, IsPictureRate, "0.1 to 30 per second"},
     Field{"hands", false, IsOnOff, "on, off"},
+    Field{"trainee", false, IsTrainee, "me, expert"},
 };
+constexpr std::array kAccountFields{Field{"name", true, IsPersonName, "1 to 63 bytes without control characters"},
+                                    Field{"pin", true, IsPinText, "4 to 12 digits"}};
+constexpr std::array kNewAccountFields{Field{"name", true, IsPersonName, "1 to 63 bytes without control characters"},
+                                       Field{"pin", true, IsPinText, "4 to 12 digits"},
+                                       Field{"instructor", false, IsOnOff, "on, off"}};
+constexpr std::array kAttemptFields{Field{"session", true, IsPlainName, "a session that /api/training lists"}};
+constexpr std::array kAttemptPictureFields{Field{"session", true, IsPlainName, "a session that /api/training lists"},
+                                           Field{"name", true, IsPictureName, "frame_<digits>.png"}};
 constexpr std::array kNodeFields{Field{"node", true, IsNode, "a node's name, for example physics_node"}};
 constexpr std::array kGeneratorFields{Field{"cut", false, IsKnob, "0 to 300 W"},
                                       Field{"coag", false, IsKnob, "0 to 300 W"},
@@ -68,6 +86,13 @@ constexpr std::array kEntries{
     Entry{"/api/recordings", false, Wanted::kRecordings, {}},
     Entry{"/api/summary", false, Wanted::kSummary, {}},
     Entry{"/api/ticket", true, Wanted::kTicket, {}},
+    Entry{"/api/training", false, Wanted::kTraining, {}},
+    Entry{"/api/training.csv", false, Wanted::kTrainingCsv, {}},
+    Entry{"/api/training/enter", true, Wanted::kTrainingEnter, kAccountFields},
+    Entry{"/api/training/new", true, Wanted::kTrainingNew, kNewAccountFields},
+    Entry{"/api/training/leave", true, Wanted::kTrainingLeave, {}},
+    Entry{"/api/attempt", false, Wanted::kAttempt, kAttemptFields},
+    Entry{"/api/attempt/picture", false, Wanted::kAttemptPicture, kAttemptPictureFields},
     Entry{"/api/start", true, Wanted::kStart, kStartFields},
     Entry{"/api/stop", true, Wanted::kStop, {}},
     Entry{"/api/restart", true, Wanted::kRestart, kNodeFields},

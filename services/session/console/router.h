@@ -22,7 +22,8 @@ enum class Wanted {
   kRecordings,  ///< The recordings that can be replayed.
   kSummary,     ///< Figures of the last session.
   kTicket,      ///< A ticket that opens the report of the last session, or the live picture, once.
-  kStart,       ///< Starts a session. Fields: scene; optional power, seconds, record, picture_rate, hands.
+  kStart,       ///< Starts a session. Fields: scene; optional power, seconds, record, picture_rate, hands,
+                ///< trainee (me, expert).
   kStop,
   kRestart,  ///< Restarts a node. Field: node.
   kDump,
@@ -31,7 +32,14 @@ enum class Wanted {
   kCalibrate,  ///< Starts a calibration. Fields: what, tool.
   kEnter,      ///< Sends Enter to the guided task.
   kCancel,
-  kClose,  ///< Removes the ended task from the page.
+  kTraining,       ///< Courses, person and attempts.
+  kTrainingCsv,    ///< The attempts with all measures.
+  kTrainingEnter,  ///< Fields: name, pin.
+  kTrainingNew,    ///< Makes an account. Fields: name, pin; optional instructor.
+  kTrainingLeave,
+  kAttempt,         ///< Sheet and pictures of an attempt. Field: session.
+  kAttemptPicture,  ///< Fields: session, name.
+  kClose,           ///< Removes the ended task from the page.
 };
 
 struct Routed {

@@ -50,6 +50,10 @@ std::vector<std::string> UpWords(const SessionRunSettings& settings, const Sessi
   if (order.picture_rate_Hz) add("--set", "render.png_rate_Hz=" + supervisor::Fixed(*order.picture_rate_Hz, 1));
   if (order.record) words.emplace_back("--record");
   if (order.hands) add("--hands", "browser");
+  if (!order.trainee.empty()) {
+    add("--trainee", order.trainee);
+    add("--database", settings.database.string());
+  }
   return words;
 }
 

@@ -16,14 +16,16 @@ struct SessionOrder {
   std::string scene;
   std::optional<double> power_W, seconds, picture_rate_Hz;
   bool record = true;
-  bool hands = false;  ///< The tools follow the operator on the page; no script.
+  bool hands = false;   ///< The tools follow the operator on the page; no script.
+  std::string trainee;  ///< The score is stored under this name; empty: not stored.
 };
 
 struct SessionRunSettings {
   std::filesystem::path program;  ///< Path of the program fulcrum.
   std::filesystem::path out;
-  std::filesystem::path cart;  ///< Cart file; empty: all hardware is simulated.
-  std::filesystem::path data;  ///< Folder of meshes; empty: the folder of the scene.
+  std::filesystem::path cart;      ///< Cart file; empty: all hardware is simulated.
+  std::filesystem::path data;      ///< Folder of meshes; empty: the folder of the scene.
+  std::filesystem::path database;  ///< Of the trainees.
   int domain = config::DefaultDomain();
 };
 

@@ -13,8 +13,8 @@ namespace fulcrum::supervisor {
 namespace {
 
 constexpr int kApplication = 0x46554c43;  // "FULC": SQLite's application_id in the file's header.
-constexpr int kVersion = 1;
-constexpr int kBusy_ms = 5000;  // Longest wait while another session of the same user writes its row.
+constexpr int kVersion = 2;               // 1: without accounts.
+constexpr int kBusy_ms = 5000;            // Longest wait while another session of the same user writes its row.
 constexpr std::size_t kLongestName = 63;
 
 constexpr const char* kTables = R"sql(
@@ -25,6 +25,9 @@ CREATE INDEX sessions_of_trainee ON sessions (trainee, scene);
 CREATE TABLE measures (
   session_id INTEGER NOT NULL REFERENCES sessions (id) ON DELETE CASCADE, measure TEXT NOT NULL, value REAL NOT NULL,
   PRIMARY KEY (session_id, measure)) WITHOUT ROWID;
+)sql";
+constexpr const char* kPeople = R"sql(
+CREATE TABLE people (name TEXT PRIMARY KEY, pin_hash TEXT NOT NULL, instructor INTEGER NOT NULL) WITHOUT ROWID;
 )sql";
 
 /// One prepared statement. As in SQLite, indices of parameters begin at 1, those of columns at 0.
@@ -157,6 +160,7 @@ void TrainingLog::CheckOrMake(Access access) {
     Execute("BEGIN IMMEDIATE");
     if (Ask("SELECT count(*) FROM sqlite_master") == 0) {
       Execute(kTables);
+      Execute(kPeople);
       Execute(("PRAGMA application_id = " + std::to_string(kApplication)).c_str());
       Execute(("PRAGMA user_version = " + std::to_string(kVersion)).c_str());
     }
@@ -173,6 +177,40 @@ void TrainingLog::CheckOrMake(Access access) {
   // Not quick_check, which does not compare the indexes with the tables: a session would be there and not be found.
   Statement check(database_.get(), "PRAGMA integrity_check(1)");
   if (!check.Next() || check.Text(0) != "ok") Fail("is damaged");
+  if (!empty && version < kVersion && access != Access::kRead) {
+    Execute("BEGIN IMMEDIATE");
+    if (!HasPeople()) Execute(kPeople);
+    Execute(("PRAGMA user_version = " + std::to_string(kVersion)).c_str());
+    Execute("COMMIT");
+  }
+}
+
+bool TrainingLog::HasPeople() const {
+  return Ask("SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = 'people'") == 1;
+}
+
+void TrainingLog::AddPerson(const Person& person) {
+  CheckTraineeName(person.name);
+  if (FindPerson(person.name)) throw InputError("\"" + person.name + "\" has an account; enter with its PIN");
+  Statement statement(database_.get(), "INSERT INTO people (name, pin_hash, instructor) VALUES (?, ?, ?)");
+  statement.Bind(1, person.name);
+  statement.Bind(2, person.pin_hash);
+  statement.Bind(3, static_cast<sqlite3_int64>(person.instructor));
+  (void)statement.Next();
+  if (!statement.good()) Fail("the account cannot be added");
+}
+
+std::optional<Person> TrainingLog::FindPerson(const std::string& name) const {
+  if (!HasPeople()) return std::nullopt;
+  Statement statement(database_.get(), "SELECT pin_hash, instructor FROM people WHERE name = ?");
+  statement.Bind(1, name);
+  if (statement.Next()) return Person{name, statement.Text(0), statement.Integer(1) != 0};
+  if (!statement.good()) Fail("cannot be read");
+  return std::nullopt;
+}
+
+bool TrainingLog::HasInstructor() const {
+  return HasPeople() && Ask("SELECT count(*) FROM people WHERE instructor != 0") > 0;
 }
 
 void TrainingLog::Add(const TrainingRow& row) {
@@ -215,7 +253,7 @@ int TrainingLog::Delete(const std::string& trainee) {
   Execute("PRAGMA secure_delete = ON");
   Execute("BEGIN IMMEDIATE");
   for (const char* sql : {"DELETE FROM measures WHERE session_id IN (SELECT id FROM sessions WHERE trainee = ?)",
-                          "DELETE FROM sessions WHERE trainee = ?"}) {
+                          "DELETE FROM people WHERE name = ?", "DELETE FROM sessions WHERE trainee = ?"}) {
     Statement statement(database_.get(), sql);
     statement.Bind(1, trainee);
     (void)statement.Next();

@@ -25,6 +25,13 @@ struct TrainingRow {
 /// Row of an assessed session. @pre outcome.sheet has a value.
 [[nodiscard]] TrainingRow TrainingRowOf(const SessionOutcome& outcome);
 
+/// Who may enter on the console's page.
+struct Person {
+  std::string name;
+  std::string pin_hash;     ///< services/session/training/pin.h
+  bool instructor = false;  ///< Sees the sessions of all trainees.
+};
+
 /// An open database. All functions throw an InputError that names the file and the remedy. A file that is damaged, of
 /// another program or of a newer version is never written to.
 class TrainingLog {
@@ -38,12 +45,19 @@ class TrainingLog {
   TrainingLog& operator=(TrainingLog&&) noexcept;
 
   void Add(const TrainingRow& row);
-  /// Deletes all sessions of a trainee; nothing of them remains in the file's bytes. @return their number.
+  /// Deletes account and all sessions of a trainee; nothing of them remains in the file's bytes. @return their number.
   int Delete(const std::string& trainee);
   /// Sessions of a trainee, oldest first. `scene` empty: of all scenes.
   [[nodiscard]] std::vector<TrainingRow> SessionsOf(const std::string& trainee, const std::string& scene) const;
   /// Number of sessions by trainee.
   [[nodiscard]] std::map<std::string, int> Trainees() const;
+
+  /// Adds an account. Throws InputError if the name has one.
+  void AddPerson(const Person& person);
+  /// The account of a name; nullopt: it has none.
+  [[nodiscard]] std::optional<Person> FindPerson(const std::string& name) const;
+  /// An instructor has an account.
+  [[nodiscard]] bool HasInstructor() const;
 
  private:
   struct Closer {
@@ -53,6 +67,7 @@ class TrainingLog {
   void Execute(const char* sql) const;
   [[nodiscard]] int Ask(const char* sql) const;
   void CheckOrMake(Access access);
+  [[nodiscard]] bool HasPeople() const;
 
   std::filesystem::path file_;
   std::unique_ptr<sqlite3, Closer> database_;

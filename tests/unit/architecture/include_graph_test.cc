@@ -27,7 +27,7 @@ const std::vector<Floor> kFloors = {
     {"transport", {"control", "bus", "bus/convert", "keys", "bus/dds", "link"}},
     {"nodes", {"app"}},
     {"records", {"recording", "recorder", "log_tools"}},
-    {"session", {"assessment", "supervisor", "console", "soak"}},
+    {"session", {"assessment", "training", "supervisor", "console", "soak"}},
     {"apps", {"scene_compiler", "replayer", "fulcrum"}},
 };
 

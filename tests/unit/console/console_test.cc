@@ -346,6 +346,11 @@ TEST(SessionRun, WordsOfAnOrder) {
   const std::vector<std::string> wanted{"up", "/s.yaml", "--out",   "/o",    "--domain",           "7", "--keep-last",
                                         "30", "--cart",  "/c.yaml", "--set", "script.power_W=40.0"};
   EXPECT_EQ(UpWords(settings, order), wanted);
+  settings.database = "/d.sqlite";
+  order.trainee = "Ann";
+  const std::vector<std::string> words = UpWords(settings, order);
+  const std::vector<std::string> scored{"--trainee", "Ann", "--database", "/d.sqlite"};
+  EXPECT_TRUE(std::equal(scored.begin(), scored.end(), words.end() - 4));
 }
 
 }  // namespace

@@ -136,12 +136,25 @@ TEST_F(TrainingLogTest, WhatIsNotOursIsRefusedAndLeftAsItIs) {
 
 TEST_F(TrainingLogTest, ANewerVersionIsRefusedAndLeftAsItIs) {
   TrainingLog{file_}.Add(Row("Ann", 1, 50));
-  Sql(file_, "PRAGMA user_version = 2");
+  Sql(file_, "PRAGMA user_version = 3");
   const std::string bytes = Bytes(file_);
   const std::string refusal = Refusal([&] { TrainingLog{file_}; });
-  EXPECT_NE(refusal.find("has version 2 of a newer program; this program reads version 1"), std::string::npos)
+  EXPECT_NE(refusal.find("has version 3 of a newer program; this program reads version 2"), std::string::npos)
       << refusal;
   EXPECT_EQ(Bytes(file_), bytes);
+}
+
+TEST_F(TrainingLogTest, ADatabaseOfTheVersionWithoutAccountsIsReadAndThenGetsThem) {
+  TrainingLog{file_}.Add(Row("Ann", 1, 50));
+  Sql(file_, "DROP TABLE people; PRAGMA user_version = 1");
+  const std::string bytes = Bytes(file_);
+  EXPECT_FALSE(TrainingLog(file_, TrainingLog::Access::kRead).FindPerson("Ann"));
+  EXPECT_FALSE(TrainingLog(file_, TrainingLog::Access::kRead).HasInstructor());
+  EXPECT_EQ(Bytes(file_), bytes) << "reading has changed the file";
+  TrainingLog log(file_);
+  log.AddPerson({"Ann", "hash", true});
+  EXPECT_TRUE(log.HasInstructor());
+  EXPECT_EQ(log.SessionsOf("Ann", "").size(), 1u);
 }
 
 TEST_F(TrainingLogTest, ADamagedPageIsFoundBeforeTheSessionBegins) {

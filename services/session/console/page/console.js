@@ -366,6 +366,7 @@ async function showEnd(before) {
   const key = `${state.session} ${state.has_report} ${state.ended ? state.ended.text : ''}`;
   if (state.phase !== 'idle' || key === ended) return;
   ended = key;
+  if (state.ended) training.ended();
   $('result').hidden = !state.ended && !state.has_report;
   $('report').hidden = !state.has_report;
   const word = $('result-word');
@@ -412,6 +413,7 @@ function goTo(view) {
     if (button.dataset.goto === view) button.setAttribute('aria-current', 'page'); else button.removeAttribute('aria-current');
   }
   if (view === 'recordings') loadRecordings();
+  if (view === 'training') training.load();
 }
 for (const button of document.querySelectorAll('nav button')) button.addEventListener('click', () => goTo(button.dataset.goto));
 

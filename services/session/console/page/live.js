@@ -57,6 +57,7 @@ const live = (() => {
       opened.onclose = () => {
         socket = null;
         seen = 0;
+        delete $('picture').dataset.live;
         takeState({controls: 'none'});
         if (running) setTimeout(connect, 1000);
       };

@@ -1,0 +1,190 @@
+'use strict';
+// Courses, the person at the cart, attempts with score sheet and pictures. The person is known to the console, not to
+// the page: all pages show the same.
+
+const training = (() => {
+  let shown = null, ran = '';
+
+  const item = (className, ...children) => {
+    const element = make('li', className);
+    element.append(...children);
+    return element;
+  };
+  const button = (text, className, act) => {
+    const element = make('button', className, text);
+    element.type = 'button';
+    element.addEventListener('click', act);
+    return element;
+  };
+  const percent = value => `${value.toFixed(0)} %`;
+
+  async function load() {
+    const answer = await call('/api/training').then(r => r.json()).catch(() => null);
+    if (!answer) return;
+    if (answer.text) return toast(answer.text, true);
+    shown = answer;
+    const person = answer.person;
+    setText($('person'), person ? `${person}${answer.instructor ? ', instructor' : ''}` : 'Nobody has entered.');
+    $('enter-form').hidden = !!person && !answer.instructor;
+    $('leave').hidden = !person;
+    $('csv').hidden = !person;
+    $('courses').replaceChildren(...answer.courses.map(showCourse));
+    const attempts = answer.attempts.map(showAttempt);
+    $('attempts').replaceChildren(...attempts);
+    if (!attempts.length) $('attempts').append(item('', person ? 'None yet: choose an exercise.' : 'Enter to see yours.'));
+  }
+
+  function showCourse(course) {
+    const section = make('section'), list = make('ul');
+    section.append(make('h3', '', course.name), make('p', 'hint', course.description), list);
+    for (const exercise of course.exercises) {
+      const passed = exercise.best >= exercise.pass;
+      const what = make('span', 'what', exercise.description.replace(/^Exercise: /, '').replace(/^./, c => c.toUpperCase()));
+      what.append(make('small', '', `Passed from ${percent(exercise.pass)}. ` + (exercise.attempts ? `${exercise.attempts} done, best ${percent(exercise.best)}.` : 'Not tried yet.')));
+      const mark = make('span', passed ? 'mark level-good' : 'mark level-off', passed ? '●' : '○');
+      mark.setAttribute('role', 'img');
+      mark.setAttribute('aria-label', passed ? 'passed' : 'not passed');
+      const go = button('Operate', 'go', () => start(exercise, 'me'));
+      go.disabled = !shown.person;
+      go.setAttribute('aria-label', `Operate ${exercise.scene}`);
+      const demonstrate = button('Demonstration', '', () => start(exercise, 'expert'));
+      demonstrate.setAttribute('aria-label', `Demonstration of ${exercise.scene}`);
+      list.append(item('', mark, what, ...(exercise.attempts ? [trend(exercise)] : []), demonstrate, go));
+    }
+    return section;
+  }
+
+  /** The scores of one exercise over the attempts, with the level that passes. */
+  function trend(exercise) {
+    const scores = shown.attempts.filter(a => a.scene === exercise.scene && a.trainee === shown.person).map(a => a.score).reverse();
+    const svg = $('trend-form').cloneNode(true);
+    svg.removeAttribute('id');
+    svg.removeAttribute('hidden');
+    svg.setAttribute('aria-label', `scores ${scores.map(s => s.toFixed(0)).join(', ')} percent`);
+    const y = score => 42 - 0.4 * score, x = i => scores.length < 2 ? 60 : 4 + 112 * i / (scores.length - 1);
+    svg.querySelector('.pass').setAttribute('d', `M0 ${y(exercise.pass)}H120`);
+    svg.querySelector('.scores').setAttribute('d', scores.map((s, i) => `${i ? 'L' : 'M'}${x(i)} ${y(s)}h.1`).join(''));
+    return svg;
+  }
+
+  async function start(exercise, trainee) {
+    const byHand = trainee === 'me';
+    // Ten pictures a second are kept, for the replay of the attempt.
+    const fields = {scene: exercise.scene, record: 'on', hands: byHand ? 'on' : 'off', trainee, picture_rate: 10};
+    if (await order('/api/start', fields, byHand ? 'Take the controls when the picture comes, and press Stop when you have finished.' : 'The script shows how it is done.')) ran = byHand ? exercise.scene : '';
+  }
+
+  function showAttempt(attempt) {
+    const what = make('span', 'what', `${attempt.scene}, ${percent(attempt.score)}`);
+    what.append(make('small', '', `${shown.instructor ? `${attempt.trainee}, ` : ''}${attempt.started}${attempt.well ? '' : ', the session did not end well'}`));
+    return item('', what, button('Score and replay', '', () => open(attempt)));
+  }
+
+  // ---------------------------------------------------------------------------------------------- one attempt
+
+  let films = [], time = 0, playing = 0;
+  const timeOf = name => Number(name.match(/\d+/)[0]) / 1000;
+
+  async function open(attempt) {
+    const answer = await call(`/api/attempt?session=${attempt.session}`).then(r => r.json()).catch(() => null);
+    if (!answer || answer.text) return toast(answer ? answer.text : 'No response from the console.', true);
+    setText($('attempt-title'), `${attempt.scene}: ${percent(attempt.score)}`);
+    const sheet = answer.sheet, rows = [];
+    for (const [key, label] of Object.entries(answer.labels)) {
+      if (!(sheet[`${key}.of`] > 0)) continue;
+      const row = make('tr', sheet[`${key}.passed`] ? '' : 'bad');
+      const number = value => value === null ? '–' : Number(value).toFixed(Math.abs(value) < 10 ? 2 : 0);
+      row.append(make('td', '', label), make('td', 'number', number(sheet[key])), make('td', 'number', number(sheet[`${key}.threshold`])),
+        make('td', 'number', sheet[`${key}.passed`] ? 'kept' : 'missed'), make('td', 'number', `${sheet[`${key}.points`].toFixed(1)} / ${sheet[`${key}.of`]}`));
+      rows.push(row);
+    }
+    $('sheet').replaceChildren(...rows);
+    films = [{canvas: $('film-own'), session: attempt.session, names: answer.pictures},
+      {canvas: $('film-expert'), session: answer.expert, names: answer.expert_pictures}].map(f => ({...f, times: f.names.map(timeOf), pictures: new Map(), drawn: ''}));
+    $('film-expert-box').hidden = !films[1].names.length;
+    $('films').hidden = !films[0].names.length;
+    $('scrub').max = Math.max(0, ...films.flatMap(f => f.times.slice(-1)));
+    setTime(0);
+    $('attempt-box').showModal();
+  }
+
+  async function drawFilm(film) {
+    let i = film.times.findIndex(t => t > time + 1e-6);
+    i = i < 0 ? film.names.length - 1 : Math.max(0, i - 1);
+    const name = film.names[i];
+    if (!name || name === film.drawn) return;
+    film.drawn = name;
+    if (!film.pictures.has(name)) {
+      const bytes = await call(`/api/attempt/picture?session=${film.session}&name=${name}`).then(r => r.ok ? r.blob() : null).catch(() => null);
+      if (!bytes) return;
+      film.pictures.set(name, await createImageBitmap(bytes));
+      // A minute at ten pictures a second; the oldest goes first.
+      if (film.pictures.size > 600) film.pictures.delete(film.pictures.keys().next().value);
+    }
+    const picture = film.pictures.get(name);
+    if (film.drawn !== name) return;
+    film.canvas.width = picture.width;
+    film.canvas.height = picture.height;
+    film.canvas.getContext('2d').drawImage(picture, 0, 0);
+    film.canvas.dataset.name = name;
+  }
+  function setTime(seconds) {
+    time = Math.min(Number($('scrub').max), Math.max(0, seconds));
+    $('scrub').value = time;
+    setText($('scrub-time'), `${time.toFixed(1)} s`);
+    for (const film of films) drawFilm(film);
+  }
+  function play(on) {
+    clearInterval(playing);
+    playing = 0;
+    setText($('play'), on ? 'Pause' : 'Play');
+    if (!on) return;
+    if (time >= Number($('scrub').max)) setTime(0);
+    let last = performance.now();
+    playing = setInterval(() => {
+      const now = performance.now();
+      setTime(time + Number($('speed').value) * (now - last) / 1000);
+      last = now;
+      if (time >= Number($('scrub').max)) play(false);
+    }, 50);
+  }
+
+  document.addEventListener('DOMContentLoaded', () => {
+    $('play').addEventListener('click', () => play(!playing));
+    $('scrub').addEventListener('input', () => { play(false); setTime(Number($('scrub').value)); });
+    $('attempt-box').addEventListener('close', () => { play(false); films = []; });
+    $('attempt-close').addEventListener('click', () => $('attempt-box').close());
+    const account = async (path, more) => {
+      const form = $('enter-form');
+      const answer = await order(path, {name: form.person_name.value.trim(), pin: form.pin.value, ...more});
+      form.pin.value = '';
+      if (answer) load();
+    };
+    $('enter-form').addEventListener('submit', event => { event.preventDefault(); account('/api/training/enter', {}); });
+    $('new-trainee').addEventListener('click', () => account('/api/training/new', {instructor: $('enter-form').instructor.checked ? 'on' : 'off'}));
+    $('leave').addEventListener('click', async () => { await order('/api/training/leave'); load(); });
+    $('csv').addEventListener('click', async () => {
+      const bytes = await call('/api/training.csv').then(r => r.ok ? r.blob() : null).catch(() => null);
+      if (!bytes) return toast('No attempts could be read.', true);
+      const link = make('a');
+      link.href = URL.createObjectURL(bytes);
+      link.download = 'attempts.csv';
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+    });
+  });
+
+  return {
+    load,
+    /** Called when a session has ended: an attempt that began here is shown. */
+    async ended() {
+      if (!ran) return;
+      const scene = ran;
+      ran = '';
+      goTo('training');
+      await load();
+      const newest = shown && shown.attempts.find(a => a.scene === scene && a.trainee === shown.person);
+      if (newest) open(newest);
+    },
+  };
+})();

@@ -1,0 +1,192 @@
+#include "services/session/console/training_desk.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <sstream>
+
+#include "services/base/core/error.h"
+#include "services/base/core/tick.h"
+#include "services/session/console/form.h"
+#include "services/session/console/json.h"
+#include "services/session/training/pin.h"
+
+namespace fulcrum::console {
+namespace {
+
+namespace fs = std::filesystem;
+using supervisor::TrainingLog;
+using supervisor::TrainingRow;
+
+/// 43,000 guesses a day: a PIN of four digits is no secret from who stands at the cart, but takes hours.
+constexpr std::int64_t kAfterWrongPin = 2 * kSecond_ns;
+constexpr std::size_t kMostAttempts = 500, kMostPictures = 10'000;
+
+std::string JsonOf(const TrainingRow& row) {
+  Json json('{');
+  json.Text("trainee", row.trainee).Text("session", row.session).Text("scene", row.scene);
+  json.Text("started", row.started_utc).Number("score", row.score_pct, 0.1).Flag("well", row.well);
+  return json.Done();
+}
+
+/// A field of CSV (RFC 4180). A leading character that a spreadsheet would take for a formula gets an apostrophe.
+std::string Quoted(std::string text) {
+  if (!text.empty() && std::string_view("=+-@").find(text.front()) != std::string_view::npos) text.insert(0, "'");
+  std::string quoted = "\"";
+  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
+  return quoted + "\"";
+}
+
+std::vector<std::string> PicturesIn(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (entry->path().extension() == ".png") names.push_back(entry->path().filename().string());
+    if (names.size() == kMostPictures) break;
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+std::string PicturesJson(const fs::path& folder) {
+  Json list('[');
+  for (const std::string& name : PicturesIn(folder)) list.Item(JsonString(name));
+  return list.Done();
+}
+
+std::string TextOf(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+}
+
+}  // namespace
+
+void TrainingDesk::Enter(const std::string& name, const std::string& pin, std::int64_t now_ns) {
+  if (now_ns < locked_until_ns_) throw InputError("too soon after a wrong PIN; wait two seconds");
+  std::optional<supervisor::Person> found;
+  std::error_code error;
+  if (fs::exists(database_, error)) found = TrainingLog(database_, TrainingLog::Access::kRead).FindPerson(name);
+  if (!found || !training::IsHashOf(found->pin_hash, pin)) {
+    locked_until_ns_ = now_ns + kAfterWrongPin;
+    throw InputError("name or PIN is wrong; a new name needs New trainee");
+  }
+  person_ = found;
+}
+
+void TrainingDesk::Create(const std::string& name, const std::string& pin, bool instructor) {
+  if (name == kExpert) throw InputError("this name is that of the demonstrations; choose another");
+  TrainingLog log(database_);
+  if (instructor && log.HasInstructor() && !(person_ && person_->instructor)) {
+    throw InputError("there is an instructor already, who must enter first to add another");
+  }
+  supervisor::Person person{name, training::HashOfPin(pin), instructor};
+  log.AddPerson(person);
+  person_ = std::move(person);
+}
+
+std::vector<TrainingRow> TrainingDesk::Attempts() const {
+  std::error_code error;
+  if (!person_ || !fs::exists(database_, error)) return {};
+  const TrainingLog log(database_, TrainingLog::Access::kRead);
+  std::vector<TrainingRow> rows;
+  for (const auto& [trainee, sessions] : log.Trainees()) {
+    if (trainee == kExpert || (trainee != person_->name && !person_->instructor)) continue;
+    std::ranges::move(log.SessionsOf(trainee, ""), std::back_inserter(rows));
+  }
+  std::ranges::stable_sort(rows, std::greater<>(), &TrainingRow::started_utc);
+  return rows;
+}
+
+std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) const {
+  const std::vector<TrainingRow> attempts = Attempts();
+  Json courses('[');
+  for (const training::Course& course : training::ReadCourses(courses_)) {
+    Json exercises('[');
+    for (const training::Exercise& exercise : course.exercises) {
+      const auto scene = std::ranges::find(scenes, exercise.scene, &SceneChoice::name);
+      if (scene == scenes.end()) continue;
+      double best = std::nan("");
+      int count = 0;
+      for (const TrainingRow& row : attempts) {
+        if (row.scene != exercise.scene || row.trainee != person()) continue;
+        best = std::fmax(best, row.score_pct);
+        ++count;
+      }
+      Json one('{');
+      one.Text("scene", exercise.scene).Text("description", scene->description).Number("pass", exercise.pass_pct, 0.1);
+      one.Raw("attempts", std::to_string(count)).Number("power", scene->power_W, 0.1);
+      if (count > 0) one.Number("best", best, 0.1);
+      exercises.Item(one.Done());
+    }
+    Json one('{');
+    courses.Item(one.Text("name", course.name)
+                     .Text("description", course.description)
+                     .Raw("exercises", exercises.Done())
+                     .Done());
+  }
+  Json rows('[');
+  for (std::size_t i = 0; i < std::min(attempts.size(), kMostAttempts); ++i) rows.Item(JsonOf(attempts[i]));
+  Json json('{');
+  json.Text("person", person()).Flag("instructor", person_ && person_->instructor);
+  return json.Raw("courses", courses.Done()).Raw("attempts", rows.Done()).Done();
+}
+
+std::string TrainingDesk::Csv() const {
+  const std::vector<TrainingRow> attempts = Attempts();
+  std::set<std::string> measures;
+  for (const TrainingRow& row : attempts) {
+    for (const auto& [key, value] : row.measures) measures.insert(key);
+  }
+  std::ostringstream csv;
+  csv << "trainee,session,scene,started_utc,seconds,well,score_pct";
+  for (const std::string& measure : measures) csv << ',' << measure;
+  csv << "\r\n";
+  for (const TrainingRow& row : attempts) {
+    csv << Quoted(row.trainee) << ',' << Quoted(row.session) << ',' << Quoted(row.scene) << ','
+        << Quoted(row.started_utc) << ',' << row.seconds << ',' << (row.well ? 1 : 0) << ',' << row.score_pct;
+    for (const std::string& measure : measures) {
+      const auto found = row.measures.find(measure);
+      csv << ',';
+      if (found != row.measures.end()) csv << found->second;
+    }
+    csv << "\r\n";
+  }
+  return csv.str();
+}
+
+fs::path TrainingDesk::FolderOf(const std::string& session) const {
+  std::error_code error;
+  if (!person_ || !IsPlainName(session) || !fs::exists(database_, error)) return {};
+  const TrainingLog log(database_, TrainingLog::Access::kRead);
+  for (const auto& [trainee, sessions] : log.Trainees()) {
+    if (trainee != kExpert && trainee != person_->name && !person_->instructor) continue;
+    const std::vector<TrainingRow> rows = log.SessionsOf(trainee, "");
+    if (std::ranges::find(rows, session, &TrainingRow::session) != rows.end()) return out_ / session;
+  }
+  return {};
+}
+
+std::string TrainingDesk::AttemptJson(const std::string& session) const {
+  const fs::path folder = FolderOf(session);
+  if (folder.empty()) throw InputError("no attempt \"" + session + "\" of yours");
+  const std::string sheet = TextOf(folder / "assessment.json");
+  if (sheet.empty()) throw InputError(folder.string() + ": the session's folder is gone; its score is kept");
+  const TrainingLog log(database_, TrainingLog::Access::kRead);
+  std::string expert;
+  for (const TrainingRow& row : log.SessionsOf(kExpert, "")) {
+    if (session.ends_with("-" + row.scene)) expert = row.session;
+  }
+  Json json('{');
+  json.Raw("sheet", sheet).Raw("pictures", PicturesJson(folder / "frames")).Text("expert", expert);
+  Json labels('{');
+  for (const MeasureInfo& info : kMeasures) {
+    labels.Text(info.key, std::string(info.label) + (*info.unit == '\0' ? "" : std::string(" [") + info.unit + "]"));
+  }
+  json.Raw("labels", labels.Done());
+  json.Raw("expert_pictures", expert.empty() ? "[]" : PicturesJson(out_ / expert / "frames"));
+  return json.Done();
+}
+
+}  // namespace fulcrum::console

@@ -1,0 +1,52 @@
+// Courses, people and attempts, as the page shows them. One person at a time is at the cart.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/session/console/library.h"
+#include "services/session/supervisor/training_log.h"
+#include "services/session/training/course.h"
+
+namespace fulcrum::console {
+
+class TrainingDesk {
+ public:
+  /// @param database may be missing: the first account or session makes it. @param out folder of the session folders.
+  TrainingDesk(std::filesystem::path database, std::filesystem::path courses, std::filesystem::path out)
+      : database_(std::move(database)), courses_(std::move(courses)), out_(std::move(out)) {}
+
+  /// Checks the PIN. Throws InputError: a wrong name or PIN, or too soon after a wrong one.
+  void Enter(const std::string& name, const std::string& pin, std::int64_t now_ns);
+  /// Makes an account and enters. An instructor must be made by an instructor, but for the first.
+  void Create(const std::string& name, const std::string& pin, bool instructor);
+  void Leave() { person_.reset(); }
+
+  /// Name of the person at the cart; empty: nobody.
+  [[nodiscard]] std::string person() const { return person_ ? person_->name : std::string(); }
+  [[nodiscard]] const std::filesystem::path& database() const { return database_; }
+
+  /// Person, courses with the person's results, and the attempts that the person may see. Throws InputError.
+  [[nodiscard]] std::string OverviewJson(const std::vector<SceneChoice>& scenes) const;
+  /// The same attempts with all measures as CSV.
+  [[nodiscard]] std::string Csv() const;
+  /// A session's folder, for the sheet and the pictures; empty: the person may not see it.
+  [[nodiscard]] std::filesystem::path FolderOf(const std::string& session) const;
+  /// Sheet and pictures of an attempt, and the name of the newest session of its exercise by the expert.
+  [[nodiscard]] std::string AttemptJson(const std::string& session) const;
+
+ private:
+  [[nodiscard]] std::vector<supervisor::TrainingRow> Attempts() const;
+
+  std::filesystem::path database_, courses_, out_;
+  std::optional<supervisor::Person> person_;
+  std::int64_t locked_until_ns_ = 0;  ///< After a wrong PIN.
+};
+
+/// Trainee under whose name the scripted demonstration of an exercise is stored. Nobody can have an account of it.
+inline constexpr const char* kExpert = "Expert (script)";
+
+}  // namespace fulcrum::console

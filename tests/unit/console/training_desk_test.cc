@@ -1,0 +1,120 @@
+// Courses, accounts and attempts of the page.
+#include "services/session/console/training_desk.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "services/base/core/error.h"
+#include "services/base/core/tick.h"
+
+namespace fulcrum::console {
+namespace {
+
+namespace fs = std::filesystem;
+using supervisor::TrainingLog;
+using supervisor::TrainingRow;
+
+class TrainingDeskTest : public testing::Test {
+ protected:
+  TrainingDeskTest() {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_ / "courses");
+    std::ofstream(folder_ / "courses/1.yaml") << "name: One\nexercises:\n  - {scene: line, pass_pct: 70}\n";
+  }
+  ~TrainingDeskTest() override { fs::remove_all(folder_); }
+
+  void Store(const std::string& trainee, const std::string& session, double score) {
+    TrainingLog(database_).Add(
+        {trainee, session, "line", "2026-01-0" + session.substr(7, 1), 10, true, score, {{"time_s", 9.5}}});
+    fs::create_directories(folder_ / "out" / session / "frames");
+    std::ofstream(folder_ / "out" / session / "assessment.json") << "{\"score_pct\": 1}";
+    std::ofstream(folder_ / "out" / session / "frames/frame_0000100.png") << "x";
+  }
+  [[nodiscard]] std::string Overview() const { return desk_.OverviewJson({{"line", "Exercise: x", 9, 0, 2}}); }
+
+  const fs::path folder_ = fs::temp_directory_path() / ("fulcrum_desk_test_" + std::to_string(::getpid()));
+  const fs::path database_ = folder_ / "trainees.sqlite";
+  TrainingDesk desk_{database_, folder_ / "courses", folder_ / "out"};
+};
+
+TEST_F(TrainingDeskTest, ShowsCoursesToAnybodyAndAttemptsToTheirTraineeOnly) {
+  EXPECT_NE(Overview().find("\"person\":\"\""), std::string::npos) << Overview();
+  EXPECT_NE(Overview().find("\"scene\":\"line\""), std::string::npos);
+  Store("Ann", "2026010-1-line", 60);
+  Store("Ann", "2026010-2-line", 80);
+  Store("Bob", "2026010-3-line", 90);
+  EXPECT_EQ(Overview().find("Ann"), std::string::npos) << "nobody has entered";
+  desk_.Create("Ann", "2468", false);
+  EXPECT_NE(Overview().find("\"attempts\":2"), std::string::npos) << Overview();
+  EXPECT_NE(Overview().find("\"best\":80"), std::string::npos) << Overview();
+  EXPECT_EQ(Overview().find("Bob"), std::string::npos);
+  EXPECT_EQ(desk_.FolderOf("2026010-2-line"), folder_ / "out/2026010-2-line");
+  EXPECT_EQ(desk_.FolderOf("2026010-3-line"), fs::path()) << "another trainee's";
+  EXPECT_EQ(desk_.FolderOf("../2026010-2-line"), fs::path());
+  EXPECT_THROW((void)desk_.AttemptJson("2026010-3-line"), InputError);
+  const std::string csv = desk_.Csv();
+  EXPECT_TRUE(csv.starts_with("trainee,session,scene,started_utc,seconds,well,score_pct,time_s\r\n\"Ann\"")) << csv;
+  EXPECT_EQ(csv.find("Bob"), std::string::npos);
+  desk_.Leave();
+  EXPECT_EQ(desk_.person(), "");
+}
+
+TEST_F(TrainingDeskTest, ComparesWithTheNewestDemonstration) {
+  Store("Ann", "2026010-1-line", 60);
+  Store(kExpert, "2026010-2-line", 100);
+  desk_.Create("Ann", "2468", false);
+  const std::string attempt = desk_.AttemptJson("2026010-1-line");
+  EXPECT_NE(attempt.find("\"expert\":\"2026010-2-line\""), std::string::npos) << attempt;
+  EXPECT_NE(attempt.find("\"pictures\":[\"frame_0000100.png\"]"), std::string::npos) << attempt;
+  EXPECT_NE(attempt.find("\"time_s\":\"time from first to last movement [s]\""), std::string::npos) << attempt;
+  EXPECT_THROW(desk_.Create(kExpert, "2468", false), InputError) << "nobody can take the demonstrations' name";
+}
+
+TEST_F(TrainingDeskTest, RefusesWrongPinsAndWaitsAfterThem) {
+  desk_.Create("Ann", "2468", false);
+  desk_.Leave();
+  EXPECT_THROW(desk_.Enter("Ann", "2469", 0), InputError);
+  EXPECT_EQ(desk_.person(), "");
+  EXPECT_THROW(desk_.Enter("Ann", "2468", kSecond_ns), InputError) << "too soon";
+  desk_.Enter("Ann", "2468", 3 * kSecond_ns);
+  EXPECT_EQ(desk_.person(), "Ann");
+  EXPECT_THROW(desk_.Create("Ann", "1111", false), InputError) << "the name has an account";
+  EXPECT_THROW(desk_.Create("Cy", "12a4", false), InputError);
+  EXPECT_THROW(desk_.Create("Cy", "123", false), InputError);
+  std::ifstream file(database_, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  EXPECT_EQ(bytes.find("2468"), std::string::npos) << "the PIN is in the file";
+}
+
+TEST_F(TrainingDeskTest, InstructorSeesAllAndOnlyAnInstructorMakesAnother) {
+  Store("Ann", "2026010-1-line", 60);
+  desk_.Create("Ines", "2468", true);
+  EXPECT_NE(Overview().find("\"trainee\":\"Ann\""), std::string::npos) << Overview();
+  EXPECT_FALSE(desk_.FolderOf("2026010-1-line").empty());
+  desk_.Create("Ivo", "1357", true);
+  desk_.Leave();
+  desk_.Create("Bob", "1357", false);
+  EXPECT_THROW(desk_.Create("Eve", "1357", true), InputError);
+}
+
+TEST_F(TrainingDeskTest, AnAccountGoesWithItsSessions) {
+  Store("Ann", "2026010-1-line", 60);
+  EXPECT_FALSE(TrainingLog(database_, TrainingLog::Access::kRead).FindPerson("Ann"));
+  TrainingLog log(database_);
+  log.AddPerson({"Ann", "x", false});
+  EXPECT_TRUE(log.FindPerson("Ann"));
+  EXPECT_EQ(TrainingLog(database_, TrainingLog::Access::kDelete).Delete("Ann"), 1);
+  EXPECT_FALSE(TrainingLog(database_).FindPerson("Ann")) << "the account is deleted with the sessions";
+}
+
+TEST_F(TrainingDeskTest, CsvKeepsFormulasAway) {
+  Store("=cmd()", "2026010-1-line", 60);
+  desk_.Create("=cmd()", "2468", false);
+  EXPECT_NE(desk_.Csv().find("\"'=cmd()\""), std::string::npos) << desk_.Csv();
+}
+
+}  // namespace
+}  // namespace fulcrum::console
