@@ -59,11 +59,12 @@ ScriptDemands DemandsUntil(const SceneView& scene, double end_s) {
   ScriptDemands demands;
   for (const ScriptKey& key : scene.script) {
     const double left = end_s - static_cast<double>(key.time_s);
-    const bool cutting = key.pedals != kPedalNone && key.power_W > 0;
+    const bool heating = key.pedals != kPedalNone && key.power_W > 0;
     const bool grasping =
         scene.tools[key.tool].kind == ToolKind::kGrasper && key.jaw_rad < scene.physics.grasp_close_rad;
-    demands.deformation |= (cutting || grasping) && left >= kTimeToDeform;
-    demands.cut |= cutting && left >= kTimeToCut;
+    demands.deformation |= (heating || grasping) && left >= kTimeToDeform;
+    // Coag opens nothing.
+    demands.cut |= heating && (key.pedals & (kPedalCut | kPedalBlend)) != 0 && left >= kTimeToCut;
   }
   return demands;
 }

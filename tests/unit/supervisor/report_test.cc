@@ -128,6 +128,12 @@ TEST_F(ScriptTest, DemandsGrowWithTheTimeGiven) {
   EXPECT_FALSE(DemandsUntil(scene_, 9.0).cut);
   EXPECT_TRUE(DemandsUntil(scene_, 20.0).cut);
   EXPECT_FALSE(DemandsUntil(SceneView{}, 20.0).deformation);
+  std::vector<ScriptKey> coag(scene_.script.begin(), scene_.script.end());
+  for (ScriptKey& key : coag) key.pedals = key.pedals == kPedalNone ? kPedalNone : kPedalCoag;
+  SceneView only_coag = scene_;
+  only_coag.script = coag;
+  EXPECT_FALSE(DemandsUntil(only_coag, 20.0).cut);
+  EXPECT_TRUE(DemandsUntil(only_coag, 20.0).deformation);
 }
 
 // -------------------------------------------------------------------------------------------------- presentation

@@ -19,7 +19,7 @@ if ! cmp -s "$here/package-lock.json" "$folder/package-lock.json" || [[ ! -e $fo
   rm -f "$folder/installed"
   cp "$here/package.json" "$here/package-lock.json" "$folder/"
   # The lock file holds a checksum of the package. Its own browsers are not fetched.
-  (cd "$folder" && npm ci --ignore-scripts --no-audit --no-fund >npm.log 2>&1) ||
+  (cd "$folder" && npm ci --ignore-scripts --no-audit --no-fund --fetch-retries=1 --fetch-timeout=20000 >npm.log 2>&1) ||
     skip "npm ci failed (no network?), see $folder/npm.log: $(grep -m 1 -i 'err' "$folder/npm.log" || true)"
   touch "$folder/installed"
 fi
