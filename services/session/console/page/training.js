@@ -69,8 +69,8 @@ const training = (() => {
 
   async function start(exercise, trainee) {
     const byHand = trainee === 'me';
-    // Ten pictures a second are kept, for the replay of the attempt.
-    const fields = {scene: exercise.scene, record: 'on', hands: byHand ? 'on' : 'off', trainee, picture_rate: 10};
+    // Five pictures a second are kept, for the replay of the attempt.
+    const fields = {scene: exercise.scene, record: 'on', hands: byHand ? 'on' : 'off', trainee, picture_rate: 5};
     if (await order('/api/start', fields, byHand ? 'Take the controls when the picture comes, and press Stop when you have finished.' : 'The script shows how it is done.')) ran = byHand ? exercise.scene : '';
   }
 
@@ -118,7 +118,7 @@ const training = (() => {
       const bytes = await call(`/api/attempt/picture?session=${film.session}&name=${name}`).then(r => r.ok ? r.blob() : null).catch(() => null);
       if (!bytes) return;
       film.pictures.set(name, await createImageBitmap(bytes));
-      // A minute at ten pictures a second; the oldest goes first.
+      // Two minutes of them; the oldest goes first.
       if (film.pictures.size > 600) film.pictures.delete(film.pictures.keys().next().value);
     }
     const picture = film.pictures.get(name);
