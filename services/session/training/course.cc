@@ -1,6 +1,7 @@
 #include "services/session/training/course.h"
 
 #include <algorithm>
+#include <iterator>
 #include <system_error>
 
 #include "services/base/config/strict_yaml.h"
@@ -38,7 +39,7 @@ std::vector<Course> ReadCourses(const fs::path& folder) {
   }
   std::ranges::sort(files);
   std::vector<Course> courses;
-  for (const fs::path& file : files) courses.push_back(ReadCourse(file));
+  std::ranges::transform(files, std::back_inserter(courses), ReadCourse);
   return courses;
 }
 
