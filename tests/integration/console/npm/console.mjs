@@ -30,7 +30,7 @@ export async function withConsole(fulcrum, browserPath, domain, use) {
       program.on('exit', () => failed(new Error(`the console ended: ${said}`)));
       setTimeout(() => failed(new Error(`the console does not listen: ${said}`)), 20_000);
     });
-    browser = await chromium.launch({executablePath: browserPath, args: ['--no-sandbox', '--disable-gpu', '--force-color-profile=srgb']});
+    browser = await chromium.launch({executablePath: browserPath, args: ['--no-sandbox', '--disable-dev-shm-usage', '--disable-gpu', '--force-color-profile=srgb']});
     const newPage = async size => {
       const page = await (await browser.newContext({viewport: size})).newPage();
       page.on('pageerror', error => trouble.push(`error in the page: ${error.message}`));
