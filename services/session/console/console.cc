@@ -239,9 +239,11 @@ struct Console::Impl {
         const fs::path folder = desk.FolderOf(TextIn(fields, "session"));
         return File(folder.empty() ? folder : folder / "frames" / TextIn(fields, "name"), "image/png");
       }
-      default:
+      case Wanted::kTrainingLeave:
         desk.Leave();
         return Done("left");
+      default:
+        return Refusal(404, "unknown call of the training");
     }
   }
 
@@ -288,7 +290,7 @@ struct Console::Impl {
     order.hands = fields.contains("hands") && TextIn(fields, "hands") == "on";
     if (fields.contains("trainee")) {
       order.trainee = TextIn(fields, "trainee") == "expert" ? kExpert : desk.person();
-      if (order.trainee.empty()) return Refusal(409, "nobody has entered; enter with name and PIN first");
+      if (order.trainee.empty()) return Refusal(409, "no trainee has entered; enter with name and PIN first");
     }
     order.record = !fields.contains("record") || TextIn(fields, "record") == "on";
     run.Start(order);

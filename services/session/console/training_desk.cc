@@ -116,7 +116,7 @@ std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) c
       }
       Json one('{');
       one.Text("scene", exercise.scene).Text("description", scene->description).Number("pass", exercise.pass_pct, 0.1);
-      one.Raw("attempts", std::to_string(count)).Number("power", scene->power_W, 0.1);
+      one.Raw("attempts", std::to_string(count));
       if (count > 0) one.Number("best", best, 0.1);
       exercises.Item(one.Done());
     }

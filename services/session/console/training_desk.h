@@ -25,9 +25,8 @@ class TrainingDesk {
   void Create(const std::string& name, const std::string& pin, bool instructor);
   void Leave() { person_.reset(); }
 
-  /// Name of the person at the cart; empty: nobody.
+  /// Name of the person at the cart; empty: none.
   [[nodiscard]] std::string person() const { return person_ ? person_->name : std::string(); }
-  [[nodiscard]] const std::filesystem::path& database() const { return database_; }
 
   /// Person, courses with the person's results, and the attempts that the person may see. Throws InputError.
   [[nodiscard]] std::string OverviewJson(const std::vector<SceneChoice>& scenes) const;
@@ -46,7 +45,7 @@ class TrainingDesk {
   std::int64_t locked_until_ns_ = 0;  ///< After a wrong PIN.
 };
 
-/// Trainee under whose name the scripted demonstration of an exercise is stored. Nobody can have an account of it.
+/// Trainee under whose name the scripted demonstration of an exercise is stored. No account can have it.
 inline constexpr const char* kExpert = "Expert (script)";
 
 }  // namespace fulcrum::console

@@ -46,7 +46,7 @@ TEST_F(TrainingDeskTest, ShowsCoursesToAnybodyAndAttemptsToTheirTraineeOnly) {
   Store("Ann", "2026010-1-line", 60);
   Store("Ann", "2026010-2-line", 80);
   Store("Bob", "2026010-3-line", 90);
-  EXPECT_EQ(Overview().find("Ann"), std::string::npos) << "nobody has entered";
+  EXPECT_EQ(Overview().find("Ann"), std::string::npos) << "without a person no attempt is shown";
   desk_.Create("Ann", "2468", false);
   EXPECT_NE(Overview().find("\"attempts\":2"), std::string::npos) << Overview();
   EXPECT_NE(Overview().find("\"best\":80"), std::string::npos) << Overview();
@@ -70,7 +70,7 @@ TEST_F(TrainingDeskTest, ComparesWithTheNewestDemonstration) {
   EXPECT_NE(attempt.find("\"expert\":\"2026010-2-line\""), std::string::npos) << attempt;
   EXPECT_NE(attempt.find("\"pictures\":[\"frame_0000100.png\"]"), std::string::npos) << attempt;
   EXPECT_NE(attempt.find("\"time_s\":\"time from first to last movement [s]\""), std::string::npos) << attempt;
-  EXPECT_THROW(desk_.Create(kExpert, "2468", false), InputError) << "nobody can take the demonstrations' name";
+  EXPECT_THROW(desk_.Create(kExpert, "2468", false), InputError) << "an account has the demonstrations' name";
 }
 
 TEST_F(TrainingDeskTest, RefusesWrongPinsAndWaitsAfterThem) {
