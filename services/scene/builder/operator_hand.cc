@@ -47,24 +47,17 @@ OperatorHand Varied(OperatorHand hand, std::mt19937* random) {
 }  // namespace
 
 std::optional<OperatorHand> HandNamed(std::string_view name) {
-  OperatorHand hand;
   if (name == "expert") {
-    hand.tremor_m = 0.08e-3;
-    hand.drift_m = 0.15e-3;
-    hand.hesitation = 0.1;
-    hand.lag_s = 0.05;
-    hand.pedal_lag_s = 0.05;
-    hand.jaw_lag_s = 0.05;
-    return hand;
+    return OperatorHand{.tremor_m = 0.08e-3,
+                        .drift_m = 0.15e-3,
+                        .hesitation = 0.1,
+                        .lag_s = 0.05,
+                        .pedal_lag_s = 0.05,
+                        .jaw_lag_s = 0.05};
   }
   if (name == "novice") {
-    hand.tremor_m = 0.4e-3;
-    hand.drift_m = 1.5e-3;
-    hand.hesitation = 0.7;
-    hand.lag_s = 0.2;
-    hand.pedal_lag_s = 0.5;
-    hand.jaw_lag_s = 0.3;
-    return hand;
+    return OperatorHand{
+        .tremor_m = 0.4e-3, .drift_m = 1.5e-3, .hesitation = 0.7, .lag_s = 0.2, .pedal_lag_s = 0.5, .jaw_lag_s = 0.3};
   }
   return std::nullopt;
 }
