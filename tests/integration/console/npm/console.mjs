@@ -78,6 +78,17 @@ export async function until(page, limit_s, done, argument) {
   throw new Error(`after ${limit_s} s it does not hold: ${done}`);
 }
 
+/** The page shows live pictures. */
+export const drawn = () => Number(document.getElementById('picture').dataset.live || 0) > 5;
+
+/** Waits until `nodes` nodes run and the page shows them live, and takes the controls by mouse. */
+export async function takeControls(page, nodes) {
+  await until(page, 60, allRun, nodes);
+  await until(page, 20, drawn);
+  await page.click('#take:enabled');
+  await until(page, 5, () => document.body.dataset.controls === 'you');
+}
+
 /** All nodes run; slow ones, on a busy machine, too. */
 export const allRun = count => document.querySelectorAll('#nodes .word.level-good, #nodes .word.level-busy').length === count;
 export const pictureShown = () => !!document.getElementById('picture').dataset.shown || !!document.getElementById('picture').dataset.live;

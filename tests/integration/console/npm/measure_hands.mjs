@@ -1,7 +1,7 @@
 // measure_hands.mjs FULCRUM CHROMIUM FOLDER: prints `key value` for tests/benchmark/console: the live picture and the
 // controls of the page, in headless Chromium on the same machine.
 import {readFileSync, readdirSync} from 'node:fs';
-import {allRun, pidOf, sizes, until, withConsole} from './console.mjs';
+import {allRun, drawn, pidOf, sizes, takeControls, until, withConsole} from './console.mjs';
 
 const [fulcrum, browser] = process.argv.slice(2);
 const kWatch_s = 10, kMoves = 40;
@@ -16,7 +16,6 @@ const cpuOf = path => {
 const streamCpu = pid => readdirSync(`/proc/${pid}/task`)
   .filter(id => readFileSync(`/proc/${pid}/task/${id}/comm`, 'utf8').trim() === 'picture stream')
   .reduce((sum, id) => sum + cpuOf(`/proc/${pid}/task/${id}/stat`), 0);
-const drawn = () => Number(document.getElementById('picture').dataset.live || 0) > 5;
 const live = page => page.evaluate(() => Number(document.getElementById('picture').dataset.live));
 const pause = ms => new Promise(done => setTimeout(done, ms));
 
@@ -60,10 +59,7 @@ await withConsole(fulcrum, browser, 66, async ({address, newPage, pid, out}) => 
   // From an event of the pointer to a picture that shows it.
   await page.locator('label', {hasText: 'You, on this page'}).click();
   await page.click('#start');
-  await until(page, 60, allRun, 6);
-  await until(page, 20, drawn);
-  await page.click('#take');
-  await until(page, 5, () => document.body.dataset.controls === 'you');
+  await takeControls(page, 6);
   await page.evaluate(() => {
     const picture = document.getElementById('picture'), small = document.createElement('canvas');
     small.width = 240;

@@ -4,10 +4,9 @@
 import {realpathSync} from 'node:fs';
 import {join} from 'node:path';
 import {createInterface} from 'node:readline';
-import {allRun, until, withConsole} from './console.mjs';
+import {takeControls, withConsole} from './console.mjs';
 
 const [fulcrum, browser, , scene, domain] = process.argv.slice(2);
-const drawn = () => Number(document.getElementById('picture').dataset.live || 0) > 5;
 
 // Orders are queued from the start: the browser takes them when it can.
 const orders = [];
@@ -33,10 +32,7 @@ try {
     await page.locator('#scenes label', {hasText: scene}).first().click();
     await page.locator('label', {hasText: 'You, on this page'}).click();
     await page.click('#start');
-    await until(page, 60, allRun, 6);
-    await until(page, 20, drawn);
-    await page.click('#take');
-    await until(page, 5, () => document.body.dataset.controls === 'you');
+    await takeControls(page, 6);
     const box = await (await page.$('#picture')).boundingBox();
     const scale = await page.evaluate(() => {
       const picture = document.getElementById('picture'), size = picture.getBoundingClientRect();

@@ -3,10 +3,9 @@
 import {mkdtempSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
-import {allRun, expect, sizes, until, withConsole} from './console.mjs';
+import {allRun, drawn, expect, sizes, until, withConsole} from './console.mjs';
 
 const [fulcrum, browser, folder] = process.argv.slice(2);
-const drawn = () => Number(document.getElementById('picture').dataset.live || 0) > 5;
 const state = mkdtempSync(join(tmpdir(), 'fulcrum-training-'));
 process.env.XDG_STATE_HOME = state;
 
