@@ -14,8 +14,9 @@ namespace {
 fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
   using namespace fulcrum::handle_bridge;
   using fulcrum::config::LinkKind;
-  const bool operated = HasLinks(app.cart(), LinkKind::kOperator);
-  OperatedHands hands(app.cart());
+  const fulcrum::config::CartConfig cart = ForScene(app.cart(), app.scene());
+  const bool operated = HasLinks(cart, LinkKind::kOperator);
+  OperatedHands hands(cart, app.scene());
   fulcrum::OperatorChoice choice;
   fulcrum::OperatorInput sample;
   fulcrum::bus::Input<fulcrum::OperatorInput>* const inputs =
@@ -26,14 +27,14 @@ fulcrum::ExitCode RunBridge(fulcrum::app::NodeApp& app) {
     while (inputs != nullptr && inputs->TakeNext(&sample)) (void)choice.Add(sample);
     const double time_s = app.SessionTime(now_ns);
     if (time_s < 0) return std::nullopt;
-    return hands.Replace(FollowScript(app.scene(), app.cart(), time_s), choice.At(now_ns));
+    return hands.Replace(FollowScript(app.scene(), cart, time_s), choice.At(now_ns));
   };
-  const auto firmware = operated || HasLinks(app.cart(), LinkKind::kSimulated)
-                            ? std::make_unique<SimulatedFirmware>(input_at, MakeSimulatedUnits(app.cart()))
+  const auto firmware = operated || HasLinks(cart, LinkKind::kSimulated)
+                            ? std::make_unique<SimulatedFirmware>(input_at, MakeSimulatedUnits(cart))
                             : nullptr;
   const CalibrationStore calibrations = CalibrationStore::Load(CalibrationFolder());
   fulcrum::runtime::Log(fulcrum::runtime::LogLevel::kInfo, calibrations.Describe());
-  HandleBridgeNode node(app.cart(), calibrations, MakeCartLinks(app.cart(), firmware.get()),
+  HandleBridgeNode node(cart, calibrations, MakeCartLinks(cart, firmware.get()),
                         &app.MakeOutput<fulcrum::HandleState>(), fulcrum::runtime::MonotonicNs());
   return app.Run(
       app.timing(), [&node](const fulcrum::Tick& tick) { node.Step(tick); },

@@ -33,7 +33,7 @@ Options ParseOptions(int argc, const char* const* argv) {
   po::options_description known("Options");
   known.add_options()                                                                                                 //
       ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration that names the device")              //
-      ("tool", po::value<int>()->value_name("N")->default_value(0), "tool whose trocar is measured: 0 or 1")          //
+      ("tool", po::value<int>()->value_name("N")->default_value(0), "tool whose trocar is measured, 0 to 3")          //
       ("seconds", po::value<double>()->value_name("S")->default_value(10), "motion to record from a Touch")           //
       ("save", po::value<std::string>()->value_name("FILE"), "also save the motion, for a simulated device to play")  //
       ("help", "print this");
@@ -58,7 +58,8 @@ Options ParseOptions(int argc, const char* const* argv) {
     options.cart = values["cart"].as<std::string>();
     if (values.count("save") != 0) options.save = values["save"].as<std::string>();
     const int tool = values["tool"].as<int>();
-    if (tool < 0 || tool >= kMaxTools) throw InputError("--tool " + std::to_string(tool) + ": valid: 0 or 1");
+    if (tool < 0 || tool >= kMaxTools)
+      throw InputError("--tool " + std::to_string(tool) + ": valid: 0 to " + std::to_string(kMaxTools - 1));
     options.tool = static_cast<std::size_t>(tool);
     options.seconds = values["seconds"].as<double>();
     if (!(options.seconds >= 2 && options.seconds <= 600)) throw InputError("--seconds: valid: 2 to 600");

@@ -77,7 +77,7 @@ std::optional<Options> Parse(const std::vector<std::string>& words, std::ostream
   po::options_description known("Options");
   known.add_options()                                                                                           //
       ("cart", po::value<std::string>()->value_name("FILE"), "cart configuration; default: all simulated")      //
-      ("tool", po::value<int>()->value_name("N")->default_value(0), "the handle of this tool, 0 or 1")          //
+      ("tool", po::value<int>()->value_name("N")->default_value(0), "the handle of this tool, 0 to 3")          //
       ("angles", po::value<std::string>()->value_name("A,B,...")->default_value("0,15,30,45,60"), "jaw [deg]")  //
       ("help", "print this");
   po::variables_map values;

@@ -38,6 +38,14 @@ bool Within(const std::vector<double>& ends_s, double time_s) {
 
 }  // namespace
 
+config::CartConfig ForScene(config::CartConfig cart, const SceneView& scene) {
+  for (std::size_t tool = 0; tool < cart.handles.size(); ++tool) {
+    const bool real = cart.handles[tool].kind == config::LinkKind::kSerial;
+    if (scene.tools[tool].kind == ToolKind::kNone && !real) cart.handles[tool].kind = config::LinkKind::kNone;
+  }
+  return cart;
+}
+
 bool HasLinks(const config::CartConfig& cart, config::LinkKind kind) {
   return cart.pedal.kind == kind ||
          std::any_of(cart.handles.begin(), cart.handles.end(),
@@ -93,9 +101,17 @@ SimulatedInput FollowScript(const SceneView& scene, const config::CartConfig& ca
   return input;
 }
 
+OperatedHands::OperatedHands(const config::CartConfig& cart, const SceneView& scene) : cart_(cart) {
+  std::transform(scene.tools.begin(), scene.tools.end(), assists_.begin(),
+                 [](const ToolDescription& tool) { return tool.traction_N > 0; });
+  // The jaw of a scope is its zoom ring: wide.
+  std::transform(scene.tools.begin(), scene.tools.end(), jaw_deg_.begin(),
+                 [](const ToolDescription& tool) { return tool.kind == ToolKind::kScope ? 0 : kStartJaw_deg; });
+}
+
 SimulatedInput OperatedHands::Replace(SimulatedInput input, const OperatorInput* operated) {
   for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
-    if (cart_.handles[tool].kind != config::LinkKind::kOperator) continue;
+    if (cart_.handles[tool].kind != config::LinkKind::kOperator || assists_[tool]) continue;
     if (operated != nullptr && operated->tools[tool].moves) {
       jaw_deg_[tool] = kDegPerRad * static_cast<double>(operated->tools[tool].jaw_angle_rad);
     }

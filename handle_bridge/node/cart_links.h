@@ -10,6 +10,9 @@
 
 namespace fulcrum::handle_bridge {
 
+/// The cart without simulated handles of tools that the scene does not have.
+[[nodiscard]] config::CartConfig ForScene(config::CartConfig cart, const SceneView& scene);
+
 /// True if any handle or the pedal of the cart is of this kind.
 [[nodiscard]] bool HasLinks(const config::CartConfig& cart, config::LinkKind kind);
 
@@ -33,7 +36,7 @@ namespace fulcrum::handle_bridge {
 /// script's.
 class OperatedHands {
  public:
-  explicit OperatedHands(const config::CartConfig& cart) : cart_(cart) {}
+  OperatedHands(const config::CartConfig& cart, const SceneView& scene);
 
   /// @param operated newest input of the present operator; null: there is none. Jaws then keep their angles and the
   /// pedal is released.
@@ -43,7 +46,8 @@ class OperatedHands {
   static constexpr double kStartJaw_deg = 30;
 
   const config::CartConfig& cart_;
-  std::array<double, kMaxTools> jaw_deg_{kStartJaw_deg, kStartJaw_deg};
+  std::array<bool, kMaxTools> assists_{};  ///< No person operates it.
+  std::array<double, kMaxTools> jaw_deg_;
 };
 
 }  // namespace fulcrum::handle_bridge

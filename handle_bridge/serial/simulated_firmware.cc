@@ -22,8 +22,9 @@ constexpr std::uint64_t kMaxCatchUp = 100;
 SimulatedFirmware::SimulatedFirmware(InputAt input, const std::array<SimulatedUnit, kLinks>& units)
     : input_(std::move(input)),
       units_(units),
-      jaws_{JawFirmware(units[0].jaw, 1), JawFirmware(units[1].jaw, 2)},
-      links_{Link(11), Link(12), Link(13)},
+      jaws_{JawFirmware(units[0].jaw, 1), JawFirmware(units[1].jaw, 2), JawFirmware(units[2].jaw, 3),
+            JawFirmware(units[3].jaw, 4)},
+      links_{Link(11), Link(12), Link(14), Link(15), Link(13)},
       thread_({.name = "firmware", .period_ns = kPeriod_ns}, [this](const Tick& tick) { Step(tick); }) {
   thread_.Start();
 }
@@ -31,10 +32,17 @@ SimulatedFirmware::SimulatedFirmware(InputAt input, const std::array<SimulatedUn
 std::array<SimulatedUnit, kLinks> SimulatedFirmware::DefaultUnits() {
   return {SimulatedUnit{"simulated-tool0", false, kLeftHandle, {}},
           SimulatedUnit{"simulated-tool1", false, kRightHandle, {}},
+          SimulatedUnit{"simulated-tool2", false, kLeftHandle, {}},
+          SimulatedUnit{"simulated-tool3", false, kRightHandle, {}},
           SimulatedUnit{"simulated-pedal", false, kPedalSender, {}}};
 }
 
 std::unique_ptr<ByteSourceOpener> SimulatedFirmware::MakeOpener(std::size_t link) {
+  {
+    const std::lock_guard lock(mutex_);
+    links_[link].used = true;
+    if (!links_[link].terminal) links_[link].terminal.emplace();
+  }
   const auto device = [this, link]() -> std::string {
     const std::lock_guard lock(mutex_);
     const auto& terminal = links_[link].terminal;
@@ -53,10 +61,10 @@ void SimulatedFirmware::Step(const Tick& tick) {
       continue;
     }
     for (std::size_t link = 0; link < kLinks; ++link) {
-      Plug(&links_[link], !input->faults[link].unplugged);
+      if (links_[link].used) Plug(&links_[link], !input->faults[link].unplugged);
     }
     for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
-      SendJaw(tool, input->jaw_deg[tool], input->faults[tool]);
+      if (links_[tool].used) SendJaw(tool, input->jaw_deg[tool], input->faults[tool]);
     }
     SendPedals(input->pedals, input->faults[kPedalLink]);
   }

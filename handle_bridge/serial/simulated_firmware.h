@@ -59,14 +59,15 @@ class SimulatedFirmware {
   /// Plain lines, the paper's potentiometers.
   static std::array<SimulatedUnit, kLinks> DefaultUnits();
 
-  /// Opener of the bridge's end of a link; may be used again after each hang-up. Reading at another speed than the
-  /// unit's gives garbage, as on a wire.
+  /// Opener of the bridge's end of a link, which is simulated from then on; may be used again after each hang-up.
+  /// Reading at another speed than the unit's gives garbage, as on a wire.
   [[nodiscard]] std::unique_ptr<ByteSourceOpener> MakeOpener(std::size_t link);
 
  private:
   struct Link {
     explicit Link(std::uint64_t seed) : cable(seed) {}
-    std::optional<PseudoTerminal> terminal = PseudoTerminal();
+    bool used = false;  ///< Somebody has asked for its opener.
+    std::optional<PseudoTerminal> terminal;
     DamagedLine cable;
     std::uint8_t sequence = 0;
   };

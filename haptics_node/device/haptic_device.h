@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <memory>
 #include <string>
 
@@ -24,6 +25,11 @@ class HapticDevice {
   /// Position of the tool's attach point, in frame W [m]. Called once per tick on the servo thread: does not wait, lock
   /// or allocate.
   [[nodiscard]] virtual Vec3d ReadPosition(const Tick& tick) noexcept = 0;
+  /// Rotation of the tool about its shaft [rad], clockwise as seen from the handle; after ReadPosition of the tick,
+  /// under the same conditions.
+  [[nodiscard]] virtual float ReadRoll() const noexcept { return 0; }
+  /// Bit per pressed button; bit 0: the one nearest to the tip. As ReadRoll.
+  [[nodiscard]] virtual std::uint8_t ReadButtons() const noexcept { return 0; }
   /// Sets the force on the hand at the attach point, in frame W [N]; it is held until the next call.
   virtual void WriteForce(const Vec3d& f_W) noexcept = 0;
   /// State for Health. Call from any thread except the servo's.

@@ -10,6 +10,7 @@ namespace {
 /// Fastest motion of the intended attach point [m/s]: faster than a surgeon's hand in a dissection, and slow enough
 /// that an operator who takes the controls with another place in mind does not strike the tissue.
 constexpr double kFastest_m_s = 0.6;
+constexpr double kFastestTurn_rad_s = 6;
 
 }  // namespace
 
@@ -35,6 +36,8 @@ Vec3d OperatedDevice::ReadPosition(const Tick& tick) noexcept {
   const Vec3d way = AttachPointForTip(trocar_, intention_.p_WT.cast<double>()) - hand_.target();
   const double longest = kFastest_m_s * elapsed_s;
   hand_.Advance(hand_.target() + way * std::min(1.0, longest / std::max(way.norm(), longest)), force_, elapsed_s);
+  const auto widest = static_cast<float>(kFastestTurn_rad_s * elapsed_s);
+  roll_ += std::clamp(intention_.roll_rad - roll_, -widest, widest);
   return hand_.position();
 }
 

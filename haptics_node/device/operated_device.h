@@ -24,12 +24,14 @@ class OperatedDevice final : public HapticDevice {
   /// While the operator is silent for kOperatorSilence_ns or does not operate the tool, the hand lets go: the tissue
   /// pushes the tool until its force has vanished.
   [[nodiscard]] Vec3d ReadPosition(const Tick& tick) noexcept override;
+  [[nodiscard]] float ReadRoll() const noexcept override { return roll_; }
   void WriteForce(const Vec3d& f_W) noexcept override { force_ = force_scale_ * f_W; }
 
  private:
   HandOnDevice hand_;
   Trocar trocar_;
   double force_scale_ = 1;
+  float roll_ = 0;
   OperatorTool intention_;
   std::int64_t intention_ns_ = 0;
   std::int64_t stamp_ns_ = 0;  ///< Of the last tick; 0: none yet.

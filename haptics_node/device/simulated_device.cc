@@ -4,13 +4,17 @@
 #include <cmath>
 #include <utility>
 
-#include "services/base/core/operator_script.h"
-
 namespace fulcrum::haptics {
 namespace {
 
 // If session time and clock differ by more than this, a new session has begun and the device restarts at rest.
 constexpr double kSessionJump_s = 0.05;
+// An assistant reaches the wanted traction on tissue of 40 N/m in half a second, and no faster than a careful hand.
+constexpr double kPull_m_per_Ns = 0.05, kFastestPull_m_s = 0.010;
+constexpr double kFarthestPull_m = 0.025;  // From the script.
+constexpr double kLetGo_s = 0.3;           // Time constant of the way back to the script.
+constexpr float kHolds_rad = 0.2f;         // Jaw angle below which it holds.
+constexpr double kFeels_N = 0.02;          // A smaller force has no direction.
 
 }  // namespace
 
@@ -21,28 +25,43 @@ Vec3d RestingAttachPoint(const Trocar& trocar) {
 
 SimulatedDevice::SimulatedDevice(const HandModel& hand, const Trocar& trocar, std::span<const ScriptKey> script,
                                  std::uint32_t tool)
-    : hand_(hand), trocar_(trocar), script_(script), tool_(tool) {}
+    : hand_(hand), trocar_(trocar), script_(script), tool_(tool), rest_(RestingAttachPoint(trocar)) {}
 
 SimulatedDevice::SimulatedDevice(const HandModel& hand, std::shared_ptr<const RecordedMotion> motion,
                                  const WorkspaceMap& map)
-    : hand_(hand), motion_(std::move(motion)), map_(map) {}
+    : hand_(hand), motion_(std::move(motion)), map_(map), rest_(Vec3d::Zero()) {}
 
-Vec3d SimulatedDevice::Target(double session_time_s) const noexcept {
+Vec3d SimulatedDevice::Target(double session_time_s) noexcept {
   if (motion_) return map_.ToWorld(motion_->PositionAt(session_time_s));
-  const ScriptPoint point = EvaluateScript(script_, tool_, session_time_s);
-  return point.present ? AttachPointForTip(trocar_, point.p_W.cast<double>()) : RestingAttachPoint(trocar_);
+  point_ = EvaluateScript(script_, tool_, session_time_s);
+  return point_.present ? AttachPointForTip(trocar_, point_.p_W.cast<double>() + offset_) : rest_;
+}
+
+void SimulatedDevice::Pull(double elapsed_s) noexcept {
+  if (!(traction_N_ > 0)) return;
+  const Vec3d f_T = ForceAtTip(PoseFromAttachPoint(trocar_, hand_.position()), sent_);
+  const double force_N = f_T.norm();
+  if (point_.jaw_rad > kHolds_rad) {
+    offset_ *= std::exp(-elapsed_s / kLetGo_s);
+  } else if (force_N > kFeels_N) {
+    const double speed = std::clamp(kPull_m_per_Ns * (traction_N_ - force_N), -kFastestPull_m_s, kFastestPull_m_s);
+    offset_ -= elapsed_s * speed / force_N * f_T;
+    offset_ *= std::min(1.0, kFarthestPull_m / std::max(offset_.norm(), 1e-9));
+  }
 }
 
 Vec3d SimulatedDevice::ReadPosition(const Tick& tick) noexcept {
-  const Vec3d target = Target(tick.session_time_s);
   const double elapsed = 1e-9 * static_cast<double>(tick.stamp_ns - stamp_ns_);
   const bool same_session = std::abs(tick.session_time_s - session_time_s_ - elapsed) < kSessionJump_s ||
                             (tick.session_time_s < 0 && session_time_s_ < 0);
   if (!placed_ || !same_session) {
     placed_ = true;
-    hand_.Place(target);
-  } else if (elapsed > 0.0) {
-    hand_.Advance(target, force_, elapsed);
+    offset_.setZero();
+    hand_.Place(Target(tick.session_time_s));
+  } else {
+    if (elapsed > 0.0) Pull(elapsed);
+    const Vec3d target = Target(tick.session_time_s);
+    if (elapsed > 0.0) hand_.Advance(target, force_scale_ * sent_, elapsed);
   }
   session_time_s_ = tick.session_time_s;
   stamp_ns_ = tick.stamp_ns;

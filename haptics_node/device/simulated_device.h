@@ -11,6 +11,7 @@
 #include "haptics_node/device/recorded_motion.h"
 #include "haptics_node/device/workspace_map.h"
 #include "haptics_node/kinematics/trocar.h"
+#include "services/base/core/operator_script.h"
 #include "services/base/core/scene_view.h"
 
 namespace fulcrum::haptics {
@@ -26,15 +27,23 @@ class SimulatedDevice final : public HapticDevice {
   /// The hand plays a recorded motion of the attach point, transformed to the world by `map`.
   SimulatedDevice(const HandModel& hand, std::shared_ptr<const RecordedMotion> motion, const WorkspaceMap& map);
 
+  /// The hand of an assistant: while the script's jaw is closed it pulls against the tissue until the force at the tip
+  /// is this [N], wherever the tissue goes. 0: it follows the script alone.
+  void set_traction(double traction_N) { traction_N_ = traction_N; }
+  /// Attach point of a tool that the script does not move [m].
+  void set_rest(const Vec3d& p_WA) { rest_ = p_WA; }
   /// Share of the force that reaches the hand, 0 … 1.
   void set_force_scale(double scale) { force_scale_ = scale; }
 
   [[nodiscard]] Vec3d ReadPosition(const Tick& tick) noexcept override;
-  void WriteForce(const Vec3d& f_W) noexcept override { force_ = force_scale_ * f_W; }
+  [[nodiscard]] float ReadRoll() const noexcept override { return point_.roll_rad; }
+  void WriteForce(const Vec3d& f_W) noexcept override { sent_ = f_W; }
 
  private:
   /// Intended attach point at this session time.
-  [[nodiscard]] Vec3d Target(double session_time_s) const noexcept;
+  [[nodiscard]] Vec3d Target(double session_time_s) noexcept;
+  /// Moves offset_ towards the wanted traction.
+  void Pull(double elapsed_s) noexcept;
 
   HandOnDevice hand_;
   Trocar trocar_;
@@ -43,11 +52,15 @@ class SimulatedDevice final : public HapticDevice {
   std::shared_ptr<const RecordedMotion> motion_;
   WorkspaceMap map_;
   double force_scale_ = 1;
+  double traction_N_ = 0;
+  Vec3d rest_;
 
   bool placed_ = false;
   double session_time_s_ = 0;
   std::int64_t stamp_ns_ = 0;
-  Vec3d force_ = Vec3d::Zero();
+  ScriptPoint point_;             ///< Of the script at session_time_s_.
+  Vec3d offset_ = Vec3d::Zero();  ///< Of an assistant's tip from the script [m].
+  Vec3d sent_ = Vec3d::Zero();    ///< Force on the hand, before its scale [N].
 };
 
 }  // namespace fulcrum::haptics

@@ -50,6 +50,12 @@ WorkspaceMap MapOf(const config::CartConfig& cart, std::size_t tool, const Vec3d
   return map;
 }
 
+/// Attach point of a tool that nothing moves: a scope shows what the scene's `render` describes.
+Vec3d RestOf(const SceneView& scene, std::uint32_t tool, const Trocar& trocar) {
+  return scene.tools[tool].kind == ToolKind::kScope ? AttachPointForTip(trocar, scene.render.scope_tip_W.cast<double>())
+                                                    : RestingAttachPoint(trocar);
+}
+
 std::unique_ptr<HapticDevice> MakeSimulated(const DeviceConfig& device, const SceneView& scene, const Trocar& trocar,
                                             std::uint32_t tool, const WorkspaceMap& map) {
   const HandModel hand = HandOf(device.hand, scene.haptics);
@@ -61,6 +67,8 @@ std::unique_ptr<HapticDevice> MakeSimulated(const DeviceConfig& device, const Sc
         hand, std::make_shared<const RecordedMotion>(RecordedMotion::Load(device.motion)), map);
   }
   made->set_force_scale(device.force_scale);
+  made->set_traction(static_cast<double>(scene.tools[tool].traction_N));
+  made->set_rest(RestOf(scene, tool, trocar));
   return made;
 }
 
@@ -75,7 +83,7 @@ ScriptPoint FirstInView(const SceneView& scene, std::uint32_t tool) {
   double end_s = 0;
   for (const ScriptKey& key : scene.script) end_s = std::max(end_s, static_cast<double>(key.time_s));
   ScriptPoint first = EvaluateScript(scene.script, tool, 0);
-  if (!first.present) return first;
+  if (!first.present || scene.tools[tool].kind == ToolKind::kScope) return first;
   for (double time_s = 0; time_s <= end_s; time_s += kStep_s) {
     ScriptPoint point = EvaluateScript(scene.script, tool, time_s);
     if (sight.dot((point.p_W - scope.scope_tip_W).normalized()) > widest) return point;
@@ -108,7 +116,9 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
     const DeviceConfig& device = cart.devices[i];
     if (!used[i]) continue;
     const Trocar trocar{scene.tools[i].p_WP.cast<double>(), scene.tools[i].shaft_length_m};
-    switch (device.kind) {
+    // No person operates an assistant.
+    const bool assists = scene.tools[i].traction_N > 0 && device.kind == DeviceKind::kOperator;
+    switch (assists ? DeviceKind::kSimulated : device.kind) {
       case DeviceKind::kNone:
         break;
       case DeviceKind::kSimulated: {
@@ -121,7 +131,7 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
         // The rest of the script is the simulated operator's.
         const ScriptPoint first = FirstInView(scene, i);
         const Vec3d start =
-            first.present ? AttachPointForTip(trocar, first.p_W.cast<double>()) : RestingAttachPoint(trocar);
+            first.present ? AttachPointForTip(trocar, first.p_W.cast<double>()) : RestOf(scene, i, trocar);
         auto operated = std::make_unique<OperatedDevice>(HandOf(device.hand, scene.haptics), trocar, start);
         operated->set_force_scale(device.force_scale);
         made.notes.push_back("tool " + std::to_string(i) + ": moved by the operator's input");
@@ -133,7 +143,7 @@ CartDevices MakeCartDevices(const config::CartConfig& cart, const SceneView& sce
         const std::string& serial = found.empty() ? device.serial : found;
         const WorkspaceMap map = MapOf(cart, i, trocar.p_WP, serial, trocars, &made.notes);
         made.notes.push_back("tool " + std::to_string(i) + ": " + (trouble.empty() ? "Touch " + serial : trouble));
-        made.devices[i] = std::make_unique<TouchDevice>(driver, i, map, device.force_scale, RestingAttachPoint(trocar));
+        made.devices[i] = std::make_unique<TouchDevice>(driver, i, map, device.force_scale, RestOf(scene, i, trocar));
         break;
       }
     }

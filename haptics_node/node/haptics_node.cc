@@ -15,7 +15,12 @@ DeviceArray MakeScriptedDevices(const SceneView& scene, const std::array<bool, k
     const ToolDescription& tool = scene.tools[i];
     if (tool.kind == ToolKind::kNone || !simulated[i]) continue;
     const Trocar trocar{tool.p_WP.cast<double>(), tool.shaft_length_m};
-    devices[i] = std::make_unique<SimulatedDevice>(scene.haptics, trocar, scene.script, i);
+    auto device = std::make_unique<SimulatedDevice>(scene.haptics, trocar, scene.script, i);
+    device->set_traction(static_cast<double>(tool.traction_N));
+    if (tool.kind == ToolKind::kScope) {
+      device->set_rest(AttachPointForTip(trocar, scene.render.scope_tip_W.cast<double>()));
+    }
+    devices[i] = std::move(device);
   }
   return devices;
 }
@@ -112,8 +117,10 @@ void HapticsNode::FillHealth(Health* health) const {
   const ServoFigures figures = figures_.Load();
   const auto metric = [&](const char* name, double value) { health->metrics.push_back({name, value}); };
   metric("peak_force_N", figures.peak_force_N);
-  metric("force0_N", figures.force_N[0]);
-  metric("force1_N", figures.force_N[1]);
+  for (std::size_t i = 0; i < devices_.size(); ++i) {
+    // The first two always: reports and pages show them.
+    if (i < 2 || devices_[i]) metric(("force" + std::to_string(i) + "_N").c_str(), figures.force_N[i]);
+  }
   metric("model_age_ms", 1e3 * figures.model_age_s);
   metric("models_dropped", static_cast<double>(figures.models_dropped));
   metric("models_not_taken", static_cast<double>(models_not_taken_.load(std::memory_order_relaxed)));

@@ -6,6 +6,7 @@
 
 #include "services/base/core/error.h"
 #include "services/base/core/hash.h"
+#include "services/base/core/scope.h"
 
 namespace fulcrum::haptics {
 namespace {
@@ -24,6 +25,10 @@ Vec3f FieldCentre(const SceneView& scene) {
   return scene.rest_position.empty() ? sum : Vec3f(sum / static_cast<float>(scene.rest_position.size()));
 }
 
+/// A scope's x axis shows to the right in the picture, so that the picture is level without roll. @param up of the
+/// scene's line of sight, so that the axis does not jump.
+Vec3d RightOf(const Vec3d& d_W, const Vec3d& up) { return d_W.cross(up).normalized(); }
+
 /// World X, or Y where the direction from trocar to tissue is within 18 degrees of X. The roll of a tool is arbitrary,
 /// but it must not jump during a motion or at a restart.
 Vec3d RollReference(const Vec3f& p_WP, const Vec3f& field_centre) {
@@ -33,7 +38,9 @@ Vec3d RollReference(const Vec3f& p_WP, const Vec3f& field_centre) {
 
 }  // namespace
 
-ServoSettings ServoSettingsOf(const SceneView& scene) { return {scene.haptics, scene.tools, FieldCentre(scene)}; }
+ServoSettings ServoSettingsOf(const SceneView& scene) {
+  return {scene.haptics, scene.tools, FieldCentre(scene), LevelUp(scene.render)};
+}
 
 Servo::Servo(const ServoSettings& settings, const Devices& devices) : force_scale_(settings.params.force_scale) {
   for (std::size_t i = 0; i < channels_.size(); ++i) {
@@ -47,7 +54,8 @@ Servo::Servo(const ServoSettings& settings, const Devices& devices) : force_scal
     channel.device = devices[i];
     channel.kind = tool.kind;
     channel.trocar = {tool.p_WP.cast<double>(), tool.shaft_length_m};
-    channel.x_reference = RollReference(tool.p_WP, settings.field_centre);
+    channel.x_reference = tool.kind == ToolKind::kScope ? settings.level_up.cast<double>()
+                                                        : RollReference(tool.p_WP, settings.field_centre);
     channel.output.limit_N = settings.params.force_limit_N;
     channel.output.slew_N_per_ms = settings.params.slew_N_per_ms;
   }
@@ -84,6 +92,8 @@ void Servo::ReadDevice(Channel* channel, const Tick& tick) const noexcept {
   channel->p_WA = p_WA;
   channel->v_WA += dt_ / (dt_ + kVelocityFilter_s) * (channel->moved / dt_ - channel->v_WA);
   channel->pose = PoseFromAttachPoint(channel->trocar, p_WA);
+  if (const float roll = channel->device->ReadRoll(); std::isfinite(roll)) channel->roll = roll;
+  channel->buttons = channel->device->ReadButtons();
   channel->ring.Push(tick.stamp_ns, channel->pose.p_WT);
 }
 
@@ -116,7 +126,11 @@ void Servo::Render(Channel* channel, const Tick& tick) const noexcept {
 
 void Servo::TrackProxy(Channel* channel, const Vec3d& offset, bool first) const noexcept {
   const Vec3d p_WT = channel->pose.p_WT + offset;
-  const Eigen::Quaterniond q_WT = ToolOrientation(channel->pose.d_W, channel->x_reference);
+  const Vec3d& d_W = channel->pose.d_W;
+  const Vec3d& reference = channel->x_reference;
+  Eigen::Quaterniond q_WT =
+      ToolOrientation(d_W, channel->kind == ToolKind::kScope ? RightOf(d_W, reference) : reference);
+  if (channel->roll != 0) q_WT = q_WT * Eigen::AngleAxisd(static_cast<double>(channel->roll), Vec3d::UnitZ());
   if (!first) {
     const double blend = dt_ / (dt_ + kVelocityFilter_s);
     const Eigen::Quaterniond turn = q_WT * channel->q_WT.conjugate();
@@ -146,12 +160,14 @@ void Servo::FillRecord(const Tick& tick) noexcept {
     sample.w_WT = channel.w_WT.cast<float>();
     sample.f_W = ForceAtTip(channel.pose, sent).cast<float>();
     sample.model_age_s = static_cast<float>(std::max(0.0, age));
+    sample.buttons = channel.buttons;
     figures_.force_N[i] = sent.norm();
     figures_.peak_force_N = std::max(figures_.peak_force_N, figures_.force_N[i]);
     figures_.not_finite += channel.output.not_finite;
     hash.Add(std::as_bytes(std::span(channel.p_WA.data(), 3)));
     hash.Add(std::as_bytes(std::span(sent.data(), 3)));
     channel.model.AddTo(&hash);
+    if (channel.roll != 0) hash.AddValue(channel.roll);
   }
   hash.AddValue(age_.gain());
   figures_.state = age_.state();

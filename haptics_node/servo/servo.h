@@ -45,6 +45,7 @@ struct ServoSettings {
   std::array<ToolDescription, kMaxTools> tools{};
   /// Middle of the tissue at rest, frame W [m]: the direction from a trocar to it decides a tool's roll reference.
   Vec3f field_centre = Vec3f::Zero();
+  Vec3f level_up = Vec3f::UnitZ();  ///< "Up" of a scope's level picture, frame W.
 };
 [[nodiscard]] ServoSettings ServoSettingsOf(const SceneView& scene);
 
@@ -80,6 +81,8 @@ class Servo {
     Vec3d p_WT = Vec3d::Zero(), v_WT = Vec3d::Zero(), w_WT = Vec3d::Zero();  ///< Position and velocities of the proxy.
     Eigen::Quaterniond q_WT = Eigen::Quaterniond::Identity();
     double external_W = 0;
+    float roll = 0;  ///< About the shaft [rad].
+    std::uint8_t buttons = 0;
   };
 
   void ReadDevice(Channel* channel, const Tick& tick) const noexcept;

@@ -196,7 +196,7 @@ class ToolCollision {
   OpenCells open_;              ///< Removed cells around the hook.
   std::array<Patch, 2> patch_;  ///< Cache: the last normal now, and before this step.
   float band_ = 0;              ///< Rows are made for tissue this near to touch [m].
-  std::array<Vec3f, kMaxTools> force_{Vec3f::Zero(), Vec3f::Zero()};
+  std::array<Vec3f, kMaxTools> force_ = AtOrigin();
   std::vector<std::pair<std::uint64_t, Index>> row_order_;  ///< Scratch for rows and pairs.
 };
 

@@ -19,8 +19,8 @@
 
 namespace fulcrum::physics::implicit {
 
-/// Stiffness queries whose last answers are kept, as first guesses of the next ones.
-inline constexpr std::size_t kQueryCount = 4;
+/// Stiffness queries whose last answers are kept, as first guesses of the next ones: two of each tool.
+inline constexpr std::size_t kQueryCount = 2 * kMaxTools;
 
 /// What all stages work with. Of the particles, stages change positions and, during a stiffness query, inverse masses.
 struct SolverContext {

@@ -118,7 +118,7 @@ void PhysicsNode::TakeTools(std::int64_t now_ns) {
   const std::array<ToolInput, kMaxTools> last = inputs_;
   for (std::size_t i = 0; i < kMaxTools; ++i) {
     const ToolSample &a = before.tools[i], &b = after.tools[i];
-    if (a.kind != ToolKind::kNone && scene_.tools[i].kind != ToolKind::kNone) {
+    if (a.kind != ToolKind::kNone && TouchesTissue(scene_.tools[i].kind)) {
       const bool both = b.kind == a.kind;
       const ToolPose from{a.p_WT, a.q_WT.normalized(), inputs_[i].pose.jaw_rad};
       const ToolPose to = both ? ToolPose{b.p_WT, b.q_WT.normalized(), from.jaw_rad} : from;
@@ -385,8 +385,11 @@ void PhysicsNode::FillHealth(Health* health) const {
   add("max_displacement_mm", figures_.max_displacement_mm.load(std::memory_order_relaxed));
   add("grasped_particles", figures_.grasped.load(std::memory_order_relaxed));
   add("quarantined", static_cast<double>(figures_.quarantined.load(std::memory_order_relaxed)));
-  add("tissue_force0_N", figures_.force_N[0].load(std::memory_order_relaxed));
-  add("tissue_force1_N", figures_.force_N[1].load(std::memory_order_relaxed));
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    // The first two always: reports show them.
+    if (i >= 2 && !TouchesTissue(scene_.tools[i].kind)) continue;
+    add(("tissue_force" + std::to_string(i) + "_N").c_str(), figures_.force_N[i].load(std::memory_order_relaxed));
+  }
   add("asleep_ticks", static_cast<double>(figures_.asleep_ticks.load(std::memory_order_relaxed)));
   add("topology_edits", static_cast<double>(figures_.topology_edits.load(std::memory_order_relaxed)));
   add("torn_edges", figures_.torn_edges.load(std::memory_order_relaxed));

@@ -31,7 +31,7 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
       solver_(scene.physics, &model_, &particles_, pbd::KernelsFor(set), tissue::KernelsFor(set)),
       collision_(scene, &model_, &particles_, collision::KernelsFor(set)),
       tissue_collision_(scene, &model_, &particles_, collision::KernelsFor(set)),
-      grasps_{Grasp(scene), Grasp(scene)},
+      grasps_{Grasp(scene), Grasp(scene), Grasp(scene), Grasp(scene)},
       contacts_(scene, &model_, &particles_),
       cautery_(scene, &model_, &particles_),
       tears_(scene, &model_, &particles_) {
@@ -51,7 +51,9 @@ TissueSimulation::TissueSimulation(const TissueScene& scene, int threads, Instru
 }
 
 bool TissueSimulation::ImplicitCompliance::Stiffness(const Probe& probe, float horizon_s, float* newton_per_m) {
-  if ((simulation_->counters_.steps + probe.tool * kQueryEvery / 2) % kQueryEvery != 0) {
+  // Tools take turns: half, then a quarter of the period apart.
+  const std::uint64_t turn = probe.tool % 2 * (kQueryEvery / 2) + probe.tool / 2 * (kQueryEvery / 4);
+  if ((simulation_->counters_.steps + turn) % kQueryEvery != 0) {
     return false;
   }
   at_.clear();

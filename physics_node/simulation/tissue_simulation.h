@@ -158,7 +158,7 @@ class TissueSimulation {
   std::vector<ContactRow> rows_;
   std::vector<float> moved_;  ///< By block of particles: movement in the last step [m].
   /// Force of the tissue on a tool, mean over the substeps of the last step; mode accurate [N].
-  std::array<Vec3f, kMaxTools> tool_force_{Vec3f::Zero(), Vec3f::Zero()};
+  std::array<Vec3f, kMaxTools> tool_force_ = AtOrigin();
   float largest_speed_ = 0;  ///< Of the tissue in the last step; not in mode paper [m/s].
   ToolCollision collision_;
   TissueCollision tissue_collision_;

@@ -1,6 +1,7 @@
 #include "render_node/geometry/camera_control.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 namespace fulcrum::render {
@@ -15,6 +16,7 @@ constexpr float kSteepest = 0.97f;  // Limit of the cosine to the vertical, wher
 }  // namespace
 
 void CameraControl::Press(CameraKey key) {
+  if (held_) return;
   const Vec3f out = now_.scope_tip_W - now_.scope_target_W;
   const Vec3f side = Vec3f::UnitZ().cross(out).normalized();
   const auto turn = [&](float angle, const Vec3f& axis) {
@@ -52,7 +54,20 @@ void CameraControl::Press(CameraKey key) {
   }
 }
 
+void CameraControl::Hold(const Vec3f& eye, const Sight& sight, float zoom) {
+  held_ = true;
+  now_ = scene_;
+  now_.scope_tip_W = eye;
+  // The light is set for the tissue in the middle of the scene's own view, as by a camera's automatic exposure.
+  const float distance_m = std::clamp((scene_.scope_target_W - eye).norm(), kNearest_m, kFarthest_m);
+  now_.scope_target_W = eye + distance_m * sight.forward;
+  now_.roll_deg = RollOf(sight, LevelUp(sight.forward)) * 180 / std::numbers::pi_v<float>;
+  const float half = std::tan(RadiansOf(scene_.fov_deg) / 2);
+  now_.fov_deg = 2 * std::atan(half / zoom) * 180 / std::numbers::pi_v<float>;
+}
+
 void CameraControl::Follow(const Vec3f& p_W) {
+  if (held_) return;
   now_.scope_tip_W += p_W - now_.scope_target_W;
   now_.scope_target_W = p_W;
 }

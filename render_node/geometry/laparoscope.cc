@@ -1,7 +1,8 @@
 #include "render_node/geometry/laparoscope.h"
 
 #include <cmath>
-#include <numbers>
+
+#include "services/base/core/scope.h"
 
 namespace fulcrum::render {
 namespace {
@@ -15,18 +16,15 @@ constexpr float kBeamTilt = 0.25f;
 // Radius of the circle relative to the picture's height: it is cut by the edges, as with a zoomed camera head.
 constexpr float kCircle = 0.70f;
 
-constexpr float Radians(float degrees) { return degrees * std::numbers::pi_v<float> / 180; }
-
 }  // namespace
 
 Laparoscope MakeLaparoscope(const RenderParams& params) {
   Laparoscope scope;
   const Vec3f sight = params.scope_target_W - params.scope_tip_W;
   const Vec3f back = -sight.normalized();
-  // For a nearly vertical line of sight "up" in the picture is cranial (+y).
-  const Vec3f up_hint = std::abs(back.z()) > 0.9f ? Vec3f::UnitY() : Vec3f::UnitZ();
+  const Vec3f up_hint = LevelUp(back);
   // The picture turns clockwise when the camera turns the other way.
-  const Vec3f right = Eigen::AngleAxisf(Radians(params.roll_deg), back) * up_hint.cross(back).normalized();
+  const Vec3f right = Eigen::AngleAxisf(RadiansOf(params.roll_deg), back) * up_hint.cross(back).normalized();
   const Vec3f up = back.cross(right);
   scope.view.setIdentity();
   scope.view.block<1, 3>(0, 0) = right.transpose();
@@ -35,7 +33,7 @@ Laparoscope MakeLaparoscope(const RenderParams& params) {
   scope.view.block<3, 1>(0, 3) = -scope.view.block<3, 3>(0, 0) * params.scope_tip_W;
 
   const auto width = static_cast<float>(params.width), height = static_cast<float>(params.height);
-  const float focal = 1 / std::tan(Radians(params.fov_deg) / 2);
+  const float focal = 1 / std::tan(RadiansOf(params.fov_deg) / 2);
   scope.projection.setZero();
   scope.projection(0, 0) = focal * height / width;
   scope.projection(1, 1) = focal;
@@ -43,7 +41,7 @@ Laparoscope MakeLaparoscope(const RenderParams& params) {
   scope.projection(2, 3) = 2 * kFar * kNear / (kNear - kFar);
   scope.projection(3, 2) = -1;
 
-  const float tilt = kBeamTilt * Radians(params.scope_angle_deg);
+  const float tilt = kBeamTilt * RadiansOf(params.scope_angle_deg);
   scope.light_position = Vec3f(0.6f * kFibreOffset, kFibreOffset, 0);
   scope.light_axis = Vec3f(0, -std::sin(tilt), -std::cos(tilt));
   scope.wall_direction = (scope.view.block<3, 3>(0, 0) * Vec3f(0.15f, 0.25f, 1.0f)).normalized();

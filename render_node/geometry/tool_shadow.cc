@@ -40,12 +40,12 @@ void ToolShadow::Update(const Laparoscope& scope, std::span<const float> xyz,
   positions_.clear();
   coordinates_.clear();
   triangles_.clear();
-  if (std::all_of(tools.begin(), tools.end(), [](const ToolSample& t) { return t.kind == ToolKind::kNone; })) {
+  if (std::all_of(tools.begin(), tools.end(), [](const ToolSample& t) { return !TouchesTissue(t.kind); })) {
     return;
   }
   FindDepths(scope, xyz);
   for (std::size_t k = 0; k < tools.size(); ++k) {
-    if (tools[k].kind != ToolKind::kNone) {
+    if (TouchesTissue(tools[k].kind)) {
       AppendRibbon(scope, scene_.tools[k], tools[k]);
     }
   }

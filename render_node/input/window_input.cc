@@ -20,10 +20,12 @@ constexpr unsigned kPointerEvents = ButtonPressMask | ButtonReleaseMask | Pointe
 
 std::optional<HandsKey> KeyOf(KeySym symbol) {
   static const std::map<KeySym, HandsKey> kKeys{
-      {XK_1, HandsKey::kTool0},      {XK_2, HandsKey::kTool1},         {XK_j, HandsKey::kJaw},
-      {XK_k, HandsKey::kJawLock},    {XK_f, HandsKey::kCut},           {XK_g, HandsKey::kCoag},
-      {XK_space, HandsKey::kClutch}, {XK_Control_L, HandsKey::kDepth}, {XK_Control_R, HandsKey::kDepth},
-      {XK_Shift_L, HandsKey::kFine}, {XK_Shift_R, HandsKey::kFine},    {XK_v, HandsKey::kSteady}};
+      {XK_1, HandsKey::kTool0},         {XK_2, HandsKey::kTool1},      {XK_3, HandsKey::kTool2},
+      {XK_4, HandsKey::kTool3},         {XK_q, HandsKey::kRollLeft},   {XK_e, HandsKey::kRollRight},
+      {XK_j, HandsKey::kJaw},           {XK_k, HandsKey::kJawLock},    {XK_f, HandsKey::kCut},
+      {XK_g, HandsKey::kCoag},          {XK_space, HandsKey::kClutch}, {XK_Control_L, HandsKey::kDepth},
+      {XK_Control_R, HandsKey::kDepth}, {XK_Shift_L, HandsKey::kFine}, {XK_Shift_R, HandsKey::kFine},
+      {XK_v, HandsKey::kSteady}};
   const auto found = kKeys.find(symbol);
   return found == kKeys.end() ? std::nullopt : std::optional(found->second);
 }
@@ -236,7 +238,8 @@ void WindowInput::Run(const std::stop_token& stop) {
       sent_ns = now_ns;
     }
     const std::lock_guard lock(mutex_);
-    state_ = {hands.active(), hands.tool(), hands.locked(hands.tool()), hands.steady()};
+    state_ = {hands.active(), hands.tool(), view_.scope[static_cast<std::size_t>(hands.tool())],
+              hands.locked(hands.tool()), hands.steady()};
   }
   if (hands.active()) {
     connection_->Release(&hands);

@@ -19,7 +19,8 @@ namespace fulcrum::render {
 struct HandsState {
   bool active = false;
   int tool = 1;
-  bool locked = false;  ///< The jaw of that tool is locked.
+  bool scope = false;   ///< It is a scope.
+  bool locked = false;  ///< Its jaw is locked.
   bool steady = false;
   bool operator==(const HandsState&) const = default;
 };

@@ -8,7 +8,11 @@
 namespace fulcrum::render {
 namespace {
 
-constexpr int kBar = 10;  // Length of the force bar [characters].
+/// Tools by their place: left and right of the surgeon, and the assistant's.
+constexpr std::array<const char*, kMaxTools> kShort{"L", "R", "3", "4"};
+constexpr std::array<const char*, kMaxTools> kNames{"LEFT TOOL", "RIGHT TOOL", "TOOL 3", "TOOL 4"};
+constexpr float kSoiled = 0.3f;  // Of the lens: above it the picture says what to do.
+constexpr int kBar = 10;         // Length of the force bar [characters].
 
 std::string Number(const char* format, double value) {
   std::array<char, 32> text;
@@ -18,7 +22,7 @@ std::string Number(const char* format, double value) {
 
 std::string ForceBar(int tool, float force_N, float limit_N) {
   const int full = std::clamp(static_cast<int>(std::ceil(kBar * force_N / limit_N - 0.05f)), 0, kBar);
-  return (tool == 0 ? "L " : "R ") + std::string(static_cast<std::size_t>(full), '#') +
+  return std::string(kShort[static_cast<std::size_t>(tool)]) + " " + std::string(static_cast<std::size_t>(full), '#') +
          std::string(static_cast<std::size_t>(kBar - full), '-') + Number(" %.1f N", force_N);
 }
 
@@ -38,6 +42,9 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
   for (const std::string& late : state.late) {
     texts.push_back({Corner::kTopLeft, ++line, late, true});
   }
+  if (state.soil > kSoiled) {
+    texts.push_back({Corner::kTopLeft, ++line, "LENS SOILED: DRAW THE SCOPE BACK", true});
+  }
   if (state.paused) {
     texts.push_back({Corner::kTopLeft, ++line, "PAUSED", true});
   }
@@ -45,13 +52,16 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
     texts.push_back({Corner::kTopLeft, ++line, "CLICK OR ENTER: TAKE THE TOOLS", true});
   } else if (state.hands) {
     texts.push_back({Corner::kTopLeft, ++line,
-                     std::string(state.hands->tool == 0 ? "LEFT TOOL" : "RIGHT TOOL") +
-                         (state.hands->locked ? ", JAW LOCKED" : "") + (state.hands->steady ? ", STEADY" : "")});
+                     std::string(state.hands->scope ? "SCOPE" : kNames[static_cast<std::size_t>(state.hands->tool)]) +
+                         (!state.hands->locked ? ""
+                          : state.hands->scope ? ", ZOOMED"
+                                               : ", JAW LOCKED") +
+                         (state.hands->steady ? ", STEADY" : "")});
   }
   if (state.help && state.hands) {
-    for (const std::string_view key :
-         {"MOUSE MOVE", "WHEEL, CTRL DEPTH", "LEFT BUTTON, J JAW", "K LOCK JAW", "RIGHT BUTTON, F CUT",
-          "MIDDLE BUTTON, G COAG", "1 2 LEFT, RIGHT TOOL", "SPACE CLUTCH", "SHIFT FINE", "V STEADY", "ESC RELEASE"}) {
+    for (const std::string_view key : {"MOUSE MOVE", "WHEEL, CTRL DEPTH", "LEFT BUTTON, J JAW", "K LOCK JAW",
+                                       "RIGHT BUTTON, F CUT", "MIDDLE BUTTON, G COAG", "1 2 3 4 TOOL, SCOPE",
+                                       "Q E TURN THE TOOL", "SPACE CLUTCH", "SHIFT FINE", "V STEADY", "ESC RELEASE"}) {
       texts.push_back({Corner::kTopLeft, ++line, std::string(key)});
     }
   }

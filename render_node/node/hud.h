@@ -24,6 +24,7 @@ struct HudState {
   float slit_m = 0;
   Alarm ureter = Alarm::kNone, nerve = Alarm::kNone;
   std::vector<std::string> late;  ///< Texts for inputs that are late, such as "TISSUE HELD".
+  float soil = 0;                 ///< Of the lens.
   bool paused = false;
   bool help = false;
   std::optional<HandsState> hands;  ///< No value: the window operates nothing.

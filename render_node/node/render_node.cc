@@ -20,9 +20,11 @@ namespace {
 constexpr float kSamePlace = 2e-5f;   // [m]
 constexpr float kSameAngle = 0.002f;  // [rad]
 constexpr float kSameForce = 0.05f;   // [N]: half of the resolution of the displayed figure.
+constexpr float kSameZoom = 0.03f;    // [rad] of the ring: above the noise of a handle's potentiometer.
 constexpr float kBoils_C = 90;        // Highest temperature of a patch above which there is steam.
-constexpr double kTextLife_s = 4.0;   // Duration for which a temperature or a warning is shown.
-constexpr double kLate_s = 0.3;       // Timeout of topics with a rate of 100 Hz.
+constexpr float kSameSoil = 0.02f;
+constexpr double kTextLife_s = 4.0;  // Duration for which a temperature or a warning is shown.
+constexpr double kLate_s = 0.3;      // Timeout of topics with a rate of 100 Hz.
 
 bool LooksTheSame(const ToolSample& a, const ToolSample& b) {
   return a.kind == b.kind && (a.p_WT - b.p_WT).norm() < kSamePlace && a.q_WT.angularDistance(b.q_WT) < kSameAngle &&
@@ -44,6 +46,7 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       operator_stamper_(runtime::MonotonicNs()),
       picture_stamper_(runtime::MonotonicNs()),
       camera_(scene.render),
+      lens_(scene),
       figures_(scene.render.hud != 0) {
   if (ports_.pictures != nullptr) stream_ = std::make_unique<PictureStream>(ports_.pictures);
   if (ports_.operator_input == nullptr) return;
@@ -182,7 +185,7 @@ void RenderNode::UpdateTexts() {
   hud_.slit_m = topology_.cut_length_m;
   hud_.tip_C = Recent(temperature_time_s_) ? std::optional(temperature_C_) : std::nullopt;
   for (std::size_t k = 0; k < kMaxTools; ++k) {
-    const bool there = tools_.tools[k].kind != ToolKind::kNone;
+    const bool there = TouchesTissue(tools_.tools[k].kind);
     hud_.force_N[k] = there ? std::optional(tools_.tools[k].f_W.norm()) : std::nullopt;
   }
   const auto alarm = [this](std::size_t k) {
@@ -252,7 +255,8 @@ HandsView RenderNode::ViewNow() const {
   hands.forward = -view.row(2).head<3>().transpose();
   hands.pixel = 2.0f * std::tan(0.5f * kRadPerDeg * camera.fov_deg) / static_cast<float>(camera.height);
   for (std::size_t i = 0; i < kMaxTools; ++i) {
-    hands.present[i] = tools_.tools[i].kind != ToolKind::kNone;
+    hands.present[i] = tools_.tools[i].kind != ToolKind::kNone && !(scene_.tools[i].traction_N > 0);
+    hands.scope[i] = tools_.tools[i].kind == ToolKind::kScope;
     hands.tip[i] = tools_.tools[i].p_WT;
   }
   return hands;
@@ -272,7 +276,10 @@ PictureHeader RenderNode::HeaderNow() {
   header.forward_W = view.forward;
   header.pixel_rad = view.pixel;
   header.tip_W = view.tip;
-  for (std::size_t i = 0; i < kMaxTools; ++i) header.present |= view.present[i] ? 1u << i : 0u;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    header.present |= view.present[i] ? 1u << i : 0u;
+    header.scopes |= view.scope[i] ? 1u << i : 0u;
+  }
   header.scale = static_cast<float>(quality_.scale());
   return header;
 }
@@ -333,9 +340,16 @@ void RenderNode::TakeTools() {
       if (!LooksTheSame(tools_.tools[i], new_tools_.tools[i])) {
         tools_.tools[i] = new_tools_.tools[i];
         view_.SetTool(k, tools_.tools[i]);
+        if (tools_.tools[i].kind == ToolKind::kScope) FollowScope();
         changed_on_screen_ = changed_in_file_ = true;
       }
     }
+  }
+  lens_.Step(session_time_s_, tools_, contact_.touching && hud_.power_W > 0);
+  if (std::abs(lens_.soil() - hud_.soil) > kSameSoil || (lens_.soil() == 0 && hud_.soil != 0)) {
+    hud_.soil = lens_.soil();
+    view_.SetSoil(hud_.soil);
+    changed_on_screen_ = changed_in_file_ = true;
   }
   if (ports_.handles.TakeLatest(&new_handles_)) {
     arrivals_[2].time_s = session_time_s_;
@@ -347,12 +361,25 @@ void RenderNode::TakeTools() {
       const auto i = static_cast<std::size_t>(k);
       HandleSample& shown = handles_.handles[i];
       const HandleSample& now = new_handles_.handles[i];
-      if (now.present && std::abs(now.jaw_angle_rad - shown.jaw_angle_rad) > kSameAngle) {
+      const bool scope = scene_.tools[i].kind == ToolKind::kScope;
+      if (now.present && std::abs(now.jaw_angle_rad - shown.jaw_angle_rad) > (scope ? kSameZoom : kSameAngle)) {
         shown = now;
         view_.SetJaw(k, now.jaw_angle_rad);
+        if (scope) FollowScope();
         changed_on_screen_ = changed_in_file_ = true;
       }
     }
+  }
+}
+
+void RenderNode::FollowScope() {
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    const ToolSample& scope = tools_.tools[i];
+    if (scope.kind != ToolKind::kScope) continue;
+    camera_.Hold(scope.p_WT, SightOf(scope.q_WT, scene_.render.scope_angle_deg),
+                 ZoomAt(handles_.handles[i].jaw_angle_rad));
+    view_.SetCamera(camera_.params());
+    return;
   }
 }
 

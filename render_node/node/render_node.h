@@ -17,6 +17,7 @@
 #include "render_node/node/picture_stream.h"
 #include "render_node/node/stage.h"
 #include "render_node/offscreen/png_writer.h"
+#include "services/base/core/lens.h"
 #include "services/base/core/tick.h"
 #include "services/transport/bus/input_account.h"
 #include "services/transport/bus/port.h"
@@ -85,6 +86,8 @@ class RenderNode {
   void Apply(const TemperaturePatch& patch);
   void TakeThermal();
   void TakeTools();
+  /// The camera of a scene with a scope is where the scope is.
+  void FollowScope();
   [[nodiscard]] bool ready() const { return tissue_.header.stamp.sequence != 0; }
   void TakeEvents();
   void TakeGenerator();
@@ -126,6 +129,7 @@ class RenderNode {
   Bitmap picture_;
   HudState hud_;
   CameraControl camera_;
+  Lens lens_;
   bool figures_;             // Figures are shown.
   int followed_ = -1;        // Tool that the camera follows; -1: none.
   bool screenshot_ = false;  // A screenshot is requested.

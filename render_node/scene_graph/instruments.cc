@@ -32,7 +32,7 @@ Instruments::Instruments(const SceneView& scene) : root_(new osg::Group) {
     root_->addChild(instrument.body);
     if (std::any_of(scene.tool_meshes.begin(), scene.tool_meshes.end(), [k](const auto& m) { return m.tool == k; })) {
       BuildFromMeshes(scene, k, &instrument);
-    } else if (scene.tools[k].kind != ToolKind::kNone) {
+    } else if (TouchesTissue(scene.tools[k].kind)) {  // The picture is the scope's own.
       Build(scene.tools[k], &instrument);
     }
     SetJaw(static_cast<int>(k), 0);

@@ -224,11 +224,14 @@ void LaparoscopeView::SetCamera(const RenderParams& params) {
   wanted.scope_tip_W = params.scope_tip_W;
   wanted.scope_target_W = params.scope_target_W;
   wanted.roll_deg = params.roll_deg;
+  wanted.fov_deg = params.fov_deg;
   impl_->scope = MakeLaparoscope(wanted);
   impl_->layers.SetScope(impl_->scope);
   impl_->optics.SetScope(impl_->scope);
   impl_->ShineFrom(impl_->scope);
 }
+
+void LaparoscopeView::SetSoil(float soil) { impl_->optics.SetSoil(soil); }
 
 void LaparoscopeView::SetScale(float scale) { impl_->optics.SetScale(scale); }
 

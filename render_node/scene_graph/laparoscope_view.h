@@ -39,8 +39,10 @@ class LaparoscopeView {
   /// Advances smoke and blood. Returns true if the picture changes or will change by that.
   bool UpdateEffects(double session_time_s);
 
-  /// Sets the camera's position and target from `params`; size and field of view do not change.
+  /// Sets the camera's position, target, roll and field of view from `params`; the size does not change.
   void SetCamera(const RenderParams& params);
+  /// 0: clear lens … 1: nothing to be seen.
+  void SetSoil(float soil);
   /// Resolution of the scene as a share of the picture's width and height, in (0, 1]; text is always drawn at full
   /// resolution.
   void SetScale(float scale);

@@ -75,7 +75,8 @@ Optics::Optics(const Laparoscope& scope, int width, int height, osg::Node* backg
       circle_radius_(new osg::Uniform("circle_radius", 1.0f)),
       picture_centre_(new osg::Uniform("picture_centre", osg::Vec2())),
       texture_scale_(new osg::Uniform("texture_scale", osg::Vec2(1, 1))),
-      texture_most_(new osg::Uniform("texture_most", osg::Vec2(1, 1))) {
+      texture_most_(new osg::Uniform("texture_most", osg::Vec2(1, 1))),
+      soil_(new osg::Uniform("soil", 0.0f)) {
   osg::StateSet* state = node_->getOrCreateStateSet();
   state->addUniform(circle_radius_);
   state->addUniform(picture_centre_);
@@ -129,6 +130,7 @@ void Optics::AddField() {
   field.state()->addUniform(new osg::Uniform("scene_picture", static_cast<int>(kPictureUnit)));
   field.state()->addUniform(texture_scale_);
   field.state()->addUniform(texture_most_);
+  field.state()->addUniform(soil_);
   field.state()->setMode(GL_DEPTH_TEST, osg::StateAttribute::OFF);
   field.state()->setRenderBinDetails(0, "RenderBin");
   std::vector<Vec3f> positions{Vec3f::Zero()};
@@ -169,8 +171,10 @@ void Optics::SetScale(float scale) {
 }
 
 void Optics::SetScope(const Laparoscope& scope) {
-  background_.camera->setViewMatrix(ToOsg(scope.view));
-  scene_.camera->setViewMatrix(ToOsg(scope.view));
+  for (osg::Camera* camera : {background_.camera.get(), scene_.camera.get()}) {
+    camera->setViewMatrix(ToOsg(scope.view));
+    camera->setProjectionMatrix(ToOsg(scope.projection));
+  }
   BackgroundChanged();
 }
 

@@ -18,6 +18,8 @@ class Optics {
   /// Resolution of the scene as a share of width and height, in (0, 1].
   void SetScale(float scale);
   void SetScope(const Laparoscope& scope);
+  /// 0: clear lens … 1: nothing to be seen (services/base/core/lens.h).
+  void SetSoil(float soil) { soil_->set(soil); }
   /// Must be called when the scene has changed since its last picture.
   void SceneChanged();
   [[nodiscard]] osg::Group* node() const { return node_; }
@@ -36,7 +38,7 @@ class Optics {
   int width_;
   int height_;
   osg::ref_ptr<osg::Group> node_;
-  osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_;
+  osg::ref_ptr<osg::Uniform> circle_radius_, picture_centre_, texture_scale_, texture_most_, soil_;
   Target background_, scene_;
 };
 

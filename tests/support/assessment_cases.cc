@@ -80,6 +80,56 @@ double SpectralArc(const std::function<double(double)>& speed, double duration_s
 
 double MinimumJerkSpeed(double u) { return u <= 0 || u >= 1 ? 0 : 30 * u * u * (1 - u) * (1 - u); }
 
+/// A scope that touches tissue at 1 s and is in its trocar from 3 s on: its lens, smeared by 0.8, is clear 0.8 s later.
+void AddLens(SceneView scene, std::vector<KnownAnswer>* answers) {
+  const std::vector<Vec3f> tissue{Vec3f::Zero()};
+  scene.rest_position = tissue;
+  scene.tools[2].kind = ToolKind::kScope;
+  scene.tools[2].p_WP = {0, 0, 0.2f};
+  Assessor assessor(scene);
+  assessor.Begin(kStart_ns);
+  for (int i = 0; i <= std::lround(5 / kToolPeriod_s); ++i) {
+    const double time_s = i * kToolPeriod_s;
+    ToolState state = ToolAt(time_s, Vec3d::Zero(), kAside);
+    state.tools[2].kind = ToolKind::kScope;
+    const bool touches = time_s >= 1 && time_s < 1.1, drawn_back = time_s >= 3;
+    state.tools[2].p_WT = {0, 0, touches ? 0.001f : drawn_back ? 0.19f : 0.1f};
+    assessor.Add(state);
+  }
+  assessor.Finish();
+  answers->push_back({"lens_smeared.touch", ValueOf(assessor, Measure::kLensSmeared), 2.8});
+}
+
+/// A scope that turns about the vertical through the origin of W, where tool 0 is, with a tilted horizon.
+void AddScope(SceneView scene, std::vector<KnownAnswer>* answers) {
+  constexpr double kTilt_deg = 7, kOff_deg = 11, kSession_s = 4;
+  scene.tools[1] = {};
+  scene.tools[2].kind = ToolKind::kScope;
+  scene.render.scope_angle_deg = 0;
+  scene.render.scope_tip_W = {0, -0.1f, 0};
+  Assessor assessor(scene);
+  assessor.Begin(kStart_ns);
+  for (int i = 0; i <= std::lround(kSession_s / kToolPeriod_s); ++i) {
+    const double time_s = i * kToolPeriod_s;
+    ToolState state = ToolAt(time_s, Vec3d::Zero(), kAside);
+    ToolSample& scope = state.tools[2];
+    scope.kind = ToolKind::kScope;
+    const Eigen::AngleAxisd around(0.3 * time_s, Vec3d::UnitZ());
+    scope.p_WT = (around * Vec3d(0, -0.1, 0)).cast<float>();
+    // z of a level scope towards +y of W, y down; then off its target, level, and tilted, with changing sign.
+    Eigen::Matrix3d level;
+    level << Vec3d::UnitX(), -Vec3d::UnitZ(), Vec3d::UnitY();
+    const double sign = time_s < kSession_s / 2 ? 1 : -1;
+    scope.q_WT = (around * Eigen::AngleAxisd(kOff_deg * pi / 180, Vec3d::UnitZ()) * Eigen::Quaterniond(level) *
+                  Eigen::AngleAxisd(sign * kTilt_deg * pi / 180, Vec3d::UnitZ()))
+                     .cast<float>();
+    assessor.Add(state);
+  }
+  assessor.Finish();
+  answers->push_back({"horizon.tilted", ValueOf(assessor, Measure::kHorizon), kTilt_deg});
+  answers->push_back({"off_centre.turned", ValueOf(assessor, Measure::kOffCentre), kOff_deg});
+}
+
 void AddMotions(const SceneView& scene, std::vector<KnownAnswer>* answers) {
   const Reaches reaches;
   {
@@ -372,6 +422,8 @@ std::vector<KnownAnswer> KnownAnswers() {
   const AssessedScene scene;
   std::vector<KnownAnswer> answers;
   AddMotions(scene.view, &answers);
+  AddLens(scene.view, &answers);
+  AddScope(scene.view, &answers);
   AddForces(scene.view, &answers);
   AddLines(scene.view, &answers);
   AddHeat(scene.view, &answers);

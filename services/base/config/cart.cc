@@ -263,7 +263,7 @@ CartConfig::CartConfig() {
   for (HandleConfig& handle : handles) {
     handle.kind = LinkKind::kSimulated;
   }
-  handles[1].hand = Hand::kRight;
+  handles[1].hand = handles[3].hand = Hand::kRight;
   pedal.kind = LinkKind::kSimulated;
   for (DeviceConfig& device : devices) {
     device.kind = DeviceKind::kSimulated;

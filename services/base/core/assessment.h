@@ -31,12 +31,15 @@ enum class Measure : std::uint32_t {
   kDeviationMean,
   kDeviationMax,
   kDamageBeyondMargin,
+  kOffCentre,
+  kHorizon,
+  kLensSmeared,
   kUreterWarnings,
   kUreterInjuries,
   kNerveWarnings,
   kNerveInjuries
 };
-inline constexpr std::size_t kMeasureCount = 22;
+inline constexpr std::size_t kMeasureCount = 25;
 
 /// Part of a measure in the score.
 enum class MeasureRole : std::uint8_t {
@@ -85,6 +88,11 @@ inline constexpr std::array<MeasureInfo, kMeasureCount> kMeasures{{
      3, 0, 100, 5},
     {"damage_beyond_margin", "damage_beyond_margin_mm2", "thermal damage beyond the margin", "mm²", 1,
      MeasureRole::kSkill, false, false, 5, 0, 1e5f, 10},
+    {"off_centre", "off_centre_deg", "tool off the middle of the picture", "°", 1, MeasureRole::kSkill, false, false,
+     12, 0, 180, 0},
+    {"horizon", "horizon_deg", "tilt of the horizon", "°", 1, MeasureRole::kSkill, false, false, 5, 0, 180, 0},
+    {"lens_smeared", "lens_smeared_s", "time with a smeared lens", "s", 1, MeasureRole::kSkill, false, false, 2, 0,
+     3600, 0},
     {"ureter_warnings", "ureter_warnings", "ureter: warnings", "", 0, MeasureRole::kSkill, false, false, 0, 0, 1000, 5},
     {"ureter_injuries", "ureter_injuries", "ureter: injuries", "", 0, MeasureRole::kSkill, false, false, 0, 0, 1000,
      15},
@@ -99,7 +107,8 @@ inline constexpr std::array<MeasureInfo, kMeasureCount> kMeasures{{
 // ------------------------------------------------------------------------------------------- section assessment
 
 /// Instrument action that traces the planned line.
-enum class LineTracing : std::uint32_t { kCut = 0, kTouch = 1 };
+/// kView: the middle of the picture of a held scope.
+enum class LineTracing : std::uint32_t { kCut = 0, kTouch = 1, kView = 2 };
 
 /// Section `assessment` of a scene. The planned line itself is an array of the scene.
 struct AssessmentParams {

@@ -19,9 +19,9 @@ namespace fulcrum {
 #define FULCRUM_FIELDS_OF_HandleSample(F) F(present) F(jaw_angle_rad) F(jaw_rate_rad_s) F(quality) F(raw_counts)
 #define FULCRUM_FIELDS_OF_HandleState(F) F(stamp) F(handles) F(pedals)
 #define FULCRUM_FIELDS_OF_GeneratorSetting(F) F(stamp) F(cut_W) F(coag_W) F(blend_W)
-#define FULCRUM_FIELDS_OF_OperatorTool(F) F(p_WT) F(jaw_angle_rad) F(moves)
+#define FULCRUM_FIELDS_OF_OperatorTool(F) F(p_WT) F(jaw_angle_rad) F(roll_rad) F(moves)
 #define FULCRUM_FIELDS_OF_OperatorInput(F) F(stamp) F(claim_ns) F(tools) F(pedals) F(source)
-#define FULCRUM_FIELDS_OF_ToolSample(F) F(kind) F(state) F(p_WT) F(q_WT) F(v_WT) F(w_WT) F(f_W) F(model_age_s)
+#define FULCRUM_FIELDS_OF_ToolSample(F) F(kind) F(state) F(p_WT) F(q_WT) F(v_WT) F(w_WT) F(f_W) F(model_age_s) F(buttons)
 #define FULCRUM_FIELDS_OF_ToolState(F) F(stamp) F(tools)
 #define FULCRUM_FIELDS_OF_TissueFrameHeader(F) F(stamp) F(scene_hash) F(topology_revision) F(tool_sequence) \
   F(handle_sequence) F(session_time_s) F(simulated_time_s) F(vertex_count) F(grasping_tools)
@@ -41,7 +41,7 @@ namespace fulcrum {
   F(max_temperature_C)
 #define FULCRUM_FIELDS_OF_TemperaturePatch(F) F(header) F(texels)
 #define FULCRUM_FIELDS_OF_PictureHeader(F) F(stamp) F(session_time_s) F(tool_sequence) F(tissue_sequence) F(width) \
-  F(height) F(size) F(present) F(eye_W) F(right_W) F(up_W) F(forward_W) F(pixel_rad) F(tip_W) F(scale)
+  F(height) F(size) F(present) F(scopes) F(eye_W) F(right_W) F(up_W) F(forward_W) F(pixel_rad) F(tip_W) F(scale)
 #define FULCRUM_FIELDS_OF_Picture(F) F(header) F(jpeg)
 #define FULCRUM_FIELDS_OF_ThermalEvent(F) F(stamp) F(session_time_s) F(kind) F(material) F(temperature_C) F(value) \
   F(topology_revision)

@@ -17,12 +17,19 @@
 
 namespace fulcrum {
 
-inline constexpr int kMaxTools = 2;               ///< Devices, handles and tools on one cart.
+inline constexpr int kMaxTools = 4;               ///< Devices, handles and tools on one cart.
 inline constexpr int kMaxContacts = 4;            ///< Contacts per tool in a ContactModel.
 inline constexpr int kMaxTissueVertices = 25600;  ///< Capacity of a TissueFrame: 25600 * 12 B = 300 KiB.
 inline constexpr int kMaxMembraneNodes = 24576;   ///< Capacity of a TopologyState.
 inline constexpr int kPatchTexels = 256;          ///< Edge of a TemperaturePatch.
 inline constexpr int kAtlasTexels = 4096;         ///< Edge of the atlas.
+
+/// A place for each tool, at the origin.
+inline std::array<Vec3f, kMaxTools> AtOrigin() {
+  std::array<Vec3f, kMaxTools> places;
+  places.fill(Vec3f::Zero());
+  return places;
+}
 
 /// Identifies one sample of one writer.
 struct Stamp {
@@ -75,6 +82,7 @@ enum class OperatorSource : std::uint8_t { kNone, kWindow, kProgram, kBrowser };
 struct OperatorTool {
   Vec3f p_WT = Vec3f::Zero();  ///< Intended place of the tip [m].
   float jaw_angle_rad = 0;     ///< Intended angle, 0 closed to about 1.05 open.
+  float roll_rad = 0;          ///< Intended rotation about the shaft, clockwise as seen from the handle.
   bool moves = false;          ///< The source operates this tool.
 };
 
@@ -89,7 +97,11 @@ struct OperatorInput {
 
 // ------------------------------------------------------------------------------------------------ ToolState
 
-enum class ToolKind : std::uint8_t { kNone, kGrasper, kHook, kScissors };
+/// The jaw of a scope is the zoom ring of its camera head: 0 wide (services/base/core/scope.h).
+enum class ToolKind : std::uint8_t { kNone, kGrasper, kHook, kScissors, kScope };
+/// A scope is held clear of the tissue: nothing collides with it.
+constexpr bool TouchesTissue(ToolKind kind) { return kind != ToolKind::kNone && kind != ToolKind::kScope; }
+
 enum class ServoState : std::uint8_t { kOff, kNormal, kHold, kFade, kRise };
 
 struct ToolSample {
@@ -101,6 +113,7 @@ struct ToolSample {
   Vec3f w_WT = Vec3f::Zero();  ///< Angular velocity [rad/s].
   Vec3f f_W = Vec3f::Zero();   ///< Force sent to the hand, at the tip, after all limits [N].
   float model_age_s = 0;       ///< Age of the contact model in use [s].
+  std::uint8_t buttons = 0;    ///< Bit per pressed button of the device; bit 0: the one nearest to the tip.
 };
 
 struct ToolState {
@@ -275,20 +288,21 @@ inline constexpr std::size_t kMaxPictureBytes = 512 * 1024;
 
 /// A picture of the laparoscope with what shows where a pixel lies in W.
 struct PictureHeader {
-  Stamp stamp;                                                       ///< Time of the shown ToolState.
-  double session_time_s = 0;                                         ///< Session time at which it was drawn.
-  std::uint64_t tool_sequence = 0;                                   ///< Sequence of the shown ToolState; 0: none yet.
-  std::uint64_t tissue_sequence = 0;                                 ///< Sequence of the shown TissueFrame.
-  std::uint32_t width = 0;                                           ///< [pixels]
-  std::uint32_t height = 0;                                          ///< [pixels]
-  std::uint32_t size = 0;                                            ///< Used bytes of `jpeg`.
-  std::uint32_t present = 0;                                         ///< Bit per tool: the session has it.
-  Vec3f eye_W = Vec3f::Zero();                                       ///< Place of the eye [m].
-  Vec3f right_W = Vec3f::UnitX(), up_W = Vec3f::UnitZ();             ///< Unit vectors of the picture.
-  Vec3f forward_W = Vec3f::UnitY();                                  ///< Unit vector of the view.
-  float pixel_rad = 1e-3f;                                           ///< Angle of a pixel in the middle [rad].
-  std::array<Vec3f, kMaxTools> tip_W{Vec3f::Zero(), Vec3f::Zero()};  ///< Tips of the shown tools [m].
-  float scale = 1;                                                   ///< Drawn size over that of the picture.
+  Stamp stamp;                                            ///< Time of the shown ToolState.
+  double session_time_s = 0;                              ///< Session time at which it was drawn.
+  std::uint64_t tool_sequence = 0;                        ///< Sequence of the shown ToolState; 0: none yet.
+  std::uint64_t tissue_sequence = 0;                      ///< Sequence of the shown TissueFrame.
+  std::uint32_t width = 0;                                ///< [pixels]
+  std::uint32_t height = 0;                               ///< [pixels]
+  std::uint32_t size = 0;                                 ///< Used bytes of `jpeg`.
+  std::uint16_t present = 0;                              ///< Bit per tool: a person can operate it.
+  std::uint16_t scopes = 0;                               ///< Bit per tool: it is a scope.
+  Vec3f eye_W = Vec3f::Zero();                            ///< Place of the eye [m].
+  Vec3f right_W = Vec3f::UnitX(), up_W = Vec3f::UnitZ();  ///< Unit vectors of the picture.
+  Vec3f forward_W = Vec3f::UnitY();                       ///< Unit vector of the view.
+  float pixel_rad = 1e-3f;                                ///< Angle of a pixel in the middle [rad].
+  std::array<Vec3f, kMaxTools> tip_W = AtOrigin();        ///< Tips of the shown tools [m].
+  float scale = 1;                                        ///< Drawn size over that of the picture.
 };
 
 struct Picture {

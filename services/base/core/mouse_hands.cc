@@ -2,11 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+
+#include "services/base/core/scope.h"
 
 namespace fulcrum {
 namespace {
 
-constexpr float kOpenJaw_rad = 0.7f;     ///< Without a button.
+constexpr float kOpenJaw_rad = 0.7f;  ///< Without a button.
+/// Distance of a scope's tip from its pivot, about which a motion of the pointer turns the view [m].
+constexpr float kScopeLever_m = 0.12f;
+constexpr float kRollStep_rad = 5 * std::numbers::pi_v<float> / 180;
 constexpr float kWheelStep_m = 1.0e-3f;  ///< Along the view.
 constexpr float kFine = 0.25f;           ///< Factor of the motion while kFine is held.
 /// Longest distance of the intended place from the tip [m]: tissue that holds the tool must not store a motion that is
@@ -22,8 +28,9 @@ void MouseHands::SetView(const HandsView& view) {
     if (view.present[i] && !view_.present[i]) wanted_[i] = sent_[i] = view.tip[i];
   }
   view_ = view;
-  if (!view_.present[static_cast<std::size_t>(tool_)] && view_.present[static_cast<std::size_t>(1 - tool_)]) {
-    tool_ = 1 - tool_;
+  const auto first = std::find(view_.present.begin(), view_.present.end(), true);
+  if (!view_.present[static_cast<std::size_t>(tool_)] && first != view_.present.end()) {
+    tool_ = static_cast<int>(first - view_.present.begin());
   }
 }
 
@@ -50,13 +57,30 @@ void MouseHands::MoveTip(const Vec3f& by) {
 
 void MouseHands::Move(float x, float y) {
   // The tip stays under the pointer: a pixel is as large as it is at the depth of the tip.
-  const float depth = std::max(0.01f, view_.forward.dot(view_.tip[static_cast<std::size_t>(tool_)] - view_.eye));
+  // The picture of a scope follows it.
+  const auto tool = static_cast<std::size_t>(tool_);
+  const float depth =
+      view_.scope[tool] ? kScopeLever_m : std::max(0.01f, view_.forward.dot(view_.tip[tool] - view_.eye));
   const float metres = depth * view_.pixel;
   MoveTip(depth_ ? Vec3f(metres * y * view_.forward + metres * x * view_.right)
                  : Vec3f(metres * (x * view_.right + y * view_.up)));
 }
 
 void MouseHands::Turn(int steps) { MoveTip(kWheelStep_m * static_cast<float>(steps) * view_.forward); }
+
+void MouseHands::Roll(float by_rad) {
+  constexpr float kTurn = 2 * std::numbers::pi_v<float>;
+  if (!active() || clutch_) return;
+  float& roll = roll_[static_cast<std::size_t>(tool_)];
+  roll = std::clamp(roll + (fine_ ? kFine : 1.0f) * by_rad, -kTurn, kTurn);
+}
+
+void MouseHands::Choose(int tool) {
+  if (tool == tool_ || !view_.present[static_cast<std::size_t>(tool)]) return;
+  // The tool that is left keeps what it holds.
+  if (jaw_down_) locked_[static_cast<std::size_t>(tool_)] = true;
+  tool_ = tool;
+}
 
 void MouseHands::Press(HandsKey key, bool down) {
   if (!active()) return;
@@ -65,15 +89,15 @@ void MouseHands::Press(HandsKey key, bool down) {
   };
   switch (key) {
     case HandsKey::kTool0:
-    case HandsKey::kTool1: {
-      const int tool = key == HandsKey::kTool0 ? 0 : 1;
-      // The tool that is left keeps what it holds.
-      if (down && tool != tool_ && view_.present[static_cast<std::size_t>(tool)]) {
-        if (jaw_down_) locked_[static_cast<std::size_t>(tool_)] = true;
-        tool_ = tool;
-      }
+    case HandsKey::kTool1:
+    case HandsKey::kTool2:
+    case HandsKey::kTool3:
+      if (down) Choose(static_cast<int>(key) - static_cast<int>(HandsKey::kTool0));
       return;
-    }
+    case HandsKey::kRollLeft:
+    case HandsKey::kRollRight:
+      if (down) Roll(key == HandsKey::kRollLeft ? -kRollStep_rad : kRollStep_rad);
+      return;
     case HandsKey::kJaw:
       jaw_down_ = down;
       return;
@@ -114,7 +138,9 @@ OperatorInput MouseHands::At(std::int64_t now_ns) {
   for (std::size_t i = 0; i < input.tools.size(); ++i) {
     sent_[i] += share * (wanted_[i] - sent_[i]);
     const bool closed = locked_[i] || (jaw_down_ && static_cast<std::size_t>(tool_) == i);
-    input.tools[i] = {sent_[i], closed ? 0.0f : kOpenJaw_rad, view_.present[i]};
+    // The jaw of a scope is its zoom ring.
+    const float jaw = view_.scope[i] ? (closed ? kZoomRing_rad : 0.0f) : closed ? 0.0f : kOpenJaw_rad;
+    input.tools[i] = {sent_[i], jaw, roll_[i], view_.present[i]};
   }
   return input;
 }

@@ -12,15 +12,31 @@ namespace fulcrum {
 
 /// What the hands need of the picture, frame W.
 struct HandsView {
-  Vec3f eye = Vec3f::Zero();                                       ///< [m]
-  Vec3f right = Vec3f::UnitX(), up = Vec3f::UnitZ();               ///< Unit vectors of the picture.
-  Vec3f forward = Vec3f::UnitY();                                  ///< Unit vector of the view.
-  float pixel = 1e-3f;                                             ///< Size of a pixel at 1 m [m].
-  std::array<bool, kMaxTools> present{};                           ///< The session has this tool.
-  std::array<Vec3f, kMaxTools> tip{Vec3f::Zero(), Vec3f::Zero()};  ///< Newest places of the tips [m].
+  Vec3f eye = Vec3f::Zero();                          ///< [m]
+  Vec3f right = Vec3f::UnitX(), up = Vec3f::UnitZ();  ///< Unit vectors of the picture.
+  Vec3f forward = Vec3f::UnitY();                     ///< Unit vector of the view.
+  float pixel = 1e-3f;                                ///< Size of a pixel at 1 m [m].
+  std::array<bool, kMaxTools> present{};              ///< The session has this tool, and a person operates it.
+  std::array<bool, kMaxTools> scope{};                ///< It is a scope: its motion moves the picture.
+  std::array<Vec3f, kMaxTools> tip = AtOrigin();      ///< Newest places of the tips [m].
 };
 
-enum class HandsKey { kTool0, kTool1, kJaw, kJawLock, kCut, kCoag, kClutch, kDepth, kFine, kSteady };
+enum class HandsKey {
+  kTool0,
+  kTool1,
+  kTool2,
+  kTool3,
+  kJaw,
+  kJawLock,
+  kCut,
+  kCoag,
+  kClutch,
+  kDepth,
+  kFine,
+  kSteady,
+  kRollLeft,
+  kRollRight
+};
 
 class MouseHands {
  public:
@@ -44,6 +60,9 @@ class MouseHands {
   void Move(float x, float y);
   /// Steps of the wheel, positive away from the operator.
   void Turn(int steps);
+  /// Turns the tool about its shaft [rad], clockwise as seen from the handle; kRollLeft and kRollRight do the same in
+  /// steps of 5 degrees.
+  void Roll(float by_rad);
   void Press(HandsKey key, bool down);
 
   /// The present intention. @param now_ns CLOCK_MONOTONIC [ns].
@@ -51,6 +70,7 @@ class MouseHands {
 
  private:
   void MoveTip(const Vec3f& by);
+  void Choose(int tool);
 
   const OperatorSource source_;
   HandsView view_;
@@ -59,7 +79,8 @@ class MouseHands {
   bool jaw_down_ = false, clutch_ = false, depth_ = false, fine_ = false, steady_ = false;
   std::uint8_t pedals_ = kPedalNone;
   std::array<bool, kMaxTools> locked_{};
-  std::array<Vec3f, kMaxTools> wanted_{Vec3f::Zero(), Vec3f::Zero()}, sent_{Vec3f::Zero(), Vec3f::Zero()};
+  std::array<Vec3f, kMaxTools> wanted_ = AtOrigin(), sent_ = AtOrigin();
+  std::array<float, kMaxTools> roll_{};
   std::int64_t sent_ns_ = 0;
 };
 

@@ -15,11 +15,12 @@ struct ScriptPoint {
   float jaw_rad = 0;
   std::uint32_t pedals = 0;
   float power_W = 0;
+  float roll_rad = 0;
 };
 
-/// Script of one tool at session time `time_s`. Place and jaw follow a smoothstep from key to key, at rest at each key;
-/// pedals and power apply from their key to the next. Before the first key (also before a session is known) tool and
-/// jaw are at that key with pedals up; after the last key the state is that of the last key.
+/// Script of one tool at session time `time_s`. Place, jaw and roll follow a smoothstep from key to key, at rest at
+/// each key; pedals and power apply from their key to the next. Before the first key (also before a session is known)
+/// tool and jaw are at that key with pedals up; after the last key the state is that of the last key.
 /// @param script keys sorted by tool, then time.
 [[nodiscard]] inline ScriptPoint EvaluateScript(std::span<const ScriptKey> script, std::uint32_t tool, double time_s) {
   const auto first = std::lower_bound(script.begin(), script.end(), tool,
@@ -30,15 +31,17 @@ struct ScriptPoint {
   }
   const auto next = std::find_if(first, end, [time_s](const ScriptKey& key) { return key.time_s > time_s; });
   if (next == first) {
-    return {true, first->p_W, first->jaw_rad, 0u, 0.0f};
+    return {true, first->p_W, first->jaw_rad, 0u, 0.0f, first->roll_rad};
   }
   const ScriptKey& a = *(next - 1);
   if (next == end) {
-    return {true, a.p_W, a.jaw_rad, a.pedals, a.power_W};
+    return {true, a.p_W, a.jaw_rad, a.pedals, a.power_W, a.roll_rad};
   }
   const auto u = static_cast<float>((time_s - a.time_s) / (next->time_s - a.time_s));
   const float w = u * u * (3.0f - 2.0f * u);
-  return {true, a.p_W + w * (next->p_W - a.p_W), a.jaw_rad + w * (next->jaw_rad - a.jaw_rad), a.pedals, a.power_W};
+  const auto between = [w](const auto& from, const auto& to) { return from + w * (to - from); };
+  return {true,      a.p_W + w * (next->p_W - a.p_W),    between(a.jaw_rad, next->jaw_rad), a.pedals,
+          a.power_W, between(a.roll_rad, next->roll_rad)};
 }
 
 }  // namespace fulcrum

@@ -177,12 +177,15 @@ struct ProtectedPoint {
 };
 
 struct ToolDescription {
-  ToolKind kind;
-  Vec3f p_WP;  ///< Trocar pivot (the fulcrum) [m].
-  float shaft_radius_m;
-  float shaft_length_m;
-  float tip_radius_m;  ///< Radius of the capsule that touches tissue.
-  float tip_length_m;  ///< Length of the jaws, or of the hook's foot.
+  ToolKind kind = ToolKind::kNone;
+  Vec3f p_WP = Vec3f::Zero();  ///< Trocar pivot (the fulcrum) [m].
+  float shaft_radius_m = 0;
+  float shaft_length_m = 0;
+  float tip_radius_m = 0;  ///< Radius of the capsule that touches tissue.
+  float tip_length_m = 0;  ///< Length of the jaws, or of the hook's foot.
+  /// An assistant: no person operates this tool, and its scripted hand keeps this force at the tip while its jaws are
+  /// closed [N]. 0: none.
+  float traction_N = 0;
 };
 
 /// Part of an instrument that a mesh represents: everything that does not turn, or the jaw that opens towards +x or -x.
@@ -205,6 +208,7 @@ struct ScriptKey {
   float jaw_rad;
   std::uint32_t pedals;  ///< PedalBits, valid from this key to the tool's next one.
   float power_W;
+  float roll_rad = 0;  ///< Rotation about the shaft, clockwise as seen from the handle.
 };
 
 // --------------------------------------------------------------------------------------------------- the scene

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "services/base/core/error.h"
+#include "services/base/core/scope.h"
 #include "services/scene/builder/build.h"
 #include "services/scene/builder/flatten.h"
 #include "services/scene/builder/geometry.h"
@@ -288,6 +289,15 @@ void AddStructures(const SceneSettings& settings, const Sheet& sheet, SceneData*
   }
 }
 
+/// Bit per tool: it is a scope.
+std::uint32_t ScopesOf(const SceneSettings& settings) {
+  std::uint32_t scopes = 0;
+  for (std::size_t i = 0; i < settings.tools.size(); ++i) {
+    if (settings.tools[i].kind == ToolKind::kScope) scopes |= 1u << i;
+  }
+  return scopes;
+}
+
 void AddScript(const SceneSettings& settings, const Sheet& sheet, SceneData* scene) {
   for (const ScriptKeySettings& key : settings.script) {
     if (key.tool < 0 || key.tool >= kMaxTools || settings.tools[key.tool].kind == ToolKind::kNone) {
@@ -300,7 +310,10 @@ void AddScript(const SceneSettings& settings, const Sheet& sheet, SceneData* sce
     Vec3f p = key.world_m.value_or(Vec3f::Zero());
     if (!key.world_m) {
       const SheetPoint at = sheet.At(key.sheet.x(), key.sheet.y());
-      p = (at.p + key.height_m * at.normal).cast<float>() + key.offset_m;
+      const ToolDescription& tool = settings.tools[key.tool];
+      p = tool.kind == ToolKind::kScope ? TipLookingAt(at.p.cast<float>() + key.offset_m,
+                                                       static_cast<float>(key.height_m), tool.p_WP, settings.render)
+                                        : Vec3f((at.p + key.height_m * at.normal).cast<float>() + key.offset_m);
     }
     const double reach = (p - settings.tools[key.tool].p_WP).norm();
     const double longest = std::min(kLongestReach_m, settings.tools[key.tool].shaft_length_m - kLeastLever_m);
@@ -310,12 +323,14 @@ void AddScript(const SceneSettings& settings, const Sheet& sheet, SceneData* sce
                            std::to_string(1e3 * kLeastLever_m) + " to " + std::to_string(1e3 * longest) + " mm");
     }
     scene->script.push_back({static_cast<float>(key.time_s), static_cast<std::uint32_t>(key.tool), p,
-                             static_cast<float>(key.jaw_rad), key.pedals, static_cast<float>(key.power_W)});
+                             static_cast<float>(key.jaw_rad), key.pedals, static_cast<float>(key.power_W),
+                             static_cast<float>(key.roll_rad)});
   }
   std::stable_sort(scene->script.begin(), scene->script.end(), [](const ScriptKey& a, const ScriptKey& b) {
     return a.tool != b.tool ? a.tool < b.tool : a.time_s < b.time_s;
   });
-  if (settings.hand) scene->script = Perform(scene->script, *settings.hand, settings.script_duration_s);
+  if (settings.hand)
+    scene->script = Perform(scene->script, *settings.hand, settings.script_duration_s, ScopesOf(settings));
   scene->fixed.script_duration_s = static_cast<float>(settings.script_duration_s);
 }
 

@@ -53,16 +53,23 @@ std::optional<OperatorHand> HandNamed(std::string_view name) {
                         .hesitation = 0.1,
                         .lag_s = 0.05,
                         .pedal_lag_s = 0.05,
-                        .jaw_lag_s = 0.05};
+                        .jaw_lag_s = 0.05,
+                        .roll_rad = 0.02};
   }
   if (name == "novice") {
-    return OperatorHand{
-        .tremor_m = 0.4e-3, .drift_m = 1.5e-3, .hesitation = 0.7, .lag_s = 0.2, .pedal_lag_s = 0.5, .jaw_lag_s = 0.3};
+    return OperatorHand{.tremor_m = 0.4e-3,
+                        .drift_m = 1.5e-3,
+                        .hesitation = 0.7,
+                        .lag_s = 0.2,
+                        .pedal_lag_s = 0.5,
+                        .jaw_lag_s = 0.3,
+                        .roll_rad = 0.15};
   }
   return std::nullopt;
 }
 
-std::vector<ScriptKey> Perform(std::span<const ScriptKey> script, const OperatorHand& usual, double duration_s) {
+std::vector<ScriptKey> Perform(std::span<const ScriptKey> script, const OperatorHand& usual, double duration_s,
+                               std::uint32_t scopes) {
   std::mt19937 random(usual.seed);
   const OperatorHand hand = Varied(usual, &random);
   const double varied = std::clamp(hand.hesitation, 0.0, 0.9);
@@ -71,6 +78,9 @@ std::vector<ScriptKey> Perform(std::span<const ScriptKey> script, const Operator
     if (!EvaluateScript(script, tool, 0).present) continue;
     const std::array<Wander, 3> tremor{Wander(8, 12, &random), Wander(8, 12, &random), Wander(8, 12, &random)};
     const std::array<Wander, 3> drift{Wander(0.2, 0.8, &random), Wander(0.2, 0.8, &random), Wander(0.2, 0.8, &random)};
+    // Of a generator of its own, so that a scope changes nothing for the other tools.
+    std::mt19937 turns(usual.seed + 1);
+    const Wander roll(0.2, 0.8, &turns);
     const double pace_Hz = std::uniform_real_distribution<double>(0.5, 0.9)(random);
     const double pace_phase = std::uniform_real_distribution<double>(0, kTau)(random);
     // Time in the script: its rate is 1 + varied · cos(…), never negative.
@@ -87,10 +97,11 @@ std::vector<ScriptKey> Perform(std::span<const ScriptKey> script, const Operator
         point.p_W[axis] +=
             static_cast<float>(hand.tremor_m * tremor[n].At(time_s) + hand.drift_m * drift[n].At(time_s));
       }
+      if ((scopes >> tool & 1u) != 0) point.roll_rad += static_cast<float>(usual.roll_rad * roll.At(time_s));
       const ScriptPoint pedals = EvaluateScript(script, tool, now_s - hand.pedal_lag_s);
       performed.push_back({static_cast<float>(time_s), tool, point.p_W,
-                           EvaluateScript(script, tool, now_s - hand.jaw_lag_s).jaw_rad, pedals.pedals,
-                           pedals.power_W});
+                           EvaluateScript(script, tool, now_s - hand.jaw_lag_s).jaw_rad, pedals.pedals, pedals.power_W,
+                           point.roll_rad});
     }
   }
   return performed;

@@ -19,6 +19,7 @@ struct OperatorHand {
   double lag_s = 0;        ///< Tools behind the script.
   double pedal_lag_s = 0;  ///< Pedals behind the tools: down late, up late.
   double jaw_lag_s = 0;    ///< Jaws behind the tools.
+  double roll_rad = 0;     ///< RMS of the turn of a held scope about its shaft, 0.2 to 0.8 Hz: the horizon tilts.
   std::uint32_t seed = 0;  ///< Of the phases, and of a variation of all values by up to a quarter.
 };
 
@@ -28,8 +29,8 @@ struct OperatorHand {
 inline constexpr std::string_view kHandNames = "expert, novice";
 
 /// The script as this hand performs it, a key each 20 ms, with the same seed the same. @param script sorted by tool,
-/// then time.
+/// then time. @param scopes bit per tool: it is a scope.
 [[nodiscard]] std::vector<ScriptKey> Perform(std::span<const ScriptKey> script, const OperatorHand& hand,
-                                             double duration_s);
+                                             double duration_s, std::uint32_t scopes = 0);
 
 }  // namespace fulcrum::scene

@@ -99,6 +99,7 @@ struct ScriptKeySettings {
   double jaw_rad = 0;
   std::uint32_t pedals = kPedalNone;
   double power_W = 0;
+  double roll_rad = 0;
 };
 
 /// Appearance of a tool, from mesh files. The z axis of the files runs along the shaft to the tip; jaws are closed and,

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "services/base/core/scope.h"
 #include "services/scene/compiler/changes.h"
 #include "services/scene/compiler/yaml_parameters.h"
 
@@ -26,7 +27,8 @@ constexpr std::size_t kMaxPathPoints = 64;
 const StrictMap::Choices<ToolKind> kToolKinds = {{"none", ToolKind::kNone},
                                                  {"grasper", ToolKind::kGrasper},
                                                  {"hook", ToolKind::kHook},
-                                                 {"scissors", ToolKind::kScissors}};
+                                                 {"scissors", ToolKind::kScissors},
+                                                 {"scope", ToolKind::kScope}};
 const StrictMap::Choices<ProtectedKind> kProtectedKinds = {{"ureter", ProtectedKind::kUreter},
                                                            {"nerve", ProtectedKind::kNerve}};
 const StrictMap::Choices<SurfaceRole> kRoles = {{"abdominal_wall", SurfaceRole::kAbdominalWall},
@@ -176,6 +178,7 @@ StructureSettings ReadStructure(StrictMap map) {
 
 void ReadToolMeshes(StrictMap map, const ToolDescription& tool, const Folders& folders, ToolMeshSettings* meshes) {
   const bool has_jaws = tool.kind != ToolKind::kHook;
+  if (tool.kind == ToolKind::kScope) map.Fail("body", "a scope is not seen");
   meshes->scale_m = map.Choice("unit", meshes->scale_m, kLengthUnits);
   if (!has_jaws && map.Has("jaws")) {
     map.Fail("jaws", "a hook has none");
@@ -191,16 +194,25 @@ void ReadToolMeshes(StrictMap map, const ToolDescription& tool, const Folders& f
   meshes->origin_m = map.Vector3Si("origin_mm", meshes->origin_m, Range::Between(-500, 500));
 }
 
-void ReadTool(StrictMap map, const Folders& folders, ToolDescription* tool, ToolMeshSettings* meshes) {
+Vec3f TrocarFor(const RenderParams& render) {
+  constexpr float kInside_m = 0.12f;
+  return render.scope_tip_W - kInside_m * ShaftOf(render);
+}
+
+void ReadTool(StrictMap map, const Folders& folders, const RenderParams& render, ToolDescription* tool,
+              ToolMeshSettings* meshes) {
   tool->kind = map.Choice("kind", tool->kind, kToolKinds);
   if (tool->kind == ToolKind::kNone) {
     return;
   }
-  *tool = DefaultTool(tool->kind, map.Vector3Si("trocar_mm", Range::Between(-1000, 1000)));
+  // A scope without a trocar gets one on the axis of the shaft that shows what `render` describes.
+  const bool placed = tool->kind != ToolKind::kScope || map.Has("trocar_mm");
+  *tool = DefaultTool(tool->kind, placed ? map.Vector3Si("trocar_mm", Range::Between(-1000, 1000)) : TrocarFor(render));
   ReadSi(&map, "shaft_radius_mm", Range::Between(0.1, 20), &tool->shaft_radius_m);
   ReadSi(&map, "shaft_length_mm", Range::Between(50, 1000), &tool->shaft_length_m);
   ReadSi(&map, "tip_radius_mm", Range::Between(0.05, 20), &tool->tip_radius_m);
   ReadSi(&map, "tip_length_mm", Range::Between(0.1, 100), &tool->tip_length_m);
+  if (tool->kind == ToolKind::kGrasper) ReadSi(&map, "traction_N", Range::Between(0, 3), &tool->traction_N);
   if (auto entry = map.OptionalMap("meshes")) {
     ReadToolMeshes(*entry, *tool, folders, meshes);
   }
@@ -217,6 +229,7 @@ ScriptKeySettings ReadKey(StrictMap map, double duration_s) {
     key.offset_m = map.Vector3Si("offset_mm", key.offset_m, Range::Between(-200, 200));
   }
   ReadSi(&map, "jaw_deg", Range::Between(0, 90), &key.jaw_rad);
+  ReadSi(&map, "roll_deg", Range::Between(-180, 180), &key.roll_rad);
   key.pedals = map.Choice("pedal", key.pedals, kPedals);
   ReadSi(&map, "power_W", Range::Between(0, 300), &key.power_W);
   if (key.pedals != kPedalNone && !(key.power_W > 0)) {
@@ -299,15 +312,15 @@ SceneDescription Read(StrictYaml* yaml, const Folders& bases, const std::filesys
   for (StrictMap& entry : root.Maps("structures", 0, kMaxStructures)) {
     scene.structures.push_back(ReadStructure(entry));
   }
+  ReadRender(root.MapOrDefaults("render"), &scene.render);
   StrictMap tools = root.MapOrDefaults("tools");
   for (int i = 0; i < kMaxTools; ++i) {
     const std::string key = "tool" + std::to_string(i);
-    ReadTool(tools.MapOrDefaults(key), folders, &scene.tools[i], &scene.tool_meshes[i]);
+    ReadTool(tools.MapOrDefaults(key), folders, scene.render, &scene.tools[i], &scene.tool_meshes[i]);
   }
   ReadPhysics(root.MapOrDefaults("physics"), &scene.physics);
   ReadBreathing(root.MapOrDefaults("breathing"), scene.physics.mode, &scene.breathing);
   ReadThermal(root.MapOrDefaults("thermal"), &scene.thermal);
-  ReadRender(root.MapOrDefaults("render"), &scene.render);
   ReadHaptics(root.MapOrDefaults("haptics"), &scene.haptics);
   ReadScript(root.MapOrDefaults("script"), &scene);
   if (auto assessment = root.OptionalMap("assessment")) {

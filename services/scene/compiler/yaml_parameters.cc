@@ -151,7 +151,8 @@ void ReadLine(StrictMap map, AssessmentParams* a, std::vector<Vec2f>* line) {
       map.Fail("t", "a point of the line stands twice");
     }
   }
-  a->tracing = map.Choice("by", a->tracing, {{"cut", LineTracing::kCut}, {"touch", LineTracing::kTouch}});
+  a->tracing = map.Choice("by", a->tracing,
+                          {{"cut", LineTracing::kCut}, {"touch", LineTracing::kTouch}, {"view", LineTracing::kView}});
   ReadSi(&map, "reach_mm", Range::Between(0.1, 50), &a->line_reach_m);
 }
 

@@ -49,7 +49,7 @@ static_assert(sizeof(SectionEntry) == 56);
 struct FixedTool {
   std::uint32_t kind;
   Vec3f p_WP;
-  float shaft_radius_m, shaft_length_m, tip_radius_m, tip_length_m;
+  float shaft_radius_m, shaft_length_m, tip_radius_m, tip_length_m, traction_N;
 };
 struct FixedPart {
   char name[64];
@@ -67,7 +67,7 @@ struct FixedPart {
 };
 static_assert(sizeof(FixedPart) == 64 + sizeof(PhysicsParams) + sizeof(ThermalParams) + sizeof(RenderParams) +
                                        sizeof(HapticsParams) + sizeof(Breathing) + sizeof(AssessmentParams) +
-                                       sizeof(MembraneGrid) + 4 + kMaxTools * 32 + 8);
+                                       sizeof(MembraneGrid) + 4 + kMaxTools * 36 + 8);
 
 FixedPart ToFixed(const SceneView& view) {
   FixedPart fixed{};
@@ -82,8 +82,13 @@ FixedPart ToFixed(const SceneView& view) {
   fixed.tube_vertex_count = view.tube_vertex_count;
   for (int i = 0; i < kMaxTools; ++i) {
     const ToolDescription& t = view.tools[i];
-    fixed.tools[i] = {
-        static_cast<std::uint32_t>(t.kind), t.p_WP, t.shaft_radius_m, t.shaft_length_m, t.tip_radius_m, t.tip_length_m};
+    fixed.tools[i] = {static_cast<std::uint32_t>(t.kind),
+                      t.p_WP,
+                      t.shaft_radius_m,
+                      t.shaft_length_m,
+                      t.tip_radius_m,
+                      t.tip_length_m,
+                      t.traction_N};
   }
   fixed.script_duration_s = view.script_duration_s;
   fixed.node_mask = view.node_mask;
@@ -104,7 +109,7 @@ void FromFixed(const FixedPart& fixed, SceneView* view) {
     const FixedTool& t = fixed.tools[i];
     // A kind that does not fit is refused by the validation.
     const auto kind = static_cast<ToolKind>(std::min<std::uint32_t>(t.kind, 255));
-    view->tools[i] = {kind, t.p_WP, t.shaft_radius_m, t.shaft_length_m, t.tip_radius_m, t.tip_length_m};
+    view->tools[i] = {kind, t.p_WP, t.shaft_radius_m, t.shaft_length_m, t.tip_radius_m, t.tip_length_m, t.traction_N};
   }
   view->script_duration_s = fixed.script_duration_s;
   view->node_mask = fixed.node_mask;

@@ -19,8 +19,9 @@ void CheckBounds(std::initializer_list<Bound> bounds) {
 }
 
 void CheckAssessment(const AssessmentParams& a) {
-  if (a.tracing > LineTracing::kTouch) {
-    Fail("scene", "assessment.line.by = ", static_cast<std::uint32_t>(a.tracing), "; valid: 0 (cut), 1 (touch)");
+  if (a.tracing > LineTracing::kView) {
+    Fail("scene", "assessment.line.by = ", static_cast<std::uint32_t>(a.tracing),
+         "; valid: 0 (cut), 1 (touch), 2 (view)");
   }
   CheckBounds({{"assessment", static_cast<float>(a.on), 0, 1},
                {"assessment.line.reach", a.line_reach_m, 1e-4f, 0.05f},
@@ -122,7 +123,7 @@ void CheckParameters(const SceneView& s) {
   CheckPoint("scene", 1, r.scope_target_W);
   for (std::size_t i = 0; i < s.tools.size(); ++i) {
     const ToolDescription& tool = s.tools[i];
-    if (tool.kind > ToolKind::kScissors) {
+    if (tool.kind > ToolKind::kScope) {
       Fail("scene", "tool ", i, ": unknown kind ", static_cast<int>(tool.kind));
     }
     CheckPoint("scene", i, tool.p_WP);
@@ -130,6 +131,7 @@ void CheckParameters(const SceneView& s) {
     CheckRange("scene", "shaft_length_m", i, tool.shaft_length_m, 0, 2);
     CheckRange("scene", "tip_radius_m", i, tool.tip_radius_m, 0, 0.05);
     CheckRange("scene", "tip_length_m", i, tool.tip_length_m, 0, 0.5);
+    CheckRange("scene", "traction_N", i, tool.traction_N, 0, 3);
   }
   if (s.node_mask >> kNodeCount != 0) {
     Fail("scene", "node_mask = ", s.node_mask, ": only ", kNodeCount, " nodes exist");

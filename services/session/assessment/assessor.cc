@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace fulcrum::assessment {
 namespace {
@@ -15,6 +16,8 @@ constexpr double kPedalLate_s = 1;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
+double DegreesOf(double rad) { return rad * 180 / std::numbers::pi; }
+
 std::size_t At(Measure measure) { return static_cast<std::size_t>(measure); }
 
 }  // namespace
@@ -24,6 +27,7 @@ Assessor::Assessor(const SceneView& scene)
       motion_(scene.assessment),
       force_(scene.assessment, scene.physics),
       line_(scene),
+      scope_(scene),
       damage_(line_.line(), static_cast<double>(scene.assessment.margin_m),
               static_cast<double>(scene.membrane.texel_m)) {
   prompt_until_s_.fill(-1);
@@ -44,13 +48,25 @@ void Assessor::Raise(Prompt prompt, double until_s) {
 }
 
 void Assessor::Add(const ToolState& state) {
-  if (const double time_s = TimeOf(state.stamp); Counts(time_s)) motion_.Add(time_s, state);
+  const double time_s = TimeOf(state.stamp);
+  if (!Counts(time_s)) return;
+  // What an assistant does is not the trainee's.
+  ToolState own = state;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    if (Assists(i)) own.tools[i] = {};
+  }
+  motion_.Add(time_s, own);
+  if (scope_.Add(time_s, state)) Raise(Prompt::kOffLine, time_s + kStays_s);
 }
 
 void Assessor::Add(const ContactModel& model) {
   const double time_s = TimeOf(model.stamp);
   if (!Counts(time_s)) return;
-  const ForceMeter::Finding finding = force_.Add(time_s, model);
+  ContactModel own = model;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    if (Assists(i)) own.devices[i] = {};
+  }
+  const ForceMeter::Finding finding = force_.Add(time_s, own);
   if (finding.too_high) Raise(Prompt::kForceTooHigh, time_s + kStays_s);
   if (finding.slips) Raise(Prompt::kGraspSlips, time_s + kHappened_s);
 }
@@ -77,7 +93,7 @@ void Assessor::MeasureContacts(bool all) {
     generator_.DropBefore(ns);
     const LineMeter::Finding finding = line_.Add(contact);
     if (finding.pedal_without_contact) Raise(Prompt::kPedalWithoutContact, time_s + kStays_s);
-    if (finding.off_line) Raise(Prompt::kOffLine, time_s + kStays_s);
+    if (finding.off_line && !by_view()) Raise(Prompt::kOffLine, time_s + kStays_s);
     if (finding.ureter_near) Raise(Prompt::kUreterNear, time_s + kStays_s);
     if (finding.nerve_near) Raise(Prompt::kNerveNear, time_s + kStays_s);
     contacts_.pop_front();
@@ -130,15 +146,16 @@ MeasureValues Assessor::ToolFigures(int i) const {
   const ToolMotion& motion = motion_.tool(i);
   const ToolForce& force = force_.tool(i);
   const ToolKind kind = scene_.tools[static_cast<std::size_t>(i)].kind;
-  if (kind == ToolKind::kNone) return own;
+  if (kind == ToolKind::kNone || Assists(static_cast<std::size_t>(i))) return own;
+  const bool touches = TouchesTissue(kind);
   const auto set = [&](Measure measure, double value) { own[At(measure)] = value; };
   set(Measure::kTime, motion.first_s < 0 ? 0 : motion.last_s - motion.first_s);
   set(Measure::kPathLength, 1e3 * motion.path_m);
   set(Measure::kMovements, motion.movements);
   set(Measure::kIdle, motion.idle.total_s());
   if (motion.smoothness_count > 0) set(Measure::kSmoothness, motion.smoothness_sum / motion.smoothness_count);
-  set(Measure::kForceTime, force.force_time_Ns);
-  set(Measure::kPeakForce, force.peak_N);
+  if (touches) set(Measure::kForceTime, force.force_time_Ns);
+  if (touches) set(Measure::kPeakForce, force.peak_N);
   if (kind == ToolKind::kGrasper) {
     set(Measure::kGraspSlips, force.slips);
     set(Measure::kLift, 1e3 * force.lift_m);
@@ -163,6 +180,21 @@ void Assessor::SetOfMotion(MeasureValues* session) const {
   if (smooth_movements > 0) (*session)[At(Measure::kSmoothness)] = smoothness / smooth_movements;
 }
 
+void Assessor::SetOfScope(MeasureValues* session) const {
+  if (const auto tilt = scope_.horizon_rad()) (*session)[At(Measure::kHorizon)] = DegreesOf(*tilt);
+  if (const auto smeared_s = scope_.smeared_s()) (*session)[At(Measure::kLensSmeared)] = *smeared_s;
+  if (const auto off = scope_.off_centre_rad()) (*session)[At(Measure::kOffCentre)] = DegreesOf(*off);
+}
+
+void Assessor::SetOfLine(MeasureValues* session) const {
+  const auto set = [&](Measure measure, double value) { (*session)[At(measure)] = value; };
+  const LineMeter& line = by_view() ? scope_.line() : line_;
+  if (line.line().empty()) return;
+  set(Measure::kLineDone, 100 * line.done());
+  if (const auto mean = line.deviation_mean_m()) set(Measure::kDeviationMean, 1e3 * *mean);
+  if (const auto most = line.deviation_max_m()) set(Measure::kDeviationMax, 1e3 * *most);
+}
+
 void Assessor::SetOfHook(MeasureValues* session) const {
   const auto set = [&](Measure measure, double value) { (*session)[At(measure)] = value; };
   set(Measure::kPedalWithoutContact, line_.pedal_without_contact_s());
@@ -173,11 +205,7 @@ void Assessor::SetOfHook(MeasureValues* session) const {
   set(Measure::kUreterInjuries, alarms_[1]);
   set(Measure::kNerveWarnings, alarms_[2]);
   set(Measure::kNerveInjuries, alarms_[3]);
-  if (line_.line().empty()) return;
-  set(Measure::kLineDone, 100 * line_.done());
-  if (const auto mean = line_.deviation_mean_m()) set(Measure::kDeviationMean, 1e3 * *mean);
-  if (const auto most = line_.deviation_max_m()) set(Measure::kDeviationMax, 1e3 * *most);
-  set(Measure::kDamageBeyondMargin, 1e6 * damage_.beyond_margin_m2());
+  if (!line_.line().empty()) set(Measure::kDamageBeyondMargin, 1e6 * damage_.beyond_margin_m2());
 }
 
 Figures Assessor::figures() const {
@@ -201,6 +229,8 @@ Figures Assessor::figures() const {
   }
   SetOfMotion(&figures.session);
   if (hook) SetOfHook(&figures.session);
+  if (hook || by_view()) SetOfLine(&figures.session);
+  SetOfScope(&figures.session);
   return figures;
 }
 

@@ -20,6 +20,7 @@
 #include "services/session/assessment/force_meter.h"
 #include "services/session/assessment/line_meter.h"
 #include "services/session/assessment/motion_meter.h"
+#include "services/session/assessment/scope_meter.h"
 #include "services/session/assessment/score.h"
 
 namespace fulcrum::assessment {
@@ -61,8 +62,12 @@ class Assessor {
   /// Measures the waiting contacts whose pedal state is known, or all of them.
   void MeasureContacts(bool all);
   [[nodiscard]] MeasureValues ToolFigures(int i) const;
+  [[nodiscard]] bool Assists(std::size_t tool) const { return scene_.tools[tool].traction_N > 0; }
   void SetOfMotion(MeasureValues* session) const;
   void SetOfHook(MeasureValues* session) const;
+  void SetOfScope(MeasureValues* session) const;
+  void SetOfLine(MeasureValues* session) const;
+  [[nodiscard]] bool by_view() const { return scene_.assessment.tracing == LineTracing::kView; }
 
   SceneView scene_;
   bool begun_ = false;
@@ -71,6 +76,7 @@ class Assessor {
   MotionMeter motion_;
   ForceMeter force_;
   LineMeter line_;
+  ScopeMeter scope_;
   GeneratorInputs generator_;
   std::deque<HookSample> contacts_;  ///< Contacts that wait for the pedal state of their time.
   DamageMap damage_;

@@ -76,7 +76,7 @@ LineMeter::Finding LineMeter::Add(const HookSample& contact) {
       (spared.kind == ProtectedKind::kUreter ? finding.ureter_near : finding.nerve_near) |= near;
     }
   }
-  if (!line_.empty() && (energised || params_.tracing == LineTracing::kTouch)) {
+  if (!line_.empty() && (energised || params_.tracing != LineTracing::kCut)) {
     finding.off_line = Trace(at, continues);
   } else {
     last_.reset();

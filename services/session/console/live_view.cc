@@ -4,6 +4,7 @@
 #include <exception>
 #include <utility>
 
+#include "services/base/core/scope.h"
 #include "services/session/console/json.h"
 
 namespace fulcrum::console {
@@ -17,10 +18,10 @@ constexpr std::array kKeys{
     NamedKey{"tool0", HandsKey::kTool0},   NamedKey{"tool1", HandsKey::kTool1}, NamedKey{"jaw", HandsKey::kJaw},
     NamedKey{"lock", HandsKey::kJawLock},  NamedKey{"cut", HandsKey::kCut},     NamedKey{"coag", HandsKey::kCoag},
     NamedKey{"clutch", HandsKey::kClutch}, NamedKey{"depth", HandsKey::kDepth}, NamedKey{"fine", HandsKey::kFine},
-    NamedKey{"steady", HandsKey::kSteady},
+    NamedKey{"steady", HandsKey::kSteady}, NamedKey{"tool2", HandsKey::kTool2}, NamedKey{"tool3", HandsKey::kTool3},
 };
-/// Longest motion of the pointer in one message [pixels], and most steps of depth.
-constexpr double kLongestMove = 4000, kMostSteps = 50;
+/// Longest motion of the pointer in one message [pixels], most steps of depth, and widest turn [degrees].
+constexpr double kLongestMove = 4000, kMostSteps = 50, kWidestTurn = 90;
 
 std::optional<double> NumberOf(const Form& form, std::string_view name, double least, double most) {
   const auto found = form.find(name);
@@ -43,7 +44,10 @@ HandsView ViewOf(const PictureHeader& header) {
   view.forward = header.forward_W;
   view.pixel = header.pixel_rad;
   view.tip = header.tip_W;
-  for (std::size_t i = 0; i < kMaxTools; ++i) view.present[i] = (header.present >> i & 1u) != 0;
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    view.present[i] = (header.present >> i & 1u) != 0;
+    view.scope[i] = (header.scopes >> i & 1u) != 0;
+  }
   return view;
 }
 
@@ -124,6 +128,9 @@ void LiveView::Apply(const Form& form, std::int64_t now_ns) {
   const double y = NumberOf(form, "y", -kLongestMove, kLongestMove).value_or(0);
   if (x != 0 || y != 0) hands_.Move(static_cast<float>(x), static_cast<float>(y));
   if (const auto turn = NumberOf(form, "turn", -kMostSteps, kMostSteps)) hands_.Turn(static_cast<int>(*turn));
+  if (const auto roll = NumberOf(form, "roll", -kWidestTurn, kWidestTurn)) {
+    hands_.Roll(RadiansOf(static_cast<float>(*roll)));
+  }
   PressNamed(form, "up", false, &hands_);
   Write(now_ns);
 }
@@ -193,6 +200,8 @@ std::string LiveView::StateFor(const Socket* viewer) const {
   Json json('{');
   json.Text("controls", controls).Flag("ready", ports_.hands && picture_.header.stamp.sequence != 0);
   json.Number("tool", hands_.tool(), 1).Flag("locked", hands_.locked(hands_.tool())).Flag("steady", hands_.steady());
+  json.Number("present", picture_.header.present, 1);
+  json.Flag("scope", (picture_.header.scopes >> hands_.tool() & 1u) != 0);
   if (!trouble_.empty()) json.Text("trouble", trouble_);
   return json.Done();
 }

@@ -46,7 +46,7 @@ bool AllWithin(std::span<const float> values, float limit) {
 }
 
 bool IsTool(const ToolSample& t) {
-  return UpTo(t.kind, ToolKind::kScissors) && UpTo(t.state, ServoState::kRise) && Magnitude(t.p_WT, kMaxCoordinate_m) &&
+  return UpTo(t.kind, ToolKind::kScope) && UpTo(t.state, ServoState::kRise) && Magnitude(t.p_WT, kMaxCoordinate_m) &&
          IsUnit(t.q_WT) && Magnitude(t.v_WT, kMaxSpeed_m_s) && Magnitude(t.w_WT, kMaxTurnRate_rad_s) &&
          Magnitude(t.f_W, kMaxForce_N) && Within(t.model_age_s, 0.0, 1e9);
 }
@@ -93,7 +93,8 @@ bool PassesGate(const OperatorInput& m) noexcept {
   return IsStamp(m.stamp) && m.claim_ns >= 0 && m.claim_ns <= m.stamp.stamp_ns && ArePedals(m.pedals) &&
          UpTo(m.source, OperatorSource::kBrowser) &&
          std::all_of(m.tools.begin(), m.tools.end(), [](const OperatorTool& t) {
-           return Magnitude(t.p_WT, kMaxCoordinate_m) && Magnitude(t.jaw_angle_rad, kMaxJawAngle_rad);
+           return Magnitude(t.p_WT, kMaxCoordinate_m) && Magnitude(t.jaw_angle_rad, kMaxJawAngle_rad) &&
+                  Magnitude(t.roll_rad, kMaxRoll_rad);
          });
 }
 
@@ -153,9 +154,9 @@ bool PassesGate(const Picture& m) noexcept {
   const auto unit = [](const Vec3f& v) { return Within(v.norm(), 1.0f - kUnitTolerance, 1.0f + kUnitTolerance); };
   return IsStamp(h.stamp) && IsSessionTime(h.session_time_s) && h.width >= 1 && h.width <= kMaxEdge_px &&
          h.height >= 1 && h.height <= kMaxEdge_px && h.size <= kMaxPictureBytes && m.jpeg.size() == h.size &&
-         h.size >= kShortestJpeg && m.jpeg[0] == 0xff && m.jpeg[1] == 0xd8 && h.present >> kMaxTools == 0 &&
-         Magnitude(h.eye_W, kMaxCoordinate_m) && unit(h.right_W) && unit(h.up_W) && unit(h.forward_W) &&
-         Within(h.pixel_rad, 1e-6f, 1.0f) && Within(h.scale, 1e-3f, 1.0f) &&
+         h.size >= kShortestJpeg && m.jpeg[0] == 0xff && m.jpeg[1] == 0xd8 &&
+         (h.present | h.scopes) >> kMaxTools == 0 && Magnitude(h.eye_W, kMaxCoordinate_m) && unit(h.right_W) &&
+         unit(h.up_W) && unit(h.forward_W) && Within(h.pixel_rad, 1e-6f, 1.0f) && Within(h.scale, 1e-3f, 1.0f) &&
          std::all_of(h.tip_W.begin(), h.tip_W.end(), [](const Vec3f& p) { return Magnitude(p, kMaxCoordinate_m); });
 }
 

@@ -16,6 +16,7 @@ inline constexpr float kMaxTurnRate_rad_s = 1000.0f;
 inline constexpr float kMaxForce_N = 1000.0f;
 /// A jaw opens to about 1.05 rad; a miscalibrated one may read somewhat more [rad].
 inline constexpr float kMaxJawAngle_rad = 3.2f;
+inline constexpr float kMaxRoll_rad = 6.3f;
 /// Largest magnitude of a stiffness, viscosity or curvature; beyond it the number is an accident [SI].
 inline constexpr float kMaxCoefficient = 1e12f;
 /// Coldest and hottest tissue; arcs heat char to about 1000 °C.

@@ -138,6 +138,47 @@ TEST_F(RenderNodeTest, SendsEachChangeWhilePicturesAreReadAndNoneOtherwise) {
   EXPECT_EQ(Metric(*node, "pictures_sent"), 2) << "the topic has no reader";
 }
 
+TEST_F(RenderNodeTest, ThePictureIsThatOfTheHeldScope) {
+  view_.tools[2] = view_.tools[0];
+  view_.tools[2].traction_N = 1;  // An assistant.
+  view_.tools[3].kind = ToolKind::kScope;
+  view_.render.scope_angle_deg = 0;
+  const auto node = MakeNode();
+  SyntheticMoment moment = MakeSyntheticMoment(view_, 1.0);
+  ToolSample& scope = moment.tools.tools[3];
+  scope.kind = ToolKind::kScope;
+  scope.p_WT = {0.01f, -0.05f, 0.09f};
+  // Level, looking to +y and down.
+  const Vec3f shaft = Vec3f(0, 0.05f, -0.07f).normalized();
+  Mat3f turn;
+  turn << Vec3f::UnitX(), shaft.cross(Vec3f::UnitX()), shaft;
+  scope.q_WT = Quatf(turn);
+  moment.tools.tools[2].kind = ToolKind::kGrasper;
+  const auto reader = bus_.pictures.MakeInput();
+  Picture picture;
+  const auto show = [&](double time_s) {
+    moment.tools.stamp.sequence += 1;
+    Publish(moment);
+    node->Step(At(time_s));
+    for (int i = 0; i < 500 && !reader->TakeLatest(&picture); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  };
+  show(1.0);
+  EXPECT_EQ(picture.header.eye_W, scope.p_WT);
+  EXPECT_LT((picture.header.forward_W - shaft).norm(), 1e-5f);
+  EXPECT_LT((picture.header.right_W - Vec3f::UnitX()).norm(), 1e-5f);
+  EXPECT_EQ(picture.header.present, 0b1011u) << "nobody operates the assistant";
+  EXPECT_EQ(picture.header.scopes, 0b1000u);
+  const float wide = picture.header.pixel_rad;
+  scope.q_WT = Quatf(turn) * Quatf(Eigen::AngleAxisf(0.4f, Vec3f::UnitZ()));
+  moment.handles.handles[3] = {.present = true, .jaw_angle_rad = 1.0472f};
+  node->Press('r');  // The scope is held: keys do not turn the picture.
+  show(1.1);
+  EXPECT_NEAR(picture.header.right_W.dot(Vec3f::UnitX()), std::cos(0.4f), 1e-4f) << "its turn is the picture's";
+  EXPECT_NEAR(picture.header.pixel_rad, wide / 2, 1e-3f * wide) << "zoomed twice";
+}
+
 TEST(JpegEncoder, KeepsThePictureAndTheLimit) {
   Bitmap picture{64, 48, std::vector<std::uint8_t>(3 * 64 * 48)};
   // Red above, blue beneath; the first row is the bottom one.

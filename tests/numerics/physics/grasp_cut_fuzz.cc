@@ -168,7 +168,7 @@ void GraspCutFuzz::DoRestart() {
 }
 
 std::string GraspCutFuzz::Operate() {
-  const std::size_t tool = Below(kMaxTools);
+  const std::size_t tool = Below(kOperated);
   const float what = Unit();
   if (what < 0.28f) {
     DoGrasp(tool);

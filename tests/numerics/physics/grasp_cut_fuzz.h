@@ -34,6 +34,8 @@ class GraspCutFuzz {
   [[nodiscard]] std::uint64_t StateHash() const { return simulation_->StateHash(); }
 
  private:
+  static constexpr Index kOperated = 2;  ///< Tools.
+
   [[nodiscard]] float Unit() { return unit_(random_); }
   [[nodiscard]] Index Below(Index count) { return static_cast<Index>(random_() % count); }
   [[nodiscard]] Vec3f PlaceOnTissue();

@@ -111,7 +111,7 @@ TEST(GateRanges, TissueFrame) {
   ExpectRefused<TissueFrame>({{"more vertices than fit", [](auto& m) { m.header.vertex_count = 25601; }},
                               {"payload shorter than its count", [](auto& m) { m.xyz.pop_back(); }},
                               {"payload longer than its count", [](auto& m) { --m.header.vertex_count; }},
-                              {"a third tool grasps", [](auto& m) { m.header.grasping_tools = 4; }},
+                              {"a fifth tool grasps", [](auto& m) { m.header.grasping_tools = 16; }},
                               {"vertex outside the room", [](auto& m) { m.xyz[60000] = -10.5f; }}});
 }
 
@@ -130,7 +130,7 @@ TEST(GateRanges, ContactModel) {
 
 TEST(GateRanges, CauteryContact) {
   ExpectRefused<CauteryContact>(
-      {{"third tool", [](auto& m) { m.tool = 2; }},
+      {{"fifth tool", [](auto& m) { m.tool = 4; }},
        {"weights beyond 1",
         [](auto& m) {
           m.barycentric = {2, -1, 0};
@@ -155,6 +155,7 @@ TEST(GateRanges, GeneratorSetting) {
 
 TEST(GateRanges, OperatorInput) {
   ExpectRefused<OperatorInput>({{"a place beyond the room", [](auto& m) { m.tools[1].p_WT.x() = 11; }},
+                                {"more than a turn", [](auto& m) { m.tools[3].roll_rad = 7; }},
                                 {"a jaw beyond its stop", [](auto& m) { m.tools[0].jaw_angle_rad = 4; }},
                                 {"unknown pedal", [](auto& m) { m.pedals = 8; }},
                                 {"unknown source", [](auto& m) { m.source = BeyondLast<OperatorSource>(); }},
@@ -172,7 +173,8 @@ TEST(GateRanges, Picture) {
                              m.jpeg.resize(3);
                              m.header.size = 3;
                            }},
-                          {"a tool too many", [](auto& m) { m.header.present = 4; }},
+                          {"a tool too many", [](auto& m) { m.header.present = 16; }},
+                          {"a scope too many", [](auto& m) { m.header.scopes = 16; }},
                           {"an eye beyond the room", [](auto& m) { m.header.eye_W.z() = 11; }},
                           {"a view of no direction", [](auto& m) { m.header.forward_W.setZero(); }},
                           {"pixels of no size", [](auto& m) { m.header.pixel_rad = 0; }},

@@ -93,8 +93,8 @@ inline OperatorInput Sample(std::uint64_t sequence) {
   OperatorInput m;
   m.stamp = {sequence, 13, 4600};
   m.claim_ns = 4000;
-  m.tools[0] = {{0.01f, -0.02f, 0.03f}, 0.5f, true};
-  m.tools[1] = {{-0.04f, 0.05f, 0.06f}, 0.25f, true};
+  m.tools[0] = {{0.01f, -0.02f, 0.03f}, 0.5f, 0.125f, true};
+  m.tools[1] = {{-0.04f, 0.05f, 0.06f}, 0.25f, -0.5f, true};
   m.pedals = kPedalCoag;
   m.source = OperatorSource::kWindow;
   return m;
@@ -110,12 +110,13 @@ inline Picture Sample(std::uint64_t sequence) {
   m.header.width = 960;
   m.header.height = 540;
   m.header.present = 3;
+  m.header.scopes = 2;
   m.header.eye_W = Vec(0.11f);
   m.header.right_W = Vec3f::UnitY();
   m.header.up_W = Vec3f::UnitX();
   m.header.forward_W = -Vec3f::UnitZ();
   m.header.pixel_rad = 0.002f;
-  m.header.tip_W = {Vec(0.21f), Vec(0.31f)};
+  m.header.tip_W = {Vec(0.21f), Vec(0.31f), Vec(0.41f), Vec(0.51f)};
   m.header.scale = 0.75f;
   m.jpeg = {0xff, 0xd8, 1, 2, 3, 0xff, 0xd9};
   m.header.size = static_cast<std::uint32_t>(m.jpeg.size());

@@ -105,7 +105,7 @@ TEST_P(RefusedCart, SaysFileFieldAndValidRange) {
 const BadCart kBadCarts[] = {
     {"DomainZero", "domain: 0", "domain: '0' is not valid; valid: an integer from 1 to 100"},
     {"DomainAbove", "domain: 101", "1 to 100"},
-    {"UnknownTool", "handles: {tool2: {kind: simulated}}", "handles.tool2: unknown key"},
+    {"UnknownTool", "handles: {tool4: {kind: simulated}}", "handles.tool4: unknown key"},
     {"UnknownLinkKind", "handles: {tool0: {kind: usb}}", "valid: none, simulated, serial, operator"},
     {"UnknownDevice", "devices: {tool0: {kind: omega}}", "valid: none, simulated, touch, operator"},
     {"UnknownHandHold", "devices: {tool0: {hand: fist}}", "valid: scene, fingertip, light_grip, firm_grip"},

@@ -48,7 +48,8 @@ class LiveViewTest : public testing::Test {
     picture.header.eye_W = {0, -0.1f, 0};
     picture.header.up_W = Vec3f::UnitZ();
     picture.header.present = 3;
-    picture.header.tip_W = {Vec3f(-0.02f, 0, 0), Vec3f(0.02f, 0, 0)};
+    picture.header.tip_W[0] = {-0.02f, 0, 0};
+    picture.header.tip_W[1] = {0.02f, 0, 0};
     picture.jpeg = {0xff, 0xd8, static_cast<std::uint8_t>(drawn_), 0xff, 0xd9};
     picture.header.size = 5;
     ASSERT_TRUE(picture_out_->Write(picture));

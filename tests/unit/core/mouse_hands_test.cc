@@ -15,7 +15,8 @@ HandsView View() {
   view.eye = {0, -0.1f, 0};
   view.pixel = 1e-3f;
   view.present = {true, true};
-  view.tip = {Vec3f(-0.02f, 0, 0), Vec3f(0.02f, 0, 0)};
+  view.tip[0] = {-0.02f, 0, 0};
+  view.tip[1] = {0.02f, 0, 0};
   return view;
 }
 
@@ -118,6 +119,31 @@ TEST_F(MouseHandsTest, ControlsTakenBeforeTheToolsAreKnownMoveNothing) {
   hands.SetView(View());
   const OperatorInput input = hands.At(7 * kMs);
   for (std::size_t i = 0; i < kMaxTools; ++i) EXPECT_EQ(input.tools[i].p_WT, View().tip[i]) << "not the origin of W";
+}
+
+TEST_F(MouseHandsTest, AScopeTurnsWithThePointerRollsAndZooms) {
+  HandsView view = View();
+  view.present[2] = view.scope[2] = true;
+  view.tip[2] = view.eye;
+  hands_.SetView(view);
+  hands_.Take(5 * kMs);
+  hands_.Press(HandsKey::kTool3, true);
+  EXPECT_EQ(hands_.tool(), 1) << "the session has no fourth tool";
+  hands_.Press(HandsKey::kTool2, true);
+  EXPECT_EQ(hands_.tool(), 2);
+  hands_.Move(10, 0);
+  hands_.Press(HandsKey::kRollRight, true);
+  hands_.Roll(0.1f);
+  OperatorInput input = hands_.At(6 * kMs);
+  // The picture turns by the angle of ten pixels about a pivot 120 mm behind the lens.
+  EXPECT_LT((input.tools[2].p_WT - (view.eye + Vec3f(10 * 1e-3f * 0.12f, 0, 0))).norm(), 1e-6f);
+  EXPECT_NEAR(input.tools[2].roll_rad, 0.1f + 0.0872665f, 1e-5f);
+  EXPECT_EQ(input.tools[2].jaw_angle_rad, 0) << "wide";
+  EXPECT_EQ(input.tools[1].roll_rad, 0);
+  hands_.Press(HandsKey::kJawLock, true);
+  EXPECT_NEAR(hands_.At(7 * kMs).tools[2].jaw_angle_rad, 1.0472f, 1e-4f) << "zoomed";
+  hands_.Roll(1000);
+  EXPECT_LE(hands_.At(8 * kMs).tools[2].roll_rad, 6.2832f);
 }
 
 }  // namespace

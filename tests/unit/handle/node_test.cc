@@ -54,7 +54,7 @@ class NodeTest : public ::testing::Test {
 
   void Restart(std::int64_t epoch_ns) {
     HandleBridgeNode::Links links;
-    for (std::size_t tool = 0; tool < kMaxTools; ++tool) {
+    for (std::size_t tool = 0; tool < 2; ++tool) {
       links.handles[tool] = MakeLink(&handle_[tool]);
     }
     links.pedal = MakeLink(&pedal_);

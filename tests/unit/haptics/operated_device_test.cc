@@ -19,7 +19,7 @@ using testing::TickAt;
 
 Vec3d Tip(const Vec3d& p_WA) { return PoseFromAttachPoint(BenchTrocar(), p_WA).p_WT; }
 
-OperatorTool At(const Vec3f& tip) { return {tip, 0, true}; }
+OperatorTool At(const Vec3f& tip) { return {tip, 0, 0, true}; }
 
 /// Ticks from `begin` to below `end`, with a sample of the operator each 20 ms; the last tip.
 Vec3d Operate(OperatedDevice* device, std::uint64_t begin, std::uint64_t end, const OperatorTool& intention) {
@@ -37,6 +37,18 @@ TEST(OperatedDevice, RestsUntilItIsOperatedAndThenComesToThePlace) {
   EXPECT_LT((Operate(&device, 2, 500, OperatorTool()) - rest).norm(), 1e-12);
   const Vec3f wanted = rest.cast<float>() + Vec3f(0.02f, -0.01f, 0.01f);
   EXPECT_LT((Operate(&device, 500, 1500, At(wanted)) - wanted.cast<double>()).norm(), 1e-6);
+}
+
+TEST(OperatedDevice, TurnsAboutItsShaftAtBoundedSpeed) {
+  OperatedDevice device({}, BenchTrocar(), RestingAttachPoint(BenchTrocar()));
+  const Vec3f rest = Tip(device.ReadPosition(TickAt(1))).cast<float>();
+  OperatorTool intention = At(rest);
+  intention.roll_rad = 1;
+  Operate(&device, 2, 60, intention);
+  EXPECT_GT(device.ReadRoll(), 0.2f);
+  EXPECT_LT(device.ReadRoll(), 0.6f);
+  Operate(&device, 60, 400, intention);
+  EXPECT_FLOAT_EQ(device.ReadRoll(), 1);
 }
 
 TEST(OperatedDevice, AFarPlaceIsReachedAtBoundedSpeed) {

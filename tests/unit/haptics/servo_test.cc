@@ -11,6 +11,7 @@
 
 #include "haptics_node/device/simulated_device.h"
 #include "services/base/core/error.h"
+#include "services/base/core/scope.h"
 #include "tests/unit/haptics/loop.h"
 #include "tests/unit/haptics/rig.h"
 #include "tests/unit/haptics/test_tissue.h"
@@ -52,6 +53,35 @@ TEST(Servo, WithoutModelsThereIsNoForceAndTheToolIsPublished) {
   EXPECT_EQ(tool.model_age_s, 0.0f);                                      // The gate of the bus refuses negative ages.
   EXPECT_LT(loop.servo.figures().model_age_s, 0.0);
   EXPECT_EQ(loop.servo.record().tool.tools[1].kind, ToolKind::kNone);
+}
+
+TEST(Servo, AScopeIsLevelUntilItIsTurned) {
+  class Turned final : public HapticDevice {
+   public:
+    [[nodiscard]] Vec3d ReadPosition(const Tick& tick) noexcept override {
+      return AttachPointForTip(BenchTrocar(), Vec3d(0.03 * tick.session_time_s, 0.02, 0.05));
+    }
+    void WriteForce(const Vec3d& f_W) noexcept override { (void)f_W; }
+    [[nodiscard]] float ReadRoll() const noexcept override { return roll; }
+    [[nodiscard]] std::uint8_t ReadButtons() const noexcept override { return 2; }
+    float roll = 0;
+  } device;
+  SceneView scene = BenchScene(1);
+  scene.tools[0].kind = ToolKind::kScope;
+  scene.render.scope_tip_W = {0, -0.01f, 0.1f};  // Nearly vertical: level is cranial.
+  Servo servo(ServoSettingsOf(scene), {&device});
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    servo.Step(TickAt(i));
+    EXPECT_NEAR(RollOf(SightOf(servo.record().tool.tools[0].q_WT, 0), Vec3f::UnitY()), 0, 1e-4f) << i;
+  }
+  device.roll = 0.3f;
+  servo.Step(TickAt(1000));
+  EXPECT_NEAR(RollOf(SightOf(servo.record().tool.tools[0].q_WT, 0), Vec3f::UnitY()), -0.3f, 1e-4f);
+  EXPECT_EQ(servo.record().tool.tools[0].buttons, 2);
+  device.roll = std::numeric_limits<float>::quiet_NaN();
+  servo.Step(TickAt(1001));
+  EXPECT_NEAR(RollOf(SightOf(servo.record().tool.tools[0].q_WT, 0), Vec3f::UnitY()), -0.3f, 1e-4f)
+      << "the last valid one";
 }
 
 TEST(Servo, PressingAPlaneGivesItsSeriesStiffnessStraightOut) {

@@ -93,5 +93,32 @@ TEST(SimulatedDevice, AToolWithoutKeysRests) {
   EXPECT_TRUE(first.allFinite());
 }
 
+// A grasper closes at 1 s on tissue of 40 N/m, which later gives way by 10 mm.
+TEST(SimulatedDevice, AnAssistantKeepsItsTractionAndFollowsTheTissue) {
+  const std::array<ScriptKey, 3> script{{{0.0f, 0, Vec3f(0, 0, 0.05f), 0.8f, 0, 0},
+                                         {1.0f, 0, Vec3f(0, 0, 0.05f), 0, 0, 0},
+                                         {1.5f, 0, Vec3f(0, 0, 0.055f), 0, 0, 0}}};
+  const Trocar trocar = BenchTrocar();
+  constexpr double kStiffness_N_m = 40, kTraction_N = 0.6;
+  SimulatedDevice device({}, trocar, script, 0);
+  device.set_traction(kTraction_N);
+  Vec3d anchor(0, 0, 0.05);
+  double force_N = 0, fastest = 0;
+  Vec3d before = Vec3d::Zero();
+  for (std::uint64_t i = 0; i < 9000; ++i) {
+    const TrocarPose pose = PoseFromAttachPoint(trocar, device.ReadPosition(TickAt(i)));
+    if (i >= 5000 && i < 6000) anchor += Vec3d(0, 0, 10e-6);
+    const Vec3d pull = i < 1000 ? Vec3d(Vec3d::Zero()) : Vec3d(kStiffness_N_m * (anchor - pose.p_WT));
+    device.WriteForce(ForceAtAttachPoint(pose, pull));
+    force_N = pull.norm();
+    if (i > 1600) fastest = std::max(fastest, (pose.p_WT - before).norm() / 1e-3);
+    before = pose.p_WT;
+    if (i == 4999 || i == 8999) {
+      EXPECT_NEAR(force_N, kTraction_N, 0.05 * kTraction_N) << i;
+    }
+  }
+  EXPECT_LT(fastest, 0.05) << "no jerk in the hand";
+}
+
 }  // namespace
 }  // namespace fulcrum::haptics

@@ -173,6 +173,35 @@ TEST_F(OnSmallScene, OneToolFeelsWhatTheOtherDoes) {
   EXPECT_GT(power, 0.0f);
 }
 
+TEST_F(OnSmallScene, FourToolsGraspAtOnce) {
+  scene::SceneSettings settings = scene::Small();
+  for (std::size_t i = 0; i < kMaxTools; ++i) {
+    settings.tools[i] = scene::DefaultTool(ToolKind::kGrasper, Vec3f(0.05f * static_cast<float>(i), -0.05f, 0.1f));
+  }
+  const scene::SceneData data = scene::BuildProcedural(settings);
+  const SceneView scene = data.View();
+  TissueSimulation simulation(scene);
+  std::array<ToolInput, kMaxTools> tools;
+  for (int step = 0; step < 200; ++step) {
+    for (std::size_t i = 0; i < kMaxTools; ++i) {
+      const Vec3f place = scene.rest_position[scene.membrane.first + (20 + 10 * i) * scene.membrane.cols + 12];
+      tools[i].present = true;
+      tools[i].pose.q_WT = Quatf::FromTwoVectors(Vec3f::UnitZ(), -Vec3f::UnitZ());
+      tools[i].pose.jaw_rad = step < 30 ? 0.8f : 0.0f;
+      tools[i].pose.p_WT = place + Vec3f(0, 0, step < 60 ? -0.001f : 5e-5f * static_cast<float>(step - 80));
+    }
+    simulation.Step(tools);
+    for (std::uint32_t i = 0; i < kMaxTools; ++i) ASSERT_LE(simulation.Contacts(i).p_ext_W, 0.05f);
+  }
+  for (std::uint32_t i = 0; i < kMaxTools; ++i) {
+    EXPECT_FALSE(simulation.grasp(i).held().empty()) << i;
+    const DeviceContacts contacts = simulation.Contacts(i);
+    ASSERT_GT(contacts.count, 0u) << i;
+    EXPECT_EQ(contacts.contacts[0].kind, ContactKind::kGrasp) << i;
+    EXPECT_GT(contacts.contacts[0].f_ref.norm(), 0.05f) << i;
+  }
+}
+
 TEST_F(OnSmallScene, TheSameRunGivesTheSameHash) {
   std::vector<std::uint64_t> first, second;
   for (auto* hashes : {&first, &second}) {

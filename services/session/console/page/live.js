@@ -5,12 +5,14 @@
 const live = (() => {
   const kBeat = 20;      // ms between two messages while the controls are taken; without one for 250 ms the tools stop.
   const kStick = 9;      // Pixels of the picture per beat at the end of a stick's way, or while an arrow key is held.
-  const kKeys = {j: 'jaw', k: 'lock', f: 'cut', g: 'coag', 1: 'tool0', 2: 'tool1', v: 'steady', ' ': 'clutch', Shift: 'fine', Control: 'depth'};
+  const kTurn = 5;       // Degrees about the shaft for a press of q or e.
+  const kTools = ['left tool', 'right tool', 'tool 3', 'tool 4'];
+  const kKeys = {j: 'jaw', k: 'lock', f: 'cut', g: 'coag', 1: 'tool0', 2: 'tool1', 3: 'tool2', 4: 'tool3', v: 'steady', ' ': 'clutch', Shift: 'fine', Control: 'depth'};
   const kButtons = ['jaw', 'coag', 'cut'];  // Of the mouse: left, middle, right.
   const kPadButtons = {0: 'jaw', 1: 'lock', 4: 'tool0', 5: 'tool1', 6: 'coag', 7: 'cut'};
 
   let socket = null, connecting = false, seen = 0, hands = {controls: 'none'}, operated = false, running = false;
-  let x = 0, y = 0, turn = 0;
+  let x = 0, y = 0, turn = 0, roll = 0;
   const down = new Set(), arrows = new Set();
   let padDown = new Set();
 
@@ -22,8 +24,8 @@ const live = (() => {
   /** Sends what the pointer and the wheel have done since the last time; less than a step of depth waits. */
   function sendMotion() {
     const whole = Math.trunc(turn);
-    send({x: x.toFixed(2), y: y.toFixed(2), turn: whole});
-    x = y = 0;
+    send({x: x.toFixed(2), y: y.toFixed(2), turn: whole, roll: roll.toFixed(2)});
+    x = y = roll = 0;
     turn -= whole;
   }
   function press(key, pressed) {
@@ -92,8 +94,9 @@ const live = (() => {
   function showKeys() {
     $('hands').hidden = !operated || !socket;
     if ($('hands').hidden) return;
-    const tool = hands.tool === 0 ? 'left' : 'right';
-    const text = {you: `You operate the ${tool} tool${hands.locked ? ', jaw locked' : ''}${hands.steady ? ', tremor filter on' : ''}.`,
+    const tool = hands.scope ? 'scope' : kTools[hands.tool];
+    const locked = !hands.locked ? '' : hands.scope ? ', zoomed' : ', jaw locked';
+    const text = {you: `You operate the ${tool}${locked}${hands.steady ? ', tremor filter on' : ''}.`,
       browser: 'Another page has the controls.', window: 'The window has the controls.', program: 'A program has the controls.',
       none: 'Nobody has the controls; the tools stand still.'}[hands.controls];
     setText($('hands-state'), text);
@@ -103,7 +106,10 @@ const live = (() => {
     for (const button of document.querySelectorAll('#hands .held')) {
       button.hidden = !mine();
       const key = button.dataset.key;
-      const on = key === 'lock' ? hands.locked : key === 'tool0' ? hands.tool === 0 : key === 'tool1' ? hands.tool === 1 : down.has(key);
+      const chosen = key && key.startsWith('tool') ? Number(key.slice(4)) : -1;
+      // The first two tools always have a button; a third is rare.
+      if (chosen >= 2) button.hidden = !mine() || !(hands.present >> chosen & 1);
+      const on = key === 'lock' ? hands.locked : chosen >= 0 ? hands.tool === chosen : down.has(key);
       if (key) button.setAttribute('aria-pressed', on ? 'true' : 'false');
     }
   }
@@ -161,6 +167,8 @@ const live = (() => {
 
   let fingers = [];
   const spread = touches => touches.length < 2 ? 0 : Math.hypot(touches[0].clientX - touches[1].clientX, touches[0].clientY - touches[1].clientY);
+  const kLeastTwist = 2;  // Degrees between two fingers.
+  const angle = touches => 180 / Math.PI * Math.atan2(touches[1].clientY - touches[0].clientY, touches[1].clientX - touches[0].clientX);
   const places = touches => [...touches].map(t => ({clientX: t.clientX, clientY: t.clientY}));
   for (const kind of ['touchstart', 'touchend', 'touchcancel']) canvas.addEventListener(kind, event => { fingers = places(event.targetTouches); });
   canvas.addEventListener('touchmove', event => {
@@ -169,9 +177,11 @@ const live = (() => {
     const now = places(event.targetTouches);
     if (now.length === 1 && fingers.length === 1) move(now[0].clientX - fingers[0].clientX, now[0].clientY - fingers[0].clientY);
     if (now.length === 2 && fingers.length === 2) {
-      const steps = Math.trunc((spread(now) - spread(fingers)) / 12);
-      if (!steps) return;  // Small changes add up.
+      const steps = Math.trunc((spread(now) - spread(fingers)) / 12), twist = angle(now) - angle(fingers);
+      const degrees = (twist + 540) % 360 - 180;  // The shorter way round.
+      if (!steps && Math.abs(degrees) < kLeastTwist) return;  // Small changes add up.
       turn += steps;
+      roll += degrees;
     }
     fingers = now;
   }, {passive: false});
@@ -184,6 +194,7 @@ const live = (() => {
     // A button that has the focus is pressed by the space bar.
     if (event.key === ' ' && document.activeElement.tagName === 'BUTTON') return;
     if (event.key.startsWith('Arrow') || event.key.startsWith('Page')) arrows.add(event.key);
+    else if (event.key === 'q' || event.key === 'e') roll += event.key === 'q' ? -kTurn : kTurn;
     else if (!keyOf(event) || event.repeat) return;
     else press(keyOf(event), true);
     event.preventDefault();
