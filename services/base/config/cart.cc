@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "services/base/config/cart_inputs.h"
 #include "services/base/config/strict_yaml.h"
 
 namespace fulcrum::config {
@@ -142,6 +143,7 @@ CartConfig ReadCart(StrictYaml* file, CartConfig cart) {
   cart.verdict.restarts = static_cast<int>(verdict.Integer("restarts", cart.verdict.restarts, 0, kMostRestarts));
   StrictMap recorder = root.MapOrDefaults("recorder");
   cart.recorder.keep_free_MB = recorder.Number("keep_free_MB", cart.recorder.keep_free_MB, Range::Between(0, 1e6));
+  ReadInputs(root.MapOrDefaults("inputs"), &cart.inputs);
   file->Finish();
   return cart;
 }

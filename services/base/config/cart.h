@@ -10,6 +10,7 @@
 
 #include "services/base/config/strict_yaml.h"
 #include "services/base/core/messages.h"
+#include "services/base/core/pad_hands.h"
 
 namespace fulcrum::config {
 
@@ -131,6 +132,12 @@ struct RecorderConfig {
   double keep_free_MB = 500;  ///< Free space that a recording leaves: it ends in order before [10^6 B].
 };
 
+/// Assignment of the inputs beside mouse and keyboard, at the window.
+struct InputsConfig {
+  PadSettings gamepad;
+  PadSettings space_mouse = PadSettings::OfSpaceMouse();
+};
+
 struct CartConfig;
 /// True if an operator's input moves a tool of the cart, a handle or the pedal (kind: operator).
 [[nodiscard]] bool IsOperated(const CartConfig& cart);
@@ -147,6 +154,7 @@ struct CartConfig {
   SecurityConfig security;
   VerdictConfig verdict;
   RecorderConfig recorder;
+  InputsConfig inputs;
 
   /// Everything simulated, at the rates of the architecture page.
   CartConfig();

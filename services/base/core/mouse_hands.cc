@@ -82,6 +82,8 @@ void MouseHands::Choose(int tool) {
   tool_ = tool;
 }
 
+void MouseHands::Push(const Vec3f& by) { MoveTip(by.x() * view_.right + by.y() * view_.up + by.z() * view_.forward); }
+
 void MouseHands::Press(HandsKey key, bool down) {
   if (!active()) return;
   const auto pedal = [&](std::uint8_t bit) {

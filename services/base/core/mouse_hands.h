@@ -19,6 +19,7 @@ struct HandsView {
   std::array<bool, kMaxTools> present{};              ///< The session has this tool, and a person operates it.
   std::array<bool, kMaxTools> scope{};                ///< It is a scope: its motion moves the picture.
   std::array<Vec3f, kMaxTools> tip = AtOrigin();      ///< Newest places of the tips [m].
+  std::array<float, kMaxTools> force_N{};             ///< Forces at the tips [N].
 };
 
 enum class HandsKey {
@@ -63,6 +64,8 @@ class MouseHands {
   /// Turns the tool about its shaft [rad], clockwise as seen from the handle; kRollLeft and kRollRight do the same in
   /// steps of 5 degrees.
   void Roll(float by_rad);
+  /// Motion of the tip: to the right and up in the picture, and along the view [m].
+  void Push(const Vec3f& by);
   void Press(HandsKey key, bool down);
 
   /// The present intention. @param now_ns CLOCK_MONOTONIC [ns].

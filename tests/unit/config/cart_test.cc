@@ -53,6 +53,23 @@ TEST(Cart, TouchFileNamesTwoDevices) {
   EXPECT_NE(cart.devices[0].serial, cart.devices[1].serial);
 }
 
+TEST(Cart, AssignsAxesAndButtonsOfAGamepadByName) {
+  const CartConfig cart = LoadCartText(
+      "inputs: {gamepad: {speed_mm_s: 80, motion: {up: -left_y}, buttons: {cut: a, jaw: right_trigger}},\n"
+      "         space_mouse: {motion: {along: -turn_x}, buttons: {jaw: none}}}",
+      "cart.yaml");
+  const PadSettings& pad = cart.inputs.gamepad;
+  EXPECT_FLOAT_EQ(pad.speed_m_s, 0.08f);
+  EXPECT_EQ(pad.motion[0], PadDirection{PadAxis::kLeftX});
+  EXPECT_EQ(pad.motion[1], (PadDirection{PadAxis::kLeftY, -1}));
+  EXPECT_EQ(pad.buttons[static_cast<std::size_t>(PadAction::kCut)], PadButton::kA);
+  EXPECT_EQ(pad.buttons[static_cast<std::size_t>(PadAction::kCoag)], PadButton::kLeftTrigger);
+  EXPECT_EQ(cart.inputs.space_mouse.motion[2], (PadDirection{PadAxis::kTurnX, -1}));
+  EXPECT_EQ(cart.inputs.space_mouse.buttons[static_cast<std::size_t>(PadAction::kJaw)], std::nullopt);
+  const std::string yaml = CartToYaml(cart);
+  EXPECT_EQ(CartToYaml(LoadCartText(yaml, "effective")), yaml);
+}
+
 TEST(Cart, MotionFileIsFoundFromTheCartsFolder) {
   const auto folder = std::filesystem::temp_directory_path();
   const auto file = folder / ("cart_test." + std::to_string(::getpid()) + ".yaml");
@@ -147,6 +164,17 @@ const BadCart kBadCarts[] = {
     {"Threads", "nodes: {physics_node: {threads: 17}}", "an integer from 1 to 16"},
     {"ThreadsElsewhere", "nodes: {thermal_node: {threads: 2}}", "threads"},
     {"Spin", "nodes: {physics_node: {spin_us: 1000}}", "valid: 0 to 500 us"},
+    {"PadSpeed", "inputs: {gamepad: {speed_mm_s: 0}}",
+     "inputs.gamepad.speed_mm_s: '0' is out of range; valid: 1 to 500"},
+    {"PadDeadZone", "inputs: {gamepad: {dead_zone_percent: 95}}", "valid: 0 to 90 %"},
+    {"PadAxis", "inputs: {gamepad: {motion: {up: left_z}}}", "valid: none, left_x, -left_x, left_y"},
+    {"PadAxisOfASpaceMouse", "inputs: {gamepad: {motion: {up: turn_x}}}", "valid: none, left_x"},
+    {"PadButton", "inputs: {gamepad: {buttons: {cut: r2}}}", "valid: none, a, b, x, y, back"},
+    {"PadAction", "inputs: {gamepad: {buttons: {fire: a}}}", "inputs.gamepad.buttons.fire: unknown key"},
+    {"PadButtonTwice", "inputs: {gamepad: {buttons: {cut: a}}}", "inputs.gamepad.buttons.cut: button a also does jaw"},
+    {"PadRumble", "inputs: {gamepad: {rumble_from_N: 4}}", "rumble_full_N must be above rumble_from_N"},
+    {"SpaceMouseButton", "inputs: {space_mouse: {buttons: {cut: a}}}", "valid: none, first, second"},
+    {"SpaceMouseRumble", "inputs: {space_mouse: {rumble_from_N: 1}}", "unknown key"},
 };
 
 INSTANTIATE_TEST_SUITE_P(Rules, RefusedCart, ::testing::ValuesIn(kBadCarts),
