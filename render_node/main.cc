@@ -20,9 +20,9 @@ ExitCode RunRender(app::NodeApp& app) {
   settings.window = app.options().TakeFlag("--window") || hands;
   settings.quality = render::QualityFromName(app.options().TakeValue("--quality", "auto"));
   settings.frames = app.options().session / "frames";
+  settings.inputs = app.cart().inputs;
   auto stage = render::MakeStage(app.scene(), settings.window, spare);
   if (spare && !app::WaitUntilNeeded(NodeId::kRender)) return ExitCode::kDone;
-
   // Collected before the ports are created: the threads that draw, this one and the rasteriser's, without those of the
   // bus.
   const std::vector<int> drawing = render::ThreadsOfProcess();

@@ -6,10 +6,12 @@
 #include <X11/Xlib.h>
 #include <X11/keysym.h>
 
+#include <array>
 #include <map>
 #include <memory>
 #include <optional>
 
+#include "render_node/input/pad_inputs.h"
 #include "services/base/core/error.h"
 #include "services/base/runtime/cyclic_thread.h"
 
@@ -59,11 +61,11 @@ class WindowInput::Connection {
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  /// Waits for events, at most `limit_ms`.
-  void Wait(int limit_ms) {
+  /// Waits for events, or until `other` (-1: none) is readable, at most `limit_ms`.
+  void Wait(int limit_ms, int other) {
     if (XPending(display_) > 0) return;
-    pollfd readable{ConnectionNumber(display_), POLLIN, 0};
-    (void)::poll(&readable, 1, limit_ms);
+    std::array<pollfd, 2> readable{{{ConnectionNumber(display_), POLLIN, 0}, {other, POLLIN, 0}}};
+    (void)::poll(readable.data(), readable.size(), limit_ms);
   }
 
   /// Takes the controls once the pointer is free: a button that is still down belongs to the window's own connection.
@@ -199,8 +201,8 @@ class WindowInput::Connection {
   bool warped_ = false;  ///< The motion to the middle has not arrived yet.
 };
 
-WindowInput::WindowInput(const std::string& display, unsigned long window, Sink sink)
-    : sink_(std::move(sink)), connection_(std::make_unique<Connection>(display, window)) {
+WindowInput::WindowInput(const std::string& display, unsigned long window, Sink sink, const InputSettings& settings)
+    : sink_(std::move(sink)), settings_(settings), connection_(std::make_unique<Connection>(display, window)) {
   thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
 }
 
@@ -218,18 +220,25 @@ HandsState WindowInput::state() const {
 
 void WindowInput::Run(const std::stop_token& stop) {
   MouseHands hands(OperatorSource::kWindow);
+  PadInputs pads(settings_);
   std::int64_t sent_ns = 0;
   bool take = false;
   while (!stop.stop_requested()) {
-    connection_->Wait(kRepeat_ms);
+    connection_->Wait(pads.Wait_ms(kRepeat_ms), pads.descriptor());
+    float force_N = 0;
     {
       const std::lock_guard lock(mutex_);
       hands.SetView(view_);
+      if (hands.active()) force_N = view_.force_N[static_cast<std::size_t>(hands.tool())];
     }
     const bool was_active = hands.active();
     bool changed = connection_->Handle(&hands, &take);
-    take = wants_take_.exchange(false, std::memory_order_relaxed) || take;
     const std::int64_t now_ns = runtime::MonotonicNs();
+    const PadHands::Outcome pad = pads.Update(now_ns, &hands);
+    pads.Rumble(force_N, now_ns);
+    changed = changed || pad.changed;
+    if (pad.release && hands.active()) connection_->Release(&hands);
+    take = wants_take_.exchange(false, std::memory_order_relaxed) || pad.take || take;
     if (take && !hands.active() && connection_->Take(&hands, now_ns)) changed = true;
     take = take && !hands.active();
     const bool due = hands.active() && now_ns - sent_ns >= kRepeat_ms * 1'000'000LL;
@@ -238,8 +247,12 @@ void WindowInput::Run(const std::stop_token& stop) {
       sent_ns = now_ns;
     }
     const std::lock_guard lock(mutex_);
-    state_ = {hands.active(), hands.tool(), view_.scope[static_cast<std::size_t>(hands.tool())],
-              hands.locked(hands.tool()), hands.steady()};
+    state_ = {hands.active(),
+              hands.tool(),
+              view_.scope[static_cast<std::size_t>(hands.tool())],
+              hands.locked(hands.tool()),
+              hands.steady(),
+              pads.has_gamepad()};
   }
   if (hands.active()) {
     connection_->Release(&hands);

@@ -1,5 +1,5 @@
-// Pointer and keys of an X11 window, read on a thread of their own with a connection of their own: a picture takes tens
-// of milliseconds to draw, and the hand must not wait for it.
+// Pointer and keys of an X11 window, and gamepads, read on a thread of their own with a connection of their own: a
+// picture takes tens of milliseconds to draw, and the hand must not wait for it.
 #pragma once
 
 #include <atomic>
@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "services/base/core/mouse_hands.h"
+#include "services/base/core/pad_hands.h"
 
 namespace fulcrum::render {
 
@@ -22,6 +23,7 @@ struct HandsState {
   bool scope = false;   ///< It is a scope.
   bool locked = false;  ///< Its jaw is locked.
   bool steady = false;
+  bool gamepad = false;  ///< One is plugged in.
   bool operator==(const HandsState&) const = default;
 };
 
@@ -33,7 +35,7 @@ class WindowInput {
 
   /// @param display name of the X display; empty: that of the environment. @param window X window to be read. Throws
   /// InputError if the display cannot be opened.
-  WindowInput(const std::string& display, unsigned long window, Sink sink);
+  WindowInput(const std::string& display, unsigned long window, Sink sink, const InputSettings& settings = {});
   /// Releases the controls.
   ~WindowInput();
   WindowInput(const WindowInput&) = delete;
@@ -50,6 +52,7 @@ class WindowInput {
   void Run(const std::stop_token& stop);
 
   Sink sink_;
+  InputSettings settings_;
   std::unique_ptr<Connection> connection_;
   std::atomic<bool> wants_take_{false};
   mutable std::mutex mutex_;  ///< Guards the members below.

@@ -1,6 +1,8 @@
 #include "render_node/node/hud.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <string_view>
@@ -26,6 +28,29 @@ std::string ForceBar(int tool, float force_N, float limit_N) {
          std::string(static_cast<std::size_t>(kBar - full), '-') + Number(" %.1f N", force_N);
 }
 
+/// The overlay has capitals only.
+std::string InCapitals(std::string_view name) {
+  std::string text(name);
+  for (char& c : text) c = c == '_' ? ' ' : static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return text;
+}
+
+/// What the gamepad does, a line each.
+std::vector<std::string> PadHelp(const PadSettings& settings) {
+  std::vector<std::string> lines;
+  constexpr std::array kMotions{"RIGHT", "UP", "DEEPER"};
+  for (std::size_t i = 0; i < kMotions.size(); ++i) {
+    const auto& way = settings.motion[i];
+    if (way) lines.push_back((way->sign < 0 ? "-" : "") + InCapitals(PadAxisName(way->axis)) + ": " + kMotions[i]);
+  }
+  for (std::size_t i = 0; i < kPadActions; ++i) {
+    if (!settings.buttons[i]) continue;
+    lines.push_back(InCapitals(PadButtonName(*settings.buttons[i])) + ": " +
+                    InCapitals(PadActionName(static_cast<PadAction>(i))));
+  }
+  return lines;
+}
+
 }  // namespace
 
 std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
@@ -38,6 +63,9 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
       line += 2;
     }
   }
+  if (state.help && state.hands && state.hands->gamepad) {
+    for (const std::string& text : PadHelp(state.gamepad)) texts.push_back({Corner::kTopRight, line++, text});
+  }
   line = 0;
   for (const std::string& late : state.late) {
     texts.push_back({Corner::kTopLeft, ++line, late, true});
@@ -48,8 +76,13 @@ std::vector<OverlayText> HudTexts(const HudState& state, bool figures) {
   if (state.paused) {
     texts.push_back({Corner::kTopLeft, ++line, "PAUSED", true});
   }
+  const auto take = state.hands && state.hands->gamepad
+                        ? state.gamepad.buttons[static_cast<std::size_t>(PadAction::kTake)]
+                        : std::nullopt;
   if (state.hands && !state.hands->active) {
-    texts.push_back({Corner::kTopLeft, ++line, "CLICK OR ENTER: TAKE THE TOOLS", true});
+    texts.push_back(
+        {Corner::kTopLeft, ++line,
+         "CLICK" + (take ? ", ENTER OR " + InCapitals(PadButtonName(*take)) : " OR ENTER") + ": TAKE THE TOOLS", true});
   } else if (state.hands) {
     texts.push_back({Corner::kTopLeft, ++line,
                      std::string(state.hands->scope ? "SCOPE" : kNames[static_cast<std::size_t>(state.hands->tool)]) +

@@ -28,6 +28,7 @@ struct HudState {
   bool paused = false;
   bool help = false;
   std::optional<HandsState> hands;  ///< No value: the window operates nothing.
+  PadSettings gamepad;              ///< For the help.
 };
 
 /// Texts to draw: figures, and warnings at twice their size. With `figures` false warnings only.

@@ -50,12 +50,14 @@ RenderNode::RenderNode(const SceneView& scene, const RenderSettings& settings, c
       figures_(scene.render.hud != 0) {
   if (ports_.pictures != nullptr) stream_ = std::make_unique<PictureStream>(ports_.pictures);
   if (ports_.operator_input == nullptr) return;
-  hands_ = std::make_unique<WindowInput>("", display_.window(), [this](const OperatorInput& input) {
+  const auto write = [this](const OperatorInput& input) {
     OperatorInput stamped = input;
     stamped.stamp = operator_stamper_.Next(input.stamp.stamp_ns);
     ports_.operator_input->Write(stamped);
-  });
+  };
+  hands_ = std::make_unique<WindowInput>("", display_.window(), write, settings.inputs);
   hud_.hands = HandsState();
+  hud_.gamepad = settings.inputs.gamepad;
 }
 
 RenderNode::~RenderNode() = default;
@@ -258,6 +260,7 @@ HandsView RenderNode::ViewNow() const {
     hands.present[i] = tools_.tools[i].kind != ToolKind::kNone && !(scene_.tools[i].traction_N > 0);
     hands.scope[i] = tools_.tools[i].kind == ToolKind::kScope;
     hands.tip[i] = tools_.tools[i].p_WT;
+    hands.force_N[i] = tools_.tools[i].f_W.norm();
   }
   return hands;
 }

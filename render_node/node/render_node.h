@@ -41,6 +41,7 @@ struct RenderSettings {
   bool window = false;               ///< Draw into a window instead of memory.
   Quality quality = Quality::kAuto;  ///< Resolution of the scene.
   std::filesystem::path frames;      ///< Folder for the pictures.
+  InputSettings inputs = {};         ///< Gamepads as hands.
 };
 
 class RenderNode {

@@ -132,12 +132,6 @@ struct RecorderConfig {
   double keep_free_MB = 500;  ///< Free space that a recording leaves: it ends in order before [10^6 B].
 };
 
-/// Assignment of the inputs beside mouse and keyboard, at the window.
-struct InputsConfig {
-  PadSettings gamepad;
-  PadSettings space_mouse = PadSettings::OfSpaceMouse();
-};
-
 struct CartConfig;
 /// True if an operator's input moves a tool of the cart, a handle or the pedal (kind: operator).
 [[nodiscard]] bool IsOperated(const CartConfig& cart);
@@ -154,7 +148,7 @@ struct CartConfig {
   SecurityConfig security;
   VerdictConfig verdict;
   RecorderConfig recorder;
-  InputsConfig inputs;
+  InputSettings inputs;  ///< At the window.
 
   /// Everything simulated, at the rates of the architecture page.
   CartConfig();

@@ -67,7 +67,7 @@ void ReadPad(StrictMap map, const StrictMap::Choices<Way>& ways, const StrictMap
 
 }  // namespace
 
-void ReadInputs(StrictMap map, InputsConfig* inputs) {
+void ReadInputs(StrictMap map, InputSettings* inputs) {
   PadSettings& pad = inputs->gamepad;
   StrictMap gamepad = map.MapOrDefaults("gamepad");
   const auto force = [&gamepad](const char* key, float value) {

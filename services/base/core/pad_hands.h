@@ -103,6 +103,12 @@ struct PadSettings {
   [[nodiscard]] static PadSettings OfSpaceMouse();
 };
 
+/// Assignment of the inputs beside mouse and keyboard.
+struct InputSettings {
+  PadSettings gamepad;
+  PadSettings space_mouse = PadSettings::OfSpaceMouse();
+};
+
 class PadHands {
  public:
   explicit PadHands(const PadSettings& settings) : settings_(settings) {}

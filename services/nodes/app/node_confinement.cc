@@ -66,6 +66,7 @@ std::optional<runtime::WritablePlaces> WritablePlacesOf(NodeId node, const NodeO
            {"/dev/dri", "/dev/nvidiactl", "/dev/nvidia-modeset", "/dev/nvidia-uvm", "/dev/nvidia0", "/dev/nvidia1"}) {
         places.devices.emplace_back(gpu);
       }
+      places.devices.emplace_back("/dev/input");  // Rumble; a gamepad that is plugged in is a new file.
       break;
     }
     case NodeId::kHaptics:

@@ -1,0 +1,114 @@
+// A gamepad at the window: from SDL's virtual joystick to OperatorInput.
+#include <X11/Xlib.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "render_node/input/window_input.h"
+#include "services/base/runtime/cyclic_thread.h"
+#include "tests/support/virtual_pad.h"
+#include "tests/support/virtual_screen.h"
+
+namespace fulcrum::render {
+namespace {
+
+constexpr auto kPatience = std::chrono::seconds(20);
+
+/// What the window has sent.
+class Received {
+ public:
+  void Add(const OperatorInput& input) {
+    const std::lock_guard lock(mutex_);
+    newest_ = input;
+    changed_.notify_all();
+  }
+  /// Waits until the newest sample fulfils the condition.
+  bool Await(const std::function<bool(const OperatorInput&)>& condition) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kPatience, [&] { return condition(newest_); });
+  }
+  OperatorInput newest() {
+    const std::lock_guard lock(mutex_);
+    return newest_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  OperatorInput newest_;
+};
+
+class WindowPad : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!screen_.installed()) GTEST_SKIP() << "Xvfb is not installed";
+    display_ = XOpenDisplay(screen_.display().c_str());
+    ASSERT_NE(display_, nullptr);
+    const ::Window window = XCreateSimpleWindow(display_, DefaultRootWindow(display_), 0, 0, 640, 360, 0, 0, 0);
+    XMapWindow(display_, window);
+    XSync(display_, False);
+    input_ = std::make_unique<WindowInput>(screen_.display(), window,
+                                           [this](const OperatorInput& input) { received_.Add(input); });
+    HandsView view;
+    view.present[0] = view.present[1] = true;
+    view.tip[1] = Vec3f(0.02f, 0.1f, 0);
+    input_->SetView(view);
+  }
+  void TearDown() override {
+    input_.reset();
+    if (display_ != nullptr) XCloseDisplay(display_);
+  }
+
+  /// Waits until the window knows of a gamepad, or of none: a button that is down when it is found counts as held.
+  [[nodiscard]] bool AwaitPad(bool there) const {
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (input_->state().gamepad != there && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+    return input_->state().gamepad == there;
+  }
+
+  testing::VirtualScreen screen_;
+  ::Display* display_ = nullptr;
+  Received received_;
+  std::unique_ptr<WindowInput> input_;
+};
+
+TEST_F(WindowPad, OperatesFromThePlugToThePlug) {
+  testing::VirtualPad pad;
+  ASSERT_TRUE(AwaitPad(true));
+  pad.Button(SDL_CONTROLLER_BUTTON_START, true);
+  ASSERT_TRUE(received_.Await([](const OperatorInput& input) { return input.claim_ns != 0; }))
+      << "Start takes the tools";
+  pad.Axis(SDL_CONTROLLER_AXIS_LEFTX, 1);
+  ASSERT_TRUE(received_.Await([](const OperatorInput& input) { return input.tools[1].p_WT.x() > 0.025f; }));
+  pad.Axis(SDL_CONTROLLER_AXIS_TRIGGERRIGHT, 1);
+  pad.Button(SDL_CONTROLLER_BUTTON_A, true);
+  ASSERT_TRUE(received_.Await(
+      [](const OperatorInput& input) { return input.pedals == kPedalCut && input.tools[1].jaw_angle_rad == 0; }));
+  const std::int64_t unplugged_ns = runtime::MonotonicNs();
+  pad.Unplug();
+  ASSERT_TRUE(received_.Await([](const OperatorInput& input) { return input.claim_ns == 0; })) << "nobody operates";
+  const OperatorInput last = received_.newest();
+  EXPECT_EQ(last.pedals, kPedalNone);
+  EXPECT_FALSE(last.tools[1].moves);
+  RecordProperty("unplug_to_release_us", static_cast<int>((last.stamp.stamp_ns - unplugged_ns) / 1000));
+  // The next one starts anew: its trigger is no pedal until the controls are taken again.
+  ASSERT_TRUE(AwaitPad(false));
+  testing::VirtualPad other;
+  ASSERT_TRUE(AwaitPad(true));
+  other.Axis(SDL_CONTROLLER_AXIS_TRIGGERLEFT, 1);
+  other.Button(SDL_CONTROLLER_BUTTON_START, true);
+  ASSERT_TRUE(received_.Await([](const OperatorInput& input) { return input.claim_ns != 0; }));
+  EXPECT_EQ(received_.newest().pedals, kPedalNone);
+  other.Button(SDL_CONTROLLER_BUTTON_BACK, true);
+  EXPECT_TRUE(received_.Await([](const OperatorInput& input) { return input.claim_ns == 0; })) << "Back releases";
+}
+
+}  // namespace
+}  // namespace fulcrum::render
