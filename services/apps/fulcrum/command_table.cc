@@ -48,6 +48,8 @@ std::span<const CommandEntry> Commands() {
       {"doctor", "doctor [--security] [--domain N] [--out DIR]",
        "Check whether this machine can run sessions, or what protects them, and print a fix for each problem.",
        "doctor --security", Doctor},
+      {"inputs", "inputs [--watch [--seconds N]] [--json] [--cart FILE]",
+       "List the gamepads and SpaceMice that are plugged in, or show live what they report.", "inputs --watch", Inputs},
       {"reference", "reference cart|scene FILE...",
        "Print every key of cart or scene files with default and valid values.",
        "reference cart deploy/carts/simulated.yaml", Reference},

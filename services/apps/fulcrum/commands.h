@@ -28,6 +28,7 @@ ExitCode Log(const Words& words);
 ExitCode TestNode(const Words& words);
 ExitCode Keys(const Words& words);
 ExitCode Doctor(const Words& words);
+ExitCode Inputs(const Words& words);
 ExitCode Console(const Words& words);
 ExitCode Reference(const Words& words);
 ExitCode Assess(const Words& words);
