@@ -9,7 +9,7 @@ const live = (() => {
   const kTools = ['left tool', 'right tool', 'tool 3', 'tool 4'];
   const kKeys = {j: 'jaw', k: 'lock', f: 'cut', g: 'coag', 1: 'tool0', 2: 'tool1', 3: 'tool2', 4: 'tool3', v: 'steady', ' ': 'clutch', Shift: 'fine', Control: 'depth'};
   const kButtons = ['jaw', 'coag', 'cut'];  // Of the mouse: left, middle, right.
-  const kPadButtons = {0: 'jaw', 1: 'lock', 4: 'tool0', 5: 'tool1', 6: 'coag', 7: 'cut'};
+  const kPadButtons = {0: 'jaw', 1: 'lock', 2: 'fine', 3: 'steady', 4: 'tool0', 5: 'tool1', 6: 'coag', 7: 'cut', 10: 'clutch'};
 
   let socket = null, connecting = false, seen = 0, hands = {controls: 'none'}, operated = false, running = false;
   let x = 0, y = 0, turn = 0, roll = 0;
