@@ -8,8 +8,8 @@
 namespace fulcrum::render {
 namespace {
 
-/// Gamepads report each 1 to 8 ms; a period of the servo is 1 ms.
-constexpr int kPoll_ms = 2;
+/// A period of the servo; gamepads report each 1 to 8 ms.
+constexpr int kPoll_ms = 1;
 /// Time after which the strength of the rumble is given again [ns]: well within Gamepads::kRumble_ms.
 constexpr std::int64_t kRepeat_ns = 100'000'000;
 
@@ -41,11 +41,11 @@ void PadInputs::Rumble(float force_N, std::int64_t now_ns) {
   gamepads_->Rumble(strength);
 }
 
-int PadInputs::Wait_ms(int longest) const {
+int PadInputs::Wait_ms(bool active, int longest) const {
   const PadState* const mouse = mice_.first();
   const bool tilted =
       mouse != nullptr && std::any_of(mouse->axes.begin(), mouse->axes.end(), [](float axis) { return axis != 0; });
-  return has_gamepad() || tilted ? kPoll_ms : longest;
+  return active && (has_gamepad() || tilted) ? kPoll_ms : longest;
 }
 
 }  // namespace fulcrum::render

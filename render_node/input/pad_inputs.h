@@ -24,8 +24,8 @@ class PadInputs {
   void Rumble(float force_N, std::int64_t now_ns);
 
   /// How long the caller may wait before the next Update() [ms]: SDL has no descriptor to wait for, and a stick that is
-  /// held reports nothing. @param longest without a device.
-  [[nodiscard]] int Wait_ms(int longest) const;
+  /// held reports nothing. @param active the controls are taken. @param longest without a device.
+  [[nodiscard]] int Wait_ms(bool active, int longest) const;
   /// Readable when a SpaceMouse reports; -1: there is none.
   [[nodiscard]] int descriptor() const { return mice_.descriptor(); }
   [[nodiscard]] bool has_gamepad() const { return gamepads_ && !gamepads_->pads().empty(); }

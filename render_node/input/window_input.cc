@@ -224,7 +224,7 @@ void WindowInput::Run(const std::stop_token& stop) {
   std::int64_t sent_ns = 0;
   bool take = false;
   while (!stop.stop_requested()) {
-    connection_->Wait(pads.Wait_ms(kRepeat_ms), pads.descriptor());
+    connection_->Wait(pads.Wait_ms(hands.active(), kRepeat_ms), pads.descriptor());
     float force_N = 0;
     {
       const std::lock_guard lock(mutex_);

@@ -69,4 +69,14 @@ void XClient::Press(const std::string& key, bool down) {
   XFlush(impl_->display);
 }
 
+BareWindow::BareWindow(const std::string& display) : display_(XOpenDisplay(display.c_str())) {
+  auto* const opened = static_cast<::Display*>(display_);
+  if (opened == nullptr) throw std::runtime_error("no X server at " + display);
+  id_ = XCreateSimpleWindow(opened, DefaultRootWindow(opened), 0, 0, 640, 360, 0, 0, 0);
+  XMapWindow(opened, id_);
+  XSync(opened, False);
+}
+
+BareWindow::~BareWindow() { XCloseDisplay(static_cast<::Display*>(display_)); }
+
 }  // namespace fulcrum::testing

@@ -29,4 +29,19 @@ class XClient final : public MouseAndKeyboard {
   std::unique_ptr<Impl> impl_;
 };
 
+/// An empty window of 640 x 360 pixels, as long as the object exists.
+class BareWindow {
+ public:
+  /// Throws std::runtime_error if the display does not answer.
+  explicit BareWindow(const std::string& display);
+  ~BareWindow();
+  BareWindow(const BareWindow&) = delete;
+  BareWindow& operator=(const BareWindow&) = delete;
+  [[nodiscard]] unsigned long id() const { return id_; }
+
+ private:
+  void* display_;
+  unsigned long id_ = 0;
+};
+
 }  // namespace fulcrum::testing

@@ -1,5 +1,4 @@
 // A gamepad at the window: from SDL's virtual joystick to OperatorInput.
-#include <X11/Xlib.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -13,6 +12,7 @@
 #include "services/base/runtime/cyclic_thread.h"
 #include "tests/support/virtual_pad.h"
 #include "tests/support/virtual_screen.h"
+#include "tests/support/xclient.h"
 
 namespace fulcrum::render {
 namespace {
@@ -47,23 +47,14 @@ class WindowPad : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!screen_.installed()) GTEST_SKIP() << "Xvfb is not installed";
-    display_ = XOpenDisplay(screen_.display().c_str());
-    ASSERT_NE(display_, nullptr);
-    const ::Window window = XCreateSimpleWindow(display_, DefaultRootWindow(display_), 0, 0, 640, 360, 0, 0, 0);
-    XMapWindow(display_, window);
-    XSync(display_, False);
-    input_ = std::make_unique<WindowInput>(screen_.display(), window,
+    window_ = std::make_unique<testing::BareWindow>(screen_.display());
+    input_ = std::make_unique<WindowInput>(screen_.display(), window_->id(),
                                            [this](const OperatorInput& input) { received_.Add(input); });
     HandsView view;
     view.present[0] = view.present[1] = true;
     view.tip[1] = Vec3f(0.02f, 0.1f, 0);
     input_->SetView(view);
   }
-  void TearDown() override {
-    input_.reset();
-    if (display_ != nullptr) XCloseDisplay(display_);
-  }
-
   /// Waits until the window knows of a gamepad, or of none: a button that is down when it is found counts as held.
   [[nodiscard]] bool AwaitPad(bool there) const {
     const auto end = std::chrono::steady_clock::now() + kPatience;
@@ -74,7 +65,7 @@ class WindowPad : public ::testing::Test {
   }
 
   testing::VirtualScreen screen_;
-  ::Display* display_ = nullptr;
+  std::unique_ptr<testing::BareWindow> window_;
   Received received_;
   std::unique_ptr<WindowInput> input_;
 };
