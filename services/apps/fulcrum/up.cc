@@ -61,7 +61,7 @@ ExitCode Up(const Words& words) {
       ("window", "also show the picture in a window")                                                                //
       ("hands", po::value<std::string>()->value_name("INPUT"),
        "operate the tools yourself, with INPUT: mouse (and keyboard or gamepad, in the window), browser (the page of "
-       "fulcrum console). No script; until Ctrl-C or --seconds")                                                    //
+       "fulcrum console). No script; until Ctrl-C or --seconds")                                            //
       ("quality", po::value<std::string>()->value_name("NAME")->default_value("auto"),                      //
        "quality of the picture: auto, low, high")                                                           //
       ("data", po::value<std::string>()->value_name("DIR"), "folder of the meshes that the scene imports")  //

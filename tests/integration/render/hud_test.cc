@@ -1,0 +1,33 @@
+#include "render_node/node/hud.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+namespace fulcrum::render {
+namespace {
+
+bool Says(const HudState& state, const std::string& text) {
+  const auto texts = HudTexts(state, false);
+  return std::any_of(texts.begin(), texts.end(), [&](const OverlayText& line) { return line.text == text; });
+}
+
+TEST(Hud, NamesTheGamepadsButtonsAsTheCartAssignsThemWhileOneIsPluggedIn) {
+  HudState state;
+  state.help = true;
+  state.hands = HandsState();
+  EXPECT_TRUE(Says(state, "CLICK OR ENTER: TAKE THE TOOLS"));
+  EXPECT_FALSE(Says(state, "RIGHT TRIGGER: CUT"));
+  state.hands->gamepad = true;
+  EXPECT_TRUE(Says(state, "CLICK, ENTER OR START: TAKE THE TOOLS"));
+  EXPECT_TRUE(Says(state, "RIGHT TRIGGER: CUT"));
+  EXPECT_TRUE(Says(state, "RIGHT Y: DEEPER"));
+  state.gamepad.motion[1] = PadDirection{PadAxis::kLeftY, -1};
+  state.gamepad.buttons[static_cast<std::size_t>(PadAction::kTake)] = std::nullopt;
+  EXPECT_TRUE(Says(state, "-LEFT Y: UP"));
+  EXPECT_TRUE(Says(state, "CLICK OR ENTER: TAKE THE TOOLS"));
+}
+
+}  // namespace
+}  // namespace fulcrum::render
