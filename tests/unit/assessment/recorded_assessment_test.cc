@@ -11,6 +11,7 @@
 #include "services/base/core/error.h"
 #include "services/records/recording/mcap_writer.h"
 #include "services/session/assessment/assessor.h"
+#include "services/session/assessment/recorded_timeline.h"
 #include "services/transport/bus/convert/cdr.h"
 #include "services/transport/bus/schema.h"
 #include "services/transport/bus/topics.h"
@@ -126,6 +127,24 @@ TEST_F(RecordedSession, SameMessagesGiveTheSameFigures) {
 TEST_F(RecordedSession, ARecordingThatWasCutOffIsMeasuredToItsLastMessage) {
   const RecordedAssessment got = AssessRecording(Record({.manifest = true, .end = false}), scene_.view);
   EXPECT_NEAR(got.end_s, 4.199, 1e-6);
+}
+
+TEST_F(RecordedSession, ItsTimeLineIsThatOfTheMessages) {
+  Timeline live(test::kStart_ns);
+  Play([&](const auto& message) {
+    if constexpr (requires { live.Add(message); }) live.Add(message);
+  });
+  const RecordedTimeline got = ReadTimeline(Record({}));
+  const std::vector<Happening> wanted = live.happenings();
+  ASSERT_EQ(got.happenings.size(), wanted.size());
+  EXPECT_EQ(wanted.size(), 6u) << "two touches, a hold and its end, a pedal, one warning that repeats";
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    EXPECT_EQ(got.happenings[i].time_s, wanted[i].time_s);
+    EXPECT_EQ(got.happenings[i].until_s, wanted[i].until_s);
+    EXPECT_EQ(TextOf(got.happenings[i]), TextOf(wanted[i]));
+  }
+  EXPECT_THROW((void)ReadTimeline(Record({.manifest = false})), InputError);
+  EXPECT_THROW((void)ReadTimeline(folder_ / "none.mcap"), InputError);
 }
 
 TEST_F(RecordedSession, WhatCannotBeMeasuredIsRefusedWithTheReason) {

@@ -1,0 +1,71 @@
+// What happened when in a session.
+#include "services/session/assessment/timeline.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/assessment_cases.h"
+
+namespace fulcrum::assessment {
+namespace {
+
+ThermalEvent EventAt(double time_s, ThermalEventKind kind) {
+  ThermalEvent event;
+  event.stamp = test::StampAt(time_s);
+  event.session_time_s = time_s;
+  event.kind = kind;
+  return event;
+}
+
+std::string Told(const Timeline& timeline) {
+  std::string told;
+  for (const Happening& one : timeline.happenings()) {
+    char line[80];
+    std::snprintf(line, sizeof(line), "%.1f-%.1f %s; ", one.time_s, one.until_s, KeyOf(one));
+    told += line;
+  }
+  return told;
+}
+
+TEST(Timeline, TellsTouchGraspAndReleaseOfEachTool) {
+  Timeline timeline(test::kStart_ns);
+  timeline.Add(test::PushAt(-0.5, 2));  // Before the session.
+  timeline.Add(test::GraspAt(1, Vec3d::Zero(), 1, 5));
+  timeline.Add(test::GraspAt(2, Vec3d::Zero(), 1, 5));
+  timeline.Add(test::PushAt(3, 2));  // Tool 1 presses, tool 0 holds nothing.
+  timeline.Add(test::GraspAt(4, Vec3d::Zero(), 1, 5));
+  timeline.Add(test::ToolAt(5, Vec3d::Zero(), Vec3d::Zero()));
+  EXPECT_EQ(Told(timeline), "1.0-1.0 touch; 1.0-1.0 grasp; 3.0-3.0 release; 3.0-3.0 touch; 4.0-4.0 grasp; ");
+  EXPECT_EQ(TextOf(timeline.happenings()[1]), "Grasper (tool 1) grasps");
+  EXPECT_EQ(TextOf(timeline.happenings()[3]), "Hook (tool 2) touches");
+}
+
+TEST(Timeline, APedalLastsWhileItIsDown) {
+  Timeline timeline(test::kStart_ns);
+  for (const double time_s : {1.0, 1.1, 1.2}) timeline.Add(test::PedalAt(time_s, CauteryMode::kCut));
+  timeline.Add(test::PedalAt(1.3, CauteryMode::kCoag));
+  timeline.Add(test::PedalAt(1.4, CauteryMode::kOff));
+  timeline.Add(test::PedalAt(9, CauteryMode::kCut));
+  EXPECT_EQ(Told(timeline), "1.0-1.3 pedal_cut; 1.3-1.4 pedal_coag; 9.0-9.0 pedal_cut; ");
+}
+
+TEST(Timeline, EventsOfHeatThatRepeatAreOne) {
+  Timeline timeline(test::kStart_ns);
+  for (int i = 0; i < 10; ++i) timeline.Add(EventAt(2 + 0.1 * i, ThermalEventKind::kCut));
+  timeline.Add(EventAt(2.5, ThermalEventKind::kUreterWarning));
+  timeline.Add(EventAt(8, ThermalEventKind::kCut));
+  EXPECT_EQ(Told(timeline), "2.0-2.9 cut; 2.5-2.5 ureter_warning; 8.0-8.0 cut; ");
+  EXPECT_EQ(TextOf(timeline.happenings()[1]), "Ureter warning");
+}
+
+TEST(Timeline, ItsLengthIsLimited) {
+  Timeline timeline(test::kStart_ns);
+  for (std::size_t i = 0; i < Timeline::kMost + 7; ++i) {
+    timeline.Add(test::PedalAt(static_cast<double>(i), CauteryMode::kCut));
+    timeline.Add(test::PedalAt(static_cast<double>(i) + 0.5, CauteryMode::kOff));
+  }
+  EXPECT_EQ(timeline.happenings().size(), Timeline::kMost);
+  EXPECT_EQ(timeline.left_out(), 7u);
+}
+
+}  // namespace
+}  // namespace fulcrum::assessment
