@@ -8,16 +8,15 @@
 #include <chrono>
 #include <cstdlib>
 #include <ctime>
-#include <fstream>
 #include <future>
 #include <optional>
 #include <utility>
 
-#include "services/base/core/error.h"
 #include "services/base/core/tick.h"
 #include "services/base/runtime/cyclic_thread.h"
 #include "services/base/runtime/realtime.h"
 #include "services/session/console/access.h"
+#include "services/session/console/file_response.h"
 #include "services/session/console/guided_task.h"
 #include "services/session/console/http_server.h"
 #include "services/session/console/json.h"
@@ -29,7 +28,7 @@
 #include "services/session/console/router.h"
 #include "services/session/console/session_run.h"
 #include "services/session/console/session_watch.h"
-#include "services/session/console/training_desk.h"
+#include "services/session/console/training_calls.h"
 #include "services/session/supervisor/ask.h"
 
 namespace fulcrum::console {
@@ -68,18 +67,6 @@ fs::path DefaultTokenFile(int port) {
          name;
 }
 
-std::optional<std::string> ReadAll(const fs::path& file) {
-  std::error_code error;
-  const auto size = fs::is_regular_file(file, error) ? fs::file_size(file, error) : 0;
-  if (error || size == 0) return {};
-  // One read call for the whole file, because pictures are read many times a minute.
-  std::string bytes(size, '\0');
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, stream.gcount())));
-  return bytes;
-}
-
 double NumberIn(const Form& fields, std::string_view name) {
   const auto found = fields.find(name);
   return found == fields.end() ? 0 : ParseNumber(found->second, 0, 1e9).value_or(0);
@@ -101,7 +88,7 @@ struct Console::Impl {
              .database = given.database,
              .domain = given.domain}),
         watch(given.domain),
-        desk(given.database, given.courses, given.out),
+        training(given.database, given.courses, given.out),
         server({.address = given.bind, .port = given.port, .tls = Identity()},
                {.handle = [this](const HttpRequest& request) { return Handle(request); },
                 .knows = [this](const HttpRequest& request) { return access->HasToken(request); },
@@ -177,11 +164,11 @@ struct Console::Impl {
       case Wanted::kChoices:
         return {.body = ChoicesJson()};
       case Wanted::kPicture:
-        return File(pictures.FileOf(TextIn(routed.fields, "name")), "image/png");
+        return FileResponse(pictures.FileOf(TextIn(routed.fields, "name")), "image/png");
       case Wanted::kRecordings:
         return {.body = RecordingsJson()};
       case Wanted::kSummary:
-        return File(SessionFile("summary.json"), "application/json");
+        return FileResponse(SessionFile("summary.json"), "application/json");
       case Wanted::kTicket:
         ticket = MakeToken();
         ticket_end_ns = MonotonicNs() + kTicketLife;
@@ -206,8 +193,9 @@ struct Console::Impl {
       case Wanted::kTrainingNew:
       case Wanted::kTrainingLeave:
       case Wanted::kAttempt:
+      case Wanted::kAttemptEvents:
       case Wanted::kAttemptPicture:
-        return Train(routed);
+        return training.Answer(routed, settings.scenes);
       case Wanted::kEnter:
       case Wanted::kCancel:
         return LeadTask(routed.wanted);
@@ -219,44 +207,10 @@ struct Console::Impl {
     return Refusal(404, "unknown call; valid calls: services/session/console/DESIGN.md");
   }
 
-  HttpResponse Train(const Routed& routed) {
-    const Form& fields = routed.fields;
-    switch (routed.wanted) {
-      case Wanted::kTraining:
-        return {.body = desk.OverviewJson(FindScenes(settings.scenes))};
-      case Wanted::kTrainingCsv:
-        return {.type = "text/csv; charset=utf-8", .body = desk.Csv()};
-      case Wanted::kTrainingEnter:
-        desk.Enter(TextIn(fields, "name"), TextIn(fields, "pin"), MonotonicNs());
-        return Done("entered");
-      case Wanted::kTrainingNew:
-        desk.Create(TextIn(fields, "name"), TextIn(fields, "pin"),
-                    fields.contains("instructor") && TextIn(fields, "instructor") == "on");
-        return Done("the account is made");
-      case Wanted::kAttempt:
-        return {.body = desk.AttemptJson(TextIn(fields, "session"))};
-      case Wanted::kAttemptPicture: {
-        const fs::path folder = desk.FolderOf(TextIn(fields, "session"));
-        return File(folder.empty() ? folder : folder / "frames" / TextIn(fields, "name"), "image/png");
-      }
-      case Wanted::kTrainingLeave:
-        desk.Leave();
-        return Done("left");
-      default:
-        return Refusal(404, "unknown call of the training");
-    }
-  }
-
   static HttpResponse Page(const std::string& path) {
     const PageFile* file = FindPageFile(path);
     if (file == nullptr) return Refusal(404, "no such page");
     return {.type = std::string(file->type), .body = std::string(file->text)};
-  }
-
-  static HttpResponse File(const fs::path& file, const char* type) {
-    std::optional<std::string> bytes = file.empty() ? std::nullopt : ReadAll(file);
-    if (!bytes) return Refusal(404, "the file does not exist, or not yet");
-    return {.type = type, .body = *std::move(bytes)};
   }
 
   /// True when the ticket is valid; it is valid once.
@@ -268,7 +222,7 @@ struct Console::Impl {
 
   HttpResponse Report(const std::string& given) {
     if (!UseTicket(given)) return Refusal(401, kTicketIsOld);
-    HttpResponse response = File(SessionFile("report.html"), "text/html; charset=utf-8");
+    HttpResponse response = FileResponse(SessionFile("report.html"), "text/html; charset=utf-8");
     response.policy = kReportPolicy;
     return response;
   }
@@ -289,7 +243,7 @@ struct Console::Impl {
     order.picture_rate_Hz = MaybeNumberIn(fields, "picture_rate");
     order.hands = fields.contains("hands") && TextIn(fields, "hands") == "on";
     if (fields.contains("trainee")) {
-      order.trainee = TextIn(fields, "trainee") == "expert" ? kExpert : desk.person();
+      order.trainee = TextIn(fields, "trainee") == "expert" ? kExpert : training.person();
       if (order.trainee.empty()) return Refusal(409, "no trainee has entered; enter with name and PIN first");
     }
     order.record = !fields.contains("record") || TextIn(fields, "record") == "on";
@@ -464,7 +418,7 @@ struct Console::Impl {
   std::optional<Access> access;
   SessionRun run;
   SessionWatch watch;
-  TrainingDesk desk;
+  TrainingCalls training;
   LiveView live;  ///< Its ports are those of `watch`.
   std::uint64_t live_session = 0;
   std::unique_ptr<GuidedTask> task;

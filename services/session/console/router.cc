@@ -88,6 +88,7 @@ constexpr std::array kEntries{
     Entry{"/api/training/new", true, Wanted::kTrainingNew, kNewAccountFields},
     Entry{"/api/training/leave", true, Wanted::kTrainingLeave, {}},
     Entry{"/api/attempt", false, Wanted::kAttempt, kAttemptFields},
+    Entry{"/api/attempt/events", false, Wanted::kAttemptEvents, kAttemptFields},
     Entry{"/api/attempt/picture", false, Wanted::kAttemptPicture, kAttemptPictureFields},
     Entry{"/api/start", true, Wanted::kStart, kStartFields},
     Entry{"/api/stop", true, Wanted::kStop, {}},

@@ -38,6 +38,7 @@ enum class Wanted {
   kTrainingNew,    ///< Makes an account. Fields: name, pin; optional instructor.
   kTrainingLeave,
   kAttempt,         ///< Sheet and pictures of an attempt. Field: session.
+  kAttemptEvents,   ///< What happened when. Field: session.
   kAttemptPicture,  ///< Fields: session, name.
   kClose,           ///< Removes the ended task from the page.
 };

@@ -1,16 +1,14 @@
 #include "services/session/console/training_desk.h"
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <iterator>
-#include <set>
-#include <sstream>
 
 #include "services/base/core/error.h"
 #include "services/base/core/tick.h"
 #include "services/session/console/form.h"
 #include "services/session/console/json.h"
+#include "services/session/console/training_group.h"
 #include "services/session/training/pin.h"
 
 namespace fulcrum::console {
@@ -29,14 +27,6 @@ std::string JsonOf(const TrainingRow& row) {
   json.Text("trainee", row.trainee).Text("session", row.session).Text("scene", row.scene);
   json.Text("started", row.started_utc).Number("score", row.score_pct, 0.1).Flag("well", row.well);
   return json.Done();
-}
-
-/// A field of CSV (RFC 4180). A leading character that a spreadsheet would take for a formula gets an apostrophe.
-std::string Quoted(std::string text) {
-  if (!text.empty() && std::string_view("=+-@").find(text.front()) != std::string_view::npos) text.insert(0, "'");
-  std::string quoted = "\"";
-  for (const char c : text) quoted.append(c == '"' ? 2 : 1, c);
-  return quoted + "\"";
 }
 
 std::vector<std::string> PicturesIn(const fs::path& folder) {
@@ -86,39 +76,27 @@ void TrainingDesk::Create(const std::string& name, const std::string& pin, bool 
   person_ = std::move(person);
 }
 
-std::vector<TrainingRow> TrainingDesk::Attempts() const {
-  std::error_code error;
-  if (!person_ || !fs::exists(database_, error)) return {};
-  const TrainingLog log(database_, TrainingLog::Access::kRead);
-  std::vector<TrainingRow> rows;
-  for (const auto& [trainee, sessions] : log.Trainees()) {
-    if (trainee == kExpert || (trainee != person_->name && !person_->instructor)) continue;
-    std::ranges::move(log.SessionsOf(trainee, ""), std::back_inserter(rows));
-  }
-  std::ranges::stable_sort(rows, std::greater<>(), &TrainingRow::started_utc);
-  return rows;
-}
-
 std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) const {
-  const std::vector<TrainingRow> attempts = Attempts();
+  const bool instructor = person_ && person_->instructor;
+  const TrainingGroup group(person_ ? database_ : fs::path());
+  const std::vector<training::Course> all = training::ReadCourses(courses_);
   Json courses('[');
-  for (const training::Course& course : training::ReadCourses(courses_)) {
+  for (const training::Course& course : all) {
     Json exercises('[');
     for (const training::Exercise& exercise : course.exercises) {
       const auto scene = std::ranges::find(scenes, exercise.scene, &SceneChoice::name);
       if (scene == scenes.end()) continue;
-      double best = std::nan("");
-      int count = 0;
-      for (const TrainingRow& row : attempts) {
-        if (row.scene != exercise.scene || row.trainee != person()) continue;
-        best = std::fmax(best, row.score_pct);
-        ++count;
+      Json scores('[');
+      for (const double score : group.ScoresOf(person(), exercise.scene)) scores.Item(Json::Rounded(score, 0.1));
+      Json cohort('[');
+      for (const training::Spread& spread : group.CohortOf(exercise.scene, person())) {
+        Json one('{');
+        one.Raw("people", std::to_string(spread.people)).Number("low", spread.low, 0.1);
+        cohort.Item(one.Number("median", spread.median, 0.1).Number("high", spread.high, 0.1).Done());
       }
       Json one('{');
       one.Text("scene", exercise.scene).Text("description", scene->description).Number("pass", exercise.pass_pct, 0.1);
-      one.Raw("attempts", std::to_string(count));
-      if (count > 0) one.Number("best", best, 0.1);
-      exercises.Item(one.Done());
+      exercises.Item(one.Raw("scores", scores.Done()).Raw("cohort", cohort.Done()).Done());
     }
     Json one('{');
     courses.Item(one.Text("name", course.name)
@@ -126,34 +104,21 @@ std::string TrainingDesk::OverviewJson(const std::vector<SceneChoice>& scenes) c
                      .Raw("exercises", exercises.Done())
                      .Done());
   }
+  std::vector<TrainingRow> attempts;
+  for (const auto& [trainee, sessions] : group.sessions()) {
+    if (instructor || trainee == person()) std::ranges::copy(sessions, std::back_inserter(attempts));
+  }
+  std::ranges::stable_sort(attempts, std::greater<>(), &TrainingRow::started_utc);
   Json rows('[');
   for (std::size_t i = 0; i < std::min(attempts.size(), kMostAttempts); ++i) rows.Item(JsonOf(attempts[i]));
   Json json('{');
-  json.Text("person", person()).Flag("instructor", person_ && person_->instructor);
-  return json.Raw("courses", courses.Done()).Raw("attempts", rows.Done()).Done();
+  json.Text("person", person()).Flag("instructor", instructor).Raw("courses", courses.Done());
+  return json.Raw("attempts", rows.Done()).Raw("group", instructor ? group.TableJson(all) : "[]").Done();
 }
 
 std::string TrainingDesk::Csv() const {
-  const std::vector<TrainingRow> attempts = Attempts();
-  std::set<std::string> measures;
-  for (const TrainingRow& row : attempts) {
-    for (const auto& [key, value] : row.measures) measures.insert(key);
-  }
-  std::ostringstream csv;
-  csv << "trainee,session,scene,started_utc,seconds,well,score_pct";
-  for (const std::string& measure : measures) csv << ',' << measure;
-  csv << "\r\n";
-  for (const TrainingRow& row : attempts) {
-    csv << Quoted(row.trainee) << ',' << Quoted(row.session) << ',' << Quoted(row.scene) << ','
-        << Quoted(row.started_utc) << ',' << row.seconds << ',' << (row.well ? 1 : 0) << ',' << row.score_pct;
-    for (const std::string& measure : measures) {
-      const auto found = row.measures.find(measure);
-      csv << ',';
-      if (found != row.measures.end()) csv << found->second;
-    }
-    csv << "\r\n";
-  }
-  return csv.str();
+  const TrainingGroup group(person_ ? database_ : fs::path());
+  return group.Csv(person_ && person_->instructor ? std::string() : person(), training::ReadCourses(courses_));
 }
 
 fs::path TrainingDesk::FolderOf(const std::string& session) const {

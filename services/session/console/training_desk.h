@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "services/session/console/library.h"
+#include "services/session/console/training_group.h"
 #include "services/session/supervisor/training_log.h"
 #include "services/session/training/course.h"
 
@@ -28,9 +29,10 @@ class TrainingDesk {
   /// Name of the person at the cart; empty: none.
   [[nodiscard]] std::string person() const { return person_ ? person_->name : std::string(); }
 
-  /// Person, courses with the person's results, and the attempts that the person may see. Throws InputError.
+  /// Person, courses with the person's scores beside those of the others, and the attempts that the person may see.
+  /// Throws InputError.
   [[nodiscard]] std::string OverviewJson(const std::vector<SceneChoice>& scenes) const;
-  /// The same attempts with all measures as CSV.
+  /// The same as CSV, with all measures.
   [[nodiscard]] std::string Csv() const;
   /// A session's folder, for the sheet and the pictures; empty: the person may not see it.
   [[nodiscard]] std::filesystem::path FolderOf(const std::string& session) const;
@@ -38,14 +40,9 @@ class TrainingDesk {
   [[nodiscard]] std::string AttemptJson(const std::string& session) const;
 
  private:
-  [[nodiscard]] std::vector<supervisor::TrainingRow> Attempts() const;
-
   std::filesystem::path database_, courses_, out_;
   std::optional<supervisor::Person> person_;
   std::int64_t locked_until_ns_ = 0;  ///< After a wrong PIN.
 };
-
-/// Trainee under whose name the scripted demonstration of an exercise is stored. No account can have it.
-inline constexpr const char* kExpert = "Expert (script)";
 
 }  // namespace fulcrum::console

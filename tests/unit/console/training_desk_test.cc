@@ -26,9 +26,9 @@ class TrainingDeskTest : public testing::Test {
   }
   ~TrainingDeskTest() override { fs::remove_all(folder_); }
 
-  void Store(const std::string& trainee, const std::string& session, double score) {
+  void Store(const std::string& trainee, const std::string& session, double score, bool well = true) {
     TrainingLog(database_).Add(
-        {trainee, session, "line", "2026-01-0" + session.substr(7, 1), 10, true, score, {{"time_s", 9.5}}});
+        {trainee, session, "line", "2026-01-0" + session.substr(8, 1), 10, well, score, {{"time_s", 9.5}}});
     fs::create_directories(folder_ / "out" / session / "frames");
     std::ofstream(folder_ / "out" / session / "assessment.json") << "{\"score_pct\": 1}";
     std::ofstream(folder_ / "out" / session / "frames/frame_0000100.png") << "x";
@@ -48,15 +48,18 @@ TEST_F(TrainingDeskTest, ShowsCoursesToAnybodyAndAttemptsToTheirTraineeOnly) {
   Store("Bob", "2026010-3-line", 90);
   EXPECT_EQ(Overview().find("Ann"), std::string::npos) << "without a person no attempt is shown";
   desk_.Create("Ann", "2468", false);
-  EXPECT_NE(Overview().find("\"attempts\":2"), std::string::npos) << Overview();
-  EXPECT_NE(Overview().find("\"best\":80"), std::string::npos) << Overview();
+  EXPECT_NE(Overview().find("\"scores\":[60,80],\"cohort\":[]"), std::string::npos) << Overview();
   EXPECT_EQ(Overview().find("Bob"), std::string::npos);
   EXPECT_EQ(desk_.FolderOf("2026010-2-line"), folder_ / "out/2026010-2-line");
   EXPECT_EQ(desk_.FolderOf("2026010-3-line"), fs::path()) << "another trainee's";
   EXPECT_EQ(desk_.FolderOf("../2026010-2-line"), fs::path());
   EXPECT_THROW((void)desk_.AttemptJson("2026010-3-line"), InputError);
   const std::string csv = desk_.Csv();
-  EXPECT_TRUE(csv.starts_with("trainee,session,scene,started_utc,seconds,well,score_pct,time_s\r\n\"Ann\"")) << csv;
+  EXPECT_EQ(csv,
+            "trainee,session,scene,started_utc,seconds,well,score_pct,attempt,pass_pct,passed,cohort_people,"
+            "cohort_low_pct,cohort_median_pct,cohort_high_pct,time_s\r\n"
+            "\"Ann\",\"2026010-2-line\",\"line\",\"2026-01-02\",10,1,80,2,70,1,,,,,9.5\r\n"
+            "\"Ann\",\"2026010-1-line\",\"line\",\"2026-01-01\",10,1,60,1,70,0,,,,,9.5\r\n");
   EXPECT_EQ(csv.find("Bob"), std::string::npos);
   desk_.Leave();
   EXPECT_EQ(desk_.person(), "");
@@ -71,6 +74,43 @@ TEST_F(TrainingDeskTest, ComparesWithTheNewestDemonstration) {
   EXPECT_NE(attempt.find("\"pictures\":[\"frame_0000100.png\"]"), std::string::npos) << attempt;
   EXPECT_NE(attempt.find("\"time_s\":\"time from first to last movement [s]\""), std::string::npos) << attempt;
   EXPECT_THROW(desk_.Create(kExpert, "2468", false), InputError) << "an account has the demonstrations' name";
+}
+
+TEST_F(TrainingDeskTest, TheCohortHasNoNamesAndAtLeastThreeOthers) {
+  Store("Ann", "2026010-1-line", 60);
+  Store("Bob", "2026010-2-line", 10);
+  Store("Cy", "2026010-3-line", 20);
+  Store("Dee", "2026010-4-line", 99, false);  // The cart failed.
+  desk_.Create("Ines", "2468", true);
+  Store("Ines", "2026010-5-line", 100);
+  Store(kExpert, "2026010-6-line", 100);
+  desk_.Create("Ann", "2468", false);
+  EXPECT_NE(Overview().find("\"cohort\":[]"), std::string::npos) << Overview();
+  Store("Dee", "2026010-7-line", 40);
+  const std::string cohort = R"("cohort":[{"people":3,"low":15,"median":20,"high":30}])";
+  EXPECT_NE(Overview().find(cohort), std::string::npos) << Overview();
+  EXPECT_NE(Overview().find("\"group\":[]"), std::string::npos) << "the table is the instructor's";
+  for (const char* name : {"Bob", "Cy", "Dee", "Ines"}) {
+    EXPECT_EQ(Overview().find(name), std::string::npos) << Overview();
+    EXPECT_EQ(desk_.Csv().find(name), std::string::npos) << desk_.Csv();
+  }
+  EXPECT_NE(desk_.Csv().find(",60,1,70,0,3,15,20,30,9.5\r\n"), std::string::npos) << desk_.Csv();
+}
+
+TEST_F(TrainingDeskTest, TheInstructorsTableHasEachTraineesBest) {
+  Store("Ann", "2026010-1-line", 60);
+  Store("Ann", "2026010-2-line", 71);
+  Store("Bob", "2026010-3-line", 10);
+  Store("Bob", "2026010-4-line", 100, false);
+  desk_.Create("Ines", "2468", true);
+  Store("Ines", "2026010-5-line", 100);
+  const std::string table =
+      R"("group":[{"trainee":"Ann","results":[{"scene":"line","attempts":2,"best":71,"passed":true}]},)"
+      R"({"trainee":"Bob","results":[{"scene":"line","attempts":1,"best":10,"passed":false}]}])";
+  EXPECT_NE(Overview().find(table), std::string::npos) << Overview();
+  EXPECT_NE(desk_.Csv().find("\"Bob\",\"2026010-4-line\",\"line\",\"2026-01-04\",10,0,100,,70,,,,,,9.5\r\n"),
+            std::string::npos)
+      << "a session of a failed cart is no attempt: " << desk_.Csv();
 }
 
 TEST_F(TrainingDeskTest, RefusesWrongPinsAndWaitsAfterThem) {
