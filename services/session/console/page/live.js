@@ -102,6 +102,8 @@ const live = (() => {
     setText($('hands-state'), text);
     $('take').hidden = mine();
     $('take').disabled = !hands.ready;
+    // The button that started the session is hidden; the keyboard goes on here.
+    if (!mine() && hands.ready && document.activeElement === document.body) $('take').focus();
     $('release').hidden = !mine();
     for (const button of document.querySelectorAll('#hands .held')) {
       button.hidden = !mine();

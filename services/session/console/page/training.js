@@ -29,6 +29,7 @@ const training = (() => {
     $('leave').hidden = !person;
     $('csv').hidden = !person;
     $('courses').replaceChildren(...answer.courses.map(showCourse));
+    trend.group(answer.group);
     const attempts = answer.attempts.map(showAttempt);
     $('attempts').replaceChildren(...attempts);
     if (!attempts.length) $('attempts').append(item('', person ? 'None yet: choose an exercise.' : 'Enter to see yours.'));
@@ -38,9 +39,9 @@ const training = (() => {
     const section = make('section'), list = make('ul');
     section.append(make('h3', '', course.name), make('p', 'hint', course.description), list);
     for (const exercise of course.exercises) {
-      const passed = exercise.best >= exercise.pass;
+      const {scores, cohort} = exercise, best = Math.max(...scores), passed = best >= exercise.pass;
       const what = make('span', 'what', exercise.description.replace(/^Exercise: /, '').replace(/^./, c => c.toUpperCase()));
-      what.append(make('small', '', `Passed from ${percent(exercise.pass)}. ` + (exercise.attempts ? `${exercise.attempts} done, best ${percent(exercise.best)}.` : 'Not tried yet.')));
+      what.append(make('small', '', `Passed from ${percent(exercise.pass)}. ` + (scores.length ? `${scores.length} done, best ${percent(best)}.` : 'Not tried yet.')));
       const mark = make('span', passed ? 'mark level-good' : 'mark level-off', passed ? '●' : '○');
       mark.setAttribute('role', 'img');
       mark.setAttribute('aria-label', passed ? 'passed' : 'not passed');
@@ -49,22 +50,9 @@ const training = (() => {
       go.setAttribute('aria-label', `Operate ${exercise.scene}`);
       const demonstrate = button('Demonstration', '', () => start(exercise, 'expert'));
       demonstrate.setAttribute('aria-label', `Demonstration of ${exercise.scene}`);
-      list.append(item('', mark, what, ...(exercise.attempts ? [trend(exercise)] : []), demonstrate, go));
+      list.append(item('', mark, what, ...(scores.length || cohort.length ? [trend.button(exercise)] : []), demonstrate, go));
     }
     return section;
-  }
-
-  /** The scores of one exercise over the attempts, with the level that passes. */
-  function trend(exercise) {
-    const scores = shown.attempts.filter(a => a.scene === exercise.scene && a.trainee === shown.person).map(a => a.score).reverse();
-    const svg = $('trend-form').cloneNode(true);
-    svg.removeAttribute('id');
-    svg.removeAttribute('hidden');
-    svg.setAttribute('aria-label', `scores ${scores.map(s => s.toFixed(0)).join(', ')} percent`);
-    const y = score => 42 - 0.4 * score, x = i => scores.length < 2 ? 60 : 4 + 112 * i / (scores.length - 1);
-    svg.querySelector('.pass').setAttribute('d', `M0 ${y(exercise.pass)}H120`);
-    svg.querySelector('.scores').setAttribute('d', scores.map((s, i) => `${i ? 'L' : 'M'}${x(i)} ${y(s)}h.1`).join(''));
-    return svg;
   }
 
   async function start(exercise, trainee) {
@@ -77,12 +65,14 @@ const training = (() => {
   function showAttempt(attempt) {
     const what = make('span', 'what', `${attempt.scene}, ${percent(attempt.score)}`);
     what.append(make('small', '', `${shown.instructor ? `${attempt.trainee}, ` : ''}${attempt.started}${attempt.well ? '' : ', the session did not end well'}`));
-    return item('', what, button('Score and replay', '', () => open(attempt)));
+    const go = button('Score and replay', '', () => open(attempt));
+    go.dataset.session = attempt.session;
+    return item('', what, go);
   }
 
   // ---------------------------------------------------------------------------------------------- one attempt
 
-  let films = [], time = 0, playing = 0;
+  let films = [], time = 0, playing = 0, opened = '';
   const timeOf = name => Number(name.match(/\d+/)[0]) / 1000;
 
   async function open(attempt) {
@@ -102,10 +92,12 @@ const training = (() => {
     films = [{canvas: $('film-own'), session: attempt.session, names: answer.pictures},
       {canvas: $('film-expert'), session: answer.expert, names: answer.expert_pictures}].map(f => ({...f, times: f.names.map(timeOf), pictures: new Map(), drawn: ''}));
     $('film-expert-box').hidden = !films[1].names.length;
-    $('films').hidden = !films[0].names.length;
+    $('screens').hidden = !films[0].names.length;
     $('scrub').max = Math.max(0, ...films.flatMap(f => f.times.slice(-1)));
+    opened = attempt.session;
     setTime(0);
     $('attempt-box').showModal();
+    timeline.open(attempt.session, answer.expert, t => { play(false); setTime(t); });
   }
 
   async function drawFilm(film) {
@@ -133,6 +125,7 @@ const training = (() => {
     $('scrub').value = time;
     setText($('scrub-time'), `${time.toFixed(1)} s`);
     for (const film of films) drawFilm(film);
+    timeline.at(time);
   }
   function play(on) {
     clearInterval(playing);
@@ -152,17 +145,26 @@ const training = (() => {
   document.addEventListener('DOMContentLoaded', () => {
     $('play').addEventListener('click', () => play(!playing));
     $('scrub').addEventListener('input', () => { play(false); setTime(Number($('scrub').value)); });
-    $('attempt-box').addEventListener('close', () => { play(false); films = []; });
+    $('attempt-box').addEventListener('close', () => {
+      play(false);
+      films = [];
+      timeline.close();
+      // The button that opened it may be gone; the keyboard goes on at the attempt.
+      ($('attempts').querySelector(`[data-session="${opened}"]`) || $('training-title')).focus();
+    });
     $('attempt-close').addEventListener('click', () => $('attempt-box').close());
     const account = async (path, more) => {
       const form = $('enter-form');
       const answer = await order(path, {name: form.person_name.value.trim(), pin: form.pin.value, ...more});
       form.pin.value = '';
-      if (answer) load();
+      if (!answer) return;
+      form.reset();
+      await load();
+      $('training-title').focus();  // The form, with the focus, is hidden.
     };
     $('enter-form').addEventListener('submit', event => { event.preventDefault(); account('/api/training/enter', {}); });
     $('new-trainee').addEventListener('click', () => account('/api/training/new', {instructor: $('enter-form').instructor.checked ? 'on' : 'off'}));
-    $('leave').addEventListener('click', async () => { await order('/api/training/leave'); load(); });
+    $('leave').addEventListener('click', async () => { await order('/api/training/leave'); await load(); $('training-title').focus(); });
     $('csv').addEventListener('click', async () => {
       const bytes = await call('/api/training.csv').then(r => r.ok ? r.blob() : null).catch(() => null);
       if (!bytes) return toast('No attempts could be read.', true);

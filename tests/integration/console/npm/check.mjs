@@ -1,34 +1,8 @@
 // The page as an operator uses it: check.mjs FULCRUM CHROMIUM FOLDER. Leaves screenshots in FOLDER.
 import {join} from 'node:path';
-import {allRun, expect, pictureShown, pidOf, sizes, until, withConsole} from './console.mjs';
+import {allRun, expect, look, pictureShown, pidOf, sizes, until, withConsole} from './console.mjs';
 
 const [fulcrum, browser, folder] = process.argv.slice(2);
-
-/** Everything that can be pressed is big enough and on the screen; nothing has to be scrolled sideways. */
-async function checkLayout(page, what) {
-  const found = await page.evaluate(() => {
-    const bad = [];
-    const covered = e => e.closest('#view-session') && !document.getElementById('task').hidden;
-    for (const e of document.querySelectorAll('button, input, label:has(input)')) {
-      if (e.matches('.chips input') || !e.checkVisibility() || covered(e)) continue;
-      const box = e.getBoundingClientRect();
-      if (box.width < 48 || box.height < 48) bad.push(`${e.id || e.textContent}: ${box.width} x ${box.height}`);
-      if (box.left < 0 || box.right > innerWidth + 0.5) bad.push(`${e.id || e.textContent}: beyond the screen`);
-    }
-    if (document.documentElement.scrollWidth > innerWidth) bad.push('wider than the screen');
-    return bad;
-  });
-  expect(found.length === 0, `${what}: all targets of 48 px and on the screen, but ${found.join('; ')}`);
-}
-
-async function look(page, name) {
-  for (const size of sizes) {
-    await page.setViewportSize(size);
-    await page.waitForTimeout(300);
-    await checkLayout(page, `${name} at ${size.width} x ${size.height}`);
-    await page.screenshot({path: join(folder, `${name}-${size.width}.png`)});
-  }
-}
 
 await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out}) => {
   // A stranger's page shows no session.
@@ -45,7 +19,7 @@ await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out})
   expect(!page.url().includes('#'), 'the token does not stay in the address line');
   expect(await page.getAttribute('html', 'lang') === 'en', 'a language');
   await page.waitForSelector('#scenes label');
-  await look(page, 'idle');
+  await look(page, 'idle', folder);
 
   await page.locator('#scenes label', {hasText: 'small'}).click();
   await page.click('#power-less');
@@ -59,13 +33,13 @@ await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out})
   await until(page, 60, allRun, 6);
   await until(page, 20, pictureShown);
   await until(page, 20, () => parseFloat(document.getElementById('temperature').textContent) > 60);
-  await look(page, 'running');
+  await look(page, 'running', folder);
 
   // A node that hangs is seen, named and restarted.
   process.kill(pidOf('thermal_node', out), 'SIGSTOP');
   await until(page, 10, () => document.querySelector('[data-node=thermal_node] .word').textContent === 'Silent');
   await until(page, 5, () => document.querySelector('#warning-list').textContent.includes('Heat has been silent'));
-  await look(page, 'silent');
+  await look(page, 'silent', folder);
   await page.click('[data-node=thermal_node] button');
   await until(page, 20, allRun, 6);
 
@@ -74,7 +48,7 @@ await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out})
   await page.waitForSelector('#report:visible', {timeout: 30_000});
   await page.waitForSelector('#result-figures dd');
   expect(await page.textContent('#power') === '30 W', 'the power chosen before stays chosen');
-  await look(page, 'ended');
+  await look(page, 'ended', folder);
   await page.click('#report');
   await page.frameLocator('#report-frame').locator('h1, h2').first().waitFor({timeout: 20_000});
   await page.screenshot({path: join(folder, 'report-1920.png')});
@@ -82,11 +56,11 @@ await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out})
 
   await page.click('nav [data-goto=recordings]');
   await page.waitForSelector('#recordings button');
-  await look(page, 'recordings');
+  await look(page, 'recordings', folder);
   await page.click('nav [data-goto=calibration]');
   await page.click('[data-what=handle][data-tool="0"]');
   await page.waitForSelector('#task-enter:enabled');
-  await look(page, 'calibration');
+  await look(page, 'calibration', folder);
   await page.click('#task-cancel');
   await page.waitForSelector('#task-close:visible');
   await page.click('#task-close');

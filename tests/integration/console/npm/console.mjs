@@ -4,6 +4,7 @@ import {mkdtempSync, readFileSync, readdirSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 import {chromium} from 'playwright-core';
+import {axe, faultsOf} from './contrast.mjs';
 
 export const sizes = [{width: 1280, height: 800}, {width: 1920, height: 1080}, {width: 360, height: 740}];
 
@@ -31,8 +32,9 @@ export async function withConsole(fulcrum, browserPath, domain, use) {
       setTimeout(() => failed(new Error(`the console does not listen: ${said}`)), 20_000);
     });
     browser = await chromium.launch({executablePath: browserPath, args: ['--no-sandbox', '--disable-dev-shm-usage', '--disable-gpu', '--force-color-profile=srgb']});
-    const newPage = async size => {
-      const page = await (await browser.newContext({viewport: size})).newPage();
+    const newPage = async (size, more) => {
+      const page = await (await browser.newContext({viewport: size, ...more})).newPage();
+      await page.addInitScript({content: axe});
       page.on('pageerror', error => trouble.push(`error in the page: ${error.message}`));
       page.on('console', message => { if (message.type() === 'error') trouble.push(`console: ${message.text()}`); });
       page.on('response', async response => {
@@ -92,3 +94,37 @@ export async function takeControls(page, nodes) {
 /** All nodes run; slow ones, on a busy machine, too. */
 export const allRun = count => document.querySelectorAll('#nodes .word.level-good, #nodes .word.level-busy').length === count;
 export const pictureShown = () => !!document.getElementById('picture').dataset.shown || !!document.getElementById('picture').dataset.live;
+
+/** Everything that can be pressed is big enough and on the screen; nothing has to be scrolled sideways. */
+async function checkLayout(page, what) {
+  const found = await page.evaluate(() => {
+    const bad = [], box = document.querySelector('dialog[open]'), top = box || document;
+    const covered = e => e.closest('#view-session') && !document.getElementById('task').hidden;
+    for (const e of top.querySelectorAll('button, input, select, label:has(input)')) {
+      if (e.matches('.chips input, .check input') || !e.checkVisibility() || covered(e)) continue;
+      const box = e.getBoundingClientRect();
+      if (box.width < 48 || box.height < 48) bad.push(`${e.id || e.textContent}: ${box.width} x ${box.height}`);
+      if (box.left < 0 || box.right > innerWidth + 0.5) bad.push(`${e.id || e.textContent}: beyond the screen`);
+    }
+    for (const e of [document.documentElement, box, ...top.querySelectorAll('main, section')]) {
+      if (e && e.clientWidth > 0 && e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).overflowX !== 'visible') bad.push(`${e.id || e.tagName} is wider than its place`);
+    }
+    if (document.documentElement.scrollWidth > innerWidth) bad.push('wider than the screen');
+    return bad;
+  });
+  expect(found.length === 0, `${what}: all targets of 48 px and on the screen, but ${found.join('; ')}`);
+}
+
+/** Looks at the present view in all sizes: layout, contrast, and what else axe-core finds. Leaves a screenshot of each in `folder`. */
+export async function look(page, name, folder) {
+  for (const size of sizes) {
+    await page.setViewportSize(size);
+    await page.waitForTimeout(300);
+    await checkLayout(page, `${name} at ${size.width} x ${size.height}`);
+    await page.screenshot({path: join(folder, `${name}-${size.width}.png`)});
+    const {faults, texts, controls} = await faultsOf(page);
+    expect(faults.length === 0, `${name} at ${size.width} x ${size.height}: no fault of access, but\n${faults.join('\n')}`);
+    expect(texts > 0 && controls > 0, `${name}: contrasts were measured`);
+  }
+  await page.setViewportSize(sizes[0]);
+}
