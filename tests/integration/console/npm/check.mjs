@@ -1,6 +1,8 @@
 // The page as an operator uses it: check.mjs FULCRUM CHROMIUM FOLDER. Leaves screenshots in FOLDER.
+import {realpathSync} from 'node:fs';
 import {join} from 'node:path';
 import {allRun, expect, look, pictureShown, pidOf, sizes, until, withConsole} from './console.mjs';
+import {axe, faultsOf} from './contrast.mjs';
 
 const [fulcrum, browser, folder] = process.argv.slice(2);
 
@@ -10,6 +12,7 @@ await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out})
   await stranger.goto(address.replace(/#.*/, '#wrong'));
   await stranger.waitForSelector('#ask-token[open]');
   expect(!(await stranger.isVisible('#nodes li')), 'nothing without the token');
+  await look(stranger, 'token', folder);
   await stranger.context().close();
   expect(trouble.every(t => t.includes('401')), `401 alone for a stranger, but ${trouble}`);
   trouble.length = 0;
@@ -20,6 +23,14 @@ await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out})
   expect(await page.getAttribute('html', 'lang') === 'en', 'a language');
   await page.waitForSelector('#scenes label');
   await look(page, 'idle', folder);
+  const messages = shown => page.evaluate(on => {
+    $('banner').textContent = 'No response from the console.';
+    $('banner').hidden = !on;
+    if (on) toast('A refusal', true); else $('toast').hidden = true;
+  }, shown);
+  await messages(true);
+  await look(page, 'messages', folder);
+  await messages(false);
 
   await page.locator('#scenes label', {hasText: 'small'}).click();
   await page.click('#power-less');
@@ -53,6 +64,14 @@ await withConsole(fulcrum, browser, 65, async ({address, newPage, trouble, out})
   await page.frameLocator('#report-frame').locator('h1, h2').first().waitFor({timeout: 20_000});
   await page.screenshot({path: join(folder, 'report-1920.png')});
   await page.click('#report-close');
+  // Within the page no script may look at it.
+  const report = await (await page.context().browser().newContext({viewport: sizes[0]})).newPage();
+  await report.addInitScript({content: axe});
+  await report.goto(`file://${realpathSync(join(out, 'latest', 'report.html'))}`);
+  const {faults, texts} = await faultsOf(report);
+  expect(texts > 20, `the texts of the report were measured, but ${texts}`);
+  expect(faults.length === 0, `the report: no fault of access, but\n${faults.join('\n')}`);
+  await report.context().close();
 
   await page.click('nav [data-goto=recordings]');
   await page.waitForSelector('#recordings button');
