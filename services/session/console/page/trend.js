@@ -7,7 +7,7 @@ const trend = (() => {
 
   const percent = value => `${value.toFixed(0)} %`;
   const shape = (name, attributes, text) => {
-    const element = document.createElementNS('http://www.w3.org/2000/svg', name);
+    const element = document.createElementNS($('trend-chart').namespaceURI, name);
     for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
     if (text !== undefined) element.textContent = text;
     return element;
